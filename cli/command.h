@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <CLI/App.hpp>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "alidade/config.h"
+#include "alidade/plugin_host.h"
+#include "alidade/run.h"
+
+/// The commands of the program. Each one reads its arguments, calls core and prints.
+namespace alidade::cli {
+
+/// What a command does once the command line has been read; gives the exit code.
+using Action = std::function<ExitCode()>;
+
+void AddRun(CLI::App& program, Action& action);
+void AddExplain(CLI::App& program, Action& action);
+void AddSweep(CLI::App& program, Action& action);
+void AddPlugins(CLI::App& program, Action& action);
+void AddDoctor(CLI::App& program, Action& action);
+
+/// Arguments that name a config and the plugins it needs.
+struct Input {
+  std::string config;
+  std::vector<std::string> sets;  ///< `key=value`, applied in order
+  std::vector<std::string> plugin_paths;
+  bool allow_outside = false;
+
+  void AddTo(CLI::App& command);
+  Config Load() const;
+  /// The plugins that `config` and the command line name, then the usual places.
+  PluginHost Host(const Config& config) const;
+};
+
+void AddPluginPath(CLI::App& command, std::vector<std::string>& paths);
+std::vector<std::filesystem::path> Absolute(const std::vector<std::string>& paths);
+
+/// Where output goes: `given`, or the config's `output:` inside runs/, or runs/PREFIX and the name
+/// of the config's folder, or of its file where it is named without one. Errors: kNotTrusted,
+/// kBadConfig.
+std::filesystem::path OutputFolder(const std::string& given, const Config& config,
+                                   const Input& input, const std::string& prefix = "");
+
+}  // namespace alidade::cli

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "console.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <system_error>
+
+#include "alidade/error.h"
+
+namespace alidade::cli {
+namespace {
+
+std::atomic<bool> stop_requested{false};
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler sets it");
+
+extern "C" void HandleStop(int signal_number) {
+  if (!stop_requested.exchange(true)) return;
+  ::signal(signal_number, SIG_DFL);
+  ::raise(signal_number);
+}
+
+/// Writes all of it; false with errno where that fails.
+bool WriteAll(int fd, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(fd, text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return false;
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+/// What cannot be said on standard error cannot be said.
+void WriteError(std::string_view text) { static_cast<void>(WriteAll(STDERR_FILENO, text)); }
+
+bool IsSet(const char* variable) {
+  const char* value = std::getenv(variable);
+  return value != nullptr && *value != '\0';
+}
+
+/// A terminal that moves its cursor.
+bool OnTerminal() {
+  const char* terminal = std::getenv("TERM");
+  const bool dumb = terminal == nullptr || std::strcmp(terminal, "dumb") == 0;
+  return !dumb && ::isatty(STDERR_FILENO) == 1;
+}
+
+}  // namespace
+
+void PrepareConsole() {
+  ::signal(SIGPIPE, SIG_IGN);
+  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(fd, F_GETFD) != -1 || errno != EBADF) continue;
+    // The lowest free number is this one; opened the wrong way round, so that its use fails.
+    static_cast<void>(::open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY));
+  }
+}
+
+void Print(std::string_view text) {
+  if (WriteAll(STDOUT_FILENO, text)) return;
+  const std::string reason = std::generic_category().message(errno);
+  throw Error(ExitCode::kIo, "<stdout>: cannot write: " + reason);
+}
+
+void PrintErrors(std::string_view text) {
+  const bool colour = OnTerminal() && !IsSet("NO_COLOR");
+  std::string lines;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::string_view line = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    if (line.empty()) continue;
+    if (line[0] != ' ') lines += colour ? "\033[1;31merror:\033[0m " : "error: ";
+    lines.append(line).append("\n");
+  }
+  WriteError(lines);
+}
+
+void PrintNote(std::string_view text) { WriteError(std::string(text) + '\n'); }
+
+Progress::Progress(const char* unit, bool quiet) : unit_(unit), enabled_(!quiet && OnTerminal()) {}
+
+void Progress::Show(std::int64_t done, std::int64_t total) {
+  if (!enabled_) return;
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_) return;
+  next_ = now + std::chrono::milliseconds(100);
+  std::string line = std::to_string(done);
+  if (total > 0) line += " of " + std::to_string(total);
+  line.append(" ").append(unit_);
+  if (total > 0) line += ", " + std::to_string(100 * done / total) + " %";
+  // Blanks, not an escape sequence, cover what a longer line left.
+  const std::size_t width = line.size();
+  if (width < width_) line.append(width_ - width, ' ');
+  width_ = width;
+  WriteError('\r' + line);
+}
+
+void Progress::Clear() {
+  if (width_ == 0) return;
+  WriteError('\r' + std::string(width_, ' ') + '\r');
+  width_ = 0;
+}
+
+void StopOnSignals() {
+  struct sigaction action {};
+  action.sa_handler = HandleStop;
+  sigemptyset(&action.sa_mask);
+  action.sa_flags = 0;  // a wait for data ends
+  ::sigaction(SIGINT, &action, nullptr);
+  ::sigaction(SIGTERM, &action, nullptr);
+}
+
+bool StopRequested() { return stop_requested; }
+
+}  // namespace alidade::cli

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace alidade::cli {
+
+/// Makes the three standard descriptors safe to use: one that is closed becomes one that fails, so
+/// that no file of ours takes its number. A write to a closed pipe is an error, not a signal.
+void PrepareConsole();
+
+/// Writes to standard output, every byte checked. Error: kIo.
+void Print(std::string_view text);
+
+/// `error: LINE` on standard error for each line; a line that is indented continues the one above.
+void PrintErrors(std::string_view text);
+void PrintNote(std::string_view text);
+
+/// A line on the terminal of standard error that says how far a command is; nothing where that is
+/// no terminal, or where `quiet`.
+class Progress {
+ public:
+  Progress(const char* unit, bool quiet);
+  ~Progress() { Clear(); }
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  /// `total` < 0: not known.
+  void Show(std::int64_t done, std::int64_t total);
+  void Clear();
+
+ private:
+  const char* unit_;
+  bool enabled_;
+  std::size_t width_ = 0;  ///< of what stands on the line
+  std::chrono::steady_clock::time_point next_;
+};
+
+/// From now on SIGINT and SIGTERM ask the command to stop; a second one ends the program at once.
+void StopOnSignals();
+bool StopRequested();
+
+}  // namespace alidade::cli

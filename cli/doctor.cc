@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <Eigen/Core>
+#include <cerrno>
+#include <cstdlib>
+#include <system_error>
+#include <thread>
+
+#include "command.h"
+#include "console.h"
+
+namespace alidade::cli {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr const char* kFooter = R"(Each line is ok, warn or fail, with a remedy where one is needed. The exit code is 1 where a line
+says fail, else 0.)";
+
+/// The lines that the doctor says.
+class Diagnosis {
+ public:
+  void Ok(const std::string& what) { text_ += "ok    " + what + '\n'; }
+  void Warn(const std::string& what, const std::string& remedy) { Add("warn  ", what, remedy); }
+  void Fail(const std::string& what, const std::string& remedy) {
+    failed_ = true;
+    Add("fail  ", what, remedy);
+  }
+  const std::string& text() const { return text_; }
+  bool failed() const { return failed_; }
+
+ private:
+  void Add(const char* level, const std::string& what, const std::string& remedy) {
+    text_ += level + what + '\n';
+    if (!remedy.empty()) text_ += "      remedy: " + remedy + '\n';
+  }
+  std::string text_;
+  bool failed_ = false;
+};
+
+std::string EigenVersion() {
+  return std::to_string(EIGEN_WORLD_VERSION) + '.' + std::to_string(EIGEN_MAJOR_VERSION) + '.' +
+         std::to_string(EIGEN_MINOR_VERSION);
+}
+
+std::string Compiler() {
+#if defined(__clang__)
+  return std::string("clang ") + __clang_version__;
+#else
+  return std::string("g++ ") + __VERSION__;
+#endif
+}
+
+std::string Processor() {
+  std::string text = std::to_string(std::thread::hardware_concurrency()) + " threads";
+#if defined(__x86_64__)
+  const auto add = [&](bool has, const char* name) {
+    if (has) text.append(" ").append(name);
+  };
+  text += ", x86-64:";
+  add(__builtin_cpu_supports("sse4.2") != 0, "sse4.2");
+  add(__builtin_cpu_supports("avx") != 0, "avx");
+  add(__builtin_cpu_supports("avx2") != 0, "avx2");
+  add(__builtin_cpu_supports("fma") != 0, "fma");
+  add(__builtin_cpu_supports("avx512f") != 0, "avx512f");
+#endif
+  return text;
+}
+
+void CheckVersions(Diagnosis& diagnosis) {
+  diagnosis.Ok("alidade " ALIDADE_VERSION);
+  diagnosis.Ok("built with " + Compiler() + ", Eigen " + EigenVersion() + ", yaml-cpp " +
+               ALIDADE_YAML_CPP_VERSION + ", Boost " + ALIDADE_BOOST_VERSION);
+  diagnosis.Ok("processor: " + Processor());
+}
+
+std::string RemedyFor(const Refusal& refusal) {
+  const std::string file = refusal.file.string();
+  if (refusal.code == ExitCode::kNotTrusted) {
+    return "if you trust it: chmod go-w '" + file + "' and the folders above it, chown to yourself";
+  }
+  return "build it anew against this alidade, or remove it";
+}
+
+void CheckPlugins(const std::vector<std::string>& paths, Diagnosis& diagnosis) {
+  const PluginHost host(Absolute(paths));
+  for (const std::string& place : host.searched()) diagnosis.Ok("searched " + place);
+  for (const Refusal& refusal : host.refusals()) {
+    diagnosis.Warn("refused " + refusal.file.string() + ": " + refusal.reason, RemedyFor(refusal));
+  }
+  int sources = 0;
+  for (const PluginEntry& entry : host.entries()) {
+    sources += entry.kind == PluginEntry::Kind::kSource ? 1 : 0;
+  }
+  const int models = static_cast<int>(host.entries().size()) - sources;
+  const std::string found =
+      std::to_string(models) + " models and " + std::to_string(sources) + " sources";
+  if (models > 0 && sources > 0) {
+    diagnosis.Ok(found);
+  } else {
+    diagnosis.Fail("plugins: " + found,
+                   "build or install them all, or name their folder: ALIDADE_PLUGIN_PATH=FOLDER");
+  }
+}
+
+bool OnPath(const char* program) {
+  const char* path = std::getenv("PATH");
+  std::string rest = path == nullptr ? "" : path;
+  while (!rest.empty()) {
+    const std::size_t end = std::min(rest.find(':'), rest.size());
+    if (::access((fs::path(rest.substr(0, end)) / program).c_str(), X_OK) == 0) return true;
+    rest.erase(0, end + 1);
+  }
+  return false;
+}
+
+void CheckSurroundings(Diagnosis& diagnosis) {
+  if (OnPath("gnuplot")) {
+    diagnosis.Ok("gnuplot: runs get figures");
+  } else {
+    diagnosis.Warn("gnuplot is not installed: runs get no figures", "apt-get install gnuplot-nox");
+  }
+  const char* const data = std::getenv("ALIDADE_DATA");
+  const std::string remedy = "export ALIDADE_DATA=FOLDER, the folder that holds kitti-depth-pairs";
+  std::error_code error;
+  if (data == nullptr || *data == '\0') {
+    diagnosis.Warn("ALIDADE_DATA is not set: examples on real recordings need it", remedy);
+  } else if (!fs::is_directory(data, error)) {
+    diagnosis.Warn(std::string("ALIDADE_DATA is no folder: ") + data, remedy);
+  } else {
+    diagnosis.Ok(std::string("ALIDADE_DATA is ") + data);
+  }
+}
+
+/// Tries it: permissions do not tell of a file system that is read-only or full.
+void CheckCurrentFolder(Diagnosis& diagnosis) {
+  std::string name = ".alidade-doctor-XXXXXX";
+  if (::mkdtemp(name.data()) != nullptr) {
+    ::rmdir(name.c_str());
+    diagnosis.Ok("the current folder can be written: runs/ goes there");
+    return;
+  }
+  const std::string reason = std::generic_category().message(errno);
+  diagnosis.Fail("the current folder cannot be written: " + reason,
+                 "change to another folder, or name one: alidade run CONFIG -o DIR");
+}
+
+ExitCode Examine(const std::vector<std::string>& paths) {
+  Diagnosis diagnosis;
+  CheckVersions(diagnosis);
+  CheckPlugins(paths, diagnosis);
+  CheckSurroundings(diagnosis);
+  CheckCurrentFolder(diagnosis);
+  Print(diagnosis.text());
+  return diagnosis.failed() ? ExitCode::kFound : ExitCode::kOk;
+}
+
+}  // namespace
+
+void AddDoctor(CLI::App& program, Action& action) {
+  CLI::App& command = *program.add_subcommand("doctor", "Check that everything is in place");
+  const auto paths = std::make_shared<std::vector<std::string>>();
+  AddPluginPath(command, *paths);
+  command.footer(kFooter);
+  command.callback([&action, paths] { action = [paths] { return Examine(*paths); }; });
+}
+
+}  // namespace alidade::cli

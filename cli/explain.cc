@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/explain.h"
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <memory>
+
+#include "command.h"
+#include "console.h"
+
+namespace alidade::cli {
+namespace {
+
+constexpr const char* kFooter = R"(Example:
+  alidade explain examples/05_depth_principled/config.yaml --set estimators.ekf.fuse=per_sensor)";
+
+ExitCode ExplainConfig(const Input& input) {
+  const Config config = input.Load();
+  const PluginHost host = input.Host(config);
+  Print(Explain(config, BuildExperiment(config, host)));
+  return ExitCode::kOk;
+}
+
+}  // namespace
+
+void AddExplain(CLI::App& program, Action& action) {
+  CLI::App& command = *program.add_subcommand(
+      "explain", "Tell what a config does: state, models, who touches what, what cannot be seen");
+  const auto input = std::make_shared<Input>();
+  input->AddTo(command);
+  command.footer(kFooter);
+  command.callback([&action, input] { action = [input] { return ExplainConfig(*input); }; });
+}
+
+}  // namespace alidade::cli

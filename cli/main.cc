@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <exception>
+#include <new>
+
+#include "command.h"
+#include "console.h"
+
+namespace alidade::cli {
+namespace {
+
+constexpr const char* kFooter = R"(Examples:
+  alidade doctor                                   is everything in place?
+  alidade plugins list                             sensors, motion models, sources
+  alidade explain examples/05_depth_principled/config.yaml
+  alidade run examples/05_depth_principled/config.yaml -o runs/first
+  alidade sweep examples/05_depth_principled/config.yaml --runs 200
+
+`alidade COMMAND --help` tells the rest. Exit codes: 0 ok, 1 something found wrong, 2 usage,
+65 bad data, 66 input missing, 69 plugin missing or refused, 70 internal, 73 cannot create output,
+74 input/output, 75 stopped by a signal, 77 not trusted, 78 bad config, 79 diverged.)";
+
+class Format : public CLI::Formatter {
+ public:
+  Format() {
+    label("SUBCOMMAND", "COMMAND");
+    label("Positionals", "Arguments");
+    column_width(28);
+  }
+};
+
+void Describe(CLI::App& program, Action& action) {
+  program.formatter(std::make_shared<Format>());
+  program.footer(kFooter);
+  program.set_version_flag("--version", "alidade " ALIDADE_VERSION, "print the version and leave");
+  program.require_subcommand(1);
+  AddRun(program, action);
+  AddSweep(program, action);
+  AddExplain(program, action);
+  AddPlugins(program, action);
+  AddDoctor(program, action);
+  const auto polish = [](const auto& self, CLI::App& app) -> void {
+    app.get_help_ptr()->description("print this help and leave");
+    for (CLI::App* command : app.get_subcommands({})) {
+      command->group("Commands");
+      self(self, *command);
+    }
+  };
+  polish(polish, program);
+}
+
+/// The innermost command that the line names.
+const CLI::App& Named(const CLI::App& app) {
+  const auto chosen = app.get_subcommands();
+  return chosen.empty() ? app : Named(*chosen.front());
+}
+
+/// The command or option nearest to a word that is none, as ` did you mean '...'?`.
+std::string Suggestion(const CLI::App& app, const std::string& word) {
+  std::vector<std::string> names;
+  if (word.starts_with('-')) {
+    for (const CLI::Option* option : app.get_options()) {
+      for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    }
+  } else {
+    for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
+  }
+  const std::string nearest = Nearest(word.substr(0, word.find('=')), names);
+  return nearest.empty() ? "" : "; did you mean '" + nearest + "'?";
+}
+
+/// What is wrong with a command line that CLI11 refuses.
+std::string Complaint(const CLI::App& command, const CLI::ParseError& error) {
+  const std::vector<std::string> extra = command.remaining();
+  if (extra.empty()) return error.what();
+  const std::string& word = extra.front();
+  const bool wants_command = !command.get_subcommands({}).empty();
+  const char* const what = word.starts_with('-') ? "no option '"
+                           : wants_command       ? "no command '"
+                                                 : "unexpected argument '";
+  return what + word + "'" + Suggestion(command, word);
+}
+
+ExitCode Fail(const CLI::App& program, const CLI::ParseError& error) {
+  const CLI::App& command = Named(program);
+  if (dynamic_cast<const CLI::CallForHelp*>(&error) != nullptr) {
+    Print(program.help());
+    return ExitCode::kOk;
+  }
+  if (dynamic_cast<const CLI::CallForVersion*>(&error) != nullptr) {
+    Print(std::string(error.what()) + '\n');
+    return ExitCode::kOk;
+  }
+  PrintErrors(Complaint(command, error));
+  PrintNote('\n' + program.help());
+  return ExitCode::kUsage;
+}
+
+ExitCode Main(int argc, char** argv) {
+  CLI::App program("Recursive state estimation from plugins: write h(x) once.", "alidade");
+  Action action;
+  Describe(program, action);
+  if (argc < 2) {
+    PrintErrors("no command");
+    PrintNote('\n' + program.help());
+    return ExitCode::kUsage;
+  }
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return Fail(program, error);
+  }
+  return action();
+}
+
+ExitCode Guarded(int argc, char** argv) {
+  try {
+    return Main(argc, argv);
+  } catch (const Error& error) {
+    PrintErrors(error.what());
+    return error.code();
+  } catch (const std::bad_alloc&) {
+    PrintErrors("out of memory");
+  } catch (const std::exception& error) {
+    PrintErrors(std::string("internal: ") + error.what());
+  } catch (...) {
+    PrintErrors("internal: an exception of unknown type");
+  }
+  return ExitCode::kInternal;
+}
+
+}  // namespace
+}  // namespace alidade::cli
+
+int main(int argc, char** argv) {
+  alidade::cli::PrepareConsole();
+  return static_cast<int>(alidade::cli::Guarded(argc, argv));
+}

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <memory>
+
+#include "alidade/plugin_listing.h"
+#include "command.h"
+#include "console.h"
+
+namespace alidade::cli {
+namespace {
+
+constexpr const char* kFooter = R"(Examples:
+  alidade plugins list
+  alidade plugins info stereo_disparity
+  alidade plugins info scale_2d --json
+  alidade plugins where --plugin-path build/lib
+
+Plugins are looked for in the config's `plugins:`, --plugin-path, ALIDADE_PLUGIN_PATH, the user's
+data folder ($XDG_DATA_HOME/alidade/plugins) and beside the program.)";
+
+struct Arguments {
+  std::vector<std::string> paths;
+  std::string name;
+  bool json = false;
+};
+
+using Listing = std::string (*)(const PluginHost&, const Arguments&);
+
+/// A subcommand that prints what `listing` makes of the plugins.
+std::shared_ptr<Arguments> AddListing(CLI::App& command, Action& action, Listing listing) {
+  const auto arguments = std::make_shared<Arguments>();
+  AddPluginPath(command, arguments->paths);
+  command.footer(kFooter);
+  command.callback([&action, arguments, listing] {
+    action = [arguments, listing] {
+      const PluginHost host(Absolute(arguments->paths));
+      Print(listing(host, *arguments));
+      return ExitCode::kOk;
+    };
+  });
+  return arguments;
+}
+
+std::string List(const PluginHost& host, const Arguments& arguments) {
+  if (const std::size_t count = host.refusals().size(); count > 0) {
+    PrintNote(std::to_string(count) + " refused: `alidade plugins where` tells why");
+  }
+  return arguments.json ? PluginListJson(host) : PluginList(host);
+}
+
+std::string Info(const PluginHost& host, const Arguments& arguments) {
+  return arguments.json ? PluginInfoJson(host, arguments.name) : PluginInfo(host, arguments.name);
+}
+
+std::string Where(const PluginHost& host, const Arguments&) { return PluginPlaces(host); }
+
+}  // namespace
+
+void AddPlugins(CLI::App& program, Action& action) {
+  CLI::App& plugins = *program.add_subcommand("plugins", "Tell which plugins there are");
+  plugins.require_subcommand(1);
+  plugins.footer(kFooter);
+  CLI::App& list = *plugins.add_subcommand("list", "List the models and sources on offer");
+  const auto list_arguments = AddListing(list, action, List);
+  list.add_flag("--json", list_arguments->json, "print JSON");
+  CLI::App& info = *plugins.add_subcommand("info", "Tell all about one of them");
+  const auto info_arguments = AddListing(info, action, Info);
+  info.add_option("NAME", info_arguments->name, "of a sensor, motion model or source")
+      ->option_text(" ")
+      ->required();
+  info.add_flag("--json", info_arguments->json, "print JSON");
+  CLI::App& where =
+      *plugins.add_subcommand("where", "List the places searched, what they have, what is refused");
+  AddListing(where, action, Where);
+}
+
+}  // namespace alidade::cli

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/run.h"
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <cstdio>
+#include <exception>
+#include <memory>
+
+#include "alidade/recorder.h"
+#include "command.h"
+#include "console.h"
+
+namespace alidade::cli {
+namespace {
+
+constexpr const char* kFooter = R"(Examples:
+  alidade run config.yaml                          into runs/config
+  alidade run config.yaml -o runs/b --seed 2 --set estimators.ekf.gate=0.99
+  alidade run config.yaml --set source.path=other.csv --force
+
+Ctrl-C finishes the frame, writes all that is done and ends with exit code 75; twice: at once.)";
+
+struct Arguments {
+  Input input;
+  std::string folder;
+  std::optional<std::uint64_t> seed;
+  bool force = false, quiet = false, no_figures = false;
+};
+
+/// Events of one estimator and one kind.
+struct EventGroup {
+  std::string kind;
+  std::vector<const Event*> events;
+};
+
+std::vector<EventGroup> Group(const std::vector<Event>& events) {
+  std::vector<EventGroup> groups;
+  for (const Event& event : events) {
+    const auto same = [&](const EventGroup& group) { return group.kind == event.kind; };
+    auto group = std::find_if(groups.begin(), groups.end(), same);
+    if (group == groups.end()) group = groups.insert(group, {event.kind, {}});
+    group->events.push_back(&event);
+  }
+  return groups;
+}
+
+std::string EventLine(const Event& event) {
+  if (event.stamp == kNoStamp) return event.text;
+  char at[48];
+  std::snprintf(at, sizeof(at), "t = %.3f s: ", Seconds(event.stamp));
+  return at + event.text;
+}
+
+/// What happened to the estimators, a few lines for each kind of event.
+std::string EventSummary(const RunResult& result) {
+  constexpr std::size_t kShown = 3;
+  std::string text;
+  for (const ContestantResult& one : result.contestants) {
+    for (const EventGroup& group : Group(one.events)) {
+      const std::size_t count = group.events.size();
+      text += one.name + ": " + group.kind;
+      if (count > 1) text += ", " + std::to_string(count) + " times";
+      text += '\n';
+      for (std::size_t i = 0; i < std::min(count, kShown); ++i) {
+        text += "  " + EventLine(*group.events[i]) + '\n';
+      }
+      if (count > kShown) {
+        text += "  ... and " + std::to_string(count - kShown) + " more, in " + one.name +
+                "/events.csv\n";
+      }
+    }
+  }
+  return text;
+}
+
+std::string Summary(const RunResult& result, const Recorder& recorder) {
+  std::string text = ComparisonTable(result);
+  if (const std::string events = EventSummary(result); !events.empty()) text += '\n' + events;
+  text += "\nwrote " + recorder.folder().string() + '\n';
+  for (const std::string& path : recorder.highlights()) {
+    text += "  " + (recorder.folder() / path).string() + '\n';
+  }
+  if (!recorder.note().empty()) text += recorder.note() + '\n';
+  return text;
+}
+
+RunResult Failure(ExitCode code, const std::string& reason) {
+  RunResult result;
+  result.status = code == ExitCode::kStopped ? RunStatus::kStopped : RunStatus::kFailed;
+  result.code = code;
+  result.reason = reason;
+  return result;
+}
+
+/// Runs, and turns what is thrown into a result, so that the run folder can tell of it.
+RunResult RunOrFail(Experiment& experiment, const RunOptions& options) {
+  try {
+    return Run(experiment, options);
+  } catch (const Error& error) {
+    return Failure(error.code(), error.what());
+  } catch (const std::bad_alloc&) {
+    return Failure(ExitCode::kInternal, "out of memory");
+  } catch (const std::exception& error) {
+    return Failure(ExitCode::kInternal, std::string("internal: ") + error.what());
+  }
+}
+
+ExitCode RunConfig(const Arguments& arguments) {
+  Config config = arguments.input.Load();
+  if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
+  const std::filesystem::path folder =
+      OutputFolder(arguments.folder, config, arguments.input);
+  const PluginHost host = arguments.input.Host(config);
+  Experiment experiment = BuildExperiment(config, host);
+  Recorder recorder({folder, arguments.force, !arguments.no_figures, "alidade run"}, config, host);
+
+  StopOnSignals();
+  Progress progress("frames", arguments.quiet);
+  RunOptions options;
+  options.recorder = &recorder;
+  options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
+  options.stop = StopRequested;
+  const RunResult result = RunOrFail(experiment, options);
+  progress.Clear();
+  if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
+  if (result.status == RunStatus::kStopped) PrintNote(result.reason);
+  recorder.Finish(result);
+  if (!arguments.quiet) Print(Summary(result, recorder));
+  return result.code;
+}
+
+}  // namespace
+
+void AddRun(CLI::App& program, Action& action) {
+  CLI::App& command = *program.add_subcommand("run", "Run the estimators of a config");
+  const auto arguments = std::make_shared<Arguments>();
+  arguments->input.AddTo(command);
+  command.add_option("-o,--output", arguments->folder,
+                     "run folder; default: the config's `output:`, or its folder's name, in runs/")
+      ->option_text("DIR");
+  command.add_option("--seed", arguments->seed, "seed of the source; overrides the config")
+      ->option_text("N");
+  command.add_flag("--force", arguments->force, "replace the run folder if it is there");
+  command.add_flag("--quiet", arguments->quiet, "print errors only");
+  command.add_flag("--no-figures", arguments->no_figures, "draw no figures");
+  command.footer(kFooter);
+  command.callback([&action, arguments] { action = [arguments] { return RunConfig(*arguments); }; });
+}
+
+}  // namespace alidade::cli

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/sweep.h"
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <cstdio>
+#include <memory>
+
+#include "command.h"
+#include "console.h"
+
+namespace alidade::cli {
+namespace {
+
+constexpr const char* kFooter = R"(Examples:
+  alidade sweep config.yaml --runs 200             seeds 1 to 200, all processors
+  alidade sweep config.yaml --runs 200 --first-seed 1001 -o runs/test
+  alidade sweep config.yaml --runs 10000 --shard 3/16 -o runs/share-03
+
+The folder gets sweep.json, runs.csv and table.md. The number of jobs does not change a byte of
+them. Exit code 1: some runs failed; 75: stopped by a signal, with what was complete written.)";
+
+struct Arguments {
+  Input input;
+  std::string folder, shard = "1/1";
+  SweepOptions options;
+  bool force = false, quiet = false;
+};
+
+std::string IsShard(const std::string& text) {
+  int shard = 0, shards = 0;
+  char rest = '\0';
+  const bool two = std::sscanf(text.c_str(), "%d/%d%c", &shard, &shards, &rest) == 2;
+  if (two && shard >= 1 && shard <= shards) return {};
+  return "'" + text + "' is no share; expected i/n with 1 <= i <= n";
+}
+
+/// Tells of the runs that failed, the first few in full; true where there are any.
+bool ReportFailures(const SweepResult& result) {
+  constexpr int kShown = 5;
+  int failed = 0;
+  for (const SweepRun& run : result.done) {
+    if (run.status != RunStatus::kFailed) continue;
+    if (++failed <= kShown) PrintErrors("seed " + std::to_string(run.seed) + ": " + run.reason);
+  }
+  if (failed > kShown) PrintErrors(std::to_string(failed) + " runs failed: see failures.csv");
+  return failed > 0;
+}
+
+ExitCode RunSweep(const Arguments& arguments) {
+  const Config config = arguments.input.Load();
+  const std::filesystem::path path =
+      OutputFolder(arguments.folder, config, arguments.input, "sweep-");
+  const PluginHost host = arguments.input.Host(config);
+  SweepFolder folder(path, arguments.force);
+
+  StopOnSignals();
+  Progress progress("runs", arguments.quiet);
+  SweepOptions options = arguments.options;
+  std::sscanf(arguments.shard.c_str(), "%d/%d", &options.shard, &options.shards);
+  options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
+  options.stop = StopRequested;
+  const SweepResult result = Sweep(config, host, options);
+  progress.Clear();
+  const bool failed = ReportFailures(result);
+  if (result.stopped) {
+    PrintNote("stopped after " + std::to_string(result.done.size()) + " of " +
+              std::to_string(result.runs) + " runs");
+  }
+  folder.Write(result, config);
+  if (!arguments.quiet) {
+    Print(SweepTable(result) + "\nwrote " + path.string() + "\n  " +
+          (path / "table.md").string() + "\n  " + (path / "sweep.json").string() + "\n  " +
+          (path / "runs.csv").string() + '\n');
+  }
+  if (result.stopped) return ExitCode::kStopped;
+  return failed ? ExitCode::kFound : ExitCode::kOk;
+}
+
+}  // namespace
+
+void AddSweep(CLI::App& program, Action& action) {
+  CLI::App& command = *program.add_subcommand("sweep", "Run a config with many seeds");
+  const auto arguments = std::make_shared<Arguments>();
+  arguments->input.AddTo(command);
+  command.add_option("--runs", arguments->options.runs, "number of runs, of all shards together")
+      ->option_text("N")
+      ->required()
+      ->check(CLI::Range(std::int64_t{1}, std::int64_t{10'000'000}));
+  command.add_option("--first-seed", arguments->options.first_seed, "seeds count up from S; default 1")
+      ->option_text("S")
+      ->check(CLI::Range(std::int64_t{0}, std::int64_t{1} << 62));
+  command.add_option("--jobs", arguments->options.jobs, "threads; default: all processors")
+      ->option_text("J")
+      ->check(CLI::Range(1, 1024));
+  command.add_option("--shard", arguments->shard, "do share i of n of the seeds only")
+      ->option_text("i/n")
+      ->check(IsShard);
+  command.add_option("-o,--output", arguments->folder,
+                     "folder; default: the config's `output:`, or sweep-NAME, in runs/")
+      ->option_text("DIR");
+  command.add_flag("--force", arguments->force, "replace the folder if it is there");
+  command.add_flag("--quiet", arguments->quiet, "print errors only");
+  command.footer(kFooter);
+  command.callback([&action, arguments] { action = [arguments] { return RunSweep(*arguments); }; });
+}
+
+}  // namespace alidade::cli

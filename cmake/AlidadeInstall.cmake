@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+
+# Installs the program, the library, the headers of core and of the shipped models, the plugins,
+# and the package that find_package(alidade) reads.
+include(CMakePackageConfigHelpers)
+
+# The plugins that `folder` and the folders below it define.
+function(alidade_plugins_of folder result)
+  get_property(targets DIRECTORY ${folder} PROPERTY BUILDSYSTEM_TARGETS)
+  set(plugins)
+  foreach(target IN LISTS targets)
+    get_target_property(type ${target} TYPE)
+    if(type STREQUAL "MODULE_LIBRARY")
+      list(APPEND plugins ${target})
+    endif()
+  endforeach()
+  get_property(subfolders DIRECTORY ${folder} PROPERTY SUBDIRECTORIES)
+  foreach(subfolder IN LISTS subfolders)
+    alidade_plugins_of(${subfolder} below)
+    list(APPEND plugins ${below})
+  endforeach()
+  set(${result} ${plugins} PARENT_SCOPE)
+endfunction()
+
+set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/alidade)
+set(plugin_folder ${CMAKE_INSTALL_LIBDIR}/alidade/plugins)
+
+file(RELATIVE_PATH bin_to_lib /${CMAKE_INSTALL_BINDIR} /${CMAKE_INSTALL_LIBDIR})
+set_target_properties(alidade PROPERTIES INSTALL_RPATH "$ORIGIN/${bin_to_lib}")
+install(TARGETS alidade)
+install(TARGETS alidade_core alidade_model EXPORT alidadeTargets)
+
+foreach(folder IN ITEMS motion_models sensors plugins)
+  alidade_plugins_of(${PROJECT_SOURCE_DIR}/${folder} plugins)
+  # Build-tier plugins link the library; both may move together.
+  set_target_properties(${plugins} PROPERTIES INSTALL_RPATH "$ORIGIN/../..")
+  install(TARGETS ${plugins} LIBRARY DESTINATION ${plugin_folder})
+endforeach()
+
+install(DIRECTORY core/include/ TYPE INCLUDE FILES_MATCHING PATTERN "*.h")
+foreach(folder IN ITEMS motion_models sensors)
+  install(DIRECTORY ${folder}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/alidade/${folder}
+          FILES_MATCHING PATTERN "*.h")
+endforeach()
+
+install(EXPORT alidadeTargets NAMESPACE alidade:: DESTINATION ${package_folder})
+configure_package_config_file(cmake/alidadeConfig.cmake.in alidadeConfig.cmake
+                              INSTALL_DESTINATION ${package_folder}
+                              PATH_VARS plugin_folder)
+write_basic_package_version_file(alidadeConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/alidadeConfig.cmake
+              ${CMAKE_CURRENT_BINARY_DIR}/alidadeConfigVersion.cmake
+              cmake/AlidadeAddPlugin.cmake
+        DESTINATION ${package_folder})
+install(FILES LICENSE TYPE DOC)

@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "alidade/model.h"
+#include "alidade/status.h"
+#include "ceres/jet.h"
+
+/// Evaluates models with their Jacobians in the tangent, by forward-mode automatic differentiation
+/// through (+) and (-), or by the author's closed form where there is one. Plugins, the static
+/// filter and tests share it. Matrices are row-major with a row stride; outputs are untouched
+/// unless the result is kOk.
+namespace alidade {
+namespace detail {
+
+/// All blocks x (+) 0 as dual numbers, seeded in order; block `skip` gets neither value nor seed.
+template <class Model, class Jet>
+void Lift(const double* const* x, int skip, Jet* lifted, const Jet** pointers) {
+  int seed = 0, offset = 0;
+  const auto lift = [&](auto index) {
+    constexpr int i = decltype(index)::value;
+    using G = SpaceAt<i, Model>;
+    pointers[i] = nullptr;
+    if (i != skip && x[i] != nullptr) {
+      Jet d[G::kTangent];
+      for (int k = 0; k < G::kTangent; ++k) d[k] = Jet(0.0, seed + k);
+      G::Plus(x[i], d, lifted + offset);
+      pointers[i] = lifted + offset;
+    }
+    if (i != skip) seed += G::kTangent;
+    offset += G::kAmbient;
+  };
+  ForEach(lift, typename Blocks<Model>::Indices{});
+}
+
+/// d value / d seeds [first, first + count), in the tangent of G at the value itself.
+template <class G, class Jet>
+void ReadTangent(const Jet* value, int first, int count, MatrixRef j) {
+  double base[G::kAmbient];
+  for (int i = 0; i < G::kAmbient; ++i) base[i] = value[i].a;
+  Jet d[G::kTangent];
+  G::Minus(value, base, d);
+  for (int r = 0; r < G::kTangent; ++r) {
+    for (int c = 0; c < count; ++c) j(r, c) = d[r].v[first + c];
+  }
+}
+
+inline void Zero(MatrixRef m, int rows, int columns) {
+  for (int r = 0; r < rows && columns > 0; ++r) std::fill_n(&m(r, 0), columns, 0.0);
+}
+
+template <class Model, class T, std::size_t... I>
+bool CallPredict(const Model& model, const T* const* x, T* z, std::index_sequence<I...>) {
+  return model.Predict(x[I]..., z);
+}
+
+template <class Model, std::size_t... I>
+void ClosedForm(const Model& model, const double* const* x, double* const* jacobians,
+                const int* strides, std::index_sequence<I...> indices) {
+  constexpr int m = Model::Measurement::kTangent;
+  double unwanted[m * Blocks<Model>::kTangent];
+  MatrixRef j[sizeof...(I)];
+  int used = 0;
+  const auto bind = [&](auto index) {
+    constexpr int i = decltype(index)::value;
+    constexpr int n = SpaceAt<i, Model>::kTangent;
+    j[i] = jacobians[i] != nullptr ? MatrixRef{jacobians[i], strides[i]}
+                                   : MatrixRef{unwanted + used, n};
+    used += m * n;
+    Zero(j[i], m, n);
+  };
+  ForEach(bind, indices);
+  model.Jacobian(x[I]..., j[I]...);
+}
+
+}  // namespace detail
+
+/// z = h(roles); where `jacobians` is not null, jacobians[i] = d z / d role_i. A null entry, or a
+/// role that is not bound, is skipped.
+template <class Model>
+Status Evaluate(const Model& model, const double* const* roles, double* z,
+                double* const* jacobians, const int* strides) {
+  using Z = typename Model::Measurement;
+  using Blocks = detail::Blocks<Model>;
+  constexpr typename Blocks::Indices indices{};
+  constexpr bool kClosedForm = detail::HasJacobian<Model, typename Blocks::Indices>::value;
+  if (kClosedForm || jacobians == nullptr) {
+    double value[Z::kAmbient];
+    if (!detail::CallPredict(model, roles, value, indices)) return Status::kOutOfDomain;
+    std::copy_n(value, Z::kAmbient, z);
+    if constexpr (kClosedForm) {
+      if (jacobians != nullptr) detail::ClosedForm(model, roles, jacobians, strides, indices);
+    }
+    return Status::kOk;
+  }
+  if constexpr (!kClosedForm) {
+    using Jet = ceres::Jet<double, Blocks::kTangent>;
+    Jet lifted[Blocks::kAmbient], value[Z::kAmbient];
+    const Jet* x[Blocks::kCount];
+    detail::Lift<Model>(roles, -1, lifted, x);
+    if (!detail::CallPredict(model, x, value, indices)) return Status::kOutOfDomain;
+    for (int i = 0; i < Z::kAmbient; ++i) z[i] = value[i].a;
+    int first = 0;
+    const auto read = [&](auto index) {
+      constexpr int i = decltype(index)::value;
+      constexpr int n = detail::SpaceAt<i, Model>::kTangent;
+      if (jacobians[i] != nullptr) {
+        detail::ReadTangent<Z>(value, first, n, MatrixRef{jacobians[i], strides[i]});
+      }
+      first += n;
+    };
+    detail::ForEach(read, indices);
+  }
+  return Status::kOk;
+}
+
+namespace detail {
+
+template <class Model, class T, std::size_t... I>
+bool CallInitialise(const Model& model, const T* const* x, const T* z, const T* prior, T* y,
+                    std::index_sequence<I...>) {
+  // The roles but the initialised one, in order.
+  const auto other = [&](std::size_t k) {
+    return x[k < static_cast<std::size_t>(Model::kInitialises) ? k : k + 1];
+  };
+  if constexpr (Model::kPrior > 0) {
+    return model.Initialise(other(I)..., z, prior, y);
+  } else {
+    static_cast<void>(prior);
+    return model.Initialise(other(I)..., z, y);
+  }
+}
+
+}  // namespace detail
+
+/// y, the role Model::kInitialises, from the other roles, z and prior (inverse observation), with
+/// Jacobians jx[i] = d y / d role_i, jz = d y / d z, jp = d y / d prior; each may be null. kInvalid
+/// where the model needs a prior and has none.
+template <class Model>
+Status InitialiseRole(const Model& model, const double* const* roles, const double* z,
+                      const double* prior, double* y, double* const* jx, const int* jx_strides,
+                      MatrixRef jz, MatrixRef jp) {
+  using Z = typename Model::Measurement;
+  using Y = detail::SpaceAt<Model::kInitialises, Model>;
+  using Blocks = detail::Blocks<Model>;
+  constexpr std::make_index_sequence<Blocks::kCount - 1> others{};
+  constexpr int kRoles = Blocks::kTangent - Y::kTangent;
+  using Jet = ceres::Jet<double, kRoles + Z::kTangent + Model::kPrior>;
+  if (Model::kPrior > 0 && prior == nullptr) return Status::kInvalid;
+  Jet lifted[Blocks::kAmbient], dz[Z::kTangent], lifted_z[Z::kAmbient];
+  Jet lifted_prior[Model::kPrior + 1], value[Y::kAmbient];
+  const Jet* x[Blocks::kCount];
+  detail::Lift<Model>(roles, Model::kInitialises, lifted, x);
+  for (int i = 0; i < Z::kTangent; ++i) dz[i] = Jet(0.0, kRoles + i);
+  Z::Plus(z, dz, lifted_z);
+  for (int i = 0; i < Model::kPrior; ++i) {
+    lifted_prior[i] = Jet(prior[i], kRoles + Z::kTangent + i);
+  }
+  if (!detail::CallInitialise(model, x, lifted_z, lifted_prior, value, others)) {
+    return Status::kOutOfDomain;
+  }
+  for (int i = 0; i < Y::kAmbient; ++i) y[i] = value[i].a;
+  int first = 0;
+  const auto read = [&](auto index) {
+    constexpr int i = decltype(index)::value;
+    constexpr int n = detail::SpaceAt<i, Model>::kTangent;
+    if (i == Model::kInitialises) return;
+    if (jx != nullptr && jx[i] != nullptr) {
+      detail::ReadTangent<Y>(value, first, n, MatrixRef{jx[i], jx_strides[i]});
+    }
+    first += n;
+  };
+  detail::ForEach(read, typename Blocks::Indices{});
+  if (jz) detail::ReadTangent<Y>(value, kRoles, Z::kTangent, jz);
+  if (jp) detail::ReadTangent<Y>(value, kRoles + Z::kTangent, Model::kPrior, jp);
+  return Status::kOk;
+}
+
+namespace detail {
+
+/// x' alone. Static blocks go through a buffer, so that a failed step leaves `next` untouched;
+/// models with dynamic blocks see to that themselves.
+template <class Model>
+bool StepValue(const Model& model, const double* const* x, const double* u, const double* w,
+               double dt_s, double* const* next) {
+  using Blocks = detail::Blocks<Model>;
+  constexpr typename Blocks::Indices indices{};
+  if constexpr (Blocks::kStatic) {
+    double value[Blocks::kAmbient];
+    double* result[Blocks::kCount];
+    int offset = 0;
+    const auto place = [&](auto index) {
+      constexpr int i = decltype(index)::value;
+      result[i] = value + offset;
+      offset += SpaceAt<i, Model>::kAmbient;
+    };
+    ForEach(place, indices);
+    if (!CallStep(model, x, u, w, dt_s, result, indices)) return false;
+    const auto copy = [&](auto index) {
+      constexpr int i = decltype(index)::value;
+      std::copy_n(result[i], SpaceAt<i, Model>::kAmbient, next[i]);
+    };
+    ForEach(copy, indices);
+    return true;
+  } else {
+    return CallStep(model, x, u, w, dt_s, next, indices);
+  }
+}
+
+template <class Model, std::size_t... I>
+void ClosedFormStep(const Model& model, const double* const* x, const double* w, double dt_s,
+                    MatrixRef f, MatrixRef g, std::index_sequence<I...>) {
+  const int n = TangentSizeOf(model);
+  Zero(f, n, n);
+  Zero(g, n, NoiseSizeOf(model));
+  model.StepJacobian(x[I]..., w, dt_s, f, g);
+}
+
+/// x', F and G by dual numbers.
+template <class Model>
+Status StepJets(const Model& model, const double* const* x, const double* u, const double* w,
+                double dt_s, double* const* next, MatrixRef f, MatrixRef g) {
+  using All = Blocks<Model>;
+  constexpr typename All::Indices indices{};
+  using Jet = ceres::Jet<double, All::kTangent + Model::kNoise>;
+  Jet lifted[All::kAmbient], value[All::kAmbient];
+  Jet lifted_w[Model::kNoise + 1], lifted_u[Model::Input::kAmbient + 1];
+  const Jet* block[All::kCount];
+  Jet* result[All::kCount];
+  Lift<Model>(x, -1, lifted, block);
+  for (int i = 0; i < All::kCount; ++i) result[i] = value + (block[i] - lifted);
+  for (int i = 0; i < Model::kNoise; ++i) lifted_w[i] = Jet(w[i], All::kTangent + i);
+  for (int i = 0; i < Model::Input::kAmbient; ++i) lifted_u[i] = Jet(u[i]);
+  const Jet *const_w = lifted_w, *const_u = lifted_u;
+  if (!CallStep(model, block, const_u, const_w, dt_s, result, indices)) {
+    return Status::kOutOfDomain;
+  }
+  int row = 0;
+  const auto read = [&](auto index) {
+    constexpr int i = decltype(index)::value;
+    using B = SpaceAt<i, Model>;
+    for (int k = 0; k < B::kAmbient; ++k) next[i][k] = result[i][k].a;
+    ReadTangent<B>(result[i], 0, All::kTangent, f.Row(row));
+    ReadTangent<B>(result[i], All::kTangent, Model::kNoise, g.Row(row));
+    row += B::kTangent;
+  };
+  ForEach(read, indices);
+  return Status::kOk;
+}
+
+/// Calls f(w) with zeros of the size of the model's noise.
+template <class Model, class F>
+Status WithZeroNoise(const Model& model, const F& f) {
+  if constexpr (Model::kNoise == kDynamic) {
+    const std::vector<double> zero(static_cast<std::size_t>(NoiseSizeOf(model)) + 1);
+    return f(zero.data());
+  } else {
+    static_cast<void>(model);
+    const double zero[Model::kNoise + 1] = {};
+    return f(zero);
+  }
+}
+
+}  // namespace detail
+
+/// x' = f(x, u, w, dt), F = d x' / d x (n x n), G = d x' / d w (n x n_w); w may be null (zero), F
+/// and G may be empty.
+template <class Model>
+Status Step(const Model& model, const double* const* x, const double* u, const double* w,
+            double dt_s, double* const* next, MatrixRef f, MatrixRef g) {
+  constexpr typename detail::Blocks<Model>::Indices indices{};
+  if (w == nullptr) {
+    return detail::WithZeroNoise(model, [&](const double* zero) {
+      return Step(model, x, u, zero, dt_s, next, f, g);
+    });
+  }
+  const int n = detail::TangentSizeOf(model), n_w = detail::NoiseSizeOf(model);
+  if (!f && (!g || n_w == 0)) {
+    return detail::StepValue(model, x, u, w, dt_s, next) ? Status::kOk : Status::kOutOfDomain;
+  }
+  if (n_w > 0 && (!f || !g)) {  // one of the two: rare enough to make a buffer for the other
+    std::vector<double> unwanted(static_cast<std::size_t>(n) * std::max(n, n_w));
+    return Step(model, x, u, w, dt_s, next, f ? f : MatrixRef{unwanted.data(), n},
+                g ? g : MatrixRef{unwanted.data(), n_w});
+  }
+  if constexpr (detail::HasStepJacobian<Model, typename detail::Blocks<Model>::Indices>::value) {
+    static_assert(Model::Input::kAmbient == 0, "closed forms take no control input");
+    if (!detail::StepValue(model, x, u, w, dt_s, next)) return Status::kOutOfDomain;
+    detail::ClosedFormStep(model, x, w, dt_s, f, g, indices);
+    return Status::kOk;
+  } else {
+    return detail::StepJets(model, x, u, w, dt_s, next, f, g);
+  }
+}
+
+}  // namespace alidade

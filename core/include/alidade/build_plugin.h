@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+
+#include "alidade/fingerprint.h"
+#include "alidade/source.h"
+
+/// Exports of the build tier: plugins in C++ against alidade::core, loaded only into the very build
+/// that they were made with.
+namespace alidade {
+
+/// All that must be equal between the host and a build-tier plugin: version, compiler, and the
+/// flags that change layout.
+#define ALIDADE_STRINGISE_(x) #x
+#define ALIDADE_STRINGISE(x) ALIDADE_STRINGISE_(x)
+#if defined(_GLIBCXX_DEBUG)
+#define ALIDADE_BUILD_STL "debug-stl"
+#else
+#define ALIDADE_BUILD_STL "stl"
+#endif
+#define ALIDADE_BUILD_ID                                                                    \
+  "0.1.0 " __VERSION__ " cxx" ALIDADE_STRINGISE(__cplusplus) " abi" ALIDADE_STRINGISE(      \
+      __GXX_ABI_VERSION) " align" ALIDADE_STRINGISE(__BIGGEST_ALIGNMENT__) " " ALIDADE_BUILD_STL
+
+struct SourceEntry {
+  const char* name;
+  const char* doc;
+  /// Keys that are not read through Params, one a line: `key  meaning`.
+  const char* keys;
+  std::unique_ptr<Source> (*create)(const SourceArguments& arguments);
+};
+
+struct BuildTable {
+  std::uint32_t struct_size = sizeof(BuildTable);
+  const AlidadeFingerprint* fingerprint = nullptr;
+  const SourceEntry* sources = nullptr;
+  int source_count = 0;
+};
+
+inline constexpr const char* kBuildEntrySymbol = "alidade_build_plugin";
+
+}  // namespace alidade
+
+/// Exports the sources of this plugin: ALIDADE_SOURCE_PLUGIN({"name", "doc", "keys", &Create}, ...)
+#define ALIDADE_SOURCE_PLUGIN(...)                                                         \
+  ALIDADE_FINGERPRINT(ALIDADE_TIER_BUILD, ALIDADE_BUILD_ID)                                \
+  extern "C" __attribute__((visibility("default"))) const alidade::BuildTable*             \
+  alidade_build_plugin() {                                                                 \
+    static const alidade::SourceEntry sources[] = {__VA_ARGS__};                           \
+    static const alidade::BuildTable table = {sizeof(alidade::BuildTable),                 \
+                                              &alidade_fingerprint, sources,               \
+                                              static_cast<int>(sizeof(sources) / sizeof(sources[0]))}; \
+    return &table;                                                                         \
+  }

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "alidade/run.h"
+
+namespace alidade {
+
+/// Metrics of one estimator, taken frame by frame.
+///
+///   rmse:BLOCK          sqrt(mean |x (-) x_true|^2)                    unit of the block
+///   lag_ms:BLOCK        shift of the maximum of the normalised cross-correlation with truth,
+///                       parabolic between samples; > 0: late. Scalar blocks, even sampling (steps
+///                       within 5 % of their mean), a truth that changes
+///   cov95:BLOCK         share of stamps with |error| <= 1.96 sigma (scalar blocks)
+///   nees.mean:OWNER     mean of e' P^-1 e / dof over the owner's estimated blocks with known truth,
+///                       jointly; stamps where P is singular or not finite are left out
+///   nees.cov95:OWNER    share of those stamps with e' P^-1 e <= chi2(0.95, dof)
+///   nis.mean:SENSOR     mean of r' S^-1 r / dof over accepted measurements
+///   final:BLOCK         |error| at the last stamp
+///
+/// Over a segment the key ends in `@SEGMENT` (not lag_ms and final). Counts are `OUTCOME:SENSOR`. A
+/// truth is named like the block, `target.depth`, or like its last component where that is unique.
+/// A metric without a stamp to take it from is left out; an estimate that is not finite makes its
+/// rmse infinite.
+class Metrics {
+ public:
+  Metrics(const Contestant& contestant, const Source& source, const std::vector<Segment>& segments);
+  ~Metrics();
+  Metrics(Metrics&&) noexcept;
+
+  /// Takes the state after `frame`; `in_segment[i]` tells whether the frame lies in segment i.
+  void Add(const Frame& frame, const std::vector<bool>& in_segment, const State& state,
+           const UpdateReport& report);
+  /// `inconsistent`, once for each block element: truth is known and the error has been beyond 10
+  /// sigma for 20 stamps on end.
+  const std::vector<Event>& events() const;
+  std::map<std::string, double> Finish() const;
+  const std::map<std::string, std::int64_t>& counts() const;
+  /// Unit of each block with truth, where it has one: for ContestantResult::units.
+  const std::map<std::string, std::string>& units() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Quantile q, in [0, 1], of chi-square with `dof` > 0 degrees of freedom.
+double ChiSquareQuantile(double q, int dof);
+
+/// Delay of `signal` after `reference`, both sampled every `step`, in the unit of step: the maximum
+/// of the correlation coefficient over the n - |k| samples that overlap, |k| <= min(n/4, 2000),
+/// refined by a parabola. NaN where one of them is constant or n < 8.
+double Lag(const std::vector<double>& signal, const std::vector<double>& reference, double step);
+
+}  // namespace alidade

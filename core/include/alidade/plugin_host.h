@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "alidade/config.h"
+#include "alidade/models.h"
+#include "alidade/source.h"
+
+namespace alidade {
+
+struct SourceEntry;  // in alidade/build_plugin.h
+
+/// One parameter of a model, as declared by being read.
+struct ParamInfo {
+  std::string key, unit, doc;
+  std::string type;                  ///< number, integer, flag, choice, or `number[3]`
+  std::string range;                 ///< `> 0`, `[1, 3]`, or "" where everything is allowed
+  std::string fallback;              ///< the default as text, "" where the key is required
+  std::vector<std::string> choices;  ///< of a choice
+  std::string when;                  ///< `noise = fixed` where only that choice reads it, else ""
+};
+
+/// A model or source that a loaded plugin offers.
+struct PluginEntry {
+  enum class Kind { kSensor, kMotion, kLandmarkForm, kSource } kind;
+  std::string name, doc, citation, family;
+  std::filesystem::path plugin;  ///< the file it came from
+};
+
+/// Why a file in a searched folder was not loaded.
+struct Refusal {
+  std::filesystem::path file;
+  std::string reason;
+  ExitCode code;
+};
+
+/// Finds, checks, loads and lends plugins. A file is opened only when its fingerprint, read from the
+/// bytes beforehand, fits, and nobody but root, the caller or the owner of the running program could
+/// have written it. Plugins are never unloaded. Creation is safe from several threads.
+class PluginHost {
+ public:
+  /// Searches, in this order: `files_and_folders` (config `plugins:`, then `--plugin-path`; a
+  /// refusal there is an error), ALIDADE_PLUGIN_PATH, the user data folder, the build tree, the
+  /// install folder. Errors: kPlugin, kNotTrusted.
+  explicit PluginHost(const std::vector<std::filesystem::path>& files_and_folders = {});
+  ~PluginHost();
+
+  /// A model from its config entry: reads its parameters there, leaving unread keys to
+  /// Node::RejectUnread. Errors: kPlugin with the places searched, kBadConfig.
+  SensorModel CreateSensor(const std::string& name, const Node& entry) const;
+  MotionModel CreateMotion(const std::string& name, const Node& entry) const;
+  std::unique_ptr<Source> CreateSource(const std::string& name, const Node& entry,
+                                       std::uint64_t seed,
+                                       const std::filesystem::path& folder) const;
+
+  const std::vector<PluginEntry>& entries() const { return entries_; }
+  /// The parameters of a model, found by creating it with stand-in values, each choice in turn.
+  std::vector<ParamInfo> Schema(const PluginEntry& entry) const;
+  /// Roles, measurement or blocks of a model with stand-in parameters, for `plugins info`.
+  std::vector<std::string> Describe(const PluginEntry& entry) const;
+  /// Every place looked at, in order, with what was found there.
+  const std::vector<std::string>& searched() const { return searched_; }
+  const std::vector<Refusal>& refusals() const { return refusals_; }
+
+ private:
+  struct Loaded;
+  void LoadPlace(const std::filesystem::path& place, const std::string& origin, bool required);
+  void LoadFolder(const std::filesystem::path& folder, bool required);
+  void LoadFile(const std::filesystem::path& file, bool required);
+  void Load(const std::filesystem::path& file);
+  void AddEntries(const Loaded& plugin);
+
+  const PluginEntry& Find(PluginEntry::Kind kind, const std::string& name, const Node& entry) const;
+  [[noreturn]] void FailMissing(PluginEntry::Kind kind, const std::string& name,
+                                const Node& entry) const;
+  const Loaded& LoadedFrom(const std::filesystem::path& file) const;
+  AlidadeEntry EntryOf(const PluginEntry& entry) const;
+  const SourceEntry& SourceOf(const PluginEntry& entry) const;
+  std::shared_ptr<const ModelInstance> Create(PluginEntry::Kind kind, const std::string& name,
+                                              const Node& entry) const;
+
+  std::vector<std::unique_ptr<Loaded>> loaded_;
+  std::vector<PluginEntry> entries_;
+  std::vector<std::string> searched_;
+  std::vector<Refusal> refusals_;
+  mutable std::mutex create_mutex_;
+};
+
+/// The fingerprint in the `.alidade` section of an ELF file, read from its bytes, every offset
+/// checked. Errors: kPlugin (not ELF, truncated, malformed, no fingerprint, another ABI).
+AlidadeFingerprint ReadFingerprint(const std::filesystem::path& file);
+
+/// Refuses a file that someone else could have written: not absolute; it, its folder or a folder
+/// above it owned by another than root, the caller or the owner of the running program; writable
+/// for group or world (sticky folders above excepted). Follows symlinks and checks what they pass.
+/// Errors: kNotTrusted.
+void CheckTrusted(const std::filesystem::path& file);
+
+}  // namespace alidade

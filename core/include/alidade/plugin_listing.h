@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "alidade/plugin_host.h"
+
+namespace alidade {
+
+/// The models and sources on offer: name, kind, doc, file.
+std::string PluginList(const PluginHost& host);
+/// The same as a JSON array of objects with `name`, `kind`, `family`, `doc`, `citation`, `file`.
+std::string PluginListJson(const PluginHost& host);
+
+/// All there is to know of the entries called `name`: doc, citation, what they measure or move, and
+/// every parameter. Error: kPlugin where there is none.
+std::string PluginInfo(const PluginHost& host, const std::string& name);
+/// The same as a JSON array: the keys of PluginListJson, `describes` (lines) and `parameters`
+/// (objects with `key`, `unit`, `type`, `range`, `default` where there is one, `choices`, `when`,
+/// `doc`).
+std::string PluginInfoJson(const PluginHost& host, const std::string& name);
+
+/// Every place searched and what was found there, and every file refused with the reason.
+std::string PluginPlaces(const PluginHost& host);
+
+}  // namespace alidade

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "alidade/config.h"
+#include "alidade/estimator.h"
+#include "alidade/plugin_host.h"
+#include "alidade/system.h"
+
+namespace alidade {
+
+enum class OnDivergence { kReport, kFail };
+
+/// One estimator of a run, on its own system (the config with the estimator's overrides merged in).
+struct Contestant {
+  std::string name;
+  std::string type;
+  System system;
+  std::unique_ptr<Estimator> estimator;
+  OnDivergence on_divergence = OnDivergence::kReport;
+};
+
+/// A share of the stamps over which metrics are taken apart: those with (or without) a valid
+/// measurement of a sensor.
+struct Segment {
+  std::string name;
+  int stream = -1;
+  bool with = true;     ///< stamps with one, or stamps without
+  SensorModel sensor;   ///< decides validity
+};
+
+/// All that a config describes, made and checked, ready to run.
+struct Experiment {
+  std::unique_ptr<Source> source;
+  std::vector<Contestant> contestants;
+  std::vector<Segment> segments;
+  std::uint64_t seed = 1;
+};
+
+/// The files and folders that a config's `plugins:` names, relative ones taken from its folder.
+std::vector<std::filesystem::path> PluginPaths(const Config& config);
+
+/// Makes everything a config names. Errors: kBadConfig, kPlugin, kInputMissing, ...
+Experiment BuildExperiment(const Config& config, const PluginHost& host);
+
+enum class RunStatus { kOk, kStopped, kFailed };
+const char* ToString(RunStatus status);
+
+/// What became of one estimator.
+struct ContestantResult {
+  std::string name;
+  std::map<std::string, double> metrics;           ///< as in docs/run_folder.md
+  std::map<std::string, std::int64_t> counts;      ///< `accepted:stereo`
+  std::map<std::string, std::string> units;        ///< of blocks, {"target.depth", "m"}; may lack some
+  bool diverged = false;
+  std::vector<Event> events;
+  std::vector<std::vector<std::string>> unobservable;
+};
+
+struct RunResult {
+  RunStatus status = RunStatus::kOk;
+  ExitCode code = ExitCode::kOk;
+  std::string reason;
+  std::int64_t frames = 0;
+  std::vector<ContestantResult> contestants;
+};
+
+class Recorder;
+
+struct RunOptions {
+  Recorder* recorder = nullptr;                          ///< null: nothing is written
+  std::function<void(std::int64_t, std::int64_t)> progress;  ///< frames done, frames in all or -1
+  std::function<bool()> stop;                            ///< true: finish the frame and stop
+};
+
+/// Runs all estimators over the source, frame by frame, so that all see the same data. Data errors
+/// and divergence under `fail` end the run early; they are in the result, not thrown.
+RunResult Run(Experiment& experiment, const RunOptions& options);
+
+/// A table of the estimators' main metrics, one column each, for a terminal.
+std::string ComparisonTable(const RunResult& result);
+
+}  // namespace alidade

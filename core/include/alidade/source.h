@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "alidade/config.h"
+#include "alidade/params.h"
+
+namespace alidade {
+
+/// Time stamps are int64 nanoseconds from the source's own origin.
+using Stamp = std::int64_t;
+
+inline constexpr Stamp kNoStamp = INT64_MIN;
+
+/// Nearest stamp to `t_s` seconds.
+Stamp StampFromSeconds(double t_s);
+inline double Seconds(Stamp t) { return 1e-9 * static_cast<double>(t); }
+
+/// One value of one stream.
+struct Measurement {
+  Stamp stamp = 0;
+  int stream = 0;  ///< index into Source::streams()
+  std::int64_t landmark = -1;
+  std::vector<double> values;
+  std::vector<double> covariance;  ///< row-major, overrides the model's noise; empty: none
+};
+
+/// All that is known at one stamp, in the order of the source.
+struct Frame {
+  Stamp stamp = 0;
+  std::vector<Measurement> measurements;
+  /// One value list for each entry of Source::truths(); an empty list is unknown at this stamp.
+  std::vector<std::vector<double>> truth;
+};
+
+/// A named stream or truth value of a source.
+struct StreamInfo {
+  std::string name;
+  int size = 1;
+};
+
+/// Where measurements come from: a simulator, a file, a pipe. A build-tier plugin.
+class Source {
+ public:
+  virtual ~Source() = default;
+  virtual const std::vector<StreamInfo>& streams() const = 0;
+  /// Values that the source knows exactly, named like the blocks they are truth of.
+  virtual const std::vector<StreamInfo>& truths() const = 0;
+  /// Fills `frame` with the next one; false at the end. Errors: kBadData, kIo.
+  virtual bool Next(Frame& frame) = 0;
+  /// Frames in all, or -1 where that is not known (for progress only).
+  virtual std::int64_t size() const { return -1; }
+};
+
+/// What a source is made from.
+struct SourceArguments {
+  Node entry;      ///< the config's `source` map
+  Params& params;  ///< the same map, read by declaration (numbers, flags, choices)
+  std::uint64_t seed;
+  std::filesystem::path folder;  ///< relative paths are taken from here
+};
+
+}  // namespace alidade

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "alidade/run.h"
+
+namespace alidade {
+
+struct SweepOptions {
+  std::int64_t runs = 1;  ///< of all shards together; their seeds count up from first_seed
+  std::uint64_t first_seed = 1;
+  int jobs = 0;              ///< threads; 0: as many as the processor has
+  int shard = 1, shards = 1;  ///< which of the equal shares of the seeds, in order
+  std::function<void(std::int64_t, std::int64_t)> progress;  ///< runs done, runs in all
+  std::function<bool()> stop;                                ///< true: drop unfinished runs
+};
+
+/// One run of a sweep.
+struct SweepRun {
+  std::uint64_t seed = 0;
+  RunStatus status = RunStatus::kOk;
+  ExitCode code = ExitCode::kOk;
+  std::string reason;
+  std::vector<ContestantResult> contestants;  ///< without events
+
+  /// Whether the metrics of `one` count: the run is whole, and it did not diverge.
+  bool Uses(const ContestantResult& one) const { return status == RunStatus::kOk && !one.diverged; }
+};
+
+struct SweepResult {
+  std::int64_t runs = 0;  ///< asked for, of this shard
+  std::uint64_t first_seed = 1;
+  bool stopped = false;
+  std::vector<std::string> estimators;  ///< in the order of the config
+  std::vector<SweepRun> done;           ///< by seed, those that failed too
+};
+
+/// Runs `config` once for each seed (key `source.seed`), in memory, each run built afresh from its
+/// own copy of the config. Results do not depend on the number of threads. A run in which an
+/// estimator diverges goes on also under `on_divergence: fail`. What ends one run, ends that one
+/// only. Errors: those of BuildExperiment, before the first run.
+SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptions& options);
+
+/// Mean and quantiles of a metric.
+struct Spread {
+  double mean = 0.0, p05 = 0.0, p50 = 0.0, p95 = 0.0;
+};
+
+/// Quantile q, in [0, 1], of ascending values x[0..n-1], n > 0, linear between order statistics
+/// (type 7 of Hyndman and Fan): with h = (n - 1) q, x[floor h] + (h - floor h) (x[floor h + 1] -
+/// x[floor h]).
+double Quantile(const std::vector<double>& ascending, double q);
+
+/// One estimator over all runs.
+struct SweepSummary {
+  std::string name;
+  std::int64_t used = 0;      ///< runs that metrics are taken over
+  std::int64_t diverged = 0;  ///< runs left out because it diverged
+  std::map<std::string, Spread> metrics;
+  std::map<std::string, std::string> units;  ///< as in ContestantResult
+};
+std::vector<SweepSummary> Summarise(const SweepResult& result);
+
+/// Mean [p05, p50, p95] of the main metrics, one column for each estimator, for a terminal.
+std::string SweepTable(const SweepResult& result);
+
+/// The folder of a sweep (docs/cli.md): sweep.json, runs.csv, table.md, config.resolved.yaml, and
+/// failures.csv where a run failed. It is there in full or not at all.
+class SweepFolder {
+ public:
+  /// Takes the name. Errors: kCannotCreate where it exists without `force`; kIo.
+  SweepFolder(const std::filesystem::path& folder, bool force);
+  ~SweepFolder();
+  SweepFolder(const SweepFolder&) = delete;
+  SweepFolder& operator=(const SweepFolder&) = delete;
+
+  /// Errors: kCannotCreate, kIo.
+  void Write(const SweepResult& result, const Config& config);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace alidade

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "alidade/config.h"
+#include "alidade/models.h"
+#include "alidade/plugin_host.h"
+#include "alidade/state.h"
+
+namespace alidade {
+
+/// What an update does with the block in a role: correct it; let its uncertainty count but leave it
+/// (Schmidt); take its value as exact (its Jacobian is zero).
+enum class RoleMode { kEstimate, kConsider, kHold };
+
+/// Where a sensor's Jacobian is taken for the value of a role: the prediction, or the value that the
+/// measurement itself implies (Initialise of that role).
+enum class LineariseAt { kPrediction, kMeasurement };
+
+struct RoleBinding {
+  BlockId block = -1;  ///< -1: an optional role left unbound
+  RoleMode mode = RoleMode::kEstimate;
+  LineariseAt linearise_at = LineariseAt::kPrediction;
+};
+
+/// stream -> sensor model -> the blocks that fill its roles.
+struct SensorBinding {
+  std::string name;
+  std::string stream;
+  SensorModel model;
+  std::vector<RoleBinding> roles;
+};
+
+/// Motion model -> the blocks it moves.
+struct MotionBinding {
+  std::string name;
+  MotionModel model;
+  std::vector<BlockId> blocks;
+};
+
+/// How a block starts: a value with a covariance, or the first measurement of a sensor.
+struct Prior {
+  BlockId block = -1;
+  std::vector<double> mean;
+  Eigen::MatrixXd covariance;
+  std::string from;  ///< a sensor's name, or "" where mean and covariance are given
+};
+
+/// The problem that every estimator is given: blocks, how they move, what measures them, how they
+/// start. Built from a config, or by hand.
+struct System {
+  StateLayout layout;
+  std::vector<MotionBinding> motions;
+  std::vector<SensorBinding> sensors;
+  std::vector<Prior> priors;
+  std::optional<double> start_s;  ///< time of the priors; else the first frame's
+
+  /// The state before the first measurement: all blocks with a given prior are present.
+  State InitialState() const;
+  /// -1 where there is none.
+  int FindSensor(std::string_view name) const;
+};
+
+/// Reads `state`, `sensors` and `start_s` of a config's root. `only` keeps the named sensors, in its
+/// own order, and the state entries that they touch; empty: everything.
+/// Errors: kBadConfig with place and remedy, kPlugin.
+System BuildSystem(const Node& root, const PluginHost& host, const std::vector<std::string>& only);
+
+/// Directions of the initial state that no sensor can see, found at a generic point near the prior
+/// from the rank of the observability matrix [H; H F; H F^2; ...]: for each one the names of the
+/// block elements it moves.
+std::vector<std::vector<std::string>> UnobservableDirections(const System& system);
+
+}  // namespace alidade

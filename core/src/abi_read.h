@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+namespace alidade::internal {
+
+/// A copy of a struct of plugin_abi.h, as far as its own size says; zero beyond. `limit`: bytes that
+/// it may claim at most.
+template <class T>
+T ReadPrefix(const T* from, std::size_t limit = sizeof(T)) {
+  T copy{};
+  const std::size_t size = std::min({std::size_t{from->struct_size}, limit, sizeof(T)});
+  std::memcpy(&copy, from, size);
+  return copy;
+}
+
+/// The i-th struct of a table that states its own stride.
+template <class T>
+T ReadEntry(const T* first, std::uint32_t stride, std::size_t i) {
+  const char* at = reinterpret_cast<const char*>(first) + i * stride;
+  return ReadPrefix(reinterpret_cast<const T*>(at), stride);
+}
+
+/// Strides of a table must hold its structs aligned.
+template <class T>
+bool GoodStride(std::uint32_t stride) {
+  constexpr std::uint32_t kMax = 1 << 16;
+  return stride >= 2 * sizeof(std::uint32_t) && stride <= kMax && stride % alignof(T) == 0;
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "columns.h"
+
+#include <algorithm>
+#include <string_view>
+
+namespace alidade::internal {
+namespace {
+
+std::string_view LastComponent(std::string_view name) {
+  return name.substr(name.rfind('.') + 1);  // npos + 1 = 0
+}
+
+}  // namespace
+
+std::vector<int> MatchTruths(const StateLayout& layout, const std::vector<StreamInfo>& truths) {
+  const std::vector<Block>& blocks = layout.blocks();
+  std::vector<int> match(blocks.size(), -1);
+  const auto fits = [&](std::size_t block, const StreamInfo& truth) {
+    return match[block] < 0 && blocks[block].geometry().ambient == truth.size;
+  };
+  for (std::size_t t = 0; t < truths.size(); ++t) {
+    const int block = layout.Find(truths[t].name);
+    if (block >= 0 && fits(static_cast<std::size_t>(block), truths[t])) match[block] = int(t);
+  }
+  for (std::size_t t = 0; t < truths.size(); ++t) {
+    if (layout.Find(truths[t].name) >= 0) continue;
+    const auto named = [&](const Block& b) { return LastComponent(b.name) == truths[t].name; };
+    const auto first = std::find_if(blocks.begin(), blocks.end(), named);
+    if (first == blocks.end() || std::any_of(first + 1, blocks.end(), named)) continue;
+    const auto block = static_cast<std::size_t>(first - blocks.begin());
+    if (fits(block, truths[t])) match[block] = static_cast<int>(t);
+  }
+  return match;
+}
+
+std::vector<std::string> AmbientNames(const std::string& name, const Space& space) {
+  const auto size = static_cast<std::size_t>(space.geometry.ambient);
+  if (space.elements.size() == size) return ColumnNames(name, space);
+  return NumberedNames(name, size);
+}
+
+std::vector<std::string> NumberedNames(const std::string& name, std::size_t size) {
+  if (size == 1) return {name};
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < size; ++i) names.push_back(name + '.' + std::to_string(i));
+  return names;
+}
+
+std::vector<std::string> TangentNames(const std::string& name, const Space& space) {
+  switch (space.geometry.kind) {
+    case GeometryKind::kUnitQuaternion:
+      return {name + ".rx", name + ".ry", name + ".rz"};
+    case GeometryKind::kUnitVector:
+      return {name + ".d0", name + ".d1"};
+    case GeometryKind::kVector:
+    case GeometryKind::kAngle:
+      break;
+  }
+  return AmbientNames(name, space);
+}
+
+std::string UnitOf(const System& system, BlockId id) {
+  if (!system.layout[id].space.unit.empty()) return system.layout[id].space.unit;
+  for (const SensorBinding& sensor : system.sensors) {
+    for (std::size_t r = 0; r < sensor.roles.size(); ++r) {
+      if (sensor.roles[r].block == id) return sensor.model.roles()[r].unit;
+    }
+  }
+  return {};
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "comparison_table.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string_view>
+#include <tuple>
+
+#include "number_text.h"
+
+namespace alidade {
+namespace internal {
+namespace {
+
+constexpr std::array<std::string_view, 6> kOrder = {"rmse",      "lag_ms",     "cov95",
+                                                    "nees.mean", "nees.cov95", "nis.mean"};
+
+std::string_view KindOf(std::string_view key) { return key.substr(0, key.find(':')); }
+
+/// `target.depth` of `rmse:target.depth@blind`.
+std::string_view SubjectOf(std::string_view key) {
+  const std::string_view rest = key.substr(std::min(key.find(':'), key.size() - 1) + 1);
+  return rest.substr(0, rest.find('@'));
+}
+
+/// Sorts by kind, whole before segments, then by name.
+auto Rank(const std::string& key) {
+  const auto kind = std::find(kOrder.begin(), kOrder.end(), KindOf(key)) - kOrder.begin();
+  const std::size_t segment = key.find('@');
+  return std::tuple(kind, segment == key.npos ? "" : key.substr(segment), key);
+}
+
+template <class Map>
+std::vector<std::string> Keys(const RunResult& result, const Map ContestantResult::*values) {
+  std::vector<std::string> keys;
+  for (const ContestantResult& one : result.contestants) {
+    for (const auto& [key, value] : one.*values) keys.push_back(key);
+  }
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  return keys;
+}
+
+/// A unit with the prefix that makes numbers of this size easy to read, and what to multiply by.
+struct Scaled {
+  double factor = 1.0;
+  std::string unit;
+};
+
+Scaled ScaleUnit(const std::string& unit, double largest) {
+  const std::string_view base = std::string_view(unit).substr(0, unit.find('/'));
+  const bool takes_prefix = base == "m" || base == "s" || base == "rad";
+  if (!takes_prefix || !(largest > 0.0) || largest >= 1.0) return {1.0, unit};
+  return largest >= 1e-3 ? Scaled{1e3, 'm' + unit} : Scaled{1e6, 'u' + unit};
+}
+
+using Values = std::vector<std::optional<double>>;
+
+/// Cells of one row with the same number of decimals: four significant digits of the smallest, or
+/// of each where they lie too far apart for that.
+std::vector<std::string> Format(const Values& values) {
+  double smallest = std::numeric_limits<double>::infinity(), largest = 0.0;
+  for (const auto& value : values) {
+    if (!value || !std::isfinite(*value) || *value == 0.0) continue;
+    smallest = std::min(smallest, std::abs(*value));
+    largest = std::max(largest, std::abs(*value));
+  }
+  const auto decimals = [](double v) {
+    return std::clamp(3 - static_cast<int>(std::floor(std::log10(v))), 0, 9);
+  };
+  const bool together = largest < 1e4 * smallest;
+  std::vector<std::string> cells;
+  for (const auto& value : values) {
+    if (!value) {
+      cells.emplace_back("-");
+    } else if (!std::isfinite(*value)) {
+      cells.push_back(NumberText(*value));
+    } else if (largest == 0.0 || *value == 0.0) {
+      cells.emplace_back("0");
+    } else if (together) {
+      cells.push_back(FixedText(*value, std::min(decimals(smallest), 6)));
+    } else if (std::abs(*value) < 1e7 && std::abs(*value) > 1e-5) {
+      cells.push_back(FixedText(*value, decimals(std::abs(*value))));
+    } else {
+      cells.push_back(ScientificText(*value, 3));
+    }
+  }
+  return cells;
+}
+
+std::string UnitOfKey(const RunResult& result, const std::string& key) {
+  for (const ContestantResult& one : result.contestants) {
+    const auto unit = one.units.find(std::string(SubjectOf(key)));
+    if (unit != one.units.end()) return unit->second;
+  }
+  return {};
+}
+
+ComparisonRow MetricRow(const RunResult& result, const std::string& key) {
+  const std::string_view kind = KindOf(key);
+  Values values;
+  double largest = 0.0;
+  for (const ContestantResult& one : result.contestants) {
+    const auto found = one.metrics.find(key);
+    values.push_back(found == one.metrics.end() ? std::nullopt : std::optional(found->second));
+    if (values.back() && std::isfinite(*values.back())) {
+      largest = std::max(largest, std::abs(*values.back()));
+    }
+  }
+  Scaled scaled;
+  if (kind == "rmse") scaled = ScaleUnit(UnitOfKey(result, key), largest);
+  if (kind == "lag_ms") scaled.unit = "ms";
+  if (kind == "cov95" || kind == "nees.cov95") scaled = {100.0, "%"};
+  for (auto& value : values) {
+    if (value) *value *= scaled.factor;
+  }
+  std::string label(kind == "lag_ms" ? "lag" : kind);
+  if (key.size() > kind.size()) label.append(" ").append(key.substr(kind.size() + 1));
+  if (const std::size_t at = label.find('@'); at != label.npos) label.insert(at, " ");
+  if (!scaled.unit.empty()) label.append(" [").append(scaled.unit).append("]");
+  return {label, Format(values)};
+}
+
+/// Over segments a person wants the errors; the rest is in comparison.csv.
+bool IsMain(const std::string& key) {
+  const std::string_view kind = KindOf(key);
+  if (key.find('@') != key.npos) return kind == "rmse";
+  return std::find(kOrder.begin(), kOrder.end(), kind) != kOrder.end();
+}
+
+}  // namespace
+
+std::vector<std::string> OrderedMetrics(const RunResult& result) {
+  std::vector<std::string> keys = Keys(result, &ContestantResult::metrics);
+  std::stable_sort(keys.begin(), keys.end(),
+                   [](const auto& a, const auto& b) { return Rank(a) < Rank(b); });
+  return keys;
+}
+
+std::vector<std::string> OrderedCounts(const RunResult& result) {
+  std::vector<std::string> keys = Keys(result, &ContestantResult::counts);
+  std::stable_partition(keys.begin(), keys.end(),
+                        [](const auto& key) { return KindOf(key) == "accepted"; });
+  return keys;
+}
+
+std::vector<ComparisonRow> ComparisonRows(const RunResult& result) {
+  std::vector<ComparisonRow> rows;
+  for (const std::string& key : OrderedMetrics(result)) {
+    if (IsMain(key)) rows.push_back(MetricRow(result, key));
+  }
+  for (const std::string& key : OrderedCounts(result)) {
+    ComparisonRow row{std::string(KindOf(key)) + ' ' + std::string(SubjectOf(key)), {}};
+    for (const ContestantResult& one : result.contestants) {
+      const auto count = one.counts.find(key);
+      row.cells.push_back(count == one.counts.end() ? "-" : std::to_string(count->second));
+    }
+    rows.push_back(std::move(row));
+  }
+  ComparisonRow diverged{"diverged", {}};
+  for (const ContestantResult& one : result.contestants) {
+    diverged.cells.emplace_back(one.diverged ? "yes" : "no");
+  }
+  rows.push_back(std::move(diverged));
+  return rows;
+}
+
+}  // namespace internal
+
+namespace {
+
+constexpr std::size_t kLineWidth = 100;
+constexpr std::size_t kGap = 2;
+
+void AppendRight(std::string& line, const std::string& cell, std::size_t width) {
+  line.append(width - std::min(width, cell.size()), ' ');
+  line += cell;
+}
+
+}  // namespace
+
+std::string ComparisonTable(const RunResult& result) {
+  const std::vector<internal::ComparisonRow> rows = internal::ComparisonRows(result);
+  const std::size_t columns = result.contestants.size();
+  std::size_t label_width = 0;
+  std::vector<std::size_t> widths;
+  for (const ContestantResult& one : result.contestants) widths.push_back(one.name.size());
+  for (const auto& row : rows) {
+    label_width = std::max(label_width, row.label.size());
+    for (std::size_t c = 0; c < columns; ++c) widths[c] = std::max(widths[c], row.cells[c].size());
+  }
+  std::string text;
+  // Estimators that do not fit beside the others go into a table below.
+  for (std::size_t first = 0, end = 0; first < columns; first = end) {
+    std::size_t width = label_width;
+    for (end = first; end < columns; ++end) {
+      width += kGap + widths[end];
+      if (width > kLineWidth && end > first) break;
+    }
+    if (first > 0) text += '\n';
+    const auto append_line = [&](const std::string& label, const auto& cell) {
+      std::string line = label;
+      line.resize(label_width, ' ');
+      for (std::size_t c = first; c < end; ++c) AppendRight(line, cell(c), kGap + widths[c]);
+      text += line + '\n';
+    };
+    append_line("", [&](std::size_t c) { return result.contestants[c].name; });
+    for (const auto& row : rows)
+      append_line(row.label, [&](std::size_t c) { return row.cells[c]; });
+  }
+  return text;
+}
+
+}  // namespace alidade

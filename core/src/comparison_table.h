@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "alidade/run.h"
+
+namespace alidade::internal {
+
+/// Keys of all metrics of all estimators, the ones a person wants first: rmse, rmse over segments,
+/// lag, coverage, NEES, NIS, then what else there is.
+std::vector<std::string> OrderedMetrics(const RunResult& result);
+/// Keys of all counts, those accepted first.
+std::vector<std::string> OrderedCounts(const RunResult& result);
+
+/// One line of a comparison: a label with its unit, and a cell for each estimator, `-` where it has
+/// no value.
+struct ComparisonRow {
+  std::string label;
+  std::vector<std::string> cells;
+};
+/// The main metrics and all counts.
+std::vector<ComparisonRow> ComparisonRows(const RunResult& result);
+
+}  // namespace alidade::internal

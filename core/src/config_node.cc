@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "config_tree.h"
+
+namespace alidade {
+
+using internal::Child;
+using internal::FailAt;
+using internal::KeyPlace;
+using internal::PathOf;
+using internal::Quoted;
+
+namespace internal {
+namespace {
+
+std::string Component(const ConfigTree& tree) {
+  return tree.index < 0 ? tree.key : '[' + std::to_string(tree.index) + ']';
+}
+
+}  // namespace
+
+const std::string& PathOf(const ConfigTree& tree) {
+  if (!tree.path.empty()) return tree.path;
+  std::string path;
+  for (const ConfigTree* at = &tree; at->parent != nullptr; at = at->parent) {
+    const bool dot = at->index < 0 && at->parent->parent != nullptr;
+    path.insert(0, (dot ? "." : "") + Component(*at));
+  }
+  return tree.path = path;
+}
+
+Place KeyPlace(const ConfigTree& tree) {
+  if (tree.key_line == 0) return tree.place;
+  return Place{tree.place.file, tree.key_line, tree.key_column};
+}
+
+ConfigTree* Child(const ConfigTree& map, std::string_view key) {
+  for (const auto& child : map.children) {
+    if (child->key == key) return child.get();
+  }
+  return nullptr;
+}
+
+std::string Quoted(std::string_view text) {
+  constexpr std::size_t kShown = 60;
+  constexpr std::string_view kHex = "0123456789abcdef";
+  std::string quoted = "'";
+  std::size_t end = std::min(text.size(), kShown);
+  while (end < text.size() && (text[end] & 0xC0) == 0x80) --end;
+  for (const char c : text.substr(0, end)) {
+    if (c == '\n') {
+      quoted += "\\n";
+    } else if ((c >= 0 && c < ' ') || c == 0x7F) {
+      quoted.append("\\x") += kHex[c >> 4];
+      quoted += kHex[c & 15];
+    } else {
+      quoted += c;
+    }
+  }
+  return quoted + (end < text.size() ? "...'" : "'");
+}
+
+void FailAt(const Place& place, std::string_view key, std::string_view what,
+            std::string_view expected, std::string_view suggestion) {
+  throw Error(ExitCode::kBadConfig, ErrorLine(place, key, what, expected, suggestion));
+}
+
+}  // namespace internal
+
+namespace {
+
+std::string Found(const ConfigTree& tree) {
+  switch (tree.kind) {
+    case Node::Kind::kNull:
+      return "no value";
+    case Node::Kind::kScalar:
+      return Quoted(tree.text);
+    case Node::Kind::kList:
+      return "a list";
+    case Node::Kind::kMap:
+      return "a map";
+  }
+  return {};
+}
+
+const ConfigTree& Expect(const ConfigTree& tree, Node::Kind kind, const char* expected) {
+  if (tree.kind != kind) FailAt(tree.place, PathOf(tree), Found(tree), expected);
+  return tree;
+}
+
+std::string Joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+std::string PathBelow(const ConfigTree& map, std::string_view key) {
+  const std::string& path = PathOf(map);
+  return path.empty() ? std::string(key) : path + '.' + std::string(key);
+}
+
+[[noreturn]] void FailMissing(const ConfigTree& map, std::string_view key,
+                              std::string_view needed_by) {
+  std::vector<std::string> unread;
+  for (const auto& child : map.children) {
+    if (map.asked.contains(child->key)) continue;
+    const std::string unit = internal::UnitSlip(child->key, key, true);
+    if (!unit.empty()) {
+      FailAt(KeyPlace(*child), PathOf(*child), "wrong unit '" + unit + "'", key);
+    }
+    unread.push_back(child->key);
+  }
+  std::string what = "missing key";
+  if (!needed_by.empty()) what.append(", needed by '").append(needed_by).append("'");
+  const std::string near = Nearest(key, unread);
+  if (!near.empty()) {
+    what += "; found '" + near + "'";
+    const int line = Child(map, near)->key_line;
+    if (line > 0) what += " at line " + std::to_string(line);
+  }
+  FailAt(KeyPlace(map), PathBelow(map, key), what);
+}
+
+std::string UnknownKey(const ConfigTree& map, const ConfigTree& child) {
+  std::vector<std::string> absent;
+  for (const std::string& asked : map.asked) {
+    const std::string unit = internal::UnitSlip(child.key, asked, false);
+    if (!unit.empty() && Child(map, asked) == nullptr) {
+      return ErrorLine(KeyPlace(child), PathOf(child), "wrong unit '" + unit + "'", asked);
+    }
+    if (Child(map, asked) == nullptr) absent.push_back(asked);
+  }
+  std::string near = Nearest(child.key, absent);
+  if (near.empty()) near = Nearest(child.key, map.asked);
+  constexpr std::size_t kListed = 8;
+  std::string expected;
+  if (near.empty() && !absent.empty() && absent.size() <= kListed) {
+    expected = (absent.size() > 1 ? "one of " : "") + Joined(absent);
+  }
+  return ErrorLine(KeyPlace(child), PathOf(child), "unknown key", expected, near);
+}
+
+}  // namespace
+
+Node::Kind Node::kind() const { return tree_->kind; }
+const Place& Node::place() const { return tree_->place; }
+const std::string& Node::path() const { return PathOf(*tree_); }
+
+std::string Node::key() const {
+  const ConfigTree* named = tree_;
+  std::string indices;
+  for (; named->index >= 0; named = named->parent) {
+    indices.insert(0, '[' + std::to_string(named->index) + ']');
+  }
+  return named->key + indices;
+}
+
+std::optional<Node> Node::Find(std::string_view key) const {
+  Declare(key);
+  const ConfigTree* child = internal::Child(*tree_, key);
+  return child == nullptr ? std::nullopt : std::optional<Node>(Node(child));
+}
+
+Node Node::At(std::string_view key, std::string_view needed_by) const {
+  if (const std::optional<Node> child = Find(key)) return *child;
+  FailMissing(*tree_, key, needed_by);
+}
+
+std::vector<std::pair<std::string, Node>> Node::Entries() const {
+  std::vector<std::pair<std::string, Node>> entries;
+  for (const auto& child : Expect(*tree_, Kind::kMap, "a map").children) {
+    tree_->asked.insert(child->key);
+    entries.emplace_back(child->key, Node(child.get()));
+  }
+  return entries;
+}
+
+std::vector<Node> Node::Items() const {
+  std::vector<Node> items;
+  for (const auto& child : Expect(*tree_, Kind::kList, "a list").children) {
+    items.emplace_back(child.get());
+  }
+  return items;
+}
+
+bool Node::Flag() const {
+  const ConfigTree& tree = Expect(*tree_, Kind::kScalar, "true or false");
+  if (!tree.quoted && tree.text == "true") return true;
+  if (!tree.quoted && tree.text == "false") return false;
+  std::string word = tree.text;
+  std::transform(word.begin(), word.end(), word.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  const bool yes = word == "true" || word == "yes" || word == "on" || word == "y" || word == "1";
+  const bool no = word == "false" || word == "no" || word == "off" || word == "n" || word == "0";
+  Fail((tree.quoted ? "the text " : "") + Quoted(tree.text), "true or false",
+       yes  ? "true"
+       : no ? "false"
+            : "");
+}
+
+std::string Node::Text() const { return Expect(*tree_, Kind::kScalar, "text").text; }
+
+int Node::Choice(const std::vector<std::string>& choices) const {
+  const std::string expected = (choices.size() > 1 ? "one of " : "") + Joined(choices);
+  const std::string& text = Expect(*tree_, Kind::kScalar, expected.c_str()).text;
+  const auto found = std::find(choices.begin(), choices.end(), text);
+  if (found == choices.end()) Fail(Quoted(text), expected, Nearest(text, choices));
+  return static_cast<int>(found - choices.begin());
+}
+
+void Node::RejectUnread() const {
+  constexpr int kMaxLines = 20;
+  std::string lines;
+  int count = 0;
+  for (const auto& child : Expect(*tree_, Kind::kMap, "a map").children) {
+    if (tree_->asked.contains(child->key)) continue;
+    if (++count > kMaxLines) break;
+    lines += (lines.empty() ? "" : "\n") + UnknownKey(*tree_, *child);
+  }
+  if (count > 0) throw Error(ExitCode::kBadConfig, lines);
+}
+
+void Node::Declare(std::string_view key) const {
+  Expect(*tree_, Kind::kMap, "a map").asked.emplace(key);
+}
+
+void Node::Fail(std::string_view what, std::string_view expected,
+                std::string_view suggestion) const {
+  FailAt(tree_->place, PathOf(*tree_), what, expected, suggestion);
+}
+
+}  // namespace alidade

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/covariance.h"
+
+#include <algorithm>
+
+#include "alidade/error.h"
+
+namespace alidade {
+
+Eigen::MatrixXd Times(const std::vector<JacobianBlock>& h, int rows,
+                      const Eigen::MatrixXd& columns) {
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(rows, columns.cols());
+  for (const JacobianBlock& part : h) {
+    result += part.block * columns.middleRows(part.offset, part.block.cols());
+  }
+  return result;
+}
+
+int Covariance::Add(int rows) {
+  const auto gap = std::find_if(gaps_.begin(), gaps_.end(),
+                                [rows](const auto& g) { return g.second == rows; });
+  if (gap != gaps_.end()) {
+    const int offset = gap->first;
+    gaps_.erase(gap);
+    return offset;
+  }
+  const int offset = size_;
+  if (size_ + rows > p_.rows()) {
+    const Eigen::Index capacity = std::max<Eigen::Index>(2 * p_.rows(), size_ + rows);
+    Eigen::MatrixXd larger = Eigen::MatrixXd::Zero(capacity, capacity);
+    larger.topLeftCorner(size_, size_) = p_.topLeftCorner(size_, size_);
+    p_.swap(larger);
+  }
+  size_ += rows;
+  return offset;
+}
+
+void Covariance::Release(int offset, int rows) {
+  p_.block(offset, 0, rows, offset).setZero();
+  p_.block(offset, offset, size_ - offset, rows).setZero();
+  gaps_.emplace_back(offset, rows);
+  // Gaps at the end are given back.
+  for (bool shrunk = true; shrunk;) {
+    const auto last = std::find_if(gaps_.begin(), gaps_.end(), [this](const auto& g) {
+      return g.first + g.second == size_;
+    });
+    shrunk = last != gaps_.end();
+    if (!shrunk) break;
+    size_ = last->first;
+    gaps_.erase(last);
+  }
+}
+
+void Covariance::Move(int from, int to, int rows) {
+  const auto gap = std::find(gaps_.begin(), gaps_.end(), std::pair(to, rows));
+  ALIDADE_EXPECTS(gap != gaps_.end());
+  gaps_.erase(gap);
+  Eigen::MatrixXd cross(size_, rows);
+  cross.topRows(from) = p_.block(from, 0, rows, from).transpose();
+  cross.bottomRows(size_ - from) = p_.block(from, from, size_ - from, rows);
+  SetRows(to, Block(from, rows, from, rows), cross);
+  Release(from, rows);
+}
+
+Eigen::MatrixXd Covariance::Block(int a, int rows, int b, int columns) const {
+  if (a == b) return p_.block(a, a, rows, rows).selfadjointView<Eigen::Lower>();
+  if (a > b) return p_.block(a, b, rows, columns);
+  return p_.block(b, a, columns, rows).transpose();
+}
+
+void Covariance::SetBlock(int a, int b, const Eigen::MatrixXd& value) {
+  if (a == b) {
+    p_.block(a, a, value.rows(), value.rows()).triangularView<Eigen::Lower>() = value;
+  } else if (a > b) {
+    p_.block(a, b, value.rows(), value.cols()) = value;
+  } else {
+    p_.block(b, a, value.cols(), value.rows()) = value.transpose();
+  }
+}
+
+void Covariance::SetRows(int offset, const Eigen::MatrixXd& own, const Eigen::MatrixXd& cross) {
+  const Eigen::Index k = own.rows();
+  const Eigen::Index below = size_ - offset - k;
+  p_.block(offset, 0, k, offset) = cross.topRows(offset).transpose();
+  p_.block(offset + k, offset, below, k) = cross.middleRows(offset + k, below);
+  SetBlock(offset, offset, own);
+}
+
+Eigen::MatrixXd Covariance::TimesTransposed(const std::vector<JacobianBlock>& h, int rows) const {
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(size_, rows);
+  for (const JacobianBlock& part : h) {
+    const Eigen::Index o = part.offset, k = part.block.cols(), below = size_ - o - k;
+    const auto jt = part.block.transpose();
+    result.topRows(o).noalias() += p_.block(o, 0, k, o).transpose() * jt;
+    result.middleRows(o, k).noalias() +=
+        p_.block(o, o, k, k).selfadjointView<Eigen::Lower>() * Eigen::MatrixXd(jt);
+    result.bottomRows(below).noalias() += p_.block(o + k, o, below, k) * jt;
+  }
+  return result;
+}
+
+void Covariance::Propagate(const std::vector<std::pair<int, int>>& segments,
+                           const Eigen::MatrixXd& f, const Eigen::MatrixXd& q) {
+  std::vector<JacobianBlock> rows;
+  Eigen::Index at = 0;
+  for (const auto& [offset, size] : segments) {
+    rows.push_back({offset, f.middleCols(at, size)});
+    at += size;
+  }
+  const Eigen::MatrixXd cross = TimesTransposed(rows, static_cast<int>(f.rows()));
+  const Eigen::MatrixXd own = Times(rows, static_cast<int>(f.rows()), cross) + q;
+  at = 0;
+  for (const auto& [offset, size] : segments) {
+    SetRows(offset, own.block(at, at, size, size), cross.middleCols(at, size));
+    at += size;
+  }
+  // Between segments SetRows wrote P_ai F_i'; there both sides move.
+  Eigen::Index row = 0;
+  for (const auto& [a, a_size] : segments) {
+    Eigen::Index column = 0;
+    for (const auto& [b, b_size] : segments) {
+      if (column < row) SetBlock(a, b, own.block(row, column, a_size, b_size));
+      column += b_size;
+    }
+    row += a_size;
+  }
+}
+
+void Covariance::SubtractOuter(const Eigen::MatrixXd& w) {
+  p_.topLeftCorner(size_, size_).selfadjointView<Eigen::Lower>().rankUpdate(w, -1.0);
+}
+
+void Covariance::Joseph(const Eigen::MatrixXd& k, const Eigen::MatrixXd& h,
+                        const Eigen::MatrixXd& r) {
+  Eigen::MatrixXd m = -k * h;
+  m.diagonal().array() += 1.0;
+  const Eigen::MatrixXd krk = k * r * k.transpose();
+  SetBlock(0, 0, m * Dense() * m.transpose() + krk);
+}
+
+void Covariance::Transform(int offset, const Eigen::MatrixXd& j) {
+  Propagate({{offset, static_cast<int>(j.cols())}}, j, Eigen::MatrixXd::Zero(j.rows(), j.rows()));
+}
+
+Eigen::MatrixXd Covariance::Dense() const {
+  return p_.topLeftCorner(size_, size_).selfadjointView<Eigen::Lower>();
+}
+
+}  // namespace alidade

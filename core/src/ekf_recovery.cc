@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "alidade/ekf.h"
+
+namespace alidade {
+namespace {
+
+bool Rejected(Outcome outcome) {
+  return outcome == Outcome::kGated || outcome == Outcome::kOutOfDomain ||
+         outcome == Outcome::kNotFinite || outcome == Outcome::kNotPd;
+}
+
+}  // namespace
+
+/// Initialises the blocks that wait for one of these measurements, each using up its measurement;
+/// what then still needs a block without a value is not ready.
+void Ekf::InitialiseFrom(std::vector<Row>& rows, UpdateReport& report) {
+  const auto missing = [this](const RoleBinding& role) {
+    return role.block >= 0 && !state_.layout()[role.block].present;
+  };
+  for (bool progress = true; progress;) {
+    progress = false;
+    for (Row& row : rows) {
+      Outcome& outcome = report.measurements[row.report].outcome;
+      const SensorBinding& binding = system_.sensors[static_cast<std::size_t>(row.sensor)];
+      const int role = binding.model.initialised_role();
+      if (outcome != Outcome::kAccepted || role < 0) continue;
+      const RoleBinding& target = binding.roles[static_cast<std::size_t>(role)];
+      const auto waits = [&](const Prior& prior) {
+        return prior.block == target.block && prior.from == binding.name;
+      };
+      if (std::count_if(binding.roles.begin(), binding.roles.end(), missing) != 1 ||
+          !missing(target) ||
+          std::none_of(system_.priors.begin(), system_.priors.end(), waits)) {
+        continue;
+      }
+      outcome = InitialiseBlock(row) ? Outcome::kInitialised : Outcome::kInvalid;
+      progress = outcome == Outcome::kInitialised;
+    }
+  }
+  for (Row& row : rows) {
+    Outcome& outcome = report.measurements[row.report].outcome;
+    const SensorBinding& binding = system_.sensors[static_cast<std::size_t>(row.sensor)];
+    if (outcome == Outcome::kAccepted &&
+        std::any_of(binding.roles.begin(), binding.roles.end(), missing)) {
+      outcome = Outcome::kNotReady;
+    }
+  }
+}
+
+/// Gives the block of the sensor's initialised role the value that the measurement implies, with
+/// its covariance and correlations; a block that has a value loses it.
+bool Ekf::InitialiseBlock(const Row& row) {
+  const SensorBinding& binding = system_.sensors[static_cast<std::size_t>(row.sensor)];
+  const auto target = static_cast<std::size_t>(binding.model.initialised_role());
+  const BlockId id = binding.roles[target].block;
+  const int m = binding.model.measurement().geometry.tangent;
+  const int k = state_.layout()[id].geometry().tangent;
+
+  std::vector<const double*> roles(binding.roles.size(), nullptr);
+  std::vector<RowMajor> jacobians(roles.size());
+  std::vector<double*> jx(roles.size(), nullptr);
+  std::vector<BlockId> from;
+  std::vector<Eigen::MatrixXd> from_jacobians;
+  for (std::size_t i = 0; i < roles.size(); ++i) {
+    if (i == target || binding.roles[i].block < 0) continue;
+    const BlockId other = binding.roles[i].block;
+    roles[i] = state_.value(other);
+    jacobians[i].resize(k, state_.layout()[other].geometry().tangent);
+    jx[i] = jacobians[i].data();
+  }
+  std::vector<double> y(static_cast<std::size_t>(state_.layout()[id].geometry().ambient));
+  RowMajor jz(k, m), l = RowMajor::Zero(m, m);
+  const double* z = row.measurement->values.data();
+  if (binding.model.Initialise(roles.data(), z, y.data(), jx.data(), jz.data()) != Status::kOk) {
+    return false;
+  }
+  roles[target] = y.data();
+  if (binding.model.SqrtNoise(roles.data(), z, l.data()) != Status::kOk) return false;
+  const RowMajor jl = jz * l;
+  const auto finite = [](double v) { return std::isfinite(v); };
+  if (!jl.allFinite() || !std::all_of(y.begin(), y.end(), finite)) return false;
+  for (std::size_t i = 0; i < roles.size(); ++i) {
+    if (jx[i] == nullptr) continue;
+    from.push_back(binding.roles[i].block);
+    from_jacobians.emplace_back(jacobians[i]);
+  }
+  if (state_.layout()[id].present) state_.Marginalise(id);
+  state_.Initialise(id, y.data(), from, from_jacobians, jl * jl.transpose());
+  return true;
+}
+
+/// Counts rejections in a row for each sensor, and recovers one that is locked out.
+void Ekf::CountRejections(const std::vector<Row>& rows, UpdateReport& report) {
+  for (const Row& row : rows) {
+    int& count = rejections_[static_cast<std::size_t>(row.sensor)];
+    const Outcome outcome = report.measurements[row.report].outcome;
+    if (outcome == Outcome::kAccepted || outcome == Outcome::kInitialised) count = 0;
+    if (!Rejected(outcome)) continue;
+    if (++count < options_.lockout_after || options_.lockout == Lockout::kNone) continue;
+    count = 0;
+    Recover(row, report);
+  }
+}
+
+/// Resets what the sensor determines from its measurement, with the blocks that move with it at
+/// their prior uncertainty; where that cannot be, inflates all blocks that the sensor touches.
+void Ekf::Recover(const Row& row, UpdateReport& report) {
+  const SensorBinding& binding = system_.sensors[static_cast<std::size_t>(row.sensor)];
+  const std::string why = "sensor '" + binding.name + "' rejected " +
+                          std::to_string(options_.lockout_after) + " times in a row: ";
+  const int role = binding.model.initialised_role();
+  const RoleBinding* target = role < 0 ? nullptr : &binding.roles[static_cast<std::size_t>(role)];
+  if (options_.lockout == Lockout::kReset && target != nullptr &&
+      target->mode == RoleMode::kEstimate &&
+      state_.layout()[target->block].status == BlockStatus::kEstimated && InitialiseBlock(row)) {
+    ForgetMotionOf(target->block);
+    Note(report, "lockout", why + "reset " + state_.layout()[target->block].name +
+                                " from its measurement");
+    return;
+  }
+  constexpr double kInflation = 10.0;
+  for (const RoleBinding& bound : binding.roles) {
+    if (bound.block < 0 || !state_.layout()[bound.block].has_covariance()) continue;
+    const Block& block = state_.layout()[bound.block];
+    const int n = block.geometry().tangent;
+    state_.covariance().Transform(block.tangent_offset,
+                                  kInflation * Eigen::MatrixXd::Identity(n, n));
+  }
+  Note(report, "lockout", why + "inflated the covariance of its blocks");
+}
+
+/// Puts the blocks that one motion model moves together with `id` back to their prior covariance,
+/// uncorrelated, with the values they have.
+void Ekf::ForgetMotionOf(BlockId id) {
+  for (const MotionBinding& motion : system_.motions) {
+    if (std::find(motion.blocks.begin(), motion.blocks.end(), id) == motion.blocks.end()) continue;
+    for (const Prior& prior : system_.priors) {
+      const bool together = std::find(motion.blocks.begin(), motion.blocks.end(), prior.block) !=
+                            motion.blocks.end();
+      if (!together || prior.block == id || prior.covariance.size() == 0 ||
+          !state_.layout()[prior.block].has_covariance()) {
+        continue;
+      }
+      const std::vector<double> value(
+          state_.value(prior.block),
+          state_.value(prior.block) + state_.layout()[prior.block].geometry().ambient);
+      state_.Marginalise(prior.block);
+      state_.Add(prior.block, value.data(), prior.covariance);
+    }
+  }
+}
+
+}  // namespace alidade

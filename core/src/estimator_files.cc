@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "estimator_files.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "columns.h"
+
+namespace alidade::internal {
+
+RecordedEstimator EstimatorFiles::Describe(const Contestant& contestant) {
+  RecordedEstimator recorded;
+  recorded.name = contestant.name;
+  for (const SensorBinding& binding : contestant.system.sensors) {
+    const Space& space = binding.model.measurement();
+    RecordedSensor& sensor = recorded.sensors.emplace_back();
+    sensor.name = binding.name;
+    sensor.stream = binding.stream;
+    sensor.unit = space.unit;
+    sensor.tangent = space.geometry.tangent;
+    recorded.width = std::max(recorded.width, space.geometry.ambient);
+  }
+  return recorded;
+}
+
+EstimatorFiles::EstimatorFiles(const RunFolder& folder, const Contestant& contestant,
+                               const std::vector<StreamInfo>& truths)
+    : recorded_(Describe(contestant)),
+      estimates_(folder, contestant.name + "/estimates.csv",
+                 EstimatesHeader(contestant.system, truths)),
+      innovations_(folder, contestant.name + "/innovations.csv", InnovationsHeader()),
+      gains_(folder, contestant.name + "/gains.csv", GainsHeader(contestant.system)) {}
+
+std::vector<std::string> EstimatorFiles::EstimatesHeader(const System& system,
+                                                         const std::vector<StreamInfo>& truths) {
+  std::vector<std::string> header = {"t_s"};
+  const std::vector<int> match = MatchTruths(system.layout, truths);
+  for (BlockId id = 0; id < static_cast<int>(system.layout.blocks().size()); ++id) {
+    const Block& block = system.layout[id];
+    const std::vector<std::string> names = AmbientNames(block.name, block.space);
+    const std::vector<std::string> tangents = TangentNames(block.name, block.space);
+    const int truth = match[static_cast<std::size_t>(id)];
+    blocks_.push_back({id, names.size(), tangents.size(), recorded_.elements.size(), truth});
+    int truth_column = 2;
+    for (int t = 0; t < truth; ++t) truth_column += truths[t].size;
+    const bool same = block.geometry().kind == GeometryKind::kVector ||
+                      block.geometry().kind == GeometryKind::kAngle;
+    const int first = static_cast<int>(header.size()) + 1;
+    for (int i = 0; i < static_cast<int>(names.size()); ++i) {
+      recorded_.elements.push_back({names[i], UnitOf(system, id), first + i,
+                                    same ? first + static_cast<int>(names.size()) + i : 0,
+                                    truth >= 0 ? truth_column + i : 0});
+    }
+    header.insert(header.end(), names.begin(), names.end());
+    for (const std::string& name : tangents) header.push_back("sigma:" + name);
+  }
+  return header;
+}
+
+std::vector<std::string> EstimatorFiles::InnovationsHeader() const {
+  std::vector<std::string> header = {"t_s",     "stream", "sensor", "landmark",
+                                     "outcome", "dof",    "nis"};
+  for (const char* what : {"z", "h", "s", "r"}) {
+    for (int i = 0; i < recorded_.width; ++i) header.push_back(what + std::to_string(i));
+  }
+  return header;
+}
+
+std::vector<std::string> EstimatorFiles::GainsHeader(const System& system) {
+  std::vector<std::string> header = {"t_s", "sensor"};
+  std::map<std::string, int> known;  // sensors that measure alike share columns
+  for (std::size_t s = 0; s < system.sensors.size(); ++s) {
+    const Space& space = system.sensors[s].model.measurement();
+    for (const BlockColumns& columns : blocks_) {
+      const Block& block = system.layout[columns.id];
+      if (block.status == BlockStatus::kFixed) continue;
+      for (const std::string& element : TangentNames(block.name, block.space)) {
+        for (const std::string& measured : TangentNames(space.name, space)) {
+          const std::string name = element + "<-" + measured;
+          const int next = static_cast<int>(header.size()) + 1;
+          const auto [column, is_new] = known.try_emplace(name, next);
+          if (is_new) header.push_back(name);
+          recorded_.sensors[s].gains.push_back({name, column->second});
+        }
+      }
+    }
+  }
+  gain_columns_ = header.size() - 2;
+  return header;
+}
+
+void EstimatorFiles::Add(const Frame& frame, const State& state, const UpdateReport& report) {
+  AddEstimate(frame, state);
+  for (const MeasurementReport& one : report.measurements) {
+    if (one.sensor < 0 || one.sensor >= static_cast<int>(recorded_.sensors.size())) continue;
+    AddInnovation(frame.stamp, one);
+    if (one.gain.size() > 0) AddGain(frame.stamp, state, one);
+  }
+}
+
+void EstimatorFiles::AddEstimate(const Frame& frame, const State& state) {
+  estimates_.Time(frame.stamp);
+  for (const BlockColumns& columns : blocks_) {
+    const Block& block = state.layout()[columns.id];
+    if (!block.present) {
+      estimates_.Empty(columns.ambient + columns.tangent);
+      continue;
+    }
+    estimates_.Numbers(state.value(columns.id), columns.ambient, columns.ambient);
+    const auto truth = static_cast<std::size_t>(columns.truth);
+    const bool known = truth < frame.truth.size() && !frame.truth[truth].empty();
+    for (std::size_t i = 0; i < columns.ambient; ++i) {
+      RecordedElement& element = recorded_.elements[columns.element + i];
+      element.has_value = true;
+      element.has_truth = element.has_truth || known;
+    }
+    if (!block.has_covariance()) {
+      estimates_.Empty(columns.tangent);
+      continue;
+    }
+    for (std::size_t i = 0; i < columns.tangent; ++i) {
+      const double variance =
+          state.covariance().Variance(block.tangent_offset + static_cast<int>(i));
+      estimates_.Number(std::sqrt(variance));
+      RecordedElement& element = recorded_.elements[columns.element + i];
+      if (element.sigma > 0 && variance > 0.0) element.is_random = true;
+    }
+  }
+  estimates_.EndRow();
+}
+
+void EstimatorFiles::AddInnovation(Stamp stamp, const MeasurementReport& report) {
+  RecordedSensor& sensor = recorded_.sensors[static_cast<std::size_t>(report.sensor)];
+  const auto width = static_cast<std::size_t>(recorded_.width);
+  innovations_.Time(stamp).Text(sensor.stream).Text(sensor.name);
+  if (report.landmark >= 0) {
+    innovations_.Integer(report.landmark);
+  } else {
+    innovations_.Empty();
+  }
+  innovations_.Text(ToString(report.outcome)).Integer(report.dof);
+  const bool reached = report.s.size() > 0;
+  if (reached) {
+    innovations_.Number(report.nis);
+  } else {
+    innovations_.Empty();
+  }
+  const Eigen::VectorXd sigma = report.s.diagonal().cwiseSqrt();
+  innovations_.Numbers(report.z.data(), report.z.size(), width)
+      .Numbers(report.h.data(), report.h.size(), width)
+      .Numbers(sigma.data(), static_cast<std::size_t>(sigma.size()), width)
+      .Numbers(report.innovation.data(), static_cast<std::size_t>(report.innovation.size()), width)
+      .EndRow();
+  sensor.has_innovations = sensor.has_innovations || (reached && report.innovation.size() > 0);
+}
+
+void EstimatorFiles::AddGain(Stamp stamp, const State& state, const MeasurementReport& report) {
+  RecordedSensor& sensor = recorded_.sensors[static_cast<std::size_t>(report.sensor)];
+  std::vector<const double*> cells(gain_columns_, nullptr);
+  std::size_t next = 0;  // of sensor.gains, which lists blocks, elements, measured elements
+  for (const BlockColumns& columns : blocks_) {
+    const Block& block = state.layout()[columns.id];
+    if (block.status == BlockStatus::kFixed) continue;
+    for (int i = 0; i < static_cast<int>(columns.tangent); ++i) {
+      const int row = block.tangent_offset + i;
+      for (int j = 0; j < sensor.tangent && next < sensor.gains.size(); ++j, ++next) {
+        if (!block.present || row >= report.gain.rows() || j >= report.gain.cols()) continue;
+        RecordedGain& gain = sensor.gains[next];
+        cells[static_cast<std::size_t>(gain.column) - 3] = &report.gain(row, j);
+        gain.used = gain.used || report.gain(row, j) != 0.0;
+      }
+    }
+  }
+  gains_.Time(stamp).Text(sensor.name);
+  for (const double* cell : cells) {
+    if (cell != nullptr) {
+      gains_.Number(*cell);
+    } else {
+      gains_.Empty();
+    }
+  }
+  gains_.EndRow();
+}
+
+void EstimatorFiles::Close() {
+  estimates_.Close();
+  innovations_.Close();
+  gains_.Close();
+  recorded_.estimate_rows = estimates_.rows();
+  recorded_.innovation_rows = innovations_.rows();
+  recorded_.gain_rows = gains_.rows();
+}
+
+}  // namespace alidade::internal

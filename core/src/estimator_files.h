@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "alidade/run.h"
+#include "csv_file.h"
+#include "recorded.h"
+
+namespace alidade::internal {
+
+/// The files of one estimator that grow frame by frame: `estimates.csv`, `innovations.csv` and
+/// `gains.csv`. They hold the blocks and sensors that the system has from the start.
+class EstimatorFiles {
+ public:
+  EstimatorFiles(const RunFolder& folder, const Contestant& contestant,
+                 const std::vector<StreamInfo>& truths);
+
+  /// Error: kIo.
+  void Add(const Frame& frame, const State& state, const UpdateReport& report);
+  void Close();
+  const RecordedEstimator& recorded() const { return recorded_; }
+
+ private:
+  struct BlockColumns {
+    BlockId id;
+    std::size_t ambient, tangent;
+    std::size_t element;  ///< the first of it in recorded_.elements
+    int truth;            ///< index into Frame::truth, or -1
+  };
+
+  static RecordedEstimator Describe(const Contestant& contestant);
+  std::vector<std::string> EstimatesHeader(const System& system,
+                                           const std::vector<StreamInfo>& truths);
+  std::vector<std::string> InnovationsHeader() const;
+  std::vector<std::string> GainsHeader(const System& system);
+  void AddEstimate(const Frame& frame, const State& state);
+  void AddInnovation(Stamp stamp, const MeasurementReport& report);
+  void AddGain(Stamp stamp, const State& state, const MeasurementReport& report);
+
+  RecordedEstimator recorded_;
+  std::vector<BlockColumns> blocks_;
+  std::size_t gain_columns_ = 0;
+  CsvFile estimates_, innovations_, gains_;
+};
+
+}  // namespace alidade::internal

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "alidade/ekf.h"
+#include "alidade/run.h"
+
+namespace alidade {
+namespace {
+
+constexpr int kSchema = 1;
+
+void CheckSchema(const Node& root) {
+  const Node version = root.At("alidade", "every config: the version of its schema");
+  const std::int64_t found = version.Integer(1, 1'000'000);
+  if (found > kSchema) {
+    version.Fail("schema version " + std::to_string(found),
+                 std::to_string(kSchema) + ", the newest that this program knows; a newer alidade "
+                 "reads this file");
+  }
+}
+
+std::vector<std::string> NamesOf(const std::vector<StreamInfo>& streams) {
+  std::vector<std::string> names;
+  for (const StreamInfo& stream : streams) names.push_back(stream.name);
+  return names;
+}
+
+/// Index of the stream that the sensor entry names, of the size that the model measures.
+int FindStream(const Node& sensor, const SensorModel& model,
+               const std::vector<StreamInfo>& streams) {
+  const Node node = sensor.At("stream");
+  const std::vector<std::string> names = NamesOf(streams);
+  const auto found = std::find(names.begin(), names.end(), node.Text());
+  if (found == names.end()) {
+    std::string all;
+    for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
+    node.Fail("the source has no stream '" + node.Text() + "'", "one of " + all,
+              Nearest(node.Text(), names));
+  }
+  const auto index = static_cast<std::size_t>(found - names.begin());
+  if (streams[index].size != model.measurement().geometry.ambient) {
+    node.Fail("stream '" + names[index] + "' has " + std::to_string(streams[index].size) +
+                  " values at a time",
+              std::to_string(model.measurement().geometry.ambient) + ", as model '" +
+                  model.name() + "' measures");
+  }
+  return static_cast<int>(index);
+}
+
+/// Names of the sensors an estimator uses, in its own order; empty: all, in the config's.
+std::vector<std::string> ReadSensorList(const Node& entry, const Node& root) {
+  std::vector<std::string> names;
+  const auto list = entry.Find("sensors");
+  if (!list) return names;
+  std::vector<std::string> known;
+  for (const auto& [name, sensor] : root.At("sensors").Entries()) known.push_back(name);
+  for (const Node& item : list->Items()) {
+    const std::string name = item.Text();
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      item.Fail("no sensor '" + name + "'", "a name from `sensors`", Nearest(name, known));
+    }
+    if (std::find(names.begin(), names.end(), name) != names.end()) {
+      item.Fail("sensor '" + name + "' is listed twice", "each sensor once");
+    }
+    names.push_back(name);
+  }
+  if (names.empty()) list->Fail("empty", "at least one sensor, or leave the key out for all");
+  return names;
+}
+
+void CheckName(const std::string& name, const Node& entry) {
+  const auto fits = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-'; };
+  if (name.empty() || !std::all_of(name.begin(), name.end(), fits)) {
+    entry.Fail("'" + name + "' cannot name an estimator: it names a folder too",
+               "letters, digits, _ and -");
+  }
+}
+
+Contestant BuildContestant(const std::string& name, const Node& entry, const Config& config,
+                           const PluginHost& host, const std::vector<StreamInfo>& streams) {
+  CheckName(name, entry);
+  Contestant contestant;
+  contestant.name = name;
+  const Node type = entry.At("type", "an estimator");
+  const std::vector<std::string> types = {"ekf"};
+  contestant.type = types[static_cast<std::size_t>(type.Choice(types))];
+  const EkfOptions options = EkfOptions::FromNode(entry);
+  if (const auto policy = entry.Find("on_divergence")) {
+    contestant.on_divergence = static_cast<OnDivergence>(policy->Choice({"report", "fail"}));
+  }
+  const auto overrides = entry.Find("overrides");
+  const Config own = overrides ? config.Merged(*overrides) : config;
+  if (overrides) {
+    for (const auto& [key, value] : overrides->Entries()) {
+      if (key != "state" && key != "sensors" && key != "start_s") {
+        value.Fail("'" + key + "' is common to all estimators of a run",
+                   "state, sensors or start_s");
+      }
+    }
+  }
+  const std::vector<std::string> only = ReadSensorList(entry, own.root());
+  entry.RejectUnread();
+  contestant.system = BuildSystem(own.root(), host, only);
+  for (const SensorBinding& sensor : contestant.system.sensors) {
+    FindStream(own.root().At("sensors").At(sensor.name), sensor.model, streams);
+  }
+  contestant.estimator = std::make_unique<Ekf>(contestant.system, options, streams);
+  return contestant;
+}
+
+std::vector<Segment> ReadSegments(const Node& root, const System& system,
+                                  const std::vector<StreamInfo>& streams) {
+  std::vector<Segment> segments;
+  const auto evaluate = root.Find("evaluate");
+  if (!evaluate) return segments;
+  if (const auto list = evaluate->Find("segments")) {
+    for (const auto& [name, entry] : list->Entries()) {
+      const auto with = entry.Find("with"), without = entry.Find("without");
+      if (with.has_value() == without.has_value()) {
+        entry.Fail("a segment is the stamps with or without a valid measurement",
+                   "one of with: SENSOR, without: SENSOR");
+      }
+      const Node& sensor = with ? *with : *without;
+      std::vector<std::string> names;
+      for (const SensorBinding& binding : system.sensors) names.push_back(binding.name);
+      const int index = system.FindSensor(sensor.Text());
+      if (index < 0) {
+        sensor.Fail("no sensor '" + sensor.Text() + "'", "a name from `sensors`",
+                    Nearest(sensor.Text(), names));
+      }
+      const SensorBinding& binding = system.sensors[static_cast<std::size_t>(index)];
+      const int stream =
+          FindStream(root.At("sensors").At(binding.name), binding.model, streams);
+      segments.push_back({name, stream, with.has_value(), binding.model});
+      entry.RejectUnread();
+    }
+  }
+  evaluate->RejectUnread();
+  return segments;
+}
+
+}  // namespace
+
+std::vector<std::filesystem::path> PluginPaths(const Config& config) {
+  std::vector<std::filesystem::path> paths;
+  if (const auto list = config.root().Find("plugins")) {
+    for (const Node& item : list->Items()) {
+      const std::filesystem::path path = item.Text();
+      paths.push_back(path.is_absolute() ? path : config.folder() / path);
+    }
+  }
+  return paths;
+}
+
+Experiment BuildExperiment(const Config& config, const PluginHost& host) {
+  const Node root = config.root();
+  CheckSchema(root);
+  for (const char* key : {"title", "output", "plugins", "include"}) root.Declare(key);
+  if (const auto reference = root.Find("reference")) {
+    static_cast<void>(reference->Choice({"truth"}));
+  }
+
+  Experiment experiment;
+  const Node source = root.At("source", "a run: where measurements come from");
+  if (const auto seed = source.Find("seed")) {
+    experiment.seed = static_cast<std::uint64_t>(seed->Integer(0, INT64_MAX));
+  }
+  experiment.source = host.CreateSource(source.At("type", "a source").Text(), source,
+                                        experiment.seed, config.folder());
+  source.RejectUnread();
+  const std::vector<StreamInfo>& streams = experiment.source->streams();
+
+  // Every sensor is checked, whether or not an estimator uses it.
+  const System whole = BuildSystem(root, host, {});
+  for (const SensorBinding& sensor : whole.sensors) {
+    FindStream(root.At("sensors").At(sensor.name), sensor.model, streams);
+  }
+  experiment.segments = ReadSegments(root, whole, streams);
+  for (const auto& [name, entry] : root.At("estimators", "a run").Entries()) {
+    experiment.contestants.push_back(BuildContestant(name, entry, config, host, streams));
+  }
+  if (experiment.contestants.empty()) {
+    root.At("estimators").Fail("empty", "at least one estimator");
+  }
+  root.RejectUnread();
+  return experiment;
+}
+
+}  // namespace alidade

@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/explain.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "alidade/ekf.h"
+#include "alidade/metrics.h"
+#include "number_text.h"
+#include "text_table.h"
+
+namespace alidade {
+namespace {
+
+using internal::Join;
+using internal::NumberText;
+using internal::TextRow;
+using internal::TextTable;
+
+constexpr std::size_t kIndent = 4;
+
+std::string GeometryText(const Geometry& geometry) {
+  switch (geometry.kind) {
+    case GeometryKind::kVector:
+      return "vector";
+    case GeometryKind::kAngle:
+      return "angle";
+    case GeometryKind::kUnitQuaternion:
+      return "unit_quaternion";
+    case GeometryKind::kUnitVector:
+      return "unit_vector";
+  }
+  return {};
+}
+
+const char* StatusText(BlockStatus status) {
+  switch (status) {
+    case BlockStatus::kEstimated:
+      return "estimated";
+    case BlockStatus::kConsidered:
+      return "considered";
+    case BlockStatus::kFixed:
+      break;
+  }
+  return "fixed";
+}
+
+/// A number, or a list; the number alone where all are equal and `same` allows it.
+std::string ListText(const std::vector<double>& values, bool same = false) {
+  const bool equal = std::equal(values.begin() + 1, values.end(), values.begin());
+  if (values.size() == 1 || (same && equal)) return NumberText(values[0]);
+  std::vector<std::string> parts;
+  for (const double value : values) parts.push_back(NumberText(value));
+  return '[' + Join(parts) + ']';
+}
+
+std::string PriorText(const Prior& prior, const Block& block) {
+  if (!prior.from.empty()) return "first measurement of " + prior.from;
+  std::string text = ListText(prior.mean);
+  if (block.status == BlockStatus::kFixed) return text + ", exact";
+  std::vector<double> sigmas;
+  for (Eigen::Index i = 0; i < prior.covariance.rows(); ++i) {
+    // Six digits hide the rounding of sigma -> variance -> sigma.
+    char sigma[32];
+    std::snprintf(sigma, sizeof(sigma), "%.6g", std::sqrt(prior.covariance(i, i)));
+    sigmas.push_back(std::strtod(sigma, nullptr));
+  }
+  return text + " +- " + ListText(sigmas, true);
+}
+
+std::string States(const System& system) {
+  std::vector<TextRow> rows = {
+      {"block", "geometry", "size", "unit", "owner", "status", "starts from"}};
+  for (const Prior& prior : system.priors) {
+    const Block& block = system.layout[prior.block];
+    const Geometry& geometry = block.geometry();
+    std::string size = std::to_string(geometry.ambient);
+    if (geometry.tangent != geometry.ambient) {
+      size.append(" (").append(std::to_string(geometry.tangent)).append(" free)");
+    }
+    rows.push_back({block.name, GeometryText(geometry), size, block.space.unit, block.owner,
+                    StatusText(block.status), PriorText(prior, block)});
+  }
+  return TextTable(rows, kIndent);
+}
+
+std::string Motions(const System& system) {
+  std::vector<TextRow> rows = {{"entry", "model", "moves", "noise inputs"}};
+  for (const MotionBinding& motion : system.motions) {
+    std::vector<std::string> blocks;
+    for (const BlockId id : motion.blocks) blocks.push_back(system.layout[id].name);
+    const int noise = motion.model.noise_size();
+    rows.push_back({motion.name, motion.model.name(), Join(blocks),
+                    noise == 0 ? "none" : std::to_string(noise)});
+  }
+  return TextTable(rows, kIndent);
+}
+
+const char* ModeText(RoleMode mode) {
+  switch (mode) {
+    case RoleMode::kEstimate:
+      return "estimate";
+    case RoleMode::kConsider:
+      return "consider";
+    case RoleMode::kHold:
+      break;
+  }
+  return "hold";
+}
+
+std::string Sensors(const System& system) {
+  std::vector<TextRow> rows = {
+      {"sensor", "stream", "model", "role", "block", "mode", "linearise_at"}};
+  for (const SensorBinding& sensor : system.sensors) {
+    TextRow front = {sensor.name, sensor.stream, sensor.model.name()};
+    for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
+      const RoleBinding& role = sensor.roles[i];
+      TextRow row = std::exchange(front, TextRow(3));
+      row.push_back(sensor.model.roles()[i].name);
+      if (role.block < 0) {
+        row.insert(row.end(), {"(unbound)", "", ""});
+      } else {
+        const bool prediction = role.linearise_at == LineariseAt::kPrediction;
+        row.insert(row.end(), {system.layout[role.block].name, ModeText(role.mode),
+                               prediction ? "prediction" : "measurement"});
+      }
+      rows.push_back(std::move(row));
+    }
+  }
+  return TextTable(rows, kIndent);
+}
+
+/// What a sensor does with the block that fills a role.
+const char* EffectText(const Block& block, RoleMode mode) {
+  if (block.status == BlockStatus::kFixed || mode == RoleMode::kHold) return "holds";
+  const bool considers = block.status == BlockStatus::kConsidered || mode == RoleMode::kConsider;
+  return considers ? "considers" : "corrects";
+}
+
+/// A line for each block, a column for each motion entry and sensor.
+std::string Touches(const System& system) {
+  std::vector<TextRow> rows(1 + system.layout.blocks().size());
+  rows[0].push_back("block");
+  for (std::size_t b = 0; b + 1 < rows.size(); ++b) {
+    rows[b + 1].push_back(system.layout.blocks()[b].name);
+  }
+  const auto add_column = [&](const std::string& name) {
+    for (TextRow& row : rows) row.emplace_back("-");
+    rows[0].back() = name;
+  };
+  for (const MotionBinding& motion : system.motions) {
+    add_column(motion.name);
+    for (const BlockId id : motion.blocks) rows[static_cast<std::size_t>(id) + 1].back() = "moves";
+  }
+  for (const SensorBinding& sensor : system.sensors) {
+    add_column(sensor.name);
+    for (const RoleBinding& role : sensor.roles) {
+      if (role.block < 0) continue;
+      rows[static_cast<std::size_t>(role.block) + 1].back() =
+          EffectText(system.layout[role.block], role.mode);
+    }
+  }
+  return TextTable(rows, kIndent);
+}
+
+std::string Unobservable(const System& system) {
+  std::map<std::vector<std::string>, int> directions;
+  for (const auto& names : UnobservableDirections(system)) ++directions[names];
+  if (directions.empty()) return "  every direction of the state can be observed\n";
+  std::string text;
+  for (const auto& [names, count] : directions) {
+    text += "  cannot be observed: " + names[0];
+    if (names.size() > 1) text += " together with " + Join({names.begin() + 1, names.end()});
+    text += " (" + std::to_string(count) + (count == 1 ? " direction)\n" : " directions)\n");
+  }
+  return text;
+}
+
+std::string GateText(const EkfOptions& options, const System& system) {
+  if (options.gate >= 1.0) return "none: every measurement is used";
+  std::map<int, std::string> thresholds;
+  for (const SensorBinding& sensor : system.sensors) {
+    const int dof = sensor.model.measurement().geometry.tangent;
+    thresholds[dof] = internal::FixedText(ChiSquareQuantile(options.gate, dof), 2);
+  }
+  std::vector<std::string> parts;
+  for (const auto& [dof, threshold] : thresholds) {
+    parts.push_back(threshold + " at " + std::to_string(dof) + " dof");
+  }
+  return NumberText(options.gate) + ": accepts r' S^-1 r up to " + Join(parts);
+}
+
+std::string FuseText(Fuse fuse, const System& system) {
+  std::vector<std::string> names;
+  for (const SensorBinding& sensor : system.sensors) names.push_back(sensor.name);
+  switch (fuse) {
+    case Fuse::kJoint:
+      return "joint: one stacked update for each stamp";
+    case Fuse::kPerSensor:
+      return "per_sensor: one update for each sensor, in the order " + Join(names);
+    case Fuse::kPerMeasurement:
+      break;
+  }
+  return "per_measurement: one update for each measurement, in the order " + Join(names);
+}
+
+std::string LockoutText(const EkfOptions& options) {
+  const std::string after =
+      " after " + std::to_string(options.lockout_after) + " rejections of a sensor in a row";
+  switch (options.lockout) {
+    case Lockout::kReset:
+      return "reset its blocks from the measurement, or inflate them," + after;
+    case Lockout::kInflate:
+      return "inflate its blocks," + after;
+    case Lockout::kNone:
+      break;
+  }
+  return "none";
+}
+
+std::string Options(const Node& entry, const Contestant& contestant) {
+  const EkfOptions options = EkfOptions::FromNode(entry);
+  const System& system = contestant.system;
+  std::vector<TextRow> rows = {{"gate", GateText(options, system)},
+                               {"fuse", FuseText(options.fuse, system)},
+                               {"lockout", LockoutText(options)},
+                               {"max_dt_s", std::isfinite(options.max_dt_s)
+                                                ? NumberText(options.max_dt_s)
+                                                : "none: a gap is one step"},
+                               {"on_divergence",
+                                contestant.on_divergence == OnDivergence::kFail
+                                    ? "fail: the run ends with exit code 79"
+                                    : "report: the run goes on"}};
+  if (system.start_s) rows.push_back({"start_s", NumberText(*system.start_s)});
+  return TextTable(rows, kIndent);
+}
+
+std::string SupportText(const std::string& type) {
+  if (type != "ekf") return {};
+  return "    blocks estimated, considered (Schmidt) or fixed; roles estimate, consider, hold;\n"
+         "    linearise_at prediction or measurement; blocks that start from a measurement.\n"
+         "    Not: control inputs, landmarks, measurements out of order.\n";
+}
+
+std::string SourceText(const Config& config, const Experiment& experiment) {
+  const Node source = config.root().At("source");
+  std::string text = "source " + source.At("type").Text();
+  text += ", seed " + std::to_string(experiment.seed) + '\n';
+  std::vector<TextRow> rows = {{"stream", "size", "used by"}};
+  for (const StreamInfo& stream : experiment.source->streams()) {
+    std::vector<std::string> users;
+    for (const auto& [name, sensor] : config.root().At("sensors").Entries()) {
+      if (sensor.At("stream").Text() == stream.name) users.push_back(name);
+    }
+    rows.push_back({stream.name, std::to_string(stream.size), users.empty() ? "-" : Join(users)});
+  }
+  std::vector<std::string> truths;
+  for (const StreamInfo& truth : experiment.source->truths()) truths.push_back(truth.name);
+  text += TextTable(rows, kIndent);
+  return text + "  truth: " + (truths.empty() ? "not known" : Join(truths)) + '\n';
+}
+
+}  // namespace
+
+std::string Explain(const Config& config, const Experiment& experiment) {
+  std::string text = SourceText(config, experiment);
+  for (const Contestant& contestant : experiment.contestants) {
+    const System& system = contestant.system;
+    const Node entry = config.root().At("estimators").At(contestant.name);
+    text += "\nestimator " + contestant.name + " (" + contestant.type + ")\n";
+    text += "  state\n" + States(system);
+    text += "  motion\n" + Motions(system);
+    text += "  sensors\n" + Sensors(system);
+    text += "  who touches which block\n" + Touches(system);
+    text += Unobservable(system);
+    text += "  options\n" + Options(entry, contestant);
+    if (const std::string support = SupportText(contestant.type); !support.empty()) {
+      text += "  an " + contestant.type + " supports\n" + support;
+    }
+  }
+  return text;
+}
+
+}  // namespace alidade

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "alidade/source.h"
+
+namespace alidade::internal {
+
+/// A csv file to draw from. Rows of `kinds` kinds take turns in it, as those of several sensors.
+struct FigureFile {
+  std::string name;
+  std::int64_t rows = 0;
+  int kinds = 1;
+};
+
+/// A gnuplot script that draws panels, one above the other over the same time axis, from the csv
+/// files of a run folder into `figures/NAME.svg` (or .png). It is kept in the folder, so it is
+/// written to be read and changed.
+class FigureScript {
+ public:
+  /// All panels show the time from `first` to `last`.
+  FigureScript(std::string name, std::string title, Stamp first, Stamp last);
+
+  /// Starts the next panel.
+  void Panel(std::string_view title, std::string_view y_label);
+  /// A line of the panel's settings.
+  void Set(std::string_view line);
+  /// Adds a curve: what stands behind `using`, and its entry in the key ("": none). Of a long file
+  /// it draws every n-th row.
+  void Curve(const FigureFile& file, std::string_view how, std::string_view key);
+  /// Adds a line through the rows for which the expression `mine` is true, broken at gaps.
+  void LineOf(const FigureFile& file, std::string_view mine, std::string_view value, int style,
+              std::string_view key);
+  /// Names the quartiles of an expression over a file NAME_lo_quartile, NAME_up_quartile.
+  void Quartiles(std::string_view name, std::string_view file, std::string_view expression);
+
+  bool empty() const { return panels_ == 0; }
+  const std::string& name() const { return name_; }
+  const std::string& title() const { return title_; }
+  /// The whole script.
+  std::string Text() const;
+
+ private:
+  void EndPanel();
+
+  std::string name_, title_, first_, last_, body_, plot_;
+  double span_s_ = 0.0;
+  int panels_ = 0;
+};
+
+/// `text` as a gnuplot string.
+std::string GnuplotQuoted(std::string_view text);
+/// `[unit]`, or "".
+std::string InBrackets(std::string_view unit);
+
+}  // namespace alidade::internal

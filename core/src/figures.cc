@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "figures.h"
+
+#include <algorithm>
+
+#include "figure_script.h"
+#include "gnuplot.h"
+
+namespace alidade::internal {
+namespace {
+
+constexpr std::size_t kMaxPanels = 12;
+constexpr std::size_t kMaxCurves = 8;
+
+std::string Column(int column) { return '$' + std::to_string(column); }
+
+std::string Is(int column, std::string_view text) {
+  return "strcol(" + std::to_string(column) + ") eq " + GnuplotQuoted(text);
+}
+
+std::string Line(int column, int style) {
+  return "1:" + std::to_string(column) + " with lines ls " + std::to_string(style);
+}
+
+/// `value` where the condition holds, else nothing.
+std::string Where(const std::string& condition, const std::string& value) {
+  return '(' + condition + " ? " + value + " : NaN)";
+}
+
+int EstimatorStyle(std::size_t index) { return static_cast<int>(index % kMaxCurves) + 1; }
+
+int Kinds(std::size_t count) { return std::max(1, static_cast<int>(count)); }
+
+FigureFile Estimates(const RecordedEstimator& e) {
+  return {e.name + "/estimates.csv", e.estimate_rows};
+}
+FigureFile Innovations(const RecordedEstimator& e) {
+  return {e.name + "/innovations.csv", e.innovation_rows, Kinds(e.sensors.size())};
+}
+
+void TruthCurve(FigureScript& script, const RecordedRun& run, const RecordedElement& element) {
+  if (!element.has_truth) return;
+  script.Curve({"truth.csv", run.truth_rows}, Line(element.truth, 11), "truth");
+}
+
+/// The y range that shows estimate and truth in full, and most of the band.
+void StateRange(FigureScript& script, const RecordedEstimator& estimator,
+                const RecordedElement& element) {
+  script.Quartiles("E", Estimates(estimator).name, std::to_string(element.value));
+  if (element.is_random) {
+    script.Quartiles("S", Estimates(estimator).name, std::to_string(element.sigma));
+  }
+  std::string low = "E_min", high = "E_max";
+  if (element.has_truth) {
+    script.Quartiles("T", "truth.csv", std::to_string(element.truth));
+    low = "min(E_min, T_min)";
+    high = "max(E_max, T_max)";
+  }
+  script.Set("low = " + low + (element.is_random ? " - 3 * S_up_quartile" : ""));
+  script.Set("high = " + high + (element.is_random ? " + 3 * S_up_quartile" : ""));
+  script.Set("set yrange [low - margin(low, high) : high + margin(low, high)]");
+}
+
+FigureScript StateFigure(const RecordedRun& run, const RecordedEstimator& estimator) {
+  FigureScript script(estimator.name + ".state", estimator.name + ": state, 3 sigma and truth",
+                      run.first, run.last);
+  std::size_t panels = 0;
+  for (const RecordedElement& element : estimator.elements) {
+    if (!element.has_value || panels++ == kMaxPanels) continue;
+    script.Panel(element.name, InBrackets(element.unit));
+    StateRange(script, estimator, element);
+    const std::string value = Column(element.value), sigma = Column(element.sigma);
+    if (element.is_random) {
+      script.Curve(Estimates(estimator),
+                   "1:(" + value + "-3*" + sigma + "):(" + value + "+3*" + sigma +
+                       ") with filledcurves ls 1",
+                   "+-3 sigma");
+    }
+    script.Curve(Estimates(estimator), Line(element.value, 1), "estimate");
+    TruthCurve(script, run, element);
+  }
+  return script;
+}
+
+std::string Squared(const std::string& unit) {
+  if (unit.empty()) return "";
+  const bool is_simple = unit.find_first_of("/ ^") == unit.npos;
+  return (is_simple ? unit : '(' + unit + ')') + "^2";
+}
+
+FigureScript CovarianceFigure(const RecordedRun& run, const RecordedEstimator& estimator) {
+  FigureScript script(estimator.name + ".covariance", estimator.name + ": variance of each element",
+                      run.first, run.last);
+  std::size_t curves = 0;
+  for (const RecordedElement& element : estimator.elements) {
+    if (!element.is_random || curves == kMaxPanels) continue;
+    if (script.empty()) {
+      script.Panel("diagonal of P", "variance");
+      script.Set("set logscale y\nset format y '%.0e'");
+    }
+    const std::string sigma = Column(element.sigma);
+    script.Curve(Estimates(estimator),
+                 "1:" + Where(sigma + " > 0", sigma + "**2") + " with lines ls " +
+                     std::to_string(EstimatorStyle(curves++)),
+                 element.name + " " + InBrackets(Squared(element.unit)));
+  }
+  return script;
+}
+
+/// The panel names the sensor: where that measures one element, the block element says it all.
+std::string KeyOf(const RecordedGain& gain, const RecordedSensor& sensor) {
+  return sensor.tangent > 1 ? gain.name : gain.name.substr(0, gain.name.find("<-"));
+}
+
+FigureScript GainFigure(const RecordedRun& run, const RecordedEstimator& estimator) {
+  FigureScript script(estimator.name + ".gain", estimator.name + ": Kalman gain of each sensor",
+                      run.first, run.last);
+  const FigureFile file{estimator.name + "/gains.csv", estimator.gain_rows,
+                        Kinds(estimator.sensors.size())};
+  std::size_t panels = 0;
+  for (const RecordedSensor& sensor : estimator.sensors) {
+    std::size_t curves = 0;
+    for (const RecordedGain& gain : sensor.gains) {
+      if (!gain.used || curves == kMaxCurves || panels > kMaxPanels) continue;
+      if (curves == 0 && panels++ < kMaxPanels) script.Panel(sensor.name, "K");
+      script.LineOf(file, Is(2, sensor.name), Column(gain.column), EstimatorStyle(curves++),
+                    KeyOf(gain, sensor));
+    }
+  }
+  return script;
+}
+
+/// One element of a sensor's innovation, with +-3 sigma of S. What lies beyond the axis is drawn on
+/// its edge.
+void InnovationPanel(FigureScript& script, const RecordedEstimator& estimator,
+                     const RecordedSensor& sensor, int element) {
+  const FigureFile file = Innovations(estimator);
+  const std::string r = Column(estimator.r_column(element));
+  const std::string s = Column(estimator.s_column(element));
+  const std::string mine = Is(3, sensor.name);
+  const std::string count = sensor.tangent > 1 ? " " + std::to_string(element) : "";
+  script.Panel(sensor.name + count, "z - h " + InBrackets(sensor.unit));
+  script.Quartiles("S", file.name, Where(mine, s));
+  script.Set("limit = 5 * S_up_quartile");
+  script.Set("set yrange [-limit : limit]");
+  script.LineOf(file, mine, "3 * " + s, 12, "+-3 sqrt(S)");
+  script.LineOf(file, mine, "-3 * " + s, 12, "");
+  const auto points = [&](const std::string& condition, const std::string& value,
+                          const std::string& style, const char* key) {
+    script.Curve(file, "1:" + Where(mine + " && " + condition, value) + " with points " + style,
+                 key);
+  };
+  points("strcol(5) eq 'accepted'", r, "ls 14", "accepted");
+  points("strcol(5) ne 'accepted'", r, "ls 16", "not used");
+  points("abs(" + r + ") > limit", "0.97 * limit * sgn(" + r + ')', "ls 17", "beyond the axis");
+}
+
+FigureScript InnovationFigure(const RecordedRun& run, const RecordedEstimator& estimator) {
+  constexpr int kMaxElements = 3;
+  FigureScript script(estimator.name + ".innovation",
+                      estimator.name + ": innovation of each sensor", run.first, run.last);
+  std::size_t panels = 0;
+  for (const RecordedSensor& sensor : estimator.sensors) {
+    if (!sensor.has_innovations) continue;
+    for (int i = 0; i < std::min(sensor.tangent, kMaxElements); ++i) {
+      if (panels++ < kMaxPanels) InnovationPanel(script, estimator, sensor, i);
+    }
+  }
+  return script;
+}
+
+/// What the measurements tell of a block by themselves, beside truth and estimates.
+void ImpliedPanel(FigureScript& script, const RecordedRun& run, const RecordedImplied& implied) {
+  script.Panel(implied.block + " from single measurements", InBrackets(implied.unit));
+  const std::string column = std::to_string(implied.column);
+  script.Quartiles("I", "implied.csv", column);
+  script.Set("low = I_lo_quartile - 2 * (I_up_quartile - I_lo_quartile)");
+  script.Set("high = I_up_quartile + 2 * (I_up_quartile - I_lo_quartile)");
+  const RecordedElement* truth = nullptr;
+  for (const RecordedEstimator& estimator : run.estimators) {
+    for (const RecordedElement& element : estimator.elements) {
+      if (element.name == implied.block && element.has_truth) truth = &element;
+    }
+  }
+  if (truth != nullptr) {
+    script.Quartiles("T", "truth.csv", std::to_string(truth->truth));
+    script.Set("low = min(low, T_min)\nhigh = max(high, T_max)");
+  }
+  script.Set("set yrange [low - margin(low, high) : high + margin(low, high)]");
+  int style = 13;
+  for (const RecordedImplied& one : run.implied) {
+    if (one.block != implied.block || one.rows == 0) continue;
+    script.Curve({"implied.csv", run.implied_rows, Kinds(run.implied.size())},
+                 "1:" + Where(Is(2, one.sensor), Column(one.column)) + " with points ls " +
+                     std::to_string(style),
+                 "measured: " + one.sensor);
+    style = style == 15 ? 13 : style + 1;
+  }
+  for (std::size_t i = 0; i < std::min(run.estimators.size(), kMaxCurves); ++i) {
+    const RecordedEstimator& estimator = run.estimators[i];
+    for (const RecordedElement& element : estimator.elements) {
+      if (element.name != implied.block || !element.has_value) continue;
+      script.Curve(Estimates(estimator), Line(element.value, EstimatorStyle(i)), estimator.name);
+    }
+  }
+  if (truth != nullptr) TruthCurve(script, run, *truth);
+}
+
+/// The first estimator with a sensor on the stream, and that sensor.
+std::pair<const RecordedEstimator*, const RecordedSensor*> PredictorOf(const RecordedRun& run,
+                                                                       const std::string& stream) {
+  for (const RecordedEstimator& estimator : run.estimators) {
+    for (const RecordedSensor& sensor : estimator.sensors) {
+      if (sensor.stream == stream && sensor.has_innovations) return {&estimator, &sensor};
+    }
+  }
+  return {nullptr, nullptr};
+}
+
+void StreamPanel(FigureScript& script, const RecordedRun& run, const RecordedStream& stream,
+                 int element) {
+  const auto [estimator, sensor] = PredictorOf(run, stream.name);
+  const std::string count = stream.size > 1 ? " " + std::to_string(element) : "";
+  script.Panel("stream " + stream.name + count + ", as measured",
+               InBrackets(sensor != nullptr ? sensor->unit : ""));
+  const std::string value = Where(Is(2, stream.name), Column(4 + element));
+  script.Quartiles("M", "measurements.csv", value);
+  script.Set("low = max(M_min, M_lo_quartile - 3 * (M_up_quartile - M_lo_quartile))");
+  script.Set("high = min(M_max, M_up_quartile + 3 * (M_up_quartile - M_lo_quartile))");
+  script.Set("set yrange [low - margin(low, high) : high + margin(low, high)]");
+  script.Curve({"measurements.csv", run.measurement_rows, Kinds(run.streams.size())},
+               "1:" + value + " with points ls 13", "measured");
+  if (estimator == nullptr) return;
+  script.LineOf(Innovations(*estimator), Is(3, sensor->name), Column(estimator->h_column(element)),
+                1, "predicted: " + estimator->name);
+}
+
+FigureScript MeasurementFigure(const RecordedRun& run) {
+  constexpr int kMaxElements = 3;
+  FigureScript script("measurements", "measurements, and what they tell", run.first, run.last);
+  std::vector<std::string> blocks;
+  for (const RecordedImplied& implied : run.implied) {
+    if (implied.rows == 0 || blocks.size() == kMaxPanels) continue;
+    if (std::find(blocks.begin(), blocks.end(), implied.block) != blocks.end()) continue;
+    blocks.push_back(implied.block);
+    ImpliedPanel(script, run, implied);
+  }
+  std::size_t panels = blocks.size();
+  const bool any_used =
+      std::any_of(run.streams.begin(), run.streams.end(), [&](const auto& stream) {
+        return stream.rows > 0 && PredictorOf(run, stream.name).second != nullptr;
+      });
+  for (const RecordedStream& stream : run.streams) {
+    if (stream.rows == 0) continue;
+    if (any_used && PredictorOf(run, stream.name).second == nullptr) continue;
+    for (int i = 0; i < std::min(stream.size, kMaxElements); ++i) {
+      if (panels++ < kMaxPanels) StreamPanel(script, run, stream, i);
+    }
+  }
+  return script;
+}
+
+/// All estimators beside truth, for the elements that more than one of them estimates.
+FigureScript ComparisonFigure(const RecordedRun& run) {
+  FigureScript script("comparison", "estimators side by side", run.first, run.last);
+  std::size_t panels = 0;
+  if (run.estimators.size() < 2) return script;
+  for (const RecordedElement& element : run.estimators[0].elements) {
+    if (!element.has_value || panels++ >= kMaxPanels) continue;
+    script.Panel(element.name, InBrackets(element.unit));
+    for (std::size_t i = 0; i < std::min(run.estimators.size(), kMaxCurves); ++i) {
+      const RecordedEstimator& estimator = run.estimators[i];
+      for (const RecordedElement& same : estimator.elements) {
+        if (same.name != element.name || !same.has_value) continue;
+        script.Curve(Estimates(estimator), Line(same.value, EstimatorStyle(i)), estimator.name);
+      }
+    }
+    TruthCurve(script, run, element);
+  }
+  return script;
+}
+
+void Draw(const RunFolder& folder, const FigureScript& script, const std::string& estimator,
+          Figures& figures) {
+  if (script.empty() || figures.note.starts_with(kNoGnuplot)) return;
+  const std::string file = "figures/" + script.name() + ".gp";
+  folder.Write(file, script.Text());
+  const std::string why = RunGnuplot(folder.partial(), {file});
+  if (why.empty()) {
+    figures.drawn.push_back({script.name(), script.title(), estimator});
+    return;
+  }
+  std::error_code ignored;  // half a figure is none
+  std::filesystem::remove(folder.partial() / ("figures/" + script.name() + ".svg"), ignored);
+  figures.note = why == kNoGnuplot ? why + ": no figures" : script.name() + " is not drawn: " + why;
+}
+
+}  // namespace
+
+Figures DrawFigures(const RunFolder& folder, const RecordedRun& run) {
+  Figures figures;
+  Draw(folder, MeasurementFigure(run), "", figures);
+  if (!figures.drawn.empty()) {
+    figures.has_png =
+        RunGnuplot(folder.partial(), {"-e", "png=1", "figures/measurements.gp"}).empty();
+    std::error_code ignored;
+    if (!figures.has_png)
+      std::filesystem::remove(folder.partial() / "figures/measurements.png", ignored);
+  }
+  Draw(folder, ComparisonFigure(run), "", figures);
+  for (const RecordedEstimator& estimator : run.estimators) {
+    Draw(folder, StateFigure(run, estimator), estimator.name, figures);
+    Draw(folder, CovarianceFigure(run, estimator), estimator.name, figures);
+    Draw(folder, GainFigure(run, estimator), estimator.name, figures);
+    Draw(folder, InnovationFigure(run, estimator), estimator.name, figures);
+  }
+  return figures;
+}
+
+}  // namespace alidade::internal

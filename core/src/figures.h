@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "recorded.h"
+#include "run_folder.h"
+
+namespace alidade::internal {
+
+/// A figure that was drawn: `figures/NAME.svg`.
+struct Figure {
+  std::string name;
+  std::string title;
+  std::string estimator;  ///< "" where it is of all
+};
+
+struct Figures {
+  std::vector<Figure> drawn;
+  bool has_png = false;  ///< of the first
+  std::string note;      ///< why some or all are missing, or ""
+};
+
+/// Draws what the csv files hold: the measurements and what they tell, the estimators side by side,
+/// and for each estimator its state, variances, gains and innovations. Keeps the scripts. What
+/// gnuplot cannot do is noted, not an error. Errors: kIo.
+Figures DrawFigures(const RunFolder& folder, const RecordedRun& run);
+
+}  // namespace alidade::internal

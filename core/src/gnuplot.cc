@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gnuplot.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <fstream>
+#include <thread>
+
+namespace alidade::internal {
+namespace {
+
+/// The environment of this process, with the language of numbers and messages set to C.
+std::vector<std::string> Environment() {
+  std::vector<std::string> variables;
+  for (char** v = environ; v != nullptr && *v != nullptr; ++v) {
+    if (std::strncmp(*v, "LC_", 3) != 0 && std::strncmp(*v, "GNUPLOT", 7) != 0) {
+      variables.emplace_back(*v);
+    }
+  }
+  variables.emplace_back("LC_ALL=C");
+  return variables;
+}
+
+std::vector<char*> Pointers(std::vector<std::string>& texts) {
+  std::vector<char*> pointers;
+  for (std::string& text : texts) pointers.push_back(text.data());
+  pointers.push_back(nullptr);
+  return pointers;
+}
+
+/// Waits for the child; false where it takes too long, and is ended.
+bool WaitFor(pid_t child, int* status) {
+  using Clock = std::chrono::steady_clock;
+  const auto end = Clock::now() + std::chrono::minutes(1);
+  while (true) {
+    const pid_t done = ::waitpid(child, status, WNOHANG);
+    if (done == child || (done < 0 && errno != EINTR)) return done == child;
+    if (Clock::now() > end) break;
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  ::kill(child, SIGKILL);
+  ::waitpid(child, status, 0);
+  return false;
+}
+
+/// The line of gnuplot's complaint that says what is wrong: the last that is not empty.
+std::string Complaint(const std::filesystem::path& log) {
+  std::ifstream stream(log);
+  std::string line, last;
+  while (std::getline(stream, line)) {
+    if (line.find_first_not_of(" \t^") != line.npos) last = line;
+  }
+  return last;
+}
+
+}  // namespace
+
+std::string RunGnuplot(const std::filesystem::path& folder,
+                       const std::vector<std::string>& arguments) {
+  const std::filesystem::path log = folder / ".gnuplot.log";
+  std::vector<std::string> words = {"gnuplot", "-d"};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<std::string> variables = Environment();
+  const std::vector<char*> argv = Pointers(words), environment = Pointers(variables);
+
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log.filename().c_str(),
+                                   O_WRONLY | O_CREAT | O_TRUNC, 0666);
+  pid_t child = 0;
+  const int error =
+      ::posix_spawnp(&child, "gnuplot", &actions, nullptr, argv.data(), environment.data());
+  posix_spawn_file_actions_destroy(&actions);
+
+  std::string why;
+  int status = 0;
+  if (error == ENOENT) {
+    why = kNoGnuplot;
+  } else if (error != 0) {
+    why = std::string("gnuplot does not start: ") + std::strerror(error);
+  } else if (!WaitFor(child, &status)) {
+    why = "gnuplot took too long";
+  } else if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
+    why = "gnuplot failed: " + Complaint(log);
+  }
+  std::error_code ignored;
+  std::filesystem::remove(log, ignored);
+  return why;
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,324 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/metrics.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "alidade/geometry.h"
+#include "columns.h"
+#include "number_text.h"
+
+namespace alidade {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kInconsistentSigmas = 10.0;
+constexpr int kInconsistentStamps = 20;
+constexpr std::size_t kOutcomes = static_cast<std::size_t>(Outcome::kFailed) + 1;
+
+/// Mean of a quantity, and the share of it that lies inside a bound.
+struct Tally {
+  double sum = 0.0;
+  std::int64_t count = 0, inside = 0;
+
+  void Add(double value, bool is_inside = false) {
+    sum += value;
+    ++count;
+    inside += is_inside;
+  }
+  double mean() const { return sum / static_cast<double>(count); }
+  double share() const { return static_cast<double>(inside) / static_cast<double>(count); }
+};
+
+/// Sums over all stamps, or over those of one segment.
+struct Sums {
+  std::string suffix;                   ///< "" or `@SEGMENT`
+  std::vector<Tally> squares, covered;  ///< by tracked block
+  std::vector<Tally> nees;              ///< by owner
+  std::vector<Tally> nis;               ///< by sensor
+};
+
+/// Estimate and truth of a scalar block over evenly spaced stamps, for its lag.
+struct Series {
+  std::vector<double> estimate, truth;
+  Stamp first = 0, last = 0;
+  Stamp shortest = INT64_MAX, longest = 0;
+
+  void Add(Stamp stamp, double true_value, double error) {
+    if (truth.empty()) {
+      first = stamp;
+    } else {
+      shortest = std::min(shortest, stamp - last);
+      longest = std::max(longest, stamp - last);
+    }
+    last = stamp;
+    truth.push_back(true_value);
+    estimate.push_back(true_value + error);
+  }
+  double step_ms() const {
+    return 1e-6 * static_cast<double>(last - first) / static_cast<double>(truth.size() - 1);
+  }
+  /// Within 5 % of the mean step: what a camera's clock does.
+  bool even() const {
+    if (truth.size() < 2 || shortest <= 0) return false;
+    return 1e-6 * static_cast<double>(longest) < 1.05 * step_ms() &&
+           1e-6 * static_cast<double>(shortest) > 0.95 * step_ms();
+  }
+};
+
+/// A block whose truth is known.
+struct Tracked {
+  BlockId id;
+  std::size_t truth;
+  std::string name, unit;
+  std::vector<std::string> elements;  ///< of the tangent
+  std::vector<int> outside;           ///< stamps on end beyond 10 sigma, by element; -1: reported
+  bool scalar;
+  Series series;  ///< where scalar
+  double last_error = -1.0;
+
+  bool known = false;  ///< at this stamp, and so is what follows
+  Eigen::VectorXd error;
+};
+
+struct Owner {
+  std::string name;
+  std::vector<std::size_t> tracked;
+};
+
+/// e' P^-1 e, or -1 where P is singular or not finite. P is scaled to unit variances first, so that
+/// singular means the same in any unit.
+double SquaredMahalanobis(const Eigen::MatrixXd& p, const Eigen::VectorXd& error) {
+  constexpr double kSingular = 1e-13;
+  const Eigen::VectorXd sigma = p.diagonal().cwiseSqrt();
+  if (!p.allFinite() || !error.allFinite() || !(sigma.minCoeff() > 0.0)) return -1.0;
+  const Eigen::VectorXd scale = sigma.cwiseInverse();
+  const Eigen::LDLT<Eigen::MatrixXd> ldlt(scale.asDiagonal() * p * scale.asDiagonal());
+  if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > kSingular)) return -1.0;
+  const Eigen::VectorXd scaled = scale.cwiseProduct(error);
+  const double squared = scaled.dot(ldlt.solve(scaled));
+  return std::isfinite(squared) ? squared : -1.0;
+}
+
+}  // namespace
+
+struct Metrics::Impl {
+  std::vector<Tracked> tracked;
+  std::vector<Owner> owners;
+  std::vector<std::string> sensors;
+  std::vector<Sums> sums;                                      ///< all stamps, then the segments
+  std::vector<std::array<std::int64_t*, kOutcomes>> count_of;  ///< into counts, by sensor
+  std::map<std::string, std::int64_t> counts;
+  std::map<std::string, std::string> units;
+  std::map<int, double> quantiles;  ///< chi2(0.95, dof)
+  std::vector<Event> events;
+
+  void Track(const System& system, const std::vector<StreamInfo>& truths);
+  void AddErrors(const Frame& frame, const std::vector<Sums*>& into, const State& state);
+  void AddConsistency(Stamp stamp, const std::vector<Sums*>& into, const State& state);
+  void CheckElement(Stamp stamp, Tracked& block, int element, double sigma);
+  void AddNees(const Owner& owner, std::size_t index, const std::vector<Sums*>& into,
+               const State& state);
+  void AddReport(const std::vector<Sums*>& into, const UpdateReport& report);
+  void Write(const Sums& sums_of, std::map<std::string, double>& metrics) const;
+};
+
+void Metrics::Impl::Track(const System& system, const std::vector<StreamInfo>& truths) {
+  const std::vector<int> match = internal::MatchTruths(system.layout, truths);
+  for (BlockId id = 0; id < static_cast<int>(match.size()); ++id) {
+    if (match[id] < 0) continue;
+    const Block& block = system.layout[id];
+    Tracked one;
+    one.id = id;
+    one.truth = static_cast<std::size_t>(match[id]);
+    one.name = block.name;
+    one.unit = internal::UnitOf(system, id);
+    one.elements = internal::TangentNames(block.name, block.space);
+    one.outside.assign(block.geometry().tangent, 0);
+    one.scalar = block.geometry().tangent == 1;
+    one.error.resize(block.geometry().tangent);
+    if (!one.unit.empty()) units[one.name] = one.unit;
+    auto owner = std::find_if(owners.begin(), owners.end(),
+                              [&](const Owner& o) { return o.name == block.owner; });
+    if (owner == owners.end()) owner = owners.insert(owner, {block.owner, {}});
+    owner->tracked.push_back(tracked.size());
+    tracked.push_back(std::move(one));
+  }
+}
+
+void Metrics::Impl::AddErrors(const Frame& frame, const std::vector<Sums*>& into,
+                              const State& state) {
+  for (std::size_t i = 0; i < tracked.size(); ++i) {
+    Tracked& block = tracked[i];
+    const Block& place = state.layout()[block.id];
+    block.known =
+        place.present && block.truth < frame.truth.size() && !frame.truth[block.truth].empty();
+    if (!block.known) continue;
+    const double* truth = frame.truth[block.truth].data();
+    place.geometry().Minus(state.value(block.id), truth, block.error.data());
+    const double square = block.error.allFinite() ? block.error.squaredNorm() : kInfinity;
+    block.last_error = std::sqrt(square);
+    for (Sums* s : into) s->squares[i].Add(square);
+    if (!block.scalar) continue;
+    double value = truth[0];
+    if (place.geometry().kind == GeometryKind::kAngle && !block.series.truth.empty()) {
+      const double before = block.series.truth.back();  // unwrapped: lag needs no jumps
+      value = before + Angle::Wrap(truth[0] - before);
+    }
+    block.series.Add(frame.stamp, value, block.error[0]);
+  }
+}
+
+void Metrics::Impl::CheckElement(Stamp stamp, Tracked& block, int element, double sigma) {
+  int& outside = block.outside[element];
+  if (outside < 0) return;
+  const double error = std::abs(block.error[element]);
+  // A sigma of zero is a value taken as known: its errors are not the filter's.
+  const bool inside = sigma == 0.0 || error <= kInconsistentSigmas * sigma;
+  outside = inside ? 0 : outside + 1;
+  if (outside < kInconsistentStamps) return;
+  outside = -1;
+  const std::string unit = block.unit.empty() ? "" : ' ' + block.unit;
+  events.push_back({stamp, "inconsistent",
+                    block.elements[element] + ": the error, " + internal::NumberText(error) + unit +
+                        ", has been beyond " + internal::NumberText(kInconsistentSigmas) +
+                        " sigma for " + std::to_string(kInconsistentStamps) + " stamps; sigma is " +
+                        internal::NumberText(sigma) + unit});
+}
+
+void Metrics::Impl::AddConsistency(Stamp stamp, const std::vector<Sums*>& into,
+                                   const State& state) {
+  constexpr double kNormal95 = 1.959963984540054;
+  for (std::size_t i = 0; i < tracked.size(); ++i) {
+    Tracked& block = tracked[i];
+    const Block& place = state.layout()[block.id];
+    if (!block.known || !place.has_covariance()) continue;
+    for (int e = 0; e < place.geometry().tangent; ++e) {
+      const double sigma = std::sqrt(state.covariance().Variance(place.tangent_offset + e));
+      CheckElement(stamp, block, e, sigma);
+      if (!block.scalar) continue;
+      const bool covered = std::abs(block.error[0]) <= kNormal95 * sigma;
+      for (Sums* s : into) s->covered[i].Add(0.0, covered);
+    }
+  }
+  for (std::size_t o = 0; o < owners.size(); ++o) AddNees(owners[o], o, into, state);
+}
+
+void Metrics::Impl::AddNees(const Owner& owner, std::size_t index, const std::vector<Sums*>& into,
+                            const State& state) {
+  std::vector<std::size_t> used;
+  int dof = 0;
+  for (const std::size_t i : owner.tracked) {
+    const Block& place = state.layout()[tracked[i].id];
+    if (!tracked[i].known || !place.present || place.status != BlockStatus::kEstimated) continue;
+    used.push_back(i);
+    dof += place.geometry().tangent;
+  }
+  if (dof == 0) return;
+  Eigen::MatrixXd p(dof, dof);
+  Eigen::VectorXd error(dof);
+  int row = 0;
+  for (const std::size_t i : used) {
+    const Block& a = state.layout()[tracked[i].id];
+    const int rows = a.geometry().tangent;
+    error.segment(row, rows) = tracked[i].error;
+    int column = 0;
+    for (const std::size_t j : used) {
+      const Block& b = state.layout()[tracked[j].id];
+      const int columns = b.geometry().tangent;
+      p.block(row, column, rows, columns) =
+          state.covariance().Block(a.tangent_offset, rows, b.tangent_offset, columns);
+      column += columns;
+    }
+    row += rows;
+  }
+  const double nees = SquaredMahalanobis(p, error);
+  if (nees < 0.0) return;
+  const auto [bound, is_new] = quantiles.try_emplace(dof, 0.0);
+  if (is_new) bound->second = ChiSquareQuantile(0.95, dof);
+  for (Sums* s : into) s->nees[index].Add(nees / dof, nees <= bound->second);
+}
+
+void Metrics::Impl::AddReport(const std::vector<Sums*>& into, const UpdateReport& report) {
+  for (const MeasurementReport& m : report.measurements) {
+    if (m.sensor < 0 || m.sensor >= static_cast<int>(sensors.size())) continue;
+    const auto sensor = static_cast<std::size_t>(m.sensor);
+    std::int64_t*& count = count_of[sensor][static_cast<std::size_t>(m.outcome)];
+    if (count == nullptr) count = &counts[std::string(ToString(m.outcome)) + ':' + sensors[sensor]];
+    ++*count;
+    if (m.outcome != Outcome::kAccepted || m.dof <= 0 || !std::isfinite(m.nis)) continue;
+    for (Sums* s : into) s->nis[sensor].Add(m.nis / m.dof);
+  }
+}
+
+void Metrics::Impl::Write(const Sums& s, std::map<std::string, double>& metrics) const {
+  for (std::size_t i = 0; i < tracked.size(); ++i) {
+    const std::string key = tracked[i].name + s.suffix;
+    if (s.squares[i].count > 0) metrics["rmse:" + key] = std::sqrt(s.squares[i].mean());
+    if (s.covered[i].count > 0) metrics["cov95:" + key] = s.covered[i].share();
+  }
+  for (std::size_t o = 0; o < owners.size(); ++o) {
+    if (s.nees[o].count == 0) continue;
+    metrics["nees.mean:" + owners[o].name + s.suffix] = s.nees[o].mean();
+    metrics["nees.cov95:" + owners[o].name + s.suffix] = s.nees[o].share();
+  }
+  for (std::size_t i = 0; i < sensors.size(); ++i) {
+    if (s.nis[i].count > 0) metrics["nis.mean:" + sensors[i] + s.suffix] = s.nis[i].mean();
+  }
+}
+
+Metrics::Metrics(const Contestant& contestant, const Source& source,
+                 const std::vector<Segment>& segments)
+    : impl_(std::make_unique<Impl>()) {
+  impl_->Track(contestant.system, source.truths());
+  for (const SensorBinding& sensor : contestant.system.sensors) {
+    impl_->sensors.push_back(sensor.name);
+  }
+  impl_->count_of.resize(impl_->sensors.size());
+  const auto add_sums = [&](std::string suffix) {
+    const std::vector<Tally> blocks(impl_->tracked.size());
+    impl_->sums.push_back({std::move(suffix), blocks, blocks,
+                           std::vector<Tally>(impl_->owners.size()),
+                           std::vector<Tally>(impl_->sensors.size())});
+  };
+  add_sums("");
+  for (const Segment& segment : segments) add_sums('@' + segment.name);
+}
+
+Metrics::~Metrics() = default;
+Metrics::Metrics(Metrics&&) noexcept = default;
+
+void Metrics::Add(const Frame& frame, const std::vector<bool>& in_segment, const State& state,
+                  const UpdateReport& report) {
+  ALIDADE_EXPECTS(in_segment.size() + 1 == impl_->sums.size());
+  std::vector<Sums*> into = {&impl_->sums[0]};
+  for (std::size_t i = 0; i < in_segment.size(); ++i) {
+    if (in_segment[i]) into.push_back(&impl_->sums[i + 1]);
+  }
+  impl_->AddErrors(frame, into, state);
+  impl_->AddConsistency(frame.stamp, into, state);
+  impl_->AddReport(into, report);
+}
+
+const std::vector<Event>& Metrics::events() const { return impl_->events; }
+
+const std::map<std::string, std::int64_t>& Metrics::counts() const { return impl_->counts; }
+
+const std::map<std::string, std::string>& Metrics::units() const { return impl_->units; }
+
+std::map<std::string, double> Metrics::Finish() const {
+  std::map<std::string, double> metrics;
+  for (const Sums& sums : impl_->sums) impl_->Write(sums, metrics);
+  for (const Tracked& block : impl_->tracked) {
+    if (block.last_error >= 0.0) metrics["final:" + block.name] = block.last_error;
+    if (!block.series.even()) continue;
+    const double lag = Lag(block.series.estimate, block.series.truth, block.series.step_ms());
+    if (std::isfinite(lag)) metrics["lag_ms:" + block.name] = lag;
+  }
+  return metrics;
+}
+
+}  // namespace alidade

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "alidade/source.h"
+
+namespace alidade::internal {
+
+/// The shortest decimal that reads back to `value`, whatever the locale: `0.1`, `1e-05`, `nan`,
+/// `-inf`.
+void AppendNumber(std::string& text, double value);
+std::string NumberText(double value);
+
+/// `decimals` digits after the point.
+std::string FixedText(double value, int decimals);
+
+/// `digits` digits after the point and an exponent.
+std::string ScientificText(double value, int digits);
+
+/// Seconds with nine decimals, exact: `-0.033000000`.
+void AppendSeconds(std::string& text, Stamp stamp);
+
+}  // namespace alidade::internal

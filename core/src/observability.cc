@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/system.h"
+
+namespace alidade {
+namespace {
+
+/// Blocks with their values and the columns they take in the observability matrix.
+struct Trajectory {
+  std::vector<std::vector<double>> values;
+  std::vector<int> columns;  ///< -1: known, no column
+  std::vector<double> scale;
+  std::vector<std::string> names;
+};
+
+/// A generic point near the prior: no element at a special value, the sensors' domain kept.
+Trajectory StartNearPrior(const System& system) {
+  Trajectory t;
+  t.values.resize(system.layout.blocks().size());
+  t.columns.assign(t.values.size(), -1);
+  for (const Prior& prior : system.priors) {
+    const Block& block = system.layout[prior.block];
+    const Geometry& geometry = block.geometry();
+    auto& value = t.values[static_cast<std::size_t>(prior.block)];
+    value.resize(static_cast<std::size_t>(geometry.ambient));
+    if (prior.from.empty()) {
+      value = prior.mean;
+    } else {
+      geometry.Identity(value.data());
+    }
+    std::vector<double> nudge(static_cast<std::size_t>(geometry.tangent));
+    for (std::size_t i = 0; i < nudge.size(); ++i) {
+      const double size = prior.from.empty() ? 0.03 * (1.0 + std::abs(value[i])) : 1.0;
+      nudge[i] = size * (1.0 + 0.1 * static_cast<double>((prior.block + 3 * i) % 7));
+    }
+    geometry.Plus(value.data(), nudge.data(), value.data());
+    if (block.status == BlockStatus::kFixed) continue;
+    t.columns[static_cast<std::size_t>(prior.block)] = static_cast<int>(t.names.size());
+    const std::vector<std::string> names = ColumnNames(block.name, block.space);
+    for (int i = 0; i < geometry.tangent; ++i) {
+      const bool by_element = geometry.tangent == geometry.ambient;
+      t.names.push_back(by_element ? names[static_cast<std::size_t>(i)] : block.name);
+      const double sigma =
+          prior.covariance.size() > 0 ? std::sqrt(prior.covariance(i, i)) : 1.0;
+      t.scale.push_back(sigma > 0.0 ? sigma : 1.0);
+    }
+  }
+  return t;
+}
+
+/// Moves the values by dt and phi <- F phi. False where a model cannot step.
+bool Advance(const System& system, double dt_s, Trajectory& t, Eigen::MatrixXd& phi) {
+  for (const MotionBinding& motion : system.motions) {
+    const int n = motion.model.tangent_size();
+    std::vector<const double*> x;
+    std::vector<std::vector<double>> next;
+    std::vector<double*> y;
+    for (const BlockId id : motion.blocks) {
+      x.push_back(t.values[static_cast<std::size_t>(id)].data());
+      next.push_back(t.values[static_cast<std::size_t>(id)]);
+    }
+    for (auto& value : next) y.push_back(value.data());
+    RowMajor f(n, n), g(n, std::max(1, motion.model.noise_size()));
+    if (motion.model.Step(x.data(), nullptr, nullptr, dt_s, y.data(), f.data(), g.data()) !=
+        Status::kOk) {
+      return false;
+    }
+    std::vector<Eigen::Index> to, from;
+    Eigen::Index row = 0;
+    for (std::size_t i = 0; i < motion.blocks.size(); ++i) {
+      const BlockId id = motion.blocks[i];
+      const int column = t.columns[static_cast<std::size_t>(id)];
+      for (int k = 0; k < system.layout[id].geometry().tangent; ++k, ++row) {
+        if (column < 0) continue;
+        from.push_back(row);
+        to.push_back(column + k);
+      }
+      if (column >= 0) t.values[static_cast<std::size_t>(id)] = next[i];
+    }
+    const Eigen::MatrixXd moved = f(from, from) * phi(to, Eigen::all);
+    phi(to, Eigen::all) = moved;
+  }
+  return true;
+}
+
+/// Rows H phi of every sensor that is defined at the values.
+void Observe(const System& system, const Trajectory& t, const Eigen::MatrixXd& phi,
+             std::vector<Eigen::RowVectorXd>& rows) {
+  for (const SensorBinding& sensor : system.sensors) {
+    const int m = sensor.model.measurement().geometry.tangent;
+    std::vector<const double*> roles;
+    std::vector<RowMajor> j;
+    for (const RoleBinding& role : sensor.roles) {
+      roles.push_back(role.block < 0 ? nullptr
+                                     : t.values[static_cast<std::size_t>(role.block)].data());
+      j.push_back(RowMajor::Zero(m, role.block < 0
+                                        ? 1
+                                        : system.layout[role.block].geometry().tangent));
+    }
+    std::vector<double*> data;
+    std::vector<int> strides;
+    for (RowMajor& block : j) {
+      data.push_back(block.data());
+      strides.push_back(static_cast<int>(block.cols()));
+    }
+    std::vector<double> z(static_cast<std::size_t>(sensor.model.measurement().geometry.ambient));
+    if (sensor.model.Linearise(roles.data(), z.data(), data.data(), strides.data()) !=
+        Status::kOk) {
+      continue;
+    }
+    Eigen::MatrixXd h = Eigen::MatrixXd::Zero(m, phi.rows());
+    for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
+      const RoleBinding& role = sensor.roles[i];
+      if (role.block < 0 || role.mode == RoleMode::kHold) continue;
+      const int column = t.columns[static_cast<std::size_t>(role.block)];
+      if (column >= 0) h.middleCols(column, j[i].cols()) += j[i];
+    }
+    const Eigen::MatrixXd seen = h * phi;
+    for (Eigen::Index i = 0; i < seen.rows(); ++i) rows.emplace_back(seen.row(i));
+  }
+}
+
+/// Brings the columns of a null-space basis to reduced echelon form, so that each one moves as few
+/// elements as it can.
+void Reduce(Eigen::MatrixXd& basis) {
+  Eigen::Index done = 0;
+  for (Eigen::Index row = 0; row < basis.rows() && done < basis.cols(); ++row) {
+    Eigen::Index pivot = done;
+    basis.row(row).tail(basis.cols() - done).cwiseAbs().maxCoeff(&pivot);
+    pivot += done;
+    if (std::abs(basis(row, pivot)) < 1e-6) continue;
+    basis.col(done).swap(basis.col(pivot));
+    basis.col(done) /= basis(row, done);
+    for (Eigen::Index c = 0; c < basis.cols(); ++c) {
+      if (c != done) basis.col(c) -= basis(row, c) * basis.col(done);
+    }
+    ++done;
+  }
+}
+
+}  // namespace
+
+std::vector<std::vector<std::string>> UnobservableDirections(const System& system) {
+  constexpr double kStep = 0.02, kRankTolerance = 1e-9;
+  Trajectory t = StartNearPrior(system);
+  const Eigen::Index n = static_cast<Eigen::Index>(t.names.size());
+  if (n == 0) return {};
+  Eigen::MatrixXd phi = Eigen::MatrixXd::Identity(n, n);
+  std::vector<Eigen::RowVectorXd> rows;
+  for (Eigen::Index k = 0; k <= n; ++k) {
+    Observe(system, t, phi, rows);
+    if (!Advance(system, kStep, t, phi)) break;
+  }
+  Eigen::MatrixXd o = Eigen::MatrixXd::Zero(std::max<Eigen::Index>(n, static_cast<Eigen::Index>(rows.size())), n);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const double norm = rows[i].norm();
+    if (norm > 0.0) o.row(static_cast<Eigen::Index>(i)) = rows[i] / norm;
+  }
+  const Eigen::Map<const Eigen::VectorXd> scale(t.scale.data(), n);
+  o = o * scale.asDiagonal();
+  Eigen::JacobiSVD<Eigen::MatrixXd> svd(o, Eigen::ComputeFullV);
+  Eigen::Index rank = 0;
+  const Eigen::VectorXd& values = svd.singularValues();
+  while (rank < values.size() && values[rank] > kRankTolerance * values[0]) ++rank;
+  Eigen::MatrixXd null_space = svd.matrixV().rightCols(n - rank);
+  Reduce(null_space);
+  std::vector<std::vector<std::string>> directions;
+  for (Eigen::Index c = 0; c < null_space.cols(); ++c) {
+    std::vector<std::string>& names = directions.emplace_back();
+    for (Eigen::Index i = 0; i < n; ++i) {
+      if (std::abs(null_space(i, c)) < 1e-6 * null_space.col(c).cwiseAbs().maxCoeff()) continue;
+      if (names.empty() || names.back() != t.names[static_cast<std::size_t>(i)]) {
+        names.push_back(t.names[static_cast<std::size_t>(i)]);
+      }
+    }
+  }
+  return directions;
+}
+
+}  // namespace alidade

@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "param_reader.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <tuple>
+#include <utility>
+
+#include "abi_read.h"
+#include "number_text.h"
+
+namespace alidade::internal {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+std::string Text(const char* text) { return text == nullptr ? "" : text; }
+
+std::string RangeText(const AlidadeParam& param) {
+  const bool low_open = (param.flags & ALIDADE_PARAM_LOW_OPEN) != 0;
+  const bool high_open = (param.flags & ALIDADE_PARAM_HIGH_OPEN) != 0;
+  const bool bounded_below = param.low > -kInfinity, bounded_above = param.high < kInfinity;
+  if (bounded_below && bounded_above) {
+    return (low_open ? "(" : "[") + NumberText(param.low) + ", " + NumberText(param.high) +
+           (high_open ? ")" : "]");
+  }
+  if (bounded_below) return (low_open ? "> " : ">= ") + NumberText(param.low);
+  if (bounded_above) return (high_open ? "< " : "<= ") + NumberText(param.high);
+  return {};
+}
+
+std::string TypeText(const AlidadeParam& param) {
+  const char* const names[] = {"", "number", "integer", "flag", "choice"};
+  const std::string name = names[param.kind];
+  if (param.count < 0) return name + "[]";
+  return param.count == 1 ? name : name + '[' + std::to_string(param.count) + ']';
+}
+
+std::string ValueText(const AlidadeParam& param, double value) {
+  if (param.kind == ALIDADE_PARAM_FLAG) return value != 0.0 ? "true" : "false";
+  if (param.kind != ALIDADE_PARAM_CHOICE) return NumberText(value);
+  const bool known = value >= 0.0 && value < param.choice_count;
+  return known ? Text(param.choices[static_cast<int>(value)]) : "";
+}
+
+std::vector<double> Fallback(const AlidadeParam& param) {
+  if (param.fallback == nullptr) return {};
+  return std::vector<double>(param.fallback, param.fallback + std::max(param.count, 0));
+}
+
+bool HasFallback(const AlidadeParam& param) {
+  return (param.flags & ALIDADE_PARAM_HAS_DEFAULT) != 0;
+}
+
+std::string FallbackText(const AlidadeParam& param) {
+  if (!HasFallback(param)) return {};
+  std::string text;
+  for (const double value : Fallback(param)) {
+    text += (text.empty() ? "" : ", ") + ValueText(param, value);
+  }
+  return param.count == 1 ? text : '[' + text + ']';
+}
+
+std::vector<std::string> Choices(const AlidadeParam& param) {
+  std::vector<std::string> choices;
+  for (int i = 0; i < param.choice_count; ++i) choices.push_back(Text(param.choices[i]));
+  return choices;
+}
+
+ParamInfo Describe(const AlidadeParam& param) {
+  ParamInfo info;
+  info.key = param.key;
+  info.unit = Text(param.unit);
+  info.doc = Text(param.doc);
+  info.type = TypeText(param);
+  const bool number = param.kind == ALIDADE_PARAM_NUMBER || param.kind == ALIDADE_PARAM_INTEGER;
+  if (number) info.range = RangeText(param);
+  info.fallback = FallbackText(param);
+  info.choices = Choices(param);
+  return info;
+}
+
+/// The parameter, where it follows the rules of plugin_abi.h; else an exception.
+AlidadeParam Checked(const AlidadeParam* from, const double* values, std::int32_t capacity) {
+  if (from == nullptr) throw Error(ExitCode::kPlugin, "asks for no parameter at all");
+  const AlidadeParam param = ReadPrefix(from);
+  const std::string key = Text(param.key);
+  const bool known = param.kind >= ALIDADE_PARAM_NUMBER && param.kind <= ALIDADE_PARAM_CHOICE;
+  const bool choice = param.kind == ALIDADE_PARAM_CHOICE;
+  if (key.empty() || !known || param.count == 0 || param.count < -1 || param.count > capacity ||
+      values == nullptr || choice != (param.choices != nullptr && param.choice_count > 0)) {
+    throw Error(ExitCode::kPlugin, "the plugin asks for parameter '" + key +
+                                       "' in a way that this version does not understand");
+  }
+  return param;
+}
+
+std::string Joined(const std::vector<std::string>& words, const char* between) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : between) + word;
+  return text;
+}
+
+/// `(px, > 0: rectified focal length)`
+std::string Meaning(const AlidadeParam& param) {
+  const ParamInfo info = Describe(param);
+  std::vector<std::string> parts;
+  if (!info.unit.empty()) parts.push_back(info.unit);
+  if (!info.range.empty()) parts.push_back(info.range);
+  if (!info.choices.empty()) parts.push_back("one of " + Joined(info.choices, ", "));
+  std::string text = Joined(parts, ", ");
+  if (!text.empty() && !info.doc.empty()) text += ": ";
+  return '(' + text + info.doc + ')';
+}
+
+std::string PathBelow(const Node& map, const std::string& key) {
+  return map.path().empty() ? key : map.path() + '.' + key;
+}
+
+double One(const AlidadeParam& param, const Node& node) {
+  const bool low_open = (param.flags & ALIDADE_PARAM_LOW_OPEN) != 0;
+  const bool high_open = (param.flags & ALIDADE_PARAM_HIGH_OPEN) != 0;
+  constexpr double kExact = 9007199254740992.0;
+  switch (param.kind) {
+    case ALIDADE_PARAM_INTEGER:
+      return static_cast<double>(
+          node.Integer(static_cast<std::int64_t>(std::clamp(param.low, -kExact, kExact)),
+                       static_cast<std::int64_t>(std::clamp(param.high, -kExact, kExact))));
+    case ALIDADE_PARAM_FLAG:
+      return node.Flag() ? 1.0 : 0.0;
+    case ALIDADE_PARAM_CHOICE:
+      return node.Choice(Choices(param));
+    default:
+      return node.Number(param.low, param.high, low_open, high_open);
+  }
+}
+
+std::vector<double> All(const AlidadeParam& param, const Node& node) {
+  if (param.count == 1) return {One(param, node)};
+  const bool is_list = node.kind() == Node::Kind::kList;
+  const std::vector<Node> items = is_list ? node.Items() : std::vector<Node>{node};
+  if (param.kind == ALIDADE_PARAM_NUMBER) {
+    static_cast<void>(node.Numbers(param.count));
+  } else if (param.count > 0 && std::ssize(items) != param.count) {
+    node.Fail(std::to_string(items.size()) + " values", std::to_string(param.count));
+  }
+  std::vector<double> values;
+  for (const Node& item : items) values.push_back(One(param, item));
+  return values;
+}
+
+}  // namespace
+
+ParamReader::ParamReader(const Node& entry, std::string owner)
+    : entry_(entry), owner_(std::move(owner)) {
+  host_.struct_size = sizeof(AlidadeHost);
+  host_.abi_major = ALIDADE_ABI_MAJOR;
+  host_.abi_minor = ALIDADE_ABI_MINOR;
+  host_.context = this;
+  host_.read = &ParamReader::Read;
+  host_.fail = &ParamReader::Fail;
+}
+
+void ParamReader::Check() const {
+  if (errors_.empty()) return;
+  std::vector<std::string> lines(errors_.begin(), errors_.end());
+  const auto by_place = [](const std::string& a, const std::string& b) {
+    return strverscmp(a.c_str(), b.c_str()) < 0;
+  };
+  std::sort(lines.begin(), lines.end(), by_place);
+  lines.erase(std::unique(lines.begin(), lines.end()), lines.end());
+  throw Error(ExitCode::kBadConfig, Joined(lines, "\n"));
+}
+
+std::int32_t ParamReader::Read(void* self, const AlidadeParam* param, double* values,
+                               std::int32_t capacity) noexcept {
+  auto* reader = static_cast<ParamReader*>(self);
+  try {
+    const std::vector<double> read = reader->Values(Checked(param, values, capacity));
+    std::copy_n(read.begin(), std::min(std::ssize(read), std::ptrdiff_t{capacity}), values);
+    return static_cast<std::int32_t>(read.size());
+  } catch (const std::exception& e) {
+    reader->errors_.push_back(e.what());
+  }
+  return -1;
+}
+
+void ParamReader::Fail(void* self, const char* key, const char* text) noexcept {
+  auto* reader = static_cast<ParamReader*>(self);
+  if (Text(key).empty()) {
+    reader->failure_ = Text(text).empty() ? "it does not say why" : Text(text);
+    return;
+  }
+  Place place = reader->entry_.place();
+  std::optional<Node> at = reader->entry_;
+  std::string rest = key;
+  for (std::size_t dot = 0; at && at->is_map() && dot != std::string::npos;) {
+    dot = rest.find('.');
+    at = at->Find(rest.substr(0, dot));
+    if (at) place = at->place();
+    rest.erase(0, dot == std::string::npos ? dot : dot + 1);
+  }
+  reader->errors_.push_back(ErrorLine(place, PathBelow(reader->entry_, key), Text(text)));
+}
+
+std::vector<double> ParamReader::Values(const AlidadeParam& param) const {
+  std::string rest = param.key;
+  Node map = entry_;
+  for (std::size_t dot; (dot = rest.find('.')) != std::string::npos; rest.erase(0, dot + 1)) {
+    const std::optional<Node> child = map.Find(rest.substr(0, dot));
+    if (!child) return Absent(param, map, rest);
+    map = *child;
+  }
+  const std::optional<Node> node = map.Find(rest);
+  return node ? All(param, *node) : Absent(param, map, rest);
+}
+
+std::vector<double> ParamReader::Absent(const AlidadeParam& param, const Node& map,
+                                        const std::string& key_in_map) const {
+  if (HasFallback(param)) return Fallback(param);
+  const std::string missing = "missing; " + owner_ + " needs it " + Meaning(param);
+  if (key_in_map.find('.') != std::string::npos) {
+    throw Error(ExitCode::kBadConfig, ErrorLine(map.place(), PathBelow(map, key_in_map), missing));
+  }
+  try {
+    static_cast<void>(map.At(key_in_map));
+  } catch (const Error& e) {
+    // The config also tells of a key that looks like the missing one, or has another unit.
+    constexpr std::string_view kPhrase = "missing key";
+    std::string text = e.what();
+    const std::size_t at = text.find(kPhrase);
+    if (at != std::string::npos) text.replace(at, kPhrase.size(), missing);
+    throw Error(ExitCode::kBadConfig, text);
+  }
+  return {};
+}
+
+ParamRecorder::ParamRecorder() : trials_(1) {
+  host_.struct_size = sizeof(AlidadeHost);
+  host_.abi_major = ALIDADE_ABI_MAJOR;
+  host_.abi_minor = ALIDADE_ABI_MINOR;
+  host_.context = this;
+  host_.read = &ParamRecorder::Read;
+  host_.fail = [](void*, const char*, const char*) {};
+}
+
+std::int32_t ParamRecorder::Read(void* self, const AlidadeParam* from, double* values,
+                                 std::int32_t capacity) noexcept {
+  Trial& trial = static_cast<ParamRecorder*>(self)->trials_.back();
+  try {
+    const AlidadeParam param = Checked(from, values, capacity);
+    const bool choice = param.kind == ALIDADE_PARAM_CHOICE;
+    if (choice) values[0] = HasFallback(param) ? Fallback(param)[0] : 0.0;
+    if (choice && trial.choice == param.key) values[0] = trial.value;
+    const auto same = [&](const Asked& other) { return other.info.key == param.key; };
+    if (std::none_of(trial.asked.begin(), trial.asked.end(), same)) {
+      trial.asked.push_back({Describe(param), choice ? static_cast<int>(values[0]) : 0});
+    }
+    return std::max(param.count, 0);
+  } catch (const std::exception&) {
+    return -1;
+  }
+}
+
+std::string ParamRecorder::When(const std::string& key) const {
+  const auto asks = [&](const Trial& trial) {
+    return std::any_of(trial.asked.begin(), trial.asked.end(),
+                       [&](const Asked& asked) { return asked.info.key == key; });
+  };
+  std::vector<std::string> conditions;
+  for (const Asked& choice : trials_[0].asked) {
+    std::vector<std::string> values;
+    for (int i = 0; i < std::ssize(choice.info.choices); ++i) {
+      const auto with_value = [&](const Trial& trial) {
+        return trial.choice.empty() ? i == choice.value
+                                    : trial.choice == choice.info.key && trial.value == i;
+      };
+      const auto trial = std::find_if(trials_.begin(), trials_.end(), with_value);
+      if (trial != trials_.end() && asks(*trial)) values.push_back(choice.info.choices[i]);
+    }
+    if (values.empty() || values.size() == choice.info.choices.size()) continue;
+    conditions.push_back(choice.info.key + " = " + Joined(values, " or "));
+  }
+  return Joined(conditions, ", ");
+}
+
+std::vector<ParamInfo> ParamRecorder::Result() const {
+  std::vector<ParamInfo> result;
+  for (const Trial& trial : trials_) {
+    for (const Asked& asked : trial.asked) {
+      const auto same = [&](const ParamInfo& other) { return other.key == asked.info.key; };
+      const auto known = std::find_if(result.begin(), result.end(), same);
+      if (known == result.end()) {
+        result.push_back(asked.info);
+        result.back().when = When(asked.info.key);
+      } else if (known->unit != asked.info.unit &&
+                 !known->unit.ends_with(" or " + asked.info.unit)) {
+        known->unit += " or " + asked.info.unit;
+      }
+    }
+  }
+  const auto rank = [](const ParamInfo& info) {
+    return std::tuple(!info.when.empty(), !info.fallback.empty(), info.key);
+  };
+  std::sort(result.begin(), result.end(),
+            [&](const ParamInfo& a, const ParamInfo& b) { return rank(a) < rank(b); });
+  return result;
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "alidade/config.h"
+#include "alidade/plugin_abi.h"
+#include "alidade/plugin_host.h"
+
+namespace alidade::internal {
+
+/// Lends a model the parameters of its config entry. A dotted key walks nested maps. Everything
+/// wrong is collected, so that one run tells all.
+class ParamReader {
+ public:
+  /// `owner` names the model in messages, as in `model 'scale_2d'`.
+  ParamReader(const Node& entry, std::string owner);
+  ParamReader(const ParamReader&) = delete;
+  ParamReader& operator=(const ParamReader&) = delete;
+
+  const AlidadeHost& host() const { return host_; }
+  /// Why the model says that it cannot be made, where that belongs to no key; else "".
+  const std::string& failure() const { return failure_; }
+  /// Throws all errors as one, kBadConfig, in the order of their places (that of the reads depends on
+  /// the compiler); returns where there are none.
+  void Check() const;
+
+ private:
+  static std::int32_t Read(void* self, const AlidadeParam* param, double* values,
+                           std::int32_t capacity) noexcept;
+  static void Fail(void* self, const char* key, const char* text) noexcept;
+  std::vector<double> Values(const AlidadeParam& param) const;
+  std::vector<double> Absent(const AlidadeParam& param, const Node& map,
+                             const std::string& key_in_map) const;
+
+  Node entry_;
+  std::string owner_;
+  AlidadeHost host_{};
+  std::vector<std::string> errors_;
+  std::string failure_;
+};
+
+/// Notes what a model asks for while it is created with stand-in values.
+class ParamRecorder {
+ public:
+  ParamRecorder();
+  ParamRecorder(const ParamRecorder&) = delete;
+  ParamRecorder& operator=(const ParamRecorder&) = delete;
+
+  const AlidadeHost& host() const { return host_; }
+  /// Runs `create` once, then again for each other value of each choice, one at a time.
+  template <class Create>
+  void Run(const Create& create) {
+    trials_.assign(1, Trial{});
+    create();
+    const std::vector<Asked> first = trials_[0].asked;
+    for (const Asked& choice : first) {
+      for (int i = 0; i < static_cast<int>(choice.info.choices.size()); ++i) {
+        if (i == choice.value) continue;
+        trials_.push_back({choice.info.key, i, {}});
+        create();
+      }
+    }
+  }
+  /// All keys that were asked for: the required, those with a default, those that a choice asks for.
+  std::vector<ParamInfo> Result() const;
+
+ private:
+  struct Asked {
+    ParamInfo info;
+    int value = 0;  ///< of a choice: the one given
+  };
+  struct Trial {
+    std::string choice;  ///< "" in the first
+    int value = 0;
+    std::vector<Asked> asked;
+  };
+  static std::int32_t Read(void* self, const AlidadeParam* param, double* values,
+                           std::int32_t capacity) noexcept;
+  std::string When(const std::string& key) const;
+
+  AlidadeHost host_{};
+  std::vector<Trial> trials_;
+};
+
+}  // namespace alidade::internal

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <exception>
+#include <sstream>
+
+#include "abi_read.h"
+#include "alidade/build_plugin.h"
+#include "alidade/plugin_host.h"
+#include "param_reader.h"
+#include "plugin_file.h"
+
+namespace alidade {
+namespace {
+
+using internal::KindName;
+using internal::ParamReader;
+using internal::ParamRecorder;
+
+std::uint32_t ToKind(PluginEntry::Kind kind) {
+  if (kind == PluginEntry::Kind::kSensor) return ALIDADE_KIND_SENSOR;
+  if (kind == PluginEntry::Kind::kMotion) return ALIDADE_KIND_MOTION;
+  return ALIDADE_KIND_LANDMARK_FORM;
+}
+
+/// An instance that `create` has filled, destroyed unless it is released.
+class NewInstance {
+ public:
+  NewInstance() { c_.struct_size = sizeof(AlidadeInstance); }
+  ~NewInstance() {
+    if (c_.self != nullptr && c_.destroy != nullptr) c_.destroy(c_.self);
+  }
+  NewInstance(const NewInstance&) = delete;
+  NewInstance& operator=(const NewInstance&) = delete;
+
+  AlidadeInstance* c() { return &c_; }
+  AlidadeInstance Release() { return std::exchange(c_, AlidadeInstance{}); }
+
+ private:
+  AlidadeInstance c_{};
+};
+
+std::string Named(PluginEntry::Kind kind, const std::string& name) {
+  return std::string(kind == PluginEntry::Kind::kSource ? "source" : "model") + " '" + name + "'";
+}
+
+[[noreturn]] void FailCreation(const PluginEntry& entry, const Node& node, const std::string& why) {
+  throw Error(ExitCode::kPlugin,
+              ErrorLine(node.place(), node.path(),
+                        Named(entry.kind, entry.name) + " of plugin " + entry.plugin.string() +
+                            " failed while being created: " + why));
+}
+
+std::string SizeText(const Geometry& geometry) {
+  switch (geometry.kind) {
+    case GeometryKind::kVector:
+      return "vector(" + std::to_string(geometry.ambient) + ')';
+    case GeometryKind::kAngle:
+      return "angle";
+    case GeometryKind::kUnitQuaternion:
+      return "unit_quaternion";
+    case GeometryKind::kUnitVector:
+      return "unit_vector";
+  }
+  return {};
+}
+
+std::string Line(const std::string& what, const Space& space) {
+  std::string line = what + ' ' + space.name + ": " + SizeText(space.geometry);
+  if (!space.unit.empty()) line += ", " + space.unit;
+  if (!space.doc.empty()) line += "; " + space.doc;
+  if (space.optional()) line += " (optional)";
+  return line;
+}
+
+/// The `keys` of a source: `key  meaning` on each line.
+std::vector<ParamInfo> ListedKeys(const char* keys) {
+  std::vector<ParamInfo> result;
+  std::istringstream lines(keys == nullptr ? "" : keys);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    ParamInfo info;
+    words >> info.key >> std::ws;
+    std::getline(words, info.doc);
+    if (!info.key.empty()) result.push_back(info);
+  }
+  return result;
+}
+
+}  // namespace
+
+AlidadeEntry PluginHost::EntryOf(const PluginEntry& entry) const {
+  const AlidadeTable table = internal::ReadPrefix(LoadedFrom(entry.plugin).table);
+  for (std::uint32_t i = 0; i < table.entry_count; ++i) {
+    const AlidadeEntry c = internal::ReadEntry(table.entries, table.entry_stride, i);
+    if (c.kind == ToKind(entry.kind) && entry.name == c.name) return c;
+  }
+  throw ContractViolation("no such entry: " + entry.name);
+}
+
+const SourceEntry& PluginHost::SourceOf(const PluginEntry& entry) const {
+  const BuildTable& table = *LoadedFrom(entry.plugin).build_table;
+  for (int i = 0; i < table.source_count; ++i) {
+    if (entry.name == table.sources[i].name) return table.sources[i];
+  }
+  throw ContractViolation("no such entry: " + entry.name);
+}
+
+std::shared_ptr<const ModelInstance> PluginHost::Create(PluginEntry::Kind kind,
+                                                        const std::string& name,
+                                                        const Node& node) const {
+  const PluginEntry& entry = Find(kind, name, node);
+  const AlidadeEntry c = EntryOf(entry);
+  ParamReader reader(node, Named(kind, name));
+  NewInstance instance;
+  std::int32_t code;
+  {
+    const std::lock_guard lock(create_mutex_);
+    code = c.create(&reader.host(), instance.c());
+  }
+  reader.Check();
+  if (code != ALIDADE_OK) {
+    FailCreation(entry, node, reader.failure().empty() ? "it does not say why" : reader.failure());
+  }
+  if (!reader.failure().empty()) node.Fail(reader.failure());
+  if (instance.c()->kind != c.kind) FailCreation(entry, node, "it is not what its table says");
+  return std::make_shared<const ModelInstance>(instance.Release(), name, entry.plugin.string());
+}
+
+SensorModel PluginHost::CreateSensor(const std::string& name, const Node& entry) const {
+  return SensorModel(Create(PluginEntry::Kind::kSensor, name, entry));
+}
+
+MotionModel PluginHost::CreateMotion(const std::string& name, const Node& entry) const {
+  return MotionModel(Create(PluginEntry::Kind::kMotion, name, entry));
+}
+
+std::unique_ptr<Source> PluginHost::CreateSource(const std::string& name, const Node& node,
+                                                 std::uint64_t seed,
+                                                 const std::filesystem::path& folder) const {
+  const PluginEntry& entry = Find(PluginEntry::Kind::kSource, name, node);
+  ParamReader reader(node, Named(entry.kind, name));
+  Params params(&reader.host());
+  std::unique_ptr<Source> source;
+  try {
+    const std::lock_guard lock(create_mutex_);
+    source = SourceOf(entry).create(SourceArguments{node, params, seed, folder});
+  } catch (const Error&) {
+    reader.Check();
+    throw;
+  } catch (const std::exception& e) {
+    reader.Check();
+    FailCreation(entry, node, e.what());
+  } catch (...) {
+    reader.Check();
+    FailCreation(entry, node, "an exception of unknown type");
+  }
+  reader.Check();
+  if (!reader.failure().empty()) node.Fail(reader.failure());
+  if (source == nullptr) FailCreation(entry, node, "it gives nothing");
+  return source;
+}
+
+std::vector<ParamInfo> PluginHost::Schema(const PluginEntry& entry) const {
+  ParamRecorder recorder;
+  const std::lock_guard lock(create_mutex_);
+  if (entry.kind != PluginEntry::Kind::kSource) {
+    const AlidadeEntry c = EntryOf(entry);
+    recorder.Run([&] {
+      NewInstance instance;
+      static_cast<void>(c.create(&recorder.host(), instance.c()));
+    });
+    return recorder.Result();
+  }
+  const SourceEntry& source = SourceOf(entry);
+  const Config stand_in = Config::FromText("type: " + entry.name, "stand-in");
+  recorder.Run([&] {
+    Params params(&recorder.host());
+    try {
+      static_cast<void>(source.create(SourceArguments{stand_in.root(), params, 1, {}}));
+    } catch (...) {
+      // It wants a file, say, that stand-ins do not give; what it read before counts.
+    }
+  });
+  std::vector<ParamInfo> result = ListedKeys(source.keys);
+  for (const ParamInfo& info : recorder.Result()) result.push_back(info);
+  return result;
+}
+
+std::vector<std::string> PluginHost::Describe(const PluginEntry& entry) const {
+  if (entry.kind == PluginEntry::Kind::kSource) return {};
+  ParamRecorder recorder;
+  NewInstance instance;
+  const std::lock_guard lock(create_mutex_);
+  if (EntryOf(entry).create(&recorder.host(), instance.c()) != ALIDADE_OK) return {};
+  const ModelInstance model(instance.Release(), entry.name, entry.plugin.string());
+  const bool sensor = entry.kind == PluginEntry::Kind::kSensor;
+  std::vector<std::string> lines;
+  for (const Space& space : model.spaces()) lines.push_back(Line(sensor ? "role" : "block", space));
+  if (!model.space().name.empty()) {
+    lines.push_back(Line(sensor ? "measurement" : "input", model.space()));
+  }
+  return lines;
+}
+
+}  // namespace alidade

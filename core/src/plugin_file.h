@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "alidade/plugin_abi.h"
+#include "alidade/plugin_host.h"
+
+/// What PluginHost asks of a plugin file before and while opening it.
+namespace alidade {
+
+struct BuildTable;
+
+struct PluginHost::Loaded {
+  std::filesystem::path file;     ///< canonical
+  const AlidadeTable* table;      ///< sealed tier, else null
+  const BuildTable* build_table;  ///< build tier, else null
+};
+
+namespace internal {
+
+/// The build id that a build-tier plugin must have: that of this library.
+const char* HostBuildId();
+
+/// Refuses a build that this host cannot run: fast-math, instructions that this processor lacks, a
+/// build-tier plugin of another build. Errors: kPlugin.
+void CheckBuild(const AlidadeFingerprint& fingerprint, const std::filesystem::path& file);
+
+/// Opens the plugin in a child process, looks its entry up and walks its table. Returns "" or why
+/// that failed.
+std::string TrialLoad(const std::filesystem::path& file, std::uint32_t tier);
+
+/// What breaks the rules of plugin_abi.h or build_plugin.h in a table, or "".
+std::string Defect(const AlidadeTable* table);
+std::string Defect(const BuildTable* table);
+
+/// `sensor`, `motion model`, `landmark form`, `source`.
+const char* KindName(PluginEntry::Kind kind);
+
+}  // namespace internal
+}  // namespace alidade

@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/plugin_host.h"
+
+#include <dlfcn.h>
+
+#define BOOST_DLL_USE_STD_FS
+#include <algorithm>
+#include <boost/dll/shared_library.hpp>
+#include <cstdlib>
+#include <optional>
+#include <set>
+
+#include "abi_read.h"
+#include "alidade/build_plugin.h"
+#include "plugin_file.h"
+
+namespace alidade {
+namespace fs = std::filesystem;
+namespace {
+
+using internal::KindName;
+
+[[noreturn]] void Refuse(const fs::path& file, const std::string& why) {
+  throw Error(ExitCode::kPlugin, ErrorLine({file.string()}, {}, why));
+}
+
+std::string Text(const char* text) { return text == nullptr ? "" : text; }
+
+std::vector<fs::path> FoldersOf(const char* variable) {
+  std::vector<fs::path> folders;
+  std::string rest = Text(secure_getenv(variable));
+  while (!rest.empty()) {
+    const std::size_t colon = std::min(rest.find(':'), rest.size());
+    if (colon > 0) folders.emplace_back(rest.substr(0, colon));
+    rest.erase(0, colon + 1);
+  }
+  return folders;
+}
+
+std::optional<fs::path> UserFolder() {
+  const fs::path data = Text(secure_getenv("XDG_DATA_HOME"));
+  if (data.is_absolute()) return data / "alidade/plugins";
+  const fs::path home = Text(secure_getenv("HOME"));
+  if (home.is_absolute()) return home / ".local/share/alidade/plugins";
+  return std::nullopt;
+}
+
+/// Beside this library: `lib/alidade/plugins` of the build tree or of the installation.
+std::optional<fs::path> FolderOfProgram() {
+  Dl_info info{};
+  const auto* here = reinterpret_cast<const void*>(&internal::HostBuildId);
+  if (dladdr(here, &info) == 0 || info.dli_fname == nullptr) return std::nullopt;
+  std::error_code error;
+  const fs::path library = fs::canonical(info.dli_fname, error);
+  if (error) return std::nullopt;
+  return library.parent_path() / "alidade/plugins";
+}
+
+PluginEntry::Kind ToKind(std::uint32_t kind) {
+  if (kind == ALIDADE_KIND_SENSOR) return PluginEntry::Kind::kSensor;
+  if (kind == ALIDADE_KIND_MOTION) return PluginEntry::Kind::kMotion;
+  return PluginEntry::Kind::kLandmarkForm;
+}
+
+/// Opens the library for the rest of the process.
+const boost::dll::shared_library& OpenForGood(const fs::path& file) {
+  using boost::dll::load_mode::rtld_local;
+  using boost::dll::load_mode::rtld_now;
+  return *new boost::dll::shared_library(file, rtld_now | rtld_local);
+}
+
+}  // namespace
+
+PluginHost::PluginHost(const std::vector<fs::path>& files_and_folders) {
+  for (const fs::path& place : files_and_folders) LoadPlace(place, "given", true);
+  for (const fs::path& folder : FoldersOf("ALIDADE_PLUGIN_PATH")) {
+    LoadPlace(folder, "ALIDADE_PLUGIN_PATH", false);
+  }
+  if (const auto folder = UserFolder()) LoadPlace(*folder, "user data folder", false);
+  if (const auto folder = FolderOfProgram()) LoadPlace(*folder, "beside the program", false);
+}
+
+PluginHost::~PluginHost() = default;
+
+void PluginHost::LoadPlace(const fs::path& place, const std::string& origin, bool required) {
+  const std::size_t entries = entries_.size(), refusals = refusals_.size();
+  std::error_code error;
+  const bool there = fs::exists(place, error);
+  if (!there && required) {
+    if (!place.is_absolute()) CheckTrusted(place);
+    Refuse(place, "no such file or folder");
+  }
+  if (fs::is_directory(place, error)) {
+    LoadFolder(place, required);
+  } else if (there) {
+    LoadFile(place, required);
+  }
+  std::string found = "not there";
+  if (there) {
+    found = std::to_string(entries_.size() - entries) + " found";
+    if (refusals_.size() > refusals) {
+      found += ", " + std::to_string(refusals_.size() - refusals) + " refused";
+    }
+  }
+  searched_.push_back(place.string() + " (" + origin + "): " + found);
+}
+
+void PluginHost::LoadFolder(const fs::path& folder, bool required) {
+  std::set<fs::path> files;
+  std::error_code error;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    if (at->path().extension() == ".so") files.insert(at->path());
+  }
+  if (error) {
+    if (required) Refuse(folder, error.message());
+    refusals_.push_back({folder, error.message(), ExitCode::kPlugin});
+  }
+  for (const fs::path& file : files) LoadFile(file, required);
+}
+
+void PluginHost::LoadFile(const fs::path& file, bool required) {
+  try {
+    Load(file);
+  } catch (const Error& e) {
+    if (required) throw;
+    const std::string prefix = file.string() + ": ";
+    std::string reason = e.what();
+    if (reason.starts_with(prefix)) reason.erase(0, prefix.size());
+    refusals_.push_back({file, reason, e.code()});
+  }
+}
+
+void PluginHost::Load(const fs::path& file) {
+  if (!file.is_absolute()) CheckTrusted(file);
+  std::error_code error;
+  const fs::path canonical = fs::canonical(file, error);
+  if (error) Refuse(file, error.message());
+  const auto same = [&](const auto& other) {
+    return other->file == canonical || fs::equivalent(other->file, canonical, error);
+  };
+  if (std::any_of(loaded_.begin(), loaded_.end(), same)) return;
+  const AlidadeFingerprint fingerprint = ReadFingerprint(canonical);
+  internal::CheckBuild(fingerprint, canonical);
+  CheckTrusted(file);
+  const std::string failure = internal::TrialLoad(canonical, fingerprint.tier);
+  if (!failure.empty()) Refuse(file, failure);
+
+  auto plugin = std::make_unique<Loaded>(Loaded{canonical, nullptr, nullptr});
+  std::string defect;
+  try {
+    const boost::dll::shared_library& library = OpenForGood(canonical);
+    if (fingerprint.tier == ALIDADE_TIER_BUILD) {
+      plugin->build_table = library.get<const BuildTable*()>(kBuildEntrySymbol)();
+      defect = internal::Defect(plugin->build_table);
+    } else {
+      plugin->table = library.get<const AlidadeTable*()>(ALIDADE_ENTRY_SYMBOL)();
+      defect = internal::Defect(plugin->table);
+    }
+  } catch (const std::exception& e) {
+    Refuse(file, std::string("cannot be loaded: ") + e.what());
+  }
+  if (!defect.empty()) Refuse(file, defect);
+  AddEntries(*plugin);
+  loaded_.push_back(std::move(plugin));
+}
+
+void PluginHost::AddEntries(const Loaded& plugin) {
+  if (plugin.build_table != nullptr) {
+    for (int i = 0; i < plugin.build_table->source_count; ++i) {
+      const SourceEntry& source = plugin.build_table->sources[i];
+      entries_.push_back(
+          {PluginEntry::Kind::kSource, source.name, Text(source.doc), "", "", plugin.file});
+    }
+    return;
+  }
+  const AlidadeTable table = internal::ReadPrefix(plugin.table);
+  for (std::uint32_t i = 0; i < table.entry_count; ++i) {
+    const AlidadeEntry entry = internal::ReadEntry(table.entries, table.entry_stride, i);
+    entries_.push_back({ToKind(entry.kind), entry.name, Text(entry.doc), Text(entry.citation),
+                        Text(entry.family), plugin.file});
+  }
+}
+
+const PluginEntry& PluginHost::Find(PluginEntry::Kind kind, const std::string& name,
+                                    const Node& entry) const {
+  const auto matches = [&](const PluginEntry& e) { return e.kind == kind && e.name == name; };
+  const auto found = std::find_if(entries_.begin(), entries_.end(), matches);
+  if (found == entries_.end()) FailMissing(kind, name, entry);
+  const auto other = std::find_if(found + 1, entries_.end(), matches);
+  if (other != entries_.end()) {
+    throw Error(ExitCode::kPlugin,
+                ErrorLine(entry.place(), entry.path(),
+                          std::string("two plugins offer the ") + KindName(kind) + " '" + name +
+                              "': " + found->plugin.string() + " and " + other->plugin.string() +
+                              "; remove one of them"));
+  }
+  return *found;
+}
+
+void PluginHost::FailMissing(PluginEntry::Kind kind, const std::string& name,
+                             const Node& entry) const {
+  const char* const key = kind == PluginEntry::Kind::kSource ? "type" : "model";
+  const Node at = entry.is_map() ? entry.Find(key).value_or(entry) : entry;
+  std::string what = std::string("no plugin offers the ") + KindName(kind) + " '" + name + "'";
+  std::vector<std::string> names;
+  for (const PluginEntry& other : entries_) {
+    if (other.kind == kind) names.push_back(other.name);
+    if (other.name == name)
+      what += std::string("; there is a ") + KindName(other.kind) + " of that name";
+  }
+  ExitCode code = ExitCode::kPlugin;
+  std::string lines;
+  for (const std::string& place : searched_) lines += "\n  searched " + place;
+  for (const Refusal& refusal : refusals_) {
+    lines += "\n  refused " + refusal.file.string() + ": " + refusal.reason;
+    if (refusal.code == ExitCode::kNotTrusted && code != ExitCode::kNotTrusted) {
+      code = ExitCode::kNotTrusted;
+      what += "; '" + refusal.file.string() + "' was refused because it is not trusted";
+    }
+  }
+  throw Error(code, ErrorLine(at.place(), at.path(), what, {}, Nearest(name, names)) + lines);
+}
+
+const PluginHost::Loaded& PluginHost::LoadedFrom(const fs::path& file) const {
+  const auto same = [&](const auto& plugin) { return plugin->file == file; };
+  const auto found = std::find_if(loaded_.begin(), loaded_.end(), same);
+  ALIDADE_EXPECTS(found != loaded_.end());
+  return **found;
+}
+
+}  // namespace alidade

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/plugin_listing.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "json.h"
+#include "plugin_file.h"
+#include "text_table.h"
+
+namespace alidade {
+namespace {
+
+using internal::Join;
+using internal::Json;
+using internal::KindName;
+using internal::TextRow;
+using internal::TextTable;
+
+std::vector<const PluginEntry*> Sorted(const PluginHost& host) {
+  std::vector<const PluginEntry*> entries;
+  for (const PluginEntry& entry : host.entries()) entries.push_back(&entry);
+  std::sort(entries.begin(), entries.end(), [](const PluginEntry* a, const PluginEntry* b) {
+    return std::tie(a->kind, a->name, a->plugin) < std::tie(b->kind, b->name, b->plugin);
+  });
+  return entries;
+}
+
+std::vector<const PluginEntry*> Named(const PluginHost& host, const std::string& name) {
+  std::vector<const PluginEntry*> entries = Sorted(host);
+  std::vector<std::string> names;
+  for (const PluginEntry* entry : entries) names.push_back(entry->name);
+  std::erase_if(entries, [&](const PluginEntry* entry) { return entry->name != name; });
+  if (entries.empty()) {
+    throw Error(ExitCode::kPlugin, ErrorLine({}, {}, "no plugin offers '" + name + "'",
+                                             "a name that `alidade plugins list` prints",
+                                             Nearest(name, names)) +
+                                       "\n" + PluginPlaces(host));
+  }
+  return entries;
+}
+
+std::string Parameters(const std::vector<ParamInfo>& schema) {
+  std::vector<TextRow> rows = {{"parameter", "unit", "type", "range", "default", "only where",
+                                "meaning"}};
+  for (const ParamInfo& info : schema) {
+    // The keys that a source lists itself have no type.
+    const std::string fallback =
+        !info.fallback.empty() || info.type.empty() ? info.fallback : "required";
+    const std::string range = info.choices.empty() ? info.range : Join(info.choices, " | ");
+    rows.push_back({info.key, info.unit, info.type, range, fallback, info.when, info.doc});
+  }
+  return rows.size() > 1 ? TextTable(rows, 2) : "  no parameters\n";
+}
+
+void AddEntry(const PluginEntry& entry, Json& json) {
+  json.Key("name").Text(entry.name);
+  json.Key("kind").Text(KindName(entry.kind));
+  json.Key("family").Text(entry.family);
+  json.Key("doc").Text(entry.doc);
+  json.Key("citation").Text(entry.citation);
+  json.Key("file").Text(entry.plugin.string());
+}
+
+void AddParameter(const ParamInfo& info, Json& json) {
+  json.Object();
+  json.Key("key").Text(info.key);
+  json.Key("unit").Text(info.unit);
+  json.Key("type").Text(info.type);
+  json.Key("range").Text(info.range);
+  if (!info.fallback.empty()) json.Key("default").Text(info.fallback);
+  json.Key("choices").Array();
+  for (const std::string& choice : info.choices) json.Text(choice);
+  json.End();
+  json.Key("when").Text(info.when);
+  json.Key("doc").Text(info.doc);
+  json.End();
+}
+
+}  // namespace
+
+std::string PluginList(const PluginHost& host) {
+  std::vector<TextRow> rows = {{"name", "kind", "what it is", "file"}};
+  for (const PluginEntry* entry : Sorted(host)) {
+    rows.push_back({entry->name, KindName(entry->kind), entry->doc, entry->plugin.string()});
+  }
+  return rows.size() > 1 ? TextTable(rows) : "no plugin was found\n";
+}
+
+std::string PluginListJson(const PluginHost& host) {
+  Json json;
+  json.Array();
+  for (const PluginEntry* entry : Sorted(host)) {
+    json.Object();
+    AddEntry(*entry, json);
+    json.End();
+  }
+  json.End();
+  return json.text();
+}
+
+std::string PluginInfo(const PluginHost& host, const std::string& name) {
+  std::string text;
+  for (const PluginEntry* entry : Named(host, name)) {
+    if (!text.empty()) text += '\n';
+    text += entry->name + ": " + KindName(entry->kind) + "\n  " + entry->doc + '\n';
+    if (!entry->citation.empty()) text += "  source: " + entry->citation + '\n';
+    text += "  plugin: " + entry->plugin.string() + "\n\n";
+    const std::vector<std::string> lines = host.Describe(*entry);
+    for (const std::string& line : lines) text += "  " + line + '\n';
+    if (!lines.empty()) text += '\n';
+    text += Parameters(host.Schema(*entry));
+  }
+  return text;
+}
+
+std::string PluginInfoJson(const PluginHost& host, const std::string& name) {
+  Json json;
+  json.Array();
+  for (const PluginEntry* entry : Named(host, name)) {
+    json.Object();
+    AddEntry(*entry, json);
+    json.Key("describes").Array();
+    for (const std::string& line : host.Describe(*entry)) json.Text(line);
+    json.End();
+    json.Key("parameters").Array();
+    for (const ParamInfo& info : host.Schema(*entry)) AddParameter(info, json);
+    json.End();
+    json.End();
+  }
+  json.End();
+  return json.text();
+}
+
+std::string PluginPlaces(const PluginHost& host) {
+  std::string text;
+  for (const std::string& place : host.searched()) text += "  searched " + place + '\n';
+  for (const Refusal& refusal : host.refusals()) {
+    text += "  refused " + refusal.file.string() + ": " + refusal.reason + '\n';
+  }
+  return text;
+}
+
+}  // namespace alidade

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/recorder.h"
+
+#include <chrono>
+#include <ctime>
+#include <fstream>
+#include <optional>
+#include <sstream>
+
+#include "estimator_files.h"
+#include "figures.h"
+#include "json.h"
+#include "report_html.h"
+#include "run_folder.h"
+#include "run_json.h"
+#include "sha256.h"
+#include "source_files.h"
+
+namespace alidade {
+
+using internal::CsvFile;
+using Clock = std::chrono::steady_clock;
+
+struct Recorder::Impl {
+  Impl(const Options& given, const Config& config, const PluginHost& plugin_host);
+
+  void AddPlugin(const std::filesystem::path& file);
+  void AddPlugins(const Experiment& experiment);
+  internal::RecordedRun CloseFiles();
+  void WriteEvents(const ContestantResult& result) const;
+  std::string TimingJson(const RunResult& result) const;
+  void WriteReport(const RunResult& result, const internal::RecordedRun& recorded);
+
+  Options options;
+  internal::RunFolder folder;
+  const PluginHost& host;
+  std::string title, config_text, source_type;
+  internal::RunFacts facts;
+  std::optional<internal::SourceFiles> source;
+  std::vector<std::unique_ptr<internal::EstimatorFiles>> estimators;
+  std::vector<std::string> highlights;
+  std::string note;
+  Clock::time_point started = Clock::now();
+  std::time_t started_at = std::time(nullptr);
+};
+
+namespace {
+
+std::string ReadText(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+/// The text of a key where there is one, else `fallback`.
+std::string TextOf(const Node& map, std::string_view key, std::string fallback) {
+  const std::optional<Node> node = map.is_map() ? map.Find(key) : std::nullopt;
+  return node && node->kind() == Node::Kind::kScalar ? node->Text() : fallback;
+}
+
+/// An svg file as an element of a page: without its XML prolog.
+std::string AsElement(const std::string& svg) {
+  const std::size_t at = svg.find("<svg");
+  return at == svg.npos ? "" : svg.substr(at);
+}
+
+}  // namespace
+
+Recorder::Impl::Impl(const Options& given, const Config& config, const PluginHost& plugin_host)
+    : options(given),
+      folder(given.folder, given.force),
+      host(plugin_host),
+      title(TextOf(config.root(), "title", std::filesystem::path(config.name()).stem().string())),
+      config_text(config.ToYaml()) {
+  if (const auto entry = config.root().is_map() ? config.root().Find("source") : std::nullopt) {
+    source_type = TextOf(*entry, "type", "");
+  }
+  folder.Write("config.resolved.yaml", config_text);
+}
+
+void Recorder::Impl::AddPlugin(const std::filesystem::path& file) {
+  if (!file.is_absolute()) return;  // a model made in this process
+  const auto [entry, is_new] = facts.plugins.try_emplace(file.filename().string());
+  if (is_new) entry->second = internal::Sha256OfFile(file);
+}
+
+void Recorder::Impl::AddPlugins(const Experiment& experiment) {
+  for (const Contestant& contestant : experiment.contestants) {
+    for (const auto& sensor : contestant.system.sensors)
+      AddPlugin(sensor.model.instance().plugin());
+    for (const auto& motion : contestant.system.motions)
+      AddPlugin(motion.model.instance().plugin());
+  }
+  for (const PluginEntry& entry : host.entries()) {
+    if (entry.kind == PluginEntry::Kind::kSource && entry.name == source_type) {
+      AddPlugin(entry.plugin);
+    }
+  }
+}
+
+internal::RecordedRun Recorder::Impl::CloseFiles() {
+  internal::RecordedRun recorded;
+  if (source) {
+    source->Close();
+    source->Describe(recorded);
+  }
+  for (const auto& estimator : estimators) {
+    estimator->Close();
+    recorded.estimators.push_back(estimator->recorded());
+  }
+  return recorded;
+}
+
+void Recorder::Impl::WriteEvents(const ContestantResult& result) const {
+  CsvFile events(folder, result.name + "/events.csv", {"t_s", "kind", "text"});
+  for (const Event& event : result.events) {
+    events.Time(event.stamp).Text(event.kind).Text(event.text).EndRow();
+  }
+  events.Close();
+}
+
+std::string Recorder::Impl::TimingJson(const RunResult& result) const {
+  const double wall_s = std::chrono::duration<double>(Clock::now() - started).count();
+  char at[32] = "";
+  std::tm utc{};
+  if (gmtime_r(&started_at, &utc) != nullptr) {
+    std::strftime(at, sizeof at, "%Y-%m-%dT%H:%M:%SZ", &utc);
+  }
+  internal::Json json;
+  json.Object();
+  json.Key("started").Text(at);
+  json.Key("command").Text(options.command);
+  json.Key("wall_s").Number(wall_s);
+  json.Key("frames_per_s").Number(static_cast<double>(result.frames) / wall_s);
+  json.End();
+  return json.text();
+}
+
+void Recorder::Impl::WriteReport(const RunResult& result, const internal::RecordedRun& recorded) {
+  internal::Report report{title, config_text, facts, {}, {}};
+  if (options.figures) {
+    report.figures = internal::DrawFigures(folder, recorded);
+  } else {
+    report.figures.note = "figures were not asked for";
+  }
+  for (const internal::Figure& figure : report.figures.drawn) {
+    const std::filesystem::path svg = folder.partial() / ("figures/" + figure.name + ".svg");
+    report.svgs[figure.name] = AsElement(ReadText(svg));
+  }
+  folder.Write("report.html", internal::ReportHtml(result, report));
+  highlights = {"report.html"};
+  if (report.figures.has_png) highlights.emplace_back("figures/measurements.png");
+  highlights.insert(highlights.end(), {"comparison.csv", "run.json"});
+  if (options.figures) note = report.figures.note;
+}
+
+Recorder::Recorder(const Options& options, const Config& config, const PluginHost& host)
+    : impl_(std::make_unique<Impl>(options, config, host)) {}
+
+Recorder::~Recorder() = default;
+
+void Recorder::Start(const Experiment& experiment) {
+  impl_->facts.seed = experiment.seed;
+  impl_->AddPlugins(experiment);
+  impl_->source.emplace(impl_->folder, experiment);
+  for (const Contestant& contestant : experiment.contestants) {
+    impl_->facts.types[contestant.name] = contestant.type;
+    impl_->estimators.push_back(std::make_unique<internal::EstimatorFiles>(
+        impl_->folder, contestant, experiment.source->truths()));
+  }
+  impl_->started = Clock::now();
+}
+
+void Recorder::AddFrame(const Frame& frame) {
+  ALIDADE_EXPECTS(impl_->source.has_value());
+  impl_->source->Add(frame);
+}
+
+void Recorder::AddEstimate(int contestant, const Frame& frame, const State& state,
+                           const UpdateReport& report) {
+  ALIDADE_EXPECTS(contestant >= 0 && contestant < static_cast<int>(impl_->estimators.size()));
+  impl_->estimators[static_cast<std::size_t>(contestant)]->Add(frame, state, report);
+}
+
+void Recorder::Finish(const RunResult& result) {
+  const std::string timing = impl_->TimingJson(result);
+  const internal::RecordedRun recorded = impl_->CloseFiles();
+  const internal::RunFolder& folder = impl_->folder;
+  for (const ContestantResult& one : result.contestants) impl_->WriteEvents(one);
+  folder.Write("run.json", internal::RunJson(result, impl_->facts));
+  folder.Write("comparison.csv", internal::ComparisonCsv(result));
+  folder.Write("timing.json", timing);
+  impl_->WriteReport(result, recorded);
+  impl_->folder.Commit();
+}
+
+const std::vector<std::string>& Recorder::highlights() const { return impl_->highlights; }
+const std::string& Recorder::note() const { return impl_->note; }
+const std::filesystem::path& Recorder::folder() const { return impl_->options.folder; }
+
+}  // namespace alidade

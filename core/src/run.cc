@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/run.h"
+
+#include <algorithm>
+
+#include "alidade/metrics.h"
+#include "alidade/recorder.h"
+
+namespace alidade {
+namespace {
+
+/// Whether the frame has a measurement of the segment's stream that its sensor finds valid.
+bool InSegment(const Segment& segment, const Frame& frame) {
+  const auto seen = [&](const Measurement& m) {
+    return m.stream == segment.stream && segment.sensor.Valid(m.values.data()) == Status::kOk;
+  };
+  return std::any_of(frame.measurements.begin(), frame.measurements.end(), seen) == segment.with;
+}
+
+std::string Join(const std::vector<std::string>& parts, const char* separator) {
+  std::string text;
+  for (const std::string& part : parts) text += (text.empty() ? "" : separator) + part;
+  return text;
+}
+
+/// One estimator on its way through a run.
+struct Lane {
+  Contestant& contestant;
+  Metrics metrics;
+  ContestantResult result;
+};
+
+ContestantResult Begin(const Contestant& contestant) {
+  ContestantResult result;
+  result.name = contestant.name;
+  result.unobservable = UnobservableDirections(contestant.system);
+  for (const auto& direction : result.unobservable) {
+    result.events.push_back(
+        {kNoStamp, "unobservable",
+         "no sensor of this estimator tells " + Join(direction, " and ") +
+             (direction.size() > 1 ? " apart" : "")});
+  }
+  return result;
+}
+
+void Fail(RunResult& result, ExitCode code, std::string reason) {
+  result.status = RunStatus::kFailed;
+  result.code = code;
+  result.reason = std::move(reason);
+}
+
+/// One frame through one estimator; false where the run has to end.
+bool Advance(Lane& lane, int index, const Frame& frame, const std::vector<bool>& in_segment,
+             const RunOptions& options, RunResult& result) {
+  Estimator& estimator = *lane.contestant.estimator;
+  const UpdateReport report = estimator.Process(frame);
+  lane.result.events.insert(lane.result.events.end(), report.events.begin(), report.events.end());
+  lane.metrics.Add(frame, in_segment, estimator.state(), report);
+  if (options.recorder != nullptr) {
+    options.recorder->AddEstimate(index, frame, estimator.state(), report);
+  }
+  const bool must_end = estimator.failed() || (estimator.diverged() && lane.contestant.on_divergence ==
+                                                                           OnDivergence::kFail);
+  if (!must_end) return true;
+  const std::string why = report.events.empty() ? "diverged" : report.events.back().text;
+  char at[48];
+  std::snprintf(at, sizeof(at), " at t = %.6f s: ", Seconds(frame.stamp));
+  Fail(result, ExitCode::kDiverged, "estimator '" + lane.contestant.name + "'" + at + why);
+  return false;
+}
+
+void RunFrames(Experiment& experiment, std::vector<Lane>& lanes, const RunOptions& options,
+               RunResult& result) {
+  Frame frame;
+  std::vector<bool> in_segment(experiment.segments.size());
+  const std::int64_t size = experiment.source->size();
+  while (experiment.source->Next(frame)) {
+    for (std::size_t i = 0; i < experiment.segments.size(); ++i) {
+      in_segment[i] = InSegment(experiment.segments[i], frame);
+    }
+    if (options.recorder != nullptr) options.recorder->AddFrame(frame);
+    bool go_on = true;
+    for (std::size_t i = 0; i < lanes.size(); ++i) {
+      go_on = Advance(lanes[i], static_cast<int>(i), frame, in_segment, options, result) && go_on;
+    }
+    ++result.frames;
+    if (!go_on) return;
+    if (options.progress) options.progress(result.frames, size);
+    if (options.stop && options.stop()) {
+      result.status = RunStatus::kStopped;
+      result.code = ExitCode::kStopped;
+      result.reason = "stopped after " + std::to_string(result.frames) + " frames";
+      return;
+    }
+  }
+}
+
+}  // namespace
+
+const char* ToString(RunStatus status) {
+  switch (status) {
+    case RunStatus::kOk:
+      return "ok";
+    case RunStatus::kStopped:
+      return "stopped";
+    case RunStatus::kFailed:
+      break;
+  }
+  return "failed";
+}
+
+RunResult Run(Experiment& experiment, const RunOptions& options) {
+  RunResult result;
+  std::vector<Lane> lanes;
+  for (Contestant& contestant : experiment.contestants) {
+    lanes.push_back({contestant, Metrics(contestant, *experiment.source, experiment.segments),
+                     Begin(contestant)});
+  }
+  if (options.recorder != nullptr) options.recorder->Start(experiment);
+  try {
+    RunFrames(experiment, lanes, options, result);
+  } catch (const Error& error) {
+    // Bad data half-way, or a signal while waiting for data: what was done so far is kept.
+    const bool stopped = error.code() == ExitCode::kStopped;
+    if (!stopped && error.code() != ExitCode::kBadData) throw;
+    Fail(result, error.code(), error.what());
+    if (stopped) result.status = RunStatus::kStopped;
+  }
+  for (Lane& lane : lanes) {
+    lane.result.metrics = lane.metrics.Finish();
+    lane.result.counts = lane.metrics.counts();
+    lane.result.units = lane.metrics.units();
+    const std::vector<Event>& inconsistent = lane.metrics.events();
+    lane.result.events.insert(lane.result.events.end(), inconsistent.begin(), inconsistent.end());
+    lane.result.diverged = lane.contestant.estimator->diverged() || !inconsistent.empty();
+    result.contestants.push_back(std::move(lane.result));
+  }
+  return result;
+}
+
+}  // namespace alidade

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run_folder.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+
+namespace alidade::internal {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Holds the lock of a folder, where it can be had, until the end of its scope.
+class FolderLock {
+ public:
+  explicit FolderLock(const fs::path& folder)
+      : fd_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+    // A file system without locks goes without: the checks then race, the renames do not.
+    if (fd_ >= 0) static_cast<void>(::flock(fd_, LOCK_EX));
+  }
+  ~FolderLock() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  int fd_;
+};
+
+bool Exists(const fs::path& path) {
+  std::error_code error;
+  return fs::exists(fs::symlink_status(path, error));
+}
+
+/// True where a living process holds the folder.
+bool IsHeld(const fs::path& folder) {
+  const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+  if (fd < 0) return false;
+  const bool held = ::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  ::close(fd);
+  return held;
+}
+
+fs::path WithoutTrailingSlash(const fs::path& path) {
+  const fs::path normal = fs::absolute(path).lexically_normal();
+  return normal.has_filename() ? normal : normal.parent_path();
+}
+
+[[noreturn]] void Refuse(const fs::path& path, std::string_view what,
+                         std::string_view remedy = {}) {
+  std::string text = ErrorLine(Place{path.string()}, {}, what);
+  if (!remedy.empty()) text.append("; ").append(remedy);
+  throw Error(ExitCode::kCannotCreate, text);
+}
+
+}  // namespace
+
+RunFolder::RunFolder(const fs::path& target, bool force)
+    : shown_(target), target_(WithoutTrailingSlash(target)), force_(force) {
+  if (target.empty() || !target_.has_filename()) Refuse(target, "is no name for a run folder");
+  try {
+    MakeParents();
+    const FolderLock lock(target_.parent_path());
+    RemoveLeftovers();
+    CheckTarget();
+    partial_ = Sibling("partial");
+    if (::mkdir(partial_.c_str(), 0777) != 0) {
+      const int error = errno;
+      partial_.clear();
+      FailCreate(shown_.string(), error);
+    }
+    lock_ = ::open(partial_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (lock_ >= 0) static_cast<void>(::flock(lock_, LOCK_EX | LOCK_NB));
+  } catch (...) {
+    Discard();
+    throw;
+  }
+}
+
+RunFolder::~RunFolder() { Discard(); }
+
+void RunFolder::Discard() {
+  std::error_code ignored;
+  if (!partial_.empty()) {
+    fs::remove_all(partial_, ignored);
+    partial_.clear();
+  }
+  for (; !made_.empty(); made_.pop_back()) ::rmdir(made_.back().c_str());
+  if (lock_ >= 0) ::close(lock_);
+  lock_ = -1;
+}
+
+fs::path RunFolder::Sibling(const char* kind) const {
+  return target_.parent_path() /
+         ('.' + target_.filename().string() + '.' + kind + '-' + std::to_string(::getpid()));
+}
+
+void RunFolder::MakeParents() {
+  std::vector<fs::path> missing;
+  for (fs::path p = target_.parent_path(); !Exists(p) && p.has_relative_path();
+       p = p.parent_path()) {
+    missing.push_back(p);
+  }
+  for (; !missing.empty(); missing.pop_back()) {
+    if (::mkdir(missing.back().c_str(), 0777) == 0) {
+      made_.push_back(missing.back());
+    } else if (errno != EEXIST) {
+      FailCreate(missing.back().string(), errno);
+    }
+  }
+}
+
+void RunFolder::RemoveLeftovers() const {
+  const std::string partial = '.' + target_.filename().string() + ".partial-";
+  const std::string old = '.' + target_.filename().string() + ".old-";
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(target_.parent_path(), error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with(partial)) {
+      if (IsHeld(entry.path())) {
+        Refuse(shown_, "process " + name.substr(partial.size()) + " is writing it now",
+               "wait for it or choose another folder");
+      }
+      fs::remove_all(entry.path(), error);
+    } else if (name.starts_with(old)) {
+      // A process died while it replaced the folder: the old one is whole.
+      if (Exists(target_)) {
+        fs::remove_all(entry.path(), error);
+      } else {
+        fs::rename(entry.path(), target_, error);
+      }
+    }
+  }
+}
+
+void RunFolder::CheckTarget() const {
+  if (!Exists(target_)) return;
+  if (!force_) Refuse(shown_, "exists already", "add --force to replace it");
+  std::error_code error;
+  if (!fs::is_directory(target_, error)) Refuse(shown_, "is a file", "choose another folder");
+  const bool ours = Exists(target_ / "run.json") || Exists(target_ / "sweep.json");
+  if (!fs::is_empty(target_, error) && !ours) {
+    Refuse(shown_, "is not a run folder (it has no run.json)",
+           "--force replaces run folders only; choose another folder");
+  }
+}
+
+std::unique_ptr<OutputFile> RunFolder::Create(const std::string& name) const {
+  const fs::path file = partial_ / name;
+  std::error_code error;
+  fs::create_directories(file.parent_path(), error);
+  if (error) FailCreate(Shown(fs::path(name).parent_path().string()), error.value());
+  return std::make_unique<OutputFile>(file, Shown(name));
+}
+
+void RunFolder::Write(const std::string& name, std::string_view text) const {
+  const std::unique_ptr<OutputFile> file = Create(name);
+  file->Write(text);
+  file->Close();
+}
+
+void RunFolder::SyncAll() const {
+  for (const auto& entry : fs::recursive_directory_iterator(partial_)) {
+    Sync(entry.path(), Shown(entry.path().lexically_relative(partial_).string()));
+  }
+  Sync(partial_, shown_.string());
+}
+
+void RunFolder::Commit() {
+  SyncAll();
+  const FolderLock lock(target_.parent_path());
+  CheckTarget();
+  const fs::path old = Sibling("old");
+  const bool replace = Exists(target_);
+  if (replace && ::rename(target_.c_str(), old.c_str()) != 0) {
+    FailIo(shown_.string(), "replace", errno);
+  }
+  if (::rename(partial_.c_str(), target_.c_str()) != 0) {
+    const int error = errno;
+    if (replace) static_cast<void>(::rename(old.c_str(), target_.c_str()));
+    FailIo(shown_.string(), "move to its place", error);
+  }
+  partial_.clear();
+  made_.clear();
+  Sync(target_.parent_path(), shown_.string());
+  std::error_code ignored;
+  if (replace) fs::remove_all(old, ignored);
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "alidade/run.h"
+#include "csv_file.h"
+#include "recorded.h"
+
+namespace alidade::internal {
+
+/// What the source gave, frame by frame: `measurements.csv`, `truth.csv` where it knows truths, and
+/// `implied.csv` where a sensor can be inverted without knowing anything else.
+class SourceFiles {
+ public:
+  SourceFiles(const RunFolder& folder, const Experiment& experiment);
+
+  /// Error: kIo.
+  void Add(const Frame& frame);
+  void Close();
+  /// Fills what the source gave.
+  void Describe(RecordedRun& run) const;
+
+ private:
+  struct Inverse {
+    int stream;
+    SensorModel model;
+    RecordedImplied recorded;
+  };
+
+  void FindInverses(const Experiment& experiment);
+  void AddImplied(const Measurement& measurement);
+
+  std::vector<StreamInfo> streams_, truths_;
+  std::vector<std::int64_t> stream_rows_;  ///< in measurements.csv
+  std::vector<Inverse> inverses_;
+  std::size_t width_ = 1, blocks_ = 0;
+  Stamp first_ = kNoStamp, last_ = kNoStamp;
+  std::optional<CsvFile> measurements_, truth_, implied_;
+};
+
+}  // namespace alidade::internal

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/space.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/geometry.h"
+
+namespace alidade {
+namespace {
+
+double Norm(const double* x, int size) {
+  double sum = 0.0;
+  for (int i = 0; i < size; ++i) sum += x[i] * x[i];
+  return std::sqrt(sum);
+}
+
+void Scale(double factor, double* x, int size) {
+  for (int i = 0; i < size; ++i) x[i] *= factor;
+}
+
+/// y = x (+) d by way of a buffer, so that y may be x; brought back to unit length, because
+/// rounding would otherwise add up over many steps.
+template <class G>
+void UnitPlus(const double* x, const double* d, double* y) {
+  double sum[G::kAmbient];
+  G::Plus(x, d, sum);
+  const double norm = Norm(sum, G::kAmbient);
+  constexpr double kRounding = 4e-16;
+  if (std::abs(norm - 1.0) > kRounding) Scale(1.0 / norm, sum, G::kAmbient);
+  std::copy_n(sum, G::kAmbient, y);
+}
+
+/// Parallel transport on S^2 in the bases of geometry.h: J = B(to)' R B(from), where R turns `from`
+/// into `to` the short way, R v = v - (from + to) (to . v) / (1 + from . to).
+/// From a point to its antipode every way is as short; the one along the first basis vector is taken.
+void UnitVectorTransport(const double* from, const double* to, double* j) {
+  double b_from[6], b_to[6];
+  UnitVector::Basis(from, b_from);
+  UnitVector::Basis(to, b_to);
+  const double c = from[0] * to[0] + from[1] * to[1] + from[2] * to[2];
+  constexpr double kAntipode = 1e-14;
+  for (int column = 0; column < 2; ++column) {
+    double v[3];
+    for (int i = 0; i < 3; ++i) v[i] = b_from[2 * i + column];
+    if (1.0 + c > kAntipode) {
+      const double k = (to[0] * v[0] + to[1] * v[1] + to[2] * v[2]) / (1.0 + c);
+      for (int i = 0; i < 3; ++i) v[i] -= k * (from[i] + to[i]);
+    } else if (column == 0) {
+      Scale(-1.0, v, 3);
+    }
+    for (int row = 0; row < 2; ++row) {
+      j[2 * row + column] = b_to[row] * v[0] + b_to[2 + row] * v[1] + b_to[4 + row] * v[2];
+    }
+  }
+}
+
+}  // namespace
+
+void Geometry::Plus(const double* x, const double* d, double* y) const {
+  switch (kind) {
+    case GeometryKind::kVector:
+      return Vec<kDynamic>::Plus(x, d, y, ambient);
+    case GeometryKind::kAngle:
+      return alidade::Angle::Plus(x, d, y);
+    case GeometryKind::kUnitQuaternion:
+      return UnitPlus<alidade::UnitQuaternion>(x, d, y);
+    case GeometryKind::kUnitVector:
+      return UnitPlus<alidade::UnitVector>(x, d, y);
+  }
+}
+
+void Geometry::Minus(const double* y, const double* x, double* d) const {
+  switch (kind) {
+    case GeometryKind::kVector:
+      return Vec<kDynamic>::Minus(y, x, d, ambient);
+    case GeometryKind::kAngle:
+      return alidade::Angle::Minus(y, x, d);
+    case GeometryKind::kUnitQuaternion:
+      return alidade::UnitQuaternion::Minus(y, x, d);
+    case GeometryKind::kUnitVector:
+      return alidade::UnitVector::Minus(y, x, d);
+  }
+}
+
+void Geometry::Transport(const double* from, const double* to, double* j) const {
+  if (kind == GeometryKind::kUnitVector) return UnitVectorTransport(from, to, j);
+  for (int row = 0; row < tangent; ++row) {
+    for (int column = 0; column < tangent; ++column) j[row * tangent + column] = row == column;
+  }
+}
+
+double Geometry::Defect(const double* x) const {
+  const bool unit = kind == GeometryKind::kUnitQuaternion || kind == GeometryKind::kUnitVector;
+  return unit ? std::abs(Norm(x, ambient) - 1.0) : 0.0;
+}
+
+void Geometry::Normalise(double* x) const {
+  if (kind == GeometryKind::kAngle) x[0] = alidade::Angle::Wrap(x[0]);
+  if (Defect(x) == 0.0) return;
+  const double norm = Norm(x, ambient);
+  if (norm > 0.0) {
+    Scale(1.0 / norm, x, ambient);
+  } else {
+    Identity(x);
+  }
+}
+
+void Geometry::Identity(double* x) const {
+  std::fill_n(x, ambient, 0.0);
+  if (kind == GeometryKind::kUnitQuaternion) x[0] = 1.0;
+  if (kind == GeometryKind::kUnitVector) x[2] = 1.0;
+}
+
+std::vector<std::string> ColumnNames(const std::string& name, const Space& space) {
+  std::vector<std::string> columns;
+  for (const std::string& element : space.elements) {
+    columns.push_back(element.empty() ? name : name + '.' + element);
+  }
+  return columns;
+}
+
+}  // namespace alidade

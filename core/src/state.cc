@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/state.h"
+
+#include <algorithm>
+
+#include "alidade/error.h"
+
+namespace alidade {
+
+BlockId StateLayout::Declare(std::string name, std::string owner, Space space,
+                             BlockStatus status) {
+  ALIDADE_EXPECTS(Find(name) < 0);
+  Block block;
+  block.name = std::move(name);
+  block.owner = std::move(owner);
+  block.space = std::move(space);
+  block.status = status;
+  blocks_.push_back(std::move(block));
+  return static_cast<BlockId>(blocks_.size()) - 1;
+}
+
+BlockId StateLayout::Find(std::string_view name) const {
+  const auto found = std::find_if(blocks_.begin(), blocks_.end(),
+                                  [name](const Block& b) { return b.name == name; });
+  return found == blocks_.end() ? -1 : static_cast<BlockId>(found - blocks_.begin());
+}
+
+BlockId State::Declare(std::string name, std::string owner, Space space, BlockStatus status) {
+  return layout_.Declare(std::move(name), std::move(owner), std::move(space), status);
+}
+
+void State::PlaceValue(BlockId id, const double* value) {
+  Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
+  ALIDADE_EXPECTS(!block.present);
+  const int size = block.geometry().ambient;
+  const auto gap = std::find_if(value_gaps_.begin(), value_gaps_.end(),
+                                [size](const auto& g) { return g.second == size; });
+  if (gap != value_gaps_.end()) {
+    block.value_offset = gap->first;
+    value_gaps_.erase(gap);
+  } else {
+    block.value_offset = static_cast<int>(values_.size());
+    values_.resize(values_.size() + static_cast<std::size_t>(size));
+  }
+  block.present = true;
+  std::copy_n(value, size, this->value(id));
+}
+
+void State::Add(BlockId id, const double* value, const Eigen::MatrixXd& covariance) {
+  PlaceValue(id, value);
+  Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
+  if (block.status == BlockStatus::kFixed) return;
+  ALIDADE_EXPECTS(covariance.rows() == block.geometry().tangent);
+  block.tangent_offset = covariance_.Add(block.geometry().tangent);
+  covariance_.SetBlock(block.tangent_offset, block.tangent_offset, covariance);
+}
+
+void State::Initialise(BlockId id, const double* value, const std::vector<BlockId>& from,
+                       const std::vector<Eigen::MatrixXd>& jacobians, const Eigen::MatrixXd& own) {
+  ALIDADE_EXPECTS(from.size() == jacobians.size());
+  PlaceValue(id, value);
+  Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
+  if (block.status == BlockStatus::kFixed) return;
+  const int rows = block.geometry().tangent;
+  block.tangent_offset = covariance_.Add(rows);
+  std::vector<JacobianBlock> j;
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    const Block& source = layout_[from[i]];
+    if (source.has_covariance()) j.push_back({source.tangent_offset, jacobians[i]});
+  }
+  const Eigen::MatrixXd cross = covariance_.TimesTransposed(j, rows);
+  covariance_.SetRows(block.tangent_offset, Times(j, rows, cross) + own, cross);
+}
+
+BlockId State::Clone(BlockId source, std::string name) {
+  const Block original = layout_[source];
+  ALIDADE_EXPECTS(original.present);
+  const BlockId id =
+      Declare(std::move(name), original.owner, original.space, original.status);
+  const std::vector<double> copy(value(source), value(source) + original.geometry().ambient);
+  const int n = original.geometry().tangent;
+  Initialise(id, copy.data(), {source}, {Eigen::MatrixXd::Identity(n, n)},
+             Eigen::MatrixXd::Zero(n, n));
+  return id;
+}
+
+void State::Marginalise(BlockId id) {
+  Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
+  ALIDADE_EXPECTS(block.present);
+  value_gaps_.emplace_back(block.value_offset, block.geometry().ambient);
+  if (block.has_covariance()) {
+    const int rows = block.geometry().tangent;
+    const auto last = std::max_element(
+        layout_.blocks_.begin(), layout_.blocks_.end(),
+        [](const Block& a, const Block& b) { return a.tangent_offset < b.tangent_offset; });
+    covariance_.Release(block.tangent_offset, rows);
+    if (&*last != &block && last->geometry().tangent == rows) {
+      covariance_.Move(last->tangent_offset, block.tangent_offset, rows);
+      last->tangent_offset = block.tangent_offset;
+    }
+  }
+  block.present = false;
+  block.value_offset = block.tangent_offset = -1;
+}
+
+void State::Consider(BlockId id, bool considered) {
+  Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
+  ALIDADE_EXPECTS(block.status != BlockStatus::kFixed);
+  block.status = considered ? BlockStatus::kConsidered : BlockStatus::kEstimated;
+}
+
+void State::Reparametrise(BlockId id, Space space, const double* value,
+                          const Eigen::MatrixXd& jacobian) {
+  const Block old = layout_[id];
+  ALIDADE_EXPECTS(old.present);
+  const BlockId fresh = Declare(old.name + "'", old.owner, std::move(space), old.status);
+  const Eigen::Index n = jacobian.rows();
+  Initialise(fresh, value, {id}, {jacobian}, Eigen::MatrixXd::Zero(n, n));
+  Marginalise(id);
+  Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
+  block = layout_[fresh];
+  block.name = old.name;
+  layout_.blocks_.pop_back();
+}
+
+void State::Correct(const Eigen::VectorXd& dx) {
+  for (BlockId id = 0; id < static_cast<BlockId>(layout_.blocks_.size()); ++id) {
+    const Block& block = layout_[id];
+    if (!block.has_covariance()) continue;
+    const Geometry& geometry = block.geometry();
+    double* x = value(id);
+    if (geometry.kind != GeometryKind::kUnitVector) {
+      geometry.Plus(x, dx.data() + block.tangent_offset, x);
+      continue;
+    }
+    double moved[3];
+    Eigen::Matrix<double, 2, 2, Eigen::RowMajor> j;
+    geometry.Plus(x, dx.data() + block.tangent_offset, moved);
+    geometry.Transport(x, moved, j.data());
+    covariance_.Transform(block.tangent_offset, j);
+    std::copy_n(moved, 3, x);
+  }
+}
+
+}  // namespace alidade

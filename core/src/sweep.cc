@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/sweep.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+namespace alidade {
+namespace {
+
+/// The runs of a sweep, handed out to threads one after the other.
+class Queue {
+ public:
+  Queue(const Config& config, const PluginHost& host, const SweepOptions& options,
+        std::uint64_t first_seed, std::int64_t runs)
+      : config_(config), host_(host), options_(options), first_seed_(first_seed),
+        done_(static_cast<std::size_t>(runs)) {}
+
+  /// Takes runs until there are none left.
+  void Work() {
+    while (!Stopped()) {
+      const std::size_t index = next_++;
+      if (index >= done_.size()) return;
+      SweepRun run = RunSeed(first_seed_ + index);
+      if (run.status == RunStatus::kStopped) return;
+      const std::lock_guard lock(mutex_);
+      done_[index] = std::move(run);
+      ++count_;
+      if (options_.progress) options_.progress(count_, static_cast<std::int64_t>(done_.size()));
+    }
+  }
+
+  /// The finished ones, by seed.
+  std::vector<SweepRun> Take() {
+    std::vector<SweepRun> runs;
+    for (auto& run : done_) {
+      if (run) runs.push_back(std::move(*run));
+    }
+    return runs;
+  }
+
+ private:
+  bool Stopped() const { return options_.stop && options_.stop(); }
+
+  /// A config of this run's own: reading marks what was read.
+  Config CopyFor(std::uint64_t seed) {
+    const std::lock_guard lock(mutex_);
+    Config copy = config_.Merged(Config::FromText("{}", "sweep").root());
+    copy.Set("source.seed", std::to_string(seed), "--first-seed");
+    return copy;
+  }
+
+  SweepRun RunSeed(std::uint64_t seed) {
+    SweepRun run;
+    run.seed = seed;
+    try {
+      const Config config = CopyFor(seed);
+      Experiment experiment = BuildExperiment(config, host_);
+      for (Contestant& contestant : experiment.contestants) {
+        contestant.on_divergence = OnDivergence::kReport;
+      }
+      RunOptions options;
+      options.stop = options_.stop;
+      RunResult result = Run(experiment, options);
+      run.status = result.status;
+      run.code = result.code;
+      run.reason = std::move(result.reason);
+      run.contestants = std::move(result.contestants);
+      for (ContestantResult& one : run.contestants) one.events = {};
+    } catch (const Error& error) {
+      Fail(run, error.code(), error.what());
+    } catch (const std::exception& error) {
+      Fail(run, ExitCode::kInternal, error.what());
+    }
+    return run;
+  }
+
+  static void Fail(SweepRun& run, ExitCode code, const char* reason) {
+    run.status = code == ExitCode::kStopped ? RunStatus::kStopped : RunStatus::kFailed;
+    run.code = code;
+    run.reason = reason;
+  }
+
+  const Config& config_;
+  const PluginHost& host_;
+  const SweepOptions& options_;
+  const std::uint64_t first_seed_;
+  std::atomic<std::size_t> next_{0};
+  std::mutex mutex_;
+  std::vector<std::optional<SweepRun>> done_;
+  std::int64_t count_ = 0;
+};
+
+Spread SpreadOf(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  double sum = 0.0;
+  for (const double value : values) sum += value;
+  return {sum / static_cast<double>(values.size()), Quantile(values, 0.05), Quantile(values, 0.5),
+          Quantile(values, 0.95)};
+}
+
+}  // namespace
+
+SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptions& options) {
+  ALIDADE_EXPECTS(options.runs > 0 && options.jobs >= 0);
+  ALIDADE_EXPECTS(options.shard >= 1 && options.shard <= options.shards);
+  SweepResult result;
+  // What is wrong with the config is said once, before the first run.
+  for (const Contestant& contestant : BuildExperiment(config, host).contestants) {
+    result.estimators.push_back(contestant.name);
+  }
+  const auto share = [&](int i) { return options.runs / options.shards * i +
+                                         options.runs % options.shards * i / options.shards; };
+  const std::int64_t first = share(options.shard - 1);
+  result.runs = share(options.shard) - first;
+  result.first_seed = options.first_seed + static_cast<std::uint64_t>(first);
+
+  Queue queue(config, host, options, result.first_seed, result.runs);
+  const auto hardware = static_cast<std::int64_t>(std::thread::hardware_concurrency());
+  const std::int64_t wanted = options.jobs > 0 ? options.jobs : std::max<std::int64_t>(1, hardware);
+  {
+    std::vector<std::jthread> threads;
+    for (std::int64_t i = 1; i < std::min(wanted, result.runs); ++i) {
+      threads.emplace_back([&queue] { queue.Work(); });
+    }
+    queue.Work();
+  }
+  result.done = queue.Take();
+  result.stopped = static_cast<std::int64_t>(result.done.size()) < result.runs;
+  return result;
+}
+
+double Quantile(const std::vector<double>& ascending, double q) {
+  ALIDADE_EXPECTS(!ascending.empty() && q >= 0.0 && q <= 1.0);
+  const double h = static_cast<double>(ascending.size() - 1) * q;
+  const auto below = static_cast<std::size_t>(h);
+  const double low = ascending[below];
+  const double high = ascending[std::min(below + 1, ascending.size() - 1)];
+  const double share = h - static_cast<double>(below);
+  // Infinities next to one another have no difference.
+  return share == 0.0 || low == high ? low : low + share * (high - low);
+}
+
+std::vector<SweepSummary> Summarise(const SweepResult& result) {
+  std::vector<SweepSummary> summaries;
+  for (const std::string& name : result.estimators) {
+    SweepSummary& summary = summaries.emplace_back();
+    summary.name = name;
+    std::map<std::string, std::vector<double>> values;
+    for (const SweepRun& run : result.done) {
+      for (const ContestantResult& one : run.contestants) {
+        if (one.name != name) continue;
+        summary.units.insert(one.units.begin(), one.units.end());
+        summary.diverged += one.diverged ? 1 : 0;
+        if (!run.Uses(one)) continue;
+        ++summary.used;
+        for (const auto& [key, value] : one.metrics) {
+          if (!std::isnan(value)) values[key].push_back(value);
+        }
+      }
+    }
+    for (auto& [key, list] : values) summary.metrics[key] = SpreadOf(std::move(list));
+  }
+  return summaries;
+}
+
+}  // namespace alidade

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "alidade/sweep.h"
+#include "comparison_table.h"
+#include "csv_file.h"
+#include "json.h"
+#include "run_folder.h"
+#include "text_table.h"
+
+namespace alidade {
+
+using internal::CsvFile;
+using internal::Json;
+using internal::RunFolder;
+using internal::TextRow;
+
+struct SweepFolder::Impl {
+  Impl(const std::filesystem::path& path, bool force) : folder(path, force) {}
+  RunFolder folder;
+};
+
+namespace {
+
+/// Rows of the table below, a cell for each estimator. Each one stands as four in a comparison, so
+/// that its numbers share their unit and decimals with all others of the row.
+std::vector<TextRow> TableRows(const std::vector<SweepSummary>& summaries) {
+  RunResult columns;
+  for (const SweepSummary& summary : summaries) {
+    for (const auto member : {&Spread::mean, &Spread::p05, &Spread::p50, &Spread::p95}) {
+      ContestantResult& column = columns.contestants.emplace_back();
+      column.units = summary.units;
+      for (const auto& [key, spread] : summary.metrics) column.metrics[key] = spread.*member;
+    }
+  }
+  TextRow names = {""}, used = {"runs used"}, diverged = {"diverged"};
+  for (const SweepSummary& summary : summaries) {
+    names.push_back(summary.name);
+    used.push_back(std::to_string(summary.used));
+    diverged.push_back(std::to_string(summary.diverged));
+  }
+  std::vector<TextRow> rows = {names};
+  std::vector<internal::ComparisonRow> comparison = internal::ComparisonRows(columns);
+  comparison.pop_back();  // yes or no of one run
+  for (const internal::ComparisonRow& from : comparison) {
+    TextRow& row = rows.emplace_back(TextRow{from.label});
+    for (std::size_t i = 0; i < from.cells.size(); i += 4) {
+      const std::string* const c = &from.cells[i];
+      row.push_back(c[0] == "-" ? "-" : c[0] + " [" + c[1] + ", " + c[2] + ", " + c[3] + ']');
+    }
+  }
+  rows.push_back(used);
+  rows.push_back(diverged);
+  return rows;
+}
+
+std::string Markdown(const SweepResult& result) {
+  const auto whole = std::count_if(result.done.begin(), result.done.end(), [](const auto& run) {
+    return run.status == RunStatus::kOk;
+  });
+  std::string text = std::to_string(whole) + " of " + std::to_string(result.runs) +
+                     " runs, seeds from " + std::to_string(result.first_seed) +
+                     ". Mean [5 %, 50 %, 95 % quantile] over the runs that did not diverge.\n\n";
+  const std::vector<TextRow> rows = TableRows(Summarise(result));
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    text += "| " + internal::Join(rows[r], " | ") + " |\n";
+    if (r > 0) continue;
+    for (std::size_t c = 0; c < rows[r].size(); ++c) text += c == 0 ? "|---" : "|---:";
+    text += "|\n";
+  }
+  return text;
+}
+
+std::string SweepJson(const SweepResult& result) {
+  const auto whole = std::count_if(result.done.begin(), result.done.end(), [](const auto& run) {
+    return run.status == RunStatus::kOk;
+  });
+  Json json;
+  json.Object();
+  json.Key("runs").Integer(result.runs);
+  json.Key("runs_used").Integer(whole);
+  json.Key("first_seed").Integer(static_cast<std::int64_t>(result.first_seed));
+  json.Key("estimators").Object();
+  for (const SweepSummary& summary : Summarise(result)) {
+    json.Key(summary.name).Object();
+    json.Key("diverged").Integer(summary.diverged);
+    json.Key("metrics").Object();
+    for (const auto& [key, spread] : summary.metrics) {
+      json.Key(key).Object();
+      json.Key("mean").Number(spread.mean);
+      json.Key("p05").Number(spread.p05);
+      json.Key("p50").Number(spread.p50);
+      json.Key("p95").Number(spread.p95);
+      json.End();
+    }
+    json.End();
+    json.End();
+  }
+  json.End();
+  json.End();
+  return json.text();
+}
+
+/// Keys that any run has, in the order of a comparison.
+RunResult AllKeys(const SweepResult& result) {
+  RunResult all;
+  ContestantResult& keys = all.contestants.emplace_back();
+  for (const SweepRun& run : result.done) {
+    for (const ContestantResult& one : run.contestants) {
+      keys.metrics.insert(one.metrics.begin(), one.metrics.end());
+      keys.counts.insert(one.counts.begin(), one.counts.end());
+    }
+  }
+  return all;
+}
+
+void WriteRuns(const RunFolder& folder, const SweepResult& result) {
+  const RunResult all = AllKeys(result);
+  const std::vector<std::string> metrics = internal::OrderedMetrics(all);
+  const std::vector<std::string> counts = internal::OrderedCounts(all);
+  std::vector<std::string> header = {"seed", "estimator", "diverged"};
+  header.insert(header.end(), metrics.begin(), metrics.end());
+  header.insert(header.end(), counts.begin(), counts.end());
+  CsvFile csv(folder, "runs.csv", header);
+  for (const SweepRun& run : result.done) {
+    for (const ContestantResult& one : run.contestants) {
+      if (!run.Uses(one) && !one.diverged) continue;
+      csv.Integer(static_cast<std::int64_t>(run.seed)).Text(one.name);
+      csv.Text(one.diverged ? "true" : "false");
+      for (const std::string& key : metrics) {
+        const auto found = one.metrics.find(key);
+        found == one.metrics.end() ? csv.Empty() : csv.Number(found->second);
+      }
+      for (const std::string& key : counts) {
+        const auto found = one.counts.find(key);
+        csv.Integer(found == one.counts.end() ? 0 : found->second);
+      }
+      csv.EndRow();
+    }
+  }
+  csv.Close();
+}
+
+void WriteFailures(const RunFolder& folder, const SweepResult& result) {
+  const auto failed = [](const SweepRun& run) { return run.status == RunStatus::kFailed; };
+  if (std::none_of(result.done.begin(), result.done.end(), failed)) return;
+  CsvFile csv(folder, "failures.csv", {"seed", "exit_code", "reason"});
+  for (const SweepRun& run : result.done) {
+    if (!failed(run)) continue;
+    csv.Integer(static_cast<std::int64_t>(run.seed)).Integer(static_cast<int>(run.code));
+    csv.Text(run.reason).EndRow();
+  }
+  csv.Close();
+}
+
+}  // namespace
+
+std::string SweepTable(const SweepResult& result) {
+  constexpr std::size_t kLineWidth = 100;
+  const std::vector<TextRow> rows = TableRows(Summarise(result));
+  std::size_t label = 0, cell = 0;
+  for (const TextRow& row : rows) {
+    label = std::max(label, row[0].size());
+    for (std::size_t c = 1; c < row.size(); ++c) cell = std::max(cell, row[c].size() + 2);
+  }
+  // Estimators that do not fit beside the others go into a table below.
+  const std::size_t fit =
+      std::max<std::size_t>(1, (kLineWidth - std::min(label, kLineWidth)) / std::max<std::size_t>(1, cell));
+  std::string text;
+  for (std::size_t first = 1; first < rows[0].size(); first += fit) {
+    std::vector<TextRow> part;
+    for (const TextRow& row : rows) {
+      TextRow& some = part.emplace_back(TextRow{row[0]});
+      for (std::size_t c = first; c < std::min(first + fit, row.size()); ++c) some.push_back(row[c]);
+    }
+    text += (first > 1 ? "\n" : "") + internal::TextTable(part);
+  }
+  return text;
+}
+
+SweepFolder::SweepFolder(const std::filesystem::path& folder, bool force)
+    : impl_(std::make_unique<Impl>(folder, force)) {}
+
+SweepFolder::~SweepFolder() = default;
+
+void SweepFolder::Write(const SweepResult& result, const Config& config) {
+  const RunFolder& folder = impl_->folder;
+  folder.Write("config.resolved.yaml", config.ToYaml());
+  folder.Write("sweep.json", SweepJson(result));
+  WriteRuns(folder, result);
+  WriteFailures(folder, result);
+  folder.Write("table.md", Markdown(result));
+  impl_->folder.Commit();
+}
+
+}  // namespace alidade

@@ -1,0 +1,337 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/system.h"
+
+#include <algorithm>
+#include <functional>
+
+namespace alidade {
+namespace {
+
+constexpr double kQuaternionTolerance = 1e-3;
+
+std::vector<std::string> Names(const std::vector<Space>& spaces) {
+  std::vector<std::string> names;
+  for (const Space& space : spaces) names.push_back(space.name);
+  return names;
+}
+
+/// The value of a block: a number, a list, or {w, x, y, z} for a unit quaternion.
+std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
+  std::vector<double> mean;
+  if (geometry.kind == GeometryKind::kUnitQuaternion) {
+    for (const char* part : {"w", "x", "y", "z"}) mean.push_back(node.At(part).Number());
+    node.RejectUnread();
+  } else {
+    mean = node.Numbers(geometry.ambient);
+  }
+  if (geometry.Defect(mean.data()) > kQuaternionTolerance) {
+    node.Fail("not of unit length", "a unit vector or quaternion to 1e-3");
+  }
+  geometry.Normalise(mean.data());
+  return mean;
+}
+
+/// Exactly one of sigma, variance, covariance.
+Eigen::MatrixXd ReadCovariance(const Node& node, int size) {
+  const auto sigma = node.Find("sigma"), variance = node.Find("variance"),
+             covariance = node.Find("covariance");
+  if (int{sigma.has_value()} + int{variance.has_value()} + int{covariance.has_value()} != 1) {
+    node.Fail("needs its uncertainty once", "one of sigma, variance, covariance");
+  }
+  if (covariance) {
+    const std::vector<double> values = covariance->Covariance(size);
+    return Eigen::Map<const Eigen::MatrixXd>(values.data(), size, size);
+  }
+  const Node& spread = sigma ? *sigma : *variance;
+  std::vector<double> values = spread.Numbers();
+  if (values.size() == 1) values.assign(static_cast<std::size_t>(size), values[0]);
+  if (values.size() != static_cast<std::size_t>(size)) {
+    spread.Fail(std::to_string(values.size()) + " numbers", std::to_string(size) + ", or one");
+  }
+  Eigen::VectorXd diagonal = Eigen::Map<const Eigen::VectorXd>(values.data(), size);
+  if (diagonal.minCoeff() < 0.0) spread.Fail("negative", ">= 0");
+  if (sigma) diagonal = diagonal.cwiseAbs2();
+  return diagonal.asDiagonal();
+}
+
+/// Blocks of the entry that a list such as `consider: [depth]` names.
+std::vector<std::string> ReadNames(const Node& entry, const char* key,
+                                   const std::vector<std::string>& accepted) {
+  std::vector<std::string> names;
+  const auto list = entry.Find(key);
+  if (!list) return names;
+  for (const Node& item : list->Items()) {
+    const std::string name = item.Text();
+    if (std::find(accepted.begin(), accepted.end(), name) == accepted.end()) {
+      item.Fail("no block '" + name + "' in this entry", {}, Nearest(name, accepted));
+    }
+    names.push_back(name);
+  }
+  return names;
+}
+
+bool Contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+/// Names of the blocks as the entry renames them, in the order of the model.
+std::vector<std::string> ReadBlockNames(const Node& entry, const MotionModel& model) {
+  std::vector<std::string> names = Names(model.blocks());
+  const auto renamed = entry.Find("blocks");
+  if (!renamed) return names;
+  for (std::string& name : names) {
+    const auto given = renamed->Find(name);
+    if (given) name = given->Text();
+  }
+  renamed->RejectUnread();
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (std::count(names.begin(), names.end(), names[i]) > 1) {
+      renamed->Fail("two blocks are called '" + names[i] + "'", "a name of its own for each block");
+    }
+  }
+  return names;
+}
+
+void ReadPrior(const Node& initial, const Block& block, BlockId id, System& system) {
+  Prior prior;
+  prior.block = id;
+  if (const auto from = initial.Find("from")) {
+    prior.from = from->Text();
+  } else {
+    prior.mean = ReadMean(initial.At("mean", "the initial value"), block.geometry());
+    if (block.status != BlockStatus::kFixed) {
+      prior.covariance = ReadCovariance(initial, block.geometry().tangent);
+    } else {
+      for (const char* key : {"sigma", "variance", "covariance"}) initial.Declare(key);
+    }
+  }
+  initial.RejectUnread();
+  system.priors.push_back(std::move(prior));
+}
+
+void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost& host,
+                    System& system) {
+  const std::string model_name = entry.At("model", "a state entry").Text();
+  MotionBinding binding{name, host.CreateMotion(model_name, entry), {}};
+  if (binding.model.has_input()) {
+    entry.Fail("model '" + model_name + "' needs a control input", "a model without: control "
+               "inputs are not supported yet");
+  }
+  const std::vector<std::string> names = ReadBlockNames(entry, binding.model);
+  const auto considered = ReadNames(entry, "consider", names);
+  const auto fixed = ReadNames(entry, "fixed", names);
+  const Node initial = entry.At("initial", "the state entry '" + name + "'");
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const BlockStatus status = Contains(fixed, names[i])        ? BlockStatus::kFixed
+                               : Contains(considered, names[i]) ? BlockStatus::kConsidered
+                                                                : BlockStatus::kEstimated;
+    const BlockId id = system.layout.Declare(name + "." + names[i], name,
+                                             binding.model.blocks()[i], status);
+    binding.blocks.push_back(id);
+    ReadPrior(initial.At(names[i], "block '" + name + "." + names[i] + "'"), system.layout[id], id,
+              system);
+  }
+  initial.RejectUnread();
+  entry.RejectUnread();
+  system.motions.push_back(std::move(binding));
+}
+
+BlockId FindBlock(const Node& node, const System& system) {
+  const std::string name = node.Text();
+  const BlockId id = system.layout.Find(name);
+  if (id >= 0) return id;
+  std::vector<std::string> names;
+  for (const Block& block : system.layout.blocks()) names.push_back(block.name);
+  node.Fail("no state block '" + name + "'", "a block of `state`, as in ENTRY.BLOCK",
+            Nearest(name, names));
+}
+
+RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& model,
+                     const System& system) {
+  RoleBinding binding;
+  if (!node.is_map()) {
+    binding.block = FindBlock(node, system);
+  } else {
+    binding.block = FindBlock(node.At("block", "a role"), system);
+    if (const auto mode = node.Find("mode")) {
+      binding.mode = static_cast<RoleMode>(mode->Choice({"estimate", "consider", "hold"}));
+    }
+    if (const auto at = node.Find("linearise_at")) {
+      binding.linearise_at = static_cast<LineariseAt>(at->Choice({"prediction", "measurement"}));
+      const int initialised = model.initialised_role();
+      if (binding.linearise_at == LineariseAt::kMeasurement &&
+          (initialised < 0 ||
+           model.roles()[static_cast<std::size_t>(initialised)].name != role.name)) {
+        at->Fail("model '" + model.name() + "' has no inverse observation of role '" + role.name +
+                     "'",
+                 "prediction");
+      }
+    }
+    node.RejectUnread();
+  }
+  const Block& block = system.layout[binding.block];
+  if (!(block.geometry() == role.geometry)) {
+    node.Fail("block '" + block.name + "' has size " + std::to_string(block.geometry().ambient) +
+                  " or another geometry",
+              "one that fits role '" + role.name + "' of size " +
+                  std::to_string(role.geometry.ambient));
+  }
+  return binding;
+}
+
+SensorBinding ReadSensor(const std::string& name, const Node& entry, const PluginHost& host,
+                         const System& system) {
+  const std::string model_name = entry.At("model", "a sensor entry").Text();
+  SensorBinding binding{name, entry.At("stream", "sensor '" + name + "'").Text(),
+                        host.CreateSensor(model_name, entry), {}};
+  const Node roles = entry.At("roles", "sensor '" + name + "'");
+  for (const Space& role : binding.model.roles()) {
+    const auto node = roles.Find(role.name);
+    if (!node && role.optional()) {
+      binding.roles.push_back({});
+      continue;
+    }
+    const Node given = node ? *node : roles.At(role.name, "model '" + model_name + "'");
+    binding.roles.push_back(ReadRole(given, role, binding.model, system));
+    const BlockId block = binding.roles.back().block;
+    const auto same = [block](const RoleBinding& r) { return r.block == block; };
+    if (std::count_if(binding.roles.begin(), binding.roles.end(), same) > 1) {
+      given.Fail("block '" + system.layout[block].name + "' already fills another role",
+                 "a block of its own for each role");
+    }
+  }
+  roles.RejectUnread();
+  entry.RejectUnread();
+  return binding;
+}
+
+std::vector<std::string> SensorNames(const System& system) {
+  std::vector<std::string> names;
+  for (const SensorBinding& sensor : system.sensors) names.push_back(sensor.name);
+  return names;
+}
+
+/// Checks that every block that starts from a sensor can do so: the sensor measures it, and the
+/// blocks it needs start without waiting for this one.
+void CheckInitialisation(const Node& root, const System& system) {
+  const auto place = [&](BlockId id) {
+    const Block& block = system.layout[id];
+    const std::string name = block.name.substr(block.owner.size() + 1);
+    return root.At("state").At(block.owner).At("initial").At(name).At("from");
+  };
+  const auto prior_of = [&](BlockId id) -> const Prior& {
+    return *std::find_if(system.priors.begin(), system.priors.end(),
+                         [id](const Prior& p) { return p.block == id; });
+  };
+  for (const Prior& prior : system.priors) {
+    if (prior.from.empty()) continue;
+    const int sensor = system.FindSensor(prior.from);
+    if (sensor < 0) {
+      place(prior.block).Fail("no sensor '" + prior.from + "' here", "a sensor of this estimator",
+                              Nearest(prior.from, SensorNames(system)));
+    }
+    const SensorBinding& binding = system.sensors[static_cast<std::size_t>(sensor)];
+    const int role = binding.model.initialised_role();
+    if (role < 0 || binding.roles[static_cast<std::size_t>(role)].block != prior.block) {
+      place(prior.block).Fail("sensor '" + prior.from + "' does not determine this block",
+                              "a sensor whose inverse observation is this block");
+    }
+  }
+  std::vector<BlockId> chain;
+  const std::function<void(BlockId)> follow = [&](BlockId id) {
+    const Prior& prior = prior_of(id);
+    if (prior.from.empty()) return;
+    if (std::find(chain.begin(), chain.end(), id) != chain.end()) {
+      std::string text;
+      for (const BlockId b : chain) text += system.layout[b].name + " <- ";
+      place(id).Fail("cyclic: " + text + system.layout[id].name,
+                     "one block of the cycle with a mean of its own");
+    }
+    chain.push_back(id);
+    const SensorBinding& binding =
+        system.sensors[static_cast<std::size_t>(system.FindSensor(prior.from))];
+    for (const RoleBinding& role : binding.roles) {
+      if (role.block >= 0 && role.block != id) follow(role.block);
+    }
+    chain.pop_back();
+  };
+  for (const Prior& prior : system.priors) follow(prior.block);
+}
+
+/// The system without the state entries that no sensor touches.
+System WithoutUntouched(System system) {
+  std::vector<std::string> touched;
+  for (const SensorBinding& sensor : system.sensors) {
+    for (const RoleBinding& role : sensor.roles) {
+      if (role.block >= 0) touched.push_back(system.layout[role.block].owner);
+    }
+  }
+  System kept;
+  kept.start_s = system.start_s;
+  std::vector<BlockId> moved;
+  for (const Block& block : system.layout.blocks()) {
+    moved.push_back(Contains(touched, block.owner)
+                        ? kept.layout.Declare(block.name, block.owner, block.space, block.status)
+                        : -1);
+  }
+  const auto follow = [&moved](BlockId& id) {
+    if (id >= 0) id = moved[static_cast<std::size_t>(id)];
+  };
+  for (MotionBinding& motion : system.motions) {
+    if (!Contains(touched, motion.name)) continue;
+    for (BlockId& id : motion.blocks) follow(id);
+    kept.motions.push_back(std::move(motion));
+  }
+  for (Prior& prior : system.priors) {
+    follow(prior.block);
+    if (prior.block >= 0) kept.priors.push_back(std::move(prior));
+  }
+  for (SensorBinding& sensor : system.sensors) {
+    for (RoleBinding& role : sensor.roles) follow(role.block);
+    kept.sensors.push_back(std::move(sensor));
+  }
+  return kept;
+}
+
+}  // namespace
+
+State System::InitialState() const {
+  State state(layout);
+  for (const Prior& prior : priors) {
+    if (prior.from.empty()) state.Add(prior.block, prior.mean.data(), prior.covariance);
+  }
+  return state;
+}
+
+int System::FindSensor(std::string_view name) const {
+  const auto found = std::find_if(sensors.begin(), sensors.end(),
+                                  [name](const SensorBinding& s) { return s.name == name; });
+  return found == sensors.end() ? -1 : static_cast<int>(found - sensors.begin());
+}
+
+System BuildSystem(const Node& root, const PluginHost& host,
+                   const std::vector<std::string>& only) {
+  System system;
+  for (const auto& [name, entry] : root.At("state", "a run").Entries()) {
+    ReadStateEntry(name, entry, host, system);
+  }
+  std::vector<SensorBinding> sensors;
+  for (const auto& [name, entry] : root.At("sensors", "a run").Entries()) {
+    sensors.push_back(ReadSensor(name, entry, host, system));
+  }
+  if (only.empty()) {
+    system.sensors = std::move(sensors);
+  } else {
+    for (const std::string& name : only) {
+      for (const SensorBinding& sensor : sensors) {
+        if (sensor.name == name) system.sensors.push_back(sensor);
+      }
+    }
+  }
+  if (const auto start = root.Find("start_s")) system.start_s = start->Number();
+  if (!only.empty()) system = WithoutUntouched(std::move(system));
+  CheckInitialisation(root, system);
+  return system;
+}
+
+}  // namespace alidade

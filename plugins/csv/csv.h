@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <charconv>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+#include "alidade/source.h"
+#include "csv_layout.h"
+#include "line_reader.h"
+
+namespace alidade {
+
+/// Measurements and truth from the columns of a table: a file, a pipe, or standard input.
+///
+/// Each row is a frame. The first line that is neither blank nor a comment (`#`) names the columns;
+/// columns that the config does not name may hold anything. A cell that says "missing" leaves its
+/// stream, or truth value, out of the frame; nothing stands in for it. Time is read exactly where
+/// it is written without an exponent, so that ns since 1970 keep every digit.
+///
+/// Keys         kCsvKeys in csv_layout.h.
+/// Errors       kBadData with file, line and column of the first cell that is wrong; kInputMissing;
+///              kIo where the file changes while it is read; kBadConfig.
+class CsvSource : public Source {
+ public:
+  explicit CsvSource(const SourceArguments& arguments)
+      : layout_(ReadCsvLayout(arguments.entry)),
+        path_(arguments.entry.At("path", "csv")),
+        reader_(Path(path_, arguments.folder), path_.place(), path_.path()) {
+    for (const CsvField& field : layout_.streams) streams_.push_back(field.info);
+    for (const CsvField& field : layout_.truths) truths_.push_back(field.info);
+    ReadHeader();
+    if (layout_.blind_after_node) CountRows();
+  }
+
+  const std::vector<StreamInfo>& streams() const override { return streams_; }
+  const std::vector<StreamInfo>& truths() const override { return truths_; }
+  std::int64_t size() const override { return size_; }
+
+  bool Next(Frame& frame) override {
+    if (!NextRow()) {
+      if (rows_ == 0) Fail(Place{reader_.name()}, {}, "no data rows", "a row below the header");
+      return false;
+    }
+    Split();
+    CheckColumns();
+    frame.stamp = ReadStamp();
+    std::size_t used = 0;
+    for (std::size_t i = 0; i < layout_.streams.size(); ++i) {
+      if (used == frame.measurements.size()) frame.measurements.emplace_back();
+      Measurement& measurement = frame.measurements[used];
+      if (!ReadField(layout_.streams[i], measurement.values)) continue;
+      if (layout_.streams[i].goes_blind && rows_ >= first_blind_row_) continue;
+      measurement.stamp = frame.stamp;
+      measurement.stream = static_cast<int>(i);
+      measurement.landmark = -1;
+      measurement.covariance.clear();
+      ++used;
+    }
+    frame.measurements.resize(used);
+    frame.truth.resize(layout_.truths.size());
+    for (std::size_t i = 0; i < frame.truth.size(); ++i) {
+      ReadField(layout_.truths[i], frame.truth[i]);
+    }
+    last_stamp_ = frame.stamp;
+    last_line_ = reader_.number();
+    ++rows_;
+    return true;
+  }
+
+ private:
+  static std::filesystem::path Path(const Node& node, const std::filesystem::path& folder) {
+    // `--set source.path=-` is read as YAML: a list of one item without a value.
+    const bool dash = node.kind() == Node::Kind::kList && node.Items().size() == 1 &&
+                      node.Items()[0].kind() == Node::Kind::kNull;
+    const std::filesystem::path path = dash ? "-" : node.Text();
+    if (path.empty()) node.Fail("no path", "a file, or '-' for standard input");
+    const bool from_here = path == "-" || node.place().file == "--set";
+    return from_here ? path : (folder / path).lexically_normal();
+  }
+
+  /// The next line that is neither comment nor blank. A blank line is a row where it is the missing
+  /// value of a single column, and a row of too few columns where rows count the time.
+  bool NextRow() {
+    while (reader_.Next(line_)) {
+      if (line_.starts_with('#')) continue;
+      const bool blank = line_.find_first_not_of(" \t") == std::string_view::npos;
+      const bool skips_blank = names_.empty() || (names_.size() > 1 && layout_.rate_hz == 0.0);
+      if (!blank || !skips_blank) return true;
+    }
+    return false;
+  }
+
+  static std::string_view Trim(std::string_view text) {
+    const std::size_t first = std::min(text.find_first_not_of(" \t"), text.size());
+    text.remove_prefix(first);
+    text = text.substr(0, text.find_last_not_of(" \t") + 1);
+    const bool quoted = text.size() > 1 && text.front() == '"' && text.back() == '"';
+    return quoted ? text.substr(1, text.size() - 2) : text;
+  }
+
+  /// Cuts line_ into cells_, each with its untrimmed start.
+  void Split() {
+    cells_.clear();
+    for (std::string_view rest = line_;;) {
+      const std::size_t end = std::min(rest.find(layout_.separator), rest.size());
+      cells_.push_back(rest.substr(0, end));
+      if (end == rest.size()) return;
+      rest.remove_prefix(end + 1);
+    }
+  }
+
+  void ReadHeader() {
+    if (!NextRow())
+      Fail(Place{reader_.name()}, {}, "no header line", "a line that names the columns");
+    header_line_ = reader_.number();
+    Split();
+    std::vector<std::string> names;
+    for (const std::string_view cell : cells_) names.emplace_back(Trim(cell));
+    names_ = std::move(names);
+    ResolveColumns(names_, reader_.name(), layout_);
+  }
+
+  void CountRows() {
+    if (!reader_.regular()) {
+      layout_.blind_after_node->Fail(
+          "'" + reader_.name() + "' is a pipe, which cannot be read twice",
+          "a regular file, whose rows can be counted first");
+    }
+    size_ = 0;
+    while (NextRow()) ++size_;
+    reader_.Rewind();
+    NextRow();  // the header
+    const double share = layout_.blind_after * static_cast<double>(size_);
+    first_blind_row_ = static_cast<std::int64_t>(std::ceil(share * (1.0 - 1e-12)));
+  }
+
+  void CheckColumns() const {
+    const auto count = [](std::size_t n) {
+      return std::to_string(n) + (n == 1 ? " column" : " columns");
+    };
+    if (cells_.size() == names_.size()) return;
+    const bool few = cells_.size() < names_.size();
+    const std::size_t column = few ? line_.size() : Column(cells_[names_.size()]) - 1;
+    Fail(Place{reader_.name(), reader_.number(), static_cast<int>(column) + 1}, {},
+         (few && reader_.unterminated() ? "the last line is cut short: " : "") +
+             count(cells_.size()),
+         count(names_.size()) + ", as in line " + std::to_string(header_line_));
+  }
+
+  bool Missing(std::string_view cell) const {
+    return std::find(layout_.missing.begin(), layout_.missing.end(), cell) != layout_.missing.end();
+  }
+
+  /// Values of the field in this row; false, and none, where one of its cells says "missing".
+  bool ReadField(const CsvField& field, std::vector<double>& values) const {
+    values.clear();
+    for (const CsvColumn& column : field.columns) {
+      if (Missing(Trim(cells_[column.index]))) continue;
+      const double x = ReadNumber(column);
+      const double value = field.reciprocal ? field.gain / x : field.gain * x;
+      if (!std::isfinite(value)) {
+        FailCell(column,
+                 field.reciprocal ? "has no finite reciprocal" : "is too large for the gain");
+      }
+      values.push_back(value);
+    }
+    if (values.size() < field.columns.size()) values.clear();
+    return !values.empty();
+  }
+
+  double ReadNumber(const CsvColumn& column) const {
+    std::string_view text = Trim(cells_[column.index]);
+    const bool plus = text.starts_with('+');
+    if (plus) text.remove_prefix(1);
+    double value = 0.0;
+    const char* last = text.data() + text.size();
+    const auto [end, error] = std::from_chars(text.data(), last, value);
+    if (error == std::errc::invalid_argument || end != last || (plus && text.starts_with('-'))) {
+      FailCell(column, "is not a number");
+    }
+    if (error == std::errc::result_out_of_range) FailCell(column, "is too large or too small");
+    if (!std::isfinite(value)) FailCell(column, "is not finite");
+    return value;
+  }
+
+  Stamp ReadStamp() const {
+    if (!layout_.time) return StampFromSeconds(static_cast<double>(rows_) / layout_.rate_hz);
+    const CsvColumn& column = *layout_.time;
+    const double t_s =
+        ReadNumber(column) * std::pow(10.0, static_cast<double>(layout_.time_digits) - 9.0);
+    if (!(std::abs(t_s) < 9.2e9)) FailCell(column, "is beyond 292 years");
+    const std::string_view text = Trim(cells_[column.index]);
+    const bool has_exponent = text.find_first_of("eE") != std::string_view::npos;
+    const Stamp stamp =
+        has_exponent ? StampFromSeconds(t_s) : ExactStamp(text, layout_.time_digits);
+    if (rows_ > 0 && stamp <= last_stamp_) {
+      FailCell(column,
+               std::string(stamp < last_stamp_ ? "is before" : "is the same time as") + " line " +
+                   std::to_string(last_line_),
+               "times that increase");
+    }
+    return stamp;
+  }
+
+  /// The nearest ns to a decimal number without exponent, in a unit of 10^digits ns.
+  static Stamp ExactStamp(std::string_view text, std::size_t digits) {
+    const bool negative = text.starts_with('-');
+    if (negative || text.starts_with('+')) text.remove_prefix(1);
+    const std::size_t point = std::min(text.find('.'), text.size());
+    const std::string_view fraction = text.substr(std::min(point + 1, text.size()));
+    Stamp ns = 0;
+    for (const char digit : text.substr(0, point)) ns = 10 * ns + (digit - '0');
+    for (std::size_t i = 0; i < digits; ++i) {
+      ns = 10 * ns + (i < fraction.size() ? fraction[i] - '0' : 0);
+    }
+    if (fraction.size() > digits && fraction[digits] >= '5') ++ns;
+    return negative ? -ns : ns;
+  }
+
+  std::size_t Column(std::string_view cell) const {
+    return static_cast<std::size_t>(cell.data() - line_.data()) + 1;
+  }
+
+  [[noreturn]] void FailCell(const CsvColumn& column, const std::string& what,
+                             std::string_view expected = "a finite number") const {
+    constexpr std::size_t kShown = 40;
+    const std::string_view cell = Trim(cells_[column.index]);
+    std::string shown(cell.substr(0, kShown));
+    for (char& c : shown) {
+      if (static_cast<unsigned char>(c) < ' ' || c == 0x7F) c = '?';
+    }
+    if (cell.size() > kShown) shown += "...";
+    const int at = static_cast<int>(Column(cells_[column.index]));
+    Fail(Place{reader_.name(), reader_.number(), at}, column.name, '\'' + shown + "' " + what,
+         expected);
+  }
+  [[noreturn]] static void Fail(const Place& place, std::string_view key, std::string_view what,
+                                std::string_view expected) {
+    throw Error(ExitCode::kBadData, ErrorLine(place, key, what, expected));
+  }
+
+  CsvLayout layout_;
+  Node path_;
+  LineReader reader_;
+  std::vector<StreamInfo> streams_, truths_;
+  std::vector<std::string> names_;
+  int header_line_ = 0;
+  std::int64_t size_ = -1, first_blind_row_ = 0;
+
+  std::string_view line_;
+  std::vector<std::string_view> cells_;
+  std::int64_t rows_ = 0;  ///< given out so far
+  Stamp last_stamp_ = 0;
+  int last_line_ = 0;
+};
+
+inline std::unique_ptr<Source> CreateCsv(const SourceArguments& arguments) {
+  return std::make_unique<CsvSource>(arguments);
+}
+
+}  // namespace alidade

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "alidade/config.h"
+#include "alidade/source.h"
+
+namespace alidade {
+
+/// A column that the config names, and where the header has it.
+struct CsvColumn {
+  std::string name;
+  Node node;  ///< where the config says so
+  std::size_t index = 0;
+};
+
+/// A stream or truth value: v = gain x, or gain / x, of each of its columns.
+struct CsvField {
+  StreamInfo info;
+  std::vector<CsvColumn> columns;
+  double gain = 1.0;
+  bool reciprocal = false;
+  bool goes_blind = false;  ///< dropped from `blind_after` on
+};
+
+/// What the config says of a table: see kCsvKeys.
+struct CsvLayout {
+  std::optional<CsvColumn> time;  ///< none: rows come at rate_hz
+  std::size_t time_digits = 9;    ///< decimal digits from the unit of time to ns
+  double rate_hz = 0.0;
+  std::vector<CsvField> streams, truths;
+  char separator = ',';
+  std::vector<std::string> missing{""};
+  std::optional<Node> blind_after_node;
+  double blind_after = 1.0;
+};
+
+inline constexpr const char* kCsvKeys =
+    "path           file or pipe, from the folder of the config; '-' is standard input\n"
+    "time           {column: t_s, unit: s}; unit s, ms, us or ns; default column t_s in s\n"
+    "rate_hz        rows a second, where there is no column of time; the first is at 0\n"
+    "streams        map of stream to a column, a list of columns, or\n"
+    "               {columns: ..., reciprocal: false, gain: 1}: gain * x, or gain / x\n"
+    "truth          map of truth value to columns, in the same forms\n"
+    "separator      character between cells; default ','\n"
+    "missing        cells that say there is no value; default [\"\"], the empty cell\n"
+    "blind_after    share of the rows, in [0, 1], from which on streams are dropped; default 1\n"
+    "blind          streams that blind_after drops; default the first";
+
+namespace csv_detail {
+
+/// The items of a list; a scalar counts as a list of one.
+inline std::vector<Node> ItemsOrOne(const Node& node) {
+  return node.kind() == Node::Kind::kList ? node.Items() : std::vector<Node>{node};
+}
+
+inline CsvField ReadField(const std::string& name, const Node& node) {
+  CsvField field;
+  field.info.name = name;
+  Node columns = node;
+  if (node.is_map()) {
+    columns = node.At("columns", name);
+    if (const auto reciprocal = node.Find("reciprocal")) field.reciprocal = reciprocal->Flag();
+    if (const auto gain = node.Find("gain")) field.gain = gain->Number();
+    node.RejectUnread();
+  }
+  for (const Node& column : ItemsOrOne(columns)) field.columns.push_back({column.Text(), column});
+  if (field.columns.empty()) columns.Fail("no columns", "the name of a column, or a list of names");
+  field.info.size = static_cast<int>(field.columns.size());
+  return field;
+}
+
+inline std::vector<CsvField> ReadFields(const Node& map) {
+  std::vector<CsvField> fields;
+  for (const auto& [name, node] : map.Entries()) fields.push_back(ReadField(name, node));
+  return fields;
+}
+
+inline void ReadTime(const Node& entry, CsvLayout& layout) {
+  const std::optional<Node> time = entry.Find("time");
+  const std::optional<Node> rate = entry.Find("rate_hz");
+  if (rate) {
+    if (time) rate->Fail("'time' and 'rate_hz' are both given", "one of them");
+    layout.rate_hz = rate->Number(1e-3, 1e9);
+    return;
+  }
+  layout.time = CsvColumn{"t_s", time.value_or(entry)};
+  if (!time) return;
+  if (const auto column = time->Find("column")) layout.time = CsvColumn{column->Text(), *column};
+  if (const auto unit = time->Find("unit")) {
+    const int thousands = unit->Choice({"s", "ms", "us", "ns"});
+    layout.time_digits = static_cast<std::size_t>(9 - 3 * thousands);
+  }
+  time->RejectUnread();
+}
+
+inline char ReadSeparator(const Node& node) {
+  const std::string text = node.Text();
+  const bool part_of_number = text.find_first_of("+-.#\"\r\n0123456789eE") != std::string::npos;
+  if (text.size() != 1 || part_of_number) {
+    node.Fail("not a separator", "one character that numbers do not hold, as in ';' or \"\\t\"");
+  }
+  return text[0];
+}
+
+inline void ReadBlind(const Node& entry, CsvLayout& layout) {
+  const std::optional<Node> after = entry.Find("blind_after");
+  const std::optional<Node> blind = entry.Find("blind");
+  if (!after) {
+    if (blind) blind->Fail("without 'blind_after' no stream goes blind", "'blind_after' beside it");
+    return;
+  }
+  layout.blind_after_node = after;
+  layout.blind_after = after->Number(0.0, 1.0);
+  if (!blind) layout.streams.front().goes_blind = true;
+  for (const Node& item : blind ? ItemsOrOne(*blind) : std::vector<Node>{}) {
+    std::vector<std::string> names;
+    for (const CsvField& stream : layout.streams) names.push_back(stream.info.name);
+    const auto found = std::find(names.begin(), names.end(), item.Text());
+    if (found == names.end()) {
+      item.Fail("no stream '" + item.Text() + "'", {}, Nearest(item.Text(), names));
+    }
+    layout.streams[static_cast<std::size_t>(found - names.begin())].goes_blind = true;
+  }
+}
+
+/// Finds a column in the header `names` of `file`.
+inline void Resolve(const std::vector<std::string>& names, const std::string& file,
+                    CsvColumn& column) {
+  constexpr std::size_t kListed = 20;
+  const auto found = std::find(names.begin(), names.end(), column.name);
+  if (found == names.end()) {
+    std::string expected = "one of ";
+    for (std::size_t i = 0; i < std::min(names.size(), kListed); ++i) {
+      expected += (i > 0 ? ", " : "") + names[i];
+    }
+    if (names.size() > kListed) expected += ", ...";
+    column.node.Fail("no column '" + column.name + "' in " + file, expected,
+                     Nearest(column.name, names));
+  }
+  if (std::find(found + 1, names.end(), column.name) != names.end()) {
+    column.node.Fail(file + " has two columns '" + column.name + "'", "one");
+  }
+  column.index = static_cast<std::size_t>(found - names.begin());
+}
+
+}  // namespace csv_detail
+
+/// Reads all keys of kCsvKeys but `path`. Errors: kBadConfig.
+inline CsvLayout ReadCsvLayout(const Node& entry) {
+  CsvLayout layout;
+  for (const char* key : {"path", "time", "rate_hz", "streams", "truth", "separator", "missing",
+                          "blind_after", "blind"}) {
+    entry.Declare(key);
+  }
+  const Node streams = entry.At("streams", "csv");
+  layout.streams = csv_detail::ReadFields(streams);
+  if (layout.streams.empty()) streams.Fail("no streams", "a map, as in 'disparity: disparity_px'");
+  if (const auto truth = entry.Find("truth")) layout.truths = csv_detail::ReadFields(*truth);
+  csv_detail::ReadTime(entry, layout);
+  if (const auto separator = entry.Find("separator")) {
+    layout.separator = csv_detail::ReadSeparator(*separator);
+  }
+  if (const auto missing = entry.Find("missing")) {
+    layout.missing.clear();
+    for (const Node& word : csv_detail::ItemsOrOne(*missing)) layout.missing.push_back(word.Text());
+  }
+  csv_detail::ReadBlind(entry, layout);
+  return layout;
+}
+
+/// Finds the columns of the layout in the header of `file`. Errors: kBadConfig at the config's
+/// place, with the nearest name and the list of columns.
+inline void ResolveColumns(const std::vector<std::string>& names, const std::string& file,
+                           CsvLayout& layout) {
+  if (layout.time) csv_detail::Resolve(names, file, *layout.time);
+  for (std::vector<CsvField>* fields : {&layout.streams, &layout.truths}) {
+    for (CsvField& field : *fields) {
+      for (CsvColumn& column : field.columns) csv_detail::Resolve(names, file, column);
+    }
+  }
+}
+
+}  // namespace alidade

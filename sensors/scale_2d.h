@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "alidade/model.h"
+
+namespace alidade {
+
+/// Inverse apparent size of a target relative to a template taken at depth Z0.
+///
+///   model      s = lambda Z + n,   n ~ N(0, sigma_s^2),   lambda = 1 / Z0,  s = 1 / scale
+///   Jacobian   ds/dZ = lambda, ds/dlambda = Z          1x1, 1/m and m
+///   noise      propagated: sigma_s = (2 sigma / w) (lambda Z)^3      from pixels, see below
+///              fixed:      sigma_s^2 = variance
+///   inverse    lambda = s / Z
+///
+///   symbol     shape  unit    frame  meaning
+///   s          1      -       cam    template size / apparent size
+///   Z          1      m       cam    depth along the optical axis
+///   lambda     1      1/m     -      inverse depth at which the template was taken
+///   w, sigma   1      px      -      template width, noise of an edge, 1 sigma; > 0
+///
+/// The scale w'/w of a target w' = w / s wide is known to 2 sigma / w' (two edges, as the source
+/// takes it: linearly, not in quadrature); s = 1 / scale turns that into s^2 2 sigma / w'.
+///
+/// Defined for  Z > 0 and lambda > 0; else out_of_domain, outputs untouched.
+/// Valid for    s > 0; else the measurement is invalid.
+/// Source       [Ekf2017] sec. 1.2, h2; noise sec. 4.
+struct Scale2d : Sensor<Vec<1>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{
+      Quantity{"depth", "m", "depth along the optical axis"},
+      Quantity{"inverse_distance", "1/m", "inverse depth at which the template was taken"}};
+  static constexpr Quantity kMeasurement{"inverse_scale", "", "template size / apparent size"};
+  static constexpr int kInitialises = 1;
+
+  double fixed_sigma = 0.0;     ///< > 0: the noise is fixed
+  double relative_sigma = 0.0;  ///< 2 sigma / w
+
+  static Scale2d FromPixels(double template_px, double sigma_px) {
+    return Scale2d(0.0, 2.0 * sigma_px / template_px);
+  }
+  static Scale2d FromVariance(double variance) { return Scale2d(std::sqrt(variance), 0.0); }
+  explicit Scale2d(Params& p)
+      : Scale2d(p.Choice("noise", {"propagated", "fixed"}, "noise of 1/scale", 0) == 1
+                    ? FromVariance(p.Positive("variance", "", "noise = fixed: variance of 1/scale"))
+                    : FromPixels(p.Positive("template_px", "px", "width of the template"),
+                                 p.Positive("sigma_px", "px", "noise of an edge, 1 sigma"))) {}
+
+  template <class T>
+  bool Predict(const T* depth, const T* inverse_distance, T* inverse_scale) const {
+    if (!(depth[0] > T(0.0)) || !(inverse_distance[0] > T(0.0))) return false;
+    inverse_scale[0] = inverse_distance[0] * depth[0];
+    return true;
+  }
+  void Jacobian(const double* depth, const double* inverse_distance, MatrixRef J_s_depth,
+                MatrixRef J_s_inverse_distance) const {
+    J_s_depth(0, 0) = inverse_distance[0];
+    J_s_inverse_distance(0, 0) = depth[0];
+  }
+  template <class T>
+  void SqrtNoise(const T* depth, const T* inverse_distance, T* l) const {
+    const T s = inverse_distance[0] * depth[0];
+    l[0] = fixed_sigma > 0.0 ? T(fixed_sigma) : relative_sigma * s * s * s;
+  }
+  bool Valid(const double* inverse_scale) const { return inverse_scale[0] > 0.0; }
+  template <class T>
+  bool Initialise(const T* depth, const T* inverse_scale, T* inverse_distance) const {
+    if (!(depth[0] > T(0.0))) return false;
+    inverse_distance[0] = inverse_scale[0] / depth[0];
+    return true;
+  }
+
+ private:
+  Scale2d(double fixed, double relative) : fixed_sigma(fixed), relative_sigma(relative) {}
+};
+
+}  // namespace alidade

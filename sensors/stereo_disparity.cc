@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "stereo_disparity.h"
+
+#include "alidade/plugin.h"
+
+ALIDADE_PLUGIN(ALIDADE_SENSOR(alidade::StereoDisparity, "stereo_disparity",
+                              "disparity of one point seen by a rectified stereo pair: d = f B / Z",
+                              "[Ekf2017] sec. 1.2"))

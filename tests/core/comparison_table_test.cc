@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <sstream>
+
+#include "alidade/run.h"
+
+namespace alidade {
+namespace {
+
+ContestantResult Named(const std::string& name, std::map<std::string, double> metrics) {
+  ContestantResult result;
+  result.name = name;
+  result.metrics = std::move(metrics);
+  result.units = {{"target.depth", "m"}, {"cam.heading", "rad"}, {"cam.pixel", "px"}};
+  return result;
+}
+
+TEST(ComparisonTable, OrdersScalesAndAligns) {
+  RunResult result;
+  result.contestants = {
+      Named("fused", {{"rmse:target.depth", 0.002145},
+                      {"rmse:target.depth@blind", 0.00121},
+                      {"rmse:cam.pixel", 0.31},
+                      {"lag_ms:target.depth", -1.42},
+                      {"cov95:target.depth", 0.9342},
+                      {"cov95:target.depth@blind", 0.9},
+                      {"nees.mean:target", 0.8948},
+                      {"nees.cov95:target", 1.0},
+                      {"nis.mean:stereo", 0.9059},
+                      {"final:target.depth", 1.0}}),
+      Named("stereo_only", {{"rmse:target.depth", 0.206534}})};
+  result.contestants[0].counts = {{"accepted:stereo", 74}, {"gated:stereo", 1}};
+  result.contestants[1].diverged = true;
+  EXPECT_EQ(ComparisonTable(result),
+            "                               fused  stereo_only\n"
+            "rmse cam.pixel [px]           0.3100            -\n"
+            "rmse target.depth [mm]         2.145      206.534\n"
+            "rmse target.depth @blind [mm]  1.210            -\n"
+            "lag target.depth [ms]         -1.420            -\n"
+            "cov95 target.depth [%]         93.42            -\n"
+            "nees.mean target              0.8948            -\n"
+            "nees.cov95 target [%]          100.0            -\n"
+            "nis.mean stereo               0.9059            -\n"
+            "accepted stereo                   74            -\n"
+            "gated stereo                       1            -\n"
+            "diverged                          no          yes\n");
+}
+
+TEST(ComparisonTable, PrintsNumbersThatLieFarApart) {
+  RunResult result;
+  const double inf = std::numeric_limits<double>::infinity();
+  for (const double rmse : {1.95e-5, 0.0, 250.0, 3e12, inf}) {
+    const std::string name = std::string(1, static_cast<char>('a' + result.contestants.size()));
+    result.contestants.push_back(Named(name, {{"rmse:cam.pixel", rmse}}));
+  }
+  const std::string table = ComparisonTable(result);
+  EXPECT_NE(table.find("rmse cam.pixel [px]  0.00001950  0  250.0  3.000e+12  inf\n"),
+            std::string::npos)
+      << table;
+}
+
+TEST(ComparisonTable, FoldsWhatIsWiderThanALine) {
+  RunResult result;
+  for (int i = 0; i < 12; ++i) {
+    result.contestants.push_back(
+        Named("estimator_" + std::to_string(i), {{"rmse:target.depth", 1.0 + i}}));
+  }
+  std::istringstream table(ComparisonTable(result));
+  std::string line;
+  int headers = 0, widest = 0;
+  while (std::getline(table, line)) {
+    headers += line.starts_with("   ");
+    widest = std::max(widest, static_cast<int>(line.size()));
+  }
+  EXPECT_EQ(headers, 3);
+  EXPECT_LE(widest, 100);
+  EXPECT_GT(widest, 60);
+}
+
+TEST(ComparisonTable, WithoutEstimatorsIsEmpty) { EXPECT_EQ(ComparisonTable({}), ""); }
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,349 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/ekf.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+
+#include "alidade/random.h"
+#include "support/systems.h"
+
+namespace alidade {
+namespace {
+
+using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
+
+/// Textbook Kalman filter of MovingPoint, written out: x' = F x, P' = F P F' + G q G', and an update
+/// by the inverse of S.
+struct Textbook {
+  Eigen::Vector2d x{1.0, -0.5};
+  Eigen::Matrix2d p = Eigen::Vector2d(4.0, 9.0).asDiagonal();
+  void Step(double dt, double sigma) {
+    Eigen::Matrix2d f;
+    f << 1.0, dt, 0.0, 1.0;
+    const Eigen::Vector2d g(0.5 * dt * dt, dt);
+    x = f * x;
+    p = f * p * f.transpose() + sigma * sigma * g * g.transpose();
+  }
+  void Update(const Eigen::MatrixXd& h, const Eigen::VectorXd& z, const Eigen::MatrixXd& r) {
+    const Eigen::MatrixXd s = h * p * h.transpose() + r;
+    const Eigen::MatrixXd k = p * h.transpose() * s.inverse();
+    x += k * (z - h * x);
+    p = (Eigen::Matrix2d::Identity() - k * h) * p;
+  }
+};
+
+System TwoSensors() {
+  System system = MovingPoint();
+  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 0.3), "linear"), {"p.x"});
+  AddSensor(system, "doubled", InProcessSensor(Linear(2.0, 0.7), "linear"), {"p.x"});
+  return system;
+}
+
+TEST(Ekf, EqualsTheClosedFormKalmanFilterOnALinearProblem) {
+  const System system = TwoSensors();
+  Ekf ekf(system, {}, StreamsOf(system));
+  ekf.Start(0);
+  Textbook textbook;
+  Random random(11);
+  Eigen::MatrixXd h(2, 2);
+  h << 1.0, 0.0, 2.0, 0.0;
+  const Eigen::MatrixXd r = Eigen::Vector2d(0.09, 0.49).asDiagonal();
+  double t = 0.0;
+  for (int k = 1; k <= 200; ++k) {
+    const double dt = k % 3 == 0 ? 0.05 : 0.033;
+    t += dt;
+    const Eigen::Vector2d z(random.Normal(), random.Normal());
+    ekf.Process(FrameAt(t, {{0, z[0]}, {1, z[1]}}));
+    textbook.Step(Seconds(StampFromSeconds(t)) - Seconds(StampFromSeconds(t - dt)), 1.0);
+    textbook.Update(h, z, r);
+    ASSERT_NEAR(ValueOf(ekf.state(), "p.x"), textbook.x[0], 1e-10) << k;
+    ASSERT_NEAR(ValueOf(ekf.state(), "p.v"), textbook.x[1], 1e-10) << k;
+    ASSERT_NEAR(CovarianceOf(ekf.state(), "p.x", "p.x"), textbook.p(0, 0), 1e-10) << k;
+    ASSERT_NEAR(CovarianceOf(ekf.state(), "p.x", "p.v"), textbook.p(0, 1), 1e-10) << k;
+    ASSERT_NEAR(CovarianceOf(ekf.state(), "p.v", "p.v"), textbook.p(1, 1), 1e-10) << k;
+  }
+}
+
+TEST(Ekf, JointEqualsSequentialOnALinearProblem) {
+  const System system = TwoSensors();
+  EkfOptions per_sensor, per_measurement;
+  per_sensor.fuse = Fuse::kPerSensor;
+  per_measurement.fuse = Fuse::kPerMeasurement;
+  Ekf joint(system, {}, StreamsOf(system)), sensors(system, per_sensor, StreamsOf(system)),
+      measurements(system, per_measurement, StreamsOf(system));
+  Random random(12);
+  for (int k = 0; k < 200; ++k) {
+    // Two measurements of the first stream at one stamp, one of the second.
+    const Frame frame = FrameAt(
+        0.033 * k, {{0, random.Normal()}, {1, random.Normal()}, {0, random.Normal()}});
+    for (Ekf* ekf : {&joint, &sensors, &measurements}) ekf->Process(frame);
+    for (const Ekf* ekf : {&sensors, &measurements}) {
+      ASSERT_NEAR(ValueOf(ekf->state(), "p.x"), ValueOf(joint.state(), "p.x"), 1e-10) << k;
+      ASSERT_NEAR(ValueOf(ekf->state(), "p.v"), ValueOf(joint.state(), "p.v"), 1e-10) << k;
+      ASSERT_LT((ekf->state().covariance().Dense() - joint.state().covariance().Dense()).norm(),
+                1e-10);
+    }
+  }
+}
+
+TEST(Ekf, AnOutlierIsGatedAndLeavesStateAndCovarianceBitForBit) {
+  const System system = DepthFilter();
+  EkfOptions options;
+  options.gate = 0.999;
+  Ekf ekf(system, options, StreamsOf(system));
+  ekf.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.0}}));
+  const std::vector<double> x = ekf.state().values();
+  const Eigen::MatrixXd p = ekf.state().covariance().Dense();
+  const UpdateReport report = ekf.Process(FrameAt(0.0, {{0, 1e9}}));
+  ASSERT_EQ(report.measurements.size(), 1u);
+  EXPECT_EQ(report.measurements[0].outcome, Outcome::kGated);
+  EXPECT_GT(report.measurements[0].nis, 1e9);
+  EXPECT_EQ(ekf.state().values(), x);
+  EXPECT_EQ(ekf.state().covariance().Dense(), p);
+}
+
+TEST(Ekf, TheGatePassesTheShareThatItsProbabilityStates) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.0, 1e-9}});
+  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 1.0), "linear"), {"p.x"});
+  EkfOptions options;
+  options.gate = 0.9;
+  options.lockout = Lockout::kNone;
+  Ekf ekf(system, options, StreamsOf(system));
+  Random random(13);
+  constexpr int kTrials = 20000;
+  int passed = 0;
+  for (int k = 0; k < kTrials; ++k) {
+    const UpdateReport report = ekf.Process(FrameAt(0.0, {{0, random.Normal()}}));
+    passed += report.measurements[0].outcome == Outcome::kAccepted ? 1 : 0;
+  }
+  // 5 sigma of a binomial share.
+  EXPECT_NEAR(passed / double{kTrials}, 0.9, 5.0 * std::sqrt(0.9 * 0.1 / kTrials));
+}
+
+/// Returns what is not a number once x passes 5, from h and from its Jacobian.
+struct Broken : Sensor<Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    using std::sqrt;
+    z[0] = sqrt(T(5.0) - x[0]);
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(1.0);
+  }
+};
+
+TEST(Ekf, AnUpdateThatIsNotFiniteIsRolledBackAndReported) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 7.0, 1.0}});
+  AddSensor(system, "broken", InProcessSensor(Broken(), "broken"), {"p.x"});
+  Ekf ekf(system, {}, StreamsOf(system));
+  const UpdateReport report = ekf.Process(FrameAt(0.0, {{0, 1.0}}));
+  EXPECT_EQ(report.measurements[0].outcome, Outcome::kNotFinite);
+  ASSERT_EQ(report.events.size(), 1u);
+  EXPECT_EQ(report.events[0].kind, "not_finite");
+  EXPECT_NE(report.events[0].text.find("broken"), std::string::npos);
+  EXPECT_EQ(ValueOf(ekf.state(), "p.x"), 7.0);
+  EXPECT_EQ(CovarianceOf(ekf.state(), "p.x", "p.x"), 1.0);
+  EXPECT_FALSE(ekf.failed());
+}
+
+/// Overflows as soon as it moves.
+struct Exploding : Motion<1, Vec<1>> {
+  static constexpr std::array kBlocks{Quantity{"x"}};
+  template <class T>
+  void Step(const T* x, const T* w, double, T* next) const {
+    next[0] = 1e308 * (x[0] + w[0]);
+  }
+  void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
+};
+
+TEST(Ekf, AStepThatIsNotFiniteEndsWithTheLastGoodStateAndMeasurement) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
+  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 1.0), "linear"), {"p.x"});
+  Ekf ekf(system, {}, StreamsOf(system));
+  ekf.Process(FrameAt(0.0, {{0, 5.0}}));
+  const UpdateReport report = ekf.Process(FrameAt(1.0, {{0, 5.0}}));
+  EXPECT_TRUE(ekf.failed());
+  EXPECT_EQ(ValueOf(ekf.state(), "p.x"), 4.0);
+  ASSERT_EQ(report.events.size(), 1u);
+  EXPECT_EQ(report.events[0].kind, "not_finite");
+  EXPECT_NE(report.events[0].text.find("last good state at 0.000000 s: p.x = 4"),
+            std::string::npos);
+  EXPECT_NE(report.events[0].text.find("sensor 'direct' at 0.000000 s, z = 5"), std::string::npos);
+}
+
+TEST(Ekf, AMeasurementThatIsNotFiniteIsNotUsed) {
+  const System system = DepthFilter();
+  Ekf ekf(system, {}, StreamsOf(system));
+  const UpdateReport report = ekf.Process(FrameAt(0.0, {{0, std::nan("")}}));
+  EXPECT_EQ(report.measurements[0].outcome, Outcome::kNotFinite);
+  EXPECT_EQ(ValueOf(ekf.state(), "target.depth"), 0.35);
+}
+
+TEST(Ekf, ConsideredBlocksKeepTheirValueAndTheirCorrelationsFollowSchmidt) {
+  // z = lambda Z, lambda considered; Schmidt's gain by hand.
+  System system = DepthFilter();
+  system.sensors.erase(system.sensors.begin());
+  system.sensors[0].roles[1].mode = RoleMode::kConsider;
+  Ekf ekf(system, {}, StreamsOf(system));
+  ekf.Start(0);
+  ekf.Process(FrameAt(0.0, {{0, 1.1}}));
+  const double z = 0.35, lambda = 3.3, h = z * lambda;
+  const Eigen::RowVector3d jacobian(lambda, 0.0, z);  // depth, depth_rate, inverse_distance
+  const Eigen::Matrix3d p = Eigen::Vector3d(0.01, 0.25, 0.25).asDiagonal();
+  const double sigma = 2.0 / 300.0 * h * h * h, r = sigma * sigma;
+  const double s = jacobian * p * jacobian.transpose() + r;
+  Eigen::Vector3d k = p * jacobian.transpose() / s;
+  k[2] = 0.0;
+  const Eigen::Matrix3d m = Eigen::Matrix3d::Identity() - k * jacobian;
+  const Eigen::Matrix3d expected = m * p * m.transpose() + k * r * k.transpose();
+  EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), z + k[0] * (1.1 - h), 1e-14);
+  EXPECT_EQ(ValueOf(ekf.state(), "template.inverse_distance"), lambda);
+  EXPECT_LT((ekf.state().covariance().Dense() - expected).norm(), 1e-14);
+}
+
+TEST(Ekf, HeldRolesHaveNoJacobian) {
+  System system = DepthFilter();
+  system.sensors.erase(system.sensors.begin());
+  system.sensors[0].roles[1].mode = RoleMode::kHold;
+  Ekf ekf(system, {}, StreamsOf(system));
+  const UpdateReport report = ekf.Process(FrameAt(0.0, {{0, 1.1}}));
+  const double z = 0.35, lambda = 3.3, h = z * lambda, sigma = 2.0 / 300.0 * h * h * h;
+  EXPECT_NEAR(report.measurements[0].s(0), lambda * lambda * 0.01 + sigma * sigma, 1e-15);
+  EXPECT_EQ(ValueOf(ekf.state(), "template.inverse_distance"), lambda);
+  EXPECT_EQ(CovarianceOf(ekf.state(), "template.inverse_distance", "template.inverse_distance"),
+            0.25);
+}
+
+TEST(Ekf, LinearisedAtTheMeasurementTheJacobianIsThatOfTheMeasuredDepth) {
+  System system = DepthFilter();
+  system.sensors.pop_back();
+  system.sensors[0].roles[0].linearise_at = LineariseAt::kMeasurement;
+  Ekf ekf(system, {}, StreamsOf(system));
+  const double d = 80.0, bf = 26.0;
+  const UpdateReport report = ekf.Process(FrameAt(0.0, {{0, d}}));
+  // H1 = -d^2 / BF; the innovation stays at the prediction.
+  const double jacobian = -d * d / bf;
+  EXPECT_NEAR(report.measurements[0].s(0), jacobian * jacobian * 0.01 + 1.0, 1e-9);
+  EXPECT_NEAR(report.measurements[0].innovation[0], d - bf / 0.35, 1e-12);
+}
+
+TEST(Ekf, ASensorOutsideItsDomainIsReportedAsDivergenceOnce) {
+  System system = DepthFilter();
+  system.priors[0].mean = {-0.2};
+  EkfOptions options;
+  options.lockout = Lockout::kNone;
+  Ekf ekf(system, options, StreamsOf(system));
+  int events = 0;
+  for (int k = 0; k < 5; ++k) {
+    const UpdateReport report = ekf.Process(FrameAt(0.0, {{0, 80.0}}));
+    EXPECT_EQ(report.measurements[0].outcome, Outcome::kOutOfDomain);
+    events += static_cast<int>(report.events.size());
+  }
+  EXPECT_EQ(events, 1);
+  EXPECT_TRUE(ekf.diverged());
+  EXPECT_EQ(ValueOf(ekf.state(), "target.depth"), -0.2);
+}
+
+TEST(Ekf, ALockedOutSensorResetsItsBlockFromTheMeasurement) {
+  System system = DepthFilter();
+  system.priors[0].mean = {3.0};
+  system.priors[0].covariance(0, 0) = 1e-6;
+  EkfOptions options;
+  options.gate = 0.999;
+  Ekf ekf(system, options, StreamsOf(system));
+  UpdateReport report;
+  for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(0.0, {{0, 65.0}}));
+  ASSERT_FALSE(report.events.empty());
+  EXPECT_EQ(report.events.back().kind, "lockout");
+  EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), 26.0 / 65.0, 1e-15);
+  // sigma_Z = Z^2 / BF sigma_d, uncorrelated with the rest; the rate is back at its prior.
+  EXPECT_NEAR(std::sqrt(CovarianceOf(ekf.state(), "target.depth", "target.depth")),
+              0.4 * 0.4 / 26.0, 1e-12);
+  EXPECT_EQ(CovarianceOf(ekf.state(), "target.depth_rate", "target.depth_rate"), 0.25);
+  EXPECT_EQ(ekf.Process(FrameAt(0.0, {{0, 65.0}})).measurements[0].outcome, Outcome::kAccepted);
+}
+
+TEST(Ekf, BlocksStartFromMeasurementsWithTheirCorrelation) {
+  System system = DepthFilter();
+  system.priors[0] = {0, {}, {}, "disparity"};
+  system.priors[2] = {2, {}, {}, "inverse_scale"};
+  Ekf ekf(system, {}, StreamsOf(system));
+  // The scale alone has to wait for a depth.
+  EXPECT_EQ(ekf.Process(FrameAt(0.0, {{1, 1.0}})).measurements[0].outcome, Outcome::kNotReady);
+  const UpdateReport report = ekf.Process(FrameAt(0.1, {{1, 1.0}, {0, 52.0}}));
+  EXPECT_EQ(report.measurements[0].outcome, Outcome::kInitialised);
+  EXPECT_EQ(report.measurements[1].outcome, Outcome::kInitialised);
+  EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), 0.5, 1e-15);
+  EXPECT_NEAR(ValueOf(ekf.state(), "template.inverse_distance"), 2.0, 1e-15);
+  // lambda = s / Z: d lambda = ds / Z - s / Z^2 dZ, sigma_s = 2/300 at s = 1.
+  const double variance_z = std::pow(0.25 / 26.0, 2), variance_s = std::pow(2.0 / 300.0, 2);
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "target.depth", "target.depth"), variance_z, 1e-15);
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "template.inverse_distance", "target.depth"),
+              -4.0 * variance_z, 1e-15);
+  EXPECT_NEAR(
+      CovarianceOf(ekf.state(), "template.inverse_distance", "template.inverse_distance"),
+      16.0 * variance_z + 4.0 * variance_s, 1e-14);
+}
+
+TEST(Ekf, NoiseThatVanishesIsWarnedOfOnce) {
+  System system = MovingPoint();
+  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 1e-200), "linear"), {"p.x"});
+  Ekf ekf(system, {}, StreamsOf(system));
+  const UpdateReport first = ekf.Process(FrameAt(0.0, {{0, 1.0}}));
+  ASSERT_EQ(first.events.size(), 1u);
+  EXPECT_EQ(first.events[0].kind, "conditioning");
+  EXPECT_EQ(first.measurements[0].outcome, Outcome::kAccepted);
+  EXPECT_GE(CovarianceOf(ekf.state(), "p.x", "p.x"), 0.0);
+  EXPECT_TRUE(ekf.Process(FrameAt(0.1, {{0, 1.0}})).events.empty());
+}
+
+TEST(Ekf, FramesOfThePastAreStale) {
+  const System system = DepthFilter();
+  Ekf ekf(system, {}, StreamsOf(system));
+  ekf.Process(FrameAt(1.0, {{0, 80.0}}));
+  const std::vector<double> x = ekf.state().values();
+  EXPECT_EQ(ekf.Process(FrameAt(0.5, {{0, 80.0}})).measurements[0].outcome, Outcome::kStale);
+  EXPECT_EQ(ekf.state().values(), x);
+}
+
+TEST(Ekf, AGapIsSteppedInEqualParts) {
+  EkfOptions options;
+  options.max_dt_s = 0.3;
+  const System system = MovingPoint(2.0);
+  Ekf ekf(system, options, {});
+  ekf.Start(0);
+  ekf.Process(FrameAt(1.0, {}));
+  Textbook textbook;
+  for (int i = 0; i < 4; ++i) textbook.Step(0.25, 2.0);
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "p.x", "p.x"), textbook.p(0, 0), 1e-12);
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "p.v", "p.v"), textbook.p(1, 1), 1e-12);
+}
+
+TEST(Ekf, FixedBlocksAreNeitherMovedNorCorrected) {
+  System system;
+  const MotionModel model = InProcessMotion(ConstantVelocity<1, false>(1.0), "constant_velocity");
+  AddMotion(system, "p", model, {{"x", 1.0, 2.0}});
+  const BlockId v =
+      system.layout.Declare("p.v", "p", model.blocks()[1], BlockStatus::kFixed);
+  system.motions[0].blocks.push_back(v);
+  system.priors.push_back({v, {2.0}, {}, ""});
+  Ekf ekf(system, {}, {});
+  ekf.Start(0);
+  ekf.Process(FrameAt(0.5, {}));
+  EXPECT_NEAR(ValueOf(ekf.state(), "p.x"), 2.0, 1e-15);
+  EXPECT_EQ(ValueOf(ekf.state(), "p.v"), 2.0);
+  // P = 4 + (dt^2/2)^2
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "p.x", "p.x"), 4.0 + std::pow(0.125, 2), 1e-14);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// A table spoiled in the way that BAD_TABLE names.
+#include "alidade/plugin.h"
+#include "probe.h"
+
+#define MAGIC 1
+#define STRUCT_SIZE 2
+#define STRIDE 3
+#define NULL_NAME 4
+#define NULL_TABLE 5
+#define NO_CREATE 6
+#define NAME_TWICE 7
+#define NO_ENTRY_SYMBOL 8
+#define EMPTY 9
+
+ALIDADE_FINGERPRINT(ALIDADE_TIER_SEALED, "")
+
+#if BAD_TABLE != NO_ENTRY_SYMBOL
+extern "C" __attribute__((visibility("default"))) const AlidadeTable* alidade_plugin() {
+  static AlidadeEntry entries[] = {ALIDADE_SENSOR(Probe, "probe", "", ""),
+                                   ALIDADE_SENSOR(Probe, "other_probe", "", "")};
+  static AlidadeTable table = alidade::detail::Table(entries, &alidade_fingerprint);
+  if (BAD_TABLE == MAGIC) table.magic = 0;
+  if (BAD_TABLE == STRUCT_SIZE) table.struct_size = 8;
+  if (BAD_TABLE == STRIDE) table.entry_stride = 3;
+  if (BAD_TABLE == NULL_NAME) entries[1].name = nullptr;
+  if (BAD_TABLE == NO_CREATE) entries[1].create = nullptr;
+  if (BAD_TABLE == NAME_TWICE) entries[1].name = "probe";
+  if (BAD_TABLE == EMPTY) table.entry_count = 0;
+  return BAD_TABLE == NULL_TABLE ? nullptr : &table;
+}
+#endif

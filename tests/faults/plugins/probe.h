@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "alidade/model.h"
+
+/// z = PROBE_GAIN x: the model of the plugins that are spoiled on purpose.
+#ifndef PROBE_GAIN
+#define PROBE_GAIN 2.0
+#endif
+
+struct Probe : alidade::Sensor<alidade::Vec<1>, alidade::Vec<1>> {
+  static constexpr std::array kRoles{alidade::Quantity{"x", "m"}};
+  static constexpr alidade::Quantity kMeasurement{"z", "m"};
+  explicit Probe(alidade::Params&) {}
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    z[0] = PROBE_GAIN * x[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(1.0);
+  }
+};

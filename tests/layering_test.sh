@@ -1,0 +1,328 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+#
+# tests/layering_test.sh [ROOT]
+# tests/layering_test.sh --self-test [ROOT]
+#
+# Checks who includes whom and what must not stand in the sources: one line
+# `FILE:LINE: [rule] text` for each violation, exit code 1 where there is one. With --self-test it
+# plants violations of every rule in a copy of the tree and fails unless each is caught.
+#
+#   spdx      every source, CMake file and script begins with the licence line
+#   core      core includes headers of core alone
+#   model     motion_models and sensors include core, Eigen, the standard library and their own stem
+#   plugin    nothing includes from plugins/, but a plugin from its own folder and tests/plugins,
+#             which test the class behind the export
+#   upward    what lies below does not include cli, bench, tests or examples
+#   library   yaml-cpp, spdlog, fmt and Boost in core/src alone; OpenCV in image plugins alone; of
+#             Ceres only jet.h and rotation.h outside plugins/ceres_batch
+#   exit      core, models and plugins neither exit nor abort (but `_exit` where the file forks)
+#   print     core, models and plugins do not print
+#   flags     no instruction-set or fast-math flag in CMake files (but those of the deliberately
+#             bad plugins in tests/faults and tests/plugins)
+set -euo pipefail
+
+self_test=false
+if [[ ${1:-} == --self-test ]]; then
+  self_test=true
+  shift
+fi
+root=$(cd "${1:-$(dirname "${BASH_SOURCE[0]}")/..}" && pwd)
+folders=(core motion_models sensors plugins cli bench tests examples)
+
+# Violations in the sources given as arguments.
+sources() {
+  awk '
+    function report(rule, text) { print FILENAME ":" FNR ": [" rule "] " text }
+    function exists(path,    line, status) {
+      status = (getline line < path)
+      close(path)
+      return status >= 0
+    }
+    function forks(file,    line, found) {
+      while ((getline line < file) > 0) if (line ~ /[^A-Za-z0-9_]fork\(\)/) found = 1
+      close(file)
+      return found
+    }
+    # Blanks comments and the contents of texts; `in_comment` goes on over lines.
+    function code_of(text,    out, two, c) {
+      out = ""
+      while (text != "") {
+        two = substr(text, 1, 2)
+        c = substr(text, 1, 1)
+        if (in_comment) {
+          if (two == "*/") { in_comment = 0; text = substr(text, 3) } else { text = substr(text, 2) }
+        } else if (two == "//") {
+          break
+        } else if (two == "/*") {
+          in_comment = 1
+          text = substr(text, 3)
+        } else if (c == "\"" && match(text, /^"([^"\\]|\\.)*"/)) {
+          out = out "\"\""
+          text = substr(text, RLENGTH + 1)
+        } else if (c == "\047" && match(text, /^\047([^\047\\]|\\.[^\047]*)\047/)) {
+          out = out "0"
+          text = substr(text, RLENGTH + 1)
+        } else {
+          out = out c
+          text = substr(text, 2)
+        }
+      }
+      return out
+    }
+    # True where `path` names a file of a plugin other than the one of the present file.
+    function of_plugin(path,    base) {
+      base = path
+      while (sub(/^(\.\.?\/)+/, "", base)) {}
+      if (base ~ /^plugins\//) return !(folder == "tests" && exists("tests/" base))
+      if (own_plugin != "" && exists("plugins/" own_plugin "/" path)) return path ~ /^\.\.\//
+      if (own_plugin != "" && base ~ /\// && exists("plugins/" base)) return 1
+      return path ~ /\/plugins\//
+    }
+    function foreign_to_core(path,    i) {
+      if (path ~ /^alidade\//) return !exists("core/include/" path)
+      if (path ~ /\//) return path !~ /^(Eigen|sys|linux|ceres|boost|spdlog|yaml-cpp|fmt)\//
+      for (i in others) if (exists(others[i] "/" path)) return !exists("core/src/" path)
+      return 0
+    }
+    function foreign_to_model(path, bracket) {
+      if (path ~ /^alidade\//) return !exists("core/include/" path)
+      if (bracket) return path !~ /^(Eigen\/[A-Za-z]+|[a-z_0-9]+)$/
+      return path != stem ".h"
+    }
+    function check_include(path, bracket) {
+      if (path ~ /^(yaml-cpp|spdlog|boost|fmt)\// && FILENAME !~ /^core\/src\//)
+        report("library", "only core/src includes " path)
+      if (path ~ /^ceres\// && path !~ /^ceres\/(jet|rotation)\.h$/ && own_plugin != "ceres_batch")
+        report("library", "only plugins/ceres_batch includes " path)
+      if (path ~ /^opencv/ && own_plugin !~ /image/)
+        report("library", "only image plugins include " path)
+      if (FILENAME !~ /^tests\/plugins\// && of_plugin(path))
+        report("plugin", "plugins are loaded, not included: " path)
+      if (folder == "core" && foreign_to_core(path)) report("core", "not a header of core: " path)
+      if (folder ~ /^(sensors|motion_models)$/ && foreign_to_model(path, bracket))
+        report("model", "a model includes core, Eigen and its own header alone: " path)
+      if (folder ~ /^(core|sensors|motion_models|plugins|cli)$/ &&
+          path ~ /^(\.\.\/)*(cli|bench|tests|examples)\//)
+        report("upward", "a layer above: " path)
+    }
+    BEGIN {
+      split("sensors motion_models cli", others, " ")
+    }
+    FNR == 1 {
+      in_comment = 0
+      folder = FILENAME
+      sub(/\/.*/, "", folder)
+      own_plugin = ""
+      if (FILENAME ~ /^plugins\/[^\/]+\//) {
+        own_plugin = substr(FILENAME, 9)
+        sub(/\/.*/, "", own_plugin)
+      }
+      stem = FILENAME
+      sub(/.*\//, "", stem)
+      sub(/\.[a-z]+$/, "", stem)
+      if ($0 !~ /^(\/\/|\/\*) SPDX-License-Identifier: Apache-2\.0( \*\/)?$/)
+        report("spdx", "the first line is not the licence line")
+    }
+    /^[ \t]*#[ \t]*include[ \t]*[<"]/ {
+      path = $0
+      sub(/^[ \t]*#[ \t]*include[ \t]*/, "", path)
+      bracket = substr(path, 1, 1) == "<"
+      path = substr(path, 2)
+      sub(/[>"].*/, "", path)
+      check_include(path, bracket)
+      next
+    }
+    folder ~ /^(core|sensors|motion_models|plugins)$/ {
+      code = " " code_of($0) " "
+      if (code ~ /[^A-Za-z0-9_.>:](std::|::)?(exit|_Exit|quick_exit|abort|terminate)[ \t]*\(/ ||
+          code ~ /[^A-Za-z0-9_.>:](::)?_exit[ \t]*\(/ && !forks(FILENAME))
+        report("exit", $0)
+      if (code ~ /std::(cout|cerr|clog)[^A-Za-z0-9_]/ ||
+          code ~ /[^A-Za-z0-9_.>:](std::|::)?(printf|vprintf|puts|putchar)[ \t]*\(/ ||
+          code ~ /(std|fmt)::(print|println)[ \t]*\(/ ||
+          code ~ /[^A-Za-z0-9_.>](stdout|stderr)[^A-Za-z0-9_]/)
+        report("print", $0)
+    }' "$@"
+}
+
+# Scripts and CMake files: the licence line, below `#!` where there is one.
+licences() {
+  awk '
+    FNR == 1 && /^#!/ { below = 1; next }
+    FNR == 1 || below {
+      below = 0
+      if ($0 !~ /^# SPDX-License-Identifier: Apache-2\.0$/)
+        print FILENAME ":" FNR ": [spdx] the first line is not the licence line"
+    }' "$@"
+}
+
+flags() {
+  awk '
+    FILENAME !~ /\.json$/ { sub(/(^|[ \t])#.*/, "") }
+    /-(march|mtune|mcpu)=|-ffast-math|-funsafe-math|-ffinite-math|-Ofast|-m(avx|fma|sse)/ {
+      print FILENAME ":" FNR ": [flags] " $0
+    }' "$@"
+}
+
+# All violations in the tree at $1.
+violations() {
+  cd "$1"
+  local present=() found
+  for found in "${folders[@]}"; do [[ -d $found ]] && present+=("$found"); done
+  local list
+  mapfile -t list < <(find "${present[@]}" -type f \( -name '*.h' -o -name '*.cc' -o -name '*.c' \) | sort)
+  sources "${list[@]}"
+
+  local cmake
+  mapfile -t cmake < <({
+    ls CMakeLists.txt
+    find "${present[@]}" cmake -type f \( -name CMakeLists.txt -o -name '*.cmake' -o -name '*.cmake.in' \)
+  } | sort)
+  local scripts
+  mapfile -t scripts < <({
+    find scripts .ci -type f ! -name '*.txt'
+    find "${present[@]}" -type f -name '*.sh'
+  } 2>/dev/null | sort)
+  licences "${cmake[@]}" "${scripts[@]}"
+
+  local flagged=()
+  for found in "${cmake[@]}" CMakePresets.json; do
+    [[ $found == tests/faults/* || $found == tests/plugins/* || ! -f $found ]] || flagged+=("$found")
+  done
+  flags "${flagged[@]}"
+}
+
+check() {
+  local found
+  found=$(violations "$1")
+  [[ -z $found ]] && return 0
+  printf '%s\n' "$found"
+  return 1
+}
+
+if ! $self_test; then
+  check "$root" || exit 1
+  echo "layering: nothing found"
+  exit 0
+fi
+
+# ---- self-test --------------------------------------------------------------------------------
+
+copy=$(mktemp -d)
+trap 'rm -rf "$copy"' EXIT
+(cd "$root" && tar -cf - --exclude='*.partial' --exclude='./runs' --exclude='./build*' --exclude='./.git' .) |
+  tar -xf - -C "$copy"
+planted=0
+failed=0
+licence='// SPDX-License-Identifier: Apache-2.0'
+
+# plant RULE FILE TEXT: TEXT, appended to FILE or making it, is a violation of RULE on its last line.
+plant() {
+  local rule=$1 file=$copy/$2 text=$3 existed=false found
+  planted=$((planted + 1))
+  mkdir -p "$(dirname "$file")"
+  if [[ -f $file ]]; then
+    existed=true
+    cp "$file" "$file.kept"
+  fi
+  printf '%b\n' "$text" >>"$file"
+  found=$(violations "$copy")
+  if ! grep -qF "$2:$(wc -l <"$file"): [$rule]" <<<"$found"; then
+    echo "not caught: [$rule] $2: $text"
+    failed=$((failed + 1))
+  fi
+  if $existed; then mv "$file.kept" "$file"; else rm "$file"; fi
+}
+
+# allow FILE TEXT: TEXT, appended to FILE or making it, breaks no rule.
+allow() {
+  local file=$copy/$1 existed=false found
+  planted=$((planted + 1))
+  mkdir -p "$(dirname "$file")"
+  if [[ -f $file ]]; then
+    existed=true
+    cp "$file" "$file.kept"
+  fi
+  printf '%b\n' "$2" >>"$file"
+  found=$(violations "$copy" | grep -F "$1:" || true)
+  if [[ -n $found ]]; then
+    echo "wrongly caught: $found"
+    failed=$((failed + 1))
+  fi
+  if $existed; then mv "$file.kept" "$file"; else rm "$file"; fi
+}
+
+check "$copy" || { echo "the tree itself is not clean"; failed=1; }
+
+plant spdx core/src/new.cc 'int x;'
+plant spdx sensors/new.h '#pragma once'
+plant spdx cmake/New.cmake 'set(x 1)'
+plant spdx scripts/new '#!/bin/sh\ntrue'
+plant spdx tests/new/CMakeLists.txt 'project(x)'
+for header in sensors/scale_2d.h motion_models/constant.h alidade/no_such.h ../../sensors/scale_2d.h scale_2d.h \
+  alidade/sensors/scale_2d.h; do
+  plant core core/src/new.cc "$licence\n#include \"$header\""
+done
+plant core core/include/alidade/new.h "$licence\n#  include <sensors/scale_2d.h>"
+for header in '"stereo_disparity.h"' '"motion_models/constant.h"' '"../motion_models/constant.h"' '<vector.h>' \
+  '<unistd.h>' '<sys/stat.h>' '"ceres/jet.h"' '<spdlog/spdlog.h>' '"alidade/no_such.h"'; do
+  plant model sensors/new.cc "$licence\n#include $header"
+  plant model motion_models/new.cc "$licence\n#include ${header/stereo_disparity/scale_2d}"
+done
+for file in core/src/new.cc sensors/new.h cli/new.cc tests/core/new.cc bench/speed/new.cc examples/new.cc; do
+  plant plugin "$file" "$licence\n#include \"plugins/csv/csv.h\""
+done
+plant plugin tests/sensors/new.cc "$licence\n#include \"../../plugins/csv/csv.h\""
+mkdir -p "$copy/plugins/depth_target" && echo "$licence" >"$copy/plugins/depth_target/planted.h"
+plant plugin plugins/csv/new.cc "$licence\n#include \"../depth_target/planted.h\""
+plant plugin plugins/csv/new.cc "$licence\n#include \"depth_target/planted.h\""
+for header in cli/main.h bench/speed/x.h tests/support/x.h ../tests/support/x.h; do
+  plant upward plugins/csv/new.cc "$licence\n#include \"$header\""
+  plant upward sensors/new.cc "$licence\n#include \"$header\""
+done
+for header in yaml-cpp/yaml.h spdlog/spdlog.h boost/dll.hpp fmt/core.h; do
+  for file in core/include/alidade/new.h plugins/csv/new.cc cli/new.cc tests/core/new.cc; do
+    plant library "$file" "$licence\n#include <$header>"
+  done
+done
+plant library core/src/new.cc "$licence\n#include <ceres/problem.h>"
+plant library plugins/csv/new.cc "$licence\n#include \"ceres/ceres.h\""
+plant library core/src/new.cc "$licence\n#include <opencv2/core.hpp>"
+plant library plugins/csv/new.cc "$licence\n#include <opencv2/core.hpp>"
+for call in 'std::exit(1);' 'exit (1);' 'std::abort();' 'abort();' '::_exit(0);' 'if (x) std::quick_exit(1);' \
+  'std::terminate();' '/* why */ abort();'; do
+  for file in core/src/new.cc sensors/new.cc motion_models/new.h plugins/csv/new.cc; do
+    plant exit "$file" "$licence\n$call"
+  done
+done
+for call in 'std::cout << 1;' 'std::cerr << 1;' 'printf("x");' 'std::printf("//");' 'puts("x");' \
+  'fprintf(stdout, "x");' 'std::fputs("x", stderr);' 'fmt::print("x");'; do
+  for file in core/src/new.cc sensors/new.cc motion_models/new.h plugins/csv/new.cc; do
+    plant print "$file" "$licence\n$call"
+  done
+done
+for flag in -march=native -ffast-math -Ofast -mavx2; do
+  plant flags sensors/CMakeLists.txt "add_compile_options($flag)"
+  plant flags cmake/AlidadeAddPlugin.cmake "  target_compile_options(x PRIVATE $flag)  # fast"
+  plant flags tests/CMakeLists.txt "add_compile_options($flag)"
+  plant flags CMakePresets.json "\"CMAKE_CXX_FLAGS\": \"$flag\""
+done
+
+allow core/src/new.cc "$licence\n#include <yaml-cpp/yaml.h>\n#include <boost/dll.hpp>\n#include <sys/stat.h>\n#include \"error.h\""
+allow core/src/new.cc "$licence\n// std::cout, abort()\n/* exit(1);\n printf(\"x\") */ int a = std::snprintf(b, 3, \"exit(1)\");"
+allow core/src/new.cc "$licence\nloop.abort(); p->exit(); my_exit(); stop::exit_code(); char c = '\"'; f(\"std::cout <<\");"
+allow core/src/new.cc "$licence\nif (fork() == 0) _exit(0);"
+allow sensors/new.cc "$licence\n#include \"new.h\"\n#include <cmath>\n#include <Eigen/Dense>\n#include \"alidade/model.h\""
+allow plugins/csv/new.cc "$licence\n#include \"own.h\"\n#include <fcntl.h>\n#include \"sensors/scale_2d.h\""
+allow plugins/ceres_batch/new.cc "$licence\n#include <ceres/ceres.h>"
+allow plugins/image_sequence/new.cc "$licence\n#include <opencv2/core.hpp>"
+allow cli/new.cc "$licence\n#include <CLI/CLI.hpp>\nint main() { std::cout << 1; }"
+allow tests/core/new.cc "$licence\n#include \"sensors/scale_2d.h\"\n#include \"core/src/config_tree.h\"\n#include \"ceres/rotation.h\""
+allow tests/plugins/new.cc "$licence\n#include \"plugins/csv/csv.h\""
+allow tests/faults/CMakeLists.txt '# SPDX-License-Identifier: Apache-2.0\nadd_compile_options(-ffast-math)'
+allow tests/plugins/CMakeLists.txt '# SPDX-License-Identifier: Apache-2.0\nadd_compile_options(-march=native)'
+allow cmake/New.cmake '# SPDX-License-Identifier: Apache-2.0\n# never -march=native'
+
+echo "layering: $planted planted, $failed not as expected"
+((failed == 0))

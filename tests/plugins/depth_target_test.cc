@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/depth_target/depth_target.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace alidade {
+namespace {
+
+enum Stream { kDisparity, kDisparityAll, kInverseScale, kInverseScaleSeeing, kInverseScaleBlind };
+constexpr double kBfPxM = 400.0 * 0.065;
+
+using Values = std::map<std::string, double>;
+
+/// Lends a source its parameters: `values`, else the defaults. Choices are given by index.
+class Host {
+ public:
+  explicit Host(Values values = {}) : values_(std::move(values)) {
+    host_.struct_size = sizeof host_;
+    host_.context = this;
+    host_.read = [](void* context, const AlidadeParam* p, double* to, std::int32_t) {
+      auto* self = static_cast<Host*>(context);
+      self->units_[p->key] = p->unit;
+      const auto found = self->values_.find(p->key);
+      if (found != self->values_.end()) {
+        to[0] = found->second;
+      } else if (p->fallback != nullptr) {
+        to[0] = p->fallback[0];
+      } else {
+        self->failed_ = std::string("no default: ") + p->key;
+      }
+      return std::int32_t{1};
+    };
+    host_.fail = [](void* context, const char* key, const char*) {
+      static_cast<Host*>(context)->failed_ = key;
+    };
+  }
+  DepthTarget Make(std::uint64_t seed = 1) {
+    Params params(&host_);
+    return DepthTarget(params, seed);
+  }
+  const std::string& failed() const { return failed_; }
+  const std::map<std::string, std::string>& units() const { return units_; }
+
+ private:
+  Values values_;
+  AlidadeHost host_{};
+  std::map<std::string, std::string> units_;
+  std::string failed_;
+};
+
+std::vector<Frame> AllFrames(const Values& values, std::uint64_t seed = 1) {
+  DepthTarget source = Host(values).Make(seed);
+  std::vector<Frame> frames;
+  for (Frame frame; source.Next(frame);) frames.push_back(frame);
+  return frames;
+}
+
+std::optional<double> Value(const Frame& frame, Stream stream) {
+  for (const Measurement& measurement : frame.measurements) {
+    if (measurement.stream == stream) return measurement.values.at(0);
+  }
+  return std::nullopt;
+}
+
+std::vector<double> Series(const Values& values, Stream stream, std::uint64_t seed = 1) {
+  std::vector<double> series;
+  for (const Frame& frame : AllFrames(values, seed)) {
+    if (const auto value = Value(frame, stream)) series.push_back(*value);
+  }
+  return series;
+}
+
+/// The samples of noise, undone from the formulas of the source; all N(0, 1).
+struct Noise {
+  std::vector<double> disparity, scale;
+};
+
+Noise NoiseOf(const std::vector<Frame>& frames, double sigma_d, double sigma_e) {
+  Noise noise;
+  for (const Frame& frame : frames) {
+    const double depth_m = frame.truth[0][0];
+    const double scale = 0.3 / depth_m;  // of the target, with Z0 = 0.3 m and w = 300 px
+    noise.disparity.push_back((*Value(frame, kDisparityAll) - kBfPxM / depth_m) / sigma_d);
+    noise.scale.push_back((1.0 / *Value(frame, kInverseScale) - scale) * scale * 300.0 /
+                          (2.0 * sigma_e));
+  }
+  return noise;
+}
+
+double Mean(const std::vector<double>& a) {
+  double sum = 0.0;
+  for (const double x : a) sum += x;
+  return sum / static_cast<double>(a.size());
+}
+
+double MeanProduct(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
+  return sum / static_cast<double>(a.size());
+}
+
+TEST(DepthTarget, DefaultsAreTheScenarioOf2017) {
+  // t = 0, 33 ms, ... <= 5 s: 151 * 33 ms = 4.983 s.
+  const std::vector<Frame> frames = AllFrames({});
+  ASSERT_EQ(frames.size(), 152u);
+  EXPECT_EQ(Host().Make().size(), 152);
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    const double t_s = 0.033 * static_cast<double>(k);
+    const double omega = 2.0 * std::numbers::pi * 0.4;
+    EXPECT_EQ(frames[k].stamp, static_cast<Stamp>(33'000'000 * k));
+    EXPECT_NEAR(frames[k].truth[0][0], 0.3 + 0.1 * std::sin(omega * t_s), 1e-15);
+    EXPECT_NEAR(frames[k].truth[1][0], 0.1 * omega * std::cos(omega * t_s), 1e-15);
+    EXPECT_EQ(frames[k].truth[2][0], 1.0 / 0.3);
+    for (const Measurement& m : frames[k].measurements) EXPECT_EQ(m.stamp, frames[k].stamp);
+  }
+}
+
+TEST(DepthTarget, NamesItsStreamsAndTruths) {
+  const DepthTarget source = Host().Make();
+  std::string names;
+  for (const StreamInfo& info : source.streams()) names += info.name + " ";
+  names += "| ";
+  for (const StreamInfo& info : source.truths()) names += info.name + " ";
+  EXPECT_EQ(names,
+            "disparity disparity_all inverse_scale inverse_scale_seeing inverse_scale_blind | "
+            "depth depth_rate inverse_distance ");
+}
+
+TEST(DepthTarget, LastSampleSurvivesRounding) {
+  // 0.3 / 0.1 is 2.9999999999999996 in doubles; t = 0, 0.1, 0.2, 0.3 s.
+  EXPECT_EQ(AllFrames({{"duration_s", 0.3}, {"step_s", 0.1}}).size(), 4u);
+  EXPECT_EQ(AllFrames({{"duration_s", 0.299999}, {"step_s", 0.1}}).size(), 3u);
+  EXPECT_EQ(AllFrames({{"duration_s", 0.0}}).size(), 1u);
+}
+
+TEST(DepthTarget, WithoutNoiseGivesTheFormulas) {
+  // Quarter periods of 0.5 Hz: Z = 0.3, 0.4, 0.3, 0.2 m. d = 26 px m / Z; 1/scale = Z / 0.3 m.
+  const std::vector<Frame> frames = AllFrames({{"frequency_hz", 0.5},
+                                               {"step_s", 0.5},
+                                               {"duration_s", 1.5},
+                                               {"disparity_sigma_px", 0.0},
+                                               {"scale_sigma_px", 0.0}});
+  const double disparity_px[] = {26.0 / 0.3, 65.0, 26.0 / 0.3, 130.0};
+  const double inverse_scale[] = {1.0, 4.0 / 3.0, 1.0, 2.0 / 3.0};
+  ASSERT_EQ(frames.size(), 4u);
+  for (std::size_t k = 0; k < 4; ++k) {
+    const bool sees = k < 3;  // 0.3 m is not nearer than 0.3 m
+    EXPECT_NEAR(*Value(frames[k], kDisparityAll), disparity_px[k], 1e-12);
+    EXPECT_NEAR(*Value(frames[k], kInverseScale), inverse_scale[k], 1e-15);
+    EXPECT_EQ(Value(frames[k], kDisparity).has_value(), sees);
+    EXPECT_EQ(Value(frames[k], kInverseScaleSeeing).has_value(), sees);
+    EXPECT_EQ(Value(frames[k], kInverseScaleBlind).has_value(), !sees);
+  }
+}
+
+TEST(DepthTarget, TemplateDepthScalesTheImage) {
+  // Z = 0.3 m and a template from 0.6 m: the target looks twice as large; its truth is 1 / 0.6 m.
+  const std::vector<Frame> frames =
+      AllFrames({{"template_depth_m", 0.6}, {"duration_s", 0.0}, {"scale_sigma_px", 0.0}});
+  EXPECT_NEAR(*Value(frames[0], kInverseScale), 0.5, 1e-15);
+  EXPECT_NEAR(frames[0].truth[2][0], 1.0 / 0.6, 1e-15);
+}
+
+TEST(DepthTarget, SplitStreamsRepeatTheWholeOnes) {
+  for (const Frame& frame : AllFrames({})) {
+    const auto disparity = Value(frame, kDisparity);
+    const auto seeing = Value(frame, kInverseScaleSeeing), blind = Value(frame, kInverseScaleBlind);
+    EXPECT_EQ(disparity.value_or(*Value(frame, kDisparityAll)), *Value(frame, kDisparityAll));
+    EXPECT_EQ(disparity.has_value(), seeing.has_value());
+    ASSERT_NE(seeing.has_value(), blind.has_value());
+    EXPECT_EQ(seeing ? *seeing : *blind, *Value(frame, kInverseScale));
+  }
+}
+
+TEST(DepthTarget, NearOnMeasuredComparesTheNoisyDisparity) {
+  int unlike_truth = 0;
+  for (const Frame& frame : AllFrames({{"near_on", 0}, {"step_s", 0.001}})) {
+    const bool sees = Value(frame, kDisparity).has_value();
+    EXPECT_EQ(sees, *Value(frame, kDisparityAll) <= kBfPxM / 0.3);
+    unlike_truth += sees != (frame.truth[0][0] >= 0.3) ? 1 : 0;
+  }
+  EXPECT_GT(unlike_truth, 0);
+}
+
+TEST(DepthTarget, NearOnTrueComparesTheExactDisparity) {
+  for (const Frame& frame : AllFrames({{"near_on", 1}, {"step_s", 0.001}})) {
+    EXPECT_EQ(Value(frame, kDisparity).has_value(), kBfPxM / frame.truth[0][0] <= kBfPxM / 0.3);
+  }
+}
+
+TEST(DepthTarget, ThresholdOnTheNoisyDisparitySelects) {
+  // At rest at the limit: of N(0, 1) only the lower half passes, its mean is -sqrt(2/pi) and its
+  // variance 1 - 2/pi; on the exact disparity all pass. 5 sigma.
+  Values values{{"frequency_hz", 0.0}, {"step_s", 0.001}, {"duration_s", 20.0}};
+  const std::vector<double> measured = Series(values, kDisparity);
+  values["near_on"] = 1;
+  const std::vector<double> exact = Series(values, kDisparity);
+  EXPECT_EQ(exact.size(), 20001u);
+  EXPECT_NEAR(static_cast<double>(measured.size()), 10000.5, 5.0 * std::sqrt(20001 * 0.25));
+  EXPECT_NEAR(Mean(measured) - kBfPxM / 0.3, -std::sqrt(2.0 / std::numbers::pi),
+              5.0 * std::sqrt((1.0 - 2.0 / std::numbers::pi) / 9500.0));
+  EXPECT_NEAR(Mean(exact) - kBfPxM / 0.3, 0.0, 5.0 / std::sqrt(20001.0));
+}
+
+TEST(DepthTarget, NearZeroIsNeverBlind) {
+  EXPECT_EQ(Series({{"near_m", 0.0}}, kDisparity).size(), 152u);
+  EXPECT_TRUE(Series({{"near_m", 0.0}}, kInverseScaleBlind).empty());
+}
+
+TEST(DepthTarget, NoiseIsAsItsFormulasSay) {
+  // Undone, both noises are N(0, 1) at every depth: mean 0, variance 1 in either half of the
+  // depths, and no correlation; 5 sigma of N samples.
+  const std::vector<Frame> frames = AllFrames({{"step_s", 0.0001},
+                                               {"duration_s", 5.0},
+                                               {"disparity_sigma_px", 0.5},
+                                               {"scale_sigma_px", 0.7}});
+  std::vector<Frame> near, far;
+  for (const Frame& frame : frames) (frame.truth[0][0] < 0.3 ? near : far).push_back(frame);
+  for (const std::vector<Frame>* part : {&near, &far}) {
+    const Noise noise = NoiseOf(*part, 0.5, 0.7);
+    const double n = static_cast<double>(part->size());
+    ASSERT_GT(n, 20000.0);
+    for (const std::vector<double>* samples : {&noise.disparity, &noise.scale}) {
+      EXPECT_NEAR(Mean(*samples), 0.0, 5.0 / std::sqrt(n));
+      EXPECT_NEAR(MeanProduct(*samples, *samples), 1.0, 5.0 * std::sqrt(2.0 / n));
+    }
+    EXPECT_NEAR(MeanProduct(noise.disparity, noise.scale), 0.0, 5.0 / std::sqrt(n));
+  }
+}
+
+TEST(DepthTarget, SameSeedGivesTheSameBytes) {
+  for (const Stream stream : {kDisparity, kDisparityAll, kInverseScale}) {
+    EXPECT_EQ(Series({}, stream, 7), Series({}, stream, 7));
+    EXPECT_NE(Series({}, stream, 7), Series({}, stream, 8));
+  }
+}
+
+TEST(DepthTarget, OneNoiseNeverShiftsTheOther) {
+  const std::vector<double> disparity = Series({}, kDisparityAll);
+  EXPECT_EQ(Series({{"scale_sigma_px", 0.0}}, kDisparityAll), disparity);
+  EXPECT_EQ(Series({{"near_m", 0.0}}, kDisparityAll), disparity);
+  const std::vector<double> scale = Series({}, kInverseScale);
+  EXPECT_EQ(Series({{"disparity_sigma_px", 0.0}}, kInverseScale), scale);
+  EXPECT_EQ(Series({{"near_m", 0.35}, {"near_on", 1}}, kInverseScale), scale);
+}
+
+TEST(DepthTarget, RefusesADepthThatReachesTheCamera) {
+  for (const double amplitude_m : {0.3, 0.5}) {
+    Host host({{"amplitude_m", amplitude_m}});
+    host.Make();
+    EXPECT_EQ(host.failed(), "amplitude_m");
+  }
+  Host host({{"amplitude_m", 0.299}});
+  host.Make();
+  EXPECT_EQ(host.failed(), "");
+}
+
+TEST(DepthTarget, EveryParameterHasAUnitAndADefault) {
+  Host host;
+  host.Make();
+  EXPECT_EQ(host.failed(), "");
+  const std::map<std::string, std::string> expected{
+      {"depth_mean_m", "m"},    {"amplitude_m", "m"},
+      {"frequency_hz", "Hz"},   {"step_s", "s"},
+      {"duration_s", "s"},      {"focal_px", "px"},
+      {"baseline_m", "m"},      {"near_m", "m"},
+      {"near_on", ""},          {"disparity_sigma_px", "px"},
+      {"scale_sigma_px", "px"}, {"template_px", "px"},
+      {"template_depth_m", "m"}};
+  EXPECT_EQ(host.units(), expected);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <elf.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <random>
+
+#include "host_fixture.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Damaged copies of a good plugin, the same in every run: most damage is to the headers, where a
+/// loader trusts offsets.
+class FuzzTest : public HostTest {
+ protected:
+  FuzzTest() {
+    std::ifstream file(Built("good"), std::ios::binary);
+    good_.assign(std::istreambuf_iterator<char>(file), {});
+    Elf64_Ehdr header;
+    std::memcpy(&header, good_.data(), sizeof(header));
+    sections_ = header.e_shoff;
+  }
+  std::size_t Below(std::size_t n) { return static_cast<std::size_t>(engine_() % n); }
+
+  std::string Damaged() {
+    std::string bytes = good_;
+    const std::size_t kind = Below(10);
+    if (kind == 0) bytes.resize(Below(bytes.size()));
+    for (std::size_t flips = 1 + Below(6); flips > 0 && !bytes.empty(); --flips) {
+      std::size_t at = Below(bytes.size());
+      if (kind < 5) at = Below(0x400);
+      if (kind >= 5 && kind < 8) at = sections_ + Below(good_.size() - sections_);
+      if (at < bytes.size()) bytes[at] = static_cast<char>(engine_());
+    }
+    return bytes;
+  }
+  fs::path Write(const std::string& bytes) const {
+    const fs::path file = folder_ / "fuzzed.so";
+    fs::remove(file);
+    std::ofstream(file, std::ios::binary) << bytes;
+    return file;
+  }
+
+  std::string good_;
+  std::size_t sections_ = 0;
+  std::mt19937_64 engine_{20260101};
+};
+
+TEST_F(FuzzTest, TheFingerprintReaderRefusesOrReads) {
+  int read = 0;
+  for (int i = 0; i < 3000; ++i) {
+    try {
+      static_cast<void>(ReadFingerprint(Write(Damaged())));
+      ++read;
+    } catch (const Error& e) {
+      EXPECT_EQ(e.code(), ExitCode::kPlugin);
+    }
+  }
+  EXPECT_GT(read, 0);
+  EXPECT_LT(read, 2500) << "most damage is to headers and must be noticed";
+}
+
+/// 0: loaded, 1: refused; anything else is the death of the host.
+int LoadInAChild(const fs::path& file) {
+  const pid_t child = fork();
+  if (child == 0) {
+    try {
+      PluginHost host({file});
+      _exit(0);
+    } catch (const Error& e) {
+      _exit(e.code() == ExitCode::kPlugin ? 1 : 2);
+    } catch (...) {
+      _exit(3);
+    }
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+TEST_F(FuzzTest, TheHostSurvivesDamagedPlugins) {
+  int counts[2] = {};
+  for (int i = 0; i < 300; ++i) {
+    const std::string bytes = Damaged();
+    const int outcome = LoadInAChild(Write(bytes));
+    ASSERT_LE(outcome, 1) << "case " << i << " ended the host";
+    ++counts[outcome];
+  }
+  EXPECT_GT(counts[0], 0) << "damage to unused bytes goes unnoticed";
+  EXPECT_GT(counts[1], 100);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "alidade/plugin_host.h"
+
+namespace alidade {
+
+/// A folder of its own for each test, and no plugins of the user's.
+class HostTest : public testing::Test {
+ protected:
+  HostTest() {
+    std::string name = (std::filesystem::temp_directory_path() / "alidade_XXXXXX").string();
+    folder_ = mkdtemp(name.data());
+    setenv("XDG_DATA_HOME", (folder_ / "no_user_data").c_str(), 1);
+    unsetenv("ALIDADE_PLUGIN_PATH");
+  }
+  ~HostTest() override {
+    unsetenv("ALIDADE_PLUGIN_PATH");
+    std::filesystem::remove_all(folder_);
+  }
+
+  /// A plugin that the build made.
+  static std::filesystem::path Built(const std::string& name) {
+    return std::filesystem::path(ALIDADE_TEST_PLUGINS) / (name + ".so");
+  }
+  std::filesystem::path Copy(const std::string& name, const std::filesystem::path& to) {
+    std::filesystem::create_directories((folder_ / to).parent_path());
+    std::filesystem::copy_file(Built(name), folder_ / to);
+    return folder_ / to;
+  }
+  static Config Parse(const std::string& text) { return Config::FromText(text, "test.yaml"); }
+
+  /// f throws an Error with `code` that says all of `words`.
+  template <class F>
+  static void ExpectError(ExitCode code, const std::vector<std::string>& words, const F& f) {
+    try {
+      f();
+      ADD_FAILURE() << "no error; expected: " << words.front();
+    } catch (const Error& e) {
+      const std::string text = e.what();
+      EXPECT_EQ(e.code(), code) << text;
+      for (const std::string& word : words) {
+        EXPECT_NE(text.find(word), std::string::npos) << "'" << word << "' is not in: " << text;
+      }
+    }
+  }
+  /// Loading `file` alone is an error.
+  static void ExpectRefused(const std::filesystem::path& file, std::vector<std::string> words,
+                            ExitCode code = ExitCode::kPlugin) {
+    words.push_back(file.string());
+    ExpectError(code, words, [&] { PluginHost host({file}); });
+  }
+
+  std::filesystem::path folder_;
+};
+
+}  // namespace alidade

@@ -1,0 +1,340 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <fstream>
+
+#include "host_fixture.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+
+double Predicted(const SensorModel& sensor, double x) {
+  const double* roles[] = {&x};
+  double z = 0.0;
+  EXPECT_EQ(sensor.Predict(roles, &z), Status::kOk);
+  return z;
+}
+
+TEST_F(HostTest, LoadsAPluginAndCreatesItsModel) {
+  const PluginHost host({Built("good")});
+  const auto has_name = [](const PluginEntry& entry) { return entry.name == "probe"; };
+  const auto found = std::find_if(host.entries().begin(), host.entries().end(), has_name);
+  ASSERT_NE(found, host.entries().end());
+  EXPECT_EQ(found->kind, PluginEntry::Kind::kSensor);
+  EXPECT_EQ(found->doc, "gain times x");
+  EXPECT_EQ(found->plugin, fs::canonical(Built("good")));
+  const Config config = Parse("model: probe");
+  EXPECT_EQ(Predicted(host.CreateSensor("probe", config.root()), 3.0), 6.0);
+}
+
+TEST_F(HostTest, FindsTheShippedModelsBesideTheProgram) {
+  const PluginHost host;
+  for (const char* name : {"stereo_disparity", "scale_2d", "constant", "constant_velocity"}) {
+    const auto has_name = [&](const PluginEntry& entry) { return entry.name == name; };
+    EXPECT_EQ(std::count_if(host.entries().begin(), host.entries().end(), has_name), 1) << name;
+  }
+}
+
+TEST_F(HostTest, RunsASensorOfOneFileBuiltByABareCommandLine) {
+  const PluginHost host({Built("range_rate")});
+  const Config config = Parse("sensors:\n  radar: {model: range_rate, sigma_m_s: 0.5}");
+  const Node entry = config.root().At("sensors").At("radar");
+  const SensorModel radar = host.CreateSensor("range_rate", entry);
+  const double p[2] = {3.0, 4.0}, v[2] = {10.0, 0.0};
+  const double* roles[] = {p, v};
+  double z = 0.0, l = 0.0, by_p[2], by_v[2];
+  double* jacobians[] = {by_p, by_v};
+  const int strides[] = {2, 2};
+  ASSERT_EQ(radar.Linearise(roles, &z, jacobians, strides), Status::kOk);
+  ASSERT_EQ(radar.SqrtNoise(roles, &z, &l), Status::kOk);
+  EXPECT_DOUBLE_EQ(z, 6.0);  // 3 10 / 5
+  EXPECT_DOUBLE_EQ(by_v[0], 0.6);
+  EXPECT_DOUBLE_EQ(by_v[1], 0.8);
+  EXPECT_DOUBLE_EQ(by_p[0], 10.0 / 5.0 - 6.0 * 3.0 / 25.0);
+  EXPECT_EQ(l, 0.5);
+}
+
+TEST_F(HostTest, StructsOfOneNameInTwoPluginsStayApart) {
+  // Both define `struct Probe` with default visibility, and are open at once.
+  const PluginHost two({Built("twin_two")}), three({Built("twin_three")});
+  const Config config = Parse("model: probe");
+  EXPECT_EQ(Predicted(two.CreateSensor("probe", config.root()), 1.0), 2.0);
+  EXPECT_EQ(Predicted(three.CreateSensor("probe", config.root()), 1.0), 3.0);
+}
+
+TEST_F(HostTest, FindsPluginsOfTheEnvironmentAndTheUser) {
+  Copy("good", "path/good.so");
+  Copy("range_rate", "user/alidade/plugins/range_rate.so");
+  setenv("ALIDADE_PLUGIN_PATH", ("/nowhere:" + (folder_ / "path").string()).c_str(), 1);
+  setenv("XDG_DATA_HOME", (folder_ / "user").c_str(), 1);
+  const PluginHost host;
+  const Config config = Parse("{model: any, sigma_m_s: 1}");
+  EXPECT_NO_THROW(host.CreateSensor("probe", config.root()));
+  EXPECT_NO_THROW(host.CreateSensor("range_rate", config.root()));
+  ASSERT_GE(host.searched().size(), 4u);
+  EXPECT_EQ(host.searched()[0], "/nowhere (ALIDADE_PLUGIN_PATH): not there");
+  EXPECT_EQ(host.searched()[1], (folder_ / "path").string() + " (ALIDADE_PLUGIN_PATH): 1 found");
+}
+
+// ---- 50: missing ---------------------------------------------------------------------------------
+
+TEST_F(HostTest, AMissingModelNamesPlaceSuggestionAndSearch) {
+  const PluginHost host({Built("good")});
+  const Config config = Parse("sensors:\n  s: {model: prob}");
+  const Node entry = config.root().At("sensors").At("s");
+  ExpectError(ExitCode::kPlugin,
+              {"test.yaml:2:14 sensors.s.model", "no plugin offers the sensor 'prob'",
+               "did you mean 'probe'?", "searched " + Built("good").string() + " (given): 1 found",
+               "no_user_data/alidade/plugins (user data folder): not there"},
+              [&] { host.CreateSensor("prob", entry); });
+  ExpectError(ExitCode::kPlugin, {"no plugin offers the motion model 'probe'", "there is a sensor"},
+              [&] { host.CreateMotion("probe", entry); });
+}
+
+TEST_F(HostTest, AMissingModelNamesWhatWasRefusedAndWhy) {
+  Copy("other_abi", "path/other_abi.so");
+  setenv("ALIDADE_PLUGIN_PATH", (folder_ / "path").c_str(), 1);
+  const PluginHost host;
+  ASSERT_EQ(host.refusals().size(), 1u);
+  EXPECT_EQ(host.refusals()[0].code, ExitCode::kPlugin);
+  const Config config = Parse("model: probe");
+  ExpectError(ExitCode::kPlugin,
+              {"refused " + (folder_ / "path/other_abi.so").string(), "built for plugin ABI 99.1"},
+              [&] { host.CreateSensor("probe", config.root()); });
+}
+
+TEST_F(HostTest, AGivenPlaceThatIsNotThereIsAnError) {
+  ExpectRefused("/nowhere/x.so", {"no such file or folder"});
+}
+
+// ---- 51: not ELF, truncated ----------------------------------------------------------------------
+
+TEST_F(HostTest, WhatIsNotElfIsRefused) {
+  const fs::path text = folder_ / "text.so", empty = folder_ / "empty.so";
+  std::ofstream(text) << "#!/bin/sh\necho a script is no plugin, however long it may be\n";
+  std::ofstream(empty).flush();
+  ExpectRefused(text, {"not an ELF file"});
+  ExpectRefused(empty, {"not an ELF file"});
+  const fs::path folder = folder_ / "folder.so";
+  fs::create_directory(folder);
+  EXPECT_NO_THROW(PluginHost({folder})) << "a folder is searched, whatever its name";
+}
+
+TEST_F(HostTest, ATruncatedFileIsRefused) {
+  const auto size = fs::file_size(Built("good"));
+  for (const double part : {0.0005, 0.004, 0.1, 0.5, 0.9, 0.999}) {
+    const fs::path file = Copy("good", "truncated" + std::to_string(part) + ".so");
+    fs::resize_file(file, static_cast<std::uintmax_t>(part * static_cast<double>(size)));
+    ExpectRefused(file, {part < 0.001 ? "ELF" : "truncated"});
+  }
+}
+
+TEST_F(HostTest, AnExecutableIsNoPlugin) {
+  const fs::path file = folder_ / "object.so";
+  fs::copy_file(Built("good"), file);
+  std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
+  stream.seekp(18);  // e_machine
+  stream.put(2);     // SPARC
+  stream.close();
+  ExpectRefused(file, {"another kind of processor"});
+}
+
+// ---- 52 to 55: fingerprint and load --------------------------------------------------------------
+
+TEST_F(HostTest, AFileWithoutFingerprintIsRefused) {
+  ExpectRefused(Built("no_fingerprint"), {"has no alidade fingerprint"});
+}
+
+TEST_F(HostTest, AnotherAbiIsRefused) {
+  ExpectRefused(Built("other_abi"),
+                {"built for plugin ABI 99.1", "this program has 0.1", "rebuild the plugin"});
+}
+
+TEST_F(HostTest, FastMathIsRefused) {
+  ExpectRefused(Built("fast_math"), {"built with -ffast-math"});
+}
+
+TEST_F(HostTest, InstructionsThatTheProcessorLacksAreRefused) {
+  ExpectRefused(Built("other_processor"), {"needs an instruction set that this processor lacks"});
+}
+
+TEST_F(HostTest, AnotherBuildIsRefusedWithBothBuildsNamed) {
+  ExpectRefused(Built("other_build"), {"of another build", "'0.0.9 other'", "expected '0.1.0 "});
+}
+
+TEST_F(HostTest, AMissingSymbolIsNamedAtLoad) {
+  ExpectRefused(Built("undefined_symbol"), {"cannot be loaded", "a_function_nobody_defines"});
+}
+
+TEST_F(HostTest, ABadTableIsRefused) {
+  const std::pair<const char*, const char*> faults[] = {
+      {"MAGIC", "wrong magic number"},
+      {"STRUCT_SIZE", "table states a size of 8 bytes"},
+      {"STRIDE", "entry stride of 3 bytes"},
+      {"NULL_NAME", "entry 1 of its table has no name"},
+      {"NULL_TABLE", "its table is null"},
+      {"NO_CREATE", "entry 1 of its table cannot be created"},
+      {"NAME_TWICE", "names 'probe' twice"},
+      {"NO_ENTRY_SYMBOL", "does not export alidade_plugin"},
+      {"EMPTY", "table has 0 entries"}};
+  for (const auto& [fault, words] : faults) {
+    ExpectRefused(Built(std::string("table_") + fault), {words});
+  }
+}
+
+TEST_F(HostTest, ACrashWhileLoadingIsARefusal) {
+  ExpectRefused(Built("start_CRASH"), {"crashed while loading (signal 11"});
+  ExpectRefused(Built("start_ABORT"), {"crashed while loading (signal 6"});
+  ExpectRefused(Built("start_EXIT"), {"ended the process while loading"});
+}
+
+// ---- 56, 57: two files, one name; one file, two names ----------------------------------------------
+
+TEST_F(HostTest, TwoPluginsWithOneNameAreAnErrorOnceItIsAskedFor) {
+  const fs::path a = Copy("good", "a.so"), b = Copy("good", "b.so");
+  const PluginHost host({folder_});
+  const Config config = Parse("model: probe");
+  ExpectError(ExitCode::kPlugin, {"two plugins offer the sensor 'probe'", a.string(), b.string()},
+              [&] { host.CreateSensor("probe", config.root()); });
+}
+
+TEST_F(HostTest, OneFileUnderManyNamesIsLoadedOnce) {
+  const fs::path file = Copy("good", "good.so");
+  fs::create_symlink(file, folder_ / "link.so");
+  fs::create_hard_link(file, folder_ / "hard.so");
+  const PluginHost host({file, folder_ / "link.so", folder_ / "." / "good.so", folder_});
+  const auto has_name = [](const PluginEntry& entry) { return entry.name == "probe"; };
+  EXPECT_EQ(std::count_if(host.entries().begin(), host.entries().end(), has_name), 1);
+}
+
+// ---- 58, 59: failures while creating ---------------------------------------------------------------
+
+TEST_F(HostTest, AnExceptionInCreateNamesModelAndPlugin) {
+  const PluginHost host({Built("bad_create")});
+  const Config config = Parse("sensors:\n  s: {model: throws}");
+  const Node entry = config.root().At("sensors").At("s");
+  ExpectError(ExitCode::kPlugin,
+              {"test.yaml:2", "sensors.s", "model 'throws'", Built("bad_create").string(),
+               "the dog ate it"},
+              [&] { host.CreateSensor("throws", entry); });
+  ExpectError(ExitCode::kPlugin, {"model 'throws_int'", "an exception of unknown type"},
+              [&] { host.CreateSensor("throws_int", entry); });
+  ExpectError(ExitCode::kPlugin, {"model 'wrong_kind'", "not what its table says"},
+              [&] { host.CreateSensor("wrong_kind", entry); });
+}
+
+TEST_F(HostTest, ParametersThatDoNotFitTogetherAreABadConfig) {
+  const PluginHost host({Built("bad_create")});
+  const Config far = Parse("model: misfit\nnear_m: 2\nfar_m: 1");
+  ExpectError(ExitCode::kBadConfig, {"test.yaml:3:8 far_m: is not beyond near_m"},
+              [&] { host.CreateSensor("misfit", far.root()); });
+  const Config unlucky = Parse("{model: misfit, near_m: 13, far_m: 14}");
+  ExpectError(ExitCode::kBadConfig, {"near and far are unlucky together"},
+              [&] { host.CreateSensor("misfit", unlucky.root()); });
+}
+
+// ---- parameters ------------------------------------------------------------------------------------
+
+TEST_F(HostTest, AllBadParametersAreToldAtOnce) {
+  const PluginHost host;
+  const Config config =
+      Parse("sensors:\n  s: {model: stereo_disparity, focal_px: -1, near_m: [1]}");
+  const Node entry = config.root().At("sensors").At("s");
+  ExpectError(ExitCode::kBadConfig,
+              {"sensors.s.baseline_m: missing; model 'stereo_disparity' needs it (m, > 0: stereo "
+               "baseline)",
+               "sensors.s.sigma_px: missing", "sensors.s.focal_px", "'-1'", "sensors.s.near_m"},
+              [&] { host.CreateSensor("stereo_disparity", entry); });
+}
+
+TEST_F(HostTest, ADottedKeyWalksNestedMaps) {
+  const PluginHost host;
+  const Config good = Parse("{model: constant_velocity, noise: {acceleration: 2, kind: white}}");
+  EXPECT_EQ(host.CreateMotion("constant_velocity", good.root()).noise_size(), 2);
+  EXPECT_NO_THROW(good.root().At("noise").RejectUnread());
+  const Config none = Parse("state: {cam: {model: constant_velocity}}");
+  ExpectError(ExitCode::kBadConfig, {"state.cam.noise.acceleration: missing", "(m/s^2, >= 0"},
+              [&] { host.CreateMotion("constant_velocity", none.root().At("state").At("cam")); });
+  const Config scalar = Parse("{model: constant_velocity, noise: 3}");
+  ExpectError(ExitCode::kBadConfig, {"noise: ", "map"},
+              [&] { host.CreateMotion("constant_velocity", scalar.root()); });
+}
+
+TEST_F(HostTest, KeysThatTheModelDoesNotReadAreLeftToTheConfig) {
+  const PluginHost host({Built("good")});
+  const Config config = Parse("{model: probe, gian: 2}");
+  static_cast<void>(config.root().At("model"));
+  EXPECT_NO_THROW(host.CreateSensor("probe", config.root()));
+  EXPECT_THROW(config.root().RejectUnread(), Error);
+}
+
+const ParamInfo& Param(const std::vector<ParamInfo>& schema, const std::string& key) {
+  const auto has_key = [&](const ParamInfo& info) { return info.key == key; };
+  const auto found = std::find_if(schema.begin(), schema.end(), has_key);
+  EXPECT_NE(found, schema.end()) << key;
+  return *found;
+}
+
+TEST_F(HostTest, TheSchemaTellsWhatEachChoiceReads) {
+  const PluginHost host;
+  const auto schema = [&](const std::string& name) {
+    const auto has_name = [&](const PluginEntry& entry) { return entry.name == name; };
+    return host.Schema(*std::find_if(host.entries().begin(), host.entries().end(), has_name));
+  };
+  const std::vector<ParamInfo> scale = schema("scale_2d");
+  EXPECT_EQ(Param(scale, "noise").type, "choice");
+  EXPECT_EQ(Param(scale, "noise").choices, (std::vector<std::string>{"propagated", "fixed"}));
+  EXPECT_EQ(Param(scale, "noise").fallback, "propagated");
+  EXPECT_EQ(Param(scale, "noise").when, "");
+  EXPECT_EQ(Param(scale, "variance").when, "noise = fixed");
+  EXPECT_EQ(Param(scale, "sigma_px").when, "noise = propagated");
+  EXPECT_EQ(Param(scale, "sigma_px").range, "> 0");
+  EXPECT_EQ(Param(scale, "sigma_px").unit, "px");
+  const std::vector<ParamInfo> motion = schema("constant_velocity");
+  EXPECT_EQ(Param(motion, "dimensions").range, "[1, 3]");
+  EXPECT_EQ(Param(motion, "dimensions").fallback, "1");
+  EXPECT_EQ(Param(motion, "noise.acceleration").when, "");
+  EXPECT_EQ(Param(motion, "noise.acceleration").unit, "m/s^2 or m/s^2/Hz^0.5");
+}
+
+TEST_F(HostTest, DescribesRolesAndMeasurement) {
+  const PluginHost host({Built("range_rate")});
+  const std::vector<std::string> lines = host.Describe(host.entries().front());
+  ASSERT_EQ(lines.size(), 3u);
+  EXPECT_EQ(lines[0], "role position: vector(2), m; of the point");
+  EXPECT_EQ(lines[2], "measurement range_rate: vector(1), m/s; closing is negative");
+}
+
+// ---- build tier ------------------------------------------------------------------------------------
+
+TEST_F(HostTest, CreatesASourceOfTheBuildTier) {
+  const PluginHost host({Built("sources")});
+  const Config config = Parse("{type: counter, last: 2, unit: sheep}");
+  const auto source = host.CreateSource("counter", config.root(), 1, "/");
+  EXPECT_EQ(source->streams().at(0).name, "count");
+  Frame frame;
+  EXPECT_TRUE(source->Next(frame));
+  EXPECT_TRUE(source->Next(frame));
+  EXPECT_FALSE(source->Next(frame));
+  EXPECT_NO_THROW(Parse("{type: counter, last: 2, unit: sheep}"));
+}
+
+TEST_F(HostTest, AFailingSourceNamesItselfAndItsPlugin) {
+  const PluginHost host({Built("sources")});
+  const Config config = Parse("source: {type: throwing_source}");
+  const Node entry = config.root().At("source");
+  ExpectError(ExitCode::kPlugin,
+              {"source 'throwing_source'", Built("sources").string(), "no such thing"},
+              [&] { host.CreateSource("throwing_source", entry, 1, "/"); });
+  ExpectError(ExitCode::kBadConfig, {"source.last: missing; source 'counter' needs it ([1, 100]"},
+              [&] { host.CreateSource("counter", entry, 1, "/"); });
+  const auto counter = std::find_if(host.entries().begin(), host.entries().end(),
+                                    [](const PluginEntry& e) { return e.name == "counter"; });
+  const std::vector<ParamInfo> schema = host.Schema(*counter);
+  EXPECT_EQ(Param(schema, "last").range, "[1, 100]");
+  EXPECT_EQ(Param(schema, "unit").doc, "what is counted");
+}
+
+}  // namespace
+}  // namespace alidade

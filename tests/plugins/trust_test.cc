@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <unistd.h>
+
+#include "host_fixture.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr uid_t kStranger = 54321;
+
+/// Fault 70: what someone else could have written is not opened.
+class TrustTest : public HostTest {
+ protected:
+  static void Allow(const fs::path& path, fs::perms who) {
+    fs::permissions(path, who, fs::perm_options::add);
+  }
+  void ExpectNotTrusted(const fs::path& file, const std::string& why) const {
+    ExpectRefused(file, {"not trusted", why}, ExitCode::kNotTrusted);
+  }
+};
+
+TEST_F(TrustTest, AFileThatOthersCanWrite) {
+  const fs::path file = Copy("good", "good.so");
+  EXPECT_NO_THROW(CheckTrusted(file));
+  Allow(file, fs::perms::group_write);
+  ExpectNotTrusted(file, "writable for its group; chmod go-w " + file.string());
+  Allow(file, fs::perms::others_write);
+  ExpectNotTrusted(file, "it is writable for everyone");
+}
+
+TEST_F(TrustTest, AFolderThatOthersCanWrite) {
+  const fs::path file = Copy("good", "a/b/good.so");
+  Allow(folder_ / "a", fs::perms::others_write);
+  ExpectNotTrusted(file, "'" + (folder_ / "a").string() + "' is writable for everyone");
+  Allow(folder_ / "a", fs::perms::sticky_bit);
+  EXPECT_NO_THROW(CheckTrusted(file)) << "like /tmp: others cannot replace what is in it";
+  Allow(folder_ / "a/b", fs::perms::others_write | fs::perms::sticky_bit);
+  ExpectNotTrusted(file, "'" + (folder_ / "a/b").string() + "' is writable for everyone");
+}
+
+TEST_F(TrustTest, ARelativePath) {
+  ExpectRefused("good.so", {"not trusted", "a relative path"}, ExitCode::kNotTrusted);
+  ExpectError(ExitCode::kNotTrusted, {"a relative path"}, [] { CheckTrusted("a/good.so"); });
+}
+
+TEST_F(TrustTest, ALinkToWhatOthersCanWrite) {
+  const fs::path file = Copy("good", "open/good.so");
+  fs::create_symlink(file, folder_ / "link.so");
+  fs::create_directory_symlink(folder_ / "open", folder_ / "link_to_folder");
+  EXPECT_NO_THROW(CheckTrusted(folder_ / "link.so"));
+  EXPECT_NO_THROW(CheckTrusted(folder_ / "link_to_folder/good.so"));
+  Allow(folder_ / "open", fs::perms::others_write);
+  ExpectNotTrusted(folder_ / "link.so", "writable for everyone");
+  ExpectNotTrusted(folder_ / "link_to_folder/good.so", "writable for everyone");
+}
+
+TEST_F(TrustTest, AFolderThatIsLeftAgainCounts) {
+  Copy("good", "good.so");
+  fs::create_directory(folder_ / "open");
+  Allow(folder_ / "open", fs::perms::others_write);
+  fs::create_directory(folder_ / "open/deeper");
+  ExpectNotTrusted(folder_ / "open/deeper/../../good.so", "writable for everyone");
+}
+
+TEST_F(TrustTest, EndlessLinks) {
+  fs::create_symlink(folder_ / "b.so", folder_ / "a.so");
+  fs::create_symlink(folder_ / "a.so", folder_ / "b.so");
+  ExpectError(ExitCode::kNotTrusted, {"symbolic links"}, [&] { CheckTrusted(folder_ / "a.so"); });
+}
+
+TEST_F(TrustTest, AForeignOwner) {
+  if (geteuid() != 0) GTEST_SKIP() << "only root can give files away";
+  const fs::path file = Copy("good", "a/good.so");
+  ASSERT_EQ(chown(file.c_str(), kStranger, 0), 0);
+  ExpectNotTrusted(file, "owned by user 54321, not by root, you or the owner of this program");
+  ASSERT_EQ(chown(file.c_str(), 0, 0), 0);
+  ASSERT_EQ(chown((folder_ / "a").c_str(), kStranger, 0), 0);
+  ExpectNotTrusted(file, "'" + (folder_ / "a").string() + "' is owned by user 54321");
+  ASSERT_EQ(chown((folder_ / "a").c_str(), 0, 0), 0);
+  fs::create_symlink(file, folder_ / "link.so");
+  ASSERT_EQ(lchown((folder_ / "link.so").c_str(), kStranger, 0), 0);
+  ExpectNotTrusted(folder_ / "link.so", "owned by user 54321");
+}
+
+TEST_F(TrustTest, InADefaultPlaceItIsToldWhenItsModelIsMissed) {
+  const fs::path file = Copy("good", "path/good.so");
+  Allow(file, fs::perms::others_write);
+  setenv("ALIDADE_PLUGIN_PATH", (folder_ / "path").c_str(), 1);
+  const PluginHost host;
+  ASSERT_EQ(host.refusals().size(), 1u);
+  EXPECT_EQ(host.refusals()[0].code, ExitCode::kNotTrusted);
+  EXPECT_EQ(host.refusals()[0].file, file);
+  const Config config = Parse("model: probe");
+  ExpectError(ExitCode::kNotTrusted, {file.string(), "not trusted", "writable for everyone"},
+              [&] { host.CreateSensor("probe", config.root()); });
+  const Config stereo = Parse("{model: s, focal_px: 1, baseline_m: 1, sigma_px: 1}");
+  EXPECT_NO_THROW(host.CreateSensor("stereo_disparity", stereo.root()));
+}
+
+TEST_F(TrustTest, ARelativePlaceOfTheEnvironmentIsNotSearched) {
+  setenv("ALIDADE_PLUGIN_PATH", ".", 1);
+  const fs::path before = fs::current_path();
+  Copy("good", "good.so");
+  fs::current_path(folder_);
+  const PluginHost host;
+  fs::current_path(before);
+  ASSERT_EQ(host.refusals().size(), 1u);
+  EXPECT_EQ(host.refusals()[0].code, ExitCode::kNotTrusted);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -25,6 +25,7 @@ std::string NameOf(const fs::path& config) {
 void AddPluginPath(CLI::App& command, std::vector<std::string>& paths) {
   command.add_option("--plugin-path", paths, "a plugin, or a folder of plugins; may be repeated")
       ->option_text("PATH")
+      ->type_name("PATH")
       ->allow_extra_args(false);
 }
 
@@ -32,6 +33,7 @@ void Input::AddTo(CLI::App& command) {
   command.add_option("CONFIG", config, "the config, a YAML file")->option_text(" ")->required();
   command.add_option("--set", sets, "set a key of the config, in dotted form; may be repeated")
       ->option_text("KEY=VALUE")
+      ->type_name("KEY=VALUE")
       ->allow_extra_args(false)
       ->check(IsAssignment);
   AddPluginPath(command, plugin_paths);

@@ -73,9 +73,9 @@ std::string Suggestion(const CLI::App& app, const std::string& word) {
 /// What is wrong with a command line that CLI11 refuses.
 std::string Complaint(const CLI::App& command, const CLI::ParseError& error) {
   const std::vector<std::string> extra = command.remaining();
-  if (extra.empty()) return error.what();
-  const std::string& word = extra.front();
   const bool wants_command = !command.get_subcommands({}).empty();
+  if (extra.empty()) return wants_command ? "no command" : error.what();
+  const std::string& word = extra.front();
   const char* const what = word.starts_with('-') ? "no option '"
                            : wants_command       ? "no command '"
                                                  : "unexpected argument '";
@@ -101,11 +101,6 @@ ExitCode Main(int argc, char** argv) {
   CLI::App program("Recursive state estimation from plugins: write h(x) once.", "alidade");
   Action action;
   Describe(program, action);
-  if (argc < 2) {
-    PrintErrors("no command");
-    PrintNote('\n' + program.help());
-    return ExitCode::kUsage;
-  }
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

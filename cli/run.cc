@@ -140,7 +140,8 @@ void AddRun(CLI::App& program, Action& action) {
                      "run folder; default: the config's `output:`, or its folder's name, in runs/")
       ->option_text("DIR");
   command.add_option("--seed", arguments->seed, "seed of the source; overrides the config")
-      ->option_text("N");
+      ->option_text("N")
+      ->check(CLI::Range(std::int64_t{0}, INT64_MAX));
   command.add_flag("--force", arguments->force, "replace the run folder if it is there");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.add_flag("--no-figures", arguments->no_figures, "draw no figures");

@@ -3,5 +3,5 @@
 
 #include "alidade/plugin.h"
 
-ALIDADE_PLUGIN(ALIDADE_MOTION(alidade::Constant<>, "constant", "a value that stays, or a random walk",
-                              "[Ekf2017] sec. 1.2"))
+ALIDADE_PLUGIN(ALIDADE_MOTION(alidade::Constant<>, "constant",
+                              "a value that stays, or a random walk", "[Ekf2017] sec. 1.2"))

@@ -34,11 +34,11 @@ struct StereoDisparity : Sensor<Vec<1>, Vec<1>> {
         sigma_px(sigma),
         max_px(near_m > 0.0 ? bf_px_m / near_m : std::numeric_limits<double>::infinity()) {}
   explicit StereoDisparity(Params& p)
-      : StereoDisparity(p.Positive("focal_px", "px", "rectified focal length"),
-                        p.Positive("baseline_m", "m", "stereo baseline"),
-                        p.Positive("sigma_px", "px", "disparity noise, 1 sigma"),
-                        p.NonNegative("near_m", "m", "nearest depth it measures; 0: no limit", 0.0)) {
-  }
+      : StereoDisparity(
+            p.Positive("focal_px", "px", "rectified focal length"),
+            p.Positive("baseline_m", "m", "stereo baseline"),
+            p.Positive("sigma_px", "px", "disparity noise, 1 sigma"),
+            p.NonNegative("near_m", "m", "nearest depth it measures; 0: no limit", 0.0)) {}
 
   template <class T>
   bool Predict(const T* depth, T* disparity) const {

@@ -27,8 +27,7 @@ constexpr const char* kWalk = "state.template.noise.random_walk";
 constexpr const char* kScale = "sensors.scale.sigma_px";
 constexpr const char* kBaseline =
     "estimators.stereo_only.overrides.state.target.noise.acceleration";
-constexpr const char* kBaselineSigma =
-    "estimators.stereo_only.overrides.sensors.stereo.sigma_px";
+constexpr const char* kBaselineSigma = "estimators.stereo_only.overrides.sensors.stereo.sigma_px";
 
 /// RMSE of depth by estimator: masked, in the blind half; unmasked, over the whole series.
 std::map<std::string, double> Rmse(const std::string& config_file, const Settings& settings,
@@ -41,8 +40,7 @@ std::map<std::string, double> Rmse(const std::string& config_file, const Setting
   alidade::Experiment experiment = alidade::BuildExperiment(config, host);
   std::map<std::string, double> rmse;
   for (const auto& result : alidade::Run(experiment, {}).contestants) {
-    rmse[result.name] =
-        result.metrics.at(masked ? "rmse:target.depth@blind" : "rmse:target.depth");
+    rmse[result.name] = result.metrics.at(masked ? "rmse:target.depth@blind" : "rmse:target.depth");
   }
   return rmse;
 }
@@ -64,8 +62,8 @@ Choice Choose(const std::string& config, const std::string& estimator,
     const double mean = std::exp(sum / static_cast<double>(series.size()));
     if (mean < best.geometric_mean) best = {settings, mean};
   }
-  std::printf("%s, geometric mean %.3f m on %zu series:\n", estimator.c_str(),
-              best.geometric_mean, series.size());
+  std::printf("%s, geometric mean %.3f m on %zu series:\n", estimator.c_str(), best.geometric_mean,
+              series.size());
   for (const auto& [key, value] : best.settings) {
     std::printf("  %s = %s\n", key.c_str(), value.c_str());
   }
@@ -87,8 +85,9 @@ double Mean(const std::vector<double>& values) {
 void Report(const std::string& config, const Settings& settings, const Names& series,
             const alidade::PluginHost& host) {
   const Names estimators = {"fused", "stereo_only", "hold_last"};
-  std::printf("\n| series | masked: fused | stereo_only | hold_last | whole: fused | stereo_only |\n"
-              "|---|---|---|---|---|---|\n");
+  std::printf(
+      "\n| series | masked: fused | stereo_only | hold_last | whole: fused | stereo_only |\n"
+      "|---|---|---|---|---|---|\n");
   std::map<std::string, std::vector<double>> masked, whole;
   for (const std::string& file : series) {
     const auto m = Rmse(config, settings, file, true, host);

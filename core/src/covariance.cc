@@ -17,8 +17,8 @@ Eigen::MatrixXd Times(const std::vector<JacobianBlock>& h, int rows,
 }
 
 int Covariance::Add(int rows) {
-  const auto gap = std::find_if(gaps_.begin(), gaps_.end(),
-                                [rows](const auto& g) { return g.second == rows; });
+  const auto gap =
+      std::find_if(gaps_.begin(), gaps_.end(), [rows](const auto& g) { return g.second == rows; });
   if (gap != gaps_.end()) {
     const int offset = gap->first;
     gaps_.erase(gap);
@@ -41,9 +41,8 @@ void Covariance::Release(int offset, int rows) {
   gaps_.emplace_back(offset, rows);
   // Gaps at the end are given back.
   for (bool shrunk = true; shrunk;) {
-    const auto last = std::find_if(gaps_.begin(), gaps_.end(), [this](const auto& g) {
-      return g.first + g.second == size_;
-    });
+    const auto last = std::find_if(gaps_.begin(), gaps_.end(),
+                                   [this](const auto& g) { return g.first + g.second == size_; });
     shrunk = last != gaps_.end();
     if (!shrunk) break;
     size_ = last->first;

@@ -24,9 +24,9 @@ Outcome OutcomeOf(Status status) {
 }
 
 const char* ToString(Outcome outcome) {
-  constexpr const char* kNames[] = {"accepted",   "initialised", "gated", "out_of_domain",
-                                    "invalid",    "not_finite",  "not_pd", "stale",
-                                    "not_ready",  "failed"};
+  constexpr const char* kNames[] = {"accepted",  "initialised", "gated",  "out_of_domain",
+                                    "invalid",   "not_finite",  "not_pd", "stale",
+                                    "not_ready", "failed"};
   return kNames[static_cast<int>(outcome)];
 }
 
@@ -34,8 +34,8 @@ EkfOptions EkfOptions::FromNode(const Node& entry) {
   EkfOptions options;
   if (const auto gate = entry.Find("gate")) options.gate = gate->Number(0.0, 1.0, true);
   if (const auto fuse = entry.Find("fuse")) {
-    options.fuse = static_cast<alidade::Fuse>(
-        fuse->Choice({"joint", "per_sensor", "per_measurement"}));
+    options.fuse =
+        static_cast<alidade::Fuse>(fuse->Choice({"joint", "per_sensor", "per_measurement"}));
   }
   if (const auto dt = entry.Find("max_dt_s")) {
     options.max_dt_s = dt->Number(0.0, std::numeric_limits<double>::infinity(), true);
@@ -125,10 +125,9 @@ std::vector<Ekf::Row> Ekf::Collect(const Frame& frame, UpdateReport& report) {
     entry.landmark = row.measurement->landmark;
     entry.dof = binding.model.measurement().geometry.tangent;
     entry.z = row.measurement->values;
-    const bool finite = std::all_of(entry.z.begin(), entry.z.end(),
-                                    [](double v) { return std::isfinite(v); });
-    entry.outcome =
-        finite ? OutcomeOf(binding.model.Valid(entry.z.data())) : Outcome::kNotFinite;
+    const bool finite =
+        std::all_of(entry.z.begin(), entry.z.end(), [](double v) { return std::isfinite(v); });
+    entry.outcome = finite ? OutcomeOf(binding.model.Valid(entry.z.data())) : Outcome::kNotFinite;
   }
   return rows;
 }
@@ -161,7 +160,8 @@ bool Ekf::StepModel(const MotionBinding& motion, double dt_s, UpdateReport& repo
     if (!block.present) return true;
     x.push_back(state_.value(id));
     next.emplace_back(block.geometry().ambient);
-    if (block.has_covariance()) segments.emplace_back(block.tangent_offset, block.geometry().tangent);
+    if (block.has_covariance())
+      segments.emplace_back(block.tangent_offset, block.geometry().tangent);
     for (int i = 0; i < block.geometry().tangent; ++i, ++row) {
       if (block.has_covariance()) rows.push_back(row);
     }
@@ -169,8 +169,7 @@ bool Ekf::StepModel(const MotionBinding& motion, double dt_s, UpdateReport& repo
   for (std::vector<double>& value : next) y.push_back(value.data());
   RowMajor f = RowMajor::Constant(n, n, std::nan("")), g = RowMajor::Constant(n, n_w, std::nan(""));
   RowMajor l = RowMajor::Zero(n_w, n_w);
-  Status status =
-      motion.model.Step(x.data(), nullptr, nullptr, dt_s, y.data(), f.data(), g.data());
+  Status status = motion.model.Step(x.data(), nullptr, nullptr, dt_s, y.data(), f.data(), g.data());
   if (status == Status::kOk) status = motion.model.SqrtQ(x.data(), dt_s, l.data());
   if (status != Status::kOk) {
     GiveUp(report, status == Status::kError ? "plugin_failed" : "diverged",

@@ -31,8 +31,7 @@ void Ekf::InitialiseFrom(std::vector<Row>& rows, UpdateReport& report) {
         return prior.block == target.block && prior.from == binding.name;
       };
       if (std::count_if(binding.roles.begin(), binding.roles.end(), missing) != 1 ||
-          !missing(target) ||
-          std::none_of(system_.priors.begin(), system_.priors.end(), waits)) {
+          !missing(target) || std::none_of(system_.priors.begin(), system_.priors.end(), waits)) {
         continue;
       }
       outcome = InitialiseBlock(row) ? Outcome::kInitialised : Outcome::kInvalid;
@@ -116,8 +115,8 @@ void Ekf::Recover(const Row& row, UpdateReport& report) {
       target->mode == RoleMode::kEstimate &&
       state_.layout()[target->block].status == BlockStatus::kEstimated && InitialiseBlock(row)) {
     ForgetMotionOf(target->block);
-    Note(report, "lockout", why + "reset " + state_.layout()[target->block].name +
-                                " from its measurement");
+    Note(report, "lockout",
+         why + "reset " + state_.layout()[target->block].name + " from its measurement");
     return;
   }
   constexpr double kInflation = 10.0;
@@ -137,8 +136,8 @@ void Ekf::ForgetMotionOf(BlockId id) {
   for (const MotionBinding& motion : system_.motions) {
     if (std::find(motion.blocks.begin(), motion.blocks.end(), id) == motion.blocks.end()) continue;
     for (const Prior& prior : system_.priors) {
-      const bool together = std::find(motion.blocks.begin(), motion.blocks.end(), prior.block) !=
-                            motion.blocks.end();
+      const bool together =
+          std::find(motion.blocks.begin(), motion.blocks.end(), prior.block) != motion.blocks.end();
       if (!together || prior.block == id || prior.covariance.size() == 0 ||
           !state_.layout()[prior.block].has_covariance()) {
         continue;

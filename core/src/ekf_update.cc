@@ -54,8 +54,7 @@ Outcome Ekf::Linearise(Row& row, MeasurementReport& entry, UpdateReport& report)
     diverged_ = true;
     std::vector<BlockId> blocks;
     for (const RoleBinding& role : binding.roles) blocks.push_back(role.block);
-    Note(report, "diverged",
-         "sensor '" + binding.name + "' is not defined at " + Describe(blocks));
+    Note(report, "diverged", "sensor '" + binding.name + "' is not defined at " + Describe(blocks));
   }
   if (outcome != Outcome::kAccepted) return outcome;
   row.innovation.resize(geometry.tangent);

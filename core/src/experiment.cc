@@ -14,8 +14,9 @@ void CheckSchema(const Node& root) {
   const std::int64_t found = version.Integer(1, 1'000'000);
   if (found > kSchema) {
     version.Fail("schema version " + std::to_string(found),
-                 std::to_string(kSchema) + ", the newest that this program knows; a newer alidade "
-                 "reads this file");
+                 std::to_string(kSchema) +
+                     ", the newest that this program knows; a newer alidade "
+                     "reads this file");
   }
 }
 
@@ -41,8 +42,8 @@ int FindStream(const Node& sensor, const SensorModel& model,
   if (streams[index].size != model.measurement().geometry.ambient) {
     node.Fail("stream '" + names[index] + "' has " + std::to_string(streams[index].size) +
                   " values at a time",
-              std::to_string(model.measurement().geometry.ambient) + ", as model '" +
-                  model.name() + "' measures");
+              std::to_string(model.measurement().geometry.ambient) + ", as model '" + model.name() +
+                  "' measures");
   }
   return static_cast<int>(index);
 }
@@ -129,8 +130,7 @@ std::vector<Segment> ReadSegments(const Node& root, const System& system,
                     Nearest(sensor.Text(), names));
       }
       const SensorBinding& binding = system.sensors[static_cast<std::size_t>(index)];
-      const int stream =
-          FindStream(root.At("sensors").At(binding.name), binding.model, streams);
+      const int stream = FindStream(root.At("sensors").At(binding.name), binding.model, streams);
       segments.push_back({name, stream, with.has_value(), binding.model});
       entry.RejectUnread();
     }

@@ -43,8 +43,7 @@ Trajectory StartNearPrior(const System& system) {
     for (int i = 0; i < geometry.tangent; ++i) {
       const bool by_element = geometry.tangent == geometry.ambient;
       t.names.push_back(by_element ? names[static_cast<std::size_t>(i)] : block.name);
-      const double sigma =
-          prior.covariance.size() > 0 ? std::sqrt(prior.covariance(i, i)) : 1.0;
+      const double sigma = prior.covariance.size() > 0 ? std::sqrt(prior.covariance(i, i)) : 1.0;
       t.scale.push_back(sigma > 0.0 ? sigma : 1.0);
     }
   }
@@ -96,9 +95,8 @@ void Observe(const System& system, const Trajectory& t, const Eigen::MatrixXd& p
     for (const RoleBinding& role : sensor.roles) {
       roles.push_back(role.block < 0 ? nullptr
                                      : t.values[static_cast<std::size_t>(role.block)].data());
-      j.push_back(RowMajor::Zero(m, role.block < 0
-                                        ? 1
-                                        : system.layout[role.block].geometry().tangent));
+      j.push_back(
+          RowMajor::Zero(m, role.block < 0 ? 1 : system.layout[role.block].geometry().tangent));
     }
     std::vector<double*> data;
     std::vector<int> strides;
@@ -154,7 +152,8 @@ std::vector<std::vector<std::string>> UnobservableDirections(const System& syste
     Observe(system, t, phi, rows);
     if (!Advance(system, kStep, t, phi)) break;
   }
-  Eigen::MatrixXd o = Eigen::MatrixXd::Zero(std::max<Eigen::Index>(n, static_cast<Eigen::Index>(rows.size())), n);
+  Eigen::MatrixXd o =
+      Eigen::MatrixXd::Zero(std::max<Eigen::Index>(n, static_cast<Eigen::Index>(rows.size())), n);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const double norm = rows[i].norm();
     if (norm > 0.0) o.row(static_cast<Eigen::Index>(i)) = rows[i] / norm;

@@ -35,10 +35,9 @@ ContestantResult Begin(const Contestant& contestant) {
   result.name = contestant.name;
   result.unobservable = UnobservableDirections(contestant.system);
   for (const auto& direction : result.unobservable) {
-    result.events.push_back(
-        {kNoStamp, "unobservable",
-         "no sensor of this estimator tells " + Join(direction, " and ") +
-             (direction.size() > 1 ? " apart" : "")});
+    result.events.push_back({kNoStamp, "unobservable",
+                             "no sensor of this estimator tells " + Join(direction, " and ") +
+                                 (direction.size() > 1 ? " apart" : "")});
   }
   return result;
 }
@@ -59,8 +58,9 @@ bool Advance(Lane& lane, int index, const Frame& frame, const std::vector<bool>&
   if (options.recorder != nullptr) {
     options.recorder->AddEstimate(index, frame, estimator.state(), report);
   }
-  const bool must_end = estimator.failed() || (estimator.diverged() && lane.contestant.on_divergence ==
-                                                                           OnDivergence::kFail);
+  const bool must_end =
+      estimator.failed() ||
+      (estimator.diverged() && lane.contestant.on_divergence == OnDivergence::kFail);
   if (!must_end) return true;
   const std::string why = report.events.empty() ? "diverged" : report.events.back().text;
   char at[48];

@@ -7,8 +7,7 @@
 
 namespace alidade {
 
-BlockId StateLayout::Declare(std::string name, std::string owner, Space space,
-                             BlockStatus status) {
+BlockId StateLayout::Declare(std::string name, std::string owner, Space space, BlockStatus status) {
   ALIDADE_EXPECTS(Find(name) < 0);
   Block block;
   block.name = std::move(name);
@@ -75,8 +74,7 @@ void State::Initialise(BlockId id, const double* value, const std::vector<BlockI
 BlockId State::Clone(BlockId source, std::string name) {
   const Block original = layout_[source];
   ALIDADE_EXPECTS(original.present);
-  const BlockId id =
-      Declare(std::move(name), original.owner, original.space, original.status);
+  const BlockId id = Declare(std::move(name), original.owner, original.space, original.status);
   const std::vector<double> copy(value(source), value(source) + original.geometry().ambient);
   const int n = original.geometry().tangent;
   Initialise(id, copy.data(), {source}, {Eigen::MatrixXd::Identity(n, n)},

@@ -173,7 +173,7 @@ std::string SweepTable(const SweepResult& result) {
       TextRow& some = part.emplace_back(TextRow{row[0]});
       for (std::size_t c = first; c < std::min(first + fit, row.size()); ++c) some.push_back(row[c]);
     }
-    text += (first > 1 ? "\n" : "") + internal::TextTable(part);
+    text.append(first > 1 ? "\n" : "").append(internal::TextTable(part));
   }
   return text;
 }

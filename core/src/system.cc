@@ -114,7 +114,8 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
   const std::string model_name = entry.At("model", "a state entry").Text();
   MotionBinding binding{name, host.CreateMotion(model_name, entry), {}};
   if (binding.model.has_input()) {
-    entry.Fail("model '" + model_name + "' needs a control input", "a model without: control "
+    entry.Fail("model '" + model_name + "' needs a control input",
+               "a model without: control "
                "inputs are not supported yet");
   }
   const std::vector<std::string> names = ReadBlockNames(entry, binding.model);
@@ -125,8 +126,8 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
     const BlockStatus status = Contains(fixed, names[i])        ? BlockStatus::kFixed
                                : Contains(considered, names[i]) ? BlockStatus::kConsidered
                                                                 : BlockStatus::kEstimated;
-    const BlockId id = system.layout.Declare(name + "." + names[i], name,
-                                             binding.model.blocks()[i], status);
+    const BlockId id =
+        system.layout.Declare(name + "." + names[i], name, binding.model.blocks()[i], status);
     binding.blocks.push_back(id);
     ReadPrior(initial.At(names[i], "block '" + name + "." + names[i] + "'"), system.layout[id], id,
               system);
@@ -162,19 +163,19 @@ RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& mod
       if (binding.linearise_at == LineariseAt::kMeasurement &&
           (initialised < 0 ||
            model.roles()[static_cast<std::size_t>(initialised)].name != role.name)) {
-        at->Fail("model '" + model.name() + "' has no inverse observation of role '" + role.name +
-                     "'",
-                 "prediction");
+        at->Fail(
+            "model '" + model.name() + "' has no inverse observation of role '" + role.name + "'",
+            "prediction");
       }
     }
     node.RejectUnread();
   }
   const Block& block = system.layout[binding.block];
   if (!(block.geometry() == role.geometry)) {
-    node.Fail("block '" + block.name + "' has size " + std::to_string(block.geometry().ambient) +
-                  " or another geometry",
-              "one that fits role '" + role.name + "' of size " +
-                  std::to_string(role.geometry.ambient));
+    node.Fail(
+        "block '" + block.name + "' has size " + std::to_string(block.geometry().ambient) +
+            " or another geometry",
+        "one that fits role '" + role.name + "' of size " + std::to_string(role.geometry.ambient));
   }
   return binding;
 }
@@ -182,8 +183,10 @@ RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& mod
 SensorBinding ReadSensor(const std::string& name, const Node& entry, const PluginHost& host,
                          const System& system) {
   const std::string model_name = entry.At("model", "a sensor entry").Text();
-  SensorBinding binding{name, entry.At("stream", "sensor '" + name + "'").Text(),
-                        host.CreateSensor(model_name, entry), {}};
+  SensorBinding binding{name,
+                        entry.At("stream", "sensor '" + name + "'").Text(),
+                        host.CreateSensor(model_name, entry),
+                        {}};
   const Node roles = entry.At("roles", "sensor '" + name + "'");
   for (const Space& role : binding.model.roles()) {
     const auto node = roles.Find(role.name);
@@ -227,14 +230,16 @@ void CheckInitialisation(const Node& root, const System& system) {
     if (prior.from.empty()) continue;
     const int sensor = system.FindSensor(prior.from);
     if (sensor < 0) {
-      place(prior.block).Fail("no sensor '" + prior.from + "' here", "a sensor of this estimator",
-                              Nearest(prior.from, SensorNames(system)));
+      place(prior.block)
+          .Fail("no sensor '" + prior.from + "' here", "a sensor of this estimator",
+                Nearest(prior.from, SensorNames(system)));
     }
     const SensorBinding& binding = system.sensors[static_cast<std::size_t>(sensor)];
     const int role = binding.model.initialised_role();
     if (role < 0 || binding.roles[static_cast<std::size_t>(role)].block != prior.block) {
-      place(prior.block).Fail("sensor '" + prior.from + "' does not determine this block",
-                              "a sensor whose inverse observation is this block");
+      place(prior.block)
+          .Fail("sensor '" + prior.from + "' does not determine this block",
+                "a sensor whose inverse observation is this block");
     }
   }
   std::vector<BlockId> chain;
@@ -309,8 +314,7 @@ int System::FindSensor(std::string_view name) const {
   return found == sensors.end() ? -1 : static_cast<int>(found - sensors.begin());
 }
 
-System BuildSystem(const Node& root, const PluginHost& host,
-                   const std::vector<std::string>& only) {
+System BuildSystem(const Node& root, const PluginHost& host, const std::vector<std::string>& only) {
   System system;
   for (const auto& [name, entry] : root.At("state", "a run").Entries()) {
     ReadStateEntry(name, entry, host, system);

@@ -19,33 +19,32 @@ ContestantResult Named(const std::string& name, std::map<std::string, double> me
 
 TEST(ComparisonTable, OrdersScalesAndAligns) {
   RunResult result;
-  result.contestants = {
-      Named("fused", {{"rmse:target.depth", 0.002145},
-                      {"rmse:target.depth@blind", 0.00121},
-                      {"rmse:cam.pixel", 0.31},
-                      {"lag_ms:target.depth", -1.42},
-                      {"cov95:target.depth", 0.9342},
-                      {"cov95:target.depth@blind", 0.9},
-                      {"nees.mean:target", 0.8948},
-                      {"nees.cov95:target", 1.0},
-                      {"nis.mean:stereo", 0.9059},
-                      {"final:target.depth", 1.0}}),
-      Named("stereo_only", {{"rmse:target.depth", 0.206534}})};
+  result.contestants = {Named("fused", {{"rmse:target.depth", 0.002145},
+                                        {"rmse:target.depth@blind", 0.00121},
+                                        {"rmse:cam.pixel", 0.31},
+                                        {"lag_ms:target.depth", -1.42},
+                                        {"cov95:target.depth", 0.9342},
+                                        {"cov95:target.depth@blind", 0.9},
+                                        {"nees.mean:target", 0.8948},
+                                        {"nees.cov95:target", 1.0},
+                                        {"nis.mean:stereo", 0.9059},
+                                        {"final:target.depth", 1.0}}),
+                        Named("stereo_only", {{"rmse:target.depth", 0.206534}})};
   result.contestants[0].counts = {{"accepted:stereo", 74}, {"gated:stereo", 1}};
   result.contestants[1].diverged = true;
   EXPECT_EQ(ComparisonTable(result),
-            "                               fused  stereo_only\n"
-            "rmse cam.pixel [px]           0.3100            -\n"
-            "rmse target.depth [mm]         2.145      206.534\n"
-            "rmse target.depth @blind [mm]  1.210            -\n"
-            "lag target.depth [ms]         -1.420            -\n"
-            "cov95 target.depth [%]         93.42            -\n"
-            "nees.mean target              0.8948            -\n"
-            "nees.cov95 target [%]          100.0            -\n"
-            "nis.mean stereo               0.9059            -\n"
-            "accepted stereo                   74            -\n"
-            "gated stereo                       1            -\n"
-            "diverged                          no          yes\n");
+            "                                fused  stereo_only\n"
+            "rmse cam.pixel [px]            0.3100            -\n"
+            "rmse target.depth [mm]          2.145      206.534\n"
+            "rmse target.depth @blind [mm]   1.210            -\n"
+            "lag target.depth [ms]          -1.420            -\n"
+            "cov95 target.depth [%]          93.42            -\n"
+            "nees.mean target               0.8948            -\n"
+            "nees.cov95 target [%]           100.0            -\n"
+            "nis.mean stereo                0.9059            -\n"
+            "accepted stereo                    74            -\n"
+            "gated stereo                        1            -\n"
+            "diverged                           no          yes\n");
 }
 
 TEST(ComparisonTable, PrintsNumbersThatLieFarApart) {
@@ -56,7 +55,7 @@ TEST(ComparisonTable, PrintsNumbersThatLieFarApart) {
     result.contestants.push_back(Named(name, {{"rmse:cam.pixel", rmse}}));
   }
   const std::string table = ComparisonTable(result);
-  EXPECT_NE(table.find("rmse cam.pixel [px]  0.00001950  0  250.0  3.000e+12  inf\n"),
+  EXPECT_NE(table.find("rmse cam.pixel [px]  0.00001950   0  250.0  3.000e+12  inf\n"),
             std::string::npos)
       << table;
 }

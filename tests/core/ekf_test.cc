@@ -76,8 +76,8 @@ TEST(Ekf, JointEqualsSequentialOnALinearProblem) {
   Random random(12);
   for (int k = 0; k < 200; ++k) {
     // Two measurements of the first stream at one stamp, one of the second.
-    const Frame frame = FrameAt(
-        0.033 * k, {{0, random.Normal()}, {1, random.Normal()}, {0, random.Normal()}});
+    const Frame frame =
+        FrameAt(0.033 * k, {{0, random.Normal()}, {1, random.Normal()}, {0, random.Normal()}});
     for (Ekf* ekf : {&joint, &sensors, &measurements}) ekf->Process(frame);
     for (const Ekf* ekf : {&sensors, &measurements}) {
       ASSERT_NEAR(ValueOf(ekf->state(), "p.x"), ValueOf(joint.state(), "p.x"), 1e-10) << k;
@@ -289,9 +289,8 @@ TEST(Ekf, BlocksStartFromMeasurementsWithTheirCorrelation) {
   EXPECT_NEAR(CovarianceOf(ekf.state(), "target.depth", "target.depth"), variance_z, 1e-15);
   EXPECT_NEAR(CovarianceOf(ekf.state(), "template.inverse_distance", "target.depth"),
               -4.0 * variance_z, 1e-15);
-  EXPECT_NEAR(
-      CovarianceOf(ekf.state(), "template.inverse_distance", "template.inverse_distance"),
-      16.0 * variance_z + 4.0 * variance_s, 1e-14);
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "template.inverse_distance", "template.inverse_distance"),
+              16.0 * variance_z + 4.0 * variance_s, 1e-14);
 }
 
 TEST(Ekf, NoiseThatVanishesIsWarnedOfOnce) {
@@ -332,8 +331,7 @@ TEST(Ekf, FixedBlocksAreNeitherMovedNorCorrected) {
   System system;
   const MotionModel model = InProcessMotion(ConstantVelocity<1, false>(1.0), "constant_velocity");
   AddMotion(system, "p", model, {{"x", 1.0, 2.0}});
-  const BlockId v =
-      system.layout.Declare("p.v", "p", model.blocks()[1], BlockStatus::kFixed);
+  const BlockId v = system.layout.Declare("p.v", "p", model.blocks()[1], BlockStatus::kFixed);
   system.motions[0].blocks.push_back(v);
   system.priors.push_back({v, {2.0}, {}, ""});
   Ekf ekf(system, {}, {});

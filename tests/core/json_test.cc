@@ -38,9 +38,9 @@ TEST(Json, EscapesTexts) {
 
 TEST(Json, ReplacesWhatIsNoUtf8) {
   const std::string bad = "\xEF\xBF\xBD";
-  EXPECT_EQ(JsonQuoted("a\xFF"), "\"a" + bad + "\"");              // never a byte of UTF-8
-  EXPECT_EQ(JsonQuoted("\xC3"), "\"" + bad + "\"");                // cut short
-  EXPECT_EQ(JsonQuoted("\xC0\xAF"), "\"" + bad + bad + "\"");      // overlong
+  EXPECT_EQ(JsonQuoted("a\xFF"), "\"a" + bad + "\"");                    // never a byte of UTF-8
+  EXPECT_EQ(JsonQuoted("\xC3"), "\"" + bad + "\"");                      // cut short
+  EXPECT_EQ(JsonQuoted("\xC0\xAF"), "\"" + bad + bad + "\"");            // overlong
   EXPECT_EQ(JsonQuoted("\xED\xA0\x80"), "\"" + bad + bad + bad + "\"");  // surrogate
 }
 

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
-
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -200,9 +199,9 @@ std::vector<std::string> Matched(const std::vector<std::string>& blocks,
 TEST(Metrics, MatchesTruthsByName) {
   using Names = std::vector<std::string>;
   EXPECT_EQ(Matched({"a.x", "b.y"}, {{"x", 1}, {"b.y", 1}}), (Names{"a.x", "b.y"}));
-  EXPECT_EQ(Matched({"a.x", "b.x"}, {{"x", 1}}), Names{});            // which one?
+  EXPECT_EQ(Matched({"a.x", "b.x"}, {{"x", 1}}), Names{});  // which one?
   EXPECT_EQ(Matched({"a.x", "b.x"}, {{"x", 1}, {"b.x", 1}}), Names{"b.x"});
-  EXPECT_EQ(Matched({"a.x"}, {{"x", 2}}), Names{});                   // another size
+  EXPECT_EQ(Matched({"a.x"}, {{"x", 2}}), Names{});  // another size
   EXPECT_EQ(Matched({"a.x"}, {{"a", 1}, {"ax", 1}}), Names{});
 }
 

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
-
 #include <cmath>
 
 #include "alidade/error.h"
@@ -47,7 +46,8 @@ TEST(State, InitialiseCarriesTheCorrelationsOfWhatItCameFrom) {
   const Eigen::MatrixXd jb = Eigen::MatrixXd::Constant(1, 1, 3.0);
   const double value = 7.0;
   state.Initialise(y, &value, {a, b}, {ja, jb}, Eigen::MatrixXd::Constant(1, 1, 0.25));
-  const Eigen::MatrixXd expected_cross = ja * Cross(state, "s.a", "s.c") + jb * Cross(state, "s.b", "s.c");
+  const Eigen::MatrixXd expected_cross =
+      ja * Cross(state, "s.a", "s.c") + jb * Cross(state, "s.b", "s.c");
   EXPECT_LT((Cross(state, "s.y", "s.c") - expected_cross).norm(), 1e-13);
   Eigen::RowVector3d j(1.0, -2.0, 3.0);
   const double variance = (j * state.covariance().Block(0, 3, 0, 3) * j.transpose())(0) + 0.25;
@@ -110,8 +110,7 @@ TEST(State, ReparametriseMapsCovarianceAndCorrelations) {
 
 TEST(State, FixedBlocksHaveAValueAndNoCovariance) {
   State state;
-  const BlockId id =
-      state.Declare("s.f", "s", Named(Geometry::Vector(2)), BlockStatus::kFixed);
+  const BlockId id = state.Declare("s.f", "s", Named(Geometry::Vector(2)), BlockStatus::kFixed);
   const double value[2] = {1, 2};
   state.Add(id, value, {});
   EXPECT_EQ(state.covariance().size(), 0);

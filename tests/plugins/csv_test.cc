@@ -8,6 +8,7 @@
 #include <sys/time.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <clocale>
 #include <cstdlib>
 #include <filesystem>
@@ -510,6 +511,18 @@ TEST_F(Csv, LineTooLong) {
   }
   ExpectBadData(kHeader + row(200000),
                 "FILE:2:1: line too long; expected at most 4096 bytes a line");
+}
+
+TEST_F(Csv, LongestLineMayEndAcrossTheBuffer) {
+  // The buffer of 65536 bytes ends between the '\r' and the '\n' of a line of 4096 bytes: still one
+  // line, of which the next is counted.
+  std::string text = kHeader;
+  while (text.size() + 4097 + 4000 < 65536) text += '#' + std::string(3998, ' ') + '\n';
+  text += '#' + std::string(65536 - 4097 - 2 - text.size(), ' ') + '\n';
+  const auto before = std::count(text.begin(), text.end(), '\n');
+  text += "0,1,2,3." + std::string(4088, '0') + "\r\nx,1,2,3\n";
+  ExpectBadData(text, "FILE:" + std::to_string(before + 2) +
+                          ":1 t_s: 'x' is not a number; expected a finite number");
 }
 
 TEST_F(Csv, TimeMustIncrease) {

@@ -47,8 +47,7 @@ inline void AddMotion(System& system, const std::string& name, const MotionModel
                       const std::vector<GivenPrior>& priors) {
   MotionBinding binding{name, model, {}};
   for (std::size_t i = 0; i < priors.size(); ++i) {
-    const BlockId id =
-        system.layout.Declare(name + "." + priors[i].block, name, model.blocks()[i]);
+    const BlockId id = system.layout.Declare(name + "." + priors[i].block, name, model.blocks()[i]);
     binding.blocks.push_back(id);
     Prior prior;
     prior.block = id;

@@ -80,8 +80,8 @@ void ClosedForm(const Model& model, const double* const* x, double* const* jacob
 /// z = h(roles); where `jacobians` is not null, jacobians[i] = d z / d role_i. A null entry, or a
 /// role that is not bound, is skipped.
 template <class Model>
-Status Evaluate(const Model& model, const double* const* roles, double* z,
-                double* const* jacobians, const int* strides) {
+Status Evaluate(const Model& model, const double* const* roles, double* z, double* const* jacobians,
+                const int* strides) {
   using Z = typename Model::Measurement;
   using Blocks = detail::Blocks<Model>;
   constexpr typename Blocks::Indices indices{};
@@ -272,9 +272,8 @@ Status Step(const Model& model, const double* const* x, const double* u, const d
             double dt_s, double* const* next, MatrixRef f, MatrixRef g) {
   constexpr typename detail::Blocks<Model>::Indices indices{};
   if (w == nullptr) {
-    return detail::WithZeroNoise(model, [&](const double* zero) {
-      return Step(model, x, u, zero, dt_s, next, f, g);
-    });
+    return detail::WithZeroNoise(
+        model, [&](const double* zero) { return Step(model, x, u, zero, dt_s, next, f, g); });
   }
   const int n = detail::TangentSizeOf(model), n_w = detail::NoiseSizeOf(model);
   if (!f && (!g || n_w == 0)) {

@@ -19,8 +19,8 @@ namespace alidade {
 #else
 #define ALIDADE_BUILD_STL "stl"
 #endif
-#define ALIDADE_BUILD_ID                                                                    \
-  "0.1.0 " __VERSION__ " cxx" ALIDADE_STRINGISE(__cplusplus) " abi" ALIDADE_STRINGISE(      \
+#define ALIDADE_BUILD_ID                                                               \
+  "0.1.0 " __VERSION__ " cxx" ALIDADE_STRINGISE(__cplusplus) " abi" ALIDADE_STRINGISE( \
       __GXX_ABI_VERSION) " align" ALIDADE_STRINGISE(__BIGGEST_ALIGNMENT__) " " ALIDADE_BUILD_STL
 
 struct SourceEntry {
@@ -43,13 +43,13 @@ inline constexpr const char* kBuildEntrySymbol = "alidade_build_plugin";
 }  // namespace alidade
 
 /// Exports the sources of this plugin: ALIDADE_SOURCE_PLUGIN({"name", "doc", "keys", &Create}, ...)
-#define ALIDADE_SOURCE_PLUGIN(...)                                                         \
-  ALIDADE_FINGERPRINT(ALIDADE_TIER_BUILD, ALIDADE_BUILD_ID)                                \
-  extern "C" __attribute__((visibility("default"))) const alidade::BuildTable*             \
-  alidade_build_plugin() {                                                                 \
-    static const alidade::SourceEntry sources[] = {__VA_ARGS__};                           \
-    static const alidade::BuildTable table = {sizeof(alidade::BuildTable),                 \
-                                              &alidade_fingerprint, sources,               \
-                                              static_cast<int>(sizeof(sources) / sizeof(sources[0]))}; \
-    return &table;                                                                         \
+#define ALIDADE_SOURCE_PLUGIN(...)                                             \
+  ALIDADE_FINGERPRINT(ALIDADE_TIER_BUILD, ALIDADE_BUILD_ID)                    \
+  extern "C" __attribute__((visibility("default"))) const alidade::BuildTable* \
+  alidade_build_plugin() {                                                     \
+    static const alidade::SourceEntry sources[] = {__VA_ARGS__};               \
+    static const alidade::BuildTable table = {                                 \
+        sizeof(alidade::BuildTable), &alidade_fingerprint, sources,            \
+        static_cast<int>(sizeof(sources) / sizeof(sources[0]))};               \
+    return &table;                                                             \
   }

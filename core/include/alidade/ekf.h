@@ -63,7 +63,7 @@ class Ekf : public Estimator {
     std::vector<JacobianBlock> h;  ///< by role with a non-zero Jacobian
     std::vector<bool> considered;  ///< of the blocks in h
     Eigen::VectorXd innovation;
-    Eigen::MatrixXd r, pht;        ///< R, P H'
+    Eigen::MatrixXd r, pht;  ///< R, P H'
   };
 
   void StepTo(Stamp stamp, UpdateReport& report);
@@ -78,8 +78,8 @@ class Ekf : public Estimator {
   void CheckConditioning(const Row& row, const Eigen::MatrixXd& hpht, UpdateReport& report);
   Outcome Apply(const std::vector<Row*>& rows, UpdateReport& report);
   bool MaskConsidered(const std::vector<Row*>& rows, Eigen::MatrixXd& gain) const;
-  bool Correct(const std::vector<Row*>& rows, const Eigen::MatrixXd& w,
-               const Eigen::MatrixXd& gain, bool masked, const Eigen::MatrixXd& r);
+  bool Correct(const std::vector<Row*>& rows, const Eigen::MatrixXd& w, const Eigen::MatrixXd& gain,
+               bool masked, const Eigen::MatrixXd& r);
 
   void InitialiseFrom(std::vector<Row>& rows, UpdateReport& report);
   bool InitialiseBlock(const Row& row);

@@ -37,11 +37,11 @@ struct MeasurementReport {
   Outcome outcome = Outcome::kAccepted;
   std::int64_t landmark = -1;
   int dof = 0;
-  double nis = 0.0;             ///< r' S^-1 r, not divided by dof
-  std::vector<double> z, h;     ///< ambient
-  Eigen::VectorXd innovation;   ///< r = z (-) h, tangent
-  Eigen::MatrixXd s;            ///< S = H P H' + R, m x m; empty where it was not reached
-  Eigen::MatrixXd gain;         ///< K, n x m, in the covariance's order; empty unless accepted
+  double nis = 0.0;            ///< r' S^-1 r, not divided by dof
+  std::vector<double> z, h;    ///< ambient
+  Eigen::VectorXd innovation;  ///< r = z (-) h, tangent
+  Eigen::MatrixXd s;           ///< S = H P H' + R, m x m; empty where it was not reached
+  Eigen::MatrixXd gain;        ///< K, n x m, in the covariance's order; empty unless accepted
 };
 
 /// Something that happened to the filter, worth a line to its user.

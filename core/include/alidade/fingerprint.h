@@ -63,9 +63,9 @@ constexpr AlidadeTable Table(const AlidadeEntry (&entries)[N],
 }  // namespace alidade::detail
 
 /// Lays the fingerprint into its section. `tier` is ALIDADE_TIER_*, `build` what must equal the host's.
-#define ALIDADE_FINGERPRINT(tier, build)                                                         \
-  extern "C" {                                                                                   \
-  __attribute__((section(ALIDADE_FINGERPRINT_SECTION), used, visibility("default")))             \
-  extern const AlidadeFingerprint alidade_fingerprint =                                          \
-      alidade::detail::MakeFingerprint(tier, build);                                             \
+#define ALIDADE_FINGERPRINT(tier, build)                                                       \
+  extern "C" {                                                                                 \
+  __attribute__((section(ALIDADE_FINGERPRINT_SECTION), used,                                   \
+                 visibility("default"))) extern const AlidadeFingerprint alidade_fingerprint = \
+      alidade::detail::MakeFingerprint(tier, build);                                           \
   }

@@ -124,11 +124,11 @@ struct HasJacobian<Model, std::index_sequence<I...>,
 template <class Model, class Indices, class = void>
 struct HasNoiseOfMeasurement : std::false_type {};
 template <class Model, std::size_t... I>
-struct HasNoiseOfMeasurement<
-    Model, std::index_sequence<I...>,
-    std::void_t<decltype(std::declval<const Model&>().SqrtNoise(
-        std::declval<Pointer<double, I>>()..., std::declval<const double*>(),
-        std::declval<double*>()))>> : std::true_type {};
+struct HasNoiseOfMeasurement<Model, std::index_sequence<I...>,
+                             std::void_t<decltype(std::declval<const Model&>().SqrtNoise(
+                                 std::declval<Pointer<double, I>>()...,
+                                 std::declval<const double*>(), std::declval<double*>()))>>
+    : std::true_type {};
 
 template <class Model, class = void>
 struct HasValid : std::false_type {};

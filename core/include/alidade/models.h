@@ -32,7 +32,7 @@ class ModelInstance {
   const AlidadeInstance& c() const { return instance_; }
   const std::string& name() const { return name_; }
   const std::string& plugin() const { return plugin_; }
-  const std::vector<Space>& spaces() const { return spaces_; }  ///< roles, or blocks
+  const std::vector<Space>& spaces() const { return spaces_; }             ///< roles, or blocks
   const std::vector<std::int32_t>& tangents() const { return tangents_; }  ///< of the spaces
   /// The measurement of a sensor, the control input of a motion model (empty name: none).
   const Space& space() const { return space_; }
@@ -81,8 +81,7 @@ class SensorModel {
         sensor_->sqrt_noise(self_, roles, z, l, measurement().geometry.tangent));
   }
   Status Valid(const double* z) const {
-    return sensor_->valid == nullptr ? Status::kOk
-                                     : detail::ToStatus(sensor_->valid(self_, z));
+    return sensor_->valid == nullptr ? Status::kOk : detail::ToStatus(sensor_->valid(self_, z));
   }
   /// y = g(other roles, z), dense row-major Jacobians jx[i] = dy/d role_i and jz = dy/dz.
   Status Initialise(const double* const* roles, const double* z, double* y, double* const* jx,

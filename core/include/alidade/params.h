@@ -33,7 +33,8 @@ class Params {
   double Number(const char* key, const char* unit, const char* doc, Range range = {},
                 std::optional<double> fallback = std::nullopt) {
     double value = fallback.value_or(StandIn(range));
-    Read(ALIDADE_PARAM_NUMBER, key, unit, doc, range, 1, fallback ? &*fallback : nullptr, &value, 1);
+    Read(ALIDADE_PARAM_NUMBER, key, unit, doc, range, 1, fallback ? &*fallback : nullptr, &value,
+         1);
     return value;
   }
   double Positive(const char* key, const char* unit, const char* doc,
@@ -64,8 +65,8 @@ class Params {
              std::optional<int> fallback = std::nullopt) {
     double value = fallback.value_or(0);
     const double default_value = value;
-    AlidadeParam param = Describe(ALIDADE_PARAM_CHOICE, key, "", doc, {}, 1,
-                                  fallback ? &default_value : nullptr);
+    AlidadeParam param =
+        Describe(ALIDADE_PARAM_CHOICE, key, "", doc, {}, 1, fallback ? &default_value : nullptr);
     param.choices = choices.begin();
     param.choice_count = static_cast<std::int32_t>(choices.size());
     host_->read(host_->context, &param, &value, 1);

@@ -135,9 +135,14 @@ struct __attribute__((visibility("hidden"))) SensorCalls {
       }
     });
   }
-  static constexpr AlidadeSensor kCalls{sizeof(AlidadeSensor), 0, Eval, SqrtNoise,
+  static constexpr AlidadeSensor kCalls{sizeof(AlidadeSensor),
+                                        0,
+                                        Eval,
+                                        SqrtNoise,
                                         HasValid<Model>::value ? Valid : nullptr,
-                                        kInitialises ? Initialise : nullptr, nullptr, {}};
+                                        kInitialises ? Initialise : nullptr,
+                                        nullptr,
+                                        {}};
 };
 
 template <class Model>
@@ -146,8 +151,8 @@ struct __attribute__((visibility("hidden"))) MotionCalls {
                            const double* w, double dt_s, double* const* next, double* f,
                            std::int32_t f_stride, double* g, std::int32_t g_stride) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
-      return static_cast<std::int32_t>(alidade::Step(model, blocks, input, w, dt_s, next,
-                                                     {f, f_stride}, {g, g_stride}));
+      return static_cast<std::int32_t>(
+          alidade::Step(model, blocks, input, w, dt_s, next, {f, f_stride}, {g, g_stride}));
     });
   }
   template <std::size_t... I>
@@ -196,7 +201,8 @@ void PublishSensor(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* insta
   holder->description.capabilities =
       (Model::kInitialises >= 0 ? unsigned{ALIDADE_CAN_INITIALISE} : 0u) |
       (HasValid<Model>::value ? unsigned{ALIDADE_HAS_VALIDITY} : 0u) |
-      (HasJacobian<Model, typename Blocks<Model>::Indices>::value ? unsigned{ALIDADE_CLOSED_FORM} : 0u);
+      (HasJacobian<Model, typename Blocks<Model>::Indices>::value ? unsigned{ALIDADE_CLOSED_FORM}
+                                                                  : 0u);
   instance->sensor = &SensorCalls<Model>::kCalls;
   Publish(std::move(holder), ALIDADE_KIND_SENSOR, instance);
 }
@@ -282,12 +288,10 @@ void EmplaceMotion(Params& params, AlidadeInstance* instance) {
   (alidade::detail::Entry<make>(ALIDADE_KIND_MOTION, name, doc, citation))
 
 /// Exports the models as this plugin's table. Once for each plugin.
-#define ALIDADE_PLUGIN(...)                                                              \
-  ALIDADE_FINGERPRINT(ALIDADE_TIER_SEALED, "")                                           \
-  extern "C" __attribute__((visibility("default"))) const AlidadeTable* alidade_plugin(  \
-      void) {                                                                            \
-    static const AlidadeEntry entries[] = {__VA_ARGS__};                                 \
-    static const AlidadeTable table =                                                    \
-        alidade::detail::Table(entries, &alidade_fingerprint);                           \
-    return &table;                                                                       \
+#define ALIDADE_PLUGIN(...)                                                                    \
+  ALIDADE_FINGERPRINT(ALIDADE_TIER_SEALED, "")                                                 \
+  extern "C" __attribute__((visibility("default"))) const AlidadeTable* alidade_plugin(void) { \
+    static const AlidadeEntry entries[] = {__VA_ARGS__};                                       \
+    static const AlidadeTable table = alidade::detail::Table(entries, &alidade_fingerprint);   \
+    return &table;                                                                             \
   }

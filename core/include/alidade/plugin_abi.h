@@ -148,11 +148,11 @@ typedef struct AlidadeDescription {
   uint32_t role_count;
   uint32_t role_stride; /* bytes from one role to the next */
   const AlidadeSpace* roles;
-  const AlidadeSpace* output;    /* sensor: its measurement; else null */
-  const AlidadeSpace* input;     /* motion: its control input, or null */
-  int32_t noise_count;           /* motion: n_w */
-  int32_t initialise_role;       /* the role that `initialise` computes, where it can */
-  const uint8_t* step_sparsity;  /* motion: n x n, 1 where F may be non-zero; null: dense */
+  const AlidadeSpace* output;   /* sensor: its measurement; else null */
+  const AlidadeSpace* input;    /* motion: its control input, or null */
+  int32_t noise_count;          /* motion: n_w */
+  int32_t initialise_role;      /* the role that `initialise` computes, where it can */
+  const uint8_t* step_sparsity; /* motion: n x n, 1 where F may be non-zero; null: dense */
   void* reserved[4];
 } AlidadeDescription;
 
@@ -161,8 +161,8 @@ typedef struct AlidadeDescription {
 typedef struct AlidadeSensor {
   uint32_t struct_size;
   uint32_t reserved0;
-  int32_t (*eval)(const void* self, const double* const* roles, double* z,
-                  double* const* jacobians, const int32_t* row_strides);
+  int32_t (*eval)(const void* self, const double* const* roles, double* z, double* const* jacobians,
+                  const int32_t* row_strides);
   /* L with R = L L', tangent of z squared. */
   int32_t (*sqrt_noise)(const void* self, const double* const* roles, const double* z, double* l,
                         int32_t row_stride);

@@ -17,9 +17,9 @@ class Recorder {
  public:
   struct Options {
     std::filesystem::path folder;
-    bool force = false;       ///< replace what is there
-    bool figures = true;      ///< draw with gnuplot where it is installed
-    std::string command;      ///< of the program, for timing.json
+    bool force = false;   ///< replace what is there
+    bool figures = true;  ///< draw with gnuplot where it is installed
+    std::string command;  ///< of the program, for timing.json
   };
   /// Creates the temporary folder. Errors: kCannotCreate where `folder` exists without `force`.
   Recorder(const Options& options, const Config& config, const PluginHost& host);

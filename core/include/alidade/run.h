@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <filesystem>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
@@ -32,8 +32,8 @@ struct Contestant {
 struct Segment {
   std::string name;
   int stream = -1;
-  bool with = true;     ///< stamps with one, or stamps without
-  SensorModel sensor;   ///< decides validity
+  bool with = true;    ///< stamps with one, or stamps without
+  SensorModel sensor;  ///< decides validity
 };
 
 /// All that a config describes, made and checked, ready to run.
@@ -56,9 +56,9 @@ const char* ToString(RunStatus status);
 /// What became of one estimator.
 struct ContestantResult {
   std::string name;
-  std::map<std::string, double> metrics;           ///< as in docs/run_folder.md
-  std::map<std::string, std::int64_t> counts;      ///< `accepted:stereo`
-  std::map<std::string, std::string> units;        ///< of blocks, {"target.depth", "m"}; may lack some
+  std::map<std::string, double> metrics;       ///< as in docs/run_folder.md
+  std::map<std::string, std::int64_t> counts;  ///< `accepted:stereo`
+  std::map<std::string, std::string> units;    ///< of blocks, {"target.depth", "m"}; may lack some
   bool diverged = false;
   std::vector<Event> events;
   std::vector<std::vector<std::string>> unobservable;
@@ -75,9 +75,9 @@ struct RunResult {
 class Recorder;
 
 struct RunOptions {
-  Recorder* recorder = nullptr;                          ///< null: nothing is written
+  Recorder* recorder = nullptr;                              ///< null: nothing is written
   std::function<void(std::int64_t, std::int64_t)> progress;  ///< frames done, frames in all or -1
-  std::function<bool()> stop;                            ///< true: finish the frame and stop
+  std::function<bool()> stop;                                ///< true: finish the frame and stop
 };
 
 /// Runs all estimators over the source, frame by frame, so that all see the same data. Data errors

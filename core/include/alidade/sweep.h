@@ -16,7 +16,7 @@ namespace alidade {
 struct SweepOptions {
   std::int64_t runs = 1;  ///< of all shards together; their seeds count up from first_seed
   std::uint64_t first_seed = 1;
-  int jobs = 0;              ///< threads; 0: as many as the processor has
+  int jobs = 0;               ///< threads; 0: as many as the processor has
   int shard = 1, shards = 1;  ///< which of the equal shares of the seeds, in order
   std::function<void(std::int64_t, std::int64_t)> progress;  ///< runs done, runs in all
   std::function<bool()> stop;                                ///< true: drop unfinished runs

@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/config.h"
+#include "support/program.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::Arguments;
+using testing::Contains;
+using testing::Outcome;
+using Cli = testing::ProgramTest;
+
+TEST_F(Cli, HelpNamesEveryCommandAndExitsWithZero) {
+  const Outcome help = Call({"--help"});
+  EXPECT_EQ(help.code, 0);
+  EXPECT_EQ(help.err, "");
+  for (const char* command : {"run", "explain", "sweep", "plugins", "doctor"}) {
+    EXPECT_TRUE(Contains(help.out, std::string("\n  ") + command + ' ')) << command;
+    const Outcome one = Call({command, "--help"});
+    EXPECT_EQ(one.code, 0) << command;
+    EXPECT_TRUE(Contains(one.out, "Usage: alidade " + std::string(command))) << one.out;
+    EXPECT_TRUE(Contains(one.out, "--help")) << one.out;
+  }
+}
+
+TEST_F(Cli, UsageErrorsExitWithTwoAndHelp) {
+  const Outcome mistyped = Call({"rnu"});
+  EXPECT_EQ(mistyped.code, 2);
+  EXPECT_TRUE(mistyped.err.starts_with("error: no command 'rnu'; did you mean 'run'?\n"));
+  EXPECT_TRUE(Contains(mistyped.err, "Usage: alidade"));
+  EXPECT_EQ(mistyped.out, "");
+
+  EXPECT_TRUE(Call({}).err.starts_with("error: no command\n"));
+  EXPECT_TRUE(Call({"run", "config.yaml", "--forec"})
+                  .err.starts_with("error: no option '--forec'; did you mean '--force'?\n"));
+  for (const Arguments& bad :
+       {Arguments{}, {"run"}, {"run", "a", "b"}, {"run", "a", "--set", "no_value"},
+        {"run", "a", "--seed", "-1"}, {"plugins"}, {"plugins", "lst"}, {"sweep", "a"},
+        {"sweep", "a", "--runs", "0"}, {"sweep", "a", "--runs", "4", "--shard", "5/4"}}) {
+    const Outcome outcome = Call(bad);
+    EXPECT_EQ(outcome.code, 2) << outcome.err;
+    EXPECT_TRUE(outcome.err.starts_with("error: ")) << outcome.err;
+    EXPECT_TRUE(Contains(outcome.err, "Usage: alidade")) << outcome.err;
+  }
+}
+
+TEST_F(Cli, VersionIsOneLine) {
+  const Outcome version = Call({"--version"});
+  EXPECT_EQ(version.code, 0);
+  EXPECT_EQ(version.out, "alidade 0.1.0\n");
+}
+
+TEST_F(Cli, RunPrintsTheComparisonAndWhereItWrote) {
+  const Outcome run = Call({"run", "config.yaml", "--no-figures"});
+  EXPECT_EQ(run.code, 0) << run.err;
+  EXPECT_TRUE(Contains(run.out, "rmse target.depth [mm]")) << run.out;
+  EXPECT_TRUE(Contains(run.out, "wrote runs/config\n")) << run.out;
+  // No terminal: no progress, no colour.
+  EXPECT_EQ(run.err, "");
+  EXPECT_EQ(Json("runs/config/run.json").root().At("status").Text(), "ok");
+  EXPECT_EQ(Call({"run", "config.yaml", "--force", "--quiet", "--no-figures"}).out, "");
+}
+
+TEST_F(Cli, SetAndSeedReplaceKeysOfTheConfig) {
+  const auto rmse = [&](const Arguments& more) {
+    Arguments all = {"run", "config.yaml", "-o", "out", "--force", "--no-figures"};
+    all.insert(all.end(), more.begin(), more.end());
+    EXPECT_EQ(Call(all).code, 0);
+    const Config record = Json("out/run.json");
+    const Node metrics = record.root().At("estimators").At("ekf").At("metrics");
+    return metrics.At("rmse:target.depth").Number();
+  };
+  const double base = rmse({});
+  EXPECT_EQ(rmse({"--seed", "1"}), base);
+  EXPECT_NE(rmse({"--seed", "2"}), base);
+  EXPECT_EQ(rmse({"--set", "source.seed=2"}), rmse({"--seed", "2"}));
+  // Without noise the depth is better.
+  EXPECT_LT(rmse({"--set", "source.disparity_sigma_px=0", "--set=source.scale_sigma_px=0"}), base);
+  EXPECT_TRUE(Contains(Read("out/config.resolved.yaml"), "disparity_sigma_px: 0"));
+}
+
+TEST_F(Cli, OutputGoesWhereItIsNamed) {
+  fs::create_directory(folder_ / "05_depth");
+  Write("05_depth/config.yaml", testing::kDepthConfig);
+  EXPECT_EQ(Call({"run", "05_depth/config.yaml", "--no-figures"}).code, 0);
+  EXPECT_TRUE(Exists("runs/05_depth/run.json"));
+  const auto run_into = [&](const char* output, const Arguments& more) {
+    Arguments all = {"run", "config.yaml", "--no-figures", "--set", output};
+    all.insert(all.end(), more.begin(), more.end());
+    return Call(all).code;
+  };
+  EXPECT_EQ(run_into("output=own/name", {}), 0);
+  EXPECT_TRUE(Exists("runs/own/name/run.json"));
+  EXPECT_EQ(run_into("output=../out", {}), 77);
+  EXPECT_FALSE(Exists("out"));
+  EXPECT_EQ(run_into("output=../out", {"--allow-outside"}), 0);
+  EXPECT_TRUE(Exists("out/run.json"));
+  const Outcome again = Call({"run", "config.yaml", "-o", "out"});
+  EXPECT_EQ(again.code, 73);
+  EXPECT_TRUE(Contains(again.err, "--force")) << again.err;
+}
+
+TEST_F(Cli, ConfigErrorsHavePlaceAndRemedy) {
+  const Outcome range = Call({"run", "config.yaml", "--set", "sensors.stereo.focal_px=-1"});
+  EXPECT_EQ(range.code, 78);
+  EXPECT_TRUE(range.err.starts_with("error: --set sensors.stereo.focal_px: ")) << range.err;
+  Write("config.yaml", std::string("estimtors: {}\n") + testing::kDepthConfig);
+  const Outcome unknown = Call({"run", "config.yaml"});
+  EXPECT_EQ(unknown.code, 78);
+  EXPECT_TRUE(unknown.err.starts_with("error: config.yaml:1:1 estimtors: ")) << unknown.err;
+  EXPECT_TRUE(Contains(unknown.err, "did you mean 'estimators'?")) << unknown.err;
+  EXPECT_FALSE(Exists("runs"));
+
+  EXPECT_EQ(Call({"run", "missing.yaml"}).code, 66);
+  Write("table.csv", "t_s,d\n0,80\n");
+  const Outcome model = Call({"run", "table.yaml", "--set", "sensors.stereo.model=stereo_disparty"});
+  EXPECT_EQ(model.code, 69);
+  EXPECT_TRUE(Contains(model.err, "did you mean stereo_disparity?") ||
+              Contains(model.err, "did you mean 'stereo_disparity'?"))
+      << model.err;
+  EXPECT_TRUE(Contains(model.err, "\n  searched ")) << model.err;
+}
+
+TEST_F(Cli, UntrustedPluginIsRefusedWithSeventySeven) {
+  const fs::path plugin = folder_ / "alidade_constant.so";
+  fs::copy_file(ALIDADE_BINARY_DIR "/lib/alidade/plugins/alidade_constant.so", plugin);
+  fs::permissions(plugin, fs::perms::all);
+  const Outcome run = Call({"run", "config.yaml", "--plugin-path", "alidade_constant.so"});
+  EXPECT_EQ(run.code, 77) << run.err;
+  EXPECT_TRUE(Contains(run.err, plugin.string())) << run.err;
+  EXPECT_EQ(Call({"plugins", "list", "--plugin-path", plugin.string()}).code, 77);
+}
+
+TEST_F(Cli, BadDataEndsTheRunAndLeavesARecord) {
+  Write("table.csv", "t_s,d\n0,80\n0.1,81\n0.2,eighty\n");
+  const Outcome run = Call({"run", "table.yaml", "--no-figures"});
+  EXPECT_EQ(run.code, 65);
+  EXPECT_TRUE(Contains(run.err, "table.csv:4:5 d: 'eighty'")) << run.err;
+  const Config record = Json("runs/table/run.json");
+  EXPECT_EQ(record.root().At("status").Text(), "failed");
+  EXPECT_TRUE(Contains(record.root().At("reason").Text(), "eighty"));
+  EXPECT_TRUE(Contains(Read("runs/table/ekf/estimates.csv"), "\n0.1"));
+}
+
+TEST_F(Cli, DivergenceEndsTheRunWhereAsked) {
+  const Outcome reported = Call(Diverging({"run", "config.yaml", "--no-figures"}));
+  EXPECT_EQ(reported.code, 0);
+  EXPECT_TRUE(Contains(reported.out, "ekf: diverged")) << reported.out;
+  const Outcome failed = Call(Diverging({"run", "config.yaml", "--no-figures", "--force", "--set",
+                                         "estimators.ekf.on_divergence=fail"}));
+  EXPECT_EQ(failed.code, 79);
+  EXPECT_TRUE(Contains(failed.err, "error: estimator 'ekf' at t = ")) << failed.err;
+  EXPECT_EQ(Json("runs/config/run.json").root().At("status").Text(), "failed");
+}
+
+TEST_F(Cli, OutputThatCannotBeWrittenIsSeventyFour) {
+  const Outcome full = Call({"run", "config.yaml", "--no-figures"}, "/dev/full");
+  EXPECT_EQ(full.code, 74);
+  EXPECT_TRUE(Contains(full.err, "error: <stdout>: cannot write")) << full.err;
+  const Outcome closed = Call({"run", "config.yaml", "--no-figures", "--force"}, "");
+  EXPECT_EQ(closed.code, 74);
+  // No file of the run took the number of standard output.
+  EXPECT_EQ(Json("runs/config/run.json").root().At("status").Text(), "ok");
+  EXPECT_EQ(Call({"plugins", "list"}, "/dev/full").code, 74);
+  EXPECT_EQ(Call({"--version"}, "").code, 74);
+}
+
+/// A run fed by a pipe, and the test at its other end.
+class PipedRun : public testing::ProgramTest {
+ protected:
+  void SetUp() override {
+    ProgramTest::SetUp();
+    ASSERT_EQ(::mkfifo((folder_ / "table.csv").c_str(), 0600), 0);
+    pipe_ = ::open((folder_ / "table.csv").c_str(), O_RDWR | O_CLOEXEC);
+    Feed("t_s,d\n0,80\n0.1,81\n0.2,82\n");
+    run_ = Start({"run", "table.yaml", "--no-figures", "-o", "out"});
+    // It heeds signals before it opens the files of the estimator.
+    ASSERT_TRUE(Eventually([&] { return Exists(Partial() + "/ekf/estimates.csv"); }));
+  }
+  void TearDown() override {
+    ::close(pipe_);
+    ProgramTest::TearDown();
+  }
+  std::string Partial() const { return ".out.partial-" + std::to_string(run_); }
+  void Feed(const std::string& rows) const {
+    ASSERT_EQ(::write(pipe_, rows.data(), rows.size()), static_cast<ssize_t>(rows.size()));
+  }
+  int pipe_ = -1;
+  pid_t run_ = -1;
+};
+
+TEST_F(PipedRun, StopsAtASignalWithAllThatIsDone) {
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  ::kill(run_, SIGINT);
+  // A signal just before it waits for data is seen with the next row.
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  Feed("0.3,83\n");
+  const Outcome run = Wait(run_);
+  EXPECT_EQ(run.code, 75) << run.err;
+  const Config record = Json("out/run.json");
+  EXPECT_EQ(record.root().At("status").Text(), "stopped");
+  const Node counts = record.root().At("estimators").At("ekf").At("counts");
+  EXPECT_GE(counts.At("accepted:stereo").Number(), 3);
+  EXPECT_TRUE(Contains(Read("out/ekf/estimates.csv"), "\n0.2"));
+  EXPECT_FALSE(Exists(Partial()));
+}
+
+TEST_F(PipedRun, EndsAtOnceAtTheSecondSignal) {
+  ::kill(run_, SIGSTOP);
+  ::kill(run_, SIGTERM);
+  ::kill(run_, SIGINT);
+  ::kill(run_, SIGCONT);
+  const Outcome run = Wait(run_);
+  EXPECT_NE(run.signal, 0) << run.err;
+  EXPECT_FALSE(Exists("out"));
+}
+
+TEST_F(Cli, ExplainTellsWhatCannotBeObserved) {
+  const Outcome both = Call({"explain", "config.yaml"});
+  EXPECT_EQ(both.code, 0) << both.err;
+  EXPECT_FALSE(Contains(both.out, "cannot be observed")) << both.out;
+  for (const char* part : {"target.depth ", "0.3 +- 0.1", "constant_velocity", "scale_2d",
+                           "linearise_at", "corrects", "gate ", "joint"}) {
+    EXPECT_TRUE(Contains(both.out, part)) << part << '\n' << both.out;
+  }
+  const Outcome scale = Call({"explain", "config.yaml", "--set", "estimators.ekf.sensors=[scale]"});
+  EXPECT_TRUE(Contains(scale.out,
+                       "cannot be observed: target.depth together with target.depth_rate, "
+                       "template.inverse_distance (1 direction)"))
+      << scale.out;
+  const Outcome held = Call({"explain", "config.yaml", "--set",
+                             "sensors.scale.roles.inverse_distance={block: "
+                             "template.inverse_distance, mode: hold}"});
+  EXPECT_TRUE(Contains(held.out, "cannot be observed: template.inverse_distance (1 direction)"))
+      << held.out;
+  EXPECT_TRUE(Contains(held.out, "holds")) << held.out;
+}
+
+TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
+  const Outcome list = Call({"plugins", "list"});
+  EXPECT_EQ(list.code, 0);
+  for (const char* name : {"constant", "stereo_disparity", "depth_target", "alidade_csv.so"}) {
+    EXPECT_TRUE(Contains(list.out, name)) << list.out;
+  }
+  const Outcome info = Call({"plugins", "info", "stereo_disparity"});
+  EXPECT_EQ(info.code, 0);
+  for (const char* part : {"role depth: vector(1), m", "measurement disparity: vector(1), px",
+                           "focal_px", "required", "near_m", ">= 0", "[Ekf2017]"}) {
+    EXPECT_TRUE(Contains(info.out, part)) << part << '\n' << info.out;
+  }
+  const Outcome scale = Call({"plugins", "info", "scale_2d"});
+  EXPECT_TRUE(Contains(scale.out, "propagated | fixed")) << scale.out;
+  EXPECT_TRUE(Contains(scale.out, "noise = fixed")) << scale.out;
+
+  const Outcome missing = Call({"plugins", "info", "stereo_disparit"});
+  EXPECT_EQ(missing.code, 69);
+  EXPECT_TRUE(Contains(missing.err, "stereo_disparity")) << missing.err;
+  const Outcome where = Call({"plugins", "where"});
+  EXPECT_EQ(where.code, 0);
+  EXPECT_TRUE(Contains(where.out, "lib/alidade/plugins (beside the program)")) << where.out;
+}
+
+TEST_F(Cli, PluginsPrintsJson) {
+  // JSON is YAML too.
+  const auto parse = [](const std::string& json) {
+    return Config::FromText("list:\n  " + json, "json");
+  };
+  const Config info = parse(Call({"plugins", "info", "depth_target", "--json"}).out);
+  const Node entry = info.root().At("list").Items().at(0);
+  EXPECT_EQ(entry.At("kind").Text(), "source");
+  const std::vector<Node> parameters = entry.At("parameters").Items();
+  const auto depth = std::find_if(parameters.begin(), parameters.end(), [](const Node& node) {
+    return node.At("key").Text() == "depth_mean_m";
+  });
+  ASSERT_NE(depth, parameters.end());
+  EXPECT_EQ(depth->At("unit").Text(), "m");
+  EXPECT_EQ(depth->At("default").Text(), "0.3");
+  const Config list = parse(Call({"plugins", "list", "--json"}).out);
+  EXPECT_GE(list.root().At("list").Items().size(), 6u);
+}
+
+TEST_F(Cli, DoctorFindsThisBuildHealthy) {
+  const Outcome doctor = Call({"doctor"});
+  EXPECT_EQ(doctor.code, 0) << doctor.out;
+  EXPECT_FALSE(Contains(doctor.out, "\nfail")) << doctor.out;
+  EXPECT_TRUE(Contains(doctor.out, "ok    alidade 0.1.0\n")) << doctor.out;
+  EXPECT_TRUE(Contains(doctor.out, "yaml-cpp 0.")) << doctor.out;
+}
+
+}  // namespace
+}  // namespace alidade

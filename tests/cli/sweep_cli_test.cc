@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/config.h"
+#include "support/program.h"
+
+namespace alidade {
+namespace {
+
+using testing::Arguments;
+using testing::Contains;
+using testing::Outcome;
+using SweepCli = testing::ProgramTest;
+
+std::string Rows(const std::string& csv) { return csv.substr(csv.find('\n') + 1); }
+
+TEST_F(SweepCli, GivesTheSameBytesForAnyNumberOfJobs) {
+  const Outcome one = Call({"sweep", "config.yaml", "--runs", "12", "--jobs", "1", "-o", "one"});
+  EXPECT_EQ(one.code, 0) << one.err;
+  EXPECT_EQ(Call({"sweep", "config.yaml", "--runs", "12", "--jobs", "2", "-o", "two"}).code, 0);
+  for (const std::string name : {"sweep.json", "runs.csv", "table.md", "config.resolved.yaml"}) {
+    EXPECT_NE(Read("one/" + name), "") << name;
+    EXPECT_EQ(Read("one/" + name), Read("two/" + name)) << name;
+  }
+}
+
+TEST_F(SweepCli, SummarisesRunsThatRunWouldGive) {
+  const Outcome sweep =
+      Call({"sweep", "config.yaml", "--runs", "1", "--first-seed", "7", "-o", "sweep"});
+  EXPECT_EQ(sweep.code, 0) << sweep.err;
+  EXPECT_TRUE(Contains(sweep.out, "rmse target.depth [mm]")) << sweep.out;
+  EXPECT_TRUE(Contains(sweep.out, "cov95 target.depth [%]")) << sweep.out;
+  EXPECT_EQ(Call({"run", "config.yaml", "--seed", "7", "-o", "run", "--no-figures"}).code, 0);
+  const Config summary = Json("sweep/sweep.json"), record = Json("run/run.json");
+  EXPECT_EQ(summary.root().At("runs").Number(), 1);
+  EXPECT_EQ(summary.root().At("runs_used").Number(), 1);
+  EXPECT_EQ(summary.root().At("first_seed").Number(), 7);
+  const Node ekf = summary.root().At("estimators").At("ekf");
+  EXPECT_EQ(ekf.At("diverged").Number(), 0);
+  const Node metrics = record.root().At("estimators").At("ekf").At("metrics");
+  const double rmse = metrics.At("rmse:target.depth").Number();
+  for (const char* key : {"mean", "p05", "p50", "p95"}) {
+    EXPECT_EQ(ekf.At("metrics").At("rmse:target.depth").At(key).Number(), rmse) << key;
+  }
+}
+
+TEST_F(SweepCli, SharesMakeTheWhole) {
+  // Without a gate all shares count the same outcomes, so that they have the same columns.
+  const auto rows = [&](const std::string& folder, const std::string& shard) {
+    const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "5", "-o", folder, "--shard",
+                                shard, "--set", "estimators.ekf.gate=1"});
+    EXPECT_EQ(sweep.code, 0) << sweep.err;
+    return Rows(Read(folder + "/runs.csv"));
+  };
+  EXPECT_EQ(rows("a", "1/2") + rows("b", "2/2"), rows("whole", "1/1"));
+  EXPECT_EQ(Json("b/sweep.json").root().At("first_seed").Number(), 3);
+}
+
+TEST_F(SweepCli, CountsDivergedRunsAndLeavesTheirMetricsOut) {
+  const Outcome sweep = Call(Diverging({"sweep", "config.yaml", "--runs", "3", "-o", "out", "--set",
+                                        "estimators.ekf.on_divergence=fail"}));
+  EXPECT_EQ(sweep.code, 0) << sweep.err;
+  const Config summary = Json("out/sweep.json");
+  const Node ekf = summary.root().At("estimators").At("ekf");
+  EXPECT_EQ(ekf.At("diverged").Number(), 3);
+  EXPECT_TRUE(ekf.At("metrics").Entries().empty());
+  EXPECT_TRUE(Contains(Read("out/runs.csv"), "\n2,ekf,true,"));
+}
+
+TEST_F(SweepCli, ReportsFailedRunsWithTheirSeeds) {
+  Write("table.csv", "t_s,d\n0,80\n0.1,none\n");
+  const Outcome sweep = Call({"sweep", "table.yaml", "--runs", "2", "-o", "out"});
+  EXPECT_EQ(sweep.code, 1);
+  EXPECT_TRUE(Contains(sweep.err, "error: seed 2: ")) << sweep.err;
+  EXPECT_TRUE(Contains(sweep.err, "table.csv:3:5")) << sweep.err;
+  EXPECT_TRUE(Contains(Read("out/failures.csv"), "\n2,65,")) << Read("out/failures.csv");
+  EXPECT_EQ(Json("out/sweep.json").root().At("runs_used").Number(), 0);
+}
+
+TEST_F(SweepCli, ReplacesItsFolderOnlyByForce) {
+  EXPECT_EQ(Call({"sweep", "config.yaml", "--runs", "1"}).code, 0);
+  EXPECT_TRUE(Exists("runs/sweep-config/sweep.json"));
+  EXPECT_EQ(Call({"sweep", "config.yaml", "--runs", "1"}).code, 73);
+  EXPECT_EQ(Call({"sweep", "config.yaml", "--runs", "1", "--force"}).code, 0);
+}
+
+TEST_F(SweepCli, StopsAtASignalWithTheRunsThatAreComplete) {
+  const pid_t sweep =
+      Start({"sweep", "config.yaml", "--runs", "1000000", "--jobs", "2", "-o", "out"});
+  ASSERT_TRUE(Eventually([&] { return Exists(".out.partial-" + std::to_string(sweep)); }));
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  ::kill(sweep, SIGTERM);
+  const Outcome stopped = Wait(sweep);
+  EXPECT_EQ(stopped.code, 75) << stopped.err;
+  const Config summary = Json("out/sweep.json");
+  EXPECT_EQ(summary.root().At("runs").Number(), 1e6);
+  EXPECT_GT(summary.root().At("runs_used").Number(), 0);
+  EXPECT_TRUE(Contains(stopped.err, "stopped after ")) << stopped.err;
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "alidade/models.h"
+#include "support/numeric_jacobian.h"
+
+/// What the tests of models ask of them, through the C boundary.
+namespace alidade::testing {
+
+inline constexpr double kPoison = 1e302;
+inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+// Of numeric Jacobians: h^4 = 1e-12 times derivatives of order 1e2, and rounding / h = 1e-13.
+inline constexpr double kNumeric = 1e-9;
+
+/// Jacobians by all roles side by side, m x n.
+inline std::vector<double> Linearised(const SensorModel& sensor, const Blocks& roles) {
+  const int m = sensor.measurement().geometry.tangent, n = TangentSize(sensor.roles());
+  std::vector<double> z(sensor.measurement().geometry.ambient), j(m * n, kPoison);
+  std::vector<double*> blocks;
+  int column = 0;
+  for (const Space& role : sensor.roles()) {
+    blocks.push_back(j.data() + column);
+    column += role.geometry.tangent;
+  }
+  const std::vector<int> strides(blocks.size(), n);
+  EXPECT_EQ(sensor.Linearise(Pointers(roles).data(), z.data(), blocks.data(), strides.data()),
+            Status::kOk);
+  return j;
+}
+
+inline std::vector<double> NumericallyLinearised(const SensorModel& sensor, const Blocks& roles) {
+  const auto predict = [&](const Blocks& x) {
+    Blocks z = Filled({sensor.measurement()}, kPoison);
+    EXPECT_EQ(sensor.Predict(Pointers(x).data(), z[0].data()), Status::kOk);
+    return z;
+  };
+  return NumericJacobian(sensor.roles(), roles, {sensor.measurement()}, predict);
+}
+
+inline void ExpectSame(const std::vector<double>& a, const std::vector<double>& b,
+                       double relative) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_NEAR(a[i], b[i], relative * (1.0 + std::abs(b[i]))) << "entry " << i;
+  }
+}
+
+struct Stepped {
+  Blocks next;
+  std::vector<double> f, g;
+};
+
+inline Stepped Step(const MotionModel& motion, const Blocks& x, const double* u, const double* w,
+                    double dt_s) {
+  const int n = motion.tangent_size();
+  Stepped out{Filled(motion.blocks(), kPoison), std::vector<double>(n * n, kPoison),
+              std::vector<double>(n * motion.noise_size(), kPoison)};
+  EXPECT_EQ(motion.Step(Pointers(x).data(), u, w, dt_s, Pointers(out.next).data(), out.f.data(),
+                        out.g.data()),
+            Status::kOk);
+  return out;
+}
+
+/// Checks F and G of a step at noise w against numeric ones.
+inline void ExpectTrueJacobians(const MotionModel& motion, const Blocks& x, const double* u,
+                                const std::vector<double>& w, double dt_s) {
+  const auto value = [&](const Blocks& blocks, const std::vector<double>& noise) {
+    Blocks next = Filled(motion.blocks(), kPoison);
+    EXPECT_EQ(motion.Step(Pointers(blocks).data(), u, noise.data(), dt_s, Pointers(next).data(),
+                          nullptr, nullptr),
+              Status::kOk);
+    return next;
+  };
+  const Stepped out = Step(motion, x, u, w.data(), dt_s);
+  EXPECT_EQ(out.next, value(x, w)) << "the value is the same with and without Jacobians";
+  ExpectSame(out.f,
+             NumericJacobian(motion.blocks(), x, motion.blocks(),
+                             [&](const Blocks& blocks) { return value(blocks, w); }),
+             kNumeric);
+  Space noise;
+  noise.geometry = Geometry::Vector(motion.noise_size());
+  ExpectSame(out.g,
+             NumericJacobian({noise}, {w}, motion.blocks(),
+                             [&](const Blocks& blocks) { return value(x, blocks[0]); }),
+             kNumeric);
+}
+
+/// L L' of the process noise, n_w x n_w.
+inline std::vector<double> Covariance(const MotionModel& motion, const Blocks& x, double dt_s) {
+  const int n = motion.noise_size();
+  std::vector<double> l(n * n, kPoison), q(n * n);
+  EXPECT_EQ(motion.SqrtQ(Pointers(x).data(), dt_s, l.data()), Status::kOk);
+  for (int r = 0; r < n; ++r) {
+    for (int c = 0; c < n; ++c) {
+      for (int k = 0; k < n; ++k) q[r * n + c] += l[r * n + k] * l[c * n + k];
+    }
+  }
+  return q;
+}
+
+}  // namespace alidade::testing

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "alidade/config.h"
+
+namespace alidade::testing {
+
+namespace fs = std::filesystem;
+using Arguments = std::vector<std::string>;
+
+inline std::string ReadText(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+inline bool Contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+/// What a program that ended has left.
+struct Outcome {
+  int code = -1;    ///< exit code, -1 where a signal ended it
+  int signal = 0;   ///< that ended it
+  std::string out, err;
+};
+
+/// A target in depth, seen by a stereo pair and by its size.
+inline constexpr const char* kDepthConfig = R"(alidade: 1
+state:
+  target:
+    model: constant_velocity
+    blocks: {position: depth, velocity: depth_rate}
+    noise: {acceleration: 1.0}
+    initial: {depth: {mean: 0.3, sigma: 0.1}, depth_rate: {mean: 0, sigma: 0.5}}
+  template:
+    model: constant
+    blocks: {value: inverse_distance}
+    initial: {inverse_distance: {mean: 3.3, sigma: 0.5}}
+sensors:
+  stereo: {model: stereo_disparity, stream: disparity, roles: {depth: target.depth},
+           focal_px: 400, baseline_m: 0.065, sigma_px: 1.0}
+  scale:  {model: scale_2d, stream: inverse_scale, template_px: 300, sigma_px: 1.0,
+           roles: {depth: target.depth, inverse_distance: template.inverse_distance}}
+source: {type: depth_target, seed: 1}
+estimators: {ekf: {type: ekf, gate: 0.999}}
+reference: truth
+)";
+
+/// Stereo alone, on a table.
+inline constexpr const char* kTableConfig = R"(alidade: 1
+state:
+  target:
+    model: constant_velocity
+    blocks: {position: depth, velocity: depth_rate}
+    noise: {acceleration: 1.0}
+    initial: {depth: {mean: 0.3, sigma: 0.1}, depth_rate: {mean: 0, sigma: 0.5}}
+sensors:
+  stereo: {model: stereo_disparity, stream: disparity, roles: {depth: target.depth},
+           focal_px: 400, baseline_m: 0.065, sigma_px: 1.0}
+source: {type: csv, path: table.csv, streams: {disparity: d}}
+estimators: {ekf: {type: ekf}}
+)";
+
+/// The program of this build, run in a folder of its own that has `config.yaml` and `table.yaml`.
+class ProgramTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "alidade-cli-XXXXXX").string();
+    ASSERT_NE(::mkdtemp(name.data()), nullptr);
+    folder_ = name;
+    Write("config.yaml", kDepthConfig);
+    Write("table.yaml", kTableConfig);
+    ::unsetenv("ALIDADE_PLUGIN_PATH");
+    ::setenv("XDG_DATA_HOME", (folder_ / "data").c_str(), 1);
+  }
+  void TearDown() override {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  }
+
+  void Write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+  }
+  std::string Read(const std::string& name) const { return ReadText(folder_ / name); }
+  /// A JSON file whose top is an object; JSON is YAML too.
+  Config Json(const std::string& name) const { return Config::FromText(Read(name), name); }
+  bool Exists(const std::string& name) const { return fs::exists(folder_ / name); }
+
+  /// Starts `alidade ARGUMENTS...`, its output going to files; `out` "" closes standard output.
+  pid_t Start(Arguments arguments, const std::string& out = "stdout") const {
+    arguments.insert(arguments.begin(), ALIDADE_BINARY_DIR "/bin/alidade");
+    std::vector<char*> argv;
+    for (std::string& argument : arguments) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addchdir_np(&actions, folder_.c_str());
+    constexpr int kFlags = O_WRONLY | O_CREAT | O_TRUNC;
+    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "stderr", kFlags, 0600);
+    if (out.empty()) {
+      posix_spawn_file_actions_addclose(&actions, STDOUT_FILENO);
+    } else {
+      posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, out.c_str(), kFlags, 0600);
+    }
+    pid_t pid = -1;
+    const int error = ::posix_spawn(&pid, argv[0], &actions, nullptr, argv.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    EXPECT_EQ(error, 0) << "cannot start " << argv[0];
+    return pid;
+  }
+  Outcome Wait(pid_t pid) const {
+    int status = 0;
+    EXPECT_EQ(::waitpid(pid, &status, 0), pid);
+    Outcome outcome;
+    if (WIFEXITED(status)) outcome.code = WEXITSTATUS(status);
+    if (WIFSIGNALED(status)) outcome.signal = WTERMSIG(status);
+    outcome.out = Read("stdout");
+    outcome.err = Read("stderr");
+    return outcome;
+  }
+  Outcome Call(Arguments arguments, const std::string& out = "stdout") const {
+    return Wait(Start(std::move(arguments), out));
+  }
+
+  /// `arguments`, with 5 m/s towards the camera from 0.3 m away.
+  static Arguments Diverging(Arguments arguments) {
+    arguments.insert(arguments.end(),
+                     {"--set", "state.target.initial.depth_rate={mean: -5, sigma: 0}", "--set",
+                      "state.target.initial.depth={mean: 0.3, sigma: 0}"});
+    return arguments;
+  }
+
+  /// Waits until `condition` holds, at most 20 s.
+  template <class Condition>
+  static bool Eventually(const Condition& condition) {
+    for (int i = 0; i < 2000; ++i) {
+      if (condition()) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return false;
+  }
+
+  fs::path folder_;
+};
+
+}  // namespace alidade::testing

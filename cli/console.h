@@ -9,7 +9,8 @@
 namespace alidade::cli {
 
 /// Makes the three standard descriptors safe to use: one that is closed becomes one that fails, so
-/// that no file of ours takes its number. A write to a closed pipe is an error, not a signal.
+/// that no file of ours takes its number. A write to a closed pipe, or beyond the limit of a file,
+/// is an error, not a signal.
 void PrepareConsole();
 
 /// Writes to standard output, every byte checked. Error: kIo.

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <Eigen/Core>
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <system_error>
@@ -17,8 +17,9 @@ namespace alidade::cli {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr const char* kFooter = R"(Each line is ok, warn or fail, with a remedy where one is needed. The exit code is 1 where a line
-says fail, else 0.)";
+constexpr const char* kFooter =
+    R"(Each line is ok, warn or fail, with a remedy where one is needed. The exit code is 1 where a
+line says fail, else 0.)";
 
 /// The lines that the doctor says.
 class Diagnosis {

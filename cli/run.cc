@@ -3,6 +3,7 @@
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <memory>
@@ -109,8 +110,7 @@ RunResult RunOrFail(Experiment& experiment, const RunOptions& options) {
 ExitCode RunConfig(const Arguments& arguments) {
   Config config = arguments.input.Load();
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
-  const std::filesystem::path folder =
-      OutputFolder(arguments.folder, config, arguments.input);
+  const std::filesystem::path folder = OutputFolder(arguments.folder, config, arguments.input);
   const PluginHost host = arguments.input.Host(config);
   Experiment experiment = BuildExperiment(config, host);
   Recorder recorder({folder, arguments.force, !arguments.no_figures, "alidade run"}, config, host);
@@ -136,8 +136,9 @@ void AddRun(CLI::App& program, Action& action) {
   CLI::App& command = *program.add_subcommand("run", "Run the estimators of a config");
   const auto arguments = std::make_shared<Arguments>();
   arguments->input.AddTo(command);
-  command.add_option("-o,--output", arguments->folder,
-                     "run folder; default: the config's `output:`, or its folder's name, in runs/")
+  command
+      .add_option("-o,--output", arguments->folder,
+                  "run folder; default: the config's `output:`, or its folder's name, in runs/")
       ->option_text("DIR");
   command.add_option("--seed", arguments->seed, "seed of the source; overrides the config")
       ->option_text("N")
@@ -146,7 +147,8 @@ void AddRun(CLI::App& program, Action& action) {
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.add_flag("--no-figures", arguments->no_figures, "draw no figures");
   command.footer(kFooter);
-  command.callback([&action, arguments] { action = [arguments] { return RunConfig(*arguments); }; });
+  command.callback(
+      [&action, arguments] { action = [arguments] { return RunConfig(*arguments); }; });
 }
 
 }  // namespace alidade::cli

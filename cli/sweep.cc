@@ -69,9 +69,8 @@ ExitCode RunSweep(const Arguments& arguments) {
   }
   folder.Write(result, config);
   if (!arguments.quiet) {
-    Print(SweepTable(result) + "\nwrote " + path.string() + "\n  " +
-          (path / "table.md").string() + "\n  " + (path / "sweep.json").string() + "\n  " +
-          (path / "runs.csv").string() + '\n');
+    Print(SweepTable(result) + "\nwrote " + path.string() + "\n  " + (path / "table.md").string() +
+          "\n  " + (path / "sweep.json").string() + "\n  " + (path / "runs.csv").string() + '\n');
   }
   if (result.stopped) return ExitCode::kStopped;
   return failed ? ExitCode::kFound : ExitCode::kOk;
@@ -86,8 +85,9 @@ void AddSweep(CLI::App& program, Action& action) {
   command.add_option("--runs", arguments->options.runs, "number of runs, of all shards together")
       ->option_text("N")
       ->required()
-      ->check(CLI::Range(std::int64_t{1}, std::int64_t{10'000'000}));
-  command.add_option("--first-seed", arguments->options.first_seed, "seeds count up from S; default 1")
+      ->check(CLI::Range(std::int64_t{1}, std::int64_t{1'000'000}));
+  command
+      .add_option("--first-seed", arguments->options.first_seed, "seeds count up from S; default 1")
       ->option_text("S")
       ->check(CLI::Range(std::int64_t{0}, std::int64_t{1} << 62));
   command.add_option("--jobs", arguments->options.jobs, "threads; default: all processors")
@@ -96,8 +96,9 @@ void AddSweep(CLI::App& program, Action& action) {
   command.add_option("--shard", arguments->shard, "do share i of n of the seeds only")
       ->option_text("i/n")
       ->check(IsShard);
-  command.add_option("-o,--output", arguments->folder,
-                     "folder; default: the config's `output:`, or sweep-NAME, in runs/")
+  command
+      .add_option("-o,--output", arguments->folder,
+                  "folder; default: the config's `output:`, or sweep-NAME, in runs/")
       ->option_text("DIR");
   command.add_flag("--force", arguments->force, "replace the folder if it is there");
   command.add_flag("--quiet", arguments->quiet, "print errors only");

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <map>
+#include <utility>
 
 #include "alidade/ekf.h"
 #include "alidade/metrics.h"
@@ -222,16 +225,15 @@ std::string LockoutText(const EkfOptions& options) {
 std::string Options(const Node& entry, const Contestant& contestant) {
   const EkfOptions options = EkfOptions::FromNode(entry);
   const System& system = contestant.system;
-  std::vector<TextRow> rows = {{"gate", GateText(options, system)},
-                               {"fuse", FuseText(options.fuse, system)},
-                               {"lockout", LockoutText(options)},
-                               {"max_dt_s", std::isfinite(options.max_dt_s)
-                                                ? NumberText(options.max_dt_s)
-                                                : "none: a gap is one step"},
-                               {"on_divergence",
-                                contestant.on_divergence == OnDivergence::kFail
-                                    ? "fail: the run ends with exit code 79"
-                                    : "report: the run goes on"}};
+  std::vector<TextRow> rows = {
+      {"gate", GateText(options, system)},
+      {"fuse", FuseText(options.fuse, system)},
+      {"lockout", LockoutText(options)},
+      {"max_dt_s",
+       std::isfinite(options.max_dt_s) ? NumberText(options.max_dt_s) : "none: a gap is one step"},
+      {"on_divergence", contestant.on_divergence == OnDivergence::kFail
+                            ? "fail: the run ends with exit code 79"
+                            : "report: the run goes on"}};
   if (system.start_s) rows.push_back({"start_s", NumberText(*system.start_s)});
   return TextTable(rows, kIndent);
 }

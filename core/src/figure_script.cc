@@ -2,6 +2,7 @@
 #include "figure_script.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <numeric>
 
 #include "number_text.h"
@@ -9,13 +10,14 @@
 namespace alidade::internal {
 namespace {
 
-constexpr std::int64_t kMaxRows = 5000;
+constexpr std::int64_t kMaxRows = 5000;     // of which all are drawn
+constexpr std::int64_t kEnoughRows = 2500;  // of a longer file
 
 /// Every n-th row is enough; n shares no divisor with the number of kinds that take turns.
 std::int64_t Stride(const FigureFile& file) {
-  std::int64_t stride = (file.rows + kMaxRows - 1) / kMaxRows;
+  std::int64_t stride = file.rows > kMaxRows ? file.rows / kEnoughRows : 1;
   while (stride > 1 && std::gcd(stride, std::int64_t{file.kinds}) > 1) ++stride;
-  return std::max<std::int64_t>(stride, 1);
+  return stride;
 }
 
 constexpr const char* kSettings = R"(
@@ -26,7 +28,7 @@ set samples 2
 set border 3 lc rgb '#555555'
 set tics nomirror textcolor rgb '#333333'
 set grid lc rgb '#e4e4e4' lt 1
-set key at graph 1.01, graph 1.05 left top Left reverse samplen 2 noenhanced
+set key at graph 1.01, graph 1.08 left top Left reverse samplen 2 maxrows 12 font ',11' noenhanced
 set lmargin 11
 set rmargin 30
 set tmargin 2
@@ -50,7 +52,8 @@ set style line 17 pt 8 ps 0.6 lc rgb '#c03030'
 max(a, b) = a > b ? a : b
 min(a, b) = a < b ? a : b
 # What a range is widened by at each end; never zero.
-margin(low, high) = max(0.08 * (high - low), 1e-6 * max(abs(low), abs(high)) + 1e-12)
+margin(low, high) = high > low ? max(0.08 * (high - low), 1e-6 * max(abs(low), abs(high))) : \
+                    low == 0 ? 1 : 0.1 * abs(low)
 # A line through those rows of a file that are `mine`, broken where none comes for a time: along()
 # is its x, level() its y.
 along(mine, t) = (row = mine, jump = mine && t - px > gap, px = mine ? t : px)
@@ -73,11 +76,11 @@ std::string InBrackets(std::string_view unit) {
 }
 
 FigureScript::FigureScript(std::string name, std::string title, Stamp first, Stamp last)
-    : name_(std::move(name)), title_(std::move(title)) {
-  AppendSeconds(first_, first);
-  AppendSeconds(last_, last);
-  span_s_ = Seconds(last - first);
-}
+    : name_(std::move(name)),
+      title_(std::move(title)),
+      first_(first),
+      last_(last),
+      span_s_(Seconds(last - first)) {}
 
 void FigureScript::EndPanel() {
   if (!plot_.empty()) body_ += "plot " + plot_ + "\n";
@@ -111,7 +114,7 @@ void FigureScript::LineOf(const FigureFile& file, std::string_view mine, std::st
   if (!plot_.empty()) plot_ += ", \\\n     ";
   plot_ += "gap = " + NumberText(std::max(4.0 * step_s, 0.02 * span_s_)) + ", px = py = NaN";
   std::string how = "(along(";
-  how.append(mine).append(", $1)):(level(").append(value).append(")) with lines ls ");
+  how.append(mine).append(", $1-t0)):(level(").append(value).append(")) with lines ls ");
   Curve(file, how + std::to_string(style), key);
 }
 
@@ -134,9 +137,17 @@ std::string FigureScript::Text() const {
   text += "set output png ? 'figures/" + name_ + ".png' : 'figures/" + name_ + ".svg'\n";
   text += "set multiplot layout " + std::to_string(panels_) + ",1 title " + GnuplotQuoted(title_) +
           " noenhanced\n";
-  if (span_s_ > 0.0) text += "set xrange [" + first_ + ':' + last_ + "]\n";
+  // Stamps that count from 1970 would leave no room for what differs.
+  const Stamp second = 1'000'000'000;
+  const Stamp origin = std::abs(first_ / second) > 100'000 ? first_ / second : 0;
+  std::string first, last;
+  AppendSeconds(first, first_ - origin * second);
+  AppendSeconds(last, last_ - origin * second);
+  text += "t0 = " + std::to_string(origin) + ".0\n";
+  if (span_s_ > 0.0) text += "set xrange [" + first + ':' + last + "]\n";
   text += body_;
-  text += "set xlabel 't [s]' offset 0,0.8\nset bmargin 2.6\n";
+  text += "set xlabel 't" + (origin == 0 ? "" : " - " + std::to_string(origin)) +
+          " [s]' offset 0,0.5\nset bmargin 2.9\n";
   if (!plot_.empty()) text += "plot " + plot_ + "\n";
   return text + "\nunset multiplot\nset output\n";
 }

@@ -22,6 +22,9 @@ struct FigureFile {
 /// written to be read and changed.
 class FigureScript {
  public:
+  /// The x of every curve.
+  static constexpr const char* kTime = "($1-t0):";
+
   /// All panels show the time from `first` to `last`.
   FigureScript(std::string name, std::string title, Stamp first, Stamp last);
 
@@ -47,8 +50,9 @@ class FigureScript {
  private:
   void EndPanel();
 
-  std::string name_, title_, first_, last_, body_, plot_;
-  double span_s_ = 0.0;
+  std::string name_, title_, body_, plot_;
+  Stamp first_, last_;
+  double span_s_;
   int panels_ = 0;
 };
 

@@ -18,8 +18,10 @@ std::string Is(int column, std::string_view text) {
   return "strcol(" + std::to_string(column) + ") eq " + GnuplotQuoted(text);
 }
 
+std::string OverTime(const std::string& y) { return FigureScript::kTime + y; }
+
 std::string Line(int column, int style) {
-  return "1:" + std::to_string(column) + " with lines ls " + std::to_string(style);
+  return OverTime(std::to_string(column)) + " with lines ls " + std::to_string(style);
 }
 
 /// `value` where the condition holds, else nothing.
@@ -72,8 +74,8 @@ FigureScript StateFigure(const RecordedRun& run, const RecordedEstimator& estima
     const std::string value = Column(element.value), sigma = Column(element.sigma);
     if (element.is_random) {
       script.Curve(Estimates(estimator),
-                   "1:(" + value + "-3*" + sigma + "):(" + value + "+3*" + sigma +
-                       ") with filledcurves ls 1",
+                   OverTime("(" + value + "-3*" + sigma + "):(" + value + "+3*" + sigma + ")") +
+                       " with filledcurves ls 1",
                    "+-3 sigma");
     }
     script.Curve(Estimates(estimator), Line(element.value, 1), "estimate");
@@ -100,7 +102,7 @@ FigureScript CovarianceFigure(const RecordedRun& run, const RecordedEstimator& e
     }
     const std::string sigma = Column(element.sigma);
     script.Curve(Estimates(estimator),
-                 "1:" + Where(sigma + " > 0", sigma + "**2") + " with lines ls " +
+                 OverTime(Where(sigma + " > 0", sigma + "**2")) + " with lines ls " +
                      std::to_string(EstimatorStyle(curves++)),
                  element.name + " " + InBrackets(Squared(element.unit)));
   }
@@ -147,7 +149,7 @@ void InnovationPanel(FigureScript& script, const RecordedEstimator& estimator,
   script.LineOf(file, mine, "-3 * " + s, 12, "");
   const auto points = [&](const std::string& condition, const std::string& value,
                           const std::string& style, const char* key) {
-    script.Curve(file, "1:" + Where(mine + " && " + condition, value) + " with points " + style,
+    script.Curve(file, OverTime(Where(mine + " && " + condition, value)) + " with points " + style,
                  key);
   };
   points("strcol(5) eq 'accepted'", r, "ls 14", "accepted");
@@ -191,7 +193,7 @@ void ImpliedPanel(FigureScript& script, const RecordedRun& run, const RecordedIm
   for (const RecordedImplied& one : run.implied) {
     if (one.block != implied.block || one.rows == 0) continue;
     script.Curve({"implied.csv", run.implied_rows, Kinds(run.implied.size())},
-                 "1:" + Where(Is(2, one.sensor), Column(one.column)) + " with points ls " +
+                 OverTime(Where(Is(2, one.sensor), Column(one.column))) + " with points ls " +
                      std::to_string(style),
                  "measured: " + one.sensor);
     style = style == 15 ? 13 : style + 1;
@@ -229,7 +231,7 @@ void StreamPanel(FigureScript& script, const RecordedRun& run, const RecordedStr
   script.Set("high = min(M_max, M_up_quartile + 3 * (M_up_quartile - M_lo_quartile))");
   script.Set("set yrange [low - margin(low, high) : high + margin(low, high)]");
   script.Curve({"measurements.csv", run.measurement_rows, Kinds(run.streams.size())},
-               "1:" + value + " with points ls 13", "measured");
+               OverTime(value) + " with points ls 13", "measured");
   if (estimator == nullptr) return;
   script.LineOf(Innovations(*estimator), Is(3, sensor->name), Column(estimator->h_column(element)),
                 1, "predicted: " + estimator->name);

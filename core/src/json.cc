@@ -9,7 +9,7 @@
 namespace alidade::internal {
 namespace {
 
-/// Bytes of the UTF-8 sequence at the front of `text`, 0 where there is none. [RFC 3629]
+/// Bytes of the UTF-8 sequence at the front of `text`, 0 where there is none. (RFC 3629)
 std::size_t Utf8Length(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned char lead = byte(0);

@@ -56,7 +56,7 @@ struct Series {
     }
     last = stamp;
     truth.push_back(true_value);
-    estimate.push_back(true_value + error);
+    estimate.push_back(true_value - error);
   }
   double step_ms() const {
     return 1e-6 * static_cast<double>(last - first) / static_cast<double>(truth.size() - 1);
@@ -158,7 +158,8 @@ void Metrics::Impl::AddErrors(const Frame& frame, const std::vector<Sums*>& into
         place.present && block.truth < frame.truth.size() && !frame.truth[block.truth].empty();
     if (!block.known) continue;
     const double* truth = frame.truth[block.truth].data();
-    place.geometry().Minus(state.value(block.id), truth, block.error.data());
+    // In the tangent at the estimate, where P is.
+    place.geometry().Minus(truth, state.value(block.id), block.error.data());
     const double square = block.error.allFinite() ? block.error.squaredNorm() : kInfinity;
     block.last_error = std::sqrt(square);
     for (Sums* s : into) s->squares[i].Add(square);

@@ -32,17 +32,17 @@ std::vector<const PluginEntry*> Named(const PluginHost& host, const std::string&
   for (const PluginEntry* entry : entries) names.push_back(entry->name);
   std::erase_if(entries, [&](const PluginEntry* entry) { return entry->name != name; });
   if (entries.empty()) {
-    throw Error(ExitCode::kPlugin, ErrorLine({}, {}, "no plugin offers '" + name + "'",
-                                             "a name that `alidade plugins list` prints",
-                                             Nearest(name, names)) +
-                                       "\n" + PluginPlaces(host));
+    throw Error(ExitCode::kPlugin,
+                ErrorLine({}, {}, "no plugin offers '" + name + "'",
+                          "a name that `alidade plugins list` prints", Nearest(name, names)) +
+                    "\n" + PluginPlaces(host));
   }
   return entries;
 }
 
 std::string Parameters(const std::vector<ParamInfo>& schema) {
-  std::vector<TextRow> rows = {{"parameter", "unit", "type", "range", "default", "only where",
-                                "meaning"}};
+  std::vector<TextRow> rows = {
+      {"parameter", "unit", "type", "range", "default", "only where", "meaning"}};
   for (const ParamInfo& info : schema) {
     // The keys that a source lists itself have no type.
     const std::string fallback =

@@ -120,11 +120,9 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
   try {
     RunFrames(experiment, lanes, options, result);
   } catch (const Error& error) {
-    // Bad data half-way, or a signal while waiting for data: what was done so far is kept.
-    const bool stopped = error.code() == ExitCode::kStopped;
-    if (!stopped && error.code() != ExitCode::kBadData) throw;
+    // What was done so far is kept.
     Fail(result, error.code(), error.what());
-    if (stopped) result.status = RunStatus::kStopped;
+    if (error.code() == ExitCode::kStopped) result.status = RunStatus::kStopped;
   }
   for (Lane& lane : lanes) {
     lane.result.metrics = lane.metrics.Finish();

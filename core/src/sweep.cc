@@ -5,7 +5,6 @@
 #include <atomic>
 #include <cmath>
 #include <mutex>
-#include <optional>
 #include <thread>
 
 namespace alidade {
@@ -16,30 +15,26 @@ class Queue {
  public:
   Queue(const Config& config, const PluginHost& host, const SweepOptions& options,
         std::uint64_t first_seed, std::int64_t runs)
-      : config_(config), host_(host), options_(options), first_seed_(first_seed),
-        done_(static_cast<std::size_t>(runs)) {}
+      : config_(config), host_(host), options_(options), first_seed_(first_seed), runs_(runs) {}
 
   /// Takes runs until there are none left.
   void Work() {
     while (!Stopped()) {
-      const std::size_t index = next_++;
-      if (index >= done_.size()) return;
-      SweepRun run = RunSeed(first_seed_ + index);
+      const std::int64_t index = next_++;
+      if (index >= runs_) return;
+      SweepRun run = RunSeed(first_seed_ + static_cast<std::uint64_t>(index));
       if (run.status == RunStatus::kStopped) return;
       const std::lock_guard lock(mutex_);
-      done_[index] = std::move(run);
-      ++count_;
-      if (options_.progress) options_.progress(count_, static_cast<std::int64_t>(done_.size()));
+      done_.push_back(std::move(run));
+      if (options_.progress) options_.progress(static_cast<std::int64_t>(done_.size()), runs_);
     }
   }
 
   /// The finished ones, by seed.
   std::vector<SweepRun> Take() {
-    std::vector<SweepRun> runs;
-    for (auto& run : done_) {
-      if (run) runs.push_back(std::move(*run));
-    }
-    return runs;
+    std::sort(done_.begin(), done_.end(),
+              [](const SweepRun& a, const SweepRun& b) { return a.seed < b.seed; });
+    return std::move(done_);
   }
 
  private:
@@ -88,10 +83,10 @@ class Queue {
   const PluginHost& host_;
   const SweepOptions& options_;
   const std::uint64_t first_seed_;
-  std::atomic<std::size_t> next_{0};
+  const std::int64_t runs_;
+  std::atomic<std::int64_t> next_{0};
   std::mutex mutex_;
-  std::vector<std::optional<SweepRun>> done_;
-  std::int64_t count_ = 0;
+  std::vector<SweepRun> done_;
 };
 
 Spread SpreadOf(std::vector<double> values) {
@@ -112,8 +107,9 @@ SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptio
   for (const Contestant& contestant : BuildExperiment(config, host).contestants) {
     result.estimators.push_back(contestant.name);
   }
-  const auto share = [&](int i) { return options.runs / options.shards * i +
-                                         options.runs % options.shards * i / options.shards; };
+  const auto share = [&](int i) {
+    return options.runs / options.shards * i + options.runs % options.shards * i / options.shards;
+  };
   const std::int64_t first = share(options.shard - 1);
   result.runs = share(options.shard) - first;
   result.first_seed = options.first_seed + static_cast<std::uint64_t>(first);

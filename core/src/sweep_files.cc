@@ -55,9 +55,8 @@ std::vector<TextRow> TableRows(const std::vector<SweepSummary>& summaries) {
 }
 
 std::string Markdown(const SweepResult& result) {
-  const auto whole = std::count_if(result.done.begin(), result.done.end(), [](const auto& run) {
-    return run.status == RunStatus::kOk;
-  });
+  const auto whole = std::count_if(result.done.begin(), result.done.end(),
+                                   [](const auto& run) { return run.status == RunStatus::kOk; });
   std::string text = std::to_string(whole) + " of " + std::to_string(result.runs) +
                      " runs, seeds from " + std::to_string(result.first_seed) +
                      ". Mean [5 %, 50 %, 95 % quantile] over the runs that did not diverge.\n\n";
@@ -72,9 +71,8 @@ std::string Markdown(const SweepResult& result) {
 }
 
 std::string SweepJson(const SweepResult& result) {
-  const auto whole = std::count_if(result.done.begin(), result.done.end(), [](const auto& run) {
-    return run.status == RunStatus::kOk;
-  });
+  const auto whole = std::count_if(result.done.begin(), result.done.end(),
+                                   [](const auto& run) { return run.status == RunStatus::kOk; });
   Json json;
   json.Object();
   json.Key("runs").Integer(result.runs);
@@ -164,14 +162,15 @@ std::string SweepTable(const SweepResult& result) {
     for (std::size_t c = 1; c < row.size(); ++c) cell = std::max(cell, row[c].size() + 2);
   }
   // Estimators that do not fit beside the others go into a table below.
-  const std::size_t fit =
-      std::max<std::size_t>(1, (kLineWidth - std::min(label, kLineWidth)) / std::max<std::size_t>(1, cell));
+  const std::size_t fit = std::max<std::size_t>(
+      1, (kLineWidth - std::min(label, kLineWidth)) / std::max<std::size_t>(1, cell));
   std::string text;
   for (std::size_t first = 1; first < rows[0].size(); first += fit) {
     std::vector<TextRow> part;
     for (const TextRow& row : rows) {
       TextRow& some = part.emplace_back(TextRow{row[0]});
-      for (std::size_t c = first; c < std::min(first + fit, row.size()); ++c) some.push_back(row[c]);
+      for (std::size_t c = first; c < std::min(first + fit, row.size()); ++c)
+        some.push_back(row[c]);
     }
     text.append(first > 1 ? "\n" : "").append(internal::TextTable(part));
   }

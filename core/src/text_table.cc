@@ -31,7 +31,8 @@ std::string TextTable(const std::vector<TextRow>& rows, std::size_t indent) {
 
 std::string Join(const std::vector<std::string>& parts, const char* separator) {
   std::string text;
-  for (std::size_t i = 0; i < parts.size(); ++i) text.append(i > 0 ? separator : "").append(parts[i]);
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    text.append(i > 0 ? separator : "").append(parts[i]);
   return text;
 }
 

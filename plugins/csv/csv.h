@@ -3,6 +3,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -34,7 +35,7 @@ class CsvSource : public Source {
     for (const CsvField& field : layout_.streams) streams_.push_back(field.info);
     for (const CsvField& field : layout_.truths) truths_.push_back(field.info);
     ReadHeader();
-    if (layout_.blind_after_node) CountRows();
+    if (layout_.blind_after < 1.0) CountRows();
   }
 
   const std::vector<StreamInfo>& streams() const override { return streams_; }
@@ -250,7 +251,7 @@ class CsvSource : public Source {
   std::vector<StreamInfo> streams_, truths_;
   std::vector<std::string> names_;
   int header_line_ = 0;
-  std::int64_t size_ = -1, first_blind_row_ = 0;
+  std::int64_t size_ = -1, first_blind_row_ = INT64_MAX;
 
   std::string_view line_;
   std::vector<std::string_view> cells_;

@@ -34,10 +34,16 @@ TEST_F(Cli, UsageErrorsExitWithTwoAndHelp) {
   EXPECT_TRUE(Call({}).err.starts_with("error: no command\n"));
   EXPECT_TRUE(Call({"run", "config.yaml", "--forec"})
                   .err.starts_with("error: no option '--forec'; did you mean '--force'?\n"));
-  for (const Arguments& bad :
-       {Arguments{}, {"run"}, {"run", "a", "b"}, {"run", "a", "--set", "no_value"},
-        {"run", "a", "--seed", "-1"}, {"plugins"}, {"plugins", "lst"}, {"sweep", "a"},
-        {"sweep", "a", "--runs", "0"}, {"sweep", "a", "--runs", "4", "--shard", "5/4"}}) {
+  for (const Arguments& bad : {Arguments{},
+                               {"run"},
+                               {"run", "a", "b"},
+                               {"run", "a", "--set", "no_value"},
+                               {"run", "a", "--seed", "-1"},
+                               {"plugins"},
+                               {"plugins", "lst"},
+                               {"sweep", "a"},
+                               {"sweep", "a", "--runs", "0"},
+                               {"sweep", "a", "--runs", "4", "--shard", "5/4"}}) {
     const Outcome outcome = Call(bad);
     EXPECT_EQ(outcome.code, 2) << outcome.err;
     EXPECT_TRUE(outcome.err.starts_with("error: ")) << outcome.err;
@@ -114,7 +120,8 @@ TEST_F(Cli, ConfigErrorsHavePlaceAndRemedy) {
 
   EXPECT_EQ(Call({"run", "missing.yaml"}).code, 66);
   Write("table.csv", "t_s,d\n0,80\n");
-  const Outcome model = Call({"run", "table.yaml", "--set", "sensors.stereo.model=stereo_disparty"});
+  const Outcome model =
+      Call({"run", "table.yaml", "--set", "sensors.stereo.model=stereo_disparty"});
   EXPECT_EQ(model.code, 69);
   EXPECT_TRUE(Contains(model.err, "did you mean stereo_disparity?") ||
               Contains(model.err, "did you mean 'stereo_disparity'?"))

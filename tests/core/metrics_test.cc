@@ -94,7 +94,7 @@ MetricsOf OneScalar(int segments = 0) {
   return one;
 }
 
-// Tables of chi-square, e.g. [Abramowitz1964] table 26.8.
+// Quantiles that tables of chi-square give.
 TEST(ChiSquareQuantile, AgreesWithTables) {
   EXPECT_NEAR(ChiSquareQuantile(0.95, 1), 3.841458820694124, 1e-12);
   EXPECT_NEAR(ChiSquareQuantile(0.95, 2), 5.991464547107979, 1e-12);
@@ -176,6 +176,19 @@ TEST(Metrics, TakesErrorsOnTheManifold) {
   EXPECT_NEAR(metrics.at("rmse:a.heading"), 0.05, 1e-12);
   EXPECT_NEAR(metrics.at("rmse:a.attitude"), 0.2, 1e-12);
   EXPECT_NEAR(metrics.at("nees.mean:a"), (0.05 * 0.05 + 0.2 * 0.2) / 4.0, 1e-12);
+}
+
+TEST(Metrics, TakesTheErrorWhereTheCovarianceIs) {
+  // The basis of the tangent turns from point to point: e must be in the one at the estimate.
+  StateLayout layout;
+  layout.Declare("a.bearing", "a", SpaceOf("bearing", "", Geometry::UnitVector()));
+  MetricsOf one(layout, {{"bearing", 3}});
+  const double estimate[3] = {0.48, 0.6, 0.64}, error[2] = {0.3, 0.0};
+  double truth[3];
+  Geometry::UnitVector().Plus(estimate, error, truth);
+  one.state().Add(0, estimate, Eigen::Vector2d(0.09, 1e-6).asDiagonal());
+  one.Add({{truth[0], truth[1], truth[2]}});
+  EXPECT_NEAR(one.Finish().at("nees.mean:a"), 0.5, 1e-9);
 }
 
 /// Blocks for which a metric appears where every truth is 1 and every state 0.

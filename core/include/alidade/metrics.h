@@ -13,16 +13,16 @@ namespace alidade {
 
 /// Metrics of one estimator, taken frame by frame.
 ///
-///   rmse:BLOCK          sqrt(mean |x (-) x_true|^2)                    unit of the block
+///   rmse:BLOCK          sqrt(mean |e|^2),  e = x_true (-) x            unit of the block
 ///   lag_ms:BLOCK        shift of the maximum of the normalised cross-correlation with truth,
 ///                       parabolic between samples; > 0: late. Scalar blocks, even sampling (steps
 ///                       within 5 % of their mean), a truth that changes
-///   cov95:BLOCK         share of stamps with |error| <= 1.96 sigma (scalar blocks)
+///   cov95:BLOCK         share of stamps with |e| <= 1.96 sigma (scalar blocks)
 ///   nees.mean:OWNER     mean of e' P^-1 e / dof over the owner's estimated blocks with known truth,
 ///                       jointly; stamps where P is singular or not finite are left out
 ///   nees.cov95:OWNER    share of those stamps with e' P^-1 e <= chi2(0.95, dof)
 ///   nis.mean:SENSOR     mean of r' S^-1 r / dof over accepted measurements
-///   final:BLOCK         |error| at the last stamp
+///   final:BLOCK         |e| at the last stamp
 ///
 /// Over a segment the key ends in `@SEGMENT` (not lag_ms and final). Counts are `OUTCOME:SENSOR`. A
 /// truth is named like the block, `target.depth`, or like its last component where that is unique.

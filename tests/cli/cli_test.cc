@@ -167,7 +167,6 @@ TEST_F(Cli, OutputThatCannotBeWrittenIsSeventyFour) {
   EXPECT_TRUE(Contains(full.err, "error: <stdout>: cannot write")) << full.err;
   const Outcome closed = Call({"run", "config.yaml", "--no-figures", "--force"}, "");
   EXPECT_EQ(closed.code, 74);
-  // No file of the run took the number of standard output.
   EXPECT_EQ(Json("runs/config/run.json").root().At("status").Text(), "ok");
   EXPECT_EQ(Call({"plugins", "list"}, "/dev/full").code, 74);
   EXPECT_EQ(Call({"--version"}, "").code, 74);
@@ -181,7 +180,7 @@ class PipedRun : public testing::ProgramTest {
     ASSERT_EQ(::mkfifo((folder_ / "table.csv").c_str(), 0600), 0);
     pipe_ = ::open((folder_ / "table.csv").c_str(), O_RDWR | O_CLOEXEC);
     Feed("t_s,d\n0,80\n0.1,81\n0.2,82\n");
-    run_ = Start({"run", "table.yaml", "--no-figures", "-o", "out"});
+    run_ = Start({"run", "table.yaml", "--no-figures", "-o", "out"}, out_);
     // It heeds signals before it opens the files of the estimator.
     ASSERT_TRUE(Eventually([&] { return Exists(Partial() + "/ekf/estimates.csv"); }));
   }
@@ -193,6 +192,7 @@ class PipedRun : public testing::ProgramTest {
   void Feed(const std::string& rows) const {
     ASSERT_EQ(::write(pipe_, rows.data(), rows.size()), static_cast<ssize_t>(rows.size()));
   }
+  std::string out_ = "stdout";
   int pipe_ = -1;
   pid_t run_ = -1;
 };
@@ -221,6 +221,31 @@ TEST_F(PipedRun, EndsAtOnceAtTheSecondSignal) {
   const Outcome run = Wait(run_);
   EXPECT_NE(run.signal, 0) << run.err;
   EXPECT_FALSE(Exists("out"));
+}
+
+class PipedRunWithoutOutput : public PipedRun {
+ protected:
+  PipedRunWithoutOutput() { out_ = ""; }
+};
+
+TEST_F(PipedRunWithoutOutput, LetsNoFileTakeTheNumberOfStandardOutput) {
+  const fs::path output = "/proc/" + std::to_string(run_) + "/fd/1";
+  EXPECT_EQ(fs::read_symlink(output), "/dev/null");
+  ::kill(run_, SIGKILL);
+  Wait(run_);
+}
+
+TEST_F(Cli, StopsBetweenFramesAtASignal) {
+  // 300000 frames: seconds of work.
+  const pid_t run = Start(
+      {"run", "config.yaml", "--no-figures", "-o", "out", "--set", "source.duration_s=10000"});
+  const std::string partial = ".out.partial-" + std::to_string(run);
+  ASSERT_TRUE(Eventually([&] { return Exists(partial + "/ekf/estimates.csv"); }));
+  ::kill(run, SIGTERM);
+  const Outcome stopped = Wait(run);
+  EXPECT_EQ(stopped.code, 75) << stopped.err;
+  EXPECT_TRUE(stopped.err.starts_with("stopped after ")) << stopped.err;
+  EXPECT_EQ(Json("out/run.json").root().At("status").Text(), "stopped");
 }
 
 TEST_F(Cli, ExplainTellsWhatCannotBeObserved) {

@@ -1,181 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdio>
 #include <exception>
 #include <memory>
+#include <utility>
 
-#include "alidade/autodiff.h"
 #include "alidade/fingerprint.h"
+#include "alidade/plugin_thunks.h"
 
 /// Puts models behind the sealed boundary of plugin_abi.h. In the .cc of a plugin:
 ///
 ///   ALIDADE_PLUGIN(ALIDADE_SENSOR(Model, "name", "doc", "citation"), ...)
 namespace alidade {
 namespace detail {
-
-inline AlidadeSpace Describe(const Quantity& q, std::uint32_t geometry, int ambient, int tangent) {
-  AlidadeSpace space{};
-  space.struct_size = sizeof(AlidadeSpace);
-  space.geometry = geometry;
-  space.ambient = ambient;
-  space.tangent = tangent;
-  space.flags = q.flags;
-  space.name = q.name;
-  space.unit = q.unit;
-  space.elements = q.elements;
-  space.doc = q.doc;
-  return space;
-}
-
-/// A model with its description, as the instance's `self`.
-template <class Model>
-struct Holder {
-  explicit Holder(Params& p) : Holder(Model(p)) {}
-  explicit Holder(Model m) : model(std::move(m)) { description.struct_size = sizeof(description); }
-  Holder(const Holder&) = delete;
-  Holder& operator=(const Holder&) = delete;
-
-  template <class Quantities>
-  void DescribeRoles(const Quantities& quantities) {
-    static_assert(std::tuple_size<Quantities>::value == Blocks<Model>::kCount,
-                  "one Quantity for each role or block");
-    const auto describe = [&](auto index) {
-      constexpr int i = decltype(index)::value;
-      using G = SpaceAt<i, Model>;
-      if constexpr (HasSize<Model>::value) {
-        roles[i] = Describe(quantities[i], G::kGeometry, model.Size(i), model.Size(i));
-      } else {
-        roles[i] = Describe(quantities[i], G::kGeometry, G::kAmbient, G::kTangent);
-      }
-    };
-    ForEach(describe, typename Blocks<Model>::Indices{});
-    description.role_count = Blocks<Model>::kCount;
-    description.role_stride = sizeof(AlidadeSpace);
-    description.roles = roles;
-  }
-
-  Model model;
-  AlidadeDescription description{};
-  AlidadeSpace roles[Blocks<Model>::kCount];
-  AlidadeSpace space;  ///< the measurement, or the control input
-  mutable char error[256] = "";
-};
-
-/// Runs f on the holder behind `self`; an exception becomes ALIDADE_ERROR and its text.
-template <class Model, class F>
-std::int32_t Guarded(const void* self, const F& f) noexcept {
-  const auto* holder = static_cast<const Holder<Model>*>(self);
-#if defined(__cpp_exceptions)
-  try {
-    return f(holder->model);
-  } catch (const std::exception& e) {
-    std::snprintf(holder->error, sizeof(holder->error), "%s", e.what());
-  } catch (...) {
-    std::snprintf(holder->error, sizeof(holder->error), "an exception of unknown type");
-  }
-  return ALIDADE_ERROR;
-#else
-  return f(holder->model);
-#endif
-}
-
-/// Hidden, as is MotionCalls: were its table exported, two plugins with a struct of one name would
-/// share the table of the first (STB_GNU_UNIQUE), whatever dlopen is told.
-template <class Model>
-struct __attribute__((visibility("hidden"))) SensorCalls {
-  static constexpr bool kInitialises = Model::kInitialises >= 0;
-
-  static std::int32_t Eval(const void* self, const double* const* roles, double* z,
-                           double* const* jacobians, const std::int32_t* strides) noexcept {
-    return Guarded<Model>(self, [&](const Model& model) {
-      return static_cast<std::int32_t>(Evaluate(model, roles, z, jacobians, strides));
-    });
-  }
-  template <std::size_t... I>
-  static void CallNoise(const Model& model, const double* const* x, const double* z, double* l,
-                        std::index_sequence<I...>) {
-    if constexpr (HasNoiseOfMeasurement<Model, std::index_sequence<I...>>::value) {
-      model.SqrtNoise(x[I]..., z, l);
-    } else {
-      static_cast<void>(z);
-      model.SqrtNoise(x[I]..., l);
-    }
-  }
-  static std::int32_t SqrtNoise(const void* self, const double* const* roles, const double* z,
-                                double* l, std::int32_t stride) noexcept {
-    return Guarded<Model>(self, [&](const Model& model) {
-      constexpr int m = Model::Measurement::kTangent;
-      double dense[m * m] = {};
-      CallNoise(model, roles, z, dense, typename Blocks<Model>::Indices{});
-      for (int i = 0; i < m; ++i) std::copy_n(dense + i * m, m, l + i * stride);
-      return std::int32_t{ALIDADE_OK};
-    });
-  }
-  static std::int32_t Valid(const void* self, const double* z) noexcept {
-    return Guarded<Model>(self, [&](const Model& model) {
-      if constexpr (HasValid<Model>::value) {
-        return std::int32_t{model.Valid(z) ? ALIDADE_OK : ALIDADE_INVALID};
-      } else {
-        static_cast<void>(model);
-        return std::int32_t{ALIDADE_OK};
-      }
-    });
-  }
-  static std::int32_t Initialise(const void* self, const double* const* roles, const double* z,
-                                 const double* prior, double* y, double* const* jx,
-                                 const std::int32_t* jx_strides, double* jz, std::int32_t jz_stride,
-                                 double* jp, std::int32_t jp_stride) noexcept {
-    return Guarded<Model>(self, [&](const Model& model) {
-      if constexpr (kInitialises) {
-        return static_cast<std::int32_t>(InitialiseRole(model, roles, z, prior, y, jx, jx_strides,
-                                                        {jz, jz_stride}, {jp, jp_stride}));
-      } else {
-        return std::int32_t{ALIDADE_ERROR};
-      }
-    });
-  }
-  static constexpr AlidadeSensor kCalls{sizeof(AlidadeSensor),
-                                        0,
-                                        Eval,
-                                        SqrtNoise,
-                                        HasValid<Model>::value ? Valid : nullptr,
-                                        kInitialises ? Initialise : nullptr,
-                                        nullptr,
-                                        {}};
-};
-
-template <class Model>
-struct __attribute__((visibility("hidden"))) MotionCalls {
-  static std::int32_t Step(const void* self, const double* const* blocks, const double* input,
-                           const double* w, double dt_s, double* const* next, double* f,
-                           std::int32_t f_stride, double* g, std::int32_t g_stride) noexcept {
-    return Guarded<Model>(self, [&](const Model& model) {
-      return static_cast<std::int32_t>(
-          alidade::Step(model, blocks, input, w, dt_s, next, {f, f_stride}, {g, g_stride}));
-    });
-  }
-  template <std::size_t... I>
-  static void CallSqrtQ(const Model& model, const double* const* x, double dt_s, MatrixRef l,
-                        std::index_sequence<I...>) {
-    if constexpr (HasSimpleSqrtQ<Model>::value) {
-      static_cast<void>(x);
-      model.SqrtQ(dt_s, l);
-    } else {
-      model.SqrtQ(x[I]..., dt_s, l);
-    }
-  }
-  static std::int32_t SqrtQ(const void* self, const double* const* blocks, double dt_s, double* l,
-                            std::int32_t stride) noexcept {
-    return Guarded<Model>(self, [&](const Model& model) {
-      const int n = NoiseSizeOf(model);
-      Zero({l, stride}, n, n);
-      CallSqrtQ(model, blocks, dt_s, {l, stride}, typename Blocks<Model>::Indices{});
-      return std::int32_t{ALIDADE_OK};
-    });
-  }
-  static constexpr AlidadeMotion kCalls{sizeof(AlidadeMotion), 0, Step, SqrtQ, {}};
-};
 
 /// Hands `holder` over as `instance`.
 template <class Model>

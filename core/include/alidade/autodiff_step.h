@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "alidade/autodiff.h"
+
+/// The motion-model side of autodiff.h.
+namespace alidade {
+namespace detail {
+
+/// x' alone. Static blocks go through a buffer, so that a failed step leaves `next` untouched;
+/// models with dynamic blocks see to that themselves.
+template <class Model>
+bool StepValue(const Model& model, const double* const* x, const double* u, const double* w,
+               double dt_s, double* const* next) {
+  using Blocks = detail::Blocks<Model>;
+  constexpr typename Blocks::Indices indices{};
+  if constexpr (Blocks::kStatic) {
+    double value[Blocks::kAmbient];
+    double* result[Blocks::kCount];
+    int offset = 0;
+    const auto place = [&](auto index) {
+      constexpr int i = decltype(index)::value;
+      result[i] = value + offset;
+      offset += SpaceAt<i, Model>::kAmbient;
+    };
+    ForEach(place, indices);
+    if (!CallStep(model, x, u, w, dt_s, result, indices)) return false;
+    const auto copy = [&](auto index) {
+      constexpr int i = decltype(index)::value;
+      std::copy_n(result[i], SpaceAt<i, Model>::kAmbient, next[i]);
+    };
+    ForEach(copy, indices);
+    return true;
+  } else {
+    return CallStep(model, x, u, w, dt_s, next, indices);
+  }
+}
+
+template <class Model, std::size_t... I>
+void ClosedFormStep(const Model& model, const double* const* x, const double* w, double dt_s,
+                    MatrixRef f, MatrixRef g, std::index_sequence<I...>) {
+  const int n = TangentSizeOf(model);
+  Zero(f, n, n);
+  Zero(g, n, NoiseSizeOf(model));
+  model.StepJacobian(x[I]..., w, dt_s, f, g);
+}
+
+/// x', F and G by dual numbers.
+template <class Model>
+Status StepJets(const Model& model, const double* const* x, const double* u, const double* w,
+                double dt_s, double* const* next, MatrixRef f, MatrixRef g) {
+  using All = Blocks<Model>;
+  constexpr typename All::Indices indices{};
+  using Jet = ceres::Jet<double, All::kTangent + Model::kNoise>;
+  Jet lifted[All::kAmbient], value[All::kAmbient];
+  Jet lifted_w[Model::kNoise + 1], lifted_u[Model::Input::kAmbient + 1];
+  const Jet* block[All::kCount];
+  Jet* result[All::kCount];
+  Lift<Model>(x, -1, lifted, block);
+  for (int i = 0; i < All::kCount; ++i) result[i] = value + (block[i] - lifted);
+  for (int i = 0; i < Model::kNoise; ++i) lifted_w[i] = Jet(w[i], All::kTangent + i);
+  for (int i = 0; i < Model::Input::kAmbient; ++i) lifted_u[i] = Jet(u[i]);
+  const Jet *const_w = lifted_w, *const_u = lifted_u;
+  if (!CallStep(model, block, const_u, const_w, dt_s, result, indices)) {
+    return Status::kOutOfDomain;
+  }
+  int row = 0;
+  const auto read = [&](auto index) {
+    constexpr int i = decltype(index)::value;
+    using B = SpaceAt<i, Model>;
+    for (int k = 0; k < B::kAmbient; ++k) next[i][k] = result[i][k].a;
+    ReadTangent<B>(result[i], 0, All::kTangent, f.Row(row));
+    ReadTangent<B>(result[i], All::kTangent, Model::kNoise, g.Row(row));
+    row += B::kTangent;
+  };
+  ForEach(read, indices);
+  return Status::kOk;
+}
+
+/// Calls f(w) with zeros of the size of the model's noise.
+template <class Model, class F>
+Status WithZeroNoise(const Model& model, const F& f) {
+  if constexpr (Model::kNoise == kDynamic) {
+    const std::vector<double> zero(static_cast<std::size_t>(NoiseSizeOf(model)) + 1);
+    return f(zero.data());
+  } else {
+    static_cast<void>(model);
+    const double zero[Model::kNoise + 1] = {};
+    return f(zero);
+  }
+}
+
+}  // namespace detail
+
+/// x' = f(x, u, w, dt), F = d x' / d x (n x n), G = d x' / d w (n x n_w); w may be null (zero), F
+/// and G may be empty.
+template <class Model>
+Status Step(const Model& model, const double* const* x, const double* u, const double* w,
+            double dt_s, double* const* next, MatrixRef f, MatrixRef g) {
+  constexpr typename detail::Blocks<Model>::Indices indices{};
+  if (w == nullptr) {
+    return detail::WithZeroNoise(
+        model, [&](const double* zero) { return Step(model, x, u, zero, dt_s, next, f, g); });
+  }
+  const int n = detail::TangentSizeOf(model), n_w = detail::NoiseSizeOf(model);
+  if (!f && (!g || n_w == 0)) {
+    return detail::StepValue(model, x, u, w, dt_s, next) ? Status::kOk : Status::kOutOfDomain;
+  }
+  if (n_w > 0 && (!f || !g)) {  // one of the two: rare enough to make a buffer for the other
+    std::vector<double> unwanted(static_cast<std::size_t>(n) * std::max(n, n_w));
+    return Step(model, x, u, w, dt_s, next, f ? f : MatrixRef{unwanted.data(), n},
+                g ? g : MatrixRef{unwanted.data(), n_w});
+  }
+  if constexpr (detail::HasStepJacobian<Model, typename detail::Blocks<Model>::Indices>::value) {
+    static_assert(Model::Input::kAmbient == 0, "closed forms take no control input");
+    if (!detail::StepValue(model, x, u, w, dt_s, next)) return Status::kOutOfDomain;
+    detail::ClosedFormStep(model, x, w, dt_s, f, g, indices);
+    return Status::kOk;
+  } else {
+    return detail::StepJets(model, x, u, w, dt_s, next, f, g);
+  }
+}
+
+}  // namespace alidade

@@ -8,7 +8,8 @@
 
 namespace alidade::internal {
 
-/// A copy of a struct of plugin_abi.h, as far as its own size says; zero beyond. `limit`: bytes that
+/// A copy of a struct of plugin_abi.h, as far as its own size says; zero beyond. `limit`: bytes
+/// that
 /// it may claim at most.
 template <class T>
 T ReadPrefix(const T* from, std::size_t limit = sizeof(T)) {

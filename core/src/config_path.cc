@@ -55,7 +55,7 @@ fs::path ResolveInside(const fs::path& base, const std::string& path, bool allow
   const fs::path target = Followed(joined);
   if (inside.empty() || target.empty() || !Contains(inside, target)) {
     throw Error(ExitCode::kNotTrusted,
-                ErrorLine(place, key, internal::Quoted(path) + " leaves the folder of the config",
+                ErrorLine(place, key, internal::Quoted(path) + " leaves its folder",
                           "a path inside " + internal::Quoted(folder.string())));
   }
   return joined;

@@ -184,10 +184,10 @@ void Metrics::Impl::CheckElement(Stamp stamp, Tracked& block, int element, doubl
   outside = -1;
   const std::string unit = block.unit.empty() ? "" : ' ' + block.unit;
   events.push_back({stamp, "inconsistent",
-                    block.elements[element] + ": the error, " + internal::NumberText(error) + unit +
-                        ", has been beyond " + internal::NumberText(kInconsistentSigmas) +
+                    block.elements[element] + ": the error, " + internal::RoundedText(error, 4) +
+                        unit + ", has been beyond " + internal::NumberText(kInconsistentSigmas) +
                         " sigma for " + std::to_string(kInconsistentStamps) + " stamps; sigma is " +
-                        internal::NumberText(sigma) + unit});
+                        internal::RoundedText(sigma, 4) + unit});
 }
 
 void Metrics::Impl::AddConsistency(Stamp stamp, const std::vector<Sums*>& into,

@@ -28,6 +28,13 @@ std::string FixedText(double value, int decimals) {
   return {buffer, result.ptr};
 }
 
+std::string RoundedText(double value, int digits) {
+  char buffer[64];
+  const auto result =
+      std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::general, digits);
+  return {buffer, result.ptr};
+}
+
 std::string ScientificText(double value, int digits) {
   char buffer[64];
   const auto result =

@@ -302,10 +302,10 @@ std::vector<ParamInfo> ParamRecorder::Result() const {
     }
   }
   const auto rank = [](const ParamInfo& info) {
-    return std::tuple(!info.when.empty(), !info.fallback.empty(), info.key);
+    return std::tuple(!info.when.empty(), !info.fallback.empty());
   };
-  std::sort(result.begin(), result.end(),
-            [&](const ParamInfo& a, const ParamInfo& b) { return rank(a) < rank(b); });
+  std::stable_sort(result.begin(), result.end(),
+                   [&](const ParamInfo& a, const ParamInfo& b) { return rank(a) < rank(b); });
   return result;
 }
 

@@ -54,7 +54,7 @@ std::string ReadText(const std::filesystem::path& file) {
 }
 
 /// The text of a key where there is one, else `fallback`.
-std::string TextOf(const Node& map, std::string_view key, std::string fallback) {
+std::string TextOf(const Node& map, std::string_view key, const std::string& fallback) {
   const std::optional<Node> node = map.is_map() ? map.Find(key) : std::nullopt;
   return node && node->kind() == Node::Kind::kScalar ? node->Text() : fallback;
 }

@@ -28,6 +28,7 @@ struct Lane {
   Contestant& contestant;
   Metrics metrics;
   ContestantResult result;
+  bool ended = false;  ///< it had nothing left to go on with
 };
 
 ContestantResult Begin(const Contestant& contestant) {
@@ -48,9 +49,10 @@ void Fail(RunResult& result, ExitCode code, std::string reason) {
   result.reason = std::move(reason);
 }
 
-/// One frame through one estimator; false where the run has to end.
+/// One frame through one estimator; false where the whole run has to end.
 bool Advance(Lane& lane, int index, const Frame& frame, const std::vector<bool>& in_segment,
              const RunOptions& options, RunResult& result) {
+  if (lane.ended) return true;
   Estimator& estimator = *lane.contestant.estimator;
   const UpdateReport report = estimator.Process(frame);
   lane.result.events.insert(lane.result.events.end(), report.events.begin(), report.events.end());
@@ -58,15 +60,16 @@ bool Advance(Lane& lane, int index, const Frame& frame, const std::vector<bool>&
   if (options.recorder != nullptr) {
     options.recorder->AddEstimate(index, frame, estimator.state(), report);
   }
-  const bool must_end =
-      estimator.failed() ||
-      (estimator.diverged() && lane.contestant.on_divergence == OnDivergence::kFail);
-  if (!must_end) return true;
-  const std::string why = report.events.empty() ? "diverged" : report.events.back().text;
-  char at[48];
-  std::snprintf(at, sizeof(at), " at t = %.6f s: ", Seconds(frame.stamp));
-  Fail(result, ExitCode::kDiverged, "estimator '" + lane.contestant.name + "'" + at + why);
-  return false;
+  lane.ended = estimator.failed();
+  const bool policy = lane.contestant.on_divergence == OnDivergence::kFail && estimator.diverged();
+  if (!lane.ended && !policy) return true;
+  if (result.status == RunStatus::kOk) {
+    const std::string why = report.events.empty() ? "diverged" : report.events.back().text;
+    char at[48];
+    std::snprintf(at, sizeof(at), " at t = %.6f s: ", Seconds(frame.stamp));
+    Fail(result, ExitCode::kDiverged, "estimator '" + lane.contestant.name + "'" + at + why);
+  }
+  return !policy;
 }
 
 void RunFrames(Experiment& experiment, std::vector<Lane>& lanes, const RunOptions& options,
@@ -84,7 +87,8 @@ void RunFrames(Experiment& experiment, std::vector<Lane>& lanes, const RunOption
       go_on = Advance(lanes[i], static_cast<int>(i), frame, in_segment, options, result) && go_on;
     }
     ++result.frames;
-    if (!go_on) return;
+    const auto ended = [](const Lane& lane) { return lane.ended; };
+    if (!go_on || std::all_of(lanes.begin(), lanes.end(), ended)) return;
     if (options.progress) options.progress(result.frames, size);
     if (options.stop && options.stop()) {
       result.status = RunStatus::kStopped;
@@ -114,7 +118,7 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
   std::vector<Lane> lanes;
   for (Contestant& contestant : experiment.contestants) {
     lanes.push_back({contestant, Metrics(contestant, *experiment.source, experiment.segments),
-                     Begin(contestant)});
+                     Begin(contestant), false});
   }
   if (options.recorder != nullptr) options.recorder->Start(experiment);
   try {

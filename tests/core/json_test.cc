@@ -62,6 +62,12 @@ TEST(NumberText, IsTheShortestThatReadsBack) {
   EXPECT_EQ(NumberText(-std::numeric_limits<double>::infinity()), "-inf");
 }
 
+TEST(RoundedText, HasAFewDigits) {
+  EXPECT_EQ(RoundedText(0.0234567, 4), "0.02346");
+  EXPECT_EQ(RoundedText(21.0, 4), "21");
+  EXPECT_EQ(RoundedText(1.5e9, 4), "1.5e+09");
+}
+
 TEST(Seconds, AreExactToTheNanosecond) {
   const auto text = [](Stamp stamp) {
     std::string seconds;

@@ -157,7 +157,42 @@ TEST(AutodiffSensor, AnExceptionIsAnErrorWithItsText) {
   EXPECT_EQ(z, kPoison);
 }
 
-// ---- descriptions that break the rules -----------------------------------------------------------
+/// Inverse observation of a point at a known position: roles of different sizes.
+struct Displacement : Sensor<Vec<2>, Vec<2>, Vec<3>> {
+  static constexpr std::array kRoles{Quantity{"point", "m", "", "x,y"},
+                                     Quantity{"camera", "m", "", "x,y,z"}};
+  static constexpr Quantity kMeasurement{"z", "m", "", "x,y"};
+  static constexpr int kInitialises = 0;
+  explicit Displacement(Params&) {}
+  template <class T>
+  bool Predict(const T* point, const T* camera, T* z) const {
+    for (int i = 0; i < 2; ++i) z[i] = (point[i] - camera[i]) / camera[2];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = l[3] = T(1.0);
+  }
+  template <class T>
+  bool Initialise(const T* camera, const T* z, T* point) const {
+    for (int i = 0; i < 2; ++i) point[i] = camera[i] + z[i] * camera[2];
+    return true;
+  }
+};
+
+TEST(AutodiffSensor, InitialisesWithDenseJacobians) {
+  const SensorModel sensor = MakeSensor<Displacement>();
+  const double camera[3] = {1, 2, 4}, z[2] = {0.5, 0.25};
+  const double* roles[] = {nullptr, camera};
+  std::vector<double> point(2, kPoison), by_camera(6, kPoison), by_z(4, kPoison);
+  double* jx[] = {nullptr, by_camera.data()};
+  ASSERT_EQ(sensor.Initialise(roles, z, point.data(), jx, by_z.data()), Status::kOk);
+  EXPECT_EQ(point, (std::vector<double>{3, 3}));
+  EXPECT_EQ(by_camera, (std::vector<double>{1, 0, 0.5, 0, 1, 0.25}));
+  EXPECT_EQ(by_z, (std::vector<double>{4, 0, 0, 4}));
+}
+
+// ---- descriptions that break the rules ----------------------------------------------------------
 
 /// A sensor written by hand against the C header, right unless a test spoils it.
 struct HandWritten {
@@ -231,6 +266,27 @@ TEST(ModelInstance, ReadsNoFurtherThanAStructSays) {
   EXPECT_EQ(sensor.roles()[0].unit, "");
   const double z = 0.0;
   EXPECT_EQ(sensor.Valid(&z), Status::kOk);
+}
+
+TEST(MotionModel, PassesZerosWhereNoNoiseIsGiven) {
+  // A plugin of another language may not know null.
+  HandWritten hand;
+  AlidadeMotion motion{};
+  motion.struct_size = sizeof(motion);
+  motion.step = [](const void*, const double* const*, const double*, const double* w, double,
+                   double* const*, double*, std::int32_t, double*, std::int32_t) {
+    return std::int32_t{w != nullptr && w[0] == 0.0 && w[1] == 0.0 ? ALIDADE_OK : ALIDADE_ERROR};
+  };
+  motion.sqrt_q = [](const void*, const double* const*, double, double*, std::int32_t) {
+    return std::int32_t{ALIDADE_OK};
+  };
+  hand.instance.kind = ALIDADE_KIND_MOTION;
+  hand.instance.motion = &motion;
+  hand.description.output = nullptr;
+  hand.description.noise_count = 2;
+  const MotionModel model(std::make_shared<const ModelInstance>(hand.instance, "m", "p.so"));
+  EXPECT_FALSE(model.has_input());
+  EXPECT_EQ(model.Step(nullptr, nullptr, nullptr, 0.1, nullptr, nullptr, nullptr), Status::kOk);
 }
 
 struct Spoiled {

@@ -201,7 +201,8 @@ void CheckConstantVelocity() {
     EXPECT_EQ(out.next[1][i], x[1][i]);
   }
   ExpectTrueJacobians(motion, x, nullptr, w, dt_s);
-  // G Qw G' per axis: piecewise sigma^2 [dt^4/4 dt^3/2; . dt^2], white sigma^2 [dt^3/3 dt^2/2; . dt]
+  // G Qw G' per axis: piecewise sigma^2 [dt^4/4 dt^3/2; . dt^2], white sigma^2 [dt^3/3 dt^2/2; .
+  // dt]
   const double s2 = sigma * sigma, t = dt_s;
   const double pp = kWhite ? t * t * t / 3 : t * t * t * t / 4;
   const double pv = kWhite ? t * t / 2 : t * t * t / 2;

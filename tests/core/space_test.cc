@@ -77,7 +77,8 @@ TEST_P(GeometryLaws, HoldAtRandomPointsAndStepsOfEverySize) {
 }
 
 TEST_P(GeometryLaws, SmallStepsKeepTheirDigits) {
-  // Where sin(d)/d changes to its series the derivative must not jump: relative error, not absolute.
+  // Where sin(d)/d changes to its series the derivative must not jump: relative error, not
+  // absolute.
   const Values x = [&] {
     Values identity{};
     geometry_.Identity(identity.data());

@@ -77,7 +77,7 @@ TEST_F(HostTest, FindsPluginsOfTheEnvironmentAndTheUser) {
   EXPECT_EQ(host.searched()[1], (folder_ / "path").string() + " (ALIDADE_PLUGIN_PATH): 1 found");
 }
 
-// ---- 50: missing ---------------------------------------------------------------------------------
+// ---- 50: missing --------------------------------------------------------------------------------
 
 TEST_F(HostTest, AMissingModelNamesPlaceSuggestionAndSearch) {
   const PluginHost host({Built("good")});
@@ -108,7 +108,7 @@ TEST_F(HostTest, AGivenPlaceThatIsNotThereIsAnError) {
   ExpectRefused("/nowhere/x.so", {"no such file or folder"});
 }
 
-// ---- 51: not ELF, truncated ----------------------------------------------------------------------
+// ---- 51: not ELF, truncated ---------------------------------------------------------------------
 
 TEST_F(HostTest, WhatIsNotElfIsRefused) {
   const fs::path text = folder_ / "text.so", empty = folder_ / "empty.so";
@@ -124,7 +124,7 @@ TEST_F(HostTest, WhatIsNotElfIsRefused) {
 TEST_F(HostTest, ATruncatedFileIsRefused) {
   const auto size = fs::file_size(Built("good"));
   for (const double part : {0.0005, 0.004, 0.1, 0.5, 0.9, 0.999}) {
-    const fs::path file = Copy("good", "truncated" + std::to_string(part) + ".so");
+    const fs::path file = Copy("good", "part" + std::to_string(part) + ".so");
     fs::resize_file(file, static_cast<std::uintmax_t>(part * static_cast<double>(size)));
     ExpectRefused(file, {"truncated"});
   }
@@ -140,7 +140,7 @@ TEST_F(HostTest, AnExecutableIsNoPlugin) {
   ExpectRefused(file, {"another kind of processor"});
 }
 
-// ---- 52 to 55: fingerprint and load --------------------------------------------------------------
+// ---- 52 to 55: fingerprint and load -------------------------------------------------------------
 
 TEST_F(HostTest, AFileWithoutFingerprintIsRefused) {
   ExpectRefused(Built("no_fingerprint"), {"has no alidade fingerprint"});
@@ -189,7 +189,7 @@ TEST_F(HostTest, ACrashWhileLoadingIsARefusal) {
   ExpectRefused(Built("start_EXIT"), {"ended the process while loading"});
 }
 
-// ---- 56, 57: two files, one name; one file, two names ----------------------------------------------
+// ---- 56, 57: two files, one name; one file, two names -------------------------------------------
 
 TEST_F(HostTest, TwoPluginsWithOneNameAreAnErrorOnceItIsAskedFor) {
   const fs::path a = Copy("good", "a.so"), b = Copy("good", "b.so");
@@ -208,7 +208,7 @@ TEST_F(HostTest, OneFileUnderManyNamesIsLoadedOnce) {
   EXPECT_EQ(std::count_if(host.entries().begin(), host.entries().end(), has_name), 1);
 }
 
-// ---- 58, 59: failures while creating ---------------------------------------------------------------
+// ---- 58, 59: failures while creating ------------------------------------------------------------
 
 TEST_F(HostTest, AnExceptionInCreateNamesModelAndPlugin) {
   const PluginHost host({Built("bad_create")});
@@ -234,7 +234,7 @@ TEST_F(HostTest, ParametersThatDoNotFitTogetherAreABadConfig) {
               [&] { host.CreateSensor("misfit", unlucky.root()); });
 }
 
-// ---- parameters ------------------------------------------------------------------------------------
+// ---- parameters ---------------------------------------------------------------------------------
 
 TEST_F(HostTest, AllBadParametersAreToldAtOnce) {
   const PluginHost host;
@@ -306,7 +306,7 @@ TEST_F(HostTest, DescribesRolesAndMeasurement) {
   EXPECT_EQ(lines[2], "measurement range_rate: vector(1), m/s; closing is negative");
 }
 
-// ---- build tier ------------------------------------------------------------------------------------
+// ---- build tier ---------------------------------------------------------------------------------
 
 TEST_F(HostTest, CreatesASourceOfTheBuildTier) {
   const PluginHost host({Built("sources")});

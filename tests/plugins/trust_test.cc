@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <unistd.h>
 
+#include <fstream>
+
 #include "host_fixture.h"
 
 namespace alidade {
@@ -102,7 +104,7 @@ TEST_F(TrustTest, InADefaultPlaceItIsToldWhenItsModelIsMissed) {
 TEST_F(TrustTest, ARelativePlaceOfTheEnvironmentIsNotSearched) {
   setenv("ALIDADE_PLUGIN_PATH", ".", 1);
   const fs::path before = fs::current_path();
-  Copy("good", "good.so");
+  std::ofstream(folder_ / "no_plugin.so") << "refused for its place before it is looked at";
   fs::current_path(folder_);
   const PluginHost host;
   fs::current_path(before);

@@ -107,7 +107,8 @@ class MotionModel {
   int tangent_size() const { return tangent_size_; }
   bool has_input() const { return instance_->c().description->input != nullptr; }
 
-  /// x', where `w` may be null (zero), F (n x n) and G (n x n_w) dense row-major; F and G may both be null.
+  /// x', where `w` may be null (zero), F (n x n) and G (n x n_w) dense row-major; F and G may both
+  /// be null.
   Status Step(const double* const* blocks, const double* input, const double* w, double dt_s,
               double* const* next, double* f, double* g) const;
   /// l, row-major n_w x n_w, with Qw = l l'.

@@ -81,7 +81,8 @@ struct RunOptions {
 };
 
 /// Runs all estimators over the source, frame by frame, so that all see the same data. Data errors
-/// and divergence under `fail` end the run early; they are in the result, not thrown.
+/// and divergence under `fail` end the run early; an estimator that has nothing left to go on with
+/// ends by itself. Both are in the result, not thrown.
 RunResult Run(Experiment& experiment, const RunOptions& options);
 
 /// A table of the estimators' main metrics, one column each, for a terminal.

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/src/run_folder.h"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <fstream>
+
+#include "support/recording.h"
+
+namespace {
+
+/// The n-th call of write, fsync or rename by this process fails with `error`; 0: none does.
+int fail_at = 0;
+int fail_error = 0;
+
+bool IsToFail() {
+  if (fail_at == 0 || --fail_at > 0) return false;
+  errno = fail_error;
+  return true;
+}
+
+}  // namespace
+
+// These stand before those of the C library, for the shared libraries of this process too.
+extern "C" {
+__attribute__((visibility("default"))) ssize_t write(int fd, const void* data, size_t size) {
+  return IsToFail() ? -1 : syscall(SYS_write, fd, data, size);
+}
+__attribute__((visibility("default"))) int fsync(int fd) {
+  static_cast<void>(fd);  // tests need not survive a power cut
+  return IsToFail() ? -1 : 0;
+}
+__attribute__((visibility("default"))) int rename(const char* from, const char* to) noexcept {
+  return IsToFail() ? -1
+                    : static_cast<int>(syscall(SYS_renameat2, AT_FDCWD, from, AT_FDCWD, to, 0));
+}
+}
+
+namespace alidade {
+namespace {
+
+using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
+
+TEST(RunFolder, LeavesAnExistingFolderAlone) {
+  const TemporaryFolder folder;
+  Record(OptionsFor(folder / "out"), 3);
+  const std::string before = Read(folder / "out/run.json");
+  std::string text;
+  EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "out"), 5); }, &text), 73);
+  EXPECT_EQ(text, (folder / "out").string() + ": exists already; add --force to replace it");
+  EXPECT_EQ(Read(folder / "out/run.json"), before);
+  EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "out/"), 5); }), 73);
+}
+
+TEST(RunFolder, ForceReplacesARunFolder) {
+  const TemporaryFolder folder;
+  Record(OptionsFor(folder / "out"), 3);
+  std::ofstream(folder / "out/mine.txt") << "x";
+  Record(OptionsFor(folder / "out", true), 5);
+  EXPECT_EQ(Lines(folder / "out/truth.csv").size(), 6u);
+  EXPECT_FALSE(fs::exists(folder / "out/mine.txt"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);  // the old one is gone
+}
+
+TEST(RunFolder, ForceSparesWhatIsNoRunFolder) {
+  const TemporaryFolder folder;
+  fs::create_directories(folder / "home");
+  std::ofstream(folder / "home/thesis.tex") << "x";
+  std::ofstream(folder / "file") << "x";
+  EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "home", true)); }), 73);
+  EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "file", true)); }), 73);
+  EXPECT_EQ(Read(folder / "home/thesis.tex"), "x");
+  fs::remove(folder / "home/thesis.tex");
+  EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "home", true)); }), 0);  // empty
+}
+
+TEST(RunFolder, AFolderBeingWrittenIsRefused) {
+  const TemporaryFolder folder;
+  const Recorder first(OptionsFor(folder / "out"), MakeConfig(), Host());
+  std::string text;
+  EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "out")); }, &text), 73);
+  EXPECT_NE(text.find("process " + std::to_string(::getpid()) + " is writing it now"),
+            std::string::npos)
+      << text;
+  Record(OptionsFor(folder / "other"));  // another name is free
+}
+
+TEST(RunFolder, RemovesWhatADeadProcessLeft) {
+  const TemporaryFolder folder;
+  fs::create_directories(folder / ".out.partial-1/ekf");  // process 1 lives, but does not hold it
+  fs::create_directories(folder / ".other.partial-1");
+  Record(OptionsFor(folder / "out"));
+  EXPECT_FALSE(fs::exists(folder / ".out.partial-1"));
+  EXPECT_TRUE(fs::exists(folder / ".other.partial-1"));
+}
+
+TEST(RunFolder, RestoresWhatADeadProcessWasReplacing) {
+  const TemporaryFolder folder;
+  Record(OptionsFor(folder / "out"), 3);
+  fs::rename(folder / "out", folder / ".out.old-1");
+  EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "out")); }), 73);
+  EXPECT_EQ(Lines(folder / "out/truth.csv").size(), 4u);
+}
+
+TEST(RunFolder, LeavesNothingWithoutFinish) {
+  const TemporaryFolder folder;
+  {
+    Recorder recorder(OptionsFor(folder / "above/out"), MakeConfig(), Host());
+    EXPECT_FALSE(folder.empty());
+  }
+  EXPECT_TRUE(folder.empty());
+}
+
+// Every write, fsync and rename in turn, on a new folder and on one to be replaced.
+TEST(RunFolder, EveryFailureOfTheDiskIsAnErrorThatLeavesNothing) {
+  for (const bool replace : {false, true}) {
+    const TemporaryFolder folder;
+    if (replace) Record(OptionsFor(folder / "out"), 3);
+    int calls = 0;
+    for (int n = 1; n < 200; ++n) {
+      fail_at = n;
+      fail_error = n % 2 == 0 ? ENOSPC : EIO;
+      std::string text;
+      const int code = CodeOf([&] { Record(OptionsFor(folder / "out", true), 5); }, &text);
+      const bool failed = fail_at <= 0;
+      fail_at = 0;
+      if (!failed) {
+        EXPECT_EQ(code, 0) << text;
+        calls = n - 1;
+        break;
+      }
+      ASSERT_TRUE(code == 74) << "call " << n << ": " << code << ' ' << text;
+      EXPECT_TRUE(text.starts_with((folder / "out").string())) << text;
+      EXPECT_NE(text.find(n % 2 == 0 ? "No space left on device" : "Input/output error"),
+                std::string::npos)
+          << text;
+      if (replace && fs::exists(folder / "out") && Lines(folder / "out/truth.csv").size() == 6) {
+        // The last fsync, of the folder above: the new one is in its place, the old one beside it.
+        EXPECT_NE(text.find("cannot sync"), std::string::npos) << text;
+        for (const auto& entry : fs::directory_iterator(folder.path())) fs::remove_all(entry);
+        Record(OptionsFor(folder / "out"), 3);
+      } else if (replace) {
+        EXPECT_EQ(FilesIn(folder.path()).size(), 16u) << "call " << n;
+        EXPECT_EQ(Lines(folder / "out/truth.csv").size(), 4u);
+      } else if (!folder.empty()) {
+        EXPECT_EQ(FilesIn(folder.path()).size(), 16u) << "call " << n;
+        fs::remove_all(folder / "out");
+      }
+    }
+    EXPECT_GT(calls, 30);
+  }
+}
+
+TEST(RunFolder, ALimitOnTheFileSizeIsAnErrorNotTheEnd) {
+  const TemporaryFolder folder;
+  const int code = InChild([&] {
+    const rlimit limit{2000, 2000};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    Record(OptionsFor(folder / "out"));
+  });
+  EXPECT_EQ(code, 74);
+  EXPECT_TRUE(folder.empty());
+}
+
+TEST(RunFolder, AFolderThatCannotBeWrittenToIsRefused) {
+  const TemporaryFolder folder;
+  Host();  // a child without rights could not look for plugins
+  fs::create_directories(folder / "mine");
+  fs::permissions(folder.path(), fs::perms(0755));
+  fs::permissions(folder / "mine", fs::perms(0555));
+  const int code = InChild([&] {
+    if (::getuid() == 0 && ::setuid(65534) != 0) ::_exit(99);
+    Record(OptionsFor(folder / "mine/deep/out"));
+  });
+  if (code == 99) GTEST_SKIP() << "cannot give up the rights of root";
+  EXPECT_EQ(code, 73);
+  EXPECT_TRUE(fs::is_empty(folder / "mine"));
+}
+
+}  // namespace
+}  // namespace alidade

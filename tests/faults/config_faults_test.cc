@@ -48,7 +48,7 @@ TEST_P(ConfigFault, GetsItsCodePlaceAndWords) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Files, ConfigFault, ::testing::ValuesIn(ConfigsWithAFault()),
-                         [](const auto& info) { return "_" + info.param; });
+                         [](const auto& file) { return "_" + file.param; });
 
 }  // namespace
 }  // namespace alidade::testing

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/run.h"
+
+#include <gtest/gtest.h>
+
+#include "support/recording.h"
+
+namespace alidade {
+namespace {
+
+using testing::MakeExperiment;
+
+/// Steps to infinity at the first step.
+struct Exploding : Motion<1, Vec<1>> {
+  static constexpr std::array kBlocks{Quantity{"x"}};
+  template <class T>
+  void Step(const T* x, const T* w, double, T* next) const {
+    next[0] = 1e308 * 10.0 * (x[0] + w[0]);
+  }
+  void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
+};
+
+Contestant ExplodingContestant(const std::vector<StreamInfo>& streams) {
+  Contestant contestant;
+  contestant.name = "exploding";
+  testing::AddMotion(contestant.system, "p", InProcessMotion(Exploding(), "exploding"),
+                     {{"x", 1.0, 1.0}});
+  testing::AddSensor(contestant.system, "disparity",
+                     InProcessSensor(testing::Linear(1.0, 1.0), "linear"), {"p.x"});
+  contestant.estimator = std::make_unique<Ekf>(contestant.system, EkfOptions{}, streams);
+  return contestant;
+}
+
+TEST(Run, AnEstimatorThatCannotGoOnEndsAloneAndTheCodeSaysSo) {
+  Experiment experiment = MakeExperiment();
+  experiment.contestants.push_back(ExplodingContestant(experiment.source->streams()));
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.status, RunStatus::kFailed);
+  EXPECT_EQ(result.code, ExitCode::kDiverged);
+  EXPECT_NE(result.reason.find("estimator 'exploding' at t = 0.033000 s"), std::string::npos)
+      << result.reason;
+  EXPECT_NE(result.reason.find("last good state at 0.000000 s: p.x = "), std::string::npos);
+  EXPECT_NE(result.reason.find("last measurement used: sensor 'disparity'"), std::string::npos);
+  // The others saw all frames.
+  EXPECT_EQ(result.frames, 60);
+  EXPECT_EQ(result.contestants[0].counts.at("accepted:inverse_scale"), 60);
+}
+
+TEST(Run, DivergenceUnderFailEndsTheRun) {
+  Experiment experiment = MakeExperiment();
+  Contestant& alone = experiment.contestants[1];
+  alone.system.priors[0].mean = {-0.2};
+  alone.on_divergence = OnDivergence::kFail;
+  alone.estimator = std::make_unique<Ekf>(alone.system, EkfOptions{}, experiment.source->streams());
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.code, ExitCode::kDiverged);
+  EXPECT_EQ(result.frames, 1);
+  EXPECT_NE(result.reason.find("not defined at target.depth = -0.2"), std::string::npos);
+}
+
+TEST(Run, AStopIsTakenAfterTheFrame) {
+  Experiment experiment = MakeExperiment();
+  int frames = 0;
+  RunOptions options;
+  options.stop = [&] { return ++frames == 7; };
+  const RunResult result = alidade::Run(experiment, options);
+  EXPECT_EQ(result.status, RunStatus::kStopped);
+  EXPECT_EQ(result.code, ExitCode::kStopped);
+  EXPECT_EQ(result.frames, 7);
+}
+
+/// Five frames, then bad data.
+class Failing : public testing::SwingingTarget {
+ public:
+  explicit Failing(ExitCode code) : SwingingTarget(60), code_(code) {}
+  bool Next(Frame& frame) override {
+    if (++count_ > 5) throw Error(code_, "rows.csv:7 d: 'x' is not a number");
+    return SwingingTarget::Next(frame);
+  }
+
+ private:
+  ExitCode code_;
+  int count_ = 0;
+};
+
+TEST(Run, BadDataKeepsWhatWasDone) {
+  Experiment experiment = MakeExperiment();
+  experiment.source = std::make_unique<Failing>(ExitCode::kBadData);
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.status, RunStatus::kFailed);
+  EXPECT_EQ(result.code, ExitCode::kBadData);
+  EXPECT_EQ(result.reason, "rows.csv:7 d: 'x' is not a number");
+  EXPECT_EQ(result.frames, 5);
+  EXPECT_EQ(result.contestants[0].counts.at("accepted:inverse_scale"), 5);
+}
+
+TEST(Run, TheSameSeedGivesTheSameMetricsTwice) {
+  Experiment first = MakeExperiment(), second = MakeExperiment();
+  EXPECT_EQ(alidade::Run(first, {}).contestants[0].metrics,
+            alidade::Run(second, {}).contestants[0].metrics);
+}
+
+}  // namespace
+}  // namespace alidade

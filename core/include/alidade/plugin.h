@@ -19,9 +19,7 @@ template <class Model>
 void Publish(std::unique_ptr<Holder<Model>> holder, std::uint32_t kind, AlidadeInstance* instance) {
   instance->kind = kind;
   instance->destroy = [](void* self) { delete static_cast<Holder<Model>*>(self); };
-  instance->error_text = [](const void* self) -> const char* {
-    return static_cast<const Holder<Model>*>(self)->error;
-  };
+  instance->error_text = [](const void*) -> const char* { return LastError::Text(); };
   instance->description = &holder->description;
   instance->self = holder.release();
 }

@@ -56,7 +56,15 @@ struct Holder {
   AlidadeDescription description{};
   AlidadeSpace roles[Blocks<Model>::kCount];
   AlidadeSpace space;  ///< the measurement, or the control input
-  mutable char error[256] = "";
+};
+
+/// What the last ALIDADE_ERROR of this thread was about. Hidden: one for each plugin.
+struct __attribute__((visibility("hidden"))) LastError {
+  static char* Text() {
+    static thread_local char text[256] = "";
+    return text;
+  }
+  static void Set(const char* what) { std::snprintf(Text(), 256, "%s", what); }
 };
 
 /// Runs f on the holder behind `self`; an exception becomes ALIDADE_ERROR and its text.
@@ -67,9 +75,9 @@ std::int32_t Guarded(const void* self, const F& f) noexcept {
   try {
     return f(holder->model);
   } catch (const std::exception& e) {
-    std::snprintf(holder->error, sizeof(holder->error), "%s", e.what());
+    LastError::Set(e.what());
   } catch (...) {
-    std::snprintf(holder->error, sizeof(holder->error), "an exception of unknown type");
+    LastError::Set("an exception of unknown type");
   }
   return ALIDADE_ERROR;
 #else

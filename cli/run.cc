@@ -104,6 +104,8 @@ RunResult RunOrFail(Experiment& experiment, const RunOptions& options) {
     return Failure(ExitCode::kInternal, "out of memory");
   } catch (const std::exception& error) {
     return Failure(ExitCode::kInternal, std::string("internal: ") + error.what());
+  } catch (...) {
+    return Failure(ExitCode::kInternal, "internal: an unknown exception was thrown");
   }
 }
 

@@ -3,7 +3,7 @@
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
-#include <cstdio>
+#include <charconv>
 #include <memory>
 
 #include "command.h"
@@ -22,17 +22,23 @@ them. Exit code 1: some runs failed; 75: stopped by a signal, with what was comp
 
 struct Arguments {
   Input input;
-  std::string folder, shard = "1/1";
+  std::string folder;
   SweepOptions options;
   bool force = false, quiet = false;
 };
 
-std::string IsShard(const std::string& text) {
-  int shard = 0, shards = 0;
-  char rest = '\0';
-  const bool two = std::sscanf(text.c_str(), "%d/%d%c", &shard, &shards, &rest) == 2;
-  if (two && shard >= 1 && shard <= shards) return {};
-  return "'" + text + "' is no share; expected i/n with 1 <= i <= n";
+void ReadShard(const std::string& text, SweepOptions& options) {
+  const auto read = [](const std::string& part, int& number) {
+    const char* const end = part.data() + part.size();
+    const auto [rest, error] = std::from_chars(part.data(), end, number);
+    return error == std::errc() && rest == end;
+  };
+  const std::size_t slash = text.find('/');
+  const bool two = slash != std::string::npos && read(text.substr(0, slash), options.shard) &&
+                   read(text.substr(slash + 1), options.shards);
+  if (two && options.shard >= 1 && options.shard <= options.shards) return;
+  throw CLI::ValidationError("--shard",
+                             "'" + text + "' is no share; expected i/n with 1 <= i <= n");
 }
 
 /// Tells of the runs that failed, the first few in full; true where there are any.
@@ -57,7 +63,6 @@ ExitCode RunSweep(const Arguments& arguments) {
   StopOnSignals();
   Progress progress("runs", arguments.quiet);
   SweepOptions options = arguments.options;
-  std::sscanf(arguments.shard.c_str(), "%d/%d", &options.shard, &options.shards);
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
   const SweepResult result = Sweep(config, host, options);
@@ -93,9 +98,12 @@ void AddSweep(CLI::App& program, Action& action) {
   command.add_option("--jobs", arguments->options.jobs, "threads; default: all processors")
       ->option_text("J")
       ->check(CLI::Range(1, 1024));
-  command.add_option("--shard", arguments->shard, "do share i of n of the seeds only")
-      ->option_text("i/n")
-      ->check(IsShard);
+  const auto read_shard = [arguments](const std::string& text) {
+    ReadShard(text, arguments->options);
+  };
+  command
+      .add_option_function<std::string>("--shard", read_shard, "do share i of n of the seeds only")
+      ->option_text("i/n");
   command
       .add_option("-o,--output", arguments->folder,
                   "folder; default: the config's `output:`, or sweep-NAME, in runs/")

@@ -20,7 +20,7 @@ namespace alidade {
 ///   D          -      -                        -      1 to 3
 ///
 /// Defined everywhere.
-/// Source       piecewise [Ekf2017] sec. 4.1 (code), [BarShalom2001] sec. 6.3; white ibid. sec. 6.2.
+/// Source       piecewise [Ekf2017] sec. 4.1 (code), [BarShalom2001] sec. 6.3; white sec. 6.2.
 template <int D, bool kWhite>
 struct ConstantVelocity : Motion<kWhite ? 2 * D : D, Vec<D>, Vec<D>> {
   static constexpr const char* kElements = D == 1 ? "" : D == 2 ? "x,y" : "x,y,z";

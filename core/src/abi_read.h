@@ -9,8 +9,7 @@
 namespace alidade::internal {
 
 /// A copy of a struct of plugin_abi.h, as far as its own size says; zero beyond. `limit`: bytes
-/// that
-/// it may claim at most.
+/// that it may claim at most.
 template <class T>
 T ReadPrefix(const T* from, std::size_t limit = sizeof(T)) {
   T copy{};

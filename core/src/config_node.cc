@@ -2,11 +2,13 @@
 #include <algorithm>
 
 #include "config_tree.h"
+#include "text_table.h"
 
 namespace alidade {
 
 using internal::Child;
 using internal::FailAt;
+using internal::Join;
 using internal::KeyPlace;
 using internal::PathOf;
 using internal::Quoted;
@@ -89,12 +91,6 @@ const ConfigTree& Expect(const ConfigTree& tree, Node::Kind kind, const char* ex
   return tree;
 }
 
-std::string Joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
-
 std::string PathBelow(const ConfigTree& map, std::string_view key) {
   const std::string& path = PathOf(map);
   return path.empty() ? std::string(key) : path + '.' + std::string(key);
@@ -136,7 +132,7 @@ std::string UnknownKey(const ConfigTree& map, const ConfigTree& child) {
   constexpr std::size_t kListed = 8;
   std::string expected;
   if (near.empty() && !absent.empty() && absent.size() <= kListed) {
-    expected = (absent.size() > 1 ? "one of " : "") + Joined(absent);
+    expected = (absent.size() > 1 ? "one of " : "") + Join(absent);
   }
   return ErrorLine(KeyPlace(child), PathOf(child), "unknown key", expected, near);
 }
@@ -203,7 +199,7 @@ bool Node::Flag() const {
 std::string Node::Text() const { return Expect(*tree_, Kind::kScalar, "text").text; }
 
 int Node::Choice(const std::vector<std::string>& choices) const {
-  const std::string expected = (choices.size() > 1 ? "one of " : "") + Joined(choices);
+  const std::string expected = (choices.size() > 1 ? "one of " : "") + Join(choices);
   const std::string& text = Expect(*tree_, Kind::kScalar, expected.c_str()).text;
   const auto found = std::find(choices.begin(), choices.end(), text);
   if (found == choices.end()) Fail(Quoted(text), expected, Nearest(text, choices));

@@ -8,8 +8,7 @@ namespace alidade {
 namespace fs = std::filesystem;
 namespace {
 
-/// `path` with every symlink followed, also one that leads to nothing; empty where they are
-/// endless.
+/// `path` with every symlink followed, also one to nothing; empty where they are endless.
 fs::path Followed(const fs::path& path) {
   constexpr int kMaxLinks = 40;
   const fs::path absolute = fs::absolute(path);

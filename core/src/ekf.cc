@@ -58,6 +58,7 @@ Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>
       sensors_of_stream_(streams.size()),
       state_(system_.InitialState()),
       rejections_(system_.sensors.size(), 0),
+      inflated_(system_.sensors.size(), false),
       warned_(system_.sensors.size(), false) {
   for (const SensorBinding& sensor : system_.sensors) {
     gate_threshold_.push_back(
@@ -72,6 +73,10 @@ Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>
       sensors_of_stream_[s].push_back(static_cast<int>(i));
     }
   }
+}
+
+bool AllFinite(const std::vector<double>& values) {
+  return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
 }
 
 void Ekf::Start(Stamp stamp) { stamp_ = stamp; }
@@ -94,13 +99,14 @@ UpdateReport Ekf::Process(const Frame& frame) {
   std::vector<Row*> together;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (report.measurements[rows[i].report].outcome != Outcome::kAccepted) continue;
-    together.push_back(&rows[i]);
-    const bool last_of_sensor = i + 1 == rows.size() || rows[i + 1].sensor != rows[i].sensor;
-    if (options_.fuse == Fuse::kPerMeasurement ||
-        (options_.fuse == Fuse::kPerSensor && last_of_sensor)) {
+    const bool apart = options_.fuse == Fuse::kPerMeasurement ||
+                       (options_.fuse == Fuse::kPerSensor && !together.empty() &&
+                        together.back()->sensor != rows[i].sensor);
+    if (apart) {
       FuseRows(together, report);
       together.clear();
     }
+    together.push_back(&rows[i]);
   }
   FuseRows(together, report);
   CountRejections(rows, report);
@@ -111,6 +117,7 @@ UpdateReport Ekf::Process(const Frame& frame) {
 std::vector<Ekf::Row> Ekf::Collect(const Frame& frame, UpdateReport& report) {
   std::vector<Row> rows;
   for (const Measurement& m : frame.measurements) {
+    ALIDADE_EXPECTS(m.stream >= 0 && m.stream < std::ssize(sensors_of_stream_));
     for (const int sensor : sensors_of_stream_[static_cast<std::size_t>(m.stream)]) {
       rows.push_back({&m, sensor, 0, {}, {}, {}, {}, {}});
     }
@@ -118,53 +125,89 @@ std::vector<Ekf::Row> Ekf::Collect(const Frame& frame, UpdateReport& report) {
   std::stable_sort(rows.begin(), rows.end(),
                    [](const Row& a, const Row& b) { return a.sensor < b.sensor; });
   for (Row& row : rows) {
-    const SensorBinding& binding = system_.sensors[static_cast<std::size_t>(row.sensor)];
+    const SensorBinding& binding = BindingOf(row);
+    const Geometry& geometry = binding.model.measurement().geometry;
+    ALIDADE_EXPECTS(std::ssize(row.measurement->values) == geometry.ambient);
+    ALIDADE_EXPECTS(row.measurement->covariance.empty() ||
+                    std::ssize(row.measurement->covariance) == geometry.tangent * geometry.tangent);
     row.report = report.measurements.size();
     MeasurementReport& entry = report.measurements.emplace_back();
     entry.sensor = row.sensor;
     entry.landmark = row.measurement->landmark;
-    entry.dof = binding.model.measurement().geometry.tangent;
+    entry.dof = geometry.tangent;
     entry.z = row.measurement->values;
-    const bool finite =
-        std::all_of(entry.z.begin(), entry.z.end(), [](double v) { return std::isfinite(v); });
-    entry.outcome = finite ? OutcomeOf(binding.model.Valid(entry.z.data())) : Outcome::kNotFinite;
+    entry.outcome =
+        AllFinite(entry.z) ? OutcomeOf(binding.model.Valid(entry.z.data())) : Outcome::kNotFinite;
+    if (entry.outcome == Outcome::kFailed) NotePluginFailure(binding, report);
   }
   return rows;
 }
 
+/// Moves the state to `stamp`, in equal parts of at most max_dt_s. Where a part cannot be done the
+/// state stays at the end of the one before.
 void Ekf::StepTo(Stamp stamp, UpdateReport& report) {
-  const double dt_s = Seconds(stamp - stamp_);
-  if (!(dt_s > 0.0)) return;
-  const double parts = std::ceil(dt_s / options_.max_dt_s);
-  const int count = parts > 1.0 ? static_cast<int>(parts) : 1;
-  for (int i = 0; i < count && !failed_; ++i) {
-    for (const MotionBinding& motion : system_.motions) {
-      if (!StepModel(motion, dt_s / count, report)) break;
-    }
+  constexpr double kMostParts = 1e6;
+  Stamp elapsed = 0;
+  const bool overflow = __builtin_sub_overflow(stamp, stamp_, &elapsed);
+  const double dt_s = Seconds(elapsed), parts = std::ceil(dt_s / options_.max_dt_s);
+  if (elapsed == 0) return;
+  if (overflow || parts > kMostParts) {
+    char text[128];
+    std::snprintf(text, sizeof(text), "a gap of %.6g s would need more than %g steps of %g s", dt_s,
+                  kMostParts, options_.max_dt_s);
+    return GiveUp(report, "gap", text);
   }
-  if (!failed_) stamp_ = stamp;
+  const std::int64_t count = std::max<std::int64_t>(1, static_cast<std::int64_t>(parts));
+  const Stamp start = stamp_;
+  for (std::int64_t i = 1; i <= count; ++i) {
+    if (!StepOnce(dt_s / static_cast<double>(count), report)) return;
+    stamp_ = i == count ? stamp : start + elapsed / count * i;
+  }
 }
 
-/// Moves the blocks of one motion model. Fixed blocks stay; a model with a block that has no value
-/// yet waits. False where the filter cannot go on.
-bool Ekf::StepModel(const MotionBinding& motion, double dt_s, UpdateReport& report) {
+/// One step of all motion models: all of it happens or nothing.
+bool Ekf::StepOnce(double dt_s, UpdateReport& report) {
+  std::vector<Motion> moves;
+  for (const MotionBinding& motion : system_.motions) {
+    if (!StepModel(motion, dt_s, moves, report)) return false;
+  }
+  for (const Motion& move : moves) {
+    state_.covariance().Propagate(move.segments, move.f, move.q);
+  }
+  for (int i = 0; i < state_.covariance().size(); ++i) {
+    if (std::isfinite(state_.covariance().Variance(i))) continue;
+    GiveUp(report, "not_finite", "the covariance steps to what is not finite");
+    return false;
+  }
+  for (const Motion& move : moves) {
+    for (const auto& [id, value] : move.next)
+      std::copy(value.begin(), value.end(), state_.value(id));
+  }
+  return true;
+}
+
+/// What one motion model makes of its blocks, added to `moves`. Fixed blocks stay; a model with a
+/// block that has no value yet waits. False where the filter cannot go on.
+bool Ekf::StepModel(const MotionBinding& motion, double dt_s, std::vector<Motion>& moves,
+                    UpdateReport& report) {
   const int n = motion.model.tangent_size(), n_w = motion.model.noise_size();
   std::vector<const double*> x;
   std::vector<std::vector<double>> next;
   std::vector<double*> y;
-  std::vector<std::pair<int, int>> segments;
   std::vector<Eigen::Index> rows;  // of F that have a covariance
+  Motion move;
   int row = 0;
   for (const BlockId id : motion.blocks) {
     const Block& block = state_.layout()[id];
     if (!block.present) return true;
+    const int size = block.geometry().tangent;
     x.push_back(state_.value(id));
     next.emplace_back(block.geometry().ambient);
-    if (block.has_covariance())
-      segments.emplace_back(block.tangent_offset, block.geometry().tangent);
-    for (int i = 0; i < block.geometry().tangent; ++i, ++row) {
-      if (block.has_covariance()) rows.push_back(row);
+    if (block.has_covariance()) {
+      move.segments.emplace_back(block.tangent_offset, size);
+      for (int i = 0; i < size; ++i) rows.push_back(row + i);
     }
+    row += size;
   }
   for (std::vector<double>& value : next) y.push_back(value.data());
   RowMajor f = RowMajor::Constant(n, n, std::nan("")), g = RowMajor::Constant(n, n_w, std::nan(""));
@@ -178,22 +221,24 @@ bool Ekf::StepModel(const MotionBinding& motion, double dt_s, UpdateReport& repo
     return false;
   }
   const RowMajor gl = g * l;
-  const Eigen::MatrixXd f_used = f(rows, rows), q_used = (gl * gl.transpose())(rows, rows);
-  bool finite = f_used.allFinite() && q_used.allFinite();
-  for (const auto& value : next) {
-    for (const double v : value) finite = finite && std::isfinite(v);
-  }
-  if (!finite) {
+  move.f = f(rows, rows);
+  move.q = (gl * gl.transpose())(rows, rows);
+  if (!move.f.allFinite() || !move.q.allFinite() ||
+      !std::all_of(next.begin(), next.end(), AllFinite)) {
     GiveUp(report, "not_finite",
            "motion model of '" + motion.name + "' steps to a state that is not finite");
     return false;
   }
-  state_.covariance().Propagate(segments, f_used, q_used);
   for (std::size_t i = 0; i < next.size(); ++i) {
     if (state_.layout()[motion.blocks[i]].status == BlockStatus::kFixed) continue;
-    std::copy(next[i].begin(), next[i].end(), state_.value(motion.blocks[i]));
+    move.next.emplace_back(motion.blocks[i], std::move(next[i]));
   }
+  moves.push_back(std::move(move));
   return true;
+}
+
+void Ekf::NotePluginFailure(const SensorBinding& sensor, UpdateReport& report) const {
+  Note(report, "plugin_failed", "sensor '" + sensor.name + "': " + sensor.model.error_text());
 }
 
 void Ekf::Note(UpdateReport& report, const char* kind, std::string text) const {

@@ -6,9 +6,18 @@
 namespace alidade {
 namespace {
 
-bool Rejected(Outcome outcome) {
-  return outcome == Outcome::kGated || outcome == Outcome::kOutOfDomain ||
-         outcome == Outcome::kNotFinite || outcome == Outcome::kNotPd;
+/// A measurement that is itself not finite tells nothing of the filter.
+bool Rejected(const MeasurementReport& entry) {
+  switch (entry.outcome) {
+    case Outcome::kGated:
+    case Outcome::kOutOfDomain:
+    case Outcome::kNotPd:
+      return true;
+    case Outcome::kNotFinite:
+      return AllFinite(entry.z);
+    default:
+      return false;
+  }
 }
 
 }  // namespace
@@ -23,7 +32,7 @@ void Ekf::InitialiseFrom(std::vector<Row>& rows, UpdateReport& report) {
     progress = false;
     for (Row& row : rows) {
       Outcome& outcome = report.measurements[row.report].outcome;
-      const SensorBinding& binding = system_.sensors[static_cast<std::size_t>(row.sensor)];
+      const SensorBinding& binding = BindingOf(row);
       const int role = binding.model.initialised_role();
       if (outcome != Outcome::kAccepted || role < 0) continue;
       const RoleBinding& target = binding.roles[static_cast<std::size_t>(role)];
@@ -34,13 +43,13 @@ void Ekf::InitialiseFrom(std::vector<Row>& rows, UpdateReport& report) {
           !missing(target) || std::none_of(system_.priors.begin(), system_.priors.end(), waits)) {
         continue;
       }
-      outcome = InitialiseBlock(row) ? Outcome::kInitialised : Outcome::kInvalid;
-      progress = outcome == Outcome::kInitialised;
+      outcome = InitialiseBlock(row, report);
+      progress = progress || outcome == Outcome::kInitialised;
     }
   }
   for (Row& row : rows) {
     Outcome& outcome = report.measurements[row.report].outcome;
-    const SensorBinding& binding = system_.sensors[static_cast<std::size_t>(row.sensor)];
+    const SensorBinding& binding = BindingOf(row);
     if (outcome == Outcome::kAccepted &&
         std::any_of(binding.roles.begin(), binding.roles.end(), missing)) {
       outcome = Outcome::kNotReady;
@@ -49,9 +58,9 @@ void Ekf::InitialiseFrom(std::vector<Row>& rows, UpdateReport& report) {
 }
 
 /// Gives the block of the sensor's initialised role the value that the measurement implies, with
-/// its covariance and correlations; a block that has a value loses it.
-bool Ekf::InitialiseBlock(const Row& row) {
-  const SensorBinding& binding = system_.sensors[static_cast<std::size_t>(row.sensor)];
+/// its covariance and correlations; a block that has a value loses it. kInitialised, or why not.
+Outcome Ekf::InitialiseBlock(Row& row, UpdateReport& report) {
+  const SensorBinding& binding = BindingOf(row);
   const auto target = static_cast<std::size_t>(binding.model.initialised_role());
   const BlockId id = binding.roles[target].block;
   const int m = binding.model.measurement().geometry.tangent;
@@ -70,58 +79,68 @@ bool Ekf::InitialiseBlock(const Row& row) {
     jx[i] = jacobians[i].data();
   }
   std::vector<double> y(static_cast<std::size_t>(state_.layout()[id].geometry().ambient));
-  RowMajor jz(k, m), l = RowMajor::Zero(m, m);
+  RowMajor jz(k, m);
   const double* z = row.measurement->values.data();
-  if (binding.model.Initialise(roles.data(), z, y.data(), jx.data(), jz.data()) != Status::kOk) {
-    return false;
-  }
+  const Status status = binding.model.Initialise(roles.data(), z, y.data(), jx.data(), jz.data());
   roles[target] = y.data();
-  if (binding.model.SqrtNoise(roles.data(), z, l.data()) != Status::kOk) return false;
-  const RowMajor jl = jz * l;
-  const auto finite = [](double v) { return std::isfinite(v); };
-  if (!jl.allFinite() || !std::all_of(y.begin(), y.end(), finite)) return false;
+  const Outcome outcome = status == Status::kOk ? NoiseOf(row, roles) : OutcomeOf(status);
+  if (outcome == Outcome::kFailed) NotePluginFailure(binding, report);
+  if (outcome != Outcome::kAccepted) {
+    return outcome == Outcome::kFailed ? outcome : Outcome::kInvalid;
+  }
+  const Eigen::MatrixXd own = jz * row.r * jz.transpose();
+  if (!own.allFinite() || !AllFinite(y)) return Outcome::kNotFinite;
   for (std::size_t i = 0; i < roles.size(); ++i) {
     if (jx[i] == nullptr) continue;
     from.push_back(binding.roles[i].block);
     from_jacobians.emplace_back(jacobians[i]);
   }
   if (state_.layout()[id].present) state_.Marginalise(id);
-  state_.Initialise(id, y.data(), from, from_jacobians, jl * jl.transpose());
-  return true;
+  state_.Initialise(id, y.data(), from, from_jacobians, own);
+  return Outcome::kInitialised;
 }
 
 /// Counts rejections in a row for each sensor, and recovers one that is locked out.
-void Ekf::CountRejections(const std::vector<Row>& rows, UpdateReport& report) {
-  for (const Row& row : rows) {
-    int& count = rejections_[static_cast<std::size_t>(row.sensor)];
-    const Outcome outcome = report.measurements[row.report].outcome;
-    if (outcome == Outcome::kAccepted || outcome == Outcome::kInitialised) count = 0;
-    if (!Rejected(outcome)) continue;
-    if (++count < options_.lockout_after || options_.lockout == Lockout::kNone) continue;
-    count = 0;
+void Ekf::CountRejections(std::vector<Row>& rows, UpdateReport& report) {
+  for (Row& row : rows) {
+    const auto sensor = static_cast<std::size_t>(row.sensor);
+    const MeasurementReport& entry = report.measurements[row.report];
+    if (entry.outcome == Outcome::kAccepted || entry.outcome == Outcome::kInitialised) {
+      rejections_[sensor] = 0;
+      inflated_[sensor] = false;
+    }
+    if (!Rejected(entry)) continue;
+    if (++rejections_[sensor] < options_.lockout_after) continue;
+    if (options_.lockout == Lockout::kNone) continue;
+    rejections_[sensor] = 0;
     Recover(row, report);
   }
 }
 
 /// Resets what the sensor determines from its measurement, with the blocks that move with it at
-/// their prior uncertainty; where that cannot be, inflates all blocks that the sensor touches.
-void Ekf::Recover(const Row& row, UpdateReport& report) {
-  const SensorBinding& binding = system_.sensors[static_cast<std::size_t>(row.sensor)];
+/// their prior uncertainty; where that cannot be, inflates the blocks that the sensor corrects, once
+/// until it is accepted again.
+void Ekf::Recover(Row& row, UpdateReport& report) {
+  const SensorBinding& binding = BindingOf(row);
   const std::string why = "sensor '" + binding.name + "' rejected " +
                           std::to_string(options_.lockout_after) + " times in a row: ";
   const int role = binding.model.initialised_role();
   const RoleBinding* target = role < 0 ? nullptr : &binding.roles[static_cast<std::size_t>(role)];
   if (options_.lockout == Lockout::kReset && target != nullptr &&
       target->mode == RoleMode::kEstimate &&
-      state_.layout()[target->block].status == BlockStatus::kEstimated && InitialiseBlock(row)) {
+      state_.layout()[target->block].status == BlockStatus::kEstimated &&
+      InitialiseBlock(row, report) == Outcome::kInitialised) {
     ForgetMotionOf(target->block);
     Note(report, "lockout",
          why + "reset " + state_.layout()[target->block].name + " from its measurement");
     return;
   }
+  if (inflated_[static_cast<std::size_t>(row.sensor)]) return;
+  inflated_[static_cast<std::size_t>(row.sensor)] = true;
   constexpr double kInflation = 10.0;
   for (const RoleBinding& bound : binding.roles) {
-    if (bound.block < 0 || !state_.layout()[bound.block].has_covariance()) continue;
+    if (bound.block < 0 || bound.mode != RoleMode::kEstimate) continue;
+    if (!state_.layout()[bound.block].has_covariance()) continue;
     const Block& block = state_.layout()[bound.block];
     const int n = block.geometry().tangent;
     state_.covariance().Transform(block.tangent_offset,

@@ -47,9 +47,7 @@ Outcome Ekf::Linearise(Row& row, MeasurementReport& entry, UpdateReport& report)
     outcome = NoiseOf(row, roles);
   }
   if (outcome == Outcome::kAccepted) outcome = JacobiansOf(row, roles);
-  if (outcome == Outcome::kFailed) {
-    Note(report, "plugin_failed", "sensor '" + binding.name + "': " + binding.model.error_text());
-  }
+  if (outcome == Outcome::kFailed) NotePluginFailure(binding, report);
   if (outcome == Outcome::kOutOfDomain && rejections_[static_cast<std::size_t>(row.sensor)] == 0) {
     diverged_ = true;
     std::vector<BlockId> blocks;
@@ -94,6 +92,7 @@ Outcome Ekf::JacobiansOf(Row& row, std::vector<const double*> roles) const {
       implied.resize(static_cast<std::size_t>(binding.model.roles()[i].geometry.ambient));
       const Status status = binding.model.Initialise(roles.data(), row.measurement->values.data(),
                                                      implied.data(), nullptr, nullptr);
+      if (status == Status::kError) return Outcome::kFailed;
       if (status != Status::kOk) return Outcome::kInvalid;
       roles[i] = implied.data();
     }
@@ -185,8 +184,8 @@ Outcome Ekf::Apply(const std::vector<Row*>& rows, UpdateReport& report) {
   const Eigen::MatrixXd w = llt.matrixL().solve(pht.transpose()).transpose();
   Eigen::MatrixXd gain = llt.solve(pht.transpose()).transpose();
   const bool masked = MaskConsidered(rows, gain);
-  const Eigen::VectorXd dx = gain * innovation;
-  if (!dx.allFinite() || !w.allFinite()) {
+  std::vector<double> moved = state_.Moved(gain * innovation);
+  if (!AllFinite(moved) || !w.allFinite() || !gain.allFinite()) {
     Note(report, "not_finite", "the update is not finite; rolled back");
     return Outcome::kNotFinite;
   }
@@ -194,11 +193,16 @@ Outcome Ekf::Apply(const std::vector<Row*>& rows, UpdateReport& report) {
     Note(report, "not_pd", "the update would leave P not positive definite; rolled back");
     return Outcome::kNotPd;
   }
-  state_.Correct(dx);
+  state_.MoveTo(std::move(moved));
   at = 0;
   for (const Row* row : rows) {
     const Eigen::Index k = row->innovation.size();
-    report.measurements[row->report].gain = gain.middleCols(at, k);
+    for (BlockId id = 0; id < std::ssize(state_.layout().blocks()); ++id) {
+      const Block& block = state_.layout()[id];
+      if (!block.has_covariance()) continue;
+      report.measurements[row->report].gain.push_back(
+          {id, gain.block(block.tangent_offset, at, block.geometry().tangent, k)});
+    }
     last_used_ = {row->sensor, row->measurement->stamp, row->measurement->values};
     at += k;
   }

@@ -95,7 +95,7 @@ void EstimatorFiles::Add(const Frame& frame, const State& state, const UpdateRep
   for (const MeasurementReport& one : report.measurements) {
     if (one.sensor < 0 || one.sensor >= static_cast<int>(recorded_.sensors.size())) continue;
     AddInnovation(frame.stamp, one);
-    if (one.gain.size() > 0) AddGain(frame.stamp, state, one);
+    if (!one.gain.empty()) AddGain(frame.stamp, state, one);
   }
 }
 
@@ -160,15 +160,15 @@ void EstimatorFiles::AddGain(Stamp stamp, const State& state, const MeasurementR
   std::vector<const double*> cells(gain_columns_, nullptr);
   std::size_t next = 0;  // of sensor.gains, which lists blocks, elements, measured elements
   for (const BlockColumns& columns : blocks_) {
-    const Block& block = state.layout()[columns.id];
-    if (block.status == BlockStatus::kFixed) continue;
+    if (state.layout()[columns.id].status == BlockStatus::kFixed) continue;
+    const auto of_block = [&](const BlockGain& gain) { return gain.block == columns.id; };
+    const auto found = std::find_if(report.gain.begin(), report.gain.end(), of_block);
     for (int i = 0; i < static_cast<int>(columns.tangent); ++i) {
-      const int row = block.tangent_offset + i;
       for (int j = 0; j < sensor.tangent && next < sensor.gains.size(); ++j, ++next) {
-        if (!block.present || row >= report.gain.rows() || j >= report.gain.cols()) continue;
+        if (found == report.gain.end()) continue;
         RecordedGain& gain = sensor.gains[next];
-        cells[static_cast<std::size_t>(gain.column) - 3] = &report.gain(row, j);
-        gain.used = gain.used || report.gain(row, j) != 0.0;
+        cells[static_cast<std::size_t>(gain.column) - 3] = &found->k(i, j);
+        gain.used = gain.used || found->k(i, j) != 0.0;
       }
     }
   }

@@ -115,9 +115,6 @@ void ModelInstance::ReadCalls() {
   if (instance_.kind == ALIDADE_KIND_SENSOR && instance_.sensor != nullptr) {
     sensor_ = ReadPrefix(instance_.sensor);
     instance_.sensor = &sensor_;
-    if (sensor_.residual == nullptr && (sensor_.eval == nullptr || sensor_.sqrt_noise == nullptr)) {
-      Refuse("lacks a function that every sensor must have: eval, sqrt_noise");
-    }
   } else if (instance_.kind == ALIDADE_KIND_MOTION && instance_.motion != nullptr) {
     motion_ = ReadPrefix(instance_.motion);
     instance_.motion = &motion_;
@@ -137,6 +134,9 @@ void ModelInstance::ReadDescription() {
   const bool is_sensor = instance_.kind == ALIDADE_KIND_SENSOR;
   if ((capabilities_ & ALIDADE_RESIDUAL_ONLY) != 0) {
     Refuse("gives a residual alone, which this version does not support");
+  }
+  if (is_sensor && (sensor_.eval == nullptr || sensor_.sqrt_noise == nullptr)) {
+    Refuse("lacks a function that every sensor must have: eval, sqrt_noise");
   }
   const int count = static_cast<int>(std::min<std::uint32_t>(description_.role_count, 1 << 16));
   if (count < 1 || count > kMaxRoles || description_.roles == nullptr) {

@@ -75,12 +75,16 @@ void OutputFile::Write(std::string_view text) {
 }
 
 void OutputFile::Flush() {
-  std::string_view rest = buffer_;
-  while (!rest.empty()) {
-    const ssize_t written = WriteQuietly(fd_, rest.data(), rest.size());
+  std::size_t done = 0;
+  while (done < buffer_.size()) {
+    const ssize_t written = WriteQuietly(fd_, buffer_.data() + done, buffer_.size() - done);
     if (written < 0 && errno == EINTR) continue;
-    if (written < 0) FailIo(shown_, "write", errno);
-    rest.remove_prefix(static_cast<std::size_t>(written));
+    if (written < 0) {
+      const int error = errno;
+      buffer_.erase(0, done);  // or else a later Close() would write it a second time
+      FailIo(shown_, "write", error);
+    }
+    done += static_cast<std::size_t>(written);
   }
   buffer_.clear();
 }

@@ -23,8 +23,7 @@ class ParamReader {
   /// Why the model says that it cannot be made, where that belongs to no key; else "".
   const std::string& failure() const { return failure_; }
   /// Throws all errors as one, kBadConfig, in the order of their places (that of the reads depends
-  /// on
-  /// the compiler); returns where there are none.
+  /// on the compiler); returns where there are none.
   void Check() const;
 
  private:
@@ -64,8 +63,8 @@ class ParamRecorder {
       }
     }
   }
-  /// All keys that were asked for: the required, those with a default, those that a choice asks
-  /// for.
+  /// All keys that were asked for: the required ones, those with a default, and those that a choice
+  /// asks for.
   std::vector<ParamInfo> Result() const;
 
  private:

@@ -11,7 +11,6 @@
 namespace alidade {
 namespace {
 
-using internal::KindName;
 using internal::ParamReader;
 using internal::ParamRecorder;
 

@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <optional>
 #include <set>
+#include <string_view>
 
 #include "abi_read.h"
 #include "alidade/build_plugin.h"
@@ -19,6 +20,9 @@ namespace fs = std::filesystem;
 namespace {
 
 using internal::KindName;
+
+static_assert(std::string_view(ALIDADE_BUILD_VERSION) == ALIDADE_VERSION,
+              "build_plugin.h states another version than the project");
 
 [[noreturn]] void Refuse(const fs::path& file, const std::string& why) {
   throw Error(ExitCode::kPlugin, ErrorLine({file.string()}, {}, why));
@@ -169,7 +173,7 @@ void PluginHost::AddEntries(const Loaded& plugin) {
     for (int i = 0; i < plugin.build_table->source_count; ++i) {
       const SourceEntry& source = plugin.build_table->sources[i];
       entries_.push_back(
-          {PluginEntry::Kind::kSource, source.name, Text(source.doc), "", "", plugin.file});
+          {PluginEntry::Kind::kSource, source.name, Text(source.doc), "", "", plugin.file, 0});
     }
     return;
   }
@@ -177,7 +181,7 @@ void PluginHost::AddEntries(const Loaded& plugin) {
   for (std::uint32_t i = 0; i < table.entry_count; ++i) {
     const AlidadeEntry entry = internal::ReadEntry(table.entries, table.entry_stride, i);
     entries_.push_back({ToKind(entry.kind), entry.name, Text(entry.doc), Text(entry.citation),
-                        Text(entry.family), plugin.file});
+                        Text(entry.family), plugin.file, entry.thread_flags});
   }
 }
 

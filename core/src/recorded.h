@@ -46,7 +46,6 @@ struct RecordedEstimator {
   int width = 0;  ///< of the widest measurement: columns z0 .. z<width - 1>, then h, s and r
   std::int64_t estimate_rows = 0, innovation_rows = 0, gain_rows = 0;
 
-  int z_column(int i) const { return 8 + i; }
   int h_column(int i) const { return 8 + width + i; }
   int s_column(int i) const { return 8 + 2 * width + i; }
   int r_column(int i) const { return 8 + 3 * width + i; }

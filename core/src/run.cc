@@ -56,11 +56,13 @@ bool Advance(Lane& lane, int index, const Frame& frame, const std::vector<bool>&
   Estimator& estimator = *lane.contestant.estimator;
   const UpdateReport report = estimator.Process(frame);
   lane.result.events.insert(lane.result.events.end(), report.events.begin(), report.events.end());
-  lane.metrics.Add(frame, in_segment, estimator.state(), report);
-  if (options.recorder != nullptr) {
-    options.recorder->AddEstimate(index, frame, estimator.state(), report);
-  }
   lane.ended = estimator.failed();
+  if (!lane.ended) {
+    lane.metrics.Add(frame, in_segment, estimator.state(), report);
+    if (options.recorder != nullptr) {
+      options.recorder->AddEstimate(index, frame, estimator.state(), report);
+    }
+  }
   const bool policy = lane.contestant.on_divergence == OnDivergence::kFail && estimator.diverged();
   if (!lane.ended && !policy) return true;
   if (result.status == RunStatus::kOk) {
@@ -91,6 +93,7 @@ void RunFrames(Experiment& experiment, std::vector<Lane>& lanes, const RunOption
     if (!go_on || std::all_of(lanes.begin(), lanes.end(), ended)) return;
     if (options.progress) options.progress(result.frames, size);
     if (options.stop && options.stop()) {
+      if (result.status != RunStatus::kOk) return;
       result.status = RunStatus::kStopped;
       result.code = ExitCode::kStopped;
       result.reason = "stopped after " + std::to_string(result.frames) + " frames";

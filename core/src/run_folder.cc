@@ -2,11 +2,13 @@
 #include "run_folder.h"
 
 #include <fcntl.h>
+#include <signal.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <charconv>
 
 namespace alidade::internal {
 namespace {
@@ -36,13 +38,24 @@ bool Exists(const fs::path& path) {
   return fs::exists(fs::symlink_status(path, error));
 }
 
-/// True where a living process holds the folder.
-bool IsHeld(const fs::path& folder) {
+bool IsAlive(std::string_view process) {
+  pid_t pid = 0;
+  const char* const end = process.data() + process.size();
+  const auto [rest, error] = std::from_chars(process.data(), end, pid);
+  if (error != std::errc() || rest != end || pid <= 0) return false;
+  return ::kill(pid, 0) == 0 || errno == EPERM;
+}
+
+/// True where a living process holds the folder, which `process` has made. On a file system
+/// without locks it holds the folder as long as it lives.
+bool IsHeld(const fs::path& folder, std::string_view process) {
   const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
   if (fd < 0) return false;
-  const bool held = ::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  const bool locked = ::flock(fd, LOCK_EX | LOCK_NB) == 0;
+  const int error = errno;
   ::close(fd);
-  return held;
+  if (locked) return false;
+  return error == EWOULDBLOCK || IsAlive(process);
 }
 
 fs::path WithoutTrailingSlash(const fs::path& path) {
@@ -121,8 +134,9 @@ void RunFolder::RemoveLeftovers() const {
   for (const auto& entry : fs::directory_iterator(target_.parent_path(), error)) {
     const std::string name = entry.path().filename().string();
     if (name.starts_with(partial)) {
-      if (IsHeld(entry.path())) {
-        Refuse(shown_, "process " + name.substr(partial.size()) + " is writing it now",
+      const std::string process = name.substr(partial.size());
+      if (IsHeld(entry.path(), process)) {
+        Refuse(shown_, "process " + process + " is writing it now",
                "wait for it or choose another folder");
       }
       fs::remove_all(entry.path(), error);
@@ -144,7 +158,7 @@ void RunFolder::CheckTarget() const {
   if (!fs::is_directory(target_, error)) Refuse(shown_, "is a file", "choose another folder");
   const bool ours = Exists(target_ / "run.json") || Exists(target_ / "sweep.json");
   if (!fs::is_empty(target_, error) && !ours) {
-    Refuse(shown_, "is not a run folder (it has no run.json)",
+    Refuse(shown_, "is not a run folder (it has neither run.json nor sweep.json)",
            "--force replaces run folders only; choose another folder");
   }
 }

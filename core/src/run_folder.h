@@ -18,7 +18,7 @@ class RunFolder {
  public:
   /// Creates the partial folder, and the folders above it where they are missing. Removes partial
   /// folders of dead processes. Errors: kCannotCreate where `target` exists without `force`, is no
-  /// run folder (no run.json), or is being written by another process; kIo.
+  /// run folder (neither run.json nor sweep.json), or is being written by another process; kIo.
   RunFolder(const std::filesystem::path& target, bool force);
   /// Removes what was not committed, with the folders above it that were made for it.
   ~RunFolder();

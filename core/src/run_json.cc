@@ -6,10 +6,6 @@
 #include "json.h"
 #include "number_text.h"
 
-#ifndef ALIDADE_VERSION
-#define ALIDADE_VERSION "0"
-#endif
-
 namespace alidade::internal {
 namespace {
 

@@ -32,9 +32,8 @@ void UnitPlus(const double* x, const double* d, double* y) {
 }
 
 /// Parallel transport on S^2 in the bases of geometry.h: J = B(to)' R B(from), where R turns `from`
-/// into `to` the short way, R v = v - (from + to) (to . v) / (1 + from . to).
-/// From a point to its antipode every way is as short; the one along the first basis vector is
-/// taken.
+/// into `to` the short way, R v = v - (from + to) (to . v) / (1 + from . to). From a point to its
+/// antipode every way is as short; the one along the first basis vector is taken.
 void UnitVectorTransport(const double* from, const double* to, double* j) {
   double b_from[6], b_to[6];
   UnitVector::Basis(from, b_from);

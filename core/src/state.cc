@@ -121,23 +121,26 @@ void State::Reparametrise(BlockId id, Space space, const double* value,
   layout_.blocks_.pop_back();
 }
 
-void State::Correct(const Eigen::VectorXd& dx) {
-  for (BlockId id = 0; id < static_cast<BlockId>(layout_.blocks_.size()); ++id) {
-    const Block& block = layout_[id];
+std::vector<double> State::Moved(const Eigen::VectorXd& dx) const {
+  std::vector<double> moved = values_;
+  for (const Block& block : layout_.blocks()) {
     if (!block.has_covariance()) continue;
-    const Geometry& geometry = block.geometry();
-    double* x = value(id);
-    if (geometry.kind != GeometryKind::kUnitVector) {
-      geometry.Plus(x, dx.data() + block.tangent_offset, x);
-      continue;
-    }
-    double moved[3];
-    Eigen::Matrix<double, 2, 2, Eigen::RowMajor> j;
-    geometry.Plus(x, dx.data() + block.tangent_offset, moved);
-    geometry.Transport(x, moved, j.data());
-    covariance_.Transform(block.tangent_offset, j);
-    std::copy_n(moved, 3, x);
+    double* x = moved.data() + block.value_offset;
+    block.geometry().Plus(x, dx.data() + block.tangent_offset, x);
   }
+  return moved;
+}
+
+void State::MoveTo(std::vector<double> values) {
+  ALIDADE_EXPECTS(values.size() == values_.size());
+  for (const Block& block : layout_.blocks()) {
+    if (!block.has_covariance() || block.geometry().kind != GeometryKind::kUnitVector) continue;
+    RowMajor j(block.geometry().tangent, block.geometry().tangent);
+    block.geometry().Transport(values_.data() + block.value_offset,
+                               values.data() + block.value_offset, j.data());
+    covariance_.Transform(block.tangent_offset, j);
+  }
+  values_ = std::move(values);
 }
 
 }  // namespace alidade

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <mutex>
+#include <system_error>
 #include <thread>
 
 namespace alidade {
@@ -60,7 +61,7 @@ class Queue {
       RunOptions options;
       options.stop = options_.stop;
       RunResult result = Run(experiment, options);
-      run.status = result.status;
+      run.status = result.code == ExitCode::kDiverged ? RunStatus::kOk : result.status;
       run.code = result.code;
       run.reason = std::move(result.reason);
       run.contestants = std::move(result.contestants);
@@ -69,6 +70,8 @@ class Queue {
       Fail(run, error.code(), error.what());
     } catch (const std::exception& error) {
       Fail(run, ExitCode::kInternal, error.what());
+    } catch (...) {
+      Fail(run, ExitCode::kInternal, "an unknown exception was thrown");
     }
     return run;
   }
@@ -88,6 +91,15 @@ class Queue {
   std::mutex mutex_;
   std::vector<SweepRun> done_;
 };
+
+/// Whether every model on offer may work in several instances at once. Asked of all, used or not:
+/// which ones a config uses is known only to those who build it.
+bool MayRunInParallel(const PluginHost& host) {
+  return std::ranges::all_of(host.entries(), [](const PluginEntry& entry) {
+    return entry.kind == PluginEntry::Kind::kSource ||
+           (entry.thread_flags & ALIDADE_THREAD_INSTANCES) != 0;
+  });
+}
 
 Spread SpreadOf(std::vector<double> values) {
   std::sort(values.begin(), values.end());
@@ -116,11 +128,16 @@ SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptio
 
   Queue queue(config, host, options, result.first_seed, result.runs);
   const auto hardware = static_cast<std::int64_t>(std::thread::hardware_concurrency());
-  const std::int64_t wanted = options.jobs > 0 ? options.jobs : std::max<std::int64_t>(1, hardware);
+  const std::int64_t jobs = options.jobs > 0 ? options.jobs : std::max<std::int64_t>(1, hardware);
+  const std::int64_t wanted = MayRunInParallel(host) ? jobs : 1;
   {
     std::vector<std::jthread> threads;
     for (std::int64_t i = 1; i < std::min(wanted, result.runs); ++i) {
-      threads.emplace_back([&queue] { queue.Work(); });
+      try {
+        threads.emplace_back([&queue] { queue.Work(); });
+      } catch (const std::system_error&) {
+        break;  // no more threads are to be had; these do
+      }
     }
     queue.Work();
   }

@@ -1,4 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <sys/resource.h>
+
+#include <algorithm>
+
 #include "alidade/config.h"
 #include "support/program.h"
 
@@ -52,6 +56,29 @@ TEST_F(SweepCli, SharesMakeTheWhole) {
   };
   EXPECT_EQ(rows("a", "1/2") + rows("b", "2/2"), rows("whole", "1/1"));
   EXPECT_EQ(Json("b/sweep.json").root().At("first_seed").Number(), 3);
+}
+
+TEST_F(SweepCli, RefusesWhatIsNoShare) {
+  // 4294967297 is 1 in 32 bits.
+  for (const std::string shard : {"4294967297/4294967297", "1/99999999999999999999", "1/", "/2",
+                                  "1", "", "0/2", "3/2", "1/2/3", "1/2x", " 1/2", "-1/2"}) {
+    const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "1", "--shard=" + shard});
+    EXPECT_EQ(sweep.code, 2) << shard;
+  }
+  const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "1", "--shard", "3/2"});
+  EXPECT_TRUE(Contains(sweep.err, "--shard: '3/2' is no share")) << sweep.err;
+}
+
+TEST_F(SweepCli, GoesOnWithTheThreadsThereAre) {
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_STACK, &before), 0);
+  // The stack of a thread is to be as large as this, half of the address space.
+  const rlimit huge{std::min<rlim_t>(rlim_t{1} << 46, before.rlim_max), before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_STACK, &huge), 0);
+  const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "6", "--jobs", "6", "-o", "out"});
+  ASSERT_EQ(::setrlimit(RLIMIT_STACK, &before), 0);
+  EXPECT_EQ(sweep.code, 0) << sweep.err;
+  EXPECT_EQ(Json("out/sweep.json").root().At("runs_used").Number(), 6);
 }
 
 TEST_F(SweepCli, CountsDivergedRunsAndLeavesTheirMetricsOut) {

@@ -14,7 +14,7 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// Textbook Kalman filter of MovingPoint, written out: x' = F x, P' = F P F' + G q G', and an update
+/// Textbook Kalman filter of MovingPoint in full: x' = F x, P' = F P F' + G q G', and an update
 /// by the inverse of S.
 struct Textbook {
   Eigen::Vector2d x{1.0, -0.5};
@@ -178,6 +178,78 @@ TEST(Ekf, AStepThatIsNotFiniteEndsWithTheLastGoodStateAndMeasurement) {
   EXPECT_NE(report.events[0].text.find("last good state at 0.000000 s: p.x = 4"),
             std::string::npos);
   EXPECT_NE(report.events[0].text.find("sensor 'direct' at 0.000000 s, z = 5"), std::string::npos);
+}
+
+TEST(Ekf, AFailedStepMovesNothing) {
+  System system = MovingPoint();
+  AddMotion(system, "q", InProcessMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
+  Ekf ekf(system, {}, {});
+  ekf.Start(0);
+  const std::vector<double> x = ekf.state().values();
+  const Eigen::MatrixXd p = ekf.state().covariance().Dense();
+  ekf.Process(FrameAt(1.0, {}));
+  EXPECT_TRUE(ekf.failed());
+  EXPECT_EQ(ekf.state().values(), x);
+  EXPECT_EQ(ekf.state().covariance().Dense(), p);
+}
+
+TEST(Ekf, AGapOfTooManyPartsIsGivenUpNotSkipped) {
+  EkfOptions options;
+  options.max_dt_s = 1e-9;
+  Ekf ekf(MovingPoint(), options, {});
+  ekf.Start(0);
+  const UpdateReport report = ekf.Process(FrameAt(10.0, {}));
+  EXPECT_TRUE(ekf.failed());
+  ASSERT_EQ(report.events.size(), 1u);
+  EXPECT_EQ(report.events[0].kind, "gap");
+}
+
+TEST(Ekf, PerSensorHoldsWhereTheLastMeasurementOfASensorIsNotUsed) {
+  // d = BF / Z is not linear: joint and per-sensor updates differ.
+  const System system = DepthFilter();
+  EkfOptions options;
+  options.fuse = Fuse::kPerSensor;
+  Ekf whole(system, options, StreamsOf(system)), with_invalid(system, options, StreamsOf(system));
+  whole.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.0}}));
+  const UpdateReport report = with_invalid.Process(FrameAt(0.0, {{0, 80.0}, {0, -1.0}, {1, 1.0}}));
+  EXPECT_EQ(report.measurements[1].outcome, Outcome::kInvalid);
+  EXPECT_EQ(with_invalid.state().values(), whole.state().values());
+  Ekf joint(system, {}, StreamsOf(system));
+  joint.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.0}}));
+  EXPECT_NE(joint.state().values(), whole.state().values());
+}
+
+TEST(Ekf, TheMeasurementsOwnCovarianceCountsAlsoWhereItInitialises) {
+  System system = DepthFilter();
+  system.sensors.pop_back();
+  system.priors[0] = {0, {}, {}, "disparity"};
+  Ekf ekf(system, {}, StreamsOf(system));
+  Frame frame = FrameAt(0.0, {{0, 65.0}});
+  frame.measurements[0].covariance = {100.0};
+  ekf.Process(frame);
+  // sigma_Z = Z^2 / BF sigma_d
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "target.depth", "target.depth"),
+              std::pow(0.16 / 26.0 * 10.0, 2), 1e-12);
+}
+
+TEST(Ekf, NumbersThatAreNoneDoNotLockASensorOut) {
+  const System system = DepthFilter();
+  Ekf ekf(system, {}, StreamsOf(system));
+  const Eigen::MatrixXd p = ekf.state().covariance().Dense();
+  for (int k = 0; k < 100; ++k) ekf.Process(FrameAt(0.0, {{1, std::nan("")}}));
+  EXPECT_EQ(ekf.state().covariance().Dense(), p);
+}
+
+TEST(Ekf, ASensorThatStaysOutOfItsDomainInflatesOnceAndNotWhatItHolds) {
+  System system = DepthFilter();
+  system.sensors.erase(system.sensors.begin());
+  system.sensors[0].roles[1].mode = RoleMode::kHold;
+  system.priors[0].mean = {-1.0};
+  Ekf ekf(system, {}, StreamsOf(system));
+  for (int k = 0; k < 100; ++k) ekf.Process(FrameAt(0.0, {{0, 1.0}}));
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "target.depth", "target.depth"), 1.0, 1e-12);
+  EXPECT_EQ(CovarianceOf(ekf.state(), "template.inverse_distance", "template.inverse_distance"),
+            0.25);
 }
 
 TEST(Ekf, AMeasurementThatIsNotFiniteIsNotUsed) {

@@ -102,6 +102,38 @@ TEST(AutodiffMotion, NullNoiseIsZeroInThePluginItself) {
   EXPECT_NEAR(next[0][3], std::sin(0.05), 1e-16);
 }
 
+/// x' = x + w, with a closed form that throws once it has written.
+struct Faulty : Motion<1, Vec<1>> {
+  static constexpr std::array kBlocks{Quantity{"x"}};
+  explicit Faulty(Params&) {}
+  template <class T>
+  void Step(const T* x, const T* w, double, T* next) const {
+    next[0] = x[0] + w[0];
+  }
+  void StepJacobian(const double*, const double*, double, MatrixRef f, MatrixRef g) const {
+    f(0, 0) = g(0, 0) = 1.0;
+    throw std::runtime_error("faulty");
+  }
+  void SqrtQ(double, MatrixRef l) const {
+    l(0, 0) = 1.0;
+    throw std::runtime_error("faulty");
+  }
+};
+
+TEST(AutodiffMotion, AClosedFormThatThrowsWritesNothing) {
+  const MotionModel faulty = MakeMotion<Faulty>();
+  const Blocks x{{1.0}};
+  Blocks next = Filled(faulty.blocks(), kPoison);
+  double f = kPoison, g = kPoison, l = kPoison;
+  EXPECT_EQ(faulty.Step(Pointers(x).data(), nullptr, nullptr, 0.1, Pointers(next).data(), &f, &g),
+            Status::kError);
+  EXPECT_EQ(faulty.SqrtQ(Pointers(x).data(), 0.1, &l), Status::kError);
+  EXPECT_EQ(next, Filled(faulty.blocks(), kPoison));
+  EXPECT_EQ(f, kPoison);
+  EXPECT_EQ(g, kPoison);
+  EXPECT_EQ(l, kPoison);
+}
+
 /// Bearing of a point from a pose: an angle measured, an optional bias role.
 struct Bearing : Sensor<Angle, Vec<2>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"point", "m", "", "x,y"},
@@ -155,6 +187,43 @@ TEST(AutodiffSensor, AnExceptionIsAnErrorWithItsText) {
   EXPECT_EQ(bearing.Predict(roles, &z), Status::kError);
   EXPECT_EQ(bearing.error_text(), "an exception of unknown type");
   EXPECT_EQ(z, kPoison);
+}
+
+/// z = x, with a closed form that throws once it has written, where x < 0.
+struct FaultySensor : Sensor<Vec<1>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}, Quantity{"y"}};
+  static constexpr Quantity kMeasurement{"z"};
+  explicit FaultySensor(Params&) {}
+  template <class T>
+  bool Predict(const T* x, const T*, T* z) const {
+    z[0] = x[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(1.0);
+  }
+  void Jacobian(const double* x, const double*, MatrixRef by_x, MatrixRef) const {
+    by_x(0, 0) = 1.0;
+    if (x[0] < 0.0) throw std::runtime_error("faulty");
+  }
+};
+
+TEST(AutodiffSensor, AClosedFormThatThrowsWritesNothing) {
+  const SensorModel faulty = MakeSensor<FaultySensor>();
+  const int strides[] = {1, 1};
+  double x = -1.0, y = 0.0, z = kPoison, by_x = kPoison, by_y = kPoison;
+  const double* roles[] = {&x, &y};
+  double* jacobians[] = {&by_x, &by_y};
+  EXPECT_EQ(faulty.Linearise(roles, &z, jacobians, strides), Status::kError);
+  EXPECT_EQ(z, kPoison);
+  EXPECT_EQ(by_x, kPoison);
+  EXPECT_EQ(by_y, kPoison);
+  x = 2.0;
+  jacobians[0] = nullptr;
+  EXPECT_EQ(faulty.Linearise(roles, &z, jacobians, strides), Status::kOk);
+  EXPECT_EQ(z, 2.0);
+  EXPECT_EQ(by_y, 0.0);
 }
 
 /// Inverse observation of a point at a known position: roles of different sizes.
@@ -317,6 +386,18 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
        [](HandWritten& h) { h.description.capabilities = ALIDADE_CAN_INITIALISE; }},
       {"eval, sqrt_noise", [](HandWritten& h) { h.sensor.eval = nullptr; }},
       {"eval, sqrt_noise", [](HandWritten& h) { h.sensor.struct_size = 8; }},
+      {"eval, sqrt_noise",
+       [](HandWritten& h) {
+         h.sensor.sqrt_noise = nullptr;
+         h.sensor.residual = [](const void*, const double* const*, const double*, double*,
+                                double* const*, const std::int32_t*) { return std::int32_t{0}; };
+       }},
+      {"step, sqrt_q",
+       [](HandWritten& h) {
+         static constexpr AlidadeMotion kNoStep{sizeof(AlidadeMotion), 0, nullptr, nullptr, {}};
+         h.instance.kind = ALIDADE_KIND_MOTION;
+         h.instance.motion = &kNoStep;
+       }},
       {"lacks the functions of its kind", [](HandWritten& h) { h.instance.sensor = nullptr; }},
       {"is of kind 3", [](HandWritten& h) { h.instance.kind = ALIDADE_KIND_LANDMARK_FORM; }},
   };

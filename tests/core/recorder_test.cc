@@ -115,7 +115,7 @@ struct HandMade {
     accepted.h = {79.0};
     accepted.innovation = Eigen::VectorXd::Constant(1, 1.0);
     accepted.s = Eigen::MatrixXd::Constant(1, 1, 2.25);
-    accepted.gain = Eigen::Vector3d(0.1, 0.0, -0.3);
+    accepted.gain = {{2, Eigen::Vector3d(0.1, 0.0, -0.3)}};
     MeasurementReport invalid;
     invalid.sensor = 0;
     invalid.dof = 1;

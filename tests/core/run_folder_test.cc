@@ -3,10 +3,12 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <fstream>
 
@@ -17,6 +19,10 @@ namespace {
 /// The n-th call of write, fsync or rename by this process fails with `error`; 0: none does.
 int fail_at = 0;
 int fail_error = 0;
+/// The most that one write takes; 0: all.
+std::size_t write_limit = 0;
+/// As on a file system without locks.
+bool no_locks = false;
 
 bool IsToFail() {
   if (fail_at == 0 || --fail_at > 0) return false;
@@ -29,7 +35,13 @@ bool IsToFail() {
 // These stand before those of the C library, for the shared libraries of this process too.
 extern "C" {
 __attribute__((visibility("default"))) ssize_t write(int fd, const void* data, size_t size) {
-  return IsToFail() ? -1 : syscall(SYS_write, fd, data, size);
+  const size_t taken = write_limit == 0 ? size : std::min(size, write_limit);
+  return IsToFail() ? -1 : syscall(SYS_write, fd, data, taken);
+}
+__attribute__((visibility("default"))) int flock(int fd, int operation) noexcept {
+  if (!no_locks) return static_cast<int>(syscall(SYS_flock, fd, operation));
+  errno = ENOLCK;
+  return -1;
 }
 __attribute__((visibility("default"))) int fsync(int fd) {
   static_cast<void>(fd);  // tests need not survive a power cut
@@ -99,6 +111,25 @@ TEST(RunFolder, RemovesWhatADeadProcessLeft) {
   EXPECT_TRUE(fs::exists(folder / ".other.partial-1"));
 }
 
+TEST(RunFolder, WithoutLocksALivingProcessHoldsItsFolder) {
+  const TemporaryFolder folder;
+  fs::create_directories(folder / ".dead.partial-999999999");  // beyond Linux's largest pid
+  fs::create_directories(folder / ".odd.partial-x");
+  fs::create_directories(folder / ".out.partial-1");
+  no_locks = true;
+  std::string text;
+  const int dead = CodeOf([&] { Record(OptionsFor(folder / "dead")); });
+  const int odd = CodeOf([&] { Record(OptionsFor(folder / "odd")); });
+  const int living = CodeOf([&] { Record(OptionsFor(folder / "out")); }, &text);
+  no_locks = false;
+  EXPECT_EQ(dead, 0);
+  EXPECT_FALSE(fs::exists(folder / ".dead.partial-999999999"));
+  EXPECT_EQ(odd, 0);
+  EXPECT_EQ(living, 73);
+  EXPECT_NE(text.find("process 1 is writing it now"), std::string::npos) << text;
+  EXPECT_TRUE(fs::exists(folder / ".out.partial-1"));
+}
+
 TEST(RunFolder, RestoresWhatADeadProcessWasReplacing) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "out"), 3);
@@ -114,6 +145,23 @@ TEST(RunFolder, LeavesNothingWithoutFinish) {
     EXPECT_FALSE(folder.empty());
   }
   EXPECT_TRUE(folder.empty());
+}
+
+TEST(OutputFile, WritesNothingTwiceAfterAFailure) {
+  const TemporaryFolder folder;
+  std::string text;
+  for (int i = 0; text.size() < 70'000; ++i) text += std::to_string(i) + '\n';
+  internal::OutputFile file(folder / "file", "file");
+  write_limit = 1000;
+  fail_at = 4;
+  fail_error = ENOSPC;
+  const int code = CodeOf([&] { file.Write(text); });
+  fail_at = 0;
+  write_limit = 0;
+  EXPECT_EQ(code, 74);
+  EXPECT_EQ(Read(folder / "file"), text.substr(0, 3000));
+  file.Close();
+  EXPECT_TRUE(Read(folder / "file") == text);
 }
 
 // Every write, fsync and rename in turn, on a new folder and on one to be replaced.

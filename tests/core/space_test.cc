@@ -148,6 +148,23 @@ TEST(Angle, WrapsAtPlusAndMinusPi) {
   EXPECT_NEAR(minus(kPi - 0.01, -kPi + 0.01), -0.02, 1e-15);
 }
 
+TEST(Angle, NeverLeavesItsIntervalByRounding) {
+  const Geometry angle = Geometry::Angle();
+  const double ulp_inside = std::nextafter(-kPi, 0.0), zero = 0.0;
+  double y;
+  angle.Plus(&ulp_inside, &zero, &y);
+  EXPECT_EQ(y, ulp_inside);
+  for (int turns = -50; turns <= 50; ++turns) {
+    double x = (2 * turns + 1) * kPi;
+    for (int i = 0; i < 10; ++i) x = std::nextafter(x, -1e9);
+    for (int i = 0; i < 20; ++i, x = std::nextafter(x, 1e9)) {
+      angle.Plus(&x, &zero, &y);
+      EXPECT_GT(y, -kPi) << x;
+      EXPECT_LE(y, kPi) << x;
+    }
+  }
+}
+
 TEST(UnitQuaternion, AndItsNegativeAreOneRotation) {
   const Geometry geometry = Geometry::UnitQuaternion();
   const double q[4] = {0.5, -0.5, 0.5, 0.5}, negative[4] = {-0.5, 0.5, -0.5, -0.5};
@@ -214,6 +231,36 @@ TEST(UnitVector, TransportKeepsOrientation) {
   double j[4];
   geometry.Transport(from, to, j);
   EXPECT_NEAR(j[0] * j[3] - j[1] * j[2], 1.0, 1e-12);
+}
+
+TEST(UnitVector, MinusIsTrueUpToTheAntipode) {
+  const Geometry geometry = Geometry::UnitVector();
+  const double x[3] = {0.6, 0.0, 0.8};
+  for (const double short_of : {1e-3, 1.01e-6, 0.99e-6, 1e-8, 1e-12}) {
+    const double angle = kPi - short_of, d[2] = {0.6 * angle, -0.8 * angle};
+    double y[3], back[2];
+    geometry.Plus(x, d, y);
+    geometry.Minus(y, x, back);
+    // The direction is that of a vector of length `short_of`, known to rounding.
+    const double tolerance = 2e-15 / short_of;
+    EXPECT_NEAR(back[0], d[0], tolerance);
+    EXPECT_NEAR(back[1], d[1], tolerance);
+    EXPECT_NEAR(std::hypot(back[0], back[1]), angle, 1e-14);
+  }
+}
+
+TEST(UnitVector, MinusToTheAntipodeIsHalfATurn) {
+  const Geometry geometry = Geometry::UnitVector();
+  const double x[3] = {0.0, 0.0, 1.0};
+  for (const double sideways : {0.0, 1e-170, 1e-160}) {
+    const double y[3] = {0.0, sideways, -1.0};
+    double d[2], there[3];
+    geometry.Minus(y, x, d);
+    EXPECT_EQ(d[0], kPi);
+    EXPECT_EQ(d[1], 0.0);
+    geometry.Plus(x, d, there);
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(there[i], y[i], 1e-15);
+  }
 }
 
 TEST(UnitVector, TransportToTheAntipodeIsFiniteAndOrthogonal) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Every file of tests/faults/run is a config with one fault; its first lines say what has to come of
+// Every file of tests/faults/run is a config with one fault; its first lines say what must come of
 // it: the exit code, the line named in the message (0: none), and words of the message.
 #include <gtest/gtest.h>
 
@@ -35,8 +35,8 @@ class ConfigFault : public ProgramTest, public ::testing::WithParamInterface<std
 TEST_P(ConfigFault, GetsItsCodePlaceAndWords) {
   const fs::path file = kFolder / (GetParam() + ".yaml");
   const std::string text = ReadText(file);
-  const Outcome outcome =
-      Call({"run", file.string(), "-o", "out", "--plugin-path", ALIDADE_BINARY_DIR "/tests/faults"});
+  const std::string plugins = ALIDADE_BINARY_DIR "/tests/faults";
+  const Outcome outcome = Call({"run", file.string(), "-o", "out", "--plugin-path", plugins});
   EXPECT_EQ("exit " + std::to_string(outcome.code), Expected(text, "fault")) << outcome.err;
   EXPECT_EQ(outcome.err.rfind("error: ", 0), 0u) << outcome.err;
   const std::string line = Expected(text, "line");

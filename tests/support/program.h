@@ -38,8 +38,8 @@ inline bool Contains(const std::string& text, const std::string& part) {
 
 /// What a program that ended has left.
 struct Outcome {
-  int code = -1;    ///< exit code, -1 where a signal ended it
-  int signal = 0;   ///< that ended it
+  int code = -1;   ///< exit code, -1 where a signal ended it
+  int signal = 0;  ///< that ended it
   std::string out, err;
 };
 

@@ -51,28 +51,37 @@ inline void Zero(MatrixRef m, int rows, int columns) {
   for (int r = 0; r < rows && columns > 0; ++r) std::fill_n(&m(r, 0), columns, 0.0);
 }
 
+inline void Copy(MatrixRef from, int rows, int columns, MatrixRef to) {
+  for (int r = 0; r < rows && columns > 0; ++r) std::copy_n(&from(r, 0), columns, &to(r, 0));
+}
+
 template <class Model, class T, std::size_t... I>
 bool CallPredict(const Model& model, const T* const* x, T* z, std::index_sequence<I...>) {
   return model.Predict(x[I]..., z);
 }
 
+/// By way of a buffer, so that a Jacobian that throws leaves `jacobians` untouched.
 template <class Model, std::size_t... I>
 void ClosedForm(const Model& model, const double* const* x, double* const* jacobians,
                 const int* strides, std::index_sequence<I...> indices) {
   constexpr int m = Model::Measurement::kTangent;
-  double unwanted[m * Blocks<Model>::kTangent];
+  double buffer[m * Blocks<Model>::kTangent] = {};
   MatrixRef j[sizeof...(I)];
   int used = 0;
   const auto bind = [&](auto index) {
     constexpr int i = decltype(index)::value;
     constexpr int n = SpaceAt<i, Model>::kTangent;
-    j[i] = jacobians[i] != nullptr ? MatrixRef{jacobians[i], strides[i]}
-                                   : MatrixRef{unwanted + used, n};
+    j[i] = {buffer + used, n};
     used += m * n;
-    Zero(j[i], m, n);
   };
   ForEach(bind, indices);
   model.Jacobian(x[I]..., j[I]...);
+  const auto copy = [&](auto index) {
+    constexpr int i = decltype(index)::value;
+    if (jacobians[i] == nullptr) return;
+    Copy(j[i], m, SpaceAt<i, Model>::kTangent, {jacobians[i], strides[i]});
+  };
+  ForEach(copy, indices);
 }
 
 }  // namespace detail
@@ -89,10 +98,10 @@ Status Evaluate(const Model& model, const double* const* roles, double* z, doubl
   if (kClosedForm || jacobians == nullptr) {
     double value[Z::kAmbient];
     if (!detail::CallPredict(model, roles, value, indices)) return Status::kOutOfDomain;
-    std::copy_n(value, Z::kAmbient, z);
     if constexpr (kClosedForm) {
       if (jacobians != nullptr) detail::ClosedForm(model, roles, jacobians, strides, indices);
     }
+    std::copy_n(value, Z::kAmbient, z);
     return Status::kOk;
   }
   if constexpr (!kClosedForm) {

@@ -7,14 +7,13 @@
 namespace alidade {
 namespace detail {
 
-/// x' alone. Static blocks go through a buffer, so that a failed step leaves `next` untouched;
-/// models with dynamic blocks see to that themselves.
-template <class Model>
-bool StepValue(const Model& model, const double* const* x, const double* u, const double* w,
-               double dt_s, double* const* next) {
+/// step(next). Static blocks go through a buffer, so that a step that fails or throws leaves
+/// `next` untouched; models with dynamic blocks see to that themselves.
+template <class Model, class F>
+bool Buffered(double* const* next, const F& step) {
   using Blocks = detail::Blocks<Model>;
-  constexpr typename Blocks::Indices indices{};
   if constexpr (Blocks::kStatic) {
+    constexpr typename Blocks::Indices indices{};
     double value[Blocks::kAmbient];
     double* result[Blocks::kCount];
     int offset = 0;
@@ -24,7 +23,7 @@ bool StepValue(const Model& model, const double* const* x, const double* u, cons
       offset += SpaceAt<i, Model>::kAmbient;
     };
     ForEach(place, indices);
-    if (!CallStep(model, x, u, w, dt_s, result, indices)) return false;
+    if (!step(result)) return false;
     const auto copy = [&](auto index) {
       constexpr int i = decltype(index)::value;
       std::copy_n(result[i], SpaceAt<i, Model>::kAmbient, next[i]);
@@ -32,17 +31,27 @@ bool StepValue(const Model& model, const double* const* x, const double* u, cons
     ForEach(copy, indices);
     return true;
   } else {
-    return CallStep(model, x, u, w, dt_s, next, indices);
+    return step(next);
   }
 }
 
+/// F and G in closed form, buffered as `next` is.
 template <class Model, std::size_t... I>
 void ClosedFormStep(const Model& model, const double* const* x, const double* w, double dt_s,
                     MatrixRef f, MatrixRef g, std::index_sequence<I...>) {
-  const int n = TangentSizeOf(model);
-  Zero(f, n, n);
-  Zero(g, n, NoiseSizeOf(model));
-  model.StepJacobian(x[I]..., w, dt_s, f, g);
+  if constexpr (Blocks<Model>::kStatic && Model::kNoise != kDynamic) {
+    constexpr int n = Blocks<Model>::kTangent, n_w = Model::kNoise;
+    double f_buffer[n * n] = {}, g_buffer[n * n_w + 1] = {};
+    const MatrixRef f_new{f_buffer, n}, g_new{g_buffer, n_w};
+    model.StepJacobian(x[I]..., w, dt_s, f_new, g_new);
+    Copy(f_new, n, n, f);
+    Copy(g_new, n, NoiseSizeOf(model), g);  // a model may use less noise than it has room for
+  } else {
+    const int n = TangentSizeOf(model);
+    Zero(f, n, n);
+    Zero(g, n, NoiseSizeOf(model));
+    model.StepJacobian(x[I]..., w, dt_s, f, g);
+  }
 }
 
 /// x', F and G by dual numbers.
@@ -104,7 +113,10 @@ Status Step(const Model& model, const double* const* x, const double* u, const d
   }
   const int n = detail::TangentSizeOf(model), n_w = detail::NoiseSizeOf(model);
   if (!f && (!g || n_w == 0)) {
-    return detail::StepValue(model, x, u, w, dt_s, next) ? Status::kOk : Status::kOutOfDomain;
+    const auto step = [&](double* const* to) {
+      return detail::CallStep(model, x, u, w, dt_s, to, indices);
+    };
+    return detail::Buffered<Model>(next, step) ? Status::kOk : Status::kOutOfDomain;
   }
   if (n_w > 0 && (!f || !g)) {  // one of the two: rare enough to make a buffer for the other
     std::vector<double> unwanted(static_cast<std::size_t>(n) * std::max(n, n_w));
@@ -113,9 +125,12 @@ Status Step(const Model& model, const double* const* x, const double* u, const d
   }
   if constexpr (detail::HasStepJacobian<Model, typename detail::Blocks<Model>::Indices>::value) {
     static_assert(Model::Input::kAmbient == 0, "closed forms take no control input");
-    if (!detail::StepValue(model, x, u, w, dt_s, next)) return Status::kOutOfDomain;
-    detail::ClosedFormStep(model, x, w, dt_s, f, g, indices);
-    return Status::kOk;
+    const auto step = [&](double* const* to) {
+      if (!detail::CallStep(model, x, u, w, dt_s, to, indices)) return false;
+      detail::ClosedFormStep(model, x, w, dt_s, f, g, indices);
+      return true;
+    };
+    return detail::Buffered<Model>(next, step) ? Status::kOk : Status::kOutOfDomain;
   } else {
     return detail::StepJets(model, x, u, w, dt_s, next, f, g);
   }

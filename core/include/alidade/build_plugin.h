@@ -19,8 +19,10 @@ namespace alidade {
 #else
 #define ALIDADE_BUILD_STL "stl"
 #endif
-#define ALIDADE_BUILD_ID                                                               \
-  "0.1.0 " __VERSION__ " cxx" ALIDADE_STRINGISE(__cplusplus) " abi" ALIDADE_STRINGISE( \
+#define ALIDADE_BUILD_VERSION "0.1.0"  // of the project: plugin_host.cc checks it
+#define ALIDADE_BUILD_ID                                                          \
+  ALIDADE_BUILD_VERSION                                                           \
+  " " __VERSION__ " cxx" ALIDADE_STRINGISE(__cplusplus) " abi" ALIDADE_STRINGISE( \
       __GXX_ABI_VERSION) " align" ALIDADE_STRINGISE(__BIGGEST_ALIGNMENT__) " " ALIDADE_BUILD_STL
 
 struct SourceEntry {

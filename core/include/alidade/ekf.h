@@ -36,9 +36,9 @@ struct EkfOptions {
   static EkfOptions FromNode(const Node& entry);
 };
 
-/// Extended Kalman filter: x' = f(x, 0), P' = F P F' + G Q G'; an update with the stacked Jacobian H
+/// Extended Kalman filter: x' = f(x, 0), P' = F P F' + G Q G'; an update with stacked Jacobian H
 /// of all accepted measurements, S = H P H' + R = L L', W = P H' L^-T, dx = W L^-1 r, P -= W W'.
-/// Where a gain is not the optimal one (considered or held roles) the Joseph form takes its place.
+/// Where a gain is not the optimal one (considered blocks) the Joseph form takes its place.
 ///
 /// An update is a transaction: what would leave the state not finite or not positive definite is
 /// rolled back and reported.
@@ -66,8 +66,17 @@ class Ekf : public Estimator {
     Eigen::MatrixXd r, pht;  ///< R, P H'
   };
 
+  /// What one motion model makes of its blocks.
+  struct Motion {
+    std::vector<std::pair<BlockId, std::vector<double>>> next;
+    std::vector<std::pair<int, int>> segments;  ///< rows of the covariance: (offset, size)
+    Eigen::MatrixXd f, q;                       ///< of those rows
+  };
+
   void StepTo(Stamp stamp, UpdateReport& report);
-  bool StepModel(const MotionBinding& motion, double dt_s, UpdateReport& report);
+  bool StepOnce(double dt_s, UpdateReport& report);
+  bool StepModel(const MotionBinding& motion, double dt_s, std::vector<Motion>& moves,
+                 UpdateReport& report);
 
   std::vector<Row> Collect(const Frame& frame, UpdateReport& report);
   void FuseRows(const std::vector<Row*>& group, UpdateReport& report);
@@ -82,14 +91,15 @@ class Ekf : public Estimator {
                bool masked, const Eigen::MatrixXd& r);
 
   void InitialiseFrom(std::vector<Row>& rows, UpdateReport& report);
-  bool InitialiseBlock(const Row& row);
-  void CountRejections(const std::vector<Row>& rows, UpdateReport& report);
-  void Recover(const Row& row, UpdateReport& report);
+  Outcome InitialiseBlock(Row& row, UpdateReport& report);
+  void CountRejections(std::vector<Row>& rows, UpdateReport& report);
+  void Recover(Row& row, UpdateReport& report);
   void ForgetMotionOf(BlockId id);
 
   const SensorBinding& BindingOf(const Row& row) const {
     return system_.sensors[static_cast<std::size_t>(row.sensor)];
   }
+  void NotePluginFailure(const SensorBinding& sensor, UpdateReport& report) const;
   void Note(UpdateReport& report, const char* kind, std::string text) const;
   void GiveUp(UpdateReport& report, const char* kind, const std::string& what);
   std::string Describe(const std::vector<BlockId>& blocks) const;
@@ -101,6 +111,7 @@ class Ekf : public Estimator {
   Stamp stamp_ = kNoStamp;
   std::vector<double> gate_threshold_;  ///< on r' S^-1 r, by sensor
   std::vector<int> rejections_;         ///< consecutive, by sensor
+  std::vector<bool> inflated_;          ///< since the last acceptance, by sensor
   std::vector<bool> warned_;            ///< of conditioning, by sensor
   /// The last accepted measurement, for the record of a failure.
   struct {

@@ -61,6 +61,7 @@ class ContractViolation : public std::logic_error {
   using std::logic_error::logic_error;
 };
 
+/// Throws ContractViolation; called by ALIDADE_EXPECTS.
 [[noreturn]] void FailContract(const char* expression, const char* file, int line);
 
 template <class Range>

@@ -2,9 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <memory>
-#include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -30,6 +27,13 @@ enum class Outcome {
 const char* ToString(Outcome outcome);
 /// What a model's status means for the measurement; kOk is kAccepted.
 Outcome OutcomeOf(Status status);
+bool AllFinite(const std::vector<double>& values);
+
+/// Rows of the gain K that belong to one block: tangent size x m.
+struct BlockGain {
+  BlockId block;
+  Eigen::MatrixXd k;
+};
 
 /// The complete record of one measurement. m = its tangent size.
 struct MeasurementReport {
@@ -37,11 +41,11 @@ struct MeasurementReport {
   Outcome outcome = Outcome::kAccepted;
   std::int64_t landmark = -1;
   int dof = 0;
-  double nis = 0.0;            ///< r' S^-1 r, not divided by dof
-  std::vector<double> z, h;    ///< ambient
-  Eigen::VectorXd innovation;  ///< r = z (-) h, tangent
-  Eigen::MatrixXd s;           ///< S = H P H' + R, m x m; empty where it was not reached
-  Eigen::MatrixXd gain;        ///< K, n x m, in the covariance's order; empty unless accepted
+  double nis = 0.0;             ///< r' S^-1 r, not divided by dof
+  std::vector<double> z, h;     ///< ambient
+  Eigen::VectorXd innovation;   ///< r = z (-) h, tangent
+  Eigen::MatrixXd s;            ///< S = H P H' + R, m x m; empty where it was not reached
+  std::vector<BlockGain> gain;  ///< K by block; empty unless accepted
 };
 
 /// Something that happened to the filter, worth a line to its user.
@@ -65,7 +69,7 @@ class Estimator {
   /// Sets the time of the initial state.
   virtual void Start(Stamp stamp) = 0;
   /// Steps to the frame's stamp and uses those of its measurements that a sensor is bound to.
-  /// `sensor_of_stream[s]` lists the sensors of stream s.
+  ///
   virtual UpdateReport Process(const Frame& frame) = 0;
   virtual const State& state() const = 0;
   virtual Stamp stamp() const = 0;

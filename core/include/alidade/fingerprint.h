@@ -62,7 +62,7 @@ constexpr AlidadeTable Table(const AlidadeEntry (&entries)[N],
 
 }  // namespace alidade::detail
 
-/// Lays the fingerprint into its section. `tier` is ALIDADE_TIER_*, `build` what must equal the host's.
+/// Lays the fingerprint into its section: `tier` ALIDADE_TIER_*, `build` to equal the host's.
 #define ALIDADE_FINGERPRINT(tier, build)                                                       \
   extern "C" {                                                                                 \
   __attribute__((section(ALIDADE_FINGERPRINT_SECTION), used,                                   \

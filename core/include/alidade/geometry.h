@@ -39,11 +39,16 @@ struct Angle {
   static constexpr std::uint32_t kGeometry = ALIDADE_ANGLE;
   static constexpr int kAmbient = 1, kTangent = 1;
 
+  /// a - 2 pi k, the one in (-pi, pi].
   template <class T>
   static T Wrap(const T& a) {
     constexpr double kPi = 3.14159265358979323846;
     using std::ceil;
-    return a - 2.0 * kPi * ceil((a - kPi) / (2.0 * kPi));
+    const T wrapped = a - 2.0 * kPi * ceil((a - kPi) / (2.0 * kPi));
+    // Rounding may have missed the interval by an ulp.
+    if (wrapped > T(kPi)) return wrapped - 2.0 * kPi;
+    if (wrapped <= T(-kPi)) return wrapped + 2.0 * kPi;
+    return wrapped;
   }
   template <class X, class D, class Y>
   static void Plus(const X* x, const D* d, Y* y, int = 1) {
@@ -119,7 +124,7 @@ struct UnitQuaternion {
 };
 
 /// S^2: y = cos|d| x + sin|d|/|d| B(x) d, with B(x) (3x2) an orthonormal basis of the plane normal
-/// to x. Not defined for the antipode of x.  Basis: [Duff2017].
+/// to x. To the antipode of x every way is as short: (-) gives (pi, 0).  Basis: [Duff2017].
 struct UnitVector {
   static constexpr std::uint32_t kGeometry = ALIDADE_UNIT_VECTOR;
   static constexpr int kAmbient = 3, kTangent = 2;
@@ -167,11 +172,15 @@ struct UnitVector {
     for (int j = 0; j < 2; ++j) p[j] = b[j] * y[0] + b[2 + j] * y[1] + b[4 + j] * y[2];
     const D s2 = p[0] * p[0] + p[1] * p[1];
     D k;  // angle / sin(angle)
-    if (s2 > D(1e-12)) {
+    if (c > D(0.0) && !(s2 > D(1e-12))) {
+      k = 1.0 + s2 / 6.0;
+    } else if (s2 > D(1e-300)) {  // below, sqrt has lost its digits
       const D s = sqrt(s2);
       k = atan2(s, c) / s;
     } else {
-      k = 1.0 + s2 / 6.0;
+      d[0] = D(3.14159265358979323846);
+      d[1] = D(0.0);
+      return;
     }
     d[0] = k * p[0];
     d[1] = k * p[1];

@@ -10,6 +10,7 @@
 /// Models used directly from C++, without a plugin file: the same thunks, in this process.
 namespace alidade {
 
+/// The sensor `model`; `name` is for messages.
 template <class Model>
 SensorModel InProcessSensor(Model model, const char* name) {
   AlidadeInstance instance{};
@@ -18,6 +19,7 @@ SensorModel InProcessSensor(Model model, const char* name) {
   return SensorModel(std::make_shared<ModelInstance>(instance, name, "in process"));
 }
 
+/// The motion model `model`; `name` is for messages.
 template <class Model>
 MotionModel InProcessMotion(Model model, const char* name) {
   AlidadeInstance instance{};

@@ -18,7 +18,7 @@ namespace alidade {
 ///                       parabolic between samples; > 0: late. Scalar blocks, even sampling (steps
 ///                       within 5 % of their mean), a truth that changes
 ///   cov95:BLOCK         share of stamps with |e| <= 1.96 sigma (scalar blocks)
-///   nees.mean:OWNER     mean of e' P^-1 e / dof over the owner's estimated blocks with known truth,
+///   nees.mean:OWNER     mean of e' P^-1 e / dof over the owner's estimated blocks of known truth,
 ///                       jointly; stamps where P is singular or not finite are left out
 ///   nees.cov95:OWNER    share of those stamps with e' P^-1 e <= chi2(0.95, dof)
 ///   nis.mean:SENSOR     mean of r' S^-1 r / dof over accepted measurements

@@ -39,14 +39,15 @@ struct MatrixRef {
 ///   static constexpr Quantity kMeasurement{...};
 ///   explicit Model(Params&);
 ///   template <class T> bool Predict(const T* role..., T* z) const;      false: out of domain
-///   template <class T> void SqrtNoise(const T* role..., T* L) const;    L row-major, zeroed
+///   template <class T> void SqrtNoise(const T* role..., [const T* z,] T* L) const;
+///                                                                       L row-major, zeroed
 ///
 /// and may have
 ///
 ///   bool Valid(const double* z) const;
 ///   static constexpr int kInitialises;                                  the role y below
 ///   static constexpr int kPrior;                                        size of the prior, or 0
-///   template <class T> bool Initialise(const T* other..., const T* z, [const T* prior,] T* y) const;
+///   template <class T> bool Initialise(const T* other..., const T* z, [const T* prior,] T* y)
 ///   void Jacobian(const double* role..., MatrixRef J_z_role...) const;  closed form, zeroed
 template <class MeasurementGeometry, class... RoleGeometries>
 struct Sensor {
@@ -67,11 +68,12 @@ struct Sensor {
 /// Step may return bool, false meaning out of domain. The model may have
 ///
 ///   using Input = Vec<2>; static constexpr Quantity kInput{...};        a control input u
-///   void StepJacobian(const double* block..., [const double* u,] const double* w, double dt_s,
-///                     MatrixRef F, MatrixRef G) const;                  closed form, zeroed
+///   void StepJacobian(const double* block..., const double* w, double dt_s, MatrixRef F,
+///                     MatrixRef G) const;      closed form, zeroed; only without control input
 ///
 /// Blocks of size kDynamic need StepJacobian, `int Size(int block) const` and
-/// `int NoiseSize() const`.
+/// `int NoiseSize() const`. Their Step, StepJacobian and SqrtQ write to the caller's buffers: they
+/// must not throw, and a Step that returns false must not have written.
 template <int NoiseSize, class... BlockGeometries>
 struct Motion {
   using Spaces = std::tuple<BlockGeometries...>;

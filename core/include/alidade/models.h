@@ -67,6 +67,7 @@ class SensorModel {
   /// Index of the role that Initialise computes, -1 where there is none.
   int initialised_role() const { return initialised_role_; }
 
+  /// z = h(roles), ambient values; kOutOfDomain where h is not defined.
   Status Predict(const double* const* roles, double* z) const {
     return detail::ToStatus(sensor_->eval(self_, roles, z, nullptr, nullptr));
   }

@@ -30,6 +30,7 @@ class Params {
  public:
   explicit Params(const AlidadeHost* host) : host_(host) {}
 
+  /// One value of `key`; `fallback` makes it optional. A bad value gives a stand-in within `range`.
   double Number(const char* key, const char* unit, const char* doc, Range range = {},
                 std::optional<double> fallback = std::nullopt) {
     double value = fallback.value_or(StandIn(range));

@@ -31,6 +31,7 @@ struct PluginEntry {
   enum class Kind { kSensor, kMotion, kLandmarkForm, kSource } kind;
   std::string name, doc, citation, family;
   std::filesystem::path plugin;  ///< the file it came from
+  unsigned thread_flags = 0;     ///< ALIDADE_THREAD_*; of a source 0
 };
 
 /// Why a file in a searched folder was not loaded.
@@ -40,8 +41,8 @@ struct Refusal {
   ExitCode code;
 };
 
-/// Finds, checks, loads and lends plugins. A file is opened only when its fingerprint, read from the
-/// bytes beforehand, fits, and nobody but root, the caller or the owner of the running program could
+/// Finds, checks, loads and lends plugins. A file is opened only when its fingerprint, read from
+/// the bytes beforehand, fits, and nobody but root, the caller or the owner of the program could
 /// have written it. Plugins are never unloaded. Creation is safe from several threads.
 class PluginHost {
  public:

@@ -173,9 +173,17 @@ struct __attribute__((visibility("hidden"))) MotionCalls {
   static std::int32_t SqrtQ(const void* self, const double* const* blocks, double dt_s, double* l,
                             std::int32_t stride) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
-      const int n = NoiseSizeOf(model);
-      Zero({l, stride}, n, n);
-      CallSqrtQ(model, blocks, dt_s, {l, stride}, typename Blocks<Model>::Indices{});
+      constexpr typename Blocks<Model>::Indices indices{};
+      if constexpr (Model::kNoise != kDynamic) {
+        constexpr int n = Model::kNoise;
+        double buffer[n * n + 1] = {};
+        CallSqrtQ(model, blocks, dt_s, {buffer, n}, indices);
+        Copy({buffer, n}, NoiseSizeOf(model), NoiseSizeOf(model), {l, stride});
+      } else {
+        const int n = NoiseSizeOf(model);
+        Zero({l, stride}, n, n);
+        CallSqrtQ(model, blocks, dt_s, {l, stride}, indices);
+      }
       return std::int32_t{ALIDADE_OK};
     });
   }

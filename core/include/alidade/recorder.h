@@ -35,7 +35,7 @@ class Recorder {
   /// Writes run.json, comparison.csv, timing.json, figures and report.html, syncs and renames.
   void Finish(const RunResult& result);
 
-  /// Paths that Finish made, relative to the folder, the ones a person wants first: report.html, ...
+  /// Paths that Finish made, relative to the folder, those a person wants first: report.html, ...
   const std::vector<std::string>& highlights() const;
   /// What was left out and why ("gnuplot is not installed: no figures"), or "".
   const std::string& note() const;

@@ -51,6 +51,7 @@ std::vector<std::filesystem::path> PluginPaths(const Config& config);
 Experiment BuildExperiment(const Config& config, const PluginHost& host);
 
 enum class RunStatus { kOk, kStopped, kFailed };
+/// `ok`, `stopped`, `failed`, as in run.json.
 const char* ToString(RunStatus status);
 
 /// What became of one estimator.

@@ -22,6 +22,7 @@ struct Geometry {
   int ambient = 1;
   int tangent = 1;
 
+  /// The geometries of geometry.h by name.
   static Geometry Vector(int size) { return {GeometryKind::kVector, size, size}; }
   static Geometry UnitQuaternion() { return {GeometryKind::kUnitQuaternion, 4, 3}; }
   static Geometry UnitVector() { return {GeometryKind::kUnitVector, 3, 2}; }

@@ -34,6 +34,7 @@ struct Block {
 /// Names, geometries and places of the blocks; knows no values.
 class StateLayout {
  public:
+  /// Adds a block without a value; ContractViolation where the name is taken.
   BlockId Declare(std::string name, std::string owner, Space space,
                   BlockStatus status = BlockStatus::kEstimated);
   const std::vector<Block>& blocks() const { return blocks_; }
@@ -48,7 +49,7 @@ class StateLayout {
 
 /// Layout, values and covariance of the blocks, kept consistent. Copying it is a snapshot.
 ///
-/// x is one contiguous buffer of ambient values, P the covariance in the tangent. Adding or removing
+/// x is one buffer of ambient values, P the covariance in the tangent. Adding or removing
 /// a block moves O(n) numbers: a removed block leaves a gap that the last block of the same size
 /// fills, or that a later block of that size takes.
 class State {
@@ -72,7 +73,7 @@ class State {
   /// uncorrelated with the rest.
   void Add(BlockId id, const double* value, const Eigen::MatrixXd& covariance);
   /// Gives a declared block the value y = g(x, n), with dy = J_y_x dx + J_y_n dn: its covariance is
-  /// J_y_x P J_y_x' + own, its correlation J_y_x P. `from` names the blocks of x, `jacobians` d y / d
+  /// J_y_x P J_y_x' + own, its correlation J_y_x P. `from` names the blocks of x, `jacobians` dy / d
   /// block; `own` = J_y_n R J_y_n'.
   void Initialise(BlockId id, const double* value, const std::vector<BlockId>& from,
                   const std::vector<Eigen::MatrixXd>& jacobians, const Eigen::MatrixXd& own);
@@ -84,9 +85,11 @@ class State {
   void Consider(BlockId id, bool considered);
   /// Replaces the block by y = g(x_id) of another geometry, J = dy/dx in the tangents.
   void Reparametrise(BlockId id, Space space, const double* value, const Eigen::MatrixXd& jacobian);
-  /// x_i <- x_i (+) dx_i for every block with a covariance, transporting P where a base point's
-  /// tangent basis turns. dx is indexed like the covariance.
-  void Correct(const Eigen::VectorXd& dx);
+  /// The values x_i (+) dx_i of all blocks with a covariance, the rest as it is; dx is indexed like
+  /// the covariance. Changes nothing: see MoveTo.
+  std::vector<double> Moved(const Eigen::VectorXd& dx) const;
+  /// Takes the values over, transporting P where the tangent basis of a block turns with its value.
+  void MoveTo(std::vector<double> values);
 
  private:
   void PlaceValue(BlockId id, const double* value);

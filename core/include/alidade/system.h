@@ -18,7 +18,7 @@ namespace alidade {
 /// (Schmidt); take its value as exact (its Jacobian is zero).
 enum class RoleMode { kEstimate, kConsider, kHold };
 
-/// Where a sensor's Jacobian is taken for the value of a role: the prediction, or the value that the
+/// Where a sensor's Jacobian is taken for the value of a role: the prediction, or the value the
 /// measurement itself implies (Initialise of that role).
 enum class LineariseAt { kPrediction, kMeasurement };
 
@@ -66,7 +66,7 @@ struct System {
   int FindSensor(std::string_view name) const;
 };
 
-/// Reads `state`, `sensors` and `start_s` of a config's root. `only` keeps the named sensors, in its
+/// Reads `state`, `sensors` and `start_s` of a config's root. `only` keeps named sensors, in its
 /// own order, and the state entries that they touch; empty: everything.
 /// Errors: kBadConfig with place and remedy, kPlugin.
 System BuildSystem(const Node& root, const PluginHost& host, const std::vector<std::string>& only);

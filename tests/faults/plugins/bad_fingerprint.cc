@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A fingerprint of another ABI, of a foreign processor or of another build, as BAD_FINGERPRINT says.
+// A fingerprint of another ABI, of another processor or build, as BAD_FINGERPRINT says.
 #include "alidade/plugin.h"
 #include "probe.h"
 

@@ -2,6 +2,7 @@
 // A static constructor that ends the process in the way that BAD_START names.
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdlib>
 
 #include "alidade/plugin.h"
@@ -15,7 +16,7 @@ namespace {
 
 struct Start {
   Start() {
-    if (BAD_START == CRASH) *static_cast<volatile int*>(nullptr) = 1;
+    if (BAD_START == CRASH) std::raise(SIGSEGV);
     if (BAD_START == ABORT) std::abort();
     if (BAD_START == EXIT) std::exit(0);
   }

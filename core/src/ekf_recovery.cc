@@ -118,7 +118,7 @@ void Ekf::CountRejections(std::vector<Row>& rows, UpdateReport& report) {
 }
 
 /// Resets what the sensor determines from its measurement, with the blocks that move with it at
-/// their prior uncertainty; where that cannot be, inflates the blocks that the sensor corrects, once
+/// their prior uncertainty; where that cannot be, inflates the blocks that it corrects, once
 /// until it is accepted again.
 void Ekf::Recover(Row& row, UpdateReport& report) {
   const SensorBinding& binding = BindingOf(row);

@@ -332,9 +332,9 @@ System BuildSystem(const Node& root, const PluginHost& host, const std::vector<s
       }
     }
   }
-  constexpr double kLatest_s = 4.6e9;  // two stamps may differ by twice that
+  constexpr double kLatestSeconds = 4.6e9;  // two stamps may differ by twice that
   if (const auto start = root.Find("start_s"))
-    system.start_s = start->Number(-kLatest_s, kLatest_s);
+    system.start_s = start->Number(-kLatestSeconds, kLatestSeconds);
   if (!only.empty()) system = WithoutUntouched(std::move(system));
   CheckInitialisation(root, system);
   return system;

@@ -73,7 +73,7 @@ class State {
   /// uncorrelated with the rest.
   void Add(BlockId id, const double* value, const Eigen::MatrixXd& covariance);
   /// Gives a declared block the value y = g(x, n), with dy = J_y_x dx + J_y_n dn: its covariance is
-  /// J_y_x P J_y_x' + own, its correlation J_y_x P. `from` names the blocks of x, `jacobians` dy / d
+  /// J_y_x P J_y_x' + own, its correlation J_y_x P. `from` names the blocks of x, `jacobians` dy/d
   /// block; `own` = J_y_n R J_y_n'.
   void Initialise(BlockId id, const double* value, const std::vector<BlockId>& from,
                   const std::vector<Eigen::MatrixXd>& jacobians, const Eigen::MatrixXd& own);

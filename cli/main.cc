@@ -112,17 +112,11 @@ ExitCode Main(int argc, char** argv) {
 ExitCode Guarded(int argc, char** argv) {
   try {
     return Main(argc, argv);
-  } catch (const Error& error) {
-    PrintErrors(error.what());
-    return error.code();
-  } catch (const std::bad_alloc&) {
-    PrintErrors("out of memory");
-  } catch (const std::exception& error) {
-    PrintErrors(std::string("internal: ") + error.what());
   } catch (...) {
-    PrintErrors("internal: an exception of unknown type");
+    const Failure failure = CaughtFailure();
+    PrintErrors(failure.reason);
+    return failure.code;
   }
-  return ExitCode::kInternal;
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 #include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <cstdio>
-#include <exception>
 #include <memory>
 
 #include "alidade/recorder.h"
@@ -86,29 +85,6 @@ std::string Summary(const RunResult& result, const Recorder& recorder) {
   return text;
 }
 
-RunResult Failure(ExitCode code, const std::string& reason) {
-  RunResult result;
-  result.status = code == ExitCode::kStopped ? RunStatus::kStopped : RunStatus::kFailed;
-  result.code = code;
-  result.reason = reason;
-  return result;
-}
-
-/// Runs, and turns what is thrown into a result, so that the run folder can tell of it.
-RunResult RunOrFail(Experiment& experiment, const RunOptions& options) {
-  try {
-    return Run(experiment, options);
-  } catch (const Error& error) {
-    return Failure(error.code(), error.what());
-  } catch (const std::bad_alloc&) {
-    return Failure(ExitCode::kInternal, "out of memory");
-  } catch (const std::exception& error) {
-    return Failure(ExitCode::kInternal, std::string("internal: ") + error.what());
-  } catch (...) {
-    return Failure(ExitCode::kInternal, "internal: an unknown exception was thrown");
-  }
-}
-
 ExitCode RunConfig(const Arguments& arguments) {
   Config config = arguments.input.Load();
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
@@ -123,7 +99,7 @@ ExitCode RunConfig(const Arguments& arguments) {
   options.recorder = &recorder;
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
-  const RunResult result = RunOrFail(experiment, options);
+  const RunResult result = Run(experiment, options);
   progress.Clear();
   if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
   if (result.status == RunStatus::kStopped) PrintNote(result.reason);

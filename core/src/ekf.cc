@@ -167,11 +167,11 @@ void Ekf::StepTo(Stamp stamp, UpdateReport& report) {
 
 /// One step of all motion models: all of it happens or nothing.
 bool Ekf::StepOnce(double dt_s, UpdateReport& report) {
-  std::vector<Motion> moves;
+  std::vector<Move> moves;
   for (const MotionBinding& motion : system_.motions) {
     if (!StepModel(motion, dt_s, moves, report)) return false;
   }
-  for (const Motion& move : moves) {
+  for (const Move& move : moves) {
     state_.covariance().Propagate(move.segments, move.f, move.q);
   }
   for (int i = 0; i < state_.covariance().size(); ++i) {
@@ -179,7 +179,7 @@ bool Ekf::StepOnce(double dt_s, UpdateReport& report) {
     GiveUp(report, "not_finite", "the covariance steps to what is not finite");
     return false;
   }
-  for (const Motion& move : moves) {
+  for (const Move& move : moves) {
     for (const auto& [id, value] : move.next)
       std::copy(value.begin(), value.end(), state_.value(id));
   }
@@ -188,14 +188,14 @@ bool Ekf::StepOnce(double dt_s, UpdateReport& report) {
 
 /// What one motion model makes of its blocks, added to `moves`. Fixed blocks stay; a model with a
 /// block that has no value yet waits. False where the filter cannot go on.
-bool Ekf::StepModel(const MotionBinding& motion, double dt_s, std::vector<Motion>& moves,
+bool Ekf::StepModel(const MotionBinding& motion, double dt_s, std::vector<Move>& moves,
                     UpdateReport& report) {
   const int n = motion.model.tangent_size(), n_w = motion.model.noise_size();
   std::vector<const double*> x;
   std::vector<std::vector<double>> next;
   std::vector<double*> y;
   std::vector<Eigen::Index> rows;  // of F that have a covariance
-  Motion move;
+  Move move;
   int row = 0;
   for (const BlockId id : motion.blocks) {
     const Block& block = state_.layout()[id];

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
 
 #include "alidade/ekf.h"
 
@@ -75,11 +76,13 @@ Outcome Ekf::InitialiseBlock(Row& row, UpdateReport& report) {
     if (i == target || binding.roles[i].block < 0) continue;
     const BlockId other = binding.roles[i].block;
     roles[i] = state_.value(other);
-    jacobians[i].resize(k, state_.layout()[other].geometry().tangent);
+    if (binding.roles[i].mode == RoleMode::kHold) continue;
+    const int columns = state_.layout()[other].geometry().tangent;
+    jacobians[i] = RowMajor::Constant(k, columns, std::nan(""));
     jx[i] = jacobians[i].data();
   }
   std::vector<double> y(static_cast<std::size_t>(state_.layout()[id].geometry().ambient));
-  RowMajor jz(k, m);
+  RowMajor jz = RowMajor::Constant(k, m, std::nan(""));
   const double* z = row.measurement->values.data();
   const Status status = binding.model.Initialise(roles.data(), z, y.data(), jx.data(), jz.data());
   roles[target] = y.data();
@@ -92,6 +95,7 @@ Outcome Ekf::InitialiseBlock(Row& row, UpdateReport& report) {
   if (!own.allFinite() || !AllFinite(y)) return Outcome::kNotFinite;
   for (std::size_t i = 0; i < roles.size(); ++i) {
     if (jx[i] == nullptr) continue;
+    if (!jacobians[i].allFinite()) return Outcome::kNotFinite;
     from.push_back(binding.roles[i].block);
     from_jacobians.emplace_back(jacobians[i]);
   }

@@ -2,6 +2,7 @@
 #include "alidade/error.h"
 
 #include <algorithm>
+#include <new>
 #include <numeric>
 #include <vector>
 
@@ -32,6 +33,20 @@ std::string ErrorLine(const Place& place, std::string_view key, std::string_view
   }
   if (!suggestion.empty()) line.append("; did you mean '").append(suggestion).append("'?");
   return line;
+}
+
+Failure CaughtFailure() {
+  try {
+    throw;
+  } catch (const Error& error) {
+    return {error.code(), error.what()};
+  } catch (const std::bad_alloc&) {
+    return {ExitCode::kInternal, "out of memory"};
+  } catch (const std::exception& error) {
+    return {ExitCode::kInternal, std::string("internal: ") + error.what()};
+  } catch (...) {
+    return {ExitCode::kInternal, "internal: an exception of unknown type"};
+  }
 }
 
 int EditDistance(std::string_view a, std::string_view b) {

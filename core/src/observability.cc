@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <Eigen/SVD>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
@@ -85,9 +85,39 @@ bool Advance(const System& system, double dt_s, Trajectory& t, Eigen::MatrixXd& 
   return true;
 }
 
-/// Rows H phi of every sensor that is defined at the values.
+/// The span of the rows seen so far, as an orthonormal basis.
+class RowSpace {
+ public:
+  explicit RowSpace(Eigen::Index n) : q_(n, n) {}
+
+  Eigen::Index rank() const { return rank_; }
+  /// Adds what `row` has outside the span; nothing where that is rounding.
+  void Add(Eigen::VectorXd row) {
+    constexpr double kRankTolerance = 1e-9;
+    const double norm = row.norm();
+    if (rank_ == q_.rows() || !(norm > 0.0) || !std::isfinite(norm)) return;
+    row /= norm;
+    const auto known = q_.leftCols(rank_);
+    for (int twice = 0; twice < 2; ++twice) row -= known * (known.transpose() * row);
+    const double outside = row.norm();
+    if (outside > kRankTolerance) q_.col(rank_++) = row / outside;
+  }
+  /// Orthonormal columns which the rows do not see: n x (n - rank).
+  Eigen::MatrixXd Complement() const {
+    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(q_.leftCols(rank_));
+    const Eigen::MatrixXd q = qr.householderQ();
+    return q.rightCols(q_.rows() - rank_);
+  }
+
+ private:
+  Eigen::MatrixXd q_;
+  Eigen::Index rank_ = 0;
+};
+
+/// Adds the rows H phi of every sensor that is defined at the values, in units of the prior sigma.
 void Observe(const System& system, const Trajectory& t, const Eigen::MatrixXd& phi,
-             std::vector<Eigen::RowVectorXd>& rows) {
+             RowSpace& rows) {
+  const Eigen::Map<const Eigen::RowVectorXd> scale(t.scale.data(), phi.cols());
   for (const SensorBinding& sensor : system.sensors) {
     const int m = sensor.model.measurement().geometry.tangent;
     std::vector<const double*> roles;
@@ -109,15 +139,14 @@ void Observe(const System& system, const Trajectory& t, const Eigen::MatrixXd& p
         Status::kOk) {
       continue;
     }
-    Eigen::MatrixXd h = Eigen::MatrixXd::Zero(m, phi.rows());
+    Eigen::MatrixXd seen = Eigen::MatrixXd::Zero(m, phi.cols());
     for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
       const RoleBinding& role = sensor.roles[i];
       if (role.block < 0 || role.mode == RoleMode::kHold) continue;
       const int column = t.columns[static_cast<std::size_t>(role.block)];
-      if (column >= 0) h.middleCols(column, j[i].cols()) += j[i];
+      if (column >= 0) seen += j[i] * phi.middleRows(column, j[i].cols());
     }
-    const Eigen::MatrixXd seen = h * phi;
-    for (Eigen::Index i = 0; i < seen.rows(); ++i) rows.emplace_back(seen.row(i));
+    for (Eigen::Index i = 0; i < m; ++i) rows.Add(seen.row(i).cwiseProduct(scale));
   }
 }
 
@@ -142,29 +171,22 @@ void Reduce(Eigen::MatrixXd& basis) {
 }  // namespace
 
 std::vector<std::vector<std::string>> UnobservableDirections(const System& system) {
-  constexpr double kStep = 0.02, kRankTolerance = 1e-9;
+  constexpr double kStep = 0.02;
+  constexpr int kIdleSteps = 2;
   Trajectory t = StartNearPrior(system);
   const Eigen::Index n = static_cast<Eigen::Index>(t.names.size());
   if (n == 0) return {};
   Eigen::MatrixXd phi = Eigen::MatrixXd::Identity(n, n);
-  std::vector<Eigen::RowVectorXd> rows;
-  for (Eigen::Index k = 0; k <= n; ++k) {
+  RowSpace rows(n);
+  // Once a step adds nothing to the rank, later ones do not either; twice, as trajectories turn.
+  for (int idle = 0; idle < kIdleSteps && rows.rank() < n;) {
+    const Eigen::Index before = rows.rank();
     Observe(system, t, phi, rows);
+    idle = rows.rank() == before ? idle + 1 : 0;
     if (!Advance(system, kStep, t, phi)) break;
   }
-  Eigen::MatrixXd o =
-      Eigen::MatrixXd::Zero(std::max<Eigen::Index>(n, static_cast<Eigen::Index>(rows.size())), n);
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const double norm = rows[i].norm();
-    if (norm > 0.0) o.row(static_cast<Eigen::Index>(i)) = rows[i] / norm;
-  }
-  const Eigen::Map<const Eigen::VectorXd> scale(t.scale.data(), n);
-  o = o * scale.asDiagonal();
-  Eigen::JacobiSVD<Eigen::MatrixXd> svd(o, Eigen::ComputeFullV);
-  Eigen::Index rank = 0;
-  const Eigen::VectorXd& values = svd.singularValues();
-  while (rank < values.size() && values[rank] > kRankTolerance * values[0]) ++rank;
-  Eigen::MatrixXd null_space = svd.matrixV().rightCols(n - rank);
+  if (rows.rank() == n) return {};
+  Eigen::MatrixXd null_space = rows.Complement();
   Reduce(null_space);
   std::vector<std::vector<std::string>> directions;
   for (Eigen::Index c = 0; c < null_space.cols(); ++c) {

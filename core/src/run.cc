@@ -119,17 +119,18 @@ const char* ToString(RunStatus status) {
 RunResult Run(Experiment& experiment, const RunOptions& options) {
   RunResult result;
   std::vector<Lane> lanes;
-  for (Contestant& contestant : experiment.contestants) {
-    lanes.push_back({contestant, Metrics(contestant, *experiment.source, experiment.segments),
-                     Begin(contestant), false});
-  }
-  if (options.recorder != nullptr) options.recorder->Start(experiment);
   try {
+    for (Contestant& contestant : experiment.contestants) {
+      lanes.push_back({contestant, Metrics(contestant, *experiment.source, experiment.segments),
+                       Begin(contestant), false});
+    }
+    if (options.recorder != nullptr) options.recorder->Start(experiment);
     RunFrames(experiment, lanes, options, result);
-  } catch (const Error& error) {
+  } catch (...) {
     // What was done so far is kept.
-    Fail(result, error.code(), error.what());
-    if (error.code() == ExitCode::kStopped) result.status = RunStatus::kStopped;
+    Failure failure = CaughtFailure();
+    Fail(result, failure.code, std::move(failure.reason));
+    if (failure.code == ExitCode::kStopped) result.status = RunStatus::kStopped;
   }
   for (Lane& lane : lanes) {
     lane.result.metrics = lane.metrics.Finish();

@@ -66,20 +66,13 @@ class Queue {
       run.reason = std::move(result.reason);
       run.contestants = std::move(result.contestants);
       for (ContestantResult& one : run.contestants) one.events = {};
-    } catch (const Error& error) {
-      Fail(run, error.code(), error.what());
-    } catch (const std::exception& error) {
-      Fail(run, ExitCode::kInternal, error.what());
     } catch (...) {
-      Fail(run, ExitCode::kInternal, "an unknown exception was thrown");
+      Failure failure = CaughtFailure();
+      run.status = RunStatus::kFailed;
+      run.code = failure.code;
+      run.reason = std::move(failure.reason);
     }
     return run;
-  }
-
-  static void Fail(SweepRun& run, ExitCode code, const char* reason) {
-    run.status = code == ExitCode::kStopped ? RunStatus::kStopped : RunStatus::kFailed;
-    run.code = code;
-    run.reason = reason;
   }
 
   const Config& config_;

@@ -123,87 +123,6 @@ TEST(Ekf, TheGatePassesTheShareThatItsProbabilityStates) {
   EXPECT_NEAR(passed / double{kTrials}, 0.9, 5.0 * std::sqrt(0.9 * 0.1 / kTrials));
 }
 
-/// Returns what is not a number once x passes 5, from h and from its Jacobian.
-struct Broken : Sensor<Vec<1>, Vec<1>> {
-  static constexpr std::array kRoles{Quantity{"x"}};
-  static constexpr Quantity kMeasurement{"z"};
-  template <class T>
-  bool Predict(const T* x, T* z) const {
-    using std::sqrt;
-    z[0] = sqrt(T(5.0) - x[0]);
-    return true;
-  }
-  template <class T>
-  void SqrtNoise(const T*, T* l) const {
-    l[0] = T(1.0);
-  }
-};
-
-TEST(Ekf, AnUpdateThatIsNotFiniteIsRolledBackAndReported) {
-  System system;
-  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 7.0, 1.0}});
-  AddSensor(system, "broken", InProcessSensor(Broken(), "broken"), {"p.x"});
-  Ekf ekf(system, {}, StreamsOf(system));
-  const UpdateReport report = ekf.Process(FrameAt(0.0, {{0, 1.0}}));
-  EXPECT_EQ(report.measurements[0].outcome, Outcome::kNotFinite);
-  ASSERT_EQ(report.events.size(), 1u);
-  EXPECT_EQ(report.events[0].kind, "not_finite");
-  EXPECT_NE(report.events[0].text.find("broken"), std::string::npos);
-  EXPECT_EQ(ValueOf(ekf.state(), "p.x"), 7.0);
-  EXPECT_EQ(CovarianceOf(ekf.state(), "p.x", "p.x"), 1.0);
-  EXPECT_FALSE(ekf.failed());
-}
-
-/// Overflows as soon as it moves.
-struct Exploding : Motion<1, Vec<1>> {
-  static constexpr std::array kBlocks{Quantity{"x"}};
-  template <class T>
-  void Step(const T* x, const T* w, double, T* next) const {
-    next[0] = 1e308 * (x[0] + w[0]);
-  }
-  void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
-};
-
-TEST(Ekf, AStepThatIsNotFiniteEndsWithTheLastGoodStateAndMeasurement) {
-  System system;
-  AddMotion(system, "p", InProcessMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
-  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 1.0), "linear"), {"p.x"});
-  Ekf ekf(system, {}, StreamsOf(system));
-  ekf.Process(FrameAt(0.0, {{0, 5.0}}));
-  const UpdateReport report = ekf.Process(FrameAt(1.0, {{0, 5.0}}));
-  EXPECT_TRUE(ekf.failed());
-  EXPECT_EQ(ValueOf(ekf.state(), "p.x"), 4.0);
-  ASSERT_EQ(report.events.size(), 1u);
-  EXPECT_EQ(report.events[0].kind, "not_finite");
-  EXPECT_NE(report.events[0].text.find("last good state at 0.000000 s: p.x = 4"),
-            std::string::npos);
-  EXPECT_NE(report.events[0].text.find("sensor 'direct' at 0.000000 s, z = 5"), std::string::npos);
-}
-
-TEST(Ekf, AFailedStepMovesNothing) {
-  System system = MovingPoint();
-  AddMotion(system, "q", InProcessMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
-  Ekf ekf(system, {}, {});
-  ekf.Start(0);
-  const std::vector<double> x = ekf.state().values();
-  const Eigen::MatrixXd p = ekf.state().covariance().Dense();
-  ekf.Process(FrameAt(1.0, {}));
-  EXPECT_TRUE(ekf.failed());
-  EXPECT_EQ(ekf.state().values(), x);
-  EXPECT_EQ(ekf.state().covariance().Dense(), p);
-}
-
-TEST(Ekf, AGapOfTooManyPartsIsGivenUpNotSkipped) {
-  EkfOptions options;
-  options.max_dt_s = 1e-9;
-  Ekf ekf(MovingPoint(), options, {});
-  ekf.Start(0);
-  const UpdateReport report = ekf.Process(FrameAt(10.0, {}));
-  EXPECT_TRUE(ekf.failed());
-  ASSERT_EQ(report.events.size(), 1u);
-  EXPECT_EQ(report.events[0].kind, "gap");
-}
-
 TEST(Ekf, PerSensorHoldsWhereTheLastMeasurementOfASensorIsNotUsed) {
   // d = BF / Z is not linear: joint and per-sensor updates differ.
   const System system = DepthFilter();
@@ -217,47 +136,6 @@ TEST(Ekf, PerSensorHoldsWhereTheLastMeasurementOfASensorIsNotUsed) {
   Ekf joint(system, {}, StreamsOf(system));
   joint.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.0}}));
   EXPECT_NE(joint.state().values(), whole.state().values());
-}
-
-TEST(Ekf, TheMeasurementsOwnCovarianceCountsAlsoWhereItInitialises) {
-  System system = DepthFilter();
-  system.sensors.pop_back();
-  system.priors[0] = {0, {}, {}, "disparity"};
-  Ekf ekf(system, {}, StreamsOf(system));
-  Frame frame = FrameAt(0.0, {{0, 65.0}});
-  frame.measurements[0].covariance = {100.0};
-  ekf.Process(frame);
-  // sigma_Z = Z^2 / BF sigma_d
-  EXPECT_NEAR(CovarianceOf(ekf.state(), "target.depth", "target.depth"),
-              std::pow(0.16 / 26.0 * 10.0, 2), 1e-12);
-}
-
-TEST(Ekf, NumbersThatAreNoneDoNotLockASensorOut) {
-  const System system = DepthFilter();
-  Ekf ekf(system, {}, StreamsOf(system));
-  const Eigen::MatrixXd p = ekf.state().covariance().Dense();
-  for (int k = 0; k < 100; ++k) ekf.Process(FrameAt(0.0, {{1, std::nan("")}}));
-  EXPECT_EQ(ekf.state().covariance().Dense(), p);
-}
-
-TEST(Ekf, ASensorThatStaysOutOfItsDomainInflatesOnceAndNotWhatItHolds) {
-  System system = DepthFilter();
-  system.sensors.erase(system.sensors.begin());
-  system.sensors[0].roles[1].mode = RoleMode::kHold;
-  system.priors[0].mean = {-1.0};
-  Ekf ekf(system, {}, StreamsOf(system));
-  for (int k = 0; k < 100; ++k) ekf.Process(FrameAt(0.0, {{0, 1.0}}));
-  EXPECT_NEAR(CovarianceOf(ekf.state(), "target.depth", "target.depth"), 1.0, 1e-12);
-  EXPECT_EQ(CovarianceOf(ekf.state(), "template.inverse_distance", "template.inverse_distance"),
-            0.25);
-}
-
-TEST(Ekf, AMeasurementThatIsNotFiniteIsNotUsed) {
-  const System system = DepthFilter();
-  Ekf ekf(system, {}, StreamsOf(system));
-  const UpdateReport report = ekf.Process(FrameAt(0.0, {{0, std::nan("")}}));
-  EXPECT_EQ(report.measurements[0].outcome, Outcome::kNotFinite);
-  EXPECT_EQ(ValueOf(ekf.state(), "target.depth"), 0.35);
 }
 
 TEST(Ekf, ConsideredBlocksKeepTheirValueAndTheirCorrelationsFollowSchmidt) {
@@ -323,46 +201,6 @@ TEST(Ekf, ASensorOutsideItsDomainIsReportedAsDivergenceOnce) {
   EXPECT_EQ(events, 1);
   EXPECT_TRUE(ekf.diverged());
   EXPECT_EQ(ValueOf(ekf.state(), "target.depth"), -0.2);
-}
-
-TEST(Ekf, ALockedOutSensorResetsItsBlockFromTheMeasurement) {
-  System system = DepthFilter();
-  system.priors[0].mean = {3.0};
-  system.priors[0].covariance(0, 0) = 1e-6;
-  EkfOptions options;
-  options.gate = 0.999;
-  Ekf ekf(system, options, StreamsOf(system));
-  UpdateReport report;
-  for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(0.0, {{0, 65.0}}));
-  ASSERT_FALSE(report.events.empty());
-  EXPECT_EQ(report.events.back().kind, "lockout");
-  EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), 26.0 / 65.0, 1e-15);
-  // sigma_Z = Z^2 / BF sigma_d, uncorrelated with the rest; the rate is back at its prior.
-  EXPECT_NEAR(std::sqrt(CovarianceOf(ekf.state(), "target.depth", "target.depth")),
-              0.4 * 0.4 / 26.0, 1e-12);
-  EXPECT_EQ(CovarianceOf(ekf.state(), "target.depth_rate", "target.depth_rate"), 0.25);
-  EXPECT_EQ(ekf.Process(FrameAt(0.0, {{0, 65.0}})).measurements[0].outcome, Outcome::kAccepted);
-}
-
-TEST(Ekf, BlocksStartFromMeasurementsWithTheirCorrelation) {
-  System system = DepthFilter();
-  system.priors[0] = {0, {}, {}, "disparity"};
-  system.priors[2] = {2, {}, {}, "inverse_scale"};
-  Ekf ekf(system, {}, StreamsOf(system));
-  // The scale alone has to wait for a depth.
-  EXPECT_EQ(ekf.Process(FrameAt(0.0, {{1, 1.0}})).measurements[0].outcome, Outcome::kNotReady);
-  const UpdateReport report = ekf.Process(FrameAt(0.1, {{1, 1.0}, {0, 52.0}}));
-  EXPECT_EQ(report.measurements[0].outcome, Outcome::kInitialised);
-  EXPECT_EQ(report.measurements[1].outcome, Outcome::kInitialised);
-  EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), 0.5, 1e-15);
-  EXPECT_NEAR(ValueOf(ekf.state(), "template.inverse_distance"), 2.0, 1e-15);
-  // lambda = s / Z: d lambda = ds / Z - s / Z^2 dZ, sigma_s = 2/300 at s = 1.
-  const double variance_z = std::pow(0.25 / 26.0, 2), variance_s = std::pow(2.0 / 300.0, 2);
-  EXPECT_NEAR(CovarianceOf(ekf.state(), "target.depth", "target.depth"), variance_z, 1e-15);
-  EXPECT_NEAR(CovarianceOf(ekf.state(), "template.inverse_distance", "target.depth"),
-              -4.0 * variance_z, 1e-15);
-  EXPECT_NEAR(CovarianceOf(ekf.state(), "template.inverse_distance", "template.inverse_distance"),
-              16.0 * variance_z + 4.0 * variance_s, 1e-14);
 }
 
 TEST(Ekf, NoiseThatVanishesIsWarnedOfOnce) {

@@ -37,5 +37,29 @@ TEST(UnobservableDirections, AHeldBlockIsNotEstimated) {
   EXPECT_EQ(directions[0], Names{"template.inverse_distance"});
 }
 
+TEST(UnobservableDirections, WhereNothingMeasuresNothingIsSeen) {
+  System system = testing::DepthFilter();
+  system.sensors.clear();
+  EXPECT_EQ(
+      UnobservableDirections(system),
+      (std::vector<Names>{{"target.depth"}, {"target.depth_rate"}, {"template.inverse_distance"}}));
+}
+
+TEST(UnobservableDirections, ManyBlocksThatNothingJoinsAreToldApart) {
+  constexpr int kPairs = 150;
+  System system;
+  for (int i = 0; i < kPairs; ++i) {
+    const std::string name = "p" + std::to_string(i);
+    testing::AddMotion(system, name,
+                       InProcessMotion(ConstantVelocity<1, false>(1.0), "constant_velocity"),
+                       {{"x", 1.0, 1e-3}, {"v", 0.0, 1e3}});
+    if (i % 50 == 7) continue;
+    testing::AddSensor(system, name, InProcessSensor(testing::Linear(1.0, 1.0), "linear"),
+                       {name + ".x"});
+  }
+  EXPECT_EQ(UnobservableDirections(system),
+            (std::vector<Names>{{"p7.x"}, {"p7.v"}, {"p57.x"}, {"p57.v"}, {"p107.x"}, {"p107.v"}}));
+}
+
 }  // namespace
 }  // namespace alidade

@@ -94,6 +94,28 @@ TEST(Run, BadDataKeepsWhatWasDone) {
   EXPECT_EQ(result.contestants[0].counts.at("accepted:inverse_scale"), 5);
 }
 
+/// A defect of the program half-way.
+class Breaking : public testing::SwingingTarget {
+ public:
+  Breaking() : SwingingTarget(60) {}
+  bool Next(Frame& frame) override {
+    if (++count_ > 5) throw std::logic_error("an invariant");
+    return SwingingTarget::Next(frame);
+  }
+
+ private:
+  int count_ = 0;
+};
+
+TEST(Run, ADefectIsAResultToo) {
+  Experiment experiment = MakeExperiment();
+  experiment.source = std::make_unique<Breaking>();
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.code, ExitCode::kInternal);
+  EXPECT_EQ(result.reason, "internal: an invariant");
+  EXPECT_EQ(result.contestants[0].counts.at("accepted:inverse_scale"), 5);
+}
+
 TEST(Run, TheSameSeedGivesTheSameMetricsTwice) {
   Experiment first = MakeExperiment(), second = MakeExperiment();
   EXPECT_EQ(alidade::Run(first, {}).contestants[0].metrics,

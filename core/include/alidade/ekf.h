@@ -67,7 +67,7 @@ class Ekf : public Estimator {
   };
 
   /// What one motion model makes of its blocks.
-  struct Motion {
+  struct Move {
     std::vector<std::pair<BlockId, std::vector<double>>> next;
     std::vector<std::pair<int, int>> segments;  ///< rows of the covariance: (offset, size)
     Eigen::MatrixXd f, q;                       ///< of those rows
@@ -75,7 +75,7 @@ class Ekf : public Estimator {
 
   void StepTo(Stamp stamp, UpdateReport& report);
   bool StepOnce(double dt_s, UpdateReport& report);
-  bool StepModel(const MotionBinding& motion, double dt_s, std::vector<Motion>& moves,
+  bool StepModel(const MotionBinding& motion, double dt_s, std::vector<Move>& moves,
                  UpdateReport& report);
 
   std::vector<Row> Collect(const Frame& frame, UpdateReport& report);

@@ -45,6 +45,16 @@ class Error : public std::runtime_error {
   ExitCode code_;
 };
 
+/// An exception as an end of the program: its exit code, and what to say.
+struct Failure {
+  ExitCode code = ExitCode::kInternal;
+  std::string reason;
+};
+
+/// Of the exception that is being handled: an Error's own code and text; anything else is internal.
+/// Call it in a catch block only.
+Failure CaughtFailure();
+
 /// Composes the one message form of the project; empty parts are left out.
 std::string ErrorLine(const Place& place, std::string_view key, std::string_view what,
                       std::string_view expected = {}, std::string_view suggestion = {});

@@ -112,6 +112,22 @@ std::unique_ptr<ConfigTree> ParseRoot(std::string_view text, const std::string& 
   return root;
 }
 
+/// Makes the relative paths of a config absolute: `source.path`, and the items of `plugins`.
+void AnchorPaths(const ConfigTree& root, const fs::path& folder) {
+  const auto anchor = [&](ConfigTree* node) {
+    if (node->kind != Node::Kind::kScalar || node->text.empty() || node->text == "-") return;
+    std::error_code error;
+    const fs::path absolute = fs::absolute(folder / node->text, error);
+    if (!error) node->text = absolute.string();
+  };
+  const ConfigTree* source = Child(root, "source");
+  ConfigTree* const path = source == nullptr ? nullptr : Child(*source, "path");
+  if (path != nullptr) anchor(path);
+  const ConfigTree* plugins = Child(root, "plugins");
+  if (plugins == nullptr) return;
+  for (const auto& plugin : plugins->children) anchor(plugin.get());
+}
+
 /// Takes `include:` out of the map.
 std::unique_ptr<ConfigTree> TakeInclude(ConfigTree* root) {
   auto& children = root->children;
@@ -136,6 +152,7 @@ class Loader {
     }
     if (++files_ > kMaxFiles) FailAt(place, key, "too many includes", "at most 64 files");
     auto own = ParseRoot(ReadFile(file, place, key), file.string(), &budget_);
+    AnchorPaths(*own, file.parent_path());
     const auto include = TakeInclude(own.get());
     if (include == nullptr) return own;
     open_.push_back(canonical);
@@ -259,6 +276,7 @@ void Config::Set(std::string_view dotted_key, std::string_view value, std::strin
   const int depth = internal::kMaxDepth - static_cast<int>(steps.size());
   if (depth < 0) FailAt(place, dotted_key, "nested too deep", "at most 64 levels");
   Budget budget;
+  if (value == "-") value = "'-'";  // alone it would be a list of nothing
   auto next = internal::ParseYaml(value, Origin{place.file, std::string(dotted_key), false, depth},
                                   &budget);
   if (next == nullptr) FailAt(place, dotted_key, "no value", "a value, or \"\" for an empty text");
@@ -272,6 +290,7 @@ void Config::Set(std::string_view dotted_key, std::string_view value, std::strin
   next->key = at->key;
   next->index = at->index;
   *slot = std::move(next);
+  AnchorPaths(*tree_, {});
 }
 
 Config Config::Merged(const Node& overrides) const {

@@ -75,13 +75,9 @@ class CsvSource : public Source {
 
  private:
   static std::filesystem::path Path(const Node& node, const std::filesystem::path& folder) {
-    // `--set source.path=-` is read as YAML: a list of one item without a value.
-    const bool dash = node.kind() == Node::Kind::kList && node.Items().size() == 1 &&
-                      node.Items()[0].kind() == Node::Kind::kNull;
-    const std::filesystem::path path = dash ? "-" : node.Text();
+    const std::filesystem::path path = node.Text();
     if (path.empty()) node.Fail("no path", "a file, or '-' for standard input");
-    const bool from_here = path == "-" || node.place().file == "--set";
-    return from_here ? path : (folder / path).lexically_normal();
+    return path == "-" ? path : folder / path;
   }
 
   /// The next line that is neither comment nor blank. A blank line is a row where it is the missing

@@ -236,6 +236,19 @@ TEST_F(ConfigFolder, IncludeLiesBelowTheFile) {
   EXPECT_EQ(config.folder(), folder_);
 }
 
+TEST_F(ConfigFolder, RelativePathsAreTakenFromTheFileThatHasThem) {
+  Write("parts/base.yaml", "source: {path: a.csv}\nplugins: [../x.so, /y.so]\n");
+  const fs::path file = Write("f.yaml", "include: parts/base.yaml\nsource: {type: csv}\n");
+  const Config config = Config::FromFile(file);
+  EXPECT_EQ(config.root().At("source").At("path").Text(), (folder_ / "parts/a.csv").string());
+  const std::vector<Node> plugins = config.root().At("plugins").Items();
+  EXPECT_EQ(plugins[0].Text(), (folder_ / "parts/../x.so").string());
+  EXPECT_EQ(plugins[1].Text(), "/y.so");
+  // What a run writes down means the same wherever it lies.
+  const Config again = Config::FromFile(Write("elsewhere/g.yaml", config.ToYaml()));
+  EXPECT_EQ(again.ToYaml(), config.ToYaml());
+}
+
 TEST_F(ConfigFolder, CyclicIncludeIsRefused) {
   Write("a.yaml", "include: b.yaml");
   Write("b.yaml", "x: 1\ninclude: ./a.yaml");

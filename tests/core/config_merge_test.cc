@@ -36,6 +36,20 @@ TEST(ConfigSet, ReplacesAndMakes) {
   EXPECT_EQ(config.root().At("a").At("b").Items()[1].At("c").path(), "a.b[1].c");
 }
 
+TEST(ConfigSet, RelativePathsAreTakenFromTheCurrentFolder) {
+  Config config = Read("source: {seed: 1}\n");
+  const auto path = [&] { return config.root().At("source").At("path").Text(); };
+  config.Set("source.path", "a/b.csv", "--set");
+  EXPECT_EQ(path(), (std::filesystem::current_path() / "a/b.csv").string());
+  config.Set("source", "{path: /x.csv}", "--set");
+  EXPECT_EQ(path(), "/x.csv");
+  config.Set("source.path", "-", "--set");
+  EXPECT_EQ(path(), "-");
+  config.Set("plugins", "[p.so]", "--set");
+  EXPECT_EQ(config.root().At("plugins").Items()[0].Text(),
+            (std::filesystem::current_path() / "p.so").string());
+}
+
 TEST(ConfigSet, ErrorsAboutTheValueNameTheOrigin) {
   Config config = Read("a: 1\nsource: {seed: 1}\n");
   config.Set("source.seed", "3.8x", "--set");

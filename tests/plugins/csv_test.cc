@@ -260,24 +260,8 @@ TEST_F(Csv, LinesAcrossTheBufferAreWhole) {
 
 // ---- where it comes from ------------------------------------------------------------------------
 
-TEST_F(Csv, PathOfTheCommandLineIsRelativeToTheCurrentFolder) {
-  Write("t_s,z\n0,1\n");
-  const fs::path before = fs::current_path();
-  fs::create_directory(folder_ / "here");
-  fs::current_path(folder_ / "here");
-  std::ofstream("b.csv") << "t_s,z\n0,1\n1,2\n";
-  config_ =
-      std::make_unique<Config>(Config::FromText("path: a.csv\nstreams: {z: z}\n", "run.yaml"));
-  config_->Set("path", "b.csv", "--set");
-  const auto source = OpenConfig();
-  fs::current_path(before);
-  Frame frame;
-  EXPECT_TRUE(source->Next(frame));
-  EXPECT_TRUE(source->Next(frame));
-}
-
 TEST_F(Csv, DashIsStandardInput) {
-  for (const char* written : {"\"-\"", "-"}) {  // as YAML the second is a list of nothing
+  for (const char* written : {"\"-\"", "-"}) {
     Write("t_s,z\n0,1\n1,x\n");
     const int kept = dup(STDIN_FILENO), file = open(File().c_str(), O_RDONLY);
     dup2(file, STDIN_FILENO);

@@ -80,19 +80,21 @@ class Node {
 class Config {
  public:
   /// Reads a file, and the files its `include:` names (below it in precedence). An include must lie
-  /// inside the folder of the file unless `allow_outside`.
+  /// inside the folder of the file unless `allow_outside`. Relative paths (`source.path`, the items
+  /// of `plugins`) become absolute, taken from the folder of the file that has them.
   /// Errors: kInputMissing, kBadConfig, kNotTrusted.
   static Config FromFile(const std::filesystem::path& file, bool allow_outside = false);
   /// Reads YAML text, in which `include:` is refused; `name` stands for the file in messages.
   static Config FromText(std::string_view text, std::string_view name);
 
   Node root() const;
-  /// The folder against which relative paths of the config are taken.
+  /// The folder of the file; of a text, the current one.
   const std::filesystem::path& folder() const { return folder_; }
   const std::string& name() const { return name_; }
 
   /// Sets `dotted.key` to `value`, read as YAML; maps on the way are made. `origin` stands for the
-  /// file in messages about it (as in `--set`). Handles to what was there before become invalid.
+  /// file in messages about it (as in `--set`). A lone `-` is a text; a relative path becomes
+  /// absolute, taken from the current folder. Handles to what was there before become invalid.
   void Set(std::string_view dotted_key, std::string_view value, std::string_view origin);
   /// A copy with `overrides` (a map) merged in: maps merge key by key, everything else replaces,
   /// and a map that names another `model:` or `type:` replaces the old map whole. Reads recorded in

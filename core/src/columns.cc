@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <string_view>
 
+#include "text_table.h"
+
 namespace alidade::internal {
 namespace {
 
@@ -32,6 +34,24 @@ std::vector<int> MatchTruths(const StateLayout& layout, const std::vector<Stream
     if (fits(block, truths[t])) match[block] = static_cast<int>(t);
   }
   return match;
+}
+
+std::string WhyNoBlock(const StateLayout& layout, const std::vector<StreamInfo>& truths,
+                       std::size_t t) {
+  const StreamInfo& truth = truths[t];
+  const std::vector<int> match = MatchTruths(layout, truths);
+  if (std::find(match.begin(), match.end(), static_cast<int>(t)) != match.end()) return {};
+  std::vector<std::string> fitting;
+  int size = 0;
+  for (const Block& block : layout.blocks()) {
+    if (block.name != truth.name && LastComponent(block.name) != truth.name) continue;
+    fitting.push_back(block.name);
+    size = block.geometry().ambient;
+  }
+  if (fitting.empty()) return "no block has this name";
+  if (fitting.size() > 1) return "it may be of " + Join(fitting, " or ");
+  if (size == truth.size) return fitting[0] + " has a truth of its full name";
+  return fitting[0] + " has size " + std::to_string(size) + ", not " + std::to_string(truth.size);
 }
 
 std::vector<std::string> AmbientNames(const std::string& name, const Space& space) {

@@ -15,6 +15,10 @@ namespace alidade::internal {
 /// fits none, and so does a truth of another size.
 std::vector<int> MatchTruths(const StateLayout& layout, const std::vector<StreamInfo>& truths);
 
+/// Why truth `t` belongs to no block of `layout`; "" where it belongs to one.
+std::string WhyNoBlock(const StateLayout& layout, const std::vector<StreamInfo>& truths,
+                       std::size_t t);
+
 /// ColumnNames, or numbers for names where the space names no elements.
 std::vector<std::string> AmbientNames(const std::string& name, const Space& space);
 /// `name`, or `name.0`, `name.1`, ... where there are several.

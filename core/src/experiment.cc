@@ -3,6 +3,7 @@
 
 #include "alidade/ekf.h"
 #include "alidade/run.h"
+#include "columns.h"
 
 namespace alidade {
 namespace {
@@ -139,6 +140,30 @@ std::vector<Segment> ReadSegments(const Node& root, const System& system,
   return segments;
 }
 
+/// Refuses a truth that the config names where it belongs to no block, be it of `whole` or of an
+/// estimator's own state.
+void CheckTruths(const Node& source, const Experiment& experiment, const System& whole) {
+  const auto named = source.Find("truth");
+  if (!named || !named->is_map()) return;
+  const std::vector<StreamInfo>& truths = experiment.source->truths();
+  for (std::size_t t = 0; t < truths.size(); ++t) {
+    const auto node = named->Find(truths[t].name);
+    const auto has_block = [&](const Contestant& contestant) {
+      return internal::WhyNoBlock(contestant.system.layout, truths, t).empty();
+    };
+    const std::string why = internal::WhyNoBlock(whole.layout, truths, t);
+    if (!node || why.empty() || std::ranges::any_of(experiment.contestants, has_block)) continue;
+    std::vector<std::string> names;
+    for (const Block& block : whole.layout.blocks()) {
+      names.push_back(block.name);
+      names.push_back(block.name.substr(block.owner.size() + 1));
+    }
+    std::erase(names, truths[t].name);
+    node->Fail("truth of no block: " + why, "the name and size of one block, as in ENTRY.BLOCK",
+               Nearest(truths[t].name, names));
+  }
+}
+
 }  // namespace
 
 std::vector<std::filesystem::path> PluginPaths(const Config& config) {
@@ -182,6 +207,7 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   if (experiment.contestants.empty()) {
     root.At("estimators").Fail("empty", "at least one estimator");
   }
+  CheckTruths(source, experiment, whole);
   root.RejectUnread();
   return experiment;
 }

@@ -10,6 +10,7 @@
 
 #include "alidade/ekf.h"
 #include "alidade/metrics.h"
+#include "columns.h"
 #include "number_text.h"
 #include "text_table.h"
 
@@ -72,9 +73,11 @@ std::string PriorText(const Prior& prior, const Block& block) {
   return text + " +- " + ListText(sigmas, true);
 }
 
-std::string States(const System& system) {
+/// A line for each block; then, for each truth that is of none of them, why.
+std::string States(const System& system, const std::vector<StreamInfo>& truths) {
+  const std::vector<int> match = internal::MatchTruths(system.layout, truths);
   std::vector<TextRow> rows = {
-      {"block", "geometry", "size", "unit", "owner", "status", "starts from"}};
+      {"block", "geometry", "size", "unit", "owner", "status", "truth", "starts from"}};
   for (const Prior& prior : system.priors) {
     const Block& block = system.layout[prior.block];
     const Geometry& geometry = block.geometry();
@@ -82,10 +85,20 @@ std::string States(const System& system) {
     if (geometry.tangent != geometry.ambient) {
       size.append(" (").append(std::to_string(geometry.tangent)).append(" free)");
     }
+    const int truth = match[static_cast<std::size_t>(prior.block)];
     rows.push_back({block.name, GeometryText(geometry), size, block.space.unit, block.owner,
-                    StatusText(block.status), PriorText(prior, block)});
+                    StatusText(block.status),
+                    truth >= 0       ? truths[static_cast<std::size_t>(truth)].name
+                    : truths.empty() ? ""
+                                     : "-",
+                    PriorText(prior, block)});
   }
-  return TextTable(rows, kIndent);
+  std::string text = TextTable(rows, kIndent);
+  for (std::size_t t = 0; t < truths.size(); ++t) {
+    const std::string why = internal::WhyNoBlock(system.layout, truths, t);
+    if (!why.empty()) text += "    truth not used: " + truths[t].name + ", " + why + '\n';
+  }
+  return text;
 }
 
 std::string Motions(const System& system) {
@@ -271,7 +284,7 @@ std::string Explain(const Config& config, const Experiment& experiment) {
     const System& system = contestant.system;
     const Node entry = config.root().At("estimators").At(contestant.name);
     text += "\nestimator " + contestant.name + " (" + contestant.type + ")\n";
-    text += "  state\n" + States(system);
+    text += "  state\n" + States(system, experiment.source->truths());
     text += "  motion\n" + Motions(system);
     text += "  sensors\n" + Sensors(system);
     text += "  who touches which block\n" + Touches(system);

@@ -269,6 +269,22 @@ TEST_F(Cli, ExplainTellsWhatCannotBeObserved) {
   EXPECT_TRUE(Contains(held.out, "holds")) << held.out;
 }
 
+TEST_F(Cli, ExplainTellsWhichTruthIsOfWhichBlock) {
+  const Outcome both = Call({"explain", "config.yaml"});
+  EXPECT_TRUE(Contains(both.out, "estimated  depth_rate        0 +- 0.5\n")) << both.out;
+  EXPECT_FALSE(Contains(both.out, "truth not used")) << both.out;
+  // Stereo alone leaves the template out: its truth is there, but of no use.
+  const Outcome stereo =
+      Call({"explain", "config.yaml", "--set", "estimators.ekf.sensors=[stereo]"});
+  EXPECT_EQ(stereo.code, 0) << stereo.err;
+  EXPECT_TRUE(Contains(stereo.out, "truth not used: inverse_distance, no block has this name\n"))
+      << stereo.out;
+  Write("table.csv", "t_s,d\n0,80\n");
+  const Outcome some = Call({"explain", "table.yaml", "--set", "source.truth={depth_rate: d}"});
+  EXPECT_TRUE(Contains(some.out, "estimated  -           0.3 +- 0.1\n")) << some.out;
+  EXPECT_FALSE(Contains(Call({"explain", "table.yaml"}).out, "truth  ")) << some.out;
+}
+
 TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
   const Outcome list = Call({"plugins", "list"});
   EXPECT_EQ(list.code, 0);

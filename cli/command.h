@@ -39,6 +39,8 @@ struct Input {
 };
 
 void AddPluginPath(CLI::App& command, std::vector<std::string>& paths);
+/// The option -o, a folder; "" where it is not given.
+void AddOutput(CLI::App& command, std::string& folder, const std::string& help);
 std::vector<std::filesystem::path> Absolute(const std::vector<std::string>& paths);
 
 /// Where output goes: `given`, or the config's `output:` inside runs/, or runs/PREFIX and the name

@@ -87,7 +87,7 @@ std::string RemedyFor(const Refusal& refusal) {
 }
 
 void CheckPlugins(const std::vector<std::string>& paths, Diagnosis& diagnosis) {
-  const PluginHost host(Absolute(paths));
+  const PluginHost host(Absolute(paths), OnRefusal::kList);
   for (const std::string& place : host.searched()) diagnosis.Ok("searched " + place);
   for (const Refusal& refusal : host.refusals()) {
     diagnosis.Warn("refused " + refusal.file.string() + ": " + refusal.reason, RemedyFor(refusal));

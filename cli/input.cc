@@ -14,6 +14,8 @@ std::string IsAssignment(const std::string& text) {
   return "'" + text + "' is no assignment; expected key=value, as in source.seed=7";
 }
 
+std::string IsNamed(const std::string& path) { return path.empty() ? "empty path" : ""; }
+
 std::string NameOf(const fs::path& config) {
   const std::string folder = config.parent_path().lexically_normal().filename().string();
   const bool named = !folder.empty() && folder != "." && folder != "..";
@@ -26,11 +28,19 @@ void AddPluginPath(CLI::App& command, std::vector<std::string>& paths) {
   command.add_option("--plugin-path", paths, "a plugin, or a folder of plugins; may be repeated")
       ->option_text("PATH")
       ->type_name("PATH")
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->check(IsNamed);
+}
+
+void AddOutput(CLI::App& command, std::string& folder, const std::string& help) {
+  command.add_option("-o,--output", folder, help)->option_text("DIR")->check(IsNamed);
 }
 
 void Input::AddTo(CLI::App& command) {
-  command.add_option("CONFIG", config, "the config, a YAML file")->option_text(" ")->required();
+  command.add_option("CONFIG", config, "the config, a YAML file")
+      ->option_text(" ")
+      ->required()
+      ->check(IsNamed);
   command.add_option("--set", sets, "set a key of the config, in dotted form; may be repeated")
       ->option_text("KEY=VALUE")
       ->type_name("KEY=VALUE")

@@ -14,6 +14,7 @@ constexpr const char* kFooter = R"(Examples:
   alidade plugins list
   alidade plugins info stereo_disparity
   alidade plugins info scale_2d --json
+  alidade plugins info ekf
   alidade plugins where --plugin-path build/lib
 
 Plugins are looked for in the config's `plugins:`, --plugin-path, ALIDADE_PLUGIN_PATH, the user's
@@ -28,13 +29,14 @@ struct Arguments {
 using Listing = std::string (*)(const PluginHost&, const Arguments&);
 
 /// A subcommand that prints what `listing` makes of the plugins.
-std::shared_ptr<Arguments> AddListing(CLI::App& command, Action& action, Listing listing) {
+std::shared_ptr<Arguments> AddListing(CLI::App& command, Action& action, Listing listing,
+                                      OnRefusal on_refusal = OnRefusal::kThrow) {
   const auto arguments = std::make_shared<Arguments>();
   AddPluginPath(command, arguments->paths);
   command.footer(kFooter);
-  command.callback([&action, arguments, listing] {
-    action = [arguments, listing] {
-      const PluginHost host(Absolute(arguments->paths));
+  command.callback([&action, arguments, listing, on_refusal] {
+    action = [arguments, listing, on_refusal] {
+      const PluginHost host(Absolute(arguments->paths), on_refusal);
       Print(listing(host, *arguments));
       return ExitCode::kOk;
     };
@@ -66,13 +68,13 @@ void AddPlugins(CLI::App& program, Action& action) {
   list.add_flag("--json", list_arguments->json, "print JSON");
   CLI::App& info = *plugins.add_subcommand("info", "Tell all about one of them");
   const auto info_arguments = AddListing(info, action, Info);
-  info.add_option("NAME", info_arguments->name, "of a sensor, motion model or source")
+  info.add_option("NAME", info_arguments->name, "of a sensor, motion model, source or estimator")
       ->option_text(" ")
       ->required();
   info.add_flag("--json", info_arguments->json, "print JSON");
   CLI::App& where =
       *plugins.add_subcommand("where", "List the places searched, what they have, what is refused");
-  AddListing(where, action, Where);
+  AddListing(where, action, Where, OnRefusal::kList);
 }
 
 }  // namespace alidade::cli

@@ -114,10 +114,8 @@ void AddRun(CLI::App& program, Action& action) {
   CLI::App& command = *program.add_subcommand("run", "Run the estimators of a config");
   const auto arguments = std::make_shared<Arguments>();
   arguments->input.AddTo(command);
-  command
-      .add_option("-o,--output", arguments->folder,
-                  "run folder; default: the config's `output:`, or its folder's name, in runs/")
-      ->option_text("DIR");
+  AddOutput(command, arguments->folder,
+            "run folder; default: the config's `output:`, or its folder's name, in runs/");
   command.add_option("--seed", arguments->seed, "seed of the source; overrides the config")
       ->option_text("N")
       ->check(CLI::Range(std::int64_t{0}, INT64_MAX));

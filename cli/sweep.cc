@@ -104,10 +104,8 @@ void AddSweep(CLI::App& program, Action& action) {
   command
       .add_option_function<std::string>("--shard", read_shard, "do share i of n of the seeds only")
       ->option_text("i/n");
-  command
-      .add_option("-o,--output", arguments->folder,
-                  "folder; default: the config's `output:`, or sweep-NAME, in runs/")
-      ->option_text("DIR");
+  AddOutput(command, arguments->folder,
+            "folder; default: the config's `output:`, or sweep-NAME, in runs/");
   command.add_flag("--force", arguments->force, "replace the folder if it is there");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.footer(kFooter);

@@ -273,6 +273,9 @@ Node Config::root() const { return Node(tree_.get()); }
 void Config::Set(std::string_view dotted_key, std::string_view value, std::string_view origin) {
   const Place place{std::string(origin)};
   const std::vector<Step> steps = ParseDotted(dotted_key, place);
+  if (steps[0].name == "include") {
+    FailAt(place, dotted_key, "files are included before it is set", "a key of the file");
+  }
   const int depth = internal::kMaxDepth - static_cast<int>(steps.size());
   if (depth < 0) FailAt(place, dotted_key, "nested too deep", "at most 64 levels");
   Budget budget;

@@ -30,28 +30,6 @@ const char* ToString(Outcome outcome) {
   return kNames[static_cast<int>(outcome)];
 }
 
-EkfOptions EkfOptions::FromNode(const Node& entry) {
-  EkfOptions options;
-  if (const auto gate = entry.Find("gate")) options.gate = gate->Number(0.0, 1.0, true);
-  if (const auto fuse = entry.Find("fuse")) {
-    options.fuse =
-        static_cast<alidade::Fuse>(fuse->Choice({"joint", "per_sensor", "per_measurement"}));
-  }
-  if (const auto dt = entry.Find("max_dt_s")) {
-    options.max_dt_s = dt->Number(0.0, std::numeric_limits<double>::infinity(), true);
-  }
-  if (const auto lockout = entry.Find("lockout")) {
-    if (const auto after = lockout->Find("after")) {
-      options.lockout_after = static_cast<int>(after->Integer(1, 1'000'000));
-    }
-    if (const auto action = lockout->Find("action")) {
-      options.lockout = static_cast<Lockout>(action->Choice({"reset", "inflate", "none"}));
-    }
-    lockout->RejectUnread();
-  }
-  return options;
-}
-
 Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams)
     : system_(std::move(system)),
       options_(options),

@@ -171,6 +171,7 @@ std::vector<std::filesystem::path> PluginPaths(const Config& config) {
   if (const auto list = config.root().Find("plugins")) {
     for (const Node& item : list->Items()) {
       const std::filesystem::path path = item.Text();
+      if (path.empty()) item.Fail("empty path", "a plugin file, or a folder of plugins");
       paths.push_back(path.is_absolute() ? path : config.folder() / path);
     }
   }

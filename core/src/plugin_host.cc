@@ -75,8 +75,9 @@ const boost::dll::shared_library& OpenForGood(const fs::path& file) {
 
 }  // namespace
 
-PluginHost::PluginHost(const std::vector<fs::path>& files_and_folders) {
-  for (const fs::path& place : files_and_folders) LoadPlace(place, "given", true);
+PluginHost::PluginHost(const std::vector<fs::path>& files_and_folders, OnRefusal on_refusal) {
+  const bool required = on_refusal == OnRefusal::kThrow;
+  for (const fs::path& place : files_and_folders) LoadPlace(place, "given", required);
   for (const fs::path& folder : FoldersOf("ALIDADE_PLUGIN_PATH")) {
     LoadPlace(folder, "ALIDADE_PLUGIN_PATH", false);
   }

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <tuple>
+#include <utility>
 
+#include "alidade/ekf.h"
 #include "json.h"
 #include "plugin_file.h"
 #include "text_table.h"
@@ -26,16 +28,33 @@ std::vector<const PluginEntry*> Sorted(const PluginHost& host) {
   return entries;
 }
 
+constexpr const char* kEkf = "ekf";
+constexpr const char* kEkfDoc = "Extended Kalman filter; built in, for `estimators`.";
+
+/// What an ekf reads, and what every estimator has.
+std::vector<ParamInfo> EkfKeys() {
+  std::vector<ParamInfo> keys = EkfOptions::Schema();
+  const auto add = [&](const char* name, const char* type, const char* fallback, const char* doc,
+                       std::vector<std::string> choices = {}) {
+    keys.push_back({name, "", doc, type, "", fallback, std::move(choices), ""});
+  };
+  add("sensors", "list", "all", "names of those it uses, in the order of their updates");
+  add("on_divergence", "choice", "report", "fail ends the run", {"report", "fail"});
+  add("overrides", "map", "none", "its own state, sensors and start_s, merged in");
+  return keys;
+}
+
+/// The entries called `name`; there may be none for a built-in estimator only.
 std::vector<const PluginEntry*> Named(const PluginHost& host, const std::string& name) {
   std::vector<const PluginEntry*> entries = Sorted(host);
-  std::vector<std::string> names;
+  std::vector<std::string> names = {kEkf};
   for (const PluginEntry* entry : entries) names.push_back(entry->name);
   std::erase_if(entries, [&](const PluginEntry* entry) { return entry->name != name; });
-  if (entries.empty()) {
-    throw Error(ExitCode::kPlugin,
-                ErrorLine({}, {}, "no plugin offers '" + name + "'",
-                          "a name that `alidade plugins list` prints", Nearest(name, names)) +
-                    "\n" + PluginPlaces(host));
+  if (entries.empty() && name != kEkf) {
+    throw Error(ExitCode::kPlugin, ErrorLine({}, {}, "no plugin offers '" + name + "'",
+                                             "a name that `alidade plugins list` prints, or ekf",
+                                             Nearest(name, names)) +
+                                       "\n" + PluginPlaces(host));
   }
   return entries;
 }
@@ -101,6 +120,9 @@ std::string PluginListJson(const PluginHost& host) {
 
 std::string PluginInfo(const PluginHost& host, const std::string& name) {
   std::string text;
+  if (name == kEkf) {
+    text = kEkf + std::string(": estimator\n  ") + kEkfDoc + "\n\n" + Parameters(EkfKeys());
+  }
   for (const PluginEntry* entry : Named(host, name)) {
     if (!text.empty()) text += '\n';
     text += entry->name + ": " + KindName(entry->kind) + "\n  " + entry->doc + '\n';
@@ -117,6 +139,16 @@ std::string PluginInfo(const PluginHost& host, const std::string& name) {
 std::string PluginInfoJson(const PluginHost& host, const std::string& name) {
   Json json;
   json.Array();
+  if (name == kEkf) {
+    json.Object();
+    json.Key("name").Text(kEkf);
+    json.Key("kind").Text("estimator");
+    json.Key("doc").Text(kEkfDoc);
+    json.Key("parameters").Array();
+    for (const ParamInfo& info : EkfKeys()) AddParameter(info, json);
+    json.End();
+    json.End();
+  }
   for (const PluginEntry* entry : Named(host, name)) {
     json.Object();
     AddEntry(*entry, json);

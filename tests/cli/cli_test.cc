@@ -39,6 +39,11 @@ TEST_F(Cli, UsageErrorsExitWithTwoAndHelp) {
                                {"run", "a", "b"},
                                {"run", "a", "--set", "no_value"},
                                {"run", "a", "--seed", "-1"},
+                               {"run", ""},
+                               {"run", "config.yaml", "-o", ""},
+                               {"run", "config.yaml", "--plugin-path", ""},
+                               {"sweep", "config.yaml", "--runs", "1", "--output="},
+                               {"plugins", "list", "--plugin-path="},
                                {"plugins"},
                                {"plugins", "lst"},
                                {"sweep", "a"},
@@ -117,6 +122,13 @@ TEST_F(Cli, ConfigErrorsHavePlaceAndRemedy) {
   EXPECT_TRUE(unknown.err.starts_with("error: config.yaml:1:1 estimtors: ")) << unknown.err;
   EXPECT_TRUE(Contains(unknown.err, "did you mean 'estimators'?")) << unknown.err;
   EXPECT_FALSE(Exists("runs"));
+  Write("config.yaml", testing::kDepthConfig);
+  const Outcome include = Call({"run", "config.yaml", "--set", "include=x.yaml"});
+  EXPECT_EQ(include.code, 78);
+  EXPECT_TRUE(include.err.starts_with("error: --set include: files are included before"));
+  const Outcome nameless = Call({"run", "config.yaml", "--set", "plugins=['']"});
+  EXPECT_EQ(nameless.code, 78);
+  EXPECT_TRUE(nameless.err.starts_with("error: --set plugins[0]: empty path")) << nameless.err;
 
   EXPECT_EQ(Call({"run", "missing.yaml"}).code, 66);
   Write("table.csv", "t_s,d\n0,80\n");
@@ -137,6 +149,16 @@ TEST_F(Cli, UntrustedPluginIsRefusedWithSeventySeven) {
   EXPECT_EQ(run.code, 77) << run.err;
   EXPECT_TRUE(Contains(run.err, plugin.string())) << run.err;
   EXPECT_EQ(Call({"plugins", "list", "--plugin-path", plugin.string()}).code, 77);
+  // These tell of it and of the rest.
+  const Outcome where = Call({"plugins", "where", "--plugin-path", "alidade_constant.so"});
+  EXPECT_EQ(where.code, 0) << where.err;
+  EXPECT_TRUE(Contains(where.out, plugin.string() + " (given): 0 found, 1 refused\n")) << where.out;
+  EXPECT_TRUE(Contains(where.out, "refused " + plugin.string() + ": not trusted")) << where.out;
+  EXPECT_TRUE(Contains(where.out, "(beside the program): ")) << where.out;
+  const Outcome nowhere = Call({"plugins", "where", "--plugin-path", "none.so"});
+  EXPECT_TRUE(Contains(nowhere.out, "/none.so (given): not there\n")) << nowhere.out;
+  const Outcome doctor = Call({"doctor", "--plugin-path", "alidade_constant.so"});
+  EXPECT_TRUE(Contains(doctor.out, "warn  refused " + plugin.string())) << doctor.out;
 }
 
 TEST_F(Cli, BadDataEndsTheRunAndLeavesARecord) {
@@ -300,6 +322,13 @@ TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
   const Outcome scale = Call({"plugins", "info", "scale_2d"});
   EXPECT_TRUE(Contains(scale.out, "propagated | fixed")) << scale.out;
   EXPECT_TRUE(Contains(scale.out, "noise = fixed")) << scale.out;
+
+  const Outcome ekf = Call({"plugins", "info", "ekf"});
+  for (const char* part : {"ekf: estimator", "(0, 1]", "joint | per_sensor | per_measurement",
+                           "lockout.after", "[1, 1e+06]", "inf", "on_divergence"}) {
+    EXPECT_TRUE(Contains(ekf.out, part)) << part << '\n' << ekf.out;
+  }
+  EXPECT_TRUE(Contains(Call({"plugins", "info", "ekf", "--json"}).out, "\"estimator\""));
 
   const Outcome missing = Call({"plugins", "info", "stereo_disparit"});
   EXPECT_EQ(missing.code, 69);

@@ -34,6 +34,8 @@ struct EkfOptions {
 
   /// Reads them from an estimator's entry of the config.
   static EkfOptions FromNode(const Node& entry);
+  /// What FromNode reads.
+  static std::vector<ParamInfo> Schema();
 };
 
 /// Extended Kalman filter: x' = f(x, 0), P' = F P F' + G Q G'; an update with stacked Jacobian H

@@ -41,15 +41,20 @@ struct Refusal {
   ExitCode code;
 };
 
+/// What becomes of a given file or folder that is missing or refused: an error, or an entry of
+/// PluginHost::searched() and refusals().
+enum class OnRefusal { kThrow, kList };
+
 /// Finds, checks, loads and lends plugins. A file is opened only when its fingerprint, read from
 /// the bytes beforehand, fits, and nobody but root, the caller or the owner of the program could
 /// have written it. Plugins are never unloaded. Creation is safe from several threads.
 class PluginHost {
  public:
-  /// Searches, in this order: `files_and_folders` (config `plugins:`, then `--plugin-path`; a
-  /// refusal there is an error), ALIDADE_PLUGIN_PATH, the user data folder, the build tree, the
-  /// install folder. Errors: kPlugin, kNotTrusted.
-  explicit PluginHost(const std::vector<std::filesystem::path>& files_and_folders = {});
+  /// Searches, in this order: `files_and_folders` (config `plugins:`, then `--plugin-path`),
+  /// ALIDADE_PLUGIN_PATH, the user data folder, the build tree, the install folder. What is refused
+  /// elsewhere than in `files_and_folders` is always listed. Errors: kPlugin, kNotTrusted.
+  explicit PluginHost(const std::vector<std::filesystem::path>& files_and_folders = {},
+                      OnRefusal on_refusal = OnRefusal::kThrow);
   ~PluginHost();
 
   /// A model from its config entry: reads its parameters there, leaving unread keys to

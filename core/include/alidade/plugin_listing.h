@@ -13,11 +13,11 @@ std::string PluginList(const PluginHost& host);
 std::string PluginListJson(const PluginHost& host);
 
 /// All there is to know of the entries called `name`: doc, citation, what they measure or move, and
-/// every parameter. Error: kPlugin where there is none.
+/// every parameter; `ekf` is the estimator's. Error: kPlugin where there is none.
 std::string PluginInfo(const PluginHost& host, const std::string& name);
 /// The same as a JSON array: the keys of PluginListJson, `describes` (lines) and `parameters`
 /// (objects with `key`, `unit`, `type`, `range`, `default` where there is one, `choices`, `when`,
-/// `doc`).
+/// `doc`). An estimator has no `family`, `citation`, `file` and `describes`.
 std::string PluginInfoJson(const PluginHost& host, const std::string& name);
 
 /// Every place searched and what was found there, and every file refused with the reason.

@@ -41,6 +41,14 @@ void ReadShard(const std::string& text, SweepOptions& options) {
                              "'" + text + "' is no share; expected i/n with 1 <= i <= n");
 }
 
+/// Every share has a run, so that each gives a result.
+void CheckShares(const SweepOptions& options) {
+  if (options.shards <= options.runs) return;
+  throw CLI::ValidationError("--shard", std::to_string(options.shards) + " shares of " +
+                                            std::to_string(options.runs) +
+                                            " runs; expected a run for each share");
+}
+
 /// Tells of the runs that failed, the first few in full; true where there are any.
 bool ReportFailures(const SweepResult& result) {
   constexpr int kShown = 5;
@@ -109,7 +117,10 @@ void AddSweep(CLI::App& program, Action& action) {
   command.add_flag("--force", arguments->force, "replace the folder if it is there");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.footer(kFooter);
-  command.callback([&action, arguments] { action = [arguments] { return RunSweep(*arguments); }; });
+  command.callback([&action, arguments] {
+    CheckShares(arguments->options);
+    action = [arguments] { return RunSweep(*arguments); };
+  });
 }
 
 }  // namespace alidade::cli

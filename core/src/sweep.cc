@@ -11,6 +11,24 @@
 namespace alidade {
 namespace {
 
+/// A config of its own: reading one marks what was read.
+Config Copy(const Config& config) { return config.Merged(Config::FromText("{}", "sweep").root()); }
+
+/// Refuses a source that the second run would find empty: standard input, or a pipe.
+void CheckReadableAgain(const Config& config) {
+  const Config copy = Copy(config);
+  const auto source = copy.root().Find("source");
+  const auto path = source && source->is_map() ? source->Find("path") : std::nullopt;
+  if (!path || path->kind() != Node::Kind::kScalar) return;
+  std::error_code error;
+  const auto status = std::filesystem::status(config.folder() / path->Text(), error);
+  const bool file =
+      !std::filesystem::exists(status) || is_regular_file(status) || is_directory(status);
+  if (path->Text() != "-" && file) return;
+  path->Fail("'" + path->Text() + "' can be read once, but a sweep reads it for every run",
+             "a regular file");
+}
+
 /// The runs of a sweep, handed out to threads one after the other.
 class Queue {
  public:
@@ -41,10 +59,9 @@ class Queue {
  private:
   bool Stopped() const { return options_.stop && options_.stop(); }
 
-  /// A config of this run's own: reading marks what was read.
   Config CopyFor(std::uint64_t seed) {
     const std::lock_guard lock(mutex_);
-    Config copy = config_.Merged(Config::FromText("{}", "sweep").root());
+    Config copy = Copy(config_);
     copy.Set("source.seed", std::to_string(seed), "--first-seed");
     return copy;
   }
@@ -108,6 +125,7 @@ SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptio
   ALIDADE_EXPECTS(options.runs > 0 && options.jobs >= 0);
   ALIDADE_EXPECTS(options.shard >= 1 && options.shard <= options.shards);
   SweepResult result;
+  CheckReadableAgain(config);
   // What is wrong with the config is said once, before the first run.
   for (const Contestant& contestant : BuildExperiment(config, host).contestants) {
     result.estimators.push_back(contestant.name);

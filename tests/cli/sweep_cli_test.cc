@@ -69,6 +69,33 @@ TEST_F(SweepCli, RefusesWhatIsNoShare) {
   EXPECT_TRUE(Contains(sweep.err, "--shard: '3/2' is no share")) << sweep.err;
 }
 
+TEST_F(SweepCli, EveryShareHasARun) {
+  const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "2", "--shard", "1/3"});
+  EXPECT_EQ(sweep.code, 2);
+  EXPECT_TRUE(Contains(sweep.err, "error: --shard: 3 shares of 2 runs; expected a run for each"))
+      << sweep.err;
+  EXPECT_EQ(Call({"sweep", "config.yaml", "--runs", "2", "--shard", "2/2"}).code, 0);
+}
+
+TEST_F(SweepCli, RefusesASourceThatCanBeReadOnce) {
+  ASSERT_EQ(::mkfifo((folder_ / "table.csv").c_str(), 0600), 0);
+  const Outcome pipe = Call({"sweep", "table.yaml", "--runs", "2", "-o", "out"});
+  EXPECT_EQ(pipe.code, 78);
+  EXPECT_TRUE(pipe.err.starts_with("error: table.yaml:11:27 source.path: '")) << pipe.err;
+  EXPECT_TRUE(Contains(pipe.err, "can be read once")) << pipe.err;
+  for (const char* once : {"-", "/dev/stdin"}) {
+    const Outcome sweep = Call({"sweep", "table.yaml", "--runs", "2", "--set",
+                                std::string("source.path=") + once, "-o", "out"});
+    EXPECT_EQ(sweep.code, 78) << sweep.err;
+    EXPECT_TRUE(sweep.err.starts_with("error: --set source.path: '")) << sweep.err;
+  }
+  EXPECT_FALSE(Exists("out"));
+  // A key that the source does not know stays unknown.
+  const Outcome unknown = Call({"sweep", "config.yaml", "--runs", "2", "--set", "source.path=a"});
+  EXPECT_EQ(unknown.code, 78);
+  EXPECT_TRUE(Contains(unknown.err, "source.path: unknown key")) << unknown.err;
+}
+
 TEST_F(SweepCli, GoesOnWithTheThreadsThereAre) {
   rlimit before{};
   ASSERT_EQ(::getrlimit(RLIMIT_STACK, &before), 0);

@@ -56,6 +56,14 @@ bool NamesAnotherModel(const ConfigTree& old, const ConfigTree& next) {
   return false;
 }
 
+/// Fixes the key paths of `copy` and what is below it as those of `original`.
+void KeepPaths(const ConfigTree& original, const ConfigTree& copy) {
+  copy.path = PathOf(original);
+  for (std::size_t i = 0; i < copy.children.size(); ++i) {
+    KeepPaths(*original.children[i], *copy.children[i]);
+  }
+}
+
 /// Moves the children of `over` into `base`; both are maps.
 void Merge(ConfigTree* base, ConfigTree* over) {
   std::unordered_map<std::string, std::size_t> at;
@@ -299,6 +307,7 @@ void Config::Set(std::string_view dotted_key, std::string_view value, std::strin
 Config Config::Merged(const Node& overrides) const {
   if (!overrides.is_map()) overrides.Fail("not a map", "a map of keys to override");
   const auto over = Clone(*overrides.tree_);
+  KeepPaths(*overrides.tree_, *over);
   Config config(*this);
   config.tree_ = Clone(*tree_);
   Merge(config.tree_.get(), over.get());

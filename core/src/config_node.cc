@@ -137,6 +137,19 @@ std::string UnknownKey(const ConfigTree& map, const ConfigTree& child) {
   return ErrorLine(KeyPlace(child), PathOf(child), "unknown key", expected, near);
 }
 
+/// A line for each key that was not asked for, of `map` and of the maps in it that were read.
+void ListUnread(const ConfigTree& map, std::vector<std::string>& lines) {
+  constexpr std::size_t kMaxLines = 20;
+  for (const auto& child : map.children) {
+    if (lines.size() >= kMaxLines) return;
+    if (!map.asked.contains(child->key)) {
+      lines.push_back(UnknownKey(map, *child));
+    } else if (child->kind == Node::Kind::kMap && !child->asked.empty()) {
+      ListUnread(*child, lines);
+    }
+  }
+}
+
 }  // namespace
 
 Node::Kind Node::kind() const { return tree_->kind; }
@@ -207,15 +220,9 @@ int Node::Choice(const std::vector<std::string>& choices) const {
 }
 
 void Node::RejectUnread() const {
-  constexpr int kMaxLines = 20;
-  std::string lines;
-  int count = 0;
-  for (const auto& child : Expect(*tree_, Kind::kMap, "a map").children) {
-    if (tree_->asked.contains(child->key)) continue;
-    if (++count > kMaxLines) break;
-    lines += (lines.empty() ? "" : "\n") + UnknownKey(*tree_, *child);
-  }
-  if (count > 0) throw Error(ExitCode::kBadConfig, lines);
+  std::vector<std::string> lines;
+  ListUnread(Expect(*tree_, Kind::kMap, "a map"), lines);
+  if (!lines.empty()) throw Error(ExitCode::kBadConfig, Join(lines, "\n"));
 }
 
 void Node::Declare(std::string_view key) const {

@@ -30,7 +30,6 @@ EkfOptions EkfOptions::FromNode(const Node& entry) {
   Params params(&reader.host());
   const EkfOptions options = Read(params);
   reader.Check();
-  if (const auto lockout = entry.Find("lockout")) lockout->RejectUnread();
   return options;
 }
 

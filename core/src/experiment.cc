@@ -4,6 +4,7 @@
 #include "alidade/ekf.h"
 #include "alidade/run.h"
 #include "columns.h"
+#include "names.h"
 
 namespace alidade {
 namespace {
@@ -117,6 +118,7 @@ std::vector<Segment> ReadSegments(const Node& root, const System& system,
   if (!evaluate) return segments;
   if (const auto list = evaluate->Find("segments")) {
     for (const auto& [name, entry] : list->Entries()) {
+      internal::ExpectName(name, entry, "a segment");
       const auto with = entry.Find("with"), without = entry.Find("without");
       if (with.has_value() == without.has_value()) {
         entry.Fail("a segment is the stamps with or without a valid measurement",

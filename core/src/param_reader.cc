@@ -220,18 +220,19 @@ std::vector<double> ParamReader::Values(const AlidadeParam& param) const {
 std::vector<double> ParamReader::Absent(const AlidadeParam& param, const Node& map,
                                         const std::string& key_in_map) const {
   if (HasFallback(param)) return Fallback(param);
-  const std::string missing = "missing; " + owner_ + " needs it " + Meaning(param);
-  if (key_in_map.find('.') != std::string::npos) {
-    throw Error(ExitCode::kBadConfig, ErrorLine(map.place(), PathBelow(map, key_in_map), missing));
-  }
+  const std::string first = key_in_map.substr(0, key_in_map.find('.'));
   try {
-    static_cast<void>(map.At(key_in_map));
+    static_cast<void>(map.At(first));
   } catch (const Error& e) {
     // The config also tells of a key that looks like the missing one, or has another unit.
-    constexpr std::string_view kPhrase = "missing key";
+    constexpr std::string_view kPhrase = ": missing key";
     std::string text = e.what();
     const std::size_t at = text.find(kPhrase);
-    if (at != std::string::npos) text.replace(at, kPhrase.size(), missing);
+    if (at != std::string::npos) {
+      text.replace(
+          at, kPhrase.size(),
+          key_in_map.substr(first.size()) + ": missing; " + owner_ + " needs it " + Meaning(param));
+    }
     throw Error(ExitCode::kBadConfig, text);
   }
   return {};

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <functional>
 
+#include "names.h"
+
 namespace alidade {
 namespace {
 
@@ -78,11 +80,12 @@ bool Contains(const std::vector<std::string>& names, const std::string& name) {
 std::vector<std::string> ReadBlockNames(const Node& entry, const MotionModel& model) {
   std::vector<std::string> names = Names(model.blocks());
   const auto renamed = entry.Find("blocks");
-  if (!renamed) return names;
   for (std::string& name : names) {
-    const auto given = renamed->Find(name);
+    const auto given = renamed ? renamed->Find(name) : std::nullopt;
     if (given) name = given->Text();
+    internal::ExpectName(name, given.value_or(entry), "a block");
   }
+  if (!renamed) return names;
   renamed->RejectUnread();
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (std::count(names.begin(), names.end(), names[i]) > 1) {
@@ -317,10 +320,12 @@ int System::FindSensor(std::string_view name) const {
 System BuildSystem(const Node& root, const PluginHost& host, const std::vector<std::string>& only) {
   System system;
   for (const auto& [name, entry] : root.At("state", "a run").Entries()) {
+    internal::ExpectName(name, entry, "a state entry");
     ReadStateEntry(name, entry, host, system);
   }
   std::vector<SensorBinding> sensors;
   for (const auto& [name, entry] : root.At("sensors", "a run").Entries()) {
+    internal::ExpectName(name, entry, "a sensor");
     sensors.push_back(ReadSensor(name, entry, host, system));
   }
   if (only.empty()) {

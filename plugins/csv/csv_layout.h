@@ -65,7 +65,10 @@ inline CsvField ReadField(const std::string& name, const Node& node) {
   if (node.is_map()) {
     columns = node.At("columns", name);
     if (const auto reciprocal = node.Find("reciprocal")) field.reciprocal = reciprocal->Flag();
-    if (const auto gain = node.Find("gain")) field.gain = gain->Number();
+    if (const auto gain = node.Find("gain")) {
+      field.gain = gain->Number();
+      if (field.gain == 0.0) gain->Fail("0 leaves nothing of the column", "a number but 0");
+    }
     node.RejectUnread();
   }
   for (const Node& column : ItemsOrOne(columns)) field.columns.push_back({column.Text(), column});

@@ -99,9 +99,11 @@ TEST(ConfigMerged, MapsMergeAndTheRestReplaces) {
   const Node scale = merged.root().At("sensors").At("scale");
   EXPECT_EQ(scale.At("model").Text(), "scale_2d");
   EXPECT_EQ(scale.At("span").Numbers(), std::vector<double>{3});
-  EXPECT_EQ(merged.root().At("sensors").At("late").path(), "sensors.late");
+  EXPECT_EQ(merged.root().At("sensors").At("late").path(),
+            "estimators.loud.overrides.sensors.late");
   EXPECT_EQ(Message([&] { scale.At("sigma_px").Number(); }),
-            "f.yaml:7:35 sensors.scale.sigma_px: '2x' is not a finite number; expected a number");
+            "f.yaml:7:35 estimators.loud.overrides.sensors.scale.sigma_px: '2x' is not a finite "
+            "number; expected a number");
   EXPECT_EQ(config.root().At("sensors").At("scale").At("sigma_px").Number(), 1.0);
 }
 
@@ -120,7 +122,7 @@ TEST(ConfigMerged, DoesNotCopyReads) {
   config.root().At("a");
   const Config merged = config.Merged(config.root().At("over"));
   EXPECT_EQ(Message([&] { merged.root().RejectUnread(); }),
-            "f.yaml:2:8 a: unknown key\nf.yaml:2:1 over: unknown key");
+            "f.yaml:2:8 over.a: unknown key\nf.yaml:2:1 over: unknown key");
   EXPECT_EQ(Message([&] { config.Merged(config.root().At("a")); }),
             "f.yaml:1:4 a: not a map; expected a map of keys to override");
 }

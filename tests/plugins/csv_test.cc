@@ -567,6 +567,13 @@ TEST_F(Csv, UnknownAndMissingKeys) {
   ExpectBadConfig("streams: {d: scale}\n", "run.yaml:1:1 path: missing key, needed by 'csv'");
 }
 
+TEST_F(Csv, GainOfNothing) {
+  Write("t_s,z\n0,1\n");
+  ExpectBadConfig("path: a.csv\nstreams: {z: {columns: z, gain: 0}}\n",
+                  "run.yaml:2:33 streams.z.gain: 0 leaves nothing of the column; expected a number "
+                  "but 0");
+}
+
 TEST_F(Csv, TimeAndRateExcludeEachOther) {
   ExpectBadConfig("path: a.csv\ntime: {column: t_s}\nrate_hz: 30\nstreams: {d: scale}\n",
                   "run.yaml:3:10 rate_hz: 'time' and 'rate_hz' are both given; expected one of "

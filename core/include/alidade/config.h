@@ -62,7 +62,8 @@ class Node {
   /// standard deviations is rounding: the mean of both entries is returned.
   std::vector<double> Covariance(int size) const;
 
-  /// Map: fails on every key that was never asked for, with the nearest asked one.
+  /// Map: fails on every key that was never asked for, with the nearest asked one; also in the maps
+  /// below of which a key was asked for.
   void RejectUnread() const;
   /// Map: declares keys without reading them (so that they are known to RejectUnread).
   void Declare(std::string_view key) const;
@@ -97,8 +98,8 @@ class Config {
   /// absolute, taken from the current folder. Handles to what was there before become invalid.
   void Set(std::string_view dotted_key, std::string_view value, std::string_view origin);
   /// A copy with `overrides` (a map) merged in: maps merge key by key, everything else replaces,
-  /// and a map that names another `model:` or `type:` replaces the old map whole. Reads recorded in
-  /// this config are not copied.
+  /// and a map that names another `model:` or `type:` replaces the old map whole. What is merged in
+  /// keeps place and key path. Reads recorded in this config are not copied.
   Config Merged(const Node& overrides) const;
 
   /// The tree as YAML, in the order written; reads back to the same tree.

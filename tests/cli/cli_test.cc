@@ -257,6 +257,30 @@ TEST_F(PipedRunWithoutOutput, LetsNoFileTakeTheNumberOfStandardOutput) {
   Wait(run_);
 }
 
+TEST_F(Cli, StopsAtASignalWhileNobodyWritesToThePipe) {
+  ASSERT_EQ(::mkfifo((folder_ / "table.csv").c_str(), 0600), 0);
+  const pid_t run = Start({"run", "table.yaml", "--no-figures", "-o", "out"});
+  // Opening the pipe comes soon after it heeds signals, the second of them in the mask.
+  const auto heeds_signals = [&] {
+    const std::string status = testing::ReadText("/proc/" + std::to_string(run) + "/status");
+    const std::size_t caught = status.find("SigCgt:\t");
+    return caught != std::string::npos && (std::stoull(status.substr(caught + 8), nullptr, 16) & 2);
+  };
+  ASSERT_TRUE(Eventually(heeds_signals));
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  ::kill(run, SIGINT);
+  siginfo_t ended{};
+  const auto has_ended = [&] {
+    return ::waitid(P_PID, static_cast<id_t>(run), &ended, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+           ended.si_pid == run;
+  };
+  if (!Eventually(has_ended)) ::kill(run, SIGKILL);
+  const Outcome stopped = Wait(run);
+  EXPECT_EQ(stopped.code, 75) << stopped.err;
+  EXPECT_TRUE(Contains(stopped.err, "table.csv: stopped by a signal while waiting")) << stopped.err;
+  EXPECT_FALSE(Exists("out"));
+}
+
 TEST_F(Cli, StopsBetweenFramesAtASignal) {
   // 300000 frames: seconds of work.
   const pid_t run = Start(

@@ -142,15 +142,18 @@ void Ekf::Recover(Row& row, UpdateReport& report) {
   if (inflated_[static_cast<std::size_t>(row.sensor)]) return;
   inflated_[static_cast<std::size_t>(row.sensor)] = true;
   constexpr double kInflation = 10.0;
+  bool any = false;
   for (const RoleBinding& bound : binding.roles) {
     if (bound.block < 0 || bound.mode != RoleMode::kEstimate) continue;
     if (!state_.layout()[bound.block].has_covariance()) continue;
     const Block& block = state_.layout()[bound.block];
     const int n = block.geometry().tangent;
+    any = true;
     state_.covariance().Transform(block.tangent_offset,
                                   kInflation * Eigen::MatrixXd::Identity(n, n));
   }
-  Note(report, "lockout", why + "inflated the covariance of its blocks");
+  Note(report, "lockout",
+       why + (any ? "inflated the covariance of its blocks" : "it corrects no block to inflate"));
 }
 
 /// Puts the blocks that one motion model moves together with `id` back to their prior covariance,

@@ -60,9 +60,10 @@ std::string ListText(const std::vector<double>& values, bool same = false) {
 }
 
 std::string PriorText(const Prior& prior, const Block& block) {
-  if (!prior.from.empty()) return "first measurement of " + prior.from;
-  std::string text = ListText(prior.mean);
+  const bool measured = !prior.from.empty();
+  std::string text = measured ? "first measurement of " + prior.from : ListText(prior.mean);
   if (block.status == BlockStatus::kFixed) return text + ", exact";
+  if (measured) return text;
   std::vector<double> sigmas;
   for (Eigen::Index i = 0; i < prior.covariance.rows(); ++i) {
     // Six digits hide the rounding of sigma -> variance -> sigma.
@@ -73,7 +74,7 @@ std::string PriorText(const Prior& prior, const Block& block) {
   return text + " +- " + ListText(sigmas, true);
 }
 
-/// A line for each block; then, for each truth that is of none of them, why.
+/// A line for each block; what fixed ones are; for each truth that is of no block, why.
 std::string States(const System& system, const std::vector<StreamInfo>& truths) {
   const std::vector<int> match = internal::MatchTruths(system.layout, truths);
   std::vector<TextRow> rows = {
@@ -94,6 +95,10 @@ std::string States(const System& system, const std::vector<StreamInfo>& truths) 
                     PriorText(prior, block)});
   }
   std::string text = TextTable(rows, kIndent);
+  const auto is_fixed = [](const Block& block) { return block.status == BlockStatus::kFixed; };
+  if (std::ranges::any_of(system.layout.blocks(), is_fixed)) {
+    text += "    fixed: known exactly, without covariance; nothing moves or corrects it\n";
+  }
   for (std::size_t t = 0; t < truths.size(); ++t) {
     const std::string why = internal::WhyNoBlock(system.layout, truths, t);
     if (!why.empty()) text += "    truth not used: " + truths[t].name + ", " + why + '\n';
@@ -105,9 +110,12 @@ std::string Motions(const System& system) {
   std::vector<TextRow> rows = {{"entry", "model", "moves", "noise inputs"}};
   for (const MotionBinding& motion : system.motions) {
     std::vector<std::string> blocks;
-    for (const BlockId id : motion.blocks) blocks.push_back(system.layout[id].name);
+    for (const BlockId id : motion.blocks) {
+      if (system.layout[id].status == BlockStatus::kFixed) continue;
+      blocks.push_back(system.layout[id].name);
+    }
     const int noise = motion.model.noise_size();
-    rows.push_back({motion.name, motion.model.name(), Join(blocks),
+    rows.push_back({motion.name, motion.model.name(), blocks.empty() ? "none" : Join(blocks),
                     noise == 0 ? "none" : std::to_string(noise)});
   }
   return TextTable(rows, kIndent);
@@ -167,7 +175,10 @@ std::string Touches(const System& system) {
   };
   for (const MotionBinding& motion : system.motions) {
     add_column(motion.name);
-    for (const BlockId id : motion.blocks) rows[static_cast<std::size_t>(id) + 1].back() = "moves";
+    for (const BlockId id : motion.blocks) {
+      const bool fixed = system.layout[id].status == BlockStatus::kFixed;
+      rows[static_cast<std::size_t>(id) + 1].back() = fixed ? "holds" : "moves";
+    }
   }
   for (const SensorBinding& sensor : system.sensors) {
     add_column(sensor.name);
@@ -221,9 +232,18 @@ std::string FuseText(Fuse fuse, const System& system) {
   return "per_measurement: one update for each measurement, in the order " + Join(names);
 }
 
-std::string LockoutText(const EkfOptions& options) {
-  const std::string after =
+std::string LockoutText(const EkfOptions& options, const System& system) {
+  const auto corrects = [&](const RoleBinding& role) {
+    return role.block >= 0 && role.mode == RoleMode::kEstimate &&
+           system.layout[role.block].status != BlockStatus::kFixed;
+  };
+  std::vector<std::string> without;
+  for (const SensorBinding& sensor : system.sensors) {
+    if (std::ranges::none_of(sensor.roles, corrects)) without.push_back(sensor.name);
+  }
+  std::string after =
       " after " + std::to_string(options.lockout_after) + " rejections of a sensor in a row";
+  if (!without.empty()) after += "; nothing for " + Join(without);
   switch (options.lockout) {
     case Lockout::kReset:
       return "reset its blocks from the measurement, or inflate them," + after;
@@ -241,7 +261,7 @@ std::string Options(const Node& entry, const Contestant& contestant) {
   std::vector<TextRow> rows = {
       {"gate", GateText(options, system)},
       {"fuse", FuseText(options.fuse, system)},
-      {"lockout", LockoutText(options)},
+      {"lockout", LockoutText(options, system)},
       {"max_dt_s",
        std::isfinite(options.max_dt_s) ? NumberText(options.max_dt_s) : "none: a gap is one step"},
       {"on_divergence", contestant.on_divergence == OnDivergence::kFail

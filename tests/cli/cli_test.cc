@@ -294,43 +294,6 @@ TEST_F(Cli, StopsBetweenFramesAtASignal) {
   EXPECT_EQ(Json("out/run.json").root().At("status").Text(), "stopped");
 }
 
-TEST_F(Cli, ExplainTellsWhatCannotBeObserved) {
-  const Outcome both = Call({"explain", "config.yaml"});
-  EXPECT_EQ(both.code, 0) << both.err;
-  EXPECT_FALSE(Contains(both.out, "cannot be observed")) << both.out;
-  for (const char* part : {"target.depth ", "0.3 +- 0.1", "constant_velocity", "scale_2d",
-                           "linearise_at", "corrects", "gate ", "joint"}) {
-    EXPECT_TRUE(Contains(both.out, part)) << part << '\n' << both.out;
-  }
-  const Outcome scale = Call({"explain", "config.yaml", "--set", "estimators.ekf.sensors=[scale]"});
-  EXPECT_TRUE(Contains(scale.out,
-                       "cannot be observed: target.depth together with target.depth_rate, "
-                       "template.inverse_distance (1 direction)"))
-      << scale.out;
-  const Outcome held = Call({"explain", "config.yaml", "--set",
-                             "sensors.scale.roles.inverse_distance={block: "
-                             "template.inverse_distance, mode: hold}"});
-  EXPECT_TRUE(Contains(held.out, "cannot be observed: template.inverse_distance (1 direction)"))
-      << held.out;
-  EXPECT_TRUE(Contains(held.out, "holds")) << held.out;
-}
-
-TEST_F(Cli, ExplainTellsWhichTruthIsOfWhichBlock) {
-  const Outcome both = Call({"explain", "config.yaml"});
-  EXPECT_TRUE(Contains(both.out, "estimated  depth_rate        0 +- 0.5\n")) << both.out;
-  EXPECT_FALSE(Contains(both.out, "truth not used")) << both.out;
-  // Stereo alone leaves the template out: its truth is there, but of no use.
-  const Outcome stereo =
-      Call({"explain", "config.yaml", "--set", "estimators.ekf.sensors=[stereo]"});
-  EXPECT_EQ(stereo.code, 0) << stereo.err;
-  EXPECT_TRUE(Contains(stereo.out, "truth not used: inverse_distance, no block has this name\n"))
-      << stereo.out;
-  Write("table.csv", "t_s,d\n0,80\n");
-  const Outcome some = Call({"explain", "table.yaml", "--set", "source.truth={depth_rate: d}"});
-  EXPECT_TRUE(Contains(some.out, "estimated  -           0.3 +- 0.1\n")) << some.out;
-  EXPECT_FALSE(Contains(Call({"explain", "table.yaml"}).out, "truth  ")) << some.out;
-}
-
 TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
   const Outcome list = Call({"plugins", "list"});
   EXPECT_EQ(list.code, 0);

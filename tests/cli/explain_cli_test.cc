@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "support/program.h"
+
+namespace alidade {
+namespace {
+
+using testing::Contains;
+using testing::Outcome;
+using ExplainCli = testing::ProgramTest;
+
+TEST_F(ExplainCli, TellsWhatCannotBeObserved) {
+  const Outcome both = Call({"explain", "config.yaml"});
+  EXPECT_EQ(both.code, 0) << both.err;
+  EXPECT_FALSE(Contains(both.out, "cannot be observed")) << both.out;
+  for (const char* part : {"target.depth ", "0.3 +- 0.1", "constant_velocity", "scale_2d",
+                           "linearise_at", "corrects", "gate ", "joint"}) {
+    EXPECT_TRUE(Contains(both.out, part)) << part << '\n' << both.out;
+  }
+  const Outcome scale = Call({"explain", "config.yaml", "--set", "estimators.ekf.sensors=[scale]"});
+  EXPECT_TRUE(Contains(scale.out,
+                       "cannot be observed: target.depth together with target.depth_rate, "
+                       "template.inverse_distance (1 direction)"))
+      << scale.out;
+  const Outcome held = Call({"explain", "config.yaml", "--set",
+                             "sensors.scale.roles.inverse_distance={block: "
+                             "template.inverse_distance, mode: hold}"});
+  EXPECT_TRUE(Contains(held.out, "cannot be observed: template.inverse_distance (1 direction)"))
+      << held.out;
+  EXPECT_TRUE(Contains(held.out, "holds")) << held.out;
+}
+
+TEST_F(ExplainCli, TellsWhichTruthIsOfWhichBlock) {
+  const Outcome both = Call({"explain", "config.yaml"});
+  EXPECT_TRUE(Contains(both.out, "estimated  depth_rate        0 +- 0.5\n")) << both.out;
+  EXPECT_FALSE(Contains(both.out, "truth not used")) << both.out;
+  // Stereo alone leaves the template out: its truth is there, but of no use.
+  const Outcome stereo =
+      Call({"explain", "config.yaml", "--set", "estimators.ekf.sensors=[stereo]"});
+  EXPECT_EQ(stereo.code, 0) << stereo.err;
+  EXPECT_TRUE(Contains(stereo.out, "truth not used: inverse_distance, no block has this name\n"))
+      << stereo.out;
+  Write("table.csv", "t_s,d\n0,80\n");
+  const Outcome some = Call({"explain", "table.yaml", "--set", "source.truth={depth_rate: d}"});
+  EXPECT_TRUE(Contains(some.out, "estimated  -           0.3 +- 0.1\n")) << some.out;
+  EXPECT_FALSE(Contains(Call({"explain", "table.yaml"}).out, "truth  ")) << some.out;
+}
+
+TEST_F(ExplainCli, TellsWhatAFixedBlockIs) {
+  const Outcome none = Call({"explain", "config.yaml"});
+  EXPECT_FALSE(Contains(none.out, "fixed: ")) << none.out;
+  EXPECT_FALSE(Contains(none.out, "nothing for")) << none.out;
+  // 3.3 +- 0.5 in the config.
+  const Outcome one =
+      Call({"explain", "config.yaml", "--set", "state.template.fixed=[inverse_distance]"});
+  for (const char* part :
+       {"inverse_distance  3.3, exact\n", "    fixed: known exactly, without covariance; nothing",
+        "template  constant           none ",
+        "template.inverse_distance  -       holds     -         holds\n"}) {
+    EXPECT_TRUE(Contains(one.out, part)) << part << '\n' << one.out;
+  }
+  EXPECT_FALSE(Contains(one.out, "nothing for")) << one.out;
+  // Stereo sees nothing but a fixed block.
+  const Outcome all =
+      Call({"explain", "config.yaml", "--set", "state.target.fixed=[depth, depth_rate]"});
+  EXPECT_TRUE(Contains(all.out, "rejections of a sensor in a row; nothing for stereo\n"))
+      << all.out;
+}
+
+}  // namespace
+}  // namespace alidade

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "alidade/source.h"
+#include "csv_cell.h"
 #include "csv_layout.h"
 #include "line_reader.h"
 
@@ -92,14 +93,6 @@ class CsvSource : public Source {
     return false;
   }
 
-  static std::string_view Trim(std::string_view text) {
-    const std::size_t first = std::min(text.find_first_not_of(" \t"), text.size());
-    text.remove_prefix(first);
-    text = text.substr(0, text.find_last_not_of(" \t") + 1);
-    const bool quoted = text.size() > 1 && text.front() == '"' && text.back() == '"';
-    return quoted ? text.substr(1, text.size() - 2) : text;
-  }
-
   /// Cuts line_ into cells_, each with its untrimmed start.
   void Split() {
     cells_.clear();
@@ -117,7 +110,7 @@ class CsvSource : public Source {
     header_line_ = reader_.number();
     Split();
     std::vector<std::string> names;
-    for (const std::string_view cell : cells_) names.emplace_back(Trim(cell));
+    for (const std::string_view cell : cells_) names.emplace_back(csv_detail::Trim(cell));
     names_ = std::move(names);
     ResolveColumns(names_, reader_.name(), layout_);
   }
@@ -157,7 +150,7 @@ class CsvSource : public Source {
   bool ReadField(const CsvField& field, std::vector<double>& values) const {
     values.clear();
     for (const CsvColumn& column : field.columns) {
-      if (Missing(Trim(cells_[column.index]))) continue;
+      if (Missing(csv_detail::Trim(cells_[column.index]))) continue;
       const double x = ReadNumber(column);
       const double value = field.reciprocal ? field.gain / x : field.gain * x;
       if (!std::isfinite(value)) {
@@ -171,7 +164,7 @@ class CsvSource : public Source {
   }
 
   double ReadNumber(const CsvColumn& column) const {
-    std::string_view text = Trim(cells_[column.index]);
+    std::string_view text = csv_detail::Trim(cells_[column.index]);
     const bool plus = text.starts_with('+');
     if (plus) text.remove_prefix(1);
     double value = 0.0;
@@ -191,10 +184,10 @@ class CsvSource : public Source {
     const double t_s =
         ReadNumber(column) * std::pow(10.0, static_cast<double>(layout_.time_digits) - 9.0);
     if (!(std::abs(t_s) < 9.2e9)) FailCell(column, "is beyond 292 years");
-    const std::string_view text = Trim(cells_[column.index]);
+    const std::string_view text = csv_detail::Trim(cells_[column.index]);
     const bool has_exponent = text.find_first_of("eE") != std::string_view::npos;
     const Stamp stamp =
-        has_exponent ? StampFromSeconds(t_s) : ExactStamp(text, layout_.time_digits);
+        has_exponent ? StampFromSeconds(t_s) : csv_detail::ExactStamp(text, layout_.time_digits);
     if (rows_ > 0 && stamp <= last_stamp_) {
       FailCell(column,
                std::string(stamp < last_stamp_ ? "is before" : "is the same time as") + " line " +
@@ -204,36 +197,15 @@ class CsvSource : public Source {
     return stamp;
   }
 
-  /// The nearest ns to a decimal number without exponent, in a unit of 10^digits ns.
-  static Stamp ExactStamp(std::string_view text, std::size_t digits) {
-    const bool negative = text.starts_with('-');
-    if (negative || text.starts_with('+')) text.remove_prefix(1);
-    const std::size_t point = std::min(text.find('.'), text.size());
-    const std::string_view fraction = text.substr(std::min(point + 1, text.size()));
-    Stamp ns = 0;
-    for (const char digit : text.substr(0, point)) ns = 10 * ns + (digit - '0');
-    for (std::size_t i = 0; i < digits; ++i) {
-      ns = 10 * ns + (i < fraction.size() ? fraction[i] - '0' : 0);
-    }
-    if (fraction.size() > digits && fraction[digits] >= '5') ++ns;
-    return negative ? -ns : ns;
-  }
-
   std::size_t Column(std::string_view cell) const {
     return static_cast<std::size_t>(cell.data() - line_.data()) + 1;
   }
 
   [[noreturn]] void FailCell(const CsvColumn& column, const std::string& what,
                              std::string_view expected = "a finite number") const {
-    constexpr std::size_t kShown = 40;
-    const std::string_view cell = Trim(cells_[column.index]);
-    std::string shown(cell.substr(0, kShown));
-    for (char& c : shown) {
-      if (static_cast<unsigned char>(c) < ' ' || c == 0x7F) c = '?';
-    }
-    if (cell.size() > kShown) shown += "...";
     const int at = static_cast<int>(Column(cells_[column.index]));
-    Fail(Place{reader_.name(), reader_.number(), at}, column.name, '\'' + shown + "' " + what,
+    Fail(Place{reader_.name(), reader_.number(), at}, column.name,
+         '\'' + csv_detail::Harmless(csv_detail::Trim(cells_[column.index])) + "' " + what,
          expected);
   }
   [[noreturn]] static void Fail(const Place& place, std::string_view key, std::string_view what,

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Tables and configs with a fault.
+#include <algorithm>
+
+#include "csv_fixture.h"
+
+namespace alidade::testing {
+namespace {
+
+// ---- bad data -----------------------------------------------------------------------------------
+
+TEST_F(Csv, WrongNumberOfColumns) {
+  ExpectBadData(std::string("# c\n") + kHeader + "0,1,2,3\n1,2,3\n",
+                "FILE:4:6: 3 columns; expected 4 columns, as in line 2");
+  ExpectBadData(std::string(kHeader) + "0,1,2,3,4\n",
+                "FILE:2:9: 5 columns; expected 4 columns, as in line 1");
+}
+
+TEST_F(Csv, TruncatedLastLine) {
+  ExpectBadData(
+      std::string(kHeader) + "0,1,2,3\n1,2",
+      "FILE:3:4: the last line is cut short: 2 columns; expected 4 columns, as in line 1");
+}
+
+TEST_F(Csv, NotANumber) {
+  const auto expect = [&](const std::string& cell) {
+    ExpectBadData(
+        std::string(kHeader) + "0, " + cell + ",2,3\n",
+        "FILE:2:3 disparity_px: '" + cell + "' is not a number; expected a finite number");
+  };
+  for (const char* cell : {"abc", "6.5x", "0x10", "1.5.2", "+-1", "--1", "+", "1e", "1 2"}) {
+    expect(cell);
+  }
+}
+
+TEST_F(Csv, ShowsHostileCellsHarmlessly) {
+  ExpectBadData(std::string(kHeader) + "0,\x1b[31m" + std::string(50, 'y') + ",2,3\n",
+                "FILE:2:3 disparity_px: '?[31m" + std::string(35, 'y') +
+                    "...' is not a number; expected a finite number");
+  ExpectBadData(std::string(kHeader) + "0," + std::string(1, '\0') + ",2,3\n",
+                "FILE:2:3 disparity_px: '?' is not a number; expected a finite number");
+}
+
+TEST_F(Csv, NotFinite) {
+  for (const std::string cell : {"nan", "inf", "-inf", "NaN", "Infinity"}) {
+    ExpectBadData(std::string(kHeader) + "0,1," + cell + ",3\n",
+                  "FILE:2:5 scale: '" + cell + "' is not finite; expected a finite number");
+  }
+}
+
+TEST_F(Csv, Overflow) {
+  for (const std::string cell : {"1e400", "-1e400", "1e-400"}) {
+    ExpectBadData(std::string(kHeader) + "0,1,2," + cell + "\n",
+                  "FILE:2:7 reference_depth_m: '" + cell +
+                      "' is too large or too small; expected a finite number");
+  }
+}
+
+TEST_F(Csv, ReciprocalOfZero) {
+  ExpectBadData(std::string(kHeader) + "0,1,0,3\n",
+                "FILE:2:5 scale: '0' has no finite reciprocal; expected a finite number");
+}
+
+TEST_F(Csv, LineTooLong) {
+  // "0,1,2," and a number: 4096 bytes are read, one more is refused, line end not counted.
+  const auto row = [](std::size_t length) { return "0,1,2,3." + std::string(length - 8, '0'); };
+  for (const std::string end : {"", "\n", "\r\n"}) {
+    EXPECT_EQ(Frames(kHeader + row(4096) + end, kDepthConfig).size(), 1u);
+    ExpectBadData(kHeader + row(4097) + end,
+                  "FILE:2:1: line too long; expected at most 4096 bytes a line");
+  }
+  ExpectBadData(kHeader + row(200000),
+                "FILE:2:1: line too long; expected at most 4096 bytes a line");
+}
+
+TEST_F(Csv, LongestLineMayEndAcrossTheBuffer) {
+  // The buffer of 65536 bytes ends between the '\r' and the '\n' of a line of 4096 bytes: still one
+  // line, of which the next is counted.
+  std::string text = kHeader;
+  while (text.size() + 4097 + 4000 < 65536) text += '#' + std::string(3998, ' ') + '\n';
+  text += '#' + std::string(65536 - 4097 - 2 - text.size(), ' ') + '\n';
+  const auto before = std::count(text.begin(), text.end(), '\n');
+  text += "0,1,2,3." + std::string(4088, '0') + "\r\nx,1,2,3\n";
+  ExpectBadData(text, "FILE:" + std::to_string(before + 2) +
+                          ":1 t_s: 'x' is not a number; expected a finite number");
+}
+
+TEST_F(Csv, TimeMustIncrease) {
+  ExpectBadData(std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n# c\n0.1,1,2,3\n",
+                "FILE:5:1 t_s: '0.1' is before line 3; expected times that increase");
+  ExpectBadData(std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n0.2000000001,1,2,3\n",
+                "FILE:4:1 t_s: '0.2000000001' is the same time as line 3; expected times that "
+                "increase");
+}
+
+TEST_F(Csv, TimeBeyondTheStamps) {
+  ExpectBadData(std::string(kHeader) + "9.3e9,1,2,3\n",
+                "FILE:2:1 t_s: '9.3e9' is beyond 292 years; expected a finite number");
+  ExpectBadData(std::string(kHeader) + ",1,2,3\n",
+                "FILE:2:1 t_s: '' is not a number; expected a finite number");
+}
+
+TEST_F(Csv, NothingAtAll) {
+  ExpectBadData("", "FILE: no header line; expected a line that names the columns");
+  ExpectBadData("# c\n\n", "FILE: no header line; expected a line that names the columns");
+  ExpectBadData(kHeader, "FILE: no data rows; expected a row below the header");
+}
+
+// ---- bad config ---------------------------------------------------------------------------------
+
+TEST_F(Csv, UnknownColumn) {
+  Write(std::string(kHeader) + "0,1,2,3\n");
+  ExpectBadConfig("path: a.csv\nstreams: {d: [disparity_pc]}\n",
+                  "run.yaml:2:15 streams.d[0]: no column 'disparity_pc' in FILE; expected one of "
+                  "t_s, disparity_px, scale, reference_depth_m; did you mean 'disparity_px'?");
+  ExpectBadConfig("path: a.csv\nstreams: {d: scale}\ntime: {column: stamp}\n",
+                  "run.yaml:3:16 time.column: no column 'stamp' in FILE; expected one of t_s, "
+                  "disparity_px, scale, reference_depth_m");
+}
+
+TEST_F(Csv, ColumnNamedTwice) {
+  Write("t_s,z,z\n0,1,2\n");
+  ExpectBadConfig("path: a.csv\nstreams: {z: z}\n",
+                  "run.yaml:2:14 streams.z: FILE has two columns 'z'; expected one");
+}
+
+TEST_F(Csv, UnknownAndMissingKeys) {
+  Write(std::string(kHeader) + "0,1,2,3\n");
+  ExpectBadConfig("path: a.csv\nstreams: {d: {columns: scale, recipocal: true}}\n",
+                  "run.yaml:2:31 streams.d.recipocal: unknown key; did you mean 'reciprocal'?");
+  ExpectBadConfig("path: a.csv\nstreams: {d: scale}\nblind_afer: 0.5\n",
+                  "run.yaml:3:1 blind_afer: unknown key; did you mean 'blind_after'?");
+  ExpectBadConfig("path: a.csv\nstreams: {}\n",
+                  "run.yaml:2:10 streams: no streams; expected a map, as in 'disparity: "
+                  "disparity_px'");
+  ExpectBadConfig("streams: {d: scale}\n", "run.yaml:1:1 path: missing key, needed by 'csv'");
+}
+
+TEST_F(Csv, GainOfNothing) {
+  Write("t_s,z\n0,1\n");
+  ExpectBadConfig("path: a.csv\nstreams: {z: {columns: z, gain: 0}}\n",
+                  "run.yaml:2:33 streams.z.gain: 0 leaves nothing of the column; expected a number "
+                  "but 0");
+}
+
+TEST_F(Csv, TimeAndRateExcludeEachOther) {
+  ExpectBadConfig("path: a.csv\ntime: {column: t_s}\nrate_hz: 30\nstreams: {d: scale}\n",
+                  "run.yaml:3:10 rate_hz: 'time' and 'rate_hz' are both given; expected one of "
+                  "them");
+}
+
+}  // namespace
+}  // namespace alidade::testing

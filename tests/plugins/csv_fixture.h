@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gtest/gtest.h>
+#include <stdlib.h>
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "plugins/csv/csv.h"
+
+namespace alidade::testing {
+
+namespace fs = std::filesystem;
+
+inline constexpr const char* kDepthConfig =
+    "path: a.csv\nstreams: {disparity: disparity_px, inverse_scale: {columns: [scale], "
+    "reciprocal: true}}\ntruth: {depth: reference_depth_m}\n";
+inline constexpr const char* kHeader = "t_s,disparity_px,scale,reference_depth_m\n";
+
+/// A folder of its own for each test, with `a.csv` in it.
+class Csv : public ::testing::Test {
+ protected:
+  Csv() {
+    std::string name = (fs::temp_directory_path() / "alidade_csv_XXXXXX").string();
+    folder_ = mkdtemp(name.data());
+  }
+  ~Csv() override { fs::remove_all(folder_); }
+
+  fs::path File() const { return folder_ / "a.csv"; }
+  void Write(const std::string& text) const { std::ofstream(File(), std::ios::binary) << text; }
+
+  /// The source of `config_`, whose `source` map is the root.
+  std::unique_ptr<CsvSource> Open(const std::string& config = kDepthConfig) {
+    config_ = std::make_unique<Config>(Config::FromText(config, "run.yaml"));
+    return OpenConfig();
+  }
+  std::unique_ptr<CsvSource> OpenConfig() {
+    static const AlidadeHost kHost{};
+    Params params(&kHost);
+    auto source = std::make_unique<CsvSource>(SourceArguments{config_->root(), params, 1, folder_});
+    config_->root().RejectUnread();
+    return source;
+  }
+  std::vector<Frame> Frames(const std::string& config = kDepthConfig) {
+    const auto source = Open(config);
+    std::vector<Frame> frames;
+    for (Frame frame; source->Next(frame);) frames.push_back(frame);
+    return frames;
+  }
+  std::vector<Frame> Frames(const std::string& text, const std::string& config) {
+    Write(text);
+    return Frames(config);
+  }
+
+  /// That the work fails with `code` and exactly `message`, where FILE stands for a.csv.
+  void ExpectError(ExitCode code, std::string message, const std::function<void()>& work) const {
+    if (const auto at = message.find("FILE"); at != std::string::npos) {
+      message.replace(at, 4, File().string());
+    }
+    try {
+      work();
+      FAIL() << "no error; expected: " << message;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.what(), message);
+      EXPECT_EQ(error.code(), code);
+    }
+  }
+  void ExpectBadData(const std::string& text, const std::string& message,
+                     const std::string& config = kDepthConfig) {
+    Write(text);
+    ExpectError(ExitCode::kBadData, message, [&] { Frames(config); });
+  }
+  void ExpectBadConfig(const std::string& config, const std::string& message) {
+    ExpectError(ExitCode::kBadConfig, message, [&] { Frames(config); });
+  }
+
+  fs::path folder_;
+  std::unique_ptr<Config> config_;
+};
+
+inline std::vector<Stamp> Stamps(const std::vector<Frame>& frames) {
+  std::vector<Stamp> stamps;
+  for (const Frame& frame : frames) stamps.push_back(frame.stamp);
+  return stamps;
+}
+
+/// For each frame the names of what it holds, as `0 1 | 1`: streams and known truth values.
+inline std::string Held(const Frame& frame) {
+  std::string held;
+  for (const Measurement& m : frame.measurements) held += std::to_string(m.stream) + ' ';
+  held += "|";
+  for (std::size_t i = 0; i < frame.truth.size(); ++i) {
+    if (!frame.truth[i].empty()) held += ' ' + std::to_string(i);
+  }
+  return held;
+}
+
+}  // namespace alidade::testing

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Files, pipes and standard input.
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/stat.h>
+#include <sys/time.h>
+#include <unistd.h>
+
+#include <thread>
+
+#include "csv_fixture.h"
+
+namespace alidade::testing {
+namespace {
+
+TEST_F(Csv, DashIsStandardInput) {
+  for (const char* written : {"\"-\"", "-"}) {
+    Write("t_s,z\n0,1\n1,x\n");
+    const int kept = dup(STDIN_FILENO), file = open(File().c_str(), O_RDONLY);
+    dup2(file, STDIN_FILENO);
+    close(file);
+    config_ = std::make_unique<Config>(Config::FromText("path: q\nstreams: {z: z}\n", "run.yaml"));
+    config_->Set("path", written, "--set");
+    const auto source = OpenConfig();
+    Frame frame;
+    EXPECT_TRUE(source->Next(frame));
+    ExpectError(ExitCode::kBadData, "<stdin>:3:3 z: 'x' is not a number; expected a finite number",
+                [&] { source->Next(frame); });
+    dup2(kept, STDIN_FILENO);
+    close(kept);
+  }
+}
+
+TEST_F(Csv, ReadsAPipeAsItIsWritten) {
+  ASSERT_EQ(mkfifo(File().c_str(), 0600), 0);
+  int descriptor = -1;
+  std::thread writer([&] {
+    descriptor = open(File().c_str(), O_WRONLY);
+    EXPECT_EQ(write(descriptor, "t_s,z\n0,1\n1", 11), 11);
+  });
+  const auto source = Open("path: a.csv\nstreams: {z: z}\n");
+  Frame frame;
+  EXPECT_TRUE(source->Next(frame));  // comes although the pipe is still open
+  writer.join();
+  EXPECT_EQ(write(descriptor, ",2\n", 3), 3);
+  EXPECT_TRUE(source->Next(frame));
+  EXPECT_EQ(frame.measurements[0].values[0], 2.0);
+  close(descriptor);
+  EXPECT_FALSE(source->Next(frame));
+}
+
+TEST_F(Csv, ASignalEndsTheWaitForAPipe) {
+  ASSERT_EQ(mkfifo(File().c_str(), 0600), 0);
+  const int both_ends = open(File().c_str(), O_RDWR);  // never at its end
+  ASSERT_EQ(write(both_ends, "t_s,z\n", 6), 6);
+  const auto source = Open("path: a.csv\nstreams: {z: z}\n");
+  struct sigaction action {
+  }, before{};
+  action.sa_handler = [](int) {};
+  sigaction(SIGALRM, &action, &before);
+  const itimerval every_50_ms{{0, 50000}, {0, 50000}}, never{};
+  setitimer(ITIMER_REAL, &every_50_ms, nullptr);
+  Frame frame;
+  ExpectError(ExitCode::kStopped, "FILE:1: stopped by a signal while waiting for data",
+              [&] { source->Next(frame); });
+  setitimer(ITIMER_REAL, &never, nullptr);
+  sigaction(SIGALRM, &before, nullptr);
+  close(both_ends);
+}
+
+TEST_F(Csv, RefusesWhatCannotBeRead) {
+  const auto expect = [&](const std::string& reason) {
+    ExpectError(ExitCode::kInputMissing,
+                "run.yaml:1:7 path: 'FILE': " + reason + "; expected a readable file",
+                [&] { Open(); });
+  };
+  expect("No such file or directory");
+  fs::create_directory(File());
+  expect("Is a directory");
+  fs::remove(File());
+  if (geteuid() == 0) return;  // root may read everything
+  Write("t_s\n");
+  fs::permissions(File(), fs::perms::none);
+  expect("Permission denied");
+}
+
+TEST_F(Csv, NoticesAFileThatChangesWhileItIsRead) {
+  Write("t_s,z\n0,1\n");
+  const auto source = Open("path: a.csv\nstreams: {z: z}\n");
+  Frame frame;
+  EXPECT_TRUE(source->Next(frame));
+  std::ofstream(File(), std::ios::app) << "1,2\n";
+  ExpectError(ExitCode::kIo, "FILE:3: changed while it was read", [&] {
+    while (source->Next(frame)) {
+    }
+  });
+}
+
+TEST_F(Csv, StreamsALongFileInConstantMemory) {
+  // A pipe of 2e6 rows, about 40 MB, written by a thread; the peak may grow by 4 MB.
+  const auto peak_kb = [] {
+    std::ifstream status("/proc/self/status");
+    for (std::string word; status >> word;) {
+      if (word == "VmHWM:") {
+        status >> word;
+        return std::stol(word);
+      }
+    }
+    return 0L;
+  };
+  ASSERT_EQ(mkfifo(File().c_str(), 0600), 0);
+  std::thread writer([&] {
+    std::ofstream out(File());
+    out << "t_s,z\n";
+    for (int i = 0; i < 2000000; ++i) out << i << ",1.234567890\n";
+  });
+  const auto source = Open("path: a.csv\nstreams: {z: z}\n");
+  Frame frame;
+  const long before = peak_kb();
+  int count = 0;
+  while (source->Next(frame)) ++count;
+  writer.join();
+  EXPECT_EQ(count, 2000000);
+  EXPECT_LT(peak_kb() - before, 4096);
+}
+
+}  // namespace
+}  // namespace alidade::testing

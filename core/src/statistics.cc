@@ -48,14 +48,57 @@ struct Centred {
   }
 };
 
-/// Correlation coefficient of reference(i) and signal(i + shift) over all i where both are.
+/// The samples of two series of n values where both are, one `shift` after the other.
+struct Overlap {
+  Eigen::Index signal, reference, count;
+
+  Overlap(Eigen::Index n, Eigen::Index shift)
+      : signal(std::max<Eigen::Index>(0, shift)),
+        reference(std::max<Eigen::Index>(0, -shift)),
+        count(n - std::abs(shift)) {}
+};
+
+/// Correlation coefficient of reference(i) and signal(i + shift).
 double Correlation(const Centred& signal, const Centred& reference, Eigen::Index shift) {
-  const Eigen::Index n = reference.values.size() - std::abs(shift);
-  const Eigen::Index r = std::max<Eigen::Index>(0, -shift), s = std::max<Eigen::Index>(0, shift);
-  const double product = reference.values.segment(r, n).dot(signal.values.segment(s, n)) -
-                         reference.Sum(r, n) * signal.Sum(s, n) / static_cast<double>(n);
-  const double spread = reference.Spread(r, n) * signal.Spread(s, n);
+  const Overlap o(reference.values.size(), shift);
+  const double product =
+      reference.values.segment(o.reference, o.count).dot(signal.values.segment(o.signal, o.count)) -
+      reference.Sum(o.reference, o.count) * signal.Sum(o.signal, o.count) /
+          static_cast<double>(o.count);
+  const double spread = reference.Spread(o.reference, o.count) * signal.Spread(o.signal, o.count);
   return spread > 0.0 ? product / std::sqrt(spread) : kNaN;
+}
+
+/// Minus the mean of (reference(i) - signal(i + shift))^2.
+double Closeness(const std::vector<double>& signal, const std::vector<double>& reference,
+                 Eigen::Index shift) {
+  const Overlap o(std::ssize(reference), shift);
+  const auto r = Eigen::VectorXd::Map(reference.data() + o.reference, o.count);
+  const auto s = Eigen::VectorXd::Map(signal.data() + o.signal, o.count);
+  return -(r - s).squaredNorm() / static_cast<double>(o.count);
+}
+
+/// Whether the series looks like itself at every shift up to `reach`, but for offset and scale.
+bool IsRamp(const Centred& series, Eigen::Index reach) {
+  constexpr double kAlike = 0.9;
+  for (Eigen::Index k = 1; k <= reach; ++k) {
+    if (!(Correlation(series, series, k) > kAlike)) return false;
+  }
+  return true;
+}
+
+/// Where a parabola through the largest score and its neighbours has its top, from the middle. NaN
+/// where the largest one is at the edge, or no higher than its neighbours but for rounding.
+double Peak(const Eigen::VectorXd& scores) {
+  constexpr double kRounding = 1e-12;
+  Eigen::Index best = 0;
+  if (!scores.allFinite()) return kNaN;
+  scores.maxCoeff(&best);
+  if (best == 0 || best == scores.size() - 1) return kNaN;
+  const double before = scores[best - 1], after = scores[best + 1];
+  const double curvature = before - 2.0 * scores[best] + after;
+  if (!(curvature < -kRounding)) return kNaN;
+  return static_cast<double>(best - scores.size() / 2) + 0.5 * (before - after) / curvature;
 }
 
 }  // namespace
@@ -68,18 +111,13 @@ double Lag(const std::vector<double>& signal, const std::vector<double>& referen
   const Centred s(signal), r(reference);
   if (!s.values.allFinite() || s.values.isZero(0.0) || r.values.isZero(0.0)) return kNaN;
   const Eigen::Index reach = std::min(n / 4, kMaxShift);
-  Eigen::VectorXd correlation(2 * reach + 1);
-  for (Eigen::Index k = -reach; k <= reach; ++k) correlation[k + reach] = Correlation(s, r, k);
-  if (!correlation.allFinite()) return kNaN;
-  Eigen::Index best = 0;
-  correlation.maxCoeff(&best);
-  double shift = static_cast<double>(best - reach);
-  if (best > 0 && best < 2 * reach) {
-    const double before = correlation[best - 1], after = correlation[best + 1];
-    const double curvature = before - 2.0 * correlation[best] + after;
-    if (curvature < 0.0) shift += 0.5 * (before - after) / curvature;
+  const bool ramp = IsRamp(r, reach);
+  const double variance = r.Spread(0, n) / static_cast<double>(n);
+  Eigen::VectorXd scores(2 * reach + 1);
+  for (Eigen::Index k = -reach; k <= reach; ++k) {
+    scores[k + reach] = ramp ? Closeness(signal, reference, k) / variance : Correlation(s, r, k);
   }
-  return shift * step;
+  return Peak(scores) * step;
 }
 
 }  // namespace alidade

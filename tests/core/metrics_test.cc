@@ -121,6 +121,45 @@ TEST(Lag, FindsTheShiftOfASineToAHundredthOfASample) {
   }
 }
 
+/// f(i - shift) for i = 0 .. n - 1.
+template <class Function>
+std::vector<double> Sampled(int n, double shift, const Function& f) {
+  std::vector<double> values;
+  for (int i = 0; i < n; ++i) values.push_back(f(i - shift));
+  return values;
+}
+
+TEST(Lag, FindsTheShiftOfARamp) {
+  const auto straight = [](double i) { return 50.0 - 0.8 * i; };
+  const auto bent = [](double i) { return 50.0 - 0.8 * i + 0.002 * i * i; };
+  for (const double shift : {0.0, 0.3, -3.6, 11.2}) {
+    // Exact for a straight line: the mean square is a parabola of the shift.
+    EXPECT_NEAR(Lag(Sampled(100, shift, straight), Sampled(100, 0.0, straight), 1.0), shift, 1e-9);
+    EXPECT_NEAR(Lag(Sampled(100, shift, bent), Sampled(100, 0.0, bent), 1.0), shift, 0.02);
+  }
+  // Noise of 0.3, of which the mean over 100 samples is worth 0.3 / sqrt(100) / 0.8 samples.
+  Random random(1);
+  const auto noisy = [&](double i) { return straight(i) + 0.3 * random.Normal(); };
+  EXPECT_NEAR(Lag(Sampled(100, 2.5, noisy), Sampled(100, 0.0, straight), 1.0), 2.5, 0.15);
+}
+
+TEST(Lag, OfARampTakesAnOffsetForDelay) {
+  const auto ramp = [](double i) { return 0.5 * i; };
+  const auto low = [&](double i) { return ramp(i) - 1.0; };  // 1 at 0.5 a sample: 2 samples
+  EXPECT_NEAR(Lag(Sampled(60, 3.0, low), Sampled(60, 0.0, ramp), 1.0), 5.0, 1e-9);
+}
+
+TEST(Lag, IsUnknownAtTheEdgeOfTheSearch) {
+  // A quarter of 80 samples is as far as it looks.
+  const auto ramp = [](double i) { return 0.5 * i; };
+  const auto pulse = [](double i) { return std::exp(-0.02 * (i - 25.0) * (i - 25.0)); };
+  EXPECT_NEAR(Lag(Sampled(80, 19.0, ramp), Sampled(80, 0.0, ramp), 1.0), 19.0, 1e-9);
+  EXPECT_TRUE(std::isnan(Lag(Sampled(80, 20.0, ramp), Sampled(80, 0.0, ramp), 1.0)));
+  EXPECT_TRUE(std::isnan(Lag(Sampled(80, -31.0, ramp), Sampled(80, 0.0, ramp), 1.0)));
+  EXPECT_NEAR(Lag(Sampled(80, 12.0, pulse), Sampled(80, 0.0, pulse), 1.0), 12.0, 0.1);
+  EXPECT_TRUE(std::isnan(Lag(Sampled(80, 25.0, pulse), Sampled(80, 0.0, pulse), 1.0)));
+}
+
 TEST(Lag, IsUnknownWithoutAnythingToMatch) {
   const std::vector<double> constant(50, 0.1), few = {1.0, 2.0, 1.0};
   std::vector<double> wave, broken;

@@ -19,7 +19,8 @@ namespace alidade::cli {
 /// What a command does once the command line has been read; gives the exit code.
 using Action = std::function<ExitCode()>;
 
-void AddRun(CLI::App& program, Action& action);
+/// `command_line` is what the record of the run shows.
+void AddRun(CLI::App& program, Action& action, const std::string& command_line);
 void AddExplain(CLI::App& program, Action& action);
 void AddSweep(CLI::App& program, Action& action);
 void AddPlugins(CLI::App& program, Action& action);

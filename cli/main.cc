@@ -30,12 +30,29 @@ class Format : public CLI::Formatter {
   }
 };
 
-void Describe(CLI::App& program, Action& action) {
+/// `text` as one word of a shell.
+std::string ShellQuoted(const std::string& text) {
+  constexpr const char* kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
+      "%+,-./:=@_";
+  if (!text.empty() && text.find_first_not_of(kPlain) == text.npos) return text;
+  std::string quoted = "'";
+  for (const char c : text) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + '\'';
+}
+
+std::string CommandLine(int argc, char** argv) {
+  std::string line = "alidade";
+  for (int i = 1; i < argc; ++i) line += ' ' + ShellQuoted(argv[i]);
+  return line;
+}
+
+void Describe(CLI::App& program, Action& action, const std::string& command_line) {
   program.formatter(std::make_shared<Format>());
   program.footer(kFooter);
   program.set_version_flag("--version", "alidade " ALIDADE_VERSION, "print the version and leave");
   program.require_subcommand(1);
-  AddRun(program, action);
+  AddRun(program, action, command_line);
   AddSweep(program, action);
   AddExplain(program, action);
   AddPlugins(program, action);
@@ -100,7 +117,7 @@ ExitCode Fail(const CLI::App& program, const CLI::ParseError& error) {
 ExitCode Main(int argc, char** argv) {
   CLI::App program("Recursive state estimation from plugins: write h(x) once.", "alidade");
   Action action;
-  Describe(program, action);
+  Describe(program, action, CommandLine(argc, argv));
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -19,9 +19,11 @@ constexpr const char* kFooter = R"(Examples:
   alidade run config.yaml -o runs/b --seed 2 --set estimators.ekf.gate=0.99
   alidade run config.yaml --set source.path=other.csv --force
 
-Ctrl-C finishes the frame, writes all that is done and ends with exit code 75; twice: at once.)";
+Ctrl-C finishes the frame, writes all that is done and ends with exit code 75; twice: at once. While
+figures are drawn it leaves out the rest of them.)";
 
 struct Arguments {
+  std::string command;  ///< the whole line
   Input input;
   std::string folder;
   std::optional<std::uint64_t> seed;
@@ -92,7 +94,9 @@ ExitCode RunConfig(const Arguments& arguments) {
   const PluginHost host = arguments.input.Host(config);
   StopOnSignals();  // before a source that waits for its pipe is made
   Experiment experiment = BuildExperiment(config, host);
-  Recorder recorder({folder, arguments.force, !arguments.no_figures, "alidade run"}, config, host);
+  Recorder recorder(
+      {folder, arguments.force, !arguments.no_figures, arguments.command, StopRequested}, config,
+      host);
 
   Progress progress("frames", arguments.quiet);
   RunOptions options;
@@ -110,9 +114,10 @@ ExitCode RunConfig(const Arguments& arguments) {
 
 }  // namespace
 
-void AddRun(CLI::App& program, Action& action) {
+void AddRun(CLI::App& program, Action& action, const std::string& command_line) {
   CLI::App& command = *program.add_subcommand("run", "Run the estimators of a config");
   const auto arguments = std::make_shared<Arguments>();
+  arguments->command = command_line;
   arguments->input.AddTo(command);
   AddOutput(command, arguments->folder,
             "run folder; default: the config's `output:`, or its folder's name, in runs/");

@@ -282,39 +282,73 @@ FigureScript ComparisonFigure(const RecordedRun& run) {
   return script;
 }
 
-void Draw(const RunFolder& folder, const FigureScript& script, const std::string& estimator,
-          Figures& figures) {
-  if (script.empty() || figures.note.starts_with(kNoGnuplot)) return;
-  const std::string file = "figures/" + script.name() + ".gp";
-  folder.Write(file, script.Text());
-  const std::string why = RunGnuplot(folder.partial(), {file});
-  if (why.empty()) {
-    figures.drawn.push_back({script.name(), script.title(), estimator});
-    return;
+/// A figure and the estimator it is of, "" where it is of all.
+struct Plan {
+  FigureScript script;
+  std::string estimator;
+};
+
+std::vector<Plan> PlanFigures(const RecordedRun& run) {
+  std::vector<Plan> plans = {{MeasurementFigure(run), ""}, {ComparisonFigure(run), ""}};
+  for (const RecordedEstimator& estimator : run.estimators) {
+    for (const auto figure : {StateFigure, CovarianceFigure, GainFigure, InnovationFigure}) {
+      plans.push_back({figure(run, estimator), estimator.name});
+    }
   }
-  std::error_code ignored;  // half a figure is none
-  std::filesystem::remove(folder.partial() / ("figures/" + script.name() + ".svg"), ignored);
-  figures.note = why == kNoGnuplot ? why + ": no figures" : script.name() + " is not drawn: " + why;
+  std::erase_if(plans, [](const Plan& plan) { return plan.script.empty(); });
+  return plans;
+}
+
+/// Draws `figures/NAME`, which half drawn is none.
+GnuplotResult Draw(const RunFolder& folder, const std::string& name,
+                   std::vector<std::string> arguments, const DrawingLimits& limits) {
+  const GnuplotResult result = RunGnuplot(folder.partial(), arguments, limits);
+  std::error_code ignored;
+  if (result.end != GnuplotResult::End::kDrawn) {
+    std::filesystem::remove(folder.partial() / "figures" / name, ignored);
+  }
+  return result;
+}
+
+/// Why no more is drawn, or "".
+std::string Obstacle(GnuplotResult::End end) {
+  switch (end) {
+    case GnuplotResult::End::kMissing:
+      return "gnuplot is not installed";
+    case GnuplotResult::End::kStopped:
+      return "the drawing was stopped";
+    case GnuplotResult::End::kTimeUp:
+      return "gnuplot took too long";
+    case GnuplotResult::End::kDrawn:
+    case GnuplotResult::End::kFailed:
+      break;
+  }
+  return "";
 }
 
 }  // namespace
 
-Figures DrawFigures(const RunFolder& folder, const RecordedRun& run) {
+Figures DrawFigures(const RunFolder& folder, const RecordedRun& run, const DrawingLimits& limits) {
+  using End = GnuplotResult::End;
   Figures figures;
-  Draw(folder, MeasurementFigure(run), "", figures);
-  if (!figures.drawn.empty()) {
+  const std::vector<Plan> plans = PlanFigures(run);
+  const auto file = [](const Plan& plan) { return "figures/" + plan.script.name() + ".gp"; };
+  for (const Plan& plan : plans) folder.Write(file(plan), plan.script.Text());
+  for (const Plan& plan : plans) {
+    const std::string& name = plan.script.name();
+    const GnuplotResult result = Draw(folder, name + ".svg", {file(plan)}, limits);
+    if (const std::string why = Obstacle(result.end); !why.empty()) {
+      const std::string count =
+          std::to_string(figures.drawn.size()) + " of " + std::to_string(plans.size());
+      figures.note = why + ": " + (figures.drawn.empty() ? "no" : count) + " figures";
+      break;
+    }
+    if (result.end == End::kFailed) figures.note = name + " is not drawn: " + result.complaint;
+    if (result.end != End::kDrawn) continue;
+    figures.drawn.push_back({name, plan.script.title(), plan.estimator});
+    if (name != "measurements") continue;
     figures.has_png =
-        RunGnuplot(folder.partial(), {"-e", "png=1", "figures/measurements.gp"}).empty();
-    std::error_code ignored;
-    if (!figures.has_png)
-      std::filesystem::remove(folder.partial() / "figures/measurements.png", ignored);
-  }
-  Draw(folder, ComparisonFigure(run), "", figures);
-  for (const RecordedEstimator& estimator : run.estimators) {
-    Draw(folder, StateFigure(run, estimator), estimator.name, figures);
-    Draw(folder, CovarianceFigure(run, estimator), estimator.name, figures);
-    Draw(folder, GainFigure(run, estimator), estimator.name, figures);
-    Draw(folder, InnovationFigure(run, estimator), estimator.name, figures);
+        Draw(folder, name + ".png", {"-e", "png=1", file(plan)}, limits).end == End::kDrawn;
   }
   return figures;
 }

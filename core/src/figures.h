@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "gnuplot.h"
 #include "recorded.h"
 #include "run_folder.h"
 
@@ -23,8 +24,8 @@ struct Figures {
 };
 
 /// Draws what the csv files hold: the measurements and what they tell, the estimators side by side,
-/// and for each estimator its state, variances, gains and innovations. Keeps the scripts. What
-/// gnuplot cannot do is noted, not an error. Errors: kIo.
-Figures DrawFigures(const RunFolder& folder, const RecordedRun& run);
+/// and for each estimator its state, variances, gains and innovations. The scripts are written all,
+/// and first. What gnuplot cannot do, or not within the limits, is noted, not an error. Errors: kIo.
+Figures DrawFigures(const RunFolder& folder, const RecordedRun& run, const DrawingLimits& limits);
 
 }  // namespace alidade::internal

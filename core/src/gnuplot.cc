@@ -16,6 +16,8 @@
 namespace alidade::internal {
 namespace {
 
+using End = GnuplotResult::End;
+
 /// The environment of this process, with the language of numbers and messages set to C.
 std::vector<std::string> Environment() {
   std::vector<std::string> variables;
@@ -35,19 +37,20 @@ std::vector<char*> Pointers(std::vector<std::string>& texts) {
   return pointers;
 }
 
-/// Waits for the child; false where it takes too long, and is ended.
-bool WaitFor(pid_t child, int* status) {
-  using Clock = std::chrono::steady_clock;
-  const auto end = Clock::now() + std::chrono::minutes(1);
-  while (true) {
+/// Waits for the child, or ends it where a limit is reached.
+End WaitFor(pid_t child, const DrawingLimits& limits, int* status) {
+  End end = End::kDrawn;
+  while (end == End::kDrawn) {
     const pid_t done = ::waitpid(child, status, WNOHANG);
-    if (done == child || (done < 0 && errno != EINTR)) return done == child;
-    if (Clock::now() > end) break;
+    // A Ctrl-C ends gnuplot too.
+    if (limits.stop && limits.stop()) end = End::kStopped;
+    if (done == child || (done < 0 && errno != EINTR)) return end;
+    if (std::chrono::steady_clock::now() > limits.end) end = End::kTimeUp;
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
   ::kill(child, SIGKILL);
   ::waitpid(child, status, 0);
-  return false;
+  return end;
 }
 
 /// The line of gnuplot's complaint that says what is wrong: the last that is not empty.
@@ -62,8 +65,9 @@ std::string Complaint(const std::filesystem::path& log) {
 
 }  // namespace
 
-std::string RunGnuplot(const std::filesystem::path& folder,
-                       const std::vector<std::string>& arguments) {
+GnuplotResult RunGnuplot(const std::filesystem::path& folder,
+                         const std::vector<std::string>& arguments, const DrawingLimits& limits) {
+  if (limits.stop && limits.stop()) return {End::kStopped, ""};
   const std::filesystem::path log = folder / ".gnuplot.log";
   std::vector<std::string> words = {"gnuplot", "-d"};
   words.insert(words.end(), arguments.begin(), arguments.end());
@@ -82,20 +86,22 @@ std::string RunGnuplot(const std::filesystem::path& folder,
       ::posix_spawnp(&child, "gnuplot", &actions, nullptr, argv.data(), environment.data());
   posix_spawn_file_actions_destroy(&actions);
 
-  std::string why;
+  GnuplotResult result;
   int status = 0;
   if (error == ENOENT) {
-    why = kNoGnuplot;
+    result.end = End::kMissing;
   } else if (error != 0) {
-    why = std::string("gnuplot does not start: ") + std::strerror(error);
-  } else if (!WaitFor(child, &status)) {
-    why = "gnuplot took too long";
-  } else if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
-    why = "gnuplot failed: " + Complaint(log);
+    result = {End::kFailed, std::string("gnuplot does not start: ") + std::strerror(error)};
+  } else {
+    result.end = WaitFor(child, limits, &status);
+    const bool failed = !WIFEXITED(status) || WEXITSTATUS(status) != 0;
+    if (result.end == End::kDrawn && failed) {
+      result = {End::kFailed, "gnuplot failed: " + Complaint(log)};
+    }
   }
   std::error_code ignored;
   std::filesystem::remove(log, ignored);
-  return why;
+  return result;
 }
 
 }  // namespace alidade::internal

@@ -1,18 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
 namespace alidade::internal {
 
-/// Runs gnuplot, found through PATH, in `folder`, without a shell and without the user's settings.
-/// Returns "" or why it did not work. One minute is the most it gets.
-std::string RunGnuplot(const std::filesystem::path& folder,
-                       const std::vector<std::string>& arguments);
+/// What ends a drawing before it is done.
+struct DrawingLimits {
+  std::function<bool()> stop;  ///< asked every few milliseconds; may be empty
+  std::chrono::steady_clock::time_point end = std::chrono::steady_clock::time_point::max();
+};
 
-/// What RunGnuplot returns where there is no gnuplot.
-inline constexpr const char* kNoGnuplot = "gnuplot is not installed";
+/// How gnuplot fared.
+struct GnuplotResult {
+  enum class End { kDrawn, kFailed, kMissing, kStopped, kTimeUp } end = End::kDrawn;
+  std::string complaint;  ///< of kFailed
+};
+
+/// Runs gnuplot, found through PATH, in `folder`, without a shell and without the user's settings.
+/// It is killed where a limit is reached.
+GnuplotResult RunGnuplot(const std::filesystem::path& folder,
+                         const std::vector<std::string>& arguments, const DrawingLimits& limits);
 
 }  // namespace alidade::internal

@@ -140,7 +140,9 @@ std::string Recorder::Impl::TimingJson(const RunResult& result) const {
 void Recorder::Impl::WriteReport(const RunResult& result, const internal::RecordedRun& recorded) {
   internal::Report report{title, config_text, facts, {}, {}};
   if (options.figures) {
-    report.figures = internal::DrawFigures(folder, recorded);
+    const auto limit = std::chrono::duration<double>(options.drawing_s);
+    const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(limit);
+    report.figures = internal::DrawFigures(folder, recorded, {options.stop, end});
   } else {
     report.figures.note = "figures were not asked for";
   }

@@ -281,6 +281,31 @@ TEST_F(Cli, StopsAtASignalWhileNobodyWritesToThePipe) {
   EXPECT_FALSE(Exists("out"));
 }
 
+TEST_F(Cli, ASignalWhileFiguresAreDrawnKeepsTheRun) {
+  fs::create_directory(folder_ / "bin");
+  Write("bin/gnuplot", "#!/bin/sh\n: > sleeping\nexec sleep 100\n");
+  fs::permissions(folder_ / "bin/gnuplot", fs::perms::owner_all);
+  const std::string path = std::getenv("PATH");
+  ::setenv("PATH", (folder_.string() + "/bin:" + path).c_str(), 1);
+  const pid_t run = Start({"run", "config.yaml", "-o", "out"});
+  ::setenv("PATH", path.c_str(), 1);
+  const std::string partial = ".out.partial-" + std::to_string(run);
+  ASSERT_TRUE(Eventually([&] { return Exists(partial + "/sleeping"); }));
+  ::kill(run, SIGINT);
+  const Outcome ended = Wait(run);
+  EXPECT_EQ(ended.code, 0) << ended.err;
+  EXPECT_TRUE(Contains(ended.out, "the drawing was stopped: no figures")) << ended.out;
+  EXPECT_EQ(Json("out/run.json").root().At("status").Text(), "ok");
+  EXPECT_TRUE(Exists("out/report.html"));
+}
+
+TEST_F(Cli, TimingHasTheWholeCommand) {
+  const Arguments arguments = {"run", "config.yaml", "--no-figures", "--set=title=it's a \"run\""};
+  EXPECT_EQ(Call(arguments).code, 0);
+  EXPECT_EQ(Json("runs/config/timing.json").root().At("command").Text(),
+            "alidade run config.yaml --no-figures '--set=title=it'\\''s a \"run\"'");
+}
+
 TEST_F(Cli, StopsBetweenFramesAtASignal) {
   // 300000 frames: seconds of work.
   const pid_t run = Start(

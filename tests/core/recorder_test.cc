@@ -267,6 +267,14 @@ TEST(Recorder, DrawsWhereGnuplotIs) {
   EXPECT_NE(report.find("<svg"), std::string::npos);
 }
 
+using Names = std::vector<std::string>;
+
+Names SvgsOf(const fs::path& folder) {
+  Names names = FilesIn(folder / "figures");
+  std::erase_if(names, [](const std::string& name) { return !name.ends_with(".svg"); });
+  return names;
+}
+
 TEST(Recorder, DoesWithoutGnuplot) {
   const TemporaryFolder folder;
   const int code = InChild([&] {
@@ -278,7 +286,65 @@ TEST(Recorder, DoesWithoutGnuplot) {
   });
   EXPECT_EQ(code, 0);
   EXPECT_TRUE(fs::exists(folder / "out/report.html"));
-  EXPECT_FALSE(fs::exists(folder / "out/figures/measurements.svg"));
+  EXPECT_EQ(SvgsOf(folder / "out"), Names{});
+  EXPECT_TRUE(fs::exists(folder / "out/figures/alone.innovation.gp"));  // to be drawn elsewhere
+}
+
+/// A gnuplot on PATH that draws the first figure and its PNG, and then sleeps over half a one.
+void UseSlowGnuplot(const TemporaryFolder& folder) {
+  const fs::path program = folder / "bin/gnuplot";
+  fs::create_directory(program.parent_path());
+  std::ofstream(program) << "#!/bin/sh\n"
+                            "case \"$*\" in\n"
+                            "  *measurements*) echo '<svg>one</svg>' > figures/measurements.svg\n"
+                            "                  echo > figures/measurements.png;;\n"
+                            "  *) echo '<svg>half' > figures/comparison.svg; exec sleep 100;;\n"
+                            "esac\n";
+  fs::permissions(program, fs::perms::owner_all);
+  ::setenv("PATH", (program.parent_path().string() + ":/usr/bin:/bin").c_str(), 1);
+}
+
+/// Records with the slow gnuplot in a child; `note` is what must have been left out.
+int RecordSlowly(const TemporaryFolder& folder, Recorder::Options options, const char* note) {
+  return InChild([&] {
+    UseSlowGnuplot(folder);
+    Recorder recorder(options, MakeConfig(), Host());
+    Experiment experiment = MakeExperiment();
+    recorder.Finish(RunInto(recorder, experiment));
+    if (recorder.note() != note) ::_exit(1);
+  });
+}
+
+TEST(Recorder, AStopLeavesOutTheRestOfTheFigures) {
+  const TemporaryFolder folder;
+  Recorder::Options options = OptionsFor(folder / "out", false, true);
+  const fs::path half = folder / (".out.partial-");
+  options.stop = [&] {  // once it sleeps
+    return fs::exists(half.string() + std::to_string(::getpid()) + "/figures/comparison.svg");
+  };
+  EXPECT_EQ(RecordSlowly(folder, options, "the drawing was stopped: 1 of 10 figures"), 0);
+  EXPECT_EQ(SvgsOf(folder / "out"), Names{"measurements.svg"});
+  EXPECT_TRUE(fs::exists(folder / "out/run.json"));
+  const std::string report = Read(folder / "out/report.html");
+  EXPECT_NE(report.find("<svg>one</svg>"), std::string::npos);
+  EXPECT_EQ(report.find("<svg>half"), std::string::npos);
+  EXPECT_NE(report.find("the drawing was stopped: 1 of 10 figures"), std::string::npos);
+}
+
+TEST(Recorder, DrawsNothingOnceItIsStopped) {
+  const TemporaryFolder folder;
+  Recorder::Options options = OptionsFor(folder / "out", false, true);
+  options.stop = [] { return true; };
+  EXPECT_EQ(RecordSlowly(folder, options, "the drawing was stopped: no figures"), 0);
+  EXPECT_EQ(SvgsOf(folder / "out"), Names{});
+}
+
+TEST(Recorder, GivesGnuplotSoMuchTimeAndNoMore) {
+  const TemporaryFolder folder;
+  Recorder::Options options = OptionsFor(folder / "out", false, true);
+  options.drawing_s = 1.0;
+  EXPECT_EQ(RecordSlowly(folder, options, "gnuplot took too long: 1 of 10 figures"), 0);
+  EXPECT_EQ(SvgsOf(folder / "out"), Names{"measurements.svg"});
 }
 
 // FIPS 180-4, examples of NIST: one block, two blocks, and none.

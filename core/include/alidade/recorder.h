@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -17,9 +18,11 @@ class Recorder {
  public:
   struct Options {
     std::filesystem::path folder;
-    bool force = false;   ///< replace what is there
-    bool figures = true;  ///< draw with gnuplot where it is installed
-    std::string command;  ///< of the program, for timing.json
+    bool force = false;               ///< replace what is there
+    bool figures = true;              ///< draw with gnuplot where it is installed
+    std::string command;              ///< of the program, for timing.json
+    std::function<bool()> stop = {};  ///< true: leave out the figures that are not drawn yet
+    double drawing_s = 60.0;          ///< the most that all figures may take
   };
   /// Creates the temporary folder. Errors: kCannotCreate where `folder` exists without `force`.
   Recorder(const Options& options, const Config& config, const PluginHost& host);

@@ -64,12 +64,12 @@ UpdateReport Ekf::Process(const Frame& frame) {
   if (stamp_ == kNoStamp) {
     Start(system_.start_s ? StampFromSeconds(*system_.start_s) : frame.stamp);
   }
-  const bool stale = frame.stamp < stamp_;
-  if (!stale) StepTo(frame.stamp, report);
+  report.stale = frame.stamp < stamp_;
+  if (!report.stale) StepTo(frame.stamp, report);
   std::vector<Row> rows = Collect(frame, report);
-  if (stale || failed_) {
+  if (report.stale || failed_) {
     for (MeasurementReport& entry : report.measurements) {
-      entry.outcome = stale ? Outcome::kStale : Outcome::kFailed;
+      entry.outcome = report.stale ? Outcome::kStale : Outcome::kFailed;
     }
     return report;
   }

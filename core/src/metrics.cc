@@ -299,8 +299,10 @@ void Metrics::Add(const Frame& frame, const std::vector<bool>& in_segment, const
   for (std::size_t i = 0; i < in_segment.size(); ++i) {
     if (in_segment[i]) into.push_back(&impl_->sums[i + 1]);
   }
-  impl_->AddErrors(frame, into, state);
-  impl_->AddConsistency(frame.stamp, into, state);
+  if (!report.stale) {
+    impl_->AddErrors(frame, into, state);
+    impl_->AddConsistency(frame.stamp, into, state);
+  }
   impl_->AddReport(into, report);
 }
 

@@ -376,6 +376,18 @@ TEST(Metrics, AKnownValueIsNotInconsistent) {
   EXPECT_TRUE(one.metrics().events().empty());
 }
 
+TEST(Metrics, AFrameOlderThanTheStateHasNoError) {
+  MetricsOf one = OneScalar(1);
+  one.in_segment() = {true};
+  UpdateReport stale;
+  stale.stale = true;
+  one.Add({{99.0}}, stale);
+  EXPECT_TRUE(one.Finish().empty());
+  one.Add({{1.0}});
+  EXPECT_DOUBLE_EQ(one.Finish().at("rmse:a.x@s0"), 1.0);
+  EXPECT_DOUBLE_EQ(one.Finish().at("nees.mean:a"), 0.25);
+}
+
 MeasurementReport ReportOf(Outcome outcome, double nis, int dof) {
   MeasurementReport report;
   report.sensor = 0;

@@ -69,6 +69,19 @@ TEST(Run, AStopIsTakenAfterTheFrame) {
   EXPECT_EQ(result.frames, 7);
 }
 
+TEST(Run, FramesBeforeTheStartEnterTheCountsAlone) {
+  Experiment experiment = MakeExperiment();  // 60 frames, one each 33 ms
+  Contestant& ekf = experiment.contestants[0];
+  ekf.system.start_s = 49.5 * 0.033;
+  ekf.estimator = std::make_unique<Ekf>(ekf.system, EkfOptions{}, experiment.source->streams());
+  const ContestantResult late = alidade::Run(experiment, {}).contestants[0];
+  EXPECT_EQ(late.counts.at("stale:inverse_scale"), 50);
+  EXPECT_EQ(late.counts.at("accepted:inverse_scale"), 10);
+  // The prior, 0.35 m, is off by 80 mm RMS over the first 50. After it only the first update is off,
+  // by 75 mm of curvature: sqrt(75^2 / 10) mm, and a little for the wobble.
+  EXPECT_LT(late.metrics.at("rmse:target.depth"), 0.04);
+}
+
 /// Five frames, then bad data.
 class Failing : public testing::SwingingTarget {
  public:

@@ -57,6 +57,7 @@ struct Event {
 
 /// What one frame did.
 struct UpdateReport {
+  bool stale = false;  ///< the frame is older than the state, which stays as it was
   std::vector<MeasurementReport> measurements;
   std::vector<Event> events;
 };

@@ -43,6 +43,30 @@ ContestantResult Begin(const Contestant& contestant) {
   return result;
 }
 
+/// An event `unused` for each sensor of which the whole run used no measurement.
+void NoteUnused(const System& system, ContestantResult& result) {
+  for (const SensorBinding& sensor : system.sensors) {
+    std::int64_t used = 0, all = 0;
+    std::vector<std::string> others;
+    for (const auto& [key, count] : result.counts) {
+      const std::size_t colon = key.find(':');
+      const std::string outcome = key.substr(0, colon);
+      if (key.substr(colon + 1) != sensor.name) continue;
+      all += count;
+      if (outcome == ToString(Outcome::kAccepted) || outcome == ToString(Outcome::kInitialised)) {
+        used += count;
+      } else {
+        others.push_back(std::to_string(count) + ' ' + outcome);
+      }
+    }
+    if (used > 0) continue;
+    const std::string of_all =
+        all > 0 ? " used none of " + std::to_string(all) + " measurements: " + Join(others, ", ")
+                : ": stream '" + sensor.stream + "' had no measurement";
+    result.events.push_back({kNoStamp, "unused", "sensor '" + sensor.name + "'" + of_all});
+  }
+}
+
 void Fail(RunResult& result, ExitCode code, std::string reason) {
   result.status = RunStatus::kFailed;
   result.code = code;
@@ -136,6 +160,7 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
     lane.result.metrics = lane.metrics.Finish();
     lane.result.counts = lane.metrics.counts();
     lane.result.units = lane.metrics.units();
+    if (result.frames > 0) NoteUnused(lane.contestant.system, lane.result);
     const std::vector<Event>& inconsistent = lane.metrics.events();
     lane.result.events.insert(lane.result.events.end(), inconsistent.begin(), inconsistent.end());
     lane.result.diverged = lane.contestant.estimator->diverged() || !inconsistent.empty();

@@ -82,6 +82,34 @@ TEST(Run, FramesBeforeTheStartEnterTheCountsAlone) {
   EXPECT_LT(late.metrics.at("rmse:target.depth"), 0.04);
 }
 
+TEST(Run, ASensorOfWhichNothingWasUsedIsAnEvent) {
+  const auto unused = [](const ContestantResult& result) {
+    std::vector<std::string> texts;
+    for (const Event& event : result.events) {
+      if (event.kind == "unused") texts.push_back(event.text);
+    }
+    return texts;
+  };
+  using Texts = std::vector<std::string>;
+  Experiment experiment = MakeExperiment();
+  EXPECT_EQ(unused(alidade::Run(experiment, {}).contestants[0]), Texts{});
+
+  experiment = MakeExperiment();
+  Contestant& ekf = experiment.contestants[0];
+  const SensorModel linear = InProcessSensor(testing::Linear(1.0, 1.0), "linear");
+  testing::AddSensor(ekf.system, "elsewhere", linear, {"target.depth"});
+  for (Prior& prior : ekf.system.priors) prior.covariance *= 1e-12;  // sure of what is wrong
+  EkfOptions options;
+  options.gate = 1e-6;
+  options.lockout = Lockout::kNone;
+  ekf.system.motions.clear();
+  ekf.estimator = std::make_unique<Ekf>(ekf.system, options, experiment.source->streams());
+  EXPECT_EQ(unused(alidade::Run(experiment, {}).contestants[0]),
+            (Texts{"sensor 'disparity' used none of 30 measurements: 30 gated",
+                   "sensor 'inverse_scale' used none of 60 measurements: 60 gated",
+                   "sensor 'elsewhere': stream 'elsewhere' had no measurement"}));
+}
+
 /// Five frames, then bad data.
 class Failing : public testing::SwingingTarget {
  public:

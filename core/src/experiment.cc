@@ -77,6 +77,10 @@ void CheckName(const std::string& name, const Node& entry) {
     entry.Fail("'" + name + "' cannot name an estimator: it names a folder too",
                "letters, digits, _ and -");
   }
+  if (name == "figures") {
+    entry.Fail("'figures' cannot name an estimator: the run folder has one of that name",
+               "another name");
+  }
 }
 
 Contestant BuildContestant(const std::string& name, const Node& entry, const Config& config,

@@ -60,8 +60,9 @@ Scaled ScaleUnit(const std::string& unit, double largest) {
 using Values = std::vector<std::optional<double>>;
 
 /// Cells of one row with the same number of decimals: four significant digits of the smallest, or
-/// of each where they lie too far apart for that.
+/// of each where they lie too far apart for that. What is below 1e-5 is in scientific notation.
 std::vector<std::string> Format(const Values& values) {
+  constexpr double kSmall = 1e-5, kLarge = 1e7;
   double smallest = std::numeric_limits<double>::infinity(), largest = 0.0;
   for (const auto& value : values) {
     if (!value || !std::isfinite(*value) || *value == 0.0) continue;
@@ -71,18 +72,18 @@ std::vector<std::string> Format(const Values& values) {
   const auto decimals = [](double v) {
     return std::clamp(3 - static_cast<int>(std::floor(std::log10(v))), 0, 9);
   };
-  const bool together = largest < 1e4 * smallest;
+  const bool together = largest < 1e4 * smallest && smallest > kSmall && largest < kLarge;
   std::vector<std::string> cells;
   for (const auto& value : values) {
     if (!value) {
       cells.emplace_back("-");
     } else if (!std::isfinite(*value)) {
       cells.push_back(NumberText(*value));
-    } else if (largest == 0.0 || *value == 0.0) {
+    } else if (*value == 0.0) {
       cells.emplace_back("0");
     } else if (together) {
-      cells.push_back(FixedText(*value, std::min(decimals(smallest), 6)));
-    } else if (std::abs(*value) < 1e7 && std::abs(*value) > 1e-5) {
+      cells.push_back(FixedText(*value, decimals(smallest)));
+    } else if (std::abs(*value) < kLarge && std::abs(*value) > kSmall) {
       cells.push_back(FixedText(*value, decimals(std::abs(*value))));
     } else {
       cells.push_back(ScientificText(*value, 3));
@@ -99,19 +100,35 @@ std::string UnitOfKey(const RunResult& result, const std::string& key) {
   return {};
 }
 
-ComparisonRow MetricRow(const RunResult& result, const std::string& key) {
-  const std::string_view kind = KindOf(key);
+Values ValuesOf(const RunResult& result, const std::string& key) {
   Values values;
-  double largest = 0.0;
   for (const ContestantResult& one : result.contestants) {
     const auto found = one.metrics.find(key);
     values.push_back(found == one.metrics.end() ? std::nullopt : std::optional(found->second));
-    if (values.back() && std::isfinite(*values.back())) {
-      largest = std::max(largest, std::abs(*values.back()));
+  }
+  return values;
+}
+
+/// The largest finite RMSE of all blocks with that unit: one prefix serves the whole table.
+double LargestRmse(const RunResult& result, const std::string& unit) {
+  double largest = 0.0;
+  for (const std::string& key : Keys(result, &ContestantResult::metrics)) {
+    if (KindOf(key) != "rmse" || UnitOfKey(result, key) != unit) continue;
+    for (const auto& value : ValuesOf(result, key)) {
+      if (value && std::isfinite(*value)) largest = std::max(largest, *value);
     }
   }
+  return largest;
+}
+
+ComparisonRow MetricRow(const RunResult& result, const std::string& key) {
+  const std::string_view kind = KindOf(key);
+  Values values = ValuesOf(result, key);
   Scaled scaled;
-  if (kind == "rmse") scaled = ScaleUnit(UnitOfKey(result, key), largest);
+  if (kind == "rmse") {
+    const std::string unit = UnitOfKey(result, key);
+    scaled = ScaleUnit(unit, LargestRmse(result, unit));
+  }
   if (kind == "lag_ms") scaled.unit = "ms";
   if (kind == "cov95" || kind == "nees.cov95") scaled = {100.0, "%"};
   for (auto& value : values) {
@@ -124,10 +141,25 @@ ComparisonRow MetricRow(const RunResult& result, const std::string& key) {
   return {label, Format(values)};
 }
 
-/// Over segments a person wants the errors; the rest is in comparison.csv.
-bool IsMain(const std::string& key) {
+/// Whether every estimator has the subject without any error, as a block that is held at truth.
+bool IsExact(const RunResult& result, std::string_view subject) {
+  for (const char* kind : {"rmse:", "nees.mean:"}) {
+    const Values values = ValuesOf(result, std::string(kind).append(subject));
+    const auto wrong = [](const auto& value) { return value && *value != 0.0; };
+    const auto known = [](const auto& value) { return value.has_value(); };
+    if (std::any_of(values.begin(), values.end(), wrong)) return false;
+    if (std::any_of(values.begin(), values.end(), known)) return true;
+  }
+  return false;
+}
+
+/// Over segments a person wants errors and coverage; the rest is in comparison.csv.
+bool IsMain(const RunResult& result, const std::string& key) {
   const std::string_view kind = KindOf(key);
-  if (key.find('@') != key.npos) return kind == "rmse";
+  if (IsExact(result, SubjectOf(key))) return false;
+  if (key.find('@') != key.npos) {
+    return kind == "rmse" || kind == "cov95" || kind == "nees.cov95";
+  }
   return std::find(kOrder.begin(), kOrder.end(), kind) != kOrder.end();
 }
 
@@ -150,7 +182,7 @@ std::vector<std::string> OrderedCounts(const RunResult& result) {
 std::vector<ComparisonRow> ComparisonRows(const RunResult& result) {
   std::vector<ComparisonRow> rows;
   for (const std::string& key : OrderedMetrics(result)) {
-    if (IsMain(key)) rows.push_back(MetricRow(result, key));
+    if (IsMain(result, key)) rows.push_back(MetricRow(result, key));
   }
   for (const std::string& key : OrderedCounts(result)) {
     ComparisonRow row{std::string(KindOf(key)) + ' ' + std::string(SubjectOf(key)), {}};

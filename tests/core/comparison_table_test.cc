@@ -39,6 +39,7 @@ TEST(ComparisonTable, OrdersScalesAndAligns) {
             "rmse target.depth @blind [mm]   1.210            -\n"
             "lag target.depth [ms]          -1.420            -\n"
             "cov95 target.depth [%]          93.42            -\n"
+            "cov95 target.depth @blind [%]   90.00            -\n"
             "nees.mean target               0.8948            -\n"
             "nees.cov95 target [%]           100.0            -\n"
             "nis.mean stereo                0.9059            -\n"
@@ -50,14 +51,48 @@ TEST(ComparisonTable, OrdersScalesAndAligns) {
 TEST(ComparisonTable, PrintsNumbersThatLieFarApart) {
   RunResult result;
   const double inf = std::numeric_limits<double>::infinity();
-  for (const double rmse : {1.95e-5, 0.0, 250.0, 3e12, inf}) {
+  for (const double rmse : {1.95e-5, 0.0, 250.0, 3e12, 4e-7, inf}) {
     const std::string name = std::string(1, static_cast<char>('a' + result.contestants.size()));
     result.contestants.push_back(Named(name, {{"rmse:cam.pixel", rmse}}));
   }
   const std::string table = ComparisonTable(result);
-  EXPECT_NE(table.find("rmse cam.pixel [px]  0.00001950   0  250.0  3.000e+12  inf\n"),
+  EXPECT_NE(table.find("rmse cam.pixel [px]  0.00001950   0  250.0  3.000e+12  4.000e-07  inf\n"),
             std::string::npos)
       << table;
+}
+
+TEST(ComparisonTable, KeepsOneUnitThroughoutTheTable) {
+  RunResult result;
+  result.contestants = {Named("ekf", {{"rmse:target.depth", 0.9},
+                                      {"rmse:target.depth@blind", 1.2},
+                                      {"rmse:target.depth@seeing", 0.004}})};
+  EXPECT_EQ(ComparisonTable(result),
+            "                                    ekf\n"
+            "rmse target.depth [m]            0.9000\n"
+            "rmse target.depth @blind [m]      1.200\n"
+            "rmse target.depth @seeing [m]  0.004000\n"
+            "diverged                             no\n");
+}
+
+TEST(ComparisonTable, SmallNumbersKeepTheirDigits) {
+  RunResult result;
+  result.contestants = {Named("a", {{"nees.mean:target", 3.21e-6}}),
+                        Named("b", {{"nees.mean:target", 4.5e-6}})};
+  EXPECT_NE(ComparisonTable(result).find("nees.mean target  3.210e-06  4.500e-06\n"),
+            std::string::npos)
+      << ComparisonTable(result);
+}
+
+TEST(ComparisonTable, LeavesOutWhatIsHeldAtTruth) {
+  RunResult result;
+  result.contestants = {Named("a", {{"rmse:target.depth", 0.0},
+                                    {"cov95:target.depth", 1.0},
+                                    {"nees.mean:target", 0.0},
+                                    {"nees.cov95:target", 1.0}}),
+                        Named("b", {})};
+  EXPECT_EQ(ComparisonTable(result), "           a   b\ndiverged  no  no\n");
+  result.contestants[1].metrics = {{"rmse:target.depth", 0.1}};  // b has it to estimate
+  EXPECT_NE(ComparisonTable(result).find("rmse target.depth"), std::string::npos);
 }
 
 TEST(ComparisonTable, FoldsWhatIsWiderThanALine) {

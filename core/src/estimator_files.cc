@@ -25,32 +25,28 @@ RecordedEstimator EstimatorFiles::Describe(const Contestant& contestant) {
 }
 
 EstimatorFiles::EstimatorFiles(const RunFolder& folder, const Contestant& contestant,
-                               const std::vector<StreamInfo>& truths)
+                               const std::vector<StreamInfo>& truths,
+                               const std::vector<std::vector<std::string>>& truth_columns)
     : recorded_(Describe(contestant)),
       estimates_(folder, contestant.name + "/estimates.csv",
-                 EstimatesHeader(contestant.system, truths)),
+                 EstimatesHeader(contestant.system, MatchTruths(contestant.system.layout, truths),
+                                 truth_columns)),
       innovations_(folder, contestant.name + "/innovations.csv", InnovationsHeader()),
       gains_(folder, contestant.name + "/gains.csv", GainsHeader(contestant.system)) {}
 
-std::vector<std::string> EstimatorFiles::EstimatesHeader(const System& system,
-                                                         const std::vector<StreamInfo>& truths) {
+std::vector<std::string> EstimatorFiles::EstimatesHeader(
+    const System& system, const std::vector<int>& truth_of,
+    const std::vector<std::vector<std::string>>& truth_columns) {
   std::vector<std::string> header = {"t_s"};
-  const std::vector<int> match = MatchTruths(system.layout, truths);
   for (BlockId id = 0; id < static_cast<int>(system.layout.blocks().size()); ++id) {
     const Block& block = system.layout[id];
     const std::vector<std::string> names = AmbientNames(block.name, block.space);
     const std::vector<std::string> tangents = TangentNames(block.name, block.space);
-    const int truth = match[static_cast<std::size_t>(id)];
+    const int truth = truth_of[static_cast<std::size_t>(id)];
     blocks_.push_back({id, names.size(), tangents.size(), recorded_.elements.size(), truth});
-    int truth_column = 2;
-    for (int t = 0; t < truth; ++t) truth_column += truths[t].size;
-    const bool same = block.geometry().kind == GeometryKind::kVector ||
-                      block.geometry().kind == GeometryKind::kAngle;
-    const int first = static_cast<int>(header.size()) + 1;
-    for (int i = 0; i < static_cast<int>(names.size()); ++i) {
-      recorded_.elements.push_back({names[i], UnitOf(system, id), first + i,
-                                    same ? first + static_cast<int>(names.size()) + i : 0,
-                                    truth >= 0 ? truth_column + i : 0});
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      recorded_.elements.push_back({names[i], UnitOf(system, id), names == tangents,
+                                    truth >= 0 ? truth_columns[truth][i] : ""});
     }
     header.insert(header.end(), names.begin(), names.end());
     for (const std::string& name : tangents) header.push_back("sigma:" + name);
@@ -69,7 +65,7 @@ std::vector<std::string> EstimatorFiles::InnovationsHeader() const {
 
 std::vector<std::string> EstimatorFiles::GainsHeader(const System& system) {
   std::vector<std::string> header = {"t_s", "sensor"};
-  std::map<std::string, int> known;  // sensors that measure alike share columns
+  std::map<std::string, std::size_t> known;  // sensors that measure alike share columns
   for (std::size_t s = 0; s < system.sensors.size(); ++s) {
     const Space& space = system.sensors[s].model.measurement();
     for (const BlockColumns& columns : blocks_) {
@@ -78,10 +74,9 @@ std::vector<std::string> EstimatorFiles::GainsHeader(const System& system) {
       for (const std::string& element : TangentNames(block.name, block.space)) {
         for (const std::string& measured : TangentNames(space.name, space)) {
           const std::string name = element + "<-" + measured;
-          const int next = static_cast<int>(header.size()) + 1;
-          const auto [column, is_new] = known.try_emplace(name, next);
+          const auto [cell, is_new] = known.try_emplace(name, known.size());
           if (is_new) header.push_back(name);
-          recorded_.sensors[s].gains.push_back({name, column->second});
+          recorded_.sensors[s].gains.push_back({name, cell->second});
         }
       }
     }
@@ -124,7 +119,7 @@ void EstimatorFiles::AddEstimate(const Frame& frame, const State& state) {
           state.covariance().Variance(block.tangent_offset + static_cast<int>(i));
       estimates_.Number(std::sqrt(variance));
       RecordedElement& element = recorded_.elements[columns.element + i];
-      if (element.sigma > 0 && variance > 0.0) element.is_random = true;
+      if (element.has_sigma && variance > 0.0) element.is_random = true;
     }
   }
   estimates_.EndRow();
@@ -167,7 +162,7 @@ void EstimatorFiles::AddGain(Stamp stamp, const State& state, const MeasurementR
       for (int j = 0; j < sensor.tangent && next < sensor.gains.size(); ++j, ++next) {
         if (found == report.gain.end()) continue;
         RecordedGain& gain = sensor.gains[next];
-        cells[static_cast<std::size_t>(gain.column) - 3] = &found->k(i, j);
+        cells[gain.cell] = &found->k(i, j);
         gain.used = gain.used || found->k(i, j) != 0.0;
       }
     }

@@ -13,8 +13,10 @@ namespace alidade::internal {
 /// `gains.csv`. They hold the blocks and sensors that the system has from the start.
 class EstimatorFiles {
  public:
+  /// `truth_columns` names the columns of truth.csv, by truth and element.
   EstimatorFiles(const RunFolder& folder, const Contestant& contestant,
-                 const std::vector<StreamInfo>& truths);
+                 const std::vector<StreamInfo>& truths,
+                 const std::vector<std::vector<std::string>>& truth_columns);
 
   /// Error: kIo.
   void Add(const Frame& frame, const State& state, const UpdateReport& report);
@@ -30,8 +32,9 @@ class EstimatorFiles {
   };
 
   static RecordedEstimator Describe(const Contestant& contestant);
-  std::vector<std::string> EstimatesHeader(const System& system,
-                                           const std::vector<StreamInfo>& truths);
+  std::vector<std::string> EstimatesHeader(
+      const System& system, const std::vector<int>& truth_of,
+      const std::vector<std::vector<std::string>>& truth_columns);
   std::vector<std::string> InnovationsHeader() const;
   std::vector<std::string> GainsHeader(const System& system);
   void AddEstimate(const Frame& frame, const State& state);

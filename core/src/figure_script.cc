@@ -30,7 +30,6 @@ set tics nomirror textcolor rgb '#333333'
 set grid lc rgb '#e4e4e4' lt 1
 set key at graph 1.01, graph 1.08 left top Left reverse samplen 2 maxrows 12 font ',11' noenhanced
 set lmargin 11
-set rmargin 30
 set tmargin 2
 set bmargin 1.5
 set style fill solid 0.22 noborder
@@ -103,6 +102,7 @@ void FigureScript::Curve(const FigureFile& file, std::string_view how, std::stri
   const std::int64_t stride = Stride(file);
   if (stride > 1) plot_ += " every " + std::to_string(stride);
   plot_.append(" using ").append(how);
+  longest_key_ = std::max(longest_key_, key.size());
   plot_ += key.empty() ? " notitle" : " title " + GnuplotQuoted(key) + " noenhanced";
 }
 
@@ -114,14 +114,14 @@ void FigureScript::LineOf(const FigureFile& file, std::string_view mine, std::st
   if (!plot_.empty()) plot_ += ", \\\n     ";
   plot_ += "gap = " + NumberText(std::max(4.0 * step_s, 0.02 * span_s_)) + ", px = py = NaN";
   std::string how = "(along(";
-  how.append(mine).append(", $1-t0)):(level(").append(value).append(")) with lines ls ");
+  how.append(mine).append(", column('t_s')-t0)):(level(").append(value).append(")) with lines ls ");
   Curve(file, how + std::to_string(style), key);
 }
 
 void FigureScript::Quartiles(std::string_view name, std::string_view file,
                              std::string_view expression) {
-  body_ += "stats " + GnuplotQuoted(file) + " using ";
-  body_.append(expression).append(" name ").append(GnuplotQuoted(name)).append(" nooutput\n");
+  body_ += "stats " + GnuplotQuoted(file) + " using (";
+  body_.append(expression).append(") name ").append(GnuplotQuoted(name)).append(" nooutput\n");
 }
 
 std::string FigureScript::Text() const {
@@ -129,6 +129,7 @@ std::string FigureScript::Text() const {
   std::string text =
       "# Draws figures/" + name_ + ".svg. In the run folder: gnuplot figures/" + name_ + ".gp\n";
   text += kSettings;
+  text += "set rmargin " + std::to_string(longest_key_ + 9) + "  # room for the key\n";
   text += "if (!exists('png')) png = 0\n";
   text += "if (png) set terminal pngcairo size " + size +
           " font 'sans,10' noenhanced background '#ffffff'\n";

@@ -23,7 +23,7 @@ struct FigureFile {
 class FigureScript {
  public:
   /// The x of every curve.
-  static constexpr const char* kTime = "($1-t0):";
+  static constexpr const char* kTime = "(column('t_s')-t0):";
 
   /// All panels show the time from `first` to `last`.
   FigureScript(std::string name, std::string title, Stamp first, Stamp last);
@@ -54,6 +54,7 @@ class FigureScript {
   Stamp first_, last_;
   double span_s_;
   int panels_ = 0;
+  std::size_t longest_key_ = 0;
 };
 
 /// `text` as a gnuplot string.

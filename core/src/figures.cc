@@ -12,16 +12,17 @@ namespace {
 constexpr std::size_t kMaxPanels = 12;
 constexpr std::size_t kMaxCurves = 8;
 
-std::string Column(int column) { return '$' + std::to_string(column); }
+std::string Column(std::string_view name) { return "column(" + GnuplotQuoted(name) + ')'; }
+std::string Sigma(const RecordedElement& element) { return Column("sigma:" + element.name); }
 
-std::string Is(int column, std::string_view text) {
-  return "strcol(" + std::to_string(column) + ") eq " + GnuplotQuoted(text);
+std::string Is(const char* column, std::string_view text) {
+  return "strcol('" + std::string(column) + "') eq " + GnuplotQuoted(text);
 }
 
 std::string OverTime(const std::string& y) { return FigureScript::kTime + y; }
 
-std::string Line(int column, int style) {
-  return OverTime(std::to_string(column)) + " with lines ls " + std::to_string(style);
+std::string Line(std::string_view column, int style) {
+  return OverTime('(' + Column(column) + ')') + " with lines ls " + std::to_string(style);
 }
 
 /// `value` where the condition holds, else nothing.
@@ -48,13 +49,11 @@ void TruthCurve(FigureScript& script, const RecordedRun& run, const RecordedElem
 /// The y range that shows estimate and truth in full, and most of the band.
 void StateRange(FigureScript& script, const RecordedEstimator& estimator,
                 const RecordedElement& element) {
-  script.Quartiles("E", Estimates(estimator).name, std::to_string(element.value));
-  if (element.is_random) {
-    script.Quartiles("S", Estimates(estimator).name, std::to_string(element.sigma));
-  }
+  script.Quartiles("E", Estimates(estimator).name, Column(element.name));
+  if (element.is_random) script.Quartiles("S", Estimates(estimator).name, Sigma(element));
   std::string low = "E_min", high = "E_max";
   if (element.has_truth) {
-    script.Quartiles("T", "truth.csv", std::to_string(element.truth));
+    script.Quartiles("T", "truth.csv", Column(element.truth));
     low = "min(E_min, T_min)";
     high = "max(E_max, T_max)";
   }
@@ -71,14 +70,14 @@ FigureScript StateFigure(const RecordedRun& run, const RecordedEstimator& estima
     if (!element.has_value || panels++ == kMaxPanels) continue;
     script.Panel(element.name, InBrackets(element.unit));
     StateRange(script, estimator, element);
-    const std::string value = Column(element.value), sigma = Column(element.sigma);
+    const std::string value = Column(element.name), sigma = Sigma(element);
     if (element.is_random) {
       script.Curve(Estimates(estimator),
                    OverTime("(" + value + "-3*" + sigma + "):(" + value + "+3*" + sigma + ")") +
                        " with filledcurves ls 1",
                    "+-3 sigma");
     }
-    script.Curve(Estimates(estimator), Line(element.value, 1), "estimate");
+    script.Curve(Estimates(estimator), Line(element.name, 1), "estimate");
     TruthCurve(script, run, element);
   }
   return script;
@@ -99,13 +98,18 @@ FigureScript CovarianceFigure(const RecordedRun& run, const RecordedEstimator& e
     if (script.empty()) {
       script.Panel("diagonal of P", "variance");
       script.Set("set logscale y\nset format y '%.0e'");
+      script.Set("low = 1e300\nhigh = 1e-300");
     }
-    const std::string sigma = Column(element.sigma);
+    const std::string variance = Where(Sigma(element) + " > 0", Sigma(element) + "**2");
+    script.Quartiles("V", Estimates(estimator).name, variance);
+    script.Set("low = min(low, V_min)\nhigh = max(high, V_max)");
     script.Curve(Estimates(estimator),
-                 OverTime(Where(sigma + " > 0", sigma + "**2")) + " with lines ls " +
-                     std::to_string(EstimatorStyle(curves++)),
+                 OverTime(variance) + " with lines ls " + std::to_string(EstimatorStyle(curves++)),
                  element.name + " " + InBrackets(Squared(element.unit)));
   }
+  // Whole decades, and a tick for each, or for every second, third, ... of them.
+  script.Set("low = floor(log10(low))\nhigh = max(ceil(log10(high)), low + 1)");
+  script.Set("set yrange [10**low : 10**high]\nset ytics 10**max(1, ceil((high - low) / 5.0))");
   return script;
 }
 
@@ -125,7 +129,7 @@ FigureScript GainFigure(const RecordedRun& run, const RecordedEstimator& estimat
     for (const RecordedGain& gain : sensor.gains) {
       if (!gain.used || curves == kMaxCurves || panels > kMaxPanels) continue;
       if (curves == 0 && panels++ < kMaxPanels) script.Panel(sensor.name, "K");
-      script.LineOf(file, Is(2, sensor.name), Column(gain.column), EstimatorStyle(curves++),
+      script.LineOf(file, Is("sensor", sensor.name), Column(gain.name), EstimatorStyle(curves++),
                     KeyOf(gain, sensor));
     }
   }
@@ -137,9 +141,9 @@ FigureScript GainFigure(const RecordedRun& run, const RecordedEstimator& estimat
 void InnovationPanel(FigureScript& script, const RecordedEstimator& estimator,
                      const RecordedSensor& sensor, int element) {
   const FigureFile file = Innovations(estimator);
-  const std::string r = Column(estimator.r_column(element));
-  const std::string s = Column(estimator.s_column(element));
-  const std::string mine = Is(3, sensor.name);
+  const std::string r = Column('r' + std::to_string(element));
+  const std::string s = Column('s' + std::to_string(element));
+  const std::string mine = Is("sensor", sensor.name);
   const std::string count = sensor.tangent > 1 ? " " + std::to_string(element) : "";
   script.Panel(sensor.name + count, "z - h " + InBrackets(sensor.unit));
   script.Quartiles("S", file.name, Where(mine, s));
@@ -152,8 +156,8 @@ void InnovationPanel(FigureScript& script, const RecordedEstimator& estimator,
     script.Curve(file, OverTime(Where(mine + " && " + condition, value)) + " with points " + style,
                  key);
   };
-  points("strcol(5) eq 'accepted'", r, "ls 14", "accepted");
-  points("strcol(5) ne 'accepted'", r, "ls 16", "not used");
+  points("strcol('outcome') eq 'accepted'", r, "ls 14", "accepted");
+  points("strcol('outcome') ne 'accepted'", r, "ls 16", "not used");
   points("abs(" + r + ") > limit", "0.97 * limit * sgn(" + r + ')', "ls 17", "beyond the axis");
 }
 
@@ -174,10 +178,9 @@ FigureScript InnovationFigure(const RecordedRun& run, const RecordedEstimator& e
 /// What the measurements tell of a block by themselves, beside truth and estimates.
 void ImpliedPanel(FigureScript& script, const RecordedRun& run, const RecordedImplied& implied) {
   script.Panel(implied.block + " from single measurements", InBrackets(implied.unit));
-  const std::string column = std::to_string(implied.column);
-  script.Quartiles("I", "implied.csv", column);
-  script.Set("low = I_lo_quartile - 2 * (I_up_quartile - I_lo_quartile)");
-  script.Set("high = I_up_quartile + 2 * (I_up_quartile - I_lo_quartile)");
+  script.Quartiles("I", "implied.csv", Column(implied.block));
+  script.Set("low = max(I_min, I_lo_quartile - 2 * (I_up_quartile - I_lo_quartile))");
+  script.Set("high = min(I_max, I_up_quartile + 2 * (I_up_quartile - I_lo_quartile))");
   const RecordedElement* truth = nullptr;
   for (const RecordedEstimator& estimator : run.estimators) {
     for (const RecordedElement& element : estimator.elements) {
@@ -185,7 +188,7 @@ void ImpliedPanel(FigureScript& script, const RecordedRun& run, const RecordedIm
     }
   }
   if (truth != nullptr) {
-    script.Quartiles("T", "truth.csv", std::to_string(truth->truth));
+    script.Quartiles("T", "truth.csv", Column(truth->truth));
     script.Set("low = min(low, T_min)\nhigh = max(high, T_max)");
   }
   script.Set("set yrange [low - margin(low, high) : high + margin(low, high)]");
@@ -193,7 +196,7 @@ void ImpliedPanel(FigureScript& script, const RecordedRun& run, const RecordedIm
   for (const RecordedImplied& one : run.implied) {
     if (one.block != implied.block || one.rows == 0) continue;
     script.Curve({"implied.csv", run.implied_rows, Kinds(run.implied.size())},
-                 OverTime(Where(Is(2, one.sensor), Column(one.column))) + " with points ls " +
+                 OverTime(Where(Is("sensor", one.sensor), Column(one.block))) + " with points ls " +
                      std::to_string(style),
                  "measured: " + one.sensor);
     style = style == 15 ? 13 : style + 1;
@@ -202,7 +205,7 @@ void ImpliedPanel(FigureScript& script, const RecordedRun& run, const RecordedIm
     const RecordedEstimator& estimator = run.estimators[i];
     for (const RecordedElement& element : estimator.elements) {
       if (element.name != implied.block || !element.has_value) continue;
-      script.Curve(Estimates(estimator), Line(element.value, EstimatorStyle(i)), estimator.name);
+      script.Curve(Estimates(estimator), Line(element.name, EstimatorStyle(i)), estimator.name);
     }
   }
   if (truth != nullptr) TruthCurve(script, run, *truth);
@@ -225,7 +228,7 @@ void StreamPanel(FigureScript& script, const RecordedRun& run, const RecordedStr
   const std::string count = stream.size > 1 ? " " + std::to_string(element) : "";
   script.Panel("stream " + stream.name + count + ", as measured",
                InBrackets(sensor != nullptr ? sensor->unit : ""));
-  const std::string value = Where(Is(2, stream.name), Column(4 + element));
+  const std::string value = Where(Is("stream", stream.name), Column('v' + std::to_string(element)));
   script.Quartiles("M", "measurements.csv", value);
   script.Set("low = max(M_min, M_lo_quartile - 3 * (M_up_quartile - M_lo_quartile))");
   script.Set("high = min(M_max, M_up_quartile + 3 * (M_up_quartile - M_lo_quartile))");
@@ -233,8 +236,8 @@ void StreamPanel(FigureScript& script, const RecordedRun& run, const RecordedStr
   script.Curve({"measurements.csv", run.measurement_rows, Kinds(run.streams.size())},
                OverTime(value) + " with points ls 13", "measured");
   if (estimator == nullptr) return;
-  script.LineOf(Innovations(*estimator), Is(3, sensor->name), Column(estimator->h_column(element)),
-                1, "predicted: " + estimator->name);
+  script.LineOf(Innovations(*estimator), Is("sensor", sensor->name),
+                Column('h' + std::to_string(element)), 1, "predicted: " + estimator->name);
 }
 
 FigureScript MeasurementFigure(const RecordedRun& run) {
@@ -262,22 +265,37 @@ FigureScript MeasurementFigure(const RecordedRun& run) {
   return script;
 }
 
-/// All estimators beside truth, for the elements that more than one of them estimates.
+/// Elements of one truth, or of one name where none is known, are one and the same.
+const std::string& Identity(const RecordedElement& element) {
+  return element.truth.empty() ? element.name : element.truth;
+}
+
+/// All estimators beside truth, for each element that any of them has.
 FigureScript ComparisonFigure(const RecordedRun& run) {
   FigureScript script("comparison", "estimators side by side", run.first, run.last);
-  std::size_t panels = 0;
-  if (run.estimators.size() < 2) return script;
-  for (const RecordedElement& element : run.estimators[0].elements) {
-    if (!element.has_value || panels++ >= kMaxPanels) continue;
-    script.Panel(element.name, InBrackets(element.unit));
-    for (std::size_t i = 0; i < std::min(run.estimators.size(), kMaxCurves); ++i) {
-      const RecordedEstimator& estimator = run.estimators[i];
-      for (const RecordedElement& same : estimator.elements) {
-        if (same.name != element.name || !same.has_value) continue;
-        script.Curve(Estimates(estimator), Line(same.value, EstimatorStyle(i)), estimator.name);
+  std::vector<const RecordedElement*> elements;
+  for (const RecordedEstimator& estimator : run.estimators) {
+    for (const RecordedElement& element : estimator.elements) {
+      const auto same = [&](const auto* other) { return Identity(*other) == Identity(element); };
+      if (element.has_value && std::none_of(elements.begin(), elements.end(), same)) {
+        elements.push_back(&element);
       }
     }
-    TruthCurve(script, run, element);
+  }
+  if (run.estimators.size() < 2) return script;
+  if (elements.size() > kMaxPanels) elements.resize(kMaxPanels);
+  for (const RecordedElement* first : elements) {
+    script.Panel(first->name, InBrackets(first->unit));
+    for (std::size_t i = 0; i < std::min(run.estimators.size(), kMaxCurves); ++i) {
+      const RecordedEstimator& estimator = run.estimators[i];
+      for (const RecordedElement& element : estimator.elements) {
+        if (!element.has_value || Identity(element) != Identity(*first)) continue;
+        const bool named = element.name != first->name;
+        script.Curve(Estimates(estimator), Line(element.name, EstimatorStyle(i)),
+                     estimator.name + (named ? ": " + element.name : ""));
+      }
+    }
+    TruthCurve(script, run, *first);
   }
   return script;
 }

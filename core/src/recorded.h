@@ -7,26 +7,24 @@
 
 #include "alidade/source.h"
 
-/// What the csv files of a run folder hold and where, for those who draw them. Columns count from
-/// 1; 0 where there is none.
+/// What the csv files of a run folder hold, for those who draw them. Columns go by their names.
 namespace alidade::internal {
 
 /// One element of a block in `NAME/estimates.csv`. Value and truth are ambient elements, sigma is a
 /// tangent one: beside a value only where both are the same, in vectors and angles.
 struct RecordedElement {
-  std::string name;
+  std::string name;  ///< the column of its value too
   std::string unit;
-  int value = 0;
-  int sigma = 0;
-  int truth = 0;           ///< in truth.csv
+  bool has_sigma = false;  ///< in column `sigma:NAME`
+  std::string truth;       ///< column in truth.csv, or ""
   bool has_value = false;  ///< at some stamp
   bool has_truth = false;
   bool is_random = false;  ///< its variance was above zero at some stamp
 };
 
 struct RecordedGain {
-  std::string name;  ///< `target.depth<-disparity`
-  int column = 0;    ///< in `NAME/gains.csv`
+  std::string name;      ///< the column in `NAME/gains.csv`: `target.depth<-disparity`
+  std::size_t cell = 0;  ///< of a row, behind time and sensor
   bool used = false;
 };
 
@@ -45,10 +43,6 @@ struct RecordedEstimator {
   std::vector<RecordedSensor> sensors;
   int width = 0;  ///< of the widest measurement: columns z0 .. z<width - 1>, then h, s and r
   std::int64_t estimate_rows = 0, innovation_rows = 0, gain_rows = 0;
-
-  int h_column(int i) const { return 8 + width + i; }
-  int s_column(int i) const { return 8 + 2 * width + i; }
-  int r_column(int i) const { return 8 + 3 * width + i; }
 };
 
 struct RecordedStream {
@@ -60,9 +54,9 @@ struct RecordedStream {
 /// A block whose value each measurement of a sensor implies by itself, in `implied.csv`.
 struct RecordedImplied {
   std::string sensor;
-  std::string block;
+  std::string block;  ///< the column too
   std::string unit;
-  int column = 0;
+  std::size_t cell = 0;  ///< of a row, behind time and sensor
   std::int64_t rows = 0;
 };
 

@@ -169,7 +169,7 @@ void Recorder::Start(const Experiment& experiment) {
   for (const Contestant& contestant : experiment.contestants) {
     impl_->facts.types[contestant.name] = contestant.type;
     impl_->estimators.push_back(std::make_unique<internal::EstimatorFiles>(
-        impl_->folder, contestant, experiment.source->truths()));
+        impl_->folder, contestant, experiment.source->truths(), impl_->source->truth_columns()));
   }
   impl_->started = Clock::now();
 }

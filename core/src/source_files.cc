@@ -21,9 +21,10 @@ bool IsInvertible(const System& system, const SensorBinding& binding) {
   return block >= 0 && system.layout[block].geometry().ambient == 1;
 }
 
-std::vector<std::string> TruthHeader(const Experiment& experiment) {
+/// By truth and element.
+std::vector<std::vector<std::string>> TruthColumns(const Experiment& experiment) {
   const std::vector<StreamInfo>& truths = experiment.source->truths();
-  std::vector<std::string> header = {"t_s"};
+  std::vector<std::vector<std::string>> columns;
   for (std::size_t t = 0; t < truths.size(); ++t) {
     std::vector<std::string> names = NumberedNames(truths[t].name, truths[t].size);
     // Elements are named as in the first state that has this block.
@@ -35,9 +36,9 @@ std::vector<std::string> TruthHeader(const Experiment& experiment) {
       names = AmbientNames(truths[t].name, layout.blocks()[block - match.begin()].space);
       break;
     }
-    header.insert(header.end(), names.begin(), names.end());
+    columns.push_back(std::move(names));
   }
-  return header;
+  return columns;
 }
 
 }  // namespace
@@ -45,6 +46,7 @@ std::vector<std::string> TruthHeader(const Experiment& experiment) {
 SourceFiles::SourceFiles(const RunFolder& folder, const Experiment& experiment)
     : streams_(experiment.source->streams()),
       truths_(experiment.source->truths()),
+      truth_columns_(TruthColumns(experiment)),
       stream_rows_(streams_.size(), 0) {
   for (const StreamInfo& stream : streams_) {
     width_ = std::max(width_, static_cast<std::size_t>(stream.size));
@@ -52,13 +54,17 @@ SourceFiles::SourceFiles(const RunFolder& folder, const Experiment& experiment)
   std::vector<std::string> header = {"t_s", "stream", "landmark"};
   for (std::size_t i = 0; i < width_; ++i) header.push_back('v' + std::to_string(i));
   measurements_.emplace(folder, "measurements.csv", header);
-  if (!truths_.empty()) truth_.emplace(folder, "truth.csv", TruthHeader(experiment));
+  if (!truths_.empty()) {
+    header = {"t_s"};
+    for (const auto& names : truth_columns_)
+      header.insert(header.end(), names.begin(), names.end());
+    truth_.emplace(folder, "truth.csv", header);
+  }
   FindInverses(experiment);
   if (inverses_.empty()) return;
   header = {"t_s", "sensor"};
   for (const Inverse& inverse : inverses_) {
-    const auto column = static_cast<std::size_t>(inverse.recorded.column);
-    if (column > header.size()) header.push_back(inverse.recorded.block);
+    if (inverse.recorded.cell + 2 == header.size()) header.push_back(inverse.recorded.block);
   }
   blocks_ = header.size() - 2;
   implied_.emplace(folder, "implied.csv", header);
@@ -66,7 +72,7 @@ SourceFiles::SourceFiles(const RunFolder& folder, const Experiment& experiment)
 
 void SourceFiles::FindInverses(const Experiment& experiment) {
   std::set<std::string> sensors;
-  std::map<std::string, int> columns;
+  std::map<std::string, std::size_t> cells;
   for (const Contestant& contestant : experiment.contestants) {
     const System& system = contestant.system;
     for (const SensorBinding& binding : system.sensors) {
@@ -77,11 +83,10 @@ void SourceFiles::FindInverses(const Experiment& experiment) {
       if (!sensors.insert(binding.name).second) continue;
       const BlockId id = binding.roles[binding.model.initialised_role()].block;
       const Block& block = system.layout[id];
-      const int next = static_cast<int>(columns.size()) + 3;
-      const int column = columns.try_emplace(block.name, next).first->second;
+      const std::size_t cell = cells.try_emplace(block.name, cells.size()).first->second;
       inverses_.push_back({static_cast<int>(stream - streams_.begin()),
                            binding.model,
-                           {binding.name, block.name, UnitOf(system, id), column, 0}});
+                           {binding.name, block.name, UnitOf(system, id), cell, 0}});
     }
   }
 }
@@ -122,7 +127,7 @@ void SourceFiles::AddImplied(const Measurement& m) {
         Status::kOk) {
       continue;
     }
-    const auto before = static_cast<std::size_t>(inverse.recorded.column) - 3;
+    const std::size_t before = inverse.recorded.cell;
     implied_->Time(m.stamp).Text(inverse.recorded.sensor).Empty(before).Number(value);
     implied_->Empty(blocks_ - before - 1).EndRow();
     ++inverse.recorded.rows;

@@ -19,6 +19,8 @@ class SourceFiles {
   /// Error: kIo.
   void Add(const Frame& frame);
   void Close();
+  /// The columns of truth.csv, by truth and element.
+  const std::vector<std::vector<std::string>>& truth_columns() const { return truth_columns_; }
   /// Fills what the source gave.
   void Describe(RecordedRun& run) const;
 
@@ -33,6 +35,7 @@ class SourceFiles {
   void AddImplied(const Measurement& measurement);
 
   std::vector<StreamInfo> streams_, truths_;
+  std::vector<std::vector<std::string>> truth_columns_;
   std::vector<std::int64_t> stream_rows_;  ///< in measurements.csv
   std::vector<Inverse> inverses_;
   std::size_t width_ = 1, blocks_ = 0;

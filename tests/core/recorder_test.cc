@@ -275,6 +275,29 @@ Names SvgsOf(const fs::path& folder) {
   return names;
 }
 
+TEST(Recorder, TheComparisonDrawsEveryEstimatorWhateverItsBlocksAreCalled) {
+  const TemporaryFolder folder;
+  Experiment experiment = MakeExperiment();
+  Contestant other;
+  other.name = "other";
+  testing::AddMotion(other.system, "thing", InProcessMotion(Constant<>(1), "constant"),
+                     {{"depth", 0.3, 0.1}});
+  testing::AddMotion(other.system, "own", InProcessMotion(Constant<>(1), "constant"),
+                     {{"bias", 0.1, 0.1}});
+  other.estimator = std::make_unique<Ekf>(other.system, EkfOptions{}, experiment.source->streams());
+  experiment.contestants.push_back(std::move(other));
+  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+  recorder.Finish(RunInto(recorder, experiment));
+  const std::string script = Read(folder / "out/figures/comparison.gp");
+  EXPECT_NE(script.find("'other/estimates.csv' using (column('t_s')-t0):(column('thing.depth'))"),
+            std::string::npos);
+  EXPECT_NE(script.find("title 'other: thing.depth'"), std::string::npos);
+  EXPECT_NE(script.find("column('own.bias')"), std::string::npos);
+  // One truth, one panel: that of the depth which the others name target.depth.
+  EXPECT_EQ(script.find("set label 1 'thing.depth'"), std::string::npos);
+  EXPECT_NE(script.find("set label 1 'target.depth'"), std::string::npos);
+}
+
 TEST(Recorder, DoesWithoutGnuplot) {
   const TemporaryFolder folder;
   const int code = InChild([&] {

@@ -66,6 +66,7 @@ UpdateReport Ekf::Process(const Frame& frame) {
   }
   report.stale = frame.stamp < stamp_;
   if (!report.stale) StepTo(frame.stamp, report);
+  for (Event& event : report.events) event.stamp = frame.stamp;  // also where it stays behind
   std::vector<Row> rows = Collect(frame, report);
   if (report.stale || failed_) {
     for (MeasurementReport& entry : report.measurements) {

@@ -41,6 +41,8 @@ TEST(Run, AnEstimatorThatCannotGoOnEndsAloneAndTheCodeSaysSo) {
       << result.reason;
   EXPECT_NE(result.reason.find("last good state at 0.000000 s: p.x = "), std::string::npos);
   EXPECT_NE(result.reason.find("last measurement used: sensor 'disparity'"), std::string::npos);
+  // The event is at the frame of the failed step too.
+  EXPECT_EQ(result.contestants[2].events.back().stamp, StampFromSeconds(0.033));
   // The others saw all frames.
   EXPECT_EQ(result.frames, 60);
   EXPECT_EQ(result.contestants[0].counts.at("accepted:inverse_scale"), 60);

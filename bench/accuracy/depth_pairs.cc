@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Chooses the noise of the real depth filter on every second series and reports it on the others:
+// Chooses the noise of the real depth filter on every second series and reports it on the others,
+// and then on those too:
 //
 //   accuracy_depth_pairs examples/07_depth_pairs/config.yaml FOLDER_OF_SERIES
 //
@@ -82,9 +83,10 @@ double Mean(const std::vector<double>& values) {
   return sum / static_cast<double>(values.size());
 }
 
-void Report(const std::string& config, const Settings& settings, const Names& series,
-            const alidade::PluginHost& host) {
+void Report(const char* title, const std::string& config, const Settings& settings,
+            const Names& series, const alidade::PluginHost& host) {
   const Names estimators = {"fused", "stereo_only", "hold_last"};
+  std::printf("\n%s:\n", title);
   std::printf(
       "\n| series | masked: fused | stereo_only | hold_last | whole: fused | stereo_only |\n"
       "|---|---|---|---|---|---|\n");
@@ -133,7 +135,8 @@ int Main(const std::string& config, const std::string& folder) {
   Settings settings = Choose(config, "fused", fused_grid, tuning, host).settings;
   const Choice baseline = Choose(config, "stereo_only", baseline_grid, tuning, host);
   settings.insert(settings.end(), baseline.settings.begin(), baseline.settings.end());
-  Report(config, settings, reporting, host);
+  Report("reported", config, settings, reporting, host);
+  Report("tuned on", config, settings, tuning, host);
   return 0;
 }
 

@@ -71,7 +71,7 @@ std::string GnuplotQuoted(std::string_view text) {
 }
 
 std::string InBrackets(std::string_view unit) {
-  return unit.empty() ? "" : "[" + std::string(unit) + ']';
+  return unit.empty() ? "" : std::string("[").append(unit).append("]");
 }
 
 FigureScript::FigureScript(std::string name, std::string title, Stamp first, Stamp last)

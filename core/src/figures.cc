@@ -319,11 +319,14 @@ std::vector<Plan> PlanFigures(const RecordedRun& run) {
 
 /// Draws `figures/NAME`, which half drawn is none.
 GnuplotResult Draw(const RunFolder& folder, const std::string& name,
-                   std::vector<std::string> arguments, const DrawingLimits& limits) {
+                   const std::vector<std::string>& arguments, const DrawingLimits& limits) {
+  const std::filesystem::path figure = folder.partial() / "figures" / name;
   const GnuplotResult result = RunGnuplot(folder.partial(), arguments, limits);
   std::error_code ignored;
   if (result.end != GnuplotResult::End::kDrawn) {
-    std::filesystem::remove(folder.partial() / "figures" / name, ignored);
+    std::filesystem::remove(figure, ignored);
+  } else if (!std::filesystem::exists(figure, ignored)) {
+    return {GnuplotResult::End::kFailed, "gnuplot wrote nothing"};
   }
   return result;
 }

@@ -24,8 +24,8 @@ struct Figures {
 };
 
 /// Draws what the csv files hold: the measurements and what they tell, the estimators side by side,
-/// and for each estimator its state, variances, gains and innovations. The scripts are written all,
-/// and first. What gnuplot cannot do, or not within the limits, is noted, not an error. Errors: kIo.
+/// and for each estimator its state, variances, gains and innovations. The scripts are all written,
+/// and first. What gnuplot cannot do, or not within the limits, is noted, no error. Errors: kIo.
 Figures DrawFigures(const RunFolder& folder, const RecordedRun& run, const DrawingLimits& limits);
 
 }  // namespace alidade::internal

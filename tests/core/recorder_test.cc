@@ -354,6 +354,21 @@ TEST(Recorder, AStopLeavesOutTheRestOfTheFigures) {
   EXPECT_NE(report.find("the drawing was stopped: 1 of 10 figures"), std::string::npos);
 }
 
+TEST(Recorder, AFigureThatGnuplotDidNotWriteIsNotThere) {
+  const TemporaryFolder folder;
+  const int code = InChild([&] {
+    fs::create_directory(folder / "bin");
+    fs::create_symlink("/bin/true", folder / "bin/gnuplot");
+    ::setenv("PATH", (folder / "bin").c_str(), 1);
+    Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+    Experiment experiment = MakeExperiment();
+    recorder.Finish(RunInto(recorder, experiment));
+    if (recorder.note() != "alone.innovation is not drawn: gnuplot wrote nothing") ::_exit(1);
+  });
+  EXPECT_EQ(code, 0);
+  EXPECT_EQ(Read(folder / "out/report.html").find("<figure>"), std::string::npos);
+}
+
 TEST(Recorder, DrawsNothingOnceItIsStopped) {
   const TemporaryFolder folder;
   Recorder::Options options = OptionsFor(folder / "out", false, true);

@@ -79,8 +79,8 @@ TEST(Run, FramesBeforeTheStartEnterTheCountsAlone) {
   const ContestantResult late = alidade::Run(experiment, {}).contestants[0];
   EXPECT_EQ(late.counts.at("stale:inverse_scale"), 50);
   EXPECT_EQ(late.counts.at("accepted:inverse_scale"), 10);
-  // The prior, 0.35 m, is off by 80 mm RMS over the first 50. After it only the first update is off,
-  // by 75 mm of curvature: sqrt(75^2 / 10) mm, and a little for the wobble.
+  // The prior, 0.35 m, is off by 80 mm RMS over the first 50. After it only the first update is
+  // off, by 75 mm of curvature: sqrt(75^2 / 10) mm, and a little for the wobble.
   EXPECT_LT(late.metrics.at("rmse:target.depth"), 0.04);
 }
 

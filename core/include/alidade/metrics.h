@@ -14,8 +14,8 @@ namespace alidade {
 /// Metrics of one estimator, taken frame by frame.
 ///
 ///   rmse:BLOCK          sqrt(mean |e|^2),  e = x_true (-) x            unit of the block
-///   lag_ms:BLOCK        delay after truth, as Lag() has it; > 0: late. Scalar blocks, even sampling
-///                       (steps within 5 % of their mean), a truth that changes
+///   lag_ms:BLOCK        delay after truth, as Lag() has it; > 0: late. Scalar blocks, even
+///                       sampling (steps within 5 % of their mean), a truth that changes
 ///   cov95:BLOCK         share of stamps with |e| <= 1.96 sigma (scalar blocks)
 ///   nees.mean:OWNER     mean of e' P^-1 e / dof over the owner's estimated blocks of known truth,
 ///                       jointly; stamps where P is singular or not finite are left out
@@ -53,10 +53,10 @@ class Metrics {
 /// Quantile q, in [0, 1], of chi-square with `dof` > 0 degrees of freedom.
 double ChiSquareQuantile(double q, int dof);
 
-/// Delay of `signal` after `reference`, both sampled every `step`, in the unit of step: the shift k,
-/// |k| <= min(n/4, 2000), with the largest correlation coefficient over the n - |k| samples that
-/// overlap, refined by a parabola. On a ramp, where `reference` correlates with itself by more than
-/// 0.9 at every such k, that tells nothing: there it is the k with the least mean of
+/// Delay of `signal` after `reference`, both sampled every `step`, in the unit of step: the shift
+/// k, |k| <= min(n/4, 2000), with the largest correlation coefficient over the n - |k| samples
+/// that overlap, refined by a parabola. On a ramp, where `reference` correlates with itself by more
+/// than 0.9 at every such k, that tells nothing: there it is the k with the least mean of
 /// (signal(i + k) - reference(i))^2, and an offset counts as delay. NaN where one of them is
 /// constant, the best k lies at the edge or is no better than its neighbours, or n < 8.
 double Lag(const std::vector<double>& signal, const std::vector<double>& reference, double step);

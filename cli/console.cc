@@ -17,11 +17,11 @@
 namespace alidade::cli {
 namespace {
 
-std::atomic<bool> stop_requested{false};
+std::atomic<bool> stop_requested{false}, finishing{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler sets it");
 
 extern "C" void HandleStop(int signal_number) {
-  if (!stop_requested.exchange(true)) return;
+  if (!stop_requested.exchange(true) || finishing) return;
   ::signal(signal_number, SIG_DFL);
   ::raise(signal_number);
 }
@@ -120,5 +120,7 @@ void StopOnSignals() {
 }
 
 bool StopRequested() { return stop_requested; }
+
+void FinishOnSignals() { finishing = true; }
 
 }  // namespace alidade::cli

@@ -43,5 +43,7 @@ class Progress {
 /// From now on SIGINT and SIGTERM ask the command to stop; a second one ends the program at once.
 void StopOnSignals();
 bool StopRequested();
+/// From now on a second signal ends nothing: what is done is written to the end.
+void FinishOnSignals();
 
 }  // namespace alidade::cli

@@ -107,6 +107,7 @@ ExitCode RunConfig(const Arguments& arguments) {
   progress.Clear();
   if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
   if (result.status == RunStatus::kStopped) PrintNote(result.reason);
+  FinishOnSignals();
   recorder.Finish(result);
   if (!arguments.quiet) Print(Summary(result, recorder));
   return result.code;

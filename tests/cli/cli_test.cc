@@ -281,7 +281,7 @@ TEST_F(Cli, StopsAtASignalWhileNobodyWritesToThePipe) {
   EXPECT_FALSE(Exists("out"));
 }
 
-TEST_F(Cli, ASignalWhileFiguresAreDrawnKeepsTheRun) {
+TEST_F(Cli, SignalsWhileFiguresAreDrawnKeepTheRun) {
   fs::create_directory(folder_ / "bin");
   Write("bin/gnuplot", "#!/bin/sh\n: > sleeping\nexec sleep 100\n");
   fs::permissions(folder_ / "bin/gnuplot", fs::perms::owner_all);
@@ -292,6 +292,7 @@ TEST_F(Cli, ASignalWhileFiguresAreDrawnKeepsTheRun) {
   const std::string partial = ".out.partial-" + std::to_string(run);
   ASSERT_TRUE(Eventually([&] { return Exists(partial + "/sleeping"); }));
   ::kill(run, SIGINT);
+  ::kill(run, SIGTERM);
   const Outcome ended = Wait(run);
   EXPECT_EQ(ended.code, 0) << ended.err;
   EXPECT_TRUE(Contains(ended.out, "the drawing was stopped: no figures")) << ended.out;

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # shellcheck shell=bash
 #
-# What the scripts share; they source it from the top of the tree.
+# What the scripts share; they source it from the top of the tree, under `set -o pipefail`.
 
 # Compilers at once: one for each processor, and one for each 2 GiB of memory.
 jobs=$(nproc)
@@ -14,11 +14,20 @@ if command -v ccache >/dev/null; then
   export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
 fi
 
+# Shows the last `[done/all]` of its input, in one line and on a terminal only.
+progress() {
+  local line
+  while IFS= read -r line; do
+    [[ -t 2 && $line =~ ^\[[0-9]+/[0-9]+\] ]] && printf '\r%-12s' "${BASH_REMATCH[0]}" >&2
+  done
+  [[ ! -t 2 ]] || printf '\r%12s\r' '' >&2
+}
+
 # Runs a command and shows what it printed only when it fails.
 quietly() {
   local log
   log=$(mktemp)
-  if ! "$@" >"$log" 2>&1; then
+  if ! "$@" 2>&1 | tee "$log" | progress; then
     cat "$log" >&2
     rm -f "$log"
     echo "error: failed: $*" >&2

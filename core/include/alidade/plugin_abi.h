@@ -48,9 +48,7 @@ typedef struct AlidadeFingerprint {
   char magic[8]; /* "ALIDADE" and a zero */
   uint32_t struct_size;
   uint16_t abi_major, abi_minor;
-  uint32_t tier;
-  uint32_t flags;
-  uint32_t isa;
+  uint32_t tier, flags, isa;
   uint32_t cplusplus; /* __cplusplus */
   char compiler[64];  /* __VERSION__ */
   char build[160];    /* build tier: all that must equal the host's, else empty */
@@ -73,11 +71,9 @@ enum {
 
 /* A role, a measurement or a control input: a named quantity with its geometry. */
 typedef struct AlidadeSpace {
-  uint32_t struct_size;
-  uint32_t geometry;
+  uint32_t struct_size, geometry;
   int32_t ambient, tangent;
-  uint32_t flags;
-  uint32_t reserved0;
+  uint32_t flags, reserved0;
   const char* name;
   const char* unit;     /* of every element; "" where it has none */
   const char* elements; /* names of the ambient elements, comma separated; "" for a single one */
@@ -101,8 +97,7 @@ enum {
 
 /* A parameter is declared by being read. */
 typedef struct AlidadeParam {
-  uint32_t struct_size;
-  uint32_t kind;
+  uint32_t struct_size, kind;
   const char* key; /* may be dotted: `noise.acceleration` */
   const char* unit;
   const char* doc;
@@ -111,8 +106,7 @@ typedef struct AlidadeParam {
   double low, high;
   const double* fallback; /* `count` defaults, where ALIDADE_PARAM_HAS_DEFAULT */
   const char* const* choices;
-  int32_t choice_count;
-  int32_t reserved0;
+  int32_t choice_count, reserved0;
   void* reserved[4];
 } AlidadeParam;
 
@@ -143,9 +137,7 @@ enum {
 };
 
 typedef struct AlidadeDescription {
-  uint32_t struct_size;
-  uint32_t capabilities;
-  uint32_t role_count;
+  uint32_t struct_size, capabilities, role_count;
   uint32_t role_stride; /* bytes from one role to the next */
   const AlidadeSpace* roles;
   const AlidadeSpace* output;   /* sensor: its measurement; else null */
@@ -159,8 +151,7 @@ typedef struct AlidadeDescription {
 /* z = h(roles). `roles[i]` is the ambient value of role i, null where an optional role is unbound.
  * `jacobians` may be null; `jacobians[i]` (tangent of z  x  tangent of role i) may be null. */
 typedef struct AlidadeSensor {
-  uint32_t struct_size;
-  uint32_t reserved0;
+  uint32_t struct_size, reserved0;
   int32_t (*eval)(const void* self, const double* const* roles, double* z, double* const* jacobians,
                   const int32_t* row_strides);
   /* L with R = L L', tangent of z squared. */
@@ -183,8 +174,7 @@ typedef struct AlidadeSensor {
 
 /* x' = f(x, u, w, dt), w ~ N(0, Qw). All blocks of the model together have tangent size n. */
 typedef struct AlidadeMotion {
-  uint32_t struct_size;
-  uint32_t reserved0;
+  uint32_t struct_size, reserved0;
   /* `w` may be null (zero); `f` (n x n, d x'/d x) and `g` (n x n_w, d x'/d w) may be null. */
   int32_t (*step)(const void* self, const double* const* blocks, const double* input,
                   const double* w, double dt_s, double* const* next, double* f, int32_t f_stride,
@@ -197,8 +187,7 @@ typedef struct AlidadeMotion {
 
 /* A landmark form: how a point of the world is written in the state. */
 typedef struct AlidadeLandmarkForm {
-  uint32_t struct_size;
-  uint32_t reserved0;
+  uint32_t struct_size, reserved0;
   /* Blocks of a landmark from camera position, orientation, bearing and prior. */
   int32_t (*initialise)(const void* self, const double* const* roles, const double* z,
                         const double* prior, double* const* blocks, double* const* jx,
@@ -215,8 +204,7 @@ typedef struct AlidadeLandmarkForm {
 
 /* One created model. The host zeroes it and sets struct_size; `create` fills it. */
 typedef struct AlidadeInstance {
-  uint32_t struct_size;
-  uint32_t kind;
+  uint32_t struct_size, kind;
   void* self;
   void (*destroy)(void* self);
   const char* (*error_text)(const void* self); /* of the last ALIDADE_ERROR in this thread */
@@ -234,26 +222,21 @@ enum {
 };
 
 typedef struct AlidadeEntry {
-  uint32_t struct_size;
-  uint32_t kind;
+  uint32_t struct_size, kind;
   const char* family; /* sensors that understand each other's landmarks; may be "" */
   const char* name;
   const char* doc;
   const char* citation;
-  uint32_t thread_flags;
-  uint32_t reserved0;
+  uint32_t thread_flags, reserved0;
   /* Reads the parameters and fills `instance`; ALIDADE_OK or ALIDADE_ERROR. */
   int32_t (*create)(const AlidadeHost* host, AlidadeInstance* instance);
   void* reserved[4];
 } AlidadeEntry;
 
 typedef struct AlidadeTable {
-  uint32_t struct_size;
-  uint32_t magic;
+  uint32_t struct_size, magic;
   uint16_t abi_major, abi_minor;
-  uint32_t entry_stride;
-  uint32_t entry_count;
-  uint32_t reserved0;
+  uint32_t entry_stride, entry_count, reserved0;
   const AlidadeEntry* entries;
   const AlidadeFingerprint* fingerprint;
   void* reserved[4];

@@ -116,7 +116,7 @@ TEST_F(Cli, ConfigErrorsHavePlaceAndRemedy) {
   const Outcome range = Call({"run", "config.yaml", "--set", "sensors.stereo.focal_px=-1"});
   EXPECT_EQ(range.code, 78);
   EXPECT_TRUE(range.err.starts_with("error: --set sensors.stereo.focal_px: ")) << range.err;
-  Write("config.yaml", std::string("estimtors: {}\n") + testing::kDepthConfig);
+  Write("config.yaml", "estimtors: {}\n" + testing::kDepthConfig);
   const Outcome unknown = Call({"run", "config.yaml"});
   EXPECT_EQ(unknown.code, 78);
   EXPECT_TRUE(unknown.err.starts_with("error: config.yaml:1:1 estimtors: ")) << unknown.err;

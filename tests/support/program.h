@@ -43,22 +43,28 @@ struct Outcome {
   std::string out, err;
 };
 
-/// A target in depth, seen by a stereo pair and by its size.
-inline constexpr const char* kDepthConfig = R"(alidade: 1
+// What the configs below share.
+inline const std::string kTargetConfig = R"(alidade: 1
 state:
   target:
     model: constant_velocity
     blocks: {position: depth, velocity: depth_rate}
     noise: {acceleration: 1.0}
     initial: {depth: {mean: 0.3, sigma: 0.1}, depth_rate: {mean: 0, sigma: 0.5}}
-  template:
+)";
+inline const std::string kStereoConfig = R"(sensors:
+  stereo: {model: stereo_disparity, stream: disparity, roles: {depth: target.depth},
+           focal_px: 400, baseline_m: 0.065, sigma_px: 1.0}
+)";
+
+/// A target in depth, seen by a stereo pair and by its size.
+inline const std::string kDepthConfig =
+    kTargetConfig + R"(  template:
     model: constant
     blocks: {value: inverse_distance}
     initial: {inverse_distance: {mean: 3.3, sigma: 0.5}}
-sensors:
-  stereo: {model: stereo_disparity, stream: disparity, roles: {depth: target.depth},
-           focal_px: 400, baseline_m: 0.065, sigma_px: 1.0}
-  scale:  {model: scale_2d, stream: inverse_scale, template_px: 300, sigma_px: 1.0,
+)" + kStereoConfig +
+    R"(  scale:  {model: scale_2d, stream: inverse_scale, template_px: 300, sigma_px: 1.0,
            roles: {depth: target.depth, inverse_distance: template.inverse_distance}}
 source: {type: depth_target, seed: 1}
 estimators: {ekf: {type: ekf, gate: 0.999}}
@@ -66,17 +72,9 @@ reference: truth
 )";
 
 /// Stereo alone, on a table.
-inline constexpr const char* kTableConfig = R"(alidade: 1
-state:
-  target:
-    model: constant_velocity
-    blocks: {position: depth, velocity: depth_rate}
-    noise: {acceleration: 1.0}
-    initial: {depth: {mean: 0.3, sigma: 0.1}, depth_rate: {mean: 0, sigma: 0.5}}
-sensors:
-  stereo: {model: stereo_disparity, stream: disparity, roles: {depth: target.depth},
-           focal_px: 400, baseline_m: 0.065, sigma_px: 1.0}
-source: {type: csv, path: table.csv, streams: {disparity: d}}
+inline const std::string kTableConfig =
+    kTargetConfig + kStereoConfig +
+    R"(source: {type: csv, path: table.csv, streams: {disparity: d}}
 estimators: {ekf: {type: ekf}}
 )";
 

@@ -14,8 +14,8 @@
 #   plugin    nothing includes from plugins/, but a plugin from its own folder and tests/plugins,
 #             which test the class behind the export
 #   upward    what lies below does not include cli, bench, tests or examples
-#   library   yaml-cpp, spdlog, fmt and Boost in core/src alone; OpenCV in image plugins alone; of
-#             Ceres only jet.h and rotation.h outside plugins/ceres_batch
+#   library   yaml-cpp and Boost in core/src alone; CLI11 in cli alone; OpenCV in image plugins
+#             alone; of Ceres only jet.h and rotation.h outside plugins/ceres_batch
 #   exit      core, models and plugins neither exit nor abort (but `_exit` where the file forks)
 #   print     core, models and plugins do not print
 #   flags     no instruction-set or fast-math flag in CMake files (but those of the deliberately
@@ -81,7 +81,7 @@ sources() {
     }
     function foreign_to_core(path,    i) {
       if (path ~ /^alidade\//) return !exists("core/include/" path)
-      if (path ~ /\//) return path !~ /^(Eigen|sys|linux|ceres|boost|spdlog|yaml-cpp|fmt)\//
+      if (path ~ /\//) return path !~ /^(Eigen|sys|linux|ceres|boost|yaml-cpp)\//
       for (i in others) if (exists(others[i] "/" path)) return !exists("core/src/" path)
       return 0
     }
@@ -91,8 +91,9 @@ sources() {
       return path != stem ".h"
     }
     function check_include(path, bracket) {
-      if (path ~ /^(yaml-cpp|spdlog|boost|fmt)\// && FILENAME !~ /^core\/src\//)
+      if (path ~ /^(yaml-cpp|boost)\// && FILENAME !~ /^core\/src\//)
         report("library", "only core/src includes " path)
+      if (path ~ /^CLI\// && folder != "cli") report("library", "only cli includes " path)
       if (path ~ /^ceres\// && path !~ /^ceres\/(jet|rotation)\.h$/ && own_plugin != "ceres_batch")
         report("library", "only plugins/ceres_batch includes " path)
       if (path ~ /^opencv/ && own_plugin !~ /image/)
@@ -140,7 +141,7 @@ sources() {
         report("exit", $0)
       if (code ~ /std::(cout|cerr|clog)[^A-Za-z0-9_]/ ||
           code ~ /[^A-Za-z0-9_.>:](std::|::)?(printf|vprintf|puts|putchar)[ \t]*\(/ ||
-          code ~ /(std|fmt)::(print|println)[ \t]*\(/ ||
+          code ~ /std::(print|println)[ \t]*\(/ ||
           code ~ /[^A-Za-z0-9_.>](stdout|stderr)[^A-Za-z0-9_]/)
         report("print", $0)
     }' "$@"
@@ -266,7 +267,7 @@ for header in sensors/scale_2d.h motion_models/constant.h alidade/no_such.h ../.
 done
 plant core core/include/alidade/new.h "$licence\n#  include <sensors/scale_2d.h>"
 for header in '"stereo_disparity.h"' '"motion_models/constant.h"' '"../motion_models/constant.h"' '<vector.h>' \
-  '<unistd.h>' '<sys/stat.h>' '"ceres/jet.h"' '<spdlog/spdlog.h>' '"alidade/no_such.h"'; do
+  '<unistd.h>' '<sys/stat.h>' '"ceres/jet.h"' '<yaml-cpp/yaml.h>' '"alidade/no_such.h"'; do
   plant model sensors/new.cc "$licence\n#include $header"
   plant model motion_models/new.cc "$licence\n#include ${header/stereo_disparity/scale_2d}"
 done
@@ -281,11 +282,15 @@ for header in cli/main.h bench/speed/x.h tests/support/x.h ../tests/support/x.h;
   plant upward plugins/csv/new.cc "$licence\n#include \"$header\""
   plant upward sensors/new.cc "$licence\n#include \"$header\""
 done
-for header in yaml-cpp/yaml.h spdlog/spdlog.h boost/dll.hpp fmt/core.h; do
+for header in yaml-cpp/yaml.h boost/dll.hpp; do
   for file in core/include/alidade/new.h plugins/csv/new.cc cli/new.cc tests/core/new.cc; do
     plant library "$file" "$licence\n#include <$header>"
   done
 done
+for file in core/src/new.cc plugins/csv/new.cc tests/core/new.cc; do
+  plant library "$file" "$licence\n#include <CLI/App.hpp>"
+done
+plant core core/src/new.cc "$licence\n#include <spdlog/spdlog.h>"
 plant library core/src/new.cc "$licence\n#include <ceres/problem.h>"
 plant library plugins/csv/new.cc "$licence\n#include \"ceres/ceres.h\""
 plant library core/src/new.cc "$licence\n#include <opencv2/core.hpp>"
@@ -297,7 +302,7 @@ for call in 'std::exit(1);' 'exit (1);' 'std::abort();' 'abort();' '::_exit(0);'
   done
 done
 for call in 'std::cout << 1;' 'std::cerr << 1;' 'printf("x");' 'std::printf("//");' 'puts("x");' \
-  'fprintf(stdout, "x");' 'std::fputs("x", stderr);' 'fmt::print("x");'; do
+  'fprintf(stdout, "x");' 'std::fputs("x", stderr);' 'std::print("x");'; do
   for file in core/src/new.cc sensors/new.cc motion_models/new.h plugins/csv/new.cc; do
     plant print "$file" "$licence\n$call"
   done

@@ -137,10 +137,14 @@ TEST_F(SweepCli, ReplacesItsFolderOnlyByForce) {
 }
 
 TEST_F(SweepCli, StopsAtASignalWithTheRunsThatAreComplete) {
+  // Two runs come to their end in this time, on this machine and in this build.
+  const auto start = std::chrono::steady_clock::now();
+  ASSERT_EQ(Call({"sweep", "config.yaml", "--runs", "2", "--jobs", "2", "-o", "first"}).code, 0);
+  const auto two_runs = std::chrono::steady_clock::now() - start;
   const pid_t sweep =
       Start({"sweep", "config.yaml", "--runs", "1000000", "--jobs", "2", "-o", "out"});
   ASSERT_TRUE(Eventually([&] { return Exists(".out.partial-" + std::to_string(sweep)); }));
-  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  std::this_thread::sleep_for(3 * two_runs);
   ::kill(sweep, SIGTERM);
   const Outcome stopped = Wait(sweep);
   EXPECT_EQ(stopped.code, 75) << stopped.err;

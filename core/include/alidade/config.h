@@ -50,8 +50,10 @@ class Node {
   double Number() const;
   /// Number within [low, high]; an open end excludes its value.
   double Number(double low, double high, bool low_open = false, bool high_open = false) const;
+  /// Integer in full, as Number, within [low, high]; the limits of the type stand for no bound.
   std::int64_t Integer(std::int64_t low, std::int64_t high) const;
   bool Flag() const;  ///< `true` or `false`, nothing else
+  /// The scalar as it is written, without quotes: a number or a flag is text too.
   std::string Text() const;
   /// Index of the scalar in `choices`.
   int Choice(const std::vector<std::string>& choices) const;

@@ -22,39 +22,46 @@ Eigen::MatrixXd Times(const std::vector<JacobianBlock>& h, int rows,
 
 /// The covariance P of a state in its tangent, behind block queries only: who uses it names rows by
 /// (offset, size) and never sees the storage. Dense here: one symmetric matrix, the lower triangle
-/// authoritative, with spare capacity.
+/// authoritative, with spare capacity. Offsets and sizes lie in [0, size()], as Add gave them; they
+/// are not checked, but where said.
 class Covariance {
  public:
   /// Rows in use, gaps included; a gap has zero rows and columns.
   int size() const { return size_; }
 
-  /// Takes `rows` new rows, uncorrelated and zero, and returns their offset; a gap of that size is
-  /// used before the end. Amortised O(n).
+  /// Takes `rows` > 0 new rows, uncorrelated and zero, and returns their offset; a gap of that size
+  /// is used before the end. Amortised O(n).
   int Add(int rows);
   /// Gives [offset, offset + rows) back. O(n).
   void Release(int offset, int rows);
-  /// Moves rows to a released place of the same size and releases where they were. O(n).
+  /// Moves rows to a released place of the same size (ContractViolation: not released) and releases
+  /// where they were. O(n).
   void Move(int from, int to, int rows);
 
-  /// P(a, b) as a copy.
+  /// P(a, b) as a copy, rows x columns. [a, a + rows) and [b, b + columns) are the same rows, or
+  /// have none in common.
   Eigen::MatrixXd Block(int a, int rows, int b, int columns) const;
+  /// Sets P(a, b) and P(b, a) = P(a, b)', as above; of a diagonal block the lower triangle counts.
   void SetBlock(int a, int b, const Eigen::MatrixXd& value);
+  /// P(i, i), 0 <= i < size().
   double Variance(int i) const { return p_(i, i); }
-  /// Sets rows [offset, offset + k): `own` (k x k) on the diagonal, `cross` (n x k) elsewhere.
+  /// Sets rows [offset, offset + k): `own` (k x k) on the diagonal, `cross` (n x k, n = size())
+  /// elsewhere; its rows [offset, offset + k) are not read.
   void SetRows(int offset, const Eigen::MatrixXd& own, const Eigen::MatrixXd& cross);
 
   /// P H' (n x m), for H given by the blocks that it touches.
   Eigen::MatrixXd TimesTransposed(const std::vector<JacobianBlock>& h, int rows) const;
 
   /// x' = F x + w of the rows in `segments` (offset, size), gathered in that order, w ~ N(0, Q):
-  /// P_aa <- F P_aa F' + Q, P_ai <- F P_ai. O(n k).
+  /// P_aa <- F P_aa F' + Q, P_ai <- F P_ai, F and Q k x k, k the sum of the sizes. O(n k).
   void Propagate(const std::vector<std::pair<int, int>>& segments, const Eigen::MatrixXd& f,
                  const Eigen::MatrixXd& q);
-  /// P <- P - W W'. O(n^2 m).
+  /// P <- P - W W', W n x m. O(n^2 m).
   void SubtractOuter(const Eigen::MatrixXd& w);
-  /// P <- (I - K H) P (I - K H)' + K R K' for any gain K (Joseph). O(n^3).
+  /// P <- (I - K H) P (I - K H)' + K R K' for any gain K (Joseph), K n x m, H m x n, R m x m.
+  /// O(n^3).
   void Joseph(const Eigen::MatrixXd& k, const Eigen::MatrixXd& h, const Eigen::MatrixXd& r);
-  /// Rows of one block <- J times them: P_bb <- J P_bb J', P_bi <- J P_bi.
+  /// Rows of one block <- J (k x k) times them: P_bb <- J P_bb J', P_bi <- J P_bi.
   void Transform(int offset, const Eigen::MatrixXd& j);
   /// The whole matrix, mirrored; for records and tests.
   Eigen::MatrixXd Dense() const;

@@ -28,11 +28,13 @@ struct EkfOptions {
   double gate = 1.0;
   Fuse fuse = Fuse::kJoint;
   Lockout lockout = Lockout::kReset;
-  int lockout_after = 20;
+  int lockout_after = 20;  ///< consecutive rejections of one sensor
   /// Longer gaps are stepped in equal parts of at most this.
   double max_dt_s = std::numeric_limits<double>::infinity();
 
-  /// Reads them from an estimator's entry of the config.
+  /// Reads `gate`, `fuse` (`joint`, `per_sensor`, `per_measurement`), `lockout` (`after`; `action`:
+  /// `reset`, `inflate`, `none`) and `max_dt_s` from an estimator's entry of the config; what is
+  /// not there keeps its default. Errors: kBadConfig.
   static EkfOptions FromNode(const Node& entry);
   /// What FromNode reads.
   static std::vector<ParamInfo> Schema();

@@ -61,6 +61,7 @@ class State {
   const Covariance& covariance() const { return covariance_; }
   Covariance& covariance() { return covariance_; }
 
+  /// The ambient value of a present block; valid until a block is added or values() is replaced.
   const double* value(BlockId id) const { return values_.data() + layout_[id].value_offset; }
   double* value(BlockId id) { return values_.data() + layout_[id].value_offset; }
   const std::vector<double>& values() const { return values_; }

@@ -16,7 +16,9 @@ namespace alidade {
 struct SweepOptions {
   std::int64_t runs = 1;  ///< of all shards together; their seeds count up from first_seed
   std::uint64_t first_seed = 1;
-  int jobs = 0;               ///< threads; 0: as many as the processor has
+  /// Threads; 0: as many as the processor has. One where a model on offer does not allow several
+  /// instances at once (no ALIDADE_THREAD_INSTANCES).
+  int jobs = 0;
   int shard = 1, shards = 1;  ///< which of the equal shares of the seeds, in order
   std::function<void(std::int64_t, std::int64_t)> progress;  ///< runs done, runs in all
   std::function<bool()> stop;                                ///< true: drop unfinished runs

@@ -70,7 +70,6 @@ class Estimator {
   /// Sets the time of the initial state.
   virtual void Start(Stamp stamp) = 0;
   /// Steps to the frame's stamp and uses those of its measurements that a sensor is bound to.
-  ///
   virtual UpdateReport Process(const Frame& frame) = 0;
   virtual const State& state() const = 0;
   virtual Stamp stamp() const = 0;

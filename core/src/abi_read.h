@@ -5,8 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <string>
 
 namespace alidade::internal {
+
+/// A text that may be null.
+inline std::string Text(const char* text) { return text == nullptr ? "" : text; }
 
 /// A copy of a struct of plugin_abi.h, as far as its own size says; zero beyond. `limit`: bytes
 /// that it may claim at most.

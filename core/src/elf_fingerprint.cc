@@ -13,6 +13,8 @@ namespace alidade {
 namespace fs = std::filesystem;
 namespace {
 
+using internal::Refuse;
+
 #if defined(__x86_64__)
 constexpr Elf64_Half kMachine = EM_X86_64;
 #elif defined(__aarch64__)
@@ -20,10 +22,6 @@ constexpr Elf64_Half kMachine = EM_AARCH64;
 #else
 #error "alidade does not know the ELF machine of this target"
 #endif
-
-[[noreturn]] void Refuse(const fs::path& file, const std::string& why) {
-  throw Error(ExitCode::kPlugin, ErrorLine({file.string()}, {}, why));
-}
 
 /// An ELF file read piece by piece; a piece that is not all inside the file is refused.
 class ElfFile {

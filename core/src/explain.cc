@@ -24,20 +24,6 @@ using internal::TextTable;
 
 constexpr std::size_t kIndent = 4;
 
-std::string GeometryText(const Geometry& geometry) {
-  switch (geometry.kind) {
-    case GeometryKind::kVector:
-      return "vector";
-    case GeometryKind::kAngle:
-      return "angle";
-    case GeometryKind::kUnitQuaternion:
-      return "unit_quaternion";
-    case GeometryKind::kUnitVector:
-      return "unit_vector";
-  }
-  return {};
-}
-
 const char* StatusText(BlockStatus status) {
   switch (status) {
     case BlockStatus::kEstimated:
@@ -87,7 +73,7 @@ std::string States(const System& system, const std::vector<StreamInfo>& truths) 
       size.append(" (").append(std::to_string(geometry.tangent)).append(" free)");
     }
     const int truth = match[static_cast<std::size_t>(prior.block)];
-    rows.push_back({block.name, GeometryText(geometry), size, block.space.unit, block.owner,
+    rows.push_back({block.name, ToString(geometry.kind), size, block.space.unit, block.owner,
                     StatusText(block.status),
                     truth >= 0       ? truths[static_cast<std::size_t>(truth)].name
                     : truths.empty() ? ""

@@ -12,6 +12,7 @@ namespace alidade {
 namespace {
 
 using internal::ReadPrefix;
+using internal::Text;
 
 constexpr int kMaxRoles = 64;
 constexpr int kMaxSize = 1 << 20;
@@ -34,8 +35,6 @@ bool KnownGeometry(const AlidadeSpace& space) {
       return false;
   }
 }
-
-std::string Text(const char* text) { return text == nullptr ? "" : text; }
 
 std::vector<std::string> SplitAtCommas(const std::string& text) {
   std::vector<std::string> parts{""};

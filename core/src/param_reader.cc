@@ -10,13 +10,12 @@
 
 #include "abi_read.h"
 #include "number_text.h"
+#include "text_table.h"
 
 namespace alidade::internal {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-std::string Text(const char* text) { return text == nullptr ? "" : text; }
 
 std::string RangeText(const AlidadeParam& param) {
   const bool low_open = (param.flags & ALIDADE_PARAM_LOW_OPEN) != 0;
@@ -97,20 +96,14 @@ AlidadeParam Checked(const AlidadeParam* from, const double* values, std::int32_
   return param;
 }
 
-std::string Joined(const std::vector<std::string>& words, const char* between) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : between) + word;
-  return text;
-}
-
 /// `(px, > 0: rectified focal length)`
 std::string Meaning(const AlidadeParam& param) {
   const ParamInfo info = Describe(param);
   std::vector<std::string> parts;
   if (!info.unit.empty()) parts.push_back(info.unit);
   if (!info.range.empty()) parts.push_back(info.range);
-  if (!info.choices.empty()) parts.push_back("one of " + Joined(info.choices, ", "));
-  std::string text = Joined(parts, ", ");
+  if (!info.choices.empty()) parts.push_back("one of " + Join(info.choices));
+  std::string text = Join(parts);
   if (!text.empty() && !info.doc.empty()) text += ": ";
   return '(' + text + info.doc + ')';
 }
@@ -171,7 +164,7 @@ void ParamReader::Check() const {
   };
   std::sort(lines.begin(), lines.end(), by_place);
   lines.erase(std::unique(lines.begin(), lines.end()), lines.end());
-  throw Error(ExitCode::kBadConfig, Joined(lines, "\n"));
+  throw Error(ExitCode::kBadConfig, Join(lines, "\n"));
 }
 
 std::int32_t ParamReader::Read(void* self, const AlidadeParam* param, double* values,
@@ -282,9 +275,9 @@ std::string ParamRecorder::When(const std::string& key) const {
       if (trial != trials_.end() && asks(*trial)) values.push_back(choice.info.choices[i]);
     }
     if (values.empty() || values.size() == choice.info.choices.size()) continue;
-    conditions.push_back(choice.info.key + " = " + Joined(values, " or "));
+    conditions.push_back(choice.info.key + " = " + Join(values, " or "));
   }
-  return Joined(conditions, ", ");
+  return Join(conditions);
 }
 
 std::vector<ParamInfo> ParamRecorder::Result() const {

@@ -49,17 +49,10 @@ std::string Named(PluginEntry::Kind kind, const std::string& name) {
 }
 
 std::string SizeText(const Geometry& geometry) {
-  switch (geometry.kind) {
-    case GeometryKind::kVector:
-      return "vector(" + std::to_string(geometry.ambient) + ')';
-    case GeometryKind::kAngle:
-      return "angle";
-    case GeometryKind::kUnitQuaternion:
-      return "unit_quaternion";
-    case GeometryKind::kUnitVector:
-      return "unit_vector";
-  }
-  return {};
+  const std::string name = ToString(geometry.kind);
+  return geometry.kind == GeometryKind::kVector
+             ? name + '(' + std::to_string(geometry.ambient) + ')'
+             : name;
 }
 
 std::string Line(const std::string& what, const Space& space) {

@@ -23,6 +23,10 @@ namespace internal {
 /// The build id that a build-tier plugin must have: that of this library.
 const char* HostBuildId();
 
+[[noreturn]] inline void Refuse(const std::filesystem::path& file, const std::string& why) {
+  throw Error(ExitCode::kPlugin, ErrorLine({file.string()}, {}, why));
+}
+
 /// Refuses a build that this host cannot run: fast-math, instructions that this processor lacks, a
 /// build-tier plugin of another build. Errors: kPlugin.
 void CheckBuild(const AlidadeFingerprint& fingerprint, const std::filesystem::path& file);

@@ -20,15 +20,11 @@ namespace fs = std::filesystem;
 namespace {
 
 using internal::KindName;
+using internal::Refuse;
+using internal::Text;
 
 static_assert(std::string_view(ALIDADE_BUILD_VERSION) == ALIDADE_VERSION,
               "build_plugin.h states another version than the project");
-
-[[noreturn]] void Refuse(const fs::path& file, const std::string& why) {
-  throw Error(ExitCode::kPlugin, ErrorLine({file.string()}, {}, why));
-}
-
-std::string Text(const char* text) { return text == nullptr ? "" : text; }
 
 std::vector<fs::path> FoldersOf(const char* variable) {
   std::vector<fs::path> folders;

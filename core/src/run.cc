@@ -5,6 +5,7 @@
 
 #include "alidade/metrics.h"
 #include "alidade/recorder.h"
+#include "text_table.h"
 
 namespace alidade {
 namespace {
@@ -15,12 +16,6 @@ bool InSegment(const Segment& segment, const Frame& frame) {
     return m.stream == segment.stream && segment.sensor.Valid(m.values.data()) == Status::kOk;
   };
   return std::any_of(frame.measurements.begin(), frame.measurements.end(), seen) == segment.with;
-}
-
-std::string Join(const std::vector<std::string>& parts, const char* separator) {
-  std::string text;
-  for (const std::string& part : parts) text += (text.empty() ? "" : separator) + part;
-  return text;
 }
 
 /// One estimator on its way through a run.
@@ -37,7 +32,8 @@ ContestantResult Begin(const Contestant& contestant) {
   result.unobservable = UnobservableDirections(contestant.system);
   for (const auto& direction : result.unobservable) {
     result.events.push_back({kNoStamp, "unobservable",
-                             "no sensor of this estimator tells " + Join(direction, " and ") +
+                             "no sensor of this estimator tells " +
+                                 internal::Join(direction, " and ") +
                                  (direction.size() > 1 ? " apart" : "")});
   }
   return result;

@@ -57,6 +57,20 @@ void UnitVectorTransport(const double* from, const double* to, double* j) {
 
 }  // namespace
 
+const char* ToString(GeometryKind kind) {
+  switch (kind) {
+    case GeometryKind::kVector:
+      return "vector";
+    case GeometryKind::kAngle:
+      return "angle";
+    case GeometryKind::kUnitQuaternion:
+      return "unit_quaternion";
+    case GeometryKind::kUnitVector:
+      break;
+  }
+  return "unit_vector";
+}
+
 void Geometry::Plus(const double* x, const double* d, double* y) const {
   switch (kind) {
     case GeometryKind::kVector:

@@ -15,6 +15,8 @@ enum class GeometryKind : std::uint32_t {
   kUnitQuaternion = ALIDADE_UNIT_QUATERNION,
   kUnitVector = ALIDADE_UNIT_VECTOR,
 };
+/// `vector`, `angle`, `unit_quaternion`, `unit_vector`.
+const char* ToString(GeometryKind kind);
 
 /// A geometry of geometry.h with its size, chosen at run time.
 struct Geometry {

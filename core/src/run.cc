@@ -56,9 +56,9 @@ void NoteUnused(const System& system, ContestantResult& result) {
       }
     }
     if (used > 0) continue;
-    const std::string of_all =
-        all > 0 ? " used none of " + std::to_string(all) + " measurements: " + Join(others, ", ")
-                : ": stream '" + sensor.stream + "' had no measurement";
+    const std::string of_all = all > 0 ? " used none of " + std::to_string(all) +
+                                             " measurements: " + internal::Join(others, ", ")
+                                       : ": stream '" + sensor.stream + "' had no measurement";
     result.events.push_back({kNoStamp, "unused", "sensor '" + sensor.name + "'" + of_all});
   }
 }

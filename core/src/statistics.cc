@@ -91,6 +91,7 @@ bool IsRamp(const Centred& series, Eigen::Index reach) {
 /// where the largest one is at the edge, or no higher than its neighbours but for rounding.
 double Peak(const Eigen::VectorXd& scores) {
   constexpr double kRounding = 1e-12;
+  const Eigen::Index middle = scores.size() / 2;
   Eigen::Index best = 0;
   if (!scores.allFinite()) return kNaN;
   scores.maxCoeff(&best);
@@ -98,7 +99,7 @@ double Peak(const Eigen::VectorXd& scores) {
   const double before = scores[best - 1], after = scores[best + 1];
   const double curvature = before - 2.0 * scores[best] + after;
   if (!(curvature < -kRounding)) return kNaN;
-  return static_cast<double>(best - scores.size() / 2) + 0.5 * (before - after) / curvature;
+  return static_cast<double>(best - middle) + 0.5 * (before - after) / curvature;
 }
 
 }  // namespace

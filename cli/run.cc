@@ -58,7 +58,7 @@ std::string EventLine(const Event& event) {
 std::string EventSummary(const RunResult& result) {
   constexpr std::size_t kShown = 3;
   std::string text;
-  for (const ContestantResult& one : result.contestants) {
+  for (const EstimatorResult& one : result.estimators) {
     for (const EventGroup& group : Group(one.events)) {
       const std::size_t count = group.events.size();
       text += one.name + ": " + group.kind;

@@ -40,7 +40,7 @@ std::map<std::string, double> Rmse(const std::string& config_file, const Setting
   config.Set("source.blind_after", masked ? "0.5" : "1.0", "--set");
   alidade::Experiment experiment = alidade::BuildExperiment(config, host);
   std::map<std::string, double> rmse;
-  for (const auto& result : alidade::Run(experiment, {}).contestants) {
+  for (const auto& result : alidade::Run(experiment, {}).estimators) {
     rmse[result.name] = result.metrics.at(masked ? "rmse:target.depth@blind" : "rmse:target.depth");
   }
   return rmse;

@@ -34,9 +34,9 @@ auto Rank(const std::string& key) {
 }
 
 template <class Map>
-std::vector<std::string> Keys(const RunResult& result, const Map ContestantResult::*values) {
+std::vector<std::string> Keys(const RunResult& result, const Map EstimatorResult::*values) {
   std::vector<std::string> keys;
-  for (const ContestantResult& one : result.contestants) {
+  for (const EstimatorResult& one : result.estimators) {
     for (const auto& [key, value] : one.*values) keys.push_back(key);
   }
   std::sort(keys.begin(), keys.end());
@@ -93,7 +93,7 @@ std::vector<std::string> Format(const Values& values) {
 }
 
 std::string UnitOfKey(const RunResult& result, const std::string& key) {
-  for (const ContestantResult& one : result.contestants) {
+  for (const EstimatorResult& one : result.estimators) {
     const auto unit = one.units.find(std::string(SubjectOf(key)));
     if (unit != one.units.end()) return unit->second;
   }
@@ -102,7 +102,7 @@ std::string UnitOfKey(const RunResult& result, const std::string& key) {
 
 Values ValuesOf(const RunResult& result, const std::string& key) {
   Values values;
-  for (const ContestantResult& one : result.contestants) {
+  for (const EstimatorResult& one : result.estimators) {
     const auto found = one.metrics.find(key);
     values.push_back(found == one.metrics.end() ? std::nullopt : std::optional(found->second));
   }
@@ -112,7 +112,7 @@ Values ValuesOf(const RunResult& result, const std::string& key) {
 /// The largest finite RMSE of all blocks with that unit: one prefix serves the whole table.
 double LargestRmse(const RunResult& result, const std::string& unit) {
   double largest = 0.0;
-  for (const std::string& key : Keys(result, &ContestantResult::metrics)) {
+  for (const std::string& key : Keys(result, &EstimatorResult::metrics)) {
     if (KindOf(key) != "rmse" || UnitOfKey(result, key) != unit) continue;
     for (const auto& value : ValuesOf(result, key)) {
       if (value && std::isfinite(*value)) largest = std::max(largest, *value);
@@ -166,14 +166,14 @@ bool IsMain(const RunResult& result, const std::string& key) {
 }  // namespace
 
 std::vector<std::string> OrderedMetrics(const RunResult& result) {
-  std::vector<std::string> keys = Keys(result, &ContestantResult::metrics);
+  std::vector<std::string> keys = Keys(result, &EstimatorResult::metrics);
   std::stable_sort(keys.begin(), keys.end(),
                    [](const auto& a, const auto& b) { return Rank(a) < Rank(b); });
   return keys;
 }
 
 std::vector<std::string> OrderedCounts(const RunResult& result) {
-  std::vector<std::string> keys = Keys(result, &ContestantResult::counts);
+  std::vector<std::string> keys = Keys(result, &EstimatorResult::counts);
   std::stable_partition(keys.begin(), keys.end(),
                         [](const auto& key) { return KindOf(key) == "accepted"; });
   return keys;
@@ -186,14 +186,14 @@ std::vector<ComparisonRow> ComparisonRows(const RunResult& result) {
   }
   for (const std::string& key : OrderedCounts(result)) {
     ComparisonRow row{std::string(KindOf(key)) + ' ' + std::string(SubjectOf(key)), {}};
-    for (const ContestantResult& one : result.contestants) {
+    for (const EstimatorResult& one : result.estimators) {
       const auto count = one.counts.find(key);
       row.cells.push_back(count == one.counts.end() ? "-" : std::to_string(count->second));
     }
     rows.push_back(std::move(row));
   }
   ComparisonRow diverged{"diverged", {}};
-  for (const ContestantResult& one : result.contestants) {
+  for (const EstimatorResult& one : result.estimators) {
     diverged.cells.emplace_back(one.diverged ? "yes" : "no");
   }
   rows.push_back(std::move(diverged));
@@ -216,10 +216,10 @@ void AppendRight(std::string& line, const std::string& cell, std::size_t width) 
 
 std::string ComparisonTable(const RunResult& result) {
   const std::vector<internal::ComparisonRow> rows = internal::ComparisonRows(result);
-  const std::size_t columns = result.contestants.size();
+  const std::size_t columns = result.estimators.size();
   std::size_t label_width = 0;
   std::vector<std::size_t> widths;
-  for (const ContestantResult& one : result.contestants) widths.push_back(one.name.size());
+  for (const EstimatorResult& one : result.estimators) widths.push_back(one.name.size());
   for (const auto& row : rows) {
     label_width = std::max(label_width, row.label.size());
     for (std::size_t c = 0; c < columns; ++c) widths[c] = std::max(widths[c], row.cells[c].size());
@@ -239,7 +239,7 @@ std::string ComparisonTable(const RunResult& result) {
       for (std::size_t c = first; c < end; ++c) AppendRight(line, cell(c), kGap + widths[c]);
       text += line + '\n';
     };
-    append_line("", [&](std::size_t c) { return result.contestants[c].name; });
+    append_line("", [&](std::size_t c) { return result.estimators[c].name; });
     for (const auto& row : rows)
       append_line(row.label, [&](std::size_t c) { return row.cells[c]; });
   }

@@ -9,10 +9,10 @@
 
 namespace alidade::internal {
 
-RecordedEstimator EstimatorFiles::Describe(const Contestant& contestant) {
+RecordedEstimator EstimatorFiles::Describe(const NamedEstimator& named) {
   RecordedEstimator recorded;
-  recorded.name = contestant.name;
-  for (const SensorBinding& binding : contestant.system.sensors) {
+  recorded.name = named.name;
+  for (const SensorBinding& binding : named.system.sensors) {
     const Space& space = binding.model.measurement();
     RecordedSensor& sensor = recorded.sensors.emplace_back();
     sensor.name = binding.name;
@@ -24,15 +24,15 @@ RecordedEstimator EstimatorFiles::Describe(const Contestant& contestant) {
   return recorded;
 }
 
-EstimatorFiles::EstimatorFiles(const RunFolder& folder, const Contestant& contestant,
+EstimatorFiles::EstimatorFiles(const RunFolder& folder, const NamedEstimator& named,
                                const std::vector<StreamInfo>& truths,
                                const std::vector<std::vector<std::string>>& truth_columns)
-    : recorded_(Describe(contestant)),
-      estimates_(folder, contestant.name + "/estimates.csv",
-                 EstimatesHeader(contestant.system, MatchTruths(contestant.system.layout, truths),
-                                 truth_columns)),
-      innovations_(folder, contestant.name + "/innovations.csv", InnovationsHeader()),
-      gains_(folder, contestant.name + "/gains.csv", GainsHeader(contestant.system)) {}
+    : recorded_(Describe(named)),
+      estimates_(
+          folder, named.name + "/estimates.csv",
+          EstimatesHeader(named.system, MatchTruths(named.system.layout, truths), truth_columns)),
+      innovations_(folder, named.name + "/innovations.csv", InnovationsHeader()),
+      gains_(folder, named.name + "/gains.csv", GainsHeader(named.system)) {}
 
 std::vector<std::string> EstimatorFiles::EstimatesHeader(
     const System& system, const std::vector<int>& truth_of,

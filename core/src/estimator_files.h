@@ -14,7 +14,7 @@ namespace alidade::internal {
 class EstimatorFiles {
  public:
   /// `truth_columns` names the columns of truth.csv, by truth and element.
-  EstimatorFiles(const RunFolder& folder, const Contestant& contestant,
+  EstimatorFiles(const RunFolder& folder, const NamedEstimator& named,
                  const std::vector<StreamInfo>& truths,
                  const std::vector<std::vector<std::string>>& truth_columns);
 
@@ -31,7 +31,7 @@ class EstimatorFiles {
     int truth;            ///< index into Frame::truth, or -1
   };
 
-  static RecordedEstimator Describe(const Contestant& contestant);
+  static RecordedEstimator Describe(const NamedEstimator& named);
   std::vector<std::string> EstimatesHeader(
       const System& system, const std::vector<int>& truth_of,
       const std::vector<std::vector<std::string>>& truth_columns);

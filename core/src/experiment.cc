@@ -83,17 +83,17 @@ void CheckName(const std::string& name, const Node& entry) {
   }
 }
 
-Contestant BuildContestant(const std::string& name, const Node& entry, const Config& config,
-                           const PluginHost& host, const std::vector<StreamInfo>& streams) {
+NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const Config& config,
+                              const PluginHost& host, const std::vector<StreamInfo>& streams) {
   CheckName(name, entry);
-  Contestant contestant;
-  contestant.name = name;
+  NamedEstimator named;
+  named.name = name;
   const Node type = entry.At("type", "an estimator");
   const std::vector<std::string> types = {"ekf"};
-  contestant.type = types[static_cast<std::size_t>(type.Choice(types))];
+  named.type = types[static_cast<std::size_t>(type.Choice(types))];
   const EkfOptions options = EkfOptions::FromNode(entry);
   if (const auto policy = entry.Find("on_divergence")) {
-    contestant.on_divergence = static_cast<OnDivergence>(policy->Choice({"report", "fail"}));
+    named.on_divergence = static_cast<OnDivergence>(policy->Choice({"report", "fail"}));
   }
   const auto overrides = entry.Find("overrides");
   const Config own = overrides ? config.Merged(*overrides) : config;
@@ -107,12 +107,12 @@ Contestant BuildContestant(const std::string& name, const Node& entry, const Con
   }
   const std::vector<std::string> only = ReadSensorList(entry, own.root());
   entry.RejectUnread();
-  contestant.system = BuildSystem(own.root(), host, only);
-  for (const SensorBinding& sensor : contestant.system.sensors) {
+  named.system = BuildSystem(own.root(), host, only);
+  for (const SensorBinding& sensor : named.system.sensors) {
     FindStream(own.root().At("sensors").At(sensor.name), sensor.model, streams);
   }
-  contestant.estimator = std::make_unique<Ekf>(contestant.system, options, streams);
-  return contestant;
+  named.estimator = std::make_unique<Ekf>(named.system, options, streams);
+  return named;
 }
 
 std::vector<Segment> ReadSegments(const Node& root, const System& system,
@@ -154,11 +154,11 @@ void CheckTruths(const Node& source, const Experiment& experiment, const System&
   const std::vector<StreamInfo>& truths = experiment.source->truths();
   for (std::size_t t = 0; t < truths.size(); ++t) {
     const auto node = named->Find(truths[t].name);
-    const auto has_block = [&](const Contestant& contestant) {
-      return internal::WhyNoBlock(contestant.system.layout, truths, t).empty();
+    const auto has_block = [&](const NamedEstimator& named) {
+      return internal::WhyNoBlock(named.system.layout, truths, t).empty();
     };
     const std::string why = internal::WhyNoBlock(whole.layout, truths, t);
-    if (!node || why.empty() || std::ranges::any_of(experiment.contestants, has_block)) continue;
+    if (!node || why.empty() || std::ranges::any_of(experiment.estimators, has_block)) continue;
     std::vector<std::string> names;
     for (const Block& block : whole.layout.blocks()) {
       names.push_back(block.name);
@@ -209,9 +209,9 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   }
   experiment.segments = ReadSegments(root, whole, streams);
   for (const auto& [name, entry] : root.At("estimators", "a run").Entries()) {
-    experiment.contestants.push_back(BuildContestant(name, entry, config, host, streams));
+    experiment.estimators.push_back(BuildEstimator(name, entry, config, host, streams));
   }
-  if (experiment.contestants.empty()) {
+  if (experiment.estimators.empty()) {
     root.At("estimators").Fail("empty", "at least one estimator");
   }
   CheckTruths(source, experiment, whole);

@@ -241,16 +241,16 @@ std::string LockoutText(const EkfOptions& options, const System& system) {
   return "none";
 }
 
-std::string Options(const Node& entry, const Contestant& contestant) {
+std::string Options(const Node& entry, const NamedEstimator& named) {
   const EkfOptions options = EkfOptions::FromNode(entry);
-  const System& system = contestant.system;
+  const System& system = named.system;
   std::vector<TextRow> rows = {
       {"gate", GateText(options, system)},
       {"fuse", FuseText(options.fuse, system)},
       {"lockout", LockoutText(options, system)},
       {"max_dt_s",
        std::isfinite(options.max_dt_s) ? NumberText(options.max_dt_s) : "none: a gap is one step"},
-      {"on_divergence", contestant.on_divergence == OnDivergence::kFail
+      {"on_divergence", named.on_divergence == OnDivergence::kFail
                             ? "fail: the run ends with exit code 79"
                             : "report: the run goes on"}};
   if (system.start_s) rows.push_back({"start_s", NumberText(*system.start_s)});
@@ -286,18 +286,18 @@ std::string SourceText(const Config& config, const Experiment& experiment) {
 
 std::string Explain(const Config& config, const Experiment& experiment) {
   std::string text = SourceText(config, experiment);
-  for (const Contestant& contestant : experiment.contestants) {
-    const System& system = contestant.system;
-    const Node entry = config.root().At("estimators").At(contestant.name);
-    text += "\nestimator " + contestant.name + " (" + contestant.type + ")\n";
+  for (const NamedEstimator& named : experiment.estimators) {
+    const System& system = named.system;
+    const Node entry = config.root().At("estimators").At(named.name);
+    text += "\nestimator " + named.name + " (" + named.type + ")\n";
     text += "  state\n" + States(system, experiment.source->truths());
     text += "  motion\n" + Motions(system);
     text += "  sensors\n" + Sensors(system);
     text += "  who touches which block\n" + Touches(system);
     text += Unobservable(system);
-    text += "  options\n" + Options(entry, contestant);
-    if (const std::string support = SupportText(contestant.type); !support.empty()) {
-      text += "  an " + contestant.type + " supports\n" + support;
+    text += "  options\n" + Options(entry, named);
+    if (const std::string support = SupportText(named.type); !support.empty()) {
+      text += "  an " + named.type + " supports\n" + support;
     }
   }
   return text;

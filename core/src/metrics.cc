@@ -271,11 +271,11 @@ void Metrics::Impl::Write(const Sums& s, std::map<std::string, double>& metrics)
   }
 }
 
-Metrics::Metrics(const Contestant& contestant, const Source& source,
+Metrics::Metrics(const NamedEstimator& named, const Source& source,
                  const std::vector<Segment>& segments)
     : impl_(std::make_unique<Impl>()) {
-  impl_->Track(contestant.system, source.truths());
-  for (const SensorBinding& sensor : contestant.system.sensors) {
+  impl_->Track(named.system, source.truths());
+  for (const SensorBinding& sensor : named.system.sensors) {
     impl_->sensors.push_back(sensor.name);
   }
   impl_->count_of.resize(impl_->sensors.size());

@@ -27,7 +27,7 @@ struct Recorder::Impl {
   void AddPlugin(const std::filesystem::path& file);
   void AddPlugins(const Experiment& experiment);
   internal::RecordedRun CloseFiles();
-  void WriteEvents(const ContestantResult& result) const;
+  void WriteEvents(const EstimatorResult& result) const;
   std::string TimingJson(const RunResult& result) const;
   void WriteReport(const RunResult& result, const internal::RecordedRun& recorded);
 
@@ -86,11 +86,9 @@ void Recorder::Impl::AddPlugin(const std::filesystem::path& file) {
 }
 
 void Recorder::Impl::AddPlugins(const Experiment& experiment) {
-  for (const Contestant& contestant : experiment.contestants) {
-    for (const auto& sensor : contestant.system.sensors)
-      AddPlugin(sensor.model.instance().plugin());
-    for (const auto& motion : contestant.system.motions)
-      AddPlugin(motion.model.instance().plugin());
+  for (const NamedEstimator& named : experiment.estimators) {
+    for (const auto& sensor : named.system.sensors) AddPlugin(sensor.model.instance().plugin());
+    for (const auto& motion : named.system.motions) AddPlugin(motion.model.instance().plugin());
   }
   for (const PluginEntry& entry : host.entries()) {
     if (entry.kind == PluginEntry::Kind::kSource && entry.name == source_type) {
@@ -112,7 +110,7 @@ internal::RecordedRun Recorder::Impl::CloseFiles() {
   return recorded;
 }
 
-void Recorder::Impl::WriteEvents(const ContestantResult& result) const {
+void Recorder::Impl::WriteEvents(const EstimatorResult& result) const {
   CsvFile events(folder, result.name + "/events.csv", {"t_s", "kind", "text"});
   for (const Event& event : result.events) {
     events.Time(event.stamp).Text(event.kind).Text(event.text).EndRow();
@@ -166,10 +164,10 @@ void Recorder::Start(const Experiment& experiment) {
   impl_->facts.seed = experiment.seed;
   impl_->AddPlugins(experiment);
   impl_->source.emplace(impl_->folder, experiment);
-  for (const Contestant& contestant : experiment.contestants) {
-    impl_->facts.types[contestant.name] = contestant.type;
+  for (const NamedEstimator& named : experiment.estimators) {
+    impl_->facts.types[named.name] = named.type;
     impl_->estimators.push_back(std::make_unique<internal::EstimatorFiles>(
-        impl_->folder, contestant, experiment.source->truths(), impl_->source->truth_columns()));
+        impl_->folder, named, experiment.source->truths(), impl_->source->truth_columns()));
   }
   impl_->started = Clock::now();
 }
@@ -179,17 +177,17 @@ void Recorder::AddFrame(const Frame& frame) {
   impl_->source->Add(frame);
 }
 
-void Recorder::AddEstimate(int contestant, const Frame& frame, const State& state,
+void Recorder::AddEstimate(int estimator, const Frame& frame, const State& state,
                            const UpdateReport& report) {
-  ALIDADE_EXPECTS(contestant >= 0 && contestant < static_cast<int>(impl_->estimators.size()));
-  impl_->estimators[static_cast<std::size_t>(contestant)]->Add(frame, state, report);
+  ALIDADE_EXPECTS(estimator >= 0 && estimator < static_cast<int>(impl_->estimators.size()));
+  impl_->estimators[static_cast<std::size_t>(estimator)]->Add(frame, state, report);
 }
 
 void Recorder::Finish(const RunResult& result) {
   const std::string timing = impl_->TimingJson(result);
   const internal::RecordedRun recorded = impl_->CloseFiles();
   const internal::RunFolder& folder = impl_->folder;
-  for (const ContestantResult& one : result.contestants) impl_->WriteEvents(one);
+  for (const EstimatorResult& one : result.estimators) impl_->WriteEvents(one);
   folder.Write("run.json", internal::RunJson(result, impl_->facts));
   folder.Write("comparison.csv", internal::ComparisonCsv(result));
   folder.Write("timing.json", timing);

@@ -65,13 +65,13 @@ std::string Head(const RunResult& result, const Report& report) {
   std::string html = "<h1>" + HtmlEscaped(report.title) + " <span class=\"badge " +
                      ToString(result.status) + "\">" + ToString(result.status) + "</span></h1>\n";
   html += "<p class=\"soft\">" + std::to_string(result.frames) + " frames, seed " +
-          std::to_string(report.facts.seed) + ", " + std::to_string(result.contestants.size()) +
-          (result.contestants.size() == 1 ? " estimator" : " estimators") + "</p>\n";
+          std::to_string(report.facts.seed) + ", " + std::to_string(result.estimators.size()) +
+          (result.estimators.size() == 1 ? " estimator" : " estimators") + "</p>\n";
   if (!result.reason.empty()) html += Element("p", result.reason);
   html += "<nav><a href=\"#comparison\">Comparison</a><a href=\"#figures\">Figures</a>";
-  for (std::size_t i = 0; i < result.contestants.size(); ++i) {
+  for (std::size_t i = 0; i < result.estimators.size(); ++i) {
     html += "<a href=\"#estimator-" + std::to_string(i) + "\">" +
-            HtmlEscaped(result.contestants[i].name) + "</a>";
+            HtmlEscaped(result.estimators[i].name) + "</a>";
   }
   return html + "<a href=\"#config\">Config</a></nav>\n";
 }
@@ -79,7 +79,7 @@ std::string Head(const RunResult& result, const Report& report) {
 std::string Comparison(const RunResult& result) {
   std::string html =
       "<h2 id=\"comparison\">Comparison</h2>\n<div class=\"scroll\"><table>\n<tr><th></th>";
-  for (const ContestantResult& one : result.contestants) {
+  for (const EstimatorResult& one : result.estimators) {
     html += "<th>" + HtmlEscaped(one.name) + "</th>";
   }
   html += "</tr>\n";
@@ -108,7 +108,7 @@ std::string FiguresOf(const Report& report, const std::string& estimator) {
   return html;
 }
 
-std::string Events(const ContestantResult& result) {
+std::string Events(const EstimatorResult& result) {
   constexpr std::size_t kMaxEvents = 50;
   if (result.events.empty()) return {};
   std::string html = Element("h3", "events") + "<div class=\"scroll\"><table>\n" +
@@ -126,7 +126,7 @@ std::string Events(const ContestantResult& result) {
          " more, in " + HtmlEscaped(result.name) + "/events.csv</p>\n";
 }
 
-std::string Estimator(const ContestantResult& result, std::size_t index, const Report& report) {
+std::string Estimator(const EstimatorResult& result, std::size_t index, const Report& report) {
   std::string html =
       "<h2 id=\"estimator-" + std::to_string(index) + "\">" + HtmlEscaped(result.name);
   const auto type = report.facts.types.find(result.name);
@@ -180,8 +180,8 @@ std::string ReportHtml(const RunResult& result, const Report& report) {
   html += Head(result, report) + Comparison(result);
   html += "<h2 id=\"figures\">Figures</h2>\n" + FiguresOf(report, "");
   if (!report.figures.note.empty()) html += Element("p", report.figures.note);
-  for (std::size_t i = 0; i < result.contestants.size(); ++i) {
-    html += Estimator(result.contestants[i], i, report);
+  for (std::size_t i = 0; i < result.estimators.size(); ++i) {
+    html += Estimator(result.estimators[i], i, report);
   }
   html += "<h2 id=\"config\">Config</h2>\n" + Element("pre", report.config);
   if (!report.facts.plugins.empty()) {

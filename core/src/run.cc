@@ -19,17 +19,17 @@ bool InSegment(const Segment& segment, const Frame& frame) {
 }
 
 /// One estimator on its way through a run.
-struct Lane {
-  Contestant& contestant;
+struct Running {
+  NamedEstimator& named;
   Metrics metrics;
-  ContestantResult result;
+  EstimatorResult result;
   bool ended = false;  ///< it had nothing left to go on with
 };
 
-ContestantResult Begin(const Contestant& contestant) {
-  ContestantResult result;
-  result.name = contestant.name;
-  result.unobservable = UnobservableDirections(contestant.system);
+EstimatorResult Begin(const NamedEstimator& named) {
+  EstimatorResult result;
+  result.name = named.name;
+  result.unobservable = UnobservableDirections(named.system);
   for (const auto& direction : result.unobservable) {
     result.events.push_back({kNoStamp, "unobservable",
                              "no sensor of this estimator tells " +
@@ -40,7 +40,7 @@ ContestantResult Begin(const Contestant& contestant) {
 }
 
 /// An event `unused` for each sensor of which the whole run used no measurement.
-void NoteUnused(const System& system, ContestantResult& result) {
+void NoteUnused(const System& system, EstimatorResult& result) {
   for (const SensorBinding& sensor : system.sensors) {
     std::int64_t used = 0, all = 0;
     std::vector<std::string> others;
@@ -70,31 +70,31 @@ void Fail(RunResult& result, ExitCode code, std::string reason) {
 }
 
 /// One frame through one estimator; false where the whole run has to end.
-bool Advance(Lane& lane, int index, const Frame& frame, const std::vector<bool>& in_segment,
+bool Advance(Running& one, int index, const Frame& frame, const std::vector<bool>& in_segment,
              const RunOptions& options, RunResult& result) {
-  if (lane.ended) return true;
-  Estimator& estimator = *lane.contestant.estimator;
+  if (one.ended) return true;
+  Estimator& estimator = *one.named.estimator;
   const UpdateReport report = estimator.Process(frame);
-  lane.result.events.insert(lane.result.events.end(), report.events.begin(), report.events.end());
-  lane.ended = estimator.failed();
-  if (!lane.ended) {
-    lane.metrics.Add(frame, in_segment, estimator.state(), report);
+  one.result.events.insert(one.result.events.end(), report.events.begin(), report.events.end());
+  one.ended = estimator.failed();
+  if (!one.ended) {
+    one.metrics.Add(frame, in_segment, estimator.state(), report);
     if (options.recorder != nullptr) {
       options.recorder->AddEstimate(index, frame, estimator.state(), report);
     }
   }
-  const bool policy = lane.contestant.on_divergence == OnDivergence::kFail && estimator.diverged();
-  if (!lane.ended && !policy) return true;
+  const bool policy = one.named.on_divergence == OnDivergence::kFail && estimator.diverged();
+  if (!one.ended && !policy) return true;
   if (result.status == RunStatus::kOk) {
     const std::string why = report.events.empty() ? "diverged" : report.events.back().text;
     char at[48];
     std::snprintf(at, sizeof(at), " at t = %.6f s: ", Seconds(frame.stamp));
-    Fail(result, ExitCode::kDiverged, "estimator '" + lane.contestant.name + "'" + at + why);
+    Fail(result, ExitCode::kDiverged, "estimator '" + one.named.name + "'" + at + why);
   }
   return !policy;
 }
 
-void RunFrames(Experiment& experiment, std::vector<Lane>& lanes, const RunOptions& options,
+void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunOptions& options,
                RunResult& result) {
   Frame frame;
   std::vector<bool> in_segment(experiment.segments.size());
@@ -105,12 +105,12 @@ void RunFrames(Experiment& experiment, std::vector<Lane>& lanes, const RunOption
     }
     if (options.recorder != nullptr) options.recorder->AddFrame(frame);
     bool go_on = true;
-    for (std::size_t i = 0; i < lanes.size(); ++i) {
-      go_on = Advance(lanes[i], static_cast<int>(i), frame, in_segment, options, result) && go_on;
+    for (std::size_t i = 0; i < running.size(); ++i) {
+      go_on = Advance(running[i], static_cast<int>(i), frame, in_segment, options, result) && go_on;
     }
     ++result.frames;
-    const auto ended = [](const Lane& lane) { return lane.ended; };
-    if (!go_on || std::all_of(lanes.begin(), lanes.end(), ended)) return;
+    const auto ended = [](const Running& one) { return one.ended; };
+    if (!go_on || std::all_of(running.begin(), running.end(), ended)) return;
     if (options.progress) options.progress(result.frames, size);
     if (options.stop && options.stop()) {
       if (result.status != RunStatus::kOk) return;
@@ -138,29 +138,29 @@ const char* ToString(RunStatus status) {
 
 RunResult Run(Experiment& experiment, const RunOptions& options) {
   RunResult result;
-  std::vector<Lane> lanes;
+  std::vector<Running> running;
   try {
-    for (Contestant& contestant : experiment.contestants) {
-      lanes.push_back({contestant, Metrics(contestant, *experiment.source, experiment.segments),
-                       Begin(contestant), false});
+    for (NamedEstimator& named : experiment.estimators) {
+      running.push_back(
+          {named, Metrics(named, *experiment.source, experiment.segments), Begin(named), false});
     }
     if (options.recorder != nullptr) options.recorder->Start(experiment);
-    RunFrames(experiment, lanes, options, result);
+    RunFrames(experiment, running, options, result);
   } catch (...) {
     // What was done so far is kept.
     Failure failure = CaughtFailure();
     Fail(result, failure.code, std::move(failure.reason));
     if (failure.code == ExitCode::kStopped) result.status = RunStatus::kStopped;
   }
-  for (Lane& lane : lanes) {
-    lane.result.metrics = lane.metrics.Finish();
-    lane.result.counts = lane.metrics.counts();
-    lane.result.units = lane.metrics.units();
-    if (result.frames > 0) NoteUnused(lane.contestant.system, lane.result);
-    const std::vector<Event>& inconsistent = lane.metrics.events();
-    lane.result.events.insert(lane.result.events.end(), inconsistent.begin(), inconsistent.end());
-    lane.result.diverged = lane.contestant.estimator->diverged() || !inconsistent.empty();
-    result.contestants.push_back(std::move(lane.result));
+  for (Running& one : running) {
+    one.result.metrics = one.metrics.Finish();
+    one.result.counts = one.metrics.counts();
+    one.result.units = one.metrics.units();
+    if (result.frames > 0) NoteUnused(one.named.system, one.result);
+    const std::vector<Event>& inconsistent = one.metrics.events();
+    one.result.events.insert(one.result.events.end(), inconsistent.begin(), inconsistent.end());
+    one.result.diverged = one.named.estimator->diverged() || !inconsistent.empty();
+    result.estimators.push_back(std::move(one.result));
   }
   return result;
 }

@@ -21,7 +21,7 @@ void WriteTexts(Json& json, const std::map<std::string, std::string>& values) {
   json.End();
 }
 
-void WriteContestant(Json& json, const ContestantResult& result, const RunFacts& facts) {
+void WriteEstimator(Json& json, const EstimatorResult& result, const RunFacts& facts) {
   json.Key(result.name).Object();
   if (const auto type = facts.types.find(result.name); type != facts.types.end()) {
     json.Key("type").Text(type->second);
@@ -44,7 +44,7 @@ void WriteContestant(Json& json, const ContestantResult& result, const RunFacts&
 
 }  // namespace
 
-std::map<std::string, std::int64_t> CountEvents(const ContestantResult& result) {
+std::map<std::string, std::int64_t> CountEvents(const EstimatorResult& result) {
   std::map<std::string, std::int64_t> counts;
   for (const Event& event : result.events) ++counts[event.kind];
   return counts;
@@ -64,18 +64,18 @@ std::string RunJson(const RunResult& result, const RunFacts& facts) {
   }
   json.End();
   json.Key("estimators").Object();
-  for (const ContestantResult& one : result.contestants) WriteContestant(json, one, facts);
+  for (const EstimatorResult& one : result.estimators) WriteEstimator(json, one, facts);
   json.End().End();
   return json.text();
 }
 
 std::string ComparisonCsv(const RunResult& result) {
   std::string text = "metric";
-  for (const ContestantResult& one : result.contestants) text += ',' + CsvQuoted(one.name);
+  for (const EstimatorResult& one : result.estimators) text += ',' + CsvQuoted(one.name);
   text += '\n';
   for (const std::string& key : OrderedMetrics(result)) {
     text += CsvQuoted(key);
-    for (const ContestantResult& one : result.contestants) {
+    for (const EstimatorResult& one : result.estimators) {
       text += ',';
       const auto value = one.metrics.find(key);
       if (value != one.metrics.end()) AppendNumber(text, value->second);
@@ -84,14 +84,14 @@ std::string ComparisonCsv(const RunResult& result) {
   }
   for (const std::string& key : OrderedCounts(result)) {
     text += CsvQuoted(key);
-    for (const ContestantResult& one : result.contestants) {
+    for (const EstimatorResult& one : result.estimators) {
       const auto count = one.counts.find(key);
       text += ',' + std::to_string(count == one.counts.end() ? 0 : count->second);
     }
     text += '\n';
   }
   text += "diverged";
-  for (const ContestantResult& one : result.contestants) text += one.diverged ? ",true" : ",false";
+  for (const EstimatorResult& one : result.estimators) text += one.diverged ? ",true" : ",false";
   return text + '\n';
 }
 

@@ -22,6 +22,6 @@ std::string RunJson(const RunResult& result, const RunFacts& facts);
 std::string ComparisonCsv(const RunResult& result);
 
 /// How many events there are of each kind.
-std::map<std::string, std::int64_t> CountEvents(const ContestantResult& result);
+std::map<std::string, std::int64_t> CountEvents(const EstimatorResult& result);
 
 }  // namespace alidade::internal

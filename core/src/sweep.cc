@@ -72,8 +72,8 @@ class Queue {
     try {
       const Config config = CopyFor(seed);
       Experiment experiment = BuildExperiment(config, host_);
-      for (Contestant& contestant : experiment.contestants) {
-        contestant.on_divergence = OnDivergence::kReport;
+      for (NamedEstimator& named : experiment.estimators) {
+        named.on_divergence = OnDivergence::kReport;
       }
       RunOptions options;
       options.stop = options_.stop;
@@ -81,8 +81,8 @@ class Queue {
       run.status = result.code == ExitCode::kDiverged ? RunStatus::kOk : result.status;
       run.code = result.code;
       run.reason = std::move(result.reason);
-      run.contestants = std::move(result.contestants);
-      for (ContestantResult& one : run.contestants) one.events = {};
+      run.estimators = std::move(result.estimators);
+      for (EstimatorResult& one : run.estimators) one.events = {};
     } catch (...) {
       Failure failure = CaughtFailure();
       run.status = RunStatus::kFailed;
@@ -127,8 +127,8 @@ SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptio
   SweepResult result;
   CheckReadableAgain(config);
   // What is wrong with the config is said once, before the first run.
-  for (const Contestant& contestant : BuildExperiment(config, host).contestants) {
-    result.estimators.push_back(contestant.name);
+  for (const NamedEstimator& named : BuildExperiment(config, host).estimators) {
+    result.estimators.push_back(named.name);
   }
   const auto share = [&](int i) {
     return options.runs / options.shards * i + options.runs % options.shards * i / options.shards;
@@ -175,7 +175,7 @@ std::vector<SweepSummary> Summarise(const SweepResult& result) {
     summary.name = name;
     std::map<std::string, std::vector<double>> values;
     for (const SweepRun& run : result.done) {
-      for (const ContestantResult& one : run.contestants) {
+      for (const EstimatorResult& one : run.estimators) {
         if (one.name != name) continue;
         summary.units.insert(one.units.begin(), one.units.end());
         summary.diverged += one.diverged ? 1 : 0;

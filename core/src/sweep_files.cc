@@ -28,7 +28,7 @@ std::vector<TextRow> TableRows(const std::vector<SweepSummary>& summaries) {
   RunResult columns;
   for (const SweepSummary& summary : summaries) {
     for (const auto member : {&Spread::mean, &Spread::p05, &Spread::p50, &Spread::p95}) {
-      ContestantResult& column = columns.contestants.emplace_back();
+      EstimatorResult& column = columns.estimators.emplace_back();
       column.units = summary.units;
       for (const auto& [key, spread] : summary.metrics) column.metrics[key] = spread.*member;
     }
@@ -102,9 +102,9 @@ std::string SweepJson(const SweepResult& result) {
 /// Keys that any run has, in the order of a comparison.
 RunResult AllKeys(const SweepResult& result) {
   RunResult all;
-  ContestantResult& keys = all.contestants.emplace_back();
+  EstimatorResult& keys = all.estimators.emplace_back();
   for (const SweepRun& run : result.done) {
-    for (const ContestantResult& one : run.contestants) {
+    for (const EstimatorResult& one : run.estimators) {
       keys.metrics.insert(one.metrics.begin(), one.metrics.end());
       keys.counts.insert(one.counts.begin(), one.counts.end());
     }
@@ -121,7 +121,7 @@ void WriteRuns(const RunFolder& folder, const SweepResult& result) {
   header.insert(header.end(), counts.begin(), counts.end());
   CsvFile csv(folder, "runs.csv", header);
   for (const SweepRun& run : result.done) {
-    for (const ContestantResult& one : run.contestants) {
+    for (const EstimatorResult& one : run.estimators) {
       if (!run.Uses(one) && !one.diverged) continue;
       csv.Integer(static_cast<std::int64_t>(run.seed)).Text(one.name);
       csv.Text(one.diverged ? "true" : "false");

@@ -9,8 +9,8 @@
 namespace alidade {
 namespace {
 
-ContestantResult Named(const std::string& name, std::map<std::string, double> metrics) {
-  ContestantResult result;
+EstimatorResult Named(const std::string& name, std::map<std::string, double> metrics) {
+  EstimatorResult result;
   result.name = name;
   result.metrics = std::move(metrics);
   result.units = {{"target.depth", "m"}, {"cam.heading", "rad"}, {"cam.pixel", "px"}};
@@ -19,19 +19,19 @@ ContestantResult Named(const std::string& name, std::map<std::string, double> me
 
 TEST(ComparisonTable, OrdersScalesAndAligns) {
   RunResult result;
-  result.contestants = {Named("fused", {{"rmse:target.depth", 0.002145},
-                                        {"rmse:target.depth@blind", 0.00121},
-                                        {"rmse:cam.pixel", 0.31},
-                                        {"lag_ms:target.depth", -1.42},
-                                        {"cov95:target.depth", 0.9342},
-                                        {"cov95:target.depth@blind", 0.9},
-                                        {"nees.mean:target", 0.8948},
-                                        {"nees.cov95:target", 1.0},
-                                        {"nis.mean:stereo", 0.9059},
-                                        {"final:target.depth", 1.0}}),
-                        Named("stereo_only", {{"rmse:target.depth", 0.206534}})};
-  result.contestants[0].counts = {{"accepted:stereo", 74}, {"gated:stereo", 1}};
-  result.contestants[1].diverged = true;
+  result.estimators = {Named("fused", {{"rmse:target.depth", 0.002145},
+                                       {"rmse:target.depth@blind", 0.00121},
+                                       {"rmse:cam.pixel", 0.31},
+                                       {"lag_ms:target.depth", -1.42},
+                                       {"cov95:target.depth", 0.9342},
+                                       {"cov95:target.depth@blind", 0.9},
+                                       {"nees.mean:target", 0.8948},
+                                       {"nees.cov95:target", 1.0},
+                                       {"nis.mean:stereo", 0.9059},
+                                       {"final:target.depth", 1.0}}),
+                       Named("stereo_only", {{"rmse:target.depth", 0.206534}})};
+  result.estimators[0].counts = {{"accepted:stereo", 74}, {"gated:stereo", 1}};
+  result.estimators[1].diverged = true;
   EXPECT_EQ(ComparisonTable(result),
             "                                fused  stereo_only\n"
             "rmse cam.pixel [px]            0.3100            -\n"
@@ -52,8 +52,8 @@ TEST(ComparisonTable, PrintsNumbersThatLieFarApart) {
   RunResult result;
   const double inf = std::numeric_limits<double>::infinity();
   for (const double rmse : {1.95e-5, 0.0, 250.0, 3e12, 4e-7, inf}) {
-    const std::string name = std::string(1, static_cast<char>('a' + result.contestants.size()));
-    result.contestants.push_back(Named(name, {{"rmse:cam.pixel", rmse}}));
+    const std::string name = std::string(1, static_cast<char>('a' + result.estimators.size()));
+    result.estimators.push_back(Named(name, {{"rmse:cam.pixel", rmse}}));
   }
   const std::string table = ComparisonTable(result);
   EXPECT_NE(table.find("rmse cam.pixel [px]  0.00001950   0  250.0  3.000e+12  4.000e-07  inf\n"),
@@ -63,9 +63,9 @@ TEST(ComparisonTable, PrintsNumbersThatLieFarApart) {
 
 TEST(ComparisonTable, KeepsOneUnitThroughoutTheTable) {
   RunResult result;
-  result.contestants = {Named("ekf", {{"rmse:target.depth", 0.9},
-                                      {"rmse:target.depth@blind", 1.2},
-                                      {"rmse:target.depth@seeing", 0.004}})};
+  result.estimators = {Named("ekf", {{"rmse:target.depth", 0.9},
+                                     {"rmse:target.depth@blind", 1.2},
+                                     {"rmse:target.depth@seeing", 0.004}})};
   EXPECT_EQ(ComparisonTable(result),
             "                                    ekf\n"
             "rmse target.depth [m]            0.9000\n"
@@ -76,8 +76,8 @@ TEST(ComparisonTable, KeepsOneUnitThroughoutTheTable) {
 
 TEST(ComparisonTable, SmallNumbersKeepTheirDigits) {
   RunResult result;
-  result.contestants = {Named("a", {{"nees.mean:target", 3.21e-6}}),
-                        Named("b", {{"nees.mean:target", 4.5e-6}})};
+  result.estimators = {Named("a", {{"nees.mean:target", 3.21e-6}}),
+                       Named("b", {{"nees.mean:target", 4.5e-6}})};
   EXPECT_NE(ComparisonTable(result).find("nees.mean target  3.210e-06  4.500e-06\n"),
             std::string::npos)
       << ComparisonTable(result);
@@ -85,20 +85,20 @@ TEST(ComparisonTable, SmallNumbersKeepTheirDigits) {
 
 TEST(ComparisonTable, LeavesOutWhatIsHeldAtTruth) {
   RunResult result;
-  result.contestants = {Named("a", {{"rmse:target.depth", 0.0},
-                                    {"cov95:target.depth", 1.0},
-                                    {"nees.mean:target", 0.0},
-                                    {"nees.cov95:target", 1.0}}),
-                        Named("b", {})};
+  result.estimators = {Named("a", {{"rmse:target.depth", 0.0},
+                                   {"cov95:target.depth", 1.0},
+                                   {"nees.mean:target", 0.0},
+                                   {"nees.cov95:target", 1.0}}),
+                       Named("b", {})};
   EXPECT_EQ(ComparisonTable(result), "           a   b\ndiverged  no  no\n");
-  result.contestants[1].metrics = {{"rmse:target.depth", 0.1}};  // b has it to estimate
+  result.estimators[1].metrics = {{"rmse:target.depth", 0.1}};  // b has it to estimate
   EXPECT_NE(ComparisonTable(result).find("rmse target.depth"), std::string::npos);
 }
 
 TEST(ComparisonTable, FoldsWhatIsWiderThanALine) {
   RunResult result;
   for (int i = 0; i < 12; ++i) {
-    result.contestants.push_back(
+    result.estimators.push_back(
         Named("estimator_" + std::to_string(i), {{"rmse:target.depth", 1.0 + i}}));
   }
   std::istringstream table(ComparisonTable(result));

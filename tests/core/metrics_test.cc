@@ -45,14 +45,14 @@ class MetricsOf {
  public:
   MetricsOf(const StateLayout& layout, const std::vector<StreamInfo>& truths, int segments = 0)
       : source_(truths), state_(layout) {
-    contestant_.system.layout = layout;
+    named_.system.layout = layout;
     const SensorModel sensor =
         InProcessSensor(StereoDisparity(400.0, 0.065, 1.0), "stereo_disparity");
-    contestant_.system.sensors.push_back({"stereo", "disparity", sensor, {}});
+    named_.system.sensors.push_back({"stereo", "disparity", sensor, {}});
     std::vector<Segment> list;
     for (int i = 0; i < segments; ++i) list.push_back({"s" + std::to_string(i), 0, true, sensor});
     in_segment_.assign(segments, false);
-    metrics_.emplace(contestant_, source_, list);
+    metrics_.emplace(named_, source_, list);
   }
 
   State& state() { return state_; }
@@ -70,7 +70,7 @@ class MetricsOf {
   const Metrics& metrics() const { return *metrics_; }
 
  private:
-  Contestant contestant_;
+  NamedEstimator named_;
   FakeSource source_;
   State state_;
   std::vector<bool> in_segment_;
@@ -92,84 +92,6 @@ MetricsOf OneScalar(int segments = 0) {
   const double zero = 0.0;
   one.state().Add(0, &zero, Eigen::MatrixXd::Constant(1, 1, 4.0));
   return one;
-}
-
-// Quantiles that tables of chi-square give.
-TEST(ChiSquareQuantile, AgreesWithTables) {
-  EXPECT_NEAR(ChiSquareQuantile(0.95, 1), 3.841458820694124, 1e-12);
-  EXPECT_NEAR(ChiSquareQuantile(0.95, 2), 5.991464547107979, 1e-12);
-  EXPECT_NEAR(ChiSquareQuantile(0.5, 3), 2.365973884375338, 1e-12);
-  EXPECT_NEAR(ChiSquareQuantile(0.99, 6), 16.811893829770927, 1e-11);
-  EXPECT_NEAR(ChiSquareQuantile(0.999, 2), -2.0 * std::log(0.001), 1e-11);
-  EXPECT_EQ(ChiSquareQuantile(0.0, 2), 0.0);
-  EXPECT_TRUE(std::isinf(ChiSquareQuantile(1.0, 2)));
-  EXPECT_THROW(ChiSquareQuantile(0.5, 0), ContractViolation);
-  EXPECT_THROW(ChiSquareQuantile(1.5, 1), ContractViolation);
-}
-
-TEST(Lag, FindsTheShiftOfASineToAHundredthOfASample) {
-  // Two periods of 75.76 samples, as in [Ekf2017]; scale and offset do not matter.
-  const double rate = 2.0 * kPi * 0.4 * 0.033;
-  for (const double shift : {0.0, 0.3, -0.45, 0.5, 3.7, -6.25, 11.2}) {
-    std::vector<double> reference, signal;
-    for (int i = 0; i < 152; ++i) {
-      reference.push_back(0.3 + 0.1 * std::sin(rate * i));
-      signal.push_back(-2.0 + 0.07 * std::sin(rate * (i - shift)));
-    }
-    EXPECT_NEAR(Lag(signal, reference, 1.0), shift, 0.01) << shift;
-    EXPECT_NEAR(Lag(signal, reference, 33.0), 33.0 * shift, 0.33) << shift;
-  }
-}
-
-/// f(i - shift) for i = 0 .. n - 1.
-template <class Function>
-std::vector<double> Sampled(int n, double shift, const Function& f) {
-  std::vector<double> values;
-  for (int i = 0; i < n; ++i) values.push_back(f(i - shift));
-  return values;
-}
-
-TEST(Lag, FindsTheShiftOfARamp) {
-  const auto straight = [](double i) { return 50.0 - 0.8 * i; };
-  const auto bent = [](double i) { return 50.0 - 0.8 * i + 0.002 * i * i; };
-  for (const double shift : {0.0, 0.3, -3.6, 11.2}) {
-    // Exact for a straight line: the mean square is a parabola of the shift.
-    EXPECT_NEAR(Lag(Sampled(100, shift, straight), Sampled(100, 0.0, straight), 1.0), shift, 1e-9);
-    EXPECT_NEAR(Lag(Sampled(100, shift, bent), Sampled(100, 0.0, bent), 1.0), shift, 0.02);
-  }
-  // Noise of 0.3, of which the mean over 100 samples is worth 0.3 / sqrt(100) / 0.8 samples.
-  Random random(1);
-  const auto noisy = [&](double i) { return straight(i) + 0.3 * random.Normal(); };
-  EXPECT_NEAR(Lag(Sampled(100, 2.5, noisy), Sampled(100, 0.0, straight), 1.0), 2.5, 0.15);
-}
-
-TEST(Lag, OfARampTakesAnOffsetForDelay) {
-  const auto ramp = [](double i) { return 0.5 * i; };
-  const auto low = [&](double i) { return ramp(i) - 1.0; };  // 1 at 0.5 a sample: 2 samples
-  EXPECT_NEAR(Lag(Sampled(60, 3.0, low), Sampled(60, 0.0, ramp), 1.0), 5.0, 1e-9);
-}
-
-TEST(Lag, IsUnknownAtTheEdgeOfTheSearch) {
-  // A quarter of 80 samples is as far as it looks.
-  const auto ramp = [](double i) { return 0.5 * i; };
-  const auto pulse = [](double i) { return std::exp(-0.02 * (i - 25.0) * (i - 25.0)); };
-  EXPECT_NEAR(Lag(Sampled(80, 19.0, ramp), Sampled(80, 0.0, ramp), 1.0), 19.0, 1e-9);
-  EXPECT_TRUE(std::isnan(Lag(Sampled(80, 20.0, ramp), Sampled(80, 0.0, ramp), 1.0)));
-  EXPECT_TRUE(std::isnan(Lag(Sampled(80, -31.0, ramp), Sampled(80, 0.0, ramp), 1.0)));
-  EXPECT_NEAR(Lag(Sampled(80, 12.0, pulse), Sampled(80, 0.0, pulse), 1.0), 12.0, 0.1);
-  EXPECT_TRUE(std::isnan(Lag(Sampled(80, 25.0, pulse), Sampled(80, 0.0, pulse), 1.0)));
-}
-
-TEST(Lag, IsUnknownWithoutAnythingToMatch) {
-  const std::vector<double> constant(50, 0.1), few = {1.0, 2.0, 1.0};
-  std::vector<double> wave, broken;
-  for (int i = 0; i < 50; ++i) wave.push_back(std::sin(0.3 * i));
-  broken = wave;
-  broken[7] = std::nan("");
-  EXPECT_TRUE(std::isnan(Lag(wave, constant, 1.0)));
-  EXPECT_TRUE(std::isnan(Lag(constant, wave, 1.0)));
-  EXPECT_TRUE(std::isnan(Lag(broken, wave, 1.0)));
-  EXPECT_TRUE(std::isnan(Lag(few, few, 1.0)));
 }
 
 TEST(Metrics, TakesErrorsByHand) {

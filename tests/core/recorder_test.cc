@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "core/src/number_text.h"
-#include "core/src/sha256.h"
 #include "support/recording.h"
 
 namespace alidade {
@@ -40,7 +39,7 @@ TEST(Recorder, EstimatesRoundTrip) {
   const std::vector<std::string> last = Cells(lines[60]);
   ASSERT_EQ(last.size(), 7u);
   EXPECT_EQ(last[0], "1.947000000");
-  const State& state = experiment.contestants[0].estimator->state();
+  const State& state = experiment.estimators[0].estimator->state();
   for (int id = 0; id < 3; ++id) {
     EXPECT_EQ(last[1 + 2 * id], internal::NumberText(*state.value(id)));
     EXPECT_EQ(last[2 + 2 * id], internal::NumberText(std::sqrt(state.covariance().Variance(id))));
@@ -89,23 +88,23 @@ struct HandMade {
 
   HandMade() {
     experiment.source = std::make_unique<SwingingTarget>(1);
-    Contestant contestant;
-    contestant.name = "hand";
-    contestant.type = "fake";
-    StateLayout& layout = contestant.system.layout;
+    NamedEstimator named;
+    named.name = "hand";
+    named.type = "fake";
+    StateLayout& layout = named.system.layout;
     const Space scalar{"x", "m", "", {""}, Geometry::Vector(1)};
     layout.Declare("a.waits", "a", scalar);
     layout.Declare("a.fixed", "a", scalar, BlockStatus::kFixed);
     layout.Declare("a.attitude", "a",
                    {"q", "rad", "", {"w", "x", "y", "z"}, Geometry::UnitQuaternion()});
-    testing::AddSensor(contestant.system, "disparity",
+    testing::AddSensor(named.system, "disparity",
                        InProcessSensor(StereoDisparity(400.0, 0.065, 1.0, 0.3), "stereo_disparity"),
                        {"a.waits"});
     state = State(layout);
     const double fixed = 0.25, attitude[4] = {1.0, 0.0, 0.0, 0.0};
     state.Add(1, &fixed, Eigen::MatrixXd());
     state.Add(2, attitude, Eigen::Vector3d(1.0, 4.0, 9.0).asDiagonal());
-    experiment.contestants.push_back(std::move(contestant));
+    experiment.estimators.push_back(std::move(named));
     frame = testing::FrameAt(5e-9, {{0, 90.0}});  // 0.289 m, nearer than stereo sees
     MeasurementReport accepted;
     accepted.sensor = 0;
@@ -134,8 +133,8 @@ TEST(Recorder, WritesAbsentFixedAndRejected) {
   recorder.AddFrame(hand.frame);
   recorder.AddEstimate(0, hand.frame, hand.state, hand.report);
   RunResult result;
-  result.contestants.resize(1);
-  result.contestants[0].name = "hand";
+  result.estimators.resize(1);
+  result.estimators[0].name = "hand";
   recorder.Finish(result);
   EXPECT_EQ(
       Read(folder / "out/hand/estimates.csv"),
@@ -168,7 +167,7 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
   result.status = RunStatus::kFailed;
   result.reason = "it \"broke\"";
   result.frames = 7;
-  ContestantResult one;
+  EstimatorResult one;
   one.name = "ekf";
   one.metrics = {{"rmse:target.depth", 0.00195}, {"final:target.depth", INFINITY}};
   one.counts = {{"accepted:stereo", 151}};
@@ -176,7 +175,7 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
   one.diverged = true;
   one.events = {{0, "lockout", ""}, {1, "lockout", ""}, {2, "diverged", ""}};
   one.unobservable = {{"a.x", "b.y"}};
-  result.contestants = {one};
+  result.estimators = {one};
   Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
   const Experiment experiment = MakeExperiment();
   recorder.Start(experiment);
@@ -278,14 +277,14 @@ Names SvgsOf(const fs::path& folder) {
 TEST(Recorder, TheComparisonDrawsEveryEstimatorWhateverItsBlocksAreCalled) {
   const TemporaryFolder folder;
   Experiment experiment = MakeExperiment();
-  Contestant other;
+  NamedEstimator other;
   other.name = "other";
   testing::AddMotion(other.system, "thing", InProcessMotion(Constant<>(1), "constant"),
                      {{"depth", 0.3, 0.1}});
   testing::AddMotion(other.system, "own", InProcessMotion(Constant<>(1), "constant"),
                      {{"bias", 0.1, 0.1}});
   other.estimator = std::make_unique<Ekf>(other.system, EkfOptions{}, experiment.source->streams());
-  experiment.contestants.push_back(std::move(other));
+  experiment.estimators.push_back(std::move(other));
   Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
   recorder.Finish(RunInto(recorder, experiment));
   const std::string script = Read(folder / "out/figures/comparison.gp");
@@ -383,18 +382,6 @@ TEST(Recorder, GivesGnuplotSoMuchTimeAndNoMore) {
   options.drawing_s = 1.0;
   EXPECT_EQ(RecordSlowly(folder, options, "gnuplot took too long: 1 of 10 figures"), 0);
   EXPECT_EQ(SvgsOf(folder / "out"), Names{"measurements.svg"});
-}
-
-// FIPS 180-4, examples of NIST: one block, two blocks, and none.
-TEST(Sha256, AgreesWithTheStandard) {
-  EXPECT_EQ(internal::Sha256("abc"),
-            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
-  EXPECT_EQ(internal::Sha256("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq"),
-            "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1");
-  EXPECT_EQ(internal::Sha256(""),
-            "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
-  EXPECT_EQ(internal::Sha256(std::string(1'000'000, 'a')),
-            "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
 }
 
 }  // namespace

@@ -20,20 +20,20 @@ struct Exploding : Motion<1, Vec<1>> {
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
 };
 
-Contestant ExplodingContestant(const std::vector<StreamInfo>& streams) {
-  Contestant contestant;
-  contestant.name = "exploding";
-  testing::AddMotion(contestant.system, "p", InProcessMotion(Exploding(), "exploding"),
+NamedEstimator ExplodingEstimator(const std::vector<StreamInfo>& streams) {
+  NamedEstimator named;
+  named.name = "exploding";
+  testing::AddMotion(named.system, "p", InProcessMotion(Exploding(), "exploding"),
                      {{"x", 1.0, 1.0}});
-  testing::AddSensor(contestant.system, "disparity",
+  testing::AddSensor(named.system, "disparity",
                      InProcessSensor(testing::Linear(1.0, 1.0), "linear"), {"p.x"});
-  contestant.estimator = std::make_unique<Ekf>(contestant.system, EkfOptions{}, streams);
-  return contestant;
+  named.estimator = std::make_unique<Ekf>(named.system, EkfOptions{}, streams);
+  return named;
 }
 
 TEST(Run, AnEstimatorThatCannotGoOnEndsAloneAndTheCodeSaysSo) {
   Experiment experiment = MakeExperiment();
-  experiment.contestants.push_back(ExplodingContestant(experiment.source->streams()));
+  experiment.estimators.push_back(ExplodingEstimator(experiment.source->streams()));
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.status, RunStatus::kFailed);
   EXPECT_EQ(result.code, ExitCode::kDiverged);
@@ -42,15 +42,15 @@ TEST(Run, AnEstimatorThatCannotGoOnEndsAloneAndTheCodeSaysSo) {
   EXPECT_NE(result.reason.find("last good state at 0.000000 s: p.x = "), std::string::npos);
   EXPECT_NE(result.reason.find("last measurement used: sensor 'disparity'"), std::string::npos);
   // The event is at the frame of the failed step too.
-  EXPECT_EQ(result.contestants[2].events.back().stamp, StampFromSeconds(0.033));
+  EXPECT_EQ(result.estimators[2].events.back().stamp, StampFromSeconds(0.033));
   // The others saw all frames.
   EXPECT_EQ(result.frames, 60);
-  EXPECT_EQ(result.contestants[0].counts.at("accepted:inverse_scale"), 60);
+  EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 60);
 }
 
 TEST(Run, DivergenceUnderFailEndsTheRun) {
   Experiment experiment = MakeExperiment();
-  Contestant& alone = experiment.contestants[1];
+  NamedEstimator& alone = experiment.estimators[1];
   alone.system.priors[0].mean = {-0.2};
   alone.on_divergence = OnDivergence::kFail;
   alone.estimator = std::make_unique<Ekf>(alone.system, EkfOptions{}, experiment.source->streams());
@@ -73,10 +73,10 @@ TEST(Run, AStopIsTakenAfterTheFrame) {
 
 TEST(Run, FramesBeforeTheStartEnterTheCountsAlone) {
   Experiment experiment = MakeExperiment();  // 60 frames, one each 33 ms
-  Contestant& ekf = experiment.contestants[0];
+  NamedEstimator& ekf = experiment.estimators[0];
   ekf.system.start_s = 49.5 * 0.033;
   ekf.estimator = std::make_unique<Ekf>(ekf.system, EkfOptions{}, experiment.source->streams());
-  const ContestantResult late = alidade::Run(experiment, {}).contestants[0];
+  const EstimatorResult late = alidade::Run(experiment, {}).estimators[0];
   EXPECT_EQ(late.counts.at("stale:inverse_scale"), 50);
   EXPECT_EQ(late.counts.at("accepted:inverse_scale"), 10);
   // The prior, 0.35 m, is off by 80 mm RMS over the first 50. After it only the first update is
@@ -85,7 +85,7 @@ TEST(Run, FramesBeforeTheStartEnterTheCountsAlone) {
 }
 
 TEST(Run, ASensorOfWhichNothingWasUsedIsAnEvent) {
-  const auto unused = [](const ContestantResult& result) {
+  const auto unused = [](const EstimatorResult& result) {
     std::vector<std::string> texts;
     for (const Event& event : result.events) {
       if (event.kind == "unused") texts.push_back(event.text);
@@ -94,10 +94,10 @@ TEST(Run, ASensorOfWhichNothingWasUsedIsAnEvent) {
   };
   using Texts = std::vector<std::string>;
   Experiment experiment = MakeExperiment();
-  EXPECT_EQ(unused(alidade::Run(experiment, {}).contestants[0]), Texts{});
+  EXPECT_EQ(unused(alidade::Run(experiment, {}).estimators[0]), Texts{});
 
   experiment = MakeExperiment();
-  Contestant& ekf = experiment.contestants[0];
+  NamedEstimator& ekf = experiment.estimators[0];
   const SensorModel linear = InProcessSensor(testing::Linear(1.0, 1.0), "linear");
   testing::AddSensor(ekf.system, "elsewhere", linear, {"target.depth"});
   for (Prior& prior : ekf.system.priors) prior.covariance *= 1e-12;  // sure of what is wrong
@@ -106,7 +106,7 @@ TEST(Run, ASensorOfWhichNothingWasUsedIsAnEvent) {
   options.lockout = Lockout::kNone;
   ekf.system.motions.clear();
   ekf.estimator = std::make_unique<Ekf>(ekf.system, options, experiment.source->streams());
-  EXPECT_EQ(unused(alidade::Run(experiment, {}).contestants[0]),
+  EXPECT_EQ(unused(alidade::Run(experiment, {}).estimators[0]),
             (Texts{"sensor 'disparity' used none of 30 measurements: 30 gated",
                    "sensor 'inverse_scale' used none of 60 measurements: 60 gated",
                    "sensor 'elsewhere': stream 'elsewhere' had no measurement"}));
@@ -134,7 +134,7 @@ TEST(Run, BadDataKeepsWhatWasDone) {
   EXPECT_EQ(result.code, ExitCode::kBadData);
   EXPECT_EQ(result.reason, "rows.csv:7 d: 'x' is not a number");
   EXPECT_EQ(result.frames, 5);
-  EXPECT_EQ(result.contestants[0].counts.at("accepted:inverse_scale"), 5);
+  EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 5);
 }
 
 /// A defect of the program half-way.
@@ -156,13 +156,13 @@ TEST(Run, ADefectIsAResultToo) {
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.code, ExitCode::kInternal);
   EXPECT_EQ(result.reason, "internal: an invariant");
-  EXPECT_EQ(result.contestants[0].counts.at("accepted:inverse_scale"), 5);
+  EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 5);
 }
 
 TEST(Run, TheSameSeedGivesTheSameMetricsTwice) {
   Experiment first = MakeExperiment(), second = MakeExperiment();
-  EXPECT_EQ(alidade::Run(first, {}).contestants[0].metrics,
-            alidade::Run(second, {}).contestants[0].metrics);
+  EXPECT_EQ(alidade::Run(first, {}).estimators[0].metrics,
+            alidade::Run(second, {}).estimators[0].metrics);
 }
 
 }  // namespace

@@ -27,8 +27,8 @@ TEST(Quantile, OfInfiniteValuesIsNotNan) {
   EXPECT_EQ(Quantile({1.0, 2.0, kInfinity}, 0.5), 2.0);
 }
 
-ContestantResult Diverged(bool diverged, double rmse) {
-  ContestantResult one;
+EstimatorResult Diverged(bool diverged, double rmse) {
+  EstimatorResult one;
   one.name = "ekf";
   one.diverged = diverged;
   one.metrics["rmse:x"] = rmse;

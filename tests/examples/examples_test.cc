@@ -38,7 +38,7 @@ std::map<std::string, Means> Sweep(const std::string& name) {
   for (int seed = 1001; seed <= 1200; ++seed) {
     const RunResult run = RunExample(name, {{"source.seed", std::to_string(seed)}});
     EXPECT_EQ(run.status, RunStatus::kOk) << name << " seed " << seed << ": " << run.reason;
-    for (const ContestantResult& result : run.contestants) {
+    for (const EstimatorResult& result : run.estimators) {
       Means& mean = means[result.name];
       if (result.diverged) {
         ++mean.diverged;
@@ -54,7 +54,7 @@ std::map<std::string, Means> Sweep(const std::string& name) {
   return means;
 }
 
-bool HasEvent(const ContestantResult& result, const std::string& kind) {
+bool HasEvent(const EstimatorResult& result, const std::string& kind) {
   return std::any_of(result.events.begin(), result.events.end(),
                      [&](const Event& event) { return event.kind == kind; });
 }
@@ -79,7 +79,7 @@ TEST(Examples, StereoOnlyReportsItsDivergence) {
     const RunResult run =
         RunExample("01_depth_stereo_only", {{"source.seed", std::to_string(seed)}});
     ASSERT_EQ(run.code, ExitCode::kOk);
-    const ContestantResult& ekf = run.contestants.at(0);
+    const EstimatorResult& ekf = run.estimators.at(0);
     if (!ekf.diverged) continue;
     ++diverged;
     for (const Event& event : ekf.events) {
@@ -95,7 +95,7 @@ TEST(Examples, StereoOnlyReportsItsDivergence) {
 TEST(Examples, ScaleOnlyReportsThatLambdaIsUnobservable) {
   const RunResult run = RunExample("02_depth_scale_only", {});
   EXPECT_EQ(run.code, ExitCode::kOk);
-  const ContestantResult& ekf = run.contestants.at(0);
+  const EstimatorResult& ekf = run.estimators.at(0);
   EXPECT_TRUE(ekf.diverged);
   ASSERT_EQ(ekf.unobservable.size(), 1u);
   EXPECT_EQ(ekf.unobservable[0].back(), "template.inverse_distance");
@@ -155,7 +155,7 @@ std::vector<std::filesystem::path> ReportingSeries() {
 }
 
 double MetricOf(const RunResult& run, const std::string& estimator, const std::string& metric) {
-  for (const ContestantResult& result : run.contestants) {
+  for (const EstimatorResult& result : run.estimators) {
     if (result.name == estimator) return result.metrics.at(metric);
   }
   return NAN;

@@ -94,14 +94,14 @@ inline Experiment MakeExperiment(int frames = 60) {
   Experiment experiment;
   experiment.source = std::make_unique<SwingingTarget>(frames);
   for (const char* name : {"ekf", "alone"}) {
-    Contestant contestant;
-    contestant.name = name;
-    contestant.type = "ekf";
-    contestant.system = DepthFilter();
-    if (contestant.name == "alone") contestant.system.sensors.pop_back();
-    contestant.estimator =
-        std::make_unique<Ekf>(contestant.system, EkfOptions{}, experiment.source->streams());
-    experiment.contestants.push_back(std::move(contestant));
+    NamedEstimator named;
+    named.name = name;
+    named.type = "ekf";
+    named.system = DepthFilter();
+    if (named.name == "alone") named.system.sensors.pop_back();
+    named.estimator =
+        std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+    experiment.estimators.push_back(std::move(named));
   }
   experiment.seed = 42;
   return experiment;
@@ -132,8 +132,8 @@ inline void Record(const Recorder::Options& options, int frames = 60) {
   Experiment experiment = MakeExperiment(frames);
   Recorder recorder(options, MakeConfig(), Host());
   RunResult result = RunInto(recorder, experiment);
-  result.contestants[0].events.push_back({33'000'000, "note", "a \"word\", and\nanother"});
-  result.contestants[0].events.push_back({kNoStamp, "note", "timeless"});
+  result.estimators[0].events.push_back({33'000'000, "note", "a \"word\", and\nanother"});
+  result.estimators[0].events.push_back({kNoStamp, "note", "timeless"});
   recorder.Finish(result);
 }
 

@@ -30,7 +30,7 @@ namespace alidade {
 /// rmse infinite.
 class Metrics {
  public:
-  Metrics(const Contestant& contestant, const Source& source, const std::vector<Segment>& segments);
+  Metrics(const NamedEstimator& named, const Source& source, const std::vector<Segment>& segments);
   ~Metrics();
   Metrics(Metrics&&) noexcept;
 
@@ -42,7 +42,7 @@ class Metrics {
   const std::vector<Event>& events() const;
   std::map<std::string, double> Finish() const;
   const std::map<std::string, std::int64_t>& counts() const;
-  /// Unit of each block with truth, where it has one: for ContestantResult::units.
+  /// Unit of each block with truth, where it has one: for EstimatorResult::units.
   const std::map<std::string, std::string>& units() const;
 
  private:

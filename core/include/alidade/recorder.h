@@ -33,7 +33,7 @@ class Recorder {
   /// Writes the headers, once the experiment is known.
   void Start(const Experiment& experiment);
   void AddFrame(const Frame& frame);
-  void AddEstimate(int contestant, const Frame& frame, const State& state,
+  void AddEstimate(int estimator, const Frame& frame, const State& state,
                    const UpdateReport& report);
   /// Writes run.json, comparison.csv, timing.json, figures and report.html, syncs and renames.
   void Finish(const RunResult& result);

@@ -19,7 +19,7 @@ namespace alidade {
 enum class OnDivergence { kReport, kFail };
 
 /// One estimator of a run, on its own system (the config with the estimator's overrides merged in).
-struct Contestant {
+struct NamedEstimator {
   std::string name;
   std::string type;
   System system;
@@ -39,7 +39,7 @@ struct Segment {
 /// All that a config describes, made and checked, ready to run.
 struct Experiment {
   std::unique_ptr<Source> source;
-  std::vector<Contestant> contestants;
+  std::vector<NamedEstimator> estimators;
   std::vector<Segment> segments;
   std::uint64_t seed = 1;
 };
@@ -55,7 +55,7 @@ enum class RunStatus { kOk, kStopped, kFailed };
 const char* ToString(RunStatus status);
 
 /// What became of one estimator.
-struct ContestantResult {
+struct EstimatorResult {
   std::string name;
   std::map<std::string, double> metrics;       ///< as in docs/run_folder.md
   std::map<std::string, std::int64_t> counts;  ///< `accepted:stereo`
@@ -70,7 +70,7 @@ struct RunResult {
   ExitCode code = ExitCode::kOk;
   std::string reason;
   std::int64_t frames = 0;
-  std::vector<ContestantResult> contestants;
+  std::vector<EstimatorResult> estimators;
 };
 
 class Recorder;

@@ -30,10 +30,10 @@ struct SweepRun {
   RunStatus status = RunStatus::kOk;
   ExitCode code = ExitCode::kOk;
   std::string reason;
-  std::vector<ContestantResult> contestants;  ///< without events
+  std::vector<EstimatorResult> estimators;  ///< without events
 
   /// Whether the metrics of `one` count: the run is whole, and it did not diverge.
-  bool Uses(const ContestantResult& one) const { return status == RunStatus::kOk && !one.diverged; }
+  bool Uses(const EstimatorResult& one) const { return status == RunStatus::kOk && !one.diverged; }
 };
 
 struct SweepResult {
@@ -66,7 +66,7 @@ struct SweepSummary {
   std::int64_t used = 0;      ///< runs that metrics are taken over
   std::int64_t diverged = 0;  ///< runs left out because it diverged
   std::map<std::string, Spread> metrics;
-  std::map<std::string, std::string> units;  ///< as in ContestantResult
+  std::map<std::string, std::string> units;  ///< as in EstimatorResult
 };
 std::vector<SweepSummary> Summarise(const SweepResult& result);
 

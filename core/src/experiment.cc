@@ -149,13 +149,13 @@ std::vector<Segment> ReadSegments(const Node& root, const System& system,
 /// Refuses a truth that the config names where it belongs to no block, be it of `whole` or of an
 /// estimator's own state.
 void CheckTruths(const Node& source, const Experiment& experiment, const System& whole) {
-  const auto named = source.Find("truth");
-  if (!named || !named->is_map()) return;
+  const auto listed = source.Find("truth");
+  if (!listed || !listed->is_map()) return;
   const std::vector<StreamInfo>& truths = experiment.source->truths();
   for (std::size_t t = 0; t < truths.size(); ++t) {
-    const auto node = named->Find(truths[t].name);
-    const auto has_block = [&](const NamedEstimator& named) {
-      return internal::WhyNoBlock(named.system.layout, truths, t).empty();
+    const auto node = listed->Find(truths[t].name);
+    const auto has_block = [&](const NamedEstimator& one) {
+      return internal::WhyNoBlock(one.system.layout, truths, t).empty();
     };
     const std::string why = internal::WhyNoBlock(whole.layout, truths, t);
     if (!node || why.empty() || std::ranges::any_of(experiment.estimators, has_block)) continue;

@@ -21,7 +21,7 @@ template <int N = kDynamic>
 struct Constant : Motion<N, Vec<N>> {
   static constexpr std::array kBlocks{Quantity{"value", "", "the value"}};
 
-  int size;
+  int size;  ///< where N is kDynamic
   double walk;
 
   explicit Constant(int n, double random_walk = 0.0) : size(n), walk(random_walk) {}
@@ -30,15 +30,16 @@ struct Constant : Motion<N, Vec<N>> {
                  p.NonNegative("noise.random_walk", "unit/s^0.5",
                                "standard deviation after one second; 0: constant", 0.0)) {}
 
-  int Size(int) const { return size; }
-  int NoiseSize() const { return walk > 0.0 ? size : 0; }
+  int Size(int) const { return N == kDynamic ? size : N; }
+  bool Stationary() const { return !(walk > 0.0); }
+  int NoiseSize() const { return walk > 0.0 ? Size(0) : 0; }
 
   template <class T>
   void Step(const T* x, const T* w, double, T* next) const {
-    for (int i = 0; i < size; ++i) next[i] = walk > 0.0 ? T(x[i] + w[i]) : x[i];
+    for (int i = 0; i < Size(0); ++i) next[i] = walk > 0.0 ? T(x[i] + w[i]) : x[i];
   }
   void StepJacobian(const double*, const double*, double, MatrixRef f, MatrixRef g) const {
-    for (int i = 0; i < size; ++i) f(i, i) = 1.0;
+    for (int i = 0; i < Size(0); ++i) f(i, i) = 1.0;
     for (int i = 0; i < NoiseSize(); ++i) g(i, i) = 1.0;
   }
   void SqrtQ(double dt_s, MatrixRef l) const {

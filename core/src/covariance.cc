@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "alidade/error.h"
+#include "small_kernels.h"
 
 namespace alidade {
 
@@ -123,6 +124,48 @@ void Covariance::Propagate(const std::vector<std::pair<int, int>>& segments,
     }
     row += a_size;
   }
+}
+
+void Covariance::Propagate(int offset, int k, const double* f, const double* q) {
+  const int ld = static_cast<int>(p_.rows());
+  if (small()) return internal::SmallKernelsFor(size_).propagate(p_.data(), ld, offset, k, f, q);
+  const Eigen::Map<const RowMajor> fm(f, k, k), qm(q, k, k);
+  Propagate({{offset, k}}, fm, qm);
+}
+
+void Covariance::Project(const JacobianRows& h, double* pht, double* s) const {
+  if (small() && h.stride == size_) {
+    const int ld = static_cast<int>(p_.rows());
+    return internal::SmallKernelsFor(size_).project(p_.data(), ld, h.data, h.rows, pht, s);
+  }
+  using Strided = Eigen::Map<const RowMajor, 0, Eigen::OuterStride<>>;
+  Eigen::Map<Eigen::MatrixXd> product(pht, size_, h.rows);
+  Eigen::Map<Eigen::MatrixXd> sum(s, h.rows, h.rows);
+  product.setZero();
+  for (const JacobianPart& part : h.parts) {
+    const int o = part.offset, k = part.size, below = size_ - o - k;
+    const Strided j(h.data + part.column, h.rows, k, Eigen::OuterStride<>(h.stride));
+    product.topRows(o).noalias() += p_.block(o, 0, k, o).transpose() * j.transpose();
+    product.middleRows(o, k).noalias() +=
+        p_.block(o, o, k, k).selfadjointView<Eigen::Lower>() * j.transpose();
+    product.bottomRows(below).noalias() += p_.block(o + k, o, below, k) * j.transpose();
+  }
+  for (const JacobianPart& part : h.parts) {
+    const Strided j(h.data + part.column, h.rows, part.size, Eigen::OuterStride<>(h.stride));
+    sum.noalias() += j * product.middleRows(part.offset, part.size);
+  }
+}
+
+Covariance::Solved Covariance::Solve(int m, const double* pht, const double* s, const double* r,
+                                     double* w, double* inverse_d, double* dx, double* gain) const {
+  const int ld = static_cast<int>(p_.rows());
+  return internal::SmallKernelsFor(size_).solve(p_.data(), ld, m, pht, s, r, w, inverse_d, dx,
+                                                gain);
+}
+
+void Covariance::Downdate(int m, const double* w, const double* inverse_d) {
+  internal::SmallKernelsFor(size_).downdate(p_.data(), static_cast<int>(p_.rows()), m, w,
+                                            inverse_d);
 }
 
 void Covariance::SubtractOuter(const Eigen::MatrixXd& w) {

@@ -9,6 +9,27 @@
 #include "alidade/metrics.h"
 
 namespace alidade {
+namespace {
+
+/// gl = G L and q = G L L' G', for G n x m and L m x m.
+void SpreadNoise(const std::vector<double>& g, const std::vector<double>& l, std::size_t n,
+                 std::size_t m, std::vector<double>& gl, std::vector<double>& q) {
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t c = 0; c < m; ++c) {
+      double sum = 0.0;
+      for (std::size_t k = 0; k < m; ++k) sum += g[i * m + k] * l[k * m + c];
+      gl[i * m + c] = sum;
+    }
+    for (std::size_t j = 0; j <= i; ++j) {
+      double sum = 0.0;
+      for (std::size_t c = 0; c < m; ++c) sum += gl[i * m + c] * gl[j * m + c];
+      q[i * n + j] = q[j * n + i] = sum;
+    }
+  }
+}
+
+}  // namespace
+
 Outcome OutcomeOf(Status status) {
   switch (status) {
     case Status::kOk:
@@ -33,7 +54,7 @@ const char* ToString(Outcome outcome) {
 Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams)
     : system_(std::move(system)),
       options_(options),
-      sensors_of_stream_(streams.size()),
+      stream_of_sensor_(system_.sensors.size(), -1),
       state_(system_.InitialState()),
       rejections_(system_.sensors.size(), 0),
       inflated_(system_.sensors.size(), false),
@@ -48,180 +69,257 @@ Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>
     for (std::size_t s = 0; s < streams.size(); ++s) {
       if (streams[s].name != system_.sensors[i].stream) continue;
       ALIDADE_EXPECTS(streams[s].size == system_.sensors[i].model.measurement().geometry.ambient);
-      sensors_of_stream_[s].push_back(static_cast<int>(i));
+      stream_of_sensor_[i] = static_cast<int>(s);
     }
   }
-}
-
-bool AllFinite(const std::vector<double>& values) {
-  return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+  Bind();
 }
 
 void Ekf::Start(Stamp stamp) { stamp_ = stamp; }
 
-UpdateReport Ekf::Process(const Frame& frame) {
-  UpdateReport report;
+/// Works out how models and state fit together; again whenever blocks come, go or move.
+void Ekf::Bind() {
+  const StateLayout& layout = state_.layout();
+  waiting_ = considering_ = false;
+  order_.clear();
+  bool in_order = true;
+  for (const Block& block : layout.blocks()) {
+    waiting_ = waiting_ || !block.present;
+    considering_ = considering_ || (block.present && block.status == BlockStatus::kConsidered);
+    if (!block.has_covariance()) continue;
+    in_order = in_order && block.tangent_offset == std::ssize(order_);
+    for (int i = 0; i < block.geometry().tangent; ++i) order_.push_back(block.tangent_offset + i);
+  }
+  if (in_order) order_.clear();
+  const bool small = state_.covariance().small();
+  plans_.assign(system_.sensors.size(), {});
+  for (std::size_t s = 0; s < plans_.size(); ++s) {
+    const SensorBinding& sensor = system_.sensors[s];
+    SensorPlan& plan = plans_[s];
+    bool apart = true;  // no two roles have the same block
+    for (const RoleBinding& role : sensor.roles) {
+      const bool present = role.block >= 0 && layout[role.block].present;
+      plan.roles.push_back(present ? state_.value(role.block) : nullptr);
+      plan.columns.push_back(-1);
+      plan.ready = plan.ready && (role.block < 0 || present);
+      plan.at_measurement = plan.at_measurement || role.linearise_at == LineariseAt::kMeasurement;
+      if (!present || role.mode == RoleMode::kHold || !layout[role.block].has_covariance())
+        continue;
+      const Block& block = layout[role.block];
+      for (const JacobianPart& other : plan.parts) apart &= other.offset != block.tangent_offset;
+      plan.columns.back() = plan.width;
+      plan.parts.push_back({block.tangent_offset, block.geometry().tangent, plan.width});
+      plan.considered.push_back(role.mode == RoleMode::kConsider);
+      plan.width += block.geometry().tangent;
+    }
+    if (small && apart) {  // whole rows of H
+      plan.width = state_.covariance().size();
+      std::size_t part = 0;
+      for (int& column : plan.columns) {
+        if (column < 0) continue;
+        column = plan.parts[part].column = plan.parts[part].offset;
+        ++part;
+      }
+    }
+    plan.strides.assign(sensor.roles.size(), plan.width);
+  }
+  for (Row& row : rows_) row.zeroed = nullptr;
+  BindMotions();
+}
+
+void Ekf::BindMotions() {
+  next_.resize(state_.values().size());
+  motions_.assign(system_.motions.size(), {});
+  for (std::size_t i = 0; i < motions_.size(); ++i) {
+    const MotionBinding& motion = system_.motions[i];
+    MotionPlan& plan = motions_[i];
+    plan.active = !motion.model.stationary();
+    bool whole = true;  // every block has a covariance
+    int row = 0;
+    for (const BlockId id : motion.blocks) {
+      const Block& block = state_.layout()[id];
+      plan.active = plan.active && block.present;
+      if (!plan.active) break;
+      const int size = block.geometry().tangent;
+      plan.x.push_back(state_.value(id));
+      plan.next.push_back(next_.data() + block.value_offset);
+      for (int k = 0; k < size && block.has_covariance(); ++k) plan.rows.push_back(row + k);
+      row += size;
+      if (!block.has_covariance()) {
+        whole = false;
+      } else if (!plan.segments.empty() &&
+                 plan.segments.back().first + plan.segments.back().second == block.tangent_offset) {
+        plan.segments.back().second += size;
+      } else {
+        plan.segments.emplace_back(block.tangent_offset, size);
+      }
+    }
+    if (whole) plan.rows.clear();
+    const auto n = static_cast<std::size_t>(motion.model.tangent_size());
+    const auto n_w = static_cast<std::size_t>(motion.model.noise_size());
+    plan.f.resize(n * n);
+    plan.g.resize(n * n_w);
+    plan.gl.resize(n * n_w);
+    plan.l.resize(n_w * n_w);
+    plan.q.resize(n * n);
+  }
+}
+
+const UpdateReport& Ekf::Process(const Frame& frame) {
+  report_.Clear();
   if (stamp_ == kNoStamp) {
     Start(system_.start_s ? StampFromSeconds(*system_.start_s) : frame.stamp);
   }
-  report.stale = frame.stamp < stamp_;
-  if (!report.stale) StepTo(frame.stamp, report);
-  for (Event& event : report.events) event.stamp = frame.stamp;  // also where it stays behind
-  std::vector<Row> rows = Collect(frame, report);
-  if (report.stale || failed_) {
-    for (MeasurementReport& entry : report.measurements) {
-      entry.outcome = report.stale ? Outcome::kStale : Outcome::kFailed;
+  report_.stale = frame.stamp < stamp_;
+  if (!report_.stale) StepTo(frame.stamp);
+  for (Event& event : report_.events) event.stamp = frame.stamp;  // also where it stays behind
+  Collect(frame);
+  if (report_.stale || failed_) {
+    for (MeasurementReport& entry : report_.measurements()) {
+      entry.outcome = report_.stale ? Outcome::kStale : Outcome::kFailed;
     }
-    return report;
+    return report_;
   }
-  InitialiseFrom(rows, report);
-  std::vector<Row*> together;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (report.measurements[rows[i].report].outcome != Outcome::kAccepted) continue;
+  if (waiting_) InitialiseFromMeasurements();
+  group_.clear();
+  for (Row& row : rows()) {
+    if (EntryOf(row).outcome != Outcome::kAccepted) continue;
     const bool apart = options_.fuse == Fuse::kPerMeasurement ||
-                       (options_.fuse == Fuse::kPerSensor && !together.empty() &&
-                        together.back()->sensor != rows[i].sensor);
+                       (options_.fuse == Fuse::kPerSensor && !group_.empty() &&
+                        group_.back()->sensor != row.sensor);
     if (apart) {
-      FuseRows(together, report);
-      together.clear();
+      Fuse(group_);
+      group_.clear();
     }
-    together.push_back(&rows[i]);
+    group_.push_back(&row);
   }
-  FuseRows(together, report);
-  CountRejections(rows, report);
-  return report;
+  Fuse(group_);
+  CountRejections();
+  return report_;
 }
 
 /// One row for each measurement and sensor bound to its stream, in the order of the sensors.
-std::vector<Ekf::Row> Ekf::Collect(const Frame& frame, UpdateReport& report) {
-  std::vector<Row> rows;
-  for (const Measurement& m : frame.measurements) {
-    ALIDADE_EXPECTS(m.stream >= 0 && m.stream < std::ssize(sensors_of_stream_));
-    for (const int sensor : sensors_of_stream_[static_cast<std::size_t>(m.stream)]) {
-      rows.push_back({&m, sensor, 0, {}, {}, {}, {}, {}});
+void Ekf::Collect(const Frame& frame) {
+  row_count_ = 0;
+  for (int sensor = 0; sensor < std::ssize(system_.sensors); ++sensor) {
+    const SensorBinding& binding = system_.sensors[static_cast<std::size_t>(sensor)];
+    const Geometry& geometry = binding.model.measurement().geometry;
+    for (const Measurement& m : frame.measurements) {
+      if (m.stream != stream_of_sensor_[static_cast<std::size_t>(sensor)]) continue;
+      ALIDADE_EXPECTS(std::ssize(m.values) == geometry.ambient);
+      ALIDADE_EXPECTS(m.covariance.empty() ||
+                      std::ssize(m.covariance) == geometry.tangent * geometry.tangent);
+      if (row_count_ == rows_.size()) rows_.emplace_back();
+      Row& row = rows_[row_count_];
+      row.measurement = &m;
+      row.sensor = sensor;
+      row.report = row_count_++;
+      MeasurementReport& entry = report_.Add();
+      entry.Reset(sensor, m.landmark, geometry.tangent);
+      entry.z.assign(m.values.begin(), m.values.end());
+      entry.outcome =
+          AllFinite(entry.z) ? OutcomeOf(binding.model.Valid(entry.z.data())) : Outcome::kNotFinite;
+      if (entry.outcome == Outcome::kFailed) NotePluginFailure(binding);
     }
   }
-  std::stable_sort(rows.begin(), rows.end(),
-                   [](const Row& a, const Row& b) { return a.sensor < b.sensor; });
-  for (Row& row : rows) {
-    const SensorBinding& binding = BindingOf(row);
-    const Geometry& geometry = binding.model.measurement().geometry;
-    ALIDADE_EXPECTS(std::ssize(row.measurement->values) == geometry.ambient);
-    ALIDADE_EXPECTS(row.measurement->covariance.empty() ||
-                    std::ssize(row.measurement->covariance) == geometry.tangent * geometry.tangent);
-    row.report = report.measurements.size();
-    MeasurementReport& entry = report.measurements.emplace_back();
-    entry.sensor = row.sensor;
-    entry.landmark = row.measurement->landmark;
-    entry.dof = geometry.tangent;
-    entry.z = row.measurement->values;
-    entry.outcome =
-        AllFinite(entry.z) ? OutcomeOf(binding.model.Valid(entry.z.data())) : Outcome::kNotFinite;
-    if (entry.outcome == Outcome::kFailed) NotePluginFailure(binding, report);
-  }
-  return rows;
 }
 
 /// Moves the state to `stamp`, in equal parts of at most max_dt_s. Where a part cannot be done the
 /// state stays at the end of the one before.
-void Ekf::StepTo(Stamp stamp, UpdateReport& report) {
+void Ekf::StepTo(Stamp stamp) {
   constexpr double kMostParts = 1e6;
   Stamp elapsed = 0;
   const bool overflow = __builtin_sub_overflow(stamp, stamp_, &elapsed);
-  const double dt_s = Seconds(elapsed), parts = std::ceil(dt_s / options_.max_dt_s);
   if (elapsed == 0) return;
+  const double dt_s = Seconds(elapsed), parts = std::ceil(dt_s / options_.max_dt_s);
   if (overflow || parts > kMostParts) {
     char text[128];
     std::snprintf(text, sizeof(text), "a gap of %.6g s would need more than %g steps of %g s", dt_s,
                   kMostParts, options_.max_dt_s);
-    return GiveUp(report, "gap", text);
+    return GiveUp("gap", text);
   }
   const std::int64_t count = std::max<std::int64_t>(1, static_cast<std::int64_t>(parts));
   const Stamp start = stamp_;
   for (std::int64_t i = 1; i <= count; ++i) {
-    if (!StepOnce(dt_s / static_cast<double>(count), report)) return;
+    if (!StepOnce(dt_s / static_cast<double>(count))) return;
     stamp_ = i == count ? stamp : start + elapsed / count * i;
   }
 }
 
 /// One step of all motion models: all of it happens or nothing.
-bool Ekf::StepOnce(double dt_s, UpdateReport& report) {
-  std::vector<Move> moves;
-  for (const MotionBinding& motion : system_.motions) {
-    if (!StepModel(motion, dt_s, moves, report)) return false;
+bool Ekf::StepOnce(double dt_s) {
+  for (std::size_t i = 0; i < motions_.size(); ++i) {
+    if (motions_[i].active && !StepModel(system_.motions[i], motions_[i], dt_s)) return false;
   }
-  for (const Move& move : moves) {
-    state_.covariance().Propagate(move.segments, move.f, move.q);
+  Covariance& p = state_.covariance();
+  for (const MotionPlan& plan : motions_) {
+    if (!plan.active || plan.segments.empty()) continue;
+    if (plan.rows.empty() && plan.segments.size() == 1) {
+      p.Propagate(plan.segments[0].first, plan.segments[0].second, plan.f.data(), plan.q.data());
+      continue;
+    }
+    const auto n = static_cast<Eigen::Index>(std::sqrt(static_cast<double>(plan.f.size())) + 0.5);
+    const Eigen::Map<const RowMajor> f(plan.f.data(), n, n), q(plan.q.data(), n, n);
+    if (plan.rows.empty()) {
+      p.Propagate(plan.segments, f, q);
+    } else {
+      p.Propagate(plan.segments, f(plan.rows, plan.rows), q(plan.rows, plan.rows));
+    }
   }
-  for (int i = 0; i < state_.covariance().size(); ++i) {
-    if (std::isfinite(state_.covariance().Variance(i))) continue;
-    GiveUp(report, "not_finite", "the covariance steps to what is not finite");
+  double sum = 0.0;
+  for (int i = 0; i < p.size(); ++i) sum += 0.0 * p.Variance(i);
+  if (sum != 0.0) {
+    GiveUp("not_finite", "the covariance steps to what is not finite");
     return false;
   }
-  for (const Move& move : moves) {
-    for (const auto& [id, value] : move.next)
-      std::copy(value.begin(), value.end(), state_.value(id));
+  for (std::size_t i = 0; i < motions_.size(); ++i) {
+    if (!motions_[i].active) continue;
+    for (const BlockId id : system_.motions[i].blocks) {
+      const Block& block = state_.layout()[id];
+      if (block.status == BlockStatus::kFixed) continue;
+      std::copy_n(next_.data() + block.value_offset, block.geometry().ambient, state_.value(id));
+    }
   }
   return true;
 }
 
-/// What one motion model makes of its blocks, added to `moves`. Fixed blocks stay; a model with a
-/// block that has no value yet waits. False where the filter cannot go on.
-bool Ekf::StepModel(const MotionBinding& motion, double dt_s, std::vector<Move>& moves,
-                    UpdateReport& report) {
-  const int n = motion.model.tangent_size(), n_w = motion.model.noise_size();
-  std::vector<const double*> x;
-  std::vector<std::vector<double>> next;
-  std::vector<double*> y;
-  std::vector<Eigen::Index> rows;  // of F that have a covariance
-  Move move;
-  int row = 0;
-  for (const BlockId id : motion.blocks) {
-    const Block& block = state_.layout()[id];
-    if (!block.present) return true;
-    const int size = block.geometry().tangent;
-    x.push_back(state_.value(id));
-    next.emplace_back(block.geometry().ambient);
-    if (block.has_covariance()) {
-      move.segments.emplace_back(block.tangent_offset, size);
-      for (int i = 0; i < size; ++i) rows.push_back(row + i);
-    }
-    row += size;
-  }
-  for (std::vector<double>& value : next) y.push_back(value.data());
-  RowMajor f = RowMajor::Constant(n, n, std::nan("")), g = RowMajor::Constant(n, n_w, std::nan(""));
-  RowMajor l = RowMajor::Zero(n_w, n_w);
-  Status status = motion.model.Step(x.data(), nullptr, nullptr, dt_s, y.data(), f.data(), g.data());
-  if (status == Status::kOk) status = motion.model.SqrtQ(x.data(), dt_s, l.data());
+/// What one motion model makes of its blocks: next_, and F and G Q G' of the plan. False where the
+/// filter cannot go on.
+bool Ekf::StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s) {
+  const double unwritten = std::nan("");
+  std::fill(plan.f.begin(), plan.f.end(), unwritten);
+  std::fill(plan.g.begin(), plan.g.end(), unwritten);
+  std::fill(plan.l.begin(), plan.l.end(), 0.0);
+  Status status = motion.model.Step(plan.x.data(), nullptr, nullptr, dt_s, plan.next.data(),
+                                    plan.f.data(), plan.g.data());
+  if (status == Status::kOk) status = motion.model.SqrtQ(plan.x.data(), dt_s, plan.l.data());
   if (status != Status::kOk) {
-    GiveUp(report, status == Status::kError ? "plugin_failed" : "diverged",
+    GiveUp(status == Status::kError ? "plugin_failed" : "diverged",
            "motion model of '" + motion.name + "' cannot step: " +
                (status == Status::kError ? motion.model.error_text() : "out of its domain"));
     return false;
   }
-  const RowMajor gl = g * l;
-  move.f = f(rows, rows);
-  move.q = (gl * gl.transpose())(rows, rows);
-  if (!move.f.allFinite() || !move.q.allFinite() ||
-      !std::all_of(next.begin(), next.end(), AllFinite)) {
-    GiveUp(report, "not_finite",
+  SpreadNoise(plan.g, plan.l, static_cast<std::size_t>(motion.model.tangent_size()),
+              static_cast<std::size_t>(motion.model.noise_size()), plan.gl, plan.q);
+  bool finite = AllFinite(plan.f) && AllFinite(plan.q);
+  for (std::size_t i = 0; i < motion.blocks.size(); ++i) {
+    const auto size =
+        static_cast<std::size_t>(state_.layout()[motion.blocks[i]].geometry().ambient);
+    finite = finite && AllFinite({plan.next[i], size});
+  }
+  if (!finite) {
+    GiveUp("not_finite",
            "motion model of '" + motion.name + "' steps to a state that is not finite");
-    return false;
   }
-  for (std::size_t i = 0; i < next.size(); ++i) {
-    if (state_.layout()[motion.blocks[i]].status == BlockStatus::kFixed) continue;
-    move.next.emplace_back(motion.blocks[i], std::move(next[i]));
-  }
-  moves.push_back(std::move(move));
-  return true;
+  return finite;
 }
 
-void Ekf::NotePluginFailure(const SensorBinding& sensor, UpdateReport& report) const {
-  Note(report, "plugin_failed", "sensor '" + sensor.name + "': " + sensor.model.error_text());
+void Ekf::NotePluginFailure(const SensorBinding& sensor) {
+  Note("plugin_failed", "sensor '" + sensor.name + "': " + sensor.model.error_text());
 }
 
-void Ekf::Note(UpdateReport& report, const char* kind, std::string text) const {
-  report.events.push_back({stamp_, kind, std::move(text)});
+void Ekf::Note(const char* kind, std::string text) {
+  report_.events.push_back({stamp_, kind, std::move(text)});
 }
 
 /// `block = value, ...` for the given blocks that have one.
@@ -241,7 +339,7 @@ std::string Ekf::Describe(const std::vector<BlockId>& blocks) const {
 }
 
 /// Ends the filter: what happened, the state that is left, the measurement that led there.
-void Ekf::GiveUp(UpdateReport& report, const char* kind, const std::string& what) {
+void Ekf::GiveUp(const char* kind, const std::string& what) {
   failed_ = diverged_ = true;
   std::vector<BlockId> all(state_.layout().blocks().size());
   std::iota(all.begin(), all.end(), 0);
@@ -258,7 +356,7 @@ void Ekf::GiveUp(UpdateReport& report, const char* kind, const std::string& what
       text += number;
     }
   }
-  Note(report, kind, text);
+  Note(kind, text);
 }
 
 }  // namespace alidade

@@ -25,14 +25,14 @@ bool Rejected(const MeasurementReport& entry) {
 
 /// Initialises the blocks that wait for one of these measurements, each using up its measurement;
 /// what then still needs a block without a value is not ready.
-void Ekf::InitialiseFrom(std::vector<Row>& rows, UpdateReport& report) {
+void Ekf::InitialiseFromMeasurements() {
   const auto missing = [this](const RoleBinding& role) {
     return role.block >= 0 && !state_.layout()[role.block].present;
   };
   for (bool progress = true; progress;) {
     progress = false;
-    for (Row& row : rows) {
-      Outcome& outcome = report.measurements[row.report].outcome;
+    for (Row& row : rows()) {
+      Outcome& outcome = EntryOf(row).outcome;
       const SensorBinding& binding = BindingOf(row);
       const int role = binding.model.initialised_role();
       if (outcome != Outcome::kAccepted || role < 0) continue;
@@ -44,23 +44,19 @@ void Ekf::InitialiseFrom(std::vector<Row>& rows, UpdateReport& report) {
           !missing(target) || std::none_of(system_.priors.begin(), system_.priors.end(), waits)) {
         continue;
       }
-      outcome = InitialiseBlock(row, report);
+      outcome = InitialiseBlock(row);
       progress = progress || outcome == Outcome::kInitialised;
     }
   }
-  for (Row& row : rows) {
-    Outcome& outcome = report.measurements[row.report].outcome;
-    const SensorBinding& binding = BindingOf(row);
-    if (outcome == Outcome::kAccepted &&
-        std::any_of(binding.roles.begin(), binding.roles.end(), missing)) {
-      outcome = Outcome::kNotReady;
-    }
+  for (Row& row : rows()) {
+    Outcome& outcome = EntryOf(row).outcome;
+    if (outcome == Outcome::kAccepted && !PlanOf(row).ready) outcome = Outcome::kNotReady;
   }
 }
 
 /// Gives the block of the sensor's initialised role the value that the measurement implies, with
 /// its covariance and correlations; a block that has a value loses it. kInitialised, or why not.
-Outcome Ekf::InitialiseBlock(Row& row, UpdateReport& report) {
+Outcome Ekf::InitialiseBlock(Row& row) {
   const SensorBinding& binding = BindingOf(row);
   const auto target = static_cast<std::size_t>(binding.model.initialised_role());
   const BlockId id = binding.roles[target].block;
@@ -86,12 +82,12 @@ Outcome Ekf::InitialiseBlock(Row& row, UpdateReport& report) {
   const double* z = row.measurement->values.data();
   const Status status = binding.model.Initialise(roles.data(), z, y.data(), jx.data(), jz.data());
   roles[target] = y.data();
-  const Outcome outcome = status == Status::kOk ? NoiseOf(row, roles) : OutcomeOf(status);
-  if (outcome == Outcome::kFailed) NotePluginFailure(binding, report);
+  const Outcome outcome = status == Status::kOk ? NoiseOf(row, roles.data()) : OutcomeOf(status);
+  if (outcome == Outcome::kFailed) NotePluginFailure(binding);
   if (outcome != Outcome::kAccepted) {
     return outcome == Outcome::kFailed ? outcome : Outcome::kInvalid;
   }
-  const Eigen::MatrixXd own = jz * row.r * jz.transpose();
+  const Eigen::MatrixXd own = jz * Eigen::Map<const RowMajor>(row.r.data(), m, m) * jz.transpose();
   if (!own.allFinite() || !AllFinite(y)) return Outcome::kNotFinite;
   for (std::size_t i = 0; i < roles.size(); ++i) {
     if (jx[i] == nullptr) continue;
@@ -101,14 +97,15 @@ Outcome Ekf::InitialiseBlock(Row& row, UpdateReport& report) {
   }
   if (state_.layout()[id].present) state_.Marginalise(id);
   state_.Initialise(id, y.data(), from, from_jacobians, own);
+  Bind();
   return Outcome::kInitialised;
 }
 
 /// Counts rejections in a row for each sensor, and recovers one that is locked out.
-void Ekf::CountRejections(std::vector<Row>& rows, UpdateReport& report) {
-  for (Row& row : rows) {
+void Ekf::CountRejections() {
+  for (Row& row : rows()) {
     const auto sensor = static_cast<std::size_t>(row.sensor);
-    const MeasurementReport& entry = report.measurements[row.report];
+    const MeasurementReport& entry = EntryOf(row);
     if (entry.outcome == Outcome::kAccepted || entry.outcome == Outcome::kInitialised) {
       rejections_[sensor] = 0;
       inflated_[sensor] = false;
@@ -117,14 +114,14 @@ void Ekf::CountRejections(std::vector<Row>& rows, UpdateReport& report) {
     if (++rejections_[sensor] < options_.lockout_after) continue;
     if (options_.lockout == Lockout::kNone) continue;
     rejections_[sensor] = 0;
-    Recover(row, report);
+    Recover(row);
   }
 }
 
 /// Resets what the sensor determines from its measurement, with the blocks that move with it at
 /// their prior uncertainty; where that cannot be, inflates the blocks that it corrects, once
 /// until it is accepted again.
-void Ekf::Recover(Row& row, UpdateReport& report) {
+void Ekf::Recover(Row& row) {
   const SensorBinding& binding = BindingOf(row);
   const std::string why = "sensor '" + binding.name + "' rejected " +
                           std::to_string(options_.lockout_after) + " times in a row: ";
@@ -133,10 +130,9 @@ void Ekf::Recover(Row& row, UpdateReport& report) {
   if (options_.lockout == Lockout::kReset && target != nullptr &&
       target->mode == RoleMode::kEstimate &&
       state_.layout()[target->block].status == BlockStatus::kEstimated &&
-      InitialiseBlock(row, report) == Outcome::kInitialised) {
+      InitialiseBlock(row) == Outcome::kInitialised) {
     ForgetMotionOf(target->block);
-    Note(report, "lockout",
-         why + "reset " + state_.layout()[target->block].name + " from its measurement");
+    Note("lockout", why + "reset " + state_.layout()[target->block].name + " from its measurement");
     return;
   }
   if (inflated_[static_cast<std::size_t>(row.sensor)]) return;
@@ -152,7 +148,7 @@ void Ekf::Recover(Row& row, UpdateReport& report) {
     state_.covariance().Transform(block.tangent_offset,
                                   kInflation * Eigen::MatrixXd::Identity(n, n));
   }
-  Note(report, "lockout",
+  Note("lockout",
        why + (any ? "inflated the covariance of its blocks" : "it corrects no block to inflate"));
 }
 
@@ -175,6 +171,7 @@ void Ekf::ForgetMotionOf(BlockId id) {
       state_.Add(prior.block, value.data(), prior.covariance);
     }
   }
+  Bind();
 }
 
 }  // namespace alidade

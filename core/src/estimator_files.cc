@@ -87,7 +87,7 @@ std::vector<std::string> EstimatorFiles::GainsHeader(const System& system) {
 
 void EstimatorFiles::Add(const Frame& frame, const State& state, const UpdateReport& report) {
   AddEstimate(frame, state);
-  for (const MeasurementReport& one : report.measurements) {
+  for (const MeasurementReport& one : report.measurements()) {
     if (one.sensor < 0 || one.sensor >= static_cast<int>(recorded_.sensors.size())) continue;
     AddInnovation(frame.stamp, one);
     if (!one.gain.empty()) AddGain(frame.stamp, state, one);
@@ -135,17 +135,19 @@ void EstimatorFiles::AddInnovation(Stamp stamp, const MeasurementReport& report)
     innovations_.Empty();
   }
   innovations_.Text(ToString(report.outcome)).Integer(report.dof);
-  const bool reached = report.s.size() > 0;
+  const bool reached = !report.s.empty();
   if (reached) {
     innovations_.Number(report.nis);
   } else {
     innovations_.Empty();
   }
-  const Eigen::VectorXd sigma = report.s.diagonal().cwiseSqrt();
+  std::vector<double> sigma;
+  const auto m = static_cast<std::size_t>(report.dof);
+  for (std::size_t i = 0; i < m && reached; ++i) sigma.push_back(std::sqrt(report.s[i * m + i]));
   innovations_.Numbers(report.z.data(), report.z.size(), width)
       .Numbers(report.h.data(), report.h.size(), width)
-      .Numbers(sigma.data(), static_cast<std::size_t>(sigma.size()), width)
-      .Numbers(report.innovation.data(), static_cast<std::size_t>(report.innovation.size()), width)
+      .Numbers(sigma.data(), sigma.size(), width)
+      .Numbers(report.innovation.data(), report.innovation.size(), width)
       .EndRow();
   sensor.has_innovations = sensor.has_innovations || (reached && report.innovation.size() > 0);
 }
@@ -153,18 +155,21 @@ void EstimatorFiles::AddInnovation(Stamp stamp, const MeasurementReport& report)
 void EstimatorFiles::AddGain(Stamp stamp, const State& state, const MeasurementReport& report) {
   RecordedSensor& sensor = recorded_.sensors[static_cast<std::size_t>(report.sensor)];
   std::vector<const double*> cells(gain_columns_, nullptr);
+  const std::size_t rows = report.gain.size() / static_cast<std::size_t>(sensor.tangent);
   std::size_t next = 0;  // of sensor.gains, which lists blocks, elements, measured elements
+  std::size_t row = 0;   // of K
   for (const BlockColumns& columns : blocks_) {
     if (state.layout()[columns.id].status == BlockStatus::kFixed) continue;
-    const auto of_block = [&](const BlockGain& gain) { return gain.block == columns.id; };
-    const auto found = std::find_if(report.gain.begin(), report.gain.end(), of_block);
-    for (int i = 0; i < static_cast<int>(columns.tangent); ++i) {
+    const bool present = state.layout()[columns.id].present;
+    for (std::size_t i = 0; i < columns.tangent; ++i) {
       for (int j = 0; j < sensor.tangent && next < sensor.gains.size(); ++j, ++next) {
-        if (found == report.gain.end()) continue;
+        if (!present) continue;
+        const double& k = report.gain[row + rows * static_cast<std::size_t>(j)];
         RecordedGain& gain = sensor.gains[next];
-        cells[gain.cell] = &found->k(i, j);
-        gain.used = gain.used || found->k(i, j) != 0.0;
+        cells[gain.cell] = &k;
+        gain.used = gain.used || k != 0.0;
       }
+      row += present ? 1 : 0;
     }
   }
   gains_.Time(stamp).Text(sensor.name);

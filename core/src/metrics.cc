@@ -244,7 +244,7 @@ void Metrics::Impl::AddNees(const Owner& owner, std::size_t index, const std::ve
 }
 
 void Metrics::Impl::AddReport(const std::vector<Sums*>& into, const UpdateReport& report) {
-  for (const MeasurementReport& m : report.measurements) {
+  for (const MeasurementReport& m : report.measurements()) {
     if (m.sensor < 0 || m.sensor >= static_cast<int>(sensors.size())) continue;
     const auto sensor = static_cast<std::size_t>(m.sensor);
     std::int64_t*& count = count_of[sensor][static_cast<std::size_t>(m.outcome)];

@@ -201,10 +201,4 @@ MotionModel::MotionModel(std::shared_ptr<const ModelInstance> instance)
   zero_noise_.assign(static_cast<std::size_t>(noise_size_) + 1, 0.0);
 }
 
-Status MotionModel::Step(const double* const* blocks, const double* input, const double* w,
-                         double dt_s, double* const* next, double* f, double* g) const {
-  return detail::ToStatus(motion_->step(self_, blocks, input, w != nullptr ? w : zero_noise_.data(),
-                                        dt_s, next, f, tangent_size_, g, noise_size_));
-}
-
 }  // namespace alidade

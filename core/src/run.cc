@@ -74,7 +74,7 @@ bool Advance(Running& one, int index, const Frame& frame, const std::vector<bool
              const RunOptions& options, RunResult& result) {
   if (one.ended) return true;
   Estimator& estimator = *one.named.estimator;
-  const UpdateReport report = estimator.Process(frame);
+  const UpdateReport& report = estimator.Process(frame);
   one.result.events.insert(one.result.events.end(), report.events.begin(), report.events.end());
   one.ended = estimator.failed();
   if (!one.ended) {

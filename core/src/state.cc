@@ -121,17 +121,16 @@ void State::Reparametrise(BlockId id, Space space, const double* value,
   layout_.blocks_.pop_back();
 }
 
-std::vector<double> State::Moved(const Eigen::VectorXd& dx) const {
-  std::vector<double> moved = values_;
+void State::Retract(const double* dx, std::vector<double>& moved) const {
+  moved.assign(values_.begin(), values_.end());
   for (const Block& block : layout_.blocks()) {
     if (!block.has_covariance()) continue;
     double* x = moved.data() + block.value_offset;
-    block.geometry().Plus(x, dx.data() + block.tangent_offset, x);
+    block.geometry().Plus(x, dx + block.tangent_offset, x);
   }
-  return moved;
 }
 
-void State::MoveTo(std::vector<double> values) {
+void State::MoveTo(const std::vector<double>& values) {
   ALIDADE_EXPECTS(values.size() == values_.size());
   for (const Block& block : layout_.blocks()) {
     if (!block.has_covariance() || block.geometry().kind != GeometryKind::kUnitVector) continue;
@@ -140,7 +139,7 @@ void State::MoveTo(std::vector<double> values) {
                                values.data() + block.value_offset, j.data());
     covariance_.Transform(block.tangent_offset, j);
   }
-  values_ = std::move(values);
+  std::copy(values.begin(), values.end(), values_.begin());
 }
 
 }  // namespace alidade

@@ -96,10 +96,10 @@ TEST(Ekf, AnOutlierIsGatedAndLeavesStateAndCovarianceBitForBit) {
   ekf.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.0}}));
   const std::vector<double> x = ekf.state().values();
   const Eigen::MatrixXd p = ekf.state().covariance().Dense();
-  const UpdateReport report = ekf.Process(FrameAt(0.0, {{0, 1e9}}));
-  ASSERT_EQ(report.measurements.size(), 1u);
-  EXPECT_EQ(report.measurements[0].outcome, Outcome::kGated);
-  EXPECT_GT(report.measurements[0].nis, 1e9);
+  const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 1e9}}));
+  ASSERT_EQ(report.measurements().size(), 1u);
+  EXPECT_EQ(report.measurements()[0].outcome, Outcome::kGated);
+  EXPECT_GT(report.measurements()[0].nis, 1e9);
   EXPECT_EQ(ekf.state().values(), x);
   EXPECT_EQ(ekf.state().covariance().Dense(), p);
 }
@@ -116,8 +116,8 @@ TEST(Ekf, TheGatePassesTheShareThatItsProbabilityStates) {
   constexpr int kTrials = 20000;
   int passed = 0;
   for (int k = 0; k < kTrials; ++k) {
-    const UpdateReport report = ekf.Process(FrameAt(0.0, {{0, random.Normal()}}));
-    passed += report.measurements[0].outcome == Outcome::kAccepted ? 1 : 0;
+    const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, random.Normal()}}));
+    passed += report.measurements()[0].outcome == Outcome::kAccepted ? 1 : 0;
   }
   // 5 sigma of a binomial share.
   EXPECT_NEAR(passed / double{kTrials}, 0.9, 5.0 * std::sqrt(0.9 * 0.1 / kTrials));
@@ -130,8 +130,8 @@ TEST(Ekf, PerSensorHoldsWhereTheLastMeasurementOfASensorIsNotUsed) {
   options.fuse = Fuse::kPerSensor;
   Ekf whole(system, options, StreamsOf(system)), with_invalid(system, options, StreamsOf(system));
   whole.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.0}}));
-  const UpdateReport report = with_invalid.Process(FrameAt(0.0, {{0, 80.0}, {0, -1.0}, {1, 1.0}}));
-  EXPECT_EQ(report.measurements[1].outcome, Outcome::kInvalid);
+  const UpdateReport& report = with_invalid.Process(FrameAt(0.0, {{0, 80.0}, {0, -1.0}, {1, 1.0}}));
+  EXPECT_EQ(report.measurements()[1].outcome, Outcome::kInvalid);
   EXPECT_EQ(with_invalid.state().values(), whole.state().values());
   Ekf joint(system, {}, StreamsOf(system));
   joint.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.0}}));
@@ -165,9 +165,9 @@ TEST(Ekf, HeldRolesHaveNoJacobian) {
   system.sensors.erase(system.sensors.begin());
   system.sensors[0].roles[1].mode = RoleMode::kHold;
   Ekf ekf(system, {}, StreamsOf(system));
-  const UpdateReport report = ekf.Process(FrameAt(0.0, {{0, 1.1}}));
+  const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 1.1}}));
   const double z = 0.35, lambda = 3.3, h = z * lambda, sigma = 2.0 / 300.0 * h * h * h;
-  EXPECT_NEAR(report.measurements[0].s(0), lambda * lambda * 0.01 + sigma * sigma, 1e-15);
+  EXPECT_NEAR(report.measurements()[0].s[0], lambda * lambda * 0.01 + sigma * sigma, 1e-15);
   EXPECT_EQ(ValueOf(ekf.state(), "template.inverse_distance"), lambda);
   EXPECT_EQ(CovarianceOf(ekf.state(), "template.inverse_distance", "template.inverse_distance"),
             0.25);
@@ -179,11 +179,11 @@ TEST(Ekf, LinearisedAtTheMeasurementTheJacobianIsThatOfTheMeasuredDepth) {
   system.sensors[0].roles[0].linearise_at = LineariseAt::kMeasurement;
   Ekf ekf(system, {}, StreamsOf(system));
   const double d = 80.0, bf = 26.0;
-  const UpdateReport report = ekf.Process(FrameAt(0.0, {{0, d}}));
+  const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, d}}));
   // H1 = -d^2 / BF; the innovation stays at the prediction.
   const double jacobian = -d * d / bf;
-  EXPECT_NEAR(report.measurements[0].s(0), jacobian * jacobian * 0.01 + 1.0, 1e-9);
-  EXPECT_NEAR(report.measurements[0].innovation[0], d - bf / 0.35, 1e-12);
+  EXPECT_NEAR(report.measurements()[0].s[0], jacobian * jacobian * 0.01 + 1.0, 1e-9);
+  EXPECT_NEAR(report.measurements()[0].innovation[0], d - bf / 0.35, 1e-12);
 }
 
 TEST(Ekf, ASensorOutsideItsDomainIsReportedAsDivergenceOnce) {
@@ -194,8 +194,8 @@ TEST(Ekf, ASensorOutsideItsDomainIsReportedAsDivergenceOnce) {
   Ekf ekf(system, options, StreamsOf(system));
   int events = 0;
   for (int k = 0; k < 5; ++k) {
-    const UpdateReport report = ekf.Process(FrameAt(0.0, {{0, 80.0}}));
-    EXPECT_EQ(report.measurements[0].outcome, Outcome::kOutOfDomain);
+    const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 80.0}}));
+    EXPECT_EQ(report.measurements()[0].outcome, Outcome::kOutOfDomain);
     events += static_cast<int>(report.events.size());
   }
   EXPECT_EQ(events, 1);
@@ -210,7 +210,7 @@ TEST(Ekf, NoiseThatVanishesIsWarnedOfOnce) {
   const UpdateReport first = ekf.Process(FrameAt(0.0, {{0, 1.0}}));
   ASSERT_EQ(first.events.size(), 1u);
   EXPECT_EQ(first.events[0].kind, "conditioning");
-  EXPECT_EQ(first.measurements[0].outcome, Outcome::kAccepted);
+  EXPECT_EQ(first.measurements()[0].outcome, Outcome::kAccepted);
   EXPECT_GE(CovarianceOf(ekf.state(), "p.x", "p.x"), 0.0);
   EXPECT_TRUE(ekf.Process(FrameAt(0.1, {{0, 1.0}})).events.empty());
 }
@@ -220,7 +220,7 @@ TEST(Ekf, FramesOfThePastAreStale) {
   Ekf ekf(system, {}, StreamsOf(system));
   ekf.Process(FrameAt(1.0, {{0, 80.0}}));
   const std::vector<double> x = ekf.state().values();
-  EXPECT_EQ(ekf.Process(FrameAt(0.5, {{0, 80.0}})).measurements[0].outcome, Outcome::kStale);
+  EXPECT_EQ(ekf.Process(FrameAt(0.5, {{0, 80.0}})).measurements()[0].outcome, Outcome::kStale);
   EXPECT_EQ(ekf.state().values(), x);
 }
 

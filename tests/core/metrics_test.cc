@@ -322,8 +322,9 @@ MeasurementReport ReportOf(Outcome outcome, double nis, int dof) {
 TEST(Metrics, CountsOutcomesAndTakesNisOfWhatIsAccepted) {
   MetricsOf one = OneScalar();
   UpdateReport report;
-  report.measurements = {ReportOf(Outcome::kAccepted, 3.0, 2), ReportOf(Outcome::kGated, 99.0, 2),
-                         ReportOf(Outcome::kAccepted, 1.0, 2)};
+  report.Add() = ReportOf(Outcome::kAccepted, 3.0, 2);
+  report.Add() = ReportOf(Outcome::kGated, 99.0, 2);
+  report.Add() = ReportOf(Outcome::kAccepted, 1.0, 2);
   one.Add({{0.0}}, report);
   one.Add({{0.0}}, report);
   EXPECT_DOUBLE_EQ(one.Finish().at("nis.mean:stereo"), 1.0);

@@ -112,16 +112,17 @@ struct HandMade {
     accepted.nis = 0.5;
     accepted.z = {80.0};
     accepted.h = {79.0};
-    accepted.innovation = Eigen::VectorXd::Constant(1, 1.0);
-    accepted.s = Eigen::MatrixXd::Constant(1, 1, 2.25);
-    accepted.gain = {{2, Eigen::Vector3d(0.1, 0.0, -0.3)}};
+    accepted.innovation = {1.0};
+    accepted.s = {2.25};
+    accepted.gain = {0.1, 0.0, -0.3};
     MeasurementReport invalid;
     invalid.sensor = 0;
     invalid.dof = 1;
     invalid.landmark = 17;
     invalid.outcome = Outcome::kInvalid;
     invalid.z = {-1.0};
-    report.measurements = {accepted, invalid};
+    report.Add() = accepted;
+    report.Add() = invalid;
   }
 };
 

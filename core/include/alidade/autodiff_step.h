@@ -99,6 +99,30 @@ Status WithZeroNoise(const Model& model, const F& f) {
   }
 }
 
+/// Step for a `w` that is given.
+template <class Model>
+Status StepWithNoise(const Model& model, const double* const* x, const double* u, const double* w,
+                     double dt_s, double* const* next, MatrixRef f, MatrixRef g) {
+  constexpr typename Blocks<Model>::Indices indices{};
+  if (!f && !g) {
+    const auto step = [&](double* const* to) {
+      return CallStep(model, x, u, w, dt_s, to, indices);
+    };
+    return Buffered<Model>(next, step) ? Status::kOk : Status::kOutOfDomain;
+  }
+  if constexpr (HasStepJacobian<Model, typename Blocks<Model>::Indices>::value) {
+    static_assert(Model::Input::kAmbient == 0, "closed forms take no control input");
+    const auto step = [&](double* const* to) {
+      if (!CallStep(model, x, u, w, dt_s, to, indices)) return false;
+      ClosedFormStep(model, x, w, dt_s, f, g, indices);
+      return true;
+    };
+    return Buffered<Model>(next, step) ? Status::kOk : Status::kOutOfDomain;
+  } else {
+    return StepJets(model, x, u, w, dt_s, next, f, g);
+  }
+}
+
 }  // namespace detail
 
 /// x' = f(x, u, w, dt), F = d x' / d x (n x n), G = d x' / d w (n x n_w); w may be null (zero), F
@@ -106,34 +130,16 @@ Status WithZeroNoise(const Model& model, const F& f) {
 template <class Model>
 Status Step(const Model& model, const double* const* x, const double* u, const double* w,
             double dt_s, double* const* next, MatrixRef f, MatrixRef g) {
-  constexpr typename detail::Blocks<Model>::Indices indices{};
-  if (w == nullptr) {
-    return detail::WithZeroNoise(
-        model, [&](const double* zero) { return Step(model, x, u, zero, dt_s, next, f, g); });
-  }
   const int n = detail::TangentSizeOf(model), n_w = detail::NoiseSizeOf(model);
-  if (!f && (!g || n_w == 0)) {
-    const auto step = [&](double* const* to) {
-      return detail::CallStep(model, x, u, w, dt_s, to, indices);
-    };
-    return detail::Buffered<Model>(next, step) ? Status::kOk : Status::kOutOfDomain;
+  std::vector<double> unwanted;  // where one of the two is asked for: rare
+  if (static_cast<bool>(f) != static_cast<bool>(g) && n_w > 0) {
+    unwanted.resize(static_cast<std::size_t>(n) * std::max(n, n_w));
+    (f ? g : f) = MatrixRef{unwanted.data(), f ? n_w : n};
   }
-  if (n_w > 0 && (!f || !g)) {  // one of the two: rare enough to make a buffer for the other
-    std::vector<double> unwanted(static_cast<std::size_t>(n) * std::max(n, n_w));
-    return Step(model, x, u, w, dt_s, next, f ? f : MatrixRef{unwanted.data(), n},
-                g ? g : MatrixRef{unwanted.data(), n_w});
-  }
-  if constexpr (detail::HasStepJacobian<Model, typename detail::Blocks<Model>::Indices>::value) {
-    static_assert(Model::Input::kAmbient == 0, "closed forms take no control input");
-    const auto step = [&](double* const* to) {
-      if (!detail::CallStep(model, x, u, w, dt_s, to, indices)) return false;
-      detail::ClosedFormStep(model, x, w, dt_s, f, g, indices);
-      return true;
-    };
-    return detail::Buffered<Model>(next, step) ? Status::kOk : Status::kOutOfDomain;
-  } else {
-    return detail::StepJets(model, x, u, w, dt_s, next, f, g);
-  }
+  const auto step = [&](const double* noise) {
+    return detail::StepWithNoise(model, x, u, noise, dt_s, next, f, n_w > 0 ? g : MatrixRef{});
+  };
+  return w != nullptr ? step(w) : detail::WithZeroNoise(model, step);
 }
 
 }  // namespace alidade

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -14,6 +15,21 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 struct JacobianBlock {
   int offset;
   Eigen::MatrixXd block;
+};
+
+/// The columns of a Jacobian that belong to one block of the state: at `column` of its rows.
+struct JacobianPart {
+  int offset;  ///< of the block in the covariance
+  int size;
+  int column;
+};
+
+/// m rows of a Jacobian H, row-major in the caller's memory, that is zero but for its parts.
+struct JacobianRows {
+  const double* data;
+  int rows;
+  int stride;  ///< numbers in a row; the size of the covariance: rows are whole, zeros included
+  std::span<const JacobianPart> parts;
 };
 
 /// H times `columns` (n x k), for H given by the blocks that it touches; `rows` is that of H.
@@ -51,11 +67,28 @@ class Covariance {
 
   /// P H' (n x m), for H given by the blocks that it touches.
   Eigen::MatrixXd TimesTransposed(const std::vector<JacobianBlock>& h, int rows) const;
+  /// pht = P H' (n x m, by columns) and s += H P H' (m x m).
+  void Project(const JacobianRows& h, double* pht, double* s) const;
 
   /// x' = F x + w of the rows in `segments` (offset, size), gathered in that order, w ~ N(0, Q):
   /// P_aa <- F P_aa F' + Q, P_ai <- F P_ai, F and Q k x k, k the sum of the sizes. O(n k).
   void Propagate(const std::vector<std::pair<int, int>>& segments, const Eigen::MatrixXd& f,
                  const Eigen::MatrixXd& q);
+  /// The same for the k rows [offset, offset + k), F and Q row-major. Allocates nothing where the
+  /// covariance is small.
+  void Propagate(int offset, int k, const double* f, const double* q);
+
+  /// Few states, at least one: the operations below exist.
+  bool small() const { return size_ > 0 && size_ <= kSmall; }
+  static constexpr int kSmall = 16;
+  enum class Solved { kYes, kNotPd, kCancelled };
+  /// Of m <= kSmall rows with P H' (by columns), S and innovation r: W = P H' L^-T and 1/D for
+  /// S = L D L', dx = K r and K = P H' S^-1 (by columns). kCancelled where P - W D^-1 W' would lose
+  /// nearly all digits of a variance.
+  Solved Solve(int m, const double* pht, const double* s, const double* r, double* w,
+               double* inverse_d, double* dx, double* gain) const;
+  /// P <- P - W D^-1 W', with what Solve gave.
+  void Downdate(int m, const double* w, const double* inverse_d);
   /// P <- P - W W', W n x m. O(n^2 m).
   void SubtractOuter(const Eigen::MatrixXd& w);
   /// P <- (I - K H) P (I - K H)' + K R K' for any gain K (Joseph), K n x m, H m x n, R m x m.

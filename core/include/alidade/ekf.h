@@ -2,6 +2,7 @@
 #pragma once
 
 #include <limits>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -51,67 +52,106 @@ class Ekf : public Estimator {
   /// `streams` are the source's, in the order of Measurement::stream.
   Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
 
+  Ekf(const Ekf&) = delete;  // its plans point into its state
+  Ekf& operator=(const Ekf&) = delete;
+
   void Start(Stamp stamp) override;
-  UpdateReport Process(const Frame& frame) override;
+  const UpdateReport& Process(const Frame& frame) override;
   const State& state() const override { return state_; }
   Stamp stamp() const override { return stamp_; }
   bool diverged() const override { return diverged_; }
   bool failed() const override { return failed_; }
 
  private:
+  /// How a sensor touches the state, as long as the layout stays as it is.
+  struct SensorPlan {
+    std::vector<const double*> roles;  ///< values; null where unbound or without a value yet
+    std::vector<int> columns;          ///< of each role in a row of H; -1: no Jacobian
+    std::vector<int> strides;          ///< for the model: `width` for each role
+    std::vector<JacobianPart> parts;
+    std::vector<bool> considered;  ///< of the parts
+    int width = 0;                 ///< of a row of H: n where the covariance is small
+    bool ready = true;             ///< all roles have a value
+    bool at_measurement = false;   ///< a role is linearised at what the measurement implies
+  };
+  /// How a motion model moves the state.
+  struct MotionPlan {
+    bool active = true;  ///< false: stationary, or a block has no value yet
+    std::vector<const double*> x;
+    std::vector<double*> next;                  ///< into next_
+    std::vector<std::pair<int, int>> segments;  ///< rows of the covariance: (offset, size)
+    std::vector<int> rows;                      ///< of F that have a covariance; empty: all
+    std::vector<double> f, g, l, gl, q;         ///< F, G, L of Qw, G L, G Qw G'
+  };
   /// One measurement on its way into an update.
   struct Row {
-    const Measurement* measurement;
-    int sensor;
-    std::size_t report = 0;        ///< index into UpdateReport::measurements
-    std::vector<JacobianBlock> h;  ///< by role with a non-zero Jacobian
-    std::vector<bool> considered;  ///< of the blocks in h
-    Eigen::VectorXd innovation;
-    Eigen::MatrixXd r, pht;  ///< R, P H'
+    const Measurement* measurement = nullptr;
+    int sensor = -1;
+    std::size_t report = 0;              ///< index into UpdateReport::measurements()
+    std::vector<double> h;               ///< H, m rows of the plan's width
+    std::vector<double> r, l, pht;       ///< R and its factor, m x m; P H', n x m by columns
+    const SensorPlan* zeroed = nullptr;  ///< whose zeros H holds
   };
 
-  /// What one motion model makes of its blocks.
-  struct Move {
-    std::vector<std::pair<BlockId, std::vector<double>>> next;
-    std::vector<std::pair<int, int>> segments;  ///< rows of the covariance: (offset, size)
-    Eigen::MatrixXd f, q;                       ///< of those rows
-  };
+  void Bind();
+  void BindMotions();
+  void StepTo(Stamp stamp);
+  bool StepOnce(double dt_s);
+  bool StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s);
 
-  void StepTo(Stamp stamp, UpdateReport& report);
-  bool StepOnce(double dt_s, UpdateReport& report);
-  bool StepModel(const MotionBinding& motion, double dt_s, std::vector<Move>& moves,
-                 UpdateReport& report);
+  void Collect(const Frame& frame);
+  void Fuse(std::span<Row* const> group);
+  Outcome Linearise(Row& row);
+  Outcome NoiseOf(Row& row, const double* const* roles);
+  Outcome Evaluate(Row& row, MeasurementReport& entry);
+  Outcome EvaluateAtMeasurement(Row& row, MeasurementReport& entry);
+  Outcome Gate(Row& row);
+  void CheckConditioning(const Row& row);
+  Outcome Apply(std::span<Row* const> rows);
+  Outcome ApplySmall(std::span<Row* const> rows, int m);
+  Outcome ApplyLarge(std::span<Row* const> rows, int m);
+  bool MaskConsidered(std::span<Row* const> rows, Eigen::MatrixXd& gain) const;
+  bool Correct(const Eigen::MatrixXd& w, const Eigen::MatrixXd& gain, bool masked,
+               const Eigen::MatrixXd& h, const Eigen::MatrixXd& r);
+  bool Move(const double* dx);
+  void RecordGain(MeasurementReport& entry, const double* gain) const;
 
-  std::vector<Row> Collect(const Frame& frame, UpdateReport& report);
-  void FuseRows(const std::vector<Row*>& group, UpdateReport& report);
-  Outcome Linearise(Row& row, MeasurementReport& entry, UpdateReport& report);
-  Outcome NoiseOf(Row& row, const std::vector<const double*>& roles) const;
-  Outcome JacobiansOf(Row& row, std::vector<const double*> roles) const;
-  Outcome Gate(Row& row, MeasurementReport& entry, UpdateReport& report);
-  void CheckConditioning(const Row& row, const Eigen::MatrixXd& hpht, UpdateReport& report);
-  Outcome Apply(const std::vector<Row*>& rows, UpdateReport& report);
-  bool MaskConsidered(const std::vector<Row*>& rows, Eigen::MatrixXd& gain) const;
-  bool Correct(const std::vector<Row*>& rows, const Eigen::MatrixXd& w, const Eigen::MatrixXd& gain,
-               bool masked, const Eigen::MatrixXd& r);
-
-  void InitialiseFrom(std::vector<Row>& rows, UpdateReport& report);
-  Outcome InitialiseBlock(Row& row, UpdateReport& report);
-  void CountRejections(std::vector<Row>& rows, UpdateReport& report);
-  void Recover(Row& row, UpdateReport& report);
+  void InitialiseFromMeasurements();
+  Outcome InitialiseBlock(Row& row);
+  void CountRejections();
+  void Recover(Row& row);
   void ForgetMotionOf(BlockId id);
 
+  std::span<Row> rows() { return {rows_.data(), row_count_}; }
+  MeasurementReport& EntryOf(const Row& row) { return report_.measurements()[row.report]; }
   const SensorBinding& BindingOf(const Row& row) const {
     return system_.sensors[static_cast<std::size_t>(row.sensor)];
   }
-  void NotePluginFailure(const SensorBinding& sensor, UpdateReport& report) const;
-  void Note(UpdateReport& report, const char* kind, std::string text) const;
-  void GiveUp(UpdateReport& report, const char* kind, const std::string& what);
+  const SensorPlan& PlanOf(const Row& row) const {
+    return plans_[static_cast<std::size_t>(row.sensor)];
+  }
+  JacobianRows JacobianOf(const Row& row) const;
+  void NotePluginFailure(const SensorBinding& sensor);
+  void Note(const char* kind, std::string text);
+  void GiveUp(const char* kind, const std::string& what);
   std::string Describe(const std::vector<BlockId>& blocks) const;
 
   System system_;
   EkfOptions options_;
-  std::vector<std::vector<int>> sensors_of_stream_;
+  std::vector<int> stream_of_sensor_;  ///< -1: the source has none of that name
   State state_;
+  std::vector<SensorPlan> plans_;  ///< by sensor
+  std::vector<MotionPlan> motions_;
+  std::vector<int> order_;    ///< rows of P in the order of the layout; empty: as they are
+  bool waiting_ = false;      ///< a block has no value yet
+  bool considering_ = false;  ///< a block is considered
+  // Memory that is kept from frame to frame.
+  UpdateReport report_;
+  std::vector<Row> rows_;  ///< the first row_count_ are in use
+  std::size_t row_count_ = 0;
+  std::vector<Row*> group_, passed_;
+  std::vector<double> next_, moved_;
+  std::vector<double*> jacobians_;
   Stamp stamp_ = kNoStamp;
   std::vector<double> gate_threshold_;  ///< on r' S^-1 r, by sensor
   std::vector<int> rejections_;         ///< consecutive, by sensor

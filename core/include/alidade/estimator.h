@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Core>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -27,25 +27,35 @@ enum class Outcome {
 const char* ToString(Outcome outcome);
 /// What a model's status means for the measurement; kOk is kAccepted.
 Outcome OutcomeOf(Status status);
-bool AllFinite(const std::vector<double>& values);
+inline bool AllFinite(std::span<const double> values) {
+  double sum = 0.0;  // 0 times what is not finite is not a number
+  for (const double value : values) sum += 0.0 * value;
+  return sum == 0.0;
+}
 
-/// Rows of the gain K that belong to one block: tangent size x m.
-struct BlockGain {
-  BlockId block;
-  Eigen::MatrixXd k;
-};
-
-/// The complete record of one measurement. m = its tangent size.
+/// The complete record of one measurement; m = dof, its tangent size. What was not reached is empty.
 struct MeasurementReport {
   int sensor = -1;  ///< index into System::sensors
   Outcome outcome = Outcome::kAccepted;
   std::int64_t landmark = -1;
   int dof = 0;
-  double nis = 0.0;             ///< r' S^-1 r, not divided by dof
-  std::vector<double> z, h;     ///< ambient
-  Eigen::VectorXd innovation;   ///< r = z (-) h, tangent
-  Eigen::MatrixXd s;            ///< S = H P H' + R, m x m; empty where it was not reached
-  std::vector<BlockGain> gain;  ///< K by block; empty unless accepted
+  double nis = 0.0;                ///< r' S^-1 r, not divided by dof
+  std::vector<double> z, h;        ///< ambient
+  std::vector<double> innovation;  ///< r = z (-) h, m
+  std::vector<double> s;           ///< S = H P H' + R, m x m
+  /// K by columns, its rows those of the blocks with a covariance in the order of the layout; empty
+  /// unless accepted.
+  std::vector<double> gain;
+
+  /// Makes it that of a new measurement, nothing reached yet. The memory is kept.
+  void Reset(int of_sensor, std::int64_t of_landmark, int of_dof) {
+    sensor = of_sensor;
+    landmark = of_landmark;
+    dof = of_dof;
+    outcome = Outcome::kAccepted;
+    nis = 0.0;
+    for (std::vector<double>* part : {&z, &h, &innovation, &s, &gain}) part->clear();
+  }
 };
 
 /// Something that happened to the filter, worth a line to its user.
@@ -55,11 +65,28 @@ struct Event {
   std::string text;
 };
 
-/// What one frame did.
-struct UpdateReport {
+/// What one frame did. Filled again and again without allocating.
+class UpdateReport {
+ public:
+  std::span<const MeasurementReport> measurements() const { return {pool_.data(), count_}; }
+  std::span<MeasurementReport> measurements() { return {pool_.data(), count_}; }
+  /// One more; references to the others end.
+  MeasurementReport& Add() {
+    if (count_ == pool_.size()) pool_.emplace_back();
+    return pool_[count_++];
+  }
+  void Clear() {
+    stale = false;
+    count_ = 0;
+    events.clear();
+  }
+
   bool stale = false;  ///< the frame is older than the state, which stays as it was
-  std::vector<MeasurementReport> measurements;
   std::vector<Event> events;
+
+ private:
+  std::vector<MeasurementReport> pool_;  ///< the first count_ are in use
+  std::size_t count_ = 0;
 };
 
 /// A recursive estimator over one system. It takes values and returns values: it neither reads
@@ -69,8 +96,9 @@ class Estimator {
   virtual ~Estimator() = default;
   /// Sets the time of the initial state.
   virtual void Start(Stamp stamp) = 0;
-  /// Steps to the frame's stamp and uses those of its measurements that a sensor is bound to.
-  virtual UpdateReport Process(const Frame& frame) = 0;
+  /// Steps to the frame's stamp and uses those of its measurements that a sensor is bound to. The
+  /// report is good until the next call.
+  virtual const UpdateReport& Process(const Frame& frame) = 0;
   virtual const State& state() const = 0;
   virtual Stamp stamp() const = 0;
   /// True once the filter left the domain of its sensors or lost its numbers; see the events.

@@ -70,6 +70,7 @@ struct Sensor {
 ///   using Input = Vec<2>; static constexpr Quantity kInput{...};        a control input u
 ///   void StepJacobian(const double* block..., const double* w, double dt_s, MatrixRef F,
 ///                     MatrixRef G) const;      closed form, zeroed; only without control input
+///   bool Stationary() const;                   x' = x and no noise: estimators skip the step
 ///
 /// Blocks of size kDynamic need StepJacobian, `int Size(int block) const` and
 /// `int NoiseSize() const`. Their Step, StepJacobian and SqrtQ write to the caller's buffers: they
@@ -168,6 +169,30 @@ bool CallStep(const Model& model, const T* const* x, const T* u, const T* w, dou
   }
 }
 
+/// L with R = L L' of a sensor, row-major and zeroed before.
+template <class Model, std::size_t... I>
+void CallSqrtNoise(const Model& model, const double* const* x, const double* z, double* l,
+                   std::index_sequence<I...>) {
+  if constexpr (HasNoiseOfMeasurement<Model, std::index_sequence<I...>>::value) {
+    model.SqrtNoise(x[I]..., z, l);
+  } else {
+    static_cast<void>(z);
+    model.SqrtNoise(x[I]..., l);
+  }
+}
+
+/// Lq of a motion model, zeroed before.
+template <class Model, std::size_t... I>
+void CallSqrtQ(const Model& model, const double* const* x, double dt_s, MatrixRef l,
+               std::index_sequence<I...>) {
+  if constexpr (HasSimpleSqrtQ<Model>::value) {
+    static_cast<void>(x);
+    model.SqrtQ(dt_s, l);
+  } else {
+    model.SqrtQ(x[I]..., dt_s, l);
+  }
+}
+
 template <class Model, class Indices, class = void>
 struct HasStepJacobian : std::false_type {};
 template <class Model, std::size_t... I>
@@ -175,6 +200,12 @@ struct HasStepJacobian<Model, std::index_sequence<I...>,
                        std::void_t<decltype(std::declval<const Model&>().StepJacobian(
                            std::declval<Pointer<double, I>>()..., std::declval<const double*>(),
                            1.0, std::declval<MatrixRef>(), std::declval<MatrixRef>()))>>
+    : std::true_type {};
+
+template <class Model, class = void>
+struct HasStationary : std::false_type {};
+template <class Model>
+struct HasStationary<Model, std::void_t<decltype(std::declval<const Model&>().Stationary())>>
     : std::true_type {};
 
 template <class Model, class = void>

@@ -105,13 +105,19 @@ class MotionModel {
   const ModelInstance& instance() const { return *instance_; }
   const std::vector<Space>& blocks() const { return instance_->spaces(); }
   int noise_size() const { return noise_size_; }
+  /// Its blocks stay as they are, without noise: Step need not be called.
+  bool stationary() const { return (instance_->capabilities() & ALIDADE_STATIONARY) != 0; }
   int tangent_size() const { return tangent_size_; }
   bool has_input() const { return instance_->c().description->input != nullptr; }
 
   /// x', where `w` may be null (zero), F (n x n) and G (n x n_w) dense row-major; F and G may both
   /// be null.
   Status Step(const double* const* blocks, const double* input, const double* w, double dt_s,
-              double* const* next, double* f, double* g) const;
+              double* const* next, double* f, double* g) const {
+    return detail::ToStatus(motion_->step(self_, blocks, input,
+                                          w != nullptr ? w : zero_noise_.data(), dt_s, next, f,
+                                          tangent_size_, g, noise_size_));
+  }
   /// l, row-major n_w x n_w, with Qw = l l'.
   Status SqrtQ(const double* const* blocks, double dt_s, double* l) const {
     return detail::ToStatus(motion_->sqrt_q(self_, blocks, dt_s, l, noise_size_));

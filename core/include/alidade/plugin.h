@@ -53,6 +53,9 @@ void PublishMotion(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* insta
     holder->description.input = &holder->space;
   }
   holder->description.noise_count = NoiseSizeOf(holder->model);
+  if constexpr (HasStationary<Model>::value) {
+    if (holder->model.Stationary()) holder->description.capabilities |= ALIDADE_STATIONARY;
+  }
   holder->description.initialise_role = -1;
   instance->motion = &MotionCalls<Model>::kCalls;
   Publish(std::move(holder), ALIDADE_KIND_MOTION, instance);

@@ -91,33 +91,26 @@ template <class Model>
 struct __attribute__((visibility("hidden"))) SensorCalls {
   static constexpr bool kInitialises = Model::kInitialises >= 0;
 
-  static std::int32_t Eval(const void* self, const double* const* roles, double* z,
-                           double* const* jacobians, const std::int32_t* strides) noexcept {
+  __attribute__((flatten)) static std::int32_t Eval(const void* self, const double* const* roles,
+                                                    double* z, double* const* jacobians,
+                                                    const std::int32_t* strides) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
       return static_cast<std::int32_t>(Evaluate(model, roles, z, jacobians, strides));
     });
   }
-  template <std::size_t... I>
-  static void CallNoise(const Model& model, const double* const* x, const double* z, double* l,
-                        std::index_sequence<I...>) {
-    if constexpr (HasNoiseOfMeasurement<Model, std::index_sequence<I...>>::value) {
-      model.SqrtNoise(x[I]..., z, l);
-    } else {
-      static_cast<void>(z);
-      model.SqrtNoise(x[I]..., l);
-    }
-  }
-  static std::int32_t SqrtNoise(const void* self, const double* const* roles, const double* z,
-                                double* l, std::int32_t stride) noexcept {
+  __attribute__((flatten)) static std::int32_t SqrtNoise(const void* self,
+                                                         const double* const* roles,
+                                                         const double* z, double* l,
+                                                         std::int32_t stride) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
       constexpr int m = Model::Measurement::kTangent;
       double dense[m * m] = {};
-      CallNoise(model, roles, z, dense, typename Blocks<Model>::Indices{});
+      CallSqrtNoise(model, roles, z, dense, typename Blocks<Model>::Indices{});
       for (int i = 0; i < m; ++i) std::copy_n(dense + i * m, m, l + i * stride);
       return std::int32_t{ALIDADE_OK};
     });
   }
-  static std::int32_t Valid(const void* self, const double* z) noexcept {
+  __attribute__((flatten)) static std::int32_t Valid(const void* self, const double* z) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
       if constexpr (HasValid<Model>::value) {
         return std::int32_t{model.Valid(z) ? ALIDADE_OK : ALIDADE_INVALID};
@@ -152,26 +145,19 @@ struct __attribute__((visibility("hidden"))) SensorCalls {
 
 template <class Model>
 struct __attribute__((visibility("hidden"))) MotionCalls {
-  static std::int32_t Step(const void* self, const double* const* blocks, const double* input,
-                           const double* w, double dt_s, double* const* next, double* f,
-                           std::int32_t f_stride, double* g, std::int32_t g_stride) noexcept {
+  __attribute__((flatten)) static std::int32_t Step(const void* self, const double* const* blocks,
+                                                    const double* input, const double* w,
+                                                    double dt_s, double* const* next, double* f,
+                                                    std::int32_t f_stride, double* g,
+                                                    std::int32_t g_stride) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
       return static_cast<std::int32_t>(
           alidade::Step(model, blocks, input, w, dt_s, next, {f, f_stride}, {g, g_stride}));
     });
   }
-  template <std::size_t... I>
-  static void CallSqrtQ(const Model& model, const double* const* x, double dt_s, MatrixRef l,
-                        std::index_sequence<I...>) {
-    if constexpr (HasSimpleSqrtQ<Model>::value) {
-      static_cast<void>(x);
-      model.SqrtQ(dt_s, l);
-    } else {
-      model.SqrtQ(x[I]..., dt_s, l);
-    }
-  }
-  static std::int32_t SqrtQ(const void* self, const double* const* blocks, double dt_s, double* l,
-                            std::int32_t stride) noexcept {
+  __attribute__((flatten)) static std::int32_t SqrtQ(const void* self, const double* const* blocks,
+                                                     double dt_s, double* l,
+                                                     std::int32_t stride) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
       constexpr typename Blocks<Model>::Indices indices{};
       if constexpr (Model::kNoise != kDynamic) {

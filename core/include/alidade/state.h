@@ -86,11 +86,12 @@ class State {
   void Consider(BlockId id, bool considered);
   /// Replaces the block by y = g(x_id) of another geometry, J = dy/dx in the tangents.
   void Reparametrise(BlockId id, Space space, const double* value, const Eigen::MatrixXd& jacobian);
-  /// The values x_i (+) dx_i of all blocks with a covariance, the rest as it is; dx is indexed like
-  /// the covariance. Changes nothing: see MoveTo.
-  std::vector<double> Moved(const Eigen::VectorXd& dx) const;
+  /// moved = the values x_i (+) dx_i of all blocks with a covariance, the rest as it is; dx is
+  /// indexed like the covariance. Changes nothing: see MoveTo.
+  void Retract(const double* dx, std::vector<double>& moved) const;
   /// Takes the values over, transporting P where the tangent basis of a block turns with its value.
-  void MoveTo(std::vector<double> values);
+  /// They stay where they are in memory.
+  void MoveTo(const std::vector<double>& values);
 
  private:
   void PlaceValue(BlockId id, const double* value);

@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <cmath>
+#include <limits>
+#include <tuple>
+#include <utility>
+
+#include "alidade/autodiff_step.h"
+
+/// The models of a filter combined at compile time: no plugins, no config, no allocation, no
+/// exceptions; C++17 and Eigen. For embedded systems, and as a yardstick of the engine.
+namespace alidade {
+
+/// What became of a measurement that a StaticEkf was given.
+enum class StaticOutcome {
+  kAccepted,
+  kGated,
+  kOutOfDomain,  ///< h is not defined at the prediction
+  kInvalid,      ///< beyond the sensor's limits
+  kNotFinite,    ///< S is not positive definite, or something is not finite; nothing has changed
+};
+
+/// Extended Kalman filter over the blocks of `Motions`, numbered in order.
+///
+///   predict    x' = f(x, 0, dt),  P' = F P F' + G Q G'
+///   update     S = H P H' + R,  K = P H' S^-1,  x' = x (+) K r,  P' = P - K S K'
+///
+///   symbol     shape                  meaning
+///   x          sum of ambient sizes   state; P, n x n, in its tangent, is its covariance
+///   r          m                      innovation z (-) h(x)
+///   gate       1                      bound on r' S^-1 r; infinity: none
+///
+/// Measurements are used one after the other, each linearised at the state that the one before has
+/// left, as the engine does under `fuse: per_measurement`. Sizes are known at compile time:
+/// Constant<1>, not Constant<>. Control inputs are not supported.
+template <class... Motions>
+class StaticEkf {
+ public:
+  using Spaces = decltype(std::tuple_cat(std::declval<typename Motions::Spaces>()...));
+  static constexpr int kBlocks = static_cast<int>(std::tuple_size<Spaces>::value);
+  static constexpr int kAmbient = detail::SpacesOf<Spaces>::kAmbient;
+  static constexpr int kTangent = detail::SpacesOf<Spaces>::kTangent;
+  static_assert(detail::SpacesOf<Spaces>::kStatic, "sizes have to be known at compile time");
+  template <int B>
+  using Space = std::tuple_element_t<static_cast<std::size_t>(B), Spaces>;
+  using Covariance = Eigen::Matrix<double, kTangent, kTangent>;
+
+  explicit StaticEkf(Motions... motions) : motions_(std::move(motions)...) {}
+
+  /// Sets block B to `value` (ambient) with the covariance `p` (tangent), uncorrelated with others.
+  template <int B, class Matrix>
+  void Set(const double* value, const Eigen::MatrixBase<Matrix>& p) {
+    constexpr int o = TangentOffset(B), k = Space<B>::kTangent;
+    std::copy_n(value, Space<B>::kAmbient, x_ + AmbientOffset(B));
+    p_.template middleRows<k>(o).setZero();
+    p_.template middleCols<k>(o).setZero();
+    p_.template block<k, k>(o, o) = p;
+  }
+  /// Sets a scalar block to `value`, standard deviation `sigma`.
+  template <int B>
+  void Set(double value, double sigma) {
+    static_assert(Space<B>::kTangent == 1 && Space<B>::kAmbient == 1, "a scalar block");
+    Set<B>(&value, Eigen::Matrix<double, 1, 1>::Constant(sigma * sigma));
+  }
+
+  /// Ambient values of block B.
+  template <int B>
+  const double* value() const {
+    return x_ + AmbientOffset(B);
+  }
+  /// P, n x n, in the order of the blocks.
+  Covariance covariance() const { return p_.template selfadjointView<Eigen::Lower>(); }
+
+  /// Steps by dt_s seconds. Not kOk, and nothing moved, where a model is not defined.
+  __attribute__((flatten)) Status Predict(double dt_s) {
+    return PredictAll(dt_s, std::index_sequence_for<Motions...>{});
+  }
+
+  /// Uses z (ambient), a measurement of `sensor` whose roles are filled by the blocks `Roles`.
+  template <int... Roles, class Model>
+  __attribute__((flatten)) StaticOutcome Update(
+      const Model& sensor, const double* z, double gate = std::numeric_limits<double>::infinity());
+
+ private:
+  using Indices = std::make_index_sequence<static_cast<std::size_t>(kBlocks)>;
+  static constexpr int AmbientOffset(int block) { return OffsetOf<true>(block, Indices{}); }
+  static constexpr int TangentOffset(int block) { return OffsetOf<false>(block, Indices{}); }
+  template <bool kOfAmbient, std::size_t... I>
+  static constexpr int OffsetOf(int block, std::index_sequence<I...>) {
+    const int sizes[] = {(kOfAmbient ? Space<static_cast<int>(I)>::kAmbient
+                                     : Space<static_cast<int>(I)>::kTangent)...};
+    int offset = 0;
+    for (int i = 0; i < block; ++i) offset += sizes[i];
+    return offset;
+  }
+  /// Number of the first block of motion model M.
+  static constexpr int FirstBlock(std::size_t m) {
+    const int counts[] = {detail::Blocks<Motions>::kCount...};
+    int first = 0;
+    for (std::size_t i = 0; i < m; ++i) first += counts[i];
+    return first;
+  }
+  /// What models write, as a matrix. (Eigen wants a single column in column order.)
+  template <int rows, int columns>
+  using RowMajorMap = Eigen::Map<const Eigen::Matrix<
+      double, rows, columns, columns == 1 && rows != 1 ? Eigen::ColMajor : Eigen::RowMajor>>;
+
+  /// One motion model's part of a step: F, and G Q G'.
+  template <class Model>
+  struct Transition {
+    static constexpr int n = detail::Blocks<Model>::kTangent;
+    Eigen::Matrix<double, n, n> f, q;
+  };
+
+  template <std::size_t... M>
+  Status PredictAll(double dt_s, std::index_sequence<M...>) {
+    double next[kAmbient];
+    std::tuple<Transition<Motions>...> transitions;
+    Status status = Status::kOk;
+    const bool all =
+        (((status = StepOne<M>(dt_s, next, std::get<M>(transitions))) == Status::kOk) && ...);
+    if (!all) return status;
+    std::copy_n(next, kAmbient, x_);
+    (Propagate<TangentOffset(FirstBlock(M))>(std::get<M>(transitions)), ...);
+    return Status::kOk;
+  }
+  template <std::size_t M, class Model>
+  Status StepOne(double dt_s, double* next, Transition<Model>& transition) const {
+    constexpr typename detail::Blocks<Model>::Indices indices{};
+    constexpr int n = Transition<Model>::n, n_w = Model::kNoise;
+    const Model& model = std::get<M>(motions_);
+    const double* x[detail::Blocks<Model>::kCount];
+    double* y[detail::Blocks<Model>::kCount];
+    const auto place = [&](auto index) {
+      constexpr int i = decltype(index)::value, o = AmbientOffset(FirstBlock(M) + i);
+      x[i] = x_ + o;
+      y[i] = next + o;
+    };
+    detail::ForEach(place, indices);
+    double f[n * n], g[n * n_w + 1] = {}, l[n_w * n_w + 1] = {};
+    const Status status = Step(model, x, nullptr, nullptr, dt_s, y, {f, n}, {g, n_w});
+    if (status != Status::kOk) return status;
+    detail::CallSqrtQ(model, x, dt_s, {l, n_w}, indices);
+    const Eigen::Matrix<double, n, n_w> gl =
+        RowMajorMap<n, n_w>(g).lazyProduct(RowMajorMap<n_w, n_w>(l));
+    transition.f = RowMajorMap<n, n>(f);
+    transition.q = gl.lazyProduct(gl.transpose());
+    return Status::kOk;
+  }
+
+  /// P(i, j), of which the lower triangle is kept.
+  double& P(int i, int j) { return i >= j ? p_(i, j) : p_(j, i); }
+  /// P of the rows [o, o + n): P_aa <- F P_aa F' + Q, P_ai <- F P_ai.
+  template <int o, class Model>
+  void Propagate(const Transition<Model>& t);
+  template <int m>
+  StaticOutcome Correct(const Eigen::Matrix<double, kTangent, m>& pht,
+                        const Eigen::Matrix<double, m, m>& s, const Eigen::Matrix<double, m, 1>& r,
+                        double gate);
+  /// x <- x (+) dx
+  void Move(const double* dx) {
+    const auto move = [&](auto index) {
+      constexpr int b = decltype(index)::value;
+      double moved[Space<b>::kAmbient];
+      Space<b>::Plus(value<b>(), dx + TangentOffset(b), moved);
+      std::copy_n(moved, Space<b>::kAmbient, x_ + AmbientOffset(b));
+    };
+    detail::ForEach(move, Indices{});
+  }
+
+  std::tuple<Motions...> motions_;
+  double x_[kAmbient] = {};
+  Covariance p_ = Covariance::Zero();
+};
+
+// Loops of constant length, unrolled at any level of optimisation.
+#define ALIDADE_UNROLL _Pragma("GCC unroll 16")
+
+template <class... Motions>
+template <int o, class Model>
+void StaticEkf<Motions...>::Propagate(const Transition<Model>& t) {
+  constexpr int n = Transition<Model>::n;
+  double fp[n][kTangent];
+  ALIDADE_UNROLL for (int r = 0; r < n; ++r) {
+    ALIDADE_UNROLL for (int c = 0; c < kTangent; ++c) {
+      fp[r][c] = t.f(r, 0) * P(o, c);
+      ALIDADE_UNROLL for (int k = 1; k < n; ++k) fp[r][c] += t.f(r, k) * P(o + k, c);
+    }
+  }
+  ALIDADE_UNROLL for (int r = 0; r < n; ++r) {
+    ALIDADE_UNROLL for (int c = 0; c < kTangent; ++c) {
+      if (c < o || c >= o + n) P(o + r, c) = fp[r][c];
+    }
+    ALIDADE_UNROLL for (int c = 0; c <= r; ++c) {
+      double sum = t.q(r, c);
+      ALIDADE_UNROLL for (int k = 0; k < n; ++k) sum += fp[r][o + k] * t.f(c, k);
+      P(o + r, o + c) = sum;
+    }
+  }
+}
+
+template <class... Motions>
+template <int... Roles, class Model>
+StaticOutcome StaticEkf<Motions...>::Update(const Model& sensor, const double* z, double gate) {
+  using Z = typename Model::Measurement;
+  using RoleBlocks = detail::Blocks<Model>;
+  constexpr typename RoleBlocks::Indices indices{};
+  constexpr int m = Z::kTangent, bound[] = {Roles...};
+  static_assert(sizeof...(Roles) == RoleBlocks::kCount, "one block for each role");
+  if constexpr (detail::HasValid<Model>::value) {
+    if (!sensor.Valid(z)) return StaticOutcome::kInvalid;
+  }
+  const double* const roles[] = {value<Roles>()...};
+  double h[Z::kAmbient], l[m * m] = {}, j[m * RoleBlocks::kTangent];
+  double* jacobians[RoleBlocks::kCount];
+  int strides[RoleBlocks::kCount], used = 0;
+  const auto place = [&](auto index) {
+    constexpr int i = decltype(index)::value;
+    strides[i] = detail::SpaceAt<i, Model>::kTangent;
+    jacobians[i] = j + used;
+    used += m * strides[i];
+  };
+  detail::ForEach(place, indices);
+  if (Evaluate(sensor, roles, h, jacobians, strides) != Status::kOk) {
+    return StaticOutcome::kOutOfDomain;
+  }
+  detail::CallSqrtNoise(sensor, roles, z, l, indices);
+  Eigen::Matrix<double, m, 1> r;
+  Z::Minus(z, h, r.data());
+  Eigen::Matrix<double, kTangent, m> pht;
+  ALIDADE_UNROLL for (int i = 0; i < kTangent; ++i) {
+    ALIDADE_UNROLL for (int c = 0; c < m; ++c) {
+      double sum = -0.0;  // adds nothing, not even a sign
+      const auto add = [&](auto index) {
+        constexpr int role = decltype(index)::value, o = TangentOffset(bound[role]);
+        constexpr int n = detail::SpaceAt<role, Model>::kTangent;
+        ALIDADE_UNROLL for (int k = 0; k < n; ++k) sum += P(i, o + k) * jacobians[role][c * n + k];
+      };
+      detail::ForEach(add, indices);
+      pht(i, c) = sum;
+    }
+  }
+  Eigen::Matrix<double, m, m> s =
+      RowMajorMap<m, m>(l).lazyProduct(RowMajorMap<m, m>(l).transpose());
+  const auto add = [&](auto index) {
+    constexpr int role = decltype(index)::value, n = detail::SpaceAt<role, Model>::kTangent;
+    s += RowMajorMap<m, n>(jacobians[role])
+             .lazyProduct(pht.template middleRows<n>(TangentOffset(bound[role])));
+  };
+  detail::ForEach(add, indices);
+  return Correct<m>(pht, s, r, gate);
+}
+
+template <class... Motions>
+template <int m>
+StaticOutcome StaticEkf<Motions...>::Correct(const Eigen::Matrix<double, kTangent, m>& pht,
+                                             const Eigen::Matrix<double, m, m>& s,
+                                             const Eigen::Matrix<double, m, 1>& r, double gate) {
+  Eigen::Matrix<double, kTangent, m> k;  // K = P H' S^-1
+  if constexpr (m == 1) {
+    if (!(s(0) > 0.0 && s(0) <= std::numeric_limits<double>::max())) {
+      return StaticOutcome::kNotFinite;
+    }
+    const double inverse = 1.0 / s(0), nis = r(0) * r(0) * inverse;
+    k = pht * inverse;
+    if (!std::isfinite(nis)) return StaticOutcome::kNotFinite;
+    if (!(nis <= gate)) return StaticOutcome::kGated;
+  } else {
+    const Eigen::LLT<Eigen::Matrix<double, m, m>> llt(s);
+    if (!s.allFinite() || llt.info() != Eigen::Success) return StaticOutcome::kNotFinite;
+    const double nis = llt.matrixL().solve(r).squaredNorm();
+    if (!std::isfinite(nis)) return StaticOutcome::kNotFinite;
+    if (!(nis <= gate)) return StaticOutcome::kGated;
+    k = llt.solve(pht.transpose()).transpose();
+  }
+  const Eigen::Matrix<double, kTangent, 1> dx = k.lazyProduct(r);
+  Move(dx.data());
+  ALIDADE_UNROLL for (int i = 0; i < kTangent; ++i) {
+    ALIDADE_UNROLL for (int j = 0; j <= i; ++j) {
+      double sum = k(i, 0) * pht(j, 0);
+      ALIDADE_UNROLL for (int c = 1; c < m; ++c) sum += k(i, c) * pht(j, c);
+      p_(i, j) -= sum;
+    }
+  }
+  return StaticOutcome::kAccepted;
+}
+
+#undef ALIDADE_UNROLL
+
+}  // namespace alidade

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/static_ekf.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <limits>
+
+#include "alidade/metrics.h"
+#include "support/systems.h"
+
+namespace alidade {
+namespace {
+
+using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
+
+using DepthEkf = StaticEkf<ConstantVelocity<1, false>, Constant<1>>;
+constexpr int kDepth = 0, kRate = 1, kInverseDistance = 2;
+
+DepthEkf StaticDepthFilter() {
+  DepthEkf filter(ConstantVelocity<1, false>(1.0), Constant<1>(1));
+  filter.Set<kDepth>(0.35, 0.1);
+  filter.Set<kRate>(0.0, 0.5);
+  filter.Set<kInverseDistance>(3.3, 0.5);
+  return filter;
+}
+
+StaticOutcome ToStatic(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::kAccepted:
+      return StaticOutcome::kAccepted;
+    case Outcome::kGated:
+      return StaticOutcome::kGated;
+    case Outcome::kInvalid:
+      return StaticOutcome::kInvalid;
+    case Outcome::kOutOfDomain:
+      return StaticOutcome::kOutOfDomain;
+    default:
+      return StaticOutcome::kNotFinite;
+  }
+}
+
+TEST(StaticEkf, IsTheEngineComposedAtCompileTime) {
+  const System system = DepthFilter();
+  EkfOptions options;
+  options.fuse = Fuse::kPerMeasurement;
+  options.gate = 0.99;
+  Ekf engine(system, options, StreamsOf(system));
+  DepthEkf filter = StaticDepthFilter();
+  const StereoDisparity stereo(400.0, 0.065, 1.0);
+  const Scale2d scale = Scale2d::FromPixels(300.0, 1.0);
+  const double gate = ChiSquareQuantile(0.99, 1);
+  int gated = 0, invalid = 0;
+  for (int k = 0; k < 300; ++k) {
+    const double t = 0.033 * k, depth = 0.3 + 0.1 * std::sin(2.5 * t);
+    const double d =
+        k % 17 == 3 ? -1.0 : 26.0 / depth + std::sin(7.0 * k) + (k % 13 == 5 ? 9.0 : 0.0);
+    const double s = depth / 0.3 + 0.01 * std::cos(5.0 * k);
+    const UpdateReport& report = engine.Process(FrameAt(t, {{0, d}, {1, s}}));
+    if (k > 0) {
+      const double dt = Seconds(StampFromSeconds(t) - StampFromSeconds(0.033 * (k - 1)));
+      ASSERT_EQ(filter.Predict(dt), Status::kOk);
+    }
+    const StaticOutcome of_d = filter.Update<kDepth>(stereo, &d, gate);
+    ASSERT_EQ(of_d, ToStatic(report.measurements()[0].outcome)) << k;
+    ASSERT_EQ((filter.Update<kDepth, kInverseDistance>(scale, &s, gate)),
+              ToStatic(report.measurements()[1].outcome));
+    gated += of_d == StaticOutcome::kGated ? 1 : 0;
+    invalid += of_d == StaticOutcome::kInvalid ? 1 : 0;
+    ASSERT_NEAR(*filter.value<kDepth>(), ValueOf(engine.state(), "target.depth"), 1e-12);
+    ASSERT_NEAR(*filter.value<kRate>(), ValueOf(engine.state(), "target.depth_rate"), 1e-11);
+    ASSERT_NEAR(*filter.value<kInverseDistance>(),
+                ValueOf(engine.state(), "template.inverse_distance"), 1e-11);
+    ASSERT_LT((filter.covariance() - engine.state().covariance().Dense()).norm(), 1e-12);
+  }
+  EXPECT_GT(gated, 5);
+  EXPECT_GT(invalid, 10);
+}
+
+/// Two numbers at once, correlated noise, two roles of two numbers each.
+struct Difference : Sensor<Vec<2>, Vec<2>, Vec<2>> {
+  static constexpr std::array kRoles{Quantity{"a", "m", "", "x,y"}, Quantity{"b", "m", "", "x,y"}};
+  static constexpr Quantity kMeasurement{"z", "m", "", "x,y"};
+  template <class T>
+  bool Predict(const T* a, const T* b, T* z) const {
+    for (int i = 0; i < 2; ++i) z[i] = a[i] * b[0] - b[i];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(0.5);
+    l[2] = T(0.2);
+    l[3] = T(0.4);
+  }
+};
+
+TEST(StaticEkf, UpdatesWithVectorsAndDerivedJacobiansAsTheTextbookSays) {
+  StaticEkf<Constant<2>, ConstantVelocity<2, false>> filter(Constant<2>(2, 0.3),
+                                                            ConstantVelocity<2, false>(2.0));
+  const double a[] = {1.0, 2.0}, b[] = {0.5, -0.3}, v[] = {0.1, 0.2};
+  Eigen::Matrix2d own;
+  own << 0.4, 0.1, 0.1, 0.3;
+  filter.Set<0>(a, own);
+  filter.Set<1>(b, 2.0 * own);
+  filter.Set<2>(v, 0.5 * own);
+  constexpr double kDt = 0.5;
+  ASSERT_EQ(filter.Predict(kDt), Status::kOk);
+  // By hand, order a, b, v.
+  Eigen::Matrix<double, 6, 6> f = Eigen::Matrix<double, 6, 6>::Identity(), p = f, q = 0.0 * f;
+  p.setZero();
+  p.block<2, 2>(0, 0) = own;
+  p.block<2, 2>(2, 2) = 2.0 * own;
+  p.block<2, 2>(4, 4) = 0.5 * own;
+  f(2, 4) = f(3, 5) = kDt;
+  q(0, 0) = q(1, 1) = 0.09 * kDt;
+  for (int i = 0; i < 2; ++i) {
+    q(2 + i, 2 + i) = 4.0 * std::pow(kDt, 4) / 4.0;
+    q(2 + i, 4 + i) = q(4 + i, 2 + i) = 4.0 * std::pow(kDt, 3) / 2.0;
+    q(4 + i, 4 + i) = 4.0 * kDt * kDt;
+  }
+  p = f * p * f.transpose() + q;
+  EXPECT_LT((filter.covariance() - p).norm(), 1e-14);
+  Eigen::Matrix<double, 6, 1> x;
+  x << 1.0, 2.0, 0.55, -0.2, 0.1, 0.2;
+  Eigen::Matrix<double, 2, 6> h = Eigen::Matrix<double, 2, 6>::Zero();
+  h(0, 0) = h(1, 1) = x(2);
+  h(0, 2) = x(0) - 1.0;
+  h(1, 2) = x(1);
+  h(1, 3) = -1.0;
+  Eigen::Matrix2d r, s;
+  r << 0.25, 0.1, 0.1, 0.2;
+  s = h * p * h.transpose() + r;
+  const double z[] = {0.2, 1.1};
+  const Eigen::Vector2d innovation(z[0] - (x(0) * x(2) - x(2)), z[1] - (x(1) * x(2) - x(3)));
+  ASSERT_EQ((filter.Update<0, 1>(Difference(), z)), StaticOutcome::kAccepted);
+  const Eigen::Matrix<double, 6, 2> k = p * h.transpose() * s.inverse();
+  x += k * innovation;
+  EXPECT_LT((filter.covariance() - (p - k * s * k.transpose())).norm(), 1e-14);
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_NEAR(filter.value<0>()[i], x(i), 1e-14);
+    EXPECT_NEAR(filter.value<1>()[i], x(2 + i), 1e-14);
+    EXPECT_NEAR(filter.value<2>()[i], x(4 + i), 1e-14);
+  }
+}
+
+TEST(StaticEkf, WhatCannotBeUsedChangesNothing) {
+  DepthEkf filter = StaticDepthFilter();
+  const StereoDisparity stereo(400.0, 0.065, 1.0);
+  const Eigen::Matrix3d p = filter.covariance();
+  const double infinity = std::numeric_limits<double>::infinity();
+  const double nan = std::nan(""), negative = -1.0, far = 1e6;
+  EXPECT_EQ(filter.Update<kDepth>(stereo, &negative), StaticOutcome::kInvalid);
+  EXPECT_EQ(filter.Update<kDepth>(stereo, &nan), StaticOutcome::kInvalid);
+  EXPECT_EQ(filter.Update<kDepth>(stereo, &far, 10.0), StaticOutcome::kGated);
+  EXPECT_EQ((filter.Update<kDepth, kInverseDistance>(Scale2d::FromVariance(infinity), &far)),
+            StaticOutcome::kNotFinite);
+  EXPECT_EQ(*filter.value<kDepth>(), 0.35);
+  EXPECT_EQ(filter.covariance(), p);
+  filter.Set<kDepth>(-0.35, 0.1);
+  const double d = 70.0;
+  EXPECT_EQ(filter.Update<kDepth>(stereo, &d), StaticOutcome::kOutOfDomain);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <functional>
 
 #include "alidade/ekf.h"
 #include "alidade/run.h"
@@ -83,15 +84,26 @@ void CheckName(const std::string& name, const Node& entry) {
   }
 }
 
+/// Makes the estimator once its system is known.
+using EstimatorMaker = std::function<std::unique_ptr<Estimator>(
+    const System& system, const std::vector<StreamInfo>& streams)>;
+
+/// Reads `type` and what that type of estimator has for keys.
+EstimatorMaker ReadEstimator(const Node& entry, std::string& type) {
+  const std::vector<std::string> types = {"ekf"};
+  type = types[static_cast<std::size_t>(entry.At("type", "an estimator").Choice(types))];
+  return [options = EkfOptions::FromNode(entry)](const System& system,
+                                                 const std::vector<StreamInfo>& streams) {
+    return std::make_unique<Ekf>(system, options, streams);
+  };
+}
+
 NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const Config& config,
                               const PluginHost& host, const std::vector<StreamInfo>& streams) {
   CheckName(name, entry);
   NamedEstimator named;
   named.name = name;
-  const Node type = entry.At("type", "an estimator");
-  const std::vector<std::string> types = {"ekf"};
-  named.type = types[static_cast<std::size_t>(type.Choice(types))];
-  const EkfOptions options = EkfOptions::FromNode(entry);
+  const EstimatorMaker make = ReadEstimator(entry, named.type);
   if (const auto policy = entry.Find("on_divergence")) {
     named.on_divergence = static_cast<OnDivergence>(policy->Choice({"report", "fail"}));
   }
@@ -111,7 +123,7 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   for (const SensorBinding& sensor : named.system.sensors) {
     FindStream(own.root().At("sensors").At(sensor.name), sensor.model, streams);
   }
-  named.estimator = std::make_unique<Ekf>(named.system, options, streams);
+  named.estimator = make(named.system, streams);
   return named;
 }
 

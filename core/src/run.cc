@@ -18,12 +18,28 @@ bool InSegment(const Segment& segment, const Frame& frame) {
   return std::any_of(frame.measurements.begin(), frame.measurements.end(), seen) == segment.with;
 }
 
+/// A frame, and which segments it is in.
+struct Seen {
+  Frame frame;
+  std::vector<bool> in_segment;
+};
+
 /// One estimator on its way through a run.
 struct Running {
   NamedEstimator& named;
+  int index = 0;  ///< in the experiment
   Metrics metrics;
   EstimatorResult result;
   bool ended = false;  ///< it had nothing left to go on with
+
+  /// Puts an estimate into metrics and record.
+  void Take(const Seen& seen, const State& state, const UpdateReport& report, Recorder* recorder) {
+    metrics.Add(seen.frame, seen.in_segment, state, report);
+    if (recorder != nullptr) recorder->AddEstimate(index, seen.frame, state, report);
+  }
+  void Note(const std::vector<Event>& events) {
+    result.events.insert(result.events.end(), events.begin(), events.end());
+  }
 };
 
 EstimatorResult Begin(const NamedEstimator& named) {
@@ -70,47 +86,44 @@ void Fail(RunResult& result, ExitCode code, std::string reason) {
 }
 
 /// One frame through one estimator; false where the whole run has to end.
-bool Advance(Running& one, int index, const Frame& frame, const std::vector<bool>& in_segment,
-             const RunOptions& options, RunResult& result) {
+bool Advance(Running& one, const Seen& seen, const RunOptions& options, RunResult& result) {
   if (one.ended) return true;
   Estimator& estimator = *one.named.estimator;
-  const UpdateReport& report = estimator.Process(frame);
-  one.result.events.insert(one.result.events.end(), report.events.begin(), report.events.end());
+  const UpdateReport& report = estimator.Process(seen.frame);
+  one.Note(report.events);
   one.ended = estimator.failed();
-  if (!one.ended) {
-    one.metrics.Add(frame, in_segment, estimator.state(), report);
-    if (options.recorder != nullptr) {
-      options.recorder->AddEstimate(index, frame, estimator.state(), report);
-    }
+  if (!one.ended && !estimator.offline()) {
+    one.Take(seen, estimator.state(), report, options.recorder);
   }
   const bool policy = one.named.on_divergence == OnDivergence::kFail && estimator.diverged();
   if (!one.ended && !policy) return true;
   if (result.status == RunStatus::kOk) {
     const std::string why = report.events.empty() ? "diverged" : report.events.back().text;
     char at[48];
-    std::snprintf(at, sizeof(at), " at t = %.6f s: ", Seconds(frame.stamp));
+    std::snprintf(at, sizeof(at), " at t = %.6f s: ", Seconds(seen.frame.stamp));
     Fail(result, ExitCode::kDiverged, "estimator '" + one.named.name + "'" + at + why);
   }
   return !policy;
 }
 
+/// The frames one by one through all estimators; those that an offline one needs again go to `kept`.
 void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunOptions& options,
-               RunResult& result) {
-  Frame frame;
-  std::vector<bool> in_segment(experiment.segments.size());
+               RunResult& result, std::vector<Seen>& kept) {
+  Seen seen;
+  seen.in_segment.resize(experiment.segments.size());
   const std::int64_t size = experiment.source->size();
-  while (experiment.source->Next(frame)) {
+  const bool keep = std::ranges::any_of(
+      running, [](const Running& one) { return one.named.estimator->offline(); });
+  while (experiment.source->Next(seen.frame)) {
     for (std::size_t i = 0; i < experiment.segments.size(); ++i) {
-      in_segment[i] = InSegment(experiment.segments[i], frame);
+      seen.in_segment[i] = InSegment(experiment.segments[i], seen.frame);
     }
-    if (options.recorder != nullptr) options.recorder->AddFrame(frame);
+    if (options.recorder != nullptr) options.recorder->AddFrame(seen.frame);
+    if (keep) kept.push_back(seen);
     bool go_on = true;
-    for (std::size_t i = 0; i < running.size(); ++i) {
-      go_on = Advance(running[i], static_cast<int>(i), frame, in_segment, options, result) && go_on;
-    }
+    for (Running& one : running) go_on = Advance(one, seen, options, result) && go_on;
     ++result.frames;
-    const auto ended = [](const Running& one) { return one.ended; };
-    if (!go_on || std::all_of(running.begin(), running.end(), ended)) return;
+    if (!go_on || std::ranges::all_of(running, &Running::ended)) return;
     if (options.progress) options.progress(result.frames, size);
     if (options.stop && options.stop()) {
       if (result.status != RunStatus::kOk) return;
@@ -119,6 +132,24 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
       result.reason = "stopped after " + std::to_string(result.frames) + " frames";
       return;
     }
+  }
+}
+
+/// The estimates of those that needed all frames.
+void SmoothAll(std::vector<Running>& running, const std::vector<Seen>& kept,
+               const RunOptions& options, RunResult& result) {
+  for (Running& one : running) {
+    Estimator& estimator = *one.named.estimator;
+    if (one.ended || !estimator.offline()) continue;
+    std::vector<Event> events;
+    estimator.Smooth([&](std::size_t k, const State& state, const UpdateReport& report) {
+      one.Take(kept[k], state, report, options.recorder);
+      events = report.events;
+    });
+    one.Note(events);
+    if (!estimator.failed()) continue;
+    Fail(result, ExitCode::kDiverged,
+         "estimator '" + one.named.name + "': " + (events.empty() ? "failed" : events.back().text));
   }
 }
 
@@ -141,11 +172,13 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
   std::vector<Running> running;
   try {
     for (NamedEstimator& named : experiment.estimators) {
-      running.push_back(
-          {named, Metrics(named, *experiment.source, experiment.segments), Begin(named), false});
+      running.push_back({named, static_cast<int>(running.size()),
+                         Metrics(named, *experiment.source, experiment.segments), Begin(named)});
     }
     if (options.recorder != nullptr) options.recorder->Start(experiment);
-    RunFrames(experiment, running, options, result);
+    std::vector<Seen> kept;
+    RunFrames(experiment, running, options, result, kept);
+    SmoothAll(running, kept, options, result);
   } catch (...) {
     // What was done so far is kept.
     Failure failure = CaughtFailure();
@@ -157,9 +190,8 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
     one.result.counts = one.metrics.counts();
     one.result.units = one.metrics.units();
     if (result.frames > 0) NoteUnused(one.named.system, one.result);
-    const std::vector<Event>& inconsistent = one.metrics.events();
-    one.result.events.insert(one.result.events.end(), inconsistent.begin(), inconsistent.end());
-    one.result.diverged = one.named.estimator->diverged() || !inconsistent.empty();
+    one.Note(one.metrics.events());
+    one.result.diverged = one.named.estimator->diverged() || !one.metrics.events().empty();
     result.estimators.push_back(std::move(one.result));
   }
   return result;

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "support/recording.h"
 
 namespace alidade {
@@ -58,6 +61,54 @@ TEST(Run, DivergenceUnderFailEndsTheRun) {
   EXPECT_EQ(result.code, ExitCode::kDiverged);
   EXPECT_EQ(result.frames, 1);
   EXPECT_NE(result.reason.find("not defined at target.depth = -0.2"), std::string::npos);
+}
+
+/// Says at the end that the depth was 1 m at the first frame, and a millimetre more at each next.
+struct Hindsight : Estimator {
+  explicit Hindsight(const System& system) : state_(system.InitialState()) {}
+  void Start(Stamp) override {}
+  const UpdateReport& Process(const Frame&) override {
+    ++frames_;
+    return report_;
+  }
+  bool offline() const override { return true; }
+  void Smooth(const Emit& emit) override {
+    for (std::size_t k = 0; k < frames_; ++k) {
+      *state_.value(0) = 1.0 + 1e-3 * static_cast<double>(k);
+      if (k + 1 == frames_) report_.events.push_back({kNoStamp, "hindsight", "all is known"});
+      emit(k, state_, report_);
+    }
+  }
+  const State& state() const override { return state_; }
+  Stamp stamp() const override { return kNoStamp; }
+  bool diverged() const override { return false; }
+  bool failed() const override { return false; }
+
+ private:
+  State state_;
+  UpdateReport report_;
+  std::size_t frames_ = 0;
+};
+
+TEST(Run, TakesTheEstimatesOfAnOfflineEstimatorAtTheEnd) {
+  Experiment experiment = MakeExperiment();
+  NamedEstimator& alone = experiment.estimators[1];
+  alone.estimator = std::make_unique<Hindsight>(alone.system);
+  Experiment truths = MakeExperiment();
+  Frame frame;
+  double squares = 0.0, known = 0.0;
+  for (double k = 0.0; truths.source->Next(frame); ++k) {
+    for (const double depth : frame.truth[0]) {
+      squares += std::pow(1.0 + 1e-3 * k - depth, 2);
+      ++known;
+    }
+  }
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.status, RunStatus::kOk);
+  EXPECT_NEAR(result.estimators[1].metrics.at("rmse:target.depth"), std::sqrt(squares / known),
+              1e-12);
+  const std::vector<Event>& events = result.estimators[1].events;
+  EXPECT_EQ(std::ranges::count(events, "all is known", &Event::text), 1);
 }
 
 TEST(Run, AStopIsTakenAfterTheFrame) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -89,16 +90,25 @@ class UpdateReport {
   std::size_t count_ = 0;
 };
 
-/// A recursive estimator over one system. It takes values and returns values: it neither reads
-/// files nor prints nor exits.
+/// An estimator over one system. It takes values and returns values: it neither reads files nor
+/// prints nor exits.
 class Estimator {
  public:
+  /// Takes the estimate of frame `index`, counted from the first call of Process, and its report.
+  using Emit = std::function<void(std::size_t index, const State&, const UpdateReport&)>;
+
   virtual ~Estimator() = default;
   /// Sets the time of the initial state.
   virtual void Start(Stamp stamp) = 0;
   /// Steps to the frame's stamp and uses those of its measurements that a sensor is bound to. The
   /// report is good until the next call.
   virtual const UpdateReport& Process(const Frame& frame) = 0;
+  /// True where an estimate depends on later frames too (a smoother, a batch): state() after
+  /// Process is then of no use to anyone but the estimator, and Smooth gives the estimates.
+  virtual bool offline() const { return false; }
+  /// Once, after the last frame: the estimates of all frames, in their order. The events of the
+  /// smoothing itself come with the last report.
+  virtual void Smooth(const Emit& /*emit*/) {}
   virtual const State& state() const = 0;
   virtual Stamp stamp() const = 0;
   /// True once the filter left the domain of its sensors or lost its numbers; see the events.

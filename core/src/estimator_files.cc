@@ -86,7 +86,7 @@ std::vector<std::string> EstimatorFiles::GainsHeader(const System& system) {
 }
 
 void EstimatorFiles::Add(const Frame& frame, const State& state, const UpdateReport& report) {
-  AddEstimate(frame, state);
+  if (!report.stale) AddEstimate(frame, state);
   for (const MeasurementReport& one : report.measurements()) {
     if (one.sensor < 0 || one.sensor >= static_cast<int>(recorded_.sensors.size())) continue;
     AddInnovation(frame.stamp, one);

@@ -18,6 +18,7 @@ class EstimatorFiles {
                  const std::vector<StreamInfo>& truths,
                  const std::vector<std::vector<std::string>>& truth_columns);
 
+  /// A frame older than the state has no row in estimates.csv: the state is not of its stamp.
   /// Error: kIo.
   void Add(const Frame& frame, const State& state, const UpdateReport& report);
   void Close();

@@ -79,7 +79,7 @@ FigureScript::FigureScript(std::string name, std::string title, Stamp first, Sta
       title_(std::move(title)),
       first_(first),
       last_(last),
-      span_s_(Seconds(last - first)) {}
+      span_s_(Seconds(last) - Seconds(first)) {}
 
 void FigureScript::EndPanel() {
   if (!plot_.empty()) body_ += "plot " + plot_ + "\n";
@@ -140,7 +140,8 @@ std::string FigureScript::Text() const {
           " noenhanced\n";
   // Stamps that count from 1970 would leave no room for what differs.
   const Stamp second = 1'000'000'000;
-  const Stamp origin = std::abs(first_ / second) > 100'000 ? first_ / second : 0;
+  const bool far = std::abs(first_ / second) > 100'000 && span_s_ < std::abs(Seconds(first_));
+  const Stamp origin = far ? first_ / second : 0;
   std::string first, last;
   AppendSeconds(first, first_ - origin * second);
   AppendSeconds(last, last_ - origin * second);

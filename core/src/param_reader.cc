@@ -81,6 +81,14 @@ ParamInfo Describe(const AlidadeParam& param) {
   return info;
 }
 
+/// Whether the defaults are there that it says it has; that of a choice is one of its names.
+bool GoodFallback(const AlidadeParam& param) {
+  if (!HasFallback(param) || param.count < 0) return true;
+  if (param.fallback == nullptr) return false;
+  const bool choice = param.kind == ALIDADE_PARAM_CHOICE;
+  return !choice || (param.fallback[0] >= 0.0 && param.fallback[0] < param.choice_count);
+}
+
 /// The parameter, where it follows the rules of plugin_abi.h; else an exception.
 AlidadeParam Checked(const AlidadeParam* from, const double* values, std::int32_t capacity) {
   if (from == nullptr) throw Error(ExitCode::kPlugin, "asks for no parameter at all");
@@ -89,7 +97,8 @@ AlidadeParam Checked(const AlidadeParam* from, const double* values, std::int32_
   const bool known = param.kind >= ALIDADE_PARAM_NUMBER && param.kind <= ALIDADE_PARAM_CHOICE;
   const bool choice = param.kind == ALIDADE_PARAM_CHOICE;
   if (key.empty() || !known || param.count == 0 || param.count < -1 || param.count > capacity ||
-      values == nullptr || choice != (param.choices != nullptr && param.choice_count > 0)) {
+      values == nullptr || choice != (param.choices != nullptr && param.choice_count > 0) ||
+      (choice && param.count != 1) || !GoodFallback(param)) {
     throw Error(ExitCode::kPlugin, "the plugin asks for parameter '" + key +
                                        "' in a way that this version does not understand");
   }

@@ -10,6 +10,38 @@
 namespace alidade {
 namespace {
 
+[[noreturn]] void Refuse(const Frame& frame, const std::string& what) {
+  char at[48];
+  std::snprintf(at, sizeof(at), " at t = %.6f s", Seconds(frame.stamp));
+  throw ContractViolation("the source gives " + what + at);
+}
+
+/// Throws ContractViolation for a frame that is not as Source::streams() and truths() say. Whatever
+/// takes the frame afterwards indexes by stream and reads as many values as these tell.
+void CheckFrame(const Frame& frame, const Source& source) {
+  const std::vector<StreamInfo>& streams = source.streams();
+  const std::vector<StreamInfo>& truths = source.truths();
+  const auto check = [&](const StreamInfo& info, const std::vector<double>& values) {
+    if (std::ssize(values) == info.size) return;
+    Refuse(frame, std::to_string(values.size()) + " values of '" + info.name + "', not " +
+                      std::to_string(info.size) + ',');
+  };
+  for (const Measurement& m : frame.measurements) {
+    if (m.stream < 0 || m.stream >= std::ssize(streams)) {
+      Refuse(frame, "a measurement of stream " + std::to_string(m.stream) + " of " +
+                        std::to_string(streams.size()));
+    }
+    check(streams[static_cast<std::size_t>(m.stream)], m.values);
+  }
+  if (frame.truth.size() > truths.size()) {
+    Refuse(frame,
+           std::to_string(frame.truth.size()) + " truths of " + std::to_string(truths.size()));
+  }
+  for (std::size_t t = 0; t < frame.truth.size(); ++t) {
+    if (!frame.truth[t].empty()) check(truths[t], frame.truth[t]);
+  }
+}
+
 /// Whether the frame has a measurement of the segment's stream that its sensor finds valid.
 bool InSegment(const Segment& segment, const Frame& frame) {
   const auto seen = [&](const Measurement& m) {
@@ -115,6 +147,7 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
   const bool keep = std::ranges::any_of(
       running, [](const Running& one) { return one.named.estimator->offline(); });
   while (experiment.source->Next(seen.frame)) {
+    CheckFrame(seen.frame, *experiment.source);
     for (std::size_t i = 0; i < experiment.segments.size(); ++i) {
       seen.in_segment[i] = InSegment(experiment.segments[i], seen.frame);
     }

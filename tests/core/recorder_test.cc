@@ -153,6 +153,25 @@ TEST(Recorder, WritesAbsentFixedAndRejected) {
   EXPECT_EQ(Read(folder / "out/implied.csv"), "t_s,sensor,a.waits\n");  // invalid: implies nothing
 }
 
+TEST(Recorder, AFrameOlderThanTheStateHasNoEstimate) {
+  const TemporaryFolder folder;
+  Experiment experiment = MakeExperiment(6);  // one frame each 33 ms
+  NamedEstimator& ekf = experiment.estimators[0];
+  ekf.system.start_s = 0.066;
+  ekf.estimator = std::make_unique<Ekf>(ekf.system, EkfOptions{}, experiment.source->streams());
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  recorder.Finish(RunInto(recorder, experiment));
+  std::vector<std::string> stamps;
+  for (const std::string& line : Lines(folder / "out/ekf/estimates.csv")) {
+    stamps.push_back(Cells(line)[0]);
+  }
+  EXPECT_EQ(stamps, (std::vector<std::string>{"t_s", "0.066000000", "0.099000000", "0.132000000",
+                                              "0.165000000"}));
+  // 26 px m at 0.3 m
+  EXPECT_EQ(Lines(folder / "out/ekf/innovations.csv")[1].substr(0, 46),
+            "0.000000000,disparity,disparity,,stale,1,,86.6");
+}
+
 TEST(Recorder, QuotesTextsInEvents) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "out"));

@@ -210,6 +210,54 @@ TEST(Run, ADefectIsAResultToo) {
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 5);
 }
 
+/// Spoils its fourth frame.
+class Spoiling : public testing::SwingingTarget {
+ public:
+  explicit Spoiling(void (*spoil)(Frame&)) : SwingingTarget(60), spoil_(spoil) {}
+  bool Next(Frame& frame) override {
+    const bool more = SwingingTarget::Next(frame);
+    if (++count_ == 4) spoil_(frame);
+    return more;
+  }
+
+ private:
+  void (*spoil_)(Frame&);
+  int count_ = 0;
+};
+
+TEST(Run, AFrameThatBreaksTheContractOfItsSourceEndsTheRun) {
+  struct Case {
+    void (*spoil)(Frame&);
+    std::string reason;
+  };
+  for (const Case& one : std::vector<Case>{
+           {[](Frame& f) { f.measurements[0].values.clear(); },
+            "0 values of 'inverse_scale', not 1"},
+           {[](Frame& f) {
+              f.measurements[0].values = {1, 2};
+            },
+            "2 values of 'inverse_scale', not 1"},
+           {[](Frame& f) { f.measurements[0].stream = -1; }, "a measurement of stream -1 of 2"},
+           {[](Frame& f) { f.measurements[0].stream = 2; }, "a measurement of stream 2 of 2"},
+           {[](Frame& f) {
+              f.truth[0] = {1, 2};
+            },
+            "2 values of 'depth', not 1"},
+           {[](Frame& f) { f.truth.resize(2); }, "2 truths of 1"}}) {
+    Experiment experiment = MakeExperiment();
+    const SensorModel stereo = experiment.estimators[0].system.sensors[1].model;
+    experiment.segments.push_back({"near", 1, true, stereo});
+    experiment.source = std::make_unique<Spoiling>(one.spoil);
+    const RunResult result = alidade::Run(experiment, {});
+    EXPECT_EQ(result.code, ExitCode::kInternal);
+    EXPECT_NE(result.reason.find("the source gives " + one.reason), std::string::npos)
+        << result.reason;
+    EXPECT_NE(result.reason.find("at t = 0.099000 s"), std::string::npos) << result.reason;
+    EXPECT_EQ(result.frames, 3);
+    EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 3);
+  }
+}
+
 TEST(Run, TheSameSeedGivesTheSameMetricsTwice) {
   Experiment first = MakeExperiment(), second = MakeExperiment();
   EXPECT_EQ(alidade::Run(first, {}).estimators[0].metrics,

@@ -234,6 +234,24 @@ TEST_F(HostTest, ParametersThatDoNotFitTogetherAreABadConfig) {
               [&] { host.CreateSensor("misfit", unlucky.root()); });
 }
 
+TEST_F(HostTest, AParameterDeclaredAgainstTheRulesIsRefused) {
+  const PluginHost host({Built("bad_create")});
+  for (const char* name :
+       {"no_default", "no_number", "two_choices", "any_choices", "default_beyond"}) {
+    const Config config = Parse(std::string("{model: ") + name + '}');
+    // A parameter in the config is read by the same declaration.
+    const Config given = Parse(std::string("{model: ") + name + ", noise: [fixed, free]}");
+    for (const Config* one : {&config, &given}) {
+      ExpectError(ExitCode::kBadConfig, {"asks for parameter 'noise' in a way that"},
+                  [&] { host.CreateSensor(name, one->root()); });
+    }
+    const auto has_name = [&](const PluginEntry& entry) { return entry.name == name; };
+    const auto entry = std::find_if(host.entries().begin(), host.entries().end(), has_name);
+    ASSERT_NE(entry, host.entries().end());
+    EXPECT_TRUE(host.Schema(*entry).empty()) << name;
+  }
+}
+
 // ---- parameters ---------------------------------------------------------------------------------
 
 TEST_F(HostTest, AllBadParametersAreToldAtOnce) {

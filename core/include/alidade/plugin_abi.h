@@ -87,7 +87,7 @@ enum {
   ALIDADE_PARAM_NUMBER = 1,
   ALIDADE_PARAM_INTEGER = 2,
   ALIDADE_PARAM_FLAG = 3,
-  ALIDADE_PARAM_CHOICE = 4 /* read as the index into `choices` */
+  ALIDADE_PARAM_CHOICE = 4 /* read as the index into `choices`; one at a time */
 };
 enum {
   ALIDADE_PARAM_HAS_DEFAULT = 1,
@@ -104,7 +104,8 @@ typedef struct AlidadeParam {
   int32_t count; /* values asked for; -1: a list of any length */
   uint32_t flags;
   double low, high;
-  const double* fallback; /* `count` defaults, where ALIDADE_PARAM_HAS_DEFAULT */
+  const double*
+      fallback; /* `count` defaults, where ALIDADE_PARAM_HAS_DEFAULT; a choice's: an index */
   const char* const* choices;
   int32_t choice_count, reserved0;
   void* reserved[4];

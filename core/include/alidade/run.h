@@ -83,7 +83,9 @@ struct RunOptions {
 
 /// Runs all estimators over the source, frame by frame, so that all see the same data. Data errors
 /// and divergence under `fail` end the run early; an estimator that has nothing left to go on with
-/// ends by itself. Both, and whatever else goes wrong, are in the result; nothing is thrown.
+/// ends by itself; a frame that is not as the source's streams() and truths() say ends the
+/// run. All that, and
+/// whatever else goes wrong, is in the result; nothing is thrown.
 RunResult Run(Experiment& experiment, const RunOptions& options);
 
 /// A table of the estimators' main metrics, one column each, for a terminal.

@@ -34,7 +34,8 @@ struct Measurement {
 struct Frame {
   Stamp stamp = 0;
   std::vector<Measurement> measurements;
-  /// One value list for each entry of Source::truths(); an empty list is unknown at this stamp.
+  /// One value list for each entry of Source::truths(), of its size; what is empty, or lacks at the
+  /// end, is unknown at this stamp.
   std::vector<std::vector<double>> truth;
 };
 
@@ -51,7 +52,9 @@ class Source {
   virtual const std::vector<StreamInfo>& streams() const = 0;
   /// Values that the source knows exactly, named like the blocks they are truth of.
   virtual const std::vector<StreamInfo>& truths() const = 0;
-  /// Fills `frame` with the next one; false at the end. Errors: kBadData, kIo.
+  /// Fills `frame` with the next one; false at the end. Its streams are indices into streams(), its
+  /// values as many as streams() and truths() say: what is not ends the run as internal.
+  /// Errors: kBadData, kIo.
   virtual bool Next(Frame& frame) = 0;
   /// Frames in all, or -1 where that is not known (for progress only).
   virtual std::int64_t size() const { return -1; }

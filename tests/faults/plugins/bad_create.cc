@@ -26,9 +26,53 @@ void MakeWrongKind(alidade::Params& p, AlidadeInstance* instance) {
   instance->kind = ALIDADE_KIND_MOTION;
 }
 
+constexpr const char* kNames[] = {"fixed", "free"};
+constexpr double kBeyond = 7.0;
+
+constexpr AlidadeParam Declared(std::uint32_t kind, std::int32_t count, const double* fallback,
+                                std::uint32_t flags) {
+  AlidadeParam param{};
+  param.struct_size = sizeof(param);
+  param.kind = kind;
+  param.key = "noise";
+  param.count = count;
+  param.flags = flags;
+  param.fallback = fallback;
+  if (kind == ALIDADE_PARAM_CHOICE) {
+    param.choices = kNames;
+    param.choice_count = 2;
+  }
+  return param;
+}
+constexpr AlidadeParam kNoDefault =
+    Declared(ALIDADE_PARAM_CHOICE, 1, nullptr, ALIDADE_PARAM_HAS_DEFAULT);
+constexpr AlidadeParam kNoNumber =
+    Declared(ALIDADE_PARAM_NUMBER, 2, nullptr, ALIDADE_PARAM_HAS_DEFAULT);
+constexpr AlidadeParam kTwoChoices = Declared(ALIDADE_PARAM_CHOICE, 2, nullptr, 0);
+constexpr AlidadeParam kAnyChoices = Declared(ALIDADE_PARAM_CHOICE, -1, nullptr, 0);
+constexpr AlidadeParam kDefaultBeyond =
+    Declared(ALIDADE_PARAM_CHOICE, 1, &kBeyond, ALIDADE_PARAM_HAS_DEFAULT);
+
+/// A model that reads `kParam` without the help of alidade::Params, which always gives a whole one.
+template <const AlidadeParam& kParam>
+AlidadeEntry Reading(const char* name) {
+  AlidadeEntry entry = ALIDADE_SENSOR(Probe, name, "", "");
+  entry.create = [](const AlidadeHost* host, AlidadeInstance* instance) -> std::int32_t {
+    double values[2] = {};
+    host->read(host->context, &kParam, values, 2);
+    alidade::Params params(host);
+    alidade::EmplaceSensor<Probe>(params, instance);
+    return ALIDADE_OK;
+  };
+  return entry;
+}
+
 }  // namespace
 
 ALIDADE_PLUGIN(ALIDADE_SENSOR(Throws, "throws", "", ""),
                ALIDADE_SENSOR(ThrowsInt, "throws_int", "", ""),
                ALIDADE_SENSOR(Misfit, "misfit", "", ""),
-               ALIDADE_SENSOR_BY(MakeWrongKind, "wrong_kind", "", ""))
+               ALIDADE_SENSOR_BY(MakeWrongKind, "wrong_kind", "", ""),
+               Reading<kNoDefault>("no_default"), Reading<kNoNumber>("no_number"),
+               Reading<kTwoChoices>("two_choices"), Reading<kAnyChoices>("any_choices"),
+               Reading<kDefaultBeyond>("default_beyond"))

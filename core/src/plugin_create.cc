@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <exception>
+#include <iterator>
 #include <sstream>
 
 #include "abi_read.h"
@@ -15,9 +17,7 @@ using internal::ParamReader;
 using internal::ParamRecorder;
 
 std::uint32_t ToKind(PluginEntry::Kind kind) {
-  if (kind == PluginEntry::Kind::kSensor) return ALIDADE_KIND_SENSOR;
-  if (kind == PluginEntry::Kind::kMotion) return ALIDADE_KIND_MOTION;
-  return ALIDADE_KIND_LANDMARK_FORM;
+  return kind == PluginEntry::Kind::kSensor ? ALIDADE_KIND_SENSOR : ALIDADE_KIND_MOTION;
 }
 
 /// An instance that `create` has filled, destroyed unless it is released.
@@ -61,6 +61,19 @@ std::string Line(const std::string& what, const Space& space) {
   if (!space.doc.empty()) line += "; " + space.doc;
   if (space.optional()) line += " (optional)";
   return line;
+}
+
+/// What the model says of itself beside its blocks.
+std::vector<std::string> Capabilities(const ModelInstance& model) {
+  const auto can = [&](unsigned what) { return (model.capabilities() & what) != 0; };
+  std::vector<std::string> lines = {std::string("Jacobians: ") +
+                                    (can(ALIDADE_CLOSED_FORM) ? "closed form" : "derived")};
+  if (can(ALIDADE_HAS_VALIDITY)) lines.emplace_back("refuses measurements of no use by itself");
+  if (can(ALIDADE_CAN_INITIALISE)) {
+    const int role = model.c().description->initialise_role;
+    lines.push_back("can initialise " + model.spaces()[static_cast<std::size_t>(role)].name);
+  }
+  return lines;
 }
 
 /// The `keys` of a source: `key  meaning` on each line.
@@ -190,6 +203,7 @@ std::vector<std::string> PluginHost::Describe(const PluginEntry& entry) const {
   if (!model.space().name.empty()) {
     lines.push_back(Line(sensor ? "measurement" : "input", model.space()));
   }
+  std::ranges::copy(Capabilities(model), std::back_inserter(lines));
   return lines;
 }
 

@@ -57,9 +57,7 @@ std::optional<fs::path> FolderOfProgram() {
 }
 
 PluginEntry::Kind ToKind(std::uint32_t kind) {
-  if (kind == ALIDADE_KIND_SENSOR) return PluginEntry::Kind::kSensor;
-  if (kind == ALIDADE_KIND_MOTION) return PluginEntry::Kind::kMotion;
-  return PluginEntry::Kind::kLandmarkForm;
+  return kind == ALIDADE_KIND_SENSOR ? PluginEntry::Kind::kSensor : PluginEntry::Kind::kMotion;
 }
 
 /// Opens the library for the rest of the process.

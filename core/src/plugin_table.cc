@@ -30,7 +30,10 @@ std::string EntryDefect(const AlidadeEntry& entry, std::uint32_t stride) {
     return "states a size of " + Number(entry.struct_size) + " bytes";
   }
   if (!GoodName(entry.name)) return "has no name";
-  if (entry.kind < ALIDADE_KIND_SENSOR || entry.kind > ALIDADE_KIND_LANDMARK_FORM) {
+  if (entry.kind == ALIDADE_KIND_LANDMARK_FORM) {
+    return "is a landmark form, which this version does not support";
+  }
+  if (entry.kind != ALIDADE_KIND_SENSOR && entry.kind != ALIDADE_KIND_MOTION) {
     return "is of unknown kind " + Number(entry.kind);
   }
   if (entry.create == nullptr) return "cannot be created";
@@ -91,8 +94,6 @@ const char* KindName(PluginEntry::Kind kind) {
       return "sensor";
     case PluginEntry::Kind::kMotion:
       return "motion model";
-    case PluginEntry::Kind::kLandmarkForm:
-      return "landmark form";
     case PluginEntry::Kind::kSource:
       return "source";
   }

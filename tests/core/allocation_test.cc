@@ -26,7 +26,9 @@ namespace alidade {
 namespace {
 
 TEST(Allocation, AStepOfTheFilterTakesNone) {
-  const System system = testing::DepthFilter();
+  System system = testing::DepthFilter();
+  testing::AddMotion(system, "walk", InProcessMotion(Constant<>(1, 0.1), "constant"),
+                     {{"value", 0.0, 1.0}});
   for (const Fuse fuse : {Fuse::kJoint, Fuse::kPerSensor, Fuse::kPerMeasurement}) {
     EkfOptions options;
     options.fuse = fuse;

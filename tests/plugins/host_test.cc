@@ -177,6 +177,8 @@ TEST_F(HostTest, ABadTableIsRefused) {
       {"NO_CREATE", "entry 1 of its table cannot be created"},
       {"NAME_TWICE", "names 'probe' twice"},
       {"NO_ENTRY_SYMBOL", "does not export alidade_plugin"},
+      {"LANDMARK_FORM", "entry 1 of its table is a landmark form, which this version"},
+      {"UNKNOWN_KIND", "entry 1 of its table is of unknown kind 9"},
       {"EMPTY", "table has 0 entries"}};
   for (const auto& [fault, words] : faults) {
     ExpectRefused(Built(std::string("table_") + fault), {words});
@@ -319,9 +321,25 @@ TEST_F(HostTest, TheSchemaTellsWhatEachChoiceReads) {
 TEST_F(HostTest, DescribesRolesAndMeasurement) {
   const PluginHost host({Built("range_rate")});
   const std::vector<std::string> lines = host.Describe(host.entries().front());
-  ASSERT_EQ(lines.size(), 3u);
+  ASSERT_EQ(lines.size(), 4u);
   EXPECT_EQ(lines[0], "role position: vector(2), m; of the point");
   EXPECT_EQ(lines[2], "measurement range_rate: vector(1), m/s; closing is negative");
+  EXPECT_EQ(lines[3], "Jacobians: derived");
+}
+
+TEST_F(HostTest, DescribesWhatAModelCanDo) {
+  const PluginHost host;
+  const auto behind_the_blocks = [&](const std::string& name, std::size_t blocks) {
+    const auto has_name = [&](const PluginEntry& entry) { return entry.name == name; };
+    const std::vector<std::string> lines =
+        host.Describe(*std::find_if(host.entries().begin(), host.entries().end(), has_name));
+    return std::vector<std::string>(lines.begin() + std::ptrdiff_t(blocks), lines.end());
+  };
+  using Lines = std::vector<std::string>;
+  EXPECT_EQ(behind_the_blocks("stereo_disparity", 2),
+            (Lines{"Jacobians: derived", "refuses measurements of no use by itself",
+                   "can initialise depth"}));
+  EXPECT_EQ(behind_the_blocks("constant", 1), Lines{"Jacobians: closed form"});
 }
 
 // ---- build tier ---------------------------------------------------------------------------------

@@ -35,7 +35,6 @@ struct SourceEntry {
 
 struct BuildTable {
   std::uint32_t struct_size = sizeof(BuildTable);
-  const AlidadeFingerprint* fingerprint = nullptr;
   const SourceEntry* sources = nullptr;
   int source_count = 0;
 };
@@ -51,7 +50,7 @@ inline constexpr const char* kBuildEntrySymbol = "alidade_build_plugin";
   alidade_build_plugin() {                                                     \
     static const alidade::SourceEntry sources[] = {__VA_ARGS__};               \
     static const alidade::BuildTable table = {                                 \
-        sizeof(alidade::BuildTable), &alidade_fingerprint, sources,            \
+        sizeof(alidade::BuildTable), sources,                                  \
         static_cast<int>(sizeof(sources) / sizeof(sources[0]))};               \
     return &table;                                                             \
   }

@@ -46,14 +46,13 @@ struct MatrixRef {
 ///
 ///   bool Valid(const double* z) const;
 ///   static constexpr int kInitialises;                                  the role y below
-///   static constexpr int kPrior;                                        size of the prior, or 0
-///   template <class T> bool Initialise(const T* other..., const T* z, [const T* prior,] T* y)
+///   template <class T> bool Initialise(const T* other..., const T* z, T* y) const;
 ///   void Jacobian(const double* role..., MatrixRef J_z_role...) const;  closed form, zeroed
 template <class MeasurementGeometry, class... RoleGeometries>
 struct Sensor {
   using Measurement = MeasurementGeometry;
   using Spaces = std::tuple<RoleGeometries...>;
-  static constexpr int kPrior = 0;
+  static constexpr int kPrior = 0;  // of Initialise: no config gives a prior
   static constexpr int kInitialises = -1;
 };
 
@@ -111,8 +110,6 @@ void ForEach(const F& f, std::index_sequence<I...>) {
 /// `const T*` for every index.
 template <class T, std::size_t>
 using Pointer = const T*;
-template <class T, std::size_t>
-using MutablePointer = T*;
 template <std::size_t>
 using Matrix = MatrixRef;
 

@@ -130,7 +130,7 @@ class MotionModel {
   const void* self_;
   int noise_size_ = 0;
   int tangent_size_ = 0;
-  std::vector<double> zero_noise_;
+  std::vector<double> zero_noise_;  ///< so that a model of dynamic noise allocates none in a step
 };
 
 }  // namespace alidade

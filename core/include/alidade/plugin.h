@@ -26,6 +26,8 @@ void Publish(std::unique_ptr<Holder<Model>> holder, std::uint32_t kind, AlidadeI
 
 template <class Model>
 void PublishSensor(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* instance) {
+  static_assert(Model::kPrior == 0,
+                "no config gives a prior: Initialise takes the other roles and z alone");
   using Z = typename Model::Measurement;
   constexpr auto roles = Model::kRoles;  // copies, lest they too be shared
   constexpr Quantity measurement = Model::kMeasurement;
@@ -53,6 +55,9 @@ void PublishMotion(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* insta
     holder->description.input = &holder->space;
   }
   holder->description.noise_count = NoiseSizeOf(holder->model);
+  if constexpr (HasStepJacobian<Model, typename Blocks<Model>::Indices>::value) {
+    holder->description.capabilities |= ALIDADE_CLOSED_FORM;
+  }
   if constexpr (HasStationary<Model>::value) {
     if (holder->model.Stationary()) holder->description.capabilities |= ALIDADE_STATIONARY;
   }

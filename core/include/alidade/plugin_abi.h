@@ -134,8 +134,7 @@ enum {
   ALIDADE_HAS_VALIDITY = 2,
   ALIDADE_RESIDUAL_ONLY = 4, /* recursive estimators refuse it */
   ALIDADE_CLOSED_FORM = 8,   /* Jacobians written by the author, not derived */
-  ALIDADE_STATE_DEPENDENT_NOISE = 16,
-  ALIDADE_STATIONARY = 32 /* motion: x' = x without noise; step need not be called */
+  ALIDADE_STATIONARY = 16    /* motion: x' = x without noise; step need not be called */
 };
 
 typedef struct AlidadeDescription {

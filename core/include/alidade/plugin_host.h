@@ -28,7 +28,7 @@ struct ParamInfo {
 
 /// A model or source that a loaded plugin offers.
 struct PluginEntry {
-  enum class Kind { kSensor, kMotion, kLandmarkForm, kSource } kind;
+  enum class Kind { kSensor, kMotion, kSource } kind;
   std::string name, doc, citation, family;
   std::filesystem::path plugin;  ///< the file it came from
   unsigned thread_flags = 0;     ///< ALIDADE_THREAD_*; of a source 0
@@ -68,7 +68,8 @@ class PluginHost {
   const std::vector<PluginEntry>& entries() const { return entries_; }
   /// The parameters of a model, found by creating it with stand-in values, each choice in turn.
   std::vector<ParamInfo> Schema(const PluginEntry& entry) const;
-  /// Roles, measurement or blocks of a model with stand-in parameters, for `plugins info`.
+  /// Roles, measurement or blocks of a model with stand-in parameters, and what it can do, a line
+  /// each, for `plugins info`.
   std::vector<std::string> Describe(const PluginEntry& entry) const;
   /// Every place looked at, in order, with what was found there.
   const std::vector<std::string>& searched() const { return searched_; }

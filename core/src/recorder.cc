@@ -5,6 +5,7 @@
 #include <ctime>
 #include <fstream>
 #include <optional>
+#include <set>
 #include <sstream>
 
 #include "estimator_files.h"
@@ -36,6 +37,7 @@ struct Recorder::Impl {
   const PluginHost& host;
   std::string title, config_text, source_type;
   internal::RunFacts facts;
+  std::set<std::filesystem::path> hashed;  ///< plugins that are in the facts
   std::optional<internal::SourceFiles> source;
   std::vector<std::unique_ptr<internal::EstimatorFiles>> estimators;
   std::vector<std::string> highlights;
@@ -81,8 +83,8 @@ Recorder::Impl::Impl(const Options& given, const Config& config, const PluginHos
 
 void Recorder::Impl::AddPlugin(const std::filesystem::path& file) {
   if (!file.is_absolute()) return;  // a model made in this process
-  const auto [entry, is_new] = facts.plugins.try_emplace(file.filename().string());
-  if (is_new) entry->second = internal::Sha256OfFile(file);
+  if (!hashed.insert(file).second) return;
+  facts.plugins.emplace(file.filename().string(), internal::Sha256OfFile(file));
 }
 
 void Recorder::Impl::AddPlugins(const Experiment& experiment) {

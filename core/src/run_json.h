@@ -11,8 +11,8 @@ namespace alidade::internal {
 /// What run.json says beside the result.
 struct RunFacts {
   std::uint64_t seed = 0;
-  std::map<std::string, std::string> plugins;  ///< file name -> SHA-256 of the file
-  std::map<std::string, std::string> types;    ///< estimator -> its type
+  std::multimap<std::string, std::string> plugins;  ///< file name -> SHA-256, for each file
+  std::map<std::string, std::string> types;         ///< estimator -> its type
 };
 
 /// The text of `run.json`: keys as in docs/run_folder.md, which other programs read.

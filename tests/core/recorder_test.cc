@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/src/number_text.h"
+#include "core/src/sha256.h"
 #include "support/recording.h"
 
 namespace alidade {
@@ -179,6 +180,37 @@ TEST(Recorder, QuotesTextsInEvents) {
             "t_s,kind,text\n"
             "0.033000000,note,\"a \"\"word\"\", and\nanother\"\n"
             ",note,timeless\n");
+}
+
+/// A sensor that says it came from `plugin`.
+SensorModel SensorFrom(const fs::path& plugin) {
+  AlidadeInstance instance{};
+  instance.struct_size = sizeof(instance);
+  detail::PublishSensor(std::make_unique<detail::Holder<Linear>>(Linear(1.0, 1.0)), &instance);
+  return SensorModel(std::make_shared<const ModelInstance>(instance, "linear", plugin.string()));
+}
+
+TEST(Recorder, TellsPluginsOfOneNameApart) {
+  const TemporaryFolder folder;
+  std::string expected = "\"plugins\": [";
+  Experiment experiment = MakeExperiment();
+  for (const char* where : {"b", "a"}) {  // in the order of the config, whatever the folders are
+    fs::create_directory(folder / where);
+    const fs::path plugin = folder / where / "models.so";
+    std::ofstream(plugin) << "bytes of " << where;
+    for (NamedEstimator& named : experiment.estimators) {
+      testing::AddSensor(named.system, where, SensorFrom(plugin), {"target.depth"});
+    }
+    expected.append(expected.back() == '[' ? "" : ",")
+        .append("\n    {\n      \"file\": \"models.so\",\n      \"sha256\": \"")
+        .append(internal::Sha256OfFile(plugin))
+        .append("\"\n    }");
+  }
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  recorder.Start(experiment);
+  recorder.Finish({});
+  const std::string json = Read(folder / "out/run.json");
+  EXPECT_NE(json.find(expected + "\n  ]"), std::string::npos) << json;
 }
 
 TEST(Recorder, RunJsonHasTheAgreedKeys) {

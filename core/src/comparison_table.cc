@@ -9,6 +9,7 @@
 #include <string_view>
 #include <tuple>
 
+#include "names.h"
 #include "number_text.h"
 
 namespace alidade {
@@ -121,7 +122,7 @@ double LargestRmse(const RunResult& result, const std::string& unit) {
   return largest;
 }
 
-ComparisonRow MetricRow(const RunResult& result, const std::string& key) {
+ComparisonRow RowOf(const RunResult& result, const std::string& key) {
   const std::string_view kind = KindOf(key);
   Values values = ValuesOf(result, key);
   Scaled scaled;
@@ -179,10 +180,10 @@ std::vector<std::string> OrderedCounts(const RunResult& result) {
   return keys;
 }
 
-std::vector<ComparisonRow> ComparisonRows(const RunResult& result) {
+std::vector<ComparisonRow> MetricRows(const RunResult& result) {
   std::vector<ComparisonRow> rows;
   for (const std::string& key : OrderedMetrics(result)) {
-    if (IsMain(result, key)) rows.push_back(MetricRow(result, key));
+    if (IsMain(result, key)) rows.push_back(RowOf(result, key));
   }
   for (const std::string& key : OrderedCounts(result)) {
     ComparisonRow row{std::string(KindOf(key)) + ' ' + std::string(SubjectOf(key)), {}};
@@ -192,6 +193,11 @@ std::vector<ComparisonRow> ComparisonRows(const RunResult& result) {
     }
     rows.push_back(std::move(row));
   }
+  return rows;
+}
+
+std::vector<ComparisonRow> ComparisonRows(const RunResult& result) {
+  std::vector<ComparisonRow> rows = MetricRows(result);
   ComparisonRow diverged{"diverged", {}};
   for (const EstimatorResult& one : result.estimators) {
     diverged.cells.emplace_back(one.diverged ? "yes" : "no");
@@ -200,50 +206,44 @@ std::vector<ComparisonRow> ComparisonRows(const RunResult& result) {
   return rows;
 }
 
-}  // namespace internal
-
-namespace {
-
-constexpr std::size_t kLineWidth = 100;
-constexpr std::size_t kGap = 2;
-
-void AppendRight(std::string& line, const std::string& cell, std::size_t width) {
-  line.append(width - std::min(width, cell.size()), ' ');
-  line += cell;
-}
-
-}  // namespace
-
-std::string ComparisonTable(const RunResult& result) {
-  const std::vector<internal::ComparisonRow> rows = internal::ComparisonRows(result);
-  const std::size_t columns = result.estimators.size();
+std::string EstimatorTable(const std::vector<std::string>& names,
+                           const std::vector<ComparisonRow>& rows) {
+  constexpr std::size_t kLineWidth = 100, kGap = 2;
   std::size_t label_width = 0;
   std::vector<std::size_t> widths;
-  for (const EstimatorResult& one : result.estimators) widths.push_back(one.name.size());
-  for (const auto& row : rows) {
+  for (const std::string& name : names) widths.push_back(name.size());
+  for (const ComparisonRow& row : rows) {
     label_width = std::max(label_width, row.label.size());
-    for (std::size_t c = 0; c < columns; ++c) widths[c] = std::max(widths[c], row.cells[c].size());
+    for (std::size_t c = 0; c < widths.size(); ++c) {
+      widths[c] = std::max(widths[c], row.cells[c].size());
+    }
   }
   std::string text;
-  // Estimators that do not fit beside the others go into a table below.
-  for (std::size_t first = 0, end = 0; first < columns; first = end) {
+  for (std::size_t first = 0, end = 0; first < names.size(); first = end) {
     std::size_t width = label_width;
-    for (end = first; end < columns; ++end) {
+    for (end = first; end < names.size(); ++end) {
       width += kGap + widths[end];
       if (width > kLineWidth && end > first) break;
     }
     if (first > 0) text += '\n';
-    const auto append_line = [&](const std::string& label, const auto& cell) {
-      std::string line = label;
+    const auto append_line = [&](std::string line, const std::vector<std::string>& cells) {
       line.resize(label_width, ' ');
-      for (std::size_t c = first; c < end; ++c) AppendRight(line, cell(c), kGap + widths[c]);
+      for (std::size_t c = first; c < end; ++c) {
+        line.append(kGap + widths[c] - cells[c].size(), ' ').append(cells[c]);
+      }
       text += line + '\n';
     };
-    append_line("", [&](std::size_t c) { return result.estimators[c].name; });
-    for (const auto& row : rows)
-      append_line(row.label, [&](std::size_t c) { return row.cells[c]; });
+    append_line("", names);
+    for (const ComparisonRow& row : rows) append_line(row.label, row.cells);
   }
   return text;
+}
+
+}  // namespace internal
+
+std::string ComparisonTable(const RunResult& result) {
+  return internal::EstimatorTable(internal::NamesOf(result.estimators),
+                                  internal::ComparisonRows(result));
 }
 
 }  // namespace alidade

@@ -21,6 +21,12 @@ struct ComparisonRow {
   std::vector<std::string> cells;
 };
 /// The main metrics and all counts.
+std::vector<ComparisonRow> MetricRows(const RunResult& result);
+/// These, and whether it diverged.
 std::vector<ComparisonRow> ComparisonRows(const RunResult& result);
+/// Rows below the names of the estimators, aligned to the right. Estimators that do not fit beside
+/// the others in a line of 100 characters go into a table below.
+std::string EstimatorTable(const std::vector<std::string>& names,
+                           const std::vector<ComparisonRow>& rows);
 
 }  // namespace alidade::internal

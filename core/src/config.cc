@@ -174,11 +174,9 @@ class Loader {
  private:
   std::unique_ptr<ConfigTree> LoadIncludes(const ConfigTree& include, const fs::path& folder) {
     const Node node(&include);
-    const std::vector<Node> names =
-        node.kind() == Node::Kind::kList ? node.Items() : std::vector<Node>{node};
     auto merged = std::make_unique<ConfigTree>();
     merged->kind = Node::Kind::kMap;
-    for (const Node& name : names) {
+    for (const Node& name : node.ItemsOrOne()) {
       if (name.kind() != Node::Kind::kScalar)
         name.Fail("not a file name", "a file or a list of files");
       const fs::path file =

@@ -23,10 +23,7 @@ bool PlainSafe(std::string_view text) {
 bool HasMeaning(std::string_view text) {
   constexpr std::array<std::string_view, 8> kWords = {"true", "false", "yes",  "no",
                                                       "on",   "off",   "null", "nan"};
-  std::string word(text);
-  std::transform(word.begin(), word.end(), word.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
+  const std::string word = LowerCase(text);
   return !IsLetter(text[0]) || std::find(kWords.begin(), kWords.end(), word) != kWords.end();
 }
 

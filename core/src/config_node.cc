@@ -10,6 +10,7 @@ using internal::Child;
 using internal::FailAt;
 using internal::Join;
 using internal::KeyPlace;
+using internal::PathBelow;
 using internal::PathOf;
 using internal::Quoted;
 
@@ -30,6 +31,10 @@ const std::string& PathOf(const ConfigTree& tree) {
     path.insert(0, (dot ? "." : "") + Component(*at));
   }
   return tree.path = path;
+}
+
+std::string PathBelow(const std::string& path, std::string_view key) {
+  return path.empty() ? std::string(key) : path + '.' + std::string(key);
 }
 
 Place KeyPlace(const ConfigTree& tree) {
@@ -63,6 +68,14 @@ std::string Quoted(std::string_view text) {
   return quoted + (end < text.size() ? "...'" : "'");
 }
 
+std::string LowerCase(std::string_view text) {
+  std::string lower(text);
+  for (char& c : lower) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return lower;
+}
+
 void FailAt(const Place& place, std::string_view key, std::string_view what,
             std::string_view expected, std::string_view suggestion) {
   throw Error(ExitCode::kBadConfig, ErrorLine(place, key, what, expected, suggestion));
@@ -91,11 +104,6 @@ const ConfigTree& Expect(const ConfigTree& tree, Node::Kind kind, const char* ex
   return tree;
 }
 
-std::string PathBelow(const ConfigTree& map, std::string_view key) {
-  const std::string& path = PathOf(map);
-  return path.empty() ? std::string(key) : path + '.' + std::string(key);
-}
-
 [[noreturn]] void FailMissing(const ConfigTree& map, std::string_view key,
                               std::string_view needed_by) {
   std::vector<std::string> unread;
@@ -115,7 +123,7 @@ std::string PathBelow(const ConfigTree& map, std::string_view key) {
     const int line = Child(map, near)->key_line;
     if (line > 0) what += " at line " + std::to_string(line);
   }
-  FailAt(KeyPlace(map), PathBelow(map, key), what);
+  FailAt(KeyPlace(map), PathBelow(PathOf(map), key), what);
 }
 
 std::string UnknownKey(const ConfigTree& map, const ConfigTree& child) {
@@ -156,15 +164,6 @@ Node::Kind Node::kind() const { return tree_->kind; }
 const Place& Node::place() const { return tree_->place; }
 const std::string& Node::path() const { return PathOf(*tree_); }
 
-std::string Node::key() const {
-  const ConfigTree* named = tree_;
-  std::string indices;
-  for (; named->index >= 0; named = named->parent) {
-    indices.insert(0, '[' + std::to_string(named->index) + ']');
-  }
-  return named->key + indices;
-}
-
 std::optional<Node> Node::Find(std::string_view key) const {
   Declare(key);
   const ConfigTree* child = internal::Child(*tree_, key);
@@ -193,14 +192,15 @@ std::vector<Node> Node::Items() const {
   return items;
 }
 
+std::vector<Node> Node::ItemsOrOne() const {
+  return kind() == Kind::kList ? Items() : std::vector<Node>{*this};
+}
+
 bool Node::Flag() const {
   const ConfigTree& tree = Expect(*tree_, Kind::kScalar, "true or false");
   if (!tree.quoted && tree.text == "true") return true;
   if (!tree.quoted && tree.text == "false") return false;
-  std::string word = tree.text;
-  std::transform(word.begin(), word.end(), word.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
+  const std::string word = internal::LowerCase(tree.text);
   const bool yes = word == "true" || word == "yes" || word == "on" || word == "y" || word == "1";
   const bool no = word == "false" || word == "no" || word == "off" || word == "n" || word == "0";
   Fail((tree.quoted ? "the text " : "") + Quoted(tree.text), "true or false",

@@ -5,10 +5,12 @@
 #include <limits>
 
 #include "config_tree.h"
+#include "number_text.h"
 
 namespace alidade {
 namespace {
 
+using internal::NumberText;
 using internal::Quoted;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -18,18 +20,6 @@ bool IsDigit(char c) { return c >= '0' && c <= '9'; }
 std::size_t SkipDigits(std::string_view text, std::size_t at) {
   while (at < text.size() && IsDigit(text[at])) ++at;
   return at;
-}
-
-std::string Shortest(double value) {
-  char buffer[32];
-  return std::string(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr);
-}
-
-std::string SixDigits(double value) {
-  char buffer[32];
-  const auto end =
-      std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::general, 6);
-  return std::string(buffer, end.ptr);
 }
 
 /// The digits of a decimal number: [+-] digits [. digits] [e [+-] digits].
@@ -65,14 +55,14 @@ Decimal Scan(std::string_view text) {
 std::string Interval(const char* kind, double low, double high, bool low_open, bool high_open) {
   std::string text = kind;
   if (low == -kInfinity && high == kInfinity) return text;
-  if (high == kInfinity) return text + (low_open ? " > " : " >= ") + Shortest(low);
-  if (low == -kInfinity) return text + (high_open ? " < " : " <= ") + Shortest(high);
-  return text + " in " + (low_open ? '(' : '[') + Shortest(low) + ", " + Shortest(high) +
+  if (high == kInfinity) return text + (low_open ? " > " : " >= ") + NumberText(low);
+  if (low == -kInfinity) return text + (high_open ? " < " : " <= ") + NumberText(high);
+  return text + " in " + (low_open ? '(' : '[') + NumberText(low) + ", " + NumberText(high) +
          (high_open ? ')' : ']');
 }
 
 /// The text of a plain scalar that is a decimal number as `expected` says, without a leading '+'.
-std::string_view NumberText(const ConfigTree& tree, const std::string& expected) {
+std::string_view DecimalText(const ConfigTree& tree, const std::string& expected) {
   const Node node(&tree);
   if (tree.kind == Node::Kind::kNull) node.Fail("no value", expected);
   if (tree.kind == Node::Kind::kList) node.Fail("a list", expected);
@@ -86,7 +76,7 @@ std::string_view NumberText(const ConfigTree& tree, const std::string& expected)
 }
 
 double ReadNumber(const ConfigTree& tree, const std::string& expected) {
-  const std::string_view text = NumberText(tree, expected);
+  const std::string_view text = DecimalText(tree, expected);
   double value = 0;
   const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
   if (result.ec != std::errc()) {
@@ -121,7 +111,7 @@ void CheckSymmetric(const Node& node, const Eigen::MatrixXd& covariance) {
       if (!(std::abs(scaled(i, j) - scaled(j, i)) > kTolerance)) continue;
       const auto entry = [&](Eigen::Index row, Eigen::Index column) {
         return '[' + std::to_string(row) + "][" + std::to_string(column) + "] is " +
-               Shortest(covariance(row, column));
+               NumberText(covariance(row, column));
       };
       node.Fail("not symmetric: " + entry(j, i) + ", " + entry(i, j), "a covariance");
     }
@@ -141,7 +131,7 @@ void CheckPositive(const Node& node, const Eigen::MatrixXd& covariance) {
   const bool drowned = smallest >= 0;  // in the rounding of a much larger one
   if (drowned) smallest = SmallestEigenvalue(Correlation(covariance));
   node.Fail(std::string("not positive semi-definite: ") + (drowned ? "its correlation's" : "its") +
-                " smallest eigenvalue is " + SixDigits(smallest),
+                " smallest eigenvalue is " + internal::RoundedText(smallest, 6),
             "a covariance");
 }
 
@@ -169,7 +159,7 @@ std::int64_t Node::Integer(std::int64_t low, std::int64_t high) const {
   } else if (high != kHighest) {
     expected += " <= " + std::to_string(high);
   }
-  const std::string_view text = NumberText(*tree_, expected);
+  const std::string_view text = DecimalText(*tree_, expected);
   if (!Scan(text).integer) Fail(Quoted(tree_->text) + " is not an integer", expected);
   std::int64_t value = 0;
   const auto result = std::from_chars(text.data(), text.data() + text.size(), value);

@@ -59,11 +59,16 @@ std::string CleanText(std::string_view text, const Origin& origin);
 bool IsUtf8(std::string_view text);
 
 const std::string& PathOf(const ConfigTree& tree);
+/// The key path of `key` in the map at `path`.
+std::string PathBelow(const std::string& path, std::string_view key);
 /// Where the key of `tree` is written, or its value where it has none.
 Place KeyPlace(const ConfigTree& tree);
 ConfigTree* Child(const ConfigTree& map, std::string_view key);
 std::unique_ptr<ConfigTree> Clone(const ConfigTree& tree);
 std::string ToYaml(const ConfigTree& root);
+
+/// With its ASCII letters in lower case, whatever the locale.
+std::string LowerCase(std::string_view text);
 
 /// `text` in quotes, shortened and without control characters.
 std::string Quoted(std::string_view text);

@@ -45,6 +45,8 @@ CsvFile& CsvFile::Integer(std::int64_t value) {
   return *this;
 }
 
+CsvFile& CsvFile::Landmark(std::int64_t id) { return id < 0 ? Empty() : Integer(id); }
+
 CsvFile& CsvFile::Text(std::string_view value) {
   Separate();
   row_ += CsvQuoted(value);

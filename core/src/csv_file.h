@@ -21,6 +21,8 @@ class CsvFile {
   CsvFile& Time(Stamp stamp);  ///< empty for kNoStamp
   CsvFile& Number(double value);
   CsvFile& Integer(std::int64_t value);
+  /// Empty where it is negative: there is none.
+  CsvFile& Landmark(std::int64_t id);
   CsvFile& Text(std::string_view value);
   CsvFile& Empty(std::size_t cells = 1);
   /// `values`, then empty cells up to `width`.

@@ -128,12 +128,7 @@ void EstimatorFiles::AddEstimate(const Frame& frame, const State& state) {
 void EstimatorFiles::AddInnovation(Stamp stamp, const MeasurementReport& report) {
   RecordedSensor& sensor = recorded_.sensors[static_cast<std::size_t>(report.sensor)];
   const auto width = static_cast<std::size_t>(recorded_.width);
-  innovations_.Time(stamp).Text(sensor.stream).Text(sensor.name);
-  if (report.landmark >= 0) {
-    innovations_.Integer(report.landmark);
-  } else {
-    innovations_.Empty();
-  }
+  innovations_.Time(stamp).Text(sensor.stream).Text(sensor.name).Landmark(report.landmark);
   innovations_.Text(ToString(report.outcome)).Integer(report.dof);
   const bool reached = !report.s.empty();
   if (reached) {

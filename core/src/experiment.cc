@@ -6,9 +6,12 @@
 #include "alidade/run.h"
 #include "columns.h"
 #include "names.h"
+#include "text_table.h"
 
 namespace alidade {
 namespace {
+
+using internal::NamesOf;
 
 constexpr int kSchema = 1;
 
@@ -23,12 +26,6 @@ void CheckSchema(const Node& root) {
   }
 }
 
-std::vector<std::string> NamesOf(const std::vector<StreamInfo>& streams) {
-  std::vector<std::string> names;
-  for (const StreamInfo& stream : streams) names.push_back(stream.name);
-  return names;
-}
-
 /// Index of the stream that the sensor entry names, of the size that the model measures.
 int FindStream(const Node& sensor, const SensorModel& model,
                const std::vector<StreamInfo>& streams) {
@@ -36,9 +33,7 @@ int FindStream(const Node& sensor, const SensorModel& model,
   const std::vector<std::string> names = NamesOf(streams);
   const auto found = std::find(names.begin(), names.end(), node.Text());
   if (found == names.end()) {
-    std::string all;
-    for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
-    node.Fail("the source has no stream '" + node.Text() + "'", "one of " + all,
+    node.Fail("the source has no stream '" + node.Text() + "'", "one of " + internal::Join(names),
               Nearest(node.Text(), names));
   }
   const auto index = static_cast<std::size_t>(found - names.begin());
@@ -73,11 +68,7 @@ std::vector<std::string> ReadSensorList(const Node& entry, const Node& root) {
 }
 
 void CheckName(const std::string& name, const Node& entry) {
-  const auto fits = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-'; };
-  if (name.empty() || !std::all_of(name.begin(), name.end(), fits)) {
-    entry.Fail("'" + name + "' cannot name an estimator: it names a folder too",
-               "letters, digits, _ and -");
-  }
+  internal::ExpectName(name, entry, "an estimator");
   if (name == "figures") {
     entry.Fail("'figures' cannot name an estimator: the run folder has one of that name",
                "another name");
@@ -141,12 +132,10 @@ std::vector<Segment> ReadSegments(const Node& root, const System& system,
                    "one of with: SENSOR, without: SENSOR");
       }
       const Node& sensor = with ? *with : *without;
-      std::vector<std::string> names;
-      for (const SensorBinding& binding : system.sensors) names.push_back(binding.name);
       const int index = system.FindSensor(sensor.Text());
       if (index < 0) {
         sensor.Fail("no sensor '" + sensor.Text() + "'", "a name from `sensors`",
-                    Nearest(sensor.Text(), names));
+                    Nearest(sensor.Text(), NamesOf(system.sensors)));
       }
       const SensorBinding& binding = system.sensors[static_cast<std::size_t>(index)];
       const int stream = FindStream(root.At("sensors").At(binding.name), binding.model, streams);

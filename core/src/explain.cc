@@ -11,6 +11,7 @@
 #include "alidade/ekf.h"
 #include "alidade/metrics.h"
 #include "columns.h"
+#include "names.h"
 #include "number_text.h"
 #include "text_table.h"
 
@@ -205,8 +206,7 @@ std::string GateText(const EkfOptions& options, const System& system) {
 }
 
 std::string FuseText(Fuse fuse, const System& system) {
-  std::vector<std::string> names;
-  for (const SensorBinding& sensor : system.sensors) names.push_back(sensor.name);
+  const std::vector<std::string> names = internal::NamesOf(system.sensors);
   switch (fuse) {
     case Fuse::kJoint:
       return "joint: one stacked update for each stamp";
@@ -276,8 +276,7 @@ std::string SourceText(const Config& config, const Experiment& experiment) {
     }
     rows.push_back({stream.name, std::to_string(stream.size), users.empty() ? "-" : Join(users)});
   }
-  std::vector<std::string> truths;
-  for (const StreamInfo& truth : experiment.source->truths()) truths.push_back(truth.name);
+  const std::vector<std::string> truths = internal::NamesOf(experiment.source->truths());
   text += TextTable(rows, kIndent);
   return text + "  truth: " + (truths.empty() ? "not known" : Join(truths)) + '\n';
 }

@@ -9,6 +9,7 @@
 
 #include "alidade/geometry.h"
 #include "columns.h"
+#include "names.h"
 #include "number_text.h"
 
 namespace alidade {
@@ -275,9 +276,7 @@ Metrics::Metrics(const NamedEstimator& named, const Source& source,
                  const std::vector<Segment>& segments)
     : impl_(std::make_unique<Impl>()) {
   impl_->Track(named.system, source.truths());
-  for (const SensorBinding& sensor : named.system.sensors) {
-    impl_->sensors.push_back(sensor.name);
-  }
+  impl_->sensors = internal::NamesOf(named.system.sensors);
   impl_->count_of.resize(impl_->sensors.size());
   const auto add_sums = [&](std::string suffix) {
     const std::vector<Tally> blocks(impl_->tracked.size());

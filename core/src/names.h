@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <string>
+#include <vector>
 
 #include "config_tree.h"
 
@@ -17,6 +18,14 @@ inline void ExpectName(const std::string& name, const Node& at, const std::strin
   };
   if (!name.empty() && std::all_of(name.begin(), name.end(), fits)) return;
   at.Fail(Quoted(name) + " cannot name " + of, "letters, digits, _ and -");
+}
+
+/// The `name` of each.
+template <class Range>
+std::vector<std::string> NamesOf(const Range& named) {
+  std::vector<std::string> names;
+  for (const auto& one : named) names.push_back(one.name);
+  return names;
 }
 
 }  // namespace alidade::internal

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "abi_read.h"
+#include "config_tree.h"
 #include "number_text.h"
 #include "text_table.h"
 
@@ -117,10 +118,6 @@ std::string Meaning(const AlidadeParam& param) {
   return '(' + text + info.doc + ')';
 }
 
-std::string PathBelow(const Node& map, const std::string& key) {
-  return map.path().empty() ? key : map.path() + '.' + key;
-}
-
 double One(const AlidadeParam& param, const Node& node) {
   const bool low_open = (param.flags & ALIDADE_PARAM_LOW_OPEN) != 0;
   const bool high_open = (param.flags & ALIDADE_PARAM_HIGH_OPEN) != 0;
@@ -141,8 +138,7 @@ double One(const AlidadeParam& param, const Node& node) {
 
 std::vector<double> All(const AlidadeParam& param, const Node& node) {
   if (param.count == 1) return {One(param, node)};
-  const bool is_list = node.kind() == Node::Kind::kList;
-  const std::vector<Node> items = is_list ? node.Items() : std::vector<Node>{node};
+  const std::vector<Node> items = node.ItemsOrOne();
   if (param.kind == ALIDADE_PARAM_NUMBER) {
     static_cast<void>(node.Numbers(param.count));
   } else if (param.count > 0 && std::ssize(items) != param.count) {
@@ -204,7 +200,7 @@ void ParamReader::Fail(void* self, const char* key, const char* text) noexcept {
     if (at) place = at->place();
     rest.erase(0, dot == std::string::npos ? dot : dot + 1);
   }
-  reader->errors_.push_back(ErrorLine(place, PathBelow(reader->entry_, key), Text(text)));
+  reader->errors_.push_back(ErrorLine(place, PathBelow(reader->entry_.path(), key), Text(text)));
 }
 
 std::vector<double> ParamReader::Values(const AlidadeParam& param) const {

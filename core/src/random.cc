@@ -4,8 +4,6 @@
 #include <bit>
 #include <cmath>
 
-#include "alidade/error.h"
-
 namespace alidade {
 namespace {
 
@@ -21,11 +19,6 @@ std::uint64_t Mix(std::uint64_t z) {
 Random::Random(std::uint64_t seed, std::uint64_t stream) {
   std::uint64_t counter = seed + Mix(stream);
   for (std::uint64_t& word : state_) word = Mix(counter += 0x9E3779B97F4A7C15u);
-}
-
-Random Random::FromState(const std::array<std::uint64_t, 4>& state) {
-  ALIDADE_EXPECTS((state[0] | state[1] | state[2] | state[3]) != 0);
-  return Random(state);
 }
 
 std::uint64_t Random::NextBits() {

@@ -3,6 +3,7 @@
 
 #include "comparison_table.h"
 #include "number_text.h"
+#include "text_table.h"
 
 namespace alidade::internal {
 namespace {
@@ -136,9 +137,7 @@ std::string Estimator(const EstimatorResult& result, std::size_t index, const Re
   if (result.diverged) html += " <span class=\"badge diverged\">diverged</span>";
   html += "</h2>\n";
   for (const std::vector<std::string>& direction : result.unobservable) {
-    std::string names;
-    for (const std::string& name : direction) names += (names.empty() ? "" : ", ") + name;
-    html += "<p><b>Unobservable:</b> " + HtmlEscaped(names) + "</p>\n";
+    html += "<p><b>Unobservable:</b> " + HtmlEscaped(Join(direction)) + "</p>\n";
   }
   const auto count = [](std::int64_t n) { return std::to_string(n); };
   html += "<div class=\"columns\">\n" + Pairs("counts", result.counts, count) +

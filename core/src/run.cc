@@ -138,7 +138,7 @@ bool Advance(Running& one, const Seen& seen, const RunOptions& options, RunResul
   return !policy;
 }
 
-/// The frames one by one through all estimators; those that an offline one needs again go to `kept`.
+/// The frames one by one through all estimators; where one is offline, they are kept for it.
 void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunOptions& options,
                RunResult& result, std::vector<Seen>& kept) {
   Seen seen;

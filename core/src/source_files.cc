@@ -95,13 +95,9 @@ void SourceFiles::Add(const Frame& frame) {
   if (first_ == kNoStamp) first_ = frame.stamp;
   last_ = frame.stamp;
   for (const Measurement& m : frame.measurements) {
-    measurements_->Time(m.stamp).Text(streams_[static_cast<std::size_t>(m.stream)].name);
-    if (m.landmark >= 0) {
-      measurements_->Integer(m.landmark);
-    } else {
-      measurements_->Empty();
-    }
-    ++stream_rows_[static_cast<std::size_t>(m.stream)];
+    const auto stream = static_cast<std::size_t>(m.stream);
+    ++stream_rows_[stream];
+    measurements_->Time(m.stamp).Text(streams_[stream].name).Landmark(m.landmark);
     measurements_->Numbers(m.values.data(), m.values.size(), width_).EndRow();
     AddImplied(m);
   }

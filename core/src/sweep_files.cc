@@ -5,15 +5,18 @@
 #include "comparison_table.h"
 #include "csv_file.h"
 #include "json.h"
+#include "names.h"
 #include "run_folder.h"
 #include "text_table.h"
 
 namespace alidade {
 
+using internal::ComparisonRow;
 using internal::CsvFile;
+using internal::Join;
 using internal::Json;
+using internal::NamesOf;
 using internal::RunFolder;
-using internal::TextRow;
 
 struct SweepFolder::Impl {
   Impl(const std::filesystem::path& path, bool force) : folder(path, force) {}
@@ -22,9 +25,14 @@ struct SweepFolder::Impl {
 
 namespace {
 
-/// Rows of the table below, a cell for each estimator. Each one stands as four in a comparison, so
-/// that its numbers share their unit and decimals with all others of the row.
-std::vector<TextRow> TableRows(const std::vector<SweepSummary>& summaries) {
+/// Runs that came to their end.
+std::int64_t CountWhole(const SweepResult& result) {
+  return std::ranges::count(result.done, RunStatus::kOk, &SweepRun::status);
+}
+
+/// A cell for each estimator. Each one stands as four in a comparison, so that its numbers share
+/// their unit and decimals with all others of the row.
+std::vector<ComparisonRow> TableRows(const std::vector<SweepSummary>& summaries) {
   RunResult columns;
   for (const SweepSummary& summary : summaries) {
     for (const auto member : {&Spread::mean, &Spread::p05, &Spread::p50, &Spread::p95}) {
@@ -33,21 +41,18 @@ std::vector<TextRow> TableRows(const std::vector<SweepSummary>& summaries) {
       for (const auto& [key, spread] : summary.metrics) column.metrics[key] = spread.*member;
     }
   }
-  TextRow names = {""}, used = {"runs used"}, diverged = {"diverged"};
-  for (const SweepSummary& summary : summaries) {
-    names.push_back(summary.name);
-    used.push_back(std::to_string(summary.used));
-    diverged.push_back(std::to_string(summary.diverged));
-  }
-  std::vector<TextRow> rows = {names};
-  std::vector<internal::ComparisonRow> comparison = internal::ComparisonRows(columns);
-  comparison.pop_back();  // yes or no of one run
-  for (const internal::ComparisonRow& from : comparison) {
-    TextRow& row = rows.emplace_back(TextRow{from.label});
+  std::vector<ComparisonRow> rows;
+  for (const ComparisonRow& from : internal::MetricRows(columns)) {
+    ComparisonRow& row = rows.emplace_back(ComparisonRow{from.label, {}});
     for (std::size_t i = 0; i < from.cells.size(); i += 4) {
       const std::string* const c = &from.cells[i];
-      row.push_back(c[0] == "-" ? "-" : c[0] + " [" + c[1] + ", " + c[2] + ", " + c[3] + ']');
+      row.cells.push_back(c[0] == "-" ? "-" : c[0] + " [" + c[1] + ", " + c[2] + ", " + c[3] + ']');
     }
+  }
+  ComparisonRow used{"runs used", {}}, diverged{"diverged", {}};
+  for (const SweepSummary& summary : summaries) {
+    used.cells.push_back(std::to_string(summary.used));
+    diverged.cells.push_back(std::to_string(summary.diverged));
   }
   rows.push_back(used);
   rows.push_back(diverged);
@@ -55,28 +60,24 @@ std::vector<TextRow> TableRows(const std::vector<SweepSummary>& summaries) {
 }
 
 std::string Markdown(const SweepResult& result) {
-  const auto whole = std::count_if(result.done.begin(), result.done.end(),
-                                   [](const auto& run) { return run.status == RunStatus::kOk; });
-  std::string text = std::to_string(whole) + " of " + std::to_string(result.runs) +
+  std::string text = std::to_string(CountWhole(result)) + " of " + std::to_string(result.runs) +
                      " runs, seeds from " + std::to_string(result.first_seed) +
                      ". Mean [5 %, 50 %, 95 % quantile] over the runs that did not diverge.\n\n";
-  const std::vector<TextRow> rows = TableRows(Summarise(result));
-  for (std::size_t r = 0; r < rows.size(); ++r) {
-    text += "| " + internal::Join(rows[r], " | ") + " |\n";
-    if (r > 0) continue;
-    for (std::size_t c = 0; c < rows[r].size(); ++c) text += c == 0 ? "|---" : "|---:";
-    text += "|\n";
+  const std::vector<SweepSummary> summaries = Summarise(result);
+  text += "|  | " + Join(NamesOf(summaries), " | ") + " |\n|---|";
+  for (std::size_t c = 0; c < summaries.size(); ++c) text += "---:|";
+  text += '\n';
+  for (const ComparisonRow& row : TableRows(summaries)) {
+    text += "| " + row.label + " | " + Join(row.cells, " | ") + " |\n";
   }
   return text;
 }
 
 std::string SweepJson(const SweepResult& result) {
-  const auto whole = std::count_if(result.done.begin(), result.done.end(),
-                                   [](const auto& run) { return run.status == RunStatus::kOk; });
   Json json;
   json.Object();
   json.Key("runs").Integer(result.runs);
-  json.Key("runs_used").Integer(whole);
+  json.Key("runs_used").Integer(CountWhole(result));
   json.Key("first_seed").Integer(static_cast<std::int64_t>(result.first_seed));
   json.Key("estimators").Object();
   for (const SweepSummary& summary : Summarise(result)) {
@@ -154,27 +155,8 @@ void WriteFailures(const RunFolder& folder, const SweepResult& result) {
 }  // namespace
 
 std::string SweepTable(const SweepResult& result) {
-  constexpr std::size_t kLineWidth = 100;
-  const std::vector<TextRow> rows = TableRows(Summarise(result));
-  std::size_t label = 0, cell = 0;
-  for (const TextRow& row : rows) {
-    label = std::max(label, row[0].size());
-    for (std::size_t c = 1; c < row.size(); ++c) cell = std::max(cell, row[c].size() + 2);
-  }
-  // Estimators that do not fit beside the others go into a table below.
-  const std::size_t fit = std::max<std::size_t>(
-      1, (kLineWidth - std::min(label, kLineWidth)) / std::max<std::size_t>(1, cell));
-  std::string text;
-  for (std::size_t first = 1; first < rows[0].size(); first += fit) {
-    std::vector<TextRow> part;
-    for (const TextRow& row : rows) {
-      TextRow& some = part.emplace_back(TextRow{row[0]});
-      for (std::size_t c = first; c < std::min(first + fit, row.size()); ++c)
-        some.push_back(row[c]);
-    }
-    text.append(first > 1 ? "\n" : "").append(internal::TextTable(part));
-  }
-  return text;
+  const std::vector<SweepSummary> summaries = Summarise(result);
+  return internal::EstimatorTable(NamesOf(summaries), TableRows(summaries));
 }
 
 SweepFolder::SweepFolder(const std::filesystem::path& folder, bool force)

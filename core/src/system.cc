@@ -9,13 +9,9 @@
 namespace alidade {
 namespace {
 
-constexpr double kQuaternionTolerance = 1e-3;
+using internal::NamesOf;
 
-std::vector<std::string> Names(const std::vector<Space>& spaces) {
-  std::vector<std::string> names;
-  for (const Space& space : spaces) names.push_back(space.name);
-  return names;
-}
+constexpr double kQuaternionTolerance = 1e-3;
 
 /// The value of a block: a number, a list, or {w, x, y, z} for a unit quaternion.
 std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
@@ -78,7 +74,7 @@ bool Contains(const std::vector<std::string>& names, const std::string& name) {
 
 /// Names of the blocks as the entry renames them, in the order of the model.
 std::vector<std::string> ReadBlockNames(const Node& entry, const MotionModel& model) {
-  std::vector<std::string> names = Names(model.blocks());
+  std::vector<std::string> names = NamesOf(model.blocks());
   const auto renamed = entry.Find("blocks");
   for (std::string& name : names) {
     const auto given = renamed ? renamed->Find(name) : std::nullopt;
@@ -144,8 +140,7 @@ BlockId FindBlock(const Node& node, const System& system) {
   const std::string name = node.Text();
   const BlockId id = system.layout.Find(name);
   if (id >= 0) return id;
-  std::vector<std::string> names;
-  for (const Block& block : system.layout.blocks()) names.push_back(block.name);
+  const std::vector<std::string> names = NamesOf(system.layout.blocks());
   node.Fail("no state block '" + name + "'", "a block of `state`, as in ENTRY.BLOCK",
             Nearest(name, names));
 }
@@ -211,12 +206,6 @@ SensorBinding ReadSensor(const std::string& name, const Node& entry, const Plugi
   return binding;
 }
 
-std::vector<std::string> SensorNames(const System& system) {
-  std::vector<std::string> names;
-  for (const SensorBinding& sensor : system.sensors) names.push_back(sensor.name);
-  return names;
-}
-
 /// Checks that every block that starts from a sensor can do so: the sensor measures it, and the
 /// blocks it needs start without waiting for this one.
 void CheckInitialisation(const Node& root, const System& system) {
@@ -235,7 +224,7 @@ void CheckInitialisation(const Node& root, const System& system) {
     if (sensor < 0) {
       place(prior.block)
           .Fail("no sensor '" + prior.from + "' here", "a sensor of this estimator",
-                Nearest(prior.from, SensorNames(system)));
+                Nearest(prior.from, NamesOf(system.sensors)));
     }
     const SensorBinding& binding = system.sensors[static_cast<std::size_t>(sensor)];
     const int role = binding.model.initialised_role();

@@ -30,9 +30,7 @@ namespace alidade {
 class CsvSource : public Source {
  public:
   explicit CsvSource(const SourceArguments& arguments)
-      : layout_(ReadCsvLayout(arguments.entry)),
-        path_(arguments.entry.At("path", "csv")),
-        reader_(Path(path_, arguments.folder), path_.place(), path_.path()) {
+      : layout_(ReadCsvLayout(arguments.entry)), reader_(Open(arguments)) {
     for (const CsvField& field : layout_.streams) streams_.push_back(field.info);
     for (const CsvField& field : layout_.truths) truths_.push_back(field.info);
     ReadHeader();
@@ -75,6 +73,10 @@ class CsvSource : public Source {
   }
 
  private:
+  static LineReader Open(const SourceArguments& arguments) {
+    const Node path = arguments.entry.At("path", "csv");
+    return {Path(path, arguments.folder), path.place(), path.path()};
+  }
   static std::filesystem::path Path(const Node& node, const std::filesystem::path& folder) {
     const std::filesystem::path path = node.Text();
     if (path.empty()) node.Fail("no path", "a file, or '-' for standard input");
@@ -214,7 +216,6 @@ class CsvSource : public Source {
   }
 
   CsvLayout layout_;
-  Node path_;
   LineReader reader_;
   std::vector<StreamInfo> streams_, truths_;
   std::vector<std::string> names_;

@@ -53,11 +53,6 @@ inline constexpr const char* kCsvKeys =
 
 namespace csv_detail {
 
-/// The items of a list; a scalar counts as a list of one.
-inline std::vector<Node> ItemsOrOne(const Node& node) {
-  return node.kind() == Node::Kind::kList ? node.Items() : std::vector<Node>{node};
-}
-
 inline CsvField ReadField(const std::string& name, const Node& node) {
   CsvField field;
   field.info.name = name;
@@ -71,7 +66,7 @@ inline CsvField ReadField(const std::string& name, const Node& node) {
     }
     node.RejectUnread();
   }
-  for (const Node& column : ItemsOrOne(columns)) field.columns.push_back({column.Text(), column});
+  for (const Node& column : columns.ItemsOrOne()) field.columns.push_back({column.Text(), column});
   if (field.columns.empty()) columns.Fail("no columns", "the name of a column, or a list of names");
   field.info.size = static_cast<int>(field.columns.size());
   return field;
@@ -120,7 +115,7 @@ inline void ReadBlind(const Node& entry, CsvLayout& layout) {
   layout.blind_after_node = after;
   layout.blind_after = after->Number(0.0, 1.0);
   if (!blind) layout.streams.front().goes_blind = true;
-  for (const Node& item : blind ? ItemsOrOne(*blind) : std::vector<Node>{}) {
+  for (const Node& item : blind ? blind->ItemsOrOne() : std::vector<Node>{}) {
     std::vector<std::string> names;
     for (const CsvField& stream : layout.streams) names.push_back(stream.info.name);
     const auto found = std::find(names.begin(), names.end(), item.Text());
@@ -170,7 +165,7 @@ inline CsvLayout ReadCsvLayout(const Node& entry) {
   }
   if (const auto missing = entry.Find("missing")) {
     layout.missing.clear();
-    for (const Node& word : csv_detail::ItemsOrOne(*missing)) layout.missing.push_back(word.Text());
+    for (const Node& word : missing->ItemsOrOne()) layout.missing.push_back(word.Text());
   }
   csv_detail::ReadBlind(entry, layout);
   return layout;

@@ -3,23 +3,13 @@
 
 #include <string>
 
-#include "alidade/config.h"
+#include "support/config_text.h"
 
 namespace alidade {
 namespace {
 
-Config Read(std::string_view text) { return Config::FromText(text, "f.yaml"); }
-
-template <class Call>
-std::string Message(const Call& call) {
-  try {
-    call();
-  } catch (const Error& e) {
-    EXPECT_EQ(e.code(), ExitCode::kBadConfig);
-    return e.what();
-  }
-  return "no error";
-}
+using testing::Message;
+using testing::Read;
 
 std::string SetError(const std::string& key, const std::string& value) {
   Config config = Read("a: {b: [1, {c: 2}], t: text}");

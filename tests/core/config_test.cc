@@ -8,24 +8,15 @@
 #include <string>
 #include <vector>
 
+#include "support/config_text.h"
+
 namespace alidade {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-Config Read(std::string_view text) { return Config::FromText(text, "f.yaml"); }
-
-/// The message of the kBadConfig that `call` fails with.
-template <class Call>
-std::string Message(const Call& call) {
-  try {
-    call();
-  } catch (const Error& e) {
-    EXPECT_EQ(e.code(), ExitCode::kBadConfig);
-    return e.what();
-  }
-  return "no error";
-}
+using testing::Message;
+using testing::Read;
 
 /// The message of `read` on the value of `v`, without the place `f.yaml:1:4 v: ` at its start.
 template <class Reader>
@@ -277,9 +268,20 @@ TEST(Node, PathNamesKeysAndItems) {
   const Config config = Read("source: {columns: [a, [b, c]]}");
   const Node inner = config.root().At("source").At("columns").Items()[1].Items()[0];
   EXPECT_EQ(inner.path(), "source.columns[1][0]");
-  EXPECT_EQ(inner.key(), "columns[1][0]");
   EXPECT_EQ(config.root().path(), "");
   EXPECT_EQ(ToString(inner.place()), "f.yaml:1:24");
+}
+
+TEST(Node, AnythingButAListCountsAsAListOfOne) {
+  const Config config = Read("a: [1, 2]\nb: 3\nc: []");
+  const auto paths = [&](const char* key) {
+    std::vector<std::string> found;
+    for (const Node& item : config.root().At(key).ItemsOrOne()) found.push_back(item.path());
+    return found;
+  };
+  EXPECT_EQ(paths("a"), (std::vector<std::string>{"a[0]", "a[1]"}));
+  EXPECT_EQ(paths("b"), std::vector<std::string>{"b"});
+  EXPECT_TRUE(paths("c").empty());
 }
 
 TEST(Node, WrongKindSaysWhatIsThere) {

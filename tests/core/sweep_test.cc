@@ -35,7 +35,8 @@ EstimatorResult Diverged(bool diverged, double rmse) {
   return one;
 }
 
-TEST(Summarise, TakesMetricsOverWholeRunsThatDidNotDiverge) {
+/// Two runs that count, one that diverged, one that failed.
+SweepResult FourRuns() {
   SweepResult result;
   result.runs = 4;
   result.estimators = {"ekf"};
@@ -43,12 +44,39 @@ TEST(Summarise, TakesMetricsOverWholeRunsThatDidNotDiverge) {
                  {2, RunStatus::kOk, ExitCode::kOk, "", {Diverged(false, 2.0)}},
                  {3, RunStatus::kOk, ExitCode::kOk, "", {Diverged(true, 100.0)}},
                  {4, RunStatus::kFailed, ExitCode::kBadData, "", {Diverged(false, 50.0)}}};
-  const std::vector<SweepSummary> summaries = Summarise(result);
+  return result;
+}
+
+TEST(Summarise, TakesMetricsOverWholeRunsThatDidNotDiverge) {
+  const std::vector<SweepSummary> summaries = Summarise(FourRuns());
   ASSERT_EQ(summaries.size(), 1u);
   EXPECT_EQ(summaries[0].used, 2);
   EXPECT_EQ(summaries[0].diverged, 1);
   EXPECT_DOUBLE_EQ(summaries[0].metrics.at("rmse:x").mean, 1.5);
   EXPECT_DOUBLE_EQ(summaries[0].metrics.at("rmse:x").p95, 1.95);
+}
+
+TEST(SweepTable, HasQuantilesAndCountsOfRuns) {
+  EXPECT_EQ(SweepTable(FourRuns()),
+            "                                   ekf\n"
+            "rmse x     1.500 [1.050, 1.500, 1.950]\n"
+            "runs used                            2\n"
+            "diverged                             1\n");
+}
+
+TEST(SweepTable, FoldsAsAComparisonDoes) {
+  SweepResult result = FourRuns();
+  result.estimators = {"ekf", "a", "b", "c"};
+  for (SweepRun& run : result.done) {
+    for (const char* name : {"a", "b", "c"}) {
+      run.estimators.push_back(run.estimators[0]);
+      run.estimators.back().name = name;
+    }
+  }
+  // 9 of the label and three times 29 are 96 characters; the fourth goes below.
+  const std::string table = SweepTable(result);
+  EXPECT_EQ(table.find('\n'), 96u) << table;
+  EXPECT_NE(table.find("\n\n" + std::string(37, ' ') + "c\nrmse x "), std::string::npos) << table;
 }
 
 }  // namespace

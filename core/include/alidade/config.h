@@ -34,8 +34,6 @@ class Node {
   const Place& place() const;
   /// Key path from the root, as in `sensors.stereo.focal_px` or `source.columns[2]`.
   const std::string& path() const;
-  /// Last component of the path.
-  std::string key() const;
 
   /// Map: the value of `key`, if it is there. Fails where this is not a map.
   std::optional<Node> Find(std::string_view key) const;
@@ -45,6 +43,8 @@ class Node {
   std::vector<std::pair<std::string, Node>> Entries() const;
   /// List: all items.
   std::vector<Node> Items() const;
+  /// All items of a list; anything else counts as a list of one.
+  std::vector<Node> ItemsOrOne() const;
 
   /// Finite number in full: no unit, no trailing text, no leading zeros, no under- or overflow.
   double Number() const;

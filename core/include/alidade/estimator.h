@@ -34,7 +34,7 @@ inline bool AllFinite(std::span<const double> values) {
   return sum == 0.0;
 }
 
-/// The complete record of one measurement; m = dof, its tangent size. What was not reached is empty.
+/// All that is known of one measurement; m = dof, its tangent size. Empty: not reached.
 struct MeasurementReport {
   int sensor = -1;  ///< index into System::sensors
   Outcome outcome = Outcome::kAccepted;

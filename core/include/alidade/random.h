@@ -17,9 +17,6 @@ class Random {
  public:
   explicit Random(std::uint64_t seed, std::uint64_t stream = 0);
 
-  /// Continues from a state of xoshiro256++, which must not be all zero.
-  static Random FromState(const std::array<std::uint64_t, 4>& state);
-
   /// The next 64 bits, uniform.
   std::uint64_t NextBits();
   /// Uniform in [0, 1), a multiple of 2^-53.
@@ -28,8 +25,6 @@ class Random {
   double Normal();
 
  private:
-  explicit Random(const std::array<std::uint64_t, 4>& state) : state_(state) {}
-
   std::array<std::uint64_t, 4> state_;
   double spare_ = 0.0;  ///< second normal of the last pair
   bool has_spare_ = false;

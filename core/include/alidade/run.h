@@ -16,6 +16,8 @@
 
 namespace alidade {
 
+/// What Estimator::diverged() does to the run. The event `inconsistent` of the metrics, which takes
+/// truth, never ends one.
 enum class OnDivergence { kReport, kFail };
 
 /// One estimator of a run, on its own system (the config with the estimator's overrides merged in).

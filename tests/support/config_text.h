@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <string_view>
+
+#include "alidade/config.h"
+
+/// Configs given as text, for tests.
+namespace alidade::testing {
+
+inline Config Read(std::string_view text) { return Config::FromText(text, "f.yaml"); }
+
+/// The message of the kBadConfig that `call` fails with.
+template <class Call>
+std::string Message(const Call& call) {
+  try {
+    call();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::kBadConfig);
+    return e.what();
+  }
+  return "no error";
+}
+
+}  // namespace alidade::testing

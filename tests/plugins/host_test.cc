@@ -337,7 +337,7 @@ TEST_F(HostTest, DescribesWhatAModelCanDo) {
   };
   using Lines = std::vector<std::string>;
   EXPECT_EQ(behind_the_blocks("stereo_disparity", 2),
-            (Lines{"Jacobians: derived", "refuses measurements of no use by itself",
+            (Lines{"Jacobians: closed form", "refuses measurements of no use by itself",
                    "can initialise depth"}));
   EXPECT_EQ(behind_the_blocks("constant", 1), Lines{"Jacobians: closed form"});
 }

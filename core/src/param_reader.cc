@@ -100,8 +100,8 @@ AlidadeParam Checked(const AlidadeParam* from, const double* values, std::int32_
   if (key.empty() || !known || param.count == 0 || param.count < -1 || param.count > capacity ||
       values == nullptr || choice != (param.choices != nullptr && param.choice_count > 0) ||
       (choice && param.count != 1) || !GoodFallback(param)) {
-    throw Error(ExitCode::kPlugin, "the plugin asks for parameter '" + key +
-                                       "' in a way that this version does not understand");
+    throw Error(ExitCode::kPlugin,
+                "asks for parameter '" + key + "' in a way that this version does not understand");
   }
   return param;
 }
@@ -169,7 +169,7 @@ void ParamReader::Check() const {
   };
   std::sort(lines.begin(), lines.end(), by_place);
   lines.erase(std::unique(lines.begin(), lines.end()), lines.end());
-  throw Error(ExitCode::kBadConfig, Join(lines, "\n"));
+  throw Error(code_, Join(lines, "\n"));
 }
 
 std::int32_t ParamReader::Read(void* self, const AlidadeParam* param, double* values,
@@ -179,6 +179,13 @@ std::int32_t ParamReader::Read(void* self, const AlidadeParam* param, double* va
     const std::vector<double> read = reader->Values(Checked(param, values, capacity));
     std::copy_n(read.begin(), std::min(std::ssize(read), std::ptrdiff_t{capacity}), values);
     return static_cast<std::int32_t>(read.size());
+  } catch (const Error& e) {
+    const bool by_plugin = e.code() == ExitCode::kPlugin;
+    if (by_plugin) reader->code_ = ExitCode::kPlugin;
+    const Node& entry = reader->entry_;
+    reader->errors_.push_back(
+        by_plugin ? ErrorLine(entry.place(), entry.path(), reader->owner_ + ' ' + e.what())
+                  : e.what());
   } catch (const std::exception& e) {
     reader->errors_.push_back(e.what());
   }

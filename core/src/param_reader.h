@@ -22,8 +22,9 @@ class ParamReader {
   const AlidadeHost& host() const { return host_; }
   /// Why the model says that it cannot be made, where that belongs to no key; else "".
   const std::string& failure() const { return failure_; }
-  /// Throws all errors as one, kBadConfig, in the order of their places (that of the reads depends
-  /// on the compiler); returns where there are none.
+  /// Throws all errors as one, in the order of their places (that of the reads depends on the
+  /// compiler); returns where there are none. kBadConfig, or kPlugin where the model asks against
+  /// the rules of plugin_abi.h.
   void Check() const;
 
  private:
@@ -38,6 +39,7 @@ class ParamReader {
   std::string owner_;
   AlidadeHost host_{};
   std::vector<std::string> errors_;
+  ExitCode code_ = ExitCode::kBadConfig;
   std::string failure_;
 };
 

@@ -244,7 +244,8 @@ TEST_F(HostTest, AParameterDeclaredAgainstTheRulesIsRefused) {
     // A parameter in the config is read by the same declaration.
     const Config given = Parse(std::string("{model: ") + name + ", noise: [fixed, free]}");
     for (const Config* one : {&config, &given}) {
-      ExpectError(ExitCode::kBadConfig, {"asks for parameter 'noise' in a way that"},
+      ExpectError(ExitCode::kPlugin,
+                  {"test.yaml:1", std::string("model '") + name + "' asks for parameter 'noise'"},
                   [&] { host.CreateSensor(name, one->root()); });
     }
     const auto has_name = [&](const PluginEntry& entry) { return entry.name == name; };

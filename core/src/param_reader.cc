@@ -176,16 +176,9 @@ std::int32_t ParamReader::Read(void* self, const AlidadeParam* param, double* va
                                std::int32_t capacity) noexcept {
   auto* reader = static_cast<ParamReader*>(self);
   try {
-    const std::vector<double> read = reader->Values(Checked(param, values, capacity));
+    const std::vector<double> read = reader->Values(reader->Expect(param, values, capacity));
     std::copy_n(read.begin(), std::min(std::ssize(read), std::ptrdiff_t{capacity}), values);
     return static_cast<std::int32_t>(read.size());
-  } catch (const Error& e) {
-    const bool by_plugin = e.code() == ExitCode::kPlugin;
-    if (by_plugin) reader->code_ = ExitCode::kPlugin;
-    const Node& entry = reader->entry_;
-    reader->errors_.push_back(
-        by_plugin ? ErrorLine(entry.place(), entry.path(), reader->owner_ + ' ' + e.what())
-                  : e.what());
   } catch (const std::exception& e) {
     reader->errors_.push_back(e.what());
   }
@@ -208,6 +201,17 @@ void ParamReader::Fail(void* self, const char* key, const char* text) noexcept {
     rest.erase(0, dot == std::string::npos ? dot : dot + 1);
   }
   reader->errors_.push_back(ErrorLine(place, PathBelow(reader->entry_.path(), key), Text(text)));
+}
+
+/// The parameter; one that breaks the rules is an error of the plugin, at the entry.
+AlidadeParam ParamReader::Expect(const AlidadeParam* param, const double* values,
+                                 std::int32_t capacity) {
+  try {
+    return Checked(param, values, capacity);
+  } catch (const Error& e) {
+    code_ = e.code();
+    throw Error(code_, ErrorLine(entry_.place(), entry_.path(), owner_ + ' ' + e.what()));
+  }
 }
 
 std::vector<double> ParamReader::Values(const AlidadeParam& param) const {

@@ -11,7 +11,8 @@
 namespace alidade::internal {
 
 /// Lends a model the parameters of its config entry. A dotted key walks nested maps. Everything
-/// wrong is collected, so that one run tells all.
+/// wrong is collected, so that one run tells all; kPlugin where the model itself asks against the
+/// rules of plugin_abi.h.
 class ParamReader {
  public:
   /// `owner` names the model in messages, as in `model 'scale_2d'`.
@@ -22,24 +23,24 @@ class ParamReader {
   const AlidadeHost& host() const { return host_; }
   /// Why the model says that it cannot be made, where that belongs to no key; else "".
   const std::string& failure() const { return failure_; }
-  /// Throws all errors as one, in the order of their places (that of the reads depends on the
-  /// compiler); returns where there are none. kBadConfig, or kPlugin where the model asks against
-  /// the rules of plugin_abi.h.
+  /// Throws all errors as one, kBadConfig, in the order of their places (that of the reads depends
+  /// on the compiler); returns where there are none.
   void Check() const;
 
  private:
   static std::int32_t Read(void* self, const AlidadeParam* param, double* values,
                            std::int32_t capacity) noexcept;
   static void Fail(void* self, const char* key, const char* text) noexcept;
+  AlidadeParam Expect(const AlidadeParam* param, const double* values, std::int32_t capacity);
   std::vector<double> Values(const AlidadeParam& param) const;
   std::vector<double> Absent(const AlidadeParam& param, const Node& map,
                              const std::string& key_in_map) const;
 
   Node entry_;
   std::string owner_;
+  ExitCode code_ = ExitCode::kBadConfig;  ///< of the errors
   AlidadeHost host_{};
   std::vector<std::string> errors_;
-  ExitCode code_ = ExitCode::kBadConfig;
   std::string failure_;
 };
 

@@ -18,12 +18,12 @@ TEST(Recorder, WritesEveryFile) {
   Record(OptionsFor(folder / "above" / "out"));
   EXPECT_EQ(
       FilesIn(folder / "above" / "out"),
-      (std::vector<std::string>{"alone/estimates.csv", "alone/events.csv", "alone/gains.csv",
-                                "alone/innovations.csv", "comparison.csv", "config.resolved.yaml",
-                                "ekf/estimates.csv", "ekf/events.csv", "ekf/gains.csv",
-                                "ekf/innovations.csv", "implied.csv", "measurements.csv",
-                                "report.html", "run.json", "timing.json", "truth.csv"}));
-  EXPECT_EQ(FilesIn(folder.path()).size(), 16u);  // nothing beside it
+      (std::vector<std::string>{
+          "alone/estimates.csv", "alone/events.csv", "alone/gains.csv", "alone/innovations.csv",
+          "comparison.csv", "config.resolved.yaml", "ekf/estimates.csv", "ekf/events.csv",
+          "ekf/gains.csv", "ekf/innovations.csv", "files.txt", "implied.csv", "measurements.csv",
+          "report.html", "run.json", "timing.json", "truth.csv"}));
+  EXPECT_EQ(FilesIn(folder.path()).size(), 17u);  // nothing beside it
 }
 
 TEST(Recorder, EstimatesRoundTrip) {

@@ -162,6 +162,7 @@ TEST_F(Cli, DivergenceEndsTheRunWhereAsked) {
   EXPECT_EQ(Json("runs/config/run.json").root().At("status").Text(), "failed");
 }
 
+// FAULTS 89
 TEST_F(Cli, OutputThatCannotBeWrittenIsSeventyFour) {
   const Outcome full = Call({"run", "config.yaml", "--no-figures"}, "/dev/full");
   EXPECT_EQ(full.code, 74);
@@ -198,6 +199,7 @@ class PipedRun : public testing::ProgramTest {
   pid_t run_ = -1;
 };
 
+// FAULTS 90
 TEST_F(PipedRun, StopsAtASignalWithAllThatIsDone) {
   std::this_thread::sleep_for(std::chrono::milliseconds(200));
   ::kill(run_, SIGINT);
@@ -214,6 +216,7 @@ TEST_F(PipedRun, StopsAtASignalWithAllThatIsDone) {
   EXPECT_FALSE(Exists(Partial()));
 }
 
+// FAULTS 90
 TEST_F(PipedRun, EndsAtOnceAtTheSecondSignal) {
   ::kill(run_, SIGSTOP);
   ::kill(run_, SIGTERM);

@@ -12,6 +12,7 @@
 #include <cerrno>
 #include <fstream>
 
+#include "alidade/sweep.h"
 #include "support/recording.h"
 
 namespace {
@@ -68,6 +69,7 @@ std::vector<std::string> EntriesOf(const fs::path& folder) {
   return entries;
 }
 
+// FAULTS 92
 TEST(RunFolder, LeavesAnExistingFolderAlone) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "out"), 3);
@@ -170,6 +172,7 @@ TEST(RunFolder, ForceSparesWhatIsNoRunFolder) {
   EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "home", true)); }), 0);  // empty
 }
 
+// FAULTS 95
 TEST(RunFolder, AFolderBeingWrittenIsRefused) {
   const TemporaryFolder folder;
   const Recorder first(OptionsFor(folder / "out"), MakeConfig(), Host());
@@ -243,7 +246,7 @@ TEST(OutputFile, WritesNothingTwiceAfterAFailure) {
   EXPECT_TRUE(Read(folder / "file") == text);
 }
 
-// Every write, fsync and rename in turn, on a new folder and on one to be replaced.
+// FAULTS 87: every write, fsync and rename in turn, on a new folder and on one to be replaced.
 TEST(RunFolder, EveryFailureOfTheDiskIsAnErrorThatLeavesNothing) {
   for (const bool replace : {false, true}) {
     const TemporaryFolder folder;
@@ -283,6 +286,44 @@ TEST(RunFolder, EveryFailureOfTheDiskIsAnErrorThatLeavesNothing) {
   }
 }
 
+// FAULTS 87: the folder of a sweep.
+TEST(RunFolder, EveryFailureOfTheDiskIsAnErrorForASweepToo) {
+  const Config config = MakeConfig();
+  SweepResult result;
+  result.runs = 1;
+  result.estimators = {"ekf"};
+  SweepRun& run = result.done.emplace_back();
+  run.estimators.resize(1);
+  run.estimators[0].name = "ekf";
+  run.estimators[0].metrics["rmse:depth"] = 0.5;
+  const TemporaryFolder folder;
+  int calls = 0;
+  for (int n = 1; n < 100; ++n) {
+    fail_at = n;
+    fail_error = n % 2 == 0 ? EDQUOT : EIO;
+    std::string text;
+    const auto write = [&] { SweepFolder(folder / "out", false).Write(result, config); };
+    const int code = CodeOf(write, &text);
+    const bool failed = fail_at <= 0;
+    fail_at = 0;
+    if (!failed) {
+      EXPECT_EQ(code, 0) << text;
+      break;
+    }
+    ++calls;
+    ASSERT_EQ(code, 74) << "call " << n << ": " << text;
+    EXPECT_TRUE(text.starts_with((folder / "out").string())) << text;
+    if (!folder.empty()) {
+      // The last fsync, of the folder above: all is in its place.
+      EXPECT_NE(text.find("cannot sync"), std::string::npos) << text;
+      EXPECT_EQ(Lines(folder / "out/files.txt"), EntriesOf(folder / "out"));
+      fs::remove_all(folder / "out");
+    }
+  }
+  EXPECT_GT(calls, 10);
+}
+
+// FAULTS 88
 TEST(RunFolder, ALimitOnTheFileSizeIsAnErrorNotTheEnd) {
   const TemporaryFolder folder;
   const int code = InChild([&] {
@@ -294,6 +335,7 @@ TEST(RunFolder, ALimitOnTheFileSizeIsAnErrorNotTheEnd) {
   EXPECT_TRUE(folder.empty());
 }
 
+// FAULTS 93
 TEST(RunFolder, AFolderThatCannotBeWrittenToIsRefused) {
   const TemporaryFolder folder;
   Host();  // a child without rights could not look for plugins

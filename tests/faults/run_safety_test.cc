@@ -2,7 +2,7 @@
 //
 // What surrounds a run fails: disk, signals, memory, descriptors, other processes. The number of
 // each fault is in the comment above its test. These are tested elsewhere:
-//   87  RunFolder.EveryFailureOfTheDiskIsAnErrorThatLeavesNothing, OutputFile.*
+//   87  RunFolder.EveryFailureOfTheDisk*, OutputFile.*
 //   90  PipedRun.*, Cli.Stops*, Cli.Signals*, SweepCli.StopsAtASignal*
 //   93  RunFolder.AFolderThatCannotBeWrittenToIsRefused
 //   97  SweepCli.GivesTheSameBytesForAnyNumberOfJobs

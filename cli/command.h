@@ -49,7 +49,7 @@ std::function<std::string(const std::string&)> IsInteger(std::int64_t least, std
 
 /// Where output goes: `given`, or the config's `output:` inside runs/, or runs/PREFIX and the name
 /// of the config: of its folder where it is called config.yaml, else of the file. Errors:
-/// kCannotCreate where that is runs/ itself, kNotTrusted, kBadConfig.
+/// kCannotCreate where `given` is runs/ itself, kNotTrusted, kBadConfig.
 std::filesystem::path OutputFolder(const std::string& given, const Config& config,
                                    const Input& input, const std::string& prefix = "");
 

@@ -38,14 +38,11 @@ std::string NameOf(const fs::path& config) {
 
 constexpr const char* kRuns = "runs";
 
-/// Refuses the folder that holds all the others: replaced, they would be gone.
-void ExpectNotAll(const fs::path& folder) {
+/// True of the folder that holds all the others: replaced, they would be gone.
+bool HoldsAllRuns(const fs::path& folder) {
   std::error_code error;
   const fs::path runs = fs::absolute(kRuns, error) / "";
-  if (error || FullPath(folder / "") != runs) return;
-  throw Error(ExitCode::kCannotCreate,
-              ErrorLine(Place{folder.string()}, {},
-                        "is the folder that holds the runs; name one inside, as runs/NAME"));
+  return !error && FullPath(folder / "") == runs;
 }
 
 }  // namespace
@@ -112,16 +109,20 @@ PluginHost Input::Host(const Config& loaded) const {
 
 fs::path OutputFolder(const std::string& given, const Config& config, const Input& input,
                       const std::string& prefix) {
-  fs::path folder = given;
-  if (const auto output = config.root().Find("output"); output && given.empty()) {
-    const std::string name = output->Text();
-    FullPath(name);
-    folder = ResolveInside(kRuns, name, input.allow_outside, output->place(), output->path());
-  } else if (given.empty()) {
-    folder = fs::path(kRuns) / (prefix + NameOf(input.config));
+  constexpr const char* kHoldsAll = "is the folder that holds the runs";
+  if (!given.empty()) {
+    if (!HoldsAllRuns(given)) return given;
+    throw Error(ExitCode::kCannotCreate, ErrorLine(Place{given}, {}, kHoldsAll, "runs/NAME"));
   }
-  ExpectNotAll(folder);
-  return folder;
+  if (const auto output = config.root().Find("output")) {
+    const std::string name = output->Text();
+    FullPath(name);  // or the current folder is gone
+    const fs::path folder =
+        ResolveInside(kRuns, name, input.allow_outside, output->place(), output->path());
+    if (HoldsAllRuns(folder)) output->Fail("'" + name + "' " + kHoldsAll, "a name inside runs/");
+    return folder;
+  }
+  return fs::path(kRuns) / (prefix + NameOf(input.config));
 }
 
 }  // namespace alidade::cli

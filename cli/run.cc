@@ -124,8 +124,7 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
   arguments->command = command_line;
   arguments->input.AddTo(command);
   AddOutput(command, arguments->folder,
-            "run folder; default: in runs/, the config's `output:`, or its name: the folder's "
-            "for config.yaml");
+            "run folder; default: the config's `output:`, or its name, in runs/");
   command.add_option("--seed", arguments->seed, "seed of the source; overrides the config")
       ->option_text("N")
       ->check(IsInteger(0, INT64_MAX));

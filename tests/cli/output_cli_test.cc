@@ -36,22 +36,23 @@ TEST_F(OutputCli, OutputIsCalledAsTheConfig) {
 }
 
 TEST_F(OutputCli, OutputIsNotTheFolderOfAllRuns) {
-  const auto expect = [&](const Arguments& more, const std::string& shown) {
+  const auto expect = [&](const Arguments& more, int code, const std::string& text) {
     for (const Arguments& command : {Arguments{"run", "config.yaml", "--no-figures"},
                                      {"sweep", "config.yaml", "--runs", "1"}}) {
       Arguments all = command;
       all.insert(all.end(), more.begin(), more.end());
       const Outcome outcome = Call(all);
-      EXPECT_EQ(outcome.code, 73) << outcome.err;
-      EXPECT_EQ(outcome.err, "error: " + shown +
-                                 ": is the folder that holds the runs; name one inside, as "
-                                 "runs/NAME\n");
+      EXPECT_EQ(outcome.code, code) << outcome.err;
+      EXPECT_EQ(outcome.err, "error: " + text + '\n');
     }
   };
-  expect({"-o", "runs"}, "runs");
-  expect({"-o", "./runs/"}, "./runs/");
-  expect({"-o", "runs/a/..", "--force"}, "runs/a/..");
-  expect({"--set", "output=."}, "runs/.");
+  const std::string holds = " is the folder that holds the runs; expected ";
+  for (const std::string folder : {"runs", "./runs/", "runs/a/.."}) {
+    expect({"-o", folder, "--force"}, 73, folder + ':' + holds + "runs/NAME");
+  }
+  expect({"--set", "output=."}, 78, "--set output: '.'" + holds + "a name inside runs/");
+  Write("config.yaml", "output: a/..\n" + testing::kDepthConfig);
+  expect({}, 78, "config.yaml:1:9 output: 'a/..'" + holds + "a name inside runs/");
   EXPECT_FALSE(Exists("runs"));
 }
 

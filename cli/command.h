@@ -44,9 +44,12 @@ void AddPluginPath(CLI::App& command, std::vector<std::string>& paths);
 void AddOutput(CLI::App& command, std::string& folder, const std::string& help);
 std::vector<std::filesystem::path> Absolute(const std::vector<std::string>& paths);
 
+/// A check of an option: says what is wrong with its text, or "".
+std::function<std::string(const std::string&)> IsInteger(std::int64_t least, std::int64_t most);
+
 /// Where output goes: `given`, or the config's `output:` inside runs/, or runs/PREFIX and the name
-/// of the config's folder, or of its file where it is named without one. Errors: kNotTrusted,
-/// kBadConfig.
+/// of the config: of its folder where it is called config.yaml, else of the file. Errors:
+/// kCannotCreate where `given` is runs/ itself, kNotTrusted, kBadConfig.
 std::filesystem::path OutputFolder(const std::string& given, const Config& config,
                                    const Input& input, const std::string& prefix = "");
 

@@ -37,6 +37,19 @@ bool WriteAll(int fd, std::string_view text) {
   return true;
 }
 
+/// `text` without what a terminal would obey: control characters but for line ends, those from
+/// U+0080 on too.
+std::string Harmless(std::string_view text) {
+  std::string shown(text);
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    const auto c = static_cast<unsigned char>(shown[i]);
+    const bool is_c1 = c >= 0x80 && c < 0xA0 && i > 0 && shown[i - 1] == '\xC2';
+    if (is_c1) shown[i - 1] = '?';
+    if (is_c1 || (c < ' ' && c != '\n' && c != '\t') || c == 0x7F) shown[i] = '?';
+  }
+  return shown;
+}
+
 /// What cannot be said on standard error cannot be said.
 void WriteError(std::string_view text) { static_cast<void>(WriteAll(STDERR_FILENO, text)); }
 
@@ -79,12 +92,12 @@ void PrintErrors(std::string_view text) {
     text.remove_prefix(std::min(end + 1, text.size()));
     if (line.empty()) continue;
     if (line[0] != ' ') lines += colour ? "\033[1;31merror:\033[0m " : "error: ";
-    lines.append(line).append("\n");
+    lines.append(Harmless(line)).append("\n");
   }
   WriteError(lines);
 }
 
-void PrintNote(std::string_view text) { WriteError(std::string(text) + '\n'); }
+void PrintNote(std::string_view text) { WriteError(Harmless(text) + '\n'); }
 
 Progress::Progress(const char* unit, bool quiet) : unit_(unit), enabled_(!quiet && OnTerminal()) {}
 

@@ -17,6 +17,7 @@ void PrepareConsole();
 void Print(std::string_view text);
 
 /// `error: LINE` on standard error for each line; a line that is indented continues the one above.
+/// Control characters, as a file may hold them, are shown as `?`; in notes too.
 void PrintErrors(std::string_view text);
 void PrintNote(std::string_view text);
 

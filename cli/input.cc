@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <charconv>
 
 #include "command.h"
 
@@ -16,13 +17,46 @@ std::string IsAssignment(const std::string& text) {
 
 std::string IsNamed(const std::string& path) { return path.empty() ? "empty path" : ""; }
 
+/// The full path, in its shortest form.
+fs::path FullPath(const fs::path& path) {
+  std::error_code error;
+  const fs::path full = fs::absolute(path, error).lexically_normal();
+  if (!error) return full;
+  throw Error(ExitCode::kCannotCreate,
+              ErrorLine(Place{path.string()}, {},
+                        "the current folder is gone; change to one that exists, or give full "
+                        "paths"));
+}
+
+/// Where output goes that nothing else places: its name is that of the config, of which one that is
+/// called config.yaml goes by its folder.
 std::string NameOf(const fs::path& config) {
-  const std::string folder = config.parent_path().lexically_normal().filename().string();
-  const bool named = !folder.empty() && folder != "." && folder != "..";
-  return named ? folder : config.stem().string();
+  const std::string folder = FullPath(config).parent_path().filename().string();
+  const bool by_folder = config.filename() == "config.yaml" && !folder.empty();
+  return by_folder ? folder : config.stem().string();
+}
+
+constexpr const char* kRuns = "runs";
+
+/// True of the folder that holds all the others: replaced, they would be gone.
+bool HoldsAllRuns(const fs::path& folder) {
+  std::error_code error;
+  const fs::path runs = fs::absolute(kRuns, error) / "";
+  return !error && FullPath(folder / "") == runs;
 }
 
 }  // namespace
+
+std::function<std::string(const std::string&)> IsInteger(std::int64_t least, std::int64_t most) {
+  return [least, most](const std::string& text) -> std::string {
+    std::int64_t value = 0;
+    const char* const end = text.data() + text.size();
+    const auto [rest, error] = std::from_chars(text.data(), end, value);
+    if (error == std::errc() && rest == end && value >= least && value <= most) return {};
+    return "'" + text + "' is no integer from " + std::to_string(least) + " to " +
+           std::to_string(most);
+  };
+}
 
 void AddPluginPath(CLI::App& command, std::vector<std::string>& paths) {
   command.add_option("--plugin-path", paths, "a plugin, or a folder of plugins; may be repeated")
@@ -62,25 +96,33 @@ Config Input::Load() const {
 
 std::vector<fs::path> Absolute(const std::vector<std::string>& paths) {
   std::vector<fs::path> absolute;
-  for (const std::string& path : paths) absolute.push_back(fs::absolute(path).lexically_normal());
+  for (const std::string& path : paths) absolute.push_back(FullPath(path));
   return absolute;
 }
 
 PluginHost Input::Host(const Config& loaded) const {
   std::vector<fs::path> places;
-  for (const fs::path& path : PluginPaths(loaded)) places.push_back(fs::absolute(path));
+  for (const fs::path& path : PluginPaths(loaded)) places.push_back(FullPath(path));
   for (const fs::path& path : Absolute(plugin_paths)) places.push_back(path);
   return PluginHost(places);
 }
 
 fs::path OutputFolder(const std::string& given, const Config& config, const Input& input,
                       const std::string& prefix) {
-  if (!given.empty()) return given;
-  if (const auto output = config.root().Find("output")) {
-    return ResolveInside("runs", output->Text(), input.allow_outside, output->place(),
-                         output->path());
+  constexpr const char* kHoldsAll = "is the folder that holds the runs";
+  if (!given.empty()) {
+    if (!HoldsAllRuns(given)) return given;
+    throw Error(ExitCode::kCannotCreate, ErrorLine(Place{given}, {}, kHoldsAll, "runs/NAME"));
   }
-  return fs::path("runs") / (prefix + NameOf(input.config));
+  if (const auto output = config.root().Find("output")) {
+    const std::string name = output->Text();
+    FullPath(name);  // or the current folder is gone
+    const fs::path folder =
+        ResolveInside(kRuns, name, input.allow_outside, output->place(), output->path());
+    if (HoldsAllRuns(folder)) output->Fail("'" + name + "' " + kHoldsAll, "a name inside runs/");
+    return folder;
+  }
+  return fs::path(kRuns) / (prefix + NameOf(input.config));
 }
 
 }  // namespace alidade::cli

@@ -15,7 +15,8 @@ namespace alidade::cli {
 namespace {
 
 constexpr const char* kFooter = R"(Examples:
-  alidade run config.yaml                          into runs/config
+  alidade run base.yaml                            into runs/base
+  alidade run near/config.yaml                     into runs/near
   alidade run config.yaml -o runs/b --seed 2 --set estimators.ekf.gate=0.99
   alidade run config.yaml --set source.path=other.csv --force
 
@@ -83,7 +84,6 @@ std::string Summary(const RunResult& result, const Recorder& recorder) {
   for (const std::string& path : recorder.highlights()) {
     text += "  " + (recorder.folder() / path).string() + '\n';
   }
-  if (!recorder.note().empty()) text += recorder.note() + '\n';
   return text;
 }
 
@@ -109,7 +109,10 @@ ExitCode RunConfig(const Arguments& arguments) {
   if (result.status == RunStatus::kStopped) PrintNote(result.reason);
   FinishOnSignals();
   recorder.Finish(result);
-  if (!arguments.quiet) Print(Summary(result, recorder));
+  if (!arguments.quiet) {
+    Print(Summary(result, recorder));
+    if (!recorder.note().empty()) PrintNote(recorder.note());
+  }
   return result.code;
 }
 
@@ -121,10 +124,10 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
   arguments->command = command_line;
   arguments->input.AddTo(command);
   AddOutput(command, arguments->folder,
-            "run folder; default: the config's `output:`, or its folder's name, in runs/");
+            "run folder; default: the config's `output:`, or its name, in runs/");
   command.add_option("--seed", arguments->seed, "seed of the source; overrides the config")
       ->option_text("N")
-      ->check(CLI::Range(std::int64_t{0}, INT64_MAX));
+      ->check(IsInteger(0, INT64_MAX));
   command.add_flag("--force", arguments->force, "replace the run folder if it is there");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.add_flag("--no-figures", arguments->no_figures, "draw no figures");

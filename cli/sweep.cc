@@ -98,14 +98,14 @@ void AddSweep(CLI::App& program, Action& action) {
   command.add_option("--runs", arguments->options.runs, "number of runs, of all shards together")
       ->option_text("N")
       ->required()
-      ->check(CLI::Range(std::int64_t{1}, std::int64_t{1'000'000}));
+      ->check(IsInteger(1, 1'000'000));
   command
       .add_option("--first-seed", arguments->options.first_seed, "seeds count up from S; default 1")
       ->option_text("S")
-      ->check(CLI::Range(std::int64_t{0}, std::int64_t{1} << 62));
+      ->check(IsInteger(0, std::int64_t{1} << 62));
   command.add_option("--jobs", arguments->options.jobs, "threads; default: all processors")
       ->option_text("J")
-      ->check(CLI::Range(1, 1024));
+      ->check(IsInteger(1, 1024));
   const auto read_shard = [arguments](const std::string& text) {
     ReadShard(text, arguments->options);
   };

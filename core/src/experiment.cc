@@ -188,7 +188,10 @@ std::vector<std::filesystem::path> PluginPaths(const Config& config) {
 Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   const Node root = config.root();
   CheckSchema(root);
-  for (const char* key : {"title", "output", "plugins", "include"}) root.Declare(key);
+  for (const char* key : {"plugins", "include"}) root.Declare(key);
+  for (const char* key : {"title", "output"}) {
+    if (const auto text = root.Find(key)) static_cast<void>(text->Text());
+  }
   if (const auto reference = root.Find("reference")) {
     static_cast<void>(reference->Choice({"truth"}));
   }

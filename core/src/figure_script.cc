@@ -28,7 +28,7 @@ set samples 2
 set border 3 lc rgb '#555555'
 set tics nomirror textcolor rgb '#333333'
 set grid lc rgb '#e4e4e4' lt 1
-set key at graph 1.01, graph 1.08 left top Left reverse samplen 2 maxrows 12 font ',11' noenhanced
+set key at graph 1.01, graph 1.08 left top Left reverse samplen 2 font ',11' noenhanced
 set lmargin 11
 set tmargin 2
 set bmargin 1.5
@@ -89,6 +89,7 @@ void FigureScript::EndPanel() {
 void FigureScript::Panel(std::string_view title, std::string_view y_label) {
   EndPanel();
   ++panels_;
+  keys_ = 0;
   body_ += "\nset label 1 " + GnuplotQuoted(title) + " at graph 0, 1.09 left noenhanced\n";
   body_ += "set ylabel " + GnuplotQuoted(y_label) + " noenhanced\n";
   body_ += "set autoscale y\n";
@@ -103,6 +104,7 @@ void FigureScript::Curve(const FigureFile& file, std::string_view how, std::stri
   if (stride > 1) plot_ += " every " + std::to_string(stride);
   plot_.append(" using ").append(how);
   longest_key_ = std::max(longest_key_, key.size());
+  if (!key.empty()) most_keys_ = std::max(most_keys_, ++keys_);
   plot_ += key.empty() ? " notitle" : " title " + GnuplotQuoted(key) + " noenhanced";
 }
 
@@ -125,7 +127,9 @@ void FigureScript::Quartiles(std::string_view name, std::string_view file,
 }
 
 std::string FigureScript::Text() const {
-  const std::string size = "960," + std::to_string(64 + 170 * panels_);
+  // A panel is as high as its key, which would go on beyond the right edge.
+  const int height = std::max(170, 60 + 18 * most_keys_);
+  const std::string size = "960," + std::to_string(64 + height * panels_);
   std::string text =
       "# Draws figures/" + name_ + ".svg. In the run folder: gnuplot figures/" + name_ + ".gp\n";
   text += kSettings;

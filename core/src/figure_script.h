@@ -54,6 +54,7 @@ class FigureScript {
   Stamp first_, last_;
   double span_s_;
   int panels_ = 0;
+  int keys_ = 0, most_keys_ = 0;  ///< entries in the key of the panel at hand, and of the fullest
   std::size_t longest_key_ = 0;
 };
 

@@ -355,21 +355,26 @@ Figures DrawFigures(const RunFolder& folder, const RecordedRun& run, const Drawi
   const std::vector<Plan> plans = PlanFigures(run);
   const auto file = [](const Plan& plan) { return "figures/" + plan.script.name() + ".gp"; };
   for (const Plan& plan : plans) folder.Write(file(plan), plan.script.Text());
+  std::string why;
   for (const Plan& plan : plans) {
     const std::string& name = plan.script.name();
     const GnuplotResult result = Draw(folder, name + ".svg", {file(plan)}, limits);
-    if (const std::string why = Obstacle(result.end); !why.empty()) {
-      const std::string count =
-          std::to_string(figures.drawn.size()) + " of " + std::to_string(plans.size());
-      figures.note = why + ": " + (figures.drawn.empty() ? "no" : count) + " figures";
+    if (const std::string obstacle = Obstacle(result.end); !obstacle.empty()) {
+      why = obstacle;
       break;
     }
-    if (result.end == End::kFailed) figures.note = name + " is not drawn: " + result.complaint;
+    if (result.end == End::kFailed && why.empty()) {
+      why = name + " is not: " + result.complaint;
+    }
     if (result.end != End::kDrawn) continue;
     figures.drawn.push_back({name, plan.script.title(), plan.estimator});
     if (name != "measurements") continue;
     figures.has_png =
         Draw(folder, name + ".png", {"-e", "png=1", file(plan)}, limits).end == End::kDrawn;
+  }
+  if (!why.empty()) {
+    figures.note = std::to_string(figures.drawn.size()) + " of " + std::to_string(plans.size()) +
+                   " figures drawn: " + why;
   }
   return figures;
 }

@@ -53,6 +53,13 @@ End WaitFor(pid_t child, const DrawingLimits& limits, int* status) {
   return end;
 }
 
+/// "" where it ended well.
+std::string HowItEnded(int status) {
+  if (WIFSIGNALED(status)) return "was ended by signal " + std::to_string(WTERMSIG(status));
+  const int code = WEXITSTATUS(status);
+  return code == 0 ? "" : "failed with exit code " + std::to_string(code);
+}
+
 /// The line of gnuplot's complaint that says what is wrong: the last that is not empty.
 std::string Complaint(const std::filesystem::path& log) {
   std::ifstream stream(log);
@@ -94,9 +101,10 @@ GnuplotResult RunGnuplot(const std::filesystem::path& folder,
     result = {End::kFailed, std::string("gnuplot does not start: ") + std::strerror(error)};
   } else {
     result.end = WaitFor(child, limits, &status);
-    const bool failed = !WIFEXITED(status) || WEXITSTATUS(status) != 0;
-    if (result.end == End::kDrawn && failed) {
-      result = {End::kFailed, "gnuplot failed: " + Complaint(log)};
+    const std::string how = HowItEnded(status);
+    if (result.end == End::kDrawn && !how.empty()) {
+      const std::string complaint = Complaint(log);
+      result = {End::kFailed, "gnuplot " + how + (complaint.empty() ? "" : ": " + complaint)};
     }
   }
   std::error_code ignored;

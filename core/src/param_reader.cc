@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <new>
 #include <tuple>
 #include <utility>
 
@@ -162,6 +163,7 @@ ParamReader::ParamReader(const Node& entry, std::string owner)
 }
 
 void ParamReader::Check() const {
+  if (thrown_) std::rethrow_exception(thrown_);
   if (errors_.empty()) return;
   std::vector<std::string> lines(errors_.begin(), errors_.end());
   const auto by_place = [](const std::string& a, const std::string& b) {
@@ -173,20 +175,24 @@ void ParamReader::Check() const {
 }
 
 std::int32_t ParamReader::Read(void* self, const AlidadeParam* param, double* values,
-                               std::int32_t capacity) noexcept {
+                               std::int32_t capacity) noexcept try {
   auto* reader = static_cast<ParamReader*>(self);
   try {
     const std::vector<double> read = reader->Values(reader->Expect(param, values, capacity));
     std::copy_n(read.begin(), std::min(std::ssize(read), std::ptrdiff_t{capacity}), values);
     return static_cast<std::int32_t>(read.size());
-  } catch (const std::exception& e) {
-    reader->errors_.push_back(e.what());
+  } catch (const Error& e) {
+    reader->errors_.emplace_back(e.what());
   }
+  return -1;
+} catch (...) {
+  static_cast<ParamReader*>(self)->thrown_ = std::current_exception();
   return -1;
 }
 
-void ParamReader::Fail(void* self, const char* key, const char* text) noexcept {
+void ParamReader::Fail(void* self, const char* key, const char* text) noexcept try {
   auto* reader = static_cast<ParamReader*>(self);
+  if (Text(text) == std::bad_alloc().what()) throw std::bad_alloc();  // on the other side
   if (Text(key).empty()) {
     reader->failure_ = Text(text).empty() ? "it does not say why" : Text(text);
     return;
@@ -201,6 +207,8 @@ void ParamReader::Fail(void* self, const char* key, const char* text) noexcept {
     rest.erase(0, dot == std::string::npos ? dot : dot + 1);
   }
   reader->errors_.push_back(ErrorLine(place, PathBelow(reader->entry_.path(), key), Text(text)));
+} catch (...) {
+  static_cast<ParamReader*>(self)->thrown_ = std::current_exception();
 }
 
 /// The parameter; one that breaks the rules is an error of the plugin, at the entry.
@@ -258,7 +266,8 @@ ParamRecorder::ParamRecorder() : trials_(1) {
 
 std::int32_t ParamRecorder::Read(void* self, const AlidadeParam* from, double* values,
                                  std::int32_t capacity) noexcept {
-  Trial& trial = static_cast<ParamRecorder*>(self)->trials_.back();
+  auto* recorder = static_cast<ParamRecorder*>(self);
+  Trial& trial = recorder->trials_.back();
   try {
     const AlidadeParam param = Checked(from, values, capacity);
     const bool choice = param.kind == ALIDADE_PARAM_CHOICE;
@@ -269,9 +278,12 @@ std::int32_t ParamRecorder::Read(void* self, const AlidadeParam* from, double* v
       trial.asked.push_back({Describe(param), choice ? static_cast<int>(values[0]) : 0});
     }
     return std::max(param.count, 0);
+  } catch (const std::bad_alloc&) {
+    recorder->out_of_memory_ = true;
   } catch (const std::exception&) {
-    return -1;
+    // The plugin asks wrongly; it is told so when the model is made.
   }
+  return -1;
 }
 
 std::string ParamRecorder::When(const std::string& key) const {
@@ -297,6 +309,7 @@ std::string ParamRecorder::When(const std::string& key) const {
 }
 
 std::vector<ParamInfo> ParamRecorder::Result() const {
+  if (out_of_memory_) throw std::bad_alloc();
   std::vector<ParamInfo> result;
   for (const Trial& trial : trials_) {
     for (const Asked& asked : trial.asked) {

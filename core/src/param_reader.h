@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <exception>
 #include <string>
 #include <vector>
 
@@ -24,7 +25,8 @@ class ParamReader {
   /// Why the model says that it cannot be made, where that belongs to no key; else "".
   const std::string& failure() const { return failure_; }
   /// Throws all errors as one, kBadConfig, in the order of their places (that of the reads depends
-  /// on the compiler); returns where there are none.
+  /// on the compiler), or what else went wrong in a call, as memory that ran out; returns where
+  /// there is nothing.
   void Check() const;
 
  private:
@@ -42,6 +44,7 @@ class ParamReader {
   AlidadeHost host_{};
   std::vector<std::string> errors_;
   std::string failure_;
+  std::exception_ptr thrown_;  ///< by a call from the plugin, which must not see it
 };
 
 /// Notes what a model asks for while it is created with stand-in values.
@@ -86,6 +89,7 @@ class ParamRecorder {
 
   AlidadeHost host_{};
   std::vector<Trial> trials_;
+  bool out_of_memory_ = false;
 };
 
 }  // namespace alidade::internal

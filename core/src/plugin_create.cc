@@ -48,15 +48,8 @@ std::string Named(PluginEntry::Kind kind, const std::string& name) {
                             " failed while being created: " + why));
 }
 
-std::string SizeText(const Geometry& geometry) {
-  const std::string name = ToString(geometry.kind);
-  return geometry.kind == GeometryKind::kVector
-             ? name + '(' + std::to_string(geometry.ambient) + ')'
-             : name;
-}
-
 std::string Line(const std::string& what, const Space& space) {
-  std::string line = what + ' ' + space.name + ": " + SizeText(space.geometry);
+  std::string line = what + ' ' + space.name + ": " + ToString(space.geometry);
   if (!space.unit.empty()) line += ", " + space.unit;
   if (!space.doc.empty()) line += "; " + space.doc;
   if (space.optional()) line += " (optional)";

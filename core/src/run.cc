@@ -168,6 +168,16 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
   }
 }
 
+/// The metrics of the estimator; where memory, say, does not last for them, the rest is kept.
+void Measure(Running& one, RunResult& result) {
+  try {
+    one.result.metrics = one.metrics.Finish();
+  } catch (...) {
+    Failure failure = CaughtFailure();
+    if (result.status == RunStatus::kOk) Fail(result, failure.code, std::move(failure.reason));
+  }
+}
+
 /// The estimates of those that needed all frames.
 void SmoothAll(std::vector<Running>& running, const std::vector<Seen>& kept,
                const RunOptions& options, RunResult& result) {
@@ -219,7 +229,7 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
     if (failure.code == ExitCode::kStopped) result.status = RunStatus::kStopped;
   }
   for (Running& one : running) {
-    one.result.metrics = one.metrics.Finish();
+    Measure(one, result);
     one.result.counts = one.metrics.counts();
     one.result.units = one.metrics.units();
     if (result.frames > 0) NoteUnused(one.named.system, one.result);

@@ -7,13 +7,17 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
+#include <fstream>
 
 namespace alidade::internal {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr const char* kList = "files.txt";
 
 /// Holds the lock of a folder, where it can be had, until the end of its scope.
 class FolderLock {
@@ -58,16 +62,57 @@ bool IsHeld(const fs::path& folder, std::string_view process) {
   return error == EWOULDBLOCK || IsAlive(process);
 }
 
-fs::path WithoutTrailingSlash(const fs::path& path) {
-  const fs::path normal = fs::absolute(path).lexically_normal();
-  return normal.has_filename() ? normal : normal.parent_path();
-}
-
 [[noreturn]] void Refuse(const fs::path& path, std::string_view what,
                          std::string_view remedy = {}) {
   std::string text = ErrorLine(Place{path.string()}, {}, what);
   if (!remedy.empty()) text.append("; ").append(remedy);
   throw Error(ExitCode::kCannotCreate, text);
+}
+
+fs::path WithoutTrailingSlash(const fs::path& path) {
+  std::error_code error;
+  const fs::path normal = fs::absolute(path, error).lexically_normal();
+  if (error) {
+    Refuse(path, "the current folder is gone",
+           "change to one that exists, or name the output by its full path");
+  }
+  return normal.has_filename() ? normal : normal.parent_path();
+}
+
+/// The lines of the list in a run folder, sorted as they were written; none where there is no list.
+std::vector<std::string> ReadList(const fs::path& folder, std::error_code& error) {
+  std::ifstream stream(folder / kList);
+  if (!stream && errno != ENOENT) error.assign(errno, std::generic_category());
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+/// What lies in the folder but not on its list; a folder stands for all that is in it.
+std::vector<std::string> Unlisted(const fs::path& folder, std::error_code& error) {
+  const std::vector<std::string> listed = ReadList(folder, error);
+  std::vector<std::string> found;
+  if (error) return found;
+  for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().lexically_relative(folder).string();
+    if (std::binary_search(listed.begin(), listed.end(), name)) continue;
+    found.push_back(name);
+    entry.disable_recursion_pending();
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+/// The first few of the names, for a message.
+std::string Few(const std::vector<std::string>& names) {
+  constexpr std::size_t kShown = 3;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(names.size(), kShown); ++i) {
+    text.append(i > 0 ? ", '" : "'").append(names[i]).append("'");
+  }
+  if (names.size() > kShown) text += " and " + std::to_string(names.size() - kShown) + " more";
+  return text;
 }
 
 }  // namespace
@@ -156,11 +201,15 @@ void RunFolder::CheckTarget() const {
   if (!force_) Refuse(shown_, "exists already", "add --force to replace it");
   std::error_code error;
   if (!fs::is_directory(target_, error)) Refuse(shown_, "is a file", "choose another folder");
-  const bool ours = Exists(target_ / "run.json") || Exists(target_ / "sweep.json");
-  if (!fs::is_empty(target_, error) && !ours) {
-    Refuse(shown_, "is not a run folder (it has neither run.json nor sweep.json)",
-           "--force replaces run folders only; choose another folder");
+  const std::vector<std::string> foreign = Unlisted(target_, error);
+  if (error) Refuse(shown_, "cannot be read: " + error.message(), "choose another folder");
+  if (foreign.empty()) return;
+  if (!Exists(target_ / kList)) {
+    Refuse(shown_, std::string("is not a run folder (it has no ") + kList + ')',
+           "--force replaces run folders only; remove it yourself, or choose another folder");
   }
+  Refuse(shown_, "holds what was not written with it: " + Few(foreign),
+         "move that elsewhere, or choose another folder");
 }
 
 std::unique_ptr<OutputFile> RunFolder::Create(const std::string& name) const {
@@ -177,6 +226,17 @@ void RunFolder::Write(const std::string& name, std::string_view text) const {
   file->Close();
 }
 
+void RunFolder::WriteList() const {
+  std::vector<std::string> names = {kList};
+  for (const auto& entry : fs::recursive_directory_iterator(partial_)) {
+    names.push_back(entry.path().lexically_relative(partial_).string());
+  }
+  std::sort(names.begin(), names.end());
+  std::string text;
+  for (const std::string& name : names) text += name + '\n';
+  Write(kList, text);
+}
+
 void RunFolder::SyncAll() const {
   for (const auto& entry : fs::recursive_directory_iterator(partial_)) {
     Sync(entry.path(), Shown(entry.path().lexically_relative(partial_).string()));
@@ -185,6 +245,7 @@ void RunFolder::SyncAll() const {
 }
 
 void RunFolder::Commit() {
+  WriteList();
   SyncAll();
   const FolderLock lock(target_.parent_path());
   CheckTarget();

@@ -17,8 +17,8 @@ namespace alidade::internal {
 class RunFolder {
  public:
   /// Creates the partial folder, and the folders above it where they are missing. Removes partial
-  /// folders of dead processes. Errors: kCannotCreate where `target` exists without `force`, is no
-  /// run folder (neither run.json nor sweep.json), or is being written by another process; kIo.
+  /// folders of dead processes. Errors: kCannotCreate where `target` exists without `force`, holds
+  /// anything that its own `files.txt` does not list, or is being written by another process; kIo.
   RunFolder(const std::filesystem::path& target, bool force);
   /// Removes what was not committed, with the folders above it that were made for it.
   ~RunFolder();
@@ -32,7 +32,8 @@ class RunFolder {
   const std::filesystem::path& partial() const { return partial_; }
   /// The path of `name` as messages give it: in the folder's place.
   std::string Shown(const std::string& name) const { return (shown_ / name).string(); }
-  /// Syncs everything and moves it to its place; an old folder goes. Errors: kCannotCreate, kIo.
+  /// Lists all that was written in `files.txt`, syncs it and moves it to its place; an old folder
+  /// goes. Errors: kCannotCreate, kIo.
   void Commit();
 
  private:
@@ -41,6 +42,7 @@ class RunFolder {
   void MakeParents();
   void RemoveLeftovers() const;
   std::filesystem::path Sibling(const char* kind) const;
+  void WriteList() const;
   void SyncAll() const;
 
   std::filesystem::path shown_;   ///< as given

@@ -71,6 +71,13 @@ const char* ToString(GeometryKind kind) {
   return "unit_vector";
 }
 
+std::string ToString(const Geometry& geometry) {
+  const std::string name = ToString(geometry.kind);
+  return geometry.kind == GeometryKind::kVector
+             ? name + '(' + std::to_string(geometry.ambient) + ')'
+             : name;
+}
+
 void Geometry::Plus(const double* x, const double* d, double* y) const {
   switch (kind) {
     case GeometryKind::kVector:

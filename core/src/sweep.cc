@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <exception>
 #include <mutex>
 #include <system_error>
 #include <thread>
@@ -36,21 +37,20 @@ class Queue {
         std::uint64_t first_seed, std::int64_t runs)
       : config_(config), host_(host), options_(options), first_seed_(first_seed), runs_(runs) {}
 
-  /// Takes runs until there are none left.
-  void Work() {
-    while (!Stopped()) {
-      const std::int64_t index = next_++;
-      if (index >= runs_) return;
-      SweepRun run = RunSeed(first_seed_ + static_cast<std::uint64_t>(index));
-      if (run.status == RunStatus::kStopped) return;
+  /// Takes runs until there are none left. What ends it before that, Take() throws.
+  void Work() noexcept {
+    try {
+      while (!Stopped() && TakeOne()) continue;
+    } catch (...) {
       const std::lock_guard lock(mutex_);
-      done_.push_back(std::move(run));
-      if (options_.progress) options_.progress(static_cast<std::int64_t>(done_.size()), runs_);
+      thrown_ = std::current_exception();
+      next_ = runs_;
     }
   }
 
   /// The finished ones, by seed.
   std::vector<SweepRun> Take() {
+    if (thrown_) std::rethrow_exception(thrown_);
     std::sort(done_.begin(), done_.end(),
               [](const SweepRun& a, const SweepRun& b) { return a.seed < b.seed; });
     return std::move(done_);
@@ -58,6 +58,18 @@ class Queue {
 
  private:
   bool Stopped() const { return options_.stop && options_.stop(); }
+
+  /// False where none is left, or it was stopped.
+  bool TakeOne() {
+    const std::int64_t index = next_++;
+    if (index >= runs_) return false;
+    SweepRun run = RunSeed(first_seed_ + static_cast<std::uint64_t>(index));
+    if (run.status == RunStatus::kStopped) return false;
+    const std::lock_guard lock(mutex_);
+    done_.push_back(std::move(run));
+    if (options_.progress) options_.progress(static_cast<std::int64_t>(done_.size()), runs_);
+    return true;
+  }
 
   Config CopyFor(std::uint64_t seed) {
     const std::lock_guard lock(mutex_);
@@ -100,6 +112,7 @@ class Queue {
   std::atomic<std::int64_t> next_{0};
   std::mutex mutex_;
   std::vector<SweepRun> done_;
+  std::exception_ptr thrown_;
 };
 
 /// Whether every model on offer may work in several instances at once. Asked of all, used or not:

@@ -120,6 +120,11 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
   const std::vector<std::string> names = ReadBlockNames(entry, binding.model);
   const auto considered = ReadNames(entry, "consider", names);
   const auto fixed = ReadNames(entry, "fixed", names);
+  for (const std::string& both : fixed) {
+    if (!Contains(considered, both)) continue;
+    entry.At("fixed").Fail("block '" + both + "' is in `consider` too",
+                           "a block in one of them: fixed is known, considered is uncertain");
+  }
   const Node initial = entry.At("initial", "the state entry '" + name + "'");
   for (std::size_t i = 0; i < names.size(); ++i) {
     const BlockStatus status = Contains(fixed, names[i])        ? BlockStatus::kFixed
@@ -171,9 +176,8 @@ RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& mod
   const Block& block = system.layout[binding.block];
   if (!(block.geometry() == role.geometry)) {
     node.Fail(
-        "block '" + block.name + "' has size " + std::to_string(block.geometry().ambient) +
-            " or another geometry",
-        "one that fits role '" + role.name + "' of size " + std::to_string(role.geometry.ambient));
+        "block '" + block.name + "' is of geometry " + ToString(block.geometry()),
+        ToString(role.geometry) + ", as role '" + role.name + "' of model '" + model.name() + "'");
   }
   return binding;
 }

@@ -16,6 +16,7 @@ using SweepCli = testing::ProgramTest;
 
 std::string Rows(const std::string& csv) { return csv.substr(csv.find('\n') + 1); }
 
+// FAULTS 97
 TEST_F(SweepCli, GivesTheSameBytesForAnyNumberOfJobs) {
   const Outcome one = Call({"sweep", "config.yaml", "--runs", "12", "--jobs", "1", "-o", "one"});
   EXPECT_EQ(one.code, 0) << one.err;

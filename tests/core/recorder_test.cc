@@ -19,12 +19,12 @@ TEST(Recorder, WritesEveryFile) {
   Record(OptionsFor(folder / "above" / "out"));
   EXPECT_EQ(
       FilesIn(folder / "above" / "out"),
-      (std::vector<std::string>{"alone/estimates.csv", "alone/events.csv", "alone/gains.csv",
-                                "alone/innovations.csv", "comparison.csv", "config.resolved.yaml",
-                                "ekf/estimates.csv", "ekf/events.csv", "ekf/gains.csv",
-                                "ekf/innovations.csv", "implied.csv", "measurements.csv",
-                                "report.html", "run.json", "timing.json", "truth.csv"}));
-  EXPECT_EQ(FilesIn(folder.path()).size(), 16u);  // nothing beside it
+      (std::vector<std::string>{
+          "alone/estimates.csv", "alone/events.csv", "alone/gains.csv", "alone/innovations.csv",
+          "comparison.csv", "config.resolved.yaml", "ekf/estimates.csv", "ekf/events.csv",
+          "ekf/gains.csv", "ekf/innovations.csv", "files.txt", "implied.csv", "measurements.csv",
+          "report.html", "run.json", "timing.json", "truth.csv"}));
+  EXPECT_EQ(FilesIn(folder.path()).size(), 17u);  // nothing beside it
 }
 
 TEST(Recorder, EstimatesRoundTrip) {
@@ -306,7 +306,8 @@ TEST(Recorder, DrawsWhereGnuplotIs) {
   for (const std::string& file : recorder.highlights()) {
     EXPECT_TRUE(fs::exists(folder / "out" / file)) << file;
   }
-  if (recorder.note() == "gnuplot is not installed: no figures") GTEST_SKIP() << recorder.note();
+  if (recorder.note() == "0 of 10 figures drawn: gnuplot is not installed")
+    GTEST_SKIP() << recorder.note();
   EXPECT_EQ(recorder.note(), "");
   EXPECT_EQ(recorder.highlights()[1], "figures/measurements.png");
   for (const char* name : {"measurements", "comparison", "ekf.state", "ekf.covariance", "ekf.gain",
@@ -356,7 +357,7 @@ TEST(Recorder, DoesWithoutGnuplot) {
     Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
     Experiment experiment = MakeExperiment();
     recorder.Finish(RunInto(recorder, experiment));
-    if (recorder.note() != "gnuplot is not installed: no figures") ::_exit(1);
+    if (recorder.note() != "0 of 10 figures drawn: gnuplot is not installed") ::_exit(1);
   });
   EXPECT_EQ(code, 0);
   EXPECT_TRUE(fs::exists(folder / "out/report.html"));
@@ -396,13 +397,13 @@ TEST(Recorder, AStopLeavesOutTheRestOfTheFigures) {
   options.stop = [&] {  // once it sleeps
     return fs::exists(half.string() + std::to_string(::getpid()) + "/figures/comparison.svg");
   };
-  EXPECT_EQ(RecordSlowly(folder, options, "the drawing was stopped: 1 of 10 figures"), 0);
+  EXPECT_EQ(RecordSlowly(folder, options, "1 of 10 figures drawn: the drawing was stopped"), 0);
   EXPECT_EQ(SvgsOf(folder / "out"), Names{"measurements.svg"});
   EXPECT_TRUE(fs::exists(folder / "out/run.json"));
   const std::string report = Read(folder / "out/report.html");
   EXPECT_NE(report.find("<svg>one</svg>"), std::string::npos);
   EXPECT_EQ(report.find("<svg>half"), std::string::npos);
-  EXPECT_NE(report.find("the drawing was stopped: 1 of 10 figures"), std::string::npos);
+  EXPECT_NE(report.find("1 of 10 figures drawn: the drawing was stopped"), std::string::npos);
 }
 
 TEST(Recorder, AFigureThatGnuplotDidNotWriteIsNotThere) {
@@ -414,7 +415,8 @@ TEST(Recorder, AFigureThatGnuplotDidNotWriteIsNotThere) {
     Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
     Experiment experiment = MakeExperiment();
     recorder.Finish(RunInto(recorder, experiment));
-    if (recorder.note() != "alone.innovation is not drawn: gnuplot wrote nothing") ::_exit(1);
+    const std::string note = recorder.note();
+    if (note != "0 of 10 figures drawn: measurements is not: gnuplot wrote nothing") ::_exit(1);
   });
   EXPECT_EQ(code, 0);
   EXPECT_EQ(Read(folder / "out/report.html").find("<figure>"), std::string::npos);
@@ -424,7 +426,7 @@ TEST(Recorder, DrawsNothingOnceItIsStopped) {
   const TemporaryFolder folder;
   Recorder::Options options = OptionsFor(folder / "out", false, true);
   options.stop = [] { return true; };
-  EXPECT_EQ(RecordSlowly(folder, options, "the drawing was stopped: no figures"), 0);
+  EXPECT_EQ(RecordSlowly(folder, options, "0 of 10 figures drawn: the drawing was stopped"), 0);
   EXPECT_EQ(SvgsOf(folder / "out"), Names{});
 }
 
@@ -432,7 +434,7 @@ TEST(Recorder, GivesGnuplotSoMuchTimeAndNoMore) {
   const TemporaryFolder folder;
   Recorder::Options options = OptionsFor(folder / "out", false, true);
   options.drawing_s = 1.0;
-  EXPECT_EQ(RecordSlowly(folder, options, "gnuplot took too long: 1 of 10 figures"), 0);
+  EXPECT_EQ(RecordSlowly(folder, options, "1 of 10 figures drawn: gnuplot took too long"), 0);
   EXPECT_EQ(SvgsOf(folder / "out"), Names{"measurements.svg"});
 }
 

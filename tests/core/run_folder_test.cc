@@ -12,6 +12,7 @@
 #include <cerrno>
 #include <fstream>
 
+#include "alidade/sweep.h"
 #include "support/recording.h"
 
 namespace {
@@ -58,6 +59,17 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
+/// Files and folders at any depth.
+std::vector<std::string> EntriesOf(const fs::path& folder) {
+  std::vector<std::string> entries;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    entries.push_back(entry.path().lexically_relative(folder).string());
+  }
+  std::sort(entries.begin(), entries.end());
+  return entries;
+}
+
+// FAULTS 92
 TEST(RunFolder, LeavesAnExistingFolderAlone) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "out"), 3);
@@ -72,11 +84,80 @@ TEST(RunFolder, LeavesAnExistingFolderAlone) {
 TEST(RunFolder, ForceReplacesARunFolder) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "out"), 3);
-  std::ofstream(folder / "out/mine.txt") << "x";
+  EXPECT_EQ(Lines(folder / "out/files.txt"), EntriesOf(folder / "out"));
   Record(OptionsFor(folder / "out", true), 5);
   EXPECT_EQ(Lines(folder / "out/truth.csv").size(), 6u);
-  EXPECT_FALSE(fs::exists(folder / "out/mine.txt"));
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);  // the old one is gone
+}
+
+TEST(RunFolder, ForceSparesWhatWasNotWrittenWithTheRun) {
+  const TemporaryFolder folder;
+  Record(OptionsFor(folder / "runs"), 3);
+  const std::string start = (folder / "runs").string() + ": holds what was not written with it: ";
+  const auto expect = [&](const std::string& names) {
+    std::string text;
+    EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "runs", true)); }, &text), 73);
+    EXPECT_EQ(text, start + names + "; move that elsewhere, or choose another folder");
+    EXPECT_EQ(Lines(folder / "runs/truth.csv").size(), 4u);
+  };
+  // Another run, be it in a folder of this one.
+  Record(OptionsFor(folder / "runs/base"), 3);
+  expect("'base'");
+  Record(OptionsFor(folder / "runs/ekf/base"), 3);
+  expect("'base', 'ekf/base'");
+  std::ofstream(folder / "runs/a.txt") << "x";
+  fs::create_directory(folder / "runs/empty");
+  expect("'a.txt', 'base', 'ekf/base' and 1 more");
+  for (const char* name : {"a.txt", "base", "empty", "ekf/base"}) {
+    fs::rename(folder / "runs" / name, folder / fs::path(name).filename());
+    fs::remove_all(folder / fs::path(name).filename());
+  }
+  Record(OptionsFor(folder / "runs", true), 5);
+  EXPECT_EQ(Lines(folder / "runs/truth.csv").size(), 6u);
+}
+
+TEST(RunFolder, ForceSparesWhatCameWhileTheRunWasAtWork) {
+  const TemporaryFolder folder;
+  Record(OptionsFor(folder / "out"), 3);
+  Recorder second(OptionsFor(folder / "out", true), MakeConfig(), Host());
+  std::ofstream(folder / "out/mine.txt") << "x";
+  EXPECT_EQ(CodeOf([&] { second.Finish({}); }), 73);
+  EXPECT_EQ(Read(folder / "out/mine.txt"), "x");
+}
+
+TEST(RunFolder, SaysThatAFolderCannotBeRead) {
+  const TemporaryFolder folder;
+  Host();  // a child without rights could not look for plugins
+  Record(OptionsFor(folder / "out"), 3);
+  fs::permissions(folder.path(), fs::perms::all);
+  for (const char* closed : {"out", "out/files.txt"}) {
+    fs::permissions(folder / closed, fs::perms::none);
+    const int code = InChild([&] {
+      if (::getuid() == 0 && ::setuid(65534) != 0) ::_exit(99);
+      std::string text;
+      const int refused = CodeOf([&] { Record(OptionsFor(folder / "out", true)); }, &text);
+      ::_exit(text.find(": cannot be read: Permission denied;") == text.npos ? 1 : refused);
+    });
+    fs::permissions(folder / closed, fs::perms::owner_all);
+    if (code == 99) GTEST_SKIP() << "cannot give up the rights of root";
+    EXPECT_EQ(code, 73) << closed;
+  }
+}
+
+TEST(RunFolder, NeedsTheCurrentFolderForARelativeNameOnly) {
+  const TemporaryFolder folder;
+  fs::create_directory(folder / "gone");
+  Host();
+  const int code = InChild([&] {
+    fs::current_path(folder / "gone");
+    fs::remove(folder / "gone");
+    std::string text;
+    if (CodeOf([&] { Record(OptionsFor("out")); }, &text) != 73) ::_exit(1);
+    if (!text.starts_with("out: the current folder is gone; change to one")) ::_exit(2);
+    Record(OptionsFor(folder / "out"));
+  });
+  EXPECT_EQ(code, 0);
+  EXPECT_TRUE(fs::exists(folder / "out/run.json"));
 }
 
 TEST(RunFolder, ForceSparesWhatIsNoRunFolder) {
@@ -91,6 +172,7 @@ TEST(RunFolder, ForceSparesWhatIsNoRunFolder) {
   EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "home", true)); }), 0);  // empty
 }
 
+// FAULTS 95
 TEST(RunFolder, AFolderBeingWrittenIsRefused) {
   const TemporaryFolder folder;
   const Recorder first(OptionsFor(folder / "out"), MakeConfig(), Host());
@@ -164,7 +246,7 @@ TEST(OutputFile, WritesNothingTwiceAfterAFailure) {
   EXPECT_TRUE(Read(folder / "file") == text);
 }
 
-// Every write, fsync and rename in turn, on a new folder and on one to be replaced.
+// FAULTS 87: every write, fsync and rename in turn, on a new folder and on one to be replaced.
 TEST(RunFolder, EveryFailureOfTheDiskIsAnErrorThatLeavesNothing) {
   for (const bool replace : {false, true}) {
     const TemporaryFolder folder;
@@ -193,10 +275,10 @@ TEST(RunFolder, EveryFailureOfTheDiskIsAnErrorThatLeavesNothing) {
         for (const auto& entry : fs::directory_iterator(folder.path())) fs::remove_all(entry);
         Record(OptionsFor(folder / "out"), 3);
       } else if (replace) {
-        EXPECT_EQ(FilesIn(folder.path()).size(), 16u) << "call " << n;
+        EXPECT_EQ(FilesIn(folder.path()).size(), 17u) << "call " << n;
         EXPECT_EQ(Lines(folder / "out/truth.csv").size(), 4u);
       } else if (!folder.empty()) {
-        EXPECT_EQ(FilesIn(folder.path()).size(), 16u) << "call " << n;
+        EXPECT_EQ(FilesIn(folder.path()).size(), 17u) << "call " << n;
         fs::remove_all(folder / "out");
       }
     }
@@ -204,6 +286,44 @@ TEST(RunFolder, EveryFailureOfTheDiskIsAnErrorThatLeavesNothing) {
   }
 }
 
+// FAULTS 87: the folder of a sweep.
+TEST(RunFolder, EveryFailureOfTheDiskIsAnErrorForASweepToo) {
+  const Config config = MakeConfig();
+  SweepResult result;
+  result.runs = 1;
+  result.estimators = {"ekf"};
+  SweepRun& run = result.done.emplace_back();
+  run.estimators.resize(1);
+  run.estimators[0].name = "ekf";
+  run.estimators[0].metrics["rmse:depth"] = 0.5;
+  const TemporaryFolder folder;
+  int calls = 0;
+  for (int n = 1; n < 100; ++n) {
+    fail_at = n;
+    fail_error = n % 2 == 0 ? EDQUOT : EIO;
+    std::string text;
+    const auto write = [&] { SweepFolder(folder / "out", false).Write(result, config); };
+    const int code = CodeOf(write, &text);
+    const bool failed = fail_at <= 0;
+    fail_at = 0;
+    if (!failed) {
+      EXPECT_EQ(code, 0) << text;
+      break;
+    }
+    ++calls;
+    ASSERT_EQ(code, 74) << "call " << n << ": " << text;
+    EXPECT_TRUE(text.starts_with((folder / "out").string())) << text;
+    if (!folder.empty()) {
+      // The last fsync, of the folder above: all is in its place.
+      EXPECT_NE(text.find("cannot sync"), std::string::npos) << text;
+      EXPECT_EQ(Lines(folder / "out/files.txt"), EntriesOf(folder / "out"));
+      fs::remove_all(folder / "out");
+    }
+  }
+  EXPECT_GT(calls, 10);
+}
+
+// FAULTS 88
 TEST(RunFolder, ALimitOnTheFileSizeIsAnErrorNotTheEnd) {
   const TemporaryFolder folder;
   const int code = InChild([&] {
@@ -215,6 +335,7 @@ TEST(RunFolder, ALimitOnTheFileSizeIsAnErrorNotTheEnd) {
   EXPECT_TRUE(folder.empty());
 }
 
+// FAULTS 93
 TEST(RunFolder, AFolderThatCannotBeWrittenToIsRefused) {
   const TemporaryFolder folder;
   Host();  // a child without rights could not look for plugins

@@ -119,6 +119,14 @@ TEST_F(Csv, UnknownColumn) {
                   "disparity_px, scale, reference_depth_m");
 }
 
+TEST_F(Csv, ShowsHostileColumnNamesHarmlessly) {
+  Write("t_s,disp\x1b[31marity," + std::string(50, 'y') + "\n0,1,2\n");
+  ExpectBadConfig("path: a.csv\nstreams: {d: 'disp[31marity'}\n",
+                  "run.yaml:2:14 streams.d: no column 'disp[31marity' in FILE; expected one of "
+                  "t_s, disp?[31marity, " +
+                      std::string(40, 'y') + "...; did you mean 'disp?[31marity'?");
+}
+
 TEST_F(Csv, ColumnNamedTwice) {
   Write("t_s,z,z\n0,1,2\n");
   ExpectBadConfig("path: a.csv\nstreams: {z: z}\n",

@@ -5,10 +5,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <clocale>
 #include <cstring>
 
 #include "csv_fixture.h"
+#include "support/comma_locale.h"
 
 namespace alidade::testing {
 namespace {
@@ -146,11 +146,10 @@ TEST_F(Csv, RateStandsInForTime) {
 }
 
 TEST_F(Csv, NumbersDoNotDependOnTheLocale) {
-  const std::string before = std::setlocale(LC_NUMERIC, nullptr);
-  if (std::setlocale(LC_NUMERIC, "de_DE.UTF-8") == nullptr) GTEST_SKIP() << "no comma locale here";
+  const CommaLocale comma;
+  if (!comma.active()) GTEST_SKIP() << "localedef is not here";
   EXPECT_EQ(Frames("t_s,z\n0.5,1.25\n", "path: a.csv\nstreams: {z: z}\n")[0].measurements[0].values,
             std::vector<double>{1.25});
-  std::setlocale(LC_NUMERIC, before.c_str());
 }
 
 TEST_F(Csv, LinesAcrossTheBufferAreWhole) {

@@ -78,13 +78,15 @@ inline const std::string kTableConfig =
 estimators: {ekf: {type: ekf}}
 )";
 
-/// The program of this build, run in a folder of its own that has `config.yaml` and `table.yaml`.
+/// The program of this build, run in a folder of its own that has `config.yaml` and `table.yaml`;
+/// the folder is called config, so that the first of them goes to `runs/config`.
 class ProgramTest : public ::testing::Test {
  protected:
   void SetUp() override {
     std::string name = (fs::temp_directory_path() / "alidade-cli-XXXXXX").string();
     ASSERT_NE(::mkdtemp(name.data()), nullptr);
-    folder_ = name;
+    folder_ = fs::path(name) / "config";
+    fs::create_directory(folder_);
     Write("config.yaml", kDepthConfig);
     Write("table.yaml", kTableConfig);
     ::unsetenv("ALIDADE_PLUGIN_PATH");
@@ -92,7 +94,7 @@ class ProgramTest : public ::testing::Test {
   }
   void TearDown() override {
     std::error_code ignored;
-    fs::remove_all(folder_, ignored);
+    fs::remove_all(folder_.parent_path(), ignored);
   }
 
   void Write(const std::string& name, const std::string& text) const {
@@ -103,9 +105,14 @@ class ProgramTest : public ::testing::Test {
   Config Json(const std::string& name) const { return Config::FromText(Read(name), name); }
   bool Exists(const std::string& name) const { return fs::exists(folder_ / name); }
 
-  /// Starts `alidade ARGUMENTS...`, its output going to files; `out` "" closes standard output.
+  /// Starts `alidade ARGUMENTS...`, its output going to files; `out` "" closes standard output. A
+  /// shell runs `before_`, which may set limits and redirect, first.
   pid_t Start(Arguments arguments, const std::string& out = "stdout") const {
     arguments.insert(arguments.begin(), ALIDADE_BINARY_DIR "/bin/alidade");
+    if (!before_.empty()) {
+      const Arguments shell = {"/bin/sh", "-c", before_ + "; exec \"$0\" \"$@\""};
+      arguments.insert(arguments.begin(), shell.begin(), shell.end());
+    }
     std::vector<char*> argv;
     for (std::string& argument : arguments) argv.push_back(argument.data());
     argv.push_back(nullptr);
@@ -159,6 +166,7 @@ class ProgramTest : public ::testing::Test {
   }
 
   fs::path folder_;
+  std::string before_;
 };
 
 }  // namespace alidade::testing

@@ -47,6 +47,9 @@ struct Geometry {
   friend bool operator==(const Geometry&, const Geometry&) = default;
 };
 
+/// `vector(3)`, `angle`, `unit_quaternion`, `unit_vector`.
+std::string ToString(const Geometry& geometry);
+
 /// A named quantity with its geometry: a role, a measurement, a control input, a state block.
 struct Space {
   std::string name;

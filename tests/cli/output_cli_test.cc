@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Where the program writes, and how it says what is wrong.
+#include "alidade/config.h"
+#include "support/program.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::Arguments;
+using testing::Contains;
+using testing::Outcome;
+using OutputCli = testing::ProgramTest;
+
+// However it is named, one file goes to one folder.
+TEST_F(OutputCli, OutputIsCalledAsTheConfig) {
+  fs::create_directory(folder_ / "05_depth");
+  const fs::path folder = fs::absolute(folder_ / "05_depth");
+  for (const std::string name : {"config.yaml", "base.yaml"}) {
+    fs::copy_file(folder_ / "config.yaml", folder / name);
+    const std::string output = name == "config.yaml" ? "05_depth" : "base";
+    for (const std::string& config :
+         {"05_depth/" + name, "./05_depth/../05_depth/" + name, (folder / name).string()}) {
+      const Outcome run = Call({"run", config, "--no-figures", "--force"});
+      EXPECT_EQ(run.code, 0) << run.err;
+      EXPECT_TRUE(Contains(run.out, "wrote runs/" + output + '\n')) << config << '\n' << run.out;
+    }
+    fs::remove_all(folder_ / "runs");
+    const fs::path before = folder_;
+    folder_ = folder;
+    EXPECT_EQ(Call({"run", name, "--no-figures"}).code, 0);
+    EXPECT_TRUE(Exists("runs/" + output + "/run.json"));
+    folder_ = before;
+  }
+}
+
+TEST_F(OutputCli, OutputIsNotTheFolderOfAllRuns) {
+  const auto expect = [&](const Arguments& more, int code, const std::string& text) {
+    for (const Arguments& command : {Arguments{"run", "config.yaml", "--no-figures"},
+                                     {"sweep", "config.yaml", "--runs", "1"}}) {
+      Arguments all = command;
+      all.insert(all.end(), more.begin(), more.end());
+      const Outcome outcome = Call(all);
+      EXPECT_EQ(outcome.code, code) << outcome.err;
+      EXPECT_EQ(outcome.err, "error: " + text + '\n');
+    }
+  };
+  const std::string holds = " is the folder that holds the runs; expected ";
+  for (const std::string folder : {"runs", "./runs/", "runs/a/.."}) {
+    expect({"-o", folder, "--force"}, 73, folder + ':' + holds + "runs/NAME");
+  }
+  expect({"--set", "output=."}, 78, "--set output: '.'" + holds + "a name inside runs/");
+  Write("config.yaml", "output: a/..\n" + testing::kDepthConfig);
+  expect({}, 78, "config.yaml:1:9 output: 'a/..'" + holds + "a name inside runs/");
+  EXPECT_FALSE(Exists("runs"));
+}
+
+TEST_F(OutputCli, OutputGoesWhereItIsNamed) {
+  const auto run_into = [&](const char* output, const Arguments& more) {
+    Arguments all = {"run", "config.yaml", "--no-figures", "--set", output};
+    all.insert(all.end(), more.begin(), more.end());
+    return Call(all).code;
+  };
+  EXPECT_EQ(run_into("output=own/name", {}), 0);
+  EXPECT_TRUE(Exists("runs/own/name/run.json"));
+  EXPECT_EQ(run_into("output=../out", {}), 77);
+  EXPECT_FALSE(Exists("out"));
+  EXPECT_EQ(run_into("output=../out", {"--allow-outside"}), 0);
+  EXPECT_TRUE(Exists("out/run.json"));
+  const Outcome again = Call({"run", "config.yaml", "-o", "out"});
+  EXPECT_EQ(again.code, 73);
+  EXPECT_TRUE(Contains(again.err, "--force")) << again.err;
+}
+
+TEST_F(OutputCli, NumbersOutOfRangeAreShownAsTyped) {
+  const auto expect = [&](const Arguments& arguments, const std::string& text) {
+    const Outcome outcome = Call(arguments);
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_TRUE(outcome.err.starts_with("error: " + text + '\n')) << outcome.err;
+  };
+  const std::string seeds = "' is no integer from 0 to 9223372036854775807";
+  for (const std::string seed :
+       {"99999999999999999999999", "9223372036854775808", "-1", "1e3", "0x10", " 1", "1.0"}) {
+    expect({"run", "config.yaml", "--seed=" + seed}, "--seed: '" + seed + seeds);
+  }
+  expect({"sweep", "config.yaml", "--runs", "1000001"},
+         "--runs: '1000001' is no integer from 1 to 1000000");
+  expect({"sweep", "config.yaml", "--runs", "1", "--jobs", "4294967297"},
+         "--jobs: '4294967297' is no integer from 1 to 1024");
+  expect({"sweep", "config.yaml", "--runs", "1", "--first-seed", "4611686018427387905"},
+         "--first-seed: '4611686018427387905' is no integer from 0 to 4611686018427387904");
+  EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "--seed", "9223372036854775807"}).code, 0);
+  EXPECT_TRUE(Contains(Read("runs/config/run.json"), "\"seed\": 9223372036854775807"));
+}
+
+TEST_F(OutputCli, ErrorsObeyNoControlCharacters) {
+  Write("table.csv",
+        "t_s,\x1b[31md,\xc2\x9b"
+        "1m,\xc3\xbc\n0,80,1,2\n");
+  const Outcome run = Call({"run", "table.yaml", "--no-figures"});
+  EXPECT_EQ(run.code, 78);
+  EXPECT_TRUE(Contains(run.err, "expected one of t_s, ?[31md, ??1m, \xc3\xbc")) << run.err;
+  const Outcome missing = Call({"run", "\x1b[31m.yaml"});
+  EXPECT_EQ(missing.code, 66);
+  EXPECT_TRUE(missing.err.starts_with("error: ?[31m.yaml: ")) << missing.err;
+}
+
+TEST_F(OutputCli, SaysThatTheCurrentFolderIsGone) {
+  fs::create_directory(folder_ / "gone");
+  before_ = "cd gone; rmdir ../gone";
+  const std::string config = (folder_ / "config.yaml").string();
+  const auto expect = [&](const Arguments& arguments) {
+    fs::create_directory(folder_ / "gone");
+    const Outcome outcome = Call(arguments);
+    EXPECT_EQ(outcome.code, 73) << outcome.err;
+    EXPECT_TRUE(Contains(outcome.err, ": the current folder is gone; change to one that exists"))
+        << outcome.err;
+  };
+  expect({"run", config});
+  expect({"run", config, "-o", "out"});
+  expect({"run", config, "--set", "output=out"});
+  expect({"run", config, "-o", (folder_ / "out").string(), "--plugin-path", "plugins"});
+  expect({"sweep", config, "--runs", "1"});
+  fs::create_directory(folder_ / "gone");
+  const Outcome run = Call({"run", config, "--no-figures", "-o", (folder_ / "out").string()});
+  EXPECT_EQ(run.code, 0) << run.err;
+}
+
+TEST_F(OutputCli, SaysHowManyFiguresAreMissingAndWhy) {
+  fs::create_directory(folder_ / "bin");
+  Write("bin/gnuplot", "#!/bin/sh\nexit 1\n");
+  fs::permissions(folder_ / "bin/gnuplot", fs::perms::owner_all);
+  before_ = "PATH=\"$PWD/bin:$PATH\"";
+  const Outcome run = Call({"run", "config.yaml"});
+  EXPECT_EQ(run.code, 0) << run.err;
+  const std::string note =
+      "0 of 5 figures drawn: measurements is not: gnuplot failed with exit code 1";
+  EXPECT_EQ(run.err, note + '\n');
+  EXPECT_FALSE(Contains(run.out, "figures drawn"));
+  EXPECT_TRUE(Contains(Read("runs/config/report.html"), note));
+  Write("bin/gnuplot", "#!/bin/sh\necho 'line 3: no such thing' >&2; exit 2\n");
+  EXPECT_EQ(
+      Call({"run", "config.yaml", "--force"}).err,
+      "0 of 5 figures drawn: measurements is not: gnuplot failed with exit code 2: line 3: no "
+      "such thing\n");
+  EXPECT_EQ(Call({"run", "config.yaml", "--force", "--quiet"}).err, "");
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The keys of the figures, as gnuplot draws them.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <map>
+
+#include "support/recording.h"
+
+namespace alidade::testing {
+namespace {
+
+constexpr double kWidth = 960.0;
+
+/// Where the texts of an svg file stand, in pixels: text -> x of each.
+std::map<std::string, std::vector<double>> TextsOf(const std::string& svg) {
+  std::map<std::string, std::vector<double>> texts;
+  const std::string open = "<text>", place = "translate(";
+  for (std::size_t at = svg.find(open); at != svg.npos; at = svg.find(open, at + 1)) {
+    const std::size_t start = at + open.size();
+    const double x = std::atof(svg.c_str() + svg.rfind(place, at) + place.size());
+    texts[svg.substr(start, svg.find('<', start) - start)].push_back(x);
+  }
+  return texts;
+}
+
+class FigureKey : public ::testing::TestWithParam<int> {};
+
+// Beside every panel of the comparison stand all estimators, one below the other.
+TEST_P(FigureKey, HasAllEstimatorsInOneColumn) {
+  const TemporaryFolder folder;
+  Experiment experiment = MakeExperiment();
+  experiment.estimators.clear();
+  for (int i = 0; i < GetParam(); ++i) {
+    NamedEstimator named;
+    named.name = "an_estimator_" + std::to_string(i);
+    named.system = DepthFilter();
+    named.estimator =
+        std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+    experiment.estimators.push_back(std::move(named));
+  }
+  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+  recorder.Finish(RunInto(recorder, experiment));
+  if (recorder.note().ends_with("not installed")) GTEST_SKIP() << recorder.note();
+  auto texts = TextsOf(Read(folder / "out/figures/comparison.svg"));
+  const double column = texts["truth"].empty() ? 0.0 : texts["truth"][0];
+  for (int i = 0; i < GetParam(); ++i) {
+    const std::string name = "an_estimator_" + std::to_string(i);
+    ASSERT_EQ(texts[name].size(), 3u) << name;  // depth, its rate, inverse distance
+    for (const double x : texts[name]) {
+      EXPECT_NEAR(x, column, 1.0) << name;
+      EXPECT_LT(x + 7.0 * static_cast<double>(name.size()), kWidth);
+    }
+  }
+  // One panel has the measurements of two sensors besides.
+  texts = TextsOf(Read(folder / "out/figures/measurements.svg"));
+  for (int i = 0; i < GetParam(); ++i) {
+    EXPECT_EQ(texts["an_estimator_" + std::to_string(i)].size(), 1u) << i;
+  }
+  EXPECT_EQ(texts["truth"].size(), 1u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Estimators, FigureKey, ::testing::Values(2, 5, 6, 8));
+
+}  // namespace
+}  // namespace alidade::testing

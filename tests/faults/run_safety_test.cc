@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What surrounds a run fails: disk, signals, memory, descriptors, other processes. The number of
+// each fault is in the comment above its test. These are tested elsewhere:
+//   87  RunFolder.EveryFailureOfTheDisk*, OutputFile.*
+//   90  PipedRun.*, Cli.Stops*, Cli.Signals*, SweepCli.StopsAtASignal*
+//   93  RunFolder.AFolderThatCannotBeWrittenToIsRefused
+//   97  SweepCli.GivesTheSameBytesForAnyNumberOfJobs
+//   98  CommaLocale.*, Node.NumberIsReadTheSameInACommaLocale
+#include <algorithm>
+
+#include "support/program.h"
+
+namespace alidade::testing {
+namespace {
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kSanitized = true;
+#else
+constexpr bool kSanitized = false;
+#endif
+
+class RunSafety : public ProgramTest {
+ protected:
+  /// Nothing but what every test has, and `names`.
+  void ExpectOnly(std::vector<std::string> names) const {
+    names.insert(names.end(), {"config.yaml", "table.yaml", "stdout", "stderr"});
+    for (const auto& entry : fs::directory_iterator(folder_)) {
+      const std::string name = entry.path().filename();
+      EXPECT_NE(std::find(names.begin(), names.end(), name), names.end()) << name;
+    }
+  }
+  /// Either there is no folder `out`, or one that says why the run failed.
+  void ExpectRecordOfFailure(const std::string& reason) const {
+    ExpectOnly({"out"});
+    if (!Exists("out")) return;
+    const Config record = Json("out/run.json");
+    EXPECT_EQ(record.root().At("status").Text(), "failed");
+    EXPECT_TRUE(Contains(record.root().At("reason").Text(), reason)) << Read("out/run.json");
+  }
+  std::string Estimates(const std::string& run) const { return Read(run + "/ekf/estimates.csv"); }
+};
+
+// 88
+TEST_F(RunSafety, EveryLimitOnTheSizeOfFilesIsAnErrorWithThePath) {
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "whole", "--no-figures"}).code, 0);
+  std::uintmax_t largest = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(folder_ / "whole")) {
+    if (entry.is_regular_file()) largest = std::max(largest, entry.file_size());
+  }
+  fs::remove_all(folder_ / "whole");
+  int refused = 0;
+  for (std::uintmax_t blocks = 0; blocks <= largest / 512 + 1; blocks += 1 + blocks / 3) {
+    // The shell counts in 512 bytes..
+    before_ = "ulimit -f " + std::to_string(blocks) + "; exec 2>/dev/null >/dev/null";
+    const Outcome run = Call({"run", "config.yaml", "-o", "out", "--no-figures"});
+    EXPECT_EQ(run.signal, 0) << blocks;
+    const bool fits = blocks * 512 >= largest;
+    EXPECT_EQ(run.code, fits ? 0 : 74) << blocks;
+    ExpectOnly({"out"});
+    EXPECT_EQ(Exists("out"), fits) << blocks;
+    refused += run.code == 74 ? 1 : 0;
+  }
+  EXPECT_GT(refused, 5);
+  before_ = "ulimit -f 4";
+  const Outcome run = Call({"run", "config.yaml", "-o", "out", "--no-figures", "--force"});
+  EXPECT_TRUE(run.err.starts_with("error: out/")) << run.err;
+  EXPECT_TRUE(Contains(run.err, ": cannot write: File too large")) << run.err;
+}
+
+// 89
+TEST_F(RunSafety, AReaderThatIsGoneIsAnErrorNotASignal) {
+  for (const Arguments& command : {Arguments{"run", "config.yaml", "-o", "out", "--no-figures"},
+                                   {"sweep", "config.yaml", "--runs", "1", "-o", "sweep"},
+                                   {"explain", "config.yaml"},
+                                   {"plugins", "list"},
+                                   {"doctor"},
+                                   {"--help"}}) {
+    // The shell's reader of this pipe has ended before the program starts.
+    ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+    before_ = "exec 3<>pipe 1>pipe 3<&-";
+    const Outcome outcome = Call(command);
+    EXPECT_EQ(outcome.signal, 0) << command[0];
+    EXPECT_EQ(outcome.code, 74) << command[0];
+    EXPECT_TRUE(Contains(outcome.err, "error: <stdout>: cannot write: Broken pipe"))
+        << command[0] << outcome.err;
+    fs::remove(folder_ / "pipe");
+  }
+  // What the commands were to write is whole.
+  EXPECT_EQ(Json("out/run.json").root().At("status").Text(), "ok");
+  EXPECT_EQ(Json("sweep/sweep.json").root().At("runs_used").Number(), 1);
+}
+
+// 92
+TEST_F(RunSafety, WhatIsThereIsReplacedByForceOnly) {
+  const Arguments run = {"run", "config.yaml", "-o", "out", "--no-figures"};
+  ASSERT_EQ(Call(run).code, 0);
+  const std::string before = Estimates("out");
+  Arguments other = run;
+  other.insert(other.end(), {"--seed", "2"});
+  const Outcome refused = Call(other);
+  EXPECT_EQ(refused.code, 73);
+  EXPECT_EQ(refused.err, "error: out: exists already; add --force to replace it\n");
+  EXPECT_EQ(Estimates("out"), before);
+  other.push_back("--force");
+  EXPECT_EQ(Call(other).code, 0);
+  EXPECT_NE(Estimates("out"), before);
+}
+
+// 92: one run inside the folder of another is not lost with it.
+TEST_F(RunSafety, ForceSparesRunsInsideARun) {
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "out", "--no-figures"}).code, 0);
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "out/base", "--no-figures"}).code, 0);
+  ASSERT_EQ(Call({"sweep", "config.yaml", "--runs", "1", "-o", "out/ekf/sweep"}).code, 0);
+  for (const Arguments& command :
+       {Arguments{"run", "config.yaml", "--no-figures"}, {"sweep", "config.yaml", "--runs", "1"}}) {
+    Arguments all = command;
+    all.insert(all.end(), {"-o", "out", "--force"});
+    const Outcome refused = Call(all);
+    EXPECT_EQ(refused.code, 73);
+    EXPECT_EQ(refused.err,
+              "error: out: holds what was not written with it: 'base', 'ekf/sweep'; move that "
+              "elsewhere, or choose another folder\n");
+  }
+  EXPECT_TRUE(Exists("out/base/run.json"));
+  EXPECT_TRUE(Exists("out/ekf/sweep/sweep.json"));
+}
+
+// 94
+TEST_F(RunSafety, TheClockIsInTimingAlone) {
+  const auto record = [&](const std::string& output) {
+    const Outcome run = Call({"run", "config.yaml", "-o", output, "--quiet"});
+    EXPECT_EQ(run.code, 0) << run.err;
+  };
+  record("one");
+  std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // the next second of the day
+  record("two");
+  int same = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(folder_ / "one")) {
+    if (!entry.is_regular_file()) continue;
+    const std::string name = entry.path().lexically_relative(folder_ / "one");
+    if (name == "timing.json") {
+      EXPECT_NE(Read("one/" + name), Read("two/" + name));
+      continue;
+    }
+    EXPECT_EQ(Read("one/" + name), Read("two/" + name)) << name;
+    ++same;
+  }
+  EXPECT_GT(same, 12);
+}
+
+// 95
+TEST_F(RunSafety, OfProcessesThatWriteToOneFolderOneWins) {
+  std::vector<pid_t> runs;
+  for (int i = 0; i < 6; ++i) {
+    runs.push_back(
+        Start({"run", "config.yaml", "-o", "out", "--no-figures", "--seed", std::to_string(i)}));
+  }
+  int won = 0, refused = 0;
+  for (const pid_t run : runs) {
+    const Outcome outcome = Wait(run);
+    won += outcome.code == 0 ? 1 : 0;
+    refused += outcome.code == 73 ? 1 : 0;
+  }
+  EXPECT_EQ(won, 1);
+  EXPECT_EQ(refused, 5);
+  ExpectOnly({"out"});
+  EXPECT_EQ(Json("out/run.json").root().At("status").Text(), "ok");
+}
+
+// 95
+TEST_F(RunSafety, AFolderThatAnotherProcessWritesIsRefusedAtOnce) {
+  ASSERT_EQ(::mkfifo((folder_ / "table.csv").c_str(), 0600), 0);
+  const int pipe = ::open((folder_ / "table.csv").c_str(), O_RDWR | O_CLOEXEC);
+  ASSERT_EQ(::write(pipe, "t_s,d\n0,80\n", 11), 11);
+  const pid_t first = Start({"run", "table.yaml", "--no-figures", "-o", "out"});
+  const std::string process = std::to_string(first);
+  ASSERT_TRUE(Eventually([&] { return Exists(".out.partial-" + process + "/measurements.csv"); }));
+  for (const char* force : {"--quiet", "--force"}) {
+    const Outcome second = Call({"run", "config.yaml", "-o", "out", "--no-figures", force});
+    EXPECT_EQ(second.code, 73);
+    EXPECT_EQ(second.err, "error: out: process " + process +
+                              " is writing it now; wait for it or choose another folder\n");
+  }
+  ::kill(first, SIGKILL);
+  Wait(first);
+  ::close(pipe);
+  // What the dead process left is cleared away.
+  EXPECT_EQ(Call({"run", "config.yaml", "-o", "out", "--no-figures"}).code, 0);
+  fs::remove(folder_ / "table.csv");
+  ExpectOnly({"out"});
+}
+
+// 96
+TEST_F(RunSafety, MemoryThatRunsOutIsAnErrorAndARecord) {
+  if (kSanitized) GTEST_SKIP() << "the sanitizer maps more than any limit";
+  int failed = 0, recorded = 0;
+  for (int kib = 8'000; kib <= 60'000; kib += kib < 20'000 ? 3'000 : 1'000) {
+    fs::remove_all(folder_ / "out");
+    before_ = "ulimit -v " + std::to_string(kib);
+    const Outcome run = Call(
+        {"run", "config.yaml", "-o", "out", "--no-figures", "--set", "source.duration_s=2000"});
+    EXPECT_EQ(run.signal, 0) << kib << " KiB: " << run.err;
+    if (run.code == 0) break;
+    if (run.code == 127) continue;  // the loader had not enough
+    if (run.code == 69) {
+      EXPECT_TRUE(Contains(run.err, "cannot be loaded")) << kib << " KiB: " << run.err;
+      continue;  // what a plugin takes to load was not there
+    }
+    EXPECT_EQ(run.code, 70) << kib << " KiB: " << run.err;
+    EXPECT_TRUE(Contains(run.err, "error: out of memory")) << kib << " KiB: " << run.err;
+    ExpectRecordOfFailure("out of memory");
+    ++failed;
+    recorded += Exists("out") ? 1 : 0;
+  }
+  EXPECT_GT(failed, 0);
+  EXPECT_GT(recorded, 0);
+}
+
+// 96: in the threads of a sweep.
+TEST_F(RunSafety, MemoryThatRunsOutEndsRunsOfASweepNotTheProgram) {
+  if (kSanitized) GTEST_SKIP() << "the sanitizer maps more than any limit";
+  int failed = 0;
+  for (int kib = 16'000; kib <= 30'000; kib += 1'000) {
+    fs::remove_all(folder_ / "out");
+    before_ = "ulimit -c 0; ulimit -v " + std::to_string(kib);
+    const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "6", "--jobs", "3", "-o", "out",
+                                "--set", "source.duration_s=10"});
+    EXPECT_EQ(sweep.signal, 0) << kib << " KiB: " << sweep.err;
+    if (sweep.code == 0 || sweep.code == 69 || sweep.code == 127) continue;
+    EXPECT_TRUE(sweep.code == 1 || sweep.code == 70) << kib << " KiB: " << sweep.err;
+    EXPECT_TRUE(Contains(sweep.err, "out of memory")) << kib << " KiB: " << sweep.err;
+    EXPECT_EQ(Exists("out/failures.csv"), sweep.code == 1) << kib << " KiB";
+    ++failed;
+  }
+  EXPECT_GT(failed, 0);
+}
+
+// 99
+TEST_F(RunSafety, FewDescriptorsAreAnErrorThatSaysSo) {
+  int failed = 0, code = -1;
+  for (int limit = 4; code != 0 && limit < 64; ++limit) {
+    fs::remove_all(folder_ / "out");
+    before_ = "ulimit -n " + std::to_string(limit);
+    const Outcome run = Call({"run", "config.yaml", "-o", "out", "--no-figures"});
+    code = run.code;
+    if (code == 0 || code == 127) continue;  // 127: the loader had not enough
+    EXPECT_EQ(run.signal, 0) << limit << ": " << run.err;
+    EXPECT_TRUE(code == 66 || code == 69 || code == 73 || code == 74) << limit << ": " << run.err;
+    EXPECT_TRUE(Contains(run.err, "Too many open files")) << limit << ": " << run.err;
+    ExpectRecordOfFailure("Too many open files");
+    ++failed;
+  }
+  EXPECT_EQ(code, 0);
+  EXPECT_GT(failed, 2);
+}
+
+// 100
+TEST_F(RunSafety, MessagesThatNobodyTakesDoNotEndTheRun) {
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "plain", "--no-figures"}).code, 0);
+  ::mkfifo((folder_ / "pipe").c_str(), 0600);
+  for (const std::string to : {"exec 2>/dev/full", "exec 2>&-", "exec 3<>pipe 2>pipe 3<&-"}) {
+    fs::remove_all(folder_ / "out");
+    // A gnuplot that fails gives the run something to say there.
+    fs::create_directories(folder_ / "bin");
+    fs::create_symlink("/bin/false", folder_ / "bin/gnuplot");
+    before_ = "PATH=\"$PWD/bin:$PATH\"; " + to;
+    const Outcome run = Call({"run", "config.yaml", "-o", "out"});
+    fs::remove_all(folder_ / "bin");
+    EXPECT_EQ(run.code, 0) << to;
+    EXPECT_TRUE(Contains(run.out, "wrote out\n")) << to;
+    EXPECT_EQ(Estimates("out"), Estimates("plain")) << to;
+    EXPECT_EQ(Call({"run", "missing.yaml"}).code, 66) << to;
+  }
+}
+
+}  // namespace
+}  // namespace alidade::testing

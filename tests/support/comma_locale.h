@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <unistd.h>
+
+#include <clocale>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <locale>
+#include <string>
+
+namespace alidade::testing {
+
+/// While it lives, C and C++ write `1,5` for 1.5. It makes the locale with localedef, so that none
+/// need be installed.
+class CommaLocale {
+ public:
+  CommaLocale() : before_(std::setlocale(LC_ALL, nullptr)) {
+    std::string name = (std::filesystem::temp_directory_path() / "alidade-locale-XXXXXX").string();
+    folder_ = ::mkdtemp(name.data());
+    std::ofstream(folder_ / "comma.src") << "comment_char %\nescape_char /\nLC_NUMERIC\n"
+                                            "decimal_point \",\"\nthousands_sep \".\"\n"
+                                            "grouping 3;3\nEND LC_NUMERIC\n";
+    const std::string make = "cd '" + folder_.string() +
+                             "' && localedef --quiet --force --no-archive -i comma.src ./comma";
+    static_cast<void>(std::system((make + " >made 2>&1").c_str()));
+    ::setenv("LOCPATH", folder_.c_str(), 1);
+    active_ = std::setlocale(LC_NUMERIC, "comma") != nullptr;
+    ::unsetenv("LOCPATH");
+    if (active_) std::locale::global(std::locale(std::locale::classic(), new Comma));
+  }
+  ~CommaLocale() {
+    std::locale::global(std::locale::classic());
+    std::setlocale(LC_ALL, before_.c_str());
+    std::error_code ignored;
+    std::filesystem::remove_all(folder_, ignored);
+  }
+  CommaLocale(const CommaLocale&) = delete;
+  CommaLocale& operator=(const CommaLocale&) = delete;
+
+  /// False where it could not be made.
+  bool active() const { return active_; }
+
+ private:
+  struct Comma : std::numpunct<char> {
+    char do_decimal_point() const override { return ','; }
+    char do_thousands_sep() const override { return '.'; }
+    std::string do_grouping() const override { return "\3"; }
+  };
+
+  std::string before_;
+  std::filesystem::path folder_;
+  bool active_ = false;
+};
+
+}  // namespace alidade::testing

@@ -18,6 +18,8 @@ struct CheckOptions {
   int memory_mb = 1024;     ///< that the model may take
   /// A Step that is additive in dt only up to an error of this order passes (2: Euler); 0: exactly.
   int step_order = 0;
+  /// The parameters may have keys that the model does not read, as an entry of a run's config has.
+  bool other_keys = false;
 };
 
 /// What came of one check.

@@ -1,8 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
 #include "check_states.h"
 #include "check_table.h"
 
 namespace alidade::internal {
+namespace {
+
+constexpr double kLarge = 1e6;  // the largest edge of RandomStates
+
+/// Whether a large state has an infinite value, which says nothing against the model.
+bool Overflows(const State& state, const Answer& answer) {
+  bool large = false, infinite = false;
+  for (const auto& value : state.values) {
+    for (const double element : value) large = large || std::abs(element) >= kLarge;
+  }
+  for (const Buffer& value : answer.outputs) {
+    for (int i = 0; i < value.columns(); ++i) infinite = infinite || std::isinf(value(0, i));
+  }
+  return large && infinite;
+}
+
+}  // namespace
 
 Context::Context(const PluginHost& host, const PluginEntry& entry, const Node& parameters,
                  const CheckOptions& options, Journal& journal)
@@ -15,6 +34,7 @@ const std::vector<State>& Context::states() {
   for (Values& values : RandomStates(*model_, options_.states, options_.seed)) {
     State state{std::move(values), false};
     const Answer answer = Call(main(), state, kNoMatrix);
+    if (answer.ok() && Overflows(state, answer)) continue;
     state.defined = answer.ok();
     if (state.defined && model_->is_sensor()) {
       const Buffer& z = answer.outputs[0];

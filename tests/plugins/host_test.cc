@@ -184,9 +184,9 @@ TEST_F(HostTest, ABadTableIsRefused) {
 }
 
 TEST_F(HostTest, ACrashWhileLoadingIsARefusal) {
-  ExpectRefused(Built("start_CRASH"), {"crashed while loading (signal 11"});
-  ExpectRefused(Built("start_ABORT"), {"crashed while loading (signal 6"});
-  ExpectRefused(Built("start_EXIT"), {"ended the process while loading"});
+  ExpectRefused(Built("start_CRASH"), {"crashed (signal 11", "while loading"});
+  ExpectRefused(Built("start_ABORT"), {"crashed (signal 6", "while loading"});
+  ExpectRefused(Built("start_EXIT"), {"ended the process with exit code 0 while loading"});
 }
 
 // ---- 56, 57: two files, one name; one file, two names -------------------------------------------

@@ -20,8 +20,8 @@ constexpr const char* kFooter = R"(Examples:
   alidade check mine.so radar --set sigma_m_s=0.5 --states 500 --seed 7
   alidade check stereo_disparity --config examples/05_depth_principled/config.yaml
 
-Each check is a line: ok, FAIL or skipped, and what was seen. A plugin that crashes, ends the process,
-hangs or eats memory ends nothing but its check. Exits with 1 where a line says FAIL, 78 where a
+Each check is a line: ok, FAIL or skipped, and what was seen. A plugin that crashes, ends the
+process, hangs or eats memory ends nothing but its check. Exits with 1 where a line says FAIL, 78 where a
 parameter is missing or wrong. Of a plugin with several models, `--set MODEL.key=value`.)";
 
 struct Arguments {
@@ -31,8 +31,7 @@ struct Arguments {
 };
 
 bool IsFile(const std::string& plugin) {
-  std::error_code ignored;
-  return plugin.find('/') != plugin.npos || fs::is_regular_file(plugin, ignored);
+  return plugin.find('/') != plugin.npos || plugin.ends_with(".so");
 }
 
 /// The parameters that the command line gives the model `entry`, which is the only one or not.

@@ -127,7 +127,9 @@ std::string CheckText(const PluginEntry& entry, const std::vector<Finding>& find
   constexpr const char* kWords[] = {"ok", "FAIL", "skipped"};
   std::vector<internal::TextRow> rows;
   for (const Finding& finding : findings) {
-    rows.push_back({kWords[static_cast<int>(finding.verdict)], finding.check, finding.words});
+    std::string words = finding.words;
+    std::replace(words.begin(), words.end(), '\n', ' ');
+    rows.push_back({kWords[static_cast<int>(finding.verdict)], finding.check, words});
   }
   return entry.name + " (" + internal::KindName(entry.kind) + " of " + entry.plugin.string() +
          ")\n" + internal::TextTable(rows, 2);

@@ -77,7 +77,7 @@ std::optional<Additivity> Split(const Context& context, const Function& f, const
   const auto both = StepOver(context, f, inputs, *first, dt_s - first_s);
   if (!both) return std::nullopt;
   Additivity result;
-  result.size = std::max({1.0, Largest(blocks), Largest(*whole), Largest(*both)});
+  result.size = std::max({1.0, Largest(inputs), Largest(*whole), Largest(*both)});
   result.defect = Difference(f.outputs, *whole, *both).abs().maxCoeff(&result.row);
   return result;
 }
@@ -125,6 +125,8 @@ Finding CheckDoubleCover(Context& context) {
       any = true;
       for (const State& state : context.states()) {
         Values turned = Context::Inputs(f, state);
+        // Of a half turn, -0 apart from 0 decides which way round its logarithm goes.
+        if (turned[i].empty() || turned[i][0] == 0.0) continue;
         for (double& element : turned[i]) element = -element;
         const Answer a = context.Call(f, state), b = context.CallWith(f, turned, kAllMatrices);
         const auto words = [&] {

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <malloc.h>
 
-#include <cfenv>
-#include <clocale>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 
 #include "check_table.h"
 #include "number_text.h"
+#include "surroundings.h"
 
 #if defined(__SANITIZE_ADDRESS__)
 extern "C" std::size_t __sanitizer_get_current_allocated_bytes();
@@ -53,31 +51,6 @@ std::string CodeDefect(const Context& context, const Function& f, std::int32_t c
   }
   return "returned " + std::to_string(code) + ", which is no status of its";
 }
-
-/// What a plugin shares with the program and must leave as it was.
-struct Surroundings {
-  int rounding = std::fegetround();
-  int traps = fegetexcept();
-  bool flushes = [] {
-    volatile double tiny = std::numeric_limits<double>::min();
-    return tiny / 2.0 == 0.0;
-  }();
-  std::string locale = std::setlocale(LC_ALL, nullptr);
-  locale_t thread_locale = uselocale(nullptr);
-  std::filesystem::path folder = std::filesystem::current_path();
-
-  /// What is no longer as in `before`, or "".
-  std::string ChangeSince(const Surroundings& before) const {
-    if (rounding != before.rounding) return "changed the rounding mode";
-    if (traps != before.traps) return "changed the floating-point traps";
-    if (flushes != before.flushes) return "makes the processor flush small numbers to zero";
-    if (locale != before.locale || thread_locale != before.thread_locale) {
-      return "changed the locale from '" + before.locale + "' to '" + locale + "'";
-    }
-    if (folder != before.folder) return "changed the current folder to " + folder.string();
-    return {};
-  }
-};
 
 /// Bytes on the heap.
 double HeapBytes() {

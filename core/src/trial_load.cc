@@ -4,6 +4,7 @@
 #include "alidade/build_plugin.h"
 #include "child_process.h"
 #include "plugin_file.h"
+#include "surroundings.h"
 
 namespace alidade::internal {
 namespace {
@@ -24,8 +25,11 @@ std::string WalkTable(void* library, const char* symbol) {
 
 /// In the child.
 std::string Try(const std::filesystem::path& file, std::uint32_t tier) {
+  const Surroundings before;
   void* const library = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (library == nullptr) return "cannot be loaded: " + DlError();
+  const std::string change = Surroundings().ChangeSince(before);
+  if (!change.empty()) return change + " while loading";
   if (tier == ALIDADE_TIER_BUILD) return WalkTable<BuildTable>(library, kBuildEntrySymbol);
   const std::string defect = WalkTable<AlidadeTable>(library, ALIDADE_ENTRY_SYMBOL);
   // The destructors of its statics run when the host ends; a crash is better found here.

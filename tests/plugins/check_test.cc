@@ -111,7 +111,7 @@ INSTANTIATE_TEST_SUITE_P(
     Name);
 
 TEST_F(CheckTest, EveryModelWithAFaultIsTested) {
-  std::set<std::string> tested = {"right", "gravity", "turning"};
+  std::set<std::string> tested = {"right", "may_have_bias", "gravity", "turning"};
   const auto* suite = testing::UnitTest::GetInstance();
   for (int i = 0; i < suite->total_test_suite_count(); ++i) {
     const auto* tests = suite->GetTestSuite(i);
@@ -127,7 +127,7 @@ TEST_F(CheckTest, EveryModelWithAFaultIsTested) {
 }
 
 TEST_F(CheckTest, ModelsWithoutFaultPass) {
-  for (const char* model : {"right", "gravity", "turning"}) {
+  for (const char* model : {"right", "may_have_bias", "gravity", "turning"}) {
     const auto findings = Checked(model);
     EXPECT_EQ(Joined(Failures(findings)), "") << model;
     EXPECT_FALSE(AnyFailure(findings));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One fault each, for tests/plugins/check_test.cc; and two models without fault.
+// One fault each, for tests/plugins/check_test.cc; and four models without fault.
 #include <unistd.h>
 
 #include <cfenv>
@@ -43,6 +43,23 @@ struct Right : alidade::Sensor<Vec<2>, Vec<1>, Vec<1>> {
   template <class T>
   void SqrtNoise(const T*, const T*, T* l) const {
     l[0] = l[3] = T(0.5);
+  }
+};
+
+/// z = x + b where a bias b is bound.
+struct MayHaveBias : alidade::Sensor<Vec<1>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x", "m"},
+                                     Quantity{"bias", "m", "", "", ALIDADE_ROLE_OPTIONAL}};
+  static constexpr Quantity kMeasurement{"z", "m"};
+  explicit MayHaveBias(Params&) {}
+  template <class T>
+  bool Predict(const T* x, const T* bias, T* z) const {
+    z[0] = bias == nullptr ? x[0] : T(x[0] + bias[0]);
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(0.5);
   }
 };
 
@@ -312,7 +329,8 @@ struct Turning : alidade::Motion<4, Vec<1>, UnitQuaternion> {
 #define RAW(eval, name) ALIDADE_SENSOR_BY(MakeRaw<eval>, name, "", "")
 #define MOTION(Model, name) ALIDADE_MOTION(Model, name, "", "")
 
-ALIDADE_PLUGIN(SENSOR(Right, "right"), SENSOR(Gravity, "gravity"), MOTION(Turning<0>, "turning"),
+ALIDADE_PLUGIN(SENSOR(Right, "right"), SENSOR(MayHaveBias, "may_have_bias"),
+               SENSOR(Gravity, "gravity"), MOTION(Turning<0>, "turning"),
                SENSOR(WrongJacobian, "wrong_jacobian"), SENSOR(TwoValues, "two_values"),
                SENSOR(NotDeterministic, "not_deterministic"), SENSOR(HiddenState, "hidden_state"),
                SENSOR(Unwritten, "unwritten"), SENSOR(NanOutput, "nan_output"),

@@ -16,13 +16,16 @@ using Eigen::MatrixXd;
 
 std::string Text(double value) { return RoundedText(value, 6); }
 
-/// Whether status and value are the same but for the rounding of another order of operations.
-bool SameValue(const Function& f, const Answer& a, const Answer& b, const Values& inputs) {
-  if (a.code != b.code) return false;
-  if (!a.ok()) return true;
+/// How two answers of a function differ, beyond the rounding of another order of operations; or "".
+std::string ValueDefect(const Function& f, const Answer& a, const Answer& b, const Values& inputs) {
+  if (a.code != b.code) {
+    return "status " + std::to_string(a.code) + " against " + std::to_string(b.code);
+  }
+  if (!a.ok()) return {};
   const Values x = OutputValues(a);
-  const double size = 1.0 + Largest(x) + Largest(inputs);
-  return Difference(f.outputs, x, OutputValues(b)).abs().maxCoeff() <= 1e-12 * size;
+  const double distance = Difference(f.outputs, x, OutputValues(b)).abs().maxCoeff();
+  if (distance <= 1e-12 * (1.0 + Largest(x) + Largest(inputs))) return {};
+  return StateText(f.outputs, x) + ", " + Text(distance) + " apart";
 }
 
 /// How far an entry of a Jacobian is from the numeric one.
@@ -152,11 +155,10 @@ Finding CheckSameValue(Context& context) {
       const int count = static_cast<int>(f.matrices.size());
       for (int matrix = kNoMatrix; matrix < count; ++matrix) {
         const Answer other = context.Call(f, state, matrix);
-        if (SameValue(f, with, other, Context::Inputs(f, state))) continue;
+        const std::string defect = ValueDefect(f, with, other, Context::Inputs(f, state));
+        if (defect.empty()) continue;
         return Fail(context.Where(f, state) + ": the value differs with all Jacobians and with " +
-                    (matrix == kNoMatrix ? "none" : "one alone") + ": " +
-                    StateText(f.outputs, OutputValues(with)) + " against " +
-                    StateText(f.outputs, OutputValues(other)));
+                    (matrix == kNoMatrix ? "none: " : "one alone: ") + defect);
       }
     }
   }

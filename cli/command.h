@@ -24,6 +24,7 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line);
 void AddExplain(CLI::App& program, Action& action);
 void AddSweep(CLI::App& program, Action& action);
 void AddPlugins(CLI::App& program, Action& action);
+void AddCheck(CLI::App& program, Action& action);
 void AddDoctor(CLI::App& program, Action& action);
 
 /// Arguments that name a config and the plugins it needs.
@@ -40,6 +41,10 @@ struct Input {
 };
 
 void AddPluginPath(CLI::App& command, std::vector<std::string>& paths);
+/// The option --set; `help` says what it sets.
+void AddSets(CLI::App& command, std::vector<std::string>& sets, const std::string& help);
+/// A validator of CLI11: the path is not empty.
+std::string IsNamed(const std::string& path);
 /// The option -o, a folder; "" where it is not given.
 void AddOutput(CLI::App& command, std::string& folder, const std::string& help);
 std::vector<std::filesystem::path> Absolute(const std::vector<std::string>& paths);

@@ -15,8 +15,6 @@ std::string IsAssignment(const std::string& text) {
   return "'" + text + "' is no assignment; expected key=value, as in source.seed=7";
 }
 
-std::string IsNamed(const std::string& path) { return path.empty() ? "empty path" : ""; }
-
 /// The full path, in its shortest form.
 fs::path FullPath(const fs::path& path) {
   std::error_code error;
@@ -58,6 +56,16 @@ std::function<std::string(const std::string&)> IsInteger(std::int64_t least, std
   };
 }
 
+std::string IsNamed(const std::string& path) { return path.empty() ? "empty path" : ""; }
+
+void AddSets(CLI::App& command, std::vector<std::string>& sets, const std::string& help) {
+  command.add_option("--set", sets, help)
+      ->option_text("KEY=VALUE")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false)
+      ->check(IsAssignment);
+}
+
 void AddPluginPath(CLI::App& command, std::vector<std::string>& paths) {
   command.add_option("--plugin-path", paths, "a plugin, or a folder of plugins; may be repeated")
       ->option_text("PATH")
@@ -75,11 +83,7 @@ void Input::AddTo(CLI::App& command) {
       ->option_text(" ")
       ->required()
       ->check(IsNamed);
-  command.add_option("--set", sets, "set a key of the config, in dotted form; may be repeated")
-      ->option_text("KEY=VALUE")
-      ->type_name("KEY=VALUE")
-      ->allow_extra_args(false)
-      ->check(IsAssignment);
+  AddSets(command, sets, "set a key of the config, in dotted form; may be repeated");
   AddPluginPath(command, plugin_paths);
   command.add_flag("--allow-outside", allow_outside,
                    "let `include:` and `output:` of the config leave their folders");

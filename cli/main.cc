@@ -56,6 +56,7 @@ void Describe(CLI::App& program, Action& action, const std::string& command_line
   AddSweep(program, action);
   AddExplain(program, action);
   AddPlugins(program, action);
+  AddCheck(program, action);
   AddDoctor(program, action);
   const auto polish = [](const auto& self, CLI::App& app) -> void {
     app.get_help_ptr()->description("print this help and leave");

@@ -102,12 +102,10 @@ const SourceEntry& PluginHost::SourceOf(const PluginEntry& entry) const {
   throw ContractViolation("no such entry: " + entry.name);
 }
 
-std::shared_ptr<const ModelInstance> PluginHost::Create(PluginEntry::Kind kind,
-                                                        const std::string& name,
+std::shared_ptr<const ModelInstance> PluginHost::Create(const PluginEntry& entry,
                                                         const Node& node) const {
-  const PluginEntry& entry = Find(kind, name, node);
   const AlidadeEntry c = EntryOf(entry);
-  ParamReader reader(node, Named(kind, name));
+  ParamReader reader(node, Named(entry.kind, entry.name));
   NewInstance instance;
   std::int32_t code;
   {
@@ -120,15 +118,16 @@ std::shared_ptr<const ModelInstance> PluginHost::Create(PluginEntry::Kind kind,
   }
   if (!reader.failure().empty()) node.Fail(reader.failure());
   if (instance.c()->kind != c.kind) FailCreation(entry, node, "it is not what its table says");
-  return std::make_shared<const ModelInstance>(instance.Release(), name, entry.plugin.string());
+  return std::make_shared<const ModelInstance>(instance.Release(), entry.name,
+                                               entry.plugin.string());
 }
 
 SensorModel PluginHost::CreateSensor(const std::string& name, const Node& entry) const {
-  return SensorModel(Create(PluginEntry::Kind::kSensor, name, entry));
+  return SensorModel(Create(Find(PluginEntry::Kind::kSensor, name, entry), entry));
 }
 
 MotionModel PluginHost::CreateMotion(const std::string& name, const Node& entry) const {
-  return MotionModel(Create(PluginEntry::Kind::kMotion, name, entry));
+  return MotionModel(Create(Find(PluginEntry::Kind::kMotion, name, entry), entry));
 }
 
 std::unique_ptr<Source> PluginHost::CreateSource(const std::string& name, const Node& node,

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cfenv>
 #include <fstream>
 
 #include "host_fixture.h"
@@ -186,9 +187,17 @@ TEST_F(HostTest, ABadTableIsRefused) {
 }
 
 TEST_F(HostTest, ACrashWhileLoadingIsARefusal) {
-  ExpectRefused(Built("start_CRASH"), {"crashed while loading (signal 11"});
-  ExpectRefused(Built("start_ABORT"), {"crashed while loading (signal 6"});
-  ExpectRefused(Built("start_EXIT"), {"ended the process while loading"});
+  ExpectRefused(Built("start_CRASH"), {"crashed (signal 11", "while loading"});
+  ExpectRefused(Built("start_ABORT"), {"crashed (signal 6", "while loading"});
+  ExpectRefused(Built("start_EXIT"), {"ended the process with exit code 0 while loading"});
+}
+
+// ---- 69: changes rounding or locale -----------------------------------------------------------
+
+TEST_F(HostTest, APluginThatChangesTheProgramWhileLoadingIsRefused) {
+  ExpectRefused(Built("start_ROUND"), {"changed the rounding mode while loading"});
+  ExpectRefused(Built("start_LOCALE"), {"changed the locale from 'C' to 'C.UTF-8' while loading"});
+  EXPECT_EQ(std::fegetround(), FE_TONEAREST);
 }
 
 // ---- 56, 57: two files, one name; one file, two names -------------------------------------------

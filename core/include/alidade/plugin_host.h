@@ -61,6 +61,8 @@ class PluginHost {
   /// Node::RejectUnread. Errors: kPlugin with the places searched, kBadConfig.
   SensorModel CreateSensor(const std::string& name, const Node& entry) const;
   MotionModel CreateMotion(const std::string& name, const Node& entry) const;
+  /// The model `entry` of entries(), also where another plugin offers its name.
+  std::shared_ptr<const ModelInstance> Create(const PluginEntry& entry, const Node& node) const;
   std::unique_ptr<Source> CreateSource(const std::string& name, const Node& entry,
                                        std::uint64_t seed,
                                        const std::filesystem::path& folder) const;
@@ -89,8 +91,6 @@ class PluginHost {
   const Loaded& LoadedFrom(const std::filesystem::path& file) const;
   AlidadeEntry EntryOf(const PluginEntry& entry) const;
   const SourceEntry& SourceOf(const PluginEntry& entry) const;
-  std::shared_ptr<const ModelInstance> Create(PluginEntry::Kind kind, const std::string& name,
-                                              const Node& entry) const;
 
   std::vector<std::unique_ptr<Loaded>> loaded_;
   std::vector<PluginEntry> entries_;

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "support/program.h"
+
+namespace alidade::testing {
+namespace {
+
+class CheckProgram : public ProgramTest {};
+
+const Arguments kStereo = {"check", "stereo_disparity", "--set", "focal_px=400",
+                           "--set", "baseline_m=0.065", "--set", "sigma_px=1"};
+
+Arguments With(Arguments arguments, const Arguments& more) {
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+TEST_F(CheckProgram, SaysALineForEachCheckAndEndsWithZero) {
+  const Outcome outcome = Call(kStereo);
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_TRUE(outcome.out.starts_with("stereo_disparity (sensor of /")) << outcome.out;
+  for (const char* line : {"\n  ok       create ", "\n  ok       jacobian ",
+                           "\n  skipped  step           not a motion model\n"}) {
+    EXPECT_TRUE(Contains(outcome.out, line)) << line << outcome.out;
+  }
+  EXPECT_FALSE(Contains(outcome.out, "FAIL"));
+}
+
+TEST_F(CheckProgram, EndsWithOneWhereACheckFails) {
+  // Time enough for nothing: the first call is too late.
+  const Outcome outcome = Call(With(kStereo, {"--states", "100000", "--timeout", "0.01"}));
+  EXPECT_EQ(outcome.code, 1) << outcome.out;
+  EXPECT_TRUE(Contains(outcome.out, "\n  FAIL ")) << outcome.out;
+  EXPECT_TRUE(Contains(outcome.out, "did not return within 0.01 s")) << outcome.out;
+}
+
+TEST_F(CheckProgram, NamesParametersThatAreMissingOrUnknown) {
+  const Outcome missing = Call({"check", "stereo_disparity", "--set", "focal_px=400"});
+  EXPECT_EQ(missing.code, 78);
+  EXPECT_TRUE(Contains(missing.err, "baseline_m: missing")) << missing.err;
+  EXPECT_TRUE(Contains(missing.err, "sigma_px: missing")) << missing.err;
+  EXPECT_TRUE(Contains(missing.err, "\n  parameters are given with --set KEY=VALUE"));
+  const Outcome unknown = Call(With(kStereo, {"--set", "near=1"}));
+  EXPECT_EQ(unknown.code, 78) << unknown.out;
+  EXPECT_TRUE(Contains(unknown.err, "error: --set")) << unknown.err;
+  EXPECT_TRUE(Contains(unknown.err, "near: unknown key")) << unknown.err;
+  EXPECT_TRUE(Contains(unknown.err, "did you mean 'near_m'?")) << unknown.err;
+}
+
+TEST_F(CheckProgram, TakesParametersFromTheConfigOfARun) {
+  const Outcome outcome = Call({"check", "stereo_disparity", "--config", "config.yaml"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_TRUE(outcome.out.starts_with("sensors.stereo: stereo_disparity (sensor of "))
+      << outcome.out;
+  const Outcome motion = Call({"check", "constant_velocity", "--config", "config.yaml"});
+  EXPECT_TRUE(motion.out.starts_with("state.target: constant_velocity (")) << motion.out;
+  const Outcome none = Call({"check", "scale_2d", "--config", "table.yaml"});
+  EXPECT_EQ(none.code, 78);
+  EXPECT_TRUE(Contains(none.err, "error: table.yaml")) << none.err;
+  EXPECT_TRUE(Contains(none.err, "has a model of the plugin")) << none.err;
+  EXPECT_EQ(Call(With(kStereo, {"--config", "config.yaml"})).code, 2);
+}
+
+TEST_F(CheckProgram, SetsParametersOfSeveralModelsByTheirNames) {
+  const std::string several = ALIDADE_BINARY_DIR "/tests/plugins/matrix_baseline.so";
+  if (!fs::exists(several)) GTEST_SKIP() << "built for test_plugins";
+  const Outcome plain = Call({"check", several, "--set", "gain=1"});
+  EXPECT_EQ(plain.code, 78);
+  EXPECT_TRUE(Contains(plain.err, "error: --set gain: of which model?; expected MODEL.key=value"))
+      << plain.err;
+  const Outcome one = Call({"check", several, "matrix_sensor", "--set", "gain=1"});
+  EXPECT_EQ(one.code, 0) << one.out << one.err;
+  const Outcome named = Call({"check", several, "--set", "matrix_sensor.gain=abc"});
+  EXPECT_EQ(named.code, 78);
+  EXPECT_TRUE(Contains(named.err, "error: --set")) << named.err;
+}
+
+TEST_F(CheckProgram, SaysWhichPluginsAreMissingOrRefused) {
+  const Outcome missing = Call({"check", "stereo"});
+  EXPECT_EQ(missing.code, 69);
+  EXPECT_TRUE(Contains(missing.err, "error: no plugin 'stereo' with a sensor or motion model"));
+  const Outcome file = Call({"check", "./nowhere.so"});
+  EXPECT_EQ(file.code, 69);
+  EXPECT_TRUE(Contains(file.err, "nowhere.so: no such file or folder")) << file.err;
+  EXPECT_EQ(Call({"check"}).code, 2);
+  EXPECT_EQ(Call(With(kStereo, {"--states", "0"})).code, 2);
+}
+
+}  // namespace
+}  // namespace alidade::testing

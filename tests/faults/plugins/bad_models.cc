@@ -1,0 +1,351 @@
+// SPDX-License-Identifier: Apache-2.0
+// One fault each, for tests/plugins/check_test.cc; and four models without fault.
+#include <unistd.h>
+
+#include <cfenv>
+#include <clocale>
+#include <csignal>
+#include <cstdlib>
+#include <limits>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "alidade/plugin.h"
+
+using alidade::MatrixRef;
+using alidade::Params;
+using alidade::Quantity;
+using alidade::UnitQuaternion;
+using alidade::Vec;
+
+namespace {
+
+volatile int g_calls = 0;  // of the models with a state of their own
+// Keep the compiler from knowing better.
+volatile double g_zero = 0.0;
+volatile int g_first = 0;
+
+/// z = (2 x, x y), defined for y > 0.
+struct Right : alidade::Sensor<Vec<2>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x", "m"}, Quantity{"y", "m"}};
+  static constexpr Quantity kMeasurement{"z", "m", "", "first,second"};
+  Right() = default;
+  explicit Right(Params&) {}
+  template <class T>
+  bool Predict(const T* x, const T* y, T* z) const {
+    if (!(y[0] > T(0.0))) return false;
+    z[0] = 2.0 * x[0];
+    z[1] = x[0] * y[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = l[3] = T(0.5);
+  }
+};
+
+/// z = x + b where a bias b is bound.
+struct MayHaveBias : alidade::Sensor<Vec<1>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x", "m"},
+                                     Quantity{"bias", "m", "", "", ALIDADE_ROLE_OPTIONAL}};
+  static constexpr Quantity kMeasurement{"z", "m"};
+  explicit MayHaveBias(Params&) {}
+  template <class T>
+  bool Predict(const T* x, const T* bias, T* z) const {
+    z[0] = bias == nullptr ? x[0] : T(x[0] + bias[0]);
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(0.5);
+  }
+};
+
+struct WrongJacobian : Right {
+  using Right::Right;
+  void Jacobian(const double* x, const double* y, MatrixRef by_x, MatrixRef by_y) const {
+    by_x(0, 0) = 2.0;
+    by_x(1, 0) = 1.001 * y[0];
+    by_y(1, 0) = x[0];
+  }
+};
+
+/// The value of dual numbers is another one.
+struct TwoValues : Right {
+  using Right::Right;
+  template <class T>
+  bool Predict(const T* x, const T* y, T* z) const {
+    if (!Right::Predict(x, y, z)) return false;
+    if (!std::is_same<T, double>::value) z[0] = z[0] + 1e-9;
+    return true;
+  }
+};
+
+struct NotDeterministic : Right {
+  using Right::Right;
+  template <class T>
+  bool Predict(const T* x, const T* y, T* z) const {
+    if (!Right::Predict(x, y, z)) return false;
+    g_calls = g_calls + 1;
+    z[0] = z[0] + 1e-12 * g_calls;
+    return true;
+  }
+};
+
+/// Mixes what it was given last into what it gives.
+struct HiddenState : Right {
+  using Right::Right;
+  mutable double last = 0.0;
+  template <class T>
+  bool Predict(const T* x, const T* y, T* z) const {
+    if (!Right::Predict(x, y, z)) return false;
+    const double now = *reinterpret_cast<const double*>(x);  // the value, also of a dual number
+    if (now != last) {
+      before = last;
+      last = now;
+    }
+    z[0] = z[0] + 1e-3 * before;
+    return true;
+  }
+  mutable double before = 0.0;
+};
+
+struct Unwritten : Right {
+  using Right::Right;
+  template <class T>
+  bool Predict(const T* x, const T* y, T* z) const {
+    if (!(y[0] > T(0.0))) return false;
+    z[0] = 2.0 * x[0];
+    z[g_first] = 2.0 * x[0];
+    return true;
+  }
+};
+
+/// Not a number at x = 0.
+struct NanOutput : Right {
+  using Right::Right;
+  template <class T>
+  bool Predict(const T* x, const T* y, T* z) const {
+    if (!Right::Predict(x, y, z)) return false;
+    z[1] = x[0] / x[0];
+    return true;
+  }
+};
+
+struct NanNoise : Right {
+  using Right::Right;
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = l[3] = T(std::numeric_limits<double>::quiet_NaN());
+  }
+};
+
+struct SingularNoise : Right {
+  using Right::Right;
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = l[2] = T(0.5);
+  }
+};
+
+struct NoNoise : Right {
+  using Right::Right;
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(0.5);
+  }
+};
+
+/// x from z, but for a factor.
+struct WrongInverse : Right {
+  using Right::Right;
+  static constexpr int kInitialises = 0;
+  template <class T>
+  bool Initialise(const T*, const T* z, T* x) const {
+    x[0] = 0.49 * z[0];
+    return true;
+  }
+};
+
+struct ThrowsInt : Right {
+  using Right::Right;
+  template <class T>
+  bool Predict(const T* x, const T* y, T* z) const {
+    if (g_zero == 0.0) throw 42;
+    return Right::Predict(x, y, z);
+  }
+};
+struct ThrowsInNoise : Right {
+  using Right::Right;
+  template <class T>
+  void SqrtNoise(const T*, const T*, T*) const {
+    throw std::runtime_error("the dog ate it");
+  }
+};
+struct ThrowsInDestroy : Right {
+  using Right::Right;
+  ~ThrowsInDestroy() noexcept(false) {
+    if (owner) throw std::runtime_error("never let go");
+  }
+  ThrowsInDestroy(ThrowsInDestroy&& other) noexcept : owner(other.owner) { other.owner = false; }
+  explicit ThrowsInDestroy(Params&) {}
+  bool owner = true;
+};
+struct ThrowsInCreate : Right {
+  explicit ThrowsInCreate(Params&) { throw std::runtime_error("the dog ate it"); }
+};
+
+/// What Predict does instead of predicting.
+template <int kWhat>
+struct Misbehaves : Right {
+  using Right::Right;
+  template <class T>
+  bool Predict(const T* x, const T* y, T* z) const {
+    if (kWhat == 1) std::exit(0);
+    if (kWhat == 2) std::raise(SIGSEGV);
+    while (kWhat == 3) ::pause();
+    if (kWhat == 4) Eat();
+    if (kWhat == 5) std::fesetround(FE_UPWARD);
+    if (kWhat == 6) std::setlocale(LC_ALL, "C.UTF-8");
+    if (kWhat == 7) static_cast<void>(!new std::string(1000, 'x'));
+    if (kWhat == 8) static_cast<void>(::chdir("/"));
+    if (kWhat == 9) static_cast<void>(::dup(0));
+    return Right::Predict(x, y, z);
+  }
+  static void Eat() {
+    for (std::vector<double*> all;;) all.push_back(new double[1 << 16]());
+  }
+};
+struct LosesItself : Right {
+  explicit LosesItself(Params&) { static_cast<void>(!new std::string(500, 'x')); }
+};
+
+// ---- written against the C boundary ------------------------------------------------------------
+
+using Eval = std::int32_t (*)(const void*, const double* const*, double*, double* const*,
+                              const std::int32_t*);
+
+/// Right, with a function of another for Predict.
+template <Eval kEval>
+void MakeRaw(Params& p, AlidadeInstance* instance) {
+  static AlidadeSensor calls = alidade::detail::SensorCalls<Right>::kCalls;
+  calls.eval = kEval;
+  alidade::EmplaceSensor<Right>(p, instance);
+  instance->sensor = &calls;
+}
+
+std::int32_t RightEval(const double* const* x, double* z, double* const* j,
+                       const std::int32_t* strides) {
+  return static_cast<std::int32_t>(alidade::Evaluate(Right(), x, z, j, strides));
+}
+
+std::int32_t PastTheEnd(const void*, const double* const* x, double* z, double* const* j,
+                        const std::int32_t* strides) {
+  z[2] = 0.0;
+  return RightEval(x, z, j, strides);
+}
+/// Takes the rows of a Jacobian to lie one behind the other.
+std::int32_t IgnoresStrides(const void*, const double* const* x, double* z, double* const* j,
+                            const std::int32_t*) {
+  const std::int32_t dense[] = {1, 1};
+  return RightEval(x, z, j, dense);
+}
+std::int32_t WritesAndFails(const void*, const double* const* x, double* z, double* const* j,
+                            const std::int32_t* strides) {
+  if (!(x[1][0] > 0.0)) z[0] = 2.0 * x[0][0];
+  return RightEval(x, z, j, strides);
+}
+std::int32_t StrangeStatus(const void*, const double* const*, double*, double* const*,
+                           const std::int32_t*) {
+  return 77;
+}
+/// No noise, z or Jacobian comes of it anywhere.
+std::int32_t NowhereDefined(const void*, const double* const*, double*, double* const*,
+                            const std::int32_t*) {
+  return ALIDADE_OUT_OF_DOMAIN;
+}
+
+// ---- with rotations, motion --------------------------------------------------------------------
+
+/// b = R(q)' (0, 0, 1)
+struct Gravity : alidade::Sensor<alidade::UnitVector, UnitQuaternion> {
+  static constexpr std::array kRoles{Quantity{"orientation"}};
+  static constexpr Quantity kMeasurement{"down"};
+  explicit Gravity(Params&) {}
+  template <class T>
+  bool Predict(const T* q, T* z) const {
+    z[0] = 2.0 * (q[1] * q[3] - q[0] * q[2]);
+    z[1] = 2.0 * (q[2] * q[3] + q[0] * q[1]);
+    z[2] = q[0] * q[0] - q[1] * q[1] - q[2] * q[2] + q[3] * q[3];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = l[3] = T(0.01);
+  }
+};
+
+/// Takes q and -q for two rotations.
+struct TwoCovers : alidade::Sensor<Vec<1>, UnitQuaternion> {
+  static constexpr std::array kRoles{Quantity{"orientation"}};
+  static constexpr Quantity kMeasurement{"x"};
+  explicit TwoCovers(Params&) {}
+  template <class T>
+  bool Predict(const T* q, T* z) const {
+    z[0] = 2.0 * q[1];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(0.01);
+  }
+};
+
+/// A turning body with a control input; kWhat names a fault.
+template <int kWhat>
+struct Turning : alidade::Motion<4, Vec<1>, UnitQuaternion> {
+  static constexpr std::array kBlocks{Quantity{"distance", "m"}, Quantity{"orientation"}};
+  using Input = Vec<1>;
+  static constexpr Quantity kInput{"speed", "m/s"};
+  explicit Turning(Params&) {}
+  template <class T>
+  void Step(const T* s, const T* q, const T* u, const T* w, double dt_s, T* s1, T* q1) const {
+    s1[0] = s[0] + (u[0] + w[0]) * (kWhat == 1 ? 0.1 : dt_s);
+    if (kWhat == 2) s1[0] = s1[0] - 0.3 * s[0] * dt_s;  // Euler's step of s' = u - 0.3 s
+    if (kWhat == 3) s1[0] = s1[0] + T(1e-3);
+    const T d[3] = {w[1], w[2] + 0.4 * dt_s, w[3]};
+    UnitQuaternion::Plus(q, d, q1);
+  }
+  void SqrtQ(double dt_s, MatrixRef l) const {
+    for (int i = 0; i < 4; ++i) l(i, i) = kWhat == 4 ? std::log(0.0 * dt_s) : 0.1 * dt_s;
+  }
+};
+
+}  // namespace
+
+#define SENSOR(Model, name) ALIDADE_SENSOR(Model, name, "", "")
+#define RAW(eval, name) ALIDADE_SENSOR_BY(MakeRaw<eval>, name, "", "")
+#define MOTION(Model, name) ALIDADE_MOTION(Model, name, "", "")
+
+ALIDADE_PLUGIN(SENSOR(Right, "right"), SENSOR(MayHaveBias, "may_have_bias"),
+               SENSOR(Gravity, "gravity"), MOTION(Turning<0>, "turning"),
+               SENSOR(WrongJacobian, "wrong_jacobian"), SENSOR(TwoValues, "two_values"),
+               SENSOR(NotDeterministic, "not_deterministic"), SENSOR(HiddenState, "hidden_state"),
+               SENSOR(Unwritten, "unwritten"), SENSOR(NanOutput, "nan_output"),
+               SENSOR(NanNoise, "nan_noise"), SENSOR(SingularNoise, "singular_noise"),
+               SENSOR(NoNoise, "no_noise"), SENSOR(WrongInverse, "wrong_inverse"),
+               SENSOR(ThrowsInt, "throws_int"), SENSOR(ThrowsInNoise, "throws_in_noise"),
+               SENSOR(ThrowsInDestroy, "throws_in_destroy"),
+               SENSOR(ThrowsInCreate, "throws_in_create"), SENSOR(Misbehaves<1>, "exits"),
+               SENSOR(Misbehaves<2>, "crashes"), SENSOR(Misbehaves<3>, "hangs"),
+               SENSOR(Misbehaves<4>, "eats_memory"), SENSOR(Misbehaves<5>, "rounds_upward"),
+               SENSOR(Misbehaves<6>, "sets_locale"), SENSOR(Misbehaves<7>, "leaks"),
+               SENSOR(Misbehaves<8>, "changes_folder"), SENSOR(Misbehaves<9>, "leaks_files"),
+               SENSOR(LosesItself, "loses_itself"), RAW(PastTheEnd, "past_the_end"),
+               RAW(IgnoresStrides, "ignores_strides"), RAW(WritesAndFails, "writes_and_fails"),
+               RAW(StrangeStatus, "strange_status"), RAW(NowhereDefined, "nowhere_defined"),
+               SENSOR(TwoCovers, "two_covers"), MOTION(Turning<1>, "ignores_dt"),
+               MOTION(Turning<2>, "euler"), MOTION(Turning<3>, "drifts"),
+               MOTION(Turning<4>, "infinite_q"))

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Every model of tests/faults/plugins/bad_models.cc has one fault: the check that is made for it
+// must find it and say so, and no other may.
+#include "alidade/check.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "host_fixture.h"
+
+namespace alidade {
+namespace {
+
+using Verdict = Finding::Verdict;
+
+/// `check: words` of every failure.
+std::vector<std::string> Failures(const std::vector<Finding>& findings) {
+  std::vector<std::string> failures;
+  for (const Finding& finding : findings) {
+    if (finding.verdict == Verdict::kFail) failures.push_back(finding.check + ": " + finding.words);
+  }
+  return failures;
+}
+
+std::string Joined(const std::vector<std::string>& lines) {
+  std::string text;
+  for (const std::string& line : lines) text += line + '\n';
+  return text;
+}
+
+class CheckTest : public HostTest {
+ protected:
+  std::vector<Finding> Checked(const std::string& model, const CheckOptions& options = {}) {
+    return CheckModel(host_, FindModels(host_, Built("bad_models").string(), model).at(0),
+                      Config::FromText("{}", model).root(), options);
+  }
+  PluginHost host_{{Built("bad_models")}};
+};
+
+struct Fault {
+  int number;  ///< in the project's list of faults, 0: none
+  const char* model;
+  const char* check;
+  std::vector<const char*> words;
+};
+
+std::string Name(const testing::TestParamInfo<Fault>& info) {
+  return "Fault" + std::to_string(info.param.number) + '_' + info.param.model;
+}
+
+class OneFault : public CheckTest, public testing::WithParamInterface<Fault> {};
+
+TEST_P(OneFault, IsFoundByItsCheckAlone) {
+#if defined(__SANITIZE_ADDRESS__)
+  // The sanitizer ends such a process in its own way.
+  const std::string model = GetParam().model;
+  if (model == "exits" || model == "eats_memory") GTEST_SKIP();
+#endif
+  CheckOptions options;
+  if (std::string(GetParam().model) == "hangs") options.timeout_s = 1.0;
+  options.memory_mb = 64;
+  const auto findings = Checked(GetParam().model, options);
+  const auto failures = Failures(findings);
+  ASSERT_EQ(failures.size(), 1u) << Joined(failures);
+  EXPECT_TRUE(failures[0].starts_with(std::string(GetParam().check) + ": ")) << failures[0];
+  for (const char* word : GetParam().words) {
+    EXPECT_NE(failures[0].find(word), std::string::npos) << word << " in: " << failures[0];
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Models, OneFault,
+    testing::Values(
+        Fault{58, "throws_in_create", "create", {"failed while being created: the dog ate it"}},
+        Fault{58, "throws_in_noise", "calls", {"SqrtNoise at x = ", "failed: the dog ate it"}},
+        Fault{58, "throws_in_destroy", "create", {"destroy crashed", "threw never let go"}},
+        Fault{59, "throws_int", "calls", {"Predict at", "an exception of unknown type"}},
+        Fault{60, "unwritten", "outputs", {"Predict at", "z.second is not written"}},
+        Fault{60, "nan_output", "outputs", {"Predict at x = 0, y = ", "z.second is nan"}},
+        Fault{60, "nan_noise", "noise", {"SqrtNoise at", "entry (0, 0) is nan"}},
+        Fault{60, "infinite_q", "noise", {"SqrtQ at", "dt = ", "entry (0, 0) is -inf"}},
+        Fault{61, "past_the_end", "bounds", {"Predict at", "writes past its buffer of z"}},
+        Fault{61, "ignores_strides", "bounds", {"writes past its buffer of Jacobian 0"}},
+        Fault{62, "wrong_jacobian", "jacobian", {"Predict: d z.second / d x is", "by differences"}},
+        Fault{63,
+              "two_values",
+              "same_value",
+              {"differs with all Jacobians and with none: z = (", " apart"}},
+        Fault{
+            64, "not_deterministic", "deterministic", {"Predict at", "two calls in a row differ"}},
+        Fault{65, "hidden_state", "pure", {"Predict at", "depends on what was called before"}},
+        Fault{66, "crashes", "calls", {"Predict crashed (signal 11", "; at x = "}},
+        Fault{66, "exits", "calls", {"Predict ended the process with exit code 0; at x = "}},
+        Fault{67, "hangs", "calls", {"Predict did not return within 1 s; at x = "}},
+        Fault{68, "leaks", "leaks", {"Predict loses 10", "bytes each time"}},
+        Fault{68, "loses_itself", "leaks", {"create and destroy loses", "bytes each time"}},
+        Fault{68, "leaks_files", "leaks", {"Predict leaves files open"}},
+        Fault{69, "rounds_upward", "environment", {"Predict changed the rounding mode"}},
+        Fault{69, "sets_locale", "environment", {"Predict changed the locale from 'C'"}},
+        Fault{69, "changes_folder", "environment", {"Predict changed the current folder to /"}},
+        Fault{0, "eats_memory", "calls", {"Predict at", "std::bad_alloc; it may take 64 MB"}},
+        Fault{0, "singular_noise", "noise", {"R is singular: smallest eigenvalue"}},
+        Fault{0, "no_noise", "noise", {"R is singular: no noise on z.second"}},
+        Fault{0, "writes_and_fails", "failure", {"Predict at", "fails, but wrote an output"}},
+        Fault{0, "strange_status", "calls", {"returned 77, which is no status"}},
+        Fault{0, "nowhere_defined", "calls", {"Predict is defined at 0 of", "--states N"}},
+        Fault{0, "wrong_inverse", "initialise", {"Initialise at", "gives x = ", "Predict gives z"}},
+        Fault{0, "two_covers", "double_cover", {"q and -q of orientation are not the same"}},
+        Fault{0, "ignores_dt", "step", {"a step over dt = 0 without noise moves it"}},
+        Fault{0, "euler", "step", {"apart in distance", "of order 2 in dt", "--step-order N"}},
+        Fault{0, "drifts", "step", {"a step over dt = 0 without noise moves it"}}),
+    Name);
+
+TEST_F(CheckTest, EveryModelWithAFaultIsTested) {
+  std::set<std::string> tested = {"right", "may_have_bias", "gravity", "turning"};
+  const auto* suite = testing::UnitTest::GetInstance();
+  for (int i = 0; i < suite->total_test_suite_count(); ++i) {
+    const auto* tests = suite->GetTestSuite(i);
+    for (int k = 0; k < tests->total_test_count(); ++k) {
+      const std::string name = tests->GetTestInfo(k)->name();
+      const std::size_t at = name.find("/Fault");
+      if (at != name.npos) tested.insert(name.substr(name.find('_', at) + 1));
+    }
+  }
+  for (const PluginEntry& entry : FindModels(host_, Built("bad_models").string())) {
+    EXPECT_TRUE(tested.contains(entry.name)) << entry.name;
+  }
+}
+
+TEST_F(CheckTest, ModelsWithoutFaultPass) {
+  for (const char* model : {"right", "may_have_bias", "gravity", "turning"}) {
+    const auto findings = Checked(model);
+    EXPECT_EQ(Joined(Failures(findings)), "") << model;
+    EXPECT_FALSE(AnyFailure(findings));
+  }
+}
+
+TEST_F(CheckTest, ADiscretisationPassesWhereItsOrderIsGiven) {
+  CheckOptions options;
+  options.step_order = 2;
+  EXPECT_EQ(Joined(Failures(Checked("euler", options))), "");
+  options.step_order = 3;
+  EXPECT_TRUE(AnyFailure(Checked("euler", options)));
+  EXPECT_TRUE(AnyFailure(Checked("ignores_dt", options)));
+}
+
+TEST_F(CheckTest, NamesTheWorstEntryOfAWrongJacobian) {
+  const auto findings = Checked("wrong_jacobian");
+  const auto is = [](const Finding& finding) { return finding.check == "jacobian"; };
+  const std::string words = std::find_if(findings.begin(), findings.end(), is)->words;
+  double written = 0.0, numeric = 0.0, x = 0.0, y = 0.0;
+  ASSERT_EQ(std::sscanf(words.c_str(),
+                        "Predict: d z.second / d x is %lf from the model, %lf by differences; "
+                        "Predict at x = %lf, y = %lf",
+                        &written, &numeric, &x, &y),
+            4)
+      << words;
+  EXPECT_NEAR(written / y, 1.001, 1e-5) << words;  // six digits are printed
+  EXPECT_NEAR(numeric / y, 1.0, 1e-5) << words;
+}
+
+TEST_F(CheckTest, SkipsWhatAFailureLeavesUnsaid) {
+  const auto findings = Checked("not_deterministic");
+  const auto failed = std::find_if(findings.begin(), findings.end(), [](const Finding& finding) {
+    return finding.verdict == Verdict::kFail;
+  });
+  ASSERT_NE(failed, findings.end());
+  for (auto later = failed + 1; later != findings.end(); ++later) {
+    EXPECT_EQ(later->verdict, Verdict::kSkipped) << later->check;
+    EXPECT_EQ(later->words, "'deterministic' failed");
+  }
+}
+
+TEST_F(CheckTest, GivesTheSameFindingsForTheSameSeed) {
+  const auto text = [&](std::uint64_t seed) {
+    CheckOptions options;
+    options.seed = seed;
+    return Joined(Failures(Checked("wrong_jacobian", options)));
+  };
+  EXPECT_EQ(text(3), text(3));
+  EXPECT_NE(text(3), text(4));
+}
+
+TEST_F(CheckTest, ParametersThatDoNotFitAreErrorsOfTheConfig) {
+  const auto stereo = FindModels(host_, "stereo_disparity").at(0);
+  const auto check = [&](const std::string& parameters) {
+    const Config config = Parse(parameters);
+    CheckModel(host_, stereo, config.root());
+  };
+  ExpectError(ExitCode::kBadConfig, {"test.yaml:1:1 sigma_px: missing", "focal_px: missing"},
+              [&] { check("{baseline_m: 0.1}"); });
+  ExpectError(ExitCode::kBadConfig, {"test.yaml", "basline_m", "did you mean 'baseline_m'?"},
+              [&] { check("{baseline_m: 1, focal_px: 1, sigma_px: 1, basline_m: 1}"); });
+}
+
+TEST_F(CheckTest, FindsPluginsByFileStemAndModel) {
+  EXPECT_EQ(FindModels(host_, "bad_models").size(), FindModels(host_, Built("bad_models")).size());
+  EXPECT_EQ(FindModels(host_, "scale_2d").at(0).name, "scale_2d");
+  EXPECT_EQ(FindModels(host_, "gravity").size(), 1u);
+  ExpectError(ExitCode::kPlugin, {"no plugin 'scale_2' with", "did you mean 'scale_2d'?"},
+              [&] { FindModels(host_, "scale_2"); });
+  ExpectError(ExitCode::kPlugin, {"offers no model 'righ'", "did you mean 'right'?"},
+              [&] { FindModels(host_, "bad_models", "righ"); });
+}
+
+/// Every shipped model passes, with the parameters of its row.
+TEST_F(CheckTest, ShippedModelsPass) {
+  const std::multimap<std::string, std::string> parameters = {
+      {"constant", "{}"},
+      {"constant", "{size: 3, noise: {random_walk: 0.1}}"},
+      {"constant_velocity", "{noise: {acceleration: 1}}"},
+      {"constant_velocity", "{dimensions: 3, noise: {acceleration: 2, kind: white}}"},
+      {"stereo_disparity", "{focal_px: 400, baseline_m: 0.065, sigma_px: 1}"},
+      {"stereo_disparity", "{focal_px: 400, baseline_m: 0.065, sigma_px: 1, near_m: 0.3}"},
+      {"scale_2d", "{template_px: 300, sigma_px: 1}"},
+      {"scale_2d", "{noise: fixed, variance: 0.01}"},
+  };
+  const std::filesystem::path shipped = ALIDADE_BINARY_DIR "/lib/alidade/plugins";
+  int checked = 0;
+  for (const PluginEntry& entry : host_.entries()) {
+    const bool model =
+        entry.kind == PluginEntry::Kind::kSensor || entry.kind == PluginEntry::Kind::kMotion;
+    if (!model || entry.plugin.parent_path() != std::filesystem::canonical(shipped)) continue;
+    const auto [first, last] = parameters.equal_range(entry.name);
+    EXPECT_NE(first, last) << "no parameters here for " << entry.name;
+    for (auto row = first; row != last; ++row, ++checked) {
+      const Config config = Parse(row->second);
+      EXPECT_EQ(Joined(Failures(CheckModel(host_, entry, config.root()))), "")
+          << entry.name << ' ' << row->second;
+    }
+  }
+  EXPECT_GE(checked, 8);
+}
+
+}  // namespace
+}  // namespace alidade

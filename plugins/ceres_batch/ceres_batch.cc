@@ -60,13 +60,13 @@ class CeresBatch : public Estimator {
 
   const UpdateReport& Process(const Frame& frame) override {
     report_.Clear();
-    if (!trajectory_.Add(frame)) {
+    const UpdateReport& filter = filter_.Process(frame);
+    if (!trajectory_.Add(frame, filter)) {
       failed_ = true;
       report_.events.push_back({frame.stamp, "batch", trajectory_.problem()});
       return report_;
     }
-    filter_.Process(frame);
-    if (!filter_.failed()) filtered_.push_back(filter_.state().values());
+    if (!filter_.failed()) filtered_.push_back(trajectory_.ValuesOf(filter_.state()));
     if (!offline()) SolveSoFar(frame.stamp);
     return report_;
   }
@@ -86,7 +86,7 @@ class CeresBatch : public Estimator {
     Each([&](std::size_t k, const Trajectory::Point& point) {
       const bool last = k + 1 == trajectory_.size();
       trajectory_.Report(k, point, report_);
-      PutState(point);
+      PutState(k, point);
       if (last) report_.events.push_back({trajectory_.stamp(), "batch", summary_});
       emit(k, state_, report_);
     });
@@ -118,7 +118,7 @@ class CeresBatch : public Estimator {
       Each([&](std::size_t k, const Trajectory::Point& point) {
         if (k + 1 < trajectory_.size()) return;
         trajectory_.Report(k, point, report_);
-        PutState(point);
+        PutState(k, point);
       });
     } else {
       failed_ = true;
@@ -200,9 +200,9 @@ class CeresBatch : public Estimator {
     }
   }
 
-  void PutState(const Trajectory::Point& point) {
-    Trajectory::Put(point, u_.transpose().triangularView<Eigen::Lower>().solve(point.s.transpose()),
-                    state_);
+  void PutState(std::size_t k, const Trajectory::Point& point) {
+    trajectory_.Put(
+        k, point, u_.transpose().triangularView<Eigen::Lower>().solve(point.s.transpose()), state_);
   }
 
   Options options_;
@@ -225,12 +225,6 @@ void CheckSupported(const System& system, const Node& entry) {
   for (const Block& block : system.layout.blocks()) {
     if (block.status == BlockStatus::kConsidered) {
       refuse("block '" + block.name + "' is considered", "a block estimated or fixed");
-    }
-  }
-  for (const Prior& prior : system.priors) {
-    if (!prior.from.empty()) {
-      refuse("block '" + system.layout[prior.block].name + "' starts from a measurement",
-             "a mean and its uncertainty");
     }
   }
   for (const SensorBinding& sensor : system.sensors) {

@@ -16,26 +16,10 @@ constexpr int kMostInputs = 4000;  // the dense Jacobian of as many rows takes 1
 
 /// L with P = L L', for P positive semidefinite.
 Eigen::MatrixXd SquareRoot(const Eigen::MatrixXd& p) {
+  if (p.size() == 0) return p;
   const Eigen::LDLT<Eigen::MatrixXd> ldlt(p);
   const Eigen::VectorXd d = ldlt.vectorD().cwiseMax(0.0).cwiseSqrt();
   return ldlt.transpositionsP().transpose() * (Eigen::MatrixXd(ldlt.matrixL()) * d.asDiagonal());
-}
-
-/// The rows of the covariance that belong to the blocks, in their order; -1: a fixed block's.
-std::vector<int> RowsOf(const StateLayout& layout, const std::vector<BlockId>& blocks) {
-  std::vector<int> rows;
-  for (const BlockId id : blocks) {
-    const Block& block = layout[id];
-    for (int i = 0; i < block.geometry().tangent; ++i) {
-      rows.push_back(block.has_covariance() ? block.tangent_offset + i : -1);
-    }
-  }
-  return rows;
-}
-
-/// What a status says that is not kOk.
-std::string Why(Status status, const std::string& error) {
-  return status == Status::kError ? error : "out of its domain";
 }
 
 }  // namespace
@@ -49,6 +33,15 @@ Trajectory::Trajectory(System system, const std::vector<StreamInfo>& streams, do
   }
   l0_ = SquareRoot(initial_.covariance().Dense());
   inputs_ = static_cast<int>(l0_.cols());
+  for (const Block& block : initial_.layout().blocks()) present_.push_back(block.present);
+  for (std::size_t i = 0; i < present_.size(); ++i) {
+    if (present_[i]) continue;
+    const BlockId id = static_cast<BlockId>(i);
+    const Geometry geometry = initial_.layout()[id].geometry();
+    std::vector<double> value(static_cast<std::size_t>(geometry.ambient));
+    geometry.Identity(value.data());
+    initial_.Add(id, value.data(), Eigen::MatrixXd::Zero(geometry.tangent, geometry.tangent));
+  }
 }
 
 bool Trajectory::Fail(std::string why) const {
@@ -56,7 +49,23 @@ bool Trajectory::Fail(std::string why) const {
   return false;
 }
 
-bool Trajectory::Add(const Frame& frame) {
+bool Trajectory::AllPresent(const std::vector<BlockId>& blocks) const {
+  return std::ranges::all_of(
+      blocks, [&](BlockId id) { return id < 0 || present_[static_cast<std::size_t>(id)]; });
+}
+
+std::vector<double> Trajectory::ValuesOf(const State& state) const {
+  std::vector<double> values = initial_.values();
+  for (std::size_t i = 0; i < present_.size(); ++i) {
+    const BlockId id = static_cast<BlockId>(i);
+    if (!state.layout()[id].present) continue;
+    const Block& block = initial_.layout()[id];
+    std::copy_n(state.value(id), block.geometry().ambient, values.data() + block.value_offset);
+  }
+  return values;
+}
+
+bool Trajectory::Add(const Frame& frame, const UpdateReport& filter) {
   if (stamp_ == kNoStamp) {
     stamp_ = system_.start_s ? StampFromSeconds(*system_.start_s) : frame.stamp;
   }
@@ -72,9 +81,10 @@ bool Trajectory::Add(const Frame& frame) {
   int inputs = inputs_;
   for (int part = 0; part < static_cast<int>(parts) && !node.stale && elapsed > 0; ++part) {
     for (std::size_t i = 0; i < system_.motions.size(); ++i) {
-      if (system_.motions[i].model.stationary()) continue;
+      const MotionBinding& motion = system_.motions[i];
+      if (motion.model.stationary() || !AllPresent(motion.blocks)) continue;
       node.steps.push_back({i, Seconds(elapsed) / parts, inputs, {}});
-      inputs += system_.motions[i].model.noise_size();
+      inputs += motion.model.noise_size();
     }
     if (inputs <= kMostInputs) continue;
     return Fail("more than " + std::to_string(kMostInputs) +
@@ -83,13 +93,13 @@ bool Trajectory::Add(const Frame& frame) {
   }
   inputs_ = inputs;
   if (!node.stale) stamp_ = frame.stamp;
-  AddFactors(frame, node);
+  AddFactors(frame, filter, node);
   nodes_.push_back(std::move(node));
   return true;
 }
 
 /// One factor for each measurement and sensor bound to its stream, in the order of the sensors.
-void Trajectory::AddFactors(const Frame& frame, Node& node) {
+void Trajectory::AddFactors(const Frame& frame, const UpdateReport& filter, Node& node) {
   for (std::size_t i = 0; i < system_.sensors.size(); ++i) {
     const SensorModel& model = system_.sensors[i].model;
     for (const Measurement& m : frame.measurements) {
@@ -100,18 +110,52 @@ void Trajectory::AddFactors(const Frame& frame, Node& node) {
         factor.outcome =
             AllFinite(m.values) ? OutcomeOf(model.Valid(m.values.data())) : Outcome::kNotFinite;
       }
-      if (factor.outcome == Outcome::kAccepted) {
-        factor.row = residuals_;
-        residuals_ += model.measurement().geometry.tangent;
-      }
+      const std::size_t index = node.factors.size();  // the filter has the same order
+      const bool first = index < filter.measurements().size() &&
+                         filter.measurements()[index].outcome == Outcome::kInitialised;
+      if (first) factor.outcome = Outcome::kInitialised;
       node.factors.push_back(std::move(factor));
+    }
+  }
+  AddFirsts(node);
+  for (Factor& factor : node.factors) {
+    if (factor.outcome != Outcome::kAccepted) continue;
+    const SensorBinding& sensor = SensorOf(factor);
+    if (!std::ranges::all_of(sensor.roles,
+                             [&](const RoleBinding& role) { return AllPresent({role.block}); })) {
+      factor.outcome = Outcome::kNotReady;
+      continue;
+    }
+    factor.row = residuals_;
+    residuals_ += sensor.model.measurement().geometry.tangent;
+  }
+}
+
+/// First values in an order in which each finds the blocks that it needs.
+void Trajectory::AddFirsts(Node& node) {
+  for (bool progress = true; progress;) {
+    progress = false;
+    for (std::size_t i = 0; i < node.factors.size(); ++i) {
+      if (node.factors[i].outcome != Outcome::kInitialised) continue;
+      const SensorBinding& sensor = SensorOf(node.factors[i]);
+      const auto target = static_cast<std::size_t>(sensor.model.initialised_role());
+      std::vector<BlockId> others;
+      for (std::size_t k = 0; k < sensor.roles.size(); ++k) {
+        if (k != target) others.push_back(sensor.roles[k].block);
+      }
+      const BlockId block = sensor.roles[target].block;
+      if (present_[static_cast<std::size_t>(block)] || !AllPresent(others)) continue;
+      present_[static_cast<std::size_t>(block)] = progress = true;
+      node.firsts.push_back({i, block, inputs_});
+      inputs_ += sensor.model.measurement().geometry.tangent;
     }
   }
 }
 
 bool Trajectory::Begin(const double* e, bool sensitivity, Point& point) const {
-  const auto n = l0_.rows();
-  const Eigen::VectorXd d = l0_ * Eigen::Map<const Eigen::VectorXd>(e, n);
+  const Eigen::Index n = initial_.covariance().size(), n0 = l0_.rows();
+  Eigen::VectorXd d = Eigen::VectorXd::Zero(n);
+  d.head(n0) = l0_ * Eigen::Map<const Eigen::VectorXd>(e, n0);
   initial_.Retract(d.data(), point.x);
   point.offset = Eigen::VectorXd::Zero(n);
   point.s.resize(0, 0);
@@ -120,9 +164,9 @@ bool Trajectory::Begin(const double* e, bool sensitivity, Point& point) const {
   point.s = Eigen::MatrixXd::Zero(n, inputs_);
   for (std::size_t id = 0; id < initial_.layout().blocks().size(); ++id) {
     const Block& block = initial_.layout().blocks()[id];
-    if (!block.has_covariance()) continue;
     const int at = block.tangent_offset, t = block.geometry().tangent;
-    point.s.block(at, 0, t, n) =
+    if (!block.has_covariance() || at >= n0) continue;
+    point.s.block(at, 0, t, n0) =
         PlusJacobian(block.geometry(), initial_.value(static_cast<BlockId>(id)), d.data() + at) *
         l0_.middleRows(at, t);
   }
@@ -130,59 +174,11 @@ bool Trajectory::Begin(const double* e, bool sensitivity, Point& point) const {
 }
 
 bool Trajectory::Advance(std::size_t k, const double* e, Point& point) const {
-  return std::ranges::all_of(nodes_[k].steps,
-                             [&](const Step& step) { return Move(step, e, point); });
-}
-
-/// x = f(x, L e, dt); S = F S + [0  G L  0] and offset = F offset, in the rows of the model.
-bool Trajectory::Move(const Step& step, const double* e, Point& point) const {
-  const MotionBinding& motion = system_.motions[step.motion];
-  const StateLayout& layout = initial_.layout();
-  const int n = motion.model.tangent_size(), n_w = motion.model.noise_size();
-  const Eigen::VectorXd w = step.l * Eigen::Map<const Eigen::VectorXd>(e + step.column, n_w);
-  const bool sensitivity = point.s.size() > 0;
-  RowMajor f = RowMajor::Constant(n, n, std::nan("")), g = RowMajor::Constant(n, n_w, std::nan(""));
-  std::vector<double> next = point.x;
-  std::vector<const double*> from;
-  std::vector<double*> to;
-  for (const BlockId id : motion.blocks) {
-    from.push_back(point.x.data() + layout[id].value_offset);
-    to.push_back(next.data() + layout[id].value_offset);
-  }
-  const Status status =
-      motion.model.Step(from.data(), nullptr, w.data(), step.dt_s, to.data(),
-                        sensitivity ? f.data() : nullptr, sensitivity ? g.data() : nullptr);
-  if (status != Status::kOk) {
-    return Fail("motion model of '" + motion.name +
-                "' cannot step: " + Why(status, motion.model.error_text()));
-  }
-  for (const BlockId id : motion.blocks) {
-    const Block& block = layout[id];
-    if (block.status != BlockStatus::kFixed) continue;
-    std::copy_n(point.x.data() + block.value_offset, block.geometry().ambient,
-                next.data() + block.value_offset);
-  }
-  const bool finite = AllFinite(next) && (!sensitivity || (f.allFinite() && g.allFinite()));
-  if (!finite) return Fail("motion model of '" + motion.name + "' steps to what is not finite");
-  point.x = std::move(next);
-  if (!sensitivity) return true;
-
-  // F and G L in the rows of the whole state.
-  const std::vector<int> rows = RowsOf(layout, motion.blocks);
-  const RowMajor gl = g * step.l;
-  Eigen::MatrixXd a = Eigen::MatrixXd::Identity(point.s.rows(), point.s.rows());
-  for (int i = 0; i < n; ++i) {
-    const int row = rows[static_cast<std::size_t>(i)];
-    if (row < 0) continue;
-    for (int k = 0; k < n; ++k) {
-      const int column = rows[static_cast<std::size_t>(k)];
-      if (column >= 0) a(row, column) = f(i, k);
-    }
-    point.s.row(row).segment(step.column, n_w) = gl.row(i);
-  }
-  point.s.leftCols(step.column) = a * point.s.leftCols(step.column);
-  point.offset = a * point.offset;
-  return true;
+  const Node& node = nodes_[k];
+  return std::ranges::all_of(node.steps, [&](const Step& step) { return Move(step, e, point); }) &&
+         std::ranges::all_of(node.firsts, [&](const First& first) {
+           return Initialise(first, node.factors[first.factor], e, point);
+         });
 }
 
 std::vector<const double*> Trajectory::RolesOf(const SensorBinding& sensor,
@@ -193,51 +189,6 @@ std::vector<const double*> Trajectory::RolesOf(const SensorBinding& sensor,
                                    : point.x.data() + initial_.layout()[role.block].value_offset);
   }
   return roles;
-}
-
-/// r = L^-1 (z (-) h), m, and unless null a = dr/dx, m x n.
-bool Trajectory::Residual(const Factor& factor, const Point& point, Eigen::VectorXd& r,
-                          Eigen::MatrixXd* a) const {
-  const SensorBinding& sensor = SensorOf(factor);
-  const Geometry& geometry = sensor.model.measurement().geometry;
-  const std::vector<const double*> roles = RolesOf(sensor, point);
-  std::vector<RowMajor> jacobians(roles.size());
-  std::vector<double*> into(roles.size(), nullptr);
-  std::vector<int> strides(roles.size(), 0);
-  for (std::size_t i = 0; i < roles.size() && a != nullptr; ++i) {
-    const BlockId id = sensor.roles[i].block;
-    if (id < 0 || !initial_.layout()[id].has_covariance()) continue;
-    strides[i] = initial_.layout()[id].geometry().tangent;
-    jacobians[i] = RowMajor::Constant(geometry.tangent, strides[i], std::nan(""));
-    into[i] = jacobians[i].data();
-  }
-  std::vector<double> h(static_cast<std::size_t>(geometry.ambient), std::nan(""));
-  const Status status =
-      a == nullptr ? sensor.model.Predict(roles.data(), h.data())
-                   : sensor.model.Linearise(roles.data(), h.data(), into.data(), strides.data());
-  if (status != Status::kOk) {
-    return Fail("sensor '" + sensor.name + "' at " +
-                std::to_string(Seconds(factor.measurement.stamp)) +
-                " s: " + Why(status, sensor.model.error_text()));
-  }
-  const double* z = factor.measurement.values.data();
-  r.resize(geometry.tangent);
-  geometry.Minus(z, h.data(), r.data());
-  const auto whiten = factor.l.triangularView<Eigen::Lower>();
-  whiten.solveInPlace(r);
-  bool finite = r.allFinite();
-  if (a != nullptr) {
-    a->setZero(geometry.tangent, l0_.rows());
-    const Eigen::MatrixXd j_r_h = MinusJacobian(geometry, z, h.data());
-    for (std::size_t i = 0; i < roles.size(); ++i) {
-      if (into[i] == nullptr) continue;
-      const Block& block = initial_.layout()[sensor.roles[i].block];
-      a->middleCols(block.tangent_offset, strides[i]) += j_r_h * jacobians[i];
-    }
-    whiten.solveInPlace(*a);
-    finite = finite && a->allFinite();
-  }
-  return finite || Fail("sensor '" + sensor.name + "' predicts what is not finite");
 }
 
 bool Trajectory::Evaluate(const double* e, double* r, double* j) const {
@@ -268,50 +219,20 @@ void Trajectory::NoteChange(const Eigen::MatrixXd& before, const Eigen::MatrixXd
   change_ = std::max(change_, moved == 0.0 ? 0.0 : moved / scale);
 }
 
-bool Trajectory::FreezeStep(Step& step, const Point& point) {
-  const MotionBinding& motion = system_.motions[step.motion];
-  const int n_w = motion.model.noise_size();
-  std::vector<const double*> blocks;
-  for (const BlockId id : motion.blocks) {
-    blocks.push_back(point.x.data() + initial_.layout()[id].value_offset);
+/// Advances to the node, taking Q of its steps and R of its first values on the way.
+bool Trajectory::FreezeNode(Node& node, const double* e, Point& point) {
+  for (Step& step : node.steps) {
+    if (!FreezeStep(step, point) || !Move(step, e, point)) return false;
   }
-  RowMajor l = RowMajor::Zero(n_w, n_w);
-  const Status status = motion.model.SqrtQ(blocks.data(), step.dt_s, l.data());
-  if (status != Status::kOk || !l.allFinite()) {
-    return Fail("the noise of motion model '" + motion.name +
-                "': " + Why(status, motion.model.error_text()));
-  }
-  NoteChange(step.l, l);
-  step.l = std::move(l);
-  return true;
-}
-
-bool Trajectory::FreezeFactor(Factor& factor, const Point& point) {
-  const SensorBinding& sensor = SensorOf(factor);
-  const int m = sensor.model.measurement().geometry.tangent;
-  Eigen::MatrixXd r;
-  if (factor.measurement.covariance.empty()) {
-    RowMajor root = RowMajor::Constant(m, m, std::nan(""));
-    const Status status = sensor.model.SqrtNoise(RolesOf(sensor, point).data(),
-                                                 factor.measurement.values.data(), root.data());
-    if (status != Status::kOk) {
-      return Fail("the noise of sensor '" + sensor.name + "' at " +
-                  std::to_string(Seconds(factor.measurement.stamp)) +
-                  " s: " + Why(status, sensor.model.error_text()));
+  for (const First& first : node.firsts) {
+    Factor& factor = node.factors[first.factor];
+    Point values = point;  // R may depend on the first value itself
+    values.s.resize(0, 0);
+    if (!Initialise(first, factor, e, values) || !FreezeFactor(factor, values) ||
+        !Initialise(first, factor, e, point)) {
+      return false;
     }
-    r = root * root.transpose();
-  } else {
-    r = Eigen::Map<const RowMajor>(factor.measurement.covariance.data(), m, m);
   }
-  const Eigen::LLT<Eigen::MatrixXd> llt(r);  // which takes what is not a number for a success
-  if (!r.allFinite() || llt.info() != Eigen::Success) {
-    return Fail("the noise of sensor '" + sensor.name + "' at " +
-                std::to_string(Seconds(factor.measurement.stamp)) +
-                " s is not positive definite: a batch needs sigma > 0");
-  }
-  const Eigen::MatrixXd l = llt.matrixL();
-  NoteChange(factor.l, l);
-  factor.l = l;
   return true;
 }
 
@@ -320,9 +241,7 @@ bool Trajectory::Freeze(const double* e) {
   Point point;
   if (!Begin(e, false, point)) return false;
   for (Node& node : nodes_) {
-    for (Step& step : node.steps) {
-      if (!FreezeStep(step, point) || !Move(step, e, point)) return false;
-    }
+    if (!FreezeNode(node, e, point)) return false;
     for (Factor& factor : node.factors) {
       if (factor.row >= 0 && !FreezeFactor(factor, point)) return false;
     }
@@ -340,9 +259,7 @@ bool Trajectory::Linearised(const std::vector<std::vector<double>>& trajectory,
   Point point;
   if (!Begin(zero.data(), true, point)) return false;
   for (std::size_t k = 0; k < nodes_.size(); ++k) {
-    for (Step& step : nodes_[k].steps) {
-      if (!FreezeStep(step, point) || !Move(step, zero.data(), point)) return false;
-    }
+    if (!FreezeNode(nodes_[k], zero.data(), point)) return false;
     for (const Block& block : initial_.layout().blocks()) {
       if (k >= trajectory.size() || !block.has_covariance()) continue;
       Eigen::VectorXd defect(block.geometry().tangent);
@@ -363,9 +280,29 @@ bool Trajectory::Linearised(const std::vector<std::vector<double>>& trajectory,
   return e.allFinite() || Fail("the problem linearised about the filter has no solution");
 }
 
-void Trajectory::Put(const Point& point, const Eigen::MatrixXd& y, State& state) {
-  state.values() = point.x;
-  if (y.cols() > 0) state.covariance().SetBlock(0, 0, y.transpose() * y);
+void Trajectory::Put(std::size_t k, const Point& point, const Eigen::MatrixXd& y,
+                     State& state) const {
+  const std::vector<Block>& places = initial_.layout().blocks();
+  for (const First& first : nodes_[k].firsts) {
+    const Block& place = places[static_cast<std::size_t>(first.block)];
+    const int t = place.geometry().tangent;
+    state.Add(first.block, point.x.data() + place.value_offset, Eigen::MatrixXd::Zero(t, t));
+  }
+  const Eigen::MatrixXd p = y.transpose() * y;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const Block& place = places[i];
+    const Block& block = state.layout().blocks()[i];
+    if (!block.present) continue;
+    std::copy_n(point.x.data() + place.value_offset, place.geometry().ambient,
+                state.value(static_cast<BlockId>(i)));
+    for (std::size_t j = 0; j <= i && block.has_covariance(); ++j) {
+      const Block& other = state.layout().blocks()[j];
+      if (!other.has_covariance()) continue;
+      state.covariance().SetBlock(block.tangent_offset, other.tangent_offset,
+                                  p.block(place.tangent_offset, places[j].tangent_offset,
+                                          place.geometry().tangent, places[j].geometry().tangent));
+    }
+  }
 }
 
 void Trajectory::Report(std::size_t k, const Point& point, UpdateReport& report) const {

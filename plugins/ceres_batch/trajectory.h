@@ -15,6 +15,7 @@ namespace alidade::ceres_batch {
 ///   motion        x_{k+1} = f(x_k, L_k e_{k+1}, dt),   Q_k = L_k L_k'
 ///   measurement   r_i     = L_i^-1 (z_i (-) h(x_k)),   R_i = L_i L_i'
 ///   MAP           e*      = argmin |e|^2 + |r(e)|^2
+///   first value   y       = g(x_k, z (+) L_i e_k)      of a block that starts from a measurement
 ///   sensitivity   S_k = dx_k/de:  S_0 = [J L_0  0],  S_{k+1} = F S_k + [0  G L_k  0]
 ///                 with J = d(m (+) d)/dd,  J_r_e = L_i^-1 d(z (-) h)/dh H S_k
 ///
@@ -22,7 +23,7 @@ namespace alidade::ceres_batch {
 /// every e. What depends on the state in Q and R stands at where it was last frozen.
 ///
 ///   symbol   shape      meaning
-///   e        N          inputs: those of the prior, then of the steps in their order
+///   e        N          inputs: of the prior, then frame by frame of its steps and first values
 ///   r        M          residuals: of the measurements in use, in their order
 ///   x, S     -, n x N   values of all blocks; n: their tangents, those of fixed blocks apart
 ///
@@ -40,8 +41,11 @@ class Trajectory {
   /// Gaps longer than `max_dt_s` are stepped in equal parts.
   Trajectory(System system, const std::vector<StreamInfo>& streams, double max_dt_s);
 
-  /// One frame more. False, and problem(), where its gap would make the inputs too many.
-  bool Add(const Frame& frame);
+  /// One frame more; `filter` says which of its measurements gave a block its first value. False,
+  /// and problem(), where there would be too many inputs.
+  bool Add(const Frame& frame, const UpdateReport& filter);
+  /// The values of a filter's state as Linearised takes them.
+  std::vector<double> ValuesOf(const State& state) const;
   int inputs() const { return inputs_; }        ///< N
   int residuals() const { return residuals_; }  ///< M
   std::size_t size() const { return nodes_.size(); }
@@ -61,8 +65,9 @@ class Trajectory {
   bool Begin(const double* e, bool sensitivity, Point& point) const;
   /// From frame k - 1 (or the prior) to frame k.
   bool Advance(std::size_t k, const double* e, Point& point) const;
-  /// `state` becomes the one of `point`, with the covariance y' y for y = U^-T S'.
-  static void Put(const Point& point, const Eigen::MatrixXd& y, State& state);
+  /// `state`, that of frame k - 1, becomes the one of frame k: the values of `point`, with the
+  /// covariance y' y for y = U^-T S'.
+  void Put(std::size_t k, const Point& point, const Eigen::MatrixXd& y, State& state) const;
   /// What became of the measurements of frame k, seen from `point`.
   void Report(std::size_t k, const Point& point, UpdateReport& report) const;
 
@@ -83,14 +88,25 @@ class Trajectory {
     int row = -1;       ///< of r; -1: not in use
     Eigen::MatrixXd l;  ///< frozen
   };
+  /// A factor whose measurement gives a block its first value.
+  struct First {
+    std::size_t factor;
+    BlockId block;
+    int column;
+  };
   struct Node {
     std::vector<Step> steps;  ///< that lead to it
     std::vector<Factor> factors;
+    std::vector<First> firsts;  ///< after the steps
     bool stale = false;
   };
 
-  void AddFactors(const Frame& frame, Node& node);
+  void AddFactors(const Frame& frame, const UpdateReport& filter, Node& node);
+  void AddFirsts(Node& node);
+  bool AllPresent(const std::vector<BlockId>& blocks) const;
   bool Move(const Step& step, const double* e, Point& point) const;
+  bool Initialise(const First& first, const Factor& factor, const double* e, Point& point) const;
+  bool FreezeNode(Node& node, const double* e, Point& point);
   bool FreezeStep(Step& step, const Point& point);
   bool FreezeFactor(Factor& factor, const Point& point);
   bool Residual(const Factor& factor, const Point& point, Eigen::VectorXd& r,
@@ -105,7 +121,8 @@ class Trajectory {
   System system_;
   std::vector<int> stream_of_sensor_;
   double max_dt_s_;
-  State initial_;
+  State initial_;              ///< all blocks have a place in it
+  std::vector<bool> present_;  ///< at the last frame, by block
   Eigen::MatrixXd l0_;
   std::vector<Node> nodes_;
   Stamp stamp_ = kNoStamp;

@@ -2,6 +2,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "alidade/plugin_listing.h"
 #include "alidade/run.h"
 #include "host_fixture.h"
 #include "plugins/depth_target/depth_target.h"
@@ -233,6 +234,44 @@ TEST(CeresBatch, StepsGapsInTheSamePartsAsTheFilter) {
   EXPECT_LT((found.p.back() - ekf.state().covariance().Dense()).cwiseAbs().maxCoeff(), 1e-9);
 }
 
+// The first value of p.x comes from the third frame; the Kalman filter has the same, and its
+// correlation.
+TEST(CeresBatch, ABlockMayStartFromAMeasurement) {
+  System system = LinearSystem();
+  system.priors[0].from = "z";
+  std::vector<Frame> frames = LinearFrames(30);
+  frames[0].measurements.clear();
+  frames[1].measurements.clear();
+  const auto batch = MakeBatch(system), so_far = MakeBatch(system, "data: so_far\n");
+  const BlockId x = system.layout.Find("p.x");
+  Ekf ekf(system, {}, testing::StreamsOf(system));
+  const auto expect_equal = [&](const State& found, const State& expected, std::size_t k) {
+    ASSERT_EQ(found.layout()[x].present, k >= 2);
+    for (const char* block : {"p.v", "p.x"}) {
+      if (k < 2 && std::string(block) == "p.x") continue;
+      EXPECT_NEAR(testing::ValueOf(found, block), testing::ValueOf(expected, block), 1e-9) << k;
+      EXPECT_NEAR(testing::CovarianceOf(found, block, "p.v"),
+                  testing::CovarianceOf(expected, block, "p.v"), 1e-9)
+          << k;
+    }
+  };
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    const UpdateReport& report = so_far->Process(frames[k]);
+    ekf.Process(frames[k]);
+    batch->Process(frames[k]);
+    if (k == 2) {
+      EXPECT_EQ(report.measurements()[0].outcome, Outcome::kInitialised);
+    }
+    expect_equal(so_far->state(), ekf.state(), k);
+  }
+  std::size_t emitted = 0;
+  batch->Smooth([&](std::size_t k, const State& state, const UpdateReport&) {
+    EXPECT_EQ(state.layout()[x].present, k >= 2);
+    if (++emitted == frames.size()) expect_equal(state, ekf.state(), k);
+  });
+  EXPECT_EQ(emitted, frames.size());
+}
+
 // A block that is known for certain stays, whether its sigma is zero or it is fixed.
 TEST(CeresBatch, WhatIsKnownStays) {
   System system = LinearSystem();
@@ -348,7 +387,14 @@ TEST_F(CeresBatchConfig, WhatItCannotDoIsRefusedByName) {
          "a role of sensor 'stereo' is linearised at the measurement");
   expect("state.template.consider", "[inverse_distance]",
          "block 'template.inverse_distance' is considered");
-  expect("state.target.initial.depth", "{from: stereo}", "block 'target.depth' starts");
+}
+
+TEST_F(CeresBatchConfig, IsListedWithItsKeysAndThoseOfEveryEstimator) {
+  const std::string info = PluginInfo(Shipped(), "ceres_batch");
+  for (const char* words : {"ceres_batch: estimator", "[Bell1994]", "all | so_far",
+                            "max_outer_iterations", "on_divergence", "overrides"}) {
+    EXPECT_NE(info.find(words), std::string::npos) << words << " is not in\n" << info;
+  }
 }
 
 TEST_F(CeresBatchConfig, BadOptionsAndTypesAreErrorsWithAPlace) {

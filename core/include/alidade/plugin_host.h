@@ -20,7 +20,7 @@ struct System;          // in alidade/system.h
 struct SourceEntry;     // in alidade/build_plugin.h
 struct EstimatorEntry;  // likewise
 
-/// Makes an estimator, whose options are read, once its system is known; `streams` are the source's.
+/// Makes an estimator, its options read, once its system is known; `streams` are the source's.
 using EstimatorMaker = std::function<std::unique_ptr<Estimator>(
     const System& system, const std::vector<StreamInfo>& streams)>;
 

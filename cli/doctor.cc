@@ -92,13 +92,14 @@ void CheckPlugins(const std::vector<std::string>& paths, Diagnosis& diagnosis) {
   for (const Refusal& refusal : host.refusals()) {
     diagnosis.Warn("refused " + refusal.file.string() + ": " + refusal.reason, RemedyFor(refusal));
   }
-  int sources = 0;
-  for (const PluginEntry& entry : host.entries()) {
-    sources += entry.kind == PluginEntry::Kind::kSource ? 1 : 0;
-  }
-  const int models = static_cast<int>(host.entries().size()) - sources;
-  const std::string found =
-      std::to_string(models) + " models and " + std::to_string(sources) + " sources";
+  const auto count = [&](PluginEntry::Kind kind) {
+    return static_cast<int>(std::ranges::count(host.entries(), kind, &PluginEntry::kind));
+  };
+  const int sources = count(PluginEntry::Kind::kSource);
+  const int estimators = count(PluginEntry::Kind::kEstimator);
+  const int models = static_cast<int>(host.entries().size()) - sources - estimators;
+  const std::string found = std::to_string(models) + " models, " + std::to_string(sources) +
+                            " sources and " + std::to_string(estimators) + " estimators";
   if (models > 0 && sources > 0) {
     diagnosis.Ok(found);
   } else {

@@ -63,7 +63,8 @@ void AddPlugins(CLI::App& program, Action& action) {
   CLI::App& plugins = *program.add_subcommand("plugins", "Tell which plugins there are");
   plugins.require_subcommand(1);
   plugins.footer(kFooter);
-  CLI::App& list = *plugins.add_subcommand("list", "List the models and sources on offer");
+  CLI::App& list =
+      *plugins.add_subcommand("list", "List the models, sources and estimators on offer");
   const auto list_arguments = AddListing(list, action, List);
   list.add_flag("--json", list_arguments->json, "print JSON");
   CLI::App& info = *plugins.add_subcommand("info", "Tell all about one of them");

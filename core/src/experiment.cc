@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <functional>
 
 #include "alidade/ekf.h"
+#include "alidade/plugin_listing.h"
 #include "alidade/run.h"
 #include "columns.h"
 #include "names.h"
@@ -75,14 +75,32 @@ void CheckName(const std::string& name, const Node& entry) {
   }
 }
 
-/// Makes the estimator once its system is known.
-using EstimatorMaker = std::function<std::unique_ptr<Estimator>(
-    const System& system, const std::vector<StreamInfo>& streams)>;
+/// Refuses a type of estimator that is neither of core nor of a plugin.
+void CheckOffered(const std::string& type, const std::vector<std::string>& of_core,
+                  const PluginHost& host, const Node& node) {
+  std::vector<std::string> names = of_core, of_plugins;
+  for (const PluginEntry& entry : host.entries()) {
+    if (entry.kind == PluginEntry::Kind::kEstimator) of_plugins.push_back(entry.name);
+  }
+  if (std::ranges::find(of_plugins, type) != of_plugins.end()) return;
+  names.insert(names.end(), of_plugins.begin(), of_plugins.end());
+  const std::string expected = internal::Join(of_core) + ", built in, or of a plugin: " +
+                               (of_plugins.empty() ? "none was found" : internal::Join(of_plugins));
+  throw Error(ExitCode::kPlugin,
+              ErrorLine(node.place(), node.path(),
+                        "no estimator '" + type + "' is built in, and no plugin offers it",
+                        expected, Nearest(type, names)) +
+                  "\n" + PluginPlaces(host));
+}
 
-/// Reads `type` and what that type of estimator has for keys.
-EstimatorMaker ReadEstimator(const Node& entry, std::string& type) {
+/// Reads `type` and what that type of estimator has for keys: one of core, or else of a plugin.
+EstimatorMaker ReadEstimator(const Node& entry, const PluginHost& host, std::string& type) {
   const std::vector<std::string> types = {"ekf"};
-  type = types[static_cast<std::size_t>(entry.At("type", "an estimator").Choice(types))];
+  type = entry.At("type", "an estimator").Text();
+  if (std::ranges::find(types, type) == types.end()) {
+    CheckOffered(type, types, host, entry.At("type"));
+    return host.CreateEstimator(type, entry);
+  }
   return [options = EkfOptions::FromNode(entry)](const System& system,
                                                  const std::vector<StreamInfo>& streams) {
     return std::make_unique<Ekf>(system, options, streams);
@@ -94,7 +112,7 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   CheckName(name, entry);
   NamedEstimator named;
   named.name = name;
-  const EstimatorMaker make = ReadEstimator(entry, named.type);
+  const EstimatorMaker make = ReadEstimator(entry, host, named.type);
   if (const auto policy = entry.Find("on_divergence")) {
     named.on_divergence = static_cast<OnDivergence>(policy->Choice({"report", "fail"}));
   }

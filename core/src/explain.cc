@@ -242,17 +242,19 @@ std::string LockoutText(const EkfOptions& options, const System& system) {
 }
 
 std::string Options(const Node& entry, const NamedEstimator& named) {
-  const EkfOptions options = EkfOptions::FromNode(entry);
   const System& system = named.system;
-  std::vector<TextRow> rows = {
-      {"gate", GateText(options, system)},
-      {"fuse", FuseText(options.fuse, system)},
-      {"lockout", LockoutText(options, system)},
-      {"max_dt_s",
-       std::isfinite(options.max_dt_s) ? NumberText(options.max_dt_s) : "none: a gap is one step"},
-      {"on_divergence", named.on_divergence == OnDivergence::kFail
-                            ? "fail: the run ends with exit code 79"
-                            : "report: the run goes on"}};
+  std::vector<TextRow> rows;
+  if (named.type == "ekf") {
+    const EkfOptions options = EkfOptions::FromNode(entry);
+    rows = {{"gate", GateText(options, system)},
+            {"fuse", FuseText(options.fuse, system)},
+            {"lockout", LockoutText(options, system)},
+            {"max_dt_s", std::isfinite(options.max_dt_s) ? NumberText(options.max_dt_s)
+                                                         : "none: a gap is one step"}};
+  }
+  rows.push_back({"on_divergence", named.on_divergence == OnDivergence::kFail
+                                       ? "fail: the run ends with exit code 79"
+                                       : "report: the run goes on"});
   if (system.start_s) rows.push_back({"start_s", NumberText(*system.start_s)});
   return TextTable(rows, kIndent);
 }

@@ -38,7 +38,8 @@ class NewInstance {
 };
 
 std::string Named(PluginEntry::Kind kind, const std::string& name) {
-  return std::string(kind == PluginEntry::Kind::kSource ? "source" : "model") + " '" + name + "'";
+  const bool model = kind != PluginEntry::Kind::kSource && kind != PluginEntry::Kind::kEstimator;
+  return std::string(model ? "model" : internal::KindName(kind)) + " '" + name + "'";
 }
 
 [[noreturn]] void FailCreation(const PluginEntry& entry, const Node& node, const std::string& why) {
@@ -67,6 +68,32 @@ std::vector<std::string> Capabilities(const ModelInstance& model) {
     lines.push_back("can initialise " + model.spaces()[static_cast<std::size_t>(role)].name);
   }
   return lines;
+}
+
+/// What `create` of a build-tier entry makes of its parameters, checked.
+template <class Create>
+auto CreateBuilt(const PluginEntry& entry, const Node& node, std::mutex& mutex,
+                 const Create& create) {
+  ParamReader reader(node, Named(entry.kind, entry.name));
+  Params params(&reader.host());
+  decltype(create(params)) made;
+  try {
+    const std::lock_guard lock(mutex);
+    made = create(params);
+  } catch (const Error&) {
+    reader.Check();
+    throw;
+  } catch (const std::exception& e) {
+    reader.Check();
+    FailCreation(entry, node, e.what());
+  } catch (...) {
+    reader.Check();
+    FailCreation(entry, node, "an exception of unknown type");
+  }
+  reader.Check();
+  if (!reader.failure().empty()) node.Fail(reader.failure());
+  if (made == nullptr) FailCreation(entry, node, "it gives nothing");
+  return made;
 }
 
 /// The `keys` of a source: `key  meaning` on each line.
@@ -98,6 +125,14 @@ const SourceEntry& PluginHost::SourceOf(const PluginEntry& entry) const {
   const BuildTable& table = *LoadedFrom(entry.plugin).build_table;
   for (int i = 0; i < table.source_count; ++i) {
     if (entry.name == table.sources[i].name) return table.sources[i];
+  }
+  throw ContractViolation("no such entry: " + entry.name);
+}
+
+const EstimatorEntry& PluginHost::EstimatorOf(const PluginEntry& entry) const {
+  const BuildTable& table = *LoadedFrom(entry.plugin).build_table;
+  for (int i = 0; i < table.estimator_count; ++i) {
+    if (entry.name == table.estimators[i].name) return table.estimators[i];
   }
   throw ContractViolation("no such entry: " + entry.name);
 }
@@ -134,31 +169,29 @@ std::unique_ptr<Source> PluginHost::CreateSource(const std::string& name, const 
                                                  std::uint64_t seed,
                                                  const std::filesystem::path& folder) const {
   const PluginEntry& entry = Find(PluginEntry::Kind::kSource, name, node);
-  ParamReader reader(node, Named(entry.kind, name));
-  Params params(&reader.host());
-  std::unique_ptr<Source> source;
-  try {
-    const std::lock_guard lock(create_mutex_);
-    source = SourceOf(entry).create(SourceArguments{node, params, seed, folder});
-  } catch (const Error&) {
-    reader.Check();
-    throw;
-  } catch (const std::exception& e) {
-    reader.Check();
-    FailCreation(entry, node, e.what());
-  } catch (...) {
-    reader.Check();
-    FailCreation(entry, node, "an exception of unknown type");
-  }
-  reader.Check();
-  if (!reader.failure().empty()) node.Fail(reader.failure());
-  if (source == nullptr) FailCreation(entry, node, "it gives nothing");
-  return source;
+  return CreateBuilt(entry, node, create_mutex_, [&](Params& params) {
+    return SourceOf(entry).create(SourceArguments{node, params, seed, folder});
+  });
+}
+
+EstimatorMaker PluginHost::CreateEstimator(const std::string& name, const Node& node) const {
+  const PluginEntry& entry = Find(PluginEntry::Kind::kEstimator, name, node);
+  return CreateBuilt(entry, node, create_mutex_, [&](Params& params) {
+    return EstimatorOf(entry).create(EstimatorArguments{node, params});
+  });
 }
 
 std::vector<ParamInfo> PluginHost::Schema(const PluginEntry& entry) const {
   ParamRecorder recorder;
   const std::lock_guard lock(create_mutex_);
+  if (entry.kind == PluginEntry::Kind::kEstimator) {
+    const Config stand_in = Config::FromText("type: " + entry.name, "stand-in");
+    recorder.Run([&] {
+      Params params(&recorder.host());
+      static_cast<void>(EstimatorOf(entry).create(EstimatorArguments{stand_in.root(), params}));
+    });
+    return recorder.Result();
+  }
   if (entry.kind != PluginEntry::Kind::kSource) {
     const AlidadeEntry c = EntryOf(entry);
     recorder.Run([&] {
@@ -183,7 +216,9 @@ std::vector<ParamInfo> PluginHost::Schema(const PluginEntry& entry) const {
 }
 
 std::vector<std::string> PluginHost::Describe(const PluginEntry& entry) const {
-  if (entry.kind == PluginEntry::Kind::kSource) return {};
+  if (entry.kind == PluginEntry::Kind::kSource || entry.kind == PluginEntry::Kind::kEstimator) {
+    return {};
+  }
   ParamRecorder recorder;
   NewInstance instance;
   const std::lock_guard lock(create_mutex_);

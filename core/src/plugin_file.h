@@ -39,7 +39,7 @@ std::string TrialLoad(const std::filesystem::path& file, std::uint32_t tier);
 std::string Defect(const AlidadeTable* table);
 std::string Defect(const BuildTable* table);
 
-/// `sensor`, `motion model`, `source`.
+/// `sensor`, `motion model`, `source`, `estimator`.
 const char* KindName(PluginEntry::Kind kind);
 
 }  // namespace internal

@@ -170,6 +170,11 @@ void PluginHost::AddEntries(const Loaded& plugin) {
       entries_.push_back(
           {PluginEntry::Kind::kSource, source.name, Text(source.doc), "", "", plugin.file, 0});
     }
+    for (int i = 0; i < plugin.build_table->estimator_count; ++i) {
+      const EstimatorEntry& one = plugin.build_table->estimators[i];
+      entries_.push_back({PluginEntry::Kind::kEstimator, one.name, Text(one.doc),
+                          Text(one.citation), "", plugin.file, 0});
+    }
     return;
   }
   const AlidadeTable table = internal::ReadPrefix(plugin.table);
@@ -198,7 +203,8 @@ const PluginEntry& PluginHost::Find(PluginEntry::Kind kind, const std::string& n
 
 void PluginHost::FailMissing(PluginEntry::Kind kind, const std::string& name,
                              const Node& entry) const {
-  const char* const key = kind == PluginEntry::Kind::kSource ? "type" : "model";
+  const bool model = kind != PluginEntry::Kind::kSource && kind != PluginEntry::Kind::kEstimator;
+  const char* const key = model ? "model" : "type";
   const Node at = entry.is_map() ? entry.Find(key).value_or(entry) : entry;
   std::string what = std::string("no plugin offers the ") + KindName(kind) + " '" + name + "'";
   std::vector<std::string> names;

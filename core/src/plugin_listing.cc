@@ -31,9 +31,8 @@ std::vector<const PluginEntry*> Sorted(const PluginHost& host) {
 constexpr const char* kEkf = "ekf";
 constexpr const char* kEkfDoc = "Extended Kalman filter; built in, for `estimators`.";
 
-/// What an ekf reads, and what every estimator has.
-std::vector<ParamInfo> EkfKeys() {
-  std::vector<ParamInfo> keys = EkfOptions::Schema();
+/// `keys`, and those that every estimator has.
+std::vector<ParamInfo> WithCommonKeys(std::vector<ParamInfo> keys) {
   const auto add = [&](const char* name, const char* type, const char* fallback, const char* doc,
                        std::vector<std::string> choices = {}) {
     keys.push_back({name, "", doc, type, "", fallback, std::move(choices), ""});
@@ -42,6 +41,13 @@ std::vector<ParamInfo> EkfKeys() {
   add("on_divergence", "choice", "report", "fail ends the run", {"report", "fail"});
   add("overrides", "map", "none", "its own state, sensors and start_s, merged in");
   return keys;
+}
+
+std::vector<ParamInfo> EkfKeys() { return WithCommonKeys(EkfOptions::Schema()); }
+
+std::vector<ParamInfo> KeysOf(const PluginHost& host, const PluginEntry& entry) {
+  const std::vector<ParamInfo> keys = host.Schema(entry);
+  return entry.kind == PluginEntry::Kind::kEstimator ? WithCommonKeys(keys) : keys;
 }
 
 /// The entries called `name`; there may be none for a built-in estimator only.
@@ -131,7 +137,7 @@ std::string PluginInfo(const PluginHost& host, const std::string& name) {
     const std::vector<std::string> lines = host.Describe(*entry);
     for (const std::string& line : lines) text += "  " + line + '\n';
     if (!lines.empty()) text += '\n';
-    text += Parameters(host.Schema(*entry));
+    text += Parameters(KeysOf(host, *entry));
   }
   return text;
 }
@@ -156,7 +162,7 @@ std::string PluginInfoJson(const PluginHost& host, const std::string& name) {
     for (const std::string& line : host.Describe(*entry)) json.Text(line);
     json.End();
     json.Key("parameters").Array();
-    for (const ParamInfo& info : host.Schema(*entry)) AddParameter(info, json);
+    for (const ParamInfo& info : KeysOf(host, *entry)) AddParameter(info, json);
     json.End();
     json.End();
   }

@@ -40,6 +40,20 @@ std::string EntryDefect(const AlidadeEntry& entry, std::uint32_t stride) {
   return {};
 }
 
+template <class Entry>
+std::string BuildDefect(const Entry* entries, int count, const char* kind) {
+  std::set<std::string> names;
+  for (int i = 0; i < count; ++i) {
+    const Entry& entry = entries[i];
+    if (!GoodName(entry.name)) return std::string(kind) + " has no name";
+    if (entry.create == nullptr) return std::string(entry.name) + " cannot be created";
+    if (!names.insert(entry.name).second) {
+      return std::string("its table names '") + entry.name + "' twice";
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 std::string Defect(const AlidadeTable* from) {
@@ -75,17 +89,12 @@ std::string Defect(const BuildTable* table) {
   if (table->struct_size != sizeof(BuildTable)) {
     return "its table states a size of " + Number(table->struct_size) + " bytes";
   }
-  if (table->source_count < 1 || table->sources == nullptr) return "its table is empty";
-  std::set<std::string> names;
-  for (int i = 0; i < table->source_count; ++i) {
-    const SourceEntry& source = table->sources[i];
-    if (!GoodName(source.name)) return "a source has no name";
-    if (source.create == nullptr) return std::string(source.name) + " cannot be created";
-    if (!names.insert(source.name).second) {
-      return std::string("its table names '") + source.name + "' twice";
-    }
-  }
-  return {};
+  const int sources = table->sources == nullptr ? 0 : table->source_count;
+  const int estimators = table->estimators == nullptr ? 0 : table->estimator_count;
+  if (sources < 1 && estimators < 1) return "its table is empty";
+  std::string defect = BuildDefect(table->sources, sources, "a source");
+  if (defect.empty()) defect = BuildDefect(table->estimators, estimators, "an estimator");
+  return defect;
 }
 
 const char* KindName(PluginEntry::Kind kind) {
@@ -96,6 +105,8 @@ const char* KindName(PluginEntry::Kind kind) {
       return "motion model";
     case PluginEntry::Kind::kSource:
       return "source";
+    case PluginEntry::Kind::kEstimator:
+      return "estimator";
   }
   return "";
 }

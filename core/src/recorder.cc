@@ -93,9 +93,12 @@ void Recorder::Impl::AddPlugins(const Experiment& experiment) {
     for (const auto& motion : named.system.motions) AddPlugin(motion.model.instance().plugin());
   }
   for (const PluginEntry& entry : host.entries()) {
-    if (entry.kind == PluginEntry::Kind::kSource && entry.name == source_type) {
-      AddPlugin(entry.plugin);
-    }
+    const auto is_used = [&](const NamedEstimator& named) { return named.type == entry.name; };
+    const bool used = entry.kind == PluginEntry::Kind::kSource
+                          ? entry.name == source_type
+                          : entry.kind == PluginEntry::Kind::kEstimator &&
+                                std::ranges::any_of(experiment.estimators, is_used);
+    if (used) AddPlugin(entry.plugin);
   }
 }
 

@@ -185,10 +185,15 @@ void SmoothAll(std::vector<Running>& running, const std::vector<Seen>& kept,
     Estimator& estimator = *one.named.estimator;
     if (one.ended || !estimator.offline()) continue;
     std::vector<Event> events;
-    estimator.Smooth([&](std::size_t k, const State& state, const UpdateReport& report) {
-      one.Take(kept[k], state, report, options.recorder);
-      events = report.events;
-    });
+    try {
+      estimator.Smooth([&](std::size_t k, const State& state, const UpdateReport& report) {
+        one.Take(kept[k], state, report, options.recorder);
+        events = report.events;
+      });
+    } catch (const Error& e) {
+      if (!estimator.failed()) throw;  // it is the record, say, that failed
+      events.push_back({estimator.stamp(), "failed", e.what()});
+    }
     one.Note(events);
     if (!estimator.failed()) continue;
     Fail(result, ExitCode::kDiverged,

@@ -120,6 +120,7 @@ class Queue {
 bool MayRunInParallel(const PluginHost& host) {
   return std::ranges::all_of(host.entries(), [](const PluginEntry& entry) {
     return entry.kind == PluginEntry::Kind::kSource ||
+           entry.kind == PluginEntry::Kind::kEstimator ||
            (entry.thread_flags & ALIDADE_THREAD_INSTANCES) != 0;
   });
 }

@@ -383,5 +383,20 @@ TEST_F(HostTest, AFailingSourceNamesItselfAndItsPlugin) {
   EXPECT_EQ(Param(schema, "unit").doc, "what is counted");
 }
 
+TEST_F(HostTest, AFailingEstimatorNamesItselfAndItsPlugin) {
+  const PluginHost host({Built("estimators")});
+  const Config config = Parse("{gain: 1}"), empty = Parse("{type: throwing_estimator}");
+  for (const char* name : {"throwing_estimator", "no_estimator"}) {
+    const char* why = name[0] == 't' ? "no such thing" : "it gives nothing";
+    ExpectError(ExitCode::kPlugin,
+                {std::string("estimator '") + name + "'", Built("estimators").string(), why},
+                [&] { host.CreateEstimator(name, config.root()); });
+  }
+  ExpectError(ExitCode::kBadConfig, {"gain: missing; estimator 'throwing_estimator' needs it (> 0"},
+              [&] { host.CreateEstimator("throwing_estimator", empty.root()); });
+  ExpectError(ExitCode::kPlugin, {"no plugin offers the estimator 'none'", "searched"},
+              [&] { host.CreateEstimator("none", config.root()); });
+}
+
 }  // namespace
 }  // namespace alidade

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <iterator>
 #include <memory>
 
+#include "alidade/estimator.h"
 #include "alidade/fingerprint.h"
 #include "alidade/source.h"
 
@@ -33,24 +35,50 @@ struct SourceEntry {
   std::unique_ptr<Source> (*create)(const SourceArguments& arguments);
 };
 
+/// What an estimator reads its options from.
+struct EstimatorArguments {
+  Node entry;      ///< the config's entry of `estimators`
+  Params& params;  ///< the same entry, read by declaration (numbers, flags, choices)
+};
+
+struct EstimatorEntry {
+  const char* name;
+  const char* doc;
+  const char* citation;
+  /// Reads the options; what it returns makes the estimator once its system is known. Errors of
+  /// both: an Error with a place, as of Node::Fail.
+  EstimatorMaker (*create)(const EstimatorArguments& arguments);
+};
+
 struct BuildTable {
   std::uint32_t struct_size = sizeof(BuildTable);
   const SourceEntry* sources = nullptr;
   int source_count = 0;
+  const EstimatorEntry* estimators = nullptr;
+  int estimator_count = 0;
 };
 
 inline constexpr const char* kBuildEntrySymbol = "alidade_build_plugin";
 
 }  // namespace alidade
 
-/// Exports the sources of this plugin: ALIDADE_SOURCE_PLUGIN({"name", "doc", "keys", &Create}, ...)
-#define ALIDADE_SOURCE_PLUGIN(...)                                             \
-  ALIDADE_FINGERPRINT(ALIDADE_TIER_BUILD, ALIDADE_BUILD_ID)                    \
-  extern "C" __attribute__((visibility("default"))) const alidade::BuildTable* \
-  alidade_build_plugin() {                                                     \
-    static const alidade::SourceEntry sources[] = {__VA_ARGS__};               \
-    static const alidade::BuildTable table = {                                 \
-        sizeof(alidade::BuildTable), sources,                                  \
-        static_cast<int>(sizeof(sources) / sizeof(sources[0]))};               \
-    return &table;                                                             \
+/// Exports a table of this plugin; `...` are the members of BuildTable after the size.
+#define ALIDADE_BUILD_PLUGIN_(...)                                                               \
+  ALIDADE_FINGERPRINT(ALIDADE_TIER_BUILD, ALIDADE_BUILD_ID)                                      \
+  extern "C" __attribute__((visibility("default"))) const alidade::BuildTable*                   \
+  alidade_build_plugin() {                                                                       \
+    static const alidade::BuildTable table = {sizeof(alidade::BuildTable), &alidade_fingerprint, \
+                                              __VA_ARGS__};                                      \
+    return &table;                                                                               \
   }
+
+/// Exports the sources of this plugin: ALIDADE_SOURCE_PLUGIN({"name", "doc", "keys", &Create}, ...)
+#define ALIDADE_SOURCE_PLUGIN(...)                                     \
+  static const alidade::SourceEntry alidade_sources[] = {__VA_ARGS__}; \
+  ALIDADE_BUILD_PLUGIN_(alidade_sources, std::size(alidade_sources), nullptr, 0)
+
+/// Exports the estimators of this plugin:
+/// ALIDADE_ESTIMATOR_PLUGIN({"name", "doc", "citation", &Create}, ...)
+#define ALIDADE_ESTIMATOR_PLUGIN(...)                                        \
+  static const alidade::EstimatorEntry alidade_estimators[] = {__VA_ARGS__}; \
+  ALIDADE_BUILD_PLUGIN_(nullptr, 0, alidade_estimators, std::size(alidade_estimators))

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -14,7 +15,14 @@
 
 namespace alidade {
 
-struct SourceEntry;  // in alidade/build_plugin.h
+class Estimator;        // in alidade/estimator.h
+struct System;          // in alidade/system.h
+struct SourceEntry;     // in alidade/build_plugin.h
+struct EstimatorEntry;  // likewise
+
+/// Makes an estimator, its options read, once its system is known; `streams` are the source's.
+using EstimatorMaker = std::function<std::unique_ptr<Estimator>(
+    const System& system, const std::vector<StreamInfo>& streams)>;
 
 /// One parameter of a model, as declared by being read.
 struct ParamInfo {
@@ -26,12 +34,12 @@ struct ParamInfo {
   std::string when;                  ///< `noise = fixed` where only that choice reads it, else ""
 };
 
-/// A model or source that a loaded plugin offers.
+/// A model, source or estimator that a loaded plugin offers.
 struct PluginEntry {
-  enum class Kind { kSensor, kMotion, kSource } kind;
+  enum class Kind { kSensor, kMotion, kSource, kEstimator } kind;
   std::string name, doc, citation, family;
   std::filesystem::path plugin;  ///< the file it came from
-  unsigned thread_flags = 0;     ///< ALIDADE_THREAD_*; of a source 0
+  unsigned thread_flags = 0;     ///< ALIDADE_THREAD_*; of a source or estimator 0
 };
 
 /// Why a file in a searched folder was not loaded.
@@ -66,6 +74,8 @@ class PluginHost {
   std::unique_ptr<Source> CreateSource(const std::string& name, const Node& entry,
                                        std::uint64_t seed,
                                        const std::filesystem::path& folder) const;
+  /// The maker of an estimator whose options are in `entry`; its errors are the same.
+  EstimatorMaker CreateEstimator(const std::string& name, const Node& entry) const;
 
   const std::vector<PluginEntry>& entries() const { return entries_; }
   /// The parameters of a model, found by creating it with stand-in values, each choice in turn.
@@ -91,6 +101,7 @@ class PluginHost {
   const Loaded& LoadedFrom(const std::filesystem::path& file) const;
   AlidadeEntry EntryOf(const PluginEntry& entry) const;
   const SourceEntry& SourceOf(const PluginEntry& entry) const;
+  const EstimatorEntry& EstimatorOf(const PluginEntry& entry) const;
 
   std::vector<std::unique_ptr<Loaded>> loaded_;
   std::vector<PluginEntry> entries_;

@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-/// The models and sources on offer: name, kind, doc, file.
+/// The models, sources and estimators on offer: name, kind, doc, file.
 std::string PluginList(const PluginHost& host);
 /// The same as a JSON array of objects with `name`, `kind`, `family`, `doc`, `citation`, `file`.
 std::string PluginListJson(const PluginHost& host);
@@ -17,7 +17,7 @@ std::string PluginListJson(const PluginHost& host);
 std::string PluginInfo(const PluginHost& host, const std::string& name);
 /// The same as a JSON array: the keys of PluginListJson, `describes` (lines) and `parameters`
 /// (objects with `key`, `unit`, `type`, `range`, `default` where there is one, `choices`, `when`,
-/// `doc`). An estimator has no `family`, `citation`, `file` and `describes`.
+/// `doc`). A built-in estimator has no `family`, `citation`, `file` and `describes`.
 std::string PluginInfoJson(const PluginHost& host, const std::string& name);
 
 /// Every place searched and what was found there, and every file refused with the reason.

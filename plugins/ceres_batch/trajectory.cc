@@ -1,0 +1,328 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "trajectory.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "geometry_jacobian.h"
+
+namespace alidade::ceres_batch {
+namespace {
+
+constexpr int kMostInputs = 4000;  // the dense Jacobian of as many rows takes 128 MB
+
+/// L with P = L L', for P positive semidefinite.
+Eigen::MatrixXd SquareRoot(const Eigen::MatrixXd& p) {
+  if (p.size() == 0) return p;
+  const Eigen::LDLT<Eigen::MatrixXd> ldlt(p);
+  const Eigen::VectorXd d = ldlt.vectorD().cwiseMax(0.0).cwiseSqrt();
+  return ldlt.transpositionsP().transpose() * (Eigen::MatrixXd(ldlt.matrixL()) * d.asDiagonal());
+}
+
+}  // namespace
+
+Trajectory::Trajectory(System system, const std::vector<StreamInfo>& streams, double max_dt_s)
+    : system_(std::move(system)), max_dt_s_(max_dt_s), initial_(system_.InitialState()) {
+  for (const SensorBinding& sensor : system_.sensors) {
+    const auto found = std::ranges::find(streams, sensor.stream, &StreamInfo::name);
+    stream_of_sensor_.push_back(found == streams.end() ? -1
+                                                       : static_cast<int>(found - streams.begin()));
+  }
+  l0_ = SquareRoot(initial_.covariance().Dense());
+  inputs_ = static_cast<int>(l0_.cols());
+  for (const Block& block : initial_.layout().blocks()) present_.push_back(block.present);
+  for (std::size_t i = 0; i < present_.size(); ++i) {
+    if (present_[i]) continue;
+    const BlockId id = static_cast<BlockId>(i);
+    const Geometry geometry = initial_.layout()[id].geometry();
+    std::vector<double> value(static_cast<std::size_t>(geometry.ambient));
+    geometry.Identity(value.data());
+    initial_.Add(id, value.data(), Eigen::MatrixXd::Zero(geometry.tangent, geometry.tangent));
+  }
+}
+
+bool Trajectory::Fail(std::string why) const {
+  problem_ = std::move(why);
+  return false;
+}
+
+bool Trajectory::AllPresent(const std::vector<BlockId>& blocks) const {
+  return std::ranges::all_of(
+      blocks, [&](BlockId id) { return id < 0 || present_[static_cast<std::size_t>(id)]; });
+}
+
+std::vector<double> Trajectory::ValuesOf(const State& state) const {
+  std::vector<double> values = initial_.values();
+  for (std::size_t i = 0; i < present_.size(); ++i) {
+    const BlockId id = static_cast<BlockId>(i);
+    if (!state.layout()[id].present) continue;
+    const Block& block = initial_.layout()[id];
+    std::copy_n(state.value(id), block.geometry().ambient, values.data() + block.value_offset);
+  }
+  return values;
+}
+
+bool Trajectory::Add(const Frame& frame, const UpdateReport& filter) {
+  if (stamp_ == kNoStamp) {
+    stamp_ = system_.start_s ? StampFromSeconds(*system_.start_s) : frame.stamp;
+  }
+  Node node;
+  node.stale = frame.stamp < stamp_;
+  Stamp elapsed = 0;
+  const bool overflow = __builtin_sub_overflow(frame.stamp, stamp_, &elapsed);
+  const double parts = std::max(1.0, std::ceil(Seconds(elapsed) / max_dt_s_));
+  if (!node.stale && (overflow || parts > kMostInputs)) {
+    return Fail("a gap before " + std::to_string(Seconds(frame.stamp)) + " s needs more than " +
+                std::to_string(kMostInputs) + " steps of max_dt_s");
+  }
+  int inputs = inputs_;
+  for (int part = 0; part < static_cast<int>(parts) && !node.stale && elapsed > 0; ++part) {
+    for (std::size_t i = 0; i < system_.motions.size(); ++i) {
+      const MotionBinding& motion = system_.motions[i];
+      if (motion.model.stationary() || !AllPresent(motion.blocks)) continue;
+      node.steps.push_back({i, Seconds(elapsed) / parts, inputs, {}});
+      inputs += motion.model.noise_size();
+    }
+    if (inputs <= kMostInputs) continue;
+    return Fail("more than " + std::to_string(kMostInputs) +
+                " noise inputs: the batch solves for all of them at once; a shorter series, or a "
+                "longer time between frames, has fewer");
+  }
+  inputs_ = inputs;
+  if (!node.stale) stamp_ = frame.stamp;
+  AddFactors(frame, filter, node);
+  nodes_.push_back(std::move(node));
+  return true;
+}
+
+/// One factor for each measurement and sensor bound to its stream, in the order of the sensors.
+void Trajectory::AddFactors(const Frame& frame, const UpdateReport& filter, Node& node) {
+  for (std::size_t i = 0; i < system_.sensors.size(); ++i) {
+    const SensorModel& model = system_.sensors[i].model;
+    for (const Measurement& m : frame.measurements) {
+      if (m.stream != stream_of_sensor_[i]) continue;
+      ALIDADE_EXPECTS(std::ssize(m.values) == model.measurement().geometry.ambient);
+      Factor factor{static_cast<int>(i), m, Outcome::kStale, -1, {}};
+      if (!node.stale) {
+        factor.outcome =
+            AllFinite(m.values) ? OutcomeOf(model.Valid(m.values.data())) : Outcome::kNotFinite;
+      }
+      const std::size_t index = node.factors.size();  // the filter has the same order
+      const bool first = index < filter.measurements().size() &&
+                         filter.measurements()[index].outcome == Outcome::kInitialised;
+      if (first) factor.outcome = Outcome::kInitialised;
+      node.factors.push_back(std::move(factor));
+    }
+  }
+  AddFirsts(node);
+  for (Factor& factor : node.factors) {
+    if (factor.outcome != Outcome::kAccepted) continue;
+    const SensorBinding& sensor = SensorOf(factor);
+    if (!std::ranges::all_of(sensor.roles,
+                             [&](const RoleBinding& role) { return AllPresent({role.block}); })) {
+      factor.outcome = Outcome::kNotReady;
+      continue;
+    }
+    factor.row = residuals_;
+    residuals_ += sensor.model.measurement().geometry.tangent;
+  }
+}
+
+/// First values in an order in which each finds the blocks that it needs.
+void Trajectory::AddFirsts(Node& node) {
+  for (bool progress = true; progress;) {
+    progress = false;
+    for (std::size_t i = 0; i < node.factors.size(); ++i) {
+      if (node.factors[i].outcome != Outcome::kInitialised) continue;
+      const SensorBinding& sensor = SensorOf(node.factors[i]);
+      const auto target = static_cast<std::size_t>(sensor.model.initialised_role());
+      std::vector<BlockId> others;
+      for (std::size_t k = 0; k < sensor.roles.size(); ++k) {
+        if (k != target) others.push_back(sensor.roles[k].block);
+      }
+      const BlockId block = sensor.roles[target].block;
+      if (present_[static_cast<std::size_t>(block)] || !AllPresent(others)) continue;
+      present_[static_cast<std::size_t>(block)] = progress = true;
+      node.firsts.push_back({i, block, inputs_});
+      inputs_ += sensor.model.measurement().geometry.tangent;
+    }
+  }
+}
+
+bool Trajectory::Begin(const double* e, bool sensitivity, Point& point) const {
+  const Eigen::Index n = initial_.covariance().size(), n0 = l0_.rows();
+  Eigen::VectorXd d = Eigen::VectorXd::Zero(n);
+  d.head(n0) = l0_ * Eigen::Map<const Eigen::VectorXd>(e, n0);
+  initial_.Retract(d.data(), point.x);
+  point.offset = Eigen::VectorXd::Zero(n);
+  point.s.resize(0, 0);
+  if (!AllFinite(point.x)) return Fail("the initial state is not finite");
+  if (!sensitivity) return true;
+  point.s = Eigen::MatrixXd::Zero(n, inputs_);
+  for (std::size_t id = 0; id < initial_.layout().blocks().size(); ++id) {
+    const Block& block = initial_.layout().blocks()[id];
+    const int at = block.tangent_offset, t = block.geometry().tangent;
+    if (!block.has_covariance() || at >= n0) continue;
+    point.s.block(at, 0, t, n0) =
+        PlusJacobian(block.geometry(), initial_.value(static_cast<BlockId>(id)), d.data() + at) *
+        l0_.middleRows(at, t);
+  }
+  return true;
+}
+
+bool Trajectory::Advance(std::size_t k, const double* e, Point& point) const {
+  const Node& node = nodes_[k];
+  return std::ranges::all_of(node.steps, [&](const Step& step) { return Move(step, e, point); }) &&
+         std::ranges::all_of(node.firsts, [&](const First& first) {
+           return Initialise(first, node.factors[first.factor], e, point);
+         });
+}
+
+std::vector<const double*> Trajectory::RolesOf(const SensorBinding& sensor,
+                                               const Point& point) const {
+  std::vector<const double*> roles;
+  for (const RoleBinding& role : sensor.roles) {
+    roles.push_back(role.block < 0 ? nullptr
+                                   : point.x.data() + initial_.layout()[role.block].value_offset);
+  }
+  return roles;
+}
+
+bool Trajectory::Evaluate(const double* e, double* r, double* j) const {
+  Point point;
+  if (!Begin(e, j != nullptr, point)) return false;
+  Eigen::VectorXd residual;
+  Eigen::MatrixXd a;
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    if (!Advance(k, e, point)) return false;
+    for (const Factor& factor : nodes_[k].factors) {
+      if (factor.row < 0) continue;
+      if (!Residual(factor, point, residual, j != nullptr ? &a : nullptr)) return false;
+      Eigen::Map<Eigen::VectorXd>(r + factor.row, residual.size()) = residual;
+      if (j == nullptr) continue;
+      Eigen::Map<RowMajor>(j + std::ptrdiff_t{factor.row} * inputs_, a.rows(), inputs_).noalias() =
+          a * point.s;
+    }
+  }
+  return true;
+}
+
+void Trajectory::NoteChange(const Eigen::MatrixXd& before, const Eigen::MatrixXd& after) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  if (after.size() == 0) return;
+  const double scale = after.cwiseAbs().maxCoeff();
+  const double moved =
+      before.size() == after.size() ? (after - before).cwiseAbs().maxCoeff() : kInfinity;
+  change_ = std::max(change_, moved == 0.0 ? 0.0 : moved / scale);
+}
+
+/// Advances to the node, taking Q of its steps and R of its first values on the way.
+bool Trajectory::FreezeNode(Node& node, const double* e, Point& point) {
+  for (Step& step : node.steps) {
+    if (!FreezeStep(step, point) || !Move(step, e, point)) return false;
+  }
+  for (const First& first : node.firsts) {
+    Factor& factor = node.factors[first.factor];
+    Point values = point;  // R may depend on the first value itself
+    values.s.resize(0, 0);
+    if (!Initialise(first, factor, e, values) || !FreezeFactor(factor, values) ||
+        !Initialise(first, factor, e, point)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+bool Trajectory::Freeze(const double* e) {
+  change_ = 0.0;
+  Point point;
+  if (!Begin(e, false, point)) return false;
+  for (Node& node : nodes_) {
+    if (!FreezeNode(node, e, point)) return false;
+    for (Factor& factor : node.factors) {
+      if (factor.row >= 0 && !FreezeFactor(factor, point)) return false;
+    }
+  }
+  return true;
+}
+
+bool Trajectory::Linearised(const std::vector<std::vector<double>>& trajectory,
+                            Eigen::VectorXd& e) {
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(inputs_);
+  Eigen::MatrixXd j = Eigen::MatrixXd::Identity(inputs_ + residuals_, inputs_);
+  j.bottomRows(residuals_).setZero();
+  Eigen::VectorXd r = Eigen::VectorXd::Zero(inputs_ + residuals_), residual;
+  Eigen::MatrixXd a;
+  Point point;
+  if (!Begin(zero.data(), true, point)) return false;
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    if (!FreezeNode(nodes_[k], zero.data(), point)) return false;
+    for (const Block& block : initial_.layout().blocks()) {
+      if (k >= trajectory.size() || !block.has_covariance()) continue;
+      Eigen::VectorXd defect(block.geometry().tangent);
+      double* const x = point.x.data() + block.value_offset;
+      block.geometry().Minus(x, trajectory[k].data() + block.value_offset, defect.data());
+      point.offset.segment(block.tangent_offset, defect.size()) += defect;
+      std::copy_n(trajectory[k].data() + block.value_offset, block.geometry().ambient, x);
+    }
+    for (Factor& factor : nodes_[k].factors) {
+      // What is not defined here tells nothing yet; it may be at the solution.
+      if (factor.row < 0 || !FreezeFactor(factor, point)) continue;
+      if (!Residual(factor, point, residual, &a)) continue;
+      r.segment(inputs_ + factor.row, residual.size()) = residual + a * point.offset;
+      j.middleRows(inputs_ + factor.row, residual.size()) = a * point.s;
+    }
+  }
+  e = -j.householderQr().solve(r);
+  return e.allFinite() || Fail("the problem linearised about the filter has no solution");
+}
+
+void Trajectory::Put(std::size_t k, const Point& point, const Eigen::MatrixXd& y,
+                     State& state) const {
+  const std::vector<Block>& places = initial_.layout().blocks();
+  for (const First& first : nodes_[k].firsts) {
+    const Block& place = places[static_cast<std::size_t>(first.block)];
+    const int t = place.geometry().tangent;
+    state.Add(first.block, point.x.data() + place.value_offset, Eigen::MatrixXd::Zero(t, t));
+  }
+  const Eigen::MatrixXd p = y.transpose() * y;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const Block& place = places[i];
+    const Block& block = state.layout().blocks()[i];
+    if (!block.present) continue;
+    std::copy_n(point.x.data() + place.value_offset, place.geometry().ambient,
+                state.value(static_cast<BlockId>(i)));
+    for (std::size_t j = 0; j <= i && block.has_covariance(); ++j) {
+      const Block& other = state.layout().blocks()[j];
+      if (!other.has_covariance()) continue;
+      state.covariance().SetBlock(block.tangent_offset, other.tangent_offset,
+                                  p.block(place.tangent_offset, places[j].tangent_offset,
+                                          place.geometry().tangent, places[j].geometry().tangent));
+    }
+  }
+}
+
+void Trajectory::Report(std::size_t k, const Point& point, UpdateReport& report) const {
+  report.Clear();
+  report.stale = nodes_[k].stale;
+  for (const Factor& factor : nodes_[k].factors) {
+    const SensorBinding& sensor = SensorOf(factor);
+    const Geometry& geometry = sensor.model.measurement().geometry;
+    MeasurementReport& entry = report.Add();
+    entry.Reset(factor.sensor, factor.measurement.landmark, geometry.tangent);
+    entry.outcome = factor.outcome;
+    entry.z = factor.measurement.values;
+    entry.nis = std::nan("");  // what is left after smoothing is no innovation
+    if (factor.row < 0) continue;
+    entry.h.resize(entry.z.size());
+    entry.innovation.resize(static_cast<std::size_t>(geometry.tangent));
+    if (sensor.model.Predict(RolesOf(sensor, point).data(), entry.h.data()) != Status::kOk)
+      continue;
+    geometry.Minus(entry.z.data(), entry.h.data(), entry.innovation.data());
+  }
+}
+
+}  // namespace alidade::ceres_batch

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "alidade/estimator.h"
+
+namespace alidade::ceres_batch {
+
+/// A whole run as a function of its random inputs e, all of them N(0, 1):
+///
+///   prior         x_0     = m (+) L_0 e_0,             P_0 = L_0 L_0'
+///   motion        x_{k+1} = f(x_k, L_k e_{k+1}, dt),   Q_k = L_k L_k'
+///   measurement   r_i     = L_i^-1 (z_i (-) h(x_k)),   R_i = L_i L_i'
+///   MAP           e*      = argmin |e|^2 + |r(e)|^2
+///   first value   y       = g(x_k, z (+) L_i e_k)      of a block that starts from a measurement
+///   sensitivity   S_k = dx_k/de:  S_0 = [J L_0  0],  S_{k+1} = F S_k + [0  G L_k  0]
+///                 with J = d(m (+) d)/dd,  J_r_e = L_i^-1 d(z (-) h)/dh H S_k
+///
+/// So P_0 and Q may have any rank, nothing is inverted but L_i, and the motion holds exactly at
+/// every e. What depends on the state in Q and R stands at where it was last frozen.
+///
+///   symbol   shape      meaning
+///   e        N          inputs: of the prior, then frame by frame of its steps and first values
+///   r        M          residuals: of the measurements in use, in their order
+///   x, S     -, n x N   values of all blocks; n: their tangents, those of fixed blocks apart
+///
+/// Source       [Bock1984] (condensing), [Bell1994] (smoothing as least squares).
+class Trajectory {
+ public:
+  /// x_k, and S_k where it was asked for (columns of later inputs are zero). About a given
+  /// trajectory x is that one's, and the linearised state is x (+) (offset + S e).
+  struct Point {
+    std::vector<double> x;
+    Eigen::MatrixXd s;
+    Eigen::VectorXd offset;
+  };
+
+  /// Gaps longer than `max_dt_s` are stepped in equal parts.
+  Trajectory(System system, const std::vector<StreamInfo>& streams, double max_dt_s);
+
+  /// One frame more; `filter` says which of its measurements gave a block its first value. False,
+  /// and problem(), where there would be too many inputs.
+  bool Add(const Frame& frame, const UpdateReport& filter);
+  /// The values of a filter's state as Linearised takes them.
+  std::vector<double> ValuesOf(const State& state) const;
+  int inputs() const { return inputs_; }        ///< N
+  int residuals() const { return residuals_; }  ///< M
+  std::size_t size() const { return nodes_.size(); }
+  Stamp stamp() const { return stamp_; }
+
+  /// Takes Q and R at the states of e. False where that cannot be.
+  bool Freeze(const double* e);
+  /// Largest relative change of a factor of Q or R in the last Freeze.
+  double change() const { return change_; }
+  /// r (M) and, unless null, its row-major Jacobian (M x N). False where a model is not defined.
+  bool Evaluate(const double* e, double* r, double* j) const;
+  /// The inputs that solve the problem linearised about `trajectory`, the values of a filter frame
+  /// by frame (it may end early). Freezes there. False where that cannot be.
+  bool Linearised(const std::vector<std::vector<double>>& trajectory, Eigen::VectorXd& e);
+
+  /// x_0 and S_0.
+  bool Begin(const double* e, bool sensitivity, Point& point) const;
+  /// From frame k - 1 (or the prior) to frame k.
+  bool Advance(std::size_t k, const double* e, Point& point) const;
+  /// `state`, that of frame k - 1, becomes the one of frame k: the values of `point`, with the
+  /// covariance y' y for y = U^-T S'.
+  void Put(std::size_t k, const Point& point, const Eigen::MatrixXd& y, State& state) const;
+  /// What became of the measurements of frame k, seen from `point`.
+  void Report(std::size_t k, const Point& point, UpdateReport& report) const;
+
+  /// Why the last call failed.
+  const std::string& problem() const { return problem_; }
+
+ private:
+  struct Step {
+    std::size_t motion;
+    double dt_s;
+    int column;
+    RowMajor l;  ///< frozen
+  };
+  struct Factor {
+    int sensor;
+    Measurement measurement;
+    Outcome outcome;
+    int row = -1;       ///< of r; -1: not in use
+    Eigen::MatrixXd l;  ///< frozen
+  };
+  /// A factor whose measurement gives a block its first value.
+  struct First {
+    std::size_t factor;
+    BlockId block;
+    int column;
+  };
+  struct Node {
+    std::vector<Step> steps;  ///< that lead to it
+    std::vector<Factor> factors;
+    std::vector<First> firsts;  ///< after the steps
+    bool stale = false;
+  };
+
+  void AddFactors(const Frame& frame, const UpdateReport& filter, Node& node);
+  void AddFirsts(Node& node);
+  bool AllPresent(const std::vector<BlockId>& blocks) const;
+  bool Move(const Step& step, const double* e, Point& point) const;
+  bool Initialise(const First& first, const Factor& factor, const double* e, Point& point) const;
+  bool FreezeNode(Node& node, const double* e, Point& point);
+  bool FreezeStep(Step& step, const Point& point);
+  bool FreezeFactor(Factor& factor, const Point& point);
+  bool Residual(const Factor& factor, const Point& point, Eigen::VectorXd& r,
+                Eigen::MatrixXd* a) const;
+  void NoteChange(const Eigen::MatrixXd& before, const Eigen::MatrixXd& after);
+  std::vector<const double*> RolesOf(const SensorBinding& sensor, const Point& point) const;
+  const SensorBinding& SensorOf(const Factor& factor) const {
+    return system_.sensors[static_cast<std::size_t>(factor.sensor)];
+  }
+  bool Fail(std::string why) const;
+
+  System system_;
+  std::vector<int> stream_of_sensor_;
+  double max_dt_s_;
+  State initial_;              ///< all blocks have a place in it
+  std::vector<bool> present_;  ///< at the last frame, by block
+  Eigen::MatrixXd l0_;
+  std::vector<Node> nodes_;
+  Stamp stamp_ = kNoStamp;
+  int inputs_ = 0, residuals_ = 0;
+  double change_ = 0.0;
+  mutable std::string problem_;
+};
+
+}  // namespace alidade::ceres_batch

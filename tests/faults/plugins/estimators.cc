@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// Build tier: an estimator that throws while its options are read, and one without a maker.
+#include <stdexcept>
+
+#include "alidade/build_plugin.h"
+
+namespace {
+
+alidade::EstimatorMaker Throw(const alidade::EstimatorArguments& arguments) {
+  static_cast<void>(arguments.params.Positive("gain", "", "required"));
+  throw std::runtime_error("no such thing");
+}
+
+alidade::EstimatorMaker MakeNothing(const alidade::EstimatorArguments&) { return {}; }
+
+}  // namespace
+
+ALIDADE_ESTIMATOR_PLUGIN({"throwing_estimator", "throws", "", &Throw},
+                         {"no_estimator", "makes nothing", "", &MakeNothing})

@@ -67,11 +67,13 @@ Outcome Ekf::Linearise(Row& row) {
     return outcome;
   }
   if (outcome == Outcome::kFailed) NotePluginFailure(binding);
-  if (outcome == Outcome::kOutOfDomain && rejections_[static_cast<std::size_t>(row.sensor)] == 0) {
-    diverged_ = true;
+  const auto sensor = static_cast<std::size_t>(row.sensor);
+  if (outcome == Outcome::kOutOfDomain && !out_of_domain_[sensor]) {
+    out_of_domain_[sensor] = true;
     std::vector<BlockId> blocks;
     for (const RoleBinding& role : binding.roles) blocks.push_back(role.block);
-    Note("diverged", "sensor '" + binding.name + "' is not defined at " + Describe(blocks));
+    NoteDivergence("diverged",
+                   "sensor '" + binding.name + "' is not defined at " + Describe(blocks));
   }
   return outcome;
 }

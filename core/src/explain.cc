@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "alidade/ekf.h"
-#include "alidade/metrics.h"
+#include "alidade/statistics.h"
 #include "columns.h"
 #include "number_text.h"
 #include "text_table.h"
@@ -221,7 +221,7 @@ std::string FuseText(Fuse fuse, const System& system) {
 std::string LockoutText(const EkfOptions& options, const System& system) {
   const auto corrects = [&](const RoleBinding& role) {
     return role.block >= 0 && role.mode == RoleMode::kEstimate &&
-           system.layout[role.block].status != BlockStatus::kFixed;
+           system.layout[role.block].status == BlockStatus::kEstimated;
   };
   std::vector<std::string> without;
   for (const SensorBinding& sensor : system.sensors) {

@@ -59,6 +59,9 @@ TEST_F(ExplainCli, TellsWhatAFixedBlockIs) {
     EXPECT_TRUE(Contains(one.out, part)) << part << '\n' << one.out;
   }
   EXPECT_FALSE(Contains(one.out, "nothing for")) << one.out;
+  const Outcome considered =
+      Call({"explain", "config.yaml", "--set", "state.target.consider=[depth]"});
+  EXPECT_TRUE(Contains(considered.out, "in a row; nothing for stereo\n")) << considered.out;
   // Stereo sees nothing but a fixed block.
   const Outcome all =
       Call({"explain", "config.yaml", "--set", "state.target.fixed=[depth, depth_rate]"});

@@ -30,7 +30,7 @@ struct EkfOptions {
   Fuse fuse = Fuse::kJoint;
   Lockout lockout = Lockout::kReset;
   int lockout_after = 20;  ///< consecutive rejections of one sensor
-  /// Longer gaps are stepped in equal parts of at most this.
+  /// Longer gaps are stepped in equal parts of at most this, to whole ns, and at least 1 ns.
   double max_dt_s = std::numeric_limits<double>::infinity();
 
   /// Reads `gate`, `fuse` (`joint`, `per_sensor`, `per_measurement`), `lockout` (`after`; `action`:
@@ -97,6 +97,9 @@ class Ekf : public Estimator {
   void BindMotions();
   void StepTo(Stamp stamp);
   bool StepOnce(double dt_s);
+  bool StepIsBounded() const;
+  bool Propagate();
+  void PropagateModels();
   bool StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s);
 
   void Collect(const Frame& frame);
@@ -132,7 +135,8 @@ class Ekf : public Estimator {
   }
   JacobianRows JacobianOf(const Row& row) const;
   void NotePluginFailure(const SensorBinding& sensor);
-  void Note(const char* kind, std::string text);
+  Event& Note(const char* kind, std::string text);
+  void NoteDivergence(const char* kind, std::string text);
   void GiveUp(const char* kind, const std::string& what);
   std::string Describe(const std::vector<BlockId>& blocks) const;
 
@@ -155,6 +159,7 @@ class Ekf : public Estimator {
   Stamp stamp_ = kNoStamp;
   std::vector<double> gate_threshold_;  ///< on r' S^-1 r, by sensor
   std::vector<int> rejections_;         ///< consecutive, by sensor
+  std::vector<bool> out_of_domain_;     ///< since the last acceptance, by sensor
   std::vector<bool> inflated_;          ///< since the last acceptance, by sensor
   std::vector<bool> warned_;            ///< of conditioning, by sensor
   /// The last accepted measurement, for the record of a failure.

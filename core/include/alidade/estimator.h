@@ -28,6 +28,7 @@ enum class Outcome {
 const char* ToString(Outcome outcome);
 /// What a model's status means for the measurement; kOk is kAccepted.
 Outcome OutcomeOf(Status status);
+/// Whether none of the values is infinite or not a number.
 inline bool AllFinite(std::span<const double> values) {
   double sum = 0.0;  // 0 times what is not finite is not a number
   for (const double value : values) sum += 0.0 * value;
@@ -64,6 +65,7 @@ struct Event {
   Stamp stamp = kNoStamp;
   std::string kind;  ///< one word: diverged, lockout, conditioning, not_finite, ...
   std::string text;
+  bool divergence = false;  ///< the estimator diverged or failed by this
 };
 
 /// What one frame did. Filled again and again without allocating.

@@ -98,6 +98,7 @@ Outcome Ekf::InitialiseBlock(Row& row) {
   }
   if (state_.layout()[id].present) state_.Marginalise(id);
   state_.Initialise(id, y.data(), from, from_jacobians, own);
+  if (!first_.empty()) FirstEstimate(id).clear();
   Bind();
   return Outcome::kInitialised;
 }

@@ -41,10 +41,10 @@ struct MeasurementReport {
   Outcome outcome = Outcome::kAccepted;
   std::int64_t landmark = -1;
   int dof = 0;
-  double nis = 0.0;                ///< r' S^-1 r, not divided by dof
+  double nis = 0.0;                ///< r' S^-1 r, not divided by dof; S without the loss
   std::vector<double> z, h;        ///< ambient
   std::vector<double> innovation;  ///< r = z (-) h, m
-  std::vector<double> s;           ///< S = H P H' + R, m x m
+  std::vector<double> s;           ///< S = H P H' + R / w, m x m; w < 1 by a robust loss alone
   /// K by columns, its rows those of the blocks with a covariance in the order of the layout; empty
   /// unless accepted.
   std::vector<double> gain;

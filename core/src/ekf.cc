@@ -183,7 +183,7 @@ bool Ekf::StepIsBounded() const {
   return sum * sum * p + q <= kSafe;
 }
 
-/// P <- F P F' + G Q G' with what StepModel found; false, and P as it was, where that is not finite.
+/// P <- F P F' + G Q G' with what StepModel found; false, and P as it was, where it is not finite.
 bool Ekf::Propagate() {
   Covariance& p = state_.covariance();
   if (StepIsBounded()) {

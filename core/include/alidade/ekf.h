@@ -72,6 +72,7 @@ class Ekf : public Estimator {
   bool failed() const override { return failed_; }
 
  protected:  // for the estimators that share how frames are stepped to, read, gated and reported
+  /// @cond
   /// How a sensor touches the state, as long as the layout stays as it is.
   struct SensorPlan {
     std::vector<const double*> roles;  ///< values; null where unbound or without a value yet
@@ -198,6 +199,7 @@ class Ekf : public Estimator {
   } last_used_;
   bool diverged_ = false;
   bool failed_ = false;
+  /// @endcond
 };
 
 }  // namespace alidade

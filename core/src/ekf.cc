@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <numeric>
 
-#include "alidade/metrics.h"
+#include "alidade/statistics.h"
 
 namespace alidade {
 namespace {
@@ -28,28 +28,15 @@ void SpreadNoise(const std::vector<double>& g, const std::vector<double>& l, std
   }
 }
 
+/// max_dt_s in whole nanoseconds, at least one.
+Stamp LongestPart(double max_dt_s) {
+  constexpr double kBeyond = 9.2e18;  // what a Stamp cannot hold
+  const double ns = std::round(1e9 * max_dt_s);
+  return ns < kBeyond ? std::max<Stamp>(1, static_cast<Stamp>(ns))
+                      : std::numeric_limits<Stamp>::max();
+}
+
 }  // namespace
-
-Outcome OutcomeOf(Status status) {
-  switch (status) {
-    case Status::kOk:
-      return Outcome::kAccepted;
-    case Status::kOutOfDomain:
-      return Outcome::kOutOfDomain;
-    case Status::kInvalid:
-      return Outcome::kInvalid;
-    case Status::kError:
-      break;
-  }
-  return Outcome::kFailed;
-}
-
-const char* ToString(Outcome outcome) {
-  constexpr const char* kNames[] = {"accepted",  "initialised", "gated",  "out_of_domain",
-                                    "invalid",   "not_finite",  "not_pd", "stale",
-                                    "not_ready", "failed"};
-  return kNames[static_cast<int>(outcome)];
-}
 
 Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams)
     : system_(std::move(system)),
@@ -57,6 +44,7 @@ Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>
       stream_of_sensor_(system_.sensors.size(), -1),
       state_(system_.InitialState()),
       rejections_(system_.sensors.size(), 0),
+      out_of_domain_(system_.sensors.size(), false),
       inflated_(system_.sensors.size(), false),
       warned_(system_.sensors.size(), false) {
   for (const SensorBinding& sensor : system_.sensors) {
@@ -76,94 +64,6 @@ Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>
 }
 
 void Ekf::Start(Stamp stamp) { stamp_ = stamp; }
-
-/// Works out how models and state fit together; again whenever blocks come, go or move.
-void Ekf::Bind() {
-  const StateLayout& layout = state_.layout();
-  waiting_ = considering_ = false;
-  order_.clear();
-  bool in_order = true;
-  for (const Block& block : layout.blocks()) {
-    waiting_ = waiting_ || !block.present;
-    considering_ = considering_ || (block.present && block.status == BlockStatus::kConsidered);
-    if (!block.has_covariance()) continue;
-    in_order = in_order && block.tangent_offset == std::ssize(order_);
-    for (int i = 0; i < block.geometry().tangent; ++i) order_.push_back(block.tangent_offset + i);
-  }
-  if (in_order) order_.clear();
-  const bool small = state_.covariance().small();
-  plans_.assign(system_.sensors.size(), {});
-  for (std::size_t s = 0; s < plans_.size(); ++s) {
-    const SensorBinding& sensor = system_.sensors[s];
-    SensorPlan& plan = plans_[s];
-    bool apart = true;  // no two roles have the same block
-    for (const RoleBinding& role : sensor.roles) {
-      const bool present = role.block >= 0 && layout[role.block].present;
-      plan.roles.push_back(present ? state_.value(role.block) : nullptr);
-      plan.columns.push_back(-1);
-      plan.ready = plan.ready && (role.block < 0 || present);
-      plan.at_measurement = plan.at_measurement || role.linearise_at == LineariseAt::kMeasurement;
-      if (!present || role.mode == RoleMode::kHold || !layout[role.block].has_covariance())
-        continue;
-      const Block& block = layout[role.block];
-      for (const JacobianPart& other : plan.parts) apart &= other.offset != block.tangent_offset;
-      plan.columns.back() = plan.width;
-      plan.parts.push_back({block.tangent_offset, block.geometry().tangent, plan.width});
-      plan.considered.push_back(role.mode == RoleMode::kConsider);
-      plan.width += block.geometry().tangent;
-    }
-    if (small && apart) {  // whole rows of H
-      plan.width = state_.covariance().size();
-      std::size_t part = 0;
-      for (int& column : plan.columns) {
-        if (column < 0) continue;
-        column = plan.parts[part].column = plan.parts[part].offset;
-        ++part;
-      }
-    }
-    plan.strides.assign(sensor.roles.size(), plan.width);
-  }
-  for (Row& row : rows_) row.zeroed = nullptr;
-  BindMotions();
-}
-
-void Ekf::BindMotions() {
-  next_.resize(state_.values().size());
-  motions_.assign(system_.motions.size(), {});
-  for (std::size_t i = 0; i < motions_.size(); ++i) {
-    const MotionBinding& motion = system_.motions[i];
-    MotionPlan& plan = motions_[i];
-    plan.active = !motion.model.stationary();
-    bool whole = true;  // every block has a covariance
-    int row = 0;
-    for (const BlockId id : motion.blocks) {
-      const Block& block = state_.layout()[id];
-      plan.active = plan.active && block.present;
-      if (!plan.active) break;
-      const int size = block.geometry().tangent;
-      plan.x.push_back(state_.value(id));
-      plan.next.push_back(next_.data() + block.value_offset);
-      for (int k = 0; k < size && block.has_covariance(); ++k) plan.rows.push_back(row + k);
-      row += size;
-      if (!block.has_covariance()) {
-        whole = false;
-      } else if (!plan.segments.empty() &&
-                 plan.segments.back().first + plan.segments.back().second == block.tangent_offset) {
-        plan.segments.back().second += size;
-      } else {
-        plan.segments.emplace_back(block.tangent_offset, size);
-      }
-    }
-    if (whole) plan.rows.clear();
-    const auto n = static_cast<std::size_t>(motion.model.tangent_size());
-    const auto n_w = static_cast<std::size_t>(motion.model.noise_size());
-    plan.f.resize(n * n);
-    plan.g.resize(n * n_w);
-    plan.gl.resize(n * n_w);
-    plan.l.resize(n_w * n_w);
-    plan.q.resize(n * n);
-  }
-}
 
 const UpdateReport& Ekf::Process(const Frame& frame) {
   report_.Clear();
@@ -227,21 +127,21 @@ void Ekf::Collect(const Frame& frame) {
 /// Moves the state to `stamp`, in equal parts of at most max_dt_s. Where a part cannot be done the
 /// state stays at the end of the one before.
 void Ekf::StepTo(Stamp stamp) {
-  constexpr double kMostParts = 1e6;
+  constexpr Stamp kMostParts = 1'000'000;
   Stamp elapsed = 0;
   const bool overflow = __builtin_sub_overflow(stamp, stamp_, &elapsed);
   if (elapsed == 0) return;
-  const double dt_s = Seconds(elapsed), parts = std::ceil(dt_s / options_.max_dt_s);
-  if (overflow || parts > kMostParts) {
+  const Stamp count = (elapsed - 1) / LongestPart(options_.max_dt_s) + 1;
+  if (overflow || count > kMostParts) {
     char text[128];
-    std::snprintf(text, sizeof(text), "a gap of %.6g s would need more than %g steps of %g s", dt_s,
-                  kMostParts, options_.max_dt_s);
+    std::snprintf(text, sizeof(text), "a gap of %.6g s would need more than %g steps of %g s",
+                  Seconds(stamp) - Seconds(stamp_), static_cast<double>(kMostParts),
+                  options_.max_dt_s);
     return GiveUp("gap", text);
   }
-  const std::int64_t count = std::max<std::int64_t>(1, static_cast<std::int64_t>(parts));
   const Stamp start = stamp_;
-  for (std::int64_t i = 1; i <= count; ++i) {
-    if (!StepOnce(dt_s / static_cast<double>(count))) return;
+  for (Stamp i = 1; i <= count; ++i) {
+    if (!StepOnce(Seconds(elapsed) / static_cast<double>(count))) return;
     stamp_ = i == count ? stamp : start + elapsed / count * i;
   }
 }
@@ -251,6 +151,53 @@ bool Ekf::StepOnce(double dt_s) {
   for (std::size_t i = 0; i < motions_.size(); ++i) {
     if (motions_[i].active && !StepModel(system_.motions[i], motions_[i], dt_s)) return false;
   }
+  if (!Propagate()) {
+    GiveUp("not_finite", "the covariance steps to what is not finite");
+    return false;
+  }
+  for (std::size_t i = 0; i < motions_.size(); ++i) {
+    if (!motions_[i].active) continue;
+    for (const BlockId id : system_.motions[i].blocks) {
+      const Block& block = state_.layout()[id];
+      if (block.status == BlockStatus::kFixed) continue;
+      const Geometry& geometry = block.geometry();
+      std::copy_n(next_.data() + block.value_offset, geometry.ambient, state_.value(id));
+      if (geometry.kind != GeometryKind::kVector) geometry.Normalise(state_.value(id));
+    }
+  }
+  return true;
+}
+
+/// Whether no F P F' + Q of this step can overflow, by |F P F'|_ij <= (n max|F|)^2 max|P|.
+bool Ekf::StepIsBounded() const {
+  constexpr double kSafe = 1e300;
+  double f = 1.0, q = 0.0, p = 0.0;
+  for (const MotionPlan& plan : motions_) {
+    if (!plan.active) continue;
+    for (const double value : plan.f) f = std::max(f, std::abs(value));
+    for (const double value : plan.q) q = std::max(q, std::abs(value));
+  }
+  const int n = state_.covariance().size();
+  for (int i = 0; i < n; ++i) p = std::max(p, state_.covariance().Variance(i));
+  const double sum = f * n;
+  return sum * sum * p + q <= kSafe;
+}
+
+/// P <- F P F' + G Q G' with what StepModel found; false, and P as it was, where it is not finite.
+bool Ekf::Propagate() {
+  Covariance& p = state_.covariance();
+  if (StepIsBounded()) {
+    PropagateModels();
+    return true;
+  }
+  const Covariance before = p;
+  PropagateModels();
+  if (p.Dense().allFinite()) return true;
+  p = before;
+  return false;
+}
+
+void Ekf::PropagateModels() {
   Covariance& p = state_.covariance();
   for (const MotionPlan& plan : motions_) {
     if (!plan.active || plan.segments.empty()) continue;
@@ -266,21 +213,6 @@ bool Ekf::StepOnce(double dt_s) {
       p.Propagate(plan.segments, f(plan.rows, plan.rows), q(plan.rows, plan.rows));
     }
   }
-  double sum = 0.0;
-  for (int i = 0; i < p.size(); ++i) sum += 0.0 * p.Variance(i);
-  if (sum != 0.0) {
-    GiveUp("not_finite", "the covariance steps to what is not finite");
-    return false;
-  }
-  for (std::size_t i = 0; i < motions_.size(); ++i) {
-    if (!motions_[i].active) continue;
-    for (const BlockId id : system_.motions[i].blocks) {
-      const Block& block = state_.layout()[id];
-      if (block.status == BlockStatus::kFixed) continue;
-      std::copy_n(next_.data() + block.value_offset, block.geometry().ambient, state_.value(id));
-    }
-  }
-  return true;
 }
 
 /// What one motion model makes of its blocks: next_, and F and G Q G' of the plan. False where the
@@ -318,8 +250,15 @@ void Ekf::NotePluginFailure(const SensorBinding& sensor) {
   Note("plugin_failed", "sensor '" + sensor.name + "': " + sensor.model.error_text());
 }
 
-void Ekf::Note(const char* kind, std::string text) {
+Event& Ekf::Note(const char* kind, std::string text) {
   report_.events.push_back({stamp_, kind, std::move(text)});
+  return report_.events.back();
+}
+
+/// An event by which the filter counts as diverged.
+void Ekf::NoteDivergence(const char* kind, std::string text) {
+  diverged_ = true;
+  Note(kind, std::move(text)).divergence = true;
 }
 
 /// `block = value, ...` for the given blocks that have one.
@@ -340,7 +279,7 @@ std::string Ekf::Describe(const std::vector<BlockId>& blocks) const {
 
 /// Ends the filter: what happened, the state that is left, the measurement that led there.
 void Ekf::GiveUp(const char* kind, const std::string& what) {
-  failed_ = diverged_ = true;
+  failed_ = true;
   std::vector<BlockId> all(state_.layout().blocks().size());
   std::iota(all.begin(), all.end(), 0);
   char at[48];
@@ -356,7 +295,7 @@ void Ekf::GiveUp(const char* kind, const std::string& what) {
       text += number;
     }
   }
-  Note(kind, text);
+  NoteDivergence(kind, text);
 }
 
 }  // namespace alidade

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/ekf.h"
-#include "param_reader.h"
+#include "alidade/iekf.h"
+#include "filter_options.h"
 
 namespace alidade {
 namespace {
 
-EkfOptions Read(Params& p) {
+EkfOptions ReadCommon(Params& p) {
   EkfOptions options;
   options.gate =
       p.Number("gate", "", "probability with which a measurement that fits passes; 1: no gate",
@@ -23,23 +24,36 @@ EkfOptions Read(Params& p) {
   return options;
 }
 
-}  // namespace
-
-EkfOptions EkfOptions::FromNode(const Node& entry) {
-  internal::ParamReader reader(entry, "estimator 'ekf'");
-  Params params(&reader.host());
-  const EkfOptions options = Read(params);
-  reader.Check();
+EkfOptions ReadEkf(Params& p) {
+  EkfOptions options = ReadCommon(p);
+  options.jacobian = static_cast<JacobianAt>(p.Choice(
+      "jacobian", {"latest", "first_estimate"}, "where H is taken for blocks of stationary models",
+      static_cast<int>(options.jacobian)));
   return options;
 }
 
-std::vector<ParamInfo> EkfOptions::Schema() {
-  internal::ParamRecorder recorder;
-  recorder.Run([&] {
-    Params params(&recorder.host());
-    static_cast<void>(Read(params));
-  });
-  return recorder.Result();
+IekfOptions ReadIekf(Params& p) {
+  IekfOptions options{ReadCommon(p)};
+  options.max_iterations = p.Integer("max_iterations", "most linearisations of an update", 2, 1000,
+                                     options.max_iterations);
+  options.tolerance = p.Number(
+      "tolerance", "", "step, in posterior standard deviations, at which an update has converged",
+      {0.0, 1.0, true, false}, options.tolerance);
+  return options;
 }
+
+}  // namespace
+
+EkfOptions EkfOptions::FromNode(const Node& entry) {
+  return internal::OptionsFromNode(entry, "ekf", ReadEkf);
+}
+
+std::vector<ParamInfo> EkfOptions::Schema() { return internal::SchemaOf(ReadEkf); }
+
+IekfOptions IekfOptions::FromNode(const Node& entry) {
+  return internal::OptionsFromNode(entry, "iekf", ReadIekf);
+}
+
+std::vector<ParamInfo> IekfOptions::Schema() { return internal::SchemaOf(ReadIekf); }
 
 }  // namespace alidade

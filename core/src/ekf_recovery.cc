@@ -89,6 +89,7 @@ Outcome Ekf::InitialiseBlock(Row& row) {
   }
   const Eigen::MatrixXd own = jz * Eigen::Map<const RowMajor>(row.r.data(), m, m) * jz.transpose();
   if (!own.allFinite() || !AllFinite(y)) return Outcome::kNotFinite;
+  state_.layout()[id].geometry().Normalise(y.data());
   for (std::size_t i = 0; i < roles.size(); ++i) {
     if (jx[i] == nullptr) continue;
     if (!jacobians[i].allFinite()) return Outcome::kNotFinite;
@@ -97,6 +98,7 @@ Outcome Ekf::InitialiseBlock(Row& row) {
   }
   if (state_.layout()[id].present) state_.Marginalise(id);
   state_.Initialise(id, y.data(), from, from_jacobians, own);
+  if (!first_.empty()) FirstEstimate(id).clear();
   Bind();
   return Outcome::kInitialised;
 }
@@ -108,7 +110,7 @@ void Ekf::CountRejections() {
     const MeasurementReport& entry = EntryOf(row);
     if (entry.outcome == Outcome::kAccepted || entry.outcome == Outcome::kInitialised) {
       rejections_[sensor] = 0;
-      inflated_[sensor] = false;
+      out_of_domain_[sensor] = inflated_[sensor] = false;
     }
     if (!Rejected(entry)) continue;
     if (++rejections_[sensor] < options_.lockout_after) continue;
@@ -127,7 +129,7 @@ void Ekf::Recover(Row& row) {
                           std::to_string(options_.lockout_after) + " times in a row: ";
   const int role = binding.model.initialised_role();
   const RoleBinding* target = role < 0 ? nullptr : &binding.roles[static_cast<std::size_t>(role)];
-  if (options_.lockout == Lockout::kReset && target != nullptr &&
+  if (options_.lockout == Lockout::kReset && target != nullptr && target->block >= 0 &&
       target->mode == RoleMode::kEstimate &&
       state_.layout()[target->block].status == BlockStatus::kEstimated &&
       InitialiseBlock(row) == Outcome::kInitialised) {
@@ -141,8 +143,8 @@ void Ekf::Recover(Row& row) {
   bool any = false;
   for (const RoleBinding& bound : binding.roles) {
     if (bound.block < 0 || bound.mode != RoleMode::kEstimate) continue;
-    if (!state_.layout()[bound.block].has_covariance()) continue;
     const Block& block = state_.layout()[bound.block];
+    if (!block.has_covariance() || block.status != BlockStatus::kEstimated) continue;
     const int n = block.geometry().tangent;
     any = true;
     state_.covariance().Transform(block.tangent_offset,
@@ -161,7 +163,8 @@ void Ekf::ForgetMotionOf(BlockId id) {
       const bool together =
           std::find(motion.blocks.begin(), motion.blocks.end(), prior.block) != motion.blocks.end();
       if (!together || prior.block == id || prior.covariance.size() == 0 ||
-          !state_.layout()[prior.block].has_covariance()) {
+          !state_.layout()[prior.block].has_covariance() ||
+          state_.layout()[prior.block].status != BlockStatus::kEstimated) {
         continue;
       }
       const std::vector<double> value(

@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 
-#include "alidade/ekf.h"
 #include "alidade/plugin_listing.h"
 #include "alidade/run.h"
 #include "columns.h"
+#include "estimator_types.h"
 #include "names.h"
 #include "text_table.h"
 
 namespace alidade {
 namespace {
 
+using internal::EstimatorType;
+using internal::EstimatorTypes;
+using internal::FindEstimatorType;
 using internal::NamesOf;
 
 constexpr int kSchema = 1;
@@ -76,13 +79,14 @@ void CheckName(const std::string& name, const Node& entry) {
 }
 
 /// Refuses a type of estimator that is neither of core nor of a plugin.
-void CheckOffered(const std::string& type, const std::vector<std::string>& of_core,
-                  const PluginHost& host, const Node& node) {
-  std::vector<std::string> names = of_core, of_plugins;
+void CheckOffered(const std::string& type, const PluginHost& host, const Node& node) {
+  std::vector<std::string> of_core, of_plugins;
+  for (const EstimatorType& one : EstimatorTypes()) of_core.emplace_back(one.name);
   for (const PluginEntry& entry : host.entries()) {
     if (entry.kind == PluginEntry::Kind::kEstimator) of_plugins.push_back(entry.name);
   }
   if (std::ranges::find(of_plugins, type) != of_plugins.end()) return;
+  std::vector<std::string> names = of_core;
   names.insert(names.end(), of_plugins.begin(), of_plugins.end());
   const std::string expected = internal::Join(of_core) + ", built in, or of a plugin: " +
                                (of_plugins.empty() ? "none was found" : internal::Join(of_plugins));
@@ -93,26 +97,21 @@ void CheckOffered(const std::string& type, const std::vector<std::string>& of_co
                   "\n" + PluginPlaces(host));
 }
 
-/// Reads `type` and what that type of estimator has for keys: one of core, or else of a plugin.
-EstimatorMaker ReadEstimator(const Node& entry, const PluginHost& host, std::string& type) {
-  const std::vector<std::string> types = {"ekf"};
-  type = entry.At("type", "an estimator").Text();
-  if (std::ranges::find(types, type) == types.end()) {
-    CheckOffered(type, types, host, entry.At("type"));
-    return host.CreateEstimator(type, entry);
-  }
-  return [options = EkfOptions::FromNode(entry)](const System& system,
-                                                 const std::vector<StreamInfo>& streams) {
-    return std::make_unique<Ekf>(system, options, streams);
-  };
-}
-
 NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const Config& config,
                               const PluginHost& host, const std::vector<StreamInfo>& streams) {
   CheckName(name, entry);
   NamedEstimator named;
   named.name = name;
-  const EstimatorMaker make = ReadEstimator(entry, host, named.type);
+  const Node type = entry.At("type", "an estimator");
+  named.type = type.Text();
+  const EstimatorType* const of_core = FindEstimatorType(named.type);
+  if (of_core == nullptr) {
+    CheckOffered(named.type, host, type);
+  } else {
+    internal::RefuseUnsupportedKeys(*of_core, entry);
+  }
+  const EstimatorMaker make =
+      of_core != nullptr ? of_core->read(entry) : host.CreateEstimator(named.type, entry);
   if (const auto policy = entry.Find("on_divergence")) {
     named.on_divergence = static_cast<OnDivergence>(policy->Choice({"report", "fail"}));
   }
@@ -129,6 +128,7 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   const std::vector<std::string> only = ReadSensorList(entry, own.root());
   entry.RejectUnread();
   named.system = BuildSystem(own.root(), host, only);
+  if (of_core != nullptr) internal::RefuseUnsupported(*of_core, own.root(), named.system);
   for (const SensorBinding& sensor : named.system.sensors) {
     FindStream(own.root().At("sensors").At(sensor.name), sensor.model, streams);
   }

@@ -8,9 +8,10 @@
 #include <map>
 #include <utility>
 
-#include "alidade/ekf.h"
-#include "alidade/metrics.h"
+#include "alidade/iekf.h"
+#include "alidade/statistics.h"
 #include "columns.h"
+#include "estimator_types.h"
 #include "names.h"
 #include "number_text.h"
 #include "text_table.h"
@@ -221,7 +222,7 @@ std::string FuseText(Fuse fuse, const System& system) {
 std::string LockoutText(const EkfOptions& options, const System& system) {
   const auto corrects = [&](const RoleBinding& role) {
     return role.block >= 0 && role.mode == RoleMode::kEstimate &&
-           system.layout[role.block].status != BlockStatus::kFixed;
+           system.layout[role.block].status == BlockStatus::kEstimated;
   };
   std::vector<std::string> without;
   for (const SensorBinding& sensor : system.sensors) {
@@ -241,29 +242,64 @@ std::string LockoutText(const EkfOptions& options, const System& system) {
   return "none";
 }
 
+std::string LossText(const System& system) {
+  std::vector<std::string> losses;
+  for (const SensorBinding& sensor : system.sensors) {
+    if (sensor.loss.kind == LossKind::kNone) continue;
+    losses.push_back(sensor.name + ": " + ToString(sensor.loss.kind) + ' ' +
+                     NumberText(sensor.loss.scale));
+  }
+  return Join(losses);
+}
+
 std::string Options(const Node& entry, const NamedEstimator& named) {
   const System& system = named.system;
   std::vector<TextRow> rows;
-  if (named.type == "ekf") {
-    const EkfOptions options = EkfOptions::FromNode(entry);
+  if (internal::FindEstimatorType(named.type) != nullptr) {
+    const bool iterated = named.type == "iekf";
+    const IekfOptions options =
+        iterated ? IekfOptions::FromNode(entry) : IekfOptions{EkfOptions::FromNode(entry)};
     rows = {{"gate", GateText(options, system)},
             {"fuse", FuseText(options.fuse, system)},
             {"lockout", LockoutText(options, system)},
             {"max_dt_s", std::isfinite(options.max_dt_s) ? NumberText(options.max_dt_s)
                                                          : "none: a gap is one step"}};
+    if (iterated) {
+      rows.push_back({"max_iterations", std::to_string(options.max_iterations)});
+      rows.push_back({"tolerance", NumberText(options.tolerance) + " sigma of the posterior"});
+    } else {
+      rows.push_back({"jacobian", options.jacobian == JacobianAt::kLatest
+                                      ? "latest: H at the estimate"
+                                      : "first_estimate: H where stationary blocks started from"});
+    }
   }
   rows.push_back({"on_divergence", named.on_divergence == OnDivergence::kFail
                                        ? "fail: the run ends with exit code 79"
                                        : "report: the run goes on"});
+  if (const std::string losses = LossText(system); !losses.empty()) {
+    rows.push_back({"loss", losses});
+  }
   if (system.start_s) rows.push_back({"start_s", NumberText(*system.start_s)});
   return TextTable(rows, kIndent);
 }
 
 std::string SupportText(const std::string& type) {
-  if (type != "ekf") return {};
-  return "    blocks estimated, considered (Schmidt) or fixed; roles estimate, consider, hold;\n"
-         "    linearise_at prediction or measurement; blocks that start from a measurement.\n"
-         "    Not: control inputs, landmarks, measurements out of order.\n";
+  const internal::EstimatorType* known = internal::FindEstimatorType(type);
+  if (known == nullptr) return {};
+  const internal::Support& can = known->support;
+  const auto either = [](bool can_do, const char* with, const char* without) {
+    return std::string(can_do ? with : without);
+  };
+  return either(can.considered,
+                "    blocks estimated, considered (Schmidt) or fixed; roles estimate, consider, "
+                "hold;\n",
+                "    blocks estimated or fixed; roles estimate, hold;\n") +
+         "    linearise_at prediction" + either(can.at_measurement, " or measurement", "") +
+         "; blocks that start from a measurement" +
+         either(can.robust_loss, ";\n    robust losses", "") +
+         ".\n    Not: " + either(can.considered, "", "considered blocks and roles, ") +
+         either(can.at_measurement, "", "linearise_at measurement, ") +
+         "control inputs, landmarks, measurements out of order.\n";
 }
 
 std::string SourceText(const Config& config, const Experiment& experiment) {

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "alidade/geometry.h"
+#include "alidade/statistics.h"
 #include "columns.h"
 #include "names.h"
 #include "number_text.h"

@@ -5,7 +5,7 @@
 #include <tuple>
 #include <utility>
 
-#include "alidade/ekf.h"
+#include "estimator_types.h"
 #include "json.h"
 #include "plugin_file.h"
 #include "text_table.h"
@@ -13,6 +13,9 @@
 namespace alidade {
 namespace {
 
+using internal::EstimatorType;
+using internal::EstimatorTypes;
+using internal::FindEstimatorType;
 using internal::Join;
 using internal::Json;
 using internal::KindName;
@@ -28,9 +31,6 @@ std::vector<const PluginEntry*> Sorted(const PluginHost& host) {
   return entries;
 }
 
-constexpr const char* kEkf = "ekf";
-constexpr const char* kEkfDoc = "Extended Kalman filter; built in, for `estimators`.";
-
 /// `keys`, and those that every estimator has.
 std::vector<ParamInfo> WithCommonKeys(std::vector<ParamInfo> keys) {
   const auto add = [&](const char* name, const char* type, const char* fallback, const char* doc,
@@ -43,8 +43,6 @@ std::vector<ParamInfo> WithCommonKeys(std::vector<ParamInfo> keys) {
   return keys;
 }
 
-std::vector<ParamInfo> EkfKeys() { return WithCommonKeys(EkfOptions::Schema()); }
-
 std::vector<ParamInfo> KeysOf(const PluginHost& host, const PluginEntry& entry) {
   const std::vector<ParamInfo> keys = host.Schema(entry);
   return entry.kind == PluginEntry::Kind::kEstimator ? WithCommonKeys(keys) : keys;
@@ -53,12 +51,14 @@ std::vector<ParamInfo> KeysOf(const PluginHost& host, const PluginEntry& entry) 
 /// The entries called `name`; there may be none for a built-in estimator only.
 std::vector<const PluginEntry*> Named(const PluginHost& host, const std::string& name) {
   std::vector<const PluginEntry*> entries = Sorted(host);
-  std::vector<std::string> names = {kEkf};
+  std::vector<std::string> names;
+  for (const EstimatorType& type : EstimatorTypes()) names.emplace_back(type.name);
   for (const PluginEntry* entry : entries) names.push_back(entry->name);
   std::erase_if(entries, [&](const PluginEntry* entry) { return entry->name != name; });
-  if (entries.empty() && name != kEkf) {
+  if (entries.empty() && FindEstimatorType(name) == nullptr) {
     throw Error(ExitCode::kPlugin, ErrorLine({}, {}, "no plugin offers '" + name + "'",
-                                             "a name that `alidade plugins list` prints, or ekf",
+                                             "a name that `alidade plugins list` prints, or a "
+                                             "type of estimator",
                                              Nearest(name, names)) +
                                        "\n" + PluginPlaces(host));
   }
@@ -126,8 +126,8 @@ std::string PluginListJson(const PluginHost& host) {
 
 std::string PluginInfo(const PluginHost& host, const std::string& name) {
   std::string text;
-  if (name == kEkf) {
-    text = kEkf + std::string(": estimator\n  ") + kEkfDoc + "\n\n" + Parameters(EkfKeys());
+  if (const EstimatorType* type = FindEstimatorType(name)) {
+    text = name + ": estimator\n  " + type->doc + "\n\n" + Parameters(WithCommonKeys(type->schema()));
   }
   for (const PluginEntry* entry : Named(host, name)) {
     if (!text.empty()) text += '\n';
@@ -145,13 +145,13 @@ std::string PluginInfo(const PluginHost& host, const std::string& name) {
 std::string PluginInfoJson(const PluginHost& host, const std::string& name) {
   Json json;
   json.Array();
-  if (name == kEkf) {
+  if (const EstimatorType* type = FindEstimatorType(name)) {
     json.Object();
-    json.Key("name").Text(kEkf);
+    json.Key("name").Text(type->name);
     json.Key("kind").Text("estimator");
-    json.Key("doc").Text(kEkfDoc);
+    json.Key("doc").Text(type->doc);
     json.Key("parameters").Array();
-    for (const ParamInfo& info : EkfKeys()) AddParameter(info, json);
+    for (const ParamInfo& info : WithCommonKeys(type->schema())) AddParameter(info, json);
     json.End();
     json.End();
   }

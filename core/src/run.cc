@@ -117,6 +117,13 @@ void Fail(RunResult& result, ExitCode code, std::string reason) {
   result.reason = std::move(reason);
 }
 
+/// The text of the event by which the estimator diverged or failed, else of the last one.
+std::string Cause(const std::vector<Event>& events, const char* otherwise) {
+  const auto cause = std::ranges::find(events, true, &Event::divergence);
+  if (cause != events.end()) return cause->text;
+  return events.empty() ? otherwise : events.back().text;
+}
+
 /// One frame through one estimator; false where the whole run has to end.
 bool Advance(Running& one, const Seen& seen, const RunOptions& options, RunResult& result) {
   if (one.ended) return true;
@@ -130,7 +137,7 @@ bool Advance(Running& one, const Seen& seen, const RunOptions& options, RunResul
   const bool policy = one.named.on_divergence == OnDivergence::kFail && estimator.diverged();
   if (!one.ended && !policy) return true;
   if (result.status == RunStatus::kOk) {
-    const std::string why = report.events.empty() ? "diverged" : report.events.back().text;
+    const std::string why = Cause(report.events, "diverged");
     char at[48];
     std::snprintf(at, sizeof(at), " at t = %.6f s: ", Seconds(seen.frame.stamp));
     Fail(result, ExitCode::kDiverged, "estimator '" + one.named.name + "'" + at + why);
@@ -197,7 +204,7 @@ void SmoothAll(std::vector<Running>& running, const std::vector<Seen>& kept,
     one.Note(events);
     if (!estimator.failed()) continue;
     Fail(result, ExitCode::kDiverged,
-         "estimator '" + one.named.name + "': " + (events.empty() ? "failed" : events.back().text));
+         "estimator '" + one.named.name + "': " + Cause(events, "failed"));
   }
 }
 

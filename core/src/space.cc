@@ -55,6 +55,49 @@ void UnitVectorTransport(const double* from, const double* to, double* j) {
   }
 }
 
+/// The right Jacobian of SO(3), with t = |d|:
+///
+///   J = I - (1 - cos t) / t^2 [d]x + (t - sin t) / t^3 [d]x^2     [Sola2017] eq. 183
+///
+/// where [d]x^2 = d d' - t^2 I.
+void RightJacobian(const double* d, double* j) {
+  const double t2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], t = std::sqrt(t2);
+  constexpr double kSeries = 1e-4;
+  const double a = t < kSeries ? 0.5 - t2 / 24.0 : (1.0 - std::cos(t)) / t2;
+  const double b = t < kSeries ? 1.0 / 6.0 - t2 / 120.0 : (t - std::sin(t)) / (t2 * t);
+  const double cross[9] = {0.0, -d[2], d[1], d[2], 0.0, -d[0], -d[1], d[0], 0.0};
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      const double one = row == column ? 1.0 : 0.0;
+      j[3 * row + column] = one - a * cross[3 * row + column] + b * (d[row] * d[column] - t2 * one);
+    }
+  }
+}
+
+/// Derivative of the exponential map of S^2: along d nothing is stretched, across it lengths go
+/// with sin |d| / |d|; then what geodesic transport makes of both.
+void UnitVectorPlusJacobian(const double* x, const double* d, double* j) {
+  const double t2 = d[0] * d[0] + d[1] * d[1], t = std::sqrt(t2);
+  constexpr double kSeries = 1e-4;
+  const double s = t < kSeries ? 1.0 - t2 / 6.0 : std::sin(t) / t;
+  const double k = t < kSeries ? 1.0 / 6.0 : (1.0 - s) / t2;  // of d d'
+  double y[3], transport[4];
+  UnitPlus<alidade::UnitVector>(x, d, y);
+  UnitVectorTransport(x, y, transport);
+  for (int row = 0; row < 2; ++row) {
+    const double along = transport[2 * row] * d[0] + transport[2 * row + 1] * d[1];
+    for (int column = 0; column < 2; ++column) {
+      j[2 * row + column] = s * transport[2 * row + column] + k * along * d[column];
+    }
+  }
+}
+
+void Identity(int size, double* j) {
+  for (int row = 0; row < size; ++row) {
+    for (int column = 0; column < size; ++column) j[row * size + column] = row == column;
+  }
+}
+
 }  // namespace
 
 const char* ToString(GeometryKind kind) {
@@ -106,9 +149,13 @@ void Geometry::Minus(const double* y, const double* x, double* d) const {
 
 void Geometry::Transport(const double* from, const double* to, double* j) const {
   if (kind == GeometryKind::kUnitVector) return UnitVectorTransport(from, to, j);
-  for (int row = 0; row < tangent; ++row) {
-    for (int column = 0; column < tangent; ++column) j[row * tangent + column] = row == column;
-  }
+  alidade::Identity(tangent, j);
+}
+
+void Geometry::PlusJacobian(const double* x, const double* d, double* j) const {
+  if (kind == GeometryKind::kUnitQuaternion) return RightJacobian(d, j);
+  if (kind == GeometryKind::kUnitVector) return UnitVectorPlusJacobian(x, d, j);
+  alidade::Identity(tangent, j);
 }
 
 double Geometry::Defect(const double* x) const {

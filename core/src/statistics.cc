@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "alidade/statistics.h"
+
 #include <Eigen/Core>
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
@@ -6,7 +8,6 @@
 #include <vector>
 
 #include "alidade/error.h"
-#include "alidade/metrics.h"
 
 namespace alidade {
 

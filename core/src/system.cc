@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <limits>
 
 #include "names.h"
 
@@ -182,13 +183,28 @@ RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& mod
   return binding;
 }
 
+/// `{huber: k}` or `{cauchy: k}`.
+RobustLoss ReadLoss(const Node& node) {
+  const auto huber = node.Find("huber"), cauchy = node.Find("cauchy");
+  if (huber.has_value() == cauchy.has_value()) {
+    node.RejectUnread();
+    node.Fail("not one loss with its scale", "one of {huber: SCALE}, {cauchy: SCALE}");
+  }
+  const Node& scale = huber ? *huber : *cauchy;
+  node.RejectUnread();
+  return {huber ? LossKind::kHuber : LossKind::kCauchy,
+          scale.Number(0.0, std::numeric_limits<double>::infinity(), true, true)};
+}
+
 SensorBinding ReadSensor(const std::string& name, const Node& entry, const PluginHost& host,
                          const System& system) {
   const std::string model_name = entry.At("model", "a sensor entry").Text();
   SensorBinding binding{name,
                         entry.At("stream", "sensor '" + name + "'").Text(),
                         host.CreateSensor(model_name, entry),
+                        {},
                         {}};
+  if (const auto loss = entry.Find("loss")) binding.loss = ReadLoss(*loss);
   const Node roles = entry.At("roles", "sensor '" + name + "'");
   for (const Space& role : binding.model.roles()) {
     const auto node = roles.Find(role.name);

@@ -324,6 +324,10 @@ TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
     EXPECT_TRUE(Contains(ekf.out, part)) << part << '\n' << ekf.out;
   }
   EXPECT_TRUE(Contains(Call({"plugins", "info", "ekf", "--json"}).out, "\"estimator\""));
+  const Outcome iekf = Call({"plugins", "info", "iekf"});
+  for (const char* part : {"iekf: estimator", "max_iterations", "[2, 1000]", "tolerance"}) {
+    EXPECT_TRUE(Contains(iekf.out, part)) << part << '\n' << iekf.out;
+  }
 
   const Outcome missing = Call({"plugins", "info", "stereo_disparit"});
   EXPECT_EQ(missing.code, 69);

@@ -45,6 +45,25 @@ TEST_F(ExplainCli, TellsWhichTruthIsOfWhichBlock) {
   EXPECT_FALSE(Contains(Call({"explain", "table.yaml"}).out, "truth  ")) << some.out;
 }
 
+TEST_F(ExplainCli, TellsTheOptionsOfEachTypeOfEstimator) {
+  const Outcome ekf =
+      Call({"explain", "config.yaml", "--set", "estimators.ekf.jacobian=first_estimate", "--set",
+            "sensors.stereo.loss={huber: 1.345}"});
+  for (const char* part :
+       {"jacobian       first_estimate: H where", "loss           stereo: huber 1.345",
+        "considered (Schmidt)", "robust losses"}) {
+    EXPECT_TRUE(Contains(ekf.out, part)) << part << '\n' << ekf.out;
+  }
+  const Outcome iekf = Call({"explain", "config.yaml", "--set", "estimators.ekf.type=iekf"});
+  for (const char* part :
+       {"(iekf)", "max_iterations  10", "tolerance       1e-04 sigma of the posterior",
+        "blocks estimated or fixed; roles estimate, hold;",
+        "Not: considered blocks and roles, linearise_at measurement, control"}) {
+    EXPECT_TRUE(Contains(iekf.out, part)) << part << '\n' << iekf.out;
+  }
+  EXPECT_FALSE(Contains(iekf.out, "loss  ")) << iekf.out;
+}
+
 TEST_F(ExplainCli, TellsWhatAFixedBlockIs) {
   const Outcome none = Call({"explain", "config.yaml"});
   EXPECT_FALSE(Contains(none.out, "fixed: ")) << none.out;
@@ -59,6 +78,9 @@ TEST_F(ExplainCli, TellsWhatAFixedBlockIs) {
     EXPECT_TRUE(Contains(one.out, part)) << part << '\n' << one.out;
   }
   EXPECT_FALSE(Contains(one.out, "nothing for")) << one.out;
+  const Outcome considered =
+      Call({"explain", "config.yaml", "--set", "state.target.consider=[depth]"});
+  EXPECT_TRUE(Contains(considered.out, "in a row; nothing for stereo\n")) << considered.out;
   // Stereo sees nothing but a fixed block.
   const Outcome all =
       Call({"explain", "config.yaml", "--set", "state.target.fixed=[depth, depth_rate]"});

@@ -10,6 +10,17 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
+/// The system with the block `name` estimated, considered or fixed.
+System WithStatus(System system, const std::string& name, BlockStatus status) {
+  StateLayout layout;
+  for (const Block& block : system.layout.blocks()) {
+    layout.Declare(block.name, block.owner, block.space,
+                   block.name == name ? status : block.status);
+  }
+  system.layout = layout;
+  return system;
+}
+
 /// Returns what is not a number once x passes 5, from h and from its Jacobian.
 struct Broken : Sensor<Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}};
@@ -188,13 +199,7 @@ TEST(Ekf, AHeldRoleIsExactWhereABlockStartsFromIt) {
 
 TEST(Ekf, ALockedOutSensorOfFixedBlocksInflatesNothing) {
   const auto event_of = [](BlockStatus status) {
-    System system = DepthFilter();
-    StateLayout layout;
-    for (const Block& block : system.layout.blocks()) {
-      layout.Declare(block.name, block.owner, block.space,
-                     block.name == "target.depth" ? status : block.status);
-    }
-    system.layout = layout;
+    System system = WithStatus(DepthFilter(), "target.depth", status);
     system.priors[0].mean = {3.0};
     system.priors[0].covariance(0, 0) = 1e-6;
     EkfOptions options;
@@ -208,6 +213,77 @@ TEST(Ekf, ALockedOutSensorOfFixedBlocksInflatesNothing) {
   const std::string why = "sensor 'disparity' rejected 20 times in a row: ";
   EXPECT_EQ(event_of(BlockStatus::kEstimated), why + "inflated the covariance of its blocks");
   EXPECT_EQ(event_of(BlockStatus::kFixed), why + "it corrects no block to inflate");
+  EXPECT_EQ(event_of(BlockStatus::kConsidered), why + "it corrects no block to inflate");
+}
+
+TEST(Ekf, AResetLeavesConsideredBlocksAsTheyAre) {
+  System system = WithStatus(DepthFilter(), "target.depth_rate", BlockStatus::kConsidered);
+  system.priors[0].mean = {3.0};
+  system.priors[0].covariance(0, 0) = 1e-6;
+  EkfOptions options;
+  options.gate = 0.999;
+  Ekf ekf(system, options, StreamsOf(system));
+  ekf.Start(0);
+  UpdateReport report;
+  for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(1.0, {{0, 65.0}}));
+  ASSERT_EQ(report.events.back().kind, "lockout");
+  EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), 0.4, 1e-15);
+  // 0.25 of the prior and 1 of the acceleration over the second.
+  EXPECT_EQ(CovarianceOf(ekf.state(), "target.depth_rate", "target.depth_rate"), 1.25);
+}
+
+/// z = x + y, which tells y; y may stay unbound.
+struct WithOptional : Sensor<Vec<1>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"},
+                                     Quantity{"y", "", "", "", ALIDADE_ROLE_OPTIONAL}};
+  static constexpr Quantity kMeasurement{"z"};
+  static constexpr int kInitialises = 1;
+  template <class T>
+  bool Predict(const T* x, const T* y, T* z) const {
+    z[0] = y == nullptr ? x[0] : x[0] + y[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(1e-3);
+  }
+  template <class T>
+  bool Initialise(const T* x, const T* z, T* y) const {
+    y[0] = z[0] - x[0];
+    return true;
+  }
+};
+
+TEST(Ekf, ALockedOutSensorWhoseRoleIsUnboundInflatesWhatItCorrects) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.0, 1.0}});
+  AddSensor(system, "s", InProcessSensor(WithOptional(), "with_optional"), {"p.x"});
+  system.sensors[0].roles.push_back({});
+  EkfOptions options;
+  options.gate = 0.999;
+  Ekf ekf(system, options, StreamsOf(system));
+  UpdateReport report;
+  for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(0.0, {{0, 100.0}}));
+  ASSERT_FALSE(report.events.empty());
+  EXPECT_EQ(report.events.back().text,
+            "sensor 's' rejected 20 times in a row: inflated the covariance of its blocks");
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "p.x", "p.x"), 100.0, 1e-12);
+}
+
+TEST(Ekf, ThatASensorLeftItsDomainIsNotedAlsoAfterAGatedMeasurement) {
+  System system = DepthFilter();
+  system.priors[1].mean = {-1.0};
+  EkfOptions options;
+  options.gate = 0.999;
+  Ekf ekf(system, options, StreamsOf(system));
+  EXPECT_EQ(ekf.Process(FrameAt(0.0, {{0, 1e6}})).measurements()[0].outcome, Outcome::kGated);
+  EXPECT_FALSE(ekf.diverged());
+  const UpdateReport& report = ekf.Process(FrameAt(1.0, {{0, 80.0}}));
+  EXPECT_EQ(report.measurements()[0].outcome, Outcome::kOutOfDomain);
+  EXPECT_TRUE(ekf.diverged());
+  ASSERT_EQ(report.events.size(), 1u);
+  EXPECT_EQ(report.events[0].kind, "diverged");
+  EXPECT_TRUE(ekf.Process(FrameAt(1.0, {{0, 80.0}})).events.empty());
 }
 
 }  // namespace

@@ -63,6 +63,22 @@ TEST(Run, DivergenceUnderFailEndsTheRun) {
   EXPECT_NE(result.reason.find("not defined at target.depth = -0.2"), std::string::npos);
 }
 
+TEST(Run, TheReasonOfAFailureIsTheEventThatCausedIt) {
+  Experiment experiment = MakeExperiment();
+  NamedEstimator& alone = experiment.estimators[1];
+  alone.on_divergence = OnDivergence::kFail;
+  alone.system.priors[0].mean = {-0.2};
+  EkfOptions options;
+  options.lockout_after = 1;
+  alone.estimator = std::make_unique<Ekf>(alone.system, options, experiment.source->streams());
+  const RunResult result = alidade::Run(experiment, {});
+  ASSERT_EQ(result.code, ExitCode::kDiverged);
+  const std::vector<Event>& events = result.estimators[1].events;
+  EXPECT_EQ(std::ranges::count(events, "lockout", &Event::kind), 1);
+  EXPECT_NE(result.reason.find("not defined at target.depth = -0.2"), std::string::npos)
+      << result.reason;
+}
+
 /// Says at the end that the depth was 1 m at the first frame, and a millimetre more at each next.
 struct Hindsight : Estimator {
   explicit Hindsight(const System& system) : state_(system.InitialState()) {}

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <random>
+#include <vector>
 
 namespace alidade {
 namespace {
@@ -97,6 +98,27 @@ TEST_P(GeometryLaws, PlusStaysOnTheManifoldAndMayWriteOverItsArgument) {
     geometry_.Plus(x.data(), d.data(), x.data());
   }
   EXPECT_LE(geometry_.Defect(x.data()), 1e-15);
+}
+
+TEST_P(GeometryLaws, ThePlusJacobianIsThatOfPlus) {
+  constexpr double kStep = 1e-6;
+  const auto n = static_cast<std::size_t>(geometry_.tangent);
+  for (int k = 0; k < kPoints; ++k) {
+    const Values x = Point(), d = Step(k % 4 == 0 ? 1e-5 : 0.02 * k / 2.0);
+    const Values y = Plus(x, d);
+    std::vector<double> j(n * n);
+    geometry_.PlusJacobian(x.data(), d.data(), j.data());
+    for (std::size_t c = 0; c < n; ++c) {
+      Values above = d, below = d;
+      above[c] += kStep;
+      below[c] -= kStep;
+      const Values up = Minus(Plus(x, above), y), down = Minus(Plus(x, below), y);
+      for (std::size_t r = 0; r < n; ++r) {
+        // Rounding of 1e-16 over the step, and its square.
+        EXPECT_NEAR(j[r * n + c], (up[r] - down[r]) / (2.0 * kStep), 1e-8) << k;
+      }
+    }
+  }
 }
 
 TEST_P(GeometryLaws, TransportIsOrthogonalAndTheIdentityAtOnePoint) {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "alidade/metrics.h"
+#include "alidade/statistics.h"
 #include "support/systems.h"
 
 namespace alidade {

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "alidade/statistics.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -6,7 +8,6 @@
 #include <vector>
 
 #include "alidade/error.h"
-#include "alidade/metrics.h"
 #include "alidade/random.h"
 
 namespace alidade {

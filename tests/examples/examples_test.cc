@@ -76,7 +76,7 @@ TEST(Examples, EveryExampleRuns) {
     EXPECT_EQ(run.code, ExitCode::kOk) << entry.path();
     EXPECT_TRUE(std::filesystem::exists(entry.path() / "README.md")) << entry.path();
   }
-  EXPECT_GE(count, 6);
+  EXPECT_GE(count, 7);
 }
 
 // Experiment 4.1: the prediction crosses Z = 0 in about half of the runs, which is reported.
@@ -143,6 +143,19 @@ TEST(Examples, ThePrincipledFilterBeatsTheFusedFilterOf2017) {
   for (const char* key : {"nees.cov95:target@blind", "nees.cov95:target@seeing"}) {
     EXPECT_GE(principled[key], 0.95) << key;
     EXPECT_LE(principled[key], 0.995) << key;
+  }
+}
+
+// A start that is off by 5 cm, and by 10 % in lambda, under priors that say so.
+TEST(Examples, TheIteratedFilterStartsFromFarAway) {
+  const auto means = Sweep("06_depth_poor_start");
+  const Means &ekf = means.at("ekf"), &iekf = means.at("iekf");
+  EXPECT_EQ(iekf.diverged, 0);
+  EXPECT_LE(iekf["rmse:target.depth"], 0.0021);
+  EXPECT_LT(iekf["rmse:target.depth"], 0.95 * ekf["rmse:target.depth"]);
+  for (const char* key : {"nees.cov95:target@blind", "nees.cov95:target@seeing"}) {
+    EXPECT_GE(iekf[key], 0.95) << key;
+    EXPECT_LE(iekf[key], 0.995) << key;
   }
 }
 

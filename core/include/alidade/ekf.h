@@ -24,18 +24,26 @@ enum class Lockout {
   kNone,
 };
 
+/// Where H is taken for the blocks of stationary motion models (`constant`) [Huang2010].
+enum class JacobianAt {
+  kLatest,         ///< their estimate
+  kFirstEstimate,  ///< what they started from: the prior's mean, or what a measurement implied
+};
+
 struct EkfOptions {
   /// Probability with which a measurement that fits passes the gate; 1: no gate.
   double gate = 1.0;
   Fuse fuse = Fuse::kJoint;
+  JacobianAt jacobian = JacobianAt::kLatest;
   Lockout lockout = Lockout::kReset;
   int lockout_after = 20;  ///< consecutive rejections of one sensor
-  /// Longer gaps are stepped in equal parts of at most this.
+  /// Longer gaps are stepped in equal parts of at most this, to whole ns, and at least 1 ns.
   double max_dt_s = std::numeric_limits<double>::infinity();
 
-  /// Reads `gate`, `fuse` (`joint`, `per_sensor`, `per_measurement`), `lockout` (`after`; `action`:
-  /// `reset`, `inflate`, `none`) and `max_dt_s` from an estimator's entry of the config; what is
-  /// not there keeps its default. Errors: kBadConfig.
+  /// Reads `gate`, `fuse` (`joint`, `per_sensor`, `per_measurement`), `jacobian` (`latest`,
+  /// `first_estimate`), `lockout` (`after`; `action`: `reset`, `inflate`, `none`) and `max_dt_s`
+  /// from an estimator's entry of the config; what is not there keeps its default.
+  /// Errors: kBadConfig.
   static EkfOptions FromNode(const Node& entry);
   /// What FromNode reads.
   static std::vector<ParamInfo> Schema();
@@ -43,7 +51,8 @@ struct EkfOptions {
 
 /// Extended Kalman filter: x' = f(x, 0), P' = F P F' + G Q G'; an update with stacked Jacobian H
 /// of all accepted measurements, S = H P H' + R = L L', W = P H' L^-T, dx = W L^-1 r, P -= W W'.
-/// Where a gain is not the optimal one (considered blocks) the Joseph form takes its place.
+/// Where a gain is not the optimal one (considered blocks) the Joseph form takes its place. With a
+/// robust loss on the sensor R / w(d) stands for R, d^2 = r' S^-1 r.
 ///
 /// An update is a transaction: what would leave the state not finite or not positive definite is
 /// rolled back and reported.
@@ -62,17 +71,20 @@ class Ekf : public Estimator {
   bool diverged() const override { return diverged_; }
   bool failed() const override { return failed_; }
 
- private:
+ protected:  // for the estimators that share how frames are stepped to, read, gated and reported
+  /// @cond
   /// How a sensor touches the state, as long as the layout stays as it is.
   struct SensorPlan {
     std::vector<const double*> roles;  ///< values; null where unbound or without a value yet
+    std::vector<const double*> at;     ///< where H is taken: `roles`, where not apart
     std::vector<int> columns;          ///< of each role in a row of H; -1: no Jacobian
     std::vector<int> strides;          ///< for the model: `width` for each role
     std::vector<JacobianPart> parts;
     std::vector<bool> considered;  ///< of the parts
     int width = 0;                 ///< of a row of H: n where the covariance is small
     bool ready = true;             ///< all roles have a value
-    bool at_measurement = false;   ///< a role is linearised at what the measurement implies
+    bool apart = false;            ///< H is taken elsewhere than h
+    std::vector<double> implied;   ///< of the role that is linearised at what z implies
   };
   /// How a motion model moves the state.
   struct MotionPlan {
@@ -90,13 +102,18 @@ class Ekf : public Estimator {
     std::size_t report = 0;              ///< index into UpdateReport::measurements()
     std::vector<double> h;               ///< H, m rows of the plan's width
     std::vector<double> r, l, pht;       ///< R and its factor, m x m; P H', n x m by columns
+    double weight = 1.0;                 ///< w of the robust loss; R is divided by it
     const SensorPlan* zeroed = nullptr;  ///< whose zeros H holds
   };
 
   void Bind();
+  void KeepFirstEstimates();
   void BindMotions();
   void StepTo(Stamp stamp);
   bool StepOnce(double dt_s);
+  bool StepIsBounded() const;
+  bool Propagate();
+  void PropagateModels();
   bool StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s);
 
   void Collect(const Frame& frame);
@@ -104,16 +121,27 @@ class Ekf : public Estimator {
   Outcome Linearise(Row& row);
   Outcome NoiseOf(Row& row, const double* const* roles);
   Outcome Evaluate(Row& row, MeasurementReport& entry);
-  Outcome EvaluateAtMeasurement(Row& row, MeasurementReport& entry);
+  Outcome EvaluateApart(Row& row, MeasurementReport& entry);
+  void Chain(Row& row, int column, const RowMajor& j) const;
+  /// S of one measurement by itself, in its report.
+  void Project(Row& row);
   Outcome Gate(Row& row);
+  void Weigh(Row& row);
   void CheckConditioning(const Row& row);
-  Outcome Apply(std::span<Row* const> rows);
+  /// One update with all rows: all of it happens or nothing.
+  virtual Outcome Apply(std::span<Row* const> rows);
   Outcome ApplySmall(std::span<Row* const> rows, int m);
-  Outcome ApplyLarge(std::span<Row* const> rows, int m);
+  Outcome ApplyLarge(std::span<Row* const> rows);
   bool MaskConsidered(std::span<Row* const> rows, Eigen::MatrixXd& gain) const;
   bool Correct(const Eigen::MatrixXd& w, const Eigen::MatrixXd& gain, bool masked,
                const Eigen::MatrixXd& h, const Eigen::MatrixXd& r);
-  bool Move(const double* dx);
+  /// The rows below one another: H (m x n), R and the innovation r.
+  struct Stacked {
+    Eigen::MatrixXd h, noise;
+    Eigen::VectorXd innovation;
+  };
+  Stacked Stack(std::span<Row* const> rows) const;
+  Eigen::MatrixXd ProjectionOf(std::span<Row* const> rows) const;
   void RecordGain(MeasurementReport& entry, const double* gain) const;
 
   void InitialiseFromMeasurements();
@@ -131,8 +159,11 @@ class Ekf : public Estimator {
     return plans_[static_cast<std::size_t>(row.sensor)];
   }
   JacobianRows JacobianOf(const Row& row) const;
+  std::vector<double>& FirstEstimate(BlockId id) { return first_[static_cast<std::size_t>(id)]; }
+  void NoteRefusal(const Row& row, Outcome outcome);
   void NotePluginFailure(const SensorBinding& sensor);
-  void Note(const char* kind, std::string text);
+  Event& Note(const char* kind, std::string text);
+  void NoteDivergence(const char* kind, std::string text);
   void GiveUp(const char* kind, const std::string& what);
   std::string Describe(const std::vector<BlockId>& blocks) const;
 
@@ -145,16 +176,19 @@ class Ekf : public Estimator {
   std::vector<int> order_;    ///< rows of P in the order of the layout; empty: as they are
   bool waiting_ = false;      ///< a block has no value yet
   bool considering_ = false;  ///< a block is considered
+  std::vector<std::vector<double>> first_;       ///< estimates of stationary blocks, by block
+  const Eigen::VectorXd* correction_ = nullptr;  ///< dx of the update; null: K r
   // Memory that is kept from frame to frame.
   UpdateReport report_;
   std::vector<Row> rows_;  ///< the first row_count_ are in use
   std::size_t row_count_ = 0;
   std::vector<Row*> group_, passed_;
-  std::vector<double> next_, moved_;
+  std::vector<double> next_, moved_, predicted_;
   std::vector<double*> jacobians_;
   Stamp stamp_ = kNoStamp;
   std::vector<double> gate_threshold_;  ///< on r' S^-1 r, by sensor
   std::vector<int> rejections_;         ///< consecutive, by sensor
+  std::vector<bool> out_of_domain_;     ///< since the last acceptance, by sensor
   std::vector<bool> inflated_;          ///< since the last acceptance, by sensor
   std::vector<bool> warned_;            ///< of conditioning, by sensor
   /// The last accepted measurement, for the record of a failure.
@@ -165,6 +199,7 @@ class Ekf : public Estimator {
   } last_used_;
   bool diverged_ = false;
   bool failed_ = false;
+  /// @endcond
 };
 
 }  // namespace alidade

@@ -28,6 +28,7 @@ enum class Outcome {
 const char* ToString(Outcome outcome);
 /// What a model's status means for the measurement; kOk is kAccepted.
 Outcome OutcomeOf(Status status);
+/// Whether none of the values is infinite or not a number.
 inline bool AllFinite(std::span<const double> values) {
   double sum = 0.0;  // 0 times what is not finite is not a number
   for (const double value : values) sum += 0.0 * value;
@@ -40,10 +41,10 @@ struct MeasurementReport {
   Outcome outcome = Outcome::kAccepted;
   std::int64_t landmark = -1;
   int dof = 0;
-  double nis = 0.0;                ///< r' S^-1 r, not divided by dof
+  double nis = 0.0;                ///< r' S^-1 r, not divided by dof; S without the loss
   std::vector<double> z, h;        ///< ambient
   std::vector<double> innovation;  ///< r = z (-) h, m
-  std::vector<double> s;           ///< S = H P H' + R, m x m
+  std::vector<double> s;           ///< S = H P H' + R / w, m x m; w < 1 by a robust loss alone
   /// K by columns, its rows those of the blocks with a covariance in the order of the layout; empty
   /// unless accepted.
   std::vector<double> gain;
@@ -64,6 +65,7 @@ struct Event {
   Stamp stamp = kNoStamp;
   std::string kind;  ///< one word: diverged, lockout, conditioning, not_finite, ...
   std::string text;
+  bool divergence = false;  ///< the estimator diverged or failed by this
 };
 
 /// What one frame did. Filled again and again without allocating.

@@ -37,6 +37,9 @@ struct Geometry {
   /// j (tangent x tangent, row-major): carries a tangent vector at `from` to the tangent space of
   /// `to` along the geodesic. The identity but for unit vectors, whose basis turns with the point.
   void Transport(const double* from, const double* to, double* j) const;
+  /// j (tangent x tangent, row-major) = d(x (+) d)/dd, in the tangent space at x (+) d: the
+  /// identity for vectors and angles, and where d = 0.
+  void PlusJacobian(const double* x, const double* d, double* j) const;
   /// Distance of x from the manifold: 0 for vectors, | |x| - 1 | for unit vectors and quaternions.
   double Defect(const double* x) const;
   /// The nearest point of the manifold; an angle is wrapped.

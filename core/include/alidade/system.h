@@ -10,6 +10,7 @@
 #include "alidade/config.h"
 #include "alidade/models.h"
 #include "alidade/plugin_host.h"
+#include "alidade/robust_loss.h"
 #include "alidade/state.h"
 
 namespace alidade {
@@ -34,6 +35,7 @@ struct SensorBinding {
   std::string stream;
   SensorModel model;
   std::vector<RoleBinding> roles;
+  RobustLoss loss = {};  ///< on the Mahalanobis distance of the innovation
 };
 
 /// Motion model -> the blocks it moves.

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "alidade/ekf.h"
+
+namespace alidade {
+
+struct IekfOptions : EkfOptions {
+  int max_iterations = 10;  ///< most linearisations of an update
+  /// An update has converged where its next step is at most this, in posterior standard deviations.
+  double tolerance = 1e-4;
+
+  /// Reads what EkfOptions reads but `jacobian`, and `max_iterations`, `tolerance`.
+  /// Errors: kBadConfig.
+  static IekfOptions FromNode(const Node& entry);
+  /// What FromNode reads.
+  static std::vector<ParamInfo> Schema();
+};
+
+/// Iterated extended Kalman filter [Bell1993]: an Ekf whose updates minimise
+///
+///   c(dx) = dx' P^-1 dx + r' R^-1 r,   r = z (-) h(x (+) dx)
+///
+/// over dx by Gauss-Newton, P the prediction's covariance. At each iterate, H = d h / d dx there,
+///
+///   dx+ = K (r + H dx),   K = P H' S^-1,   S = H P H' + R
+///
+/// and the step dx+ - dx is halved while c rises, or h is not defined. R is that of the iterate,
+/// kept during a step. The covariance is P - K S K' of the last linearisation. Gate and robust loss
+/// are decided at the prediction, and h, S and NIS are reported as they are there.
+///
+/// An update that does not converge keeps its last iterate and notes the event `not_converged`. One
+/// with R not positive definite has no such c: it is that of the Ekf.
+///
+/// The system has no considered blocks or roles and no role that is linearised at the measurement,
+/// and `jacobian` is kLatest: ContractViolation otherwise.
+class Iekf : public Ekf {
+ public:
+  Iekf(System system, const IekfOptions& options, const std::vector<StreamInfo>& streams);
+
+ private:
+  struct Minimum {
+    Eigen::VectorXd dx;
+    int iterations = 0;
+    double step = 0.0;  ///< that is left, in posterior standard deviations
+    bool converged = false;
+  };
+  Outcome Apply(std::span<Row* const> rows) override;
+  std::optional<Minimum> Minimise(std::span<Row* const> rows, const std::vector<double>& prior);
+  bool MoveFrom(const std::vector<double>& prior, const Eigen::VectorXd& dx);
+  bool Innovations(std::span<Row* const> rows, Eigen::VectorXd& innovations);
+  bool Relinearise(std::span<Row* const> rows, const std::vector<double>& prior,
+                   const Eigen::VectorXd& dx);
+
+  int max_iterations_;
+  double tolerance_;
+};
+
+}  // namespace alidade

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+
+#include "alidade/ekf.h"
+#include "cholesky.h"
+
+namespace alidade {
+
+/// One stacked update with all rows: transactional, so either all of it happens or nothing.
+Outcome Ekf::Apply(std::span<Row* const> rows) {
+  int m = 0;
+  bool considering = considering_;
+  for (const Row* row : rows) {
+    m += BindingOf(*row).model.measurement().geometry.tangent;
+    const std::vector<bool>& considered = PlanOf(*row).considered;
+    considering =
+        considering || std::find(considered.begin(), considered.end(), true) != considered.end();
+  }
+  const bool small = state_.covariance().small() && m <= Covariance::kSmall && !considering;
+  const Outcome outcome = small ? ApplySmall(rows, m) : ApplyLarge(rows);
+  if (outcome == Outcome::kNotPd) {
+    Note("not_pd", "the update would leave S or P not positive definite; rolled back");
+  } else if (outcome == Outcome::kNotFinite) {
+    Note("not_finite", "the update is not finite; rolled back");
+  } else {
+    const Row& last = *rows.back();
+    last_used_.sensor = last.sensor;
+    last_used_.stamp = last.measurement->stamp;
+    last_used_.z.assign(last.measurement->values.begin(), last.measurement->values.end());
+  }
+  return outcome;
+}
+
+/// `gain` is n x m by columns, its rows as they lie in P.
+void Ekf::RecordGain(MeasurementReport& entry, const double* gain) const {
+  const auto n = static_cast<std::size_t>(state_.covariance().size());
+  const auto m = static_cast<std::size_t>(entry.dof);
+  if (order_.empty()) return entry.gain.assign(gain, gain + n * m);
+  for (std::size_t j = 0; j < m; ++j) {
+    for (const int row : order_) entry.gain.push_back(gain[j * n + static_cast<std::size_t>(row)]);
+  }
+}
+
+/// Few states and few rows: nothing is allocated.
+Outcome Ekf::ApplySmall(std::span<Row* const> rows, int m) {
+  constexpr std::size_t kMost = Covariance::kSmall;
+  std::array<double, kMost * kMost> pht, s, w, gain;
+  std::array<double, kMost> innovation, inverse_d, dx;
+  const auto n = static_cast<std::size_t>(state_.covariance().size());
+  const auto all = static_cast<std::size_t>(m);
+  std::size_t at = 0;
+  for (const Row* row : rows) {
+    const MeasurementReport& entry = EntryOf(*row);
+    const JacobianRows h = JacobianOf(*row);
+    const auto k = static_cast<std::size_t>(entry.dof);
+    std::copy(row->pht.begin(), row->pht.end(), pht.begin() + at * n);
+    std::copy(entry.innovation.begin(), entry.innovation.end(), innovation.begin() + at);
+    for (std::size_t i = 0; i < k; ++i) {
+      for (std::size_t j = 0; j < k; ++j) s[(at + i) * all + at + j] = entry.s[i * k + j];
+      for (std::size_t j = 0; j < at; ++j) {  // H of this row times P H' of those before
+        double sum = 0.0;
+        for (const JacobianPart& part : h.parts) {
+          for (int c = 0; c < part.size; ++c) {
+            sum += h.data[i * static_cast<std::size_t>(h.stride) +
+                          static_cast<std::size_t>(part.column + c)] *
+                   pht[j * n + static_cast<std::size_t>(part.offset + c)];
+          }
+        }
+        s[(at + i) * all + j] = s[j * all + at + i] = sum;
+      }
+    }
+    at += k;
+  }
+  Covariance& p = state_.covariance();
+  const Covariance::Solved solved = p.Solve(m, pht.data(), s.data(), innovation.data(), w.data(),
+                                            inverse_d.data(), dx.data(), gain.data());
+  if (solved == Covariance::Solved::kNotPd) return Outcome::kNotPd;
+  if (solved == Covariance::Solved::kCancelled) return ApplyLarge(rows);
+  if (correction_ != nullptr) std::copy_n(correction_->data(), n, dx.begin());
+  if (!AllFinite({dx.data(), n})) return Outcome::kNotFinite;
+  state_.Retract(dx.data(), moved_);
+  if (!AllFinite(moved_)) return Outcome::kNotFinite;
+  p.Downdate(m, w.data(), inverse_d.data());
+  state_.MoveTo(moved_);
+  at = 0;
+  for (const Row* row : rows) {
+    MeasurementReport& entry = EntryOf(*row);
+    const auto k = static_cast<std::size_t>(entry.dof);
+    RecordGain(entry, gain.data() + at * n);
+    at += k;
+  }
+  return Outcome::kAccepted;
+}
+
+Ekf::Stacked Ekf::Stack(std::span<Row* const> rows) const {
+  Eigen::Index m = 0;
+  for (const Row* row : rows) m += BindingOf(*row).model.measurement().geometry.tangent;
+  Stacked all{Eigen::MatrixXd::Zero(m, state_.covariance().size()), Eigen::MatrixXd::Zero(m, m),
+              Eigen::VectorXd(m)};
+  Eigen::Index at = 0;
+  for (const Row* row : rows) {
+    const JacobianRows own = JacobianOf(*row);
+    const Eigen::Index k = own.rows;
+    const Eigen::Map<const RowMajor> compact(own.data, k, own.stride);
+    for (const JacobianPart& part : own.parts) {
+      all.h.block(at, part.offset, k, part.size) += compact.middleCols(part.column, part.size);
+    }
+    all.noise.block(at, at, k, k) = Eigen::Map<const RowMajor>(row->r.data(), k, k);
+    const MeasurementReport& entry = report_.measurements()[row->report];
+    all.innovation.segment(at, k) = Eigen::Map<const Eigen::VectorXd>(entry.innovation.data(), k);
+    at += k;
+  }
+  return all;
+}
+
+/// P H' of all rows, n x m.
+Eigen::MatrixXd Ekf::ProjectionOf(std::span<Row* const> rows) const {
+  const Eigen::Index n = state_.covariance().size();
+  Eigen::Index m = 0;
+  for (const Row* row : rows) m += BindingOf(*row).model.measurement().geometry.tangent;
+  Eigen::MatrixXd pht(n, m);
+  m = 0;
+  for (const Row* row : rows) {
+    const Eigen::Index k = BindingOf(*row).model.measurement().geometry.tangent;
+    pht.middleCols(m, k) = Eigen::Map<const Eigen::MatrixXd>(row->pht.data(), n, k);
+    m += k;
+  }
+  return pht;
+}
+
+Outcome Ekf::ApplyLarge(std::span<Row* const> rows) {
+  const int n = state_.covariance().size();
+  const Stacked all = Stack(rows);
+  const Eigen::MatrixXd pht = ProjectionOf(rows);
+  Eigen::MatrixXd s = all.noise;
+  Eigen::Index at = 0;
+  for (const Row* row : rows) {
+    const Eigen::Index k = EntryOf(*row).dof;
+    for (const JacobianPart& part : PlanOf(*row).parts) {
+      s.middleRows(at, k) +=
+          all.h.block(at, part.offset, k, part.size) * pht.middleRows(part.offset, part.size);
+    }
+    at += k;
+  }
+  Eigen::LLT<Eigen::MatrixXd> llt;
+  if (!internal::Factorise(s, llt)) return Outcome::kNotPd;
+  const Eigen::MatrixXd w = llt.matrixL().solve(pht.transpose()).transpose();
+  Eigen::MatrixXd gain = llt.solve(pht.transpose()).transpose();
+  const bool masked = MaskConsidered(rows, gain);
+  const Eigen::VectorXd dx = correction_ != nullptr ? *correction_ : gain * all.innovation;
+  state_.Retract(dx.data(), moved_);
+  if (!AllFinite(moved_) || !w.allFinite() || !gain.allFinite()) return Outcome::kNotFinite;
+  if (!Correct(w, gain, masked, all.h, all.noise)) return Outcome::kNotPd;
+  state_.MoveTo(moved_);
+  at = 0;
+  for (const Row* row : rows) {
+    MeasurementReport& entry = EntryOf(*row);
+    RecordGain(entry, gain.data() + at * n);
+    at += entry.dof;
+  }
+  return Outcome::kAccepted;
+}
+
+/// Zeroes the gain of considered blocks; true where that changed anything.
+bool Ekf::MaskConsidered(std::span<Row* const> rows, Eigen::MatrixXd& gain) const {
+  bool masked = false;
+  for (const Block& block : state_.layout().blocks()) {
+    if (!block.present || block.status != BlockStatus::kConsidered) continue;
+    gain.middleRows(block.tangent_offset, block.geometry().tangent).setZero();
+    masked = true;
+  }
+  Eigen::Index at = 0;
+  for (const Row* row : rows) {
+    const SensorPlan& plan = PlanOf(*row);
+    const Eigen::Index k = BindingOf(*row).model.measurement().geometry.tangent;
+    for (std::size_t i = 0; i < plan.parts.size(); ++i) {
+      if (!plan.considered[i]) continue;
+      gain.block(plan.parts[i].offset, at, plan.parts[i].size, k).setZero();
+      masked = true;
+    }
+    at += k;
+  }
+  return masked;
+}
+
+/// P after the update: P -= W W' for the optimal gain, Joseph's form for any other and where the
+/// difference would cancel to nothing. False, and P as it was, where P would not stay positive.
+bool Ekf::Correct(const Eigen::MatrixXd& w, const Eigen::MatrixXd& gain, bool masked,
+                  const Eigen::MatrixXd& h, const Eigen::MatrixXd& r) {
+  constexpr double kCancelled = 1e-10;
+  Covariance& p = state_.covariance();
+  bool joseph = masked;
+  for (int i = 0; i < p.size() && !joseph; ++i) {
+    joseph = p.Variance(i) - w.row(i).squaredNorm() < kCancelled * p.Variance(i);
+  }
+  if (!joseph) {
+    p.SubtractOuter(w);
+    return true;
+  }
+  Covariance updated = p;
+  updated.Joseph(gain, h, r);
+  for (int i = 0; i < updated.size(); ++i) {
+    if (!(updated.Variance(i) >= 0.0)) return false;
+  }
+  p = std::move(updated);
+  return true;
+}
+
+}  // namespace alidade

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+
+#include "support/systems.h"
+
+namespace alidade {
+namespace {
+
+using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
+
+TEST(Ekf, UnderFirstEstimateTheJacobianOfAStationaryBlockIsThatOfItsStart) {
+  // 1/scale = lambda Z: dh/dZ = lambda at its start, dh/dlambda = Z as it is.
+  System system = DepthFilter();
+  system.sensors.erase(system.sensors.begin());
+  EkfOptions options;
+  options.jacobian = JacobianAt::kFirstEstimate;
+  Ekf ekf(system, options, StreamsOf(system)), latest(system, {}, StreamsOf(system));
+  Eigen::Vector3d x(0.35, 0.0, 3.3);
+  Eigen::Matrix3d p = Eigen::Vector3d(0.01, 0.25, 0.25).asDiagonal();
+  for (int k = 0; k < 5; ++k) {
+    const double z = 1.0 + 0.05 * k;
+    ekf.Process(FrameAt(0.1 * k, {{0, z}}));
+    latest.Process(FrameAt(0.1 * k, {{0, z}}));
+    if (k > 0) {
+      Eigen::Matrix3d f = Eigen::Matrix3d::Identity();
+      f(0, 1) = 0.1;
+      const Eigen::Vector3d g(0.005, 0.1, 0.0);
+      x = f * x;
+      p = f * p * f.transpose() + g * g.transpose();
+    }
+    const Eigen::RowVector3d h(3.3, 0.0, x[0]);
+    const double predicted = x[0] * x[2], sigma = 2.0 / 300.0 * std::pow(predicted, 3);
+    const Eigen::Vector3d gain = p * h.transpose() / (h * p * h.transpose() + sigma * sigma);
+    x += gain * (z - predicted);
+    p = (Eigen::Matrix3d::Identity() - gain * h) * p;
+  }
+  EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), x[0], 1e-10);
+  EXPECT_NEAR(ValueOf(ekf.state(), "target.depth_rate"), x[1], 1e-10);
+  EXPECT_NEAR(ValueOf(ekf.state(), "template.inverse_distance"), x[2], 1e-10);
+  EXPECT_LT((ekf.state().covariance().Dense() - p).norm(), 1e-10);
+  EXPECT_GT(std::abs(ValueOf(latest.state(), "template.inverse_distance") - x[2]), 1e-6);
+}
+
+TEST(Ekf, AFirstEstimateIsThatOfTheMeasurementABlockStartsFrom) {
+  System system = DepthFilter();
+  system.priors[2] = {2, {}, {}, "inverse_scale"};
+  EkfOptions options;
+  options.jacobian = JacobianAt::kFirstEstimate;
+  Ekf ekf(system, options, StreamsOf(system));
+  ekf.Process(FrameAt(0.0, {{1, 1.05}}));
+  const double lambda = 1.05 / 0.35;
+  ASSERT_NEAR(ValueOf(ekf.state(), "template.inverse_distance"), lambda, 1e-12);
+  ekf.Process(FrameAt(0.1, {{0, 80.0}, {1, 1.0}}));
+  ASSERT_GT(std::abs(ValueOf(ekf.state(), "template.inverse_distance") - lambda), 1e-3);
+  const Eigen::Matrix3d p = ekf.state().covariance().Dense();
+  const double depth = ValueOf(ekf.state(), "target.depth");
+  const double sigma =
+      2.0 / 300.0 * std::pow(depth * ValueOf(ekf.state(), "template.inverse_distance"), 3);
+  const Eigen::RowVector3d h(lambda, 0.0, depth);
+  const UpdateReport& report = ekf.Process(FrameAt(0.1, {{1, 1.0}}));
+  EXPECT_NEAR(report.measurements()[0].s[0], h * p * h.transpose() + sigma * sigma, 1e-12);
+}
+
+TEST(Ekf, AResetMakesANewFirstEstimate) {
+  // The scale alone, its lambda far off: a lock-out resets it to z / Z.
+  System system = DepthFilter();
+  system.sensors.erase(system.sensors.begin());
+  system.priors[0].covariance(0, 0) = 1e-6;
+  system.priors[1].covariance(0, 0) = 1e-12;
+  system.priors[2].covariance(0, 0) = 1e-12;
+  EkfOptions options;
+  options.jacobian = JacobianAt::kFirstEstimate;
+  options.gate = 0.999;
+  Ekf ekf(system, options, StreamsOf(system));
+  UpdateReport report;
+  for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(0.0, {{0, 2.0}}));
+  ASSERT_EQ(report.events.back().kind, "lockout");
+  const double lambda = ValueOf(ekf.state(), "template.inverse_distance");
+  ASSERT_NEAR(lambda, 2.0 / 0.35, 1e-12);
+  const Eigen::Matrix3d p = ekf.state().covariance().Dense();
+  const Eigen::RowVector3d h(lambda, 0.0, 0.35);
+  const double sigma = 2.0 / 300.0 * 8.0;  // of 1/scale = 2
+  const UpdateReport& next = ekf.Process(FrameAt(0.0, {{0, 2.0}}));
+  EXPECT_NEAR(next.measurements()[0].s[0], h * p * h.transpose() + sigma * sigma, 1e-12);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,20 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/ekf.h"
-#include "param_reader.h"
+#include "filter_options.h"
 
 namespace alidade {
 namespace {
 
 EkfOptions Read(Params& p) {
-  EkfOptions options;
-  options.gate =
-      p.Number("gate", "", "probability with which a measurement that fits passes; 1: no gate",
-               {0.0, 1.0, true, false}, options.gate);
-  options.fuse = static_cast<Fuse>(p.Choice("fuse", {"joint", "per_sensor", "per_measurement"},
-                                            "how the measurements of one stamp make updates",
-                                            static_cast<int>(options.fuse)));
-  options.max_dt_s =
-      p.Positive("max_dt_s", "s", "longer gaps are stepped in equal parts", options.max_dt_s);
+  EkfOptions options = internal::ReadCommonOptions(p);
   options.lockout = static_cast<Lockout>(p.Choice("lockout.action", {"reset", "inflate", "none"},
                                                   "what is done after so many rejections",
                                                   static_cast<int>(options.lockout)));
@@ -25,21 +17,23 @@ EkfOptions Read(Params& p) {
 
 }  // namespace
 
-EkfOptions EkfOptions::FromNode(const Node& entry) {
-  internal::ParamReader reader(entry, "estimator 'ekf'");
-  Params params(&reader.host());
-  const EkfOptions options = Read(params);
-  reader.Check();
+EkfOptions internal::ReadCommonOptions(Params& p) {
+  EkfOptions options;
+  options.gate =
+      p.Number("gate", "", "probability with which a measurement that fits passes; 1: no gate",
+               {0.0, 1.0, true, false}, options.gate);
+  options.fuse = static_cast<Fuse>(p.Choice("fuse", {"joint", "per_sensor", "per_measurement"},
+                                            "how the measurements of one stamp make updates",
+                                            static_cast<int>(options.fuse)));
+  options.max_dt_s =
+      p.Positive("max_dt_s", "s", "longer gaps are stepped in equal parts", options.max_dt_s);
   return options;
 }
 
-std::vector<ParamInfo> EkfOptions::Schema() {
-  internal::ParamRecorder recorder;
-  recorder.Run([&] {
-    Params params(&recorder.host());
-    static_cast<void>(Read(params));
-  });
-  return recorder.Result();
+EkfOptions EkfOptions::FromNode(const Node& entry) {
+  return internal::OptionsFromNode(entry, "ekf", Read);
 }
+
+std::vector<ParamInfo> EkfOptions::Schema() { return internal::SchemaOf(Read); }
 
 }  // namespace alidade

@@ -66,6 +66,13 @@ Outcome Ekf::Linearise(Row& row) {
     geometry.Minus(entry.z.data(), entry.h.data(), entry.innovation.data());
     return outcome;
   }
+  NoteRefusal(row, outcome);
+  return outcome;
+}
+
+/// Tells why h could not be had; outside its domain, once until the sensor is accepted again.
+void Ekf::NoteRefusal(const Row& row, Outcome outcome) {
+  const SensorBinding& binding = BindingOf(row);
   if (outcome == Outcome::kFailed) NotePluginFailure(binding);
   if (outcome == Outcome::kOutOfDomain && rejections_[static_cast<std::size_t>(row.sensor)] == 0) {
     diverged_ = true;
@@ -73,7 +80,6 @@ Outcome Ekf::Linearise(Row& row) {
     for (const RoleBinding& role : binding.roles) blocks.push_back(role.block);
     Note("diverged", "sensor '" + binding.name + "' is not defined at " + Describe(blocks));
   }
-  return outcome;
 }
 
 /// h and H, whose parts are not numbers until the model writes them.
@@ -145,13 +151,19 @@ JacobianRows Ekf::JacobianOf(const Row& row) const {
   return {row.h.data(), m, plan.width, plan.parts};
 }
 
-/// S and NIS of one measurement by itself, and whether it passes the gate.
-Outcome Ekf::Gate(Row& row) {
+/// P H' and S = H P H' + R of one measurement by itself.
+void Ekf::Project(Row& row) {
   MeasurementReport& entry = EntryOf(row);
   const auto n = static_cast<std::size_t>(state_.covariance().size());
   row.pht.resize(n * static_cast<std::size_t>(entry.dof));
   entry.s.assign(row.r.begin(), row.r.end());
   state_.covariance().Project(JacobianOf(row), row.pht.data(), entry.s.data());
+}
+
+/// S and NIS of one measurement by itself, and whether it passes the gate.
+Outcome Ekf::Gate(Row& row) {
+  MeasurementReport& entry = EntryOf(row);
+  Project(row);
   if (!AllFinite(entry.s) || !AllFinite(row.pht) || !AllFinite(entry.innovation)) {
     entry.s.clear();
     Note("not_finite",

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <functional>
 
-#include "alidade/ekf.h"
 #include "alidade/run.h"
 #include "columns.h"
+#include "estimator_types.h"
 #include "names.h"
 
 namespace alidade {
 namespace {
+
+using internal::EstimatorMaker;
+using internal::EstimatorType;
+using internal::EstimatorTypes;
 
 constexpr int kSchema = 1;
 
@@ -84,18 +87,12 @@ void CheckName(const std::string& name, const Node& entry) {
   }
 }
 
-/// Makes the estimator once its system is known.
-using EstimatorMaker = std::function<std::unique_ptr<Estimator>(
-    const System& system, const std::vector<StreamInfo>& streams)>;
-
-/// Reads `type` and what that type of estimator has for keys.
-EstimatorMaker ReadEstimator(const Node& entry, std::string& type) {
-  const std::vector<std::string> types = {"ekf"};
-  type = types[static_cast<std::size_t>(entry.At("type", "an estimator").Choice(types))];
-  return [options = EkfOptions::FromNode(entry)](const System& system,
-                                                 const std::vector<StreamInfo>& streams) {
-    return std::make_unique<Ekf>(system, options, streams);
-  };
+/// Reads `type`.
+const EstimatorType& ReadType(const Node& entry) {
+  std::vector<std::string> names;
+  for (const EstimatorType& type : EstimatorTypes()) names.emplace_back(type.name);
+  const int choice = entry.At("type", "an estimator").Choice(names);
+  return EstimatorTypes()[static_cast<std::size_t>(choice)];
 }
 
 NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const Config& config,
@@ -103,7 +100,9 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   CheckName(name, entry);
   NamedEstimator named;
   named.name = name;
-  const EstimatorMaker make = ReadEstimator(entry, named.type);
+  const EstimatorType& type = ReadType(entry);
+  named.type = type.name;
+  const EstimatorMaker make = type.read(entry);
   if (const auto policy = entry.Find("on_divergence")) {
     named.on_divergence = static_cast<OnDivergence>(policy->Choice({"report", "fail"}));
   }
@@ -118,8 +117,10 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
     }
   }
   const std::vector<std::string> only = ReadSensorList(entry, own.root());
+  internal::RefuseUnsupportedKeys(type, entry);
   entry.RejectUnread();
   named.system = BuildSystem(own.root(), host, only);
+  internal::RefuseUnsupported(type, own.root(), named.system);
   for (const SensorBinding& sensor : named.system.sensors) {
     FindStream(own.root().At("sensors").At(sensor.name), sensor.model, streams);
   }

@@ -11,6 +11,7 @@
 #include "alidade/ekf.h"
 #include "alidade/metrics.h"
 #include "columns.h"
+#include "estimator_types.h"
 #include "number_text.h"
 #include "text_table.h"
 
@@ -242,7 +243,9 @@ std::string LockoutText(const EkfOptions& options, const System& system) {
 }
 
 std::string Options(const Node& entry, const NamedEstimator& named) {
-  const EkfOptions options = EkfOptions::FromNode(entry);
+  const internal::EstimatorType* type = internal::FindEstimatorType(named.type);
+  EkfOptions options = EkfOptions::FromNode(entry);
+  if (type != nullptr && !type->extended) options.lockout = Lockout::kNone;
   const System& system = named.system;
   std::vector<TextRow> rows = {
       {"gate", GateText(options, system)},
@@ -255,13 +258,6 @@ std::string Options(const Node& entry, const NamedEstimator& named) {
                             : "report: the run goes on"}};
   if (system.start_s) rows.push_back({"start_s", NumberText(*system.start_s)});
   return TextTable(rows, kIndent);
-}
-
-std::string SupportText(const std::string& type) {
-  if (type != "ekf") return {};
-  return "    blocks estimated, considered (Schmidt) or fixed; roles estimate, consider, hold;\n"
-         "    linearise_at prediction or measurement; blocks that start from a measurement.\n"
-         "    Not: control inputs, landmarks, measurements out of order.\n";
 }
 
 std::string SourceText(const Config& config, const Experiment& experiment) {
@@ -296,8 +292,8 @@ std::string Explain(const Config& config, const Experiment& experiment) {
     text += "  who touches which block\n" + Touches(system);
     text += Unobservable(system);
     text += "  options\n" + Options(entry, named);
-    if (const std::string support = SupportText(named.type); !support.empty()) {
-      text += "  an " + named.type + " supports\n" + support;
+    if (const auto* type = internal::FindEstimatorType(named.type)) {
+      text += "  type " + named.type + " supports\n" + type->support;
     }
   }
   return text;

@@ -5,7 +5,7 @@
 #include <tuple>
 #include <utility>
 
-#include "alidade/ekf.h"
+#include "estimator_types.h"
 #include "json.h"
 #include "plugin_file.h"
 #include "text_table.h"
@@ -13,6 +13,9 @@
 namespace alidade {
 namespace {
 
+using internal::EstimatorType;
+using internal::EstimatorTypes;
+using internal::FindEstimatorType;
 using internal::Join;
 using internal::Json;
 using internal::KindName;
@@ -28,12 +31,9 @@ std::vector<const PluginEntry*> Sorted(const PluginHost& host) {
   return entries;
 }
 
-constexpr const char* kEkf = "ekf";
-constexpr const char* kEkfDoc = "Extended Kalman filter; built in, for `estimators`.";
-
-/// What an ekf reads, and what every estimator has.
-std::vector<ParamInfo> EkfKeys() {
-  std::vector<ParamInfo> keys = EkfOptions::Schema();
+/// What an estimator of the type reads, and what every estimator has.
+std::vector<ParamInfo> KeysOf(const EstimatorType& estimator) {
+  std::vector<ParamInfo> keys = estimator.schema();
   const auto add = [&](const char* name, const char* type, const char* fallback, const char* doc,
                        std::vector<std::string> choices = {}) {
     keys.push_back({name, "", doc, type, "", fallback, std::move(choices), ""});
@@ -47,12 +47,14 @@ std::vector<ParamInfo> EkfKeys() {
 /// The entries called `name`; there may be none for a built-in estimator only.
 std::vector<const PluginEntry*> Named(const PluginHost& host, const std::string& name) {
   std::vector<const PluginEntry*> entries = Sorted(host);
-  std::vector<std::string> names = {kEkf};
+  std::vector<std::string> names;
+  for (const EstimatorType& type : EstimatorTypes()) names.emplace_back(type.name);
   for (const PluginEntry* entry : entries) names.push_back(entry->name);
   std::erase_if(entries, [&](const PluginEntry* entry) { return entry->name != name; });
-  if (entries.empty() && name != kEkf) {
+  if (entries.empty() && FindEstimatorType(name) == nullptr) {
     throw Error(ExitCode::kPlugin, ErrorLine({}, {}, "no plugin offers '" + name + "'",
-                                             "a name that `alidade plugins list` prints, or ekf",
+                                             "a name that `alidade plugins list` prints, or a type "
+                                             "of estimator",
                                              Nearest(name, names)) +
                                        "\n" + PluginPlaces(host));
   }
@@ -120,8 +122,8 @@ std::string PluginListJson(const PluginHost& host) {
 
 std::string PluginInfo(const PluginHost& host, const std::string& name) {
   std::string text;
-  if (name == kEkf) {
-    text = kEkf + std::string(": estimator\n  ") + kEkfDoc + "\n\n" + Parameters(EkfKeys());
+  if (const EstimatorType* type = FindEstimatorType(name)) {
+    text = name + ": estimator\n  " + type->doc + "\n\n" + Parameters(KeysOf(*type));
   }
   for (const PluginEntry* entry : Named(host, name)) {
     if (!text.empty()) text += '\n';
@@ -139,13 +141,13 @@ std::string PluginInfo(const PluginHost& host, const std::string& name) {
 std::string PluginInfoJson(const PluginHost& host, const std::string& name) {
   Json json;
   json.Array();
-  if (name == kEkf) {
+  if (const EstimatorType* type = FindEstimatorType(name)) {
     json.Object();
-    json.Key("name").Text(kEkf);
+    json.Key("name").Text(type->name);
     json.Key("kind").Text("estimator");
-    json.Key("doc").Text(kEkfDoc);
+    json.Key("doc").Text(type->doc);
     json.Key("parameters").Array();
-    for (const ParamInfo& info : EkfKeys()) AddParameter(info, json);
+    for (const ParamInfo& info : KeysOf(*type)) AddParameter(info, json);
     json.End();
     json.End();
   }

@@ -62,7 +62,7 @@ class Ekf : public Estimator {
   bool diverged() const override { return diverged_; }
   bool failed() const override { return failed_; }
 
- private:
+ protected:  // for the estimators that share how frames are stepped to, read, gated and reported
   /// How a sensor touches the state, as long as the layout stays as it is.
   struct SensorPlan {
     std::vector<const double*> roles;  ///< values; null where unbound or without a value yet
@@ -96,18 +96,23 @@ class Ekf : public Estimator {
   void Bind();
   void BindMotions();
   void StepTo(Stamp stamp);
-  bool StepOnce(double dt_s);
+  /// Moves state and covariance by dt_s; false, and GiveUp called, where that cannot be.
+  virtual bool StepOnce(double dt_s);
   bool StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s);
 
   void Collect(const Frame& frame);
   void Fuse(std::span<Row* const> group);
-  Outcome Linearise(Row& row);
+  /// h, the innovation, R and what the estimator makes of h, in `row` and its report.
+  virtual Outcome Linearise(Row& row);
   Outcome NoiseOf(Row& row, const double* const* roles);
   Outcome Evaluate(Row& row, MeasurementReport& entry);
   Outcome EvaluateAtMeasurement(Row& row, MeasurementReport& entry);
+  /// S of one measurement by itself, in its report.
+  virtual void Project(Row& row);
   Outcome Gate(Row& row);
   void CheckConditioning(const Row& row);
-  Outcome Apply(std::span<Row* const> rows);
+  /// One update with all rows: all of it happens or nothing.
+  virtual Outcome Apply(std::span<Row* const> rows);
   Outcome ApplySmall(std::span<Row* const> rows, int m);
   Outcome ApplyLarge(std::span<Row* const> rows, int m);
   bool MaskConsidered(std::span<Row* const> rows, Eigen::MatrixXd& gain) const;
@@ -131,6 +136,22 @@ class Ekf : public Estimator {
     return plans_[static_cast<std::size_t>(row.sensor)];
   }
   JacobianRows JacobianOf(const Row& row) const;
+
+  /// Of the last StepOnce, n = size of the covariance: F (n x n), and G Lq (n x noise inputs).
+  Eigen::MatrixXd Transition() const;
+  Eigen::MatrixXd NoiseInput() const;
+  /// The rows below one another: H (m x n), R = Lr Lr' and the innovation r.
+  struct Stacked {
+    Eigen::MatrixXd h, noise;
+    Eigen::VectorXd innovation;
+  };
+  Stacked Stack(std::span<Row* const> rows) const;
+  /// J (n x n) of State::MoveTo(values): dx there = J dx here.
+  Eigen::MatrixXd TransportTo(const std::vector<double>& values) const;
+  /// Writes the gain of all rows, n x m, down in their reports, and remembers the last one used.
+  void RecordUpdate(std::span<Row* const> rows, const Eigen::MatrixXd& gain);
+
+  void NoteRefusal(const Row& row, Outcome outcome);
   void NotePluginFailure(const SensorBinding& sensor);
   void Note(const char* kind, std::string text);
   void GiveUp(const char* kind, const std::string& what);

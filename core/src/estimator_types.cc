@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "alidade/rts.h"
+#include "alidade/square_root_ekf.h"
 #include "filter_options.h"
 
 namespace alidade::internal {
@@ -27,6 +28,10 @@ EstimatorMaker Maker(const auto& options) {
 EstimatorMaker ReadEkf(const Node& entry) { return Maker<Ekf>(EkfOptions::FromNode(entry)); }
 EstimatorMaker ReadRts(const Node& entry) {
   return Maker<RtsSmoother>(OptionsFromNode(entry, "rts", ReadCommonOptions));
+}
+
+EstimatorMaker ReadSquareRoot(const Node& entry) {
+  return Maker<SquareRootEkf>(OptionsFromNode(entry, "square_root_ekf", ReadCommonOptions));
 }
 
 std::string Who(const EstimatorType& type) {
@@ -99,6 +104,9 @@ const std::vector<EstimatorType>& EstimatorTypes() {
       {"rts",
        "Fixed-interval smoother after an extended Kalman filter; built in, for `estimators`.",
        kPlainSupport, ReadRts, CommonSchema, false},
+      {"square_root_ekf",
+       "Extended Kalman filter that carries a square root of P; built in, for `estimators`.",
+       kPlainSupport, ReadSquareRoot, CommonSchema, false},
   };
   return types;
 }

@@ -5,6 +5,7 @@
 
 #include "alidade/rts.h"
 #include "alidade/square_root_ekf.h"
+#include "alidade/ukf.h"
 #include "filter_options.h"
 
 namespace alidade::internal {
@@ -33,6 +34,8 @@ EstimatorMaker ReadRts(const Node& entry) {
 EstimatorMaker ReadSquareRoot(const Node& entry) {
   return Maker<SquareRootEkf>(OptionsFromNode(entry, "square_root_ekf", ReadCommonOptions));
 }
+
+EstimatorMaker ReadUkf(const Node& entry) { return Maker<Ukf>(UkfOptions::FromNode(entry)); }
 
 std::string Who(const EstimatorType& type) {
   return std::string("estimator type '") + type.name + "'";
@@ -107,6 +110,8 @@ const std::vector<EstimatorType>& EstimatorTypes() {
       {"square_root_ekf",
        "Extended Kalman filter that carries a square root of P; built in, for `estimators`.",
        kPlainSupport, ReadSquareRoot, CommonSchema, false},
+      {"ukf", "Unscented Kalman filter; built in, for `estimators`.", kPlainSupport, ReadUkf,
+       UkfOptions::Schema, false},
   };
   return types;
 }

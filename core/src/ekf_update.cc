@@ -229,14 +229,6 @@ Outcome Ekf::Apply(std::span<Row* const> rows) {
   return outcome;
 }
 
-/// x <- x (+) dx; false, and nothing moved, where that is not finite.
-bool Ekf::Move(const double* dx) {
-  state_.Retract(dx, moved_);
-  if (!AllFinite(moved_)) return false;
-  state_.MoveTo(moved_);
-  return true;
-}
-
 /// `gain` is n x m by columns, its rows as they lie in P.
 void Ekf::RecordGain(MeasurementReport& entry, const double* gain) const {
   const auto n = static_cast<std::size_t>(state_.covariance().size());
@@ -282,8 +274,10 @@ Outcome Ekf::ApplySmall(std::span<Row* const> rows, int m) {
                                             inverse_d.data(), dx.data(), gain.data());
   if (solved == Covariance::Solved::kNotPd) return Outcome::kNotPd;
   if (solved == Covariance::Solved::kCancelled) return ApplyLarge(rows, m);
-  if (!AllFinite({dx.data(), n}) || !Move(dx.data())) return Outcome::kNotFinite;
+  state_.Retract(dx.data(), moved_);
+  if (!AllFinite({dx.data(), n}) || !AllFinite(moved_)) return Outcome::kNotFinite;
   p.Downdate(m, w.data(), inverse_d.data());
+  state_.MoveTo(moved_);  // last: P turns with the tangent planes
   at = 0;
   for (const Row* row : rows) {
     MeasurementReport& entry = EntryOf(*row);

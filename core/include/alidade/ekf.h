@@ -118,7 +118,6 @@ class Ekf : public Estimator {
   bool MaskConsidered(std::span<Row* const> rows, Eigen::MatrixXd& gain) const;
   bool Correct(const Eigen::MatrixXd& w, const Eigen::MatrixXd& gain, bool masked,
                const Eigen::MatrixXd& h, const Eigen::MatrixXd& r);
-  bool Move(const double* dx);
   void RecordGain(MeasurementReport& entry, const double* gain) const;
 
   void InitialiseFromMeasurements();

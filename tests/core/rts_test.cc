@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <cmath>
 
 #include "alidade/random.h"
@@ -108,6 +107,49 @@ TEST(RtsSmoother, GapsInPartsAndTheGateAreThoseOfTheFilter) {
   });
   ASSERT_EQ(sigma.size(), frames.size());
   EXPECT_LT(sigma[0], 0.09);  // better than the measurement alone
+}
+
+// The depth filter is not linear. The smoother's own recursion, with the inverse that the adjoint
+// form does without: x_s = x + C (x_s+ - x-), P_s = P + C (P_s+ - P-) C', C = P F' P-^-1.
+TEST(RtsSmoother, EqualsTheRecursionOfRauchTungAndStriebelOnTheDepthFilter) {
+  const System system = DepthFilter();
+  EkfOptions options;
+  options.gate = 0.999;
+  options.lockout = Lockout::kNone;
+  RtsSmoother rts(system, options, StreamsOf(system));
+  Ekf ekf(system, options, StreamsOf(system));
+  struct Pass {
+    Eigen::Vector3d predicted, x;
+    Eigen::Matrix3d p_predicted, p;
+  };
+  const auto values = [&] { return Eigen::Vector3d(ekf.state().values().data()); };
+  std::vector<Pass> passes;
+  Random random(6);
+  constexpr int kFrames = 60;
+  for (int k = 0; k < kFrames; ++k) {
+    const double depth = 0.3 + 0.1 * std::sin(2.5 * 0.033 * k);
+    const double d = k == 20 ? 500.0 : 26.0 / depth + random.Normal();
+    const Frame frame = FrameAt(0.033 * k, {{0, d}, {1, depth / 0.3 + 0.01 * random.Normal()}});
+    rts.Process(frame);
+    ekf.Process(FrameAt(0.033 * k, {}));
+    const Eigen::Vector3d predicted = values();
+    const Eigen::Matrix3d p_predicted = ekf.state().covariance().Dense();
+    ekf.Process(frame);
+    passes.push_back({predicted, values(), p_predicted, ekf.state().covariance().Dense()});
+  }
+  for (int k = kFrames - 2; k >= 0; --k) {
+    Pass& pass = passes[static_cast<std::size_t>(k)];
+    const Pass& next = passes[static_cast<std::size_t>(k) + 1];
+    Eigen::Matrix3d f = Eigen::Matrix3d::Identity();
+    f(0, 1) = 0.033;
+    const Eigen::Matrix3d c = pass.p * f.transpose() * next.p_predicted.inverse();
+    pass.x += c * (next.x - next.predicted);
+    pass.p += c * (next.p - next.p_predicted) * c.transpose();
+  }
+  rts.Smooth([&](std::size_t k, const State& state, const UpdateReport&) {
+    EXPECT_LT((Eigen::Vector3d(state.values().data()) - passes[k].x).norm(), 1e-9) << k;
+    EXPECT_LT((state.covariance().Dense() - passes[k].p).norm(), 1e-9) << k;
+  });
 }
 
 TEST(RtsSmoother, IsNotMadeWithConsideredOrWaitingBlocks) {

@@ -81,6 +81,7 @@ TEST(Ukf, GetsTheMomentsOfASquareExactly) {
   AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 1.5, 0.8}});
   AddSensor(system, "square", InProcessSensor(Square{}, "square"), {"p.x"});
   UkfOptions options;
+  options.alpha = 1.0;
   options.beta = 0.0;
   options.kappa = 2.0;
   Ukf ukf(system, options, StreamsOf(system));
@@ -143,7 +144,9 @@ System Orientation() {
 // and the estimate lies on the great circle to the measurement, to second order in sigma.
 TEST(Ukf, FollowsAnOrientationFarFromWhereItBegan) {
   const System system = Orientation();
-  Ukf ukf(system, {}, StreamsOf(system));
+  UkfOptions options;
+  options.alpha = 1.0;
+  Ukf ukf(system, options, StreamsOf(system));
   Ekf ekf(system, {}, StreamsOf(system));
   Random random(32);
   Eigen::Quaterniond truth(1.0, 0.0, 0.0, 0.0);
@@ -166,7 +169,7 @@ TEST(Ukf, FollowsAnOrientationFarFromWhereItBegan) {
     ASSERT_NEAR(Eigen::Map<const Eigen::Vector4d>(q).norm(), 1.0, 1e-12);
     double between[3];
     UnitQuaternion::Minus(q, ekf.state().value(0), between);
-    // Points at 2.4 sigma bend the moments by sigma^2 / 12 of themselves, here 1e-3 at most.
+    // Points at sqrt(6) sigma bend the moments by sigma^2 / 12 of themselves, here 1e-3 at most.
     ASSERT_LT(Eigen::Map<const Eigen::Vector3d>(between).norm(), 1e-3) << k;
     ASSERT_LT((ukf.state().covariance().Dense() - p * Eigen::Matrix3d::Identity()).norm(), 0.01 * p)
         << k;
@@ -177,7 +180,9 @@ TEST(Ukf, FollowsAnOrientationFarFromWhereItBegan) {
 TEST(Ukf, PointsThatWouldLeaveTheDomainAreDrawnNearerAndThatIsSaid) {
   System system = DepthFilter();
   system.priors[0].covariance(0) = 1.0;  // 0.35 +- 1 m: points at 0.35 - 1.7 m
-  Ukf ukf(system, {}, StreamsOf(system));
+  UkfOptions options;
+  options.alpha = 1.0;
+  Ukf ukf(system, options, StreamsOf(system));
   const UpdateReport& first = ukf.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.1}}));
   for (const MeasurementReport& entry : first.measurements()) {
     EXPECT_EQ(entry.outcome, Outcome::kAccepted);

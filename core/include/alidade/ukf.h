@@ -10,7 +10,7 @@ namespace alidade {
 
 struct UkfOptions {
   EkfOptions filter;  ///< gate, fuse and max_dt_s; `lockout` counts as kNone
-  double alpha = 1.0;
+  double alpha = 0.01;
   double beta = 2.0;
   double kappa = 0.0;
 

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "alidade/random.h"
+#include "alidade/square_root_ekf.h"
 #include "support/systems.h"
 
 namespace alidade {
@@ -261,6 +262,33 @@ TEST(Ukf, GatesAndHoldsAsTheEkfDoes) {
   // h' = 3.3 Z is linear: S is that of the Kalman filter, R = (2/300 h^3)^2 at the prediction.
   const double h = 0.35 * 3.3, sigma = 2.0 / 300.0 * h * h * h;
   EXPECT_NEAR(report.measurements()[1].s[0], 3.3 * 3.3 * 0.01 + sigma * sigma, 1e-14);
+}
+
+// A linear problem, so all three filters agree; v is known, and neither moved nor corrected.
+TEST(Ukf, AFixedBlockEntersTheModelsAndStaysAsItIs) {
+  System system;
+  const MotionModel model = InProcessMotion(ConstantVelocity<1, false>(0.7), "constant_velocity");
+  const BlockId v = system.layout.Declare("p.v", "p", model.blocks()[1], BlockStatus::kFixed);
+  const BlockId x = system.layout.Declare("p.x", "p", model.blocks()[0]);
+  system.motions.push_back({"p", model, {x, v}});
+  system.priors.push_back({v, {-0.5}, {}, ""});
+  system.priors.push_back({x, {1.0}, Eigen::MatrixXd::Constant(1, 1, 4.0), ""});
+  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 0.3), "linear"), {"p.x"});
+  Ekf ekf(system, {}, StreamsOf(system));
+  Ukf ukf(system, {}, StreamsOf(system));
+  SquareRootEkf root(system, {}, StreamsOf(system));
+  Random random(33);
+  for (int k = 0; k < 50; ++k) {
+    const Frame frame = FrameAt(0.04 * k, {{0, random.Normal()}});
+    ekf.Process(frame);
+    for (Ekf* filter : {static_cast<Ekf*>(&ukf), static_cast<Ekf*>(&root)}) {
+      filter->Process(frame);
+      EXPECT_EQ(ValueOf(filter->state(), "p.v"), -0.5);
+      EXPECT_NEAR(ValueOf(filter->state(), "p.x"), ValueOf(ekf.state(), "p.x"), 1e-10);
+      EXPECT_NEAR(CovarianceOf(filter->state(), "p.x", "p.x"),
+                  CovarianceOf(ekf.state(), "p.x", "p.x"), 1e-10);
+    }
+  }
 }
 
 }  // namespace

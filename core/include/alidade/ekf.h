@@ -93,26 +93,63 @@ class Ekf : public Estimator {
     const SensorPlan* zeroed = nullptr;  ///< whose zeros H holds
   };
 
+  /// Moves state and covariance by dt_s; false, and GiveUp called, where that cannot be.
+  virtual bool StepOnce(double dt_s);
+  /// x', F, G and Lq of one motion model in its plan, x' in next_; false, and GiveUp called, where
+  /// that cannot be or is not finite.
+  bool StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s);
+  /// h, the innovation, R and what the estimator makes of h, in `row` and its report.
+  virtual Outcome Linearise(Row& row);
+  /// R at the values `roles`, or as the measurement itself says, in `row`.
+  Outcome NoiseOf(Row& row, const double* const* roles);
+  /// S of one measurement by itself, in its report.
+  virtual void Project(Row& row);
+  /// One update with all rows: all of it happens or nothing.
+  virtual Outcome Apply(std::span<Row* const> rows);
+
+  /// F (n x n) of the last StepOnce, n = size of the covariance.
+  Eigen::MatrixXd Transition() const;
+  /// G Lq (n x noise inputs of the active models) of the last StepOnce.
+  Eigen::MatrixXd NoiseInput() const;
+  /// Rows below one another: H (m x n), R (m x m) and the innovation.
+  struct Stacked {
+    Eigen::MatrixXd h, noise;
+    Eigen::VectorXd innovation;
+  };
+  /// The rows as Linearise left them.
+  Stacked Stack(std::span<Row* const> rows) const;
+  /// J (n x n) of State::MoveTo(values): dx there = J dx here.
+  Eigen::MatrixXd TransportTo(const std::vector<double>& values) const;
+  /// Writes the gain of all rows, n x m, down in their reports, and remembers the last one used.
+  void RecordUpdate(std::span<Row* const> rows, const Eigen::MatrixXd& gain);
+
+  /// The report, the sensor and the plan that belong to a row.
+  MeasurementReport& EntryOf(const Row& row) { return report_.measurements()[row.report]; }
+  const SensorBinding& BindingOf(const Row& row) const {
+    return system_.sensors[static_cast<std::size_t>(row.sensor)];
+  }
+  const SensorPlan& PlanOf(const Row& row) const {
+    return plans_[static_cast<std::size_t>(row.sensor)];
+  }
+
+  /// Tells why h of a row could not be had.
+  void NoteRefusal(const Row& row, Outcome outcome);
+  /// An event in the report.
+  void Note(const char* kind, std::string text);
+  /// Ends the filter, with an event that tells its last good state.
+  void GiveUp(const char* kind, const std::string& what);
+
+ private:
   void Bind();
   void BindMotions();
   void StepTo(Stamp stamp);
-  /// Moves state and covariance by dt_s; false, and GiveUp called, where that cannot be.
-  virtual bool StepOnce(double dt_s);
-  bool StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s);
 
   void Collect(const Frame& frame);
   void Fuse(std::span<Row* const> group);
-  /// h, the innovation, R and what the estimator makes of h, in `row` and its report.
-  virtual Outcome Linearise(Row& row);
-  Outcome NoiseOf(Row& row, const double* const* roles);
   Outcome Evaluate(Row& row, MeasurementReport& entry);
   Outcome EvaluateAtMeasurement(Row& row, MeasurementReport& entry);
-  /// S of one measurement by itself, in its report.
-  virtual void Project(Row& row);
   Outcome Gate(Row& row);
   void CheckConditioning(const Row& row);
-  /// One update with all rows: all of it happens or nothing.
-  virtual Outcome Apply(std::span<Row* const> rows);
   Outcome ApplySmall(std::span<Row* const> rows, int m);
   Outcome ApplyLarge(std::span<Row* const> rows, int m);
   bool MaskConsidered(std::span<Row* const> rows, Eigen::MatrixXd& gain) const;
@@ -127,35 +164,11 @@ class Ekf : public Estimator {
   void ForgetMotionOf(BlockId id);
 
   std::span<Row> rows() { return {rows_.data(), row_count_}; }
-  MeasurementReport& EntryOf(const Row& row) { return report_.measurements()[row.report]; }
-  const SensorBinding& BindingOf(const Row& row) const {
-    return system_.sensors[static_cast<std::size_t>(row.sensor)];
-  }
-  const SensorPlan& PlanOf(const Row& row) const {
-    return plans_[static_cast<std::size_t>(row.sensor)];
-  }
   JacobianRows JacobianOf(const Row& row) const;
-
-  /// Of the last StepOnce, n = size of the covariance: F (n x n), and G Lq (n x noise inputs).
-  Eigen::MatrixXd Transition() const;
-  Eigen::MatrixXd NoiseInput() const;
-  /// The rows below one another: H (m x n), R = Lr Lr' and the innovation r.
-  struct Stacked {
-    Eigen::MatrixXd h, noise;
-    Eigen::VectorXd innovation;
-  };
-  Stacked Stack(std::span<Row* const> rows) const;
-  /// J (n x n) of State::MoveTo(values): dx there = J dx here.
-  Eigen::MatrixXd TransportTo(const std::vector<double>& values) const;
-  /// Writes the gain of all rows, n x m, down in their reports, and remembers the last one used.
-  void RecordUpdate(std::span<Row* const> rows, const Eigen::MatrixXd& gain);
-
-  void NoteRefusal(const Row& row, Outcome outcome);
   void NotePluginFailure(const SensorBinding& sensor);
-  void Note(const char* kind, std::string text);
-  void GiveUp(const char* kind, const std::string& what);
   std::string Describe(const std::vector<BlockId>& blocks) const;
 
+ protected:
   System system_;
   EkfOptions options_;
   std::vector<int> stream_of_sensor_;  ///< -1: the source has none of that name

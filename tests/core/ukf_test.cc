@@ -264,6 +264,22 @@ TEST(Ukf, GatesAndHoldsAsTheEkfDoes) {
   EXPECT_NEAR(report.measurements()[1].s[0], 3.3 * 3.3 * 0.01 + sigma * sigma, 1e-14);
 }
 
+// x' = x + v dt, but x is known.
+TEST(Ukf, AFixedBlockIsNotMovedByItsModel) {
+  System system;
+  const MotionModel model = InProcessMotion(ConstantVelocity<1, false>(0.7), "constant_velocity");
+  const BlockId x = system.layout.Declare("p.x", "p", model.blocks()[0], BlockStatus::kFixed);
+  const BlockId v = system.layout.Declare("p.v", "p", model.blocks()[1]);
+  system.motions.push_back({"p", model, {x, v}});
+  system.priors.push_back({x, {1.0}, {}, ""});
+  system.priors.push_back({v, {-0.5}, Eigen::MatrixXd::Constant(1, 1, 4.0), ""});
+  Ukf ukf(system, {}, {});
+  ukf.Start(0);
+  ukf.Process(FrameAt(0.5, {}));
+  EXPECT_EQ(ValueOf(ukf.state(), "p.x"), 1.0);
+  EXPECT_NEAR(CovarianceOf(ukf.state(), "p.v", "p.v"), 4.0 + 0.49 * 0.25, 1e-12);
+}
+
 // A linear problem, so all three filters agree; v is known, and neither moved nor corrected.
 TEST(Ukf, AFixedBlockEntersTheModelsAndStaysAsItIs) {
   System system;

@@ -93,27 +93,6 @@ Outcome Ekf::ApplySmall(std::span<Row* const> rows, int m) {
   return Outcome::kAccepted;
 }
 
-Ekf::Stacked Ekf::Stack(std::span<Row* const> rows) const {
-  Eigen::Index m = 0;
-  for (const Row* row : rows) m += BindingOf(*row).model.measurement().geometry.tangent;
-  Stacked all{Eigen::MatrixXd::Zero(m, state_.covariance().size()), Eigen::MatrixXd::Zero(m, m),
-              Eigen::VectorXd(m)};
-  Eigen::Index at = 0;
-  for (const Row* row : rows) {
-    const JacobianRows own = JacobianOf(*row);
-    const Eigen::Index k = own.rows;
-    const Eigen::Map<const RowMajor> compact(own.data, k, own.stride);
-    for (const JacobianPart& part : own.parts) {
-      all.h.block(at, part.offset, k, part.size) += compact.middleCols(part.column, part.size);
-    }
-    all.noise.block(at, at, k, k) = Eigen::Map<const RowMajor>(row->r.data(), k, k);
-    const MeasurementReport& entry = report_.measurements()[row->report];
-    all.innovation.segment(at, k) = Eigen::Map<const Eigen::VectorXd>(entry.innovation.data(), k);
-    at += k;
-  }
-  return all;
-}
-
 /// P H' of all rows, n x m.
 Eigen::MatrixXd Ekf::ProjectionOf(std::span<Row* const> rows) const {
   const Eigen::Index n = state_.covariance().size();

@@ -6,16 +6,8 @@
 namespace alidade {
 namespace {
 
-EkfOptions ReadCommon(Params& p) {
-  EkfOptions options;
-  options.gate =
-      p.Number("gate", "", "probability with which a measurement that fits passes; 1: no gate",
-               {0.0, 1.0, true, false}, options.gate);
-  options.fuse = static_cast<Fuse>(p.Choice("fuse", {"joint", "per_sensor", "per_measurement"},
-                                            "how the measurements of one stamp make updates",
-                                            static_cast<int>(options.fuse)));
-  options.max_dt_s =
-      p.Positive("max_dt_s", "s", "longer gaps are stepped in equal parts", options.max_dt_s);
+EkfOptions ReadRecovering(Params& p) {
+  EkfOptions options = internal::ReadCommonOptions(p);
   options.lockout = static_cast<Lockout>(p.Choice("lockout.action", {"reset", "inflate", "none"},
                                                   "what is done after so many rejections",
                                                   static_cast<int>(options.lockout)));
@@ -25,7 +17,7 @@ EkfOptions ReadCommon(Params& p) {
 }
 
 EkfOptions ReadEkf(Params& p) {
-  EkfOptions options = ReadCommon(p);
+  EkfOptions options = ReadRecovering(p);
   options.jacobian = static_cast<JacobianAt>(p.Choice(
       "jacobian", {"latest", "first_estimate"}, "where H is taken for blocks of stationary models",
       static_cast<int>(options.jacobian)));
@@ -33,7 +25,7 @@ EkfOptions ReadEkf(Params& p) {
 }
 
 IekfOptions ReadIekf(Params& p) {
-  IekfOptions options{ReadCommon(p)};
+  IekfOptions options{ReadRecovering(p)};
   options.max_iterations = p.Integer("max_iterations", "most linearisations of an update", 2, 1000,
                                      options.max_iterations);
   options.tolerance = p.Number(
@@ -43,6 +35,19 @@ IekfOptions ReadIekf(Params& p) {
 }
 
 }  // namespace
+
+EkfOptions internal::ReadCommonOptions(Params& p) {
+  EkfOptions options;
+  options.gate =
+      p.Number("gate", "", "probability with which a measurement that fits passes; 1: no gate",
+               {0.0, 1.0, true, false}, options.gate);
+  options.fuse = static_cast<Fuse>(p.Choice("fuse", {"joint", "per_sensor", "per_measurement"},
+                                            "how the measurements of one stamp make updates",
+                                            static_cast<int>(options.fuse)));
+  options.max_dt_s =
+      p.Positive("max_dt_s", "s", "longer gaps are stepped in equal parts", options.max_dt_s);
+  return options;
+}
 
 EkfOptions EkfOptions::FromNode(const Node& entry) {
   return internal::OptionsFromNode(entry, "ekf", ReadEkf);

@@ -4,9 +4,15 @@
 #include <algorithm>
 
 #include "alidade/iekf.h"
+#include "alidade/rts.h"
+#include "alidade/square_root_ekf.h"
+#include "alidade/ukf.h"
+#include "filter_options.h"
 
 namespace alidade::internal {
 namespace {
+
+std::vector<ParamInfo> CommonSchema() { return SchemaOf(ReadCommonOptions); }
 
 template <class Filter>
 EstimatorMaker Maker(const auto& options) {
@@ -17,21 +23,44 @@ EstimatorMaker Maker(const auto& options) {
 
 EstimatorMaker ReadEkf(const Node& entry) { return Maker<Ekf>(EkfOptions::FromNode(entry)); }
 EstimatorMaker ReadIekf(const Node& entry) { return Maker<Iekf>(IekfOptions::FromNode(entry)); }
+EstimatorMaker ReadRts(const Node& entry) {
+  return Maker<RtsSmoother>(OptionsFromNode(entry, "rts", ReadCommonOptions));
+}
+EstimatorMaker ReadSquareRoot(const Node& entry) {
+  return Maker<SquareRootEkf>(OptionsFromNode(entry, "square_root_ekf", ReadCommonOptions));
+}
+EstimatorMaker ReadUkf(const Node& entry) { return Maker<Ukf>(UkfOptions::FromNode(entry)); }
 
-/// Fails at `node`: the type `name` cannot have `what`.
+/// Fails at `node`: the type cannot have `what`.
 [[noreturn]] void Refuse(const EstimatorType& type, const Node& node, const std::string& what,
                          const std::string& instead) {
   node.Fail(std::string("estimator type '") + type.name + "' does not support " + what,
             instead + " (also by the estimator's `overrides`), or type: ekf");
 }
 
+std::string NameIn(const Block& block) { return block.name.substr(block.owner.size() + 1); }
+
 /// The item `block` of the list under `consider` of its state entry.
 Node ConsiderOf(const Node& root, const Block& block) {
   const Node list = root.At("state").At(block.owner).At("consider");
   for (const Node& item : list.Items()) {
-    if (block.owner + '.' + item.Text() == block.name) return item;
+    if (item.Text() == NameIn(block)) return item;
   }
   return list;
+}
+
+void RefuseBlocks(const EstimatorType& type, const Node& root, const System& system) {
+  for (const Block& block : system.layout.blocks()) {
+    if (block.status == BlockStatus::kConsidered && !type.support.considered) {
+      Refuse(type, ConsiderOf(root, block), "considered blocks", "the block estimated or fixed");
+    }
+  }
+  for (const Prior& prior : system.priors) {
+    if (prior.from.empty() || type.support.recovery) continue;
+    const Block& block = system.layout[prior.block];
+    const Node initial = root.At("state").At(block.owner).At("initial").At(NameIn(block));
+    Refuse(type, initial.At("from"), "blocks that start from a measurement", "mean and sigma");
+  }
 }
 
 void RefuseRole(const EstimatorType& type, const RoleBinding& role, const Node& node) {
@@ -46,17 +75,26 @@ void RefuseRole(const EstimatorType& type, const RoleBinding& role, const Node& 
 }  // namespace
 
 const std::vector<EstimatorType>& EstimatorTypes() {
+  constexpr Support kPlain = {};
   static const std::vector<EstimatorType> types = {
       {"ekf",
        "Extended Kalman filter; built in, for `estimators`.",
        ReadEkf,
        EkfOptions::Schema,
-       {.considered = true, .at_measurement = true, .robust_loss = true}},
+       {.considered = true, .at_measurement = true, .recovery = true, .robust_loss = true}},
       {"iekf",
        "Iterated extended Kalman filter; built in, for `estimators`.",
        ReadIekf,
        IekfOptions::Schema,
-       {.considered = false, .at_measurement = false, .robust_loss = true}},
+       {.considered = false, .at_measurement = false, .recovery = true, .robust_loss = true}},
+      {"rts",
+       "Fixed-interval smoother after an extended Kalman filter; built in, for `estimators`.",
+       ReadRts, CommonSchema, kPlain},
+      {"square_root_ekf",
+       "Extended Kalman filter that carries a square root of P; built in, for `estimators`.",
+       ReadSquareRoot, CommonSchema, kPlain},
+      {"ukf", "Unscented Kalman filter; built in, for `estimators`.", ReadUkf, UkfOptions::Schema,
+       kPlain},
   };
   return types;
 }
@@ -69,18 +107,21 @@ const EstimatorType* FindEstimatorType(std::string_view name) {
 
 void RefuseUnsupportedKeys(const EstimatorType& type, const Node& entry) {
   const std::vector<ParamInfo> keys = type.schema();
-  const auto jacobian = entry.Find("jacobian");
-  if (!jacobian || std::ranges::find(keys, "jacobian", &ParamInfo::key) != keys.end()) return;
-  jacobian->Fail(std::string("estimator type '") + type.name + "' has no choice of Jacobian",
-                 "the key left out, or type: ekf");
+  const auto refuse = [&](const std::string& key, const std::string& what) {
+    const auto of_key = [&](const ParamInfo& info) {
+      return info.key == key || info.key.starts_with(key + '.');
+    };
+    const auto node = entry.Find(key);
+    if (!node || std::ranges::any_of(keys, of_key)) return;
+    node->Fail(std::string("estimator type '") + type.name + "' has no " + what,
+               "the key left out, or type: ekf");
+  };
+  refuse("jacobian", "choice of Jacobian");
+  refuse("lockout", "recovery from a lock-out");
 }
 
 void RefuseUnsupported(const EstimatorType& type, const Node& root, const System& system) {
-  for (const Block& block : system.layout.blocks()) {
-    if (block.status == BlockStatus::kConsidered && !type.support.considered) {
-      Refuse(type, ConsiderOf(root, block), "considered blocks", "the block estimated or fixed");
-    }
-  }
+  RefuseBlocks(type, root, system);
   for (const SensorBinding& sensor : system.sensors) {
     const Node entry = root.At("sensors").At(sensor.name);
     for (std::size_t i = 0; i < sensor.roles.size(); ++i) {

@@ -14,6 +14,7 @@ namespace alidade::internal {
 struct Support {
   bool considered;      ///< blocks and roles
   bool at_measurement;  ///< linearise_at: measurement
+  bool recovery;        ///< blocks that start from a measurement, and from one after a lock-out
   bool robust_loss;
 };
 
@@ -33,10 +34,11 @@ const std::vector<EstimatorType>& EstimatorTypes();
 const EstimatorType* FindEstimatorType(std::string_view name);
 
 /// Refuses by name the keys of an estimator's entry that its type cannot have but others do:
-/// `jacobian: first_estimate`. Errors: kBadConfig.
+/// `jacobian`, `lockout`. Errors: kBadConfig.
 void RefuseUnsupportedKeys(const EstimatorType& type, const Node& entry);
 /// The same for what `system`, built from the config `root`, asks of it: considered blocks and
-/// roles, linearise_at: measurement, a robust loss. Errors: kBadConfig.
+/// roles, blocks that start from a measurement, linearise_at: measurement, a robust loss.
+/// Errors: kBadConfig.
 void RefuseUnsupported(const EstimatorType& type, const Node& root, const System& system);
 
 }  // namespace alidade::internal

@@ -10,6 +10,7 @@
 
 #include "alidade/iekf.h"
 #include "alidade/statistics.h"
+#include "alidade/ukf.h"
 #include "columns.h"
 #include "estimator_types.h"
 #include "names.h"
@@ -252,26 +253,34 @@ std::string LossText(const System& system) {
   return Join(losses);
 }
 
+/// What the type has beyond the options of all.
+void AddOwnOptions(const std::string& type, const Node& entry, std::vector<TextRow>& rows) {
+  if (type == "ekf") {
+    const bool latest = EkfOptions::FromNode(entry).jacobian == JacobianAt::kLatest;
+    rows.push_back({"jacobian", latest ? "latest: H at the estimate"
+                                       : "first_estimate: H where stationary blocks started from"});
+  } else if (type == "iekf") {
+    const IekfOptions options = IekfOptions::FromNode(entry);
+    rows.push_back({"max_iterations", std::to_string(options.max_iterations)});
+    rows.push_back({"tolerance", NumberText(options.tolerance) + " sigma of the posterior"});
+  } else if (type == "ukf") {
+    const UkfOptions options = UkfOptions::FromNode(entry);
+    rows.push_back({"alpha, beta, kappa", NumberText(options.alpha) + ", " +
+                                              NumberText(options.beta) + ", " +
+                                              NumberText(options.kappa)});
+  }
+}
+
 std::string Options(const Node& entry, const NamedEstimator& named) {
   const System& system = named.system;
   std::vector<TextRow> rows;
-  if (internal::FindEstimatorType(named.type) != nullptr) {
-    const bool iterated = named.type == "iekf";
-    const IekfOptions options =
-        iterated ? IekfOptions::FromNode(entry) : IekfOptions{EkfOptions::FromNode(entry)};
-    rows = {{"gate", GateText(options, system)},
-            {"fuse", FuseText(options.fuse, system)},
-            {"lockout", LockoutText(options, system)},
-            {"max_dt_s", std::isfinite(options.max_dt_s) ? NumberText(options.max_dt_s)
-                                                         : "none: a gap is one step"}};
-    if (iterated) {
-      rows.push_back({"max_iterations", std::to_string(options.max_iterations)});
-      rows.push_back({"tolerance", NumberText(options.tolerance) + " sigma of the posterior"});
-    } else {
-      rows.push_back({"jacobian", options.jacobian == JacobianAt::kLatest
-                                      ? "latest: H at the estimate"
-                                      : "first_estimate: H where stationary blocks started from"});
-    }
+  if (const internal::EstimatorType* const type = internal::FindEstimatorType(named.type)) {
+    const EkfOptions options = EkfOptions::FromNode(entry);
+    rows = {{"gate", GateText(options, system)}, {"fuse", FuseText(options.fuse, system)}};
+    if (type->support.recovery) rows.push_back({"lockout", LockoutText(options, system)});
+    rows.push_back({"max_dt_s", std::isfinite(options.max_dt_s) ? NumberText(options.max_dt_s)
+                                                                : "none: a gap is one step"});
+    AddOwnOptions(named.type, entry, rows);
   }
   rows.push_back({"on_divergence", named.on_divergence == OnDivergence::kFail
                                        ? "fail: the run ends with exit code 79"
@@ -295,10 +304,12 @@ std::string SupportText(const std::string& type) {
                 "hold;\n",
                 "    blocks estimated or fixed; roles estimate, hold;\n") +
          "    linearise_at prediction" + either(can.at_measurement, " or measurement", "") +
-         "; blocks that start from a measurement" +
+         either(can.recovery, "; blocks that start from a measurement", "") +
          either(can.robust_loss, ";\n    robust losses", "") +
          ".\n    Not: " + either(can.considered, "", "considered blocks and roles, ") +
          either(can.at_measurement, "", "linearise_at measurement, ") +
+         either(can.recovery, "",
+                "blocks that start from a measurement, recovery from a\n    lock-out, ") +
          "control inputs, landmarks, measurements out of order.\n";
 }
 
@@ -334,7 +345,7 @@ std::string Explain(const Config& config, const Experiment& experiment) {
     text += Unobservable(system);
     text += "  options\n" + Options(entry, named);
     if (const std::string support = SupportText(named.type); !support.empty()) {
-      text += "  an " + named.type + " supports\n" + support;
+      text += "  type " + named.type + " supports\n" + support;
     }
   }
   return text;

@@ -7,6 +7,14 @@
 
 namespace alidade::internal {
 
+/// What every recursive filter reads: `gate`, `fuse`, `max_dt_s`.
+EkfOptions ReadCommonOptions(Params& p);
+
+inline EkfOptions WithoutRecovery(EkfOptions options) {
+  options.lockout = Lockout::kNone;
+  return options;
+}
+
 /// What `read` makes of the entry of an estimator of that type. Errors: kBadConfig.
 template <class Read>
 auto OptionsFromNode(const Node& entry, const std::string& type, const Read& read) {

@@ -127,7 +127,8 @@ std::string PluginListJson(const PluginHost& host) {
 std::string PluginInfo(const PluginHost& host, const std::string& name) {
   std::string text;
   if (const EstimatorType* type = FindEstimatorType(name)) {
-    text = name + ": estimator\n  " + type->doc + "\n\n" + Parameters(WithCommonKeys(type->schema()));
+    text =
+        name + ": estimator\n  " + type->doc + "\n\n" + Parameters(WithCommonKeys(type->schema()));
   }
   for (const PluginEntry* entry : Named(host, name)) {
     if (!text.empty()) text += '\n';

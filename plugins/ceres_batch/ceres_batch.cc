@@ -228,6 +228,9 @@ void CheckSupported(const System& system, const Node& entry) {
     }
   }
   for (const SensorBinding& sensor : system.sensors) {
+    if (sensor.loss.kind != LossKind::kNone) {
+      refuse("sensor '" + sensor.name + "' has a robust loss", "the sensor without one");
+    }
     for (const RoleBinding& role : sensor.roles) {
       if (role.mode != RoleMode::kEstimate) {
         refuse("a role of sensor '" + sensor.name + "' is considered or held", "mode: estimate");

@@ -329,6 +329,14 @@ TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
     EXPECT_TRUE(Contains(iekf.out, part)) << part << '\n' << iekf.out;
   }
 
+  for (const std::string type : {"rts", "square_root_ekf", "ukf"}) {
+    const Outcome estimator = Call({"plugins", "info", type});
+    EXPECT_TRUE(Contains(estimator.out, type + ": estimator")) << estimator.out;
+    EXPECT_TRUE(Contains(estimator.out, "max_dt_s")) << estimator.out;
+    EXPECT_EQ(Contains(estimator.out, "kappa"), type == "ukf") << estimator.out;
+    EXPECT_FALSE(Contains(estimator.out, "lockout")) << estimator.out;
+  }
+
   const Outcome missing = Call({"plugins", "info", "stereo_disparit"});
   EXPECT_EQ(missing.code, 69);
   EXPECT_TRUE(Contains(missing.err, "stereo_disparity")) << missing.err;

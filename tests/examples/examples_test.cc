@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -38,11 +39,13 @@ struct Means {
   double operator[](const std::string& key) const { return metrics.at(key); }
 };
 
-std::map<std::string, Means> Sweep(const std::string& name) {
+std::map<std::string, Means> Sweep(const std::string& name, const Settings& settings = {}) {
   std::map<std::string, Means> means;
   std::map<std::string, int> used;
   for (int seed = 1001; seed <= 1200; ++seed) {
-    const RunResult run = RunExample(name, {{"source.seed", std::to_string(seed)}});
+    Settings with_seed = settings;
+    with_seed.emplace_back("source.seed", std::to_string(seed));
+    const RunResult run = RunExample(name, with_seed);
     EXPECT_EQ(run.status, RunStatus::kOk) << name << " seed " << seed << ": " << run.reason;
     for (const EstimatorResult& result : run.estimators) {
       Means& mean = means[result.name];
@@ -205,6 +208,79 @@ TEST(Examples, RealSeriesAreBetterFusedThanByStereoAlone) {
   EXPECT_LT(Median(masked["fused"]), Median(masked["stereo_only"]));
   EXPECT_LT(Median(masked["fused"]), Median(masked["hold_last"]));
   EXPECT_LE(whole_fused, whole_stereo);
+}
+
+const Settings kPoorStart = {{"state.target.initial.depth", "{mean: 0.35, sigma: 0.1}"},
+                             {"state.target.initial.depth_rate", "{mean: 0, sigma: 0.5}"},
+                             {"state.template.initial.inverse_distance", "{mean: 3, sigma: 1.5}"}};
+
+// A prototype's smoother, and its batch over the same data: 1.03 mm, 11.7 mm/s, 99 %.
+TEST(Examples, TheSmootherHalvesTheErrorOfTheFilter) {
+  const auto means = Sweep("08_depth_all_estimators");
+  const Means &ekf = means.at("ekf"), &rts = means.at("rts"), &root = means.at("square_root");
+  for (const auto& [name, mean] : means) EXPECT_EQ(mean.diverged, 0) << name;
+  EXPECT_GE(rts["rmse:target.depth"], 0.00095);
+  EXPECT_LE(rts["rmse:target.depth"], 0.0012);
+  EXPECT_LE(rts["rmse:target.depth_rate"], 0.0125);
+  EXPECT_GE(rts["nees.cov95:target"], 0.98);
+  EXPECT_LE(rts["nees.cov95:target"], 0.999);
+  EXPECT_LE(rts["rmse:target.depth"], 0.6 * ekf["rmse:target.depth"]);
+  for (const char* key : {"rmse:target.depth", "nees.mean:target", "nis.mean:stereo"}) {
+    EXPECT_NEAR(root[key], ekf[key], 1e-6 * ekf[key]) << key;
+  }
+  EXPECT_GE(means.at("ukf")["nees.cov95:target"], 0.95);
+  EXPECT_LE(means.at("ukf")["rmse:target.depth"], 0.0032);
+}
+
+// Depth 0.35 +- 0.1 m, lambda 3 +- 1.5 /m: sigma points at 3.9 sigma lie beyond both poles.
+TEST(Examples, APoorStartDoesNotMakeTheUnscentedFilterDiverge) {
+  const Means ukf = Sweep("08_depth_all_estimators", kPoorStart).at("ukf");
+  EXPECT_EQ(ukf.diverged, 0);
+  EXPECT_LE(ukf["rmse:target.depth"], 0.0042);
+  EXPECT_GE(ukf["nees.cov95:target"], 0.95);
+  Settings wide = kPoorStart;
+  wide.emplace_back("estimators.ukf", "{type: ukf, alpha: 1, kappa: 12}");
+  for (int seed = 1001; seed <= 1020; ++seed) {
+    wide.emplace_back("source.seed", std::to_string(seed));
+    const RunResult run = RunExample("08_depth_all_estimators", wide);
+    const auto result = std::ranges::find(run.estimators, "ukf", &EstimatorResult::name);
+    ASSERT_NE(result, run.estimators.end());
+    EXPECT_TRUE(HasEvent(*result, "guarded")) << seed;
+    EXPECT_FALSE(result->diverged) << seed;
+    for (const auto& [key, value] : result->metrics) {
+      EXPECT_TRUE(std::isfinite(value)) << seed << ' ' << key;
+    }
+  }
+}
+
+TEST(Examples, WhatAnEstimatorTypeDoesNotHaveIsRefusedByName) {
+  const std::vector<std::pair<std::string, std::string>> unsupported = {
+      {"state.template.consider", "[inverse_distance]"},
+      {"state.target.initial.depth", "{from: stereo}"},
+      {"sensors.scale.roles.inverse_distance",
+       "{block: template.inverse_distance, mode: consider}"},
+      {"sensors.stereo.roles.depth", "{block: target.depth, linearise_at: measurement}"},
+      {"estimators.one.lockout", "{after: 20}"},
+      {"estimators.one.loss", "huber"}};
+  for (const std::string type : {"rts", "square_root_ekf", "ukf"}) {
+    for (const auto& [key, value] : unsupported) {
+      try {
+        RunExample("08_depth_all_estimators",
+                   {{"estimators", "{one: {type: " + type + "}}"}, {key, value}});
+        ADD_FAILURE() << type << " took " << key;
+      } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ExitCode::kBadConfig);
+        const std::string text = error.what();
+        EXPECT_NE(text.find("estimator type '" + type + "'"), std::string::npos) << text;
+        EXPECT_NE(text.find("; expected "), std::string::npos) << text;
+      }
+    }
+    const RunResult held =
+        RunExample("08_depth_all_estimators", {{"estimators", "{one: {type: " + type + "}}"},
+                                               {"sensors.scale.roles.inverse_distance",
+                                                "{block: template.inverse_distance, mode: hold}"}});
+    EXPECT_EQ(held.status, RunStatus::kOk) << type;
+  }
 }
 
 }  // namespace

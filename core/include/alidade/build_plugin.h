@@ -63,13 +63,12 @@ inline constexpr const char* kBuildEntrySymbol = "alidade_build_plugin";
 }  // namespace alidade
 
 /// Exports a table of this plugin; `...` are the members of BuildTable after the size.
-#define ALIDADE_BUILD_PLUGIN_(...)                                                               \
-  ALIDADE_FINGERPRINT(ALIDADE_TIER_BUILD, ALIDADE_BUILD_ID)                                      \
-  extern "C" __attribute__((visibility("default"))) const alidade::BuildTable*                   \
-  alidade_build_plugin() {                                                                       \
-    static const alidade::BuildTable table = {sizeof(alidade::BuildTable), &alidade_fingerprint, \
-                                              __VA_ARGS__};                                      \
-    return &table;                                                                               \
+#define ALIDADE_BUILD_PLUGIN_(...)                                                       \
+  ALIDADE_FINGERPRINT(ALIDADE_TIER_BUILD, ALIDADE_BUILD_ID)                              \
+  extern "C" __attribute__((visibility("default"))) const alidade::BuildTable*           \
+  alidade_build_plugin() {                                                               \
+    static const alidade::BuildTable table = {sizeof(alidade::BuildTable), __VA_ARGS__}; \
+    return &table;                                                                       \
   }
 
 /// Exports the sources of this plugin: ALIDADE_SOURCE_PLUGIN({"name", "doc", "keys", &Create}, ...)

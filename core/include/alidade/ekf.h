@@ -106,41 +106,73 @@ class Ekf : public Estimator {
     const SensorPlan* zeroed = nullptr;  ///< whose zeros H holds
   };
 
+  /// Moves state and covariance by dt_s; false, and GiveUp called, where that cannot be.
+  virtual bool StepOnce(double dt_s);
+  /// x', F, G and Lq of one motion model in its plan, x' in next_; false, and GiveUp called, where
+  /// that cannot be or is not finite.
+  bool StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s);
+  /// h, the innovation, R and what the estimator makes of h, in `row` and its report.
+  virtual Outcome Linearise(Row& row);
+  /// R at the values `roles`, or as the measurement itself says, in `row`.
+  Outcome NoiseOf(Row& row, const double* const* roles);
+  /// S of one measurement by itself, in its report.
+  virtual void Project(Row& row);
+  /// One update with all rows: all of it happens or nothing.
+  virtual Outcome Apply(std::span<Row* const> rows);
+
+  /// F (n x n) of the last StepOnce, n = size of the covariance.
+  Eigen::MatrixXd Transition() const;
+  /// G Lq (n x noise inputs of the active models) of the last StepOnce.
+  Eigen::MatrixXd NoiseInput() const;
+  /// Rows below one another: H (m x n), R (m x m) and the innovation.
+  struct Stacked {
+    Eigen::MatrixXd h, noise;
+    Eigen::VectorXd innovation;
+  };
+  /// The rows as Linearise left them.
+  Stacked Stack(std::span<Row* const> rows) const;
+  /// J (n x n) of State::MoveTo(values): dx there = J dx here.
+  Eigen::MatrixXd TransportTo(const std::vector<double>& values) const;
+  /// Writes the gain of all rows, n x m, down in their reports, and remembers the last one used.
+  void RecordUpdate(std::span<Row* const> rows, const Eigen::MatrixXd& gain);
+
+  /// The report, the sensor and the plan that belong to a row.
+  MeasurementReport& EntryOf(const Row& row) { return report_.measurements()[row.report]; }
+  const SensorBinding& BindingOf(const Row& row) const {
+    return system_.sensors[static_cast<std::size_t>(row.sensor)];
+  }
+  const SensorPlan& PlanOf(const Row& row) const {
+    return plans_[static_cast<std::size_t>(row.sensor)];
+  }
+
+  /// Tells why h of a row could not be had.
+  void NoteRefusal(const Row& row, Outcome outcome);
+  /// An event in the report.
+  Event& Note(const char* kind, std::string text);
+  /// Ends the filter, with an event that tells its last good state.
+  void GiveUp(const char* kind, const std::string& what);
+
   void Bind();
   void KeepFirstEstimates();
   void BindMotions();
   void StepTo(Stamp stamp);
-  bool StepOnce(double dt_s);
   bool StepIsBounded() const;
   bool Propagate();
   void PropagateModels();
-  bool StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s);
 
   void Collect(const Frame& frame);
   void Fuse(std::span<Row* const> group);
-  Outcome Linearise(Row& row);
-  Outcome NoiseOf(Row& row, const double* const* roles);
   Outcome Evaluate(Row& row, MeasurementReport& entry);
   Outcome EvaluateApart(Row& row, MeasurementReport& entry);
   void Chain(Row& row, int column, const RowMajor& j) const;
-  /// S of one measurement by itself, in its report.
-  void Project(Row& row);
   Outcome Gate(Row& row);
   void Weigh(Row& row);
   void CheckConditioning(const Row& row);
-  /// One update with all rows: all of it happens or nothing.
-  virtual Outcome Apply(std::span<Row* const> rows);
   Outcome ApplySmall(std::span<Row* const> rows, int m);
   Outcome ApplyLarge(std::span<Row* const> rows);
   bool MaskConsidered(std::span<Row* const> rows, Eigen::MatrixXd& gain) const;
   bool Correct(const Eigen::MatrixXd& w, const Eigen::MatrixXd& gain, bool masked,
                const Eigen::MatrixXd& h, const Eigen::MatrixXd& r);
-  /// The rows below one another: H (m x n), R and the innovation r.
-  struct Stacked {
-    Eigen::MatrixXd h, noise;
-    Eigen::VectorXd innovation;
-  };
-  Stacked Stack(std::span<Row* const> rows) const;
   Eigen::MatrixXd ProjectionOf(std::span<Row* const> rows) const;
   void RecordGain(MeasurementReport& entry, const double* gain) const;
 
@@ -151,20 +183,10 @@ class Ekf : public Estimator {
   void ForgetMotionOf(BlockId id);
 
   std::span<Row> rows() { return {rows_.data(), row_count_}; }
-  MeasurementReport& EntryOf(const Row& row) { return report_.measurements()[row.report]; }
-  const SensorBinding& BindingOf(const Row& row) const {
-    return system_.sensors[static_cast<std::size_t>(row.sensor)];
-  }
-  const SensorPlan& PlanOf(const Row& row) const {
-    return plans_[static_cast<std::size_t>(row.sensor)];
-  }
   JacobianRows JacobianOf(const Row& row) const;
   std::vector<double>& FirstEstimate(BlockId id) { return first_[static_cast<std::size_t>(id)]; }
-  void NoteRefusal(const Row& row, Outcome outcome);
   void NotePluginFailure(const SensorBinding& sensor);
-  Event& Note(const char* kind, std::string text);
   void NoteDivergence(const char* kind, std::string text);
-  void GiveUp(const char* kind, const std::string& what);
   std::string Describe(const std::vector<BlockId>& blocks) const;
 
   System system_;

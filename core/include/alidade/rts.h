@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "alidade/ekf.h"
+
+namespace alidade {
+
+/// Fixed-interval smoother: the estimate of every frame from the measurements of all. An extended
+/// Kalman filter goes forward; the way back is that of Rauch, Tung and Striebel in the adjoint form
+/// of Bryson and Frazier, which inverts no covariance: P may be singular. n = size of P.
+///
+///   estimate   x_s = x (+) P lambda,   P_s = P - P Lambda P      x, P: the filter's, of the frame
+///   start      lambda = 0, Lambda = 0                            at the last frame
+///   step       lambda <- F' lambda,   Lambda <- F' Lambda F
+///   update     lambda <- A' lambda + H' S^-1 r,   Lambda <- A' Lambda A + H' S^-1 H,
+///              A = I - K H
+///
+/// All Jacobians are those of the filter. Blocks are estimated or fixed, present from the start;
+/// no considered block, no recovery from a lock-out.
+///
+/// Source       [Rauch1965]; [Bierman1977] ch. X, modified Bryson-Frazier.
+class RtsSmoother : public Ekf {
+ public:
+  /// `options.lockout` counts as kNone. ContractViolation where a block is considered or waits for
+  /// its first measurement.
+  RtsSmoother(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
+
+  const UpdateReport& Process(const Frame& frame) override;
+  bool offline() const override { return true; }
+  /// The reports are the filter's. Event `not_pd` where rounding would leave a smoothed variance
+  /// negative: the covariance of that frame is then the filter's.
+  void Smooth(const Emit& emit) override;
+
+ protected:
+  bool StepOnce(double dt_s) override;
+  Outcome Apply(std::span<Row* const> rows) override;
+
+ private:
+  /// How the adjoint goes back over a frame: lambda <- A' lambda + b, Lambda <- A' Lambda A + B.
+  struct Adjoint {
+    Eigen::MatrixXd a;  ///< n x n
+    Eigen::VectorXd b;
+    Eigen::MatrixXd b2;
+
+    /// This one, and then what comes later in time.
+    void Append(const Eigen::MatrixXd& a, const Eigen::VectorXd& b, const Eigen::MatrixXd& b2);
+  };
+  /// One frame, and the filter's estimate after it.
+  struct Passed {
+    Adjoint adjoint;
+    std::vector<double> x;
+    Eigen::MatrixXd p;
+    UpdateReport report;
+  };
+
+  std::vector<Passed> passed_frames_;
+  Adjoint current_;
+};
+
+}  // namespace alidade

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "alidade/ekf.h"
+
+namespace alidade {
+
+/// Extended Kalman filter that carries a square root L of the covariance, P = L L', so that P is
+/// positive semi-definite whatever rounding does, with twice the digits. Both steps are one QR
+/// factorisation, of which the orthogonal factor is not needed; m rows of measurements, P n x n.
+///
+///   predict   [F L, G Lq]' = Q [L+ 0]'                                     (n + n_w) x n
+///   update    [Lr  H L]    [Ls  0 ]
+///             [0   L  ]  = [W   L+] Q'                                     (m + n) x (m + n)
+///             S = Ls Ls',  dx = W Ls^-1 r,  K = W Ls^-1
+///
+/// All Jacobians are those of Ekf. Blocks are estimated or fixed, present from the start; no
+/// considered block, no recovery from a lock-out. O((m + n)^3) for each update, and it allocates.
+///
+/// Source       [Bierman1977] ch. V; [Kailath2000] sec. 12.3, the array form.
+class SquareRootEkf : public Ekf {
+ public:
+  /// `options.lockout` counts as kNone. ContractViolation where a block is considered or waits for
+  /// its first measurement.
+  SquareRootEkf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
+
+  /// L, n x n. state().covariance() is L L' in double precision, and so has half its digits.
+  const Eigen::MatrixXd& root() const { return root_; }
+
+ protected:
+  bool StepOnce(double dt_s) override;
+  void Project(Row& row) override;
+  Outcome Apply(std::span<Row* const> rows) override;
+
+ private:
+  void Take(Eigen::MatrixXd root);
+
+  Eigen::MatrixXd root_;
+};
+
+}  // namespace alidade

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "alidade/ekf.h"
+
+namespace alidade {
+
+struct UkfOptions {
+  EkfOptions filter;  ///< gate, fuse and max_dt_s; `lockout` counts as kNone
+  double alpha = 0.01;
+  double beta = 2.0;
+  double kappa = 0.0;
+
+  /// Reads `alpha` in (0, 1], `beta` >= 0, `kappa` >= 0, `gate`, `fuse` and `max_dt_s` from an
+  /// estimator's entry of the config. Errors: kBadConfig.
+  static UkfOptions FromNode(const Node& entry);
+  /// What FromNode reads.
+  static std::vector<ParamInfo> Schema();
+};
+
+/// Unscented Kalman filter: moments of y = g(x), x ~ N(x0, A A'), from 2N + 1 sigma points, A from
+/// the pivoted L D L' of P, which may be singular.
+///
+///   points     x0,  x0 (+) c a_i,  x0 (+) -c a_i        a_i: columns of A, i = 1 ... N
+///   spread     c^2 = alpha^2 (N + kappa),   w = 1 / (2 c^2)
+///   mean       y = g(x0) (+) m,   m = w sum f_i         f_i = g(x_i) (-) g(x0), at the mean
+///   moments    Cov(y) = w sum f_i f_i' + (beta - alpha^2) m m',   Cov(x, y) = w sum dx_i f_i'
+///
+/// This is the scaled transform without its large weight of the centre, which cancels. The mean on
+/// a manifold is found by iteration. Process noise is augmented: N = n + noise inputs. A
+/// measurement's R is that at x0; S = Cov(h) + R, K = Cov(x, h) S^-1, and with dx_i - K f_i in place
+/// of f_i the new P is a sum of squares, Cov(x - K h) + K R K'.
+///
+/// Where sigma points leave the domain of a model that is defined at x0, their spread is halved
+/// until none does (event `guarded`); a sensor that is not defined at x0 is out of domain. Where
+/// P has lost positive semi-definiteness, negative pivots count as zero (event `repaired`).
+/// Blocks are estimated or fixed, present from the start; no considered block, no recovery from a
+/// lock-out.
+///
+/// Source       [Julier2004]; [Wan2000] alpha, beta, kappa.
+class Ukf : public Ekf {
+ public:
+  /// ContractViolation where a block is considered or waits for its first measurement.
+  Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>& streams);
+
+ protected:
+  bool StepOnce(double dt_s) override;
+  Outcome Linearise(Row& row) override;
+  void Project(Row& row) override;
+  Outcome Apply(std::span<Row* const> rows) override;
+
+ private:
+  /// Weights of the transform with 2N sigma points besides the centre.
+  struct Transform {
+    double c, w;
+    double centre;  ///< beta - alpha^2
+  };
+  /// What the sigma points make of one measurement.
+  struct Predicted {
+    int halvings = 0;   ///< of the spread
+    Eigen::MatrixXd f;  ///< m x 2n
+    Eigen::VectorXd m;
+  };
+
+  Transform TransformOf(Eigen::Index directions, int halvings) const;
+  const Eigen::MatrixXd& Root();
+  Status StepPoints(const Eigen::MatrixXd& root, int halvings, double dt_s);
+  Status StepPoint(const std::vector<double>& from, const Eigen::VectorXd& noise, double dt_s,
+                   std::vector<double>& to) const;
+  Outcome Predict(Row& row, int halvings);
+  Predicted& PredictedOf(const Row& row) { return predicted_[row.report]; }
+  Outcome StackPoints(std::span<Row* const> rows, Stacked& all, Eigen::VectorXd& mean,
+                      int& halvings);
+  void NoteGuard(const std::string& who, std::size_t index, int halvings);
+
+  UkfOptions spread_;
+  Eigen::MatrixXd root_;  ///< of P
+  bool root_is_current_ = false;
+  std::vector<Predicted> predicted_;  ///< by report
+  std::vector<bool> guarded_;         ///< by sensor; the last: the motion
+};
+
+}  // namespace alidade

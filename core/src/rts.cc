@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/rts.h"
+
+#include <Eigen/Cholesky>
+
+#include "filter_options.h"
+
+namespace alidade {
+
+RtsSmoother::RtsSmoother(System system, const EkfOptions& options,
+                         const std::vector<StreamInfo>& streams)
+    : Ekf(std::move(system), internal::WithoutRecovery(options), streams) {
+  ALIDADE_EXPECTS(!considering_ && !waiting_);
+}
+
+void RtsSmoother::Adjoint::Append(const Eigen::MatrixXd& later_a, const Eigen::VectorXd& later_b,
+                                  const Eigen::MatrixXd& later_b2) {
+  b += a.transpose() * later_b;
+  b2 += a.transpose() * later_b2 * a;
+  a = later_a * a;
+}
+
+const UpdateReport& RtsSmoother::Process(const Frame& frame) {
+  const Eigen::Index n = state_.covariance().size();
+  current_ = {Eigen::MatrixXd::Identity(n, n), Eigen::VectorXd::Zero(n),
+              Eigen::MatrixXd::Zero(n, n)};
+  const UpdateReport& report = Ekf::Process(frame);
+  passed_frames_.push_back({current_, state_.values(), state_.covariance().Dense(), report});
+  passed_frames_.back().report.events.clear();  // told already
+  return report;
+}
+
+bool RtsSmoother::StepOnce(double dt_s) {
+  if (!Ekf::StepOnce(dt_s)) return false;
+  const Eigen::Index n = state_.covariance().size();
+  current_.Append(Transition(), Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n));
+  return true;
+}
+
+Outcome RtsSmoother::Apply(std::span<Row* const> rows) {
+  const Stacked all = Stack(rows);
+  const Eigen::MatrixXd p = state_.covariance().Dense();
+  const std::vector<double> before = state_.values();
+  const Outcome outcome = Ekf::Apply(rows);
+  if (outcome != Outcome::kAccepted) return outcome;
+  // The filter has factorised the same S.
+  const Eigen::LLT<Eigen::MatrixXd> s(all.h * p * all.h.transpose() + all.noise);
+  const Eigen::MatrixXd weighted = s.solve(all.h);  // S^-1 H
+  Eigen::MatrixXd a = -p * all.h.transpose() * weighted;
+  a.diagonal().array() += 1.0;
+  const Eigen::MatrixXd back = TransportTo(before);
+  current_.Append(back.transpose() * a, weighted.transpose() * all.innovation,
+                  all.h.transpose() * weighted);
+  return outcome;
+}
+
+void RtsSmoother::Smooth(const Emit& emit) {
+  const Eigen::Index n = state_.covariance().size();
+  Eigen::VectorXd lambda = Eigen::VectorXd::Zero(n);
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);  // Lambda
+  std::vector<Event> events;
+  State smoothed = state_;
+  for (auto passed = passed_frames_.rbegin(); passed != passed_frames_.rend(); ++passed) {
+    const Eigen::MatrixXd p = passed->p - passed->p * information * passed->p;
+    const bool positive = (p.diagonal().array() >= 0.0).all();
+    if (!positive) {
+      events.push_back({stamp_, "not_pd",
+                        "a smoothed variance is negative by rounding in frame " +
+                            std::to_string(passed_frames_.rend() - passed - 1) +
+                            "; its covariance is the filter's"});
+    }
+    smoothed.values() = passed->x;
+    smoothed.Retract((passed->p * lambda).eval().data(), passed->x);
+    if (positive) passed->p = p;
+    smoothed.covariance().SetBlock(0, 0, passed->p);
+    smoothed.MoveTo(passed->x);
+    passed->p = smoothed.covariance().Dense();
+    const Adjoint& adjoint = passed->adjoint;
+    lambda = adjoint.a.transpose() * lambda + adjoint.b;
+    information = adjoint.a.transpose() * information * adjoint.a + adjoint.b2;
+    information = 0.5 * (information + information.transpose()).eval();
+  }
+  for (std::size_t k = 0; k < passed_frames_.size(); ++k) {
+    Passed& passed = passed_frames_[k];
+    smoothed.values() = passed.x;
+    smoothed.covariance().SetBlock(0, 0, passed.p);
+    if (k + 1 == passed_frames_.size()) passed.report.events = events;
+    emit(k, smoothed, passed.report);
+  }
+}
+
+}  // namespace alidade

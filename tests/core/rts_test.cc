@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -114,7 +115,7 @@ TEST(RtsSmoother, GapsInPartsAndTheGateAreThoseOfTheFilter) {
   std::vector<double> of_frames;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const Stamp last = i == 0 ? 0 : frames[i - 1].stamp, gap = frames[i].stamp - last;
-    const int parts = static_cast<int>(std::ceil(Seconds(gap) / 0.1));
+    const int parts = std::array{1, 4, 1, 6}[i];
     for (int k = 1; k < parts; ++k) in_frames.Process(FrameAt(Seconds(last + gap * k / parts), {}));
     in_frames.Process(frames[i]);
   }

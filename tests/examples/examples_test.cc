@@ -261,7 +261,7 @@ TEST(Examples, WhatAnEstimatorTypeDoesNotHaveIsRefusedByName) {
        "{block: template.inverse_distance, mode: consider}"},
       {"sensors.stereo.roles.depth", "{block: target.depth, linearise_at: measurement}"},
       {"estimators.one.lockout", "{after: 20}"},
-      {"estimators.one.loss", "huber"}};
+      {"sensors.scale.loss", "{huber: 1.345}"}};
   for (const std::string type : {"rts", "square_root_ekf", "ukf"}) {
     for (const auto& [key, value] : unsupported) {
       try {

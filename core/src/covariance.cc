@@ -156,16 +156,14 @@ void Covariance::Project(const JacobianRows& h, double* pht, double* s) const {
   }
 }
 
-Covariance::Solved Covariance::Solve(int m, const double* pht, const double* s, const double* r,
-                                     double* w, double* inverse_d, double* dx, double* gain) const {
-  const int ld = static_cast<int>(p_.rows());
-  return internal::SmallKernelsFor(size_).solve(p_.data(), ld, m, pht, s, r, w, inverse_d, dx,
-                                                gain);
+bool Covariance::Solve(int m, const double* pht, const double* s, const double* r, double* w,
+                       double* inverse_d, double* dx, double* gain) const {
+  return internal::SmallKernelsFor(size_).solve(m, pht, s, m, r, w, inverse_d, dx, gain);
 }
 
-void Covariance::Downdate(int m, const double* w, const double* inverse_d) {
-  internal::SmallKernelsFor(size_).downdate(p_.data(), static_cast<int>(p_.rows()), m, w,
-                                            inverse_d);
+bool Covariance::Downdate(int m, const double* w, const double* inverse_d) {
+  return internal::SmallKernelsFor(size_).downdate(p_.data(), static_cast<int>(p_.rows()), m, w,
+                                                   inverse_d);
 }
 
 void Covariance::SubtractOuter(const Eigen::MatrixXd& w) {

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstdio>
 #include <numeric>
+#include <typeinfo>
 
 #include "alidade/statistics.h"
+#include "ekf_small.h"
 
 namespace alidade {
 namespace {
@@ -38,6 +40,8 @@ Stamp LongestPart(double max_dt_s) {
 
 }  // namespace
 
+Ekf::~Ekf() = default;
+
 Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams)
     : system_(std::move(system)),
       options_(options),
@@ -67,6 +71,11 @@ void Ekf::Start(Stamp stamp) { stamp_ = stamp; }
 
 const UpdateReport& Ekf::Process(const Frame& frame) {
   report_.Clear();
+  if (!small_is_known_) {
+    small_ = typeid(*this) == typeid(Ekf) ? Small::For(*this) : nullptr;
+    small_is_known_ = true;
+  }
+  if (small_ != nullptr && small_->Process(frame)) return report_;
   if (stamp_ == kNoStamp) {
     Start(system_.start_s ? StampFromSeconds(*system_.start_s) : frame.stamp);
   }
@@ -101,6 +110,7 @@ const UpdateReport& Ekf::Process(const Frame& frame) {
 /// One row for each measurement and sensor bound to its stream, in the order of the sensors.
 void Ekf::Collect(const Frame& frame) {
   row_count_ = 0;
+  report_.ClearMeasurements();
   for (int sensor = 0; sensor < std::ssize(system_.sensors); ++sensor) {
     const SensorBinding& binding = system_.sensors[static_cast<std::size_t>(sensor)];
     const Geometry& geometry = binding.model.measurement().geometry;

@@ -73,16 +73,16 @@ Outcome Ekf::ApplySmall(std::span<Row* const> rows, int m) {
     at += k;
   }
   Covariance& p = state_.covariance();
-  const Covariance::Solved solved = p.Solve(m, pht.data(), s.data(), innovation.data(), w.data(),
-                                            inverse_d.data(), dx.data(), gain.data());
-  if (solved == Covariance::Solved::kNotPd) return Outcome::kNotPd;
-  if (solved == Covariance::Solved::kCancelled) return ApplyLarge(rows);
+  if (!p.Solve(m, pht.data(), s.data(), innovation.data(), w.data(), inverse_d.data(), dx.data(),
+               gain.data())) {
+    return Outcome::kNotPd;
+  }
   if (correction_ != nullptr) std::copy_n(correction_->data(), n, dx.begin());
   if (!AllFinite({dx.data(), n})) return Outcome::kNotFinite;
   state_.Retract(dx.data(), moved_);
   if (!AllFinite(moved_)) return Outcome::kNotFinite;
-  p.Downdate(m, w.data(), inverse_d.data());
-  state_.MoveTo(moved_);
+  if (!p.Downdate(m, w.data(), inverse_d.data())) return ApplyLarge(rows);
+  state_.MoveTo(moved_);  // last: P turns with the tangent planes
   at = 0;
   for (const Row* row : rows) {
     MeasurementReport& entry = EntryOf(*row);

@@ -59,6 +59,7 @@ void Ekf::Bind() {
   }
   for (Row& row : rows_) row.zeroed = nullptr;
   BindMotions();
+  small_is_known_ = false;
 }
 
 /// Under `first_estimate`: the values of stationary blocks that have none noted yet.

@@ -81,14 +81,13 @@ class Covariance {
   /// Few states, at least one: the operations below exist.
   bool small() const { return size_ > 0 && size_ <= kSmall; }
   static constexpr int kSmall = 16;
-  enum class Solved { kYes, kNotPd, kCancelled };
   /// Of m <= kSmall rows with P H' (by columns), S and innovation r: W = P H' L^-T and 1/D for
-  /// S = L D L', dx = K r and K = P H' S^-1 (by columns). kCancelled where P - W D^-1 W' would lose
-  /// nearly all digits of a variance.
-  Solved Solve(int m, const double* pht, const double* s, const double* r, double* w,
-               double* inverse_d, double* dx, double* gain) const;
-  /// P <- P - W D^-1 W', with what Solve gave.
-  void Downdate(int m, const double* w, const double* inverse_d);
+  /// S = L D L', dx = K r and K = P H' S^-1 (by columns). False where S is not positive definite.
+  bool Solve(int m, const double* pht, const double* s, const double* r, double* w,
+             double* inverse_d, double* dx, double* gain) const;
+  /// P <- P - W D^-1 W', with what Solve gave. False, and P as it was, where a variance would lose
+  /// nearly all its digits.
+  bool Downdate(int m, const double* w, const double* inverse_d);
   /// P <- P - W W', W n x m. O(n^2 m).
   void SubtractOuter(const Eigen::MatrixXd& w);
   /// P <- (I - K H) P (I - K H)' + K R K' for any gain K (Joseph), K n x m, H m x n, R m x m.
@@ -96,6 +95,10 @@ class Covariance {
   void Joseph(const Eigen::MatrixXd& k, const Eigen::MatrixXd& h, const Eigen::MatrixXd& r);
   /// Rows of one block <- J (k x k) times them: P_bb <- J P_bb J', P_bi <- J P_bi.
   void Transform(int offset, const Eigen::MatrixXd& j);
+  /// Where P lies, column-major with leading dimension stride(); the lower triangle counts.
+  double* data() { return p_.data(); }
+  const double* data() const { return p_.data(); }
+  int stride() const { return static_cast<int>(p_.rows()); }
   /// The whole matrix, mirrored; for records and tests.
   Eigen::MatrixXd Dense() const;
 

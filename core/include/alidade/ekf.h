@@ -2,6 +2,7 @@
 #pragma once
 
 #include <limits>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -61,6 +62,7 @@ class Ekf : public Estimator {
   /// `streams` are the source's, in the order of Measurement::stream.
   Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
 
+  ~Ekf() override;
   Ekf(const Ekf&) = delete;  // its plans point into its state
   Ekf& operator=(const Ekf&) = delete;
 
@@ -152,6 +154,8 @@ class Ekf : public Estimator {
   /// Ends the filter, with an event that tells its last good state.
   void GiveUp(const char* kind, const std::string& what);
 
+  class Small;  ///< the fast path of a filter of few states that are all vectors
+
   void Bind();
   void KeepFirstEstimates();
   void BindMotions();
@@ -195,9 +199,11 @@ class Ekf : public Estimator {
   State state_;
   std::vector<SensorPlan> plans_;  ///< by sensor
   std::vector<MotionPlan> motions_;
-  std::vector<int> order_;    ///< rows of P in the order of the layout; empty: as they are
-  bool waiting_ = false;      ///< a block has no value yet
-  bool considering_ = false;  ///< a block is considered
+  std::unique_ptr<Small> small_;  ///< null where the general path is the only one
+  bool small_is_known_ = false;   ///< whether small_ fits the plans
+  std::vector<int> order_;        ///< rows of P in the order of the layout; empty: as they are
+  bool waiting_ = false;          ///< a block has no value yet
+  bool considering_ = false;      ///< a block is considered
   std::vector<std::vector<double>> first_;       ///< estimates of stationary blocks, by block
   const Eigen::VectorXd* correction_ = nullptr;  ///< dx of the update; null: K r
   // Memory that is kept from frame to frame.
@@ -210,8 +216,8 @@ class Ekf : public Estimator {
   Stamp stamp_ = kNoStamp;
   std::vector<double> gate_threshold_;  ///< on r' S^-1 r, by sensor
   std::vector<int> rejections_;         ///< consecutive, by sensor
-  std::vector<bool> out_of_domain_;     ///< since the last acceptance, by sensor
-  std::vector<bool> inflated_;          ///< since the last acceptance, by sensor
+  std::vector<char> out_of_domain_;     ///< since the last acceptance, by sensor
+  std::vector<char> inflated_;          ///< since the last acceptance, by sensor
   std::vector<bool> warned_;            ///< of conditioning, by sensor
   /// The last accepted measurement, for the record of a failure.
   struct {

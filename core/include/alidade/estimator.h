@@ -80,9 +80,10 @@ class UpdateReport {
   }
   void Clear() {
     stale = false;
-    count_ = 0;
+    ClearMeasurements();
     events.clear();
   }
+  void ClearMeasurements() { count_ = 0; }
 
   bool stale = false;  ///< the frame is older than the state, which stays as it was
   std::vector<Event> events;

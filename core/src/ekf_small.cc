@@ -1,0 +1,362 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ekf_small.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "small_kernels.h"
+
+#define ALIDADE_INLINE [[gnu::always_inline]] inline
+
+namespace alidade {
+namespace {
+
+void Fit(std::vector<double>& values, int size) {
+  if (std::ssize(values) != size) values.resize(static_cast<std::size_t>(size));
+}
+
+/// Makes room in the report of an accepted measurement of m rows in a filter of n states.
+void Fit(MeasurementReport& entry, int m, int n) {
+  Fit(entry.z, m);
+  Fit(entry.h, m);
+  Fit(entry.innovation, m);
+  Fit(entry.s, m * m);
+  Fit(entry.gain, m * n);
+}
+
+ALIDADE_INLINE void Copy(const double* from, int size, std::vector<double>& to) {
+  double* const at = to.data();
+  for (int i = 0; i < size; ++i) at[i] = from[i];
+}
+
+/// 0 where all are finite, else not a number.
+ALIDADE_INLINE double Defect(const double* values, int size) {
+  double sum = 0.0;
+  for (int i = 0; i < size; ++i) sum += 0.0 * values[i];
+  return sum;
+}
+
+/// r' S^-1 r by S = L D L', m <= 3; not a number where S is not positive definite.
+ALIDADE_INLINE double SquaredMahalanobis(const double* s, const double* r, int m) {
+  if (m == 1) return s[0] > 0.0 ? r[0] * r[0] / s[0] : std::nan("");
+  double l[3][3], d[3], y[3], sum = 0.0;
+  for (int i = 0; i < m; ++i) {
+    d[i] = s[i * m + i];
+    y[i] = r[i];
+    for (int j = 0; j < i; ++j) {
+      double v = s[i * m + j];
+      for (int k = 0; k < j; ++k) v -= l[i][k] * d[k] * l[j][k];
+      l[i][j] = v / d[j];
+      d[i] -= v * l[i][j];
+      y[i] -= l[i][j] * y[j];
+    }
+    if (!(d[i] > 0.0)) return std::nan("");
+    sum += y[i] * y[i] / d[i];
+  }
+  return sum;
+}
+
+/// Q = G L L' G', its lower triangle, for G n x w and L w x w lower triangular; G becomes G L.
+ALIDADE_INLINE void SpreadNoise(double* g, const double* l, int n, int w, double* q) {
+  for (int i = 0; i < n; ++i) {
+    for (int c = 0; c < w; ++c) {  // from left to right: column c needs none of those before it
+      double sum = g[i * w + c] * l[c * w + c];
+      for (int k = c + 1; k < w; ++k) sum += g[i * w + k] * l[k * w + c];
+      g[i * w + c] = sum;
+    }
+    for (int j = 0; j <= i; ++j) {
+      double sum = g[i * w] * g[j * w];
+      for (int c = 1; c < w; ++c) sum += g[i * w + c] * g[j * w + c];
+      q[i * n + j] = sum;
+    }
+  }
+}
+
+}  // namespace
+
+/// What one motion model makes of its blocks and of P. K rows and W noise inputs, or 0 where they
+/// are known at run time only.
+template <int N, int K, int W>
+ALIDADE_INLINE bool Ekf::Small::StepModel(const Motion& motion, double dt_s, double (&p)[N][N]) {
+  MotionPlan& plan = *motion.plan;
+  double* const l = plan.l.data();
+  double* const g = plan.g.data();
+  const int k = K > 0 ? K : motion.size, w = W > 0 ? W : motion.noise;
+  for (int i = 0; i < w * w; ++i) l[i] = 0.0;
+  if (motion.model->Step(plan.x.data(), nullptr, nullptr, dt_s, plan.next.data(), plan.f.data(),
+                         g) != Status::kOk ||
+      motion.model->SqrtQ(plan.x.data(), dt_s, l) != Status::kOk) {
+    return false;
+  }
+  double own[K > 0 ? K * K : 1];
+  double* const q = K > 0 ? own : plan.q.data();
+  SpreadNoise(g, l, k, w, q);
+  internal::Propagate<N, K>(p, motion.offset, k, plan.f.data(), q);
+  return Defect(ekf_.next_.data() + motion.offset, k) == 0.0;
+}
+
+/// All motion models, or nothing.
+template <int N>
+ALIDADE_INLINE bool Ekf::Small::Step(double dt_s) {
+  Covariance& covariance = ekf_.state_.covariance();
+  double p[N][N];
+  internal::Load(covariance.data(), covariance.stride(), p);
+  for (const Motion& motion : motions_) {
+    bool done = false;
+    if constexpr (N >= 2) {
+      done = motion.size == 2 && motion.noise == 1 ? StepModel<N, 2, 1>(motion, dt_s, p)
+                                                   : StepModel<N, 0, 0>(motion, dt_s, p);
+    } else {
+      done = StepModel<N, 0, 0>(motion, dt_s, p);
+    }
+    if (!done) return false;
+  }
+  double defect = 0.0;
+  for (int i = 0; i < N; ++i) defect += 0.0 * p[i][i];
+  if (defect != 0.0) return false;
+  internal::Store(p, covariance.data(), covariance.stride());
+  double* const x = ekf_.state_.values().data();
+  const double* const next = ekf_.next_.data();
+  for (const Motion& motion : motions_) {
+    for (int i = motion.offset; i < motion.offset + motion.size; ++i) x[i] = next[i];
+  }
+  return true;
+}
+
+/// h, H, R, S and NIS of one measurement of M rows (0: known at run time only), with P H' at
+/// `pht`; false where anything is unusual.
+template <int N, int M>
+ALIDADE_INLINE bool Ekf::Small::Linearise(Sensor& sensor, const double* z, MeasurementReport& entry,
+                                          double* pht) {
+  constexpr double kTiny = 1e-13;
+  constexpr int kMost = M > 0 ? M : kMostOfOne;
+  const int m = M > 0 ? M : sensor.rows;
+  const Covariance& p = ekf_.state_.covariance();
+  double h[kMost], l[kMost * kMost], r[kMost], noise[kMost], s[kMost * kMost];
+  for (int i = 0; i < m * m; ++i) l[i] = 0.0;
+  const double* const* const roles = sensor.roles.data();
+  if (sensor.model->Linearise(roles, h, sensor.jacobians.data(), sensor.strides.data()) !=
+          Status::kOk ||
+      sensor.model->SqrtNoise(roles, z, l) != Status::kOk) {
+    return false;
+  }
+  for (int i = 0; i < m; ++i) {
+    r[i] = z[i] - h[i];
+    for (int j = 0; j <= i; ++j) {
+      double sum = l[i * m] * l[j * m];
+      for (int c = 1; c < m; ++c) sum += l[i * m + c] * l[j * m + c];
+      s[i * m + j] = s[j * m + i] = sum;
+    }
+    noise[i] = s[i * m + i];
+  }
+  internal::Project<N>(p.data(), p.stride(), sensor.h.data(), m, pht, s);
+  bool tiny = false;
+  for (int i = 0; i < m; ++i) tiny |= !(noise[i] > kTiny * s[i * m + i]);
+  if (tiny && !ekf_.warned_[static_cast<std::size_t>(entry.sensor)]) return false;
+  entry.nis = SquaredMahalanobis(s, r, m);
+  if (Defect(s, m * m) + 0.0 * entry.nis != 0.0) return false;
+  Copy(z, m, entry.z);
+  Copy(h, m, entry.h);
+  Copy(r, m, entry.innovation);
+  Copy(s, m * m, entry.s);
+  return true;
+}
+
+/// Puts a measurement that passed its gate below the `at` rows before it; their P H' is there.
+template <int N, int M>
+ALIDADE_INLINE void Ekf::Small::Stack(const Sensor& sensor, MeasurementReport& entry, Rows<N>& rows,
+                                      int at) {
+  const int m = M > 0 ? M : sensor.rows;
+  for (int i = 0; i < m; ++i) {
+    const double* const h = sensor.h.data() + i * N;
+    double* const s = rows.s + (at + i) * kRows;
+    for (int j = 0; j < at; ++j) {
+      double sum = h[0] * rows.pht[j * N];
+      for (int c = 1; c < N; ++c) sum += h[c] * rows.pht[j * N + c];
+      s[j] = sum;
+    }
+    for (int j = 0; j <= i; ++j) s[at + j] = entry.s[static_cast<std::size_t>(i * m + j)];
+    rows.innovation[at + i] = entry.innovation[static_cast<std::size_t>(i)];
+    rows.gain[at + i] = entry.gain.data() + i * N;
+  }
+}
+
+/// The update with M rows (0: known at run time only), or nothing.
+template <int N, int M>
+ALIDADE_INLINE bool Ekf::Small::Correct(const Rows<N>& rows, int count) {
+  constexpr int kMost = M > 0 ? M : kRows;
+  const int m = M > 0 ? M : count;
+  Covariance& p = ekf_.state_.covariance();
+  double w[kMost * N], inverse_d[kMost], dx[N], gain[kMost * N], moved[N], updated[N * N];
+  if (!internal::Solve<N, M>(m, rows.pht, rows.s, kRows, rows.innovation, w, inverse_d, dx, gain) ||
+      !internal::Downdate<N, M>(p.data(), p.stride(), m, w, inverse_d, updated)) {
+    return false;
+  }
+  double* const x = ekf_.state_.values().data();
+  for (int i = 0; i < N; ++i) moved[i] = x[i] + dx[i];
+  if (Defect(moved, N) != 0.0) return false;
+  for (int c = 0; c < N; ++c) {
+    for (int r = c; r < N; ++r) p.data()[c * p.stride() + r] = updated[c * N + r];
+  }
+  for (int i = 0; i < N; ++i) x[i] = moved[i];
+  for (int i = 0; i < m; ++i) {
+    for (int n = 0; n < N; ++n) rows.gain[i][n] = gain[i * N + n];
+  }
+  return true;
+}
+
+/// The measurements of a frame as one update, or nothing.
+template <int N>
+ALIDADE_INLINE bool Ekf::Small::Update(const Frame& frame) {
+  Rows<N> rows;
+  int m = 0;
+  const Measurement* last = nullptr;
+  int last_sensor = -1;
+  ekf_.report_.ClearMeasurements();
+  for (Sensor& sensor : sensors_) {
+    const Measurement* found = nullptr;
+    for (const Measurement& one : frame.measurements) {
+      if (one.stream != sensor.stream) continue;
+      if (found != nullptr) return false;
+      found = &one;
+    }
+    if (found == nullptr) continue;
+    const int size = sensor.rows;
+    const double* const z = found->values.data();
+    if (std::ssize(found->values) != size || !found->covariance.empty() || Defect(z, size) != 0.0 ||
+        m + size > kRows) {
+      return false;
+    }
+    const Status valid = sensor.model->Valid(z);
+    if (valid != Status::kOk && valid != Status::kInvalid) return false;
+    MeasurementReport& entry = ekf_.report_.Add();
+    if (valid == Status::kInvalid) {
+      entry.Reset(sensor.index, found->landmark, size);
+      entry.z.assign(z, z + size);
+      entry.outcome = Outcome::kInvalid;
+      continue;
+    }
+    if (std::ssize(entry.gain) != size * N || std::ssize(entry.z) != size) Fit(entry, size, N);
+    entry.sensor = sensor.index;
+    entry.landmark = found->landmark;
+    entry.dof = size;
+    entry.outcome = Outcome::kAccepted;
+    double* const pht = rows.pht + m * N;
+    const bool usual =
+        size == 1 ? Linearise<N, 1>(sensor, z, entry, pht) : Linearise<N, 0>(sensor, z, entry, pht);
+    if (!usual) return false;
+    if (!(entry.nis <= sensor.gate)) {
+      if (*sensor.rejections + 1 >= ekf_.options_.lockout_after) return false;
+      entry.outcome = Outcome::kGated;
+      entry.gain.clear();
+      continue;
+    }
+    size == 1 ? Stack<N, 1>(sensor, entry, rows, m) : Stack<N, 0>(sensor, entry, rows, m);
+    m += size;
+    last = found;
+    last_sensor = sensor.index;
+  }
+  if (m > 0) {
+    const bool done = m == 1   ? Correct<N, 1>(rows, m)
+                      : m == 2 ? Correct<N, 2>(rows, m)
+                               : Correct<N, 0>(rows, m);
+    if (!done) return false;
+    ekf_.last_used_.sensor = last_sensor;
+    ekf_.last_used_.stamp = last->stamp;
+    Fit(ekf_.last_used_.z, static_cast<int>(std::ssize(last->values)));
+    Copy(last->values.data(), static_cast<int>(std::ssize(last->values)), ekf_.last_used_.z);
+  }
+  CountRejections();
+  return true;
+}
+
+void Ekf::Small::CountRejections() {
+  for (const MeasurementReport& entry : ekf_.report_.measurements()) {
+    const auto k = static_cast<std::size_t>(entry.sensor);
+    if (entry.outcome == Outcome::kAccepted) {
+      ekf_.rejections_[k] = 0;
+      ekf_.inflated_[k] = false;
+      ekf_.out_of_domain_[k] = false;
+    } else if (entry.outcome == Outcome::kGated) {
+      ++ekf_.rejections_[k];
+    }
+  }
+}
+
+template <int N>
+bool Ekf::Small::ProcessSized(const Frame& frame) {
+  Stamp elapsed = 0;
+  if (ekf_.failed_ || ekf_.stamp_ == kNoStamp || frame.stamp < ekf_.stamp_ ||
+      __builtin_sub_overflow(frame.stamp, ekf_.stamp_, &elapsed)) {
+    return false;
+  }
+  if (elapsed > 0) {
+    const double dt_s = Seconds(elapsed);
+    if (!(dt_s <= ekf_.options_.max_dt_s) || !Step<N>(dt_s)) return false;
+    ekf_.stamp_ = frame.stamp;
+  }
+  return Update<N>(frame);
+}
+
+bool Ekf::Small::AddMotions() {
+  for (std::size_t i = 0; i < ekf_.motions_.size(); ++i) {
+    MotionPlan& plan = ekf_.motions_[i];
+    if (!plan.active) continue;
+    if (plan.segments.size() != 1 || !plan.rows.empty()) return false;
+    const MotionModel& model = ekf_.system_.motions[i].model;
+    motions_.push_back(
+        {&model, &plan, plan.segments[0].first, plan.segments[0].second, model.noise_size()});
+  }
+  return true;
+}
+
+bool Ekf::Small::AddSensors() {
+  sensors_.reserve(ekf_.plans_.size());  // they hold pointers into themselves
+  for (std::size_t k = 0; k < ekf_.plans_.size(); ++k) {
+    const SensorPlan& plan = ekf_.plans_[k];
+    const SensorModel& model = ekf_.system_.sensors[k].model;
+    const Geometry& geometry = model.measurement().geometry;
+    if (geometry.kind != GeometryKind::kVector || geometry.tangent > kMostOfOne ||
+        plan.width != ekf_.state_.covariance().size() || plan.apart ||
+        ekf_.system_.sensors[k].loss.kind != LossKind::kNone ||
+        std::ranges::count(plan.considered, true) > 0) {
+      return false;
+    }
+    Sensor& sensor = sensors_.emplace_back();
+    sensor.index = static_cast<int>(k);
+    sensor.rejections = &ekf_.rejections_[k];
+    sensor.model = &model;
+    sensor.roles = plan.roles;
+    sensor.strides = plan.strides;
+    for (const int column : plan.columns) {
+      sensor.jacobians.push_back(column < 0 ? nullptr : sensor.h.data() + column);
+    }
+    sensor.stream = ekf_.stream_of_sensor_[k];
+    sensor.rows = geometry.tangent;
+    sensor.gate = ekf_.gate_threshold_[k];
+  }
+  return true;
+}
+
+std::unique_ptr<Ekf::Small> Ekf::Small::For(Ekf& ekf) {
+  const int n = ekf.state_.covariance().size();
+  const auto plain = [](const Block& block) {
+    return block.has_covariance() && block.geometry().kind == GeometryKind::kVector &&
+           block.value_offset == block.tangent_offset;
+  };
+  if (!ekf.state_.covariance().small() || ekf.options_.fuse != Fuse::kJoint || ekf.waiting_ ||
+      ekf.considering_ || !ekf.order_.empty() || std::ssize(ekf.state_.values()) != n ||
+      !std::ranges::all_of(ekf.state_.layout().blocks(), plain)) {
+    return nullptr;
+  }
+  std::unique_ptr<Small> small(new Small(ekf));
+  if (!small->AddMotions() || !small->AddSensors()) return nullptr;
+  const auto choose = [&]<int... I>(std::integer_sequence<int, I...>) {
+    ((n == I + 1 ? (small->process_ = &Small::ProcessSized<I + 1>, 0) : 0), ...);
+  };
+  choose(std::make_integer_sequence<int, Covariance::kSmall>{});
+  return small;
+}
+
+}  // namespace alidade

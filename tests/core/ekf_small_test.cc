@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The fast path of a small filter against the general path, which a fixed block beside the others
+// makes the same filter take.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <string>
+
+#include "support/systems.h"
+
+namespace alidade {
+namespace {
+
+using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
+
+/// Two numbers from one state entry of two, with correlated noise.
+struct Pair : Sensor<Vec<2>, Vec<2>> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    z[0] = x[0] * x[1];
+    z[1] = x[0] + 2.0 * x[1];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(0.3);
+    l[2] = T(0.1);
+    l[3] = T(0.2);
+  }
+};
+
+/// The same system, which a block of no sensor's keeps from the fast path.
+System WithFixedBlock(System system) {
+  const BlockId id =
+      system.layout.Declare("aside.x", "aside", system.layout[0].space, BlockStatus::kFixed);
+  Prior prior;
+  prior.block = id;
+  prior.mean = {1.0};
+  prior.covariance = Eigen::MatrixXd::Zero(1, 1);
+  system.priors.push_back(prior);
+  return system;
+}
+
+void ExpectEqual(const std::vector<double>& a, const std::vector<double>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (std::isnan(b[i])) {
+      EXPECT_TRUE(std::isnan(a[i]));
+    } else {
+      EXPECT_NEAR(a[i], b[i], 1e-11 * (1.0 + std::abs(b[i])));
+    }
+  }
+}
+
+/// Both filters over the same frames; counts how often each outcome and kind of event was seen.
+std::map<std::string, int> Compare(const System& system, const EkfOptions& options,
+                                   const std::vector<Frame>& frames) {
+  const System other = WithFixedBlock(system);
+  Ekf fast(system, options, StreamsOf(system)), general(other, options, StreamsOf(other));
+  std::map<std::string, int> seen;
+  for (const Frame& frame : frames) {
+    const UpdateReport& a = fast.Process(frame);
+    const UpdateReport& b = general.Process(frame);
+    EXPECT_EQ(a.events.size(), b.events.size());
+    for (const Event& event : b.events) ++seen[event.kind];
+    EXPECT_EQ(a.measurements().size(), b.measurements().size());
+    for (std::size_t i = 0; i < a.measurements().size(); ++i) {
+      const MeasurementReport& one = a.measurements()[i];
+      const MeasurementReport& two = b.measurements()[i];
+      ++seen[ToString(two.outcome)];
+      EXPECT_EQ(one.sensor, two.sensor);
+      EXPECT_EQ(one.outcome, two.outcome);
+      EXPECT_EQ(one.dof, two.dof);
+      EXPECT_NEAR(one.nis, two.nis, 1e-10 * (1.0 + two.nis));
+      ExpectEqual(one.z, two.z);
+      ExpectEqual(one.h, two.h);
+      ExpectEqual(one.innovation, two.innovation);
+      ExpectEqual(one.s, two.s);
+      ExpectEqual(one.gain, two.gain);
+    }
+    EXPECT_EQ(fast.diverged(), general.diverged());
+    const int n = fast.state().covariance().size();
+    EXPECT_LT((fast.state().covariance().Dense() - general.state().covariance().Dense())
+                  .cwiseAbs()
+                  .maxCoeff(),
+              1e-11);
+    for (int i = 0; i < n; ++i) {
+      EXPECT_NEAR(fast.state().values()[i], general.state().values()[i], 1e-11);
+    }
+    if (::testing::Test::HasFailure()) break;
+  }
+  return seen;
+}
+
+TEST(SmallEkf, DoesWhatTheGeneralPathDoes) {
+  EkfOptions options;
+  options.gate = 0.99;
+  options.lockout_after = 4;
+  std::vector<Frame> frames;
+  for (int k = 0; k < 400; ++k) {
+    const double t = 0.033 * k, depth = 0.3 + 0.1 * std::sin(2.5 * t);
+    const double wild = k % 19 == 7 || (k > 200 && k < 206) ? 40.0 : 0.0;
+    const double d = k % 11 == 3 ? -1.0 : 26.0 / depth + 0.8 * std::sin(7.0 * k) + wild;
+    const double s = depth / 0.3 + 0.01 * std::cos(5.0 * k);
+    switch (k % 7) {
+      case 2:
+        frames.push_back(FrameAt(t, {{1, s}}));
+        break;
+      case 3:
+        frames.push_back(FrameAt(t, {}));
+        break;
+      case 4:
+        frames.push_back(FrameAt(t, {{1, s}, {0, d}, {0, d + 0.5}}));  // two of one sensor
+        break;
+      case 5:
+        frames.push_back(FrameAt(t, {{1, k % 3 == 0 ? std::nan("") : s}, {0, d}}));
+        break;
+      default:
+        frames.push_back(FrameAt(t, {{0, d}, {1, s}}));
+    }
+    if (k % 23 == 5 && k % 7 != 3) frames.back().measurements[0].covariance = {2.0};
+    if (k == 300) frames.back().stamp -= StampFromSeconds(1.0);
+  }
+  const auto seen = Compare(DepthFilter(), options, frames);
+  for (const char* what : {"accepted", "gated", "invalid", "not_finite", "stale", "lockout"}) {
+    EXPECT_GT(seen.count(what), 0u) << what;
+  }
+}
+
+TEST(SmallEkf, StacksMeasurementsOfSeveralRows) {
+  System system;
+  const BlockId x =
+      system.layout.Declare("a.x", "a", InProcessMotion(Constant<>(2), "constant").blocks()[0]);
+  system.motions.push_back({"a", InProcessMotion(Constant<>(2, 0.4), "constant"), {x}});
+  Prior prior;
+  prior.block = x;
+  prior.mean = {1.5, 0.7};
+  prior.covariance = Eigen::Matrix2d{{0.5, 0.1}, {0.1, 0.3}};
+  system.priors.push_back(prior);
+  AddSensor(system, "first", InProcessSensor(Pair(), "pair"), {"a.x"});
+  AddSensor(system, "second", InProcessSensor(Pair(), "pair"), {"a.x"});
+  EkfOptions options;
+  options.gate = 0.999;
+  std::vector<Frame> frames;
+  for (int k = 0; k < 50; ++k) {
+    Frame frame = FrameAt(0.1 * k, {});
+    for (int stream = 0; stream < (k % 3 == 0 ? 1 : 2); ++stream) {
+      const double wild = k % 10 == 9 ? 20.0 : 0.0;
+      frame.measurements.push_back(
+          {frame.stamp, stream, -1, {1.0 + 0.2 * std::sin(k + stream), 3.0 + wild}, {}});
+    }
+    frames.push_back(frame);
+  }
+  const auto seen = Compare(system, options, frames);
+  EXPECT_GT(seen.count("gated"), 0u);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -103,7 +103,7 @@ TEST(SmallEkf, DoesWhatTheGeneralPathDoes) {
   std::vector<Frame> frames;
   for (int k = 0; k < 400; ++k) {
     const double t = 0.033 * k, depth = 0.3 + 0.1 * std::sin(2.5 * t);
-    const double wild = k % 19 == 7 || (k > 200 && k < 206) ? 40.0 : 0.0;
+    const double wild = k % 19 == 7 || (k > 200 && k < 212) ? 40.0 : 0.0;
     const double d = k % 11 == 3 ? -1.0 : 26.0 / depth + 0.8 * std::sin(7.0 * k) + wild;
     const double s = depth / 0.3 + 0.01 * std::cos(5.0 * k);
     switch (k % 7) {

@@ -6,8 +6,8 @@
 #include <Eigen/Core>
 
 #include "alidade/ekf.h"
-#include "alidade/metrics.h"
 #include "alidade/static_ekf.h"
+#include "alidade/statistics.h"
 #include "bench/speed/depth_step.h"
 #include "bench/speed/interleaved.h"
 #include "tests/support/systems.h"

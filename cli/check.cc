@@ -21,8 +21,8 @@ constexpr const char* kFooter = R"(Examples:
   alidade check stereo_disparity --config examples/05_depth_principled/config.yaml
 
 Each check is a line: ok, FAIL or skipped, and what was seen. A plugin that crashes, ends the
-process, hangs or eats memory ends nothing but its check. Exits with 1 where a line says FAIL, 78 where a
-parameter is missing or wrong. Of a plugin with several models, `--set MODEL.key=value`.)";
+process, hangs or eats memory ends nothing but its check. Exits with 1 where a line says FAIL, 78
+where a parameter is missing or wrong. Of a plugin with several models, `--set MODEL.key=value`.)";
 
 struct Arguments {
   std::string plugin, model, config;

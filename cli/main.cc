@@ -12,7 +12,8 @@ namespace {
 
 constexpr const char* kFooter = R"(Examples:
   alidade doctor                                   is everything in place?
-  alidade plugins list                             sensors, motion models, sources
+  alidade plugins list                             sensors, motion models, sources, estimators
+  alidade check stereo_disparity --config examples/05_depth_principled/config.yaml
   alidade explain examples/05_depth_principled/config.yaml
   alidade run examples/05_depth_principled/config.yaml -o runs/first
   alidade sweep examples/05_depth_principled/config.yaml --runs 200

@@ -34,7 +34,7 @@ class Buffer {
  private:
   static constexpr int kGuard = 32, kGap = 3;
   std::size_t Index(int row, int column) const {
-    return static_cast<std::size_t>(kGuard + row * stride() + column);
+    return static_cast<std::size_t>(kGuard) + static_cast<std::size_t>(row) * stride() + column;
   }
   int rows_, columns_;
   std::vector<double> cells_;

@@ -202,8 +202,8 @@ Eigen::Matrix3d InSpace(const State& state) {
   return b * state.covariance().Dense() * b.transpose();
 }
 
-// In the tangent plane before, h is the identity: 1/P+ = 1/P + 1/R. The update then turns P with the
-// direction, by the smallest rotation.
+// In the tangent plane before, h is the identity: 1/P+ = 1/P + 1/R. The update then turns P with
+// the direction, by the smallest rotation.
 TEST(SquareRootEkf, CarriesTheCovarianceOfADirectionAcrossTheSeamOfItsBasis) {
   const System system = DirectionNearTheSeam();
   SquareRootEkf filter(system, {}, StreamsOf(system));

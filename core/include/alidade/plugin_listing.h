@@ -13,7 +13,8 @@ std::string PluginList(const PluginHost& host);
 std::string PluginListJson(const PluginHost& host);
 
 /// All there is to know of the entries called `name`: doc, citation, what they measure or move, and
-/// every parameter; also of the types of estimators that core has (`ekf`, `rts`, ...). Error: kPlugin where there is none.
+/// every parameter; also of the types of estimators that core has (`ekf`, `rts`, ...). Error:
+/// kPlugin where there is none.
 std::string PluginInfo(const PluginHost& host, const std::string& name);
 /// The same as a JSON array: the keys of PluginListJson, `describes` (lines) and `parameters`
 /// (objects with `key`, `unit`, `type`, `range`, `default` where there is one, `choices`, `when`,

@@ -31,8 +31,8 @@ struct UkfOptions {
 ///
 /// This is the scaled transform without its large weight of the centre, which cancels. The mean on
 /// a manifold is found by iteration. Process noise is augmented: N = n + noise inputs. A
-/// measurement's R is that at x0; S = Cov(h) + R, K = Cov(x, h) S^-1, and with dx_i - K f_i in place
-/// of f_i the new P is a sum of squares, Cov(x - K h) + K R K'.
+/// measurement's R is that at x0; S = Cov(h) + R, K = Cov(x, h) S^-1, and with dx_i - K f_i in
+/// place of f_i the new P is a sum of squares, Cov(x - K h) + K R K'.
 ///
 /// Where sigma points leave the domain of a model that is defined at x0, their spread is halved
 /// until none does (event `guarded`); a sensor that is not defined at x0 is out of domain. Where

@@ -35,6 +35,7 @@ class RtsSmoother : public Ekf {
   void Smooth(const Emit& emit) override;
 
  protected:
+  /// @cond
   bool StepOnce(double dt_s) override;
   Outcome Apply(std::span<Row* const> rows) override;
 
@@ -58,6 +59,7 @@ class RtsSmoother : public Ekf {
 
   std::vector<Passed> passed_frames_;
   Adjoint current_;
+  /// @endcond
 };
 
 }  // namespace alidade

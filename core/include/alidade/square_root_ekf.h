@@ -31,6 +31,7 @@ class SquareRootEkf : public Ekf {
   const Eigen::MatrixXd& root() const { return root_; }
 
  protected:
+  /// @cond
   bool StepOnce(double dt_s) override;
   void Project(Row& row) override;
   Outcome Apply(std::span<Row* const> rows) override;
@@ -39,6 +40,7 @@ class SquareRootEkf : public Ekf {
   void Take(Eigen::MatrixXd root);
 
   Eigen::MatrixXd root_;
+  /// @endcond
 };
 
 }  // namespace alidade

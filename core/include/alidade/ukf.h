@@ -47,6 +47,7 @@ class Ukf : public Ekf {
   Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>& streams);
 
  protected:
+  /// @cond
   bool StepOnce(double dt_s) override;
   Outcome Linearise(Row& row) override;
   void Project(Row& row) override;
@@ -81,6 +82,7 @@ class Ukf : public Ekf {
   bool root_is_current_ = false;
   std::vector<Predicted> predicted_;  ///< by report
   std::vector<bool> guarded_;         ///< by sensor; the last: the motion
+  /// @endcond
 };
 
 }  // namespace alidade

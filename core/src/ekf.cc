@@ -209,13 +209,14 @@ bool Ekf::Propagate() {
 
 void Ekf::PropagateModels() {
   Covariance& p = state_.covariance();
-  for (const MotionPlan& plan : motions_) {
+  for (std::size_t i = 0; i < motions_.size(); ++i) {
+    const MotionPlan& plan = motions_[i];
     if (!plan.active || plan.segments.empty()) continue;
     if (plan.rows.empty() && plan.segments.size() == 1) {
       p.Propagate(plan.segments[0].first, plan.segments[0].second, plan.f.data(), plan.q.data());
       continue;
     }
-    const auto n = static_cast<Eigen::Index>(std::sqrt(static_cast<double>(plan.f.size())) + 0.5);
+    const Eigen::Index n = system_.motions[i].model.tangent_size();
     const Eigen::Map<const RowMajor> f(plan.f.data(), n, n), q(plan.q.data(), n, n);
     if (plan.rows.empty()) {
       p.Propagate(plan.segments, f, q);

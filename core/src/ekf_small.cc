@@ -168,6 +168,7 @@ template <int N, int M>
 ALIDADE_INLINE void Ekf::Small::Stack(const Sensor& sensor, MeasurementReport& entry, Rows<N>& rows,
                                       int at) {
   const int m = M > 0 ? M : sensor.rows;
+  const double* const own = entry.s.data();
   for (int i = 0; i < m; ++i) {
     const double* const h = sensor.h.data() + i * N;
     double* const s = rows.s + (at + i) * kRows;
@@ -176,7 +177,7 @@ ALIDADE_INLINE void Ekf::Small::Stack(const Sensor& sensor, MeasurementReport& e
       for (int c = 1; c < N; ++c) sum += h[c] * rows.pht[j * N + c];
       s[j] = sum;
     }
-    for (int j = 0; j <= i; ++j) s[at + j] = entry.s[static_cast<std::size_t>(i * m + j)];
+    for (int j = 0; j <= i; ++j) s[at + j] = own[i * m + j];
     rows.innovation[at + i] = entry.innovation[static_cast<std::size_t>(i)];
     rows.gain[at + i] = entry.gain.data() + i * N;
   }
@@ -206,13 +207,50 @@ ALIDADE_INLINE bool Ekf::Small::Correct(const Rows<N>& rows, int count) {
   return true;
 }
 
+/// Reports a measurement and stacks it below the `at` rows before it, where it passes its gate.
+template <int N>
+ALIDADE_INLINE Ekf::Small::Taken Ekf::Small::Take(Sensor& sensor, const Measurement& measurement,
+                                                  Rows<N>& rows, int at) {
+  const int size = sensor.rows;
+  const double* const z = measurement.values.data();
+  if (std::ssize(measurement.values) != size || !measurement.covariance.empty() ||
+      Defect(z, size) != 0.0 || at + size > kRows) {
+    return Taken::kUnusual;
+  }
+  const Status valid = sensor.model->Valid(z);
+  if (valid != Status::kOk && valid != Status::kInvalid) return Taken::kUnusual;
+  MeasurementReport& entry = ekf_.report_.Add();
+  if (valid == Status::kInvalid) {
+    entry.Reset(sensor.index, measurement.landmark, size);
+    entry.z.assign(z, z + size);
+    entry.outcome = Outcome::kInvalid;
+    return Taken::kLeftOut;
+  }
+  if (std::ssize(entry.gain) != size * N || std::ssize(entry.z) != size) Fit(entry, size, N);
+  entry.sensor = sensor.index;
+  entry.landmark = measurement.landmark;
+  entry.dof = size;
+  entry.outcome = Outcome::kAccepted;
+  double* const pht = rows.pht + at * N;
+  const bool usual =
+      size == 1 ? Linearise<N, 1>(sensor, z, entry, pht) : Linearise<N, 0>(sensor, z, entry, pht);
+  if (!usual) return Taken::kUnusual;
+  if (!(entry.nis <= sensor.gate)) {
+    if (*sensor.rejections + 1 >= ekf_.options_.lockout_after) return Taken::kUnusual;
+    entry.outcome = Outcome::kGated;
+    entry.gain.clear();
+    return Taken::kLeftOut;
+  }
+  size == 1 ? Stack<N, 1>(sensor, entry, rows, at) : Stack<N, 0>(sensor, entry, rows, at);
+  return Taken::kStacked;
+}
+
 /// The measurements of a frame as one update, or nothing.
 template <int N>
 ALIDADE_INLINE bool Ekf::Small::Update(const Frame& frame) {
   Rows<N> rows;
-  int m = 0;
+  int m = 0, last_sensor = -1;
   const Measurement* last = nullptr;
-  int last_sensor = -1;
   ekf_.report_.ClearMeasurements();
   for (Sensor& sensor : sensors_) {
     const Measurement* found = nullptr;
@@ -222,38 +260,10 @@ ALIDADE_INLINE bool Ekf::Small::Update(const Frame& frame) {
       found = &one;
     }
     if (found == nullptr) continue;
-    const int size = sensor.rows;
-    const double* const z = found->values.data();
-    if (std::ssize(found->values) != size || !found->covariance.empty() || Defect(z, size) != 0.0 ||
-        m + size > kRows) {
-      return false;
-    }
-    const Status valid = sensor.model->Valid(z);
-    if (valid != Status::kOk && valid != Status::kInvalid) return false;
-    MeasurementReport& entry = ekf_.report_.Add();
-    if (valid == Status::kInvalid) {
-      entry.Reset(sensor.index, found->landmark, size);
-      entry.z.assign(z, z + size);
-      entry.outcome = Outcome::kInvalid;
-      continue;
-    }
-    if (std::ssize(entry.gain) != size * N || std::ssize(entry.z) != size) Fit(entry, size, N);
-    entry.sensor = sensor.index;
-    entry.landmark = found->landmark;
-    entry.dof = size;
-    entry.outcome = Outcome::kAccepted;
-    double* const pht = rows.pht + m * N;
-    const bool usual =
-        size == 1 ? Linearise<N, 1>(sensor, z, entry, pht) : Linearise<N, 0>(sensor, z, entry, pht);
-    if (!usual) return false;
-    if (!(entry.nis <= sensor.gate)) {
-      if (*sensor.rejections + 1 >= ekf_.options_.lockout_after) return false;
-      entry.outcome = Outcome::kGated;
-      entry.gain.clear();
-      continue;
-    }
-    size == 1 ? Stack<N, 1>(sensor, entry, rows, m) : Stack<N, 0>(sensor, entry, rows, m);
-    m += size;
+    const Taken taken = Take(sensor, *found, rows, m);
+    if (taken == Taken::kUnusual) return false;
+    if (taken == Taken::kLeftOut) continue;
+    m += sensor.rows;
     last = found;
     last_sensor = sensor.index;
   }

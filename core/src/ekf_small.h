@@ -48,6 +48,8 @@ class Ekf::Small {
     double* gain[kRows];  ///< where to report each row's column of K
   };
 
+  enum class Taken { kUnusual, kLeftOut, kStacked };
+
   explicit Small(Ekf& ekf) : ekf_(ekf) {}
   bool AddMotions();
   bool AddSensors();
@@ -57,6 +59,8 @@ class Ekf::Small {
   bool Step(double dt_s);
   template <int N, int K, int W>
   bool StepModel(const Motion& motion, double dt_s, double (&p)[N][N]);
+  template <int N>
+  Taken Take(Sensor& sensor, const Measurement& measurement, Rows<N>& rows, int at);
   template <int N>
   bool Update(const Frame& frame);
   template <int N, int M>

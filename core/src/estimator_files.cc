@@ -144,7 +144,7 @@ void EstimatorFiles::AddInnovation(Stamp stamp, const MeasurementReport& report)
       .Numbers(sigma.data(), sigma.size(), width)
       .Numbers(report.innovation.data(), report.innovation.size(), width)
       .EndRow();
-  sensor.has_innovations = sensor.has_innovations || (reached && report.innovation.size() > 0);
+  sensor.has_innovations = sensor.has_innovations || (reached && !report.innovation.empty());
 }
 
 void EstimatorFiles::AddGain(Stamp stamp, const State& state, const MeasurementReport& report) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
@@ -56,6 +57,12 @@ class HostTest : public testing::Test {
                             ExitCode code = ExitCode::kPlugin) {
     words.push_back(file.string());
     ExpectError(code, words, [&] { PluginHost host({file}); });
+  }
+  static const ParamInfo& Param(const std::vector<ParamInfo>& schema, const std::string& key) {
+    const auto has_key = [&](const ParamInfo& info) { return info.key == key; };
+    const auto found = std::find_if(schema.begin(), schema.end(), has_key);
+    EXPECT_NE(found, schema.end()) << key;
+    return *found;
   }
 
   std::filesystem::path folder_;

@@ -299,13 +299,6 @@ TEST_F(HostTest, KeysThatTheModelDoesNotReadAreLeftToTheConfig) {
   EXPECT_THROW(config.root().RejectUnread(), Error);
 }
 
-const ParamInfo& Param(const std::vector<ParamInfo>& schema, const std::string& key) {
-  const auto has_key = [&](const ParamInfo& info) { return info.key == key; };
-  const auto found = std::find_if(schema.begin(), schema.end(), has_key);
-  EXPECT_NE(found, schema.end()) << key;
-  return *found;
-}
-
 TEST_F(HostTest, TheSchemaTellsWhatEachChoiceReads) {
   const PluginHost host;
   const auto schema = [&](const std::string& name) {
@@ -350,52 +343,6 @@ TEST_F(HostTest, DescribesWhatAModelCanDo) {
             (Lines{"Jacobians: closed form", "refuses measurements of no use by itself",
                    "can initialise depth"}));
   EXPECT_EQ(behind_the_blocks("constant", 1), Lines{"Jacobians: closed form"});
-}
-
-// ---- build tier ---------------------------------------------------------------------------------
-
-TEST_F(HostTest, CreatesASourceOfTheBuildTier) {
-  const PluginHost host({Built("sources")});
-  const Config config = Parse("{type: counter, last: 2, unit: sheep}");
-  const auto source = host.CreateSource("counter", config.root(), 1, "/");
-  EXPECT_EQ(source->streams().at(0).name, "count");
-  Frame frame;
-  EXPECT_TRUE(source->Next(frame));
-  EXPECT_TRUE(source->Next(frame));
-  EXPECT_FALSE(source->Next(frame));
-  static_cast<void>(config.root().At("type"));
-  EXPECT_NO_THROW(config.root().RejectUnread());
-}
-
-TEST_F(HostTest, AFailingSourceNamesItselfAndItsPlugin) {
-  const PluginHost host({Built("sources")});
-  const Config config = Parse("source: {type: throwing_source}");
-  const Node entry = config.root().At("source");
-  ExpectError(ExitCode::kPlugin,
-              {"source 'throwing_source'", Built("sources").string(), "no such thing"},
-              [&] { host.CreateSource("throwing_source", entry, 1, "/"); });
-  ExpectError(ExitCode::kBadConfig, {"source.last: missing; source 'counter' needs it ([1, 100]"},
-              [&] { host.CreateSource("counter", entry, 1, "/"); });
-  const auto counter = std::find_if(host.entries().begin(), host.entries().end(),
-                                    [](const PluginEntry& e) { return e.name == "counter"; });
-  const std::vector<ParamInfo> schema = host.Schema(*counter);
-  EXPECT_EQ(Param(schema, "last").range, "[1, 100]");
-  EXPECT_EQ(Param(schema, "unit").doc, "what is counted");
-}
-
-TEST_F(HostTest, AFailingEstimatorNamesItselfAndItsPlugin) {
-  const PluginHost host({Built("estimators")});
-  const Config config = Parse("{gain: 1}"), empty = Parse("{type: throwing_estimator}");
-  for (const char* name : {"throwing_estimator", "no_estimator"}) {
-    const char* why = name[0] == 't' ? "no such thing" : "it gives nothing";
-    ExpectError(ExitCode::kPlugin,
-                {std::string("estimator '") + name + "'", Built("estimators").string(), why},
-                [&] { host.CreateEstimator(name, config.root()); });
-  }
-  ExpectError(ExitCode::kBadConfig, {"gain: missing; estimator 'throwing_estimator' needs it (> 0"},
-              [&] { host.CreateEstimator("throwing_estimator", empty.root()); });
-  ExpectError(ExitCode::kPlugin, {"no plugin offers the estimator 'none'", "searched"},
-              [&] { host.CreateEstimator("none", config.root()); });
 }
 
 }  // namespace

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "support/recording.h"
+
+namespace alidade {
+namespace {
+
+using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
+
+TEST(Recorder, DrawsWhereGnuplotIs) {
+  const TemporaryFolder folder;
+  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+  Experiment experiment = MakeExperiment();
+  recorder.Finish(RunInto(recorder, experiment));
+  const std::string report = Read(folder / "out/report.html");
+  EXPECT_NE(report.find("A &lt;swinging&gt; target"), std::string::npos);
+  ASSERT_EQ(recorder.highlights().front(), "report.html");
+  for (const std::string& file : recorder.highlights()) {
+    EXPECT_TRUE(fs::exists(folder / "out" / file)) << file;
+  }
+  if (recorder.note() == "0 of 10 figures drawn: gnuplot is not installed")
+    GTEST_SKIP() << recorder.note();
+  EXPECT_EQ(recorder.note(), "");
+  EXPECT_EQ(recorder.highlights()[1], "figures/measurements.png");
+  for (const char* name : {"measurements", "comparison", "ekf.state", "ekf.covariance", "ekf.gain",
+                           "ekf.innovation", "alone.state"}) {
+    const fs::path figure = folder / "out/figures" / name;
+    EXPECT_GT(fs::file_size(figure.string() + ".svg"), 5000u) << name;
+    EXPECT_TRUE(fs::exists(figure.string() + ".gp")) << name;
+  }
+  EXPECT_NE(report.find("<svg"), std::string::npos);
+}
+
+using Names = std::vector<std::string>;
+
+Names SvgsOf(const fs::path& folder) {
+  Names names = FilesIn(folder / "figures");
+  std::erase_if(names, [](const std::string& name) { return !name.ends_with(".svg"); });
+  return names;
+}
+
+TEST(Recorder, TheComparisonDrawsEveryEstimatorWhateverItsBlocksAreCalled) {
+  const TemporaryFolder folder;
+  Experiment experiment = MakeExperiment();
+  NamedEstimator other;
+  other.name = "other";
+  testing::AddMotion(other.system, "thing", InProcessMotion(Constant<>(1), "constant"),
+                     {{"depth", 0.3, 0.1}});
+  testing::AddMotion(other.system, "own", InProcessMotion(Constant<>(1), "constant"),
+                     {{"bias", 0.1, 0.1}});
+  other.estimator = std::make_unique<Ekf>(other.system, EkfOptions{}, experiment.source->streams());
+  experiment.estimators.push_back(std::move(other));
+  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+  recorder.Finish(RunInto(recorder, experiment));
+  const std::string script = Read(folder / "out/figures/comparison.gp");
+  EXPECT_NE(script.find("'other/estimates.csv' using (column('t_s')-t0):(column('thing.depth'))"),
+            std::string::npos);
+  EXPECT_NE(script.find("title 'other: thing.depth'"), std::string::npos);
+  EXPECT_NE(script.find("column('own.bias')"), std::string::npos);
+  // One truth, one panel: that of the depth which the others name target.depth.
+  EXPECT_EQ(script.find("set label 1 'thing.depth'"), std::string::npos);
+  EXPECT_NE(script.find("set label 1 'target.depth'"), std::string::npos);
+}
+
+TEST(Recorder, DoesWithoutGnuplot) {
+  const TemporaryFolder folder;
+  const int code = InChild([&] {
+    ::setenv("PATH", "/nowhere", 1);
+    Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+    Experiment experiment = MakeExperiment();
+    recorder.Finish(RunInto(recorder, experiment));
+    if (recorder.note() != "0 of 10 figures drawn: gnuplot is not installed") ::_exit(1);
+  });
+  EXPECT_EQ(code, 0);
+  EXPECT_TRUE(fs::exists(folder / "out/report.html"));
+  EXPECT_EQ(SvgsOf(folder / "out"), Names{});
+  EXPECT_TRUE(fs::exists(folder / "out/figures/alone.innovation.gp"));  // to be drawn elsewhere
+}
+
+/// A gnuplot on PATH that draws the first figure and its PNG, and then sleeps over half a one.
+void UseSlowGnuplot(const TemporaryFolder& folder) {
+  const fs::path program = folder / "bin/gnuplot";
+  fs::create_directory(program.parent_path());
+  std::ofstream(program) << "#!/bin/sh\n"
+                            "case \"$*\" in\n"
+                            "  *measurements*) echo '<svg>one</svg>' > figures/measurements.svg\n"
+                            "                  echo > figures/measurements.png;;\n"
+                            "  *) echo '<svg>half' > figures/comparison.svg; exec sleep 100;;\n"
+                            "esac\n";
+  fs::permissions(program, fs::perms::owner_all);
+  ::setenv("PATH", (program.parent_path().string() + ":/usr/bin:/bin").c_str(), 1);
+}
+
+/// Records with the slow gnuplot in a child; `note` is what must have been left out.
+int RecordSlowly(const TemporaryFolder& folder, Recorder::Options options, const char* note) {
+  return InChild([&] {
+    UseSlowGnuplot(folder);
+    Recorder recorder(options, MakeConfig(), Host());
+    Experiment experiment = MakeExperiment();
+    recorder.Finish(RunInto(recorder, experiment));
+    if (recorder.note() != note) ::_exit(1);
+  });
+}
+
+TEST(Recorder, AStopLeavesOutTheRestOfTheFigures) {
+  const TemporaryFolder folder;
+  Recorder::Options options = OptionsFor(folder / "out", false, true);
+  const fs::path half = folder / (".out.partial-");
+  options.stop = [&] {  // once it sleeps
+    return fs::exists(half.string() + std::to_string(::getpid()) + "/figures/comparison.svg");
+  };
+  EXPECT_EQ(RecordSlowly(folder, options, "1 of 10 figures drawn: the drawing was stopped"), 0);
+  EXPECT_EQ(SvgsOf(folder / "out"), Names{"measurements.svg"});
+  EXPECT_TRUE(fs::exists(folder / "out/run.json"));
+  const std::string report = Read(folder / "out/report.html");
+  EXPECT_NE(report.find("<svg>one</svg>"), std::string::npos);
+  EXPECT_EQ(report.find("<svg>half"), std::string::npos);
+  EXPECT_NE(report.find("1 of 10 figures drawn: the drawing was stopped"), std::string::npos);
+}
+
+TEST(Recorder, AFigureThatGnuplotDidNotWriteIsNotThere) {
+  const TemporaryFolder folder;
+  const int code = InChild([&] {
+    fs::create_directory(folder / "bin");
+    fs::create_symlink("/bin/true", folder / "bin/gnuplot");
+    ::setenv("PATH", (folder / "bin").c_str(), 1);
+    Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+    Experiment experiment = MakeExperiment();
+    recorder.Finish(RunInto(recorder, experiment));
+    const std::string note = recorder.note();
+    if (note != "0 of 10 figures drawn: measurements is not: gnuplot wrote nothing") ::_exit(1);
+  });
+  EXPECT_EQ(code, 0);
+  EXPECT_EQ(Read(folder / "out/report.html").find("<figure>"), std::string::npos);
+}
+
+TEST(Recorder, DrawsNothingOnceItIsStopped) {
+  const TemporaryFolder folder;
+  Recorder::Options options = OptionsFor(folder / "out", false, true);
+  options.stop = [] { return true; };
+  EXPECT_EQ(RecordSlowly(folder, options, "0 of 10 figures drawn: the drawing was stopped"), 0);
+  EXPECT_EQ(SvgsOf(folder / "out"), Names{});
+}
+
+TEST(Recorder, GivesGnuplotSoMuchTimeAndNoMore) {
+  const TemporaryFolder folder;
+  Recorder::Options options = OptionsFor(folder / "out", false, true);
+  options.drawing_s = 1.0;
+  EXPECT_EQ(RecordSlowly(folder, options, "1 of 10 figures drawn: gnuplot took too long"), 0);
+  EXPECT_EQ(SvgsOf(folder / "out"), Names{"measurements.svg"});
+}
+
+}  // namespace
+}  // namespace alidade

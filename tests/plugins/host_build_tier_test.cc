@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "host_fixture.h"
+
+namespace alidade {
+namespace {
+
+TEST_F(HostTest, CreatesASourceOfTheBuildTier) {
+  const PluginHost host({Built("sources")});
+  const Config config = Parse("{type: counter, last: 2, unit: sheep}");
+  const auto source = host.CreateSource("counter", config.root(), 1, "/");
+  EXPECT_EQ(source->streams().at(0).name, "count");
+  Frame frame;
+  EXPECT_TRUE(source->Next(frame));
+  EXPECT_TRUE(source->Next(frame));
+  EXPECT_FALSE(source->Next(frame));
+  static_cast<void>(config.root().At("type"));
+  EXPECT_NO_THROW(config.root().RejectUnread());
+}
+
+TEST_F(HostTest, AFailingSourceNamesItselfAndItsPlugin) {
+  const PluginHost host({Built("sources")});
+  const Config config = Parse("source: {type: throwing_source}");
+  const Node entry = config.root().At("source");
+  ExpectError(ExitCode::kPlugin,
+              {"source 'throwing_source'", Built("sources").string(), "no such thing"},
+              [&] { host.CreateSource("throwing_source", entry, 1, "/"); });
+  ExpectError(ExitCode::kBadConfig, {"source.last: missing; source 'counter' needs it ([1, 100]"},
+              [&] { host.CreateSource("counter", entry, 1, "/"); });
+  const auto counter = std::find_if(host.entries().begin(), host.entries().end(),
+                                    [](const PluginEntry& e) { return e.name == "counter"; });
+  const std::vector<ParamInfo> schema = host.Schema(*counter);
+  EXPECT_EQ(Param(schema, "last").range, "[1, 100]");
+  EXPECT_EQ(Param(schema, "unit").doc, "what is counted");
+}
+
+TEST_F(HostTest, AFailingEstimatorNamesItselfAndItsPlugin) {
+  const PluginHost host({Built("estimators")});
+  const Config config = Parse("{gain: 1}"), empty = Parse("{type: throwing_estimator}");
+  for (const char* name : {"throwing_estimator", "no_estimator"}) {
+    const char* why = name[0] == 't' ? "no such thing" : "it gives nothing";
+    ExpectError(ExitCode::kPlugin,
+                {std::string("estimator '") + name + "'", Built("estimators").string(), why},
+                [&] { host.CreateEstimator(name, config.root()); });
+  }
+  ExpectError(ExitCode::kBadConfig, {"gain: missing; estimator 'throwing_estimator' needs it (> 0"},
+              [&] { host.CreateEstimator("throwing_estimator", empty.root()); });
+  ExpectError(ExitCode::kPlugin, {"no plugin offers the estimator 'none'", "searched"},
+              [&] { host.CreateEstimator("none", config.root()); });
+}
+
+}  // namespace
+}  // namespace alidade

@@ -30,12 +30,16 @@ class SquareRootEkf : public Ekf {
   /// L, n x n. state().covariance() is L L' in double precision, and so has half its digits.
   const Eigen::MatrixXd& root() const { return root_; }
 
+  std::unique_ptr<Snapshot> Save() const override;
+  void Restore(const Snapshot& snapshot) override;
+
  protected:
   bool StepOnce(double dt_s) override;
   void Project(Row& row) override;
   Outcome Apply(std::span<Row* const> rows) override;
 
  private:
+  struct Kept;
   void Take(Eigen::MatrixXd root);
 
   Eigen::MatrixXd root_;

@@ -310,7 +310,7 @@ std::string SupportText(const std::string& type) {
          either(can.at_measurement, "", "linearise_at measurement, ") +
          either(can.recovery, "",
                 "blocks that start from a measurement, recovery from a\n    lock-out, ") +
-         "control inputs, landmarks, measurements out of order.\n";
+         "control inputs, landmarks.\n";
 }
 
 std::string SourceText(const Config& config, const Experiment& experiment) {

@@ -91,6 +91,22 @@ TEST_P(FrameOrder, AStreamTwiceAtOneStampIsAnErrorThatNamesBothPlaces) {
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 3);
 }
 
+TEST_P(FrameOrder, MergedMeasurementsHaveTheOrderOfTheSensors) {
+  for (const bool swapped : {false, true}) {
+    const TemporaryFolder folder;
+    const std::vector<Frame> frames = {FrameAt(0.0, {{0, 80.0}}), FrameAt(0.0, {{1, 1.0}})};
+    Experiment experiment = MakeGiven({frames[swapped], frames[!swapped]}, GetParam());
+    experiment.time.ranks = {1, 0};
+    Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+    recorder.Finish(RunInto(recorder, experiment));
+    EXPECT_EQ(Lines(folder / "out/measurements.csv"),
+              (std::vector<std::string>{"t_s,stream,landmark,v0", "0.000000000,inverse_scale,,1",
+                                        "0.000000000,disparity,,80"}));
+    const std::string timing = Read(folder / "out/timing.json");
+    EXPECT_NE(timing.find("\"merged\": 1"), std::string::npos) << timing;
+  }
+}
+
 TEST_P(FrameOrder, LandmarksOfOneStreamAreNotTheSameTwice) {
   Frame one = FrameAt(0.0, {{1, 1.0}}), another = one;
   one.measurements[0].landmark = 1;

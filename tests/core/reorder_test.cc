@@ -32,14 +32,15 @@ estimators:
   ekf: {type: ekf, gate: 0.999}
   first: {type: ekf, jacobian: first_estimate, fuse: per_measurement}
   iekf: {type: iekf, gate: 0.999}
-  ukf: {type: ukf}
+  ukf: {type: ukf, alpha: 1, gate: 0.9,
+        overrides: {state: {target: {initial: {depth: {sigma: 0.2}}}}}}  # guarded at first
   root: {type: square_root_ekf}
   rts: {type: rts}
 evaluate:
   segments: {seeing: {with: stereo}, blind: {without: stereo}}
 )";
 
-/// A block that waits for its first measurement, and a gate so narrow that sensors are locked out:
+/// Blocks that wait for their first measurement, and a gate so narrow that sensors are locked out:
 /// what the filter keeps besides its state decides what comes.
 constexpr const char* kEventful = R"(alidade: 1
 state:
@@ -47,7 +48,7 @@ state:
            noise: {acceleration: 0.1},
            initial: {depth: {from: stereo}, depth_rate: {mean: 0, sigma: 0.5}}}
   template: {model: constant, blocks: {value: inverse_distance},
-             initial: {inverse_distance: {mean: 3.3, sigma: 0.5}}}
+             initial: {inverse_distance: {from: scale}}}
 sensors:
   stereo: {model: stereo_disparity, stream: disparity, roles: {depth: target.depth},
            focal_px: 400, baseline_m: 0.065, sigma_px: 0.5}
@@ -56,11 +57,11 @@ sensors:
           template_px: 300, sigma_px: 1.0}
 source: {type: depth_target, seed: 3}
 estimators:
-  reset: {type: ekf, gate: 0.5, lockout: {after: 3}}
-  inflate: {type: ekf, gate: 0.5, lockout: {after: 3, action: inflate}, jacobian: first_estimate}
+  reset: {type: ekf, gate: 0.5, lockout: {after: 3}, jacobian: first_estimate}
+  inflate: {type: ekf, gate: 0.5, lockout: {after: 3, action: inflate}}
 )";
 
-/// The frames of a source, each as late as it likes, up to `most_s`; with `split` each measurement
+/// The frames of a source, each late by up to `most_s`, the first by all of it; with `split` each measurement
 /// comes by itself, and truth too.
 class Delayed : public Source {
  public:
@@ -69,7 +70,7 @@ class Delayed : public Source {
     std::multimap<Stamp, Frame> arrivals;  // in the order of insertion where equal
     const auto add = [&](Frame frame) {
       const auto most = static_cast<std::uint64_t>(StampFromSeconds(most_s));
-      const auto delay = static_cast<Stamp>(random() % (most + 1));
+      const auto delay = static_cast<Stamp>(arrivals.empty() ? most : random() % (most + 1));
       const Stamp at = frame.stamp + delay;
       arrivals.emplace(at, std::move(frame));
     };
@@ -143,6 +144,7 @@ TEST_P(Reordered, LateFramesGiveTheBytesOfTheInOrderRun) {
       for (const EstimatorResult& one : in_order.estimators) {
         EXPECT_GT(std::ranges::count(one.events, "lockout", &Event::kind), 3) << one.name;
         EXPECT_EQ(one.counts.at("initialised:stereo"), 1) << one.name;
+        EXPECT_EQ(one.counts.at("initialised:scale"), 1) << one.name;
       }
     }
     const RunResult late = RecordDelayed(config, here / "late", GetParam(), kWindow_s);
@@ -186,17 +188,26 @@ std::string Refused(const std::string& time) {
 TEST(TimePolicy, IsReadStrictly) {
   const Config config = Config::FromText(
       std::string(kFilters) + "time: {order: rewind, window_s: 0.25}\n", "order.yaml");
-  const TimePolicy policy = BuildExperiment(config, Host()).time;
+  const Experiment experiment = BuildExperiment(config, Host());
+  const TimePolicy& policy = experiment.time;
   EXPECT_EQ(policy.order, TimeOrder::kRewind);
   EXPECT_EQ(policy.window, 250'000'000);
+  std::map<std::string, int> ranks;
+  for (std::size_t s = 0; s < policy.ranks.size(); ++s) {
+    ranks[experiment.source->streams()[s].name] = policy.ranks[s];
+  }
+  EXPECT_EQ(ranks.size(), experiment.source->streams().size());
+  EXPECT_EQ(ranks["disparity"], 0);
+  EXPECT_EQ(ranks["inverse_scale"], 1);
+  EXPECT_EQ(ranks["disparity_all"], 2);  // of no sensor
   EXPECT_EQ(Refused("time: {order: rewind}"),
-            "order.yaml:24:15 time.order: 'rewind' without 'window_s'; expected 'window_s', how "
+            "order.yaml:25:15 time.order: 'rewind' without 'window_s'; expected 'window_s', how "
             "late a frame may be");
   EXPECT_EQ(Refused("time: {order: reject, window_s: 1}"),
-            "order.yaml:24:33 time.window_s: without a use: 'order: reject' holds nothing back; "
+            "order.yaml:25:33 time.window_s: without a use: 'order: reject' holds nothing back; "
             "expected 'order: sort' or 'rewind'");
   EXPECT_NE(Refused("time: {order: sorted}").find("did you mean 'sort'?"), std::string::npos);
-  EXPECT_NE(Refused("time: {order: sort, window_s: -1}").find("24:31 time.window_s"),
+  EXPECT_NE(Refused("time: {order: sort, window_s: -1}").find("25:31 time.window_s"),
             std::string::npos);
   EXPECT_NE(Refused("time: {window_s: 1}").find("order"), std::string::npos);
 }

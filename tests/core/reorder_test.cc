@@ -6,6 +6,7 @@
 #include <map>
 #include <random>
 
+#include "alidade/explain.h"
 #include "support/recording.h"
 
 namespace alidade::testing {
@@ -192,6 +193,9 @@ TEST(TimePolicy, IsReadStrictly) {
   const TimePolicy& policy = experiment.time;
   EXPECT_EQ(policy.order, TimeOrder::kRewind);
   EXPECT_EQ(policy.window, 250'000'000);
+  EXPECT_NE(Explain(config, experiment)
+                .find("late frames: the estimators go back for them, up to 0.25 s behind"),
+            std::string::npos);
   std::map<std::string, int> ranks;
   for (std::size_t s = 0; s < policy.ranks.size(); ++s) {
     ranks[experiment.source->streams()[s].name] = policy.ranks[s];

@@ -8,6 +8,7 @@
 #include <typeinfo>
 
 #include "alidade/statistics.h"
+#include "ekf_kept.h"
 #include "ekf_small.h"
 
 namespace alidade {
@@ -68,6 +69,23 @@ Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>
 }
 
 void Ekf::Start(Stamp stamp) { stamp_ = stamp; }
+
+std::unique_ptr<Estimator::Snapshot> Ekf::Save() const { return std::make_unique<Kept>(*this); }
+
+void Ekf::Restore(const Snapshot& snapshot) {
+  const auto& kept = dynamic_cast<const Kept&>(snapshot);
+  state_ = kept.state;
+  stamp_ = kept.stamp;
+  first_ = kept.first;
+  rejections_ = kept.rejections;
+  out_of_domain_ = kept.out_of_domain;
+  inflated_ = kept.inflated;
+  warned_ = kept.warned;
+  last_used_ = kept.last_used;
+  diverged_ = kept.diverged;
+  failed_ = kept.failed;
+  Bind();
+}
 
 const UpdateReport& Ekf::Process(const Frame& frame) {
   report_.Clear();

@@ -189,6 +189,42 @@ void CheckTruths(const Node& source, const Experiment& experiment, const System&
   }
 }
 
+/// How the run takes frames that are not in the order of their stamps.
+TimePolicy ReadTimePolicy(const Node& root) {
+  TimePolicy policy;
+  const auto time = root.Find("time");
+  if (!time) return policy;
+  const Node order = time->At("order", "time");
+  policy.order = static_cast<TimeOrder>(order.Choice({"reject", "sort", "rewind"}));
+  const auto window = time->Find("window_s");
+  if (window && policy.order == TimeOrder::kReject) {
+    window->Fail("without a use: 'order: reject' holds nothing back", "'order: sort' or 'rewind'");
+  }
+  if (window) policy.window = StampFromSeconds(window->Number(0.0, 1e9));
+  if (!window && policy.order == TimeOrder::kRewind) {
+    order.Fail("'rewind' without 'window_s'", "'window_s', how late a frame may be");
+  }
+  time->RejectUnread();
+  return policy;
+}
+
+/// For each stream the first sensor of the config that it goes to; behind them those of none.
+std::vector<int> RanksOf(const std::vector<StreamInfo>& streams, const System& system) {
+  std::vector<int> ranks;
+  for (const StreamInfo& stream : streams) {
+    const auto first = std::ranges::find(system.sensors, stream.name, &SensorBinding::stream);
+    ranks.push_back(static_cast<int>(first - system.sensors.begin()));
+  }
+  return ranks;
+}
+
+/// Refuses an estimator that cannot do what the run's order of time asks of it.
+void CheckCanRewind(const NamedEstimator& named, const Node& entry) {
+  if (named.estimator->offline() || named.estimator->Save() != nullptr) return;
+  entry.At("type").Fail("'" + named.type + "' cannot go back for a late frame",
+                        "another type under 'time.order: rewind', or 'time.order: sort'");
+}
+
 }  // namespace
 
 std::vector<std::filesystem::path> PluginPaths(const Config& config) {
@@ -219,8 +255,10 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   if (const auto seed = source.Find("seed")) {
     experiment.seed = static_cast<std::uint64_t>(seed->Integer(0, INT64_MAX));
   }
-  experiment.source = host.CreateSource(source.At("type", "a source").Text(), source,
-                                        experiment.seed, config.folder());
+  experiment.time = ReadTimePolicy(root);
+  experiment.source =
+      host.CreateSource(source.At("type", "a source").Text(), source, experiment.seed,
+                        config.folder(), experiment.time.order != TimeOrder::kReject);
   source.RejectUnread();
   const std::vector<StreamInfo>& streams = experiment.source->streams();
 
@@ -229,9 +267,13 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   for (const SensorBinding& sensor : whole.sensors) {
     FindStream(root.At("sensors").At(sensor.name), sensor.model, streams);
   }
+  experiment.time.ranks = RanksOf(streams, whole);
   experiment.segments = ReadSegments(root, whole, streams);
   for (const auto& [name, entry] : root.At("estimators", "a run").Entries()) {
     experiment.estimators.push_back(BuildEstimator(name, entry, config, host, streams));
+    if (experiment.time.order == TimeOrder::kRewind) {
+      CheckCanRewind(experiment.estimators.back(), entry);
+    }
   }
   if (experiment.estimators.empty()) {
     root.At("estimators").Fail("empty", "at least one estimator");

@@ -310,7 +310,19 @@ std::string SupportText(const std::string& type) {
          either(can.at_measurement, "", "linearise_at measurement, ") +
          either(can.recovery, "",
                 "blocks that start from a measurement, recovery from a\n    lock-out, ") +
-         "control inputs, landmarks, measurements out of order.\n";
+         "control inputs, landmarks.\n";
+}
+
+/// What is done with late frames, where it is not the default.
+std::string LateFrames(const TimePolicy& time) {
+  if (time.order == TimeOrder::kReject) return "";
+  const char* const done = time.order == TimeOrder::kSort ? "sorted, frames held back"
+                                                          : "the estimators go back for them";
+  return std::string("  late frames: ") + done +
+         (time.window ? ", up to " + internal::RoundedText(Seconds(*time.window), 6) +
+                            " s behind the newest"
+                      : " to the end of the run") +
+         '\n';
 }
 
 std::string SourceText(const Config& config, const Experiment& experiment) {
@@ -327,7 +339,8 @@ std::string SourceText(const Config& config, const Experiment& experiment) {
   }
   const std::vector<std::string> truths = internal::NamesOf(experiment.source->truths());
   text += TextTable(rows, kIndent);
-  return text + "  truth: " + (truths.empty() ? "not known" : Join(truths)) + '\n';
+  return text + "  truth: " + (truths.empty() ? "not known" : Join(truths)) + '\n' +
+         LateFrames(experiment.time);
 }
 
 }  // namespace

@@ -167,10 +167,11 @@ MotionModel PluginHost::CreateMotion(const std::string& name, const Node& entry)
 
 std::unique_ptr<Source> PluginHost::CreateSource(const std::string& name, const Node& node,
                                                  std::uint64_t seed,
-                                                 const std::filesystem::path& folder) const {
+                                                 const std::filesystem::path& folder,
+                                                 bool any_order) const {
   const PluginEntry& entry = Find(PluginEntry::Kind::kSource, name, node);
   return CreateBuilt(entry, node, create_mutex_, [&](Params& params) {
-    return SourceOf(entry).create(SourceArguments{node, params, seed, folder});
+    return SourceOf(entry).create(SourceArguments{node, params, seed, folder, any_order});
   });
 }
 

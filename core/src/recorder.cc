@@ -136,6 +136,12 @@ std::string Recorder::Impl::TimingJson(const RunResult& result) const {
   json.Key("command").Text(options.command);
   json.Key("wall_s").Number(wall_s);
   json.Key("frames_per_s").Number(static_cast<double>(result.frames) / wall_s);
+  json.Key("arrivals").Object();
+  json.Key("late").Integer(result.arrivals.late);
+  json.Key("merged").Integer(result.arrivals.merged);
+  json.Key("dropped").Integer(result.arrivals.dropped);
+  json.Key("longest_lag_s").Number(Seconds(result.arrivals.longest_lag));
+  json.End();
   json.End();
   return json.text();
 }

@@ -5,6 +5,7 @@
 
 #include "alidade/metrics.h"
 #include "alidade/recorder.h"
+#include "reorder.h"
 #include "text_table.h"
 
 namespace alidade {
@@ -62,7 +63,8 @@ struct Running {
   int index = 0;  ///< in the experiment
   Metrics metrics;
   EstimatorResult result;
-  bool ended = false;  ///< it had nothing left to go on with
+  bool ended = false;     ///< it had nothing left to go on with
+  bool diverged = false;  ///< by a frame that was taken; not of offline estimators
 
   /// Puts an estimate into metrics and record.
   void Take(const Seen& seen, const State& state, const UpdateReport& report, Recorder* recorder) {
@@ -124,17 +126,20 @@ std::string Cause(const std::vector<Event>& events, const char* otherwise) {
   return events.empty() ? otherwise : events.back().text;
 }
 
-/// One frame through one estimator; false where the whole run has to end.
-bool Advance(Running& one, const Seen& seen, const RunOptions& options, RunResult& result) {
+/// One frame through one estimator, unless it has passed already; false where the whole run has to
+/// end.
+bool Advance(Running& one, const Seen& seen, const internal::Passed* passed,
+             const RunOptions& options, RunResult& result) {
   if (one.ended) return true;
   Estimator& estimator = *one.named.estimator;
-  const UpdateReport& report = estimator.Process(seen.frame);
+  const UpdateReport& report = passed ? passed->report : estimator.Process(seen.frame);
   one.Note(report.events);
-  one.ended = estimator.failed();
+  one.ended = passed ? passed->failed : estimator.failed();
+  one.diverged = passed ? passed->diverged : estimator.diverged();
   if (!one.ended && !estimator.offline()) {
-    one.Take(seen, estimator.state(), report, options.recorder);
+    one.Take(seen, passed ? passed->after->state : estimator.state(), report, options.recorder);
   }
-  const bool policy = one.named.on_divergence == OnDivergence::kFail && estimator.diverged();
+  const bool policy = one.named.on_divergence == OnDivergence::kFail && one.diverged;
   if (!one.ended && !policy) return true;
   if (result.status == RunStatus::kOk) {
     const std::string why = Cause(report.events, "diverged");
@@ -145,6 +150,25 @@ bool Advance(Running& one, const Seen& seen, const RunOptions& options, RunResul
   return !policy;
 }
 
+/// The next frame, as the experiment's TimePolicy has it; false at the end. What became of others
+/// on the way is noted.
+bool NextFrame(internal::FrameOrder& frames, std::vector<Running>& running, RunResult& result,
+               Frame& frame) {
+  const auto note = [&] {
+    result.arrivals = frames.arrivals();
+    const std::vector<Event> events = frames.TakeEvents();
+    for (Running& one : running) one.Note(events);
+  };
+  try {
+    const bool more = frames.Next(frame);
+    note();
+    return more;
+  } catch (...) {
+    note();
+    throw;
+  }
+}
+
 /// The frames one by one through all estimators; where one is offline, they are kept for it.
 void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunOptions& options,
                RunResult& result, std::vector<Seen>& kept) {
@@ -153,15 +177,17 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
   const std::int64_t size = experiment.source->size();
   const bool keep = std::ranges::any_of(
       running, [](const Running& one) { return one.named.estimator->offline(); });
-  while (experiment.source->Next(seen.frame)) {
-    CheckFrame(seen.frame, *experiment.source);
+  internal::FrameOrder frames(experiment, &CheckFrame);
+  while (NextFrame(frames, running, result, seen.frame)) {
     for (std::size_t i = 0; i < experiment.segments.size(); ++i) {
       seen.in_segment[i] = InSegment(experiment.segments[i], seen.frame);
     }
     if (options.recorder != nullptr) options.recorder->AddFrame(seen.frame);
     if (keep) kept.push_back(seen);
     bool go_on = true;
-    for (Running& one : running) go_on = Advance(one, seen, options, result) && go_on;
+    for (std::size_t e = 0; e < running.size(); ++e) {
+      go_on = Advance(running[e], seen, frames.passed(e), options, result) && go_on;
+    }
     ++result.frames;
     if (!go_on || std::ranges::all_of(running, &Running::ended)) return;
     if (options.progress) options.progress(result.frames, size);
@@ -246,7 +272,9 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
     one.result.units = one.metrics.units();
     if (result.frames > 0) NoteUnused(one.named.system, one.result);
     one.Note(one.metrics.events());
-    one.result.diverged = one.named.estimator->diverged() || !one.metrics.events().empty();
+    const Estimator& estimator = *one.named.estimator;
+    one.result.diverged = one.diverged || (estimator.offline() && estimator.diverged()) ||
+                          !one.metrics.events().empty();
     result.estimators.push_back(std::move(one.result));
   }
   return result;

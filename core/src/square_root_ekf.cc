@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/square_root_ekf.h"
 
+#include "ekf_kept.h"
 #include "filter_options.h"
 #include "square_root.h"
 
@@ -11,6 +12,21 @@ SquareRootEkf::SquareRootEkf(System system, const EkfOptions& options,
     : Ekf(std::move(system), internal::WithoutRecovery(options), streams) {
   ALIDADE_EXPECTS(!considering_ && !waiting_);
   Take(internal::SquareRootOf(state_.covariance().Dense()).root);
+}
+
+struct SquareRootEkf::Kept : Ekf::Kept {
+  explicit Kept(const SquareRootEkf& ekf) : Ekf::Kept(ekf), root(ekf.root_) {}
+
+  Eigen::MatrixXd root;
+};
+
+std::unique_ptr<Estimator::Snapshot> SquareRootEkf::Save() const {
+  return std::make_unique<Kept>(*this);
+}
+
+void SquareRootEkf::Restore(const Snapshot& snapshot) {
+  Ekf::Restore(snapshot);
+  root_ = dynamic_cast<const Kept&>(snapshot).root;
 }
 
 void SquareRootEkf::Take(Eigen::MatrixXd root) {

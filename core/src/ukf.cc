@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "ekf_kept.h"
 #include "filter_options.h"
 #include "square_root.h"
 
@@ -63,6 +64,28 @@ Ukf::Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>
       spread_(options),
       guarded_(system_.sensors.size() + 1, false) {
   ALIDADE_EXPECTS(!considering_ && !waiting_);
+}
+
+struct Ukf::Kept : Ekf::Kept {
+  explicit Kept(const Ukf& ukf)
+      : Ekf::Kept(ukf),
+        root(ukf.root_),
+        root_is_current(ukf.root_is_current_),
+        guarded(ukf.guarded_) {}
+
+  Eigen::MatrixXd root;
+  bool root_is_current;
+  std::vector<bool> guarded;
+};
+
+std::unique_ptr<Estimator::Snapshot> Ukf::Save() const { return std::make_unique<Kept>(*this); }
+
+void Ukf::Restore(const Snapshot& snapshot) {
+  Ekf::Restore(snapshot);
+  const auto& kept = dynamic_cast<const Kept&>(snapshot);
+  root_ = kept.root;
+  root_is_current_ = kept.root_is_current;
+  guarded_ = kept.guarded;
 }
 
 Ukf::Transform Ukf::TransformOf(Eigen::Index directions, int halvings) const {

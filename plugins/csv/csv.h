@@ -30,7 +30,9 @@ namespace alidade {
 class CsvSource : public Source {
  public:
   explicit CsvSource(const SourceArguments& arguments)
-      : layout_(ReadCsvLayout(arguments.entry)), reader_(Open(arguments)) {
+      : layout_(ReadCsvLayout(arguments.entry)),
+        reader_(Open(arguments)),
+        any_order_(arguments.any_order) {
     for (const CsvField& field : layout_.streams) streams_.push_back(field.info);
     for (const CsvField& field : layout_.truths) truths_.push_back(field.info);
     ReadHeader();
@@ -40,6 +42,7 @@ class CsvSource : public Source {
   const std::vector<StreamInfo>& streams() const override { return streams_; }
   const std::vector<StreamInfo>& truths() const override { return truths_; }
   std::int64_t size() const override { return size_; }
+  Place place() const override { return {reader_.name(), reader_.number(), 0}; }
 
   bool Next(Frame& frame) override {
     if (!NextRow()) {
@@ -190,11 +193,11 @@ class CsvSource : public Source {
     const bool has_exponent = text.find_first_of("eE") != std::string_view::npos;
     const Stamp stamp =
         has_exponent ? StampFromSeconds(t_s) : csv_detail::ExactStamp(text, layout_.time_digits);
-    if (rows_ > 0 && stamp <= last_stamp_) {
+    if (!any_order_ && rows_ > 0 && stamp <= last_stamp_) {
       FailCell(column,
                std::string(stamp < last_stamp_ ? "is before" : "is the same time as") + " line " +
                    std::to_string(last_line_),
-               "times that increase");
+               "times that increase, or 'time.order: sort'");
     }
     return stamp;
   }
@@ -217,6 +220,7 @@ class CsvSource : public Source {
 
   CsvLayout layout_;
   LineReader reader_;
+  bool any_order_;
   std::vector<StreamInfo> streams_, truths_;
   std::vector<std::string> names_;
   int header_line_ = 0;

@@ -88,10 +88,11 @@ TEST_F(Csv, LongestLineMayEndAcrossTheBuffer) {
 
 TEST_F(Csv, TimeMustIncrease) {
   ExpectBadData(std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n# c\n0.1,1,2,3\n",
-                "FILE:5:1 t_s: '0.1' is before line 3; expected times that increase");
+                "FILE:5:1 t_s: '0.1' is before line 3; expected times that increase, or "
+                "'time.order: sort'");
   ExpectBadData(std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n0.2000000001,1,2,3\n",
                 "FILE:4:1 t_s: '0.2000000001' is the same time as line 3; expected times that "
-                "increase");
+                "increase, or 'time.order: sort'");
 }
 
 TEST_F(Csv, TimeBeyondTheStamps) {

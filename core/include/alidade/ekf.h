@@ -72,6 +72,9 @@ class Ekf : public Estimator {
   Stamp stamp() const override { return stamp_; }
   bool diverged() const override { return diverged_; }
   bool failed() const override { return failed_; }
+  /// An estimator derived from this one that keeps more from frame to frame overrides both.
+  std::unique_ptr<Snapshot> Save() const override;
+  void Restore(const Snapshot& snapshot) override;
 
  protected:  // for the estimators that share how frames are stepped to, read, gated and reported
   /// @cond
@@ -154,6 +157,7 @@ class Ekf : public Estimator {
   /// Ends the filter, with an event that tells its last good state.
   void GiveUp(const char* kind, const std::string& what);
 
+  struct Kept;  ///< the snapshot
   class Small;  ///< the fast path of a filter of few states that are all vectors
 
   void Bind();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -100,6 +101,13 @@ class Estimator {
   /// Takes the estimate of frame `index`, counted from the first call of Process, and its report.
   using Emit = std::function<void(std::size_t index, const State&, const UpdateReport&)>;
 
+  /// All that what comes after a frame depends on; each type of estimator adds its own.
+  struct Snapshot {
+    explicit Snapshot(State after) : state(std::move(after)) {}
+    virtual ~Snapshot() = default;
+    State state;
+  };
+
   virtual ~Estimator() = default;
   /// Sets the time of the initial state.
   virtual void Start(Stamp stamp) = 0;
@@ -113,6 +121,11 @@ class Estimator {
   /// smoothing itself come with the last report. Errors: where there is nothing to emit, failed()
   /// turns true and the text of the error says why; whatever `emit` throws.
   virtual void Smooth(const Emit& /*emit*/) {}
+  /// The estimator as it is after the last frame; null: it cannot go back to one.
+  virtual std::unique_ptr<Snapshot> Save() const { return nullptr; }
+  /// Goes back to where this estimator gave `snapshot`: every result from there on has the same
+  /// bits as if nothing had come between.
+  virtual void Restore(const Snapshot& /*snapshot*/) {}
   virtual const State& state() const = 0;
   virtual Stamp stamp() const = 0;
   /// True once the filter left the domain of its sensors or lost its numbers; see the events.

@@ -71,9 +71,10 @@ class PluginHost {
   MotionModel CreateMotion(const std::string& name, const Node& entry) const;
   /// The model `entry` of entries(), also where another plugin offers its name.
   std::shared_ptr<const ModelInstance> Create(const PluginEntry& entry, const Node& node) const;
+  /// `any_order` as in SourceArguments.
   std::unique_ptr<Source> CreateSource(const std::string& name, const Node& entry,
-                                       std::uint64_t seed,
-                                       const std::filesystem::path& folder) const;
+                                       std::uint64_t seed, const std::filesystem::path& folder,
+                                       bool any_order = false) const;
   /// The maker of an estimator whose options are in `entry`; its errors are the same.
   EstimatorMaker CreateEstimator(const std::string& name, const Node& entry) const;
 

@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,12 +39,37 @@ struct Segment {
   SensorModel sensor;  ///< decides validity
 };
 
+/// What is done with a frame whose stamp is before that of a frame that came earlier.
+enum class TimeOrder {
+  kReject,  ///< estimators are given it as it comes, and count its measurements as stale
+  kSort,    ///< frames are held back while one before them can still come
+  kRewind,  ///< as kSort, but estimators take frames as they come, and go back for a late one
+};
+
+/// How a run takes frames that are not in the order of their stamps. But under kReject, frames of
+/// equal stamps are merged.
+struct TimePolicy {
+  TimeOrder order = TimeOrder::kReject;
+  /// A frame farther behind the newest is dropped, with the event `late`; none: no frame is.
+  std::optional<Stamp> window;
+  std::vector<int> ranks;  ///< of the streams, among the measurements of merged frames
+};
+
 /// All that a config describes, made and checked, ready to run.
 struct Experiment {
   std::unique_ptr<Source> source;
   std::vector<NamedEstimator> estimators;
   std::vector<Segment> segments;
   std::uint64_t seed = 1;
+  TimePolicy time;
+};
+
+/// How the frames of a run came.
+struct Arrivals {
+  std::int64_t late = 0;     ///< before one that came earlier
+  std::int64_t merged = 0;   ///< into another of the same stamp
+  std::int64_t dropped = 0;  ///< of the late ones: beyond the window
+  Stamp longest_lag = 0;     ///< of a late one behind the newest, ns
 };
 
 /// The files and folders that a config's `plugins:` names, relative ones taken from its folder.
@@ -72,6 +98,7 @@ struct RunResult {
   ExitCode code = ExitCode::kOk;
   std::string reason;
   std::int64_t frames = 0;
+  Arrivals arrivals;
   std::vector<EstimatorResult> estimators;
 };
 

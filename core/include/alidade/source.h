@@ -58,6 +58,8 @@ class Source {
   virtual bool Next(Frame& frame) = 0;
   /// Frames in all, or -1 where that is not known (for progress only).
   virtual std::int64_t size() const { return -1; }
+  /// Where the last frame is written, for messages; empty where that means nothing.
+  virtual Place place() const { return {}; }
 };
 
 /// What a source is made from.
@@ -66,6 +68,7 @@ struct SourceArguments {
   Params& params;  ///< the same map, read by declaration (numbers, flags, choices)
   std::uint64_t seed;
   std::filesystem::path folder;  ///< relative paths are taken from here
+  bool any_order = false;        ///< times may go back or repeat: the run deals with it
 };
 
 }  // namespace alidade

@@ -30,6 +30,9 @@ class SquareRootEkf : public Ekf {
   /// L, n x n. state().covariance() is L L' in double precision, and so has half its digits.
   const Eigen::MatrixXd& root() const { return root_; }
 
+  std::unique_ptr<Snapshot> Save() const override;
+  void Restore(const Snapshot& snapshot) override;
+
  protected:
   /// @cond
   bool StepOnce(double dt_s) override;
@@ -37,6 +40,7 @@ class SquareRootEkf : public Ekf {
   Outcome Apply(std::span<Row* const> rows) override;
 
  private:
+  struct Kept;
   void Take(Eigen::MatrixXd root);
 
   Eigen::MatrixXd root_;

@@ -46,6 +46,9 @@ class Ukf : public Ekf {
   /// ContractViolation where a block is considered or waits for its first measurement.
   Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>& streams);
 
+  std::unique_ptr<Snapshot> Save() const override;
+  void Restore(const Snapshot& snapshot) override;
+
  protected:
   /// @cond
   bool StepOnce(double dt_s) override;
@@ -54,6 +57,7 @@ class Ukf : public Ekf {
   Outcome Apply(std::span<Row* const> rows) override;
 
  private:
+  struct Kept;
   /// Weights of the transform with 2N sigma points besides the centre.
   struct Transform {
     double c, w;

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What a filter says once, or says of its past, is part of what it goes back to.
+#include <algorithm>
+#include <limits>
+
+#include "support/recording.h"
+
+namespace alidade::testing {
+namespace {
+
+/// Stays where it is for a second, and is not finite after more.
+struct Breaking : Motion<1, Vec<1>> {
+  static constexpr std::array kBlocks{Quantity{"x"}};
+  template <class T>
+  void Step(const T* x, const T* w, double dt_s, T* next) const {
+    next[0] = (x[0] + w[0]) * (dt_s > 1.0 ? std::numeric_limits<double>::infinity() : 1.0);
+  }
+  void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
+};
+
+/// One block of known value 1 +- 1, measured directly with the given noise.
+Ekf Filter(double sigma) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Breaking(), "breaking"), {{"x", 1.0, 1.0}});
+  AddSensor(system, "z", InProcessSensor(Linear(1.0, sigma), "linear"), {"p.x"});
+  return {system, EkfOptions{}, {{"z", 1}}};
+}
+
+bool Has(const UpdateReport& report, const std::string& kind) {
+  return std::ranges::find(report.events, kind, &Event::kind) != report.events.end();
+}
+
+TEST(EkfSnapshot, AWarningThatIsGivenOnceIsGivenAgainOnlyFromBeforeIt) {
+  Ekf ekf = Filter(1e-9);
+  const auto before = ekf.Save();
+  EXPECT_TRUE(Has(ekf.Process(FrameAt(0.0, {{0, 1.0}})), "conditioning"));
+  const auto after = ekf.Save();
+  ekf.Restore(*before);
+  EXPECT_TRUE(Has(ekf.Process(FrameAt(0.0, {{0, 1.0}})), "conditioning"));
+  ekf.Restore(*before);
+  ekf.Restore(*after);
+  EXPECT_FALSE(Has(ekf.Process(FrameAt(0.5, {{0, 1.0}})), "conditioning"));
+}
+
+TEST(EkfSnapshot, AFailureTellsTheLastMeasurementOfThePastThatCounts) {
+  Ekf ekf = Filter(1.0);
+  ekf.Process(FrameAt(0.0, {{0, 1.5}}));
+  const auto saved = ekf.Save();
+  const std::vector<double> values = saved->state.values();
+  ekf.Process(FrameAt(0.5, {{0, 2.5}}));
+  ASSERT_TRUE(Has(ekf.Process(FrameAt(2.0, {{0, 1.0}})), "not_finite"));
+  EXPECT_TRUE(ekf.failed());
+  ekf.Restore(*saved);
+  EXPECT_FALSE(ekf.failed());
+  EXPECT_FALSE(ekf.diverged());
+  EXPECT_EQ(ekf.stamp(), 0);
+  EXPECT_EQ(ekf.state().values(), values);
+  const UpdateReport& report = ekf.Process(FrameAt(2.0, {{0, 1.0}}));
+  ASSERT_TRUE(Has(report, "not_finite"));
+  const std::string end = "sensor 'z' at 0.000000 s, z = 1.5";
+  EXPECT_TRUE(report.events.back().text.ends_with(end)) << report.events.back().text;
+}
+
+}  // namespace
+}  // namespace alidade::testing

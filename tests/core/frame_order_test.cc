@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// FAULTS 36, 37: late frames and equal stamps, frame by frame.
+#include <algorithm>
+
+#include "support/recording.h"
+
+namespace alidade::testing {
+namespace {
+
+class FrameOrder : public ::testing::TestWithParam<TimeOrder> {};
+
+INSTANTIATE_TEST_SUITE_P(Policies, FrameOrder,
+                         ::testing::Values(TimeOrder::kSort, TimeOrder::kRewind),
+                         [](const auto& of) {
+                           return of.param == TimeOrder::kSort ? "sort" : "rewind";
+                         });
+
+/// What the test says, frame by frame; frame k is in line k + 2 of rows.csv.
+class Given : public SwingingTarget {
+ public:
+  explicit Given(std::vector<Frame> frames, bool then_fails = false)
+      : SwingingTarget(0), frames_(std::move(frames)), then_fails_(then_fails) {}
+  bool Next(Frame& frame) override {
+    if (next_ == std::ssize(frames_) && then_fails_) throw Error(ExitCode::kBadData, "torn");
+    if (next_ == std::ssize(frames_)) return false;
+    frame = frames_[static_cast<std::size_t>(next_++)];
+    return true;
+  }
+  Place place() const override { return {"rows.csv", next_ + 1, 0}; }
+
+ private:
+  std::vector<Frame> frames_;
+  int next_ = 0;
+  bool then_fails_;
+};
+
+Experiment MakeGiven(std::vector<Frame> frames, TimeOrder order, bool then_fails = false) {
+  Experiment experiment = MakeExperiment();
+  experiment.source = std::make_unique<Given>(std::move(frames), then_fails);
+  experiment.time.order = order;
+  experiment.time.window = StampFromSeconds(0.1);
+  return experiment;
+}
+
+TEST_P(FrameOrder, AFrameBeyondTheWindowIsDroppedWithAnEvent) {
+  // 0.1 s behind the newest is in the window, a nanosecond more is not.
+  Frame beyond = FrameAt(0.2, {{0, 80.0}, {1, 1.0}});
+  beyond.stamp -= 1;
+  Experiment experiment = MakeGiven(
+      {FrameAt(0.1, {{1, 1.0}}), FrameAt(0.3, {{1, 1.0}}), beyond, FrameAt(0.2, {{1, 1.0}})},
+      GetParam());
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.status, RunStatus::kOk) << result.reason;
+  EXPECT_EQ(result.frames, 3);
+  EXPECT_EQ(result.arrivals.late, 2);
+  EXPECT_EQ(result.arrivals.dropped, 1);
+  EXPECT_EQ(result.arrivals.longest_lag, 100'000'001);
+  for (const EstimatorResult& one : result.estimators) {
+    const auto event = std::ranges::find(one.events, "late", &Event::kind);
+    ASSERT_NE(event, one.events.end());
+    EXPECT_EQ(event->stamp, beyond.stamp);
+    EXPECT_EQ(event->text,
+              "a frame of disparity, inverse_scale came 0.100000 s behind the newest, beyond the "
+              "window of 0.100000 s: dropped");
+  }
+  EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 3);
+}
+
+TEST_P(FrameOrder, AFrameBeforeTheFirstIsWhereTheRunStarts) {
+  const Frame first = FrameAt(0.0, {{1, 1.0}}), second = FrameAt(0.1, {{1, 1.1}});
+  Experiment in_order = MakeGiven({first, second}, TimeOrder::kReject);
+  Experiment late = MakeGiven({second, first}, GetParam());
+  alidade::Run(in_order, {});
+  alidade::Run(late, {});
+  EXPECT_EQ(late.estimators[0].estimator->state().values(),
+            in_order.estimators[0].estimator->state().values());
+}
+
+TEST_P(FrameOrder, AStreamTwiceAtOneStampIsAnErrorThatNamesBothPlaces) {
+  Experiment experiment =
+      MakeGiven({FrameAt(0.0, {{1, 1.0}}), FrameAt(0.05, {{1, 1.0}}), FrameAt(0.1, {{1, 1.0}}),
+                 FrameAt(0.05, {{0, 80.0}}), FrameAt(0.05, {{1, 1.0}})},
+                GetParam());
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.code, ExitCode::kBadData);
+  EXPECT_EQ(result.reason,
+            "rows.csv:6: stream 'inverse_scale' twice at t = 0.050000 s; expected one measurement "
+            "at a stamp; the first is in rows.csv:3");
+  EXPECT_EQ(result.frames, 3);  // what came before it is kept
+  EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 3);
+}
+
+TEST_P(FrameOrder, MergedMeasurementsHaveTheOrderOfTheSensors) {
+  for (const bool swapped : {false, true}) {
+    const TemporaryFolder folder;
+    const std::vector<Frame> frames = {FrameAt(0.0, {{0, 80.0}}), FrameAt(0.0, {{1, 1.0}})};
+    Experiment experiment = MakeGiven({frames[swapped], frames[!swapped]}, GetParam());
+    experiment.time.ranks = {1, 0};
+    Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+    recorder.Finish(RunInto(recorder, experiment));
+    EXPECT_EQ(Lines(folder / "out/measurements.csv"),
+              (std::vector<std::string>{"t_s,stream,landmark,v0", "0.000000000,inverse_scale,,1",
+                                        "0.000000000,disparity,,80"}));
+    const std::string timing = Read(folder / "out/timing.json");
+    EXPECT_NE(timing.find("\"merged\": 1"), std::string::npos) << timing;
+  }
+}
+
+TEST_P(FrameOrder, LandmarksOfOneStreamAreNotTheSameTwice) {
+  Frame one = FrameAt(0.0, {{1, 1.0}}), another = one;
+  one.measurements[0].landmark = 1;
+  another.measurements[0].landmark = 2;
+  Experiment experiment = MakeGiven({one, another}, GetParam());
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.status, RunStatus::kOk) << result.reason;
+  EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 2);
+}
+
+TEST_P(FrameOrder, TwoTruthsAtOneStampAreAnError) {
+  Frame one = FrameAt(0.0, {{1, 1.0}}), same = FrameAt(0.0, {{0, 80.0}}), other = FrameAt(0.0, {});
+  one.truth = same.truth = {{0.3}};
+  other.truth = {{0.31}};
+  Experiment experiment = MakeGiven({one, same}, GetParam());
+  EXPECT_EQ(alidade::Run(experiment, {}).status, RunStatus::kOk);
+  experiment = MakeGiven({one, same, other}, GetParam());
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.code, ExitCode::kBadData);
+  EXPECT_EQ(
+      result.reason,
+      "rows.csv:4: another value of truth 'depth' at t = 0.000000 s; expected one at a stamp");
+}
+
+TEST_P(FrameOrder, BadDataKeepsTheFramesHeldBack) {
+  Experiment experiment =
+      MakeGiven({FrameAt(0.1, {{1, 1.0}}), FrameAt(0.05, {{1, 1.0}}), FrameAt(0.0, {{1, 1.0}})},
+                GetParam(), true);
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.code, ExitCode::kBadData);
+  EXPECT_EQ(result.reason, "torn");
+  EXPECT_EQ(result.frames, 3);
+  EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 3);
+}
+
+TEST_P(FrameOrder, DivergenceUnderFailEndsTheRunAtTheFrameOfTheInOrderRun) {
+  // A negative depth is outside of the domain of both sensors, from the second frame on.
+  const std::vector<Frame> frames = {FrameAt(0.0, {}), FrameAt(0.05, {{0, 80.0}}),
+                                     FrameAt(0.1, {{0, 80.0}}), FrameAt(0.15, {{0, 80.0}})};
+  const auto run = [](std::vector<Frame> given, TimeOrder order) {
+    Experiment experiment = MakeGiven(std::move(given), order);
+    NamedEstimator& alone = experiment.estimators[1];
+    alone.system.priors[0].mean = {-0.2};
+    alone.on_divergence = OnDivergence::kFail;
+    alone.estimator =
+        std::make_unique<Ekf>(alone.system, EkfOptions{}, experiment.source->streams());
+    return alidade::Run(experiment, {});
+  };
+  const RunResult in_order = run(frames, TimeOrder::kReject);
+  ASSERT_EQ(in_order.code, ExitCode::kDiverged);
+  EXPECT_EQ(in_order.frames, 2);
+  const RunResult late = run({frames[2], frames[0], frames[3], frames[1]}, GetParam());
+  EXPECT_EQ(late.reason, in_order.reason);
+  EXPECT_EQ(late.frames, in_order.frames);
+  for (std::size_t e = 0; e < 2; ++e) {
+    EXPECT_EQ(late.estimators[e].diverged, in_order.estimators[e].diverged);
+    EXPECT_EQ(late.estimators[e].counts, in_order.estimators[e].counts);
+  }
+}
+
+TEST(Sort, WithoutAWindowTakesTheWholeRun) {
+  std::vector<Frame> frames;
+  for (int k = 0; k < 50; ++k) frames.push_back(FrameAt(100.0 - k, {{1, 1.0}}));
+  Experiment experiment = MakeGiven(frames, TimeOrder::kSort);
+  experiment.time.window.reset();
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.frames, 50);
+  EXPECT_EQ(result.arrivals.late, 49);
+  EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 50);
+}
+
+/// Remembers how many frames it was given, and that it was asked to go back.
+struct Watching : Ekf {
+  using Ekf::Ekf;
+  const UpdateReport& Process(const Frame& frame) override {
+    stamps.push_back(frame.stamp);
+    return Ekf::Process(frame);
+  }
+  std::vector<Stamp> stamps;
+};
+
+TEST(Rewind, TakesAFrameAtOnceAndTheLaterOnesAgain) {
+  Experiment experiment = MakeGiven({FrameAt(0.0, {{1, 1.0}}), FrameAt(0.05, {{1, 1.0}}),
+                                     FrameAt(0.1, {{1, 1.0}}), FrameAt(0.02, {{1, 1.0}})},
+                                    TimeOrder::kRewind);
+  NamedEstimator& named = experiment.estimators[0];
+  auto watching =
+      std::make_unique<Watching>(named.system, EkfOptions{}, experiment.source->streams());
+  const Watching& seen = *watching;
+  named.estimator = std::move(watching);
+  alidade::Run(experiment, {});
+  const Stamp ms = 1'000'000;
+  EXPECT_EQ(seen.stamps, (std::vector<Stamp>{0, 50 * ms, 100 * ms, 20 * ms, 50 * ms, 100 * ms}));
+}
+
+/// An estimator that cannot go back.
+class Forward : public Estimator {
+ public:
+  explicit Forward(const System& system) : state_(system.InitialState()) {}
+  void Start(Stamp) override {}
+  const UpdateReport& Process(const Frame&) override { return report_; }
+  const State& state() const override { return state_; }
+  Stamp stamp() const override { return kNoStamp; }
+  bool diverged() const override { return false; }
+  bool failed() const override { return false; }
+
+ private:
+  State state_;
+  UpdateReport report_;
+};
+
+TEST(Rewind, IsNotForAnEstimatorThatCannotGoBack) {
+  Experiment experiment = MakeGiven({FrameAt(0.0, {})}, TimeOrder::kRewind);
+  experiment.estimators[0].estimator = std::make_unique<Forward>(experiment.estimators[0].system);
+  EXPECT_EQ(alidade::Run(experiment, {}).code, ExitCode::kInternal);
+}
+
+}  // namespace
+}  // namespace alidade::testing

@@ -34,8 +34,9 @@ enum class StaticOutcome {
 ///   gate       1                      bound on r' S^-1 r; infinity: none
 ///
 /// Measurements are used one after the other, each linearised at the state that the one before has
-/// left, as the engine does under `fuse: per_measurement`. Sizes are known at compile time:
-/// Constant<1>, not Constant<>. Control inputs are not supported.
+/// left, as the engine does under `fuse: per_measurement`. As there, P is carried along where the
+/// tangent basis of a unit vector turns with it. Sizes are known at compile time: Constant<1>, not
+/// Constant<>. Control inputs are not supported.
 template <class... Motions>
 class StaticEkf {
  public:
@@ -108,29 +109,36 @@ class StaticEkf {
   using RowMajorMap = Eigen::Map<const Eigen::Matrix<
       double, rows, columns, columns == 1 && rows != 1 ? Eigen::ColMajor : Eigen::RowMajor>>;
 
-  /// One motion model's part of a step: F, and G Q G'.
-  template <class Model>
+  /// Part of a step of n elements: F, and G Q G'.
+  template <int n>
   struct Transition {
-    static constexpr int n = detail::Blocks<Model>::kTangent;
     Eigen::Matrix<double, n, n> f, q;
   };
+  template <class Model>
+  using TransitionOf = Transition<detail::Blocks<Model>::kTangent>;
 
   template <std::size_t... M>
   Status PredictAll(double dt_s, std::index_sequence<M...>) {
     double next[kAmbient];
-    std::tuple<Transition<Motions>...> transitions;
+    std::tuple<TransitionOf<Motions>...> transitions;
     Status status = Status::kOk;
     const bool all =
         (((status = StepOne<M>(dt_s, next, std::get<M>(transitions))) == Status::kOk) && ...);
     if (!all) return status;
     std::copy_n(next, kAmbient, x_);
+    const auto normalise = [&](auto index) {
+      constexpr int b = decltype(index)::value;
+      Normalise<Space<b>>(x_ + AmbientOffset(b));
+    };
+    detail::ForEach(normalise, Indices{});
     (Propagate<TangentOffset(FirstBlock(M))>(std::get<M>(transitions)), ...);
     return Status::kOk;
   }
-  template <std::size_t M, class Model>
-  Status StepOne(double dt_s, double* next, Transition<Model>& transition) const {
+  template <std::size_t M, int n>
+  Status StepOne(double dt_s, double* next, Transition<n>& transition) const {
+    using Model = std::tuple_element_t<M, std::tuple<Motions...>>;
     constexpr typename detail::Blocks<Model>::Indices indices{};
-    constexpr int n = Transition<Model>::n, n_w = Model::kNoise;
+    constexpr int n_w = Model::kNoise;
     const Model& model = std::get<M>(motions_);
     const double* x[detail::Blocks<Model>::kCount];
     double* y[detail::Blocks<Model>::kCount];
@@ -154,18 +162,25 @@ class StaticEkf {
   /// P(i, j), of which the lower triangle is kept.
   double& P(int i, int j) { return i >= j ? p_(i, j) : p_(j, i); }
   /// P of the rows [o, o + n): P_aa <- F P_aa F' + Q, P_ai <- F P_ai.
-  template <int o, class Model>
-  void Propagate(const Transition<Model>& t);
+  template <int o, int n>
+  void Propagate(const Transition<n>& t);
   template <int m>
   StaticOutcome Correct(const Eigen::Matrix<double, kTangent, m>& pht,
                         const Eigen::Matrix<double, m, m>& s, const Eigen::Matrix<double, m, 1>& r,
                         double gate);
-  /// x <- x (+) dx
+  /// x <- x (+) dx, and P turns with the tangent planes of unit vectors
   void Move(const double* dx) {
     const auto move = [&](auto index) {
-      constexpr int b = decltype(index)::value;
+      constexpr int b = decltype(index)::value, n = Space<b>::kTangent;
       double moved[Space<b>::kAmbient];
       Space<b>::Plus(value<b>(), dx + TangentOffset(b), moved);
+      Normalise<Space<b>>(moved);
+      if constexpr (Space<b>::kGeometry == ALIDADE_UNIT_VECTOR) {
+        double j[n * n];
+        Space<b>::Transport(value<b>(), moved, j);
+        const Transition<n> turn{RowMajorMap<n, n>(j), Eigen::Matrix<double, n, n>::Zero()};
+        Propagate<TangentOffset(b)>(turn);
+      }
       std::copy_n(moved, Space<b>::kAmbient, x_ + AmbientOffset(b));
     };
     detail::ForEach(move, Indices{});
@@ -180,9 +195,8 @@ class StaticEkf {
 #define ALIDADE_UNROLL _Pragma("GCC unroll 16")
 
 template <class... Motions>
-template <int o, class Model>
-void StaticEkf<Motions...>::Propagate(const Transition<Model>& t) {
-  constexpr int n = Transition<Model>::n;
+template <int o, int n>
+void StaticEkf<Motions...>::Propagate(const Transition<n>& t) {
   double fp[n][kTangent];
   ALIDADE_UNROLL for (int r = 0; r < n; ++r) {
     ALIDADE_UNROLL for (int c = 0; c < kTangent; ++c) {
@@ -277,7 +291,6 @@ StaticOutcome StaticEkf<Motions...>::Correct(const Eigen::Matrix<double, kTangen
     k = llt.solve(pht.transpose()).transpose();
   }
   const Eigen::Matrix<double, kTangent, 1> dx = k.lazyProduct(r);
-  Move(dx.data());
   ALIDADE_UNROLL for (int i = 0; i < kTangent; ++i) {
     ALIDADE_UNROLL for (int j = 0; j <= i; ++j) {
       double sum = k(i, 0) * pht(j, 0);
@@ -285,6 +298,7 @@ StaticOutcome StaticEkf<Motions...>::Correct(const Eigen::Matrix<double, kTangen
       p_(i, j) -= sum;
     }
   }
+  Move(dx.data());
   return StaticOutcome::kAccepted;
 }
 

@@ -215,7 +215,7 @@ System WanderSystem(const Eigen::Matrix3d& p_q, const Eigen::Matrix2d& p_u) {
   return system;
 }
 
-// Corrections of up to 0.5 rad: P has to turn with the unit vector, and values to keep their length.
+// Corrections are of up to 0.5 rad: P has to turn with the unit vector.
 TEST(StaticEkf, CarriesCovariancesAndLengthsOnManifoldsAsTheEngineDoes) {
   const Eigen::Matrix3d p_q = Eigen::Vector3d(0.3, 0.2, 0.1).asDiagonal();
   Eigen::Matrix2d p_u;

@@ -247,7 +247,7 @@ TEST_P(EveryModel, IsTheSameAsAPluginAndComposedAtCompileTime) {
   row_.expect_static_is_engine(system_);
 }
 
-// The last estimate of the batch is the filter's where models are linear, as motion models are here.
+// The last estimate of the batch is the filter's where models are linear, as motions are here.
 // Without the measurements of its sensor a batch would be off by 0.1 to 0.6 sigma.
 TEST_P(EveryModel, GivesTheBatchItsFactors) {
   const auto& entries = Shipped().entries();

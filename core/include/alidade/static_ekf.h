@@ -105,14 +105,14 @@ class StaticEkf {
     return first;
   }
   /// What models write, as a matrix. (Eigen wants a single column in column order.)
-  template <int rows, int columns>
-  using RowMajorMap = Eigen::Map<const Eigen::Matrix<
-      double, rows, columns, columns == 1 && rows != 1 ? Eigen::ColMajor : Eigen::RowMajor>>;
+  template <int R, int C>
+  using RowMajorMap = Eigen::Map<
+      const Eigen::Matrix<double, R, C, C == 1 && R != 1 ? Eigen::ColMajor : Eigen::RowMajor>>;
 
   /// Part of a step of n elements: F, and G Q G'.
-  template <int n>
+  template <int N>
   struct Transition {
-    Eigen::Matrix<double, n, n> f, q;
+    Eigen::Matrix<double, N, N> f, q;
   };
   template <class Model>
   using TransitionOf = Transition<detail::Blocks<Model>::kTangent>;
@@ -134,8 +134,10 @@ class StaticEkf {
     (Propagate<TangentOffset(FirstBlock(M))>(std::get<M>(transitions)), ...);
     return Status::kOk;
   }
-  template <std::size_t M, int n>
-  Status StepOne(double dt_s, double* next, Transition<n>& transition) const {
+  template <std::size_t M, int N>
+  Status StepOne(double dt_s,
+                 double* next,  // NOLINT(readability-non-const-parameter): y points into it
+                 Transition<N>& transition) const {
     using Model = std::tuple_element_t<M, std::tuple<Motions...>>;
     constexpr typename detail::Blocks<Model>::Indices indices{};
     constexpr int n_w = Model::kNoise;
@@ -148,25 +150,25 @@ class StaticEkf {
       y[i] = next + o;
     };
     detail::ForEach(place, indices);
-    double f[n * n], g[n * n_w + 1] = {}, l[n_w * n_w + 1] = {};
-    const Status status = Step(model, x, nullptr, nullptr, dt_s, y, {f, n}, {g, n_w});
+    double f[N * N], g[N * n_w + 1] = {}, l[n_w * n_w + 1] = {};
+    const Status status = Step(model, x, nullptr, nullptr, dt_s, y, {f, N}, {g, n_w});
     if (status != Status::kOk) return status;
     detail::CallSqrtQ(model, x, dt_s, {l, n_w}, indices);
-    const Eigen::Matrix<double, n, n_w> gl =
-        RowMajorMap<n, n_w>(g).lazyProduct(RowMajorMap<n_w, n_w>(l));
-    transition.f = RowMajorMap<n, n>(f);
+    const Eigen::Matrix<double, N, n_w> gl =
+        RowMajorMap<N, n_w>(g).lazyProduct(RowMajorMap<n_w, n_w>(l));
+    transition.f = RowMajorMap<N, N>(f);
     transition.q = gl.lazyProduct(gl.transpose());
     return Status::kOk;
   }
 
   /// P(i, j), of which the lower triangle is kept.
   double& P(int i, int j) { return i >= j ? p_(i, j) : p_(j, i); }
-  /// P of the rows [o, o + n): P_aa <- F P_aa F' + Q, P_ai <- F P_ai.
-  template <int o, int n>
-  void Propagate(const Transition<n>& t);
-  template <int m>
-  StaticOutcome Correct(const Eigen::Matrix<double, kTangent, m>& pht,
-                        const Eigen::Matrix<double, m, m>& s, const Eigen::Matrix<double, m, 1>& r,
+  /// P of the rows [O, O + N): P_aa <- F P_aa F' + Q, P_ai <- F P_ai.
+  template <int O, int N>
+  void Propagate(const Transition<N>& t);
+  template <int M>
+  StaticOutcome Correct(const Eigen::Matrix<double, kTangent, M>& pht,
+                        const Eigen::Matrix<double, M, M>& s, const Eigen::Matrix<double, M, 1>& r,
                         double gate);
   /// x <- x (+) dx, and P turns with the tangent planes of unit vectors
   void Move(const double* dx) {
@@ -195,23 +197,23 @@ class StaticEkf {
 #define ALIDADE_UNROLL _Pragma("GCC unroll 16")
 
 template <class... Motions>
-template <int o, int n>
-void StaticEkf<Motions...>::Propagate(const Transition<n>& t) {
-  double fp[n][kTangent];
-  ALIDADE_UNROLL for (int r = 0; r < n; ++r) {
+template <int O, int N>
+void StaticEkf<Motions...>::Propagate(const Transition<N>& t) {
+  double fp[N][kTangent];
+  ALIDADE_UNROLL for (int r = 0; r < N; ++r) {
     ALIDADE_UNROLL for (int c = 0; c < kTangent; ++c) {
-      fp[r][c] = t.f(r, 0) * P(o, c);
-      ALIDADE_UNROLL for (int k = 1; k < n; ++k) fp[r][c] += t.f(r, k) * P(o + k, c);
+      fp[r][c] = t.f(r, 0) * P(O, c);
+      ALIDADE_UNROLL for (int k = 1; k < N; ++k) fp[r][c] += t.f(r, k) * P(O + k, c);
     }
   }
-  ALIDADE_UNROLL for (int r = 0; r < n; ++r) {
+  ALIDADE_UNROLL for (int r = 0; r < N; ++r) {
     ALIDADE_UNROLL for (int c = 0; c < kTangent; ++c) {
-      if (c < o || c >= o + n) P(o + r, c) = fp[r][c];
+      if (c < O || c >= O + N) P(O + r, c) = fp[r][c];
     }
     ALIDADE_UNROLL for (int c = 0; c <= r; ++c) {
       double sum = t.q(r, c);
-      ALIDADE_UNROLL for (int k = 0; k < n; ++k) sum += fp[r][o + k] * t.f(c, k);
-      P(o + r, o + c) = sum;
+      ALIDADE_UNROLL for (int k = 0; k < N; ++k) sum += fp[r][O + k] * t.f(c, k);
+      P(O + r, O + c) = sum;
     }
   }
 }
@@ -269,12 +271,12 @@ StaticOutcome StaticEkf<Motions...>::Update(const Model& sensor, const double* z
 }
 
 template <class... Motions>
-template <int m>
-StaticOutcome StaticEkf<Motions...>::Correct(const Eigen::Matrix<double, kTangent, m>& pht,
-                                             const Eigen::Matrix<double, m, m>& s,
-                                             const Eigen::Matrix<double, m, 1>& r, double gate) {
-  Eigen::Matrix<double, kTangent, m> k;  // K = P H' S^-1
-  if constexpr (m == 1) {
+template <int M>
+StaticOutcome StaticEkf<Motions...>::Correct(const Eigen::Matrix<double, kTangent, M>& pht,
+                                             const Eigen::Matrix<double, M, M>& s,
+                                             const Eigen::Matrix<double, M, 1>& r, double gate) {
+  Eigen::Matrix<double, kTangent, M> k;  // K = P H' S^-1
+  if constexpr (M == 1) {
     if (!(s(0) > 0.0 && s(0) <= std::numeric_limits<double>::max())) {
       return StaticOutcome::kNotFinite;
     }
@@ -283,7 +285,7 @@ StaticOutcome StaticEkf<Motions...>::Correct(const Eigen::Matrix<double, kTangen
     if (!std::isfinite(nis)) return StaticOutcome::kNotFinite;
     if (!(nis <= gate)) return StaticOutcome::kGated;
   } else {
-    const Eigen::LLT<Eigen::Matrix<double, m, m>> llt(s);
+    const Eigen::LLT<Eigen::Matrix<double, M, M>> llt(s);
     if (!s.allFinite() || llt.info() != Eigen::Success) return StaticOutcome::kNotFinite;
     const double nis = llt.matrixL().solve(r).squaredNorm();
     if (!std::isfinite(nis)) return StaticOutcome::kNotFinite;
@@ -294,7 +296,7 @@ StaticOutcome StaticEkf<Motions...>::Correct(const Eigen::Matrix<double, kTangen
   ALIDADE_UNROLL for (int i = 0; i < kTangent; ++i) {
     ALIDADE_UNROLL for (int j = 0; j <= i; ++j) {
       double sum = k(i, 0) * pht(j, 0);
-      ALIDADE_UNROLL for (int c = 1; c < m; ++c) sum += k(i, c) * pht(j, c);
+      ALIDADE_UNROLL for (int c = 1; c < M; ++c) sum += k(i, c) * pht(j, c);
       p_(i, j) -= sum;
     }
   }

@@ -19,40 +19,13 @@ void Scale(double factor, double* x, int size) {
   for (int i = 0; i < size; ++i) x[i] *= factor;
 }
 
-/// y = x (+) d by way of a buffer, so that y may be x; brought back to unit length, because
-/// rounding would otherwise add up over many steps.
+/// y = x (+) d by way of a buffer, so that y may be x, and kept on the manifold.
 template <class G>
 void UnitPlus(const double* x, const double* d, double* y) {
   double sum[G::kAmbient];
   G::Plus(x, d, sum);
-  const double norm = Norm(sum, G::kAmbient);
-  constexpr double kRounding = 4e-16;
-  if (std::abs(norm - 1.0) > kRounding) Scale(1.0 / norm, sum, G::kAmbient);
+  alidade::Normalise<G>(sum);
   std::copy_n(sum, G::kAmbient, y);
-}
-
-/// Parallel transport on S^2 in the bases of geometry.h: J = B(to)' R B(from), where R turns `from`
-/// into `to` the short way, R v = v - (from + to) (to . v) / (1 + from . to). From a point to its
-/// antipode every way is as short; the one along the first basis vector is taken.
-void UnitVectorTransport(const double* from, const double* to, double* j) {
-  double b_from[6], b_to[6];
-  UnitVector::Basis(from, b_from);
-  UnitVector::Basis(to, b_to);
-  const double c = from[0] * to[0] + from[1] * to[1] + from[2] * to[2];
-  constexpr double kAntipode = 1e-14;
-  for (int column = 0; column < 2; ++column) {
-    double v[3];
-    for (int i = 0; i < 3; ++i) v[i] = b_from[2 * i + column];
-    if (1.0 + c > kAntipode) {
-      const double k = (to[0] * v[0] + to[1] * v[1] + to[2] * v[2]) / (1.0 + c);
-      for (int i = 0; i < 3; ++i) v[i] -= k * (from[i] + to[i]);
-    } else if (column == 0) {
-      Scale(-1.0, v, 3);
-    }
-    for (int row = 0; row < 2; ++row) {
-      j[2 * row + column] = b_to[row] * v[0] + b_to[2 + row] * v[1] + b_to[4 + row] * v[2];
-    }
-  }
 }
 
 /// The right Jacobian of SO(3), with t = |d|:
@@ -82,8 +55,8 @@ void UnitVectorPlusJacobian(const double* x, const double* d, double* j) {
   const double s = t < kSeries ? 1.0 - t2 / 6.0 : std::sin(t) / t;
   const double k = t < kSeries ? 1.0 / 6.0 : (1.0 - s) / t2;  // of d d'
   double y[3], transport[4];
-  UnitPlus<alidade::UnitVector>(x, d, y);
-  UnitVectorTransport(x, y, transport);
+  UnitPlus<UnitVector>(x, d, y);
+  UnitVector::Transport(x, y, transport);
   for (int row = 0; row < 2; ++row) {
     const double along = transport[2 * row] * d[0] + transport[2 * row + 1] * d[1];
     for (int column = 0; column < 2; ++column) {
@@ -148,7 +121,7 @@ void Geometry::Minus(const double* y, const double* x, double* d) const {
 }
 
 void Geometry::Transport(const double* from, const double* to, double* j) const {
-  if (kind == GeometryKind::kUnitVector) return UnitVectorTransport(from, to, j);
+  if (kind == GeometryKind::kUnitVector) return alidade::UnitVector::Transport(from, to, j);
   alidade::Identity(tangent, j);
 }
 

@@ -185,6 +185,44 @@ struct UnitVector {
     d[0] = k * p[0];
     d[1] = k * p[1];
   }
+  /// j (2x2, row-major): parallel transport, J = B(to)' R B(from), where R turns `from` into `to`
+  /// the short way, R v = v - (from + to) (to . v) / (1 + from . to). From a point to its antipode
+  /// every way is as short; the one along the first basis vector is taken.
+  static void Transport(const double* from, const double* to, double* j) {
+    double b_from[6], b_to[6];
+    Basis(from, b_from);
+    Basis(to, b_to);
+    const double c = from[0] * to[0] + from[1] * to[1] + from[2] * to[2];
+    constexpr double kAntipode = 1e-14;
+    for (int column = 0; column < 2; ++column) {
+      double v[3];
+      for (int i = 0; i < 3; ++i) v[i] = b_from[2 * i + column];
+      if (1.0 + c > kAntipode) {
+        const double k = (to[0] * v[0] + to[1] * v[1] + to[2] * v[2]) / (1.0 + c);
+        for (int i = 0; i < 3; ++i) v[i] -= k * (from[i] + to[i]);
+      } else if (column == 0) {
+        for (int i = 0; i < 3; ++i) v[i] = -v[i];
+      }
+      for (int row = 0; row < 2; ++row) {
+        j[2 * row + column] = b_to[row] * v[0] + b_to[2 + row] * v[1] + b_to[4 + row] * v[2];
+      }
+    }
+  }
 };
+
+/// Brings x, off the manifold of G by rounding, back to it: else rounding would add up over many
+/// steps. An angle is wrapped.
+template <class G>
+void Normalise(double* x) {
+  if constexpr (G::kGeometry == ALIDADE_ANGLE) x[0] = G::Wrap(x[0]);
+  if constexpr (G::kAmbient > G::kTangent) {  // of unit length
+    double sum = 0.0;
+    for (int i = 0; i < G::kAmbient; ++i) sum += x[i] * x[i];
+    const double norm = std::sqrt(sum);
+    constexpr double kRounding = 4e-16;
+    if (!(std::abs(norm - 1.0) > kRounding)) return;
+    for (int i = 0; i < G::kAmbient; ++i) x[i] *= 1.0 / norm;
+  }
+}
 
 }  // namespace alidade

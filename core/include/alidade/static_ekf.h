@@ -34,8 +34,9 @@ enum class StaticOutcome {
 ///   gate       1                      bound on r' S^-1 r; infinity: none
 ///
 /// Measurements are used one after the other, each linearised at the state that the one before has
-/// left, as the engine does under `fuse: per_measurement`. Sizes are known at compile time:
-/// Constant<1>, not Constant<>. Control inputs are not supported.
+/// left, as the engine does under `fuse: per_measurement`. As there, P is carried along where the
+/// tangent basis of a unit vector turns with it. Sizes are known at compile time: Constant<1>, not
+/// Constant<>. Control inputs are not supported.
 template <class... Motions>
 class StaticEkf {
  public:
@@ -104,33 +105,42 @@ class StaticEkf {
     return first;
   }
   /// What models write, as a matrix. (Eigen wants a single column in column order.)
-  template <int rows, int columns>
-  using RowMajorMap = Eigen::Map<const Eigen::Matrix<
-      double, rows, columns, columns == 1 && rows != 1 ? Eigen::ColMajor : Eigen::RowMajor>>;
+  template <int R, int C>
+  using RowMajorMap = Eigen::Map<
+      const Eigen::Matrix<double, R, C, C == 1 && R != 1 ? Eigen::ColMajor : Eigen::RowMajor>>;
 
-  /// One motion model's part of a step: F, and G Q G'.
-  template <class Model>
+  /// Part of a step of n elements: F, and G Q G'.
+  template <int N>
   struct Transition {
-    static constexpr int n = detail::Blocks<Model>::kTangent;
-    Eigen::Matrix<double, n, n> f, q;
+    Eigen::Matrix<double, N, N> f, q;
   };
+  template <class Model>
+  using TransitionOf = Transition<detail::Blocks<Model>::kTangent>;
 
   template <std::size_t... M>
   Status PredictAll(double dt_s, std::index_sequence<M...>) {
     double next[kAmbient];
-    std::tuple<Transition<Motions>...> transitions;
+    std::tuple<TransitionOf<Motions>...> transitions;
     Status status = Status::kOk;
     const bool all =
         (((status = StepOne<M>(dt_s, next, std::get<M>(transitions))) == Status::kOk) && ...);
     if (!all) return status;
     std::copy_n(next, kAmbient, x_);
+    const auto normalise = [&](auto index) {
+      constexpr int b = decltype(index)::value;
+      Normalise<Space<b>>(x_ + AmbientOffset(b));
+    };
+    detail::ForEach(normalise, Indices{});
     (Propagate<TangentOffset(FirstBlock(M))>(std::get<M>(transitions)), ...);
     return Status::kOk;
   }
-  template <std::size_t M, class Model>
-  Status StepOne(double dt_s, double* next, Transition<Model>& transition) const {
+  template <std::size_t M, int N>
+  Status StepOne(double dt_s,
+                 double* next,  // NOLINT(readability-non-const-parameter): y points into it
+                 Transition<N>& transition) const {
+    using Model = std::tuple_element_t<M, std::tuple<Motions...>>;
     constexpr typename detail::Blocks<Model>::Indices indices{};
-    constexpr int n = Transition<Model>::n, n_w = Model::kNoise;
+    constexpr int n_w = Model::kNoise;
     const Model& model = std::get<M>(motions_);
     const double* x[detail::Blocks<Model>::kCount];
     double* y[detail::Blocks<Model>::kCount];
@@ -140,32 +150,39 @@ class StaticEkf {
       y[i] = next + o;
     };
     detail::ForEach(place, indices);
-    double f[n * n], g[n * n_w + 1] = {}, l[n_w * n_w + 1] = {};
-    const Status status = Step(model, x, nullptr, nullptr, dt_s, y, {f, n}, {g, n_w});
+    double f[N * N], g[N * n_w + 1] = {}, l[n_w * n_w + 1] = {};
+    const Status status = Step(model, x, nullptr, nullptr, dt_s, y, {f, N}, {g, n_w});
     if (status != Status::kOk) return status;
     detail::CallSqrtQ(model, x, dt_s, {l, n_w}, indices);
-    const Eigen::Matrix<double, n, n_w> gl =
-        RowMajorMap<n, n_w>(g).lazyProduct(RowMajorMap<n_w, n_w>(l));
-    transition.f = RowMajorMap<n, n>(f);
+    const Eigen::Matrix<double, N, n_w> gl =
+        RowMajorMap<N, n_w>(g).lazyProduct(RowMajorMap<n_w, n_w>(l));
+    transition.f = RowMajorMap<N, N>(f);
     transition.q = gl.lazyProduct(gl.transpose());
     return Status::kOk;
   }
 
   /// P(i, j), of which the lower triangle is kept.
   double& P(int i, int j) { return i >= j ? p_(i, j) : p_(j, i); }
-  /// P of the rows [o, o + n): P_aa <- F P_aa F' + Q, P_ai <- F P_ai.
-  template <int o, class Model>
-  void Propagate(const Transition<Model>& t);
-  template <int m>
-  StaticOutcome Correct(const Eigen::Matrix<double, kTangent, m>& pht,
-                        const Eigen::Matrix<double, m, m>& s, const Eigen::Matrix<double, m, 1>& r,
+  /// P of the rows [O, O + N): P_aa <- F P_aa F' + Q, P_ai <- F P_ai.
+  template <int O, int N>
+  void Propagate(const Transition<N>& t);
+  template <int M>
+  StaticOutcome Correct(const Eigen::Matrix<double, kTangent, M>& pht,
+                        const Eigen::Matrix<double, M, M>& s, const Eigen::Matrix<double, M, 1>& r,
                         double gate);
-  /// x <- x (+) dx
+  /// x <- x (+) dx, and P turns with the tangent planes of unit vectors
   void Move(const double* dx) {
     const auto move = [&](auto index) {
-      constexpr int b = decltype(index)::value;
+      constexpr int b = decltype(index)::value, n = Space<b>::kTangent;
       double moved[Space<b>::kAmbient];
       Space<b>::Plus(value<b>(), dx + TangentOffset(b), moved);
+      Normalise<Space<b>>(moved);
+      if constexpr (Space<b>::kGeometry == ALIDADE_UNIT_VECTOR) {
+        double j[n * n];
+        Space<b>::Transport(value<b>(), moved, j);
+        const Transition<n> turn{RowMajorMap<n, n>(j), Eigen::Matrix<double, n, n>::Zero()};
+        Propagate<TangentOffset(b)>(turn);
+      }
       std::copy_n(moved, Space<b>::kAmbient, x_ + AmbientOffset(b));
     };
     detail::ForEach(move, Indices{});
@@ -180,24 +197,23 @@ class StaticEkf {
 #define ALIDADE_UNROLL _Pragma("GCC unroll 16")
 
 template <class... Motions>
-template <int o, class Model>
-void StaticEkf<Motions...>::Propagate(const Transition<Model>& t) {
-  constexpr int n = Transition<Model>::n;
-  double fp[n][kTangent];
-  ALIDADE_UNROLL for (int r = 0; r < n; ++r) {
+template <int O, int N>
+void StaticEkf<Motions...>::Propagate(const Transition<N>& t) {
+  double fp[N][kTangent];
+  ALIDADE_UNROLL for (int r = 0; r < N; ++r) {
     ALIDADE_UNROLL for (int c = 0; c < kTangent; ++c) {
-      fp[r][c] = t.f(r, 0) * P(o, c);
-      ALIDADE_UNROLL for (int k = 1; k < n; ++k) fp[r][c] += t.f(r, k) * P(o + k, c);
+      fp[r][c] = t.f(r, 0) * P(O, c);
+      ALIDADE_UNROLL for (int k = 1; k < N; ++k) fp[r][c] += t.f(r, k) * P(O + k, c);
     }
   }
-  ALIDADE_UNROLL for (int r = 0; r < n; ++r) {
+  ALIDADE_UNROLL for (int r = 0; r < N; ++r) {
     ALIDADE_UNROLL for (int c = 0; c < kTangent; ++c) {
-      if (c < o || c >= o + n) P(o + r, c) = fp[r][c];
+      if (c < O || c >= O + N) P(O + r, c) = fp[r][c];
     }
     ALIDADE_UNROLL for (int c = 0; c <= r; ++c) {
       double sum = t.q(r, c);
-      ALIDADE_UNROLL for (int k = 0; k < n; ++k) sum += fp[r][o + k] * t.f(c, k);
-      P(o + r, o + c) = sum;
+      ALIDADE_UNROLL for (int k = 0; k < N; ++k) sum += fp[r][O + k] * t.f(c, k);
+      P(O + r, O + c) = sum;
     }
   }
 }
@@ -255,12 +271,12 @@ StaticOutcome StaticEkf<Motions...>::Update(const Model& sensor, const double* z
 }
 
 template <class... Motions>
-template <int m>
-StaticOutcome StaticEkf<Motions...>::Correct(const Eigen::Matrix<double, kTangent, m>& pht,
-                                             const Eigen::Matrix<double, m, m>& s,
-                                             const Eigen::Matrix<double, m, 1>& r, double gate) {
-  Eigen::Matrix<double, kTangent, m> k;  // K = P H' S^-1
-  if constexpr (m == 1) {
+template <int M>
+StaticOutcome StaticEkf<Motions...>::Correct(const Eigen::Matrix<double, kTangent, M>& pht,
+                                             const Eigen::Matrix<double, M, M>& s,
+                                             const Eigen::Matrix<double, M, 1>& r, double gate) {
+  Eigen::Matrix<double, kTangent, M> k;  // K = P H' S^-1
+  if constexpr (M == 1) {
     if (!(s(0) > 0.0 && s(0) <= std::numeric_limits<double>::max())) {
       return StaticOutcome::kNotFinite;
     }
@@ -269,7 +285,7 @@ StaticOutcome StaticEkf<Motions...>::Correct(const Eigen::Matrix<double, kTangen
     if (!std::isfinite(nis)) return StaticOutcome::kNotFinite;
     if (!(nis <= gate)) return StaticOutcome::kGated;
   } else {
-    const Eigen::LLT<Eigen::Matrix<double, m, m>> llt(s);
+    const Eigen::LLT<Eigen::Matrix<double, M, M>> llt(s);
     if (!s.allFinite() || llt.info() != Eigen::Success) return StaticOutcome::kNotFinite;
     const double nis = llt.matrixL().solve(r).squaredNorm();
     if (!std::isfinite(nis)) return StaticOutcome::kNotFinite;
@@ -277,14 +293,14 @@ StaticOutcome StaticEkf<Motions...>::Correct(const Eigen::Matrix<double, kTangen
     k = llt.solve(pht.transpose()).transpose();
   }
   const Eigen::Matrix<double, kTangent, 1> dx = k.lazyProduct(r);
-  Move(dx.data());
   ALIDADE_UNROLL for (int i = 0; i < kTangent; ++i) {
     ALIDADE_UNROLL for (int j = 0; j <= i; ++j) {
       double sum = k(i, 0) * pht(j, 0);
-      ALIDADE_UNROLL for (int c = 1; c < m; ++c) sum += k(i, c) * pht(j, c);
+      ALIDADE_UNROLL for (int c = 1; c < M; ++c) sum += k(i, c) * pht(j, c);
       p_(i, j) -= sum;
     }
   }
+  Move(dx.data());
   return StaticOutcome::kAccepted;
 }
 

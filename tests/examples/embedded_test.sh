@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+#
+# tests/examples/embedded_test.sh COMPILER INCLUDE...
+#
+# Compiles examples/09_static_depth, and each shipped model by itself, with COMPILER as C++17 without
+# exceptions and RTTI, and fails where the example would allocate or throw. INCLUDE: folders of the
+# libraries, Eigen. Exit code 77 where there is no such compiler.
+set -euo pipefail
+compiler=$1
+shift
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+
+if ! command -v "$compiler" >/dev/null; then
+  echo "skipped: no $compiler"
+  exit 77
+fi
+flags=(-std=c++17 -O2 -fno-exceptions -fno-rtti -Wall -Wextra -Wpedantic -Werror -Wno-psabi
+  -Icore/include -I.)
+for include in "$@"; do flags+=(-isystem "$include"); done
+object=$(mktemp --suffix .o)
+trap 'rm -f "$object"' EXIT
+
+for header in motion_models/*.h sensors/*.h; do
+  printf '#include "%s"\n' alidade/static_ekf.h "$header" |
+    "$compiler" "${flags[@]}" -fsyntax-only -x c++ -
+done
+"$compiler" "${flags[@]}" -c examples/09_static_depth/main.cc -o "$object"
+# -print-prog-name may be a bare name, which the path then finds.
+undefined=$("$("$compiler" -print-prog-name=nm)" -uC "$object")
+if grep -E 'operator (new|delete)|alloc|__cxa_[^a]|_Unwind|typeinfo' <<<"$undefined"; then
+  echo "error: the lines above are of memory or exceptions"
+  exit 1
+fi
+echo "$("$compiler" -dumpmachine): compiled"

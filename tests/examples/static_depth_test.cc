@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// examples/09_static_depth against the engine, on the same numbers.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <memory>
+
+#include "alidade/ekf.h"
+#include "alidade/run.h"
+#include "examples/09_static_depth/measurements.h"
+
+namespace alidade {
+namespace {
+
+using static_depth::kRows;
+using static_depth::kStep;
+
+Config Example05() {
+  return Config::FromFile(ALIDADE_SOURCE_DIR "/examples/05_depth_principled/config.yaml");
+}
+
+TEST(StaticDepth, ItsNumbersAreThoseOfExample05) {
+  const Config config = Example05();
+  const PluginHost host;
+  const std::unique_ptr<Source> source = std::move(BuildExperiment(config, host).source);
+  Frame frame;
+  for (const static_depth::Row& row : kRows) {
+    ASSERT_TRUE(source->Next(frame));
+    double disparity = 0.0, inverse_scale = 0.0;
+    for (const Measurement& m : frame.measurements) {
+      const std::string& stream = source->streams()[static_cast<std::size_t>(m.stream)].name;
+      if (stream == "disparity") disparity = m.values[0];
+      if (stream == "inverse_scale") inverse_scale = m.values[0];
+    }
+    EXPECT_NEAR(row.disparity_px, disparity, 0.00501);
+    EXPECT_NEAR(row.inverse_scale, inverse_scale, 0.0000501);
+  }
+}
+
+TEST(StaticDepth, PrintsWhatTheEngineEstimates) {
+  const Config config = Example05();
+  const PluginHost host;
+  const System system = BuildSystem(config.root(), host, {});
+  EkfOptions options;
+  options.gate = 0.9999;
+  options.fuse = Fuse::kPerMeasurement;
+  Ekf engine(system, options, {{"disparity", 1}, {"inverse_scale", 1}});
+  std::FILE* printed = ::popen(ALIDADE_BINARY_DIR "/bin/example_static_depth", "r");
+  ASSERT_NE(printed, nullptr);
+  char line[128];
+  ASSERT_NE(std::fgets(line, sizeof(line), printed), nullptr);  // names of the columns
+  int used = 0, k = 0;
+  for (const static_depth::Row& row : kRows) {
+    Frame frame;
+    frame.stamp = StampFromSeconds(kStep * k);
+    frame.measurements = {{frame.stamp, 1, -1, {row.inverse_scale}, {}}};
+    if (row.disparity_px > 0.0) {
+      frame.measurements.push_back({frame.stamp, 0, -1, {row.disparity_px}, {}});
+    }
+    for (const MeasurementReport& m : engine.Process(frame).measurements()) {
+      used += m.outcome == Outcome::kAccepted ? 1 : 0;
+    }
+    if (k++ % 5 != 0) continue;
+    double t = 0.0, depth = 0.0, sigma = 0.0;
+    ASSERT_NE(std::fgets(line, sizeof(line), printed), nullptr);
+    ASSERT_EQ(std::sscanf(line, "%lf %lf %lf", &t, &depth, &sigma), 3) << line;
+    constexpr double kPrinted = 5.01e-7;  // six digits
+    EXPECT_NEAR(t, Seconds(frame.stamp), 5e-4);
+    EXPECT_NEAR(depth, engine.state().values()[0], kPrinted);
+    EXPECT_NEAR(sigma, std::sqrt(engine.state().covariance().Variance(0)), kPrinted);
+  }
+  int rows = 0, accepted = 0;
+  double rmse_mm = 0.0;
+  ASSERT_NE(std::fgets(line, sizeof(line), printed), nullptr);
+  ASSERT_EQ(
+      std::sscanf(line, "%d rows, %d measurements used, rmse %lf", &rows, &accepted, &rmse_mm), 3);
+  EXPECT_EQ(rows, k);
+  EXPECT_EQ(accepted, used);
+  EXPECT_LT(rmse_mm, 2.5);  // example 05: 2.05 over all of the series
+  EXPECT_EQ(::pclose(printed), 0);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -16,13 +16,15 @@ constexpr const char* kFooter = R"(Examples:
   alidade sweep config.yaml --runs 200             seeds 1 to 200, all processors
   alidade sweep config.yaml --runs 200 --first-seed 1001 -o runs/test
   alidade sweep config.yaml --runs 10000 --shard 3/16 -o runs/share-03
+  alidade sweep config.yaml --runs 200 --vary sensors.stereo.sigma_px=0.5,1,2
 
-The folder gets sweep.json, runs.csv and table.md. The number of jobs does not change a byte of
+The folder gets sweep.json, runs.csv and table.md; with --vary, sweep.csv and a figure too. The number of jobs does not change a byte of
 them. Exit code 1: some runs failed; 75: stopped by a signal, with what was complete written.)";
 
 struct Arguments {
   Input input;
   std::string folder;
+  std::string vary;
   SweepOptions options;
   bool force = false, quiet = false;
 };
@@ -61,32 +63,75 @@ bool ReportFailures(const SweepResult& result) {
   return failed > 0;
 }
 
+void TellStopped(std::size_t done, std::int64_t runs) {
+  PrintNote("stopped after " + std::to_string(done) + " of " + std::to_string(runs) + " runs");
+}
+
+/// What both kinds of sweep start from.
+struct Task {
+  const Arguments& arguments;
+  const Config& config;
+  const PluginHost& host;
+  const SweepOptions& options;
+  const std::filesystem::path& path;
+  Progress& progress;
+};
+
+void TellWritten(const Task& task, const std::string& table,
+                 const std::vector<std::string>& names) {
+  if (task.arguments.quiet) return;
+  std::string text = table + "\nwrote " + task.path.string() + '\n';
+  for (const std::string& name : names) text += "  " + (task.path / name).string() + '\n';
+  Print(text);
+}
+
+ExitCode SweepSeeds(const Task& task) {
+  SweepFolder folder(task.path, task.arguments.force);
+  const SweepResult result = Sweep(task.config, task.host, task.options);
+  task.progress.Clear();
+  const bool failed = ReportFailures(result);
+  if (result.stopped) TellStopped(result.done.size(), result.runs);
+  folder.Write(result, task.config);
+  TellWritten(task, SweepTable(result), {"table.md", "sweep.json", "runs.csv"});
+  if (result.stopped) return ExitCode::kStopped;
+  return failed ? ExitCode::kFound : ExitCode::kOk;
+}
+
+ExitCode SweepValues(const Task& task) {
+  const Variation variation = Variation::FromText(task.arguments.vary);
+  SweepFolder folder(task.path, task.arguments.force);
+  const VariedSweep sweep = SweepOver(task.config, task.host, task.options, variation);
+  task.progress.Clear();
+  bool failed = false;
+  std::size_t done = 0;
+  for (const SweepResult& result : sweep.results) {
+    failed = ReportFailures(result) || failed;
+    done += result.done.size();
+  }
+  const auto values = static_cast<std::int64_t>(variation.values.size());
+  if (sweep.stopped()) TellStopped(done, values * sweep.results.front().runs);
+  const std::string note = folder.Write(sweep, task.config, StopRequested);
+  std::vector<std::string> names = {"table.md", "sweep.csv", "sweep.json", "runs.csv"};
+  if (note.empty()) names.insert(names.begin(), "figures/vary.svg");
+  TellWritten(task, SweepTable(sweep), names);
+  if (!note.empty() && !task.arguments.quiet) PrintNote("no figure drawn: " + note);
+  if (sweep.stopped()) return ExitCode::kStopped;
+  return failed ? ExitCode::kFound : ExitCode::kOk;
+}
+
 ExitCode RunSweep(const Arguments& arguments) {
   const Config config = arguments.input.Load();
   const std::filesystem::path path =
       OutputFolder(arguments.folder, config, arguments.input, "sweep-");
   const PluginHost host = arguments.input.Host(config);
-  SweepFolder folder(path, arguments.force);
 
   StopOnSignals();
   Progress progress("runs", arguments.quiet);
   SweepOptions options = arguments.options;
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
-  const SweepResult result = Sweep(config, host, options);
-  progress.Clear();
-  const bool failed = ReportFailures(result);
-  if (result.stopped) {
-    PrintNote("stopped after " + std::to_string(result.done.size()) + " of " +
-              std::to_string(result.runs) + " runs");
-  }
-  folder.Write(result, config);
-  if (!arguments.quiet) {
-    Print(SweepTable(result) + "\nwrote " + path.string() + "\n  " + (path / "table.md").string() +
-          "\n  " + (path / "sweep.json").string() + "\n  " + (path / "runs.csv").string() + '\n');
-  }
-  if (result.stopped) return ExitCode::kStopped;
-  return failed ? ExitCode::kFound : ExitCode::kOk;
+  const Task task{arguments, config, host, options, path, progress};
+  return arguments.vary.empty() ? SweepSeeds(task) : SweepValues(task);
 }
 
 }  // namespace
@@ -112,6 +157,11 @@ void AddSweep(CLI::App& program, Action& action) {
   command
       .add_option_function<std::string>("--shard", read_shard, "do share i of n of the seeds only")
       ->option_text("i/n");
+  command
+      .add_option("--vary", arguments->vary,
+                  "run all seeds with each of these values of a key, and compare")
+      ->option_text("KEY=v1,v2,...")
+      ->check(IsNamed);
   AddOutput(command, arguments->folder,
             "folder; default: the config's `output:`, or sweep-NAME, in runs/");
   command.add_flag("--force", arguments->force, "replace the folder if it is there");

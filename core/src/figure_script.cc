@@ -81,6 +81,11 @@ FigureScript::FigureScript(std::string name, std::string title, Stamp first, Sta
       last_(last),
       span_s_(Seconds(last) - Seconds(first)) {}
 
+FigureScript::FigureScript(std::string name, std::string title, std::string x_label)
+    : FigureScript(std::move(name), std::move(title), Stamp{0}, Stamp{0}) {
+  x_label_ = std::move(x_label);
+}
+
 void FigureScript::EndPanel() {
   if (!plot_.empty()) body_ += "plot " + plot_ + "\n";
   plot_.clear();
@@ -126,6 +131,21 @@ void FigureScript::Quartiles(std::string_view name, std::string_view file,
   body_.append(expression).append(") name ").append(GnuplotQuoted(name)).append(" nooutput\n");
 }
 
+/// Its settings; and its label.
+std::string FigureScript::TimeAxis(std::string& label) const {
+  // Stamps that count from 1970 would leave no room for what differs.
+  const Stamp second = 1'000'000'000;
+  const bool far = std::abs(first_ / second) > 100'000 && span_s_ < std::abs(Seconds(first_));
+  const Stamp origin = far ? first_ / second : 0;
+  std::string first, last;
+  AppendSeconds(first, first_ - origin * second);
+  AppendSeconds(last, last_ - origin * second);
+  label = "t" + (origin == 0 ? "" : " - " + std::to_string(origin)) + " [s]";
+  std::string text = "t0 = " + std::to_string(origin) + ".0\n";
+  if (span_s_ > 0.0) text += "set xrange [" + first + ':' + last + "]\n";
+  return text;
+}
+
 std::string FigureScript::Text() const {
   // A panel is as high as its key, which would go on beyond the right edge.
   const int height = std::max(170, 60 + 18 * most_keys_);
@@ -142,18 +162,10 @@ std::string FigureScript::Text() const {
   text += "set output png ? 'figures/" + name_ + ".png' : 'figures/" + name_ + ".svg'\n";
   text += "set multiplot layout " + std::to_string(panels_) + ",1 title " + GnuplotQuoted(title_) +
           " noenhanced\n";
-  // Stamps that count from 1970 would leave no room for what differs.
-  const Stamp second = 1'000'000'000;
-  const bool far = std::abs(first_ / second) > 100'000 && span_s_ < std::abs(Seconds(first_));
-  const Stamp origin = far ? first_ / second : 0;
-  std::string first, last;
-  AppendSeconds(first, first_ - origin * second);
-  AppendSeconds(last, last_ - origin * second);
-  text += "t0 = " + std::to_string(origin) + ".0\n";
-  if (span_s_ > 0.0) text += "set xrange [" + first + ':' + last + "]\n";
+  std::string label = x_label_;
+  if (label.empty()) text += TimeAxis(label);
   text += body_;
-  text += "set xlabel 't" + (origin == 0 ? "" : " - " + std::to_string(origin)) +
-          " [s]' offset 0,0.5\nset bmargin 2.9\n";
+  text += "set xlabel " + GnuplotQuoted(label) + " offset 0,0.5 noenhanced\nset bmargin 2.9\n";
   if (!plot_.empty()) text += "plot " + plot_ + "\n";
   return text + "\nunset multiplot\nset output\n";
 }

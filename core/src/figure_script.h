@@ -17,8 +17,8 @@ struct FigureFile {
   int kinds = 1;
 };
 
-/// A gnuplot script that draws panels, one above the other over the same time axis, from the csv
-/// files of a run folder into `figures/NAME.svg` (or .png). It is kept in the folder, so it is
+/// A gnuplot script that draws panels, one above the other over the same axis, from the csv files
+/// of a run or sweep folder into `figures/NAME.svg` (or .png). It is kept in the folder, so it is
 /// written to be read and changed.
 class FigureScript {
  public:
@@ -27,6 +27,8 @@ class FigureScript {
 
   /// All panels show the time from `first` to `last`.
   FigureScript(std::string name, std::string title, Stamp first, Stamp last);
+  /// All panels are over something else than time.
+  FigureScript(std::string name, std::string title, std::string x_label);
 
   /// Starts the next panel.
   void Panel(std::string_view title, std::string_view y_label);
@@ -49,8 +51,10 @@ class FigureScript {
 
  private:
   void EndPanel();
+  std::string TimeAxis(std::string& label) const;
 
   std::string name_, title_, body_, plot_;
+  std::string x_label_;  ///< "": time
   Stamp first_, last_;
   double span_s_;
   int panels_ = 0;

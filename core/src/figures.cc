@@ -317,9 +317,10 @@ std::vector<Plan> PlanFigures(const RecordedRun& run) {
   return plans;
 }
 
-/// Draws `figures/NAME`, which half drawn is none.
-GnuplotResult Draw(const RunFolder& folder, const std::string& name,
-                   const std::vector<std::string>& arguments, const DrawingLimits& limits) {
+}  // namespace
+
+GnuplotResult DrawFigure(const RunFolder& folder, const std::string& name,
+                         const std::vector<std::string>& arguments, const DrawingLimits& limits) {
   const std::filesystem::path figure = folder.partial() / "figures" / name;
   const GnuplotResult result = RunGnuplot(folder.partial(), arguments, limits);
   std::error_code ignored;
@@ -331,24 +332,6 @@ GnuplotResult Draw(const RunFolder& folder, const std::string& name,
   return result;
 }
 
-/// Why no more is drawn, or "".
-std::string Obstacle(GnuplotResult::End end) {
-  switch (end) {
-    case GnuplotResult::End::kMissing:
-      return "gnuplot is not installed";
-    case GnuplotResult::End::kStopped:
-      return "the drawing was stopped";
-    case GnuplotResult::End::kTimeUp:
-      return "gnuplot took too long";
-    case GnuplotResult::End::kDrawn:
-    case GnuplotResult::End::kFailed:
-      break;
-  }
-  return "";
-}
-
-}  // namespace
-
 Figures DrawFigures(const RunFolder& folder, const RecordedRun& run, const DrawingLimits& limits) {
   using End = GnuplotResult::End;
   Figures figures;
@@ -358,7 +341,7 @@ Figures DrawFigures(const RunFolder& folder, const RecordedRun& run, const Drawi
   std::string why;
   for (const Plan& plan : plans) {
     const std::string& name = plan.script.name();
-    const GnuplotResult result = Draw(folder, name + ".svg", {file(plan)}, limits);
+    const GnuplotResult result = DrawFigure(folder, name + ".svg", {file(plan)}, limits);
     if (const std::string obstacle = Obstacle(result.end); !obstacle.empty()) {
       why = obstacle;
       break;
@@ -370,7 +353,7 @@ Figures DrawFigures(const RunFolder& folder, const RecordedRun& run, const Drawi
     figures.drawn.push_back({name, plan.script.title(), plan.estimator});
     if (name != "measurements") continue;
     figures.has_png =
-        Draw(folder, name + ".png", {"-e", "png=1", file(plan)}, limits).end == End::kDrawn;
+        DrawFigure(folder, name + ".png", {"-e", "png=1", file(plan)}, limits).end == End::kDrawn;
   }
   if (!why.empty()) {
     figures.note = std::to_string(figures.drawn.size()) + " of " + std::to_string(plans.size()) +

@@ -112,4 +112,19 @@ GnuplotResult RunGnuplot(const std::filesystem::path& folder,
   return result;
 }
 
+std::string Obstacle(GnuplotResult::End end) {
+  switch (end) {
+    case GnuplotResult::End::kMissing:
+      return "gnuplot is not installed";
+    case GnuplotResult::End::kStopped:
+      return "the drawing was stopped";
+    case GnuplotResult::End::kTimeUp:
+      return "gnuplot took too long";
+    case GnuplotResult::End::kDrawn:
+    case GnuplotResult::End::kFailed:
+      break;
+  }
+  return "";
+}
+
 }  // namespace alidade::internal

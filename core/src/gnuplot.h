@@ -26,4 +26,7 @@ struct GnuplotResult {
 GnuplotResult RunGnuplot(const std::filesystem::path& folder,
                          const std::vector<std::string>& arguments, const DrawingLimits& limits);
 
+/// Why no more is drawn after such an end, or "".
+std::string Obstacle(GnuplotResult::End end);
+
 }  // namespace alidade::internal

@@ -7,6 +7,7 @@
 #include "json.h"
 #include "names.h"
 #include "run_folder.h"
+#include "sweep_vary_files.h"
 #include "text_table.h"
 
 namespace alidade {
@@ -24,6 +25,21 @@ struct SweepFolder::Impl {
 };
 
 namespace {
+
+/// A sweep, and the value of the varied key that it is of, "" where none is varied.
+struct Part {
+  const SweepResult* result;
+  std::string value;
+};
+using Parts = std::vector<Part>;
+
+Parts PartsOf(const VariedSweep& sweep) {
+  Parts parts;
+  for (const SweepResult& result : sweep.results) {
+    parts.push_back({&result, sweep.variation.values[parts.size()]});
+  }
+  return parts;
+}
 
 /// Runs that came to their end.
 std::int64_t CountWhole(const SweepResult& result) {
@@ -73,12 +89,7 @@ std::string Markdown(const SweepResult& result) {
   return text;
 }
 
-std::string SweepJson(const SweepResult& result) {
-  Json json;
-  json.Object();
-  json.Key("runs").Integer(result.runs);
-  json.Key("runs_used").Integer(CountWhole(result));
-  json.Key("first_seed").Integer(static_cast<std::int64_t>(result.first_seed));
+void AppendEstimators(Json& json, const SweepResult& result) {
   json.Key("estimators").Object();
   for (const SweepSummary& summary : Summarise(result)) {
     json.Key(summary.name).Object();
@@ -96,58 +107,103 @@ std::string SweepJson(const SweepResult& result) {
     json.End();
   }
   json.End();
+}
+
+std::string SweepJson(const SweepResult& result) {
+  Json json;
+  json.Object();
+  json.Key("runs").Integer(result.runs);
+  json.Key("runs_used").Integer(CountWhole(result));
+  json.Key("first_seed").Integer(static_cast<std::int64_t>(result.first_seed));
+  AppendEstimators(json, result);
+  json.End();
+  return json.text();
+}
+
+std::string SweepJson(const VariedSweep& sweep) {
+  Json json;
+  json.Object();
+  json.Key("runs").Integer(sweep.results.front().runs);
+  json.Key("first_seed").Integer(static_cast<std::int64_t>(sweep.results.front().first_seed));
+  json.Key("vary").Text(sweep.variation.key);
+  json.Key("values").Array();
+  for (const Part& part : PartsOf(sweep)) {
+    json.Object();
+    json.Key("value").Text(part.value);
+    json.Key("runs_used").Integer(CountWhole(*part.result));
+    AppendEstimators(json, *part.result);
+    json.End();
+  }
+  json.End();
   json.End();
   return json.text();
 }
 
 /// Keys that any run has, in the order of a comparison.
-RunResult AllKeys(const SweepResult& result) {
+RunResult AllKeys(const Parts& parts) {
   RunResult all;
   EstimatorResult& keys = all.estimators.emplace_back();
-  for (const SweepRun& run : result.done) {
-    for (const EstimatorResult& one : run.estimators) {
-      keys.metrics.insert(one.metrics.begin(), one.metrics.end());
-      keys.counts.insert(one.counts.begin(), one.counts.end());
+  for (const Part& part : parts) {
+    for (const SweepRun& run : part.result->done) {
+      for (const EstimatorResult& one : run.estimators) {
+        keys.metrics.insert(one.metrics.begin(), one.metrics.end());
+        keys.counts.insert(one.counts.begin(), one.counts.end());
+      }
     }
   }
   return all;
 }
 
-void WriteRuns(const RunFolder& folder, const SweepResult& result) {
-  const RunResult all = AllKeys(result);
+/// `header`, below the varied key where there is one.
+std::vector<std::string> Header(const std::string& key, std::vector<std::string> header) {
+  if (!key.empty()) header.insert(header.begin(), key);
+  return header;
+}
+
+void WriteRuns(const RunFolder& folder, const Parts& parts, const std::string& key) {
+  const RunResult all = AllKeys(parts);
   const std::vector<std::string> metrics = internal::OrderedMetrics(all);
   const std::vector<std::string> counts = internal::OrderedCounts(all);
-  std::vector<std::string> header = {"seed", "estimator", "diverged"};
+  std::vector<std::string> header = Header(key, {"seed", "estimator", "diverged"});
   header.insert(header.end(), metrics.begin(), metrics.end());
   header.insert(header.end(), counts.begin(), counts.end());
   CsvFile csv(folder, "runs.csv", header);
-  for (const SweepRun& run : result.done) {
-    for (const EstimatorResult& one : run.estimators) {
-      if (!run.Uses(one) && !one.diverged) continue;
-      csv.Integer(static_cast<std::int64_t>(run.seed)).Text(one.name);
-      csv.Text(one.diverged ? "true" : "false");
-      for (const std::string& key : metrics) {
-        const auto found = one.metrics.find(key);
-        found == one.metrics.end() ? csv.Empty() : csv.Number(found->second);
+  const auto write_run = [&](const Part& part, const SweepRun& run, const EstimatorResult& one) {
+    if (!key.empty()) csv.Text(part.value);
+    csv.Integer(static_cast<std::int64_t>(run.seed)).Text(one.name);
+    csv.Text(one.diverged ? "true" : "false");
+    for (const std::string& metric : metrics) {
+      const auto found = one.metrics.find(metric);
+      found == one.metrics.end() ? csv.Empty() : csv.Number(found->second);
+    }
+    for (const std::string& count : counts) {
+      const auto found = one.counts.find(count);
+      csv.Integer(found == one.counts.end() ? 0 : found->second);
+    }
+    csv.EndRow();
+  };
+  for (const Part& part : parts) {
+    for (const SweepRun& run : part.result->done) {
+      for (const EstimatorResult& one : run.estimators) {
+        if (run.Uses(one) || one.diverged) write_run(part, run, one);
       }
-      for (const std::string& key : counts) {
-        const auto found = one.counts.find(key);
-        csv.Integer(found == one.counts.end() ? 0 : found->second);
-      }
-      csv.EndRow();
     }
   }
   csv.Close();
 }
 
-void WriteFailures(const RunFolder& folder, const SweepResult& result) {
+void WriteFailures(const RunFolder& folder, const Parts& parts, const std::string& key) {
   const auto failed = [](const SweepRun& run) { return run.status == RunStatus::kFailed; };
-  if (std::none_of(result.done.begin(), result.done.end(), failed)) return;
-  CsvFile csv(folder, "failures.csv", {"seed", "exit_code", "reason"});
-  for (const SweepRun& run : result.done) {
-    if (!failed(run)) continue;
-    csv.Integer(static_cast<std::int64_t>(run.seed)).Integer(static_cast<int>(run.code));
-    csv.Text(run.reason).EndRow();
+  const auto any = [&](const Part& part) { return std::ranges::any_of(part.result->done, failed); };
+  if (std::ranges::none_of(parts, any)) return;
+  CsvFile csv(folder, "failures.csv", Header(key, {"seed", "exit_code", "reason"}));
+  for (const Part& part : parts) {
+    for (const SweepRun& run : part.result->done) {
+      if (!failed(run)) continue;
+      if (!key.empty()) csv.Text(part.value);
+      csv.Integer(static_cast<std::int64_t>(run.seed)).Integer(static_cast<int>(run.code));
+      csv.Text(run.reason).EndRow();
+    }
   }
   csv.Close();
 }
@@ -168,10 +224,26 @@ void SweepFolder::Write(const SweepResult& result, const Config& config) {
   const RunFolder& folder = impl_->folder;
   folder.Write("config.resolved.yaml", config.ToYaml());
   folder.Write("sweep.json", SweepJson(result));
-  WriteRuns(folder, result);
-  WriteFailures(folder, result);
+  const Parts parts = {{&result, ""}};
+  WriteRuns(folder, parts, "");
+  WriteFailures(folder, parts, "");
   folder.Write("table.md", Markdown(result));
   impl_->folder.Commit();
+}
+
+std::string SweepFolder::Write(const VariedSweep& sweep, const Config& config,
+                               const std::function<bool()>& stop) {
+  const RunFolder& folder = impl_->folder;
+  const Parts parts = PartsOf(sweep);
+  folder.Write("config.resolved.yaml", config.ToYaml());
+  folder.Write("sweep.json", SweepJson(sweep));
+  internal::WriteSweepCsv(folder, sweep);
+  WriteRuns(folder, parts, sweep.variation.key);
+  WriteFailures(folder, parts, sweep.variation.key);
+  folder.Write("table.md", internal::VariedMarkdown(sweep));
+  const std::string note = internal::DrawVariation(folder, sweep, stop);
+  impl_->folder.Commit();
+  return note;
 }
 
 }  // namespace alidade

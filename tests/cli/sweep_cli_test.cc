@@ -137,6 +137,89 @@ TEST_F(SweepCli, ReplacesItsFolderOnlyByForce) {
   EXPECT_EQ(Call({"sweep", "config.yaml", "--runs", "1", "--force"}).code, 0);
 }
 
+TEST_F(SweepCli, EachValueOfAKeyIsSweptAsIfItWereSet) {
+  // Without a gate all values count the same outcomes, so that they have the same columns.
+  const std::string no_gate = "estimators.ekf.gate=1";
+  const Outcome varied =
+      Call({"sweep", "config.yaml", "--runs", "3", "--first-seed", "5", "-o", "varied", "--vary",
+            "sensors.stereo.sigma_px=0.5,2", "--set", no_gate});
+  ASSERT_EQ(varied.code, 0) << varied.err;
+  EXPECT_TRUE(Contains(varied.out, "ekf, by sensors.stereo.sigma_px\n")) << varied.out;
+  EXPECT_TRUE(Contains(varied.out, "\n0.5    0 of 3  ")) << varied.out;
+  const Config summary = Json("varied/sweep.json");
+  EXPECT_EQ(summary.root().At("vary").Text(), "sensors.stereo.sigma_px");
+  const std::vector<Node> values = summary.root().At("values").Items();
+  ASSERT_EQ(values.size(), 2u);
+  std::string rows;
+  for (std::size_t v = 0; v < 2; ++v) {
+    const std::string value = v == 0 ? "0.5" : "2", folder = "set-" + value;
+    const Outcome set =
+        Call({"sweep", "config.yaml", "--runs", "3", "--first-seed", "5", "-o", folder, "--set",
+              "sensors.stereo.sigma_px=" + value, "--set", no_gate});
+    ASSERT_EQ(set.code, 0) << set.err;
+    EXPECT_EQ(values[v].At("value").Text(), value);
+    EXPECT_EQ(values[v].At("runs_used").Number(), 3);
+    const auto rmse = [](const Node& of) {
+      const Node metrics = of.At("estimators").At("ekf").At("metrics");
+      return metrics.At("rmse:target.depth").At("mean").Number();
+    };
+    EXPECT_EQ(rmse(values[v]), rmse(Json(folder + "/sweep.json").root()));
+    std::istringstream lines(Rows(Read(folder + "/runs.csv")));
+    for (std::string line; std::getline(lines, line);) rows += value + ',' + line + '\n';
+  }
+  EXPECT_EQ(Rows(Read("varied/runs.csv")), rows);
+  const std::string table = Read("varied/sweep.csv");
+  EXPECT_TRUE(table.starts_with("sensors.stereo.sigma_px,ekf.used,ekf.diverged,ekf.mean:rmse:"));
+  EXPECT_TRUE(Contains(table, "\n0.5,3,0,")) << table;
+  EXPECT_TRUE(Contains(table, "\n2,3,0,")) << table;
+}
+
+TEST_F(SweepCli, ValuesMayBeMapsAndTheirFigureIsDrawn) {
+  const Outcome varied = Call({"sweep", "config.yaml", "--runs", "2", "-o", "out", "--vary",
+                               "estimators.ekf.lockout={after: 5, action: none},{after: 6}"});
+  ASSERT_EQ(varied.code, 0) << varied.err;
+  EXPECT_EQ(Json("out/sweep.json").root().At("values").Items().size(), 2u);
+  const bool drawn = Exists("out/figures/vary.svg");
+  EXPECT_EQ(drawn, !Contains(varied.err, "no figure drawn: gnuplot is not installed"))
+      << varied.err;
+  if (!drawn) GTEST_SKIP() << "gnuplot is not installed";
+  const std::string figure = Read("out/figures/vary.svg");
+  EXPECT_TRUE(Contains(figure, "rmse target.depth: mean, 5 % to 95 %")) << figure.substr(0, 2000);
+  EXPECT_TRUE(Contains(figure, "after: 5, action: none")) << "the axis has the values";
+}
+
+TEST_F(SweepCli, RefusesWhatCannotBeVaried) {
+  const std::vector<std::pair<std::string, std::string>> wrong = {
+      {"source.noise", "error: --vary: 'source.noise' varies no key; expected KEY=v1,v2,..."},
+      {"=1,2", "'=1,2' varies no key"},
+      {"a.b=1,,2", "'a.b=1,,2' lacks a value"},
+      {"a.b=", "'a.b=' lacks a value"},
+      {"a.b=[1,2", "leaves a bracket or quote open"},
+      {"a.b=1,2,1", "has the value '1' twice"}};
+  for (const auto& [text, words] : wrong) {
+    const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "1", "--vary", text});
+    EXPECT_EQ(sweep.code, 2) << text;
+    EXPECT_TRUE(Contains(sweep.err, words)) << sweep.err;
+  }
+  const std::vector<std::pair<std::string, std::string>> unknown = {
+      {"sensors.stereo.sigma_pix=1,2",
+       "error: --vary sensors.stereo.sigma_pix: unknown key; did "
+       "you mean 'sigma_px'?"},
+      {"sensors.sterio.sigma_px=1,2",
+       "error: --vary sensors.sterio.sigma_px: no 'sensors.sterio' "
+       "in the config; expected a key of a map that is there; did "
+       "you mean 'stereo'?"},
+      {"sensors.stereo.sigma_px=1,-2", "error: --vary sensors.stereo.sigma_px: "},
+      {"source.seed=1,2", "error: --vary source.seed: every value is run with the same seeds"}};
+  for (const auto& [text, words] : unknown) {
+    const Outcome sweep =
+        Call({"sweep", "config.yaml", "--runs", "1", "-o", "out", "--vary", text});
+    EXPECT_EQ(sweep.code, 78) << text;
+    EXPECT_TRUE(Contains(sweep.err, words)) << sweep.err;
+    EXPECT_FALSE(Exists("out"));
+  }
+}
+
 TEST_F(SweepCli, StopsAtASignalWithTheRunsThatAreComplete) {
   // Two runs come to their end in this time, on this machine and in this build.
   const auto start = std::chrono::steady_clock::now();

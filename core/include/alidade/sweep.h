@@ -50,6 +50,30 @@ struct SweepResult {
 /// only. Errors: those of BuildExperiment, before the first run.
 SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptions& options);
 
+/// A key of the config, and the values that it takes one after the other.
+struct Variation {
+  std::string key;                  ///< dotted, as Config::Set takes it
+  std::vector<std::string> values;  ///< each read as YAML
+
+  /// Reads `KEY=v1,v2,v3`; commas inside brackets, braces and quotes belong to their value. Error:
+  /// kUsage where a key or a value is missing, a bracket is left open, or a value comes twice.
+  static Variation FromText(const std::string& text);
+};
+
+/// One sweep for each value, with the same seeds.
+struct VariedSweep {
+  Variation variation;
+  std::vector<SweepResult> results;  ///< by value; fewer where it was stopped
+
+  bool stopped() const { return !results.empty() && results.back().stopped; }
+};
+
+/// Sweeps over `config` with each value of the variation in turn; `options.progress` counts the
+/// runs of all. Errors: kBadConfig where the key is `source.seed`, or the map that it is in is not
+/// there; those of BuildExperiment for any of the values, before the first run.
+VariedSweep SweepOver(const Config& config, const PluginHost& host, const SweepOptions& options,
+                      const Variation& variation);
+
 /// Mean and quantiles of a metric.
 struct Spread {
   double mean = 0.0, p05 = 0.0, p50 = 0.0, p95 = 0.0;
@@ -72,9 +96,12 @@ std::vector<SweepSummary> Summarise(const SweepResult& result);
 
 /// Mean [p05, p50, p95] of the main metrics, one column for each estimator, for a terminal.
 std::string SweepTable(const SweepResult& result);
+/// For each estimator a table with a row for each value: means of the main metrics.
+std::string SweepTable(const VariedSweep& sweep);
 
 /// The folder of a sweep (docs/cli.md): sweep.json, runs.csv, table.md, config.resolved.yaml, and
-/// failures.csv where a run failed. It is there in full or not at all.
+/// failures.csv where a run failed; of a varied one sweep.csv and a figure too. It is there in full
+/// or not at all.
 class SweepFolder {
  public:
   /// Takes the name. Errors: kCannotCreate where it exists without `force`; kIo.
@@ -85,6 +112,9 @@ class SweepFolder {
 
   /// Errors: kCannotCreate, kIo.
   void Write(const SweepResult& result, const Config& config);
+  /// Returns why there is no figure, or "". `stop` ends the drawing. Errors: kCannotCreate, kIo.
+  std::string Write(const VariedSweep& sweep, const Config& config,
+                    const std::function<bool()>& stop = {});
 
  private:
   struct Impl;

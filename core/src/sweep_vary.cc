@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <optional>
+
+#include "alidade/sweep.h"
+#include "config_tree.h"
+
+namespace alidade {
+namespace {
+
+using internal::Quoted;
+
+constexpr const char* kOrigin = "--vary";
+
+[[noreturn]] void FailUsage(const std::string& what) {
+  throw Error(ExitCode::kUsage, ErrorLine(Place{kOrigin}, {}, what,
+                                          "KEY=v1,v2,... as in sensors.stereo.sigma_px=0.5,1,2"));
+}
+
+/// Splits at the commas outside of brackets, braces and quotes.
+std::vector<std::string> SplitValues(const std::string& text) {
+  std::vector<std::string> values(1);
+  int depth = 0;
+  char quote = '\0';
+  for (const char c : text) {
+    if (quote != '\0') {
+      if (c == quote) quote = '\0';
+    } else if (c == '\'' || c == '"') {
+      quote = c;
+    } else if (c == '[' || c == '{') {
+      ++depth;
+    } else if (c == ']' || c == '}') {
+      --depth;
+    } else if (c == ',' && depth == 0) {
+      values.emplace_back();
+      continue;
+    }
+    values.back() += c;
+  }
+  if (depth != 0 || quote != '\0') FailUsage(Quoted(text) + " leaves a bracket or quote open");
+  return values;
+}
+
+/// Refuses a key whose map is not there: written wrong, it would make a map that nobody wants.
+void CheckKey(const Config& config, const std::string& key) {
+  const Place place{kOrigin};
+  if (key == "source.seed") {
+    internal::FailAt(place, key, "every value is run with the same seeds",
+                     "another key; --first-seed and --runs for the seeds");
+  }
+  Node map = config.root();
+  std::size_t start = 0;
+  for (std::size_t dot = key.find('.'); dot != key.npos; dot = key.find('.', start)) {
+    const std::string name = key.substr(start, dot - start);
+    if (name.find('[') != name.npos || !map.is_map()) return;  // Config::Set tells
+    std::vector<std::string> names;
+    std::optional<Node> next;
+    for (const auto& [entry, node] : map.Entries()) {
+      names.push_back(entry);
+      if (entry == name) next = node;
+    }
+    if (!next) {
+      internal::FailAt(place, key, "no " + Quoted(key.substr(0, dot)) + " in the config",
+                       "a key of a map that is there", Nearest(name, names));
+    }
+    map = *next;
+    start = dot + 1;
+  }
+}
+
+/// A config of its own for each value.
+Config ConfigWith(const Config& config, const std::string& key, const std::string& value) {
+  Config copy = config.Merged(Config::FromText("{}", "sweep").root());
+  copy.Set(key, value, kOrigin);
+  return copy;
+}
+
+}  // namespace
+
+Variation Variation::FromText(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == text.npos || equals == 0) FailUsage(Quoted(text) + " varies no key");
+  Variation variation{text.substr(0, equals), SplitValues(text.substr(equals + 1))};
+  const std::vector<std::string>& values = variation.values;
+  for (auto value = values.begin(); value != values.end(); ++value) {
+    if (value->find_first_not_of(' ') == value->npos) FailUsage(Quoted(text) + " lacks a value");
+    if (std::find(values.begin(), value, *value) != value) {
+      FailUsage(Quoted(text) + " has the value " + Quoted(*value) + " twice");
+    }
+  }
+  return variation;
+}
+
+VariedSweep SweepOver(const Config& config, const PluginHost& host, const SweepOptions& options,
+                      const Variation& variation) {
+  ALIDADE_EXPECTS(!variation.values.empty());
+  CheckKey(ConfigWith(config, "alidade", "1"), variation.key);
+  for (const std::string& value : variation.values) {
+    BuildExperiment(ConfigWith(config, variation.key, value), host);
+  }
+  VariedSweep sweep{variation, {}};
+  SweepOptions each = options;
+  for (const std::string& value : variation.values) {
+    const auto before = static_cast<std::int64_t>(sweep.results.size());
+    if (options.progress) {
+      each.progress = [&options, before, &variation](std::int64_t done, std::int64_t total) {
+        const auto values = static_cast<std::int64_t>(variation.values.size());
+        options.progress(before * total + done, values * total);
+      };
+    }
+    sweep.results.push_back(Sweep(ConfigWith(config, variation.key, value), host, each));
+    if (sweep.stopped()) break;
+  }
+  return sweep;
+}
+
+}  // namespace alidade

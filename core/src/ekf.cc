@@ -121,6 +121,7 @@ const UpdateReport& Ekf::Process(const Frame& frame) {
     group_.push_back(&row);
   }
   Fuse(group_);
+  RepairCovariance();
   CountRejections();
   return report_;
 }

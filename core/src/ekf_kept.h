@@ -17,6 +17,7 @@ struct Ekf::Kept : Snapshot {
         out_of_domain(ekf.out_of_domain_),
         inflated(ekf.inflated_),
         warned(ekf.warned_),
+        repairs(ekf.repairs_),
         last_used(ekf.last_used_),
         diverged(ekf.diverged_),
         failed(ekf.failed_) {}
@@ -26,6 +27,7 @@ struct Ekf::Kept : Snapshot {
   std::vector<int> rejections;
   std::vector<char> out_of_domain, inflated;
   std::vector<bool> warned;
+  int repairs;
   decltype(last_used_) last_used;
   bool diverged, failed;
 };

@@ -13,6 +13,8 @@ EkfOptions ReadRecovering(Params& p) {
                                                   static_cast<int>(options.lockout)));
   options.lockout_after = p.Integer("lockout.after", "rejections of one sensor in a row", 1,
                                     1'000'000, options.lockout_after);
+  options.repairs = p.Integer("repairs", "of a covariance that lost its positive definiteness", 0,
+                              1'000'000, options.repairs);
   return options;
 }
 

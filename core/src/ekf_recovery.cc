@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "alidade/ekf.h"
+#include "square_root.h"
 
 namespace alidade {
 namespace {
@@ -101,6 +102,29 @@ Outcome Ekf::InitialiseBlock(Row& row) {
   if (!first_.empty()) FirstEstimate(id).clear();
   Bind();
   return Outcome::kInitialised;
+}
+
+/// After an update that left S not positive definite: where that is P's fault, makes P positive
+/// semi-definite; ends the filter where it needed that too often.
+void Ekf::RepairCovariance() {
+  constexpr double kRounding = 1e-12;
+  const auto is_not_pd = [this](const Row& row) { return EntryOf(row).outcome == Outcome::kNotPd; };
+  if (std::ranges::none_of(rows(), is_not_pd)) return;
+  Covariance& p = state_.covariance();
+  const internal::SquareRoot result = internal::SquareRootOf(p.Dense());
+  if (!(result.defect < -kRounding)) return;
+  char text[160];
+  std::snprintf(text, sizeof(text),
+                "the covariance is not positive semi-definite: a pivot is %.3g of its largest "
+                "variance",
+                result.defect);
+  if (repairs_ == options_.repairs) {
+    return GiveUp("not_pd", std::string(text) + ", after " + std::to_string(repairs_) + " repairs");
+  }
+  ++repairs_;
+  p.SetBlock(0, 0, result.root * result.root.transpose());
+  Note("repaired", std::string(text) + "; negative pivots count as zero (repair " +
+                       std::to_string(repairs_) + " of " + std::to_string(options_.repairs) + ")");
 }
 
 /// Counts rejections in a row for each sensor, and recovers one that is locked out.

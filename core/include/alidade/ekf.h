@@ -38,12 +38,13 @@ struct EkfOptions {
   JacobianAt jacobian = JacobianAt::kLatest;
   Lockout lockout = Lockout::kReset;
   int lockout_after = 20;  ///< consecutive rejections of one sensor
+  int repairs = 10;        ///< of a covariance that lost its positive definiteness; then it ends
   /// Longer gaps are stepped in equal parts of at most this, to whole ns, and at least 1 ns.
   double max_dt_s = std::numeric_limits<double>::infinity();
 
   /// Reads `gate`, `fuse` (`joint`, `per_sensor`, `per_measurement`), `jacobian` (`latest`,
-  /// `first_estimate`), `lockout` (`after`; `action`: `reset`, `inflate`, `none`) and `max_dt_s`
-  /// from an estimator's entry of the config; what is not there keeps its default.
+  /// `first_estimate`), `lockout` (`after`; `action`: `reset`, `inflate`, `none`), `repairs` and
+  /// `max_dt_s` from an estimator's entry of the config; what is not there keeps its default.
   /// Errors: kBadConfig.
   static EkfOptions FromNode(const Node& entry);
   /// What FromNode reads.
@@ -56,7 +57,9 @@ struct EkfOptions {
 /// robust loss on the sensor R / w(d) stands for R, d^2 = r' S^-1 r.
 ///
 /// An update is a transaction: what would leave the state not finite or not positive definite is
-/// rolled back and reported.
+/// rolled back and reported. Where S is not positive definite because P is not positive
+/// semi-definite, P is repaired (event `repaired`: negative pivots of its L D L' count as zero);
+/// after `repairs` of that the next ends the filter.
 class Ekf : public Estimator {
  public:
   /// `streams` are the source's, in the order of Measurement::stream.
@@ -186,6 +189,7 @@ class Ekf : public Estimator {
 
   void InitialiseFromMeasurements();
   Outcome InitialiseBlock(Row& row);
+  void RepairCovariance();
   void CountRejections();
   void Recover(Row& row);
   void ForgetMotionOf(BlockId id);
@@ -223,6 +227,7 @@ class Ekf : public Estimator {
   std::vector<char> out_of_domain_;     ///< since the last acceptance, by sensor
   std::vector<char> inflated_;          ///< since the last acceptance, by sensor
   std::vector<bool> warned_;            ///< of conditioning, by sensor
+  int repairs_ = 0;                     ///< of the covariance, so far
   /// The last accepted measurement, for the record of a failure.
   struct {
     int sensor = -1;

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The covariance of a filter goes wrong. The number of each fault is in the comment above its test.
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+#include "alidade/iekf.h"
+#include "support/recording.h"
+
+namespace alidade {
+namespace {
+
+using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
+
+/// z = x0 - x1 + n
+struct Difference : Sensor<Vec<1>, Vec<2>> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  double sigma;
+  explicit Difference(double s) : sigma(s) {}
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    z[0] = x[0] - x[1];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(sigma);
+  }
+};
+
+/// Two elements x with the covariance P, and their difference measured.
+System TwoElements(const Eigen::Matrix2d& p, double sigma) {
+  System system;
+  MotionBinding binding{"p", InProcessMotion(Constant<>(2), "constant"), {}};
+  binding.blocks.push_back(system.layout.Declare("p.x", "p", binding.model.blocks()[0]));
+  Prior prior;
+  prior.block = 0;
+  prior.mean = {1.0, 2.0};
+  prior.covariance = p;
+  system.priors.push_back(prior);
+  system.motions.push_back(binding);
+  AddSensor(system, "difference", InProcessSensor(Difference(sigma), "difference"), {"p.x"});
+  return system;
+}
+
+/// Eigenvalues 2.1 and -0.1; S = 1 - 2.2 + 1 + 0.01 < 0.
+Eigen::Matrix2d Indefinite() { return (Eigen::Matrix2d() << 1.0, 1.1, 1.1, 1.0).finished(); }
+
+bool HasEvent(const UpdateReport& report, const std::string& kind) {
+  return std::ranges::count(report.events, kind, &Event::kind) > 0;
+}
+
+// FAULTS 75
+TEST(LostPositiveDefiniteness, IsRepairedReportedAndTheFilterGoesOn) {
+  const System system = TwoElements(Indefinite(), 0.1);
+  for (const bool iterated : {false, true}) {
+    const auto filter = iterated ? std::make_unique<Iekf>(system, IekfOptions{}, StreamsOf(system))
+                                 : std::make_unique<Ekf>(system, EkfOptions{}, StreamsOf(system));
+    const UpdateReport& report = filter->Process(FrameAt(0.0, {{0, -1.0}}));
+    EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotPd);
+    EXPECT_TRUE(HasEvent(report, "repaired"));
+    EXPECT_EQ(filter->state().values(), (std::vector<double>{1.0, 2.0}));
+    // The nearest that its factors give: l = 1.1, pivots 1 and -0.21, which counts as zero.
+    const Eigen::MatrixXd p = filter->state().covariance().Dense();
+    const Eigen::Matrix2d expected = (Eigen::Matrix2d() << 1.0, 1.1, 1.1, 1.21).finished();
+    EXPECT_TRUE(p.isApprox(expected, 1e-12)) << p;
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(p);
+    EXPECT_GE(eigen.eigenvalues().minCoeff(), -1e-12);
+    const UpdateReport& next = filter->Process(FrameAt(0.0, {{0, -1.0}}));
+    EXPECT_EQ(next.measurements()[0].outcome, Outcome::kAccepted);
+    EXPECT_FALSE(HasEvent(next, "repaired"));
+    EXPECT_FALSE(filter->failed());
+  }
+}
+
+// FAULTS 75: the budget.
+TEST(LostPositiveDefiniteness, EndsTheFilterOnceItsRepairsAreUsedUp) {
+  const System system = TwoElements(Indefinite(), 0.1);
+  EkfOptions options;
+  options.repairs = 3;
+  Ekf ekf(system, options, StreamsOf(system));
+  for (int k = 0; k <= options.repairs; ++k) {
+    const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, -1.0}}));
+    EXPECT_EQ(HasEvent(report, "repaired"), k < options.repairs) << k;
+    EXPECT_EQ(ekf.failed(), k == options.repairs) << k;
+    // Spoilt again, from where it is.
+    const auto kept = ekf.Save();
+    kept->state.covariance().SetBlock(0, 0, Indefinite());
+    ekf.Restore(*kept);
+  }
+}
+
+// FAULTS 75: the exit code, and the others go on.
+TEST(LostPositiveDefiniteness, BeyondItsRepairsIsExitCode79) {
+  Experiment experiment = MakeExperiment();
+  NamedEstimator named;
+  named.name = "indefinite";
+  named.system = TwoElements(Indefinite(), 0.1);
+  named.system.sensors[0].stream = "inverse_scale";
+  EkfOptions options;
+  options.repairs = 0;
+  named.estimator = std::make_unique<Ekf>(named.system, options, experiment.source->streams());
+  experiment.estimators.push_back(std::move(named));
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.code, ExitCode::kDiverged);
+  EXPECT_NE(result.reason.find("estimator 'indefinite' at t = 0.000000 s: the covariance is not "
+                               "positive semi-definite"),
+            std::string::npos)
+      << result.reason;
+  EXPECT_NE(result.reason.find("after 0 repairs; last good state"), std::string::npos)
+      << result.reason;
+  EXPECT_EQ(result.frames, 60);
+  EXPECT_TRUE(result.estimators.back().diverged);
+  EXPECT_FALSE(result.estimators.front().diverged);
+}
+
+// FAULTS 79: S = H P H' + R = 0, though P is as it should be.
+TEST(SingularInnovation, IsReportedAndChangesNothing) {
+  const Eigen::Matrix2d ones = Eigen::Matrix2d::Ones();  // x0 - x1 is known exactly
+  const System system = TwoElements(ones, 0.0);
+  Ekf ekf(system, {}, StreamsOf(system));
+  const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, -0.5}}));
+  EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotPd);
+  ASSERT_TRUE(HasEvent(report, "not_pd"));
+  const auto event = std::ranges::find(report.events, "not_pd", &Event::kind);
+  EXPECT_EQ(event->text, "sensor 'difference': S is not positive definite");
+  EXPECT_FALSE(HasEvent(report, "repaired")) << "P is not to blame";
+  EXPECT_EQ(ekf.state().values(), (std::vector<double>{1.0, 2.0}));
+  EXPECT_EQ(ekf.state().covariance().Dense(), Eigen::MatrixXd(ones));
+  EXPECT_FALSE(ekf.failed());
+  EXPECT_FALSE(ekf.diverged());
+}
+
+// FAULTS 79: the same measurement twice without noise; one by one each S is as it should be.
+TEST(SingularInnovation, OfTwoStackedMeasurementsRollsBoth) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 1.0, 2.0}});
+  AddSensor(system, "one", InProcessSensor(Linear(1.0, 0.0), "linear"), {"p.x"});
+  AddSensor(system, "two", InProcessSensor(Linear(1.0, 0.0), "linear"), {"p.x"});
+  Ekf ekf(system, {}, StreamsOf(system));
+  const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 3.0}, {1, 4.0}}));
+  for (const MeasurementReport& entry : report.measurements()) {
+    EXPECT_EQ(entry.outcome, Outcome::kNotPd);
+  }
+  EXPECT_TRUE(HasEvent(report, "not_pd"));
+  EXPECT_EQ(ValueOf(ekf.state(), "p.x"), 1.0);
+  EXPECT_EQ(CovarianceOf(ekf.state(), "p.x", "p.x"), 4.0);
+  EXPECT_FALSE(ekf.failed());
+}
+
+}  // namespace
+}  // namespace alidade

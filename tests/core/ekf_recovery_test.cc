@@ -37,6 +37,7 @@ struct Broken : Sensor<Vec<1>, Vec<1>> {
   }
 };
 
+// FAULTS 76
 TEST(Ekf, AnUpdateThatIsNotFiniteIsRolledBackAndReported) {
   System system;
   AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 7.0, 1.0}});
@@ -62,6 +63,7 @@ struct Exploding : Motion<1, Vec<1>> {
   void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
 };
 
+// FAULTS 76
 TEST(Ekf, AStepThatIsNotFiniteEndsWithTheLastGoodStateAndMeasurement) {
   System system;
   AddMotion(system, "p", InProcessMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
@@ -91,6 +93,7 @@ TEST(Ekf, AFailedStepMovesNothing) {
   EXPECT_EQ(ekf.state().covariance().Dense(), p);
 }
 
+// FAULTS 38
 TEST(Ekf, AGapOfTooManyPartsIsGivenUpNotSkipped) {
   EkfOptions options;
   options.max_dt_s = 1e-9;
@@ -123,6 +126,7 @@ TEST(Ekf, NumbersThatAreNoneDoNotLockASensorOut) {
   EXPECT_EQ(ekf.state().covariance().Dense(), p);
 }
 
+// FAULTS 77
 TEST(Ekf, ASensorThatStaysOutOfItsDomainInflatesOnceAndNotWhatItHolds) {
   System system = DepthFilter();
   system.sensors.erase(system.sensors.begin());
@@ -143,6 +147,7 @@ TEST(Ekf, AMeasurementThatIsNotFiniteIsNotUsed) {
   EXPECT_EQ(ValueOf(ekf.state(), "target.depth"), 0.35);
 }
 
+// FAULTS 77
 TEST(Ekf, ALockedOutSensorResetsItsBlockFromTheMeasurement) {
   System system = DepthFilter();
   system.priors[0].mean = {3.0};

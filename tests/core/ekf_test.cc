@@ -224,6 +224,7 @@ TEST(Ekf, FramesOfThePastAreStale) {
   EXPECT_EQ(ekf.state().values(), x);
 }
 
+// FAULTS 38
 TEST(Ekf, AGapIsSteppedInEqualParts) {
   EkfOptions options;
   options.max_dt_s = 0.3;

@@ -107,6 +107,7 @@ System FarArcTangent() {
   return system;
 }
 
+// FAULTS 81: the best is kept
 TEST(Iekf, HalvesAStepThatWouldRaiseTheCost) {
   // From 3 a whole Gauss-Newton step leads to -9.5, from there to 116, and so on.
   const System system = FarArcTangent();
@@ -116,6 +117,7 @@ TEST(Iekf, HalvesAStepThatWouldRaiseTheCost) {
   EXPECT_NEAR(ValueOf(iekf.state(), "p.x"), 0.0, 1e-6);
 }
 
+// FAULTS 81
 TEST(Iekf, AnUpdateThatDoesNotConvergeKeepsTheLastIterateAndSaysSo) {
   const System system = FarArcTangent();
   IekfOptions options;

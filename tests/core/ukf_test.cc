@@ -226,6 +226,7 @@ struct First : Sensor<Vec<1>, Vec<2>> {
   }
 };
 
+// FAULTS 82
 TEST(Ukf, ACovarianceWithoutASquareRootIsRepairedAndThatIsSaid) {
   System system;
   MotionBinding binding{"p", InProcessMotion(Constant<>(2), "constant"), {}};

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Several runs, and plugins, in one process. The number of each fault is in the comment above its
+// test.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <optional>
+
+#include "alidade/run.h"
+#include "support/program.h"
+
+namespace alidade {
+namespace {
+
+using testing::kDepthConfig;
+
+/// The last state of every estimator, and all their metrics.
+struct Result {
+  std::vector<double> values, covariance;
+  std::map<std::string, double> metrics;
+  bool operator==(const Result&) const = default;
+};
+
+Result Finish(Experiment& experiment) {
+  const RunResult run = Run(experiment, {});
+  EXPECT_EQ(run.status, RunStatus::kOk) << run.reason;
+  Result result;
+  for (const NamedEstimator& named : experiment.estimators) {
+    const State& state = named.estimator->state();
+    result.values.insert(result.values.end(), state.values().begin(), state.values().end());
+    const Eigen::MatrixXd p = state.covariance().Dense();
+    result.covariance.insert(result.covariance.end(), p.data(), p.data() + p.size());
+  }
+  result.metrics = run.estimators.at(0).metrics;
+  return result;
+}
+
+Experiment Build(const PluginHost& host, const std::string& text = kDepthConfig) {
+  return BuildExperiment(Config::FromText(text, "config.yaml"), host);
+}
+
+// FAULTS 72
+TEST(OneProcess, TwoRunsAgreeWhateverRanBetween) {
+  const PluginHost host(std::vector<std::filesystem::path>{});
+  Experiment first = Build(host);
+  Experiment waiting = Build(host);  // made now, run last
+  const Result expected = Finish(first);
+  EXPECT_FALSE(expected.metrics.empty());
+  std::string other = kDepthConfig;
+  other.replace(other.find("sigma_px: 1.0"), 13, "sigma_px: 7.0");
+  Experiment between = Build(host, other);
+  EXPECT_NE(Finish(between), expected);
+  Experiment second = Build(host);
+  EXPECT_EQ(Finish(second), expected);
+  const PluginHost fresh(std::vector<std::filesystem::path>{});
+  Experiment third = Build(fresh);
+  EXPECT_EQ(Finish(third), expected);
+  EXPECT_EQ(Finish(waiting), expected);
+}
+
+// FAULTS 71: models, sources and estimators outlive the host that made them, in any order.
+TEST(OneProcess, WhatAHostMadeOutlivesIt) {
+  std::optional<PluginHost> host(std::in_place, std::vector<std::filesystem::path>{});
+  Experiment kept = Build(*host);
+  std::optional<Experiment> other(Build(*host));
+  const Config entry = Config::FromText(
+      "{model: stereo_disparity, focal_px: 400, baseline_m: 0.065, sigma_px: 1}", "entry.yaml");
+  const SensorModel sensor = host->CreateSensor("stereo_disparity", entry.root());
+  host.reset();
+  other.reset();
+  const double depth = 0.5;
+  const double* const role = &depth;
+  double disparity = 0.0;
+  EXPECT_EQ(sensor.Predict(&role, &disparity), Status::kOk);
+  EXPECT_DOUBLE_EQ(disparity, 52.0);
+  EXPECT_FALSE(Finish(kept).metrics.empty());
+}
+
+using OneProcessDeathTest = ::testing::Test;
+
+// FAULTS 71: the program ends while experiments, hosts and models are alive.
+TEST(OneProcessDeathTest, ExitsWithLiveObjects) {
+  ::testing::FLAGS_gtest_death_test_style = "threadsafe";
+  EXPECT_EXIT(
+      {
+        static const PluginHost host(std::vector<std::filesystem::path>{});
+        static Experiment finished = Build(host);
+        static Experiment untouched = Build(host);
+        Finish(finished);
+        std::exit(0);
+      },
+      ::testing::ExitedWithCode(0), "");
+  // Destroyed the other way round: the host first, what it made at the very end.
+  EXPECT_EXIT(
+      {
+        static std::optional<Experiment> experiment;
+        static std::optional<PluginHost> host;
+        host.emplace(std::vector<std::filesystem::path>{});
+        experiment.emplace(Build(*host));
+        Finish(*experiment);
+        std::exit(0);
+      },
+      ::testing::ExitedWithCode(0), "");
+}
+
+}  // namespace
+}  // namespace alidade

@@ -24,11 +24,16 @@ constexpr bool kHasCeres = true;
 
 using Settings = std::vector<std::pair<std::string, std::string>>;
 
+/// The plugins of the build, looked at once for all runs: no example names others.
+const PluginHost& Host() {
+  static const PluginHost host(std::vector<std::filesystem::path>{});
+  return host;
+}
+
 RunResult RunExample(const std::string& name, const Settings& settings) {
   Config config = Config::FromFile(kExamples / name / "config.yaml");
   for (const auto& [key, value] : settings) config.Set(key, value, "--set");
-  const PluginHost host(PluginPaths(config));
-  Experiment experiment = BuildExperiment(config, host);
+  Experiment experiment = BuildExperiment(config, Host());
   return Run(experiment, {});
 }
 
@@ -159,6 +164,105 @@ TEST(Examples, TheIteratedFilterStartsFromFarAway) {
   for (const char* key : {"nees.cov95:target@blind", "nees.cov95:target@seeing"}) {
     EXPECT_GE(iekf[key], 0.95) << key;
     EXPECT_LE(iekf[key], 0.995) << key;
+  }
+}
+
+/// rms over the series of the difference of two estimates of a block.
+double RmsApart(const std::string& name, int seed, const std::string& block) {
+  Config config = Config::FromFile(kExamples / name / "config.yaml");
+  config.Set("source.seed", std::to_string(seed), "--set");
+  Experiment experiment = BuildExperiment(config, Host());
+  double squares = 0.0;
+  int count = 0;
+  for (Frame frame; experiment.source->Next(frame); ++count) {
+    std::vector<double> values;
+    for (const NamedEstimator& named : experiment.estimators) {
+      named.estimator->Process(frame);
+      const State& state = named.estimator->state();
+      values.push_back(*state.value(state.layout().Find(block)));
+    }
+    squares += std::pow(values.at(0) - values.at(1), 2);
+  }
+  return std::sqrt(squares / count);
+}
+
+// Experiment 5, "the order probably does not matter". A prototype: 0.026 mm rms apart.
+TEST(Examples, TheOrderOfTheTwoUpdatesHardlyMatters) {
+  const auto means = Sweep("17_depth_update_order");
+  const Means &stereo = means.at("stereo_first"), &scale = means.at("scale_first");
+  EXPECT_EQ(stereo.diverged, 0);
+  EXPECT_EQ(scale.diverged, 0);
+  EXPECT_GE(stereo["rmse:target.depth"], 0.0019);
+  EXPECT_LE(stereo["rmse:target.depth"], 0.0025);
+  EXPECT_NEAR(scale["rmse:target.depth"] / stereo["rmse:target.depth"], 1.0, 0.005);
+  EXPECT_NEAR(scale["rmse:target.depth_rate"] / stereo["rmse:target.depth_rate"], 1.0, 0.005);
+  double apart = 0.0;
+  for (int seed = 1001; seed <= 1200; ++seed) {
+    apart += RmsApart("17_depth_update_order", seed, "target.depth") / 200.0;
+  }
+  EXPECT_LE(apart, 3e-5);
+  EXPECT_GE(apart, 1e-5) << "the second update is linearised at what the first one left";
+}
+
+/// sigma of the depth of example 18 after `updates`, by the scalar form of the Riccati equation:
+/// x' = A x + G a, z = Z / Z0 + n, from P = 100 I.
+double RiccatiSigma(double r, int updates) {
+  const double t = 0.033, h = 1.0 / 0.3;
+  double p = 100.0, c = 0.0, v = 100.0;  // var Z, cov(Z, rate), var rate
+  for (int k = 0; k < updates; ++k) {
+    if (k > 0) {
+      p += 2.0 * t * c + t * t * v + std::pow(t, 4) / 4.0;
+      c += t * v + std::pow(t, 3) / 2.0;
+      v += t * t;
+    }
+    const double s = h * h * p + r;
+    v -= h * h * c * c / s;
+    c *= r / s;
+    p *= r / s;
+  }
+  return std::sqrt(p);
+}
+
+// Experiment 4.3 over decades of R2: lag against noise, and both ends fail.
+TEST(Examples, LagAgainstNoiseHasAnOptimumAndTwoEndsThatFail) {
+  const auto with = [](const char* r) {
+    return Sweep("18_depth_noise_lag", {{"sensors.scale.variance", r}}).at("ekf");
+  };
+  const Means best = with("5e-5");
+  EXPECT_EQ(best.diverged, 0);
+  EXPECT_LE(best["rmse:target.depth"], 0.0023);
+  for (const char* off : {"5e-6", "5e-4"}) {
+    const Means ekf = with(off);
+    EXPECT_GT(ekf["rmse:target.depth"], best["rmse:target.depth"]) << off;
+    EXPECT_GT(ekf["rmse:target.depth_rate"], best["rmse:target.depth_rate"]) << off;
+  }
+  double lag = best["lag_ms:target.depth"];
+  for (const char* r : {"5e-4", "5e-3", "5e-2", "0.5", "5"}) {
+    const Means ekf = with(r);
+    EXPECT_EQ(ekf.diverged, 0) << r;
+    EXPECT_GT(ekf["lag_ms:target.depth"], 1.4 * lag) << r;
+    lag = ekf["lag_ms:target.depth"];
+  }
+  // Believed a thousand times too much: errors beyond 10 sigma without end.
+  EXPECT_EQ(with("5e-9").diverged, 200);
+  // Worse than to say 0.3 m all the time, 0.1 m / sqrt(2) rms.
+  EXPECT_GT(with("5000")["rmse:target.depth"], 0.0707);
+}
+
+TEST(Examples, TheGainSettlesWithinTheSeriesUpToR50) {
+  const int updates = 152, many = 200'000;
+  for (const char* r : {"5e-5", "0.5", "50", "500", "50000"}) {
+    Config config = Config::FromFile(kExamples / "18_depth_noise_lag" / "config.yaml");
+    config.Set("sensors.scale.variance", r, "--set");
+    Experiment experiment = BuildExperiment(config, Host());
+    ASSERT_EQ(alidade::Run(experiment, {}).status, RunStatus::kOk);
+    const State& state = experiment.estimators.at(0).estimator->state();
+    const Block& depth = state.layout()[state.layout().Find("target.depth")];
+    const double sigma = std::sqrt(state.covariance().Variance(depth.tangent_offset));
+    const double variance = std::strtod(r, nullptr);
+    EXPECT_NEAR(sigma, RiccatiSigma(variance, updates), 1e-6 * sigma) << r;
+    const bool settled = sigma < 1.05 * RiccatiSigma(variance, many);
+    EXPECT_EQ(settled, variance <= 50.0) << r;
   }
 }
 

@@ -198,7 +198,7 @@ void ImpliedPanel(FigureScript& script, const RecordedRun& run, const RecordedIm
     script.Curve({"implied.csv", run.implied_rows, Kinds(run.implied.size())},
                  OverTime(Where(Is("sensor", one.sensor), Column(one.block))) + " with points ls " +
                      std::to_string(style),
-                 "measured: " + one.sensor);
+                 "measured: " + one.sensor + (one.rest_at_truth ? ", rest true" : ""));
     style = style == 15 ? 13 : style + 1;
   }
   for (std::size_t i = 0; i < std::min(run.estimators.size(), kMaxCurves); ++i) {
@@ -235,6 +235,10 @@ void StreamPanel(FigureScript& script, const RecordedRun& run, const RecordedStr
   script.Set("set yrange [low - margin(low, high) : high + margin(low, high)]");
   script.Curve({"measurements.csv", run.measurement_rows, Kinds(run.streams.size())},
                OverTime(value) + " with points ls 13", "measured");
+  if (stream.expected_rows > 0) {
+    script.LineOf({"expected.csv", run.expected_rows, Kinds(run.streams.size())},
+                  Is("stream", stream.name), Column('v' + std::to_string(element)), 11, "truth");
+  }
   if (estimator == nullptr) return;
   script.LineOf(Innovations(*estimator), Is("sensor", sensor->name),
                 Column('h' + std::to_string(element)), 1, "predicted: " + estimator->name);

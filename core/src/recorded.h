@@ -49,13 +49,16 @@ struct RecordedStream {
   std::string name;
   int size = 1;
   std::int64_t rows = 0;
+  std::int64_t expected_rows = 0;  ///< in expected.csv
 };
 
-/// A block whose value each measurement of a sensor implies by itself, in `implied.csv`.
+/// A block whose value each measurement of a sensor implies, in `implied.csv`: by itself, or with
+/// the sensor's other roles at truth.
 struct RecordedImplied {
   std::string sensor;
   std::string block;  ///< the column too
   std::string unit;
+  bool rest_at_truth = false;
   std::size_t cell = 0;  ///< of a row, behind time and sensor
   std::int64_t rows = 0;
 };
@@ -65,7 +68,7 @@ struct RecordedRun {
   std::vector<RecordedStream> streams;
   std::vector<RecordedImplied> implied;
   Stamp first = 0, last = 0;
-  std::int64_t truth_rows = 0, measurement_rows = 0, implied_rows = 0;
+  std::int64_t truth_rows = 0, measurement_rows = 0, implied_rows = 0, expected_rows = 0;
 };
 
 }  // namespace alidade::internal

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -10,8 +11,9 @@
 
 namespace alidade::internal {
 
-/// What the source gave, frame by frame: `measurements.csv`, `truth.csv` where it knows truths, and
-/// `implied.csv` where a sensor can be inverted without knowing anything else.
+/// What the source gave, frame by frame: `measurements.csv`, `truth.csv` where it knows truths,
+/// `expected.csv` where these tell what a sensor measures, and `implied.csv` where a sensor can be
+/// inverted without knowing anything else, or knowing truth.
 class SourceFiles {
  public:
   SourceFiles(const RunFolder& folder, const Experiment& experiment);
@@ -29,18 +31,27 @@ class SourceFiles {
     int stream;
     SensorModel model;
     RecordedImplied recorded;
+    std::vector<int> truths;  ///< by role; empty: inverted by itself
+  };
+  /// The first sensor of a stream whose roles all have a truth.
+  struct Expectation {
+    SensorModel model;
+    std::vector<int> truths;
   };
 
   void FindInverses(const Experiment& experiment);
-  void AddImplied(const Measurement& measurement);
+  void AddExpected(const Frame& frame, const Measurement& measurement);
+  void AddImplied(const Frame& frame, const Measurement& measurement);
 
   std::vector<StreamInfo> streams_, truths_;
   std::vector<std::vector<std::string>> truth_columns_;
-  std::vector<std::int64_t> stream_rows_;  ///< in measurements.csv
+  std::vector<std::int64_t> stream_rows_;    ///< in measurements.csv
+  std::vector<std::int64_t> expected_rows_;  ///< in expected.csv, by stream
+  std::map<int, Expectation> expectations_;  ///< by stream
   std::vector<Inverse> inverses_;
   std::size_t width_ = 1, blocks_ = 0;
   Stamp first_ = kNoStamp, last_ = kNoStamp;
-  std::optional<CsvFile> measurements_, truth_, implied_;
+  std::optional<CsvFile> measurements_, truth_, expected_, implied_;
 };
 
 }  // namespace alidade::internal

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Where the program writes, and how it says what is wrong.
+#include <cmath>
+
 #include "alidade/config.h"
 #include "support/program.h"
 
@@ -104,6 +106,34 @@ TEST_F(OutputCli, ErrorsObeyNoControlCharacters) {
   const Outcome missing = Call({"run", "\x1b[31m.yaml"});
   EXPECT_EQ(missing.code, 66);
   EXPECT_TRUE(missing.err.starts_with("error: ?[31m.yaml: ")) << missing.err;
+}
+
+/// The number in `column` (from 0) of the row that starts with `start`.
+double Cell(const std::string& csv, const std::string& start, int column) {
+  std::istringstream row(csv.substr(csv.find('\n' + start) + 1));
+  std::string cell;
+  for (int i = 0; i <= column; ++i) std::getline(row, cell, ',');
+  return std::stod(cell);
+}
+
+TEST_F(OutputCli, MeasurementsStandBesideWhatTruthMakesOfThem) {
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "out"}).code, 0);
+  const std::string t = "0.330000000,";
+  const double depth = Cell(Read("out/truth.csv"), t, 1);
+  const double lambda = Cell(Read("out/truth.csv"), t, 3);
+  EXPECT_NEAR(depth, 0.3 + 0.1 * std::sin(2 * 3.14159265358979 * 0.4 * 0.33), 1e-12);
+  const std::string expected = Read("out/expected.csv"), implied = Read("out/implied.csv");
+  EXPECT_NEAR(Cell(expected, t + "inverse_scale", 2), lambda * depth, 1e-12);
+  EXPECT_NEAR(Cell(expected, t + "disparity,", 2), 26.0 / depth, 1e-9);
+  // Z0 / scale
+  const double s = Cell(Read("out/measurements.csv"), t + "inverse_scale,", 3);
+  EXPECT_NE(s, lambda * depth);
+  EXPECT_NEAR(Cell(implied, t + "scale,", 2), s / lambda, 1e-12);
+  const double d = Cell(Read("out/measurements.csv"), t + "disparity,", 3);
+  EXPECT_NEAR(Cell(implied, t + "stereo,", 2), 26.0 / d, 1e-12);
+  const std::string figure = Read("out/figures/measurements.gp");
+  EXPECT_TRUE(Contains(figure, "'measured: scale, rest true'")) << figure;
+  EXPECT_TRUE(Contains(figure, "'expected.csv'")) << figure;
 }
 
 TEST_F(OutputCli, SaysThatTheCurrentFolderIsGone) {

@@ -22,9 +22,9 @@ TEST(Recorder, WritesEveryFile) {
       (std::vector<std::string>{
           "alone/estimates.csv", "alone/events.csv", "alone/gains.csv", "alone/innovations.csv",
           "comparison.csv", "config.resolved.yaml", "ekf/estimates.csv", "ekf/events.csv",
-          "ekf/gains.csv", "ekf/innovations.csv", "files.txt", "implied.csv", "measurements.csv",
-          "report.html", "run.json", "timing.json", "truth.csv"}));
-  EXPECT_EQ(FilesIn(folder.path()).size(), 17u);  // nothing beside it
+          "ekf/gains.csv", "ekf/innovations.csv", "expected.csv", "files.txt", "implied.csv",
+          "measurements.csv", "report.html", "run.json", "timing.json", "truth.csv"}));
+  EXPECT_EQ(FilesIn(folder.path()).size(), 18u);  // nothing beside it
 }
 
 TEST(Recorder, EstimatesRoundTrip) {

@@ -81,6 +81,7 @@ void Ekf::Restore(const Snapshot& snapshot) {
   out_of_domain_ = kept.out_of_domain;
   inflated_ = kept.inflated;
   warned_ = kept.warned;
+  repairs_ = kept.repairs;
   last_used_ = kept.last_used;
   diverged_ = kept.diverged;
   failed_ = kept.failed;

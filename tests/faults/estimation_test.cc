@@ -93,6 +93,20 @@ TEST(LostPositiveDefiniteness, EndsTheFilterOnceItsRepairsAreUsedUp) {
   }
 }
 
+// FAULTS 75: a repair that is taken back, as for a late frame, does not count.
+TEST(LostPositiveDefiniteness, WhatIsTakenBackIsNotCounted) {
+  const System system = TwoElements(Indefinite(), 0.1);
+  EkfOptions options;
+  options.repairs = 1;
+  Ekf ekf(system, options, StreamsOf(system));
+  const auto before = ekf.Save();
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_TRUE(HasEvent(ekf.Process(FrameAt(0.0, {{0, -1.0}})), "repaired")) << k;
+    EXPECT_FALSE(ekf.failed());
+    ekf.Restore(*before);
+  }
+}
+
 // FAULTS 75: the exit code, and the others go on.
 TEST(LostPositiveDefiniteness, BeyondItsRepairsIsExitCode79) {
   Experiment experiment = MakeExperiment();

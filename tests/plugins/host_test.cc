@@ -147,11 +147,13 @@ TEST_F(HostTest, AFileWithoutFingerprintIsRefused) {
   ExpectRefused(Built("no_fingerprint"), {"has no alidade fingerprint"});
 }
 
+// FAULTS 53
 TEST_F(HostTest, AnotherAbiIsRefused) {
   ExpectRefused(Built("other_abi"),
                 {"built for plugin ABI 99.1", "this program has 0.1", "rebuild the plugin"});
 }
 
+// FAULTS 54
 TEST_F(HostTest, FastMathIsRefused) {
   ExpectRefused(Built("fast_math"), {"built with -ffast-math"});
 }
@@ -164,6 +166,7 @@ TEST_F(HostTest, AnotherBuildIsRefusedWithBothBuildsNamed) {
   ExpectRefused(Built("other_build"), {"of another build", "'0.0.9 other'", "expected '0.1.0 "});
 }
 
+// FAULTS 55
 TEST_F(HostTest, AMissingSymbolIsNamedAtLoad) {
   ExpectRefused(Built("undefined_symbol"), {"cannot be loaded", "a_function_nobody_defines"});
 }

@@ -30,6 +30,14 @@ std::int64_t CountWhole(const SweepResult& result) {
   return std::ranges::count(result.done, RunStatus::kOk, &SweepRun::status);
 }
 
+/// ReferenceText of each run that has a reference, as a line of its own behind an empty one.
+std::string ReferenceLine(const SweepResult& result) {
+  RunResult of_runs;
+  of_runs.reference = result.reference;
+  const std::string text = internal::ReferenceText(of_runs);
+  return text.empty() ? "" : '\n' + text + '\n';
+}
+
 /// A cell for each estimator. Each one stands as four in a comparison, so that its numbers share
 /// their unit and decimals with all others of the row.
 std::vector<ComparisonRow> TableRows(const std::vector<SweepSummary>& summaries) {
@@ -70,7 +78,7 @@ std::string Markdown(const SweepResult& result) {
   for (const ComparisonRow& row : TableRows(summaries)) {
     text += "| " + row.label + " | " + Join(row.cells, " | ") + " |\n";
   }
-  return text;
+  return text + ReferenceLine(result);
 }
 
 std::string SweepJson(const SweepResult& result) {
@@ -79,6 +87,7 @@ std::string SweepJson(const SweepResult& result) {
   json.Key("runs").Integer(result.runs);
   json.Key("runs_used").Integer(CountWhole(result));
   json.Key("first_seed").Integer(static_cast<std::int64_t>(result.first_seed));
+  json.Key("reference").Text(result.reference);
   json.Key("estimators").Object();
   for (const SweepSummary& summary : Summarise(result)) {
     json.Key(summary.name).Object();
@@ -156,7 +165,7 @@ void WriteFailures(const RunFolder& folder, const SweepResult& result) {
 
 std::string SweepTable(const SweepResult& result) {
   const std::vector<SweepSummary> summaries = Summarise(result);
-  return internal::EstimatorTable(NamesOf(summaries), TableRows(summaries));
+  return internal::EstimatorTable(NamesOf(summaries), TableRows(summaries)) + ReferenceLine(result);
 }
 
 SweepFolder::SweepFolder(const std::filesystem::path& folder, bool force)

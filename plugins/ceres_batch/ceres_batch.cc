@@ -16,6 +16,8 @@
 namespace alidade::ceres_batch {
 namespace {
 
+constexpr int kManyInputs = 1000;  // of which a solve takes seconds
+
 struct Options {
   enum class Data { kAll, kSoFar } data = Data::kAll;
   int max_iterations = 50;
@@ -47,6 +49,7 @@ class CeresBatch : public Estimator {
   const UpdateReport& Process(const Frame& frame) override {
     report_.Clear();
     const UpdateReport& filter = filter_.Process(frame);
+    const bool were_few = trajectory_.inputs() <= kManyInputs;
     if (!trajectory_.Add(frame, filter)) {
       failed_ = true;
       report_.events.push_back({frame.stamp, "batch", trajectory_.problem()});
@@ -54,6 +57,11 @@ class CeresBatch : public Estimator {
     }
     if (!filter_.failed()) filtered_.push_back(trajectory_.ValuesOf(filter_.state()));
     if (!offline()) SolveSoFar(frame.stamp);
+    if (were_few && trajectory_.inputs() > kManyInputs) {
+      report_.events.push_back({frame.stamp, "slow",
+                                "more than " + std::to_string(kManyInputs) +
+                                    " noise inputs: the time of a solve grows with their cube"});
+    }
     return report_;
   }
 

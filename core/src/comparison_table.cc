@@ -206,6 +206,13 @@ std::vector<ComparisonRow> ComparisonRows(const RunResult& result) {
   return rows;
 }
 
+std::string ReferenceText(const RunResult& result) {
+  if (!result.withheld.empty()) return result.withheld;
+  if (result.reference == "truth") return "";
+  return "errors are differences from estimator '" + result.reference +
+         "', an estimate itself: no coverage, no NEES";
+}
+
 std::string EstimatorTable(const std::vector<std::string>& names,
                            const std::vector<ComparisonRow>& rows) {
   constexpr std::size_t kLineWidth = 100, kGap = 2;
@@ -242,8 +249,10 @@ std::string EstimatorTable(const std::vector<std::string>& names,
 }  // namespace internal
 
 std::string ComparisonTable(const RunResult& result) {
+  const std::string reference = internal::ReferenceText(result);
   return internal::EstimatorTable(internal::NamesOf(result.estimators),
-                                  internal::ComparisonRows(result));
+                                  internal::ComparisonRows(result)) +
+         (reference.empty() ? "" : '\n' + reference + '\n');
 }
 
 }  // namespace alidade

@@ -24,6 +24,8 @@ struct ComparisonRow {
 std::vector<ComparisonRow> MetricRows(const RunResult& result);
 /// These, and whether it diverged.
 std::vector<ComparisonRow> ComparisonRows(const RunResult& result);
+/// What the metrics compare with, in words; "" where that is truth.
+std::string ReferenceText(const RunResult& result);
 /// Rows below the names of the estimators, aligned to the right. Estimators that do not fit beside
 /// the others in a line of 100 characters go into a table below.
 std::string EstimatorTable(const std::vector<std::string>& names,

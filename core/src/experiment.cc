@@ -97,8 +97,57 @@ void CheckOffered(const std::string& type, const PluginHost& host, const Node& n
                   "\n" + PluginPlaces(host));
 }
 
+/// Refuses `filter` where what it accepted does not tell what `named` is to see.
+void CheckAccepts(const NamedEstimator& filter, const NamedEstimator& named, const Node& by) {
+  const std::string quoted = '\'' + filter.name + '\'';
+  if (filter.estimator->offline()) {
+    by.Fail(quoted + " has its estimates at the end only", "a filter");
+  }
+  for (const SensorBinding& sensor : named.system.sensors) {
+    const int index = filter.system.FindSensor(sensor.name);
+    const auto& theirs = filter.system.sensors;
+    if (index < 0 || theirs[static_cast<std::size_t>(index)].stream != sensor.stream) {
+      by.Fail(
+          quoted + " does not use sensor '" + sensor.name + "' on stream '" + sensor.stream + "'",
+          "an estimator with the same sensors");
+    }
+    if (std::ranges::count(theirs, sensor.stream, &SensorBinding::stream) > 1) {
+      by.Fail("stream '" + sensor.stream + "' goes to several sensors of " + quoted +
+                  ": one may accept what another does not",
+              "a stream for each sensor");
+    }
+  }
+}
+
+/// Index of the estimator whose accepted measurements `named` is to see, as the key `use` says; -1:
+/// it sees all. `before` are those listed before it.
+int ReadUse(const Node& use, const NamedEstimator& named, const Node& estimators,
+            const std::vector<NamedEstimator>& before) {
+  if (!use.is_map()) {
+    if (use.Text() == "all") return -1;
+    use.Fail("not a choice of data: '" + use.Text() + "'", "all, or {accepted_by: NAME}");
+  }
+  const Node by = use.At("accepted_by", "use");
+  const std::string name = by.Text();
+  if (name == named.name) by.Fail("'" + name + "' is this estimator itself", "another one");
+  const auto found = std::ranges::find(before, name, &NamedEstimator::name);
+  if (found == before.end()) {
+    std::vector<std::string> known;
+    for (const auto& [other, entry] : estimators.Entries()) known.push_back(other);
+    if (std::ranges::find(known, name) != known.end()) {
+      by.Fail("'" + name + "' is listed after '" + named.name + "'",
+              "an estimator listed before, which has each frame first");
+    }
+    std::erase(known, named.name);
+    by.Fail("no estimator '" + name + "'", "a name from `estimators`", Nearest(name, known));
+  }
+  CheckAccepts(*found, named, by);
+  return static_cast<int>(found - before.begin());
+}
+
 NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const Config& config,
-                              const PluginHost& host, const std::vector<StreamInfo>& streams) {
+                              const PluginHost& host, const std::vector<StreamInfo>& streams,
+                              const std::vector<NamedEstimator>& before) {
   CheckName(name, entry);
   NamedEstimator named;
   named.name = name;
@@ -126,6 +175,8 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
     }
   }
   const std::vector<std::string> only = ReadSensorList(entry, own.root());
+  const auto use = entry.Find("use");
+  if (use && use->is_map()) use->Declare("accepted_by");
   entry.RejectUnread();
   named.system = BuildSystem(own.root(), host, only);
   if (of_core != nullptr) internal::RefuseUnsupported(*of_core, own.root(), named.system);
@@ -133,6 +184,7 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
     FindStream(own.root().At("sensors").At(sensor.name), sensor.model, streams);
   }
   named.estimator = make(named.system, streams);
+  if (use) named.accepted_by = ReadUse(*use, named, config.root().At("estimators"), before);
   return named;
 }
 
@@ -218,6 +270,21 @@ std::vector<int> RanksOf(const std::vector<StreamInfo>& streams, const System& s
   return ranks;
 }
 
+/// Index of the estimator that metrics compare with; -1: truth.
+int ReadReference(const Node& root, const std::vector<NamedEstimator>& estimators) {
+  const auto reference = root.Find("reference");
+  if (!reference || reference->Text() == "truth") return -1;
+  const std::string name = reference->Text();
+  const auto found = std::ranges::find(estimators, name, &NamedEstimator::name);
+  if (found == estimators.end()) {
+    std::vector<std::string> names = NamesOf(estimators);
+    const std::string expected = "truth, or an estimator: " + internal::Join(names);
+    names.emplace_back("truth");
+    reference->Fail("no estimator '" + name + "'", expected, Nearest(name, names));
+  }
+  return static_cast<int>(found - estimators.begin());
+}
+
 /// Refuses an estimator that cannot do what the run's order of time asks of it.
 void CheckCanRewind(const NamedEstimator& named, const Node& entry) {
   if (named.estimator->offline() || named.estimator->Save() != nullptr) return;
@@ -246,9 +313,6 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   for (const char* key : {"title", "output"}) {
     if (const auto text = root.Find(key)) static_cast<void>(text->Text());
   }
-  if (const auto reference = root.Find("reference")) {
-    static_cast<void>(reference->Choice({"truth"}));
-  }
 
   Experiment experiment;
   const Node source = root.At("source", "a run: where measurements come from");
@@ -270,7 +334,8 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   experiment.time.ranks = RanksOf(streams, whole);
   experiment.segments = ReadSegments(root, whole, streams);
   for (const auto& [name, entry] : root.At("estimators", "a run").Entries()) {
-    experiment.estimators.push_back(BuildEstimator(name, entry, config, host, streams));
+    experiment.estimators.push_back(
+        BuildEstimator(name, entry, config, host, streams, experiment.estimators));
     if (experiment.time.order == TimeOrder::kRewind) {
       CheckCanRewind(experiment.estimators.back(), entry);
     }
@@ -278,6 +343,7 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   if (experiment.estimators.empty()) {
     root.At("estimators").Fail("empty", "at least one estimator");
   }
+  experiment.reference = ReadReference(root, experiment.estimators);
   CheckTruths(source, experiment, whole);
   root.RejectUnread();
   return experiment;

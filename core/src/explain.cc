@@ -282,6 +282,9 @@ std::string Options(const Node& entry, const NamedEstimator& named) {
                                                                 : "none: a gap is one step"});
     AddOwnOptions(named.type, entry, rows);
   }
+  if (const auto use = entry.Find("use"); use && use->is_map()) {
+    rows.push_back({"use", "the measurements that " + use->At("accepted_by").Text() + " accepts"});
+  }
   rows.push_back({"on_divergence", named.on_divergence == OnDivergence::kFail
                                        ? "fail: the run ends with exit code 79"
                                        : "report: the run goes on"});

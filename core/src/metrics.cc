@@ -125,6 +125,8 @@ struct Metrics::Impl {
   void AddNees(const Owner& owner, std::size_t index, const std::vector<Sums*>& into,
                const State& state);
   void AddReport(const std::vector<Sums*>& into, const UpdateReport& report);
+  /// The sums over all stamps, and over the segments that a frame is in.
+  std::vector<Sums*> SumsOf(const std::vector<bool>& in_segment);
   void Write(const Sums& sums_of, std::map<std::string, double>& metrics) const;
 };
 
@@ -257,6 +259,15 @@ void Metrics::Impl::AddReport(const std::vector<Sums*>& into, const UpdateReport
   }
 }
 
+std::vector<Sums*> Metrics::Impl::SumsOf(const std::vector<bool>& in_segment) {
+  ALIDADE_EXPECTS(in_segment.size() + 1 == sums.size());
+  std::vector<Sums*> into = {&sums[0]};
+  for (std::size_t i = 0; i < in_segment.size(); ++i) {
+    if (in_segment[i]) into.push_back(&sums[i + 1]);
+  }
+  return into;
+}
+
 void Metrics::Impl::Write(const Sums& s, std::map<std::string, double>& metrics) const {
   for (std::size_t i = 0; i < tracked.size(); ++i) {
     const std::string key = tracked[i].name + s.suffix;
@@ -273,10 +284,10 @@ void Metrics::Impl::Write(const Sums& s, std::map<std::string, double>& metrics)
   }
 }
 
-Metrics::Metrics(const NamedEstimator& named, const Source& source,
+Metrics::Metrics(const NamedEstimator& named, const std::vector<StreamInfo>& truths,
                  const std::vector<Segment>& segments)
     : impl_(std::make_unique<Impl>()) {
-  impl_->Track(named.system, source.truths());
+  impl_->Track(named.system, truths);
   impl_->sensors = internal::NamesOf(named.system.sensors);
   impl_->count_of.resize(impl_->sensors.size());
   const auto add_sums = [&](std::string suffix) {
@@ -294,16 +305,21 @@ Metrics::Metrics(Metrics&&) noexcept = default;
 
 void Metrics::Add(const Frame& frame, const std::vector<bool>& in_segment, const State& state,
                   const UpdateReport& report) {
-  ALIDADE_EXPECTS(in_segment.size() + 1 == impl_->sums.size());
-  std::vector<Sums*> into = {&impl_->sums[0]};
-  for (std::size_t i = 0; i < in_segment.size(); ++i) {
-    if (in_segment[i]) into.push_back(&impl_->sums[i + 1]);
-  }
+  const std::vector<Sums*> into = impl_->SumsOf(in_segment);
   if (!report.stale) {
     impl_->AddErrors(frame, into, state);
     impl_->AddConsistency(frame.stamp, into, state);
   }
   impl_->AddReport(into, report);
+}
+
+void Metrics::AddReport(const std::vector<bool>& in_segment, const UpdateReport& report) {
+  impl_->AddReport(impl_->SumsOf(in_segment), report);
+}
+
+void Metrics::AddDifference(const Frame& frame, const std::vector<bool>& in_segment,
+                            const State& state) {
+  impl_->AddErrors(frame, impl_->SumsOf(in_segment), state);
 }
 
 const std::vector<Event>& Metrics::events() const { return impl_->events; }

@@ -7,6 +7,7 @@
 #include <tuple>
 #include <utility>
 
+#include "accepted.h"
 #include "text_table.h"
 
 namespace alidade::internal {
@@ -200,11 +201,19 @@ void FrameOrder::Replay(std::size_t from, bool is_newest) {
         passed.failed = true;
         passed.diverged = before->diverged;
       } else {
-        passed = Process(estimator, held_[i].frame);
+        const int by = experiment_.estimators[e].accepted_by;
+        passed = Process(estimator, by < 0 ? held_[i].frame : Accepted(held_[i], by));
       }
       before = &passed;
     }
   }
+}
+
+/// The frame as an estimator sees it that uses what estimator `by` accepted.
+Frame FrameOrder::Accepted(const Held& held, int by) const {
+  const auto index = static_cast<std::size_t>(by);
+  return AcceptedOf(held.frame, experiment_.source->streams(), experiment_.estimators[index].system,
+                    held.passed[index].report);
 }
 
 Passed FrameOrder::Process(Estimator& estimator, const Frame& frame) const {

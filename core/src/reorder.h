@@ -51,6 +51,7 @@ class FrameOrder {
   std::size_t Insert(Held&& arrived);
   void Merge(Held& held, Held&& arrived) const;
   void Replay(std::size_t from, bool is_newest);
+  Frame Accepted(const Held& held, int by) const;
   Passed Process(Estimator& estimator, const Frame& frame) const;
   bool IsBeyond(Stamp stamp) const;
   std::string Names(const Frame& frame) const;

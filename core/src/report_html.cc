@@ -92,8 +92,12 @@ std::string Comparison(const RunResult& result) {
     }
     html += "</tr>\n";
   }
+  html += "</table></div>\n";
+  if (const std::string reference = ReferenceText(result); !reference.empty()) {
+    html += Element("p", reference);
+  }
   return html +
-         "</table></div>\n<p class=\"soft\">NEES and NIS are divided by their degrees of freedom: "
+         "<p class=\"soft\">NEES and NIS are divided by their degrees of freedom: "
          "1 is consistent, more is too sure of itself. A positive lag is late.</p>\n";
 }
 

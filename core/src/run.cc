@@ -3,8 +3,10 @@
 
 #include <algorithm>
 
+#include "accepted.h"
 #include "alidade/metrics.h"
 #include "alidade/recorder.h"
+#include "reference.h"
 #include "reorder.h"
 #include "text_table.h"
 
@@ -51,11 +53,7 @@ bool InSegment(const Segment& segment, const Frame& frame) {
   return std::any_of(frame.measurements.begin(), frame.measurements.end(), seen) == segment.with;
 }
 
-/// A frame, and which segments it is in.
-struct Seen {
-  Frame frame;
-  std::vector<bool> in_segment;
-};
+using internal::Seen;
 
 /// One estimator on its way through a run.
 struct Running {
@@ -63,12 +61,21 @@ struct Running {
   int index = 0;  ///< in the experiment
   Metrics metrics;
   EstimatorResult result;
-  bool ended = false;     ///< it had nothing left to go on with
-  bool diverged = false;  ///< by a frame that was taken; not of offline estimators
+  bool ended = false;                  ///< it had nothing left to go on with
+  bool diverged = false;               ///< by a frame that was taken; not of offline estimators
+  const UpdateReport* last = nullptr;  ///< report of the last frame; null: it had ended before
+  bool waits = false;                  ///< metrics need the estimates of the reference
+  std::vector<internal::Estimate> estimates = {};  ///< where it waits
 
-  /// Puts an estimate into metrics and record.
-  void Take(const Seen& seen, const State& state, const UpdateReport& report, Recorder* recorder) {
-    metrics.Add(seen.frame, seen.in_segment, state, report);
+  /// Puts the estimate of frame k into metrics and record.
+  void Take(std::size_t k, const Seen& seen, const State& state, const UpdateReport& report,
+            Recorder* recorder) {
+    if (!waits) {
+      metrics.Add(seen.frame, seen.in_segment, state, report);
+    } else {
+      metrics.AddReport(seen.in_segment, report);
+      if (!report.stale) estimates.push_back({k, state});
+    }
     if (recorder != nullptr) recorder->AddEstimate(index, seen.frame, state, report);
   }
   void Note(const std::vector<Event>& events) {
@@ -89,8 +96,9 @@ EstimatorResult Begin(const NamedEstimator& named) {
   return result;
 }
 
-/// An event `unused` for each sensor of which the whole run used no measurement.
-void NoteUnused(const System& system, EstimatorResult& result) {
+/// An event `unused` for each sensor of which the whole run used no measurement; `accepted_by`
+/// names the filter that chose them, or is empty.
+void NoteUnused(const System& system, const std::string& accepted_by, EstimatorResult& result) {
   for (const SensorBinding& sensor : system.sensors) {
     std::int64_t used = 0, all = 0;
     std::vector<std::string> others;
@@ -106,9 +114,11 @@ void NoteUnused(const System& system, EstimatorResult& result) {
       }
     }
     if (used > 0) continue;
-    const std::string of_all = all > 0 ? " used none of " + std::to_string(all) +
-                                             " measurements: " + internal::Join(others, ", ")
-                                       : ": stream '" + sensor.stream + "' had no measurement";
+    const std::string of_all =
+        all > 0 ? " used none of " + std::to_string(all) +
+                      " measurements: " + internal::Join(others, ", ")
+                : ": stream '" + sensor.stream + "' had no measurement" +
+                      (accepted_by.empty() ? "" : " that " + accepted_by + " accepted");
     result.events.push_back({kNoStamp, "unused", "sensor '" + sensor.name + "'" + of_all});
   }
 }
@@ -126,18 +136,21 @@ std::string Cause(const std::vector<Event>& events, const char* otherwise) {
   return events.empty() ? otherwise : events.back().text;
 }
 
-/// One frame through one estimator, unless it has passed already; false where the whole run has to
-/// end.
-bool Advance(Running& one, const Seen& seen, const internal::Passed* passed,
+/// One frame through one estimator, which sees `visible` of it, unless it has passed already; false
+/// where the whole run has to end.
+bool Advance(Running& one, const Seen& seen, const Frame& visible, const internal::Passed* passed,
              const RunOptions& options, RunResult& result) {
+  one.last = nullptr;
   if (one.ended) return true;
   Estimator& estimator = *one.named.estimator;
-  const UpdateReport& report = passed ? passed->report : estimator.Process(seen.frame);
+  const UpdateReport& report = passed ? passed->report : estimator.Process(visible);
+  one.last = &report;
   one.Note(report.events);
   one.ended = passed ? passed->failed : estimator.failed();
   one.diverged = passed ? passed->diverged : estimator.diverged();
   if (!one.ended && !estimator.offline()) {
-    one.Take(seen, passed ? passed->after->state : estimator.state(), report, options.recorder);
+    one.Take(static_cast<std::size_t>(result.frames), seen,
+             passed ? passed->after->state : estimator.state(), report, options.recorder);
   }
   const bool policy = one.named.on_divergence == OnDivergence::kFail && one.diverged;
   if (!one.ended && !policy) return true;
@@ -148,6 +161,12 @@ bool Advance(Running& one, const Seen& seen, const internal::Passed* passed,
     Fail(result, ExitCode::kDiverged, "estimator '" + one.named.name + "'" + at + why);
   }
   return !policy;
+}
+
+/// The measurements of the frame that `filter`, which has had it, accepted.
+Frame AcceptedOf(const Running& filter, const Frame& frame, const Source& source) {
+  return internal::AcceptedOf(frame, source.streams(), filter.named.system,
+                              filter.last ? *filter.last : UpdateReport());
 }
 
 /// The next frame, as the experiment's TimePolicy has it; false at the end. What became of others
@@ -169,14 +188,15 @@ bool NextFrame(internal::FrameOrder& frames, std::vector<Running>& running, RunR
   }
 }
 
-/// The frames one by one through all estimators; where one is offline, they are kept for it.
+/// The frames one by one through all estimators. They are kept where an estimator is offline or
+/// metrics wait for one.
 void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunOptions& options,
                RunResult& result, std::vector<Seen>& kept) {
   Seen seen;
   seen.in_segment.resize(experiment.segments.size());
   const std::int64_t size = experiment.source->size();
   const bool keep = std::ranges::any_of(
-      running, [](const Running& one) { return one.named.estimator->offline(); });
+      running, [](const Running& one) { return one.waits || one.named.estimator->offline(); });
   internal::FrameOrder frames(experiment, &CheckFrame);
   while (NextFrame(frames, running, result, seen.frame)) {
     for (std::size_t i = 0; i < experiment.segments.size(); ++i) {
@@ -186,7 +206,15 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
     if (keep) kept.push_back(seen);
     bool go_on = true;
     for (std::size_t e = 0; e < running.size(); ++e) {
-      go_on = Advance(running[e], seen, frames.passed(e), options, result) && go_on;
+      const int by = running[e].named.accepted_by;
+      Frame accepted;
+      if (by >= 0) {
+        accepted =
+            AcceptedOf(running[static_cast<std::size_t>(by)], seen.frame, *experiment.source);
+      }
+      go_on = Advance(running[e], seen, by < 0 ? seen.frame : accepted, frames.passed(e), options,
+                      result) &&
+              go_on;
     }
     ++result.frames;
     if (!go_on || std::ranges::all_of(running, &Running::ended)) return;
@@ -220,7 +248,7 @@ void SmoothAll(std::vector<Running>& running, const std::vector<Seen>& kept,
     std::vector<Event> events;
     try {
       estimator.Smooth([&](std::size_t k, const State& state, const UpdateReport& report) {
-        one.Take(kept[k], state, report, options.recorder);
+        one.Take(k, kept[k], state, report, options.recorder);
         events = report.events;
       });
     } catch (const Error& e) {
@@ -232,6 +260,52 @@ void SmoothAll(std::vector<Running>& running, const std::vector<Seen>& kept,
     Fail(result, ExitCode::kDiverged,
          "estimator '" + one.named.name + "': " + Cause(events, "failed"));
   }
+}
+
+/// Why the estimates of a reference are of no use to compare with; "": they are of use.
+std::string WhyNoReference(const Running& reference) {
+  const Estimator& estimator = *reference.named.estimator;
+  const char* why = nullptr;
+  if (reference.ended || estimator.failed()) {
+    why = "failed";
+  } else if (reference.diverged || estimator.diverged()) {
+    why = "diverged";
+  } else if (reference.estimates.empty()) {
+    why = "has no estimates";
+  }
+  if (why == nullptr) return "";
+  return "no reference: estimator '" + reference.named.name + "' " + why +
+         ", the comparison with it is withheld";
+}
+
+/// The metrics that waited for the estimates of the reference; what does not last for them is kept.
+void Compare(std::vector<Running>& running, int index, const std::vector<Seen>& kept,
+             RunResult& result) {
+  const Running& reference = running[static_cast<std::size_t>(index)];
+  result.withheld = WhyNoReference(reference);
+  if (!result.withheld.empty()) return;
+  for (Running& one : running) {
+    if (one.index == index) continue;
+    internal::AddDifferences(one.estimates, reference.estimates, kept, one.metrics);
+  }
+}
+
+/// All estimators of the experiment before their first frame.
+std::vector<Running> BeginAll(Experiment& experiment) {
+  const int reference = experiment.reference;
+  std::vector<StreamInfo> truths = experiment.source->truths();
+  if (reference >= 0) {
+    truths = internal::BlocksOf(experiment.estimators[static_cast<std::size_t>(reference)].system);
+  }
+  std::vector<Running> running;
+  for (NamedEstimator& named : experiment.estimators) {
+    const int index = static_cast<int>(running.size());
+    Metrics metrics(named, index == reference ? std::vector<StreamInfo>() : truths,
+                    experiment.segments);
+    running.push_back({named, index, std::move(metrics), Begin(named)});
+    running.back().waits = reference >= 0;
+  }
+  return running;
 }
 
 }  // namespace
@@ -250,27 +324,40 @@ const char* ToString(RunStatus status) {
 
 RunResult Run(Experiment& experiment, const RunOptions& options) {
   RunResult result;
+  const int reference = experiment.reference;
+  if (reference >= 0) {
+    result.reference = experiment.estimators[static_cast<std::size_t>(reference)].name;
+  }
   std::vector<Running> running;
-  try {
-    for (NamedEstimator& named : experiment.estimators) {
-      running.push_back({named, static_cast<int>(running.size()),
-                         Metrics(named, *experiment.source, experiment.segments), Begin(named)});
+  std::vector<Seen> kept;
+  const auto guarded = [&result](const auto& call) {
+    try {
+      call();
+    } catch (...) {
+      // What was done so far is kept.
+      Failure failure = CaughtFailure();
+      Fail(result, failure.code, std::move(failure.reason));
+      if (failure.code == ExitCode::kStopped) result.status = RunStatus::kStopped;
     }
+  };
+  guarded([&] {
+    running = BeginAll(experiment);
     if (options.recorder != nullptr) options.recorder->Start(experiment);
-    std::vector<Seen> kept;
     RunFrames(experiment, running, options, result, kept);
     SmoothAll(running, kept, options, result);
-  } catch (...) {
-    // What was done so far is kept.
-    Failure failure = CaughtFailure();
-    Fail(result, failure.code, std::move(failure.reason));
-    if (failure.code == ExitCode::kStopped) result.status = RunStatus::kStopped;
+  });
+  if (reference >= 0 && !running.empty()) {
+    guarded([&] { Compare(running, reference, kept, result); });
   }
   for (Running& one : running) {
     Measure(one, result);
     one.result.counts = one.metrics.counts();
     one.result.units = one.metrics.units();
-    if (result.frames > 0) NoteUnused(one.named.system, one.result);
+    if (result.frames > 0) {
+      const int by = one.named.accepted_by;
+      NoteUnused(one.named.system, by < 0 ? "" : running[static_cast<std::size_t>(by)].named.name,
+                 one.result);
+    }
     one.Note(one.metrics.events());
     const Estimator& estimator = *one.named.estimator;
     one.result.diverged = one.diverged || (estimator.offline() && estimator.diverged()) ||

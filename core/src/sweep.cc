@@ -141,8 +141,14 @@ SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptio
   SweepResult result;
   CheckReadableAgain(config);
   // What is wrong with the config is said once, before the first run.
-  for (const NamedEstimator& named : BuildExperiment(config, host).estimators) {
-    result.estimators.push_back(named.name);
+  {
+    const Experiment experiment = BuildExperiment(config, host);
+    for (const NamedEstimator& named : experiment.estimators) {
+      result.estimators.push_back(named.name);
+    }
+    if (experiment.reference >= 0) {
+      result.reference = result.estimators[static_cast<std::size_t>(experiment.reference)];
+    }
   }
   const auto share = [&](int i) {
     return options.runs / options.shards * i + options.runs % options.shards * i / options.shards;

@@ -46,6 +46,14 @@ std::int64_t CountWhole(const SweepResult& result) {
   return std::ranges::count(result.done, RunStatus::kOk, &SweepRun::status);
 }
 
+/// ReferenceText of each run that has a reference, as a line of its own behind an empty one.
+std::string ReferenceLine(const SweepResult& result) {
+  RunResult of_runs;
+  of_runs.reference = result.reference;
+  const std::string text = internal::ReferenceText(of_runs);
+  return text.empty() ? "" : '\n' + text + '\n';
+}
+
 /// A cell for each estimator. Each one stands as four in a comparison, so that its numbers share
 /// their unit and decimals with all others of the row.
 std::vector<ComparisonRow> TableRows(const std::vector<SweepSummary>& summaries) {
@@ -86,7 +94,7 @@ std::string Markdown(const SweepResult& result) {
   for (const ComparisonRow& row : TableRows(summaries)) {
     text += "| " + row.label + " | " + Join(row.cells, " | ") + " |\n";
   }
-  return text;
+  return text + ReferenceLine(result);
 }
 
 void AppendEstimators(Json& json, const SweepResult& result) {
@@ -115,6 +123,7 @@ std::string SweepJson(const SweepResult& result) {
   json.Key("runs").Integer(result.runs);
   json.Key("runs_used").Integer(CountWhole(result));
   json.Key("first_seed").Integer(static_cast<std::int64_t>(result.first_seed));
+  json.Key("reference").Text(result.reference);
   AppendEstimators(json, result);
   json.End();
   return json.text();
@@ -125,6 +134,7 @@ std::string SweepJson(const VariedSweep& sweep) {
   json.Object();
   json.Key("runs").Integer(sweep.results.front().runs);
   json.Key("first_seed").Integer(static_cast<std::int64_t>(sweep.results.front().first_seed));
+  json.Key("reference").Text(sweep.results.front().reference);
   json.Key("vary").Text(sweep.variation.key);
   json.Key("values").Array();
   for (const Part& part : PartsOf(sweep)) {
@@ -212,7 +222,7 @@ void WriteFailures(const RunFolder& folder, const Parts& parts, const std::strin
 
 std::string SweepTable(const SweepResult& result) {
   const std::vector<SweepSummary> summaries = Summarise(result);
-  return internal::EstimatorTable(NamesOf(summaries), TableRows(summaries));
+  return internal::EstimatorTable(NamesOf(summaries), TableRows(summaries)) + ReferenceLine(result);
 }
 
 SweepFolder::SweepFolder(const std::filesystem::path& folder, bool force)

@@ -4,15 +4,19 @@
 #include <ceres/solver.h>
 
 #include <Eigen/QR>
+#include <cmath>
 #include <cstdio>
 #include <limits>
 
 #include "alidade/build_plugin.h"
 #include "alidade/ekf.h"
+#include "residuals.h"
 #include "trajectory.h"
 
 namespace alidade::ceres_batch {
 namespace {
+
+constexpr int kManyInputs = 1000;  // of which a solve takes seconds
 
 struct Options {
   enum class Data { kAll, kSoFar } data = Data::kAll;
@@ -21,28 +25,12 @@ struct Options {
   double max_dt_s = std::numeric_limits<double>::infinity();
 };
 
-/// r(e) of a trajectory, with its Jacobian.
-class Residuals : public ceres::CostFunction {
- public:
-  explicit Residuals(const Trajectory& trajectory) : trajectory_(trajectory) {
-    set_num_residuals(trajectory.residuals());
-    mutable_parameter_block_sizes()->push_back(trajectory.inputs());
-  }
-  bool Evaluate(const double* const* parameters, double* residuals,
-                double** jacobians) const override {
-    return trajectory_.Evaluate(parameters[0], residuals,
-                                jacobians == nullptr ? nullptr : jacobians[0]);
-  }
-
- private:
-  const Trajectory& trajectory_;
-};
-
 /// Maximum a posteriori of all states given all data, or given the data so far (the
 /// full-information filter): see Trajectory for the problem.
 ///
 /// Q and R that depend on the state are frozen, the problem is solved, and so on until they settle.
-/// With [I; J_r_e] = Q U at the solution, Cov(e) = (U'U)^-1 and P_k = (U^-T S_k')'(U^-T S_k').
+/// With [I; sqrt(w) J_r_e] = Q U at the solution, where w are the weights of robust losses, 1
+/// without, Cov(e) = (U'U)^-1 and P_k = (U^-T S_k')'(U^-T S_k').
 class CeresBatch : public Estimator {
  public:
   CeresBatch(const System& system, const Options& options, const std::vector<StreamInfo>& streams)
@@ -61,6 +49,7 @@ class CeresBatch : public Estimator {
   const UpdateReport& Process(const Frame& frame) override {
     report_.Clear();
     const UpdateReport& filter = filter_.Process(frame);
+    const bool were_few = trajectory_.inputs() <= kManyInputs;
     if (!trajectory_.Add(frame, filter)) {
       failed_ = true;
       report_.events.push_back({frame.stamp, "batch", trajectory_.problem()});
@@ -68,6 +57,11 @@ class CeresBatch : public Estimator {
     }
     if (!filter_.failed()) filtered_.push_back(trajectory_.ValuesOf(filter_.state()));
     if (!offline()) SolveSoFar(frame.stamp);
+    if (were_few && trajectory_.inputs() > kManyInputs) {
+      report_.events.push_back({frame.stamp, "slow",
+                                "more than " + std::to_string(kManyInputs) +
+                                    " noise inputs: the time of a solve grows with their cube"});
+    }
     return report_;
   }
 
@@ -138,6 +132,7 @@ class CeresBatch : public Estimator {
       iterations += static_cast<int>(summary.iterations.size()) - 1;
       ++outer;
       failed_ = summary.termination_type != ceres::CONVERGENCE;
+      if (!failed_ && trajectory_.robust()) iterations += Polish();
       if (failed_ || !trajectory_.Freeze(e_.data())) break;
       settled = trajectory_.change() <= kSettled;
     } while (!settled && outer < options_.max_outer_iterations);
@@ -155,13 +150,14 @@ class CeresBatch : public Estimator {
 
   ceres::Solver::Summary SolveFrozen() {
     const Eigen::Index n = e_.size();
-    ceres::Problem problem;
+    Residuals residuals(trajectory_, e_);
+    ceres::Problem::Options of_problem;
+    of_problem.evaluation_callback = &residuals;
+    ceres::Problem problem(of_problem);
     problem.AddResidualBlock(
         new ceres::NormalPrior(Eigen::MatrixXd::Identity(n, n), Eigen::VectorXd::Zero(n)), nullptr,
         e_.data());
-    if (trajectory_.residuals() > 0) {
-      problem.AddResidualBlock(new Residuals(trajectory_), nullptr, e_.data());
-    }
+    residuals.AddTo(problem, e_.data());
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_QR;
     options.max_num_iterations = options_.max_iterations;
@@ -178,15 +174,44 @@ class CeresBatch : public Estimator {
 
   /// U at e_, and the Gauss-Newton step that it gives: Ceres stops before the last one.
   void Covariances() {
+    Eigen::VectorXd step;
+    u_.setIdentity(e_.size(), e_.size());
+    if (GaussNewton(step) && !failed_) e_ += step;
+  }
+
+  /// Reweighted least squares converges linearly where the squared error does so quadratically:
+  /// what is left below Ceres' tolerances counts. How many steps it took.
+  int Polish() {
+    constexpr double kStep = 1e-10;  // of inputs whose sigma is 1
+    Eigen::VectorXd step;
+    int steps = 0;
+    do {
+      if (!GaussNewton(step)) return steps;
+      e_ += step;
+      ++steps;
+    } while (step.norm() > kStep && steps < options_.max_iterations);
+    return steps;
+  }
+
+  /// U at e_ and the step -(U'U)^-1 J' r of the weighted problem. False where a model is not
+  /// defined.
+  bool GaussNewton(Eigen::VectorXd& step) {
     const Eigen::Index n = e_.size(), m = trajectory_.residuals();
     RowMajor j = RowMajor::Identity(n + m, n);
     Eigen::VectorXd r(n + m);
     r.head(n) = e_;
-    u_.setIdentity(n, n);
-    if (!trajectory_.Evaluate(e_.data(), r.data() + n, j.data() + n * n)) return;
+    if (!trajectory_.Evaluate(e_.data(), r.data() + n, j.data() + n * n)) return false;
+    for (const Trajectory::Part& part : trajectory_.parts()) {
+      if (part.loss.kind == LossKind::kNone) continue;
+      auto rows = r.segment(n + part.row, part.size);
+      const double root = std::sqrt(Weight(part.loss, rows.norm()));
+      rows *= root;
+      j.middleRows(n + part.row, part.size) *= root;
+    }
     const Eigen::HouseholderQR<Eigen::MatrixXd> qr(j);
     u_ = qr.matrixQR().topRows(n).triangularView<Eigen::Upper>();
-    if (!failed_) e_ -= qr.solve(r);
+    step = -qr.solve(r);
+    return true;
   }
 
   /// The points of e_, frame by frame.
@@ -228,9 +253,6 @@ void CheckSupported(const System& system, const Node& entry) {
     }
   }
   for (const SensorBinding& sensor : system.sensors) {
-    if (sensor.loss.kind != LossKind::kNone) {
-      refuse("sensor '" + sensor.name + "' has a robust loss", "the sensor without one");
-    }
     for (const RoleBinding& role : sensor.roles) {
       if (role.mode != RoleMode::kEstimate) {
         refuse("a role of sensor '" + sensor.name + "' is considered or held", "mode: estimate");

@@ -127,8 +127,18 @@ void Trajectory::AddFactors(const Frame& frame, const UpdateReport& filter, Node
       continue;
     }
     factor.row = residuals_;
-    residuals_ += sensor.model.measurement().geometry.tangent;
+    AddPart(sensor.model.measurement().geometry.tangent, sensor.loss);
   }
+}
+
+void Trajectory::AddPart(int size, const RobustLoss& loss) {
+  const bool plain = loss.kind == LossKind::kNone;
+  if (plain && !parts_.empty() && parts_.back().loss.kind == LossKind::kNone) {
+    parts_.back().size += size;
+  } else {
+    parts_.push_back({residuals_, size, loss});
+  }
+  residuals_ += size;
 }
 
 /// First values in an order in which each finds the blocks that it needs.
@@ -272,8 +282,9 @@ bool Trajectory::Linearised(const std::vector<std::vector<double>>& trajectory,
       // What is not defined here tells nothing yet; it may be at the solution.
       if (factor.row < 0 || !FreezeFactor(factor, point)) continue;
       if (!Residual(factor, point, residual, &a)) continue;
-      r.segment(inputs_ + factor.row, residual.size()) = residual + a * point.offset;
-      j.middleRows(inputs_ + factor.row, residual.size()) = a * point.s;
+      const double root = std::sqrt(Weight(SensorOf(factor).loss, residual.norm()));
+      r.segment(inputs_ + factor.row, residual.size()) = root * (residual + a * point.offset);
+      j.middleRows(inputs_ + factor.row, residual.size()) = root * a * point.s;
     }
   }
   e = -j.householderQr().solve(r);

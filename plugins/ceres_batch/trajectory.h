@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -14,7 +15,7 @@ namespace alidade::ceres_batch {
 ///   prior         x_0     = m (+) L_0 e_0,             P_0 = L_0 L_0'
 ///   motion        x_{k+1} = f(x_k, L_k e_{k+1}, dt),   Q_k = L_k L_k'
 ///   measurement   r_i     = L_i^-1 (z_i (-) h(x_k)),   R_i = L_i L_i'
-///   MAP           e*      = argmin |e|^2 + |r(e)|^2
+///   MAP           e*      = argmin |e|^2 / 2 + sum_i rho_i(|r_i(e)|)   rho(d) = d^2 / 2, or a loss
 ///   first value   y       = g(x_k, z (+) L_i e_k)      of a block that starts from a measurement
 ///   sensitivity   S_k = dx_k/de:  S_0 = [J L_0  0],  S_{k+1} = F S_k + [0  G L_k  0]
 ///                 with J = d(m (+) d)/dd,  J_r_e = L_i^-1 d(z (-) h)/dh H S_k
@@ -48,6 +49,18 @@ class Trajectory {
   std::vector<double> ValuesOf(const State& state) const;
   int inputs() const { return inputs_; }        ///< N
   int residuals() const { return residuals_; }  ///< M
+  /// Residuals of one measurement, of which a loss takes the norm; or, without a loss, of all
+  /// measurements on end.
+  struct Part {
+    int row, size;
+    RobustLoss loss;
+  };
+  const std::vector<Part>& parts() const { return parts_; }
+  /// Whether any of them has a loss.
+  bool robust() const {
+    return std::ranges::any_of(parts_,
+                               [](const Part& p) { return p.loss.kind != LossKind::kNone; });
+  }
   std::size_t size() const { return nodes_.size(); }
   Stamp stamp() const { return stamp_; }
 
@@ -103,6 +116,7 @@ class Trajectory {
 
   void AddFactors(const Frame& frame, const UpdateReport& filter, Node& node);
   void AddFirsts(Node& node);
+  void AddPart(int size, const RobustLoss& loss);
   bool AllPresent(const std::vector<BlockId>& blocks) const;
   bool Move(const Step& step, const double* e, Point& point) const;
   bool Initialise(const First& first, const Factor& factor, const double* e, Point& point) const;
@@ -125,6 +139,7 @@ class Trajectory {
   std::vector<bool> present_;  ///< at the last frame, by block
   Eigen::MatrixXd l0_;
   std::vector<Node> nodes_;
+  std::vector<Part> parts_;
   Stamp stamp_ = kNoStamp;
   int inputs_ = 0, residuals_ = 0;
   double change_ = 0.0;

@@ -52,7 +52,7 @@ class MetricsOf {
     std::vector<Segment> list;
     for (int i = 0; i < segments; ++i) list.push_back({"s" + std::to_string(i), 0, true, sensor});
     in_segment_.assign(segments, false);
-    metrics_.emplace(named_, source_, list);
+    metrics_.emplace(named_, source_.truths(), list);
   }
 
   State& state() { return state_; }

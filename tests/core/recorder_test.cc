@@ -240,6 +240,7 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
   },
   "seed": 42,
   "frames": 7,
+  "reference": "truth",
   "plugins": [],
   "estimators": {
     "ekf": {

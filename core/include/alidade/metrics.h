@@ -30,13 +30,20 @@ namespace alidade {
 /// rmse infinite.
 class Metrics {
  public:
-  Metrics(const NamedEstimator& named, const Source& source, const std::vector<Segment>& segments);
+  /// `truths` are those of the source, or the blocks of an estimator that stands for them.
+  Metrics(const NamedEstimator& named, const std::vector<StreamInfo>& truths,
+          const std::vector<Segment>& segments);
   ~Metrics();
   Metrics(Metrics&&) noexcept;
 
   /// Takes the state after `frame`; `in_segment[i]` tells whether the frame lies in segment i.
   void Add(const Frame& frame, const std::vector<bool>& in_segment, const State& state,
            const UpdateReport& report);
+  /// The part of Add that needs no truth: counts and NIS.
+  void AddReport(const std::vector<bool>& in_segment, const UpdateReport& report);
+  /// The errors of `state` where `frame.truth` is an estimate itself: rmse, lag and final alone.
+  /// How far the two may be apart P does not tell, as they share their data.
+  void AddDifference(const Frame& frame, const std::vector<bool>& in_segment, const State& state);
   /// `inconsistent`, once for each block element: truth is known and the error has been beyond 10
   /// sigma for 20 stamps on end.
   const std::vector<Event>& events() const;

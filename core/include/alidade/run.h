@@ -28,6 +28,9 @@ struct NamedEstimator {
   System system;
   std::unique_ptr<Estimator> estimator;
   OnDivergence on_divergence = OnDivergence::kReport;
+  /// Index of an estimator before it, not an offline one: it sees the measurements alone that this
+  /// one accepted or took as first values. -1: it sees all.
+  int accepted_by = -1;
 };
 
 /// A share of the stamps over which metrics are taken apart: those with (or without) a valid
@@ -62,6 +65,7 @@ struct Experiment {
   std::vector<Segment> segments;
   std::uint64_t seed = 1;
   TimePolicy time;
+  int reference = -1;  ///< index of the estimator that metrics compare with; -1: truth
 };
 
 /// How the frames of a run came.
@@ -99,6 +103,8 @@ struct RunResult {
   std::string reason;
   std::int64_t frames = 0;
   Arrivals arrivals;
+  std::string reference = "truth";  ///< what metrics compare with: truth, or an estimator's name
+  std::string withheld;             ///< why there is no comparison with that estimator, or ""
   std::vector<EstimatorResult> estimators;
 };
 
@@ -117,7 +123,8 @@ struct RunOptions {
 /// whatever else goes wrong, is in the result; nothing is thrown.
 RunResult Run(Experiment& experiment, const RunOptions& options);
 
-/// A table of the estimators' main metrics, one column each, for a terminal.
+/// A table of the estimators' main metrics, one column each, for a terminal; below it what they
+/// compare with, where that is not truth.
 std::string ComparisonTable(const RunResult& result);
 
 }  // namespace alidade

@@ -40,6 +40,7 @@ struct SweepResult {
   std::int64_t runs = 0;  ///< asked for, of this shard
   std::uint64_t first_seed = 1;
   bool stopped = false;
+  std::string reference = "truth";      ///< as in RunResult
   std::vector<std::string> estimators;  ///< in the order of the config
   std::vector<SweepRun> done;           ///< by seed, those that failed too
 };

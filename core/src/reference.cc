@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "reference.h"
+
+namespace alidade::internal {
+namespace {
+
+/// As Frame::truth, for BlocksOf the state's system.
+std::vector<std::vector<double>> ValuesOf(const State& state, std::size_t blocks) {
+  std::vector<std::vector<double>> values(blocks);
+  for (std::size_t i = 0; i < blocks; ++i) {
+    const auto id = static_cast<BlockId>(i);
+    const Block& block = state.layout()[id];
+    if (!block.present) continue;
+    const double* const x = state.value(id);
+    values[i].assign(x, x + block.geometry().ambient);
+    if (!AllFinite(values[i])) values[i].clear();
+  }
+  return values;
+}
+
+}  // namespace
+
+std::vector<StreamInfo> BlocksOf(const System& system) {
+  std::vector<StreamInfo> blocks;
+  for (const Block& block : system.layout.blocks()) {
+    blocks.push_back({block.name, block.geometry().ambient});
+  }
+  return blocks;
+}
+
+void AddDifferences(const std::vector<Estimate>& estimates, const std::vector<Estimate>& reference,
+                    const std::vector<Seen>& seen, Metrics& metrics) {
+  std::vector<const State*> at(seen.size(), nullptr);
+  for (const Estimate& one : reference) at[one.frame] = &one.state;
+  for (const Estimate& one : estimates) {
+    const State* const state = at[one.frame];
+    if (state == nullptr) continue;
+    const Seen& frame = seen[one.frame];
+    metrics.AddDifference(
+        {frame.frame.stamp, {}, ValuesOf(*state, state->layout().blocks().size())},
+        frame.in_segment, one.state);
+  }
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// An estimator in the place of truth.
+#include <cmath>
+
+#include "support/recording.h"
+
+namespace alidade::testing {
+namespace {
+
+/// Knows at the end that the depth was 0.3 m, but not at the first frame; or fails to.
+struct Constant : Estimator {
+  Constant(const System& system, bool fails) : state_(system.InitialState()), failed_(fails) {}
+  void Start(Stamp) override {}
+  const UpdateReport& Process(const Frame&) override {
+    ++frames_;
+    return report_;
+  }
+  bool offline() const override { return true; }
+  void Smooth(const Emit& emit) override {
+    for (std::size_t k = 0; k < frames_; ++k) {
+      *state_.value(0) = k == 0 ? std::nan("") : 0.3;
+      emit(k, state_, report_);
+    }
+  }
+  const State& state() const override { return state_; }
+  Stamp stamp() const override { return kNoStamp; }
+  bool diverged() const override { return false; }
+  bool failed() const override { return failed_; }
+
+ private:
+  State state_;
+  UpdateReport report_;
+  std::size_t frames_ = 0;
+  bool failed_;
+};
+
+/// An ekf, `alone` and `reference`, which is compared with; the source knows no truth.
+class Blind : public SwingingTarget {
+ public:
+  using SwingingTarget::SwingingTarget;
+  const std::vector<StreamInfo>& truths() const override { return none_; }
+  bool Next(Frame& frame) override {
+    const bool more = SwingingTarget::Next(frame);
+    frame.truth.clear();
+    return more;
+  }
+
+ private:
+  std::vector<StreamInfo> none_;
+};
+
+Experiment MakeCompared(bool fails = false) {
+  Experiment experiment = MakeExperiment();
+  experiment.source = std::make_unique<Blind>(60);
+  NamedEstimator named;
+  named.name = "known";
+  named.system = DepthFilter();
+  named.estimator = std::make_unique<Constant>(named.system, fails);
+  experiment.estimators.push_back(std::move(named));
+  experiment.reference = 2;
+  return experiment;
+}
+
+/// Depths of an ekf, frame by frame.
+std::vector<double> Depths(bool alone) {
+  Experiment experiment = MakeExperiment();
+  Estimator& ekf = *experiment.estimators[alone ? 1 : 0].estimator;
+  Frame frame;
+  std::vector<double> depths;
+  while (experiment.source->Next(frame)) {
+    ekf.Process(frame);
+    depths.push_back(ValueOf(ekf.state(), "target.depth"));
+  }
+  return depths;
+}
+
+TEST(Reference, ErrorsAreDifferencesFromTheEstimatesOfTheNamedOne) {
+  Experiment experiment = MakeCompared();
+  const RunResult run = alidade::Run(experiment, {});
+  ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
+  EXPECT_EQ(run.reference, "known");
+  EXPECT_EQ(run.withheld, "");
+  double squares = 0.0;
+  const std::vector<double> depths = Depths(false);
+  for (std::size_t k = 1; k < depths.size(); ++k) squares += std::pow(depths[k] - 0.3, 2);
+  const std::map<std::string, double>& metrics = run.estimators[0].metrics;
+  EXPECT_NEAR(metrics.at("rmse:target.depth"), std::sqrt(squares / 59.0), 1e-12);
+  EXPECT_NEAR(metrics.at("final:target.depth"), std::abs(depths.back() - 0.3), 1e-12);
+  EXPECT_EQ(run.estimators[0].units.at("target.depth"), "m");
+}
+
+TEST(Reference, MayBeAnyEstimatorOfTheRun) {
+  Experiment experiment = MakeCompared();
+  experiment.reference = 1;
+  const RunResult run = alidade::Run(experiment, {});
+  const std::vector<double> ekf = Depths(false), alone = Depths(true);
+  double squares = 0.0;
+  for (std::size_t k = 0; k < ekf.size(); ++k) squares += std::pow(ekf[k] - alone[k], 2);
+  EXPECT_NEAR(run.estimators[0].metrics.at("rmse:target.depth"), std::sqrt(squares / 60.0), 1e-12);
+  EXPECT_NEAR(run.estimators[2].metrics.at("final:target.depth"), std::abs(0.3 - alone.back()),
+              1e-12);
+}
+
+// What an estimator's covariance says of its distance from truth it does not say of that from
+// another estimator. NIS needs neither.
+TEST(Reference, WithholdsWhatTheCovarianceDoesNotTell) {
+  Experiment experiment = MakeCompared();
+  const RunResult run = alidade::Run(experiment, {});
+  for (const EstimatorResult& one : run.estimators) {
+    EXPECT_EQ(one.metrics.count("cov95:target.depth"), 0u);
+    EXPECT_EQ(one.metrics.count("nees.mean:target"), 0u);
+    EXPECT_FALSE(one.diverged);  // the ekf is a hundred sigma off
+  }
+  EXPECT_EQ(run.estimators[0].metrics.count("nis.mean:disparity"), 1u);
+  EXPECT_EQ(run.estimators[2].metrics.size(), 0u);  // not even compared with itself
+  EXPECT_EQ(run.estimators[0].counts.at("accepted:inverse_scale"), 60);
+}
+
+// FAULTS 85
+TEST(Reference, ThatFailedIsNone) {
+  Experiment experiment = MakeCompared(true);
+  const RunResult run = alidade::Run(experiment, {});
+  EXPECT_EQ(run.status, RunStatus::kFailed);
+  EXPECT_EQ(run.withheld,
+            "no reference: estimator 'known' failed, the comparison with it is withheld");
+  EXPECT_EQ(run.estimators[0].metrics.count("rmse:target.depth"), 0u);
+  EXPECT_EQ(run.estimators[0].metrics.count("nis.mean:disparity"), 1u);
+  EXPECT_NE(ComparisonTable(run).find("\nno reference: estimator 'known' failed"),
+            std::string::npos);
+}
+
+/// Fails before there is anything to smooth.
+class Torn : public Blind {
+ public:
+  using Blind::Blind;
+  bool Next(Frame& frame) override {
+    if (left_-- == 0) throw Error(ExitCode::kBadData, "torn");
+    return Blind::Next(frame);
+  }
+
+ private:
+  int left_ = 20;
+};
+
+TEST(Reference, WithoutEstimatesIsNone) {
+  Experiment experiment = MakeCompared();
+  experiment.source = std::make_unique<Torn>(60);
+  const RunResult run = alidade::Run(experiment, {});
+  EXPECT_EQ(run.code, ExitCode::kBadData);
+  EXPECT_EQ(run.withheld,
+            "no reference: estimator 'known' has no estimates, the comparison with it is withheld");
+  // A filter has those up to there.
+  Experiment online = MakeCompared();
+  online.source = std::make_unique<Torn>(60);
+  online.reference = 1;
+  const RunResult other = alidade::Run(online, {});
+  EXPECT_EQ(other.withheld, "");
+  EXPECT_EQ(other.estimators[0].metrics.count("rmse:target.depth"), 1u);
+}
+
+TEST(Reference, IsNamedBelowTheTableInRunJsonAndInTheReport) {
+  const TemporaryFolder folder;
+  Experiment experiment = MakeCompared();
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  const RunResult run = RunInto(recorder, experiment);
+  recorder.Finish(run);
+  const std::string words =
+      "errors are differences from estimator 'known', an estimate itself: no coverage, no NEES";
+  EXPECT_TRUE(ComparisonTable(run).ends_with('\n' + words + '\n')) << ComparisonTable(run);
+  EXPECT_NE(Read(folder / "out/run.json").find("\"reference\": \"known\""), std::string::npos);
+  EXPECT_NE(Read(folder / "out/report.html").find("differences from estimator"), std::string::npos);
+
+  Experiment plain = MakeExperiment();
+  const RunResult truth = alidade::Run(plain, {});
+  EXPECT_EQ(truth.reference, "truth");
+  EXPECT_EQ(ComparisonTable(truth).find("errors are"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace alidade::testing

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "alidade/run.h"
+#include "host_fixture.h"
+#include "support/systems.h"
+
+namespace alidade {
+namespace {
+
+using testing::AddSensor;
+using testing::FrameAt;
+
+const PluginHost& Shipped() {
+  static const PluginHost host;
+  return host;
+}
+
+struct Solution {
+  std::vector<Eigen::VectorXd> x;
+  std::vector<Eigen::MatrixXd> p;
+  double cost = 0.0;
+};
+
+Solution SmoothOver(const System& system, const std::vector<Frame>& frames) {
+  const Config config = Config::FromText("type: ceres_batch", "batch.yaml");
+  const auto batch =
+      Shipped().CreateEstimator("ceres_batch", config.root())(system, testing::StreamsOf(system));
+  for (const Frame& frame : frames) batch->Process(frame);
+  Solution found;
+  batch->Smooth([&](std::size_t, const State& state, const UpdateReport& report) {
+    found.x.emplace_back(Eigen::VectorXd::Map(state.values().data(), std::ssize(state.values())));
+    found.p.push_back(state.covariance().Dense());
+    if (report.events.empty()) return;
+    EXPECT_NE(report.events[0].text.find("converged"), std::string::npos);
+    EXPECT_EQ(std::sscanf(report.events[0].text.c_str(), "cost %lf", &found.cost), 1);
+  });
+  EXPECT_FALSE(batch->failed());
+  return found;
+}
+
+// ---- one element, over time ---------------------------------------------------------------------
+
+constexpr double kGain = 2.0, kSigma = 0.3, kAcceleration = 0.7, kStep = 0.05;
+
+/// A moving point with a linear sensor: p.x ~ N(1, 2^2), p.v ~ N(-0.5, 3^2).
+System PointWith(const RobustLoss& loss) {
+  System system = testing::MovingPoint(kAcceleration);
+  AddSensor(system, "z", InProcessSensor(testing::Linear(kGain, kSigma), "linear"), {"p.x"});
+  system.sensors[0].loss = loss;
+  return system;
+}
+
+/// 2 cos t with a wobble of 0.3 m, and every ninth 4 m off.
+std::vector<Frame> FramesWithOutliers(int count) {
+  std::vector<Frame> frames;
+  for (int k = 0; k < count; ++k) {
+    const double wobble = 0.3 * std::sin(37.0 * k), outlier = k % 9 == 5 ? 4.0 : 0.0;
+    frames.push_back(FrameAt(kStep * k, {{0, 2.0 * std::cos(kStep * k) + wobble + outlier}}));
+  }
+  return frames;
+}
+
+/// Iteratively reweighted least squares by normal equations. The unknowns u are the prior's two
+/// deviations from the mean and the acceleration of each step, all scaled to N(0, 1);
+/// x_k = c_k + M_k u.
+Solution Reweighted(const RobustLoss& loss, const std::vector<Frame>& frames) {
+  const auto count = std::ssize(frames), n = count + 1;
+  std::vector<Eigen::MatrixXd> m;
+  std::vector<Eigen::VectorXd> c;
+  Eigen::MatrixXd to_x = Eigen::MatrixXd::Zero(2, n);
+  to_x(0, 0) = 2.0;
+  to_x(1, 1) = 3.0;
+  Eigen::Vector2d centre(1.0, -0.5);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    if (k > 0) {
+      to_x.row(0) += kStep * to_x.row(1);
+      centre(0) += kStep * centre(1);
+      to_x.col(k + 1) = kAcceleration * Eigen::Vector2d(0.5 * kStep * kStep, kStep);
+    }
+    m.push_back(to_x);
+    c.emplace_back(centre);
+  }
+  Eigen::VectorXd u = Eigen::VectorXd::Zero(n);
+  Solution solution;
+  Eigen::MatrixXd information;
+  for (int iteration = 0; iteration < 1000; ++iteration) {
+    information.setIdentity(n, n);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(n);
+    solution.cost = 0.5 * u.squaredNorm();
+    for (std::size_t k = 0; k < frames.size(); ++k) {
+      const Eigen::VectorXd h = kGain / kSigma * m[k].row(0).transpose();
+      const double z = (frames[k].measurements[0].values[0] - kGain * c[k](0)) / kSigma;
+      const double d = std::abs(z - h.dot(u)), w = Weight(loss, d);
+      solution.cost += Rho(loss, d);
+      information += w * h * h.transpose();
+      right += w * z * h;
+    }
+    u = information.ldlt().solve(right);
+  }
+  const Eigen::MatrixXd p = information.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    solution.x.emplace_back(c[i] + m[i] * u);
+    solution.p.emplace_back(m[i] * p * m[i].transpose());
+  }
+  return solution;
+}
+
+// An independent solve of the same: 60 measurements, 7 of them 13 sigma off.
+TEST(CeresBatchLoss, EqualsIterativelyReweightedLeastSquares) {
+  const std::vector<Frame> frames = FramesWithOutliers(60);
+  const double plain = SmoothOver(PointWith({}), frames).x[5](0);
+  for (const RobustLoss loss : {RobustLoss{LossKind::kHuber, 1.345}, {LossKind::kCauchy, 2.4}}) {
+    SCOPED_TRACE(ToString(loss.kind));
+    const Solution found = SmoothOver(PointWith(loss), frames);
+    const Solution expected = Reweighted(loss, frames);
+    ASSERT_EQ(found.x.size(), frames.size());
+    for (std::size_t k = 0; k < frames.size(); ++k) {
+      EXPECT_LT((found.x[k] - expected.x[k]).cwiseAbs().maxCoeff(), 1e-9) << k;
+      EXPECT_LT((found.p[k] - expected.p[k]).cwiseAbs().maxCoeff(), 1e-9) << k;
+    }
+    EXPECT_NEAR(found.cost, expected.cost, 1e-8 * expected.cost);  // printed with nine digits
+    EXPECT_GT(std::abs(found.x[5](0) - plain), 0.05);              // the loss tells
+  }
+}
+
+// The estimate of the last frame is the same, be it smoothed or solved for at that frame.
+TEST(CeresBatchLoss, OfTheDataSoFarEndsWhereTheSmootherDoes) {
+  const System system = PointWith({LossKind::kHuber, 1.345});
+  const std::vector<Frame> frames = FramesWithOutliers(30);
+  const Config config = Config::FromText("type: ceres_batch\ndata: so_far", "batch.yaml");
+  const auto batch =
+      Shipped().CreateEstimator("ceres_batch", config.root())(system, testing::StreamsOf(system));
+  for (const Frame& frame : frames) batch->Process(frame);
+  const Solution smoothed = SmoothOver(system, frames);
+  EXPECT_NEAR(testing::ValueOf(batch->state(), "p.x"), smoothed.x.back()(0), 1e-8);
+  EXPECT_NEAR(testing::CovarianceOf(batch->state(), "p.x", "p.v"), smoothed.p.back()(0, 1), 1e-8);
+}
+
+// ---- several elements ---------------------------------------------------------------------------
+
+struct StillPair : Motion<0, Vec<2>> {
+  static constexpr std::array kBlocks{Quantity{"x"}};
+  bool Stationary() const { return true; }
+  template <class T>
+  void Step(const T* x, const T*, double, T* next) const {
+    std::copy_n(x, 2, next);
+  }
+  void SqrtQ(double, MatrixRef) const {}
+};
+struct DirectPair : Sensor<Vec<2>, Vec<2>> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    std::copy_n(x, 2, z);
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = l[3] = T(1.0);
+  }
+};
+
+// d^2 = r' R^-1 r of both elements together, R correlated and of each measurement itself.
+TEST(CeresBatchLoss, IsOnTheWholeWhitenedResidual) {
+  const RobustLoss loss{LossKind::kHuber, 1.5};
+  System system;
+  const MotionModel still = InProcessMotion(StillPair(), "still");
+  const BlockId id = system.layout.Declare("p.x", "p", still.blocks()[0]);
+  system.motions.push_back({"p", still, {id}});
+  system.priors.push_back({id, {0.0, 0.0}, 4.0 * Eigen::Matrix2d::Identity(), ""});
+  AddSensor(system, "z", InProcessSensor(DirectPair(), "pair"), {"p.x"});
+  system.sensors[0].loss = loss;
+  const std::vector<Eigen::Vector2d> z = {{1.0, 2.0}, {1.4, 1.8}, {0.8, 2.3}, {4.0, 3.5}};
+  std::vector<Frame> frames;
+  Eigen::Matrix2d r;
+  r << 0.25, 0.15, 0.15, 0.16;
+  for (std::size_t k = 0; k < z.size(); ++k) {
+    Measurement m{StampFromSeconds(double(k)), 0, -1, {z[k](0), z[k](1)}, {}};
+    m.covariance = {r(0, 0), r(0, 1), r(1, 0), r(1, 1)};
+    frames.push_back({m.stamp, {m}, {}});
+  }
+  const Eigen::Matrix2d inverse = r.llt().solve(Eigen::Matrix2d::Identity());
+  Eigen::Vector2d x = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d information;
+  for (int iteration = 0; iteration < 1000; ++iteration) {
+    information = 0.25 * Eigen::Matrix2d::Identity();
+    Eigen::Vector2d right = Eigen::Vector2d::Zero();
+    for (const Eigen::Vector2d& one : z) {
+      const double w = Weight(loss, std::sqrt((one - x).dot(inverse * (one - x))));
+      information += w * inverse;
+      right += w * inverse * one;
+    }
+    x = information.llt().solve(right);
+  }
+  const Solution found = SmoothOver(system, frames);
+  EXPECT_LT((found.x[0] - x).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_LT((found.p[0] * information - Eigen::Matrix2d::Identity()).cwiseAbs().maxCoeff(), 1e-8);
+}
+
+// ---- a run --------------------------------------------------------------------------------------
+
+// Noise that depends on the state settles beside a loss; without outliers the loss costs little.
+TEST(CeresBatchLoss, OfAConfigServesFilterAndBatch) {
+  Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/05_depth_principled/config.yaml");
+  config.Set("estimators.batch.type", "ceres_batch", "--set");
+  config.Set("sensors.scale.loss", "{huber: 1.345}", "--set");
+  config.Set("sensors.stereo.loss", "{cauchy: 3}", "--set");
+  Experiment experiment = BuildExperiment(config, Shipped());
+  const RunResult run = alidade::Run(experiment, {});
+  ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
+  EXPECT_FALSE(run.estimators[1].diverged);
+  EXPECT_LT(run.estimators[1].metrics.at("rmse:target.depth"), 1.5e-3);
+}
+
+}  // namespace
+}  // namespace alidade

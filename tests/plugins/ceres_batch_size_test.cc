@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/plugin_host.h"
+#include "host_fixture.h"
+#include "support/systems.h"
+
+namespace alidade {
+namespace {
+
+// Two inputs of the prior and one of each step: the 1001st comes with the thousandth frame, which
+// is at 49.95 s.
+TEST(CeresBatchSize, WhatTakesLongIsSaidOnce) {
+  const PluginHost host;
+  System system = testing::MovingPoint();
+  testing::AddSensor(system, "z", InProcessSensor(testing::Linear(2.0, 0.3), "linear"), {"p.x"});
+  const Config config = Config::FromText("type: ceres_batch", "batch.yaml");
+  const auto batch =
+      host.CreateEstimator("ceres_batch", config.root())(system, testing::StreamsOf(system));
+  std::vector<Event> events;
+  for (int k = 0; k < 1100; ++k) {
+    const UpdateReport& report = batch->Process(testing::FrameAt(0.05 * k, {{0, 2.0}}));
+    events.insert(events.end(), report.events.begin(), report.events.end());
+  }
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(events[0].kind, "slow");
+  EXPECT_EQ(events[0].stamp, StampFromSeconds(49.95));
+  EXPECT_EQ(events[0].text,
+            "more than 1000 noise inputs: the time of a solve grows with their cube");
+}
+
+}  // namespace
+}  // namespace alidade

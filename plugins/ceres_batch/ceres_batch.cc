@@ -4,7 +4,9 @@
 #include <ceres/solver.h>
 
 #include <Eigen/QR>
+#include <algorithm>
 #include <cstdio>
+#include <iterator>
 #include <limits>
 
 #include "alidade/build_plugin.h"
@@ -68,6 +70,7 @@ class CeresBatch : public Estimator {
     }
     if (!filter_.failed()) filtered_.push_back(trajectory_.ValuesOf(filter_.state()));
     if (!offline()) SolveSoFar(frame.stamp);
+    std::ranges::copy_if(filter.events, std::back_inserter(report_.events), TellsOfTheData);
     return report_;
   }
 
@@ -93,6 +96,10 @@ class CeresBatch : public Estimator {
   }
 
  private:
+  /// Whether an event of the filter that goes along is one of the batch too.
+  static bool TellsOfTheData(const Event& event) {
+    return event.kind == "input_stale" || event.kind == "input_refused" || event.kind == "substeps";
+  }
   static EkfOptions FilterOptions(const Options& options) {
     EkfOptions filter;
     filter.lockout = Lockout::kNone;

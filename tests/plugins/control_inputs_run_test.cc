@@ -127,7 +127,10 @@ TEST_F(DrivenTest, ASensorOfTheNameOfAnEntryIsStillToldUnused) {
                     {"estimators", "{ekf: {type: ekf}}"}}),
               folder_ / "run");
   ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
-  EXPECT_EQ(std::ranges::count(run.estimators[0].events, "unused", &Event::kind), 1);
+  const std::vector<Event>& events = run.estimators[0].events;
+  const auto unused = std::ranges::find(events, "unused", &Event::kind);
+  ASSERT_NE(unused, events.end());
+  EXPECT_EQ(unused->text, "sensor 'car': stream 'none' had no measurement");
 }
 
 TEST_F(DrivenTest, FramesThatComeLateGiveTheBytesOfThoseInOrder) {

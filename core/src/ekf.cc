@@ -31,14 +31,6 @@ void SpreadNoise(const std::vector<double>& g, const std::vector<double>& l, std
   }
 }
 
-/// max_dt_s in whole nanoseconds, at least one.
-Stamp LongestPart(double max_dt_s) {
-  constexpr double kBeyond = 9.2e18;  // what a Stamp cannot hold
-  const double ns = std::round(1e9 * max_dt_s);
-  return ns < kBeyond ? std::max<Stamp>(1, static_cast<Stamp>(ns))
-                      : std::numeric_limits<Stamp>::max();
-}
-
 }  // namespace
 
 Ekf::~Ekf() = default;
@@ -48,6 +40,7 @@ Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>
       options_(options),
       stream_of_sensor_(system_.sensors.size(), -1),
       state_(system_.InitialState()),
+      inputs_(system_, streams),
       rejections_(system_.sensors.size(), 0),
       out_of_domain_(system_.sensors.size(), false),
       inflated_(system_.sensors.size(), false),
@@ -76,6 +69,8 @@ void Ekf::Restore(const Snapshot& snapshot) {
   const auto& kept = dynamic_cast<const Kept&>(snapshot);
   state_ = kept.state;
   stamp_ = kept.stamp;
+  inputs_ = kept.inputs;
+  most_parts_ = kept.most_parts;
   first_ = kept.first;
   rejections_ = kept.rejections;
   out_of_domain_ = kept.out_of_domain;
@@ -94,7 +89,13 @@ const UpdateReport& Ekf::Process(const Frame& frame) {
     small_ = typeid(*this) == typeid(Ekf) ? Small::For(*this) : nullptr;
     small_is_known_ = true;
   }
-  if (small_ != nullptr && small_->Process(frame)) return report_;
+  if (small_ == nullptr || !small_->Process(frame)) ProcessFully(frame);
+  inputs_.Take(frame, report_);
+  return report_;
+}
+
+/// The step and the updates of a frame on the general path.
+void Ekf::ProcessFully(const Frame& frame) {
   if (stamp_ == kNoStamp) {
     Start(system_.start_s ? StampFromSeconds(*system_.start_s) : frame.stamp);
   }
@@ -106,7 +107,7 @@ const UpdateReport& Ekf::Process(const Frame& frame) {
     for (MeasurementReport& entry : report_.measurements()) {
       entry.outcome = report_.stale ? Outcome::kStale : Outcome::kFailed;
     }
-    return report_;
+    return;
   }
   if (waiting_) InitialiseFromMeasurements();
   group_.clear();
@@ -124,7 +125,6 @@ const UpdateReport& Ekf::Process(const Frame& frame) {
   Fuse(group_);
   RepairCovariance();
   CountRejections();
-  return report_;
 }
 
 /// One row for each measurement and sensor bound to its stream, in the order of the sensors.
@@ -154,26 +154,50 @@ void Ekf::Collect(const Frame& frame) {
   }
 }
 
-/// Moves the state to `stamp`, in equal parts of at most max_dt_s. Where a part cannot be done the
-/// state stays at the end of the one before.
+/// Moves the state to `stamp`, piece by piece where a control input stops acting on the way.
 void Ekf::StepTo(Stamp stamp) {
+  while (stamp_ < stamp) {
+    UseInputs();
+    if (!StepEvenly(inputs_.StepEnd(stamp_, stamp))) return;
+  }
+}
+
+/// The control inputs from here on, for the models that move.
+void Ekf::UseInputs() {
+  if (inputs_.empty()) return;
+  for (std::size_t i = 0; i < motions_.size(); ++i) {
+    if (motions_[i].active) motions_[i].u = inputs_.Use(i, stamp_, report_.events);
+  }
+}
+
+/// Moves the state to `end`, in equal parts of at most max_dt_s. Where a part cannot be done the
+/// state stays at the end of the one before, and the filter has given up.
+bool Ekf::StepEvenly(Stamp end) {
   constexpr Stamp kMostParts = 1'000'000;
   Stamp elapsed = 0;
-  const bool overflow = __builtin_sub_overflow(stamp, stamp_, &elapsed);
-  if (elapsed == 0) return;
-  const Stamp count = (elapsed - 1) / LongestPart(options_.max_dt_s) + 1;
+  const bool overflow = __builtin_sub_overflow(end, stamp_, &elapsed);
+  const Stamp count = overflow ? 0 : StepParts(elapsed, options_.max_dt_s);
+  char text[128];
   if (overflow || count > kMostParts) {
-    char text[128];
     std::snprintf(text, sizeof(text), "a gap of %.6g s would need more than %g steps of %g s",
-                  Seconds(stamp) - Seconds(stamp_), static_cast<double>(kMostParts),
+                  Seconds(end) - Seconds(stamp_), static_cast<double>(kMostParts),
                   options_.max_dt_s);
-    return GiveUp("gap", text);
+    GiveUp("gap", text);
+    return false;
+  }
+  if (count >= 2 * most_parts_) {
+    std::snprintf(text, sizeof(text),
+                  "a gap of %.6g s, longer than max_dt_s = %g, is stepped in %g equal parts",
+                  Seconds(elapsed), options_.max_dt_s, static_cast<double>(count));
+    Note("substeps", text);
+    most_parts_ = count;
   }
   const Stamp start = stamp_;
   for (Stamp i = 1; i <= count; ++i) {
-    if (!StepOnce(Seconds(elapsed) / static_cast<double>(count))) return;
-    stamp_ = i == count ? stamp : start + elapsed / count * i;
+    if (!StepOnce(Seconds(elapsed) / static_cast<double>(count))) return false;
+    stamp_ = i == count ? end : start + elapsed / count * i;
   }
+  return true;
 }
 
 /// One step of all motion models: all of it happens or nothing.
@@ -253,7 +277,7 @@ bool Ekf::StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s) 
   std::fill(plan.f.begin(), plan.f.end(), unwritten);
   std::fill(plan.g.begin(), plan.g.end(), unwritten);
   std::fill(plan.l.begin(), plan.l.end(), 0.0);
-  Status status = motion.model.Step(plan.x.data(), nullptr, nullptr, dt_s, plan.next.data(),
+  Status status = motion.model.Step(plan.x.data(), plan.u, nullptr, dt_s, plan.next.data(),
                                     plan.f.data(), plan.g.data());
   if (status == Status::kOk) status = motion.model.SqrtQ(plan.x.data(), dt_s, plan.l.data());
   if (status != Status::kOk) {

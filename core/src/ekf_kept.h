@@ -12,6 +12,8 @@ struct Ekf::Kept : Snapshot {
   explicit Kept(const Ekf& ekf)
       : Snapshot(ekf.state_),
         stamp(ekf.stamp_),
+        inputs(ekf.inputs_),
+        most_parts(ekf.most_parts_),
         first(ekf.first_),
         rejections(ekf.rejections_),
         out_of_domain(ekf.out_of_domain_),
@@ -23,6 +25,8 @@ struct Ekf::Kept : Snapshot {
         failed(ekf.failed_) {}
 
   Stamp stamp;
+  ControlInputs inputs;
+  Stamp most_parts;
   std::vector<std::vector<double>> first;
   std::vector<int> rejections;
   std::vector<char> out_of_domain, inflated;

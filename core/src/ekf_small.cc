@@ -84,7 +84,7 @@ ALIDADE_INLINE bool Ekf::Small::StepModel(const Motion& motion, double dt_s, dou
   double* const g = plan.g.data();
   const int k = K > 0 ? K : motion.size, w = W > 0 ? W : motion.noise;
   for (int i = 0; i < w * w; ++i) l[i] = 0.0;
-  if (motion.model->Step(plan.x.data(), nullptr, nullptr, dt_s, plan.next.data(), plan.f.data(),
+  if (motion.model->Step(plan.x.data(), plan.u, nullptr, dt_s, plan.next.data(), plan.f.data(),
                          g) != Status::kOk ||
       motion.model->SqrtQ(plan.x.data(), dt_s, l) != Status::kOk) {
     return false;
@@ -303,6 +303,8 @@ bool Ekf::Small::ProcessSized(const Frame& frame) {
   }
   if (elapsed > 0) {
     const double dt_s = Seconds(elapsed);
+    if (!ekf_.inputs_.AllAct(ekf_.stamp_, frame.stamp)) return false;
+    ekf_.UseInputs();
     if (!(dt_s <= ekf_.options_.max_dt_s) || !Step<N>(dt_s)) return false;
     ekf_.stamp_ = frame.stamp;
   }

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/estimator.h"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 namespace alidade {
 
 Outcome OutcomeOf(Status status) {
@@ -15,6 +19,14 @@ Outcome OutcomeOf(Status status) {
       break;
   }
   return Outcome::kFailed;
+}
+
+Stamp StepParts(Stamp elapsed, double max_dt_s) {
+  constexpr double kBeyond = 9.2e18;  // what a Stamp cannot hold
+  const double ns = std::round(1e9 * max_dt_s);
+  const Stamp longest =
+      ns < kBeyond ? std::max<Stamp>(1, static_cast<Stamp>(ns)) : std::numeric_limits<Stamp>::max();
+  return (elapsed - 1) / longest + 1;
 }
 
 const char* ToString(Outcome outcome) {

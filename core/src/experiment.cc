@@ -29,10 +29,10 @@ void CheckSchema(const Node& root) {
   }
 }
 
-/// Index of the stream that the sensor entry names, of the size that the model measures.
-int FindStream(const Node& sensor, const SensorModel& model,
+/// Index of the stream that an entry of a sensor or an input names, of the size that `wanted_by` it.
+int FindStream(const Node& entry, int size, const std::string& wanted_by,
                const std::vector<StreamInfo>& streams) {
-  const Node node = sensor.At("stream");
+  const Node node = entry.At("stream");
   const std::vector<std::string> names = NamesOf(streams);
   const auto found = std::find(names.begin(), names.end(), node.Text());
   if (found == names.end()) {
@@ -40,13 +40,32 @@ int FindStream(const Node& sensor, const SensorModel& model,
               Nearest(node.Text(), names));
   }
   const auto index = static_cast<std::size_t>(found - names.begin());
-  if (streams[index].size != model.measurement().geometry.ambient) {
+  if (streams[index].size != size) {
     node.Fail("stream '" + names[index] + "' has " + std::to_string(streams[index].size) +
                   " values at a time",
-              std::to_string(model.measurement().geometry.ambient) + ", as model '" + model.name() +
-                  "' measures");
+              std::to_string(size) + ", as " + wanted_by);
   }
   return static_cast<int>(index);
+}
+
+int FindStream(const Node& sensor, const SensorModel& model,
+               const std::vector<StreamInfo>& streams) {
+  return FindStream(sensor, model.measurement().geometry.ambient,
+                    "model '" + model.name() + "' measures", streams);
+}
+
+/// Refuses a sensor or a control input whose stream the source does not have.
+void CheckStreams(const Node& root, const System& system, const std::vector<StreamInfo>& streams) {
+  for (const SensorBinding& sensor : system.sensors) {
+    FindStream(root.At("sensors").At(sensor.name), sensor.model, streams);
+  }
+  for (const MotionBinding& motion : system.motions) {
+    if (!motion.model.has_input()) continue;
+    const Space& input = motion.model.input();
+    FindStream(root.At("state").At(motion.name).At("input"), input.geometry.ambient,
+               "control input '" + input.name + "' of model '" + motion.model.name() + "'",
+               streams);
+  }
 }
 
 /// Names of the sensors an estimator uses, in its own order; empty: all, in the config's.
@@ -180,9 +199,7 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   entry.RejectUnread();
   named.system = BuildSystem(own.root(), host, only);
   if (of_core != nullptr) internal::RefuseUnsupported(*of_core, own.root(), named.system);
-  for (const SensorBinding& sensor : named.system.sensors) {
-    FindStream(own.root().At("sensors").At(sensor.name), sensor.model, streams);
-  }
+  CheckStreams(own.root(), named.system, streams);
   named.estimator = make(named.system, streams);
   if (use) named.accepted_by = ReadUse(*use, named, config.root().At("estimators"), before);
   return named;
@@ -328,9 +345,7 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
 
   // Every sensor is checked, whether or not an estimator uses it.
   const System whole = BuildSystem(root, host, {});
-  for (const SensorBinding& sensor : whole.sensors) {
-    FindStream(root.At("sensors").At(sensor.name), sensor.model, streams);
-  }
+  CheckStreams(root, whole, streams);
   experiment.time.ranks = RanksOf(streams, whole);
   experiment.segments = ReadSegments(root, whole, streams);
   for (const auto& [name, entry] : root.At("estimators", "a run").Entries()) {

@@ -95,8 +95,20 @@ std::string States(const System& system, const std::vector<StreamInfo>& truths) 
   return text;
 }
 
+/// The control input of a motion model, as in `speed <- odom, up to 0.2 s old`.
+std::string InputText(const MotionBinding& motion) {
+  if (!motion.model.has_input()) return "none";
+  const InputBinding& input = motion.input;
+  return motion.model.input().name + " <- " + input.stream +
+         (std::isfinite(input.max_age_s) ? ", up to " + NumberText(input.max_age_s) + " s old"
+                                         : "");
+}
+
 std::string Motions(const System& system) {
+  const bool driven = std::ranges::any_of(
+      system.motions, [](const MotionBinding& motion) { return motion.model.has_input(); });
   std::vector<TextRow> rows = {{"entry", "model", "moves", "noise inputs"}};
+  if (driven) rows[0].emplace_back("control input");
   for (const MotionBinding& motion : system.motions) {
     std::vector<std::string> blocks;
     for (const BlockId id : motion.blocks) {
@@ -106,6 +118,7 @@ std::string Motions(const System& system) {
     const int noise = motion.model.noise_size();
     rows.push_back({motion.name, motion.model.name(), blocks.empty() ? "none" : Join(blocks),
                     noise == 0 ? "none" : std::to_string(noise)});
+    if (driven) rows.back().push_back(InputText(motion));
   }
   return TextTable(rows, kIndent);
 }
@@ -306,14 +319,15 @@ std::string SupportText(const std::string& type) {
                 "    blocks estimated, considered (Schmidt) or fixed; roles estimate, consider, "
                 "hold;\n",
                 "    blocks estimated or fixed; roles estimate, hold;\n") +
-         "    linearise_at prediction" + either(can.at_measurement, " or measurement", "") +
+         "    control inputs; linearise_at prediction" +
+         either(can.at_measurement, " or measurement", "") +
          either(can.recovery, "; blocks that start from a measurement", "") +
          either(can.robust_loss, ";\n    robust losses", "") +
          ".\n    Not: " + either(can.considered, "", "considered blocks and roles, ") +
          either(can.at_measurement, "", "linearise_at measurement, ") +
          either(can.recovery, "",
                 "blocks that start from a measurement, recovery from a\n    lock-out, ") +
-         "control inputs, landmarks.\n";
+         "landmarks.\n";
 }
 
 /// What is done with late frames, where it is not the default.
@@ -337,6 +351,10 @@ std::string SourceText(const Config& config, const Experiment& experiment) {
     std::vector<std::string> users;
     for (const auto& [name, sensor] : config.root().At("sensors").Entries()) {
       if (sensor.At("stream").Text() == stream.name) users.push_back(name);
+    }
+    for (const auto& [name, state] : config.root().At("state").Entries()) {
+      const auto input = state.Find("input");
+      if (input && input->At("stream").Text() == stream.name) users.push_back(name + " (input)");
     }
     rows.push_back({stream.name, std::to_string(stream.size), users.empty() ? "-" : Join(users)});
   }

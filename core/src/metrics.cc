@@ -110,7 +110,7 @@ double SquaredMahalanobis(const Eigen::MatrixXd& p, const Eigen::VectorXd& error
 struct Metrics::Impl {
   std::vector<Tracked> tracked;
   std::vector<Owner> owners;
-  std::vector<std::string> sensors;
+  std::vector<std::string> sensors, motions;
   std::vector<Sums> sums;                                      ///< all stamps, then the segments
   std::vector<std::array<std::int64_t*, kOutcomes>> count_of;  ///< into counts, by sensor
   std::map<std::string, std::int64_t> counts;
@@ -257,6 +257,9 @@ void Metrics::Impl::AddReport(const std::vector<Sums*>& into, const UpdateReport
     if (m.outcome != Outcome::kAccepted || m.dof <= 0 || !std::isfinite(m.nis)) continue;
     for (Sums* s : into) s->nis[sensor].Add(m.nis / m.dof);
   }
+  for (const int motion : report.inputs) {
+    ++counts["inputs:" + motions[static_cast<std::size_t>(motion)]];
+  }
 }
 
 std::vector<Sums*> Metrics::Impl::SumsOf(const std::vector<bool>& in_segment) {
@@ -289,6 +292,7 @@ Metrics::Metrics(const NamedEstimator& named, const std::vector<StreamInfo>& tru
     : impl_(std::make_unique<Impl>()) {
   impl_->Track(named.system, truths);
   impl_->sensors = internal::NamesOf(named.system.sensors);
+  impl_->motions = internal::NamesOf(named.system.motions);
   impl_->count_of.resize(impl_->sensors.size());
   const auto add_sums = [&](std::string suffix) {
     const std::vector<Tally> blocks(impl_->tracked.size());

@@ -50,6 +50,18 @@ Trajectory StartNearPrior(const System& system) {
   return t;
 }
 
+/// A control input of no special value; empty where the model takes none.
+std::vector<double> GenericInput(const MotionModel& model) {
+  if (!model.has_input()) return {};
+  const Geometry& geometry = model.input().geometry;
+  std::vector<double> input(static_cast<std::size_t>(geometry.ambient));
+  std::vector<double> nudge(static_cast<std::size_t>(geometry.tangent));
+  for (std::size_t i = 0; i < nudge.size(); ++i) nudge[i] = 1.0 + 0.1 * static_cast<double>(i % 7);
+  geometry.Identity(input.data());
+  geometry.Plus(input.data(), nudge.data(), input.data());
+  return input;
+}
+
 /// Moves the values by dt and phi <- F phi. False where a model cannot step.
 bool Advance(const System& system, double dt_s, Trajectory& t, Eigen::MatrixXd& phi) {
   for (const MotionBinding& motion : system.motions) {
@@ -63,7 +75,8 @@ bool Advance(const System& system, double dt_s, Trajectory& t, Eigen::MatrixXd& 
     }
     for (auto& value : next) y.push_back(value.data());
     RowMajor f(n, n), g(n, std::max(1, motion.model.noise_size()));
-    if (motion.model.Step(x.data(), nullptr, nullptr, dt_s, y.data(), f.data(), g.data()) !=
+    const std::vector<double> u = GenericInput(motion.model);
+    if (motion.model.Step(x.data(), u.data(), nullptr, dt_s, y.data(), f.data(), g.data()) !=
         Status::kOk) {
       return false;
     }

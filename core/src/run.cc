@@ -105,7 +105,7 @@ void NoteUnused(const System& system, const std::string& accepted_by, EstimatorR
     for (const auto& [key, count] : result.counts) {
       const std::size_t colon = key.find(':');
       const std::string outcome = key.substr(0, colon);
-      if (key.substr(colon + 1) != sensor.name) continue;
+      if (key.substr(colon + 1) != sensor.name || outcome == "inputs") continue;
       all += count;
       if (outcome == ToString(Outcome::kAccepted) || outcome == ToString(Outcome::kInitialised)) {
         used += count;

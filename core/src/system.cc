@@ -109,15 +109,33 @@ void ReadPrior(const Node& initial, const Block& block, BlockId id, System& syst
   system.priors.push_back(std::move(prior));
 }
 
+/// `input: {stream: NAME, max_age_s: S}` of a model that takes a control input.
+InputBinding ReadInput(const Node& entry, const MotionModel& model) {
+  constexpr double kMostSeconds = 1e9;
+  InputBinding binding;
+  if (!model.has_input()) {
+    if (const auto input = entry.Find("input")) {
+      input->Fail("model '" + model.name() + "' takes no control input", "the key left out");
+    }
+    return binding;
+  }
+  const std::string needed_by =
+      "the control input " + model.input().name + " of model " + model.name();
+  const Node input = entry.At("input", needed_by);
+  if (!input.is_map()) input.Fail("not a map", "{stream: NAME}, or {stream: NAME, max_age_s: S}");
+  binding.stream = input.At("stream", needed_by).Text();
+  if (const auto max_age = input.Find("max_age_s")) {
+    binding.max_age_s = max_age->Number(0.0, kMostSeconds, true);
+  }
+  input.RejectUnread();
+  return binding;
+}
+
 void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost& host,
                     System& system) {
   const std::string model_name = entry.At("model", "a state entry").Text();
   MotionBinding binding{name, host.CreateMotion(model_name, entry), {}};
-  if (binding.model.has_input()) {
-    entry.Fail("model '" + model_name + "' needs a control input",
-               "a model without: control "
-               "inputs are not supported yet");
-  }
+  binding.input = ReadInput(entry, binding.model);
   const std::vector<std::string> names = ReadBlockNames(entry, binding.model);
   const auto considered = ReadNames(entry, "consider", names);
   const auto fixed = ReadNames(entry, "fixed", names);

@@ -144,7 +144,7 @@ Status Ukf::StepPoint(const std::vector<double>& from, const Eigen::VectorXd& no
     const Eigen::Map<const RowMajor> l(motions_[i].l.data(), size, size);
     const Eigen::VectorXd w = l * noise.segment(at, size);
     const Status status =
-        motion.model.Step(x.data(), nullptr, w.data(), dt_s, next.data(), nullptr, nullptr);
+        motion.model.Step(x.data(), motions_[i].u, w.data(), dt_s, next.data(), nullptr, nullptr);
     if (status != Status::kOk) return status;
     at += size;
   }

@@ -4,8 +4,10 @@
 #include <ceres/solver.h>
 
 #include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <limits>
 
 #include "alidade/build_plugin.h"
@@ -62,6 +64,7 @@ class CeresBatch : public Estimator {
                                 "more than " + std::to_string(kManyInputs) +
                                     " noise inputs: the time of a solve grows with their cube"});
     }
+    std::ranges::copy_if(filter.events, std::back_inserter(report_.events), TellsOfTheData);
     return report_;
   }
 
@@ -87,6 +90,10 @@ class CeresBatch : public Estimator {
   }
 
  private:
+  /// Whether an event of the filter that goes along is one of the batch too.
+  static bool TellsOfTheData(const Event& event) {
+    return event.kind == "input_stale" || event.kind == "input_refused" || event.kind == "substeps";
+  }
   static EkfOptions FilterOptions(const Options& options) {
     EkfOptions filter;
     filter.lockout = Lockout::kNone;

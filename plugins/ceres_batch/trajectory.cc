@@ -25,7 +25,10 @@ Eigen::MatrixXd SquareRoot(const Eigen::MatrixXd& p) {
 }  // namespace
 
 Trajectory::Trajectory(System system, const std::vector<StreamInfo>& streams, double max_dt_s)
-    : system_(std::move(system)), max_dt_s_(max_dt_s), initial_(system_.InitialState()) {
+    : system_(std::move(system)),
+      max_dt_s_(max_dt_s),
+      initial_(system_.InitialState()),
+      controls_(system_, streams) {
   for (const SensorBinding& sensor : system_.sensors) {
     const auto found = std::ranges::find(streams, sensor.stream, &StreamInfo::name);
     stream_of_sensor_.push_back(found == streams.end() ? -1
@@ -71,30 +74,51 @@ bool Trajectory::Add(const Frame& frame, const UpdateReport& filter) {
   }
   Node node;
   node.stale = frame.stamp < stamp_;
+  const int inputs = inputs_;
+  for (Stamp from = stamp_; from < frame.stamp;) {
+    const Stamp end = controls_.StepEnd(from, frame.stamp);
+    if (!AddSteps(from, end, node)) {
+      inputs_ = inputs;
+      return false;
+    }
+    from = end;
+  }
+  if (!node.stale) stamp_ = frame.stamp;
+  UpdateReport taken;
+  controls_.Take(frame, taken);
+  node.inputs = std::move(taken.inputs);
+  AddFactors(frame, filter, node);
+  nodes_.push_back(std::move(node));
+  return true;
+}
+
+/// The steps of all models from `from` to `end`, over which the control inputs are constant.
+bool Trajectory::AddSteps(Stamp from, Stamp end, Node& node) {
   Stamp elapsed = 0;
-  const bool overflow = __builtin_sub_overflow(frame.stamp, stamp_, &elapsed);
-  const double parts = std::max(1.0, std::ceil(Seconds(elapsed) / max_dt_s_));
-  if (!node.stale && (overflow || parts > kMostInputs)) {
-    return Fail("a gap before " + std::to_string(Seconds(frame.stamp)) + " s needs more than " +
+  const bool overflow = __builtin_sub_overflow(end, from, &elapsed);
+  const Stamp parts = overflow ? 0 : StepParts(elapsed, max_dt_s_);
+  if (overflow || parts > kMostInputs) {
+    return Fail("a gap before " + std::to_string(Seconds(end)) + " s needs more than " +
                 std::to_string(kMostInputs) + " steps of max_dt_s");
   }
-  int inputs = inputs_;
-  for (int part = 0; part < static_cast<int>(parts) && !node.stale && elapsed > 0; ++part) {
+  std::vector<Event> events;  // which the filter tells
+  for (Stamp part = 0; part < parts; ++part) {
     for (std::size_t i = 0; i < system_.motions.size(); ++i) {
       const MotionBinding& motion = system_.motions[i];
       if (motion.model.stationary() || !AllPresent(motion.blocks)) continue;
-      node.steps.push_back({i, Seconds(elapsed) / parts, inputs, {}});
-      inputs += motion.model.noise_size();
+      const double* const u = controls_.Use(i, from, events);
+      Step& step = node.steps.emplace_back();
+      step.motion = i;
+      step.dt_s = Seconds(elapsed) / static_cast<double>(parts);
+      step.column = inputs_;
+      if (u != nullptr) step.u.assign(u, u + motion.model.input().geometry.ambient);
+      inputs_ += motion.model.noise_size();
     }
-    if (inputs <= kMostInputs) continue;
+    if (inputs_ <= kMostInputs) continue;
     return Fail("more than " + std::to_string(kMostInputs) +
                 " noise inputs: the batch solves for all of them at once; a shorter series, or a "
                 "longer time between frames, has fewer");
   }
-  inputs_ = inputs;
-  if (!node.stale) stamp_ = frame.stamp;
-  AddFactors(frame, filter, node);
-  nodes_.push_back(std::move(node));
   return true;
 }
 
@@ -319,6 +343,7 @@ void Trajectory::Put(std::size_t k, const Point& point, const Eigen::MatrixXd& y
 void Trajectory::Report(std::size_t k, const Point& point, UpdateReport& report) const {
   report.Clear();
   report.stale = nodes_[k].stale;
+  report.inputs = nodes_[k].inputs;
   for (const Factor& factor : nodes_[k].factors) {
     const SensorBinding& sensor = SensorOf(factor);
     const Geometry& geometry = sensor.model.measurement().geometry;

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "alidade/control_inputs.h"
 #include "alidade/estimator.h"
 
 namespace alidade::ceres_batch {
@@ -13,7 +14,7 @@ namespace alidade::ceres_batch {
 /// A whole run as a function of its random inputs e, all of them N(0, 1):
 ///
 ///   prior         x_0     = m (+) L_0 e_0,             P_0 = L_0 L_0'
-///   motion        x_{k+1} = f(x_k, L_k e_{k+1}, dt),   Q_k = L_k L_k'
+///   motion        x_{k+1} = f(x_k, u_k, L_k e_{k+1}, dt),   Q_k = L_k L_k'
 ///   measurement   r_i     = L_i^-1 (z_i (-) h(x_k)),   R_i = L_i L_i'
 ///   MAP           e*      = argmin |e|^2 / 2 + sum_i rho_i(|r_i(e)|)   rho(d) = d^2 / 2, or a loss
 ///   first value   y       = g(x_k, z (+) L_i e_k)      of a block that starts from a measurement
@@ -92,7 +93,8 @@ class Trajectory {
     std::size_t motion;
     double dt_s;
     int column;
-    RowMajor l;  ///< frozen
+    std::vector<double> u;  ///< control input; empty: the model takes none
+    RowMajor l;             ///< frozen
   };
   struct Factor {
     int sensor;
@@ -112,8 +114,10 @@ class Trajectory {
     std::vector<Factor> factors;
     std::vector<First> firsts;  ///< after the steps
     bool stale = false;
+    std::vector<int> inputs;  ///< UpdateReport::inputs
   };
 
+  bool AddSteps(Stamp from, Stamp end, Node& node);
   void AddFactors(const Frame& frame, const UpdateReport& filter, Node& node);
   void AddFirsts(Node& node);
   void AddPart(int size, const RobustLoss& loss);
@@ -141,6 +145,7 @@ class Trajectory {
   std::vector<Node> nodes_;
   std::vector<Part> parts_;
   Stamp stamp_ = kNoStamp;
+  ControlInputs controls_;
   int inputs_ = 0, residuals_ = 0;
   double change_ = 0.0;
   mutable std::string problem_;

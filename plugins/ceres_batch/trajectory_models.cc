@@ -29,7 +29,7 @@ std::string Why(Status status, const std::string& error) {
 
 }  // namespace
 
-/// x = f(x, L e, dt); S = F S + [0  G L  0] and offset = F offset, in the rows of the model.
+/// x = f(x, u, L e, dt); S = F S + [0  G L  0] and offset = F offset, in the rows of the model.
 bool Trajectory::Move(const Step& step, const double* e, Point& point) const {
   const MotionBinding& motion = system_.motions[step.motion];
   const StateLayout& layout = initial_.layout();
@@ -45,7 +45,7 @@ bool Trajectory::Move(const Step& step, const double* e, Point& point) const {
     to.push_back(next.data() + layout[id].value_offset);
   }
   const Status status =
-      motion.model.Step(from.data(), nullptr, w.data(), step.dt_s, to.data(),
+      motion.model.Step(from.data(), step.u.data(), w.data(), step.dt_s, to.data(),
                         sensitivity ? f.data() : nullptr, sensitivity ? g.data() : nullptr);
   if (status != Status::kOk) {
     return Fail("motion model of '" + motion.name +

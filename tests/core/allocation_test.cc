@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <new>
 
+#include "support/driven.h"
 #include "support/systems.h"
 
 namespace {
@@ -59,6 +60,22 @@ TEST(Allocation, AStepOfTheFilterTakesNone) {
     EXPECT_EQ(allocations - before, 0);
     EXPECT_FALSE(ekf.diverged());
   }
+}
+
+TEST(Allocation, AControlInputTakesNone) {
+  System system = testing::DepthFilter();
+  testing::AddMotion(system, "car", InProcessMotion(testing::Driven(0.2), "driven"),
+                     {{"position", 0.0, 1.0}});
+  system.motions.back().input = {"odometry", 0.05};
+  std::vector<StreamInfo> streams = testing::StreamsOf(system);
+  streams.push_back({"odometry", 1});
+  Ekf ekf(system, {}, streams);
+  std::vector<Frame> frames;
+  for (int k = 0; k < 60; ++k) frames.push_back(testing::FrameAt(0.033 * k, {{2, 0.1 * k}}));
+  for (std::size_t k = 0; k < 20; ++k) ekf.Process(frames[k]);
+  const long before = allocations;
+  for (std::size_t k = 20; k < frames.size(); ++k) ekf.Process(frames[k]);
+  EXPECT_EQ(allocations - before, 0);
 }
 
 }  // namespace

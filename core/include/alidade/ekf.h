@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "alidade/control_inputs.h"
 #include "alidade/estimator.h"
 
 namespace alidade {
@@ -51,10 +52,13 @@ struct EkfOptions {
   static std::vector<ParamInfo> Schema();
 };
 
-/// Extended Kalman filter: x' = f(x, 0), P' = F P F' + G Q G'; an update with stacked Jacobian H
+/// Extended Kalman filter: x' = f(x, u, 0), P' = F P F' + G Q G'; an update with stacked Jacobian H
 /// of all accepted measurements, S = H P H' + R = L L', W = P H' L^-T, dx = W L^-1 r, P -= W W'.
 /// Where a gain is not the optimal one (considered blocks) the Joseph form takes its place. With a
 /// robust loss on the sensor R / w(d) stands for R, d^2 = r' S^-1 r.
+///
+/// Control inputs act as ControlInputs has it. A gap stepped in parts is noted as the event
+/// `substeps`, where it takes at least twice as many as any noted before.
 ///
 /// An update is a transaction: what would leave the state not finite or not positive definite is
 /// rolled back and reported. Where S is not positive definite because P is not positive
@@ -98,7 +102,8 @@ class Ekf : public Estimator {
   struct MotionPlan {
     bool active = true;  ///< false: stationary, or a block has no value yet
     std::vector<const double*> x;
-    std::vector<double*> next;                  ///< into next_
+    const double* u = nullptr;  ///< control input of the step; null: the model takes none
+    std::vector<double*> next;  ///< into next_
     std::vector<std::pair<int, int>> segments;  ///< rows of the covariance: (offset, size)
     std::vector<int> rows;                      ///< of F that have a covariance; empty: all
     std::vector<double> f, g, l, gl, q;         ///< F, G, L of Qw, G L, G Qw G'
@@ -166,7 +171,10 @@ class Ekf : public Estimator {
   void Bind();
   void KeepFirstEstimates();
   void BindMotions();
+  void ProcessFully(const Frame& frame);
   void StepTo(Stamp stamp);
+  bool StepEvenly(Stamp end);
+  void UseInputs();
   bool StepIsBounded() const;
   bool Propagate();
   void PropagateModels();
@@ -222,6 +230,8 @@ class Ekf : public Estimator {
   std::vector<double> next_, moved_, predicted_;
   std::vector<double*> jacobians_;
   Stamp stamp_ = kNoStamp;
+  ControlInputs inputs_;
+  Stamp most_parts_ = 1;                ///< of a gap, as far as they were noted
   std::vector<double> gate_threshold_;  ///< on r' S^-1 r, by sensor
   std::vector<int> rejections_;         ///< consecutive, by sensor
   std::vector<char> out_of_domain_;     ///< since the last acceptance, by sensor

@@ -29,6 +29,9 @@ enum class Outcome {
 const char* ToString(Outcome outcome);
 /// What a model's status means for the measurement; kOk is kAccepted.
 Outcome OutcomeOf(Status status);
+/// Number of equal parts in which a gap of `elapsed` > 0 is stepped: at most max_dt_s each, to whole
+/// ns, and at least 1 ns.
+Stamp StepParts(Stamp elapsed, double max_dt_s);
 /// Whether none of the values is infinite or not a number.
 inline bool AllFinite(std::span<const double> values) {
   double sum = 0.0;  // 0 times what is not finite is not a number
@@ -81,12 +84,14 @@ class UpdateReport {
   }
   void Clear() {
     stale = false;
+    inputs.clear();
     ClearMeasurements();
     events.clear();
   }
   void ClearMeasurements() { count_ = 0; }
 
-  bool stale = false;  ///< the frame is older than the state, which stays as it was
+  bool stale = false;       ///< the frame is older than the state, which stays as it was
+  std::vector<int> inputs;  ///< motion models whose control input was taken, as in System::motions
   std::vector<Event> events;
 
  private:

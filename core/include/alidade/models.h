@@ -109,6 +109,8 @@ class MotionModel {
   bool stationary() const { return (instance_->capabilities() & ALIDADE_STATIONARY) != 0; }
   int tangent_size() const { return tangent_size_; }
   bool has_input() const { return instance_->c().description->input != nullptr; }
+  /// The control input, where it has one.
+  const Space& input() const { return instance_->space(); }
 
   /// x', where `w` may be null (zero), F (n x n) and G (n x n_w) dense row-major; F and G may both
   /// be null.

@@ -25,7 +25,7 @@ enum class StaticOutcome {
 
 /// Extended Kalman filter over the blocks of `Motions`, numbered in order.
 ///
-///   predict    x' = f(x, 0, dt),  P' = F P F' + G Q G'
+///   predict    x' = f(x, u, 0, dt),  P' = F P F' + G Q G'
 ///   update     S = H P H' + R,  K = P H' S^-1,  x' = x (+) K r,  P' = P - K S K'
 ///
 ///   symbol     shape                  meaning
@@ -36,7 +36,7 @@ enum class StaticOutcome {
 /// Measurements are used one after the other, each linearised at the state that the one before has
 /// left, as the engine does under `fuse: per_measurement`. As there, P is carried along where the
 /// tangent basis of a unit vector turns with it. Sizes are known at compile time: Constant<1>, not
-/// Constant<>. Control inputs are not supported.
+/// Constant<>. Control inputs are given to Predict: to hold them is up to the caller.
 template <class... Motions>
 class StaticEkf {
  public:
@@ -75,9 +75,14 @@ class StaticEkf {
   /// P, n x n, in the order of the blocks.
   Covariance covariance() const { return p_.template selfadjointView<Eigen::Lower>(); }
 
-  /// Steps by dt_s seconds. Not kOk, and nothing moved, where a model is not defined.
-  __attribute__((flatten)) Status Predict(double dt_s) {
-    return PredictAll(dt_s, std::index_sequence_for<Motions...>{});
+  /// Steps by dt_s seconds with the control inputs `u` (ambient), `const double*` each: one for each
+  /// model that takes one, in their order. Not kOk, and nothing moved, where a model is not defined.
+  template <class... Inputs>
+  __attribute__((flatten)) Status Predict(double dt_s, Inputs... u) {
+    static_assert(sizeof...(Inputs) == InputsBefore(sizeof...(Motions)),
+                  "one control input for each model that takes one");
+    const double* const inputs[] = {u..., nullptr};
+    return PredictAll(dt_s, inputs, std::index_sequence_for<Motions...>{});
   }
 
   /// Uses z (ambient), a measurement of `sensor` whose roles are filled by the blocks `Roles`.
@@ -104,6 +109,13 @@ class StaticEkf {
     for (std::size_t i = 0; i < m; ++i) first += counts[i];
     return first;
   }
+  /// How many of the motion models before M take a control input.
+  static constexpr std::size_t InputsBefore(std::size_t m) {
+    const bool takes[] = {(Motions::Input::kAmbient > 0)...};
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < m; ++i) count += takes[i] ? 1 : 0;
+    return count;
+  }
   /// What models write, as a matrix. (Eigen wants a single column in column order.)
   template <int R, int C>
   using RowMajorMap = Eigen::Map<
@@ -118,12 +130,13 @@ class StaticEkf {
   using TransitionOf = Transition<detail::Blocks<Model>::kTangent>;
 
   template <std::size_t... M>
-  Status PredictAll(double dt_s, std::index_sequence<M...>) {
+  Status PredictAll(double dt_s, const double* const* inputs, std::index_sequence<M...>) {
     double next[kAmbient];
     std::tuple<TransitionOf<Motions>...> transitions;
     Status status = Status::kOk;
-    const bool all =
-        (((status = StepOne<M>(dt_s, next, std::get<M>(transitions))) == Status::kOk) && ...);
+    const bool all = (((status = StepOne<M>(dt_s, inputs[InputsBefore(M)], next,
+                                            std::get<M>(transitions))) == Status::kOk) &&
+                      ...);
     if (!all) return status;
     std::copy_n(next, kAmbient, x_);
     const auto normalise = [&](auto index) {
@@ -135,7 +148,7 @@ class StaticEkf {
     return Status::kOk;
   }
   template <std::size_t M, int N>
-  Status StepOne(double dt_s,
+  Status StepOne(double dt_s, const double* u,
                  double* next,  // NOLINT(readability-non-const-parameter): y points into it
                  Transition<N>& transition) const {
     using Model = std::tuple_element_t<M, std::tuple<Motions...>>;
@@ -151,7 +164,7 @@ class StaticEkf {
     };
     detail::ForEach(place, indices);
     double f[N * N], g[N * n_w + 1] = {}, l[n_w * n_w + 1] = {};
-    const Status status = Step(model, x, nullptr, nullptr, dt_s, y, {f, N}, {g, n_w});
+    const Status status = Step(model, x, u, nullptr, dt_s, y, {f, N}, {g, n_w});
     if (status != Status::kOk) return status;
     detail::CallSqrtQ(model, x, dt_s, {l, n_w}, indices);
     const Eigen::Matrix<double, N, n_w> gl =

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -38,11 +39,19 @@ struct SensorBinding {
   RobustLoss loss = {};  ///< on the Mahalanobis distance of the innovation
 };
 
-/// Motion model -> the blocks it moves.
+/// Stream -> the control input of a motion model.
+struct InputBinding {
+  std::string stream;  ///< "" where the model takes none
+  /// From this age on an input does not act any more.
+  double max_age_s = std::numeric_limits<double>::infinity();
+};
+
+/// Motion model -> the blocks it moves, and what drives it.
 struct MotionBinding {
   std::string name;
   MotionModel model;
   std::vector<BlockId> blocks;
+  InputBinding input = {};
 };
 
 /// How a block starts: a value with a covariance, or the first measurement of a sensor.

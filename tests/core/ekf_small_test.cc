@@ -159,5 +159,52 @@ TEST(SmallEkf, StacksMeasurementsOfSeveralRows) {
   EXPECT_GT(seen.count("gated"), 0u);
 }
 
+/// x' = x + w, with a square root of Qw that is not triangular.
+struct Shaken : Motion<2, Vec<2>> {
+  static constexpr std::array kBlocks{Quantity{"x"}};
+  template <class T>
+  void Step(const T* x, const T* w, double, T* next) const {
+    next[0] = x[0] + w[0];
+    next[1] = x[1] + w[1];
+  }
+  void SqrtQ(double dt_s, MatrixRef l) const {
+    l(0, 0) = l(1, 1) = 0.3 * dt_s;
+    l(0, 1) = 0.8 * dt_s;
+  }
+};
+
+/// x' = x + dt (x_2, -x_1), without noise.
+struct Turning : Motion<0, Vec<2>> {
+  static constexpr std::array kBlocks{Quantity{"x"}};
+  template <class T>
+  void Step(const T* x, const T*, double dt_s, T* next) const {
+    next[0] = x[0] + dt_s * x[1];
+    next[1] = x[1] - dt_s * x[0];
+  }
+  void SqrtQ(double, MatrixRef) const {}
+};
+
+TEST(SmallEkf, TakesAnySquareRootOfTheNoiseAndMotionWithoutNoise) {
+  for (const MotionModel& model :
+       {InProcessMotion(Shaken(), "shaken"), InProcessMotion(Turning(), "turning")}) {
+    System system;
+    const BlockId x = system.layout.Declare("a.x", "a", model.blocks()[0]);
+    system.motions.push_back({"a", model, {x}});
+    Prior prior;
+    prior.block = x;
+    prior.mean = {1.5, 0.7};
+    prior.covariance = Eigen::Matrix2d{{0.5, 0.1}, {0.1, 0.3}};
+    system.priors.push_back(prior);
+    AddSensor(system, "pair", InProcessSensor(Pair(), "pair"), {"a.x"});
+    std::vector<Frame> frames;
+    for (int k = 0; k < 20; ++k) {
+      Frame frame = FrameAt(0.1 * k, {});
+      frame.measurements.push_back({frame.stamp, 0, -1, {1.0, 3.0}, {}});
+      frames.push_back(frame);
+    }
+    EXPECT_EQ(Compare(system, {}, frames)["accepted"], 20);
+  }
+}
+
 }  // namespace
 }  // namespace alidade

@@ -9,8 +9,8 @@
 namespace alidade::internal {
 
 /// A square root A of a symmetric, positive semi-definite P = A A', singular or not, from the
-/// pivoted L D L' of its lower triangle. Returns the most negative pivot, over the largest variance;
-/// 0: none. Negative pivots count as zero. `ldlt` is memory.
+/// pivoted L D L' of its lower triangle. Returns the most negative pivot, over the largest
+/// variance; 0: none. Negative pivots count as zero. `ldlt` is memory.
 inline double SquareRootOf(const Eigen::Ref<const Eigen::MatrixXd>& p,
                            Eigen::LDLT<Eigen::MatrixXd>& ldlt, Eigen::MatrixXd& root) {
   root.resize(p.rows(), p.cols());

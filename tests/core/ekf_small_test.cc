@@ -4,6 +4,7 @@
 // makes the same filter take.
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <cmath>
 #include <map>
 #include <string>
@@ -76,6 +77,12 @@ std::map<std::string, int> Compare(const System& system, const EkfOptions& optio
       EXPECT_EQ(one.outcome, two.outcome);
       EXPECT_EQ(one.dof, two.dof);
       EXPECT_NEAR(one.nis, two.nis, 1e-10 * (1.0 + two.nis));
+      if (one.outcome == Outcome::kAccepted || one.outcome == Outcome::kGated) {
+        const Eigen::Map<const RowMajor> cov(one.s.data(), one.dof, one.dof);
+        const Eigen::Map<const Eigen::VectorXd> r(one.innovation.data(), one.dof);
+        const double nis = r.dot(cov.fullPivLu().solve(r));
+        EXPECT_NEAR(one.nis, nis, 1e-10 * (1.0 + nis));
+      }
       ExpectEqual(one.z, two.z);
       ExpectEqual(one.h, two.h);
       ExpectEqual(one.innovation, two.innovation);

@@ -5,7 +5,10 @@
 #include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <iomanip>
+#include <locale>
 #include <memory>
+#include <sstream>
 
 #include "alidade/recorder.h"
 #include "command.h"
@@ -50,9 +53,10 @@ std::vector<EventGroup> Group(const std::vector<Event>& events) {
 
 std::string EventLine(const Event& event) {
   if (event.stamp == kNoStamp) return event.text;
-  char at[48];
-  std::snprintf(at, sizeof(at), "t = %.3f s: ", Seconds(event.stamp));
-  return at + event.text;
+  std::ostringstream line;
+  line.imbue(std::locale::classic());
+  line << "t = " << std::fixed << std::setprecision(3) << Seconds(event.stamp) << " s: ";
+  return line.str() + event.text;
 }
 
 /// What happened to the estimators, a few lines for each kind of event.

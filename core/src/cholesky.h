@@ -5,12 +5,12 @@
 
 namespace alidade::internal {
 
-/// Cholesky factor of a symmetric matrix; false unless it is finite and positive definite.
-/// (Eigen's own LLT reports success on NaN.)
-inline bool Factorise(const Eigen::MatrixXd& s, Eigen::LLT<Eigen::MatrixXd>& llt) {
+/// Puts L of a symmetric S = L L' in place of its lower triangle; false unless S is finite and
+/// positive definite. (Eigen's own LLT reports success on NaN.)
+inline bool Factorise(Eigen::Ref<Eigen::MatrixXd> s) {
   if (!s.allFinite()) return false;
-  llt.compute(s);
-  return llt.info() == Eigen::Success && (llt.matrixLLT().diagonal().array() > 0.0).all();
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(s);
+  return llt.info() == Eigen::Success && (s.diagonal().array() > 0.0).all();
 }
 
 }  // namespace alidade::internal

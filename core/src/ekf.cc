@@ -3,44 +3,38 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numeric>
-#include <typeinfo>
 
 #include "alidade/statistics.h"
 #include "ekf_kept.h"
 #include "ekf_small.h"
+#include "number_text.h"
+#include "small_kernels.h"
 
 namespace alidade {
 namespace {
 
-/// gl = G L and q = G L L' G', for G n x m and L m x m.
-void SpreadNoise(const std::vector<double>& g, const std::vector<double>& l, std::size_t n,
-                 std::size_t m, std::vector<double>& gl, std::vector<double>& q) {
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t c = 0; c < m; ++c) {
-      double sum = 0.0;
-      for (std::size_t k = 0; k < m; ++k) sum += g[i * m + k] * l[k * m + c];
-      gl[i * m + c] = sum;
-    }
-    for (std::size_t j = 0; j <= i; ++j) {
-      double sum = 0.0;
-      for (std::size_t c = 0; c < m; ++c) sum += gl[i * m + c] * gl[j * m + c];
-      q[i * n + j] = q[j * n + i] = sum;
-    }
-  }
-}
+/// Six significant digits.
+std::string Rounded(double value) { return internal::RoundedText(value, 6); }
+
+/// `1.500000 s`
+std::string InSeconds(Stamp stamp) { return internal::FixedText(Seconds(stamp), 6) + " s"; }
 
 }  // namespace
 
 Ekf::~Ekf() = default;
 
 Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams)
+    : Ekf(std::move(system), options, streams, Steps::kOwn) {}
+
+Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams,
+         Steps steps)
     : system_(std::move(system)),
       options_(options),
       stream_of_sensor_(system_.sensors.size(), -1),
       state_(system_.InitialState()),
       inputs_(system_, streams),
+      steps_(steps),
       rejections_(system_.sensors.size(), 0),
       out_of_domain_(system_.sensors.size(), false),
       inflated_(system_.sensors.size(), false),
@@ -85,10 +79,6 @@ void Ekf::Restore(const Snapshot& snapshot) {
 
 const UpdateReport& Ekf::Process(const Frame& frame) {
   report_.Clear();
-  if (!small_is_known_) {
-    small_ = typeid(*this) == typeid(Ekf) ? Small::For(*this) : nullptr;
-    small_is_known_ = true;
-  }
   if (small_ == nullptr || !small_->Process(frame)) ProcessFully(frame);
   inputs_.Take(frame, report_);
   return report_;
@@ -177,19 +167,16 @@ bool Ekf::StepEvenly(Stamp end) {
   Stamp elapsed = 0;
   const bool overflow = __builtin_sub_overflow(end, stamp_, &elapsed);
   const Stamp count = overflow ? 0 : StepParts(elapsed, options_.max_dt_s);
-  char text[128];
   if (overflow || count > kMostParts) {
-    std::snprintf(text, sizeof(text), "a gap of %.6g s would need more than %g steps of %g s",
-                  Seconds(end) - Seconds(stamp_), static_cast<double>(kMostParts),
-                  options_.max_dt_s);
-    GiveUp("gap", text);
+    GiveUp("gap", "a gap of " + Rounded(Seconds(end) - Seconds(stamp_)) +
+                      " s would need more than " + Rounded(static_cast<double>(kMostParts)) +
+                      " steps of " + Rounded(options_.max_dt_s) + " s");
     return false;
   }
   if (count >= 2 * most_parts_) {
-    std::snprintf(text, sizeof(text),
-                  "a gap of %.6g s, longer than max_dt_s = %g, is stepped in %g equal parts",
-                  Seconds(elapsed), options_.max_dt_s, static_cast<double>(count));
-    Note("substeps", text);
+    Note("substeps", "a gap of " + Rounded(Seconds(elapsed)) +
+                         " s, longer than max_dt_s = " + Rounded(options_.max_dt_s) +
+                         ", is stepped in " + std::to_string(count) + " equal parts");
     most_parts_ = count;
   }
   const Stamp start = stamp_;
@@ -286,8 +273,8 @@ bool Ekf::StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s) 
                (status == Status::kError ? motion.model.error_text() : "out of its domain"));
     return false;
   }
-  SpreadNoise(plan.g, plan.l, static_cast<std::size_t>(motion.model.tangent_size()),
-              static_cast<std::size_t>(motion.model.noise_size()), plan.gl, plan.q);
+  internal::SpreadNoise(plan.g.data(), plan.l.data(), motion.model.tangent_size(),
+                        motion.model.noise_size(), plan.gl.data(), plan.q.data());
   bool finite = AllFinite(plan.f) && AllFinite(plan.q);
   for (std::size_t i = 0; i < motion.blocks.size(); ++i) {
     const auto size =
@@ -319,14 +306,12 @@ void Ekf::NoteDivergence(const char* kind, std::string text) {
 /// `block = value, ...` for the given blocks that have one.
 std::string Ekf::Describe(const std::vector<BlockId>& blocks) const {
   std::string text;
-  char number[32];
   for (const BlockId id : blocks) {
     if (id < 0 || !state_.layout()[id].present) continue;
     const Block& block = state_.layout()[id];
     text += (text.empty() ? "" : ", ") + block.name + " =";
     for (int i = 0; i < block.geometry().ambient; ++i) {
-      std::snprintf(number, sizeof(number), " %.6g", state_.value(id)[i]);
-      text += number;
+      text += ' ' + internal::RoundedText(state_.value(id)[i], 6);
     }
   }
   return text;
@@ -337,18 +322,12 @@ void Ekf::GiveUp(const char* kind, const std::string& what) {
   failed_ = true;
   std::vector<BlockId> all(state_.layout().blocks().size());
   std::iota(all.begin(), all.end(), 0);
-  char at[48];
-  std::snprintf(at, sizeof(at), "; last good state at %.6f s: ", Seconds(stamp_));
-  std::string text = what + at + Describe(all);
+  std::string text = what + "; last good state at " + InSeconds(stamp_) + ": " + Describe(all);
   if (last_used_.sensor >= 0) {
-    std::snprintf(at, sizeof(at), " at %.6f s", Seconds(last_used_.stamp));
     text += "; last measurement used: sensor '" +
-            system_.sensors[static_cast<std::size_t>(last_used_.sensor)].name + "'" + at + ", z =";
-    for (const double z : last_used_.z) {
-      char number[32];
-      std::snprintf(number, sizeof(number), " %.6g", z);
-      text += number;
-    }
+            system_.sensors[static_cast<std::size_t>(last_used_.sensor)].name + "' at " +
+            InSeconds(last_used_.stamp) + ", z =";
+    for (const double z : last_used_.z) text += ' ' + internal::RoundedText(z, 6);
   }
   NoteDivergence(kind, text);
 }

@@ -23,23 +23,24 @@ Outcome Ekf::Apply(std::span<Row* const> rows) {
     Note("not_pd", "the update would leave S or P not positive definite; rolled back");
   } else if (outcome == Outcome::kNotFinite) {
     Note("not_finite", "the update is not finite; rolled back");
-  } else {
-    const Row& last = *rows.back();
-    last_used_.sensor = last.sensor;
-    last_used_.stamp = last.measurement->stamp;
-    last_used_.z.assign(last.measurement->values.begin(), last.measurement->values.end());
   }
   return outcome;
 }
 
-/// `gain` is n x m by columns, its rows as they lie in P.
-void Ekf::RecordGain(MeasurementReport& entry, const double* gain) const {
-  const auto n = static_cast<std::size_t>(state_.covariance().size());
-  const auto m = static_cast<std::size_t>(entry.dof);
-  if (order_.empty()) return entry.gain.assign(gain, gain + n * m);
-  for (std::size_t j = 0; j < m; ++j) {
-    for (const int row : order_) entry.gain.push_back(gain[j * n + static_cast<std::size_t>(row)]);
+void Ekf::RecordUpdate(std::span<Row* const> rows, const double* gain) {
+  const int n = state_.covariance().size();
+  for (const Row* row : rows) {
+    MeasurementReport& entry = EntryOf(*row);
+    const double* const end = gain + n * entry.dof;
+    if (order_.empty()) entry.gain.assign(gain, end);
+    for (; gain != end; gain += n) {
+      for (const int i : order_) entry.gain.push_back(gain[i]);
+    }
   }
+  const Row& last = *rows.back();
+  last_used_.sensor = last.sensor;
+  last_used_.stamp = last.measurement->stamp;
+  last_used_.z.assign(last.measurement->values.begin(), last.measurement->values.end());
 }
 
 /// Few states and few rows: nothing is allocated.
@@ -77,28 +78,22 @@ Outcome Ekf::ApplySmall(std::span<Row* const> rows, int m) {
                gain.data())) {
     return Outcome::kNotPd;
   }
-  if (correction_ != nullptr) std::copy_n(correction_->data(), n, dx.begin());
+  if (correction_ != nullptr) std::copy_n(correction_, n, dx.begin());
   if (!AllFinite({dx.data(), n})) return Outcome::kNotFinite;
   state_.Retract(dx.data(), moved_);
   if (!AllFinite(moved_)) return Outcome::kNotFinite;
   if (!p.Downdate(m, w.data(), inverse_d.data())) return ApplyLarge(rows);
   state_.MoveTo(moved_);  // last: P turns with the tangent planes
-  at = 0;
-  for (const Row* row : rows) {
-    MeasurementReport& entry = EntryOf(*row);
-    const auto k = static_cast<std::size_t>(entry.dof);
-    RecordGain(entry, gain.data() + at * n);
-    at += k;
-  }
+  RecordUpdate(rows, gain.data());
   return Outcome::kAccepted;
 }
 
 /// P H' of all rows, n x m.
-Eigen::MatrixXd Ekf::ProjectionOf(std::span<Row* const> rows) const {
+Workspace::Matrix Ekf::ProjectionOf(std::span<Row* const> rows) {
   const Eigen::Index n = state_.covariance().size();
   Eigen::Index m = 0;
   for (const Row* row : rows) m += BindingOf(*row).model.measurement().geometry.tangent;
-  Eigen::MatrixXd pht(n, m);
+  Workspace::Matrix pht = work_.Take(n, m);
   m = 0;
   for (const Row* row : rows) {
     const Eigen::Index k = BindingOf(*row).model.measurement().geometry.tangent;
@@ -109,9 +104,9 @@ Eigen::MatrixXd Ekf::ProjectionOf(std::span<Row* const> rows) const {
 }
 
 Outcome Ekf::ApplyLarge(std::span<Row* const> rows) {
-  const int n = state_.covariance().size();
+  const Workspace::Use use(work_);
   const Stacked all = Stack(rows);
-  const Eigen::MatrixXd pht = ProjectionOf(rows);
+  const Workspace::Matrix pht = ProjectionOf(rows);
   Eigen::MatrixXd s = all.noise;
   Eigen::Index at = 0;
   for (const Row* row : rows) {
@@ -122,22 +117,19 @@ Outcome Ekf::ApplyLarge(std::span<Row* const> rows) {
     }
     at += k;
   }
-  Eigen::LLT<Eigen::MatrixXd> llt;
-  if (!internal::Factorise(s, llt)) return Outcome::kNotPd;
-  const Eigen::MatrixXd w = llt.matrixL().solve(pht.transpose()).transpose();
-  Eigen::MatrixXd gain = llt.solve(pht.transpose()).transpose();
+  if (!internal::Factorise(s)) return Outcome::kNotPd;
+  const auto l = s.triangularView<Eigen::Lower>();
+  const auto l_transposed = s.transpose().triangularView<Eigen::Upper>();
+  const Eigen::MatrixXd w = l.solve(pht.transpose()).transpose();
+  Eigen::MatrixXd gain = l_transposed.solve(w.transpose()).transpose();
   const bool masked = MaskConsidered(rows, gain);
-  const Eigen::VectorXd dx = correction_ != nullptr ? *correction_ : gain * all.innovation;
+  Eigen::VectorXd dx = gain * all.innovation;
+  if (correction_ != nullptr) std::copy_n(correction_, dx.size(), dx.data());
   state_.Retract(dx.data(), moved_);
   if (!AllFinite(moved_) || !w.allFinite() || !gain.allFinite()) return Outcome::kNotFinite;
   if (!Correct(w, gain, masked, all.h, all.noise)) return Outcome::kNotPd;
   state_.MoveTo(moved_);
-  at = 0;
-  for (const Row* row : rows) {
-    MeasurementReport& entry = EntryOf(*row);
-    RecordGain(entry, gain.data() + at * n);
-    at += entry.dof;
-  }
+  RecordUpdate(rows, gain.data());
   return Outcome::kAccepted;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/ekf.h"
+#include "ekf_small.h"
 
 namespace alidade {
 
@@ -59,7 +59,7 @@ void Ekf::Bind() {
   }
   for (Row& row : rows_) row.zeroed = nullptr;
   BindMotions();
-  small_is_known_ = false;
+  small_ = steps_ == Steps::kOwn ? Small::For(*this) : nullptr;
 }
 
 /// Under `first_estimate`: the values of stationary blocks that have none noted yet.
@@ -93,6 +93,9 @@ void Ekf::BindMotions() {
       plan.x.push_back(state_.value(id));
       plan.next.push_back(next_.data() + block.value_offset);
       for (int k = 0; k < size && block.has_covariance(); ++k) plan.rows.push_back(row + k);
+      for (int k = 0; k < size; ++k) {
+        plan.at.push_back(block.has_covariance() ? block.tangent_offset + k : -1);
+      }
       row += size;
       if (!block.has_covariance()) {
         whole = false;

@@ -1,67 +1,61 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // A step and an update of the filter as whole matrices, for the estimators that build on it.
+#include <algorithm>
+
 #include "alidade/ekf.h"
 
 namespace alidade {
-namespace {
 
-/// Rows of the covariance that one motion model moves, in its own order.
-std::vector<int> RowsOf(const std::vector<std::pair<int, int>>& segments) {
-  std::vector<int> rows;
-  for (const auto& [offset, size] : segments) {
-    for (int i = 0; i < size; ++i) rows.push_back(offset + i);
+int Ekf::NoiseSize() const {
+  int size = 0;
+  for (std::size_t i = 0; i < motions_.size(); ++i) {
+    if (motions_[i].active) size += system_.motions[i].model.noise_size();
   }
-  return rows;
+  return size;
 }
 
-}  // namespace
-
-Eigen::MatrixXd Ekf::Transition() const {
+Workspace::Matrix Ekf::Transition() {
   const Eigen::Index n = state_.covariance().size();
-  Eigen::MatrixXd transition = Eigen::MatrixXd::Identity(n, n);
-  for (std::size_t i = 0; i < motions_.size(); ++i) {
-    const MotionPlan& plan = motions_[i];
-    if (!plan.active || plan.segments.empty()) continue;
-    const std::vector<int> at = RowsOf(plan.segments);
-    const Eigen::Index k = system_.motions[i].model.tangent_size();
-    const Eigen::Map<const RowMajor> f(plan.f.data(), k, k);
-    if (plan.rows.empty()) {
-      transition(at, at) = f;
-    } else {
-      transition(at, at) = f(plan.rows, plan.rows);
+  Workspace::Matrix transition = work_.Take(n, n);
+  transition.setIdentity();
+  for (const MotionPlan& plan : motions_) {
+    if (!plan.active) continue;
+    const double* f = plan.f.data();
+    for (const int row : plan.at) {
+      for (const int column : plan.at) {
+        if (row >= 0 && column >= 0) transition(row, column) = *f;
+        ++f;
+      }
     }
   }
   return transition;
 }
 
-Eigen::MatrixXd Ekf::NoiseInput() const {
+Workspace::Matrix Ekf::NoiseInput() {
+  Workspace::Matrix input = work_.Take(state_.covariance().size(), NoiseSize());
+  input.setZero();
   Eigen::Index columns = 0;
-  for (std::size_t i = 0; i < motions_.size(); ++i) {
-    if (motions_[i].active) columns += system_.motions[i].model.noise_size();
-  }
-  Eigen::MatrixXd input = Eigen::MatrixXd::Zero(state_.covariance().size(), columns);
-  columns = 0;
   for (std::size_t i = 0; i < motions_.size(); ++i) {
     const MotionPlan& plan = motions_[i];
     if (!plan.active) continue;
     const MotionModel& model = system_.motions[i].model;
     const Eigen::Map<const RowMajor> gl(plan.gl.data(), model.tangent_size(), model.noise_size());
-    const std::vector<int> at = RowsOf(plan.segments);
-    for (std::size_t row = 0; row < at.size(); ++row) {
-      const Eigen::Index own = plan.rows.empty() ? static_cast<Eigen::Index>(row) : plan.rows[row];
-      input.row(at[row]).segment(columns, model.noise_size()) = gl.row(own);
+    for (std::size_t row = 0; row < plan.at.size(); ++row) {
+      if (plan.at[row] < 0) continue;
+      input.row(plan.at[row]).segment(columns, gl.cols()) = gl.row(static_cast<Eigen::Index>(row));
     }
-    columns += model.noise_size();
+    columns += gl.cols();
   }
   return input;
 }
 
-Ekf::Stacked Ekf::Stack(std::span<Row* const> rows) const {
+Ekf::Stacked Ekf::Stack(std::span<Row* const> rows) {
   Eigen::Index m = 0;
   for (const Row* row : rows) m += BindingOf(*row).model.measurement().geometry.tangent;
-  Stacked all{Eigen::MatrixXd::Zero(m, state_.covariance().size()), Eigen::MatrixXd::Zero(m, m),
-              Eigen::VectorXd(m)};
+  Stacked all{work_.Take(m, state_.covariance().size()), work_.Take(m, m), work_.Take(m)};
+  all.h.setZero();
+  all.noise.setZero();
   Eigen::Index at = 0;
   for (const Row* row : rows) {
     const JacobianRows own = JacobianOf(*row);
@@ -78,9 +72,17 @@ Ekf::Stacked Ekf::Stack(std::span<Row* const> rows) const {
   return all;
 }
 
-Eigen::MatrixXd Ekf::TransportTo(const std::vector<double>& values) const {
+void Ekf::SetCovariance(const Workspace::Matrix& p) {
+  Covariance& covariance = state_.covariance();
+  for (Eigen::Index c = 0; c < p.cols(); ++c) {
+    std::copy_n(&p(c, c), p.rows() - c, covariance.data() + c * covariance.stride() + c);
+  }
+}
+
+Workspace::Matrix Ekf::TransportTo(const std::vector<double>& values) {
   const Eigen::Index n = state_.covariance().size();
-  Eigen::MatrixXd transport = Eigen::MatrixXd::Identity(n, n);
+  Workspace::Matrix transport = work_.Take(n, n);
+  transport.setIdentity();
   for (const Block& block : state_.layout().blocks()) {
     if (!block.has_covariance() || block.geometry().kind != GeometryKind::kUnitVector) continue;
     const Eigen::Index k = block.geometry().tangent;
@@ -90,19 +92,6 @@ Eigen::MatrixXd Ekf::TransportTo(const std::vector<double>& values) const {
     transport.block(block.tangent_offset, block.tangent_offset, k, k) = j;
   }
   return transport;
-}
-
-void Ekf::RecordUpdate(std::span<Row* const> rows, const Eigen::MatrixXd& gain) {
-  Eigen::Index at = 0;
-  for (const Row* row : rows) {
-    MeasurementReport& entry = EntryOf(*row);
-    RecordGain(entry, gain.data() + at * gain.rows());
-    at += entry.dof;
-  }
-  const Row& last = *rows.back();
-  last_used_.sensor = last.sensor;
-  last_used_.stamp = last.measurement->stamp;
-  last_used_.z.assign(last.measurement->values.begin(), last.measurement->values.end());
 }
 
 }  // namespace alidade

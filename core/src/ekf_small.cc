@@ -37,42 +37,6 @@ ALIDADE_INLINE double Defect(const double* values, int size) {
   return sum;
 }
 
-/// r' S^-1 r by S = L D L', m <= 3; not a number where S is not positive definite.
-ALIDADE_INLINE double SquaredMahalanobis(const double* s, const double* r, int m) {
-  if (m == 1) return s[0] > 0.0 ? r[0] * r[0] / s[0] : std::nan("");
-  double l[3][3], d[3], y[3], sum = 0.0;
-  for (int i = 0; i < m; ++i) {
-    d[i] = s[i * m + i];
-    y[i] = r[i];
-    for (int j = 0; j < i; ++j) {
-      double v = s[i * m + j];
-      for (int k = 0; k < j; ++k) v -= l[i][k] * d[k] * l[j][k];
-      l[i][j] = v / d[j];
-      d[i] -= v * l[i][j];
-      y[i] -= l[i][j] * y[j];
-    }
-    if (!(d[i] > 0.0)) return std::nan("");
-    sum += y[i] * y[i] / d[i];
-  }
-  return sum;
-}
-
-/// Q = G L L' G', its lower triangle, for G n x w and L w x w lower triangular; G becomes G L.
-ALIDADE_INLINE void SpreadNoise(double* g, const double* l, int n, int w, double* q) {
-  for (int i = 0; i < n; ++i) {
-    for (int c = 0; c < w; ++c) {  // from left to right: column c needs none of those before it
-      double sum = g[i * w + c] * l[c * w + c];
-      for (int k = c + 1; k < w; ++k) sum += g[i * w + k] * l[k * w + c];
-      g[i * w + c] = sum;
-    }
-    for (int j = 0; j <= i; ++j) {
-      double sum = g[i * w] * g[j * w];
-      for (int c = 1; c < w; ++c) sum += g[i * w + c] * g[j * w + c];
-      q[i * n + j] = sum;
-    }
-  }
-}
-
 }  // namespace
 
 /// What one motion model makes of its blocks and of P. K rows and W noise inputs, or 0 where they
@@ -91,7 +55,7 @@ ALIDADE_INLINE bool Ekf::Small::StepModel(const Motion& motion, double dt_s, dou
   }
   double own[K > 0 ? K * K : 1];
   double* const q = K > 0 ? own : plan.q.data();
-  SpreadNoise(g, l, k, w, q);
+  internal::SpreadNoise(g, l, k, w, plan.gl.data(), q);
   internal::Propagate<N, K>(p, motion.offset, k, plan.f.data(), q);
   return Defect(ekf_.next_.data() + motion.offset, k) == 0.0;
 }
@@ -154,7 +118,8 @@ ALIDADE_INLINE bool Ekf::Small::Linearise(Sensor& sensor, const double* z, Measu
   bool tiny = false;
   for (int i = 0; i < m; ++i) tiny |= !(noise[i] > kTiny * s[i * m + i]);
   if (tiny && !ekf_.warned_[static_cast<std::size_t>(entry.sensor)]) return false;
-  entry.nis = SquaredMahalanobis(s, r, m);
+  double work[kMost * (kMost + 1)];
+  entry.nis = internal::SquaredMahalanobis(s, r, m, work);
   if (Defect(s, m * m) + 0.0 * entry.nis != 0.0) return false;
   Copy(z, m, entry.z);
   Copy(h, m, entry.h);

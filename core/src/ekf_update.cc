@@ -3,23 +3,10 @@
 #include <cmath>
 
 #include "alidade/ekf.h"
-#include "cholesky.h"
+#include "number_text.h"
+#include "small_kernels.h"
 
 namespace alidade {
-namespace {
-
-/// r' S^-1 r; not a number where S, m x m, is not positive definite.
-double SquaredMahalanobis(const std::vector<double>& s, const std::vector<double>& r) {
-  const std::size_t m = r.size();
-  if (m == 1) return s[0] > 0.0 ? r[0] * r[0] / s[0] : std::nan("");
-  const auto size = static_cast<Eigen::Index>(m);
-  Eigen::LLT<Eigen::MatrixXd> llt;
-  if (!internal::Factorise(Eigen::Map<const Eigen::MatrixXd>(s.data(), size, size), llt))
-    return std::nan("");
-  return llt.matrixL().solve(Eigen::Map<const Eigen::VectorXd>(r.data(), size)).squaredNorm();
-}
-
-}  // namespace
 
 /// Puts together the update of one group of measurements: linearises all at the same state, gates
 /// each on its own, then one stacked update of those that passed.
@@ -119,15 +106,19 @@ Outcome Ekf::EvaluateApart(Row& row, MeasurementReport& entry) {
     }
     RowMajor j(geometry.tangent, geometry.tangent);
     geometry.Transport(plan.roles[i], plan.at[i], j.data());
-    Chain(row, plan.columns[i], j);
+    Chain(row, plan.columns[i], geometry.tangent, j.data());
   }
   return outcome;
 }
 
-/// H <- H J in the columns of one role, J square.
-void Ekf::Chain(Row& row, int column, const RowMajor& j) const {
+/// H <- H J in the columns of one role, J size x size, row-major.
+void Ekf::Chain(Row& row, int column, int size, const double* j) {
+  const Workspace::Use use(work_);
   const int m = BindingOf(row).model.measurement().geometry.tangent;
-  Eigen::Map<RowMajor>(row.h.data(), m, PlanOf(row).width).middleCols(column, j.rows()) *= j;
+  auto own = Eigen::Map<RowMajor>(row.h.data(), m, PlanOf(row).width).middleCols(column, size);
+  Workspace::Matrix chained = work_.Take(m, size);
+  chained.noalias() = own * Eigen::Map<const RowMajor>(j, size, size);
+  own = chained;
 }
 
 /// R at the roles, or as the measurement itself says.
@@ -179,7 +170,10 @@ Outcome Ekf::Gate(Row& row) {
     return Outcome::kNotFinite;
   }
   CheckConditioning(row);
-  entry.nis = SquaredMahalanobis(entry.s, entry.innovation);
+  const auto m = static_cast<std::size_t>(entry.dof);
+  row.work.resize(m * (m + 1));
+  entry.nis = internal::SquaredMahalanobis(entry.s.data(), entry.innovation.data(), entry.dof,
+                                           row.work.data());
   if (std::isnan(entry.nis)) {
     entry.nis = 0.0;
     Note("not_pd", "sensor '" + BindingOf(row).name + "': S is not positive definite");
@@ -218,11 +212,9 @@ void Ekf::CheckConditioning(const Row& row) {
   }
   if (!tiny) return;
   warned_[sensor] = true;
-  char text[160];
-  std::snprintf(text, sizeof(text),
-                ": noise variance %.3g vanishes beside H P H' = %.3g; S is badly conditioned",
-                noise, total - noise);
-  Note("conditioning", "sensor '" + BindingOf(row).name + "'" + text);
+  Note("conditioning", "sensor '" + BindingOf(row).name + "': noise variance " +
+                           internal::RoundedText(noise, 3) + " vanishes beside H P H' = " +
+                           internal::RoundedText(total - noise, 3) + "; S is badly conditioned");
 }
 
 }  // namespace alidade

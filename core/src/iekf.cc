@@ -3,24 +3,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "cholesky.h"
+#include "number_text.h"
 
 namespace alidade {
 namespace {
 
-using Llt = Eigen::LLT<Eigen::MatrixXd>;
-
-/// r' R^-1 r
-double SquaredNorm(const Llt& r, const Eigen::VectorXd& residual) {
-  return r.matrixL().solve(residual).squaredNorm();
+/// r' R^-1 r for R = L L', L the lower triangle of `l`; r becomes L^-1 r.
+double SquaredNorm(const Workspace::Matrix& l, Workspace::Vector& r) {
+  l.triangularView<Eigen::Lower>().solveInPlace(r);
+  return r.squaredNorm();
 }
 
 }  // namespace
 
 Iekf::Iekf(System system, const IekfOptions& options, const std::vector<StreamInfo>& streams)
-    : Ekf(std::move(system), options, streams),
+    : Ekf(std::move(system), options, streams, Steps::kOverridden),
       max_iterations_(options.max_iterations),
       tolerance_(options.tolerance) {
   ALIDADE_EXPECTS(options.jacobian == JacobianAt::kLatest);
@@ -37,27 +36,25 @@ Iekf::Iekf(System system, const IekfOptions& options, const std::vector<StreamIn
 }
 
 Outcome Iekf::Apply(std::span<Row* const> rows) {
-  const std::vector<double> prior = state_.values();
-  std::vector<MeasurementReport> first;  // as at the prediction
-  for (const Row* row : rows) first.push_back(EntryOf(*row));
-  const std::optional<Minimum> minimum = Minimise(rows, prior);
-  std::ranges::copy(prior, state_.values().begin());
-  if (minimum) correction_ = &minimum->dx;
+  const Workspace::Use use(work_);
+  prior_ = state_.values();
+  if (first_.size() < rows.size()) first_.resize(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) first_[i] = EntryOf(*rows[i]);
+  const std::optional<Minimum> minimum = Minimise(rows);
+  std::ranges::copy(prior_, state_.values().begin());
+  if (minimum) correction_ = minimum->dx.data();
   const Outcome outcome = Ekf::Apply(rows);
   correction_ = nullptr;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     MeasurementReport& entry = EntryOf(*rows[i]);
-    entry.h.swap(first[i].h);
-    entry.innovation.swap(first[i].innovation);
-    entry.s.swap(first[i].s);
+    entry.h.swap(first_[i].h);
+    entry.innovation.swap(first_[i].innovation);
+    entry.s.swap(first_[i].s);
   }
   if (outcome == Outcome::kAccepted && minimum && !minimum->converged) {
-    char text[128];
-    std::snprintf(text, sizeof(text),
-                  "an update stopped after %d iterations, a step of %.3g sigma before its optimum; "
-                  "the last iterate is kept",
-                  minimum->iterations, minimum->step);
-    Note("not_converged", text);
+    Note("not_converged", "an update stopped after " + std::to_string(minimum->iterations) +
+                              " iterations, a step of " + internal::RoundedText(minimum->step, 3) +
+                              " sigma before its optimum; the last iterate is kept");
   }
   return outcome;
 }
@@ -65,23 +62,37 @@ Outcome Iekf::Apply(std::span<Row* const> rows) {
 /// The optimum of one update, or the last iterate on the way, which the rows are then linearised
 /// at. P may be singular: dx = P v all the way, so that dx' P^-1 dx = v' dx. Nothing, and the rows
 /// as they were, where there is no first step.
-std::optional<Iekf::Minimum> Iekf::Minimise(std::span<Row* const> rows,
-                                            const std::vector<double>& prior) {
+std::optional<Iekf::Minimum> Iekf::Minimise(std::span<Row* const> rows) {
   const Eigen::Index n = state_.covariance().size();
-  Minimum minimum{Eigen::VectorXd::Zero(n)};
-  Eigen::VectorXd& dx = minimum.dx;
-  Eigen::VectorXd v = Eigen::VectorXd::Zero(n), innovations;
+  Eigen::Index m = 0;
+  for (const Row* row : rows) m += EntryOf(*row).dof;
+  Minimum minimum{work_.Take(n)};
+  Workspace::Vector& dx = minimum.dx;
+  Workspace::Vector v = work_.Take(n), step = work_.Take(n), step_v = work_.Take(n);
+  Workspace::Vector there = work_.Take(n), y = work_.Take(m), residual = work_.Take(m);
+  Workspace::Matrix s = work_.Take(m, m), r = work_.Take(m, m);
+  dx.setZero();
+  v.setZero();
   for (; minimum.iterations < max_iterations_; ++minimum.iterations) {
+    const Workspace::Use use(work_);
     const Stacked at = Stack(rows);
-    const Eigen::MatrixXd pht = ProjectionOf(rows);
-    Llt s, r;
-    if (!internal::Factorise(at.h * pht + at.noise, s) || !internal::Factorise(at.noise, r)) {
+    const Workspace::Matrix pht = ProjectionOf(rows);
+    s = r = at.noise;
+    s.noalias() += at.h * pht;
+    if (!internal::Factorise(s) || !internal::Factorise(r)) {
       if (minimum.iterations == 0) return std::nullopt;
       break;
     }
-    const Eigen::VectorXd y = s.solve(at.innovation + at.h * dx);
-    const Eigen::VectorXd step = pht * y - dx, step_v = at.h.transpose() * y - v;
-    minimum.step = std::sqrt(step_v.dot(step) + SquaredNorm(r, at.h * step));
+    y = at.innovation;
+    y.noalias() += at.h * dx;
+    s.triangularView<Eigen::Lower>().solveInPlace(y);
+    s.triangularView<Eigen::Lower>().transpose().solveInPlace(y);
+    step = -dx;
+    step.noalias() += pht * y;
+    step_v = -v;
+    step_v.noalias() += at.h.transpose() * y;
+    residual.noalias() = at.h * step;
+    minimum.step = std::sqrt(step_v.dot(step) + SquaredNorm(r, residual));
     if (minimum.step <= tolerance_) {
       dx += step;
       minimum.converged = true;
@@ -90,11 +101,12 @@ std::optional<Iekf::Minimum> Iekf::Minimise(std::span<Row* const> rows,
     // Falls, but for what rounding makes of it.
     constexpr double kRounding = 1e-12;
     constexpr int kHalvings = 10;
-    const double cost = (v.dot(dx) + SquaredNorm(r, at.innovation)) * (1.0 + kRounding);
+    residual = at.innovation;
+    const double cost = (v.dot(dx) + SquaredNorm(r, residual)) * (1.0 + kRounding);
     const auto risen = [&](double part) {
-      const Eigen::VectorXd there = dx + part * step;
-      return !MoveFrom(prior, there) || !Innovations(rows, innovations) ||
-             !((v + part * step_v).dot(there) + SquaredNorm(r, innovations) <= cost);
+      there = dx + part * step;
+      return !MoveFromPrior(there.data()) || !Innovations(rows, residual) ||
+             !((v + part * step_v).dot(there) + SquaredNorm(r, residual) <= cost);
     };
     int halvings = 0;
     while (halvings <= kHalvings && risen(std::ldexp(1.0, -halvings))) ++halvings;
@@ -102,26 +114,23 @@ std::optional<Iekf::Minimum> Iekf::Minimise(std::span<Row* const> rows,
     const double part = std::ldexp(1.0, -halvings);
     dx += part * step;
     v += part * step_v;
-    if (!Relinearise(rows, prior, dx)) break;
+    if (!Relinearise(rows, dx.data())) break;
   }
   return minimum;
 }
 
 /// Puts the state at prior (+) dx; its covariance stays that at the prior. False where that is not
 /// finite.
-bool Iekf::MoveFrom(const std::vector<double>& prior, const Eigen::VectorXd& dx) {
-  std::ranges::copy(prior, state_.values().begin());
-  state_.Retract(dx.data(), moved_);
+bool Iekf::MoveFromPrior(const double* dx) {
+  std::ranges::copy(prior_, state_.values().begin());
+  state_.Retract(dx, moved_);
   std::ranges::copy(moved_, state_.values().begin());
   return AllFinite(moved_);
 }
 
 /// z (-) h at the state, of all rows; false where one is not defined or not finite.
-bool Iekf::Innovations(std::span<Row* const> rows, Eigen::VectorXd& innovations) {
+bool Iekf::Innovations(std::span<Row* const> rows, Workspace::Vector& innovations) {
   Eigen::Index at = 0;
-  for (const Row* row : rows) at += EntryOf(*row).dof;
-  innovations.resize(at);
-  at = 0;
   for (Row* row : rows) {
     MeasurementReport& entry = EntryOf(*row);
     const SensorModel& model = BindingOf(*row).model;
@@ -133,8 +142,7 @@ bool Iekf::Innovations(std::span<Row* const> rows, Eigen::VectorXd& innovations)
 }
 
 /// h, R, d h / d dx and S of all rows at the state, which lies at prior (+) dx.
-bool Iekf::Relinearise(std::span<Row* const> rows, const std::vector<double>& prior,
-                       const Eigen::VectorXd& dx) {
+bool Iekf::Relinearise(std::span<Row* const> rows, const double* dx) {
   for (Row* row : rows) {
     MeasurementReport& entry = EntryOf(*row);
     const SensorBinding& binding = BindingOf(*row);
@@ -150,10 +158,12 @@ bool Iekf::Relinearise(std::span<Row* const> rows, const std::vector<double>& pr
       if (plan.columns[i] < 0) continue;
       const Block& block = state_.layout()[binding.roles[i].block];
       const Geometry& geometry = block.geometry();
-      RowMajor j(geometry.tangent, geometry.tangent);
-      geometry.PlusJacobian(prior.data() + block.value_offset, dx.data() + block.tangent_offset,
+      if (geometry.kind == GeometryKind::kVector) continue;
+      const Workspace::Use use(work_);
+      Workspace::Vector j = work_.Take(geometry.tangent * geometry.tangent);
+      geometry.PlusJacobian(prior_.data() + block.value_offset, dx + block.tangent_offset,
                             j.data());
-      Chain(*row, plan.columns[i], j);
+      Chain(*row, plan.columns[i], geometry.tangent, j.data());
     }
     Project(*row);
   }

@@ -2,12 +2,12 @@
 #include "reorder.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <limits>
 #include <tuple>
 #include <utility>
 
 #include "accepted.h"
+#include "number_text.h"
 #include "text_table.h"
 
 namespace alidade::internal {
@@ -20,11 +20,7 @@ Stamp Behind(Stamp newest, Stamp stamp) {
   return __builtin_sub_overflow(newest, stamp, &lag) ? std::numeric_limits<Stamp>::max() : lag;
 }
 
-std::string InSeconds(Stamp stamp) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.6f s", Seconds(stamp));
-  return text;
-}
+std::string InSeconds(Stamp stamp) { return FixedText(Seconds(stamp), 6) + " s"; }
 
 /// ` in FILE:LINE`, where the source knows.
 std::string In(const Place& place) {

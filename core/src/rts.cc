@@ -9,7 +9,7 @@ namespace alidade {
 
 RtsSmoother::RtsSmoother(System system, const EkfOptions& options,
                          const std::vector<StreamInfo>& streams)
-    : Ekf(std::move(system), internal::WithoutRecovery(options), streams) {
+    : Ekf(std::move(system), internal::WithoutRecovery(options), streams, Steps::kOverridden) {
   ALIDADE_EXPECTS(!considering_ && !waiting_);
 }
 
@@ -32,12 +32,14 @@ const UpdateReport& RtsSmoother::Process(const Frame& frame) {
 
 bool RtsSmoother::StepOnce(double dt_s) {
   if (!Ekf::StepOnce(dt_s)) return false;
+  const Workspace::Use use(work_);
   const Eigen::Index n = state_.covariance().size();
   current_.Append(Transition(), Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n));
   return true;
 }
 
 Outcome RtsSmoother::Apply(std::span<Row* const> rows) {
+  const Workspace::Use use(work_);
   const Stacked all = Stack(rows);
   const Eigen::MatrixXd p = state_.covariance().Dense();
   const std::vector<double> before = state_.values();
@@ -48,7 +50,7 @@ Outcome RtsSmoother::Apply(std::span<Row* const> rows) {
   const Eigen::MatrixXd weighted = s.solve(all.h);  // S^-1 H
   Eigen::MatrixXd a = -p * all.h.transpose() * weighted;
   a.diagonal().array() += 1.0;
-  const Eigen::MatrixXd back = TransportTo(before);
+  const Workspace::Matrix back = TransportTo(before);
   current_.Append(back.transpose() * a, weighted.transpose() * all.innovation,
                   all.h.transpose() * weighted);
   return outcome;

@@ -6,6 +6,7 @@
 #include "accepted.h"
 #include "alidade/metrics.h"
 #include "alidade/recorder.h"
+#include "number_text.h"
 #include "reference.h"
 #include "reorder.h"
 #include "text_table.h"
@@ -13,10 +14,13 @@
 namespace alidade {
 namespace {
 
+/// ` at t = 0.033000 s`
+std::string At(const Frame& frame) {
+  return " at t = " + internal::FixedText(Seconds(frame.stamp), 6) + " s";
+}
+
 [[noreturn]] void Refuse(const Frame& frame, const std::string& what) {
-  char at[48];
-  std::snprintf(at, sizeof(at), " at t = %.6f s", Seconds(frame.stamp));
-  throw ContractViolation("the source gives " + what + at);
+  throw ContractViolation("the source gives " + what + At(frame));
 }
 
 /// Throws ContractViolation for a frame that is not as Source::streams() and truths() say. Whatever
@@ -156,9 +160,8 @@ bool Advance(Running& one, const Seen& seen, const Frame& visible, const interna
   if (!one.ended && !policy) return true;
   if (result.status == RunStatus::kOk) {
     const std::string why = Cause(report.events, "diverged");
-    char at[48];
-    std::snprintf(at, sizeof(at), " at t = %.6f s: ", Seconds(seen.frame.stamp));
-    Fail(result, ExitCode::kDiverged, "estimator '" + one.named.name + "'" + at + why);
+    Fail(result, ExitCode::kDiverged,
+         "estimator '" + one.named.name + "'" + At(seen.frame) + ": " + why);
   }
   return !policy;
 }

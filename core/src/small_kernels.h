@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
+
 #include "alidade/covariance.h"
 
 /// The arithmetic of a filter of few states, with loops over the n states of constant length. P is
@@ -10,6 +12,48 @@
 namespace alidade::internal {
 
 inline constexpr int kSmall = Covariance::kSmall;
+
+/// r' S^-1 r by S = L D L', m x m; not a number where S is not positive definite. Writes over the
+/// m (m + 1) numbers of `work`.
+[[gnu::always_inline]] inline double SquaredMahalanobis(const double* s, const double* r, int m,
+                                                        double* work) {
+  if (m == 1) return s[0] > 0.0 ? r[0] * r[0] / s[0] : std::nan("");
+  double* const y = work + m * m;  // L^-1 r; D lies on the diagonal of L
+  double sum = 0.0;
+  for (int i = 0; i < m; ++i) {
+    double* const l = work + i * m;
+    double d = s[i * m + i];
+    y[i] = r[i];
+    for (int j = 0; j < i; ++j) {
+      double v = s[i * m + j];
+      for (int k = 0; k < j; ++k) v -= l[k] * work[k * m + k] * work[j * m + k];
+      l[j] = v / work[j * m + j];
+      d -= v * l[j];
+      y[i] -= l[j] * y[j];
+    }
+    if (!(d > 0.0)) return std::nan("");
+    l[i] = d;
+    sum += y[i] * y[i] / d;
+  }
+  return sum;
+}
+
+/// gl = G L, n x w, and the lower triangle of q = G L L' G', n x n, for G n x w and L w x w.
+[[gnu::always_inline]] inline void SpreadNoise(const double* g, const double* l, int n, int w,
+                                               double* gl, double* q) {
+  for (int i = 0; i < n; ++i) {
+    for (int c = 0; c < w; ++c) {
+      double sum = g[i * w] * l[c];
+      for (int k = 1; k < w; ++k) sum += g[i * w + k] * l[k * w + c];
+      gl[i * w + c] = sum;
+    }
+    for (int j = 0; j <= i; ++j) {
+      double sum = -0.0;  // adds nothing, not even a sign
+      for (int c = 0; c < w; ++c) sum += gl[i * w + c] * gl[j * w + c];
+      q[i * n + j] = sum;
+    }
+  }
+}
 
 #define ALIDADE_UNROLL _Pragma("GCC unroll 8")
 

@@ -2,37 +2,40 @@
 #pragma once
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
+#include <Eigen/Householder>
+#include <algorithm>
+#include <cmath>
 
 namespace alidade::internal {
 
 /// A square root A of a symmetric, positive semi-definite P = A A', singular or not, from the
-/// pivoted L D L'.
-struct SquareRoot {
-  Eigen::MatrixXd root;
-  /// The most negative pivot, over the largest variance; 0: none. Negative pivots count as zero.
-  double defect = 0.0;
-};
-
-inline SquareRoot SquareRootOf(const Eigen::MatrixXd& p) {
-  SquareRoot result;
-  if (p.size() == 0) return result;
-  const Eigen::LDLT<Eigen::MatrixXd> ldlt(p);
-  const Eigen::VectorXd d = ldlt.vectorD();
-  const double largest = p.diagonal().maxCoeff();
-  if (d.minCoeff() < 0.0) result.defect = largest > 0.0 ? d.minCoeff() / largest : -1.0;
-  const Eigen::MatrixXd l = ldlt.matrixL();
-  result.root = ldlt.transpositionsP().transpose() * (l * d.cwiseMax(0.0).cwiseSqrt().asDiagonal());
-  return result;
+/// pivoted L D L' of its lower triangle. Returns the most negative pivot, over the largest
+/// variance; 0: none. Negative pivots count as zero. `ldlt` is memory.
+inline double SquareRootOf(const Eigen::Ref<const Eigen::MatrixXd>& p,
+                           Eigen::LDLT<Eigen::MatrixXd>& ldlt, Eigen::MatrixXd& root) {
+  root.resize(p.rows(), p.cols());
+  if (p.size() == 0) return 0.0;
+  ldlt.compute(p);
+  const auto d = ldlt.vectorD();
+  root = ldlt.matrixL();
+  for (Eigen::Index i = 0; i < d.size(); ++i) root.col(i) *= std::sqrt(std::max(d[i], 0.0));
+  root = ldlt.transpositionsP().transpose() * root;
+  const double least = d.minCoeff(), largest = p.diagonal().maxCoeff();
+  if (!(least < 0.0)) return 0.0;
+  return largest > 0.0 ? least / largest : -1.0;
 }
 
-/// Lower triangular L, n x n, with L L' = wide wide' for `wide` n x m.
-inline Eigen::MatrixXd Triangular(const Eigen::MatrixXd& wide) {
-  const Eigen::Index n = wide.rows(), k = std::min(n, wide.cols());
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(wide.transpose());
-  Eigen::MatrixXd l = Eigen::MatrixXd::Zero(n, n);
-  l.leftCols(k) = qr.matrixQR().topRows(k).triangularView<Eigen::Upper>().transpose();
-  return l;
+/// Puts R of A = Q R, the upper triangle of the first n rows, in place of A, m x n, m >= n; below
+/// it lies what is of no use. `work`: n numbers.
+inline void Triangularise(Eigen::Ref<Eigen::MatrixXd> a, double* work) {
+  for (Eigen::Index k = 0; k < a.cols(); ++k) {
+    const Eigen::Index rows = a.rows() - k, columns = a.cols() - k - 1;
+    double tau = 0.0, beta = 0.0;
+    a.col(k).tail(rows).makeHouseholderInPlace(tau, beta);
+    a(k, k) = beta;
+    a.bottomRightCorner(rows, columns)
+        .applyHouseholderOnTheLeft(a.col(k).tail(rows - 1), tau, work);
+  }
 }
 
 }  // namespace alidade::internal

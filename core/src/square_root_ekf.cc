@@ -9,9 +9,12 @@ namespace alidade {
 
 SquareRootEkf::SquareRootEkf(System system, const EkfOptions& options,
                              const std::vector<StreamInfo>& streams)
-    : Ekf(std::move(system), internal::WithoutRecovery(options), streams) {
+    : Ekf(std::move(system), internal::WithoutRecovery(options), streams, Steps::kOverridden) {
   ALIDADE_EXPECTS(!considering_ && !waiting_);
-  Take(internal::SquareRootOf(state_.covariance().Dense()).root);
+  noise_roots_.resize(system_.sensors.size());
+  Eigen::LDLT<Eigen::MatrixXd> ldlt;
+  internal::SquareRootOf(state_.covariance().Dense(), ldlt, root_);
+  Take();
 }
 
 struct SquareRootEkf::Kept : Ekf::Kept {
@@ -29,56 +32,85 @@ void SquareRootEkf::Restore(const Snapshot& snapshot) {
   root_ = dynamic_cast<const Kept&>(snapshot).root;
 }
 
-void SquareRootEkf::Take(Eigen::MatrixXd root) {
-  root_ = std::move(root);
-  state_.covariance().SetBlock(0, 0, root_ * root_.transpose());
+/// The covariance, as L has it.
+void SquareRootEkf::Take() {
+  const Workspace::Use use(work_);
+  Workspace::Matrix p = work_.Take(root_.rows(), root_.rows());
+  p.noalias() = root_ * root_.transpose();
+  SetCovariance(p);
 }
 
 bool SquareRootEkf::StepOnce(double dt_s) {
   if (!Ekf::StepOnce(dt_s)) return false;
-  const Eigen::MatrixXd noise = NoiseInput();
-  Eigen::MatrixXd wide(root_.rows(), root_.cols() + noise.cols());
-  wide << Transition() * root_, noise;
-  Take(internal::Triangular(wide));
+  const Workspace::Use use(work_);
+  const Workspace::Matrix transition = Transition(), noise = NoiseInput();
+  const Eigen::Index n = root_.rows();
+  Workspace::Matrix moved = work_.Take(n, n), tall = work_.Take(n + noise.cols(), n);
+  moved.noalias() = transition * root_;
+  tall.topRows(n) = moved.transpose();
+  tall.bottomRows(noise.cols()) = noise.transpose();
+  internal::Triangularise(tall, work_.Take(n).data());
+  tall.topRows(n).triangularView<Eigen::StrictlyLower>().setZero();
+  root_ = tall.topRows(n).transpose();
+  Take();
   return true;
 }
 
 /// S = (H L) (H L)' + R, which rounding does not turn negative.
 void SquareRootEkf::Project(Row& row) {
+  const Workspace::Use use(work_);
   Row* const one[] = {&row};
   const Stacked all = Stack(one);
-  const Eigen::MatrixXd hl = all.h * root_, s = hl * hl.transpose() + all.noise;
+  const Eigen::Index m = all.h.rows();
+  Workspace::Matrix hl = work_.Take(m, root_.cols()), s = work_.Take(m, m);
+  hl.noalias() = all.h * root_;
+  s = all.noise;
+  s.noalias() += hl * hl.transpose();
   EntryOf(row).s.assign(s.data(), s.data() + s.size());
   row.pht.clear();
 }
 
 Outcome SquareRootEkf::Apply(std::span<Row* const> rows) {
+  const Workspace::Use use(work_);
   const Stacked all = Stack(rows);
   const Eigen::Index n = root_.rows(), m = all.h.rows();
-  const internal::SquareRoot noise = internal::SquareRootOf(all.noise);
-  Eigen::MatrixXd array = Eigen::MatrixXd::Zero(m + n, m + n);
-  array.topLeftCorner(m, m) = noise.root;
-  array.topRightCorner(m, n) = all.h * root_;
-  array.bottomRightCorner(n, n) = root_;
-  const Eigen::MatrixXd triangular = internal::Triangular(array);
-  const auto ls = triangular.topLeftCorner(m, m).triangularView<Eigen::Lower>();
-  if (!triangular.allFinite() || (triangular.diagonal().head(m).array() == 0.0).any()) {
+  Workspace::Matrix array = work_.Take(m + n, m + n), hl = work_.Take(m, n);  // array: transposed
+  array.setZero();
+  Eigen::Index at = 0;
+  for (const Row* row : rows) {
+    const Eigen::Index k = EntryOf(*row).dof;
+    auto& [ldlt, root] = noise_roots_[static_cast<std::size_t>(row->sensor)];
+    internal::SquareRootOf(all.noise.block(at, at, k, k), ldlt, root);
+    array.block(at, at, k, k) = root.transpose();
+    at += k;
+  }
+  hl.noalias() = all.h * root_;
+  array.bottomLeftCorner(n, m) = hl.transpose();
+  array.bottomRightCorner(n, n) = root_.transpose();
+  internal::Triangularise(array, work_.Take(m + n).data());
+  array.triangularView<Eigen::StrictlyLower>().setZero();
+  if (!array.allFinite() || (array.diagonal().head(m).array() == 0.0).any()) {
     Note("not_pd", "the update would leave S not positive definite; rolled back");
     return Outcome::kNotPd;
   }
-  // K = W Ls^-1
-  const Eigen::MatrixXd gain =
-      ls.transpose().solve(triangular.bottomLeftCorner(n, m).transpose()).transpose();
-  const Eigen::VectorXd dx = gain * all.innovation;
+  Workspace::Matrix gain = work_.Take(n, m);  // K = W Ls^-1
+  Workspace::Vector dx = work_.Take(n);
+  gain = array.topRightCorner(m, n).transpose();
+  array.topLeftCorner(m, m)
+      .triangularView<Eigen::Upper>()
+      .transpose()
+      .solveInPlace<Eigen::OnTheRight>(gain);
+  dx.noalias() = gain * all.innovation;
   state_.Retract(dx.data(), moved_);
   if (!AllFinite(moved_)) {
     Note("not_finite", "the update is not finite; rolled back");
     return Outcome::kNotFinite;
   }
-  const Eigen::MatrixXd transport = TransportTo(moved_);
+  const Workspace::Matrix transport = TransportTo(moved_);
   state_.MoveTo(moved_);
-  Take(transport * triangular.bottomRightCorner(n, n));
-  RecordUpdate(rows, gain);
+  root_.noalias() = transport * array.bottomRightCorner(n, n).transpose();
+  Take();
+  RecordUpdate(rows, gain.data());
   return Outcome::kAccepted;
 }
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/ukf.h"
 
-#include <Eigen/Cholesky>
 #include <cmath>
-#include <cstdio>
 
+#include "cholesky.h"
 #include "ekf_kept.h"
 #include "filter_options.h"
+#include "number_text.h"
 #include "square_root.h"
 
 namespace alidade {
@@ -16,27 +16,37 @@ constexpr int kMostHalvings = 30;
 
 /// Mean of the points that `centre` and the columns of `points` are, and f_i = (y_i (-) mean) -
 /// (centre (-) mean): `f` (tangent x 2N) and m = w sum f_i.
-void MeanOf(const Geometry& geometry, const double* centre, const Eigen::MatrixXd& points, double w,
+void MeanOf(const Geometry& geometry, const double* centre,
+            const Eigen::Ref<const Eigen::MatrixXd>& points, double w, Workspace& work,
             double* mean, Eigen::Ref<Eigen::MatrixXd> f, Eigen::Ref<Eigen::VectorXd> m) {
   constexpr int kMostIterations = 50;
   constexpr double kSettled = 1e-14;
+  const Workspace::Use use(work);
   std::copy_n(centre, geometry.ambient, mean);
-  Eigen::VectorXd from_mean(geometry.tangent), d(geometry.tangent);
+  Workspace::Vector from_mean = work.Take(geometry.tangent);
   for (int k = 0; k < kMostIterations; ++k) {
     geometry.Minus(centre, mean, from_mean.data());
     for (Eigen::Index i = 0; i < points.cols(); ++i) {
-      geometry.Minus(points.col(i).data(), mean, d.data());
-      f.col(i) = d - from_mean;
+      geometry.Minus(points.col(i).data(), mean, f.col(i).data());
+      f.col(i) -= from_mean;
     }
     m = w * f.rowwise().sum();
     if (geometry.kind == GeometryKind::kVector) {
-      geometry.Plus(centre, m.eval().data(), mean);
+      geometry.Plus(centre, m.data(), mean);
       return;
     }
-    const Eigen::VectorXd more = from_mean + m;
-    geometry.Plus(mean, more.data(), mean);
-    if (!(more.norm() > kSettled)) return;
+    from_mean += m;
+    geometry.Plus(mean, from_mean.data(), mean);
+    if (!(from_mean.norm() > kSettled)) return;
   }
+}
+
+/// moments = w f f' + centre m m'
+void MomentsOf(double w, const Eigen::Ref<const Eigen::MatrixXd>& f, double centre,
+               const Eigen::Ref<const Eigen::VectorXd>& m, Workspace::Matrix& moments) {
+  moments.noalias() = f * f.transpose();
+  moments *= w;
+  for (Eigen::Index i = 0; i < m.size(); ++i) moments.col(i) += centre * m[i] * m;
 }
 
 UkfOptions Read(Params& p) {
@@ -60,7 +70,8 @@ UkfOptions UkfOptions::FromNode(const Node& entry) {
 std::vector<ParamInfo> UkfOptions::Schema() { return internal::SchemaOf(Read); }
 
 Ukf::Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>& streams)
-    : Ekf(std::move(system), internal::WithoutRecovery(options.filter), streams),
+    : Ekf(std::move(system), internal::WithoutRecovery(options.filter), streams,
+          Steps::kOverridden),
       spread_(options),
       guarded_(system_.sensors.size() + 1, false) {
   ALIDADE_EXPECTS(!considering_ && !waiting_);
@@ -99,22 +110,24 @@ const Eigen::MatrixXd& Ukf::Root() {
   constexpr double kRounding = 1e-12;
   if (root_is_current_) return root_;
   root_is_current_ = true;
-  internal::SquareRoot result = internal::SquareRootOf(state_.covariance().Dense());
-  root_ = std::move(result.root);
-  if (result.defect < -kRounding) {
-    state_.covariance().SetBlock(0, 0, root_ * root_.transpose());
-    char text[160];
-    std::snprintf(text, sizeof(text),
-                  "the covariance has no square root: a pivot is %.3g of its largest variance; "
-                  "negative pivots count as zero",
-                  result.defect);
-    Note("repaired", text);
+  Covariance& p = state_.covariance();
+  const Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>> lower(
+      p.data(), p.size(), p.size(), Eigen::OuterStride<>(p.stride()));
+  const double defect = internal::SquareRootOf(lower, ldlt_, root_);
+  if (defect < -kRounding) {
+    p.SetBlock(0, 0, root_ * root_.transpose());
+    Note("repaired", "the covariance has no square root: a pivot is " +
+                         internal::RoundedText(defect, 3) +
+                         " of its largest variance; negative pivots count as zero");
   }
   return root_;
 }
 
-void Ukf::NoteGuard(const std::string& who, std::size_t index, int halvings) {
+/// Of sensor `index`, or of the motion, where that is beyond them.
+void Ukf::NoteGuard(std::size_t index, int halvings) {
   if (halvings > 0 && !guarded_[index]) {
+    const std::string who =
+        index < system_.sensors.size() ? "sensor '" + system_.sensors[index].name + "'" : "motion";
     Note("guarded", who + ": sigma points leave its domain; their spread is divided by " +
                         std::to_string(1 << halvings));
   }
@@ -122,71 +135,76 @@ void Ukf::NoteGuard(const std::string& who, std::size_t index, int halvings) {
 }
 
 /// The model's x' at the values `from`, with `noise` (over all active models) in w, in `to`.
-Status Ukf::StepPoint(const std::vector<double>& from, const Eigen::VectorXd& noise, double dt_s,
-                      std::vector<double>& to) const {
-  to = from;
-  Eigen::Index at = 0;
-  std::vector<const double*> x;
-  std::vector<double*> next;
-  std::vector<double> unused(from.size());
+Status Ukf::StepPoint(const double* from, const double* noise, double dt_s, double* to) {
+  const Workspace::Use use(work_);
+  const auto size = static_cast<Eigen::Index>(state_.values().size());
+  Workspace::Vector unused = work_.Take(size), w = work_.Take(NoiseSize());
+  std::copy_n(from, size, to);
   for (std::size_t i = 0; i < motions_.size(); ++i) {
     if (!motions_[i].active) continue;
     const MotionBinding& motion = system_.motions[i];
-    x.clear();
-    next.clear();
+    x_.clear();
+    stepped_.clear();
     for (const BlockId id : motion.blocks) {
       const Block& block = state_.layout()[id];
       const bool fixed = block.status == BlockStatus::kFixed;
-      x.push_back(from.data() + block.value_offset);
-      next.push_back((fixed ? unused : to).data() + block.value_offset);
+      x_.push_back(from + block.value_offset);
+      stepped_.push_back((fixed ? unused.data() : to) + block.value_offset);
     }
-    const Eigen::Index size = motion.model.noise_size();
-    const Eigen::Map<const RowMajor> l(motions_[i].l.data(), size, size);
-    const Eigen::VectorXd w = l * noise.segment(at, size);
-    const Status status =
-        motion.model.Step(x.data(), motions_[i].u, w.data(), dt_s, next.data(), nullptr, nullptr);
+    const Eigen::Index inputs = motion.model.noise_size();
+    const Eigen::Map<const RowMajor> l(motions_[i].l.data(), inputs, inputs);
+    Workspace::Vector(w.data(), inputs).noalias() =
+        l * Eigen::Map<const Eigen::VectorXd>(noise, inputs);
+    const Status status = motion.model.Step(x_.data(), motions_[i].u, w.data(), dt_s,
+                                            stepped_.data(), nullptr, nullptr);
     if (status != Status::kOk) return status;
-    at += size;
+    noise += inputs;
   }
-  return AllFinite(to) ? Status::kOk : Status::kOutOfDomain;
+  return AllFinite({to, state_.values().size()}) ? Status::kOk : Status::kOutOfDomain;
 }
 
 /// Moves state and covariance, which stay as they are where a point is out of its domain.
-Status Ukf::StepPoints(const Eigen::MatrixXd& root, int halvings, double dt_s) {
-  const Eigen::Index n = root.cols(), noises = NoiseInput().cols(), all = n + noises;
+Status Ukf::StepPoints(int halvings, double dt_s) {
+  const Workspace::Use use(work_);
+  const Eigen::MatrixXd& root = Root();
+  const auto size = static_cast<Eigen::Index>(state_.values().size());
+  const Eigen::Index n = root.cols(), noises = NoiseSize(), all = n + noises;
   const Transform transform = TransformOf(all, halvings);
-  std::vector<double> centre, from, to;
-  Status status = StepPoint(state_.values(), Eigen::VectorXd::Zero(noises), dt_s, centre);
-  Eigen::MatrixXd points(static_cast<Eigen::Index>(centre.size()), 2 * all);
+  Workspace::Vector centre = work_.Take(size), dx = work_.Take(n), noise = work_.Take(noises);
+  Workspace::Matrix points = work_.Take(size, 2 * all), f = work_.Take(n, 2 * all);
+  noise.setZero();
+  Status status = StepPoint(state_.values().data(), noise.data(), dt_s, centre.data());
   for (Eigen::Index i = 0; i < 2 * all && status == Status::kOk; ++i) {
     const double c = i < all ? transform.c : -transform.c;
     const Eigen::Index direction = i % all;
-    Eigen::VectorXd dx = Eigen::VectorXd::Zero(n), noise = Eigen::VectorXd::Zero(noises);
+    dx.setZero();
+    noise.setZero();
     if (direction < n) {
       dx = c * root.col(direction);
     } else {
       noise[direction - n] = c;
     }
-    state_.Retract(dx.data(), from);
-    status = StepPoint(from, noise, dt_s, to);
-    points.col(i) = Eigen::Map<const Eigen::VectorXd>(to.data(), points.rows());
+    state_.Retract(dx.data(), moved_);
+    status = StepPoint(moved_.data(), noise.data(), dt_s, points.col(i).data());
   }
   if (status != Status::kOk) return status;
-  Eigen::MatrixXd f = Eigen::MatrixXd::Zero(n, 2 * all);
-  Eigen::VectorXd m = Eigen::VectorXd::Zero(n);
-  std::vector<double> mean = centre;
+  Workspace::Vector mean = work_.Take(size), m = work_.Take(n);
+  Workspace::Matrix p = work_.Take(n, n);
+  mean = centre;
+  f.setZero();
+  m.setZero();
   for (const Block& block : state_.layout().blocks()) {
     if (!block.has_covariance()) continue;
     const Geometry& geometry = block.geometry();
     MeanOf(geometry, centre.data() + block.value_offset,
-           points.middleRows(block.value_offset, geometry.ambient), transform.w,
+           points.middleRows(block.value_offset, geometry.ambient), transform.w, work_,
            mean.data() + block.value_offset, f.middleRows(block.tangent_offset, geometry.tangent),
            m.segment(block.tangent_offset, geometry.tangent));
   }
-  const Eigen::MatrixXd p = transform.w * f * f.transpose() + transform.centre * m * m.transpose();
-  if (!AllFinite(mean) || !p.allFinite()) return Status::kOutOfDomain;
-  state_.values().assign(mean.begin(), mean.end());
-  state_.covariance().SetBlock(0, 0, p);
+  MomentsOf(transform.w, f, transform.centre, m, p);
+  if (!mean.allFinite() || !p.allFinite()) return Status::kOutOfDomain;
+  std::copy_n(mean.data(), size, state_.values().data());
+  SetCovariance(p);
   root_is_current_ = false;
   return Status::kOk;
 }
@@ -199,11 +217,10 @@ bool Ukf::StepOnce(double dt_s) {
     if (!StepModel(system_.motions[i], motions_[i], dt_s)) return false;  // the centre, and Lq
   }
   if (!moves) return true;
-  const Eigen::MatrixXd root = Root();
   for (int halvings = 0; halvings <= kMostHalvings; ++halvings) {
-    const Status status = StepPoints(root, halvings, dt_s);
+    const Status status = StepPoints(halvings, dt_s);
     if (status == Status::kOk) {
-      NoteGuard("motion", guarded_.size() - 1, halvings);
+      NoteGuard(guarded_.size() - 1, halvings);
       return true;
     }
     if (status == Status::kError) break;
@@ -214,54 +231,61 @@ bool Ukf::StepOnce(double dt_s) {
 
 /// h at the sigma points of one measurement: its mean, in the report, and its deviations.
 Outcome Ukf::Predict(Row& row, int halvings) {
+  const Workspace::Use use(work_);
   const SensorBinding& binding = BindingOf(row);
   const Geometry& geometry = binding.model.measurement().geometry;
   const Eigen::MatrixXd& root = Root();
   const Eigen::Index n = root.cols();
   const Transform transform = TransformOf(n, halvings);
-  std::vector<const double*> roles = PlanOf(row).roles;  // as held, or fixed
-  Eigen::VectorXd centre(geometry.ambient);
-  const Outcome at_centre = OutcomeOf(binding.model.Predict(roles.data(), centre.data()));
+  x_ = PlanOf(row).roles;  // as held, or fixed
+  Workspace::Vector centre = work_.Take(geometry.ambient), dx = work_.Take(n);
+  Workspace::Matrix points = work_.Take(geometry.ambient, 2 * n);
+  const Outcome at_centre = OutcomeOf(binding.model.Predict(x_.data(), centre.data()));
   if (at_centre != Outcome::kAccepted) return at_centre;
-  Eigen::MatrixXd points(geometry.ambient, 2 * n);
-  std::vector<double> values;
   for (Eigen::Index i = 0; i < 2 * n; ++i) {
-    const Eigen::VectorXd dx = (i < n ? transform.c : -transform.c) * root.col(i % n);
-    state_.Retract(dx.data(), values);
-    for (std::size_t k = 0; k < roles.size(); ++k) {
+    dx = (i < n ? transform.c : -transform.c) * root.col(i % n);
+    state_.Retract(dx.data(), moved_);
+    for (std::size_t k = 0; k < x_.size(); ++k) {
       const RoleBinding& role = binding.roles[k];
       if (role.block < 0 || role.mode == RoleMode::kHold) continue;
-      roles[k] = values.data() + state_.layout()[role.block].value_offset;
+      x_[k] = moved_.data() + state_.layout()[role.block].value_offset;
     }
-    const Outcome outcome = OutcomeOf(binding.model.Predict(roles.data(), points.col(i).data()));
+    const Outcome outcome = OutcomeOf(binding.model.Predict(x_.data(), points.col(i).data()));
     if (outcome != Outcome::kAccepted) return outcome;
   }
-  Predicted& predicted = PredictedOf(row);
+  Predicted& predicted = predicted_[row.report];
   predicted.halvings = halvings;
-  predicted.f.resize(geometry.tangent, 2 * n);
-  predicted.m.resize(geometry.tangent);
+  predicted.f.resize(static_cast<std::size_t>(geometry.tangent * 2 * n));
+  predicted.m.resize(static_cast<std::size_t>(geometry.tangent));
   MeasurementReport& entry = EntryOf(row);
   entry.h.resize(static_cast<std::size_t>(geometry.ambient));
-  MeanOf(geometry, centre.data(), points, transform.w, entry.h.data(), predicted.f, predicted.m);
+  const Moments moments = MomentsAt(row);
+  MeanOf(geometry, centre.data(), points, transform.w, work_, entry.h.data(), moments.f, moments.m);
   entry.innovation.resize(static_cast<std::size_t>(geometry.tangent));
   geometry.Minus(entry.z.data(), entry.h.data(), entry.innovation.data());
   return Outcome::kAccepted;
 }
 
+Ukf::Moments Ukf::MomentsAt(const Row& row) {
+  Predicted& predicted = predicted_[row.report];
+  const auto m = std::ssize(predicted.m);
+  return {{predicted.f.data(), m, std::ssize(predicted.f) / m}, {predicted.m.data(), m}};
+}
+
 Outcome Ukf::Linearise(Row& row) {
+  const Workspace::Use use(work_);
   const SensorBinding& binding = BindingOf(row);
   const SensorPlan& plan = PlanOf(row);
   if (predicted_.size() <= row.report) predicted_.resize(row.report + 1);
   int halvings = 0;
   Outcome outcome = Predict(row, halvings);
-  std::vector<double> centre(
-      static_cast<std::size_t>(binding.model.measurement().geometry.ambient));
+  Workspace::Vector centre = work_.Take(binding.model.measurement().geometry.ambient);
   while (outcome == Outcome::kOutOfDomain && halvings < kMostHalvings &&
          binding.model.Predict(plan.roles.data(), centre.data()) == Status::kOk) {
     outcome = Predict(row, ++halvings);
   }
   if (outcome == Outcome::kAccepted) {
-    NoteGuard("sensor '" + binding.name + "'", static_cast<std::size_t>(row.sensor), halvings);
+    NoteGuard(static_cast<std::size_t>(row.sensor), halvings);
     outcome = NoiseOf(row, plan.roles.data());
   }
   if (outcome == Outcome::kAccepted) return outcome;
@@ -273,80 +297,84 @@ Outcome Ukf::Linearise(Row& row) {
 
 /// S = Cov(h) + R.
 void Ukf::Project(Row& row) {
-  const Predicted& predicted = PredictedOf(row);
-  const Transform transform = TransformOf(Root().cols(), predicted.halvings);
-  const Eigen::Index m = predicted.m.size();
-  const Eigen::MatrixXd s = transform.w * predicted.f * predicted.f.transpose() +
-                            transform.centre * predicted.m * predicted.m.transpose() +
-                            Eigen::Map<const RowMajor>(row.r.data(), m, m);
+  const Workspace::Use use(work_);
+  const Moments moments = MomentsAt(row);
+  const Transform transform = TransformOf(Root().cols(), predicted_[row.report].halvings);
+  const Eigen::Index m = moments.m.size();
+  Workspace::Matrix s = work_.Take(m, m);
+  MomentsOf(transform.w, moments.f, transform.centre, moments.m, s);
+  s += Eigen::Map<const RowMajor>(row.r.data(), m, m);
   EntryOf(row).s.assign(s.data(), s.data() + s.size());
   row.pht.clear();
 }
 
-/// All rows at the spread of the narrowest: f, m, R and innovation below one another.
-Outcome Ukf::StackPoints(std::span<Row* const> rows, Stacked& all, Eigen::VectorXd& mean,
-                         int& halvings) {
-  Eigen::Index size = 0;
-  halvings = 0;
-  for (const Row* row : rows) {
-    size += PredictedOf(*row).m.size();
-    halvings = std::max(halvings, PredictedOf(*row).halvings);
-  }
-  all.h.resize(size, 2 * Root().cols());
-  all.noise = Eigen::MatrixXd::Zero(size, size);
-  all.innovation.resize(size);
-  mean.resize(size);
+/// All rows at one spread: f in place of H, R, innovation and m below one another.
+Outcome Ukf::StackPoints(std::span<Row* const> rows, int halvings, Stacked& all,
+                         Workspace::Vector& mean) {
+  all.noise.setZero();
   Eigen::Index at = 0;
   for (Row* row : rows) {
-    if (PredictedOf(*row).halvings < halvings) {
+    if (predicted_[row->report].halvings < halvings) {
       const Outcome outcome = Predict(*row, halvings);
       if (outcome != Outcome::kAccepted) return outcome;
     }
-    const Predicted& predicted = PredictedOf(*row);
-    const Eigen::Index k = predicted.m.size();
-    all.h.middleRows(at, k) = predicted.f;
+    const Moments moments = MomentsAt(*row);
+    const Eigen::Index k = moments.m.size();
+    all.h.middleRows(at, k) = moments.f;
     all.noise.block(at, at, k, k) = Eigen::Map<const RowMajor>(row->r.data(), k, k);
     all.innovation.segment(at, k) =
         Eigen::Map<const Eigen::VectorXd>(EntryOf(*row).innovation.data(), k);
-    mean.segment(at, k) = predicted.m;
+    mean.segment(at, k) = moments.m;
     at += k;
   }
   return Outcome::kAccepted;
 }
 
 Outcome Ukf::Apply(std::span<Row* const> rows) {
-  Stacked all;
-  Eigen::VectorXd mean;
-  int halvings = 0;
-  const Outcome stacked = StackPoints(rows, all, mean, halvings);
-  if (stacked != Outcome::kAccepted) return stacked;
+  const Workspace::Use use(work_);
   const Eigen::MatrixXd& root = Root();
-  const Transform transform = TransformOf(root.cols(), halvings);
-  Eigen::MatrixXd dx(root.rows(), 2 * root.cols());
-  dx << transform.c * root, -transform.c * root;
-  const Eigen::MatrixXd s = transform.w * all.h * all.h.transpose() +
-                            transform.centre * mean * mean.transpose() + all.noise;
-  const Eigen::LLT<Eigen::MatrixXd> llt(s);
-  if (!s.allFinite() || llt.info() != Eigen::Success) {
+  const Eigen::Index n = root.cols();
+  Eigen::Index m = 0;
+  int halvings = 0;  // of the narrowest
+  for (const Row* row : rows) {
+    m += EntryOf(*row).dof;
+    halvings = std::max(halvings, predicted_[row->report].halvings);
+  }
+  Stacked all{work_.Take(m, 2 * n), work_.Take(m, m), work_.Take(m)};
+  Workspace::Vector mean = work_.Take(m), centre = work_.Take(n), step = work_.Take(n);
+  Workspace::Matrix s = work_.Take(m, m), p = work_.Take(n, n), rest = work_.Take(n, 2 * n);
+  Workspace::Matrix gain = work_.Take(n, m), spread = work_.Take(n, m);
+  const Outcome stacked = StackPoints(rows, halvings, all, mean);
+  if (stacked != Outcome::kAccepted) return stacked;
+  const Transform transform = TransformOf(n, halvings);
+  MomentsOf(transform.w, all.h, transform.centre, mean, s);
+  s += all.noise;
+  if (!internal::Factorise(s)) {
     Note("not_pd", "the update would leave S not positive definite; rolled back");
     return Outcome::kNotPd;
   }
-  const Eigen::MatrixXd cross = transform.w * dx * all.h.transpose();
-  const Eigen::MatrixXd gain = llt.solve(cross.transpose()).transpose();
-  const Eigen::MatrixXd rest = dx - gain * all.h;
-  const Eigen::VectorXd centre = gain * mean, step = gain * all.innovation;
-  const Eigen::MatrixXd p = transform.w * rest * rest.transpose() +
-                            transform.centre * centre * centre.transpose() +
-                            gain * all.noise * gain.transpose();
+  rest.leftCols(n) = transform.c * root;
+  rest.rightCols(n) = -transform.c * root;
+  gain.noalias() = rest * all.h.transpose();
+  gain *= transform.w;
+  const auto l = s.triangularView<Eigen::Lower>();
+  l.transpose().solveInPlace<Eigen::OnTheRight>(gain);
+  l.solveInPlace<Eigen::OnTheRight>(gain);
+  rest.noalias() -= gain * all.h;
+  centre.noalias() = gain * mean;
+  step.noalias() = gain * all.innovation;
+  MomentsOf(transform.w, rest, transform.centre, centre, p);
+  spread.noalias() = gain * all.noise;
+  p.noalias() += spread * gain.transpose();
   state_.Retract(step.data(), moved_);
   if (!AllFinite(moved_) || !p.allFinite()) {
     Note("not_finite", "the update is not finite; rolled back");
     return Outcome::kNotFinite;
   }
-  state_.covariance().SetBlock(0, 0, p);
+  SetCovariance(p);
   state_.MoveTo(moved_);
   root_is_current_ = false;
-  RecordUpdate(rows, gain);
+  RecordUpdate(rows, gain.data());
   return Outcome::kAccepted;
 }
 

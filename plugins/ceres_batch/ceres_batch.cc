@@ -6,9 +6,11 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+#include <iomanip>
 #include <iterator>
 #include <limits>
+#include <locale>
+#include <sstream>
 
 #include "alidade/build_plugin.h"
 #include "alidade/ekf.h"
@@ -143,10 +145,11 @@ class CeresBatch : public Estimator {
       if (failed_ || !trajectory_.Freeze(e_.data())) break;
       settled = trajectory_.change() <= kSettled;
     } while (!settled && outer < options_.max_outer_iterations);
-    char text[160];
-    std::snprintf(text, sizeof text, "cost %.9g, %d iterations in %d solves: ", summary.final_cost,
-                  iterations, outer);
-    summary_ = text;
+    std::ostringstream text;
+    text.imbue(std::locale::classic());
+    text << "cost " << std::setprecision(9) << summary.final_cost << ", " << iterations
+         << " iterations in " << outer << " solves: ";
+    summary_ = text.str();
     if (failed_) {
       summary_ += "not converged, " + summary.message;
     } else {

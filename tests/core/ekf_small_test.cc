@@ -4,6 +4,7 @@
 // makes the same filter take.
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <cmath>
 #include <map>
 #include <string>
@@ -76,6 +77,12 @@ std::map<std::string, int> Compare(const System& system, const EkfOptions& optio
       EXPECT_EQ(one.outcome, two.outcome);
       EXPECT_EQ(one.dof, two.dof);
       EXPECT_NEAR(one.nis, two.nis, 1e-10 * (1.0 + two.nis));
+      if (one.outcome == Outcome::kAccepted || one.outcome == Outcome::kGated) {
+        const Eigen::Map<const RowMajor> cov(one.s.data(), one.dof, one.dof);
+        const Eigen::Map<const Eigen::VectorXd> r(one.innovation.data(), one.dof);
+        const double nis = r.dot(cov.fullPivLu().solve(r));
+        EXPECT_NEAR(one.nis, nis, 1e-10 * (1.0 + nis));
+      }
       ExpectEqual(one.z, two.z);
       ExpectEqual(one.h, two.h);
       ExpectEqual(one.innovation, two.innovation);
@@ -157,6 +164,53 @@ TEST(SmallEkf, StacksMeasurementsOfSeveralRows) {
   }
   const auto seen = Compare(system, options, frames);
   EXPECT_GT(seen.count("gated"), 0u);
+}
+
+/// x' = x + w, with a square root of Qw that is not triangular.
+struct Shaken : Motion<2, Vec<2>> {
+  static constexpr std::array kBlocks{Quantity{"x"}};
+  template <class T>
+  void Step(const T* x, const T* w, double, T* next) const {
+    next[0] = x[0] + w[0];
+    next[1] = x[1] + w[1];
+  }
+  void SqrtQ(double dt_s, MatrixRef l) const {
+    l(0, 0) = l(1, 1) = 0.3 * dt_s;
+    l(0, 1) = 0.8 * dt_s;
+  }
+};
+
+/// x' = x + dt (x_2, -x_1), without noise.
+struct Turning : Motion<0, Vec<2>> {
+  static constexpr std::array kBlocks{Quantity{"x"}};
+  template <class T>
+  void Step(const T* x, const T*, double dt_s, T* next) const {
+    next[0] = x[0] + dt_s * x[1];
+    next[1] = x[1] - dt_s * x[0];
+  }
+  void SqrtQ(double, MatrixRef) const {}
+};
+
+TEST(SmallEkf, TakesAnySquareRootOfTheNoiseAndMotionWithoutNoise) {
+  for (const MotionModel& model :
+       {InProcessMotion(Shaken(), "shaken"), InProcessMotion(Turning(), "turning")}) {
+    System system;
+    const BlockId x = system.layout.Declare("a.x", "a", model.blocks()[0]);
+    system.motions.push_back({"a", model, {x}});
+    Prior prior;
+    prior.block = x;
+    prior.mean = {1.5, 0.7};
+    prior.covariance = Eigen::Matrix2d{{0.5, 0.1}, {0.1, 0.3}};
+    system.priors.push_back(prior);
+    AddSensor(system, "pair", InProcessSensor(Pair(), "pair"), {"a.x"});
+    std::vector<Frame> frames;
+    for (int k = 0; k < 20; ++k) {
+      Frame frame = FrameAt(0.1 * k, {});
+      frame.measurements.push_back({frame.stamp, 0, -1, {1.0, 3.0}, {}});
+      frames.push_back(frame);
+    }
+    EXPECT_EQ(Compare(system, {}, frames)["accepted"], 20);
+  }
 }
 
 }  // namespace

@@ -52,5 +52,25 @@ TEST(CommaLocale, ChangesNoByteOfWhatIsWritten) {
   EXPECT_EQ(Read(folder / "comma/run/timing.json").find("\"wall_s\": 0,"), std::string::npos);
 }
 
+/// Why a run of kConfig ended that its filter cannot step over the first gap of.
+std::string ReasonOfAFailure() {
+  std::string text = kConfig;
+  const std::string entry = "gate: 0.999";
+  text.replace(text.find(entry), entry.size(), "max_dt_s: 1.5e-9, on_divergence: fail");
+  Experiment experiment = BuildExperiment(Config::FromText(text, "locale.yaml"), Host());
+  return Run(experiment, {}).reason;
+}
+
+TEST(CommaLocale, ChangesNoMessage) {
+  const std::string plain = ReasonOfAFailure();
+  EXPECT_NE(plain.find(" s would need more than 1e+06 steps of 1.5e-09 s; last good state at "
+                       "0.000000 s: target.depth = 0."),
+            std::string::npos)
+      << plain;
+  const CommaLocale comma;
+  if (!comma.active()) GTEST_SKIP() << "localedef is not here";
+  EXPECT_EQ(ReasonOfAFailure(), plain);
+}
+
 }  // namespace
 }  // namespace alidade::testing

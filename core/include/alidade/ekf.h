@@ -9,6 +9,7 @@
 
 #include "alidade/control_inputs.h"
 #include "alidade/estimator.h"
+#include "alidade/workspace.h"
 
 namespace alidade {
 
@@ -85,6 +86,12 @@ class Ekf : public Estimator {
 
  protected:  // for the estimators that share how frames are stepped to, read, gated and reported
   /// @cond
+  /// Whether StepOnce, Linearise, Project and Apply are those of Ekf, which the fast path may stand
+  /// in for, or a derived class overrides some of them, and says so.
+  enum class Steps { kOwn, kOverridden };
+  Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams,
+      Steps steps);
+
   /// How a sensor touches the state, as long as the layout stays as it is.
   struct SensorPlan {
     std::vector<const double*> roles;  ///< values; null where unbound or without a value yet
@@ -106,7 +113,8 @@ class Ekf : public Estimator {
     std::vector<double*> next;  ///< into next_
     std::vector<std::pair<int, int>> segments;  ///< rows of the covariance: (offset, size)
     std::vector<int> rows;                      ///< of F that have a covariance; empty: all
-    std::vector<double> f, g, l, gl, q;         ///< F, G, L of Qw, G L, G Qw G'
+    std::vector<int> at;                        ///< of the covariance, of each row of F; -1: none
+    std::vector<double> f, g, l, gl, q;  ///< F, G, L of Qw, G L, G Qw G' (its lower triangle)
   };
   /// One measurement on its way into an update.
   struct Row {
@@ -115,6 +123,7 @@ class Ekf : public Estimator {
     std::size_t report = 0;              ///< index into UpdateReport::measurements()
     std::vector<double> h;               ///< H, m rows of the plan's width
     std::vector<double> r, l, pht;       ///< R and its factor, m x m; P H', n x m by columns
+    std::vector<double> work;            ///< for the gate
     double weight = 1.0;                 ///< w of the robust loss; R is divided by it
     const SensorPlan* zeroed = nullptr;  ///< whose zeros H holds
   };
@@ -133,21 +142,27 @@ class Ekf : public Estimator {
   /// One update with all rows: all of it happens or nothing.
   virtual Outcome Apply(std::span<Row* const> rows);
 
+  // Matrices below lie in work_.
+  /// Noise inputs of the active models.
+  int NoiseSize() const;
   /// F (n x n) of the last StepOnce, n = size of the covariance.
-  Eigen::MatrixXd Transition() const;
-  /// G Lq (n x noise inputs of the active models) of the last StepOnce.
-  Eigen::MatrixXd NoiseInput() const;
+  Workspace::Matrix Transition();
+  /// G Lq (n x NoiseSize()) of the last StepOnce.
+  Workspace::Matrix NoiseInput();
   /// Rows below one another: H (m x n), R (m x m) and the innovation.
   struct Stacked {
-    Eigen::MatrixXd h, noise;
-    Eigen::VectorXd innovation;
+    Workspace::Matrix h, noise;
+    Workspace::Vector innovation;
   };
   /// The rows as Linearise left them.
-  Stacked Stack(std::span<Row* const> rows) const;
+  Stacked Stack(std::span<Row* const> rows);
   /// J (n x n) of State::MoveTo(values): dx there = J dx here.
-  Eigen::MatrixXd TransportTo(const std::vector<double>& values) const;
-  /// Writes the gain of all rows, n x m, down in their reports, and remembers the last one used.
-  void RecordUpdate(std::span<Row* const> rows, const Eigen::MatrixXd& gain);
+  Workspace::Matrix TransportTo(const std::vector<double>& values);
+  /// P <- p, of which the lower triangle counts.
+  void SetCovariance(const Workspace::Matrix& p);
+  /// Writes the gain of all rows (n x m by columns, its rows as they lie in P) down in their
+  /// reports, and remembers the last one used.
+  void RecordUpdate(std::span<Row* const> rows, const double* gain);
 
   /// The report, the sensor and the plan that belong to a row.
   MeasurementReport& EntryOf(const Row& row) { return report_.measurements()[row.report]; }
@@ -183,7 +198,7 @@ class Ekf : public Estimator {
   void Fuse(std::span<Row* const> group);
   Outcome Evaluate(Row& row, MeasurementReport& entry);
   Outcome EvaluateApart(Row& row, MeasurementReport& entry);
-  void Chain(Row& row, int column, const RowMajor& j) const;
+  void Chain(Row& row, int column, int size, const double* j);
   Outcome Gate(Row& row);
   void Weigh(Row& row);
   void CheckConditioning(const Row& row);
@@ -192,8 +207,7 @@ class Ekf : public Estimator {
   bool MaskConsidered(std::span<Row* const> rows, Eigen::MatrixXd& gain) const;
   bool Correct(const Eigen::MatrixXd& w, const Eigen::MatrixXd& gain, bool masked,
                const Eigen::MatrixXd& h, const Eigen::MatrixXd& r);
-  Eigen::MatrixXd ProjectionOf(std::span<Row* const> rows) const;
-  void RecordGain(MeasurementReport& entry, const double* gain) const;
+  Workspace::Matrix ProjectionOf(std::span<Row* const> rows);
 
   void InitialiseFromMeasurements();
   Outcome InitialiseBlock(Row& row);
@@ -215,14 +229,14 @@ class Ekf : public Estimator {
   State state_;
   std::vector<SensorPlan> plans_;  ///< by sensor
   std::vector<MotionPlan> motions_;
+  Steps steps_;
   std::unique_ptr<Small> small_;  ///< null where the general path is the only one
-  bool small_is_known_ = false;   ///< whether small_ fits the plans
   std::vector<int> order_;        ///< rows of P in the order of the layout; empty: as they are
-  bool waiting_ = false;          ///< a block has no value yet
-  bool considering_ = false;      ///< a block is considered
-  std::vector<std::vector<double>> first_;       ///< estimates of stationary blocks, by block
-  const Eigen::VectorXd* correction_ = nullptr;  ///< dx of the update; null: K r
+  bool waiting_ = false, considering_ = false;  ///< a block has no value yet; one is considered
+  std::vector<std::vector<double>> first_;      ///< estimates of stationary blocks, by block
+  const double* correction_ = nullptr;          ///< dx of the update; null: K r
   // Memory that is kept from frame to frame.
+  Workspace work_;
   UpdateReport report_;
   std::vector<Row> rows_;  ///< the first row_count_ are in use
   std::size_t row_count_ = 0;
@@ -244,8 +258,7 @@ class Ekf : public Estimator {
     Stamp stamp = kNoStamp;
     std::vector<double> z;
   } last_used_;
-  bool diverged_ = false;
-  bool failed_ = false;
+  bool diverged_ = false, failed_ = false;
   /// @endcond
 };
 

@@ -44,20 +44,21 @@ class Iekf : public Ekf {
 
  private:
   struct Minimum {
-    Eigen::VectorXd dx;
+    Workspace::Vector dx;
     int iterations = 0;
     double step = 0.0;  ///< that is left, in posterior standard deviations
     bool converged = false;
   };
   Outcome Apply(std::span<Row* const> rows) override;
-  std::optional<Minimum> Minimise(std::span<Row* const> rows, const std::vector<double>& prior);
-  bool MoveFrom(const std::vector<double>& prior, const Eigen::VectorXd& dx);
-  bool Innovations(std::span<Row* const> rows, Eigen::VectorXd& innovations);
-  bool Relinearise(std::span<Row* const> rows, const std::vector<double>& prior,
-                   const Eigen::VectorXd& dx);
+  std::optional<Minimum> Minimise(std::span<Row* const> rows);
+  bool MoveFromPrior(const double* dx);
+  bool Innovations(std::span<Row* const> rows, Workspace::Vector& innovations);
+  bool Relinearise(std::span<Row* const> rows, const double* dx);
 
   int max_iterations_;
   double tolerance_;
+  std::vector<double> prior_;             ///< values before the update
+  std::vector<MeasurementReport> first_;  ///< of its rows, as at the prediction
 };
 
 }  // namespace alidade

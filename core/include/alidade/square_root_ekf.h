@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Cholesky>
 #include <vector>
 
 #include "alidade/ekf.h"
@@ -18,7 +18,7 @@ namespace alidade {
 ///             S = Ls Ls',  dx = W Ls^-1 r,  K = W Ls^-1
 ///
 /// All Jacobians are those of Ekf. Blocks are estimated or fixed, present from the start; no
-/// considered block, no recovery from a lock-out. O((m + n)^3) for each update, and it allocates.
+/// considered block, no recovery from a lock-out. O((m + n)^3) for each update.
 ///
 /// Source       [Bierman1977] ch. V; [Kailath2000] sec. 12.3, the array form.
 class SquareRootEkf : public Ekf {
@@ -41,9 +41,16 @@ class SquareRootEkf : public Ekf {
 
  private:
   struct Kept;
-  void Take(Eigen::MatrixXd root);
+  void Take();
+
+  /// Of a sensor's R.
+  struct NoiseRoot {
+    Eigen::LDLT<Eigen::MatrixXd> ldlt;
+    Eigen::MatrixXd root;
+  };
 
   Eigen::MatrixXd root_;
+  std::vector<NoiseRoot> noise_roots_;  ///< by sensor; memory
   /// @endcond
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Cholesky>
 #include <vector>
 
 #include "alidade/ekf.h"
@@ -65,27 +65,34 @@ class Ukf : public Ekf {
   };
   /// What the sigma points make of one measurement.
   struct Predicted {
-    int halvings = 0;   ///< of the spread
-    Eigen::MatrixXd f;  ///< m x 2n
-    Eigen::VectorXd m;
+    int halvings = 0;       ///< of the spread
+    std::vector<double> f;  ///< m x 2n by columns
+    std::vector<double> m;
+  };
+  struct Moments {
+    Workspace::Matrix f;
+    Workspace::Vector m;
   };
 
   Transform TransformOf(Eigen::Index directions, int halvings) const;
   const Eigen::MatrixXd& Root();
-  Status StepPoints(const Eigen::MatrixXd& root, int halvings, double dt_s);
-  Status StepPoint(const std::vector<double>& from, const Eigen::VectorXd& noise, double dt_s,
-                   std::vector<double>& to) const;
+  Status StepPoints(int halvings, double dt_s);
+  Status StepPoint(const double* from, const double* noise, double dt_s, double* to);
   Outcome Predict(Row& row, int halvings);
-  Predicted& PredictedOf(const Row& row) { return predicted_[row.report]; }
-  Outcome StackPoints(std::span<Row* const> rows, Stacked& all, Eigen::VectorXd& mean,
-                      int& halvings);
-  void NoteGuard(const std::string& who, std::size_t index, int halvings);
+  Moments MomentsAt(const Row& row);
+  Outcome StackPoints(std::span<Row* const> rows, int halvings, Stacked& all,
+                      Workspace::Vector& mean);
+  void NoteGuard(std::size_t index, int halvings);
 
   UkfOptions spread_;
   Eigen::MatrixXd root_;  ///< of P
   bool root_is_current_ = false;
   std::vector<Predicted> predicted_;  ///< by report
   std::vector<bool> guarded_;         ///< by sensor; the last: the motion
+  // Memory that is kept from step to step.
+  Eigen::LDLT<Eigen::MatrixXd> ldlt_;
+  std::vector<const double*> x_;
+  std::vector<double*> stepped_;
   /// @endcond
 };
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "alidade/statistics.h"
@@ -33,8 +34,8 @@ Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>
       options_(options),
       stream_of_sensor_(system_.sensors.size(), -1),
       state_(system_.InitialState()),
-      inputs_(system_, streams),
       steps_(steps),
+      inputs_(system_, streams),
       rejections_(system_.sensors.size(), 0),
       out_of_domain_(system_.sensors.size(), false),
       inflated_(system_.sensors.size(), false),

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/ekf.h"
+#include "alidade/ekf_options.h"
+
 #include "alidade/iekf.h"
 #include "filter_options.h"
 

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "alidade/ekf.h"
+#include "number_text.h"
 #include "square_root.h"
 
 namespace alidade {
@@ -111,20 +112,19 @@ void Ekf::RepairCovariance() {
   const auto is_not_pd = [this](const Row& row) { return EntryOf(row).outcome == Outcome::kNotPd; };
   if (std::ranges::none_of(rows(), is_not_pd)) return;
   Covariance& p = state_.covariance();
-  const internal::SquareRoot result = internal::SquareRootOf(p.Dense());
-  if (!(result.defect < -kRounding)) return;
-  char text[160];
-  std::snprintf(text, sizeof(text),
-                "the covariance is not positive semi-definite: a pivot is %.3g of its largest "
-                "variance",
-                result.defect);
+  Eigen::LDLT<Eigen::MatrixXd> ldlt;
+  Eigen::MatrixXd root;
+  const double defect = internal::SquareRootOf(p.Dense(), ldlt, root);
+  if (!(defect < -kRounding)) return;
+  const std::string text = "the covariance is not positive semi-definite: a pivot is " +
+                           internal::RoundedText(defect, 3) + " of its largest variance";
   if (repairs_ == options_.repairs) {
-    return GiveUp("not_pd", std::string(text) + ", after " + std::to_string(repairs_) + " repairs");
+    return GiveUp("not_pd", text + ", after " + std::to_string(repairs_) + " repairs");
   }
   ++repairs_;
-  p.SetBlock(0, 0, result.root * result.root.transpose());
-  Note("repaired", std::string(text) + "; negative pivots count as zero (repair " +
-                       std::to_string(repairs_) + " of " + std::to_string(options_.repairs) + ")");
+  p.SetBlock(0, 0, root * root.transpose());
+  Note("repaired", text + "; negative pivots count as zero (repair " + std::to_string(repairs_) +
+                       " of " + std::to_string(options_.repairs) + ")");
 }
 
 /// Counts rejections in a row for each sensor, and recovers one that is locked out.

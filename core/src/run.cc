@@ -128,7 +128,7 @@ std::string Cause(const std::vector<Event>& events, const char* otherwise) {
 
 /// One frame through one estimator, unless it has passed already; false where the whole run has to
 /// end.
-bool Advance(Running& one, const Seen& seen, const internal::Passed* passed,
+bool Advance(Running& one, const Seen& seen, const internal::Processed* passed,
              const RunOptions& options, RunResult& result) {
   if (one.ended) return true;
   Estimator& estimator = *one.named.estimator;
@@ -186,7 +186,7 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
     if (keep) kept.push_back(seen);
     bool go_on = true;
     for (std::size_t e = 0; e < running.size(); ++e) {
-      go_on = Advance(running[e], seen, frames.passed(e), options, result) && go_on;
+      go_on = Advance(running[e], seen, frames.processed(e), options, result) && go_on;
     }
     ++result.frames;
     if (!go_on || std::ranges::all_of(running, &Running::ended)) return;

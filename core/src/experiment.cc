@@ -105,11 +105,7 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   const Node type = entry.At("type", "an estimator");
   named.type = type.Text();
   const EstimatorType* const of_core = FindEstimatorType(named.type);
-  if (of_core == nullptr) {
-    CheckOffered(named.type, host, type);
-  } else {
-    internal::RefuseUnsupportedKeys(*of_core, entry);
-  }
+  if (of_core == nullptr) CheckOffered(named.type, host, type);
   const EstimatorMaker make =
       of_core != nullptr ? of_core->read(entry) : host.CreateEstimator(named.type, entry);
   if (const auto policy = entry.Find("on_divergence")) {
@@ -126,9 +122,12 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
     }
   }
   const std::vector<std::string> only = ReadSensorList(entry, own.root());
+  internal::RefuseUnsupportedKeys(named.type, entry);
   entry.RejectUnread();
   named.system = BuildSystem(own.root(), host, only);
-  if (of_core != nullptr) internal::RefuseUnsupported(*of_core, own.root(), named.system);
+  if (of_core != nullptr) {
+    internal::RefuseUnsupported(named.type, of_core->support, own.root(), named.system);
+  }
   for (const SensorBinding& sensor : named.system.sensors) {
     FindStream(own.root().At("sensors").At(sensor.name), sensor.model, streams);
   }

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "cholesky.h"
+#include "number_text.h"
 
 namespace alidade {
 namespace {
@@ -25,15 +25,7 @@ Iekf::Iekf(System system, const IekfOptions& options, const std::vector<StreamIn
       tolerance_(options.tolerance) {
   ALIDADE_EXPECTS(options.jacobian == JacobianAt::kLatest);
   ALIDADE_EXPECTS(max_iterations_ > 1 && tolerance_ > 0.0);
-  for (const Block& block : system_.layout.blocks()) {
-    ALIDADE_EXPECTS(block.status != BlockStatus::kConsidered);
-  }
-  for (const SensorBinding& sensor : system_.sensors) {
-    for (const RoleBinding& role : sensor.roles) {
-      ALIDADE_EXPECTS(role.mode != RoleMode::kConsider);
-      ALIDADE_EXPECTS(role.linearise_at == LineariseAt::kPrediction);
-    }
-  }
+  ALIDADE_EXPECTS(!FindUnsupported(system_, kSupport));
 }
 
 Outcome Iekf::Apply(std::span<Row* const> rows) {
@@ -52,41 +44,49 @@ Outcome Iekf::Apply(std::span<Row* const> rows) {
     entry.s.swap(first[i].s);
   }
   if (outcome == Outcome::kAccepted && minimum && !minimum->converged) {
-    char text[128];
-    std::snprintf(text, sizeof(text),
-                  "an update stopped after %d iterations, a step of %.3g sigma before its optimum; "
-                  "the last iterate is kept",
-                  minimum->iterations, minimum->step);
-    Note("not_converged", text);
+    Note("not_converged",
+         "an update stopped after " + std::to_string(minimum->iterations) + " iterations" +
+             (minimum->step ? ", a step of " + internal::RoundedText(*minimum->step, 3) +
+                                  " sigma before its optimum"
+                            : std::string(" where h has no Jacobian")) +
+             "; the last iterate is kept");
   }
   return outcome;
 }
 
 /// The optimum of one update, or the last iterate on the way, which the rows are then linearised
-/// at. P may be singular: dx = P v all the way, so that dx' P^-1 dx = v' dx. Nothing, and the rows
-/// as they were, where there is no first step.
+/// at, or at the one before where they cannot be. P may be singular: dx = P v all the way, so that
+/// dx' P^-1 dx = v' dx. Nothing, and the rows as they were, where there is no first step.
 std::optional<Iekf::Minimum> Iekf::Minimise(std::span<Row* const> rows,
                                             const std::vector<double>& prior) {
   const Eigen::Index n = state_.covariance().size();
   Minimum minimum{Eigen::VectorXd::Zero(n)};
   Eigen::VectorXd& dx = minimum.dx;
   Eigen::VectorXd v = Eigen::VectorXd::Zero(n), innovations;
-  for (; minimum.iterations < max_iterations_; ++minimum.iterations) {
+  Eigen::VectorXd linearised = dx;  // where the rows last were
+  for (bool defined = true;; defined = Relinearise(rows, prior, dx)) {
     const Stacked at = Stack(rows);
     const Eigen::MatrixXd pht = ProjectionOf(rows);
     Llt s, r;
-    if (!internal::Factorise(at.h * pht + at.noise, s) || !internal::Factorise(at.noise, r)) {
+    if (!defined || !internal::Factorise(at.h * pht + at.noise, s) ||
+        !internal::Factorise(at.noise, r)) {
       if (minimum.iterations == 0) return std::nullopt;
+      MoveFrom(prior, linearised);
+      Relinearise(rows, prior, linearised);
+      minimum.step.reset();
       break;
     }
+    linearised = dx;
+    ++minimum.iterations;
     const Eigen::VectorXd y = s.solve(at.innovation + at.h * dx);
     const Eigen::VectorXd step = pht * y - dx, step_v = at.h.transpose() * y - v;
     minimum.step = std::sqrt(step_v.dot(step) + SquaredNorm(r, at.h * step));
-    if (minimum.step <= tolerance_) {
+    if (*minimum.step <= tolerance_) {
       dx += step;
       minimum.converged = true;
       break;
     }
+    if (minimum.iterations == max_iterations_) break;
     // Falls, but for what rounding makes of it.
     constexpr double kRounding = 1e-12;
     constexpr int kHalvings = 10;
@@ -102,7 +102,6 @@ std::optional<Iekf::Minimum> Iekf::Minimise(std::span<Row* const> rows,
     const double part = std::ldexp(1.0, -halvings);
     dx += part * step;
     v += part * step_v;
-    if (!Relinearise(rows, prior, dx)) break;
   }
   return minimum;
 }

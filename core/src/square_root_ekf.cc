@@ -10,8 +10,8 @@ namespace alidade {
 SquareRootEkf::SquareRootEkf(System system, const EkfOptions& options,
                              const std::vector<StreamInfo>& streams)
     : Ekf(std::move(system), internal::WithoutRecovery(options), streams) {
-  ALIDADE_EXPECTS(!considering_ && !waiting_);
-  Take(internal::SquareRootOf(state_.covariance().Dense()).root);
+  ALIDADE_EXPECTS(!FindUnsupported(system_, kSupport));
+  SetRoot(internal::SquareRootOf(state_.covariance().Dense()).root);
 }
 
 struct SquareRootEkf::Kept : Ekf::Kept {
@@ -29,7 +29,7 @@ void SquareRootEkf::Restore(const Snapshot& snapshot) {
   root_ = dynamic_cast<const Kept&>(snapshot).root;
 }
 
-void SquareRootEkf::Take(Eigen::MatrixXd root) {
+void SquareRootEkf::SetRoot(Eigen::MatrixXd root) {
   root_ = std::move(root);
   state_.covariance().SetBlock(0, 0, root_ * root_.transpose());
 }
@@ -39,7 +39,7 @@ bool SquareRootEkf::StepOnce(double dt_s) {
   const Eigen::MatrixXd noise = NoiseInput();
   Eigen::MatrixXd wide(root_.rows(), root_.cols() + noise.cols());
   wide << Transition() * root_, noise;
-  Take(internal::Triangular(wide));
+  SetRoot(internal::Triangular(wide));
   return true;
 }
 
@@ -77,7 +77,7 @@ Outcome SquareRootEkf::Apply(std::span<Row* const> rows) {
   }
   const Eigen::MatrixXd transport = TransportTo(moved_);
   state_.MoveTo(moved_);
-  Take(transport * triangular.bottomRightCorner(n, n));
+  SetRoot(transport * triangular.bottomRightCorner(n, n));
   RecordUpdate(rows, gain);
   return Outcome::kAccepted;
 }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/ukf.h"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <cstdio>
 
+#include "cholesky.h"
 #include "ekf_kept.h"
 #include "filter_options.h"
 #include "square_root.h"
@@ -15,10 +15,11 @@ namespace {
 constexpr int kMostHalvings = 30;
 
 /// Mean of the points that `centre` and the columns of `points` are, and f_i = (y_i (-) mean) -
-/// (centre (-) mean): `f` (tangent x 2N) and m = w sum f_i.
-void MeanOf(const Geometry& geometry, const double* centre, const Eigen::MatrixXd& points, double w,
+/// (centre (-) mean): `f` (tangent x 2N) and m = w sum f_i. False where the iteration does not
+/// settle, the points being too far apart.
+bool MeanOf(const Geometry& geometry, const double* centre, const Eigen::MatrixXd& points, double w,
             double* mean, Eigen::Ref<Eigen::MatrixXd> f, Eigen::Ref<Eigen::VectorXd> m) {
-  constexpr int kMostIterations = 50;
+  constexpr int kMostIterations = 200;
   constexpr double kSettled = 1e-14;
   std::copy_n(centre, geometry.ambient, mean);
   Eigen::VectorXd from_mean(geometry.tangent), d(geometry.tangent);
@@ -31,12 +32,14 @@ void MeanOf(const Geometry& geometry, const double* centre, const Eigen::MatrixX
     m = w * f.rowwise().sum();
     if (geometry.kind == GeometryKind::kVector) {
       geometry.Plus(centre, m.eval().data(), mean);
-      return;
+      return true;
     }
-    const Eigen::VectorXd more = from_mean + m;
-    geometry.Plus(mean, more.data(), mean);
-    if (!(more.norm() > kSettled)) return;
+    const std::vector<double> last(mean, mean + geometry.ambient);
+    geometry.Plus(last.data(), (from_mean + m).eval().data(), mean);
+    geometry.Minus(mean, last.data(), d.data());
+    if (d.norm() <= kSettled) return true;
   }
+  return false;
 }
 
 UkfOptions Read(Params& p) {
@@ -63,7 +66,9 @@ Ukf::Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>
     : Ekf(std::move(system), internal::WithoutRecovery(options.filter), streams),
       spread_(options),
       guarded_(system_.sensors.size() + 1, false) {
-  ALIDADE_EXPECTS(!considering_ && !waiting_);
+  ALIDADE_EXPECTS(!FindUnsupported(system_, kSupport));
+  ALIDADE_EXPECTS(spread_.alpha > 0.0 && spread_.alpha <= 1.0 && spread_.beta >= 0.0 &&
+                  spread_.kappa >= 0.0);
 }
 
 struct Ukf::Kept : Ekf::Kept {
@@ -115,8 +120,9 @@ const Eigen::MatrixXd& Ukf::Root() {
 
 void Ukf::NoteGuard(const std::string& who, std::size_t index, int halvings) {
   if (halvings > 0 && !guarded_[index]) {
-    Note("guarded", who + ": sigma points leave its domain; their spread is divided by " +
-                        std::to_string(1 << halvings));
+    Note("guarded",
+         who + ": sigma points leave its domain or have no mean; their spread is divided by " +
+             std::to_string(1 << halvings));
   }
   guarded_[index] = halvings > 0;
 }
@@ -151,9 +157,18 @@ Status Ukf::StepPoint(const std::vector<double>& from, const Eigen::VectorXd& no
   return AllFinite(to) ? Status::kOk : Status::kOutOfDomain;
 }
 
+/// Of the active models.
+Eigen::Index Ukf::NoiseInputs() const {
+  Eigen::Index count = 0;
+  for (std::size_t i = 0; i < motions_.size(); ++i) {
+    if (motions_[i].active) count += system_.motions[i].model.noise_size();
+  }
+  return count;
+}
+
 /// Moves state and covariance, which stay as they are where a point is out of its domain.
 Status Ukf::StepPoints(const Eigen::MatrixXd& root, int halvings, double dt_s) {
-  const Eigen::Index n = root.cols(), noises = NoiseInput().cols(), all = n + noises;
+  const Eigen::Index n = root.cols(), noises = NoiseInputs(), all = n + noises;
   const Transform transform = TransformOf(all, halvings);
   std::vector<double> centre, from, to;
   Status status = StepPoint(state_.values(), Eigen::VectorXd::Zero(noises), dt_s, centre);
@@ -178,10 +193,13 @@ Status Ukf::StepPoints(const Eigen::MatrixXd& root, int halvings, double dt_s) {
   for (const Block& block : state_.layout().blocks()) {
     if (!block.has_covariance()) continue;
     const Geometry& geometry = block.geometry();
-    MeanOf(geometry, centre.data() + block.value_offset,
-           points.middleRows(block.value_offset, geometry.ambient), transform.w,
-           mean.data() + block.value_offset, f.middleRows(block.tangent_offset, geometry.tangent),
-           m.segment(block.tangent_offset, geometry.tangent));
+    if (!MeanOf(geometry, centre.data() + block.value_offset,
+                points.middleRows(block.value_offset, geometry.ambient), transform.w,
+                mean.data() + block.value_offset,
+                f.middleRows(block.tangent_offset, geometry.tangent),
+                m.segment(block.tangent_offset, geometry.tangent))) {
+      return Status::kOutOfDomain;
+    }
   }
   const Eigen::MatrixXd p = transform.w * f * f.transpose() + transform.centre * m * m.transpose();
   if (!AllFinite(mean) || !p.allFinite()) return Status::kOutOfDomain;
@@ -242,7 +260,10 @@ Outcome Ukf::Predict(Row& row, int halvings) {
   predicted.m.resize(geometry.tangent);
   MeasurementReport& entry = EntryOf(row);
   entry.h.resize(static_cast<std::size_t>(geometry.ambient));
-  MeanOf(geometry, centre.data(), points, transform.w, entry.h.data(), predicted.f, predicted.m);
+  if (!MeanOf(geometry, centre.data(), points, transform.w, entry.h.data(), predicted.f,
+              predicted.m)) {
+    return Outcome::kOutOfDomain;
+  }
   entry.innovation.resize(static_cast<std::size_t>(geometry.tangent));
   geometry.Minus(entry.z.data(), entry.h.data(), entry.innovation.data());
   return Outcome::kAccepted;
@@ -298,7 +319,12 @@ Outcome Ukf::StackPoints(std::span<Row* const> rows, Stacked& all, Eigen::Vector
   mean.resize(size);
   Eigen::Index at = 0;
   for (Row* row : rows) {
-    if (PredictedOf(*row).halvings < halvings) {
+    MeasurementReport& entry = EntryOf(*row);
+    std::vector<double> h, innovation;  // as the gate saw them
+    const bool narrower = PredictedOf(*row).halvings < halvings;
+    if (narrower) {
+      h = entry.h;
+      innovation = entry.innovation;
       const Outcome outcome = Predict(*row, halvings);
       if (outcome != Outcome::kAccepted) return outcome;
     }
@@ -306,9 +332,12 @@ Outcome Ukf::StackPoints(std::span<Row* const> rows, Stacked& all, Eigen::Vector
     const Eigen::Index k = predicted.m.size();
     all.h.middleRows(at, k) = predicted.f;
     all.noise.block(at, at, k, k) = Eigen::Map<const RowMajor>(row->r.data(), k, k);
-    all.innovation.segment(at, k) =
-        Eigen::Map<const Eigen::VectorXd>(EntryOf(*row).innovation.data(), k);
+    all.innovation.segment(at, k) = Eigen::Map<const Eigen::VectorXd>(entry.innovation.data(), k);
     mean.segment(at, k) = predicted.m;
+    if (narrower) {
+      entry.h.swap(h);
+      entry.innovation.swap(innovation);
+    }
     at += k;
   }
   return Outcome::kAccepted;
@@ -326,8 +355,8 @@ Outcome Ukf::Apply(std::span<Row* const> rows) {
   dx << transform.c * root, -transform.c * root;
   const Eigen::MatrixXd s = transform.w * all.h * all.h.transpose() +
                             transform.centre * mean * mean.transpose() + all.noise;
-  const Eigen::LLT<Eigen::MatrixXd> llt(s);
-  if (!s.allFinite() || llt.info() != Eigen::Success) {
+  Eigen::LLT<Eigen::MatrixXd> llt;
+  if (!internal::Factorise(s, llt)) {
     Note("not_pd", "the update would leave S not positive definite; rolled back");
     return Outcome::kNotPd;
   }

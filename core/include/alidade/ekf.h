@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "alidade/estimator.h"
+#include "alidade/support.h"
 
 namespace alidade {
 
@@ -59,6 +60,10 @@ struct EkfOptions {
 /// rolled back and reported.
 class Ekf : public Estimator {
  public:
+  /// All there is.
+  static constexpr Support kSupport = {
+      .considered = true, .at_measurement = true, .from_measurement = true, .recovery = true};
+
   /// `streams` are the source's, in the order of Measurement::stream.
   Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
 

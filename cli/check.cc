@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "command.h"
 #include "console.h"
@@ -90,20 +91,26 @@ bool AnyFails(const PluginHost& host, const std::vector<PluginEntry>& entries, c
               CheckOptions options) {
   options.other_keys = true;
   bool failed = false, any = false;
-  for (const char* section : {"state", "sensors"}) {
+  constexpr std::pair<const char*, PluginEntry::Kind> kSections[] = {
+      {"state", PluginEntry::Kind::kMotion}, {"sensors", PluginEntry::Kind::kSensor}};
+  for (const auto& [section, kind] : kSections) {
     const auto map = config.root().Find(section);
     if (!map) continue;
     for (const auto& [name, node] : map->Entries()) {
       const auto model = node.Find("model");
       for (const PluginEntry& entry : entries) {
-        const bool sensor = entry.kind == PluginEntry::Kind::kSensor;
-        if (!model || model->Text() != entry.name || sensor != (section[1] == 'e')) continue;
+        if (!model || model->Text() != entry.name || entry.kind != kind) continue;
         failed = Fails(host, entry, node, options) || failed;
         any = true;
       }
     }
   }
-  if (!any) config.root().Fail("no entry of `state` and `sensors` has a model of the plugin");
+  if (!any) {
+    std::string models;
+    for (const PluginEntry& entry : entries) models += (models.empty() ? "" : ", ") + entry.name;
+    config.root().Fail("no entry of `state` and `sensors` has a model of the plugin",
+                       "one with model: " + models);
+  }
   return failed;
 }
 

@@ -34,6 +34,7 @@ Finding Decode(const std::string& answer) {
   if (answer.empty()) return internal::Fail("gave no verdict");
   if (answer.front() == kError) throw Error(ExitCode::kBadConfig, answer.substr(1));
   const auto* at = std::find(std::begin(kVerdicts), std::end(kVerdicts), answer.front());
+  if (at == std::end(kVerdicts)) return internal::Fail("gave no verdict");
   return {static_cast<Finding::Verdict>(at - kVerdicts), "", answer.substr(1)};
 }
 
@@ -113,7 +114,9 @@ std::vector<PluginEntry> FindModels(const PluginHost& host, const std::string& p
     throw Error(ExitCode::kPlugin, ErrorLine({}, {}, what, {}, Nearest(wanted, names)));
   };
   if (found.empty()) {
-    for (const PluginEntry& entry : host.entries()) names.push_back(entry.name);
+    for (const PluginEntry& entry : host.entries()) {
+      if (IsModel(entry)) names.push_back(entry.name);
+    }
     fail("no plugin '" + plugin + "' with a sensor or motion model", plugin);
   }
   if (model.empty()) return found;

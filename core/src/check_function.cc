@@ -232,19 +232,6 @@ Answer CallFunction(const Function& function, const Values& inputs, int matrices
   return answer;
 }
 
-std::vector<std::string> TangentNames(const Space& space) {
-  const Geometry& geometry = space.geometry;
-  if (geometry.tangent == geometry.ambient) return ColumnNames(space.name, space);
-  std::vector<std::string> names;
-  const char* const axes[] = {"x", "y", "z"};
-  const bool rotation = geometry.kind == GeometryKind::kUnitQuaternion;
-  for (int i = 0; i < geometry.tangent; ++i) {
-    names.push_back(space.name + (rotation ? std::string(".rotation_") + axes[i]
-                                           : ".tangent_" + std::to_string(i)));
-  }
-  return names;
-}
-
 std::string StateText(const std::vector<Space>& spaces, const Values& values) {
   std::string text;
   for (std::size_t i = 0; i < spaces.size(); ++i) {

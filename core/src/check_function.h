@@ -89,9 +89,6 @@ struct Model {
 
 Answer CallFunction(const Function& function, const Values& inputs, int matrices);
 
-/// Names of the tangent elements: `position.x`, `orientation.rotation_x`.
-std::vector<std::string> TangentNames(const Space& space);
-
 /// `depth = 0.3, orientation = (1, 0, 0, 0)`
 std::string StateText(const std::vector<Space>& spaces, const Values& values);
 

@@ -14,8 +14,6 @@ namespace {
 using Eigen::ArrayXd;
 using Eigen::MatrixXd;
 
-std::string Text(double value) { return RoundedText(value, 6); }
-
 /// How two answers of a function differ, beyond the rounding of another order of operations; or "".
 std::string ValueDefect(const Function& f, const Answer& a, const Answer& b, const Values& inputs) {
   if (a.code != b.code) {
@@ -25,7 +23,7 @@ std::string ValueDefect(const Function& f, const Answer& a, const Answer& b, con
   const Values x = OutputValues(a);
   const double distance = Difference(f.outputs, x, OutputValues(b)).abs().maxCoeff();
   if (distance <= 1e-12 * (1.0 + Largest(x) + Largest(inputs))) return {};
-  return StateText(f.outputs, x) + ", " + Text(distance) + " apart";
+  return StateText(f.outputs, x) + ", " + RoundedText(distance) + " apart";
 }
 
 /// How far an entry of a Jacobian is from the numeric one.
@@ -128,7 +126,7 @@ void TestJacobian(const Context& context, const Function& f, const State& state,
   const std::vector<std::string> rows = TangentNames(f.outputs);
   Eigen::Index column = 0;
   for (std::size_t i = 0; i < static_cast<std::size_t>(f.differentiated); ++i) {
-    const std::vector<std::string> columns = internal::TangentNames(test.Input(i));
+    const std::vector<std::string> columns = TangentNames({test.Input(i)});
     const int count = test.Input(i).geometry.tangent;
     for (int k = 0; k < count && !inputs[i].empty(); ++k) {
       for (const Entry& entry : test.Column(i, k, column + k)) {
@@ -136,8 +134,8 @@ void TestJacobian(const Context& context, const Function& f, const State& state,
         if (!entry.wrong || entry.Distance() <= tally.worst) continue;
         tally.worst = entry.Distance();
         tally.failure = f.name + ": d " + rows[static_cast<std::size_t>(entry.row)] + " / d " +
-                        columns[static_cast<std::size_t>(k)] + " is " + Text(entry.written) +
-                        " from the model, " + Text(entry.numeric) + " by differences; " +
+                        columns[static_cast<std::size_t>(k)] + " is " + RoundedText(entry.written) +
+                        " from the model, " + RoundedText(entry.numeric) + " by differences; " +
                         context.Where(f, inputs);
       }
     }

@@ -18,8 +18,6 @@ using Eigen::MatrixXd;
 // Of values that are equal but for rounding.
 constexpr double kRounding = 1e-9;
 
-std::string Text(double value) { return RoundedText(value, 6); }
-
 /// The farthest that a value is from what it should be, relative to `tolerance`.
 struct Farthest {
   double ratio = 1.0;  ///< more is a failure
@@ -36,7 +34,7 @@ struct Farthest {
 
 std::string DefectOfR(const MatrixXd& l, const Space& z) {
   const MatrixXd r = l * l.transpose();
-  const std::vector<std::string> names = internal::TangentNames(z);
+  const std::vector<std::string> names = TangentNames({z});
   for (Eigen::Index i = 0; i < r.rows(); ++i) {
     if (!(r(i, i) > 0.0)) {
       return "R is singular: no noise on " + names[static_cast<std::size_t>(i)];
@@ -47,7 +45,7 @@ std::string DefectOfR(const MatrixXd& l, const Space& z) {
   const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(correlation, Eigen::EigenvaluesOnly);
   const double smallest = solver.eigenvalues()[0];
   if (smallest > 1e-12) return {};
-  return "R is singular: smallest eigenvalue of its correlations " + Text(smallest);
+  return "R is singular: smallest eigenvalue of its correlations " + RoundedText(smallest);
 }
 
 /// Step over dt from `state` without noise; nothing where it is not defined.
@@ -206,7 +204,8 @@ Finding CheckStep(Context& context) {
     const double before = additive.ratio;
     additive.Add(split->defect, kRounding * split->size, [&] {
       return context.Where(f, state) + ", w = 0: one step and two steps over the parts of dt end " +
-             Text(split->defect) + " apart in " + names[static_cast<std::size_t>(split->row)];
+             RoundedText(split->defect) + " apart in " +
+             names[static_cast<std::size_t>(split->row)];
     });
     if (additive.ratio > before) order = OrderOf(context, f, inputs, blocks);
   }

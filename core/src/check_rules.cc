@@ -71,6 +71,48 @@ int OpenDescriptors() {
   return count;
 }
 
+/// What is wrong with one number that a model has to write, or "".
+std::string CellDefect(double cell) {
+  if (Unwritten(cell)) return "is not written";
+  return std::isfinite(cell) ? "" : "is " + NumberText(cell);
+}
+
+/// What is wrong with the values of an answer, or "".
+std::string ValueDefect(const Function& f, const Answer& answer) {
+  for (std::size_t i = 0; i < f.outputs.size(); ++i) {
+    const Space& space = f.outputs[i];
+    const std::vector<std::string> names = ColumnNames(space.name, space);
+    std::vector<double> dense;
+    for (int c = 0; c < answer.outputs[i].columns(); ++c) {
+      dense.push_back(answer.outputs[i](0, c));
+      const std::string defect = CellDefect(dense.back());
+      if (!defect.empty()) return names[static_cast<std::size_t>(c)] + ' ' + defect;
+    }
+    if (space.geometry.Defect(dense.data()) > 1e-9) {
+      return space.name + " is no " + ToString(space.geometry.kind);
+    }
+  }
+  return {};
+}
+
+/// What is wrong with the Jacobians of an answer, or "".
+std::string JacobianDefect(const Function& f, const State& state, const Answer& answer) {
+  for (std::size_t i = 0; i < answer.matrices.size(); ++i) {
+    const Buffer& j = answer.matrices[i];
+    if (f.outputs.size() == 1 && state.values[static_cast<std::size_t>(f.slots[i])].empty()) {
+      continue;  // by a role that is not bound
+    }
+    for (int cell = 0; cell < j.rows() * j.columns(); ++cell) {
+      const int r = cell / j.columns(), c = cell % j.columns();
+      const std::string defect = CellDefect(j(r, c));
+      if (defect.empty()) continue;
+      return "Jacobian " + std::to_string(i) + " entry (" + std::to_string(r) + ", " +
+             std::to_string(c) + ") " + defect;
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 Finding CheckCreate(Context& context) {
@@ -165,46 +207,14 @@ Finding CheckPure(Context& context) {
 }
 
 Finding CheckOutputs(Context& context) {
-  const auto defect = [](double cell) -> std::string {
-    if (Unwritten(cell)) return "is not written";
-    return std::isfinite(cell) ? "" : "is " + NumberText(cell);
-  };
   const std::string failure = FirstFailure(context, [&](const Function& f, const State& state) {
     if (f.is_noise) return std::string();  // of `noise`
     const Answer with = context.Call(f, state), without = context.Call(f, state, kNoMatrix);
-    for (const Answer* answer : {&without, &with}) {
-      if (!answer->ok()) continue;
-      for (std::size_t i = 0; i < f.outputs.size(); ++i) {
-        const auto names = ColumnNames(f.outputs[i].name, f.outputs[i]);
-        const Buffer& value = answer->outputs[i];
-        std::vector<double> dense;
-        for (int c = 0; c < value.columns(); ++c) {
-          dense.push_back(value(0, c));
-          if (const std::string what = defect(dense.back()); !what.empty()) {
-            return context.Where(f, state) + ": " + names[static_cast<std::size_t>(c)] + ' ' + what;
-          }
-        }
-        if (f.outputs[i].geometry.Defect(dense.data()) > 1e-9) {
-          return context.Where(f, state) + ": " + f.outputs[i].name + " is no " +
-                 ToString(f.outputs[i].geometry.kind);
-        }
-      }
-    }
-    for (std::size_t i = 0; with.ok() && i < with.matrices.size(); ++i) {
-      const Buffer& j = with.matrices[i];
-      if (f.outputs.size() == 1 && state.values[static_cast<std::size_t>(f.slots[i])].empty()) {
-        continue;  // by a role that is not bound
-      }
-      for (int r = 0; r < j.rows(); ++r) {
-        for (int c = 0; c < j.columns(); ++c) {
-          if (const std::string what = defect(j(r, c)); !what.empty()) {
-            return context.Where(f, state) + ": Jacobian " + std::to_string(i) + " entry (" +
-                   std::to_string(r) + ", " + std::to_string(c) + ") " + what;
-          }
-        }
-      }
-    }
-    return std::string();
+    std::string defect;
+    if (without.ok()) defect = ValueDefect(f, without);
+    if (defect.empty() && with.ok()) defect = ValueDefect(f, with);
+    if (defect.empty() && with.ok()) defect = JacobianDefect(f, state, with);
+    return defect.empty() ? defect : context.Where(f, state) + ": " + defect;
   });
   return Verdict(failure, "all written, finite and on their geometries");
 }

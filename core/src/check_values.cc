@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "columns.h"
+
 namespace alidade::internal {
 
 using Eigen::ArrayXd;
@@ -55,7 +57,7 @@ MatrixXd SideBySide(const Answer& answer) {
 std::vector<std::string> TangentNames(const std::vector<Space>& spaces) {
   std::vector<std::string> names;
   for (const Space& space : spaces) {
-    for (const std::string& name : internal::TangentNames(space)) names.push_back(name);
+    for (const std::string& name : TangentNames(space.name, space)) names.push_back(name);
   }
   return names;
 }

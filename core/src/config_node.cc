@@ -225,6 +225,11 @@ void Node::RejectUnread() const {
   if (!lines.empty()) throw Error(ExitCode::kBadConfig, Join(lines, "\n"));
 }
 
+bool Node::HasUnread(std::string_view key) const {
+  const ConfigTree& map = Expect(*tree_, Kind::kMap, "a map");
+  return internal::Child(map, key) != nullptr && !map.asked.contains(std::string(key));
+}
+
 void Node::Declare(std::string_view key) const {
   Expect(*tree_, Kind::kMap, "a map").asked.emplace(key);
 }

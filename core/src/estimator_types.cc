@@ -2,12 +2,14 @@
 #include "estimator_types.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "alidade/iekf.h"
 #include "alidade/rts.h"
 #include "alidade/square_root_ekf.h"
 #include "alidade/ukf.h"
 #include "filter_options.h"
+#include "number_text.h"
 
 namespace alidade::internal {
 namespace {
@@ -31,70 +33,73 @@ EstimatorMaker ReadSquareRoot(const Node& entry) {
 }
 EstimatorMaker ReadUkf(const Node& entry) { return Maker<Ukf>(UkfOptions::FromNode(entry)); }
 
-/// Fails at `node`: the type cannot have `what`.
-[[noreturn]] void Refuse(const EstimatorType& type, const Node& node, const std::string& what,
-                         const std::string& instead) {
-  node.Fail(std::string("estimator type '") + type.name + "' does not support " + what,
-            instead + " (also by the estimator's `overrides`), or type: ekf");
+Description DescribeEkf(const Node& entry) {
+  const EkfOptions options = EkfOptions::FromNode(entry);
+  const bool latest = options.jacobian == JacobianAt::kLatest;
+  return {options,
+          {{"jacobian", latest ? "latest: H at the estimate"
+                               : "first_estimate: H where stationary blocks started from"}}};
+}
+Description DescribeIekf(const Node& entry) {
+  const IekfOptions options = IekfOptions::FromNode(entry);
+  return {options,
+          {{"max_iterations", std::to_string(options.max_iterations)},
+           {"tolerance", NumberText(options.tolerance) + " sigma of the posterior"}}};
+}
+Description DescribeUkf(const Node& entry) {
+  const UkfOptions options = UkfOptions::FromNode(entry);
+  return {options.filter,
+          {{"alpha, beta, kappa", NumberText(options.alpha) + ", " + NumberText(options.beta) +
+                                      ", " + NumberText(options.kappa)}}};
+}
+Description DescribeCommon(const Node& entry) {
+  return {OptionsFromNode(entry, "filter", ReadCommonOptions), {}};
 }
 
 std::string NameIn(const Block& block) { return block.name.substr(block.owner.size() + 1); }
 
 /// The item `block` of the list under `consider` of its state entry.
-Node ConsiderOf(const Node& root, const Block& block) {
-  const Node list = root.At("state").At(block.owner).At("consider");
+Node ConsiderOf(const Node& state, const Block& block) {
+  const Node list = state.At("consider");
   for (const Node& item : list.Items()) {
     if (item.Text() == NameIn(block)) return item;
   }
   return list;
 }
 
-void RefuseBlocks(const EstimatorType& type, const Node& root, const System& system) {
-  for (const Block& block : system.layout.blocks()) {
-    if (block.status == BlockStatus::kConsidered && !type.support.considered) {
-      Refuse(type, ConsiderOf(root, block), "considered blocks", "the block estimated or fixed");
-    }
+/// Where the config asks for what is not supported.
+Node NodeOf(const Unsupported& asked, const Node& root, const System& system) {
+  if (asked.block >= 0) {
+    const Block& block = system.layout[asked.block];
+    const Node state = root.At("state").At(block.owner);
+    if (block.status == BlockStatus::kConsidered) return ConsiderOf(state, block);
+    return state.At("initial").At(NameIn(block)).At("from");
   }
-  for (const Prior& prior : system.priors) {
-    if (prior.from.empty() || type.support.recovery) continue;
-    const Block& block = system.layout[prior.block];
-    const Node initial = root.At("state").At(block.owner).At("initial").At(NameIn(block));
-    Refuse(type, initial.At("from"), "blocks that start from a measurement", "mean and sigma");
-  }
-}
-
-void RefuseRole(const EstimatorType& type, const RoleBinding& role, const Node& node) {
-  if (role.mode == RoleMode::kConsider && !type.support.considered) {
-    Refuse(type, node.At("mode"), "considered roles", "estimate or hold");
-  }
-  if (role.linearise_at == LineariseAt::kMeasurement && !type.support.at_measurement) {
-    Refuse(type, node.At("linearise_at"), "linearise_at: measurement", "prediction");
-  }
+  const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(asked.sensor)];
+  const Node entry = root.At("sensors").At(sensor.name);
+  if (asked.role < 0) return entry.At("loss");
+  const auto role = static_cast<std::size_t>(asked.role);
+  const Node node = entry.At("roles").At(sensor.model.roles()[role].name);
+  // A mode that cannot be done comes before linearise_at.
+  return node.At(asked.what.starts_with("linearise_at") ? "linearise_at" : "mode");
 }
 
 }  // namespace
 
 const std::vector<EstimatorType>& EstimatorTypes() {
-  constexpr Support kPlain = {};
   static const std::vector<EstimatorType> types = {
-      {"ekf",
-       "Extended Kalman filter; built in, for `estimators`.",
-       ReadEkf,
-       EkfOptions::Schema,
-       {.considered = true, .at_measurement = true, .recovery = true, .robust_loss = true}},
-      {"iekf",
-       "Iterated extended Kalman filter; built in, for `estimators`.",
-       ReadIekf,
-       IekfOptions::Schema,
-       {.considered = false, .at_measurement = false, .recovery = true, .robust_loss = true}},
+      {"ekf", "Extended Kalman filter; built in, for `estimators`.", ReadEkf, EkfOptions::Schema,
+       DescribeEkf, Ekf::kSupport},
+      {"iekf", "Iterated extended Kalman filter; built in, for `estimators`.", ReadIekf,
+       IekfOptions::Schema, DescribeIekf, Iekf::kSupport},
       {"rts",
        "Fixed-interval smoother after an extended Kalman filter; built in, for `estimators`.",
-       ReadRts, CommonSchema, kPlain},
+       ReadRts, CommonSchema, DescribeCommon, RtsSmoother::kSupport},
       {"square_root_ekf",
        "Extended Kalman filter that carries a square root of P; built in, for `estimators`.",
-       ReadSquareRoot, CommonSchema, kPlain},
+       ReadSquareRoot, CommonSchema, DescribeCommon, SquareRootEkf::kSupport},
       {"ukf", "Unscented Kalman filter; built in, for `estimators`.", ReadUkf, UkfOptions::Schema,
-       kPlain},
+       DescribeUkf, Ukf::kSupport},
   };
   return types;
 }
@@ -105,33 +110,25 @@ const EstimatorType* FindEstimatorType(std::string_view name) {
   return found == types.end() ? nullptr : &*found;
 }
 
-void RefuseUnsupportedKeys(const EstimatorType& type, const Node& entry) {
-  const std::vector<ParamInfo> keys = type.schema();
-  const auto refuse = [&](const std::string& key, const std::string& what) {
-    const auto of_key = [&](const ParamInfo& info) {
-      return info.key == key || info.key.starts_with(key + '.');
-    };
-    const auto node = entry.Find(key);
-    if (!node || std::ranges::any_of(keys, of_key)) return;
-    node->Fail(std::string("estimator type '") + type.name + "' has no " + what,
-               "the key left out, or type: ekf");
-  };
-  refuse("jacobian", "choice of Jacobian");
-  refuse("lockout", "recovery from a lock-out");
+void RefuseUnsupportedKeys(const std::string& type, const Node& entry) {
+  constexpr std::pair<const char*, const char*> kKeys[] = {{"gate", "gate"},
+                                                           {"fuse", "choice of updates"},
+                                                           {"jacobian", "choice of Jacobian"},
+                                                           {"lockout", "recovery from a lock-out"}};
+  for (const auto& [key, what] : kKeys) {
+    if (!entry.HasUnread(key)) continue;
+    entry.At(key).Fail("estimator type '" + type + "' has no " + what,
+                       "the key left out, or type: ekf");
+  }
 }
 
-void RefuseUnsupported(const EstimatorType& type, const Node& root, const System& system) {
-  RefuseBlocks(type, root, system);
-  for (const SensorBinding& sensor : system.sensors) {
-    const Node entry = root.At("sensors").At(sensor.name);
-    for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
-      const auto node = entry.At("roles").Find(sensor.model.roles()[i].name);
-      if (node) RefuseRole(type, sensor.roles[i], *node);
-    }
-    if (sensor.loss.kind != LossKind::kNone && !type.support.robust_loss) {
-      Refuse(type, entry.At("loss"), "robust losses", "the sensor without one");
-    }
-  }
+void RefuseUnsupported(const std::string& type, const Support& support, const Node& root,
+                       const System& system) {
+  const auto asked = FindUnsupported(system, support);
+  if (!asked) return;
+  NodeOf(*asked, root, system)
+      .Fail("estimator type '" + type + "' does not support " + asked->what,
+            asked->remedy + " (also by the estimator's `overrides`), or type: ekf");
 }
 
 }  // namespace alidade::internal

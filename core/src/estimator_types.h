@@ -6,16 +6,17 @@
 #include <vector>
 
 #include "alidade/config.h"
+#include "alidade/ekf.h"
 #include "alidade/plugin_host.h"
+#include "alidade/support.h"
+#include "text_table.h"
 
 namespace alidade::internal {
 
-/// What an estimator can do with a system, beyond estimated and fixed blocks and held roles.
-struct Support {
-  bool considered;      ///< blocks and roles
-  bool at_measurement;  ///< linearise_at: measurement
-  bool recovery;        ///< blocks that start from a measurement, and from one after a lock-out
-  bool robust_loss;
+/// The options of an estimator's entry.
+struct Description {
+  EkfOptions common;         ///< of every filter
+  std::vector<TextRow> own;  ///< key and value in words, of what only some have
 };
 
 /// A type of estimator that core has itself, for `type:` of an entry of `estimators:`.
@@ -25,6 +26,8 @@ struct EstimatorType {
   /// Reads the entry's keys. Errors: kBadConfig.
   EstimatorMaker (*read)(const Node& entry);
   std::vector<ParamInfo> (*schema)();  ///< what `read` asks for
+  /// The options that an entry sets, in words.
+  Description (*describe)(const Node& entry);
   Support support;
 };
 
@@ -33,12 +36,13 @@ const std::vector<EstimatorType>& EstimatorTypes();
 /// Null where there is none of that name.
 const EstimatorType* FindEstimatorType(std::string_view name);
 
-/// Refuses by name the keys of an estimator's entry that its type cannot have but others do:
-/// `jacobian`, `lockout`. Errors: kBadConfig.
-void RefuseUnsupportedKeys(const EstimatorType& type, const Node& entry);
-/// The same for what `system`, built from the config `root`, asks of it: considered blocks and
-/// roles, blocks that start from a measurement, linearise_at: measurement, a robust loss.
+/// Refuses by name the keys of an estimator's entry that are left unread but other types have:
+/// `gate`, `fuse`, `jacobian`, `lockout`. To be called once the entry's own keys have been read.
 /// Errors: kBadConfig.
-void RefuseUnsupported(const EstimatorType& type, const Node& root, const System& system);
+void RefuseUnsupportedKeys(const std::string& type, const Node& entry);
+/// The same for what `system`, built from the config `root`, asks for beyond `support`.
+/// Errors: kBadConfig.
+void RefuseUnsupported(const std::string& type, const Support& support, const Node& root,
+                       const System& system);
 
 }  // namespace alidade::internal

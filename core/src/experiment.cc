@@ -173,11 +173,7 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   const Node type = entry.At("type", "an estimator");
   named.type = type.Text();
   const EstimatorType* const of_core = FindEstimatorType(named.type);
-  if (of_core == nullptr) {
-    CheckOffered(named.type, host, type);
-  } else {
-    internal::RefuseUnsupportedKeys(*of_core, entry);
-  }
+  if (of_core == nullptr) CheckOffered(named.type, host, type);
   const EstimatorMaker make =
       of_core != nullptr ? of_core->read(entry) : host.CreateEstimator(named.type, entry);
   if (const auto policy = entry.Find("on_divergence")) {
@@ -196,9 +192,12 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   const std::vector<std::string> only = ReadSensorList(entry, own.root());
   const auto use = entry.Find("use");
   if (use && use->is_map()) use->Declare("accepted_by");
+  internal::RefuseUnsupportedKeys(named.type, entry);
   entry.RejectUnread();
   named.system = BuildSystem(own.root(), host, only);
-  if (of_core != nullptr) internal::RefuseUnsupported(*of_core, own.root(), named.system);
+  if (of_core != nullptr) {
+    internal::RefuseUnsupported(named.type, of_core->support, own.root(), named.system);
+  }
   CheckStreams(own.root(), named.system, streams);
   named.estimator = make(named.system, streams);
   if (use) named.accepted_by = ReadUse(*use, named, config.root().At("estimators"), before);

@@ -8,9 +8,7 @@
 #include <map>
 #include <utility>
 
-#include "alidade/iekf.h"
 #include "alidade/statistics.h"
-#include "alidade/ukf.h"
 #include "columns.h"
 #include "estimator_types.h"
 #include "names.h"
@@ -266,34 +264,16 @@ std::string LossText(const System& system) {
   return Join(losses);
 }
 
-/// What the type has beyond the options of all.
-void AddOwnOptions(const std::string& type, const Node& entry, std::vector<TextRow>& rows) {
-  if (type == "ekf") {
-    const bool latest = EkfOptions::FromNode(entry).jacobian == JacobianAt::kLatest;
-    rows.push_back({"jacobian", latest ? "latest: H at the estimate"
-                                       : "first_estimate: H where stationary blocks started from"});
-  } else if (type == "iekf") {
-    const IekfOptions options = IekfOptions::FromNode(entry);
-    rows.push_back({"max_iterations", std::to_string(options.max_iterations)});
-    rows.push_back({"tolerance", NumberText(options.tolerance) + " sigma of the posterior"});
-  } else if (type == "ukf") {
-    const UkfOptions options = UkfOptions::FromNode(entry);
-    rows.push_back({"alpha, beta, kappa", NumberText(options.alpha) + ", " +
-                                              NumberText(options.beta) + ", " +
-                                              NumberText(options.kappa)});
-  }
-}
-
 std::string Options(const Node& entry, const NamedEstimator& named) {
   const System& system = named.system;
   std::vector<TextRow> rows;
   if (const internal::EstimatorType* const type = internal::FindEstimatorType(named.type)) {
-    const EkfOptions options = EkfOptions::FromNode(entry);
+    const auto [options, own] = type->describe(entry);
     rows = {{"gate", GateText(options, system)}, {"fuse", FuseText(options.fuse, system)}};
     if (type->support.recovery) rows.push_back({"lockout", LockoutText(options, system)});
     rows.push_back({"max_dt_s", std::isfinite(options.max_dt_s) ? NumberText(options.max_dt_s)
                                                                 : "none: a gap is one step"});
-    AddOwnOptions(named.type, entry, rows);
+    rows.insert(rows.end(), own.begin(), own.end());
   }
   if (const auto use = entry.Find("use"); use && use->is_map()) {
     rows.push_back({"use", "the measurements that " + use->At("accepted_by").Text() + " accepts"});
@@ -311,7 +291,7 @@ std::string Options(const Node& entry, const NamedEstimator& named) {
 std::string SupportText(const std::string& type) {
   const internal::EstimatorType* known = internal::FindEstimatorType(type);
   if (known == nullptr) return {};
-  const internal::Support& can = known->support;
+  const Support& can = known->support;
   const auto either = [](bool can_do, const char* with, const char* without) {
     return std::string(can_do ? with : without);
   };
@@ -321,13 +301,12 @@ std::string SupportText(const std::string& type) {
                 "    blocks estimated or fixed; roles estimate, hold;\n") +
          "    control inputs; linearise_at prediction" +
          either(can.at_measurement, " or measurement", "") +
-         either(can.recovery, "; blocks that start from a measurement", "") +
+         either(can.from_measurement, "; blocks that start from a measurement", "") +
          either(can.robust_loss, ";\n    robust losses", "") +
          ".\n    Not: " + either(can.considered, "", "considered blocks and roles, ") +
          either(can.at_measurement, "", "linearise_at measurement, ") +
-         either(can.recovery, "",
-                "blocks that start from a measurement, recovery from a\n    lock-out, ") +
-         "landmarks.\n";
+         either(can.from_measurement, "", "blocks that start from a measurement, ") +
+         either(can.recovery, "", "recovery from a\n    lock-out, ") + "landmarks.\n";
 }
 
 /// What is done with late frames, where it is not the default.

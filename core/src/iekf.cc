@@ -24,15 +24,7 @@ Iekf::Iekf(System system, const IekfOptions& options, const std::vector<StreamIn
       tolerance_(options.tolerance) {
   ALIDADE_EXPECTS(options.jacobian == JacobianAt::kLatest);
   ALIDADE_EXPECTS(max_iterations_ > 1 && tolerance_ > 0.0);
-  for (const Block& block : system_.layout.blocks()) {
-    ALIDADE_EXPECTS(block.status != BlockStatus::kConsidered);
-  }
-  for (const SensorBinding& sensor : system_.sensors) {
-    for (const RoleBinding& role : sensor.roles) {
-      ALIDADE_EXPECTS(role.mode != RoleMode::kConsider);
-      ALIDADE_EXPECTS(role.linearise_at == LineariseAt::kPrediction);
-    }
-  }
+  ALIDADE_EXPECTS(!FindUnsupported(system_, kSupport));
 }
 
 Outcome Iekf::Apply(std::span<Row* const> rows) {
@@ -52,16 +44,19 @@ Outcome Iekf::Apply(std::span<Row* const> rows) {
     entry.s.swap(first_[i].s);
   }
   if (outcome == Outcome::kAccepted && minimum && !minimum->converged) {
-    Note("not_converged", "an update stopped after " + std::to_string(minimum->iterations) +
-                              " iterations, a step of " + internal::RoundedText(minimum->step, 3) +
-                              " sigma before its optimum; the last iterate is kept");
+    Note("not_converged",
+         "an update stopped after " + std::to_string(minimum->iterations) + " iterations" +
+             (minimum->step ? ", a step of " + internal::RoundedText(*minimum->step, 3) +
+                                  " sigma before its optimum"
+                            : std::string(" where h has no Jacobian")) +
+             "; the last iterate is kept");
   }
   return outcome;
 }
 
 /// The optimum of one update, or the last iterate on the way, which the rows are then linearised
-/// at. P may be singular: dx = P v all the way, so that dx' P^-1 dx = v' dx. Nothing, and the rows
-/// as they were, where there is no first step.
+/// at, or at the one before where they cannot be. P may be singular: dx = P v all the way, so that
+/// dx' P^-1 dx = v' dx. Nothing, and the rows as they were, where there is no first step.
 std::optional<Iekf::Minimum> Iekf::Minimise(std::span<Row* const> rows) {
   const Eigen::Index n = state_.covariance().size();
   Eigen::Index m = 0;
@@ -70,19 +65,26 @@ std::optional<Iekf::Minimum> Iekf::Minimise(std::span<Row* const> rows) {
   Workspace::Vector& dx = minimum.dx;
   Workspace::Vector v = work_.Take(n), step = work_.Take(n), step_v = work_.Take(n);
   Workspace::Vector there = work_.Take(n), y = work_.Take(m), residual = work_.Take(m);
+  Workspace::Vector linearised = work_.Take(n);  // where the rows last were
   Workspace::Matrix s = work_.Take(m, m), r = work_.Take(m, m);
   dx.setZero();
   v.setZero();
-  for (; minimum.iterations < max_iterations_; ++minimum.iterations) {
+  linearised.setZero();
+  for (bool defined = true;; defined = Relinearise(rows, dx.data())) {
     const Workspace::Use use(work_);
     const Stacked at = Stack(rows);
     const Workspace::Matrix pht = ProjectionOf(rows);
     s = r = at.noise;
     s.noalias() += at.h * pht;
-    if (!internal::Factorise(s) || !internal::Factorise(r)) {
+    if (!defined || !internal::Factorise(s) || !internal::Factorise(r)) {
       if (minimum.iterations == 0) return std::nullopt;
+      MoveFromPrior(linearised.data());
+      Relinearise(rows, linearised.data());
+      minimum.step.reset();
       break;
     }
+    linearised = dx;
+    ++minimum.iterations;
     y = at.innovation;
     y.noalias() += at.h * dx;
     s.triangularView<Eigen::Lower>().solveInPlace(y);
@@ -93,11 +95,12 @@ std::optional<Iekf::Minimum> Iekf::Minimise(std::span<Row* const> rows) {
     step_v.noalias() += at.h.transpose() * y;
     residual.noalias() = at.h * step;
     minimum.step = std::sqrt(step_v.dot(step) + SquaredNorm(r, residual));
-    if (minimum.step <= tolerance_) {
+    if (*minimum.step <= tolerance_) {
       dx += step;
       minimum.converged = true;
       break;
     }
+    if (minimum.iterations == max_iterations_) break;
     // Falls, but for what rounding makes of it.
     constexpr double kRounding = 1e-12;
     constexpr int kHalvings = 10;
@@ -114,7 +117,6 @@ std::optional<Iekf::Minimum> Iekf::Minimise(std::span<Row* const> rows) {
     const double part = std::ldexp(1.0, -halvings);
     dx += part * step;
     v += part * step_v;
-    if (!Relinearise(rows, dx.data())) break;
   }
   return minimum;
 }

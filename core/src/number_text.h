@@ -16,7 +16,7 @@ std::string NumberText(double value);
 std::string FixedText(double value, int decimals);
 
 /// At most `digits` significant digits, for people to read: `0.02346`, `1.5e+09`.
-std::string RoundedText(double value, int digits);
+std::string RoundedText(double value, int digits = 6);
 
 /// `digits` digits after the point and an exponent.
 std::string ScientificText(double value, int digits);

@@ -15,7 +15,7 @@ namespace {
 
 /// How far `stamp` is behind `newest`, which is not before it; the longest there is where that
 /// does not fit.
-Stamp Behind(Stamp newest, Stamp stamp) {
+Stamp Lag(Stamp newest, Stamp stamp) {
   Stamp lag = 0;
   return __builtin_sub_overflow(newest, stamp, &lag) ? std::numeric_limits<Stamp>::max() : lag;
 }
@@ -34,7 +34,7 @@ FrameOrder::FrameOrder(Experiment& experiment, Check check)
     : experiment_(experiment), check_(check) {
   if (experiment.time.order != TimeOrder::kRewind) return;
   for (const NamedEstimator& named : experiment.estimators) {
-    Passed& before = left_.passed.emplace_back();
+    Processed& before = released_.processed.emplace_back();
     if (named.estimator->offline()) continue;
     before.after = named.estimator->Save();
     ALIDADE_EXPECTS(before.after != nullptr);
@@ -48,9 +48,9 @@ bool FrameOrder::Next(Frame& frame) {
     Accept(frame);
     return true;
   }
-  while (!ended_ && (held_.empty() || !IsBeyond(held_.front().frame.stamp))) {
+  while (!ended_ && (held_.empty() || !IsTooLate(held_.front().frame.stamp))) {
     try {
-      Arrive();
+      Receive();
     } catch (...) {
       failure_ = std::current_exception();
       ended_ = true;
@@ -60,21 +60,21 @@ bool FrameOrder::Next(Frame& frame) {
     if (failure_) std::rethrow_exception(failure_);
     return false;
   }
-  left_ = std::move(held_.front());
+  released_ = std::move(held_.front());
   held_.pop_front();
-  std::swap(frame, left_.frame);
+  std::swap(frame, released_.frame);
   return true;
 }
 
-const Passed* FrameOrder::passed(std::size_t estimator) const {
-  if (estimator >= left_.passed.size()) return nullptr;
-  const Passed& one = left_.passed[estimator];
+const Processed* FrameOrder::processed(std::size_t estimator) const {
+  if (estimator >= released_.processed.size()) return nullptr;
+  const Processed& one = released_.processed[estimator];
   return one.after != nullptr || one.failed ? &one : nullptr;
 }
 
 /// Whether a frame of this stamp, were it to come now, would come too late.
-bool FrameOrder::IsBeyond(Stamp stamp) const {
-  return experiment_.time.window && Behind(newest_, stamp) > *experiment_.time.window;
+bool FrameOrder::IsTooLate(Stamp stamp) const {
+  return experiment_.time.window && Lag(newest_, stamp) > *experiment_.time.window;
 }
 
 /// Counts the frame; false where it is to be dropped.
@@ -83,10 +83,10 @@ bool FrameOrder::Accept(const Frame& frame) {
     newest_ = frame.stamp;
     return true;
   }
-  const Stamp lag = Behind(newest_, frame.stamp);
+  const Stamp lag = Lag(newest_, frame.stamp);
   ++arrivals_.late;
   arrivals_.longest_lag = std::max(arrivals_.longest_lag, lag);
-  if (!IsBeyond(frame.stamp)) return true;
+  if (!IsTooLate(frame.stamp)) return true;
   ++arrivals_.dropped;
   events_.push_back({frame.stamp, "late",
                      "a frame " + Names(frame) + "came " + InSeconds(lag) +
@@ -106,15 +106,15 @@ std::string FrameOrder::Names(const Frame& frame) const {
 }
 
 /// Takes a frame from the source.
-void FrameOrder::Arrive() {
-  Held arrived;
-  ended_ = !experiment_.source->Next(arrived.frame);
+void FrameOrder::Receive() {
+  Held received;
+  ended_ = !experiment_.source->Next(received.frame);
   if (ended_) return;
-  check_(arrived.frame, *experiment_.source);
-  arrived.places.assign(arrived.frame.measurements.size(), experiment_.source->place());
-  const bool is_newest = arrived.frame.stamp > newest_;
-  if (!Accept(arrived.frame)) return;
-  const std::size_t at = Insert(std::move(arrived));
+  check_(received.frame, *experiment_.source);
+  received.places.assign(received.frame.measurements.size(), experiment_.source->place());
+  const bool is_newest = received.frame.stamp > newest_;
+  if (!Accept(received.frame)) return;
+  const std::size_t at = Insert(std::move(received));
   if (experiment_.time.order != TimeOrder::kRewind) return;
   try {
     Replay(at, is_newest);
@@ -125,82 +125,88 @@ void FrameOrder::Arrive() {
 }
 
 /// Where the frame is now in held_.
-std::size_t FrameOrder::Insert(Held&& arrived) {
+std::size_t FrameOrder::Insert(Held&& received) {
   const auto stamp = [](const Held& held) { return held.frame.stamp; };
-  const auto at = std::ranges::lower_bound(held_, arrived.frame.stamp, {}, stamp);
+  const auto at = std::ranges::lower_bound(held_, received.frame.stamp, {}, stamp);
   const auto index = static_cast<std::size_t>(at - held_.begin());
-  if (at == held_.end() || at->frame.stamp != arrived.frame.stamp) {
-    held_.insert(at, std::move(arrived));
+  if (at == held_.end() || at->frame.stamp != received.frame.stamp) {
+    held_.insert(at, std::move(received));
   } else {
+    CheckMerge(*at, received.frame);
+    Merge(*at, std::move(received));
     ++arrivals_.merged;
-    Merge(*at, std::move(arrived));
   }
   return index;
 }
 
-/// Puts the measurements of both into the order of the config, and the truths that one of the two
-/// lacks.
-void FrameOrder::Merge(Held& held, Held&& arrived) const {
+/// Throws where both have a measurement of one stream, or another value of a truth.
+void FrameOrder::CheckMerge(const Held& held, const Frame& part) const {
   const Source& source = *experiment_.source;
-  const auto fail = [&](const Place& place, const std::string& what, const std::string& expected) {
-    throw Error(ExitCode::kBadData,
-                ErrorLine(place, {}, what + " at t = " + InSeconds(held.frame.stamp), expected));
+  const Frame& whole = held.frame;
+  const auto fail = [&](const std::string& what, const std::string& expected) {
+    throw Error(
+        ExitCode::kBadData,
+        ErrorLine(source.place(), {}, what + " at t = " + InSeconds(whole.stamp), expected));
   };
-  const Place place = source.place();
-  Frame &whole = held.frame, &part = arrived.frame;
-  for (Measurement& m : part.measurements) {
+  for (const Measurement& m : part.measurements) {
     const auto same = [&](const Measurement& other) {
       return other.stream == m.stream && other.landmark == m.landmark;
     };
     const auto first = std::ranges::find_if(whole.measurements, same);
-    if (first != whole.measurements.end()) {
-      const auto index = static_cast<std::size_t>(first - whole.measurements.begin());
-      fail(place,
-           "stream '" + source.streams()[static_cast<std::size_t>(m.stream)].name + "' twice",
-           "one measurement at a stamp; the first is" + In(held.places[index]));
-    }
+    if (first == whole.measurements.end()) continue;
+    const auto index = static_cast<std::size_t>(first - whole.measurements.begin());
+    fail("stream '" + source.streams()[static_cast<std::size_t>(m.stream)].name + "' twice",
+         "one measurement at a stamp; the first is" + In(held.places[index]));
   }
-  for (Measurement& m : part.measurements) {
-    const auto key = [this](const Measurement& one) {
-      const std::vector<int>& ranks = experiment_.time.ranks;
-      const auto stream = static_cast<std::size_t>(one.stream);
-      return std::tuple(stream < ranks.size() ? ranks[stream] : 0, one.stream, one.landmark);
-    };
+  for (std::size_t t = 0; t < std::min(whole.truth.size(), part.truth.size()); ++t) {
+    if (part.truth[t].empty() || whole.truth[t].empty() || part.truth[t] == whole.truth[t])
+      continue;
+    fail("another value of truth '" + source.truths()[t].name + "'", "one at a stamp");
+  }
+}
+
+/// Puts the measurements of both into the order of the config, and the truths that one of the two
+/// lacks.
+void FrameOrder::Merge(Held& held, Held&& received) const {
+  Frame &whole = held.frame, &part = received.frame;
+  const auto key = [this](const Measurement& one) {
+    const std::vector<int>& ranks = experiment_.time.ranks;
+    const auto stream = static_cast<std::size_t>(one.stream);
+    return std::tuple(stream < ranks.size() ? ranks[stream] : 0, one.stream, one.landmark);
+  };
+  for (std::size_t i = 0; i < part.measurements.size(); ++i) {
+    Measurement& m = part.measurements[i];
     const auto at = std::ranges::upper_bound(whole.measurements, key(m), {}, key);
-    held.places.insert(held.places.begin() + (at - whole.measurements.begin()), place);
+    held.places.insert(held.places.begin() + (at - whole.measurements.begin()), received.places[i]);
     whole.measurements.insert(at, std::move(m));
   }
   whole.truth.resize(std::max(whole.truth.size(), part.truth.size()));
   for (std::size_t t = 0; t < part.truth.size(); ++t) {
-    if (part.truth[t].empty() || part.truth[t] == whole.truth[t]) continue;
-    if (!whole.truth[t].empty()) {
-      fail(place, "another value of truth '" + source.truths()[t].name + "'", "one at a stamp");
-    }
-    whole.truth[t] = std::move(part.truth[t]);
+    if (whole.truth[t].empty()) whole.truth[t] = std::move(part.truth[t]);
   }
 }
 
 /// Gives the frames held from index `from` on to the estimators, after what came before them.
 void FrameOrder::Replay(std::size_t from, bool is_newest) {
   for (std::size_t i = from; i < held_.size(); ++i) {
-    held_[i].passed.clear();
-    held_[i].passed.resize(experiment_.estimators.size());
+    held_[i].processed.clear();
+    held_[i].processed.resize(experiment_.estimators.size());
   }
   for (std::size_t e = 0; e < experiment_.estimators.size(); ++e) {
     Estimator& estimator = *experiment_.estimators[e].estimator;
     if (estimator.offline()) continue;
-    const Passed* before = &(from == 0 ? left_ : held_[from - 1]).passed[e];
+    const Processed* before = &(from == 0 ? released_ : held_[from - 1]).processed[e];
     if (!is_newest && !before->failed) estimator.Restore(*before->after);
     for (std::size_t i = from; i < held_.size(); ++i) {
-      Passed& passed = held_[i].passed[e];
+      Processed& processed = held_[i].processed[e];
       if (before->failed) {
-        passed.failed = true;
-        passed.diverged = before->diverged;
+        processed.failed = true;
+        processed.diverged = before->diverged;
       } else {
         const int by = experiment_.estimators[e].accepted_by;
-        passed = Process(estimator, by < 0 ? held_[i].frame : Accepted(held_[i], by));
+        processed = Process(estimator, by < 0 ? held_[i].frame : Accepted(held_[i], by));
       }
-      before = &passed;
+      before = &processed;
     }
   }
 }
@@ -209,16 +215,16 @@ void FrameOrder::Replay(std::size_t from, bool is_newest) {
 Frame FrameOrder::Accepted(const Held& held, int by) const {
   const auto index = static_cast<std::size_t>(by);
   return AcceptedOf(held.frame, experiment_.source->streams(), experiment_.estimators[index].system,
-                    held.passed[index].report);
+                    held.processed[index].report);
 }
 
-Passed FrameOrder::Process(Estimator& estimator, const Frame& frame) const {
-  Passed passed;
-  passed.report = estimator.Process(frame);
-  passed.after = estimator.Save();
-  passed.failed = estimator.failed();
-  passed.diverged = estimator.diverged();
-  return passed;
+Processed FrameOrder::Process(Estimator& estimator, const Frame& frame) const {
+  Processed processed;
+  processed.report = estimator.Process(frame);
+  processed.after = estimator.Save();
+  processed.failed = estimator.failed();
+  processed.diverged = estimator.diverged();
+  return processed;
 }
 
 }  // namespace alidade::internal

@@ -13,7 +13,7 @@
 namespace alidade::internal {
 
 /// What an estimator made of a frame that may have to be taken again.
-struct Passed {
+struct Processed {
   std::unique_ptr<Estimator::Snapshot> after;
   UpdateReport report;
   bool failed = false;
@@ -34,7 +34,7 @@ class FrameOrder {
   /// a stream, or another value of a truth, comes twice at one stamp.
   bool Next(Frame& frame);
   /// What the estimator made of the frame that Next gave; null: it has not been given the frame.
-  const Passed* passed(std::size_t estimator) const;
+  const Processed* processed(std::size_t estimator) const;
   const Arrivals& arrivals() const { return arrivals_; }
   /// `late` of each frame dropped since the last call.
   std::vector<Event> TakeEvents() { return std::exchange(events_, {}); }
@@ -42,24 +42,25 @@ class FrameOrder {
  private:
   struct Held {
     Frame frame;
-    std::vector<Place> places;   ///< of the measurements
-    std::vector<Passed> passed;  ///< by estimator; empty but under kRewind
+    std::vector<Place> places;         ///< of the measurements
+    std::vector<Processed> processed;  ///< by estimator; empty but under kRewind
   };
 
   bool Accept(const Frame& frame);
-  void Arrive();
-  std::size_t Insert(Held&& arrived);
-  void Merge(Held& held, Held&& arrived) const;
+  void Receive();
+  std::size_t Insert(Held&& received);
+  void CheckMerge(const Held& held, const Frame& part) const;
+  void Merge(Held& held, Held&& received) const;
   void Replay(std::size_t from, bool is_newest);
   Frame Accepted(const Held& held, int by) const;
-  Passed Process(Estimator& estimator, const Frame& frame) const;
-  bool IsBeyond(Stamp stamp) const;
+  Processed Process(Estimator& estimator, const Frame& frame) const;
+  bool IsTooLate(Stamp stamp) const;
   std::string Names(const Frame& frame) const;
 
   Experiment& experiment_;
   Check check_;
   std::deque<Held> held_;  ///< by stamp
-  Held left_;              ///< the one that Next gave last, or what was before the first
+  Held released_;          ///< the one that Next gave last, or what was before the first
   Stamp newest_ = kNoStamp;
   bool ended_ = false;
   std::exception_ptr failure_;

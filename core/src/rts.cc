@@ -10,13 +10,13 @@ namespace alidade {
 RtsSmoother::RtsSmoother(System system, const EkfOptions& options,
                          const std::vector<StreamInfo>& streams)
     : Ekf(std::move(system), internal::WithoutRecovery(options), streams, Steps::kOverridden) {
-  ALIDADE_EXPECTS(!considering_ && !waiting_);
+  ALIDADE_EXPECTS(!FindUnsupported(system_, kSupport));
 }
 
 void RtsSmoother::Adjoint::Append(const Eigen::MatrixXd& later_a, const Eigen::VectorXd& later_b,
-                                  const Eigen::MatrixXd& later_b2) {
+                                  const Eigen::MatrixXd& later_information) {
   b += a.transpose() * later_b;
-  b2 += a.transpose() * later_b2 * a;
+  information += a.transpose() * later_information * a;
   a = later_a * a;
 }
 
@@ -79,7 +79,7 @@ void RtsSmoother::Smooth(const Emit& emit) {
     passed->p = smoothed.covariance().Dense();
     const Adjoint& adjoint = passed->adjoint;
     lambda = adjoint.a.transpose() * lambda + adjoint.b;
-    information = adjoint.a.transpose() * information * adjoint.a + adjoint.b2;
+    information = adjoint.a.transpose() * information * adjoint.a + adjoint.information;
     information = 0.5 * (information + information.transpose()).eval();
   }
   for (std::size_t k = 0; k < passed_frames_.size(); ++k) {

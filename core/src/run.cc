@@ -142,8 +142,8 @@ std::string Cause(const std::vector<Event>& events, const char* otherwise) {
 
 /// One frame through one estimator, which sees `visible` of it, unless it has passed already; false
 /// where the whole run has to end.
-bool Advance(Running& one, const Seen& seen, const Frame& visible, const internal::Passed* passed,
-             const RunOptions& options, RunResult& result) {
+bool Advance(Running& one, const Seen& seen, const Frame& visible,
+             const internal::Processed* passed, const RunOptions& options, RunResult& result) {
   one.last = nullptr;
   if (one.ended) return true;
   Estimator& estimator = *one.named.estimator;
@@ -215,8 +215,8 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
         accepted =
             AcceptedOf(running[static_cast<std::size_t>(by)], seen.frame, *experiment.source);
       }
-      go_on = Advance(running[e], seen, by < 0 ? seen.frame : accepted, frames.passed(e), options,
-                      result) &&
+      go_on = Advance(running[e], seen, by < 0 ? seen.frame : accepted, frames.processed(e),
+                      options, result) &&
               go_on;
     }
     ++result.frames;

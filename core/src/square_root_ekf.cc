@@ -10,11 +10,11 @@ namespace alidade {
 SquareRootEkf::SquareRootEkf(System system, const EkfOptions& options,
                              const std::vector<StreamInfo>& streams)
     : Ekf(std::move(system), internal::WithoutRecovery(options), streams, Steps::kOverridden) {
-  ALIDADE_EXPECTS(!considering_ && !waiting_);
+  ALIDADE_EXPECTS(!FindUnsupported(system_, kSupport));
   noise_roots_.resize(system_.sensors.size());
   Eigen::LDLT<Eigen::MatrixXd> ldlt;
   internal::SquareRootOf(state_.covariance().Dense(), ldlt, root_);
-  Take();
+  SetCovarianceOfRoot();
 }
 
 struct SquareRootEkf::Kept : Ekf::Kept {
@@ -32,8 +32,8 @@ void SquareRootEkf::Restore(const Snapshot& snapshot) {
   root_ = dynamic_cast<const Kept&>(snapshot).root;
 }
 
-/// The covariance, as L has it.
-void SquareRootEkf::Take() {
+/// P = L L'.
+void SquareRootEkf::SetCovarianceOfRoot() {
   const Workspace::Use use(work_);
   Workspace::Matrix p = work_.Take(root_.rows(), root_.rows());
   p.noalias() = root_ * root_.transpose();
@@ -52,7 +52,7 @@ bool SquareRootEkf::StepOnce(double dt_s) {
   internal::Triangularise(tall, work_.Take(n).data());
   tall.topRows(n).triangularView<Eigen::StrictlyLower>().setZero();
   root_ = tall.topRows(n).transpose();
-  Take();
+  SetCovarianceOfRoot();
   return true;
 }
 
@@ -109,7 +109,7 @@ Outcome SquareRootEkf::Apply(std::span<Row* const> rows) {
   const Workspace::Matrix transport = TransportTo(moved_);
   state_.MoveTo(moved_);
   root_.noalias() = transport * array.bottomRightCorner(n, n).transpose();
-  Take();
+  SetCovarianceOfRoot();
   RecordUpdate(rows, gain.data());
   return Outcome::kAccepted;
 }

@@ -15,15 +15,16 @@ namespace {
 constexpr int kMostHalvings = 30;
 
 /// Mean of the points that `centre` and the columns of `points` are, and f_i = (y_i (-) mean) -
-/// (centre (-) mean): `f` (tangent x 2N) and m = w sum f_i.
-void MeanOf(const Geometry& geometry, const double* centre,
+/// (centre (-) mean): `f` (tangent x 2N) and m = w sum f_i. False where the iteration does not
+/// settle, the points being too far apart.
+bool MeanOf(const Geometry& geometry, const double* centre,
             const Eigen::Ref<const Eigen::MatrixXd>& points, double w, Workspace& work,
             double* mean, Eigen::Ref<Eigen::MatrixXd> f, Eigen::Ref<Eigen::VectorXd> m) {
-  constexpr int kMostIterations = 50;
+  constexpr int kMostIterations = 200;
   constexpr double kSettled = 1e-14;
   const Workspace::Use use(work);
   std::copy_n(centre, geometry.ambient, mean);
-  Workspace::Vector from_mean = work.Take(geometry.tangent);
+  Workspace::Vector from_mean = work.Take(geometry.tangent), last = work.Take(geometry.ambient);
   for (int k = 0; k < kMostIterations; ++k) {
     geometry.Minus(centre, mean, from_mean.data());
     for (Eigen::Index i = 0; i < points.cols(); ++i) {
@@ -33,12 +34,15 @@ void MeanOf(const Geometry& geometry, const double* centre,
     m = w * f.rowwise().sum();
     if (geometry.kind == GeometryKind::kVector) {
       geometry.Plus(centre, m.data(), mean);
-      return;
+      return true;
     }
+    std::copy_n(mean, geometry.ambient, last.data());
     from_mean += m;
-    geometry.Plus(mean, from_mean.data(), mean);
-    if (!(from_mean.norm() > kSettled)) return;
+    geometry.Plus(last.data(), from_mean.data(), mean);
+    geometry.Minus(mean, last.data(), from_mean.data());
+    if (from_mean.norm() <= kSettled) return true;
   }
+  return false;
 }
 
 /// moments = w f f' + centre m m'
@@ -74,7 +78,9 @@ Ukf::Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>
           Steps::kOverridden),
       spread_(options),
       guarded_(system_.sensors.size() + 1, false) {
-  ALIDADE_EXPECTS(!considering_ && !waiting_);
+  ALIDADE_EXPECTS(!FindUnsupported(system_, kSupport));
+  ALIDADE_EXPECTS(spread_.alpha > 0.0 && spread_.alpha <= 1.0 && spread_.beta >= 0.0 &&
+                  spread_.kappa >= 0.0);
 }
 
 struct Ukf::Kept : Ekf::Kept {
@@ -128,8 +134,9 @@ void Ukf::NoteGuard(std::size_t index, int halvings) {
   if (halvings > 0 && !guarded_[index]) {
     const std::string who =
         index < system_.sensors.size() ? "sensor '" + system_.sensors[index].name + "'" : "motion";
-    Note("guarded", who + ": sigma points leave its domain; their spread is divided by " +
-                        std::to_string(1 << halvings));
+    Note("guarded",
+         who + ": sigma points leave its domain or have no mean; their spread is divided by " +
+             std::to_string(1 << halvings));
   }
   guarded_[index] = halvings > 0;
 }
@@ -196,10 +203,13 @@ Status Ukf::StepPoints(int halvings, double dt_s) {
   for (const Block& block : state_.layout().blocks()) {
     if (!block.has_covariance()) continue;
     const Geometry& geometry = block.geometry();
-    MeanOf(geometry, centre.data() + block.value_offset,
-           points.middleRows(block.value_offset, geometry.ambient), transform.w, work_,
-           mean.data() + block.value_offset, f.middleRows(block.tangent_offset, geometry.tangent),
-           m.segment(block.tangent_offset, geometry.tangent));
+    if (!MeanOf(geometry, centre.data() + block.value_offset,
+                points.middleRows(block.value_offset, geometry.ambient), transform.w, work_,
+                mean.data() + block.value_offset,
+                f.middleRows(block.tangent_offset, geometry.tangent),
+                m.segment(block.tangent_offset, geometry.tangent))) {
+      return Status::kOutOfDomain;
+    }
   }
   MomentsOf(transform.w, f, transform.centre, m, p);
   if (!mean.allFinite() || !p.allFinite()) return Status::kOutOfDomain;
@@ -260,7 +270,10 @@ Outcome Ukf::Predict(Row& row, int halvings) {
   MeasurementReport& entry = EntryOf(row);
   entry.h.resize(static_cast<std::size_t>(geometry.ambient));
   const Moments moments = MomentsAt(row);
-  MeanOf(geometry, centre.data(), points, transform.w, work_, entry.h.data(), moments.f, moments.m);
+  if (!MeanOf(geometry, centre.data(), points, transform.w, work_, entry.h.data(), moments.f,
+              moments.m)) {
+    return Outcome::kOutOfDomain;
+  }
   entry.innovation.resize(static_cast<std::size_t>(geometry.tangent));
   geometry.Minus(entry.z.data(), entry.h.data(), entry.innovation.data());
   return Outcome::kAccepted;
@@ -314,7 +327,11 @@ Outcome Ukf::StackPoints(std::span<Row* const> rows, int halvings, Stacked& all,
   all.noise.setZero();
   Eigen::Index at = 0;
   for (Row* row : rows) {
-    if (predicted_[row->report].halvings < halvings) {
+    MeasurementReport& entry = EntryOf(*row);
+    const bool narrower = predicted_[row->report].halvings < halvings;
+    if (narrower) {  // what the gate saw is what is reported
+      reported_h_ = entry.h;
+      reported_innovation_ = entry.innovation;
       const Outcome outcome = Predict(*row, halvings);
       if (outcome != Outcome::kAccepted) return outcome;
     }
@@ -322,9 +339,12 @@ Outcome Ukf::StackPoints(std::span<Row* const> rows, int halvings, Stacked& all,
     const Eigen::Index k = moments.m.size();
     all.h.middleRows(at, k) = moments.f;
     all.noise.block(at, at, k, k) = Eigen::Map<const RowMajor>(row->r.data(), k, k);
-    all.innovation.segment(at, k) =
-        Eigen::Map<const Eigen::VectorXd>(EntryOf(*row).innovation.data(), k);
+    all.innovation.segment(at, k) = Eigen::Map<const Eigen::VectorXd>(entry.innovation.data(), k);
     mean.segment(at, k) = moments.m;
+    if (narrower) {
+      entry.h.swap(reported_h_);
+      entry.innovation.swap(reported_innovation_);
+    }
     at += k;
   }
   return Outcome::kAccepted;

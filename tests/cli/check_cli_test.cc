@@ -57,7 +57,8 @@ TEST_F(CheckProgram, TakesParametersFromTheConfigOfARun) {
   const Outcome none = Call({"check", "scale_2d", "--config", "table.yaml"});
   EXPECT_EQ(none.code, 78);
   EXPECT_TRUE(Contains(none.err, "error: table.yaml")) << none.err;
-  EXPECT_TRUE(Contains(none.err, "has a model of the plugin")) << none.err;
+  EXPECT_TRUE(Contains(none.err, "has a model of the plugin; expected one with model: "))
+      << none.err;
   EXPECT_EQ(Call(With(kStereo, {"--config", "config.yaml"})).code, 2);
 }
 

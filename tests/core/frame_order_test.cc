@@ -131,6 +131,19 @@ TEST_P(FrameOrder, TwoTruthsAtOneStampAreAnError) {
       "rows.csv:4: another value of truth 'depth' at t = 0.000000 s; expected one at a stamp");
 }
 
+TEST_P(FrameOrder, ARowThatIsRefusedForItsTruthIsNotUsedAtAll) {
+  Frame one = FrameAt(0.0, {{1, 1.0}}), refused = FrameAt(0.0, {{0, 80.0}});
+  one.truth = {{0.3}};
+  refused.truth = {{0.31}};
+  Experiment experiment = MakeGiven({one, refused}, GetParam());
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.code, ExitCode::kBadData);
+  EXPECT_EQ(result.arrivals.merged, 0);
+  EXPECT_EQ(result.frames, 1);
+  EXPECT_EQ(result.estimators[0].counts,
+            (std::map<std::string, std::int64_t>{{"accepted:inverse_scale", 1}}));
+}
+
 TEST_P(FrameOrder, BadDataKeepsTheFramesHeldBack) {
   Experiment experiment =
       MakeGiven({FrameAt(0.1, {{1, 1.0}}), FrameAt(0.05, {{1, 1.0}}), FrameAt(0.0, {{1, 1.0}})},

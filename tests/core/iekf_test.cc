@@ -5,6 +5,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <cstdio>
 #include <functional>
 
 #include "alidade/random.h"
@@ -100,6 +101,34 @@ struct ArcTangent : Sensor<Vec<1>, Vec<1>> {
   }
 };
 
+/// The same, with its derivative 1 / (1 + x^2) written, and counted.
+struct CountedArcTangent : ArcTangent {
+  int* count;
+  CountedArcTangent(const ArcTangent& base, int* counter) : ArcTangent(base), count(counter) {}
+  void Jacobian(const double* x, MatrixRef j) const {
+    ++*count;
+    j(0, 0) = 1.0 / (1.0 + x[0] * x[0]);
+  }
+};
+
+/// z = x^2, whose derivative is given for |x| > 2 only.
+struct Creased : Sensor<Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    z[0] = x[0] * x[0];
+    return true;
+  }
+  void Jacobian(const double* x, MatrixRef j) const {
+    j(0, 0) = std::abs(x[0]) > 2.0 ? 2.0 * x[0] : std::nan("");
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(1.0);
+  }
+};
+
 System FarArcTangent() {
   System system;
   AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 3.0, 100.0}});
@@ -130,6 +159,68 @@ TEST(Iekf, AnUpdateThatDoesNotConvergeKeepsTheLastIterateAndSaysSo) {
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kAccepted);
   EXPECT_LT(std::abs(ValueOf(iekf.state(), "p.x")), 3.0);
   EXPECT_FALSE(iekf.diverged());
+}
+
+// The last iterate x is where H was last taken: P = (1 / P0 + H^2 / R)^-1 there, and the step left
+// is (P0 H (r + H dx) / S - dx) / sqrt(P), worked out here by hand.
+TEST(Iekf, WhatIsSaidOfAnUpdateThatDoesNotConvergeIsTrueOfItsLastIterate) {
+  const System system = FarArcTangent();
+  for (const int most : {2, 3}) {
+    IekfOptions options;
+    options.max_iterations = most;
+    Iekf iekf(system, options, StreamsOf(system));
+    const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 0.0}}));
+    ASSERT_EQ(report.events.size(), 1u) << most;
+    int count = 0;
+    double left = 0.0;
+    ASSERT_EQ(
+        std::sscanf(report.events[0].text.c_str(),
+                    "an update stopped after %d iterations, a step of %lf sigma", &count, &left),
+        2)
+        << report.events[0].text;
+    EXPECT_EQ(count, most);
+    const double x = ValueOf(iekf.state(), "p.x"), dx = x - 3.0;
+    const double h = 1.0 / (1.0 + x * x), p0 = 1e4, r = 1e-6, innovation = -std::atan(x);
+    const double step = p0 * h * (innovation + h * dx) / (h * p0 * h + r) - dx;
+    const double p = 1.0 / (1.0 / p0 + h * h / r);
+    EXPECT_NEAR(CovarianceOf(iekf.state(), "p.x", "p.x") / p, 1.0, 2.2e-16 * p0 / p) << most;
+    EXPECT_NEAR(left / (std::abs(step) / std::sqrt(p)), 1.0, 5e-3) << most;  // three digits
+  }
+}
+
+TEST(Iekf, LinearisesAnUpdateNoMoreOftenThanItMay) {
+  for (const int most : {2, 3}) {
+    int linearisations = 0;
+    System system;
+    AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 3.0, 100.0}});
+    AddSensor(system, "s", InProcessSensor(CountedArcTangent{{}, &linearisations}, "counted"),
+              {"p.x"});
+    IekfOptions options;
+    options.max_iterations = most;
+    Iekf(system, options, StreamsOf(system)).Process(FrameAt(0.0, {{0, 0.0}}));
+    EXPECT_EQ(linearisations, most);
+  }
+}
+
+// The first step leads from 2.5 to 1.34, where h is defined but its derivative is not.
+TEST(Iekf, AnIterateThatCannotBeLinearisedIsTheLast) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 2.5, 1.0}});
+  AddSensor(system, "plain", InProcessSensor(Linear(1.0, 1.0), "linear"), {"p.x"});
+  AddSensor(system, "creased", InProcessSensor(Creased{}, "creased"), {"p.x"});
+  Iekf iekf(system, {}, StreamsOf(system));
+  const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 2.5}, {1, 0.0}}));
+  for (const MeasurementReport& entry : report.measurements()) {
+    EXPECT_EQ(entry.outcome, Outcome::kAccepted);
+  }
+  ASSERT_EQ(report.events.size(), 1u);
+  EXPECT_EQ(report.events[0].kind, "not_converged");
+  EXPECT_EQ(report.events[0].text,
+            "an update stopped after 1 iterations where h has no Jacobian; the last iterate is "
+            "kept");
+  // H = 5 at the prediction: 1 / P = 1 + 1 + 25, and the step from there is P 5 (0 - 2.5^2).
+  EXPECT_NEAR(CovarianceOf(iekf.state(), "p.x", "p.x"), 1.0 / 27.0, 1e-12);
+  EXPECT_NEAR(ValueOf(iekf.state(), "p.x"), 2.5 - 5.0 * 6.25 / 27.0, 1e-12);
 }
 
 TEST(Iekf, WithoutNoiseTheUpdateIsThatOfTheEkf) {

@@ -62,8 +62,8 @@ estimators:
   inflate: {type: ekf, gate: 0.5, lockout: {after: 3, action: inflate}}
 )";
 
-/// The frames of a source, each late by up to `most_s`, the first by all of it; with `split` each measurement
-/// comes by itself, and truth too.
+/// The frames of a source, each late by up to `most_s`, the first by all of it; with `split` each
+/// measurement comes by itself, and truth too.
 class Delayed : public Source {
  public:
   Delayed(std::unique_ptr<Source> source, double most_s, bool split) : source_(std::move(source)) {

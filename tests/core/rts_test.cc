@@ -169,6 +169,11 @@ TEST(RtsSmoother, EqualsTheRecursionOfRauchTungAndStriebelOnTheDepthFilter) {
   });
 }
 
+TEST(RtsSmoother, HasNothingToGoBackTo) {
+  const System system = DepthFilter();
+  EXPECT_EQ(RtsSmoother(system, {}, StreamsOf(system)).Save(), nullptr);
+}
+
 TEST(RtsSmoother, IsNotMadeWithConsideredOrWaitingBlocks) {
   System considered = DepthFilter();
   const BlockId id = considered.layout.Find("template.inverse_distance");

@@ -198,6 +198,29 @@ TEST(Ukf, PointsThatWouldLeaveTheDomainAreDrawnNearerAndThatIsSaid) {
   EXPECT_NEAR(ValueOf(ukf.state(), "target.depth"), 26.0 / 80.0, 0.005);
 }
 
+// Stereo draws the points of the joint update nearer; the gate has seen those of the other sensor
+// as they were, and so has the report.
+TEST(Ukf, ReportsOfAJointUpdateWhatTheGateSaw) {
+  System system = DepthFilter();
+  system.priors[0].covariance(0) = 1.0;
+  system.sensors.pop_back();
+  AddSensor(system, "square", InProcessSensor(Square{}, "square"), {"target.depth"});
+  UkfOptions options;
+  options.alpha = 1.0;
+  Ukf joint(system, options, StreamsOf(system));
+  const UpdateReport& report = joint.Process(FrameAt(0.0, {{0, 80.0}, {1, 0.1}}));
+  EXPECT_TRUE(HasEvent(report, "guarded"));
+  ASSERT_EQ(report.measurements().size(), 2u);
+  const MeasurementReport& square = report.measurements()[1];
+  ASSERT_EQ(square.outcome, Outcome::kAccepted);
+  EXPECT_NEAR(square.nis, square.innovation[0] * square.innovation[0] / square.s[0], 1e-12);
+  EXPECT_NEAR(square.innovation[0], 0.1 - square.h[0], 1e-15);
+  Ukf alone(system, options, StreamsOf(system));
+  const UpdateReport& single = alone.Process(FrameAt(0.0, {{1, 0.1}}));
+  EXPECT_EQ(square.h, single.measurements()[0].h);
+  EXPECT_EQ(square.s, single.measurements()[0].s);
+}
+
 TEST(Ukf, ASensorNotDefinedAtTheEstimateIsOutOfDomain) {
   System system = DepthFilter();
   system.priors[0].mean = {-0.2};

@@ -201,6 +201,9 @@ TEST_F(CheckTest, FindsPluginsByFileStemAndModel) {
   EXPECT_EQ(FindModels(host_, "gravity").size(), 1u);
   ExpectError(ExitCode::kPlugin, {"no plugin 'scale_2' with", "did you mean 'scale_2d'?"},
               [&] { FindModels(host_, "scale_2"); });
+  // Near a source, which is nothing to check.
+  ExpectError(ExitCode::kPlugin, {"no plugin 'depth_targe' with a sensor or motion model\n"},
+              [&] { FindModels(host_, "depth_targe"); });
   ExpectError(ExitCode::kPlugin, {"offers no model 'righ'", "did you mean 'right'?"},
               [&] { FindModels(host_, "bad_models", "righ"); });
 }

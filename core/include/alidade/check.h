@@ -24,7 +24,8 @@ struct CheckOptions {
 
 /// What came of one check.
 struct Finding {
-  enum class Verdict { kOk, kFail, kSkipped } verdict;
+  enum class Verdict { kOk, kFail, kSkipped };
+  Verdict verdict = Verdict::kSkipped;
   std::string check;  ///< `jacobian`
   std::string words;  ///< what was seen; of a failure the call, the state and the numbers
 };

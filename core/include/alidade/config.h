@@ -67,6 +67,8 @@ class Node {
   /// Map: fails on every key that was never asked for, with the nearest asked one; also in the maps
   /// below of which a key was asked for.
   void RejectUnread() const;
+  /// Map: whether it has `key`, which nobody has asked for yet; does not declare it.
+  bool HasUnread(std::string_view key) const;
   /// Map: declares keys without reading them (so that they are known to RejectUnread).
   void Declare(std::string_view key) const;
 

@@ -9,6 +9,7 @@
 #include "alidade/control_inputs.h"
 #include "alidade/ekf_options.h"
 #include "alidade/estimator.h"
+#include "alidade/support.h"
 #include "alidade/workspace.h"
 
 namespace alidade {
@@ -27,6 +28,10 @@ namespace alidade {
 /// after `repairs` of that the next ends the filter.
 class Ekf : public Estimator {
  public:
+  /// All there is.
+  static constexpr Support kSupport = {
+      .considered = true, .at_measurement = true, .from_measurement = true, .recovery = true};
+
   /// `streams` are the source's, in the order of Measurement::stream.
   Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
 

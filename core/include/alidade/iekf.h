@@ -10,8 +10,9 @@
 namespace alidade {
 
 struct IekfOptions : EkfOptions {
-  int max_iterations = 10;  ///< most linearisations of an update
-  /// An update has converged where its next step is at most this, in posterior standard deviations.
+  int max_iterations = 10;  ///< most linearisations of an update; at least 2
+  /// An update has converged where its next step is at most this, in posterior standard deviations;
+  /// > 0.
   double tolerance = 1e-4;
 
   /// Reads what EkfOptions reads but `jacobian`, and `max_iterations`, `tolerance`.
@@ -33,20 +34,24 @@ struct IekfOptions : EkfOptions {
 /// kept during a step. The covariance is P - K S K' of the last linearisation. Gate and robust loss
 /// are decided at the prediction, and h, S and NIS are reported as they are there.
 ///
-/// An update that does not converge keeps its last iterate and notes the event `not_converged`. One
-/// with R not positive definite has no such c: it is that of the Ekf.
-///
-/// The system has no considered blocks or roles and no role that is linearised at the measurement,
-/// and `jacobian` is kLatest: ContractViolation otherwise.
+/// An update that does not converge keeps its last iterate and notes the event `not_converged`; so
+/// does one that comes to where h has no Jacobian. One with R not positive definite has no such c:
+/// it is that of the Ekf.
 class Iekf : public Ekf {
  public:
+  /// No considered blocks and roles, no role that is linearised at the measurement.
+  static constexpr Support kSupport = {.from_measurement = true, .recovery = true};
+
+  /// ContractViolation where `system` asks for more than kSupport, `jacobian` is not kLatest, or an
+  /// option is out of its range.
   Iekf(System system, const IekfOptions& options, const std::vector<StreamInfo>& streams);
 
  private:
   struct Minimum {
     Workspace::Vector dx;
     int iterations = 0;
-    double step = 0.0;  ///< that is left, in posterior standard deviations
+    /// That is left, in posterior standard deviations; none where h has no Jacobian.
+    std::optional<double> step = std::nullopt;
     bool converged = false;
   };
   Outcome Apply(std::span<Row* const> rows) override;

@@ -18,18 +18,23 @@ namespace alidade {
 ///   update     lambda <- A' lambda + H' S^-1 r,   Lambda <- A' Lambda A + H' S^-1 H,
 ///              A = I - K H
 ///
-/// All Jacobians are those of the filter. Blocks are estimated or fixed, present from the start;
-/// no considered block, no recovery from a lock-out.
+/// All Jacobians are those of the filter, and so are R and its weight under a robust loss.
 ///
 /// Source       [Rauch1965]; [Bierman1977] ch. X, modified Bryson-Frazier.
 class RtsSmoother : public Ekf {
  public:
-  /// `options.lockout` counts as kNone. ContractViolation where a block is considered or waits for
-  /// its first measurement.
+  /// No considered blocks and roles, none that start or are linearised at a measurement, no
+  /// recovery from a lock-out.
+  static constexpr Support kSupport = {};
+
+  /// `options.lockout` counts as kNone. ContractViolation where `system` asks for more than
+  /// kSupport.
   RtsSmoother(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
 
   const UpdateReport& Process(const Frame& frame) override;
   bool offline() const override { return true; }
+  /// None: it waits for all frames, and does not go back.
+  std::unique_ptr<Snapshot> Save() const override { return nullptr; }
   /// The reports are the filter's. Event `not_pd` where rounding would leave a smoothed variance
   /// negative: the covariance of that frame is then the filter's.
   void Smooth(const Emit& emit) override;
@@ -40,14 +45,16 @@ class RtsSmoother : public Ekf {
   Outcome Apply(std::span<Row* const> rows) override;
 
  private:
-  /// How the adjoint goes back over a frame: lambda <- A' lambda + b, Lambda <- A' Lambda A + B.
+  /// How the adjoint goes back over a frame: lambda <- A' lambda + b, Lambda <- A' Lambda A +
+  /// information.
   struct Adjoint {
     Eigen::MatrixXd a;  ///< n x n
     Eigen::VectorXd b;
-    Eigen::MatrixXd b2;
+    Eigen::MatrixXd information;
 
     /// This one, and then what comes later in time.
-    void Append(const Eigen::MatrixXd& a, const Eigen::VectorXd& b, const Eigen::MatrixXd& b2);
+    void Append(const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
+                const Eigen::MatrixXd& information);
   };
   /// One frame, and the filter's estimate after it.
   struct Passed {

@@ -17,14 +17,18 @@ namespace alidade {
 ///             [0   L  ]  = [W   L+] Q'                                     (m + n) x (m + n)
 ///             S = Ls Ls',  dx = W Ls^-1 r,  K = W Ls^-1
 ///
-/// All Jacobians are those of Ekf. Blocks are estimated or fixed, present from the start; no
-/// considered block, no recovery from a lock-out. O((m + n)^3) for each update.
+/// All Jacobians are those of Ekf, and so is the weight of a robust loss, R / w for R.
+/// O((m + n)^3) for each update.
 ///
 /// Source       [Bierman1977] ch. V; [Kailath2000] sec. 12.3, the array form.
 class SquareRootEkf : public Ekf {
  public:
-  /// `options.lockout` counts as kNone. ContractViolation where a block is considered or waits for
-  /// its first measurement.
+  /// No considered blocks and roles, none that start or are linearised at a measurement, no
+  /// recovery from a lock-out.
+  static constexpr Support kSupport = {};
+
+  /// `options.lockout` counts as kNone. ContractViolation where `system` asks for more than
+  /// kSupport.
   SquareRootEkf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
 
   /// L, n x n. state().covariance() is L L' in double precision, and so has half its digits.
@@ -41,7 +45,7 @@ class SquareRootEkf : public Ekf {
 
  private:
   struct Kept;
-  void Take();
+  void SetCovarianceOfRoot();
 
   /// Of a sensor's R.
   struct NoiseRoot {

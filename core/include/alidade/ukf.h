@@ -9,10 +9,10 @@
 namespace alidade {
 
 struct UkfOptions {
-  EkfOptions filter;  ///< gate, fuse and max_dt_s; `lockout` counts as kNone
-  double alpha = 0.01;
-  double beta = 2.0;
-  double kappa = 0.0;
+  EkfOptions filter;    ///< gate, fuse and max_dt_s; `lockout` counts as kNone
+  double alpha = 0.01;  ///< spread of the sigma points, in (0, 1]
+  double beta = 2.0;    ///< weight of what the centre adds, >= 0; 2: best for a Gaussian
+  double kappa = 0.0;   ///< spread beyond the number of directions, >= 0
 
   /// Reads `alpha` in (0, 1], `beta` >= 0, `kappa` >= 0, `gate`, `fuse` and `max_dt_s` from an
   /// estimator's entry of the config. Errors: kBadConfig.
@@ -32,18 +32,23 @@ struct UkfOptions {
 /// This is the scaled transform without its large weight of the centre, which cancels. The mean on
 /// a manifold is found by iteration. Process noise is augmented: N = n + noise inputs. A
 /// measurement's R is that at x0; S = Cov(h) + R, K = Cov(x, h) S^-1, and with dx_i - K f_i in
-/// place of f_i the new P is a sum of squares, Cov(x - K h) + K R K'.
+/// place of f_i the new P is Cov(x - K h) + K R K', a sum of squares where beta >= alpha^2. A
+/// robust loss takes R / w for R. The spread of a joint update is that of its narrowest
+/// measurement; h, S and NIS are reported as the gate saw them.
 ///
-/// Where sigma points leave the domain of a model that is defined at x0, their spread is halved
-/// until none does (event `guarded`); a sensor that is not defined at x0 is out of domain. Where
-/// P has lost positive semi-definiteness, negative pivots count as zero (event `repaired`).
-/// Blocks are estimated or fixed, present from the start; no considered block, no recovery from a
-/// lock-out.
+/// Where sigma points leave the domain of a model that is defined at x0, or lie too far round a
+/// manifold to have a mean, their spread is halved until they do not (event `guarded`); a sensor
+/// that is not defined at x0 is out of domain. Where P has lost positive semi-definiteness,
+/// negative pivots count as zero (event `repaired`).
 ///
 /// Source       [Julier2004]; [Wan2000] alpha, beta, kappa.
 class Ukf : public Ekf {
  public:
-  /// ContractViolation where a block is considered or waits for its first measurement.
+  /// No considered blocks and roles, none that start or are linearised at a measurement, no
+  /// recovery from a lock-out.
+  static constexpr Support kSupport = {};
+
+  /// ContractViolation where `system` asks for more than kSupport or an option is out of its range.
   Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>& streams);
 
   std::unique_ptr<Snapshot> Save() const override;
@@ -93,6 +98,7 @@ class Ukf : public Ekf {
   Eigen::LDLT<Eigen::MatrixXd> ldlt_;
   std::vector<const double*> x_;
   std::vector<double*> stepped_;
+  std::vector<double> reported_h_, reported_innovation_;
   /// @endcond
 };
 

@@ -142,8 +142,8 @@ class CeresBatch : public Estimator {
       settled = trajectory_.change() <= kSettled;
     } while (!settled && outer < options_.max_outer_iterations);
     char text[160];
-    std::snprintf(text, sizeof text, "cost %.9g, %d iterations in %d solves: ", summary.final_cost,
-                  iterations, outer);
+    std::snprintf(text, sizeof text, "cost %.9g, %d iterations in %d solve%s: ", summary.final_cost,
+                  iterations, outer, outer == 1 ? "" : "s");
     summary_ = text;
     if (failed_) {
       summary_ += "not converged, " + summary.message;

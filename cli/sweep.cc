@@ -68,6 +68,7 @@ ExitCode RunSweep(const Arguments& arguments) {
   const PluginHost host = arguments.input.Host(config);
   SweepFolder folder(path, arguments.force);
 
+  ReportCrashes();
   StopOnSignals();
   Progress progress("runs", arguments.quiet);
   SweepOptions options = arguments.options;

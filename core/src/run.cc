@@ -5,6 +5,7 @@
 
 #include "alidade/metrics.h"
 #include "alidade/recorder.h"
+#include "observability.h"
 #include "reorder.h"
 #include "text_table.h"
 
@@ -65,9 +66,11 @@ struct Running {
   EstimatorResult result;
   bool ended = false;     ///< it had nothing left to go on with
   bool diverged = false;  ///< by a frame that was taken; not of offline estimators
+  bool took = false;      ///< an estimate, so that its counts tell of the measurements
 
   /// Puts an estimate into metrics and record.
   void Take(const Seen& seen, const State& state, const UpdateReport& report, Recorder* recorder) {
+    took = true;
     metrics.Add(seen.frame, seen.in_segment, state, report);
     if (recorder != nullptr) recorder->AddEstimate(index, seen.frame, state, report);
   }
@@ -80,6 +83,11 @@ EstimatorResult Begin(const NamedEstimator& named) {
   EstimatorResult result;
   result.name = named.name;
   result.unobservable = UnobservableDirections(named.system);
+  if (!internal::ObservabilityIsTold(named.system)) {
+    result.events.push_back({kNoStamp, "observability",
+                             "not looked into: the state has more than " +
+                                 std::to_string(internal::kMostObserved) + " elements"});
+  }
   for (const auto& direction : result.unobservable) {
     result.events.push_back({kNoStamp, "unobservable",
                              "no sensor of this estimator tells " +
@@ -195,7 +203,8 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
       if (result.status != RunStatus::kOk) return;
       result.status = RunStatus::kStopped;
       result.code = ExitCode::kStopped;
-      result.reason = "stopped after " + std::to_string(result.frames) + " frames";
+      result.reason = "stopped after " + std::to_string(result.frames) +
+                      (result.frames == 1 ? " frame" : " frames");
       return;
     }
   }
@@ -270,7 +279,7 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
     Measure(one, result);
     one.result.counts = one.metrics.counts();
     one.result.units = one.metrics.units();
-    if (result.frames > 0) NoteUnused(one.named.system, one.result);
+    if (one.took && !one.named.estimator->failed()) NoteUnused(one.named.system, one.result);
     one.Note(one.metrics.events());
     const Estimator& estimator = *one.named.estimator;
     one.result.diverged = one.diverged || (estimator.offline() && estimator.diverged()) ||

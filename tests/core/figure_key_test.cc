@@ -61,7 +61,7 @@ TEST_P(FigureKey, HasAllEstimatorsInOneColumn) {
   EXPECT_EQ(texts["truth"].size(), 1u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Estimators, FigureKey, ::testing::Values(2, 5, 6, 8));
+INSTANTIATE_TEST_SUITE_P(Estimators, FigureKey, ::testing::Values(2, 5, 6, 7, 8));
 
 }  // namespace
 }  // namespace alidade::testing

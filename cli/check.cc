@@ -68,6 +68,22 @@ bool Fails(const PluginHost& host, const PluginEntry& entry, const Node& paramet
   return AnyFailure(findings);
 }
 
+/// The lines of an error, `model 'NAME'` in front in place of where the text of its parameters,
+/// which is in no file, would have the fault.
+std::string OfModel(const std::string& name, const std::string& lines) {
+  const std::string nowhere = name + ":1:1 ";
+  std::string text;
+  for (std::size_t at = 0; at < lines.size();) {
+    const std::size_t end = std::min(lines.find('\n', at), lines.size());
+    const std::string line = lines.substr(at, end - at);
+    if (at > 0) text += '\n';
+    text +=
+        line.starts_with(nowhere) ? "model '" + name + "': " + line.substr(nowhere.size()) : line;
+    at = end + 1;
+  }
+  return text;
+}
+
 /// The models as the command line sets them.
 bool AnyFails(const PluginHost& host, const std::vector<PluginEntry>& entries,
               const Arguments& arguments) {
@@ -79,8 +95,8 @@ bool AnyFails(const PluginHost& host, const std::vector<PluginEntry>& entries,
       failed = Fails(host, entry, parameters.root(), arguments.options) || failed;
     } catch (const Error& e) {
       if (e.code() != ExitCode::kBadConfig) throw;
-      throw Error(e.code(),
-                  e.what() + std::string("\n  parameters are given with --set KEY=VALUE"));
+      throw Error(e.code(), OfModel(entry.name, e.what()) + "\n  parameters are given with --set " +
+                                (entries.size() == 1 ? "" : entry.name + '.') + "KEY=VALUE");
     }
   }
   return failed;
@@ -152,18 +168,18 @@ void AddCheck(CLI::App& program, Action& action) {
   command.add_option("--seed", options.seed, "of the random states; default 1")->option_text("N");
   command.add_option("--states", options.states, "number of random states; default 48")
       ->option_text("N")
-      ->check(CLI::Range(1, 1000000));
+      ->check(IsInteger(1, 1'000'000));
   command.add_option("--timeout", options.timeout_s, "of each check, in seconds; default 10")
       ->option_text("S")
-      ->check(CLI::Range(0.01, 1e6));
+      ->check(IsNumber(0.01, 1e6));
   command.add_option("--memory", options.memory_mb, "that a model may take, in MB; default 1024")
       ->option_text("MB")
-      ->check(CLI::Range(16, 1 << 30));
+      ->check(IsInteger(16, 1 << 30));
   command
       .add_option("--step-order", options.step_order,
                   "let a Step that is additive in dt to this order only pass (2: Euler)")
       ->option_text("N")
-      ->check(CLI::Range(1, 8));
+      ->check(IsInteger(1, 8));
   command.footer(kFooter);
   command.callback([&action, arguments] { action = [arguments] { return Check(*arguments); }; });
 }

@@ -51,6 +51,7 @@ std::vector<std::filesystem::path> Absolute(const std::vector<std::string>& path
 
 /// A check of an option: says what is wrong with its text, or "".
 std::function<std::string(const std::string&)> IsInteger(std::int64_t least, std::int64_t most);
+std::function<std::string(const std::string&)> IsNumber(double least, double most);
 
 /// Where output goes: `given`, or the config's `output:` inside runs/, or runs/PREFIX and the name
 /// of the config: of its folder where it is called config.yaml, else of the file. Errors:

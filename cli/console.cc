@@ -26,6 +26,32 @@ extern "C" void HandleStop(int signal_number) {
   ::raise(signal_number);
 }
 
+constexpr char kCrashed[] =
+    "error: crashed, most likely inside a model, a source or an estimator of a plugin; `alidade "
+    "check "
+    "PLUGIN` finds what is wrong with a model\n";
+constexpr char kExited[] =
+    "error: a model, a source or an estimator of a plugin ended the process; `alidade check "
+    "PLUGIN` finds what "
+    "is wrong with a model\n";
+
+/// Only calls that a signal handler may make.
+void Say(const char* text, std::size_t size) {
+  if (::write(STDERR_FILENO, text, size) < 0) return;
+}
+
+extern "C" void HandleCrash(int signal_number) {
+  Say(kCrashed, sizeof kCrashed - 1);
+  ::signal(signal_number, SIG_DFL);
+  ::raise(signal_number);
+}
+
+extern "C" void HandleExit() {
+  if (finishing) return;
+  Say(kExited, sizeof kExited - 1);
+  ::_exit(static_cast<int>(ExitCode::kInternal));
+}
+
 /// Writes all of it; false with errno where that fails.
 bool WriteAll(int fd, std::string_view text) {
   while (!text.empty()) {
@@ -121,6 +147,22 @@ void Progress::Clear() {
   if (width_ == 0) return;
   WriteError('\r' + std::string(width_, ' ') + '\r');
   width_ = 0;
+}
+
+void ReportCrashes() {
+  static char stack[1 << 16];  // of the handler, as a recursion may have used up the other
+  const stack_t aside{stack, 0, sizeof stack};
+  struct sigaction action {
+  }, before{};
+  action.sa_handler = HandleCrash;
+  action.sa_flags = SA_ONSTACK;
+  sigemptyset(&action.sa_mask);
+  if (::sigaltstack(&aside, nullptr) != 0) return;
+  for (const int crash : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT}) {
+    const bool free = ::sigaction(crash, nullptr, &before) == 0 && before.sa_handler == SIG_DFL;
+    if (free) ::sigaction(crash, &action, nullptr);  // else a sanitizer, say, has its own
+  }
+  std::atexit(HandleExit);
 }
 
 void StopOnSignals() {

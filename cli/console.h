@@ -41,6 +41,10 @@ class Progress {
   std::chrono::steady_clock::time_point next_;
 };
 
+/// From now on a crash, or an exit of the process before FinishOnSignals(), says that it was inside
+/// a model or estimator; a crash then takes its course, an exit ends with kInternal.
+void ReportCrashes();
+
 /// From now on SIGINT and SIGTERM ask the command to stop; a second one ends the program at once.
 void StopOnSignals();
 bool StopRequested();

@@ -98,8 +98,11 @@ void CheckPlugins(const std::vector<std::string>& paths, Diagnosis& diagnosis) {
   const int sources = count(PluginEntry::Kind::kSource);
   const int estimators = count(PluginEntry::Kind::kEstimator);
   const int models = static_cast<int>(host.entries().size()) - sources - estimators;
-  const std::string found = std::to_string(models) + " models, " + std::to_string(sources) +
-                            " sources and " + std::to_string(estimators) + " estimators";
+  const auto counted = [](int n, const char* what) {
+    return std::to_string(n) + ' ' + what + (n == 1 ? "" : "s");
+  };
+  const std::string found = counted(models, "model") + ", " + counted(sources, "source") + " and " +
+                            counted(estimators, "estimator");
   if (models > 0 && sources > 0) {
     diagnosis.Ok(found);
   } else {

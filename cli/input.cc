@@ -2,6 +2,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <charconv>
+#include <cstdio>
 
 #include "command.h"
 
@@ -53,6 +54,18 @@ std::function<std::string(const std::string&)> IsInteger(std::int64_t least, std
     if (error == std::errc() && rest == end && value >= least && value <= most) return {};
     return "'" + text + "' is no integer from " + std::to_string(least) + " to " +
            std::to_string(most);
+  };
+}
+
+std::function<std::string(const std::string&)> IsNumber(double least, double most) {
+  return [least, most](const std::string& text) -> std::string {
+    double value = 0.0;
+    const char* const end = text.data() + text.size();
+    const auto [rest, error] = std::from_chars(text.data(), end, value);
+    if (error == std::errc() && rest == end && value >= least && value <= most) return {};
+    char range[64];
+    std::snprintf(range, sizeof range, "%g to %g", least, most);
+    return "'" + text + "' is no number from " + range;
   };
 }
 

@@ -143,5 +143,7 @@ ExitCode Guarded(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   alidade::cli::PrepareConsole();
-  return static_cast<int>(alidade::cli::Guarded(argc, argv));
+  const alidade::ExitCode code = alidade::cli::Guarded(argc, argv);
+  alidade::cli::FinishOnSignals();
+  return static_cast<int>(code);
 }

@@ -96,6 +96,7 @@ ExitCode RunConfig(const Arguments& arguments) {
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
   const std::filesystem::path folder = OutputFolder(arguments.folder, config, arguments.input);
   const PluginHost host = arguments.input.Host(config);
+  ReportCrashes();
   StopOnSignals();  // before a source that waits for its pipe is made
   Experiment experiment = BuildExperiment(config, host);
   Recorder recorder(

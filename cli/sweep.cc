@@ -125,6 +125,7 @@ ExitCode RunSweep(const Arguments& arguments) {
       OutputFolder(arguments.folder, config, arguments.input, "sweep-");
   const PluginHost host = arguments.input.Host(config);
 
+  ReportCrashes();
   StopOnSignals();
   Progress progress("runs", arguments.quiet);
   SweepOptions options = arguments.options;

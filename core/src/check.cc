@@ -7,6 +7,7 @@
 
 #include "alidade/plugin_listing.h"
 #include "check_table.h"
+#include "number_text.h"
 #include "plugin_file.h"
 #include "text_table.h"
 
@@ -17,6 +18,7 @@ namespace {
 using internal::Check;
 using internal::ChildEnd;
 using internal::Context;
+using internal::NumberText;
 
 bool IsModel(const PluginEntry& entry) {
   return entry.kind == PluginEntry::Kind::kSensor || entry.kind == PluginEntry::Kind::kMotion;
@@ -39,7 +41,14 @@ Finding Decode(const std::string& answer) {
 }
 
 /// How the child ended, in words, and in which call.
-std::string EndWords(const ChildEnd& end, const internal::Journal& journal) {
+std::string EndWords(const ChildEnd& end, const internal::Journal& journal, double timeout_s) {
+  const std::string at = journal.state().empty() ? "" : " at " + journal.state();
+  if (end.late) {
+    const std::string where =
+        journal.call().empty() ? "before its first call" : "in " + journal.call() + at;
+    return "the check took longer than " + NumberText(timeout_s) + " s (--timeout); it was " +
+           where;
+  }
   std::string words = journal.call().empty() ? "the check" : journal.call();
   words += ' ' + end.text;
   if (!journal.thrown().empty()) words += ": it threw " + journal.thrown();
@@ -64,8 +73,16 @@ Finding RunCheck(const Check& check, const PluginHost& host, const PluginEntry& 
   };
   const ChildEnd end = internal::RunInChild({options.timeout_s, options.memory_mb}, *journal, work);
   ended = !end.answered;
-  Finding finding = end.answered ? Decode(end.text) : internal::Fail(EndWords(end, *journal));
-  if (finding.words.find("std::bad_alloc") != std::string::npos) {
+  Finding finding =
+      end.answered ? Decode(end.text) : internal::Fail(EndWords(end, *journal, options.timeout_s));
+  if (finding.verdict == Finding::Verdict::kOk && check.run == internal::CheckEnvironment &&
+      !end.printed.empty()) {
+    finding = internal::Fail("the model prints, which goes into the output of a run: '" +
+                             end.printed + "'");
+  }
+  const auto says = [&](const char* what) { return finding.words.find(what) != std::string::npos; };
+  // The second is what a thread without room for its stack throws.
+  if (says("std::bad_alloc") || says("Resource temporarily unavailable")) {
     finding.words += "; it may take " + std::to_string(options.memory_mb) + " MB (--memory)";
   }
   return finding;
@@ -114,10 +131,19 @@ std::vector<PluginEntry> FindModels(const PluginHost& host, const std::string& p
     throw Error(ExitCode::kPlugin, ErrorLine({}, {}, what, {}, Nearest(wanted, names)));
   };
   if (found.empty()) {
+    const auto other = std::ranges::find(host.entries(), plugin, &PluginEntry::name);
+    if (other != host.entries().end()) {
+      throw Error(ExitCode::kPlugin,
+                  ErrorLine({}, {}, "'" + plugin + "' is a " + internal::KindName(other->kind),
+                            "a sensor or motion model, which is what is checked"));
+    }
     for (const PluginEntry& entry : host.entries()) {
       if (IsModel(entry)) names.push_back(entry.name);
     }
-    fail("no plugin '" + plugin + "' with a sensor or motion model", plugin);
+    throw Error(ExitCode::kPlugin,
+                ErrorLine({}, {}, "no plugin '" + plugin + "' with a sensor or motion model", {},
+                          Nearest(plugin, names)) +
+                    "\n" + PluginPlaces(host));
   }
   if (model.empty()) return found;
   for (const PluginEntry& entry : found) names.push_back(entry.name);

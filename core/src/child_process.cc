@@ -57,23 +57,43 @@ void Limit(int resource, rlim_t value) {
   setrlimit(resource, &limit);
 }
 
-/// A crash of the child must neither reach the handlers of the program, nor print, nor dump core.
-void PrepareChild(const ChildLimits& limits, pid_t parent) {
-  setpgid(0, 0);
-  prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (getppid() != parent) _exit(1);
+void UseDefaultHandlers() {
   for (const int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGALRM, SIGTERM, SIGINT}) {
     std::signal(signal, SIG_DFL);
   }
+}
+
+/// What a child prints goes here: a file in memory that cannot grow. -1 where there is none.
+int OpenPrinted() {
+  constexpr off_t kSize = 1 << 16;
+  const int file = memfd_create("printed", MFD_CLOEXEC | MFD_ALLOW_SEALING);
+  if (file >= 0 && ftruncate(file, kSize) == 0) fcntl(file, F_ADD_SEALS, F_SEAL_GROW);
+  return file;
+}
+
+/// The first line that was printed, cut where it is too long.
+std::string FirstLine(int printed) {
+  char line[80] = "";
+  if (pread(printed, line, sizeof line - 1, 0) < 0) return {};
+  line[strcspn(line, "\n")] = '\0';
+  return line;
+}
+
+/// A crash of the child must neither reach the handlers of the program, nor print, nor dump core.
+void PrepareChild(const ChildLimits& limits, pid_t parent, int printed) {
+  setpgid(0, 0);
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != parent) _exit(1);
+  UseDefaultHandlers();
   Limit(RLIMIT_CORE, 0);
   Limit(RLIMIT_CPU, static_cast<rlim_t>(std::ceil(limits.timeout_s)) + 1);
   if (limits.memory_mb > 0) {
     Limit(RLIMIT_AS, SizeNow() + (static_cast<rlim_t>(limits.memory_mb) << 20));
   }
-  const int null = open("/dev/null", O_RDWR | O_CLOEXEC);
-  if (null >= 0) {
-    dup2(null, STDOUT_FILENO);
-    dup2(null, STDERR_FILENO);
+  const int out = printed >= 0 ? printed : open("/dev/null", O_RDWR | O_CLOEXEC);
+  if (out >= 0) {
+    dup2(out, STDOUT_FILENO);
+    dup2(out, STDERR_FILENO);
   }
   std::set_terminate(OnTerminate);
 }
@@ -81,6 +101,7 @@ void PrepareChild(const ChildLimits& limits, pid_t parent) {
 /// Sends the answer and a zero, which no answer has: one that was cut off is none.
 [[noreturn]] void RunChild(int pipe_end, const std::function<std::string()>& work) noexcept {
   const std::string answer = work();
+  std::fflush(nullptr);
   std::size_t sent = 0;
   while (sent < answer.size() + 1) {
     const ssize_t count = write(pipe_end, answer.c_str() + sent, answer.size() + 1 - sent);
@@ -88,6 +109,56 @@ void PrepareChild(const ChildLimits& limits, pid_t parent) {
     if (count > 0) sent += static_cast<std::size_t>(count);
   }
   _exit(0);
+}
+
+/// Kills and reaps all that descends from this process: a subreaper, to which what loses its parent
+/// comes back, however it has left group and session.
+void EndDescendants() {
+  const std::string list = "/proc/self/task/" + std::to_string(getpid()) + "/children";
+  for (int found = 1; found > 0;) {
+    found = 0;
+    std::ifstream children(list);
+    for (pid_t child = 0; children >> child;) found += kill(child, SIGKILL) == 0;
+    for (int i = 0; i < found; ++i) waitpid(-1, nullptr, 0);
+  }
+}
+
+/// Ends this process as the one with `status` has ended.
+[[noreturn]] void EndLike(int status) {
+  if (!WIFSIGNALED(status)) _exit(WEXITSTATUS(status));
+  std::signal(WTERMSIG(status), SIG_DFL);
+  std::raise(WTERMSIG(status));
+  _exit(1);
+}
+
+/// Stands between the program and the child that does the work: waits until that has ended, or for
+/// SIGTERM, which the program sends, or its end; then leaves no descendant behind.
+[[noreturn]] void Supervise(pid_t program, const std::function<void()>& work) noexcept {
+  setpgid(0, 0);  // away from what a terminal sends to the program
+  prctl(PR_SET_CHILD_SUBREAPER, 1);
+  prctl(PR_SET_PDEATHSIG, SIGTERM);
+  UseDefaultHandlers();
+  Limit(RLIMIT_CORE, 0);
+  sigset_t awaited, before;
+  sigemptyset(&awaited);
+  sigaddset(&awaited, SIGCHLD);
+  sigaddset(&awaited, SIGTERM);
+  sigprocmask(SIG_BLOCK, &awaited, &before);
+  if (getppid() != program) _exit(1);
+  const pid_t worker = fork();
+  if (worker < 0) _exit(1);
+  if (worker == 0) {
+    sigprocmask(SIG_SETMASK, &before, nullptr);
+    work();
+  }
+  int status = 0;
+  while (waitpid(worker, &status, WNOHANG) == 0) {
+    int signal = 0;
+    if (sigwait(&awaited, &signal) == 0 && signal == SIGTERM) break;
+  }
+  EndDescendants();
+  sigprocmask(SIG_SETMASK, &before, nullptr);
+  EndLike(status);
 }
 
 /// What comes until a zero, the end of the pipe or `deadline`. Returns false after the deadline.
@@ -114,6 +185,27 @@ std::string EndText(int status) {
   return "ended the process with exit code " + std::to_string(WEXITSTATUS(status));
 }
 
+/// The answer of a supervised child, which has ended when this returns.
+ChildEnd Await(pid_t child, int pipe_end, double timeout_s) {
+  const auto timeout =
+      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(timeout_s));
+  std::string answer;
+  ChildEnd end;
+  end.late = !ReadAnswer(pipe_end, Clock::now() + timeout, answer);
+  if (end.late) kill(child, SIGTERM);
+  kill(child, SIGCONT);
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  end.answered = !answer.empty() && answer.back() == '\0';
+  if (end.answered) {
+    end.text = answer.substr(0, answer.size() - 1);
+  } else {
+    end.text = end.late ? "did not return within " + NumberText(timeout_s) + " s" : EndText(status);
+  }
+  return end;
+}
+
 }  // namespace
 
 void Journal::Enter(const char* call, const std::string& state) {
@@ -135,39 +227,34 @@ SharedJournal::~SharedJournal() { munmap(journal_, sizeof(Journal)); }
 ChildEnd RunInChild(const ChildLimits& limits, Journal& journal,
                     const std::function<std::string()>& work) {
   int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0) return {false, std::string("has no pipe: ") + strerror(errno)};
-  const auto timeout =
-      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(limits.timeout_s));
-  const pid_t parent = getpid();
+  ChildEnd end;
+  if (pipe2(ends, O_CLOEXEC) != 0) {
+    end.text = std::string("has no pipe: ") + strerror(errno);
+    return end;
+  }
+  std::fflush(nullptr);  // else the child prints what the program has not printed yet
+  const int printed = OpenPrinted();
+  const pid_t program = getpid();
   const pid_t child = fork();
   if (child == 0) {
     close(ends[0]);
     g_journal = &journal;
-    PrepareChild(limits, parent);
-    RunChild(ends[1], work);
+    Supervise(program, [&] {
+      PrepareChild(limits, getppid(), printed);
+      RunChild(ends[1], work);
+    });
   }
   const int fork_error = errno;
   close(ends[1]);
   if (child < 0) {
-    close(ends[0]);
-    return {false, std::string("has no process: ") + strerror(fork_error)};
+    end.text = std::string("has no process: ") + strerror(fork_error);
+  } else {
+    end = Await(child, ends[0], limits.timeout_s);
+    if (printed >= 0) end.printed = FirstLine(printed);
   }
-  setpgid(child, child);  // by both, so that it holds whoever comes first
-  std::string answer;
-  const bool in_time = ReadAnswer(ends[0], Clock::now() + timeout, answer);
   close(ends[0]);
-  const bool answered = !answer.empty() && answer.back() == '\0';
-  if (!in_time) kill(-child, SIGKILL);
-  siginfo_t ended;
-  while (waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOWAIT) < 0 && errno == EINTR) {
-  }
-  kill(-child, SIGKILL);  // whatever it started
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
-  if (answered) return {true, answer.substr(0, answer.size() - 1)};
-  if (!in_time) return {false, "did not return within " + NumberText(limits.timeout_s) + " s"};
-  return {false, EndText(status)};
+  if (printed >= 0) close(printed);
+  return end;
 }
 
 }  // namespace alidade::internal

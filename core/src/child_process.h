@@ -30,11 +30,14 @@ struct ChildLimits {
 
 struct ChildEnd {
   bool answered = false;
-  std::string text;  ///< the answer, or the end in words: `crashed (signal 11, ...)`
+  bool late = false;    ///< ended as it exceeded the time
+  std::string text;     ///< the answer, or the end in words: `crashed (signal 11, ...)`
+  std::string printed;  ///< the first line on standard output or error, cut where it is too long
 };
 
-/// The answer of `work`, done in a child that has the default signal handlers, no output, dumps no
-/// core and is killed with all that it started when it exceeds `limits` or the parent ends.
+/// The answer of `work`, done in a child that has the default signal handlers, prints to nobody and
+/// dumps no core. It is killed when it exceeds `limits` or the program ends; all that it started,
+/// daemons too, is killed when it ends.
 ChildEnd RunInChild(const ChildLimits& limits, Journal& journal,
                     const std::function<std::string()>& work);
 

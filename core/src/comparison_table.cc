@@ -60,20 +60,13 @@ Scaled ScaleUnit(const std::string& unit, double largest) {
 
 using Values = std::vector<std::optional<double>>;
 
-/// Cells of one row with the same number of decimals: four significant digits of the smallest, or
-/// of each where they lie too far apart for that. What is below 1e-5 is in scientific notation.
+/// Cells with four significant digits each, and all of those before the point. What is below 1e-5
+/// or from 1e7 on is in scientific notation.
 std::vector<std::string> Format(const Values& values) {
   constexpr double kSmall = 1e-5, kLarge = 1e7;
-  double smallest = std::numeric_limits<double>::infinity(), largest = 0.0;
-  for (const auto& value : values) {
-    if (!value || !std::isfinite(*value) || *value == 0.0) continue;
-    smallest = std::min(smallest, std::abs(*value));
-    largest = std::max(largest, std::abs(*value));
-  }
   const auto decimals = [](double v) {
     return std::clamp(3 - static_cast<int>(std::floor(std::log10(v))), 0, 9);
   };
-  const bool together = largest < 1e4 * smallest && smallest > kSmall && largest < kLarge;
   std::vector<std::string> cells;
   for (const auto& value : values) {
     if (!value) {
@@ -82,8 +75,6 @@ std::vector<std::string> Format(const Values& values) {
       cells.push_back(NumberText(*value));
     } else if (*value == 0.0) {
       cells.emplace_back("0");
-    } else if (together) {
-      cells.push_back(FixedText(*value, decimals(smallest)));
     } else if (std::abs(*value) < kLarge && std::abs(*value) > kSmall) {
       cells.push_back(FixedText(*value, decimals(std::abs(*value))));
     } else {

@@ -234,7 +234,8 @@ std::unique_ptr<ConfigTree>* Descend(ConfigTree* at, const Step& step, const Pla
   }
   const std::string& path = PathOf(*at);
   if (at->kind != (wants_map ? Node::Kind::kMap : Node::Kind::kList)) {
-    FailAt(place, dotted, Quoted(path) + (wants_map ? " is not a map" : " is not a list"));
+    FailAt(place, dotted, Quoted(path) + (wants_map ? " is not a map" : " is not a list"),
+           wants_map ? "the key of a map" : "the key of a list");
   }
   auto& children = at->children;
   if (!wants_map) {

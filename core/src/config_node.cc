@@ -116,7 +116,7 @@ const ConfigTree& Expect(const ConfigTree& tree, Node::Kind kind, const char* ex
     unread.push_back(child->key);
   }
   std::string what = "missing key";
-  if (!needed_by.empty()) what.append(", needed by '").append(needed_by).append("'");
+  if (!needed_by.empty()) what.append(", needed by ").append(needed_by);
   const std::string near = Nearest(key, unread);
   if (!near.empty()) {
     what += "; found '" + near + "'";

@@ -41,6 +41,7 @@ Outcome Ekf::Linearise(Row& row) {
   if (outcome == Outcome::kOutOfDomain || outcome == Outcome::kFailed) entry.h.clear();
   if (outcome == Outcome::kAccepted) outcome = NoiseOf(row, plan.roles.data());
   if (outcome == Outcome::kAccepted) {
+    if (geometry.kind == GeometryKind::kAngle) geometry.Normalise(entry.h.data());
     entry.innovation.resize(m);
     geometry.Minus(entry.z.data(), entry.h.data(), entry.innovation.data());
     return outcome;

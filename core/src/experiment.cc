@@ -164,6 +164,26 @@ int ReadUse(const Node& use, const NamedEstimator& named, const Node& estimators
   return static_cast<int>(found - before.begin());
 }
 
+/// Refuses overrides of what all estimators share, and of an entry that `root` does not have and
+/// that is none of `merged` either, for it has no model.
+void CheckOverrides(const Node& overrides, const Node& root, const Node& merged) {
+  for (const auto& [key, value] : overrides.Entries()) {
+    if (key == "start_s") continue;
+    if (key != "state" && key != "sensors") {
+      value.Fail("'" + key + "' is common to all estimators of a run", "state, sensors or start_s");
+    }
+    std::vector<std::string> known;
+    for (const auto& [name, entry] : root.At(key).Entries()) known.push_back(name);
+    for (const auto& [name, entry] : value.Entries()) {
+      if (std::ranges::find(known, name) != known.end()) continue;
+      if (merged.At(key).At(name).Find("model")) continue;
+      entry.Fail("no entry '" + name + "' in '" + key + "' to override",
+                 "one of " + internal::Join(known) + ", or a new entry with a model",
+                 Nearest(name, known));
+    }
+  }
+}
+
 NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const Config& config,
                               const PluginHost& host, const std::vector<StreamInfo>& streams,
                               const std::vector<NamedEstimator>& before) {
@@ -181,14 +201,7 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   }
   const auto overrides = entry.Find("overrides");
   const Config own = overrides ? config.Merged(*overrides) : config;
-  if (overrides) {
-    for (const auto& [key, value] : overrides->Entries()) {
-      if (key != "state" && key != "sensors" && key != "start_s") {
-        value.Fail("'" + key + "' is common to all estimators of a run",
-                   "state, sensors or start_s");
-      }
-    }
-  }
+  if (overrides) CheckOverrides(*overrides, config.root(), own.root());
   const std::vector<std::string> only = ReadSensorList(entry, own.root());
   const auto use = entry.Find("use");
   if (use && use->is_map()) use->Declare("accepted_by");

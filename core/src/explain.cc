@@ -13,6 +13,7 @@
 #include "estimator_types.h"
 #include "names.h"
 #include "number_text.h"
+#include "observability.h"
 #include "text_table.h"
 
 namespace alidade {
@@ -192,6 +193,10 @@ std::string Touches(const System& system) {
 }
 
 std::string Unobservable(const System& system) {
+  if (!internal::ObservabilityIsTold(system)) {
+    return "  what can be observed is not looked into: the state has more than " +
+           std::to_string(internal::kMostObserved) + " elements\n";
+  }
   std::map<std::vector<std::string>, int> directions;
   for (const auto& names : UnobservableDirections(system)) ++directions[names];
   if (directions.empty()) return "  every direction of the state can be observed\n";

@@ -57,6 +57,7 @@ margin(low, high) = high > low ? max(0.08 * (high - low), 1e-6 * max(abs(low), a
 # is its x, level() its y.
 along(mine, t) = (row = mine, jump = mine && t - px > gap, px = mine ? t : px)
 level(value) = (py = jump ? NaN : row ? value : py)
+before = 0  # of an angle, the value at the row before
 )";
 
 }  // namespace
@@ -148,7 +149,7 @@ std::string FigureScript::TimeAxis(std::string& label) const {
 
 std::string FigureScript::Text() const {
   // A panel is as high as its key, which would go on beyond the right edge.
-  const int height = std::max(170, 60 + 18 * most_keys_);
+  const int height = std::max(170, 76 + 18 * most_keys_);
   const std::string size = "960," + std::to_string(64 + height * panels_);
   std::string text =
       "# Draws figures/" + name_ + ".svg. In the run folder: gnuplot figures/" + name_ + ".gp\n";

@@ -25,6 +25,17 @@ std::string Line(std::string_view column, int style) {
   return OverTime('(' + Column(column) + ')') + " with lines ls " + std::to_string(style);
 }
 
+/// The line of an element; that of an angle is broken where it leaps from one end of (-pi, pi] to
+/// the other.
+void ElementCurve(FigureScript& script, const FigureFile& file, const std::string& column,
+                  const std::string& unit, int style, std::string_view key) {
+  if (unit != "rad") return script.Curve(file, Line(column, style), key);
+  const std::string broken = "(now = " + Column(column) +
+                             ", leap = column(0) > 0 && abs(now - before) > pi, before = now, "
+                             "leap ? NaN : now)";
+  script.Curve(file, OverTime('(' + broken + ')') + " with lines ls " + std::to_string(style), key);
+}
+
 /// `value` where the condition holds, else nothing.
 std::string Where(const std::string& condition, const std::string& value) {
   return '(' + condition + " ? " + value + " : NaN)";
@@ -43,7 +54,7 @@ FigureFile Innovations(const RecordedEstimator& e) {
 
 void TruthCurve(FigureScript& script, const RecordedRun& run, const RecordedElement& element) {
   if (!element.has_truth) return;
-  script.Curve({"truth.csv", run.truth_rows}, Line(element.truth, 11), "truth");
+  ElementCurve(script, {"truth.csv", run.truth_rows}, element.truth, element.unit, 11, "truth");
 }
 
 /// The y range that shows estimate and truth in full, and most of the band.
@@ -77,7 +88,7 @@ FigureScript StateFigure(const RecordedRun& run, const RecordedEstimator& estima
                        " with filledcurves ls 1",
                    "+-3 sigma");
     }
-    script.Curve(Estimates(estimator), Line(element.name, 1), "estimate");
+    ElementCurve(script, Estimates(estimator), element.name, element.unit, 1, "estimate");
     TruthCurve(script, run, element);
   }
   return script;
@@ -276,7 +287,11 @@ const std::string& Identity(const RecordedElement& element) {
 
 /// All estimators beside truth, for each element that any of them has.
 FigureScript ComparisonFigure(const RecordedRun& run) {
-  FigureScript script("comparison", "estimators side by side", run.first, run.last);
+  const std::size_t count = run.estimators.size();
+  const std::string some =
+      ": the first " + std::to_string(kMaxCurves) + " of " + std::to_string(count);
+  FigureScript script("comparison", "estimators side by side" + (count > kMaxCurves ? some : ""),
+                      run.first, run.last);
   std::vector<const RecordedElement*> elements;
   for (const RecordedEstimator& estimator : run.estimators) {
     for (const RecordedElement& element : estimator.elements) {
@@ -295,7 +310,7 @@ FigureScript ComparisonFigure(const RecordedRun& run) {
       for (const RecordedElement& element : estimator.elements) {
         if (!element.has_value || Identity(element) != Identity(*first)) continue;
         const bool named = element.name != first->name;
-        script.Curve(Estimates(estimator), Line(element.name, EstimatorStyle(i)),
+        ElementCurve(script, Estimates(estimator), element.name, element.unit, EstimatorStyle(i),
                      estimator.name + (named ? ": " + element.name : ""));
       }
     }

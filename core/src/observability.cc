@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "observability.h"
+
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-
-#include "alidade/system.h"
 
 namespace alidade {
 namespace {
@@ -183,7 +183,16 @@ void Reduce(Eigen::MatrixXd& basis) {
 
 }  // namespace
 
+bool internal::ObservabilityIsTold(const System& system) {
+  int size = 0;
+  for (const Block& block : system.layout.blocks()) {
+    if (block.status != BlockStatus::kFixed) size += block.geometry().tangent;
+  }
+  return size <= internal::kMostObserved;
+}
+
 std::vector<std::vector<std::string>> UnobservableDirections(const System& system) {
+  if (!internal::ObservabilityIsTold(system)) return {};
   constexpr double kStep = 0.02;
   constexpr int kIdleSteps = 2;
   Trajectory t = StartNearPrior(system);

@@ -110,7 +110,11 @@ std::string PluginList(const PluginHost& host) {
   for (const PluginEntry* entry : Sorted(host)) {
     rows.push_back({entry->name, KindName(entry->kind), entry->doc, entry->plugin.string()});
   }
-  return rows.size() > 1 ? TextTable(rows) : "no plugin was found\n";
+  const std::string none = rows.size() > 1 ? "" : "\nno plugin was found\n";
+  for (const EstimatorType& type : EstimatorTypes()) {
+    rows.push_back({type.name, KindName(PluginEntry::Kind::kEstimator), type.doc, "built in"});
+  }
+  return TextTable(rows) + none;
 }
 
 std::string PluginListJson(const PluginHost& host) {
@@ -119,6 +123,11 @@ std::string PluginListJson(const PluginHost& host) {
   for (const PluginEntry* entry : Sorted(host)) {
     json.Object();
     AddEntry(*entry, json);
+    json.End();
+  }
+  for (const EstimatorType& type : EstimatorTypes()) {
+    json.Object();
+    AddEntry({PluginEntry::Kind::kEstimator, type.name, type.doc, "", "", "", 0}, json);
     json.End();
   }
   json.End();

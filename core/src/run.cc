@@ -7,6 +7,7 @@
 #include "alidade/metrics.h"
 #include "alidade/recorder.h"
 #include "number_text.h"
+#include "observability.h"
 #include "reference.h"
 #include "reorder.h"
 #include "text_table.h"
@@ -67,6 +68,7 @@ struct Running {
   EstimatorResult result;
   bool ended = false;                  ///< it had nothing left to go on with
   bool diverged = false;               ///< by a frame that was taken; not of offline estimators
+  bool took = false;                   ///< an estimate, so that its counts tell of the measurements
   const UpdateReport* last = nullptr;  ///< report of the last frame; null: it had ended before
   bool waits = false;                  ///< metrics need the estimates of the reference
   std::vector<internal::Estimate> estimates = {};  ///< where it waits
@@ -74,6 +76,7 @@ struct Running {
   /// Puts the estimate of frame k into metrics and record.
   void Take(std::size_t k, const Seen& seen, const State& state, const UpdateReport& report,
             Recorder* recorder) {
+    took = true;
     if (!waits) {
       metrics.Add(seen.frame, seen.in_segment, state, report);
     } else {
@@ -91,6 +94,11 @@ EstimatorResult Begin(const NamedEstimator& named) {
   EstimatorResult result;
   result.name = named.name;
   result.unobservable = UnobservableDirections(named.system);
+  if (!internal::ObservabilityIsTold(named.system)) {
+    result.events.push_back({kNoStamp, "observability",
+                             "not looked into: the state has more than " +
+                                 std::to_string(internal::kMostObserved) + " elements"});
+  }
   for (const auto& direction : result.unobservable) {
     result.events.push_back({kNoStamp, "unobservable",
                              "no sensor of this estimator tells " +
@@ -226,7 +234,8 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
       if (result.status != RunStatus::kOk) return;
       result.status = RunStatus::kStopped;
       result.code = ExitCode::kStopped;
-      result.reason = "stopped after " + std::to_string(result.frames) + " frames";
+      result.reason = "stopped after " + std::to_string(result.frames) +
+                      (result.frames == 1 ? " frame" : " frames");
       return;
     }
   }
@@ -356,7 +365,7 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
     Measure(one, result);
     one.result.counts = one.metrics.counts();
     one.result.units = one.metrics.units();
-    if (result.frames > 0) {
+    if (one.took && !one.named.estimator->failed()) {
       const int by = one.named.accepted_by;
       NoteUnused(one.named.system, by < 0 ? "" : running[static_cast<std::size_t>(by)].named.name,
                  one.result);

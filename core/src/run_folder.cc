@@ -198,8 +198,11 @@ void RunFolder::RemoveLeftovers() const {
 
 void RunFolder::CheckTarget() const {
   if (!Exists(target_)) return;
-  if (!force_) Refuse(shown_, "exists already", "add --force to replace it");
   std::error_code error;
+  if (!fs::exists(target_, error)) {
+    Refuse(shown_, "is a link to what does not exist", "remove it, or choose another folder");
+  }
+  if (!force_) Refuse(shown_, "exists already", "add --force to replace it");
   if (!fs::is_directory(target_, error)) Refuse(shown_, "is a file", "choose another folder");
   const std::vector<std::string> foreign = Unlisted(target_, error);
   if (error) Refuse(shown_, "cannot be read: " + error.message(), "choose another folder");

@@ -148,7 +148,7 @@ class CeresBatch : public Estimator {
     std::ostringstream text;
     text.imbue(std::locale::classic());
     text << "cost " << std::setprecision(9) << summary.final_cost << ", " << iterations
-         << " iterations in " << outer << " solves: ";
+         << " iterations in " << outer << (outer == 1 ? " solve: " : " solves: ");
     summary_ = text.str();
     if (failed_) {
       summary_ += "not converged, " + summary.message;

@@ -357,6 +357,7 @@ void Trajectory::Report(std::size_t k, const Point& point, UpdateReport& report)
     entry.innovation.resize(static_cast<std::size_t>(geometry.tangent));
     if (sensor.model.Predict(RolesOf(sensor, point).data(), entry.h.data()) != Status::kOk)
       continue;
+    if (geometry.kind == GeometryKind::kAngle) geometry.Normalise(entry.h.data());
     geometry.Minus(entry.z.data(), entry.h.data(), entry.innovation.data());
   }
 }

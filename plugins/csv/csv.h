@@ -121,6 +121,11 @@ class CsvSource : public Source {
   }
 
   void CountRows() {
+    if (any_order_) {
+      layout_.blind_after_node->Fail(
+          "counts rows as the file has them, not as 'time.order' puts them",
+          "'time.order: reject', which asks for a file in the order of time");
+    }
     if (!reader_.regular()) {
       layout_.blind_after_node->Fail(
           "'" + reader_.name() + "' is a pipe, which cannot be read twice",
@@ -188,16 +193,19 @@ class CsvSource : public Source {
     const CsvColumn& column = *layout_.time;
     const double t_s =
         ReadNumber(column) * std::pow(10.0, static_cast<double>(layout_.time_digits) - 9.0);
-    if (!(std::abs(t_s) < 9.2e9)) FailCell(column, "is beyond 292 years");
+    if (!(std::abs(t_s) < 9.2e9)) FailCell(column, "is beyond 292 years", "-9.2e9 s to 9.2e9 s");
     const std::string_view text = csv_detail::Trim(cells_[column.index]);
     const bool has_exponent = text.find_first_of("eE") != std::string_view::npos;
     const Stamp stamp =
         has_exponent ? StampFromSeconds(t_s) : csv_detail::ExactStamp(text, layout_.time_digits);
     if (!any_order_ && rows_ > 0 && stamp <= last_stamp_) {
-      FailCell(column,
-               std::string(stamp < last_stamp_ ? "is before" : "is the same time as") + " line " +
-                   std::to_string(last_line_),
-               "times that increase, or 'time.order: sort'");
+      const bool late = stamp < last_stamp_;
+      FailCell(
+          column,
+          (late ? "is before line " : "is the same time as line ") + std::to_string(last_line_),
+          late ? "times that increase, or 'time.order: sort' or 'rewind'"
+               : "times that increase, or 'time.order: sort', which joins rows of different "
+                 "streams");
     }
     return stamp;
   }

@@ -121,7 +121,9 @@ inline void ReadBlind(const Node& entry, CsvLayout& layout) {
     for (const CsvField& stream : layout.streams) names.push_back(stream.info.name);
     const auto found = std::find(names.begin(), names.end(), item.Text());
     if (found == names.end()) {
-      item.Fail("no stream '" + item.Text() + "'", {}, Nearest(item.Text(), names));
+      std::string known;
+      for (const std::string& name : names) known += (known.empty() ? "one of " : ", ") + name;
+      item.Fail("no stream '" + item.Text() + "'", known, Nearest(item.Text(), names));
     }
     layout.streams[static_cast<std::size_t>(found - names.begin())].goes_blind = true;
   }

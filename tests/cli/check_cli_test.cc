@@ -31,14 +31,17 @@ TEST_F(CheckProgram, EndsWithOneWhereACheckFails) {
   const Outcome outcome = Call(With(kStereo, {"--states", "100000", "--timeout", "0.01"}));
   EXPECT_EQ(outcome.code, 1) << outcome.out;
   EXPECT_TRUE(Contains(outcome.out, "\n  FAIL ")) << outcome.out;
-  EXPECT_TRUE(Contains(outcome.out, "did not return within 0.01 s")) << outcome.out;
+  EXPECT_TRUE(Contains(outcome.out, "the check took longer than 0.01 s (--timeout); it was "))
+      << outcome.out;
 }
 
 TEST_F(CheckProgram, NamesParametersThatAreMissingOrUnknown) {
   const Outcome missing = Call({"check", "stereo_disparity", "--set", "focal_px=400"});
   EXPECT_EQ(missing.code, 78);
-  EXPECT_TRUE(Contains(missing.err, "baseline_m: missing")) << missing.err;
-  EXPECT_TRUE(Contains(missing.err, "sigma_px: missing")) << missing.err;
+  EXPECT_TRUE(Contains(missing.err, "model 'stereo_disparity': baseline_m: missing"))
+      << missing.err;
+  EXPECT_TRUE(Contains(missing.err, "model 'stereo_disparity': sigma_px: missing")) << missing.err;
+  EXPECT_FALSE(Contains(missing.err, ":1:1")) << missing.err;
   EXPECT_TRUE(Contains(missing.err, "\n  parameters are given with --set KEY=VALUE"));
   const Outcome unknown = Call(With(kStereo, {"--set", "near=1"}));
   EXPECT_EQ(unknown.code, 78) << unknown.out;
@@ -83,8 +86,18 @@ TEST_F(CheckProgram, SaysWhichPluginsAreMissingOrRefused) {
   const Outcome file = Call({"check", "./nowhere.so"});
   EXPECT_EQ(file.code, 69);
   EXPECT_TRUE(Contains(file.err, "nowhere.so: no such file or folder")) << file.err;
+  EXPECT_TRUE(Contains(missing.err, "\n  searched /")) << missing.err;
+  const Outcome source = Call({"check", "csv"});
+  EXPECT_EQ(source.code, 69);
+  EXPECT_EQ(source.err,
+            "error: 'csv' is a source; expected a sensor or motion model, which is what is "
+            "checked\n");
   EXPECT_EQ(Call({"check"}).code, 2);
-  EXPECT_EQ(Call(With(kStereo, {"--states", "0"})).code, 2);
+  const Outcome states = Call(With(kStereo, {"--states", "0"}));
+  EXPECT_EQ(states.code, 2);
+  EXPECT_TRUE(Contains(states.err, "'0' is no integer from 1 to 1000000")) << states.err;
+  const Outcome timeout = Call(With(kStereo, {"--timeout", "0"}));
+  EXPECT_TRUE(Contains(timeout.err, "'0' is no number from 0.01 to 1e+06")) << timeout.err;
 }
 
 }  // namespace

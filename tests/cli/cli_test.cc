@@ -305,9 +305,11 @@ TEST_F(Cli, StopsBetweenFramesAtASignal) {
 TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
   const Outcome list = Call({"plugins", "list"});
   EXPECT_EQ(list.code, 0);
-  for (const char* name : {"constant", "stereo_disparity", "depth_target", "alidade_csv.so"}) {
+  for (const char* name :
+       {"constant", "stereo_disparity", "depth_target", "alidade_csv.so", "square_root_ekf"}) {
     EXPECT_TRUE(Contains(list.out, name)) << list.out;
   }
+  EXPECT_TRUE(Contains(list.out, "  built in\n")) << list.out;
   const Outcome info = Call({"plugins", "info", "stereo_disparity"});
   EXPECT_EQ(info.code, 0);
   for (const char* part : {"role depth: vector(1), m", "measurement disparity: vector(1), px",

@@ -35,7 +35,7 @@ TEST(ComparisonTable, OrdersScalesAndAligns) {
   EXPECT_EQ(ComparisonTable(result),
             "                                fused  stereo_only\n"
             "rmse cam.pixel [px]            0.3100            -\n"
-            "rmse target.depth [mm]          2.145      206.534\n"
+            "rmse target.depth [mm]          2.145        206.5\n"
             "rmse target.depth @blind [mm]   1.210            -\n"
             "lag target.depth [ms]          -1.420            -\n"
             "cov95 target.depth [%]          93.42            -\n"

@@ -62,8 +62,8 @@ TEST(ConfigSet, ValueIsReadStrictly) {
 }
 
 TEST(ConfigSet, KeyPathMustFitTheTree) {
-  EXPECT_EQ(SetError("a.t.x", "1"), "--set a.t.x: 'a.t' is not a map");
-  EXPECT_EQ(SetError("a[0]", "1"), "--set a[0]: 'a' is not a list");
+  EXPECT_EQ(SetError("a.t.x", "1"), "--set a.t.x: 'a.t' is not a map; expected the key of a map");
+  EXPECT_EQ(SetError("a[0]", "1"), "--set a[0]: 'a' is not a list; expected the key of a list");
   EXPECT_EQ(SetError("a.b[2]", "1"), "--set a.b[2]: 'a.b' has 2 items");
   for (const char* key : {"", ".", "a..b", "a.", ".a", "a[", "a[]", "a[x]", "a[0", "a[0]b", "[0]",
                           "a[-1]", "a[99999999999999999999]"}) {

@@ -227,7 +227,7 @@ TEST(Node, MissingKeyNamesWhoNeedsIt) {
       Read("sensors:\n  stereo:\n    model: stereo_disparity\n    focla_px: 400\n");
   const Node stereo = config.root().At("sensors").At("stereo");
   EXPECT_EQ(Message([&] { stereo.At("baseline_m", "stereo_disparity"); }),
-            "f.yaml:2:3 sensors.stereo.baseline_m: missing key, needed by 'stereo_disparity'");
+            "f.yaml:2:3 sensors.stereo.baseline_m: missing key, needed by stereo_disparity");
   EXPECT_EQ(Message([&] { stereo.At("focal_px"); }),
             "f.yaml:2:3 sensors.stereo.focal_px: missing key; found 'focla_px' at line 4");
   EXPECT_EQ(Message([&] { config.root().At("source"); }), "f.yaml:1:1 source: missing key");

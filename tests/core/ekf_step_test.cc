@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "alidade/ukf.h"
 #include "support/systems.h"
 
 namespace alidade {
@@ -152,6 +153,28 @@ TEST(EkfStep, ABlockThatStartsFromAMeasurementIsOnItsManifold) {
   Ekf ekf(system, {}, StreamsOf(system));
   ekf.Process(FrameAt(0.0, {{0, -1.0}}));
   EXPECT_NEAR(ValueOf(ekf.state(), "t.a"), kPi - 1.0, 1e-12);
+}
+
+/// z = a + 6 rad, and leaves it where that falls.
+struct Unwrapped : Opposite {
+  template <class T>
+  bool Predict(const T* a, T* z) const {
+    z[0] = a[0] + 6.0;
+    return true;
+  }
+};
+
+TEST(EkfStep, APredictedAngleIsBroughtIntoItsInterval) {
+  System system = Turn();
+  AddSensor(system, "unwrapped", InProcessSensor(Unwrapped(), "unwrapped"), {"t.a"});
+  Ekf ekf(system, {}, StreamsOf(system));
+  Ukf ukf(system, {}, StreamsOf(system));
+  for (Estimator* const one : {static_cast<Estimator*>(&ekf), static_cast<Estimator*>(&ukf)}) {
+    const UpdateReport& report = one->Process(FrameAt(0.0, {{0, -0.4}}));
+    const MeasurementReport& entry = report.measurements().front();
+    EXPECT_NEAR(entry.h.at(0), 6.0 - 2.0 * kPi, 1e-12);
+    EXPECT_NEAR(entry.innovation.at(0), -0.4 - (6.0 - 2.0 * kPi), 1e-12);
+  }
 }
 
 }  // namespace

@@ -61,6 +61,35 @@ TEST_P(FigureKey, HasAllEstimatorsInOneColumn) {
   EXPECT_EQ(texts["truth"].size(), 1u);
 }
 
+// The last panel is lower than the others, by what stands below its axis.
+TEST(FigureKeyOfTheLastPanel, HasAllEstimatorsAndTruthInOneColumn) {
+  const TemporaryFolder folder;
+  Experiment experiment = MakeExperiment();
+  experiment.estimators.clear();
+  for (int i = 0; i < 7; ++i) {
+    NamedEstimator named;
+    named.name = "an_estimator_" + std::to_string(i);
+    const MotionModel constant = InProcessMotion(Constant<>(1), "constant");
+    for (const char* entry : {"first", "second"}) {
+      AddMotion(named.system, entry, constant, {{"x", 0.3, 0.1}});
+    }
+    AddMotion(named.system, "target", constant, {{"depth", 0.3, 0.1}});
+    named.estimator =
+        std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+    experiment.estimators.push_back(std::move(named));
+  }
+  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+  recorder.Finish(RunInto(recorder, experiment));
+  if (recorder.note().ends_with("not installed")) GTEST_SKIP() << recorder.note();
+  auto texts = TextsOf(Read(folder / "out/figures/comparison.svg"));
+  ASSERT_EQ(texts["truth"].size(), 1u);
+  for (int i = 0; i < 7; ++i) {
+    const std::string name = "an_estimator_" + std::to_string(i);
+    ASSERT_EQ(texts[name].size(), 3u) << name;
+    EXPECT_NEAR(texts[name][2], texts["truth"][0], 1.0) << name;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Estimators, FigureKey, ::testing::Values(2, 5, 6, 8));
 
 }  // namespace

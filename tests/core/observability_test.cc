@@ -61,5 +61,22 @@ TEST(UnobservableDirections, ManyBlocksThatNothingJoinsAreToldApart) {
             (std::vector<Names>{{"p7.x"}, {"p7.v"}, {"p57.x"}, {"p57.v"}, {"p107.x"}, {"p107.v"}}));
 }
 
+TEST(UnobservableDirections, AreNotLookedForInALargeState) {
+  const auto state_of = [](int size) {
+    System system;
+    const MotionModel model = InProcessMotion(Constant<>(size), "constant");
+    const BlockId id = system.layout.Declare("c.value", "c", model.blocks()[0]);
+    system.motions.push_back({"c", model, {id}});
+    Prior prior;
+    prior.block = id;
+    prior.mean.assign(static_cast<std::size_t>(size), 0.0);
+    prior.covariance = Eigen::MatrixXd::Identity(size, size);
+    system.priors.push_back(prior);
+    return system;
+  };
+  EXPECT_EQ(UnobservableDirections(state_of(500)).size(), 500u);
+  EXPECT_TRUE(UnobservableDirections(state_of(501)).empty());
+}
+
 }  // namespace
 }  // namespace alidade

@@ -63,6 +63,60 @@ TEST(Recorder, TheComparisonDrawsEveryEstimatorWhateverItsBlocksAreCalled) {
   EXPECT_NE(script.find("set label 1 'target.depth'"), std::string::npos);
 }
 
+/// An angle that grows by 1 rad a step.
+struct Spinning : Motion<0, Angle> {
+  static constexpr std::array kBlocks{Quantity{"heading", "rad"}};
+  template <class T>
+  void Step(const T* a, const T*, double, T* next) const {
+    next[0] = a[0] + 1.0;
+  }
+  void SqrtQ(double, MatrixRef) const {}
+};
+
+TEST(Recorder, TheLineOfAnAngleIsBrokenWhereItLeaps) {
+  const TemporaryFolder folder;
+  Experiment experiment = MakeExperiment();
+  for (NamedEstimator& named : experiment.estimators) {
+    testing::AddMotion(named.system, "top", InProcessMotion(Spinning(), "spinning"),
+                       {{"heading", 0.0, 0.1}});
+    named.estimator =
+        std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+  }
+  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+  recorder.Finish(RunInto(recorder, experiment));
+  EXPECT_TRUE(recorder.note() == "" || recorder.note().ends_with("not installed"))
+      << recorder.note();
+  for (const char* name : {"comparison", "ekf.state"}) {
+    const std::string script = Read(folder / "out/figures" / (std::string(name) + ".gp"));
+    EXPECT_NE(script.find("((now = column('top.heading'), leap = column(0) > 0 && "
+                          "abs(now - before) > pi, before = now, leap ? NaN : now))"),
+              std::string::npos)
+        << script;
+    EXPECT_EQ(script.find("now = column('target.depth')"), std::string::npos) << script;
+  }
+}
+
+TEST(Recorder, TheComparisonSaysWhatItLeavesOut) {
+  const TemporaryFolder folder;
+  Experiment experiment = MakeExperiment();
+  while (experiment.estimators.size() < 9) {
+    NamedEstimator more;
+    more.name = "more_" + std::to_string(experiment.estimators.size());
+    more.system = DepthFilter();
+    more.estimator = std::make_unique<Ekf>(more.system, EkfOptions{}, experiment.source->streams());
+    experiment.estimators.push_back(std::move(more));
+  }
+  const int code = InChild([&] {
+    ::setenv("PATH", "/nowhere", 1);  // the script tells
+    Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+    recorder.Finish(RunInto(recorder, experiment));
+  });
+  EXPECT_EQ(code, 0);
+  EXPECT_NE(Read(folder / "out/figures/comparison.gp")
+                .find("title 'estimators side by side: the first 8 of 9'"),
+            std::string::npos);
+}
+
 TEST(Recorder, DoesWithoutGnuplot) {
   const TemporaryFolder folder;
   const int code = InChild([&] {

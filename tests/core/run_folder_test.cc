@@ -81,6 +81,17 @@ TEST(RunFolder, LeavesAnExistingFolderAlone) {
   EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "out/"), 5); }), 73);
 }
 
+TEST(RunFolder, ALinkToNothingIsCalledOne) {
+  const TemporaryFolder folder;
+  fs::create_symlink(folder / "nothing", folder / "out");
+  for (const bool force : {false, true}) {
+    std::string text;
+    EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "out", force)); }, &text), 73);
+    EXPECT_EQ(text, (folder / "out").string() +
+                        ": is a link to what does not exist; remove it, or choose another folder");
+  }
+}
+
 TEST(RunFolder, ForceReplacesARunFolder) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "out"), 3);

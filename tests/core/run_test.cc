@@ -98,7 +98,10 @@ struct Hindsight : Estimator {
   const State& state() const override { return state_; }
   Stamp stamp() const override { return kNoStamp; }
   bool diverged() const override { return false; }
-  bool failed() const override { return false; }
+  bool failed() const override { return failed_; }
+
+ protected:
+  bool failed_ = false;
 
  private:
   State state_;
@@ -125,6 +128,26 @@ TEST(Run, TakesTheEstimatesOfAnOfflineEstimatorAtTheEnd) {
               1e-12);
   const std::vector<Event>& events = result.estimators[1].events;
   EXPECT_EQ(std::ranges::count(events, "all is known", &Event::text), 1);
+}
+
+/// Finds at the end that it cannot say anything.
+struct Speechless : Hindsight {
+  using Hindsight::Hindsight;
+  void Smooth(const Emit&) override {
+    failed_ = true;
+    throw Error(ExitCode::kDiverged, "no words");
+  }
+};
+
+TEST(Run, AnEstimatorThatFailsSaysNothingOfItsSensors) {
+  Experiment experiment = MakeExperiment();
+  NamedEstimator& alone = experiment.estimators[1];
+  alone.estimator = std::make_unique<Speechless>(alone.system);
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.code, ExitCode::kDiverged);
+  const std::vector<Event>& events = result.estimators[1].events;
+  EXPECT_EQ(std::ranges::count(events, "failed", &Event::kind), 1);
+  EXPECT_EQ(std::ranges::count(events, "unused", &Event::kind), 0);
 }
 
 TEST(Run, AStopIsTakenAfterTheFrame) {

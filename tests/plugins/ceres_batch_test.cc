@@ -137,7 +137,7 @@ TEST(CeresBatch, EqualsTheSmootherWrittenOutOnALinearProblem) {
   EXPECT_FALSE(batch->failed());
   ASSERT_EQ(found.events.size(), 1u);
   EXPECT_EQ(found.events[0].kind, "batch");
-  EXPECT_NE(found.events[0].text.find("in 1 solves: converged"), std::string::npos)
+  EXPECT_NE(found.events[0].text.find("in 1 solve: converged"), std::string::npos)
       << found.events[0].text;
 }
 

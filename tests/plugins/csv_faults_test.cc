@@ -89,15 +89,15 @@ TEST_F(Csv, LongestLineMayEndAcrossTheBuffer) {
 TEST_F(Csv, TimeMustIncrease) {
   ExpectBadData(std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n# c\n0.1,1,2,3\n",
                 "FILE:5:1 t_s: '0.1' is before line 3; expected times that increase, or "
-                "'time.order: sort'");
+                "'time.order: sort' or 'rewind'");
   ExpectBadData(std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n0.2000000001,1,2,3\n",
                 "FILE:4:1 t_s: '0.2000000001' is the same time as line 3; expected times that "
-                "increase, or 'time.order: sort'");
+                "increase, or 'time.order: sort', which joins rows of different streams");
 }
 
 TEST_F(Csv, TimeBeyondTheStamps) {
   ExpectBadData(std::string(kHeader) + "9.3e9,1,2,3\n",
-                "FILE:2:1 t_s: '9.3e9' is beyond 292 years; expected a finite number");
+                "FILE:2:1 t_s: '9.3e9' is beyond 292 years; expected -9.2e9 s to 9.2e9 s");
   ExpectBadData(std::string(kHeader) + ",1,2,3\n",
                 "FILE:2:1 t_s: '' is not a number; expected a finite number");
 }
@@ -143,7 +143,7 @@ TEST_F(Csv, UnknownAndMissingKeys) {
   ExpectBadConfig("path: a.csv\nstreams: {}\n",
                   "run.yaml:2:10 streams: no streams; expected a map, as in 'disparity: "
                   "disparity_px'");
-  ExpectBadConfig("streams: {d: scale}\n", "run.yaml:1:1 path: missing key, needed by 'csv'");
+  ExpectBadConfig("streams: {d: scale}\n", "run.yaml:1:1 path: missing key, needed by csv");
 }
 
 TEST_F(Csv, GainOfNothing) {

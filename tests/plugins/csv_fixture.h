@@ -42,7 +42,8 @@ class Csv : public ::testing::Test {
   std::unique_ptr<CsvSource> OpenConfig() {
     static const AlidadeHost kHost{};
     Params params(&kHost);
-    auto source = std::make_unique<CsvSource>(SourceArguments{config_->root(), params, 1, folder_});
+    auto source = std::make_unique<CsvSource>(
+        SourceArguments{config_->root(), params, 1, folder_, any_order_});
     config_->root().RejectUnread();
     return source;
   }
@@ -80,6 +81,7 @@ class Csv : public ::testing::Test {
   }
 
   fs::path folder_;
+  bool any_order_ = false;  ///< as the run says with `time.order`
   std::unique_ptr<Config> config_;
 };
 

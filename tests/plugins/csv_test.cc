@@ -210,10 +210,21 @@ TEST_F(Csv, BlindNamesTheStreams) {
   EXPECT_EQ(Held(Frames(config + "blind: inverse_scale\n")[1]), "0 | 0");
   EXPECT_EQ(Held(Frames(config + "blind: [inverse_scale, disparity]\n")[1]), "| 0");
   ExpectBadConfig(config + "blind: [disparty]\n",
-                  "run.yaml:5:9 blind[0]: no stream 'disparty'; did you mean 'disparity'?");
+                  "run.yaml:5:9 blind[0]: no stream 'disparty'; expected one of disparity, "
+                  "inverse_scale; did you mean 'disparity'?");
   ExpectBadConfig(kDepthConfig + std::string("blind: disparity\n"),
                   "run.yaml:4:8 blind: without 'blind_after' no stream goes blind; expected "
                   "'blind_after' beside it");
+}
+
+TEST_F(Csv, BlindAfterNeedsRowsInTheOrderOfTime) {
+  Write(std::string(kHeader) + "1,1,2,3\n0,1,2,3\n");
+  any_order_ = true;
+  ExpectBadConfig(kDepthConfig + std::string("blind_after: 0.5\n"),
+                  "run.yaml:4:14 blind_after: counts rows as the file has them, not as "
+                  "'time.order' puts them; expected 'time.order: reject', which asks for a file in "
+                  "the order of time");
+  EXPECT_EQ(Frames(kDepthConfig + std::string("blind_after: 1\n")).size(), 2u);
 }
 
 TEST_F(Csv, BlindAfterNeedsAFileThatCanBeReadTwice) {

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // One fault each, for tests/plugins/check_test.cc; and four models without fault.
+#include <sys/prctl.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cfenv>
 #include <clocale>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <limits>
 #include <new>
@@ -212,7 +215,21 @@ struct Misbehaves : Right {
     if (kWhat == 7) static_cast<void>(!new std::string(1000, 'x'));
     if (kWhat == 8) static_cast<void>(::chdir("/"));
     if (kWhat == 9) static_cast<void>(::dup(0));
+    if (kWhat == 10) std::puts("hello");
+    if (kWhat == 11) LeaveDaemon();
     return Right::Predict(x, y, z);
+  }
+  /// Leaves a process that has left this one's group and session, with a name of its own.
+  static void LeaveDaemon() {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      ::setsid();
+      if (::fork() > 0) ::_exit(0);
+      ::prctl(PR_SET_NAME, "alidade_daemon");
+      ::sleep(600);
+      ::_exit(0);
+    }
+    ::waitpid(child, nullptr, 0);
   }
   static void Eat() {
     for (std::vector<double*> all;;) all.push_back(new double[1 << 16]());
@@ -343,6 +360,7 @@ ALIDADE_PLUGIN(SENSOR(Right, "right"), SENSOR(MayHaveBias, "may_have_bias"),
                SENSOR(Misbehaves<4>, "eats_memory"), SENSOR(Misbehaves<5>, "rounds_upward"),
                SENSOR(Misbehaves<6>, "sets_locale"), SENSOR(Misbehaves<7>, "leaks"),
                SENSOR(Misbehaves<8>, "changes_folder"), SENSOR(Misbehaves<9>, "leaks_files"),
+               SENSOR(Misbehaves<10>, "prints"), SENSOR(Misbehaves<11>, "leaves_daemons"),
                SENSOR(LosesItself, "loses_itself"), RAW(PastTheEnd, "past_the_end"),
                RAW(IgnoresStrides, "ignores_strides"), RAW(WritesAndFails, "writes_and_fails"),
                RAW(StrangeStatus, "strange_status"), RAW(NowhereDefined, "nowhere_defined"),

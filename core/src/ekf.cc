@@ -31,14 +31,6 @@ void SpreadNoise(const std::vector<double>& g, const std::vector<double>& l, std
   }
 }
 
-/// max_dt_s in whole nanoseconds, at least one.
-Stamp LongestPart(double max_dt_s) {
-  constexpr double kBeyond = 9.2e18;  // what a Stamp cannot hold
-  const double ns = std::round(1e9 * max_dt_s);
-  return ns < kBeyond ? std::max<Stamp>(1, static_cast<Stamp>(ns))
-                      : std::numeric_limits<Stamp>::max();
-}
-
 }  // namespace
 
 Ekf::~Ekf() = default;
@@ -159,7 +151,7 @@ void Ekf::StepTo(Stamp stamp) {
   Stamp elapsed = 0;
   const bool overflow = __builtin_sub_overflow(stamp, stamp_, &elapsed);
   if (elapsed == 0) return;
-  const Stamp count = (elapsed - 1) / LongestPart(options_.max_dt_s) + 1;
+  const Stamp count = PartsOf(elapsed, options_.max_dt_s);
   if (overflow || count > kMostParts) {
     char text[128];
     std::snprintf(text, sizeof(text), "a gap of %.6g s would need more than %g steps of %g s",

@@ -20,6 +20,9 @@ inline constexpr Stamp kNoStamp = INT64_MIN;
 /// Nearest stamp to `t_s` seconds.
 Stamp StampFromSeconds(double t_s);
 inline double Seconds(Stamp t) { return 1e-9 * static_cast<double>(t); }
+/// How many equal parts a gap of `elapsed` > 0 ns is stepped in: the fewest that are none longer
+/// than `max_dt_s` > 0, itself taken in whole nanoseconds, at least one. 0 where none elapsed.
+Stamp PartsOf(Stamp elapsed, double max_dt_s);
 
 /// One value of one stream.
 struct Measurement {

@@ -251,6 +251,15 @@ void Measure(Running& one, RunResult& result) {
   }
 }
 
+/// The smoothing of `one` was stopped; the others keep theirs.
+void NoteStop(Running& one, const char* why, RunResult& result) {
+  one.Note({{one.named.estimator->stamp(), "stopped", why}});
+  if (result.status != RunStatus::kOk) return;
+  result.status = RunStatus::kStopped;
+  result.code = ExitCode::kStopped;
+  result.reason = "estimator '" + one.named.name + "': " + why;
+}
+
 /// The estimates of those that needed all frames.
 void SmoothAll(std::vector<Running>& running, const std::vector<Seen>& kept,
                const RunOptions& options, RunResult& result) {
@@ -259,11 +268,16 @@ void SmoothAll(std::vector<Running>& running, const std::vector<Seen>& kept,
     if (one.ended || !estimator.offline()) continue;
     std::vector<Event> events;
     try {
+      estimator.StopWhen(options.stop);
       estimator.Smooth([&](std::size_t k, const State& state, const UpdateReport& report) {
         one.Take(k, kept[k], state, report, options.recorder);
         events = report.events;
       });
     } catch (const Error& e) {
+      if (e.code() == ExitCode::kStopped) {
+        NoteStop(one, e.what(), result);
+        continue;
+      }
       if (!estimator.failed()) throw;  // it is the record, say, that failed
       events.push_back({estimator.stamp(), "failed", e.what()});
     }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/source.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "alidade/error.h"
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <ceres/iteration_callback.h>
 #include <ceres/normal_prior.h>
 #include <ceres/problem.h>
 #include <ceres/solver.h>
@@ -6,6 +7,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <iomanip>
 #include <iterator>
 #include <limits>
@@ -29,6 +31,18 @@ struct Options {
   double max_dt_s = std::numeric_limits<double>::infinity();
 };
 
+/// Ends a solve once `stop` is true.
+class StopCallback : public ceres::IterationCallback {
+ public:
+  explicit StopCallback(std::function<bool()> stop) : stop_(std::move(stop)) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
+    return stop_() ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  std::function<bool()> stop_;
+};
+
 /// Maximum a posteriori of all states given all data, or given the data so far (the
 /// full-information filter): see Trajectory for the problem.
 ///
@@ -43,7 +57,10 @@ class CeresBatch : public Estimator {
         state_(system.InitialState()),
         filter_(system, FilterOptions(options), streams) {}
 
-  void Start(Stamp) override {}  // the first frame, or start_s, says when
+  void Start(Stamp stamp) override {
+    trajectory_.Start(stamp);
+    filter_.Start(stamp);
+  }
   bool offline() const override { return options_.data == Options::Data::kAll; }
   const State& state() const override { return state_; }
   Stamp stamp() const override { return trajectory_.stamp(); }
@@ -70,25 +87,26 @@ class CeresBatch : public Estimator {
     return report_;
   }
 
+  void StopWhen(std::function<bool()> stop) override { stop_ = std::move(stop); }
+
   void Smooth(const Emit& emit) override {
     if (trajectory_.size() == 0) return;
-    if (!trajectory_.Linearised(filtered_, e_) || !IsStart()) {
+    if (!trajectory_.Linearised(filtered_, e_) || !CanStart()) {
       e_.setZero(trajectory_.inputs());
-      if (!IsStart()) {
-        failed_ = true;
-        throw Error(ExitCode::kDiverged,
-                    "the batch has nowhere to start: " + trajectory_.problem());
-      }
+      if (!CanStart()) FailAll("the batch has nowhere to start: " + trajectory_.problem());
     }
     Solve();
-    Covariances();
-    Each([&](std::size_t k, const Trajectory::Point& point) {
+    const auto put = [&](std::size_t k, const Trajectory::Point& point) {
+      HeedStop();
       const bool last = k + 1 == trajectory_.size();
       trajectory_.Report(k, point, report_);
       PutState(k, point);
       if (last) report_.events.push_back({trajectory_.stamp(), "batch", summary_});
       emit(k, state_, report_);
-    });
+    };
+    if (!Covariances() || !ForEachFrame(put)) {
+      FailAll(summary_ + "; then " + trajectory_.problem());
+    }
   }
 
  private:
@@ -103,8 +121,18 @@ class CeresBatch : public Estimator {
     return filter;
   }
 
+  [[noreturn]] void FailAll(const std::string& why) {
+    failed_ = true;
+    throw Error(ExitCode::kDiverged, why);
+  }
+
+  bool Stopped() const { return offline() && stop_ && stop_(); }
+  void HeedStop() const {
+    if (Stopped()) throw Error(ExitCode::kStopped, "stopped while the batch was solved");
+  }
+
   /// Freezes at e_; false where a model is not defined there.
-  bool IsStart() {
+  bool CanStart() {
     Eigen::VectorXd r(trajectory_.residuals());
     RowMajor j(r.size(), trajectory_.inputs());
     return trajectory_.Freeze(e_.data()) && trajectory_.Evaluate(e_.data(), r.data(), j.data());
@@ -115,14 +143,18 @@ class CeresBatch : public Estimator {
     const Eigen::Index before = e_.size();
     e_.conservativeResize(trajectory_.inputs());
     e_.tail(e_.size() - before).setZero();
-    if (IsStart() || (trajectory_.Linearised(filtered_, e_) && IsStart())) {
+    const bool old = !trajectory_.turns() && CanStart();
+    if (old || (trajectory_.Linearised(filtered_, e_) && CanStart())) {
       Solve();
-      Covariances();
-      Each([&](std::size_t k, const Trajectory::Point& point) {
+      const auto put = [&](std::size_t k, const Trajectory::Point& point) {
         if (k + 1 < trajectory_.size()) return;
         trajectory_.Report(k, point, report_);
         PutState(k, point);
-      });
+      };
+      if (!Covariances() || !ForEachFrame(put)) {
+        failed_ = true;
+        summary_ += "; then " + trajectory_.problem();
+      }
     } else {
       failed_ = true;
       summary_ = "the batch has nowhere to start: " + trajectory_.problem();
@@ -135,27 +167,32 @@ class CeresBatch : public Estimator {
     constexpr double kSettled = 1e-9;
     int iterations = 0, outer = 0;
     bool settled = false;
+    std::string why = "the noise that depends on the state did not settle";
     ceres::Solver::Summary summary;
     do {
+      HeedStop();
       summary = SolveFrozen();
+      HeedStop();
       iterations += static_cast<int>(summary.iterations.size()) - 1;
       ++outer;
       failed_ = summary.termination_type != ceres::CONVERGENCE;
+      if (failed_) why = "not converged, " + summary.message;
       if (!failed_ && trajectory_.robust()) iterations += Polish();
-      if (failed_ || !trajectory_.Freeze(e_.data())) break;
+      if (failed_) break;
+      if (!trajectory_.Freeze(e_.data())) {
+        why = trajectory_.problem();
+        break;
+      }
       settled = trajectory_.change() <= kSettled;
     } while (!settled && outer < options_.max_outer_iterations);
+    failed_ = failed_ || !settled;
+    cost_ = summary.final_cost;
     std::ostringstream text;
     text.imbue(std::locale::classic());
-    text << "cost " << std::setprecision(9) << summary.final_cost << ", " << iterations
-         << " iterations in " << outer << (outer == 1 ? " solve: " : " solves: ");
+    text << "cost " << std::setprecision(9) << cost_ << ", " << iterations << " iterations in "
+         << outer << (outer == 1 ? " solve: " : " solves: ");
     summary_ = text.str();
-    if (failed_) {
-      summary_ += "not converged, " + summary.message;
-    } else {
-      failed_ = !settled;
-      summary_ += settled ? "converged" : "the noise that depends on the state did not settle";
-    }
+    if (failed_) summary_ += why;
   }
 
   ceres::Solver::Summary SolveFrozen() {
@@ -176,17 +213,33 @@ class CeresBatch : public Estimator {
     options.gradient_tolerance = 1e-12;
     options.parameter_tolerance = 1e-12;
     options.num_threads = 1;
+    StopCallback stop([this] { return Stopped(); });
+    options.callbacks.push_back(&stop);
     options.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem, &summary);
     return summary;
   }
 
-  /// U at e_, and the Gauss-Newton step that it gives: Ceres stops before the last one.
-  void Covariances() {
+  /// U at e_, and the Gauss-Newton step that it gives: Ceres stops before the last one. A solver
+  /// that stopped where this step, |U step| sigmas, is long was not led down by the Jacobian that
+  /// it was given. False where a model is not defined.
+  bool Covariances() {
+    constexpr double kLong = 1e-3, kRounding = 1e-6;
     Eigen::VectorXd step;
-    u_.setIdentity(e_.size(), e_.size());
-    if (GaussNewton(step) && !failed_) e_ += step;
+    HeedStop();
+    if (!GaussNewton(step)) return false;
+    if (failed_) return true;
+    failed_ = !((u_ * step).norm() <= kLong + kRounding * std::sqrt(2.0 * cost_));
+    if (failed_) {
+      summary_ +=
+          "not converged: no step lowers the cost although the gradient is not zero; check the "
+          "models' Jacobians with alidade check";
+    } else {
+      summary_ += "converged";
+      e_ += step;
+    }
+    return true;
   }
 
   /// Reweighted least squares converges linearly where the squared error does so quadratically:
@@ -196,6 +249,7 @@ class CeresBatch : public Estimator {
     Eigen::VectorXd step;
     int steps = 0;
     do {
+      HeedStop();
       if (!GaussNewton(step)) return steps;
       e_ += step;
       ++steps;
@@ -224,15 +278,16 @@ class CeresBatch : public Estimator {
     return true;
   }
 
-  /// The points of e_, frame by frame.
+  /// The points of e_, frame by frame; false where a model is not defined, which ends it.
   template <class Take>
-  void Each(const Take& take) {
+  bool ForEachFrame(const Take& take) {
     Trajectory::Point point;
     bool good = trajectory_.Begin(e_.data(), true, point);
     for (std::size_t k = 0; k < trajectory_.size() && good; ++k) {
       good = trajectory_.Advance(k, e_.data(), point);
       if (good) take(k, point);
     }
+    return good;
   }
 
   void PutState(std::size_t k, const Trajectory::Point& point) {
@@ -249,27 +304,33 @@ class CeresBatch : public Estimator {
   Eigen::MatrixXd u_;
   UpdateReport report_;
   std::string summary_;
+  std::function<bool()> stop_;
+  double cost_ = 0.0;  ///< of the last solve
   bool failed_ = false;
 };
 
 /// Refuses what a batch cannot do, by name.
 void CheckSupported(const System& system, const Node& entry) {
-  const auto refuse = [&](const std::string& what, const char* expected) {
-    entry.Fail("estimator 'ceres_batch' cannot do this: " + what, expected);
+  const auto refuse = [&](const std::string& what, const std::string& instead) {
+    entry.Fail("estimator type 'ceres_batch' does not support " + what,
+               instead + " (also by the estimator's `overrides`), or type: ekf");
   };
   for (const Block& block : system.layout.blocks()) {
-    if (block.status == BlockStatus::kConsidered) {
-      refuse("block '" + block.name + "' is considered", "a block estimated or fixed");
-    }
+    if (block.status != BlockStatus::kConsidered) continue;
+    refuse("considered blocks: state." + block.owner + ".consider names '" + block.name + "'",
+           "the block estimated or fixed");
   }
   for (const SensorBinding& sensor : system.sensors) {
-    for (const RoleBinding& role : sensor.roles) {
+    for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
+      const RoleBinding& role = sensor.roles[i];
+      const std::string key =
+          "sensors." + sensor.name + ".roles." + sensor.model.roles()[i].name + '.';
       if (role.mode != RoleMode::kEstimate) {
-        refuse("a role of sensor '" + sensor.name + "' is considered or held", "mode: estimate");
+        const bool held = role.mode == RoleMode::kHold;
+        refuse(std::string(held ? "held" : "considered") + " roles: " + key + "mode", "estimate");
       }
       if (role.linearise_at != LineariseAt::kPrediction) {
-        refuse("a role of sensor '" + sensor.name + "' is linearised at the measurement",
-               "linearise_at: prediction");
+        refuse("linearise_at: measurement: " + key + "linearise_at", "prediction");
       }
     }
   }

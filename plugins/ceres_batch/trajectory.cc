@@ -7,8 +7,6 @@
 #include <cmath>
 #include <limits>
 
-#include "geometry_jacobian.h"
-
 namespace alidade::ceres_batch {
 namespace {
 
@@ -45,11 +43,20 @@ Trajectory::Trajectory(System system, const std::vector<StreamInfo>& streams, do
     geometry.Identity(value.data());
     initial_.Add(id, value.data(), Eigen::MatrixXd::Zero(geometry.tangent, geometry.tangent));
   }
+  turns_ = std::ranges::any_of(initial_.layout().blocks(), [](const Block& block) {
+    return block.has_covariance() && block.geometry().kind == GeometryKind::kUnitVector;
+  });
 }
 
 bool Trajectory::Fail(std::string why) const {
   problem_ = std::move(why);
   return false;
+}
+
+bool Trajectory::FailTooMany() const {
+  return Fail("more than " + std::to_string(kMostInputs) +
+              " noise inputs: the batch solves for all of them at once; a shorter series, or a "
+              "longer time between frames, has fewer");
 }
 
 bool Trajectory::AllPresent(const std::vector<BlockId>& blocks) const {
@@ -72,28 +79,28 @@ bool Trajectory::Add(const Frame& frame, const UpdateReport& filter) {
   if (stamp_ == kNoStamp) {
     stamp_ = system_.start_s ? StampFromSeconds(*system_.start_s) : frame.stamp;
   }
-  Node node;
-  node.stale = frame.stamp < stamp_;
+  Epoch epoch;
+  epoch.stale = frame.stamp < stamp_;
   const int inputs = inputs_;
   for (Stamp from = stamp_; from < frame.stamp;) {
     const Stamp end = controls_.StepEnd(from, frame.stamp);
-    if (!AddSteps(from, end, node)) {
+    if (!AddSteps(from, end, epoch)) {
       inputs_ = inputs;
       return false;
     }
     from = end;
   }
-  if (!node.stale) stamp_ = frame.stamp;
+  if (!epoch.stale) stamp_ = frame.stamp;
   UpdateReport taken;
   controls_.Take(frame, taken);
-  node.inputs = std::move(taken.inputs);
-  AddFactors(frame, filter, node);
-  nodes_.push_back(std::move(node));
-  return true;
+  epoch.inputs = std::move(taken.inputs);
+  AddFactors(frame, filter, epoch);
+  epochs_.push_back(std::move(epoch));
+  return inputs_ <= kMostInputs || FailTooMany();
 }
 
 /// The steps of all models from `from` to `end`, over which the control inputs are constant.
-bool Trajectory::AddSteps(Stamp from, Stamp end, Node& node) {
+bool Trajectory::AddSteps(Stamp from, Stamp end, Epoch& epoch) {
   Stamp elapsed = 0;
   const bool overflow = __builtin_sub_overflow(end, from, &elapsed);
   const Stamp parts = overflow ? 0 : StepParts(elapsed, max_dt_s_);
@@ -107,42 +114,39 @@ bool Trajectory::AddSteps(Stamp from, Stamp end, Node& node) {
       const MotionBinding& motion = system_.motions[i];
       if (motion.model.stationary() || !AllPresent(motion.blocks)) continue;
       const double* const u = controls_.Use(i, from, events);
-      Step& step = node.steps.emplace_back();
+      Step& step = epoch.steps.emplace_back();
       step.motion = i;
       step.dt_s = Seconds(elapsed) / static_cast<double>(parts);
       step.column = inputs_;
       if (u != nullptr) step.u.assign(u, u + motion.model.input().geometry.ambient);
       inputs_ += motion.model.noise_size();
     }
-    if (inputs_ <= kMostInputs) continue;
-    return Fail("more than " + std::to_string(kMostInputs) +
-                " noise inputs: the batch solves for all of them at once; a shorter series, or a "
-                "longer time between frames, has fewer");
+    if (inputs_ > kMostInputs) return FailTooMany();
   }
   return true;
 }
 
 /// One factor for each measurement and sensor bound to its stream, in the order of the sensors.
-void Trajectory::AddFactors(const Frame& frame, const UpdateReport& filter, Node& node) {
+void Trajectory::AddFactors(const Frame& frame, const UpdateReport& filter, Epoch& epoch) {
   for (std::size_t i = 0; i < system_.sensors.size(); ++i) {
     const SensorModel& model = system_.sensors[i].model;
     for (const Measurement& m : frame.measurements) {
       if (m.stream != stream_of_sensor_[i]) continue;
       ALIDADE_EXPECTS(std::ssize(m.values) == model.measurement().geometry.ambient);
       Factor factor{static_cast<int>(i), m, Outcome::kStale, -1, {}};
-      if (!node.stale) {
+      if (!epoch.stale) {
         factor.outcome =
             AllFinite(m.values) ? OutcomeOf(model.Valid(m.values.data())) : Outcome::kNotFinite;
       }
-      const std::size_t index = node.factors.size();  // the filter has the same order
+      const std::size_t index = epoch.factors.size();  // the filter has the same order
       const bool first = index < filter.measurements().size() &&
                          filter.measurements()[index].outcome == Outcome::kInitialised;
       if (first) factor.outcome = Outcome::kInitialised;
-      node.factors.push_back(std::move(factor));
+      epoch.factors.push_back(std::move(factor));
     }
   }
-  AddFirsts(node);
-  for (Factor& factor : node.factors) {
+  AddFirsts(epoch);
+  for (Factor& factor : epoch.factors) {
     if (factor.outcome != Outcome::kAccepted) continue;
     const SensorBinding& sensor = SensorOf(factor);
     if (!std::ranges::all_of(sensor.roles,
@@ -166,12 +170,12 @@ void Trajectory::AddPart(int size, const RobustLoss& loss) {
 }
 
 /// First values in an order in which each finds the blocks that it needs.
-void Trajectory::AddFirsts(Node& node) {
+void Trajectory::AddFirsts(Epoch& epoch) {
   for (bool progress = true; progress;) {
     progress = false;
-    for (std::size_t i = 0; i < node.factors.size(); ++i) {
-      if (node.factors[i].outcome != Outcome::kInitialised) continue;
-      const SensorBinding& sensor = SensorOf(node.factors[i]);
+    for (std::size_t i = 0; i < epoch.factors.size(); ++i) {
+      if (epoch.factors[i].outcome != Outcome::kInitialised) continue;
+      const SensorBinding& sensor = SensorOf(epoch.factors[i]);
       const auto target = static_cast<std::size_t>(sensor.model.initialised_role());
       std::vector<BlockId> others;
       for (std::size_t k = 0; k < sensor.roles.size(); ++k) {
@@ -180,7 +184,7 @@ void Trajectory::AddFirsts(Node& node) {
       const BlockId block = sensor.roles[target].block;
       if (present_[static_cast<std::size_t>(block)] || !AllPresent(others)) continue;
       present_[static_cast<std::size_t>(block)] = progress = true;
-      node.firsts.push_back({i, block, inputs_});
+      epoch.firsts.push_back({i, block, inputs_});
       inputs_ += sensor.model.measurement().geometry.tangent;
     }
   }
@@ -200,18 +204,19 @@ bool Trajectory::Begin(const double* e, bool sensitivity, Point& point) const {
     const Block& block = initial_.layout().blocks()[id];
     const int at = block.tangent_offset, t = block.geometry().tangent;
     if (!block.has_covariance() || at >= n0) continue;
-    point.s.block(at, 0, t, n0) =
-        PlusJacobian(block.geometry(), initial_.value(static_cast<BlockId>(id)), d.data() + at) *
-        l0_.middleRows(at, t);
+    RowMajor j(t, t);
+    block.geometry().PlusJacobian(initial_.value(static_cast<BlockId>(id)), d.data() + at,
+                                  j.data());
+    point.s.block(at, 0, t, n0) = j * l0_.middleRows(at, t);
   }
   return true;
 }
 
 bool Trajectory::Advance(std::size_t k, const double* e, Point& point) const {
-  const Node& node = nodes_[k];
-  return std::ranges::all_of(node.steps, [&](const Step& step) { return Move(step, e, point); }) &&
-         std::ranges::all_of(node.firsts, [&](const First& first) {
-           return Initialise(first, node.factors[first.factor], e, point);
+  const Epoch& epoch = epochs_[k];
+  return std::ranges::all_of(epoch.steps, [&](const Step& step) { return Move(step, e, point); }) &&
+         std::ranges::all_of(epoch.firsts, [&](const First& first) {
+           return Initialise(first, epoch.factors[first.factor], e, point);
          });
 }
 
@@ -230,9 +235,9 @@ bool Trajectory::Evaluate(const double* e, double* r, double* j) const {
   if (!Begin(e, j != nullptr, point)) return false;
   Eigen::VectorXd residual;
   Eigen::MatrixXd a;
-  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+  for (std::size_t k = 0; k < epochs_.size(); ++k) {
     if (!Advance(k, e, point)) return false;
-    for (const Factor& factor : nodes_[k].factors) {
+    for (const Factor& factor : epochs_[k].factors) {
       if (factor.row < 0) continue;
       if (!Residual(factor, point, residual, j != nullptr ? &a : nullptr)) return false;
       Eigen::Map<Eigen::VectorXd>(r + factor.row, residual.size()) = residual;
@@ -253,13 +258,13 @@ void Trajectory::NoteChange(const Eigen::MatrixXd& before, const Eigen::MatrixXd
   change_ = std::max(change_, moved == 0.0 ? 0.0 : moved / scale);
 }
 
-/// Advances to the node, taking Q of its steps and R of its first values on the way.
-bool Trajectory::FreezeNode(Node& node, const double* e, Point& point) {
-  for (Step& step : node.steps) {
+/// Advances to the epoch, taking Q of its steps and R of its first values on the way.
+bool Trajectory::FreezeEpoch(Epoch& epoch, const double* e, Point& point) {
+  for (Step& step : epoch.steps) {
     if (!FreezeStep(step, point) || !Move(step, e, point)) return false;
   }
-  for (const First& first : node.firsts) {
-    Factor& factor = node.factors[first.factor];
+  for (const First& first : epoch.firsts) {
+    Factor& factor = epoch.factors[first.factor];
     Point values = point;  // R may depend on the first value itself
     values.s.resize(0, 0);
     if (!Initialise(first, factor, e, values) || !FreezeFactor(factor, values) ||
@@ -274,35 +279,62 @@ bool Trajectory::Freeze(const double* e) {
   change_ = 0.0;
   Point point;
   if (!Begin(e, false, point)) return false;
-  for (Node& node : nodes_) {
-    if (!FreezeNode(node, e, point)) return false;
-    for (Factor& factor : node.factors) {
+  for (Epoch& epoch : epochs_) {
+    if (!FreezeEpoch(epoch, e, point)) return false;
+    for (Factor& factor : epoch.factors) {
       if (factor.row >= 0 && !FreezeFactor(factor, point)) return false;
     }
   }
   return true;
 }
 
-bool Trajectory::Linearised(const std::vector<std::vector<double>>& trajectory,
-                            Eigen::VectorXd& e) {
-  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(inputs_);
+bool Trajectory::Linearised(std::vector<std::vector<double>> trajectory, Eigen::VectorXd& e) {
+  constexpr int kMostPasses = 20;
+  constexpr double kSettled = 1e-9;  // of inputs whose sigma is 1
+  Eigen::VectorXd step;
+  e.setZero(inputs_);
+  for (int pass = 0; pass < kMostPasses; ++pass) {
+    if (!StepAbout(trajectory, e, step)) return pass > 0;
+    e += step;
+    if (!turns_ || step.norm() <= kSettled) break;
+  }
+  return true;
+}
+
+/// To the values of `about`, where a filter has them: x' becomes x, and offset and S are carried
+/// from the tangent at x' to the one at x, where x' (-) x adds to the offset.
+void Trajectory::PutAbout(const std::vector<double>& about, Point& point) const {
+  for (const Block& block : initial_.layout().blocks()) {
+    if (!block.has_covariance()) continue;
+    const Geometry& geometry = block.geometry();
+    const int at = block.tangent_offset, t = geometry.tangent;
+    double* const x = point.x.data() + block.value_offset;
+    const double* const to = about.data() + block.value_offset;
+    Eigen::VectorXd defect(t);
+    RowMajor j(t, t);
+    geometry.Minus(x, to, defect.data());
+    geometry.Transport(x, to, j.data());
+    point.s.middleRows(at, t) = j * point.s.middleRows(at, t);
+    point.offset.segment(at, t) = j * point.offset.segment(at, t) + defect;
+    std::copy_n(to, geometry.ambient, x);
+  }
+}
+
+bool Trajectory::StepAbout(std::vector<std::vector<double>>& trajectory, const Eigen::VectorXd& e,
+                           Eigen::VectorXd& step) {
   Eigen::MatrixXd j = Eigen::MatrixXd::Identity(inputs_ + residuals_, inputs_);
   j.bottomRows(residuals_).setZero();
   Eigen::VectorXd r = Eigen::VectorXd::Zero(inputs_ + residuals_), residual;
+  r.head(inputs_) = e;
   Eigen::MatrixXd a;
   Point point;
-  if (!Begin(zero.data(), true, point)) return false;
-  for (std::size_t k = 0; k < nodes_.size(); ++k) {
-    if (!FreezeNode(nodes_[k], zero.data(), point)) return false;
-    for (const Block& block : initial_.layout().blocks()) {
-      if (k >= trajectory.size() || !block.has_covariance()) continue;
-      Eigen::VectorXd defect(block.geometry().tangent);
-      double* const x = point.x.data() + block.value_offset;
-      block.geometry().Minus(x, trajectory[k].data() + block.value_offset, defect.data());
-      point.offset.segment(block.tangent_offset, defect.size()) += defect;
-      std::copy_n(trajectory[k].data() + block.value_offset, block.geometry().ambient, x);
-    }
-    for (Factor& factor : nodes_[k].factors) {
+  std::vector<Point> points;
+  if (!Begin(e.data(), true, point)) return false;
+  for (std::size_t k = 0; k < epochs_.size(); ++k) {
+    if (!FreezeEpoch(epochs_[k], e.data(), point)) return false;
+    if (k < trajectory.size()) PutAbout(trajectory[k], point);
+    if (turns_) points.push_back(point);
+    for (Factor& factor : epochs_[k].factors) {
       // What is not defined here tells nothing yet; it may be at the solution.
       if (factor.row < 0 || !FreezeFactor(factor, point)) continue;
       if (!Residual(factor, point, residual, &a)) continue;
@@ -311,14 +343,25 @@ bool Trajectory::Linearised(const std::vector<std::vector<double>>& trajectory,
       j.middleRows(inputs_ + factor.row, residual.size()) = root * a * point.s;
     }
   }
-  e = -j.householderQr().solve(r);
-  return e.allFinite() || Fail("the problem linearised about the filter has no solution");
+  step = -j.householderQr().solve(r);
+  if (!step.allFinite()) return Fail("the problem linearised about the filter has no solution");
+  trajectory.resize(points.size());
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const Eigen::VectorXd d = points[k].offset + points[k].s * step;
+    trajectory[k] = points[k].x;
+    for (const Block& block : initial_.layout().blocks()) {
+      if (!block.has_covariance()) continue;
+      double* const x = trajectory[k].data() + block.value_offset;
+      block.geometry().Plus(x, d.data() + block.tangent_offset, x);
+    }
+  }
+  return true;
 }
 
 void Trajectory::Put(std::size_t k, const Point& point, const Eigen::MatrixXd& y,
                      State& state) const {
   const std::vector<Block>& places = initial_.layout().blocks();
-  for (const First& first : nodes_[k].firsts) {
+  for (const First& first : epochs_[k].firsts) {
     const Block& place = places[static_cast<std::size_t>(first.block)];
     const int t = place.geometry().tangent;
     state.Add(first.block, point.x.data() + place.value_offset, Eigen::MatrixXd::Zero(t, t));
@@ -342,9 +385,9 @@ void Trajectory::Put(std::size_t k, const Point& point, const Eigen::MatrixXd& y
 
 void Trajectory::Report(std::size_t k, const Point& point, UpdateReport& report) const {
   report.Clear();
-  report.stale = nodes_[k].stale;
-  report.inputs = nodes_[k].inputs;
-  for (const Factor& factor : nodes_[k].factors) {
+  report.stale = epochs_[k].stale;
+  report.inputs = epochs_[k].inputs;
+  for (const Factor& factor : epochs_[k].factors) {
     const SensorBinding& sensor = SensorOf(factor);
     const Geometry& geometry = sensor.model.measurement().geometry;
     MeasurementReport& entry = report.Add();

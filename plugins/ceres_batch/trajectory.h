@@ -43,6 +43,8 @@ class Trajectory {
   /// Gaps longer than `max_dt_s` are stepped in equal parts.
   Trajectory(System system, const std::vector<StreamInfo>& streams, double max_dt_s);
 
+  /// Sets the time of the prior; else the first frame, or start_s, does.
+  void Start(Stamp stamp) { stamp_ = stamp; }
   /// One frame more; `filter` says which of its measurements gave a block its first value. False,
   /// and problem(), where there would be too many inputs.
   bool Add(const Frame& frame, const UpdateReport& filter);
@@ -62,7 +64,7 @@ class Trajectory {
     return std::ranges::any_of(parts_,
                                [](const Part& p) { return p.loss.kind != LossKind::kNone; });
   }
-  std::size_t size() const { return nodes_.size(); }
+  std::size_t size() const { return epochs_.size(); }
   Stamp stamp() const { return stamp_; }
 
   /// Takes Q and R at the states of e. False where that cannot be.
@@ -72,8 +74,12 @@ class Trajectory {
   /// r (M) and, unless null, its row-major Jacobian (M x N). False where a model is not defined.
   bool Evaluate(const double* e, double* r, double* j) const;
   /// The inputs that solve the problem linearised about `trajectory`, the values of a filter frame
-  /// by frame (it may end early). Freezes there. False where that cannot be.
-  bool Linearised(const std::vector<std::vector<double>>& trajectory, Eigen::VectorXd& e);
+  /// by frame (it may end early). Freezes there. False where that cannot be. Where turns(), it is
+  /// linearised about its own solution again until that settles.
+  bool Linearised(std::vector<std::vector<double>> trajectory, Eigen::VectorXd& e);
+  /// Whether a block is a unit vector: its basis turns over at z = 0, and with it what an input of
+  /// its motion means, so that x(e) jumps.
+  bool turns() const { return turns_; }
 
   /// x_0 and S_0.
   bool Begin(const double* e, bool sensitivity, Point& point) const;
@@ -109,7 +115,7 @@ class Trajectory {
     BlockId block;
     int column;
   };
-  struct Node {
+  struct Epoch {
     std::vector<Step> steps;  ///< that lead to it
     std::vector<Factor> factors;
     std::vector<First> firsts;  ///< after the steps
@@ -117,14 +123,14 @@ class Trajectory {
     std::vector<int> inputs;  ///< UpdateReport::inputs
   };
 
-  bool AddSteps(Stamp from, Stamp end, Node& node);
-  void AddFactors(const Frame& frame, const UpdateReport& filter, Node& node);
-  void AddFirsts(Node& node);
+  bool AddSteps(Stamp from, Stamp end, Epoch& epoch);
+  void AddFactors(const Frame& frame, const UpdateReport& filter, Epoch& epoch);
+  void AddFirsts(Epoch& epoch);
   void AddPart(int size, const RobustLoss& loss);
   bool AllPresent(const std::vector<BlockId>& blocks) const;
   bool Move(const Step& step, const double* e, Point& point) const;
   bool Initialise(const First& first, const Factor& factor, const double* e, Point& point) const;
-  bool FreezeNode(Node& node, const double* e, Point& point);
+  bool FreezeEpoch(Epoch& epoch, const double* e, Point& point);
   bool FreezeStep(Step& step, const Point& point);
   bool FreezeFactor(Factor& factor, const Point& point);
   bool Residual(const Factor& factor, const Point& point, Eigen::VectorXd& r,
@@ -134,7 +140,11 @@ class Trajectory {
   const SensorBinding& SensorOf(const Factor& factor) const {
     return system_.sensors[static_cast<std::size_t>(factor.sensor)];
   }
+  void PutAbout(const std::vector<double>& about, Point& point) const;
+  bool StepAbout(std::vector<std::vector<double>>& trajectory, const Eigen::VectorXd& e,
+                 Eigen::VectorXd& step);
   bool Fail(std::string why) const;
+  bool FailTooMany() const;
 
   System system_;
   std::vector<int> stream_of_sensor_;
@@ -142,11 +152,12 @@ class Trajectory {
   State initial_;              ///< all blocks have a place in it
   std::vector<bool> present_;  ///< at the last frame, by block
   Eigen::MatrixXd l0_;
-  std::vector<Node> nodes_;
+  std::vector<Epoch> epochs_;
   std::vector<Part> parts_;
   Stamp stamp_ = kNoStamp;
   ControlInputs controls_;
   int inputs_ = 0, residuals_ = 0;
+  bool turns_ = false;
   double change_ = 0.0;
   mutable std::string problem_;
 };

@@ -118,8 +118,9 @@ bool Trajectory::Initialise(const First& first, const Factor& factor, const doub
     rows += jacobians[i] * point.s.middleRows(from, jacobians[i].cols());
     offset += jacobians[i] * point.offset.segment(from, jacobians[i].cols());
   }
-  rows.middleCols(first.column, m) =
-      jz * PlusJacobian(measured, factor.measurement.values.data(), d.data()) * factor.l;
+  RowMajor j_plus(m, m);
+  measured.PlusJacobian(factor.measurement.values.data(), d.data(), j_plus.data());
+  rows.middleCols(first.column, m) = jz * j_plus * factor.l;
   point.s.middleRows(block.tangent_offset, t) = rows;
   point.offset.segment(block.tangent_offset, t) = offset;
   return true;

@@ -88,16 +88,29 @@ TEST_F(CeresBatchConfig, WhatItCannotDoIsRefusedByName) {
   const auto expect = [&](const std::string& key, const std::string& value,
                           const std::string& words) {
     ExpectError(ExitCode::kBadConfig,
-                {"estimators.batch: estimator 'ceres_batch' cannot do this", words}, [&] {
+                {"estimators.batch: estimator type 'ceres_batch' does not support", words}, [&] {
                   RunDepth(1, {{"estimators.batch.type", "ceres_batch"}, {key, value}});
                 });
   };
   expect("sensors.scale.roles.inverse_distance", "{block: template.inverse_distance, mode: hold}",
-         "a role of sensor 'scale' is considered or held");
+         "held roles: sensors.scale.roles.inverse_distance.mode");
   expect("sensors.stereo.roles.depth", "{block: target.depth, linearise_at: measurement}",
-         "a role of sensor 'stereo' is linearised at the measurement");
+         "linearise_at: measurement: sensors.stereo.roles.depth.linearise_at");
   expect("state.template.consider", "[inverse_distance]",
-         "block 'template.inverse_distance' is considered");
+         "considered blocks: state.template.consider names 'template.inverse_distance'");
+}
+
+TEST_F(CeresBatchConfig, KeysOfTheFiltersAreRefusedByName) {
+  const auto expect = [&](const std::string& key, const std::string& value,
+                          const std::string& words) {
+    ExpectError(ExitCode::kBadConfig, {"estimators.batch." + key + ": estimator type", words}, [&] {
+      RunDepth(1, {{"estimators.batch.type", "ceres_batch"}, {"estimators.batch." + key, value}});
+    });
+  };
+  expect("gate", "0.99", "'ceres_batch' has no gate; expected `use: {accepted_by: FILTER}`");
+  expect("fuse", "joint", "'ceres_batch' has no choice of fusing");
+  expect("jacobian", "latest", "'ceres_batch' has no choice of Jacobian");
+  expect("lockout", "{after: 3}", "'ceres_batch' has no recovery from a lock-out");
 }
 
 TEST_F(CeresBatchConfig, IsListedWithItsKeysAndThoseOfEveryEstimator) {

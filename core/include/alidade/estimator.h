@@ -126,6 +126,9 @@ class Estimator {
   /// smoothing itself come with the last report. Errors: where there is nothing to emit, failed()
   /// turns true and the text of the error says why; whatever `emit` throws.
   virtual void Smooth(const Emit& /*emit*/) {}
+  /// Where Smooth takes long, it asks `stop` now and then; where that is true it ends by an Error of
+  /// kStopped. A null function never stops.
+  virtual void StopWhen(std::function<bool()> /*stop*/) {}
   /// The estimator as it is after the last frame; null: it cannot go back to one.
   virtual std::unique_ptr<Snapshot> Save() const { return nullptr; }
   /// Goes back to where this estimator gave `snapshot`: every result from there on has the same

@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include "alidade/random.h"
+#include "alidade/rts.h"
+#include "alidade/run.h"
+#include "host_fixture.h"
+#include "support/systems.h"
+
+/// How a batch starts and ends: what it says where it is not at the optimum.
+namespace alidade {
+namespace {
+
+using testing::AddSensor;
+using testing::FrameAt;
+
+const PluginHost& Shipped() {
+  static const PluginHost host;
+  return host;
+}
+
+std::unique_ptr<Estimator> MakeBatch(const System& system, const std::string& options = "") {
+  const Config config = Config::FromText("type: ceres_batch\n" + options, "batch.yaml");
+  return Shipped().CreateEstimator("ceres_batch", config.root())(system,
+                                                                 testing::StreamsOf(system));
+}
+
+System LinearSystem() {
+  System system = testing::MovingPoint(0.7);
+  AddSensor(system, "z", InProcessSensor(testing::Linear(2.0, 0.3), "linear"), {"p.x"});
+  return system;
+}
+
+// The velocity is not measured at the first frame: its variance is that of the step before it.
+TEST(CeresBatchEnds, StartsAtTheGivenTime) {
+  const System system = LinearSystem();
+  const auto so_far = MakeBatch(system, "data: so_far\n"), batch = MakeBatch(system);
+  Ekf ekf(system, {}, testing::StreamsOf(system));
+  const Frame frame = FrameAt(1.0, {{0, 1.0}});
+  for (Estimator* one : {so_far.get(), batch.get(), static_cast<Estimator*>(&ekf)}) {
+    one->Start(0);
+    one->Process(frame);
+  }
+  const auto expect_equal = [&](const State& found) {
+    EXPECT_NEAR(testing::CovarianceOf(found, "p.v", "p.v"),
+                testing::CovarianceOf(ekf.state(), "p.v", "p.v"), 1e-9);
+    EXPECT_NEAR(testing::ValueOf(found, "p.x"), testing::ValueOf(ekf.state(), "p.x"), 1e-9);
+  };
+  expect_equal(so_far->state());
+  batch->Smooth([&](std::size_t, const State& state, const UpdateReport&) { expect_equal(state); });
+}
+
+// 4000 inputs fit: 1 of p.v and 1 of p.x, 3998 of steps. The first value of c.x is one more.
+TEST(CeresBatchEnds, InputsOfFirstValuesCountToo) {
+  System system = LinearSystem();
+  testing::AddMotion(system, "c", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.0, 1.0}});
+  AddSensor(system, "y", InProcessSensor(testing::Linear(1.0, 0.3), "linear"), {"c.x"});
+  system.priors.back().from = "y";
+  const auto process = [&](const std::vector<std::pair<int, double>>& values, bool fails) {
+    const auto batch = MakeBatch(system, "max_dt_s: 0.001\n");
+    batch->Process(FrameAt(0.0, {}));
+    const UpdateReport& report = batch->Process(FrameAt(3.998, values));
+    EXPECT_EQ(batch->failed(), fails);
+    ASSERT_FALSE(report.events.empty());
+    EXPECT_EQ(report.events[0].text.find("more than 4000 noise inputs: the batch") == 0, fails)
+        << report.events[0].text;
+  };
+  process({}, false);
+  process({{1, 0.5}}, true);
+}
+
+// ---- a model that fails -------------------------------------------------------------------------
+
+/// A random walk that cannot step any more after `budget` steps.
+struct Failing : Motion<1, Vec<1>> {
+  static constexpr std::array kBlocks{Quantity{"x", "m"}};
+  static inline int budget = 0;
+  template <class T>
+  bool Step(const T* x, const T* w, double dt_s, T* next) const {
+    if (budget-- <= 0) return false;
+    next[0] = x[0] + w[0] * dt_s;
+    return true;
+  }
+  void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
+};
+
+/// Whether the batch says that it failed, the first `budget` steps of the model apart.
+void ExpectSaid(const System& system, int budget, bool so_far) {
+  Failing::budget = budget;
+  const auto batch = MakeBatch(system, so_far ? "data: so_far\n" : "");
+  std::string said;
+  const auto note = [&](const UpdateReport& report) {
+    for (const Event& event : report.events) said += event.text;
+  };
+  for (int k = 0; k < 4; ++k) note(batch->Process(FrameAt(0.1 * k, {{0, 0.2 * k}})));
+  try {
+    const auto emit = [&](std::size_t, const State&, const UpdateReport& report) { note(report); };
+    if (batch->offline()) batch->Smooth(emit);
+  } catch (const Error& e) {
+    said += e.what();
+  }
+  EXPECT_TRUE(batch->failed()) << budget << ' ' << said;
+  EXPECT_NE(said.find("motion model of 'p' cannot step: out of its domain"), std::string::npos)
+      << budget << ' ' << said;
+}
+
+TEST(CeresBatchEnds, AModelThatFailsAtTheEndIsSaid) {
+  constexpr int kMany = 1'000'000;
+  System system;
+  testing::AddMotion(system, "p", InProcessMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
+  AddSensor(system, "z", InProcessSensor(testing::Linear(2.0, 0.3), "linear"), {"p.x"});
+  for (const bool so_far : {false, true}) {
+    Failing::budget = kMany;
+    const auto batch = MakeBatch(system, so_far ? "data: so_far\n" : "");
+    for (int k = 0; k < 4; ++k) batch->Process(FrameAt(0.1 * k, {{0, 0.2 * k}}));
+    if (!so_far) batch->Smooth([](std::size_t, const State&, const UpdateReport&) {});
+    ASSERT_FALSE(batch->failed());
+    // The last three steps are those of the estimates, three before of their covariances, three of
+    // the noise at the solution.
+    const int steps = kMany - Failing::budget;
+    for (int missing = 1; missing <= 9; ++missing) ExpectSaid(system, steps - missing, so_far);
+  }
+}
+
+/// z = x^2 with a Jacobian of the wrong sign.
+struct WrongSign : Sensor<Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x", "m"}};
+  static constexpr Quantity kMeasurement{"z", "m2"};
+  double sign = -1.0;
+  explicit WrongSign(double s) : sign(s) {}
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    z[0] = x[0] * x[0];
+    return true;
+  }
+  void Jacobian(const double* x, MatrixRef j) const { j(0, 0) = sign * 2.0 * x[0]; }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(0.1);
+  }
+};
+
+TEST(CeresBatchEnds, AWrongJacobianIsNotConvergence) {
+  for (const double sign : {1.0, -1.0}) {
+    System system = testing::MovingPoint(0.7);
+    AddSensor(system, "z", InProcessSensor(WrongSign(sign), "square"), {"p.x"});
+    const auto batch = MakeBatch(system, "max_iterations: 500\n");
+    for (int k = 0; k < 20; ++k) batch->Process(FrameAt(0.05 * k, {{0, 4.0 + 0.1 * k}}));
+    std::string said;
+    batch->Smooth([&](std::size_t, const State&, const UpdateReport& report) {
+      for (const Event& event : report.events) said += event.text;
+    });
+    EXPECT_EQ(batch->failed(), sign < 0.0) << said;
+    const char* words = sign < 0.0 ? "not converged: no step lowers the cost although the gradient "
+                                     "is not zero; check the models' Jacobians with alidade check"
+                                   : ": converged";
+    EXPECT_NE(said.find(words), std::string::npos) << said;
+  }
+}
+
+// ---- the seam of a unit vector ------------------------------------------------------------------
+
+constexpr double kSigma = 2e-3;  // rad
+
+/// n' = n (+) w
+struct Wander : Motion<2, UnitVector> {
+  static constexpr std::array kBlocks{Quantity{"n", "", "", "x,y,z"}};
+  template <class T>
+  void Step(const T* n, const T* w, double, T* next) const {
+    UnitVector::Plus(n, w, next);
+  }
+  void SqrtQ(double, MatrixRef l) const { l(0, 0) = l(1, 1) = kSigma; }
+};
+struct Seen : Sensor<UnitVector, UnitVector> {
+  static constexpr std::array kRoles{Quantity{"n", "", "", "x,y,z"}};
+  static constexpr Quantity kMeasurement{"z", "", "", "x,y,z"};
+  template <class T>
+  bool Predict(const T* n, T* z) const {
+    std::copy_n(n, 3, z);
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = l[3] = T(kSigma);
+  }
+};
+
+// The basis of the tangent turns over at z = 0, which this walk crosses. The smoother linearises
+// about the filter: at z = 0.6 too the two differ by 5e-6 sigma, and by up to 8e-4 in P.
+TEST(CeresBatchEnds, AUnitVectorMayCrossTheSeamOfItsBasis) {
+  System system;
+  const MotionModel wander = InProcessMotion(Wander(), "wander");
+  const BlockId id = system.layout.Declare("d.n", "d", wander.blocks()[0]);
+  system.motions.push_back({"d", wander, {id}});
+  const std::vector<double> mean = {std::sqrt(1.0 - 0.0005), 0.02, 0.01};
+  const Eigen::Matrix2d p = (Eigen::Matrix2d() << 1e-5, 2e-6, 2e-6, 4e-6).finished();
+  system.priors.push_back({id, mean, p, ""});
+  AddSensor(system, "z", InProcessSensor(Seen(), "seen"), {"d.n"});
+  const auto batch = MakeBatch(system), so_far = MakeBatch(system, "data: so_far\n");
+  RtsSmoother rts(system, {}, testing::StreamsOf(system));
+  Random random(3);
+  const auto drawn = [&](std::vector<double> x) {
+    const double d[2] = {kSigma * random.Normal(), kSigma * random.Normal()};
+    UnitVector::Plus(std::vector<double>(x).data(), d, x.data());
+    return x;
+  };
+  std::vector<double> x = mean;
+  int crossings = 0;
+  for (int k = 0; k < 60; ++k) {
+    const double before = x[2];
+    x = drawn(x);
+    crossings += before * x[2] < 0.0;
+    Frame frame = FrameAt(0.1 * k, {});
+    const std::vector<double> z = drawn(x);
+    if (k % 4 != 1) frame.measurements.push_back({frame.stamp, 0, -1, z, {}});
+    rts.Process(frame);
+    batch->Process(frame);
+    if (k < 30) so_far->Process(frame);
+    EXPECT_FALSE(so_far->failed()) << k;
+  }
+  ASSERT_GE(crossings, 1);
+  std::vector<State> smoothed;
+  rts.Smooth(
+      [&](std::size_t, const State& state, const UpdateReport&) { smoothed.push_back(state); });
+  std::string said;
+  batch->Smooth([&](std::size_t k, const State& state, const UpdateReport& report) {
+    for (const Event& event : report.events) said += event.text;
+    double d[2];
+    UnitVector::Minus(state.value(0), smoothed[k].value(0), d);
+    const double sigma = std::sqrt(smoothed[k].covariance().Dense().trace());
+    EXPECT_LT(std::hypot(d[0], d[1]), 1e-4 * sigma) << k;
+    EXPECT_NEAR(state.covariance().Dense().trace() / (sigma * sigma), 1.0, 3e-3) << k;
+  });
+  EXPECT_FALSE(batch->failed()) << said;
+  EXPECT_NE(said.find(": converged"), std::string::npos) << said;
+}
+
+// ---- stopped ------------------------------------------------------------------------------------
+
+// Example 05 has 152 frames, after each of which the run asks.
+TEST(CeresBatchEnds, AStopWhileItSolvesKeepsTheOthers) {
+  Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/05_depth_principled/config.yaml");
+  config.Set("estimators.batch.type", "ceres_batch", "--set");
+  config.Set("estimators.rts.type", "rts", "--set");
+  for (const int after : {152, 155}) {
+    Experiment experiment = BuildExperiment(config, Shipped());
+    int asked = 0;
+    RunOptions options;
+    options.stop = [&] { return ++asked > after; };
+    const RunResult run = alidade::Run(experiment, options);
+    EXPECT_EQ(run.status, RunStatus::kStopped);
+    EXPECT_EQ(run.code, ExitCode::kStopped);
+    EXPECT_EQ(run.reason, "estimator 'batch': stopped while the batch was solved");
+    EXPECT_EQ(run.frames, 152);
+    EXPECT_LE(asked, after + 2);
+    ASSERT_EQ(run.estimators.size(), 3u);
+    EXPECT_EQ(run.estimators[1].metrics.count("rmse:target.depth"), 0u);
+    EXPECT_FALSE(run.estimators[1].diverged);
+    EXPECT_TRUE(std::ranges::any_of(run.estimators[1].events,
+                                    [](const Event& event) { return event.kind == "stopped"; }));
+    EXPECT_EQ(run.estimators[0].metrics.count("rmse:target.depth"), 1u);
+    EXPECT_EQ(run.estimators[2].metrics.count("rmse:target.depth"), 1u);
+  }
+}
+
+}  // namespace
+}  // namespace alidade

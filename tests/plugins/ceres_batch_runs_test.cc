@@ -107,8 +107,8 @@ TEST_F(CeresBatchConfig, KeysOfTheFiltersAreRefusedByName) {
       RunDepth(1, {{"estimators.batch.type", "ceres_batch"}, {"estimators.batch." + key, value}});
     });
   };
-  expect("gate", "0.99", "'ceres_batch' has no gate; expected `use: {accepted_by: FILTER}`");
-  expect("fuse", "joint", "'ceres_batch' has no choice of fusing");
+  expect("gate", "0.99", "'ceres_batch' has no gate; expected the key left out");
+  expect("fuse", "joint", "'ceres_batch' has no choice of updates");
   expect("jacobian", "latest", "'ceres_batch' has no choice of Jacobian");
   expect("lockout", "{after: 3}", "'ceres_batch' has no recovery from a lock-out");
 }

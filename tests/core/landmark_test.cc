@@ -74,7 +74,7 @@ TEST(Landmark, IsPlacedWhereItIsSeen) {
   ForEachForm([&](auto form) {
     using Form = decltype(form);
     double y[detail::Blocks<Form>::kAmbient], p[3];
-    ASSERT_TRUE(Place<Form>(kPosition.data(), kTurn.data(), h.data(), 0.25, y));
+    ASSERT_TRUE(PlaceLandmark<Form>(kPosition.data(), kTurn.data(), h.data(), 0.25, y));
     ASSERT_TRUE(Xyz::FromRay(Form::ToRay(y), p));
     Vec3 along, seen;
     for (std::size_t i = 0; i < 3; ++i) along[i] = p[i] - kPosition[i];
@@ -88,10 +88,10 @@ TEST(Landmark, IsNotPlacedWhereTheFormHasNoValue) {
   const Vec3 down{0, 1, 0};
   const std::array<double, 4> straight{1, 0, 0, 0};
   double y[7] = {7, 7, 7, 7, 7, 7, 7};
-  EXPECT_FALSE(Place<InverseDepth>(kPosition.data(), straight.data(), down.data(), 0.5, y));
-  EXPECT_FALSE(Place<Xyz>(kPosition.data(), straight.data(), down.data(), 0.0, y));
+  EXPECT_FALSE(PlaceLandmark<InverseDepth>(kPosition.data(), straight.data(), down.data(), 0.5, y));
+  EXPECT_FALSE(PlaceLandmark<Xyz>(kPosition.data(), straight.data(), down.data(), 0.0, y));
   EXPECT_EQ(y[0], 7);
-  EXPECT_TRUE(Place<Anchored>(kPosition.data(), straight.data(), down.data(), 0.0, y));
+  EXPECT_TRUE(PlaceLandmark<Anchored>(kPosition.data(), straight.data(), down.data(), 0.0, y));
 }
 
 TEST(Landmark, ConversionToXyzHasTrueJacobians) {

@@ -151,7 +151,7 @@ void InCamera(const Ray<T>& ray, const T* position, const T* orientation, T* h) 
 /// Inverse observation: y of the point that a camera sees along h (in the camera, of any length) at
 /// the inverse distance rho, 1/m. False where the form has no such y.
 template <class Form, class T>
-bool Place(const T* position, const T* orientation, const T* h, const T& rho, T* y) {
+bool PlaceLandmark(const T* position, const T* orientation, const T* h, const T& rho, T* y) {
   using std::sqrt;
   const T length = sqrt(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]);
   const T unit[3] = {h[0] / length, h[1] / length, h[2] / length};

@@ -192,7 +192,7 @@ Finding CheckOutputs(Context& context) {
     }
     for (std::size_t i = 0; with.ok() && i < with.matrices.size(); ++i) {
       const Buffer& j = with.matrices[i];
-      if (f.outputs.size() == 1 && state.values[static_cast<std::size_t>(f.slots[i])].empty()) {
+      if (f.jacobian_per_input() && state.values[static_cast<std::size_t>(f.slots[i])].empty()) {
         continue;  // by a role that is not bound
       }
       for (int r = 0; r < j.rows(); ++r) {

@@ -53,6 +53,11 @@ TEST(OdometryPose, FollowsTheVehicle) {
   const double bend[6] = {2 * kPi, 0, 0, 0, 0, kPi / 2};
   ExpectPose(testing::Step(motion, Camera(5, 6, 0), bend, nullptr, 1.0).next,
              Camera(9, 10, kPi / 2));
+  // 0.005 rad of a circle of radius 400 m: there series take over
+  const double all_but_straight[6] = {2, 0, 0, 0, 0, 0.005};
+  const double half = std::sin(0.0025);
+  ExpectPose(testing::Step(motion, Camera(0, 0, 0), all_but_straight, nullptr, 1.0).next,
+             Camera(400 * std::sin(0.005), 800 * half * half, 0.005));
   // from another heading, by noise alone
   const double none[6] = {};
   ExpectPose(testing::Step(motion, Camera(5, 6, kPi / 2), none, bend, 1.0).next,

@@ -38,6 +38,7 @@ struct LandmarkSensor : detail::PoseAnd<Z, typename Form::Spaces>::Type {
   static constexpr auto kRoles = detail::BehindPose(Form::kRoles);
   static constexpr int kInitialises = 2;
 
+  /// z of a form of one block.
   template <class T>
   bool Predict(const T* position, const T* orientation, const T* y, T* z) const {
     T h[3];
@@ -45,6 +46,7 @@ struct LandmarkSensor : detail::PoseAnd<Z, typename Form::Spaces>::Type {
     InCamera(ray, position, orientation, h);
     return static_cast<const Model&>(*this).PredictInCamera(h, ray.rho, z);
   }
+  /// L of a form of one block, m x m row-major.
   template <class T>
   void SqrtNoise(const T* position, const T* orientation, const T* y, T* L) const {
     T h[3];
@@ -52,12 +54,13 @@ struct LandmarkSensor : detail::PoseAnd<Z, typename Form::Spaces>::Type {
     InCamera(ray, position, orientation, h);
     static_cast<const Model&>(*this).SqrtNoiseInCamera(h, ray.rho, L);
   }
-  // Of a form of three blocks.
+  /// z of a form of three blocks.
   template <class T>
   bool Predict(const T* position, const T* orientation, const T* anchor, const T* direction,
                const T* inverse_distance, T* z) const {
     return Predict(position, orientation, Packed<T>(anchor, direction, inverse_distance).y, z);
   }
+  /// L of a form of three blocks, m x m row-major.
   template <class T>
   void SqrtNoise(const T* position, const T* orientation, const T* anchor, const T* direction,
                  const T* inverse_distance, T* L) const {

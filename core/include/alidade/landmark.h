@@ -47,6 +47,7 @@ struct InverseDepth {
       Quantity{"landmark", "", "anchor in m, azimuth and elevation in rad, inverse distance in 1/m",
                "x0,y0,z0,theta,phi,rho", ALIDADE_ROLE_LANDMARK}};
 
+  /// p = a + m / rho of y, and y of it, as above.
   template <class T>
   static Ray<T> ToRay(const T* y) {
     using std::cos;
@@ -85,6 +86,7 @@ struct Anchored {
                ALIDADE_ROLE_LANDMARK},
       Quantity{"inverse_distance", "1/m", "from the anchor", "", ALIDADE_ROLE_LANDMARK}};
 
+  /// p = a + m / rho of y, and y of it, as above.
   template <class T>
   static Ray<T> ToRay(const T* y) {
     return {{y[0], y[1], y[2]}, {y[3], y[4], y[5]}, y[6]};
@@ -105,6 +107,7 @@ struct Xyz {
   static constexpr std::array kRoles{
       Quantity{"landmark", "m", "the point in the world", "x,y,z", ALIDADE_ROLE_LANDMARK}};
 
+  /// p = a + m / rho of y, and y of it, as above.
   template <class T>
   static Ray<T> ToRay(const T* y) {
     return {{y[0], y[1], y[2]}, {T(0.0), T(0.0), T(0.0)}, T(1.0)};

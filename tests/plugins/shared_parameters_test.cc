@@ -68,7 +68,7 @@ TEST_F(SharedParametersTest, ErrorsNameTheMapThatIsWrong) {
   refused({"test.yaml:2:45 camera.fx: '-5'", "> 0"},
           sensors + "camera: {width: 640, height: 480,       fx: -5, fy: 5, cx: 1, cy: 1}");
   // unknown, also one that another lens would have
-  refused({"test.yaml:2:77 camera.fz: unknown key", "did you mean"},
+  refused({"test.yaml:2:81 camera.fz: unknown key", "did you mean 'fx'?"},
           sensors + kCamera.substr(0, kCamera.size() - 2) + ",           fz: 3}");
   refused({"camera.k1: unknown key"}, sensors + kCamera.substr(0, kCamera.size() - 2) + ", k1: 3}");
   refused({"landmarks.form: 'xzy'", "one of inverse_depth, anchored, xyz", "did you mean 'xyz'?"},
@@ -86,7 +86,7 @@ TEST_F(SharedParametersTest, AModelsOwnComplaintNamesTheMap) {
       Parse(kCamera.substr(0, kCamera.size() - 2) +
             ", model: photogrammetric, k1: 0, k2: 0}\nsensors: {s: {sigma_px: 1, baseline_m: 1}}");
   ExpectError(
-      ExitCode::kBadConfig, {"test.yaml:1:79 camera.model: not 'pinhole', but a rectified pair"},
+      ExitCode::kBadConfig, {"test.yaml:1:78 camera.model: not 'pinhole', but a rectified pair"},
       [&] { Shipped().CreateSensor("stereo_feature", config.root().At("sensors").At("s")); });
 }
 

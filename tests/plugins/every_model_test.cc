@@ -214,9 +214,9 @@ Row SensorRow(const std::string& name, const std::string& parameters, const Mode
   return {name, parameters, system, expect, 0.05};
 }
 
-/// A landmark 2 m before the camera, on whose image the uncertainty here is a few pixels.
-const std::string kCamera = "camera: {width: 64, height: 48, fx: 50, fy: 50, cx: 32, cy: 24}";
-const Camera kSmallCamera(64, 48, 50, 50, 32, 24);
+/// A landmark 2 m before a camera on whose image the uncertainties here, of 0.05, are a pixel.
+const std::string kCamera = "camera: {width: 32, height: 24, fx: 20, fy: 20, cx: 16, cy: 12}";
+const Camera kSmallCamera(32, 24, 20, 20, 16, 12);
 const std::vector<double> kPosition{0.1, -0.1, 0.2}, kOrientation{1, 0, 0, 0}, kOrigin{0, 0, 0};
 
 const std::vector<Row>& Rows() {
@@ -252,8 +252,8 @@ const std::vector<Row>& Rows() {
       SensorRow("inverse_depth_feature", "{sigma_px: 1, landmarks: {form: xyz}, " + kCamera + "}",
                 InverseDepthFeature<Xyz>(kSmallCamera, 1.0),
                 {kPosition, kOrientation, {0.2, 0.4, 2.0}}),
-      SensorRow("stereo_feature", "{sigma_px: 1, baseline_m: 0.1, " + kCamera + "}",
-                StereoFeature<InverseDepth>(kSmallCamera, 0.1, 1.0),
+      SensorRow("stereo_feature", "{sigma_px: 1, baseline_m: 0.5, " + kCamera + "}",
+                StereoFeature<InverseDepth>(kSmallCamera, 0.5, 1.0),
                 {kPosition, kOrientation, {0, 0, 0, 0.1, -0.2, 0.5}}),
       SensorRow("depth_feature",
                 "{sigma_px: 1, sigma_depth_m: 0.1, landmarks: {form: xyz}, " + kCamera + "}",

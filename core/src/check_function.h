@@ -88,8 +88,8 @@ struct Model {
   std::vector<int> Initialised() const;
 
   std::shared_ptr<const ModelInstance> instance;
-  /// Sensor: its roles, the measurement, the `prior` of Initialise where it needs one. Motion: its blocks, the noise `w`, the control input
-  /// where it has one, `dt`.
+  /// Sensor: its roles, the measurement, the `prior` of Initialise where it needs one. Motion: its
+  /// blocks, the noise `w`, the control input where it has one, `dt`.
   std::vector<Space> slots;
   std::vector<Function> functions;
 };

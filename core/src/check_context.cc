@@ -38,7 +38,8 @@ const std::vector<State>& Context::states() {
     state.defined = answer.ok();
     if (state.defined && model_->is_sensor()) {
       const Buffer& z = answer.outputs[0];
-      std::vector<double>& slot = state.values.back();
+      std::vector<double>& slot =
+          state.values[static_cast<std::size_t>(model_->measurement_slot())];
       for (int i = 0; i < z.columns(); ++i) slot[static_cast<std::size_t>(i)] = z(0, i);
     }
     states_.push_back(std::move(state));

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <numeric>
 #include <utility>
 
 #include "number_text.h"
@@ -77,35 +78,76 @@ void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const 
   }
 }
 
-/// y = g(other roles, z)
+/// The values of several outputs, which lie apart, in one row: in front what is in them, behind the
+/// words after the last one.
+std::vector<double> Gather(const std::vector<Space>& outputs, const double* const* out) {
+  constexpr int kBehind = 8;
+  std::vector<double> row;
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    const int behind = i + 1 == outputs.size() ? kBehind : 0;
+    row.insert(row.end(), out[i], out[i] + outputs[i].geometry.ambient + behind);
+  }
+  return row;
+}
+
+/// Puts what Gather took back, as a call has left it.
+void Scatter(const std::vector<double>& row, const std::vector<Space>& outputs,
+             double* const* out) {
+  const double* from = row.data();
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    const double* const end = from + outputs[i].geometry.ambient;
+    std::copy(from, i + 1 == outputs.size() ? row.data() + row.size() : end, out[i]);
+    from = end;
+  }
+}
+
+/// y = g(other roles, z, prior), y one role or those of a landmark.
 void AddInitialise(const AlidadeInstance& c, const std::vector<Space>& roles, const Space& z,
                    Model& model) {
   const AlidadeSensor sensor = *c.sensor;
   const void* const self = c.self;
-  const auto count = roles.size(), y = static_cast<std::size_t>(c.description->initialise_role);
-  Function f{"Initialise", {}, {roles[y]}, {}, static_cast<int>(count), false, {}};
-  const int n = roles[y].geometry.tangent;
+  const auto count = roles.size();
+  const std::vector<int> y = model.Initialised();
+  const auto is_y = [y](std::size_t i) { return std::ranges::count(y, static_cast<int>(i)) > 0; };
+  const int prior = c.description->prior_count;
+  Function f{"Initialise", {}, {}, {}, 0, false, {}};
+  int n = 0;
+  for (const int i : y) {
+    f.outputs.push_back(roles[static_cast<std::size_t>(i)]);
+    n += f.outputs.back().geometry.tangent;
+  }
   for (std::size_t i = 0; i < count; ++i) {
-    if (i == y) continue;
+    if (is_y(i)) continue;
     f.slots.push_back(static_cast<int>(i));
     f.matrices.push_back({n, roles[i].geometry.tangent});
   }
-  f.slots.push_back(static_cast<int>(count));
+  f.slots.push_back(model.measurement_slot());
   f.matrices.push_back({n, z.geometry.tangent});
-  f.call = [=](const double* const* in, double* const* out, double* const* j,
-               const std::int32_t* strides) {
+  if (prior > 0) {
+    f.slots.push_back(model.measurement_slot() + 1);
+    f.matrices.push_back({n, prior});
+  }
+  f.differentiated = static_cast<int>(f.slots.size());
+  f.call = [=, outputs = f.outputs](const double* const* in, double* const* out, double* const* j,
+                                    const std::int32_t* strides) {
     std::vector<const double*> all(count, nullptr);
     std::vector<double*> jx(count, nullptr);
     std::vector<std::int32_t> jx_strides(count, 0);
     std::size_t k = 0;
     for (std::size_t i = 0; i < count; ++i) {
-      if (i == y) continue;
+      if (is_y(i)) continue;
       all[i] = in[k];
       jx[i] = j[k];
       jx_strides[i] = strides[k++];
     }
-    return sensor.initialise(self, all.data(), in[k], nullptr, out[0], jx.data(), jx_strides.data(),
-                             j[k], strides[k], nullptr, 0);
+    const bool has_prior = prior > 0, apart = outputs.size() > 1;
+    std::vector<double> row = apart ? Gather(outputs, out) : std::vector<double>();
+    const std::int32_t code = sensor.initialise(
+        self, all.data(), in[k], has_prior ? in[k + 1] : nullptr, apart ? row.data() : out[0],
+        jx.data(), jx_strides.data(), j[k], strides[k], has_prior ? j[k + 1] : nullptr,
+        has_prior ? strides[k + 1] : 0);
+    if (apart) Scatter(row, outputs, out);
+    return code;
   };
   model.functions.push_back(std::move(f));
 }
@@ -188,6 +230,8 @@ Model::Model(std::shared_ptr<const ModelInstance> from) : instance(std::move(fro
   slots = instance->spaces();
   if (is_sensor()) {
     slots.push_back(instance->space());
+    const int prior = c.description->prior_count;
+    if (prior > 0) slots.push_back(Named("prior", Geometry::Vector(prior)));
     AddSensor(c, instance->spaces(), instance->space(), *this);
     if ((instance->capabilities() & ALIDADE_CAN_INITIALISE) != 0) {
       AddInitialise(c, instance->spaces(), instance->space(), *this);
@@ -199,6 +243,13 @@ Model::Model(std::shared_ptr<const ModelInstance> from) : instance(std::move(fro
   if (has_input) slots.push_back(instance->space());
   slots.push_back(Named("dt", Geometry::Vector(1)));
   AddMotion(c, instance->spaces(), has_input, *this);
+}
+
+std::vector<int> Model::Initialised() const {
+  const SensorModel sensor(instance);
+  std::vector<int> roles(static_cast<std::size_t>(sensor.initialised_count()));
+  std::iota(roles.begin(), roles.end(), sensor.initialised_role());
+  return roles;
 }
 
 const Function* Model::Find(const std::string& name) const {
@@ -222,7 +273,8 @@ Answer CallFunction(const Function& function, const Values& inputs, int matrices
   for (std::size_t i = 0; i < function.matrices.size(); ++i) {
     Buffer& buffer = answer.matrices[i];
     // The Jacobian by a role that is not bound does not exist.
-    const bool exists = buffer.columns() > 0 && (function.outputs.size() != 1 || in[i] != nullptr);
+    const bool exists =
+        buffer.columns() > 0 && (!function.jacobian_per_input() || in[i] != nullptr);
     const bool asked = matrices == kAllMatrices || matrices == static_cast<int>(i);
     wanted.push_back(exists && (asked || function.is_noise) ? buffer.data() : nullptr);
     strides.push_back(buffer.stride());

@@ -60,6 +60,9 @@ struct Function {
   std::function<std::int32_t(const double* const* inputs, double* const* outputs,
                              double* const* matrices, const std::int32_t* strides)>
       call;
+
+  /// Whether each of the differentiated inputs has a Jacobian of its own.
+  bool jacobian_per_input() const { return std::ssize(matrices) == differentiated; }
 };
 
 /// What a call left.
@@ -79,10 +82,14 @@ struct Model {
 
   bool is_sensor() const { return instance->c().kind == ALIDADE_KIND_SENSOR; }
   const Function* Find(const std::string& name) const;
+  /// Of a sensor: the slot of its measurement.
+  int measurement_slot() const { return static_cast<int>(instance->spaces().size()); }
+  /// Of a sensor that can initialise: the roles that Initialise computes.
+  std::vector<int> Initialised() const;
 
   std::shared_ptr<const ModelInstance> instance;
-  /// Sensor: its roles, then the measurement. Motion: its blocks, the noise `w`, the control input
-  /// where it has one, `dt`.
+  /// Sensor: its roles, the measurement, the `prior` of Initialise where it needs one. Motion: its
+  /// blocks, the noise `w`, the control input where it has one, `dt`.
   std::vector<Space> slots;
   std::vector<Function> functions;
 };

@@ -107,7 +107,7 @@ Finding CheckNoise(Context& context) {
       }
     }
     if (!context.model().is_sensor()) continue;
-    const std::string defect = DefectOfR(l, context.model().slots.back());
+    const std::string defect = DefectOfR(l, context.model().instance->space());
     if (!defect.empty()) return Fail(context.Where(*f, state) + ": " + defect);
   }
   return Ok(context.model().is_sensor() ? "R is finite and positive definite" : "Lq is finite");
@@ -148,8 +148,7 @@ Finding CheckDoubleCover(Context& context) {
 Finding CheckInitialise(Context& context) {
   const Function* const f = context.model().Find("Initialise");
   if (f == nullptr) return Skip("it has no Initialise");
-  const auto y =
-      static_cast<std::size_t>(context.model().instance->c().description->initialise_role);
+  const std::vector<int> y = context.model().Initialised();
   Farthest farthest;
   int inverted = 0;
   for (const State& state : context.states()) {
@@ -158,11 +157,15 @@ Finding CheckInitialise(Context& context) {
     if (!answer.ok()) continue;
     ++inverted;
     State back = state;
-    back.values[y] = OutputValues(answer).front();
+    const Values initialised = OutputValues(answer);
+    for (std::size_t i = 0; i < y.size(); ++i) {
+      back.values[static_cast<std::size_t>(y[i])] = initialised[i];
+    }
     const Answer again = context.Call(context.main(), back, kNoMatrix);
-    const std::vector<double>& z = state.values.back();
+    const std::vector<double>& z =
+        state.values[static_cast<std::size_t>(context.model().measurement_slot())];
     const auto words = [&] {
-      return context.Where(*f, state) + " gives " + StateText(f->outputs, OutputValues(answer)) +
+      return context.Where(*f, state) + " gives " + StateText(f->outputs, initialised) +
              ", where Predict " +
              (again.ok() ? "gives " + StateText(context.main().outputs, OutputValues(again))
                          : std::string("is not defined"));

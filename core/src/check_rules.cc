@@ -99,7 +99,7 @@ std::string ValueDefect(const Function& f, const Answer& answer) {
 std::string JacobianDefect(const Function& f, const State& state, const Answer& answer) {
   for (std::size_t i = 0; i < answer.matrices.size(); ++i) {
     const Buffer& j = answer.matrices[i];
-    if (f.outputs.size() == 1 && state.values[static_cast<std::size_t>(f.slots[i])].empty()) {
+    if (f.jacobian_per_input() && state.values[static_cast<std::size_t>(f.slots[i])].empty()) {
       continue;  // by a role that is not bound
     }
     for (int cell = 0; cell < j.rows() * j.columns(); ++cell) {

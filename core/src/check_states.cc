@@ -69,7 +69,8 @@ std::vector<Values> RandomStates(const Model& model, int count, std::uint64_t se
       } else if (!model.is_sensor() && k + 1 == model.slots.size()) {
         values.push_back({RandomStep(random)});
       } else {
-        values.push_back(RandomValue(space.geometry, i % 2 == 0, random));
+        const bool is_prior = model.is_sensor() && k > blocks;
+        values.push_back(RandomValue(space.geometry, is_prior || i % 2 == 0, random));
         if (space.optional() && i % 4 >= 2) values.back().clear();
       }
     }

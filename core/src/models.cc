@@ -73,8 +73,8 @@ std::string Defect(const AlidadeSpace& space) {
   if ((space.flags & ALIDADE_ROLE_OWNED) != 0) {
     return "is owned by the sensor, which this version does not support";
   }
-  if ((space.flags & ALIDADE_ROLE_LANDMARK) != 0) {
-    return "is a landmark, which this version does not support";
+  if ((space.flags & ALIDADE_ROLE_SHARED) != 0 && (space.flags & ALIDADE_ROLE_LANDMARK) == 0) {
+    return "is shared, but not a landmark's";
   }
   return {};
 }
@@ -168,6 +168,9 @@ void ModelInstance::ReadDescription() {
       (y < 0 || y >= count || sensor_.initialise == nullptr)) {
     Refuse("says that it can initialise, but not what or how");
   }
+  if (is_sensor && (description_.prior_count < 0 || description_.prior_count > kMaxSize)) {
+    Refuse("states a prior of size " + std::to_string(description_.prior_count));
+  }
   if (!is_sensor && (description_.noise_count < 0 || description_.noise_count > kMaxSize)) {
     Refuse("states a noise of size " + std::to_string(description_.noise_count));
   }
@@ -181,16 +184,28 @@ SensorModel::SensorModel(std::shared_ptr<const ModelInstance> instance)
     : instance_(std::move(instance)), sensor_(instance_->c().sensor), self_(instance_->c().self) {
   ALIDADE_EXPECTS(instance_->c().kind == ALIDADE_KIND_SENSOR);
   if ((instance_->capabilities() & ALIDADE_CAN_INITIALISE) != 0) {
-    initialised_role_ = instance_->c().description->initialise_role;
+    const AlidadeDescription& description = *instance_->c().description;
+    initialised_role_ = description.initialise_role;
+    prior_size_ = description.prior_count;
+    const auto is_landmark = [&](int i) {
+      return i < std::ssize(roles()) && roles()[static_cast<std::size_t>(i)].landmark();
+    };
+    initialised_count_ = 1;
+    while (is_landmark(initialised_role_) && is_landmark(initialised_role_ + initialised_count_))
+      ++initialised_count_;
   }
 }
 
-Status SensorModel::Initialise(const double* const* roles, const double* z, double* y,
-                               double* const* jx, double* jz) const {
+bool SensorModel::has_landmark() const {
+  return std::any_of(roles().begin(), roles().end(), [](const Space& r) { return r.landmark(); });
+}
+
+Status SensorModel::Initialise(const double* const* roles, const double* z, const double* prior,
+                               double* y, double* const* jx, double* jz, double* jp) const {
   ALIDADE_EXPECTS(initialised_role_ >= 0);
-  return detail::ToStatus(sensor_->initialise(self_, roles, z, nullptr, y, jx,
+  return detail::ToStatus(sensor_->initialise(self_, roles, z, prior, y, jx,
                                               instance_->tangents().data(), jz,
-                                              measurement().geometry.tangent, nullptr, 0));
+                                              measurement().geometry.tangent, jp, prior_size_));
 }
 
 MotionModel::MotionModel(std::shared_ptr<const ModelInstance> instance)

@@ -11,9 +11,10 @@
 
 namespace alidade::internal {
 
-/// Lends a model the parameters of its config entry. A dotted key walks nested maps. Everything
-/// wrong is collected, so that one run tells all; kPlugin where the model itself asks against the
-/// rules of plugin_abi.h.
+/// Lends a model the parameters of its config entry. A dotted key walks nested maps. What begins
+/// with `camera.` or `landmarks.` and is not in the entry is read from the map of that name at the
+/// root of the config, which sensors and source share. Everything wrong is collected, so that one
+/// run tells all; kPlugin where the model itself asks against the rules of plugin_abi.h.
 class ParamReader {
  public:
   /// `owner` names the model in messages, as in `model 'scale_2d'`.
@@ -34,6 +35,7 @@ class ParamReader {
                            std::int32_t capacity) noexcept;
   static void Fail(void* self, const char* key, const char* text) noexcept;
   AlidadeParam Expect(const AlidadeParam* param, const double* values, std::int32_t capacity);
+  Node BaseOf(const std::string& key) const;
   std::vector<double> Values(const AlidadeParam& param) const;
   std::vector<double> Absent(const AlidadeParam& param, const Node& map,
                              const std::string& key_in_map) const;

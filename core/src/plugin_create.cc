@@ -54,6 +54,7 @@ std::string Line(const std::string& what, const Space& space) {
   if (!space.unit.empty()) line += ", " + space.unit;
   if (!space.doc.empty()) line += "; " + space.doc;
   if (space.optional()) line += " (optional)";
+  if (space.landmark()) line += " (of a landmark)";
   return line;
 }
 
@@ -64,8 +65,13 @@ std::vector<std::string> Capabilities(const ModelInstance& model) {
                                     (can(ALIDADE_CLOSED_FORM) ? "closed form" : "derived")};
   if (can(ALIDADE_HAS_VALIDITY)) lines.emplace_back("refuses measurements of no use by itself");
   if (can(ALIDADE_CAN_INITIALISE)) {
-    const int role = model.c().description->initialise_role;
-    lines.push_back("can initialise " + model.spaces()[static_cast<std::size_t>(role)].name);
+    const AlidadeDescription& description = *model.c().description;
+    const auto role = static_cast<std::size_t>(description.initialise_role);
+    const bool landmark = model.spaces()[role].landmark();
+    lines.push_back("can initialise " + (landmark ? "a landmark" : model.spaces()[role].name));
+    if (description.prior_count > 0) {
+      lines.back() += ", given a prior of " + std::to_string(description.prior_count);
+    }
   }
   return lines;
 }

@@ -225,6 +225,11 @@ SensorBinding ReadSensor(const std::string& name, const Node& entry, const Plugi
   if (const auto loss = entry.Find("loss")) binding.loss = ReadLoss(*loss);
   const Node roles = entry.At("roles", "sensor '" + name + "'");
   for (const Space& role : binding.model.roles()) {
+    if (role.landmark()) {
+      entry.At("model").Fail(
+          "role '" + role.name + "' of model '" + model_name + "' is a landmark's",
+          "a model without: landmarks are not supported yet");
+    }
     const auto node = roles.Find(role.name);
     if (!node && role.optional()) {
       binding.roles.push_back({});

@@ -127,7 +127,7 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
       {"the measurement has geometry 0", [](HandWritten& h) { h.output.geometry = 0; }},
       {"names its elements 'a,b', but has 1", [](HandWritten& h) { h.role.elements = "a,b"; }},
       {"owned by the sensor", [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_OWNED; }},
-      {"is a landmark", [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_LANDMARK; }},
+      {"is shared, but not", [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_SHARED; }},
       {"gives a residual alone",
        [](HandWritten& h) { h.description.capabilities = ALIDADE_RESIDUAL_ONLY; }},
       {"can initialise, but not what or how",

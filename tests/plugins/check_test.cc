@@ -113,6 +113,8 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{0, "strange_status", "calls", {"returned 77, which is no status"}},
         Fault{0, "nowhere_defined", "calls", {"Predict is defined at 0 of", "--states N"}},
         Fault{0, "wrong_inverse", "initialise", {"Initialise at", "gives x = ", "Predict gives z"}},
+        Fault{0, "wrong_landmark", "initialise", {"prior = ", "gives bearing = ", ", rho = "}},
+        Fault{61, "past_the_landmark", "bounds", {"Initialise at", "past its buffer of rho"}},
         Fault{0, "two_covers", "double_cover", {"q and -q of orientation are not the same"}},
         Fault{0, "ignores_dt", "step", {"a step over dt = 0 without noise moves it"}},
         Fault{0, "euler", "step", {"apart in distance", "of order 2 in dt", "--step-order N"}},
@@ -120,7 +122,8 @@ INSTANTIATE_TEST_SUITE_P(
     Name);
 
 TEST_F(CheckTest, EveryModelWithAFaultIsTested) {
-  std::set<std::string> tested = {"leaves_daemons", "right", "may_have_bias", "gravity", "turning"};
+  std::set<std::string> tested = {"leaves_daemons", "right",   "may_have_bias",
+                                  "landmark",       "gravity", "turning"};
   const auto* suite = testing::UnitTest::GetInstance();
   for (int i = 0; i < suite->total_test_suite_count(); ++i) {
     const auto* tests = suite->GetTestSuite(i);
@@ -156,7 +159,7 @@ TEST_F(CheckTest, NoProcessThatAModelStartedIsLeft) {
 }
 
 TEST_F(CheckTest, ModelsWithoutFaultPass) {
-  for (const char* model : {"right", "may_have_bias", "gravity", "turning"}) {
+  for (const char* model : {"right", "may_have_bias", "landmark", "gravity", "turning"}) {
     const auto findings = Checked(model);
     EXPECT_EQ(Joined(Failures(findings)), "") << model;
     EXPECT_FALSE(AnyFailure(findings));
@@ -234,9 +237,30 @@ TEST_F(CheckTest, FindsPluginsByFileStemAndModel) {
               [&] { FindModels(host_, "bad_models", "righ"); });
 }
 
+/// Adds sensors of landmarks: every form, and every lens.
+void AddLandmarkSensors(std::multimap<std::string, std::string>& parameters) {
+  const std::string camera = "camera: {width: 640, height: 480, fx: 525, fy: 520, cx: 320, cy: 240";
+  const std::pair<std::string, std::string> sensors[] = {
+      {"inverse_depth_feature", ""},
+      {"stereo_feature", ", baseline_m: 0.1"},
+      {"depth_feature", ", sigma_depth_m: 0.01, sigma_depth_per_m: 0.003"}};
+  for (const auto& [model, keys] : sensors) {
+    for (const char* form : {"inverse_depth", "anchored", "xyz"}) {
+      for (const char* lens : {"", ", model: radtan, k1: -0.28, k2: 0.07, p1: 0.001, p2: -0.0007",
+                               ", model: equidistant, k1: -0.012, k2: 0.034",
+                               ", model: photogrammetric, k1: 0.3, k2: 0.3"}) {
+        const bool other_lens = *lens != '\0', other_form = *form != 'i';
+        if (other_lens && (other_form || model == "stereo_feature")) continue;
+        parameters.emplace(model, "{sigma_px: 1" + keys + ", landmarks: {form: " + form + "}, " +
+                                      camera + lens + "}}");
+      }
+    }
+  }
+}
+
 /// Every shipped model passes, with the parameters of its row.
 TEST_F(CheckTest, ShippedModelsPass) {
-  const std::multimap<std::string, std::string> parameters = {
+  std::multimap<std::string, std::string> parameters = {
       {"constant", "{}"},
       {"constant", "{size: 3, noise: {random_walk: 0.1}}"},
       {"constant_velocity", "{noise: {acceleration: 1}}"},
@@ -245,7 +269,12 @@ TEST_F(CheckTest, ShippedModelsPass) {
       {"stereo_disparity", "{focal_px: 400, baseline_m: 0.065, sigma_px: 1, near_m: 0.3}"},
       {"scale_2d", "{template_px: 300, sigma_px: 1}"},
       {"scale_2d", "{noise: fixed, variance: 0.01}"},
+      {"quaternion_pose", "{noise: {linear_acceleration: 0.6, angular_acceleration: [1, 2, 3]}}"},
+      {"odometry_pose",
+       "{noise: {linear_velocity: [0.03, 0.3, 0.3], angular_velocity: 0.002}, vehicle_from_cam: "
+       "{position: [1, 0, 1.5], orientation: {w: 0.5, x: -0.5, y: 0.5, z: -0.5}}}"},
   };
+  AddLandmarkSensors(parameters);
   const std::filesystem::path shipped = ALIDADE_BINARY_DIR "/lib/alidade/plugins";
   int checked = 0;
   for (const PluginEntry& entry : host_.entries()) {
@@ -260,7 +289,7 @@ TEST_F(CheckTest, ShippedModelsPass) {
           << entry.name << ' ' << row->second;
     }
   }
-  EXPECT_GE(checked, 8);
+  EXPECT_GE(checked, 25);
 }
 
 }  // namespace

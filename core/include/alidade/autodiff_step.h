@@ -65,7 +65,7 @@ Status StepJets(const Model& model, const double* const* x, const double* u, con
   Jet lifted_w[Model::kNoise + 1], lifted_u[Model::Input::kAmbient + 1];
   const Jet* block[All::kCount];
   Jet* result[All::kCount];
-  Lift<Model>(x, -1, lifted, block);
+  Lift<Model>(x, lifted, block);
   for (int i = 0; i < All::kCount; ++i) result[i] = value + (block[i] - lifted);
   for (int i = 0; i < Model::kNoise; ++i) lifted_w[i] = Jet(w[i], All::kTangent + i);
   for (int i = 0; i < Model::Input::kAmbient; ++i) lifted_u[i] = Jet(u[i]);

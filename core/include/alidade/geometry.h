@@ -108,6 +108,22 @@ struct UnitQuaternion {
     }
     for (int i = 0; i < 3; ++i) d[i] = k * q[i + 1];
   }
+  /// y = R(q) x
+  template <class Q, class X, class Y>
+  static void Rotate(const Q* q, const X* x, Y* y) {
+    // x + 2 q0 (qv x x) + 2 qv x (qv x x)
+    const Y t[3] = {2.0 * (q[2] * x[2] - q[3] * x[1]), 2.0 * (q[3] * x[0] - q[1] * x[2]),
+                    2.0 * (q[1] * x[1] - q[2] * x[0])};
+    y[0] = x[0] + q[0] * t[0] + q[2] * t[2] - q[3] * t[1];
+    y[1] = x[1] + q[0] * t[1] + q[3] * t[0] - q[1] * t[2];
+    y[2] = x[2] + q[0] * t[2] + q[1] * t[1] - q[2] * t[0];
+  }
+  /// y = R(q)' x
+  template <class Q, class X, class Y>
+  static void RotateBack(const Q* q, const X* x, Y* y) {
+    const Q conjugate[4] = {q[0], -q[1], -q[2], -q[3]};
+    Rotate(conjugate, x, y);
+  }
   template <class X, class D, class Y>
   static void Plus(const X* x, const D* d, Y* y, int = 4) {
     D dq[4];

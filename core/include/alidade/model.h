@@ -46,13 +46,18 @@ struct MatrixRef {
 ///
 ///   bool Valid(const double* z) const;
 ///   static constexpr int kInitialises;                                  the role y below
-///   template <class T> bool Initialise(const T* other..., const T* z, T* y) const;
+///   template <class T> bool Initialise(const T* other..., const T* z, [const T* prior,] T* y) const;
+///   static constexpr int kPrior;         numbers of the prior, of what z does not tell; 0 if absent
 ///   void Jacobian(const double* role..., MatrixRef J_z_role...) const;  closed form, zeroed
+///
+/// Roles with the flag ALIDADE_ROLE_LANDMARK stand side by side and are filled by the landmark that
+/// a measurement names. Where kInitialises is the first of them, y holds them all, one after the
+/// other.
 template <class MeasurementGeometry, class... RoleGeometries>
 struct Sensor {
   using Measurement = MeasurementGeometry;
   using Spaces = std::tuple<RoleGeometries...>;
-  static constexpr int kPrior = 0;  // of Initialise: no config gives a prior
+  static constexpr int kPrior = 0;
   static constexpr int kInitialises = -1;
 };
 
@@ -100,6 +105,19 @@ using Blocks = SpacesOf<typename Model::Spaces>;
 
 template <int I, class Model>
 using SpaceAt = std::tuple_element_t<static_cast<std::size_t>(I), typename Model::Spaces>;
+
+/// Whether role i is one of those that Initialise computes.
+template <class Model>
+constexpr bool IsInitialised(int i) {
+  constexpr int first = Model::kInitialises;
+  if (first < 0 || i < first) return false;
+  for (int k = first + 1; k <= i; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    if ((Model::kRoles[at - 1].flags & Model::kRoles[at].flags & ALIDADE_ROLE_LANDMARK) == 0)
+      return false;
+  }
+  return true;
+}
 
 /// f(integral_constant<int, I>) for every I.
 template <class F, std::size_t... I>

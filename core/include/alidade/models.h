@@ -64,8 +64,14 @@ class SensorModel {
   const ModelInstance& instance() const { return *instance_; }
   const std::vector<Space>& roles() const { return instance_->spaces(); }
   const Space& measurement() const { return instance_->space(); }
-  /// Index of the role that Initialise computes, -1 where there is none.
+  /// Index of the role that Initialise computes, of a landmark the first; -1 where there is none.
   int initialised_role() const { return initialised_role_; }
+  /// How many roles from there on Initialise computes: those of a landmark together, else one.
+  int initialised_count() const { return initialised_count_; }
+  /// Numbers that Initialise needs beside the measurement.
+  int prior_size() const { return prior_size_; }
+  /// Whether its roles are filled by the landmark that a measurement names.
+  bool has_landmark() const;
 
   /// z = h(roles), ambient values; kOutOfDomain where h is not defined.
   Status Predict(const double* const* roles, double* z) const {
@@ -84,9 +90,16 @@ class SensorModel {
   Status Valid(const double* z) const {
     return sensor_->valid == nullptr ? Status::kOk : detail::ToStatus(sensor_->valid(self_, z));
   }
-  /// y = g(other roles, z), dense row-major Jacobians jx[i] = dy/d role_i and jz = dy/dz.
+  /// y = g(other roles, z), dense row-major Jacobians jx[i] = dy/d role_i and jz = dy/dz. kInvalid
+  /// where a prior is needed.
   Status Initialise(const double* const* roles, const double* z, double* y, double* const* jx,
-                    double* jz) const;
+                    double* jz) const {
+    return Initialise(roles, z, nullptr, y, jx, jz, nullptr);
+  }
+  /// y = g(other roles, z, prior), the initialised roles one after the other; Jacobians dense and
+  /// row-major, jp = dy/d prior; each may be null.
+  Status Initialise(const double* const* roles, const double* z, const double* prior, double* y,
+                    double* const* jx, double* jz, double* jp) const;
   std::string error_text() const { return instance_->error_text(); }
 
  private:
@@ -94,6 +107,8 @@ class SensorModel {
   const AlidadeSensor* sensor_;
   const void* self_;
   int initialised_role_ = -1;
+  int initialised_count_ = 0;
+  int prior_size_ = 0;
 };
 
 /// A motion model x' = f(x, u, w, dt) behind the sealed boundary. Cheap to copy.

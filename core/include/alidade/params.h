@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <initializer_list>
@@ -84,6 +85,19 @@ class Params {
          values.data(), N);
     return values;
   }
+  /// `N` numbers with one unit and range, or one that goes for all.
+  template <int N>
+  std::array<double, N> PerAxis(const char* key, const char* unit, const char* doc,
+                                Range range = {}) {
+    double values[N + 1];  // one more shows a list that is too long
+    const std::int32_t count =
+        Read(ALIDADE_PARAM_NUMBER, key, unit, doc, range, -1, nullptr, values, N + 1);
+    std::array<double, N> result;
+    result.fill(count >= 1 ? values[0] : StandIn(range));
+    if (count == N) std::copy_n(values, N, result.begin());
+    if (count > 1 && count != N) Fail(key, "needs one number, or one for each axis");
+    return result;
+  }
   /// Says that parameters, each valid, do not fit together.
   void Fail(const char* key, const char* text) { host_->fail(host_->context, key, text); }
 
@@ -112,10 +126,11 @@ class Params {
     param.fallback = fallback;
     return param;
   }
-  void Read(std::uint32_t kind, const char* key, const char* unit, const char* doc,
-            const Range& range, int count, const double* fallback, double* values, int capacity) {
+  std::int32_t Read(std::uint32_t kind, const char* key, const char* unit, const char* doc,
+                    const Range& range, int count, const double* fallback, double* values,
+                    int capacity) {
     const AlidadeParam param = Describe(kind, key, unit, doc, range, count, fallback);
-    host_->read(host_->context, &param, values, capacity);
+    return host_->read(host_->context, &param, values, capacity);
   }
 
   const AlidadeHost* host_;

@@ -26,8 +26,6 @@ void Publish(std::unique_ptr<Holder<Model>> holder, std::uint32_t kind, AlidadeI
 
 template <class Model>
 void PublishSensor(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* instance) {
-  static_assert(Model::kPrior == 0,
-                "no config gives a prior: Initialise takes the other roles and z alone");
   using Z = typename Model::Measurement;
   constexpr auto roles = Model::kRoles;  // copies, lest they too be shared
   constexpr Quantity measurement = Model::kMeasurement;
@@ -35,6 +33,7 @@ void PublishSensor(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* insta
   holder->space = Describe(measurement, Z::kGeometry, Z::kAmbient, Z::kTangent);
   holder->description.output = &holder->space;
   holder->description.initialise_role = Model::kInitialises;
+  holder->description.prior_count = Model::kPrior;
   holder->description.capabilities =
       (Model::kInitialises >= 0 ? unsigned{ALIDADE_CAN_INITIALISE} : 0u) |
       (HasValid<Model>::value ? unsigned{ALIDADE_HAS_VALIDITY} : 0u) |

@@ -66,7 +66,8 @@ enum {
 enum {
   ALIDADE_ROLE_OPTIONAL = 1, /* may stay unbound: its pointer is then null */
   ALIDADE_ROLE_OWNED = 2,    /* the block arrives with the sensor: a bias, an extrinsic */
-  ALIDADE_ROLE_LANDMARK = 4  /* filled anew for each measurement, by its landmark id */
+  ALIDADE_ROLE_LANDMARK = 4, /* filled anew for each measurement, by its landmark id */
+  ALIDADE_ROLE_SHARED = 8    /* with LANDMARK: one block for all that are first seen at one stamp */
 };
 
 /* A role, a measurement or a control input: a named quantity with its geometry. */
@@ -146,7 +147,9 @@ typedef struct AlidadeDescription {
   int32_t noise_count;          /* motion: n_w */
   int32_t initialise_role;      /* the role that `initialise` computes, where it can */
   const uint8_t* step_sparsity; /* motion: n x n, 1 where F may be non-zero; null: dense */
-  void* reserved[4];
+  int32_t prior_count;          /* numbers that `initialise` needs beside the measurement */
+  int32_t reserved0;
+  void* reserved[3];
 } AlidadeDescription;
 
 /* z = h(roles). `roles[i]` is the ambient value of role i, null where an optional role is unbound.
@@ -161,8 +164,9 @@ typedef struct AlidadeSensor {
   /* ALIDADE_OK or ALIDADE_INVALID; null: every measurement is valid. */
   int32_t (*valid)(const void* self, const double* z);
   /* Inverse observation: y, the value of role `initialise_role`, from the other roles, z and a
-   * prior of the part that z does not tell (null where it tells all). Jacobians jx[i] of y by the
-   * other roles, jz by z, jp by the prior; each may be null. */
+   * prior of the part that z does not tell (null where it tells all). Where that role is a
+   * landmark's, y are the values of it and of the landmark roles that follow it, one after the
+   * other. Jacobians jx[i] of y by the other roles, jz by z, jp by the prior; each may be null. */
   int32_t (*initialise)(const void* self, const double* const* roles, const double* z,
                         const double* prior, double* y, double* const* jx,
                         const int32_t* jx_strides, double* jz, int32_t jz_stride, double* jp,

@@ -63,6 +63,8 @@ struct Space {
   unsigned flags = 0;  ///< ALIDADE_ROLE_*
 
   bool optional() const { return (flags & ALIDADE_ROLE_OPTIONAL) != 0; }
+  bool landmark() const { return (flags & ALIDADE_ROLE_LANDMARK) != 0; }
+  bool shared() const { return (flags & ALIDADE_ROLE_SHARED) != 0; }
 };
 
 /// `name` or `name.element`, for each ambient element: the columns a value is written in.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One fault each, for tests/plugins/check_test.cc; and four models without fault.
+// One fault each, for tests/plugins/check_test.cc; and five models without fault.
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -284,6 +284,52 @@ std::int32_t NowhereDefined(const void*, const double* const*, double*, double* 
   return ALIDADE_OUT_OF_DOMAIN;
 }
 
+// ---- of landmarks ------------------------------------------------------------------------------
+
+/// z = bearing + rho x; z does not tell rho. kWhat names a fault of the inverse.
+template <int kWhat>
+struct Landmark : alidade::Sensor<Vec<1>, Vec<1>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x", "m"},
+                                     Quantity{"bearing", "", "", "", ALIDADE_ROLE_LANDMARK},
+                                     Quantity{"rho", "1/m", "", "", ALIDADE_ROLE_LANDMARK}};
+  static constexpr Quantity kMeasurement{"z"};
+  static constexpr int kInitialises = 1;
+  static constexpr int kPrior = 1;
+  explicit Landmark(Params&) {}
+  template <class T>
+  bool Predict(const T* x, const T* bearing, const T* rho, T* z) const {
+    z[0] = bearing[0] + rho[0] * x[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, const T*, T* l) const {
+    l[0] = T(0.1);
+  }
+  template <class T>
+  bool Initialise(const T* x, const T* z, const T* prior, T* y) const {
+    if (!(prior[0] > T(0.0))) return false;
+    y[0] = z[0] - (kWhat == 1 ? T(0.0) : T(prior[0] * x[0]));
+    y[1] = prior[0];
+    return true;
+  }
+};
+
+std::int32_t PastTheLandmark(const void* self, const double* const* x, const double* z,
+                             const double* prior, double* y, double* const* jx,
+                             const std::int32_t* jx_strides, double* jz, std::int32_t jz_stride,
+                             double* jp, std::int32_t jp_stride) {
+  y[2] = 0.0;
+  return alidade::detail::SensorCalls<Landmark<0>>::Initialise(self, x, z, prior, y, jx, jx_strides,
+                                                               jz, jz_stride, jp, jp_stride);
+}
+void MakePastTheLandmark(Params& p, AlidadeInstance* instance) {
+  static AlidadeSensor calls;
+  alidade::EmplaceSensor<Landmark<0>>(p, instance);
+  calls = *instance->sensor;
+  calls.initialise = PastTheLandmark;
+  instance->sensor = &calls;
+}
+
 // ---- with rotations, motion --------------------------------------------------------------------
 
 /// b = R(q)' (0, 0, 1)
@@ -364,6 +410,8 @@ ALIDADE_PLUGIN(SENSOR(Right, "right"), SENSOR(MayHaveBias, "may_have_bias"),
                SENSOR(LosesItself, "loses_itself"), RAW(PastTheEnd, "past_the_end"),
                RAW(IgnoresStrides, "ignores_strides"), RAW(WritesAndFails, "writes_and_fails"),
                RAW(StrangeStatus, "strange_status"), RAW(NowhereDefined, "nowhere_defined"),
+               SENSOR(Landmark<0>, "landmark"), SENSOR(Landmark<1>, "wrong_landmark"),
+               ALIDADE_SENSOR_BY(MakePastTheLandmark, "past_the_landmark", "", ""),
                SENSOR(TwoCovers, "two_covers"), MOTION(Turning<1>, "ignores_dt"),
                MOTION(Turning<2>, "euler"), MOTION(Turning<3>, "drifts"),
                MOTION(Turning<4>, "infinite_q"))

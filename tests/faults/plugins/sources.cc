@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Build tier: a source that works and one that throws.
+// Build tier: sources that work and one that throws.
 #include <stdexcept>
 
 #include "alidade/build_plugin.h"
+#include "alidade/camera.h"
 
 namespace {
 
@@ -31,7 +32,12 @@ std::unique_ptr<alidade::Source> Throw(const alidade::SourceArguments&) {
   throw std::runtime_error("no such thing");
 }
 
+std::unique_ptr<alidade::Source> See(const alidade::SourceArguments& arguments) {
+  return std::make_unique<Counter>(alidade::Camera(arguments.params).width);
+}
+
 }  // namespace
 
 ALIDADE_SOURCE_PLUGIN({"counter", "counts", "unit  what is counted", &MakeCounter},
-                      {"throwing_source", "throws", "", &Throw})
+                      {"throwing_source", "throws", "", &Throw},
+                      {"sees", "counts the columns of a camera", "", &See})

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "alidade/model.h"
+
+namespace alidade {
+
+/// Pose of a camera on a vehicle whose linear and angular velocity are measured.
+///
+///   model      world_from_vehicle' = world_from_vehicle exp((v, omega) dt)
+///              with world_from_vehicle = world_from_cam cam_from_vehicle; of the camera
+///              q' = q Exp(R_CV phi),  r' = r + R_WC R_CV (V(phi) (v + w_v) dt + Exp(phi) t - t)
+///              phi = (omega + w_omega) dt,  V(phi) = I + (1 - cos)/|phi|^2 [phi]x
+///                                             + (|phi| - sin)/|phi|^3 [phi]x^2
+///   noise      w = (w_v, w_omega) ~ N(0, diag(sigma_v^2, sigma_omega^2)), constant during a step
+///   Jacobian   derived                                 6 x 6; exact at omega = 0
+///
+///   symbol       shape  unit      frame    meaning
+///   r, q         3, 4   m, -      world    position and orientation (world_from_cam) of the camera
+///   v, omega     3      m/s       vehicle  control input: measured velocities, constant over dt;
+///                       rad/s              v of the vehicle's origin
+///   sigma_v      3      m/s       vehicle  noise of v, per axis; >= 0
+///   sigma_omega  3      rad/s     vehicle  noise of omega, per axis; >= 0
+///   t, R_CV      3, -   m, -      vehicle  vehicle_from_cam: where and how the camera is mounted
+///
+/// Defined everywhere. Additive in dt without noise.
+/// Source       [Sola2017] sec. 4.6 (integration); V is that of exp on SE(3).
+struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion> {
+  static constexpr std::array kBlocks{
+      Quantity{"position", "m", "of the camera in the world", "x,y,z"},
+      Quantity{"orientation", "", "world_from_cam", "w,x,y,z"}};
+  using Input = Vec<6>;
+  static constexpr Quantity kInput{"velocities", "",
+                                   "of the vehicle, in its frame: linear, m/s, and angular, rad/s",
+                                   "vx,vy,vz,wx,wy,wz"};
+
+  std::array<double, 3> sigma_v, sigma_omega, mount;  ///< mount: t above
+  std::array<double, 4> vehicle_from_cam;
+
+  OdometryPose(const std::array<double, 3>& linear, const std::array<double, 3>& angular,
+               const std::array<double, 3>& position = {},
+               const std::array<double, 4>& orientation = {1.0, 0.0, 0.0, 0.0})
+      : sigma_v(linear), sigma_omega(angular), mount(position), vehicle_from_cam(orientation) {
+    Normalise<UnitQuaternion>(vehicle_from_cam.data());
+  }
+  explicit OdometryPose(Params& p)
+      : OdometryPose(p.PerAxis<3>("noise.linear_velocity", "m/s",
+                                  "noise of the linear velocity, 1 sigma", kNonNegative),
+                     p.PerAxis<3>("noise.angular_velocity", "rad/s",
+                                  "noise of the angular velocity, 1 sigma", kNonNegative),
+                     p.Vector<3>("vehicle_from_cam.position", "m", "where the camera is mounted",
+                                 {}, std::array<double, 3>{}),
+                     ReadMounting(p)) {}
+
+  template <class T>
+  void Step(const T* r, const T* q, const T* u, const T* w, double dt_s, T* r1, T* q1) const {
+    T phi[3], way[3], turned[3], moved[3], turn[3], step[3];
+    for (int i = 0; i < 3; ++i) phi[i] = dt_s * (u[3 + i] + w[3 + i]);
+    for (int i = 0; i < 3; ++i) way[i] = dt_s * (u[i] + w[i]);
+    T rotation[4];
+    UnitQuaternion::Exp(phi, rotation);
+    UnitQuaternion::Rotate(rotation, mount.data(), turned);
+    MoveAlong(phi, way, moved);
+    for (std::size_t i = 0; i < 3; ++i) moved[i] += turned[i] - mount[i];
+    UnitQuaternion::RotateBack(vehicle_from_cam.data(), moved, step);
+    UnitQuaternion::RotateBack(vehicle_from_cam.data(), phi, turn);
+    UnitQuaternion::Rotate(q, step, moved);
+    for (int i = 0; i < 3; ++i) r1[i] = r[i] + moved[i];
+    UnitQuaternion::Plus(q, turn, q1);
+  }
+  void SqrtQ(double, MatrixRef Lq) const {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const int k = static_cast<int>(i);
+      Lq(k, k) = sigma_v[i];
+      Lq(3 + k, 3 + k) = sigma_omega[i];
+    }
+  }
+
+ private:
+  /// moved = V(phi) way
+  template <class T>
+  static void MoveAlong(const T* phi, const T* way, T* moved) {
+    using std::cos;
+    using std::sin;
+    using std::sqrt;
+    const T angle2 = phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2];
+    T a = 0.5 - angle2 / 24.0 * (1.0 - angle2 / 30.0);         // (1 - cos) / angle^2
+    T b = 1.0 / 6.0 - angle2 / 120.0 * (1.0 - angle2 / 42.0);  // (angle - sin) / angle^3
+    constexpr double kSeries = 1e-4;                           // the next term: 1e-16
+    if (angle2 > T(kSeries)) {
+      const T angle = sqrt(angle2);
+      a = (1.0 - cos(angle)) / angle2;
+      b = (angle - sin(angle)) / (angle2 * angle);
+    }
+    T once[3], twice[3];
+    Cross(phi, way, once);
+    Cross(phi, once, twice);
+    for (int i = 0; i < 3; ++i) moved[i] = way[i] + a * once[i] + b * twice[i];
+  }
+  template <class T>
+  static void Cross(const T* x, const T* y, T* z) {
+    z[0] = x[1] * y[2] - x[2] * y[1];
+    z[1] = x[2] * y[0] - x[0] * y[2];
+    z[2] = x[0] * y[1] - x[1] * y[0];
+  }
+  static std::array<double, 4> ReadMounting(Params& p) {
+    const char* const doc = "how the camera is turned, a unit quaternion";
+    const std::array<double, 4> q{p.Number("vehicle_from_cam.orientation.w", "", doc, {}, 1.0),
+                                  p.Number("vehicle_from_cam.orientation.x", "", doc, {}, 0.0),
+                                  p.Number("vehicle_from_cam.orientation.y", "", doc, {}, 0.0),
+                                  p.Number("vehicle_from_cam.orientation.z", "", doc, {}, 0.0)};
+    const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    constexpr double kTolerance = 1e-3;
+    if (std::abs(norm - 1.0) <= kTolerance) return q;
+    p.Fail("vehicle_from_cam.orientation", "not of unit length to 1e-3");
+    return {1.0, 0.0, 0.0, 0.0};
+  }
+};
+
+}  // namespace alidade

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "inverse_depth_feature.h"
+
+#include "alidade/plugin.h"
+
+namespace {
+
+void Make(alidade::Params& p, AlidadeInstance* instance) {
+  alidade::WithForm(alidade::ReadLandmarkForm(p), [&](auto form) {
+    alidade::EmplaceSensor<alidade::InverseDepthFeature<decltype(form)>>(p, instance);
+  });
+}
+
+}  // namespace
+
+ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(Make, "inverse_depth_feature",
+                                 "pixel at which one camera sees a landmark",
+                                 "[MonoSlam2015] sec. 4.3, [Civera2008]"))

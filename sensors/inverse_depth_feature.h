@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "alidade/camera.h"
+#include "alidade/landmark_sensor.h"
+
+namespace alidade {
+
+/// Pixel at which one camera sees a landmark.
+///
+///   model      (u, v) = K(h) + n,   n ~ N(0, sigma^2 I),   h = R_CW (rho (a - r) + m)
+///   Jacobian   derived                                 2 x (6 + landmark), px/m, px/rad, px m
+///   noise      R = sigma^2 I                           2x2, px^2
+///   inverse    the point along the pixel's ray, at the inverse distance rho0 of the prior
+///
+///   symbol     shape  unit    frame  meaning
+///   u, v       2      px      -      the pixel
+///   r, q       3, 4   m, -    world  position and orientation (world_from_cam) of the camera
+///   a, m, rho  form   -       world  the landmark, p = a + m / rho
+///   K          -      -       cam    projection with distortion, see alidade/camera.h
+///   sigma      1      px      -      standard deviation of u and of v; > 0
+///   rho0       1      1/m     -      prior, from the camera to the landmark (xyz: > 0)
+///
+/// Defined for  h before the camera and within its lens; else out_of_domain, outputs untouched.
+///              rho <= 0 is allowed: a ray that the camera sees, whatever lies along it.
+/// Valid for    pixels on the image; else the measurement is invalid.
+/// Source       [MonoSlam2015] sec. 4.3, [Civera2008] sec. II.
+template <class Form>
+struct InverseDepthFeature : LandmarkSensor<InverseDepthFeature<Form>, Vec<2>, Form> {
+  static constexpr Quantity kMeasurement{"pixel", "px", "where the landmark is seen", "u,v"};
+  static constexpr int kPrior = 1;
+
+  Camera camera;
+  double sigma_px;
+
+  InverseDepthFeature(const Camera& lens, double sigma) : camera(lens), sigma_px(sigma) {}
+  explicit InverseDepthFeature(Params& p)
+      : InverseDepthFeature(Camera(p),
+                            p.Positive("sigma_px", "px", "noise of a pixel coordinate, 1 sigma")) {}
+
+  template <class T>
+  bool PredictInCamera(const T* h, const T&, T* pixel) const {
+    return camera.Project(h, pixel);
+  }
+  template <class T>
+  void SqrtNoiseInCamera(const T*, const T&, T* L) const {
+    L[0] = L[3] = T(sigma_px);
+  }
+  bool Valid(const double* pixel) const { return camera.Contains(pixel); }
+  template <class T>
+  bool Initialise(const T* position, const T* orientation, const T* pixel, const T* prior,
+                  T* landmark) const {
+    T h[3];
+    return camera.Unproject(pixel, h) &&
+           PlaceLandmark<Form>(position, orientation, h, prior[0], landmark);
+  }
+};
+
+}  // namespace alidade

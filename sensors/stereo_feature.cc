@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "stereo_feature.h"
+
+#include "alidade/plugin.h"
+
+namespace {
+
+void Make(alidade::Params& p, AlidadeInstance* instance) {
+  alidade::WithForm(alidade::ReadLandmarkForm(p), [&](auto form) {
+    alidade::EmplaceSensor<alidade::StereoFeature<decltype(form)>>(p, instance);
+  });
+}
+
+}  // namespace
+
+ALIDADE_PLUGIN(ALIDADE_SENSOR_BY(Make, "stereo_feature",
+                                 "pixels at which a rectified stereo pair sees a landmark",
+                                 "[MonoSlam2015] sec. 2.2"))

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "motion_models/odometry_pose.h"
+
+#include <gtest/gtest.h>
+
+#include "support/model_checks.h"
+#include "support/model_maker.h"
+
+namespace alidade {
+namespace {
+
+using testing::Blocks;
+using testing::MakeMotion;
+using testing::MapHost;
+using testing::Stepped;
+
+const double kPi = 3.14159265358979323846;
+
+// The camera looks ahead of a vehicle whose x is forward and z up: x_cam = -y, y_cam = -z,
+// z_cam = x; it stands 1 m ahead of the vehicle's origin and 1.5 m above.
+const MapHost::Values kMounted{
+    {"noise.linear_velocity", {0.03, 0.3, 0.3}}, {"noise.angular_velocity", {0.002}},
+    {"vehicle_from_cam.position", {1, 0, 1.5}},  {"vehicle_from_cam.orientation.w", {0.5}},
+    {"vehicle_from_cam.orientation.x", {-0.5}},  {"vehicle_from_cam.orientation.y", {0.5}},
+    {"vehicle_from_cam.orientation.z", {-0.5}}};
+
+/// The pose of the camera of a vehicle at (x, y), turned by `yaw` about z up.
+Blocks Camera(double x, double y, double yaw) {
+  const double mount[3] = {1, 0, 1.5}, camera[4] = {0.5, -0.5, 0.5, -0.5};
+  const double turn[4] = {std::cos(yaw / 2), 0, 0, std::sin(yaw / 2)};
+  Blocks pose{std::vector<double>(3), std::vector<double>(4)};
+  UnitQuaternion::Rotate(turn, mount, pose[0].data());
+  pose[0][0] += x;
+  pose[0][1] += y;
+  UnitQuaternion::Multiply(turn, camera, pose[1].data());
+  return pose;
+}
+
+void ExpectPose(const Blocks& a, const Blocks& b) {
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(a[0][i], b[0][i], 1e-14);
+  double d[3];
+  UnitQuaternion::Minus(a[1].data(), b[1].data(), d);
+  for (const double element : d) EXPECT_NEAR(element, 0.0, 1e-14);
+}
+
+TEST(OdometryPose, FollowsTheVehicle) {
+  const MotionModel motion = MakeMotion<OdometryPose>(kMounted);
+  ASSERT_TRUE(motion.has_input());
+  // 2 m/s ahead for 3 s
+  const double straight[6] = {2, 0, 0, 0, 0, 0};
+  ExpectPose(testing::Step(motion, Camera(5, 6, 0), straight, nullptr, 3.0).next, Camera(11, 6, 0));
+  // A quarter of a circle of radius 4 m to the left, in 1 s
+  const double bend[6] = {2 * kPi, 0, 0, 0, 0, kPi / 2};
+  ExpectPose(testing::Step(motion, Camera(5, 6, 0), bend, nullptr, 1.0).next,
+             Camera(9, 10, kPi / 2));
+  // 0.005 rad of a circle of radius 400 m: there series take over
+  const double all_but_straight[6] = {2, 0, 0, 0, 0, 0.005};
+  const double half = std::sin(0.0025);
+  ExpectPose(testing::Step(motion, Camera(0, 0, 0), all_but_straight, nullptr, 1.0).next,
+             Camera(400 * std::sin(0.005), 800 * half * half, 0.005));
+  // from another heading, by noise alone
+  const double none[6] = {};
+  ExpectPose(testing::Step(motion, Camera(5, 6, kPi / 2), none, bend, 1.0).next,
+             Camera(1, 10, kPi));
+}
+
+TEST(OdometryPose, HasTrueJacobiansAlsoWithoutTurning) {
+  const MotionModel motion = MakeMotion<OdometryPose>(kMounted);
+  const Blocks x{{1, 2, 3}, {0.8, 0.2, -0.4, 0.4}};
+  const std::vector<double> none(6), w{0.3, -0.2, 0.5, 0.4, 0.1, -0.6};
+  const double turning[6] = {2, 0.1, -0.3, 0.2, 0.5, -0.9}, straight[6] = {2, 0.1, -0.3, 0, 0, 0};
+  testing::ExpectTrueJacobians(motion, x, turning, w, 0.2);
+  testing::ExpectTrueJacobians(motion, x, straight, none, 0.2);
+}
+
+TEST(OdometryPose, NoiseIsPerAxis) {
+  const MotionModel motion = MakeMotion<OdometryPose>(kMounted);
+  const std::vector<double> q = testing::Covariance(motion, Camera(0, 0, 0), 0.1);
+  const double sigma[6] = {0.03, 0.3, 0.3, 0.002, 0.002, 0.002};
+  for (int i = 0; i < 6; ++i) EXPECT_NEAR(q[7 * i], sigma[i] * sigma[i], 1e-17);
+}
+
+TEST(OdometryPose, IsMountedByAUnitQuaternion) {
+  MapHost::Values values = kMounted;
+  values["vehicle_from_cam.orientation.w"] = {0.51};
+  const MapHost host(values);
+  static_cast<void>(testing::MakeInstance(&EmplaceMotion<OdometryPose>, host));
+  ASSERT_EQ(host.failures().size(), 1u);
+  EXPECT_EQ(host.failures()[0], "vehicle_from_cam.orientation: not of unit length to 1e-3");
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sensors/depth_feature.h"
+
+#include <gtest/gtest.h>
+
+#include "support/landmarks.h"
+
+namespace alidade {
+namespace {
+
+using namespace testing;  // NOLINT(google-build-using-namespace)
+
+const Blocks kPose{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}};
+
+template <class Form>
+SensorModel Made(const Camera& camera) {
+  return InProcessSensor(DepthFeature<Form>(camera, 0.5, 0.01, 0.003), "depth_feature");
+}
+
+TEST(DepthFeature, PredictsWorkedNumbers) {
+  // The camera at (1, 0, 0) looks along z; the point is (0, 0.4, 2) m, 2 m deep
+  // sigma_d = 0.01 + 0.003 2^2 = 0.022 m
+  ForEachForm([](auto form) {
+    using Form = decltype(form);
+    const Blocks roles =
+        Blocks{{1, 0, 0}, {1, 0, 0, 0}} + LandmarkAt<Form>({0.3, -0.2, 0.1}, {0.0, 0.4, 2.0});
+    const SensorModel sensor = Made<Form>(Pinhole());
+    const std::vector<double> z = Predicted(sensor, roles);
+    EXPECT_NEAR(z[0], 57.5, 1e-12);
+    EXPECT_NEAR(z[1], 345.0, 1e-12);
+    EXPECT_NEAR(z[2], 2.0, 1e-14);
+    std::vector<double> l(9, kPoison);
+    ASSERT_EQ(sensor.SqrtNoise(Pointers(roles).data(), z.data(), l.data()), Status::kOk);
+    const double expected[9] = {0.5, 0, 0, 0, 0.5, 0, 0, 0, 0.022};
+    for (std::size_t i = 0; i < 9; ++i) EXPECT_NEAR(l[i], expected[i], 1e-15);
+  });
+}
+
+TEST(DepthFeature, HasTrueJacobians) {
+  Vec3 ahead{0.2, -0.3, 5.0}, point;
+  UnitQuaternion::Rotate(kPose[1].data(), ahead.data(), point.data());
+  for (std::size_t i = 0; i < 3; ++i) point[i] += kPose[0][i];
+  ForEachForm([&](auto form) {
+    using Form = decltype(form);
+    const Blocks roles = kPose + LandmarkAt<Form>({-0.5, 0.2, -0.8}, point);
+    ExpectTrueJacobians(Made<Form>(Lens()), roles);
+    EXPECT_NEAR(Predicted(Made<Form>(Lens()), roles)[2], 5.0, 1e-14);
+  });
+}
+
+TEST(DepthFeature, InitialisesWithoutAPrior) {
+  ForEachForm([](auto form) {
+    const SensorModel sensor = Made<decltype(form)>(Lens());
+    EXPECT_EQ(sensor.prior_size(), 0);
+    ExpectTrueInverse(sensor, Blocks{kPose[0], kPose[1], {411, 87.5, 3.2}});
+  });
+}
+
+TEST(DepthFeature, HasNoDepthAtInfinityOrBehind) {
+  for (const double rho : {0.0, -0.1}) {
+    const Blocks roles = Blocks{{0, 0, 0}, {1, 0, 0, 0}, {0, 0, 0, 0.1, 0.2, rho}};
+    double z[3] = {kPoison, kPoison, kPoison};
+    EXPECT_EQ(Made<InverseDepth>(Pinhole()).Predict(Pointers(roles).data(), z),
+              Status::kOutOfDomain);
+    EXPECT_EQ(z[2], kPoison);
+  }
+}
+
+TEST(DepthFeature, IsValidOnTheImageWithADepth) {
+  const SensorModel sensor = Made<Xyz>(Pinhole());
+  const double good[3] = {10, 10, 1}, beside[3] = {-1, 10, 1}, none[3] = {10, 10, 0};
+  EXPECT_EQ(sensor.Valid(good), Status::kOk);
+  EXPECT_EQ(sensor.Valid(beside), Status::kInvalid);
+  EXPECT_EQ(sensor.Valid(none), Status::kInvalid);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "alidade/camera.h"
+#include "alidade/in_process.h"
+#include "alidade/landmark.h"
+#include "support/model_checks.h"
+
+/// Landmarks of every form before a camera, and what tests of sensors of landmarks ask of them.
+namespace alidade::testing {
+
+using Vec3 = std::array<double, 3>;
+
+/// A radtan lens, of 640 x 480.
+inline Camera Lens() {
+  return Camera(640, 480, 525, 520, 320.5, 239.25, CameraModel::kRadtan, {-0.28, 0.07, 0.015, 0.0},
+                {0.0012, -0.0007});
+}
+inline Camera Pinhole() { return Camera(640, 480, 525, 525, 320, 240); }
+
+/// f(Form{}) of each form.
+template <class F>
+void ForEachForm(const F& f) {
+  for (const auto form :
+       {LandmarkForm::kInverseDepth, LandmarkForm::kAnchored, LandmarkForm::kXyz}) {
+    SCOPED_TRACE(kLandmarkForms[static_cast<int>(form)]);
+    WithForm(form, f);
+  }
+}
+
+/// The values `y` as blocks of the form.
+template <class Form>
+Blocks CutIntoBlocks(const double* y) {
+  Blocks blocks;
+  const auto cut = [&](auto index) {
+    constexpr int n = detail::SpaceAt<decltype(index)::value, Form>::kAmbient;
+    blocks.emplace_back(y, y + n);
+    y += n;
+  };
+  detail::ForEach(cut, typename detail::Blocks<Form>::Indices{});
+  return blocks;
+}
+
+/// The landmark a + m / rho, m of unit length.
+template <class Form>
+Blocks LandmarkOn(const Ray<double>& ray) {
+  double y[detail::Blocks<Form>::kAmbient];
+  EXPECT_TRUE(Form::FromRay(ray, y));
+  return CutIntoBlocks<Form>(y);
+}
+
+/// The landmark at `point`, first seen from `anchor`.
+template <class Form>
+Blocks LandmarkAt(const Vec3& anchor, const Vec3& point) {
+  Vec3 m;
+  for (std::size_t i = 0; i < 3; ++i) m[i] = point[i] - anchor[i];
+  const double distance = std::hypot(m[0], m[1], m[2]);
+  for (double& element : m) element /= distance;
+  return LandmarkOn<Form>({{anchor[0], anchor[1], anchor[2]}, {m[0], m[1], m[2]}, 1.0 / distance});
+}
+
+inline Blocks operator+(Blocks a, const Blocks& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+inline std::vector<double> Predicted(const SensorModel& sensor, const Blocks& roles) {
+  std::vector<double> z(static_cast<std::size_t>(sensor.measurement().geometry.ambient), kPoison);
+  EXPECT_EQ(sensor.Predict(Pointers(roles).data(), z.data()), Status::kOk);
+  return z;
+}
+
+/// Checks Jacobians of Predict against differences.
+inline void ExpectTrueJacobians(const SensorModel& sensor, const Blocks& roles) {
+  // h^4 times fifth derivatives of pixels, 1e4 of the Jacobians at most
+  ExpectSame(Linearised(sensor, roles), NumericallyLinearised(sensor, roles), 10 * kNumeric);
+}
+
+/// Checks that Initialise inverts Predict, and its Jacobians against differences. `from`: position,
+/// orientation, z and, where the sensor needs one, the prior.
+inline void ExpectTrueInverse(const SensorModel& sensor, const Blocks& from) {
+  std::vector<Space> spaces{sensor.roles()[0], sensor.roles()[1], sensor.measurement()};
+  spaces.resize(from.size());
+  if (from.size() > 3) spaces[3].geometry = Geometry::Vector(sensor.prior_size());
+  const std::vector<Space> forms(sensor.roles().begin() + 2, sensor.roles().end());
+  const int n = TangentSize(forms), m = spaces[2].geometry.tangent;
+  std::vector<double> jr(3 * n), jq(3 * n), jz(m * n), jp(n);
+  const auto place = [&](const Blocks& x, bool jacobians) {
+    std::vector<const double*> roles(sensor.roles().size());
+    std::vector<double*> jx(roles.size());
+    roles[0] = x[0].data();
+    roles[1] = x[1].data();
+    jx[0] = jr.data();
+    jx[1] = jq.data();
+    std::vector<double> y(16, kPoison);
+    EXPECT_EQ(
+        sensor.Initialise(roles.data(), x[2].data(), x.size() > 3 ? x[3].data() : nullptr, y.data(),
+                          jacobians ? jx.data() : nullptr, jacobians ? jz.data() : nullptr,
+                          jacobians && x.size() > 3 ? jp.data() : nullptr),
+        Status::kOk);
+    Blocks blocks = Filled(forms, 0.0);
+    const double* at = y.data();
+    for (auto& block : blocks) {
+      std::copy_n(at, block.size(), block.begin());
+      at += block.size();
+    }
+    return blocks;
+  };
+  const Blocks y = place(from, true);
+  const std::vector<double> z = Predicted(sensor, Blocks{from[0], from[1]} + y);
+  for (std::size_t i = 0; i < z.size(); ++i) EXPECT_NEAR(z[i], from[2][i], 1e-10);
+  std::vector<double> all;
+  for (int row = 0; row < n; ++row) {
+    const auto append = [&](const std::vector<double>& j, int columns) {
+      all.insert(all.end(), j.begin() + row * columns, j.begin() + (row + 1) * columns);
+    };
+    append(jr, 3);
+    append(jq, 3);
+    append(jz, m);
+    if (from.size() > 3) append(jp, 1);
+  }
+  ExpectSame(all,
+             NumericJacobian(spaces, from, forms, [&](const Blocks& x) { return place(x, false); }),
+             10 * kNumeric);
+}
+
+}  // namespace alidade::testing

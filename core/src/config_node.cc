@@ -164,6 +164,12 @@ Node::Kind Node::kind() const { return tree_->kind; }
 const Place& Node::place() const { return tree_->place; }
 const std::string& Node::path() const { return PathOf(*tree_); }
 
+Node Node::Root() const {
+  const ConfigTree* at = tree_;
+  while (at->parent != nullptr) at = at->parent;
+  return Node(at);
+}
+
 std::optional<Node> Node::Find(std::string_view key) const {
   Declare(key);
   const ConfigTree* child = internal::Child(*tree_, key);

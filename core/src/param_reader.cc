@@ -152,8 +152,8 @@ std::vector<double> All(const AlidadeParam& param, const Node& node) {
 
 }  // namespace
 
-ParamReader::ParamReader(const Node& entry, std::string owner)
-    : entry_(entry), owner_(std::move(owner)) {
+ParamReader::ParamReader(const Node& entry, std::string owner, std::string form)
+    : entry_(entry), owner_(std::move(owner)), form_(std::move(form)) {
   host_.struct_size = sizeof(AlidadeHost);
   host_.abi_major = ALIDADE_ABI_MAJOR;
   host_.abi_minor = ALIDADE_ABI_MINOR;
@@ -197,8 +197,9 @@ void ParamReader::Fail(void* self, const char* key, const char* text) noexcept t
     reader->failure_ = Text(text).empty() ? "it does not say why" : Text(text);
     return;
   }
-  Place place = reader->entry_.place();
-  std::optional<Node> at = reader->entry_;
+  const Node base = reader->BaseOf(Text(key));
+  Place place = base.place();
+  std::optional<Node> at = base;
   std::string rest = key;
   for (std::size_t dot = 0; at && at->is_map() && dot != std::string::npos;) {
     dot = rest.find('.');
@@ -206,7 +207,7 @@ void ParamReader::Fail(void* self, const char* key, const char* text) noexcept t
     if (at) place = at->place();
     rest.erase(0, dot == std::string::npos ? dot : dot + 1);
   }
-  reader->errors_.push_back(ErrorLine(place, PathBelow(reader->entry_.path(), key), Text(text)));
+  reader->errors_.push_back(ErrorLine(place, PathBelow(base.path(), key), Text(text)));
 } catch (...) {
   static_cast<ParamReader*>(self)->thrown_ = std::current_exception();
 }
@@ -222,9 +223,28 @@ AlidadeParam ParamReader::Expect(const AlidadeParam* param, const double* values
   }
 }
 
+/// The map below which `key` is read: the entry, or the root.
+Node ParamReader::BaseOf(const std::string& key) const {
+  const std::string first = key.substr(0, key.find('.'));
+  if (first == key || (first != "camera" && first != "landmarks")) return entry_;
+  std::optional<Node> at = entry_;
+  std::string rest = key;
+  for (std::size_t dot = 0; at && dot != std::string::npos;) {
+    dot = rest.find('.');
+    at = at->Find(rest.substr(0, dot));
+    rest.erase(0, dot == std::string::npos ? dot : dot + 1);
+  }
+  return at ? entry_ : entry_.Root();
+}
+
 std::vector<double> ParamReader::Values(const AlidadeParam& param) const {
   std::string rest = param.key;
-  Node map = entry_;
+  const std::vector<std::string> choices = Choices(param);
+  const auto form = std::ranges::find(choices, form_);
+  if (rest == "landmarks.form" && form != choices.end()) {
+    return {static_cast<double>(form - choices.begin())};
+  }
+  Node map = BaseOf(rest);
   for (std::size_t dot; (dot = rest.find('.')) != std::string::npos; rest.erase(0, dot + 1)) {
     const std::optional<Node> child = map.Find(rest.substr(0, dot));
     if (!child) return Absent(param, map, rest);

@@ -11,13 +11,15 @@
 
 namespace alidade::internal {
 
-/// Lends a model the parameters of its config entry. A dotted key walks nested maps. Everything
-/// wrong is collected, so that one run tells all; kPlugin where the model itself asks against the
-/// rules of plugin_abi.h.
+/// Lends a model the parameters of its config entry. A dotted key walks nested maps. What begins
+/// with `camera.` or `landmarks.` and is not in the entry is read from the map of that name at the
+/// root of the config, which sensors and source share. Everything wrong is collected, so that one
+/// run tells all; kPlugin where the model itself asks against the rules of plugin_abi.h.
 class ParamReader {
  public:
   /// `owner` names the model in messages, as in `model 'scale_2d'`.
-  ParamReader(const Node& entry, std::string owner);
+  /// `form` is the value of `landmarks.form` where it is one of the choices; "": what is written.
+  ParamReader(const Node& entry, std::string owner, std::string form = {});
   ParamReader(const ParamReader&) = delete;
   ParamReader& operator=(const ParamReader&) = delete;
 
@@ -34,12 +36,13 @@ class ParamReader {
                            std::int32_t capacity) noexcept;
   static void Fail(void* self, const char* key, const char* text) noexcept;
   AlidadeParam Expect(const AlidadeParam* param, const double* values, std::int32_t capacity);
+  Node BaseOf(const std::string& key) const;
   std::vector<double> Values(const AlidadeParam& param) const;
   std::vector<double> Absent(const AlidadeParam& param, const Node& map,
                              const std::string& key_in_map) const;
 
   Node entry_;
-  std::string owner_;
+  std::string owner_, form_;
   ExitCode code_ = ExitCode::kBadConfig;  ///< of the errors
   AlidadeHost host_{};
   std::vector<std::string> errors_;

@@ -35,6 +35,9 @@ class Node {
   /// Key path from the root, as in `sensors.stereo.focal_px` or `source.columns[2]`.
   const std::string& path() const;
 
+  /// The root of the config that this is of.
+  Node Root() const;
+
   /// Map: the value of `key`, if it is there. Fails where this is not a map.
   std::optional<Node> Find(std::string_view key) const;
   /// Map: the value of `key`; `needed_by` names who needs it in the error.

@@ -8,6 +8,7 @@
 
 #include "alidade/statistics.h"
 #include "ekf_kept.h"
+#include "ekf_landmarks.h"
 #include "ekf_small.h"
 #include "number_text.h"
 #include "small_kernels.h"
@@ -53,7 +54,15 @@ Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>
       stream_of_sensor_[i] = static_cast<int>(s);
     }
   }
+  if (system_.landmarks) {
+    landmarks_ = std::make_unique<Landmarks>(*this);
+    landmarks_->AddKnown();
+  }
   Bind();
+}
+
+std::vector<LandmarkEstimate> Ekf::landmarks() const {
+  return landmarks_ == nullptr ? std::vector<LandmarkEstimate>() : landmarks_->Estimates();
 }
 
 void Ekf::Start(Stamp stamp) { stamp_ = stamp; }
@@ -75,6 +84,7 @@ void Ekf::Restore(const Snapshot& snapshot) {
   last_used_ = kept.last_used;
   diverged_ = kept.diverged;
   failed_ = kept.failed;
+  if (landmarks_ != nullptr) landmarks_->Restore(kept.landmarks);
   Bind();
 }
 
@@ -101,6 +111,7 @@ void Ekf::ProcessFully(const Frame& frame) {
     return;
   }
   if (waiting_) InitialiseFromMeasurements();
+  if (landmarks_ != nullptr) landmarks_->Find();
   group_.clear();
   for (Row& row : rows()) {
     if (EntryOf(row).outcome != Outcome::kAccepted) continue;
@@ -116,6 +127,7 @@ void Ekf::ProcessFully(const Frame& frame) {
   Fuse(group_);
   RepairCovariance();
   CountRejections();
+  if (landmarks_ != nullptr) landmarks_->Finish();
 }
 
 /// One row for each measurement and sensor bound to its stream, in the order of the sensors.
@@ -321,7 +333,7 @@ std::string Ekf::Describe(const std::vector<BlockId>& blocks) const {
 /// Ends the filter: what happened, the state that is left, the measurement that led there.
 void Ekf::GiveUp(const char* kind, const std::string& what) {
   failed_ = true;
-  std::vector<BlockId> all(state_.layout().blocks().size());
+  std::vector<BlockId> all(system_.layout.blocks().size());
   std::iota(all.begin(), all.end(), 0);
   std::string text = what + "; last good state at " + InSeconds(stamp_) + ": " + Describe(all);
   if (last_used_.sensor >= 0) {

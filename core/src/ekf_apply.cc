@@ -32,6 +32,10 @@ void Ekf::RecordUpdate(std::span<Row* const> rows, const double* gain) {
   for (const Row* row : rows) {
     MeasurementReport& entry = EntryOf(*row);
     const double* const end = gain + n * entry.dof;
+    if (BindingOf(*row).model.has_landmark()) {  // its gain is not recorded
+      gain = end;
+      continue;
+    }
     if (order_.empty()) entry.gain.assign(gain, end);
     for (; gain != end; gain += n) {
       for (const int i : order_) entry.gain.push_back(gain[i]);

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "alidade/ekf.h"
+#include "ekf_landmarks.h"
 
 namespace alidade {
 
@@ -22,7 +23,9 @@ struct Ekf::Kept : Snapshot {
         repairs(ekf.repairs_),
         last_used(ekf.last_used_),
         diverged(ekf.diverged_),
-        failed(ekf.failed_) {}
+        failed(ekf.failed_) {
+    if (ekf.landmarks_ != nullptr) landmarks = ekf.landmarks_->map();
+  }
 
   Stamp stamp;
   ControlInputs inputs;
@@ -34,6 +37,7 @@ struct Ekf::Kept : Snapshot {
   int repairs;
   decltype(last_used_) last_used;
   bool diverged, failed;
+  LandmarkMap landmarks;
 };
 
 }  // namespace alidade

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "alidade/ekf.h"
+#include "ekf_landmarks.h"
 #include "number_text.h"
 #include "square_root.h"
 
@@ -130,6 +131,7 @@ void Ekf::RepairCovariance() {
 /// Counts rejections in a row for each sensor, and recovers one that is locked out.
 void Ekf::CountRejections() {
   for (Row& row : rows()) {
+    if (landmarks_ != nullptr && landmarks_->Has(row.sensor)) continue;  // no landmark locks it out
     const auto sensor = static_cast<std::size_t>(row.sensor);
     const MeasurementReport& entry = EntryOf(row);
     if (entry.outcome == Outcome::kAccepted || entry.outcome == Outcome::kInitialised) {

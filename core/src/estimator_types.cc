@@ -75,6 +75,7 @@ Node NodeOf(const Unsupported& asked, const Node& root, const System& system) {
     if (block.status == BlockStatus::kConsidered) return ConsiderOf(state, block);
     return state.At("initial").At(NameIn(block)).At("from");
   }
+  if (asked.sensor < 0) return root.At("landmarks");
   const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(asked.sensor)];
   const Node entry = root.At("sensors").At(sensor.name);
   if (asked.role < 0) return entry.At("loss");

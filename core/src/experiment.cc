@@ -168,9 +168,10 @@ int ReadUse(const Node& use, const NamedEstimator& named, const Node& estimators
 /// that is none of `merged` either, for it has no model.
 void CheckOverrides(const Node& overrides, const Node& root, const Node& merged) {
   for (const auto& [key, value] : overrides.Entries()) {
-    if (key == "start_s") continue;
+    if (key == "start_s" || key == "landmarks") continue;
     if (key != "state" && key != "sensors") {
-      value.Fail("'" + key + "' is common to all estimators of a run", "state, sensors or start_s");
+      value.Fail("'" + key + "' is common to all estimators of a run",
+                 "state, sensors, landmarks or start_s");
     }
     std::vector<std::string> known;
     for (const auto& [name, entry] : root.At(key).Entries()) known.push_back(name);
@@ -210,6 +211,9 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   named.system = BuildSystem(own.root(), host, only);
   if (of_core != nullptr) {
     internal::RefuseUnsupported(named.type, of_core->support, own.root(), named.system);
+  } else if (named.system.landmarks) {
+    type.Fail("estimator type '" + named.type + "' does not support landmarks",
+              "`sensors` that measure none, or type: ekf");
   }
   CheckStreams(own.root(), named.system, streams);
   named.estimator = make(named.system, streams);

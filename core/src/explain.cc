@@ -11,6 +11,7 @@
 #include "alidade/statistics.h"
 #include "columns.h"
 #include "estimator_types.h"
+#include "explain_landmarks.h"
 #include "names.h"
 #include "number_text.h"
 #include "observability.h"
@@ -143,7 +144,9 @@ std::string Sensors(const System& system) {
       const RoleBinding& role = sensor.roles[i];
       TextRow row = std::exchange(front, TextRow(3));
       row.push_back(sensor.model.roles()[i].name);
-      if (role.block < 0) {
+      if (sensor.model.roles()[i].landmark()) {
+        row.insert(row.end(), {"landmarks", ModeText(RoleMode::kEstimate), "prediction"});
+      } else if (role.block < 0) {
         row.insert(row.end(), {"(unbound)", "", ""});
       } else {
         const bool prediction = role.linearise_at == LineariseAt::kPrediction;
@@ -193,6 +196,7 @@ std::string Touches(const System& system) {
 }
 
 std::string Unobservable(const System& system) {
+  if (system.landmarks) return "  what can be observed depends on the landmarks\n";
   if (!internal::ObservabilityIsTold(system)) {
     return "  what can be observed is not looked into: the state has more than " +
            std::to_string(internal::kMostObserved) + " elements\n";
@@ -300,6 +304,15 @@ std::string SupportText(const std::string& type) {
   const auto either = [](bool can_do, const char* with, const char* without) {
     return std::string(can_do ? with : without);
   };
+  std::string lacks;
+  const auto lack = [&](bool can_do, const char* what) {
+    if (!can_do) lacks += (lacks.empty() ? "" : ", ") + std::string(what);
+  };
+  lack(can.considered, "considered blocks and roles");
+  lack(can.at_measurement, "linearise_at measurement");
+  lack(can.from_measurement, "blocks that start from a measurement");
+  lack(can.recovery, "recovery from a\n    lock-out");
+  lack(can.landmarks, "landmarks");
   return either(can.considered,
                 "    blocks estimated, considered (Schmidt) or fixed; roles estimate, consider, "
                 "hold;\n",
@@ -308,10 +321,8 @@ std::string SupportText(const std::string& type) {
          either(can.at_measurement, " or measurement", "") +
          either(can.from_measurement, "; blocks that start from a measurement", "") +
          either(can.robust_loss, ";\n    robust losses", "") +
-         ".\n    Not: " + either(can.considered, "", "considered blocks and roles, ") +
-         either(can.at_measurement, "", "linearise_at measurement, ") +
-         either(can.from_measurement, "", "blocks that start from a measurement, ") +
-         either(can.recovery, "", "recovery from a\n    lock-out, ") + "landmarks.\n";
+         either(can.landmarks, "; landmarks", "") + '.' +
+         (lacks.empty() ? "" : "\n    Not: " + lacks + '.') + '\n';
 }
 
 /// What is done with late frames, where it is not the default.
@@ -359,6 +370,8 @@ std::string Explain(const Config& config, const Experiment& experiment) {
     text += "  state\n" + States(system, experiment.source->truths());
     text += "  motion\n" + Motions(system);
     text += "  sensors\n" + Sensors(system);
+    if (system.landmarks)
+      text += "  landmarks\n" + TextTable(internal::LandmarkRows(system), kIndent);
     text += "  who touches which block\n" + Touches(system);
     text += Unobservable(system);
     text += "  options\n" + Options(entry, named);

@@ -192,7 +192,7 @@ bool internal::ObservabilityIsTold(const System& system) {
 }
 
 std::vector<std::vector<std::string>> UnobservableDirections(const System& system) {
-  if (!internal::ObservabilityIsTold(system)) return {};
+  if (system.landmarks || !internal::ObservabilityIsTold(system)) return {};
   constexpr double kStep = 0.02;
   constexpr int kIdleSteps = 2;
   Trajectory t = StartNearPrior(system);

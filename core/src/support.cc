@@ -15,6 +15,9 @@ std::optional<Unsupported> OfBlocks(const System& system, const Support& support
     if (prior.from.empty() || support.from_measurement) continue;
     return Unsupported{"blocks that start from a measurement", "mean and sigma", prior.block};
   }
+  if (system.landmarks && !support.landmarks) {
+    return Unsupported{"landmarks", "`sensors` that measure none"};
+  }
   return std::nullopt;
 }
 

@@ -45,6 +45,12 @@ System WithALoss() {
   return system;
 }
 
+System WithLandmarks() {
+  System system = DepthFilter();
+  system.landmarks.emplace();
+  return system;
+}
+
 TEST(Support, NamesTheFirstThingThatIsLacking) {
   const Support nothing = {.held = false, .robust_loss = false};
   EXPECT_FALSE(FindUnsupported(DepthFilter(), nothing));
@@ -68,6 +74,7 @@ TEST(Support, NamesTheFirstThingThatIsLacking) {
   expect(WithARole(RoleMode::kEstimate, LineariseAt::kMeasurement), {.at_measurement = true},
          "linearise_at: measurement", -1, 1, 1);
   expect(WithALoss(), {}, "robust losses", -1, 1, -1);
+  expect(WithLandmarks(), {.landmarks = true}, "landmarks", -1, -1, -1);
 }
 
 template <class Filter>
@@ -92,6 +99,7 @@ void ExpectAsSupported() {
   EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kEstimate, LineariseAt::kMeasurement)),
             can.at_measurement);
   EXPECT_EQ(Makes<Filter>(WithALoss()), can.robust_loss);
+  EXPECT_EQ(Makes<Filter>(WithLandmarks()), can.landmarks);
 }
 
 TEST(Support, IsWhatTheConstructorsTake) {

@@ -29,8 +29,11 @@ namespace alidade {
 class Ekf : public Estimator {
  public:
   /// All there is.
-  static constexpr Support kSupport = {
-      .considered = true, .at_measurement = true, .from_measurement = true, .recovery = true};
+  static constexpr Support kSupport = {.considered = true,
+                                       .at_measurement = true,
+                                       .from_measurement = true,
+                                       .recovery = true,
+                                       .landmarks = true};
 
   /// `streams` are the source's, in the order of Measurement::stream.
   Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
@@ -48,6 +51,7 @@ class Ekf : public Estimator {
   /// An estimator derived from this one that keeps more from frame to frame overrides both.
   std::unique_ptr<Snapshot> Save() const override;
   void Restore(const Snapshot& snapshot) override;
+  std::vector<LandmarkEstimate> landmarks() const override;
 
  protected:  // for the estimators that share how frames are stepped to, read, gated and reported
   /// @cond
@@ -91,6 +95,8 @@ class Ekf : public Estimator {
     std::vector<double> work;            ///< for the gate
     double weight = 1.0;                 ///< w of the robust loss; R is divided by it
     const SensorPlan* zeroed = nullptr;  ///< whose zeros H holds
+    SensorPlan* plan = nullptr;          ///< of the landmark that it measures; null: the sensor's
+    const SensorModel* model = nullptr;  ///< of the landmark's form; null: the sensor's
   };
 
   /// Moves state and covariance by dt_s; false, and GiveUp called, where that cannot be.
@@ -135,7 +141,10 @@ class Ekf : public Estimator {
     return system_.sensors[static_cast<std::size_t>(row.sensor)];
   }
   const SensorPlan& PlanOf(const Row& row) const {
-    return plans_[static_cast<std::size_t>(row.sensor)];
+    return row.plan != nullptr ? *row.plan : plans_[static_cast<std::size_t>(row.sensor)];
+  }
+  const SensorModel& ModelOf(const Row& row) const {
+    return row.model != nullptr ? *row.model : BindingOf(row).model;
   }
 
   /// Tells why h of a row could not be had.
@@ -147,6 +156,7 @@ class Ekf : public Estimator {
 
   struct Kept;  ///< the snapshot
   class Small;  ///< the fast path of a filter of few states that are all vectors
+  class Landmarks;
 
   void Bind();
   void KeepFirstEstimates();
@@ -195,8 +205,9 @@ class Ekf : public Estimator {
   std::vector<SensorPlan> plans_;  ///< by sensor
   std::vector<MotionPlan> motions_;
   Steps steps_;
-  std::unique_ptr<Small> small_;  ///< null where the general path is the only one
-  std::vector<int> order_;        ///< rows of P in the order of the layout; empty: as they are
+  std::unique_ptr<Landmarks> landmarks_;  ///< null where the system has none
+  std::unique_ptr<Small> small_;          ///< null where the general path is the only one
+  std::vector<int> order_;  ///< rows of P in the order of the layout; empty: as they are
   bool waiting_ = false, considering_ = false;  ///< a block has no value yet; one is considered
   std::vector<std::vector<double>> first_;      ///< estimates of stationary blocks, by block
   const double* correction_ = nullptr;          ///< dx of the update; null: K r

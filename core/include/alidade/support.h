@@ -16,10 +16,11 @@ struct Support {
   bool from_measurement = false;  ///< blocks that start from their first measurement
   bool recovery = false;          ///< from a lock-out
   bool robust_loss = true;        ///< of a sensor
+  bool landmarks = false;         ///< that come and go
 };
 
 /// Something that a system asks for and an estimator cannot do: of a block, of a role of a sensor,
-/// or, where both `block` and `role` are -1, the loss of a sensor.
+/// where both `block` and `role` are -1 the loss of a sensor, and without a sensor the landmarks.
 struct Unsupported {
   std::string what;    ///< `considered blocks`
   std::string remedy;  ///< what to write in its place: `the block estimated or fixed`

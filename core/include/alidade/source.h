@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -56,6 +58,10 @@ class Source {
   /// values as many as streams() and truths() say: what is not ends the run as internal.
   /// Errors: kBadData, kIo.
   virtual bool Next(Frame& frame) = 0;
+  /// Where the landmark of that id is in the world, m, where the source knows the true map.
+  virtual std::optional<std::array<double, 3>> TrueLandmark(std::int64_t /*id*/) const {
+    return std::nullopt;
+  }
   /// Frames in all, or -1 where that is not known (for progress only).
   virtual std::int64_t size() const { return -1; }
   /// Where the last frame is written, for messages; empty where that means nothing.

@@ -18,12 +18,10 @@ Eigen::MatrixXd Times(const std::vector<JacobianBlock>& h, int rows,
 }
 
 int Covariance::Add(int rows) {
-  const auto gap =
-      std::find_if(gaps_.begin(), gaps_.end(), [rows](const auto& g) { return g.second == rows; });
-  if (gap != gaps_.end()) {
-    const int offset = gap->first;
-    gaps_.erase(gap);
-    return offset;
+  const int gap = FindGap(rows);
+  if (gap >= 0) {
+    TakeFromGap(gap, rows);
+    return gap;
   }
   const int offset = size_;
   if (size_ + rows > p_.rows()) {
@@ -36,25 +34,51 @@ int Covariance::Add(int rows) {
   return offset;
 }
 
+int Covariance::FindGap(int rows) const {
+  auto best = gaps_.end();
+  for (auto gap = gaps_.begin(); gap != gaps_.end(); ++gap) {
+    if (gap->second < rows) continue;
+    if (best == gaps_.end() || gap->second < best->second) best = gap;
+  }
+  return best == gaps_.end() ? -1 : best->first;
+}
+
+/// Takes [offset, offset + rows) out of the gap that it lies in.
+void Covariance::TakeFromGap(int offset, int rows) {
+  const auto gap = std::find_if(gaps_.begin(), gaps_.end(), [&](const auto& g) {
+    return g.first <= offset && offset + rows <= g.first + g.second;
+  });
+  ALIDADE_EXPECTS(gap != gaps_.end());
+  const auto [first, size] = *gap;
+  gaps_.erase(gap);
+  if (first < offset) gaps_.emplace_back(first, offset - first);
+  const int end = offset + rows;
+  if (end < first + size) gaps_.emplace_back(end, first + size - end);
+}
+
 void Covariance::Release(int offset, int rows) {
   p_.block(offset, 0, rows, offset).setZero();
   p_.block(offset, offset, size_ - offset, rows).setZero();
-  gaps_.emplace_back(offset, rows);
-  // Gaps at the end are given back.
-  for (bool shrunk = true; shrunk;) {
-    const auto last = std::find_if(gaps_.begin(), gaps_.end(),
-                                   [this](const auto& g) { return g.first + g.second == size_; });
-    shrunk = last != gaps_.end();
-    if (!shrunk) break;
-    size_ = last->first;
-    gaps_.erase(last);
+  // Gaps that touch become one, and one at the end is given back.
+  for (auto gap = gaps_.begin(); gap != gaps_.end();) {
+    const bool before = gap->first + gap->second == offset, after = offset + rows == gap->first;
+    if (!before && !after) {
+      ++gap;
+      continue;
+    }
+    offset = std::min(offset, gap->first);
+    rows += gap->second;
+    gap = gaps_.erase(gap);
+  }
+  if (offset + rows == size_) {
+    size_ = offset;
+  } else {
+    gaps_.emplace_back(offset, rows);
   }
 }
 
 void Covariance::Move(int from, int to, int rows) {
-  const auto gap = std::find(gaps_.begin(), gaps_.end(), std::pair(to, rows));
-  ALIDADE_EXPECTS(gap != gaps_.end());
-  gaps_.erase(gap);
+  TakeFromGap(to, rows);
   Eigen::MatrixXd cross(size_, rows);
   cross.topRows(from) = p_.block(from, 0, rows, from).transpose();
   cross.bottomRows(size_ - from) = p_.block(from, from, size_ - from, rows);

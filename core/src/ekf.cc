@@ -9,6 +9,7 @@
 
 #include "alidade/statistics.h"
 #include "ekf_kept.h"
+#include "ekf_landmarks.h"
 #include "ekf_small.h"
 
 namespace alidade {
@@ -65,7 +66,15 @@ Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>
       stream_of_sensor_[i] = static_cast<int>(s);
     }
   }
+  if (system_.landmarks) {
+    landmarks_ = std::make_unique<Landmarks>(*this);
+    landmarks_->AddKnown();
+  }
   Bind();
+}
+
+std::vector<LandmarkEstimate> Ekf::landmarks() const {
+  return landmarks_ == nullptr ? std::vector<LandmarkEstimate>() : landmarks_->Estimates();
 }
 
 void Ekf::Start(Stamp stamp) { stamp_ = stamp; }
@@ -84,6 +93,7 @@ void Ekf::Restore(const Snapshot& snapshot) {
   last_used_ = kept.last_used;
   diverged_ = kept.diverged;
   failed_ = kept.failed;
+  if (landmarks_ != nullptr) landmarks_->Restore(kept.landmarks);
   Bind();
 }
 
@@ -108,6 +118,7 @@ const UpdateReport& Ekf::Process(const Frame& frame) {
     return report_;
   }
   if (waiting_) InitialiseFromMeasurements();
+  if (landmarks_ != nullptr) landmarks_->Find();
   group_.clear();
   for (Row& row : rows()) {
     if (EntryOf(row).outcome != Outcome::kAccepted) continue;
@@ -122,6 +133,7 @@ const UpdateReport& Ekf::Process(const Frame& frame) {
   }
   Fuse(group_);
   CountRejections();
+  if (landmarks_ != nullptr) landmarks_->Finish();
   return report_;
 }
 
@@ -309,7 +321,7 @@ std::string Ekf::Describe(const std::vector<BlockId>& blocks) const {
 /// Ends the filter: what happened, the state that is left, the measurement that led there.
 void Ekf::GiveUp(const char* kind, const std::string& what) {
   failed_ = true;
-  std::vector<BlockId> all(state_.layout().blocks().size());
+  std::vector<BlockId> all(system_.layout.blocks().size());
   std::iota(all.begin(), all.end(), 0);
   char at[48];
   std::snprintf(at, sizeof(at), "; last good state at %.6f s: ", Seconds(stamp_));

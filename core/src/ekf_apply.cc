@@ -34,6 +34,7 @@ Outcome Ekf::Apply(std::span<Row* const> rows) {
 
 /// `gain` is n x m by columns, its rows as they lie in P.
 void Ekf::RecordGain(MeasurementReport& entry, const double* gain) const {
+  if (system_.sensors[static_cast<std::size_t>(entry.sensor)].model.has_landmark()) return;
   const auto n = static_cast<std::size_t>(state_.covariance().size());
   const auto m = static_cast<std::size_t>(entry.dof);
   if (order_.empty()) return entry.gain.assign(gain, gain + n * m);

@@ -9,14 +9,15 @@ void Ekf::Bind() {
   waiting_ = considering_ = false;
   order_.clear();
   bool in_order = true;
-  for (const Block& block : layout.blocks()) {
+  // What comes after the blocks of the system are landmarks.
+  for (const Block& block : std::span(layout.blocks()).first(system_.layout.blocks().size())) {
     waiting_ = waiting_ || !block.present;
     considering_ = considering_ || (block.present && block.status == BlockStatus::kConsidered);
     if (!block.has_covariance()) continue;
     in_order = in_order && block.tangent_offset == std::ssize(order_);
     for (int i = 0; i < block.geometry().tangent; ++i) order_.push_back(block.tangent_offset + i);
   }
-  if (in_order) order_.clear();
+  if (in_order && std::ssize(order_) == state_.covariance().size()) order_.clear();
   KeepFirstEstimates();
   const bool small = state_.covariance().small();
   plans_.assign(system_.sensors.size(), {});
@@ -45,7 +46,7 @@ void Ekf::Bind() {
       plan.considered.push_back(role.mode == RoleMode::kConsider);
       plan.width += block.geometry().tangent;
     }
-    if (small && apart) {  // whole rows of H
+    if (small && apart && !sensor.model.has_landmark()) {  // whole rows of H
       plan.width = state_.covariance().size();
       std::size_t part = 0;
       for (int& column : plan.columns) {
@@ -65,7 +66,7 @@ void Ekf::Bind() {
 /// Under `first_estimate`: the values of stationary blocks that have none noted yet.
 void Ekf::KeepFirstEstimates() {
   if (options_.jacobian != JacobianAt::kFirstEstimate) return;
-  first_.resize(state_.layout().blocks().size());
+  first_.resize(system_.layout.blocks().size());
   for (const MotionBinding& motion : system_.motions) {
     if (!motion.model.stationary()) continue;
     for (const BlockId id : motion.blocks) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "alidade/ekf.h"
+#include "ekf_landmarks.h"
 
 namespace alidade {
 
@@ -19,7 +20,9 @@ struct Ekf::Kept : Snapshot {
         warned(ekf.warned_),
         last_used(ekf.last_used_),
         diverged(ekf.diverged_),
-        failed(ekf.failed_) {}
+        failed(ekf.failed_) {
+    if (ekf.landmarks_ != nullptr) landmarks = ekf.landmarks_->map();
+  }
 
   Stamp stamp;
   std::vector<std::vector<double>> first;
@@ -28,6 +31,7 @@ struct Ekf::Kept : Snapshot {
   std::vector<bool> warned;
   decltype(last_used_) last_used;
   bool diverged, failed;
+  LandmarkMap landmarks;
 };
 
 }  // namespace alidade

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "alidade/ekf.h"
+#include "ekf_landmarks.h"
 
 namespace alidade {
 namespace {
@@ -106,6 +107,7 @@ Outcome Ekf::InitialiseBlock(Row& row) {
 /// Counts rejections in a row for each sensor, and recovers one that is locked out.
 void Ekf::CountRejections() {
   for (Row& row : rows()) {
+    if (landmarks_ != nullptr && landmarks_->Has(row.sensor)) continue;  // no landmark locks it out
     const auto sensor = static_cast<std::size_t>(row.sensor);
     const MeasurementReport& entry = EntryOf(row);
     if (entry.outcome == Outcome::kAccepted || entry.outcome == Outcome::kInitialised) {

@@ -355,8 +355,9 @@ std::unique_ptr<Ekf::Small> Ekf::Small::For(Ekf& ekf) {
     return block.has_covariance() && block.geometry().kind == GeometryKind::kVector &&
            block.value_offset == block.tangent_offset;
   };
-  if (!ekf.state_.covariance().small() || ekf.options_.fuse != Fuse::kJoint || ekf.waiting_ ||
-      ekf.considering_ || !ekf.order_.empty() || std::ssize(ekf.state_.values()) != n ||
+  if (ekf.landmarks_ != nullptr || !ekf.state_.covariance().small() ||
+      ekf.options_.fuse != Fuse::kJoint || ekf.waiting_ || ekf.considering_ ||
+      !ekf.order_.empty() || std::ssize(ekf.state_.values()) != n ||
       !std::ranges::all_of(ekf.state_.layout().blocks(), plain)) {
     return nullptr;
   }

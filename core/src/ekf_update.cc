@@ -4,6 +4,7 @@
 
 #include "alidade/ekf.h"
 #include "cholesky.h"
+#include "ekf_landmarks.h"
 
 namespace alidade {
 namespace {
@@ -32,6 +33,7 @@ void Ekf::Fuse(std::span<Row* const> group) {
     if (outcome == Outcome::kAccepted) passed_.push_back(row);
   }
   if (passed_.empty()) return;
+  if (landmarks_ != nullptr && landmarks_->FuseByConsensus(passed_)) return;
   const Outcome outcome = Apply(passed_);
   for (const Row* row : passed_) EntryOf(*row).outcome = outcome;
 }
@@ -67,7 +69,8 @@ void Ekf::NoteRefusal(const Row& row, Outcome outcome) {
   const SensorBinding& binding = BindingOf(row);
   if (outcome == Outcome::kFailed) NotePluginFailure(binding);
   const auto sensor = static_cast<std::size_t>(row.sensor);
-  if (outcome == Outcome::kOutOfDomain && !out_of_domain_[sensor]) {
+  // A landmark behind the camera, say, is no divergence.
+  if (outcome == Outcome::kOutOfDomain && row.plan == nullptr && !out_of_domain_[sensor]) {
     out_of_domain_[sensor] = true;
     std::vector<BlockId> blocks;
     for (const RoleBinding& role : binding.roles) blocks.push_back(role.block);
@@ -88,15 +91,15 @@ Outcome Ekf::Evaluate(Row& row, MeasurementReport& entry) {
       std::fill_n(row.h.data() + i * plan.width + part.column, part.size, std::nan(""));
     }
   }
-  return OutcomeOf(BindingOf(row).model.Linearise(plan.roles.data(), entry.h.data(),
-                                                  jacobians_.data(), plan.strides.data()));
+  return OutcomeOf(ModelOf(row).Linearise(plan.roles.data(), entry.h.data(), jacobians_.data(),
+                                          plan.strides.data()));
 }
 
 /// h at the prediction; H at the first estimates, and at what the measurement implies for the role
 /// that asks for it.
 Outcome Ekf::EvaluateApart(Row& row, MeasurementReport& entry) {
-  const SensorModel& model = BindingOf(row).model;
-  SensorPlan& plan = plans_[static_cast<std::size_t>(row.sensor)];
+  const SensorModel& model = ModelOf(row);
+  SensorPlan& plan = row.plan != nullptr ? *row.plan : plans_[static_cast<std::size_t>(row.sensor)];
   Outcome outcome = OutcomeOf(model.Predict(plan.roles.data(), entry.h.data()));
   if (outcome != Outcome::kAccepted) return outcome;
   if (!plan.implied.empty()) {
@@ -132,7 +135,7 @@ void Ekf::Chain(Row& row, int column, const RowMajor& j) const {
 
 /// R at the roles, or as the measurement itself says.
 Outcome Ekf::NoiseOf(Row& row, const double* const* roles) {
-  const SensorModel& model = BindingOf(row).model;
+  const SensorModel& model = ModelOf(row);
   const auto m = static_cast<std::size_t>(model.measurement().geometry.tangent);
   const Measurement& measurement = *row.measurement;
   if (!measurement.covariance.empty()) {

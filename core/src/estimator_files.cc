@@ -68,6 +68,7 @@ std::vector<std::string> EstimatorFiles::GainsHeader(const System& system) {
   std::map<std::string, std::size_t> known;  // sensors that measure alike share columns
   for (std::size_t s = 0; s < system.sensors.size(); ++s) {
     const Space& space = system.sensors[s].model.measurement();
+    if (system.sensors[s].model.has_landmark()) continue;
     for (const BlockColumns& columns : blocks_) {
       const Block& block = system.layout[columns.id];
       if (block.status == BlockStatus::kFixed) continue;
@@ -176,6 +177,30 @@ void EstimatorFiles::AddGain(Stamp stamp, const State& state, const MeasurementR
     }
   }
   gains_.EndRow();
+}
+
+void WriteLandmarks(const RunFolder& folder, const std::string& estimator,
+                    const std::vector<LandmarkEstimate>& landmarks) {
+  CsvFile file(
+      folder, estimator + "/landmarks.csv",
+      {"id", "generation", "form", "x", "y", "z", "sigma_x", "sigma_y", "sigma_z",
+       "inverse_distance", "sigma_inverse_distance", "first_s", "last_s", "tried", "accepted"});
+  const auto number = [&file](double value) {
+    if (std::isfinite(value)) {
+      file.Number(value);
+    } else {
+      file.Empty();
+    }
+  };
+  for (const LandmarkEstimate& one : landmarks) {
+    file.Integer(one.id).Integer(one.generation).Text(one.form ? ToString(*one.form) : "");
+    for (const double x : one.position) number(x);
+    for (int i = 0; i < 3; ++i) number(std::sqrt(one.covariance(i, i)));
+    number(one.inverse_distance);
+    number(one.sigma);
+    file.Time(one.first).Time(one.last).Integer(one.tried).Integer(one.accepted).EndRow();
+  }
+  file.Close();
 }
 
 void EstimatorFiles::Close() {

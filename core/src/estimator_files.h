@@ -48,4 +48,8 @@ class EstimatorFiles {
   CsvFile estimates_, innovations_, gains_;
 };
 
+/// `NAME/landmarks.csv`: the map at the end. A number that is not finite is left empty. Error: kIo.
+void WriteLandmarks(const RunFolder& folder, const std::string& estimator,
+                    const std::vector<LandmarkEstimate>& landmarks);
+
 }  // namespace alidade::internal

@@ -81,7 +81,11 @@ const std::vector<EstimatorType>& EstimatorTypes() {
        "Extended Kalman filter; built in, for `estimators`.",
        ReadEkf,
        EkfOptions::Schema,
-       {.considered = true, .at_measurement = true, .recovery = true, .robust_loss = true}},
+       {.considered = true,
+        .at_measurement = true,
+        .recovery = true,
+        .robust_loss = true,
+        .landmarks = true}},
       {"iekf",
        "Iterated extended Kalman filter; built in, for `estimators`.",
        ReadIekf,
@@ -122,6 +126,9 @@ void RefuseUnsupportedKeys(const EstimatorType& type, const Node& entry) {
 
 void RefuseUnsupported(const EstimatorType& type, const Node& root, const System& system) {
   RefuseBlocks(type, root, system);
+  if (system.landmarks && !type.support.landmarks) {
+    Refuse(type, root.At("landmarks"), "landmarks", "`sensors` that measure none");
+  }
   for (const SensorBinding& sensor : system.sensors) {
     const Node entry = root.At("sensors").At(sensor.name);
     for (std::size_t i = 0; i < sensor.roles.size(); ++i) {

@@ -16,6 +16,7 @@ struct Support {
   bool at_measurement;  ///< linearise_at: measurement
   bool recovery;        ///< blocks that start from a measurement, and from one after a lock-out
   bool robust_loss;
+  bool landmarks = false;
 };
 
 /// A type of estimator that core has itself, for `type:` of an entry of `estimators:`.
@@ -37,8 +38,8 @@ const EstimatorType* FindEstimatorType(std::string_view name);
 /// `jacobian`, `lockout`. Errors: kBadConfig.
 void RefuseUnsupportedKeys(const EstimatorType& type, const Node& entry);
 /// The same for what `system`, built from the config `root`, asks of it: considered blocks and
-/// roles, blocks that start from a measurement, linearise_at: measurement, a robust loss.
-/// Errors: kBadConfig.
+/// roles, blocks that start from a measurement, linearise_at: measurement, a robust loss, and
+/// landmarks. Errors: kBadConfig.
 void RefuseUnsupported(const EstimatorType& type, const Node& root, const System& system);
 
 }  // namespace alidade::internal

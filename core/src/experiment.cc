@@ -119,9 +119,9 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   const Config own = overrides ? config.Merged(*overrides) : config;
   if (overrides) {
     for (const auto& [key, value] : overrides->Entries()) {
-      if (key != "state" && key != "sensors" && key != "start_s") {
+      if (key != "state" && key != "sensors" && key != "landmarks" && key != "start_s") {
         value.Fail("'" + key + "' is common to all estimators of a run",
-                   "state, sensors or start_s");
+                   "state, sensors, landmarks or start_s");
       }
     }
   }
@@ -129,6 +129,10 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   entry.RejectUnread();
   named.system = BuildSystem(own.root(), host, only);
   if (of_core != nullptr) internal::RefuseUnsupported(*of_core, own.root(), named.system);
+  if (of_core == nullptr && named.system.landmarks) {
+    entry.At("type").Fail("estimator type '" + named.type + "' does not support landmarks",
+                          "`sensors` that measure none, or type: ekf");
+  }
   for (const SensorBinding& sensor : named.system.sensors) {
     FindStream(own.root().At("sensors").At(sensor.name), sensor.model, streams);
   }

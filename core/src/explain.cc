@@ -13,6 +13,7 @@
 #include "alidade/ukf.h"
 #include "columns.h"
 #include "estimator_types.h"
+#include "explain_landmarks.h"
 #include "names.h"
 #include "number_text.h"
 #include "text_table.h"
@@ -131,7 +132,9 @@ std::string Sensors(const System& system) {
       const RoleBinding& role = sensor.roles[i];
       TextRow row = std::exchange(front, TextRow(3));
       row.push_back(sensor.model.roles()[i].name);
-      if (role.block < 0) {
+      if (sensor.model.roles()[i].landmark()) {
+        row.insert(row.end(), {"landmarks", ModeText(RoleMode::kEstimate), "prediction"});
+      } else if (role.block < 0) {
         row.insert(row.end(), {"(unbound)", "", ""});
       } else {
         const bool prediction = role.linearise_at == LineariseAt::kPrediction;
@@ -181,6 +184,7 @@ std::string Touches(const System& system) {
 }
 
 std::string Unobservable(const System& system) {
+  if (system.landmarks) return "  what can be observed depends on the landmarks\n";
   std::map<std::vector<std::string>, int> directions;
   for (const auto& names : UnobservableDirections(system)) ++directions[names];
   if (directions.empty()) return "  every direction of the state can be observed\n";
@@ -306,11 +310,12 @@ std::string SupportText(const std::string& type) {
          "    linearise_at prediction" + either(can.at_measurement, " or measurement", "") +
          either(can.recovery, "; blocks that start from a measurement", "") +
          either(can.robust_loss, ";\n    robust losses", "") +
+         either(can.landmarks, "; landmarks", "") +
          ".\n    Not: " + either(can.considered, "", "considered blocks and roles, ") +
          either(can.at_measurement, "", "linearise_at measurement, ") +
          either(can.recovery, "",
                 "blocks that start from a measurement, recovery from a\n    lock-out, ") +
-         "control inputs, landmarks.\n";
+         either(can.landmarks, "control inputs.\n", "control inputs, landmarks.\n");
 }
 
 /// What is done with late frames, where it is not the default.
@@ -354,6 +359,8 @@ std::string Explain(const Config& config, const Experiment& experiment) {
     text += "  state\n" + States(system, experiment.source->truths());
     text += "  motion\n" + Motions(system);
     text += "  sensors\n" + Sensors(system);
+    if (system.landmarks)
+      text += "  landmarks\n" + TextTable(internal::LandmarkRows(system), kIndent);
     text += "  who touches which block\n" + Touches(system);
     text += Unobservable(system);
     text += "  options\n" + Options(entry, named);

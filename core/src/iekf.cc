@@ -23,7 +23,7 @@ Iekf::Iekf(System system, const IekfOptions& options, const std::vector<StreamIn
     : Ekf(std::move(system), options, streams),
       max_iterations_(options.max_iterations),
       tolerance_(options.tolerance) {
-  ALIDADE_EXPECTS(options.jacobian == JacobianAt::kLatest);
+  ALIDADE_EXPECTS(options.jacobian == JacobianAt::kLatest && !system_.landmarks);
   ALIDADE_EXPECTS(max_iterations_ > 1 && tolerance_ > 0.0);
   for (const Block& block : system_.layout.blocks()) {
     ALIDADE_EXPECTS(block.status != BlockStatus::kConsidered);

@@ -111,6 +111,7 @@ struct Metrics::Impl {
   std::vector<Tracked> tracked;
   std::vector<Owner> owners;
   std::vector<std::string> sensors;
+  bool has_landmarks = false, has_ransac = false;
   std::vector<Sums> sums;                                      ///< all stamps, then the segments
   std::vector<std::array<std::int64_t*, kOutcomes>> count_of;  ///< into counts, by sensor
   std::map<std::string, std::int64_t> counts;
@@ -246,6 +247,16 @@ void Metrics::Impl::AddNees(const Owner& owner, std::size_t index, const std::ve
 }
 
 void Metrics::Impl::AddReport(const std::vector<Sums*>& into, const UpdateReport& report) {
+  if (has_landmarks) {
+    counts["landmarks.initialised"] += report.landmarks.initialised;
+    counts["landmarks.deleted"] += report.landmarks.deleted;
+    counts["landmarks.converted"] += report.landmarks.converted;
+    counts["landmarks.negative"] += report.landmarks.negative;
+  }
+  if (has_ransac) {
+    counts["landmarks.hypotheses"] += report.landmarks.hypotheses;
+    counts["landmarks.rescued"] += report.landmarks.rescued;
+  }
   for (const MeasurementReport& m : report.measurements()) {
     if (m.sensor < 0 || m.sensor >= static_cast<int>(sensors.size())) continue;
     const auto sensor = static_cast<std::size_t>(m.sensor);
@@ -278,6 +289,9 @@ Metrics::Metrics(const NamedEstimator& named, const Source& source,
     : impl_(std::make_unique<Impl>()) {
   impl_->Track(named.system, source.truths());
   impl_->sensors = internal::NamesOf(named.system.sensors);
+  impl_->has_landmarks = named.system.landmarks.has_value();
+  impl_->has_ransac = std::ranges::any_of(
+      named.system.sensors, [](const SensorBinding& s) { return s.association.has_value(); });
   impl_->count_of.resize(impl_->sensors.size());
   const auto add_sums = [&](std::string suffix) {
     const std::vector<Tally> blocks(impl_->tracked.size());

@@ -171,6 +171,7 @@ void Reduce(Eigen::MatrixXd& basis) {
 }  // namespace
 
 std::vector<std::vector<std::string>> UnobservableDirections(const System& system) {
+  if (system.landmarks) return {};
   constexpr double kStep = 0.02;
   constexpr int kIdleSteps = 2;
   Trajectory t = StartNearPrior(system);

@@ -18,7 +18,8 @@ namespace alidade::internal {
 class ParamReader {
  public:
   /// `owner` names the model in messages, as in `model 'scale_2d'`.
-  ParamReader(const Node& entry, std::string owner);
+  /// `form` is the value of `landmarks.form` where it is one of the choices; "": what is written.
+  ParamReader(const Node& entry, std::string owner, std::string form = {});
   ParamReader(const ParamReader&) = delete;
   ParamReader& operator=(const ParamReader&) = delete;
 
@@ -41,7 +42,7 @@ class ParamReader {
                              const std::string& key_in_map) const;
 
   Node entry_;
-  std::string owner_;
+  std::string owner_, form_;
   ExitCode code_ = ExitCode::kBadConfig;  ///< of the errors
   AlidadeHost host_{};
   std::vector<std::string> errors_;

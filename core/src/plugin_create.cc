@@ -143,10 +143,10 @@ const EstimatorEntry& PluginHost::EstimatorOf(const PluginEntry& entry) const {
   throw ContractViolation("no such entry: " + entry.name);
 }
 
-std::shared_ptr<const ModelInstance> PluginHost::Create(const PluginEntry& entry,
-                                                        const Node& node) const {
+std::shared_ptr<const ModelInstance> PluginHost::Create(const PluginEntry& entry, const Node& node,
+                                                        const std::string& form) const {
   const AlidadeEntry c = EntryOf(entry);
-  ParamReader reader(node, Named(entry.kind, entry.name));
+  ParamReader reader(node, Named(entry.kind, entry.name), form);
   NewInstance instance;
   std::int32_t code;
   {
@@ -163,8 +163,9 @@ std::shared_ptr<const ModelInstance> PluginHost::Create(const PluginEntry& entry
                                                entry.plugin.string());
 }
 
-SensorModel PluginHost::CreateSensor(const std::string& name, const Node& entry) const {
-  return SensorModel(Create(Find(PluginEntry::Kind::kSensor, name, entry), entry));
+SensorModel PluginHost::CreateSensor(const std::string& name, const Node& entry,
+                                     const std::string& form) const {
+  return SensorModel(Create(Find(PluginEntry::Kind::kSensor, name, entry), entry, form));
 }
 
 MotionModel PluginHost::CreateMotion(const std::string& name, const Node& entry) const {

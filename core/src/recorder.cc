@@ -198,7 +198,10 @@ void Recorder::Finish(const RunResult& result) {
   const std::string timing = impl_->TimingJson(result);
   const internal::RecordedRun recorded = impl_->CloseFiles();
   const internal::RunFolder& folder = impl_->folder;
-  for (const EstimatorResult& one : result.estimators) impl_->WriteEvents(one);
+  for (const EstimatorResult& one : result.estimators) {
+    impl_->WriteEvents(one);
+    if (one.landmarks) internal::WriteLandmarks(folder, one.name, *one.landmarks);
+  }
   folder.Write("run.json", internal::RunJson(result, impl_->facts));
   folder.Write("comparison.csv", internal::ComparisonCsv(result));
   folder.Write("timing.json", timing);

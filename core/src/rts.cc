@@ -10,7 +10,7 @@ namespace alidade {
 RtsSmoother::RtsSmoother(System system, const EkfOptions& options,
                          const std::vector<StreamInfo>& streams)
     : Ekf(std::move(system), internal::WithoutRecovery(options), streams) {
-  ALIDADE_EXPECTS(!considering_ && !waiting_);
+  ALIDADE_EXPECTS(!considering_ && !waiting_ && !system_.landmarks);
 }
 
 void RtsSmoother::Adjoint::Append(const Eigen::MatrixXd& later_a, const Eigen::VectorXd& later_b,

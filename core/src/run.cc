@@ -5,6 +5,7 @@
 
 #include "alidade/metrics.h"
 #include "alidade/recorder.h"
+#include "map_metrics.h"
 #include "reorder.h"
 #include "text_table.h"
 
@@ -211,6 +212,13 @@ void Measure(Running& one, RunResult& result) {
   }
 }
 
+/// The map at the end, with its metrics.
+void NoteMap(Running& one, const Source& source) {
+  if (!one.named.system.landmarks) return;
+  one.result.landmarks = one.named.estimator->landmarks();
+  one.result.metrics.merge(internal::MapMetrics(*one.result.landmarks, source));
+}
+
 /// The estimates of those that needed all frames.
 void SmoothAll(std::vector<Running>& running, const std::vector<Seen>& kept,
                const RunOptions& options, RunResult& result) {
@@ -270,6 +278,7 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
     Measure(one, result);
     one.result.counts = one.metrics.counts();
     one.result.units = one.metrics.units();
+    NoteMap(one, *experiment.source);
     if (result.frames > 0) NoteUnused(one.named.system, one.result);
     one.Note(one.metrics.events());
     const Estimator& estimator = *one.named.estimator;

@@ -10,7 +10,7 @@ namespace alidade {
 SquareRootEkf::SquareRootEkf(System system, const EkfOptions& options,
                              const std::vector<StreamInfo>& streams)
     : Ekf(std::move(system), internal::WithoutRecovery(options), streams) {
-  ALIDADE_EXPECTS(!considering_ && !waiting_);
+  ALIDADE_EXPECTS(!considering_ && !waiting_ && !system_.landmarks);
   Take(internal::SquareRootOf(state_.covariance().Dense()).root);
 }
 

@@ -14,6 +14,12 @@ BlockId StateLayout::Declare(std::string name, std::string owner, Space space, B
   block.owner = std::move(owner);
   block.space = std::move(space);
   block.status = status;
+  if (!dropped_.empty()) {
+    const BlockId id = dropped_.back();
+    dropped_.pop_back();
+    blocks_[static_cast<std::size_t>(id)] = std::move(block);
+    return id;
+  }
   blocks_.push_back(std::move(block));
   return static_cast<BlockId>(blocks_.size()) - 1;
 }
@@ -71,6 +77,35 @@ void State::Initialise(BlockId id, const double* value, const std::vector<BlockI
   covariance_.SetRows(block.tangent_offset, Times(j, rows, cross) + own, cross);
 }
 
+void State::Initialise(const std::vector<BlockId>& ids, const double* values,
+                       const std::vector<BlockId>& from,
+                       const std::vector<Eigen::MatrixXd>& jacobians, const Eigen::MatrixXd& own) {
+  ALIDADE_EXPECTS(from.size() == jacobians.size());
+  Eigen::Index row = 0;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const Geometry geometry = layout_[ids[i]].geometry();
+    const Eigen::Index k = geometry.tangent;
+    std::vector<Eigen::MatrixXd> rows;
+    for (const Eigen::MatrixXd& j : jacobians) rows.emplace_back(j.middleRows(row, k));
+    Initialise(ids[i], values, from, rows, own.block(row, row, k, k));
+    values += geometry.ambient;
+    const Block& block = layout_[ids[i]];
+    Eigen::Index column = 0;
+    for (std::size_t j = 0; j < i; ++j) {
+      const Block& other = layout_[ids[j]];
+      const int size = other.geometry().tangent;
+      if (block.has_covariance() && other.has_covariance()) {
+        const Eigen::MatrixXd through_x = covariance_.Block(
+            block.tangent_offset, block.geometry().tangent, other.tangent_offset, size);
+        covariance_.SetBlock(block.tangent_offset, other.tangent_offset,
+                             through_x + own.block(row, column, k, size));
+      }
+      column += size;
+    }
+    row += k;
+  }
+}
+
 BlockId State::Clone(BlockId source, std::string name) {
   const Block original = layout_[source];
   ALIDADE_EXPECTS(original.present);
@@ -87,18 +122,32 @@ void State::Marginalise(BlockId id) {
   ALIDADE_EXPECTS(block.present);
   value_gaps_.emplace_back(block.value_offset, block.geometry().ambient);
   if (block.has_covariance()) {
-    const int rows = block.geometry().tangent;
-    const auto last = std::max_element(
-        layout_.blocks_.begin(), layout_.blocks_.end(),
-        [](const Block& a, const Block& b) { return a.tangent_offset < b.tangent_offset; });
-    covariance_.Release(block.tangent_offset, rows);
-    if (&*last != &block && last->geometry().tangent == rows) {
-      covariance_.Move(last->tangent_offset, block.tangent_offset, rows);
-      last->tangent_offset = block.tangent_offset;
-    }
+    covariance_.Release(block.tangent_offset, block.geometry().tangent);
   }
   block.present = false;
   block.value_offset = block.tangent_offset = -1;
+  FillGaps();
+}
+
+/// Moves the last block into a gap, as long as one holds it.
+void State::FillGaps() {
+  for (;;) {
+    const auto last = std::max_element(
+        layout_.blocks_.begin(), layout_.blocks_.end(),
+        [](const Block& a, const Block& b) { return a.tangent_offset < b.tangent_offset; });
+    if (last == layout_.blocks_.end() || last->tangent_offset < 0) return;
+    const int rows = last->geometry().tangent;
+    const int gap = covariance_.FindGap(rows);
+    if (gap < 0) return;
+    covariance_.Move(last->tangent_offset, gap, rows);
+    last->tangent_offset = gap;
+  }
+}
+
+void State::Drop(BlockId id) {
+  if (layout_[id].present) Marginalise(id);
+  layout_.blocks_[static_cast<std::size_t>(id)] = {};
+  layout_.dropped_.push_back(id);
 }
 
 void State::Consider(BlockId id, bool considered) {
@@ -118,7 +167,8 @@ void State::Reparametrise(BlockId id, Space space, const double* value,
   Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
   block = layout_[fresh];
   block.name = old.name;
-  layout_.blocks_.pop_back();
+  layout_.blocks_[static_cast<std::size_t>(fresh)] = {};
+  layout_.dropped_.push_back(fresh);
 }
 
 void State::Retract(const double* dx, std::vector<double>& moved) const {

@@ -5,7 +5,9 @@
 #include <functional>
 #include <limits>
 
+#include "landmark_forms.h"
 #include "names.h"
+#include "read_landmarks.h"
 
 namespace alidade {
 namespace {
@@ -196,6 +198,18 @@ RobustLoss ReadLoss(const Node& node) {
           scale.Number(0.0, std::numeric_limits<double>::infinity(), true, true)};
 }
 
+/// All landmark roles together, by the role `landmark`; and the model's form that is xyz.
+void ReadLandmarkRole(const Node& entry, const PluginHost& host, SensorBinding& binding) {
+  const Node role = entry.At("roles").At("landmark", "sensor '" + binding.name + "'");
+  if (role.is_map() || role.Text() != "landmarks") {
+    role.Fail("not the landmarks", "`landmarks`: the one that a measurement names");
+  }
+  const auto form = FormOf(binding.model.roles());
+  if (!form || IsXyz(*form)) return;
+  SensorModel xyz = host.CreateSensor(binding.model.name(), entry, ToString(internal::XyzForm()));
+  if (FormOf(xyz.roles()) == internal::XyzForm()) binding.xyz = std::move(xyz);
+}
+
 SensorBinding ReadSensor(const std::string& name, const Node& entry, const PluginHost& host,
                          const System& system) {
   const std::string model_name = entry.At("model", "a sensor entry").Text();
@@ -208,9 +222,8 @@ SensorBinding ReadSensor(const std::string& name, const Node& entry, const Plugi
   const Node roles = entry.At("roles", "sensor '" + name + "'");
   for (const Space& role : binding.model.roles()) {
     if (role.landmark()) {
-      entry.At("model").Fail(
-          "role '" + role.name + "' of model '" + model_name + "' is a landmark's",
-          "a model without: landmarks are not supported yet");
+      binding.roles.push_back({});
+      continue;
     }
     const auto node = roles.Find(role.name);
     if (!node && role.optional()) {
@@ -224,6 +237,12 @@ SensorBinding ReadSensor(const std::string& name, const Node& entry, const Plugi
     if (std::count_if(binding.roles.begin(), binding.roles.end(), same) > 1) {
       given.Fail("block '" + system.layout[block].name + "' already fills another role",
                  "a block of its own for each role");
+    }
+  }
+  if (binding.model.has_landmark()) {
+    ReadLandmarkRole(entry, host, binding);
+    if (const auto node = entry.Find("association")) {
+      binding.association = OnePointRansac::FromNode(*node);
     }
   }
   roles.RejectUnread();
@@ -290,6 +309,7 @@ System WithoutUntouched(System system) {
   }
   System kept;
   kept.start_s = system.start_s;
+  kept.landmarks = std::move(system.landmarks);
   std::vector<BlockId> moved;
   for (const Block& block : system.layout.blocks()) {
     moved.push_back(Contains(touched, block.owner)
@@ -335,6 +355,7 @@ System BuildSystem(const Node& root, const PluginHost& host, const std::vector<s
   System system;
   for (const auto& [name, entry] : root.At("state", "a run").Entries()) {
     internal::ExpectName(name, entry, "a state entry");
+    if (name == "landmarks") entry.Fail("'landmarks' are no state entry", "another name");
     ReadStateEntry(name, entry, host, system);
   }
   std::vector<SensorBinding> sensors;
@@ -342,6 +363,7 @@ System BuildSystem(const Node& root, const PluginHost& host, const std::vector<s
     internal::ExpectName(name, entry, "a sensor");
     sensors.push_back(ReadSensor(name, entry, host, system));
   }
+  system.landmarks = internal::ReadLandmarks(root, sensors);
   if (only.empty()) {
     system.sensors = std::move(sensors);
   } else {
@@ -355,6 +377,8 @@ System BuildSystem(const Node& root, const PluginHost& host, const std::vector<s
   if (const auto start = root.Find("start_s"))
     system.start_s = start->Number(-kLatestSeconds, kLatestSeconds);
   if (!only.empty()) system = WithoutUntouched(std::move(system));
+  const auto sees = [](const SensorBinding& sensor) { return sensor.model.has_landmark(); };
+  if (std::ranges::none_of(system.sensors, sees)) system.landmarks.reset();
   CheckInitialisation(root, system);
   return system;
 }

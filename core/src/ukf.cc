@@ -63,7 +63,7 @@ Ukf::Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>
     : Ekf(std::move(system), internal::WithoutRecovery(options.filter), streams),
       spread_(options),
       guarded_(system_.sensors.size() + 1, false) {
-  ALIDADE_EXPECTS(!considering_ && !waiting_);
+  ALIDADE_EXPECTS(!considering_ && !waiting_ && !system_.landmarks);
 }
 
 struct Ukf::Kept : Ekf::Kept {

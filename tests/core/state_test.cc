@@ -92,6 +92,55 @@ TEST(State, MarginaliseMovesAtMostOneBlock) {
   EXPECT_EQ(moved, 1);
 }
 
+TEST(State, ASmallerBlockAtTheEndMovesIntoAGap) {
+  State state;
+  const double value[3] = {1, 2, 3};
+  const BlockId large = state.Declare("s.large", "s", Named(Geometry::Vector(3)));
+  const BlockId a = state.Declare("s.a", "s", Named(Geometry::Vector(1)));
+  const BlockId b = state.Declare("s.b", "s", Named(Geometry::Vector(1)));
+  state.Add(large, value, Eigen::Matrix3d::Identity());
+  state.Add(a, value, Eigen::MatrixXd::Constant(1, 1, 4.0));
+  state.Add(b, value, Eigen::MatrixXd::Constant(1, 1, 9.0));
+  state.covariance().SetBlock(3, 4, Eigen::MatrixXd::Constant(1, 1, 5.0));
+  state.Marginalise(large);
+  EXPECT_EQ(state.covariance().size(), 2);
+  EXPECT_EQ(Cross(state, "s.a", "s.a")(0), 4.0);
+  EXPECT_EQ(Cross(state, "s.b", "s.b")(0), 9.0);
+  EXPECT_EQ(Cross(state, "s.a", "s.b")(0), 5.0);
+}
+
+TEST(State, ADroppedBlockGivesItsIdAndNameBack) {
+  State state = Abc();
+  const std::size_t blocks = state.layout().blocks().size();
+  const BlockId a = state.layout().Find("s.a");
+  const Eigen::MatrixXd bc = Cross(state, "s.b", "s.c");
+  state.Drop(a);
+  EXPECT_EQ(state.layout().Find("s.a"), -1);
+  EXPECT_FALSE(state.layout()[a].present);
+  EXPECT_EQ(state.Declare("s.a", "s", Named(Geometry::Vector(4))), a);
+  EXPECT_EQ(state.layout().blocks().size(), blocks);
+  EXPECT_EQ(Cross(state, "s.b", "s.c"), bc);
+}
+
+TEST(State, BlocksInitialisedTogetherAreCorrelatedThroughTheirNoise) {
+  State state = Abc();
+  const BlockId c = state.layout().Find("s.c");
+  const Eigen::MatrixXd cc = Cross(state, "s.c", "s.c");
+  Eigen::MatrixXd j(3, 2), own(3, 3);
+  j << 1, 2, 0, 1, -1, 1;
+  own << 2, 0.5, 0.3, 0.5, 3, 0.7, 0.3, 0.7, 4;
+  const BlockId d = state.Declare("s.d", "s", Named(Geometry::Vector(1)));
+  const BlockId e = state.Declare("s.e", "s", Named(Geometry::Vector(2)));
+  const double values[3] = {7, 8, 9};
+  state.Initialise({d, e}, values, {c}, {j}, own);
+  const Eigen::MatrixXd expected = j * cc * j.transpose() + own;
+  EXPECT_LT((Cross(state, "s.d", "s.d") - expected.topLeftCorner(1, 1)).norm(), 1e-12);
+  EXPECT_LT((Cross(state, "s.d", "s.e") - expected.topRightCorner(1, 2)).norm(), 1e-12);
+  EXPECT_LT((Cross(state, "s.e", "s.e") - expected.bottomRightCorner(2, 2)).norm(), 1e-12);
+  EXPECT_LT((Cross(state, "s.e", "s.c") - j.bottomRows(2) * cc).norm(), 1e-12);
+  EXPECT_EQ(state.value(e)[1], 9.0);
+}
+
 TEST(State, CloneIsFullyCorrelatedWithItsSource) {
   State state = Abc();
   state.Clone(state.layout().Find("s.c"), "s.c_then");

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <memory>
+
 #include "alidade/plugin.h"
+#include "support/landmark_sensors.h"
 
 namespace {
 
@@ -26,6 +29,25 @@ struct Ratio : alidade::Sensor<alidade::Vec<1>, alidade::Vec<1>, alidade::Vec<1>
   }
 };
 
+template <class Model>
+void Emplace(double sigma, AlidadeInstance* instance) {
+  using Holder = alidade::detail::Holder<Model>;
+  alidade::detail::PublishSensor(std::make_unique<Holder>(Model(sigma)), instance);
+}
+
+/// Pixels of a landmark, in the form that `landmarks.form` says.
+void MakePixels(alidade::Params& p, AlidadeInstance* instance) {
+  using namespace alidade::testing;  // NOLINT(google-build-using-namespace): the test sensors
+  const int form = p.Choice("landmarks.form", {"inverse_depth", "anchored", "xyz"},
+                            "how landmarks are written", 0);
+  const double sigma = p.Positive("sigma_px", "px", "noise, 1 sigma") /
+                       p.Positive("camera.focal_px", "px", "focal length");
+  if (form == 0) Emplace<InverseDepthPixels>(sigma, instance);
+  if (form == 1) Emplace<AnchoredPixels<ALIDADE_ROLE_SHARED>>(sigma, instance);
+  if (form == 2) Emplace<XyzPixels>(sigma, instance);
+}
+
 }  // namespace
 
-ALIDADE_PLUGIN(ALIDADE_SENSOR(Ratio, "ratio", "a / b", ""))
+ALIDADE_PLUGIN(ALIDADE_SENSOR(Ratio, "ratio", "a / b", ""),
+               ALIDADE_SENSOR_BY(MakePixels, "pixels", "pixels of a landmark", ""))

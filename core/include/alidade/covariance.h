@@ -45,13 +45,15 @@ class Covariance {
   /// Rows in use, gaps included; a gap has zero rows and columns.
   int size() const { return size_; }
 
-  /// Takes `rows` > 0 new rows, uncorrelated and zero, and returns their offset; a gap of that size
-  /// is used before the end. Amortised O(n).
+  /// Takes `rows` > 0 new rows, uncorrelated and zero, and returns their offset; a gap that holds
+  /// them, the smallest, is used before the end. Amortised O(n).
   int Add(int rows);
   /// Gives [offset, offset + rows) back. O(n).
   void Release(int offset, int rows);
-  /// Moves rows to a released place of the same size (ContractViolation: not released) and releases
-  /// where they were. O(n).
+  /// Where the smallest gap of at least `rows` rows begins; -1: there is none.
+  int FindGap(int rows) const;
+  /// Moves rows to a released place (ContractViolation: not released) and releases where they were.
+  /// O(n).
   void Move(int from, int to, int rows);
 
   /// P(a, b) as a copy, rows x columns. [a, a + rows) and [b, b + columns) are the same rows, or
@@ -103,6 +105,8 @@ class Covariance {
   Eigen::MatrixXd Dense() const;
 
  private:
+  void TakeFromGap(int offset, int rows);
+
   Eigen::MatrixXd p_;  ///< capacity x capacity
   int size_ = 0;
   std::vector<std::pair<int, int>> gaps_;  ///< (offset, rows)

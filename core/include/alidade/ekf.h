@@ -75,6 +75,7 @@ class Ekf : public Estimator {
   /// An estimator derived from this one that keeps more from frame to frame overrides both.
   std::unique_ptr<Snapshot> Save() const override;
   void Restore(const Snapshot& snapshot) override;
+  std::vector<LandmarkEstimate> landmarks() const override;
 
  protected:  // for the estimators that share how frames are stepped to, read, gated and reported
   /// @cond
@@ -109,6 +110,8 @@ class Ekf : public Estimator {
     std::vector<double> r, l, pht;       ///< R and its factor, m x m; P H', n x m by columns
     double weight = 1.0;                 ///< w of the robust loss; R is divided by it
     const SensorPlan* zeroed = nullptr;  ///< whose zeros H holds
+    SensorPlan* plan = nullptr;          ///< of the landmark that it measures; null: the sensor's
+    const SensorModel* model = nullptr;  ///< of the landmark's form; null: the sensor's
   };
 
   /// Moves state and covariance by dt_s; false, and GiveUp called, where that cannot be.
@@ -147,7 +150,10 @@ class Ekf : public Estimator {
     return system_.sensors[static_cast<std::size_t>(row.sensor)];
   }
   const SensorPlan& PlanOf(const Row& row) const {
-    return plans_[static_cast<std::size_t>(row.sensor)];
+    return row.plan != nullptr ? *row.plan : plans_[static_cast<std::size_t>(row.sensor)];
+  }
+  const SensorModel& ModelOf(const Row& row) const {
+    return row.model != nullptr ? *row.model : BindingOf(row).model;
   }
 
   /// Tells why h of a row could not be had.
@@ -159,6 +165,7 @@ class Ekf : public Estimator {
 
   struct Kept;  ///< the snapshot
   class Small;  ///< the fast path of a filter of few states that are all vectors
+  class Landmarks;
 
   void Bind();
   void KeepFirstEstimates();
@@ -203,11 +210,12 @@ class Ekf : public Estimator {
   State state_;
   std::vector<SensorPlan> plans_;  ///< by sensor
   std::vector<MotionPlan> motions_;
-  std::unique_ptr<Small> small_;  ///< null where the general path is the only one
-  bool small_is_known_ = false;   ///< whether small_ fits the plans
-  std::vector<int> order_;        ///< rows of P in the order of the layout; empty: as they are
-  bool waiting_ = false;          ///< a block has no value yet
-  bool considering_ = false;      ///< a block is considered
+  std::unique_ptr<Landmarks> landmarks_;  ///< null where the system has none
+  std::unique_ptr<Small> small_;          ///< null where the general path is the only one
+  bool small_is_known_ = false;           ///< whether small_ fits the plans
+  std::vector<int> order_;    ///< rows of P in the order of the layout; empty: as they are
+  bool waiting_ = false;      ///< a block has no value yet
+  bool considering_ = false;  ///< a block is considered
   std::vector<std::vector<double>> first_;       ///< estimates of stationary blocks, by block
   const Eigen::VectorXd* correction_ = nullptr;  ///< dx of the update; null: K r
   // Memory that is kept from frame to frame.

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "alidade/landmarks.h"
 #include "alidade/source.h"
 #include "alidade/state.h"
 #include "alidade/system.h"
@@ -81,6 +82,7 @@ class UpdateReport {
   }
   void Clear() {
     stale = false;
+    landmarks = {};
     ClearMeasurements();
     events.clear();
   }
@@ -88,6 +90,7 @@ class UpdateReport {
 
   bool stale = false;  ///< the frame is older than the state, which stays as it was
   std::vector<Event> events;
+  LandmarkCounts landmarks;
 
  private:
   std::vector<MeasurementReport> pool_;  ///< the first count_ are in use
@@ -127,6 +130,8 @@ class Estimator {
   /// bits as if nothing had come between.
   virtual void Restore(const Snapshot& /*snapshot*/) {}
   virtual const State& state() const = 0;
+  /// The landmarks in the state, by id.
+  virtual std::vector<LandmarkEstimate> landmarks() const { return {}; }
   virtual Stamp stamp() const = 0;
   /// True once the filter left the domain of its sensors or lost its numbers; see the events.
   virtual bool diverged() const = 0;

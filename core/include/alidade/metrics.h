@@ -23,7 +23,8 @@ namespace alidade {
 ///   nis.mean:SENSOR     mean of r' S^-1 r / dof over accepted measurements
 ///   final:BLOCK         |e| at the last stamp
 ///
-/// Over a segment the key ends in `@SEGMENT` (not lag_ms and final). Counts are `OUTCOME:SENSOR`. A
+/// Over a segment the key ends in `@SEGMENT` (not lag_ms and final). Counts are `OUTCOME:SENSOR`,
+/// and of landmarks `landmarks.initialised`, `.deleted`, `.converted` and `.negative`. A
 /// truth is named like the block, `target.depth`, or like its last component where that is unique.
 /// A frame older than the state, as before `start_s`, adds to the counts alone.
 /// A metric without a stamp to take it from is left out; an estimate that is not finite makes its

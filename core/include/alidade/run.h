@@ -91,6 +91,8 @@ struct EstimatorResult {
   bool diverged = false;
   std::vector<Event> events;
   std::vector<std::vector<std::string>> unobservable;
+  /// The map at the end, for `landmarks.csv`; none where the estimator has no landmarks at all.
+  std::optional<std::vector<LandmarkEstimate>> landmarks;
 };
 
 struct RunResult {

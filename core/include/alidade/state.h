@@ -45,13 +45,14 @@ class StateLayout {
  private:
   friend class State;
   std::vector<Block> blocks_;
+  std::vector<BlockId> dropped_;  ///< their places wait for the next block
 };
 
 /// Layout, values and covariance of the blocks, kept consistent. Copying it is a snapshot.
 ///
 /// x is one buffer of ambient values, P the covariance in the tangent. Adding or removing
-/// a block moves O(n) numbers: a removed block leaves a gap that the last block of the same size
-/// fills, or that a later block of that size takes.
+/// a block moves O(n) numbers: a removed block leaves a gap that the last block fills where it is
+/// no larger, or that a later one takes.
 class State {
  public:
   State() = default;
@@ -78,10 +79,17 @@ class State {
   /// block; `own` = J_y_n R J_y_n'.
   void Initialise(BlockId id, const double* value, const std::vector<BlockId>& from,
                   const std::vector<Eigen::MatrixXd>& jacobians, const Eigen::MatrixXd& own);
+  /// The same of several blocks at once, correlated through n: the values, and the rows of
+  /// `jacobians` and `own`, one block after the other.
+  void Initialise(const std::vector<BlockId>& ids, const double* values,
+                  const std::vector<BlockId>& from, const std::vector<Eigen::MatrixXd>& jacobians,
+                  const Eigen::MatrixXd& own);
   /// Declares `name` as a copy of `source`, fully correlated with it.
   BlockId Clone(BlockId source, std::string name);
   /// Drops the block; the rest keeps its value and covariance.
   void Marginalise(BlockId id);
+  /// Marginalise, and gives the id back too: a block declared later may have it.
+  void Drop(BlockId id);
   /// Estimated <-> considered; the correlations stay.
   void Consider(BlockId id, bool considered);
   /// Replaces the block by y = g(x_id) of another geometry, J = dy/dx in the tangents.
@@ -95,6 +103,7 @@ class State {
 
  private:
   void PlaceValue(BlockId id, const double* value);
+  void FillGaps();
 
   StateLayout layout_;
   std::vector<double> values_;

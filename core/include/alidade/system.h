@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "alidade/config.h"
+#include "alidade/landmarks.h"
 #include "alidade/models.h"
 #include "alidade/plugin_host.h"
 #include "alidade/robust_loss.h"
@@ -29,13 +30,19 @@ struct RoleBinding {
   LineariseAt linearise_at = LineariseAt::kPrediction;
 };
 
-/// stream -> sensor model -> the blocks that fill its roles.
+/// stream -> sensor model -> the blocks that fill its roles. The roles of a landmark, which come
+/// last, have none.
 struct SensorBinding {
   std::string name;
   std::string stream;
   SensorModel model;
   std::vector<RoleBinding> roles;
   RobustLoss loss = {};  ///< on the Mahalanobis distance of the innovation
+  /// The same sensor of landmarks that are xyz, where `model` is of another form and landmarks may
+  /// become xyz or start as such. Its other roles are those of `model`.
+  std::optional<SensorModel> xyz = {};
+  /// How those of its matches are found that agree; none: each is gated on its own alone.
+  std::optional<OnePointRansac> association = {};
 };
 
 /// Motion model -> the blocks it moves.
@@ -60,7 +67,8 @@ struct System {
   std::vector<MotionBinding> motions;
   std::vector<SensorBinding> sensors;
   std::vector<Prior> priors;
-  std::optional<double> start_s;  ///< time of the priors; else the first frame's
+  std::optional<double> start_s;             ///< time of the priors; else the first frame's
+  std::optional<LandmarkOptions> landmarks;  ///< there where a sensor measures landmarks
 
   /// The state before the first measurement: all blocks with a given prior are present.
   State InitialState() const;
@@ -68,14 +76,14 @@ struct System {
   int FindSensor(std::string_view name) const;
 };
 
-/// Reads `state`, `sensors` and `start_s` of a config's root. `only` keeps named sensors, in its
-/// own order, and the state entries that they touch; empty: everything.
+/// Reads `state`, `sensors`, `landmarks`, `camera` and `start_s` of a config's root. `only` keeps
+/// named sensors, in its own order, and the state entries that they touch; empty: everything.
 /// Errors: kBadConfig with place and remedy, kPlugin.
 System BuildSystem(const Node& root, const PluginHost& host, const std::vector<std::string>& only);
 
 /// Directions of the initial state that no sensor can see, found at a generic point near the prior
 /// from the rank of the observability matrix [H; H F; H F^2; ...]: for each one the names of the
-/// block elements it moves.
+/// block elements it moves. Not of a system with landmarks.
 std::vector<std::vector<std::string>> UnobservableDirections(const System& system);
 
 }  // namespace alidade

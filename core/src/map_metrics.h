@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "alidade/landmarks.h"
+#include "alidade/source.h"
+
+namespace alidade::internal {
+
+/// Over the landmarks of a finite place whose true one the source knows:
+///
+///   map.rmse         sqrt(mean |p - p_true|^2), m
+///   map.sim3.rmse    the same of s R p + t, the similarity that makes it least [Umeyama1991]
+///   map.sim3.scale   s; both of three landmarks or more that are not on one line
+std::map<std::string, double> MapMetrics(const std::vector<LandmarkEstimate>& landmarks,
+                                         const Source& source);
+
+}  // namespace alidade::internal

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "alidade/system.h"
+
+namespace alidade::internal {
+
+/// The map `landmarks` of the config's root, as the sensors need it; none where no sensor measures
+/// landmarks. Errors: kBadConfig where it does not fit them.
+std::optional<LandmarkOptions> ReadLandmarks(const Node& root,
+                                             const std::vector<SensorBinding>& sensors);
+
+}  // namespace alidade::internal

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// 1-point RANSAC among the matches of a frame.
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+
+#include "support/landmark_models.h"
+
+namespace alidade::testing {
+namespace {
+
+constexpr int kPoints = 40;
+constexpr double kNoise = 0.001;
+
+Eigen::Vector3d PointAt(int i) {
+  return {0.1 * (i % 8 - 4), 0.1 * (i / 8 - 2), 2.0 + 0.1 * (i % 5)};
+}
+
+/// A known map, and a camera that may have moved by 0.1 m since.
+Ekf Filter(bool ransac, double gate = 0.999) {
+  LandmarkOptions options = WithPrior();
+  for (int i = 0; i < kPoints; ++i) {
+    const Eigen::Vector3d p = PointAt(i);
+    options.known.push_back({i, {p[0], p[1], p[2]}, 0.002});
+  }
+  System system = MapSystem(InverseDepthPixels(kNoise), options, 0.1);
+  if (ransac) system.sensors[0].association = OnePointRansac{};
+  EkfOptions gated;
+  gated.gate = gate;
+  return {system, gated, {{"tracks", 2}}};
+}
+
+/// What the camera sees at `r`; each `every`-th match has moved sideways, all alike.
+Frame Matches(const Eigen::Vector3d& r, int every, double aside) {
+  Random random(5);
+  std::vector<Sighting> sights;
+  for (int i = 0; i < kPoints; ++i) {
+    const Eigen::Vector3d h = PointAt(i) - r;
+    const double u = h[0] / h[2] + kNoise * random.Normal(),
+                 v = h[1] / h[2] + kNoise * random.Normal();
+    sights.push_back({i, {u + (i % every == 0 ? aside : 0.0), v}});
+  }
+  return Sights(0.0, sights);
+}
+
+int Accepted(const UpdateReport& report, int every, bool wrong) {
+  int count = 0;
+  for (const MeasurementReport& entry : report.measurements()) {
+    count += (entry.landmark % every == 0) == wrong && entry.outcome == Outcome::kAccepted;
+  }
+  return count;
+}
+
+TEST(OnePointRansac, LeavesOutWhatTheGateOfEachCannot) {
+  const Eigen::Vector3d r(0.05, -0.03, 0.02);
+  // 0.03 aside: twenty times the noise, yet within what the camera may have moved.
+  const Frame frame = Matches(r, 3, 0.03);
+  Ekf gate_alone = Filter(false), ekf = Filter(true);
+  EXPECT_EQ(Accepted(gate_alone.Process(frame), 3, true), 14);
+  const UpdateReport& report = ekf.Process(frame);
+  EXPECT_EQ(Accepted(report, 3, true), 0);
+  EXPECT_GE(Accepted(report, 3, false), 25);
+  EXPECT_GT((PositionOf(gate_alone) - r).norm(), 0.01);
+  // As if only those that are right had been there.
+  Frame right = frame;
+  std::erase_if(right.measurements, [](const Measurement& m) { return m.landmark % 3 == 0; });
+  Ekf told = Filter(false);
+  told.Process(right);
+  EXPECT_LT((PositionOf(ekf) - PositionOf(told)).norm(), 1e-3);
+}
+
+TEST(OnePointRansac, TriesFewerTheMoreAgree) {
+  const Eigen::Vector3d r(0.05, -0.03, 0.0);
+  Ekf all = Filter(true), some = Filter(true);
+  const int few = all.Process(Matches(r, 1000, 0.0)).landmarks.hypotheses;
+  const int more = some.Process(Matches(r, 2, 0.05)).landmarks.hypotheses;
+  EXPECT_LE(few, 4);
+  EXPECT_GT(more, few);
+  EXPECT_LT(more, kPoints);
+}
+
+TEST(OnePointRansac, RescuesWhatFitsTheUpdatedState) {
+  // One match does not tell how far the camera went ahead: others then miss it by more than noise.
+  const Frame frame = Matches({0.05, -0.03, 0.08}, 1000, 0.0);
+  Ekf ekf = Filter(true);
+  const UpdateReport& report = ekf.Process(frame);
+  EXPECT_GT(report.landmarks.rescued, 0);
+  const auto accepted =
+      std::ranges::count(report.measurements(), Outcome::kAccepted, &MeasurementReport::outcome);
+  EXPECT_GE(accepted, kPoints - 2);
+  // Each match counts once: the error is what P says.
+  const Eigen::Vector3d error = PositionOf(ekf) - Eigen::Vector3d(0.05, -0.03, 0.08);
+  const Eigen::MatrixXd p = ekf.state().covariance().Block(0, 3, 0, 3);
+  EXPECT_LT(error.dot(p.llt().solve(error)), 16.3);  // chi2(0.999, 3)
+}
+
+TEST(OnePointRansac, IsTheSameTwice) {
+  const Frame frame = Matches({0.05, -0.03, 0.02}, 3, 0.03);
+  Ekf a = Filter(true), b = Filter(true);
+  a.Process(frame);
+  b.Process(frame);
+  EXPECT_EQ(a.state().values(), b.state().values());
+}
+
+}  // namespace
+}  // namespace alidade::testing

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What a run tells of its landmarks.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "core/src/map_metrics.h"
+#include "support/landmark_models.h"
+#include "support/recording.h"
+
+namespace alidade::testing {
+namespace {
+
+/// Four points beside a camera that moves right, and an odometer that a static block is read by.
+class Street : public Source {
+ public:
+  const std::vector<StreamInfo>& streams() const override { return streams_; }
+  const std::vector<StreamInfo>& truths() const override { return truths_; }
+  bool Next(Frame& frame) override {
+    if (next_ == 20) return false;
+    const double x = 0.1 * next_;
+    std::vector<Sighting> sights;
+    for (int id = 0; id < 4; ++id) {
+      const std::array<double, 3> p = *TrueLandmark(id);
+      if (id == 3 && next_ < 10) continue;
+      sights.push_back({id, {p[0] - x, p[1], p[2]}});
+    }
+    frame = Sights(0.1 * next_, sights);
+    frame.truth = {{x, 0.0, 0.0}};
+    ++next_;
+    return true;
+  }
+  std::optional<std::array<double, 3>> TrueLandmark(std::int64_t id) const override {
+    if (id > 3) return std::nullopt;
+    const auto i = static_cast<double>(id);
+    return std::array{1.0 + 0.5 * i, 0.3 * i * i, 2.0 - 0.1 * i};
+  }
+
+ private:
+  std::vector<StreamInfo> streams_ = {{"tracks", 3}};
+  std::vector<StreamInfo> truths_ = {{"cam.position", 3}};
+  int next_ = 0;
+};
+
+Experiment OnTheStreet() {
+  Experiment experiment;
+  experiment.source = std::make_unique<Street>();
+  NamedEstimator named;
+  named.name = "ekf";
+  named.type = "ekf";
+  named.system = MapSystem(Offset(0.05), {}, 0.1);
+  named.estimator = std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+  experiment.estimators.push_back(std::move(named));
+  return experiment;
+}
+
+TEST(LandmarkRecords, TheMapAtTheEndIsWritten) {
+  const TemporaryFolder folder;
+  Experiment experiment = OnTheStreet();
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  const RunResult result = RunInto(recorder, experiment);
+  recorder.Finish(result);
+  ASSERT_EQ(result.status, RunStatus::kOk) << result.reason;
+  const std::vector<std::string> lines = Lines(folder / "out/ekf/landmarks.csv");
+  ASSERT_EQ(lines.size(), 5u);
+  EXPECT_EQ(lines[0],
+            "id,generation,form,x,y,z,sigma_x,sigma_y,sigma_z,inverse_distance,"
+            "sigma_inverse_distance,first_s,last_s,tried,accepted");
+  const std::vector<std::string> last = Cells(lines[4]);
+  ASSERT_EQ(last.size(), 15u);
+  EXPECT_EQ(last[0], "3");
+  EXPECT_EQ(last[2], "xyz");
+  EXPECT_NEAR(std::stod(last[3]), 2.5, 3.0 * std::stod(last[6]));
+  EXPECT_EQ(last[9], "");
+  EXPECT_EQ(last[11], "1.000000000");
+  EXPECT_EQ(last[13], "9");
+  const LandmarkEstimate estimate = experiment.estimators[0].estimator->landmarks()[3];
+  EXPECT_DOUBLE_EQ(std::stod(last[6]), std::sqrt(estimate.covariance(0, 0)));
+}
+
+TEST(LandmarkRecords, OtherFilesHaveTheBlocksOfTheSystemAlone) {
+  const TemporaryFolder folder;
+  Experiment experiment = OnTheStreet();
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  recorder.Finish(RunInto(recorder, experiment));
+  EXPECT_EQ(Lines(folder / "out/ekf/estimates.csv")[0],
+            "t_s,cam.position.x,cam.position.y,cam.position.z,sigma:cam.position.x,"
+            "sigma:cam.position.y,sigma:cam.position.z");
+  EXPECT_EQ(Lines(folder / "out/ekf/gains.csv"), std::vector<std::string>{"t_s,sensor"});
+  EXPECT_EQ(Cells(Lines(folder / "out/ekf/innovations.csv")[1])[3], "0");
+}
+
+TEST(LandmarkRecords, ResultsHaveCountsAndTheMapsErrors) {
+  Experiment experiment = OnTheStreet();
+  const RunResult result = alidade::Run(experiment, {});
+  const EstimatorResult& one = result.estimators.at(0);
+  EXPECT_EQ(one.counts.at("initialised:tracks"), 4);
+  EXPECT_EQ(one.counts.at("landmarks.initialised"), 4);
+  EXPECT_EQ(one.counts.at("landmarks.deleted"), 0);
+  EXPECT_TRUE(one.counts.contains("landmarks.converted"));
+  EXPECT_TRUE(one.counts.contains("landmarks.negative"));
+  for (const char* key :
+       {"map.rmse", "map.sim3.rmse", "map.sim3.scale", "final:cam.position", "nees.mean:cam"}) {
+    EXPECT_TRUE(one.metrics.contains(key)) << key;
+  }
+  double sum = 0.0;
+  for (const LandmarkEstimate& landmark : *one.landmarks) {
+    const auto p = experiment.source->TrueLandmark(landmark.id);
+    sum += (landmark.position - Eigen::Map<const Eigen::Vector3d>(p->data())).squaredNorm();
+  }
+  EXPECT_NEAR(one.metrics.at("map.rmse"), std::sqrt(sum / 4.0), 1e-12);
+}
+
+TEST(MapMetrics, ASimilarityIsNoErrorAfterAlignment) {
+  const Street source;
+  const Eigen::AngleAxisd turn(0.3, Eigen::Vector3d(1, 2, 3).normalized());
+  std::vector<LandmarkEstimate> map;
+  for (int id = 0; id < 4; ++id) {
+    const auto p = source.TrueLandmark(id);
+    LandmarkEstimate& one = map.emplace_back();
+    one.id = id;
+    one.position = 2.0 * (turn * Eigen::Map<const Eigen::Vector3d>(p->data())) +
+                   Eigen::Vector3d(1.0, -2.0, 0.5);
+  }
+  map.emplace_back().id = 77;  // of no known place
+  map.back().position = Eigen::Vector3d(9, 9, 9);
+  const auto metrics = internal::MapMetrics(map, source);
+  EXPECT_GT(metrics.at("map.rmse"), 1.0);
+  EXPECT_LT(metrics.at("map.sim3.rmse"), 1e-12);
+  EXPECT_NEAR(metrics.at("map.sim3.scale"), 0.5, 1e-12);
+}
+
+TEST(MapMetrics, PointsOnALineAreNotAligned) {
+  const Street source;
+  std::vector<LandmarkEstimate> map(3);
+  for (int id = 0; id < 3; ++id) {
+    map[static_cast<std::size_t>(id)].id = id;
+    map[static_cast<std::size_t>(id)].position = Eigen::Vector3d(id, 0.0, 0.0);
+  }
+  const auto metrics = internal::MapMetrics(map, source);
+  EXPECT_TRUE(metrics.contains("map.rmse"));
+  EXPECT_FALSE(metrics.contains("map.sim3.rmse"));
+}
+
+}  // namespace
+}  // namespace alidade::testing

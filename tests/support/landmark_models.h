@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "alidade/ekf.h"
+#include "alidade/in_process.h"
+#include "alidade/random.h"
+#include "support/landmark_sensors.h"
+
+/// Small systems with landmarks composed in C++, for tests.
+namespace alidade::testing {
+
+/// Block `cam.position`, known at first to `sigma_0`, and the sensor `tracks`.
+template <class Model>
+System MapSystem(const Model& model, const LandmarkOptions& options, double sigma_0 = 0.0) {
+  System system;
+  const MotionModel walk = InProcessMotion(Walk(0.1), "walk");
+  const BlockId id = system.layout.Declare("cam.position", "cam", walk.blocks()[0]);
+  system.motions.push_back({"cam", walk, {id}});
+  Prior prior;
+  prior.block = id;
+  prior.mean = {0.0, 0.0, 0.0};
+  prior.covariance = sigma_0 * sigma_0 * Eigen::Matrix3d::Identity();
+  system.priors.push_back(prior);
+  SensorBinding binding{"tracks", "tracks", InProcessSensor(model, "tracks"), {}};
+  binding.roles.resize(binding.model.roles().size());
+  binding.roles[0].block = id;
+  if constexpr (Model::Measurement::kAmbient == 2) {
+    binding.xyz = InProcessSensor(XyzPixels(model.sigma), "xyz");
+  }
+  system.sensors.push_back(binding);
+  system.landmarks = options;
+  return system;
+}
+
+inline LandmarkOptions WithPrior(double inverse_distance = 0.5, double sigma = 0.25) {
+  LandmarkOptions options;
+  options.prior = LandmarkOptions::Prior{inverse_distance, sigma, 0};
+  return options;
+}
+
+/// A frame of stream 0 with the given landmarks.
+struct Sighting {
+  std::int64_t id;
+  std::vector<double> z;
+};
+inline Frame Sights(double t_s, const std::vector<Sighting>& sights) {
+  Frame frame;
+  frame.stamp = StampFromSeconds(t_s);
+  for (const Sighting& sight : sights) {
+    frame.measurements.push_back({frame.stamp, 0, sight.id, sight.z, {}});
+  }
+  return frame;
+}
+
+inline Eigen::Vector3d PositionOf(const Estimator& filter) {
+  const State& state = filter.state();
+  return Eigen::Map<const Eigen::Vector3d>(state.value(state.layout().Find("cam.position")));
+}
+
+}  // namespace alidade::testing

@@ -75,7 +75,7 @@ inline Quaternion ReadOrientation(const Node& node) {
   return ToArray(Eigen::Quaterniond(rotation).normalized());
 }
 
-/// world_from_cam of a camera at `from` that looks at `at`: z ahead, and y down as far as z lets it.
+/// world_from_cam of a camera at `from` that looks at `at`: z ahead, y as far down as z lets it.
 ///
 ///   z = (at - from) / |at - from|,  x = z x up / |z x up|,  y = z x x
 ///

@@ -11,7 +11,7 @@
 #include "alidade/config.h"
 #include "alidade/random.h"
 
-/// The points of a scene, from the config's `source.points`. Their places in the list are their ids.
+/// The points of a scene, from the config's `source.points`. Their places in the list are ids.
 namespace alidade::scene {
 
 inline Eigen::Vector3d ReadVector(const Node& node) {

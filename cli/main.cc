@@ -55,6 +55,7 @@ void Describe(CLI::App& program, Action& action, const std::string& command_line
   program.require_subcommand(1);
   AddRun(program, action, command_line);
   AddSweep(program, action);
+  AddSimulate(program, action);
   AddExplain(program, action);
   AddPlugins(program, action);
   AddCheck(program, action);

@@ -1,19 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <vector>
 
+#include "alidade/line_reader.h"
 #include "alidade/source.h"
-#include "csv_cell.h"
+#include "alidade/text_cell.h"
 #include "csv_layout.h"
-#include "line_reader.h"
 
 namespace alidade {
 
@@ -115,7 +113,7 @@ class CsvSource : public Source {
     header_line_ = reader_.number();
     Split();
     std::vector<std::string> names;
-    for (const std::string_view cell : cells_) names.emplace_back(csv_detail::Trim(cell));
+    for (const std::string_view cell : cells_) names.emplace_back(cell::Trim(cell));
     names_ = std::move(names);
     ResolveColumns(names_, reader_.name(), layout_);
   }
@@ -160,7 +158,7 @@ class CsvSource : public Source {
   bool ReadField(const CsvField& field, std::vector<double>& values) const {
     values.clear();
     for (const CsvColumn& column : field.columns) {
-      if (Missing(csv_detail::Trim(cells_[column.index]))) continue;
+      if (Missing(cell::Trim(cells_[column.index]))) continue;
       const double x = ReadNumber(column);
       const double value = field.reciprocal ? field.gain / x : field.gain * x;
       if (!std::isfinite(value)) {
@@ -174,30 +172,20 @@ class CsvSource : public Source {
   }
 
   double ReadNumber(const CsvColumn& column) const {
-    std::string_view text = csv_detail::Trim(cells_[column.index]);
-    const bool plus = text.starts_with('+');
-    if (plus) text.remove_prefix(1);
     double value = 0.0;
-    const char* last = text.data() + text.size();
-    const auto [end, error] = std::from_chars(text.data(), last, value);
-    if (error == std::errc::invalid_argument || end != last || (plus && text.starts_with('-'))) {
-      FailCell(column, "is not a number");
-    }
-    if (error == std::errc::result_out_of_range) FailCell(column, "is too large or too small");
-    if (!std::isfinite(value)) FailCell(column, "is not finite");
+    const char* const wrong = cell::ParseNumber(cell::Trim(cells_[column.index]), value);
+    if (wrong != nullptr) FailCell(column, wrong);
     return value;
   }
 
   Stamp ReadStamp() const {
     if (!layout_.time) return StampFromSeconds(static_cast<double>(rows_) / layout_.rate_hz);
     const CsvColumn& column = *layout_.time;
-    const double t_s =
-        ReadNumber(column) * std::pow(10.0, static_cast<double>(layout_.time_digits) - 9.0);
+    const double value = ReadNumber(column);
+    const double t_s = value * std::pow(10.0, static_cast<double>(layout_.time_digits) - 9.0);
     if (!(std::abs(t_s) < 9.2e9)) FailCell(column, "is beyond 292 years", "-9.2e9 s to 9.2e9 s");
-    const std::string_view text = csv_detail::Trim(cells_[column.index]);
-    const bool has_exponent = text.find_first_of("eE") != std::string_view::npos;
     const Stamp stamp =
-        has_exponent ? StampFromSeconds(t_s) : csv_detail::ExactStamp(text, layout_.time_digits);
+        cell::ParseStamp(cell::Trim(cells_[column.index]), value, layout_.time_digits);
     if (!any_order_ && rows_ > 0 && stamp <= last_stamp_) {
       const bool late = stamp < last_stamp_;
       FailCell(
@@ -218,8 +206,7 @@ class CsvSource : public Source {
                              std::string_view expected = "a finite number") const {
     const int at = static_cast<int>(Column(cells_[column.index]));
     Fail(Place{reader_.name(), reader_.number(), at}, column.name,
-         '\'' + csv_detail::Harmless(csv_detail::Trim(cells_[column.index])) + "' " + what,
-         expected);
+         '\'' + cell::Harmless(cell::Trim(cells_[column.index])) + "' " + what, expected);
   }
   [[noreturn]] static void Fail(const Place& place, std::string_view key, std::string_view what,
                                 std::string_view expected) {

@@ -9,7 +9,7 @@
 
 #include "alidade/config.h"
 #include "alidade/source.h"
-#include "csv_cell.h"
+#include "alidade/text_cell.h"
 
 namespace alidade {
 
@@ -137,11 +137,11 @@ inline void Resolve(const std::vector<std::string>& names, const std::string& fi
   if (found == names.end()) {
     std::string expected = "one of ";
     for (std::size_t i = 0; i < std::min(names.size(), kListed); ++i) {
-      expected += (i > 0 ? ", " : "") + csv_detail::Harmless(names[i]);
+      expected += (i > 0 ? ", " : "") + cell::Harmless(names[i]);
     }
     if (names.size() > kListed) expected += ", ...";
     column.node.Fail("no column '" + column.name + "' in " + file, expected,
-                     csv_detail::Harmless(Nearest(column.name, names)));
+                     cell::Harmless(Nearest(column.name, names)));
   }
   if (std::find(found + 1, names.end(), column.name) != names.end()) {
     column.node.Fail(file + " has two columns '" + column.name + "'", "one");

@@ -9,6 +9,7 @@
 #include "alidade/check.h"
 #include "alidade/static_ekf.h"
 #include "host_fixture.h"
+#include "motion_models/odometry_pose.h"
 #include "motion_models/quaternion_pose.h"
 #include "sensors/depth_feature.h"
 #include "sensors/inverse_depth_feature.h"
@@ -53,10 +54,12 @@ struct Seen : Sensor<G, G> {
 
 using Means = std::vector<std::vector<double>>;
 
-/// Adds the state entry `name`, whose blocks start at `means`, each element known to 0.05.
+/// Adds the state entry `name`, whose blocks start at `means`, each element known to 0.05; a control
+/// input comes on the stream `NAME.input`.
 void AddMotion(System& system, const std::string& name, const MotionModel& model,
                const Means& means) {
   MotionBinding binding{name, model, {}};
+  if (model.has_input()) binding.input = {name + ".input"};
   for (std::size_t i = 0; i < means.size(); ++i) {
     const Space& space = model.blocks()[i];
     Prior prior;
@@ -81,7 +84,25 @@ void AddAllSeen(System& system, std::tuple<G...>*) {
   (AddSeen<G>(system), ...);
 }
 
-/// Frames in which every sensor sees the means of the priors, with noise of about its own size.
+/// The streams of the sensors, then those of the control inputs.
+std::vector<StreamInfo> AllStreams(const System& system) {
+  std::vector<StreamInfo> streams = StreamsOf(system);
+  for (const MotionBinding& motion : system.motions) {
+    if (!motion.model.has_input()) continue;
+    streams.push_back({motion.input.stream, motion.model.input().geometry.ambient});
+  }
+  return streams;
+}
+
+/// A control input of `size` elements that goes on for ever.
+std::vector<double> InputOf(int size) {
+  std::vector<double> u;
+  for (int i = 0; i < size; ++i) u.push_back(0.03 - 0.01 * i);
+  return u;
+}
+
+/// Frames in which every sensor sees the means of the priors, with noise of about its own size, and
+/// the control inputs come.
 std::vector<Frame> FramesOf(const System& system, int count) {
   std::vector<Frame> frames(static_cast<std::size_t>(count));
   for (int k = 0; k < count; ++k) {
@@ -105,16 +126,22 @@ std::vector<Frame> FramesOf(const System& system, int count) {
       geometry.Plus(z.data(), d.data(), z.data());
       frame.measurements.push_back({frame.stamp, static_cast<int>(s), -1, z, {}});
     }
+    const std::vector<StreamInfo> streams = AllStreams(system);
+    for (std::size_t s = system.sensors.size(); s < streams.size(); ++s) {
+      frame.measurements.push_back(
+          {frame.stamp, static_cast<int>(s), -1, InputOf(streams[s].size), {}});
+    }
   }
   return frames;
 }
 
-/// The engine and `filter`, whose blocks are seen one by one, then by `last`, over the same frames.
-template <class Filter, class Last>
-void ExpectSame(const System& system, Filter filter, const Last& last) {
+/// The engine and `filter`, whose blocks are seen one by one, then by `last`, over the same frames;
+/// `inputs` are the control inputs that `filter` takes.
+template <class Filter, class Last, class... Inputs>
+void ExpectSame(const System& system, Filter filter, const Last& last, Inputs... inputs) {
   EkfOptions options;
   options.fuse = Fuse::kPerMeasurement;
-  Ekf engine(system, options, StreamsOf(system));
+  Ekf engine(system, options, AllStreams(system));
   constexpr std::make_index_sequence<static_cast<std::size_t>(Filter::kBlocks)> blocks{};
   const auto set = [&](auto b) {
     const Prior& prior = system.priors[b];
@@ -127,7 +154,7 @@ void ExpectSame(const System& system, Filter filter, const Last& last) {
       ASSERT_EQ(m.outcome, Outcome::kAccepted);
     }
     if (frame.stamp > 0) {
-      ASSERT_EQ(filter.Predict(Seconds(frame.stamp - before)), Status::kOk);
+      ASSERT_EQ(filter.Predict(Seconds(frame.stamp - before), inputs...), Status::kOk);
     }
     before = frame.stamp;
     const auto see = [&](auto b) {
@@ -151,7 +178,7 @@ void ExpectSame(const System& system, Filter filter, const Last& last) {
 /// A model with parameters, and what the tests below need of it.
 struct Row {
   std::string model, parameters;
-  /// Around the plugin; none where the model needs a control input.
+  /// Around the plugin.
   std::function<System(const PluginHost&, const Node&)> system;
   std::function<void(const System&)> expect_static_is_engine;
   double nonlinearity;  ///< by which batch and filter may differ at the end, in sigmas
@@ -167,7 +194,13 @@ Row MotionRow(const std::string& name, const std::string& parameters, const Mode
     return result;
   };
   const auto expect = [=](const System& around) {
-    ExpectSame(around, StaticEkf<Model>(model), [](auto&, const Frame&) {});
+    const auto nothing = [](auto&, const Frame&) {};
+    if constexpr (Model::Input::kAmbient > 0) {
+      const std::vector<double> u = InputOf(Model::Input::kAmbient);
+      ExpectSame(around, StaticEkf<Model>(model), nothing, u.data());
+    } else {
+      ExpectSame(around, StaticEkf<Model>(model), nothing);
+    }
   };
   return {name, parameters, system, expect, nonlinearity};
 }
@@ -240,8 +273,9 @@ const std::vector<Row>& Rows() {
                 "{noise: {linear_acceleration: 0.4, angular_acceleration: [0.2, 0.3, 0.4]}}",
                 QuaternionPose({0.4, 0.4, 0.4}, {0.2, 0.3, 0.4}),
                 {{1.0, 2.0, 3.0}, {1, 0, 0, 0}, {0.1, 0.0, -0.1}, {0.1, -0.1, 0.0}}, 0.05),
-      {"odometry_pose", "{noise: {linear_velocity: 0.3, angular_velocity: 0.002}}", nullptr,
-       nullptr, 0.0},
+      MotionRow("odometry_pose", "{noise: {linear_velocity: 0.3, angular_velocity: 0.002}}",
+                OdometryPose({0.3, 0.3, 0.3}, {0.002, 0.002, 0.002}),
+                {{1.0, 2.0, 3.0}, {1, 0, 0, 0}}, 0.05),
       SensorRow("inverse_depth_feature", "{sigma_px: 1, " + kCamera + "}",
                 InverseDepthFeature<InverseDepth>(kSmallCamera, 1.0),
                 {kPosition, kOrientation, {0, 0, 0, 0.1, -0.2, 0.5}}),
@@ -270,22 +304,17 @@ class EveryModel : public ::testing::TestWithParam<std::size_t> {
  protected:
   const Row& row_ = Rows()[GetParam()];
   Config parameters_ = Config::FromText(row_.parameters, row_.model);
-  void SetUp() override {
-    if (!row_.system) return;
-    system_ = row_.system(Shipped(), parameters_.root());
-  }
+  void SetUp() override { system_ = row_.system(Shipped(), parameters_.root()); }
   System system_;
 };
 
 TEST_P(EveryModel, IsTheSameAsAPluginAndComposedAtCompileTime) {
-  if (!row_.system) GTEST_SKIP() << "needs a control input";
   row_.expect_static_is_engine(system_);
 }
 
 // The last estimate of the batch is the filter's where models are linear, as motions are here.
 // Without the measurements of its sensor a batch would be off by 0.1 to 0.6 sigma.
 TEST_P(EveryModel, GivesTheBatchItsFactors) {
-  if (!row_.system) GTEST_SKIP() << "needs a control input";
   const auto& entries = Shipped().entries();
   if (std::none_of(entries.begin(), entries.end(),
                    [](const PluginEntry& entry) { return entry.name == "ceres_batch"; })) {
@@ -293,8 +322,8 @@ TEST_P(EveryModel, GivesTheBatchItsFactors) {
   }
   const Config config = Config::FromText("type: ceres_batch", "batch.yaml");
   const std::unique_ptr<Estimator> batch =
-      Shipped().CreateEstimator("ceres_batch", config.root())(system_, StreamsOf(system_));
-  Ekf ekf(system_, {}, StreamsOf(system_));
+      Shipped().CreateEstimator("ceres_batch", config.root())(system_, AllStreams(system_));
+  Ekf ekf(system_, {}, AllStreams(system_));
   const std::vector<Frame> frames = FramesOf(system_, 20);
   for (const Frame& frame : frames) {
     batch->Process(frame);

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/simulate.h"
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <memory>
+
+#include "command.h"
+#include "console.h"
+
+namespace alidade::cli {
+namespace {
+
+constexpr const char* kFooter = R"(Examples:
+  alidade simulate config.yaml -o data/scene
+  alidade simulate config.yaml -o data/scene-7 --set source.seed=7
+  alidade run other.yaml --set source.path=data/scene   with source.type: tracks
+
+No estimator is made. Measurements of landmarks go to STREAM.csv as frame,feature,dim,value, others
+as frame,t_s and their values; beside them timestamps.csv, truth, map.csv and calibration.yaml.)";
+
+struct Arguments {
+  Input input;
+  std::string folder;
+  bool force = false, quiet = false;
+};
+
+ExitCode RunSimulate(const Arguments& arguments) {
+  const Config config = arguments.input.Load();
+  const std::filesystem::path path =
+      OutputFolder(arguments.folder, config, arguments.input, "data-");
+  const PluginHost host = arguments.input.Host(config);
+  StopOnSignals();
+  const SimulateResult result = Simulate(config, host, path, arguments.force, StopRequested);
+  if (!arguments.quiet) {
+    std::string text = std::to_string(result.frames) + " frames\nwrote " + path.string() + '\n';
+    for (const std::string& file : result.files) text += "  " + (path / file).string() + '\n';
+    Print(text);
+  }
+  return result.stopped ? ExitCode::kStopped : ExitCode::kOk;
+}
+
+}  // namespace
+
+void AddSimulate(CLI::App& program, Action& action) {
+  CLI::App& command = *program.add_subcommand(
+      "simulate", "Write what the source of a config gives, as files to be read again");
+  const auto arguments = std::make_shared<Arguments>();
+  arguments->input.AddTo(command);
+  AddOutput(command, arguments->folder,
+            "folder; default: the config's `output:`, or data-NAME, in runs/");
+  command.add_flag("--force", arguments->force, "replace the folder if it is there");
+  command.add_flag("--quiet", arguments->quiet, "print errors only");
+  command.footer(kFooter);
+  command.callback(
+      [&action, arguments] { action = [arguments] { return RunSimulate(*arguments); }; });
+}
+
+}  // namespace alidade::cli

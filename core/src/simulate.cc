@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/simulate.h"
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+
+#include "columns.h"
+#include "csv_file.h"
+#include "number_text.h"
+
+namespace alidade {
+namespace {
+
+using internal::CsvFile;
+using internal::OutputFile;
+using internal::RunFolder;
+
+std::unique_ptr<Source> MakeSource(const Config& config, const PluginHost& host) {
+  const Node entry = config.root().At("source", "a simulation: where measurements come from");
+  std::uint64_t seed = 1;
+  if (const auto node = entry.Find("seed")) {
+    seed = static_cast<std::uint64_t>(node->Integer(0, INT64_MAX));
+  }
+  std::unique_ptr<Source> source =
+      host.CreateSource(entry.At("type", "a source").Text(), entry, seed, config.folder());
+  entry.RejectUnread();
+  return source;
+}
+
+/// Names of the columns of a stream without landmarks.
+std::vector<std::string> ColumnsOf(const StreamInfo& stream) {
+  if (stream.name == "odometry" && stream.size == 6) {  // as source `tracks` reads it
+    return {"vx_m_s", "vy_m_s", "vz_m_s", "wx_rad_s", "wy_rad_s", "wz_rad_s"};
+  }
+  return internal::NumberedNames(stream.name, static_cast<std::size_t>(stream.size));
+}
+
+/// Indices of a truth X.position and X.orientation; none where there is no such pair.
+std::optional<std::pair<std::size_t, std::size_t>> FindPose(const std::vector<StreamInfo>& truths) {
+  constexpr std::string_view kPosition = ".position";
+  for (std::size_t p = 0; p < truths.size(); ++p) {
+    const std::string& name = truths[p].name;
+    if (truths[p].size != 3 || !name.ends_with(kPosition)) continue;
+    const std::string other = name.substr(0, name.size() - kPosition.size()) + ".orientation";
+    for (std::size_t q = 0; q < truths.size(); ++q) {
+      if (truths[q].size == 4 && truths[q].name == other) return std::pair(p, q);
+    }
+  }
+  return std::nullopt;
+}
+
+/// The files of one simulation.
+class DataFiles {
+ public:
+  DataFiles(const RunFolder& folder, const Source& source)
+      : folder_(folder), source_(source), pose_(FindPose(source.truths())) {
+    streams_.resize(source.streams().size());
+    OpenCsv(times_, "timestamps.csv", {"frame", "t_s"});
+    if (source.truths().empty()) return;
+    std::vector<std::string> header{"t_s"};
+    for (const StreamInfo& truth : source.truths()) {
+      const auto names = internal::NumberedNames(truth.name, static_cast<std::size_t>(truth.size));
+      header.insert(header.end(), names.begin(), names.end());
+    }
+    OpenCsv(truth_, "truth.csv", header);
+    if (!pose_) return;
+    tum_ = folder.Create("truth.tum");
+    names_.insert("truth.tum");
+    tum_->Write("# t x y z qx qy qz qw\n");
+  }
+
+  void Add(std::int64_t number, const Frame& frame) {
+    times_->Integer(number).Time(frame.stamp).EndRow();
+    for (const Measurement& measurement : frame.measurements) AddRow(number, measurement);
+    if (!truth_) return;
+    truth_->Time(frame.stamp);
+    for (std::size_t i = 0; i < source_.truths().size(); ++i) {
+      const auto size = static_cast<std::size_t>(source_.truths()[i].size);
+      const bool known = i < frame.truth.size() && !frame.truth[i].empty();
+      truth_->Numbers(known ? frame.truth[i].data() : nullptr, known ? size : 0, size);
+    }
+    truth_->EndRow();
+    if (pose_) AddPose(frame);
+  }
+
+  void Close() {
+    WriteMap();
+    times_->Close();
+    if (truth_) truth_->Close();
+    if (tum_) tum_->Close();
+    for (std::optional<CsvFile>& stream : streams_) {
+      if (stream) stream->Close();
+    }
+  }
+
+  const std::set<std::string>& names() const { return names_; }
+
+ private:
+  void OpenCsv(std::optional<CsvFile>& file, const std::string& name,
+               const std::vector<std::string>& header) {
+    file.emplace(folder_, name, header);
+    names_.insert(name);
+  }
+
+  void AddRow(std::int64_t number, const Measurement& measurement) {
+    const auto index = static_cast<std::size_t>(measurement.stream);
+    const StreamInfo& stream = source_.streams()[index];
+    const bool landmark = measurement.landmark >= 0;
+    std::optional<CsvFile>& file = streams_[index];
+    if (!file) {
+      std::vector<std::string> header{"frame", "feature", "dim", "value"};
+      if (!landmark) {
+        header = {"frame", "t_s"};
+        for (const std::string& name : ColumnsOf(stream)) header.push_back(name);
+      }
+      OpenCsv(file, stream.name + ".csv", header);
+    }
+    if (!landmark) {
+      file->Integer(number).Time(measurement.stamp);
+      file->Numbers(measurement.values.data(), measurement.values.size(),
+                    measurement.values.size());
+      return file->EndRow();
+    }
+    seen_.insert(measurement.landmark);
+    for (std::size_t dim = 0; dim < measurement.values.size(); ++dim) {
+      file->Integer(number).Integer(measurement.landmark);
+      file->Integer(static_cast<std::int64_t>(dim)).Number(measurement.values[dim]).EndRow();
+    }
+  }
+
+  void AddPose(const Frame& frame) {
+    if (frame.truth.size() <= std::max(pose_->first, pose_->second)) return;
+    const std::vector<double>& r = frame.truth[pose_->first];
+    const std::vector<double>& q = frame.truth[pose_->second];
+    if (r.empty() || q.empty()) return;
+    std::string line;
+    internal::AppendSeconds(line, frame.stamp);
+    for (const double value : {r[0], r[1], r[2], q[1], q[2], q[3], q[0]}) {
+      line += ' ';
+      internal::AppendNumber(line, value);
+    }
+    tum_->Write(line + '\n');
+  }
+
+  void WriteMap() {
+    std::optional<CsvFile> map;
+    for (const std::int64_t id : seen_) {
+      const auto place = source_.TrueLandmark(id);
+      if (!place) continue;
+      if (!map) OpenCsv(map, "map.csv", {"feature", "x", "y", "z"});
+      map->Integer(id).Numbers(place->data(), 3, 3).EndRow();
+    }
+    if (map) map->Close();
+  }
+
+  const RunFolder& folder_;
+  const Source& source_;
+  std::optional<std::pair<std::size_t, std::size_t>> pose_;
+  std::optional<CsvFile> times_, truth_;
+  std::vector<std::optional<CsvFile>> streams_;
+  std::unique_ptr<OutputFile> tum_;
+  std::set<std::int64_t> seen_;
+  std::set<std::string> names_;
+};
+
+/// The config's `camera` alone; "" where it has none.
+std::string CameraYaml(const Config& config) {
+  const auto camera = config.root().Find("camera");
+  if (!camera) return {};
+  Config alone = Config::FromText("camera: {}", "calibration.yaml");
+  for (const auto& [key, value] : camera->Entries()) {
+    alone.Set("camera." + key, value.Text(), "calibration.yaml");
+  }
+  return alone.ToYaml();
+}
+
+}  // namespace
+
+SimulateResult Simulate(const Config& config, const PluginHost& host,
+                        const std::filesystem::path& folder, bool force,
+                        const std::function<bool()>& stop) {
+  const std::unique_ptr<Source> source = MakeSource(config, host);
+  const std::string camera = CameraYaml(config);
+  RunFolder output(folder, force);
+  DataFiles files(output, *source);
+  SimulateResult result;
+  for (Frame frame; !result.stopped && source->Next(frame);) {
+    files.Add(result.frames++, frame);
+    result.stopped = stop && stop();
+  }
+  files.Close();
+  result.files.assign(files.names().begin(), files.names().end());
+  if (!camera.empty()) {
+    output.Write("calibration.yaml", camera);
+    result.files.insert(result.files.begin(), "calibration.yaml");
+  }
+  output.Commit();
+  return result;
+}
+
+}  // namespace alidade

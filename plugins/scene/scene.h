@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "alidade/camera.h"
+#include "alidade/random.h"
+#include "alidade/source.h"
+#include "path.h"
+#include "points.h"
+
+namespace alidade {
+
+inline constexpr const char* kSceneKeys =
+    "points         one of list: [[x, y, z], ...], m, ids are places in it; box: {min, max},\n"
+    "points.room    {min, max}: on its faces; points.shells: {center, radii}: on spheres\n"
+    "points.count   how many are drawn of a box, a room or shells\n"
+    "trajectory     one of look_at, keyframes and model\n"
+    "trajectory.look_at    [{position, target, t_s}, ...]: through way-points; up beside it\n"
+    "trajectory.keyframes  [{position, t_s, and one of euler_deg, matrix, axis_angle_deg,\n"
+    "                      quaternion}, ...]\n"
+    "trajectory.model      {linear_acceleration, angular_acceleration, position, orientation,\n"
+    "                      velocity, angular_velocity}: drawn from quaternion_pose\n"
+    "state          the state entry whose blocks the truth is named after; default cam";
+
+/// Points in space, seen by a camera that moves among them.
+///
+///   pixel      (u, v) = K(h) + n_px,   h = R_CW (p - r),   n_px ~ N(0, noise_px^2 I)
+///   stereo     (u, v, u - fx B / hz, v) + n_px: a rectified pair, B = baseline_m; pinhole alone
+///   depth      (u, v, hz) + (n_px, n_d),   n_d ~ N(0, depth_sigma_m^2)
+///   known      (u, v, hz (1 + n)),   n ~ N(0, known.relative_sigma^2)
+///   odometry   v, omega in cam, constant, that lead odometry_pose from this frame to the next,
+///              + N(0, sigma^2)
+///
+///   stream     size     values            when
+///   tracks     2, 4, 3  as `measures`     the point is seen; the landmark is its id
+///   known      3        u, v, depth       in place of the first sight of each of the first
+///                                         known.count points to be seen; with its covariance,
+///                                         unless noise_px is 0
+///   odometry   6        vx vy vz wx wy wz every frame but the last, for the way to the next
+///
+/// The camera looks along z, x to the right, y down. A point is seen where it lies ahead and both
+/// its exact pixel and the noisy one lie on the image; nothing hides it. Of more points than
+/// max_features_per_frame those seen in the frame before go first, then those with the smaller id.
+/// Truth is `cam.position`, `cam.orientation` (world_from_cam), `cam.velocity` (world) and
+/// `cam.angular_velocity` (cam), the velocities as in quaternion_pose; and the place of each point.
+///
+/// Points, path, pixels and odometry are drawn from streams 0 to 3 of the seed; of the pixels four
+/// numbers for each point and frame, seen or not.
+///
+/// Keys         kSceneKeys; the camera by the keys of alidade/camera.h.
+/// Errors       kBadConfig.
+/// Source       [MonoSlam2015] sec. 3.
+class Scene : public Source {
+ public:
+  explicit Scene(const SourceArguments& arguments)
+      : Scene(arguments.entry, arguments.params, arguments.seed) {}
+  Scene(const Node& entry, Params& p, std::uint64_t seed)
+      : camera_(p), pixel_noise_(seed, 2), odometry_noise_(seed, 3) {
+    ReadNumbers(p);
+    for (const char* key : {"points", "trajectory", "state"}) entry.Declare(key);
+    Random of_points(seed, 0), of_path(seed, 1);
+    points_ = scene::ReadPoints(entry.At("points", "scene"), of_points);
+    path_ = scene::ReadPath(entry.At("trajectory", "scene"), count_, dt_s_, of_path);
+    seen_before_.assign(points_.size(), false);
+    seen_ever_.assign(points_.size(), false);
+    const auto state = entry.Find("state");
+    NameAll(state ? state->Text() : "cam");
+  }
+
+  const std::vector<StreamInfo>& streams() const override { return streams_; }
+  const std::vector<StreamInfo>& truths() const override { return truths_; }
+  std::int64_t size() const override { return static_cast<std::int64_t>(count_); }
+
+  std::optional<std::array<double, 3>> TrueLandmark(std::int64_t id) const override {
+    if (id < 0 || id >= static_cast<std::int64_t>(points_.size())) return std::nullopt;
+    return scene::ToArray(points_[static_cast<std::size_t>(id)]);
+  }
+
+  bool Next(Frame& frame) override {
+    if (index_ == count_) return false;
+    const scene::CameraState& state = path_[index_];
+    frame.stamp = StampFromSeconds(static_cast<double>(index_) * dt_s_);
+    frame.measurements.clear();
+    const auto list = [](const auto& values) {
+      return std::vector<double>(values.begin(), values.end());
+    };
+    frame.truth = {list(state.position), list(state.orientation), list(state.velocity),
+                   list(state.angular_velocity)};
+    for (const Sight& sight : Look(state)) EmitSight(sight, frame);
+    if (odometry_stream_ >= 0 && index_ + 1 < count_) EmitOdometry(frame);
+    ++index_;
+    return true;
+  }
+
+ private:
+  enum Measures { kPixel, kStereo, kDepth };
+  /// A point that is seen, with its noise of unit variance.
+  struct Sight {
+    std::size_t point;
+    double pixel[2];  ///< exact
+    double depth;     ///< hz, m
+    std::array<double, 4> noise;
+  };
+
+  void ReadNumbers(Params& p) {
+    count_ = static_cast<std::size_t>(p.Integer("frames", "frames in all", 1, 1'000'000, 150));
+    dt_s_ = 1.0 / p.Number("rate_hz", "Hz", "frames a second", {1e-3, 1e6}, 30.0);
+    noise_px_ = p.NonNegative("noise_px", "px", "noise of a pixel coordinate, 1 sigma", 1.0);
+    most_ = static_cast<std::size_t>(
+        p.Integer("max_features_per_frame", "points seen at most", 1, 1 << 30, 1 << 30));
+    measures_ = static_cast<Measures>(p.Choice("measures", {"pixel", "stereo", "depth"},
+                                               "what stream tracks holds of a point", kPixel));
+    if (measures_ == kStereo) {
+      baseline_m_ = p.Positive("baseline_m", "m", "stereo baseline");
+      if (camera_.model != CameraModel::kPinhole) {
+        p.Fail("camera.model", "not 'pinhole', but a rectified pair has no distortion");
+      }
+    }
+    if (measures_ == kDepth) {
+      depth_sigma_m_ = p.NonNegative("depth_sigma_m", "m", "noise of the depth, 1 sigma");
+    }
+    if (measures_ == kPixel) {
+      known_left_ = p.Integer("known.count", "points whose first sight tells depth", 0, 1 << 20, 0);
+      known_sigma_ = p.Number("known.relative_sigma", "", "noise of that depth, share of it",
+                              {0.0, 1.0, true, false}, 0.005);
+    }
+    if (p.Flag("odometry", "whether there is a stream odometry", false)) {
+      odometry_stream_ = 0;  // NameAll() gives it its place
+      linear_sigma_ = p.NonNegative("odometry_noise.linear", "m/s", "1 sigma, per axis", 0.0);
+      angular_sigma_ = p.NonNegative("odometry_noise.angular", "rad/s", "1 sigma, per axis", 0.0);
+    }
+  }
+
+  void NameAll(const std::string& state) {
+    constexpr int kSizes[] = {2, 4, 3};
+    streams_ = {{"tracks", kSizes[measures_]}};
+    if (known_left_ > 0) streams_.push_back({"known", 3});
+    if (odometry_stream_ >= 0) {
+      odometry_stream_ = static_cast<int>(streams_.size());
+      streams_.push_back({"odometry", 6});
+    }
+    truths_ = {{state + ".position", 3},
+               {state + ".orientation", 4},
+               {state + ".velocity", 3},
+               {state + ".angular_velocity", 3}};
+  }
+
+  /// What is seen from there, by id.
+  std::vector<Sight> Look(const scene::CameraState& state) {
+    std::vector<Sight> sights;
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      Sight sight{i, {}, 0.0, {}};
+      for (double& noise : sight.noise) noise = pixel_noise_.Normal();
+      const auto at = scene::ToArray(points_[i]);
+      double offset[3], h[3];
+      Vec<3>::Minus(at.data(), state.position.data(), offset);
+      UnitQuaternion::RotateBack(state.orientation.data(), offset, h);
+      sight.depth = h[2];
+      if (!(h[2] > 0.0) || !camera_.Project(h, sight.pixel)) continue;
+      const double noisy[2] = {sight.pixel[0] + noise_px_ * sight.noise[0],
+                               sight.pixel[1] + noise_px_ * sight.noise[1]};
+      if (camera_.Contains(sight.pixel) && camera_.Contains(noisy)) sights.push_back(sight);
+    }
+    if (sights.size() > most_) {
+      const auto before = [&](const Sight& sight) { return bool(seen_before_[sight.point]); };
+      std::stable_partition(sights.begin(), sights.end(), before);
+      sights.resize(most_);
+      std::ranges::sort(sights, {}, &Sight::point);
+    }
+    seen_before_.assign(points_.size(), false);
+    for (const Sight& sight : sights) seen_before_[sight.point] = true;
+    return sights;
+  }
+
+  void EmitSight(const Sight& sight, Frame& frame) {
+    Measurement measurement;
+    measurement.stamp = frame.stamp;
+    measurement.landmark = static_cast<std::int64_t>(sight.point);
+    const double u = sight.pixel[0] + noise_px_ * sight.noise[0];
+    const double v = sight.pixel[1] + noise_px_ * sight.noise[1];
+    measurement.values = {u, v};
+    if (measures_ == kStereo) {
+      measurement.values.push_back(sight.pixel[0] - camera_.fx * baseline_m_ / sight.depth +
+                                   noise_px_ * sight.noise[2]);
+      measurement.values.push_back(sight.pixel[1] + noise_px_ * sight.noise[3]);
+    } else if (measures_ == kDepth) {
+      measurement.values.push_back(sight.depth + depth_sigma_m_ * sight.noise[2]);
+    } else if (!seen_ever_[sight.point] && known_left_ > 0) {
+      --known_left_;
+      const double sigma_m = known_sigma_ * sight.depth, variance_px = noise_px_ * noise_px_;
+      measurement.stream = 1;
+      measurement.values.push_back(sight.depth + sigma_m * sight.noise[2]);
+      if (noise_px_ > 0.0) {
+        measurement.covariance = {variance_px, 0, 0, 0, variance_px, 0, 0, 0, sigma_m * sigma_m};
+      }
+    }
+    seen_ever_[sight.point] = true;
+    frame.measurements.push_back(std::move(measurement));
+  }
+
+  /// v = V(phi)^-1 R_WC' (r' - r) / dt, phi = omega dt: as odometry_pose integrates it.
+  void EmitOdometry(Frame& frame) {
+    const scene::CameraState& now = path_[index_];
+    const scene::CameraState& next = path_[index_ + 1];
+    Eigen::Vector3d phi, way, moved;
+    UnitQuaternion::Minus(next.orientation.data(), now.orientation.data(), phi.data());
+    Vec<3>::Minus(next.position.data(), now.position.data(), way.data());
+    UnitQuaternion::RotateBack(now.orientation.data(), way.data(), moved.data());
+    const Eigen::Vector3d linear = scene::UndoTurn(phi, moved) / dt_s_;
+    Measurement measurement;
+    measurement.stamp = frame.stamp;
+    measurement.stream = odometry_stream_;
+    for (const double value : linear) {
+      measurement.values.push_back(value + linear_sigma_ * odometry_noise_.Normal());
+    }
+    for (const double value : phi) {
+      measurement.values.push_back(value / dt_s_ + angular_sigma_ * odometry_noise_.Normal());
+    }
+    frame.measurements.push_back(std::move(measurement));
+  }
+
+  Camera camera_;
+  std::vector<StreamInfo> streams_, truths_;
+  std::vector<Eigen::Vector3d> points_;
+  std::vector<scene::CameraState> path_;
+  std::vector<bool> seen_before_, seen_ever_;
+  std::size_t count_ = 0, index_ = 0, most_ = 0;
+  double dt_s_ = 0.0, noise_px_ = 0.0, baseline_m_ = 0.0, depth_sigma_m_ = 0.0;
+  Measures measures_ = kPixel;
+  int known_left_ = 0, odometry_stream_ = -1;
+  double known_sigma_ = 0.0, linear_sigma_ = 0.0, angular_sigma_ = 0.0;
+  Random pixel_noise_, odometry_noise_;
+};
+
+inline std::unique_ptr<Source> CreateScene(const SourceArguments& arguments) {
+  return std::make_unique<Scene>(arguments);
+}
+
+}  // namespace alidade

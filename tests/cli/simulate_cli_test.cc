@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "support/program.h"
+
+namespace alidade {
+namespace {
+
+using testing::Contains;
+using testing::Outcome;
+
+const std::string kScene = R"(alidade: 1
+camera: {width: 640, height: 480, fx: 525, fy: 525, cx: 320, cy: 240}
+source:
+  type: scene
+  seed: 3
+  frames: 20
+  odometry: true
+  points: {box: {min: [-2, -1.5, 2], max: [2, 1.5, 6]}, count: 40}
+  trajectory: {look_at: [{position: [-0.5, 0, 0], target: [0, 0, 4]},
+                         {position: [0.5, 0, 0], target: [0, 0, 4]}]}
+)";
+
+class SimulateCli : public testing::ProgramTest {
+ protected:
+  std::size_t Lines(const std::string& name) const {
+    const std::string text = Read(name);
+    return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+  }
+};
+
+TEST_F(SimulateCli, WritesFilesThatSourceTracksReadsBack) {
+  Write("scene.yaml", kScene);
+  const Outcome made = Call({"simulate", "scene.yaml", "-o", "data"});
+  ASSERT_EQ(made.code, 0) << made.err;
+  EXPECT_TRUE(Contains(made.out, "20 frames\nwrote data\n")) << made.out;
+  for (const char* name : {"calibration.yaml", "map.csv", "odometry.csv", "timestamps.csv",
+                           "tracks.csv", "truth.csv", "truth.tum"}) {
+    EXPECT_TRUE(Exists(std::string("data/") + name)) << name;
+    EXPECT_TRUE(Contains(made.out, std::string("data/") + name + '\n')) << name;
+  }
+  EXPECT_EQ(Lines("data/timestamps.csv"), 21u);
+  EXPECT_EQ(Lines("data/truth.tum"), 21u);
+  EXPECT_EQ(Lines("data/odometry.csv"), 20u);  // none after the last
+  EXPECT_TRUE(Read("data/tracks.csv").starts_with("frame,feature,dim,value\n0,")) << "header";
+  EXPECT_EQ(Json("data/calibration.yaml").root().At("camera").At("fx").Number(), 525.0);
+
+  // Read and written again they are the same bytes.
+  Write("again.yaml", "alidade: 1\nsource: {type: tracks, path: data}\n");
+  const Outcome again = Call({"simulate", "again.yaml", "-o", "again"});
+  ASSERT_EQ(again.code, 0) << again.err;
+  for (const char* name : {"tracks.csv", "timestamps.csv", "odometry.csv", "truth.tum"}) {
+    EXPECT_EQ(Read(std::string("again/") + name), Read(std::string("data/") + name)) << name;
+  }
+  EXPECT_FALSE(Exists("again/map.csv"));
+}
+
+TEST_F(SimulateCli, DrawsBySeedAndReplacesOnlyByForce) {
+  Write("scene.yaml", kScene);
+  EXPECT_EQ(Call({"simulate", "scene.yaml", "-o", "a"}).code, 0);
+  EXPECT_EQ(Call({"simulate", "scene.yaml", "-o", "b"}).code, 0);
+  EXPECT_EQ(Call({"simulate", "scene.yaml", "-o", "c", "--set", "source.seed=4"}).code, 0);
+  EXPECT_EQ(Read("a/tracks.csv"), Read("b/tracks.csv"));
+  EXPECT_NE(Read("a/tracks.csv"), Read("c/tracks.csv"));
+  EXPECT_EQ(Call({"simulate", "scene.yaml", "-o", "a"}).code, 73);
+  EXPECT_EQ(Call({"simulate", "scene.yaml", "-o", "a", "--force", "--quiet"}).out, "");
+}
+
+TEST_F(SimulateCli, WritesTheStreamsOfAnySource) {
+  const Outcome made = Call({"simulate", "config.yaml", "-o", "data"});
+  ASSERT_EQ(made.code, 0) << made.err;
+  EXPECT_TRUE(
+      Read("data/inverse_scale.csv").starts_with("frame,t_s,inverse_scale\n0,0.000000000,"));
+  EXPECT_EQ(Lines("data/inverse_scale.csv"), 153u);
+  EXPECT_TRUE(Read("data/truth.csv").starts_with("t_s,depth,depth_rate,inverse_distance\n"));
+  EXPECT_FALSE(Exists("data/truth.tum"));
+  EXPECT_FALSE(Exists("data/calibration.yaml"));
+}
+
+TEST_F(SimulateCli, RefusesAKeyThatNobodyReads) {
+  Write("scene.yaml", kScene + "  nose_px: 2\n");
+  const Outcome made = Call({"simulate", "scene.yaml", "-o", "data"});
+  EXPECT_EQ(made.code, 78);
+  EXPECT_TRUE(Contains(made.err, "source.nose_px: unknown key; did you mean 'noise_px'?"))
+      << made.err;
+  EXPECT_FALSE(Exists("data"));
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// examples/10_slam_scene, held against the figures that its README states.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "alidade/sweep.h"
+
+namespace alidade {
+namespace {
+
+const std::filesystem::path kFolder =
+    std::filesystem::path(ALIDADE_SOURCE_DIR) / "examples" / "10_slam_scene";
+
+using Settings = std::vector<std::pair<std::string, std::string>>;
+
+/// Seeds 1 to 20.
+SweepSummary Twenty(const std::string& name, const Settings& settings = {}) {
+  Config config = Config::FromFile(kFolder / name);
+  for (const auto& [key, value] : settings) config.Set(key, value, "--set");
+  const PluginHost host(PluginPaths(config));
+  SweepOptions options;
+  options.runs = 20;
+  const SweepResult result = Sweep(config, host, options);
+  for (const SweepRun& run : result.done) EXPECT_EQ(run.status, RunStatus::kOk) << run.reason;
+  return Summarise(result).at(0);
+}
+
+/// What is asked of a filter on these scenes: it is honest.
+void ExpectHonest(const SweepSummary& ekf) {
+  EXPECT_EQ(ekf.diverged, 0);
+  EXPECT_EQ(ekf.used, 20);
+  EXPECT_GE(ekf.metrics.at("nees.mean:cam").mean, 0.7);
+  EXPECT_LE(ekf.metrics.at("nees.mean:cam").mean, 1.6);
+  EXPECT_GE(ekf.metrics.at("nees.cov95:cam").mean, 0.80);
+  EXPECT_GE(ekf.metrics.at("nis.mean:pixels").mean, 0.95);
+  EXPECT_LE(ekf.metrics.at("nis.mean:pixels").mean, 1.05);
+  EXPECT_NEAR(ekf.metrics.at("map.sim3.scale").mean, 1.0, 0.01);
+}
+
+TEST(SlamScene, IsHonestOnAPathDrawnFromTheModel) {
+  const SweepSummary ekf = Twenty("config.yaml");
+  ExpectHonest(ekf);
+  EXPECT_LE(ekf.metrics.at("rmse:cam.position").mean, 0.016);
+  EXPECT_LE(ekf.metrics.at("map.sim3.rmse").mean, 0.032);
+}
+
+TEST(SlamScene, IsHonestOnASidewaysSweep) {
+  const SweepSummary ekf = Twenty("sweep.yaml");
+  ExpectHonest(ekf);
+  EXPECT_LE(ekf.metrics.at("rmse:cam.position").mean, 0.016);
+  EXPECT_LE(ekf.metrics.at("map.sim3.rmse").mean, 0.060);
+}
+
+TEST(SlamScene, IsHonestAtOtherNoise) {
+  for (const char* noise : {"0.5", "2"}) {
+    const Settings settings{{"source.noise_px", noise},
+                            {"sensors.pixels.sigma_px", noise},
+                            {"sensors.known.sigma_px", noise}};
+    for (const char* name : {"config.yaml", "sweep.yaml"}) {
+      SCOPED_TRACE(std::string(name) + ", " + noise + " px");
+      ExpectHonest(Twenty(name, settings));
+    }
+  }
+}
+
+TEST(SlamScene, WithoutNoiseTheMapIsExactButForLinearisation) {
+  const SweepSummary ekf = Twenty("config.yaml", {{"source.noise_px", "0"}});
+  EXPECT_EQ(ekf.diverged, 0);
+  EXPECT_LE(ekf.metrics.at("final:cam.position").mean, 0.005);
+  EXPECT_LE(ekf.metrics.at("nis.mean:pixels").mean, 0.05);
+}
+
+// A prior that is 1.25 times the truth, of 36 points: NIS does not tell, NEES does.
+TEST(SlamScene, ManyWrongPriorsShowInNeesAndNotInNis) {
+  const SweepSummary ekf =
+      Twenty("config.yaml", {{"landmarks.prior", "{inverse_distance: 0.3, sigma: 0.12}"}});
+  EXPECT_GE(ekf.metrics.at("nees.mean:cam").mean, 2.5);
+  EXPECT_GE(ekf.metrics.at("nis.mean:pixels").mean, 0.95);
+  EXPECT_LE(ekf.metrics.at("nis.mean:pixels").mean, 1.05);
+}
+
+}  // namespace
+}  // namespace alidade

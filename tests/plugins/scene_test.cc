@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What the camera sees of the points, and what the config may get wrong.
+#include <cmath>
+#include <set>
+
+#include "scene_fixture.h"
+
+namespace alidade::testing {
+namespace {
+
+using Eigen::Vector3d;
+
+const std::string kStill = "trajectory: {keyframes: [{position: [0, 0, 0], euler_deg: [0, 0, 0]}]}";
+
+std::set<std::int64_t> Ids(const Frame& frame, int stream = 0) {
+  std::set<std::int64_t> ids;
+  for (const Measurement& m : frame.measurements) {
+    if (m.stream != stream) continue;
+    EXPECT_TRUE(ids.insert(m.landmark).second) << "twice";
+  }
+  return ids;
+}
+
+TEST(Scene, SeesAPointWhereThePinholePutsIt) {
+  // 1 m right, 0.5 m down, 2 m ahead: u = 320 + 525 / 2, v = 240 + 525 / 4.
+  const auto frames =
+      SceneFrames("frames: 2, noise_px: 0, points: {list: [[1, 0.5, 2]]}, " + kStill);
+  ASSERT_EQ(frames.size(), 2u);
+  EXPECT_EQ(frames[1].stamp, 33333333);
+  ASSERT_EQ(frames[0].measurements.size(), 1u);
+  const Measurement& seen = frames[0].measurements[0];
+  EXPECT_EQ(seen.landmark, 0);
+  EXPECT_EQ(seen.values, (std::vector<double>{320 + 525 / 2.0, 240 + 525 / 4.0}));
+  EXPECT_TRUE(seen.covariance.empty());
+}
+
+TEST(Scene, SeesNothingBehindOrBesideTheImage) {
+  // Of the six only 1 and 4 are ahead and on the image: half the width is 320.5 px, 1.221 m at 2 m.
+  const auto frames = SceneFrames(
+      "frames: 1, noise_px: 0, points: {list: [[0, 0, -2], [0, 0, 2], [1.23, 0, 2], [0, 0, 0], "
+      "[-1.21, 0, 2], [0, 0.93, 2]]}, " +
+      kStill);
+  EXPECT_EQ(Ids(frames[0]), (std::set<std::int64_t>{1, 4}));
+}
+
+TEST(Scene, DistortsAsTheCameraDoes) {
+  const auto frames = SceneFrames(
+      "frames: 1, noise_px: 0, points: {list: [[0.4, 0.2, 2]]}, " + kStill, 1,
+      "camera: {model: radtan, width: 640, height: 480, fx: 525, fy: 525, cx: 320, cy: 240, "
+      "k1: -0.2, k2: 0.05, p1: 0.001, p2: 0.002}\n");
+  // x = 0.2, y = 0.1, q = 0.05: s = 1 - 0.01 + 0.000125 = 0.990125.
+  const double x = 0.2 * 0.990125 + 2 * 0.001 * 0.02 + 0.002 * (0.05 + 0.08);
+  const double y = 0.1 * 0.990125 + 0.001 * (0.05 + 0.02) + 2 * 0.002 * 0.02;
+  EXPECT_NEAR(frames[0].measurements[0].values[0], 320 + 525 * x, 1e-12);
+  EXPECT_NEAR(frames[0].measurements[0].values[1], 240 + 525 * y, 1e-12);
+}
+
+TEST(Scene, MeasuresStereoAndDepthToo) {
+  const std::string point = "frames: 1, noise_px: 0, points: {list: [[1, 0.5, 2]]}, " + kStill;
+  const auto stereo = SceneFrames("measures: stereo, baseline_m: 0.1, " + point);
+  EXPECT_EQ(stereo[0].measurements[0].values,
+            (std::vector<double>{582.5, 371.25, 582.5 - 525 * 0.1 / 2, 371.25}));
+  const auto depth = SceneFrames("measures: depth, depth_sigma_m: 0, " + point);
+  EXPECT_EQ(depth[0].measurements[0].values, (std::vector<double>{582.5, 371.25, 2.0}));
+}
+
+TEST(Scene, NoiseIsThatOfTheConfig) {
+  // 500 points seen 20 times: 10000 samples of each, their variance to 1.4 %; 4 sigma.
+  const std::string keys =
+      "frames: 20, points: {box: {min: [-1, -0.8, 2], max: [1, 0.8, 3]}, count: 500}, "
+      "measures: depth, depth_sigma_m: 0.01, trajectory: {keyframes: [{position: [0, 0, -1], "
+      "euler_deg: [0, 0, 0]}]}";
+  const auto exact = SceneFrames("noise_px: 0, " + keys);
+  const auto noisy = SceneFrames("noise_px: 2, " + keys);
+  const MadeScene made = MakeScene("noise_px: 2, " + keys);
+  double sums[3] = {};
+  int count = 0;
+  for (std::size_t k = 0; k < exact.size(); ++k) {
+    ASSERT_EQ(exact[k].measurements.size(), 500u);
+    ASSERT_EQ(noisy[k].measurements.size(), 500u);
+    for (std::size_t m = 0; m < 500; ++m, ++count) {
+      const auto &a = exact[k].measurements[m].values, &b = noisy[k].measurements[m].values;
+      for (std::size_t i = 0; i < 2; ++i) sums[i] += std::pow(b[i] - a[i], 2);
+      const double depth = 1.0 + (*made.scene->TrueLandmark(static_cast<std::int64_t>(m)))[2];
+      sums[2] += std::pow(b[2] - depth, 2);
+    }
+  }
+  EXPECT_NEAR(sums[0] / count, 4.0, 4 * 0.014 * 4.0);
+  EXPECT_NEAR(sums[1] / count, 4.0, 4 * 0.014 * 4.0);
+  EXPECT_NEAR(sums[2] / count, 1e-4, 4 * 0.014 * 1e-4);
+}
+
+TEST(Scene, SameSeedSameBytesAndOthersDiffer) {
+  const std::string keys =
+      "frames: 10, odometry: true, odometry_noise: {linear: 0.1, angular: 0.1}, "
+      "trajectory: {model: {linear_acceleration: 1, angular_acceleration: 1}}, " +
+      kPoints;
+  const auto values = [&](std::uint64_t seed) {
+    std::vector<double> all;
+    for (const Frame& frame : SceneFrames(keys, seed)) {
+      for (const Measurement& m : frame.measurements) {
+        all.insert(all.end(), m.values.begin(), m.values.end());
+      }
+      for (const auto& t : frame.truth) all.insert(all.end(), t.begin(), t.end());
+    }
+    return all;
+  };
+  EXPECT_EQ(values(3), values(3));
+  EXPECT_NE(values(3), values(4));
+}
+
+TEST(Scene, TellsTheDepthOfTheFirstSightOfTheKnown) {
+  const auto frames =
+      SceneFrames("frames: 5, noise_px: 0.5, known: {count: 4}, " + kPoints + ", " + kSweep);
+  const std::set<std::int64_t> known = Ids(frames[0], 1);
+  EXPECT_EQ(known.size(), 4u);
+  const MadeScene made = MakeScene("frames: 5, noise_px: 0.5, " + kPoints + ", " + kSweep);
+  for (const Measurement& m : frames[0].measurements) {
+    if (m.stream == 0) {
+      EXPECT_FALSE(known.contains(m.landmark));
+      continue;
+    }
+    // Depth along the axis, 0.5 % of it the standard deviation.
+    const auto p = *made.scene->TrueLandmark(m.landmark);
+    const Vector3d offset = Vector3d(p.data()) - Vector3d(frames[0].truth[0].data());
+    Vector3d h;
+    UnitQuaternion::RotateBack(frames[0].truth[1].data(), offset.data(), h.data());
+    EXPECT_NEAR(m.values.at(2), h.z(), 5 * 0.005 * h.z());
+    EXPECT_NE(m.values[2], h.z());
+    ASSERT_EQ(m.covariance.size(), 9u);
+    EXPECT_EQ(m.covariance[0], 0.25);
+    EXPECT_NEAR(m.covariance[8], std::pow(0.005 * h.z(), 2), 1e-15);
+  }
+  for (std::size_t k = 1; k < 5; ++k) EXPECT_TRUE(Ids(frames[k], 1).empty());
+  for (const std::int64_t id : known) EXPECT_TRUE(Ids(frames[1]).contains(id));
+}
+
+TEST(Scene, OfTooManyPointsKeepsThoseItSaw) {
+  // Point 0 comes into view from the right when two others are being seen already.
+  const auto frames = SceneFrames(
+      "frames: 30, noise_px: 0, max_features_per_frame: 2, points: {list: [[3, 0, 4], [0, 0, 4], "
+      "[0.5, 0, 4]]}, trajectory: {keyframes: [{position: [0, 0, 0], euler_deg: [0, 0, 0]}, "
+      "{position: [1, 0, 0], euler_deg: [0, 0, 0]}]}");
+  for (const Frame& frame : frames) EXPECT_EQ(Ids(frame), (std::set<std::int64_t>{1, 2}));
+  // The next to go makes room.
+  const auto all = SceneFrames(
+      "frames: 30, noise_px: 0, max_features_per_frame: 2, points: {list: [[3, 0, 4], [-2, 0, 4], "
+      "[0.5, 0, 4]]}, trajectory: {keyframes: [{position: [0, 0, 0], euler_deg: [0, 0, 0]}, "
+      "{position: [1, 0, 0], euler_deg: [0, 0, 0]}]}");
+  EXPECT_EQ(Ids(all.front()), (std::set<std::int64_t>{1, 2}));
+  EXPECT_EQ(Ids(all.back()), (std::set<std::int64_t>{0, 2}));
+}
+
+TEST(Scene, PointsLieWhereTheConfigPutsThem) {
+  const auto points = [](const std::string& keys) {
+    const MadeScene made = MakeScene("frames: 1, " + kStill + ", points: {" + keys + "}");
+    std::vector<Vector3d> all;
+    for (std::int64_t id = 0; const auto p = made.scene->TrueLandmark(id); ++id) {
+      all.emplace_back(p->data());
+    }
+    EXPECT_FALSE(made.scene->TrueLandmark(-1));
+    return all;
+  };
+  const auto room = points("room: {min: [-3, -1, -2], max: [3, 1.5, 2]}, count: 3000");
+  ASSERT_EQ(room.size(), 3000u);
+  int on[6] = {};
+  for (const Vector3d& p : room) {
+    const Vector3d low = p - Vector3d(-3, -1, -2), high = Vector3d(3, 1.5, 2) - p;
+    EXPECT_GE(std::min(low.minCoeff(), high.minCoeff()), 0.0);
+    EXPECT_EQ(std::min(low.minCoeff(), high.minCoeff()), 0.0);
+    for (int i = 0; i < 3; ++i) on[i] += low[i] == 0.0, on[3 + i] += high[i] == 0.0;
+  }
+  // Faces of 10, 24 and 15 m^2, twice each; 4 sigma of a binomial.
+  const double share[3] = {10.0 / 98, 24.0 / 98, 15.0 / 98};
+  for (int i = 0; i < 6; ++i) {
+    const double p = share[i % 3];
+    EXPECT_NEAR(on[i], 3000 * p, 4 * std::sqrt(3000 * p * (1 - p))) << i;
+  }
+  const auto shells = points("shells: {center: [0, 0, 1], radii: [4.3, 10, 20]}, count: 300");
+  Vector3d mean = Vector3d::Zero();
+  for (std::size_t i = 0; i < shells.size(); ++i) {
+    const double radius = std::vector<double>{4.3, 10, 20}[i % 3];
+    EXPECT_NEAR((shells[i] - Vector3d(0, 0, 1)).norm(), radius, 1e-12);
+    mean += (shells[i] - Vector3d(0, 0, 1)) / (radius * 300);
+  }
+  EXPECT_LT(mean.norm(), 4.0 / std::sqrt(300.0));
+}
+
+TEST(Scene, NamesTruthAsTheStateIsNamed) {
+  const MadeScene made = MakeScene("frames: 3, state: robot, " + kPoints + ", " + kStill);
+  EXPECT_EQ(made.scene->truths()[0].name, "robot.position");
+  EXPECT_EQ(made.scene->truths()[3].name, "robot.angular_velocity");
+  EXPECT_EQ(made.scene->size(), 3);
+}
+
+TEST(Scene, RefusesWhatMakesNoScene) {
+  const auto refused = [](const std::string& keys, const std::string& message) {
+    try {
+      MakeScene(keys);
+      ADD_FAILURE() << "no error; expected: " << message;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::kBadConfig);
+      EXPECT_NE(std::string(error.what()).find(message), std::string::npos)
+          << error.what() << "\nexpected: " << message;
+    }
+  };
+  refused(kStill, "points: missing key, needed by 'scene'");
+  refused(kPoints, "trajectory: missing key, needed by 'scene'");
+  refused(kStill + ", points: {bix: 3}", "points.bix: unknown key; did you mean 'box'?");
+  refused(kStill + ", points: {count: 3}",
+          "points: says nothing of its kind; expected one of list, box, room, shells");
+  refused(kStill + ", points: {list: [[1, 2, 3]], count: 3}", "points.count: a list has its own");
+  refused(kStill + ", points: {list: [[1, 2]]}", "points.list[0]");
+  refused(kStill + ", points: {box: {min: [0, 0, 0], max: [1, 0, 1]}, count: 3}",
+          "points.box.max: not above 'min' in x, y and z");
+  refused(kStill + ", points: {shells: {radii: [1, -1]}, count: 3}",
+          "points.shells.radii: a radius that is not positive");
+  refused(kPoints + ", trajectory: {}", "expected one of look_at, keyframes, model");
+  refused(kPoints + ", trajectory: {look_at: [{position: [0, 0, 0], target: [0, -2, 0]}]}",
+          "trajectory.look_at: at -0.033333 s the camera has no orientation");
+  refused(kPoints +
+              ", trajectory: {up: [0, 0, 1], model: {linear_acceleration: 1, "
+              "angular_acceleration: 1}}",
+          "trajectory.up: without a use");
+  refused(kPoints +
+              ", trajectory: {keyframes: [{position: [0, 0, 0], matrix: [[1, 0, 0], "
+              "[0, 1, 0], [0, 0, -1]]}]}",
+          "matrix: not a rotation; expected R R' = I to 1e-3, determinant 1");
+  refused(kPoints +
+              ", trajectory: {keyframes: [{position: [0, 0, 0], quaternion: "
+              "{w: 1, x: 1, y: 0, z: 0}}]}",
+          "quaternion: not of unit length");
+  refused(kPoints +
+              ", trajectory: {keyframes: [{position: [0, 0, 0], euler_deg: [0, 0, 0], "
+              "axis_angle_deg: [0, 0, 1, 5]}]}",
+          "'euler_deg' and 'axis_angle_deg' are both given");
+  refused(kPoints +
+              ", trajectory: {keyframes: [{t_s: 0, position: [0, 0, 0], euler_deg: "
+              "[0, 0, 0]}, {t_s: 0, position: [0, 0, 0], euler_deg: [0, 0, 0]}]}",
+          "keyframes[1].t_s: not after the item before");
+  refused(kPoints +
+              ", frames: 31, trajectory: {keyframes: [{t_s: 0, position: [0, 0, 0], "
+              "euler_deg: [0, 0, 0]}, {t_s: 0.5, position: [0, 0, 0], euler_deg: "
+              "[0, 0, 0]}]}",
+          "keyframes[1].t_s: before the last frame; expected at least 1.0");
+  refused(kPoints + ", trajectory: {model: {linear_acceleration: -1, angular_acceleration: 1}}",
+          "trajectory.model.linear_acceleration: negative");
+  refused(kPoints + ", " + kStill + ", noise_px: -1", "source.noise_px: '-1'");
+  refused(kPoints + ", " + kStill + ", measures: depth, depth_sigma_m: 0.1, known: {count: 3}",
+          "source.known");
+}
+
+}  // namespace
+}  // namespace alidade::testing

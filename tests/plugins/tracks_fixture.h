@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gtest/gtest.h>
+#include <stdlib.h>
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/src/param_reader.h"
+#include "plugins/tracks/tracks.h"
+
+namespace alidade::testing {
+
+namespace fs = std::filesystem;
+
+/// A folder of its own for each test, with tracks.csv and what is beside it.
+class TracksTest : public ::testing::Test {
+ protected:
+  TracksTest() {
+    std::string name = (fs::temp_directory_path() / "alidade_tracks_XXXXXX").string();
+    folder_ = mkdtemp(name.data());
+  }
+  ~TracksTest() override { fs::remove_all(folder_); }
+
+  void Write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+  }
+  fs::path File() const { return folder_ / "tracks.csv"; }
+
+  /// The source of `keys`, those of `source` in braces, of the folder.
+  std::unique_ptr<Tracks> Open(const std::string& keys = "frame_rate_hz: 10",
+                               const std::string& path = "tracks.csv") {
+    config_ = std::make_unique<Config>(
+        Config::FromText("source: {path: \"" + path + "\", " + keys + "}", "run.yaml"));
+    const Node entry = config_->root().At("source");
+    internal::ParamReader reader(entry, "source 'tracks'");
+    Params params(&reader.host());
+    auto source = std::make_unique<Tracks>(SourceArguments{entry, params, 1, folder_});
+    reader.Check();
+    entry.RejectUnread();
+    return source;
+  }
+  std::vector<Frame> Frames(const std::string& keys = "frame_rate_hz: 10",
+                            const std::string& path = "tracks.csv") {
+    const auto source = Open(keys, path);
+    std::vector<Frame> frames;
+    for (Frame frame; source->Next(frame);) frames.push_back(frame);
+    return frames;
+  }
+  std::vector<Frame> FramesOf(const std::string& text) {
+    Write("tracks.csv", text);
+    return Frames();
+  }
+
+  /// That the work fails with `code` and exactly `message`, where each DIR/ stands for the folder.
+  void ExpectError(ExitCode code, std::string message, const std::function<void()>& work) const {
+    for (auto at = message.find("DIR/"); at != std::string::npos; at = message.find("DIR/")) {
+      message.replace(at, 3, folder_.string());
+    }
+    try {
+      work();
+      FAIL() << "no error; expected: " << message;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.what(), message);
+      EXPECT_EQ(error.code(), code);
+    }
+  }
+  void ExpectBadData(const std::string& text, const std::string& message,
+                     const std::string& keys = "frame_rate_hz: 10") {
+    Write("tracks.csv", text);
+    ExpectError(ExitCode::kBadData, message, [&] { Frames(keys); });
+  }
+
+  fs::path folder_;
+  std::unique_ptr<Config> config_;
+};
+
+}  // namespace alidade::testing

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What is read: forms, times, what lies beside, pipes, real data.
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <thread>
+
+#include "tracks_fixture.h"
+
+namespace alidade::testing {
+namespace {
+
+using Values = std::vector<double>;
+
+TEST_F(TracksTest, ReadsTheRowsOfAFrameInAnyOrder) {
+  const auto frames = FramesOf(
+      "frame,feature,dim,value\n# c\n0,7,1,20\n0,3,0,1\n0,7,0,10\n"
+      "0,3,1,2\n\n2,3,0,1.5\n2,3,1,2.5\n");
+  ASSERT_EQ(frames.size(), 2u);
+  EXPECT_EQ(frames[0].stamp, 0);
+  EXPECT_EQ(frames[1].stamp, 200'000'000);  // frame 2 at 10 Hz
+  ASSERT_EQ(frames[0].measurements.size(), 2u);
+  EXPECT_EQ(frames[0].measurements[0].landmark, 3);
+  EXPECT_EQ(frames[0].measurements[0].values, (Values{1, 2}));
+  EXPECT_EQ(frames[0].measurements[1].landmark, 7);
+  EXPECT_EQ(frames[0].measurements[1].values, (Values{10, 20}));
+  EXPECT_EQ(frames[1].measurements.at(0).stamp, frames[1].stamp);
+}
+
+TEST_F(TracksTest, AHeaderAndByteOrderMarkAndCrLfMakeNoDifference) {
+  for (const std::string text : {"0,3,0,1\n0,3,1,2\n",
+                                 "\xEF\xBB\xBF"
+                                 "0,3,0,1\r\n0,3,1,2\r\n",
+                                 "frame, feature, dim, value\n0, 3, 0, 1\n0,3,1,2"}) {
+    const auto frames = FramesOf(text);
+    ASSERT_EQ(frames.size(), 1u) << text;
+    EXPECT_EQ(frames[0].measurements.at(0).values, (Values{1, 2}));
+  }
+}
+
+TEST_F(TracksTest, MeasuresWhatTheConfigSays) {
+  Write("tracks.csv", "0,1,0,10\n0,1,1,11\n0,1,2,12\n0,1,3,13\n0,2,0,20\n0,2,1,21\n");
+  const auto values = [&](const std::string& measures) {
+    std::vector<Values> all;
+    const auto frames = Frames("frame_rate_hz: 10, measures: " + measures);
+    for (const Measurement& m : frames.at(0).measurements) {
+      all.push_back(m.values);
+    }
+    return all;
+  };
+  EXPECT_EQ(values("pixel"), (std::vector<Values>{{10, 11}, {20, 21}}));
+  EXPECT_EQ(values("stereo"), (std::vector<Values>{{10, 11, 12, 13}}));
+  EXPECT_EQ(values("depth"), (std::vector<Values>{{10, 11, 12}}));
+  EXPECT_EQ(Open("frame_rate_hz: 10, measures: stereo")->streams()[0].size, 4);
+}
+
+TEST_F(TracksTest, TimestampsSayWhatFramesThereAre) {
+  Write("tracks.csv", "1,3,0,1\n1,3,1,2\n");
+  Write("timestamps.csv", "frame,t_s\n0,0.5\n1,0.6000000001\n2,0.7\n");
+  const auto frames = Frames("measures: pixel");
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_TRUE(frames[0].measurements.empty());
+  EXPECT_EQ(frames[1].measurements.size(), 1u);
+  EXPECT_TRUE(frames[2].measurements.empty());
+  EXPECT_EQ(frames[1].stamp, 600'000'000);
+  EXPECT_EQ(Frames("frames: 2").size(), 2u);
+  EXPECT_EQ(Frames("frames: 2", ".").size(), 2u) << "a folder stands for its tracks.csv";
+  EXPECT_EQ(Frames("frame_rate_hz: 4")[0].stamp, 250'000'000) << "a rate comes first";
+}
+
+TEST_F(TracksTest, OdometryIsHeldOrTheMeanOfAStep) {
+  Write("tracks.csv", "0,3,0,1\n0,3,1,2\n");
+  Write("timestamps.csv", "0,0\n1,1\n2,2\n3,3\n");
+  Write("odometry.csv",
+        "frame,wx_rad_s,wy_rad_s,wz_rad_s,vx_m_s,vy_m_s,vz_m_s,note\n"
+        "0,1,2,3,4,5,6,0\n1,3,4,5,6,7,8,0\n3,9,9,9,9,9,9,0\n");
+  const auto odometry = [&](const std::string& keys) {
+    std::vector<Values> all;
+    for (const Frame& frame : Frames(keys)) {
+      const bool has = !frame.measurements.empty() && frame.measurements.back().stream == 1;
+      all.push_back(has ? frame.measurements.back().values : Values{});
+    }
+    return all;
+  };
+  const Values none, last(6, 9.0);
+  EXPECT_EQ(odometry("measures: pixel"),
+            (std::vector<Values>{{4, 5, 6, 1, 2, 3}, {6, 7, 8, 3, 4, 5}, none, last}));
+  EXPECT_EQ(odometry("odometry: mean"),
+            (std::vector<Values>{{5, 6, 7, 2, 3, 4}, {7.5, 8, 8.5, 6, 6.5, 7}, none, last}));
+  EXPECT_EQ(Open("odometry: none")->streams().size(), 1u);
+}
+
+TEST_F(TracksTest, TruthIsTakenAtTheTimeOfAFrame) {
+  Write("tracks.csv", "0,3,0,1\n0,3,1,2\n");
+  Write("timestamps.csv", "0,0\n1,1\n2,2\n");
+  Write("groundtruth.tum",
+        "# t x y z qx qy qz qw\n-1 9 9 9 0 0 0 1\n0.0005 1 2 3  0.5 0.5 0.5 0.5005\n"
+        "1.002 4 5 6 0 0 0 1\n2 7 8 9 0 0 0 -1\n");
+  const auto source = Open("state: robot");
+  ASSERT_EQ(source->truths().size(), 2u);
+  EXPECT_EQ(source->truths()[0].name, "robot.position");
+  EXPECT_EQ(source->truths()[1].name, "robot.orientation");
+  const auto frames = Frames("state: robot");
+  EXPECT_EQ(frames[0].truth.at(0), (Values{1, 2, 3}));
+  const Values& q = frames[0].truth[1];
+  EXPECT_NEAR(q[0], 0.5005 / std::sqrt(0.75 + 0.5005 * 0.5005), 1e-15) << "w first, normalised";
+  EXPECT_NEAR(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3], 1.0, 1e-15);
+  EXPECT_TRUE(frames[1].truth[0].empty()) << "2 ms off";
+  EXPECT_EQ(frames[2].truth[0], (Values{7, 8, 9}));
+  EXPECT_EQ(Frames("truth_tolerance_s: 0.002")[1].truth[0], (Values{4, 5, 6}));
+}
+
+TEST_F(TracksTest, ReadsAPipeAsItIsWritten) {
+  ASSERT_EQ(mkfifo(File().c_str(), 0600), 0);
+  int descriptor = -1;
+  std::thread writer([&] {
+    descriptor = open(File().c_str(), O_WRONLY);
+    EXPECT_EQ(write(descriptor, "0,3,0,1\n0,3,1,2\n1,3,0,5\n", 24), 24);
+  });
+  const auto source = Open();
+  Frame frame;
+  EXPECT_TRUE(source->Next(frame));  // comes although the pipe is still open
+  EXPECT_EQ(frame.measurements.at(0).values, (Values{1, 2}));
+  writer.join();
+  EXPECT_EQ(write(descriptor, "1,3,1,6\n", 8), 8);
+  close(descriptor);
+  EXPECT_TRUE(source->Next(frame));
+  EXPECT_EQ(frame.measurements.at(0).values, (Values{5, 6}));
+  EXPECT_FALSE(source->Next(frame));
+}
+
+// FAULTS 47
+TEST_F(TracksTest, StreamsALongFileInConstantMemory) {
+  // A pipe of 2e6 rows, about 30 MB, written by a thread; the peak may grow by 4 MB.
+  const auto peak_kb = [] {
+    std::ifstream status("/proc/self/status");
+    for (std::string word; status >> word;) {
+      if (word != "VmHWM:") continue;
+      status >> word;
+      return std::stol(word);
+    }
+    return 0L;
+  };
+  ASSERT_EQ(mkfifo(File().c_str(), 0600), 0);
+  std::thread writer([&] {
+    std::ofstream out(File());
+    for (int frame = 0; frame < 10000; ++frame) {
+      for (int i = 0; i < 200; ++i) {
+        out << frame << ',' << i / 2 << ',' << i % 2 << ",123.456\n";
+      }
+    }
+  });
+  const auto source = Open();
+  Frame frame;
+  const long before = peak_kb();
+  std::size_t count = 0;
+  while (source->Next(frame)) count += frame.measurements.size();
+  writer.join();
+  EXPECT_EQ(count, 1000000u);
+  EXPECT_LT(peak_kb() - before, 4096);
+}
+
+TEST_F(TracksTest, ReadsRealTracks) {
+  const char* const data = std::getenv("ALIDADE_DATA");
+  if (data == nullptr) GTEST_SKIP() << "ALIDADE_DATA is not set";
+  const std::string drive = std::string(data) + "/kitti-stereo-tracks/drive_0001";
+  if (!fs::exists(drive)) GTEST_SKIP() << "no " << drive;
+  const auto frames = Frames("measures: stereo, odometry: mean", drive);
+  ASSERT_EQ(frames.size(), 108u);
+  std::size_t sights = 0;
+  for (const Frame& frame : frames) {
+    EXPECT_EQ(frame.truth.at(0).size(), 3u);
+    for (const Measurement& m : frame.measurements) sights += m.stream == 0;
+  }
+  EXPECT_EQ(sights, (42005u - 1) / 4);  // rows below the header, four to a sight
+  EXPECT_EQ(frames[0].measurements[0].values[0], 343.4486);
+  const Measurement& odometry = frames[0].measurements.back();
+  EXPECT_NEAR(odometry.values[0], 0.5 * (13.172717 + 13.129880), 1e-12);
+  EXPECT_NEAR(odometry.values[3], 0.5 * (0.008902 + 0.004393), 1e-12);
+}
+
+}  // namespace
+}  // namespace alidade::testing

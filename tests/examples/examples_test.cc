@@ -78,6 +78,7 @@ TEST(Examples, EveryExampleRuns) {
   for (const auto& entry : std::filesystem::directory_iterator(kExamples)) {
     if (!std::filesystem::exists(entry.path() / "config.yaml")) continue;
     if (!kHasCeres && entry.path().filename() == "08_depth_all_estimators") continue;
+    if (entry.path().filename() == "11_slam_kitti") continue;  // SlamKitti, where its drives are
     ++count;
     const RunResult run = RunExample(entry.path().filename(), {});
     EXPECT_EQ(run.status, RunStatus::kOk) << entry.path();

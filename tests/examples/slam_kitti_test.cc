@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// examples/11_slam_kitti on real drives, against what a published filter and dead reckoning reach.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+
+#include "alidade/run.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+using Settings = std::vector<std::pair<std::string, std::string>>;
+
+/// A drive over so many frames; RMS errors of position in m: of dead reckoning and of a sliding
+/// window over 10 frames, both as published, and the most allowed here.
+struct Drive {
+  const char* name;
+  int frames;
+  double dead_reckoning, published, most;
+};
+constexpr Drive kDrives[] = {{"drive_0001", 98, 1.357, 0.618, 0.50},
+                             {"drive_0036", 240, 1.151, 0.879, 0.95},
+                             {"drive_0095", 140, 2.132, 1.433, 1.62}};
+
+class SlamKitti : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const char* data = std::getenv("ALIDADE_DATA");
+    if (data != nullptr) folder_ = fs::path(data) / "kitti-stereo-tracks";
+    if (!fs::is_directory(folder_)) GTEST_SKIP() << "ALIDADE_DATA has no kitti-stereo-tracks";
+  }
+  /// The RMS error of the position, m.
+  double Error(const Drive& drive, const Settings& settings = {}) const {
+    Config config =
+        Config::FromFile(fs::path(ALIDADE_SOURCE_DIR) / "examples/11_slam_kitti/config.yaml");
+    config.Set("source.path", (folder_ / drive.name).string(), "--set");
+    config.Set("source.frames", std::to_string(drive.frames), "--set");
+    for (const auto& [key, value] : settings) config.Set(key, value, "--set");
+    const PluginHost host(PluginPaths(config));
+    Experiment experiment = BuildExperiment(config, host);
+    const RunResult run = Run(experiment, {});
+    EXPECT_EQ(run.status, RunStatus::kOk) << run.reason;
+    EXPECT_EQ(run.frames, drive.frames);
+    return run.estimators.at(0).metrics.at("rmse:cam.position");
+  }
+  fs::path folder_;
+};
+
+TEST_F(SlamKitti, IsBetterThanDeadReckoningAndThePublishedFilter) {
+  double log_ratio = 0.0;
+  for (const Drive& drive : kDrives) {
+    const double error = Error(drive);
+    EXPECT_LE(error, drive.most) << drive.name;
+    EXPECT_LE(error, 0.80 * drive.dead_reckoning) << drive.name;
+    log_ratio += std::log(error / drive.published) / 3.0;
+  }
+  EXPECT_LE(std::exp(log_ratio), 0.90);
+}
+
+TEST_F(SlamKitti, DoesNotHangOnTheNoiseOrTheNumberOfFeatures) {
+  const Settings others = {{"sensors.pixels.sigma_px", "1"}, {"sensors.pixels.sigma_px", "4"},
+                           {"landmarks.keep", "30"},         {"landmarks.keep", "200"},
+                           {"landmarks.form", "anchored"},   {"landmarks.to_xyz.linearity", "0.1"}};
+  for (const auto& other : others) {
+    for (const Drive& drive : kDrives) {
+      EXPECT_LE(Error(drive, {other}), drive.most) << drive.name << ' ' << other.first;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace alidade

@@ -42,7 +42,7 @@ class SlamKitti : public ::testing::Test {
     for (const auto& [key, value] : settings) config.Set(key, value, "--set");
     const PluginHost host(PluginPaths(config));
     Experiment experiment = BuildExperiment(config, host);
-    const RunResult run = Run(experiment, {});
+    const RunResult run = alidade::Run(experiment, {});
     EXPECT_EQ(run.status, RunStatus::kOk) << run.reason;
     EXPECT_EQ(run.frames, drive.frames);
     return run.estimators.at(0).metrics.at("rmse:cam.position");

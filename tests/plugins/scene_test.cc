@@ -205,8 +205,8 @@ TEST(Scene, RefusesWhatMakesNoScene) {
           << error.what() << "\nexpected: " << message;
     }
   };
-  refused(kStill, "points: missing key, needed by 'scene'");
-  refused(kPoints, "trajectory: missing key, needed by 'scene'");
+  refused(kStill, "points: missing key, needed by scene");
+  refused(kPoints, "trajectory: missing key, needed by scene");
   refused(kStill + ", points: {bix: 3}", "points.bix: unknown key; did you mean 'box'?");
   refused(kStill + ", points: {count: 3}",
           "points: says nothing of its kind; expected one of list, box, room, shells");

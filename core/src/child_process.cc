@@ -63,18 +63,25 @@ void UseDefaultHandlers() {
   }
 }
 
-/// What a child prints goes here: a file in memory that cannot grow. -1 where there is none.
-int OpenPrinted() {
-  constexpr off_t kSize = 1 << 16;
-  const int file = memfd_create("printed", MFD_CLOEXEC | MFD_ALLOW_SEALING);
-  if (file >= 0 && ftruncate(file, kSize) == 0) fcntl(file, F_ADD_SEALS, F_SEAL_GROW);
-  return file;
-}
+/// What a child prints goes into a pipe, as far as it holds; what is more is lost.
+struct Printed {
+  Printed() {
+    if (pipe2(ends, O_CLOEXEC | O_NONBLOCK) != 0) ends[0] = ends[1] = -1;
+  }
+  ~Printed() {
+    if (ends[0] < 0) return;
+    close(ends[0]);
+    close(ends[1]);
+  }
+  Printed(const Printed&) = delete;
+  Printed& operator=(const Printed&) = delete;
+  int ends[2];  ///< to read from, to write to; -1: none
+};
 
 /// The first line that was printed, cut where it is too long.
-std::string FirstLine(int printed) {
+std::string FirstLine(const Printed& printed) {
   char line[80] = "";
-  if (pread(printed, line, sizeof line - 1, 0) < 0) return {};
+  if (read(printed.ends[0], line, sizeof line - 1) < 0) return {};
   line[strcspn(line, "\n")] = '\0';
   return line;
 }
@@ -233,14 +240,14 @@ ChildEnd RunInChild(const ChildLimits& limits, Journal& journal,
     return end;
   }
   std::fflush(nullptr);  // else the child prints what the program has not printed yet
-  const int printed = OpenPrinted();
+  const Printed printed;
   const pid_t program = getpid();
   const pid_t child = fork();
   if (child == 0) {
     close(ends[0]);
     g_journal = &journal;
     Supervise(program, [&] {
-      PrepareChild(limits, getppid(), printed);
+      PrepareChild(limits, getppid(), printed.ends[1]);
       RunChild(ends[1], work);
     });
   }
@@ -250,10 +257,9 @@ ChildEnd RunInChild(const ChildLimits& limits, Journal& journal,
     end.text = std::string("has no process: ") + strerror(fork_error);
   } else {
     end = Await(child, ends[0], limits.timeout_s);
-    if (printed >= 0) end.printed = FirstLine(printed);
+    end.printed = FirstLine(printed);
   }
   close(ends[0]);
-  if (printed >= 0) close(printed);
   return end;
 }
 

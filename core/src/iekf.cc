@@ -64,7 +64,7 @@ std::optional<Iekf::Minimum> Iekf::Minimise(std::span<Row* const> rows) {
   Minimum minimum{work_.Take(n)};
   Workspace::Vector& dx = minimum.dx;
   Workspace::Vector v = work_.Take(n), step = work_.Take(n), step_v = work_.Take(n);
-  Workspace::Vector there = work_.Take(n), y = work_.Take(m), residual = work_.Take(m);
+  Workspace::Vector y = work_.Take(m), residual = work_.Take(m);
   Workspace::Vector linearised = work_.Take(n);  // where the rows last were
   Workspace::Matrix s = work_.Take(m, m), r = work_.Take(m, m);
   dx.setZero();
@@ -101,24 +101,34 @@ std::optional<Iekf::Minimum> Iekf::Minimise(std::span<Row* const> rows) {
       break;
     }
     if (minimum.iterations == max_iterations_) break;
-    // Falls, but for what rounding makes of it.
-    constexpr double kRounding = 1e-12;
-    constexpr int kHalvings = 10;
     residual = at.innovation;
-    const double cost = (v.dot(dx) + SquaredNorm(r, residual)) * (1.0 + kRounding);
-    const auto risen = [&](double part) {
-      there = dx + part * step;
-      return !MoveFromPrior(there.data()) || !Innovations(rows, residual) ||
-             !((v + part * step_v).dot(there) + SquaredNorm(r, residual) <= cost);
-    };
-    int halvings = 0;
-    while (halvings <= kHalvings && risen(std::ldexp(1.0, -halvings))) ++halvings;
-    if (halvings > kHalvings) break;
-    const double part = std::ldexp(1.0, -halvings);
+    const double part = PartThatLowersTheCost(rows, {dx, v, step, step_v}, r, residual);
+    if (part == 0.0) break;
     dx += part * step;
     v += part * step_v;
   }
   return minimum;
+}
+
+/// The largest of 1, 1/2, 1/4, ... of the step with which v' dx + r' R^-1 r does not rise, but for
+/// what rounding makes of it; 0 where there is none. `r` is the factor of R, `residual` the
+/// innovations at dx, then memory.
+double Iekf::PartThatLowersTheCost(std::span<Row* const> rows, const Direction& at,
+                                   const Workspace::Matrix& r, Workspace::Vector& residual) {
+  constexpr double kRounding = 1e-12;
+  constexpr int kHalvings = 10;
+  const Workspace::Use use(work_);
+  Workspace::Vector there = work_.Take(at.dx.size());
+  const double cost = (at.v.dot(at.dx) + SquaredNorm(r, residual)) * (1.0 + kRounding);
+  for (int halvings = 0; halvings <= kHalvings; ++halvings) {
+    const double part = std::ldexp(1.0, -halvings);
+    there = at.dx + part * at.step;
+    if (MoveFromPrior(there.data()) && Innovations(rows, residual) &&
+        (at.v + part * at.step_v).dot(there) + SquaredNorm(r, residual) <= cost) {
+      return part;
+    }
+  }
+  return 0.0;
 }
 
 /// Puts the state at prior (+) dx; its covariance stays that at the prior. False where that is not

@@ -87,7 +87,7 @@ class CeresBatch : public Estimator {
     return report_;
   }
 
-  void StopWhen(std::function<bool()> stop) override { stop_ = std::move(stop); }
+  void StopWhen(const std::function<bool()>& stop) override { stop_ = stop; }
 
   void Smooth(const Emit& emit) override {
     if (trajectory_.size() == 0) return;

@@ -286,10 +286,10 @@ TEST(RunFolder, EveryFailureOfTheDiskIsAnErrorThatLeavesNothing) {
         for (const auto& entry : fs::directory_iterator(folder.path())) fs::remove_all(entry);
         Record(OptionsFor(folder / "out"), 3);
       } else if (replace) {
-        EXPECT_EQ(FilesIn(folder.path()).size(), 17u) << "call " << n;
+        EXPECT_EQ(FilesIn(folder.path()).size(), 18u) << "call " << n;
         EXPECT_EQ(Lines(folder / "out/truth.csv").size(), 4u);
       } else if (!folder.empty()) {
-        EXPECT_EQ(FilesIn(folder.path()).size(), 17u) << "call " << n;
+        EXPECT_EQ(FilesIn(folder.path()).size(), 18u) << "call " << n;
         fs::remove_all(folder / "out");
       }
     }

@@ -170,14 +170,14 @@ TEST_F(DrivenTest, WhatIsNotAnInputIsRefusedWithItsPlace) {
       ":4:40 state.car.input.stream: stream 'odometry' has 2 values at a time; expected 1, as "
       "control input 'speed' of model 'driven'");
   EXPECT_EQ(Refusal("state.car", "{model: driven, noise: {speed: 0.2}, initial: {}}"),
-            "--set state.car.input: missing key, needed by 'the control input speed of model "
-            "driven'");
+            "--set state.car.input: missing key, needed by the control input speed of model "
+            "driven");
   EXPECT_EQ(Refusal("state.car.input", "odometry"),
             "--set state.car.input: not a map; expected {stream: NAME}, or {stream: NAME, "
             "max_age_s: S}");
   EXPECT_EQ(Refusal("state.car.input", "{max_age_s: 1}"),
-            "--set state.car.input.stream: missing key, needed by 'the control input speed of "
-            "model driven'");
+            "--set state.car.input.stream: missing key, needed by the control input speed of "
+            "model driven");
   EXPECT_EQ(Refusal("state.car.input.max_age_s", "0"),
             "--set state.car.input.max_age_s: '0' is out of range; expected a number in (0, "
             "1e+09]");

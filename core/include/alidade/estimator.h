@@ -131,7 +131,7 @@ class Estimator {
   virtual void Smooth(const Emit& /*emit*/) {}
   /// Where Smooth takes long, it asks `stop` now and then; where that is true it ends by an Error of
   /// kStopped. A null function never stops.
-  virtual void StopWhen(std::function<bool()> /*stop*/) {}
+  virtual void StopWhen(const std::function<bool()>& /*stop*/) {}
   /// The estimator as it is after the last frame; null: it cannot go back to one.
   virtual std::unique_ptr<Snapshot> Save() const { return nullptr; }
   /// Goes back to where this estimator gave `snapshot`: every result from there on has the same

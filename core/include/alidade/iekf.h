@@ -54,8 +54,14 @@ class Iekf : public Ekf {
     std::optional<double> step = std::nullopt;
     bool converged = false;
   };
+  /// dx = P v, and a step from there, step = P step_v.
+  struct Direction {
+    const Workspace::Vector &dx, &v, &step, &step_v;
+  };
   Outcome Apply(std::span<Row* const> rows) override;
   std::optional<Minimum> Minimise(std::span<Row* const> rows);
+  double PartThatLowersTheCost(std::span<Row* const> rows, const Direction& at,
+                               const Workspace::Matrix& r, Workspace::Vector& residual);
   bool MoveFromPrior(const double* dx);
   bool Innovations(std::span<Row* const> rows, Workspace::Vector& innovations);
   bool Relinearise(std::span<Row* const> rows, const double* dx);

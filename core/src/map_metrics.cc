@@ -45,4 +45,10 @@ std::map<std::string, double> internal::MapMetrics(const std::vector<LandmarkEst
   return metrics;
 }
 
+void internal::NoteMap(const NamedEstimator& named, const Source& source, EstimatorResult& result) {
+  if (!named.system.landmarks) return;
+  result.landmarks = named.estimator->landmarks();
+  result.metrics.merge(MapMetrics(*result.landmarks, source));
+}
+
 }  // namespace alidade

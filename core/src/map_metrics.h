@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "alidade/landmarks.h"
+#include "alidade/run.h"
 #include "alidade/source.h"
 
 namespace alidade::internal {
@@ -17,5 +18,8 @@ namespace alidade::internal {
 ///   map.sim3.scale   s; both of three landmarks or more that are not on one line
 std::map<std::string, double> MapMetrics(const std::vector<LandmarkEstimate>& landmarks,
                                          const Source& source);
+
+/// The landmarks at the end, with their metrics, in `result`; nothing where `named` has none.
+void NoteMap(const NamedEstimator& named, const Source& source, EstimatorResult& result);
 
 }  // namespace alidade::internal

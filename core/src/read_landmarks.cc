@@ -65,6 +65,20 @@ void CheckOptions(const Node& node, const LandmarkOptions& options, const Sensor
 
 }  // namespace
 
+void internal::ReadLandmarkKeys(const Node& entry, const PluginHost& host, SensorBinding& binding) {
+  const Node role = entry.At("roles").At("landmark", "sensor '" + binding.name + "'");
+  if (role.is_map() || role.Text() != "landmarks") {
+    role.Fail("not the landmarks", "`landmarks`: the one that a measurement names");
+  }
+  if (const auto node = entry.Find("association")) {
+    binding.association = OnePointRansac::FromNode(*node);
+  }
+  const auto form = FormOf(binding.model.roles());
+  if (!form || IsXyz(*form)) return;
+  SensorModel xyz = host.CreateSensor(binding.model.name(), entry, ToString(internal::XyzForm()));
+  if (FormOf(xyz.roles()) == internal::XyzForm()) binding.xyz = std::move(xyz);
+}
+
 std::optional<LandmarkOptions> internal::ReadLandmarks(const Node& root,
                                                        const std::vector<SensorBinding>& sensors) {
   const auto sees = [](const SensorBinding& sensor) { return sensor.model.has_landmark(); };

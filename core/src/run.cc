@@ -261,13 +261,6 @@ void NoteStop(Running& one, const char* why, RunResult& result) {
   result.reason = "estimator '" + one.named.name + "': " + why;
 }
 
-/// The map at the end, with its metrics.
-void NoteMap(Running& one, const Source& source) {
-  if (!one.named.system.landmarks) return;
-  one.result.landmarks = one.named.estimator->landmarks();
-  one.result.metrics.merge(internal::MapMetrics(*one.result.landmarks, source));
-}
-
 /// The estimates of those that needed all frames.
 void SmoothAll(std::vector<Running>& running, const std::vector<Seen>& kept,
                const RunOptions& options, RunResult& result) {
@@ -387,7 +380,7 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
     Measure(one, result);
     one.result.counts = one.metrics.counts();
     one.result.units = one.metrics.units();
-    NoteMap(one, *experiment.source);
+    internal::NoteMap(one.named, *experiment.source, one.result);
     if (one.took && !one.named.estimator->failed()) {
       const int by = one.named.accepted_by;
       NoteUnused(one.named.system, by < 0 ? "" : running[static_cast<std::size_t>(by)].named.name,

@@ -5,7 +5,6 @@
 #include <functional>
 #include <limits>
 
-#include "landmark_forms.h"
 #include "names.h"
 #include "read_landmarks.h"
 
@@ -216,18 +215,6 @@ RobustLoss ReadLoss(const Node& node) {
           scale.Number(0.0, std::numeric_limits<double>::infinity(), true, true)};
 }
 
-/// All landmark roles together, by the role `landmark`; and the model's form that is xyz.
-void ReadLandmarkRole(const Node& entry, const PluginHost& host, SensorBinding& binding) {
-  const Node role = entry.At("roles").At("landmark", "sensor '" + binding.name + "'");
-  if (role.is_map() || role.Text() != "landmarks") {
-    role.Fail("not the landmarks", "`landmarks`: the one that a measurement names");
-  }
-  const auto form = FormOf(binding.model.roles());
-  if (!form || IsXyz(*form)) return;
-  SensorModel xyz = host.CreateSensor(binding.model.name(), entry, ToString(internal::XyzForm()));
-  if (FormOf(xyz.roles()) == internal::XyzForm()) binding.xyz = std::move(xyz);
-}
-
 SensorBinding ReadSensor(const std::string& name, const Node& entry, const PluginHost& host,
                          const System& system) {
   const std::string model_name = entry.At("model", "a sensor entry").Text();
@@ -257,12 +244,7 @@ SensorBinding ReadSensor(const std::string& name, const Node& entry, const Plugi
                  "a block of its own for each role");
     }
   }
-  if (binding.model.has_landmark()) {
-    ReadLandmarkRole(entry, host, binding);
-    if (const auto node = entry.Find("association")) {
-      binding.association = OnePointRansac::FromNode(*node);
-    }
-  }
+  if (binding.model.has_landmark()) internal::ReadLandmarkKeys(entry, host, binding);
   roles.RejectUnread();
   entry.RejectUnread();
   return binding;

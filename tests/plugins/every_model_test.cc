@@ -54,8 +54,8 @@ struct Seen : Sensor<G, G> {
 
 using Means = std::vector<std::vector<double>>;
 
-/// Adds the state entry `name`, whose blocks start at `means`, each element known to 0.05; a control
-/// input comes on the stream `NAME.input`.
+/// Adds the state entry `name`, whose blocks start at `means`, each element known to 0.05. A
+/// control input comes on the stream `NAME.input`.
 void AddMotion(System& system, const std::string& name, const MotionModel& model,
                const Means& means) {
   MotionBinding binding{name, model, {}};

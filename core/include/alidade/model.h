@@ -46,8 +46,8 @@ struct MatrixRef {
 ///
 ///   bool Valid(const double* z) const;
 ///   static constexpr int kInitialises;                                  the role y below
-///   template <class T> bool Initialise(const T* other..., const T* z, [const T* prior,] T* y) const;
-///   static constexpr int kPrior;         numbers of the prior, of what z does not tell; 0 if absent
+///   template <class T> bool Initialise(const T* other..., const T* z[, prior], T* y) const;
+///   static constexpr int kPrior;         numbers of the prior, which z does not tell; default 0
 ///   void Jacobian(const double* role..., MatrixRef J_z_role...) const;  closed form, zeroed
 ///
 /// Roles with the flag ALIDADE_ROLE_LANDMARK stand side by side and are filled by the landmark that

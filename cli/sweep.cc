@@ -18,8 +18,9 @@ constexpr const char* kFooter = R"(Examples:
   alidade sweep config.yaml --runs 10000 --shard 3/16 -o runs/share-03
   alidade sweep config.yaml --runs 200 --vary sensors.stereo.sigma_px=0.5,1,2
 
-The folder gets sweep.json, runs.csv and table.md; with --vary, sweep.csv and a figure too. The number of jobs does not change a byte of
-them. Exit code 1: some runs failed; 75: stopped by a signal, with what was complete written.)";
+The folder gets sweep.json, runs.csv and table.md; with --vary, sweep.csv and a figure too. The
+number of jobs does not change a byte of them. Exit code 1: some runs failed; 75: stopped by a
+signal, with what was complete written.)";
 
 struct Arguments {
   Input input;

@@ -91,7 +91,7 @@ void Ekf::Restore(const Snapshot& snapshot) {
 const UpdateReport& Ekf::Process(const Frame& frame) {
   report_.Clear();
   if (small_ == nullptr || !small_->Process(frame)) ProcessFully(frame);
-  inputs_.Take(frame, report_);
+  if (!inputs_.empty()) inputs_.Take(frame, report_);
   return report_;
 }
 
@@ -160,14 +160,13 @@ void Ekf::Collect(const Frame& frame) {
 /// Moves the state to `stamp`, piece by piece where a control input stops acting on the way.
 void Ekf::StepTo(Stamp stamp) {
   while (stamp_ < stamp) {
-    UseInputs();
+    if (!inputs_.empty()) UseInputs();
     if (!StepEvenly(inputs_.StepEnd(stamp_, stamp))) return;
   }
 }
 
 /// The control inputs from here on, for the models that move.
 void Ekf::UseInputs() {
-  if (inputs_.empty()) return;
   for (std::size_t i = 0; i < motions_.size(); ++i) {
     if (motions_[i].active) motions_[i].u = inputs_.Use(i, stamp_, report_.events);
   }

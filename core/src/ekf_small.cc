@@ -268,8 +268,10 @@ bool Ekf::Small::ProcessSized(const Frame& frame) {
   }
   if (elapsed > 0) {
     const double dt_s = Seconds(elapsed);
-    if (!ekf_.inputs_.AllAct(ekf_.stamp_, frame.stamp)) return false;
-    ekf_.UseInputs();
+    if (!ekf_.inputs_.empty()) {
+      if (!ekf_.inputs_.AllAct(ekf_.stamp_, frame.stamp)) return false;
+      ekf_.UseInputs();
+    }
     if (!(dt_s <= ekf_.options_.max_dt_s) || !Step<N>(dt_s)) return false;
     ekf_.stamp_ = frame.stamp;
   }

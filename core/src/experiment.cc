@@ -29,7 +29,7 @@ void CheckSchema(const Node& root) {
   }
 }
 
-/// Index of the stream that an entry of a sensor or an input names, of the size that `wanted_by` it.
+/// Index of the stream that an entry of a sensor or an input names, of the size `wanted_by` it.
 int FindStream(const Node& entry, int size, const std::string& wanted_by,
                const std::vector<StreamInfo>& streams) {
   const Node node = entry.At("stream");

@@ -30,8 +30,8 @@ enum class Outcome {
 const char* ToString(Outcome outcome);
 /// What a model's status means for the measurement; kOk is kAccepted.
 Outcome OutcomeOf(Status status);
-/// Number of equal parts in which a gap of `elapsed` > 0 is stepped: at most max_dt_s each, to whole
-/// ns, and at least 1 ns.
+/// Number of equal parts in which a gap of `elapsed` > 0 is stepped: at most max_dt_s each, to
+/// whole ns, and at least 1 ns.
 Stamp StepParts(Stamp elapsed, double max_dt_s);
 /// Whether none of the values is infinite or not a number.
 inline bool AllFinite(std::span<const double> values) {
@@ -129,8 +129,8 @@ class Estimator {
   /// smoothing itself come with the last report. Errors: where there is nothing to emit, failed()
   /// turns true and the text of the error says why; whatever `emit` throws.
   virtual void Smooth(const Emit& /*emit*/) {}
-  /// Where Smooth takes long, it asks `stop` now and then; where that is true it ends by an Error of
-  /// kStopped. A null function never stops.
+  /// Where Smooth takes long, it asks `stop` now and then; where that is true it ends by an Error
+  /// of kStopped. A null function never stops.
   virtual void StopWhen(const std::function<bool()>& /*stop*/) {}
   /// The estimator as it is after the last frame; null: it cannot go back to one.
   virtual std::unique_ptr<Snapshot> Save() const { return nullptr; }

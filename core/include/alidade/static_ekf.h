@@ -74,8 +74,8 @@ class StaticEkf {
   /// P, n x n, in the order of the blocks.
   Covariance covariance() const { return p_.template selfadjointView<Eigen::Lower>(); }
 
-  /// Steps by dt_s seconds with the control inputs `u` (ambient), `const double*` each: one for each
-  /// model that takes one, in their order. Not kOk, and nothing moved, where a model is not defined.
+  /// Steps by dt_s seconds with the control inputs `u` (ambient), `const double*` each, of those
+  /// models that take one, in order. Not kOk, and nothing moved, where a model is not defined.
   template <class... Inputs>
   __attribute__((flatten)) Status Predict(double dt_s, Inputs... u) {
     static_assert(sizeof...(Inputs) == InputsBefore(sizeof...(Motions)),

@@ -30,8 +30,8 @@ Iekf::Iekf(System system, const IekfOptions& options, const std::vector<StreamIn
 Outcome Iekf::Apply(std::span<Row* const> rows) {
   const Workspace::Use use(work_);
   prior_ = state_.values();
-  if (first_.size() < rows.size()) first_.resize(rows.size());
-  for (std::size_t i = 0; i < rows.size(); ++i) first_[i] = EntryOf(*rows[i]);
+  if (at_prediction_.size() < rows.size()) at_prediction_.resize(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) at_prediction_[i] = EntryOf(*rows[i]);
   const std::optional<Minimum> minimum = Minimise(rows);
   std::ranges::copy(prior_, state_.values().begin());
   if (minimum) correction_ = minimum->dx.data();
@@ -39,9 +39,9 @@ Outcome Iekf::Apply(std::span<Row* const> rows) {
   correction_ = nullptr;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     MeasurementReport& entry = EntryOf(*rows[i]);
-    entry.h.swap(first_[i].h);
-    entry.innovation.swap(first_[i].innovation);
-    entry.s.swap(first_[i].s);
+    entry.h.swap(at_prediction_[i].h);
+    entry.innovation.swap(at_prediction_[i].innovation);
+    entry.s.swap(at_prediction_[i].s);
   }
   if (outcome == Outcome::kAccepted && minimum && !minimum->converged) {
     Note("not_converged",

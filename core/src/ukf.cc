@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/ukf.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "cholesky.h"
@@ -220,13 +221,11 @@ Status Ukf::StepPoints(int halvings, double dt_s) {
 }
 
 bool Ukf::StepOnce(double dt_s) {
-  bool moves = false;
+  if (std::ranges::none_of(motions_, &MotionPlan::active)) return true;
   for (std::size_t i = 0; i < motions_.size(); ++i) {
     if (!motions_[i].active) continue;
-    moves = true;
     if (!StepModel(system_.motions[i], motions_[i], dt_s)) return false;  // the centre, and Lq
   }
-  if (!moves) return true;
   for (int halvings = 0; halvings <= kMostHalvings; ++halvings) {
     const Status status = StepPoints(halvings, dt_s);
     if (status == Status::kOk) {

@@ -68,8 +68,8 @@ class Iekf : public Ekf {
 
   int max_iterations_;
   double tolerance_;
-  std::vector<double> prior_;             ///< values before the update
-  std::vector<MeasurementReport> first_;  ///< of its rows, as at the prediction
+  std::vector<double> prior_;                     ///< values before the update
+  std::vector<MeasurementReport> at_prediction_;  ///< reports of its rows
 };
 
 }  // namespace alidade

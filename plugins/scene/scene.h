@@ -16,16 +16,16 @@
 namespace alidade {
 
 inline constexpr const char* kSceneKeys =
-    "points         one of list: [[x, y, z], ...], m, ids are places in it; box: {min, max},\n"
-    "points.room    {min, max}: on its faces; points.shells: {center, radii}: on spheres\n"
-    "points.count   how many are drawn of a box, a room or shells\n"
-    "trajectory     one of look_at, keyframes and model\n"
-    "trajectory.look_at    [{position, target, t_s}, ...]: through way-points; up beside it\n"
-    "trajectory.keyframes  [{position, t_s, and one of euler_deg, matrix, axis_angle_deg,\n"
-    "                      quaternion}, ...]\n"
-    "trajectory.model      {linear_acceleration, angular_acceleration, position, orientation,\n"
-    "                      velocity, angular_velocity}: drawn from quaternion_pose\n"
-    "state          the state entry whose blocks the truth is named after; default cam";
+    "points.list           [[x, y, z], ...], m; the ids are the places in it\n"
+    "points.box            {min: [x, y, z], max}, m: drawn in its volume\n"
+    "points.room           {min: [x, y, z], max}, m: drawn on its six faces\n"
+    "points.shells         {center, radii}, m: drawn on spheres\n"
+    "points.count          how many are drawn\n"
+    "trajectory.look_at    [{position, target, t_s}, ...]; trajectory.up beside it\n"
+    "trajectory.keyframes  [{position, t_s, euler_deg | matrix | axis_angle_deg | quaternion}, "
+    "...]\n"
+    "trajectory.model      noise and start of quaternion_pose, which the path is drawn from\n"
+    "state                 state entry whose blocks the truth is named after; default cam";
 
 /// Points in space, seen by a camera that moves among them.
 ///

@@ -111,7 +111,7 @@ void Ekf::ProcessFully(const Frame& frame) {
     return;
   }
   if (waiting_) InitialiseFromMeasurements();
-  if (landmarks_ != nullptr) landmarks_->Find();
+  if (landmarks_ != nullptr) landmarks_->PlanRows();
   group_.clear();
   for (Row& row : rows()) {
     if (EntryOf(row).outcome != Outcome::kAccepted) continue;

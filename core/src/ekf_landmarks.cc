@@ -11,14 +11,44 @@
 namespace alidade {
 namespace {
 
-/// Generations are remembered of so many ids that ended.
-constexpr std::size_t kMostEnded = 100'000;
 /// A landmark that waits to enter is no more counted after so many frames without it.
 constexpr int kWaitingFrames = 30;
+
+/// The role of a landmark that is a point, m.
+Space Xyz() {
+  return {"landmark", "m", "", {"x", "y", "z"}, Geometry::Vector(3), ALIDADE_ROLE_LANDMARK};
+}
 
 bool Used(const MeasurementReport& entry) { return entry.outcome == Outcome::kAccepted; }
 
 }  // namespace
+
+int Generations::Of(std::int64_t id) const {
+  const auto found = of_.find(id);
+  return found == of_.end() ? 0 : found->second;
+}
+
+void Generations::End(std::int64_t id, int generation) {
+  constexpr std::size_t kMost = 100'000;
+  ++ends_;
+  log_.emplace_back(id, of_[id] = generation);
+  if (log_.size() <= kMost) return;
+  const auto [oldest, its] = log_.front();
+  log_.pop_front();
+  const auto found = of_.find(oldest);
+  if (found != of_.end() && found->second == its) of_.erase(found);
+}
+
+void Generations::GoBackTo(std::size_t ends) {
+  for (; ends_ > ends && !log_.empty(); --ends_, log_.pop_back()) {
+    const auto [id, generation] = log_.back();
+    if (generation > 1) {
+      of_[id] = generation - 1;
+    } else {
+      of_.erase(id);
+    }
+  }
+}
 
 Ekf::Landmarks::Landmarks(Ekf& ekf) : ekf_(ekf), options_(*ekf.system_.landmarks) {
   for (const SensorBinding& sensor : ekf_.system_.sensors) {
@@ -49,12 +79,12 @@ BlockId Ekf::Landmarks::Declare(std::int64_t id, const Space& role, BlockStatus 
 }
 
 void Ekf::Landmarks::AddKnown() {
-  const Space xyz{"landmark", "m", "", {"x", "y", "z"}, Geometry::Vector(3), ALIDADE_ROLE_LANDMARK};
   for (const KnownLandmark& known : options_.known) {
     Landmark& landmark = map_.landmarks[known.id];
     landmark.form = internal::XyzForm();
-    landmark.blocks = {
-        Declare(known.id, xyz, known.sigma > 0.0 ? BlockStatus::kEstimated : BlockStatus::kFixed)};
+    landmark.known = true;
+    landmark.blocks = {Declare(known.id, Xyz(),
+                               known.sigma > 0.0 ? BlockStatus::kEstimated : BlockStatus::kFixed)};
     ekf_.state_.Add(landmark.blocks[0], known.position.data(),
                     known.sigma * known.sigma * Eigen::Matrix3d::Identity());
   }
@@ -90,7 +120,7 @@ const double* Ekf::Landmarks::CameraOf(const Family& family) const {
   return id < 0 ? nullptr : ekf_.state_.value(id);
 }
 
-void Ekf::Landmarks::Find() {
+void Ekf::Landmarks::PlanRows() {
   used_ = 0;
   bool any = false;
   for (Row& row : ekf_.rows()) {
@@ -116,7 +146,11 @@ void Ekf::Landmarks::Plan(Row& row, const Landmark& landmark) {
   SensorPlan& plan = plans_[used_++];
   const SensorBinding& sensor = ekf_.BindingOf(row);
   const Family& family = FamilyOf(row);
-  plan = ekf_.plans_[static_cast<std::size_t>(row.sensor)];
+  const SensorPlan& base = ekf_.plans_[static_cast<std::size_t>(row.sensor)];
+  plan = base;
+  for (const double*& at : plan.at) {
+    if (at == base.implied.data()) at = plan.implied.data();
+  }
   for (auto* const roles : {&plan.roles, &plan.at}) {
     roles->resize(static_cast<std::size_t>(family.first));
   }
@@ -167,10 +201,7 @@ void Ekf::Landmarks::Count() {
     if (!ekf_.plans_[static_cast<std::size_t>(row.sensor)].ready) continue;
     const auto [at, is_new] = map_.landmarks.try_emplace(row.measurement->landmark);
     Landmark& landmark = at->second;
-    if (is_new) {
-      const auto ended = map_.ended.find(at->first);
-      landmark.generation = ended == map_.ended.end() ? 0 : ended->second;
-    }
+    if (is_new) landmark.generation = generations_.Of(at->first);
     if (landmark.first == kNoStamp) landmark.first = ekf_.stamp_;
     if (landmark.sights == 0 || landmark.seen != map_.frame) ++landmark.sights;
     landmark.seen = map_.frame;
@@ -198,9 +229,6 @@ void Ekf::Landmarks::CheckDepths() {
 
 /// Drops what was not seen for long, or fails too often. Known landmarks stay.
 void Ekf::Landmarks::Forget() {
-  const auto is_known = [this](std::int64_t id) {
-    return std::ranges::find(options_.known, id, &KnownLandmark::id) != options_.known.end();
-  };
   for (auto at = map_.landmarks.begin(); at != map_.landmarks.end();) {
     const Landmark& landmark = at->second;
     const std::int64_t unseen = map_.frame - landmark.seen;
@@ -208,7 +236,7 @@ void Ekf::Landmarks::Forget() {
     const bool lost = most > 0 && unseen >= most;
     const bool fails = landmark.tried >= options_.minimum_tries &&
                        landmark.accepted < options_.success_ratio * landmark.tried;
-    if ((lost || fails) && !is_known(at->first)) {
+    if ((lost || fails) && !landmark.known) {
       at = Delete(at);
     } else {
       ++at;
@@ -221,8 +249,8 @@ std::map<std::int64_t, Ekf::Landmarks::Landmark>::iterator Ekf::Landmarks::Delet
   if (at->second.in_state()) {
     DropBlocks(at->second);
     ++counts().deleted;
-    if (map_.ended.size() == kMostEnded) map_.ended.erase(map_.ended.begin());
-    map_.ended[at->first] = at->second.generation + 1;
+    generations_.End(at->first, at->second.generation + 1);
+    map_.ended = generations_.ends();
   }
   return map_.landmarks.erase(at);
 }
@@ -246,11 +274,11 @@ void Ekf::Landmarks::Convert() {
     if (row.plan == nullptr || row.model != nullptr || !Used(ekf_.EntryOf(row))) continue;
     const auto found = map_.landmarks.find(row.measurement->landmark);
     if (found == map_.landmarks.end() || !found->second.in_state()) continue;
-    counts().converted += Convert(found->first, found->second, FamilyOf(row));
+    counts().converted += ConvertToXyz(found->first, found->second, FamilyOf(row));
   }
 }
 
-bool Ekf::Landmarks::Convert(std::int64_t id, Landmark& landmark, const Family& family) {
+bool Ekf::Landmarks::ConvertToXyz(std::int64_t id, Landmark& landmark, const Family& family) {
   const double* const camera = CameraOf(family);
   if (!HasInverseDistance(landmark) || camera == nullptr) return false;
   const std::vector<const double*> values = ValuesOf(landmark);
@@ -265,8 +293,7 @@ bool Ekf::Landmarks::Convert(std::int64_t id, Landmark& landmark, const Family& 
     jacobians.emplace_back(point->jacobian.middleCols(column, size));
     column += size;
   }
-  const Space xyz{"landmark", "m", "", {"x", "y", "z"}, Geometry::Vector(3), ALIDADE_ROLE_LANDMARK};
-  const BlockId to = Declare(id, xyz, BlockStatus::kEstimated);
+  const BlockId to = Declare(id, Xyz(), BlockStatus::kEstimated);
   ekf_.state_.Initialise(to, point->position.data(), landmark.blocks, jacobians,
                          Eigen::Matrix3d::Zero());
   DropBlocks(landmark);
@@ -277,15 +304,17 @@ bool Ekf::Landmarks::Convert(std::int64_t id, Landmark& landmark, const Family& 
 
 /// Lets landmarks of this frame enter that wait, as long as too few are measured.
 void Ekf::Landmarks::Enter() {
-  int measured = 0;
-  for (Row& row : ekf_.rows()) measured += row.plan != nullptr && Used(ekf_.EntryOf(row));
+  const std::vector<const Row*> used = MeasuredOnce();
+  auto measured = std::ssize(used);
   for (Family& family : families_) family.shared.clear();
-  if (options_.prior) prior_ = PriorInverseDistance();
+  if (options_.prior) prior_ = *options_.prior;
+  bool asked_map = prior_.from_map == 0;
   for (Row& row : ekf_.rows()) {
     if (measured >= options_.keep) return;
     Outcome& outcome = ekf_.EntryOf(row).outcome;
     const SensorModel& model = ekf_.BindingOf(row).model;
     if (!Has(row.sensor) || outcome != Outcome::kNotReady ||
+        !ekf_.plans_[static_cast<std::size_t>(row.sensor)].ready ||
         model.initialised_role() != FamilyOf(row).first) {
       continue;
     }
@@ -294,6 +323,8 @@ void Ekf::Landmarks::Enter() {
         found->second.sights < options_.enter_after) {
       continue;
     }
+    if (!asked_map) prior_.inverse_distance = PriorInverseDistance(used);
+    asked_map = true;
     outcome = Initialise(found->first, row, found->second);
     if (outcome != Outcome::kInitialised) continue;
     ++counts().initialised;
@@ -301,19 +332,31 @@ void Ekf::Landmarks::Enter() {
   }
 }
 
-/// The median of the converged inverse distances among the landmarks of the frame, where there are
-/// enough; else the prior's.
-double Ekf::Landmarks::PriorInverseDistance() const {
-  std::vector<double> converged;
+/// A row that was used of each landmark in the state, by id.
+std::vector<const Ekf::Row*> Ekf::Landmarks::MeasuredOnce() const {
+  std::vector<const Row*> used;
   for (const Row& row : ekf_.rows()) {
-    if (options_.prior->from_map == 0) break;
+    if (row.plan == nullptr || !Used(ekf_.EntryOf(row))) continue;
     const auto found = map_.landmarks.find(row.measurement->landmark);
-    if (row.plan == nullptr || found == map_.landmarks.end()) continue;
-    const double* const camera = CameraOf(FamilyOf(row));
-    const Landmark& landmark = found->second;
+    if (found != map_.landmarks.end() && found->second.in_state()) used.push_back(&row);
+  }
+  const auto id = [](const Row* row) { return row->measurement->landmark; };
+  std::ranges::stable_sort(used, {}, id);
+  const auto twice = std::ranges::unique(used, {}, id);
+  used.erase(twice.begin(), twice.end());
+  return used;
+}
+
+/// The median of the converged inverse distances among landmarks that were measured, where there
+/// are enough; else the prior's.
+double Ekf::Landmarks::PriorInverseDistance(std::span<const Row* const> measured) const {
+  std::vector<double> converged;
+  for (const Row* const row : measured) {
+    const double* const camera = CameraOf(FamilyOf(*row));
+    const Landmark& landmark = map_.landmarks.at(row->measurement->landmark);
     constexpr double kConverged = 0.1;  // of the index of linearity, where nothing is converted
     const double limit = options_.to_xyz > 0.0 ? options_.to_xyz : kConverged;
-    if (camera == nullptr || !landmark.in_state() || !landmark.form) continue;
+    if (camera == nullptr || !landmark.form) continue;
     const std::vector<const double*> values = ValuesOf(landmark);
     if (HasInverseDistance(landmark) &&
         !(internal::LinearityOf(*landmark.form, values.data(), InverseDistanceSigma(landmark),

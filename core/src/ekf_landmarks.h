@@ -3,6 +3,8 @@
 
 #include <deque>
 #include <map>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "alidade/ekf.h"
@@ -19,13 +21,31 @@ struct LandmarkMap {
     std::int64_t seen = 0;  ///< the last frame that measured it
     Stamp first = kNoStamp, last = kNoStamp;
     bool negative = false;  ///< its inverse distance is
+    bool known = false;     ///< from the config: never forgotten
     bool in_state() const { return !blocks.empty(); }
   };
   std::map<std::int64_t, Landmark> landmarks;  ///< by the id of the measurements
   std::map<BlockId, int> users;                ///< of a shared block: landmarks on it
-  std::map<std::int64_t, int> ended;           ///< generations of an id that were forgotten
   std::int64_t frame = 0;                      ///< frames with a measurement of a landmark
   std::int64_t names = 0;                      ///< blocks named so far
+  std::size_t ended = 0;                       ///< landmarks that were in the state and left it
+};
+
+/// How many landmarks of an id have ended, over the newest 100 000 ends. Goes back with the filter
+/// without being copied into its snapshots.
+class Generations {
+ public:
+  /// Landmarks that ended so far.
+  std::size_t ends() const { return ends_; }
+  int Of(std::int64_t id) const;
+  void End(std::int64_t id, int generation);
+  /// To when so many had ended.
+  void GoBackTo(std::size_t ends);
+
+ private:
+  std::deque<std::pair<std::int64_t, int>> log_;  ///< id, its ended generations then
+  std::map<std::int64_t, int> of_;
+  std::size_t ends_ = 0;
 };
 
 /// The landmarks of a filter: finds them for the measurements of a frame, and lets them enter,
@@ -39,7 +59,7 @@ class Ekf::Landmarks {
   /// Puts the known landmarks into the state, once.
   void AddKnown();
   /// Gives the rows of landmarks in the state their plans; the others are not ready.
-  void Find();
+  void PlanRows();
   /// Makes the updates with rows that passed their gates, where a sensor asks for RANSAC; else
   /// false, and nothing done.
   bool FuseByConsensus(std::span<Row* const> passed);
@@ -47,7 +67,10 @@ class Ekf::Landmarks {
   void Finish();
 
   const LandmarkMap& map() const { return map_; }
-  void Restore(const LandmarkMap& map) { map_ = map; }
+  void Restore(const LandmarkMap& map) {
+    map_ = map;
+    generations_.GoBackTo(map.ended);
+  }
   std::vector<LandmarkEstimate> Estimates() const;
 
  private:
@@ -67,13 +90,12 @@ class Ekf::Landmarks {
   void Forget();
   void Convert();
   void Enter();
-  bool Convert(std::int64_t id, Landmark& landmark, const Family& family);
+  bool ConvertToXyz(std::int64_t id, Landmark& landmark, const Family& family);
   std::vector<char> Support(std::span<Row* const> matches);
   void SupportOf(std::size_t hypothesis, std::span<Row* const> matches, std::vector<char>& agrees);
-  struct Sight;
-  Outcome Invert(Row& row, Sight& sight);
+  std::vector<const Row*> MeasuredOnce() const;
   Outcome Initialise(std::int64_t id, Row& row, Landmark& landmark);
-  double PriorInverseDistance() const;
+  double PriorInverseDistance(std::span<const Row* const> measured) const;
   Eigen::Matrix3d CovarianceOf(const Landmark& landmark,
                                const Eigen::Matrix<double, 3, Eigen::Dynamic>& jacobian) const;
   void DropBlocks(Landmark& landmark);
@@ -93,11 +115,12 @@ class Ekf::Landmarks {
   const LandmarkOptions options_;
   std::vector<Family> families_;  ///< by sensor
   LandmarkMap map_;
+  Generations generations_;
   std::deque<SensorPlan> plans_;  ///< of the frame's rows
   std::size_t used_ = 0;
   bool moved_ = false;                    ///< blocks came or went since the plans were made
   std::vector<double> support_, rescue_;  ///< bounds on r' R^-1 r and NIS, by sensor
-  double prior_ = 0.0;                    ///< inverse distance of what enters in this frame
+  LandmarkOptions::Prior prior_;          ///< of what enters in this frame
 };
 
 }  // namespace alidade

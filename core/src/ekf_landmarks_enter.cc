@@ -9,77 +9,12 @@
 
 namespace alidade {
 
-/// What the inverse observation of a sensor makes of one measurement.
-struct Ekf::Landmarks::Sight {
-  std::vector<double> y;  ///< of all landmark roles, one after the other
-  std::vector<BlockId> from;
-  std::vector<Eigen::MatrixXd> jacobians;  ///< dy/d from
-  Eigen::MatrixXd own;                     ///< of z and the prior
-};
-
-/// y, its Jacobians and J_z R J_z' + J_p sigma^2 J_p'. kAccepted, or why not.
-Outcome Ekf::Landmarks::Invert(Row& row, Sight& sight) {
-  const SensorBinding& sensor = ekf_.BindingOf(row);
-  const SensorModel& model = sensor.model;
-  const Family& family = FamilyOf(row);
-  const auto first = static_cast<std::size_t>(family.first);
-  int rows = 0, size = 0;
-  for (const Space& role : family.roles) {
-    rows += role.geometry.tangent;
-    size += role.geometry.ambient;
-  }
-  std::vector<const double*> roles(sensor.roles.size(), nullptr);
-  std::vector<RowMajor> jacobians(first);
-  std::vector<double*> jx(roles.size(), nullptr);
-  for (std::size_t i = 0; i < first; ++i) {
-    const RoleBinding& role = sensor.roles[i];
-    if (role.block < 0) continue;
-    roles[i] = ekf_.state_.value(role.block);
-    const Block& block = ekf_.state_.layout()[role.block];
-    if (role.mode == RoleMode::kHold || !block.has_covariance()) continue;
-    jacobians[i] = RowMajor::Constant(rows, block.geometry().tangent, std::nan(""));
-    jx[i] = jacobians[i].data();
-    sight.from.push_back(role.block);
-  }
-  const int m = model.measurement().geometry.tangent;
-  RowMajor jz = RowMajor::Constant(rows, m, std::nan(""));
-  RowMajor jp = RowMajor::Constant(rows, model.prior_size(), std::nan(""));
-  sight.y.resize(static_cast<std::size_t>(size));
-  const Status status = model.Initialise(roles.data(), row.measurement->values.data(), &prior_,
-                                         sight.y.data(), jx.data(), jz.data(), jp.data());
-  if (status == Status::kError) ekf_.NotePluginFailure(sensor);
-  if (status != Status::kOk) {
-    return status == Status::kError ? Outcome::kFailed : Outcome::kInvalid;
-  }
-  double* y = sight.y.data();
-  for (std::size_t i = 0; i < family.roles.size(); ++i) {
-    family.roles[i].geometry.Normalise(y);
-    roles[first + i] = y;
-    y += family.roles[i].geometry.ambient;
-  }
-  const Outcome outcome = ekf_.NoiseOf(row, roles.data());
-  if (outcome != Outcome::kAccepted) return outcome;
-  const Eigen::Map<const RowMajor> r(row.r.data(), m, m);
-  sight.own = jz * r * jz.transpose();
-  if (jp.cols() > 0) {
-    const double sigma = options_.prior->sigma;
-    sight.own += sigma * sigma * jp * jp.transpose();
-  }
-  for (std::size_t i = 0; i < first; ++i) {
-    if (jx[i] != nullptr) sight.jacobians.emplace_back(jacobians[i]);
-  }
-  const auto finite = [](const Eigen::MatrixXd& j) { return j.allFinite(); };
-  const bool good =
-      AllFinite(sight.y) && finite(sight.own) && std::ranges::all_of(sight.jacobians, finite);
-  return good ? Outcome::kAccepted : Outcome::kNotFinite;
-}
-
 /// Gives the landmark its blocks, correlated with those that the sight took. Of a shared role the
 /// first landmark of the frame makes the block, and the others of the same sensor take it.
 Outcome Ekf::Landmarks::Initialise(std::int64_t id, Row& row, Landmark& landmark) {
   Family& family = families_[static_cast<std::size_t>(row.sensor)];
-  Sight sight;
-  const Outcome outcome = Invert(row, sight);
+  Inverse sight;
+  const Outcome outcome = ekf_.Invert(row, options_.prior ? &prior_ : nullptr, sight);
   if (outcome != Outcome::kAccepted) return outcome;
   std::vector<BlockId> fresh;
   std::vector<double> values;

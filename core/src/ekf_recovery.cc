@@ -61,46 +61,13 @@ void Ekf::InitialiseFromMeasurements() {
 /// its covariance and correlations; a block that has a value loses it. kInitialised, or why not.
 Outcome Ekf::InitialiseBlock(Row& row) {
   const SensorBinding& binding = BindingOf(row);
-  const auto target = static_cast<std::size_t>(binding.model.initialised_role());
-  const BlockId id = binding.roles[target].block;
-  const int m = binding.model.measurement().geometry.tangent;
-  const int k = state_.layout()[id].geometry().tangent;
-
-  std::vector<const double*> roles(binding.roles.size(), nullptr);
-  std::vector<RowMajor> jacobians(roles.size());
-  std::vector<double*> jx(roles.size(), nullptr);
-  std::vector<BlockId> from;
-  std::vector<Eigen::MatrixXd> from_jacobians;
-  for (std::size_t i = 0; i < roles.size(); ++i) {
-    if (i == target || binding.roles[i].block < 0) continue;
-    const BlockId other = binding.roles[i].block;
-    roles[i] = state_.value(other);
-    if (binding.roles[i].mode == RoleMode::kHold) continue;
-    const int columns = state_.layout()[other].geometry().tangent;
-    jacobians[i] = RowMajor::Constant(k, columns, std::nan(""));
-    jx[i] = jacobians[i].data();
-  }
-  std::vector<double> y(static_cast<std::size_t>(state_.layout()[id].geometry().ambient));
-  RowMajor jz = RowMajor::Constant(k, m, std::nan(""));
-  const double* z = row.measurement->values.data();
-  const Status status = binding.model.Initialise(roles.data(), z, y.data(), jx.data(), jz.data());
-  roles[target] = y.data();
-  const Outcome outcome = status == Status::kOk ? NoiseOf(row, roles.data()) : OutcomeOf(status);
-  if (outcome == Outcome::kFailed) NotePluginFailure(binding);
-  if (outcome != Outcome::kAccepted) {
-    return outcome == Outcome::kFailed ? outcome : Outcome::kInvalid;
-  }
-  const Eigen::MatrixXd own = jz * Eigen::Map<const RowMajor>(row.r.data(), m, m) * jz.transpose();
-  if (!own.allFinite() || !AllFinite(y)) return Outcome::kNotFinite;
-  state_.layout()[id].geometry().Normalise(y.data());
-  for (std::size_t i = 0; i < roles.size(); ++i) {
-    if (jx[i] == nullptr) continue;
-    if (!jacobians[i].allFinite()) return Outcome::kNotFinite;
-    from.push_back(binding.roles[i].block);
-    from_jacobians.emplace_back(jacobians[i]);
-  }
+  const BlockId id =
+      binding.roles[static_cast<std::size_t>(binding.model.initialised_role())].block;
+  Inverse inverse;
+  const Outcome outcome = Invert(row, nullptr, inverse);
+  if (outcome != Outcome::kAccepted) return outcome;
   if (state_.layout()[id].present) state_.Marginalise(id);
-  state_.Initialise(id, y.data(), from, from_jacobians, own);
+  state_.Initialise(id, inverse.y.data(), inverse.from, inverse.jacobians, inverse.own);
   if (!first_.empty()) FirstEstimate(id).clear();
   Bind();
   return Outcome::kInitialised;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <limits>
+#include <set>
 
 #include "alidade/landmarks.h"
 
@@ -32,6 +33,7 @@ void ReadForget(const Node& node, LandmarkOptions& options) {
 
 std::vector<KnownLandmark> ReadKnown(const Node& list) {
   std::vector<KnownLandmark> known;
+  std::set<std::int64_t> ids;
   for (const Node& node : list.Items()) {
     KnownLandmark& one = known.emplace_back();
     const Node id = node.At("id", "a known landmark");
@@ -40,7 +42,7 @@ std::vector<KnownLandmark> ReadKnown(const Node& list) {
     std::ranges::copy(position, one.position.begin());
     one.sigma = node.At("sigma", "a known landmark").Number(0.0, kInfinity);
     node.RejectUnread();
-    if (std::ranges::count(known, one.id, &KnownLandmark::id) > 1) {
+    if (!ids.insert(one.id).second) {
       id.Fail("landmark " + std::to_string(one.id) + " is listed twice", "each id once");
     }
   }

@@ -44,6 +44,17 @@ void CheckRoles(const Node& model, const SensorBinding& sensor, const SensorBind
   }
 }
 
+/// Refuses a sensor that does not say where it is seen from, which `key` needs to know.
+void CheckPosition(const Node& key, const SensorBinding& sensor) {
+  if (std::ranges::find(sensor.model.roles(), "position", &Space::name) !=
+      sensor.model.roles().end()) {
+    return;
+  }
+  key.Fail("model '" + sensor.model.name() + "' of sensor '" + sensor.name +
+               "' has no role 'position', the place that landmarks are seen from",
+           "the key left out");
+}
+
 /// Refuses what one sensor cannot do that `options` ask for.
 void CheckOptions(const Node& node, const LandmarkOptions& options, const SensorBinding& sensor) {
   const auto form = FormOf(sensor.model.roles());
@@ -51,6 +62,14 @@ void CheckOptions(const Node& node, const LandmarkOptions& options, const Sensor
   if (sensor.model.prior_size() > 0 && !options.prior) {
     node.Fail("no prior: " + model + " does not tell the distance of a landmark",
               "prior: {inverse_distance: ..., sigma: ...}");
+  }
+  if (options.prior) {
+    const Node prior = node.At("prior");
+    if (form == internal::XyzForm() && sensor.model.prior_size() > 0 &&
+        !(options.prior->inverse_distance > 0.0)) {
+      prior.At("inverse_distance").Fail("a landmark at infinity is no xyz", "above 0, 1/m");
+    }
+    if (options.prior->from_map > 0) CheckPosition(prior.At("from_map"), sensor);
   }
   const bool has_xyz = form == internal::XyzForm() || sensor.xyz.has_value();
   if (!options.known.empty() && !has_xyz) {
@@ -61,6 +80,7 @@ void CheckOptions(const Node& node, const LandmarkOptions& options, const Sensor
     node.At("to_xyz").Fail("landmarks are xyz already", "form: inverse_depth, or the key left out");
   }
   if (!has_xyz) node.At("to_xyz").Fail(model + " has no form xyz", "the key left out");
+  CheckPosition(node.At("to_xyz"), sensor);
 }
 
 }  // namespace

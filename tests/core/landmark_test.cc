@@ -143,24 +143,5 @@ TEST(Landmark, LinearityIndexIsThatOfCivera) {
   EXPECT_EQ(LinearityIndex(Xyz::ToRay(y), 0.02, beside), 0.0);
 }
 
-TEST(Landmark, TellsWhetherItIsInFront) {
-  const std::array<double, 4> straight{1, 0, 0, 0};
-  const double at[3] = {0, 0, 0};
-  double y[6] = {0, 0, 0, 0, 0, 0.5};  // 2 m ahead
-  const auto sign = [&](double z) {
-    const double position[3] = {0, 0, z};
-    return DepthSign(InverseDepth::ToRay(y), position, straight.data());
-  };
-  EXPECT_EQ(sign(0.0), 1);
-  EXPECT_EQ(sign(3.0), -1);
-  y[5] = -0.5;  // 2 m behind the anchor
-  EXPECT_EQ(sign(0.0), -1);
-  EXPECT_EQ(sign(-3.0), 1);
-  y[5] = 0.0;
-  EXPECT_EQ(sign(0.0), 0);
-  const double behind[3] = {0, 0, -1};
-  EXPECT_EQ(DepthSign(Xyz::ToRay(behind), at, straight.data()), -1);
-}
-
 }  // namespace
 }  // namespace alidade

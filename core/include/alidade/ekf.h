@@ -185,6 +185,14 @@ class Ekf : public Estimator {
   Workspace::Matrix ProjectionOf(std::span<Row* const> rows);
 
   void InitialiseFromMeasurements();
+  /// What the inverse observation makes of one measurement.
+  struct Inverse {
+    std::vector<double> y;                   ///< values, one role after the other
+    std::vector<BlockId> from;               ///< the blocks that it took
+    std::vector<Eigen::MatrixXd> jacobians;  ///< dy/d from
+    Eigen::MatrixXd own;                     ///< J_z R J_z' + J_p sigma^2 J_p', p the prior
+  };
+  Outcome Invert(Row& row, const LandmarkOptions::Prior* prior, Inverse& inverse);
   Outcome InitialiseBlock(Row& row);
   void RepairCovariance();
   void CountRejections();

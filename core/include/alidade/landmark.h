@@ -193,15 +193,6 @@ Status ToXyz(const double* const* blocks, double* p, MatrixRef J_p_y = {}) {
   return Status::kOk;
 }
 
-/// 1 where the point is in front of the camera, -1 behind it, 0 where it is infinitely far or in
-/// the camera's own plane.
-inline int DepthSign(const Ray<double>& ray, const double* position, const double* orientation) {
-  double h[3];
-  InCamera(ray, position, orientation, h);
-  const double depth = h[2] * ray.rho;  // of the sign of h[2] / rho
-  return depth > 0.0 ? 1 : depth < 0.0 ? -1 : 0;
-}
-
 /// L_d = 4 sigma_rho |cos alpha| / (rho^2 d1), d1 = |p - r|, alpha the angle between the rays to p
 /// from the anchor and from the camera at r; sigma_rho in 1/m. Small where p is all but Gaussian;
 /// infinite at rho = 0, zero for Xyz.  [Civera2008] sec. III.

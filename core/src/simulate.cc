@@ -168,8 +168,10 @@ class DataFiles {
 
 /// The config's `camera` alone; "" where it has none.
 std::string CameraYaml(const Config& config) {
+  const bool source_reads_it = !config.root().HasUnread("camera");
   const auto camera = config.root().Find("camera");
   if (!camera) return {};
+  if (source_reads_it) camera->RejectUnread();
   Config alone = Config::FromText("camera: {}", "calibration.yaml");
   for (const auto& [key, value] : camera->Entries()) {
     alone.Set("camera." + key, value.Text(), "calibration.yaml");

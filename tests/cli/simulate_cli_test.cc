@@ -83,6 +83,10 @@ TEST_F(SimulateCli, RefusesAKeyThatNobodyReads) {
   EXPECT_EQ(made.code, 78);
   EXPECT_TRUE(Contains(made.err, "source.nose_px: unknown key; did you mean 'noise_px'?"))
       << made.err;
+  Write("scene.yaml", kScene);
+  const Outcome lens = Call({"simulate", "scene.yaml", "-o", "data", "--set", "camera.fz=3"});
+  EXPECT_EQ(lens.code, 78);
+  EXPECT_TRUE(Contains(lens.err, "camera.fz: unknown key")) << lens.err;
   EXPECT_FALSE(Exists("data"));
 }
 

@@ -15,6 +15,7 @@
 #include "names.h"
 #include "number_text.h"
 #include "observability.h"
+#include "observed_landmarks.h"
 #include "text_table.h"
 
 namespace alidade {
@@ -196,7 +197,9 @@ std::string Touches(const System& system) {
 }
 
 std::string Unobservable(const System& system) {
-  if (system.landmarks) return "  what can be observed depends on the landmarks\n";
+  if (system.landmarks && !internal::PlaceLandmarks(system)) {
+    return "  what can be observed depends on the landmarks\n";
+  }
   if (!internal::ObservabilityIsTold(system)) {
     return "  what can be observed is not looked into: the state has more than " +
            std::to_string(internal::kMostObserved) + " elements\n";
@@ -209,6 +212,11 @@ std::string Unobservable(const System& system) {
     text += "  cannot be observed: " + names[0];
     if (names.size() > 1) text += " together with " + Join({names.begin() + 1, names.end()});
     text += " (" + std::to_string(count) + (count == 1 ? " direction)\n" : " directions)\n");
+    if (names[0] == "scale") {
+      text +=
+          "    scale, of path and map alike, is what the prior makes of it: depth, a stereo pair, "
+          "odometry\n    or known landmarks tell it\n";
+    }
   }
   return text;
 }

@@ -19,6 +19,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kInconsistentSigmas = 10.0;
 constexpr int kInconsistentStamps = 20;
+constexpr double kFarSigmas = 100.0;
 constexpr std::size_t kOutcomes = static_cast<std::size_t>(Outcome::kFailed) + 1;
 
 /// Mean of a quantity, and the share of it that lies inside a bound.
@@ -43,13 +44,17 @@ struct Sums {
   std::vector<Tally> nis;               ///< by sensor
 };
 
-/// Estimate and truth of a scalar block over evenly spaced stamps, for its lag.
+/// Estimate and truth of a scalar block over evenly spaced stamps, for its lag. Only the first ones
+/// are kept, so that memory and time of a long run do not grow with it.
 struct Series {
+  static constexpr std::size_t kMost = 100'000;
+
   std::vector<double> estimate, truth;
   Stamp first = 0, last = 0;
   Stamp shortest = INT64_MAX, longest = 0;
 
   void Add(Stamp stamp, double true_value, double error) {
+    if (truth.size() == kMost) return;
     if (truth.empty()) {
       first = stamp;
     } else {
@@ -112,6 +117,7 @@ struct Metrics::Impl {
   std::vector<Owner> owners;
   std::vector<std::string> sensors, motions;
   bool has_landmarks = false, has_ransac = false;
+  std::vector<Tally> far;                                      ///< inside: beyond 100 sigma
   std::vector<Sums> sums;                                      ///< all stamps, then the segments
   std::vector<std::array<std::int64_t*, kOutcomes>> count_of;  ///< into counts, by sensor
   std::map<std::string, std::int64_t> counts;
@@ -265,6 +271,8 @@ void Metrics::Impl::AddReport(const std::vector<Sums*>& into, const UpdateReport
     std::int64_t*& count = count_of[sensor][static_cast<std::size_t>(m.outcome)];
     if (count == nullptr) count = &counts[std::string(ToString(m.outcome)) + ':' + sensors[sensor]];
     ++*count;
+    const bool compared = m.outcome == Outcome::kAccepted || m.outcome == Outcome::kGated;
+    if (compared && m.dof > 0) far[sensor].Add(0.0, m.nis > kFarSigmas * kFarSigmas * m.dof);
     if (m.outcome != Outcome::kAccepted || m.dof <= 0 || !std::isfinite(m.nis)) continue;
     for (Sums* s : into) s->nis[sensor].Add(m.nis / m.dof);
   }
@@ -308,6 +316,7 @@ Metrics::Metrics(const NamedEstimator& named, const std::vector<StreamInfo>& tru
   impl_->has_ransac = std::ranges::any_of(
       named.system.sensors, [](const SensorBinding& s) { return s.association.has_value(); });
   impl_->count_of.resize(impl_->sensors.size());
+  impl_->far.resize(impl_->sensors.size());
   const auto add_sums = [&](std::string suffix) {
     const std::vector<Tally> blocks(impl_->tracked.size());
     impl_->sums.push_back({std::move(suffix), blocks, blocks,
@@ -338,6 +347,15 @@ void Metrics::AddReport(const std::vector<bool>& in_segment, const UpdateReport&
 void Metrics::AddDifference(const Frame& frame, const std::vector<bool>& in_segment,
                             const State& state) {
   impl_->AddErrors(frame, impl_->SumsOf(in_segment), state);
+}
+
+std::vector<int> Metrics::far_off() const {
+  std::vector<int> sensors;
+  for (std::size_t i = 0; i < impl_->far.size(); ++i) {
+    const Tally& far = impl_->far[i];
+    if (2 * far.inside > far.count) sensors.push_back(static_cast<int>(i));
+  }
+  return sensors;
 }
 
 const std::vector<Event>& Metrics::events() const { return impl_->events; }

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "observed_landmarks.h"
+
 namespace alidade {
 namespace {
 
@@ -42,7 +44,9 @@ Trajectory StartNearPrior(const System& system) {
     const std::vector<std::string> names = ColumnNames(block.name, block.space);
     for (int i = 0; i < geometry.tangent; ++i) {
       const bool by_element = geometry.tangent == geometry.ambient;
-      t.names.push_back(by_element ? names[static_cast<std::size_t>(i)] : block.name);
+      t.names.push_back(block.owner == internal::kLandmarks ? block.owner
+                        : by_element                        ? names[static_cast<std::size_t>(i)]
+                                                            : block.name);
       const double sigma = prior.covariance.size() > 0 ? std::sqrt(prior.covariance(i, i)) : 1.0;
       t.scale.push_back(sigma > 0.0 ? sigma : 1.0);
     }
@@ -163,6 +167,43 @@ void Observe(const System& system, const Trajectory& t, const Eigen::MatrixXd& p
   }
 }
 
+/// Adds the elements that the prior tells exactly, and the places of landmarks that are known: with
+/// landmarks it is these that say where the world is.
+void AddKnown(const internal::WithLandmarks& with, const Trajectory& t, RowSpace& rows) {
+  const auto n = static_cast<Eigen::Index>(t.names.size());
+  for (const Prior& prior : with.system.priors) {
+    const int column = t.columns[static_cast<std::size_t>(prior.block)];
+    const auto landmark = std::ranges::find(with.landmarks, prior.block) - with.landmarks.begin();
+    for (Eigen::Index i = 0; column >= 0 && i < prior.covariance.rows(); ++i) {
+      const bool known = landmark < static_cast<std::ptrdiff_t>(with.known);
+      if (known || prior.covariance(i, i) == 0.0) rows.Add(Eigen::VectorXd::Unit(n, column + i));
+    }
+  }
+}
+
+/// Takes the direction that moves all landmarks along their offsets from the camera, d p = p - r,
+/// and the rest of the state somehow, out of a null-space basis; false where it is not in it.
+bool TakeScale(const internal::WithLandmarks& with, const Trajectory& start,
+               Eigen::MatrixXd& basis) {
+  constexpr double kTolerance = 1e-5;
+  if (with.camera < 0 || basis.cols() == 0) return false;
+  Eigen::VectorXd offsets(3 * std::ssize(with.landmarks));
+  const double* const r = start.values[static_cast<std::size_t>(with.camera)].data();
+  for (std::size_t i = 0; i < with.landmarks.size(); ++i) {
+    const double* const p = start.values[static_cast<std::size_t>(with.landmarks[i])].data();
+    for (std::size_t e = 0; e < 3; ++e) {
+      offsets[static_cast<Eigen::Index>(3 * i + e)] = p[e] - r[e];
+    }
+  }
+  const Eigen::MatrixXd moved = basis.bottomRows(offsets.size());  // their columns come last
+  const Eigen::VectorXd scale = moved.colPivHouseholderQr().solve(offsets);
+  if (!((moved * scale - offsets).norm() < kTolerance * offsets.norm())) return false;
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(scale);
+  const Eigen::MatrixXd q = qr.householderQ();
+  basis = (basis * q.rightCols(basis.cols() - 1)).eval();
+  return true;
+}
+
 /// Brings the columns of a null-space basis to reduced echelon form, so that each one moves as few
 /// elements as it can.
 void Reduce(Eigen::MatrixXd& basis) {
@@ -191,15 +232,19 @@ bool internal::ObservabilityIsTold(const System& system) {
   return size <= internal::kMostObserved;
 }
 
-std::vector<std::vector<std::string>> UnobservableDirections(const System& system) {
-  if (system.landmarks || !internal::ObservabilityIsTold(system)) return {};
+std::vector<std::vector<std::string>> UnobservableDirections(const System& given) {
+  const auto with = internal::PlaceLandmarks(given);
+  if ((given.landmarks && !with) || !internal::ObservabilityIsTold(given)) return {};
+  const System& system = with ? with->system : given;
   constexpr double kStep = 0.02;
   constexpr int kIdleSteps = 2;
-  Trajectory t = StartNearPrior(system);
-  const Eigen::Index n = static_cast<Eigen::Index>(t.names.size());
+  const Trajectory start = StartNearPrior(system);
+  const Eigen::Index n = static_cast<Eigen::Index>(start.names.size());
   if (n == 0) return {};
+  Trajectory t = start;
   Eigen::MatrixXd phi = Eigen::MatrixXd::Identity(n, n);
   RowSpace rows(n);
+  if (with) AddKnown(*with, t, rows);
   // Once a step adds nothing to the rank, later ones do not either; twice, as trajectories turn.
   for (int idle = 0; idle < kIdleSteps && rows.rank() < n;) {
     const Eigen::Index before = rows.rank();
@@ -209,16 +254,18 @@ std::vector<std::vector<std::string>> UnobservableDirections(const System& syste
   }
   if (rows.rank() == n) return {};
   Eigen::MatrixXd null_space = rows.Complement();
-  Reduce(null_space);
   std::vector<std::vector<std::string>> directions;
+  if (with && TakeScale(*with, start, null_space)) directions.push_back({"scale"});
+  Reduce(null_space);
   for (Eigen::Index c = 0; c < null_space.cols(); ++c) {
-    std::vector<std::string>& names = directions.emplace_back();
+    std::vector<std::string> names;
     for (Eigen::Index i = 0; i < n; ++i) {
       if (std::abs(null_space(i, c)) < 1e-6 * null_space.col(c).cwiseAbs().maxCoeff()) continue;
-      if (names.empty() || names.back() != t.names[static_cast<std::size_t>(i)]) {
-        names.push_back(t.names[static_cast<std::size_t>(i)]);
-      }
+      const std::string& name = start.names[static_cast<std::size_t>(i)];
+      if (names.empty() || names.back() != name) names.push_back(name);
     }
+    // Where a landmark is by itself, the path tells in time.
+    if (!with || names.front() != internal::kLandmarks) directions.push_back(std::move(names));
   }
   return directions;
 }

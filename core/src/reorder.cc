@@ -31,7 +31,7 @@ std::string In(const Place& place) {
 }  // namespace
 
 FrameOrder::FrameOrder(Experiment& experiment, Check check)
-    : experiment_(experiment), check_(check) {
+    : experiment_(experiment), check_(std::move(check)) {
   if (experiment.time.order != TimeOrder::kRewind) return;
   for (const NamedEstimator& named : experiment.estimators) {
     Processed& before = released_.processed.emplace_back();
@@ -44,7 +44,7 @@ FrameOrder::FrameOrder(Experiment& experiment, Check check)
 bool FrameOrder::Next(Frame& frame) {
   if (experiment_.time.order == TimeOrder::kReject) {
     if (!experiment_.source->Next(frame)) return false;
-    check_(frame, *experiment_.source);
+    check_(frame);
     Accept(frame);
     return true;
   }
@@ -110,7 +110,7 @@ void FrameOrder::Receive() {
   Held received;
   ended_ = !experiment_.source->Next(received.frame);
   if (ended_) return;
-  check_(received.frame, *experiment_.source);
+  check_(received.frame);
   received.places.assign(received.frame.measurements.size(), experiment_.source->place());
   const bool is_newest = received.frame.stamp > newest_;
   if (!Accept(received.frame)) return;

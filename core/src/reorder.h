@@ -3,6 +3,7 @@
 
 #include <deque>
 #include <exception>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -24,9 +25,9 @@ struct Processed {
 /// steers the estimators: they take each frame as it comes, and what came after a late one again.
 class FrameOrder {
  public:
-  using Check = void (*)(const Frame&, const Source&);
+  using Check = std::function<void(Frame&)>;
 
-  /// `check` throws for a frame that the estimators must not see.
+  /// `check` takes each frame first; it throws for one that the estimators must not see.
   FrameOrder(Experiment& experiment, Check check);
 
   /// The next frame that no other can come before; false at the end. An error of the source, of

@@ -6,6 +6,7 @@
 #include "accepted.h"
 #include "alidade/metrics.h"
 #include "alidade/recorder.h"
+#include "frame_check.h"
 #include "map_metrics.h"
 #include "number_text.h"
 #include "observability.h"
@@ -19,36 +20,6 @@ namespace {
 /// ` at t = 0.033000 s`
 std::string At(const Frame& frame) {
   return " at t = " + internal::FixedText(Seconds(frame.stamp), 6) + " s";
-}
-
-[[noreturn]] void Refuse(const Frame& frame, const std::string& what) {
-  throw ContractViolation("the source gives " + what + At(frame));
-}
-
-/// Throws ContractViolation for a frame that is not as Source::streams() and truths() say. Whatever
-/// takes the frame afterwards indexes by stream and reads as many values as these tell.
-void CheckFrame(const Frame& frame, const Source& source) {
-  const std::vector<StreamInfo>& streams = source.streams();
-  const std::vector<StreamInfo>& truths = source.truths();
-  const auto check = [&](const StreamInfo& info, const std::vector<double>& values) {
-    if (std::ssize(values) == info.size) return;
-    Refuse(frame, std::to_string(values.size()) + " values of '" + info.name + "', not " +
-                      std::to_string(info.size) + ',');
-  };
-  for (const Measurement& m : frame.measurements) {
-    if (m.stream < 0 || m.stream >= std::ssize(streams)) {
-      Refuse(frame, "a measurement of stream " + std::to_string(m.stream) + " of " +
-                        std::to_string(streams.size()));
-    }
-    check(streams[static_cast<std::size_t>(m.stream)], m.values);
-  }
-  if (frame.truth.size() > truths.size()) {
-    Refuse(frame,
-           std::to_string(frame.truth.size()) + " truths of " + std::to_string(truths.size()));
-  }
-  for (std::size_t t = 0; t < frame.truth.size(); ++t) {
-    if (!frame.truth[t].empty()) check(truths[t], frame.truth[t]);
-  }
 }
 
 /// Whether the frame has a measurement of the segment's stream that its sensor finds valid.
@@ -107,6 +78,18 @@ EstimatorResult Begin(const NamedEstimator& named) {
                                  (direction.size() > 1 ? " apart" : "")});
   }
   return result;
+}
+
+/// An event `unit` for each sensor whose measurements are far from all that it predicts.
+void NoteUnits(const System& system, const Metrics& metrics, EstimatorResult& result) {
+  for (const int index : metrics.far_off()) {
+    const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(index)];
+    const std::string& unit = sensor.model.measurement().unit;
+    result.events.push_back(
+        {kNoStamp, "unit",
+         "sensor '" + sensor.name + "': the median of |z - h| is more than 100 sigma; is stream '" +
+             sensor.stream + "' in " + (unit.empty() ? "the model's units" : unit) + '?'});
+  }
 }
 
 /// An event `unused` for each sensor of which the whole run used no measurement; `accepted_by`
@@ -209,7 +192,7 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
   const std::int64_t size = experiment.source->size();
   const bool keep = std::ranges::any_of(
       running, [](const Running& one) { return one.waits || one.named.estimator->offline(); });
-  internal::FrameOrder frames(experiment, &CheckFrame);
+  internal::FrameOrder frames(experiment, internal::FrameCheck(experiment, result.normalised));
   while (NextFrame(frames, running, result, seen.frame)) {
     for (std::size_t i = 0; i < experiment.segments.size(); ++i) {
       seen.in_segment[i] = InSegment(experiment.segments[i], seen.frame);
@@ -386,6 +369,7 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
       NoteUnused(one.named.system, by < 0 ? "" : running[static_cast<std::size_t>(by)].named.name,
                  one.result);
     }
+    NoteUnits(one.named.system, one.metrics, one.result);
     one.Note(one.metrics.events());
     const Estimator& estimator = *one.named.estimator;
     one.result.diverged = one.diverged || (estimator.offline() && estimator.diverged()) ||

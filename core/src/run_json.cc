@@ -58,6 +58,7 @@ std::string RunJson(const RunResult& result, const RunFacts& facts) {
   WriteTexts(json.Key("versions"), {{"alidade", ALIDADE_VERSION}});
   json.Key("seed").Integer(static_cast<std::int64_t>(facts.seed));
   json.Key("frames").Integer(result.frames);
+  if (!result.normalised.empty()) WriteIntegers(json.Key("normalised"), result.normalised);
   json.Key("reference").Text(result.reference);
   if (!result.withheld.empty()) json.Key("withheld").Text(result.withheld);
   json.Key("plugins").Array();

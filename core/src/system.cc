@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "names.h"
+#include "quaternion_sign.h"
 #include "read_landmarks.h"
 
 namespace alidade {
@@ -28,6 +29,7 @@ std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
     node.Fail("not of unit length", "a unit vector or quaternion to 1e-3");
   }
   geometry.Normalise(mean.data());
+  if (geometry.kind == GeometryKind::kUnitQuaternion) internal::ChooseSign({}, mean);
   return mean;
 }
 

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "alidade/geometry.h"
 #include "number_rows.h"
 
 /// The files beside a file of tracks, read along with it.
@@ -120,7 +119,7 @@ class OdometryRows {
 };
 
 /// A trajectory in the form of TUM: `t x y z qx qy qz qw`, times increasing. Quaternions are
-/// normalised where they are of unit length to 1e-3, and refused where not.
+/// refused where they are not of unit length to 1e-3; the run normalises the others.
 class TumRows {
  public:
   struct Pose {
@@ -164,7 +163,6 @@ class TumRows {
                      "length 1 to 1e-3");
     }
     pose_ = {{values[0], values[1], values[2]}, {values[6], values[3], values[4], values[5]}};
-    Normalise<UnitQuaternion>(pose_.orientation.data());
   }
 
   NumberRows rows_;

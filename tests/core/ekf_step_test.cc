@@ -164,6 +164,7 @@ struct Unwrapped : Opposite {
   }
 };
 
+// FAULTS 84
 TEST(EkfStep, APredictedAngleIsBroughtIntoItsInterval) {
   System system = Turn();
   AddSensor(system, "unwrapped", InProcessSensor(Unwrapped(), "unwrapped"), {"t.a"});
@@ -174,6 +175,26 @@ TEST(EkfStep, APredictedAngleIsBroughtIntoItsInterval) {
     const MeasurementReport& entry = report.measurements().front();
     EXPECT_NEAR(entry.h.at(0), 6.0 - 2.0 * kPi, 1e-12);
     EXPECT_NEAR(entry.innovation.at(0), -0.4 - (6.0 - 2.0 * kPi), 1e-12);
+  }
+}
+
+// FAULTS 84: 3 and -3 rad are 0.28 rad apart, and the update takes the short way round.
+TEST(EkfStep, AnInnovationOfAnAngleTakesTheShortWay) {
+  System system = Turn();
+  AddSensor(system, "opposite", InProcessSensor(Opposite(), "opposite"), {"t.a"});
+  system.priors[0].mean = {3.0 - kPi};  // z = 3
+  for (const double turns : {0.0, 1.0, -2.0}) {
+    Ekf ekf(system, {}, StreamsOf(system));
+    Ukf ukf(system, {}, StreamsOf(system));
+    for (Estimator* const one : {static_cast<Estimator*>(&ekf), static_cast<Estimator*>(&ukf)}) {
+      const UpdateReport& report = one->Process(FrameAt(0.0, {{0, -3.0 + 2.0 * kPi * turns}}));
+      const MeasurementReport& entry = report.measurements().front();
+      EXPECT_EQ(entry.outcome, Outcome::kAccepted);
+      const double short_way = 2.0 * kPi - 6.0;
+      EXPECT_NEAR(entry.innovation.at(0), short_way, 1e-12);
+      // P = 1, R = 0.01
+      EXPECT_NEAR(ValueOf(one->state(), "t.a"), 3.0 - kPi + short_way / 1.01, 1e-9);
+    }
   }
 }
 

@@ -122,6 +122,7 @@ TEST(Landmark, ConversionToXyzHasTrueJacobians) {
   });
 }
 
+// FAULTS 40, 83
 TEST(Landmark, IsNotConvertedAtInfinityOrBehindIt) {
   for (const double rho : {0.0, -0.1}) {
     const Blocks blocks{{0, 0, 0, 0.1, 0.2, rho}};

@@ -322,6 +322,7 @@ TEST(Landmarks, EnterOnlyBelowTheNumberToKeep) {
             Outcome::kInitialised);
 }
 
+// FAULTS 39
 TEST(Landmarks, AnIdThatComesBackIsTheNextGeneration) {
   LandmarkOptions options;
   options.unseen_frames = 2;
@@ -356,6 +357,7 @@ TEST(Landmarks, ThatFailTooOftenAreForgotten) {
   EXPECT_EQ(ekf.landmarks()[0].accepted, 4);
 }
 
+// FAULTS 83
 TEST(Landmarks, OfNegativeDepthAreCountedAndDeletedWhereAsked) {
   using enum LandmarkOptions::NegativeDepth;
   for (const auto policy : {kKeep, kDelete}) {
@@ -410,6 +412,7 @@ TEST(Landmarks, KnownOnesStartAsXyzAndStay) {
   EXPECT_TRUE(IsPoint(landmarks[1]));
 }
 
+// FAULTS 41
 TEST(Landmarks, BehindTheCameraAreOutOfDomainAndNoDivergence) {
   Ekf ekf = Filter([] {
     LandmarkOptions options = WithPrior();

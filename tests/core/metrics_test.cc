@@ -259,6 +259,18 @@ TEST(Metrics, LagIsInMilliseconds) {
   EXPECT_EQ(one.Finish().count("lag_ms:a.x"), 0u);
 }
 
+TEST(Metrics, LagOfALongRunIsThatOfItsBeginning) {
+  MetricsOf one = OneScalar();
+  const auto x = [](double i) { return std::sin(0.083 * i + 20.0 * std::sin(0.001 * i)); };
+  for (int i = 0; i < 100'000; ++i) {
+    *one.state().value(0) = x(i - 1.5);
+    one.Add({{x(i)}});
+  }
+  one.Skip(50'000'000);  // neither the gap nor what follows counts
+  for (int i = 0; i < 1000; ++i) one.Add({{0.0}});
+  EXPECT_NEAR(one.Finish().at("lag_ms:a.x"), 150.0, 1.0);
+}
+
 TEST(Metrics, LagOfAnAngleSeesNoJumps) {
   StateLayout layout;
   layout.Declare("a.heading", "a", SpaceOf("heading", "rad", Geometry::Angle()));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include "support/landmark_models.h"
 #include "support/systems.h"
 
 namespace alidade {
@@ -76,6 +77,35 @@ TEST(UnobservableDirections, AreNotLookedForInALargeState) {
   };
   EXPECT_EQ(UnobservableDirections(state_of(500)).size(), 500u);
   EXPECT_TRUE(UnobservableDirections(state_of(501)).empty());
+}
+
+// FAULTS 78: one camera that nothing else moves or measures cannot tell how large the world is.
+TEST(UnobservableDirections, OneCameraCannotTellScale) {
+  const auto system = [](const LandmarkOptions& options) {
+    return testing::MapSystem(testing::InverseDepthPixels(0.01), options);
+  };
+  EXPECT_EQ(UnobservableDirections(system(testing::WithPrior())), (std::vector<Names>{{"scale"}}));
+  const auto anchored =
+      testing::MapSystem(testing::AnchoredPixels<ALIDADE_ROLE_SHARED>(0.01), testing::WithPrior());
+  EXPECT_EQ(UnobservableDirections(anchored), (std::vector<Names>{{"scale"}}));
+  // One landmark whose place is known is a scale.
+  LandmarkOptions known = testing::WithPrior();
+  known.known = {{1, {0.0, 0.0, 2.0}, 0.01}};
+  EXPECT_TRUE(UnobservableDirections(system(known)).empty());
+  // So is any offset in metres.
+  EXPECT_TRUE(UnobservableDirections(testing::MapSystem(testing::Offset(0.1), {})).empty());
+}
+
+// FAULTS 78: where the camera starts is not known either: the whole world may be elsewhere.
+TEST(UnobservableDirections, WithoutAFirstPositionTheWorldIsAnywhere) {
+  const System system =
+      testing::MapSystem(testing::InverseDepthPixels(0.01), testing::WithPrior(), 0.5);
+  const auto directions = UnobservableDirections(system);
+  ASSERT_EQ(directions.size(), 4u);
+  EXPECT_EQ(directions[0], Names{"scale"});
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(directions[i + 1], (Names{std::string("cam.position.") + "xyz"[i], "landmarks"}));
+  }
 }
 
 }  // namespace

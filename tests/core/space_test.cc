@@ -149,6 +149,7 @@ INSTANTIATE_TEST_SUITE_P(AllKinds, GeometryLaws,
                                          Case{"unit_vector", Geometry::UnitVector(), kPi}),
                          [](const auto& test) { return std::string(test.param.name); });
 
+// FAULTS 84
 TEST(Angle, WrapsAtPlusAndMinusPi) {
   const Geometry angle = Geometry::Angle();
   const auto plus = [&](double x, double d) {

@@ -204,7 +204,7 @@ Eigen::Matrix3d InSpace(const State& state) {
 
 // In the tangent plane before, h is the identity: 1/P+ = 1/P + 1/R. The update then turns P with
 // the direction, by the smallest rotation.
-TEST(SquareRootEkf, CarriesTheCovarianceOfADirectionAcrossTheSeamOfItsBasis) {
+TEST(SquareRootEkf, CarriesTheCovarianceOfADirectionAcrossTheSeamOfItsBasis) {  // FAULTS 84
   const System system = DirectionNearTheSeam();
   SquareRootEkf filter(system, {}, StreamsOf(system));
   const Eigen::Vector3d before(system.priors[0].mean.data());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tables and configs with a fault.
+// Tables and configs with a fault; the number of a fault of data is in the comment above its test.
 #include <algorithm>
 
 #include "csv_fixture.h"
@@ -10,6 +10,7 @@ namespace {
 
 // ---- bad data -----------------------------------------------------------------------------------
 
+// FAULTS 27
 TEST_F(Csv, WrongNumberOfColumns) {
   ExpectBadData(std::string("# c\n") + kHeader + "0,1,2,3\n1,2,3\n",
                 "FILE:4:6: 3 columns; expected 4 columns, as in line 2");
@@ -17,12 +18,14 @@ TEST_F(Csv, WrongNumberOfColumns) {
                 "FILE:2:9: 5 columns; expected 4 columns, as in line 1");
 }
 
+// FAULTS 34
 TEST_F(Csv, TruncatedLastLine) {
   ExpectBadData(
       std::string(kHeader) + "0,1,2,3\n1,2",
       "FILE:3:4: the last line is cut short: 2 columns; expected 4 columns, as in line 1");
 }
 
+// FAULTS 28
 TEST_F(Csv, NotANumber) {
   const auto expect = [&](const std::string& cell) {
     ExpectBadData(
@@ -42,6 +45,7 @@ TEST_F(Csv, ShowsHostileCellsHarmlessly) {
                 "FILE:2:3 disparity_px: '?' is not a number; expected a finite number");
 }
 
+// FAULTS 29
 TEST_F(Csv, NotFinite) {
   for (const std::string cell : {"nan", "inf", "-inf", "NaN", "Infinity"}) {
     ExpectBadData(std::string(kHeader) + "0,1," + cell + ",3\n",
@@ -49,6 +53,7 @@ TEST_F(Csv, NotFinite) {
   }
 }
 
+// FAULTS 30
 TEST_F(Csv, Overflow) {
   for (const std::string cell : {"1e400", "-1e400", "1e-400"}) {
     ExpectBadData(std::string(kHeader) + "0,1,2," + cell + "\n",
@@ -62,6 +67,7 @@ TEST_F(Csv, ReciprocalOfZero) {
                 "FILE:2:5 scale: '0' has no finite reciprocal; expected a finite number");
 }
 
+// FAULTS 33
 TEST_F(Csv, LineTooLong) {
   // "0,1,2," and a number: 4096 bytes are read, one more is refused, line end not counted.
   const auto row = [](std::size_t length) { return "0,1,2,3." + std::string(length - 8, '0'); };
@@ -86,6 +92,7 @@ TEST_F(Csv, LongestLineMayEndAcrossTheBuffer) {
                           ":1 t_s: 'x' is not a number; expected a finite number");
 }
 
+// FAULTS 35, 36
 TEST_F(Csv, TimeMustIncrease) {
   ExpectBadData(std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n# c\n0.1,1,2,3\n",
                 "FILE:5:1 t_s: '0.1' is before line 3; expected times that increase, or "
@@ -102,6 +109,7 @@ TEST_F(Csv, TimeBeyondTheStamps) {
                 "FILE:2:1 t_s: '' is not a number; expected a finite number");
 }
 
+// FAULTS 43
 TEST_F(Csv, NothingAtAll) {
   ExpectBadData("", "FILE: no header line; expected a line that names the columns");
   ExpectBadData("# c\n\n", "FILE: no header line; expected a line that names the columns");

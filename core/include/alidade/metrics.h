@@ -14,8 +14,8 @@ namespace alidade {
 /// Metrics of one estimator, taken frame by frame.
 ///
 ///   rmse:BLOCK          sqrt(mean |e|^2),  e = x_true (-) x            unit of the block
-///   lag_ms:BLOCK        delay after truth, as Lag() has it; > 0: late. Scalar blocks, even
-///                       sampling (steps within 5 % of their mean), a truth that changes
+///   lag_ms:BLOCK        delay after truth as Lag() has it, of the first 100 000 stamps; > 0: late.
+///                       Scalar blocks, steps within 5 % of their mean, a truth that changes
 ///   cov95:BLOCK         share of stamps with |e| <= 1.96 sigma (scalar blocks)
 ///   nees.mean:OWNER     mean of e' P^-1 e / dof over the owner's estimated blocks of known truth,
 ///                       jointly; stamps where P is singular or not finite are left out
@@ -49,6 +49,9 @@ class Metrics {
   /// `inconsistent`, once for each block element: truth is known and the error has been beyond 10
   /// sigma for 20 stamps on end.
   const std::vector<Event>& events() const;
+  /// Sensors, by index, whose measurements look as if they were in another unit: of those that
+  /// were accepted or gated, the median of sqrt(r' S^-1 r / dof) is above 100.
+  std::vector<int> far_off() const;
   std::map<std::string, double> Finish() const;
   const std::map<std::string, std::int64_t>& counts() const;
   /// Unit of each block with truth, where it has one: for EstimatorResult::units.

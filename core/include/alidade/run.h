@@ -105,6 +105,8 @@ struct RunResult {
   std::string reason;
   std::int64_t frames = 0;
   Arrivals arrivals;
+  /// Quaternions and directions of a stream or truth that were brought to unit length.
+  std::map<std::string, std::int64_t> normalised;
   std::string reference = "truth";  ///< what metrics compare with: truth, or an estimator's name
   std::string withheld;             ///< why there is no comparison with that estimator, or ""
   std::vector<EstimatorResult> estimators;
@@ -120,9 +122,9 @@ struct RunOptions {
 
 /// Runs all estimators over the source, frame by frame, so that all see the same data. Data errors
 /// and divergence under `fail` end the run early; an estimator that has nothing left to go on with
-/// ends by itself; a frame that is not as the source's streams() and truths() say ends the
-/// run. All that, and
-/// whatever else goes wrong, is in the result; nothing is thrown.
+/// ends by itself; a frame that is not as the source's streams() and truths() say ends the run, as
+/// does a quaternion or direction that is not of unit length to 1e-3. All that, and whatever else
+/// goes wrong, is in the result; nothing is thrown.
 RunResult Run(Experiment& experiment, const RunOptions& options);
 
 /// A table of the estimators' main metrics, one column each, for a terminal; below it what they

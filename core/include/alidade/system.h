@@ -92,7 +92,7 @@ System BuildSystem(const Node& root, const PluginHost& host, const std::vector<s
 
 /// Directions of the initial state that no sensor can see, found at a generic point near the prior
 /// from the rank of the observability matrix [H; H F; H F^2; ...]: for each one the names of the
-/// block elements it moves. Not of a system with landmarks.
+/// block elements it moves. With landmarks, `scale` is that of path and map; exact priors are seen.
 std::vector<std::vector<std::string>> UnobservableDirections(const System& system);
 
 }  // namespace alidade

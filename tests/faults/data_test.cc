@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Data with a fault, through the whole program. The number of each fault is in the comment above
+// its test; what the readers of files say of a fault is in tests/plugins/*_faults_test.cc.
+#include <cmath>
+
+#include "support/program.h"
+
+namespace alidade {
+namespace {
+
+using testing::Contains;
+using testing::Outcome;
+
+/// A camera that stands at the origin, or walks along x, and tracks of landmarks before it.
+constexpr const char* kMapConfig = R"(alidade: 1
+camera: {width: 640, height: 480, fx: 525, fy: 525, cx: 320, cy: 240}
+state:
+  cam:
+    model: quaternion_pose
+    noise: {linear_acceleration: 0.3, angular_acceleration: 0.05}
+    initial:
+      position: {mean: [0, 0, 0], sigma: 0}
+      orientation: {mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0}
+      velocity: {mean: [0, 0, 0], sigma: 0.1}
+      angular_velocity: {mean: [0, 0, 0], sigma: 0.05}
+landmarks: {form: inverse_depth, prior: {inverse_distance: 0.5, sigma: 0.25}}
+sensors:
+  pixels: {model: inverse_depth_feature, stream: tracks, sigma_px: 1.0,
+           roles: {position: cam.position, orientation: cam.orientation, landmark: landmarks}}
+source: {type: tracks, path: tracks.csv, frame_rate_hz: 30}
+estimators: {ekf: {type: ekf, gate: 0.99}}
+)";
+
+class DataFault : public testing::ProgramTest {
+ protected:
+  void SetUp() override {
+    ProgramTest::SetUp();
+    Write("map.yaml", kMapConfig);
+  }
+  /// Runs a config into `out`; it ends with `code`.
+  Outcome Run(const std::string& config, testing::Arguments more = {}, int code = 0) {
+    testing::Arguments arguments = {"run", config, "--no-figures", "--force", "-o", "out"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = Call(arguments);
+    EXPECT_EQ(outcome.code, code) << outcome.err;
+    return outcome;
+  }
+  double Count(const std::string& name) const {
+    const Config run = Json("out/run.json");
+    const Node counts = run.root().At("estimators").At("ekf").At("counts");
+    const auto count = counts.Find(name);
+    return count ? count->Number() : 0.0;
+  }
+};
+
+std::string Row(int frame, int feature, int dim, double value) {
+  return std::to_string(frame) + ',' + std::to_string(feature) + ',' + std::to_string(dim) + ',' +
+         std::to_string(value) + '\n';
+}
+
+/// Features 0 to 5 of a plane 4 m ahead, as a camera at x sees them.
+std::string Plane(int frame, double x) {
+  std::string rows;
+  for (int i = 0; i < 6; ++i) {
+    rows += Row(frame, i, 0, 320 + 525 * (-1.0 + 0.4 * i - x) / 4.0);
+    rows += Row(frame, i, 1, 240 + 525 * (i % 2 - 0.5) / 4.0);
+  }
+  return rows;
+}
+
+// FAULTS 39
+TEST_F(DataFault, AnIdUsedAgainIsTheNextGeneration) {
+  // Feature 7 ends with frame 2; 30 frames later its id is given to another.
+  std::string rows;
+  for (int frame = 0; frame < 40; ++frame) {
+    rows += Plane(frame, 0.02 * frame);
+    if (frame < 3) rows += Row(frame, 7, 0, 100) + Row(frame, 7, 1, 100);
+    if (frame >= 33) rows += Row(frame, 7, 0, 500) + Row(frame, 7, 1, 300);
+  }
+  Write("tracks.csv", rows);
+  Run("map.yaml", {"--set", "landmarks.forget.unseen_frames=5"});
+  const std::string map = Read("out/ekf/landmarks.csv");
+  EXPECT_TRUE(Contains(map, "\n7,1,inverse_depth,")) << map;
+  EXPECT_TRUE(Contains(map, "\n0,0,inverse_depth,")) << map;
+  EXPECT_EQ(Count("landmarks.deleted"), 1);
+}
+
+// FAULTS 40
+TEST_F(DataFault, WithoutParallaxLandmarksStayInverseDepth) {
+  // The same walk twice, once as if at infinity.
+  for (const bool moves : {true, false}) {
+    std::string rows;
+    for (int frame = 0; frame < 60; ++frame) rows += Plane(frame, moves ? 0.03 * frame : 0.0);
+    Write("tracks.csv", rows);
+    Run("map.yaml", {"--set", "landmarks.to_xyz={linearity: 0.1}", "--set",
+                     "state.cam.initial.velocity={mean: [0.9, 0, 0], sigma: 0}", "--set",
+                     "estimators.ekf.gate=1", "--set", "state.cam.noise.linear_acceleration=0.01"});
+    EXPECT_EQ(Contains(Read("out/ekf/landmarks.csv"), ",xyz,"), moves);
+    EXPECT_EQ(Count("landmarks.converted") > 0, moves);
+  }
+}
+
+// FAULTS 41: a landmark behind the camera, depths and disparities that are not positive.
+TEST_F(DataFault, WhatIsNotBeforeTheCameraIsRejectedAndCounted) {
+  Write("table.csv", "t_s,d\n0,80\n0.1,0\n0.2,-5\n0.3,82\n");
+  Run("table.yaml");
+  EXPECT_EQ(Count("invalid:stereo"), 2);
+  EXPECT_EQ(Count("accepted:stereo"), 2);
+  EXPECT_TRUE(
+      Contains(Read("out/ekf/innovations.csv"), "\n0.200000000,disparity,stereo,,invalid,1,,-5,"))
+      << Read("out/ekf/innovations.csv");
+  std::string rows;
+  for (int frame = 0; frame < 4; ++frame) rows += Row(frame, 9, 0, 320) + Row(frame, 9, 1, 240);
+  Write("tracks.csv", rows);
+  Run("map.yaml", {"--set", "landmarks.known=[{id: 9, position: [0, 0, -2], sigma: 0}]"});
+  EXPECT_EQ(Count("out_of_domain:pixels"), 4);
+  // A depth of no use: not above zero, dim 2.
+  rows.clear();
+  for (int frame = 0; frame < 4; ++frame) {
+    rows += Row(frame, 9, 0, 320) + Row(frame, 9, 1, 240) + Row(frame, 9, 2, frame < 3 ? 2.0 : 0.0);
+  }
+  Write("tracks.csv", rows);
+  Run("map.yaml", {"--set", "sensors.pixels.model=depth_feature", "--set",
+                   "sensors.pixels.sigma_depth_m=0.02", "--set", "source.measures=depth"});
+  EXPECT_EQ(Count("accepted:pixels"), 2);
+  EXPECT_EQ(Count("invalid:pixels"), 1);
+}
+
+// FAULTS 42
+TEST_F(DataFault, AnEmptyFrameIsPredictedThrough) {
+  Write("table.csv", "t_s,d\n0,80\n0.1,\n0.2,80\n");
+  Run("table.yaml");
+  const std::string estimates = Read("out/ekf/estimates.csv");
+  EXPECT_TRUE(Contains(estimates, "\n0.100000000,")) << estimates;
+  EXPECT_EQ(Count("accepted:stereo"), 2);
+  Write("tracks.csv", Plane(0, 0.0) + Plane(2, 0.0));
+  Write("timestamps.csv", "0,0\n1,0.033\n2,0.066\n");
+  Run("map.yaml", {"--set", "source.frame_rate_hz=0"});
+  EXPECT_TRUE(Contains(Read("out/ekf/estimates.csv"), "\n0.033000000,"));
+  EXPECT_EQ(Count("accepted:pixels"), 6);
+}
+
+// FAULTS 27, 43: what the program makes of an error of a reader.
+TEST_F(DataFault, WhatIsNoDataIsExitCode65WithThePlace) {
+  for (const char* config : {"table.yaml", "map.yaml"}) {
+    const std::string file = config[0] == 't' ? "table.csv" : "tracks.csv";
+    Write(file, "");
+    const Outcome nothing = Run(config, {}, 65);
+    EXPECT_TRUE(Contains(nothing.err, "error: " + file + ": no ") ||
+                Contains(nothing.err, '/' + file + ": no "))
+        << nothing.err;
+    Write(file, "t_s,d\n0,80\n0.1\n");
+    const Outcome columns = Run(config, {}, 65);
+    EXPECT_TRUE(Contains(columns.err, file + (config[0] == 't' ? ":3:4: 1 column" : ":1:6: 2 col")))
+        << columns.err;
+  }
+}
+
+// FAULTS 45
+TEST_F(DataFault, APixelOutsideTheImageIsRejectedAndCounted) {
+  // The image reaches from -0.5 to 639.5 and 479.5.
+  const std::vector<std::pair<double, double>> outside = {
+      {-0.6, 100}, {639.6, 100}, {100, -0.6}, {100, 479.6}, {1e9, -1e9}};
+  std::string rows;
+  for (int frame = 0; frame < 3; ++frame) {
+    rows += Plane(frame, 0.0) + Row(frame, 20, 0, 639.5) + Row(frame, 20, 1, -0.5);
+    for (std::size_t i = 0; i < outside.size(); ++i) {
+      const int id = 10 + static_cast<int>(i);
+      rows += Row(frame, id, 0, outside[i].first) + Row(frame, id, 1, outside[i].second);
+    }
+  }
+  Write("tracks.csv", rows);
+  Run("map.yaml");
+  EXPECT_EQ(Count("invalid:pixels"), 15);
+  EXPECT_EQ(Count("initialised:pixels"), 7);
+  EXPECT_EQ(Count("accepted:pixels"), 14);
+  EXPECT_TRUE(Contains(Read("out/ekf/innovations.csv"), ",tracks,pixels,10,invalid,2,,-0.6,100,"))
+      << Read("out/ekf/innovations.csv");
+  const std::string map = Read("out/ekf/landmarks.csv");
+  EXPECT_TRUE(Contains(map, "\n20,"));
+  EXPECT_FALSE(Contains(map, "\n10,"));
+}
+
+// FAULTS 46
+TEST_F(DataFault, AnotherUnitIsAWarning) {
+  // Disparities of a target at 0.325 m: in px as said, then 1000 times that.
+  const auto table = [](double unit) {
+    std::string rows = "t_s,d\n";
+    for (int k = 0; k < 15; ++k) {
+      rows += std::to_string(0.1 * k) + ',' + std::to_string(80.0 * unit) + '\n';
+    }
+    return rows;
+  };
+  const std::string warning =
+      "ekf: unit\n  sensor 'stereo': the median of |z - h| is more than 100 sigma; is stream "
+      "'disparity' in px?";
+  const testing::Arguments gated = {"--set", "estimators.ekf.gate=0.999", "--set",
+                                    "state.target.initial.depth={mean: 0.3, sigma: 0.01}"};
+  Write("table.csv", table(1.0));
+  EXPECT_FALSE(Contains(Run("table.yaml", gated).out, "ekf: unit"));
+  Write("table.csv", table(1000.0));
+  const Outcome slipped = Run("table.yaml", gated);
+  EXPECT_TRUE(Contains(slipped.out, warning)) << slipped.out;
+  EXPECT_TRUE(Contains(Read("out/ekf/events.csv"), ",unit,"));
+}
+
+// FAULTS 48
+TEST_F(DataFault, AFileThatChangesWhileItIsReadIsExitCode74) {
+  std::string rows = "t_s,d\n", tracks;
+  for (int k = 0; k < 200'000; ++k) rows += std::to_string(0.001 * k) + ",80\n";
+  for (int frame = 0; frame < 30'000; ++frame) tracks += Plane(frame, 0.0);
+  for (const char* config : {"table.yaml", "map.yaml"}) {
+    const std::string file = config[0] == 't' ? "table.csv" : "tracks.csv";
+    Write(file, config[0] == 't' ? rows : tracks);
+    const pid_t run = Start({"run", config, "--no-figures", "--force", "-o", "out"});
+    const std::string partial = ".out.partial-" + std::to_string(run) + "/ekf/estimates.csv";
+    EXPECT_TRUE(Eventually([&] { return Exists(partial); }));
+    std::ofstream(folder_ / file, std::ios::app) << "# one more\n";
+    const Outcome outcome = Wait(run);
+    EXPECT_EQ(outcome.code, 74) << outcome.err;
+    EXPECT_TRUE(Contains(outcome.err, ": changed while it was read")) << outcome.err;
+    EXPECT_EQ(Json("out/run.json").root().At("status").Text(), "failed");
+  }
+}
+
+/// Truth of 20 frames that turn about y by up to 4 rad; signs of every third quaternion, or of all
+/// but those, are turned.
+std::string Turning(bool turned, double length = 1.0) {
+  std::ostringstream rows;
+  rows.precision(17);
+  for (int k = 0; k < 20; ++k) {
+    const double sign = ((k % 3 == 0) == turned ? -1.0 : 1.0) * length;
+    rows << k / 30.0 << " 0 0 0 0 " << sign * std::sin(0.1 * k) << " 0 " << sign * std::cos(0.1 * k)
+         << '\n';
+  }
+  return rows.str();
+}
+
+// FAULTS 49
+TEST_F(DataFault, TheSignOfAQuaternionIsNotSeen) {
+  std::string rows;
+  for (int frame = 0; frame < 20; ++frame) rows += Plane(frame, 0.0);
+  Write("tracks.csv", rows);
+  std::vector<std::string> files;
+  for (const bool turned : {false, true}) {
+    Write("truth.tum", Turning(turned));
+    Run("map.yaml",
+        {"--set", std::string("state.cam.initial.orientation={mean: ") +
+                      (turned ? "{w: 0, x: 0, y: -1, z: 0}" : "{w: 0, x: 0, y: 1, z: 0}") +
+                      ", sigma: 0}"});
+    for (const char* file : {"ekf/estimates.csv", "ekf/innovations.csv", "truth.csv"}) {
+      files.push_back(Read(std::string("out/") + file));
+    }
+    files.push_back(std::string(Json("out/run.json")
+                                    .root()
+                                    .At("estimators")
+                                    .At("ekf")
+                                    .At("metrics")
+                                    .At("rmse:cam.orientation")
+                                    .Text()));
+  }
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(files[i], files[i + 4]);
+  // Continuous: at 2 rad w is below 0.
+  EXPECT_TRUE(Contains(files[2], ",0,0,0,-0.3")) << files[2];
+}
+
+// FAULTS 49
+TEST_F(DataFault, QuaternionsOfAnotherLengthAreNormalisedAndCounted) {
+  std::string rows;
+  for (int frame = 0; frame < 20; ++frame) rows += Plane(frame, 0.0);
+  Write("tracks.csv", rows);
+  Write("truth.tum", Turning(false));
+  Run("map.yaml");
+  EXPECT_FALSE(Json("out/run.json").root().Find("normalised"));
+  const std::string truth = Read("out/truth.csv");
+  Write("truth.tum", Turning(false, 1.0009));
+  Run("map.yaml");
+  const Config run = Json("out/run.json");
+  EXPECT_EQ(run.root().At("normalised").At("cam.orientation").Number(), 20);
+  EXPECT_EQ(Read("out/truth.csv").substr(0, 200), truth.substr(0, 200));
+  Write("truth.tum", Turning(false, 1.0011));
+  const Outcome tum = Run("map.yaml", {}, 65);
+  EXPECT_TRUE(Contains(tum.err, "truth.tum:1: quaternion of length 1.0011")) << tum.err;
+  // Columns of a table.
+  const testing::Arguments columns = {"--set",
+                                      "source={type: csv, path: turn.csv, streams: {tracks: [w, "
+                                      "x]}, truth: {orientation: [w, x, y, z]}}"};
+  Write("turn.csv", "t_s,w,x,y,z\n0,1,0,0,0\n0.1,0.6,0.8,0,0\n0.2,0.6,0.8,0.0003,0.04\n");
+  Run("map.yaml", columns);
+  EXPECT_EQ(Json("out/run.json").root().At("normalised").At("orientation").Number(), 1);
+  EXPECT_EQ(Count("invalid:pixels"), 3) << "without an id";
+  Write("turn.csv", "t_s,w,x,y,z\n0,1,0,0,0\n0.1,0.6,0.8,0.1,0\n");
+  const Outcome table = Run("map.yaml", columns, 65);
+  EXPECT_TRUE(Contains(table.err,
+                       "turn.csv:3 orientation: a quaternion whose length is off by 0.004988; "
+                       "expected unit length to 1e-3"))
+      << table.err;
+}
+
+// FAULTS 78
+TEST_F(DataFault, ScaleThatNobodyTellsIsReportedAndNoFailure) {
+  Write("tracks.csv", Plane(0, 0.0) + Plane(1, 0.01) + Plane(2, 0.02));
+  const Outcome alone = Call({"explain", "map.yaml"});
+  EXPECT_TRUE(Contains(alone.out, "  cannot be observed: scale (1 direction)\n    scale, of path"))
+      << alone.out;
+  const Outcome run = Run("map.yaml");
+  EXPECT_TRUE(Contains(run.out, "ekf: unobservable\n  no sensor of this estimator tells scale\n"))
+      << run.out;
+  EXPECT_TRUE(Contains(Read("out/run.json"), "\"scale\"")) << Read("out/run.json");
+  const char* const observed = "every direction of the state can be observed";
+  // Depth tells it, and so do landmarks that are known.
+  const Outcome depth =
+      Call({"explain", "map.yaml", "--set", "sensors.pixels.model=depth_feature", "--set",
+            "sensors.pixels.sigma_depth_m=0.02", "--set", "source.measures=depth"});
+  EXPECT_TRUE(Contains(depth.out, observed)) << depth.out << depth.err;
+  const Outcome known = Call({"explain", "map.yaml", "--set",
+                              "landmarks.known=[{id: 1, position: [0, 0, 2], sigma: 0.01}]"});
+  EXPECT_TRUE(Contains(known.out, observed)) << known.out << known.err;
+}
+
+}  // namespace
+}  // namespace alidade

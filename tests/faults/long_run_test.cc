@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What a run holds in memory does not grow with its length. The configs are those of
+// bench/long_run.
+#include <sys/resource.h>
+
+#include "support/program.h"
+
+namespace alidade {
+namespace {
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kSanitized = true;
+#else
+constexpr bool kSanitized = false;
+#endif
+
+const std::string kBench = ALIDADE_SOURCE_DIR "/bench/long_run/";
+
+class LongRun : public testing::ProgramTest {
+ protected:
+  /// KiB that a run of a config was resident in at most.
+  long PeakOf(const std::string& config, testing::Arguments settings) {
+    testing::Arguments arguments = {"run", config, "--no-figures", "--force", "-o", "out"};
+    for (std::string& setting : settings) {
+      arguments.insert(arguments.end(), {"--set", std::move(setting)});
+    }
+    const pid_t pid = Start(arguments);
+    int status = 0;
+    rusage usage{};
+    EXPECT_EQ(::wait4(pid, &status, 0, &usage), pid);
+    EXPECT_EQ(status, 0) << Read("stderr");
+    return usage.ru_maxrss;
+  }
+};
+
+// FAULTS 47
+TEST_F(LongRun, MemoryDoesNotGrowWithTheFile) {
+  if (kSanitized) GTEST_SKIP() << "the sanitizer keeps what was freed";
+  const std::string file = (folder_ / "tracks.csv").string();
+  const auto peak = [&](int frames) {
+    std::ofstream rows(file);
+    for (int k = 0; k < frames; ++k) {
+      for (int i = 0; i < 100; ++i) {
+        const int id = i + 100 * ((k + i) / 50);  // each is seen in 50 frames
+        rows << k << ',' << id << ",0," << 6 * i << ".25\n" << k << ',' << id << ",1,20.5\n";
+      }
+    }
+    rows.close();
+    return PeakOf(kBench + "stream.yaml", {"source.path=" + file});
+  };
+  // 3 and 30 MB. Where measurements are kept, each takes 100 bytes or more, and there are 900 000.
+  const long shorter = peak(1'000), longer = peak(10'000);
+  EXPECT_LT(longer - shorter, 2'048) << shorter << " KiB, then " << longer;
+  EXPECT_LT(longer, 100 * 1'024);
+}
+
+// FAULTS 47: a table with truth, of which errors and the lag are taken.
+TEST_F(LongRun, MemoryDoesNotGrowWithTheTable) {
+  if (kSanitized) GTEST_SKIP() << "the sanitizer keeps what was freed";
+  const auto peak = [&](int count) {
+    std::ofstream rows(folder_ / "table.csv");
+    rows << "t_s,d,depth\n";
+    for (int k = 0; k < count; ++k)
+      rows << k << ".5," << 80 + k % 7 << ",0." << 320 + k % 10 << '\n';
+    rows.close();
+    return PeakOf("table.yaml", {"source.truth={depth: depth}"});
+  };
+  // Estimate and truth of every row would take 16 bytes each, 6 MB.
+  const long shorter = peak(120'000), longer = peak(520'000);
+  EXPECT_LT(longer - shorter, 2'048) << shorter << " KiB, then " << longer;
+}
+
+TEST_F(LongRun, MemoryDoesNotGrowAsLandmarksComeAndGo) {
+  if (kSanitized) GTEST_SKIP() << "the sanitizer keeps what was freed";
+  const auto peak = [&](int frames) {
+    return PeakOf(kBench + "walk.yaml",
+                  {"source.frames=" + std::to_string(frames), "source.max_features_per_frame=6"});
+  };
+  // The path of the scene is drawn beforehand: 104 bytes a frame, 0.3 MB.
+  const long shorter = peak(1'000), longer = peak(4'000);
+  EXPECT_LT(longer - shorter, 1'536) << shorter << " KiB, then " << longer;
+  const Config run = Json("out/run.json");
+  const Node counts = run.root().At("estimators").At("ekf").At("counts");
+  EXPECT_GT(counts.At("landmarks.deleted").Number(), 50);
+}
+
+}  // namespace
+}  // namespace alidade

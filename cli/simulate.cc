@@ -14,16 +14,24 @@ namespace {
 constexpr const char* kFooter = R"(Examples:
   alidade simulate config.yaml -o data/scene
   alidade simulate config.yaml -o data/scene-7 --set source.seed=7
+  alidade simulate config.yaml -o data/scene --video video.avi --images images
   alidade run other.yaml --set source.path=data/scene   with source.type: tracks
 
 No estimator is made. Measurements of landmarks go to STREAM.csv as frame,feature,dim,value, others
-as frame,t_s and their values; beside them timestamps.csv, truth, map.csv and calibration.yaml.)";
+as frame,t_s and their values; beside them timestamps.csv, truth, map.csv and calibration.yaml.
+Pictures have an equal disc at the pixel of each landmark's measurement.)";
 
 struct Arguments {
   Input input;
   std::string folder;
+  SimulatePictures pictures;
   bool force = false, quiet = false;
 };
+
+std::string IsAvi(const std::string& name) {
+  if (std::filesystem::path(name).extension() == ".avi") return {};
+  return "'" + name + "' is no video that can be written; expected a name like video.avi";
+}
 
 ExitCode RunSimulate(const Arguments& arguments) {
   const Config config = arguments.input.Load();
@@ -31,7 +39,8 @@ ExitCode RunSimulate(const Arguments& arguments) {
       OutputFolder(arguments.folder, config, arguments.input, "data-");
   const PluginHost host = arguments.input.Host(config);
   StopOnSignals();
-  const SimulateResult result = Simulate(config, host, path, arguments.force, StopRequested);
+  const SimulateResult result =
+      Simulate(config, host, path, arguments.force, StopRequested, arguments.pictures);
   if (!arguments.quiet) {
     std::string text = std::to_string(result.frames) + " frames\nwrote " + path.string() + '\n';
     for (const std::string& file : result.files) text += "  " + (path / file).string() + '\n';
@@ -49,6 +58,16 @@ void AddSimulate(CLI::App& program, Action& action) {
   arguments->input.AddTo(command);
   AddOutput(command, arguments->folder,
             "folder; default: the config's `output:`, or data-NAME, in runs/");
+  command
+      .add_option("--video", arguments->pictures.video,
+                  "writes what the camera sees as a video, FILE.avi in the folder; needs OpenCV")
+      ->option_text("FILE")
+      ->check(IsAvi);
+  command
+      .add_option("--images", arguments->pictures.images,
+                  "writes it as a PNG for each frame, in DIR in the folder; needs OpenCV")
+      ->option_text("DIR")
+      ->check(IsNamed);
   command.add_flag("--force", arguments->force, "replace the folder if it is there");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.footer(kFooter);

@@ -1,17 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 
-# alidade_add_plugin(NAME SOURCES file... [BUILD_TIER] [LIBRARIES target...])
+# alidade_add_plugin(NAME SOURCES file... [BUILD_TIER] [FOLDER folder] [LIBRARIES target...])
 #
 # Builds a plugin that alidade loads at run time: hidden visibility, no undefined symbols, no
 # instruction-set flags. A sealed plugin (models) needs the headers alone; BUILD_TIER (sources,
 # estimators) links alidade::core and loads only into the very build it was made with.
+# What lies in another FOLDER than `plugins` is not searched, but loaded when it is needed.
 function(alidade_add_plugin name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "BUILD_TIER" "" "SOURCES;LIBRARIES")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "BUILD_TIER" "FOLDER" "SOURCES;LIBRARIES")
+  if(NOT arg_FOLDER)
+    set(arg_FOLDER plugins)
+  endif()
   add_library(${name} MODULE ${arg_SOURCES})
   set_target_properties(${name} PROPERTIES
     PREFIX "" OUTPUT_NAME "alidade_${name}"
     CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON
-    LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib/alidade/plugins)
+    LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib/alidade/${arg_FOLDER}
+    ALIDADE_FOLDER ${arg_FOLDER})
   target_link_options(${name} PRIVATE -Wl,-z,defs)
   if(arg_BUILD_TIER)
     target_link_libraries(${name} PRIVATE alidade::core ${arg_LIBRARIES})

@@ -34,7 +34,10 @@ foreach(folder IN ITEMS motion_models sensors plugins)
   alidade_plugins_of(${PROJECT_SOURCE_DIR}/${folder} plugins)
   # Build-tier plugins link the library; both may move together.
   set_target_properties(${plugins} PROPERTIES INSTALL_RPATH "$ORIGIN/../..")
-  install(TARGETS ${plugins} LIBRARY DESTINATION ${plugin_folder})
+  foreach(plugin IN LISTS plugins)
+    get_target_property(beside ${plugin} ALIDADE_FOLDER)
+    install(TARGETS ${plugin} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/alidade/${beside})
+  endforeach()
 endforeach()
 
 install(DIRECTORY core/include/ TYPE INCLUDE FILES_MATCHING PATTERN "*.h")

@@ -25,6 +25,8 @@ void Fit(MeasurementReport& entry, int m, int n) {
   Fit(entry.gain, m * n);
 }
 
+/// One by one: with std::copy_n and AllFinite in place of the two below a step takes 15 % longer
+/// (bench_small_filter).
 ALIDADE_INLINE void Copy(const double* from, int size, std::vector<double>& to) {
   double* const at = to.data();
   for (int i = 0; i < size; ++i) at[i] = from[i];

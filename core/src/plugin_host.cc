@@ -45,17 +45,6 @@ std::optional<fs::path> UserFolder() {
   return std::nullopt;
 }
 
-/// Beside this library: `lib/alidade/plugins` of the build tree or of the installation.
-std::optional<fs::path> FolderOfProgram() {
-  Dl_info info{};
-  const auto* here = reinterpret_cast<const void*>(&internal::HostBuildId);
-  if (dladdr(here, &info) == 0 || info.dli_fname == nullptr) return std::nullopt;
-  std::error_code error;
-  const fs::path library = fs::canonical(info.dli_fname, error);
-  if (error) return std::nullopt;
-  return library.parent_path() / "alidade/plugins";
-}
-
 PluginEntry::Kind ToKind(std::uint32_t kind) {
   return kind == ALIDADE_KIND_SENSOR ? PluginEntry::Kind::kSensor : PluginEntry::Kind::kMotion;
 }
@@ -69,6 +58,15 @@ const boost::dll::shared_library& OpenForGood(const fs::path& file) {
 
 }  // namespace
 
+fs::path internal::FolderOfProgram() {
+  Dl_info info{};
+  const auto* here = reinterpret_cast<const void*>(&HostBuildId);
+  if (dladdr(here, &info) == 0 || info.dli_fname == nullptr) return {};
+  std::error_code error;
+  const fs::path library = fs::canonical(info.dli_fname, error);
+  return error ? fs::path() : library.parent_path() / "alidade";
+}
+
 PluginHost::PluginHost(const std::vector<fs::path>& files_and_folders, OnRefusal on_refusal) {
   const bool required = on_refusal == OnRefusal::kThrow;
   for (const fs::path& place : files_and_folders) LoadPlace(place, "given", required);
@@ -76,7 +74,8 @@ PluginHost::PluginHost(const std::vector<fs::path>& files_and_folders, OnRefusal
     LoadPlace(folder, "ALIDADE_PLUGIN_PATH", false);
   }
   if (const auto folder = UserFolder()) LoadPlace(*folder, "user data folder", false);
-  if (const auto folder = FolderOfProgram()) LoadPlace(*folder, "beside the program", false);
+  const fs::path own = internal::FolderOfProgram();
+  if (!own.empty()) LoadPlace(own / "plugins", "beside the program", false);
 }
 
 PluginHost::~PluginHost() = default;

@@ -2,11 +2,13 @@
 #include "alidade/simulate.h"
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <memory>
 #include <optional>
 #include <set>
 
+#include "alidade/pictures.h"
 #include "columns.h"
 #include "csv_file.h"
 #include "number_text.h"
@@ -166,6 +168,58 @@ class DataFiles {
   std::set<std::string> names_;
 };
 
+/// The pictures of one simulation.
+class PictureFiles {
+ public:
+  PictureFiles(const SimulatePictures& names, const Config& config, const RunFolder& folder) {
+    if (!names.video.empty()) {
+      const std::filesystem::path path = Inside(folder, names.video, "--video");
+      MakeFolder(path.parent_path(), folder.Shown(names.video));
+      Open({PictureArguments::Form::kVideo, path, folder.Shown(names.video), 0, 0}, config);
+    }
+    if (!names.images.empty()) {
+      const std::filesystem::path path = Inside(folder, names.images, "--images");
+      MakeFolder(path, folder.Shown(names.images));
+      Open({PictureArguments::Form::kImages, path, folder.Shown(names.images), 0, 0}, config);
+    }
+  }
+
+  void Add(std::int64_t number, const Frame& frame) {
+    if (writers_.empty()) return;
+    pixels_.clear();
+    for (const Measurement& measurement : frame.measurements) {
+      if (measurement.landmark < 0 || measurement.values.size() < 2) continue;
+      pixels_.push_back({measurement.values[0], measurement.values[1]});
+    }
+    for (const auto& writer : writers_) writer->Add(number, frame.stamp, pixels_);
+  }
+
+  void Close() {
+    for (const auto& writer : writers_) writer->Close();
+  }
+
+ private:
+  static std::filesystem::path Inside(const RunFolder& folder, const std::string& name,
+                                      const char* option) {
+    return ResolveInside(folder.partial(), name, false, {}, option);
+  }
+  static void MakeFolder(const std::filesystem::path& path, const std::string& shown) {
+    std::error_code error;
+    std::filesystem::create_directories(path, error);
+    if (error) internal::FailCreate(shown, error.value());
+  }
+  void Open(PictureArguments arguments, const Config& config) {
+    constexpr int kMost = 16384;
+    const Node camera = config.root().At("camera", "pictures of a simulation");
+    arguments.width = static_cast<int>(camera.At("width").Integer(1, kMost));
+    arguments.height = static_cast<int>(camera.At("height").Integer(1, kMost));
+    writers_.push_back(OpenPictures(arguments));
+  }
+
+  std::vector<std::unique_ptr<PictureWriter>> writers_;
+  std::vector<std::array<double, 2>> pixels_;
+};
+
 /// The config's `camera` alone; "" where it has none.
 std::string CameraYaml(const Config& config) {
   const bool source_reads_it = !config.root().HasUnread("camera");
@@ -183,18 +237,24 @@ std::string CameraYaml(const Config& config) {
 
 SimulateResult Simulate(const Config& config, const PluginHost& host,
                         const std::filesystem::path& folder, bool force,
-                        const std::function<bool()>& stop) {
+                        const std::function<bool()>& stop, const SimulatePictures& pictures) {
   const std::unique_ptr<Source> source = MakeSource(config, host);
   const std::string camera = CameraYaml(config);
   RunFolder output(folder, force);
   DataFiles files(output, *source);
+  PictureFiles drawn(pictures, config, output);
   SimulateResult result;
   for (Frame frame; !result.stopped && source->Next(frame);) {
-    files.Add(result.frames++, frame);
+    files.Add(result.frames, frame);
+    drawn.Add(result.frames++, frame);
     result.stopped = stop && stop();
   }
   files.Close();
+  drawn.Close();
   result.files.assign(files.names().begin(), files.names().end());
+  for (const std::string& name : {pictures.images, pictures.video}) {
+    if (!name.empty()) result.files.push_back(name);
+  }
   if (!camera.empty()) {
     output.Write("calibration.yaml", camera);
     result.files.insert(result.files.begin(), "calibration.yaml");

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <string>
@@ -212,6 +213,108 @@ TEST(SmallEkf, TakesAnySquareRootOfTheNoiseAndMotionWithoutNoise) {
     EXPECT_EQ(Compare(system, {}, frames)["accepted"], 20);
   }
 }
+
+// ---- every number of states ---------------------------------------------------------------------
+
+/// Two numbers of two blocks, with correlated noise.
+struct Both : Sensor<Vec<2>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"a"}, Quantity{"b"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* a, const T* b, T* z) const {
+    z[0] = a[0] * b[0];
+    z[1] = a[0] + 2.0 * b[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(0.5);
+    l[2] = T(0.1);
+    l[3] = T(0.4);
+  }
+};
+
+/// z = a + t_1 t_2 + t_3
+struct Mixed : Sensor<Vec<1>, Vec<1>, Vec<3>> {
+  static constexpr std::array kRoles{Quantity{"a"}, Quantity{"t"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* a, const T* t, T* z) const {
+    z[0] = a[0] + t[0] * t[1] + t[2];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(0.5);
+  }
+};
+
+/// Adds a block of three that walk, `t.x`, with correlated priors.
+void AddTriple(System& system) {
+  const MotionModel walk = InProcessMotion(Constant<>(3, 0.2), "constant");
+  const BlockId id = system.layout.Declare("t.x", "t", walk.blocks()[0]);
+  system.motions.push_back({"t", walk, {id}});
+  const Eigen::Matrix3d p{{0.09, 0.02, 0.01}, {0.02, 0.04, -0.01}, {0.01, -0.01, 0.16}};
+  system.priors.push_back({id, {1.0, 1.0, 1.0}, p, ""});
+}
+
+/// `n` states: from 4 on three that walk together, of the rest as many as can in pairs of position
+/// and velocity. All motions have noise; sensors tie the first scalar to the others.
+System OfSize(int n) {
+  System system;
+  const bool triple = n >= 4;
+  const int rest = triple ? n - 3 : n;
+  std::vector<std::string> scalars;
+  for (int i = 0; i < rest / 2; ++i) {
+    const std::string name = "p" + std::to_string(i);
+    AddMotion(system, name, InProcessMotion(ConstantVelocity<1, false>(0.7), "constant_velocity"),
+              {{"x", 1.0, 0.3}, {"v", 0.0, 0.2}});
+    scalars.push_back(name + ".x");
+  }
+  if (rest % 2 == 1) {
+    AddMotion(system, "s", InProcessMotion(Constant<>(1, 0.3), "constant"), {{"x", 1.0, 0.3}});
+    scalars.emplace_back("s.x");
+  }
+  if (triple) AddTriple(system);
+  AddSensor(system, "first", InProcessSensor(Linear(2.0, 0.5), "linear"), {scalars[0]});
+  if (triple) AddSensor(system, "mixed", InProcessSensor(Mixed(), "mixed"), {scalars[0], "t.x"});
+  for (std::size_t i = 1; i < scalars.size() && i < 3; ++i) {
+    AddSensor(system, "both" + std::to_string(i), InProcessSensor(Both(), "both"),
+              {scalars[0], scalars[scalars.size() - i]});
+  }
+  return system;
+}
+
+class SmallEkfOfSize : public ::testing::TestWithParam<int> {};
+
+// Frames with one measurement, with two, and with all: updates of 1 to 6 rows.
+TEST_P(SmallEkfOfSize, DoesWhatTheGeneralPathDoes) {
+  const System system = OfSize(GetParam());
+  ASSERT_EQ(system.InitialState().covariance().size(), GetParam());
+  const int sensors = static_cast<int>(std::ssize(system.sensors));
+  std::vector<Frame> frames;
+  for (int k = 0; k < 80; ++k) {
+    Frame frame = FrameAt(0.05 * k, {});
+    const int count = k % 4 == 0 ? 1 : k % 4 == 1 ? 2 : sensors;
+    for (int i = 0; i < std::min(count, sensors); ++i) {
+      const int stream = (k / 4 + i) % sensors;
+      const std::string& name = system.sensors[static_cast<std::size_t>(stream)].name;
+      const double noise = 0.4 * std::sin(3.0 * k + stream) + (k % 17 == 11 ? 9.0 : 0.0);
+      std::vector<double> z = {2.0 + noise};
+      if (name == "mixed") z = {3.0 + noise};
+      if (name.starts_with("both")) z = {1.0 + noise, 3.0 - noise};
+      frame.measurements.push_back({frame.stamp, stream, -1, z, {}});
+    }
+    frames.push_back(frame);
+  }
+  EkfOptions options;
+  options.gate = 0.999;
+  auto seen = Compare(system, options, frames);
+  EXPECT_GT(seen["accepted"], 60);
+  EXPECT_GT(seen["gated"], 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(UpToSixteen, SmallEkfOfSize, ::testing::Range(1, 17));
 
 }  // namespace
 }  // namespace alidade

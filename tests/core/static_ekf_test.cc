@@ -305,5 +305,70 @@ TEST(StaticEkf, WhatCannotBeUsedChangesNothing) {
   EXPECT_EQ(filter.Update<kDepth>(stereo, &d), StaticOutcome::kOutOfDomain);
 }
 
+/// x' = 2 x + w: overflows in the end.
+struct Doubling : Motion<1, Vec<1>> {
+  static constexpr std::array kBlocks{Quantity{"x"}};
+  template <class T>
+  void Step(const T* x, const T* w, double, T* next) const {
+    next[0] = 2.0 * x[0] + w[0];
+  }
+  void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
+};
+
+/// z = x_1 of two, to 1.
+struct First : Sensor<Vec<1>, Vec<2>> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    z[0] = x[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(1.0);
+  }
+};
+
+TEST(StaticEkf, AStepToWhatIsNotFiniteIsAnErrorAndChangesNothing) {
+  const double largest = std::numeric_limits<double>::max();
+  StaticEkf<Doubling> filter{Doubling()};
+  filter.Set<0>(0.75 * largest, 1.0);
+  EXPECT_EQ(filter.Predict(1.0), Status::kError);  // of x
+  EXPECT_EQ(*filter.value<0>(), 0.75 * largest);
+  EXPECT_EQ(filter.covariance()(0, 0), 1.0);
+  filter.Set<0>(3.0, 1.0);
+  Eigen::Matrix<double, 1, 1> p;
+  p(0) = 0.5 * largest;
+  const double three = 3.0;
+  filter.Set<0>(&three, p);
+  EXPECT_EQ(filter.Predict(1.0), Status::kError);  // of P, four times as large
+  EXPECT_EQ(*filter.value<0>(), 3.0);
+  EXPECT_EQ(filter.covariance(), p);
+  filter.Set<0>(3.0, 1.0);
+  EXPECT_EQ(filter.Predict(1.0), Status::kOk);
+  EXPECT_EQ(*filter.value<0>(), 6.0);
+}
+
+// r = 1e150, S = 2: NIS is 5e299, but K r = 5e302 takes x_2 beyond the largest number.
+TEST(StaticEkf, AnUpdateToWhatIsNotFiniteIsReportedAndChangesNothing) {
+  const double largest = std::numeric_limits<double>::max();
+  StaticEkf<Constant<2>> filter{Constant<2>(2)};
+  Eigen::Matrix2d p;
+  p << 1.0, 1e153, 1e153, 1e307;
+  for (const double second : {largest, 0.0}) {
+    const double x[] = {0.0, second}, z = 1e150;
+    filter.Set<0>(x, p);
+    if (second == 0.0) {
+      EXPECT_EQ(filter.Update<0>(First(), &z), StaticOutcome::kAccepted);
+      continue;
+    }
+    EXPECT_EQ(filter.Update<0>(First(), &z), StaticOutcome::kNotFinite);
+    EXPECT_EQ(filter.value<0>()[0], 0.0);
+    EXPECT_EQ(filter.value<0>()[1], largest);
+    EXPECT_EQ(filter.covariance(), p);
+  }
+}
+
 }  // namespace
 }  // namespace alidade

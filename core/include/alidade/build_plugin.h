@@ -6,6 +6,7 @@
 
 #include "alidade/estimator.h"
 #include "alidade/fingerprint.h"
+#include "alidade/pictures.h"
 #include "alidade/source.h"
 
 /// Exports of the build tier: plugins in C++ against alidade::core, loaded only into the very build
@@ -56,6 +57,8 @@ struct BuildTable {
   int source_count = 0;
   const EstimatorEntry* estimators = nullptr;
   int estimator_count = 0;
+  /// Of the plugin that draws pictures: see OpenPictures.
+  std::unique_ptr<PictureWriter> (*pictures)(const PictureArguments& arguments) = nullptr;
 };
 
 inline constexpr const char* kBuildEntrySymbol = "alidade_build_plugin";
@@ -81,3 +84,6 @@ inline constexpr const char* kBuildEntrySymbol = "alidade_build_plugin";
 #define ALIDADE_ESTIMATOR_PLUGIN(...)                                        \
   static const alidade::EstimatorEntry alidade_estimators[] = {__VA_ARGS__}; \
   ALIDADE_BUILD_PLUGIN_(nullptr, 0, alidade_estimators, std::size(alidade_estimators))
+
+/// Exports the picture writer of this plugin: ALIDADE_PICTURE_PLUGIN(&Create)
+#define ALIDADE_PICTURE_PLUGIN(create) ALIDADE_BUILD_PLUGIN_(nullptr, 0, nullptr, 0, create)

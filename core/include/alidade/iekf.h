@@ -39,7 +39,7 @@ struct IekfOptions : EkfOptions {
 /// it is that of the Ekf.
 class Iekf : public Ekf {
  public:
-  /// No considered blocks and roles, no role that is linearised at the measurement.
+  /// No considered blocks and roles, no role linearised at the measurement, no landmarks.
   static constexpr Support kSupport = {.from_measurement = true, .recovery = true};
 
   /// ContractViolation where `system` asks for more than kSupport, `jacobian` is not kLatest, or an

@@ -24,7 +24,7 @@ namespace alidade {
 class SquareRootEkf : public Ekf {
  public:
   /// No considered blocks and roles, none that start or are linearised at a measurement, no
-  /// recovery from a lock-out.
+  /// recovery from a lock-out, no landmarks.
   static constexpr Support kSupport = {};
 
   /// `options.lockout` counts as kNone. ContractViolation where `system` asks for more than

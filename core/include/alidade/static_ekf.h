@@ -75,7 +75,8 @@ class StaticEkf {
   Covariance covariance() const { return p_.template selfadjointView<Eigen::Lower>(); }
 
   /// Steps by dt_s seconds with the control inputs `u` (ambient), `const double*` each, of those
-  /// models that take one, in order. Not kOk, and nothing moved, where a model is not defined.
+  /// models that take one, in order. Not kOk, and nothing moved, where a model is not defined, and
+  /// kError where x' or P' is not finite.
   template <class... Inputs>
   __attribute__((flatten)) Status Predict(double dt_s, Inputs... u) {
     static_assert(sizeof...(Inputs) == InputsBefore(sizeof...(Motions)),
@@ -137,15 +138,20 @@ class StaticEkf {
                                             std::get<M>(transitions))) == Status::kOk) &&
                       ...);
     if (!all) return status;
-    std::copy_n(next, kAmbient, x_);
-    const auto normalise = [&](auto index) {
-      constexpr int b = decltype(index)::value;
-      Normalise<Space<b>>(x_ + AmbientOffset(b));
+    const auto step = [&] {
+      std::copy_n(next, kAmbient, x_);
+      const auto normalise = [&](auto index) {
+        constexpr int b = decltype(index)::value;
+        Normalise<Space<b>>(x_ + AmbientOffset(b));
+      };
+      detail::ForEach(normalise, Indices{});
+      (Propagate<TangentOffset(FirstBlock(M))>(std::get<M>(transitions)), ...);
     };
-    detail::ForEach(normalise, Indices{});
-    (Propagate<TangentOffset(FirstBlock(M))>(std::get<M>(transitions)), ...);
-    return Status::kOk;
+    return Try(step) ? Status::kOk : Status::kError;
   }
+  /// Makes a change of x and P; false, and both as they were, where what it leaves is not finite.
+  template <class Change>
+  bool Try(const Change& change);
   template <std::size_t M, int N>
   Status StepOne(double dt_s, const double* u,
                  double* next,  // NOLINT(readability-non-const-parameter): y points into it

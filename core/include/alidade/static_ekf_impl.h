@@ -14,6 +14,24 @@ namespace alidade {
 #define ALIDADE_UNROLL _Pragma("GCC unroll 16")
 
 template <class... Motions>
+template <class Change>
+bool StaticEkf<Motions...>::Try(const Change& change) {
+  double x[kAmbient];
+  std::copy_n(x_, kAmbient, x);
+  const Covariance p = p_;
+  change();
+  double sum = 0.0;  // 0 times what is not finite is not a number
+  ALIDADE_UNROLL for (int i = 0; i < kAmbient; ++i) sum += 0.0 * x_[i];
+  ALIDADE_UNROLL for (int i = 0; i < kTangent; ++i) {
+    ALIDADE_UNROLL for (int j = 0; j <= i; ++j) sum += 0.0 * p_(i, j);
+  }
+  if (sum == 0.0) return true;
+  std::copy_n(x, kAmbient, x_);
+  p_ = p;
+  return false;
+}
+
+template <class... Motions>
 template <int O, int N>
 void StaticEkf<Motions...>::Propagate(const Transition<N>& t) {
   double fp[N][kTangent];
@@ -110,15 +128,17 @@ StaticOutcome StaticEkf<Motions...>::Correct(const Eigen::Matrix<double, kTangen
     k = llt.solve(pht.transpose()).transpose();
   }
   const Eigen::Matrix<double, kTangent, 1> dx = k.lazyProduct(r);
-  ALIDADE_UNROLL for (int i = 0; i < kTangent; ++i) {
-    ALIDADE_UNROLL for (int j = 0; j <= i; ++j) {
-      double sum = k(i, 0) * pht(j, 0);
-      ALIDADE_UNROLL for (int c = 1; c < M; ++c) sum += k(i, c) * pht(j, c);
-      p_(i, j) -= sum;
+  const auto correct = [&] {
+    ALIDADE_UNROLL for (int i = 0; i < kTangent; ++i) {
+      ALIDADE_UNROLL for (int j = 0; j <= i; ++j) {
+        double sum = k(i, 0) * pht(j, 0);
+        ALIDADE_UNROLL for (int c = 1; c < M; ++c) sum += k(i, c) * pht(j, c);
+        p_(i, j) -= sum;
+      }
     }
-  }
-  Move(dx.data());
-  return StaticOutcome::kAccepted;
+    Move(dx.data());
+  };
+  return Try(correct) ? StaticOutcome::kAccepted : StaticOutcome::kNotFinite;
 }
 
 #undef ALIDADE_UNROLL

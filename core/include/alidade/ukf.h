@@ -45,7 +45,7 @@ struct UkfOptions {
 class Ukf : public Ekf {
  public:
   /// No considered blocks and roles, none that start or are linearised at a measurement, no
-  /// recovery from a lock-out.
+  /// recovery from a lock-out, no landmarks.
   static constexpr Support kSupport = {};
 
   /// ContractViolation where `system` asks for more than kSupport or an option is out of its range.

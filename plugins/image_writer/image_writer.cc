@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "image_writer.h"
+
+#include <opencv2/core/utils/logger.hpp>
+
+#include "alidade/build_plugin.h"
+
+namespace alidade {
+namespace {
+
+std::unique_ptr<PictureWriter> Create(const PictureArguments& arguments) {
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  if (arguments.form == PictureArguments::Form::kVideo) {
+    return std::make_unique<VideoWriter>(arguments);
+  }
+  return std::make_unique<ImageWriter>(arguments);
+}
+
+}  // namespace
+}  // namespace alidade
+
+ALIDADE_PICTURE_PLUGIN(&alidade::Create)

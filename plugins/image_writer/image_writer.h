@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "alidade/error.h"
+#include "alidade/pictures.h"
+
+namespace alidade {
+
+/// The picture of one frame: on black a white disc of radius 4 px at each of the pixels (u, v),
+/// placed to 1/256 px, and the frame's number in dark grey at the lower left. The centre of the
+/// upper left pixel is (0, 0).
+inline cv::Mat Draw(std::int64_t number, const std::vector<std::array<double, 2>>& pixels,
+                    int width, int height) {
+  constexpr int kShift = 8, kRadius = 4;  // bits behind the point; px
+  constexpr double kOne = 1 << kShift, kMargin = kRadius + 1.0;
+  const cv::Scalar white(255, 255, 255), grey(50, 50, 50);
+  cv::Mat picture(height, width, CV_8UC3, cv::Scalar());
+  cv::putText(picture, std::to_string(number), {4, height - 5}, cv::FONT_HERSHEY_PLAIN, 1.0, grey);
+  for (const auto& [u, v] : pixels) {
+    const bool seen = u > -kMargin && u < width + kMargin && v > -kMargin && v < height + kMargin;
+    if (!seen) continue;
+    const cv::Point centre(cvRound(u * kOne), cvRound(v * kOne));
+    cv::circle(picture, centre, kRadius << kShift, white, cv::FILLED, cv::LINE_AA, kShift);
+  }
+  return picture;
+}
+
+/// One PNG for each frame, `000000.png` and so on.
+class ImageWriter : public PictureWriter {
+ public:
+  explicit ImageWriter(PictureArguments arguments) : to_(std::move(arguments)) {}
+
+  void Add(std::int64_t number, Stamp /*stamp*/,
+           const std::vector<std::array<double, 2>>& pixels) override {
+    std::vector<unsigned char> bytes;
+    cv::imencode(".png", Draw(number, pixels, to_.width, to_.height), bytes);
+    char name[32];
+    std::snprintf(name, sizeof name, "%06lld.png", static_cast<long long>(number));
+    std::ofstream file(to_.path / name, std::ios::binary);
+    file.write(reinterpret_cast<const char*>(bytes.data()),
+               static_cast<std::streamsize>(bytes.size()));
+    file.close();
+    if (file) return;
+    throw Error(ExitCode::kIo, ErrorLine({to_.shown + '/' + name}, {}, "cannot be written"));
+  }
+  void Close() override {}
+
+ private:
+  PictureArguments to_;
+};
+
+/// A video, MJPG in AVI, of as many frames a second as the first two are apart, to whole numbers
+/// from 1; of a single frame 30.
+class VideoWriter : public PictureWriter {
+ public:
+  explicit VideoWriter(PictureArguments arguments) : to_(std::move(arguments)) {}
+
+  void Add(std::int64_t number, Stamp stamp,
+           const std::vector<std::array<double, 2>>& pixels) override {
+    cv::Mat picture = Draw(number, pixels, to_.width, to_.height);
+    if (count_++ == 0) {
+      first_ = picture;
+      first_stamp_ = stamp;
+      return;
+    }
+    if (!video_.isOpened()) Open(std::round(1.0 / Seconds(stamp - first_stamp_)));
+    video_.write(picture);
+  }
+
+  /// The writer of OpenCV does not tell of a full disk; the index, which is written last, does.
+  void Close() override {
+    constexpr double kRateOfOne = 30.0;
+    if (count_ == 0) return;
+    if (!video_.isOpened()) Open(kRateOfOne);
+    video_.release();
+    const cv::VideoCapture written(to_.path.string(), cv::CAP_OPENCV_MJPEG);
+    if (written.isOpened() && written.get(cv::CAP_PROP_FRAME_COUNT) == count_) return;
+    throw Error(ExitCode::kIo, ErrorLine({to_.shown}, {}, "cannot be written in full"));
+  }
+
+ private:
+  void Open(double rate_hz) {
+    const int fourcc = cv::VideoWriter::fourcc('M', 'J', 'P', 'G');
+    video_.open(to_.path.string(), cv::CAP_OPENCV_MJPEG, fourcc, std::max(rate_hz, 1.0),
+                {to_.width, to_.height});
+    if (!video_.isOpened()) {
+      throw Error(ExitCode::kCannotCreate, ErrorLine({to_.shown}, {}, "cannot be created"));
+    }
+    video_.write(first_);
+  }
+
+  PictureArguments to_;
+  cv::VideoWriter video_;
+  cv::Mat first_;
+  Stamp first_stamp_ = 0;
+  int count_ = 0;
+};
+
+}  // namespace alidade

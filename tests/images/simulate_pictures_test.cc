@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <cmath>
+#include <map>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+#include <sstream>
+
+#include "support/program.h"
+
+namespace alidade {
+namespace {
+
+using testing::Contains;
+using testing::Outcome;
+
+// A lens that bends the corners inwards by about 40 px.
+const std::string kScene = R"(alidade: 1
+camera: {model: radtan, width: 320, height: 240, fx: 260, fy: 265, cx: 160.5, cy: 119,
+         k1: -0.25, k2: 0.05, p1: 0.001, p2: -0.002}
+source:
+  type: scene
+  seed: 5
+  frames: 6
+  rate_hz: 20
+  noise_px: 0.7
+  known: {count: 3}
+  points: {box: {min: [-3, -2, 2], max: [3, 2, 6]}, count: 30}
+  trajectory: {look_at: [{position: [-0.5, 0, 0], target: [0, 0, 4]},
+                         {position: [0.5, 0, 0], target: [0, 0, 4]}]}
+)";
+
+using Pixel = std::array<double, 2>;
+using Pixels = std::map<int, std::map<int, Pixel>>;  ///< by frame and feature
+
+class SimulatePictures : public testing::ProgramTest {
+ protected:
+  Outcome Simulate(const std::string& config, testing::Arguments more) {
+    Write("scene.yaml", config);
+    more.insert(more.begin(), {"simulate", "scene.yaml", "-o", "data"});
+    return Call(more);
+  }
+
+  /// Adds the pixels in a file of rows frame,feature,dim,value.
+  void Read(const std::string& name, Pixels& pixels) const {
+    std::istringstream rows(ProgramTest::Read(name));
+    std::string row;
+    std::getline(rows, row);
+    while (std::getline(rows, row)) {
+      int frame = 0, feature = 0, dim = 0;
+      double value = 0.0;
+      ASSERT_EQ(std::sscanf(row.c_str(), "%d,%d,%d,%lf", &frame, &feature, &dim, &value), 4);
+      if (dim < 2) pixels[frame][feature][static_cast<std::size_t>(dim)] = value;
+    }
+  }
+  Pixels AllPixels() const {
+    Pixels pixels;
+    Read("data/tracks.csv", pixels);
+    Read("data/known.csv", pixels);
+    return pixels;
+  }
+  cv::Mat Image(const std::string& name) const {
+    return cv::imread((folder_ / name).string(), cv::IMREAD_GRAYSCALE);
+  }
+
+  std::vector<cv::Mat> Frames(const std::string& name) const {
+    cv::VideoCapture video((folder_ / name).string(), cv::CAP_OPENCV_MJPEG);
+    std::vector<cv::Mat> frames;
+    for (cv::Mat frame; video.read(frame);) {
+      frames.emplace_back();
+      cv::cvtColor(frame, frames.back(), cv::COLOR_BGR2GRAY);
+    }
+    return frames;
+  }
+};
+
+constexpr double kRadius = 4.0, kDark = 60.0;  // px; brighter than the frame's number
+
+/// How far the discs lie from `points`, those that touch another or the border apart: the largest
+/// distance of a centroid from its point, px. Counts those that were looked at.
+double LargestError(const cv::Mat& image, const std::map<int, Pixel>& points, int& count) {
+  double largest = 0.0;
+  for (const auto& [feature, p] : points) {
+    constexpr double kReach = kRadius + 3.0;
+    bool alone = p[0] > kReach && p[1] > kReach && p[0] < image.cols - 1 - kReach &&
+                 p[1] < image.rows - 1 - kReach;
+    for (const auto& [other, q] : points) {
+      alone &= other == feature || std::hypot(p[0] - q[0], p[1] - q[1]) > 2.0 * kReach;
+    }
+    if (!alone) continue;
+    double sum = 0.0, u = 0.0, v = 0.0;
+    for (int y = static_cast<int>(p[1] - kReach); y <= p[1] + kReach; ++y) {
+      for (int x = static_cast<int>(p[0] - kReach); x <= p[0] + kReach; ++x) {
+        const double bright = std::max(0.0, image.at<unsigned char>(y, x) - kDark);
+        sum += bright;
+        u += bright * x;
+        v += bright * y;
+      }
+    }
+    ++count;
+    EXPECT_GT(sum, 0.0) << "feature " << feature;
+    if (sum > 0.0) largest = std::max(largest, std::hypot(u / sum - p[0], v / sum - p[1]));
+  }
+  return largest;
+}
+
+TEST_F(SimulatePictures, DiscsLieWhereTheTracksSay) {
+  const Outcome made = Simulate(kScene, {"--video", "video.avi", "--images", "images"});
+  ASSERT_EQ(made.code, 0) << made.err;
+  EXPECT_TRUE(Contains(made.out, "data/video.avi\n")) << made.out;
+  EXPECT_TRUE(Contains(made.out, "data/images\n")) << made.out;
+  const Pixels pixels = AllPixels();
+  const std::vector<cv::Mat> frames = Frames("data/video.avi");
+  ASSERT_EQ(frames.size(), 6u);
+  EXPECT_FALSE(Exists("data/images/000006.png"));
+  int seen = 0, seen_again = 0;
+  for (int k = 0; k < 6; ++k) {
+    const cv::Mat image = Image("data/images/00000" + std::to_string(k) + ".png");
+    ASSERT_EQ(image.size(), cv::Size(320, 240));
+    ASSERT_EQ(frames[static_cast<std::size_t>(k)].size(), cv::Size(320, 240));
+    // The smoothed discs of OpenCV lie within 0.06 px of their centres at any of 16 x 16 places in a
+    // pixel; the losses of JPEG come on top.
+    EXPECT_LT(LargestError(image, pixels.at(k), seen), 0.1) << "frame " << k;
+    const cv::Mat& frame = frames[static_cast<std::size_t>(k)];
+    EXPECT_LT(LargestError(frame, pixels.at(k), seen_again), 0.5) << "frame " << k;
+  }
+  EXPECT_GT(seen, 60);
+  EXPECT_EQ(seen, seen_again);
+}
+
+TEST_F(SimulatePictures, AreAllAlikeAndOfNothingElse) {
+  ASSERT_EQ(Simulate(kScene, {"--images", "images"}).code, 0);
+  const Pixels pixels = AllPixels();
+  const cv::Mat image = Image("data/images/000000.png");
+  // All discs together: between none and every one of their area, which is pi r^2 of 255 each.
+  const double total = cv::sum(cv::max(image, static_cast<int>(kDark)) - kDark)[0];
+  const double one = M_PI * (kRadius + 0.5) * (kRadius + 0.5) * (255.0 - kDark);
+  const auto count = static_cast<double>(pixels.at(0).size());
+  EXPECT_LT(total, 1.1 * count * one);
+  EXPECT_GT(total, 0.7 * count * one);  // some touch, or are cut by the border
+}
+
+TEST_F(SimulatePictures, TheVideoHasTheRateOfTheSource) {
+  ASSERT_EQ(Simulate(kScene, {"--video", "film/of scene.avi"}).code, 0);
+  const cv::VideoCapture video((folder_ / "data/film/of scene.avi").string(), cv::CAP_OPENCV_MJPEG);
+  EXPECT_EQ(video.get(cv::CAP_PROP_FPS), 20.0);
+  EXPECT_TRUE(Contains(ProgramTest::Read("data/files.txt"), "film/of scene.avi\n"));
+}
+
+TEST_F(SimulatePictures, OneFrameIsAVideoToo) {
+  ASSERT_EQ(Simulate(kScene, {"--video", "v.avi", "--set", "source.frames=1"}).code, 0);
+  EXPECT_EQ(Frames("data/v.avi").size(), 1u);
+}
+
+TEST_F(SimulatePictures, RefusesWhatItCannotWrite) {
+  const Outcome other = Simulate(kScene, {"--video", "video.mp4"});
+  EXPECT_EQ(other.code, 2);
+  EXPECT_TRUE(Contains(other.err, "expected a name like video.avi")) << other.err;
+  const Outcome outside = Simulate(kScene, {"--images", "../images"});
+  EXPECT_EQ(outside.code, 77) << outside.err;
+  EXPECT_TRUE(Contains(outside.err, "--images")) << outside.err;
+  const Outcome blind = Call({"simulate", "config.yaml", "-o", "data", "--video", "v.avi"});
+  EXPECT_EQ(blind.code, 78);
+  EXPECT_TRUE(Contains(blind.err, "camera: missing key, needed by pictures of a simulation"))
+      << blind.err;
+  EXPECT_FALSE(Exists("data"));
+}
+
+// Blocks are of 512 bytes: all other files fit into 16 of them, and an image is larger than 2.
+TEST_F(SimulatePictures, AFullDiskIsAnError) {
+  before_ = "ulimit -f 16";
+  const Outcome video = Simulate(kScene, {"--video", "v.avi"});
+  EXPECT_EQ(video.code, 74) << video.err;
+  EXPECT_TRUE(Contains(video.err, "data/v.avi: cannot be written in full")) << video.err;
+  before_ = "ulimit -f 2";
+  const Outcome images = Simulate(kScene, {"--images", "images"});
+  EXPECT_EQ(images.code, 74) << images.err;
+  EXPECT_TRUE(Contains(images.err, "data/images/000000.png: cannot be written")) << images.err;
+  EXPECT_FALSE(Exists("data"));
+}
+
+}  // namespace
+}  // namespace alidade

@@ -85,5 +85,35 @@ TEST_F(LongRun, MemoryDoesNotGrowAsLandmarksComeAndGo) {
   EXPECT_GT(counts.At("landmarks.deleted").Number(), 50);
 }
 
+// A frame is taken once the first row of the next has come, whether or not the pipe goes on.
+TEST_F(LongRun, APipeIsTakenAsItGrows) {
+  ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  const int pipe = ::open((folder_ / "pipe").c_str(), O_RDWR | O_CLOEXEC);
+  const auto feed = [&](int frame) {
+    const std::string k = std::to_string(frame);
+    const std::string rows = k + ",1,0,320\n" + k + ",1,1,240\n";
+    ASSERT_EQ(::write(pipe, rows.data(), rows.size()), static_cast<ssize_t>(rows.size()));
+  };
+  feed(0);
+  const pid_t run = Start({"run", kBench + "stream.yaml", "--no-figures", "-o", "out", "--set",
+                           "source.path=" + (folder_ / "pipe").string()});
+  const std::string partial = ".out.partial-" + std::to_string(run) + "/ekf/estimates.csv";
+  ASSERT_TRUE(Eventually([&] { return Exists(partial); }));
+  constexpr int kFrames = 30;
+  for (int k = 1; k <= kFrames; ++k) {
+    feed(k);
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  ::kill(run, SIGINT);
+  // A signal just before it waits for data is seen with the next row.
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  feed(kFrames + 1);
+  const testing::Outcome stopped = Wait(run);
+  EXPECT_EQ(stopped.code, 75) << stopped.err;
+  EXPECT_GE(Json("out/run.json").root().At("frames").Number(), kFrames);
+  ::close(pipe);
+}
+
 }  // namespace
 }  // namespace alidade

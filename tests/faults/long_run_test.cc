@@ -2,8 +2,6 @@
 //
 // What a run holds in memory does not grow with its length. The configs are those of
 // bench/long_run.
-#include <sys/resource.h>
-
 #include "support/program.h"
 
 namespace alidade {
@@ -26,11 +24,20 @@ class LongRun : public testing::ProgramTest {
       arguments.insert(arguments.end(), {"--set", std::move(setting)});
     }
     const pid_t pid = Start(arguments);
-    int status = 0;
-    rusage usage{};
-    EXPECT_EQ(::wait4(pid, &status, 0, &usage), pid);
-    EXPECT_EQ(status, 0) << Read("stderr");
-    return usage.ru_maxrss;
+    const std::string status = "/proc/" + std::to_string(pid) + "/status";
+    // Not of rusage, whose peak begins with that of this process.
+    long peak = 0;
+    siginfo_t ended{};
+    while (::waitid(P_PID, static_cast<id_t>(pid), &ended, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+           ended.si_pid == 0) {
+      const std::string text = testing::ReadText(status);
+      const std::size_t at = text.find("VmHWM:");
+      if (at != std::string::npos) peak = std::stol(text.substr(at + 6));
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    const testing::Outcome outcome = Wait(pid);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return peak;
   }
 };
 

@@ -214,8 +214,10 @@ void FrameOrder::Replay(std::size_t from, bool is_newest) {
 /// The frame as an estimator sees it that uses what estimator `by` accepted.
 Frame FrameOrder::Accepted(const Held& held, int by) const {
   const auto index = static_cast<std::size_t>(by);
-  return AcceptedOf(held.frame, experiment_.source->streams(), experiment_.estimators[index].system,
-                    held.processed[index].report);
+  const NamedEstimator& filter = experiment_.estimators[index];
+  const bool follows = filter.accepted_by >= 0;
+  return AcceptedOf(follows ? Accepted(held, filter.accepted_by) : held.frame,
+                    experiment_.source->streams(), filter.system, held.processed[index].report);
 }
 
 Processed FrameOrder::Process(Estimator& estimator, const Frame& frame) const {

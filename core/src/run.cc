@@ -175,9 +175,13 @@ bool Advance(Running& one, const Seen& seen, const Frame& visible,
   return !policy;
 }
 
-/// The measurements of the frame that `filter`, which has had it, accepted.
-Frame AcceptedOf(const Running& filter, const Frame& frame, const Source& source) {
-  return internal::AcceptedOf(frame, source.streams(), filter.named.system,
+/// The measurements of the frame that filter `by`, which has had what it sees of it, accepted.
+Frame AcceptedBy(int by, const std::vector<Running>& running, const Frame& frame,
+                 const Source& source) {
+  const Running& filter = running[static_cast<std::size_t>(by)];
+  const int before = filter.named.accepted_by;
+  return internal::AcceptedOf(before < 0 ? frame : AcceptedBy(before, running, frame, source),
+                              source.streams(), filter.named.system,
                               filter.last ? *filter.last : UpdateReport());
 }
 
@@ -220,10 +224,7 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
     for (std::size_t e = 0; e < running.size(); ++e) {
       const int by = running[e].named.accepted_by;
       Frame accepted;
-      if (by >= 0) {
-        accepted =
-            AcceptedOf(running[static_cast<std::size_t>(by)], seen.frame, *experiment.source);
-      }
+      if (by >= 0) accepted = AcceptedBy(by, running, seen.frame, *experiment.source);
       go_on = Advance(running[e], seen, by < 0 ? seen.frame : accepted, frames.processed(e),
                       options, result) &&
               go_on;

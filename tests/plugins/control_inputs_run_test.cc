@@ -116,6 +116,34 @@ TEST_F(DrivenTest, EveryEstimatorIsDrivenAsTheKalmanFilterWrittenOut) {
   }
 }
 
+// No sensor measures the odometry: a filter neither accepts nor refuses it.
+TEST_F(DrivenTest, WhatAFilterAcceptedComesWithAllInputs) {
+  const RunResult run =
+      RunInto(Read({{"estimators",
+                     "{ekf: {type: ekf}, same: {type: ekf, use: {accepted_by: ekf}}, batch: {type: "
+                     "ceres_batch, use: {accepted_by: ekf}}}"}}),
+              folder_ / "run");
+  ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
+  for (const EstimatorResult& one : run.estimators) {
+    const std::vector<Gaussian> expected = WrittenOut(one.name == "batch");
+    const auto lines = testing::Lines(folder_ / "run" / one.name / "estimates.csv");
+    ASSERT_EQ(lines.size(), expected.size() + 1) << one.name;
+    for (std::size_t k = 0; k < expected.size(); ++k) {
+      EXPECT_NEAR(std::stod(testing::Cells(lines[k + 1])[1]), expected[k].x, 1e-9) << one.name << k;
+    }
+    EXPECT_EQ(one.counts.at("inputs:car"), 6) << one.name;
+  }
+}
+
+TEST_F(DrivenTest, AStreamThatTheLenderMeasuresIsNoInputOfTheFollower) {
+  EXPECT_EQ(Refusal("estimators",
+                    "{ekf: {type: ekf}, same: {type: ekf, use: {accepted_by: ekf}, overrides: "
+                    "{state: {car: {input: {stream: gps}}}}}}"),
+            "--set estimators.same.use.accepted_by: stream 'gps' is the control input of 'car' and "
+            "goes to sensor 'gps' of 'ekf': what that does not accept would be missing as an "
+            "input; expected a filter without a sensor on that stream");
+}
+
 TEST_F(DrivenTest, ASensorOfTheNameOfAnEntryIsStillToldUnused) {
   const RunResult run =
       RunInto(Read({{"sensors",

@@ -2,8 +2,11 @@
 #include "reorder.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
+#include <numeric>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 
 #include "accepted.h"
@@ -174,12 +177,18 @@ void FrameOrder::Merge(Held& held, Held&& received) const {
     const auto stream = static_cast<std::size_t>(one.stream);
     return std::tuple(stream < ranks.size() ? ranks[stream] : 0, one.stream, one.landmark);
   };
-  for (std::size_t i = 0; i < part.measurements.size(); ++i) {
-    Measurement& m = part.measurements[i];
-    const auto at = std::ranges::upper_bound(whole.measurements, key(m), {}, key);
-    held.places.insert(held.places.begin() + (at - whole.measurements.begin()), received.places[i]);
-    whole.measurements.insert(at, std::move(m));
-  }
+  std::ranges::move(part.measurements, std::back_inserter(whole.measurements));
+  held.places.insert(held.places.end(), received.places.begin(), received.places.end());
+  std::vector<std::size_t> order(whole.measurements.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return key(whole.measurements[i]); });
+  const auto sorted = [&](auto& list) {
+    std::remove_reference_t<decltype(list)> ordered;
+    for (const std::size_t i : order) ordered.push_back(std::move(list[i]));
+    list = std::move(ordered);
+  };
+  sorted(whole.measurements);
+  sorted(held.places);
   whole.truth.resize(std::max(whole.truth.size(), part.truth.size()));
   for (std::size_t t = 0; t < part.truth.size(); ++t) {
     if (whole.truth[t].empty()) whole.truth[t] = std::move(part.truth[t]);

@@ -8,10 +8,9 @@
 #include "alidade/recorder.h"
 #include "map_metrics.h"
 #include "number_text.h"
-#include "observability.h"
 #include "reference.h"
 #include "reorder.h"
-#include "text_table.h"
+#include "running.h"
 
 namespace alidade {
 namespace {
@@ -59,82 +58,8 @@ bool InSegment(const Segment& segment, const Frame& frame) {
   return std::any_of(frame.measurements.begin(), frame.measurements.end(), seen) == segment.with;
 }
 
+using internal::Running;
 using internal::Seen;
-
-/// One estimator on its way through a run.
-struct Running {
-  NamedEstimator& named;
-  int index = 0;  ///< in the experiment
-  Metrics metrics;
-  EstimatorResult result;
-  bool ended = false;                  ///< it had nothing left to go on with
-  bool diverged = false;               ///< by a frame that was taken; not of offline estimators
-  bool took = false;                   ///< an estimate, so that its counts tell of the measurements
-  const UpdateReport* last = nullptr;  ///< report of the last frame; null: it had ended before
-  bool waits = false;                  ///< metrics need the estimates of the reference
-  std::vector<internal::Estimate> estimates = {};  ///< where it waits
-
-  /// Puts the estimate of frame k into metrics and record.
-  void Take(std::size_t k, const Seen& seen, const State& state, const UpdateReport& report,
-            Recorder* recorder) {
-    took = true;
-    if (!waits) {
-      metrics.Add(seen.frame, seen.in_segment, state, report);
-    } else {
-      metrics.AddReport(seen.in_segment, report);
-      if (!report.stale) estimates.push_back({k, state});
-    }
-    if (recorder != nullptr) recorder->AddEstimate(index, seen.frame, state, report);
-  }
-  void Note(const std::vector<Event>& events) {
-    result.events.insert(result.events.end(), events.begin(), events.end());
-  }
-};
-
-EstimatorResult Begin(const NamedEstimator& named) {
-  EstimatorResult result;
-  result.name = named.name;
-  result.unobservable = UnobservableDirections(named.system);
-  if (!internal::ObservabilityIsTold(named.system)) {
-    result.events.push_back({kNoStamp, "observability",
-                             "not looked into: the state has more than " +
-                                 std::to_string(internal::kMostObserved) + " elements"});
-  }
-  for (const auto& direction : result.unobservable) {
-    result.events.push_back({kNoStamp, "unobservable",
-                             "no sensor of this estimator tells " +
-                                 internal::Join(direction, " and ") +
-                                 (direction.size() > 1 ? " apart" : "")});
-  }
-  return result;
-}
-
-/// An event `unused` for each sensor of which the whole run used no measurement; `accepted_by`
-/// names the filter that chose them, or is empty.
-void NoteUnused(const System& system, const std::string& accepted_by, EstimatorResult& result) {
-  for (const SensorBinding& sensor : system.sensors) {
-    std::int64_t used = 0, all = 0;
-    std::vector<std::string> others;
-    for (const auto& [key, count] : result.counts) {
-      const std::size_t colon = key.find(':');
-      const std::string outcome = key.substr(0, colon);
-      if (key.substr(colon + 1) != sensor.name || outcome == "inputs") continue;
-      all += count;
-      if (outcome == ToString(Outcome::kAccepted) || outcome == ToString(Outcome::kInitialised)) {
-        used += count;
-      } else {
-        others.push_back(std::to_string(count) + ' ' + outcome);
-      }
-    }
-    if (used > 0) continue;
-    const std::string of_all =
-        all > 0 ? " used none of " + std::to_string(all) +
-                      " measurements: " + internal::Join(others, ", ")
-                : ": stream '" + sensor.stream + "' had no measurement" +
-                      (accepted_by.empty() ? "" : " that " + accepted_by + " accepted");
-    result.events.push_back({kNoStamp, "unused", "sensor '" + sensor.name + "'" + of_all});
-  }
-}
 
 void Fail(RunResult& result, ExitCode code, std::string reason) {
   result.status = RunStatus::kFailed;
@@ -330,7 +255,7 @@ std::vector<Running> BeginAll(Experiment& experiment) {
     const int index = static_cast<int>(running.size());
     Metrics metrics(named, index == reference ? std::vector<StreamInfo>() : truths,
                     experiment.segments);
-    running.push_back({named, index, std::move(metrics), Begin(named)});
+    running.push_back({named, index, std::move(metrics), internal::Begin(named)});
     running.back().waits = reference >= 0;
   }
   return running;
@@ -380,12 +305,14 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
   for (Running& one : running) {
     Measure(one, result);
     one.result.counts = one.metrics.counts();
+    if (one.stale_inputs > 0) one.result.counts["input_stale"] = one.stale_inputs;
     one.result.units = one.metrics.units();
     internal::NoteMap(one.named, *experiment.source, one.result);
     if (one.took && !one.named.estimator->failed()) {
       const int by = one.named.accepted_by;
-      NoteUnused(one.named.system, by < 0 ? "" : running[static_cast<std::size_t>(by)].named.name,
-                 one.result);
+      internal::NoteUnused(one.named.system,
+                           by < 0 ? "" : running[static_cast<std::size_t>(by)].named.name,
+                           one.result);
     }
     one.Note(one.metrics.events());
     const Estimator& estimator = *one.named.estimator;

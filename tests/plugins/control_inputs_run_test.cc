@@ -103,7 +103,8 @@ TEST_F(DrivenTest, EveryEstimatorIsDrivenAsTheKalmanFilterWrittenOut) {
       EXPECT_EQ(testing::Lines(folder / one.name / "innovations.csv").size(), 8u) << one.name;
       EXPECT_EQ(one.counts.at("inputs:car"), 6) << one.name;
       EXPECT_EQ(one.counts.at("accepted:gps"), 7) << one.name;
-      EXPECT_EQ(one.counts.size(), 2u) << one.name;
+      EXPECT_EQ(one.counts.at("input_stale"), 2) << one.name;
+      EXPECT_EQ(one.counts.size(), 3u) << one.name;
       const auto count = [&](const char* kind) {
         return std::ranges::count(one.events, kind, &Event::kind);
       };

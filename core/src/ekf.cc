@@ -101,7 +101,7 @@ void Ekf::ProcessFully(const Frame& frame) {
     Start(system_.start_s ? StampFromSeconds(*system_.start_s) : frame.stamp);
   }
   report_.stale = frame.stamp < stamp_;
-  if (!report_.stale) StepTo(frame.stamp);
+  if (!report_.stale && !failed_) StepTo(frame.stamp);
   for (Event& event : report_.events) event.stamp = frame.stamp;  // also where it stays behind
   Collect(frame);
   if (report_.stale || failed_) {

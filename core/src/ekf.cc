@@ -19,9 +19,6 @@ namespace {
 /// Six significant digits.
 std::string Rounded(double value) { return internal::RoundedText(value, 6); }
 
-/// `1.500000 s`
-std::string InSeconds(Stamp stamp) { return internal::FixedText(Seconds(stamp), 6) + " s"; }
-
 }  // namespace
 
 Ekf::~Ekf() = default;
@@ -334,11 +331,12 @@ void Ekf::GiveUp(const char* kind, const std::string& what) {
   failed_ = true;
   std::vector<BlockId> all(system_.layout.blocks().size());
   std::iota(all.begin(), all.end(), 0);
-  std::string text = what + "; last good state at " + InSeconds(stamp_) + ": " + Describe(all);
+  std::string text =
+      what + "; last good state at " + internal::SecondsText(stamp_) + ": " + Describe(all);
   if (last_used_.sensor >= 0) {
     text += "; last measurement used: sensor '" +
             system_.sensors[static_cast<std::size_t>(last_used_.sensor)].name + "' at " +
-            InSeconds(last_used_.stamp) + ", z =";
+            internal::SecondsText(last_used_.stamp) + ", z =";
     for (const double z : last_used_.z) text += ' ' + internal::RoundedText(z, 6);
   }
   NoteDivergence(kind, text);

@@ -23,8 +23,6 @@ Stamp Lag(Stamp newest, Stamp stamp) {
   return __builtin_sub_overflow(newest, stamp, &lag) ? std::numeric_limits<Stamp>::max() : lag;
 }
 
-std::string InSeconds(Stamp stamp) { return FixedText(Seconds(stamp), 6) + " s"; }
-
 /// ` in FILE:LINE`, where the source knows.
 std::string In(const Place& place) {
   const std::string text = ToString(Place{place.file, place.line, 0});
@@ -92,9 +90,9 @@ bool FrameOrder::Accept(const Frame& frame) {
   if (!IsTooLate(frame.stamp)) return true;
   ++arrivals_.dropped;
   events_.push_back({frame.stamp, "late",
-                     "a frame " + Names(frame) + "came " + InSeconds(lag) +
+                     "a frame " + Names(frame) + "came " + SecondsText(lag) +
                          " behind the newest, beyond the window of " +
-                         InSeconds(*experiment_.time.window) + ": dropped"});
+                         SecondsText(*experiment_.time.window) + ": dropped"});
   return false;
 }
 
@@ -149,7 +147,7 @@ void FrameOrder::CheckMerge(const Held& held, const Frame& part) const {
   const auto fail = [&](const std::string& what, const std::string& expected) {
     throw Error(
         ExitCode::kBadData,
-        ErrorLine(source.place(), {}, what + " at t = " + InSeconds(whole.stamp), expected));
+        ErrorLine(source.place(), {}, what + " at t = " + SecondsText(whole.stamp), expected));
   };
   for (const Measurement& m : part.measurements) {
     const auto same = [&](const Measurement& other) {

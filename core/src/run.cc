@@ -16,9 +16,7 @@ namespace alidade {
 namespace {
 
 /// ` at t = 0.033000 s`
-std::string At(const Frame& frame) {
-  return " at t = " + internal::FixedText(Seconds(frame.stamp), 6) + " s";
-}
+std::string At(const Frame& frame) { return " at t = " + internal::SecondsText(frame.stamp); }
 
 [[noreturn]] void Refuse(const Frame& frame, const std::string& what) {
   throw ContractViolation("the source gives " + what + At(frame));

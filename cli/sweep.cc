@@ -52,15 +52,18 @@ void CheckShares(const SweepOptions& options) {
                                             " runs; expected a run for each share");
 }
 
-/// Tells of the runs that failed, the first few in full; true where there are any.
-bool ReportFailures(const SweepResult& result) {
+/// Tells of the runs that failed, the first few in full, each after `where`; true where there are
+/// any.
+bool ReportFailures(const SweepResult& result, const std::string& where) {
   constexpr int kShown = 5;
   int failed = 0;
   for (const SweepRun& run : result.done) {
     if (run.status != RunStatus::kFailed) continue;
-    if (++failed <= kShown) PrintErrors("seed " + std::to_string(run.seed) + ": " + run.reason);
+    if (++failed <= kShown)
+      PrintErrors(where + "seed " + std::to_string(run.seed) + ": " + run.reason);
   }
-  if (failed > kShown) PrintErrors(std::to_string(failed) + " runs failed: see failures.csv");
+  if (failed > kShown)
+    PrintErrors(where + std::to_string(failed) + " runs failed: see failures.csv");
   return failed > 0;
 }
 
@@ -90,7 +93,7 @@ ExitCode SweepSeeds(const Task& task) {
   SweepFolder folder(task.path, task.arguments.force);
   const SweepResult result = Sweep(task.config, task.host, task.options);
   task.progress.Clear();
-  const bool failed = ReportFailures(result);
+  const bool failed = ReportFailures(result, "");
   if (result.stopped) TellStopped(result.done.size(), result.runs);
   folder.Write(result, task.config);
   TellWritten(task, SweepTable(result), {"table.md", "sweep.json", "runs.csv"});
@@ -105,9 +108,10 @@ ExitCode SweepValues(const Task& task) {
   task.progress.Clear();
   bool failed = false;
   std::size_t done = 0;
-  for (const SweepResult& result : sweep.results) {
-    failed = ReportFailures(result) || failed;
-    done += result.done.size();
+  for (std::size_t v = 0; v < sweep.results.size(); ++v) {
+    const std::string where = variation.key + '=' + variation.values[v] + ", ";
+    failed = ReportFailures(sweep.results[v], where) || failed;
+    done += sweep.results[v].done.size();
   }
   const auto values = static_cast<std::int64_t>(variation.values.size());
   if (sweep.stopped()) TellStopped(done, values * sweep.results.front().runs);

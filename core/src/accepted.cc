@@ -2,6 +2,7 @@
 #include "accepted.h"
 
 #include <algorithm>
+#include <optional>
 
 namespace alidade::internal {
 namespace {
@@ -21,7 +22,7 @@ std::vector<bool> UsedOf(int sensor, const UpdateReport& report) {
 Frame AcceptedOf(const Frame& frame, const std::vector<StreamInfo>& streams, const System& system,
                  const UpdateReport& report) {
   Frame accepted{frame.stamp, {}, frame.truth};
-  std::vector<std::vector<bool>> used(streams.size());
+  std::vector<std::optional<std::vector<bool>>> used(streams.size());  // none: of no sensor
   for (int sensor = 0; sensor < std::ssize(system.sensors); ++sensor) {
     const std::string& stream = system.sensors[static_cast<std::size_t>(sensor)].stream;
     const auto found = std::ranges::find(streams, stream, &StreamInfo::name);
@@ -32,7 +33,8 @@ Frame AcceptedOf(const Frame& frame, const std::vector<StreamInfo>& streams, con
   for (const Measurement& m : frame.measurements) {
     const auto stream = static_cast<std::size_t>(m.stream);
     const std::size_t at = next[stream]++;
-    if (at < used[stream].size() && used[stream][at]) accepted.measurements.push_back(m);
+    const bool is_used = !used[stream] || (at < used[stream]->size() && (*used[stream])[at]);
+    if (is_used) accepted.measurements.push_back(m);
   }
   return accepted;
 }

@@ -19,9 +19,6 @@ namespace {
 /// Six significant digits.
 std::string Rounded(double value) { return internal::RoundedText(value, 6); }
 
-/// `1.500000 s`
-std::string InSeconds(Stamp stamp) { return internal::FixedText(Seconds(stamp), 6) + " s"; }
-
 }  // namespace
 
 Ekf::~Ekf() = default;
@@ -101,7 +98,7 @@ void Ekf::ProcessFully(const Frame& frame) {
     Start(system_.start_s ? StampFromSeconds(*system_.start_s) : frame.stamp);
   }
   report_.stale = frame.stamp < stamp_;
-  if (!report_.stale) StepTo(frame.stamp);
+  if (!report_.stale && !failed_) StepTo(frame.stamp);
   for (Event& event : report_.events) event.stamp = frame.stamp;  // also where it stays behind
   Collect(frame);
   if (report_.stale || failed_) {
@@ -334,11 +331,12 @@ void Ekf::GiveUp(const char* kind, const std::string& what) {
   failed_ = true;
   std::vector<BlockId> all(system_.layout.blocks().size());
   std::iota(all.begin(), all.end(), 0);
-  std::string text = what + "; last good state at " + InSeconds(stamp_) + ": " + Describe(all);
+  std::string text =
+      what + "; last good state at " + internal::SecondsText(stamp_) + ": " + Describe(all);
   if (last_used_.sensor >= 0) {
     text += "; last measurement used: sensor '" +
             system_.sensors[static_cast<std::size_t>(last_used_.sensor)].name + "' at " +
-            InSeconds(last_used_.stamp) + ", z =";
+            internal::SecondsText(last_used_.stamp) + ", z =";
     for (const double z : last_used_.z) text += ' ' + internal::RoundedText(z, 6);
   }
   NoteDivergence(kind, text);

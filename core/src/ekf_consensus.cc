@@ -7,18 +7,9 @@
 
 #include "alidade/random.h"
 #include "ekf_landmarks.h"
+#include "small_kernels.h"
 
 namespace alidade {
-namespace {
-
-/// r' A^-1 r, A m x m.
-double SquaredMahalanobis(const std::vector<double>& a, const std::vector<double>& r) {
-  const auto m = static_cast<Eigen::Index>(r.size());
-  const Eigen::LLT<Eigen::MatrixXd> llt(Eigen::Map<const Eigen::MatrixXd>(a.data(), m, m));
-  return llt.matrixL().solve(Eigen::Map<const Eigen::VectorXd>(r.data(), m)).squaredNorm();
-}
-
-}  // namespace
 
 bool Ekf::Landmarks::FuseByConsensus(std::span<Row* const> passed) {
   std::vector<Row*> matches, agreed, rest;
@@ -33,6 +24,7 @@ bool Ekf::Landmarks::FuseByConsensus(std::span<Row* const> passed) {
   }
   const auto apply = [this](const std::vector<Row*>& rows) {
     if (rows.empty()) return;
+    for (Row* const row : rows) ekf_.Weigh(*row);
     const Outcome outcome = ekf_.Apply(rows);
     for (const Row* const row : rows) ekf_.EntryOf(*row).outcome = outcome;
   };
@@ -98,7 +90,7 @@ void Ekf::Landmarks::SupportOf(std::size_t hypothesis, std::span<Row* const> mat
   const std::vector<double> before = values;
   std::ranges::copy(moved, values.begin());
   agrees.assign(matches.size(), 0);
-  std::vector<double> h, r;
+  std::vector<double> h, r, work;
   for (std::size_t i = 0; i < matches.size(); ++i) {
     const Row& row = *matches[i];
     const MeasurementReport& entry = ekf_.EntryOf(row);
@@ -107,8 +99,9 @@ void Ekf::Landmarks::SupportOf(std::size_t hypothesis, std::span<Row* const> mat
     r.resize(static_cast<std::size_t>(entry.dof));
     if (model.Predict(ekf_.PlanOf(row).roles.data(), h.data()) != Status::kOk) continue;
     model.measurement().geometry.Minus(entry.z.data(), h.data(), r.data());
-    agrees[i] =
-        SquaredMahalanobis(row.r, r) <= support_[static_cast<std::size_t>(row.sensor)] ? 1 : 0;
+    work.resize(r.size() * (r.size() + 1));
+    const double d2 = internal::SquaredMahalanobis(row.r.data(), r.data(), entry.dof, work.data());
+    agrees[i] = d2 <= support_[static_cast<std::size_t>(row.sensor)] ? 1 : 0;
   }
   std::ranges::copy(before, values.begin());
 }

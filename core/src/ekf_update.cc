@@ -21,6 +21,7 @@ void Ekf::Fuse(std::span<Row* const> group) {
   }
   if (passed_.empty()) return;
   if (landmarks_ != nullptr && landmarks_->FuseByConsensus(passed_)) return;
+  for (Row* row : passed_) Weigh(*row);
   const Outcome outcome = Apply(passed_);
   for (const Row* row : passed_) EntryOf(*row).outcome = outcome;
 }
@@ -163,7 +164,8 @@ void Ekf::Project(Row& row) {
   state_.covariance().Project(JacobianOf(row), row.pht.data(), entry.s.data());
 }
 
-/// S and NIS of one measurement by itself, and whether it passes the gate; what does is weighed.
+/// S, NIS and w of one measurement by itself, and whether it passes the gate. What lies so far out
+/// that its R / w is not finite does not.
 Outcome Ekf::Gate(Row& row) {
   MeasurementReport& entry = EntryOf(row);
   Project(row);
@@ -184,14 +186,14 @@ Outcome Ekf::Gate(Row& row) {
     return Outcome::kNotPd;
   }
   if (!(entry.nis <= gate_threshold_[static_cast<std::size_t>(row.sensor)])) return Outcome::kGated;
-  Weigh(row);
-  return Outcome::kAccepted;
+  row.weight = Weight(BindingOf(row).loss, std::sqrt(entry.nis));
+  const double widest = *std::ranges::max_element(row.r) / row.weight;
+  return std::isfinite(widest) ? Outcome::kAccepted : Outcome::kGated;
 }
 
 /// R <- R / w of the sensor's robust loss, in R and in S.
 void Ekf::Weigh(Row& row) {
   MeasurementReport& entry = EntryOf(row);
-  row.weight = Weight(BindingOf(row).loss, std::sqrt(entry.nis));
   if (row.weight == 1.0) return;
   for (std::size_t i = 0; i < row.r.size(); ++i) {
     const double widened = row.r[i] / row.weight;

@@ -136,6 +136,16 @@ void CheckAccepts(const NamedEstimator& filter, const NamedEstimator& named, con
               "a stream for each sensor");
     }
   }
+  for (const MotionBinding& motion : named.system.motions) {
+    const std::string& stream = motion.input.stream;
+    const auto& theirs = filter.system.sensors;
+    const auto sensor = std::ranges::find(theirs, stream, &SensorBinding::stream);
+    if (!motion.model.has_input() || sensor == theirs.end()) continue;
+    by.Fail("stream '" + stream + "' is the control input of '" + motion.name +
+                "' and goes to sensor '" + sensor->name + "' of " + quoted +
+                ": what that does not accept would be missing as an input",
+            "a filter without a sensor on that stream");
+  }
 }
 
 /// Index of the estimator whose accepted measurements `named` is to see, as the key `use` says; -1:

@@ -81,6 +81,7 @@ struct Tracked {
   BlockId id;
   std::size_t truth;
   std::string name, unit;
+  Geometry geometry;
   std::vector<std::string> elements;  ///< of the tangent
   std::vector<int> outside;           ///< stamps on end beyond 10 sigma, by element; -1: reported
   bool scalar;
@@ -126,7 +127,8 @@ struct Metrics::Impl {
   std::vector<Event> events;
 
   void Track(const System& system, const std::vector<StreamInfo>& truths);
-  void AddErrors(const Frame& frame, const std::vector<Sums*>& into, const State& state);
+  template <class ValueOf>
+  void AddErrors(const Frame& frame, const std::vector<Sums*>& into, const ValueOf& value_of);
   void AddConsistency(Stamp stamp, const std::vector<Sums*>& into, const State& state);
   void CheckElement(Stamp stamp, Tracked& block, int element, double sigma);
   void AddNees(const Owner& owner, std::size_t index, const std::vector<Sums*>& into,
@@ -147,6 +149,7 @@ void Metrics::Impl::Track(const System& system, const std::vector<StreamInfo>& t
     one.truth = static_cast<std::size_t>(match[id]);
     one.name = block.name;
     one.unit = internal::UnitOf(system, id);
+    one.geometry = block.geometry();
     one.elements = internal::TangentNames(block.name, block.space);
     one.outside.assign(block.geometry().tangent, 0);
     one.scalar = block.geometry().tangent == 1;
@@ -160,23 +163,25 @@ void Metrics::Impl::Track(const System& system, const std::vector<StreamInfo>& t
   }
 }
 
+/// value_of(id): the estimate of a block; null: there is none.
+template <class ValueOf>
 void Metrics::Impl::AddErrors(const Frame& frame, const std::vector<Sums*>& into,
-                              const State& state) {
+                              const ValueOf& value_of) {
   for (std::size_t i = 0; i < tracked.size(); ++i) {
     Tracked& block = tracked[i];
-    const Block& place = state.layout()[block.id];
-    block.known =
-        place.present && block.truth < frame.truth.size() && !frame.truth[block.truth].empty();
+    const double* const estimate = value_of(block.id);
+    block.known = estimate != nullptr && block.truth < frame.truth.size() &&
+                  !frame.truth[block.truth].empty();
     if (!block.known) continue;
     const double* truth = frame.truth[block.truth].data();
     // In the tangent at the estimate, where P is.
-    place.geometry().Minus(truth, state.value(block.id), block.error.data());
+    block.geometry.Minus(truth, estimate, block.error.data());
     const double square = block.error.allFinite() ? block.error.squaredNorm() : kInfinity;
     block.last_error = std::sqrt(square);
     for (Sums* s : into) s->squares[i].Add(square);
     if (!block.scalar) continue;
     double value = truth[0];
-    if (place.geometry().kind == GeometryKind::kAngle && !block.series.truth.empty()) {
+    if (block.geometry.kind == GeometryKind::kAngle && !block.series.truth.empty()) {
       const double before = block.series.truth.back();  // unwrapped: lag needs no jumps
       value = before + Angle::Wrap(truth[0] - before);
     }
@@ -334,7 +339,9 @@ void Metrics::Add(const Frame& frame, const std::vector<bool>& in_segment, const
                   const UpdateReport& report) {
   const std::vector<Sums*> into = impl_->SumsOf(in_segment);
   if (!report.stale) {
-    impl_->AddErrors(frame, into, state);
+    impl_->AddErrors(frame, into, [&](BlockId id) {
+      return state.layout()[id].present ? state.value(id) : nullptr;
+    });
     impl_->AddConsistency(frame.stamp, into, state);
   }
   impl_->AddReport(into, report);
@@ -345,8 +352,11 @@ void Metrics::AddReport(const std::vector<bool>& in_segment, const UpdateReport&
 }
 
 void Metrics::AddDifference(const Frame& frame, const std::vector<bool>& in_segment,
-                            const State& state) {
-  impl_->AddErrors(frame, impl_->SumsOf(in_segment), state);
+                            const std::vector<std::vector<double>>& estimate) {
+  impl_->AddErrors(frame, impl_->SumsOf(in_segment), [&](BlockId id) -> const double* {
+    const std::vector<double>& value = estimate[static_cast<std::size_t>(id)];
+    return value.empty() ? nullptr : value.data();
+  });
 }
 
 std::vector<int> Metrics::far_off() const {

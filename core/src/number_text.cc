@@ -42,6 +42,8 @@ std::string ScientificText(double value, int digits) {
   return {buffer, result.ptr};
 }
 
+std::string SecondsText(Stamp stamp) { return FixedText(Seconds(stamp), 6) + " s"; }
+
 void AppendSeconds(std::string& text, Stamp stamp) {
   constexpr std::uint64_t kSecond = 1'000'000'000;
   // Unsigned, for the magnitude of the smallest stamp is no stamp.

@@ -21,6 +21,9 @@ std::string RoundedText(double value, int digits = 6);
 /// `digits` digits after the point and an exponent.
 std::string ScientificText(double value, int digits);
 
+/// `1.500000 s`, for people to read.
+std::string SecondsText(Stamp stamp);
+
 /// Seconds with nine decimals, exact: `-0.033000000`.
 void AppendSeconds(std::string& text, Stamp stamp);
 

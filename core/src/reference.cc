@@ -2,9 +2,6 @@
 #include "reference.h"
 
 namespace alidade::internal {
-namespace {
-
-/// As Frame::truth, for BlocksOf the state's system.
 std::vector<std::vector<double>> ValuesOf(const State& state, std::size_t blocks) {
   std::vector<std::vector<double>> values(blocks);
   for (std::size_t i = 0; i < blocks; ++i) {
@@ -13,12 +10,9 @@ std::vector<std::vector<double>> ValuesOf(const State& state, std::size_t blocks
     if (!block.present) continue;
     const double* const x = state.value(id);
     values[i].assign(x, x + block.geometry().ambient);
-    if (!AllFinite(values[i])) values[i].clear();
   }
   return values;
 }
-
-}  // namespace
 
 std::vector<StreamInfo> BlocksOf(const System& system) {
   std::vector<StreamInfo> blocks;
@@ -30,15 +24,16 @@ std::vector<StreamInfo> BlocksOf(const System& system) {
 
 void AddDifferences(const std::vector<Estimate>& estimates, const std::vector<Estimate>& reference,
                     const std::vector<Seen>& seen, Metrics& metrics) {
-  std::vector<const State*> at(seen.size(), nullptr);
-  for (const Estimate& one : reference) at[one.frame] = &one.state;
+  std::vector<const Estimate*> at(seen.size(), nullptr);
+  for (const Estimate& one : reference) at[one.frame] = &one;
   for (const Estimate& one : estimates) {
-    const State* const state = at[one.frame];
-    if (state == nullptr) continue;
+    if (at[one.frame] == nullptr) continue;
     const Seen& frame = seen[one.frame];
-    metrics.AddDifference(
-        {frame.frame.stamp, {}, ValuesOf(*state, state->layout().blocks().size())},
-        frame.in_segment, one.state);
+    Frame known{frame.frame.stamp, {}, at[one.frame]->values};
+    for (std::vector<double>& value : known.truth) {
+      if (!AllFinite(value)) value.clear();
+    }
+    metrics.AddDifference(known, frame.in_segment, one.values);
   }
 }
 

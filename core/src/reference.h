@@ -11,11 +11,14 @@ namespace alidade::internal {
 /// The blocks of a system as a source names its truths.
 std::vector<StreamInfo> BlocksOf(const System& system);
 
-/// An estimate, and the index of its frame in the run.
+/// An estimate, as far as errors are taken from it, and the index of its frame in the run.
 struct Estimate {
   std::size_t frame;
-  State state;
+  std::vector<std::vector<double>> values;  ///< by block of the system; empty where it has none
 };
+
+/// The values of the first `blocks` blocks of a state.
+std::vector<std::vector<double>> ValuesOf(const State& state, std::size_t blocks);
 
 /// A frame of a run, and which segments it is in.
 struct Seen {

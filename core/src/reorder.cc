@@ -2,8 +2,11 @@
 #include "reorder.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
+#include <numeric>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 
 #include "accepted.h"
@@ -19,8 +22,6 @@ Stamp Lag(Stamp newest, Stamp stamp) {
   Stamp lag = 0;
   return __builtin_sub_overflow(newest, stamp, &lag) ? std::numeric_limits<Stamp>::max() : lag;
 }
-
-std::string InSeconds(Stamp stamp) { return FixedText(Seconds(stamp), 6) + " s"; }
 
 /// ` in FILE:LINE`, where the source knows.
 std::string In(const Place& place) {
@@ -89,9 +90,9 @@ bool FrameOrder::Accept(const Frame& frame) {
   if (!IsTooLate(frame.stamp)) return true;
   ++arrivals_.dropped;
   events_.push_back({frame.stamp, "late",
-                     "a frame " + Names(frame) + "came " + InSeconds(lag) +
+                     "a frame " + Names(frame) + "came " + SecondsText(lag) +
                          " behind the newest, beyond the window of " +
-                         InSeconds(*experiment_.time.window) + ": dropped"});
+                         SecondsText(*experiment_.time.window) + ": dropped"});
   return false;
 }
 
@@ -146,7 +147,7 @@ void FrameOrder::CheckMerge(const Held& held, const Frame& part) const {
   const auto fail = [&](const std::string& what, const std::string& expected) {
     throw Error(
         ExitCode::kBadData,
-        ErrorLine(source.place(), {}, what + " at t = " + InSeconds(whole.stamp), expected));
+        ErrorLine(source.place(), {}, what + " at t = " + SecondsText(whole.stamp), expected));
   };
   for (const Measurement& m : part.measurements) {
     const auto same = [&](const Measurement& other) {
@@ -174,12 +175,18 @@ void FrameOrder::Merge(Held& held, Held&& received) const {
     const auto stream = static_cast<std::size_t>(one.stream);
     return std::tuple(stream < ranks.size() ? ranks[stream] : 0, one.stream, one.landmark);
   };
-  for (std::size_t i = 0; i < part.measurements.size(); ++i) {
-    Measurement& m = part.measurements[i];
-    const auto at = std::ranges::upper_bound(whole.measurements, key(m), {}, key);
-    held.places.insert(held.places.begin() + (at - whole.measurements.begin()), received.places[i]);
-    whole.measurements.insert(at, std::move(m));
-  }
+  std::ranges::move(part.measurements, std::back_inserter(whole.measurements));
+  held.places.insert(held.places.end(), received.places.begin(), received.places.end());
+  std::vector<std::size_t> order(whole.measurements.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return key(whole.measurements[i]); });
+  const auto sorted = [&](auto& list) {
+    std::remove_reference_t<decltype(list)> ordered;
+    for (const std::size_t i : order) ordered.push_back(std::move(list[i]));
+    list = std::move(ordered);
+  };
+  sorted(whole.measurements);
+  sorted(held.places);
   whole.truth.resize(std::max(whole.truth.size(), part.truth.size()));
   for (std::size_t t = 0; t < part.truth.size(); ++t) {
     if (whole.truth[t].empty()) whole.truth[t] = std::move(part.truth[t]);
@@ -214,8 +221,10 @@ void FrameOrder::Replay(std::size_t from, bool is_newest) {
 /// The frame as an estimator sees it that uses what estimator `by` accepted.
 Frame FrameOrder::Accepted(const Held& held, int by) const {
   const auto index = static_cast<std::size_t>(by);
-  return AcceptedOf(held.frame, experiment_.source->streams(), experiment_.estimators[index].system,
-                    held.processed[index].report);
+  const NamedEstimator& filter = experiment_.estimators[index];
+  const bool follows = filter.accepted_by >= 0;
+  return AcceptedOf(follows ? Accepted(held, filter.accepted_by) : held.frame,
+                    experiment_.source->streams(), filter.system, held.processed[index].report);
 }
 
 Processed FrameOrder::Process(Estimator& estimator, const Frame& frame) const {

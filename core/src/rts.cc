@@ -33,8 +33,7 @@ const UpdateReport& RtsSmoother::Process(const Frame& frame) {
 bool RtsSmoother::StepOnce(double dt_s) {
   if (!Ekf::StepOnce(dt_s)) return false;
   const Workspace::Use use(work_);
-  const Eigen::Index n = state_.covariance().size();
-  current_.Append(Transition(), Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n));
+  current_.a = Transition() * current_.a;
   return true;
 }
 

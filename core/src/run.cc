@@ -9,18 +9,15 @@
 #include "frame_check.h"
 #include "map_metrics.h"
 #include "number_text.h"
-#include "observability.h"
 #include "reference.h"
 #include "reorder.h"
-#include "text_table.h"
+#include "running.h"
 
 namespace alidade {
 namespace {
 
 /// ` at t = 0.033000 s`
-std::string At(const Frame& frame) {
-  return " at t = " + internal::FixedText(Seconds(frame.stamp), 6) + " s";
-}
+std::string At(const Frame& frame) { return " at t = " + internal::SecondsText(frame.stamp); }
 
 /// Whether the frame has a measurement of the segment's stream that its sensor finds valid.
 bool InSegment(const Segment& segment, const Frame& frame) {
@@ -30,94 +27,8 @@ bool InSegment(const Segment& segment, const Frame& frame) {
   return std::any_of(frame.measurements.begin(), frame.measurements.end(), seen) == segment.with;
 }
 
+using internal::Running;
 using internal::Seen;
-
-/// One estimator on its way through a run.
-struct Running {
-  NamedEstimator& named;
-  int index = 0;  ///< in the experiment
-  Metrics metrics;
-  EstimatorResult result;
-  bool ended = false;                  ///< it had nothing left to go on with
-  bool diverged = false;               ///< by a frame that was taken; not of offline estimators
-  bool took = false;                   ///< an estimate, so that its counts tell of the measurements
-  const UpdateReport* last = nullptr;  ///< report of the last frame; null: it had ended before
-  bool waits = false;                  ///< metrics need the estimates of the reference
-  std::vector<internal::Estimate> estimates = {};  ///< where it waits
-
-  /// Puts the estimate of frame k into metrics and record.
-  void Take(std::size_t k, const Seen& seen, const State& state, const UpdateReport& report,
-            Recorder* recorder) {
-    took = true;
-    if (!waits) {
-      metrics.Add(seen.frame, seen.in_segment, state, report);
-    } else {
-      metrics.AddReport(seen.in_segment, report);
-      if (!report.stale) estimates.push_back({k, state});
-    }
-    if (recorder != nullptr) recorder->AddEstimate(index, seen.frame, state, report);
-  }
-  void Note(const std::vector<Event>& events) {
-    result.events.insert(result.events.end(), events.begin(), events.end());
-  }
-};
-
-EstimatorResult Begin(const NamedEstimator& named) {
-  EstimatorResult result;
-  result.name = named.name;
-  result.unobservable = UnobservableDirections(named.system);
-  if (!internal::ObservabilityIsTold(named.system)) {
-    result.events.push_back({kNoStamp, "observability",
-                             "not looked into: the state has more than " +
-                                 std::to_string(internal::kMostObserved) + " elements"});
-  }
-  for (const auto& direction : result.unobservable) {
-    result.events.push_back({kNoStamp, "unobservable",
-                             "no sensor of this estimator tells " +
-                                 internal::Join(direction, " and ") +
-                                 (direction.size() > 1 ? " apart" : "")});
-  }
-  return result;
-}
-
-/// An event `unit` for each sensor whose measurements are far from all that it predicts.
-void NoteUnits(const System& system, const Metrics& metrics, EstimatorResult& result) {
-  for (const int index : metrics.far_off()) {
-    const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(index)];
-    const std::string& unit = sensor.model.measurement().unit;
-    result.events.push_back(
-        {kNoStamp, "unit",
-         "sensor '" + sensor.name + "': the median of |z - h| is more than 100 sigma; is stream '" +
-             sensor.stream + "' in " + (unit.empty() ? "the model's units" : unit) + '?'});
-  }
-}
-
-/// An event `unused` for each sensor of which the whole run used no measurement; `accepted_by`
-/// names the filter that chose them, or is empty.
-void NoteUnused(const System& system, const std::string& accepted_by, EstimatorResult& result) {
-  for (const SensorBinding& sensor : system.sensors) {
-    std::int64_t used = 0, all = 0;
-    std::vector<std::string> others;
-    for (const auto& [key, count] : result.counts) {
-      const std::size_t colon = key.find(':');
-      const std::string outcome = key.substr(0, colon);
-      if (key.substr(colon + 1) != sensor.name || outcome == "inputs") continue;
-      all += count;
-      if (outcome == ToString(Outcome::kAccepted) || outcome == ToString(Outcome::kInitialised)) {
-        used += count;
-      } else {
-        others.push_back(std::to_string(count) + ' ' + outcome);
-      }
-    }
-    if (used > 0) continue;
-    const std::string of_all =
-        all > 0 ? " used none of " + std::to_string(all) +
-                      " measurements: " + internal::Join(others, ", ")
-                : ": stream '" + sensor.stream + "' had no measurement" +
-                      (accepted_by.empty() ? "" : " that " + accepted_by + " accepted");
-    result.events.push_back({kNoStamp, "unused", "sensor '" + sensor.name + "'" + of_all});
-  }
-}
 
 void Fail(RunResult& result, ExitCode code, std::string reason) {
   result.status = RunStatus::kFailed;
@@ -158,9 +69,13 @@ bool Advance(Running& one, const Seen& seen, const Frame& visible,
   return !policy;
 }
 
-/// The measurements of the frame that `filter`, which has had it, accepted.
-Frame AcceptedOf(const Running& filter, const Frame& frame, const Source& source) {
-  return internal::AcceptedOf(frame, source.streams(), filter.named.system,
+/// The measurements of the frame that filter `by`, which has had what it sees of it, accepted.
+Frame AcceptedBy(int by, const std::vector<Running>& running, const Frame& frame,
+                 const Source& source) {
+  const Running& filter = running[static_cast<std::size_t>(by)];
+  const int before = filter.named.accepted_by;
+  return internal::AcceptedOf(before < 0 ? frame : AcceptedBy(before, running, frame, source),
+                              source.streams(), filter.named.system,
                               filter.last ? *filter.last : UpdateReport());
 }
 
@@ -203,10 +118,7 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
     for (std::size_t e = 0; e < running.size(); ++e) {
       const int by = running[e].named.accepted_by;
       Frame accepted;
-      if (by >= 0) {
-        accepted =
-            AcceptedOf(running[static_cast<std::size_t>(by)], seen.frame, *experiment.source);
-      }
+      if (by >= 0) accepted = AcceptedBy(by, running, seen.frame, *experiment.source);
       go_on = Advance(running[e], seen, by < 0 ? seen.frame : accepted, frames.processed(e),
                       options, result) &&
               go_on;
@@ -312,7 +224,7 @@ std::vector<Running> BeginAll(Experiment& experiment) {
     const int index = static_cast<int>(running.size());
     Metrics metrics(named, index == reference ? std::vector<StreamInfo>() : truths,
                     experiment.segments);
-    running.push_back({named, index, std::move(metrics), Begin(named)});
+    running.push_back({named, index, std::move(metrics), internal::Begin(named)});
     running.back().waits = reference >= 0;
   }
   return running;
@@ -362,14 +274,16 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
   for (Running& one : running) {
     Measure(one, result);
     one.result.counts = one.metrics.counts();
+    if (one.stale_inputs > 0) one.result.counts["input_stale"] = one.stale_inputs;
     one.result.units = one.metrics.units();
     internal::NoteMap(one.named, *experiment.source, one.result);
     if (one.took && !one.named.estimator->failed()) {
       const int by = one.named.accepted_by;
-      NoteUnused(one.named.system, by < 0 ? "" : running[static_cast<std::size_t>(by)].named.name,
-                 one.result);
+      internal::NoteUnused(one.named.system,
+                           by < 0 ? "" : running[static_cast<std::size_t>(by)].named.name,
+                           one.result);
     }
-    NoteUnits(one.named.system, one.metrics, one.result);
+    internal::NoteUnits(one.named.system, one.metrics, one.result);
     one.Note(one.metrics.events());
     const Estimator& estimator = *one.named.estimator;
     one.result.diverged = one.diverged || (estimator.offline() && estimator.diverged()) ||

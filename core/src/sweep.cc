@@ -9,26 +9,14 @@
 #include <system_error>
 #include <thread>
 
+#include "sweep_config.h"
+
 namespace alidade {
+
+using internal::CheckReadableAgain;
+using internal::Copy;
+
 namespace {
-
-/// A config of its own: reading one marks what was read.
-Config Copy(const Config& config) { return config.Merged(Config::FromText("{}", "sweep").root()); }
-
-/// Refuses a source that the second run would find empty: standard input, or a pipe.
-void CheckReadableAgain(const Config& config) {
-  const Config copy = Copy(config);
-  const auto source = copy.root().Find("source");
-  const auto path = source && source->is_map() ? source->Find("path") : std::nullopt;
-  if (!path || path->kind() != Node::Kind::kScalar) return;
-  std::error_code error;
-  const auto status = std::filesystem::status(config.folder() / path->Text(), error);
-  const bool file =
-      !std::filesystem::exists(status) || is_regular_file(status) || is_directory(status);
-  if (path->Text() != "-" && file) return;
-  path->Fail("'" + path->Text() + "' can be read once, but a sweep reads it for every run",
-             "a regular file");
-}
 
 /// The runs of a sweep, handed out to threads one after the other.
 class Queue {
@@ -93,6 +81,7 @@ class Queue {
       run.status = result.code == ExitCode::kDiverged ? RunStatus::kOk : result.status;
       run.code = result.code;
       run.reason = std::move(result.reason);
+      run.withheld = !result.withheld.empty();
       run.estimators = std::move(result.estimators);
       for (EstimatorResult& one : run.estimators) one.events = {};
     } catch (...) {

@@ -7,16 +7,20 @@
 #include "json.h"
 #include "names.h"
 #include "run_folder.h"
+#include "sweep_text.h"
 #include "sweep_vary_files.h"
 #include "text_table.h"
 
 namespace alidade {
 
 using internal::ComparisonRow;
+using internal::CountWhole;
+using internal::CountWithheld;
 using internal::CsvFile;
 using internal::Join;
 using internal::Json;
 using internal::NamesOf;
+using internal::ReferenceLines;
 using internal::RunFolder;
 
 struct SweepFolder::Impl {
@@ -39,19 +43,6 @@ Parts PartsOf(const VariedSweep& sweep) {
     parts.push_back({&result, sweep.variation.values[parts.size()]});
   }
   return parts;
-}
-
-/// Runs that came to their end.
-std::int64_t CountWhole(const SweepResult& result) {
-  return std::ranges::count(result.done, RunStatus::kOk, &SweepRun::status);
-}
-
-/// ReferenceText of each run that has a reference, as a line of its own behind an empty one.
-std::string ReferenceLine(const SweepResult& result) {
-  RunResult of_runs;
-  of_runs.reference = result.reference;
-  const std::string text = internal::ReferenceText(of_runs);
-  return text.empty() ? "" : '\n' + text + '\n';
 }
 
 /// A cell for each estimator. Each one stands as four in a comparison, so that its numbers share
@@ -94,7 +85,7 @@ std::string Markdown(const SweepResult& result) {
   for (const ComparisonRow& row : TableRows(summaries)) {
     text += "| " + row.label + " | " + Join(row.cells, " | ") + " |\n";
   }
-  return text + ReferenceLine(result);
+  return text + ReferenceLines(result);
 }
 
 void AppendEstimators(Json& json, const SweepResult& result) {
@@ -124,6 +115,7 @@ std::string SweepJson(const SweepResult& result) {
   json.Key("runs_used").Integer(CountWhole(result));
   json.Key("first_seed").Integer(static_cast<std::int64_t>(result.first_seed));
   json.Key("reference").Text(result.reference);
+  json.Key("withheld").Integer(CountWithheld(result));
   AppendEstimators(json, result);
   json.End();
   return json.text();
@@ -134,13 +126,14 @@ std::string SweepJson(const VariedSweep& sweep) {
   json.Object();
   json.Key("runs").Integer(sweep.results.front().runs);
   json.Key("first_seed").Integer(static_cast<std::int64_t>(sweep.results.front().first_seed));
-  json.Key("reference").Text(sweep.results.front().reference);
   json.Key("vary").Text(sweep.variation.key);
   json.Key("values").Array();
   for (const Part& part : PartsOf(sweep)) {
     json.Object();
     json.Key("value").Text(part.value);
     json.Key("runs_used").Integer(CountWhole(*part.result));
+    json.Key("reference").Text(part.result->reference);
+    json.Key("withheld").Integer(CountWithheld(*part.result));
     AppendEstimators(json, *part.result);
     json.End();
   }
@@ -222,7 +215,8 @@ void WriteFailures(const RunFolder& folder, const Parts& parts, const std::strin
 
 std::string SweepTable(const SweepResult& result) {
   const std::vector<SweepSummary> summaries = Summarise(result);
-  return internal::EstimatorTable(NamesOf(summaries), TableRows(summaries)) + ReferenceLine(result);
+  return internal::EstimatorTable(NamesOf(summaries), TableRows(summaries)) +
+         ReferenceLines(result);
 }
 
 SweepFolder::SweepFolder(const std::filesystem::path& folder, bool force)

@@ -4,6 +4,9 @@
 
 #include "alidade/sweep.h"
 #include "config_tree.h"
+#include "names.h"
+#include "sweep_config.h"
+#include "text_table.h"
 
 namespace alidade {
 namespace {
@@ -15,6 +18,13 @@ constexpr const char* kOrigin = "--vary";
 [[noreturn]] void FailUsage(const std::string& what) {
   throw Error(ExitCode::kUsage, ErrorLine(Place{kOrigin}, {}, what,
                                           "KEY=v1,v2,... as in sensors.stereo.sigma_px=0.5,1,2"));
+}
+
+/// Without the blanks around it.
+std::string Trimmed(const std::string& text) {
+  const std::size_t first = text.find_first_not_of(" \t");
+  if (first == text.npos) return "";
+  return text.substr(first, text.find_last_not_of(" \t") + 1 - first);
 }
 
 /// Splits at the commas outside of brackets, braces and quotes.
@@ -38,6 +48,7 @@ std::vector<std::string> SplitValues(const std::string& text) {
     values.back() += c;
   }
   if (depth != 0 || quote != '\0') FailUsage(Quoted(text) + " leaves a bracket or quote open");
+  std::ranges::transform(values, values.begin(), Trimmed);
   return values;
 }
 
@@ -70,9 +81,26 @@ void CheckKey(const Config& config, const std::string& key) {
 
 /// A config of its own for each value.
 Config ConfigWith(const Config& config, const std::string& key, const std::string& value) {
-  Config copy = config.Merged(Config::FromText("{}", "sweep").root());
+  Config copy = internal::Copy(config);
   copy.Set(key, value, kOrigin);
   return copy;
+}
+
+/// Refuses a value with which the config is wrong, or has other estimators than with the first.
+void CheckValues(const Config& config, const PluginHost& host, const Variation& variation) {
+  std::vector<std::string> first;
+  for (const std::string& value : variation.values) {
+    const Config with = ConfigWith(config, variation.key, value);
+    internal::CheckReadableAgain(with);
+    const auto names = internal::NamesOf(BuildExperiment(with, host).estimators);
+    if (first.empty()) first = names;
+    if (names == first) continue;
+    internal::FailAt(Place{kOrigin}, variation.key,
+                     "the estimators are " + internal::Join(names) + " with " + Quoted(value) +
+                         ", but " + internal::Join(first) + " with " +
+                         Quoted(variation.values.front()),
+                     "the same names for every value, to compare each with itself");
+  }
 }
 
 }  // namespace
@@ -83,7 +111,7 @@ Variation Variation::FromText(const std::string& text) {
   Variation variation{text.substr(0, equals), SplitValues(text.substr(equals + 1))};
   const std::vector<std::string>& values = variation.values;
   for (auto value = values.begin(); value != values.end(); ++value) {
-    if (value->find_first_not_of(' ') == value->npos) FailUsage(Quoted(text) + " lacks a value");
+    if (value->empty()) FailUsage(Quoted(text) + " lacks a value");
     if (std::find(values.begin(), value, *value) != value) {
       FailUsage(Quoted(text) + " has the value " + Quoted(*value) + " twice");
     }
@@ -95,9 +123,7 @@ VariedSweep SweepOver(const Config& config, const PluginHost& host, const SweepO
                       const Variation& variation) {
   ALIDADE_EXPECTS(!variation.values.empty());
   CheckKey(ConfigWith(config, "alidade", "1"), variation.key);
-  for (const std::string& value : variation.values) {
-    BuildExperiment(ConfigWith(config, variation.key, value), host);
-  }
+  CheckValues(config, host, variation);
   VariedSweep sweep{variation, {}};
   SweepOptions each = options;
   for (const std::string& value : variation.values) {

@@ -15,6 +15,7 @@
 #include "figure_script.h"
 #include "figures.h"
 #include "number_text.h"
+#include "sweep_text.h"
 #include "text_table.h"
 
 namespace alidade {
@@ -59,8 +60,8 @@ ValueTable TableOf(const VariedSweep& sweep, const Column& column) {
   for (const SweepResult& result : sweep.results) {
     const std::size_t v = table.rows.size();
     table.rows.push_back({sweep.variation.values[v], {}});
-    const auto whole = std::ranges::count(result.done, RunStatus::kOk, &SweepRun::status);
-    table.rows[v].cells = {std::to_string(column[v].diverged) + " of " + std::to_string(whole)};
+    table.rows[v].cells = {std::to_string(column[v].diverged) + " of " +
+                           std::to_string(CountWhole(result))};
   }
   table.header = {"diverged"};
   for (const ComparisonRow& metric : MetricRows(AsComparison(column))) {
@@ -221,7 +222,7 @@ std::string VariedMarkdown(const VariedSweep& sweep) {
       text += "| " + row.label + " | " + Join(row.cells, " | ") + " |\n";
     }
   }
-  return text;
+  return text + ReferenceLines(sweep);
 }
 
 std::string DrawVariation(const RunFolder& folder, const VariedSweep& sweep,
@@ -246,7 +247,7 @@ std::string SweepTable(const VariedSweep& sweep) {
     text += column.front().name + ", by " + sweep.variation.key + '\n' +
             internal::EstimatorTable(table.header, table.rows);
   }
-  return text;
+  return text + internal::ReferenceLines(sweep);
 }
 
 }  // namespace alidade

@@ -13,8 +13,6 @@
 namespace alidade {
 namespace {
 
-constexpr int kMostHalvings = 30;
-
 /// Mean of the points that `centre` and the columns of `points` are, and f_i = (y_i (-) mean) -
 /// (centre (-) mean): `f` (tangent x 2N) and m = w sum f_i. False where the iteration does not
 /// settle, the points being too far apart.
@@ -54,25 +52,7 @@ void MomentsOf(double w, const Eigen::Ref<const Eigen::MatrixXd>& f, double cent
   for (Eigen::Index i = 0; i < m.size(); ++i) moments.col(i) += centre * m[i] * m;
 }
 
-UkfOptions Read(Params& p) {
-  UkfOptions options;
-  options.alpha =
-      p.Number("alpha", "", "spread of the sigma points", {0.0, 1.0, true, false}, options.alpha);
-  options.beta = p.NonNegative("beta", "", "weight of what the centre adds; 2: best for a Gaussian",
-                               options.beta);
-  options.kappa =
-      p.NonNegative("kappa", "", "spread beyond the number of directions", options.kappa);
-  options.filter = internal::ReadCommonOptions(p);
-  return options;
-}
-
 }  // namespace
-
-UkfOptions UkfOptions::FromNode(const Node& entry) {
-  return internal::OptionsFromNode(entry, "ukf", Read);
-}
-
-std::vector<ParamInfo> UkfOptions::Schema() { return internal::SchemaOf(Read); }
 
 Ukf::Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>& streams)
     : Ekf(std::move(system), internal::WithoutRecovery(options.filter), streams,
@@ -80,8 +60,8 @@ Ukf::Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>
       spread_(options),
       guarded_(system_.sensors.size() + 1, false) {
   ALIDADE_EXPECTS(!FindUnsupported(system_, kSupport));
-  ALIDADE_EXPECTS(spread_.alpha > 0.0 && spread_.alpha <= 1.0 && spread_.beta >= 0.0 &&
-                  spread_.kappa >= 0.0);
+  ALIDADE_EXPECTS(spread_.alpha >= UkfOptions::kLeastAlpha && spread_.alpha <= 1.0 &&
+                  spread_.beta >= 0.0 && spread_.kappa >= 0.0);
 }
 
 struct Ukf::Kept : Ekf::Kept {
@@ -112,6 +92,11 @@ Ukf::Transform Ukf::TransformOf(Eigen::Index directions, int halvings) const {
   return {std::sqrt(c2), 0.5 / c2, spread_.beta - alpha * alpha};
 }
 
+/// Whether the spread may be halved once more, and still keeps its digits.
+bool Ukf::MayHalve(int halvings) const {
+  return std::ldexp(spread_.alpha, -halvings - 1) >= UkfOptions::kLeastAlpha;
+}
+
 /// A with P = A A'; repairs P where it is not positive semi-definite.
 const Eigen::MatrixXd& Ukf::Root() {
   constexpr double kRounding = 1e-12;
@@ -130,16 +115,18 @@ const Eigen::MatrixXd& Ukf::Root() {
   return root_;
 }
 
-/// Of sensor `index`, or of the motion, where that is beyond them.
-void Ukf::NoteGuard(std::size_t index, int halvings) {
-  if (halvings > 0 && !guarded_[index]) {
+/// Of sensor `index`, or of the motion, where that is beyond them; `narrow_enough`: the points at
+/// this spread are of use.
+void Ukf::NoteGuard(std::size_t index, int halvings, bool narrow_enough) {
+  const bool guarded = halvings > 0 || !narrow_enough;
+  if (guarded && !guarded_[index]) {
     const std::string who =
         index < system_.sensors.size() ? "sensor '" + system_.sensors[index].name + "'" : "motion";
-    Note("guarded",
-         who + ": sigma points leave its domain or have no mean; their spread is divided by " +
-             std::to_string(1 << halvings));
+    Note("guarded", who + ": sigma points leave its domain or have no mean" +
+                        (narrow_enough ? "" : ", and their spread can be narrowed no further") +
+                        "; their spread is divided by " + std::to_string(1 << halvings));
   }
-  guarded_[index] = halvings > 0;
+  guarded_[index] = guarded;
 }
 
 /// The model's x' at the values `from`, with `noise` (over all active models) in w, in `to`.
@@ -226,19 +213,22 @@ bool Ukf::StepOnce(double dt_s) {
     if (!motions_[i].active) continue;
     if (!StepModel(system_.motions[i], motions_[i], dt_s)) return false;  // the centre, and Lq
   }
-  for (int halvings = 0; halvings <= kMostHalvings; ++halvings) {
-    const Status status = StepPoints(halvings, dt_s);
-    if (status == Status::kOk) {
-      NoteGuard(guarded_.size() - 1, halvings);
-      return true;
-    }
-    if (status == Status::kError) break;
+  int halvings = 0;
+  Status status = StepPoints(halvings, dt_s);
+  while (status == Status::kOutOfDomain && MayHalve(halvings)) {
+    status = StepPoints(++halvings, dt_s);
   }
-  GiveUp("diverged", "the sigma points cannot step, however near the estimate");
+  if (status == Status::kOk) {
+    NoteGuard(guarded_.size() - 1, halvings, true);
+    return true;
+  }
+  GiveUp("diverged", "the sigma points cannot step, also with their spread divided by " +
+                         std::to_string(1 << halvings));
   return false;
 }
 
-/// h at the sigma points of one measurement: its mean, in the report, and its deviations.
+/// h at the sigma points of one measurement, where it is defined at the estimate: its mean, in the
+/// report, and its deviations.
 Outcome Ukf::Predict(Row& row, int halvings) {
   const Workspace::Use use(work_);
   const SensorBinding& binding = BindingOf(row);
@@ -247,10 +237,8 @@ Outcome Ukf::Predict(Row& row, int halvings) {
   const Eigen::Index n = root.cols();
   const Transform transform = TransformOf(n, halvings);
   x_ = PlanOf(row).roles;  // as held, or fixed
-  Workspace::Vector centre = work_.Take(geometry.ambient), dx = work_.Take(n);
+  Workspace::Vector dx = work_.Take(n);
   Workspace::Matrix points = work_.Take(geometry.ambient, 2 * n);
-  const Outcome at_centre = OutcomeOf(binding.model.Predict(x_.data(), centre.data()));
-  if (at_centre != Outcome::kAccepted) return at_centre;
   for (Eigen::Index i = 0; i < 2 * n; ++i) {
     dx = (i < n ? transform.c : -transform.c) * root.col(i % n);
     state_.Retract(dx.data(), moved_);
@@ -269,8 +257,8 @@ Outcome Ukf::Predict(Row& row, int halvings) {
   MeasurementReport& entry = EntryOf(row);
   entry.h.resize(static_cast<std::size_t>(geometry.ambient));
   const Moments moments = MomentsAt(row);
-  if (!MeanOf(geometry, centre.data(), points, transform.w, work_, entry.h.data(), moments.f,
-              moments.m)) {
+  if (!MeanOf(geometry, predicted.centre.data(), points, transform.w, work_, entry.h.data(),
+              moments.f, moments.m)) {
     return Outcome::kOutOfDomain;
   }
   entry.innovation.resize(static_cast<std::size_t>(geometry.tangent));
@@ -285,25 +273,27 @@ Ukf::Moments Ukf::MomentsAt(const Row& row) {
 }
 
 Outcome Ukf::Linearise(Row& row) {
-  const Workspace::Use use(work_);
   const SensorBinding& binding = BindingOf(row);
   const SensorPlan& plan = PlanOf(row);
   if (predicted_.size() <= row.report) predicted_.resize(row.report + 1);
+  std::vector<double>& centre = predicted_[row.report].centre;
+  centre.resize(static_cast<std::size_t>(binding.model.measurement().geometry.ambient));
+  Outcome outcome = OutcomeOf(binding.model.Predict(plan.roles.data(), centre.data()));
+  const bool defined = outcome == Outcome::kAccepted;  // at the estimate itself
   int halvings = 0;
-  Outcome outcome = Predict(row, halvings);
-  Workspace::Vector centre = work_.Take(binding.model.measurement().geometry.ambient);
-  while (outcome == Outcome::kOutOfDomain && halvings < kMostHalvings &&
-         binding.model.Predict(plan.roles.data(), centre.data()) == Status::kOk) {
+  if (defined) outcome = Predict(row, halvings);
+  while (defined && outcome == Outcome::kOutOfDomain && MayHalve(halvings)) {
     outcome = Predict(row, ++halvings);
   }
-  if (outcome == Outcome::kAccepted) {
-    NoteGuard(static_cast<std::size_t>(row.sensor), halvings);
-    outcome = NoiseOf(row, plan.roles.data());
+  const bool too_wide = defined && outcome == Outcome::kOutOfDomain;
+  if (outcome == Outcome::kAccepted || too_wide) {
+    NoteGuard(static_cast<std::size_t>(row.sensor), halvings, !too_wide);
   }
+  if (outcome == Outcome::kAccepted) outcome = NoiseOf(row, plan.roles.data());
   if (outcome == Outcome::kAccepted) return outcome;
   EntryOf(row).h.clear();
   EntryOf(row).innovation.clear();
-  NoteRefusal(row, outcome);
+  if (!too_wide) NoteRefusal(row, outcome);
   return outcome;
 }
 
@@ -332,7 +322,11 @@ Outcome Ukf::StackPoints(std::span<Row* const> rows, int halvings, Stacked& all,
       reported_h_ = entry.h;
       reported_innovation_ = entry.innovation;
       const Outcome outcome = Predict(*row, halvings);
-      if (outcome != Outcome::kAccepted) return outcome;
+      if (outcome != Outcome::kAccepted) {
+        entry.h.swap(reported_h_);
+        entry.innovation.swap(reported_innovation_);
+        return outcome;
+      }
     }
     const Moments moments = MomentsAt(*row);
     const Eigen::Index k = moments.m.size();

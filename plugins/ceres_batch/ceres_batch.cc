@@ -69,6 +69,7 @@ class CeresBatch : public Estimator {
 
   const UpdateReport& Process(const Frame& frame) override {
     report_.Clear();
+    const bool had_failed = filter_.failed();
     const UpdateReport& filter = filter_.Process(frame);
     const bool were_few = trajectory_.inputs() <= kManyInputs;
     if (!trajectory_.Add(frame, filter)) {
@@ -84,6 +85,7 @@ class CeresBatch : public Estimator {
                                     " noise inputs: the time of a solve grows with their cube"});
     }
     std::ranges::copy_if(filter.events, std::back_inserter(report_.events), TellsOfTheData);
+    if (filter_.failed() && !had_failed) NoteFilter(frame.stamp, filter);
     return report_;
   }
 
@@ -113,6 +115,14 @@ class CeresBatch : public Estimator {
   /// Whether an event of the filter that goes along is one of the batch too.
   static bool TellsOfTheData(const Event& event) {
     return event.kind == "input_stale" || event.kind == "input_refused" || event.kind == "substeps";
+  }
+  /// Tells why the filter that goes along ended.
+  void NoteFilter(Stamp stamp, const UpdateReport& filter) {
+    const auto cause = std::ranges::find(filter.events, true, &Event::divergence);
+    report_.events.push_back({stamp, "start",
+                              "the filter that the batch starts from, and that gives blocks their "
+                              "first values, ended" +
+                                  (cause == filter.events.end() ? "" : ": " + cause->text)});
   }
   static EkfOptions FilterOptions(const Options& options) {
     EkfOptions filter;
@@ -167,7 +177,8 @@ class CeresBatch : public Estimator {
     constexpr double kSettled = 1e-9;
     int iterations = 0, outer = 0;
     bool settled = false;
-    std::string why = "the noise that depends on the state did not settle";
+    std::string why = "the noise that depends on the state did not settle; a larger " +
+                      Setting("max_outer_iterations", options_.max_outer_iterations) + " may do";
     ceres::Solver::Summary summary;
     do {
       HeedStop();
@@ -175,9 +186,10 @@ class CeresBatch : public Estimator {
       HeedStop();
       iterations += static_cast<int>(summary.iterations.size()) - 1;
       ++outer;
-      failed_ = summary.termination_type != ceres::CONVERGENCE;
-      if (failed_) why = "not converged, " + summary.message;
-      if (!failed_ && trajectory_.robust()) iterations += Polish();
+      failed_ =
+          summary.termination_type != ceres::CONVERGENCE || !std::isfinite(summary.final_cost);
+      if (failed_) why = WhyNot(summary);
+      if (!failed_ && trajectory_.robust()) iterations += Reweight();
       if (failed_) break;
       if (!trajectory_.Freeze(e_.data())) {
         why = trajectory_.problem();
@@ -193,6 +205,23 @@ class CeresBatch : public Estimator {
          << outer << (outer == 1 ? " solve: " : " solves: ");
     summary_ = text.str();
     if (failed_) summary_ += why;
+  }
+
+  /// `key (50 here)`
+  static std::string Setting(const char* key, int value) {
+    return std::string(key) + " (" + std::to_string(value) + " here)";
+  }
+
+  std::string WhyNot(const ceres::Solver::Summary& summary) const {
+    if (!std::isfinite(summary.final_cost)) {
+      return "not converged, the cost is not finite: a measurement lies too far out; `use: "
+             "{accepted_by: FILTER}` leaves out what a filter gates";
+    }
+    const bool by_count = summary.termination_type == ceres::NO_CONVERGENCE;
+    return "not converged, " + summary.message +
+           (by_count
+                ? " A larger " + Setting("max_iterations", options_.max_iterations) + " may do."
+                : "");
   }
 
   ceres::Solver::Summary SolveFrozen() {
@@ -244,7 +273,7 @@ class CeresBatch : public Estimator {
 
   /// Reweighted least squares converges linearly where the squared error does so quadratically:
   /// what is left below Ceres' tolerances counts. How many steps it took.
-  int Polish() {
+  int Reweight() {
     constexpr double kStep = 1e-10;  // of inputs whose sigma is 1
     Eigen::VectorXd step;
     int steps = 0;

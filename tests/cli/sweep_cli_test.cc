@@ -89,6 +89,12 @@ TEST_F(SweepCli, RefusesASourceThatCanBeReadOnce) {
                                 std::string("source.path=") + once, "-o", "out"});
     EXPECT_EQ(sweep.code, 78) << sweep.err;
     EXPECT_TRUE(sweep.err.starts_with("error: --set source.path: '")) << sweep.err;
+    // With --vary too, before it is read.
+    const Outcome varied =
+        Call({"sweep", "table.yaml", "--runs", "2", "--vary", "sensors.stereo.sigma_px=1,2",
+              "--set", std::string("source.path=") + once, "-o", "out"});
+    EXPECT_EQ(varied.code, 78) << varied.err;
+    EXPECT_TRUE(Contains(varied.err, "can be read once")) << varied.err;
   }
   EXPECT_FALSE(Exists("out"));
   // A key that the source does not know stays unknown.
@@ -186,6 +192,110 @@ TEST_F(SweepCli, ValuesMayBeMapsAndTheirFigureIsDrawn) {
   const std::string figure = Read("out/figures/vary.svg");
   EXPECT_TRUE(Contains(figure, "rmse target.depth: mean, 5 % to 95 %")) << figure.substr(0, 2000);
   EXPECT_TRUE(Contains(figure, "after: 5, action: none")) << "the axis has the values";
+}
+
+TEST_F(SweepCli, ValuesAreReadWithoutTheBlanksAroundThem) {
+  const Outcome varied = Call({"sweep", "config.yaml", "--runs", "1", "-o", "out", "--vary",
+                               "estimators.ekf= {type: ekf} ,{type: ekf, gate: 0.99}"});
+  ASSERT_EQ(varied.code, 0) << varied.err;
+  const Config summary = Json("out/sweep.json");
+  const std::vector<Node> values = summary.root().At("values").Items();
+  EXPECT_EQ(values[0].At("value").Text(), "{type: ekf}");
+  EXPECT_EQ(values[1].At("value").Text(), "{type: ekf, gate: 0.99}");
+  const Outcome twice = Call({"sweep", "config.yaml", "--runs", "1", "-o", "twice", "--vary",
+                              "sensors.stereo.sigma_px=1, 2, 1"});
+  EXPECT_EQ(twice.code, 2);
+  EXPECT_TRUE(Contains(twice.err, "has the value '1' twice")) << twice.err;
+}
+
+TEST_F(SweepCli, FailuresOfAVariedSweepNameTheirValue) {
+  Write("table.csv", "t_s,d\n0,80\n0.1,none\n");
+  const Outcome sweep = Call(
+      {"sweep", "table.yaml", "--runs", "1", "-o", "out", "--vary", "sensors.stereo.sigma_px=1,2"});
+  EXPECT_EQ(sweep.code, 1);
+  for (const char* value : {"1", "2"}) {
+    const std::string where = std::string("error: sensors.stereo.sigma_px=") + value + ", seed 1: ";
+    EXPECT_TRUE(Contains(sweep.err, where)) << sweep.err;
+  }
+}
+
+TEST_F(SweepCli, EveryValueHasTheSameEstimators) {
+  const std::vector<std::pair<std::string, std::string>> wrong = {
+      {"{a: {type: ekf}, b: {type: iekf}},{a: {type: ekf}}",
+       "error: --vary estimators: the estimators are a with '{a: {type: ekf}}', but a, b with '{a: "
+       "{type: ekf}, b: {type: iekf}}'; expected the same names for every value, to compare each "
+       "with itself"},
+      {"{ekf: {type: ekf}},{other: {type: iekf}}", "the estimators are other with '{other: "}};
+  for (const auto& [values, words] : wrong) {
+    const Outcome sweep = Call(
+        {"sweep", "config.yaml", "--runs", "1", "-o", "out", "--vary", "estimators=" + values});
+    EXPECT_EQ(sweep.code, 78) << values << sweep.err;
+    EXPECT_TRUE(Contains(sweep.err, words)) << sweep.err;
+    EXPECT_FALSE(Exists("out"));
+  }
+  const Outcome same = Call({"sweep", "config.yaml", "--runs", "1", "-o", "out", "--vary",
+                             "estimators={a: {type: ekf}, b: {type: iekf}},{a: {type: iekf}, b: "
+                             "{type: ekf}}"});
+  ASSERT_EQ(same.code, 0) << same.err;
+  const Config summary = Json("out/sweep.json");
+  const std::vector<Node> values = summary.root().At("values").Items();
+  const auto rmse = [&](std::size_t value, const char* name) {
+    const Node metrics = values[value].At("estimators").At(name).At("metrics");
+    return metrics.At("rmse:target.depth").At("mean").Number();
+  };
+  EXPECT_EQ(rmse(0, "a"), rmse(1, "b"));
+  EXPECT_EQ(rmse(0, "b"), rmse(1, "a"));
+}
+
+/// An estimator beside ekf that diverges in every run.
+const Arguments kDiverging = {
+    "--set",
+    "estimators.bad={type: ekf, overrides: {state: {target: {initial: {depth: {mean: -0.2, sigma: "
+    "0.1}, depth_rate: {mean: 0, sigma: 0.5}}}}}}"};
+
+// FAULTS 85
+TEST_F(SweepCli, TellsHowOftenTheReferenceWasWithheld) {
+  Arguments arguments = {"sweep", "config.yaml", "--runs", "2",
+                         "-o",    "out",         "--set",  "reference=bad"};
+  arguments.insert(arguments.end(), kDiverging.begin(), kDiverging.end());
+  const Outcome sweep = Call(arguments);
+  ASSERT_EQ(sweep.code, 0) << sweep.err;
+  const std::string words =
+      "\nerrors are differences from estimator 'bad', an estimate itself: no coverage, no NEES; "
+      "withheld in 2 of 2 runs, in which it failed, diverged or had no estimates\n";
+  EXPECT_TRUE(Contains(sweep.out, words)) << sweep.out;
+  EXPECT_TRUE(Contains(Read("out/table.md"), words)) << Read("out/table.md");
+  EXPECT_EQ(Json("out/sweep.json").root().At("withheld").Number(), 2);
+}
+
+TEST_F(SweepCli, AVariedReferenceIsNamedForEachValue) {
+  Arguments arguments = {"sweep", "config.yaml", "--runs", "1",
+                         "-o",    "out",         "--vary", "reference=truth,ekf,bad"};
+  arguments.insert(arguments.end(), kDiverging.begin(), kDiverging.end());
+  const Outcome sweep = Call(arguments);
+  ASSERT_EQ(sweep.code, 0) << sweep.err;
+  const Config summary = Json("out/sweep.json");
+  const std::vector<Node> values = summary.root().At("values").Items();
+  const std::string names[] = {"truth", "ekf", "bad"};
+  for (std::size_t v = 0; v < 3; ++v) {
+    EXPECT_EQ(values[v].At("reference").Text(), names[v]);
+    EXPECT_EQ(values[v].At("withheld").Number(), v == 2 ? 1 : 0);
+  }
+  for (const std::string& text : {sweep.out, Read("out/table.md")}) {
+    EXPECT_TRUE(Contains(text, "\ntruth: errors are differences from truth\n")) << text;
+    EXPECT_TRUE(Contains(text,
+                         "\nekf: errors are differences from estimator 'ekf', an estimate "
+                         "itself: no coverage, no NEES\n"))
+        << text;
+    EXPECT_TRUE(Contains(text, "; withheld in 1 of 1 runs")) << text;
+  }
+  // One for all values is named once.
+  arguments[7] = "sensors.stereo.sigma_px=1,2";
+  arguments[5] = "one";
+  arguments.insert(arguments.end(), {"--set", "reference=ekf"});
+  const Outcome one = Call(arguments);
+  ASSERT_EQ(one.code, 0) << one.err;
+  EXPECT_TRUE(Contains(one.out, "\nerrors are differences from estimator 'ekf'")) << one.out;
 }
 
 TEST_F(SweepCli, RefusesWhatCannotBeVaried) {

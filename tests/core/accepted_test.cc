@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // An estimator that uses what a filter before it accepted.
+#include "support/driven.h"
+#include "support/landmark_models.h"
 #include "support/recording.h"
 
 namespace alidade::testing {
@@ -86,6 +88,92 @@ TEST(AcceptedBy, HoldsWhereTheEstimatorsGoBackForLateFrames) {
   EXPECT_GT(run.arrivals.late, 20);
   EXPECT_EQ(run.estimators[0].counts.at("gated:inverse_scale"), 7);
   EXPECT_EQ(experiment.estimators[1].estimator->state().values(), Clean());
+}
+
+/// The given frames, of the given streams.
+class Given : public Source {
+ public:
+  Given(std::vector<StreamInfo> streams, std::vector<Frame> frames)
+      : streams_(std::move(streams)), frames_(std::move(frames)) {}
+  const std::vector<StreamInfo>& streams() const override { return streams_; }
+  const std::vector<StreamInfo>& truths() const override { return truths_; }
+  bool Next(Frame& frame) override {
+    if (next_ == frames_.size()) return false;
+    frame = frames_[next_++];
+    return true;
+  }
+
+ private:
+  std::vector<StreamInfo> streams_, truths_;
+  std::vector<Frame> frames_;
+  std::size_t next_ = 0;
+};
+
+/// Three ekf, of which the first has a gate; the others see what the one before accepted.
+Experiment MakeChain(const System& system, std::vector<StreamInfo> streams,
+                     std::vector<Frame> frames) {
+  Experiment experiment;
+  for (int i = 0; i < 3; ++i) {
+    NamedEstimator& named = experiment.estimators.emplace_back();
+    named.name = "ekf" + std::to_string(i);
+    named.system = system;
+    EkfOptions options;
+    if (i == 0) options.gate = 0.999;
+    named.estimator = std::make_unique<Ekf>(system, options, streams);
+    named.accepted_by = i - 1;
+  }
+  experiment.source = std::make_unique<Given>(std::move(streams), std::move(frames));
+  return experiment;
+}
+
+// Nobody measures the odometry: all of it is passed on, where a fix is gated too.
+TEST(AcceptedBy, PassesOnTheControlInputs) {
+  System system;
+  AddMotion(system, "car", InProcessMotion(Driven(0.2), "driven"), {{"position", 1.0, 0.5}});
+  system.motions[0].input.stream = "odometry";
+  AddSensor(system, "fix", InProcessSensor(Linear(1.0, 0.3), "linear"), {"car.position"});
+  const std::vector<Frame> frames = {FrameAt(0.0, {{0, 1.1}, {1, 2.0}}),
+                                     FrameAt(1.0, {{0, 50.0}, {1, -1.0}}), FrameAt(2.0, {{1, 0.5}}),
+                                     FrameAt(3.0, {{0, 2.6}})};
+  Experiment experiment = MakeChain(system, {{"fix", 1}, {"odometry", 1}}, frames);
+  const RunResult run = alidade::Run(experiment, {});
+  EXPECT_EQ(run.estimators[0].counts.at("gated:fix"), 1);
+  for (std::size_t e = 0; e < 3; ++e) {
+    EXPECT_EQ(run.estimators[e].counts.at("inputs:car"), 3) << e;
+    EXPECT_EQ(run.estimators[e].counts.at("accepted:fix"), 2) << e;
+    EXPECT_TRUE(run.estimators[e].events.empty()) << e;
+    EXPECT_EQ(experiment.estimators[e].estimator->state().values(),
+              experiment.estimators[0].estimator->state().values())
+        << e;
+  }
+}
+
+/// Two landmarks before a camera at rest; the first is seen 0.5 aside at the second frame.
+Experiment MakeChainOfMaps() {
+  const System system = MapSystem(InverseDepthPixels(0.001), WithPrior(), 0.01);
+  return MakeChain(system, {{"tracks", 2}},
+                   {Sights(0.0, {{0, {0.1, 0.1}}, {1, {-0.1, 0.1}}}),
+                    Sights(0.1, {{0, {0.6, 0.1}}, {1, {-0.1, 0.1}}}),
+                    Sights(0.2, {{0, {0.1, 0.1}}, {1, {-0.1, 0.1}}})});
+}
+
+// Several measurements of one stream, of which one is gated, and those that enter a landmark.
+TEST(AcceptedBy, MayFollowAFollower) {
+  for (const TimeOrder order : {TimeOrder::kReject, TimeOrder::kRewind}) {
+    Experiment experiment = MakeChainOfMaps();
+    if (order == TimeOrder::kRewind) experiment.time.window = StampFromSeconds(1.0);
+    experiment.time.order = order;
+    const RunResult run = alidade::Run(experiment, {});
+    ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
+    EXPECT_EQ(run.estimators[0].counts.at("gated:tracks"), 1);
+    for (std::size_t e = 0; e < 3; ++e) {
+      EXPECT_EQ(run.estimators[e].counts.at("initialised:tracks"), 2) << e;
+      EXPECT_EQ(run.estimators[e].counts.at("accepted:tracks"), 3) << e;
+      EXPECT_EQ(run.estimators[e].counts.count("gated:tracks"), e == 0 ? 1u : 0u) << e;
+    }
+    EXPECT_EQ(experiment.estimators[2].estimator->state().values(),
+              experiment.estimators[1].estimator->state().values());
+  }
 }
 
 /// Accepts what comes, once.

@@ -88,6 +88,7 @@ TEST(Ekf, JointEqualsSequentialOnALinearProblem) {
   }
 }
 
+// FAULTS 80
 TEST(Ekf, AnOutlierIsGatedAndLeavesStateAndCovarianceBitForBit) {
   const System system = DepthFilter();
   EkfOptions options;
@@ -203,6 +204,7 @@ TEST(Ekf, ASensorOutsideItsDomainIsReportedAsDivergenceOnce) {
   EXPECT_EQ(ValueOf(ekf.state(), "target.depth"), -0.2);
 }
 
+// FAULTS 73
 TEST(Ekf, NoiseThatVanishesIsWarnedOfOnce) {
   System system = MovingPoint();
   AddSensor(system, "direct", InProcessSensor(Linear(1.0, 1e-200), "linear"), {"p.x"});

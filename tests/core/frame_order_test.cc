@@ -27,9 +27,11 @@ class Given : public SwingingTarget {
     frame = frames_[static_cast<std::size_t>(next_++)];
     return true;
   }
+  const std::vector<StreamInfo>& streams() const override { return with_another_; }
   Place place() const override { return {"rows.csv", next_ + 1, 0}; }
 
  private:
+  std::vector<StreamInfo> with_another_ = {{"disparity", 1}, {"inverse_scale", 1}, {"aside", 1}};
   std::vector<Frame> frames_;
   int next_ = 0;
   bool then_fails_;
@@ -105,6 +107,35 @@ TEST_P(FrameOrder, MergedMeasurementsHaveTheOrderOfTheSensors) {
     const std::string timing = Read(folder / "out/timing.json");
     EXPECT_NE(timing.find("\"merged\": 1"), std::string::npos) << timing;
   }
+}
+
+// A source need not give those of one frame in the order of the sensors.
+TEST_P(FrameOrder, MergedFramesOfSeveralMeasurementsToo) {
+  for (const bool swapped : {false, true}) {
+    const TemporaryFolder folder;
+    const std::vector<Frame> frames = {FrameAt(0.0, {{0, 80.0}, {1, 1.0}}),
+                                       FrameAt(0.0, {{2, 5.0}})};
+    Experiment experiment = MakeGiven({frames[swapped], frames[!swapped]}, GetParam());
+    experiment.time.ranks = {2, 1, 0};
+    Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+    recorder.Finish(RunInto(recorder, experiment));
+    EXPECT_EQ(
+        Lines(folder / "out/measurements.csv"),
+        (std::vector<std::string>{"t_s,stream,landmark,v0", "0.000000000,aside,,5",
+                                  "0.000000000,inverse_scale,,1", "0.000000000,disparity,,80"}))
+        << swapped;
+  }
+}
+
+// The place of each goes with it.
+TEST_P(FrameOrder, AStreamTwiceInMergedFramesNamesTheFirstOfItsOwn) {
+  Experiment experiment = MakeGiven(
+      {FrameAt(0.0, {{0, 80.0}, {1, 1.0}}), FrameAt(0.0, {{2, 5.0}}), FrameAt(0.0, {{2, 5.0}})},
+      GetParam());
+  experiment.time.ranks = {2, 1, 0};
+  EXPECT_EQ(alidade::Run(experiment, {}).reason,
+            "rows.csv:4: stream 'aside' twice at t = 0.000000 s; expected one measurement at a "
+            "stamp; the first is in rows.csv:3");
 }
 
 TEST_P(FrameOrder, LandmarksOfOneStreamAreNotTheSameTwice) {

@@ -18,14 +18,15 @@ Eigen::Vector3d PointAt(int i) {
   return {0.1 * (i % 8 - 4), 0.1 * (i / 8 - 2), 2.0 + 0.1 * (i % 5)};
 }
 
-/// A known map, and a camera that may have moved by 0.1 m since.
-Ekf Filter(bool ransac, double gate = 0.999) {
+/// A known map, and a camera that may have moved by 0.1 m, or `sigma_0`, since.
+Ekf Filter(bool ransac, double gate = 0.999, double sigma_0 = 0.1, const RobustLoss& loss = {}) {
   LandmarkOptions options = WithPrior();
   for (int i = 0; i < kPoints; ++i) {
     const Eigen::Vector3d p = PointAt(i);
     options.known.push_back({i, {p[0], p[1], p[2]}, 0.002});
   }
-  System system = MapSystem(InverseDepthPixels(kNoise), options, 0.1);
+  System system = MapSystem(InverseDepthPixels(kNoise), options, sigma_0);
+  system.sensors[0].loss = loss;
   if (ransac) system.sensors[0].association = OnePointRansac{};
   EkfOptions gated;
   gated.gate = gate;
@@ -94,6 +95,29 @@ TEST(OnePointRansac, RescuesWhatFitsTheUpdatedState) {
   const Eigen::Vector3d error = PositionOf(ekf) - Eigen::Vector3d(0.05, -0.03, 0.08);
   const Eigen::MatrixXd p = ekf.state().covariance().Block(0, 3, 0, 3);
   EXPECT_LT(error.dot(p.llt().solve(error)), 16.3);  // chi2(0.999, 3)
+}
+
+// Cauchy's R / w grows as fast as r^2: were it the noise of the test, any match would support any
+// hypothesis. What agrees is weighed all the same, here by less than 1.
+TEST(OnePointRansac, TestsAgainstTheSensorsNoiseWhateverTheLoss) {
+  const RobustLoss loss{LossKind::kCauchy, 1.0};
+  const Eigen::Vector3d r(0.001, 0.0, 0.0);
+  const Frame frame = Matches(r, 3, 0.03);
+  Ekf ekf = Filter(true, 1.0, 0.001, loss), told = Filter(false, 1.0, 0.001, loss);
+  const UpdateReport& report = ekf.Process(frame);
+  EXPECT_EQ(Accepted(report, 3, true), 0);
+  EXPECT_GE(Accepted(report, 3, false), 25);
+  Frame right = frame;
+  std::erase_if(right.measurements, [&](const Measurement& m) {
+    const auto entry =
+        std::ranges::find(report.measurements(), m.landmark, &MeasurementReport::landmark);
+    return entry->outcome != Outcome::kAccepted;
+  });
+  told.Process(right);
+  EXPECT_LT((PositionOf(ekf) - PositionOf(told)).norm(), 2e-5);
+  Ekf plain = Filter(false, 1.0, 0.001);
+  plain.Process(right);
+  EXPECT_GT((PositionOf(plain) - PositionOf(told)).norm(), 5e-5);
 }
 
 TEST(OnePointRansac, IsTheSameTwice) {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
+
 #include "alidade/iekf.h"
 #include "alidade/rts.h"
 #include "alidade/square_root_ekf.h"
@@ -75,6 +77,105 @@ TYPED_TEST(RobustFilter, TakesAnOutlierWithROverW) {
     EXPECT_NEAR(report.measurements()[0].nis, d * d, 1e-12);
     EXPECT_NEAR(report.measurements()[0].s[0], 4.0 + 1.0 / w, 1e-12);
   }
+}
+
+// R / w is beyond any number: the measurement is left out, and the good one beside it is used.
+TYPED_TEST(RobustFilter, LeavesOutWhatItsWeightOfZeroIsFor) {
+  for (const RobustLoss& loss : {kCauchy, kHuber}) {
+    System system = Measured({});
+    AddSensor(system, "far", InProcessSensor(Linear(1.0, 1.0), "linear"), {"p.x"});
+    system.sensors[1].loss = loss;
+    for (const double far : {1e155, 1e200}) {
+      TypeParam filter(system, {}, StreamsOf(system));
+      const UpdateReport& report = filter.Process(FrameAt(0.0, {{0, 2.0}, {1, far}}));
+      EXPECT_EQ(report.measurements()[0].outcome, Outcome::kAccepted) << far;
+      EXPECT_EQ(report.measurements()[1].outcome, Outcome::kGated) << far;
+      EXPECT_NEAR(ValueOf(filter.state(), "p.x"), 1.6, 1e-12) << far;
+      EXPECT_NEAR(CovarianceOf(filter.state(), "p.x", "p.x"), 0.8, 1e-12) << far;
+    }
+    TypeParam filter(system, {}, StreamsOf(system));  // w is a number here, and R / w too
+    const UpdateReport& report = filter.Process(FrameAt(0.0, {{0, 2.0}, {1, 1e150}}));
+    EXPECT_EQ(report.measurements()[1].outcome, Outcome::kAccepted);
+    const double pull = loss.kind == LossKind::kHuber ? 0.8 * 1.345 * std::sqrt(5.0) : 0.0;
+    EXPECT_NEAR(ValueOf(filter.state(), "p.x"), 1.6 + pull, 1e-9);
+  }
+}
+
+/// z = x + n of two elements.
+struct Pair : Sensor<Vec<2>, Vec<2>> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    std::copy_n(x, 2, z);
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = l[3] = T(1.0);
+  }
+};
+
+template <class Filter>
+struct OptionsOf : EkfOptions {};
+template <>
+struct OptionsOf<Iekf> : IekfOptions {};
+template <>
+struct OptionsOf<Ukf> : UkfOptions {};
+EkfOptions& Common(EkfOptions& options) { return options; }
+EkfOptions& Common(UkfOptions& options) { return options.filter; }
+
+struct Normal {
+  Eigen::Vector2d x;
+  Eigen::Matrix2d p;
+  /// The Kalman update with R / w(d), d^2 = r' S^-1 r.
+  void Take(const Eigen::Vector2d& z, const Eigen::Matrix2d& r, const RobustLoss& loss) {
+    const Eigen::Vector2d innovation = z - x;
+    const double d = std::sqrt(innovation.dot((p + r).inverse() * innovation));
+    const Eigen::Matrix2d gain = p * (p + r / Weight(loss, d)).inverse();
+    x += gain * innovation;
+    p -= gain * p;
+  }
+};
+
+// One weight for both elements, R correlated and of the measurement itself. `fuse: per_*` takes d
+// of the second after the first; a gate sees S before the loss.
+TYPED_TEST(RobustFilter, WeighsAMeasurementOfTwoElementsAsAWhole) {
+  System system;
+  const MotionModel still = InProcessMotion(Constant<>(2), "constant");
+  const BlockId id = system.layout.Declare("p.x", "p", still.blocks()[0]);
+  system.motions.push_back({"p", still, {id}});
+  const Eigen::Matrix2d p0 = (Eigen::Matrix2d() << 4.0, 1.0, 1.0, 2.0).finished();
+  system.priors.push_back({id, {0.0, 0.0}, p0, ""});
+  for (const char* name : {"one", "two"}) {
+    AddSensor(system, name, InProcessSensor(Pair{}, "pair"), {"p.x"});
+    system.sensors.back().loss = kCauchy;
+  }
+  const Eigen::Matrix2d r = (Eigen::Matrix2d() << 0.25, 0.15, 0.15, 0.16).finished();
+  const Eigen::Vector2d z[] = {{7.0, -4.0}, {1.0, 0.5}};
+  Frame frame = FrameAt(0.0, {});
+  for (int i = 0; i < 2; ++i) {
+    frame.measurements.push_back({frame.stamp, i, -1, {z[i](0), z[i](1)}, {}});
+    frame.measurements.back().covariance = {r(0, 0), r(0, 1), r(1, 0), r(1, 1)};
+  }
+  Normal expected{Eigen::Vector2d::Zero(), p0};
+  for (const Eigen::Vector2d& one : z) expected.Take(one, r, kCauchy);
+  OptionsOf<TypeParam> options;
+  Common(options).fuse = Fuse::kPerSensor;
+  TypeParam filter(system, options, StreamsOf(system));
+  const UpdateReport report = filter.Process(frame);
+  EXPECT_GT(report.measurements()[0].nis, 20.0);
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_NEAR(filter.state().value(id)[i], expected.x(i), 1e-9);
+    for (int j = 0; j < 2; ++j) {
+      EXPECT_NEAR(filter.state().covariance().Dense()(i, j), expected.p(i, j), 1e-9);
+    }
+  }
+  Common(options).gate = 0.9999;  // chi2(0.9999, 2) = 18.4
+  TypeParam gated(system, options, StreamsOf(system));
+  const UpdateReport& gates = gated.Process(frame);
+  EXPECT_EQ(gates.measurements()[0].outcome, Outcome::kGated);
+  EXPECT_EQ(gates.measurements()[1].outcome, Outcome::kAccepted);
 }
 
 TEST(RobustLoss, HuberLeavesAnInlierAsItIs) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "support/driven.h"
 #include "support/recording.h"
 
 namespace alidade {
@@ -215,6 +216,41 @@ class Failing : public testing::SwingingTarget {
   ExitCode code_;
   int count_ = 0;
 };
+
+/// A speed and a fix each second.
+class EachSecond : public testing::SwingingTarget {
+ public:
+  explicit EachSecond(int frames) : SwingingTarget(0), left_(frames) {}
+  bool Next(Frame& frame) override {
+    if (left_-- == 0) return false;
+    frame = testing::FrameAt(t_s_, {{0, t_s_}, {1, 1.0}});
+    t_s_ += 1.0;
+    return true;
+  }
+
+ private:
+  int left_;
+  double t_s_ = 0.0;
+};
+
+// An input that always comes too late: the run says it once, and counts.
+TEST(Run, AnInputThatIsMissingAgainAndAgainIsOneEventAndACount) {
+  Experiment experiment;
+  experiment.source = std::make_unique<EachSecond>(100);
+  NamedEstimator& named = experiment.estimators.emplace_back();
+  named.name = "ekf";
+  testing::AddMotion(named.system, "car", InProcessMotion(testing::Driven(0.2), "driven"),
+                     {{"position", 0.0, 1.0}});
+  named.system.motions[0].input = {"inverse_scale", 0.5};
+  testing::AddSensor(named.system, "disparity",
+                     InProcessSensor(testing::Linear(1.0, 1.0), "linear"), {"car.position"});
+  named.estimator = std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+  const RunResult run = alidade::Run(experiment, {});
+  const EstimatorResult& ekf = run.estimators[0];
+  EXPECT_EQ(std::ranges::count(ekf.events, "input_stale", &Event::kind), 1);
+  EXPECT_EQ(ekf.counts.at("input_stale"), 99);
+  EXPECT_EQ(ekf.counts.at("inputs:car"), 100);
+}
 
 TEST(Run, BadDataKeepsWhatWasDone) {
   Experiment experiment = MakeExperiment();

@@ -122,6 +122,76 @@ TEST(CeresBatchEnds, AModelThatFailsAtTheEndIsSaid) {
   }
 }
 
+// The filter that goes along cannot step to the second frame; the batch can, later. The block that
+// waits for its first value never gets it, and the events say why, once.
+TEST(CeresBatchEnds, ThatItsFilterEndedIsSaid) {
+  System system;
+  testing::AddMotion(system, "p", InProcessMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
+  testing::AddMotion(system, "c", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.0, 1.0}});
+  AddSensor(system, "z", InProcessSensor(testing::Linear(2.0, 0.3), "linear"), {"p.x"});
+  AddSensor(system, "y", InProcessSensor(testing::Linear(1.0, 0.3), "linear"), {"c.x"});
+  system.priors.back().from = "y";
+  const auto batch = MakeBatch(system);
+  Failing::budget = 0;
+  std::vector<std::string> said;
+  for (int k = 0; k < 4; ++k) {
+    const Frame frame =
+        k == 0 ? FrameAt(0.0, {{0, 0.0}}) : FrameAt(0.1 * k, {{0, 0.2 * k}, {1, 0.5}});
+    for (const Event& event : batch->Process(frame).events) said.push_back(event.text);
+    if (k == 1) Failing::budget = 1000;
+  }
+  ASSERT_EQ(said.size(), 1u);
+  EXPECT_EQ(said[0].find("the filter that the batch starts from, and that gives blocks their first "
+                         "values, ended: motion model of 'p' cannot step: out of its domain"),
+            0u)
+      << said[0];
+  std::vector<Outcome> outcomes;
+  batch->Smooth([&](std::size_t, const State&, const UpdateReport& report) {
+    for (const MeasurementReport& entry : report.measurements()) outcomes.push_back(entry.outcome);
+  });
+  EXPECT_FALSE(batch->failed());
+  EXPECT_EQ(std::ranges::count(outcomes, Outcome::kAccepted), 4);
+  EXPECT_EQ(std::ranges::count(outcomes, Outcome::kNotReady), 3);
+}
+
+// It ends at its last good state, and says so once.
+TEST(CeresBatchEnds, AFilterThatGaveUpStepsNoMore) {
+  System system;
+  testing::AddMotion(system, "p", InProcessMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
+  AddSensor(system, "z", InProcessSensor(testing::Linear(2.0, 0.3), "linear"), {"p.x"});
+  Ekf ekf(system, {}, testing::StreamsOf(system));
+  ekf.Process(FrameAt(0.0, {{0, 0.2}}));
+  const std::vector<double> good = ekf.state().values();
+  const Eigen::MatrixXd p = ekf.state().covariance().Dense();
+  Failing::budget = 0;
+  ekf.Process(FrameAt(0.1, {{0, 0.2}}));
+  EXPECT_TRUE(ekf.failed());
+  Failing::budget = 1000;
+  const UpdateReport& report = ekf.Process(FrameAt(0.2, {{0, 0.2}}));
+  EXPECT_TRUE(report.events.empty());
+  EXPECT_EQ(report.measurements()[0].outcome, Outcome::kFailed);
+  EXPECT_EQ(ekf.stamp(), 0);
+  EXPECT_EQ(ekf.state().values(), good);
+  EXPECT_EQ(ekf.state().covariance().Dense(), p);
+}
+
+TEST(CeresBatchEnds, TooFewIterationsNameTheKeyThatAllowsMore) {
+  System system = testing::MovingPoint(0.7);
+  AddSensor(system, "z", InProcessSensor(testing::Linear(2.0, 0.3), "linear"), {"p.x"});
+  system.sensors[0].loss = {LossKind::kHuber, 0.1};
+  const auto batch = MakeBatch(system, "max_iterations: 2\n");
+  for (int k = 0; k < 20; ++k) batch->Process(FrameAt(0.05 * k, {{0, 4.0 + k % 3}}));
+  std::string said;
+  batch->Smooth([&](std::size_t, const State&, const UpdateReport& report) {
+    for (const Event& event : report.events) said += event.text;
+  });
+  EXPECT_TRUE(batch->failed());
+  EXPECT_NE(said.find("not converged, Maximum number of iterations reached. Number of iterations: "
+                      "2. A larger max_iterations (2 here) may do."),
+            std::string::npos)
+      << said;
+}
+
 /// z = x^2 with a Jacobian of the wrong sign.
 struct WrongSign : Sensor<Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x", "m"}};

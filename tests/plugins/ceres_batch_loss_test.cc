@@ -139,6 +139,29 @@ TEST(CeresBatchLoss, OfTheDataSoFarEndsWhereTheSmootherDoes) {
   EXPECT_NEAR(testing::CovarianceOf(batch->state(), "p.x", "p.v"), smoothed.p.back()(0, 1), 1e-8);
 }
 
+// Its square is beyond any number: the cost is no cost.
+TEST(CeresBatchLoss, AResidualWithoutAFiniteSquareIsNoSolution) {
+  const System system = PointWith({LossKind::kCauchy, 2.0});
+  const Config config = Config::FromText("type: ceres_batch", "batch.yaml");
+  const auto batch =
+      Shipped().CreateEstimator("ceres_batch", config.root())(system, testing::StreamsOf(system));
+  double t_s = 0.0;
+  for (const double z : {1.0, 1e160, 1.2}) batch->Process(FrameAt(t_s += 0.1, {{0, z}}));
+  std::string said;
+  try {
+    batch->Smooth([&](std::size_t, const State&, const UpdateReport& report) {
+      for (const Event& event : report.events) said += event.text;
+    });
+  } catch (const Error& error) {
+    said += error.what();
+  }
+  EXPECT_TRUE(batch->failed());
+  EXPECT_NE(said.find("not converged, the cost is not finite: a measurement lies too far out; "
+                      "`use: {accepted_by: FILTER}` leaves out what a filter gates"),
+            std::string::npos)
+      << said;
+}
+
 // ---- several elements ---------------------------------------------------------------------------
 
 struct StillPair : Motion<0, Vec<2>> {

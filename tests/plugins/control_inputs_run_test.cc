@@ -103,7 +103,8 @@ TEST_F(DrivenTest, EveryEstimatorIsDrivenAsTheKalmanFilterWrittenOut) {
       EXPECT_EQ(testing::Lines(folder / one.name / "innovations.csv").size(), 8u) << one.name;
       EXPECT_EQ(one.counts.at("inputs:car"), 6) << one.name;
       EXPECT_EQ(one.counts.at("accepted:gps"), 7) << one.name;
-      EXPECT_EQ(one.counts.size(), 2u) << one.name;
+      EXPECT_EQ(one.counts.at("input_stale"), 2) << one.name;
+      EXPECT_EQ(one.counts.size(), 3u) << one.name;
       const auto count = [&](const char* kind) {
         return std::ranges::count(one.events, kind, &Event::kind);
       };
@@ -114,6 +115,34 @@ TEST_F(DrivenTest, EveryEstimatorIsDrivenAsTheKalmanFilterWrittenOut) {
     const std::string json = testing::Read(folder / "run.json");
     EXPECT_NE(json.find("\"inputs:car\": 6"), std::string::npos) << json;
   }
+}
+
+// No sensor measures the odometry: a filter neither accepts nor refuses it.
+TEST_F(DrivenTest, WhatAFilterAcceptedComesWithAllInputs) {
+  const RunResult run =
+      RunInto(Read({{"estimators",
+                     "{ekf: {type: ekf}, same: {type: ekf, use: {accepted_by: ekf}}, batch: {type: "
+                     "ceres_batch, use: {accepted_by: ekf}}}"}}),
+              folder_ / "run");
+  ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
+  for (const EstimatorResult& one : run.estimators) {
+    const std::vector<Gaussian> expected = WrittenOut(one.name == "batch");
+    const auto lines = testing::Lines(folder_ / "run" / one.name / "estimates.csv");
+    ASSERT_EQ(lines.size(), expected.size() + 1) << one.name;
+    for (std::size_t k = 0; k < expected.size(); ++k) {
+      EXPECT_NEAR(std::stod(testing::Cells(lines[k + 1])[1]), expected[k].x, 1e-9) << one.name << k;
+    }
+    EXPECT_EQ(one.counts.at("inputs:car"), 6) << one.name;
+  }
+}
+
+TEST_F(DrivenTest, AStreamThatTheLenderMeasuresIsNoInputOfTheFollower) {
+  EXPECT_EQ(Refusal("estimators",
+                    "{ekf: {type: ekf}, same: {type: ekf, use: {accepted_by: ekf}, overrides: "
+                    "{state: {car: {input: {stream: gps}}}}}}"),
+            "--set estimators.same.use.accepted_by: stream 'gps' is the control input of 'car' and "
+            "goes to sensor 'gps' of 'ekf': what that does not accept would be missing as an "
+            "input; expected a filter without a sensor on that stream");
 }
 
 TEST_F(DrivenTest, ASensorOfTheNameOfAnEntryIsStillToldUnused) {

@@ -43,9 +43,11 @@ class Metrics {
            const UpdateReport& report);
   /// The part of Add that needs no truth: counts and NIS.
   void AddReport(const std::vector<bool>& in_segment, const UpdateReport& report);
-  /// The errors of `state` where `frame.truth` is an estimate itself: rmse, lag and final alone.
-  /// How far the two may be apart P does not tell, as they share their data.
-  void AddDifference(const Frame& frame, const std::vector<bool>& in_segment, const State& state);
+  /// The errors of an estimate, its values by block of the estimator's system and empty where there
+  /// is none, where `frame.truth` is an estimate itself: rmse, lag and final alone. How far the two
+  /// may be apart P does not tell, as they share their data.
+  void AddDifference(const Frame& frame, const std::vector<bool>& in_segment,
+                     const std::vector<std::vector<double>>& estimate);
   /// `inconsistent`, once for each block element: truth is known and the error has been beyond 10
   /// sigma for 20 stamps on end.
   const std::vector<Event>& events() const;

@@ -31,6 +31,7 @@ struct SweepRun {
   ExitCode code = ExitCode::kOk;
   std::string reason;
   std::vector<EstimatorResult> estimators;  ///< without events
+  bool withheld = false;                    ///< no reference to compare with, as in RunResult
 
   /// Whether the metrics of `one` count: the run is whole, and it did not diverge.
   bool Uses(const EstimatorResult& one) const { return status == RunStatus::kOk && !one.diverged; }
@@ -70,8 +71,9 @@ struct VariedSweep {
 };
 
 /// Sweeps over `config` with each value of the variation in turn; `options.progress` counts the
-/// runs of all. Errors: kBadConfig where the key is `source.seed`, or the map that it is in is not
-/// there; those of BuildExperiment for any of the values, before the first run.
+/// runs of all. Errors, before the first run: kBadConfig where the key is `source.seed`, the map
+/// that it is in is not there, or the values have different estimators; those of BuildExperiment
+/// for any of the values.
 VariedSweep SweepOver(const Config& config, const PluginHost& host, const SweepOptions& options,
                       const Variation& variation);
 

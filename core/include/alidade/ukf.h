@@ -9,12 +9,15 @@
 namespace alidade {
 
 struct UkfOptions {
+  /// The mean of values y loses eps |y| / (2 alpha^2) to rounding: 1e-8 |y| here.
+  static constexpr double kLeastAlpha = 1e-4;
+
   EkfOptions filter;    ///< gate, fuse and max_dt_s; `lockout` counts as kNone
-  double alpha = 0.01;  ///< spread of the sigma points, in (0, 1]
+  double alpha = 0.01;  ///< spread of the sigma points, in [1e-4, 1]
   double beta = 2.0;    ///< weight of what the centre adds, >= 0; 2: best for a Gaussian
   double kappa = 0.0;   ///< spread beyond the number of directions, >= 0
 
-  /// Reads `alpha` in (0, 1], `beta` >= 0, `kappa` >= 0, `gate`, `fuse` and `max_dt_s` from an
+  /// Reads `alpha` in [1e-4, 1], `beta` >= 0, `kappa` >= 0, `gate`, `fuse` and `max_dt_s` from an
   /// estimator's entry of the config. Errors: kBadConfig.
   static UkfOptions FromNode(const Node& entry);
   /// What FromNode reads.
@@ -37,9 +40,11 @@ struct UkfOptions {
 /// measurement; h, S and NIS are reported as the gate saw them.
 ///
 /// Where sigma points leave the domain of a model that is defined at x0, or lie too far round a
-/// manifold to have a mean, their spread is halved until they do not (event `guarded`); a sensor
-/// that is not defined at x0 is out of domain. Where P has lost positive semi-definiteness,
-/// negative pivots count as zero (event `repaired`).
+/// manifold to have a mean, their spread is halved until they do not (event `guarded`), as long as
+/// alpha stays above 1e-4: the mean loses eps |y| / (2 alpha^2) to rounding. Where they still do,
+/// the measurement is out of domain, and a step ends the filter; a sensor that is not defined at x0
+/// is out of domain. Where P has lost positive semi-definiteness, negative pivots count as zero
+/// (event `repaired`).
 ///
 /// Source       [Julier2004]; [Wan2000] alpha, beta, kappa.
 class Ukf : public Ekf {
@@ -70,8 +75,9 @@ class Ukf : public Ekf {
   };
   /// What the sigma points make of one measurement.
   struct Predicted {
-    int halvings = 0;       ///< of the spread
-    std::vector<double> f;  ///< m x 2n by columns
+    int halvings = 0;            ///< of the spread
+    std::vector<double> centre;  ///< h(x0)
+    std::vector<double> f;       ///< m x 2n by columns
     std::vector<double> m;
   };
   struct Moments {
@@ -80,6 +86,7 @@ class Ukf : public Ekf {
   };
 
   Transform TransformOf(Eigen::Index directions, int halvings) const;
+  bool MayHalve(int halvings) const;
   const Eigen::MatrixXd& Root();
   Status StepPoints(int halvings, double dt_s);
   Status StepPoint(const double* from, const double* noise, double dt_s, double* to);
@@ -87,7 +94,7 @@ class Ukf : public Ekf {
   Moments MomentsAt(const Row& row);
   Outcome StackPoints(std::span<Row* const> rows, int halvings, Stacked& all,
                       Workspace::Vector& mean);
-  void NoteGuard(std::size_t index, int halvings);
+  void NoteGuard(std::size_t index, int halvings, bool narrow_enough);
 
   UkfOptions spread_;
   Eigen::MatrixXd root_;  ///< of P

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "running.h"
+
+#include <algorithm>
+
+#include "observability.h"
+#include "text_table.h"
+
+namespace alidade::internal {
+
+void Running::Take(std::size_t k, const Seen& seen, const State& state, const UpdateReport& report,
+                   Recorder* recorder) {
+  took = true;
+  if (!waits) {
+    metrics.Add(seen.frame, seen.in_segment, state, report);
+  } else {
+    metrics.AddReport(seen.in_segment, report);
+    if (!report.stale) {
+      estimates.push_back({k, ValuesOf(state, named.system.layout.blocks().size())});
+    }
+  }
+  if (recorder != nullptr) recorder->AddEstimate(index, seen.frame, state, report);
+}
+
+void Running::Note(const std::vector<Event>& events) {
+  for (const Event& event : events) {
+    const auto same = [&](const Event& one) {
+      return one.kind == event.kind && one.text == event.text;
+    };
+    const bool stale = event.kind == "input_stale";
+    if (stale) ++stale_inputs;
+    if (!stale || std::ranges::none_of(result.events, same)) result.events.push_back(event);
+  }
+}
+
+EstimatorResult Begin(const NamedEstimator& named) {
+  EstimatorResult result;
+  result.name = named.name;
+  result.unobservable = UnobservableDirections(named.system);
+  if (!ObservabilityIsTold(named.system)) {
+    result.events.push_back({kNoStamp, "observability",
+                             "not looked into: the state has more than " +
+                                 std::to_string(kMostObserved) + " elements"});
+  }
+  for (const auto& direction : result.unobservable) {
+    result.events.push_back({kNoStamp, "unobservable",
+                             "no sensor of this estimator tells " + Join(direction, " and ") +
+                                 (direction.size() > 1 ? " apart" : "")});
+  }
+  return result;
+}
+
+void NoteUnits(const System& system, const Metrics& metrics, EstimatorResult& result) {
+  for (const int index : metrics.far_off()) {
+    const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(index)];
+    const std::string& unit = sensor.model.measurement().unit;
+    result.events.push_back(
+        {kNoStamp, "unit",
+         "sensor '" + sensor.name + "': the median of |z - h| is more than 100 sigma; is stream '" +
+             sensor.stream + "' in " + (unit.empty() ? "the model's units" : unit) + '?'});
+  }
+}
+
+void NoteUnused(const System& system, const std::string& accepted_by, EstimatorResult& result) {
+  for (const SensorBinding& sensor : system.sensors) {
+    std::int64_t used = 0, all = 0;
+    std::vector<std::string> others;
+    for (const auto& [key, count] : result.counts) {
+      const std::size_t colon = key.find(':');
+      const std::string outcome = key.substr(0, colon);
+      if (key.substr(colon + 1) != sensor.name || outcome == "inputs") continue;
+      all += count;
+      if (outcome == ToString(Outcome::kAccepted) || outcome == ToString(Outcome::kInitialised)) {
+        used += count;
+      } else {
+        others.push_back(std::to_string(count) + ' ' + outcome);
+      }
+    }
+    if (used > 0) continue;
+    const std::string of_all =
+        all > 0 ? " used none of " + std::to_string(all) + " measurements: " + Join(others, ", ")
+                : ": stream '" + sensor.stream + "' had no measurement" +
+                      (accepted_by.empty() ? "" : " that " + accepted_by + " accepted");
+    result.events.push_back({kNoStamp, "unused", "sensor '" + sensor.name + "'" + of_all});
+  }
+}
+
+}  // namespace alidade::internal

@@ -11,7 +11,8 @@
 namespace alidade::internal {
 
 /// The files of one estimator that grow frame by frame: `estimates.csv`, `innovations.csv`,
-/// `gains.csv` and, of sensors of landmarks, `reprojection.csv`. They hold the blocks and sensors that the system has from the start.
+/// `gains.csv` and, of sensors of landmarks, `reprojection.csv`. They hold the blocks and sensors
+/// that the system has from the start.
 class EstimatorFiles {
  public:
   /// `truth_columns` names the columns of truth.csv, by truth and element.

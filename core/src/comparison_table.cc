@@ -16,8 +16,9 @@ namespace alidade {
 namespace internal {
 namespace {
 
-constexpr std::array<std::string_view, 6> kOrder = {"rmse",      "lag_ms",     "cov95",
-                                                    "nees.mean", "nees.cov95", "nis.mean"};
+constexpr std::array<std::string_view, 10> kOrder = {
+    "rmse",     "lag_ms",        "cov95",          "nees.mean",    "nees.cov95",
+    "nis.mean", "map.sim3.rmse", "map.sim3.scale", "reprojection", "settling_frames"};
 
 std::string_view KindOf(std::string_view key) { return key.substr(0, key.find(':')); }
 
@@ -122,6 +123,7 @@ ComparisonRow RowOf(const RunResult& result, const std::string& key) {
     scaled = ScaleUnit(unit, LargestRmse(result, unit));
   }
   if (kind == "lag_ms") scaled.unit = "ms";
+  if (kind == "map.sim3.rmse") scaled = ScaleUnit("m", LargestRmse(result, "m"));
   if (kind == "cov95" || kind == "nees.cov95") scaled = {100.0, "%"};
   for (auto& value : values) {
     if (value) *value *= scaled.factor;

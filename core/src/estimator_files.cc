@@ -2,10 +2,13 @@
 #include "estimator_files.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
+#include "alidade/sweep.h"
 #include "columns.h"
+#include "frame_innovation.h"
 
 namespace alidade::internal {
 
@@ -32,7 +35,29 @@ EstimatorFiles::EstimatorFiles(const RunFolder& folder, const NamedEstimator& na
           folder, named.name + "/estimates.csv",
           EstimatesHeader(named.system, MatchTruths(named.system.layout, truths), truth_columns)),
       innovations_(folder, named.name + "/innovations.csv", InnovationsHeader()),
-      gains_(folder, named.name + "/gains.csv", GainsHeader(named.system)) {}
+      gains_(folder, named.name + "/gains.csv", GainsHeader(named.system)) {
+  FindPath(named.system);
+  if (std::ranges::any_of(named.system.sensors, HasReprojection)) {
+    reprojection_.emplace(folder, named.name + "/reprojection.csv",
+                          std::vector<std::string>{"t_s", "sensor", "landmarks", "rms"});
+  }
+}
+
+void EstimatorFiles::FindPath(const System& system) {
+  for (std::size_t s = 0; s < system.sensors.size(); ++s) {
+    const SensorBinding& binding = system.sensors[s];
+    recorded_.sensors[s].has_reprojection = HasReprojection(binding);
+    if (!binding.model.has_landmark()) continue;
+    for (std::size_t r = 0; r < binding.roles.size(); ++r) {
+      if (binding.model.roles()[r].name != "position") continue;
+      for (const BlockColumns& columns : blocks_) {
+        if (columns.id == binding.roles[r].block && columns.ambient == 3) {
+          recorded_.path = static_cast<int>(columns.element);
+        }
+      }
+    }
+  }
+}
 
 std::vector<std::string> EstimatorFiles::EstimatesHeader(
     const System& system, const std::vector<int>& truth_of,
@@ -92,6 +117,13 @@ void EstimatorFiles::Add(const Frame& frame, const State& state, const UpdateRep
     if (one.sensor < 0 || one.sensor >= static_cast<int>(recorded_.sensors.size())) continue;
     AddInnovation(frame.stamp, one);
     if (!one.gain.empty()) AddGain(frame.stamp, state, one);
+  }
+  for (std::size_t s = 0; s < recorded_.sensors.size(); ++s) {
+    if (!recorded_.sensors[s].has_reprojection) continue;
+    const FrameInnovation innovation = FrameInnovationOf(report, static_cast<int>(s));
+    if (innovation.measurements == 0) continue;
+    reprojection_->Time(frame.stamp).Text(recorded_.sensors[s].name);
+    reprojection_->Integer(innovation.measurements).Number(innovation.rms).EndRow();
   }
 }
 
@@ -179,12 +211,35 @@ void EstimatorFiles::AddGain(Stamp stamp, const State& state, const MeasurementR
   gains_.EndRow();
 }
 
+RecordedMap DescribeMap(const std::vector<LandmarkEstimate>& landmarks) {
+  RecordedMap map;
+  std::array<std::vector<double>, 3> places;
+  for (const LandmarkEstimate& one : landmarks) {
+    if (!one.position.allFinite()) continue;
+    ++map.placed;
+    map.known += one.true_position.allFinite() ? 1 : 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      places[axis].push_back(one.position[static_cast<Eigen::Index>(axis)]);
+    }
+  }
+  if (map.placed == 0) return map;
+  std::array<double, 3> spread;  // by quartiles: a few lie far off
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::ranges::sort(places[axis]);
+    spread[axis] = Quantile(places[axis], 0.75) - Quantile(places[axis], 0.25);
+  }
+  const auto thin = std::ranges::min_element(spread) - spread.begin();
+  map.across = thin == 0 ? 1 : 0;
+  map.along = thin == 2 ? 1 : 2;
+  return map;
+}
+
 void WriteLandmarks(const RunFolder& folder, const std::string& estimator,
                     const std::vector<LandmarkEstimate>& landmarks) {
-  CsvFile file(
-      folder, estimator + "/landmarks.csv",
-      {"id", "generation", "form", "x", "y", "z", "sigma_x", "sigma_y", "sigma_z",
-       "inverse_distance", "sigma_inverse_distance", "first_s", "last_s", "tried", "accepted"});
+  CsvFile file(folder, estimator + "/landmarks.csv",
+               {"id", "generation", "form", "x", "y", "z", "sigma_x", "sigma_y", "sigma_z",
+                "inverse_distance", "sigma_inverse_distance", "first_s", "last_s", "tried",
+                "accepted", "true_x", "true_y", "true_z"});
   const auto number = [&file](double value) {
     if (std::isfinite(value)) {
       file.Number(value);
@@ -198,7 +253,9 @@ void WriteLandmarks(const RunFolder& folder, const std::string& estimator,
     for (int i = 0; i < 3; ++i) number(std::sqrt(one.covariance(i, i)));
     number(one.inverse_distance);
     number(one.sigma);
-    file.Time(one.first).Time(one.last).Integer(one.tried).Integer(one.accepted).EndRow();
+    file.Time(one.first).Time(one.last).Integer(one.tried).Integer(one.accepted);
+    for (const double x : one.true_position) number(x);
+    file.EndRow();
   }
   file.Close();
 }
@@ -207,6 +264,10 @@ void EstimatorFiles::Close() {
   estimates_.Close();
   innovations_.Close();
   gains_.Close();
+  if (reprojection_) {
+    reprojection_->Close();
+    recorded_.reprojection_rows = reprojection_->rows();
+  }
   recorded_.estimate_rows = estimates_.rows();
   recorded_.innovation_rows = innovations_.rows();
   recorded_.gain_rows = gains_.rows();

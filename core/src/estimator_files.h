@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "alidade/run.h"
@@ -9,8 +10,9 @@
 
 namespace alidade::internal {
 
-/// The files of one estimator that grow frame by frame: `estimates.csv`, `innovations.csv` and
-/// `gains.csv`. They hold the blocks and sensors that the system has from the start.
+/// The files of one estimator that grow frame by frame: `estimates.csv`, `innovations.csv`,
+/// `gains.csv` and, of sensors of landmarks, `reprojection.csv`. They hold the blocks and sensors
+/// that the system has from the start.
 class EstimatorFiles {
  public:
   /// `truth_columns` names the columns of truth.csv, by truth and element.
@@ -38,6 +40,8 @@ class EstimatorFiles {
       const std::vector<std::vector<std::string>>& truth_columns);
   std::vector<std::string> InnovationsHeader() const;
   std::vector<std::string> GainsHeader(const System& system);
+  /// The position that landmarks are seen from, among the elements.
+  void FindPath(const System& system);
   void AddEstimate(const Frame& frame, const State& state);
   void AddInnovation(Stamp stamp, const MeasurementReport& report);
   void AddGain(Stamp stamp, const State& state, const MeasurementReport& report);
@@ -46,7 +50,11 @@ class EstimatorFiles {
   std::vector<BlockColumns> blocks_;
   std::size_t gain_columns_ = 0;
   CsvFile estimates_, innovations_, gains_;
+  std::optional<CsvFile> reprojection_;
 };
+
+/// What a figure of the map has to know.
+RecordedMap DescribeMap(const std::vector<LandmarkEstimate>& landmarks);
 
 /// `NAME/landmarks.csv`: the map at the end. A number that is not finite is left empty. Error: kIo.
 void WriteLandmarks(const RunFolder& folder, const std::string& estimator,

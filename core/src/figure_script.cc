@@ -48,6 +48,7 @@ set style line 14 pt 7 ps 0.35 lc rgb '#4a8db7'
 set style line 15 pt 7 ps 0.35 lc rgb '#5aa469'
 set style line 16 pt 2 ps 0.5 lc rgb '#c03030'
 set style line 17 pt 8 ps 0.6 lc rgb '#c03030'
+set style line 18 pt 6 ps 0.8 lc rgb '#111111'
 max(a, b) = a > b ? a : b
 min(a, b) = a < b ? a : b
 # What a range is widened by at each end; never zero.
@@ -149,7 +150,7 @@ std::string FigureScript::TimeAxis(std::string& label) const {
 
 std::string FigureScript::Text() const {
   // A panel is as high as its key, which would go on beyond the right edge.
-  const int height = std::max(170, 76 + 18 * most_keys_);
+  const int height = std::max(panel_height_, 76 + 18 * most_keys_);
   const std::string size = "960," + std::to_string(64 + height * panels_);
   std::string text =
       "# Draws figures/" + name_ + ".svg. In the run folder: gnuplot figures/" + name_ + ".gp\n";

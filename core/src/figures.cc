@@ -5,6 +5,7 @@
 
 #include "figure_script.h"
 #include "gnuplot.h"
+#include "map_figures.h"
 
 namespace alidade::internal {
 namespace {
@@ -328,7 +329,8 @@ struct Plan {
 std::vector<Plan> PlanFigures(const RecordedRun& run) {
   std::vector<Plan> plans = {{MeasurementFigure(run), ""}, {ComparisonFigure(run), ""}};
   for (const RecordedEstimator& estimator : run.estimators) {
-    for (const auto figure : {StateFigure, CovarianceFigure, GainFigure, InnovationFigure}) {
+    for (const auto figure : {MapFigure, ReprojectionFigure, StateFigure, CovarianceFigure,
+                              GainFigure, InnovationFigure}) {
       plans.push_back({figure(run, estimator), estimator.name});
     }
   }

@@ -22,15 +22,13 @@ bool SpanAPlane(const Eigen::Matrix3Xd& points) {
 
 }  // namespace
 
-std::map<std::string, double> internal::MapMetrics(const std::vector<LandmarkEstimate>& landmarks,
-                                                   const Source& source) {
+std::map<std::string, double> internal::MapMetrics(const std::vector<LandmarkEstimate>& landmarks) {
   Eigen::Matrix3Xd estimated(3, std::ssize(landmarks)), known = estimated;
   Eigen::Index count = 0;
   for (const LandmarkEstimate& landmark : landmarks) {
-    const auto position = source.TrueLandmark(landmark.id);
-    if (!position || !landmark.position.allFinite()) continue;
+    if (!landmark.true_position.allFinite() || !landmark.position.allFinite()) continue;
     estimated.col(count) = landmark.position;
-    known.col(count++) = Eigen::Map<const Eigen::Vector3d>(position->data());
+    known.col(count++) = landmark.true_position;
   }
   if (count == 0) return {};
   estimated.conservativeResize(Eigen::NoChange, count);
@@ -48,7 +46,11 @@ std::map<std::string, double> internal::MapMetrics(const std::vector<LandmarkEst
 void internal::NoteMap(const NamedEstimator& named, const Source& source, EstimatorResult& result) {
   if (!named.system.landmarks) return;
   result.landmarks = named.estimator->landmarks();
-  result.metrics.merge(MapMetrics(*result.landmarks, source));
+  for (LandmarkEstimate& landmark : *result.landmarks) {
+    const auto position = source.TrueLandmark(landmark.id);
+    if (position) landmark.true_position = Eigen::Map<const Eigen::Vector3d>(position->data());
+  }
+  result.metrics.merge(MapMetrics(*result.landmarks));
 }
 
 }  // namespace alidade

@@ -11,15 +11,15 @@
 
 namespace alidade::internal {
 
-/// Over the landmarks of a finite place whose true one the source knows:
+/// Over the landmarks of a finite place whose true one is known:
 ///
 ///   map.rmse         sqrt(mean |p - p_true|^2), m
 ///   map.sim3.rmse    the same of s R p + t, the similarity that makes it least [Umeyama1991]
 ///   map.sim3.scale   s; both of three landmarks or more that are not on one line
-std::map<std::string, double> MapMetrics(const std::vector<LandmarkEstimate>& landmarks,
-                                         const Source& source);
+std::map<std::string, double> MapMetrics(const std::vector<LandmarkEstimate>& landmarks);
 
-/// The landmarks at the end, with their metrics, in `result`; nothing where `named` has none.
+/// The landmarks at the end, with the true places that `source` knows, and their metrics, in
+/// `result`; nothing where `named` has none.
 void NoteMap(const NamedEstimator& named, const Source& source, EstimatorResult& result);
 
 }  // namespace alidade::internal

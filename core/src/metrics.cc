@@ -10,6 +10,7 @@
 #include "alidade/geometry.h"
 #include "alidade/statistics.h"
 #include "columns.h"
+#include "frame_innovation.h"
 #include "names.h"
 #include "number_text.h"
 
@@ -119,6 +120,7 @@ struct Metrics::Impl {
   std::vector<std::string> sensors, motions;
   bool has_landmarks = false, has_ransac = false;
   std::vector<Tally> far;                                      ///< inside: beyond 100 sigma
+  std::map<int, std::vector<double>> reprojection;             ///< rms of each frame, by sensor
   std::vector<Sums> sums;                                      ///< all stamps, then the segments
   std::vector<std::array<std::int64_t*, kOutcomes>> count_of;  ///< into counts, by sensor
   std::map<std::string, std::int64_t> counts;
@@ -281,6 +283,10 @@ void Metrics::Impl::AddReport(const std::vector<Sums*>& into, const UpdateReport
     if (m.outcome != Outcome::kAccepted || m.dof <= 0 || !std::isfinite(m.nis)) continue;
     for (Sums* s : into) s->nis[sensor].Add(m.nis / m.dof);
   }
+  for (auto& [sensor, frames] : reprojection) {
+    const double rms = internal::FrameInnovationOf(report, sensor).rms;
+    if (std::isfinite(rms)) frames.push_back(rms);
+  }
   for (const int motion : report.inputs) {
     ++counts["inputs:" + motions[static_cast<std::size_t>(motion)]];
   }
@@ -320,6 +326,10 @@ Metrics::Metrics(const NamedEstimator& named, const std::vector<StreamInfo>& tru
   impl_->has_landmarks = named.system.landmarks.has_value();
   impl_->has_ransac = std::ranges::any_of(
       named.system.sensors, [](const SensorBinding& s) { return s.association.has_value(); });
+  for (std::size_t s = 0; s < named.system.sensors.size(); ++s) {
+    if (!internal::HasReprojection(named.system.sensors[s])) continue;
+    impl_->reprojection[static_cast<int>(s)] = {};
+  }
   impl_->count_of.resize(impl_->sensors.size());
   impl_->far.resize(impl_->sensors.size());
   const auto add_sums = [&](std::string suffix) {
@@ -382,6 +392,13 @@ std::map<std::string, double> Metrics::Finish() const {
     if (!block.series.even()) continue;
     const double lag = Lag(block.series.estimate, block.series.truth, block.series.step_ms());
     if (std::isfinite(lag)) metrics["lag_ms:" + block.name] = lag;
+  }
+  for (const auto& [sensor, frames] : impl_->reprojection) {
+    const Settling settling = SettlingOf(frames);
+    if (std::isnan(settling.level)) continue;
+    const std::string& name = impl_->sensors[static_cast<std::size_t>(sensor)];
+    metrics["reprojection:" + name] = settling.level;
+    metrics["settling_frames:" + name] = settling.count;
   }
   return metrics;
 }

@@ -35,6 +35,13 @@ struct RecordedSensor {
   int tangent = 1;
   std::vector<RecordedGain> gains;
   bool has_innovations = false;
+  bool has_reprojection = false;  ///< rows in `NAME/reprojection.csv`
+};
+
+/// Landmarks of `NAME/landmarks.csv` that have a place, and those whose true one is known too.
+struct RecordedMap {
+  std::int64_t placed = 0, known = 0;
+  int across = 0, along = 2;  ///< the two axes that they spread along most: horizontal, vertical
 };
 
 struct RecordedEstimator {
@@ -42,7 +49,10 @@ struct RecordedEstimator {
   std::vector<RecordedElement> elements;
   std::vector<RecordedSensor> sensors;
   int width = 0;  ///< of the widest measurement: columns z0 .. z<width - 1>, then h, s and r
+  int path = -1;  ///< the first of the three elements that landmarks are seen from; -1: none
   std::int64_t estimate_rows = 0, innovation_rows = 0, gain_rows = 0;
+  std::int64_t reprojection_rows = 0;
+  RecordedMap map;
 };
 
 struct RecordedStream {

@@ -196,11 +196,15 @@ void Recorder::AddEstimate(int estimator, const Frame& frame, const State& state
 
 void Recorder::Finish(const RunResult& result) {
   const std::string timing = impl_->TimingJson(result);
-  const internal::RecordedRun recorded = impl_->CloseFiles();
+  internal::RecordedRun recorded = impl_->CloseFiles();
   const internal::RunFolder& folder = impl_->folder;
-  for (const EstimatorResult& one : result.estimators) {
+  for (std::size_t e = 0; e < result.estimators.size(); ++e) {
+    const EstimatorResult& one = result.estimators[e];
     impl_->WriteEvents(one);
-    if (one.landmarks) internal::WriteLandmarks(folder, one.name, *one.landmarks);
+    if (!one.landmarks) continue;
+    internal::WriteLandmarks(folder, one.name, *one.landmarks);
+    if (e >= recorded.estimators.size()) continue;
+    recorded.estimators[e].map = internal::DescribeMap(*one.landmarks);
   }
   folder.Write("run.json", internal::RunJson(result, impl_->facts));
   folder.Write("comparison.csv", internal::ComparisonCsv(result));

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "alidade/error.h"
+#include "alidade/sweep.h"
 
 namespace alidade {
 
@@ -120,6 +121,26 @@ double Lag(const std::vector<double>& signal, const std::vector<double>& referen
     scores[k + reach] = ramp ? Closeness(signal, reference, k) / variance : Correlation(s, r, k);
   }
   return Peak(scores) * step;
+}
+
+Settling SettlingOf(const std::vector<double>& rms) {
+  constexpr std::ptrdiff_t kWindow = 10;
+  constexpr double kBand = 0.2;
+  const std::ptrdiff_t n = std::ssize(rms);
+  if (n < 4 * kWindow) return {kNaN, kNaN};
+  std::vector<double> last(rms.begin() + n / 2, rms.end());
+  std::ranges::sort(last);
+  const double level = Quantile(last, 0.5);
+  const auto values = Eigen::VectorXd::Map(rms.data(), n);
+  std::ptrdiff_t first = n - kWindow + 1;
+  while (first > 0) {
+    const double window = values.segment(first - 1, kWindow).norm() / std::sqrt(kWindow);
+    if (!(std::abs(window - level) <= kBand * level)) break;
+    --first;
+  }
+  const bool never = first > n - kWindow;
+  return {level,
+          never ? std::numeric_limits<double>::infinity() : static_cast<double>(first + kWindow)};
 }
 
 }  // namespace alidade

@@ -67,15 +67,16 @@ TEST(LandmarkRecords, TheMapAtTheEndIsWritten) {
   ASSERT_EQ(lines.size(), 5u);
   EXPECT_EQ(lines[0],
             "id,generation,form,x,y,z,sigma_x,sigma_y,sigma_z,inverse_distance,"
-            "sigma_inverse_distance,first_s,last_s,tried,accepted");
+            "sigma_inverse_distance,first_s,last_s,tried,accepted,true_x,true_y,true_z");
   const std::vector<std::string> last = Cells(lines[4]);
-  ASSERT_EQ(last.size(), 15u);
+  ASSERT_EQ(last.size(), 18u);
   EXPECT_EQ(last[0], "3");
   EXPECT_EQ(last[2], "xyz");
   EXPECT_NEAR(std::stod(last[3]), 2.5, 3.0 * std::stod(last[6]));
   EXPECT_EQ(last[9], "");
   EXPECT_EQ(last[11], "1.000000000");
   EXPECT_EQ(last[13], "9");
+  EXPECT_EQ(last[15] + ' ' + last[17], "2.5 1.7");
   const LandmarkEstimate estimate = experiment.estimators[0].estimator->landmarks()[3];
   EXPECT_DOUBLE_EQ(std::stod(last[6]), std::sqrt(estimate.covariance(0, 0)));
 }
@@ -113,6 +114,44 @@ TEST(LandmarkRecords, ResultsHaveCountsAndTheMapsErrors) {
   EXPECT_NEAR(one.metrics.at("map.rmse"), std::sqrt(sum / 4.0), 1e-12);
 }
 
+TEST(LandmarkRecords, TheReprojectionErrorOfEachFrameIsWritten) {
+  const TemporaryFolder folder;
+  Experiment experiment = OnTheStreet();
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  recorder.Finish(RunInto(recorder, experiment));
+  // By hand from what innovations.csv has of the last frame, of four landmarks.
+  const std::vector<std::string> innovations = Lines(folder / "out/ekf/innovations.csv");
+  double sum = 0.0;
+  for (std::size_t i = innovations.size() - 4; i < innovations.size(); ++i) {
+    const std::vector<std::string> cells = Cells(innovations[i]);
+    ASSERT_EQ(cells[0] + cells[4], "1.900000000accepted");
+    for (std::size_t r = cells.size() - 3; r < cells.size(); ++r)
+      sum += std::pow(std::stod(cells[r]), 2);
+  }
+  const std::vector<std::string> lines = Lines(folder / "out/ekf/reprojection.csv");
+  EXPECT_EQ(lines[0], "t_s,sensor,landmarks,rms");
+  EXPECT_EQ(lines.size(), 20u);  // the first frame enters the landmarks
+  const std::vector<std::string> last = Cells(lines.back());
+  EXPECT_EQ(last[0] + last[1] + last[2], "1.900000000tracks4");
+  EXPECT_NEAR(std::stod(last[3]), std::sqrt(sum / 12.0), 1e-12);
+}
+
+TEST(LandmarkRecords, TheMapIsDrawnBesideTruth) {
+  const TemporaryFolder folder;
+  Experiment experiment = OnTheStreet();
+  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+  recorder.Finish(RunInto(recorder, experiment));
+  EXPECT_TRUE(recorder.note() == "" || recorder.note().ends_with("not installed"))
+      << recorder.note();
+  const std::string map = Read(folder / "out/figures/ekf.map.gp");
+  EXPECT_NE(map.find("(column('true_x')):(column('true_y'))"), std::string::npos) << map;
+  EXPECT_NE(map.find("(column('cam.position.x')):(column('cam.position.y')) with lines"),
+            std::string::npos)
+      << map;
+  EXPECT_NE(Read(folder / "out/figures/ekf.reprojection.gp").find("column('rms')"),
+            std::string::npos);
+}
+
 TEST(MapMetrics, ASimilarityIsNoErrorAfterAlignment) {
   const Street source;
   const Eigen::AngleAxisd turn(0.3, Eigen::Vector3d(1, 2, 3).normalized());
@@ -121,12 +160,12 @@ TEST(MapMetrics, ASimilarityIsNoErrorAfterAlignment) {
     const auto p = source.TrueLandmark(id);
     LandmarkEstimate& one = map.emplace_back();
     one.id = id;
-    one.position = 2.0 * (turn * Eigen::Map<const Eigen::Vector3d>(p->data())) +
-                   Eigen::Vector3d(1.0, -2.0, 0.5);
+    one.true_position = Eigen::Map<const Eigen::Vector3d>(p->data());
+    one.position = 2.0 * (turn * one.true_position) + Eigen::Vector3d(1.0, -2.0, 0.5);
   }
   map.emplace_back().id = 77;  // of no known place
   map.back().position = Eigen::Vector3d(9, 9, 9);
-  const auto metrics = internal::MapMetrics(map, source);
+  const auto metrics = internal::MapMetrics(map);
   EXPECT_GT(metrics.at("map.rmse"), 1.0);
   EXPECT_LT(metrics.at("map.sim3.rmse"), 1e-12);
   EXPECT_NEAR(metrics.at("map.sim3.scale"), 0.5, 1e-12);
@@ -137,9 +176,11 @@ TEST(MapMetrics, PointsOnALineAreNotAligned) {
   std::vector<LandmarkEstimate> map(3);
   for (int id = 0; id < 3; ++id) {
     map[static_cast<std::size_t>(id)].id = id;
+    const auto p = source.TrueLandmark(id);
+    map[static_cast<std::size_t>(id)].true_position = Eigen::Map<const Eigen::Vector3d>(p->data());
     map[static_cast<std::size_t>(id)].position = Eigen::Vector3d(id, 0.0, 0.0);
   }
-  const auto metrics = internal::MapMetrics(map, source);
+  const auto metrics = internal::MapMetrics(map);
   EXPECT_TRUE(metrics.contains("map.rmse"));
   EXPECT_FALSE(metrics.contains("map.sim3.rmse"));
 }

@@ -93,5 +93,27 @@ TEST(Lag, IsUnknownWithoutAnythingToMatch) {
   EXPECT_TRUE(std::isnan(Lag(few, few, 1.0)));
 }
 
+// 3, 3, 1.5, then 1: the first window in the band begins at the third value, sqrt((1.5^2 + 9) / 10)
+// = 1.06, and ends at the 12th.
+TEST(Settling, CountsUntilTheWindowStaysInTheBand) {
+  std::vector<double> rms(60, 1.0);
+  rms[0] = rms[1] = 3.0;
+  rms[2] = 1.5;
+  EXPECT_EQ(SettlingOf(rms).level, 1.0);
+  EXPECT_EQ(SettlingOf(rms).count, 12.0);
+  for (double& value : rms) value *= 1e-6;
+  EXPECT_EQ(SettlingOf(rms).count, 12.0);
+  rms[30] = 3e-6;  // the median does not see it; sqrt((9 + 9) / 10) = 1.34 until it has passed
+  EXPECT_EQ(SettlingOf(rms).count, 41.0);
+  EXPECT_EQ(SettlingOf(std::vector<double>(40, 0.0)).count, 10.0);
+}
+
+TEST(Settling, IsInfiniteWhereTheEndIsOffTheLevel) {
+  std::vector<double> rms(60, 1.0);
+  rms.back() = 3.0;
+  EXPECT_TRUE(std::isinf(SettlingOf(rms).count));
+  EXPECT_TRUE(std::isnan(SettlingOf(std::vector<double>(39, 1.0)).count));
+}
+
 }  // namespace
 }  // namespace alidade

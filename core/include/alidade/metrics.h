@@ -22,10 +22,14 @@ namespace alidade {
 ///   nees.cov95:OWNER    share of those stamps with e' P^-1 e <= chi2(0.95, dof)
 ///   nis.mean:SENSOR     mean of r' S^-1 r / dof over accepted measurements
 ///   final:BLOCK         |e| at the last stamp
+///   reprojection:SENSOR     of landmarks, in the unit of the measurement: the rms of the
+///                           innovations that a frame accepts, median of the run's last half
+///   settling_frames:SENSOR  frames until that rms stays at this level, as SettlingOf() counts
+///                           them; infinite where it never does
 ///
-/// Over a segment the key ends in `@SEGMENT` (not lag_ms and final). Counts are `OUTCOME:SENSOR`,
-/// of control inputs `inputs:ENTRY`, and of landmarks `landmarks.initialised`, `.deleted`,
-/// `.converted` and `.negative`. A
+/// Over a segment the key ends in `@SEGMENT` (not lag_ms, final and the last two). Counts are
+/// `OUTCOME:SENSOR`, of control inputs `inputs:ENTRY`, and of landmarks `landmarks.initialised`,
+/// `.deleted`, `.converted` and `.negative`. A
 /// truth is named like the block, `target.depth`, or like its last component where that is unique.
 /// A frame older than the state, as before `start_s`, adds to the counts alone.
 /// A metric without a stamp to take it from is left out; an estimate that is not finite makes its

@@ -16,4 +16,14 @@ double ChiSquareQuantile(double q, int dof);
 /// constant, the best k lies at the edge or is no better than its neighbours, or n < 8.
 double Lag(const std::vector<double>& signal, const std::vector<double>& reference, double step);
 
+/// How a series of rms values comes to its steady level; NaN of fewer than 40 values.
+struct Settling {
+  double level;  ///< the median of its last half
+  /// How many values it takes until the rms of the last 10 of them is within 20 % of the level and
+  /// stays there: at least 10; infinity where it is not there at the end.
+  double count;
+};
+/// When a series of rms values, one for each frame say, has settled.
+Settling SettlingOf(const std::vector<double>& rms);
+
 }  // namespace alidade

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// examples/16_slam_room: the shape of a room from a straight path through it.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "alidade/sweep.h"
+
+namespace alidade {
+namespace {
+
+/// Mean of a coordinate over those landmarks of a wall that are known to 0.1 m.
+class Wall {
+ public:
+  Wall(int axis, double at) : axis_(axis), at_(at) {}
+  void Add(const LandmarkEstimate& landmark) {
+    if (std::abs(landmark.true_position[axis_] - at_) > 1e-9) return;
+    sum_ += landmark.position[axis_];
+    ++count_;
+  }
+  int count() const { return count_; }
+  double place() const { return sum_ / count_; }
+
+ private:
+  int axis_;
+  double at_, sum_ = 0.0;
+  int count_ = 0;
+};
+
+TEST(SlamRoom, ItsShapeIsRecovered) {
+  Config config = Config::FromFile(std::filesystem::path(ALIDADE_SOURCE_DIR) /
+                                   "examples/16_slam_room/config.yaml");
+  const PluginHost host(PluginPaths(config));
+  SweepOptions options;
+  options.runs = 20;
+  options.first_seed = 1001;
+  const SweepResult sweep = Sweep(config, host, options);
+  EXPECT_EQ(Summarise(sweep).at(0).diverged, 0);
+  double squares = 0.0, width = 0.0, height = 0.0, front = 0.0;
+  int count = 0;
+  for (const SweepRun& run : sweep.done) {
+    ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
+    Wall left(0, -1.5), right(0, 1.5), ceiling(1, -1.2), floor(1, 1.2), ahead(2, 4.0);
+    for (const LandmarkEstimate& landmark : *run.estimators.at(0).landmarks) {
+      if (!(landmark.covariance.diagonal().maxCoeff() < 0.1 * 0.1)) continue;
+      for (Wall* wall : {&left, &right, &ceiling, &floor, &ahead}) wall->Add(landmark);
+      squares += (landmark.position - landmark.true_position).squaredNorm();
+      ++count;
+    }
+    for (const Wall* wall : {&left, &right, &ceiling, &floor, &ahead}) EXPECT_GE(wall->count(), 2);
+    // Each run: to 3 % of the room.
+    EXPECT_NEAR(right.place() - left.place(), 3.0, 0.09) << run.seed;
+    EXPECT_NEAR(floor.place() - ceiling.place(), 2.4, 0.07) << run.seed;
+    EXPECT_NEAR(ahead.place(), 4.0, 0.12) << run.seed;
+    width += (right.place() - left.place()) / 20.0;
+    height += (floor.place() - ceiling.place()) / 20.0;
+    front += ahead.place() / 20.0;
+  }
+  EXPECT_GE(count, 20 * 40);
+  EXPECT_LE(std::sqrt(squares / count), 0.040);
+  EXPECT_NEAR(width, 3.0, 0.02);
+  EXPECT_NEAR(height, 2.4, 0.02);
+  EXPECT_NEAR(front, 4.0, 0.03);
+}
+
+}  // namespace
+}  // namespace alidade

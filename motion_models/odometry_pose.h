@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+
 #include "alidade/model.h"
 
 namespace alidade {
@@ -9,11 +11,13 @@ namespace alidade {
 ///
 ///   model      world_from_vehicle' = world_from_vehicle exp((v, omega) dt)
 ///              with world_from_vehicle = world_from_cam cam_from_vehicle; of the camera
-///              q' = q Exp(R_CV phi),  r' = r + R_WC R_CV (V(phi) (v + w_v) dt + Exp(phi) t - t)
-///              phi = (omega + w_omega) dt,  V(phi) = I + (1 - cos)/|phi|^2 [phi]x
-///                                             + (|phi| - sin)/|phi|^3 [phi]x^2
+///              q' = q Exp(R_CV phi),  r' = r + R_WC R_CV (V(phi) nu dt + Exp(phi) t - t)
+///              nu = (1 + e) v + w_v,  phi = (omega + w_omega) dt
+///              V(phi) = I + (1 - cos)/|phi|^2 [phi]x + (|phi| - sin)/|phi|^3 [phi]x^2
+///              t = t_0 + dt_m,  R_VC = R_m R_0;  dt_m, R_m and e are constant: owned blocks,
+///              0, I and 0, known, where the config gives them no initial value
 ///   noise      w = (w_v, w_omega) ~ N(0, diag(sigma_v^2, sigma_omega^2)), constant during a step
-///   Jacobian   derived                                 6 x 6; exact at omega = 0
+///   Jacobian   derived                                 13 x 13; exact at omega = 0
 ///
 ///   symbol       shape  unit      frame    meaning
 ///   r, q         3, 4   m, -      world    position and orientation (world_from_cam) of the camera
@@ -21,21 +25,28 @@ namespace alidade {
 ///                       rad/s              v of the vehicle's origin
 ///   sigma_v      3      m/s       vehicle  noise of v, per axis; >= 0
 ///   sigma_omega  3      rad/s     vehicle  noise of omega, per axis; >= 0
-///   t, R_CV      3, -   m, -      vehicle  vehicle_from_cam: where and how the camera is mounted
+///   t_0, R_0     3, -   m, -      vehicle  vehicle_from_cam: where and how the camera is mounted
+///   dt_m, R_m    3, 4   m, -      vehicle  what the mounting differs from that
+///   e            1      -         -        relative error of v: true speed / measured - 1
 ///
 /// Defined everywhere. Additive in dt without noise.
 /// Source       [Sola2017] sec. 4.6 (integration); V is that of exp on SE(3).
-struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion> {
+struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, Vec<1>> {
   static constexpr std::array kBlocks{
       Quantity{"position", "m", "of the camera in the world", "x,y,z"},
-      Quantity{"orientation", "", "world_from_cam", "w,x,y,z"}};
+      Quantity{"orientation", "", "world_from_cam", "w,x,y,z"},
+      Quantity{"mounting_position", "m", "added to vehicle_from_cam.position", "x,y,z",
+               ALIDADE_ROLE_OWNED},
+      Quantity{"mounting_orientation", "", "times vehicle_from_cam.orientation", "w,x,y,z",
+               ALIDADE_ROLE_OWNED},
+      Quantity{"speed_error", "", "true speed / measured speed - 1", "", ALIDADE_ROLE_OWNED}};
   using Input = Vec<6>;
   static constexpr Quantity kInput{"velocities", "",
                                    "of the vehicle, in its frame: linear, m/s, and angular, rad/s",
                                    "vx,vy,vz,wx,wy,wz"};
 
-  std::array<double, 3> sigma_v, sigma_omega, mount;  ///< mount: t above
-  std::array<double, 4> vehicle_from_cam;
+  std::array<double, 3> sigma_v, sigma_omega, mount;  ///< mount: t_0 above
+  std::array<double, 4> vehicle_from_cam;             ///< R_0
 
   OdometryPose(const std::array<double, 3>& linear, const std::array<double, 3>& angular,
                const std::array<double, 3>& position = {},
@@ -53,20 +64,26 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion> {
                      ReadMounting(p)) {}
 
   template <class T>
-  void Step(const T* r, const T* q, const T* u, const T* w, double dt_s, T* r1, T* q1) const {
-    T phi[3], way[3], turned[3], moved[3], turn[3], step[3];
+  void Step(const T* r, const T* q, const T* shift, const T* tilt, const T* speed_error, const T* u,
+            const T* w, double dt_s, T* r1, T* q1, T* shift1, T* tilt1, T* speed_error1) const {
+    T phi[3], way[3], t[3], turned[3], moved[3], turn[3], step[3];
     for (int i = 0; i < 3; ++i) phi[i] = dt_s * (u[3 + i] + w[3 + i]);
-    for (int i = 0; i < 3; ++i) way[i] = dt_s * (u[i] + w[i]);
-    T rotation[4];
+    for (int i = 0; i < 3; ++i) way[i] = dt_s * ((1.0 + speed_error[0]) * u[i] + w[i]);
+    for (std::size_t i = 0; i < 3; ++i) t[i] = mount[i] + shift[i];
+    T rotation[4], mounted[4];
+    UnitQuaternion::Multiply(tilt, vehicle_from_cam.data(), mounted);
     UnitQuaternion::Exp(phi, rotation);
-    UnitQuaternion::Rotate(rotation, mount.data(), turned);
+    UnitQuaternion::Rotate(rotation, t, turned);
     MoveAlong(phi, way, moved);
-    for (std::size_t i = 0; i < 3; ++i) moved[i] += turned[i] - mount[i];
-    UnitQuaternion::RotateBack(vehicle_from_cam.data(), moved, step);
-    UnitQuaternion::RotateBack(vehicle_from_cam.data(), phi, turn);
+    for (int i = 0; i < 3; ++i) moved[i] += turned[i] - t[i];
+    UnitQuaternion::RotateBack(mounted, moved, step);
+    UnitQuaternion::RotateBack(mounted, phi, turn);
     UnitQuaternion::Rotate(q, step, moved);
     for (int i = 0; i < 3; ++i) r1[i] = r[i] + moved[i];
     UnitQuaternion::Plus(q, turn, q1);
+    std::copy(shift, shift + 3, shift1);
+    std::copy(tilt, tilt + 4, tilt1);
+    speed_error1[0] = speed_error[0];
   }
   void SqrtQ(double, MatrixRef Lq) const {
     for (std::size_t i = 0; i < 3; ++i) {

@@ -7,6 +7,7 @@
 #include "estimator_types.h"
 #include "names.h"
 #include "text_table.h"
+#include "truth_sigma.h"
 
 namespace alidade {
 namespace {
@@ -256,6 +257,7 @@ std::vector<Segment> ReadSegments(const Node& root, const System& system,
       entry.RejectUnread();
     }
   }
+  evaluate->Declare("truth_sigma");
   evaluate->RejectUnread();
   return segments;
 }
@@ -385,6 +387,8 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
     root.At("estimators").Fail("empty", "at least one estimator");
   }
   experiment.reference = ReadReference(root, experiment.estimators);
+  experiment.truth_sigmas =
+      internal::ReadTruthSigmas(root, experiment.source->truths(), experiment.reference < 0);
   CheckTruths(source, experiment, whole);
   root.RejectUnread();
   return experiment;

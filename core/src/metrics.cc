@@ -86,7 +86,8 @@ struct Tracked {
   std::vector<std::string> elements;  ///< of the tangent
   std::vector<int> outside;           ///< stamps on end beyond 10 sigma, by element; -1: reported
   bool scalar;
-  Series series;  ///< where scalar
+  double truth_variance;  ///< of each element
+  Series series;          ///< where scalar
   double last_error = -1.0;
 
   bool known = false;  ///< at this stamp, and so is what follows
@@ -155,6 +156,7 @@ void Metrics::Impl::Track(const System& system, const std::vector<StreamInfo>& t
     one.elements = internal::TangentNames(block.name, block.space);
     one.outside.assign(block.geometry().tangent, 0);
     one.scalar = block.geometry().tangent == 1;
+    one.truth_variance = truths[one.truth].sigma * truths[one.truth].sigma;
     one.error.resize(block.geometry().tangent);
     if (!one.unit.empty()) units[one.name] = one.unit;
     auto owner = std::find_if(owners.begin(), owners.end(),
@@ -216,7 +218,8 @@ void Metrics::Impl::AddConsistency(Stamp stamp, const std::vector<Sums*>& into,
     const Block& place = state.layout()[block.id];
     if (!block.known || !place.has_covariance()) continue;
     for (int e = 0; e < place.geometry().tangent; ++e) {
-      const double sigma = std::sqrt(state.covariance().Variance(place.tangent_offset + e));
+      const double sigma =
+          std::sqrt(state.covariance().Variance(place.tangent_offset + e) + block.truth_variance);
       CheckElement(stamp, block, e, sigma);
       if (!block.scalar) continue;
       const bool covered = std::abs(block.error[0]) <= kNormal95 * sigma;
@@ -252,6 +255,7 @@ void Metrics::Impl::AddNees(const Owner& owner, std::size_t index, const std::ve
           state.covariance().Block(a.tangent_offset, rows, b.tangent_offset, columns);
       column += columns;
     }
+    p.diagonal().segment(row, rows).array() += tracked[i].truth_variance;
     row += rows;
   }
   const double nees = SquaredMahalanobis(p, error);

@@ -70,9 +70,6 @@ std::string Defect(const AlidadeSpace& space) {
   if (!elements.empty() && std::ssize(SplitAtCommas(elements)) != space.ambient) {
     return "names its elements '" + elements + "', but has " + std::to_string(space.ambient);
   }
-  if ((space.flags & ALIDADE_ROLE_OWNED) != 0) {
-    return "is owned by the sensor, which this version does not support";
-  }
   if ((space.flags & ALIDADE_ROLE_SHARED) != 0 && (space.flags & ALIDADE_ROLE_LANDMARK) == 0) {
     return "is shared, but not a landmark's";
   }
@@ -152,6 +149,10 @@ void ModelInstance::ReadDescription() {
   for (int i = 0; i < count; ++i) {
     const auto role = internal::ReadEntry(description_.roles, description_.role_stride, i);
     spaces_.push_back(read(role, "role '" + Text(role.name) + "'"));
+    if (is_sensor && (role.flags & ALIDADE_ROLE_OWNED) != 0) {
+      Refuse(": role '" + spaces_.back().name +
+             "' is owned by the sensor, which this version does not support");
+    }
     tangents_.push_back(role.tangent);
     const auto same = [&](const Space& other) { return other.name == spaces_.back().name; };
     if (std::count_if(spaces_.begin(), spaces_.end(), same) > 1) {

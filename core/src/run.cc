@@ -216,6 +216,8 @@ void Compare(std::vector<Running>& running, int index, const std::vector<Seen>& 
 std::vector<Running> BeginAll(Experiment& experiment) {
   const int reference = experiment.reference;
   std::vector<StreamInfo> truths = experiment.source->truths();
+  for (std::size_t t = 0; t < experiment.truth_sigmas.size(); ++t)
+    truths.at(t).sigma = experiment.truth_sigmas[t];
   if (reference >= 0) {
     truths = internal::BlocksOf(experiment.estimators[static_cast<std::size_t>(reference)].system);
   }

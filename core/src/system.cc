@@ -148,13 +148,22 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
                            "a block in one of them: fixed is known, considered is uncertain");
   }
   const Node initial = entry.At("initial", "the state entry '" + name + "'");
+  const std::vector<Space>& spaces = binding.model.blocks();
   for (std::size_t i = 0; i < names.size(); ++i) {
-    const BlockStatus status = Contains(fixed, names[i])        ? BlockStatus::kFixed
-                               : Contains(considered, names[i]) ? BlockStatus::kConsidered
-                                                                : BlockStatus::kEstimated;
-    const BlockId id =
-        system.layout.Declare(name + "." + names[i], name, binding.model.blocks()[i], status);
+    const bool known = (spaces[i].flags & ALIDADE_ROLE_OWNED) != 0 && !initial.Find(names[i]) &&
+                       !Contains(considered, names[i]);
+    const BlockStatus status = known || Contains(fixed, names[i]) ? BlockStatus::kFixed
+                               : Contains(considered, names[i])   ? BlockStatus::kConsidered
+                                                                  : BlockStatus::kEstimated;
+    const BlockId id = system.layout.Declare(name + "." + names[i], name, spaces[i], status);
     binding.blocks.push_back(id);
+    if (known) {
+      Prior prior{
+          id, std::vector<double>(static_cast<std::size_t>(spaces[i].geometry.ambient)), {}, {}};
+      spaces[i].geometry.Identity(prior.mean.data());
+      system.priors.push_back(std::move(prior));
+      continue;
+    }
     ReadPrior(initial.At(names[i], "block '" + name + "." + names[i] + "'"), system.layout[id], id,
               system);
   }

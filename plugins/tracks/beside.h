@@ -118,15 +118,28 @@ class OdometryRows {
   OdometryValues values_{}, next_{};
 };
 
+/// Where a camera is: world_from_cam.
+struct Pose {
+  std::array<double, 3> position;
+  std::array<double, 4> orientation;  ///< w x y z
+
+  /// The same in the frame of camera `c`: c_from_cam = world_from_c^-1 world_from_cam.
+  Pose In(const Pose& c) const {
+    Pose pose{};
+    const double away[3] = {position[0] - c.position[0], position[1] - c.position[1],
+                            position[2] - c.position[2]};
+    UnitQuaternion::RotateBack(c.orientation.data(), away, pose.position.data());
+    const double back[4] = {c.orientation[0], -c.orientation[1], -c.orientation[2],
+                            -c.orientation[3]};
+    UnitQuaternion::Multiply(back, orientation.data(), pose.orientation.data());
+    return pose;
+  }
+};
+
 /// A trajectory in the form of TUM: `t x y z qx qy qz qw`, times increasing. Quaternions are
 /// refused where they are not of unit length to 1e-3; the run normalises the others.
 class TumRows {
  public:
-  struct Pose {
-    std::array<double, 3> position;
-    std::array<double, 4> orientation;  ///< w x y z
-  };
-
   TumRows(const std::filesystem::path& path, const Place& place, const std::string& key)
       : rows_(path, place, key, ' ') {
     Advance();

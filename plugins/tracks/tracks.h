@@ -5,12 +5,14 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "alidade/source.h"
 #include "beside.h"
 #include "number_rows.h"
+#include "tracks_options.h"
 
 namespace alidade {
 
@@ -33,16 +35,16 @@ inline constexpr const char* kTracksKeys =
 ///   tracks     2, 4, 3  as `measures`     a feature has all of them; the landmark is its id
 ///   odometry   6        vx vy vz wx wy wz there is a row of the frame
 ///
-/// A feature without u or v is an error; one without what `measures` asks for besides is left out.
-/// A frame is given out once the first row of the next is there, or the end.
+/// A feature without u or v is an error; one without what `measures` asks for besides is left out,
+/// and so is one that a frame before `features_from` has. A frame is given out once the first row
+/// of the next is there, or the end.
 ///
 /// Keys         kTracksKeys.
 /// Errors       kBadData with file, line and column of the first thing that is wrong;
 ///              kInputMissing; kIo where a file changes while it is read; kBadConfig.
 class Tracks : public Source {
  public:
-  explicit Tracks(const SourceArguments& arguments) {
-    ReadNumbers(arguments.params);
+  explicit Tracks(const SourceArguments& arguments) : options_(arguments.params) {
     for (const char* key : {"path", "state"}) arguments.entry.Declare(key);
     Open(arguments.entry.At("path", "tracks"), arguments.folder);
     const auto state = arguments.entry.Find("state");
@@ -55,12 +57,25 @@ class Tracks : public Source {
   Place place() const override { return {rows_->name(), rows_->line(), 0}; }
 
   bool Next(Frame& frame) override {
-    if (frames_ == most_ || !NextFrame(frame.stamp)) return false;
+    if (frames_ == options_.most || !NextFrame(frame.stamp)) return false;
+    while (frame_ < options_.first_frame) {
+      Collect();
+      if (!NextFrame(frame.stamp)) return false;
+    }
     frame.measurements.clear();
     for (const auto& [id, feature] : Collect()) Emit(id, feature, frame);
     if (odometry_) EmitOdometry(frame);
     frame.truth.assign(truths_.size(), {});
-    const auto pose = truth_ ? truth_->At(frame.stamp, tolerance_) : std::nullopt;
+    auto pose = truth_ ? truth_->At(frame.stamp, options_.tolerance) : std::nullopt;
+    if (truth_ && options_.world == TracksOptions::kFirstCamera) {
+      if (frames_ == 0 && !pose) {
+        rows_->FailLine("the world is to be the camera of frame " + std::to_string(frame_) +
+                            ", which has no true pose",
+                        "one within truth_tolerance_s of it, or world: file");
+      }
+      if (frames_ == 0) first_pose_ = *pose;
+      if (pose) pose = pose->In(first_pose_);
+    }
     if (pose) {
       frame.truth = {{pose->position.begin(), pose->position.end()},
                      {pose->orientation.begin(), pose->orientation.end()}};
@@ -72,8 +87,6 @@ class Tracks : public Source {
  private:
   static constexpr std::size_t kDims = 4;
   static constexpr const char* kColumns = "frame,feature,dim,value";
-  enum Measures { kPixel, kStereo, kDepth };
-  enum Odometry { kNone, kHeld, kMean };
   struct Row {
     std::int64_t frame = -1, feature = 0;
     std::size_t dim = 0;
@@ -84,22 +97,6 @@ class Tracks : public Source {
     std::array<double, kDims> values{};
     std::array<int, kDims> lines{};  ///< where they stand; 0: not there
   };
-
-  void ReadNumbers(Params& p) {
-    measures_ = static_cast<Measures>(p.Choice("measures", {"pixel", "stereo", "depth"},
-                                               "what stream tracks holds of a feature", kPixel));
-    rate_hz_ =
-        p.Number("frame_rate_hz", "Hz",
-                 "frames a second, where there is no timestamps.csv; 0: there is", {0.0, 1e6}, 0.0);
-    most_ = p.Integer("frames", "frames at most; 0: all", 0, 1 << 30, 0);
-    if (most_ == 0) most_ = INT64_MAX;
-    use_ = static_cast<Odometry>(p.Choice(
-        "odometry", {"none", "held", "mean"},
-        "a frame's odometry.csv: none, its row, or the mean with the next frame's row", kHeld));
-    tolerance_ = StampFromSeconds(p.Number("truth_tolerance_s", "s",
-                                           "the true pose of a frame is at most so far off in time",
-                                           {0.0, 1e3}, 1e-3));
-  }
 
   void Open(const Node& path, const std::filesystem::path& folder) {
     std::filesystem::path file = path.Text();
@@ -113,12 +110,13 @@ class Tracks : public Source {
       const bool there = file != "-" && std::filesystem::exists(other, ignored);
       return there ? std::optional(other) : std::nullopt;
     };
-    if (const auto times = beside("timestamps.csv"); times && rate_hz_ == 0.0) {
+    if (const auto times = beside("timestamps.csv"); times && options_.rate_hz == 0.0) {
       times_.emplace(*times, path.place(), path.path());
-    } else if (rate_hz_ == 0.0) {
+    } else if (options_.rate_hz == 0.0) {
       path.Fail("no timestamps.csv beside the tracks", "that file, or 'frame_rate_hz'");
     }
-    if (const auto other = beside("odometry.csv"); other && use_ != kNone) {
+    if (const auto other = beside("odometry.csv");
+        other && options_.odometry != TracksOptions::kNone) {
       odometry_.emplace(*other, path.place(), path.path());
     }
     auto truth = beside("groundtruth.tum");
@@ -128,7 +126,7 @@ class Tracks : public Source {
 
   void NameAll(const std::string& state) {
     constexpr int kSizes[] = {2, 4, 3};
-    streams_ = {{"tracks", kSizes[measures_]}};
+    streams_ = {{"tracks", kSizes[options_.measures]}};
     if (odometry_) streams_.push_back({"odometry", 6});
     if (truth_) truths_ = {{state + ".position", 3}, {state + ".orientation", 4}};
   }
@@ -165,7 +163,7 @@ class Tracks : public Source {
     if (!times_) {
       if (!next_) return false;
       frame_ = next_->frame;
-      stamp = StampFromSeconds(static_cast<double>(frame_) / rate_hz_);
+      stamp = StampFromSeconds(static_cast<double>(frame_) / options_.rate_hz);
       return true;
     }
     const bool more = times_->Next(frame_, stamp);
@@ -176,7 +174,7 @@ class Tracks : public Source {
     return more;
   }
 
-  /// The features of frame_, by id.
+  /// The features of frame_ that are given out, by id.
   std::map<std::int64_t, Feature> Collect() {
     std::map<std::int64_t, Feature> features;
     while (next_ && next_->frame == frame_) {
@@ -192,6 +190,9 @@ class Tracks : public Source {
       feature.values[next_->dim] = next_->value;
       Advance();
     }
+    for (const auto& [id, feature] : features)
+      if (frame_ < options_.features_from) left_out_.insert(id);
+    std::erase_if(features, [&](const auto& f) { return left_out_.contains(f.first); });
     return features;
   }
 
@@ -222,7 +223,8 @@ class Tracks : public Source {
     measurement.stamp = frame.stamp;
     measurement.stream = 1;
     measurement.values.assign(values->begin(), values->end());
-    const auto next = use_ == kMean ? odometry_->Following() : std::nullopt;
+    const auto next =
+        options_.odometry == TracksOptions::kMean ? odometry_->Following() : std::nullopt;
     for (std::size_t i = 0; next && i < next->size(); ++i) {
       measurement.values[i] = 0.5 * ((*values)[i] + (*next)[i]);
     }
@@ -230,11 +232,10 @@ class Tracks : public Source {
   }
 
   std::vector<StreamInfo> streams_, truths_;
-  Measures measures_ = kPixel;
-  Odometry use_ = kHeld;
-  double rate_hz_ = 0.0;
-  Stamp tolerance_ = 0;
-  std::int64_t frames_ = 0, most_ = 0, frame_ = -1;
+  TracksOptions options_;
+  std::int64_t frames_ = 0, frame_ = -1;
+  std::set<std::int64_t> left_out_;  ///< features of the frames before features_from
+  Pose first_pose_{};
   std::optional<NumberRows> rows_;
   std::optional<TimestampRows> times_;
   std::optional<OdometryRows> odometry_;

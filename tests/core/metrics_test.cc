@@ -302,6 +302,31 @@ TEST(Metrics, TellsOnceOfErrorsBeyondTenSigma) {
             "a.x: the error, 21 m, has been beyond 10 sigma for 20 stamps; sigma is 2 m");
 }
 
+// A truth of sigma 3 m beside a filter's 2 m: the error has the variance 13 m^2.
+TEST(Metrics, TheUncertaintyOfTheTruthBelongsToTheError) {
+  MetricsOf one(Scalars({"a.x"}), {{"x", 1, 3.0}});
+  const double zero = 0.0;
+  one.state().Add(0, &zero, Eigen::MatrixXd::Constant(1, 1, 4.0));
+  for (int i = 0; i < 30; ++i) one.Add({{36.0}});  // 10 sigma are 36.06 m
+  EXPECT_TRUE(one.metrics().events().empty());
+  EXPECT_NEAR(one.Finish().at("nees.mean:a"), 36.0 * 36.0 / 13.0, 1e-9);
+  EXPECT_EQ(one.Finish().at("rmse:a.x"), 36.0);
+  for (int i = 0; i < 70; ++i) one.Add({{7.06}});  // 1.96 sigma are 7.067 m
+  EXPECT_NEAR(one.Finish().at("cov95:a.x"), 0.7, 1e-12);
+  for (int i = 0; i < 20; ++i) one.Add({{36.1}});
+  ASSERT_EQ(one.metrics().events().size(), 1u);
+}
+
+// Against a filter that says it knows exactly, a truth of some noise still tells what is too far.
+TEST(Metrics, AMeasuredTruthTellsOfAFilterThatIsTooSure) {
+  MetricsOf one(Scalars({"a.x"}), {{"x", 1, 0.1}});
+  const double zero = 0.0;
+  one.state().Add(0, &zero, Eigen::MatrixXd::Constant(1, 1, 1e-12));
+  for (int i = 0; i < 60; ++i) one.Add({{0.05 * i}});  // drifts away, 1 m at the 20th stamp
+  ASSERT_EQ(one.metrics().events().size(), 1u);
+  EXPECT_EQ(one.metrics().events()[0].kind, "inconsistent");
+}
+
 TEST(Metrics, AKnownValueIsNotInconsistent) {
   MetricsOf one(Scalars({"a.x"}), {{"x", 1}});
   const double zero = 0.0;

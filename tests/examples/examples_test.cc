@@ -78,7 +78,8 @@ TEST(Examples, EveryExampleRuns) {
   for (const auto& entry : std::filesystem::directory_iterator(kExamples)) {
     if (!std::filesystem::exists(entry.path() / "config.yaml")) continue;
     if (!kHasCeres && entry.path().filename() == "08_depth_all_estimators") continue;
-    if (entry.path().filename() == "11_slam_kitti") continue;  // SlamKitti, where its drives are
+    // Their drives are not in this tree: SlamOdometryTracks, SlamStereoTracks.
+    if (entry.path().filename().string().ends_with("_tracks")) continue;
     ++count;
     const RunResult run = RunExample(entry.path().filename(), {});
     EXPECT_EQ(run.status, RunStatus::kOk) << entry.path();

@@ -24,6 +24,9 @@ const MapHost::Values kMounted{
     {"vehicle_from_cam.orientation.x", {-0.5}},  {"vehicle_from_cam.orientation.y", {0.5}},
     {"vehicle_from_cam.orientation.z", {-0.5}}};
 
+/// Owned blocks: the mounting and the speed are as the parameters and the input have them.
+const Blocks kAsGiven{{0, 0, 0}, {1, 0, 0, 0}, {0}};
+
 /// The pose of the camera of a vehicle at (x, y), turned by `yaw` about z up.
 Blocks Camera(double x, double y, double yaw) {
   const double mount[3] = {1, 0, 1.5}, camera[4] = {0.5, -0.5, 0.5, -0.5};
@@ -33,6 +36,7 @@ Blocks Camera(double x, double y, double yaw) {
   pose[0][0] += x;
   pose[0][1] += y;
   UnitQuaternion::Multiply(turn, camera, pose[1].data());
+  pose.insert(pose.end(), kAsGiven.begin(), kAsGiven.end());
   return pose;
 }
 
@@ -64,9 +68,37 @@ TEST(OdometryPose, FollowsTheVehicle) {
              Camera(1, 10, kPi));
 }
 
+// What the owned blocks say is as if the parameters and the input had said it.
+TEST(OdometryPose, MountingAndSpeedMayBeInTheState) {
+  const double input[6] = {2, 0.1, -0.3, 0.2, 0.5, -0.9};
+  const double wrong[6] = {2 / 1.25, 0.1 / 1.25, -0.3 / 1.25, 0.2, 0.5, -0.9};
+  const Blocks truth =
+      testing::Step(MakeMotion<OdometryPose>(kMounted), Camera(5, 6, 1), input, nullptr, 0.7).next;
+
+  MapHost::Values not_mounted = kMounted;  // 0.5 m lower; turned by 0.1 rad about y
+  not_mounted["vehicle_from_cam.position"] = {1, 0, 1};
+  const double tilt[4] = {std::cos(0.05), 0, std::sin(0.05), 0},
+               back[4] = {tilt[0], 0, -tilt[2], 0};
+  const double camera[4] = {0.5, -0.5, 0.5, -0.5};
+  double turned[4];
+  UnitQuaternion::Multiply(back, camera, turned);
+  const char* const parts[] = {"w", "x", "y", "z"};
+  for (std::size_t i = 0; i < 4; ++i) {
+    not_mounted[std::string("vehicle_from_cam.orientation.") + parts[i]] = {turned[i]};
+  }
+  Blocks x = Camera(5, 6, 1);
+  x[2] = {0, 0, 0.5};
+  x[3].assign(tilt, tilt + 4);
+  x[4] = {0.25};
+  const Blocks next =
+      testing::Step(MakeMotion<OdometryPose>(not_mounted), x, wrong, nullptr, 0.7).next;
+  ExpectPose(next, truth);
+  for (std::size_t i = 2; i < 5; ++i) EXPECT_EQ(next[i], x[i]);  // they stay
+}
+
 TEST(OdometryPose, HasTrueJacobiansAlsoWithoutTurning) {
   const MotionModel motion = MakeMotion<OdometryPose>(kMounted);
-  const Blocks x{{1, 2, 3}, {0.8, 0.2, -0.4, 0.4}};
+  const Blocks x{{1, 2, 3}, {0.8, 0.2, -0.4, 0.4}, {0.1, -0.2, 0.3}, {0.8, -0.4, 0.2, 0.4}, {0.1}};
   const std::vector<double> none(6), w{0.3, -0.2, 0.5, 0.4, 0.1, -0.6};
   const double turning[6] = {2, 0.1, -0.3, 0.2, 0.5, -0.9}, straight[6] = {2, 0.1, -0.3, 0, 0, 0};
   testing::ExpectTrueJacobians(motion, x, turning, w, 0.2);

@@ -275,7 +275,7 @@ const std::vector<Row>& Rows() {
                 {{1.0, 2.0, 3.0}, {1, 0, 0, 0}, {0.1, 0.0, -0.1}, {0.1, -0.1, 0.0}}, 0.05),
       MotionRow("odometry_pose", "{noise: {linear_velocity: 0.3, angular_velocity: 0.002}}",
                 OdometryPose({0.3, 0.3, 0.3}, {0.002, 0.002, 0.002}),
-                {{1.0, 2.0, 3.0}, {1, 0, 0, 0}}, 0.05),
+                {{1.0, 2.0, 3.0}, {1, 0, 0, 0}, {0.1, 0.0, -0.1}, {1, 0, 0, 0}, {0.02}}, 0.05),
       SensorRow("inverse_depth_feature", "{sigma_px: 1, " + kCamera + "}",
                 InverseDepthFeature<InverseDepth>(kSmallCamera, 1.0),
                 {kPosition, kOrientation, {0, 0, 0, 0.1, -0.2, 0.5}}),

@@ -56,6 +56,46 @@ TEST_F(TracksTest, MeasuresWhatTheConfigSays) {
   EXPECT_EQ(Open("frame_rate_hz: 10, measures: stereo")->streams()[0].size, 4);
 }
 
+TEST_F(TracksTest, MayBeginLaterAndWithoutTheFeaturesOfBefore) {
+  Write("tracks.csv",
+        "0,1,0,1\n0,1,1,1\n1,1,0,2\n1,1,1,2\n1,2,0,3\n1,2,1,3\n2,1,0,4\n2,1,1,4\n2,2,0,5\n2,2,1,5\n"
+        "3,3,0,6\n3,3,1,6\n");
+  const auto ids = [&](const std::string& keys) {
+    std::vector<std::pair<Stamp, std::vector<std::int64_t>>> all;
+    for (const Frame& frame : Frames("frame_rate_hz: 10" + keys)) {
+      all.emplace_back(frame.stamp / 100'000'000, std::vector<std::int64_t>());
+      for (const Measurement& m : frame.measurements) all.back().second.push_back(m.landmark);
+    }
+    return all;
+  };
+  using Ids = decltype(ids(""));
+  EXPECT_EQ(ids(", first_frame: 2"), (Ids{{2, {1, 2}}, {3, {3}}}));
+  EXPECT_EQ(ids(", features_from: 1"), (Ids{{0, {}}, {1, {2}}, {2, {2}}, {3, {3}}}));
+  EXPECT_EQ(ids(", first_frame: 1, features_from: 2, frames: 2"), (Ids{{1, {}}, {2, {}}}));
+  EXPECT_EQ(ids(", first_frame: 4"), Ids{});
+}
+
+// The camera of frame 1 stands at (1, 2, 3), turned by 90 degrees about z: its x is the file's y.
+TEST_F(TracksTest, TheWorldMayBeTheFirstCamera) {
+  Write("tracks.csv", "0,1,0,1\n0,1,1,1\n1,1,0,2\n1,1,1,2\n2,1,0,4\n2,1,1,4\n");
+  Write("truth.tum", "0.1 1 2 3 0 0 0.7071067811865476 0.7071067811865476\n0.2 1 7 3.5 0 0 1 0\n");
+  const auto frames = Frames("frame_rate_hz: 10, first_frame: 1, world: first_camera");
+  ASSERT_EQ(frames.size(), 2u);
+  const Values position{5, 0, 0.5}, turned{std::sqrt(0.5), 0, 0, std::sqrt(0.5)}, none{1, 0, 0, 0};
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(frames[0].truth[0][i], 0.0, 1e-15);
+    EXPECT_NEAR(frames[1].truth[0][i], position[i], 1e-14);
+  }
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_NEAR(frames[0].truth[1][i], none[i], 1e-15);
+    EXPECT_NEAR(frames[1].truth[1][i], turned[i], 1e-15);
+  }
+  ExpectError(ExitCode::kBadData,
+              "DIR/tracks.csv:3: the world is to be the camera of frame 0, which has no true "
+              "pose; expected one within truth_tolerance_s of it, or world: file",
+              [&] { Frames("frame_rate_hz: 10, world: first_camera"); });
+}
+
 TEST_F(TracksTest, TimestampsSayWhatFramesThereAre) {
   Write("tracks.csv", "1,3,0,1\n1,3,1,2\n");
   Write("timestamps.csv", "frame,t_s\n0,0.5\n1,0.6000000001\n2,0.7\n");

@@ -17,9 +17,9 @@ namespace alidade {
 ///   lag_ms:BLOCK        delay after truth as Lag() has it, of the first 100 000 stamps; > 0: late.
 ///                       Scalar blocks, steps within 5 % of their mean, a truth that changes
 ///   cov95:BLOCK         share of stamps with |e| <= 1.96 sigma (scalar blocks)
-///   nees.mean:OWNER     mean of e' P^-1 e / dof over the owner's estimated blocks of known truth,
-///                       jointly; stamps where P is singular or not finite are left out
-///   nees.cov95:OWNER    share of those stamps with e' P^-1 e <= chi2(0.95, dof)
+///   nees.mean:OWNER     mean of e' C^-1 e / dof over the owner's estimated blocks of known truth,
+///                       jointly; stamps where C is singular or not finite are left out
+///   nees.cov95:OWNER    share of those stamps with e' C^-1 e <= chi2(0.95, dof)
 ///   nis.mean:SENSOR     mean of r' S^-1 r / dof over accepted measurements
 ///   final:BLOCK         |e| at the last stamp
 ///   reprojection:SENSOR     of landmarks, in the unit of the measurement: the rms of the
@@ -27,6 +27,8 @@ namespace alidade {
 ///   settling_frames:SENSOR  frames until that rms stays at this level, as SettlingOf() counts
 ///                           them; infinite where it never does
 ///
+/// C = P + T is the covariance of e, T = diag(StreamInfo::sigma^2) that of the truth, which knows
+/// nothing of the filter; sigma^2 is its diagonal. An exact truth has T = 0.
 /// Over a segment the key ends in `@SEGMENT` (not lag_ms, final and the last two). Counts are
 /// `OUTCOME:SENSOR`, of control inputs `inputs:ENTRY`, and of landmarks `landmarks.initialised`,
 /// `.deleted`, `.converted` and `.negative`. A

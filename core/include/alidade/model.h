@@ -76,6 +76,9 @@ struct Sensor {
 ///                     MatrixRef G) const;      closed form, zeroed; only without control input
 ///   bool Stationary() const;                   x' = x and no noise: estimators skip the step
 ///
+/// A block with the flag ALIDADE_ROLE_OWNED, a bias or an extrinsic, is fixed at the neutral
+/// element of its geometry, unless the config gives it an initial value.
+///
 /// Blocks of size kDynamic need StepJacobian, `int Size(int block) const` and
 /// `int NoiseSize() const`. Their Step, StepJacobian and SqrtQ write to the caller's buffers: they
 /// must not throw, and a Step that returns false must not have written.

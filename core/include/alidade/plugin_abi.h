@@ -65,7 +65,7 @@ enum {
 /* Bits of AlidadeSpace.flags. */
 enum {
   ALIDADE_ROLE_OPTIONAL = 1, /* may stay unbound: its pointer is then null */
-  ALIDADE_ROLE_OWNED = 2,    /* the block arrives with the sensor: a bias, an extrinsic */
+  ALIDADE_ROLE_OWNED = 2,    /* the block arrives with its motion model: a bias, an extrinsic */
   ALIDADE_ROLE_LANDMARK = 4, /* filled anew for each measurement, by its landmark id */
   ALIDADE_ROLE_SHARED = 8    /* with LANDMARK: one block for all that are first seen at one stamp */
 };

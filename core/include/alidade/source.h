@@ -45,6 +45,7 @@ struct Frame {
 struct StreamInfo {
   std::string name;
   int size = 1;
+  double sigma = 0.0;  ///< of a truth: standard deviation of each element, in its tangent
 };
 
 /// Where measurements come from: a simulator, a file, a pipe. A build-tier plugin.
@@ -52,7 +53,7 @@ class Source {
  public:
   virtual ~Source() = default;
   virtual const std::vector<StreamInfo>& streams() const = 0;
-  /// Values that the source knows exactly, named like the blocks they are truth of.
+  /// Values that the source knows, named like the blocks they are truth of.
   virtual const std::vector<StreamInfo>& truths() const = 0;
   /// Fills `frame` with the next one; false at the end. Its streams are indices into streams(), its
   /// values as many as streams() and truths() say: what is not ends the run as internal.

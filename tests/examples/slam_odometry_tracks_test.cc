@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/11_slam_kitti on real drives, against what a published filter and dead reckoning reach.
+// examples/13_slam_odometry_tracks on real drives, against a published filter and dead reckoning.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -26,7 +26,7 @@ constexpr Drive kDrives[] = {{"drive_0001", 98, 1.357, 0.618, 0.50},
                              {"drive_0036", 240, 1.151, 0.879, 0.95},
                              {"drive_0095", 140, 2.132, 1.433, 1.62}};
 
-class SlamKitti : public ::testing::Test {
+class SlamOdometryTracks : public ::testing::Test {
  protected:
   void SetUp() override {
     const char* data = std::getenv("ALIDADE_DATA");
@@ -35,8 +35,11 @@ class SlamKitti : public ::testing::Test {
   }
   /// The RMS error of the position, m.
   double Error(const Drive& drive, const Settings& settings = {}) const {
-    Config config =
-        Config::FromFile(fs::path(ALIDADE_SOURCE_DIR) / "examples/11_slam_kitti/config.yaml");
+    return Ekf(drive, settings).metrics.at("rmse:cam.position");
+  }
+  EstimatorResult Ekf(const Drive& drive, const Settings& settings = {}) const {
+    Config config = Config::FromFile(fs::path(ALIDADE_SOURCE_DIR) /
+                                     "examples/13_slam_odometry_tracks/config.yaml");
     config.Set("source.path", (folder_ / drive.name).string(), "--set");
     config.Set("source.frames", std::to_string(drive.frames), "--set");
     for (const auto& [key, value] : settings) config.Set(key, value, "--set");
@@ -45,12 +48,12 @@ class SlamKitti : public ::testing::Test {
     const RunResult run = alidade::Run(experiment, {});
     EXPECT_EQ(run.status, RunStatus::kOk) << run.reason;
     EXPECT_EQ(run.frames, drive.frames);
-    return run.estimators.at(0).metrics.at("rmse:cam.position");
+    return run.estimators.at(0);
   }
   fs::path folder_;
 };
 
-TEST_F(SlamKitti, IsBetterThanDeadReckoningAndThePublishedFilter) {
+TEST_F(SlamOdometryTracks, IsBetterThanDeadReckoningAndThePublishedFilter) {
   double log_ratio = 0.0;
   for (const Drive& drive : kDrives) {
     const double error = Error(drive);
@@ -61,7 +64,16 @@ TEST_F(SlamKitti, IsBetterThanDeadReckoningAndThePublishedFilter) {
   EXPECT_LE(std::exp(log_ratio), 0.90);
 }
 
-TEST_F(SlamKitti, DoesNotHangOnTheNoiseOrTheNumberOfFeatures) {
+// Truth that jitters by 0.035 m makes no filter inconsistent. Odometry whose speed is 1.6 % off, as
+// that of 0095, does, for no noise of this filter says so.
+TEST_F(SlamOdometryTracks, IsInconsistentOnlyWhereTheOdometryIs) {
+  for (const Drive& drive : kDrives) {
+    EXPECT_EQ(Ekf(drive).diverged, std::string(drive.name) == "drive_0095") << drive.name;
+  }
+  EXPECT_TRUE(Ekf(kDrives[0], {{"evaluate.truth_sigma", "{}"}}).diverged);
+}
+
+TEST_F(SlamOdometryTracks, DoesNotHangOnTheNoiseOrTheNumberOfFeatures) {
   const Settings others = {{"sensors.pixels.sigma_px", "1"}, {"sensors.pixels.sigma_px", "4"},
                            {"landmarks.keep", "30"},         {"landmarks.keep", "200"},
                            {"landmarks.form", "anchored"},   {"landmarks.to_xyz.linearity", "0.1"}};

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "alidade/geometry.h"
 #include "number_rows.h"
 
 /// The files beside a file of tracks, read along with it.
@@ -145,11 +146,16 @@ class TumRows {
     Advance();
   }
 
-  /// The first pose that is within `tolerance` of `stamp`. Stamps are asked for in order.
+  /// The pose nearest to `stamp`, of two as near the earlier, where it is within `tolerance`. Stamps
+  /// are asked for in order.
   std::optional<Pose> At(Stamp stamp, Stamp tolerance) {
-    while (has_next_ && stamp_ < stamp - tolerance) Advance();
-    if (!has_next_ || stamp_ > stamp + tolerance) return std::nullopt;
-    return pose_;
+    const auto off = [stamp](Stamp other) { return std::abs(other - stamp); };
+    while (has_next_ && (!nearest_ || off(stamp_) < off(nearest_stamp_))) {
+      nearest_ = pose_;
+      nearest_stamp_ = stamp_;
+      Advance();
+    }
+    return nearest_ && off(nearest_stamp_) <= tolerance ? nearest_ : std::nullopt;
   }
 
  private:
@@ -180,8 +186,10 @@ class TumRows {
 
   NumberRows rows_;
   bool has_next_ = false;
-  Stamp stamp_ = 0;
+  Stamp stamp_ = 0;  ///< of the row that was read last
   Pose pose_{};
+  Stamp nearest_stamp_ = 0;  ///< of the row before it
+  std::optional<Pose> nearest_;
 };
 
 }  // namespace alidade

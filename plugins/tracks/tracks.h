@@ -73,7 +73,10 @@ class Tracks : public Source {
                             ", which has no true pose",
                         "one within truth_tolerance_s of it, or world: file");
       }
-      if (frames_ == 0) first_pose_ = *pose;
+      if (frames_ == 0) {
+        first_pose_ = *pose;
+        Normalise<UnitQuaternion>(first_pose_.orientation.data());
+      }
       if (pose) pose = pose->In(first_pose_);
     }
     if (pose) {
@@ -163,7 +166,12 @@ class Tracks : public Source {
     if (!times_) {
       if (!next_) return false;
       frame_ = next_->frame;
-      stamp = StampFromSeconds(static_cast<double>(frame_) / options_.rate_hz);
+      const double t_s = static_cast<double>(frame_) / options_.rate_hz;
+      if (!(t_s < 9.2e9)) {
+        rows_->FailLine("frame " + std::to_string(frame_) + " is beyond 292 years",
+                        "frames that count from 0, at frame_rate_hz");
+      }
+      stamp = StampFromSeconds(t_s);
       return true;
     }
     const bool more = times_->Next(frame_, stamp);

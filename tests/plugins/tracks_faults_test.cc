@@ -50,6 +50,12 @@ TEST_F(TracksTest, Fault30Overflow) {
                 "9223372036854775807");
 }
 
+TEST_F(TracksTest, Fault30AFrameBeyondAllTimes) {
+  ExpectBadData("99999999999999,3,0,1\n99999999999999,3,1,1\n",
+                "DIR/tracks.csv:1: frame 99999999999999 is beyond 292 years; expected frames that "
+                "count from 0, at frame_rate_hz");
+}
+
 TEST_F(TracksTest, Fault31NegativeFrame) {
   ExpectBadData("-1,3,0,1\n",
                 "DIR/tracks.csv:1:1 frame: '-1' is negative; expected a whole number "

@@ -150,6 +150,18 @@ TEST_F(TracksTest, TruthIsTakenAtTheTimeOfAFrame) {
   EXPECT_EQ(Frames("truth_tolerance_s: 0.002")[1].truth[0], (Values{4, 5, 6}));
 }
 
+TEST_F(TracksTest, TruthIsThePoseNearestInTime) {
+  Write("tracks.csv", "0,3,0,1\n0,3,1,2\n1,3,0,1\n1,3,1,2\n2,3,0,1\n2,3,1,2\n");
+  Write("truth.tum",
+        "-0.02 1 0 0 0 0 0 1\n0.01 2 0 0 0 0 0 1\n0.08 3 0 0 0 0 0 1\n0.1 4 0 0 0 0 0 1\n"
+        "0.11 5 0 0 0 0 0 1\n0.17 6 0 0 0 0 0 1\n");
+  const std::vector<Frame> frames = Frames("frame_rate_hz: 10, truth_tolerance_s: 0.03");
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_EQ(frames[0].truth[0].at(0), 2.0);
+  EXPECT_EQ(frames[1].truth[0].at(0), 4.0);
+  EXPECT_EQ(frames[2].truth[0].at(0), 6.0);
+}
+
 TEST_F(TracksTest, ReadsAPipeAsItIsWritten) {
   ASSERT_EQ(mkfifo(File().c_str(), 0600), 0);
   int descriptor = -1;

@@ -16,6 +16,7 @@
 
 #include "alidade/build_plugin.h"
 #include "alidade/ekf.h"
+#include "alidade/support.h"
 #include "residuals.h"
 #include "trajectory.h"
 
@@ -338,31 +339,28 @@ class CeresBatch : public Estimator {
   bool failed_ = false;
 };
 
+constexpr Support kSupport = {.held = false, .from_measurement = true};
+
+/// Where a config asks for what is not supported: `sensors.stereo.roles.depth.mode`.
+std::string KeyOf(const Unsupported& asked, const System& system) {
+  if (asked.block >= 0) {
+    const Block& block = system.layout[asked.block];
+    return "state." + block.owner + ".consider names '" + block.name + "'";
+  }
+  if (asked.sensor < 0) return "landmarks";
+  const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(asked.sensor)];
+  const auto role = static_cast<std::size_t>(asked.role);
+  return "sensors." + sensor.name + ".roles." + sensor.model.roles()[role].name +
+         (asked.what.starts_with("linearise_at") ? ".linearise_at" : ".mode");
+}
+
 /// Refuses what a batch cannot do, by name.
 void CheckSupported(const System& system, const Node& entry) {
-  const auto refuse = [&](const std::string& what, const std::string& instead) {
-    entry.Fail("estimator type 'ceres_batch' does not support " + what,
-               instead + " (also by the estimator's `overrides`), or type: ekf");
-  };
-  for (const Block& block : system.layout.blocks()) {
-    if (block.status != BlockStatus::kConsidered) continue;
-    refuse("considered blocks: state." + block.owner + ".consider names '" + block.name + "'",
-           "the block estimated or fixed");
-  }
-  for (const SensorBinding& sensor : system.sensors) {
-    for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
-      const RoleBinding& role = sensor.roles[i];
-      const std::string key =
-          "sensors." + sensor.name + ".roles." + sensor.model.roles()[i].name + '.';
-      if (role.mode != RoleMode::kEstimate) {
-        const bool held = role.mode == RoleMode::kHold;
-        refuse(std::string(held ? "held" : "considered") + " roles: " + key + "mode", "estimate");
-      }
-      if (role.linearise_at != LineariseAt::kPrediction) {
-        refuse("linearise_at: measurement: " + key + "linearise_at", "prediction");
-      }
-    }
-  }
+  const auto asked = FindUnsupported(system, kSupport);
+  if (!asked) return;
+  entry.Fail(
+      "estimator type 'ceres_batch' does not support " + asked->what + ": " + KeyOf(*asked, system),
+      asked->remedy + " (also by the estimator's `overrides`), or type: ekf");
 }
 
 EstimatorMaker Create(const EstimatorArguments& arguments) {

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/src/number_text.h"
+
 namespace alidade::ceres_batch {
 namespace {
 
@@ -103,7 +105,7 @@ bool Trajectory::AddSteps(Stamp from, Stamp end, Epoch& epoch) {
   const bool overflow = __builtin_sub_overflow(end, from, &elapsed);
   const Stamp parts = overflow ? 0 : StepParts(elapsed, max_dt_s_);
   if (overflow || parts > kMostInputs) {
-    return Fail("a gap before " + std::to_string(Seconds(end)) + " s needs more than " +
+    return Fail("a gap before " + internal::FixedText(Seconds(end), 6) + " s needs more than " +
                 std::to_string(kMostInputs) + " steps of max_dt_s");
   }
   std::vector<Event> events;  // which the filter tells

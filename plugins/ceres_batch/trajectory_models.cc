@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/src/number_text.h"
 #include "geometry_jacobian.h"
 #include "trajectory.h"
 
@@ -148,7 +149,7 @@ bool Trajectory::Residual(const Factor& factor, const Point& point, Eigen::Vecto
                    : sensor.model.Linearise(roles.data(), h.data(), into.data(), strides.data());
   if (status != Status::kOk) {
     return Fail("sensor '" + sensor.name + "' at " +
-                std::to_string(Seconds(factor.measurement.stamp)) +
+                internal::FixedText(Seconds(factor.measurement.stamp), 6) +
                 " s: " + Why(status, sensor.model.error_text()));
   }
   const double* z = factor.measurement.values.data();
@@ -199,7 +200,7 @@ bool Trajectory::FreezeFactor(Factor& factor, const Point& point) {
                                                  factor.measurement.values.data(), root.data());
     if (status != Status::kOk) {
       return Fail("the noise of sensor '" + sensor.name + "' at " +
-                  std::to_string(Seconds(factor.measurement.stamp)) +
+                  internal::FixedText(Seconds(factor.measurement.stamp), 6) +
                   " s: " + Why(status, sensor.model.error_text()));
     }
     r = root * root.transpose();
@@ -209,7 +210,7 @@ bool Trajectory::FreezeFactor(Factor& factor, const Point& point) {
   const Eigen::LLT<Eigen::MatrixXd> llt(r);  // which takes what is not a number for a success
   if (!r.allFinite() || llt.info() != Eigen::Success) {
     return Fail("the noise of sensor '" + sensor.name + "' at " +
-                std::to_string(Seconds(factor.measurement.stamp)) +
+                internal::FixedText(Seconds(factor.measurement.stamp), 6) +
                 " s is not positive definite: a batch needs sigma > 0");
   }
   const Eigen::MatrixXd l = llt.matrixL();

@@ -4,8 +4,8 @@
 #include "alidade/random.h"
 #include "alidade/rts.h"
 #include "alidade/run.h"
-#include "host_fixture.h"
-#include "support/systems.h"
+#include "ceres_batch_fixture.h"
+#include "support/comma_locale.h"
 
 /// How a batch starts and ends: what it says where it is not at the optimum.
 namespace alidade {
@@ -13,23 +13,9 @@ namespace {
 
 using testing::AddSensor;
 using testing::FrameAt;
-
-const PluginHost& Shipped() {
-  static const PluginHost host;
-  return host;
-}
-
-std::unique_ptr<Estimator> MakeBatch(const System& system, const std::string& options = "") {
-  const Config config = Config::FromText("type: ceres_batch\n" + options, "batch.yaml");
-  return Shipped().CreateEstimator("ceres_batch", config.root())(system,
-                                                                 testing::StreamsOf(system));
-}
-
-System LinearSystem() {
-  System system = testing::MovingPoint(0.7);
-  AddSensor(system, "z", InProcessSensor(testing::Linear(2.0, 0.3), "linear"), {"p.x"});
-  return system;
-}
+using testing::LinearSystem;
+using testing::MakeBatch;
+using testing::Shipped;
 
 // The velocity is not measured at the first frame: its variance is that of the step before it.
 TEST(CeresBatchEnds, StartsAtTheGivenTime) {
@@ -67,6 +53,17 @@ TEST(CeresBatchEnds, InputsOfFirstValuesCountToo) {
   };
   process({}, false);
   process({{1, 0.5}}, true);
+}
+
+TEST(CeresBatchEnds, TimesReadTheSameInEveryLocale) {
+  const testing::CommaLocale locale;
+  if (!locale.active()) GTEST_SKIP() << "localedef made no locale";
+  const auto batch = MakeBatch(LinearSystem(), "max_dt_s: 0.001\n");
+  batch->Process(FrameAt(0.0, {}));
+  const UpdateReport& report = batch->Process(FrameAt(1010.5, {}));
+  ASSERT_FALSE(report.events.empty());
+  EXPECT_EQ(report.events[0].text,
+            "a gap before 1010.500000 s needs more than 4000 steps of max_dt_s");
 }
 
 // ---- a model that fails -------------------------------------------------------------------------

@@ -3,19 +3,15 @@
 #include <cmath>
 
 #include "alidade/run.h"
-#include "host_fixture.h"
-#include "support/systems.h"
+#include "ceres_batch_fixture.h"
 
 namespace alidade {
 namespace {
 
 using testing::AddSensor;
 using testing::FrameAt;
-
-const PluginHost& Shipped() {
-  static const PluginHost host;
-  return host;
-}
+using testing::MakeBatch;
+using testing::Shipped;
 
 struct Solution {
   std::vector<Eigen::VectorXd> x;
@@ -24,9 +20,7 @@ struct Solution {
 };
 
 Solution SmoothOver(const System& system, const std::vector<Frame>& frames) {
-  const Config config = Config::FromText("type: ceres_batch", "batch.yaml");
-  const auto batch =
-      Shipped().CreateEstimator("ceres_batch", config.root())(system, testing::StreamsOf(system));
+  const auto batch = MakeBatch(system);
   for (const Frame& frame : frames) batch->Process(frame);
   Solution found;
   batch->Smooth([&](std::size_t, const State& state, const UpdateReport& report) {
@@ -130,9 +124,7 @@ TEST(CeresBatchLoss, EqualsIterativelyReweightedLeastSquares) {
 TEST(CeresBatchLoss, OfTheDataSoFarEndsWhereTheSmootherDoes) {
   const System system = PointWith({LossKind::kHuber, 1.345});
   const std::vector<Frame> frames = FramesWithOutliers(30);
-  const Config config = Config::FromText("type: ceres_batch\ndata: so_far", "batch.yaml");
-  const auto batch =
-      Shipped().CreateEstimator("ceres_batch", config.root())(system, testing::StreamsOf(system));
+  const auto batch = MakeBatch(system, "data: so_far\n");
   for (const Frame& frame : frames) batch->Process(frame);
   const Solution smoothed = SmoothOver(system, frames);
   EXPECT_NEAR(testing::ValueOf(batch->state(), "p.x"), smoothed.x.back()(0), 1e-8);

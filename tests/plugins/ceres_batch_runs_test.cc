@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/plugin_listing.h"
 #include "alidade/run.h"
-#include "host_fixture.h"
+#include "ceres_batch_fixture.h"
 
 namespace alidade {
 namespace {
 
-const PluginHost& Shipped() {
-  static const PluginHost host;
-  return host;
-}
+using testing::Shipped;
 
 RunResult RunDepth(int seed, const std::vector<std::pair<std::string, std::string>>& settings) {
   const std::string file = ALIDADE_SOURCE_DIR "/examples/05_depth_principled/config.yaml";

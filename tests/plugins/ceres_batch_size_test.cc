@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/plugin_host.h"
-#include "host_fixture.h"
-#include "support/systems.h"
+#include "ceres_batch_fixture.h"
 
 namespace alidade {
 namespace {
@@ -9,12 +7,7 @@ namespace {
 // Two inputs of the prior and one of each step: the 1001st comes with the thousandth frame, which
 // is at 49.95 s.
 TEST(CeresBatchSize, WhatTakesLongIsSaidOnce) {
-  const PluginHost host;
-  System system = testing::MovingPoint();
-  testing::AddSensor(system, "z", InProcessSensor(testing::Linear(2.0, 0.3), "linear"), {"p.x"});
-  const Config config = Config::FromText("type: ceres_batch", "batch.yaml");
-  const auto batch =
-      host.CreateEstimator("ceres_batch", config.root())(system, testing::StreamsOf(system));
+  const auto batch = testing::MakeBatch(testing::LinearSystem());
   std::vector<Event> events;
   for (int k = 0; k < 1100; ++k) {
     const UpdateReport& report = batch->Process(testing::FrameAt(0.05 * k, {{0, 2.0}}));

@@ -4,9 +4,8 @@
 
 #include "alidade/plugin_listing.h"
 #include "alidade/run.h"
-#include "host_fixture.h"
+#include "ceres_batch_fixture.h"
 #include "plugins/depth_target/depth_target.h"
-#include "support/systems.h"
 
 namespace alidade {
 namespace {
@@ -14,17 +13,9 @@ namespace {
 using testing::AddMotion;
 using testing::AddSensor;
 using testing::FrameAt;
-
-const PluginHost& Shipped() {
-  static const PluginHost host;
-  return host;
-}
-
-std::unique_ptr<Estimator> MakeBatch(const System& system, const std::string& options = "") {
-  const Config config = Config::FromText("type: ceres_batch\n" + options, "batch.yaml");
-  return Shipped().CreateEstimator("ceres_batch", config.root())(system,
-                                                                 testing::StreamsOf(system));
-}
+using testing::LinearSystem;
+using testing::MakeBatch;
+using testing::Shipped;
 
 /// The estimates of a smoother: values and covariances, frame by frame, and its last events.
 struct Smoothed {
@@ -47,13 +38,6 @@ Smoothed SmoothOver(Estimator& batch, const std::vector<Frame>& frames) {
     result.events = report.events;
   });
   return result;
-}
-
-/// A point with a linear sensor of 0.3 m; its second block is measured by none.
-System LinearSystem() {
-  System system = testing::MovingPoint(0.7);
-  AddSensor(system, "z", InProcessSensor(testing::Linear(2.0, 0.3), "linear"), {"p.x"});
-  return system;
 }
 
 std::vector<Frame> LinearFrames(int count) {

@@ -2,18 +2,14 @@
 //
 // A batch over what a filter accepted, and a batch in the place of truth.
 #include "alidade/run.h"
-#include "host_fixture.h"
+#include "ceres_batch_fixture.h"
 #include "support/recording.h"
 
 namespace alidade {
 namespace {
 
+using testing::Shipped;
 using testing::SwingingTarget;
-
-const PluginHost& Shipped() {
-  static const PluginHost host;
-  return host;
-}
 
 bool IsOutlier(int k) { return k % 13 == 6; }
 
@@ -40,11 +36,7 @@ class WithOutliers : public SwingingTarget {
 
 /// A batch that tells its estimates.
 struct Told : Estimator {
-  explicit Told(const System& system) {
-    const Config config = Config::FromText("type: ceres_batch", "batch.yaml");
-    batch =
-        Shipped().CreateEstimator("ceres_batch", config.root())(system, testing::StreamsOf(system));
-  }
+  explicit Told(const System& system) : batch(testing::MakeBatch(system)) {}
   void Start(Stamp stamp) override { batch->Start(stamp); }
   const UpdateReport& Process(const Frame& frame) override { return batch->Process(frame); }
   bool offline() const override { return true; }

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "host_fixture.h"
+#include "support/systems.h"
+
+/// What the tests of the batch share.
+namespace alidade::testing {
+
+/// The plugins of this build.
+inline const PluginHost& Shipped() {
+  static const PluginHost host;
+  return host;
+}
+
+/// A batch with these options, one a line.
+inline std::unique_ptr<Estimator> MakeBatch(const System& system, const std::string& options = "") {
+  const Config config = Config::FromText("type: ceres_batch\n" + options, "batch.yaml");
+  return Shipped().CreateEstimator("ceres_batch", config.root())(system, StreamsOf(system));
+}
+
+/// A point with a linear sensor of 0.3 m; its second block is measured by none.
+inline System LinearSystem() {
+  System system = MovingPoint(0.7);
+  AddSensor(system, "z", InProcessSensor(Linear(2.0, 0.3), "linear"), {"p.x"});
+  return system;
+}
+
+}  // namespace alidade::testing

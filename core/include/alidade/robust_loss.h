@@ -40,7 +40,7 @@ inline double Rho(const RobustLoss& loss, double d) {
   return 0.5 * d * d;
 }
 
-/// w(d) = rho'(d) / d, in (0, 1]; d >= 0.
+/// w(d) = rho'(d) / d, in (0, 1], or 0 where that underflows; d >= 0.
 inline double Weight(const RobustLoss& loss, double d) {
   const double k = loss.scale;
   switch (loss.kind) {

@@ -27,8 +27,8 @@ const char* HostBuildId();
   throw Error(ExitCode::kPlugin, ErrorLine({file.string()}, {}, why));
 }
 
-/// Where the plugins of this very build lie: `lib/alidade` beside this library, of the build tree or
-/// of the installation; "" where that cannot be told.
+/// Where the plugins of this very build lie: `lib/alidade` beside this library, of the build tree
+/// or of the installation; "" where that cannot be told.
 std::filesystem::path FolderOfProgram();
 
 /// Refuses a build that this host cannot run: fast-math, instructions that this processor lacks, a

@@ -146,8 +146,8 @@ class TumRows {
     Advance();
   }
 
-  /// The pose nearest to `stamp`, of two as near the earlier, where it is within `tolerance`. Stamps
-  /// are asked for in order.
+  /// The pose nearest to `stamp`, of two as near the earlier, where it is within `tolerance`.
+  /// Stamps are asked for in order.
   std::optional<Pose> At(Stamp stamp, Stamp tolerance) {
     const auto off = [stamp](Stamp other) { return std::abs(other - stamp); };
     while (has_next_ && (!nearest_ || off(stamp_) < off(nearest_stamp_))) {

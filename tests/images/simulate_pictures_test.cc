@@ -120,8 +120,8 @@ TEST_F(SimulatePictures, DiscsLieWhereTheTracksSay) {
     const cv::Mat image = Image("data/images/00000" + std::to_string(k) + ".png");
     ASSERT_EQ(image.size(), cv::Size(320, 240));
     ASSERT_EQ(frames[static_cast<std::size_t>(k)].size(), cv::Size(320, 240));
-    // The smoothed discs of OpenCV lie within 0.06 px of their centres at any of 16 x 16 places in a
-    // pixel; the losses of JPEG come on top.
+    // The smoothed discs of OpenCV lie within 0.06 px of their centres at any of 16 x 16 places in
+    // a pixel; the losses of JPEG come on top.
     EXPECT_LT(LargestError(image, pixels.at(k), seen), 0.1) << "frame " << k;
     const cv::Mat& frame = frames[static_cast<std::size_t>(k)];
     EXPECT_LT(LargestError(frame, pixels.at(k), seen_again), 0.5) << "frame " << k;

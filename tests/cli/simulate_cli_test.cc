@@ -16,6 +16,7 @@ source:
   seed: 3
   frames: 20
   odometry: true
+  known: {count: 3}
   points: {box: {min: [-2, -1.5, 2], max: [2, 1.5, 6]}, count: 40}
   trajectory: {look_at: [{position: [-0.5, 0, 0], target: [0, 0, 4]},
                          {position: [0.5, 0, 0], target: [0, 0, 4]}]}
@@ -34,8 +35,8 @@ TEST_F(SimulateCli, WritesFilesThatSourceTracksReadsBack) {
   const Outcome made = Call({"simulate", "scene.yaml", "-o", "data"});
   ASSERT_EQ(made.code, 0) << made.err;
   EXPECT_TRUE(Contains(made.out, "20 frames\nwrote data\n")) << made.out;
-  for (const char* name : {"calibration.yaml", "map.csv", "odometry.csv", "timestamps.csv",
-                           "tracks.csv", "truth.csv", "truth.tum"}) {
+  for (const char* name : {"calibration.yaml", "known.csv", "map.csv", "odometry.csv",
+                           "timestamps.csv", "tracks.csv", "truth.csv", "truth.tum"}) {
     EXPECT_TRUE(Exists(std::string("data/") + name)) << name;
     EXPECT_TRUE(Contains(made.out, std::string("data/") + name + '\n')) << name;
   }
@@ -49,7 +50,7 @@ TEST_F(SimulateCli, WritesFilesThatSourceTracksReadsBack) {
   Write("again.yaml", "alidade: 1\nsource: {type: tracks, path: data}\n");
   const Outcome again = Call({"simulate", "again.yaml", "-o", "again"});
   ASSERT_EQ(again.code, 0) << again.err;
-  for (const char* name : {"tracks.csv", "timestamps.csv", "odometry.csv", "truth.tum"}) {
+  for (const char* name : {"tracks.csv", "known.csv", "timestamps.csv", "odometry.csv", "truth.tum"}) {
     EXPECT_EQ(Read(std::string("again/") + name), Read(std::string("data/") + name)) << name;
   }
   EXPECT_FALSE(Exists("again/map.csv"));

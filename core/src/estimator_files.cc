@@ -138,6 +138,9 @@ void EstimatorFiles::AddEstimate(const Frame& frame, const State& state) {
     estimates_.Numbers(state.value(columns.id), columns.ambient, columns.ambient);
     const auto truth = static_cast<std::size_t>(columns.truth);
     const bool known = truth < frame.truth.size() && !frame.truth[truth].empty();
+    if (static_cast<int>(columns.element) == recorded_.path) {
+      recorded_.path_box.extend(Eigen::Map<const Eigen::Vector3d>(state.value(columns.id)));
+    }
     for (std::size_t i = 0; i < columns.ambient; ++i) {
       RecordedElement& element = recorded_.elements[columns.element + i];
       element.has_value = true;
@@ -211,7 +214,8 @@ void EstimatorFiles::AddGain(Stamp stamp, const State& state, const MeasurementR
   gains_.EndRow();
 }
 
-RecordedMap DescribeMap(const std::vector<LandmarkEstimate>& landmarks) {
+RecordedMap DescribeMap(const std::vector<LandmarkEstimate>& landmarks,
+                        const Eigen::AlignedBox3d& path) {
   RecordedMap map;
   std::array<std::vector<double>, 3> places;
   for (const LandmarkEstimate& one : landmarks) {
@@ -223,12 +227,16 @@ RecordedMap DescribeMap(const std::vector<LandmarkEstimate>& landmarks) {
     }
   }
   if (map.placed == 0) return map;
-  std::array<double, 3> spread;  // by quartiles: a few lie far off
+  Eigen::Vector3d low, high;  // of 8 in 10: a few lie far off
   for (std::size_t axis = 0; axis < 3; ++axis) {
     std::ranges::sort(places[axis]);
-    spread[axis] = Quantile(places[axis], 0.75) - Quantile(places[axis], 0.25);
+    low[static_cast<Eigen::Index>(axis)] = Quantile(places[axis], 0.1);
+    high[static_cast<Eigen::Index>(axis)] = Quantile(places[axis], 0.9);
   }
-  const auto thin = std::ranges::min_element(spread) - spread.begin();
+  Eigen::AlignedBox3d box = path;
+  box.extend(low).extend(high);
+  Eigen::Index thin = 0;
+  box.sizes().minCoeff(&thin);
   map.across = thin == 0 ? 1 : 0;
   map.along = thin == 2 ? 1 : 2;
   return map;

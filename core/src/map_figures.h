@@ -6,7 +6,7 @@
 
 namespace alidade::internal {
 
-/// Path and landmarks at the end beside truth, over the two axes that landmarks spread along most:
+/// Path and landmarks at the end beside truth, over the two axes along which they reach farthest:
 /// from above, as a rule. What lies far off is left out. Empty where there are none.
 FigureScript MapFigure(const RecordedRun& run, const RecordedEstimator& estimator);
 

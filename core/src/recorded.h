@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -41,7 +42,8 @@ struct RecordedSensor {
 /// Landmarks of `NAME/landmarks.csv` that have a place, and those whose true one is known too.
 struct RecordedMap {
   std::int64_t placed = 0, known = 0;
-  int across = 0, along = 2;  ///< the two axes that they spread along most: horizontal, vertical
+  /// The two axes along which path and landmarks reach farthest: horizontal, vertical.
+  int across = 0, along = 2;
 };
 
 struct RecordedEstimator {
@@ -50,6 +52,7 @@ struct RecordedEstimator {
   std::vector<RecordedSensor> sensors;
   int width = 0;  ///< of the widest measurement: columns z0 .. z<width - 1>, then h, s and r
   int path = -1;  ///< the first of the three elements that landmarks are seen from; -1: none
+  Eigen::AlignedBox3d path_box = {};
   std::int64_t estimate_rows = 0, innovation_rows = 0, gain_rows = 0;
   std::int64_t reprojection_rows = 0;
   RecordedMap map;

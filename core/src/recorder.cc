@@ -204,7 +204,8 @@ void Recorder::Finish(const RunResult& result) {
     if (!one.landmarks) continue;
     internal::WriteLandmarks(folder, one.name, *one.landmarks);
     if (e >= recorded.estimators.size()) continue;
-    recorded.estimators[e].map = internal::DescribeMap(*one.landmarks);
+    internal::RecordedEstimator& estimator = recorded.estimators[e];
+    estimator.map = internal::DescribeMap(*one.landmarks, estimator.path_box);
   }
   folder.Write("run.json", internal::RunJson(result, impl_->facts));
   folder.Write("comparison.csv", internal::ComparisonCsv(result));

@@ -71,8 +71,8 @@ class Tracks : public Source {
     if (truth_ && options_.world == TracksOptions::kFirstCamera) {
       if (frames_ == 0 && !pose) {
         tracks_->FailLine("the world is to be the camera of frame " + std::to_string(frame_) +
-                            ", which has no true pose",
-                        "one within truth_tolerance_s of it, or world: file");
+                              ", which has no true pose",
+                          "one within truth_tolerance_s of it, or world: file");
       }
       if (frames_ == 0) {
         first_pose_ = *pose;
@@ -135,7 +135,7 @@ class Tracks : public Source {
       const double t_s = static_cast<double>(frame_) / options_.rate_hz;
       if (!(t_s < 9.2e9)) {
         tracks_->FailLine("frame " + std::to_string(frame_) + " is beyond 292 years",
-                        "frames that count from 0, at frame_rate_hz");
+                          "frames that count from 0, at frame_rate_hz");
       }
       stamp = StampFromSeconds(t_s);
       return true;
@@ -143,7 +143,7 @@ class Tracks : public Source {
     const bool more = times_->Next(frame_, stamp);
     if (next && (!more || *next < frame_)) {
       tracks_->FailLine("frame " + std::to_string(*next) + " is not in " + times_->name(),
-                      "a time for every frame");
+                        "a time for every frame");
     }
     return more;
   }

@@ -50,7 +50,8 @@ TEST_F(SimulateCli, WritesFilesThatSourceTracksReadsBack) {
   Write("again.yaml", "alidade: 1\nsource: {type: tracks, path: data}\n");
   const Outcome again = Call({"simulate", "again.yaml", "-o", "again"});
   ASSERT_EQ(again.code, 0) << again.err;
-  for (const char* name : {"tracks.csv", "known.csv", "timestamps.csv", "odometry.csv", "truth.tum"}) {
+  for (const char* name :
+       {"tracks.csv", "known.csv", "timestamps.csv", "odometry.csv", "truth.tum"}) {
     EXPECT_EQ(Read(std::string("again/") + name), Read(std::string("data/") + name)) << name;
   }
   EXPECT_FALSE(Exists("again/map.csv"));

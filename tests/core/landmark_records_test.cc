@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "core/src/estimator_files.h"
 #include "core/src/map_metrics.h"
 #include "support/landmark_models.h"
 #include "support/recording.h"
@@ -150,6 +151,22 @@ TEST(LandmarkRecords, TheMapIsDrawnBesideTruth) {
       << map;
   EXPECT_NE(Read(folder / "out/figures/ekf.reprojection.gp").find("column('rms')"),
             std::string::npos);
+}
+
+TEST(LandmarkRecords, AMapIsDrawnOverTheAxesOfPathAndLandmarks) {
+  std::vector<LandmarkEstimate> map;
+  for (int i = 0; i < 20; ++i) {
+    map.emplace_back().position = Eigen::Vector3d(0.2 * i, 0.1 * i, 3.0);  // a wall 4 m x 2 m
+  }
+  map.back().position.y() = 1000.0;  // one far off
+  const internal::RecordedMap wall = internal::DescribeMap(map, {});
+  EXPECT_EQ(wall.across, 0);
+  EXPECT_EQ(wall.along, 1);
+  const Eigen::AlignedBox3d path(Eigen::Vector3d::Zero(), Eigen::Vector3d(0.0, 0.0, 2.0));
+  const internal::RecordedMap from_above = internal::DescribeMap(map, path);
+  EXPECT_EQ(from_above.across, 0);
+  EXPECT_EQ(from_above.along, 2);
+  EXPECT_EQ(from_above.placed, 20);
 }
 
 TEST(MapMetrics, ASimilarityIsNoErrorAfterAlignment) {

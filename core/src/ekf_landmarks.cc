@@ -342,8 +342,8 @@ std::vector<const Ekf::Row*> Ekf::Landmarks::MeasuredOnce() const {
   }
   const auto id = [](const Row* row) { return row->measurement->landmark; };
   std::ranges::stable_sort(used, {}, id);
-  const auto twice = std::ranges::unique(used, {}, id);
-  used.erase(twice.begin(), twice.end());
+  const auto same = [&](const Row* a, const Row* b) { return id(a) == id(b); };
+  used.erase(std::unique(used.begin(), used.end(), same), used.end());
   return used;
 }
 

@@ -33,6 +33,12 @@ std::string IsAvi(const std::string& name) {
   return "'" + name + "' is no video that can be written; expected a name like video.avi";
 }
 
+std::string IsInside(const std::string& name) {
+  const std::filesystem::path path = std::filesystem::path(name).lexically_normal();
+  if (!path.empty() && path != "." && path != "./") return {};
+  return "'" + name + "' is the folder itself; expected a name in it, like images";
+}
+
 ExitCode RunSimulate(const Arguments& arguments) {
   const Config config = arguments.input.Load();
   const std::filesystem::path path =
@@ -67,7 +73,8 @@ void AddSimulate(CLI::App& program, Action& action) {
       .add_option("--images", arguments->pictures.images,
                   "writes it as a PNG for each frame, in DIR in the folder; needs OpenCV")
       ->option_text("DIR")
-      ->check(IsNamed);
+      ->check(IsNamed)
+      ->check(IsInside);
   command.add_flag("--force", arguments->force, "replace the folder if it is there");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.footer(kFooter);

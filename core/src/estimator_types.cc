@@ -132,4 +132,15 @@ void RefuseUnsupported(const std::string& type, const Support& support, const No
             asked->remedy + " (also by the estimator's `overrides`), or type: ekf");
 }
 
+void RefuseLoneMatches(const Node& entry, const System& system) {
+  const auto fuse = entry.Find("fuse");
+  if (!fuse || fuse->Text() != "per_measurement") return;
+  for (const SensorBinding& sensor : system.sensors) {
+    if (!sensor.association) continue;
+    fuse->Fail("one match has no others to agree with, as sensor '" + sensor.name +
+                   "' asks by its `association`",
+               "joint or per_sensor");
+  }
+}
+
 }  // namespace alidade::internal

@@ -44,5 +44,8 @@ void RefuseUnsupportedKeys(const std::string& type, const Node& entry);
 /// Errors: kBadConfig.
 void RefuseUnsupported(const std::string& type, const Support& support, const Node& root,
                        const System& system);
+/// Refuses `fuse: per_measurement` of an estimator, the map `entry`, where a sensor looks for
+/// matches that agree. Error: kBadConfig.
+void RefuseLoneMatches(const Node& entry, const System& system);
 
 }  // namespace alidade::internal

@@ -222,6 +222,7 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   named.system = BuildSystem(own.root(), host, only);
   if (of_core != nullptr) {
     internal::RefuseUnsupported(named.type, of_core->support, own.root(), named.system);
+    internal::RefuseLoneMatches(entry, named.system);
   } else if (named.system.landmarks) {
     type.Fail("estimator type '" + named.type + "' does not support landmarks",
               "`sensors` that measure none, or type: ekf");

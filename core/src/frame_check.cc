@@ -97,9 +97,16 @@ void FrameCheck::Normalise(Kind& kind, std::vector<double>& value) {
   }
   if (defect > kCounted) ++normalised_[kind.info.name];
   kind.geometry.Normalise(value.data());
-  if (!is_rotation) return;
-  ChooseSign(kind.before, value);
-  kind.before = value;
+  if (is_rotation) ChooseSign({}, value);
+}
+
+void FrameCheck::FollowTruth(Frame& frame) {
+  for (std::size_t t = 0; t < frame.truth.size(); ++t) {
+    Kind& kind = truths_[t];
+    if (frame.truth[t].empty() || kind.geometry.kind != GeometryKind::kUnitQuaternion) continue;
+    ChooseSign(kind.before, frame.truth[t]);
+    kind.before = frame.truth[t];
+  }
 }
 
 }  // namespace alidade::internal

@@ -11,9 +11,8 @@
 namespace alidade::internal {
 
 /// What every frame of a source passes before anything else sees it. Quaternions and directions,
-/// of measurements, control inputs and truth, are brought to unit length. Of a quaternion's two
-/// signs the one nearer to the value before is kept, at first the one of ChooseSign: the signs of a
-/// source are not seen in what a run writes.
+/// of measurements, control inputs and truth, are brought to unit length, and a quaternion to the
+/// sign that ChooseSign has for it: the signs of a source are not seen in what a run writes.
 class FrameCheck {
  public:
   using Counts = std::map<std::string, std::int64_t>;
@@ -25,13 +24,15 @@ class FrameCheck {
   /// whatever takes it afterwards indexes by stream and reads as many values as these tell;
   /// kBadData for a length that is off by more than 1e-3.
   void operator()(Frame& frame);
+  /// Of the two signs of a true quaternion, that nearer to the one before. Takes frames in order.
+  void FollowTruth(Frame& frame);
 
  private:
   /// The values of one stream or truth.
   struct Kind {
     StreamInfo info;
-    Geometry geometry;  ///< a vector where none is known
-    std::vector<double> before = {};
+    Geometry geometry;                ///< a vector where none is known
+    std::vector<double> before = {};  ///< of a truth
   };
 
   void Check(const Frame& frame) const;

@@ -11,6 +11,7 @@
 #include "alidade/statistics.h"
 #include "columns.h"
 #include "frame_innovation.h"
+#include "lag_series.h"
 #include "names.h"
 #include "number_text.h"
 
@@ -45,38 +46,6 @@ struct Sums {
   std::vector<Tally> nis;               ///< by sensor
 };
 
-/// Estimate and truth of a scalar block over evenly spaced stamps, for its lag. Only the first ones
-/// are kept, so that memory and time of a long run do not grow with it.
-struct Series {
-  static constexpr std::size_t kMost = 100'000;
-
-  std::vector<double> estimate, truth;
-  Stamp first = 0, last = 0;
-  Stamp shortest = INT64_MAX, longest = 0;
-
-  void Add(Stamp stamp, double true_value, double error) {
-    if (truth.size() == kMost) return;
-    if (truth.empty()) {
-      first = stamp;
-    } else {
-      shortest = std::min(shortest, stamp - last);
-      longest = std::max(longest, stamp - last);
-    }
-    last = stamp;
-    truth.push_back(true_value);
-    estimate.push_back(true_value - error);
-  }
-  double step_ms() const {
-    return 1e-6 * static_cast<double>(last - first) / static_cast<double>(truth.size() - 1);
-  }
-  /// Within 5 % of the mean step: what a camera's clock does.
-  bool even() const {
-    if (truth.size() < 2 || shortest <= 0) return false;
-    return 1e-6 * static_cast<double>(longest) < 1.05 * step_ms() &&
-           1e-6 * static_cast<double>(shortest) > 0.95 * step_ms();
-  }
-};
-
 /// A block whose truth is known.
 struct Tracked {
   BlockId id;
@@ -86,8 +55,8 @@ struct Tracked {
   std::vector<std::string> elements;  ///< of the tangent
   std::vector<int> outside;           ///< stamps on end beyond 10 sigma, by element; -1: reported
   bool scalar;
-  double truth_variance;  ///< of each element
-  Series series;          ///< where scalar
+  double truth_variance;       ///< of each element
+  internal::LagSeries series;  ///< where scalar
   double last_error = -1.0;
 
   bool known = false;  ///< at this stamp, and so is what follows

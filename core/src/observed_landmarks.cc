@@ -29,7 +29,8 @@ BlockId BlockIn(const SensorBinding& sensor, const char* role) {
 }
 
 /// Where the block starts, else `otherwise`.
-std::vector<double> StartOf(const System& system, BlockId block, std::vector<double> otherwise) {
+std::vector<double> StartOf(const System& system, BlockId block,
+                            const std::vector<double>& otherwise) {
   const auto prior = std::ranges::find(system.priors, block, &Prior::block);
   const bool fits = prior != system.priors.end() && prior->mean.size() == otherwise.size();
   return fits ? prior->mean : otherwise;
@@ -63,7 +64,8 @@ std::optional<internal::WithLandmarks> internal::PlaceLandmarks(const System& sy
   const std::vector<double> q =
       StartOf(system, BlockIn(*first, "orientation"), {1.0, 0.0, 0.0, 0.0});
   const auto& prior = system.landmarks->prior;
-  const double distance_m = prior ? 1.0 / prior->inverse_distance : 2.0;
+  constexpr double kFarthest_m = 1000.0;  // a prior at infinity would tell nothing of scale
+  const double distance_m = prior ? std::min(1.0 / prior->inverse_distance, kFarthest_m) : 2.0;
   const Space xyz{"landmark", "m", "", {"x", "y", "z"}, Geometry::Vector(3)};
   for (const auto& place : kPlaces) {
     const double h[3] = {distance_m * place[0], distance_m * place[1], distance_m * place[2]};

@@ -37,10 +37,11 @@ const BuildTable& Load(const std::filesystem::path& file) {
 
 std::unique_ptr<PictureWriter> OpenPictures(const PictureArguments& arguments,
                                             const std::filesystem::path& folder) {
-  const std::filesystem::path own = internal::FolderOfProgram() / "pictures";
-  const std::filesystem::path file = (folder.empty() ? own : folder) / kFile;
+  const std::filesystem::path program = internal::FolderOfProgram();
+  const bool known = !folder.empty() || !program.empty();  // never from the working folder
+  const std::filesystem::path file = (folder.empty() ? program / "pictures" : folder) / kFile;
   std::error_code error;
-  if (!std::filesystem::exists(file, error)) {
+  if (!known || !std::filesystem::exists(file, error)) {
     throw Error(ExitCode::kPlugin,
                 ErrorLine({arguments.shown}, {}, "this build of alidade draws no pictures",
                           "one that found OpenCV: apt-get install libopencv-dev, then configure "

@@ -107,8 +107,10 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
   const std::int64_t size = experiment.source->size();
   const bool keep = std::ranges::any_of(
       running, [](const Running& one) { return one.waits || one.named.estimator->offline(); });
-  internal::FrameOrder frames(experiment, internal::FrameCheck(experiment, result.normalised));
+  internal::FrameCheck check(experiment, result.normalised);
+  internal::FrameOrder frames(experiment, [&check](Frame& frame) { check(frame); });
   while (NextFrame(frames, running, result, seen.frame)) {
+    check.FollowTruth(seen.frame);
     for (std::size_t i = 0; i < experiment.segments.size(); ++i) {
       seen.in_segment[i] = InSegment(experiment.segments[i], seen.frame);
     }

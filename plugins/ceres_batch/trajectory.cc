@@ -105,7 +105,7 @@ bool Trajectory::AddSteps(Stamp from, Stamp end, Epoch& epoch) {
   const bool overflow = __builtin_sub_overflow(end, from, &elapsed);
   const Stamp parts = overflow ? 0 : StepParts(elapsed, max_dt_s_);
   if (overflow || parts > kMostInputs) {
-    return Fail("a gap before " + internal::FixedText(Seconds(end), 6) + " s needs more than " +
+    return Fail("a gap before " + internal::SecondsText(end) + " needs more than " +
                 std::to_string(kMostInputs) + " steps of max_dt_s");
   }
   std::vector<Event> events;  // which the filter tells

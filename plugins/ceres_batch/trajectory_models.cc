@@ -149,8 +149,8 @@ bool Trajectory::Residual(const Factor& factor, const Point& point, Eigen::Vecto
                    : sensor.model.Linearise(roles.data(), h.data(), into.data(), strides.data());
   if (status != Status::kOk) {
     return Fail("sensor '" + sensor.name + "' at " +
-                internal::FixedText(Seconds(factor.measurement.stamp), 6) +
-                " s: " + Why(status, sensor.model.error_text()));
+                internal::SecondsText(factor.measurement.stamp) + ": " +
+                Why(status, sensor.model.error_text()));
   }
   const double* z = factor.measurement.values.data();
   r.resize(geometry.tangent);
@@ -200,8 +200,8 @@ bool Trajectory::FreezeFactor(Factor& factor, const Point& point) {
                                                  factor.measurement.values.data(), root.data());
     if (status != Status::kOk) {
       return Fail("the noise of sensor '" + sensor.name + "' at " +
-                  internal::FixedText(Seconds(factor.measurement.stamp), 6) +
-                  " s: " + Why(status, sensor.model.error_text()));
+                  internal::SecondsText(factor.measurement.stamp) + ": " +
+                  Why(status, sensor.model.error_text()));
     }
     r = root * root.transpose();
   } else {
@@ -210,8 +210,8 @@ bool Trajectory::FreezeFactor(Factor& factor, const Point& point) {
   const Eigen::LLT<Eigen::MatrixXd> llt(r);  // which takes what is not a number for a success
   if (!r.allFinite() || llt.info() != Eigen::Success) {
     return Fail("the noise of sensor '" + sensor.name + "' at " +
-                internal::FixedText(Seconds(factor.measurement.stamp), 6) +
-                " s is not positive definite: a batch needs sigma > 0");
+                internal::SecondsText(factor.measurement.stamp) +
+                " is not positive definite: a batch needs sigma > 0");
   }
   const Eigen::MatrixXd l = llt.matrixL();
   NoteChange(factor.l, l);

@@ -66,6 +66,8 @@ class ImageWriter : public PictureWriter {
 /// from 1; of a single frame 30.
 class VideoWriter : public PictureWriter {
  public:
+  static constexpr double kRateOfOne = 30.0;  ///< where two frames do not tell
+
   explicit VideoWriter(PictureArguments arguments) : to_(std::move(arguments)) {}
 
   void Add(std::int64_t number, Stamp stamp,
@@ -76,13 +78,15 @@ class VideoWriter : public PictureWriter {
       first_stamp_ = stamp;
       return;
     }
-    if (!video_.isOpened()) Open(std::round(1.0 / Seconds(stamp - first_stamp_)));
+    if (!video_.isOpened()) {
+      const double gap_s = Seconds(stamp - first_stamp_);
+      Open(gap_s > 0.0 ? std::round(1.0 / gap_s) : kRateOfOne);
+    }
     video_.write(picture);
   }
 
   /// The writer of OpenCV does not tell of a full disk; the index, which is written last, does.
   void Close() override {
-    constexpr double kRateOfOne = 30.0;
     if (count_ == 0) return;
     if (!video_.isOpened()) Open(kRateOfOne);
     video_.release();

@@ -66,8 +66,7 @@ struct Experiment {
   std::uint64_t seed = 1;
   TimePolicy time;
   int reference = -1;  ///< index of the estimator that metrics compare with; -1: truth
-  std::vector<double> truth_sigmas =
-      {};  ///< StreamInfo::sigma of the source's truths; empty: its own
+  std::vector<double> truth_sigmas;  ///< StreamInfo::sigma of the source's truths; empty: its own
 };
 
 /// How the frames of a run came.

@@ -342,6 +342,14 @@ void Metrics::AddDifference(const Frame& frame, const std::vector<bool>& in_segm
   });
 }
 
+std::vector<std::string> Metrics::without_truth() const {
+  std::vector<std::string> names;
+  for (const Tracked& block : impl_->tracked) {
+    if (block.last_error < 0.0) names.push_back(block.name);
+  }
+  return names;
+}
+
 std::vector<int> Metrics::far_off() const {
   std::vector<int> sensors;
   for (std::size_t i = 0; i < impl_->far.size(); ++i) {

@@ -286,6 +286,7 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
       internal::NoteUnused(one.named.system,
                            by < 0 ? "" : running[static_cast<std::size_t>(by)].named.name,
                            one.result);
+      if (experiment.reference < 0) internal::NoteTruths(one.metrics, one.result);
     }
     internal::NoteUnits(one.named.system, one.metrics, one.result);
     one.Note(one.metrics.events());

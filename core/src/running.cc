@@ -61,6 +61,14 @@ void NoteUnits(const System& system, const Metrics& metrics, EstimatorResult& re
   }
 }
 
+void NoteTruths(const Metrics& metrics, EstimatorResult& result) {
+  const std::vector<std::string> names = metrics.without_truth();
+  if (names.empty()) return;
+  result.events.push_back(
+      {kNoStamp, "truth",
+       "no frame has the truth of " + Join(names) + "; are its times those of the measurements?"});
+}
+
 void NoteUnused(const System& system, const std::string& accepted_by, EstimatorResult& result) {
   for (const SensorBinding& sensor : system.sensors) {
     std::int64_t used = 0, all = 0;

@@ -38,6 +38,9 @@ EstimatorResult Begin(const NamedEstimator& named);
 /// An event `unit` for each sensor whose measurements are far from all that it predicts.
 void NoteUnits(const System& system, const Metrics& metrics, EstimatorResult& result);
 
+/// An event `truth` where no frame had the truth that the source names.
+void NoteTruths(const Metrics& metrics, EstimatorResult& result);
+
 /// An event `unused` for each sensor of which the whole run used no measurement; `accepted_by`
 /// names the filter that chose them, or is empty.
 void NoteUnused(const System& system, const std::string& accepted_by, EstimatorResult& result);

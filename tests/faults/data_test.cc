@@ -320,6 +320,18 @@ TEST_F(DataFault, QuaternionsOfAnotherLengthAreNormalisedAndCounted) {
       << table.err;
 }
 
+TEST_F(DataFault, ATruthThatNoFrameHasIsTold) {
+  Write("tracks.csv", Plane(0, 0.0) + Plane(1, 0.0));
+  Write("truth.tum", "1000 0 0 0 0 0 0 1\n");
+  const Outcome run = Run("map.yaml");
+  EXPECT_TRUE(Contains(run.out,
+                       "no frame has the truth of cam.position, cam.orientation; are its times "
+                       "those of the measurements?"))
+      << run.out;
+  Write("truth.tum", "0 0 0 0 0 0 0 1\n");
+  EXPECT_FALSE(Contains(Run("map.yaml").out, "no frame has the truth"));
+}
+
 // Which of q and -q is written is chosen in the order of the stamps, not of arrival.
 TEST_F(DataFault, SignsOfATruthDoNotDependOnTheOrderOfArrival) {
   Write("tracks.csv", Plane(0, 0.0));

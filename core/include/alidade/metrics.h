@@ -60,6 +60,8 @@ class Metrics {
   /// Sensors, by index, whose measurements look as if they were in another unit: of those that
   /// were accepted or gated, the median of sqrt(r' S^-1 r / dof) is above 100.
   std::vector<int> far_off() const;
+  /// Blocks whose truth the source names, but that no frame had a truth of.
+  std::vector<std::string> without_truth() const;
   std::map<std::string, double> Finish() const;
   const std::map<std::string, std::int64_t>& counts() const;
   /// Unit of each block with truth, where it has one: for EstimatorResult::units.

@@ -23,7 +23,7 @@ struct Drive {
 };
 constexpr Drive kDrives[] = {
     {"drive_0001", 90, 90.7}, {"drive_0036", 232, 165.8}, {"drive_0095", 132, 121.1}};
-constexpr double kMost = 0.03;  // of the path
+constexpr double kMost = 0.03;  // of the path: a prototype had 0.013 to 0.019
 
 class SlamStereoTracks : public ::testing::Test {
  protected:
@@ -59,7 +59,7 @@ class SlamStereoTracks : public ::testing::Test {
 
 TEST_F(SlamStereoTracks, EndWithinThreePercentOfThePath) { ExpectExact({}); }
 
-TEST_F(SlamStereoTracks, DoNotHangOnTheSettings) {
+TEST_F(SlamStereoTracks, DoNotHangOnNoiseGateOrMoreFeatures) {
   const Settings others = {{"sensors.stereo.sigma_px", "2"},
                            {"landmarks.keep", "200"},
                            {"estimators.ekf.gate", "0.9"},

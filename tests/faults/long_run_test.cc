@@ -2,6 +2,8 @@
 //
 // What a run holds in memory does not grow with its length. The configs are those of
 // bench/long_run.
+#include <sys/ioctl.h>
+
 #include "support/program.h"
 
 namespace alidade {
@@ -111,7 +113,10 @@ TEST_F(LongRun, APipeIsTakenAsItGrows) {
     feed(k);
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
-  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  EXPECT_TRUE(Eventually([&] {
+    int left = -1;
+    return ::ioctl(pipe, FIONREAD, &left) == 0 && left == 0;
+  }));
   ::kill(run, SIGINT);
   // A signal just before it waits for data is seen with the next row.
   std::this_thread::sleep_for(std::chrono::milliseconds(500));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 
+#include "accepted.h"
 #include "alidade/plugin_listing.h"
 #include "alidade/run.h"
 #include "columns.h"
@@ -117,64 +118,6 @@ void CheckOffered(const std::string& type, const PluginHost& host, const Node& n
                   "\n" + PluginPlaces(host));
 }
 
-/// Refuses `filter` where what it accepted does not tell what `named` is to see.
-void CheckAccepts(const NamedEstimator& filter, const NamedEstimator& named, const Node& by) {
-  const std::string quoted = '\'' + filter.name + '\'';
-  if (filter.estimator->offline()) {
-    by.Fail(quoted + " has its estimates at the end only", "a filter");
-  }
-  for (const SensorBinding& sensor : named.system.sensors) {
-    const int index = filter.system.FindSensor(sensor.name);
-    const auto& theirs = filter.system.sensors;
-    if (index < 0 || theirs[static_cast<std::size_t>(index)].stream != sensor.stream) {
-      by.Fail(
-          quoted + " does not use sensor '" + sensor.name + "' on stream '" + sensor.stream + "'",
-          "an estimator with the same sensors");
-    }
-    if (std::ranges::count(theirs, sensor.stream, &SensorBinding::stream) > 1) {
-      by.Fail("stream '" + sensor.stream + "' goes to several sensors of " + quoted +
-                  ": one may accept what another does not",
-              "a stream for each sensor");
-    }
-  }
-  for (const MotionBinding& motion : named.system.motions) {
-    const std::string& stream = motion.input.stream;
-    const auto& theirs = filter.system.sensors;
-    const auto sensor = std::ranges::find(theirs, stream, &SensorBinding::stream);
-    if (!motion.model.has_input() || sensor == theirs.end()) continue;
-    by.Fail("stream '" + stream + "' is the control input of '" + motion.name +
-                "' and goes to sensor '" + sensor->name + "' of " + quoted +
-                ": what that does not accept would be missing as an input",
-            "a filter without a sensor on that stream");
-  }
-}
-
-/// Index of the estimator whose accepted measurements `named` is to see, as the key `use` says; -1:
-/// it sees all. `before` are those listed before it.
-int ReadUse(const Node& use, const NamedEstimator& named, const Node& estimators,
-            const std::vector<NamedEstimator>& before) {
-  if (!use.is_map()) {
-    if (use.Text() == "all") return -1;
-    use.Fail("not a choice of data: '" + use.Text() + "'", "all, or {accepted_by: NAME}");
-  }
-  const Node by = use.At("accepted_by", "use");
-  const std::string name = by.Text();
-  if (name == named.name) by.Fail("'" + name + "' is this estimator itself", "another one");
-  const auto found = std::ranges::find(before, name, &NamedEstimator::name);
-  if (found == before.end()) {
-    std::vector<std::string> known;
-    for (const auto& [other, entry] : estimators.Entries()) known.push_back(other);
-    if (std::ranges::find(known, name) != known.end()) {
-      by.Fail("'" + name + "' is listed after '" + named.name + "'",
-              "an estimator listed before, which has each frame first");
-    }
-    std::erase(known, named.name);
-    by.Fail("no estimator '" + name + "'", "a name from `estimators`", Nearest(name, known));
-  }
-  CheckAccepts(*found, named, by);
-  return static_cast<int>(found - before.begin());
-}
-
 /// Refuses overrides of what all estimators share, and of an entry that `root` does not have and
 /// that is none of `merged` either, for it has no model.
 void CheckOverrides(const Node& overrides, const Node& root, const Node& merged) {
@@ -229,7 +172,8 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   }
   CheckStreams(own.root(), named.system, streams);
   named.estimator = make(named.system, streams);
-  if (use) named.accepted_by = ReadUse(*use, named, config.root().At("estimators"), before);
+  if (use)
+    named.accepted_by = internal::ReadUse(*use, named, config.root().At("estimators"), before);
   return named;
 }
 

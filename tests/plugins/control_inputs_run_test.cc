@@ -145,6 +145,24 @@ TEST_F(DrivenTest, AStreamThatTheLenderMeasuresIsNoInputOfTheFollower) {
             "input; expected a filter without a sensor on that stream");
 }
 
+// Not even where it follows a filter that does not have the sensor, but follows one that has.
+TEST_F(DrivenTest, NorIsAStreamThatAnyLenderOnTheWayMeasures) {
+  const Config config = Read(
+      {{"source.streams", "{gps: gps_m, odometry: speed_m_s, none: {columns: [gps_m]}}"},
+       {"sensors.other",
+        "{model: fix, stream: none, roles: {position: car.position}, sigma_m: 0.3}"},
+       {"estimators",
+        "{a: {type: ekf}, b: {type: ekf, sensors: [other], use: {accepted_by: a}}, c: {type: ekf, "
+        "sensors: [other], use: {accepted_by: b}, overrides: {state: {car: {input: {stream: "
+        "gps}}}}}}"}});
+  std::string text;
+  EXPECT_EQ(testing::CodeOf([&] { BuildExperiment(config, host_); }, &text), 78);
+  EXPECT_NE(text.find("estimators.c.use.accepted_by: stream 'gps' is the control input of 'car' "
+                      "and goes to sensor 'gps' of 'a'"),
+            std::string::npos)
+      << text;
+}
+
 TEST_F(DrivenTest, ASensorOfTheNameOfAnEntryIsStillToldUnused) {
   const RunResult run =
       RunInto(Read({{"sensors",

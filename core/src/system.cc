@@ -351,7 +351,9 @@ System WithoutUntouched(System system) {
 State System::InitialState() const {
   State state(layout);
   for (const Prior& prior : priors) {
-    if (prior.from.empty()) state.Add(prior.block, prior.mean.data(), prior.covariance);
+    if (!prior.from.empty()) continue;
+    ALIDADE_EXPECTS(std::ssize(prior.mean) == layout[prior.block].geometry().ambient);
+    state.Add(prior.block, prior.mean.data(), prior.covariance);
   }
   return state;
 }

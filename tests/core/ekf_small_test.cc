@@ -41,8 +41,9 @@ System WithFixedBlock(System system) {
       system.layout.Declare("aside.x", "aside", system.layout[0].space, BlockStatus::kFixed);
   Prior prior;
   prior.block = id;
-  prior.mean = {1.0};
-  prior.covariance = Eigen::MatrixXd::Zero(1, 1);
+  const Geometry geometry = system.layout[0].geometry();
+  prior.mean.assign(static_cast<std::size_t>(geometry.ambient), 1.0);
+  prior.covariance = Eigen::MatrixXd::Zero(geometry.tangent, geometry.tangent);
   system.priors.push_back(prior);
   return system;
 }

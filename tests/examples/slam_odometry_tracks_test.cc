@@ -1,19 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // examples/13_slam_odometry_tracks on real drives, against a published filter and dead reckoning.
-#include <gtest/gtest.h>
-
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
 
-#include "alidade/run.h"
+#include "drives.h"
 
 namespace alidade {
 namespace {
-
-namespace fs = std::filesystem;
-using Settings = std::vector<std::pair<std::string, std::string>>;
 
 /// A drive over so many frames; RMS errors of position in m: of dead reckoning and of a sliding
 /// window over 10 frames, both as published, and the most allowed here.
@@ -26,23 +19,14 @@ constexpr Drive kDrives[] = {{"drive_0001", 98, 1.357, 0.618, 0.50},
                              {"drive_0036", 240, 1.151, 0.879, 0.95},
                              {"drive_0095", 140, 2.132, 1.433, 1.62}};
 
-class SlamOdometryTracks : public ::testing::Test {
+class SlamOdometryTracks : public testing::DrivesTest {
  protected:
-  void SetUp() override {
-    const char* data = std::getenv("ALIDADE_DATA");
-    if (data != nullptr) folder_ = fs::path(data) / "kitti-stereo-tracks";
-    if (!fs::is_directory(folder_)) GTEST_SKIP() << "ALIDADE_DATA has no kitti-stereo-tracks";
-  }
   /// The RMS error of the position, m.
   double Error(const Drive& drive, const Settings& settings = {}) const {
     return Ekf(drive, settings).metrics.at("rmse:cam.position");
   }
   EstimatorResult Ekf(const Drive& drive, const Settings& settings = {}) const {
-    Config config = Config::FromFile(fs::path(ALIDADE_SOURCE_DIR) /
-                                     "examples/13_slam_odometry_tracks/config.yaml");
-    config.Set("source.path", (folder_ / drive.name).string(), "--set");
-    config.Set("source.frames", std::to_string(drive.frames), "--set");
-    for (const auto& [key, value] : settings) config.Set(key, value, "--set");
+    const Config config = ConfigOf("13_slam_odometry_tracks", drive.name, drive.frames, settings);
     const PluginHost host(PluginPaths(config));
     Experiment experiment = BuildExperiment(config, host);
     const RunResult run = alidade::Run(experiment, {});
@@ -50,7 +34,6 @@ class SlamOdometryTracks : public ::testing::Test {
     EXPECT_EQ(run.frames, drive.frames);
     return run.estimators.at(0);
   }
-  fs::path folder_;
 };
 
 TEST_F(SlamOdometryTracks, IsBetterThanDeadReckoningAndThePublishedFilter) {

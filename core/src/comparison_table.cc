@@ -191,11 +191,13 @@ std::vector<ComparisonRow> MetricRows(const RunResult& result) {
 
 std::vector<ComparisonRow> ComparisonRows(const RunResult& result) {
   std::vector<ComparisonRow> rows = MetricRows(result);
-  ComparisonRow diverged{"diverged", {}};
+  ComparisonRow diverged{"diverged", {}}, inconsistent{"inconsistent", {}};
   for (const EstimatorResult& one : result.estimators) {
     diverged.cells.emplace_back(one.diverged ? "yes" : "no");
+    inconsistent.cells.emplace_back(one.inconsistent ? "yes" : "no");
   }
   rows.push_back(std::move(diverged));
+  rows.push_back(std::move(inconsistent));
   return rows;
 }
 

@@ -22,7 +22,7 @@ struct ComparisonRow {
 };
 /// The main metrics and all counts.
 std::vector<ComparisonRow> MetricRows(const RunResult& result);
-/// These, and whether it diverged.
+/// These, whether it diverged and whether its errors were inconsistent.
 std::vector<ComparisonRow> ComparisonRows(const RunResult& result);
 /// What the metrics compare with, in words; "" where that is truth.
 std::string ReferenceText(const RunResult& result);

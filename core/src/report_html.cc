@@ -139,6 +139,7 @@ std::string Estimator(const EstimatorResult& result, std::size_t index, const Re
     html += " <span class=\"soft\">(" + HtmlEscaped(type->second) + ")</span>";
   }
   if (result.diverged) html += " <span class=\"badge diverged\">diverged</span>";
+  if (result.inconsistent) html += " <span class=\"badge diverged\">inconsistent</span>";
   html += "</h2>\n";
   for (const std::vector<std::string>& direction : result.unobservable) {
     html += "<p><b>Unobservable:</b> " + HtmlEscaped(Join(direction)) + "</p>\n";

@@ -291,8 +291,8 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
     internal::NoteUnits(one.named.system, one.metrics, one.result);
     one.Note(one.metrics.events());
     const Estimator& estimator = *one.named.estimator;
-    one.result.diverged = one.diverged || (estimator.offline() && estimator.diverged()) ||
-                          !one.metrics.events().empty();
+    one.result.diverged = one.diverged || (estimator.offline() && estimator.diverged());
+    one.result.inconsistent = !one.metrics.events().empty();
     result.estimators.push_back(std::move(one.result));
   }
   return result;

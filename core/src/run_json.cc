@@ -28,7 +28,8 @@ void WriteEstimator(Json& json, const EstimatorResult& result, const RunFacts& f
   }
   json.Key("metrics").Object();
   for (const auto& [key, value] : result.metrics) json.Key(key).Number(value);
-  json.Key("diverged").Flag(result.diverged).End();
+  json.Key("diverged").Flag(result.diverged);
+  json.Key("inconsistent").Flag(result.inconsistent).End();
   WriteIntegers(json.Key("counts"), result.counts);
   WriteTexts(json.Key("units"), result.units);
   WriteIntegers(json.Key("events"), CountEvents(result));
@@ -95,6 +96,10 @@ std::string ComparisonCsv(const RunResult& result) {
   }
   text += "diverged";
   for (const EstimatorResult& one : result.estimators) text += one.diverged ? ",true" : ",false";
+  text += "\ninconsistent";
+  for (const EstimatorResult& one : result.estimators) {
+    text += one.inconsistent ? ",true" : ",false";
+  }
   return text + '\n';
 }
 

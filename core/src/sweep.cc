@@ -188,6 +188,7 @@ std::vector<SweepSummary> Summarise(const SweepResult& result) {
         if (one.name != name) continue;
         summary.units.insert(one.units.begin(), one.units.end());
         summary.diverged += one.diverged ? 1 : 0;
+        summary.inconsistent += one.inconsistent && !one.diverged ? 1 : 0;
         if (!run.Uses(one)) continue;
         ++summary.used;
         for (const auto& [key, value] : one.metrics) {

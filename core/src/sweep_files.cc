@@ -64,20 +64,23 @@ std::vector<ComparisonRow> TableRows(const std::vector<SweepSummary>& summaries)
       row.cells.push_back(c[0] == "-" ? "-" : c[0] + " [" + c[1] + ", " + c[2] + ", " + c[3] + ']');
     }
   }
-  ComparisonRow used{"runs used", {}}, diverged{"diverged", {}};
+  ComparisonRow used{"runs used", {}}, diverged{"diverged", {}}, inconsistent{"inconsistent", {}};
   for (const SweepSummary& summary : summaries) {
     used.cells.push_back(std::to_string(summary.used));
     diverged.cells.push_back(std::to_string(summary.diverged));
+    inconsistent.cells.push_back(std::to_string(summary.inconsistent));
   }
   rows.push_back(used);
   rows.push_back(diverged);
+  rows.push_back(inconsistent);
   return rows;
 }
 
 std::string Markdown(const SweepResult& result) {
   std::string text = std::to_string(CountWhole(result)) + " of " + std::to_string(result.runs) +
                      " runs, seeds from " + std::to_string(result.first_seed) +
-                     ". Mean [5 %, 50 %, 95 % quantile] over the runs that did not diverge.\n\n";
+                     ". Mean [5 %, 50 %, 95 % quantile] over the runs that neither diverged nor "
+                     "were inconsistent.\n\n";
   const std::vector<SweepSummary> summaries = Summarise(result);
   text += "|  | " + Join(NamesOf(summaries), " | ") + " |\n|---|";
   for (std::size_t c = 0; c < summaries.size(); ++c) text += "---:|";
@@ -93,6 +96,7 @@ void AppendEstimators(Json& json, const SweepResult& result) {
   for (const SweepSummary& summary : Summarise(result)) {
     json.Key(summary.name).Object();
     json.Key("diverged").Integer(summary.diverged);
+    json.Key("inconsistent").Integer(summary.inconsistent);
     json.Key("metrics").Object();
     for (const auto& [key, spread] : summary.metrics) {
       json.Key(key).Object();
@@ -167,14 +171,14 @@ void WriteRuns(const RunFolder& folder, const Parts& parts, const std::string& k
   const RunResult all = AllKeys(parts);
   const std::vector<std::string> metrics = internal::OrderedMetrics(all);
   const std::vector<std::string> counts = internal::OrderedCounts(all);
-  std::vector<std::string> header = Header(key, {"seed", "estimator", "diverged"});
+  std::vector<std::string> header = Header(key, {"seed", "estimator", "diverged", "inconsistent"});
   header.insert(header.end(), metrics.begin(), metrics.end());
   header.insert(header.end(), counts.begin(), counts.end());
   CsvFile csv(folder, "runs.csv", header);
   const auto write_run = [&](const Part& part, const SweepRun& run, const EstimatorResult& one) {
     if (!key.empty()) csv.Text(part.value);
     csv.Integer(static_cast<std::int64_t>(run.seed)).Text(one.name);
-    csv.Text(one.diverged ? "true" : "false");
+    csv.Text(one.diverged ? "true" : "false").Text(one.inconsistent ? "true" : "false");
     for (const std::string& metric : metrics) {
       const auto found = one.metrics.find(metric);
       found == one.metrics.end() ? csv.Empty() : csv.Number(found->second);
@@ -188,7 +192,7 @@ void WriteRuns(const RunFolder& folder, const Parts& parts, const std::string& k
   for (const Part& part : parts) {
     for (const SweepRun& run : part.result->done) {
       for (const EstimatorResult& one : run.estimators) {
-        if (run.Uses(one) || one.diverged) write_run(part, run, one);
+        if (run.Uses(one) || one.diverged || one.inconsistent) write_run(part, run, one);
       }
     }
   }

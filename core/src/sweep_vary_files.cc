@@ -60,10 +60,11 @@ ValueTable TableOf(const VariedSweep& sweep, const Column& column) {
   for (const SweepResult& result : sweep.results) {
     const std::size_t v = table.rows.size();
     table.rows.push_back({sweep.variation.values[v], {}});
-    table.rows[v].cells = {std::to_string(column[v].diverged) + " of " +
-                           std::to_string(CountWhole(result))};
+    const std::string of_all = " of " + std::to_string(CountWhole(result));
+    table.rows[v].cells = {std::to_string(column[v].diverged) + of_all,
+                           std::to_string(column[v].inconsistent) + of_all};
   }
-  table.header = {"diverged"};
+  table.header = {"diverged", "inconsistent"};
   for (const ComparisonRow& metric : MetricRows(AsComparison(column))) {
     table.header.push_back(metric.label);
     for (std::size_t v = 0; v < table.rows.size(); ++v) {
@@ -163,12 +164,13 @@ FigureScript VariationFigure(const VariedSweep& sweep) {
                                            [&](const char* kind) { return key.starts_with(kind); });
     if (shown && key.find('@') == key.npos) MetricPanel(script, columns, key, x, rows);
   }
-  script.Panel("runs that diverged", "");
+  script.Panel("runs that diverged or were inconsistent", "");
   script.Set("unset logscale y\nset yrange [0:]");
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const std::string& name = columns[i].front().name;
     script.Curve({"sweep.csv", rows, 1},
-                 x + ":(" + ColumnNamed(name + ".diverged") + ") with linespoints ls " +
+                 x + ":(" + ColumnNamed(name + ".diverged") + " + " +
+                     ColumnNamed(name + ".inconsistent") + ") with linespoints ls " +
                      std::to_string(i % 8 + 1) + " pt 7 ps 0.5",
                  name);
   }
@@ -183,7 +185,7 @@ void WriteSweepCsv(const RunFolder& folder, const VariedSweep& sweep) {
   std::vector<std::vector<std::string>> keys;
   for (const Column& column : columns) {
     const std::string& name = column.front().name;
-    header.insert(header.end(), {name + ".used", name + ".diverged"});
+    header.insert(header.end(), {name + ".used", name + ".diverged", name + ".inconsistent"});
     RunResult comparison = AsComparison(column);
     for (const std::string& key : keys.emplace_back(OrderedMetrics(comparison))) {
       for (const auto& [part, member] : kSpread) header.push_back(name + '.' + part + ':' + key);
@@ -194,7 +196,7 @@ void WriteSweepCsv(const RunFolder& folder, const VariedSweep& sweep) {
     csv.Text(sweep.variation.values[v]);
     for (std::size_t i = 0; i < columns.size(); ++i) {
       const SweepSummary& summary = columns[i][v];
-      csv.Integer(summary.used).Integer(summary.diverged);
+      csv.Integer(summary.used).Integer(summary.diverged).Integer(summary.inconsistent);
       for (const std::string& key : keys[i]) {
         const auto found = summary.metrics.find(key);
         for (const auto& [part, member] : kSpread) {

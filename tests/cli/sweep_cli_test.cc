@@ -175,9 +175,11 @@ TEST_F(SweepCli, EachValueOfAKeyIsSweptAsIfItWereSet) {
   }
   EXPECT_EQ(Rows(Read("varied/runs.csv")), rows);
   const std::string table = Read("varied/sweep.csv");
-  EXPECT_TRUE(table.starts_with("sensors.stereo.sigma_px,ekf.used,ekf.diverged,ekf.mean:rmse:"));
-  EXPECT_TRUE(Contains(table, "\n0.5,3,0,")) << table;
-  EXPECT_TRUE(Contains(table, "\n2,3,0,")) << table;
+  EXPECT_TRUE(
+      table.starts_with("sensors.stereo.sigma_px,ekf.used,ekf.diverged,ekf.inconsistent,"
+                        "ekf.mean:rmse:"));
+  EXPECT_TRUE(Contains(table, "\n0.5,3,0,0,")) << table;
+  EXPECT_TRUE(Contains(table, "\n2,3,0,0,")) << table;
 }
 
 TEST_F(SweepCli, ValuesMayBeMapsAndTheirFigureIsDrawn) {

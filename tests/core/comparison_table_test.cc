@@ -32,6 +32,7 @@ TEST(ComparisonTable, OrdersScalesAndAligns) {
                        Named("stereo_only", {{"rmse:target.depth", 0.206534}})};
   result.estimators[0].counts = {{"accepted:stereo", 74}, {"gated:stereo", 1}};
   result.estimators[1].diverged = true;
+  result.estimators[0].inconsistent = true;
   EXPECT_EQ(ComparisonTable(result),
             "                                fused  stereo_only\n"
             "rmse cam.pixel [px]            0.3100            -\n"
@@ -45,7 +46,8 @@ TEST(ComparisonTable, OrdersScalesAndAligns) {
             "nis.mean stereo                0.9059            -\n"
             "accepted stereo                    74            -\n"
             "gated stereo                        1            -\n"
-            "diverged                           no          yes\n");
+            "diverged                           no          yes\n"
+            "inconsistent                      yes           no\n");
 }
 
 TEST(ComparisonTable, PrintsNumbersThatLieFarApart) {
@@ -71,7 +73,8 @@ TEST(ComparisonTable, KeepsOneUnitThroughoutTheTable) {
             "rmse target.depth [m]            0.9000\n"
             "rmse target.depth @blind [m]      1.200\n"
             "rmse target.depth @seeing [m]  0.004000\n"
-            "diverged                             no\n");
+            "diverged                             no\n"
+            "inconsistent                         no\n");
 }
 
 TEST(ComparisonTable, SmallNumbersKeepTheirDigits) {
@@ -90,7 +93,8 @@ TEST(ComparisonTable, LeavesOutWhatIsHeldAtTruth) {
                                    {"nees.mean:target", 0.0},
                                    {"nees.cov95:target", 1.0}}),
                        Named("b", {})};
-  EXPECT_EQ(ComparisonTable(result), "           a   b\ndiverged  no  no\n");
+  EXPECT_EQ(ComparisonTable(result),
+            "               a   b\ndiverged      no  no\ninconsistent  no  no\n");
   result.estimators[1].metrics = {{"rmse:target.depth", 0.1}};  // b has it to estimate
   EXPECT_NE(ComparisonTable(result).find("rmse target.depth"), std::string::npos);
 }

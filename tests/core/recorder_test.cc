@@ -248,7 +248,8 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
       "metrics": {
         "final:target.depth": null,
         "rmse:target.depth": 0.00195,
-        "diverged": true
+        "diverged": true,
+        "inconsistent": false
       },
       "counts": {
         "accepted:stereo": 151
@@ -272,7 +273,7 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
 )");
   EXPECT_EQ(Read(folder / "out/comparison.csv"),
             "metric,ekf\nrmse:target.depth,0.00195\nfinal:target.depth,inf\naccepted:stereo,151\n"
-            "diverged,true\n");
+            "diverged,true\ninconsistent,false\n");
 }
 
 TEST(Recorder, SaysWhatFailedBeforeTheExperimentWasKnown) {

@@ -27,45 +27,50 @@ TEST(Quantile, OfInfiniteValuesIsNotNan) {
   EXPECT_EQ(Quantile({1.0, 2.0, kInfinity}, 0.5), 2.0);
 }
 
-EstimatorResult Diverged(bool diverged, double rmse) {
+EstimatorResult Result(double rmse, bool diverged = false, bool inconsistent = false) {
   EstimatorResult one;
   one.name = "ekf";
   one.diverged = diverged;
+  one.inconsistent = inconsistent;
   one.metrics["rmse:x"] = rmse;
   return one;
 }
 
-/// Two runs that count, one that diverged, one that failed.
-SweepResult FourRuns() {
+/// Two runs that count, two that diverged, one that was inconsistent, one that failed.
+SweepResult SixRuns() {
   SweepResult result;
-  result.runs = 4;
+  result.runs = 6;
   result.estimators = {"ekf"};
-  result.done = {{1, RunStatus::kOk, ExitCode::kOk, "", {Diverged(false, 1.0)}},
-                 {2, RunStatus::kOk, ExitCode::kOk, "", {Diverged(false, 2.0)}},
-                 {3, RunStatus::kOk, ExitCode::kOk, "", {Diverged(true, 100.0)}},
-                 {4, RunStatus::kFailed, ExitCode::kBadData, "", {Diverged(false, 50.0)}}};
+  result.done = {{1, RunStatus::kOk, ExitCode::kOk, "", {Result(1.0)}},
+                 {2, RunStatus::kOk, ExitCode::kOk, "", {Result(2.0)}},
+                 {3, RunStatus::kOk, ExitCode::kOk, "", {Result(100.0, true)}},
+                 {4, RunStatus::kFailed, ExitCode::kBadData, "", {Result(50.0)}},
+                 {5, RunStatus::kOk, ExitCode::kOk, "", {Result(3.0, false, true)}},
+                 {6, RunStatus::kOk, ExitCode::kOk, "", {Result(100.0, true, true)}}};
   return result;
 }
 
-TEST(Summarise, TakesMetricsOverWholeRunsThatDidNotDiverge) {
-  const std::vector<SweepSummary> summaries = Summarise(FourRuns());
+TEST(Summarise, TakesMetricsOverWholeRunsThatDidNotDivergeAndWereConsistent) {
+  const std::vector<SweepSummary> summaries = Summarise(SixRuns());
   ASSERT_EQ(summaries.size(), 1u);
   EXPECT_EQ(summaries[0].used, 2);
-  EXPECT_EQ(summaries[0].diverged, 1);
+  EXPECT_EQ(summaries[0].diverged, 2);
+  EXPECT_EQ(summaries[0].inconsistent, 1);
   EXPECT_DOUBLE_EQ(summaries[0].metrics.at("rmse:x").mean, 1.5);
   EXPECT_DOUBLE_EQ(summaries[0].metrics.at("rmse:x").p95, 1.95);
 }
 
 TEST(SweepTable, HasQuantilesAndCountsOfRuns) {
-  EXPECT_EQ(SweepTable(FourRuns()),
-            "                                   ekf\n"
-            "rmse x     1.500 [1.050, 1.500, 1.950]\n"
-            "runs used                            2\n"
-            "diverged                             1\n");
+  EXPECT_EQ(SweepTable(SixRuns()),
+            "                                      ekf\n"
+            "rmse x        1.500 [1.050, 1.500, 1.950]\n"
+            "runs used                               2\n"
+            "diverged                                2\n"
+            "inconsistent                            1\n");
 }
 
 TEST(SweepTable, FoldsAsAComparisonDoes) {
-  SweepResult result = FourRuns();
+  SweepResult result = SixRuns();
   result.estimators = {"ekf", "a", "b", "c"};
   for (SweepRun& run : result.done) {
     for (const char* name : {"a", "b", "c"}) {
@@ -73,10 +78,10 @@ TEST(SweepTable, FoldsAsAComparisonDoes) {
       run.estimators.back().name = name;
     }
   }
-  // 9 of the label and three times 29 are 96 characters; the fourth goes below.
+  // 12 of the label and three times 29 are 99 characters; the fourth goes below.
   const std::string table = SweepTable(result);
-  EXPECT_EQ(table.find('\n'), 96u) << table;
-  EXPECT_NE(table.find("\n\n" + std::string(37, ' ') + "c\nrmse x "), std::string::npos) << table;
+  EXPECT_EQ(table.find('\n'), 99u) << table;
+  EXPECT_NE(table.find("\n\n" + std::string(40, ' ') + "c\nrmse x "), std::string::npos) << table;
 }
 
 }  // namespace

@@ -93,7 +93,8 @@ struct EstimatorResult {
   std::map<std::string, double> metrics;       ///< as in docs/run_folder.md
   std::map<std::string, std::int64_t> counts;  ///< `accepted:stereo`
   std::map<std::string, std::string> units;    ///< of blocks, {"target.depth", "m"}; may lack some
-  bool diverged = false;
+  bool diverged = false;                       ///< the estimator said so
+  bool inconsistent = false;                   ///< its error was; the event of that name
   std::vector<Event> events;
   std::vector<std::vector<std::string>> unobservable;
   /// The map at the end, for `landmarks.csv`; none where the estimator has no landmarks at all.

@@ -33,8 +33,10 @@ struct SweepRun {
   std::vector<EstimatorResult> estimators;  ///< without events
   bool withheld = false;                    ///< no reference to compare with, as in RunResult
 
-  /// Whether the metrics of `one` count: the run is whole, and it did not diverge.
-  bool Uses(const EstimatorResult& one) const { return status == RunStatus::kOk && !one.diverged; }
+  /// Whether the metrics of `one` count: the run is whole, it did not diverge and was consistent.
+  bool Uses(const EstimatorResult& one) const {
+    return status == RunStatus::kOk && !one.diverged && !one.inconsistent;
+  }
 };
 
 struct SweepResult {
@@ -90,8 +92,9 @@ double Quantile(const std::vector<double>& ascending, double q);
 /// One estimator over all runs.
 struct SweepSummary {
   std::string name;
-  std::int64_t used = 0;      ///< runs that metrics are taken over
-  std::int64_t diverged = 0;  ///< runs left out because it diverged
+  std::int64_t used = 0;          ///< runs that metrics are taken over
+  std::int64_t diverged = 0;      ///< runs left out because it diverged
+  std::int64_t inconsistent = 0;  ///< others left out because its error was
   std::map<std::string, Spread> metrics;
   std::map<std::string, std::string> units;  ///< as in EstimatorResult
 };

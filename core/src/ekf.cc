@@ -69,18 +69,7 @@ std::unique_ptr<Estimator::Snapshot> Ekf::Save() const { return std::make_unique
 void Ekf::Restore(const Snapshot& snapshot) {
   const auto& kept = dynamic_cast<const Kept&>(snapshot);
   state_ = kept.state;
-  stamp_ = kept.stamp;
-  inputs_ = kept.inputs;
-  most_parts_ = kept.most_parts;
-  first_ = kept.first;
-  rejections_ = kept.rejections;
-  out_of_domain_ = kept.out_of_domain;
-  inflated_ = kept.inflated;
-  warned_ = kept.warned;
-  repairs_ = kept.repairs;
-  last_used_ = kept.last_used;
-  diverged_ = kept.diverged;
-  failed_ = kept.failed;
+  Kept::Members(*this) = kept.values;
   if (landmarks_ != nullptr) landmarks_->Restore(kept.landmarks);
   Bind();
 }

@@ -28,14 +28,14 @@ void Ekf::Bind() {
     for (const RoleBinding& role : sensor.roles) {
       const bool present = role.block >= 0 && layout[role.block].present;
       plan.roles.push_back(present ? state_.value(role.block) : nullptr);
-      plan.at.push_back(plan.roles.back());
+      plan.linearised_at.push_back(plan.roles.back());
       plan.columns.push_back(-1);
       plan.ready = plan.ready && (role.block < 0 || present);
       if (present && role.linearise_at == LineariseAt::kMeasurement) {
         plan.implied.resize(static_cast<std::size_t>(layout[role.block].geometry().ambient));
-        plan.at.back() = plan.implied.data();
+        plan.linearised_at.back() = plan.implied.data();
       } else if (present && !first_.empty() && !FirstEstimate(role.block).empty()) {
-        plan.at.back() = FirstEstimate(role.block).data();
+        plan.linearised_at.back() = FirstEstimate(role.block).data();
       }
       if (!present || role.mode == RoleMode::kHold || !layout[role.block].has_covariance())
         continue;
@@ -55,7 +55,7 @@ void Ekf::Bind() {
         ++part;
       }
     }
-    plan.apart = plan.at != plan.roles;
+    plan.linearised_elsewhere = plan.linearised_at != plan.roles;
     plan.strides.assign(sensor.roles.size(), plan.width);
   }
   for (Row& row : rows_) row.zeroed = nullptr;

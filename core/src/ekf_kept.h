@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <tuple>
 #include <vector>
 
 #include "alidade/ekf.h"
@@ -8,35 +9,22 @@
 
 namespace alidade {
 
-/// What passes from frame to frame besides the state.
+/// What passes from frame to frame.
 struct Ekf::Kept : Snapshot {
-  explicit Kept(const Ekf& ekf)
-      : Snapshot(ekf.state_),
-        stamp(ekf.stamp_),
-        inputs(ekf.inputs_),
-        most_parts(ekf.most_parts_),
-        first(ekf.first_),
-        rejections(ekf.rejections_),
-        out_of_domain(ekf.out_of_domain_),
-        inflated(ekf.inflated_),
-        warned(ekf.warned_),
-        repairs(ekf.repairs_),
-        last_used(ekf.last_used_),
-        diverged(ekf.diverged_),
-        failed(ekf.failed_) {
+  /// All but the state and the map.
+  static auto Members(auto& ekf) {
+    return std::tie(ekf.stamp_, ekf.inputs_, ekf.most_parts_, ekf.first_, ekf.rejections_,
+                    ekf.out_of_domain_, ekf.inflated_, ekf.warned_, ekf.repairs_, ekf.last_used_,
+                    ekf.diverged_, ekf.failed_);
+  }
+  explicit Kept(const Ekf& ekf) : Snapshot(ekf.state_), values(Members(ekf)) {
     if (ekf.landmarks_ != nullptr) landmarks = ekf.landmarks_->map();
   }
 
-  Stamp stamp;
-  ControlInputs inputs;
-  Stamp most_parts;
-  std::vector<std::vector<double>> first;
-  std::vector<int> rejections;
-  std::vector<char> out_of_domain, inflated;
-  std::vector<bool> warned;
-  int repairs;
-  decltype(last_used_) last_used;
-  bool diverged, failed;
+  std::tuple<Stamp, ControlInputs, Stamp, std::vector<std::vector<double>>, std::vector<int>,
+             std::vector<char>, std::vector<char>, std::vector<bool>, int, decltype(last_used_),
+             bool, bool>
+      values;
   LandmarkMap landmarks;
 };
 

@@ -148,17 +148,17 @@ void Ekf::Landmarks::Plan(Row& row, const Landmark& landmark) {
   const Family& family = FamilyOf(row);
   const SensorPlan& base = ekf_.plans_[static_cast<std::size_t>(row.sensor)];
   plan = base;
-  for (const double*& at : plan.at) {
+  for (const double*& at : plan.linearised_at) {
     if (at == base.implied.data()) at = plan.implied.data();
   }
-  for (auto* const roles : {&plan.roles, &plan.at}) {
+  for (auto* const roles : {&plan.roles, &plan.linearised_at}) {
     roles->resize(static_cast<std::size_t>(family.first));
   }
   plan.columns.resize(static_cast<std::size_t>(family.first));
   for (const BlockId id : landmark.blocks) {
     const Block& block = ekf_.state_.layout()[id];
     plan.roles.push_back(ekf_.state_.value(id));
-    plan.at.push_back(plan.roles.back());
+    plan.linearised_at.push_back(plan.roles.back());
     plan.columns.push_back(block.has_covariance() ? plan.width : -1);
     if (!block.has_covariance()) continue;
     plan.parts.push_back({block.tangent_offset, block.geometry().tangent, plan.width});

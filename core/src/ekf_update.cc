@@ -40,7 +40,8 @@ Outcome Ekf::Linearise(Row& row) {
     row.zeroed = &plan;
   }
   entry.h.resize(static_cast<std::size_t>(geometry.ambient), std::nan(""));
-  Outcome outcome = plan.apart ? EvaluateApart(row, entry) : Evaluate(row, entry);
+  Outcome outcome =
+      plan.linearised_elsewhere ? EvaluateElsewhere(row, entry) : Evaluate(row, entry);
   if (outcome == Outcome::kOutOfDomain || outcome == Outcome::kFailed) entry.h.clear();
   if (outcome == Outcome::kAccepted) outcome = NoiseOf(row, plan.roles.data());
   if (outcome == Outcome::kAccepted) {
@@ -86,7 +87,7 @@ Outcome Ekf::Evaluate(Row& row, MeasurementReport& entry) {
 
 /// h at the prediction; H at the first estimates, and at what the measurement implies for the role
 /// that asks for it.
-Outcome Ekf::EvaluateApart(Row& row, MeasurementReport& entry) {
+Outcome Ekf::EvaluateElsewhere(Row& row, MeasurementReport& entry) {
   const SensorModel& model = ModelOf(row);
   SensorPlan& plan = row.plan != nullptr ? *row.plan : plans_[static_cast<std::size_t>(row.sensor)];
   Outcome outcome = OutcomeOf(model.Predict(plan.roles.data(), entry.h.data()));
@@ -99,18 +100,18 @@ Outcome Ekf::EvaluateApart(Row& row, MeasurementReport& entry) {
     if (outcome != Outcome::kAccepted) return outcome;
   }
   predicted_.assign(entry.h.begin(), entry.h.end());
-  plan.roles.swap(plan.at);
+  plan.roles.swap(plan.linearised_at);
   outcome = Evaluate(row, entry);
-  plan.roles.swap(plan.at);
+  plan.roles.swap(plan.linearised_at);
   entry.h.assign(predicted_.begin(), predicted_.end());
   for (std::size_t i = 0; i < plan.roles.size(); ++i) {
     const Geometry& geometry = model.roles()[i].geometry;
-    if (plan.columns[i] < 0 || plan.at[i] == plan.roles[i] ||
+    if (plan.columns[i] < 0 || plan.linearised_at[i] == plan.roles[i] ||
         geometry.kind != GeometryKind::kUnitVector) {
       continue;
     }
     RowMajor j(geometry.tangent, geometry.tangent);
-    geometry.Transport(plan.roles[i], plan.at[i], j.data());
+    geometry.Transport(plan.roles[i], plan.linearised_at[i], j.data());
     Chain(row, plan.columns[i], geometry.tangent, j.data());
   }
   return outcome;

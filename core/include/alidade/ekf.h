@@ -64,15 +64,15 @@ class Ekf : public Estimator {
   /// How a sensor touches the state, as long as the layout stays as it is.
   struct SensorPlan {
     std::vector<const double*> roles;  ///< values; null where unbound or without a value yet
-    std::vector<const double*> at;     ///< where H is taken: `roles`, where not apart
-    std::vector<int> columns;          ///< of each role in a row of H; -1: no Jacobian
-    std::vector<int> strides;          ///< for the model: `width` for each role
+    std::vector<const double*> linearised_at;  ///< `roles`, where not elsewhere
+    std::vector<int> columns;                  ///< of each role in a row of H; -1: no Jacobian
+    std::vector<int> strides;                  ///< for the model: `width` for each role
     std::vector<JacobianPart> parts;
-    std::vector<bool> considered;  ///< of the parts
-    int width = 0;                 ///< of a row of H: n where the covariance is small
-    bool ready = true;             ///< all roles have a value
-    bool apart = false;            ///< H is taken elsewhere than h
-    std::vector<double> implied;   ///< of the role that is linearised at what z implies
+    std::vector<bool> considered;       ///< of the parts
+    int width = 0;                      ///< of a row of H: n where the covariance is small
+    bool ready = true;                  ///< all roles have a value
+    bool linearised_elsewhere = false;  ///< H is taken elsewhere than h
+    std::vector<double> implied;        ///< of the role that is linearised at what z implies
   };
   /// How a motion model moves the state.
   struct MotionPlan {
@@ -172,7 +172,7 @@ class Ekf : public Estimator {
   void Collect(const Frame& frame);
   void Fuse(std::span<Row* const> group);
   Outcome Evaluate(Row& row, MeasurementReport& entry);
-  Outcome EvaluateApart(Row& row, MeasurementReport& entry);
+  Outcome EvaluateElsewhere(Row& row, MeasurementReport& entry);
   void Chain(Row& row, int column, int size, const double* j);
   Outcome Gate(Row& row);
   void Weigh(Row& row);

@@ -233,7 +233,8 @@ class CeresBatch : public Estimator {
   /// Reweighted least squares converges linearly where the squared error does so quadratically:
   /// what is left below Ceres' tolerances counts. How many steps it took.
   int Reweight() {
-    constexpr double kStep = 1e-10;  // of inputs whose sigma is 1
+    // Of inputs whose sigma is 1; with landmarks a step takes longer.
+    const double settled = trajectory_.has_landmarks() ? 1e-6 : 1e-10;
     Eigen::VectorXd step;
     int steps = 0;
     do {
@@ -241,7 +242,7 @@ class CeresBatch : public Estimator {
       if (!GaussNewton(trajectory_, e_, u_, step)) return steps;
       e_ += step;
       ++steps;
-    } while (step.norm() > kStep && steps < options_.max_iterations);
+    } while (step.norm() > settled && steps < options_.max_iterations);
     return steps;
   }
 

@@ -83,6 +83,7 @@ bool Trajectory::Add(const Frame& frame, const UpdateReport& report, const Estim
   Epoch epoch;
   epoch.stale = frame.stamp < stamp_;
   const int inputs = inputs_;
+  if (!epochs_.empty()) epoch.column = inputs;
   for (Stamp from = stamp_; from < frame.stamp;) {
     const Stamp end = controls_.StepEnd(from, frame.stamp);
     if (!AddSteps(from, end, epoch)) {

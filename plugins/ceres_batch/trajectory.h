@@ -142,6 +142,7 @@ class Trajectory {
     bool stale = false;
     std::vector<int> inputs;  ///< UpdateReport::inputs
     LandmarkCounts counts;    ///< of the filter
+    int column = 0;           ///< the first of its inputs; of the first epoch 0: the prior's too
   };
   /// What a measurement tells of the roles that its sensor initialises, t in the tangent.
   struct Inverse {
@@ -152,6 +153,7 @@ class Trajectory {
   struct Information {
     Eigen::MatrixXd h;  ///< lower triangle
     Eigen::VectorXd g;
+    std::vector<std::size_t> first;  ///< by frame: the earliest that h ties it to
   };
   /// Those of one landmark in its inputs l, and what ties l to the states.
   struct Normal {

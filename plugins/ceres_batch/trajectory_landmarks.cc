@@ -2,6 +2,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/src/landmark_forms.h"
 #include "trajectory.h"
@@ -312,6 +313,8 @@ bool Trajectory::Project(const double* e, const std::vector<Point>& points, Unde
   if (derivatives) {
     information.h = Eigen::MatrixXd::Zero(size, size);
     information.g = Eigen::VectorXd::Zero(size);
+    information.first.resize(points.size());
+    std::iota(information.first.begin(), information.first.end(), std::size_t{0});
   }
   Information* const into = derivatives ? &information : nullptr;
   reduced.cost = 0.5 * Eigen::Map<const Eigen::VectorXd>(e, inputs_).squaredNorm();
@@ -330,6 +333,8 @@ bool Trajectory::Project(const double* e, const std::vector<Point>& points, Unde
       const auto row = d * static_cast<Eigen::Index>(normal.epochs[i]);
       const Eigen::MatrixXd gain = c.solve(normal.ties[i].transpose()).transpose();
       information.g.segment(row, d).noalias() -= gain * normal.b;
+      std::size_t& earliest = information.first[normal.epochs[i]];
+      earliest = std::min(earliest, normal.epochs.front());
       for (std::size_t k = 0; k <= i; ++k) {
         const auto column = d * static_cast<Eigen::Index>(normal.epochs[k]);
         information.h.block(row, column, d, d).noalias() -= gain * normal.ties[k].transpose();
@@ -342,23 +347,40 @@ bool Trajectory::Project(const double* e, const std::vector<Point>& points, Unde
   return reduced.g.allFinite() && reduced.a.allFinite();
 }
 
-/// A = I + S' H S, g = e + S' (g_x + H offset), for S of all points.
+/// A = I + S' H S, g = e + S' (g_x + H offset), for S of all points, which is lower triangular by
+/// frames: no state depends on a later input.
 void Trajectory::Assemble(const double* e, const std::vector<Point>& points,
                           const Information& information, Reduced& reduced) const {
   const auto d = std::ssize(read_), size = d * std::ssize(points);
-  Eigen::MatrixXd s(size, inputs_);
+  const Eigen::MatrixXd& h = information.h;
+  Eigen::MatrixXd s(size, inputs_), hs = Eigen::MatrixXd::Zero(size, inputs_);
   Eigen::VectorXd offset(size);
+  const auto begin = [&](std::size_t k) {
+    return k < points.size() ? Eigen::Index{epochs_[k].column} : Eigen::Index{inputs_};
+  };
   for (std::size_t k = 0; k < points.size(); ++k) {
     const auto row = d * static_cast<Eigen::Index>(k);
     s.middleRows(row, d) = Packed(points[k].s);
     offset.segment(row, d) = points[k].offset(read_);
   }
-  const Eigen::MatrixXd h = information.h.selfadjointView<Eigen::Lower>();
-  const Eigen::MatrixXd hs = h * s;
+  for (std::size_t k = 0; k < points.size(); ++k) {  // H S, H = L + L' by blocks
+    const auto row = d * static_cast<Eigen::Index>(k);
+    const auto first = d * static_cast<Eigen::Index>(information.first[k]);
+    const Eigen::MatrixXd own = h.block(row, row, d, d).selfadjointView<Eigen::Lower>();
+    const auto before = h.block(row, first, d, row - first);
+    const auto here = s.block(row, 0, d, begin(k + 1));
+    hs.block(row, 0, d, here.cols()).noalias() += own * here;
+    hs.block(row, 0, d, begin(k)).noalias() += before * s.block(first, 0, row - first, begin(k));
+    hs.block(first, 0, row - first, here.cols()).noalias() += before.transpose() * here;
+  }
   reduced.a = Eigen::MatrixXd::Identity(inputs_, inputs_);
-  reduced.a.triangularView<Eigen::Lower>() += s.transpose() * hs;
-  reduced.g =
-      Eigen::Map<const Eigen::VectorXd>(e, inputs_) + s.transpose() * (information.g + h * offset);
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const auto row = d * static_cast<Eigen::Index>(k), from = begin(k), to = begin(k + 1);
+    reduced.a.block(from, 0, to - from, to).noalias() +=
+        s.block(row, from, size - row, to - from).transpose() * hs.block(row, 0, size - row, to);
+  }
+  const Eigen::VectorXd g = information.g + h.selfadjointView<Eigen::Lower>() * offset;
+  reduced.g = Eigen::Map<const Eigen::VectorXd>(e, inputs_) + s.transpose() * g;
 }
 
 /// A landmark moves with e by M = J (J_y_x S_k - J_y_l C^-1 B' S), and by its own inputs besides:
@@ -368,7 +390,7 @@ bool Trajectory::PutMap(const double* e, const Eigen::MatrixXd& u,
   std::vector<Point> points;
   if (!PointsOf(e, true, points)) return false;
   const auto size = std::ssize(read_) * std::ssize(points);
-  Information unused{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size)};
+  Information unused{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size), {}};
   for (LandmarkEstimate& estimate : map) {
     const auto found = std::ranges::find_if(landmarks_, [&](const MapLandmark& landmark) {
       return landmark.id == estimate.id && landmark.generation == estimate.generation;

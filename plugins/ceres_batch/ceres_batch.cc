@@ -26,6 +26,7 @@ struct Options {
   int max_iterations = 50;
   int max_outer_iterations = 20;
   double max_dt_s = std::numeric_limits<double>::infinity();
+  bool lent = false;  ///< it sees what another estimator accepted
 };
 
 /// Maximum a posteriori of all states given all data, or given the data so far (the
@@ -40,7 +41,7 @@ class CeresBatch : public Estimator {
       : options_(options),
         trajectory_(system, streams, options.max_dt_s),
         state_(system.InitialState()),
-        filter_(system, FilterOptions(options), streams) {}
+        filter_(FilterSystem(system, options), FilterOptions(options), streams) {}
 
   void Start(Stamp stamp) override {
     trajectory_.Start(stamp);
@@ -110,6 +111,11 @@ class CeresBatch : public Estimator {
                               "the filter that the batch starts from, and that gives blocks their "
                               "first values, ended" +
                                   (cause == filter.events.end() ? "" : ": " + cause->text)});
+  }
+  /// A landmark that another estimator let enter has waited long enough.
+  static System FilterSystem(System system, const Options& options) {
+    if (system.landmarks && options.lent) system.landmarks->enter_after = 1;
+    return system;
   }
   static EkfOptions FilterOptions(const Options& options) {
     EkfOptions filter;
@@ -316,6 +322,8 @@ EstimatorMaker Create(const EstimatorArguments& arguments) {
                 1, 1'000'000, options.max_outer_iterations);
   options.max_dt_s =
       p.Positive("max_dt_s", "s", "longer gaps are stepped in equal parts", options.max_dt_s);
+  const auto use = arguments.entry.Find("use");
+  options.lent = use && use->is_map();
   return [options, entry = arguments.entry](const System& system,
                                             const std::vector<StreamInfo>& streams) {
     CheckSupported(system, entry);

@@ -355,6 +355,20 @@ TEST(CeresBatchLandmarks, WhatTheFilterForgetsAndMeetsAgainIsAnotherLandmark) {
   EXPECT_LT((other.Landmark(104).position - found.Landmark(4).position).norm(), 1e-9);
 }
 
+// What waits in the filter that lends its measurements is not lent: it would wait twice.
+TEST(CeresBatchLandmarks, WhatAFilterAcceptedEntersAtOnce) {
+  const Problem problem(12, 8);
+  System system = problem.Filter();
+  system.landmarks->enter_after = 3;
+  const auto initialised = [&](const std::string& options) {
+    const auto batch = testing::MakeBatch(system, options + "data: so_far\n");
+    return batch->Process(problem.frames[0]).landmarks.initialised;
+  };
+  EXPECT_EQ(initialised(""), 0);
+  EXPECT_EQ(initialised("use: {accepted_by: ekf}\n"),
+            static_cast<int>(problem.frames[0].measurements.size()));
+}
+
 TEST(CeresBatchLandmarks, GivesTheSameBytesTwice) {
   const Problem problem(15, 8);
   const Found one = Solve(problem.Filter(), problem.frames);

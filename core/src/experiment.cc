@@ -118,6 +118,12 @@ void CheckOffered(const std::string& type, const PluginHost& host, const Node& n
                   "\n" + PluginPlaces(host));
 }
 
+bool TakesLandmarks(const std::string& type, const PluginHost& host) {
+  return std::ranges::any_of(host.entries(), [&](const PluginEntry& entry) {
+    return entry.kind == PluginEntry::Kind::kEstimator && entry.name == type && entry.landmarks;
+  });
+}
+
 /// Refuses overrides of what all estimators share, and of an entry that `root` does not have and
 /// that is none of `merged` either, for it has no model.
 void CheckOverrides(const Node& overrides, const Node& root, const Node& merged) {
@@ -166,7 +172,7 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   if (of_core != nullptr) {
     internal::RefuseUnsupported(named.type, of_core->support, own.root(), named.system);
     internal::RefuseLoneMatches(entry, named.system);
-  } else if (named.system.landmarks) {
+  } else if (named.system.landmarks && !TakesLandmarks(named.type, host)) {
     type.Fail("estimator type '" + named.type + "' does not support landmarks",
               "`sensors` that measure none, or type: ekf");
   }

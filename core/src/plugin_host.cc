@@ -172,7 +172,7 @@ void PluginHost::AddEntries(const Loaded& plugin) {
     for (int i = 0; i < plugin.build_table->estimator_count; ++i) {
       const EstimatorEntry& one = plugin.build_table->estimators[i];
       entries_.push_back({PluginEntry::Kind::kEstimator, one.name, Text(one.doc),
-                          Text(one.citation), "", plugin.file, 0});
+                          Text(one.citation), "", plugin.file, 0, one.landmarks});
     }
     return;
   }

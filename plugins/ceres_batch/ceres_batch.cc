@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <ceres/iteration_callback.h>
-#include <ceres/normal_prior.h>
-#include <ceres/problem.h>
 #include <ceres/solver.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -17,7 +13,7 @@
 #include "alidade/build_plugin.h"
 #include "alidade/ekf.h"
 #include "alidade/support.h"
-#include "residuals.h"
+#include "frozen_solve.h"
 #include "trajectory.h"
 
 namespace alidade::ceres_batch {
@@ -30,18 +26,7 @@ struct Options {
   int max_iterations = 50;
   int max_outer_iterations = 20;
   double max_dt_s = std::numeric_limits<double>::infinity();
-};
-
-/// Ends a solve once `stop` is true.
-class StopCallback : public ceres::IterationCallback {
- public:
-  explicit StopCallback(std::function<bool()> stop) : stop_(std::move(stop)) {}
-  ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
-    return stop_() ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
-  }
-
- private:
-  std::function<bool()> stop_;
+  bool lent = false;  ///< it sees what another estimator accepted
 };
 
 /// Maximum a posteriori of all states given all data, or given the data so far (the
@@ -56,7 +41,7 @@ class CeresBatch : public Estimator {
       : options_(options),
         trajectory_(system, streams, options.max_dt_s),
         state_(system.InitialState()),
-        filter_(system, FilterOptions(options), streams) {}
+        filter_(FilterSystem(system, options), FilterOptions(options), streams) {}
 
   void Start(Stamp stamp) override {
     trajectory_.Start(stamp);
@@ -64,6 +49,7 @@ class CeresBatch : public Estimator {
   }
   bool offline() const override { return options_.data == Options::Data::kAll; }
   const State& state() const override { return state_; }
+  std::vector<LandmarkEstimate> landmarks() const override { return map_; }
   Stamp stamp() const override { return trajectory_.stamp(); }
   bool diverged() const override { return failed_; }
   bool failed() const override { return failed_; }
@@ -73,7 +59,7 @@ class CeresBatch : public Estimator {
     const bool had_failed = filter_.failed();
     const UpdateReport& filter = filter_.Process(frame);
     const bool were_few = trajectory_.inputs() <= kManyInputs;
-    if (!trajectory_.Add(frame, filter)) {
+    if (!trajectory_.Add(frame, filter, filter_)) {
       failed_ = true;
       report_.events.push_back({frame.stamp, "batch", trajectory_.problem()});
       return report_;
@@ -107,7 +93,8 @@ class CeresBatch : public Estimator {
       if (last) report_.events.push_back({trajectory_.stamp(), "batch", summary_});
       emit(k, state_, report_);
     };
-    if (!Covariances() || !ForEachFrame(put)) {
+    map_ = filter_.landmarks();
+    if (!Covariances() || !ForEachFrame(put) || !PutMap()) {
       FailAll(summary_ + "; then " + trajectory_.problem());
     }
   }
@@ -124,6 +111,11 @@ class CeresBatch : public Estimator {
                               "the filter that the batch starts from, and that gives blocks their "
                               "first values, ended" +
                                   (cause == filter.events.end() ? "" : ": " + cause->text)});
+  }
+  /// A landmark that another estimator let enter has waited long enough.
+  static System FilterSystem(System system, const Options& options) {
+    if (system.landmarks && options.lent) system.landmarks->enter_after = 1;
+    return system;
   }
   static EkfOptions FilterOptions(const Options& options) {
     EkfOptions filter;
@@ -143,11 +135,7 @@ class CeresBatch : public Estimator {
   }
 
   /// Freezes at e_; false where a model is not defined there.
-  bool CanStart() {
-    Eigen::VectorXd r(trajectory_.residuals());
-    RowMajor j(r.size(), trajectory_.inputs());
-    return trajectory_.Freeze(e_.data()) && trajectory_.Evaluate(e_.data(), r.data(), j.data());
-  }
+  bool CanStart() { return trajectory_.Freeze(e_.data()) && IsDefined(trajectory_, e_); }
 
   /// Starts where the frame before ended, its new inputs at their mean.
   void SolveSoFar(Stamp stamp) {
@@ -162,7 +150,8 @@ class CeresBatch : public Estimator {
         trajectory_.Report(k, point, report_);
         PutState(k, point);
       };
-      if (!Covariances() || !ForEachFrame(put)) {
+      map_ = filter_.landmarks();
+      if (!Covariances() || !ForEachFrame(put) || !PutMap()) {
         failed_ = true;
         summary_ += "; then " + trajectory_.problem();
       }
@@ -183,7 +172,7 @@ class CeresBatch : public Estimator {
     ceres::Solver::Summary summary;
     do {
       HeedStop();
-      summary = SolveFrozen();
+      summary = SolveFrozen(trajectory_, e_, options_.max_iterations, [this] { return Stopped(); });
       HeedStop();
       iterations += static_cast<int>(summary.iterations.size()) - 1;
       ++outer;
@@ -225,32 +214,6 @@ class CeresBatch : public Estimator {
                 : "");
   }
 
-  ceres::Solver::Summary SolveFrozen() {
-    const Eigen::Index n = e_.size();
-    Residuals residuals(trajectory_, e_);
-    ceres::Problem::Options of_problem;
-    of_problem.evaluation_callback = &residuals;
-    ceres::Problem problem(of_problem);
-    problem.AddResidualBlock(
-        new ceres::NormalPrior(Eigen::MatrixXd::Identity(n, n), Eigen::VectorXd::Zero(n)), nullptr,
-        e_.data());
-    residuals.AddTo(problem, e_.data());
-    ceres::Solver::Options options;
-    options.linear_solver_type = ceres::DENSE_QR;
-    options.max_num_iterations = options_.max_iterations;
-    options.initial_trust_region_radius = 1e8;  // Gauss-Newton as long as the cost falls
-    options.function_tolerance = 1e-14;
-    options.gradient_tolerance = 1e-12;
-    options.parameter_tolerance = 1e-12;
-    options.num_threads = 1;
-    StopCallback stop([this] { return Stopped(); });
-    options.callbacks.push_back(&stop);
-    options.logging_type = ceres::SILENT;
-    ceres::Solver::Summary summary;
-    ceres::Solve(options, &problem, &summary);
-    return summary;
-  }
-
   /// U at e_, and the Gauss-Newton step that it gives: Ceres stops before the last one. A solver
   /// that stopped where this step, |U step| sigmas, is long was not led down by the Jacobian that
   /// it was given. False where a model is not defined.
@@ -258,7 +221,7 @@ class CeresBatch : public Estimator {
     constexpr double kLong = 1e-3, kRounding = 1e-6;
     Eigen::VectorXd step;
     HeedStop();
-    if (!GaussNewton(step)) return false;
+    if (!GaussNewton(trajectory_, e_, u_, step)) return false;
     if (failed_) return true;
     failed_ = !((u_ * step).norm() <= kLong + kRounding * std::sqrt(2.0 * cost_));
     if (failed_) {
@@ -268,6 +231,7 @@ class CeresBatch : public Estimator {
     } else {
       summary_ += "converged";
       e_ += step;
+      if (trajectory_.has_landmarks()) return IsDefined(trajectory_, e_);
     }
     return true;
   }
@@ -275,37 +239,17 @@ class CeresBatch : public Estimator {
   /// Reweighted least squares converges linearly where the squared error does so quadratically:
   /// what is left below Ceres' tolerances counts. How many steps it took.
   int Reweight() {
-    constexpr double kStep = 1e-10;  // of inputs whose sigma is 1
+    // Of inputs whose sigma is 1; with landmarks a step takes longer.
+    const double settled = trajectory_.has_landmarks() ? 1e-6 : 1e-10;
     Eigen::VectorXd step;
     int steps = 0;
     do {
       HeedStop();
-      if (!GaussNewton(step)) return steps;
+      if (!GaussNewton(trajectory_, e_, u_, step)) return steps;
       e_ += step;
       ++steps;
-    } while (step.norm() > kStep && steps < options_.max_iterations);
+    } while (step.norm() > settled && steps < options_.max_iterations);
     return steps;
-  }
-
-  /// U at e_ and the step -(U'U)^-1 J' r of the weighted problem. False where a model is not
-  /// defined.
-  bool GaussNewton(Eigen::VectorXd& step) {
-    const Eigen::Index n = e_.size(), m = trajectory_.residuals();
-    RowMajor j = RowMajor::Identity(n + m, n);
-    Eigen::VectorXd r(n + m);
-    r.head(n) = e_;
-    if (!trajectory_.Evaluate(e_.data(), r.data() + n, j.data() + n * n)) return false;
-    for (const Trajectory::Part& part : trajectory_.parts()) {
-      if (part.loss.kind == LossKind::kNone) continue;
-      auto rows = r.segment(n + part.row, part.size);
-      const double root = std::sqrt(Weight(part.loss, rows.norm()));
-      rows *= root;
-      j.middleRows(n + part.row, part.size) *= root;
-    }
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(j);
-    u_ = qr.matrixQR().topRows(n).triangularView<Eigen::Upper>();
-    step = -qr.solve(r);
-    return true;
   }
 
   /// The points of e_, frame by frame; false where a model is not defined, which ends it.
@@ -320,6 +264,8 @@ class CeresBatch : public Estimator {
     return good;
   }
 
+  bool PutMap() { return map_.empty() || trajectory_.PutMap(e_.data(), u_, map_); }
+
   void PutState(std::size_t k, const Trajectory::Point& point) {
     trajectory_.Put(
         k, point, u_.transpose().triangularView<Eigen::Lower>().solve(point.s.transpose()), state_);
@@ -332,6 +278,7 @@ class CeresBatch : public Estimator {
   std::vector<std::vector<double>> filtered_;
   Eigen::VectorXd e_;
   Eigen::MatrixXd u_;
+  std::vector<LandmarkEstimate> map_;
   UpdateReport report_;
   std::string summary_;
   std::function<bool()> stop_;
@@ -339,7 +286,7 @@ class CeresBatch : public Estimator {
   bool failed_ = false;
 };
 
-constexpr Support kSupport = {.held = false, .from_measurement = true};
+constexpr Support kSupport = {.held = false, .from_measurement = true, .landmarks = true};
 
 /// Where a config asks for what is not supported: `sensors.stereo.roles.depth.mode`.
 std::string KeyOf(const Unsupported& asked, const System& system) {
@@ -375,6 +322,8 @@ EstimatorMaker Create(const EstimatorArguments& arguments) {
                 1, 1'000'000, options.max_outer_iterations);
   options.max_dt_s =
       p.Positive("max_dt_s", "s", "longer gaps are stepped in equal parts", options.max_dt_s);
+  const auto use = arguments.entry.Find("use");
+  options.lent = use && use->is_map();
   return [options, entry = arguments.entry](const System& system,
                                             const std::vector<StreamInfo>& streams) {
     CheckSupported(system, entry);
@@ -387,4 +336,4 @@ EstimatorMaker Create(const EstimatorArguments& arguments) {
 
 ALIDADE_ESTIMATOR_PLUGIN({"ceres_batch",
                           "Maximum a posteriori of a whole run, by nonlinear least squares.",
-                          "[Bell1994]", &alidade::ceres_batch::Create})
+                          "[Bell1994]", &alidade::ceres_batch::Create, true})

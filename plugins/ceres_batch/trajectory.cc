@@ -46,6 +46,7 @@ Trajectory::Trajectory(System system, const std::vector<StreamInfo>& streams, do
   turns_ = std::ranges::any_of(initial_.layout().blocks(), [](const Block& block) {
     return block.has_covariance() && block.geometry().kind == GeometryKind::kUnitVector;
   });
+  if (has_landmarks()) AddKnown();
 }
 
 bool Trajectory::Fail(std::string why) const {
@@ -75,13 +76,14 @@ std::vector<double> Trajectory::ValuesOf(const State& state) const {
   return values;
 }
 
-bool Trajectory::Add(const Frame& frame, const UpdateReport& filter) {
+bool Trajectory::Add(const Frame& frame, const UpdateReport& report, const Estimator& filter) {
   if (stamp_ == kNoStamp) {
     stamp_ = system_.start_s ? StampFromSeconds(*system_.start_s) : frame.stamp;
   }
   Epoch epoch;
   epoch.stale = frame.stamp < stamp_;
   const int inputs = inputs_;
+  if (!epochs_.empty()) epoch.column = inputs;
   for (Stamp from = stamp_; from < frame.stamp;) {
     const Stamp end = controls_.StepEnd(from, frame.stamp);
     if (!AddSteps(from, end, epoch)) {
@@ -94,7 +96,8 @@ bool Trajectory::Add(const Frame& frame, const UpdateReport& filter) {
   UpdateReport taken;
   controls_.Take(frame, taken);
   epoch.inputs = std::move(taken.inputs);
-  AddFactors(frame, filter, epoch);
+  AddFactors(frame, report, epoch);
+  if (has_landmarks()) AddLandmarks(report, filter, epoch);
   epochs_.push_back(std::move(epoch));
   return inputs_ <= kMostInputs || FailTooMany();
 }
@@ -127,28 +130,28 @@ bool Trajectory::AddSteps(Stamp from, Stamp end, Epoch& epoch) {
 }
 
 /// One factor for each measurement and sensor bound to its stream, in the order of the sensors.
-void Trajectory::AddFactors(const Frame& frame, const UpdateReport& filter, Epoch& epoch) {
+void Trajectory::AddFactors(const Frame& frame, const UpdateReport& report, Epoch& epoch) {
   for (std::size_t i = 0; i < system_.sensors.size(); ++i) {
     const SensorModel& model = system_.sensors[i].model;
     for (const Measurement& m : frame.measurements) {
       if (m.stream != stream_of_sensor_[i]) continue;
       ALIDADE_EXPECTS(std::ssize(m.values) == model.measurement().geometry.ambient);
-      Factor factor{static_cast<int>(i), m, Outcome::kStale, -1, {}};
+      Factor factor{static_cast<int>(i), m, Outcome::kStale, -1, -1, {}};
       if (!epoch.stale) {
         factor.outcome =
             AllFinite(m.values) ? OutcomeOf(model.Valid(m.values.data())) : Outcome::kNotFinite;
       }
       const std::size_t index = epoch.factors.size();  // the filter has the same order
-      const bool first = index < filter.measurements().size() &&
-                         filter.measurements()[index].outcome == Outcome::kInitialised;
+      const bool first = index < report.measurements().size() &&
+                         report.measurements()[index].outcome == Outcome::kInitialised;
       if (first) factor.outcome = Outcome::kInitialised;
       epoch.factors.push_back(std::move(factor));
     }
   }
   AddFirsts(epoch);
   for (Factor& factor : epoch.factors) {
-    if (factor.outcome != Outcome::kAccepted) continue;
     const SensorBinding& sensor = SensorOf(factor);
+    if (factor.outcome != Outcome::kAccepted || sensor.model.has_landmark()) continue;
     if (!std::ranges::all_of(sensor.roles,
                              [&](const RoleBinding& role) { return AllPresent({role.block}); })) {
       factor.outcome = Outcome::kNotReady;
@@ -174,8 +177,10 @@ void Trajectory::AddFirsts(Epoch& epoch) {
   for (bool progress = true; progress;) {
     progress = false;
     for (std::size_t i = 0; i < epoch.factors.size(); ++i) {
-      if (epoch.factors[i].outcome != Outcome::kInitialised) continue;
       const SensorBinding& sensor = SensorOf(epoch.factors[i]);
+      if (epoch.factors[i].outcome != Outcome::kInitialised || sensor.model.has_landmark()) {
+        continue;
+      }
       const auto target = static_cast<std::size_t>(sensor.model.initialised_role());
       std::vector<BlockId> others;
       for (std::size_t k = 0; k < sensor.roles.size(); ++k) {
@@ -220,16 +225,6 @@ bool Trajectory::Advance(std::size_t k, const double* e, Point& point) const {
          });
 }
 
-std::vector<const double*> Trajectory::RolesOf(const SensorBinding& sensor,
-                                               const Point& point) const {
-  std::vector<const double*> roles;
-  for (const RoleBinding& role : sensor.roles) {
-    roles.push_back(role.block < 0 ? nullptr
-                                   : point.x.data() + initial_.layout()[role.block].value_offset);
-  }
-  return roles;
-}
-
 bool Trajectory::Evaluate(const double* e, double* r, double* j) const {
   Point point;
   if (!Begin(e, j != nullptr, point)) return false;
@@ -239,7 +234,7 @@ bool Trajectory::Evaluate(const double* e, double* r, double* j) const {
     if (!Advance(k, e, point)) return false;
     for (const Factor& factor : epochs_[k].factors) {
       if (factor.row < 0) continue;
-      if (!Residual(factor, point, residual, j != nullptr ? &a : nullptr)) return false;
+      if (!Residual(factor, point, {}, residual, j != nullptr ? &a : nullptr)) return false;
       Eigen::Map<Eigen::VectorXd>(r + factor.row, residual.size()) = residual;
       if (j == nullptr) continue;
       Eigen::Map<RowMajor>(j + std::ptrdiff_t{factor.row} * inputs_, a.rows(), inputs_).noalias() =
@@ -278,14 +273,16 @@ bool Trajectory::FreezeEpoch(Epoch& epoch, const double* e, Point& point) {
 bool Trajectory::Freeze(const double* e) {
   change_ = 0.0;
   Point point;
+  std::vector<Point> points;
   if (!Begin(e, false, point)) return false;
   for (Epoch& epoch : epochs_) {
     if (!FreezeEpoch(epoch, e, point)) return false;
     for (Factor& factor : epoch.factors) {
       if (factor.row >= 0 && !FreezeFactor(factor, point)) return false;
     }
+    if (has_landmarks()) points.push_back(point);
   }
-  return true;
+  return FreezeLandmarks(points);
 }
 
 void Trajectory::Put(std::size_t k, const Point& point, const Eigen::MatrixXd& y,
@@ -317,6 +314,7 @@ void Trajectory::Report(std::size_t k, const Point& point, UpdateReport& report)
   report.Clear();
   report.stale = epochs_[k].stale;
   report.inputs = epochs_[k].inputs;
+  report.landmarks = epochs_[k].counts;
   for (const Factor& factor : epochs_[k].factors) {
     const SensorBinding& sensor = SensorOf(factor);
     const Geometry& geometry = sensor.model.measurement().geometry;
@@ -325,11 +323,15 @@ void Trajectory::Report(std::size_t k, const Point& point, UpdateReport& report)
     entry.outcome = factor.outcome;
     entry.z = factor.measurement.values;
     entry.nis = std::nan("");  // what is left after smoothing is no innovation
-    if (factor.row < 0) continue;
+    const bool sight = factor.landmark >= 0 && factor.outcome == Outcome::kAccepted;
+    if (factor.row < 0 && !sight) continue;
+    std::vector<double> y;
+    if (sight) y = landmarks_[static_cast<std::size_t>(factor.landmark)].y;
     entry.h.resize(entry.z.size());
     entry.innovation.resize(static_cast<std::size_t>(geometry.tangent));
-    if (sensor.model.Predict(RolesOf(sensor, point).data(), entry.h.data()) != Status::kOk)
+    if (ModelOf(factor).Predict(RolesOf(factor, point, y).data(), entry.h.data()) != Status::kOk) {
       continue;
+    }
     if (geometry.kind == GeometryKind::kAngle) geometry.Normalise(entry.h.data());
     geometry.Minus(entry.z.data(), entry.h.data(), entry.innovation.data());
   }

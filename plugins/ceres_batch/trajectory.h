@@ -3,11 +3,13 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <map>
 #include <string>
 #include <vector>
 
 #include "alidade/control_inputs.h"
 #include "alidade/estimator.h"
+#include "map_landmark.h"
 
 namespace alidade::ceres_batch {
 
@@ -23,6 +25,9 @@ namespace alidade::ceres_batch {
 ///
 /// So P_0 and Q may have any rank, nothing is inverted but L_i, and the motion holds exactly at
 /// every e. What depends on the state in Q and R stands at where it was last frozen.
+///
+/// Landmarks are functions of the camera that saw them first and of inputs of their own, l, which
+/// are not in e: see MapLandmark. Where there are any, Reduce stands for Evaluate.
 ///
 ///   symbol   shape      meaning
 ///   e        N          inputs: of the prior, then frame by frame of its steps and first values
@@ -45,9 +50,9 @@ class Trajectory {
 
   /// Sets the time of the prior; else the first frame, or start_s, does.
   void Start(Stamp stamp) { stamp_ = stamp; }
-  /// One frame more; `filter` says which of its measurements gave a block its first value. False,
-  /// and problem(), where there would be too many inputs.
-  bool Add(const Frame& frame, const UpdateReport& filter);
+  /// One frame more; `report`, the filter's, says which of its measurements gave a block or a
+  /// landmark its first value. False, and problem(), where there would be too many inputs.
+  bool Add(const Frame& frame, const UpdateReport& report, const Estimator& filter);
   /// The values of a filter's state as Linearised takes them.
   std::vector<double> ValuesOf(const State& state) const;
   int inputs() const { return inputs_; }        ///< N
@@ -73,6 +78,20 @@ class Trajectory {
   double change() const { return change_; }
   /// r (M) and, unless null, its row-major Jacobian (M x N). False where a model is not defined.
   bool Evaluate(const double* e, double* r, double* j) const;
+  bool has_landmarks() const { return system_.landmarks.has_value(); }
+  /// The problem in e alone, the landmarks where they cost least given e (variable projection
+  /// [Golub2003]):  phi(e) = min_l |e|^2 / 2 + |l|^2 / 2 + sum_i rho_i(|r_i(e, l)|).
+  struct Reduced {
+    double cost = 0.0;  ///< phi
+    Eigen::VectorXd g;  ///< its gradient, N
+    Eigen::MatrixXd a;  ///< its Gauss-Newton matrix, N x N: a Schur complement; lower triangle
+  };
+  /// phi and, where asked for, its derivatives, which also makes the landmarks there those that the
+  /// next call starts from. False where a model is not defined.
+  bool Reduce(const double* e, bool derivatives, Reduced& reduced);
+  /// Puts place and covariance at e into `map`, the landmarks that a filter has at the end, for
+  /// Cov(e) = (U'U)^-1. False where a model is not defined.
+  bool PutMap(const double* e, const Eigen::MatrixXd& u, std::vector<LandmarkEstimate>& map);
   /// The inputs that solve the problem linearised about `trajectory`, the values of a filter frame
   /// by frame (it may end early). Freezes there. False where that cannot be. Where turns(), it is
   /// linearised about its own solution again until that settles.
@@ -106,7 +125,8 @@ class Trajectory {
     int sensor;
     Measurement measurement;
     Outcome outcome;
-    int row = -1;       ///< of r; -1: not in use
+    int row = -1;       ///< of r; -1: not in use, or of a landmark
+    int landmark = -1;  ///< index into landmarks_ of the one that it sees
     Eigen::MatrixXd l;  ///< frozen
   };
   /// A factor whose measurement gives a block its first value.
@@ -121,25 +141,76 @@ class Trajectory {
     std::vector<First> firsts;  ///< after the steps
     bool stale = false;
     std::vector<int> inputs;  ///< UpdateReport::inputs
+    LandmarkCounts counts;    ///< of the filter
+    int column = 0;           ///< the first of its inputs; of the first epoch 0: the prior's too
   };
+  /// What a measurement tells of the roles that its sensor initialises, t in the tangent.
+  struct Inverse {
+    std::vector<double> y;
+    Eigen::MatrixXd by_x, by_d, by_prior;  ///< t x n, t x m of d in z (+) d, t x prior
+  };
+  /// The normal equations in the states of all frames, d rows of each: those that a sensor reads.
+  struct Information {
+    Eigen::MatrixXd h;  ///< lower triangle
+    Eigen::VectorXd g;
+    std::vector<std::size_t> first;  ///< by frame: the earliest that h ties it to
+  };
+  /// Those of one landmark in its inputs l, and what ties l to the states.
+  struct Normal {
+    double cost = 0.0;
+    Eigen::MatrixXd c;                  ///< I + sum w J_l' J_l
+    Eigen::VectorXd b;                  ///< l + sum w J_l' r
+    std::vector<std::size_t> epochs;    ///< that it is seen from, the first sight's first
+    std::vector<Eigen::MatrixXd> ties;  ///< sum w J_x' J_l of each of them, d rows
+  };
+  /// What is done with a sight that is not defined: the problem is not defined, or it counts for
+  /// nothing.
+  enum class Undefined { kFails, kSkipped };
 
   bool AddSteps(Stamp from, Stamp end, Epoch& epoch);
-  void AddFactors(const Frame& frame, const UpdateReport& filter, Epoch& epoch);
+  void AddFactors(const Frame& frame, const UpdateReport& report, Epoch& epoch);
+  void AddLandmarks(const UpdateReport& report, const Estimator& filter, Epoch& epoch);
+  void AddKnown();
+  void Begin(const Factor& factor, std::size_t index, const Estimator& filter);
   void AddFirsts(Epoch& epoch);
   void AddPart(int size, const RobustLoss& loss);
   bool AllPresent(const std::vector<BlockId>& blocks) const;
   bool Move(const Step& step, const double* e, Point& point) const;
   bool Initialise(const First& first, const Factor& factor, const double* e, Point& point) const;
+  bool Invert(const Factor& factor, const Eigen::VectorXd& d, const double* prior,
+              const Point& point, const std::string& name, Inverse& inverse) const;
   bool FreezeEpoch(Epoch& epoch, const double* e, Point& point);
   bool FreezeStep(Step& step, const Point& point);
-  bool FreezeFactor(Factor& factor, const Point& point);
-  bool Residual(const Factor& factor, const Point& point, Eigen::VectorXd& r,
-                Eigen::MatrixXd* a) const;
+  bool FreezeFactor(Factor& factor, const Point& point, const std::vector<double>& y = {});
+  bool Residual(const Factor& factor, const Point& point, const std::vector<double>& y,
+                Eigen::VectorXd& r, Eigen::MatrixXd* a) const;
   void NoteChange(const Eigen::MatrixXd& before, const Eigen::MatrixXd& after);
-  std::vector<const double*> RolesOf(const SensorBinding& sensor, const Point& point) const;
+  const SensorModel& ModelOf(const Factor& factor) const;
+  std::vector<const double*> RolesOf(const Factor& factor, const Point& point,
+                                     const std::vector<double>& y = {}) const;
   const SensorBinding& SensorOf(const Factor& factor) const {
     return system_.sensors[static_cast<std::size_t>(factor.sensor)];
   }
+  bool PointsOf(const double* e, bool sensitivity, std::vector<Point>& points) const;
+  bool Place(const MapLandmark& landmark, const Eigen::VectorXd& l,
+             const std::vector<Point>& points, Inverse& place) const;
+  bool FreezeLandmarks(const std::vector<Point>& points);
+  bool NormalOf(const MapLandmark& landmark, const Eigen::VectorXd& l,
+                const std::vector<Point>& points, Undefined undefined, Normal& normal,
+                Information* information) const;
+  bool AddSight(const Factor& factor, std::size_t epoch, const MapLandmark& landmark,
+                const Inverse& place, const Point& point, Normal& normal,
+                Information* information) const;
+  bool Settle(MapLandmark& landmark, const std::vector<Point>& points, Undefined undefined) const;
+  bool Project(const double* e, const std::vector<Point>& points, Undefined undefined,
+               bool derivatives, Reduced& reduced);
+  bool AddPlain(const std::vector<Point>& points, Undefined undefined, Information* information,
+                double& cost) const;
+  void Assemble(const double* e, const std::vector<Point>& points, const Information& information,
+                Reduced& reduced) const;
+  Eigen::MatrixXd Packed(const Eigen::MatrixXd& rows) const;
+  void Describe(const MapLandmark& landmark, const Eigen::MatrixXd& p,
+                LandmarkEstimate& estimate) const;
   void PutAbout(const std::vector<double>& about, Point& point) const;
   bool StepAbout(std::vector<std::vector<double>>& trajectory, const Eigen::VectorXd& e,
                  Eigen::VectorXd& step);
@@ -153,6 +224,9 @@ class Trajectory {
   std::vector<bool> present_;  ///< at the last frame, by block
   Eigen::MatrixXd l0_;
   std::vector<Epoch> epochs_;
+  std::vector<MapLandmark> landmarks_;
+  std::map<std::int64_t, int> current_;  ///< by id: the last of landmarks_
+  std::vector<int> read_;                ///< tangent rows of a state that sensors read
   std::vector<Part> parts_;
   Stamp stamp_ = kNoStamp;
   ControlInputs controls_;

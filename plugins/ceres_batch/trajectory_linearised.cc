@@ -42,9 +42,10 @@ void Trajectory::PutAbout(const std::vector<double>& about, Point& point) const 
 
 bool Trajectory::StepAbout(std::vector<std::vector<double>>& trajectory, const Eigen::VectorXd& e,
                            Eigen::VectorXd& step) {
-  Eigen::MatrixXd j = Eigen::MatrixXd::Identity(inputs_ + residuals_, inputs_);
-  j.bottomRows(residuals_).setZero();
-  Eigen::VectorXd r = Eigen::VectorXd::Zero(inputs_ + residuals_), residual;
+  const int residuals = has_landmarks() ? 0 : residuals_;
+  Eigen::MatrixXd j = Eigen::MatrixXd::Identity(inputs_ + residuals, inputs_);
+  j.bottomRows(residuals).setZero();
+  Eigen::VectorXd r = Eigen::VectorXd::Zero(inputs_ + residuals), residual;
   r.head(inputs_) = e;
   Eigen::MatrixXd a;
   Point point;
@@ -53,18 +54,28 @@ bool Trajectory::StepAbout(std::vector<std::vector<double>>& trajectory, const E
   for (std::size_t k = 0; k < epochs_.size(); ++k) {
     if (!FreezeEpoch(epochs_[k], e.data(), point)) return false;
     if (k < trajectory.size()) PutAbout(trajectory[k], point);
-    if (turns_) points.push_back(point);
+    if (turns_ || has_landmarks()) points.push_back(point);
     for (Factor& factor : epochs_[k].factors) {
       // What is not defined here tells nothing yet; it may be at the solution.
       if (factor.row < 0 || !FreezeFactor(factor, point)) continue;
-      if (!Residual(factor, point, residual, &a)) continue;
+      if (has_landmarks() || !Residual(factor, point, {}, residual, &a)) continue;
       const double root = std::sqrt(Weight(SensorOf(factor).loss, residual.norm()));
       r.segment(inputs_ + factor.row, residual.size()) = root * (residual + a * point.offset);
       j.middleRows(inputs_ + factor.row, residual.size()) = root * a * point.s;
     }
   }
-  step = -j.householderQr().solve(r);
+  if (has_landmarks()) {
+    Reduced reduced;
+    if (!FreezeLandmarks(points) ||
+        !Project(e.data(), points, Undefined::kSkipped, true, reduced)) {
+      return false;
+    }
+    step = -reduced.a.selfadjointView<Eigen::Lower>().llt().solve(reduced.g);
+  } else {
+    step = -j.householderQr().solve(r);
+  }
   if (!step.allFinite()) return Fail("the problem linearised about the filter has no solution");
+  if (!turns_) return true;
   trajectory.resize(points.size());
   for (std::size_t k = 0; k < points.size(); ++k) {
     const Eigen::VectorXd d = points[k].offset + points[k].s * step;

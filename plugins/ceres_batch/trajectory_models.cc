@@ -81,76 +81,131 @@ bool Trajectory::Move(const Step& step, const double* e, Point& point) const {
   return true;
 }
 
-/// y = g(x, z'), z' = z (+) L e; S_y = J_y_x S + [0  J_y_z' J_z' L  0], offset_y = J_y_x offset.
-bool Trajectory::Initialise(const First& first, const Factor& factor, const double* e,
-                            Point& point) const {
+/// y = g(x, z (+) d, prior) and its Jacobians; roles without a covariance have none.
+bool Trajectory::Invert(const Factor& factor, const Eigen::VectorXd& d, const double* prior,
+                        const Point& point, const std::string& name, Inverse& inverse) const {
   const SensorBinding& sensor = SensorOf(factor);
-  const Block& block = initial_.layout()[first.block];
-  const Geometry& measured = sensor.model.measurement().geometry;
-  const int m = measured.tangent, t = block.geometry().tangent;
-  std::vector<const double*> roles = RolesOf(sensor, point);
-  roles[static_cast<std::size_t>(sensor.model.initialised_role())] = nullptr;
+  const SensorModel& model = sensor.model;
+  const Geometry& measured = model.measurement().geometry;
+  const auto first = static_cast<std::size_t>(model.initialised_role());
+  const auto end = first + static_cast<std::size_t>(model.initialised_count());
+  int t = 0, ambient = 0;
+  for (std::size_t i = first; i < end; ++i) {
+    t += model.roles()[i].geometry.tangent;
+    ambient += model.roles()[i].geometry.ambient;
+  }
+  std::vector<const double*> roles = RolesOf(factor, point);
   std::vector<RowMajor> jacobians(roles.size());
   std::vector<double*> jx(roles.size(), nullptr);
   for (std::size_t i = 0; i < roles.size(); ++i) {
+    if (i >= first && i < end) roles[i] = nullptr;
     if (roles[i] == nullptr || !initial_.layout()[sensor.roles[i].block].has_covariance()) continue;
-    jacobians[i] = RowMajor::Zero(t, initial_.layout()[sensor.roles[i].block].geometry().tangent);
+    jacobians[i] = RowMajor::Zero(t, model.roles()[i].geometry.tangent);
     jx[i] = jacobians[i].data();
   }
-  Eigen::VectorXd d = Eigen::VectorXd::Zero(m);
-  if (factor.l.size() > 0) d = factor.l * Eigen::Map<const Eigen::VectorXd>(e + first.column, m);
-  std::vector<double> z = factor.measurement.values,
-                      y(static_cast<std::size_t>(block.geometry().ambient));
+  std::vector<double> z = factor.measurement.values;
   measured.Plus(z.data(), d.data(), z.data());
-  RowMajor jz = RowMajor::Zero(t, m);
-  const Status status =
-      sensor.model.Initialise(roles.data(), z.data(), y.data(), jx.data(), jz.data());
-  if (status != Status::kOk || !AllFinite(y) || !jz.allFinite()) {
-    return Fail("sensor '" + sensor.name + "' gives '" + block.name +
-                "' no first value: " + Why(status, sensor.model.error_text()));
+  inverse.y.resize(static_cast<std::size_t>(ambient));
+  RowMajor jz = RowMajor::Zero(t, measured.tangent), jp = RowMajor::Zero(t, model.prior_size());
+  const Status status = model.Initialise(roles.data(), z.data(), prior, inverse.y.data(), jx.data(),
+                                         jz.data(), model.prior_size() > 0 ? jp.data() : nullptr);
+  if (status != Status::kOk || !AllFinite(inverse.y) || !jz.allFinite() || !jp.allFinite()) {
+    return Fail("sensor '" + sensor.name + "' gives " + name +
+                " no first value: " + Why(status, model.error_text()));
   }
-  std::ranges::copy(y, point.x.begin() + block.value_offset);
-  if (point.s.size() == 0 || !block.has_covariance()) return true;
-  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(t, point.s.cols());
-  Eigen::VectorXd offset = Eigen::VectorXd::Zero(t);
+  inverse.by_x = Eigen::MatrixXd::Zero(t, initial_.covariance().size());
   for (std::size_t i = 0; i < roles.size(); ++i) {
     if (jx[i] == nullptr) continue;
     const int from = initial_.layout()[sensor.roles[i].block].tangent_offset;
-    rows += jacobians[i] * point.s.middleRows(from, jacobians[i].cols());
-    offset += jacobians[i] * point.offset.segment(from, jacobians[i].cols());
+    inverse.by_x.middleCols(from, jacobians[i].cols()) += jacobians[i];
   }
-  RowMajor j_plus(m, m);
+  RowMajor j_plus(measured.tangent, measured.tangent);
   measured.PlusJacobian(factor.measurement.values.data(), d.data(), j_plus.data());
-  rows.middleCols(first.column, m) = jz * j_plus * factor.l;
+  inverse.by_d = jz * j_plus;
+  inverse.by_prior = jp;
+  return true;
+}
+
+/// y = g(x, z'), z' = z (+) L e; S_y = J_y_x S + [0  J_y_z' J_z' L  0], offset_y = J_y_x offset.
+bool Trajectory::Initialise(const First& first, const Factor& factor, const double* e,
+                            Point& point) const {
+  const Block& block = initial_.layout()[first.block];
+  const int m = SensorOf(factor).model.measurement().geometry.tangent;
+  Eigen::VectorXd d = Eigen::VectorXd::Zero(m);
+  if (factor.l.size() > 0) d = factor.l * Eigen::Map<const Eigen::VectorXd>(e + first.column, m);
+  Inverse inverse;
+  if (!Invert(factor, d, nullptr, point, '\'' + block.name + '\'', inverse)) return false;
+  std::ranges::copy(inverse.y, point.x.begin() + block.value_offset);
+  if (point.s.size() == 0 || !block.has_covariance()) return true;
+  const int t = block.geometry().tangent;
+  Eigen::MatrixXd rows = inverse.by_x * point.s;
+  const Eigen::VectorXd offset = inverse.by_x * point.offset;
+  rows.middleCols(first.column, m) = inverse.by_d * factor.l;
   point.s.middleRows(block.tangent_offset, t) = rows;
   point.offset.segment(block.tangent_offset, t) = offset;
   return true;
 }
 
-/// r = L^-1 (z (-) h), m, and unless null a = dr/dx, m x n.
-bool Trajectory::Residual(const Factor& factor, const Point& point, Eigen::VectorXd& r,
-                          Eigen::MatrixXd* a) const {
+/// Known landmarks are points, whatever the form of the others.
+const SensorModel& Trajectory::ModelOf(const Factor& factor) const {
   const SensorBinding& sensor = SensorOf(factor);
-  const Geometry& geometry = sensor.model.measurement().geometry;
-  const std::vector<const double*> roles = RolesOf(sensor, point);
+  const bool known =
+      factor.landmark >= 0 && !landmarks_[static_cast<std::size_t>(factor.landmark)].first;
+  return known && sensor.xyz ? *sensor.xyz : sensor.model;
+}
+
+/// Those of a landmark have the values `y`, one after the other; null where that is empty.
+std::vector<const double*> Trajectory::RolesOf(const Factor& factor, const Point& point,
+                                               const std::vector<double>& y) const {
+  const SensorBinding& sensor = SensorOf(factor);
+  std::vector<const double*> roles;
+  const double* next = y.empty() ? nullptr : y.data();
+  for (const Space& role : ModelOf(factor).roles()) {
+    if (role.landmark()) {
+      roles.push_back(next);
+      if (next != nullptr) next += role.geometry.ambient;
+      continue;
+    }
+    const BlockId block = sensor.roles[roles.size()].block;
+    roles.push_back(block < 0 ? nullptr : point.x.data() + initial_.layout()[block].value_offset);
+  }
+  return roles;
+}
+
+/// r = L^-1 (z (-) h), m, and unless null a = dr/d(x, y), m x (n + t_y); y is the landmark's.
+bool Trajectory::Residual(const Factor& factor, const Point& point, const std::vector<double>& y,
+                          Eigen::VectorXd& r, Eigen::MatrixXd* a) const {
+  const SensorBinding& sensor = SensorOf(factor);
+  const SensorModel& model = ModelOf(factor);
+  const Geometry& geometry = model.measurement().geometry;
+  if (factor.l.size() == 0) return Fail("sensor '" + sensor.name + "' has no noise yet");
+  const std::vector<const double*> roles = RolesOf(factor, point, y);
   std::vector<RowMajor> jacobians(roles.size());
   std::vector<double*> into(roles.size(), nullptr);
-  std::vector<int> strides(roles.size(), 0);
+  std::vector<int> strides(roles.size(), 0), columns(roles.size(), -1);
+  int width = initial_.covariance().size();
   for (std::size_t i = 0; i < roles.size() && a != nullptr; ++i) {
-    const BlockId id = sensor.roles[i].block;
-    if (id < 0 || !initial_.layout()[id].has_covariance()) continue;
-    strides[i] = initial_.layout()[id].geometry().tangent;
+    const Space& role = model.roles()[i];
+    if (role.landmark()) {
+      columns[i] = width;
+      width += role.geometry.tangent;
+    } else if (const BlockId id = sensor.roles[i].block;
+               id >= 0 && initial_.layout()[id].has_covariance()) {
+      columns[i] = initial_.layout()[id].tangent_offset;
+    }
+    if (columns[i] < 0) continue;
+    strides[i] = role.geometry.tangent;
     jacobians[i] = RowMajor::Constant(geometry.tangent, strides[i], std::nan(""));
     into[i] = jacobians[i].data();
   }
   std::vector<double> h(static_cast<std::size_t>(geometry.ambient), std::nan(""));
-  const Status status =
-      a == nullptr ? sensor.model.Predict(roles.data(), h.data())
-                   : sensor.model.Linearise(roles.data(), h.data(), into.data(), strides.data());
+  const Status status = a == nullptr
+                            ? model.Predict(roles.data(), h.data())
+                            : model.Linearise(roles.data(), h.data(), into.data(), strides.data());
   if (status != Status::kOk) {
     return Fail("sensor '" + sensor.name + "' at " +
                 internal::SecondsText(factor.measurement.stamp) + ": " +
-                Why(status, sensor.model.error_text()));
+                Why(status, model.error_text()));
   }
   const double* z = factor.measurement.values.data();
   r.resize(geometry.tangent);
@@ -159,12 +214,10 @@ bool Trajectory::Residual(const Factor& factor, const Point& point, Eigen::Vecto
   whiten.solveInPlace(r);
   bool finite = r.allFinite();
   if (a != nullptr) {
-    a->setZero(geometry.tangent, initial_.covariance().size());
+    a->setZero(geometry.tangent, width);
     const Eigen::MatrixXd j_r_h = MinusJacobian(geometry, z, h.data());
     for (std::size_t i = 0; i < roles.size(); ++i) {
-      if (into[i] == nullptr) continue;
-      const Block& block = initial_.layout()[sensor.roles[i].block];
-      a->middleCols(block.tangent_offset, strides[i]) += j_r_h * jacobians[i];
+      if (into[i] != nullptr) a->middleCols(columns[i], strides[i]) += j_r_h * jacobians[i];
     }
     whiten.solveInPlace(*a);
     finite = finite && a->allFinite();
@@ -190,18 +243,19 @@ bool Trajectory::FreezeStep(Step& step, const Point& point) {
   return true;
 }
 
-bool Trajectory::FreezeFactor(Factor& factor, const Point& point) {
+bool Trajectory::FreezeFactor(Factor& factor, const Point& point, const std::vector<double>& y) {
   const SensorBinding& sensor = SensorOf(factor);
-  const int m = sensor.model.measurement().geometry.tangent;
+  const SensorModel& model = ModelOf(factor);
+  const int m = model.measurement().geometry.tangent;
   Eigen::MatrixXd r;
   if (factor.measurement.covariance.empty()) {
     RowMajor root = RowMajor::Constant(m, m, std::nan(""));
-    const Status status = sensor.model.SqrtNoise(RolesOf(sensor, point).data(),
-                                                 factor.measurement.values.data(), root.data());
+    const Status status = model.SqrtNoise(RolesOf(factor, point, y).data(),
+                                          factor.measurement.values.data(), root.data());
     if (status != Status::kOk) {
       return Fail("the noise of sensor '" + sensor.name + "' at " +
                   internal::SecondsText(factor.measurement.stamp) + ": " +
-                  Why(status, sensor.model.error_text()));
+                  Why(status, model.error_text()));
     }
     r = root * root.transpose();
   } else {

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "frozen_solve.h"
+
+#include <ceres/iteration_callback.h>
+#include <ceres/normal_prior.h>
+#include <ceres/problem.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "residuals.h"
+
+namespace alidade::ceres_batch {
+namespace {
+
+/// Ends a solve once `stop` is true.
+class StopCallback : public ceres::IterationCallback {
+ public:
+  explicit StopCallback(std::function<bool()> stop) : stop_(std::move(stop)) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
+    return stop_() ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  std::function<bool()> stop_;
+};
+
+/// phi as least squares, with the same cost, gradient g and Gauss-Newton matrix A = U' U:
+///
+///   r = (U^-T g, sqrt(2 phi - |U^-T g|^2)),   J = [U; 0]
+///
+/// Where no Jacobian is asked for, r = (0, sqrt(2 phi)).
+class ReducedCost : public ceres::CostFunction {
+ public:
+  explicit ReducedCost(Trajectory& trajectory) : trajectory_(trajectory) {
+    set_num_residuals(trajectory.inputs() + 1);
+    mutable_parameter_block_sizes()->push_back(trajectory.inputs());
+  }
+  bool Evaluate(const double* const* e, double* residuals, double** jacobians) const override {
+    const bool derivatives = jacobians != nullptr && jacobians[0] != nullptr;
+    const int n = trajectory_.inputs();
+    Trajectory::Reduced reduced;
+    if (!trajectory_.Reduce(e[0], derivatives, reduced)) return false;
+    Eigen::Map<Eigen::VectorXd> r(residuals, n);
+    r.setZero();
+    if (derivatives) {
+      const Eigen::LLT<Eigen::MatrixXd> llt(reduced.a);
+      if (llt.info() != Eigen::Success) return false;
+      r = llt.matrixL().solve(reduced.g);
+      Eigen::Map<RowMajor> j(jacobians[0], n + 1, n);
+      j.setZero();
+      j.topRows(n) = llt.matrixU();
+    }
+    residuals[n] = std::sqrt(std::max(0.0, 2.0 * reduced.cost - r.squaredNorm()));
+    return true;
+  }
+
+ private:
+  Trajectory& trajectory_;
+};
+
+}  // namespace
+
+bool IsDefined(Trajectory& trajectory, const Eigen::VectorXd& e) {
+  if (trajectory.has_landmarks()) {
+    Trajectory::Reduced unused;
+    return trajectory.Reduce(e.data(), false, unused);
+  }
+  Eigen::VectorXd r(trajectory.residuals());
+  RowMajor j(r.size(), trajectory.inputs());
+  return trajectory.Evaluate(e.data(), r.data(), j.data());
+}
+
+ceres::Solver::Summary SolveFrozen(Trajectory& trajectory, Eigen::VectorXd& e, int max_iterations,
+                                   const std::function<bool()>& stop) {
+  const Eigen::Index n = e.size();
+  Residuals residuals(trajectory, e);
+  const bool reduced = trajectory.has_landmarks();
+  ceres::Problem::Options of_problem;
+  if (!reduced) of_problem.evaluation_callback = &residuals;
+  ceres::Problem problem(of_problem);
+  if (reduced) {
+    problem.AddResidualBlock(new ReducedCost(trajectory), nullptr, e.data());
+  } else {
+    problem.AddResidualBlock(
+        new ceres::NormalPrior(Eigen::MatrixXd::Identity(n, n), Eigen::VectorXd::Zero(n)), nullptr,
+        e.data());
+    residuals.AddTo(problem, e.data());
+  }
+  ceres::Solver::Options options;
+  options.linear_solver_type = reduced ? ceres::DENSE_NORMAL_CHOLESKY : ceres::DENSE_QR;
+  options.max_num_iterations = max_iterations;
+  options.initial_trust_region_radius = 1e8;  // Gauss-Newton as long as the cost falls
+  options.function_tolerance = 1e-14;
+  options.gradient_tolerance = 1e-12;
+  options.parameter_tolerance = 1e-12;
+  options.num_threads = 1;
+  StopCallback callback(stop);
+  options.callbacks.push_back(&callback);
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  return summary;
+}
+
+bool GaussNewton(Trajectory& trajectory, const Eigen::VectorXd& e, Eigen::MatrixXd& u,
+                 Eigen::VectorXd& step) {
+  const Eigen::Index n = e.size(), m = trajectory.residuals();
+  if (trajectory.has_landmarks()) {
+    Trajectory::Reduced reduced;
+    if (!trajectory.Reduce(e.data(), true, reduced)) return false;
+    const Eigen::LLT<Eigen::MatrixXd> llt(reduced.a);
+    u = llt.matrixU();
+    step = -llt.solve(reduced.g);
+    return llt.info() == Eigen::Success;
+  }
+  RowMajor j = RowMajor::Identity(n + m, n);
+  Eigen::VectorXd r(n + m);
+  r.head(n) = e;
+  if (!trajectory.Evaluate(e.data(), r.data() + n, j.data() + n * n)) return false;
+  for (const Trajectory::Part& part : trajectory.parts()) {
+    if (part.loss.kind == LossKind::kNone) continue;
+    auto rows = r.segment(n + part.row, part.size);
+    const double root = std::sqrt(Weight(part.loss, rows.norm()));
+    rows *= root;
+    j.middleRows(n + part.row, part.size) *= root;
+  }
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(j);
+  u = qr.matrixQR().topRows(n).triangularView<Eigen::Upper>();
+  step = -qr.solve(r);
+  return true;
+}
+
+}  // namespace alidade::ceres_batch

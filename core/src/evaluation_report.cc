@@ -2,6 +2,7 @@
 #include "alidade/evaluation_report.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "comparison_table.h"
 #include "evaluation_names.h"
@@ -83,9 +84,12 @@ std::string ConsistencyText(const Evaluation& evaluation) {
   for (const InnovationStatistics& one : evaluation.innovations) {
     text += "NIS " + one.sensor + ' ' + RoundedText(one.nis_mean, 4) + " per dof, " +
             RoundedText(100.0 * one.nis_cov95, 3) + " % within 95 %, " +
-            std::to_string(one.measurements) + " measurements; autocorrelation " +
-            RoundedText(one.whiteness, 3) + ", white within " +
-            RoundedText(one.whiteness_bound, 2) + '\n';
+            std::to_string(one.measurements) + " measurements";
+    if (std::isfinite(one.whiteness)) {
+      text += "; autocorrelation " + RoundedText(one.whiteness, 3) + ", white within " +
+              RoundedText(one.whiteness_bound, 2);
+    }
+    text += '\n';
   }
   return text;
 }

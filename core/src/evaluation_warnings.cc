@@ -164,12 +164,12 @@ class Warnings {
     if (as_is.spread_deg > kBodyTurnDeg && other < kClearly * as_is.spread_deg) {
       const Trajectory& wrong = of_estimate ? whole_estimate_ : whole_reference_;
       const bool w_first = wrong.format == TrajectoryFormat::kEuroc;
-      warnings_.push_back(ErrorLine({wrong.name, wrong.first_line, 0}, {},
-                                    "the orientations fit to " + RoundedText(other, 3) +
-                                        " deg if quaternions are read w " +
-                                        (w_first ? "last, to " : "first, to ") +
-                                        RoundedText(as_is.spread_deg, 3) + " deg as they are",
-                                    w_first ? "qw qx qy qz" : "qx qy qz qw"));
+      warnings_.push_back(
+          ErrorLine({wrong.name, wrong.first_line, 0}, {},
+                    "the orientations fit to " + internal::FixedText(other, 1) +
+                        " deg if quaternions are read w " + (w_first ? "last, to " : "first, to ") +
+                        internal::FixedText(as_is.spread_deg, 1) + " deg as they are",
+                    w_first ? "qw qx qy qz" : "qx qy qz qw"));
     } else if (as_is.turn_deg > kBodyTurnDeg && as_is.spread_deg < kClearly * as_is.turn_deg) {
       Warn("its orientations are turned by " + RoundedText(as_is.turn_deg, 4) +
                " deg, the same for all poses: looks like another body frame",

@@ -41,13 +41,16 @@ void AddWhiteness(const std::string& landmark, const std::vector<double>& r, Sen
   last = r;
 }
 
-void AddRow(const NumberRows& rows, const Columns& at, SensorSums& sums) {
+void AddRow(const NumberRows& rows, const Columns& at, std::map<std::int64_t, double>& limits,
+            SensorSums& sums) {
   const std::int64_t dof = rows.Index(at.dof, "dof");
   const double nis = rows.Number(at.nis, "nis");
   if (dof < 1) rows.FailCell(at.dof, "dof", "is no number of elements", "1 or more");
   ++sums.measurements;
   sums.nis += nis / static_cast<double>(dof);
-  sums.inside += nis <= ChiSquareQuantile(0.95, static_cast<int>(dof)) ? 1 : 0;
+  const auto [limit, is_new] = limits.try_emplace(dof, 0.0);
+  if (is_new) limit->second = ChiSquareQuantile(0.95, static_cast<int>(dof));
+  sums.inside += nis <= limit->second ? 1 : 0;
   std::vector<double> r;
   for (std::size_t k = 0; k < static_cast<std::size_t>(dof); ++k) {
     if (std::max(at.s0, at.r0) + k >= rows.size())
@@ -79,10 +82,11 @@ std::vector<InnovationStatistics> ReadInnovations(const std::filesystem::path& f
                    Find(rows, "dof"),    Find(rows, "nis"),      Find(rows, "s0"),
                    Find(rows, "r0")};
   std::map<std::string, SensorSums> sensors;
+  std::map<std::int64_t, double> limits;  // chi2(0.95, dof)
   while (rows.Next()) {
     rows.ExpectColumns(width, "as in the header");
-    if (rows.text(at.outcome) != "accepted") continue;
-    AddRow(rows, at, sensors[std::string(rows.text(at.sensor))]);
+    if (rows.text(at.outcome) != "accepted" || rows.text(at.nis).empty()) continue;
+    AddRow(rows, at, limits, sensors[std::string(rows.text(at.sensor))]);
   }
   std::vector<InnovationStatistics> statistics;
   for (const auto& [sensor, sums] : sensors) statistics.push_back(Finish(sensor, sums));

@@ -18,9 +18,7 @@ using Pairs = std::vector<std::pair<int, int>>;
 
 constexpr double kPi = 3.14159265358979323846;
 
-Similarity Known() {
-  return {2.5, Turn(1.1).toRotationMatrix(), Vector3d(10.0, -20.0, 3.0)};
-}
+Similarity Known() { return {2.5, Turn(1.1).toRotationMatrix(), Vector3d(10.0, -20.0, 3.0)}; }
 
 void ExpectSame(const Similarity& found, const Similarity& known) {
   EXPECT_NEAR(found.scale, known.scale, 1e-12);
@@ -61,16 +59,16 @@ TEST(Align, OfPathsThatDifferNothingNearbyFitsBetter) {
         EXPECT_GT(SquaredError(near, reference, estimate), least);
         near = best;
         near.rotation = Eigen::AngleAxisd(step, Vector3d::Unit(axis)) * best.rotation;
-        near.translation += reference.positions.rowwise().mean() -
-                            (near * estimate).positions.rowwise().mean();
+        near.translation +=
+            reference.positions.rowwise().mean() - (near * estimate).positions.rowwise().mean();
         if (alignment == Alignment::kYaw && axis < 2) continue;
         EXPECT_GT(SquaredError(near, reference, estimate), least);
       }
       if (alignment != Alignment::kSim3) continue;
       Similarity near = best;
       near.scale += step;
-      near.translation += reference.positions.rowwise().mean() -
-                          (near * estimate).positions.rowwise().mean();
+      near.translation +=
+          reference.positions.rowwise().mean() - (near * estimate).positions.rowwise().mean();
       EXPECT_GT(SquaredError(near, reference, estimate), least);
     }
   }
@@ -252,7 +250,7 @@ TEST(PairsOf, AreDeltaApartInEachUnit) {
   EXPECT_EQ(PairsOf(t, {4.0, DeltaUnit::kFrames}), (Pairs{{0, 4}, {4, 8}}));
   EXPECT_EQ(PairsOf(t, {8.0, DeltaUnit::kFrames, true}), (Pairs{{0, 8}, {1, 9}, {2, 10}}));
   EXPECT_EQ(PairsOf(t, {1.9, DeltaUnit::kMetres}), (Pairs{{4, 8}}));
-  EXPECT_EQ(PairsOf(t, {4.4, DeltaUnit::kMetres, true}), (Pairs{{0, 9}, {1, 10}}));
+  EXPECT_EQ(PairsOf(t, {4.4, DeltaUnit::kMetres, true, 0.05}), (Pairs{{0, 9}, {1, 10}}));
   EXPECT_EQ(PairsOf(t, {0.45, DeltaUnit::kSeconds}), (Pairs{{0, 5}, {5, 10}}));
   EXPECT_EQ(PairsOf(t, {0.95, DeltaUnit::kSeconds, true}), (Pairs{{0, 9}, {1, 10}}));
   EXPECT_EQ(PairsOf(t, {0.45, DeltaUnit::kRadians}), (Pairs{{0, 5}, {5, 10}}));
@@ -305,9 +303,8 @@ TEST(Evaluate, NeesIsWithheldOfAnAlignedEstimate) {
     options.alignment = alignment;
     const Evaluation e = Evaluate(Curve(40), estimate, options);
     EXPECT_FALSE(e.position_nees || e.orientation_nees);
-    EXPECT_EQ(e.nees_withheld,
-              std::string("the alignment by ") + ToString(alignment) +
-                  " takes errors away that the covariance is of; --align none");
+    EXPECT_EQ(e.nees_withheld, std::string("the alignment by ") + ToString(alignment) +
+                                   " takes errors away that the covariance is of; --align none");
   }
 }
 

@@ -59,8 +59,8 @@ TEST_F(TrajectoryFiles, TumIsReadExactlyWhateverTheLineEnds) {
       "1311868164 4 5 6 0 0 -1.0005 0");
   EXPECT_EQ(t.format, TrajectoryFormat::kTum);
   ASSERT_EQ(t.size(), 3);
-  EXPECT_EQ(t.stamps, (std::vector<Stamp>{1311868163869700001, 1311868163900000000,
-                                          1311868164000000000}));
+  EXPECT_EQ(t.stamps,
+            (std::vector<Stamp>{1311868163869700001, 1311868163900000000, 1311868164000000000}));
   EXPECT_EQ(t.positions.col(0), Vector3d(-0.5, 0.1, 2.0));
   EXPECT_EQ(t.positions.col(1), Vector3d(1, 2, 3));
   EXPECT_TRUE(t.orientations[1].isApprox(Eigen::Quaterniond(0.8, 0.6, 0, 0), 1e-15));
@@ -170,8 +170,7 @@ TEST_F(TrajectoryFiles, StampsThatCannotBeSecondsAreReadAsWhatTheyLookLike) {
 }
 
 TEST_F(TrajectoryFiles, StampsOutOfOrderAreSortedAndToldOf) {
-  const std::string text =
-      "1 1 0 0 0 0 0 1\n3 3 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n4 4 0 0 0 0 0 1\n";
+  const std::string text = "1 1 0 0 0 0 0 1\n3 3 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n4 4 0 0 0 0 0 1\n";
   EXPECT_EQ(WarningsOf(text),
             "poses.txt:3 t: goes back: 2.000000 s; expected poses in the order of their stamps; "
             "they are sorted\n");
@@ -181,8 +180,7 @@ TEST_F(TrajectoryFiles, StampsOutOfOrderAreSortedAndToldOf) {
 }
 
 TEST_F(TrajectoryFiles, OfAStampThatIsThereTwiceTheFirstPoseIsTaken) {
-  const std::string text =
-      "1 1 0 0 0 0 0 1\n1 9 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n";
+  const std::string text = "1 1 0 0 0 0 0 1\n1 9 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n";
   EXPECT_EQ(WarningsOf(text),
             "poses.txt:2 t: 1.000000 s is there already, as are 1 more; expected each stamp once; "
             "the first is taken\n");
@@ -201,10 +199,10 @@ TEST_F(TrajectoryFiles, AFirstPoseThatIsTheIdentityInTheOtherOrderIsToldOf) {
 }
 
 TEST_F(TrajectoryFiles, AFolderIsARunAnEstimatorOrASequenceOfEuroc) {
-  for (const char* name : {"run/truth.tum", "run/ekf/trajectory.tum",
-                           "run/ekf/trajectory_covariance.tum", "run/ekf/innovations.csv",
-                           "run/batch/trajectory.tum", "run/figures/a.svg",
-                           "euroc/mav0/state_groundtruth_estimate0/data.csv"}) {
+  for (const char* name :
+       {"run/truth.tum", "run/ekf/trajectory.tum", "run/ekf/trajectory_covariance.tum",
+        "run/ekf/innovations.csv", "run/batch/trajectory.tum", "run/figures/a.svg",
+        "euroc/mav0/state_groundtruth_estimate0/data.csv"}) {
     Write(name, "");
   }
   EXPECT_EQ(ReferenceAt(folder_ / "run").file, folder_ / "run/truth.tum");

@@ -184,10 +184,16 @@ std::string SummaryText(const std::vector<Evaluation>& evaluations) {
   return internal::EstimatorTable(names, rows) + '\n' + SharedText(evaluations) + '\n';
 }
 
+std::string MarkdownQuoted(const std::string& text) {
+  std::string quoted;
+  for (const char c : text) quoted += c == '|' ? std::string("\\|") : std::string(1, c);
+  return quoted;
+}
+
 std::string LatexQuoted(const std::string& text) {
   std::string quoted;
   for (const char c : text) {
-    if (std::string_view("_%&#$").find(c) != std::string_view::npos) quoted += '\\';
+    if (std::string_view("_%&#${}").find(c) != std::string_view::npos) quoted += '\\';
     quoted += c;
   }
   return quoted;
@@ -278,7 +284,9 @@ std::string EvaluationMarkdown(const std::vector<Evaluation>& evaluations) {
   std::string text;
   for (const internal::TextRow& row : SummaryRows(evaluations)) {
     const bool header = text.empty();
-    text += "| " + internal::Join(row, " | ") + " |\n";
+    text += '|';
+    for (const std::string& cell : row) text += ' ' + MarkdownQuoted(cell) + " |";
+    text += '\n';
     if (!header) continue;
     text += '|';
     for (std::size_t c = 0; c < row.size(); ++c) text += c < 2 ? "---|" : "---:|";

@@ -82,7 +82,11 @@ class Warnings {
     CheckWorld();
     const bool turned =
         SpansAPlane(reference.positions) && SpansAPlane(evaluation_.estimate.positions);
-    if (turned) CheckOrientations(sim3);
+    if (turned) {
+      CheckOrientations(sim3);
+    } else {
+      CheckLine();
+    }
     return warnings_;
   }
 
@@ -149,6 +153,14 @@ class Warnings {
     Warn("not aligned, the error is " + RoundedText(as_is, 4) + " m, and " +
              RoundedText(aligned, 4) + " m by se3: looks like another world frame",
          "--align se3");
+  }
+
+  void CheckLine() {
+    const Alignment alignment = evaluation_.options.alignment;
+    if (alignment != Alignment::kSe3 && alignment != Alignment::kSim3) return;
+    Warn(std::string("its positions, or the reference's, lie on a line: the turn about it by ") +
+             ToString(alignment) + " is arbitrary, and so are errors of orientation",
+         "--align none, origin or yaw for those");
   }
 
   void CheckOrientations(const Similarity& sim3) {

@@ -56,6 +56,12 @@ TEST(EvaluationReport, EveryTableSaysWhatItsFiguresDependOn) {
   }
 }
 
+TEST(EvaluationReport, NamesAreQuotedWhereTheFormAsksForIt) {
+  const std::vector<Evaluation> one = {Moved(Alignment::kNone, "a|b_{c}")};
+  EXPECT_NE(EvaluationMarkdown(one).find("| a\\|b_{c} |"), std::string::npos);
+  EXPECT_NE(EvaluationLatex(one).find("\na|b\\_\\{c\\} & none"), std::string::npos);
+}
+
 TEST(EvaluationReport, JsonHasAllOfIt) {
   Evaluation evaluation = Moved(Alignment::kNone, "a");
   evaluation.innovations = {{"pixels", 100, 0.9, 0.96, 0.01, 0.02}};

@@ -115,6 +115,17 @@ TEST(EvaluationWarnings, OrientationsTurnedAllAlikeAreOfAnotherBody) {
       << warnings;
 }
 
+TEST(EvaluationWarnings, PositionsOnALineDetermineNoTurnAboutIt) {
+  Trajectory estimate = testing::Line(60, 0.5);
+  estimate.positions.row(1) = 1e-4 * estimate.positions.row(0).array().sin();
+  estimate.name = "estimate.tum";
+  EXPECT_EQ(WarningsOf(testing::Line(60, 0.5), estimate, Aligned(Alignment::kSe3)),
+            "estimate.tum: its positions, or the reference's, lie on a line: the turn about it by "
+            "se3 is arbitrary, and so are errors of orientation; expected --align none, origin or "
+            "yaw for those\n");
+  EXPECT_EQ(WarningsOf(testing::Line(60, 0.5), estimate, Aligned(Alignment::kYaw)), "");
+}
+
 TEST(EvaluationWarnings, QuaternionsInTheOtherOrderAreToldOfWithTheirFile) {
   Trajectory estimate = Estimate(Curve(60));
   Trajectory swapped = estimate;

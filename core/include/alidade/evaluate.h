@@ -56,7 +56,7 @@ struct Matches {
 Matches Associate(const Trajectory& reference, const Trajectory& estimate, Stamp max_diff,
                   Stamp offset);
 
-/// What of the error pose E is taken: of E = est^-1 ref absolutely, and of
+/// What of the error pose E is taken [Sturm2012]: of E = est^-1 ref absolutely, and of
 /// E = (ref_i^-1 ref_j)^-1 (est_i^-1 est_j) relatively. t its translation, R its rotation.
 enum class PoseRelation {
   kTranslation,    ///< |t|, m

@@ -98,6 +98,7 @@ class NumberRows {
   /// Columns 1 to 7 of a trajectory in the form of TUM, whose first is t, s.
   static constexpr std::array<const char*, 7> kTumPose = {"x", "y", "z", "qx", "qy", "qz", "qw"};
 
+  /// Of column i, called `name`.
   [[noreturn]] void FailCell(std::size_t i, const char* name, const std::string& what,
                              std::string_view expected) const {
     Fail(Column(i), name, '\'' + cell::Harmless(text(i)) + "' " + what, expected);

@@ -26,6 +26,7 @@ void AddSweep(CLI::App& program, Action& action);
 void AddSimulate(CLI::App& program, Action& action);
 void AddPlugins(CLI::App& program, Action& action);
 void AddCheck(CLI::App& program, Action& action);
+void AddEval(CLI::App& program, Action& action);
 void AddDoctor(CLI::App& program, Action& action);
 
 /// Arguments that name a config and the plugins it needs.

@@ -17,6 +17,7 @@ constexpr const char* kFooter = R"(Examples:
   alidade explain examples/05_depth_principled/config.yaml
   alidade run examples/05_depth_principled/config.yaml -o runs/first
   alidade sweep examples/05_depth_principled/config.yaml --runs 200
+  alidade eval runs/slam runs/slam                 trajectories against truth: ATE, RPE, NEES
 
 `alidade COMMAND --help` tells the rest. Exit codes: 0 ok, 1 something found wrong, 2 usage,
 65 bad data, 66 input missing, 69 plugin missing or refused, 70 internal, 73 cannot create output,
@@ -59,6 +60,7 @@ void Describe(CLI::App& program, Action& action, const std::string& command_line
   AddExplain(program, action);
   AddPlugins(program, action);
   AddCheck(program, action);
+  AddEval(program, action);
   AddDoctor(program, action);
   const auto polish = [](const auto& self, CLI::App& app) -> void {
     app.get_help_ptr()->description("print this help and leave");

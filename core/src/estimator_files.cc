@@ -37,10 +37,26 @@ EstimatorFiles::EstimatorFiles(const RunFolder& folder, const NamedEstimator& na
       innovations_(folder, named.name + "/innovations.csv", InnovationsHeader()),
       gains_(folder, named.name + "/gains.csv", GainsHeader(named.system)) {
   FindPath(named.system);
+  OpenTrajectory(folder, named.system);
   if (std::ranges::any_of(named.system.sensors, HasReprojection)) {
     reprojection_.emplace(folder, named.name + "/reprojection.csv",
                           std::vector<std::string>{"t_s", "sensor", "landmarks", "rms"});
   }
+}
+
+void EstimatorFiles::OpenTrajectory(const RunFolder& folder, const System& system) {
+  std::vector<StreamInfo> blocks;
+  for (const Block& block : system.layout.blocks()) {
+    blocks.push_back({block.name, block.geometry().ambient});
+  }
+  pose_ = FindPose(blocks);
+  if (!pose_) return;
+  trajectory_.emplace(folder, recorded_.name + "/trajectory.tum");
+  const auto fixed = [&](std::size_t id) {
+    return system.layout.blocks()[id].status == BlockStatus::kFixed;
+  };
+  if (fixed(pose_->position) || fixed(pose_->orientation)) return;
+  trajectory_covariance_.emplace(folder, recorded_.name + "/trajectory_covariance.tum", true);
 }
 
 void EstimatorFiles::FindPath(const System& system) {
@@ -112,7 +128,10 @@ std::vector<std::string> EstimatorFiles::GainsHeader(const System& system) {
 }
 
 void EstimatorFiles::Add(const Frame& frame, const State& state, const UpdateReport& report) {
-  if (!report.stale) AddEstimate(frame, state);
+  if (!report.stale) {
+    AddEstimate(frame, state);
+    if (pose_) AddPose(frame.stamp, state);
+  }
   for (const MeasurementReport& one : report.measurements()) {
     if (one.sensor < 0 || one.sensor >= static_cast<int>(recorded_.sensors.size())) continue;
     AddInnovation(frame.stamp, one);
@@ -159,6 +178,21 @@ void EstimatorFiles::AddEstimate(const Frame& frame, const State& state) {
     }
   }
   estimates_.EndRow();
+}
+
+void EstimatorFiles::AddPose(Stamp stamp, const State& state) {
+  const auto position = static_cast<BlockId>(pose_->position);
+  const auto orientation = static_cast<BlockId>(pose_->orientation);
+  const Block& at = state.layout()[position];
+  const Block& turned = state.layout()[orientation];
+  if (!at.present || !turned.present) return;
+  trajectory_->Add(stamp, state.value(position), state.value(orientation));
+  if (!trajectory_covariance_ || !at.has_covariance() || !turned.has_covariance()) return;
+  const auto covariance = [&](const Block& block) {
+    return state.covariance().Block(block.tangent_offset, 3, block.tangent_offset, 3);
+  };
+  trajectory_covariance_->Add(stamp, state.value(position), state.value(orientation),
+                              covariance(at), covariance(turned));
 }
 
 void EstimatorFiles::AddInnovation(Stamp stamp, const MeasurementReport& report) {
@@ -272,6 +306,8 @@ void EstimatorFiles::Close() {
   estimates_.Close();
   innovations_.Close();
   gains_.Close();
+  if (trajectory_) trajectory_->Close();
+  if (trajectory_covariance_) trajectory_covariance_->Close();
   if (reprojection_) {
     reprojection_->Close();
     recorded_.reprojection_rows = reprojection_->rows();

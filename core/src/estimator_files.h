@@ -6,12 +6,14 @@
 
 #include "alidade/run.h"
 #include "csv_file.h"
+#include "pose_file.h"
 #include "recorded.h"
 
 namespace alidade::internal {
 
 /// The files of one estimator that grow frame by frame: `estimates.csv`, `innovations.csv`,
-/// `gains.csv` and, of sensors of landmarks, `reprojection.csv`. They hold the blocks and sensors
+/// `gains.csv`, of sensors of landmarks `reprojection.csv`, and of blocks X.position and
+/// X.orientation `trajectory.tum`, with a covariance `trajectory_covariance.tum`. They hold the blocks and sensors
 /// that the system has from the start.
 class EstimatorFiles {
  public:
@@ -42,7 +44,9 @@ class EstimatorFiles {
   std::vector<std::string> GainsHeader(const System& system);
   /// The position that landmarks are seen from, among the elements.
   void FindPath(const System& system);
+  void OpenTrajectory(const RunFolder& folder, const System& system);
   void AddEstimate(const Frame& frame, const State& state);
+  void AddPose(Stamp stamp, const State& state);
   void AddInnovation(Stamp stamp, const MeasurementReport& report);
   void AddGain(Stamp stamp, const State& state, const MeasurementReport& report);
 
@@ -51,6 +55,8 @@ class EstimatorFiles {
   std::size_t gain_columns_ = 0;
   CsvFile estimates_, innovations_, gains_;
   std::optional<CsvFile> reprojection_;
+  std::optional<PosePlace> pose_;  ///< among the blocks
+  std::optional<PoseFile> trajectory_, trajectory_covariance_;
 };
 
 /// What a figure of the map has to know.

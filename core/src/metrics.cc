@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/metrics.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,6 +11,7 @@
 #include "columns.h"
 #include "frame_innovation.h"
 #include "lag_series.h"
+#include "mahalanobis.h"
 #include "names.h"
 #include "number_text.h"
 
@@ -67,20 +67,6 @@ struct Owner {
   std::string name;
   std::vector<std::size_t> tracked;
 };
-
-/// e' P^-1 e, or -1 where P is singular or not finite. P is scaled to unit variances first, so that
-/// singular means the same in any unit.
-double SquaredMahalanobis(const Eigen::MatrixXd& p, const Eigen::VectorXd& error) {
-  constexpr double kSingular = 1e-13;
-  const Eigen::VectorXd sigma = p.diagonal().cwiseSqrt();
-  if (!p.allFinite() || !error.allFinite() || !(sigma.minCoeff() > 0.0)) return -1.0;
-  const Eigen::VectorXd scale = sigma.cwiseInverse();
-  const Eigen::LDLT<Eigen::MatrixXd> ldlt(scale.asDiagonal() * p * scale.asDiagonal());
-  if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > kSingular)) return -1.0;
-  const Eigen::VectorXd scaled = scale.cwiseProduct(error);
-  const double squared = scaled.dot(ldlt.solve(scaled));
-  return std::isfinite(squared) ? squared : -1.0;
-}
 
 }  // namespace
 
@@ -227,7 +213,7 @@ void Metrics::Impl::AddNees(const Owner& owner, std::size_t index, const std::ve
     p.diagonal().segment(row, rows).array() += tracked[i].truth_variance;
     row += rows;
   }
-  const double nees = SquaredMahalanobis(p, error);
+  const double nees = internal::SquaredMahalanobis(p, error);
   if (nees < 0.0) return;
   const auto [bound, is_new] = quantiles.try_emplace(dof, 0.0);
   if (is_new) bound->second = ChiSquareQuantile(0.95, dof);

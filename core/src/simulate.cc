@@ -11,13 +11,12 @@
 #include "alidade/pictures.h"
 #include "columns.h"
 #include "csv_file.h"
-#include "number_text.h"
+#include "pose_file.h"
 
 namespace alidade {
 namespace {
 
 using internal::CsvFile;
-using internal::OutputFile;
 using internal::RunFolder;
 
 std::unique_ptr<Source> MakeSource(const Config& config, const PluginHost& host) {
@@ -40,25 +39,11 @@ std::vector<std::string> ColumnsOf(const StreamInfo& stream) {
   return internal::NumberedNames(stream.name, static_cast<std::size_t>(stream.size));
 }
 
-/// Indices of a truth X.position and X.orientation; none where there is no such pair.
-std::optional<std::pair<std::size_t, std::size_t>> FindPose(const std::vector<StreamInfo>& truths) {
-  constexpr std::string_view kPosition = ".position";
-  for (std::size_t p = 0; p < truths.size(); ++p) {
-    const std::string& name = truths[p].name;
-    if (truths[p].size != 3 || !name.ends_with(kPosition)) continue;
-    const std::string other = name.substr(0, name.size() - kPosition.size()) + ".orientation";
-    for (std::size_t q = 0; q < truths.size(); ++q) {
-      if (truths[q].size == 4 && truths[q].name == other) return std::pair(p, q);
-    }
-  }
-  return std::nullopt;
-}
-
 /// The files of one simulation.
 class DataFiles {
  public:
   DataFiles(const RunFolder& folder, const Source& source)
-      : folder_(folder), source_(source), pose_(FindPose(source.truths())) {
+      : folder_(folder), source_(source), pose_(internal::FindPose(source.truths())) {
     streams_.resize(source.streams().size());
     OpenCsv(times_, "timestamps.csv", {"frame", "t_s"});
     if (source.truths().empty()) return;
@@ -69,9 +54,8 @@ class DataFiles {
     }
     OpenCsv(truth_, "truth.csv", header);
     if (!pose_) return;
-    tum_ = folder.Create("truth.tum");
+    tum_.emplace(folder, "truth.tum");
     names_.insert("truth.tum");
-    tum_->Write("# t x y z qx qy qz qw\n");
   }
 
   void Add(std::int64_t number, const Frame& frame) {
@@ -85,7 +69,7 @@ class DataFiles {
       truth_->Numbers(known ? frame.truth[i].data() : nullptr, known ? size : 0, size);
     }
     truth_->EndRow();
-    if (pose_) AddPose(frame);
+    if (pose_) tum_->AddTruth(frame, *pose_);
   }
 
   void Close() {
@@ -133,20 +117,6 @@ class DataFiles {
     }
   }
 
-  void AddPose(const Frame& frame) {
-    if (frame.truth.size() <= std::max(pose_->first, pose_->second)) return;
-    const std::vector<double>& r = frame.truth[pose_->first];
-    const std::vector<double>& q = frame.truth[pose_->second];
-    if (r.empty() || q.empty()) return;
-    std::string line;
-    internal::AppendSeconds(line, frame.stamp);
-    for (const double value : {r[0], r[1], r[2], q[1], q[2], q[3], q[0]}) {
-      line += ' ';
-      internal::AppendNumber(line, value);
-    }
-    tum_->Write(line + '\n');
-  }
-
   void WriteMap() {
     std::optional<CsvFile> map;
     for (const std::int64_t id : seen_) {
@@ -160,10 +130,10 @@ class DataFiles {
 
   const RunFolder& folder_;
   const Source& source_;
-  std::optional<std::pair<std::size_t, std::size_t>> pose_;
+  std::optional<internal::PosePlace> pose_;
   std::optional<CsvFile> times_, truth_;
   std::vector<std::optional<CsvFile>> streams_;
-  std::unique_ptr<OutputFile> tum_;
+  std::optional<internal::PoseFile> tum_;
   std::set<std::int64_t> seen_;
   std::set<std::string> names_;
 };

@@ -113,6 +113,8 @@ SourceFiles::SourceFiles(const RunFolder& folder, const Experiment& experiment)
     for (const auto& names : truth_columns_)
       header.insert(header.end(), names.begin(), names.end());
     truth_.emplace(folder, "truth.csv", header);
+    pose_ = FindPose(truths_);
+    if (pose_) poses_.emplace(folder, "truth.tum");
   }
   FindInverses(experiment);
   if (!expectations_.empty()) {
@@ -168,6 +170,7 @@ void SourceFiles::Add(const Frame& frame) {
     AddImplied(frame, m);
   }
   if (!truth_) return;
+  if (poses_) poses_->AddTruth(frame, *pose_);
   truth_->Time(frame.stamp);
   for (std::size_t t = 0; t < truths_.size(); ++t) {
     const auto size = static_cast<std::size_t>(truths_[t].size);
@@ -220,6 +223,7 @@ void SourceFiles::AddImplied(const Frame& frame, const Measurement& m) {
 void SourceFiles::Close() {
   measurements_->Close();
   if (truth_) truth_->Close();
+  if (poses_) poses_->Close();
   if (expected_) expected_->Close();
   if (implied_) implied_->Close();
 }

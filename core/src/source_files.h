@@ -7,6 +7,7 @@
 
 #include "alidade/run.h"
 #include "csv_file.h"
+#include "pose_file.h"
 #include "recorded.h"
 
 namespace alidade::internal {
@@ -52,6 +53,8 @@ class SourceFiles {
   std::size_t width_ = 1, blocks_ = 0;
   Stamp first_ = kNoStamp, last_ = kNoStamp;
   std::optional<CsvFile> measurements_, truth_, expected_, implied_;
+  std::optional<PosePlace> pose_;  ///< among the truths
+  std::optional<PoseFile> poses_;
 };
 
 }  // namespace alidade::internal

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "alidade/geometry.h"
-#include "number_rows.h"
+#include "alidade/number_rows.h"
 
 /// The files beside a file of tracks, read along with it.
 namespace alidade {
@@ -171,16 +171,7 @@ class TumRows {
       rows_.FailCell(0, "t", "is not after that of line " + std::to_string(line_before),
                      "times that increase");
     }
-    constexpr const char* kNames[] = {"x", "y", "z", "qx", "qy", "qz", "qw"};
-    double values[7], length2 = 0.0;
-    for (std::size_t i = 0; i < 7; ++i) {
-      values[i] = rows_.Number(i + 1, kNames[i]);
-      if (i >= 3) length2 += values[i] * values[i];
-    }
-    if (!(std::abs(std::sqrt(length2) - 1.0) <= 1e-3)) {
-      rows_.FailLine("quaternion of length " + std::to_string(std::sqrt(length2)),
-                     "length 1 to 1e-3");
-    }
+    const std::array<double, 7> values = rows_.PoseNumbers(NumberRows::kTumPose);
     pose_ = {{values[0], values[1], values[2]}, {values[6], values[3], values[4], values[5]}};
   }
 

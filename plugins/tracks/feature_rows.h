@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "number_rows.h"
+#include "alidade/number_rows.h"
 
 namespace alidade {
 

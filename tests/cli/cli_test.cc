@@ -15,7 +15,7 @@ TEST_F(Cli, HelpNamesEveryCommandAndExitsWithZero) {
   const Outcome help = Call({"--help"});
   EXPECT_EQ(help.code, 0);
   EXPECT_EQ(help.err, "");
-  for (const char* command : {"run", "explain", "sweep", "plugins", "doctor"}) {
+  for (const char* command : {"run", "explain", "sweep", "plugins", "eval", "doctor"}) {
     EXPECT_TRUE(Contains(help.out, std::string("\n  ") + command + ' ')) << command;
     const Outcome one = Call({command, "--help"});
     EXPECT_EQ(one.code, 0) << command;

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -20,13 +22,17 @@ namespace alidade {
 /// Errors       kBadData with file, line and column; those of LineReader.
 class NumberRows {
  public:
-  /// `separator` ' ': any blanks.
+  static constexpr char kCommaOrBlanks = '\0';
+
+  /// `separator` ' ': any blanks; kCommaOrBlanks: commas in a row that has one, else blanks.
   NumberRows(const std::filesystem::path& path, const Place& place, const std::string& key,
              char separator = ',')
       : reader_(path, place, key), separator_(separator) {}
 
   const std::string& name() const { return reader_.name(); }
   int line() const { return reader_.number(); }
+  /// The row's cells stand between commas.
+  bool has_commas() const { return line_.find(',') != std::string_view::npos; }
   std::size_t size() const { return cells_.size(); }
   std::string_view text(std::size_t i) const { return cell::Trim(cells_[i]); }
 
@@ -78,6 +84,21 @@ class NumberRows {
     return cell::ParseStamp(text(i), t_s, 9);
   }
 
+  /// x y z and a quaternion of unit length to 1e-3, of columns 1 to 7, `names` those of the columns.
+  std::array<double, 7> PoseNumbers(const std::array<const char*, 7>& names) const {
+    std::array<double, 7> values{};
+    double length2 = 0.0;
+    for (std::size_t i = 0; i < 7; ++i) {
+      values[i] = Number(i + 1, names[i]);
+      if (i >= 3) length2 += values[i] * values[i];
+    }
+    if (std::abs(std::sqrt(length2) - 1.0) <= 1e-3) return values;
+    FailLine("quaternion of length " + std::to_string(std::sqrt(length2)), "length 1 to 1e-3");
+  }
+  /// Columns 1 to 7 of a trajectory in the form of TUM, whose first is t, s.
+  static constexpr std::array<const char*, 7> kTumPose = {"x", "y", "z", "qx", "qy", "qz", "qw"};
+
+  /// Of column i, called `name`.
   [[noreturn]] void FailCell(std::size_t i, const char* name, const std::string& what,
                              std::string_view expected) const {
     Fail(Column(i), name, '\'' + cell::Harmless(text(i)) + "' " + what, expected);
@@ -90,9 +111,11 @@ class NumberRows {
  private:
   void Split() {
     cells_.clear();
-    if (separator_ != ' ') {
+    const char rows = has_commas() ? ',' : ' ';
+    const char separator = separator_ == kCommaOrBlanks ? rows : separator_;
+    if (separator != ' ') {
       for (std::string_view rest = line_;;) {
-        const std::size_t end = std::min(rest.find(separator_), rest.size());
+        const std::size_t end = std::min(rest.find(separator), rest.size());
         cells_.push_back(rest.substr(0, end));
         if (end == rest.size()) return;
         rest.remove_prefix(end + 1);

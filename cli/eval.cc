@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+
+#include "alidade/evaluation_report.h"
+#include "command.h"
+#include "console.h"
+
+namespace alidade::cli {
+namespace {
+
+constexpr const char* kFooter = R"(Examples:
+  alidade eval truth.tum estimate.tum -a           ATE and RPE after se3 alignment
+  alidade eval truth.tum mono.tum -as              and scale, as a single camera needs it
+  alidade eval runs/slam runs/slam                 all estimators of a run against its truth
+  alidade eval KITTI_00_gt.txt KITTI_00_orb.txt -a -d 100 -u m --all_pairs
+  alidade eval truth.tum a.tum b.tum -a --markdown
+
+Files: TUM (8 columns, or 20 with covariances), KITTI (12, times.txt beside), EuRoC (csv). A folder
+is a run, an estimator in one, or a sequence of EuRoC. Warnings go to standard error.)";
+
+enum class Form { kText, kJson, kMarkdown, kLatex };
+
+struct Arguments {
+  std::string reference;
+  std::vector<std::string> estimates;
+  TrajectoryFormat format = TrajectoryFormat::kDetect;
+  EvaluateOptions options;
+  bool se3 = false, scale = false, origin = false;
+  double max_diff_s = 0.01, offset_s = 0.0;
+  std::string save_absolute, save_relative;
+  Form form = Form::kText;
+  bool force = false, quiet = false;
+};
+
+/// The names of the values of an enumeration, with which a command line gives them.
+template <class T>
+std::map<std::string, T> ByName(std::initializer_list<T> values) {
+  std::map<std::string, T> names;
+  for (const T value : values) names.emplace(ToString(value), value);
+  return names;
+}
+
+/// What -a, -s and --align_origin mean beside --align.
+Alignment Chosen(const Arguments& arguments) {
+  if (arguments.origin) return Alignment::kOrigin;
+  if (arguments.se3) return arguments.scale ? Alignment::kSim3 : Alignment::kSe3;
+  return arguments.scale ? Alignment::kScale : arguments.options.alignment;
+}
+
+void WarnOf(const std::vector<std::string>& warnings, const Arguments& arguments) {
+  if (arguments.quiet) return;
+  for (const std::string& warning : warnings) PrintNote("warning: " + warning);
+}
+
+Evaluation EvaluateFile(const Trajectory& reference, const TrajectoryFile& file,
+                        const EvaluateOptions& options, TrajectoryFormat format) {
+  const Trajectory estimate = ReadTrajectory(file.file, format);
+  Evaluation evaluation = Evaluate(reference, estimate, options);
+  evaluation.label = file.label;
+  evaluation.warnings.insert(evaluation.warnings.begin(), estimate.warnings.begin(),
+                             estimate.warnings.end());
+  if (!file.innovations.empty()) evaluation.innovations = ReadInnovations(file.innovations);
+  return evaluation;
+}
+
+std::string Text(const std::vector<Evaluation>& evaluations, Form form) {
+  switch (form) {
+    case Form::kJson:
+      return EvaluationJson(evaluations);
+    case Form::kMarkdown:
+      return EvaluationMarkdown(evaluations);
+    case Form::kLatex:
+      return EvaluationLatex(evaluations);
+    case Form::kText:
+      break;
+  }
+  return EvaluationText(evaluations);
+}
+
+/// Labels that two estimates have, as of two runs, give way to the files.
+void MakeUnique(std::vector<Evaluation>& evaluations) {
+  std::map<std::string, int> times;
+  for (const Evaluation& one : evaluations) ++times[one.label];
+  for (Evaluation& one : evaluations) {
+    if (times[one.label] > 1) one.label = one.estimate.name;
+  }
+}
+
+ExitCode RunEval(const Arguments& arguments) {
+  EvaluateOptions options = arguments.options;
+  options.alignment = Chosen(arguments);
+  options.max_diff = StampFromSeconds(arguments.max_diff_s);
+  options.offset = StampFromSeconds(arguments.offset_s);
+  const Trajectory reference =
+      ReadTrajectory(ReferenceAt(arguments.reference).file, arguments.format);
+  WarnOf(reference.warnings, arguments);
+  std::vector<Evaluation> evaluations;
+  for (const std::string& path : arguments.estimates) {
+    for (const TrajectoryFile& file : EstimatesAt(path)) {
+      evaluations.push_back(EvaluateFile(reference, file, options, arguments.format));
+      WarnOf(evaluations.back().warnings, arguments);
+    }
+  }
+  MakeUnique(evaluations);
+  const bool saves = !arguments.save_absolute.empty() || !arguments.save_relative.empty();
+  if (saves && evaluations.size() > 1) {
+    throw Error(ExitCode::kUsage, "--save_results: " + std::to_string(evaluations.size()) +
+                                      " estimates; expected one, as a result of evo has one");
+  }
+  Print(Text(evaluations, arguments.form));
+  if (!arguments.save_absolute.empty()) {
+    SaveEvoResult(evaluations.front(), SavedErrors::kAbsolute, arguments.save_absolute,
+                  arguments.force);
+  }
+  if (!arguments.save_relative.empty()) {
+    SaveEvoResult(evaluations.front(), SavedErrors::kRelative, arguments.save_relative,
+                  arguments.force);
+  }
+  return ExitCode::kOk;
+}
+
+/// Says what is wrong with options that fit one by one, but not together.
+void CheckTogether(const Arguments& arguments) {
+  const PairOptions& pairs = arguments.options.pairs;
+  if (pairs.unit == DeltaUnit::kFrames && pairs.delta != std::floor(pairs.delta)) {
+    throw CLI::ValidationError("--delta: frames are a whole number");
+  }
+}
+
+void AddAlignment(CLI::App& command, Arguments& a) {
+  CLI::Option* align =
+      command
+          .add_option("--align", a.options.alignment,
+                      "none (default), origin, yaw (and translation), se3, sim3, or scale alone")
+          ->option_text("MODE")
+          ->transform(CLI::CheckedTransformer(
+              ByName({Alignment::kNone, Alignment::kScale, Alignment::kOrigin, Alignment::kYaw,
+                      Alignment::kSe3, Alignment::kSim3})));
+  CLI::Option* origin = command.add_flag("--align_origin", a.origin, "--align origin, as of evo");
+  CLI::Option* se3 = command.add_flag("-a", a.se3, "--align se3; with -s sim3, as of evo");
+  CLI::Option* scale =
+      command.add_flag("-s,--correct_scale", a.scale, "--align scale; with -a sim3, as of evo");
+  align->excludes(origin)->excludes(se3)->excludes(scale);
+  origin->excludes(se3)->excludes(scale);
+  command.add_option("--n_to_align", a.options.align_poses, "align the first N poses alone")
+      ->option_text("N")
+      ->check(IsInteger(3, 1'000'000'000));
+}
+
+void AddErrors(CLI::App& command, Arguments& a) {
+  command
+      .add_option("-r,--pose_relation", a.options.relations,
+                  "trans_part, rot_part, angle_deg, angle_rad, full, point_distance; may be "
+                  "repeated; default trans_part and angle_deg")
+      ->option_text("NAME")
+      ->allow_extra_args(false)
+      ->transform(CLI::CheckedTransformer(
+          ByName({PoseRelation::kTranslation, PoseRelation::kRotation, PoseRelation::kAngleDeg,
+                  PoseRelation::kAngleRad, PoseRelation::kFull, PoseRelation::kPointDistance})));
+  command
+      .add_option("-d,--delta", a.options.pairs.delta,
+                  "of relative errors: how far poses are apart; default 1")
+      ->option_text("X")
+      ->check(IsNumber(1e-9, 1e9));
+  command
+      .add_option("-u,--delta_unit", a.options.pairs.unit,
+                  "f (frames, default), m (of path), s, d (degrees), r (rad)")
+      ->option_text("UNIT")
+      ->transform(CLI::CheckedTransformer(
+          ByName({DeltaUnit::kFrames, DeltaUnit::kMetres, DeltaUnit::kSeconds, DeltaUnit::kDegrees,
+                  DeltaUnit::kRadians})));
+  command.add_flag("--all_pairs", a.options.pairs.all, "from each pose on; default: one by one");
+  command
+      .add_option("-t,--delta_tol", a.options.pairs.tolerance,
+                  "of all pairs: how far off delta, as a share of it; default 0.1")
+      ->option_text("X")
+      ->check(IsNumber(0.0, 1.0));
+}
+
+void AddTimes(CLI::App& command, Arguments& a) {
+  command.add_option("--t_max_diff", a.max_diff_s, "poses match within this time, s; default 0.01")
+      ->option_text("S")
+      ->check(IsNumber(0.0, 1e9));
+  command.add_option("--t_offset", a.offset_s, "is added to the stamps of the estimate, s")
+      ->option_text("S")
+      ->check(IsNumber(-9e9, 9e9));
+  command
+      .add_option("--format", a.format, "of files: tum, kitti, euroc; default: by their first row")
+      ->option_text("NAME")
+      ->transform(
+          CLI::CheckedTransformer(ByName({TrajectoryFormat::kDetect, TrajectoryFormat::kTum,
+                                          TrajectoryFormat::kKitti, TrajectoryFormat::kEuroc})));
+}
+
+void AddForms(CLI::App& command, Arguments& a) {
+  const auto add = [&](const char* name, Form form, const char* help) {
+    return command.add_flag_callback(
+        name, [&a, form] { a.form = form; }, help);
+  };
+  CLI::Option* json = add("--json", Form::kJson, "print JSON");
+  CLI::Option* markdown = add("--markdown", Form::kMarkdown, "print a table of Markdown");
+  CLI::Option* latex = add("--latex", Form::kLatex, "print a table of LaTeX");
+  json->excludes(markdown)->excludes(latex);
+  markdown->excludes(latex);
+  command
+      .add_option("--save_results", a.save_absolute,
+                  "write the absolute errors of the first -r for evo_res")
+      ->option_text("ZIP")
+      ->check(IsNamed);
+  command.add_option("--save_relative", a.save_relative, "write the relative errors, likewise")
+      ->option_text("ZIP")
+      ->check(IsNamed);
+  command.add_flag("--force", a.force, "replace ZIP if it is there");
+  command.add_flag("--quiet", a.quiet, "no warnings");
+}
+
+}  // namespace
+
+void AddEval(CLI::App& program, Action& action) {
+  CLI::App& command =
+      *program.add_subcommand("eval", "Compare trajectories with a reference: ATE, RPE, NEES");
+  const auto arguments = std::make_shared<Arguments>();
+  command.add_option("REF", arguments->reference, "the reference: a file, or the folder of a run")
+      ->option_text(" ")
+      ->required()
+      ->check(IsNamed);
+  command.add_option("EST", arguments->estimates, "the estimates: files, or folders of runs")
+      ->option_text(" ")
+      ->required()
+      ->check(IsNamed);
+  AddAlignment(command, *arguments);
+  AddErrors(command, *arguments);
+  AddTimes(command, *arguments);
+  AddForms(command, *arguments);
+  command.footer(kFooter);
+  command.callback([&action, arguments] {
+    CheckTogether(*arguments);
+    action = [arguments] { return RunEval(*arguments); };
+  });
+}
+
+}  // namespace alidade::cli

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/evaluate.h"
+
+#include <algorithm>
+
+#include "alidade/geometry.h"
+#include "alidade/statistics.h"
+#include "mahalanobis.h"
+#include "trajectory_errors.h"
+
+namespace alidade {
+namespace {
+
+constexpr int kDof = 3;
+
+/// Of the errors of all poses, columns of `errors`, with the covariances beside them.
+Nees NeesOf(const Eigen::Matrix3Xd& errors, const std::vector<Eigen::Matrix3d>& covariances) {
+  const double limit = ChiSquareQuantile(0.95, kDof);
+  Nees nees;
+  double sum = 0.0, inside = 0.0;
+  for (std::size_t i = 0; i < covariances.size(); ++i) {
+    const double squared =
+        internal::SquaredMahalanobis(covariances[i], errors.col(static_cast<Eigen::Index>(i)));
+    if (squared < 0.0) continue;
+    ++nees.poses;
+    sum += squared / kDof;
+    inside += squared <= limit ? 1.0 : 0.0;
+  }
+  nees.mean = sum / nees.poses;
+  nees.cov95 = inside / nees.poses;
+  return nees;
+}
+
+/// d = q_true (-) q of each pose, in the body, rad.
+Eigen::Matrix3Xd OrientationErrors(const Trajectory& reference, const Trajectory& estimate) {
+  Eigen::Matrix3Xd errors(3, estimate.size());
+  for (int i = 0; i < estimate.size(); ++i) {
+    const auto stored = [i](const Trajectory& t) {
+      const Eigen::Quaterniond& q = t.orientations[static_cast<std::size_t>(i)];
+      return Eigen::Vector4d(q.w(), q.x(), q.y(), q.z());
+    };
+    const Eigen::Vector4d truth = stored(reference), estimated = stored(estimate);
+    UnitQuaternion::Minus(truth.data(), estimated.data(), errors.col(i).data());
+  }
+  return errors;
+}
+
+void AddNees(Evaluation& evaluation) {
+  const Trajectory& estimate = evaluation.estimate;
+  if (!estimate.has_covariances()) return;
+  const Nees position =
+      NeesOf(evaluation.reference.positions - estimate.positions, estimate.position_covariances);
+  const Nees orientation =
+      NeesOf(OrientationErrors(evaluation.reference, estimate), estimate.orientation_covariances);
+  if (position.poses > 0) evaluation.position_nees = position;
+  if (orientation.poses > 0) evaluation.orientation_nees = orientation;
+  if (position.poses == 0 && orientation.poses == 0) {
+    evaluation.nees_withheld = "every covariance is singular";
+  }
+}
+
+/// Whether the positions of these poses are not all at one place.
+bool HasExtent(const Trajectory& trajectory) {
+  return !(trajectory.positions.colwise() - trajectory.positions.col(0)).isZero(0.0);
+}
+
+std::optional<double> ScaleOf(const Trajectory& reference, const Trajectory& estimate) {
+  if (estimate.size() < 3 || !HasExtent(reference) || !HasExtent(estimate)) return std::nullopt;
+  return Align(Alignment::kSim3, reference, estimate).scale;
+}
+
+/// Scale of the second half over that of the first, - 1.
+std::optional<double> ScaleDrift(const Trajectory& reference, const Trajectory& estimate) {
+  constexpr int kFewest = 10;
+  std::vector<int> halves[2];
+  for (int i = 0; i < estimate.size(); ++i) halves[2 * i < estimate.size() ? 0 : 1].push_back(i);
+  if (std::ssize(halves[1]) < kFewest) return std::nullopt;
+  const auto scale = [&](const std::vector<int>& half) {
+    return ScaleOf(reference.Select(half), estimate.Select(half));
+  };
+  const auto first = scale(halves[0]), second = scale(halves[1]);
+  if (!first || !second || !(*first > 0.0)) return std::nullopt;
+  return *second / *first - 1.0;
+}
+
+}  // namespace
+
+Evaluation Evaluate(const Trajectory& reference, const Trajectory& estimate,
+                    const EvaluateOptions& options) {
+  const Matches matches = Associate(reference, estimate, options.max_diff, options.offset);
+  Evaluation evaluation;
+  evaluation.label = estimate.name;
+  evaluation.options = options;
+  evaluation.possible = matches.possible;
+  evaluation.by_row = matches.by_row;
+  evaluation.reference = reference.Select(matches.reference);
+  evaluation.estimate = estimate.Select(matches.estimate);
+  evaluation.sim3_scale = ScaleOf(evaluation.reference, evaluation.estimate);
+  evaluation.scale_drift = ScaleDrift(evaluation.reference, evaluation.estimate);
+  evaluation.alignment =
+      Align(options.alignment, evaluation.reference, evaluation.estimate, options.align_poses);
+  evaluation.warnings = internal::EvaluationWarnings(evaluation, matches, reference, estimate);
+  if (options.alignment == Alignment::kNone) {
+    AddNees(evaluation);
+  } else {
+    if (estimate.has_covariances()) {
+      evaluation.nees_withheld = std::string("the alignment by ") + ToString(options.alignment) +
+                                 " takes errors away that the covariance is of; --align none";
+    }
+    evaluation.estimate = evaluation.alignment * evaluation.estimate;
+  }
+  for (const PoseRelation relation : options.relations) {
+    evaluation.absolute.push_back(
+        internal::AbsoluteErrors(relation, evaluation.reference, evaluation.estimate));
+  }
+  if (evaluation.estimate.size() < 2) return evaluation;
+  evaluation.pairs = PairsOf(evaluation.estimate, options.pairs);
+  for (const PoseRelation relation : options.relations) {
+    evaluation.relative.push_back(internal::RelativeErrors(relation, evaluation.reference,
+                                                           evaluation.estimate, evaluation.pairs));
+  }
+  return evaluation;
+}
+
+}  // namespace alidade

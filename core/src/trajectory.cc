@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/trajectory.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+#include "alidade/number_rows.h"
+#include "number_text.h"
+
+namespace alidade {
+namespace {
+
+using Format = TrajectoryFormat;
+
+constexpr const char* kTumColumns = "t x y z qx qy qz qw";
+constexpr const char* kForms =
+    "8 columns (TUM), 20 (TUM with covariances), 12 (KITTI), or with commas 8 or 17 (EuRoC)";
+constexpr const char* kCovarianceNames[] = {"Pr11", "Pr12", "Pr13", "Pr22", "Pr23", "Pr33",
+                                            "Pt11", "Pt12", "Pt13", "Pt22", "Pt23", "Pt33"};
+
+/// The symmetric matrix of its upper triangle, row by row.
+Eigen::Matrix3d Symmetric(const double* upper) {
+  Eigen::Matrix3d matrix;
+  matrix << upper[0], upper[1], upper[2], upper[1], upper[3], upper[4], upper[2], upper[4],
+      upper[5];
+  return matrix;
+}
+
+/// What a number of columns of a row is called.
+Format Detect(const NumberRows& rows) {
+  const std::size_t columns = rows.size();
+  if (rows.has_commas() && (columns == 8 || columns == 17)) return Format::kEuroc;
+  if (!rows.has_commas() && (columns == 8 || columns == 20)) return Format::kTum;
+  if (!rows.has_commas() && columns == 12) return Format::kKitti;
+  rows.FailLine(std::to_string(columns) + (columns == 1 ? " column" : " columns"), kForms);
+}
+
+/// A unit of time that stamps of TUM may be written in by mistake.
+struct TimeUnit {
+  const char* name;
+  std::size_t digits;  ///< it is 10^digits ns
+};
+
+/// The unit that the stamps must have: the seconds of a clock that anyone uses are below 1e11 (the
+/// year 5138), and poses are not 11 days apart.
+std::optional<TimeUnit> UnitOtherThanSeconds(const std::vector<double>& stamps) {
+  double largest = 0.0;
+  std::vector<double> steps;
+  for (std::size_t i = 0; i < stamps.size(); ++i) {
+    largest = std::max(largest, std::abs(stamps[i]));
+    if (i > 0) steps.push_back(std::abs(stamps[i] - stamps[i - 1]));
+  }
+  if (largest >= 1e17) return TimeUnit{"ns", 0};
+  if (largest >= 1e14) return TimeUnit{"us", 3};
+  if (largest >= 1e11) return TimeUnit{"ms", 6};
+  if (steps.empty()) return std::nullopt;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle >= 1e6 ? std::optional(TimeUnit{"ns", 0}) : std::nullopt;
+}
+
+/// Reads one file, row by row.
+class TrajectoryReader {
+ public:
+  TrajectoryReader(const std::filesystem::path& file, Format format)
+      : rows_(file, {}, {}, NumberRows::kCommaOrBlanks) {
+    trajectory_.format = format;
+  }
+
+  Trajectory Read() {
+    trajectory_.name = rows_.name();
+    while (rows_.Next()) AddRow();
+    if (lines_.empty()) rows_.FailLine("no poses", kForms);
+    trajectory_.first_line = lines_.front();
+    trajectory_.positions.resize(3, std::ssize(positions_));
+    for (std::size_t i = 0; i < positions_.size(); ++i) {
+      trajectory_.positions.col(static_cast<Eigen::Index>(i)) = positions_[i];
+    }
+    if (trajectory_.format == Format::kTum) TakeTumStamps();
+    CheckFirstQuaternion();
+    if (trajectory_.format == Format::kKitti) return std::move(trajectory_);
+    return InOrder();
+  }
+
+ private:
+  void AddRow() {
+    if (lines_.empty()) {
+      if (trajectory_.format == Format::kDetect) trajectory_.format = Detect(rows_);
+      columns_ = ExpectedColumns();
+    }
+    rows_.ExpectColumns(columns_, ColumnNames());
+    switch (trajectory_.format) {
+      case Format::kKitti:
+        AddKitti();
+        break;
+      case Format::kEuroc:
+        trajectory_.stamps.push_back(rows_.Index(0, "t"));
+        AddPose({"x", "y", "z", "qw", "qx", "qy", "qz"});
+        break;
+      default:
+        AddTum();
+    }
+    lines_.push_back(rows_.line());
+  }
+
+  /// Of the format, of those that the first row may have.
+  std::size_t ExpectedColumns() const {
+    const std::size_t columns = rows_.size();
+    if (trajectory_.format == Format::kKitti) return 12;
+    if (trajectory_.format == Format::kEuroc) return columns == 17 ? 17 : 8;
+    return columns == 20 ? 20 : 8;
+  }
+  std::string ColumnNames() const {
+    if (trajectory_.format == Format::kKitti) return "the upper three rows of world_from_body";
+    if (trajectory_.format == Format::kEuroc) return "t,x,y,z,qw,qx,qy,qz and maybe nine more";
+    return columns_ == 20 ? "t x y z qx qy qz qw and two covariances" : kTumColumns;
+  }
+
+  void AddTum() {
+    seconds_.push_back(rows_.Number(0, "t"));
+    stamp_texts_.emplace_back(rows_.text(0));
+    AddPose(NumberRows::kTumPose);
+    if (columns_ != 20) return;
+    double upper[12];
+    for (std::size_t i = 0; i < 12; ++i) upper[i] = rows_.Number(8 + i, kCovarianceNames[i]);
+    trajectory_.orientation_covariances.push_back(Symmetric(upper));
+    trajectory_.position_covariances.push_back(Symmetric(upper + 6));
+  }
+
+  /// Of columns 1 to 7.
+  void AddPose(const std::array<const char*, 7>& names) {
+    const std::array<double, 7> v = rows_.PoseNumbers(names);
+    positions_.emplace_back(v[0], v[1], v[2]);
+    const bool w_first = trajectory_.format == Format::kEuroc;
+    const Eigen::Quaterniond q = w_first ? Eigen::Quaterniond(v[3], v[4], v[5], v[6])
+                                         : Eigen::Quaterniond(v[6], v[3], v[4], v[5]);
+    trajectory_.orientations.push_back(q.normalized());
+  }
+
+  void AddKitti() {
+    constexpr double kDefect = 1e-3;
+    Eigen::Matrix<double, 3, 4, Eigen::RowMajor> pose;
+    for (std::size_t i = 0; i < 12; ++i) {
+      pose.data()[i] = rows_.Number(i, "element");
+    }
+    const Eigen::Matrix3d rotation = pose.leftCols<3>();
+    const double defect =
+        (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+    if (!(defect <= kDefect) || !(rotation.determinant() > 0.0)) {
+      rows_.FailLine("columns 1-3, 5-7, 9-11 are no rotation", "R R' = 1 to 1e-3, det R = 1");
+    }
+    positions_.push_back(pose.col(3));
+    trajectory_.orientations.push_back(Eigen::Quaterniond(rotation).normalized());
+  }
+
+  void TakeTumStamps() {
+    const auto unit = UnitOtherThanSeconds(seconds_);
+    if (unit) {
+      Warn(lines_.front(), "t",
+           '\'' + stamp_texts_.front() + "' and what follows cannot be seconds; read as " +
+               unit->name,
+           "seconds, as TUM has them");
+    }
+    for (std::size_t i = 0; i < seconds_.size(); ++i) {
+      trajectory_.stamps.push_back(
+          cell::ParseStamp(stamp_texts_[i], seconds_[i], unit ? unit->digits : 9));
+    }
+  }
+
+  /// A path that starts at the origin starts at the identity too, as a rule.
+  void CheckFirstQuaternion() {
+    if (!positions_.front().isZero(0.0) || trajectory_.format == Format::kKitti) return;
+    const Trajectory other = trajectory_.Select({0}).WithOtherQuaternionOrder();
+    if (other.orientations[0].vec() != Eigen::Vector3d::Zero()) return;
+    const bool w_first = trajectory_.format == Format::kEuroc;
+    Warn(lines_.front(), w_first ? "qw" : "qx",
+         std::string("the first pose is the identity if its quaternion is written w ") +
+             (w_first ? "last" : "first"),
+         w_first ? "qw qx qy qz, as EuRoC has it" : "qx qy qz qw, as TUM has it");
+  }
+
+  /// Sorted, each stamp once.
+  Trajectory InOrder() {
+    const std::vector<Stamp>& stamps = trajectory_.stamps;
+    std::vector<int> order(stamps.size());
+    std::iota(order.begin(), order.end(), 0);
+    const auto earlier = [&](int a, int b) { return At(stamps, a) < At(stamps, b); };
+    const auto back = std::is_sorted_until(order.begin(), order.end(), earlier);
+    if (back != order.end()) {
+      Warn(At(lines_, *back), "t", "goes back: " + internal::SecondsText(At(stamps, *back)),
+           "poses in the order of their stamps; they are sorted");
+    }
+    std::stable_sort(order.begin(), order.end(), earlier);
+    std::vector<int> kept;
+    std::string more;
+    int twice = -1, count = 0;
+    for (const int i : order) {
+      if (!kept.empty() && At(stamps, kept.back()) == At(stamps, i)) {
+        if (count++ == 0) twice = i;
+        continue;
+      }
+      kept.push_back(i);
+    }
+    if (count == 0 && back == order.end()) return std::move(trajectory_);
+    if (count > 1) more = ", as are " + std::to_string(count - 1) + " more";
+    if (count > 0) {
+      Warn(At(lines_, twice), "t",
+           internal::SecondsText(At(stamps, twice)) + " is there already" + more,
+           "each stamp once; the first is taken");
+    }
+    return trajectory_.Select(kept);
+  }
+
+  template <class T>
+  static const T& At(const std::vector<T>& values, int i) {
+    return values[static_cast<std::size_t>(i)];
+  }
+  void Warn(int line, const char* key, const std::string& what, const std::string& expected) {
+    trajectory_.warnings.push_back(ErrorLine({rows_.name(), line, 0}, key, what, expected));
+  }
+
+  NumberRows rows_;
+  Trajectory trajectory_;
+  std::size_t columns_ = 0;
+  std::vector<int> lines_;
+  std::vector<Eigen::Vector3d> positions_;
+  std::vector<double> seconds_;           ///< of TUM, before their unit is known
+  std::vector<std::string> stamp_texts_;  ///< likewise
+};
+
+/// The file of stamps beside a file of KITTI; empty where there is none.
+std::filesystem::path TimesBeside(const std::filesystem::path& file) {
+  const std::filesystem::path own = file.stem().string() + "_times.txt";
+  for (const std::filesystem::path& name : {own, std::filesystem::path("times.txt")}) {
+    const std::filesystem::path beside = file.parent_path() / name;
+    std::error_code error;
+    if (std::filesystem::is_regular_file(beside, error)) return beside;
+  }
+  return {};
+}
+
+void ReadTimes(const std::filesystem::path& times, Trajectory& trajectory) {
+  NumberRows rows(times, {}, {}, ' ');
+  while (rows.Next()) {
+    rows.ExpectColumns(1, "t");
+    trajectory.stamps.push_back(rows.Time(0, "t"));
+    const std::size_t n = trajectory.stamps.size();
+    if (n > 1 && trajectory.stamps[n - 2] >= trajectory.stamps[n - 1]) {
+      rows.FailCell(0, "t", "is not after the one before", "times that increase");
+    }
+  }
+  if (std::ssize(trajectory.stamps) == trajectory.size()) return;
+  rows.FailLine(std::to_string(trajectory.stamps.size()) + " times for " +
+                    std::to_string(trajectory.size()) + " poses of " + trajectory.name,
+                "one for each");
+}
+
+}  // namespace
+
+const char* ToString(TrajectoryFormat format) {
+  constexpr const char* kNames[] = {"detect", "tum", "kitti", "euroc"};
+  return kNames[static_cast<std::size_t>(format)];
+}
+
+double Trajectory::PathLength(int first, int last) const {
+  double length = 0.0;
+  for (int i = first + 1; i <= last; ++i) {
+    length += (positions.col(i) - positions.col(i - 1)).norm();
+  }
+  return length;
+}
+
+Trajectory Trajectory::Select(const std::vector<int>& indices) const {
+  Trajectory part;
+  part.name = name;
+  part.format = format;
+  part.first_line = first_line;
+  part.warnings = warnings;
+  part.positions.resize(3, std::ssize(indices));
+  for (std::size_t k = 0; k < indices.size(); ++k) {
+    const auto i = static_cast<std::size_t>(indices[k]);
+    part.positions.col(static_cast<Eigen::Index>(k)) = positions.col(indices[k]);
+    part.orientations.push_back(orientations[i]);
+    if (has_stamps()) part.stamps.push_back(stamps[i]);
+    if (!has_covariances()) continue;
+    part.position_covariances.push_back(position_covariances[i]);
+    part.orientation_covariances.push_back(orientation_covariances[i]);
+  }
+  return part;
+}
+
+Trajectory Trajectory::WithOtherQuaternionOrder() const {
+  Trajectory other = *this;
+  for (Eigen::Quaterniond& q : other.orientations) {
+    q = format == TrajectoryFormat::kEuroc ? Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y())
+                                           : Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w());
+  }
+  return other;
+}
+
+Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat format) {
+  Trajectory trajectory = TrajectoryReader(file, format).Read();
+  if (trajectory.format != TrajectoryFormat::kKitti) return trajectory;
+  const std::filesystem::path times = TimesBeside(file);
+  if (!times.empty()) ReadTimes(times, trajectory);
+  return trajectory;
+}
+
+}  // namespace alidade

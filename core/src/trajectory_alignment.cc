@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/evaluate.h"
+#include "number_text.h"
+
+namespace alidade {
+namespace {
+
+[[noreturn]] void Fail(const std::string& name, const std::string& what,
+                       const std::string& expected) {
+  throw Error(ExitCode::kBadData, ErrorLine({name}, {}, what, expected));
+}
+
+/// Scale, rotation and translation of [Umeyama1991].
+Similarity Umeyama(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to, bool with_scale) {
+  const Eigen::Matrix4d matrix = Eigen::umeyama(from, to, with_scale);
+  Similarity found;
+  const Eigen::Matrix3d linear = matrix.topLeftCorner<3, 3>();
+  if (with_scale) found.scale = std::cbrt(linear.determinant());
+  found.rotation = linear / found.scale;
+  found.translation = matrix.topRightCorner<3, 1>();
+  return found;
+}
+
+/// The rotation about z that maximises sum to' R from of centred points [Zhang2018].
+Similarity YawOnly(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to) {
+  const Eigen::Vector3d from_mean = from.rowwise().mean(), to_mean = to.rowwise().mean();
+  const Eigen::Matrix3d c = (to.colwise() - to_mean) * (from.colwise() - from_mean).transpose();
+  const double yaw = std::atan2(c(1, 0) - c(0, 1), c(0, 0) + c(1, 1));
+  Similarity found;
+  found.rotation = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  found.translation = to_mean - found.rotation * from_mean;
+  return found;
+}
+
+Similarity Origin(const Trajectory& reference, const Trajectory& estimate) {
+  Similarity found;
+  found.rotation =
+      (reference.orientations[0] * estimate.orientations[0].conjugate()).toRotationMatrix();
+  found.translation = reference.positions.col(0) - found.rotation * estimate.positions.col(0);
+  return found;
+}
+
+/// The nearest double: what a reader of decimal seconds has.
+double DoubleSeconds(Stamp stamp) {
+  return static_cast<double>(static_cast<long double>(stamp) / 1e9L);
+}
+
+/// |a - b| of doubles: of a clock that counts from 1970 to 0.2 us. Where a stamp lies in the middle
+/// of two others, rounding decides, as it does in evo, whose figures would differ otherwise.
+double Apart(Stamp a, Stamp b) { return std::abs(DoubleSeconds(a) - DoubleSeconds(b)); }
+
+/// Index of the nearest stamp, of two as near the earlier.
+int NearestIndex(const std::vector<Stamp>& stamps, Stamp to) {
+  const auto after = std::lower_bound(stamps.begin(), stamps.end(), to);
+  if (after == stamps.begin()) return 0;
+  const bool before = after == stamps.end() || Apart(*(after - 1), to) <= Apart(*after, to);
+  return static_cast<int>(after - stamps.begin()) - (before ? 1 : 0);
+}
+
+Matches ByRow(const Trajectory& reference, const Trajectory& estimate) {
+  Matches matches;
+  matches.by_row = true;
+  matches.possible = reference.size();
+  for (int i = 0; i < reference.size(); ++i) matches.reference.push_back(i);
+  matches.estimate = matches.reference;
+  if (reference.size() == estimate.size()) return matches;
+  Fail(estimate.name,
+       std::to_string(estimate.size()) + " poses without stamps for " +
+           std::to_string(reference.size()) + " of " + reference.name,
+       "a row for each row of the reference, or stamps in both");
+}
+
+std::string Span(const Trajectory& trajectory) {
+  return internal::SecondsText(trajectory.stamps.front()) + " to " +
+         internal::SecondsText(trajectory.stamps.back());
+}
+
+}  // namespace
+
+const char* ToString(Alignment alignment) {
+  constexpr const char* kNames[] = {"none", "scale", "origin", "yaw", "se3", "sim3"};
+  return kNames[static_cast<std::size_t>(alignment)];
+}
+
+Trajectory Similarity::operator*(const Trajectory& estimate) const {
+  Trajectory moved = estimate;
+  moved.positions = ((scale * rotation) * estimate.positions).colwise() + translation;
+  const Eigen::Quaterniond turn(rotation);
+  for (Eigen::Quaterniond& q : moved.orientations) q = (turn * q).normalized();
+  moved.position_covariances.clear();
+  moved.orientation_covariances.clear();
+  return moved;
+}
+
+Similarity Align(Alignment alignment, const Trajectory& reference, const Trajectory& estimate,
+                 int poses) {
+  ALIDADE_EXPECTS(reference.size() == estimate.size() && estimate.size() > 0 && poses >= 0);
+  if (alignment == Alignment::kNone) return {};
+  if (alignment == Alignment::kOrigin) return Origin(reference, estimate);
+  const int used = poses == 0 ? estimate.size() : std::min(poses, estimate.size());
+  const Eigen::Matrix3Xd from = estimate.positions.leftCols(used);
+  const Eigen::Matrix3Xd to = reference.positions.leftCols(used);
+  if (used < 3) {
+    Fail(estimate.name, std::to_string(used) + " poses to align by", "3 or more");
+  }
+  if (alignment == Alignment::kYaw) return YawOnly(from, to);
+  const bool with_scale = alignment != Alignment::kSe3;
+  const auto at_one_place = [](const Eigen::Matrix3Xd& points) {
+    return (points.colwise() - points.col(0)).isZero(0.0);
+  };
+  if (with_scale && (at_one_place(from) || at_one_place(to))) {
+    Fail((at_one_place(from) ? estimate : reference).name, "all poses are at one place",
+         "a path, to take a scale from");
+  }
+  Similarity found = Umeyama(from, to, with_scale);
+  if (alignment == Alignment::kScale) {
+    found.rotation.setIdentity();
+    found.translation.setZero();
+  }
+  return found;
+}
+
+Matches Associate(const Trajectory& reference, const Trajectory& estimate, Stamp max_diff,
+                  Stamp offset) {
+  const auto by_row = [](const Trajectory& t) { return t.format == TrajectoryFormat::kKitti; };
+  if ((by_row(reference) && by_row(estimate)) ||
+      (!reference.has_stamps() && !estimate.has_stamps())) {
+    return ByRow(reference, estimate);
+  }
+  if (!reference.has_stamps() || !estimate.has_stamps()) {
+    Fail((reference.has_stamps() ? estimate : reference).name, "poses without stamps",
+         "times.txt beside them, as the other trajectory has stamps");
+  }
+  const bool estimate_longer = estimate.size() > reference.size();
+  const std::vector<Stamp>& shorter = (estimate_longer ? reference : estimate).stamps;
+  const std::vector<Stamp>& longer = (estimate_longer ? estimate : reference).stamps;
+  const Stamp shift = estimate_longer ? -offset : offset;  // of the shorter
+  Matches matches;
+  matches.possible = static_cast<int>(shorter.size());
+  std::vector<int>& of_shorter = estimate_longer ? matches.reference : matches.estimate;
+  std::vector<int>& of_longer = estimate_longer ? matches.estimate : matches.reference;
+  double last_off = 0.0;
+  for (int i = 0; i < matches.possible; ++i) {
+    const Stamp at = shorter[static_cast<std::size_t>(i)] + shift;
+    const int nearest = NearestIndex(longer, at);
+    const double off = Apart(longer[static_cast<std::size_t>(nearest)], at);
+    if (!(off <= DoubleSeconds(max_diff))) continue;
+    const bool taken = !of_longer.empty() && of_longer.back() == nearest;
+    if (taken && off >= last_off) continue;
+    if (taken) {
+      of_shorter.back() = i;
+    } else {
+      of_shorter.push_back(i);
+      of_longer.push_back(nearest);
+    }
+    last_off = off;
+  }
+  if (!matches.estimate.empty()) return matches;
+  Fail(estimate.name,
+       "no pose within " + internal::NumberText(Seconds(max_diff)) + " s of one of " +
+           reference.name + ": " + Span(estimate) + " beside " + Span(reference),
+       "the same clock; or --t_offset, which is added to the estimate's stamps, or --t_max_diff");
+}
+
+}  // namespace alidade

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include "alidade/config.h"
+#include "support/program.h"
+
+namespace alidade {
+namespace {
+
+using testing::Arguments;
+using testing::Contains;
+using testing::Outcome;
+using Cli = testing::ProgramTest;
+
+/// Poses on a half circle of radius `radius`, a row each 0.1 s from `t0` on.
+std::string HalfCircle(double radius, double t0 = 0.0) {
+  std::string text = "# t x y z qx qy qz qw\n";
+  for (int i = 0; i <= 30; ++i) {
+    const double angle = 0.1 * i;
+    for (const double value : {t0 + angle, radius * std::cos(angle), radius * std::sin(angle),
+                               0.1 * std::sin(3 * angle), 0.0, 0.0, std::sin(0.5 * angle)}) {
+      text += std::to_string(value) + ' ';
+    }
+    text += std::to_string(std::cos(0.5 * angle)) + '\n';
+  }
+  return text;
+}
+
+class EvalCli : public Cli {
+ protected:
+  void SetUp() override {
+    Cli::SetUp();
+    Write("truth.tum", HalfCircle(2.0));
+    Write("mono.tum", HalfCircle(1.0));
+  }
+  Config Evaluated(Arguments arguments) const {
+    arguments.insert(arguments.begin(), "eval");
+    arguments.emplace_back("--json");
+    const Outcome outcome = Call(arguments);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return Config::FromText(outcome.out, "stdout");
+  }
+};
+
+TEST_F(EvalCli, LettersOfEvoMeanTheSameAsAlign) {
+  const auto align = [&](const Arguments& options) {
+    Arguments all = {"truth.tum", "mono.tum"};
+    all.insert(all.end(), options.begin(), options.end());
+    const Config json = Evaluated(all);
+    return json.root().At("evaluations").Items().front().At("align").Text();
+  };
+  EXPECT_EQ(align({}), "none");
+  EXPECT_EQ(align({"-a"}), "se3");
+  EXPECT_EQ(align({"-s"}), "scale");
+  EXPECT_EQ(align({"-as"}), "sim3");
+  EXPECT_EQ(align({"--align_origin"}), "origin");
+  for (const char* mode : {"none", "scale", "origin", "yaw", "se3", "sim3"}) {
+    EXPECT_EQ(align({"--align", mode}), mode);
+  }
+  for (const Arguments& bad : {Arguments{"--align", "se4"},
+                               {"--align", "se3", "-a"},
+                               {"-a", "--align_origin"},
+                               {"-r", "translation"},
+                               {"-u", "km"},
+                               {"-d", "0"},
+                               {"-d", "1.5"},
+                               {"--json", "--latex"},
+                               {"--t_max_diff", "-1"}}) {
+    Arguments all = {"eval", "truth.tum", "mono.tum"};
+    all.insert(all.end(), bad.begin(), bad.end());
+    const Outcome outcome = Call(all);
+    EXPECT_EQ(outcome.code, 2) << bad.back();
+    EXPECT_TRUE(outcome.err.starts_with("error: ")) << outcome.err;
+  }
+  EXPECT_EQ(Call({"eval", "truth.tum"}).code, 2);
+}
+
+TEST_F(EvalCli, WarningsGoToStandardErrorAndFiguresToStandardOutput) {
+  const Outcome se3 = Call({"eval", "truth.tum", "mono.tum", "-a"});
+  EXPECT_EQ(se3.code, 0);
+  EXPECT_TRUE(se3.err.starts_with("warning: mono.tum: scale 1.993 (error ")) << se3.err;
+  EXPECT_TRUE(Contains(se3.out, "aligned    se3, scale 1.000000\n")) << se3.out;
+  EXPECT_EQ(Call({"eval", "truth.tum", "mono.tum", "-a", "--quiet"}).err, "");
+  const Outcome sim3 = Call({"eval", "truth.tum", "mono.tum", "-as"});
+  EXPECT_EQ(sim3.err, "");
+  EXPECT_TRUE(Contains(sim3.out, "matched    31 of 31 possible poses, within 0.01 s\n"));
+}
+
+TEST_F(EvalCli, OptionsReachTheEvaluation) {
+  Write("late.tum", HalfCircle(2.0, 5.0));
+  const Config json =
+      Evaluated({"truth.tum", "late.tum", "--t_offset", "-5", "--t_max_diff", "0.02", "-r", "full",
+                 "-r", "angle_rad", "-d", "0.5", "-u", "m", "--all_pairs", "-t", "0.2"});
+  const Node one = json.root().At("evaluations").Items().front();
+  EXPECT_EQ(one.At("matched").Integer(0, 100), 31);
+  EXPECT_EQ(one.At("t_offset").Number(), -5.0);
+  EXPECT_EQ(one.At("t_max_diff").Number(), 0.02);
+  std::vector<std::string> relations;
+  for (const auto& [name, errors] : one.At("ate").Entries()) relations.push_back(name);
+  EXPECT_EQ(relations, (std::vector<std::string>{"full", "angle_rad"}));
+  EXPECT_EQ(one.At("pairs").At("delta").Number(), 0.5);
+  EXPECT_EQ(one.At("pairs").At("delta_unit").Text(), "m");
+  EXPECT_TRUE(one.At("pairs").At("all_pairs").Flag());
+}
+
+TEST_F(EvalCli, BadInputIsRefusedWithItsPlace) {
+  Write("bad.tum", "0 1 2 3 0 0 0 1\n1 1 2 3 0 0 nan 1\n");
+  const Outcome bad = Call({"eval", "truth.tum", "bad.tum"});
+  EXPECT_EQ(bad.code, 65);
+  EXPECT_EQ(bad.err, "error: bad.tum:2:13 qz: 'nan' is not finite; expected a finite number\n");
+  EXPECT_EQ(Call({"eval", "truth.tum", "missing.tum"}).code, 66);
+  EXPECT_EQ(Call({"eval", ".", "mono.tum"}).code, 0);  // truth.tum of the folder
+  const Outcome none = Call({"eval", "truth.tum", "."});
+  EXPECT_EQ(none.code, 66);
+  EXPECT_TRUE(none.err.starts_with("error: .: no trajectory in this folder; expected NAME/"))
+      << none.err;
+}
+
+TEST_F(EvalCli, SeveralEstimatesAreOneTableAndSaveNoSingleResult) {
+  const Outcome table = Call({"eval", "truth.tum", "truth.tum", "mono.tum", "-a", "--markdown"});
+  EXPECT_EQ(table.code, 0);
+  EXPECT_TRUE(Contains(table.out, "| truth | se3 | 1.000000 | 31 of 31 | 0.01 | 0.000000 |"))
+      << table.out;
+  EXPECT_TRUE(Contains(table.out, "| mono | se3 |")) << table.out;
+  const Outcome two =
+      Call({"eval", "truth.tum", "truth.tum", "mono.tum", "--save_results", "a.zip"});
+  EXPECT_EQ(two.code, 2);
+  EXPECT_FALSE(Exists("a.zip"));
+  EXPECT_EQ(Call({"eval", "truth.tum", "mono.tum", "--save_results", "a.zip"}).code, 0);
+  EXPECT_EQ(Call({"eval", "truth.tum", "mono.tum", "--save_results", "a.zip"}).code, 73);
+  EXPECT_EQ(Call({"eval", "truth.tum", "mono.tum", "--save_results", "a.zip", "--force",
+                  "--save_relative", "r.zip"})
+                .code,
+            0);
+  EXPECT_TRUE(Exists("r.zip"));
+}
+
+TEST_F(EvalCli, OfARunSaysWhatTheRunSaid) {
+  const std::string example = ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml";
+  ASSERT_EQ(Call({"run", example, "-o", "slam", "--no-figures", "--quiet"}).code, 0);
+  const Config run = Json("slam/run.json");
+  const Node metrics = run.root().At("estimators").At("ekf").At("metrics");
+  const Config json = Evaluated({"slam", "slam", "-r", "trans_part", "-r", "angle_rad"});
+  const Node one = json.root().At("evaluations").Items().front();
+  EXPECT_EQ(one.At("estimate").Text(), "ekf");
+  EXPECT_EQ(one.At("matched").Integer(0, 1000), 150);
+  const double position = one.At("ate").At("trans_part").At("rmse").Number();
+  EXPECT_NEAR(position, metrics.At("rmse:cam.position").Number(), 1e-12);
+  EXPECT_NEAR(one.At("ate").At("angle_rad").At("rmse").Number(),
+              metrics.At("rmse:cam.orientation").Number(), 1e-9);
+  EXPECT_NEAR(one.At("nis").At("pixels").At("mean").Number(),
+              metrics.At("nis.mean:pixels").Number(), 1e-12);
+  // The first pose is known exactly, and has none.
+  EXPECT_EQ(one.At("nees_position").At("poses").Integer(0, 1000), 149);
+  EXPECT_TRUE(one.At("nees_orientation").Find("mean"));
+  const Outcome aligned = Call({"eval", "slam", "slam/ekf", "-as"});
+  EXPECT_TRUE(Contains(aligned.out, "NEES withheld: the alignment by sim3 ")) << aligned.out;
+}
+
+}  // namespace
+}  // namespace alidade

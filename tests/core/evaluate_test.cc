@@ -1,0 +1,355 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/evaluate.h"
+
+#include <gtest/gtest.h>
+
+#include "support/recording.h"
+#include "support/trajectories.h"
+
+namespace alidade {
+namespace {
+
+using Eigen::Vector3d;
+using testing::Curve;
+using testing::Inverse;
+using testing::Line;
+using testing::Turn;
+using Pairs = std::vector<std::pair<int, int>>;
+
+constexpr double kPi = 3.14159265358979323846;
+
+Similarity Known() { return {2.5, Turn(1.1).toRotationMatrix(), Vector3d(10.0, -20.0, 3.0)}; }
+
+void ExpectSame(const Similarity& found, const Similarity& known) {
+  EXPECT_NEAR(found.scale, known.scale, 1e-12);
+  EXPECT_TRUE(found.rotation.isApprox(known.rotation, 1e-12)) << found.rotation;
+  EXPECT_TRUE(found.translation.isApprox(known.translation, 1e-12)) << found.translation;
+}
+
+double SquaredError(const Similarity& s, const Trajectory& reference, const Trajectory& estimate) {
+  return ((s * estimate).positions - reference.positions).squaredNorm();
+}
+
+TEST(Align, FindsAKnownSimilarity) {
+  const Trajectory reference = Curve(50);
+  Similarity known = Known();
+  ExpectSame(Align(Alignment::kSim3, reference, Inverse(known) * reference), known);
+  const Similarity scale = Align(Alignment::kScale, reference, Inverse(known) * reference);
+  ExpectSame(scale, {2.5, Eigen::Matrix3d::Identity(), Vector3d::Zero()});
+  ExpectSame(Align(Alignment::kNone, reference, Inverse(known) * reference), {});
+  known.scale = 1.0;
+  ExpectSame(Align(Alignment::kSe3, reference, Inverse(known) * reference), known);
+  ExpectSame(Align(Alignment::kOrigin, reference, Inverse(known) * reference), known);
+  known.rotation = Eigen::AngleAxisd(-2.0, Vector3d::UnitZ()).toRotationMatrix();
+  ExpectSame(Align(Alignment::kYaw, reference, Inverse(known) * reference), known);
+}
+
+TEST(Align, OfPathsThatDifferNothingNearbyFitsBetter) {
+  const Trajectory reference = Curve(50);
+  Trajectory estimate = Inverse(Known()) * reference;
+  for (int i = 0; i < 50; ++i) estimate.positions(i % 3, i) += 0.05 * std::sin(7.0 * i);
+  for (const Alignment alignment : {Alignment::kYaw, Alignment::kSe3, Alignment::kSim3}) {
+    SCOPED_TRACE(ToString(alignment));
+    const Similarity best = Align(alignment, reference, estimate);
+    const double least = SquaredError(best, reference, estimate);
+    for (const double step : {-1e-4, 1e-4}) {
+      for (int axis = 0; axis < 3; ++axis) {
+        Similarity near = best;
+        near.translation[axis] += step;
+        EXPECT_GT(SquaredError(near, reference, estimate), least);
+        near = best;
+        near.rotation = Eigen::AngleAxisd(step, Vector3d::Unit(axis)) * best.rotation;
+        near.translation +=
+            reference.positions.rowwise().mean() - (near * estimate).positions.rowwise().mean();
+        if (alignment == Alignment::kYaw && axis < 2) continue;
+        EXPECT_GT(SquaredError(near, reference, estimate), least);
+      }
+      if (alignment != Alignment::kSim3) continue;
+      Similarity near = best;
+      near.scale += step;
+      near.translation +=
+          reference.positions.rowwise().mean() - (near * estimate).positions.rowwise().mean();
+      EXPECT_GT(SquaredError(near, reference, estimate), least);
+    }
+  }
+}
+
+TEST(Align, TakesTheFirstPosesAloneWhereAsked) {
+  const Trajectory reference = Curve(50);
+  Trajectory estimate = Inverse(Known()) * reference;
+  estimate.positions.rightCols(25).array() += 100.0;
+  ExpectSame(Align(Alignment::kSim3, reference, estimate, 25), Known());
+}
+
+TEST(Align, RefusesWhatDeterminesNothing) {
+  EXPECT_THROW(Align(Alignment::kSe3, Curve(2), Curve(2)), Error);
+  Trajectory still = Curve(5);
+  still.positions.setConstant(4.0);
+  EXPECT_THROW(Align(Alignment::kSim3, Curve(5), still), Error);
+  EXPECT_THROW(Align(Alignment::kScale, still, Curve(5)), Error);
+  EXPECT_THROW(Align(Alignment::kSe3, Curve(5), Curve(4)), ContractViolation);
+}
+
+Trajectory At(const std::vector<double>& seconds) {
+  Trajectory t = Curve(static_cast<int>(seconds.size()));
+  t.stamps.clear();
+  for (const double s : seconds) t.stamps.push_back(StampFromSeconds(s));
+  return t;
+}
+
+TEST(Associate, TakesTheNearestWithinTheToleranceEachOnce) {
+  const Trajectory reference = At({0.0, 1.0, 2.0, 3.0, 4.0});
+  // 0.004 is nearer to 0 than 0.006; 2.02 is too far; 3.01 just is not.
+  const Matches matches = Associate(reference, At({0.006, 0.004, 2.02, 3.01}), 10'000'000, 0);
+  EXPECT_EQ(matches.possible, 4);
+  EXPECT_EQ(matches.reference, (std::vector<int>{0, 3}));
+  EXPECT_EQ(matches.estimate, (std::vector<int>{1, 3}));
+  // The shorter one is asked, whichever it is.
+  const Matches other = Associate(At({0.006, 3.01}), reference, 10'000'000, 0);
+  EXPECT_EQ(other.possible, 2);
+  EXPECT_EQ(other.reference, (std::vector<int>{0, 1}));
+  EXPECT_EQ(other.estimate, (std::vector<int>{0, 3}));
+}
+
+TEST(Associate, TheOffsetIsAddedToTheEstimate) {
+  const Trajectory longer = At({10.0, 11.0, 12.0, 13.0});
+  const Trajectory shorter = At({0.0, 1.0, 2.0});
+  EXPECT_EQ(Associate(longer, shorter, 1'000'000, 11'000'000'000).reference,
+            (std::vector<int>{1, 2, 3}));
+  EXPECT_EQ(Associate(shorter, longer, 1'000'000, -11'000'000'000).estimate,
+            (std::vector<int>{1, 2, 3}));
+  try {
+    Associate(longer, shorter, 1'000'000, 0);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::kBadData);
+    EXPECT_STREQ(error.what(),
+                 "curve.tum: no pose within 0.001 s of one of curve.tum: 0.000000 s to 2.000000 s "
+                 "beside 10.000000 s to 13.000000 s; expected the same clock; or --t_offset, which "
+                 "is added to the estimate's stamps, or --t_max_diff");
+  }
+}
+
+TEST(Associate, WithoutStampsByRow) {
+  Trajectory bare = Curve(4), five = Curve(5);
+  bare.stamps.clear();
+  five.stamps.clear();
+  const Matches matches = Associate(bare, bare, 0, 0);
+  EXPECT_TRUE(matches.by_row);
+  EXPECT_EQ(matches.estimate, (std::vector<int>{0, 1, 2, 3}));
+  EXPECT_THROW(Associate(bare, five, 0, 0), Error);
+  EXPECT_THROW(Associate(bare, Curve(4), 0, 0), Error);
+  // KITTI goes by row even with times beside.
+  Trajectory timed = Curve(4);
+  timed.format = bare.format = TrajectoryFormat::kKitti;
+  EXPECT_TRUE(Associate(timed, bare, 0, 0).by_row);
+}
+
+TEST(StatisticsOf, AreThoseOfWorkedNumbers) {
+  // mean 4, squares 9 + 1 + 4 + 100, deviations 1 + 9 + 4 + 36
+  const ErrorStatistics s = StatisticsOf({3.0, 1.0, 2.0, 10.0});
+  EXPECT_DOUBLE_EQ(s.mean, 4.0);
+  EXPECT_DOUBLE_EQ(s.median, 2.5);
+  EXPECT_DOUBLE_EQ(s.sse, 114.0);
+  EXPECT_DOUBLE_EQ(s.rmse, std::sqrt(28.5));
+  EXPECT_DOUBLE_EQ(s.std, std::sqrt(12.5));
+  EXPECT_EQ(s.min, 1.0);
+  EXPECT_EQ(s.max, 10.0);
+  EXPECT_DOUBLE_EQ(StatisticsOf({3.0, 1.0, 2.0}).median, 2.0);
+}
+
+const PoseRelation kRelations[] = {PoseRelation::kTranslation, PoseRelation::kRotation,
+                                   PoseRelation::kAngleDeg,    PoseRelation::kAngleRad,
+                                   PoseRelation::kFull,        PoseRelation::kPointDistance};
+
+EvaluateOptions AllRelations() {
+  EvaluateOptions options;
+  options.relations.assign(std::begin(kRelations), std::end(kRelations));
+  return options;
+}
+
+TEST(Evaluate, AConstantErrorIsWhatEachRelationSays) {
+  const Trajectory reference = Curve(20);
+  Trajectory estimate = reference;
+  const double angle = 0.3;
+  estimate.positions.colwise() += Vector3d(0.3, 0.0, -0.4);
+  for (Eigen::Quaterniond& q : estimate.orientations) q = q * Turn(angle);
+  const Evaluation e = Evaluate(reference, estimate, AllRelations());
+  // |R - I|^2 = 2 (3 - 1 - 2 cos) ... = 8 sin^2(angle / 2)
+  const double rotation = std::sqrt(8.0) * std::sin(0.15);
+  const double expected[] = {
+      0.5, rotation, 0.3 * 180.0 / kPi, 0.3, std::sqrt(0.25 + rotation * rotation), 0.5};
+  ASSERT_EQ(e.absolute.size(), 6u);
+  for (std::size_t r = 0; r < 6; ++r) {
+    SCOPED_TRACE(ToString(e.absolute[r].relation));
+    EXPECT_NEAR(e.absolute[r].statistics.rmse, expected[r], 1e-12);
+    EXPECT_NEAR(e.absolute[r].statistics.std, 0.0, 1e-12);
+    EXPECT_EQ(e.absolute[r].errors.size(), 20u);
+  }
+  EXPECT_NEAR(e.relative[5].statistics.max, 0.0, 1e-12);  // distances are the same
+}
+
+TEST(Evaluate, MatricesGiveTheSameRelativeErrors) {
+  const Trajectory reference = Curve(20);
+  Trajectory estimate = reference;
+  for (int i = 0; i < 20; ++i) {
+    estimate.positions.col(i) += 0.01 * Vector3d(std::sin(5.0 * i), std::cos(3.0 * i), 0.1 * i);
+    estimate.orientations[static_cast<std::size_t>(i)] *= Turn(0.02 * std::sin(4.0 * i));
+  }
+  EvaluateOptions options = AllRelations();
+  options.pairs.delta = 3;
+  options.pairs.all = true;
+  const Evaluation e = Evaluate(reference, estimate, options);
+  ASSERT_EQ(e.pairs.size(), 17u);
+  const auto matrix = [](const Trajectory& t, int i) {
+    Eigen::Isometry3d pose(t.orientations[static_cast<std::size_t>(i)]);
+    pose.translation() = t.positions.col(i);
+    return pose.matrix();
+  };
+  for (std::size_t k = 0; k < e.pairs.size(); ++k) {
+    const auto [i, j] = e.pairs[k];
+    const Eigen::Matrix4d q = matrix(reference, i).inverse() * matrix(reference, j);
+    const Eigen::Matrix4d p = matrix(estimate, i).inverse() * matrix(estimate, j);
+    const Eigen::Matrix4d error = q.inverse() * p;
+    const Eigen::Matrix3d turn = error.topLeftCorner<3, 3>();
+    EXPECT_NEAR(e.relative[0].errors[k], error.topRightCorner(3, 1).norm(), 1e-12);
+    EXPECT_NEAR(e.relative[1].errors[k], (turn - Eigen::Matrix3d::Identity()).norm(), 1e-12);
+    EXPECT_NEAR(e.relative[3].errors[k], std::abs(Eigen::AngleAxisd(turn).angle()), 1e-9);
+    EXPECT_NEAR(e.relative[4].errors[k], (error - Eigen::Matrix4d::Identity()).norm(), 1e-12);
+    const double apart = std::abs(q.topRightCorner(3, 1).norm() - p.topRightCorner(3, 1).norm());
+    EXPECT_NEAR(e.relative[5].errors[k], apart, 1e-12);
+  }
+}
+
+TEST(Evaluate, AConstantDriftIsTheRelativeError) {
+  // 2 % too long, and 0.001 rad too much from pose to pose.
+  const Trajectory reference = Line(101, 0.5);
+  Trajectory estimate = Line(101, 0.51);
+  for (int i = 0; i <= 100; ++i) {
+    estimate.orientations[static_cast<std::size_t>(i)] =
+        Eigen::AngleAxisd(0.001 * i, Vector3d::UnitX());
+  }
+  EvaluateOptions options = AllRelations();
+  const Evaluation step = Evaluate(reference, estimate, options);
+  EXPECT_EQ(step.pairs.size(), 100u);
+  EXPECT_NEAR(step.relative[0].statistics.rmse, 0.01, 1e-12);
+  EXPECT_NEAR(step.relative[3].statistics.max, 0.001, 1e-12);
+  options.pairs.delta = 10.0;  // of the estimate's path: the first pose at least that far on is 20
+  options.pairs.unit = DeltaUnit::kMetres;
+  const Evaluation metres = Evaluate(reference, estimate, options);
+  EXPECT_EQ(metres.pairs, (Pairs{{20, 40}, {40, 60}, {60, 80}, {80, 100}}));
+  EXPECT_NEAR(metres.relative[0].statistics.mean, 0.2, 1e-12);
+  EXPECT_NEAR(metres.relative[3].statistics.mean, 0.02, 1e-12);
+}
+
+TEST(PairsOf, AreDeltaApartInEachUnit) {
+  Trajectory t = Line(11, 0.5);
+  for (int i = 0; i < 11; ++i) {
+    t.orientations[static_cast<std::size_t>(i)] = Eigen::AngleAxisd(0.1 * i, Vector3d::UnitY());
+  }
+  EXPECT_EQ(PairsOf(t, {4.0, DeltaUnit::kFrames}), (Pairs{{0, 4}, {4, 8}}));
+  EXPECT_EQ(PairsOf(t, {8.0, DeltaUnit::kFrames, true}), (Pairs{{0, 8}, {1, 9}, {2, 10}}));
+  EXPECT_EQ(PairsOf(t, {1.9, DeltaUnit::kMetres}), (Pairs{{4, 8}}));
+  EXPECT_EQ(PairsOf(t, {4.4, DeltaUnit::kMetres, true, 0.05}), (Pairs{{0, 9}, {1, 10}}));
+  EXPECT_EQ(PairsOf(t, {0.45, DeltaUnit::kSeconds}), (Pairs{{0, 5}, {5, 10}}));
+  EXPECT_EQ(PairsOf(t, {0.95, DeltaUnit::kSeconds, true}), (Pairs{{0, 9}, {1, 10}}));
+  EXPECT_EQ(PairsOf(t, {0.45, DeltaUnit::kRadians}), (Pairs{{0, 5}, {5, 10}}));
+  EXPECT_EQ(PairsOf(t, {26.0, DeltaUnit::kDegrees}), (Pairs{{0, 5}, {5, 10}}));
+  EXPECT_EQ(PairsOf(t, {0.91, DeltaUnit::kRadians, true, 0.05}), (Pairs{{0, 9}, {1, 10}}));
+}
+
+TEST(PairsOf, RefusesADeltaThatNoTwoPosesAreApart) {
+  EXPECT_THROW(PairsOf(Line(5, 0.5), {5.0, DeltaUnit::kFrames}), Error);
+  EXPECT_THROW(PairsOf(Line(5, 0.5), {1.2, DeltaUnit::kMetres, true, 0.1}), Error);
+  Trajectory bare = Line(5, 0.5);
+  bare.stamps.clear();
+  EXPECT_THROW(PairsOf(bare, {0.1, DeltaUnit::kSeconds}), Error);
+  EXPECT_THROW(PairsOf(bare, {0.0, DeltaUnit::kFrames}), ContractViolation);
+}
+
+TEST(Evaluate, NeesIsThatOfTheCovariancesBesideThePoses) {
+  const Trajectory reference = Curve(40);
+  Trajectory estimate = reference;
+  for (int i = 0; i < 40; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    // In every fourth pose an error of 4 sigma, else of 1, along one axis; the first is known.
+    const double sigmas = i % 4 == 0 ? 4.0 : 1.0;
+    Eigen::Matrix3d covariance = Vector3d(0.01, 0.04, 1.0).asDiagonal();
+    estimate.positions(1, i) -= 0.2 * sigmas;
+    estimate.position_covariances.push_back(i == 0 ? Eigen::Matrix3d::Zero() : covariance);
+    covariance.diagonal() << 1.0, 1.0, 0.0025;
+    estimate.orientations[at] =
+        estimate.orientations[at] * Eigen::AngleAxisd(-0.05 * sigmas, Vector3d::UnitZ());
+    estimate.orientation_covariances.push_back(covariance);
+  }
+  const Evaluation e = Evaluate(reference, estimate, {});
+  ASSERT_TRUE(e.position_nees && e.orientation_nees);
+  EXPECT_EQ(e.position_nees->poses, 39);
+  // 9 of 16 / 3, 30 of 1 / 3; chi2(0.95, 3) = 7.8
+  EXPECT_NEAR(e.position_nees->mean, (9.0 * 16.0 + 30.0) / 3.0 / 39.0, 1e-9);
+  EXPECT_NEAR(e.position_nees->cov95, 30.0 / 39.0, 1e-12);
+  EXPECT_EQ(e.orientation_nees->poses, 40);
+  EXPECT_NEAR(e.orientation_nees->mean, (10.0 * 16.0 + 30.0) / 3.0 / 40.0, 1e-9);
+  EXPECT_EQ(e.nees_withheld, "");
+}
+
+TEST(Evaluate, NeesIsWithheldOfAnAlignedEstimate) {
+  Trajectory estimate = Curve(40);
+  estimate.position_covariances.assign(40, Eigen::Matrix3d::Identity());
+  estimate.orientation_covariances = estimate.position_covariances;
+  for (const Alignment alignment : {Alignment::kScale, Alignment::kOrigin, Alignment::kYaw,
+                                    Alignment::kSe3, Alignment::kSim3}) {
+    EvaluateOptions options;
+    options.alignment = alignment;
+    const Evaluation e = Evaluate(Curve(40), estimate, options);
+    EXPECT_FALSE(e.position_nees || e.orientation_nees);
+    EXPECT_EQ(e.nees_withheld, std::string("the alignment by ") + ToString(alignment) +
+                                   " takes errors away that the covariance is of; --align none");
+  }
+}
+
+TEST(Evaluate, ScaleAndItsDriftAreOfThePath) {
+  const Trajectory reference = Curve(40);
+  Trajectory estimate = reference;
+  estimate.positions.leftCols(20) /= 2.0;
+  estimate.positions.rightCols(20) /= 2.2;
+  const Evaluation e = Evaluate(reference, estimate, {});
+  EXPECT_NEAR(*e.scale_drift, 0.1, 1e-12);
+  EXPECT_GT(*e.sim3_scale, 2.0);
+  EXPECT_LT(*e.sim3_scale, 2.2);
+  EXPECT_FALSE(Evaluate(Curve(19), Curve(19), {}).scale_drift);
+}
+
+TEST(ReadInnovations, TellsNisAndWhiteness) {
+  const testing::TemporaryFolder folder;
+  std::string text = "t_s,stream,sensor,landmark,outcome,dof,nis,z0,h0,s0,r0\n";
+  // r / s alternates 1, -1: the products of neighbours are -1.
+  for (int i = 0; i < 10; ++i) {
+    text += "0,a,range,,accepted,1,1,0,0,2," + std::string(i % 2 == 0 ? "2" : "-2") + "\n";
+  }
+  text += "0,a,range,,gated,1,100,0,0,2,20\n";
+  // Of two landmarks, each always the same.
+  for (int i = 0; i < 10; ++i) {
+    text += "0,b,pixel," + std::to_string(i % 2) + ",accepted,1,6,0,0,1," +
+            std::to_string(1 - 2 * (i % 2)) + "\n";
+  }
+  std::ofstream(folder / "innovations.csv") << text;
+  const std::vector<InnovationStatistics> all = ReadInnovations(folder / "innovations.csv");
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_EQ(all[0].sensor, "pixel");
+  EXPECT_EQ(all[0].measurements, 10);
+  EXPECT_DOUBLE_EQ(all[0].nis_mean, 6.0);
+  EXPECT_DOUBLE_EQ(all[0].nis_cov95, 0.0);  // chi2(0.95, 1) = 3.84
+  EXPECT_DOUBLE_EQ(all[0].whiteness, 1.0);
+  EXPECT_DOUBLE_EQ(all[0].whiteness_bound, 1.96 / std::sqrt(8.0));
+  EXPECT_EQ(all[1].sensor, "range");
+  EXPECT_DOUBLE_EQ(all[1].nis_mean, 1.0);
+  EXPECT_DOUBLE_EQ(all[1].nis_cov95, 1.0);
+  EXPECT_DOUBLE_EQ(all[1].whiteness, -1.0);
+  EXPECT_DOUBLE_EQ(all[1].whiteness_bound, 1.96 / 3.0);
+  std::ofstream(folder / "innovations.csv") << "t_s,sensor\n";
+  EXPECT_THROW(ReadInnovations(folder / "innovations.csv"), Error);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <string>
+
+#include "alidade/evaluate.h"
+
+/// Trajectories made by formula, for tests of their evaluation.
+namespace alidade::testing {
+
+/// `poses` poses, 0.1 s apart from 100 s on, on a curve that bends in all directions and turns.
+inline Trajectory Curve(int poses) {
+  Trajectory t;
+  t.name = "curve.tum";
+  t.first_line = 1;
+  t.positions.resize(3, poses);
+  for (int i = 0; i < poses; ++i) {
+    const double s = 0.1 * i;
+    t.stamps.push_back(100'000'000'000 + Stamp{100'000'000} * i);
+    t.positions.col(i) << 3.0 * std::cos(s), 2.0 * std::sin(s) + 0.1 * s, 0.5 * std::sin(2.0 * s);
+    t.orientations.emplace_back(Eigen::AngleAxisd(s, Eigen::Vector3d::UnitZ()) *
+                                Eigen::AngleAxisd(0.7 * s, Eigen::Vector3d::UnitX()));
+  }
+  return t;
+}
+
+/// A straight line along x, `step_m` each 0.1 s, not turning.
+inline Trajectory Line(int poses, double step_m) {
+  Trajectory t = Curve(poses);
+  for (int i = 0; i < poses; ++i) {
+    t.positions.col(i) << step_m * i, 0.0, 0.0;
+    t.orientations[static_cast<std::size_t>(i)].setIdentity();
+  }
+  return t;
+}
+
+/// A turn by `angle` about an axis that is none of the three.
+inline Eigen::Quaterniond Turn(double angle) {
+  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d(1.0, -2.0, 0.5).normalized()));
+}
+
+/// What takes `Inverse(s) * t` back to t.
+inline Similarity Inverse(const Similarity& s) {
+  Similarity inverse;
+  inverse.scale = 1.0 / s.scale;
+  inverse.rotation = s.rotation.transpose();
+  inverse.translation = -inverse.scale * (inverse.rotation * s.translation);
+  return inverse;
+}
+
+}  // namespace alidade::testing

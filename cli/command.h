@@ -23,6 +23,7 @@ using Action = std::function<ExitCode()>;
 void AddRun(CLI::App& program, Action& action, const std::string& command_line);
 void AddExplain(CLI::App& program, Action& action);
 void AddSweep(CLI::App& program, Action& action);
+void AddBundle(CLI::App& program, Action& action);
 void AddSimulate(CLI::App& program, Action& action);
 void AddPlugins(CLI::App& program, Action& action);
 void AddCheck(CLI::App& program, Action& action);

@@ -57,6 +57,7 @@ void Describe(CLI::App& program, Action& action, const std::string& command_line
   AddRun(program, action, command_line);
   AddSweep(program, action);
   AddSimulate(program, action);
+  AddBundle(program, action);
   AddExplain(program, action);
   AddPlugins(program, action);
   AddCheck(program, action);

@@ -39,6 +39,10 @@ void CheckBuild(const AlidadeFingerprint& fingerprint, const std::filesystem::pa
 /// that failed.
 std::string TrialLoad(const std::filesystem::path& file, std::uint32_t tier);
 
+/// Opens a build-tier plugin for the rest of the process, checked as PluginHost checks all.
+/// Errors: kPlugin, kNotTrusted.
+const BuildTable& OpenBuildTier(const std::filesystem::path& file);
+
 /// What breaks the rules of plugin_abi.h or build_plugin.h in a table, or "".
 std::string Defect(const AlidadeTable* table);
 std::string Defect(const BuildTable* table);

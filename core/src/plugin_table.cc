@@ -91,7 +91,8 @@ std::string Defect(const BuildTable* table) {
   }
   const int sources = table->sources == nullptr ? 0 : table->source_count;
   const int estimators = table->estimators == nullptr ? 0 : table->estimator_count;
-  if (sources < 1 && estimators < 1 && table->pictures == nullptr) return "its table is empty";
+  const bool other = table->pictures != nullptr || table->adjust != nullptr;
+  if (sources < 1 && estimators < 1 && !other) return "its table is empty";
   std::string defect = BuildDefect(table->sources, sources, "a source");
   if (defect.empty()) defect = BuildDefect(table->estimators, estimators, "an estimator");
   return defect;

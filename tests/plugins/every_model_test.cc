@@ -13,6 +13,7 @@
 #include "motion_models/quaternion_pose.h"
 #include "sensors/depth_feature.h"
 #include "sensors/inverse_depth_feature.h"
+#include "sensors/self_calibrating_feature.h"
 #include "sensors/stereo_feature.h"
 #include "support/systems.h"
 
@@ -290,6 +291,13 @@ const std::vector<Row>& Rows() {
                 "{sigma_px: 1, sigma_depth_m: 0.1, landmarks: {form: xyz}, " + kCamera + "}",
                 DepthFeature<Xyz>(kSmallCamera, 1.0, 0.1),
                 {kPosition, kOrientation, {0.2, 0.4, 2.0}}),
+      SensorRow("self_calibrating_feature", "{sigma_px: 1}",
+                SelfCalibratingFeature<RadialLens>(1.0),
+                {kPosition, kOrientation, {20, -0.1, 0.05}, {0.2, 0.4, 2.0}}),
+      SensorRow(
+          "self_calibrating_feature", "{lens: radtan, sigma_px: 1}",
+          SelfCalibratingFeature<RadtanLens>(1.0),
+          {kPosition, kOrientation, {20, 16, 12, -0.1, 0.05, 0.0, 0.0, 0.0}, {0.2, 0.4, 2.0}}),
   };
   return rows;
 }

@@ -4,6 +4,7 @@
 #include <iterator>
 #include <memory>
 
+#include "alidade/bundle.h"
 #include "alidade/estimator.h"
 #include "alidade/fingerprint.h"
 #include "alidade/pictures.h"
@@ -60,6 +61,9 @@ struct BuildTable {
   int estimator_count = 0;
   /// Of the plugin that draws pictures: see OpenPictures.
   std::unique_ptr<PictureWriter> (*pictures)(const PictureArguments& arguments) = nullptr;
+  /// Of the plugin that adjusts bundles: see AdjustBundle.
+  BundleResult (*adjust)(const SensorModel& sensor, BundleProblem& problem,
+                         const BundleOptions& options) = nullptr;
 };
 
 inline constexpr const char* kBuildEntrySymbol = "alidade_build_plugin";
@@ -88,3 +92,6 @@ inline constexpr const char* kBuildEntrySymbol = "alidade_build_plugin";
 
 /// Exports the picture writer of this plugin: ALIDADE_PICTURE_PLUGIN(&Create)
 #define ALIDADE_PICTURE_PLUGIN(create) ALIDADE_BUILD_PLUGIN_(nullptr, 0, nullptr, 0, create)
+
+/// Exports the bundle adjustment of this plugin: ALIDADE_BUNDLE_PLUGIN(&Adjust)
+#define ALIDADE_BUNDLE_PLUGIN(adjust) ALIDADE_BUILD_PLUGIN_(nullptr, 0, nullptr, 0, nullptr, adjust)

@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Time of an iteration of Ceres on one bundle adjustment, where the costs are made of a sensor
+// model, relative to cost functions written by hand for it. 50 cameras, 2000 points, 20 000 pixels.
+#include "plugins/ceres_batch/sensor_cost.h"
+
+#include <ceres/autodiff_cost_function.h>
+#include <ceres/manifold.h>
+#include <ceres/problem.h>
+#include <ceres/product_manifold.h>
+#include <ceres/rotation.h>
+#include <ceres/sized_cost_function.h>
+#include <ceres/solver.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <memory>
+#include <numbers>
+
+#include "alidade/in_process.h"
+#include "bench/speed/interleaved.h"
+#include "plugins/ceres_batch/geometry_manifold.h"
+
+namespace alidade::bench {
+namespace {
+
+using ceres_batch::CostKind;
+using ceres_batch::GeometryManifold;
+using ceres_batch::SensorCost;
+
+constexpr double kFocal = 500.0;  // px
+constexpr int kPose = 7;          // position, world_from_cam
+
+/// z = f (hx, hy) / hz,  h = R_CW (p - r): the model, without closed Jacobians.
+struct Pinhole : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<3>> {
+  static constexpr std::array kRoles{Quantity{"position"}, Quantity{"orientation"},
+                                     Quantity{"point"}};
+  static constexpr Quantity kMeasurement{"pixel", "px", "", "u,v"};
+  template <class T>
+  bool Predict(const T* position, const T* orientation, const T* point, T* z) const {
+    const T along[3] = {point[0] - position[0], point[1] - position[1], point[2] - position[2]};
+    T h[3];
+    UnitQuaternion::RotateBack(orientation, along, h);
+    if (!(h[2] > T(0.0))) return false;
+    const T inverse = kFocal / h[2];
+    z[0] = inverse * h[0];
+    z[1] = inverse * h[1];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, const T*, T* l) const {
+    l[0] = l[3] = T(1.0);
+  }
+};
+
+/// A row of dz/dh by all, as the author of a model and the author of a cost both write it.
+inline void Row(const double* orientation, const double* h, double ax, double ay, double x,
+                double y, double* J_r, double* J_q, double* J_p) {
+  const double a[3] = {ax, ay, -(ax * x + ay * y)};
+  UnitQuaternion::Rotate(orientation, a, J_p);
+  for (int i = 0; i < 3; ++i) J_r[i] = -J_p[i];
+  J_q[0] = a[1] * h[2] - a[2] * h[1];
+  J_q[1] = a[2] * h[0] - a[0] * h[2];
+  J_q[2] = a[0] * h[1] - a[1] * h[0];
+}
+
+/// The same with closed Jacobians.
+struct PinholeClosed : Pinhole {
+  void Jacobian(const double* position, const double* orientation, const double* point,
+                MatrixRef J_r, MatrixRef J_q, MatrixRef J_p) const {
+    const double along[3] = {point[0] - position[0], point[1] - position[1],
+                             point[2] - position[2]};
+    double h[3];
+    UnitQuaternion::RotateBack(orientation, along, h);
+    const double inverse = 1.0 / h[2], a = kFocal * inverse, x = h[0] * inverse, y = h[1] * inverse;
+    Row(orientation, h, a, 0.0, x, y, &J_r(0, 0), &J_q(0, 0), &J_p(0, 0));
+    Row(orientation, h, 0.0, a, x, y, &J_r(1, 0), &J_q(1, 0), &J_p(1, 0));
+  }
+};
+
+/// r = z - h by hand, for this manifold: [J | 0].
+class ByHand final : public ceres::SizedCostFunction<2, kPose, 3> {
+ public:
+  explicit ByHand(const double* z) : u_(z[0]), v_(z[1]) {}
+  bool Evaluate(const double* const* blocks, double* r, double** j) const override {
+    const double* const pose = blocks[0];
+    const double* const q = pose + 3;
+    const double along[3] = {blocks[1][0] - pose[0], blocks[1][1] - pose[1],
+                             blocks[1][2] - pose[2]};
+    double h[3];
+    UnitQuaternion::RotateBack(q, along, h);
+    if (!(h[2] > 0.0)) return false;
+    const double inverse = 1.0 / h[2], x = h[0] * inverse, y = h[1] * inverse;
+    r[0] = u_ - kFocal * x;
+    r[1] = v_ - kFocal * y;
+    if (j == nullptr) return true;
+    const double a = -kFocal * inverse;
+    double pose_rows[14], point_rows[6];
+    Row(q, h, a, 0.0, x, y, pose_rows, pose_rows + 3, point_rows);
+    Row(q, h, 0.0, a, x, y, pose_rows + 7, pose_rows + 10, point_rows + 3);
+    pose_rows[6] = pose_rows[13] = 0.0;
+    if (j[0] != nullptr) std::copy_n(pose_rows, 14, j[0]);
+    if (j[1] != nullptr) std::copy_n(point_rows, 6, j[1]);
+    return true;
+  }
+
+ private:
+  double u_, v_;
+};
+
+/// r = z - h as users of Ceres write it.
+struct Functor {
+  double u, v;
+  template <class T>
+  bool operator()(const T* pose, const T* point, T* r) const {
+    const T along[3] = {point[0] - pose[0], point[1] - pose[1], point[2] - pose[2]};
+    const T back[4] = {pose[3], -pose[4], -pose[5], -pose[6]};
+    T h[3];
+    ceres::UnitQuaternionRotatePoint(back, along, h);
+    if (!(h[2] > T(0.0))) return false;
+    const T inverse = kFocal / h[2];
+    r[0] = u - inverse * h[0];
+    r[1] = v - inverse * h[1];
+    return true;
+  }
+};
+
+/// Cameras on a circle that look at points in a ball; values 1 % off the truth, pixels 0.5 px.
+struct Scene {
+  static constexpr int kCameras = 50, kPoints = 2000, kSeen = 10;
+  struct Pixel {
+    int camera, point;
+    double z[2];
+  };
+  std::vector<double> poses, points;
+  std::vector<Pixel> pixels;
+
+  Scene() {
+    auto wave = [n = 0]() mutable {
+      ++n;
+      return std::sin(1.7 * n) * std::cos(0.31 * n * std::sqrt(n));
+    };
+    for (int i = 0; i < kPoints; ++i)
+      for (int k = 0; k < 3; ++k) points.push_back(2.0 * wave());
+    for (int i = 0; i < kCameras; ++i) {
+      const double angle = 2.0 * std::numbers::pi * i / kCameras, turn[3] = {0.0, angle, 0.0};
+      double q[4];
+      UnitQuaternion::Exp(turn, q);
+      poses.insert(poses.end(), {-8.0 * std::sin(angle), 0.3 * wave(), -8.0 * std::cos(angle)});
+      poses.insert(poses.end(), q, q + 4);
+    }
+    const Pinhole model;
+    for (int i = 0; i < kPoints; ++i) {
+      for (int k = 0; k < kSeen; ++k) {
+        Pixel pixel{(7 * i + 5 * k) % kCameras, i, {}};
+        const double* const pose = &poses[static_cast<std::size_t>(kPose * pixel.camera)];
+        if (!model.Predict(pose, pose + 3, &points[static_cast<std::size_t>(3 * i)], pixel.z))
+          continue;
+        for (double& z : pixel.z) z += 0.5 * wave();
+        pixels.push_back(pixel);
+      }
+    }
+    for (double& x : points) x += 0.02 * wave();
+  }
+};
+
+/// One way to make costs, and its problem. The values are its own.
+class Adjustment {
+ public:
+  using Make = std::function<ceres::CostFunction*(const double* z)>;
+  using MakeManifold = std::function<ceres::Manifold*()>;
+
+  Adjustment(const Scene& scene, ceres::LinearSolverType solver, const Make& make,
+             const MakeManifold& manifold)
+      : scene_(scene), solver_(solver), poses_(scene.poses), points_(scene.points) {
+    for (const Scene::Pixel& pixel : scene.pixels) {
+      double* const pose = &poses_[static_cast<std::size_t>(kPose * pixel.camera)];
+      double* const point = &points_[static_cast<std::size_t>(3 * pixel.point)];
+      costs_.push_back({make(pixel.z), {pose, point}});
+      problem_.AddResidualBlock(costs_.back().cost, nullptr, pose, point);
+    }
+    for (int i = 0; i < Scene::kCameras; ++i)
+      problem_.SetManifold(&poses_[static_cast<std::size_t>(kPose * i)], manifold());
+    problem_.SetParameterBlockConstant(poses_.data());
+  }
+
+  /// Five iterations from the start; ms of CPU time each.
+  double Iterate() {
+    poses_ = scene_.poses;
+    points_ = scene_.points;
+    ceres::Solver::Options options;
+    options.linear_solver_type = solver_;
+    options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+    for (int i = 0; i < Scene::kPoints; ++i)
+      options.linear_solver_ordering->AddElementToGroup(&points_[static_cast<std::size_t>(3 * i)],
+                                                        0);
+    for (int i = 0; i < Scene::kCameras; ++i)
+      options.linear_solver_ordering->AddElementToGroup(
+          &poses_[static_cast<std::size_t>(kPose * i)], 1);
+    options.max_num_iterations = 5;
+    options.function_tolerance = options.gradient_tolerance = options.parameter_tolerance = 0.0;
+    options.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    const double start = CpuNs();
+    ceres::Solve(options, &problem_, &summary);
+    const double ms = 1e-6 * (CpuNs() - start);
+    cost_ = summary.final_cost;
+    return ms / static_cast<double>(summary.iterations.size() - 1);
+  }
+  /// Residuals and Jacobians of all pixels once; ns each.
+  double Evaluate() {
+    double r[2], pose[2 * kPose], point[6];
+    double* jacobians[] = {pose, point};
+    const double start = CpuNs();
+    for (const Cost& one : costs_) sum_ += one.cost->Evaluate(one.blocks, r, jacobians) ? r[0] : 0;
+    return (CpuNs() - start) / static_cast<double>(costs_.size());
+  }
+  double cost() const { return cost_; }
+
+ private:
+  struct Cost {
+    ceres::CostFunction* cost;
+    const double* blocks[2];
+  };
+  const Scene& scene_;
+  ceres::LinearSolverType solver_;
+  std::vector<double> poses_, points_;
+  std::vector<Cost> costs_;
+  ceres::Problem problem_;
+  double cost_ = 0.0, sum_ = 0.0;
+};
+
+/// Sorted ratios of two series, taken together.
+struct Ratio {
+  std::vector<double> values;
+  Ratio(const std::vector<double>& a, const std::vector<double>& b) {
+    for (std::size_t i = 0; i < a.size(); ++i) values.push_back(a[i] / b[i]);
+    std::sort(values.begin(), values.end());
+  }
+  double At(double q) const {
+    return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
+  }
+};
+
+constexpr double kPlain[4] = {1.0, 0.0, 0.0, 1.0};  // W of 1 px
+
+/// The ways to make costs: each adaptor beside what it is compared with.
+struct Ways {
+  PinholeClosed closed;
+  Pinhole derived;
+  SensorModel sealed_closed = InProcessSensor(closed, "closed");
+  SensorModel sealed_derived = InProcessSensor(derived, "derived");
+  std::vector<ceres_batch::RolePlace> places{{0, 0}, {0, 3}, {1, 0}};
+  CostKind<PinholeClosed> closed_kind{closed, places, {kPose, 3}};
+  CostKind<Pinhole> derived_kind{derived, places, {kPose, 3}};
+  CostKind<SensorModel> sealed_closed_kind{sealed_closed, places, {kPose, 3}};
+  CostKind<SensorModel> sealed_derived_kind{sealed_derived, places, {kPose, 3}};
+
+  static ceres::Manifold* Tangent() {
+    return new GeometryManifold(
+        {{Geometry::Vector(3), false}, {Geometry::UnitQuaternion(), false}});
+  }
+  static ceres::Manifold* Ambient() {
+    return new ceres::ProductManifold<ceres::EuclideanManifold<3>, ceres::QuaternionManifold>();
+  }
+  struct Way {
+    const char* name;
+    std::size_t peer;  ///< the way it is compared with
+    Adjustment::Make make;
+    Adjustment::MakeManifold manifold;
+  };
+  std::vector<Way> all = {
+      {"by hand", 0, [](const double* z) { return new ByHand(z); }, Tangent},
+      {"closed form, static", 0,
+       [this](const double* z) { return new SensorCost(closed_kind, z, kPlain); }, Tangent},
+      {"closed form, plugin", 0,
+       [this](const double* z) { return new SensorCost(sealed_closed_kind, z, kPlain); }, Tangent},
+      {"ceres::AutoDiffCostFunction", 3,
+       [](const double* z) {
+         return new ceres::AutoDiffCostFunction<Functor, 2, kPose, 3>(new Functor{z[0], z[1]});
+       },
+       Ambient},
+      {"derived, static", 3,
+       [this](const double* z) { return new SensorCost(derived_kind, z, kPlain); }, Tangent},
+      {"derived, plugin", 3,
+       [this](const double* z) { return new SensorCost(sealed_derived_kind, z, kPlain); }, Tangent},
+  };
+};
+
+int Main(int rounds) {
+  const Scene scene;
+  const Ways ways;
+  const std::size_t count = ways.all.size();
+  for (const auto solver : {ceres::DENSE_SCHUR, ceres::SPARSE_SCHUR}) {
+    std::vector<std::unique_ptr<Adjustment>> adjustments;
+    for (const Ways::Way& way : ways.all)
+      adjustments.push_back(std::make_unique<Adjustment>(scene, solver, way.make, way.manifold));
+    std::vector<std::vector<double>> ms(count), ns(count);
+    for (int round = 0; round < rounds; ++round) {
+      for (std::size_t i = 0; i < count; ++i) ms[i].push_back(adjustments[i]->Iterate());
+      for (std::size_t i = 0; i < count; ++i) ns[i].push_back(adjustments[i]->Evaluate());
+    }
+    std::printf("%s\n%-28s %12s %8s %26s\n", ceres::LinearSolverTypeToString(solver), "",
+                "ms/iteration", "ns/cost", "ratio (10 % to 90 %)");
+    for (std::size_t i = 0; i < count; ++i) {
+      if (std::abs(adjustments[i]->cost() / adjustments[0]->cost() - 1.0) > 1e-6) {
+        std::fprintf(stderr, "error: %s ends at cost %.12g, by hand at %.12g\n", ways.all[i].name,
+                     adjustments[i]->cost(), adjustments[0]->cost());
+        return 1;
+      }
+      const Ratio ratio(ms[i], ms[ways.all[i].peer]);
+      std::sort(ms[i].begin(), ms[i].end());
+      std::sort(ns[i].begin(), ns[i].end());
+      std::printf("%-28s %12.2f %8.1f %10.3f (%.3f to %.3f)\n", ways.all[i].name,
+                  ms[i][ms[i].size() / 2], ns[i][ns[i].size() / 10], ratio.At(0.5), ratio.At(0.1),
+                  ratio.At(0.9));
+    }
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace alidade::bench
+
+int main(int argc, char** argv) {
+  CLI::App app{"Time of an iteration of Ceres on costs made of sensor models, relative to others."};
+  int rounds = 15;
+  app.add_option("--rounds", rounds, "Solves of five iterations for each contender")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  return alidade::bench::Main(rounds);
+}

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <charconv>
+#include <cstdio>
+#include <memory>
+
+#include "alidade/bundle_file.h"
+#include "command.h"
+#include "console.h"
+
+namespace alidade::cli {
+namespace {
+
+constexpr const char* kFooter = R"(Examples:
+  alidade bundle problem-16-22106-pre.txt -o runs/bal
+  bzcat problem-16-22106-pre.txt.bz2 | alidade bundle - --loss huber=1.5
+  alidade bundle bundle.out --fix intrinsics -o runs/bundler
+  alidade bundle data/tracks.csv --camera data/calibration.yaml --start run/trajectory.tum -o runs/a
+
+Reads problems of BAL, Bundler v0.3 and libmv, told apart by their beginning, and tracks as `simulate`
+writes them. Ctrl-C ends after the iteration and keeps what is reached (exit code 75).)";
+
+struct Arguments {
+  std::string problem, folder, loss;
+  std::vector<std::string> fixed;
+  BundleTracks tracks;
+  std::vector<std::string> plugin_paths;
+  int iterations = 500;
+  bool force = false, quiet = false;
+};
+
+/// `huber`, `cauchy=2`
+bool ParseLoss(const std::string& text, RobustLoss& loss) {
+  const std::size_t equals = std::min(text.find('='), text.size());
+  const std::string name = text.substr(0, equals);
+  for (const LossKind kind : {LossKind::kNone, LossKind::kHuber, LossKind::kCauchy}) {
+    if (name == ToString(kind)) loss.kind = kind;
+  }
+  if (name != ToString(loss.kind)) return false;
+  if (equals == text.size()) return true;
+  const char* const end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data() + equals + 1, end, loss.scale);
+  return error == std::errc() && rest == end && loss.scale > 0.0 && loss.scale < 1e300;
+}
+
+std::string IsLoss(const std::string& text) {
+  RobustLoss loss;
+  if (ParseLoss(text, loss)) return {};
+  return "'" + text + "' is no loss; expected none, huber or cauchy, or huber=SCALE in px, > 0";
+}
+
+BundleFile Read(const Arguments& arguments, const PluginHost& host) {
+  if (arguments.tracks.camera.empty() && arguments.tracks.start.empty())
+    return ReadBundle(arguments.problem);
+  BundleTracks tracks = arguments.tracks;
+  tracks.tracks = arguments.problem;
+  return ReadBundleTracks(tracks, host);
+}
+
+std::string Short(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
+}
+
+std::string Describe(const BundleFile& file, int left_out) {
+  const BundleProblem& problem = file.problem;
+  std::string text = std::string(ToString(file.format)) + ": " +
+                     std::to_string(problem.cameras.size()) + " cameras, " +
+                     std::to_string(problem.points.size()) + " points, " +
+                     std::to_string(problem.observations.size()) + " observations";
+  if (left_out > 0)
+    text += "; " + std::to_string(left_out) + " left out, behind their camera at the start";
+  return text + '\n';
+}
+
+ExitCode CodeOf(BundleEnd end) {
+  switch (end) {
+    case BundleEnd::kConverged:
+      return ExitCode::kOk;
+    case BundleEnd::kStopped:
+      return ExitCode::kStopped;
+    case BundleEnd::kOutOfIterations:
+      return ExitCode::kFound;
+    case BundleEnd::kFailed:
+      break;
+  }
+  return ExitCode::kDiverged;
+}
+
+ExitCode RunBundle(const Arguments& arguments) {
+  const PluginHost host(Absolute(arguments.plugin_paths));
+  StopOnSignals();
+  BundleFile file = Read(arguments, host);
+  const SensorModel sensor = BundleSensor(host, file.problem);
+  const int left_out = LeaveOutUndefined(sensor, file.problem);
+  const double before = BundleRms(sensor, file.problem);
+
+  Progress progress("iterations", arguments.quiet);
+  BundleOptions options;
+  options.max_iterations = arguments.iterations;
+  options.fixed = arguments.fixed;
+  options.stop = StopRequested;
+  options.progress = [&](int done, double) { progress.Show(done, -1); };
+  if (!arguments.loss.empty()) ParseLoss(arguments.loss, options.loss);
+  const BundleResult result = AdjustBundle(sensor, file.problem, options);
+  progress.Clear();
+  FinishOnSignals();
+  const double after = BundleRms(sensor, file.problem);
+
+  std::string text = Describe(file, left_out);
+  text += "rms " + Short(before) + " px -> " + Short(after) + " px, " + ToString(result.end) +
+          " after " + std::to_string(result.iterations) + " iterations, " +
+          std::to_string(result.residuals) + " residuals, " + std::to_string(result.unknowns) +
+          " unknowns\n";
+  for (const std::string& line : Undetermined(file.problem, sensor, result)) text += line + '\n';
+  if (!arguments.folder.empty()) {
+    const std::vector<std::string> names =
+        SaveBundle(file, result, before, after, arguments.folder, arguments.force);
+    text += "wrote " + arguments.folder + '\n';
+    for (const std::string& name : names)
+      text += "  " + (std::filesystem::path(arguments.folder) / name).string() + '\n';
+  }
+  if (!arguments.quiet) Print(text);
+  if (result.end == BundleEnd::kFailed) PrintErrors(arguments.problem + ": " + result.message);
+  if (result.end == BundleEnd::kOutOfIterations)
+    PrintNote("not converged: " + result.message + " (--iterations)");
+  return CodeOf(result.end);
+}
+
+}  // namespace
+
+void AddBundle(CLI::App& program, Action& action) {
+  CLI::App& command = *program.add_subcommand(
+      "bundle", "Adjust cameras and the points that they see: BAL, Bundler, libmv, tracks");
+  const auto arguments = std::make_shared<Arguments>();
+  command.add_option("PROBLEM", arguments->problem, "the problem, a file; `-`: standard input")
+      ->option_text(" ")
+      ->required()
+      ->check(IsNamed);
+  AddOutput(command, arguments->folder, "folder for the solution; default: none is written");
+  const auto add = [&](const char* name, auto& value, const char* text, const char* help) {
+    return command.add_option(name, value, help)->option_text(text);
+  };
+  add("--loss", arguments->loss, "LOSS",
+      "none, huber or cauchy; huber=2: from 2 px on; default none")
+      ->check(IsLoss);
+  add("--fix", arguments->fixed, "NAME,...",
+      "leaves intrinsics as they are: all of them by `intrinsics`, or elements such as k1,k2")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  add("--iterations", arguments->iterations, "N", "at most; default 500")
+      ->check(IsInteger(0, 1000000));
+  CLI::Option* const camera = add("--camera", arguments->tracks.camera, "FILE",
+                                  "of tracks: YAML with `camera`, of a pair `baseline_m` too");
+  CLI::Option* const start =
+      add("--start", arguments->tracks.start, "FILE", "of tracks: trajectory to start from, TUM");
+  camera->needs(start);
+  start->needs(camera);
+  AddPluginPath(command, arguments->plugin_paths);
+  command.add_flag("--force", arguments->force, "replace the folder if it is there");
+  command.add_flag("--quiet", arguments->quiet, "print errors only");
+  command.footer(kFooter);
+  command.callback(
+      [&action, arguments] { action = [arguments] { return RunBundle(*arguments); }; });
+}
+
+}  // namespace alidade::cli

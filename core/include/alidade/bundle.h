@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "alidade/models.h"
+#include "alidade/plugin_host.h"
+#include "alidade/robust_loss.h"
+
+/// Bundle adjustment: cameras and the points that they see, estimated together from the pixels.
+///
+///   argmin  sum_i rho(|r_i|),   r_i = L^-1 (z_i (-) h(camera_i, point_i)),   R = L L'
+///
+/// h is a sensor model: its roles `position`, `orientation`, where it has one `intrinsics`, and one
+/// more, the point. rho(d) = d^2 / 2, or the robust loss.
+namespace alidade {
+
+/// Where a camera stands, and which intrinsics it has.
+struct BundleCamera {
+  std::array<double, 3> position{};               ///< in the world
+  std::array<double, 4> orientation{1, 0, 0, 0};  ///< world_from_cam, w x y z
+  int intrinsics = 0;                             ///< index into BundleProblem::intrinsics
+};
+
+/// Camera `camera` sees point `point` at `z`, of which the sensor's measurement says the size.
+struct BundleObservation {
+  int camera = 0, point = 0;
+  std::array<double, 4> z{};
+  bool used = true;  ///< false: the sensor is not defined where the problem starts
+};
+
+struct BundleProblem {
+  /// The sensor as a config writes it, YAML: `model` and its parameters.
+  std::string sensor;
+  std::vector<BundleCamera> cameras;
+  std::vector<std::vector<double>> intrinsics;  ///< empty where the sensor has no such role
+  std::vector<std::array<double, 3>> points;    ///< in the world
+  std::vector<BundleObservation> observations;
+};
+
+struct BundleOptions {
+  int max_iterations = 500;
+  RobustLoss loss;
+  std::vector<std::string> fixed;  ///< elements of the intrinsics, or `intrinsics`: all of them
+  std::function<bool()> stop;      ///< true: end after the iteration
+  std::function<void(int, double)> progress;  ///< iterations done, cost
+};
+
+enum class BundleEnd { kConverged, kOutOfIterations, kStopped, kFailed };
+/// `converged`, `out of iterations`, `stopped`, `failed`.
+const char* ToString(BundleEnd end);
+
+/// What became of an adjustment.
+struct BundleResult {
+  BundleEnd end = BundleEnd::kFailed;
+  std::string message;  ///< of the solver
+  int iterations = 0;   ///< steps tried
+  double cost_before = 0.0, cost_after = 0.0;
+  int residuals = 0;  ///< scalars
+  int unknowns = 0;   ///< tangent elements that were estimated, the held first pose left out
+  int rank = -1;      ///< of the Jacobian at the solution; -1: more than kBundleRankUnknowns
+};
+inline constexpr int kBundleRankUnknowns = 600;
+
+/// Which of a sensor's roles is what.
+struct BundleRoles {
+  std::size_t position, orientation, point;
+  int intrinsics = -1;  ///< -1: it has none
+};
+/// Roles by their names; the point is the one that is called otherwise. Error: kInternal where a
+/// sensor is no camera, or measures other than 1 to 4 numbers.
+BundleRoles RolesOf(const SensorModel& sensor);
+/// The values of an observation's roles, in the order of the sensor; they live in `problem`.
+std::vector<const double*> RoleValues(const BundleRoles& roles, const BundleProblem& problem,
+                                      const BundleObservation& seen);
+
+/// Whether each element of the intrinsics is fixed. Error: kUsage where `fixed` names another.
+std::vector<bool> FixedElements(const SensorModel& sensor, const std::vector<std::string>& fixed);
+
+/// The sensor that `problem` names. Errors: kPlugin, kBadConfig.
+SensorModel BundleSensor(const PluginHost& host, const BundleProblem& problem);
+
+/// Leaves out, by BundleObservation::used, what the sensor is not defined for where the problem
+/// stands (a point behind its camera); returns how many.
+int LeaveOutUndefined(const SensorModel& sensor, BundleProblem& problem);
+
+/// Errors of the observations used, all measured values alike:
+///
+///   rms = sqrt(sum_i |z_i (-) h_i|^2 / n),   n the number of observations
+///
+/// in the unit of z, px; 0 where none is used.
+double BundleRms(const SensorModel& sensor, const BundleProblem& problem);
+
+/// Moves cameras, points and, but for what is fixed, intrinsics of `problem` to the minimum. The
+/// pose of the first camera that is used stays. Done by the plugin of the Ceres solver, which is
+/// loaded when it is first asked for, from `folder`, or where that is "" from beside the library.
+/// Errors: kPlugin where there is none, kNotTrusted.
+BundleResult AdjustBundle(const SensorModel& sensor, BundleProblem& problem,
+                          const BundleOptions& options, const std::filesystem::path& folder = {});
+
+/// What the observations used cannot tell, in words, a line each: the gauge, parts that share no
+/// observation, points seen once, directions without any information.
+std::vector<std::string> Undetermined(const BundleProblem& problem, const SensorModel& sensor,
+                                      const BundleResult& result);
+
+}  // namespace alidade

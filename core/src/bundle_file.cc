@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/bundle_file.h"
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <iostream>
+#include <sstream>
+
+#include "bundle_formats.h"
+#include "json.h"
+#include "number_text.h"
+#include "run_folder.h"
+
+namespace alidade {
+namespace {
+
+using internal::AppendNumber;
+using internal::RunFolder;
+
+std::string ReadAll(const std::filesystem::path& file) {
+  std::ostringstream bytes;
+  if (file == "-") {
+    bytes << std::cin.rdbuf();
+    return bytes.str();
+  }
+  const auto fail = [&](int error) {
+    throw Error(ExitCode::kInputMissing,
+                ErrorLine({file.string()}, {}, std::strerror(error), "a readable file"));
+  };
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored)) fail(EISDIR);
+  errno = 0;
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) fail(errno != 0 ? errno : EIO);
+  if (stream.peek() != std::ifstream::traits_type::eof()) bytes << stream.rdbuf();
+  if (stream.bad() || bytes.fail()) {
+    throw Error(ExitCode::kIo, ErrorLine({file.string()}, {}, "reading failed half-way"));
+  }
+  return std::move(bytes).str();
+}
+
+[[noreturn]] void FailFormat(const std::string& name, const std::string& what,
+                             const std::string& expected) {
+  throw Error(ExitCode::kBadData, ErrorLine(Place{name, 1, 1}, {}, what, expected));
+}
+
+const char* ExtensionOf(BundleFormat format) {
+  constexpr const char* kExtensions[] = {".txt", ".out", ".bin", ""};
+  return kExtensions[static_cast<int>(format)];
+}
+
+std::string PosesTum(const BundleFile& file) {
+  std::string text;
+  for (std::size_t i = 0; i < file.problem.cameras.size(); ++i) {
+    const BundleCamera& camera = file.problem.cameras[i];
+    if (!file.stamps.empty()) {
+      internal::AppendSeconds(text, file.stamps[i]);
+    } else {
+      text += std::to_string(file.camera_ids.empty() ? static_cast<std::int64_t>(i)
+                                                     : file.camera_ids[i]);
+    }
+    const auto& q = camera.orientation;
+    for (const double value : camera.position) AppendNumber(text += ' ', value);
+    for (const double value : {q[1], q[2], q[3], q[0]}) AppendNumber(text += ' ', value);
+    text += '\n';
+  }
+  return text;
+}
+
+std::string PointsCsv(const BundleFile& file) {
+  std::string text = "point,x,y,z\n";
+  for (std::size_t i = 0; i < file.problem.points.size(); ++i) {
+    text +=
+        std::to_string(file.point_ids.empty() ? static_cast<std::int64_t>(i) : file.point_ids[i]);
+    for (const double value : file.problem.points[i]) AppendNumber(text += ',', value);
+    text += '\n';
+  }
+  return text;
+}
+
+std::string ResultJson(const BundleFile& file, const BundleResult& result, double rms_before,
+                       double rms_after) {
+  internal::Json json;
+  json.Object();
+  json.Key("format").Text(ToString(file.format));
+  json.Key("status").Text(ToString(result.end));
+  json.Key("message").Text(result.message);
+  json.Key("cameras").Integer(std::ssize(file.problem.cameras));
+  json.Key("points").Integer(std::ssize(file.problem.points));
+  json.Key("observations").Integer(std::ssize(file.problem.observations));
+  json.Key("rms_before_px").Number(rms_before);
+  json.Key("rms_after_px").Number(rms_after);
+  json.Key("cost_before").Number(result.cost_before);
+  json.Key("cost_after").Number(result.cost_after);
+  json.Key("iterations").Integer(result.iterations);
+  json.Key("residuals").Integer(result.residuals);
+  json.Key("unknowns").Integer(result.unknowns);
+  if (result.rank >= 0) json.Key("rank").Integer(result.rank);
+  json.End();
+  return json.text();
+}
+
+}  // namespace
+
+const char* ToString(BundleFormat format) {
+  constexpr const char* kNames[] = {"bal", "bundler", "libmv", "tracks"};
+  return kNames[static_cast<int>(format)];
+}
+
+BundleFile ReadBundle(const std::filesystem::path& file) {
+  const std::string name = file == "-" ? "<stdin>" : file.string();
+  const std::string text = ReadAll(file);
+  const std::string_view view = text;
+  if (view.find_first_not_of(" \t\r\n") == view.npos)
+    FailFormat(name, "nothing in it", "a problem");
+  if (view.starts_with("\x1F\x8B") || view.starts_with("BZh")) {
+    FailFormat(name, "compressed", "the text: zcat or bzcat FILE | alidade bundle -");
+  }
+  if (view.size() > 1 && (view[0] == 'v' || view[0] == 'V') && (view[1] == 'P' || view[1] == 'N'))
+    return internal::ReadLibmv(view, name);
+  if (view.starts_with(internal::kBundlerHeader)) return internal::ReadBundler(view, name);
+  if (view.starts_with("# Bundle")) {
+    FailFormat(name, '\'' + std::string(view.substr(0, view.find_first_of("\r\n"))) + '\'',
+               std::string(internal::kBundlerHeader));
+  }
+  const std::size_t first = std::min(view.find('\n'), view.size());
+  if (view.substr(0, first).find(',') != view.npos) {
+    FailFormat(name, "columns with commas: tracks",
+               "their calibration and start beside them, --camera FILE and --start FILE");
+  }
+  return internal::ReadBal(view, name);
+}
+
+std::string BundleText(const BundleFile& file) {
+  ALIDADE_EXPECTS(file.format != BundleFormat::kTracks);
+  if (file.format == BundleFormat::kBundler) return internal::BundlerText(file);
+  if (file.format == BundleFormat::kLibmv) return internal::LibmvBytes(file);
+  return internal::BalText(file);
+}
+
+std::vector<std::string> SaveBundle(const BundleFile& file, const BundleResult& result,
+                                    double rms_before, double rms_after,
+                                    const std::filesystem::path& folder, bool force) {
+  RunFolder output(folder, force);
+  std::vector<std::string> names = {"bundle.json", "points.csv", "poses.tum"};
+  output.Write(names[0], ResultJson(file, result, rms_before, rms_after));
+  output.Write(names[1], PointsCsv(file));
+  output.Write(names[2], PosesTum(file));
+  if (file.format != BundleFormat::kTracks) {
+    names.push_back(std::string("problem") + ExtensionOf(file.format));
+    output.Write(names.back(), BundleText(file));
+  }
+  output.Commit();
+  return names;
+}
+
+}  // namespace alidade

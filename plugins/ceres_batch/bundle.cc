@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/bundle.h"
+
+#include <ceres/crs_matrix.h>
+#include <ceres/iteration_callback.h>
+#include <ceres/problem.h>
+#include <ceres/solver.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <memory>
+
+#include "alidade/build_plugin.h"
+#include "geometry_manifold.h"
+#include "residuals.h"
+#include "sensor_cost.h"
+
+namespace alidade::ceres_batch {
+namespace {
+
+constexpr int kPoint = 3, kPose = 7;  // ambient sizes; a pose is position and orientation
+
+/// Tells of the iterations, and ends the solve where that is asked for.
+class Watch : public ceres::IterationCallback {
+ public:
+  explicit Watch(const BundleOptions& options) : options_(options) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& done) override {
+    if (options_.progress) options_.progress(done.iteration, done.cost);
+    const bool stop = options_.stop && options_.stop();
+    return stop ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  const BundleOptions& options_;
+};
+
+/// A bundle as a problem of Ceres. Parameter blocks: of each camera its pose, followed by its
+/// intrinsics where they are free and no other camera has them; else of each intrinsics; of each
+/// point. Only what an observation uses is in the problem.
+class Bundle {
+ public:
+  Bundle(const SensorModel& sensor, const BundleProblem& from, const BundleOptions& options)
+      : sensor_(sensor), roles_(RolesOf(sensor)), from_(from), options_(options) {
+    if (roles_.intrinsics >= 0) {
+      lens_ = sensor.roles()[static_cast<std::size_t>(roles_.intrinsics)].geometry;
+      fixed_ = FixedElements(sensor, options.fixed);
+      own_lens_ = !all_fixed() && NoneIsShared();
+    }
+    CopyValues();
+    MakeKind();
+    for (const BundleObservation& seen : from.observations) {
+      if (seen.used) Add(seen);
+    }
+    AddManifolds();
+  }
+
+  BundleResult Solve();
+  /// Writes the solution down.
+  void CopyTo(BundleProblem& to) const;
+
+ private:
+  int camera_size() const { return kPose + (own_lens_ ? lens_.ambient : 0); }
+  bool all_fixed() const { return std::ranges::count(fixed_, false) == 0; }
+  bool separate_lens() const { return roles_.intrinsics >= 0 && !own_lens_; }
+  double* camera(int i) { return cameras_.data() + i * camera_size(); }
+  double* point(int i) { return points_.data() + i * kPoint; }
+  double* lens(int i) { return lenses_.data() + i * lens_.ambient; }
+
+  bool NoneIsShared() const {
+    std::vector<int> users(from_.intrinsics.size());
+    for (const BundleCamera& one : from_.cameras) ++users[static_cast<std::size_t>(one.intrinsics)];
+    return std::ranges::all_of(users, [](int count) { return count < 2; });
+  }
+  void CopyValues() {
+    for (const BundleCamera& one : from_.cameras) {
+      cameras_.insert(cameras_.end(), one.position.begin(), one.position.end());
+      cameras_.insert(cameras_.end(), one.orientation.begin(), one.orientation.end());
+      if (!own_lens_) continue;
+      const auto& own = from_.intrinsics[static_cast<std::size_t>(one.intrinsics)];
+      cameras_.insert(cameras_.end(), own.begin(), own.end());
+    }
+    for (const auto& one : from_.intrinsics) lenses_.insert(lenses_.end(), one.begin(), one.end());
+    for (const auto& one : from_.points) points_.insert(points_.end(), one.begin(), one.end());
+    const auto m = static_cast<std::size_t>(sensor_.measurement().geometry.tangent);
+    sqrt_information_.reserve(from_.observations.size() * m * m);
+  }
+  void MakeKind() {
+    std::vector<RolePlace> places(sensor_.roles().size());
+    places[roles_.position] = {0, 0};
+    places[roles_.orientation] = {0, 3};
+    places[roles_.point] = {1, 0};
+    std::vector<int> sizes = {camera_size(), kPoint};
+    if (roles_.intrinsics >= 0) {
+      places[static_cast<std::size_t>(roles_.intrinsics)] =
+          own_lens_ ? RolePlace{0, kPose} : RolePlace{2, 0};
+    }
+    if (separate_lens()) sizes.push_back(lens_.ambient);
+    kind_ = std::make_unique<CostKind<SensorModel>>(sensor_, places, sizes);
+  }
+  void Add(const BundleObservation& seen) {
+    const int m = sensor_.measurement().geometry.tangent;
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, 4, 4> l(m, m);
+    const Status status =
+        sensor_.SqrtNoise(RoleValues(roles_, from_, seen).data(), seen.z.data(), l.data());
+    if (status != Status::kOk) return;
+    const std::size_t at = sqrt_information_.size();
+    sqrt_information_.resize(at + static_cast<std::size_t>(m * m));
+    Eigen::Map<RowMajor>(sqrt_information_.data() + at, m, m) =
+        l.triangularView<Eigen::Lower>().solve(RowMajor::Identity(m, m));
+    auto* const cost =
+        new SensorCost<SensorModel>(*kind_, seen.z.data(), sqrt_information_.data() + at);
+    const bool robust = options_.loss.kind != LossKind::kNone;
+    std::vector<double*> blocks = {camera(seen.camera), point(seen.point)};
+    if (separate_lens())
+      blocks.push_back(lens(from_.cameras[static_cast<std::size_t>(seen.camera)].intrinsics));
+    problem_.AddResidualBlock(cost, robust ? new Loss(options_.loss) : nullptr, blocks);
+  }
+  void AddManifolds() {
+    const Geometry position = Geometry::Vector(3), orientation = Geometry::UnitQuaternion();
+    bool first = true;
+    for (int i = 0; i < static_cast<int>(from_.cameras.size()); ++i) {
+      if (!problem_.HasParameterBlock(camera(i))) continue;
+      std::vector<GeometryManifold::Part> parts = {{position, first}, {orientation, first}};
+      if (own_lens_) AddLens(parts);
+      if (first && !own_lens_) {
+        problem_.SetParameterBlockConstant(camera(i));
+      } else {
+        problem_.SetManifold(camera(i), new GeometryManifold(parts));
+      }
+      first = false;
+    }
+    for (int i = 0; separate_lens() && i < static_cast<int>(from_.intrinsics.size()); ++i) {
+      if (!problem_.HasParameterBlock(lens(i))) continue;
+      std::vector<GeometryManifold::Part> parts;
+      AddLens(parts);
+      if (all_fixed()) {
+        problem_.SetParameterBlockConstant(lens(i));
+      } else {
+        problem_.SetManifold(lens(i), new GeometryManifold(parts));
+      }
+    }
+  }
+  void AddLens(std::vector<GeometryManifold::Part>& parts) const {
+    for (const bool fixed : fixed_) parts.push_back({Geometry::Vector(1), fixed});
+  }
+  ceres::Solver::Options SolverOptions() const;
+  void Eliminate(ceres::Solver::Options& options);
+  int Rank();
+
+  const SensorModel& sensor_;
+  BundleRoles roles_;
+  const BundleProblem& from_;
+  const BundleOptions& options_;
+  Geometry lens_;
+  std::vector<bool> fixed_;  ///< elements of the intrinsics
+  bool own_lens_ = false;    ///< in the block of the camera
+  std::vector<double> cameras_, lenses_, points_, sqrt_information_;
+  std::unique_ptr<CostKind<SensorModel>> kind_;
+  ceres::Problem problem_;
+};
+
+/// Points are eliminated first, or cameras where they have more unknowns: either see but the other.
+void Bundle::Eliminate(ceres::Solver::Options& options) {
+  int cameras = 0, points = 0;
+  const auto count = [&](const double* block, int& sum) {
+    if (problem_.HasParameterBlock(block) && !problem_.IsParameterBlockConstant(block))
+      sum += problem_.ParameterBlockTangentSize(block);
+  };
+  for (int i = 0; i < static_cast<int>(from_.cameras.size()); ++i) count(camera(i), cameras);
+  for (int i = 0; i < static_cast<int>(from_.points.size()); ++i) count(point(i), points);
+  const bool points_first = points >= cameras;
+  auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  const auto add = [&](double* block, int group) {
+    if (problem_.HasParameterBlock(block)) ordering->AddElementToGroup(block, group);
+  };
+  for (int i = 0; i < static_cast<int>(from_.points.size()); ++i)
+    add(point(i), points_first ? 0 : 1);
+  for (int i = 0; i < static_cast<int>(from_.cameras.size()); ++i)
+    add(camera(i), points_first ? 1 : 0);
+  for (int i = 0; i < static_cast<int>(from_.intrinsics.size()); ++i) add(lens(i), 1);
+  options.linear_solver_ordering = ordering;
+  constexpr int kDense = 1000;  // unknowns that are left
+  options.linear_solver_type =
+      std::min(cameras, points) <= kDense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
+}
+
+ceres::Solver::Options Bundle::SolverOptions() const {
+  ceres::Solver::Options options;
+  options.max_num_iterations = options_.max_iterations;
+  options.function_tolerance = 1e-12;
+  options.gradient_tolerance = 1e-12;
+  options.parameter_tolerance = 1e-12;
+  options.logging_type = ceres::SILENT;
+  options.num_threads = 1;
+  return options;
+}
+
+BundleResult Bundle::Solve() {
+  Watch watch(options_);
+  ceres::Solver::Options options = SolverOptions();
+  Eliminate(options);
+  options.callbacks = {&watch};
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem_, &summary);
+  BundleResult result;
+  result.message = summary.message;
+  result.iterations = std::max(0, static_cast<int>(summary.iterations.size()) - 1);
+  result.cost_before = summary.initial_cost;
+  result.cost_after = summary.final_cost;
+  result.residuals = problem_.NumResiduals();
+  result.unknowns = summary.num_effective_parameters_reduced;
+  if (summary.termination_type == ceres::CONVERGENCE) result.end = BundleEnd::kConverged;
+  if (summary.termination_type == ceres::NO_CONVERGENCE) result.end = BundleEnd::kOutOfIterations;
+  if (summary.termination_type == ceres::USER_SUCCESS) result.end = BundleEnd::kStopped;
+  constexpr double kMostWork = 2e9;
+  const double n = result.unknowns;
+  if (result.unknowns <= kBundleRankUnknowns && n * n * result.residuals < kMostWork)
+    result.rank = Rank();
+  return result;
+}
+
+/// Of dr/dx, columns scaled to length 1.
+int Bundle::Rank() {
+  std::vector<double*> blocks, moved;
+  problem_.GetParameterBlocks(&blocks);
+  std::ranges::copy_if(blocks, std::back_inserter(moved), [&](const double* block) {
+    return !problem_.IsParameterBlockConstant(block);
+  });
+  ceres::Problem::EvaluateOptions options;
+  options.parameter_blocks = moved;
+  options.apply_loss_function = false;
+  ceres::CRSMatrix sparse;
+  if (!problem_.Evaluate(options, nullptr, nullptr, nullptr, &sparse)) return -1;
+  Eigen::MatrixXd j = Eigen::MatrixXd::Zero(sparse.num_rows, sparse.num_cols);
+  for (int r = 0; r < sparse.num_rows; ++r) {
+    for (auto k = static_cast<std::size_t>(sparse.rows[static_cast<std::size_t>(r)]);
+         k < static_cast<std::size_t>(sparse.rows[static_cast<std::size_t>(r) + 1]); ++k) {
+      j(r, sparse.cols[k]) = sparse.values[k];
+    }
+  }
+  for (auto column : j.colwise()) {
+    const double norm = column.norm();
+    if (norm > 0.0) column /= norm;
+  }
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(j);
+  constexpr double kNothing = 1e-9;
+  qr.setThreshold(kNothing);
+  return static_cast<int>(qr.rank());
+}
+
+void Bundle::CopyTo(BundleProblem& to) const {
+  for (std::size_t i = 0; i < to.cameras.size(); ++i) {
+    const double* const from = cameras_.data() + i * static_cast<std::size_t>(camera_size());
+    std::copy_n(from, 3, to.cameras[i].position.data());
+    std::copy_n(from + 3, 4, to.cameras[i].orientation.data());
+    if (own_lens_) {
+      auto& own = to.intrinsics[static_cast<std::size_t>(to.cameras[i].intrinsics)];
+      std::copy_n(from + kPose, own.size(), own.data());
+    }
+  }
+  for (std::size_t i = 0; separate_lens() && i < to.intrinsics.size(); ++i)
+    std::copy_n(lenses_.data() + i * to.intrinsics[i].size(), to.intrinsics[i].size(),
+                to.intrinsics[i].data());
+  for (std::size_t i = 0; i < to.points.size(); ++i)
+    std::copy_n(points_.data() + i * kPoint, kPoint, to.points[i].data());
+}
+
+BundleResult Adjust(const SensorModel& sensor, BundleProblem& problem,
+                    const BundleOptions& options) {
+  Bundle bundle(sensor, problem, options);
+  const BundleResult result = bundle.Solve();
+  if (result.end != BundleEnd::kFailed) bundle.CopyTo(problem);
+  return result;
+}
+
+}  // namespace
+}  // namespace alidade::ceres_batch
+
+ALIDADE_BUNDLE_PLUGIN(&alidade::ceres_batch::Adjust)

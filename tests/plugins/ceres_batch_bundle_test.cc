@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "alidade/bundle_file.h"
+#include "ceres_batch_fixture.h"
+#include "support/bundles.h"
+
+namespace alidade {
+namespace {
+
+using testing::Disturb;
+using testing::Shipped;
+using testing::TrueBundle;
+using testing::Wave;
+
+BundleResult Adjusted(BundleProblem& problem, const BundleOptions& options = {}) {
+  const SensorModel sensor = BundleSensor(Shipped(), problem);
+  LeaveOutUndefined(sensor, problem);
+  return AdjustBundle(sensor, problem, options);
+}
+
+double Distance(const std::array<double, 3>& a, const std::array<double, 3>& b) {
+  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+}
+
+/// Pixels fix all but the scale: what is left is compared in units of the distance from the first
+/// camera to the first point.
+TEST(CeresBundle, FindsCamerasPointsAndIntrinsics) {
+  const BundleProblem truth = TrueBundle().problem;
+  BundleProblem problem = truth;
+  Disturb(problem);
+  const SensorModel sensor = BundleSensor(Shipped(), problem);
+  EXPECT_GT(BundleRms(sensor, problem), 1.0) << "disturbed";
+  const BundleResult result = Adjusted(problem);
+  EXPECT_EQ(result.end, BundleEnd::kConverged) << result.message;
+  EXPECT_LT(BundleRms(sensor, problem), 1e-8);
+  EXPECT_EQ(problem.cameras[0].position, truth.cameras[0].position) << "the first camera is held";
+  EXPECT_EQ(problem.cameras[0].orientation, truth.cameras[0].orientation);
+  const auto& eye = truth.cameras[0].position;
+  const double scale = Distance(problem.points[0], eye) / Distance(truth.points[0], eye);
+  EXPECT_NEAR(scale, 1.0, 0.05);
+  const auto expect_near = [&](const std::array<double, 3>& is, const std::array<double, 3>& was) {
+    for (std::size_t i = 0; i < 3; ++i)
+      EXPECT_NEAR((is[i] - eye[i]) / scale, was[i] - eye[i], 1e-7);
+  };
+  for (std::size_t i = 0; i < truth.points.size(); ++i)
+    expect_near(problem.points[i], truth.points[i]);
+  for (std::size_t i = 0; i < truth.cameras.size(); ++i) {
+    expect_near(problem.cameras[i].position, truth.cameras[i].position);
+    double d[3];
+    UnitQuaternion::Minus(problem.cameras[i].orientation.data(),
+                          truth.cameras[i].orientation.data(), d);
+    EXPECT_LT(std::hypot(d[0], d[1], d[2]), 1e-8);
+    for (std::size_t k = 0; k < 3; ++k)
+      EXPECT_NEAR(problem.intrinsics[i][k], truth.intrinsics[i][k], k == 0 ? 1e-5 : 1e-7);
+  }
+  // 6 cameras of 9, the first of 3, and 40 points
+  EXPECT_EQ(result.unknowns, 5 * 9 + 3 + 120);
+  EXPECT_EQ(result.rank, result.unknowns - 1);
+  const std::vector<std::string> words = Undetermined(problem, sensor, result);
+  ASSERT_EQ(words.size(), 2u);
+  EXPECT_EQ(words[0],
+            "gauge: the pose of the first camera is held; pixels tell no scale: it stays "
+            "near that of the start");
+  EXPECT_EQ(words[1], "rank: 167 of 168 unknowns: all but the scale is determined");
+}
+
+TEST(CeresBundle, LeavesFixedIntrinsicsAsTheyAre) {
+  BundleProblem start = TrueBundle().problem;
+  Disturb(start);
+  for (const bool all : {true, false}) {
+    BundleProblem problem = start;
+    BundleOptions options;
+    options.fixed =
+        all ? std::vector<std::string>{"intrinsics"} : std::vector<std::string>{"k1", "k2"};
+    const BundleResult result = Adjusted(problem, options);
+    EXPECT_EQ(result.end, BundleEnd::kConverged) << result.message;
+    EXPECT_EQ(result.unknowns, 5 * 6 + 120 + (all ? 0 : 6));
+    for (std::size_t i = 0; i < start.intrinsics.size(); ++i) {
+      EXPECT_EQ(problem.intrinsics[i][0] == start.intrinsics[i][0], all);
+      EXPECT_EQ(problem.intrinsics[i][1], start.intrinsics[i][1]);
+      EXPECT_EQ(problem.intrinsics[i][2], start.intrinsics[i][2]);
+    }
+  }
+  BundleOptions wrong;
+  wrong.fixed = {"k11"};
+  EXPECT_THROW(Adjusted(start, wrong), Error);
+}
+
+TEST(CeresBundle, SharesIntrinsicsBetweenCameras) {
+  BundleFile truth = TrueBundle(5, 40);
+  BundleProblem& problem = truth.problem;
+  const SensorModel sensor = BundleSensor(Shipped(), problem);
+  problem.intrinsics = {{510.0, -0.1, 0.02}};
+  for (BundleCamera& camera : problem.cameras) camera.intrinsics = 0;
+  for (BundleObservation& seen : problem.observations) {
+    ASSERT_EQ(sensor.Predict(RoleValues(RolesOf(sensor), problem, seen).data(), seen.z.data()),
+              Status::kOk);
+  }
+  Disturb(problem);
+  const BundleResult result = Adjusted(problem);
+  EXPECT_EQ(result.end, BundleEnd::kConverged) << result.message;
+  EXPECT_EQ(result.unknowns, 4 * 6 + 3 + 120);
+  EXPECT_NEAR(problem.intrinsics[0][0], 510.0, 1e-5);
+  EXPECT_NEAR(problem.intrinsics[0][1], -0.1, 1e-7);
+}
+
+TEST(CeresBundle, ALossShrugsOffOutliers) {
+  BundleProblem problem = TrueBundle().problem;
+  const auto truth = problem.points;
+  for (std::size_t i = 0; i < problem.observations.size(); i += 17)
+    problem.observations[i].z[0] += 80.0;
+  BundleProblem squared = problem;
+  Adjusted(squared);
+  BundleOptions options;
+  options.loss = {LossKind::kCauchy, 0.5};
+  Adjusted(problem, options);
+  const auto worst = [&](const BundleProblem& one) {
+    const auto& eye = one.cameras[0].position;
+    const double scale = Distance(one.points[1], eye) / Distance(truth[1], eye);
+    double most = 0.0;
+    for (std::size_t i = 0; i < truth.size(); ++i)
+      most =
+          std::max(most, std::abs(Distance(one.points[i], eye) / scale - Distance(truth[i], eye)));
+    return most;
+  };
+  EXPECT_GT(worst(squared), 0.05);
+  EXPECT_LT(worst(problem), 0.01);
+}
+
+TEST(CeresBundle, EndsAfterTheIterationWhereItIsTold) {
+  BundleProblem problem = TrueBundle().problem;
+  Disturb(problem);
+  const SensorModel sensor = BundleSensor(Shipped(), problem);
+  const double before = BundleRms(sensor, problem);
+  BundleOptions options;
+  int calls = 0;
+  options.stop = [&] { return ++calls > 2; };
+  const BundleResult result = Adjusted(problem, options);
+  EXPECT_EQ(result.end, BundleEnd::kStopped);
+  EXPECT_EQ(result.iterations, 2);
+  EXPECT_LT(BundleRms(sensor, problem), 0.5 * before) << "what is reached is kept";
+}
+
+TEST(CeresBundle, LeavesOutWhatIsBehindItsCamera) {
+  BundleProblem problem = TrueBundle().problem;
+  const auto seen_before = problem.observations.size();
+  problem.points.push_back({0.0, 0.0, -50.0});
+  problem.observations.push_back({0, static_cast<int>(problem.points.size()) - 1, {3, 4}, true});
+  const SensorModel sensor = BundleSensor(Shipped(), problem);
+  EXPECT_EQ(LeaveOutUndefined(sensor, problem), 1);
+  const BundleResult result = AdjustBundle(sensor, problem, {});
+  EXPECT_EQ(result.end, BundleEnd::kConverged) << result.message;
+  EXPECT_EQ(result.residuals, static_cast<int>(2 * seen_before));
+  const std::vector<std::string> words = Undetermined(problem, sensor, result);
+  EXPECT_EQ(words[1], "1 point is seen by no camera, and left as read");
+}
+
+TEST(CeresBundle, SaysWhatIsNotDetermined) {
+  BundleProblem problem = TrueBundle(4, 20).problem;
+  // Two pairs of cameras that share no point, and a point seen once.
+  std::erase_if(problem.observations, [](const BundleObservation& seen) {
+    return (seen.camera < 2) != (seen.point < 10) || (seen.camera == 1 && seen.point == 3);
+  });
+  const SensorModel sensor = BundleSensor(Shipped(), problem);
+  const BundleResult result = Adjusted(problem);
+  std::string all;
+  for (const std::string& line : Undetermined(problem, sensor, result)) all += line + '\n';
+  EXPECT_NE(all.find("2 parts share no observation"), std::string::npos) << all;
+  EXPECT_NE(all.find("seen once: no depth"), std::string::npos) << all;
+  EXPECT_NE(all.find("directions beside the scale are told by no observation"), std::string::npos)
+      << all;
+}
+
+TEST(CeresBundle, ABuildWithoutThePluginSaysWhatToInstall) {
+  BundleProblem problem = TrueBundle(2, 5).problem;
+  const SensorModel sensor = BundleSensor(Shipped(), problem);
+  try {
+    AdjustBundle(sensor, problem, {}, "/nonexistent");
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::kPlugin);
+    const std::string text = e.what();
+    EXPECT_EQ(text.find("this build of alidade adjusts no bundles; expected one that found the "
+                        "Ceres solver: apt-get install libceres-dev"),
+              0u)
+        << text;
+  }
+}
+
+/// Real problems; the figures are those of docs/bundle_adjustment.md.
+class CeresBundleData : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const char* const data = std::getenv("ALIDADE_DATA");
+    if (data == nullptr) GTEST_SKIP() << "no ALIDADE_DATA";
+    folder_ = std::filesystem::path(data) / "bundle-adjustment";
+    if (!std::filesystem::exists(folder_)) GTEST_SKIP() << "no " << folder_;
+  }
+  /// rms before and after, px
+  std::pair<double, double> Rms(const std::string& name, const BundleOptions& options = {}) {
+    BundleProblem problem = ReadBundle(folder_ / name).problem;
+    const SensorModel sensor = BundleSensor(Shipped(), problem);
+    EXPECT_EQ(LeaveOutUndefined(sensor, problem), 0);
+    const double before = BundleRms(sensor, problem);
+    result_ = AdjustBundle(sensor, problem, options);
+    EXPECT_EQ(result_.end, BundleEnd::kConverged) << name << ": " << result_.message;
+    return {before, BundleRms(sensor, problem)};
+  }
+  std::filesystem::path folder_;
+  BundleResult result_;
+};
+
+// 42 unknowns for 38 residuals: they all can vanish.
+TEST_F(CeresBundleData, Dubrovnik) {
+  const auto [before, after] = Rms("dubrovnik-3-7-pre.txt");
+  EXPECT_NEAR(before, 17.06, 0.005);
+  EXPECT_LT(after, 0.0305);
+  EXPECT_EQ(result_.rank, 38);
+}
+TEST_F(CeresBundleData, Balbianello) {
+  const auto [before, after] = Rms("Balbianello.out");
+  EXPECT_NEAR(before, 0.423262, 1e-6);
+  EXPECT_NEAR(after, 0.420319, 1e-6);
+}
+TEST_F(CeresBundleData, Libmv) {
+  const auto [before, after] = Rms("libmv/problem_02.bin");
+  EXPECT_NEAR(before, 0.790211, 1e-6);
+  EXPECT_NEAR(after, 0.770025, 1e-6);
+  BundleOptions options;
+  options.fixed = {"intrinsics"};
+  EXPECT_NEAR(Rms("libmv/problem_01.bin", options).second, 1.3038, 1e-4);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "alidade/in_process.h"
+#include "plugins/ceres_batch/geometry_manifold.h"
+#include "plugins/ceres_batch/sensor_cost.h"
+#include "sensors/self_calibrating_feature.h"
+#include "sensors/stereo_disparity.h"
+
+namespace alidade::ceres_batch {
+namespace {
+
+using Values = std::vector<std::vector<double>>;
+
+/// z = x (+) n
+template <class G>
+struct Seen : Sensor<G, G> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    std::copy_n(x, G::kAmbient, z);
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(1.0);
+  }
+};
+
+/// z = x + b, where b may lack.
+struct Biased : Sensor<Vec<1>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"},
+                                     Quantity{"b", "", "", "", ALIDADE_ROLE_OPTIONAL}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, const T* b, T* z) const {
+    z[0] = b == nullptr ? x[0] : T(x[0] + b[0]);
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(1.0);
+  }
+};
+
+std::vector<const double*> Pointers(const Values& values) {
+  std::vector<const double*> pointers;
+  for (const auto& value : values) pointers.push_back(value.data());
+  return pointers;
+}
+
+std::vector<double> ResidualAt(const ceres::CostFunction& cost, const Values& values) {
+  std::vector<double> r(static_cast<std::size_t>(cost.num_residuals()));
+  EXPECT_TRUE(cost.Evaluate(Pointers(values).data(), r.data(), nullptr));
+  return r;
+}
+
+/// Residual and Jacobians of a cost, its buffers full of rubbish before.
+struct Evaluated {
+  std::vector<double> r;
+  Values j;
+};
+Evaluated At(const ceres::CostFunction& cost, const Values& values) {
+  const auto m = static_cast<std::size_t>(cost.num_residuals());
+  Evaluated out{std::vector<double>(m, 1e302), {}};
+  std::vector<double*> pointers;
+  for (const auto& value : values) out.j.emplace_back(m * value.size(), 1e302);
+  for (auto& j : out.j) pointers.push_back(j.data());
+  EXPECT_TRUE(cost.Evaluate(Pointers(values).data(), out.r.data(), pointers.data()));
+  return out;
+}
+
+/// [J | 0] [I; 0], as Ceres forms it, against central differences through the manifold.
+void ExpectTrueJacobians(const ceres::CostFunction& cost, const Values& values,
+                         const std::vector<GeometryManifold>& manifolds, double tolerance) {
+  const Evaluated at = At(cost, values);
+  EXPECT_EQ(at.r, ResidualAt(cost, values)) << "with and without Jacobians";
+  const int m = cost.num_residuals();
+  for (std::size_t b = 0; b < values.size(); ++b) {
+    const int ambient = manifolds[b].AmbientSize(), tangent = manifolds[b].TangentSize();
+    std::vector<double> plus(static_cast<std::size_t>(ambient * tangent));
+    ASSERT_TRUE(manifolds[b].PlusJacobian(values[b].data(), plus.data()));
+    for (int c = 0; c < tangent; ++c) {
+      constexpr double kStep = 1e-6;
+      std::vector<double> d(static_cast<std::size_t>(tangent)), r[2];
+      for (int side = 0; side < 2; ++side) {
+        Values moved = values;
+        d[static_cast<std::size_t>(c)] = side == 0 ? kStep : -kStep;
+        ASSERT_TRUE(manifolds[b].Plus(values[b].data(), d.data(), moved[b].data()));
+        r[side] = ResidualAt(cost, moved);
+      }
+      for (int row = 0; row < m; ++row) {
+        const auto k = static_cast<std::size_t>(row);
+        double sum = 0.0;
+        for (int a = 0; a < ambient; ++a)
+          sum += at.j[b][static_cast<std::size_t>(row * ambient + a)] *
+                 plus[static_cast<std::size_t>(a * tangent + c)];
+        EXPECT_NEAR(sum, (r[0][k] - r[1][k]) / (2.0 * kStep), tolerance)
+            << "block " << b << " row " << row << " column " << c;
+      }
+    }
+  }
+}
+
+GeometryManifold Of(const Geometry& geometry) { return GeometryManifold({{geometry, false}}); }
+
+// d = 20 / 2 = 10 px, z = 13 px, sigma = 2 px: r = 1.5, dr/dZ = 10 / 2 / 2 = 2.5 per m
+TEST(SensorCost, IsTheWhitenedResidualOfTheSensor) {
+  const StereoDisparity model(200.0, 0.1, 2.0);
+  const SensorModel sealed = InProcessSensor(model, "stereo_disparity");
+  const double z = 13.0, w = 0.5;
+  const CostKind<StereoDisparity> direct(model, {{0, 0}}, {1});
+  const CostKind<SensorModel> behind(sealed, {{0, 0}}, {1});
+  const SensorCost<StereoDisparity> a(direct, &z, &w);
+  const SensorCost<SensorModel> b(behind, &z, &w);
+  for (const ceres::CostFunction* cost :
+       {static_cast<const ceres::CostFunction*>(&a), static_cast<const ceres::CostFunction*>(&b)}) {
+    const Evaluated at = At(*cost, {{2.0}});
+    EXPECT_DOUBLE_EQ(at.r[0], 1.5);
+    EXPECT_DOUBLE_EQ(at.j[0][0], 2.5);
+    const Values behind_it{{-1.0}};
+    double r = 7.0;
+    EXPECT_FALSE(cost->Evaluate(Pointers(behind_it).data(), &r, nullptr));
+  }
+}
+
+/// Pose and intrinsics in one block, in another order than the roles; correlated noise.
+TEST(SensorCost, PutsRolesIntoTheirPlacesInTheBlocks) {
+  const SelfCalibratingFeature<RadialLens> model(1.0);
+  const SensorModel sealed = InProcessSensor(model, "self_calibrating_feature");
+  const std::vector<RolePlace> places{{1, 3}, {1, 6}, {1, 0}, {0, 0}};
+  const std::vector<int> sizes{3, 10};
+  const double z[2] = {3.0, -4.0}, w[4] = {2.0, 0.0, 0.7, 0.5};
+  const CostKind<SelfCalibratingFeature<RadialLens>> direct(model, places, sizes);
+  const CostKind<SensorModel> behind(sealed, places, sizes);
+  const SensorCost a(direct, z, w);
+  const SensorCost b(behind, z, w);
+  const Values values{{-2.6, 1.1, 3.5}, {5.0, -0.3, 0.2, 0.4, -1.1, 0.3, 0.8, 0.2, -0.4, 0.4}};
+  const std::vector<GeometryManifold> manifolds = {
+      Of(Geometry::Vector(3)), GeometryManifold({{Geometry::Vector(3), false},
+                                                 {Geometry::Vector(3), false},
+                                                 {Geometry::UnitQuaternion(), false}})};
+  // Rounding of pixels, 1e-13 px, over the step.
+  ExpectTrueJacobians(a, values, manifolds, 1e-6);
+  ExpectTrueJacobians(b, values, manifolds, 1e-6);
+  EXPECT_EQ(At(a, values).j, At(b, values).j);
+  double h[2];
+  const double* const roles[] = {&values[1][3], &values[1][6], &values[1][0], &values[0][0]};
+  ASSERT_EQ(sealed.Predict(roles, h), Status::kOk);
+  const std::vector<double> r = ResidualAt(a, values);
+  EXPECT_NEAR(r[0], 2.0 * (z[0] - h[0]), 1e-12);
+  EXPECT_NEAR(r[1], 0.7 * (z[0] - h[0]) + 0.5 * (z[1] - h[1]), 1e-12);
+}
+
+TEST(SensorCost, LeavesOutWhatIsConstant) {
+  const SensorModel sensor =
+      InProcessSensor(SelfCalibratingFeature<RadialLens>(1.0), "self_calibrating_feature");
+  const CostKind<SensorModel> kind(sensor, {{0, 0}, {0, 3}, {2, 0}, {1, 0}}, {7, 3, 3});
+  const double z[2] = {3.0, -4.0}, w[4] = {1.0, 0.0, 0.0, 1.0};
+  const SensorCost cost(kind, z, w);
+  const Values values{{0.4, -1.1, 0.3, 0.8, 0.2, -0.4, 0.4}, {-2.6, 1.1, 3.5}, {5.0, -0.3, 0.2}};
+  const Evaluated all = At(cost, values);
+  std::vector<double> r(2), j(6, 1e302);
+  double* some[] = {nullptr, j.data(), nullptr};
+  ASSERT_TRUE(cost.Evaluate(Pointers(values).data(), r.data(), some));
+  EXPECT_EQ(j, all.j[1]);
+  EXPECT_EQ(r, all.r);
+  EXPECT_EQ(all.j[0][6], 0.0);
+  EXPECT_EQ(all.j[0][13], 0.0);
+}
+
+TEST(SensorCost, TakesMeasurementsOnManifolds) {
+  const double l3[9] = {2, 0, 0, 0.3, 1, 0, -0.2, 0.4, 0.5}, l2[4] = {2, 0, 0.3, 1};
+  const double q[4] = {0.8, 0.2, -0.4, 0.4}, m[3] = {0.6, 0.0, 0.8}, angle = 3.0, one = 2.0;
+  const SensorModel turn = InProcessSensor(Seen<UnitQuaternion>(), "seen");
+  const CostKind<SensorModel> turns(turn, {{0, 0}}, {4});
+  ExpectTrueJacobians(SensorCost(turns, q, l3), {{0.6, 0.0, 0.8, 0.0}},
+                      {Of(Geometry::UnitQuaternion())}, 1e-7);
+  const Seen<UnitVector> ray;
+  const CostKind<Seen<UnitVector>> rays(ray, {{0, 0}}, {3});
+  ExpectTrueJacobians(SensorCost(rays, m, l2), {{0.0, 0.28, 0.96}}, {Of(Geometry::UnitVector())},
+                      1e-7);
+  const SensorModel heading = InProcessSensor(Seen<Angle>(), "seen");
+  const CostKind<SensorModel> headings(heading, {{0, 0}}, {1});
+  const SensorCost wraps(headings, &angle, &one);
+  EXPECT_NEAR(ResidualAt(wraps, {{-3.0}})[0], 2.0 * (6.0 - 2.0 * M_PI), 1e-12);
+  ExpectTrueJacobians(wraps, {{-3.0}}, {Of(Geometry::Angle())}, 1e-7);
+}
+
+TEST(SensorCost, MayLackAnOptionalRole) {
+  const SensorModel sensor = InProcessSensor(Biased(), "biased");
+  const double z = 5.0, w = 1.0;
+  const CostKind<SensorModel> with(sensor, {{0, 0}, {1, 0}}, {1, 1}),
+      without(sensor, {{0, 0}, {}}, {1});
+  EXPECT_EQ(ResidualAt(SensorCost(with, &z, &w), {{1.0}, {0.5}})[0], 3.5);
+  EXPECT_EQ(ResidualAt(SensorCost(without, &z, &w), {{1.0}})[0], 4.0);
+  EXPECT_EQ(At(SensorCost(without, &z, &w), {{1.0}}).j[0][0], -1.0);
+}
+
+TEST(SensorCost, RefusesPlacesOutsideItsBlocks) {
+  const StereoDisparity model(200.0, 0.1, 2.0);
+  using Kind = CostKind<StereoDisparity>;
+  EXPECT_THROW(Kind(model, {{0, 1}}, {1}), ContractViolation);
+  EXPECT_THROW(Kind(model, {{1, 0}}, {1}), ContractViolation);
+  EXPECT_THROW(Kind(model, {}, {1}), ContractViolation);
+}
+
+TEST(GeometryManifold, MovesPartsByTheirGeometryAndHoldsOthers) {
+  const GeometryManifold manifold({{Geometry::Vector(2), true},
+                                   {Geometry::UnitQuaternion(), false},
+                                   {Geometry::Vector(1), false}});
+  EXPECT_EQ(manifold.AmbientSize(), 7);
+  EXPECT_EQ(manifold.TangentSize(), 4);
+  const std::vector<double> x{5, 6, 0.8, 0.2, -0.4, 0.4, 7}, d{0.1, -0.2, 0.3, 0.5};
+  std::vector<double> y(7), back(4), j(28), inverse(28);
+  ASSERT_TRUE(manifold.Plus(x.data(), d.data(), y.data()));
+  EXPECT_EQ(y[0], 5.0);
+  EXPECT_EQ(y[6], 7.5);
+  double q[4];
+  UnitQuaternion::Plus(x.data() + 2, d.data(), q);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(y[2 + i], q[i], 1e-15);
+  ASSERT_TRUE(manifold.Minus(y.data(), x.data(), back.data()));
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(back[i], d[i], 1e-14);
+  ASSERT_TRUE(manifold.PlusJacobian(x.data(), j.data()));
+  ASSERT_TRUE(manifold.MinusJacobian(x.data(), inverse.data()));
+  const std::size_t rows[4] = {2, 3, 4, 6};  // of each tangent column
+  for (std::size_t r = 0; r < 7; ++r) {
+    for (std::size_t c = 0; c < 4; ++c) {
+      EXPECT_EQ(j[4 * r + c], r == rows[c] ? 1.0 : 0.0);
+      EXPECT_EQ(inverse[7 * c + r], j[4 * r + c]);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace alidade::ceres_batch

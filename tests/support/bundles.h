@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <string>
+
+#include "alidade/bundle_file.h"
+#include "alidade/geometry.h"
+#include "alidade/in_process.h"
+#include "sensors/self_calibrating_feature.h"
+
+/// Bundles that tests make.
+namespace alidade::testing {
+
+/// A sine as noise: the same in every run.
+inline double Wave(int i) { return std::sin(1.7 * i + 0.3) * std::cos(0.9 * i); }
+
+/// The true problem: `cameras` on an arc about `points` in a box 6 m ahead, seen without noise.
+inline BundleFile TrueBundle(int cameras = 6, int points = 40) {
+  BundleFile file;
+  BundleProblem& problem = file.problem;
+  problem.sensor = "{model: self_calibrating_feature, lens: radial, sigma_px: 1}";
+  for (int i = 0; i < points; ++i)
+    problem.points.push_back({2.0 * Wave(3 * i), 2.0 * Wave(3 * i + 1), 6.0 + Wave(3 * i + 2)});
+  const SelfCalibratingFeature<RadialLens> sensor(1.0);
+  for (int i = 0; i < cameras; ++i) {
+    BundleCamera camera;
+    const double angle = 0.25 * (i - 0.5 * cameras), d[3] = {0.02 * i, -angle, 0.01 * i * i};
+    camera.position = {6.0 * std::sin(angle), 0.1 * i, 6.0 - 6.0 * std::cos(angle)};
+    UnitQuaternion::Exp(d, camera.orientation.data());
+    camera.intrinsics = i;
+    problem.cameras.push_back(camera);
+    problem.intrinsics.push_back({500.0 + 10.0 * i, -0.1 + 0.01 * i, 0.02});
+    for (int k = 0; k < points; ++k) {
+      if ((i + k) % 5 == 0) continue;
+      BundleObservation seen{i, k, {}, true};
+      if (sensor.Predict(camera.position.data(), camera.orientation.data(),
+                         problem.intrinsics.back().data(),
+                         problem.points[static_cast<std::size_t>(k)].data(), seen.z.data()))
+        problem.observations.push_back(seen);
+    }
+  }
+  return file;
+}
+
+/// Cameras but the first, and points, moved by about 5 cm, 0.01 rad and 1 % of the focal length.
+inline void Disturb(BundleProblem& problem) {
+  int i = 0;
+  for (auto& camera : problem.cameras) {
+    auto& lens = problem.intrinsics[static_cast<std::size_t>(camera.intrinsics)];
+    lens[0] *= 1.0 + 0.01 * Wave(++i);
+    if (&camera == problem.cameras.data()) continue;
+    for (double& x : camera.position) x += 0.05 * Wave(++i);
+    double d[3], before[4];
+    for (double& x : d) x = 0.01 * Wave(++i);
+    std::copy_n(camera.orientation.data(), 4, before);
+    UnitQuaternion::Plus(before, d, camera.orientation.data());
+  }
+  for (auto& point : problem.points) {
+    for (double& x : point) x += 0.05 * Wave(++i);
+  }
+}
+
+}  // namespace alidade::testing

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The batch on path and map, beside the filter: examples/10_slam_scene and 13_slam_odometry_tracks.
+#include <filesystem>
+
+#include "alidade/sweep.h"
+#include "drives.h"
+
+namespace alidade {
+namespace {
+
+/// Means of the filter and of the batch over seeds 1001 to 1008 of an example 10.
+struct Pair {
+  SweepSummary ekf, batch;
+  double Ratio(const char* key) const {
+    return ekf.metrics.at(key).mean / batch.metrics.at(key).mean;
+  }
+};
+Pair Eight(const char* name) {
+  const Config config = Config::FromFile(std::filesystem::path(ALIDADE_SOURCE_DIR) / "examples" /
+                                         "10_slam_scene" / name);
+  const PluginHost host(PluginPaths(config));
+  SweepOptions options;
+  options.runs = 8;
+  options.first_seed = 1001;
+  const SweepResult result = Sweep(config, host, options);
+  for (const SweepRun& run : result.done) EXPECT_EQ(run.status, RunStatus::kOk) << run.reason;
+  const std::vector<SweepSummary> summaries = Summarise(result);
+  EXPECT_EQ(summaries.at(1).diverged, 0);
+  return {summaries.at(0), summaries.at(1)};
+}
+
+// The path is drawn from the model, so that the batch is honest; NEES is that of the whole path.
+TEST(CeresBatchSlam, IsHonestOnAPathDrawnFromTheModelAndItsMapIsLittleBetterThanTheFilters) {
+  const Pair pair = Eight("batch.yaml");
+  EXPECT_NEAR(pair.batch.metrics.at("nees.mean:cam").mean, 1.0, 0.25);
+  EXPECT_GE(pair.batch.metrics.at("nees.cov95:cam").mean, 0.85);
+  EXPECT_LE(pair.Ratio("map.sim3.rmse"), 1.10);
+  EXPECT_GE(pair.Ratio("map.sim3.rmse"), 1.0);
+  EXPECT_GE(pair.Ratio("final:cam.position"), 1.0);
+  EXPECT_GE(pair.Ratio("rmse:cam.position"), 1.5);  // of a smoothed path
+}
+
+TEST(CeresBatchSlam, IsBetterThanTheFilterOnASidewaysSweep) {
+  const Pair pair = Eight("sweep_batch.yaml");
+  EXPECT_LE(pair.Ratio("map.sim3.rmse"), 1.10);
+  EXPECT_GE(pair.Ratio("final:cam.position"), 1.0);
+  EXPECT_GE(pair.Ratio("rmse:cam.position"), 2.0);
+}
+
+class CeresBatchSlamDrives : public testing::DrivesTest {};
+
+// RMS errors of the position over the first frames, m, as an independent batch reached them.
+TEST_F(CeresBatchSlamDrives, StaysWithinThePublishedErrorsWithARobustLoss) {
+  const struct {
+    const char* name;
+    int frames;
+    double most;
+  } drives[] = {{"drive_0001", 98, 0.45}, {"drive_0036", 240, 1.15}, {"drive_0095", 140, 1.56}};
+  const std::string batch =
+      "{type: ceres_batch, overrides: {sensors: {pixels: {loss: {cauchy: 1}}}}}";
+  for (const auto& drive : drives) {
+    const Config config = ConfigOf("13_slam_odometry_tracks", drive.name, drive.frames,
+                                   {{"estimators", "{batch: " + batch + "}"}});
+    const PluginHost host(PluginPaths(config));
+    Experiment experiment = BuildExperiment(config, host);
+    const RunResult run = alidade::Run(experiment, {});
+    ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
+    EXPECT_LE(run.estimators.at(0).metrics.at("rmse:cam.position"), drive.most) << drive.name;
+  }
+}
+
+}  // namespace
+}  // namespace alidade

@@ -153,6 +153,9 @@ TEST_F(EvalCli, OfARunSaysWhatTheRunSaid) {
   // The first pose is known exactly, and has none.
   EXPECT_EQ(one.At("nees_position").At("poses").Integer(0, 1000), 149);
   EXPECT_TRUE(one.At("nees_orientation").Find("mean"));
+  const Config twice = Evaluated({"slam", "slam", "./slam/ekf"});
+  EXPECT_EQ(twice.root().At("evaluations").Items()[0].At("estimate").Text(),
+            "slam/ekf/trajectory_covariance.tum");
   const Outcome aligned = Call({"eval", "slam", "slam/ekf", "-as"});
   EXPECT_TRUE(Contains(aligned.out, "NEES withheld: the alignment by sim3 ")) << aligned.out;
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/metrics.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,8 +11,10 @@
 #include "columns.h"
 #include "frame_innovation.h"
 #include "lag_series.h"
+#include "mahalanobis.h"
 #include "names.h"
 #include "number_text.h"
+#include "path_alignment.h"
 
 namespace alidade {
 namespace {
@@ -68,20 +69,6 @@ struct Owner {
   std::vector<std::size_t> tracked;
 };
 
-/// e' P^-1 e, or -1 where P is singular or not finite. P is scaled to unit variances first, so that
-/// singular means the same in any unit.
-double SquaredMahalanobis(const Eigen::MatrixXd& p, const Eigen::VectorXd& error) {
-  constexpr double kSingular = 1e-13;
-  const Eigen::VectorXd sigma = p.diagonal().cwiseSqrt();
-  if (!p.allFinite() || !error.allFinite() || !(sigma.minCoeff() > 0.0)) return -1.0;
-  const Eigen::VectorXd scale = sigma.cwiseInverse();
-  const Eigen::LDLT<Eigen::MatrixXd> ldlt(scale.asDiagonal() * p * scale.asDiagonal());
-  if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > kSingular)) return -1.0;
-  const Eigen::VectorXd scaled = scale.cwiseProduct(error);
-  const double squared = scaled.dot(ldlt.solve(scaled));
-  return std::isfinite(squared) ? squared : -1.0;
-}
-
 }  // namespace
 
 struct Metrics::Impl {
@@ -96,6 +83,8 @@ struct Metrics::Impl {
   std::map<std::string, std::int64_t> counts;
   std::map<std::string, std::string> units;
   std::map<int, double> quantiles;  ///< chi2(0.95, dof)
+  BlockId path = -1;                ///< that landmarks are seen from
+  internal::PathAlignment alignment;
   std::vector<Event> events;
 
   void Track(const System& system, const std::vector<StreamInfo>& truths);
@@ -151,6 +140,10 @@ void Metrics::Impl::AddErrors(const Frame& frame, const std::vector<Sums*>& into
     block.geometry.Minus(truth, estimate, block.error.data());
     const double square = block.error.allFinite() ? block.error.squaredNorm() : kInfinity;
     block.last_error = std::sqrt(square);
+    if (block.id == path && std::isfinite(square)) {
+      alignment.Add(Eigen::Map<const Eigen::Vector3d>(estimate),
+                    Eigen::Map<const Eigen::Vector3d>(truth));
+    }
     for (Sums* s : into) s->squares[i].Add(square);
     if (!block.scalar) continue;
     double value = truth[0];
@@ -227,7 +220,7 @@ void Metrics::Impl::AddNees(const Owner& owner, std::size_t index, const std::ve
     p.diagonal().segment(row, rows).array() += tracked[i].truth_variance;
     row += rows;
   }
-  const double nees = SquaredMahalanobis(p, error);
+  const double nees = internal::SquaredMahalanobis(p, error);
   if (nees < 0.0) return;
   const auto [bound, is_new] = quantiles.try_emplace(dof, 0.0);
   if (is_new) bound->second = ChiSquareQuantile(0.95, dof);
@@ -295,6 +288,7 @@ Metrics::Metrics(const NamedEstimator& named, const std::vector<StreamInfo>& tru
     : impl_(std::make_unique<Impl>()) {
   impl_->Track(named.system, truths);
   impl_->sensors = internal::NamesOf(named.system.sensors);
+  impl_->path = internal::PathBlockOf(named.system);
   impl_->motions = internal::NamesOf(named.system.motions);
   impl_->has_landmarks = named.system.landmarks.has_value();
   impl_->has_ransac = std::ranges::any_of(
@@ -373,6 +367,10 @@ std::map<std::string, double> Metrics::Finish() const {
     if (!block.series.even()) continue;
     const double lag = Lag(block.series.estimate, block.series.truth, block.series.step_ms());
     if (std::isfinite(lag)) metrics["lag_ms:" + block.name] = lag;
+  }
+  if (const auto aligned = impl_->alignment.Result()) {
+    metrics["path.sim3.rmse"] = aligned->rmse;
+    metrics["path.sim3.scale"] = aligned->scale;
   }
   for (const auto& [sensor, frames] : impl_->reprojection) {
     const Settling settling = SettlingOf(frames);

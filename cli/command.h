@@ -22,6 +22,7 @@ using Action = std::function<ExitCode()>;
 /// `command_line` is what the record of the run shows.
 void AddRun(CLI::App& program, Action& action, const std::string& command_line);
 void AddExplain(CLI::App& program, Action& action);
+void AddCompare(CLI::App& program, Action& action, const std::string& command_line);
 void AddSweep(CLI::App& program, Action& action);
 void AddBundle(CLI::App& program, Action& action);
 void AddSimulate(CLI::App& program, Action& action);

@@ -18,6 +18,7 @@ constexpr const char* kFooter = R"(Examples:
   alidade run examples/05_depth_principled/config.yaml -o runs/first
   alidade sweep examples/05_depth_principled/config.yaml --runs 200
   alidade eval runs/slam runs/slam                 trajectories against truth: ATE, RPE, NEES
+  alidade compare examples/08_depth_all_estimators/config.yaml
 
 `alidade COMMAND --help` tells the rest. Exit codes: 0 ok, 1 something found wrong, 2 usage,
 65 bad data, 66 input missing, 69 plugin missing or refused, 70 internal, 73 cannot create output,
@@ -55,6 +56,7 @@ void Describe(CLI::App& program, Action& action, const std::string& command_line
   program.set_version_flag("--version", "alidade " ALIDADE_VERSION, "print the version and leave");
   program.require_subcommand(1);
   AddRun(program, action, command_line);
+  AddCompare(program, action, command_line);
   AddSweep(program, action);
   AddSimulate(program, action);
   AddBundle(program, action);

@@ -31,7 +31,7 @@ struct Arguments {
   Input input;
   std::string folder;
   std::optional<std::uint64_t> seed;
-  bool force = false, quiet = false, no_figures = false;
+  bool force = false, quiet = false, no_figures = false, covariances = false;
 };
 
 /// Events of one estimator and one kind.
@@ -99,9 +99,10 @@ ExitCode RunConfig(const Arguments& arguments) {
   ReportCrashes();
   StopOnSignals();  // before a source that waits for its pipe is made
   Experiment experiment = BuildExperiment(config, host);
-  Recorder recorder(
-      {folder, arguments.force, !arguments.no_figures, arguments.command, StopRequested}, config,
-      host);
+  Recorder::Options record{folder, arguments.force, !arguments.no_figures, arguments.command,
+                           StopRequested};
+  record.covariances = arguments.covariances;
+  Recorder recorder(record, config, host);
 
   Progress progress("frames", arguments.quiet);
   RunOptions options;
@@ -136,6 +137,8 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
   command.add_flag("--force", arguments->force, "replace the run folder if it is there");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.add_flag("--no-figures", arguments->no_figures, "draw no figures");
+  command.add_flag("--covariances", arguments->covariances,
+                   "write P of every estimate, for `alidade compare`");
   command.footer(kFooter);
   command.callback(
       [&action, arguments] { action = [arguments] { return RunConfig(*arguments); }; });

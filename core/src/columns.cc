@@ -80,6 +80,19 @@ std::vector<std::string> TangentNames(const std::string& name, const Space& spac
   return AmbientNames(name, space);
 }
 
+BlockId PathBlockOf(const System& system) {
+  BlockId path = -1;
+  for (const SensorBinding& binding : system.sensors) {
+    if (!binding.model.has_landmark()) continue;
+    for (std::size_t r = 0; r < binding.roles.size(); ++r) {
+      const BlockId id = binding.roles[r].block;
+      const bool position = binding.model.roles()[r].name == "position" && id >= 0;
+      if (position && system.layout[id].geometry().ambient == 3) path = id;
+    }
+  }
+  return path;
+}
+
 std::string UnitOf(const System& system, BlockId id) {
   if (!system.layout[id].space.unit.empty()) return system.layout[id].space.unit;
   for (const SensorBinding& sensor : system.sensors) {

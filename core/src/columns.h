@@ -28,6 +28,9 @@ std::vector<std::string> NumberedNames(const std::string& name, std::size_t size
 /// `name.rx`, `name.ry`, `name.rz`, of a unit vector `name.d0`, `name.d1`.
 std::vector<std::string> TangentNames(const std::string& name, const Space& space);
 
+/// The block of a position that landmarks are seen from; -1: there is none.
+BlockId PathBlockOf(const System& system);
+
 /// The unit of a block, or else of a sensor's role that it fills.
 std::string UnitOf(const System& system, BlockId id);
 

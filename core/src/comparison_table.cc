@@ -102,11 +102,24 @@ Values ValuesOf(const RunResult& result, const std::string& key) {
   return values;
 }
 
-/// The largest finite RMSE of all blocks with that unit: one prefix serves the whole table.
+/// Errors and differences, in the unit of their block.
+bool IsError(std::string_view kind) {
+  return kind == "rmse" || kind == "final" || kind == "apart" || kind == "apart.final";
+}
+
+/// Errors and differences of paths and maps, in m.
+bool IsLength(std::string_view kind) {
+  return kind == "map.rmse" || kind == "map.sim3.rmse" || kind == "apart.map.sim3" ||
+         kind == "apart.path.sim3" || kind == "path.sim3.rmse";
+}
+
+/// The largest finite RMSE of all blocks with that unit: one prefix serves the whole table. Without
+/// a truth it is the largest difference.
 double LargestRmse(const RunResult& result, const std::string& unit) {
   double largest = 0.0;
   for (const std::string& key : Keys(result, &EstimatorResult::metrics)) {
-    if (KindOf(key) != "rmse" || UnitOfKey(result, key) != unit) continue;
+    const bool along = KindOf(key) == "rmse" || KindOf(key) == "apart";
+    if (!along || UnitOfKey(result, key) != unit) continue;
     for (const auto& value : ValuesOf(result, key)) {
       if (value && std::isfinite(*value)) largest = std::max(largest, *value);
     }
@@ -118,12 +131,12 @@ ComparisonRow RowOf(const RunResult& result, const std::string& key) {
   const std::string_view kind = KindOf(key);
   Values values = ValuesOf(result, key);
   Scaled scaled;
-  if (kind == "rmse") {
+  if (IsError(kind)) {
     const std::string unit = UnitOfKey(result, key);
     scaled = ScaleUnit(unit, LargestRmse(result, unit));
   }
   if (kind == "lag_ms") scaled.unit = "ms";
-  if (kind == "map.sim3.rmse") scaled = ScaleUnit("m", LargestRmse(result, "m"));
+  if (IsLength(kind)) scaled = ScaleUnit("m", LargestRmse(result, "m"));
   if (kind == "cov95" || kind == "nees.cov95") scaled = {100.0, "%"};
   for (auto& value : values) {
     if (value) *value *= scaled.factor;
@@ -185,6 +198,20 @@ std::vector<ComparisonRow> MetricRows(const RunResult& result) {
       row.cells.push_back(count == one.counts.end() ? "-" : std::to_string(count->second));
     }
     rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+std::vector<ComparisonRow> RowsOf(const RunResult& result, const std::vector<RowKind>& kinds) {
+  std::vector<ComparisonRow> rows;
+  for (const RowKind& kind : kinds) {
+    for (const std::string& key : Keys(result, &EstimatorResult::metrics)) {
+      if (KindOf(key) != kind.kind || key.find('@') != key.npos) continue;
+      if (IsExact(result, SubjectOf(key))) continue;
+      ComparisonRow row = RowOf(result, key);
+      row.label = kind.label + row.label.substr(std::min(KindOf(key).size(), row.label.size()));
+      rows.push_back(std::move(row));
+    }
   }
   return rows;
 }

@@ -24,6 +24,12 @@ struct ComparisonRow {
 std::vector<ComparisonRow> MetricRows(const RunResult& result);
 /// These, whether it diverged and whether its errors were inconsistent.
 std::vector<ComparisonRow> ComparisonRows(const RunResult& result);
+/// Metrics whose keys begin alike, `rmse` of `rmse:target.depth`, and what a row calls them.
+struct RowKind {
+  std::string kind, label;
+};
+/// The metrics of these kinds, in their order, over whole runs.
+std::vector<ComparisonRow> RowsOf(const RunResult& result, const std::vector<RowKind>& kinds);
 /// What the metrics compare with, in words; "" where that is truth.
 std::string ReferenceText(const RunResult& result);
 /// Rows below the names of the estimators, aligned to the right. Estimators that do not fit beside

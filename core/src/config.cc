@@ -313,6 +313,8 @@ Config Config::Merged(const Node& overrides) const {
   return config;
 }
 
+std::string Node::ToYaml() const { return internal::ToYaml(*tree_); }
+
 std::string Config::ToYaml() const { return internal::ToYaml(*tree_); }
 
 }  // namespace alidade

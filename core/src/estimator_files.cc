@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <map>
 
 #include "alidade/sweep.h"
 #include "columns.h"
 #include "frame_innovation.h"
+#include "series.h"
 
 namespace alidade::internal {
 
@@ -29,7 +31,8 @@ RecordedEstimator EstimatorFiles::Describe(const NamedEstimator& named) {
 
 EstimatorFiles::EstimatorFiles(const RunFolder& folder, const NamedEstimator& named,
                                const std::vector<StreamInfo>& truths,
-                               const std::vector<std::vector<std::string>>& truth_columns)
+                               const std::vector<std::vector<std::string>>& truth_columns,
+                               bool covariances)
     : recorded_(Describe(named)),
       estimates_(
           folder, named.name + "/estimates.csv",
@@ -38,6 +41,7 @@ EstimatorFiles::EstimatorFiles(const RunFolder& folder, const NamedEstimator& na
       gains_(folder, named.name + "/gains.csv", GainsHeader(named.system)) {
   FindPath(named.system);
   OpenTrajectory(folder, named.system);
+  if (covariances) covariances_ = folder.Create(named.name + "/covariance.bin");
   if (std::ranges::any_of(named.system.sensors, HasReprojection)) {
     reprojection_.emplace(folder, named.name + "/reprojection.csv",
                           std::vector<std::string>{"t_s", "sensor", "landmarks", "rms"});
@@ -61,17 +65,11 @@ void EstimatorFiles::OpenTrajectory(const RunFolder& folder, const System& syste
 
 void EstimatorFiles::FindPath(const System& system) {
   for (std::size_t s = 0; s < system.sensors.size(); ++s) {
-    const SensorBinding& binding = system.sensors[s];
-    recorded_.sensors[s].has_reprojection = HasReprojection(binding);
-    if (!binding.model.has_landmark()) continue;
-    for (std::size_t r = 0; r < binding.roles.size(); ++r) {
-      if (binding.model.roles()[r].name != "position") continue;
-      for (const BlockColumns& columns : blocks_) {
-        if (columns.id == binding.roles[r].block && columns.ambient == 3) {
-          recorded_.path = static_cast<int>(columns.element);
-        }
-      }
-    }
+    recorded_.sensors[s].has_reprojection = HasReprojection(system.sensors[s]);
+  }
+  const BlockId path = PathBlockOf(system);
+  for (const BlockColumns& columns : blocks_) {
+    if (columns.id == path) recorded_.path = static_cast<int>(columns.element);
   }
 }
 
@@ -178,6 +176,11 @@ void EstimatorFiles::AddEstimate(const Frame& frame, const State& state) {
     }
   }
   estimates_.EndRow();
+  if (!covariances_) return;
+  static_assert(std::endian::native == std::endian::little);
+  std::vector<double> cells;
+  AppendCovariance(state, blocks_.size(), cells);
+  covariances_->Write({reinterpret_cast<const char*>(cells.data()), 8 * cells.size()});
 }
 
 void EstimatorFiles::AddPose(Stamp stamp, const State& state) {
@@ -308,6 +311,7 @@ void EstimatorFiles::Close() {
   gains_.Close();
   if (trajectory_) trajectory_->Close();
   if (trajectory_covariance_) trajectory_covariance_->Close();
+  if (covariances_) covariances_->Close();
   if (reprojection_) {
     reprojection_->Close();
     recorded_.reprojection_rows = reprojection_->rows();

@@ -17,10 +17,11 @@ namespace alidade::internal {
 /// that the system has from the start.
 class EstimatorFiles {
  public:
-  /// `truth_columns` names the columns of truth.csv, by truth and element.
+  /// `truth_columns` names the columns of truth.csv, by truth and element; `covariances` asks for
+  /// `covariance.bin` too.
   EstimatorFiles(const RunFolder& folder, const NamedEstimator& named,
                  const std::vector<StreamInfo>& truths,
-                 const std::vector<std::vector<std::string>>& truth_columns);
+                 const std::vector<std::vector<std::string>>& truth_columns, bool covariances);
 
   /// A frame older than the state has no row in estimates.csv: the state is not of its stamp.
   /// Error: kIo.
@@ -57,6 +58,7 @@ class EstimatorFiles {
   std::optional<CsvFile> reprojection_;
   std::optional<PosePlace> pose_;  ///< among the blocks
   std::optional<PoseFile> trajectory_, trajectory_covariance_;
+  std::unique_ptr<OutputFile> covariances_;  ///< null: not asked for
 };
 
 /// What a figure of the map has to know.

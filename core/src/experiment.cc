@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "accepted.h"
+#include "add_estimator.h"
 #include "alidade/plugin_listing.h"
 #include "alidade/run.h"
 #include "columns.h"
@@ -162,7 +163,10 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   }
   const auto overrides = entry.Find("overrides");
   const Config own = overrides ? config.Merged(*overrides) : config;
-  if (overrides) CheckOverrides(*overrides, config.root(), own.root());
+  if (overrides) {
+    CheckOverrides(*overrides, config.root(), own.root());
+    named.overrides = overrides->ToYaml();
+  }
   const std::vector<std::string> only = ReadSensorList(entry, own.root());
   const auto use = entry.Find("use");
   if (use && use->is_map()) use->Declare("accepted_by");
@@ -302,6 +306,15 @@ std::vector<std::filesystem::path> PluginPaths(const Config& config) {
   return paths;
 }
 
+void internal::AddEstimator(const Config& config, const PluginHost& host, const std::string& name,
+                            Experiment& experiment) {
+  const Node entry = config.root().At("estimators").At(name);
+  NamedEstimator named = BuildEstimator(name, entry, config, host, experiment.source->streams(),
+                                        experiment.estimators);
+  if (experiment.time.order == TimeOrder::kRewind) CheckCanRewind(named, entry);
+  experiment.estimators.push_back(std::move(named));
+}
+
 Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   const Node root = config.root();
   CheckSchema(root);
@@ -328,11 +341,7 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   experiment.time.ranks = RanksOf(streams, whole);
   experiment.segments = ReadSegments(root, whole, streams);
   for (const auto& [name, entry] : root.At("estimators", "a run").Entries()) {
-    experiment.estimators.push_back(
-        BuildEstimator(name, entry, config, host, streams, experiment.estimators));
-    if (experiment.time.order == TimeOrder::kRewind) {
-      CheckCanRewind(experiment.estimators.back(), entry);
-    }
+    internal::AddEstimator(config, host, name, experiment);
   }
   if (experiment.estimators.empty()) {
     root.At("estimators").Fail("empty", "at least one estimator");

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <cmath>
 
 namespace alidade::internal {

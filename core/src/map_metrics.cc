@@ -1,23 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "map_metrics.h"
 
-#include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <cmath>
+
+#include "series.h"
 
 namespace alidade {
 namespace {
 
 double RootMeanSquare(const Eigen::Matrix3Xd& errors) {
   return std::sqrt(errors.squaredNorm() / static_cast<double>(errors.cols()));
-}
-
-/// Whether the points are not all on one line.
-bool SpanAPlane(const Eigen::Matrix3Xd& points) {
-  constexpr double kThin = 1e-9;
-  const Eigen::Matrix3Xd centred = points.colwise() - points.rowwise().mean();
-  const Eigen::Vector3d widths = centred.jacobiSvd().singularValues();
-  return widths[1] > kThin * widths[0];
 }
 
 }  // namespace
@@ -34,12 +26,10 @@ std::map<std::string, double> internal::MapMetrics(const std::vector<LandmarkEst
   estimated.conservativeResize(Eigen::NoChange, count);
   known.conservativeResize(Eigen::NoChange, count);
   std::map<std::string, double> metrics = {{"map.rmse", RootMeanSquare(estimated - known)}};
-  if (count < 3 || !SpanAPlane(estimated) || !SpanAPlane(known)) return metrics;
-  const Eigen::Matrix4d similarity = Eigen::umeyama(estimated, known);
-  const Eigen::Matrix3d linear = similarity.topLeftCorner<3, 3>();
-  const Eigen::Vector3d shift = similarity.topRightCorner<3, 1>();
-  metrics["map.sim3.rmse"] = RootMeanSquare(((linear * estimated).colwise() + shift) - known);
-  metrics["map.sim3.scale"] = std::cbrt(linear.determinant());
+  if (const auto aligned = internal::AlignBySimilarity(estimated, known)) {
+    metrics["map.sim3.rmse"] = aligned->rmse;
+    metrics["map.sim3.scale"] = aligned->scale;
+  }
   return metrics;
 }
 

@@ -14,6 +14,7 @@
 #include "mahalanobis.h"
 #include "names.h"
 #include "number_text.h"
+#include "path_alignment.h"
 
 namespace alidade {
 namespace {
@@ -82,6 +83,8 @@ struct Metrics::Impl {
   std::map<std::string, std::int64_t> counts;
   std::map<std::string, std::string> units;
   std::map<int, double> quantiles;  ///< chi2(0.95, dof)
+  BlockId path = -1;                ///< that landmarks are seen from
+  internal::PathAlignment alignment;
   std::vector<Event> events;
 
   void Track(const System& system, const std::vector<StreamInfo>& truths);
@@ -137,6 +140,10 @@ void Metrics::Impl::AddErrors(const Frame& frame, const std::vector<Sums*>& into
     block.geometry.Minus(truth, estimate, block.error.data());
     const double square = block.error.allFinite() ? block.error.squaredNorm() : kInfinity;
     block.last_error = std::sqrt(square);
+    if (block.id == path && std::isfinite(square)) {
+      alignment.Add(Eigen::Map<const Eigen::Vector3d>(estimate),
+                    Eigen::Map<const Eigen::Vector3d>(truth));
+    }
     for (Sums* s : into) s->squares[i].Add(square);
     if (!block.scalar) continue;
     double value = truth[0];
@@ -281,6 +288,7 @@ Metrics::Metrics(const NamedEstimator& named, const std::vector<StreamInfo>& tru
     : impl_(std::make_unique<Impl>()) {
   impl_->Track(named.system, truths);
   impl_->sensors = internal::NamesOf(named.system.sensors);
+  impl_->path = internal::PathBlockOf(named.system);
   impl_->motions = internal::NamesOf(named.system.motions);
   impl_->has_landmarks = named.system.landmarks.has_value();
   impl_->has_ransac = std::ranges::any_of(
@@ -359,6 +367,10 @@ std::map<std::string, double> Metrics::Finish() const {
     if (!block.series.even()) continue;
     const double lag = Lag(block.series.estimate, block.series.truth, block.series.step_ms());
     if (std::isfinite(lag)) metrics["lag_ms:" + block.name] = lag;
+  }
+  if (const auto aligned = impl_->alignment.Result()) {
+    metrics["path.sim3.rmse"] = aligned->rmse;
+    metrics["path.sim3.scale"] = aligned->scale;
   }
   for (const auto& [sensor, frames] : impl_->reprojection) {
     const Settling settling = SettlingOf(frames);

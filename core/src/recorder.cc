@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 
+#include "data_hash.h"
 #include "estimator_files.h"
 #include "figures.h"
 #include "json.h"
@@ -39,6 +40,7 @@ struct Recorder::Impl {
   internal::RunFacts facts;
   std::set<std::filesystem::path> hashed;  ///< plugins that are in the facts
   std::optional<internal::SourceFiles> source;
+  std::optional<internal::DataHash> data;
   std::vector<std::unique_ptr<internal::EstimatorFiles>> estimators;
   std::vector<std::string> highlights;
   std::string note;
@@ -136,6 +138,11 @@ std::string Recorder::Impl::TimingJson(const RunResult& result) const {
   json.Key("command").Text(options.command);
   json.Key("wall_s").Number(wall_s);
   json.Key("frames_per_s").Number(static_cast<double>(result.frames) / wall_s);
+  json.Key("estimators").Object();
+  for (const EstimatorResult& one : result.estimators) {
+    json.Key(one.name).Object().Key("wall_s").Number(one.wall_s).End();
+  }
+  json.End();
   json.Key("arrivals").Object();
   json.Key("late").Integer(result.arrivals.late);
   json.Key("merged").Integer(result.arrivals.merged);
@@ -175,10 +182,12 @@ void Recorder::Start(const Experiment& experiment) {
   impl_->facts.seed = experiment.seed;
   impl_->AddPlugins(experiment);
   impl_->source.emplace(impl_->folder, experiment);
+  impl_->data.emplace(experiment.source->streams(), experiment.source->truths());
   for (const NamedEstimator& named : experiment.estimators) {
-    impl_->facts.types[named.name] = named.type;
+    impl_->facts.estimators.emplace(named.name, internal::FactsOf(named, experiment));
     impl_->estimators.push_back(std::make_unique<internal::EstimatorFiles>(
-        impl_->folder, named, experiment.source->truths(), impl_->source->truth_columns()));
+        impl_->folder, named, experiment.source->truths(), impl_->source->truth_columns(),
+        impl_->options.covariances));
   }
   impl_->started = Clock::now();
 }
@@ -186,12 +195,17 @@ void Recorder::Start(const Experiment& experiment) {
 void Recorder::AddFrame(const Frame& frame) {
   ALIDADE_EXPECTS(impl_->source.has_value());
   impl_->source->Add(frame);
+  impl_->data->Add(frame);
 }
 
 void Recorder::AddEstimate(int estimator, const Frame& frame, const State& state,
                            const UpdateReport& report) {
   ALIDADE_EXPECTS(estimator >= 0 && estimator < static_cast<int>(impl_->estimators.size()));
   impl_->estimators[static_cast<std::size_t>(estimator)]->Add(frame, state, report);
+}
+
+void Recorder::AddFile(const std::string& name, std::string_view text) {
+  impl_->folder.Write(name, text);
 }
 
 void Recorder::Finish(const RunResult& result) {
@@ -206,6 +220,10 @@ void Recorder::Finish(const RunResult& result) {
     if (e >= recorded.estimators.size()) continue;
     internal::RecordedEstimator& estimator = recorded.estimators[e];
     estimator.map = internal::DescribeMap(*one.landmarks, estimator.path_box);
+  }
+  if (impl_->data) {
+    impl_->facts.measurements_sha256 = impl_->data->measurements();
+    impl_->facts.truth_sha256 = impl_->data->truth();
   }
   folder.Write("run.json", internal::RunJson(result, impl_->facts));
   folder.Write("comparison.csv", internal::ComparisonCsv(result));

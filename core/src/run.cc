@@ -2,6 +2,7 @@
 #include "alidade/run.h"
 
 #include <algorithm>
+#include <chrono>
 
 #include "accepted.h"
 #include "alidade/metrics.h"
@@ -29,6 +30,11 @@ bool InSegment(const Segment& segment, const Frame& frame) {
 
 using internal::Running;
 using internal::Seen;
+using Clock = std::chrono::steady_clock;
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 void Fail(RunResult& result, ExitCode code, std::string reason) {
   result.status = RunStatus::kFailed;
@@ -50,14 +56,16 @@ bool Advance(Running& one, const Seen& seen, const Frame& visible,
   one.last = nullptr;
   if (one.ended) return true;
   Estimator& estimator = *one.named.estimator;
+  const auto started = Clock::now();
   const UpdateReport& report = passed ? passed->report : estimator.Process(visible);
+  if (!passed) one.result.wall_s += SecondsSince(started);
   one.last = &report;
   one.Note(report.events);
   one.ended = passed ? passed->failed : estimator.failed();
   one.diverged = passed ? passed->diverged : estimator.diverged();
   if (!one.ended && !estimator.offline()) {
     one.Take(static_cast<std::size_t>(result.frames), seen,
-             passed ? passed->after->state : estimator.state(), report, options.recorder);
+             passed ? passed->after->state : estimator.state(), report, options);
   }
   const bool policy = one.named.on_divergence == OnDivergence::kFail && one.diverged;
   if (!one.ended && !policy) return true;
@@ -115,6 +123,7 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
       seen.in_segment[i] = InSegment(experiment.segments[i], seen.frame);
     }
     if (options.recorder != nullptr) options.recorder->AddFrame(seen.frame);
+    if (options.observe_frame) options.observe_frame(seen.frame);
     if (keep) kept.push_back(seen);
     bool go_on = true;
     for (std::size_t e = 0; e < running.size(); ++e) {
@@ -165,12 +174,16 @@ void SmoothAll(std::vector<Running>& running, const std::vector<Seen>& kept,
     Estimator& estimator = *one.named.estimator;
     if (one.ended || !estimator.offline()) continue;
     std::vector<Event> events;
+    const auto started = Clock::now();
     try {
       estimator.StopWhen(options.stop);
       estimator.Smooth([&](std::size_t k, const State& state, const UpdateReport& report) {
-        one.Take(k, kept[k], state, report, options.recorder);
+        const auto taken = Clock::now();
+        one.Take(k, kept[k], state, report, options);
         events = report.events;
+        one.result.wall_s -= SecondsSince(taken);  // of the record and the metrics
       });
+      one.result.wall_s += SecondsSince(started);
     } catch (const Error& e) {
       if (e.code() == ExitCode::kStopped) {
         NoteStop(one, e.what(), result);
@@ -293,6 +306,7 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
     const Estimator& estimator = *one.named.estimator;
     one.result.diverged = one.diverged || (estimator.offline() && estimator.diverged());
     one.result.inconsistent = !one.metrics.events().empty();
+    one.result.failed = one.ended || one.diverged || estimator.failed() || estimator.diverged();
     result.estimators.push_back(std::move(one.result));
   }
   return result;

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run_json.h"
 
+#include "columns.h"
 #include "comparison_table.h"
 #include "csv_file.h"
 #include "json.h"
+#include "names.h"
 #include "number_text.h"
 
 namespace alidade::internal {
@@ -21,11 +23,30 @@ void WriteTexts(Json& json, const std::map<std::string, std::string>& values) {
   json.End();
 }
 
+void WriteFacts(Json& json, const EstimatorFacts& facts) {
+  json.Key("type").Text(facts.type);
+  if (!facts.accepted_by.empty()) json.Key("accepted_by").Text(facts.accepted_by);
+  if (!facts.overrides.empty()) json.Key("overrides").Text(facts.overrides);
+  json.Key("sensors").Array();
+  for (const std::string& sensor : facts.sensors) json.Text(sensor);
+  json.End();
+  json.Key("smoothed").Flag(facts.smoothed);
+  if (!facts.path.empty()) json.Key("path").Text(facts.path);
+  json.Key("blocks").Array();
+  for (const SeriesBlock& block : facts.blocks) {
+    json.Object().Key("name").Text(block.name).Key("unit").Text(block.unit);
+    json.Key("geometry").Text(ToString(block.geometry.kind));
+    json.Key("size").Integer(block.geometry.ambient).End();
+  }
+  json.End();
+}
+
 void WriteEstimator(Json& json, const EstimatorResult& result, const RunFacts& facts) {
   json.Key(result.name).Object();
-  if (const auto type = facts.types.find(result.name); type != facts.types.end()) {
-    json.Key("type").Text(type->second);
+  if (const auto known = facts.estimators.find(result.name); known != facts.estimators.end()) {
+    WriteFacts(json, known->second);
   }
+  json.Key("failed").Flag(result.failed);
   json.Key("metrics").Object();
   for (const auto& [key, value] : result.metrics) json.Key(key).Number(value);
   json.Key("diverged").Flag(result.diverged);
@@ -51,6 +72,18 @@ std::map<std::string, std::int64_t> CountEvents(const EstimatorResult& result) {
   return counts;
 }
 
+EstimatorFacts FactsOf(const NamedEstimator& named, const Experiment& experiment) {
+  const BlockId path = PathBlockOf(named.system);
+  const auto by = static_cast<std::size_t>(named.accepted_by);
+  return {named.type,
+          named.estimator->offline(),
+          named.accepted_by < 0 ? "" : experiment.estimators[by].name,
+          named.overrides,
+          NamesOf(named.system.sensors),
+          path < 0 ? "" : named.system.layout[path].name,
+          SeriesBlocksOf(named.system)};
+}
+
 std::string RunJson(const RunResult& result, const RunFacts& facts) {
   Json json;
   json.Object();
@@ -59,6 +92,11 @@ std::string RunJson(const RunResult& result, const RunFacts& facts) {
   WriteTexts(json.Key("versions"), {{"alidade", ALIDADE_VERSION}});
   json.Key("seed").Integer(static_cast<std::int64_t>(facts.seed));
   json.Key("frames").Integer(result.frames);
+  if (!facts.measurements_sha256.empty()) {
+    json.Key("data").Object().Key("measurements").Text(facts.measurements_sha256);
+    if (!facts.truth_sha256.empty()) json.Key("truth").Text(facts.truth_sha256);
+    json.End();
+  }
   if (!result.normalised.empty()) WriteIntegers(json.Key("normalised"), result.normalised);
   json.Key("reference").Text(result.reference);
   if (!result.withheld.empty()) json.Key("withheld").Text(result.withheld);

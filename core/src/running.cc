@@ -9,7 +9,7 @@
 namespace alidade::internal {
 
 void Running::Take(std::size_t k, const Seen& seen, const State& state, const UpdateReport& report,
-                   Recorder* recorder) {
+                   const RunOptions& options) {
   took = true;
   if (!waits) {
     metrics.Add(seen.frame, seen.in_segment, state, report);
@@ -19,7 +19,8 @@ void Running::Take(std::size_t k, const Seen& seen, const State& state, const Up
       estimates.push_back({k, ValuesOf(state, named.system.layout.blocks().size())});
     }
   }
-  if (recorder != nullptr) recorder->AddEstimate(index, seen.frame, state, report);
+  if (options.recorder != nullptr) options.recorder->AddEstimate(index, seen.frame, state, report);
+  if (options.observe) options.observe(index, seen.frame, state, report);
 }
 
 void Running::Note(const std::vector<Event>& events) {

@@ -24,9 +24,9 @@ struct Running {
   std::vector<Estimate> estimates = {};  ///< where it waits
   std::int64_t stale_inputs = 0;         ///< events `input_stale`, those that are kept too
 
-  /// Puts the estimate of frame k into metrics and record.
+  /// Puts the estimate of frame k into metrics and record, and shows it to who observes the run.
   void Take(std::size_t k, const Seen& seen, const State& state, const UpdateReport& report,
-            Recorder* recorder);
+            const RunOptions& options);
   /// Keeps the events; of each input that is missing again and again the first alone, and how often
   /// that was.
   void Note(const std::vector<Event>& events);

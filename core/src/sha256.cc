@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sha256.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
@@ -21,6 +22,7 @@ constexpr std::array<std::uint32_t, 64> kRound = {
     0x748f82ee, 0x78a5636f, 0x84c87814, 0x8cc70208, 0x90befffa, 0xa4506ceb, 0xbef9a3f7, 0xc67178f2};
 
 using State = std::array<std::uint32_t, 8>;
+constexpr std::size_t kBlock = 64;  // bytes
 
 std::uint32_t BigEndian(const unsigned char* p) {
   return std::uint32_t{p[0]} << 24 | std::uint32_t{p[1]} << 16 | std::uint32_t{p[2]} << 8 | p[3];
@@ -47,30 +49,49 @@ void Compress(State& hash, const unsigned char* block) {
   for (std::size_t i = 0; i < 8; ++i) hash[i] += now[i];
 }
 
+/// The hash after the whole blocks of `bytes`, of 64 bytes each.
+void CompressAll(State& hash, std::string_view bytes) {
+  for (std::size_t at = 0; at + kBlock <= bytes.size(); at += kBlock) {
+    Compress(hash, reinterpret_cast<const unsigned char*>(bytes.data() + at));
+  }
+}
+
 }  // namespace
 
-std::string Sha256(std::string_view bytes) {
-  State hash = {0x6a09e667, 0xbb67ae85, 0x3c6ef372, 0xa54ff53a,
-                0x510e527f, 0x9b05688c, 0x1f83d9ab, 0x5be0cd19};
-  std::string tail(bytes.substr(bytes.size() / 64 * 64));
-  const auto compress = [&hash](std::string_view text) {
-    for (std::size_t at = 0; at + 64 <= text.size(); at += 64) {
-      Compress(hash, reinterpret_cast<const unsigned char*>(text.data() + at));
-    }
-  };
-  compress(bytes);
+void Sha256Stream::Add(std::string_view bytes) {
+  size_ += bytes.size();
+  if (!tail_.empty()) {
+    const std::size_t missing = std::min(kBlock - tail_.size(), bytes.size());
+    tail_ += bytes.substr(0, missing);
+    bytes.remove_prefix(missing);
+    if (tail_.size() < kBlock) return;
+    CompressAll(hash_, tail_);
+    tail_.clear();
+  }
+  CompressAll(hash_, bytes);
+  tail_ = bytes.substr(bytes.size() / kBlock * kBlock);
+}
+
+std::string Sha256Stream::Digest() const {
+  State hash = hash_;
   // One bit, zeros, and the length in bits, to a whole number of blocks.
-  tail += '\x80';
-  while (tail.size() % 64 != 56) tail += '\0';
-  const std::uint64_t bits = std::uint64_t{bytes.size()} * 8;
+  std::string tail = tail_ + '\x80';
+  while (tail.size() % kBlock != kBlock - 8) tail += '\0';
+  const std::uint64_t bits = size_ * 8;
   for (int shift = 56; shift >= 0; shift -= 8) tail += static_cast<char>(bits >> shift & 0xff);
-  compress(tail);
+  CompressAll(hash, tail);
   constexpr std::string_view kHex = "0123456789abcdef";
   std::string text;
   for (const std::uint32_t word : hash) {
     for (int shift = 28; shift >= 0; shift -= 4) text += kHex[word >> shift & 15];
   }
   return text;
+}
+
+std::string Sha256(std::string_view bytes) {
+  Sha256Stream stream;
+  stream.Add(bytes);
+  return stream.Digest();
 }
 
 std::string Sha256OfFile(const std::filesystem::path& file) {

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "sweep_config.h"
+#include "sweep_spread.h"
 
 namespace alidade {
 
@@ -77,7 +78,8 @@ class Queue {
       }
       RunOptions options;
       options.stop = options_.stop;
-      RunResult result = Run(experiment, options);
+      RunResult result =
+          options_.run ? options_.run(experiment, options) : Run(experiment, options);
       run.status = result.code == ExitCode::kDiverged ? RunStatus::kOk : result.status;
       run.code = result.code;
       run.reason = std::move(result.reason);
@@ -114,15 +116,15 @@ bool MayRunInParallel(const PluginHost& host) {
   });
 }
 
-Spread SpreadOf(std::vector<double> values) {
+}  // namespace
+
+Spread internal::SpreadOf(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   double sum = 0.0;
   for (const double value : values) sum += value;
   return {sum / static_cast<double>(values.size()), Quantile(values, 0.05), Quantile(values, 0.5),
           Quantile(values, 0.95)};
 }
-
-}  // namespace
 
 SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptions& options) {
   ALIDADE_EXPECTS(options.runs > 0 && options.jobs >= 0);
@@ -196,7 +198,7 @@ std::vector<SweepSummary> Summarise(const SweepResult& result) {
         }
       }
     }
-    for (auto& [key, list] : values) summary.metrics[key] = SpreadOf(std::move(list));
+    for (auto& [key, list] : values) summary.metrics[key] = internal::SpreadOf(std::move(list));
   }
   return summaries;
 }

@@ -228,6 +228,10 @@ SweepFolder::SweepFolder(const std::filesystem::path& folder, bool force)
 
 SweepFolder::~SweepFolder() = default;
 
+void SweepFolder::AddFile(const std::string& name, const std::string& text) {
+  impl_->folder.Write(name, text);
+}
+
 void SweepFolder::Write(const SweepResult& result, const Config& config) {
   const RunFolder& folder = impl_->folder;
   folder.Write("config.resolved.yaml", config.ToYaml());

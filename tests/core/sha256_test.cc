@@ -20,5 +20,16 @@ TEST(Sha256, AgreesWithTheStandard) {
             "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
 }
 
+TEST(Sha256, DoesNotDependOnThePieces) {
+  const std::string text(1000, 'b');
+  for (const std::size_t size : {1u, 63u, 64u, 65u, 200u, 1000u}) {
+    internal::Sha256Stream stream;
+    for (std::size_t at = 0; at < text.size(); at += size) {
+      stream.Add(std::string_view(text).substr(at, size));
+      EXPECT_EQ(stream.Digest(), internal::Sha256(text.substr(0, at + size))) << size;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace alidade

@@ -75,6 +75,9 @@ class Node {
   /// Map: declares keys without reading them (so that they are known to RejectUnread).
   void Declare(std::string_view key) const;
 
+  /// This value as YAML, which Config::Set reads back.
+  std::string ToYaml() const;
+
   /// Throws the Error of this place: `FILE:LINE:COL path: what; expected ...; did you mean ...?`
   [[noreturn]] void Fail(std::string_view what, std::string_view expected = {},
                          std::string_view suggestion = {}) const;

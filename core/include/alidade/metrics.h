@@ -22,6 +22,9 @@ namespace alidade {
 ///   nees.cov95:OWNER    share of those stamps with e' C^-1 e <= chi2(0.95, dof)
 ///   nis.mean:SENSOR     mean of r' S^-1 r / dof over accepted measurements
 ///   final:BLOCK         |e| at the last stamp
+///   path.sim3.rmse      of the position that landmarks are seen from, m, after the similarity that
+///                       brings its path nearest to the true one [Umeyama1991]
+///   path.sim3.scale     of that similarity; true = scale x estimate
 ///   reprojection:SENSOR     of landmarks, in the unit of the measurement: the rms of the
 ///                           innovations that a frame accepts, median of the run's last half
 ///   settling_frames:SENSOR  frames until that rms stays at this level, as SettlingOf() counts

@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "alidade/run.h"
@@ -23,6 +24,7 @@ class Recorder {
     std::string command;              ///< of the program, for timing.json
     std::function<bool()> stop = {};  ///< true: leave out the figures that are not drawn yet
     double drawing_s = 60.0;          ///< the most that all figures may take
+    bool covariances = false;         ///< write `NAME/covariance.bin` too
   };
   /// Creates the temporary folder. Errors: kCannotCreate where `folder` exists without `force`.
   Recorder(const Options& options, const Config& config, const PluginHost& host);
@@ -35,6 +37,8 @@ class Recorder {
   void AddFrame(const Frame& frame);
   void AddEstimate(int estimator, const Frame& frame, const State& state,
                    const UpdateReport& report);
+  /// Puts a file of that text into the folder too. Errors: kCannotCreate, kIo.
+  void AddFile(const std::string& name, std::string_view text);
   /// Writes run.json, comparison.csv, timing.json, figures and report.html, syncs and renames.
   void Finish(const RunResult& result);
 

@@ -28,6 +28,7 @@ struct NamedEstimator {
   System system;
   std::unique_ptr<Estimator> estimator;
   OnDivergence on_divergence = OnDivergence::kReport;
+  std::string overrides;  ///< of its entry, as YAML; "": none
   /// Index of an estimator before it, not an offline one: it sees the measurements alone that this
   /// one accepted or took as first values. -1: it sees all.
   int accepted_by = -1;
@@ -95,10 +96,13 @@ struct EstimatorResult {
   std::map<std::string, std::string> units;    ///< of blocks, {"target.depth", "m"}; may lack some
   bool diverged = false;                       ///< the estimator said so
   bool inconsistent = false;                   ///< its error was; the event of that name
+  bool failed = false;                         ///< it diverged, or had nothing to go on with
   std::vector<Event> events;
   std::vector<std::vector<std::string>> unobservable;
   /// The map at the end, for `landmarks.csv`; none where the estimator has no landmarks at all.
   std::optional<std::vector<LandmarkEstimate>> landmarks;
+  /// Time of the wall clock that its frames and smoothing took; not under kRewind.
+  double wall_s = 0.0;
 };
 
 struct RunResult {
@@ -117,7 +121,10 @@ struct RunResult {
 class Recorder;
 
 struct RunOptions {
-  Recorder* recorder = nullptr;                              ///< null: nothing is written
+  Recorder* recorder = nullptr;                     ///< null: nothing is written
+  std::function<void(const Frame&)> observe_frame;  ///< given each frame as it is used; or empty
+  /// Given each estimate as the recorder is, with the index of its estimator; may be empty.
+  std::function<void(int, const Frame&, const State&, const UpdateReport&)> observe;
   std::function<void(std::int64_t, std::int64_t)> progress;  ///< frames done, frames in all or -1
   std::function<bool()> stop;                                ///< true: finish the frame and stop
 };

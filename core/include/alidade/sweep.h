@@ -20,6 +20,8 @@ struct SweepOptions {
   /// instances at once (no ALIDADE_THREAD_INSTANCES).
   int jobs = 0;
   int shard = 1, shards = 1;  ///< which of the equal shares of the seeds, in order
+  /// What makes a run, from several threads at once; empty: alidade::Run.
+  std::function<RunResult(Experiment&, const RunOptions&)> run;
   std::function<void(std::int64_t, std::int64_t)> progress;  ///< runs done, runs in all
   std::function<bool()> stop;                                ///< true: drop unfinished runs
 };
@@ -116,6 +118,8 @@ class SweepFolder {
   SweepFolder(const SweepFolder&) = delete;
   SweepFolder& operator=(const SweepFolder&) = delete;
 
+  /// Puts a file of that text into the folder too. Errors: kCannotCreate, kIo.
+  void AddFile(const std::string& name, const std::string& text);
   /// Errors: kCannotCreate, kIo.
   void Write(const SweepResult& result, const Config& config);
   /// Returns why there is no figure, or "". `stop` ends the drawing. Errors: kCannotCreate, kIo.

@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/compare.h"
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <memory>
+#include <system_error>
+
+#include "alidade/recorder.h"
+#include "command.h"
+#include "console.h"
+
+namespace alidade::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kFooter = R"(Examples:
+  alidade compare config.yaml                      run it, with what explains the gap to the batch
+  alidade compare config.yaml --runs 100           over seeds 1 to 100
+  alidade compare config.yaml --no-explain --reference batch
+  alidade compare runs/a runs/b                    finished runs over the same data
+
+Exit code 1: there was no reference to compare with; 65: runs over different data.)";
+
+struct Arguments {
+  std::string command;          ///< the whole line
+  Input input;                  ///< without its config
+  std::vector<std::string> of;  ///< a config, or folders
+  std::string folder;
+  std::optional<std::uint64_t> seed;
+  SweepOptions sweep;
+  bool over_seeds = false;
+  CompareOptions options;
+  bool no_explain = false, json = false, markdown = false, latex = false;
+  bool force = false, quiet = false, figures = false;
+};
+
+std::string Shown(const Comparison& comparison, const Arguments& arguments) {
+  if (arguments.json) return CompareJson(comparison);
+  return CompareReport(comparison, arguments.markdown ? TableStyle::kMarkdown
+                                   : arguments.latex  ? TableStyle::kLatex
+                                                      : TableStyle::kText);
+}
+
+/// Prints the comparison, and where it lies.
+void Tell(const Comparison& comparison, const Arguments& arguments, const fs::path& folder) {
+  Print(Shown(comparison, arguments));
+  if (!folder.empty() && !arguments.quiet) PrintNote("wrote " + folder.string());
+}
+
+ExitCode CodeOf(const Comparison& comparison, ExitCode of_run) {
+  if (!comparison.withheld.empty()) {
+    PrintErrors(comparison.withheld);
+    return ExitCode::kFound;
+  }
+  return of_run;
+}
+
+/// Whether what ended the run was an estimator that was added, of which the comparison tells.
+bool OnlyAddedFailed(const RunResult& result, const ExplainedExperiment& explained) {
+  return result.code == ExitCode::kDiverged &&
+         std::ranges::all_of(result.estimators, [&](const EstimatorResult& one) {
+           return !one.failed || std::ranges::count(explained.added, one.name) > 0;
+         });
+}
+
+/// What a folder, of a run or a sweep, has besides.
+void AddFiles(auto& folder, const Comparison& comparison) {
+  folder.AddFile("compare.json", CompareJson(comparison));
+  folder.AddFile("compare.md", CompareReport(comparison, TableStyle::kMarkdown));
+  folder.AddFile("compare.tex", CompareReport(comparison, TableStyle::kLatex));
+}
+
+ExitCode CompareRun(const Arguments& arguments, ExplainedExperiment& explained,
+                    const PluginHost& host, const fs::path& folder) {
+  Recorder::Options record{folder, arguments.force, arguments.figures, arguments.command,
+                           StopRequested};
+  record.covariances = true;
+  Recorder recorder(record, explained.config, host);
+  RunComparer comparer(explained.experiment);
+  Progress progress("frames", arguments.quiet);
+  RunOptions options;
+  options.recorder = &recorder;
+  options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
+  options.stop = StopRequested;
+  comparer.Observe(options);
+  const RunResult result = Run(explained.experiment, options);
+  progress.Clear();
+  FinishOnSignals();
+  CompareOptions of_run = arguments.options;
+  of_run.filter = explained.filter;
+  Comparison comparison = comparer.Finish(result, of_run);
+  comparison.notes.insert(comparison.notes.begin(), explained.notes.begin(), explained.notes.end());
+  if (result.status != RunStatus::kOk) comparison.notes.push_back(result.reason);
+  AddFiles(recorder, comparison);
+  recorder.Finish(result);
+  Tell(comparison, arguments, folder);
+  if (result.status == RunStatus::kStopped) {
+    PrintNote(result.reason);
+    return result.code;
+  }
+  if (OnlyAddedFailed(result, explained)) return CodeOf(comparison, ExitCode::kOk);
+  if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
+  return CodeOf(comparison, result.code);
+}
+
+ExitCode CompareOverSeeds(const Arguments& arguments, const ExplainedExperiment& explained,
+                          const PluginHost& host, const fs::path& folder) {
+  Progress progress("runs", arguments.quiet);
+  SweepOptions options = arguments.sweep;
+  if (arguments.seed) options.first_seed = *arguments.seed;
+  options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
+  options.stop = StopRequested;
+  SweepFolder out(folder, arguments.force);
+  ComparedSeeds seeds = CompareSeeds(explained, host, options, arguments.options);
+  progress.Clear();
+  Comparison& comparison = seeds.comparison;
+  comparison.notes.insert(comparison.notes.begin(), explained.notes.begin(), explained.notes.end());
+  std::int64_t failed = 0;
+  for (const SweepRun& run : seeds.sweep.done) {
+    if (run.status != RunStatus::kFailed) continue;
+    if (failed++ == 0) PrintErrors("seed " + std::to_string(run.seed) + ": " + run.reason);
+  }
+  if (failed > 1) PrintErrors(std::to_string(failed) + " runs failed: see failures.csv");
+  const bool any = !comparison.estimators.empty();  // else no run came to its end
+  if (any) AddFiles(out, comparison);
+  out.Write(seeds.sweep, explained.config);
+  if (any) Tell(comparison, arguments, folder);
+  if (seeds.sweep.stopped) return ExitCode::kStopped;
+  return CodeOf(comparison, failed > 0 ? ExitCode::kFound : ExitCode::kOk);
+}
+
+ExitCode CompareConfig(const Arguments& arguments) {
+  Input input = arguments.input;
+  input.config = arguments.of.front();
+  Config config = input.Load();
+  if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
+  const fs::path folder = OutputFolder(arguments.folder, config, input, "compare-");
+  const PluginHost host = input.Host(config);
+  ReportCrashes();
+  StopOnSignals();
+  ExplainedExperiment explained = ExplainExperiment(config, host, arguments.options);
+  return arguments.over_seeds ? CompareOverSeeds(arguments, explained, host, folder)
+                              : CompareRun(arguments, explained, host, folder);
+}
+
+ExitCode CompareFinished(const Arguments& arguments) {
+  std::vector<fs::path> folders;
+  for (const std::string& folder : arguments.of) folders.emplace_back(folder);
+  const Comparison comparison = CompareFolders(folders, arguments.options);
+  if (!arguments.folder.empty()) {
+    WriteComparison(comparison, arguments.folder, arguments.force);
+  }
+  Tell(comparison, arguments, arguments.folder);
+  return CodeOf(comparison, ExitCode::kOk);
+}
+
+/// Whether these are run folders; what is neither all folders nor one config is refused.
+bool AreFolders(const std::vector<std::string>& of) {
+  const auto is_folder = [](const std::string& path) {
+    std::error_code error;
+    return fs::is_directory(path, error);
+  };
+  if (std::ranges::all_of(of, is_folder)) return true;
+  if (of.size() == 1) return false;
+  const auto file = std::ranges::find_if_not(of, is_folder);
+  throw CLI::ValidationError("CONFIG | DIR...",
+                             "'" + *file + "' is no folder; expected one config, or run folders");
+}
+
+void CheckOptions(const Arguments& arguments, const CLI::App& command) {
+  if (!AreFolders(arguments.of)) return;
+  for (const char* option : {"--runs", "--first-seed", "--jobs", "--seed", "--set", "--plugin-path",
+                             "--allow-outside", "--figures"}) {
+    if (command.count(option) == 0) continue;
+    throw CLI::ValidationError(option, "a finished run is not run again; expected a config");
+  }
+}
+
+void AddOptions(CLI::App& command, Arguments& arguments) {
+  command.add_option("CONFIG | DIR", arguments.of, "a config to run, or folders of finished runs")
+      ->option_text(" ")
+      ->required()
+      ->check(IsNamed);
+  command
+      .add_option("--reference", arguments.options.reference,
+                  "take errors from truth, or from an estimator; default: truth where it is known, "
+                  "else the batch")
+      ->option_text("truth|NAME");
+  command
+      .add_option("--filter", arguments.options.filter,
+                  "the filter whose gap is explained; default: the first")
+      ->option_text("NAME");
+  command.add_flag("--no-explain", arguments.no_explain,
+                   "explain no gap, and add no estimators for it");
+  command.add_option("--runs", arguments.sweep.runs, "compare over that many seeds")
+      ->option_text("N")
+      ->check(IsInteger(1, 1'000'000));
+  command
+      .add_option("--first-seed", arguments.sweep.first_seed, "seeds count up from S; default 1")
+      ->option_text("S")
+      ->check(IsInteger(0, std::int64_t{1} << 62));
+  command.add_option("--jobs", arguments.sweep.jobs, "threads; default: all processors")
+      ->option_text("J")
+      ->check(IsInteger(1, 1024));
+  command.add_option("--seed", arguments.seed, "seed of the source; overrides the config")
+      ->option_text("N")
+      ->check(IsInteger(0, INT64_MAX));
+  AddSets(command, arguments.input.sets,
+          "set a key of the config, in dotted form; may be repeated");
+  AddPluginPath(command, arguments.input.plugin_paths);
+  command.add_flag("--allow-outside", arguments.input.allow_outside,
+                   "let `include:` and `output:` of the config leave their folders");
+  AddOutput(command, arguments.folder,
+            "folder; default of a config: its `output:`, or compare-NAME, in runs/; of folders: "
+            "none is written");
+  command.add_flag("--force", arguments.force, "replace the folder if it is there");
+  command.add_flag("--json", arguments.json, "print all values as JSON");
+  command.add_flag("--markdown", arguments.markdown, "print the tables as Markdown");
+  command.add_flag("--latex", arguments.latex, "print the tables as LaTeX (booktabs)");
+  command.add_flag("--figures", arguments.figures, "draw the figures of the run too");
+  command.add_flag("--quiet", arguments.quiet, "print the comparison and errors only");
+}
+
+}  // namespace
+
+void AddCompare(CLI::App& program, Action& action, const std::string& command_line) {
+  CLI::App& command = *program.add_subcommand(
+      "compare", "Compare estimators over the same data, and explain the gap to the batch");
+  const auto arguments = std::make_shared<Arguments>();
+  arguments->command = command_line;
+  AddOptions(command, *arguments);
+  command.footer(kFooter);
+  command.callback([&action, &command, arguments] {
+    CheckOptions(*arguments, command);
+    arguments->over_seeds = command.count("--runs") > 0;
+    arguments->options.explain = !arguments->no_explain;
+    arguments->options.over_seeds = arguments->over_seeds;
+    const bool folders = AreFolders(arguments->of);
+    action = [arguments, folders] {
+      return folders ? CompareFinished(*arguments) : CompareConfig(*arguments);
+    };
+  });
+}
+
+}  // namespace alidade::cli

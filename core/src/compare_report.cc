@@ -1,0 +1,325 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "alidade/compare.h"
+#include "comparison_table.h"
+#include "json.h"
+#include "number_text.h"
+#include "report_section.h"
+#include "run_folder.h"
+#include "text_table.h"
+
+namespace alidade {
+
+using internal::ComparisonRow;
+using internal::RowKind;
+using internal::RowsOf;
+using internal::Section;
+
+namespace {
+
+/// A column of a table, in the form that rows are made of.
+struct Column {
+  std::string name;
+  std::map<std::string, Spread> values;
+  std::map<std::string, std::string> units;
+};
+
+/// Rows with the mean, and over several runs [p05, p95]. Each column stands as three, so that its
+/// numbers share their unit and decimals with all others of the row.
+std::vector<ComparisonRow> SpreadRows(const std::vector<Column>& columns, bool several,
+                                      const std::vector<RowKind>& kinds) {
+  RunResult all;
+  for (const Column& column : columns) {
+    for (const auto member : {&Spread::mean, &Spread::p05, &Spread::p95}) {
+      EstimatorResult& one = all.estimators.emplace_back();
+      one.units = column.units;
+      for (const auto& [key, spread] : column.values) one.metrics[key] = spread.*member;
+    }
+  }
+  std::vector<ComparisonRow> rows = RowsOf(all, kinds);
+  for (ComparisonRow& row : rows) {
+    std::vector<std::string> cells;
+    for (std::size_t i = 0; i < row.cells.size(); i += 3) {
+      const std::string* const c = &row.cells[i];
+      const bool spread = several && c[0] != "-";
+      cells.push_back(spread ? c[0] + " [" + c[1] + ", " + c[2] + ']' : c[0]);
+    }
+    row.cells = std::move(cells);
+  }
+  return rows;
+}
+
+std::vector<std::string> Names(const std::vector<Column>& columns) {
+  std::vector<std::string> names;
+  for (const Column& column : columns) names.push_back(column.name);
+  return names;
+}
+
+/// `BLOCK: ratio` and `apart` are to what.
+std::string HeldAgainst(const std::string& reference) {
+  return reference.empty() ? "" : "; ratio and apart: to " + reference;
+}
+
+/// The estimators along the run, of one kind: filters, or those that know later data.
+Section AlongSection(const Comparison& comparison, bool smoothed) {
+  Section section;
+  std::vector<Column> columns;
+  std::string reference;
+  ComparisonRow diverged{"diverged", {}}, used{"runs used", {}};
+  for (const ComparedEstimator& one : comparison.estimators) {
+    if (one.smoothed != smoothed) continue;
+    columns.push_back({one.name, one.values, one.units});
+    reference = one.reference.empty() ? reference : one.reference;
+    diverged.cells.push_back(std::to_string(one.diverged));
+    used.cells.push_back(std::to_string(one.used));
+  }
+  section.title = smoothed ? "Smoothed: every estimate from all data"
+                           : "Online: every estimate from the data up to it";
+  section.title += HeldAgainst(reference);
+  section.columns = Names(columns);
+  if (columns.empty()) return section;
+  section.rows = SpreadRows(columns, comparison.runs > 1,
+                            {{"rmse", "rmse"},
+                             {"ratio.rmse", "  ratio"},
+                             {"path.sim3.rmse", "path, Sim3"},
+                             {"path.sim3.scale", "path, scale"},
+                             {"ratio.path.sim3.rmse", "  ratio, path, Sim3"},
+                             {"apart", "rms apart"},
+                             {"apart.path.sim3", "path apart, Sim3"},
+                             {"apart.sigmas", "sigmas apart"},
+                             {"nees.mean", "NEES"},
+                             {"nees.cov95", "in the 95 % region"},
+                             {"nis.mean", "NIS"},
+                             {"time_us", "wall clock [us/measurement]"}});
+  const auto any = [](const std::string& cell) { return cell != "0"; };
+  if (std::ranges::any_of(diverged.cells, any)) section.rows.push_back(diverged);
+  if (comparison.runs > 1) section.rows.push_back(used);
+  return section;
+}
+
+Section FinalSection(const Comparison& comparison) {
+  Section section;
+  std::vector<Column> columns;
+  std::string reference;
+  for (const ComparedEstimator& one : comparison.estimators) {
+    columns.push_back({one.name, one.values, one.units});
+    reference = one.final_reference.empty() ? reference : one.final_reference;
+  }
+  section.title = "At the end, where all have the same data" + HeldAgainst(reference);
+  section.columns = Names(columns);
+  section.rows = SpreadRows(columns, comparison.runs > 1,
+                            {{"final", "error"},
+                             {"ratio.final", "  ratio"},
+                             {"apart.final", "apart"},
+                             {"apart.final.sigmas", "sigmas apart"},
+                             {"map.rmse", "map"},
+                             {"ratio.map.rmse", "  ratio, map"},
+                             {"map.sim3.rmse", "map, Sim3"},
+                             {"map.sim3.scale", "map, scale"},
+                             {"ratio.map.sim3.rmse", "  ratio, map, Sim3"},
+                             {"apart.map.sim3", "map apart, Sim3"}});
+  return section;
+}
+
+/// The values of one kind by their subject, under another kind.
+std::map<std::string, Spread> Under(const std::map<std::string, Spread>& values,
+                                    const std::string& kind, const std::string& as) {
+  std::map<std::string, Spread> found;
+  for (const auto& [key, value] : values) {
+    if (key.starts_with(kind)) found[as + key.substr(kind.size())] = value;
+  }
+  return found;
+}
+
+/// `0.06 sigma of target`, the largest first; the largest itself goes to `largest`.
+std::string SigmasText(const GapStep& step, double& largest) {
+  std::vector<std::pair<double, std::string>> sigmas;
+  const std::string kind = "apart.sigmas:";
+  for (const auto& [key, value] : step.values) {
+    if (key.starts_with(kind)) sigmas.emplace_back(value.mean, key.substr(kind.size()));
+  }
+  std::ranges::sort(sigmas, std::greater());
+  largest = sigmas.empty() ? 0.0 : sigmas.front().first;
+  std::vector<std::string> parts;
+  for (const auto& [value, owner] : sigmas) {
+    parts.push_back(internal::RoundedText(value, 3) + " (" + owner + ')');
+  }
+  return internal::Join(parts);
+}
+
+/// What a step of the gap means, in words.
+std::string WordsOf(GapKind kind) {
+  switch (kind) {
+    case GapKind::kLinearisation:
+      return "what it costs that each measurement is linearised once, where the filter then was";
+    case GapKind::kSmoothing:
+      return "what later data tell of each estimate: no filter can have it, a smoother can";
+    case GapKind::kLostData:
+      break;
+  }
+  return "what the filter would have gained from what its gate and its other checks kept out";
+}
+
+std::string LinesOf(const GapStep& step) {
+  double largest = 0.0;
+  const std::string sigmas = SigmasText(step, largest);
+  if (sigmas.empty()) return "";
+  std::string line = "apart by " + sigmas + " sigma of " + step.to;
+  if (step.kind == GapKind::kSmoothing) return line;
+  constexpr double kNegligible = 0.1, kSmall = 0.5, kLarge = 1.0;
+  return line + (largest < kNegligible ? ": negligible beside what neither of them knows"
+                 : largest < kSmall    ? ": small beside what neither of them knows"
+                 : largest < kLarge    ? ": not small beside what neither of them knows"
+                                    : ": more than the uncertainty that is left: here it matters");
+}
+
+/// `3 of 226 measurements were not used`
+std::string LostText(const GapStep& step) {
+  const auto lost = step.values.find("lost"), all = step.values.find("measurements");
+  if (lost == step.values.end() || all == step.values.end()) return "";
+  return internal::RoundedText(lost->second.mean, 6) + " of " +
+         internal::RoundedText(all->second.mean, 6) + " measurements were not used by the filter";
+}
+
+Section GapSection(const Comparison& comparison, const GapStep& step) {
+  Section section;
+  const std::string pair =
+      step.from.empty() || step.to.empty() ? "" : ", " + step.from + " against " + step.to;
+  section.title = ToString(step.kind) + pair;
+  section.lines.push_back(WordsOf(step.kind));
+  if (step.kind == GapKind::kLostData) {
+    section.lines.push_back(LostText(step) + (comparison.runs > 1 ? ", mean of the runs" : ""));
+  }
+  const auto lost = step.values.find("lost");
+  if (lost != step.values.end() && lost->second.mean == 0.0) return section;
+  if (!step.withheld.empty()) {
+    section.lines.push_back("not known: " + step.withheld);
+    return section;
+  }
+  std::map<std::string, std::string> units;
+  for (const ComparedEstimator& one : comparison.estimators) {
+    units.insert(one.units.begin(), one.units.end());
+  }
+  const bool several = comparison.runs > 1;
+  std::vector<Column> columns = {{step.from, Under(step.values, "rmse.from:", "rmse:"), units},
+                                 {step.to, Under(step.values, "rmse.to:", "rmse:"), units},
+                                 {"ratio", {}, {}},
+                                 {"rms apart", Under(step.values, "apart:", "rmse:"), units}};
+  if (columns[0].values.empty()) columns.erase(columns.begin(), columns.begin() + 3);
+  section.columns = Names(columns);
+  section.rows = SpreadRows(columns, several, {{"rmse", ""}});
+  for (ComparisonRow& row : section.rows) {
+    row.label.erase(0, row.label.find_first_not_of(' '));
+    const std::string block = row.label.substr(0, row.label.find(' '));
+    const auto ratio = step.values.find("error_ratio:" + block);
+    if (ratio == step.values.end()) continue;
+    const std::vector<ComparisonRow> text = SpreadRows(
+        {{"", {{"ratio.rmse:" + block, ratio->second}}, {}}}, several, {{"ratio.rmse", ""}});
+    if (!text.empty()) row.cells[2] = text[0].cells[0];
+  }
+  if (const std::string line = LinesOf(step); !line.empty()) section.lines.push_back(line);
+  return section;
+}
+
+std::vector<Section> SectionsOf(const Comparison& comparison) {
+  std::vector<Section> sections;
+  Section& head = sections.emplace_back();
+  head.title = comparison.runs > 1 ? std::to_string(comparison.runs) + " runs, mean [5 %, 95 %]"
+                                   : std::to_string(comparison.frames) + " frames";
+  head.title += comparison.reference.empty()      ? ""
+                : comparison.reference == "truth" ? ", errors against truth"
+                                                  : ", differences from " + comparison.reference;
+  if (!comparison.measurements_sha256.empty()) {
+    head.lines.push_back("data sha256 " + comparison.measurements_sha256);
+  }
+  head.lines.insert(head.lines.end(), comparison.notes.begin(), comparison.notes.end());
+  if (!comparison.withheld.empty()) head.lines.push_back(comparison.withheld);
+  for (const bool smoothed : {false, true}) {
+    Section section = AlongSection(comparison, smoothed);
+    if (!section.columns.empty()) sections.push_back(std::move(section));
+  }
+  sections.push_back(FinalSection(comparison));
+  if (comparison.gap.empty()) return sections;
+  sections.push_back({"The gap of " + comparison.explained + " explained", {}, {}, {}});
+  for (const GapStep& step : comparison.gap) sections.push_back(GapSection(comparison, step));
+  return sections;
+}
+
+void AppendValues(internal::Json& json, const char* key,
+                  const std::map<std::string, Spread>& values, bool several) {
+  json.Key(key).Object();
+  for (const auto& [name, spread] : values) {
+    json.Key(name);
+    if (!several) {
+      json.Number(spread.mean);
+      continue;
+    }
+    json.Object().Key("mean").Number(spread.mean).Key("p05").Number(spread.p05);
+    json.Key("p50").Number(spread.p50).Key("p95").Number(spread.p95).End();
+  }
+  json.End();
+}
+
+void AppendEstimator(internal::Json& json, const ComparedEstimator& one, bool several) {
+  json.Key(one.name).Object();
+  json.Key("type").Text(one.type).Key("smoothed").Flag(one.smoothed);
+  json.Key("reference").Text(one.reference).Key("final_reference").Text(one.final_reference);
+  json.Key("diverged").Integer(one.diverged).Key("used").Integer(one.used);
+  AppendValues(json, "values", one.values, several);
+  json.Key("units").Object();
+  for (const auto& [block, unit] : one.units) json.Key(block).Text(unit);
+  json.End().End();
+}
+
+void AppendGap(internal::Json& json, const Comparison& comparison) {
+  json.Key("gap").Object().Key("filter").Text(comparison.explained).Key("steps").Array();
+  for (const GapStep& step : comparison.gap) {
+    json.Object().Key("kind").Text(ToString(step.kind));
+    json.Key("from").Text(step.from).Key("to").Text(step.to);
+    if (!step.withheld.empty()) json.Key("withheld").Text(step.withheld);
+    AppendValues(json, "values", step.values, comparison.runs > 1);
+    json.End();
+  }
+  json.End().End();
+}
+
+}  // namespace
+
+std::string CompareReport(const Comparison& comparison, TableStyle style) {
+  return internal::SectionsText(SectionsOf(comparison), style);
+}
+
+std::string CompareJson(const Comparison& comparison) {
+  internal::Json json;
+  json.Object();
+  json.Key("runs").Integer(comparison.runs).Key("frames").Integer(comparison.frames);
+  json.Key("reference").Text(comparison.reference);
+  if (!comparison.withheld.empty()) json.Key("withheld").Text(comparison.withheld);
+  if (!comparison.measurements_sha256.empty()) {
+    json.Key("measurements_sha256").Text(comparison.measurements_sha256);
+  }
+  json.Key("estimators").Object();
+  for (const ComparedEstimator& one : comparison.estimators) {
+    AppendEstimator(json, one, comparison.runs > 1);
+  }
+  json.End();
+  if (!comparison.gap.empty()) AppendGap(json, comparison);
+  json.Key("notes").Array();
+  for (const std::string& note : comparison.notes) json.Text(note);
+  json.End().End();
+  return json.text();
+}
+
+void WriteComparison(const Comparison& comparison, const std::filesystem::path& folder,
+                     bool force) {
+  internal::RunFolder out(folder, force);
+  out.Write("compare.json", CompareJson(comparison));
+  out.Write("compare.md", CompareReport(comparison, TableStyle::kMarkdown));
+  out.Write("compare.tex", CompareReport(comparison, TableStyle::kLatex));
+  out.Commit();
+}
+
+}  // namespace alidade

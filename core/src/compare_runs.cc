@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <mutex>
+
+#include "compare.h"
+#include "data_hash.h"
+#include "sweep_spread.h"
+
+namespace alidade {
+
+using internal::ComparedEntry;
+using internal::ComparedRun;
+
+struct RunComparer::Impl {
+  ComparedRun run;
+  internal::DataHash data;
+};
+
+RunComparer::RunComparer(const Experiment& experiment)
+    : impl_(std::make_unique<Impl>(Impl{
+          {}, internal::DataHash(experiment.source->streams(), experiment.source->truths())})) {
+  for (const NamedEstimator& named : experiment.estimators) {
+    ComparedEntry& entry = impl_->run.estimators.emplace_back();
+    entry.facts = internal::FactsOf(named, experiment);
+    entry.series.blocks = entry.facts.blocks;
+    entry.series.joint = entry.series.tangent() <= internal::Series::kMostJoint;
+  }
+}
+
+RunComparer::~RunComparer() = default;
+
+void RunComparer::Observe(RunOptions& options) {
+  options.observe = [this](int estimator, const Frame& frame, const State& state,
+                           const UpdateReport& report) {
+    if (report.stale) return;
+    impl_->run.estimators[static_cast<std::size_t>(estimator)].series.Append(frame.stamp, state);
+  };
+  options.observe_frame = [this](const Frame& frame) { impl_->data.Add(frame); };
+}
+
+Comparison RunComparer::Finish(const RunResult& result, const CompareOptions& options) {
+  ComparedRun& run = impl_->run;
+  run.status = result.status;
+  run.reason = result.reason;
+  run.reference = result.reference;
+  run.frames = result.frames;
+  run.measurements_sha256 = impl_->data.measurements();
+  run.truth_sha256 = impl_->data.truth();
+  ALIDADE_EXPECTS(result.estimators.size() <= run.estimators.size());
+  for (std::size_t e = 0; e < result.estimators.size(); ++e) {
+    run.estimators[e].result = result.estimators[e];
+    run.estimators[e].result.events.clear();
+  }
+  run.estimators.resize(result.estimators.size());
+  return internal::CompareRuns({run}, options);
+}
+
+Comparison CompareFolders(const std::vector<std::filesystem::path>& folders,
+                          const CompareOptions& options) {
+  ALIDADE_EXPECTS(!folders.empty());
+  std::vector<ComparedRun> runs;
+  for (const auto& folder : folders) runs.push_back(internal::ReadRun(folder));
+  std::vector<std::string> notes = internal::CheckSameData(runs);
+  for (const ComparedRun& run : runs) {
+    if (run.status == RunStatus::kOk) continue;
+    notes.push_back("'" + run.folder.string() + "' " + ToString(run.status) + ": " + run.reason);
+  }
+  Comparison comparison = internal::CompareRuns(runs, options);
+  comparison.notes.insert(comparison.notes.begin(), notes.begin(), notes.end());
+  return comparison;
+}
+
+ComparedSeeds CompareSeeds(const ExplainedExperiment& explained, const PluginHost& host,
+                           const SweepOptions& sweep, const CompareOptions& options) {
+  std::mutex mutex;
+  std::map<std::uint64_t, Comparison> by_seed;
+  SweepOptions with = sweep;
+  with.run = [&](Experiment& experiment, const RunOptions& given) {
+    RunComparer comparer(experiment);
+    RunOptions observed = given;
+    comparer.Observe(observed);
+    RunResult result = Run(experiment, observed);
+    const bool whole = result.code == ExitCode::kDiverged || result.status == RunStatus::kOk;
+    if (!whole) return result;
+    CompareOptions of_run = options;
+    of_run.filter = explained.filter;
+    Comparison comparison = comparer.Finish(result, of_run);
+    const std::lock_guard lock(mutex);
+    by_seed.emplace(experiment.seed, std::move(comparison));
+    return result;
+  };
+  ComparedSeeds seeds{{}, Sweep(explained.config, host, with)};
+  std::vector<Comparison> comparisons;
+  for (auto& [seed, comparison] : by_seed) comparisons.push_back(std::move(comparison));
+  if (!comparisons.empty()) seeds.comparison = Summarise(comparisons);
+  return seeds;
+}
+
+namespace {
+
+/// Gathers values of one thing over several comparisons.
+class Gathered {
+ public:
+  void Add(const std::map<std::string, Spread>& values) {
+    for (const auto& [key, spread] : values) values_[key].push_back(spread.mean);
+  }
+  std::map<std::string, Spread> Spreads() && {
+    std::map<std::string, Spread> spreads;
+    for (auto& [key, list] : values_) spreads[key] = internal::SpreadOf(std::move(list));
+    return spreads;
+  }
+
+ private:
+  std::map<std::string, std::vector<double>> values_;
+};
+
+bool Diverged(const Comparison& comparison, const std::string& name) {
+  const auto found = std::ranges::find(comparison.estimators, name, &ComparedEstimator::name);
+  return found != comparison.estimators.end() && found->diverged > 0;
+}
+
+/// Values that compare with another are taken of runs in which that one did not diverge either.
+std::map<std::string, Spread> WithoutDiverged(const Comparison& comparison,
+                                              const ComparedEstimator& one) {
+  std::map<std::string, Spread> values = one.values;
+  const bool along = Diverged(comparison, one.reference);
+  const bool final = Diverged(comparison, one.final_reference);
+  std::erase_if(values, [&](const auto& value) {
+    const std::string& key = value.first;
+    const bool of_final = key.starts_with("apart.final") || key.starts_with("apart.map") ||
+                          key.starts_with("ratio.final") || key.starts_with("ratio.map");
+    const bool compares = key.starts_with("apart") || key.starts_with("ratio");
+    return compares && (of_final ? final : along);
+  });
+  return values;
+}
+
+}  // namespace
+
+Comparison Summarise(const std::vector<Comparison>& comparisons) {
+  ALIDADE_EXPECTS(!comparisons.empty());
+  Comparison all = comparisons.front();
+  all.runs = std::ssize(comparisons);
+  if (all.runs > 1) all.measurements_sha256.clear();
+  all.notes.clear();
+  std::int64_t withheld = 0;
+  for (const Comparison& one : comparisons) {
+    for (const std::string& note : one.notes) {
+      if (std::ranges::count(all.notes, note) == 0) all.notes.push_back(note);
+    }
+    if (one.withheld.empty()) continue;
+    all.withheld = one.withheld;
+    ++withheld;
+  }
+  if (withheld > 0 && all.runs > 1) {
+    all.withheld += " (" + std::to_string(withheld) + " of " + std::to_string(all.runs) + " runs)";
+  }
+  for (std::size_t e = 0; e < all.estimators.size(); ++e) {
+    ComparedEstimator& estimator = all.estimators[e];
+    Gathered gathered;
+    estimator.used = estimator.diverged = 0;
+    for (const Comparison& one : comparisons) {
+      const ComparedEstimator& of_run = one.estimators.at(e);
+      estimator.diverged += of_run.diverged;
+      if (of_run.diverged > 0) continue;
+      estimator.used += 1;
+      gathered.Add(WithoutDiverged(one, of_run));
+    }
+    estimator.values = std::move(gathered).Spreads();
+  }
+  for (std::size_t s = 0; s < all.gap.size(); ++s) {
+    GapStep& step = all.gap[s];
+    Gathered gathered;
+    for (const Comparison& one : comparisons) {
+      const GapStep& of_run = one.gap.at(s);
+      if (!Diverged(one, of_run.from) && !Diverged(one, of_run.to)) gathered.Add(of_run.values);
+      if (step.withheld.empty()) continue;
+      if (of_run.withheld.empty()) step = of_run;
+    }
+    step.values = std::move(gathered).Spreads();
+  }
+  return all;
+}
+
+}  // namespace alidade

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <fstream>
+#include <map>
+
+#include "compared_run.h"
+#include "text_table.h"
+
+namespace alidade::internal {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The stamp of a row of measurements.csv, for people.
+std::string StampOf(const std::string& row) {
+  const std::string t_s = row.substr(0, row.find(','));
+  return t_s.empty() ? "its end" : "t = " + t_s + " s";
+}
+
+/// Where measurements.csv of two folders begin to differ, in words.
+std::string FirstDifference(const fs::path& a, const fs::path& b) {
+  std::ifstream first(a / "measurements.csv"), second(b / "measurements.csv");
+  if (!first || !second) return "measurements.csv cannot be read";
+  for (std::string row, other; true;) {
+    row.clear();
+    other.clear();
+    std::getline(first, row);
+    std::getline(second, other);
+    if (row == other && first && second) continue;
+    if (row == other) return "their own covariances or the stamps of empty frames differ";
+    return "first at " + StampOf(row) + " of the one, " + StampOf(other) + " of the other";
+  }
+}
+
+/// Every scalar below a node by its path.
+void Flatten(const Node& node, std::map<std::string, std::string>& values) {
+  if (node.is_map()) {
+    for (const auto& [key, value] : node.Entries()) Flatten(value, values);
+  } else if (node.kind() == Node::Kind::kList) {
+    for (const Node& item : node.Items()) Flatten(item, values);
+  } else if (node.kind() == Node::Kind::kScalar) {
+    values[node.path()] = node.Text();
+  }
+}
+
+std::map<std::string, std::string> SharedSettings(const fs::path& folder) {
+  std::map<std::string, std::string> values;
+  const Config config = Config::FromFile(folder / "config.resolved.yaml", true);
+  for (const char* key : {"state", "sensors", "landmarks", "camera", "start_s"}) {
+    if (const auto node = config.root().Find(key)) Flatten(*node, values);
+  }
+  return values;
+}
+
+/// Up to three settings that two runs do not have alike; "": none.
+std::string SettingsThatDiffer(const fs::path& a, const fs::path& b) {
+  constexpr std::size_t kShown = 3;
+  const std::map<std::string, std::string> one = SharedSettings(a);
+  std::map<std::string, std::string> other = SharedSettings(b);
+  std::vector<std::string> texts;
+  const auto add = [&](const std::string& key, const std::string& x, const std::string& y) {
+    texts.push_back(key + " (" + x + ", " + y + ')');
+  };
+  for (const auto& [key, value] : one) {
+    const auto found = other.find(key);
+    if (found == other.end()) {
+      add(key, value, "none");
+    } else if (found->second != value) {
+      add(key, value, found->second);
+    }
+    if (found != other.end()) other.erase(found);
+  }
+  for (const auto& [key, value] : other) add(key, "none", value);
+  const std::size_t more = texts.size() - std::min(kShown, texts.size());
+  texts.resize(texts.size() - more);
+  return Join(texts) + (more > 0 ? " and " + std::to_string(more) + " more" : "");
+}
+
+}  // namespace
+
+std::vector<std::string> CheckSameData(const std::vector<ComparedRun>& runs) {
+  std::vector<std::string> notes;
+  const ComparedRun& first = runs.front();
+  for (std::size_t r = 1; r < runs.size(); ++r) {
+    const ComparedRun& other = runs[r];
+    const std::string both = "'" + first.folder.string() + "' and '" + other.folder.string() + "'";
+    if (first.measurements_sha256 != other.measurements_sha256) {
+      throw Error(ExitCode::kBadData,
+                  ErrorLine(Place{other.folder.string()}, {},
+                            "saw other measurements than '" + first.folder.string() +
+                                "': " + other.measurements_sha256 + " against " +
+                                first.measurements_sha256 + ", " +
+                                FirstDifference(first.folder, other.folder),
+                            "runs of the same source, seed and start"));
+    }
+    if (first.truth_sha256 != other.truth_sha256) {
+      notes.push_back("the truths of " + both +
+                      " differ: errors against truth of the one are not those of the other");
+    }
+    const std::string settings = SettingsThatDiffer(first.folder, other.folder);
+    if (!settings.empty()) {
+      notes.push_back("the settings of " + both + " differ: " + settings +
+                      ": what differs is not the estimator alone");
+    }
+  }
+  return notes;
+}
+
+}  // namespace alidade::internal

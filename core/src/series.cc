@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "series.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/estimator.h"
+#include "columns.h"
+#include "mahalanobis.h"
+
+namespace alidade::internal {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+/// A block that both series have: where it is in each, by ambient and tangent elements.
+struct Shared {
+  const SeriesBlock* block;
+  int value, reference_value, reference_tangent;
+};
+
+std::vector<Shared> SharedBlocks(const Series& series, const Series& reference) {
+  std::vector<Shared> shared;
+  int value = 0;
+  for (const SeriesBlock& block : series.blocks) {
+    int reference_value = 0, tangent = 0;
+    for (const SeriesBlock& other : reference.blocks) {
+      if (other.name == block.name && other.geometry == block.geometry) {
+        shared.push_back({&block, value, reference_value, tangent});
+      }
+      reference_value += other.geometry.ambient;
+      tangent += other.geometry.tangent;
+    }
+    value += block.geometry.ambient;
+  }
+  return shared;
+}
+
+/// Rows of both series that have the same stamp, in the order of time.
+std::vector<std::pair<std::size_t, std::size_t>> SharedRows(const Series& a, const Series& b) {
+  std::vector<std::pair<std::size_t, std::size_t>> rows;
+  for (std::size_t i = 0, j = 0; i < a.stamps.size() && j < b.stamps.size();) {
+    if (a.stamps[i] == b.stamps[j]) {
+      rows.emplace_back(i++, j++);
+    } else if (a.stamps[i] < b.stamps[j]) {
+      ++i;
+    } else {
+      ++j;
+    }
+  }
+  return rows;
+}
+
+const double* RowOf(const Series& series, std::size_t row, int offset) {
+  return series.values.data() + row * static_cast<std::size_t>(series.ambient()) + offset;
+}
+
+/// Blocks of one owner that follow each other in the reference, jointly.
+struct Joint {
+  std::string owner;
+  std::vector<const Shared*> blocks;
+  double sum = 0.0, last = -1.0;
+  std::int64_t count = 0;
+};
+
+std::vector<Joint> JointsOf(const std::vector<Shared>& shared) {
+  std::vector<Joint> joints;
+  for (const Shared& one : shared) {
+    const std::string owner = one.block->owner();
+    auto joint = std::ranges::find(joints, owner, &Joint::owner);
+    if (joint == joints.end()) joint = joints.insert(joint, {owner, {}});
+    joint->blocks.push_back(&one);
+  }
+  return joints;
+}
+
+/// P of the reference of the blocks of a joint.
+Eigen::MatrixXd CovarianceOf(const Joint& joint, const Series& reference, std::size_t row) {
+  const Eigen::MatrixXd all = reference.Covariance(row, 0, reference.tangent());
+  std::vector<int> elements;
+  for (const Shared* const one : joint.blocks) {
+    for (int i = 0; i < one->block->geometry.tangent; ++i) {
+      elements.push_back(one->reference_tangent + i);
+    }
+  }
+  return all(elements, elements);
+}
+
+}  // namespace
+
+std::vector<SeriesBlock> SeriesBlocksOf(const System& system) {
+  std::vector<SeriesBlock> blocks;
+  for (BlockId id = 0; id < static_cast<int>(system.layout.blocks().size()); ++id) {
+    const Block& block = system.layout[id];
+    blocks.push_back({block.name, UnitOf(system, id), block.geometry()});
+  }
+  return blocks;
+}
+
+void AppendCovariance(const State& state, std::size_t blocks, std::vector<double>& cells) {
+  std::vector<int> places;  // of each tangent element; -1: it has no covariance
+  for (std::size_t b = 0; b < blocks; ++b) {
+    const Block& block = state.layout()[static_cast<BlockId>(b)];
+    for (int i = 0; i < block.geometry().tangent; ++i) {
+      places.push_back(block.has_covariance() ? block.tangent_offset + i : -1);
+    }
+  }
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      const bool known = places[i] >= 0 && places[j] >= 0;
+      cells.push_back(known ? state.covariance().Block(places[i], 1, places[j], 1)(0, 0) : kNan);
+    }
+  }
+}
+
+int Series::ambient() const {
+  int sum = 0;
+  for (const SeriesBlock& block : blocks) sum += block.geometry.ambient;
+  return sum;
+}
+
+int Series::tangent() const {
+  int sum = 0;
+  for (const SeriesBlock& block : blocks) sum += block.geometry.tangent;
+  return sum;
+}
+
+std::size_t Series::cells() const {
+  const auto n = static_cast<std::size_t>(tangent());
+  return joint ? n * (n + 1) / 2 : n;
+}
+
+Eigen::MatrixXd Series::Covariance(std::size_t row, int first, int size) const {
+  Eigen::MatrixXd p = Eigen::MatrixXd::Zero(size, size);
+  const double* const at = covariances.data() + row * cells();
+  for (int i = 0; i < size; ++i) {
+    const int a = first + i;
+    if (!joint) p(i, i) = at[a];
+    for (int j = 0; joint && j <= i; ++j) p(i, j) = p(j, i) = at[a * (a + 1) / 2 + first + j];
+  }
+  return p;
+}
+
+void Series::Append(Stamp stamp, const State& state) {
+  stamps.push_back(stamp);
+  for (BlockId id = 0; id < static_cast<int>(blocks.size()); ++id) {
+    const Block& block = state.layout()[id];
+    const auto size = static_cast<std::size_t>(block.geometry().ambient);
+    if (block.present) {
+      values.insert(values.end(), state.value(id), state.value(id) + size);
+    } else {
+      values.insert(values.end(), size, kNan);
+    }
+    for (int i = 0; !joint && i < block.geometry().tangent; ++i) {
+      const bool known = block.has_covariance();
+      covariances.push_back(known ? state.covariance().Variance(block.tangent_offset + i) : kNan);
+    }
+  }
+  if (joint) AppendCovariance(state, blocks.size(), covariances);
+}
+
+Distance DistanceBetween(const Series& series, const Series& reference) {
+  const std::vector<Shared> shared = SharedBlocks(series, reference);
+  std::vector<Joint> joints = JointsOf(shared);
+  std::map<std::string, std::pair<double, std::int64_t>> squares;
+  Distance distance;
+  std::map<const Shared*, Eigen::VectorXd> d;
+  for (const auto& [row, reference_row] : SharedRows(series, reference)) {
+    for (const Shared& one : shared) {
+      const Geometry& geometry = one.block->geometry;
+      Eigen::VectorXd& error = d[&one];
+      error.resize(geometry.tangent);
+      geometry.Minus(RowOf(series, row, one.value),
+                     RowOf(reference, reference_row, one.reference_value), error.data());
+      if (!error.allFinite()) continue;
+      squares[one.block->name].first += error.squaredNorm();
+      ++squares[one.block->name].second;
+      distance.final[one.block->name] = error.norm();
+    }
+    for (Joint& joint : joints) {
+      const Eigen::MatrixXd p = CovarianceOf(joint, reference, reference_row);
+      Eigen::VectorXd error(p.rows());
+      Eigen::Index at = 0;
+      for (const Shared* const one : joint.blocks) {
+        error.segment(at, d[one].size()) = d[one];
+        at += d[one].size();
+      }
+      const double square = SquaredMahalanobis(p, error);
+      joint.last = square < 0.0 ? -1.0 : std::sqrt(square / static_cast<double>(error.size()));
+      if (square < 0.0) continue;
+      joint.sum += square / static_cast<double>(error.size());
+      ++joint.count;
+    }
+  }
+  for (const auto& [name, sum] : squares) {
+    distance.rms[name] = std::sqrt(sum.first / static_cast<double>(sum.second));
+  }
+  for (const Joint& joint : joints) {
+    if (joint.count == 0) continue;
+    distance.sigmas[joint.owner] = std::sqrt(joint.sum / static_cast<double>(joint.count));
+    if (joint.last >= 0.0) distance.final_sigmas[joint.owner] = joint.last;
+  }
+  return distance;
+}
+
+namespace {
+
+/// Whether the points are not all on one line.
+bool SpanAPlane(const Eigen::Matrix3Xd& points) {
+  constexpr double kThin = 1e-9;
+  const Eigen::Matrix3Xd centred = points.colwise() - points.rowwise().mean();
+  const Eigen::Vector3d widths = centred.jacobiSvd().singularValues();
+  return widths[1] > kThin * widths[0];
+}
+
+}  // namespace
+
+std::optional<Aligned> AlignBySimilarity(const Eigen::Matrix3Xd& points,
+                                         const Eigen::Matrix3Xd& onto) {
+  if (points.cols() < 3 || !SpanAPlane(points) || !SpanAPlane(onto)) return std::nullopt;
+  const Eigen::Matrix4d similarity = Eigen::umeyama(points, onto);
+  const Eigen::Matrix3d linear = similarity.topLeftCorner<3, 3>();
+  const Eigen::Vector3d shift = similarity.topRightCorner<3, 1>();
+  const Eigen::Matrix3Xd left = ((linear * points).colwise() + shift) - onto;
+  return Aligned{std::sqrt(left.squaredNorm() / static_cast<double>(left.cols())),
+                 std::cbrt(linear.determinant())};
+}
+
+std::optional<Aligned> AlignPaths(const Series& series, const Series& reference,
+                                  const std::string& block) {
+  for (const Shared& one : SharedBlocks(series, reference)) {
+    if (one.block->name != block || one.block->geometry != Geometry::Vector(3)) continue;
+    PathAlignment alignment;
+    for (const auto& [row, reference_row] : SharedRows(series, reference)) {
+      const Eigen::Map<const Eigen::Vector3d> point(RowOf(series, row, one.value));
+      const Eigen::Map<const Eigen::Vector3d> onto(
+          RowOf(reference, reference_row, one.reference_value));
+      if (point.allFinite() && onto.allFinite()) alignment.Add(point, onto);
+    }
+    return alignment.Result();
+  }
+  return std::nullopt;
+}
+
+}  // namespace alidade::internal

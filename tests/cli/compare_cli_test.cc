@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <regex>
+
+#include "alidade/config.h"
+#include "support/program.h"
+
+namespace alidade {
+namespace {
+
+using testing::Arguments;
+using testing::Contains;
+using testing::Outcome;
+
+/// Comparisons need the batch, which a build without the Ceres solver does not have.
+class CompareCli : public testing::ProgramTest {
+ protected:
+  void SetUp() override {
+    ProgramTest::SetUp();
+    if (!Contains(Call({"plugins", "list"}).out, "ceres_batch")) GTEST_SKIP() << "no batch";
+  }
+  /// A comparison as JSON, without the clock.
+  static std::string WithoutClock(const std::string& json) {
+    return std::regex_replace(json, std::regex(R"(\n *"time_us": (\{[^}]*\}|[^\n]*))"), "");
+  }
+  /// Disparities of a target at 0.3 m, at 1 to 20 tenths of a second.
+  void WriteTable(const std::string& name, const std::string& fifth = "86.5") const {
+    std::string text = "t_s,d\n";
+    for (int k = 1; k <= 20; ++k) {
+      text += std::to_string(0.1 * k) + ',' + (k == 5 ? fifth : "86.66666") + '\n';
+    }
+    Write(name, text);
+  }
+  Outcome Table(const std::string& table, const std::string& folder) const {
+    return Call({"run", "table.yaml", "--set", "source.path=" + table, "-o", folder, "--no-figures",
+                 "--quiet"});
+  }
+};
+
+TEST_F(CompareCli, AConfigIsRunAndItsGapExplained) {
+  const Outcome compared = Call({"compare", "config.yaml", "-o", "out"});
+  EXPECT_EQ(compared.code, 0) << compared.err;
+  for (const char* words :
+       {"added 'batch_so_far'", "Online: every estimate from the data up to it",
+        "Smoothed: every estimate from all data", "At the end, where all have the same data",
+        "linearisation, ekf against batch_so_far", "smoothing, ekf against rts",
+        "lost data, batch_accepted against batch", "of 227 measurements were not used",
+        "rmse target.depth [mm]", "wall clock [us/measurement]"}) {
+    EXPECT_TRUE(Contains(compared.out, words)) << words << '\n' << compared.out;
+  }
+  const Config json = Json("out/compare.json"), run = Json("out/run.json");
+  const Node ekf = json.root().At("estimators").At("ekf");
+  EXPECT_EQ(ekf.At("values").At("rmse:target.depth").Number(),
+            run.root().At("estimators").At("ekf").At("metrics").At("rmse:target.depth").Number());
+  EXPECT_EQ(json.root().At("measurements_sha256").Text(),
+            run.root().At("data").At("measurements").Text());
+  EXPECT_TRUE(Contains(Read("out/files.txt"), "compare.json"));
+  EXPECT_TRUE(Contains(Read("out/compare.tex"), "\\begin{tabular}{lrr}"))
+      << Read("out/compare.tex");
+  EXPECT_TRUE(Contains(Read("out/compare.tex"), "batch\\_so\\_far"));
+  EXPECT_TRUE(Contains(Read("out/compare.md"), "| rmse target.depth [mm] | "));
+}
+
+// What a run shows of itself while it runs, its folder tells later: covariances too.
+TEST_F(CompareCli, TheFolderOfARunTellsTheSame) {
+  ASSERT_EQ(Call({"compare", "config.yaml", "-o", "out", "--quiet"}).code, 0);
+  const Outcome compared = Call({"compare", "out", "--json"});
+  EXPECT_EQ(compared.code, 0) << compared.err;
+  const auto values = [](const std::string& json) {
+    const std::string text = WithoutClock(json);
+    return text.substr(0, text.find("\"notes\""));
+  };
+  EXPECT_EQ(values(compared.out), values(Read("out/compare.json")));
+  EXPECT_TRUE(Contains(compared.out, "apart.sigmas:target"));
+}
+
+TEST_F(CompareCli, OfSeveralFoldersEstimatorsAreNamedByTheirs) {
+  ASSERT_EQ(Call({"compare", "config.yaml", "-o", "runs/a", "--quiet"}).code, 0);
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "runs/b", "--no-figures", "--set",
+                  "estimators.ekf.gate=0.5"})
+                .code,
+            0);
+  const Outcome compared = Call({"compare", "runs/a", "runs/b", "-o", "both"});
+  EXPECT_EQ(compared.code, 0) << compared.err;
+  EXPECT_TRUE(Contains(compared.out, "  b/ekf")) << compared.out;
+  EXPECT_FALSE(Contains(compared.out, "covariance.bin")) << compared.out;
+  EXPECT_FALSE(Contains(compared.out, "differ")) << compared.out;
+  const Config both = Json("both/compare.json");
+  const Node all = both.root().At("estimators");
+  EXPECT_EQ(all.At("b/ekf").At("reference").Text(), "a/batch_so_far");
+}
+
+// FAULTS 86
+TEST_F(CompareCli, RefusesRunsOverDifferentData) {
+  WriteTable("one.csv");
+  WriteTable("other.csv", "86.25");
+  ASSERT_EQ(Table("one.csv", "a").code, 0);
+  ASSERT_EQ(Table("other.csv", "b").code, 0);
+  const auto hash = [&](const std::string& folder) {
+    return Json(folder + "/run.json").root().At("data").At("measurements").Text();
+  };
+  const Outcome compared = Call({"compare", "a", "b"});
+  EXPECT_EQ(compared.code, 65);
+  EXPECT_EQ(compared.out, "");
+  EXPECT_EQ(compared.err, "error: b: saw other measurements than 'a': " + hash("b") + " against " +
+                              hash("a") +
+                              ", first at t = 0.500000000 s of the one, t = 0.500000000 s of the "
+                              "other; expected runs of the same source, seed and start\n");
+}
+
+// FAULTS 86: the same numbers in another text are the same data.
+TEST_F(CompareCli, HashesWhatIsMeasuredNotItsText) {
+  WriteTable("one.csv");
+  WriteTable("other.csv", "+865e-1");
+  ASSERT_EQ(Table("one.csv", "a").code, 0);
+  ASSERT_EQ(Table("other.csv", "b").code, 0);
+  EXPECT_EQ(Call({"compare", "a", "b", "--reference", "a/ekf"}).code, 0);
+}
+
+// FAULTS 86: a run that saw less.
+TEST_F(CompareCli, TellsWhereARunEndsEarlier) {
+  WriteTable("one.csv");
+  Write("other.csv", Read("one.csv").substr(0, Read("one.csv").find("1.500000")));
+  ASSERT_EQ(Table("one.csv", "a").code, 0);
+  ASSERT_EQ(Table("other.csv", "b").code, 0);
+  const Outcome compared = Call({"compare", "a", "b"});
+  EXPECT_EQ(compared.code, 65);
+  EXPECT_TRUE(Contains(compared.err, "first at t = 1.500000000 s of the one, its end of the other"))
+      << compared.err;
+}
+
+TEST_F(CompareCli, WarnsOfSettingsAndTruthsThatDiffer) {
+  WriteTable("table.csv");
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "a", "--no-figures"}).code, 0);
+  ASSERT_EQ(
+      Call({"run", "config.yaml", "-o", "b", "--no-figures", "--set", "sensors.stereo.sigma_px=2"})
+          .code,
+      0);
+  const Outcome compared = Call({"compare", "a", "b", "--reference", "a/ekf"});
+  EXPECT_TRUE(Contains(compared.out, "'a/ekf' has no covariance.bin")) << compared.out;
+  EXPECT_TRUE(Contains(compared.out,
+                       "the settings of 'a' and 'b' differ: sensors.stereo.sigma_px "
+                       "(1.0, 2)"))
+      << compared.out << compared.err;
+}
+
+TEST_F(CompareCli, CovariancesOfARunAreWrittenWhereAskedFor) {
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "a", "--no-figures", "--covariances"}).code, 0);
+  // 152 frames, the lower triangle of 3 x 3.
+  EXPECT_EQ(Read("a/ekf/covariance.bin").size(), 152u * 6u * 8u);
+  const Outcome compared = Call({"compare", "a", "--reference", "ekf"});
+  EXPECT_EQ(compared.code, 0) << compared.err;
+  EXPECT_FALSE(Contains(compared.out, "covariance.bin")) << compared.out;
+}
+
+TEST_F(CompareCli, RefusesASourceThatCanBeReadOnceForSeveralSeeds) {
+  ASSERT_EQ(::mkfifo((folder_ / "table.csv").c_str(), 0600), 0);
+  const Outcome compared = Call({"compare", "table.yaml", "--runs", "2", "-o", "out"});
+  EXPECT_EQ(compared.code, 78);
+  EXPECT_TRUE(Contains(compared.err, "can be read once")) << compared.err;
+}
+
+// FAULTS 85
+TEST_F(CompareCli, WithholdsTheComparisonWhereTheBatchFailed) {
+  const std::string failing = "estimators.batch={type: ceres_batch, max_iterations: 1}";
+  const Outcome compared = Call({"compare", "config.yaml", "-o", "out", "--reference", "batch",
+                                 "--no-explain", "--set", failing});
+  EXPECT_EQ(compared.code, 1);
+  const std::string words =
+      "no reference: estimator 'batch' failed, the comparison with it is withheld";
+  EXPECT_TRUE(Contains(compared.err, "error: " + words)) << compared.err;
+  EXPECT_TRUE(Contains(compared.out, words)) << compared.out;
+  EXPECT_FALSE(Contains(compared.out, "apart target")) << compared.out;
+  // Errors from truth need no batch, but what is held against it is withheld.
+  const Outcome truth = Call({"compare", "config.yaml", "-o", "two", "--set", failing});
+  EXPECT_EQ(truth.code, 1);
+  EXPECT_TRUE(Contains(truth.out, "rmse target.depth [mm]")) << truth.out;
+  // A finished folder says the same.
+  EXPECT_EQ(Call({"compare", "out", "--reference", "batch"}).code, 1);
+}
+
+TEST_F(CompareCli, WithoutTruthTheBatchIsTheReference) {
+  WriteTable("table.csv");
+  const Outcome compared = Call({"compare", "table.yaml", "-o", "out"});
+  EXPECT_EQ(compared.code, 0) << compared.err;
+  EXPECT_TRUE(Contains(compared.out, "20 frames, differences from batch")) << compared.out;
+  EXPECT_FALSE(Contains(compared.out, "rmse")) << compared.out;
+  const Config json = Json("out/compare.json");
+  const Node estimators = json.root().At("estimators");
+  EXPECT_EQ(estimators.At("ekf").At("reference").Text(), "batch_so_far");
+  EXPECT_EQ(estimators.At("rts").At("reference").Text(), "batch");
+  EXPECT_GT(estimators.At("ekf").At("values").At("apart.sigmas:target").Number(), 0.0);
+  const Outcome truth = Call({"compare", "table.yaml", "-o", "two", "--reference", "truth"});
+  EXPECT_EQ(truth.code, 2);
+  EXPECT_TRUE(Contains(truth.err, "--reference: the source knows no truth")) << truth.err;
+  EXPECT_FALSE(Exists("two"));
+}
+
+TEST_F(CompareCli, OverSeedsValuesHaveASpread) {
+  const Arguments sweep = {"compare", "config.yaml", "--runs", "3", "--jobs", "1", "-o", "one"};
+  const Outcome compared = Call(sweep);
+  EXPECT_EQ(compared.code, 0) << compared.err;
+  EXPECT_TRUE(Contains(compared.out, "3 runs, mean [5 %, 95 %]")) << compared.out;
+  const auto rmse = [](const Node& of, const char* where, const char* what) {
+    return of.At("estimators").At("ekf").At(where).At("rmse:target.depth").At(what).Number();
+  };
+  const Config json = Json("one/compare.json"), summary = Json("one/sweep.json");
+  for (const char* what : {"mean", "p05", "p95"}) {
+    EXPECT_EQ(rmse(json.root(), "values", what), rmse(summary.root(), "metrics", what));
+  }
+  EXPECT_LT(rmse(json.root(), "values", "p05"), rmse(json.root(), "values", "p95"));
+  ASSERT_EQ(
+      Call({"compare", "config.yaml", "--runs", "3", "--jobs", "2", "-o", "two", "--quiet"}).code,
+      0);
+  EXPECT_EQ(WithoutClock(Read("one/compare.json")), WithoutClock(Read("two/compare.json")));
+}
+
+TEST_F(CompareCli, RefusesWhatItCannotCompare) {
+  const auto fails = [this](const Arguments& arguments, int code, const std::string& words) {
+    const Outcome outcome = Call(arguments);
+    EXPECT_EQ(outcome.code, code) << words << outcome.err;
+    EXPECT_TRUE(Contains(outcome.err, words)) << outcome.err;
+  };
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "a", "--no-figures"}).code, 0);
+  fails({"compare"}, 2, "CONFIG | DIR is required");
+  fails({"compare", "a", "config.yaml"}, 2, "'config.yaml' is no folder");
+  fails({"compare", "a", "--runs", "3"}, 2, "a finished run is not run again");
+  fails({"compare", "a", "--reference", "bath"}, 2, "no estimator 'bath'; expected one of ekf");
+  fails({"compare", "nowhere"}, 66, "nowhere");
+  fails({"compare", "."}, 66, "run.json: cannot be read");
+  fails({"compare", "config.yaml", "-o", "a"}, 73, "exists already");
+  Write("a/run.json", std::regex_replace(Read("a/run.json"), std::regex("\"data\""), "\"date\""));
+  fails({"compare", "a"}, 65, "does not say which data the run saw");
+}
+
+}  // namespace
+}  // namespace alidade

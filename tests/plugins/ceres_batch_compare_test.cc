@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Comparisons with the batch.
+#include <Eigen/LU>
+#include <cmath>
+
+#include "alidade/compare.h"
+#include "alidade/rts.h"
+#include "ceres_batch_fixture.h"
+
+namespace alidade {
+namespace {
+
+using testing::LinearSystem;
+using testing::MakeBatch;
+using testing::Shipped;
+
+/// A point at cos t, measured with a wobble but for every fourth frame; one outlier where asked.
+class Swing : public Source {
+ public:
+  explicit Swing(bool with_outlier = false) : with_outlier_(with_outlier) {}
+  const std::vector<StreamInfo>& streams() const override { return streams_; }
+  const std::vector<StreamInfo>& truths() const override { return truths_; }
+  bool Next(Frame& frame) override {
+    if (next_ == kFrames) return false;
+    const double t_s = 0.05 * next_, wobble = 0.3 * std::sin(37.0 * next_);
+    const double z = 2.0 * std::cos(t_s) + wobble + (with_outlier_ && next_ == 9 ? 50.0 : 0.0);
+    frame = next_ % 4 == 3 ? testing::FrameAt(t_s, {}) : testing::FrameAt(t_s, {{0, z}});
+    frame.truth = {{std::cos(t_s)}};
+    ++next_;
+    return true;
+  }
+
+ private:
+  static constexpr int kFrames = 30;
+  std::vector<StreamInfo> streams_ = testing::StreamsOf(LinearSystem());
+  std::vector<StreamInfo> truths_ = {{"p.x", 1}};
+  bool with_outlier_;
+  int next_ = 0;
+};
+
+void Add(Experiment& experiment, const std::string& name, const std::string& type,
+         std::unique_ptr<Estimator> estimator, int accepted_by = -1) {
+  NamedEstimator& named = experiment.estimators.emplace_back();
+  named.name = name;
+  named.type = type;
+  named.system = LinearSystem();
+  named.estimator = std::move(estimator);
+  named.accepted_by = accepted_by;
+}
+
+/// A filter, and all that its gap is explained by.
+Experiment MakeLinear(bool with_outlier) {
+  const System system = LinearSystem();
+  EkfOptions options;
+  options.gate = 0.9999;
+  Experiment experiment;
+  experiment.source = std::make_unique<Swing>(with_outlier);
+  const std::vector<StreamInfo>& streams = experiment.source->streams();
+  Add(experiment, "ekf", "ekf", std::make_unique<Ekf>(system, options, streams));
+  Add(experiment, "rts", "rts", std::make_unique<RtsSmoother>(system, options, streams));
+  Add(experiment, "so_far", "ceres_batch", MakeBatch(system, "data: so_far\n"), 0);
+  Add(experiment, "accepted", "ceres_batch", MakeBatch(system), 0);
+  Add(experiment, "batch", "ceres_batch", MakeBatch(system));
+  return experiment;
+}
+
+struct Compared {
+  RunResult run;
+  Comparison comparison;
+};
+
+Compared CompareLinear(bool with_outlier, const CompareOptions& options = {}) {
+  Experiment experiment = MakeLinear(with_outlier);
+  RunComparer comparer(experiment);
+  RunOptions observed;
+  comparer.Observe(observed);
+  RunResult run = Run(experiment, observed);
+  EXPECT_EQ(run.status, RunStatus::kOk) << run.reason;
+  Comparison comparison = comparer.Finish(run, options);
+  return {std::move(run), std::move(comparison)};
+}
+
+double ValueOf(const std::map<std::string, Spread>& values, const std::string& key) {
+  const auto found = values.find(key);
+  return found == values.end() ? std::nan("") : found->second.mean;
+}
+
+// Where all is linear a filter loses nothing by linearising, and the smoother is the batch.
+TEST(CompareLinear, OnlyMissingSmoothingIsLeftOfTheGap) {
+  const auto [run, comparison] = CompareLinear(false);
+  ASSERT_EQ(comparison.gap.size(), 3u);
+  EXPECT_EQ(comparison.explained, "ekf");
+  const GapStep& linearisation = comparison.gap[0];
+  EXPECT_EQ(linearisation.from + ' ' + linearisation.to, "ekf so_far");
+  EXPECT_LT(ValueOf(linearisation.values, "apart:p.x"), 1e-9);
+  EXPECT_LT(ValueOf(linearisation.values, "apart:p.v"), 1e-9);
+  EXPECT_LT(ValueOf(linearisation.values, "apart.sigmas:p"), 1e-9);
+  EXPECT_NEAR(ValueOf(linearisation.values, "error_ratio:p.x"), 1.0, 1e-9);
+
+  const GapStep& smoothing = comparison.gap[1];
+  EXPECT_EQ(smoothing.from + ' ' + smoothing.to, "ekf rts");
+  const auto rmse = [&run = run](std::size_t e) {
+    return run.estimators[e].metrics.at("rmse:p.x");
+  };
+  EXPECT_GT(rmse(0) / rmse(1), 1.2);
+  EXPECT_NEAR(ValueOf(smoothing.values, "error_ratio:p.x"), rmse(0) / rmse(1), 1e-12);
+
+  const GapStep& lost = comparison.gap[2];
+  EXPECT_EQ(lost.from + ' ' + lost.to, "accepted batch");
+  EXPECT_EQ(ValueOf(lost.values, "lost"), 0.0);
+  EXPECT_LT(ValueOf(lost.values, "apart:p.x"), 1e-12);
+
+  const ComparedEstimator& rts = comparison.estimators[1];
+  EXPECT_TRUE(rts.smoothed);
+  EXPECT_EQ(rts.reference, "batch");
+  EXPECT_LT(ValueOf(rts.values, "apart:p.x"), 1e-9);
+  EXPECT_LT(ValueOf(rts.values, "apart.sigmas:p"), 1e-9);
+  EXPECT_NEAR(ValueOf(rts.values, "ratio.rmse:p.x"), 1.0, 1e-9);
+}
+
+// At the end filter and batch have the same data.
+TEST(CompareLinear, TheLastEstimateOfAFilterIsThatOfTheBatch) {
+  const Comparison comparison = CompareLinear(false).comparison;
+  const ComparedEstimator& ekf = comparison.estimators[0];
+  EXPECT_EQ(ekf.reference, "so_far");
+  EXPECT_EQ(ekf.final_reference, "batch");
+  EXPECT_LT(ValueOf(ekf.values, "apart.final:p.x"), 1e-9);
+  EXPECT_LT(ValueOf(ekf.values, "apart.final.sigmas:p"), 1e-9);
+  EXPECT_NEAR(ValueOf(ekf.values, "ratio.final:p.x"), 1.0, 1e-7);
+}
+
+/// x of the smoother and of the filter, and sigma^2 of p.x and p.v of the smoother, by frame.
+struct ByHand {
+  std::vector<Eigen::Vector2d> filter, smoother;
+  std::vector<Eigen::Matrix2d> p;
+};
+
+ByHand RunByHand() {
+  const System system = LinearSystem();
+  Swing source;
+  EkfOptions options;
+  options.gate = 0.9999;
+  Ekf ekf(system, options, source.streams());
+  RtsSmoother rts(system, options, source.streams());
+  ByHand run;
+  for (Frame frame; source.Next(frame);) {
+    ekf.Process(frame);
+    rts.Process(frame);
+    run.filter.emplace_back(ekf.state().values().data());
+  }
+  rts.Smooth([&](std::size_t, const State& state, const UpdateReport&) {
+    run.smoother.emplace_back(state.values().data());
+    run.p.emplace_back(state.covariance().Block(0, 2, 0, 2));
+  });
+  return run;
+}
+
+// The distance of a filter from a smoother, in the joint sigmas of position and velocity.
+TEST(CompareLinear, DistancesAreThoseWrittenOut) {
+  const ByHand by_hand = RunByHand();
+  double squares = 0.0, sigmas = 0.0;
+  for (std::size_t k = 0; k < by_hand.filter.size(); ++k) {
+    const Eigen::Vector2d d = by_hand.filter[k] - by_hand.smoother[k];
+    squares += d[0] * d[0];
+    sigmas += d.dot(by_hand.p[k].inverse() * d) / 2.0;
+  }
+  const auto n = static_cast<double>(by_hand.filter.size());
+  const GapStep smoothing = CompareLinear(false).comparison.gap[1];
+  EXPECT_NEAR(ValueOf(smoothing.values, "apart:p.x"), std::sqrt(squares / n), 1e-12);
+  EXPECT_NEAR(ValueOf(smoothing.values, "apart.sigmas:p"), std::sqrt(sigmas / n), 1e-9);
+}
+
+// The batch takes the outlier for true, the filter and what it lends its gate to do not.
+TEST(CompareLinear, WhatTheGateKeptOutIsLostData) {
+  const Comparison comparison = CompareLinear(true).comparison;
+  EXPECT_LT(ValueOf(comparison.gap[0].values, "apart:p.x"), 1e-9);
+  const GapStep& lost = comparison.gap[2];
+  EXPECT_EQ(ValueOf(lost.values, "lost"), 1.0);
+  EXPECT_EQ(ValueOf(lost.values, "measurements"), 23.0);
+  EXPECT_GT(ValueOf(lost.values, "apart:p.x"), 0.5);
+  EXPECT_LT(ValueOf(lost.values, "error_ratio:p.x"), 0.5);
+}
+
+TEST(CompareLinear, ANamedReferenceServesAll) {
+  const Comparison comparison = CompareLinear(false, {"rts", "", true}).comparison;
+  EXPECT_EQ(comparison.reference, "rts");
+  for (const ComparedEstimator& one : comparison.estimators) {
+    EXPECT_EQ(one.reference, "rts") << one.name;
+    EXPECT_FALSE(one.values.contains("rmse:p.x")) << one.name;
+    EXPECT_EQ(one.values.contains("apart:p.x"), one.name != "rts");
+  }
+}
+
+// ---- what is added to a config ------------------------------------------------------------------
+
+Config Depth(const std::vector<std::pair<std::string, std::string>>& settings = {}) {
+  Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/05_depth_principled/config.yaml");
+  for (const auto& [key, value] : settings) config.Set(key, value, "--set");
+  return config;
+}
+
+TEST(ExplainExperiment, AddsWhatTheComparisonLacks) {
+  const ExplainedExperiment explained = ExplainExperiment(Depth(), Shipped(), {});
+  EXPECT_EQ(explained.filter, "ekf");
+  EXPECT_EQ(explained.added,
+            (std::vector<std::string>{"rts", "batch", "batch_so_far", "batch_accepted"}));
+  const Node estimators = explained.config.root().At("estimators");
+  EXPECT_EQ(estimators.At("batch_so_far").At("data").Text(), "so_far");
+  EXPECT_EQ(estimators.At("batch_accepted").At("use").At("accepted_by").Text(), "ekf");
+  EXPECT_EQ(estimators.At("rts").At("gate").Text(), estimators.At("ekf").At("gate").Text());
+  // What it gives is the config of a run.
+  EXPECT_EQ(BuildExperiment(explained.config, Shipped()).estimators.size(), 5u);
+}
+
+TEST(ExplainExperiment, AddsNothingThatIsThereOrNotAskedFor) {
+  const Config config = Depth({{"estimators.best", "{type: ceres_batch}"},
+                               {"estimators.best_now", "{type: ceres_batch, data: so_far}"}});
+  EXPECT_EQ(ExplainExperiment(config, Shipped(), {}).added,
+            (std::vector<std::string>{"rts", "batch_accepted"}));
+  EXPECT_TRUE(ExplainExperiment(config, Shipped(), {"", "", false}).added.empty());
+}
+
+TEST(ExplainExperiment, TakesOverWhatTheFilterSees) {
+  const Config config = Depth({{"estimators.ekf.sensors", "[stereo]"},
+                               {"estimators.ekf.overrides.sensors.stereo.sigma_px", "2"},
+                               {"estimators.best", "{type: ceres_batch}"}});
+  const ExplainedExperiment explained = ExplainExperiment(config, Shipped(), {});
+  // `best` has another sensor and another noise.
+  EXPECT_EQ(explained.added,
+            (std::vector<std::string>{"rts", "batch", "batch_so_far", "batch_accepted"}));
+  for (const NamedEstimator& named : explained.experiment.estimators) {
+    EXPECT_EQ(named.system.sensors.size(), named.name == "best" ? 2u : 1u) << named.name;
+    EXPECT_EQ(named.overrides.empty(), named.name == "best") << named.name;
+  }
+}
+
+TEST(ExplainExperiment, LeavesOutWithItsReasonWhatDoesNotSupportTheSystem) {
+  const Config config =
+      Config::FromFile(ALIDADE_SOURCE_DIR "/examples/04_depth_fused_2017/config.yaml");
+  const ExplainedExperiment explained = ExplainExperiment(config, Shipped(), {});
+  EXPECT_TRUE(explained.added.empty());
+  ASSERT_EQ(explained.notes.size(), 2u);
+  EXPECT_TRUE(explained.notes[0].starts_with(
+      "left out the batch of all data; the batch of the data so far that the filter accepted; "))
+      << explained.notes[0];
+  EXPECT_EQ(explained.notes[1],
+            "left out the smoother of all data: estimator type 'rts' does not support "
+            "linearise_at: measurement");
+  EXPECT_EQ(explained.experiment.estimators.size(), 1u);
+}
+
+TEST(ExplainExperiment, RefusesNamesThatAreNotThere) {
+  const auto refuses = [](const CompareOptions& options, const std::string& words) {
+    try {
+      ExplainExperiment(Depth(), Shipped(), options);
+      ADD_FAILURE() << words;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::kUsage);
+      EXPECT_TRUE(std::string(error.what()).starts_with(words)) << error.what();
+    }
+  };
+  refuses({"bath", "", true}, "--reference: no estimator 'bath'; expected one of ekf, rts");
+  refuses({"", "efk", true}, "--filter: no estimator 'efk'; expected one of ekf; did you mean");
+}
+
+}  // namespace
+}  // namespace alidade

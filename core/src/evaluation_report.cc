@@ -21,7 +21,7 @@ using internal::RoundedText;
 
 constexpr int kDecimals = 6;  // as evo has them
 
-std::string WithUnit(std::string text, const std::string& unit) {
+std::string WithUnit(const std::string& text, const std::string& unit) {
   return unit.empty() ? text : text + " [" + unit + ']';
 }
 
@@ -116,7 +116,7 @@ std::string DetailText(const Evaluation& evaluation) {
   if (evaluation.sim3_scale) {
     text += "scale      " + FixedText(*evaluation.sim3_scale, kDecimals) + " by sim3";
     if (evaluation.scale_drift) {
-      text += ", drift " + RoundedText(100.0 * *evaluation.scale_drift, 3) +
+      text += ", drift " + FixedText(100.0 * *evaluation.scale_drift, 2) +
               " % from the first half to the second";
     }
     text += '\n';

@@ -240,11 +240,40 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
   },
   "seed": 42,
   "frames": 7,
+  "data": {
+    "measurements": "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"
+  },
   "reference": "truth",
   "plugins": [],
   "estimators": {
     "ekf": {
       "type": "ekf",
+      "sensors": [
+        "disparity",
+        "inverse_scale"
+      ],
+      "smoothed": false,
+      "blocks": [
+        {
+          "name": "target.depth",
+          "unit": "m",
+          "geometry": "vector",
+          "size": 1
+        },
+        {
+          "name": "target.depth_rate",
+          "unit": "m/s",
+          "geometry": "vector",
+          "size": 1
+        },
+        {
+          "name": "template.inverse_distance",
+          "unit": "1/m",
+          "geometry": "vector",
+          "size": 1
+        }
+      ],
+      "failed": false,
       "metrics": {
         "final:target.depth": null,
         "rmse:target.depth": 0.00195,

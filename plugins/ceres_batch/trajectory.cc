@@ -151,7 +151,7 @@ void Trajectory::AddFactors(const Frame& frame, const UpdateReport& report, Epoc
   AddFirsts(epoch);
   for (Factor& factor : epoch.factors) {
     const SensorBinding& sensor = SensorOf(factor);
-    if (factor.outcome != Outcome::kAccepted || sensor.model.has_landmark()) continue;
+    if (factor.outcome != Outcome::kAccepted || SeesLandmarks(sensor)) continue;
     if (!std::ranges::all_of(sensor.roles,
                              [&](const RoleBinding& role) { return AllPresent({role.block}); })) {
       factor.outcome = Outcome::kNotReady;
@@ -178,7 +178,7 @@ void Trajectory::AddFirsts(Epoch& epoch) {
     progress = false;
     for (std::size_t i = 0; i < epoch.factors.size(); ++i) {
       const SensorBinding& sensor = SensorOf(epoch.factors[i]);
-      if (epoch.factors[i].outcome != Outcome::kInitialised || sensor.model.has_landmark()) {
+      if (epoch.factors[i].outcome != Outcome::kInitialised || SeesLandmarks(sensor)) {
         continue;
       }
       const auto target = static_cast<std::size_t>(sensor.model.initialised_role());

@@ -174,6 +174,10 @@ class Trajectory {
   void Begin(const Factor& factor, std::size_t index, const Estimator& filter);
   void AddFirsts(Epoch& epoch);
   void AddPart(int size, const RobustLoss& loss);
+  /// Whether its landmark roles are filled by what a measurement names, not by blocks.
+  bool SeesLandmarks(const SensorBinding& sensor) const {
+    return has_landmarks() && sensor.model.has_landmark();
+  }
   bool AllPresent(const std::vector<BlockId>& blocks) const;
   bool Move(const Step& step, const double* e, Point& point) const;
   bool Initialise(const First& first, const Factor& factor, const double* e, Point& point) const;

@@ -62,7 +62,7 @@ void Trajectory::AddLandmarks(const UpdateReport& report, const Estimator& filte
   std::vector<std::size_t> begin;
   for (std::size_t i = 0; i < epoch.factors.size(); ++i) {
     Factor& factor = epoch.factors[i];
-    if (!SensorOf(factor).model.has_landmark()) continue;
+    if (!SeesLandmarks(SensorOf(factor))) continue;
     if (factor.outcome == Outcome::kInitialised) begin.push_back(i);
     if (factor.outcome != Outcome::kAccepted) continue;
     const Outcome told = report.measurements()[i].outcome;

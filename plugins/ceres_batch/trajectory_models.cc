@@ -161,7 +161,7 @@ std::vector<const double*> Trajectory::RolesOf(const Factor& factor, const Point
   std::vector<const double*> roles;
   const double* next = y.empty() ? nullptr : y.data();
   for (const Space& role : ModelOf(factor).roles()) {
-    if (role.landmark()) {
+    if (role.landmark() && has_landmarks()) {
       roles.push_back(next);
       if (next != nullptr) next += role.geometry.ambient;
       continue;
@@ -186,7 +186,7 @@ bool Trajectory::Residual(const Factor& factor, const Point& point, const std::v
   int width = initial_.covariance().size();
   for (std::size_t i = 0; i < roles.size() && a != nullptr; ++i) {
     const Space& role = model.roles()[i];
-    if (role.landmark()) {
+    if (role.landmark() && has_landmarks()) {
       columns[i] = width;
       width += role.geometry.tangent;
     } else if (const BlockId id = sensor.roles[i].block;

@@ -93,7 +93,8 @@ bool Trajectory::Project(const double* e, const std::vector<Point>& points, Unde
   if (!derivatives) return true;
   for (MapLandmark& landmark : landmarks_) landmark.from = landmark.l;
   Assemble(e, points, information, reduced);
-  return reduced.g.allFinite() && reduced.a.allFinite();
+  return (reduced.g.allFinite() && reduced.a.allFinite()) ||
+         Fail("the normal equations of the batch are not finite");
 }
 
 /// A = I + S' H S, g = e + S' (g_x + H offset), for S of all points, which is lower triangular by

@@ -123,6 +123,40 @@ TEST(CeresBatchLandmarks, ALinearMapIsThatOfLeastSquaresOverAllSteps) {
   }
 }
 
+// The problem without its landmarks, of which there are none here, against that of all residuals.
+TEST(CeresBatchLandmarks, WithoutAnyTheSolutionIsThatOfTheProblemWithoutThem) {
+  const auto expect_equal = [](const System& system, const std::vector<Frame>& frames,
+                               double tolerance) {
+    System with = system;
+    with.landmarks = LandmarkOptions{};
+    const Found found = Solve(with, frames), expected = Solve(system, frames);
+    ASSERT_FALSE(found.failed) << found.events.back().text;
+    EXPECT_NEAR(found.Cost(), expected.Cost(), 1e-8 * expected.Cost());
+    ASSERT_EQ(found.states.size(), expected.states.size());
+    for (std::size_t k = 0; k < found.states.size(); ++k) {
+      const MatrixXd p = expected.states[k].covariance().Dense();
+      for (Eigen::Index i = 0; i < p.rows(); ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        EXPECT_NEAR(found.states[k].values()[at], expected.states[k].values()[at],
+                    tolerance * std::sqrt(p(i, i)));
+      }
+      EXPECT_LT((found.states[k].covariance().Dense() - p).norm(), tolerance * p.norm()) << k;
+    }
+  };
+  std::vector<Frame> point, depth;
+  for (int k = 0; k < 60; ++k) {
+    const double t_s = 0.05 * k, z = 0.3 + 0.1 * std::sin(2.5 * t_s);
+    point.push_back(testing::FrameAt(t_s, {{0, 2.0 * std::cos(t_s) + 0.3 * std::sin(37.0 * k)}}));
+    depth.push_back(testing::FrameAt(
+        t_s, {{0, 26.0 / z + std::cos(23.0 * k)}, {1, z / 0.3 + 0.006 * std::sin(37.0 * k)}}));
+  }
+  expect_equal(testing::LinearSystem(), point, 1e-9);
+  System robust = testing::DepthFilter();
+  expect_equal(robust, depth, 1e-6);  // the noise that depends on the state settles to 1e-9
+  robust.sensors[0].loss = {LossKind::kHuber, 1.0};
+  expect_equal(robust, depth, 1e-5);  // steps of 1e-6 sigma are small enough
+}
+
 // ---- inverse depth ------------------------------------------------------------------------------
 
 constexpr double kPixel = 0.004, kRho = 0.5, kRhoSigma = 0.15, kWalk = 0.1, kDt = 0.1;

@@ -287,5 +287,88 @@ TEST(FixedLag, IsNearTheBatchOnManifolds) {
   ExpectNearTheBatch<Angle>(Geometry::Angle(), 1e-9);
 }
 
+// ---- runs ---------------------------------------------------------------------------------------
+
+/// Example 08 with these estimators, and what else is set.
+RunResult RunDepth(const std::string& estimators,
+                   const std::vector<std::pair<std::string, std::string>>& settings = {}) {
+  Config config =
+      Config::FromFile(ALIDADE_SOURCE_DIR "/examples/08_depth_all_estimators/config.yaml");
+  config.Set("estimators", estimators, "--set");
+  for (const auto& [key, value] : settings) config.Set(key, value, "--set");
+  Experiment experiment = BuildExperiment(config, Shipped());
+  return Run(experiment, {});
+}
+
+/// Means over the seeds of one metric of each estimator, in their order.
+std::vector<double> Means(const std::vector<RunResult>& runs, const std::string& metric) {
+  std::vector<double> means;
+  for (const RunResult& run : runs) {
+    means.resize(run.estimators.size());
+    for (std::size_t i = 0; i < means.size(); ++i) {
+      means[i] += run.estimators[i].metrics.at(metric) / static_cast<double>(runs.size());
+    }
+  }
+  return means;
+}
+
+// Process noise of rank 1, and a template whose size is known for certain.
+TEST(FixedLag, LiesBetweenTheFilterAndTheBatchAndIsHonest) {
+  std::vector<RunResult> runs;
+  for (int seed = 1001; seed <= 1012; ++seed) {
+    runs.push_back(RunDepth(
+        "{ekf: {type: ekf}, newest: {type: fixed_lag, window_s: 0.5}, "
+        "delayed: {type: fixed_lag, window_s: 0.5, estimate: oldest}, batch: {type: ceres_batch}}",
+        {{"source.seed", std::to_string(seed)},
+         {"state.template.initial.inverse_distance", "{mean: 3.3333333333333335, sigma: 0}"},
+         {"state.target.initial.depth", "{mean: 0.35, sigma: 0.1}"},
+         {"state.target.initial.depth_rate", "{mean: 0, sigma: 0.5}"}}));
+    ASSERT_EQ(runs.back().status, RunStatus::kOk) << runs.back().reason;
+    ASSERT_EQ(runs.back().estimators.size(), 4u);
+  }
+  // Measured: depth 1.7251, 1.7134, 0.8691, 0.8692 mm, rate 38.5, 38.2, 11.67, 11.68 mm/s.
+  for (const char* block : {"target.depth", "target.depth_rate"}) {
+    const std::vector<double> rmse = Means(runs, std::string("rmse:") + block);
+    EXPECT_LT(rmse[1], rmse[0]) << block;
+    EXPECT_GT(rmse[1], rmse[3]) << block;
+    EXPECT_NEAR(rmse[2] / rmse[3], 1.0, 0.01) << block;
+  }
+  // The target swings, more gently than the process noise allows for: 0.727 of what is expected for
+  // the filter and the window, 0.530 for the two smoothed.
+  const std::vector<double> nees = Means(runs, "nees.mean:target");
+  EXPECT_NEAR(nees[1], nees[0], 0.02);
+  EXPECT_NEAR(nees[2], nees[3], 0.02);
+  for (const double share : Means(runs, "nees.cov95:target")) EXPECT_GT(share, 0.97);
+}
+
+TEST(FixedLag, LendsItsGateAndIsRefusedWhatItCannotDo) {
+  const RunResult run = RunDepth(
+      "{one: {type: fixed_lag, window_s: 0.3}, two: {type: ekf, use: {accepted_by: one}}}");
+  ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
+  EXPECT_EQ(run.estimators[0].counts.at("accepted:scale"), 152);
+  EXPECT_EQ(run.estimators[1].counts.at("accepted:scale"), 152);
+  const auto expect_refused = [](const std::string& options, const std::string& key,
+                                 const std::string& value, const std::string& what) {
+    try {
+      RunDepth("{one: {type: fixed_lag" + options + "}}", {{key, value}});
+      ADD_FAILURE() << "took " << key << ": " << value;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::kBadConfig);
+      EXPECT_NE(std::string(error.what()).find(what), std::string::npos) << error.what();
+    }
+  };
+  const std::string window = ", window_s: 0.3";
+  expect_refused(window, "sensors.scale.roles.inverse_distance",
+                 "{block: template.inverse_distance, mode: hold}",
+                 "estimator type 'fixed_lag' does not support held roles: "
+                 "sensors.scale.roles.inverse_distance.mode");
+  expect_refused(window, "state.template.consider", "[inverse_distance]",
+                 "estimator type 'fixed_lag' does not support considered blocks");
+  expect_refused(window, "estimators.one.gate", "0.99", "estimator type 'fixed_lag' has no gate");
+  expect_refused("", "source.seed", "1", "window_s");
+  expect_refused(", window_s: 0", "source.seed", "1", "window_s");
+  expect_refused(window, "estimators.one.estimate", "eldest", "oldest");
+}
+
 }  // namespace
 }  // namespace alidade

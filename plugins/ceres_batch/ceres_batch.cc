@@ -13,6 +13,7 @@
 #include "alidade/build_plugin.h"
 #include "alidade/ekf.h"
 #include "alidade/support.h"
+#include "fixed_lag.h"
 #include "frozen_solve.h"
 #include "trajectory.h"
 
@@ -336,4 +337,7 @@ EstimatorMaker Create(const EstimatorArguments& arguments) {
 
 ALIDADE_ESTIMATOR_PLUGIN({"ceres_batch",
                           "Maximum a posteriori of a whole run, by nonlinear least squares.",
-                          "[Bell1994]", &alidade::ceres_batch::Create, true})
+                          "[Bell1994]", &alidade::ceres_batch::Create, true},
+                         {"fixed_lag",
+                          "Maximum a posteriori of the last frames, by nonlinear least squares.",
+                          "[Sibley2010]", &alidade::ceres_batch::CreateFixedLag})

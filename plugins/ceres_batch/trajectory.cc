@@ -33,6 +33,7 @@ Trajectory::Trajectory(System system, const std::vector<StreamInfo>& streams, do
                                                        : static_cast<int>(found - streams.begin()));
   }
   l0_ = SquareRoot(initial_.covariance().Dense());
+  d0_ = Eigen::VectorXd::Zero(l0_.rows());
   inputs_ = static_cast<int>(l0_.cols());
   for (const Block& block : initial_.layout().blocks()) present_.push_back(block.present);
   for (std::size_t i = 0; i < present_.size(); ++i) {
@@ -198,7 +199,7 @@ void Trajectory::AddFirsts(Epoch& epoch) {
 bool Trajectory::Begin(const double* e, bool sensitivity, Point& point) const {
   const Eigen::Index n = initial_.covariance().size(), n0 = l0_.rows();
   Eigen::VectorXd d = Eigen::VectorXd::Zero(n);
-  d.head(n0) = l0_ * Eigen::Map<const Eigen::VectorXd>(e, n0);
+  d.head(n0) = d0_ + l0_ * Eigen::Map<const Eigen::VectorXd>(e, n0);
   initial_.Retract(d.data(), point.x);
   point.offset = Eigen::VectorXd::Zero(n);
   point.s.resize(0, 0);

@@ -70,6 +70,11 @@ class Trajectory {
                                [](const Part& p) { return p.loss.kind != LossKind::kNone; });
   }
   std::size_t size() const { return epochs_.size(); }
+  /// Makes the first frame, linearised at e, part of the prior, which is then that of the state at
+  /// that frame; e becomes the same trajectory in the inputs that are left. L_0 is a square root, so
+  /// P_0 may stay singular. Q, R and the weights of losses are those at e. Not with landmarks.
+  /// False where a model is not defined: nothing has changed.
+  bool MarginaliseFirst(Eigen::VectorXd& e);
   Stamp stamp() const { return stamp_; }
 
   /// Takes Q and R at the states of e. False where that cannot be.
@@ -178,6 +183,7 @@ class Trajectory {
   bool SeesLandmarks(const SensorBinding& sensor) const {
     return has_landmarks() && sensor.model.has_landmark();
   }
+  void Shift(int columns, int rows);
   bool AllPresent(const std::vector<BlockId>& blocks) const;
   bool Move(const Step& step, const double* e, Point& point) const;
   bool Initialise(const First& first, const Factor& factor, const double* e, Point& point) const;
@@ -227,6 +233,7 @@ class Trajectory {
   State initial_;              ///< all blocks have a place in it
   std::vector<bool> present_;  ///< at the last frame, by block
   Eigen::MatrixXd l0_;
+  Eigen::VectorXd d0_;  ///< x_0 = m (+) (d_0 + L_0 e_0); 0 but after MarginaliseFirst
   std::vector<Epoch> epochs_;
   std::vector<MapLandmark> landmarks_;
   std::map<std::int64_t, int> current_;  ///< by id: the last of landmarks_

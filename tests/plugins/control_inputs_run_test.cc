@@ -122,7 +122,8 @@ TEST_F(DrivenTest, WhatAFilterAcceptedComesWithAllInputs) {
   const RunResult run =
       RunInto(Read({{"estimators",
                      "{ekf: {type: ekf}, same: {type: ekf, use: {accepted_by: ekf}}, batch: {type: "
-                     "ceres_batch, use: {accepted_by: ekf}}}"}}),
+                     "ceres_batch, use: {accepted_by: ekf}}, lag: {type: fixed_lag, window_s: "
+                     "0.5}}"}}),
               folder_ / "run");
   ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
   for (const EstimatorResult& one : run.estimators) {

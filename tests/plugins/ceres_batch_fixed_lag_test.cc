@@ -1,0 +1,374 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The fixed-lag smoother against the batch, the Kalman filter, and itself before frames left it.
+#include <cmath>
+
+#include "alidade/run.h"
+#include "ceres_batch_fixture.h"
+
+namespace alidade {
+namespace {
+
+using testing::AddSensor;
+using testing::FrameAt;
+using testing::MakeBatch;
+using testing::Shipped;
+
+std::unique_ptr<Estimator> MakeFixedLag(const System& system, const std::string& options) {
+  const Config config = Config::FromText("type: fixed_lag\n" + options, "lag.yaml");
+  return Shipped().CreateEstimator("fixed_lag", config.root())(system, testing::StreamsOf(system));
+}
+
+/// An estimate of one frame.
+struct Estimate {
+  std::vector<double> x;
+  Eigen::MatrixXd p;
+};
+
+Estimate EstimateOf(const State& state) { return {state.values(), state.covariance().Dense()}; }
+
+void ExpectNear(const Estimate& found, const Estimate& expected, double tolerance, std::size_t k) {
+  ASSERT_EQ(found.x.size(), expected.x.size()) << k;
+  for (std::size_t i = 0; i < found.x.size(); ++i) {
+    EXPECT_NEAR(found.x[i], expected.x[i], tolerance) << k << ' ' << i;
+  }
+  ASSERT_EQ(found.p.rows(), expected.p.rows()) << k;
+  EXPECT_LT((found.p - expected.p).cwiseAbs().maxCoeff(), tolerance) << k;
+}
+
+std::vector<Estimate> SmoothOver(Estimator& estimator, const std::vector<Frame>& frames) {
+  for (const Frame& frame : frames) estimator.Process(frame);
+  std::vector<Estimate> result;
+  estimator.Smooth([&](std::size_t k, const State& state, const UpdateReport& report) {
+    EXPECT_EQ(k, result.size());
+    EXPECT_EQ(report.measurements().size(), frames[k].measurements.size());
+    result.push_back(EstimateOf(state));
+  });
+  return result;
+}
+
+// ---- linear -------------------------------------------------------------------------------------
+
+/// A point (process noise of rank 1), of which one sensor sees the place and one the rate.
+System LinearSystem() {
+  System system = testing::LinearSystem();
+  AddSensor(system, "rate", InProcessSensor(testing::Linear(1.5, 0.8), "linear"), {"p.v"});
+  return system;
+}
+
+/// 20 frames a second; the two sensors miss some of them.
+std::vector<Frame> LinearFrames(int count) {
+  std::vector<Frame> frames;
+  for (int k = 0; k < count; ++k) {
+    const double t_s = 0.05 * k;
+    std::vector<std::pair<int, double>> values;
+    if (k % 4 != 3) values.emplace_back(0, 2.0 * std::cos(t_s) + 0.3 * std::sin(37.0 * k));
+    if (k % 3 != 1) values.emplace_back(1, -1.5 * std::sin(t_s) + 0.8 * std::sin(23.0 * k));
+    frames.push_back(FrameAt(t_s, values));
+  }
+  return frames;
+}
+
+constexpr const char* kThreeFrames = "window_s: 0.1\n";
+
+TEST(FixedLag, OverAllFramesIsTheBatchOfTheDataSoFar) {
+  const auto lag = MakeFixedLag(LinearSystem(), "window_s: 1e12\n");
+  const auto batch = MakeBatch(LinearSystem(), "data: so_far\n");
+  EXPECT_FALSE(lag->offline());
+  const std::vector<Frame> frames = LinearFrames(40);
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    EXPECT_EQ(lag->Process(frames[k]).measurements().size(), frames[k].measurements.size());
+    batch->Process(frames[k]);
+    ExpectNear(EstimateOf(lag->state()), EstimateOf(batch->state()), 1e-9, k);
+    EXPECT_EQ(lag->stamp(), frames[k].stamp);
+  }
+  EXPECT_FALSE(lag->failed());
+}
+
+/// Expects the newest estimates of a window of three frames to be those of the Kalman filter.
+void ExpectTheKalmanFilter(const System& system, const std::vector<Frame>& frames,
+                           const std::string& options = kThreeFrames) {
+  const auto lag = MakeFixedLag(system, options);
+  Ekf ekf(system, {}, testing::StreamsOf(system));
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    lag->Process(frames[k]);
+    ekf.Process(frames[k]);
+    ExpectNear(EstimateOf(lag->state()), EstimateOf(ekf.state()), 1e-9, k);
+  }
+  EXPECT_FALSE(lag->failed());
+}
+
+TEST(FixedLag, OfALinearProblemIsTheKalmanFilterWhateverTheWindow) {
+  const std::vector<Frame> frames = LinearFrames(60);
+  ExpectTheKalmanFilter(LinearSystem(), frames);
+  ExpectTheKalmanFilter(LinearSystem(), frames, "window_s: 0.04\n");  // less than a frame
+  ExpectTheKalmanFilter(LinearSystem(), frames, "window_s: 0.7\n");
+  std::vector<Frame> gap = LinearFrames(10);  // all of the window leaves at once
+  gap.push_back(FrameAt(4.0, {{0, 1.2}}));
+  gap.push_back(FrameAt(4.05, {{1, 0.3}}));
+  ExpectTheKalmanFilter(LinearSystem(), gap);
+}
+
+// Each frame with two more: the batch of the first k + 3 frames.
+TEST(FixedLag, OfTheOldestFrameIsTheBatchWithAsManyLaterOnes) {
+  const std::vector<Frame> frames = LinearFrames(30);
+  const auto lag = MakeFixedLag(LinearSystem(), std::string(kThreeFrames) + "estimate: oldest\n");
+  EXPECT_TRUE(lag->offline());
+  const std::vector<Estimate> found = SmoothOver(*lag, frames);
+  ASSERT_EQ(found.size(), frames.size());
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    const std::size_t end = std::min(k + 3, frames.size());
+    const std::vector<Frame> known(frames.begin(),
+                                   frames.begin() + static_cast<std::ptrdiff_t>(end));
+    const std::vector<Estimate> batch = SmoothOver(*MakeBatch(LinearSystem()), known);
+    ExpectNear(found[k], batch[k], 1e-9, k);
+  }
+}
+
+// P_0 has a zero, Q none at all: what is known stays known, exactly.
+TEST(FixedLag, WhatIsKnownStays) {
+  System system = LinearSystem();
+  system.priors[1].covariance.setZero();
+  system.motions[0].model = InProcessMotion(ConstantVelocity<1, false>(0.0), "still");
+  const auto lag = MakeFixedLag(system, kThreeFrames);
+  for (const Frame& frame : LinearFrames(40)) lag->Process(frame);
+  EXPECT_DOUBLE_EQ(testing::ValueOf(lag->state(), "p.v"), -0.5);
+  EXPECT_DOUBLE_EQ(testing::CovarianceOf(lag->state(), "p.v", "p.v"), 0.0);
+  ExpectTheKalmanFilter(system, LinearFrames(40));
+}
+
+// The first value of p.x comes from the third frame, after two have left no trace of it.
+TEST(FixedLag, ABlockMayStartFromAMeasurement) {
+  System system = LinearSystem();
+  system.priors[0].from = "z";
+  std::vector<Frame> frames = LinearFrames(30);
+  for (std::size_t k = 0; k < 4; ++k)
+    std::erase_if(frames[k].measurements, [](const Measurement& m) { return m.stream == 0; });
+  const BlockId x = system.layout.Find("p.x");
+  const auto lag = MakeFixedLag(system, kThreeFrames);
+  const auto late = MakeFixedLag(system, std::string(kThreeFrames) + "estimate: oldest\n");
+  Ekf ekf(system, {}, testing::StreamsOf(system));
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    lag->Process(frames[k]);
+    late->Process(frames[k]);
+    ekf.Process(frames[k]);
+    ASSERT_EQ(lag->state().layout()[x].present, k >= 4) << k;
+    ExpectNear(EstimateOf(lag->state()), EstimateOf(ekf.state()), 1e-9, k);
+  }
+  late->Smooth([&](std::size_t k, const State& state, const UpdateReport&) {
+    EXPECT_EQ(state.layout()[x].present, k >= 4) << k;
+    if (k + 1 == frames.size()) ExpectNear(EstimateOf(state), EstimateOf(ekf.state()), 1e-9, k);
+  });
+}
+
+// ---- nonlinear ----------------------------------------------------------------------------------
+
+/// Depth 0.3 + 0.1 sin(2.5 t) m, its disparity (BF = 26 px m) on most frames, 1 / scale on all.
+std::vector<Frame> DepthFrames(int count) {
+  std::vector<Frame> frames;
+  for (int k = 0; k < count; ++k) {
+    const double t_s = 0.033 * k, depth = 0.3 + 0.1 * std::sin(2.5 * t_s);
+    Frame frame = FrameAt(t_s, {{1, depth / 0.3 + 0.006 * std::sin(37.0 * k)}});
+    if (k % 7 < 4) {
+      const double far_off = k % 10 == 6 ? 8.0 : 0.0;
+      frame.measurements.push_back(
+          {frame.stamp, 0, -1, {26.0 / depth + std::cos(23.0 * k) + far_off}, {}});
+    }
+    frames.push_back(frame);
+  }
+  return frames;
+}
+
+/// Whole windows leave at the last solution, and a frame that tells nothing comes: what was
+/// linearised was so at the optimum, so that the estimate is that of the batch, which keeps all.
+void ExpectLeavingChangesNothing(const System& system, std::vector<Frame> frames) {
+  const double window_s = Seconds(frames.back().stamp - frames.front().stamp);
+  frames.push_back({frames.back().stamp + StampFromSeconds(window_s + 0.1), {}, {}});
+  const auto lag = MakeFixedLag(system, "window_s: " + std::to_string(window_s + 0.01) + "\n");
+  const auto batch = MakeBatch(system, "data: so_far\n");
+  for (const Frame& frame : frames) {
+    lag->Process(frame);
+    batch->Process(frame);
+    ASSERT_FALSE(lag->failed());
+  }
+  ExpectNear(EstimateOf(lag->state()), EstimateOf(batch->state()), 1e-8, frames.size());
+}
+
+TEST(FixedLag, FramesThatLeaveTakeNothingWithThem) {
+  System system = testing::DepthFilter();  // R depends on the state
+  ExpectLeavingChangesNothing(system, DepthFrames(30));
+  for (SensorBinding& sensor : system.sensors) sensor.loss = {LossKind::kHuber, 1.0};
+  ExpectLeavingChangesNothing(system, DepthFrames(30));
+  for (SensorBinding& sensor : system.sensors) sensor.loss = {LossKind::kCauchy, 2.0};
+  ExpectLeavingChangesNothing(system, DepthFrames(30));
+}
+
+/// A value on a manifold that wanders, and a sensor of it.
+template <class G>
+struct Wander : Motion<G::kTangent, G> {
+  static constexpr std::array kBlocks{Quantity{"x"}};
+  template <class T>
+  void Step(const T* x, const T* w, double, T* next) const {
+    G::Plus(x, w, next);
+  }
+  void SqrtQ(double dt_s, MatrixRef l) const {
+    for (int i = 0; i < G::kTangent; ++i) l(i, i) = 0.1 * std::sqrt(dt_s);
+  }
+};
+template <class G>
+struct Direct : Sensor<G, G> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    std::copy_n(x, G::kAmbient, z);
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    for (int i = 0; i < G::kTangent; ++i) l[i * G::kTangent + i] = T(0.4);
+  }
+};
+
+template <class G>
+System OnManifold(const Geometry& geometry) {
+  System system;
+  const MotionModel model = InProcessMotion(Wander<G>(), "wander");
+  const BlockId id = system.layout.Declare("p.x", "p", model.blocks()[0]);
+  system.motions.push_back({"p", model, {id}});
+  const int t = geometry.tangent;
+  std::vector<double> mean(G::kAmbient);
+  geometry.Identity(mean.data());
+  system.priors.push_back({id, mean, 0.25 * Eigen::MatrixXd::Identity(t, t), ""});
+  AddSensor(system, "z", InProcessSensor(Direct<G>(), "direct"), {"p.x"});
+  return system;
+}
+
+/// Measurements far from the mean and from one another.
+std::vector<Frame> FramesOnManifold(const Geometry& geometry, int count) {
+  std::vector<Frame> frames;
+  std::vector<double> mean(static_cast<std::size_t>(geometry.ambient));
+  geometry.Identity(mean.data());
+  for (int k = 0; k < count; ++k) {
+    const double d[3] = {0.9 + 0.4 * std::sin(2.0 * k), -0.5 * std::cos(3.0 * k), 0.3};
+    Measurement m{StampFromSeconds(0.1 * k), 0, -1, mean, {}};
+    geometry.Plus(mean.data(), d, m.values.data());
+    frames.push_back({m.stamp, {m}, {}});
+  }
+  return frames;
+}
+
+/// And with frames that leave one by one the estimate stays near that of the batch: `tolerance` of
+/// its sigmas.
+template <class G>
+void ExpectNearTheBatch(const Geometry& geometry, double tolerance) {
+  const System system = OnManifold<G>(geometry);
+  ExpectLeavingChangesNothing(system, FramesOnManifold(geometry, 4));
+  const auto lag = MakeFixedLag(system, "window_s: 0.3\n");
+  const auto batch = MakeBatch(system, "data: so_far\n");
+  double worst = 0.0;
+  for (const Frame& frame : FramesOnManifold(geometry, 20)) {
+    lag->Process(frame);
+    batch->Process(frame);
+    ASSERT_FALSE(lag->failed());
+    EXPECT_NEAR(geometry.Defect(lag->state().values().data()), 0.0, 1e-12);
+    double d[3];
+    geometry.Minus(lag->state().values().data(), batch->state().values().data(), d);
+    for (int i = 0; i < geometry.tangent; ++i) {
+      worst = std::max(worst, std::abs(d[i]) / std::sqrt(batch->state().covariance().Variance(i)));
+    }
+  }
+  EXPECT_LT(worst, tolerance);
+}
+
+TEST(FixedLag, IsNearTheBatchOnManifolds) {
+  ExpectNearTheBatch<UnitQuaternion>(Geometry::UnitQuaternion(), 0.05);
+  ExpectNearTheBatch<UnitVector>(Geometry::UnitVector(), 0.05);
+  ExpectNearTheBatch<Angle>(Geometry::Angle(), 1e-9);
+}
+
+// ---- runs ---------------------------------------------------------------------------------------
+
+/// Example 08 with these estimators, and what else is set.
+RunResult RunDepth(const std::string& estimators,
+                   const std::vector<std::pair<std::string, std::string>>& settings = {}) {
+  Config config =
+      Config::FromFile(ALIDADE_SOURCE_DIR "/examples/08_depth_all_estimators/config.yaml");
+  config.Set("estimators", estimators, "--set");
+  for (const auto& [key, value] : settings) config.Set(key, value, "--set");
+  Experiment experiment = BuildExperiment(config, Shipped());
+  return Run(experiment, {});
+}
+
+/// Means over the seeds of one metric of each estimator, in their order.
+std::vector<double> Means(const std::vector<RunResult>& runs, const std::string& metric) {
+  std::vector<double> means;
+  for (const RunResult& run : runs) {
+    means.resize(run.estimators.size());
+    for (std::size_t i = 0; i < means.size(); ++i) {
+      means[i] += run.estimators[i].metrics.at(metric) / static_cast<double>(runs.size());
+    }
+  }
+  return means;
+}
+
+// Process noise of rank 1, and a template whose size is known for certain.
+TEST(FixedLag, LiesBetweenTheFilterAndTheBatchAndIsHonest) {
+  std::vector<RunResult> runs;
+  for (int seed = 1001; seed <= 1012; ++seed) {
+    runs.push_back(RunDepth(
+        "{ekf: {type: ekf}, newest: {type: fixed_lag, window_s: 0.5}, "
+        "delayed: {type: fixed_lag, window_s: 0.5, estimate: oldest}, batch: {type: ceres_batch}}",
+        {{"source.seed", std::to_string(seed)},
+         {"state.template.initial.inverse_distance", "{mean: 3.3333333333333335, sigma: 0}"},
+         {"state.target.initial.depth", "{mean: 0.35, sigma: 0.1}"},
+         {"state.target.initial.depth_rate", "{mean: 0, sigma: 0.5}"}}));
+    ASSERT_EQ(runs.back().status, RunStatus::kOk) << runs.back().reason;
+    ASSERT_EQ(runs.back().estimators.size(), 4u);
+  }
+  // Measured: depth 1.7251, 1.7134, 0.8691, 0.8692 mm, rate 38.5, 38.2, 11.67, 11.68 mm/s.
+  for (const char* block : {"target.depth", "target.depth_rate"}) {
+    const std::vector<double> rmse = Means(runs, std::string("rmse:") + block);
+    EXPECT_LT(rmse[1], rmse[0]) << block;
+    EXPECT_GT(rmse[1], rmse[3]) << block;
+    EXPECT_NEAR(rmse[2] / rmse[3], 1.0, 0.01) << block;
+  }
+  // The target swings, more gently than the process noise allows for: 0.727 of what is expected for
+  // the filter and the window, 0.530 for the two smoothed.
+  const std::vector<double> nees = Means(runs, "nees.mean:target");
+  EXPECT_NEAR(nees[1], nees[0], 0.02);
+  EXPECT_NEAR(nees[2], nees[3], 0.02);
+  for (const double share : Means(runs, "nees.cov95:target")) EXPECT_GT(share, 0.97);
+}
+
+TEST(FixedLag, LendsItsGateAndIsRefusedWhatItCannotDo) {
+  const RunResult run = RunDepth(
+      "{one: {type: fixed_lag, window_s: 0.3}, two: {type: ekf, use: {accepted_by: one}}}");
+  ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
+  EXPECT_EQ(run.estimators[0].counts.at("accepted:scale"), 152);
+  EXPECT_EQ(run.estimators[1].counts.at("accepted:scale"), 152);
+  const auto expect_refused = [](const std::string& options, const std::string& key,
+                                 const std::string& value, const std::string& what) {
+    try {
+      RunDepth("{one: {type: fixed_lag" + options + "}}", {{key, value}});
+      ADD_FAILURE() << "took " << key << ": " << value;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::kBadConfig);
+      EXPECT_NE(std::string(error.what()).find(what), std::string::npos) << error.what();
+    }
+  };
+  const std::string window = ", window_s: 0.3";
+  expect_refused(window, "sensors.scale.roles.inverse_distance",
+                 "{block: template.inverse_distance, mode: hold}",
+                 "estimator type 'fixed_lag' does not support held roles: "
+                 "sensors.scale.roles.inverse_distance.mode");
+  expect_refused(window, "state.template.consider", "[inverse_distance]",
+                 "estimator type 'fixed_lag' does not support considered blocks");
+  expect_refused(window, "estimators.one.gate", "0.99", "estimator type 'fixed_lag' has no gate");
+  expect_refused("", "source.seed", "1", "window_s");
+  expect_refused(", window_s: 0", "source.seed", "1", "window_s");
+  expect_refused(window, "estimators.one.estimate", "eldest", "oldest");
+}
+
+}  // namespace
+}  // namespace alidade

@@ -18,8 +18,8 @@ constexpr const char* kFooter = R"(Examples:
   alidade bundle bundle.out --fix intrinsics -o runs/bundler
   alidade bundle data/tracks.csv --camera data/calibration.yaml --start run/trajectory.tum -o runs/a
 
-Reads problems of BAL, Bundler v0.3 and libmv, told apart by their beginning, and tracks as `simulate`
-writes them. Ctrl-C ends after the iteration and keeps what is reached (exit code 75).)";
+Reads problems of BAL, Bundler v0.3 and libmv, told apart by their beginning, and tracks as
+`simulate` writes them. Ctrl-C ends after the iteration and keeps what is reached (exit code 75).)";
 
 struct Arguments {
   std::string problem, folder, loss;
@@ -72,6 +72,10 @@ std::string Describe(const BundleFile& file, int left_out) {
                      std::to_string(problem.observations.size()) + " observations";
   if (left_out > 0)
     text += "; " + std::to_string(left_out) + " left out, behind their camera at the start";
+  if (file.invalid > 0)
+    text += "; " + std::to_string(file.invalid) + " not valid, as outside the image";
+  if (file.points_left_out > 0)
+    text += "; " + std::to_string(file.points_left_out) + " points without parallax left out";
   return text + '\n';
 }
 

@@ -8,6 +8,7 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <map>
 #include <memory>
 
 #include "alidade/build_plugin.h"
@@ -47,7 +48,6 @@ class Bundle {
       own_lens_ = !all_fixed() && NoneIsShared();
     }
     CopyValues();
-    MakeKind();
     for (const BundleObservation& seen : from.observations) {
       if (seen.used) Add(seen);
     }
@@ -81,10 +81,11 @@ class Bundle {
     }
     for (const auto& one : from_.intrinsics) lenses_.insert(lenses_.end(), one.begin(), one.end());
     for (const auto& one : from_.points) points_.insert(points_.end(), one.begin(), one.end());
-    const auto m = static_cast<std::size_t>(sensor_.measurement().geometry.tangent);
-    sqrt_information_.reserve(from_.observations.size() * m * m);
   }
-  void MakeKind() {
+  /// The kind of cost with W = L^-1, made when it is first asked for.
+  const CostKind<SensorModel>& KindOf(const std::vector<double>& w) {
+    auto& kind = kinds_[w];
+    if (kind != nullptr) return *kind;
     std::vector<RolePlace> places(sensor_.roles().size());
     places[roles_.position] = {0, 0};
     places[roles_.orientation] = {0, 3};
@@ -95,20 +96,19 @@ class Bundle {
           own_lens_ ? RolePlace{0, kPose} : RolePlace{2, 0};
     }
     if (separate_lens()) sizes.push_back(lens_.ambient);
-    kind_ = std::make_unique<CostKind<SensorModel>>(sensor_, places, sizes);
+    kind = std::make_unique<CostKind<SensorModel>>(sensor_, places, sizes, w);
+    return *kind;
   }
   void Add(const BundleObservation& seen) {
     const int m = sensor_.measurement().geometry.tangent;
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, 4, 4> l(m, m);
+    RowMajor l(m, m);
     const Status status =
         sensor_.SqrtNoise(RoleValues(roles_, from_, seen).data(), seen.z.data(), l.data());
     if (status != Status::kOk) return;
-    const std::size_t at = sqrt_information_.size();
-    sqrt_information_.resize(at + static_cast<std::size_t>(m * m));
-    Eigen::Map<RowMajor>(sqrt_information_.data() + at, m, m) =
+    std::vector<double> w(static_cast<std::size_t>(m * m));
+    Eigen::Map<RowMajor>(w.data(), m, m) =
         l.triangularView<Eigen::Lower>().solve(RowMajor::Identity(m, m));
-    auto* const cost =
-        new SensorCost<SensorModel>(*kind_, seen.z.data(), sqrt_information_.data() + at);
+    auto* const cost = new SensorCost<SensorModel>(KindOf(w), seen.z.data());
     const bool robust = options_.loss.kind != LossKind::kNone;
     std::vector<double*> blocks = {camera(seen.camera), point(seen.point)};
     if (separate_lens())
@@ -154,8 +154,8 @@ class Bundle {
   Geometry lens_;
   std::vector<bool> fixed_;  ///< elements of the intrinsics
   bool own_lens_ = false;    ///< in the block of the camera
-  std::vector<double> cameras_, lenses_, points_, sqrt_information_;
-  std::unique_ptr<CostKind<SensorModel>> kind_;
+  std::vector<double> cameras_, lenses_, points_;
+  std::map<std::vector<double>, std::unique_ptr<CostKind<SensorModel>>> kinds_;  ///< by W
   ceres::Problem problem_;
 };
 

@@ -14,7 +14,7 @@ namespace alidade::ceres_batch {
 /// Values side by side in one parameter block, each moved as its geometry says or held as it is.
 ///
 ///   x (+) d           of each part by Geometry::Plus
-///   d(x (+) d)/dd  := [I; 0] of each part, tangent columns into the first rows; of a held part none
+///   d(x (+) d)/dd  := [I; 0] of each part, its tangent into the first rows; of a held part none
 ///
 /// That is not the derivative by the ambient values, which no model of alidade gives, but its
 /// counterpart: a cost writes [J | 0], J in the tangent, and Ceres forms [J | 0] [I; 0] = J. Only

@@ -39,8 +39,9 @@ struct SensorTraits {
     alidade::detail::ForEach(add, typename Roles::Indices{});
     return all;
   }
-  static Status Linearise(const Sensor& sensor, const double* const* roles, double* z,
-                          double* const* jacobians, const int* strides) {
+  __attribute__((flatten)) static Status Linearise(const Sensor& sensor, const double* const* roles,
+                                                   double* z, double* const* jacobians,
+                                                   const int* strides) {
     return Evaluate(sensor, roles, z, jacobians, strides);
   }
 };
@@ -82,33 +83,40 @@ void Difference(const double* z, const double* h, double* d, double* j) {
 
 }  // namespace detail
 
-/// A sensor with the places of its roles in the parameter blocks of its costs: one for all costs of
-/// a kind.
+/// What costs of a kind share: the sensor, the places of its roles in the parameter blocks, and the
+/// noise, by W = L^-1, R = L L'.
 template <class Sensor>
 struct CostKind {
-  /// `blocks` are the ambient sizes of the parameter blocks. No two roles may share a place; the
-  /// sensor must outlive this.
-  CostKind(const Sensor& model, const std::vector<RolePlace>& roles, const std::vector<int>& blocks)
-      : sensor(model), places(roles), sizes(blocks) {
+  /// `blocks` are the ambient sizes of the parameter blocks. `whiten` = W is lower triangular,
+  /// row-major, of the size of the tangent of z. No two roles may share a place; the sensor must
+  /// outlive this.
+  CostKind(const Sensor& model, const std::vector<RolePlace>& roles, const std::vector<int>& blocks,
+           const std::vector<double>& whiten)
+      : sensor(model), places(roles), sizes(blocks), w(whiten) {
     const std::vector<Geometry> geometries = detail::SensorTraits<Sensor>::Geometries(model);
-    ALIDADE_EXPECTS(roles.size() == geometries.size());
+    const auto m = static_cast<std::size_t>(detail::SensorTraits<Sensor>::Rows(model));
+    ALIDADE_EXPECTS(roles.size() == geometries.size() && w.size() == m * m);
     std::vector<int> written(blocks.size());
     for (std::size_t i = 0; i < roles.size(); ++i) {
-      tangents.push_back(geometries[i].tangent);
       if (roles[i].block < 0) continue;
       const auto block = static_cast<std::size_t>(roles[i].block);
       ALIDADE_EXPECTS(block < blocks.size() && roles[i].offset >= 0 &&
                       roles[i].offset + geometries[i].ambient <= blocks[block]);
       written[block] += geometries[i].tangent;
     }
-    for (std::size_t i = 0; i < blocks.size(); ++i) gaps.push_back(written[i] < blocks[i]);
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      if (written[i] < blocks[i]) with_gaps.push_back(i);
+    }
+    for (std::size_t i = 0; i < w.size(); ++i)
+      isotropic = isotropic && w[i] == (i % (m + 1) == 0 ? w[0] : 0.0);
   }
 
   const Sensor& sensor;
   std::vector<RolePlace> places;
-  std::vector<int> tangents;  ///< of the roles
-  std::vector<int> sizes;     ///< of the blocks
-  std::vector<bool> gaps;     ///< columns of a block that no role writes
+  std::vector<int> sizes;              ///< of the blocks
+  std::vector<std::size_t> with_gaps;  ///< blocks with columns that no role writes
+  std::vector<double> w;
+  bool isotropic = true;  ///< W is a multiple of the identity
 };
 
 /// The factor of a measurement, made of the sensor's own h:
@@ -117,109 +125,114 @@ struct CostKind {
 ///
 /// Jacobians are in the tangent of each role, [J | 0] in its ambient columns: see GeometryManifold.
 /// `Sensor` is a SensorModel or a model itself. Evaluate is false where h is not defined, and
-/// allocates nothing.
+/// allocates nothing. In a large problem each cost is far memory: it is as small as may be.
 template <class Sensor>
 class SensorCost final : public ceres::CostFunction {
   using Traits = detail::SensorTraits<Sensor>;
 
  public:
-  /// `z` is ambient; W is lower triangular, row-major, of the size of the tangent of z. All must
-  /// outlive the cost; costs may share all but z.
-  SensorCost(const CostKind<Sensor>& kind, const double* z, const double* w)
-      : kind_(kind), z_(z), w_(w) {
-    const int m = Traits::Rows(kind.sensor);
-    set_num_residuals(m);
+  /// `z`, ambient, and the kind must outlive the cost.
+  SensorCost(const CostKind<Sensor>& kind, const double* z) : kind_(kind), z_(z) {
+    set_num_residuals(Traits::Rows(kind.sensor));
     for (const int size : kind.sizes) mutable_parameter_block_sizes()->push_back(size);
-    for (int i = 0; i < m; ++i) {
-      for (int k = 0; k < i; ++k) diagonal_ = diagonal_ && w[i * m + k] == 0.0;
-    }
   }
 
   bool Evaluate(const double* const* blocks, double* residuals, double** jacobians) const override {
-    const int count = Traits::RoleCount(kind_.sensor);
+    __builtin_prefetch(z_);  // it is far away, and not needed until h is there
     const double* roles[Traits::kMaxRoles];
     double* j[Traits::kMaxRoles];
     int strides[Traits::kMaxRoles];
-    if (jacobians != nullptr) ClearGaps(jacobians);
-    for (int i = 0; i < count; ++i) {
-      const auto [block, offset] = kind_.places[static_cast<std::size_t>(i)];
-      roles[i] = block < 0 ? nullptr : blocks[block] + offset;
-      const bool wanted = jacobians != nullptr && block >= 0 && jacobians[block] != nullptr;
-      j[i] = wanted ? jacobians[block] + offset : nullptr;
-      strides[i] = wanted ? kind_.sizes[static_cast<std::size_t>(block)] : 0;
-    }
+    Bind(blocks, jacobians, roles, j, strides);
     double** const wanted = jacobians == nullptr ? nullptr : j;
     const GeometryKind geometry = Traits::Kind(kind_.sensor);
     if (geometry == GeometryKind::kUnitQuaternion)
-      return Curved<UnitQuaternion>(roles, residuals, wanted, strides);
+      return Curved<UnitQuaternion>(roles, wanted, strides, residuals, jacobians);
     if (geometry == GeometryKind::kUnitVector)
-      return Curved<UnitVector>(roles, residuals, wanted, strides);
+      return Curved<UnitVector>(roles, wanted, strides, residuals, jacobians);
     if (Traits::Linearise(kind_.sensor, roles, residuals, wanted, strides) != Status::kOk)
       return false;
     const int m = Traits::Rows(kind_.sensor);
     for (int i = 0; i < m; ++i) residuals[i] = z_[i] - residuals[i];
     if (geometry == GeometryKind::kAngle) residuals[0] = Angle::Wrap(residuals[0]);
-    Whiten(residuals, 1, 1, 1.0);
-    if (wanted != nullptr) WhitenAll(j, strides, -1.0);
+    Whiten(residuals, 1, 1.0);
+    WhitenAll(jacobians, -1.0);
     return true;
   }
 
  private:
-  /// Where z is on a manifold G of 2 or 3 dimensions.
+  /// Where the roles are, and where the Jacobian by each goes.
+  void Bind(const double* const* blocks, double** jacobians, const double** roles, double** j,
+            int* strides) const {
+    const RolePlace* const places = kind_.places.data();
+    const int* const sizes = kind_.sizes.data();
+    for (int i = 0; i < Traits::RoleCount(kind_.sensor); ++i) {
+      const auto [block, offset] = places[i];
+      roles[i] = block < 0 ? nullptr : blocks[block] + offset;
+      if (jacobians == nullptr) continue;
+      const bool wanted = block >= 0 && jacobians[block] != nullptr;
+      j[i] = wanted ? jacobians[block] + offset : nullptr;
+      strides[i] = wanted ? sizes[block] : 0;
+    }
+    if (jacobians == nullptr) return;
+    for (const std::size_t i : kind_.with_gaps) {
+      if (jacobians[i] != nullptr)
+        std::fill_n(jacobians[i], Traits::Rows(kind_.sensor) * sizes[i], 0.0);
+    }
+  }
+
+  /// Where z is on a manifold G, of 2 or 3 dimensions.
   template <class G>
-  bool Curved(const double* const* roles, double* residuals, double* const* j,
-              const int* strides) const {
-    double h[G::kAmbient], slope[G::kTangent * G::kTangent];
+  bool Curved(const double* const* roles, double* const* j, const int* strides, double* residuals,
+              double** jacobians) const {
+    constexpr int m = G::kTangent;
+    double h[G::kAmbient], slope[m * m];
     if (Traits::Linearise(kind_.sensor, roles, h, j, strides) != Status::kOk) return false;
     detail::Difference<G>(z_, h, residuals, j == nullptr ? nullptr : slope);
-    Whiten(residuals, 1, 1, 1.0);
-    if (j == nullptr) return true;
-    for (int i = 0; i < Traits::RoleCount(kind_.sensor); ++i) {
-      for (int c = 0; j[i] != nullptr && c < kind_.tangents[static_cast<std::size_t>(i)]; ++c) {
-        double before[G::kTangent];
-        for (int r = 0; r < G::kTangent; ++r) before[r] = j[i][r * strides[i] + c];
-        for (int r = 0; r < G::kTangent; ++r) {
+    Whiten(residuals, 1, 1.0);
+    for (std::size_t i = 0; jacobians != nullptr && i < kind_.sizes.size(); ++i) {
+      for (int c = 0; jacobians[i] != nullptr && c < kind_.sizes[i]; ++c) {
+        double before[m];
+        for (int r = 0; r < m; ++r) before[r] = jacobians[i][r * kind_.sizes[i] + c];
+        for (int r = 0; r < m; ++r) {
           double sum = 0.0;
-          for (int k = 0; k < G::kTangent; ++k) sum += slope[r * G::kTangent + k] * before[k];
-          j[i][r * strides[i] + c] = sum;
+          for (int k = 0; k < m; ++k) sum += slope[r * m + k] * before[k];
+          jacobians[i][r * kind_.sizes[i] + c] = sum;
         }
       }
     }
-    WhitenAll(j, strides, 1.0);
+    WhitenAll(jacobians, 1.0);
     return true;
   }
 
-  void WhitenAll(double* const* j, const int* strides, double sign) const {
-    for (int i = 0; i < Traits::RoleCount(kind_.sensor); ++i) {
-      if (j[i] != nullptr)
-        Whiten(j[i], kind_.tangents[static_cast<std::size_t>(i)], strides[i], sign);
-    }
-  }
-  /// a <- sign W a, in place: from the last row up, as W is lower triangular.
-  void Whiten(double* a, int columns, int stride, double sign) const {
-    const int m = Traits::Rows(kind_.sensor);
-    for (int r = m - 1; r >= 0; --r) {
-      double* const row = a + r * stride;
-      const double* const w = w_ + r * m;
-      for (int c = 0; c < columns; ++c) row[c] *= sign * w[r];
-      for (int k = 0; !diagonal_ && k < r; ++k) {
-        for (int c = 0; c < columns; ++c) row[c] += sign * w[k] * a[k * stride + c];
-      }
-    }
-  }
-  /// Zeros where no role writes.
-  void ClearGaps(double** jacobians) const {
-    const int m = Traits::Rows(kind_.sensor);
+  void WhitenAll(double** jacobians, double sign) const {
+    if (jacobians == nullptr) return;
+    const int* const sizes = kind_.sizes.data();
     for (std::size_t i = 0; i < kind_.sizes.size(); ++i) {
-      if (kind_.gaps[i] && jacobians[i] != nullptr)
-        std::fill_n(jacobians[i], m * kind_.sizes[i], 0.0);
+      if (jacobians[i] != nullptr) Whiten(jacobians[i], sizes[i], sign);
+    }
+  }
+  /// a <- sign W a, in place: from the last row up, as W is lower triangular. Not inlined: what the
+  /// sensor has just written would be read as vectors, which waits for the stores.
+  __attribute__((noinline)) void Whiten(double* a, int columns, double sign) const {
+    const int m = Traits::Rows(kind_.sensor);
+    if (kind_.isotropic) {
+      const double factor = sign * kind_.w[0];
+      for (int i = 0; i < m * columns; ++i) a[i] *= factor;
+      return;
+    }
+    for (int r = m - 1; r >= 0; --r) {
+      double* const row = a + r * columns;
+      const double* const w = kind_.w.data() + r * m;
+      for (int c = 0; c < columns; ++c) {
+        double sum = w[r] * row[c];
+        for (int k = 0; k < r; ++k) sum += w[k] * a[k * columns + c];
+        row[c] = sign * sum;
+      }
     }
   }
 
   const CostKind<Sensor>& kind_;
   const double* z_;
-  const double* w_;
-  bool diagonal_ = true;
 };
 
 }  // namespace alidade::ceres_batch

@@ -111,11 +111,12 @@ GeometryManifold Of(const Geometry& geometry) { return GeometryManifold({{geomet
 TEST(SensorCost, IsTheWhitenedResidualOfTheSensor) {
   const StereoDisparity model(200.0, 0.1, 2.0);
   const SensorModel sealed = InProcessSensor(model, "stereo_disparity");
-  const double z = 13.0, w = 0.5;
-  const CostKind<StereoDisparity> direct(model, {{0, 0}}, {1});
-  const CostKind<SensorModel> behind(sealed, {{0, 0}}, {1});
-  const SensorCost<StereoDisparity> a(direct, &z, &w);
-  const SensorCost<SensorModel> b(behind, &z, &w);
+  const double z = 13.0;
+  const std::vector<double> w{0.5};
+  const CostKind<StereoDisparity> direct(model, {{0, 0}}, {1}, w);
+  const CostKind<SensorModel> behind(sealed, {{0, 0}}, {1}, w);
+  const SensorCost<StereoDisparity> a(direct, &z);
+  const SensorCost<SensorModel> b(behind, &z);
   for (const ceres::CostFunction* cost :
        {static_cast<const ceres::CostFunction*>(&a), static_cast<const ceres::CostFunction*>(&b)}) {
     const Evaluated at = At(*cost, {{2.0}});
@@ -133,11 +134,12 @@ TEST(SensorCost, PutsRolesIntoTheirPlacesInTheBlocks) {
   const SensorModel sealed = InProcessSensor(model, "self_calibrating_feature");
   const std::vector<RolePlace> places{{1, 3}, {1, 6}, {1, 0}, {0, 0}};
   const std::vector<int> sizes{3, 10};
-  const double z[2] = {3.0, -4.0}, w[4] = {2.0, 0.0, 0.7, 0.5};
-  const CostKind<SelfCalibratingFeature<RadialLens>> direct(model, places, sizes);
-  const CostKind<SensorModel> behind(sealed, places, sizes);
-  const SensorCost a(direct, z, w);
-  const SensorCost b(behind, z, w);
+  const double z[2] = {3.0, -4.0};
+  const std::vector<double> w{2.0, 0.0, 0.7, 0.5};
+  const CostKind<SelfCalibratingFeature<RadialLens>> direct(model, places, sizes, w);
+  const CostKind<SensorModel> behind(sealed, places, sizes, w);
+  const SensorCost a(direct, z);
+  const SensorCost b(behind, z);
   const Values values{{-2.6, 1.1, 3.5}, {5.0, -0.3, 0.2, 0.4, -1.1, 0.3, 0.8, 0.2, -0.4, 0.4}};
   const std::vector<GeometryManifold> manifolds = {
       Of(Geometry::Vector(3)), GeometryManifold({{Geometry::Vector(3), false},
@@ -158,9 +160,10 @@ TEST(SensorCost, PutsRolesIntoTheirPlacesInTheBlocks) {
 TEST(SensorCost, LeavesOutWhatIsConstant) {
   const SensorModel sensor =
       InProcessSensor(SelfCalibratingFeature<RadialLens>(1.0), "self_calibrating_feature");
-  const CostKind<SensorModel> kind(sensor, {{0, 0}, {0, 3}, {2, 0}, {1, 0}}, {7, 3, 3});
-  const double z[2] = {3.0, -4.0}, w[4] = {1.0, 0.0, 0.0, 1.0};
-  const SensorCost cost(kind, z, w);
+  const CostKind<SensorModel> kind(sensor, {{0, 0}, {0, 3}, {2, 0}, {1, 0}}, {7, 3, 3},
+                                   {1.0, 0.0, 0.0, 1.0});
+  const double z[2] = {3.0, -4.0};
+  const SensorCost cost(kind, z);
   const Values values{{0.4, -1.1, 0.3, 0.8, 0.2, -0.4, 0.4}, {-2.6, 1.1, 3.5}, {5.0, -0.3, 0.2}};
   const Evaluated all = At(cost, values);
   std::vector<double> r(2), j(6, 1e302);
@@ -173,39 +176,39 @@ TEST(SensorCost, LeavesOutWhatIsConstant) {
 }
 
 TEST(SensorCost, TakesMeasurementsOnManifolds) {
-  const double l3[9] = {2, 0, 0, 0.3, 1, 0, -0.2, 0.4, 0.5}, l2[4] = {2, 0, 0.3, 1};
-  const double q[4] = {0.8, 0.2, -0.4, 0.4}, m[3] = {0.6, 0.0, 0.8}, angle = 3.0, one = 2.0;
+  const std::vector<double> w3{2, 0, 0, 0.3, 1, 0, -0.2, 0.4, 0.5}, w2{2, 0, 0.3, 1};
+  const double q[4] = {0.8, 0.2, -0.4, 0.4}, m[3] = {0.6, 0.0, 0.8}, angle = 3.0;
   const SensorModel turn = InProcessSensor(Seen<UnitQuaternion>(), "seen");
-  const CostKind<SensorModel> turns(turn, {{0, 0}}, {4});
-  ExpectTrueJacobians(SensorCost(turns, q, l3), {{0.6, 0.0, 0.8, 0.0}},
+  const CostKind<SensorModel> turns(turn, {{0, 0}}, {4}, w3);
+  ExpectTrueJacobians(SensorCost(turns, q), {{0.6, 0.0, 0.8, 0.0}},
                       {Of(Geometry::UnitQuaternion())}, 1e-7);
   const Seen<UnitVector> ray;
-  const CostKind<Seen<UnitVector>> rays(ray, {{0, 0}}, {3});
-  ExpectTrueJacobians(SensorCost(rays, m, l2), {{0.0, 0.28, 0.96}}, {Of(Geometry::UnitVector())},
-                      1e-7);
+  const CostKind<Seen<UnitVector>> rays(ray, {{0, 0}}, {3}, w2);
+  ExpectTrueJacobians(SensorCost(rays, m), {{0.0, 0.28, 0.96}}, {Of(Geometry::UnitVector())}, 1e-7);
   const SensorModel heading = InProcessSensor(Seen<Angle>(), "seen");
-  const CostKind<SensorModel> headings(heading, {{0, 0}}, {1});
-  const SensorCost wraps(headings, &angle, &one);
+  const CostKind<SensorModel> headings(heading, {{0, 0}}, {1}, {2.0});
+  const SensorCost wraps(headings, &angle);
   EXPECT_NEAR(ResidualAt(wraps, {{-3.0}})[0], 2.0 * (6.0 - 2.0 * M_PI), 1e-12);
   ExpectTrueJacobians(wraps, {{-3.0}}, {Of(Geometry::Angle())}, 1e-7);
 }
 
 TEST(SensorCost, MayLackAnOptionalRole) {
   const SensorModel sensor = InProcessSensor(Biased(), "biased");
-  const double z = 5.0, w = 1.0;
-  const CostKind<SensorModel> with(sensor, {{0, 0}, {1, 0}}, {1, 1}),
-      without(sensor, {{0, 0}, {}}, {1});
-  EXPECT_EQ(ResidualAt(SensorCost(with, &z, &w), {{1.0}, {0.5}})[0], 3.5);
-  EXPECT_EQ(ResidualAt(SensorCost(without, &z, &w), {{1.0}})[0], 4.0);
-  EXPECT_EQ(At(SensorCost(without, &z, &w), {{1.0}}).j[0][0], -1.0);
+  const double z = 5.0;
+  const CostKind<SensorModel> with(sensor, {{0, 0}, {1, 0}}, {1, 1}, {1.0}),
+      without(sensor, {{0, 0}, {}}, {1}, {1.0});
+  EXPECT_EQ(ResidualAt(SensorCost(with, &z), {{1.0}, {0.5}})[0], 3.5);
+  EXPECT_EQ(ResidualAt(SensorCost(without, &z), {{1.0}})[0], 4.0);
+  EXPECT_EQ(At(SensorCost(without, &z), {{1.0}}).j[0][0], -1.0);
 }
 
 TEST(SensorCost, RefusesPlacesOutsideItsBlocks) {
   const StereoDisparity model(200.0, 0.1, 2.0);
   using Kind = CostKind<StereoDisparity>;
-  EXPECT_THROW(Kind(model, {{0, 1}}, {1}), ContractViolation);
-  EXPECT_THROW(Kind(model, {{1, 0}}, {1}), ContractViolation);
-  EXPECT_THROW(Kind(model, {}, {1}), ContractViolation);
+  EXPECT_THROW(Kind(model, {{0, 1}}, {1}, {1.0}), ContractViolation);
+  EXPECT_THROW(Kind(model, {{1, 0}}, {1}, {1.0}), ContractViolation);
+  EXPECT_THROW(Kind(model, {}, {1}, {1.0}), ContractViolation);
+  EXPECT_THROW(Kind(model, {{0, 0}}, {1}, {1.0, 0.0}), ContractViolation);
 }
 
 TEST(GeometryManifold, MovesPartsByTheirGeometryAndHoldsOthers) {

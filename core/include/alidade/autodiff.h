@@ -18,6 +18,25 @@ namespace detail {
 /// No block.
 constexpr bool None(int) { return false; }
 
+/// x (+) d at d = 0 as dual numbers, d being the seeds from `seed` on.
+template <class G, class Jet>
+void LiftOne(const double* x, int seed, Jet* lifted) {
+  if constexpr (G::kGeometry == ALIDADE_VECTOR) {
+    for (int k = 0; k < G::kTangent; ++k) lifted[k] = Jet(x[k], seed + k);
+  } else if constexpr (G::kGeometry == ALIDADE_UNIT_QUATERNION) {  // x Exp(d) = x (1, d/2)
+    const double w = 0.5 * x[0], i = 0.5 * x[1], j = 0.5 * x[2], k = 0.5 * x[3];
+    const double slope[4][3] = {{-i, -j, -k}, {w, -k, j}, {k, w, -i}, {-j, i, w}};
+    for (int r = 0; r < 4; ++r) {
+      lifted[r] = Jet(x[r]);
+      for (int c = 0; c < 3; ++c) lifted[r].v[seed + c] = slope[r][c];
+    }
+  } else {
+    Jet d[G::kTangent];
+    for (int k = 0; k < G::kTangent; ++k) d[k] = Jet(0.0, seed + k);
+    G::Plus(x, d, lifted);
+  }
+}
+
 /// All blocks x (+) 0 as dual numbers, seeded in order; those that kSkip names get neither value
 /// nor seed.
 template <class Model, bool (*kSkip)(int) = None, class Jet>
@@ -28,9 +47,7 @@ void Lift(const double* const* x, Jet* lifted, const Jet** pointers) {
     using G = SpaceAt<i, Model>;
     pointers[i] = nullptr;
     if (!kSkip(i) && x[i] != nullptr) {
-      Jet d[G::kTangent];
-      for (int k = 0; k < G::kTangent; ++k) d[k] = Jet(0.0, seed + k);
-      G::Plus(x[i], d, lifted + offset);
+      LiftOne<G>(x[i], seed, lifted + offset);
       pointers[i] = lifted + offset;
     }
     if (!kSkip(i)) seed += G::kTangent;
@@ -42,6 +59,12 @@ void Lift(const double* const* x, Jet* lifted, const Jet** pointers) {
 /// d value / d seeds [first, first + count), in the tangent of G at the value itself.
 template <class G, class Jet>
 void ReadTangent(const Jet* value, int first, int count, MatrixRef j) {
+  if constexpr (G::kGeometry == ALIDADE_VECTOR) {
+    for (int r = 0; r < G::kTangent; ++r) {
+      for (int c = 0; c < count; ++c) j(r, c) = value[r].v[first + c];
+    }
+    return;
+  }
   double base[G::kAmbient];
   for (int i = 0; i < G::kAmbient; ++i) base[i] = value[i].a;
   Jet d[G::kTangent];

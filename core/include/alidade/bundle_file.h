@@ -42,6 +42,7 @@ struct BundleFile {
   std::vector<std::int64_t> point_ids;   ///< libmv, tracks: track, feature; else empty
   std::vector<Stamp> stamps;             ///< tracks: of the cameras; else empty
   int points_left_out = 0;               ///< tracks: without a place that their rays agree on
+  int invalid = 0;  ///< tracks: observations that the sensor finds invalid, left out
 };
 
 /// Reads a problem in the format that the file's beginning shows: bal, bundler or libmv; `-` is
@@ -56,7 +57,8 @@ struct BundleTracks {
 };
 
 /// Reads tracks of one camera (dim 0, 1) or of a rectified pair (0 to 3). Frames have the stamps of
-/// `timestamps.csv` beside the tracks; where it is not there, the k-th pose is that of frame k.
+/// `timestamps.csv` beside the tracks, and a pose to 1 us; where it is not there, the k-th pose is
+/// that of frame k. Frames without a pose are left out.
 /// Points are placed by triangulation from the start, by the inverse observations of the sensor
 /// that `host` gives; those that it cannot place are left out. Errors: kInputMissing, kBadData,
 /// kBadConfig, kPlugin.

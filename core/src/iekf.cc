@@ -145,7 +145,7 @@ bool Iekf::Innovations(std::span<Row* const> rows, Workspace::Vector& innovation
   Eigen::Index at = 0;
   for (Row* row : rows) {
     MeasurementReport& entry = EntryOf(*row);
-    const SensorModel& model = BindingOf(*row).model;
+    const SensorModel& model = ModelOf(*row);
     if (model.Predict(PlanOf(*row).roles.data(), entry.h.data()) != Status::kOk) return false;
     model.measurement().geometry.Minus(entry.z.data(), entry.h.data(), innovations.data() + at);
     at += entry.dof;
@@ -157,24 +157,24 @@ bool Iekf::Innovations(std::span<Row* const> rows, Workspace::Vector& innovation
 bool Iekf::Relinearise(std::span<Row* const> rows, const double* dx) {
   for (Row* row : rows) {
     MeasurementReport& entry = EntryOf(*row);
-    const SensorBinding& binding = BindingOf(*row);
+    const SensorModel& model = ModelOf(*row);
     const SensorPlan& plan = PlanOf(*row);
     if (Evaluate(*row, entry) != Outcome::kAccepted ||
         NoiseOf(*row, plan.roles.data()) != Outcome::kAccepted) {
       return false;
     }
     for (double& r : row->r) r /= row->weight;
-    binding.model.measurement().geometry.Minus(entry.z.data(), entry.h.data(),
-                                               entry.innovation.data());
-    for (std::size_t i = 0; i < binding.roles.size(); ++i) {
+    model.measurement().geometry.Minus(entry.z.data(), entry.h.data(), entry.innovation.data());
+    std::size_t part = 0;
+    for (std::size_t i = 0; i < plan.roles.size(); ++i) {
       if (plan.columns[i] < 0) continue;
-      const Block& block = state_.layout()[binding.roles[i].block];
-      const Geometry& geometry = block.geometry();
+      const int offset = plan.parts[part++].offset;
+      const Geometry& geometry = model.roles()[i].geometry;
       if (geometry.kind == GeometryKind::kVector) continue;
+      const double* const prior = prior_.data() + (plan.roles[i] - state_.values().data());
       const Workspace::Use use(work_);
       Workspace::Vector j = work_.Take(geometry.tangent * geometry.tangent);
-      geometry.PlusJacobian(prior_.data() + block.value_offset, dx + block.tangent_offset,
-                            j.data());
+      geometry.PlusJacobian(prior, dx + offset, j.data());
       Chain(*row, plan.columns[i], geometry.tangent, j.data());
     }
     Project(*row);

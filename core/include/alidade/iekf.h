@@ -39,8 +39,9 @@ struct IekfOptions : EkfOptions {
 /// it is that of the Ekf.
 class Iekf : public Ekf {
  public:
-  /// No considered blocks and roles, no role linearised at the measurement, no landmarks.
-  static constexpr Support kSupport = {.from_measurement = true, .recovery = true};
+  /// No considered blocks and roles, no role linearised at the measurement.
+  static constexpr Support kSupport = {
+      .from_measurement = true, .recovery = true, .landmarks = true};
 
   /// ContractViolation where `system` asks for more than kSupport, `jacobian` is not kLatest, or an
   /// option is out of its range.

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What docs/is_batch_the_truth.md says of the batch as a reference, on examples/10_slam_scene.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "alidade/sweep.h"
+
+namespace alidade {
+namespace {
+
+using Settings = std::vector<std::pair<std::string, std::string>>;
+
+const std::pair<std::string, std::string> kWrongPrior = {"landmarks.prior",
+                                                         "{inverse_distance: 0.49, sigma: 0.11}"};
+const Settings kNoKnownDepth = {{"estimators.ekf.sensors", "[pixels]"},
+                                {"estimators.batch.sensors", "[pixels]"}};
+
+/// Means of the filter and the batch over seeds 1001 and 1002.
+struct Means {
+  SweepSummary ekf, batch;
+
+  Means(const char* name, const Settings& settings) {
+    Config config = Config::FromFile(std::filesystem::path(ALIDADE_SOURCE_DIR) /
+                                     "examples/10_slam_scene" / name);
+    for (const auto& [key, value] : settings) config.Set(key, value, "--set");
+    const PluginHost host(PluginPaths(config));
+    SweepOptions options;
+    options.runs = 2;
+    options.first_seed = 1001;
+    for (SweepSummary& summary : Summarise(Sweep(config, host, options))) {
+      (summary.name == "batch" ? batch : ekf) = std::move(summary);
+    }
+    EXPECT_EQ(batch.used, 2);
+  }
+};
+
+double Of(const SweepSummary& one, const char* metric) { return one.metrics.at(metric).mean; }
+
+bool HasCeres() {
+#ifdef ALIDADE_WITHOUT_CERES
+  return false;
+#else
+  return true;
+#endif
+}
+
+// Where depth is known, the batch is right: scale 1, and a covariance that holds its errors. The
+// whole path is smoothed, so it compares with no filter's; the last frame does.
+TEST(BatchReference, IsRightWhereScaleIsAnchored) {
+  if (!HasCeres()) GTEST_SKIP() << "built without the Ceres solver";
+  const Means means("batch.yaml", {});
+  EXPECT_NEAR(Of(means.batch, "map.sim3.scale"), 1.0, 0.005);
+  EXPECT_NEAR(Of(means.batch, "nees.mean:cam"), 1.0, 0.5);
+  EXPECT_NEAR(Of(means.ekf, "map.sim3.rmse") / Of(means.batch, "map.sim3.rmse"), 1.0, 0.1);
+  const double path = Of(means.ekf, "rmse:cam.position") / Of(means.batch, "rmse:cam.position");
+  const double last = Of(means.ekf, "final:cam.position") / Of(means.batch, "final:cam.position");
+  EXPECT_GE(path, 1.3);
+  EXPECT_LE(last, 1.25);
+}
+
+// 40 priors whose mean is 1 / 0.8 of the truth, and nothing else that tells scale: the batch is
+// farther off than the filter, and but for NEES all looks well.
+TEST(BatchReference, IsWrongWhereScaleIsVotedByPriors) {
+  if (!HasCeres()) GTEST_SKIP() << "built without the Ceres solver";
+  Settings settings = kNoKnownDepth;
+  settings.push_back(kWrongPrior);
+  const Means means("batch.yaml", settings);
+  EXPECT_NEAR(Of(means.batch, "map.sim3.scale"), 1.0 / 0.8, 0.08);
+  EXPECT_GE(Of(means.batch, "nees.mean:cam"), 4.0);
+  EXPECT_GE(Of(means.ekf, "nees.mean:cam"), 3.0);
+  EXPECT_NEAR(Of(means.ekf, "nis.mean:pixels"), 1.0, 0.05);
+  EXPECT_LE(Of(means.batch, "map.sim3.rmse"), 0.0075);
+  EXPECT_GE(Of(means.batch, "map.rmse"), 0.2);
+}
+
+}  // namespace
+}  // namespace alidade

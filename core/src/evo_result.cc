@@ -41,7 +41,7 @@ struct ZipEntry {
   std::string name, content;
 };
 
-/// The entries as a zip, in a fixed order and without a time, so that equal results are equal bytes.
+/// The entries as a zip, in their order and without a time: equal results are equal bytes.
 std::string Zip(const std::vector<ZipEntry>& entries) {
   constexpr std::size_t kOverhead = 1024;  // of an entry, more than its two headers take
   std::size_t room = kOverhead;

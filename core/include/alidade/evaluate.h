@@ -122,7 +122,7 @@ struct InnovationStatistics {
   double whiteness = 0.0;
   double whiteness_bound = 0.0;  ///< 1.96 / sqrt(products): that of a white one lies within in 95 %
 };
-/// Of the sensors of a run folder's `NAME/innovations.csv`, sorted. Errors: kBadData, kInputMissing.
+/// Of the sensors of a run's `NAME/innovations.csv`, sorted. Errors: kBadData, kInputMissing.
 std::vector<InnovationStatistics> ReadInnovations(const std::filesystem::path& file);
 
 /// How a trajectory is compared with a reference.

@@ -84,7 +84,7 @@ class NumberRows {
     return cell::ParseStamp(text(i), t_s, 9);
   }
 
-  /// x y z and a quaternion of unit length to 1e-3, of columns 1 to 7, `names` those of the columns.
+  /// x y z and a quaternion of unit length to 1e-3, of columns 1 to 7, named by `names`.
   std::array<double, 7> PoseNumbers(const std::array<const char*, 7>& names) const {
     std::array<double, 7> values{};
     double length2 = 0.0;

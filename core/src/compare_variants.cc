@@ -173,7 +173,13 @@ ExplainedExperiment ExplainExperiment(const Config& config, const PluginHost& ho
     const NamedEstimator& of = all[static_cast<std::size_t>(filter)];
     const bool there = std::ranges::any_of(
         all, [&](const NamedEstimator& one) { return IsThere(variant, one, of, filter); });
-    if (!there) AddVariant(variant, host, explained, left_out);
+    if (there) continue;
+    if (variant.so_far && of.system.landmarks) {
+      left_out["with landmarks a solve at every frame takes long; the config may have it"]
+          .emplace_back(variant.what);
+      continue;
+    }
+    AddVariant(variant, host, explained, left_out);
   }
   for (const auto& [reason, what] : left_out) {
     explained.notes.push_back("left out " + internal::Join(what, "; ") + ": " + reason);

@@ -71,7 +71,7 @@ class Trajectory {
   }
   std::size_t size() const { return epochs_.size(); }
   /// Makes the first frame, linearised at e, part of the prior, which is then that of the state at
-  /// that frame; e becomes the same trajectory in the inputs that are left. L_0 is a square root,
+  /// that frame; e becomes the same trajectory in the inputs that are left. L_0 is a square root:
   /// P_0 may stay singular. Q, R and the weights of losses are those at e. Not with landmarks.
   /// False where a model is not defined: nothing has changed.
   bool MarginaliseFirst(Eigen::VectorXd& e);

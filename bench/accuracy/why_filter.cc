@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Accuracy against cost, of a filter and of the batch, as [Strasdat2012] drew it: the same path with
+// fewer or more points, and with fewer or more of its frames used.
+//
+//   accuracy_why_filter examples/10_slam_scene/sweep_batch.yaml FOLDER [SEEDS]
+//
+// writes FOLDER/why_filter.csv and FOLDER/figures/why_filter.svg, over the seeds 1001, 1002, ...:
+//
+//   rmse      sqrt(mean |e|^2) of the position at the last frame
+//   bits      E = 1/2 log2(det C_0 / det C), C the covariance of the last pose, 6 x 6, C_0 that of
+//             the smallest filter: mean
+//   cpu       time of the whole path in units of the smallest filter's: median
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "alidade/run.h"
+#include "bench/speed/interleaved.h"
+#include "core/src/figure_script.h"
+#include "core/src/gnuplot.h"
+
+namespace {
+
+constexpr int kAllFrames = 150;      // of the path
+constexpr double kAllRateHz = 30.0;  // with all of them
+const std::vector<int> kFrames = {10, 19, 38, 75, kAllFrames};
+const std::vector<int> kPoints = {10, 20, 40, 80};
+const std::vector<std::string> kEstimators = {"ekf", "batch"};
+
+/// One run of one estimator.
+struct Outcome {
+  bool whole = false;  ///< neither failed nor diverged
+  double error_m = 0.0, log2_det = 0.0, cpu_ns = 0.0;
+};
+
+/// log2 det of the covariance of position and orientation.
+double Log2Det(const alidade::State& state) {
+  const alidade::StateLayout& layout = state.layout();
+  const int p = layout[layout.Find("cam.position")].tangent_offset;
+  const int q = layout[layout.Find("cam.orientation")].tangent_offset;
+  Eigen::MatrixXd c(6, 6);
+  c << state.covariance().Block(p, 3, p, 3), state.covariance().Block(p, 3, q, 3),
+      state.covariance().Block(q, 3, p, 3), state.covariance().Block(q, 3, q, 3);
+  return 2.0 * c.llt().matrixLLT().diagonal().array().log2().sum();
+}
+
+/// The path with so many points and frames. The noise of the motion is scaled so that a velocity is
+/// as uncertain after a second, however many steps that took.
+alidade::Config ConfigOf(const std::string& file, int points, int frames, int seed) {
+  alidade::Config config = alidade::Config::FromFile(file);
+  const auto set = [&](const char* key, double value) {
+    config.Set(key, std::to_string(value), "bench");
+  };
+  config.Set("source.seed", std::to_string(seed), "bench");
+  config.Set("source.points.count", std::to_string(points), "bench");
+  config.Set("source.frames", std::to_string(frames), "bench");
+  set("source.rate_hz", kAllRateHz * frames / kAllFrames);
+  for (const char* key : {"linear_acceleration", "angular_acceleration"}) {
+    const std::string path = std::string("state.cam.noise.") + key;
+    const double all = config.root().At("state").At("cam").At("noise").At(key).Number();
+    set(path.c_str(), all * std::sqrt(static_cast<double>(frames) / kAllFrames));
+  }
+  return config;
+}
+
+/// The estimator alone over frames that were made before, so that its own time is taken.
+Outcome RunOne(alidade::NamedEstimator& named, const std::vector<alidade::Frame>& frames,
+               std::size_t truth) {
+  Outcome outcome;
+  alidade::Estimator& estimator = *named.estimator;
+  const double start = alidade::bench::CpuNs();
+  for (const alidade::Frame& frame : frames) estimator.Process(frame);
+  const auto take = [&](const alidade::State& state) {
+    outcome.cpu_ns = alidade::bench::CpuNs() - start;
+    outcome.log2_det = Log2Det(state);
+    const double* const position = state.value(state.layout().Find("cam.position"));
+    const std::vector<double>& is = frames.back().truth[truth];
+    outcome.error_m = std::hypot(position[0] - is[0], position[1] - is[1], position[2] - is[2]);
+  };
+  if (estimator.offline()) {
+    estimator.Smooth([&](std::size_t k, const alidade::State& state, const auto&) {
+      if (k + 1 == frames.size()) take(state);
+    });
+  } else {
+    take(estimator.state());
+  }
+  outcome.whole = !estimator.failed() && !estimator.diverged() && std::isfinite(outcome.log2_det);
+  return outcome;
+}
+
+/// By estimator.
+std::map<std::string, Outcome> RunAll(const alidade::Config& config,
+                                      const alidade::PluginHost& host) {
+  alidade::Experiment experiment = alidade::BuildExperiment(config, host);
+  std::vector<alidade::Frame> frames;
+  for (alidade::Frame frame; experiment.source->Next(frame);) frames.push_back(frame);
+  const auto& truths = experiment.source->truths();
+  const auto at = std::ranges::find(truths, "cam.position", &alidade::StreamInfo::name);
+  std::map<std::string, Outcome> outcomes;
+  for (alidade::NamedEstimator& named : experiment.estimators) {
+    outcomes[named.name] = RunOne(named, frames, static_cast<std::size_t>(at - truths.begin()));
+  }
+  return outcomes;
+}
+
+/// One estimator with so many points and frames.
+struct Row {
+  std::string estimator;
+  int points = 0, frames = 0;
+  std::vector<Outcome> runs;
+
+  double Rmse() const {
+    double sum = 0.0;
+    for (const Outcome& run : runs) sum += run.error_m * run.error_m;
+    return std::sqrt(sum / static_cast<double>(runs.size()));
+  }
+  double MeanLog2Det() const {
+    double sum = 0.0;
+    for (const Outcome& run : runs) sum += run.log2_det;
+    return sum / static_cast<double>(runs.size());
+  }
+  double MedianCpu() const {
+    std::vector<double> ns;
+    for (const Outcome& run : runs) ns.push_back(run.cpu_ns);
+    std::ranges::sort(ns);
+    return ns[ns.size() / 2];
+  }
+};
+
+std::vector<Row> Measure(const std::string& config, int seeds) {
+  const alidade::PluginHost host(alidade::PluginPaths(alidade::Config::FromFile(config)));
+  std::vector<Row> rows;
+  for (const std::string& estimator : kEstimators) {
+    for (const int points : kPoints) {
+      for (const int frames : kFrames) rows.push_back({estimator, points, frames, {}});
+    }
+  }
+  for (int seed = 1001; seed < 1001 + seeds; ++seed) {
+    std::fprintf(stderr, "seed %d\n", seed);
+    for (Row& row : rows) {
+      if (row.estimator != kEstimators[0]) continue;
+      const auto outcomes = RunAll(ConfigOf(config, row.points, row.frames, seed), host);
+      for (Row& same : rows) {
+        if (same.points != row.points || same.frames != row.frames) continue;
+        const Outcome& outcome = outcomes.at(same.estimator);
+        if (outcome.whole) same.runs.push_back(outcome);
+      }
+    }
+  }
+  return rows;
+}
+
+/// The csv, and the same as a table on standard output.
+void Write(const std::vector<Row>& rows, const std::filesystem::path& file) {
+  std::ofstream csv(file);
+  csv << "estimator,points,frames,runs,rmse_m,bits,cpu\n";
+  std::printf(
+      "| estimator | points | frames | runs | rmse mm | bits | cpu "
+      "|\n|---|---|---|---|---|---|---|\n");
+  const Row& smallest = rows.front();
+  for (const Row& row : rows) {
+    if (row.runs.empty()) continue;
+    const double bits = 0.5 * (smallest.MeanLog2Det() - row.MeanLog2Det());
+    const double cpu = row.MedianCpu() / smallest.MedianCpu();
+    csv << row.estimator << ',' << row.points << ',' << row.frames << ',' << row.runs.size() << ','
+        << row.Rmse() << ',' << bits << ',' << cpu << '\n';
+    std::printf("| %s | %d | %d | %zu | %.1f | %.1f | %.3g |\n", row.estimator.c_str(), row.points,
+                row.frames, row.runs.size(), 1e3 * row.Rmse(), bits, cpu);
+  }
+  if (!csv.flush()) {
+    throw alidade::Error(alidade::ExitCode::kIo, file.string() + ": cannot be written");
+  }
+}
+
+/// A curve for each number of points; its marks are numbers of frames.
+void Draw(const std::vector<Row>& rows, const std::filesystem::path& folder) {
+  using alidade::internal::FigureScript;
+  FigureScript script("why_filter", "accuracy against cost: filter and batch",
+                      "CPU time of the path, in units of the smallest filter's");
+  script.PanelHeight(220);
+  script.Set("set logscale x\nset format x '%g'");
+  const alidade::internal::FigureFile file{"why_filter.csv",
+                                           static_cast<std::int64_t>(rows.size())};
+  const auto panel = [&](const char* title, const char* unit, const char* scale,
+                         const std::string& value) {
+    script.Panel(title, unit);
+    script.Set(scale);
+    int style = 0;
+    for (const std::string& estimator : kEstimators) {
+      for (const int points : kPoints) {
+        const int color = style++ % static_cast<int>(kPoints.size()) + 1;
+        const bool dashed = estimator != kEstimators[0];
+        script.Curve(file,
+                     "(strcol('estimator') eq '" + estimator +
+                         "' && column('points') == " + std::to_string(points) +
+                         " ? column('cpu') : NaN):(" + value + ") with linespoints ls " +
+                         std::to_string(color) + (dashed ? " dt 2 pt 6 ps 0.6" : " pt 7 ps 0.6"),
+                     estimator + ", " + std::to_string(points) + " points");
+      }
+    }
+  };
+  panel("final position, RMSE; frames used from left to right: 10, 19, 38, 75, 150", "[mm]",
+        "set logscale y", "1e3 * column('rmse_m')");
+  panel("entropy of the last pose, reduced against the smallest filter", "[bits]",
+        "unset logscale y", "column('bits')");
+  std::filesystem::create_directories(folder / "figures");
+  std::ofstream(folder / "figures" / "why_filter.gp") << script.Text();
+  const auto drawn = alidade::internal::RunGnuplot(folder, {"figures/why_filter.gp"}, {});
+  if (drawn.end == alidade::internal::GnuplotResult::End::kFailed) {
+    std::fprintf(stderr, "%s\n", drawn.complaint.c_str());
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 3 && argc != 4) {
+    std::fprintf(stderr, "usage: %s CONFIG FOLDER [SEEDS]\n", argv[0]);
+    return 2;
+  }
+  try {
+    const std::filesystem::path folder = argv[2];
+    std::filesystem::create_directories(folder);
+    const std::vector<Row> rows = Measure(argv[1], argc == 4 ? std::max(1, std::atoi(argv[3])) : 5);
+    Write(rows, folder / "why_filter.csv");
+    Draw(rows, folder);
+  } catch (const alidade::Error& error) {
+    std::fprintf(stderr, "error: %s\n", error.what());
+    return static_cast<int>(error.code());
+  }
+  return 0;
+}

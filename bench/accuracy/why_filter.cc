@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Accuracy against cost, of a filter and of the batch, as [Strasdat2012] drew it: the same path with
-// fewer or more points, and with fewer or more of its frames used.
+// Accuracy against cost, of a filter and of the batch, as [Strasdat2012] drew it: the same path
+// with fewer or more points, and with fewer or more of its frames used.
 //
 //   accuracy_why_filter examples/10_slam_scene/sweep_batch.yaml FOLDER [SEEDS]
 //

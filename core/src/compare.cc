@@ -145,7 +145,7 @@ void AddAll(const std::map<std::string, double>& from, const std::string& kind,
 void AddRatios(const ComparedEntry& one, const ComparedEntry& reference,
                const std::vector<std::string>& kinds, std::map<std::string, Spread>& values) {
   for (const auto& [key, value] : one.result.metrics) {
-    const auto begins = [&](const std::string& kind) { return key.starts_with(kind); };
+    const auto begins = [&key = key](const std::string& kind) { return key.starts_with(kind); };
     const auto found = reference.result.metrics.find(key);
     if (std::ranges::none_of(kinds, begins) || key.find('@') != key.npos) continue;
     if (found == reference.result.metrics.end() || !(found->second > 0.0)) continue;

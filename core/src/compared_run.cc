@@ -85,7 +85,7 @@ void ReadEstimates(const fs::path& file, Series& series) {
   std::ifstream stream = Open(file);
   std::string line;
   std::getline(stream, line);
-  const auto columns = static_cast<std::size_t>(1 + series.ambient() + series.tangent());
+  const auto columns = 1 + static_cast<std::size_t>(series.ambient() + series.tangent());
   for (int number = 2; std::getline(stream, line); ++number) {
     const std::vector<double> row = NumbersOf(line, file, number);
     if (row.size() != columns) FailFile(file, number, "not as wide as run.json has it");

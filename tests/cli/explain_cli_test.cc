@@ -58,7 +58,7 @@ TEST_F(ExplainCli, TellsTheOptionsOfEachTypeOfEstimator) {
   for (const char* part :
        {"(iekf)", "max_iterations  10", "tolerance       1e-04 sigma of the posterior",
         "blocks estimated or fixed; roles estimate, hold;",
-        "Not: considered blocks and roles, linearise_at measurement, landmarks"}) {
+        "Not: considered blocks and roles, linearise_at measurement"}) {
     EXPECT_TRUE(Contains(iekf.out, part)) << part << '\n' << iekf.out;
   }
   EXPECT_FALSE(Contains(iekf.out, "loss  ")) << iekf.out;

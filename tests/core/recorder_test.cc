@@ -80,6 +80,21 @@ TEST(Recorder, ImpliedValuesInvertTheSensor) {
                           internal::NumberText(400.0 * 0.065 / frame.measurements[1].values[0]));
 }
 
+/// The estimator of a report made by hand.
+class NoEstimator : public Estimator {
+ public:
+  void Start(Stamp) override {}
+  const UpdateReport& Process(const Frame&) override { return report_; }
+  const State& state() const override { return state_; }
+  Stamp stamp() const override { return kNoStamp; }
+  bool diverged() const override { return false; }
+  bool failed() const override { return false; }
+
+ private:
+  State state_;
+  UpdateReport report_;
+};
+
 /// A report of one update, made by hand, on a system with a block that waits and one that is fixed.
 struct HandMade {
   Experiment experiment;
@@ -92,6 +107,7 @@ struct HandMade {
     NamedEstimator named;
     named.name = "hand";
     named.type = "fake";
+    named.estimator = std::make_unique<NoEstimator>();
     StateLayout& layout = named.system.layout;
     const Space scalar{"x", "m", "", {""}, Geometry::Vector(1)};
     layout.Declare("a.waits", "a", scalar);

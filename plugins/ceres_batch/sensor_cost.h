@@ -68,6 +68,7 @@ struct SensorTraits<SensorModel> {
 
 /// d = z (-) h and, where j is not null, dd/dh (row-major) in the tangent at h.
 template <class G>
+// NOLINTNEXTLINE(readability-non-const-parameter): written to below
 void Difference(const double* z, const double* h, double* d, double* j) {
   using Jet = ceres::Jet<double, G::kTangent>;
   Jet seed[G::kTangent], moved[G::kAmbient], difference[G::kTangent];

@@ -51,7 +51,9 @@ TEST_F(SlamOdometryTracks, IsBetterThanDeadReckoningAndThePublishedFilter) {
 // that of 0095, does, for no noise of this filter says so.
 TEST_F(SlamOdometryTracks, IsInconsistentOnlyWhereTheOdometryIs) {
   for (const Drive& drive : kDrives) {
-    EXPECT_EQ(Ekf(drive).inconsistent, std::string(drive.name) == "drive_0095") << drive.name;
+    const EstimatorResult ekf = Ekf(drive);
+    EXPECT_EQ(ekf.inconsistent, std::string(drive.name) == "drive_0095") << drive.name;
+    EXPECT_FALSE(ekf.diverged) << drive.name;
   }
   EXPECT_TRUE(Ekf(kDrives[0], {{"evaluate.truth_sigma", "{}"}}).inconsistent);
 }

@@ -61,11 +61,12 @@ alidade::Config ConfigOf(const std::string& file, int points, int frames, int se
   config.Set("source.seed", std::to_string(seed), "bench");
   config.Set("source.points.count", std::to_string(points), "bench");
   config.Set("source.frames", std::to_string(frames), "bench");
-  set("source.rate_hz", kAllRateHz * frames / kAllFrames);
+  const double share = (frames - 1.0) / (kAllFrames - 1.0);  // of the steps of the same duration
+  set("source.rate_hz", kAllRateHz * share);
   for (const char* key : {"linear_acceleration", "angular_acceleration"}) {
     const std::string path = std::string("state.cam.noise.") + key;
     const double all = config.root().At("state").At("cam").At("noise").At(key).Number();
-    set(path.c_str(), all * std::sqrt(static_cast<double>(frames) / kAllFrames));
+    set(path.c_str(), all * std::sqrt(share));
   }
   return config;
 }
@@ -149,8 +150,12 @@ std::vector<Row> Measure(const std::string& config, int seeds) {
       const auto outcomes = RunAll(ConfigOf(config, row.points, row.frames, seed), host);
       for (Row& same : rows) {
         if (same.points != row.points || same.frames != row.frames) continue;
-        const Outcome& outcome = outcomes.at(same.estimator);
-        if (outcome.whole) same.runs.push_back(outcome);
+        const auto found = outcomes.find(same.estimator);
+        if (found == outcomes.end()) {
+          throw alidade::Error(alidade::ExitCode::kBadConfig,
+                               config + ": wants estimators 'ekf' and 'batch'");
+        }
+        if (found->second.whole) same.runs.push_back(found->second);
       }
     }
   }
@@ -165,6 +170,12 @@ void Write(const std::vector<Row>& rows, const std::filesystem::path& file) {
       "| estimator | points | frames | runs | rmse mm | bits | cpu "
       "|\n|---|---|---|---|---|---|---|\n");
   const Row& smallest = rows.front();
+  if (smallest.runs.empty()) {
+    throw alidade::Error(alidade::ExitCode::kDiverged,
+                         "no run of '" + smallest.estimator + "' with " +
+                             std::to_string(smallest.points) + " points and " +
+                             std::to_string(smallest.frames) + " frames came to its end");
+  }
   for (const Row& row : rows) {
     if (row.runs.empty()) continue;
     const double bits = 0.5 * (smallest.MeanLog2Det() - row.MeanLog2Det());

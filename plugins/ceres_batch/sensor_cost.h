@@ -212,9 +212,10 @@ class SensorCost final : public ceres::CostFunction {
       if (jacobians[i] != nullptr) Whiten(jacobians[i], sizes[i], sign);
     }
   }
-  /// a <- sign W a, in place: from the last row up, as W is lower triangular. Not inlined: what the
-  /// sensor has just written would be read as vectors, which waits for the stores.
-  __attribute__((noinline)) void Whiten(double* a, int columns, double sign) const {
+  /// a <- sign W a, in place: from the last row up, as W is lower triangular.
+  /// Not inlined: the loops of a function that is are the other one's.
+  __attribute__((noinline)) ALIDADE_SCALAR_LOOPS void Whiten(double* a, int columns,
+                                                             double sign) const {
     const int m = Traits::Rows(kind_.sensor);
     if (kind_.isotropic) {
       const double factor = sign * kind_.w[0];

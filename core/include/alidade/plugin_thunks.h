@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <exception>
 
+#include "alidade/autodiff_inverse.h"
 #include "alidade/autodiff_step.h"
 #include "alidade/plugin_abi.h"
 
@@ -91,9 +92,9 @@ template <class Model>
 struct __attribute__((visibility("hidden"))) SensorCalls {
   static constexpr bool kInitialises = Model::kInitialises >= 0;
 
-  __attribute__((flatten)) static std::int32_t Eval(const void* self, const double* const* roles,
-                                                    double* z, double* const* jacobians,
-                                                    const std::int32_t* strides) noexcept {
+  __attribute__((flatten)) ALIDADE_SCALAR_LOOPS static std::int32_t Eval(
+      const void* self, const double* const* roles, double* z, double* const* jacobians,
+      const std::int32_t* strides) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
       return static_cast<std::int32_t>(Evaluate(model, roles, z, jacobians, strides));
     });

@@ -102,7 +102,7 @@ void CheckPlugins(const std::vector<std::string>& paths, Diagnosis& diagnosis) {
     return std::to_string(n) + ' ' + what + (n == 1 ? "" : "s");
   };
   const std::string found = counted(models, "model") + ", " + counted(sources, "source") + " and " +
-                            counted(estimators, "estimator");
+                            counted(estimators, "estimator") + " of plugins";
   if (models > 0 && sources > 0) {
     diagnosis.Ok(found);
   } else {

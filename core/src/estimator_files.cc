@@ -24,6 +24,7 @@ RecordedEstimator EstimatorFiles::Describe(const NamedEstimator& named) {
     sensor.stream = binding.stream;
     sensor.unit = space.unit;
     sensor.tangent = space.geometry.tangent;
+    sensor.has_landmark = binding.model.has_landmark();
     recorded.width = std::max(recorded.width, space.geometry.ambient);
   }
   return recorded;

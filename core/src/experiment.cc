@@ -108,6 +108,9 @@ void CheckOffered(const std::string& type, const PluginHost& host, const Node& n
     if (entry.kind == PluginEntry::Kind::kEstimator) of_plugins.push_back(entry.name);
   }
   if (std::ranges::find(of_plugins, type) != of_plugins.end()) return;
+  constexpr const char* kCeresHint =
+      "\n  'ceres_batch' and 'fixed_lag' come with a build that found the Ceres solver: "
+      "cmake --preset release && cmake --build --preset release";
   std::vector<std::string> names = of_core;
   names.insert(names.end(), of_plugins.begin(), of_plugins.end());
   const std::string expected = internal::Join(of_core) + ", built in, or of a plugin: " +
@@ -116,7 +119,7 @@ void CheckOffered(const std::string& type, const PluginHost& host, const Node& n
               ErrorLine(node.place(), node.path(),
                         "no estimator '" + type + "' is built in, and no plugin offers it",
                         expected, Nearest(type, names)) +
-                  "\n" + PluginPlaces(host));
+                  (of_plugins.empty() ? kCeresHint : "") + "\n" + PluginPlaces(host));
 }
 
 bool TakesLandmarks(const std::string& type, const PluginHost& host) {

@@ -79,7 +79,7 @@ FigureScript StateFigure(const RecordedRun& run, const RecordedEstimator& estima
                       run.first, run.last);
   std::size_t panels = 0;
   for (const RecordedElement& element : estimator.elements) {
-    if (!element.has_value || panels++ == kMaxPanels) continue;
+    if (!element.has_value || panels++ >= kMaxPanels) continue;
     script.Panel(element.name, InBrackets(element.unit));
     StateRange(script, estimator, element);
     const std::string value = Column(element.name), sigma = Sigma(element);
@@ -148,6 +148,18 @@ FigureScript GainFigure(const RecordedRun& run, const RecordedEstimator& estimat
   return script;
 }
 
+/// What is known of each of a sensor's measurements: a line through them, or dots where a line
+/// would lead from landmark to landmark.
+void EachMeasurement(FigureScript& script, const FigureFile& file, bool landmarks,
+                     const std::string& mine, const std::string& value, int style,
+                     const std::string& key) {
+  if (!landmarks) return script.LineOf(file, mine, value, style, key);
+  script.Curve(
+      file,
+      OverTime(Where(mine, value)) + " with points ls " + std::to_string(style) + " pt 7 ps 0.15",
+      key);
+}
+
 /// One element of a sensor's innovation, with +-3 sigma of S. What lies beyond the axis is drawn on
 /// its edge.
 void InnovationPanel(FigureScript& script, const RecordedEstimator& estimator,
@@ -161,8 +173,8 @@ void InnovationPanel(FigureScript& script, const RecordedEstimator& estimator,
   script.Quartiles("S", file.name, Where(mine, s));
   script.Set("limit = 5 * S_up_quartile");
   script.Set("set yrange [-limit : limit]");
-  script.LineOf(file, mine, "3 * " + s, 12, "+-3 sqrt(S)");
-  script.LineOf(file, mine, "-3 * " + s, 12, "");
+  EachMeasurement(script, file, sensor.has_landmark, mine, "3 * " + s, 12, "+-3 sqrt(S)");
+  EachMeasurement(script, file, sensor.has_landmark, mine, "-3 * " + s, 12, "");
   const auto points = [&](const std::string& condition, const std::string& value,
                           const std::string& style, const char* key) {
     script.Curve(file, OverTime(Where(mine + " && " + condition, value)) + " with points " + style,
@@ -247,13 +259,15 @@ void StreamPanel(FigureScript& script, const RecordedRun& run, const RecordedStr
   script.Set("set yrange [low - margin(low, high) : high + margin(low, high)]");
   script.Curve({"measurements.csv", run.measurement_rows, Kinds(run.streams.size())},
                OverTime(value) + " with points ls 13", "measured");
+  const bool landmarks = sensor != nullptr && sensor->has_landmark;
   if (stream.expected_rows > 0) {
-    script.LineOf({"expected.csv", run.expected_rows, Kinds(run.streams.size())},
-                  Is("stream", stream.name), Column('v' + std::to_string(element)), 11, "truth");
+    EachMeasurement(script, {"expected.csv", run.expected_rows, Kinds(run.streams.size())},
+                    landmarks, Is("stream", stream.name), Column('v' + std::to_string(element)), 11,
+                    "truth");
   }
   if (estimator == nullptr) return;
-  script.LineOf(Innovations(*estimator), Is("sensor", sensor->name),
-                Column('h' + std::to_string(element)), 1, "predicted: " + estimator->name);
+  EachMeasurement(script, Innovations(*estimator), landmarks, Is("sensor", sensor->name),
+                  Column('h' + std::to_string(element)), 1, "predicted: " + estimator->name);
 }
 
 FigureScript MeasurementFigure(const RecordedRun& run) {

@@ -34,6 +34,7 @@ struct RecordedSensor {
   std::string stream;
   std::string unit;
   int tangent = 1;
+  bool has_landmark = false;  ///< many measurements at a time, each of another landmark
   std::vector<RecordedGain> gains;
   bool has_innovations = false;
   bool has_reprojection = false;  ///< rows in `NAME/reprojection.csv`

@@ -126,7 +126,7 @@ TEST_F(SweepCli, CountsDivergedRunsAndLeavesTheirMetricsOut) {
   EXPECT_TRUE(Contains(Read("out/runs.csv"), "\n2,ekf,true,"));
 }
 
-// A hundredth of the pixel noise: no error stays within 10 sigma.
+// Of a filter that believes in a hundredth of the noise.
 TEST_F(SweepCli, InconsistentRunsCountAndAreTold) {
   const Arguments too_sure = {"--set", "sensors.stereo.sigma_px=0.01",
                               "--set", "sensors.scale.sigma_px=0.01",

@@ -190,9 +190,9 @@ std::vector<SweepSummary> Summarise(const SweepResult& result) {
         if (one.name != name) continue;
         summary.units.insert(one.units.begin(), one.units.end());
         summary.diverged += one.diverged ? 1 : 0;
-        summary.inconsistent += one.inconsistent && !one.diverged ? 1 : 0;
         if (!run.Uses(one)) continue;
         ++summary.used;
+        summary.inconsistent += one.inconsistent ? 1 : 0;
         for (const auto& [key, value] : one.metrics) {
           if (!std::isnan(value)) values[key].push_back(value);
         }

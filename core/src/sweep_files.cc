@@ -79,8 +79,8 @@ std::vector<ComparisonRow> TableRows(const std::vector<SweepSummary>& summaries)
 std::string Markdown(const SweepResult& result) {
   std::string text = std::to_string(CountWhole(result)) + " of " + std::to_string(result.runs) +
                      " runs, seeds from " + std::to_string(result.first_seed) +
-                     ". Mean [5 %, 50 %, 95 % quantile] over the runs that neither diverged nor "
-                     "were inconsistent.\n\n";
+                     ". Mean [5 %, 50 %, 95 % quantile] over the runs that did not diverge, "
+                     "inconsistent ones among them.\n\n";
   const std::vector<SweepSummary> summaries = Summarise(result);
   text += "|  | " + Join(NamesOf(summaries), " | ") + " |\n|---|";
   for (std::size_t c = 0; c < summaries.size(); ++c) text += "---:|";
@@ -192,7 +192,7 @@ void WriteRuns(const RunFolder& folder, const Parts& parts, const std::string& k
   for (const Part& part : parts) {
     for (const SweepRun& run : part.result->done) {
       for (const EstimatorResult& one : run.estimators) {
-        if (run.Uses(one) || one.diverged || one.inconsistent) write_run(part, run, one);
+        if (run.Uses(one) || one.diverged) write_run(part, run, one);
       }
     }
   }

@@ -211,9 +211,11 @@ void WriteSweepCsv(const RunFolder& folder, const VariedSweep& sweep) {
 
 std::string VariedMarkdown(const VariedSweep& sweep) {
   const SweepResult& first = sweep.results.front();
-  std::string text = "Seeds " + std::to_string(first.first_seed) + " to " +
-                     std::to_string(first.first_seed + static_cast<std::uint64_t>(first.runs) - 1) +
-                     " for each value. Means over the runs that did not diverge.\n";
+  std::string text =
+      "Seeds " + std::to_string(first.first_seed) + " to " +
+      std::to_string(first.first_seed + static_cast<std::uint64_t>(first.runs) - 1) +
+      " for each value. Means over the runs that did not diverge, inconsistent ones among "
+      "them.\n";
   for (const Column& column : ColumnsOf(sweep)) {
     const ValueTable table = TableOf(sweep, column);
     text += "\n| `" + column.front().name + "`: " + sweep.variation.key + " | " +

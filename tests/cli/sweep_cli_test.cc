@@ -126,6 +126,30 @@ TEST_F(SweepCli, CountsDivergedRunsAndLeavesTheirMetricsOut) {
   EXPECT_TRUE(Contains(Read("out/runs.csv"), "\n2,ekf,true,"));
 }
 
+// Of a filter that believes in a hundredth of the noise.
+TEST_F(SweepCli, InconsistentRunsCountAndAreTold) {
+  const Arguments too_sure = {"--set", "sensors.stereo.sigma_px=0.01",
+                              "--set", "sensors.scale.sigma_px=0.01",
+                              "--set", "estimators.ekf.gate=1"};
+  Arguments arguments = {"sweep", "config.yaml", "--runs", "1", "--first-seed", "7", "-o", "out"};
+  arguments.insert(arguments.end(), too_sure.begin(), too_sure.end());
+  const Outcome sweep = Call(arguments);
+  ASSERT_EQ(sweep.code, 0) << sweep.err;
+  arguments = {"run", "config.yaml", "--seed", "7", "-o", "run", "--no-figures"};
+  arguments.insert(arguments.end(), too_sure.begin(), too_sure.end());
+  ASSERT_EQ(Call(arguments).code, 0);
+  const Config summary = Json("out/sweep.json"), record = Json("run/run.json");
+  const Node ekf = summary.root().At("estimators").At("ekf");
+  EXPECT_EQ(ekf.At("diverged").Number(), 0);
+  EXPECT_EQ(ekf.At("inconsistent").Number(), 1);
+  const Node metrics = record.root().At("estimators").At("ekf").At("metrics");
+  for (const char* key : {"rmse:target.depth", "nees.mean:target"}) {
+    EXPECT_EQ(ekf.At("metrics").At(key).At("mean").Number(), metrics.At(key).Number()) << key;
+  }
+  EXPECT_TRUE(Contains(Read("out/runs.csv"), "\n7,ekf,false,true,"));
+  EXPECT_TRUE(Contains(Read("out/table.md"), "| runs used | 1 |")) << Read("out/table.md");
+}
+
 TEST_F(SweepCli, ReportsFailedRunsWithTheirSeeds) {
   Write("table.csv", "t_s,d\n0,80\n0.1,none\n");
   const Outcome sweep = Call({"sweep", "table.yaml", "--runs", "2", "-o", "out"});

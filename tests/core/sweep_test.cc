@@ -36,7 +36,8 @@ EstimatorResult Result(double rmse, bool diverged = false, bool inconsistent = f
   return one;
 }
 
-/// Two runs that count, two that diverged, one that was inconsistent, one that failed.
+/// Three runs that count, one of them inconsistent, two that diverged, one that failed (and was
+/// inconsistent).
 SweepResult SixRuns() {
   SweepResult result;
   result.runs = 6;
@@ -44,27 +45,27 @@ SweepResult SixRuns() {
   result.done = {{1, RunStatus::kOk, ExitCode::kOk, "", {Result(1.0)}},
                  {2, RunStatus::kOk, ExitCode::kOk, "", {Result(2.0)}},
                  {3, RunStatus::kOk, ExitCode::kOk, "", {Result(100.0, true)}},
-                 {4, RunStatus::kFailed, ExitCode::kBadData, "", {Result(50.0)}},
-                 {5, RunStatus::kOk, ExitCode::kOk, "", {Result(3.0, false, true)}},
+                 {4, RunStatus::kFailed, ExitCode::kBadData, "", {Result(50.0, false, true)}},
+                 {5, RunStatus::kOk, ExitCode::kOk, "", {Result(6.0, false, true)}},
                  {6, RunStatus::kOk, ExitCode::kOk, "", {Result(100.0, true, true)}}};
   return result;
 }
 
-TEST(Summarise, TakesMetricsOverWholeRunsThatDidNotDivergeAndWereConsistent) {
+TEST(Summarise, TakesMetricsOverWholeRunsThatDidNotDiverge) {
   const std::vector<SweepSummary> summaries = Summarise(SixRuns());
   ASSERT_EQ(summaries.size(), 1u);
-  EXPECT_EQ(summaries[0].used, 2);
+  EXPECT_EQ(summaries[0].used, 3);
   EXPECT_EQ(summaries[0].diverged, 2);
   EXPECT_EQ(summaries[0].inconsistent, 1);
-  EXPECT_DOUBLE_EQ(summaries[0].metrics.at("rmse:x").mean, 1.5);
-  EXPECT_DOUBLE_EQ(summaries[0].metrics.at("rmse:x").p95, 1.95);
+  EXPECT_DOUBLE_EQ(summaries[0].metrics.at("rmse:x").mean, 3.0);
+  EXPECT_DOUBLE_EQ(summaries[0].metrics.at("rmse:x").p95, 5.6);
 }
 
 TEST(SweepTable, HasQuantilesAndCountsOfRuns) {
   EXPECT_EQ(SweepTable(SixRuns()),
             "                                      ekf\n"
-            "rmse x        1.500 [1.050, 1.500, 1.950]\n"
-            "runs used                               2\n"
+            "rmse x        3.000 [1.100, 2.000, 5.600]\n"
+            "runs used                               3\n"
             "diverged                                2\n"
             "inconsistent                            1\n");
 }

@@ -35,10 +35,8 @@ struct SweepRun {
   std::vector<EstimatorResult> estimators;  ///< without events
   bool withheld = false;                    ///< no reference to compare with, as in RunResult
 
-  /// Whether the metrics of `one` count: the run is whole, it did not diverge and was consistent.
-  bool Uses(const EstimatorResult& one) const {
-    return status == RunStatus::kOk && !one.diverged && !one.inconsistent;
-  }
+  /// Whether the metrics of `one` count: the run is whole, and it did not diverge.
+  bool Uses(const EstimatorResult& one) const { return status == RunStatus::kOk && !one.diverged; }
 };
 
 struct SweepResult {
@@ -96,7 +94,7 @@ struct SweepSummary {
   std::string name;
   std::int64_t used = 0;          ///< runs that metrics are taken over
   std::int64_t diverged = 0;      ///< runs left out because it diverged
-  std::int64_t inconsistent = 0;  ///< others left out because its error was
+  std::int64_t inconsistent = 0;  ///< those of `used` in which its error was
   std::map<std::string, Spread> metrics;
   std::map<std::string, std::string> units;  ///< as in EstimatorResult
 };

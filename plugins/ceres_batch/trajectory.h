@@ -169,7 +169,7 @@ class Trajectory {
     std::vector<std::size_t> epochs;    ///< that it is seen from, the first observation's first
     std::vector<Eigen::MatrixXd> ties;  ///< sum w J_x' J_l of each of them, d rows
   };
-  /// Where an observation is not defined, nor is the problem; or the observation counts for nothing.
+  /// Where an observation is not defined, nor is the problem; or it counts for nothing.
   enum class Undefined { kFails, kSkipped };
 
   /// x_0 and S_0.

@@ -322,7 +322,7 @@ int Main(int rounds) {
       std::sort(ms[i].begin(), ms[i].end());
       std::sort(ns[i].begin(), ns[i].end());
       std::printf("%-28s %12.2f %8.1f %10.3f (%.3f to %.3f)\n", ways.all[i].name,
-                  ms[i][ms[i].size() / 2], ns[i][ns[i].size() / 10], ratio.At(0.5), ratio.At(0.1),
+                  ms[i][ms[i].size() / 2], ns[i][ns[i].size() / 2], ratio.At(0.5), ratio.At(0.1),
                   ratio.At(0.9));
     }
   }

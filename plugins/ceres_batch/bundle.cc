@@ -13,7 +13,7 @@
 
 #include "alidade/build_plugin.h"
 #include "geometry_manifold.h"
-#include "residuals.h"
+#include "loss.h"
 #include "sensor_cost.h"
 
 namespace alidade::ceres_batch {

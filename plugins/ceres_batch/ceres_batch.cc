@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <functional>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include "alidade/build_plugin.h"
-#include "companion.h"
 #include "fixed_lag.h"
+#include "initialising_filter.h"
 #include "map_solve.h"
 #include "supported.h"
 #include "trajectory.h"
@@ -18,8 +17,7 @@ constexpr int kManyInputs = 1000;  // of which a solve takes seconds
 
 struct Options {
   enum class Data { kAll, kSoFar } data = Data::kAll;
-  MapSolve::Options solve;
-  double max_dt_s = std::numeric_limits<double>::infinity();
+  SolveOptions solve;
   bool lent = false;  ///< it sees what another estimator accepted
 };
 
@@ -29,14 +27,14 @@ class CeresBatch : public Estimator {
  public:
   CeresBatch(const System& system, const Options& options, const std::vector<StreamInfo>& streams)
       : data_(options.data),
-        trajectory_(system, streams, options.max_dt_s),
+        trajectory_(system, streams, options.solve.max_dt_s),
         solve_(options.solve),
         state_(system.InitialState()),
-        companion_(FilterSystem(system, options), options.max_dt_s, streams) {}
+        initialiser_(FilterSystem(system, options), options.solve.max_dt_s, streams) {}
 
   void Start(Stamp stamp) override {
     trajectory_.Start(stamp);
-    companion_.filter().Start(stamp);
+    initialiser_.filter().Start(stamp);
   }
   bool offline() const override { return data_ == Options::Data::kAll; }
   const State& state() const override { return state_; }
@@ -47,8 +45,8 @@ class CeresBatch : public Estimator {
 
   const UpdateReport& Process(const Frame& frame) override {
     report_.Clear();
-    const Ekf& ekf = companion_.filter();
-    const UpdateReport& filter = companion_.Process(frame);
+    const Ekf& ekf = initialiser_.filter();
+    const UpdateReport& filter = initialiser_.Process(frame);
     const bool were_few = trajectory_.inputs() <= kManyInputs;
     if (!trajectory_.Add(frame, filter, ekf)) {
       failed_ = true;
@@ -62,7 +60,7 @@ class CeresBatch : public Estimator {
                                 "more than " + std::to_string(kManyInputs) +
                                     " noise inputs: the time of a solve grows with their cube"});
     }
-    companion_.Tell(frame.stamp, filter, report_.events);
+    initialiser_.Tell(frame.stamp, filter, report_.events);
     return report_;
   }
 
@@ -72,22 +70,22 @@ class CeresBatch : public Estimator {
 
   void Smooth(const Emit& emit) override {
     if (trajectory_.size() == 0) return;
-    if (!trajectory_.Linearised(filtered_, e_) || !CanStart()) {
-      e_.setZero(trajectory_.inputs());
-      if (!CanStart()) FailAll("the batch has nowhere to start: " + trajectory_.problem());
-    }
-    solve_.Solve(trajectory_, e_);
+    const bool solved = solve_.SolveAll(trajectory_, filtered_, e_);
+    failed_ = solve_.failed();
+    if (!solved) FailAll(solve_.summary());
     const auto put = [&](std::size_t k, const Trajectory::Point& point) {
       solve_.HeedStop();
       const bool last = k + 1 == trajectory_.size();
       trajectory_.Report(k, point, report_);
       PutState(k, point);
+      if (last) solve_.Note(trajectory_.stamp(), report_.events);
       if (last) report_.events.push_back({trajectory_.stamp(), "batch", solve_.summary()});
       emit(k, state_, report_);
     };
-    map_ = companion_.filter().landmarks();
-    const bool put_all = Covariances() && ForEachFrame(put) && PutMap();
-    if (!put_all) FailAll(solve_.summary() + "; then " + trajectory_.problem());
+    map_ = initialiser_.filter().landmarks();
+    if (!trajectory_.ForEachFrame(e_, trajectory_.size(), put) || !PutMap()) {
+      FailAll(solve_.summary() + "; then " + trajectory_.problem());
+    }
   }
 
  private:
@@ -101,27 +99,22 @@ class CeresBatch : public Estimator {
     throw Error(ExitCode::kDiverged, why);
   }
 
-  /// Freezes at e_; false where a model is not defined there.
-  bool CanStart() { return MapSolve::CanStart(trajectory_, e_); }
-
-  /// Starts where the frame before ended, its new inputs at their mean.
   void SolveSoFar(Stamp stamp) {
-    const Eigen::Index before = e_.size();
-    e_.conservativeResize(trajectory_.inputs());
-    e_.tail(e_.size() - before).setZero();
-    const bool old = !trajectory_.turns() && CanStart();
-    if (!old && !(trajectory_.Linearised(filtered_, e_) && CanStart())) {
-      NoteFailure(stamp, "the batch has nowhere to start: " + trajectory_.problem());
+    const bool solved = solve_.SolveAnew(trajectory_, filtered_, e_);
+    failed_ = solve_.failed();
+    if (!solved) {
+      NoteFailure(stamp, solve_.summary());
       return;
     }
-    solve_.Solve(trajectory_, e_);
     const auto put = [&](std::size_t k, const Trajectory::Point& point) {
       if (k + 1 < trajectory_.size()) return;
       trajectory_.Report(k, point, report_);
       PutState(k, point);
     };
-    map_ = companion_.filter().landmarks();
-    if (!Covariances() || !ForEachFrame(put) || !PutMap()) {
+    map_ = initialiser_.filter().landmarks();
+    const bool put_all = trajectory_.ForEachFrame(e_, trajectory_.size(), put) && PutMap();
+    solve_.Note(stamp, report_.events);
+    if (!put_all) {
       NoteFailure(stamp, solve_.summary() + "; then " + trajectory_.problem());
     } else if (failed_) {
       NoteFailure(stamp, solve_.summary());
@@ -131,24 +124,6 @@ class CeresBatch : public Estimator {
   void NoteFailure(Stamp stamp, const std::string& why) {
     failed_ = true;
     report_.events.push_back({stamp, "batch", why});
-  }
-
-  bool Covariances() {
-    const bool good = solve_.Covariances(trajectory_, e_);
-    failed_ = solve_.failed();
-    return good;
-  }
-
-  /// The points of e_, frame by frame; false where a model is not defined, which ends it.
-  template <class Take>
-  bool ForEachFrame(const Take& take) {
-    Trajectory::Point point;
-    bool good = trajectory_.Begin(e_.data(), true, point);
-    for (std::size_t k = 0; k < trajectory_.size() && good; ++k) {
-      good = trajectory_.Advance(k, e_.data(), point);
-      if (good) take(k, point);
-    }
-    return good;
   }
 
   bool PutMap() { return map_.empty() || trajectory_.PutMap(e_.data(), solve_.u(), map_); }
@@ -161,7 +136,7 @@ class CeresBatch : public Estimator {
   Trajectory trajectory_;
   MapSolve solve_;
   State state_;
-  Companion companion_;  ///< gives the trajectory to start from
+  InitialisingFilter initialiser_;  ///< gives the trajectory to start from
   std::vector<std::vector<double>> filtered_;
   Eigen::VectorXd e_;
   std::vector<LandmarkEstimate> map_;
@@ -176,13 +151,7 @@ EstimatorMaker Create(const EstimatorArguments& arguments) {
   Options options;
   options.data = static_cast<Options::Data>(
       p.Choice("data", {"all", "so_far"}, "what an estimate sees: all frames, or none later", 0));
-  options.solve.max_iterations =
-      p.Integer("max_iterations", "of one solve", 1, 1'000'000, options.solve.max_iterations);
-  options.solve.max_outer_iterations =
-      p.Integer("max_outer_iterations", "solves, with noise that depends on the state taken anew",
-                1, 1'000'000, options.solve.max_outer_iterations);
-  options.max_dt_s =
-      p.Positive("max_dt_s", "s", "longer gaps are stepped in equal parts", options.max_dt_s);
+  options.solve = ReadSolveOptions(p);
   const auto use = arguments.entry.Find("use");
   options.lent = use && use->is_map();
   return [options, entry = arguments.entry](const System& system,

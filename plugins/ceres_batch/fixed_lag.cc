@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "companion.h"
+#include "initialising_filter.h"
 #include "map_solve.h"
 #include "supported.h"
 #include "trajectory.h"
@@ -20,8 +20,7 @@ constexpr Support kFixedLagSupport = {.held = false, .from_measurement = true};
 struct FixedLagOptions {
   enum class Estimate { kNewest, kOldest } estimate = Estimate::kNewest;
   double window_s = 0.0;
-  double max_dt_s = std::numeric_limits<double>::infinity();
-  MapSolve::Options solve;
+  SolveOptions solve;
 };
 
 /// window_s in whole ns; beyond what a Stamp holds, no frame leaves the window.
@@ -46,14 +45,14 @@ class FixedLag : public Estimator {
            const std::vector<StreamInfo>& streams)
       : estimate_(options.estimate),
         window_(WindowOf(options.window_s)),
-        trajectory_(system, streams, options.max_dt_s),
+        trajectory_(system, streams, options.solve.max_dt_s),
         solve_(options.solve),
         state_(system.InitialState()),
-        companion_(system, options.max_dt_s, streams) {}
+        initialiser_(system, options.solve.max_dt_s, streams) {}
 
   void Start(Stamp stamp) override {
     trajectory_.Start(stamp);
-    companion_.filter().Start(stamp);
+    initialiser_.filter().Start(stamp);
   }
   bool offline() const override { return estimate_ == FixedLagOptions::Estimate::kOldest; }
   const State& state() const override { return state_; }
@@ -64,16 +63,16 @@ class FixedLag : public Estimator {
   const UpdateReport& Process(const Frame& frame) override {
     report_.Clear();
     if (failed_) return report_;
-    const UpdateReport& filter = companion_.Process(frame);
-    if (!MoveWindow(frame.stamp) || !trajectory_.Add(frame, filter, companion_.filter())) {
+    const UpdateReport& filter = initialiser_.Process(frame);
+    if (!MoveWindow(frame.stamp) || !trajectory_.Add(frame, filter, initialiser_.filter())) {
       return Fail(frame.stamp, trajectory_.problem());
     }
     stamps_.push_back(trajectory_.stamp());
-    if (!companion_.filter().failed()) {
-      about_.push_back(trajectory_.ValuesOf(companion_.filter().state()));
+    if (!initialiser_.filter().failed()) {
+      about_.push_back(trajectory_.ValuesOf(initialiser_.filter().state()));
     }
     SolveWindow(frame.stamp);
-    companion_.Tell(frame.stamp, filter, report_.events);
+    initialiser_.Tell(frame.stamp, filter, report_.events);
     return report_;
   }
 
@@ -120,7 +119,7 @@ class FixedLag : public Estimator {
 
   /// Keeps the estimates of the first `count` frames of the window.
   bool Keep(std::size_t count) {
-    return ForEachFrame(count, [&](std::size_t k, const Trajectory::Point& point) {
+    return trajectory_.ForEachFrame(e_, count, [&](std::size_t k, const Trajectory::Point& point) {
       Kept kept;
       trajectory_.Report(k, point, kept.report);
       trajectory_.Put(k, point, solve_.Whitened(point), state_);
@@ -129,26 +128,20 @@ class FixedLag : public Estimator {
     });
   }
 
-  /// Starts where the last window ended, its new inputs at their mean.
   void SolveWindow(Stamp stamp) {
-    const Eigen::Index before = e_.size();
-    e_.conservativeResize(trajectory_.inputs());
-    e_.tail(e_.size() - before).setZero();
-    const bool old = !trajectory_.turns() && MapSolve::CanStart(trajectory_, e_);
-    if (!old && !(trajectory_.Linearised(about_, e_) && MapSolve::CanStart(trajectory_, e_))) {
-      Fail(stamp, "the window has nowhere to start: " + trajectory_.problem());
+    if (!solve_.SolveAnew(trajectory_, about_, e_)) {
+      Fail(stamp, solve_.summary());
       return;
     }
-    solve_.Solve(trajectory_, e_);
     about_.clear();
-    const bool good =
-        solve_.Covariances(trajectory_, e_) &&
-        ForEachFrame(trajectory_.size(), [&](std::size_t k, const Trajectory::Point& point) {
+    const bool good = trajectory_.ForEachFrame(
+        e_, trajectory_.size(), [&](std::size_t k, const Trajectory::Point& point) {
           about_.push_back(point.x);
           if (offline() || k + 1 < trajectory_.size()) return;
           trajectory_.Report(k, point, report_);
           trajectory_.Put(k, point, solve_.Whitened(point), state_);
         });
+    solve_.Note(stamp, report_.events);
     if (!good) {
       Fail(stamp, solve_.summary() + "; then " + trajectory_.problem());
     } else if (solve_.failed()) {
@@ -156,24 +149,13 @@ class FixedLag : public Estimator {
     }
   }
 
-  /// The points of e_, of the first `count` frames; false where a model is not defined.
-  template <class Take>
-  bool ForEachFrame(std::size_t count, const Take& take) {
-    Trajectory::Point point;
-    bool good = count == 0 || trajectory_.Begin(e_.data(), true, point);
-    for (std::size_t k = 0; k < count && good; ++k) {
-      good = trajectory_.Advance(k, e_.data(), point);
-      if (good) take(k, point);
-    }
-    return good;
-  }
-
   FixedLagOptions::Estimate estimate_;
   Stamp window_;
   Trajectory trajectory_;  ///< that of the window
   MapSolve solve_;
-  State state_;          ///< newest: of the last frame; oldest: of the last that left
-  Companion companion_;  ///< gives the newest frame a start, and blocks their first values
+  State state_;  ///< newest: of the last frame; oldest: of the last that left
+  InitialisingFilter
+      initialiser_;  ///< gives the newest frame a start, and blocks their first values
   std::vector<Stamp> stamps_;
   std::vector<std::vector<double>> about_;  ///< the last solution
   std::vector<Kept> kept_;
@@ -191,13 +173,7 @@ EstimatorMaker CreateFixedLag(const EstimatorArguments& arguments) {
   options.estimate = static_cast<FixedLagOptions::Estimate>(p.Choice(
       "estimate", {"newest", "oldest"},
       "newest: of each frame when it comes; oldest: when it leaves the window, at the end", 0));
-  options.solve.max_iterations =
-      p.Integer("max_iterations", "of one solve", 1, 1'000'000, options.solve.max_iterations);
-  options.solve.max_outer_iterations =
-      p.Integer("max_outer_iterations", "solves, with noise that depends on the state taken anew",
-                1, 1'000'000, options.solve.max_outer_iterations);
-  options.max_dt_s =
-      p.Positive("max_dt_s", "s", "longer gaps are stepped in equal parts", options.max_dt_s);
+  options.solve = ReadSolveOptions(p);
   return [options, entry = arguments.entry](const System& system,
                                             const std::vector<StreamInfo>& streams) {
     CheckSupported(system, entry, "fixed_lag", kFixedLagSupport);

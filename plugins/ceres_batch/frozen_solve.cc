@@ -61,21 +61,38 @@ class ReducedCost : public ceres::CostFunction {
   Trajectory& trajectory_;
 };
 
+double CostOf(const Trajectory& trajectory, const Eigen::VectorXd& e, const Eigen::VectorXd& r) {
+  double cost = 0.5 * e.squaredNorm();
+  for (const Trajectory::Part& part : trajectory.parts()) {
+    cost += Rho(part.loss, r.segment(part.row, part.size).norm());
+  }
+  return cost;
+}
+
 }  // namespace
 
-bool IsDefined(Trajectory& trajectory, const Eigen::VectorXd& e) {
+bool CostAt(Trajectory& trajectory, const Eigen::VectorXd& e, double& cost) {
   if (trajectory.has_landmarks()) {
-    Trajectory::Reduced unused;
-    return trajectory.Reduce(e.data(), false, unused);
+    Trajectory::Reduced reduced;
+    if (!trajectory.Reduce(e.data(), false, reduced)) return false;
+    cost = reduced.cost;
+    return true;
   }
   Eigen::VectorXd r(trajectory.residuals());
-  RowMajor j(r.size(), trajectory.inputs());
-  return trajectory.Evaluate(e.data(), r.data(), j.data());
+  if (!trajectory.Evaluate(e.data(), r.data(), nullptr)) return false;
+  cost = CostOf(trajectory, e, r);
+  return true;
 }
 
 ceres::Solver::Summary SolveFrozen(Trajectory& trajectory, Eigen::VectorXd& e, int max_iterations,
                                    const std::function<bool()>& stop) {
   const Eigen::Index n = e.size();
+  ceres::Solver::Summary summary;
+  if (n == 0) {  // Ceres knows no block of size 0
+    const bool defined = CostAt(trajectory, e, summary.final_cost);
+    summary.termination_type = defined ? ceres::CONVERGENCE : ceres::FAILURE;
+    return summary;
+  }
   Residuals residuals(trajectory, e);
   const bool reduced = trajectory.has_landmarks();
   ceres::Problem::Options of_problem;
@@ -100,36 +117,35 @@ ceres::Solver::Summary SolveFrozen(Trajectory& trajectory, Eigen::VectorXd& e, i
   StopCallback callback(stop);
   options.callbacks.push_back(&callback);
   options.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
   return summary;
 }
 
-bool GaussNewton(Trajectory& trajectory, const Eigen::VectorXd& e, Eigen::MatrixXd& u,
-                 Eigen::VectorXd& step) {
+bool GaussNewtonAt(Trajectory& trajectory, const Eigen::VectorXd& e, GaussNewton& at) {
   const Eigen::Index n = e.size(), m = trajectory.residuals();
   if (trajectory.has_landmarks()) {
     Trajectory::Reduced reduced;
     if (!trajectory.Reduce(e.data(), true, reduced)) return false;
     const Eigen::LLT<Eigen::MatrixXd> llt(reduced.a);
-    u = llt.matrixU();
-    step = -llt.solve(reduced.g);
+    at.cost = reduced.cost;
+    at.u = llt.matrixU();
+    at.step = -llt.solve(reduced.g);
     return llt.info() == Eigen::Success;
   }
   RowMajor j = RowMajor::Identity(n + m, n);
-  Eigen::VectorXd r(n + m);
-  r.head(n) = e;
-  if (!trajectory.Evaluate(e.data(), r.data() + n, j.data() + n * n)) return false;
+  Eigen::VectorXd r(m), weighted(n + m);
+  if (!trajectory.Evaluate(e.data(), r.data(), j.data() + n * n)) return false;
+  at.cost = CostOf(trajectory, e, r);
+  weighted << e, r;
   for (const Trajectory::Part& part : trajectory.parts()) {
     if (part.loss.kind == LossKind::kNone) continue;
-    auto rows = r.segment(n + part.row, part.size);
-    const double root = std::sqrt(Weight(part.loss, rows.norm()));
-    rows *= root;
+    const double root = std::sqrt(Weight(part.loss, r.segment(part.row, part.size).norm()));
+    weighted.segment(n + part.row, part.size) *= root;
     j.middleRows(n + part.row, part.size) *= root;
   }
   const Eigen::HouseholderQR<Eigen::MatrixXd> qr(j);
-  u = qr.matrixQR().topRows(n).triangularView<Eigen::Upper>();
-  step = -qr.solve(r);
+  at.u = qr.matrixQR().topRows(n).triangularView<Eigen::Upper>();
+  at.step = -qr.solve(weighted);
   return true;
 }
 

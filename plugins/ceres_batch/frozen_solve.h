@@ -11,14 +11,19 @@
 /// The least squares problem of a Trajectory whose Q and R stand where they were frozen.
 namespace alidade::ceres_batch {
 
-/// Whether all models are defined at e.
-bool IsDefined(Trajectory& trajectory, const Eigen::VectorXd& e);
-/// Minimises over e from where it is, until `stop` is true.
+/// phi(e) = |e|^2 / 2 + sum_i rho_i(|r_i(e)|), the landmarks where they cost least. False where a
+/// model is not defined.
+bool CostAt(Trajectory& trajectory, const Eigen::VectorXd& e, double& cost);
+/// Minimises phi from e, until `stop` is true. Where there are no inputs it converges at once.
 ceres::Solver::Summary SolveFrozen(Trajectory& trajectory, Eigen::VectorXd& e, int max_iterations,
                                    const std::function<bool()>& stop);
-/// U (N x N, upper) with Cov(e) = (U'U)^-1, and the step -(U'U)^-1 J' r, of the weighted problem.
-/// False where a model is not defined.
-bool GaussNewton(Trajectory& trajectory, const Eigen::VectorXd& e, Eigen::MatrixXd& u,
-                 Eigen::VectorXd& step);
+/// phi about e, with the weights of robust losses as they are there.
+struct GaussNewton {
+  double cost = 0.0;     ///< phi(e)
+  Eigen::MatrixXd u;     ///< U, N x N, upper, with Cov(e) = (U'U)^-1
+  Eigen::VectorXd step;  ///< -(U'U)^-1 grad phi
+};
+/// False where a model is not defined, with `at` as it was or half done.
+bool GaussNewtonAt(Trajectory& trajectory, const Eigen::VectorXd& e, GaussNewton& at);
 
 }  // namespace alidade::ceres_batch

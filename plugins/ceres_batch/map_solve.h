@@ -1,16 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <ceres/solver.h>
-
 #include <Eigen/Core>
 #include <functional>
+#include <limits>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "alidade/build_plugin.h"
+#include "frozen_solve.h"
 #include "trajectory.h"
 
 namespace alidade::ceres_batch {
+
+struct SolveOptions {
+  int max_iterations = 50;
+  int max_outer_iterations = 20;
+  double max_dt_s = std::numeric_limits<double>::infinity();  ///< of a step of the motion
+};
+SolveOptions ReadSolveOptions(Params& params);
 
 /// The maximum a posteriori of a Trajectory: Q and R that depend on the state are frozen, the
 /// problem is solved, and so on until they settle.
@@ -19,42 +28,45 @@ namespace alidade::ceres_batch {
 /// without, Cov(e) = (U'U)^-1 and P_k = (U^-T S_k')'(U^-T S_k').
 class MapSolve {
  public:
-  struct Options {
-    int max_iterations = 50;
-    int max_outer_iterations = 20;
-  };
-  explicit MapSolve(const Options& options) : options_(options) {}
+  /// The values of all states, frame by frame.
+  using Values = std::vector<std::vector<double>>;
+
+  explicit MapSolve(const SolveOptions& options) : options_(options) {}
 
   /// Where `stop` is true, a solve ends by an Error of kStopped.
   void StopWhen(std::function<bool()> stop) { stop_ = std::move(stop); }
-  /// Freezes at e; false where a model is not defined there.
-  static bool CanStart(Trajectory& trajectory, const Eigen::VectorXd& e);
-  /// Solves from e, at which Q and R are frozen, until they settle.
-  void Solve(Trajectory& trajectory, Eigen::VectorXd& e);
-  /// U at e, and the Gauss-Newton step that it gives: Ceres stops before the last one. A solver
-  /// that stopped where this step, |U step| sigmas, is long was not led down by the Jacobian that
-  /// it was given. False where a model is not defined.
-  bool Covariances(Trajectory& trajectory, Eigen::VectorXd& e);
+  /// Solves from the problem linearised about `about`, or where that leaves the domain of a model,
+  /// from e = 0. False, and summary(), where there are no estimates.
+  bool SolveAll(Trajectory& trajectory, const Values& about, Eigen::VectorXd& e);
+  /// Solves from e, the solution before the last frame came, and new inputs at their mean. Where
+  /// that leaves the domain of a model, and with unit vectors, from the problem linearised about
+  /// `about`. False, and summary(), where there are no estimates.
+  bool SolveAnew(Trajectory& trajectory, const Values& about, Eigen::VectorXd& e);
   /// y = U^-T S' of a point, as Trajectory::Put takes it.
   Eigen::MatrixXd Whitened(const Trajectory::Point& point) const {
-    return u_.transpose().triangularView<Eigen::Lower>().solve(point.s.transpose());
+    return at_.u.transpose().triangularView<Eigen::Lower>().solve(point.s.transpose());
   }
 
   bool failed() const { return failed_; }  ///< not converged, or not settled
   const std::string& summary() const { return summary_; }
-  const Eigen::MatrixXd& u() const { return u_; }
+  const Eigen::MatrixXd& u() const { return at_.u; }
+  /// The event `not_converged` where the weights of robust losses did not settle.
+  void Note(Stamp stamp, std::vector<Event>& events) const;
   void HeedStop() const;
 
  private:
-  int Reweight(Trajectory& trajectory, Eigen::VectorXd& e);
+  bool SolveFrom(Trajectory& trajectory, Eigen::VectorXd& e);
+  bool NowhereToStart(const Trajectory& trajectory);
+  std::string Minimise(Trajectory& trajectory, Eigen::VectorXd& e);
+  int IterateWeights(Trajectory& trajectory, Eigen::VectorXd& e);
+  bool TakeLastStep(Trajectory& trajectory, Eigen::VectorXd& e);
   std::string WhyNot(const ceres::Solver::Summary& summary) const;
   bool Stopped() const { return stop_ && stop_(); }
 
-  Options options_;
+  SolveOptions options_;
   std::function<bool()> stop_;
-  Eigen::MatrixXd u_;
-  std::string summary_;
-  double cost_ = 0.0;  ///< of the last solve
+  GaussNewton at_;  ///< at the solution
+  std::string summary_, note_;
   bool failed_ = false;
 };
 

@@ -97,16 +97,23 @@ struct CostKind {
     const std::vector<Geometry> geometries = detail::SensorTraits<Sensor>::Geometries(model);
     const auto m = static_cast<std::size_t>(detail::SensorTraits<Sensor>::Rows(model));
     ALIDADE_EXPECTS(roles.size() == geometries.size() && w.size() == m * m);
-    std::vector<int> written(blocks.size());
+    std::vector<std::vector<bool>> taken, written;  // elements of each block
+    for (const int size : blocks) taken.emplace_back(static_cast<std::size_t>(size), false);
+    written = taken;
     for (std::size_t i = 0; i < roles.size(); ++i) {
       if (roles[i].block < 0) continue;
       const auto block = static_cast<std::size_t>(roles[i].block);
       ALIDADE_EXPECTS(block < blocks.size() && roles[i].offset >= 0 &&
                       roles[i].offset + geometries[i].ambient <= blocks[block]);
-      written[block] += geometries[i].tangent;
+      for (int k = 0; k < geometries[i].ambient; ++k) {
+        const auto at = static_cast<std::size_t>(roles[i].offset + k);
+        ALIDADE_EXPECTS(!taken[block][at]);
+        taken[block][at] = true;
+        written[block][at] = k < geometries[i].tangent;
+      }
     }
     for (std::size_t i = 0; i < blocks.size(); ++i) {
-      if (written[i] < blocks[i]) with_gaps.push_back(i);
+      if (std::ranges::count(written[i], false) > 0) with_gaps.push_back(i);
     }
     for (std::size_t i = 0; i < w.size(); ++i)
       isotropic = isotropic && w[i] == (i % (m + 1) == 0 ? w[0] : 0.0);

@@ -44,7 +44,7 @@ Trajectory::Trajectory(System system, const std::vector<StreamInfo>& streams, do
     geometry.Identity(value.data());
     initial_.Add(id, value.data(), Eigen::MatrixXd::Zero(geometry.tangent, geometry.tangent));
   }
-  turns_ = std::ranges::any_of(initial_.layout().blocks(), [](const Block& block) {
+  has_unit_vector_ = std::ranges::any_of(initial_.layout().blocks(), [](const Block& block) {
     return block.has_covariance() && block.geometry().kind == GeometryKind::kUnitVector;
   });
   if (has_landmarks()) AddKnown();
@@ -149,10 +149,10 @@ void Trajectory::AddFactors(const Frame& frame, const UpdateReport& report, Epoc
       epoch.factors.push_back(std::move(factor));
     }
   }
-  AddFirsts(epoch);
+  AddFirstValues(epoch);
   for (Factor& factor : epoch.factors) {
     const SensorBinding& sensor = SensorOf(factor);
-    if (factor.outcome != Outcome::kAccepted || SeesLandmarks(sensor)) continue;
+    if (factor.outcome != Outcome::kAccepted || ObservesLandmarks(sensor)) continue;
     if (!std::ranges::all_of(sensor.roles,
                              [&](const RoleBinding& role) { return AllPresent({role.block}); })) {
       factor.outcome = Outcome::kNotReady;
@@ -174,12 +174,12 @@ void Trajectory::AddPart(int size, const RobustLoss& loss) {
 }
 
 /// First values in an order in which each finds the blocks that it needs.
-void Trajectory::AddFirsts(Epoch& epoch) {
+void Trajectory::AddFirstValues(Epoch& epoch) {
   for (bool progress = true; progress;) {
     progress = false;
     for (std::size_t i = 0; i < epoch.factors.size(); ++i) {
       const SensorBinding& sensor = SensorOf(epoch.factors[i]);
-      if (epoch.factors[i].outcome != Outcome::kInitialised || SeesLandmarks(sensor)) {
+      if (epoch.factors[i].outcome != Outcome::kInitialised || ObservesLandmarks(sensor)) {
         continue;
       }
       const auto target = static_cast<std::size_t>(sensor.model.initialised_role());
@@ -190,7 +190,7 @@ void Trajectory::AddFirsts(Epoch& epoch) {
       const BlockId block = sensor.roles[target].block;
       if (present_[static_cast<std::size_t>(block)] || !AllPresent(others)) continue;
       present_[static_cast<std::size_t>(block)] = progress = true;
-      epoch.firsts.push_back({i, block, inputs_});
+      epoch.first_values.push_back({i, block, inputs_});
       inputs_ += sensor.model.measurement().geometry.tangent;
     }
   }
@@ -221,9 +221,20 @@ bool Trajectory::Begin(const double* e, bool sensitivity, Point& point) const {
 bool Trajectory::Advance(std::size_t k, const double* e, Point& point) const {
   const Epoch& epoch = epochs_[k];
   return std::ranges::all_of(epoch.steps, [&](const Step& step) { return Move(step, e, point); }) &&
-         std::ranges::all_of(epoch.firsts, [&](const First& first) {
+         std::ranges::all_of(epoch.first_values, [&](const FirstValue& first) {
            return Initialise(first, epoch.factors[first.factor], e, point);
          });
+}
+
+bool Trajectory::ForEachFrame(const Eigen::VectorXd& e, std::size_t count,
+                              const std::function<void(std::size_t, const Point&)>& take) const {
+  Point point;
+  if (count > 0 && !Begin(e.data(), true, point)) return false;
+  for (std::size_t k = 0; k < count; ++k) {
+    if (!Advance(k, e.data(), point)) return false;
+    take(k, point);
+  }
+  return true;
 }
 
 bool Trajectory::Evaluate(const double* e, double* r, double* j) const {
@@ -259,7 +270,7 @@ bool Trajectory::FreezeEpoch(Epoch& epoch, const double* e, Point& point) {
   for (Step& step : epoch.steps) {
     if (!FreezeStep(step, point) || !Move(step, e, point)) return false;
   }
-  for (const First& first : epoch.firsts) {
+  for (const FirstValue& first : epoch.first_values) {
     Factor& factor = epoch.factors[first.factor];
     Point values = point;  // R may depend on the first value itself
     values.s.resize(0, 0);
@@ -289,7 +300,7 @@ bool Trajectory::Freeze(const double* e) {
 void Trajectory::Put(std::size_t k, const Point& point, const Eigen::MatrixXd& y,
                      State& state) const {
   const std::vector<Block>& places = initial_.layout().blocks();
-  for (const First& first : epochs_[k].firsts) {
+  for (const FirstValue& first : epochs_[k].first_values) {
     const Block& place = places[static_cast<std::size_t>(first.block)];
     const int t = place.geometry().tangent;
     state.Add(first.block, point.x.data() + place.value_offset, Eigen::MatrixXd::Zero(t, t));
@@ -324,10 +335,10 @@ void Trajectory::Report(std::size_t k, const Point& point, UpdateReport& report)
     entry.outcome = factor.outcome;
     entry.z = factor.measurement.values;
     entry.nis = std::nan("");  // what is left after smoothing is no innovation
-    const bool sight = factor.landmark >= 0 && factor.outcome == Outcome::kAccepted;
-    if (factor.row < 0 && !sight) continue;
+    const bool of_landmark = factor.landmark >= 0 && factor.outcome == Outcome::kAccepted;
+    if (factor.row < 0 && !of_landmark) continue;
     std::vector<double> y;
-    if (sight) y = landmarks_[static_cast<std::size_t>(factor.landmark)].y;
+    if (of_landmark) y = landmarks_[static_cast<std::size_t>(factor.landmark)].y;
     entry.h.resize(entry.z.size());
     entry.innovation.resize(static_cast<std::size_t>(geometry.tangent));
     if (ModelOf(factor).Predict(RolesOf(factor, point, y).data(), entry.h.data()) != Status::kOk) {

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -98,17 +99,17 @@ class Trajectory {
   /// Cov(e) = (U'U)^-1. False where a model is not defined.
   bool PutMap(const double* e, const Eigen::MatrixXd& u, std::vector<LandmarkEstimate>& map);
   /// The inputs that solve the problem linearised about `trajectory`, the values of a filter frame
-  /// by frame (it may end early). Freezes there. False where that cannot be. Where turns(), it is
-  /// linearised about its own solution again until that settles.
+  /// by frame (it may end early). Freezes there. False where that cannot be. With a unit vector it
+  /// is linearised about its own solution again until that settles.
   bool Linearised(std::vector<std::vector<double>> trajectory, Eigen::VectorXd& e);
   /// Whether a block is a unit vector: its basis turns over at z = 0, and with it what an input of
   /// its motion means, so that x(e) jumps.
-  bool turns() const { return turns_; }
+  bool has_unit_vector() const { return has_unit_vector_; }
 
-  /// x_0 and S_0.
-  bool Begin(const double* e, bool sensitivity, Point& point) const;
-  /// From frame k - 1 (or the prior) to frame k.
-  bool Advance(std::size_t k, const double* e, Point& point) const;
+  /// Gives the points of e, of the first `count` frames, in turn. False where a model is not
+  /// defined, which ends it.
+  bool ForEachFrame(const Eigen::VectorXd& e, std::size_t count,
+                    const std::function<void(std::size_t, const Point&)>& take) const;
   /// `state`, that of frame k - 1, becomes the one of frame k: the values of `point`, with the
   /// covariance y' y for y = U^-T S'.
   void Put(std::size_t k, const Point& point, const Eigen::MatrixXd& y, State& state) const;
@@ -135,7 +136,7 @@ class Trajectory {
     Eigen::MatrixXd l;  ///< frozen
   };
   /// A factor whose measurement gives a block its first value.
-  struct First {
+  struct FirstValue {
     std::size_t factor;
     BlockId block;
     int column;
@@ -143,7 +144,7 @@ class Trajectory {
   struct Epoch {
     std::vector<Step> steps;  ///< that lead to it
     std::vector<Factor> factors;
-    std::vector<First> firsts;  ///< after the steps
+    std::vector<FirstValue> first_values;  ///< after the steps
     bool stale = false;
     std::vector<int> inputs;  ///< UpdateReport::inputs
     LandmarkCounts counts;    ///< of the filter
@@ -165,28 +166,32 @@ class Trajectory {
     double cost = 0.0;
     Eigen::MatrixXd c;                  ///< I + sum w J_l' J_l
     Eigen::VectorXd b;                  ///< l + sum w J_l' r
-    std::vector<std::size_t> epochs;    ///< that it is seen from, the first sight's first
+    std::vector<std::size_t> epochs;    ///< that it is seen from, the first observation's first
     std::vector<Eigen::MatrixXd> ties;  ///< sum w J_x' J_l of each of them, d rows
   };
-  /// What is done with a sight that is not defined: the problem is not defined, or it counts for
-  /// nothing.
+  /// Where an observation is not defined, nor is the problem; or it counts for nothing.
   enum class Undefined { kFails, kSkipped };
 
+  /// x_0 and S_0.
+  bool Begin(const double* e, bool sensitivity, Point& point) const;
+  /// From frame k - 1 (or the prior) to frame k.
+  bool Advance(std::size_t k, const double* e, Point& point) const;
   bool AddSteps(Stamp from, Stamp end, Epoch& epoch);
   void AddFactors(const Frame& frame, const UpdateReport& report, Epoch& epoch);
   void AddLandmarks(const UpdateReport& report, const Estimator& filter, Epoch& epoch);
   void AddKnown();
   void Begin(const Factor& factor, std::size_t index, const Estimator& filter);
-  void AddFirsts(Epoch& epoch);
+  void AddFirstValues(Epoch& epoch);
   void AddPart(int size, const RobustLoss& loss);
   /// Whether its landmark roles are filled by what a measurement names, not by blocks.
-  bool SeesLandmarks(const SensorBinding& sensor) const {
+  bool ObservesLandmarks(const SensorBinding& sensor) const {
     return has_landmarks() && sensor.model.has_landmark();
   }
   void Shift(int columns, int rows);
   bool AllPresent(const std::vector<BlockId>& blocks) const;
   bool Move(const Step& step, const double* e, Point& point) const;
-  bool Initialise(const First& first, const Factor& factor, const double* e, Point& point) const;
+  bool Initialise(const FirstValue& first, const Factor& factor, const double* e,
+                  Point& point) const;
   bool Invert(const Factor& factor, const Eigen::VectorXd& d, const double* prior,
               const Point& point, const std::string& name, Inverse& inverse) const;
   bool FreezeEpoch(Epoch& epoch, const double* e, Point& point);
@@ -208,10 +213,11 @@ class Trajectory {
   bool NormalOf(const MapLandmark& landmark, const Eigen::VectorXd& l,
                 const std::vector<Point>& points, Undefined undefined, Normal& normal,
                 Information* information) const;
-  bool AddSight(const Factor& factor, std::size_t epoch, const MapLandmark& landmark,
-                const Inverse& place, const Point& point, Normal& normal,
-                Information* information) const;
-  bool Settle(MapLandmark& landmark, const std::vector<Point>& points, Undefined undefined) const;
+  bool AddObservation(const Factor& factor, std::size_t epoch, const MapLandmark& landmark,
+                      const Inverse& place, const Point& point, Normal& normal,
+                      Information* information) const;
+  bool OptimiseLandmark(MapLandmark& landmark, const std::vector<Point>& points,
+                        Undefined undefined) const;
   bool Project(const double* e, const std::vector<Point>& points, Undefined undefined,
                bool derivatives, Reduced& reduced);
   bool AddPlain(const std::vector<Point>& points, Undefined undefined, Information* information,
@@ -242,7 +248,7 @@ class Trajectory {
   Stamp stamp_ = kNoStamp;
   ControlInputs controls_;
   int inputs_ = 0, residuals_ = 0;
-  bool turns_ = false;
+  bool has_unit_vector_ = false;
   double change_ = 0.0;
   mutable std::string problem_;
 };

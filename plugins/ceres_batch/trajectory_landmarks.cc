@@ -54,15 +54,15 @@ void Trajectory::AddKnown() {
   }
 }
 
-/// The sights of a frame. A landmark begins with the one that the filter began it with; what the
-/// filter had no landmark for, or could not predict, is left out.
+/// The observations of a frame. A landmark begins with the one that the filter began it with; what
+/// the filter had no landmark for, or could not predict, is left out.
 void Trajectory::AddLandmarks(const UpdateReport& report, const Estimator& filter, Epoch& epoch) {
   epoch.counts.initialised = report.landmarks.initialised;
   epoch.counts.deleted = report.landmarks.deleted;
   std::vector<std::size_t> begin;
   for (std::size_t i = 0; i < epoch.factors.size(); ++i) {
     Factor& factor = epoch.factors[i];
-    if (!SeesLandmarks(SensorOf(factor))) continue;
+    if (!ObservesLandmarks(SensorOf(factor))) continue;
     if (factor.outcome == Outcome::kInitialised) begin.push_back(i);
     if (factor.outcome != Outcome::kAccepted) continue;
     const Outcome told = report.measurements()[i].outcome;
@@ -74,7 +74,8 @@ void Trajectory::AddLandmarks(const UpdateReport& report, const Estimator& filte
       continue;
     }
     factor.landmark = current->second;
-    landmarks_[static_cast<std::size_t>(current->second)].sights.push_back({epochs_.size(), i});
+    landmarks_[static_cast<std::size_t>(current->second)].observations.push_back(
+        {epochs_.size(), i});
   }
   for (const std::size_t i : begin) {
     Begin(epoch.factors[i], i, filter);
@@ -132,8 +133,8 @@ bool Trajectory::Place(const MapLandmark& landmark, const Eigen::VectorXd& l,
   return true;
 }
 
-/// R of all sights of landmarks, these where they were found last. One that is not defined keeps
-/// what it had.
+/// R of all observations of landmarks, these where they were found last. One that is not defined
+/// keeps what it had.
 bool Trajectory::FreezeLandmarks(const std::vector<Point>& points) {
   for (MapLandmark& landmark : landmarks_) {
     if (landmark.l.size() == 0) landmark.l = landmark.from;
@@ -146,7 +147,7 @@ bool Trajectory::FreezeLandmarks(const std::vector<Point>& points) {
         return false;
       }
     }
-    for (const auto& [epoch, index] : landmark.sights) {
+    for (const auto& [epoch, index] : landmark.observations) {
       Factor& factor = epochs_[epoch].factors[index];
       std::vector<double> h(factor.measurement.values.size());
       const std::vector<const double*> roles = RolesOf(factor, points[epoch], place.y);
@@ -162,10 +163,11 @@ Eigen::MatrixXd Trajectory::Packed(const Eigen::MatrixXd& rows) const {
   return rows(read_, Eigen::all);
 }
 
-/// One sight: J_x = a_x at its frame, a_y J_y_x at the first sight's, J_l = a_y J_y_l.
-bool Trajectory::AddSight(const Factor& factor, std::size_t epoch, const MapLandmark& landmark,
-                          const Inverse& place, const Point& point, Normal& normal,
-                          Information* information) const {
+/// One observation: J_x = a_x at its frame, a_y J_y_x at the first observation's, J_l = a_y J_y_l.
+bool Trajectory::AddObservation(const Factor& factor, std::size_t epoch,
+                                const MapLandmark& landmark, const Inverse& place,
+                                const Point& point, Normal& normal,
+                                Information* information) const {
   const int n = initial_.covariance().size();
   const auto d = std::ssize(read_);
   Eigen::VectorXd r;
@@ -206,7 +208,7 @@ bool Trajectory::AddSight(const Factor& factor, std::size_t epoch, const MapLand
 }
 
 /// The normal equations of a landmark at the inputs l; into `information`, unless null, what its
-/// sights tell of the states, l apart.
+/// observations tell of the states, l apart.
 bool Trajectory::NormalOf(const MapLandmark& landmark, const Eigen::VectorXd& l,
                           const std::vector<Point>& points, Undefined undefined, Normal& normal,
                           Information* information) const {
@@ -221,9 +223,10 @@ bool Trajectory::NormalOf(const MapLandmark& landmark, const Eigen::VectorXd& l,
     normal.epochs.push_back(landmark.first->epoch);
     normal.ties.emplace_back(Eigen::MatrixXd::Zero(std::ssize(read_), l.size()));
   }
-  for (const auto& [epoch, index] : landmark.sights) {
+  for (const auto& [epoch, index] : landmark.observations) {
     const Factor& factor = epochs_[epoch].factors[index];
-    const bool added = AddSight(factor, epoch, landmark, place, points[epoch], normal, information);
+    const bool added =
+        AddObservation(factor, epoch, landmark, place, points[epoch], normal, information);
     if (!added && undefined == Undefined::kFails) return false;
   }
   return true;
@@ -231,8 +234,8 @@ bool Trajectory::NormalOf(const MapLandmark& landmark, const Eigen::VectorXd& l,
 
 /// Puts the landmark where it costs least, seen from the points: Gauss-Newton steps, halved until
 /// the cost falls.
-bool Trajectory::Settle(MapLandmark& landmark, const std::vector<Point>& points,
-                        Undefined undefined) const {
+bool Trajectory::OptimiseLandmark(MapLandmark& landmark, const std::vector<Point>& points,
+                                  Undefined undefined) const {
   constexpr int kMostSteps = 50, kMostHalvings = 20;
   constexpr double kSettled = 1e-10;  // sigma of what is left to go
   Normal now, next;

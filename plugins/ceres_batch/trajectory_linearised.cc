@@ -16,7 +16,7 @@ bool Trajectory::Linearised(std::vector<std::vector<double>> trajectory, Eigen::
   for (int pass = 0; pass < kMostPasses; ++pass) {
     if (!StepAbout(trajectory, e, step)) return pass > 0;
     e += step;
-    if (!turns_ || step.norm() <= kSettled) break;
+    if (!has_unit_vector_ || step.norm() <= kSettled) break;
   }
   return true;
 }
@@ -54,7 +54,7 @@ bool Trajectory::StepAbout(std::vector<std::vector<double>>& trajectory, const E
   for (std::size_t k = 0; k < epochs_.size(); ++k) {
     if (!FreezeEpoch(epochs_[k], e.data(), point)) return false;
     if (k < trajectory.size()) PutAbout(trajectory[k], point);
-    if (turns_ || has_landmarks()) points.push_back(point);
+    if (has_unit_vector_ || has_landmarks()) points.push_back(point);
     for (Factor& factor : epochs_[k].factors) {
       // What is not defined here tells nothing yet; it may be at the solution.
       if (factor.row < 0 || !FreezeFactor(factor, point)) continue;
@@ -75,7 +75,7 @@ bool Trajectory::StepAbout(std::vector<std::vector<double>>& trajectory, const E
     step = -j.householderQr().solve(r);
   }
   if (!step.allFinite()) return Fail("the problem linearised about the filter has no solution");
-  if (!turns_) return true;
+  if (!has_unit_vector_) return true;
   trajectory.resize(points.size());
   for (std::size_t k = 0; k < points.size(); ++k) {
     const Eigen::VectorXd d = points[k].offset + points[k].s * step;

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/src/number_text.h"
-#include "geometry_jacobian.h"
+#include "sensor_cost.h"
 #include "trajectory.h"
 
 /// The models of a Trajectory: their values, derivatives and noise at a point of it.
@@ -21,6 +21,19 @@ std::vector<int> RowsOf(const StateLayout& layout, const std::vector<BlockId>& b
     }
   }
   return rows;
+}
+
+/// d = z (-) h and, unless null, j = dd/dh (row-major), in the tangent at h.
+void Difference(const Geometry& geometry, const double* z, const double* h, double* d, double* j) {
+  if (geometry.kind == GeometryKind::kUnitQuaternion) {
+    detail::Difference<UnitQuaternion>(z, h, d, j);
+  } else if (geometry.kind == GeometryKind::kUnitVector) {
+    detail::Difference<UnitVector>(z, h, d, j);
+  } else {
+    const int t = geometry.tangent;
+    geometry.Minus(z, h, d);
+    if (j != nullptr) Eigen::Map<RowMajor>(j, t, t) = -RowMajor::Identity(t, t);
+  }
 }
 
 /// What a status says that is not kOk.
@@ -127,7 +140,7 @@ bool Trajectory::Invert(const Factor& factor, const Eigen::VectorXd& d, const do
 }
 
 /// y = g(x, z'), z' = z (+) L e; S_y = J_y_x S + [0  J_y_z' J_z' L  0], offset_y = J_y_x offset.
-bool Trajectory::Initialise(const First& first, const Factor& factor, const double* e,
+bool Trajectory::Initialise(const FirstValue& first, const Factor& factor, const double* e,
                             Point& point) const {
   const Block& block = initial_.layout()[first.block];
   const int m = SensorOf(factor).model.measurement().geometry.tangent;
@@ -209,13 +222,13 @@ bool Trajectory::Residual(const Factor& factor, const Point& point, const std::v
   }
   const double* z = factor.measurement.values.data();
   r.resize(geometry.tangent);
-  geometry.Minus(z, h.data(), r.data());
+  RowMajor j_r_h(geometry.tangent, geometry.tangent);
+  Difference(geometry, z, h.data(), r.data(), a == nullptr ? nullptr : j_r_h.data());
   const auto whiten = factor.l.triangularView<Eigen::Lower>();
   whiten.solveInPlace(r);
   bool finite = r.allFinite();
   if (a != nullptr) {
     a->setZero(geometry.tangent, width);
-    const Eigen::MatrixXd j_r_h = MinusJacobian(geometry, z, h.data());
     for (std::size_t i = 0; i < roles.size(); ++i) {
       if (into[i] != nullptr) a->middleCols(columns[i], strides[i]) += j_r_h * jacobians[i];
     }

@@ -70,7 +70,7 @@ bool Trajectory::Project(const double* e, const std::vector<Point>& points, Unde
   if (!AddPlain(points, undefined, into, reduced.cost)) return false;
   Normal normal;
   for (MapLandmark& landmark : landmarks_) {
-    if (!Settle(landmark, points, undefined) ||
+    if (!OptimiseLandmark(landmark, points, undefined) ||
         !NormalOf(landmark, landmark.l, points, undefined, normal, into)) {
       return false;
     }
@@ -170,14 +170,15 @@ bool Trajectory::PutMap(const double* e, const Eigen::MatrixXd& u,
 /// Place and covariance of a landmark whose blocks have the covariance p.
 void Trajectory::Describe(const MapLandmark& landmark, const Eigen::MatrixXd& p,
                           LandmarkEstimate& estimate) const {
-  const std::optional<MapLandmark::Sight> any =
+  const std::optional<MapLandmark::Observation> any =
       landmark.first ? landmark.first
-                     : (landmark.sights.empty() ? std::nullopt : std::optional(landmark.sights[0]));
+                     : (landmark.observations.empty() ? std::nullopt
+                                                      : std::optional(landmark.observations[0]));
   if (!any) return;
   const Factor& factor = epochs_[any->epoch].factors[any->factor];
   const std::vector<Space>& roles = ModelOf(factor).roles();
   estimate.form = FormOf(roles);
-  estimate.tried = estimate.accepted = static_cast<int>(landmark.sights.size());
+  estimate.tried = estimate.accepted = static_cast<int>(landmark.observations.size());
   if (!estimate.form) return;
   const auto last = p.rows() - 1;
   estimate.inverse_distance = IsXyz(*estimate.form) ? std::nan("") : landmark.y.back();

@@ -64,7 +64,7 @@ void Trajectory::Shift(int columns, int rows) {
   for (Epoch& epoch : epochs_) {
     epoch.column = &epoch == &epochs_.front() ? 0 : epoch.column + columns;
     for (Step& step : epoch.steps) step.column += columns;
-    for (First& first : epoch.firsts) first.column += columns;
+    for (FirstValue& first : epoch.first_values) first.column += columns;
     for (Factor& factor : epoch.factors) {
       if (factor.row < 0) continue;
       factor.row -= rows;

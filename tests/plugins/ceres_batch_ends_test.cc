@@ -225,6 +225,31 @@ TEST(CeresBatchEnds, AWrongJacobianIsNotConvergence) {
   }
 }
 
+// The steps that a loss asks for beyond the solver's end never raise the cost: with a scale that no
+// residual comes near to they leave the estimates where they are without a loss.
+TEST(CeresBatchEnds, ALossTakesNoStepUphill) {
+  const auto last_of = [](const RobustLoss& loss) {
+    System system = testing::MovingPoint(0.7);
+    AddSensor(system, "z", InProcessSensor(WrongSign(-1.0), "square"), {"p.x"});
+    system.sensors[0].loss = loss;
+    const auto batch = MakeBatch(system, "max_iterations: 500\n");
+    for (int k = 0; k < 20; ++k) batch->Process(FrameAt(0.05 * k, {{0, 4.0 + 0.1 * k}}));
+    std::pair<double, std::string> last;
+    batch->Smooth([&](std::size_t, const State& state, const UpdateReport& report) {
+      last.first = testing::ValueOf(state, "p.x");
+      for (const Event& event : report.events) last.second += event.kind + ": " + event.text + '\n';
+    });
+    EXPECT_TRUE(batch->failed());
+    return last;
+  };
+  const auto [expected, none] = last_of({});
+  const auto [found, said] = last_of({LossKind::kHuber, 1e9});
+  EXPECT_NEAR(found / expected, 1.0, 1e-4) << said;  // 1e8, and rounding as far off
+  EXPECT_EQ(said.find("not_converged: the weights of the losses did not settle in 0 steps: "), 0u)
+      << said;
+  EXPECT_NE(said.find("it does not lower the cost\n"), std::string::npos) << said;
+}
+
 // ---- the seam of a unit vector ------------------------------------------------------------------
 
 constexpr double kSigma = 2e-3;  // rad

@@ -211,6 +211,22 @@ TEST(SensorCost, RefusesPlacesOutsideItsBlocks) {
   EXPECT_THROW(Kind(model, {{0, 0}}, {1}, {1.0, 0.0}), ContractViolation);
 }
 
+// Two roles on one number would leave the other column of the block as it was.
+TEST(SensorCost, RefusesRolesThatShareAPlace) {
+  const SensorModel sensor = InProcessSensor(Biased(), "biased");
+  using Kind = CostKind<SensorModel>;
+  EXPECT_THROW(Kind(sensor, {{0, 0}, {0, 0}}, {2}, {1.0}), ContractViolation);
+  const double z = 5.0;
+  const Kind apart(sensor, {{0, 2}, {0, 0}}, {4}, {1.0});
+  EXPECT_EQ(At(SensorCost(apart, &z), {{0.5, 7.0, 1.0, 7.0}}).j[0],
+            (std::vector<double>{-1.0, 0.0, -1.0, 0.0}));
+  const SelfCalibratingFeature<RadialLens> model(1.0);
+  const std::vector<double> w{1.0, 0.0, 0.0, 1.0};
+  using Direct = CostKind<SelfCalibratingFeature<RadialLens>>;
+  EXPECT_THROW(Direct(model, {{0, 0}, {0, 2}, {1, 0}, {2, 0}}, {7, 3, 3}, w), ContractViolation);
+  EXPECT_THROW(Direct(model, {{0, 0}, {0, 4}, {0, 6}, {1, 0}}, {11, 3}, w), ContractViolation);
+}
+
 TEST(GeometryManifold, MovesPartsByTheirGeometryAndHoldsOthers) {
   const GeometryManifold manifold({{Geometry::Vector(2), true},
                                    {Geometry::UnitQuaternion(), false},

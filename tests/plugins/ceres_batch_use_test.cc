@@ -64,9 +64,11 @@ Experiment MakeWithBatch(bool outliers, bool accepted) {
   const System system = testing::DepthFilter();
   EkfOptions options;
   options.gate = 0.9999;
+  auto ekf = std::make_unique<Ekf>(system, options, testing::StreamsOf(system));
   experiment.estimators.push_back(
-      {"ekf", "ekf", system, std::make_unique<Ekf>(system, options, testing::StreamsOf(system))});
-  experiment.estimators.push_back({"batch", "ceres_batch", system, std::make_unique<Told>(system)});
+      {"ekf", "ekf", system, std::move(ekf), OnDivergence::kReport, ""});
+  experiment.estimators.push_back(
+      {"batch", "ceres_batch", system, std::make_unique<Told>(system), OnDivergence::kReport, ""});
   if (accepted) experiment.estimators[1].accepted_by = 0;
   return experiment;
 }

@@ -11,9 +11,9 @@ namespace alidade::ceres_batch {
 
 /// The EKF without gate that goes along: it gives a Trajectory values to start from, and says which
 /// measurements give blocks their first values.
-class Companion {
+class InitialisingFilter {
  public:
-  Companion(const System& system, double max_dt_s, const std::vector<StreamInfo>& streams)
+  InitialisingFilter(const System& system, double max_dt_s, const std::vector<StreamInfo>& streams)
       : filter_(system, OptionsOf(max_dt_s), streams) {}
 
   Ekf& filter() { return filter_; }

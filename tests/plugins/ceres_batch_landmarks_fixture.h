@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "ceres_batch_fixture.h"
+#include "support/landmark_models.h"
+
+/// What the tests of the batch with landmarks share.
+namespace alidade::testing {
+
+using Eigen::MatrixXd;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+/// What a batch says of a run: the camera frame by frame, the map, the events.
+struct Found {
+  std::vector<State> states;
+  std::vector<LandmarkEstimate> map;
+  std::vector<Event> events;
+  bool failed = false;
+
+  Vector3d Camera(std::size_t k) const {
+    const State& state = states[k];
+    return Eigen::Map<const Vector3d>(state.value(state.layout().Find("cam.position")));
+  }
+  const LandmarkEstimate& Landmark(std::int64_t id) const {
+    return *std::ranges::find(map, id, &LandmarkEstimate::id);
+  }
+  /// The number behind `cost` in the event of the solve.
+  double Cost() const { return std::stod(events.back().text.substr(5)); }
+};
+
+inline Found Solve(Estimator& batch, const std::vector<Frame>& frames) {
+  Found found;
+  for (const Frame& frame : frames) batch.Process(frame);
+  batch.Smooth([&](std::size_t, const State& state, const UpdateReport& report) {
+    found.states.push_back(state);
+    found.events.insert(found.events.end(), report.events.begin(), report.events.end());
+  });
+  found.map = batch.landmarks();
+  found.failed = batch.failed();
+  return found;
+}
+inline Found Solve(const System& system, const std::vector<Frame>& frames,
+                   const std::string& options = "") {
+  return Solve(*MakeBatch(system, options), frames);
+}
+
+inline constexpr double kPixel = 0.004, kRho = 0.5, kRhoSigma = 0.15, kWalk = 0.1, kDt = 0.1;
+
+/// A camera that walks before points, and what it sees of them: the problem of MapSystem in its
+/// positions r_1.. and the points p_0.., all of them 3 numbers, side by side in one vector x.
+struct Problem {
+  int steps, points;
+  std::vector<Frame> frames;
+  VectorXd truth;
+  RobustLoss loss;
+
+  Problem(int of_steps, int of_points, int outlier_every = 0) : steps(of_steps), points(of_points) {
+    Random random(11);
+    truth.setZero(3 * (steps - 1 + points));
+    for (int k = 1; k < steps; ++k) {
+      for (int e = 0; e < 3; ++e) {
+        truth[3 * (k - 1) + e] = Camera(truth, k - 1)[e] +
+                                 kWalk * std::sqrt(kDt) * random.Normal() + (e == 0 ? 0.02 : 0);
+      }
+    }
+    for (int i = 0; i < points; ++i) {
+      truth.segment<3>(3 * (steps - 1 + i)) =
+          Vector3d(0.5 * random.Normal(), 0.5 * random.Normal(), 1.7 + 0.2 * (i % 5));
+    }
+    int count = 0;
+    for (int k = 0; k < steps; ++k) {
+      std::vector<Sighting> sights;
+      for (int i = 0; i < points; ++i) {
+        if (k < i / 3 || (k + i) % 7 == 0) continue;
+        Vector2d z = Pixel(truth, k, i) + kPixel * Vector2d(random.Normal(), random.Normal());
+        if (outlier_every > 0 && ++count % outlier_every == 0) z[0] += 0.1;
+        sights.push_back({i, {z[0], z[1]}});
+      }
+      frames.push_back(Sights(kDt * k, sights));
+    }
+  }
+  Vector3d Camera(const VectorXd& x, int k) const {
+    return k == 0 ? Vector3d::Zero() : Vector3d(x.segment<3>(3 * (k - 1)));
+  }
+  Vector3d Point(const VectorXd& x, std::int64_t i) const {
+    return x.segment<3>(3 * (steps - 1 + i));
+  }
+  Vector2d Pixel(const VectorXd& x, int k, std::int64_t i) const {
+    return (Point(x, i) - Camera(x, k)).hnormalized();
+  }
+  /// All residuals over their sigma, and after which of them a sight of two ends.
+  VectorXd Residuals(const VectorXd& x, std::vector<Eigen::Index>* sights = nullptr) const {
+    std::vector<double> r;
+    for (int k = 1; k < steps; ++k) {
+      const Vector3d w = (Camera(x, k) - Camera(x, k - 1)) / (kWalk * std::sqrt(kDt));
+      r.insert(r.end(), {w[0], w[1], w[2]});
+    }
+    std::vector<bool> seen(static_cast<std::size_t>(points), false);
+    for (int k = 0; k < steps; ++k) {
+      for (const Measurement& m : frames[static_cast<std::size_t>(k)].measurements) {
+        const Vector2d d = Vector2d(m.values[0], m.values[1]) - Pixel(x, k, m.landmark);
+        r.insert(r.end(), {d[0] / kPixel, d[1] / kPixel});
+        const auto i = static_cast<std::size_t>(m.landmark);
+        if (seen[i]) {
+          if (sights != nullptr) sights->push_back(std::ssize(r));
+        } else {  // the first sight and the prior give it its place
+          seen[i] = true;
+          r.push_back((1.0 / (Point(x, m.landmark) - Camera(x, k)).norm() - kRho) / kRhoSigma);
+        }
+      }
+    }
+    return Eigen::Map<VectorXd>(r.data(), std::ssize(r));
+  }
+  double Cost(const VectorXd& x) const {
+    std::vector<Eigen::Index> sights;
+    const VectorXd r = Residuals(x, &sights);
+    double cost = 0.5 * r.squaredNorm();
+    for (const Eigen::Index end : sights) {
+      const double d = r.segment<2>(end - 2).norm();
+      cost += Rho(loss, d) - 0.5 * d * d;
+    }
+    return cost;
+  }
+  /// J' J and J' r by central differences, each sight counted with its weight at x.
+  void NormalEquations(const VectorXd& x, MatrixXd& a, VectorXd& b) const {
+    std::vector<Eigen::Index> sights;
+    const VectorXd r = Residuals(x, &sights);
+    MatrixXd j(r.size(), x.size());
+    constexpr double kStep = 1e-5;
+    for (Eigen::Index i = 0; i < x.size(); ++i) {
+      const VectorXd d = kStep * VectorXd::Unit(x.size(), i);
+      j.col(i) = (Residuals(x + d) - Residuals(x - d)) / (2.0 * kStep);
+    }
+    VectorXd w = VectorXd::Ones(r.size());
+    for (const Eigen::Index end : sights) {
+      w.segment<2>(end - 2).setConstant(Weight(loss, r.segment<2>(end - 2).norm()));
+    }
+    a = j.transpose() * w.asDiagonal() * j;
+    b = j.transpose() * w.asDiagonal() * r;
+  }
+  System Filter() const {
+    System system = MapSystem(InverseDepthPixels(kPixel), WithPrior(kRho, kRhoSigma));
+    system.sensors[0].loss = loss;
+    return system;
+  }
+  VectorXd Solution(const Found& found) const {
+    VectorXd x(truth.size());
+    for (int k = 1; k < steps; ++k) {
+      x.segment<3>(3 * (k - 1)) = found.Camera(static_cast<std::size_t>(k));
+    }
+    for (int i = 0; i < points; ++i) {
+      x.segment<3>(3 * (steps - 1 + i)) = found.Landmark(i).position;
+    }
+    return x;
+  }
+  /// At the minimum of the cost written out here, with its covariance.
+  void ExpectSolved(const Found& found) const {
+    ASSERT_FALSE(found.failed);
+    ASSERT_EQ(found.states.size(), frames.size());
+    ASSERT_EQ(found.map.size(), static_cast<std::size_t>(points));
+    const VectorXd x = Solution(found);
+    EXPECT_NEAR(found.Cost(), Cost(x), 1e-7 * Cost(x));  // nine digits are told
+    EXPECT_LT(Cost(x), Cost(truth));
+    MatrixXd a;
+    VectorXd b;
+    NormalEquations(x, a, b);
+    // What is left to go, in sigma. Third derivatives times 1e-10 leave 1e-8 in J.
+    const MatrixXd p = a.inverse();
+    EXPECT_LT(std::sqrt(b.dot(p * b)), 1e-5);
+    const auto expect_equal = [&](const MatrixXd& its, Eigen::Index at) {
+      const MatrixXd expected = p.block<3, 3>(at, at);
+      EXPECT_LT((its - expected).norm(), 1e-6 * expected.norm()) << at;
+    };
+    for (int k = 1; k < steps; ++k) {
+      expect_equal(found.states[static_cast<std::size_t>(k)].covariance().Dense(), 3 * (k - 1));
+    }
+    for (int i = 0; i < points; ++i) {
+      expect_equal(found.Landmark(i).covariance, 3 * (steps - 1 + i));
+    }
+  }
+};
+
+}  // namespace alidade::testing

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Which landmarks a batch has, and how its camera moves.
+#include "ceres_batch_landmarks_fixture.h"
+#include "scene_fixture.h"
+
+namespace alidade {
+namespace {
+
+using testing::Found;
+using testing::Problem;
+using testing::Solve;
+
+TEST(CeresBatchLandmarks, WhatTheFilterForgetsAndMeetsAgainIsAnotherLandmark) {
+  const Problem problem(25, 12);
+  std::vector<Frame> frames = problem.frames;
+  for (std::size_t k = 10; k < 14; ++k) {  // landmark 4 is out of sight
+    std::erase_if(frames[k].measurements, [](const Measurement& m) { return m.landmark == 4; });
+  }
+  System system = problem.Filter();
+  system.landmarks->unseen_frames = 3;
+  const Found found = Solve(system, frames);
+  ASSERT_FALSE(found.failed);
+  EXPECT_EQ(found.Landmark(4).generation, 1);
+  EXPECT_EQ(found.Landmark(3).generation, 0);
+  // The same as if it had come with another id.
+  for (std::size_t k = 14; k < frames.size(); ++k) {
+    for (Measurement& m : frames[k].measurements) {
+      if (m.landmark == 4) m.landmark = 104;
+    }
+  }
+  const Found other = Solve(system, frames);
+  EXPECT_EQ(other.Cost(), found.Cost());
+  EXPECT_LT((other.Landmark(104).position - found.Landmark(4).position).norm(), 1e-9);
+}
+
+// What waits in the filter that lends its measurements is not lent: it would wait twice.
+TEST(CeresBatchLandmarks, WhatAFilterAcceptedEntersAtOnce) {
+  const Problem problem(12, 8);
+  System system = problem.Filter();
+  system.landmarks->enter_after = 3;
+  const auto initialised = [&](const std::string& options) {
+    const auto batch = testing::MakeBatch(system, options + "data: so_far\n");
+    return batch->Process(problem.frames[0]).landmarks.initialised;
+  };
+  EXPECT_EQ(initialised(""), 0);
+  EXPECT_EQ(initialised("use: {accepted_by: ekf}\n"),
+            static_cast<int>(problem.frames[0].measurements.size()));
+}
+
+TEST(CeresBatchLandmarks, GivesTheSameBytesTwice) {
+  const Problem problem(15, 8);
+  const Found one = Solve(problem.Filter(), problem.frames);
+  const Found two = Solve(problem.Filter(), problem.frames);
+  EXPECT_EQ(problem.Solution(one), problem.Solution(two));
+  EXPECT_EQ(one.events.back().text, two.events.back().text);
+}
+
+// ---- a camera that turns ------------------------------------------------------------------------
+
+const std::string kMotion =
+    "state: {cam: {model: quaternion_pose, noise: {linear_acceleration: 0.3, "
+    "angular_acceleration: 0.05}, initial: {position: {mean: [0, 0, 0], sigma: 0}, orientation: "
+    "{mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0}, velocity: {mean: [0.2, 0, 0], sigma: 0.1}, "
+    "angular_velocity: {mean: [0, 0, 0], sigma: 0.05}}}}\n";
+const std::string kSensors =
+    "landmarks: {form: inverse_depth, prior: {inverse_distance: 0.39, sigma: 0.09}}\n"
+    "sensors:\n"
+    "  pixels: {model: inverse_depth_feature, stream: tracks, sigma_px: 1, roles: {position: "
+    "cam.position, orientation: cam.orientation, landmark: landmarks}}\n"
+    "  known: {model: depth_feature, stream: known, sigma_px: 1, sigma_depth_m: 0.02, roles: "
+    "{position: cam.position, orientation: cam.orientation, landmark: landmarks}}\n";
+const std::string kDrawn =
+    "frames: 40, rate_hz: 30, noise_px: 1, known: {count: 4, relative_sigma: 0.005}, "
+    "points: {box: {min: [-0.8, -0.7, 1.6], max: [1.2, 0.7, 3.6]}, count: 40}, trajectory: "
+    "{model: {linear_acceleration: 0.3, angular_acceleration: 0.05, velocity: [0.2, 0, 0]}}";
+
+// Its noise is of rank 6 in 12: v' and omega' are what moves r and q.
+TEST(CeresBatchLandmarks, NoiseOfLowRankMovesTheCameraExactlyAsItsModelSays) {
+  const testing::MadeScene made = testing::MakeScene(kDrawn);
+  const Config config = Config::FromText(testing::kCamera + kMotion + kSensors, "system.yaml");
+  const System system = BuildSystem(config.root(), testing::Shipped(), {});
+  const Config entry = Config::FromText("type: ceres_batch", "batch.yaml");
+  const auto batch = testing::Shipped().CreateEstimator("ceres_batch", entry.root())(
+      system, made.scene->streams());
+  std::vector<Frame> frames;
+  for (Frame frame; made.scene->Next(frame);) frames.push_back(frame);
+  const Found found = Solve(*batch, frames);
+  ASSERT_FALSE(found.failed) << found.events.back().text;
+  ASSERT_EQ(found.states.size(), 40u);
+  const StateLayout& layout = system.layout;
+  const auto value = [&](std::size_t k, const char* block) {
+    return found.states[k].value(layout.Find(block));
+  };
+  double moved = 0.0;
+  for (std::size_t k = 1; k < found.states.size(); ++k) {
+    const double dt_s = Seconds(frames[k].stamp - frames[k - 1].stamp);
+    double turn[3], expected[4], defect[3];
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_NEAR(value(k, "cam.position")[i],
+                  value(k - 1, "cam.position")[i] + dt_s * value(k, "cam.velocity")[i], 1e-12);
+      turn[i] = dt_s * value(k, "cam.angular_velocity")[i];
+      moved =
+          std::max(moved, std::abs(value(k, "cam.velocity")[i] - value(k - 1, "cam.velocity")[i]));
+    }
+    UnitQuaternion::Plus(value(k - 1, "cam.orientation"), turn, expected);
+    UnitQuaternion::Minus(value(k, "cam.orientation"), expected, defect);
+    for (const double d : defect) EXPECT_NEAR(d, 0.0, 1e-12);
+  }
+  EXPECT_GT(moved, 1e-3);  // there was something to hold
+  EXPECT_EQ(found.map.size(), 40u);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Problems without a noise input: no prior, no process noise. There is nothing to solve for.
+#include <cmath>
+
+#include "ceres_batch_fixture.h"
+#include "support/landmark_models.h"
+
+namespace alidade {
+namespace {
+
+using testing::FrameAt;
+
+constexpr double kGain = 2.0, kSigma = 0.3;
+
+/// A constant p.x, seen by a linear sensor.
+System Still(BlockStatus status) {
+  System system;
+  const MotionModel still = InProcessMotion(Constant<>(1), "constant");
+  const BlockId id = system.layout.Declare("p.x", "p", still.blocks()[0], status);
+  system.motions.push_back({"p", still, {id}});
+  system.priors.push_back({id, {1.5}, Eigen::MatrixXd::Zero(1, 1), ""});
+  testing::AddSensor(system, "z", InProcessSensor(testing::Linear(kGain, kSigma), "linear"),
+                     {"p.x"});
+  return system;
+}
+System StartsFromItsSensor() {
+  System system = Still(BlockStatus::kEstimated);
+  system.priors[0].from = "z";
+  return system;
+}
+
+/// The estimates, those of each frame or of a smoother, and what the events say.
+struct Estimated {
+  std::vector<State> states;
+  std::string said;
+};
+
+Estimated Estimate(const std::string& options, const System& system,
+                   const std::vector<Frame>& frames) {
+  const Config config = Config::FromText("type: " + options + "\n", "estimator.yaml");
+  const std::string type = config.root().At("type").Text();
+  const auto estimator =
+      testing::Shipped().CreateEstimator(type, config.root())(system, testing::StreamsOf(system));
+  Estimated result;
+  const auto note = [&](const State& state, const UpdateReport& report) {
+    result.states.push_back(state);
+    for (const Event& event : report.events) result.said += event.text;
+  };
+  for (const Frame& frame : frames) {
+    const UpdateReport& report = estimator->Process(frame);
+    if (!estimator->offline()) note(estimator->state(), report);
+  }
+  if (estimator->offline()) {
+    estimator->Smooth(
+        [&](std::size_t, const State& state, const UpdateReport& report) { note(state, report); });
+  }
+  EXPECT_FALSE(estimator->failed()) << options << ": " << result.said;
+  EXPECT_EQ(result.states.size(), frames.size()) << options;
+  return result;
+}
+
+const std::vector<std::string> kAll = {"ceres_batch", "ceres_batch\ndata: so_far",
+                                       "fixed_lag\nwindow_s: 0.15",
+                                       "fixed_lag\nwindow_s: 0.15\nestimate: oldest"};
+
+// Its value is the mean of what was measured, z / gain: P = sigma^2 / (gain^2 n).
+TEST(CeresBatchNoInputs, AFirstValueMayComeLate) {
+  const std::vector<double> z = {3.1, 2.8, 3.3, 2.9};
+  std::vector<Frame> frames = {FrameAt(0.0, {}), FrameAt(0.1, {})};
+  for (const double one : z) {
+    frames.push_back(FrameAt(0.1 * static_cast<double>(frames.size()), {{0, one}}));
+  }
+  for (const std::string& options : kAll) {
+    SCOPED_TRACE(options);
+    const std::vector<State> found = Estimate(options, StartsFromItsSensor(), frames).states;
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      EXPECT_EQ(found[k].layout()[0].present, k >= 2) << k;
+      EXPECT_EQ(found[k].covariance().size(), k >= 2 ? 1 : 0) << k;
+    }
+    EXPECT_NEAR(*found.back().value(0), 12.1 / 4.0 / kGain, 1e-9);
+    EXPECT_NEAR(found.back().covariance().Variance(0), kSigma * kSigma / (kGain * kGain * 4.0),
+                1e-9);
+  }
+}
+
+TEST(CeresBatchNoInputs, AFirstValueMayNeverCome) {
+  const std::vector<Frame> frames = {FrameAt(0.0, {}), FrameAt(0.1, {}), FrameAt(0.4, {})};
+  for (const std::string& options : kAll) {
+    for (const State& state : Estimate(options, StartsFromItsSensor(), frames).states) {
+      EXPECT_FALSE(state.layout()[0].present) << options;
+    }
+  }
+}
+
+// What is left of three measurements is the cost: r = (z - 3) / 0.3 = 1, -2 and 4.
+TEST(CeresBatchNoInputs, WhatIsFixedStaysAndHasItsCost) {
+  const std::vector<Frame> frames = {FrameAt(0.0, {{0, 3.3}}), FrameAt(0.1, {{0, 2.4}}),
+                                     FrameAt(0.3, {{0, 4.2}})};
+  System system = Still(BlockStatus::kFixed);
+  for (const std::string& options : kAll) {
+    const Estimated found = Estimate(options, system, frames);
+    for (const State& state : found.states) EXPECT_EQ(*state.value(0), 1.5) << options;
+    const bool tells = options == "ceres_batch";
+    EXPECT_EQ(found.said, tells ? "cost 10.5, 0 iterations in 1 solve: converged" : "") << options;
+  }
+  system.sensors[0].loss = {LossKind::kHuber, 1.0};  // rho = 0.5, 1.5 and 3.5
+  EXPECT_EQ(Estimate("ceres_batch", system, frames).said,
+            "cost 5.5, 0 iterations in 1 solve: converged");
+}
+
+// Offsets from a camera that stands still: each point is their mean.
+TEST(CeresBatchNoInputs, AFixedCameraHasAMap) {
+  System system = testing::MapSystem(testing::Offset(kSigma), {});
+  system.layout = {};
+  system.motions[0].model = InProcessMotion(Constant<>(3), "constant");
+  const Space place = system.motions[0].model.blocks()[0];
+  system.layout.Declare("cam.position", "cam", place, BlockStatus::kFixed);
+  std::vector<Frame> frames;
+  for (int k = 0; k < 4; ++k) {
+    frames.push_back(testing::Sights(0.1 * k, {{0, {1.0 + 0.1 * k, 2.0, 3.0}}}));
+  }
+  for (const std::string& options : {kAll[0], kAll[1]}) {
+    SCOPED_TRACE(options);
+    const Config config = Config::FromText("type: " + options + "\n", "estimator.yaml");
+    const auto batch = testing::Shipped().CreateEstimator("ceres_batch", config.root())(
+        system, testing::StreamsOf(system));
+    for (const Frame& frame : frames) batch->Process(frame);
+    if (batch->offline()) batch->Smooth([](std::size_t, const State&, const UpdateReport&) {});
+    ASSERT_FALSE(batch->failed());
+    const std::vector<LandmarkEstimate> map = batch->landmarks();
+    ASSERT_EQ(map.size(), 1u);
+    EXPECT_LT((map[0].position - Eigen::Vector3d(1.15, 2.0, 3.0)).norm(), 1e-9);
+    const Eigen::Matrix3d expected = kSigma * kSigma / 4.0 * Eigen::Matrix3d::Identity();
+    EXPECT_LT((map[0].covariance - expected).norm(), 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace alidade

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cstdio>
 #include <memory>
+#include <optional>
 
 #include "alidade/bundle_file.h"
 #include "command.h"
@@ -39,6 +40,7 @@ bool ParseLoss(const std::string& text, RobustLoss& loss) {
   }
   if (name != ToString(loss.kind)) return false;
   if (equals == text.size()) return true;
+  if (loss.kind == LossKind::kNone) return false;
   const char* const end = text.data() + text.size();
   const auto [rest, error] = std::from_chars(text.data() + equals + 1, end, loss.scale);
   return error == std::errc() && rest == end && loss.scale > 0.0 && loss.scale < 1e300;
@@ -47,7 +49,9 @@ bool ParseLoss(const std::string& text, RobustLoss& loss) {
 std::string IsLoss(const std::string& text) {
   RobustLoss loss;
   if (ParseLoss(text, loss)) return {};
-  return "'" + text + "' is no loss; expected none, huber or cauchy, or huber=SCALE in px, > 0";
+  return "'" + text +
+         "' is no loss; expected none, huber or cauchy, or huber=SCALE, in standard "
+         "deviations, > 0";
 }
 
 BundleFile Read(const Arguments& arguments, const PluginHost& host) {
@@ -71,12 +75,14 @@ std::string Describe(const BundleFile& file, int left_out) {
                      std::to_string(problem.points.size()) + " points, " +
                      std::to_string(problem.observations.size()) + " observations";
   if (left_out > 0)
-    text += "; " + std::to_string(left_out) + " left out, behind their camera at the start";
+    text += "; " + std::to_string(left_out) + " not defined at the start, as behind the camera";
   if (file.invalid > 0)
     text += "; " + std::to_string(file.invalid) + " not valid, as outside the image";
+  if (file.frames_left_out > 0)
+    text += "; " + std::to_string(file.frames_left_out) + " frames without a pose left out";
   if (file.points_left_out > 0)
     text += "; " + std::to_string(file.points_left_out) + " points without parallax left out";
-  return text + '\n';
+  return text;
 }
 
 ExitCode CodeOf(BundleEnd end) {
@@ -96,9 +102,17 @@ ExitCode CodeOf(BundleEnd end) {
 ExitCode RunBundle(const Arguments& arguments) {
   const PluginHost host(Absolute(arguments.plugin_paths));
   StopOnSignals();
+  std::optional<BundleFolder> folder;
+  if (!arguments.folder.empty()) folder.emplace(arguments.folder, arguments.force);
   BundleFile file = Read(arguments, host);
   const SensorModel sensor = BundleSensor(host, file.problem);
   const int left_out = LeaveOutUndefined(sensor, file.problem);
+  if (left_out == std::ssize(file.problem.observations)) {
+    throw Error(ExitCode::kBadData,
+                ErrorLine(Place{arguments.problem}, {}, "no observation can be used",
+                          "cameras that see points before them") +
+                    "\n  " + Describe(file, left_out));
+  }
   const double before = BundleRms(sensor, file.problem);
 
   Progress progress("iterations", arguments.quiet);
@@ -106,22 +120,21 @@ ExitCode RunBundle(const Arguments& arguments) {
   options.max_iterations = arguments.iterations;
   options.fixed = arguments.fixed;
   options.stop = StopRequested;
-  options.progress = [&](int done, double) { progress.Show(done, -1); };
+  options.progress = [&](int done) { progress.Show(done, -1); };
   if (!arguments.loss.empty()) ParseLoss(arguments.loss, options.loss);
   const BundleResult result = AdjustBundle(sensor, file.problem, options);
   progress.Clear();
   FinishOnSignals();
   const double after = BundleRms(sensor, file.problem);
 
-  std::string text = Describe(file, left_out);
+  std::string text = Describe(file, left_out) + '\n';
   text += "rms " + Short(before) + " px -> " + Short(after) + " px, " + ToString(result.end) +
           " after " + std::to_string(result.iterations) + " iterations, " +
           std::to_string(result.residuals) + " residuals, " + std::to_string(result.unknowns) +
           " unknowns\n";
   for (const std::string& line : Undetermined(file.problem, sensor, result)) text += line + '\n';
-  if (!arguments.folder.empty()) {
-    const std::vector<std::string> names =
-        SaveBundle(file, result, before, after, arguments.folder, arguments.force);
+  if (folder) {
+    const std::vector<std::string> names = folder->Save(file, result, before, after);
     text += "wrote " + arguments.folder + '\n';
     for (const std::string& name : names)
       text += "  " + (std::filesystem::path(arguments.folder) / name).string() + '\n';
@@ -148,7 +161,7 @@ void AddBundle(CLI::App& program, Action& action) {
     return command.add_option(name, value, help)->option_text(text);
   };
   add("--loss", arguments->loss, "LOSS",
-      "none, huber or cauchy; huber=2: from 2 px on; default none")
+      "none, huber or cauchy; huber=2: from 2 standard deviations on; default none")
       ->check(IsLoss);
   add("--fix", arguments->fixed, "NAME,...",
       "leaves intrinsics as they are: all of them by `intrinsics`, or elements such as k1,k2")

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <set>
 
 #include "alidade/build_plugin.h"
@@ -46,6 +47,18 @@ class Parts {
   std::vector<std::size_t> root_;
   std::set<std::size_t> roots_;
 };
+
+/// |z (-) h|^2; none where h is not defined, or where that is not finite.
+std::optional<double> SquaredError(const SensorModel& sensor, const BundleRoles& roles,
+                                   const BundleProblem& problem, const BundleObservation& seen) {
+  double h[4], d[4], sum = 0.0;
+  if (sensor.Predict(RoleValues(roles, problem, seen).data(), h) != Status::kOk)
+    return std::nullopt;
+  const Geometry& geometry = sensor.measurement().geometry;
+  geometry.Minus(seen.z.data(), h, d);
+  for (int i = 0; i < geometry.tangent; ++i) sum += d[i] * d[i];
+  return std::isfinite(sum) ? std::optional(sum) : std::nullopt;
+}
 
 /// `1 point is`, `3 points are`
 std::string Count(std::ptrdiff_t count, const std::string& what) {
@@ -100,7 +113,15 @@ std::vector<const double*> RoleValues(const BundleRoles& roles, const BundleProb
 
 std::vector<bool> FixedElements(const SensorModel& sensor, const std::vector<std::string>& fixed) {
   const BundleRoles roles = RolesOf(sensor);
-  if (roles.intrinsics < 0) return {};
+  if (roles.intrinsics < 0) {
+    for (const std::string& name : fixed) {
+      if (name == "intrinsics") continue;
+      throw Error(ExitCode::kUsage,
+                  ErrorLine({}, "--fix", '\'' + name + "' cannot be fixed",
+                            "intrinsics: sensor '" + sensor.name() + "' estimates none"));
+    }
+    return {};
+  }
   const Space& lens = sensor.roles()[static_cast<std::size_t>(roles.intrinsics)];
   std::vector<bool> elements(lens.elements.size());
   for (const std::string& name : fixed) {
@@ -131,8 +152,7 @@ int LeaveOutUndefined(const SensorModel& sensor, BundleProblem& problem) {
   const BundleRoles roles = RolesOf(sensor);
   int left_out = 0;
   for (BundleObservation& seen : problem.observations) {
-    double h[4];
-    seen.used = sensor.Predict(RoleValues(roles, problem, seen).data(), h) == Status::kOk;
+    seen.used = SquaredError(sensor, roles, problem, seen).has_value();
     left_out += seen.used ? 0 : 1;
   }
   return left_out;
@@ -140,14 +160,11 @@ int LeaveOutUndefined(const SensorModel& sensor, BundleProblem& problem) {
 
 double BundleRms(const SensorModel& sensor, const BundleProblem& problem) {
   const BundleRoles roles = RolesOf(sensor);
-  const int m = sensor.measurement().geometry.tangent;
   double sum = 0.0, count = 0.0;
   for (const BundleObservation& seen : problem.observations) {
-    double h[4], d[4];
-    if (!seen.used || sensor.Predict(RoleValues(roles, problem, seen).data(), h) != Status::kOk)
-      continue;
-    sensor.measurement().geometry.Minus(seen.z.data(), h, d);
-    for (int i = 0; i < m; ++i) sum += d[i] * d[i];
+    const auto error = seen.used ? SquaredError(sensor, roles, problem, seen) : std::nullopt;
+    if (!error) continue;
+    sum += *error;
     count += 1.0;
   }
   return count > 0.0 ? std::sqrt(sum / count) : 0.0;
@@ -155,6 +172,8 @@ double BundleRms(const SensorModel& sensor, const BundleProblem& problem) {
 
 BundleResult AdjustBundle(const SensorModel& sensor, BundleProblem& problem,
                           const BundleOptions& options, const std::filesystem::path& folder) {
+  if (std::ranges::none_of(problem.observations, &BundleObservation::used))
+    throw Error(ExitCode::kBadData, ErrorLine({}, {}, "no observation can be used"));
   const std::filesystem::path program = internal::FolderOfProgram();
   const bool known = !folder.empty() || !program.empty();  // never from the working folder
   const std::filesystem::path file = (folder.empty() ? program / "bundle" : folder) / kFile;
@@ -197,12 +216,15 @@ std::vector<std::string> Undetermined(const BundleProblem& problem, const Sensor
   const int scale = mono ? 1 : 0;
   const int open = result.unknowns - scale - result.rank;
   if (result.rank < 0) {
-    lines.emplace_back("rank: not computed, there are too many unknowns");
+    lines.emplace_back(result.unknowns > kBundleRankUnknowns
+                           ? "rank: not computed of more than " +
+                                 std::to_string(kBundleRankUnknowns) + " unknowns"
+                           : "rank: not computed, the Jacobian is not finite");
   } else if (open > 0) {
     lines.push_back("rank: " + std::to_string(result.rank) + " of " +
                     std::to_string(result.unknowns) + " unknowns; " + std::to_string(open) +
-                    " directions" + (mono ? " beside the scale" : "") +
-                    " are told by no observation");
+                    (open == 1 ? " direction" : " directions") + (mono ? " beside the scale" : "") +
+                    (open == 1 ? " is" : " are") + " told by no observation");
   } else {
     lines.push_back(
         "rank: " + std::to_string(result.rank) + " of " + std::to_string(result.unknowns) +

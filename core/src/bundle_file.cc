@@ -53,6 +53,7 @@ const char* ExtensionOf(BundleFormat format) {
 std::string PosesTum(const BundleFile& file) {
   std::string text;
   for (std::size_t i = 0; i < file.problem.cameras.size(); ++i) {
+    if (i < file.poses.size() && !file.poses[i].registered) continue;
     const BundleCamera& camera = file.problem.cameras[i];
     if (!file.stamps.empty()) {
       internal::AppendSeconds(text, file.stamps[i]);
@@ -139,19 +140,21 @@ std::string BundleText(const BundleFile& file) {
   return internal::BalText(file);
 }
 
-std::vector<std::string> SaveBundle(const BundleFile& file, const BundleResult& result,
-                                    double rms_before, double rms_after,
-                                    const std::filesystem::path& folder, bool force) {
-  RunFolder output(folder, force);
+BundleFolder::BundleFolder(const std::filesystem::path& folder, bool force)
+    : output_(std::make_unique<RunFolder>(folder, force)) {}
+BundleFolder::~BundleFolder() = default;
+
+std::vector<std::string> BundleFolder::Save(const BundleFile& file, const BundleResult& result,
+                                            double rms_before, double rms_after) {
   std::vector<std::string> names = {"bundle.json", "points.csv", "poses.tum"};
-  output.Write(names[0], ResultJson(file, result, rms_before, rms_after));
-  output.Write(names[1], PointsCsv(file));
-  output.Write(names[2], PosesTum(file));
+  output_->Write(names[0], ResultJson(file, result, rms_before, rms_after));
+  output_->Write(names[1], PointsCsv(file));
+  output_->Write(names[2], PosesTum(file));
   if (file.format != BundleFormat::kTracks) {
     names.push_back(std::string("problem") + ExtensionOf(file.format));
-    output.Write(names.back(), BundleText(file));
+    output_->Write(names.back(), BundleText(file));
   }
-  output.Commit();
+  output_->Commit();
   return names;
 }
 

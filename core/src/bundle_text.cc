@@ -68,7 +68,7 @@ void ReadBundlerCamera(BundleCursor& cursor, BundleFile& file) {
   problem.cameras.push_back(CameraFrom(wxyz, pose.data() + 9, true));
   problem.cameras.back().intrinsics = static_cast<int>(problem.intrinsics.size());
   problem.intrinsics.push_back(lens);
-  file.poses.push_back({problem.cameras.back(), pose});
+  file.poses.push_back({problem.cameras.back(), pose, !missing});
 }
 
 /// One point of a Bundler file, with its observations.
@@ -99,13 +99,14 @@ BundleCamera CameraFrom(const double* q, const double* t, bool looks_back) {
   BundleCamera camera;
   const double inverse[4] = {q[0], -q[1], -q[2], -q[3]};
   UnitQuaternion::Rotate(inverse, t, camera.position.data());
-  for (double& x : camera.position) x = -x;
+  for (double& x : camera.position) x = 0.0 - x;  // never -0
   if (looks_back) {
     UnitQuaternion::Multiply(inverse, kTurn, camera.orientation.data());
   } else {
     std::copy_n(inverse, 4, camera.orientation.data());
   }
   Normalise<UnitQuaternion>(camera.orientation.data());
+  for (double& x : camera.orientation) x += 0.0;
   return camera;
 }
 

@@ -321,7 +321,8 @@ void internal::AddEstimator(const Config& config, const PluginHost& host, const 
 Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   const Node root = config.root();
   CheckSchema(root);
-  for (const char* key : {"plugins", "include"}) root.Declare(key);
+  // `baseline_m`: of a calibration, for `alidade bundle`; a sensor has its own.
+  for (const char* key : {"plugins", "include", "baseline_m"}) root.Declare(key);
   for (const char* key : {"title", "output"}) {
     if (const auto text = root.Find(key)) static_cast<void>(text->Text());
   }

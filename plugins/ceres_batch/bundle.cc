@@ -26,7 +26,7 @@ class Watch : public ceres::IterationCallback {
  public:
   explicit Watch(const BundleOptions& options) : options_(options) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& done) override {
-    if (options_.progress) options_.progress(done.iteration, done.cost);
+    if (options_.progress) options_.progress(done.iteration);
     const bool stop = options_.stop && options_.stop();
     return stop ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
   }
@@ -42,9 +42,9 @@ class Bundle {
  public:
   Bundle(const SensorModel& sensor, const BundleProblem& from, const BundleOptions& options)
       : sensor_(sensor), roles_(RolesOf(sensor)), from_(from), options_(options) {
+    fixed_ = FixedElements(sensor, options.fixed);
     if (roles_.intrinsics >= 0) {
       lens_ = sensor.roles()[static_cast<std::size_t>(roles_.intrinsics)].geometry;
-      fixed_ = FixedElements(sensor, options.fixed);
       own_lens_ = !all_fixed() && NoneIsShared();
     }
     CopyValues();
@@ -212,14 +212,12 @@ BundleResult Bundle::Solve() {
   if (summary.termination_type == ceres::CONVERGENCE) result.end = BundleEnd::kConverged;
   if (summary.termination_type == ceres::NO_CONVERGENCE) result.end = BundleEnd::kOutOfIterations;
   if (summary.termination_type == ceres::USER_SUCCESS) result.end = BundleEnd::kStopped;
-  constexpr double kMostWork = 2e9;
-  const double n = result.unknowns;
-  if (result.unknowns <= kBundleRankUnknowns && n * n * result.residuals < kMostWork)
-    result.rank = Rank();
+  if (result.unknowns <= kBundleRankUnknowns) result.rank = Rank();
   return result;
 }
 
-/// Of dr/dx, columns scaled to length 1.
+/// Of dr/dx, columns scaled to length 1; -1 where it is not finite. It is that of R in dr/dx = Q R,
+/// which is made of a few rows at a time: dr/dx itself would need much memory.
 int Bundle::Rank() {
   std::vector<double*> blocks, moved;
   problem_.GetParameterBlocks(&blocks);
@@ -231,18 +229,25 @@ int Bundle::Rank() {
   options.apply_loss_function = false;
   ceres::CRSMatrix sparse;
   if (!problem_.Evaluate(options, nullptr, nullptr, nullptr, &sparse)) return -1;
-  Eigen::MatrixXd j = Eigen::MatrixXd::Zero(sparse.num_rows, sparse.num_cols);
-  for (int r = 0; r < sparse.num_rows; ++r) {
-    for (auto k = static_cast<std::size_t>(sparse.rows[static_cast<std::size_t>(r)]);
-         k < static_cast<std::size_t>(sparse.rows[static_cast<std::size_t>(r) + 1]); ++k) {
-      j(r, sparse.cols[k]) = sparse.values[k];
+  const int n = sparse.num_cols, some = 4 * n;
+  if (n == 0) return 0;
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(n + some, n);  // R of those so far, and more
+  for (int first = 0; first < sparse.num_rows; first += some) {
+    for (int r = first; r < std::min(first + some, sparse.num_rows); ++r) {
+      for (auto k = static_cast<std::size_t>(sparse.rows[static_cast<std::size_t>(r)]);
+           k < static_cast<std::size_t>(sparse.rows[static_cast<std::size_t>(r) + 1]); ++k) {
+        rows(n + r - first, sparse.cols[k]) = sparse.values[k];
+      }
     }
+    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(rows);
+    rows.setZero();
+    rows.topRows(n) = qr.matrixQR().topRows(n).triangularView<Eigen::Upper>();
   }
-  for (auto column : j.colwise()) {
+  for (auto column : rows.colwise()) {
     const double norm = column.norm();
     if (norm > 0.0) column /= norm;
   }
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(j);
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(rows.topRows(n));
   constexpr double kNothing = 1e-9;
   qr.setThreshold(kNothing);
   return static_cast<int>(qr.rank());

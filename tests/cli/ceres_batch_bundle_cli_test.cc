@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <map>
+#include <sstream>
+
 #include "support/bundles.h"
 #include "support/program.h"
 
 namespace alidade {
 namespace {
 
+using testing::Arguments;
 using testing::Contains;
 using testing::Outcome;
 
@@ -24,6 +29,7 @@ TEST_F(BundleCli, AdjustsAndWritesTheSameFormat) {
   EXPECT_EQ(again.code, 0) << again.err;
   EXPECT_LT(Json("out/bundle.json").root().At("rms_after_px").Number(), 1e-8);
   EXPECT_EQ(Call({"bundle", "p.txt", "-o", "out"}).code, 73);
+  EXPECT_EQ(Call({"bundle", "none.txt", "-o", "out"}).code, 73) << "before anything is read";
   EXPECT_EQ(Call({"bundle", "p.txt", "-o", "out", "--force", "--quiet"}).out, "");
 }
 
@@ -34,6 +40,7 @@ TEST_F(BundleCli, SaysWhatIsWrong) {
   EXPECT_EQ(bad.code, 65);
   EXPECT_TRUE(bad.err.starts_with("error: p.txt:2:3: '3' is none; expected the point")) << bad.err;
   EXPECT_EQ(Call({"bundle", "p.txt", "--loss", "hubert"}).code, 2);
+  EXPECT_EQ(Call({"bundle", "p.txt", "--loss", "none=5"}).code, 2);
   EXPECT_EQ(Call({"bundle", "p.txt", "--camera", "c.yaml"}).code, 2);
   Write("p.txt", BundleText(testing::TrueBundle()));
   const Outcome fix = Call({"bundle", "p.txt", "--fix", "k1,k22"});
@@ -62,33 +69,153 @@ source:
                          {position: [0.5, 0, 0], target: [0, 0, 4]}]}
 )";
 
-/// Tracks as `simulate` writes them, from their true poses: what is left is the noise of a pixel.
-TEST_F(BundleCli, AdjustsTracks) {
-  std::string scene = kScene;
-  Write("scene.yaml", scene.replace(scene.find("  STEREO\n"), 9, ""));
-  ASSERT_EQ(Call({"simulate", "scene.yaml", "-o", "data"}).code, 0);
-  const Outcome made = Call({"bundle", "data/tracks.csv", "--camera", "data/calibration.yaml",
-                             "--start", "data/truth.tum", "-o", "out"});
+class BundleTracksCli : public BundleCli {
+ protected:
+  /// `data/` as `simulate` writes it, of kScene.
+  void SetUp() override {
+    BundleCli::SetUp();
+    Simulate("");
+  }
+  /// `stereo`: lines of the source.
+  void Simulate(const std::string& stereo, const Arguments& more = {}) const {
+    std::string scene = kScene;
+    Write("scene.yaml", scene.replace(scene.find("  STEREO\n"), 9, stereo));
+    Arguments all = {"simulate", "scene.yaml", "-o", "data", "--force"};
+    all.insert(all.end(), more.begin(), more.end());
+    const Outcome made = Call(all);
+    ASSERT_EQ(made.code, 0) << made.err;
+  }
+  Outcome Bundle(const std::string& tracks, const std::string& start,
+                 const Arguments& more = {}) const {
+    Arguments all = {"bundle", tracks, "--camera", "data/calibration.yaml", "--start", start};
+    all.insert(all.end(), more.begin(), more.end());
+    return Call(all);
+  }
+  /// The poses of `data/truth.tum` up to `count`, their times and x moved.
+  std::string Start(int count, double dt_s, double dx_m) const {
+    std::istringstream truth(Read("data/truth.tum"));
+    std::string text, line;
+    for (int i = 0; i < count && std::getline(truth, line);) {
+      if (line.starts_with('#')) continue;
+      std::istringstream numbers(line);
+      double t = 0.0, x = 0.0;
+      numbers >> t >> x;
+      text += std::to_string(t + dt_s) + ' ' + std::to_string(x + dx_m * std::sin(++i)) +
+              numbers.str().substr(static_cast<std::size_t>(numbers.tellg())) + '\n';
+    }
+    return text;
+  }
+};
+
+/// sqrt(2 (1 - unknowns / residuals)) px is left of the noise of 1 px in u and v; its standard
+/// deviation is 2 % of that, for there are 1000 residuals more than unknowns.
+TEST_F(BundleTracksCli, AdjustsTracks) {
+  Write("start.tum", Start(15, 0.0, 0.05));
+  const Outcome made = Bundle("data/tracks.csv", "start.tum", {"-o", "out"});
   ASSERT_EQ(made.code, 0) << made.err << made.out;
   EXPECT_TRUE(Contains(made.out, "tracks: 15 cameras, ")) << made.out;
-  const double rms = Json("out/bundle.json").root().At("rms_after_px").Number();
-  EXPECT_LT(rms, 1.6);
+  const Config json = Json("out/bundle.json");
+  const auto number = [&](const char* key) { return json.root().At(key).Number(); };
+  EXPECT_GT(number("rms_before_px"), 2.5) << "4 m away, 5 cm are 6.6 px";
+  const double left = std::sqrt(2.0 * (1.0 - number("unknowns") / number("residuals")));
+  EXPECT_NEAR(number("rms_after_px"), left, 0.08 * left);
   EXPECT_FALSE(Exists("out/problem.txt"));
   const std::string poses = Read("out/poses.tum");
   EXPECT_EQ(std::count(poses.begin(), poses.end(), '\n'), 15);
+}
 
+/// A pair of 0.2 m sees points 30 to 45 m away, by a disparity of 2 to 4 px with a noise of 1.4 px;
+/// rays from 5 m of path tell their depth to about 1.5 %.
+TEST_F(BundleTracksCli, PlacesPointsOfAStereoPairByTheirRays) {
+  Simulate(
+      "  measures: stereo\n  baseline_m: 0.2\n",
+      {"--set", "source.points={box: {min: [-12, -10, 30], max: [12, 10, 45]}, count: 60}", "--set",
+       "source.trajectory={look_at: [{position: [-2.5, 0, 0], target: [0, 0, 38]}, "
+       "{position: [2.5, 0, 0], target: [0, 0, 38]}]}"});
+  EXPECT_EQ(Json("data/calibration.yaml").root().At("baseline_m").Number(), 0.2);
+  const Outcome started =
+      Bundle("data/tracks.csv", "data/truth.tum", {"-o", "start", "--iterations", "0"});
+  EXPECT_EQ(started.code, 1) << started.err;
+  const auto depths = [&](const std::string& file) {
+    std::map<int, double> all;
+    std::istringstream rows(Read(file));
+    std::string line;
+    for (std::getline(rows, line); std::getline(rows, line);)
+      all[std::stoi(line)] = std::stod(line.substr(line.rfind(',') + 1));
+    return all;
+  };
+  const std::map<int, double> is = depths("start/points.csv"), was = depths("data/map.csv");
+  EXPECT_EQ(is.size(), 60u);
+  for (const auto& [id, depth] : is)
+    EXPECT_NEAR(depth, was.at(id), 0.07 * was.at(id)) << "point " << id;
+  const Outcome made = Bundle("data/tracks.csv", "data/truth.tum", {"-o", "out"});
+  EXPECT_EQ(made.code, 0) << made.err;
+  EXPECT_TRUE(Contains(made.out, "unknowns: all is determined")) << made.out;
+  EXPECT_LT(Json("out/bundle.json").root().At("rms_after_px").Number(),
+            Json("start/bundle.json").root().At("rms_after_px").Number());
+}
+
+TEST_F(BundleTracksCli, CountsFramesWithoutAPose) {
+  Write("start.tum", Start(5, 0.0, 0.0));
+  const Outcome made = Bundle("data/tracks.csv", "start.tum");
+  EXPECT_EQ(made.code, 0) << made.err;
+  EXPECT_TRUE(Contains(made.out, "tracks: 5 cameras, ")) << made.out;
+  EXPECT_TRUE(Contains(made.out, "; 10 frames without a pose left out")) << made.out;
+  Write("start.tum", Start(5, 100.0, 0.0));
+  const Outcome none = Bundle("data/tracks.csv", "start.tum");
+  EXPECT_EQ(none.code, 65);
+  EXPECT_TRUE(Contains(none.err, "start.tum: no pose at the time of any frame")) << none.err;
+}
+
+/// Without stamps the k-th pose is that of frame k, whatever its time; so from standard input too,
+/// whatever lies in the working folder.
+TEST_F(BundleTracksCli, TakesPosesByTheirNumberWhereThereAreNoStamps) {
+  Write("start.tum", Start(5, 100.0, 0.0));
+  Write("tracks.csv", Read("data/tracks.csv"));
+  const Outcome file = Bundle("tracks.csv", "start.tum");
+  EXPECT_EQ(file.code, 0) << file.err;
+  EXPECT_TRUE(Contains(file.out, "tracks: 5 cameras, ")) << file.out;
+  Write("timestamps.csv", Read("data/timestamps.csv"));
+  EXPECT_EQ(Bundle("tracks.csv", "start.tum").code, 65);
+  before_ = "exec <tracks.csv";
+  const Outcome piped = Bundle("-", "start.tum");
+  EXPECT_EQ(piped.code, 0) << piped.err;
+  EXPECT_EQ(piped.out, file.out);
+}
+
+TEST_F(BundleTracksCli, SaysWhatIsWrong) {
   const std::string rows = "frame,feature,dim,value\n0,1,0,10\n0,1,1,20\n0,1,0,11\n";
   Write("twice.csv", rows);
-  const Outcome twice = Call(
-      {"bundle", "twice.csv", "--camera", "data/calibration.yaml", "--start", "data/truth.tum"});
+  const Outcome twice = Bundle("twice.csv", "data/truth.tum");
   EXPECT_EQ(twice.code, 65);
-  EXPECT_TRUE(Contains(twice.err, "twice.csv:4:1: the same frame, feature and dim as line 2"))
+  EXPECT_TRUE(Contains(twice.err, "twice.csv:4: the same frame, feature and dim as line 2"))
       << twice.err;
   Write("half.csv", "0,1,0,10\n");
-  EXPECT_TRUE(Contains(
-      Call({"bundle", "half.csv", "--camera", "data/calibration.yaml", "--start", "data/truth.tum"})
-          .err,
-      "frame 0 has no dim 1 of feature 1"));
+  EXPECT_TRUE(
+      Contains(Bundle("half.csv", "data/truth.tum").err, "frame 0 has no dim 1 of feature 1"));
+  Write("late.tum", "1e300 0 0 0 0 0 0 1\n");
+  const Outcome late = Bundle("data/tracks.csv", "late.tum");
+  EXPECT_EQ(late.code, 65);
+  EXPECT_TRUE(Contains(late.err, "late.tum:1:1 t: '1e300' is beyond 292 years")) << late.err;
+  const Outcome fix = Bundle("data/tracks.csv", "data/truth.tum", {"--fix", "k1"});
+  EXPECT_EQ(fix.code, 2);
+  EXPECT_TRUE(Contains(fix.err, "'k1' cannot be fixed; expected intrinsics")) << fix.err;
+  EXPECT_EQ(Bundle("data/tracks.csv", "data/truth.tum", {"--fix", "intrinsics"}).code, 0);
+}
+
+/// A point behind its only camera; one so far away that its pixels are no numbers; nothing at all.
+TEST_F(BundleCli, RefusesAProblemOfWhichNothingIsDefined) {
+  const std::string camera = "0\n0\n0\n0\n0\n0\n500\n0\n0\n";
+  for (const std::string& text :
+       {"1 1 1\n0 0 1 1\n" + camera + "0.1\n0.1\n3\n",
+        "1 1 1\n0 0 1 1\n" + camera + "1e200\n0.1\n-3\n", std::string("0 0 0\n")}) {
+    Write("p.txt", text);
+    const Outcome made = Call({"bundle", "p.txt"});
+    EXPECT_EQ(made.code, 65) << text;
+    EXPECT_TRUE(made.err.starts_with("error: p.txt: no observation can be used; expected "))
+        << made.err;
+    EXPECT_EQ(std::count(made.err.begin(), made.err.end(), '\n'), 2) << made.err;
+  }
 }
 
 }  // namespace

@@ -79,6 +79,25 @@ TEST_F(SimulateCli, WritesTheStreamsOfAnySource) {
   EXPECT_FALSE(Exists("data/calibration.yaml"));
 }
 
+TEST_F(SimulateCli, ACalibrationOfAStereoPairHasItsBaseline) {
+  std::string scene = kScene + "  measures: stereo\n  baseline_m: 0.2\n";
+  const std::string known = "  known: {count: 3}\n";
+  Write("scene.yaml", scene.erase(scene.find(known), known.size()));
+  const Outcome made = Call({"simulate", "scene.yaml", "-o", "data"});
+  ASSERT_EQ(made.code, 0) << made.err;
+  EXPECT_EQ(Json("data/calibration.yaml").root().At("baseline_m").Number(), 0.2);
+  // A config that includes it is none the worse, and hands it on.
+  Write("depth.yaml", testing::kDepthConfig + "baseline_m: 0.2\n");
+  const Outcome explained = Call({"explain", "depth.yaml"});
+  EXPECT_EQ(explained.code, 0) << explained.err;
+  Write("again.yaml",
+        "alidade: 1\ninclude: data/calibration.yaml\nsource: {type: tracks, path: data, measures: "
+        "stereo}\n");
+  const Outcome again = Call({"simulate", "again.yaml", "-o", "again"});
+  ASSERT_EQ(again.code, 0) << again.err;
+  EXPECT_EQ(Read("again/calibration.yaml"), Read("data/calibration.yaml"));
+}
+
 TEST_F(SimulateCli, RefusesAKeyThatNobodyReads) {
   Write("scene.yaml", kScene + "  nose_px: 2\n");
   const Outcome made = Call({"simulate", "scene.yaml", "-o", "data"});

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 
 #include "support/bundles.h"
 
@@ -207,7 +208,8 @@ TEST_F(BundleFiles, SavesTheProblemPosesAndPoints) {
   const BundleFile file = ReadText(kBal);
   BundleResult result;
   result.end = BundleEnd::kConverged;
-  const std::vector<std::string> names = SaveBundle(file, result, 2.0, 1.0, folder_ / "o", false);
+  const std::vector<std::string> names =
+      BundleFolder(folder_ / "o", false).Save(file, result, 2.0, 1.0);
   EXPECT_EQ(names,
             (std::vector<std::string>{"bundle.json", "points.csv", "poses.tum", "problem.txt"}));
   const auto line = [&](const char* name, int number) {
@@ -220,7 +222,17 @@ TEST_F(BundleFiles, SavesTheProblemPosesAndPoints) {
   EXPECT_TRUE(line("poses.tum", 1).starts_with("0 ")) << line("poses.tum", 1);
   EXPECT_NE(line("bundle.json", 3).find("\"status\": \"converged\""), std::string::npos);
   ExpectSame(ReadBundle(folder_ / "o" / "problem.txt"), file);
-  EXPECT_THROW(SaveBundle(file, result, 2.0, 1.0, folder_ / "o", false), Error);
+  EXPECT_THROW(BundleFolder(folder_ / "o", false), Error) << "it is there";
+}
+
+/// The camera of kBundler that was not registered has no pose, and what is 0 has no sign.
+TEST_F(BundleFiles, SavesPosesOfRegisteredCamerasOnly) {
+  std::string text = kBundler;
+  text.replace(text.find("0 -1 0\n1 0 0\n0 0 1\n0 0 1\n"), 25, "1 0 0\n0 1 0\n0 0 1\n0 0 0\n");
+  BundleFolder(folder_ / "o", false).Save(ReadText(text), {}, 2.0, 1.0);
+  std::ostringstream poses;
+  poses << std::ifstream(folder_ / "o" / "poses.tum").rdbuf();
+  EXPECT_EQ(poses.str(), "0 0 0 0 1 0 0 0\n");
 }
 
 }  // namespace

@@ -174,6 +174,65 @@ TEST(CeresBundle, SaysWhatIsNotDetermined) {
       << all;
 }
 
+/// Of a problem of 579 unknowns, the scale among them, and 7200 residuals.
+TEST(CeresBundle, FindsTheRankBelowTheLimitOfUnknowns) {
+  BundleProblem problem = TrueBundle(60, 75).problem;
+  BundleOptions options;
+  options.fixed = {"intrinsics"};
+  const BundleResult result = Adjusted(problem, options);
+  EXPECT_EQ(result.residuals, 7200);
+  EXPECT_EQ(result.unknowns, 59 * 6 + 75 * 3);
+  EXPECT_LE(result.unknowns, kBundleRankUnknowns);
+  EXPECT_EQ(result.rank, result.unknowns - 1);
+}
+
+/// More than 1000 unknowns are left whichever are eliminated.
+TEST(CeresBundle, SolvesALargeProblem) {
+  BundleProblem problem = TrueBundle(120, 400).problem;
+  std::erase_if(problem.observations, [](const BundleObservation& seen) {
+    return (3 * seen.camera + seen.point) % 8 != 0;
+  });
+  Disturb(problem);
+  const SensorModel sensor = BundleSensor(Shipped(), problem);
+  EXPECT_GT(BundleRms(sensor, problem), 1.0) << "disturbed";
+  const BundleResult result = Adjusted(problem);
+  EXPECT_EQ(result.end, BundleEnd::kConverged) << result.message;
+  EXPECT_EQ(result.unknowns, 119 * 9 + 3 + 1200);
+  EXPECT_LT(BundleRms(sensor, problem), 1e-6);
+  EXPECT_EQ(result.rank, -1);
+  EXPECT_EQ(Undetermined(problem, sensor, result).back(),
+            "rank: not computed of more than 600 unknowns");
+}
+
+TEST(CeresBundle, CountsDirectionsThatNothingTells) {
+  const BundleProblem problem = TrueBundle(2, 5).problem;
+  const SensorModel sensor = BundleSensor(Shipped(), problem);
+  BundleResult result;
+  result.unknowns = 10;
+  const auto last = [&](int rank) {
+    result.rank = rank;
+    return Undetermined(problem, sensor, result).back();
+  };
+  EXPECT_EQ(last(9), "rank: 9 of 10 unknowns: all but the scale is determined");
+  EXPECT_EQ(last(8),
+            "rank: 8 of 10 unknowns; 1 direction beside the scale is told by no observation");
+  EXPECT_EQ(last(7),
+            "rank: 7 of 10 unknowns; 2 directions beside the scale are told by no observation");
+  EXPECT_EQ(last(-1), "rank: not computed, the Jacobian is not finite");
+}
+
+TEST(CeresBundle, RefusesAProblemWithoutObservations) {
+  BundleProblem problem = TrueBundle(2, 5).problem;
+  for (BundleObservation& seen : problem.observations) seen.used = false;
+  const SensorModel sensor = BundleSensor(Shipped(), problem);
+  try {
+    AdjustBundle(sensor, problem, {});
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::kBadData);
+  }
+}
+
 TEST(CeresBundle, ABuildWithoutThePluginSaysWhatToInstall) {
   BundleProblem problem = TrueBundle(2, 5).problem;
   const SensorModel sensor = BundleSensor(Shipped(), problem);

@@ -25,12 +25,14 @@ inline BundleFile TrueBundle(int cameras = 6, int points = 40) {
   const SelfCalibratingFeature<RadialLens> sensor(1.0);
   for (int i = 0; i < cameras; ++i) {
     BundleCamera camera;
-    const double angle = 0.25 * (i - 0.5 * cameras), d[3] = {0.02 * i, -angle, 0.01 * i * i};
-    camera.position = {6.0 * std::sin(angle), 0.1 * i, 6.0 - 6.0 * std::cos(angle)};
+    const int of_six = i % 6;
+    const double angle = 0.25 * (i - 0.5 * cameras);
+    const double d[3] = {0.02 * of_six, -angle, 0.01 * of_six * of_six};
+    camera.position = {6.0 * std::sin(angle), 0.1 * of_six, 6.0 - 6.0 * std::cos(angle)};
     UnitQuaternion::Exp(d, camera.orientation.data());
     camera.intrinsics = i;
     problem.cameras.push_back(camera);
-    problem.intrinsics.push_back({500.0 + 10.0 * i, -0.1 + 0.01 * i, 0.02});
+    problem.intrinsics.push_back({500.0 + 10.0 * of_six, -0.1 + 0.01 * of_six, 0.02});
     for (int k = 0; k < points; ++k) {
       if ((i + k) % 5 == 0) continue;
       BundleObservation seen{i, k, {}, true};

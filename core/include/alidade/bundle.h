@@ -29,7 +29,7 @@ struct BundleCamera {
 struct BundleObservation {
   int camera = 0, point = 0;
   std::array<double, 4> z{};
-  bool used = true;  ///< false: the sensor is not defined where the problem starts
+  bool used = true;  ///< false: left out, see LeaveOutUndefined
 };
 
 struct BundleProblem {
@@ -44,9 +44,9 @@ struct BundleProblem {
 struct BundleOptions {
   int max_iterations = 500;
   RobustLoss loss;
-  std::vector<std::string> fixed;  ///< elements of the intrinsics, or `intrinsics`: all of them
-  std::function<bool()> stop;      ///< true: end after the iteration
-  std::function<void(int, double)> progress;  ///< iterations done, cost
+  std::vector<std::string> fixed;     ///< elements of the intrinsics, or `intrinsics`: all of them
+  std::function<bool()> stop;         ///< true: end after the iteration
+  std::function<void(int)> progress;  ///< iterations done
 };
 
 enum class BundleEnd { kConverged, kOutOfIterations, kStopped, kFailed };
@@ -61,7 +61,9 @@ struct BundleResult {
   double cost_before = 0.0, cost_after = 0.0;
   int residuals = 0;  ///< scalars
   int unknowns = 0;   ///< tangent elements that were estimated, the held first pose left out
-  int rank = -1;      ///< of the Jacobian at the solution; -1: more than kBundleRankUnknowns
+  /// Of the Jacobian at the solution; -1: of more than kBundleRankUnknowns, or where that has no
+  /// finite one.
+  int rank = -1;
 };
 inline constexpr int kBundleRankUnknowns = 600;
 
@@ -77,14 +79,15 @@ BundleRoles RolesOf(const SensorModel& sensor);
 std::vector<const double*> RoleValues(const BundleRoles& roles, const BundleProblem& problem,
                                       const BundleObservation& seen);
 
-/// Whether each element of the intrinsics is fixed. Error: kUsage where `fixed` names another.
+/// Whether each element of the intrinsics is fixed; empty where the sensor has no such role. Error:
+/// kUsage where `fixed` names another.
 std::vector<bool> FixedElements(const SensorModel& sensor, const std::vector<std::string>& fixed);
 
 /// The sensor that `problem` names. Errors: kPlugin, kBadConfig.
 SensorModel BundleSensor(const PluginHost& host, const BundleProblem& problem);
 
 /// Leaves out, by BundleObservation::used, what the sensor is not defined for where the problem
-/// stands (a point behind its camera); returns how many.
+/// stands (a point behind its camera), and where |z (-) h|^2 is not finite; returns how many.
 int LeaveOutUndefined(const SensorModel& sensor, BundleProblem& problem);
 
 /// Errors of the observations used, all measured values alike:
@@ -97,7 +100,8 @@ double BundleRms(const SensorModel& sensor, const BundleProblem& problem);
 /// Moves cameras, points and, but for what is fixed, intrinsics of `problem` to the minimum. The
 /// pose of the first camera that is used stays. Done by the plugin of the Ceres solver, which is
 /// loaded when it is first asked for, from `folder`, or where that is "" from beside the library.
-/// Errors: kPlugin where there is none, kNotTrusted.
+/// Errors: kPlugin where there is none, kNotTrusted; kBadData where no observation is used; kUsage
+/// as FixedElements.
 BundleResult AdjustBundle(const SensorModel& sensor, BundleProblem& problem,
                           const BundleOptions& options, const std::filesystem::path& folder = {});
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,9 @@
 ///
 /// Whatever the file's, in the problem a camera looks along +z, y down, v grows downwards.
 namespace alidade {
+namespace internal {
+class RunFolder;
+}
 
 enum class BundleFormat { kBal, kBundler, kLibmv, kTracks };
 /// `bal`, `bundler`, `libmv`, `tracks`.
@@ -34,6 +38,7 @@ struct BundleFile {
   struct Pose {
     BundleCamera camera;
     std::vector<double> numbers;
+    bool registered = true;  ///< false: bundler has no pose of this camera
   };
   std::vector<Pose> poses;
   std::vector<std::string> colours;      ///< bundler: of the points
@@ -42,6 +47,7 @@ struct BundleFile {
   std::vector<std::int64_t> point_ids;   ///< libmv, tracks: track, feature; else empty
   std::vector<Stamp> stamps;             ///< tracks: of the cameras; else empty
   int points_left_out = 0;               ///< tracks: without a place that their rays agree on
+  int frames_left_out = 0;               ///< tracks: frames without a pose
   int invalid = 0;  ///< tracks: observations that the sensor finds invalid, left out
 };
 
@@ -57,8 +63,8 @@ struct BundleTracks {
 };
 
 /// Reads tracks of one camera (dim 0, 1) or of a rectified pair (0 to 3). Frames have the stamps of
-/// `timestamps.csv` beside the tracks, and a pose to 1 us; where it is not there, the k-th pose is
-/// that of frame k. Frames without a pose are left out.
+/// `timestamps.csv` beside the tracks, and a pose to 1 us; where it is not there, as from standard
+/// input (`-`), the k-th pose is that of frame k. Frames without a pose are left out.
 /// Points are placed by triangulation from the start, by the inverse observations of the sensor
 /// that `host` gives; those that it cannot place are left out. Errors: kInputMissing, kBadData,
 /// kBadConfig, kPlugin.
@@ -68,18 +74,29 @@ BundleFile ReadBundleTracks(const BundleTracks& from, const PluginHost& host);
 /// the nearest 32-bit number). Not of tracks, which hold no poses.
 std::string BundleText(const BundleFile& file);
 
-/// The files that SaveBundle writes.
+/// The folder that a solution goes to.
 ///
 ///   file         rows
 ///   problem.EXT  the problem, adjusted, in its own format: .txt, .out or .bin; not of tracks
-///   poses.tum    t x y z qx qy qz qw, world_from_cam; t in s, or the number of the camera
+///   poses.tum    t x y z qx qy qz qw, world_from_cam; t in s, or the number of the camera; not of
+///                cameras that are not registered
 ///   points.csv   point,x,y,z
 ///   bundle.json  what became of it, as AdjustBundle gives it
 ///
-/// The folder appears when all is written; one that is there is replaced where `force`. Returns
-/// their names. Errors: kCannotCreate, kIo.
-std::vector<std::string> SaveBundle(const BundleFile& file, const BundleResult& result,
-                                    double rms_before, double rms_after,
-                                    const std::filesystem::path& folder, bool force);
+/// It appears when all is written; one that is there is replaced where `force`. Made before the
+/// problem is solved, it tells in time what is in its way, and keeps others from its place.
+class BundleFolder {
+ public:
+  /// Errors: kCannotCreate, kIo.
+  BundleFolder(const std::filesystem::path& folder, bool force);
+  ~BundleFolder();
+
+  /// Returns the names of the files; once. Errors: kCannotCreate, kIo.
+  std::vector<std::string> Save(const BundleFile& file, const BundleResult& result,
+                                double rms_before, double rms_after);
+
+ private:
+  std::unique_ptr<internal::RunFolder> output_;
+};
 
 }  // namespace alidade

@@ -39,7 +39,8 @@ inline const char* ParseNumber(std::string_view text, double& value) {
 /// Times of a size below this, s, are stamps (292 years).
 inline constexpr double kTimeLimit = 9.2e9;
 
-/// The nearest ns to a decimal number without exponent, in a unit of 10^digits ns; below kTimeLimit.
+/// The nearest ns to a decimal number without exponent, in a unit of 10^digits ns, of a time below
+/// kTimeLimit.
 inline Stamp ExactStamp(std::string_view text, std::size_t digits) {
   const bool negative = text.starts_with('-');
   if (negative || text.starts_with('+')) text.remove_prefix(1);

@@ -91,37 +91,71 @@ void MakeUnique(std::vector<Evaluation>& evaluations) {
   }
 }
 
+/// An estimate without figures, for its row in the table.
+Evaluation Failed(const Trajectory& reference, const TrajectoryFile& file,
+                  const EvaluateOptions& options, const Error& error) {
+  Evaluation failed;
+  failed.label = file.label;
+  failed.options = options;
+  failed.reference.name = reference.name;
+  failed.estimate.name = file.file.string();
+  failed.error = error.what();
+  return failed;
+}
+
+std::vector<TrajectoryFile> FilesOf(const Arguments& arguments) {
+  std::vector<TrajectoryFile> files;
+  for (const std::string& path : arguments.estimates) {
+    const std::vector<TrajectoryFile> more = EstimatesAt(path);
+    files.insert(files.end(), more.begin(), more.end());
+  }
+  const std::string &absolute = arguments.save_absolute, &relative = arguments.save_relative;
+  if ((!absolute.empty() || !relative.empty()) && files.size() > 1) {
+    throw Error(ExitCode::kUsage, "--save_results: " + std::to_string(files.size()) +
+                                      " estimates; expected one, as a result of evo has one");
+  }
+  if (!absolute.empty()) CheckEvoResult(absolute, arguments.force);
+  if (!relative.empty()) CheckEvoResult(relative, arguments.force);
+  return files;
+}
+
+/// Of several estimates one that fails leaves the others theirs; the exit code is the first one's.
 ExitCode RunEval(const Arguments& arguments) {
   EvaluateOptions options = arguments.options;
   options.alignment = Chosen(arguments);
   options.max_diff = StampFromSeconds(arguments.max_diff_s);
   options.offset = StampFromSeconds(arguments.offset_s);
+  const std::vector<TrajectoryFile> files = FilesOf(arguments);
   const Trajectory reference =
       ReadTrajectory(ReferenceAt(arguments.reference).file, arguments.format);
   WarnOf(reference.warnings, arguments);
   std::vector<Evaluation> evaluations;
-  for (const std::string& path : arguments.estimates) {
-    for (const TrajectoryFile& file : EstimatesAt(path)) {
+  ExitCode code = ExitCode::kOk;
+  for (const TrajectoryFile& file : files) {
+    try {
       evaluations.push_back(EvaluateFile(reference, file, options, arguments.format));
-      WarnOf(evaluations.back().warnings, arguments);
+      std::vector<std::string>& warnings = evaluations.back().warnings;
+      WarnOf(warnings, arguments);
+      warnings.insert(warnings.begin(), reference.warnings.begin(), reference.warnings.end());
+    } catch (const Error& error) {
+      if (files.size() == 1) throw;
+      PrintErrors(error.what());
+      evaluations.push_back(Failed(reference, file, options, error));
+      if (code == ExitCode::kOk) code = error.code();
     }
   }
   MakeUnique(evaluations);
-  const bool saves = !arguments.save_absolute.empty() || !arguments.save_relative.empty();
-  if (saves && evaluations.size() > 1) {
-    throw Error(ExitCode::kUsage, "--save_results: " + std::to_string(evaluations.size()) +
-                                      " estimates; expected one, as a result of evo has one");
-  }
   Print(Text(evaluations, arguments.form));
-  if (!arguments.save_absolute.empty()) {
-    SaveEvoResult(evaluations.front(), SavedErrors::kAbsolute, arguments.save_absolute,
-                  arguments.force);
-  }
+  // First those that there may be none of.
   if (!arguments.save_relative.empty()) {
     SaveEvoResult(evaluations.front(), SavedErrors::kRelative, arguments.save_relative,
                   arguments.force);
   }
-  return ExitCode::kOk;
+  if (!arguments.save_absolute.empty()) {
+    SaveEvoResult(evaluations.front(), SavedErrors::kAbsolute, arguments.save_absolute,
+                  arguments.force);
+  }
+  return code;
 }
 
 /// Says what is wrong with options that fit one by one, but not together.
@@ -129,6 +163,15 @@ void CheckTogether(const Arguments& arguments) {
   const PairOptions& pairs = arguments.options.pairs;
   if (pairs.unit == DeltaUnit::kFrames && pairs.delta != std::floor(pairs.delta)) {
     throw CLI::ValidationError("--delta: frames are a whole number");
+  }
+  const std::string &absolute = arguments.save_absolute, &relative = arguments.save_relative;
+  const auto file = [](const std::string& path) {
+    std::error_code ignored;
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(path, ignored), ignored);
+  };
+  if (!absolute.empty() && !relative.empty() && file(absolute) == file(relative)) {
+    throw CLI::ValidationError("--save_relative: " + relative +
+                               " is what --save_results writes; expected another file");
   }
 }
 

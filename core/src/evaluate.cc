@@ -6,6 +6,7 @@
 #include "alidade/geometry.h"
 #include "alidade/statistics.h"
 #include "mahalanobis.h"
+#include "similarity.h"
 #include "trajectory_errors.h"
 
 namespace alidade {
@@ -48,25 +49,26 @@ Eigen::Matrix3Xd OrientationErrors(const Trajectory& reference, const Trajectory
 void AddNees(Evaluation& evaluation) {
   const Trajectory& estimate = evaluation.estimate;
   if (!estimate.has_covariances()) return;
-  const Nees position =
-      NeesOf(evaluation.reference.positions - estimate.positions, estimate.position_covariances);
-  const Nees orientation =
-      NeesOf(OrientationErrors(evaluation.reference, estimate), estimate.orientation_covariances);
-  if (position.poses > 0) evaluation.position_nees = position;
-  if (orientation.poses > 0) evaluation.orientation_nees = orientation;
-  if (position.poses == 0 && orientation.poses == 0) {
-    evaluation.nees_withheld = "every covariance is singular";
-  }
-}
-
-/// Whether the positions of these poses are not all at one place.
-bool HasExtent(const Trajectory& trajectory) {
-  return !(trajectory.positions.colwise() - trajectory.positions.col(0)).isZero(0.0);
+  const auto add = [&](const char* of, const Nees& nees, std::optional<Nees>& to) {
+    if (nees.poses > 0) {
+      to = nees;
+      return;
+    }
+    std::string& withheld = evaluation.nees_withheld;
+    withheld += std::string(withheld.empty() ? "" : "; ") + "every covariance of the " + of +
+                " is singular";
+  };
+  add("position",
+      NeesOf(evaluation.reference.positions - estimate.positions, estimate.position_covariances),
+      evaluation.position_nees);
+  add("orientation",
+      NeesOf(OrientationErrors(evaluation.reference, estimate), estimate.orientation_covariances),
+      evaluation.orientation_nees);
 }
 
 std::optional<double> ScaleOf(const Trajectory& reference, const Trajectory& estimate) {
-  if (estimate.size() < 3 || !HasExtent(reference) || !HasExtent(estimate)) return std::nullopt;
-  return Align(Alignment::kSim3, reference, estimate).scale;
+  const auto found = internal::FindSimilarity(estimate.positions, reference.positions);
+  return found ? std::optional(found->scale) : std::nullopt;
 }
 
 /// Scale of the second half over that of the first, - 1.
@@ -79,7 +81,7 @@ std::optional<double> ScaleDrift(const Trajectory& reference, const Trajectory& 
     return ScaleOf(reference.Select(half), estimate.Select(half));
   };
   const auto first = scale(halves[0]), second = scale(halves[1]);
-  if (!first || !second || !(*first > 0.0)) return std::nullopt;
+  if (!first || !second) return std::nullopt;
   return *second / *first - 1.0;
 }
 
@@ -114,7 +116,12 @@ Evaluation Evaluate(const Trajectory& reference, const Trajectory& estimate,
         internal::AbsoluteErrors(relation, evaluation.reference, evaluation.estimate));
   }
   if (evaluation.estimate.size() < 2) return evaluation;
-  evaluation.pairs = PairsOf(evaluation.estimate, options.pairs);
+  try {
+    evaluation.pairs = PairsOf(evaluation.estimate, options.pairs);
+  } catch (const Error& error) {  // the other figures stand
+    evaluation.warnings.emplace_back(error.what());
+    return evaluation;
+  }
   for (const PoseRelation relation : options.relations) {
     evaluation.relative.push_back(internal::RelativeErrors(relation, evaluation.reference,
                                                            evaluation.estimate, evaluation.pairs));

@@ -14,4 +14,10 @@ inline constexpr std::pair<const char*, double ErrorStatistics::*> kStatistics[]
     {"min", &ErrorStatistics::min},       {"max", &ErrorStatistics::max},
     {"sse", &ErrorStatistics::sse}};
 
+/// Whether the first poses alone are aligned: of the alignments by least squares.
+inline bool LimitsAlignment(const EvaluateOptions& options) {
+  return options.align_poses > 0 && options.alignment != Alignment::kNone &&
+         options.alignment != Alignment::kOrigin;
+}
+
 }  // namespace alidade::internal

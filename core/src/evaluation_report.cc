@@ -33,6 +33,13 @@ std::string ToleranceText(const Evaluation& evaluation) {
   return evaluation.by_row ? "by row" : NumberText(Seconds(evaluation.options.max_diff));
 }
 
+std::string AlignText(const Evaluation& evaluation) {
+  const EvaluateOptions& options = evaluation.options;
+  std::string text = ToString(options.alignment);
+  if (!internal::LimitsAlignment(options)) return text;
+  return text + " by the first " + std::to_string(options.align_poses) + " poses";
+}
+
 std::string PairsText(const Evaluation& evaluation) {
   const PairOptions& pairs = evaluation.options.pairs;
   return std::to_string(evaluation.pairs.size()) + (pairs.all ? " of all" : " consecutive") +
@@ -44,10 +51,10 @@ std::string TrajectoryText(const Trajectory& trajectory) {
          RoundedText(trajectory.PathLength(0, trajectory.size() - 1)) + " m";
 }
 
-std::string NeesText(const char* name, const Nees& nees) {
-  return std::string(name) + ' ' + RoundedText(nees.mean, 4) + " per dof, " +
+std::string NeesText(const char* name, const Nees& nees, int poses) {
+  return std::string("NEES ") + name + ' ' + RoundedText(nees.mean, 4) + " per dof, " +
          RoundedText(100.0 * nees.cov95, 3) + " % within 95 %, " + std::to_string(nees.poses) +
-         " poses";
+         " of " + std::to_string(poses) + " poses\n";
 }
 
 /// All statistics of one evaluation, a row for each relation.
@@ -71,12 +78,11 @@ std::string StatisticsTable(const Evaluation& evaluation) {
 }
 
 std::string ConsistencyText(const Evaluation& evaluation) {
+  const int poses = evaluation.estimate.size();
   std::string text;
-  if (evaluation.position_nees) {
-    text += NeesText("NEES position", *evaluation.position_nees) + '\n';
-  }
+  if (evaluation.position_nees) text += NeesText("position", *evaluation.position_nees, poses);
   if (evaluation.orientation_nees) {
-    text += NeesText("NEES orientation", *evaluation.orientation_nees) + '\n';
+    text += NeesText("orientation", *evaluation.orientation_nees, poses);
   }
   if (!evaluation.nees_withheld.empty()) {
     text += "NEES withheld: " + evaluation.nees_withheld + '\n';
@@ -85,9 +91,9 @@ std::string ConsistencyText(const Evaluation& evaluation) {
     text += "NIS " + one.sensor + ' ' + RoundedText(one.nis_mean, 4) + " per dof, " +
             RoundedText(100.0 * one.nis_cov95, 3) + " % within 95 %, " +
             std::to_string(one.measurements) + " measurements";
-    if (std::isfinite(one.whiteness)) {
-      text += "; autocorrelation " + RoundedText(one.whiteness, 3) + ", white within " +
-              RoundedText(one.whiteness_bound, 2);
+    if (std::isfinite(one.autocorrelation)) {
+      text += "; autocorrelation " + RoundedText(one.autocorrelation, 3) + ", white within " +
+              RoundedText(one.white_within, 2);
     }
     text += '\n';
   }
@@ -107,12 +113,8 @@ std::string DetailText(const Evaluation& evaluation) {
     }
     text += '\n';
   }
-  text += std::string("aligned    ") + ToString(evaluation.options.alignment) + ", scale " +
-          FixedText(evaluation.alignment.scale, kDecimals);
-  if (evaluation.options.align_poses > 0) {
-    text += ", by the first " + std::to_string(evaluation.options.align_poses) + " poses";
-  }
-  text += '\n';
+  text += "aligned    " + AlignText(evaluation) + ", scale " +
+          FixedText(evaluation.alignment.scale, kDecimals) + '\n';
   if (evaluation.sim3_scale) {
     text += "scale      " + FixedText(*evaluation.sim3_scale, kDecimals) + " by sim3";
     if (evaluation.scale_drift) {
@@ -140,9 +142,13 @@ std::vector<internal::TextRow> SummaryRows(const std::vector<Evaluation>& evalua
   if (nees) header.insert(header.end(), {"NEES position", "NEES orientation"});
   std::vector<internal::TextRow> rows = {header};
   for (const Evaluation& one : evaluations) {
-    internal::TextRow row = {one.label, ToString(one.options.alignment),
-                             FixedText(one.alignment.scale, kDecimals), MatchedText(one),
-                             ToleranceText(one)};
+    if (!one.error.empty()) {
+      rows.push_back({one.label, "failed"});
+      rows.back().resize(header.size(), "-");
+      continue;
+    }
+    internal::TextRow row = {one.label, AlignText(one), FixedText(one.alignment.scale, kDecimals),
+                             MatchedText(one), ToleranceText(one)};
     for (const auto* all : {&one.absolute, &one.relative}) {
       for (std::size_t r = 0; r < one.options.relations.size(); ++r) {
         row.push_back(r < all->size() ? FixedText((*all)[r].statistics.rmse, kDecimals) : "-");
@@ -160,7 +166,7 @@ std::vector<internal::TextRow> SummaryRows(const std::vector<Evaluation>& evalua
 std::string SharedText(const std::vector<Evaluation>& evaluations) {
   const Evaluation& first = evaluations.front();
   std::string text = "Rmse against " + first.reference.name;
-  if (!first.pairs.empty()) {
+  if (std::ranges::any_of(evaluations, [](const auto& one) { return !one.pairs.empty(); })) {
     text += "; RPE of " + std::string(first.options.pairs.all ? "all" : "consecutive") +
             " pairs, " + NumberText(first.options.pairs.delta) + ' ' +
             ToString(first.options.pairs.unit) + " apart";
@@ -182,21 +188,6 @@ std::string SummaryText(const std::vector<Evaluation>& evaluations) {
   }
   for (const Evaluation& one : evaluations) names.push_back(one.label);
   return internal::EstimatorTable(names, rows) + '\n' + SharedText(evaluations) + '\n';
-}
-
-std::string MarkdownQuoted(const std::string& text) {
-  std::string quoted;
-  for (const char c : text) quoted += c == '|' ? std::string("\\|") : std::string(1, c);
-  return quoted;
-}
-
-std::string LatexQuoted(const std::string& text) {
-  std::string quoted;
-  for (const char c : text) {
-    if (std::string_view("_%&#${}").find(c) != std::string_view::npos) quoted += '\\';
-    quoted += c;
-  }
-  return quoted;
 }
 
 void AddErrors(Json& json, const char* key, const std::vector<PoseErrors>& all) {
@@ -229,8 +220,8 @@ void AddInnovations(Json& json, const std::vector<InnovationStatistics>& innovat
     json.Key("mean").Number(one.nis_mean);
     json.Key("cov95").Number(one.nis_cov95);
     json.Key("measurements").Integer(one.measurements);
-    json.Key("autocorrelation").Number(one.whiteness);
-    json.Key("white_within").Number(one.whiteness_bound);
+    json.Key("autocorrelation").Number(one.autocorrelation);
+    json.Key("white_within").Number(one.white_within);
     json.End();
   }
   json.End();
@@ -241,6 +232,11 @@ void AddEvaluation(Json& json, const Evaluation& one) {
   json.Key("estimate").Text(one.label);
   json.Key("file").Text(one.estimate.name);
   json.Key("reference").Text(one.reference.name);
+  if (!one.error.empty()) {
+    json.Key("error").Text(one.error);
+    json.End();
+    return;
+  }
   json.Key("align").Text(ToString(one.options.alignment));
   json.Key("align_poses").Integer(one.options.align_poses);
   json.Key("scale").Number(one.alignment.scale);
@@ -275,7 +271,8 @@ void AddEvaluation(Json& json, const Evaluation& one) {
 
 std::string EvaluationText(const std::vector<Evaluation>& evaluations) {
   ALIDADE_EXPECTS(!evaluations.empty());
-  if (evaluations.size() == 1) return DetailText(evaluations.front());
+  const bool details = evaluations.size() == 1 && evaluations.front().error.empty();
+  if (details) return DetailText(evaluations.front());
   return SummaryText(evaluations);
 }
 
@@ -284,9 +281,7 @@ std::string EvaluationMarkdown(const std::vector<Evaluation>& evaluations) {
   std::string text;
   for (const internal::TextRow& row : SummaryRows(evaluations)) {
     const bool header = text.empty();
-    text += '|';
-    for (const std::string& cell : row) text += ' ' + MarkdownQuoted(cell) + " |";
-    text += '\n';
+    text += internal::MarkdownRow(row);
     if (!header) continue;
     text += '|';
     for (std::size_t c = 0; c < row.size(); ++c) text += c < 2 ? "---|" : "---:|";
@@ -301,11 +296,7 @@ std::string EvaluationLatex(const std::vector<Evaluation>& evaluations) {
   std::string text = "% " + SharedText(evaluations) + "\n\\begin{tabular}{ll";
   text.append(rows.front().size() - 2, 'r').append("}\n\\hline\n");
   for (std::size_t r = 0; r < rows.size(); ++r) {
-    text += LatexQuoted(internal::Join(rows[r], "\x01"));
-    for (std::size_t at = 0; (at = text.find('\x01', at)) != text.npos;) {
-      text.replace(at, 1, " & ");
-    }
-    text += r == 0 ? " \\\\\n\\hline\n" : " \\\\\n";
+    text += internal::LatexRow(rows[r]) + (r == 0 ? "\\hline\n" : "");
   }
   return text + "\\hline\n\\end{tabular}\n";
 }

@@ -108,8 +108,8 @@ class Warnings {
     if (matches_.by_row) return;
     std::vector<Stamp> off;
     for (std::size_t k = 0; k < matches_.estimate.size(); ++k) {
-      off.push_back(evaluation_.reference.stamps[k] - evaluation_.estimate.stamps[k] -
-                    evaluation_.options.offset);
+      off.push_back(evaluation_.reference.stamps[k] -
+                    (evaluation_.estimate.stamps[k] + evaluation_.options.offset));
     }
     const auto middle = off.begin() + std::ssize(off) / 2;
     std::nth_element(off.begin(), middle, off.end());

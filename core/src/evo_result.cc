@@ -13,6 +13,7 @@
 #include "json.h"
 #include "number_text.h"
 #include "output_file.h"
+#include "trajectory_errors.h"
 
 namespace alidade {
 namespace fs = std::filesystem;
@@ -105,7 +106,11 @@ std::string Title(const Evaluation& evaluation, SavedErrors which, PoseRelation 
              kUnits[static_cast<std::size_t>(pairs.unit)] +
              (pairs.all ? ") using all pairs" : ") using consecutive pairs");
   }
-  return title + '\n' + AlignmentText(evaluation.options.alignment);
+  title += '\n' + AlignmentText(evaluation.options.alignment);
+  if (internal::LimitsAlignment(evaluation.options)) {
+    title += " (aligned poses: " + std::to_string(evaluation.options.align_poses) + ')';
+  }
+  return title;
 }
 
 std::string InfoJson(const Evaluation& evaluation, SavedErrors which, PoseRelation relation) {
@@ -136,17 +141,16 @@ void AddPlaces(const Evaluation& evaluation, const std::vector<int>& poses,
                std::vector<ZipEntry>& entries) {
   const Trajectory& estimate = evaluation.estimate;
   if (!estimate.has_stamps()) return;
+  const std::vector<double> reference_path =
+      internal::Progress(evaluation.reference, DeltaUnit::kMetres);
+  const std::vector<double> path = internal::Progress(estimate, DeltaUnit::kMetres);
   std::vector<double> times, seconds, along_reference, along;
   for (const int i : poses) {
-    const Stamp stamp = estimate.stamps[static_cast<std::size_t>(i)];
-    times.push_back(Seconds(stamp));
-    seconds.push_back(Seconds(stamp - estimate.stamps.front()));
-    const int last = along.empty() ? 0 : poses[along.size() - 1];
-    const auto next = [&](const Trajectory& t, const std::vector<double>& so_far) {
-      return (so_far.empty() ? 0.0 : so_far.back()) + t.PathLength(last, i);
-    };
-    along_reference.push_back(next(evaluation.reference, along_reference));
-    along.push_back(next(estimate, along));
+    const auto at = static_cast<std::size_t>(i);
+    times.push_back(Seconds(estimate.stamps[at]));
+    seconds.push_back(Seconds(estimate.stamps[at] - estimate.stamps.front()));
+    along_reference.push_back(reference_path[at]);
+    along.push_back(path[at]);
   }
   entries.push_back({"seconds_from_start.npy", Npy(seconds)});
   entries.push_back({"timestamps.npy", Npy(times)});
@@ -186,20 +190,22 @@ void WriteWhole(const fs::path& file, const std::string& content) {
 
 }  // namespace
 
+void CheckEvoResult(const fs::path& zip, bool force) {
+  std::error_code ignored;
+  if (force || !fs::exists(zip, ignored)) return;
+  throw Error(ExitCode::kCannotCreate,
+              ErrorLine({zip.string()}, {}, "is there already", "--force, or another name"));
+}
+
 void SaveEvoResult(const Evaluation& evaluation, SavedErrors which, const fs::path& zip,
                    bool force) {
   const bool relative = which == SavedErrors::kRelative;
   const std::vector<PoseErrors>& all = relative ? evaluation.relative : evaluation.absolute;
   if (all.empty()) {
-    throw Error(ExitCode::kBadData,
-                ErrorLine({evaluation.estimate.name}, {}, "one pose has no relative error",
-                          "two matched poses"));
+    throw Error(ExitCode::kBadData, ErrorLine({evaluation.estimate.name}, {}, "no relative errors",
+                                              "matched poses that are --delta apart"));
   }
-  std::error_code ignored;
-  if (!force && fs::exists(zip, ignored)) {
-    throw Error(ExitCode::kCannotCreate,
-                ErrorLine({zip.string()}, {}, "is there already", "--force, or another name"));
-  }
+  CheckEvoResult(zip, force);
   std::vector<int> poses;
   if (relative) {
     for (const auto& [i, j] : evaluation.pairs) poses.push_back(j);

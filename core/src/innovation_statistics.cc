@@ -30,7 +30,7 @@ std::size_t Find(const NumberRows& rows, std::string_view name) {
   rows.FailLine("no column '" + std::string(name) + '\'', "innovations.csv of a run folder");
 }
 
-void AddWhiteness(const std::string& landmark, const std::vector<double>& r, SensorSums& sums) {
+void AddProducts(const std::string& landmark, const std::vector<double>& r, SensorSums& sums) {
   std::vector<double>& last = sums.last[landmark];
   for (std::size_t k = 0; k < last.size() && k < r.size(); ++k) {
     sums.product += last[k] * r[k];
@@ -57,7 +57,7 @@ void AddRow(const NumberRows& rows, const Columns& at, std::map<std::int64_t, do
       rows.FailLine("too few columns", "as many as dof");
     r.push_back(rows.Number(at.r0 + k, "r") / rows.Number(at.s0 + k, "s"));
   }
-  AddWhiteness(std::string(rows.text(at.landmark)), r, sums);
+  AddProducts(std::string(rows.text(at.landmark)), r, sums);
 }
 
 InnovationStatistics Finish(const std::string& sensor, const SensorSums& sums) {
@@ -67,8 +67,8 @@ InnovationStatistics Finish(const std::string& sensor, const SensorSums& sums) {
   statistics.measurements = sums.measurements;
   statistics.nis_mean = sums.nis / n;
   statistics.nis_cov95 = static_cast<double>(sums.inside) / n;
-  statistics.whiteness = sums.product / std::sqrt(sums.before2 * sums.after2);
-  statistics.whiteness_bound = 1.96 / std::sqrt(static_cast<double>(sums.products));
+  statistics.autocorrelation = sums.product / std::sqrt(sums.before2 * sums.after2);
+  statistics.white_within = 1.96 / std::sqrt(static_cast<double>(sums.products));
   return statistics;
 }
 

@@ -7,8 +7,8 @@
 
 namespace alidade::internal {
 
-/// e' P^-1 e, or -1 where P is singular or not finite. P is scaled to unit variances first, so that
-/// singular means the same in any unit.
+/// e' P^-1 e, or -1 where P is singular, indefinite or not finite. P is scaled to unit variances
+/// first, so that singular means the same in any unit.
 inline double SquaredMahalanobis(const Eigen::MatrixXd& p, const Eigen::VectorXd& error) {
   constexpr double kSingular = 1e-13;
   const Eigen::VectorXd sigma = p.diagonal().cwiseSqrt();

@@ -15,7 +15,7 @@ namespace alidade::internal {
 ///
 ///   map.rmse         sqrt(mean |p - p_true|^2), m
 ///   map.sim3.rmse    the same of s R p + t, the similarity that makes it least [Umeyama1991]
-///   map.sim3.scale   s; both of three landmarks or more that are not on one line
+///   map.sim3.scale   s; both of three landmarks or more that are not all at one place
 std::map<std::string, double> MapMetrics(const std::vector<LandmarkEstimate>& landmarks);
 
 /// The landmarks at the end, with the true places that `source` knows, and their metrics, in

@@ -34,7 +34,7 @@ class PathAlignment {
     squares_ += p.squaredNorm();
     onto_squares_ += q.squaredNorm();
   }
-  /// Nothing where fewer than three points were added, or all of them are one.
+  /// Nothing where FindSimilarity finds none (similarity.h).
   std::optional<Aligned> Result() const;
 
  private:

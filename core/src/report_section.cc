@@ -6,6 +6,12 @@
 namespace alidade::internal {
 namespace {
 
+TextRow RowOf(const std::string& label, const std::vector<std::string>& cells) {
+  TextRow row = {label};
+  row.insert(row.end(), cells.begin(), cells.end());
+  return row;
+}
+
 std::string PlainText(const Section& section) {
   std::string text = section.title + '\n';
   for (const std::string& line : section.lines) text += "  " + line + '\n';
@@ -18,36 +24,13 @@ std::string Markdown(const Section& section) {
   for (const std::string& line : section.lines) text += "- " + line + '\n';
   if (section.rows.empty()) return text;
   if (!section.lines.empty()) text += '\n';
-  text += "|  | " + Join(section.columns, " | ") + " |\n|---|";
+  text += MarkdownRow(RowOf("", section.columns)) + "|---|";
   for (std::size_t c = 0; c < section.columns.size(); ++c) text += "---:|";
   text += '\n';
   for (const ComparisonRow& row : section.rows) {
-    text += "| " + row.label + " | " + Join(row.cells, " | ") + " |\n";
+    text += MarkdownRow(RowOf(row.label, row.cells));
   }
   return text;
-}
-
-/// `text` without what LaTeX would obey.
-std::string LatexText(const std::string& text) {
-  std::string safe;
-  for (const char c : text) {
-    if (c == '\\') {
-      safe += "\\textbackslash{}";
-    } else if (c == '^' || c == '~') {
-      safe.append("\\") += c;
-      safe += "{}";
-    } else {
-      if (std::string_view("_%&#${}").find(c) != std::string_view::npos) safe += '\\';
-      safe += c;
-    }
-  }
-  return safe;
-}
-
-std::string LatexRow(const std::string& label, const std::vector<std::string>& cells) {
-  std::string text = LatexText(label);
-  for (const std::string& cell : cells) text += " & " + LatexText(cell);
-  return text + " \\\\\n";
 }
 
 std::string Latex(const Section& section) {
@@ -55,8 +38,8 @@ std::string Latex(const Section& section) {
   for (const std::string& line : section.lines) text += LatexText(line) + ".\n";
   if (section.rows.empty()) return text;
   text += "\n\\begin{tabular}{l" + std::string(section.columns.size(), 'r') + "}\n\\toprule\n";
-  text += LatexRow("", section.columns) + "\\midrule\n";
-  for (const ComparisonRow& row : section.rows) text += LatexRow(row.label, row.cells);
+  text += LatexRow(RowOf("", section.columns)) + "\\midrule\n";
+  for (const ComparisonRow& row : section.rows) text += LatexRow(RowOf(row.label, row.cells));
   return text + "\\bottomrule\n\\end{tabular}\n";
 }
 

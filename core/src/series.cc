@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "series.h"
 
-#include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
 #include "alidade/estimator.h"
 #include "columns.h"
 #include "mahalanobis.h"
+#include "similarity.h"
 
 namespace alidade::internal {
 namespace {
@@ -205,27 +204,13 @@ Distance DistanceBetween(const Series& series, const Series& reference) {
   return distance;
 }
 
-namespace {
-
-/// Whether the points are not all on one line.
-bool SpanAPlane(const Eigen::Matrix3Xd& points) {
-  constexpr double kThin = 1e-9;
-  const Eigen::Matrix3Xd centred = points.colwise() - points.rowwise().mean();
-  const Eigen::Vector3d widths = centred.jacobiSvd().singularValues();
-  return widths[1] > kThin * widths[0];
-}
-
-}  // namespace
-
 std::optional<Aligned> AlignBySimilarity(const Eigen::Matrix3Xd& points,
                                          const Eigen::Matrix3Xd& onto) {
-  if (points.cols() < 3 || !SpanAPlane(points) || !SpanAPlane(onto)) return std::nullopt;
-  const Eigen::Matrix4d similarity = Eigen::umeyama(points, onto);
-  const Eigen::Matrix3d linear = similarity.topLeftCorner<3, 3>();
-  const Eigen::Vector3d shift = similarity.topRightCorner<3, 1>();
-  const Eigen::Matrix3Xd left = ((linear * points).colwise() + shift) - onto;
-  return Aligned{std::sqrt(left.squaredNorm() / static_cast<double>(left.cols())),
-                 std::cbrt(linear.determinant())};
+  const std::optional<Similarity> found = FindSimilarity(points, onto);
+  if (!found) return std::nullopt;
+  const Eigen::Matrix3Xd left =
+      ((found->scale * found->rotation * points).colwise() + found->translation) - onto;
+  return Aligned{std::sqrt(left.squaredNorm() / static_cast<double>(left.cols())), found->scale};
 }
 
 std::optional<Aligned> AlignPaths(const Series& series, const Series& reference,

@@ -66,8 +66,8 @@ struct Distance {
 /// Blocks are the same where name and geometry are.
 Distance DistanceBetween(const Series& series, const Series& reference);
 
-/// The similarity that brings columns nearest to others [Umeyama1991]; nothing of fewer than three,
-/// or of points on one line.
+/// What the similarity that brings columns nearest to others leaves; nothing where FindSimilarity
+/// finds none (similarity.h).
 std::optional<Aligned> AlignBySimilarity(const Eigen::Matrix3Xd& points,
                                          const Eigen::Matrix3Xd& onto);
 /// Of the paths that two series have of a vector block of three elements.

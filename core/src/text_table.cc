@@ -2,6 +2,7 @@
 #include "text_table.h"
 
 #include <algorithm>
+#include <string_view>
 
 namespace alidade::internal {
 
@@ -27,6 +28,41 @@ std::string TextTable(const std::vector<TextRow>& rows, std::size_t indent) {
     text += line + '\n';
   }
   return text;
+}
+
+std::string MarkdownRow(const TextRow& cells) {
+  std::string text = "|";
+  for (const std::string& cell : cells) {
+    text += ' ';
+    for (const char c : cell) {
+      if (c == '|' || c == '\\') text += '\\';
+      text += c;
+    }
+    text += " |";
+  }
+  return text + '\n';
+}
+
+std::string LatexText(const std::string& text) {
+  std::string safe;
+  for (const char c : text) {
+    if (c == '\\') {
+      safe += "\\textbackslash{}";
+    } else if (c == '^' || c == '~') {
+      safe.append("\\") += c;
+      safe += "{}";
+    } else {
+      if (std::string_view("_%&#${}").find(c) != std::string_view::npos) safe += '\\';
+      safe += c;
+    }
+  }
+  return safe;
+}
+
+std::string LatexRow(const TextRow& cells) {
+  TextRow safe;
+  for (const std::string& cell : cells) safe.push_back(LatexText(cell));
+  return Join(safe, " & ") + " \\\\\n";
 }
 
 std::string Join(const std::vector<std::string>& parts, const char* separator) {

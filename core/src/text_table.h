@@ -12,6 +12,14 @@ using TextRow = std::vector<std::string>;
 /// is empty in every row but the first is left out.
 std::string TextTable(const std::vector<TextRow>& rows, std::size_t indent = 0);
 
+/// `| a | b |`, a line of a table of Markdown, without what would end a cell.
+std::string MarkdownRow(const TextRow& cells);
+
+/// `text` without what LaTeX would obey.
+std::string LatexText(const std::string& text);
+/// `a & b \\`, a line of a tabular, each cell as LatexText.
+std::string LatexRow(const TextRow& cells);
+
 /// `a, b, c`
 std::string Join(const std::vector<std::string>& parts, const char* separator = ", ");
 

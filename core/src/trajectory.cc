@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/trajectory.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
@@ -22,14 +23,6 @@ constexpr const char* kForms =
 constexpr const char* kCovarianceNames[] = {"Pr11", "Pr12", "Pr13", "Pr22", "Pr23", "Pr33",
                                             "Pt11", "Pt12", "Pt13", "Pt22", "Pt23", "Pt33"};
 
-/// The symmetric matrix of its upper triangle, row by row.
-Eigen::Matrix3d Symmetric(const double* upper) {
-  Eigen::Matrix3d matrix;
-  matrix << upper[0], upper[1], upper[2], upper[1], upper[3], upper[4], upper[2], upper[4],
-      upper[5];
-  return matrix;
-}
-
 /// What a number of columns of a row is called.
 Format Detect(const NumberRows& rows) {
   const std::size_t columns = rows.size();
@@ -43,24 +36,40 @@ Format Detect(const NumberRows& rows) {
 struct TimeUnit {
   const char* name;
   std::size_t digits;  ///< it is 10^digits ns
+
+  double seconds() const { return std::pow(10.0, static_cast<double>(digits) - 9.0); }
 };
 
-/// The unit that the stamps must have: the seconds of a clock that anyone uses are below 1e11 (the
-/// year 5138), and poses are not 11 days apart.
-std::optional<TimeUnit> UnitOtherThanSeconds(const std::vector<double>& stamps) {
-  double largest = 0.0;
-  std::vector<double> steps;
+/// Of two in the middle the smaller; 0 of none.
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + (std::ssize(values) - 1) / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// The unit of stamps t that are d apart, on their medians: the first of s, ms, us and ns in which
+/// they are of a clock that counts from 1970, or else of one that counts from its own start.
+///
+///   from 1970        1e9 s <= t < 9.2e9 s,  d < 1000 s
+///   from its start           t < 9.2e9 s,   d < 1000 s in s, else d < 2 s
+TimeUnit UnitOf(const std::vector<double>& stamps) {
+  constexpr TimeUnit kUnits[] = {{"s", 9}, {"ms", 6}, {"us", 3}, {"ns", 0}};
+  std::vector<double> sizes, steps;
   for (std::size_t i = 0; i < stamps.size(); ++i) {
-    largest = std::max(largest, std::abs(stamps[i]));
+    sizes.push_back(std::abs(stamps[i]));
     if (i > 0) steps.push_back(std::abs(stamps[i] - stamps[i - 1]));
   }
-  if (largest >= 1e17) return TimeUnit{"ns", 0};
-  if (largest >= 1e14) return TimeUnit{"us", 3};
-  if (largest >= 1e11) return TimeUnit{"ms", 6};
-  if (steps.empty()) return std::nullopt;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle >= 1e6 ? std::optional(TimeUnit{"ns", 0}) : std::nullopt;
+  const double size = Median(sizes), step = Median(steps);
+  for (const bool since_1970 : {true, false}) {
+    for (const TimeUnit& unit : kUnits) {
+      const double t_s = size * unit.seconds();
+      const double most_step_s = since_1970 || unit.digits == 9 ? 1000.0 : 2.0;
+      if (since_1970 && t_s < 1e9) continue;
+      if (t_s < cell::kTimeLimit && step * unit.seconds() < most_step_s) return unit;
+    }
+  }
+  return kUnits[3];
 }
 
 /// Reads one file, row by row.
@@ -127,8 +136,25 @@ class TrajectoryReader {
     if (columns_ != 20) return;
     double upper[12];
     for (std::size_t i = 0; i < 12; ++i) upper[i] = rows_.Number(8 + i, kCovarianceNames[i]);
-    trajectory_.orientation_covariances.push_back(Symmetric(upper));
-    trajectory_.position_covariances.push_back(Symmetric(upper + 6));
+    trajectory_.orientation_covariances.push_back(Covariance(upper, "orientation"));
+    trajectory_.position_covariances.push_back(Covariance(upper + 6, "position"));
+  }
+
+  /// The symmetric matrix of its upper triangle, row by row. Its numbers may be rounded to six
+  /// digits: only an eigenvalue that is negative beyond that is refused.
+  Eigen::Matrix3d Covariance(const double* upper, const char* of) const {
+    constexpr double kRounding = 1e-5;
+    Eigen::Matrix3d matrix;
+    matrix << upper[0], upper[1], upper[2], upper[1], upper[3], upper[4], upper[2], upper[4],
+        upper[5];
+    const Eigen::Vector3d eigenvalues =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(matrix, Eigen::EigenvaluesOnly)
+            .eigenvalues();
+    if (eigenvalues[0] >= -kRounding * eigenvalues.cwiseAbs().maxCoeff()) return matrix;
+    rows_.FailLine(std::string("the covariance of the ") + of +
+                       " is not positive semi-definite: its smallest eigenvalue is " +
+                       internal::RoundedText(eigenvalues[0]),
+                   "a covariance");
   }
 
   /// Of columns 1 to 7.
@@ -158,16 +184,22 @@ class TrajectoryReader {
   }
 
   void TakeTumStamps() {
-    const auto unit = UnitOtherThanSeconds(seconds_);
-    if (unit) {
+    const TimeUnit unit = UnitOf(seconds_);
+    const char* const expected = "seconds, as TUM has them";
+    if (unit.digits != 9) {
       Warn(lines_.front(), "t",
            '\'' + stamp_texts_.front() + "' and what follows cannot be seconds; read as " +
-               unit->name,
-           "seconds, as TUM has them");
+               unit.name,
+           expected);
     }
     for (std::size_t i = 0; i < seconds_.size(); ++i) {
-      trajectory_.stamps.push_back(
-          cell::ParseStamp(stamp_texts_[i], seconds_[i], unit ? unit->digits : 9));
+      if (!(std::abs(seconds_[i]) * unit.seconds() < cell::kTimeLimit)) {
+        throw Error(
+            ExitCode::kBadData,
+            ErrorLine({rows_.name(), lines_[i], 0}, "t",
+                      '\'' + cell::Harmless(stamp_texts_[i]) + "' is beyond 292 years", expected));
+      }
+      trajectory_.stamps.push_back(cell::ParseStamp(stamp_texts_[i], seconds_[i], unit.digits));
     }
   }
 
@@ -304,10 +336,17 @@ Trajectory Trajectory::WithOtherQuaternionOrder() const {
 
 Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat format) {
   Trajectory trajectory = TrajectoryReader(file, format).Read();
-  if (trajectory.format != TrajectoryFormat::kKitti) return trajectory;
-  const std::filesystem::path times = TimesBeside(file);
-  if (!times.empty()) ReadTimes(times, trajectory);
-  return trajectory;
+  if (trajectory.format == TrajectoryFormat::kKitti) {
+    const std::filesystem::path times = TimesBeside(file);
+    if (!times.empty()) ReadTimes(times, trajectory);
+  }
+  const std::vector<Stamp>& stamps = trajectory.stamps;
+  if (stamps.empty() || Seconds(stamps.back()) - Seconds(stamps.front()) < cell::kTimeLimit) {
+    return trajectory;
+  }
+  throw Error(ExitCode::kBadData,
+              ErrorLine({trajectory.name}, "t", "its stamps are more than 292 years apart",
+                        "those of one clock"));
 }
 
 }  // namespace alidade

@@ -5,7 +5,9 @@
 #include <cmath>
 
 #include "alidade/evaluate.h"
+#include "alidade/text_cell.h"
 #include "number_text.h"
+#include "similarity.h"
 
 namespace alidade {
 namespace {
@@ -24,6 +26,13 @@ Similarity Umeyama(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to, boo
   found.rotation = linear / found.scale;
   found.translation = matrix.topRightCorner<3, 1>();
   return found;
+}
+
+/// Mean of |p - mean p|^2; exactly 0 where all points are one.
+double SquaredExtent(const Eigen::Matrix3Xd& points) {
+  const Eigen::Matrix3Xd from_first = points.colwise() - points.col(0);
+  return (from_first.colwise() - from_first.rowwise().mean()).squaredNorm() /
+         static_cast<double>(points.cols());
 }
 
 /// The rotation about z that maximises sum to' R from of centred points [Zhang2018].
@@ -97,6 +106,16 @@ Trajectory Similarity::operator*(const Trajectory& estimate) const {
   return moved;
 }
 
+std::optional<Similarity> internal::FindSimilarity(const Eigen::Matrix3Xd& from,
+                                                   const Eigen::Matrix3Xd& to) {
+  if (from.cols() < 3) return std::nullopt;
+  const double variance = SquaredExtent(from), to_variance = SquaredExtent(to);
+  if (!(variance > 0.0)) return std::nullopt;
+  const Similarity found = Umeyama(from, to, true);
+  if (!DeterminesScale(found.scale, variance, to_variance)) return std::nullopt;
+  return found;
+}
+
 Similarity Align(Alignment alignment, const Trajectory& reference, const Trajectory& estimate,
                  int poses) {
   ALIDADE_EXPECTS(reference.size() == estimate.size() && estimate.size() > 0 && poses >= 0);
@@ -109,15 +128,19 @@ Similarity Align(Alignment alignment, const Trajectory& reference, const Traject
     Fail(estimate.name, std::to_string(used) + " poses to align by", "3 or more");
   }
   if (alignment == Alignment::kYaw) return YawOnly(from, to);
-  const bool with_scale = alignment != Alignment::kSe3;
-  const auto at_one_place = [](const Eigen::Matrix3Xd& points) {
-    return (points.colwise() - points.col(0)).isZero(0.0);
-  };
-  if (with_scale && (at_one_place(from) || at_one_place(to))) {
-    Fail((at_one_place(from) ? estimate : reference).name, "all poses are at one place",
-         "a path, to take a scale from");
+  if (alignment == Alignment::kSe3) return Umeyama(from, to, false);
+  const std::optional<Similarity> similarity = internal::FindSimilarity(from, to);
+  if (!similarity) {
+    const auto at_one_place = [](const auto& points) { return !(SquaredExtent(points) > 0.0); };
+    if (at_one_place(from) || at_one_place(to)) {
+      Fail((at_one_place(from) ? estimate : reference).name, "all poses are at one place",
+           "a path, to take a scale from");
+    }
+    Fail(estimate.name,
+         "no scale: its positions have nothing in common with those of " + reference.name,
+         "poses of the same path, or --align se3");
   }
-  Similarity found = Umeyama(from, to, with_scale);
+  Similarity found = *similarity;
   if (alignment == Alignment::kScale) {
     found.rotation.setIdentity();
     found.translation.setZero();
@@ -140,6 +163,13 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Stamp
   const std::vector<Stamp>& shorter = (estimate_longer ? reference : estimate).stamps;
   const std::vector<Stamp>& longer = (estimate_longer ? estimate : reference).stamps;
   const Stamp shift = estimate_longer ? -offset : offset;  // of the shorter
+  for (const Stamp end : {shorter.front(), shorter.back()}) {
+    if (std::abs(Seconds(end) + Seconds(shift)) < cell::kTimeLimit) continue;
+    throw Error(ExitCode::kBadData,
+                ErrorLine({estimate.name}, "--t_offset",
+                          internal::SecondsText(offset) + " beside its stamps is beyond 292 years",
+                          "the time between the two clocks"));
+  }
   Matches matches;
   matches.possible = static_cast<int>(shorter.size());
   std::vector<int>& of_shorter = estimate_longer ? matches.reference : matches.estimate;

@@ -56,25 +56,6 @@ ErrorPose RelativeError(const Trajectory& reference, const Trajectory& estimate,
           AngleOf(turn(reference).conjugate() * turn(estimate))};
 }
 
-/// How far each pose is after the first, in the unit of delta.
-std::vector<double> Progress(const Trajectory& t, DeltaUnit unit) {
-  std::vector<double> progress = {0.0};
-  for (int i = 1; i < t.size(); ++i) {
-    double step = 1.0;
-    if (unit == DeltaUnit::kMetres) step = t.PathLength(i - 1, i);
-    if (unit == DeltaUnit::kSeconds) {
-      const auto at = static_cast<std::size_t>(i);
-      progress.push_back(Seconds(t.stamps[at] - t.stamps[0]));
-      continue;
-    }
-    if (unit == DeltaUnit::kDegrees || unit == DeltaUnit::kRadians) {
-      step = AngleOf(Orientation(t, i - 1).conjugate() * Orientation(t, i));
-    }
-    progress.push_back(progress.back() + step);
-  }
-  return progress;
-}
-
 using Pairs = std::vector<std::pair<int, int>>;
 
 Pairs ConsecutivePairs(const std::vector<double>& progress, double delta, DeltaUnit unit) {
@@ -155,6 +136,21 @@ ErrorStatistics StatisticsOf(std::vector<double> errors) {
   return s;
 }
 
+std::vector<double> internal::Progress(const Trajectory& t, DeltaUnit unit) {
+  std::vector<double> progress = {0.0};
+  for (int i = 1; i < t.size(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    double step = 1.0;
+    if (unit == DeltaUnit::kMetres) step = t.PathLength(i - 1, i);
+    if (unit == DeltaUnit::kSeconds) step = static_cast<double>(t.stamps[at] - t.stamps[at - 1]);
+    if (unit == DeltaUnit::kDegrees || unit == DeltaUnit::kRadians) {
+      step = AngleOf(Orientation(t, i - 1).conjugate() * Orientation(t, i));
+    }
+    progress.push_back(progress.back() + step);
+  }
+  return progress;
+}
+
 Pairs PairsOf(const Trajectory& estimate, const PairOptions& options) {
   ALIDADE_EXPECTS(options.delta > 0.0 && options.tolerance >= 0.0);
   const auto fail = [&](const std::string& what, const char* expected) {
@@ -165,13 +161,14 @@ Pairs PairsOf(const Trajectory& estimate, const PairOptions& options) {
   }
   const bool degrees = options.unit == DeltaUnit::kDegrees;
   const bool angles = degrees || options.unit == DeltaUnit::kRadians;
-  const double delta = degrees ? options.delta * kPi / 180.0 : options.delta;
+  double delta = degrees ? options.delta * kPi / 180.0 : options.delta;
+  if (options.unit == DeltaUnit::kSeconds) delta = std::round(1e9 * delta);
   const double tolerance = options.unit == DeltaUnit::kFrames ? 0.0 : options.tolerance * delta;
   Pairs pairs;
   if (options.all && angles) {
     pairs = AllAnglePairs(estimate, delta, tolerance);
   } else {
-    const std::vector<double> progress = Progress(estimate, options.unit);
+    const std::vector<double> progress = internal::Progress(estimate, options.unit);
     pairs = options.all ? AllPairs(progress, delta, tolerance)
                         : ConsecutivePairs(progress, delta, options.unit);
   }

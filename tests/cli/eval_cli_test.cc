@@ -135,6 +135,80 @@ TEST_F(EvalCli, SeveralEstimatesAreOneTableAndSaveNoSingleResult) {
   EXPECT_TRUE(Exists("r.zip"));
 }
 
+TEST_F(EvalCli, WithoutPairsTheOtherFiguresStand) {
+  const Outcome outcome = Call({"eval", "truth.tum", "mono.tum", "-as", "-d", "30", "-u", "m"});
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_EQ(outcome.err,
+            "warning: mono.tum --delta: no two of 31 poses are 30 m apart; expected a smaller "
+            "--delta, or a larger --delta_tol\n");
+  EXPECT_TRUE(Contains(outcome.out, "ATE trans_part [m]")) << outcome.out;
+  EXPECT_FALSE(Contains(outcome.out, "RPE")) << outcome.out;
+  const Outcome saved = Call({"eval", "truth.tum", "mono.tum", "-as", "-d", "30", "-u", "m",
+                              "--save_results", "a.zip", "--save_relative", "r.zip"});
+  EXPECT_EQ(saved.code, 65);
+  EXPECT_TRUE(Contains(saved.err, "error: mono.tum: no relative errors; expected ")) << saved.err;
+  EXPECT_FALSE(Exists("a.zip"));
+}
+
+TEST_F(EvalCli, AnEstimateThatFailsLeavesTheOthersTheirFigures) {
+  Write("two.tum", "0 2 0 0 0 0 0 1\n0.1 2 0.2 0 0 0 0 1\n");
+  const Arguments call = {"eval", "truth.tum", "two.tum", "mono.tum", "-a", "--quiet"};
+  Arguments markdown = call, json = call;
+  markdown.emplace_back("--markdown");
+  json.emplace_back("--json");
+  const Outcome table = Call(markdown);
+  EXPECT_EQ(table.code, 65);
+  EXPECT_EQ(table.err, "error: two.tum: 2 poses to align by; expected 3 or more\n");
+  EXPECT_TRUE(Contains(table.out, "| two | failed | - | - | - | - | - | - | - |\n")) << table.out;
+  EXPECT_TRUE(Contains(table.out, "| mono | se3 | 1.000000 | 31 of 31 |")) << table.out;
+  EXPECT_TRUE(Contains(table.out, "Rmse against truth.tum; RPE of consecutive pairs, 1 f apart"))
+      << table.out;
+  EXPECT_TRUE(Contains(Call(call).out, "failed")) << Call(call).out;
+  const Outcome both = Call(json);
+  EXPECT_EQ(both.code, 65);
+  const Config parsed = Config::FromText(both.out, "stdout");
+  const Node evaluations = parsed.root().At("evaluations");
+  EXPECT_EQ(evaluations.Items()[0].At("estimate").Text(), "two");
+  EXPECT_EQ(evaluations.Items()[0].At("error").Text(),
+            "two.tum: 2 poses to align by; expected 3 or more");
+  EXPECT_TRUE(evaluations.Items()[1].At("ate").Find("trans_part"));
+  EXPECT_FALSE(evaluations.Items()[1].Find("error"));
+  // Of a single one there is nothing to print.
+  const Outcome alone = Call({"eval", "truth.tum", "two.tum", "-a"});
+  EXPECT_EQ(alone.code, 65);
+  EXPECT_EQ(alone.out, "");
+  EXPECT_EQ(Call({"eval", "truth.tum", "missing.tum", "mono.tum"}).code, 66);
+}
+
+TEST_F(EvalCli, WarningsOfTheReferenceAreInJsonToo) {
+  Write("unsorted.tum", "0.1 2 0.2 0 0 0 0 1\n0 2 0 0 0 0 0 1\n0.2 2 0.4 0 0 0 0 1\n");
+  const Config json = Evaluated({"unsorted.tum", "mono.tum", "--quiet"});
+  const Node warnings = json.root().At("evaluations").Items().front().At("warnings");
+  ASSERT_FALSE(warnings.Items().empty());
+  EXPECT_TRUE(warnings.Items()[0].Text().starts_with("unsorted.tum:2 t: goes back"))
+      << warnings.Items()[0].Text();
+  const Outcome outcome = Call({"eval", "unsorted.tum", "mono.tum"});
+  EXPECT_EQ(outcome.err.find("goes back"), outcome.err.rfind("goes back")) << outcome.err;
+}
+
+TEST_F(EvalCli, ResultsThatCannotBothBeSavedAreNotSaved) {
+  const Outcome same = Call({"eval", "truth.tum", "mono.tum", "--save_results", "a.zip",
+                             "--save_relative", "./a.zip", "--force"});
+  EXPECT_EQ(same.code, 2);
+  EXPECT_TRUE(
+      same.err.starts_with("error: --save_relative: ./a.zip is what --save_results writes; "
+                           "expected another file\n"))
+      << same.err;
+  EXPECT_FALSE(Exists("a.zip"));
+  Write("r.zip", "mine");
+  const Outcome there = Call(
+      {"eval", "truth.tum", "mono.tum", "--save_results", "a.zip", "--save_relative", "r.zip"});
+  EXPECT_EQ(there.code, 73);
+  EXPECT_TRUE(Contains(there.err, "r.zip: is there already")) << there.err;
+  EXPECT_EQ(there.out, "");
+  EXPECT_FALSE(Exists("a.zip"));
+}
+
 TEST_F(EvalCli, OfARunSaysWhatTheRunSaid) {
   const std::string example = ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml";
   ASSERT_EQ(Call({"run", example, "-o", "slam", "--no-figures", "--quiet"}).code, 0);

@@ -90,6 +90,32 @@ TEST(Align, RefusesWhatDeterminesNothing) {
   EXPECT_THROW(Align(Alignment::kSe3, Curve(5), Curve(4)), ContractViolation);
 }
 
+TEST(Align, RefusesWhatDeterminesNoScale) {
+  // Of the squares of x and y no one says anything about the other.
+  Trajectory reference = Curve(12), estimate = Curve(12);
+  for (int i = 0; i < 12; ++i) {
+    reference.positions.col(i) << (i % 2 == 0 ? -1.0 : 1.0), 0.0, 0.0;
+    estimate.positions.col(i) << (i % 4 < 2 ? -1.0 : 1.0), 0.0, 0.0;
+  }
+  for (const double off : {0.0, 0.1}) {  // by 0.1, rounding leaves a scale of 1e-17
+    estimate.positions.row(0).array() += off;
+    for (const Alignment alignment : {Alignment::kSim3, Alignment::kScale}) {
+      try {
+        Align(alignment, reference, estimate);
+        FAIL() << off;
+      } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ExitCode::kBadData);
+        EXPECT_STREQ(error.what(),
+                     "curve.tum: no scale: its positions have nothing in common with those of "
+                     "curve.tum; expected poses of the same path, or --align se3");
+      }
+    }
+    const Evaluation e = Evaluate(reference, estimate, {});
+    EXPECT_FALSE(e.sim3_scale);
+    EXPECT_TRUE(std::isfinite(e.absolute[0].statistics.rmse));
+  }
+}
+
 Trajectory At(const std::vector<double>& seconds) {
   Trajectory t = Curve(static_cast<int>(seconds.size()));
   t.stamps.clear();
@@ -128,6 +154,28 @@ TEST(Associate, TheOffsetIsAddedToTheEstimate) {
                  "beside 10.000000 s to 13.000000 s; expected the same clock; or --t_offset, which "
                  "is added to the estimate's stamps, or --t_max_diff");
   }
+}
+
+TEST(Associate, RefusesAnOffsetThatNoStampHolds) {
+  const Trajectory two = At({1.6e9, 1.6e9 + 1.0}), one = At({1.6e9});
+  constexpr Stamp kOffset = 9'000'000'000'000'000'000;
+  const auto refusal = [](const Trajectory& reference, const Trajectory& estimate, Stamp offset) {
+    try {
+      Associate(reference, estimate, 10'000'000, offset);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::kBadData);
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(refusal(two, one, kOffset),
+            "curve.tum --t_offset: 9000000000.000000 s beside its stamps is beyond 292 years; "
+            "expected the "
+            "time between the two clocks");
+  EXPECT_EQ(refusal(one, two, -kOffset),
+            "curve.tum --t_offset: -9000000000.000000 s beside its stamps is beyond 292 years; "
+            "expected the "
+            "time between the two clocks");
 }
 
 TEST(Associate, WithoutStampsByRow) {
@@ -253,6 +301,10 @@ TEST(PairsOf, AreDeltaApartInEachUnit) {
   EXPECT_EQ(PairsOf(t, {4.4, DeltaUnit::kMetres, true, 0.05}), (Pairs{{0, 9}, {1, 10}}));
   EXPECT_EQ(PairsOf(t, {0.45, DeltaUnit::kSeconds}), (Pairs{{0, 5}, {5, 10}}));
   EXPECT_EQ(PairsOf(t, {0.95, DeltaUnit::kSeconds, true}), (Pairs{{0, 9}, {1, 10}}));
+  // Stamps are exact: 0.3 s are 0.3 s, wherever they begin.
+  EXPECT_EQ(PairsOf(t, {0.3, DeltaUnit::kSeconds}), (Pairs{{0, 3}, {3, 6}, {6, 9}}));
+  EXPECT_EQ(PairsOf(t, {0.7, DeltaUnit::kSeconds, true, 0.0}),
+            (Pairs{{0, 7}, {1, 8}, {2, 9}, {3, 10}}));
   EXPECT_EQ(PairsOf(t, {0.45, DeltaUnit::kRadians}), (Pairs{{0, 5}, {5, 10}}));
   EXPECT_EQ(PairsOf(t, {26.0, DeltaUnit::kDegrees}), (Pairs{{0, 5}, {5, 10}}));
   EXPECT_EQ(PairsOf(t, {0.91, DeltaUnit::kRadians, true, 0.05}), (Pairs{{0, 9}, {1, 10}}));
@@ -265,6 +317,17 @@ TEST(PairsOf, RefusesADeltaThatNoTwoPosesAreApart) {
   bare.stamps.clear();
   EXPECT_THROW(PairsOf(bare, {0.1, DeltaUnit::kSeconds}), Error);
   EXPECT_THROW(PairsOf(bare, {0.0, DeltaUnit::kFrames}), ContractViolation);
+}
+
+TEST(Evaluate, WithoutPairsThereAreNoRelativeErrorsButAWarning) {
+  EvaluateOptions options;
+  options.pairs = {1000.0, DeltaUnit::kMetres};
+  const Evaluation e = Evaluate(Curve(20), Curve(20), options);
+  EXPECT_EQ(e.absolute.size(), 2u);
+  EXPECT_TRUE(e.relative.empty());
+  EXPECT_EQ(e.warnings, (std::vector<std::string>{
+                            "curve.tum --delta: no two of 20 poses are 1000 m apart; expected a "
+                            "smaller --delta, or a larger --delta_tol"}));
 }
 
 TEST(Evaluate, NeesIsThatOfTheCovariancesBesideThePoses) {
@@ -291,6 +354,21 @@ TEST(Evaluate, NeesIsThatOfTheCovariancesBesideThePoses) {
   EXPECT_EQ(e.orientation_nees->poses, 40);
   EXPECT_NEAR(e.orientation_nees->mean, (10.0 * 16.0 + 30.0) / 3.0 / 40.0, 1e-9);
   EXPECT_EQ(e.nees_withheld, "");
+}
+
+TEST(Evaluate, NeesThatLacksIsToldOf) {
+  Trajectory estimate = Curve(5);
+  estimate.position_covariances.assign(5, Eigen::Matrix3d::Zero());
+  estimate.orientation_covariances.assign(5, Eigen::Matrix3d::Identity());
+  Evaluation e = Evaluate(Curve(5), estimate, {});
+  EXPECT_FALSE(e.position_nees);
+  EXPECT_TRUE(e.orientation_nees);
+  EXPECT_EQ(e.nees_withheld, "every covariance of the position is singular");
+  estimate.orientation_covariances = estimate.position_covariances;
+  e = Evaluate(Curve(5), estimate, {});
+  EXPECT_EQ(e.nees_withheld,
+            "every covariance of the position is singular; every covariance of the orientation is "
+            "singular");
 }
 
 TEST(Evaluate, NeesIsWithheldOfAnAlignedEstimate) {
@@ -320,7 +398,7 @@ TEST(Evaluate, ScaleAndItsDriftAreOfThePath) {
   EXPECT_FALSE(Evaluate(Curve(19), Curve(19), {}).scale_drift);
 }
 
-TEST(ReadInnovations, TellsNisAndWhiteness) {
+TEST(ReadInnovations, TellsNisAndAutocorrelation) {
   const testing::TemporaryFolder folder;
   std::string text = "t_s,stream,sensor,landmark,outcome,dof,nis,z0,h0,s0,r0\n";
   // r / s alternates 1, -1: the products of neighbours are -1.
@@ -340,13 +418,13 @@ TEST(ReadInnovations, TellsNisAndWhiteness) {
   EXPECT_EQ(all[0].measurements, 10);
   EXPECT_DOUBLE_EQ(all[0].nis_mean, 6.0);
   EXPECT_DOUBLE_EQ(all[0].nis_cov95, 0.0);  // chi2(0.95, 1) = 3.84
-  EXPECT_DOUBLE_EQ(all[0].whiteness, 1.0);
-  EXPECT_DOUBLE_EQ(all[0].whiteness_bound, 1.96 / std::sqrt(8.0));
+  EXPECT_DOUBLE_EQ(all[0].autocorrelation, 1.0);
+  EXPECT_DOUBLE_EQ(all[0].white_within, 1.96 / std::sqrt(8.0));
   EXPECT_EQ(all[1].sensor, "range");
   EXPECT_DOUBLE_EQ(all[1].nis_mean, 1.0);
   EXPECT_DOUBLE_EQ(all[1].nis_cov95, 1.0);
-  EXPECT_DOUBLE_EQ(all[1].whiteness, -1.0);
-  EXPECT_DOUBLE_EQ(all[1].whiteness_bound, 1.96 / 3.0);
+  EXPECT_DOUBLE_EQ(all[1].autocorrelation, -1.0);
+  EXPECT_DOUBLE_EQ(all[1].white_within, 1.96 / 3.0);
   std::ofstream(folder / "innovations.csv") << "t_s,sensor\n";
   EXPECT_THROW(ReadInnovations(folder / "innovations.csv"), Error);
 }

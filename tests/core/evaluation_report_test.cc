@@ -17,10 +17,9 @@ using Eigen::Vector3d;
 using testing::Curve;
 
 /// The curve, moved by 5 cm and measured against itself.
-Evaluation Moved(Alignment alignment, const std::string& label) {
+Evaluation Moved(Alignment alignment, const std::string& label, EvaluateOptions options = {}) {
   Trajectory estimate = Curve(30);
   estimate.positions.row(0).array() += 0.05;
-  EvaluateOptions options;
   options.alignment = alignment;
   Evaluation evaluation = Evaluate(Curve(30), estimate, options);
   evaluation.label = label;
@@ -56,10 +55,38 @@ TEST(EvaluationReport, EveryTableSaysWhatItsFiguresDependOn) {
   }
 }
 
+TEST(EvaluationReport, EveryTableSaysByHowManyPosesIsAligned) {
+  EvaluateOptions options;
+  options.align_poses = 20;
+  const std::vector<Evaluation> all = {Moved(Alignment::kSe3, "a", options),
+                                       Moved(Alignment::kOrigin, "b", options)};
+  EXPECT_NE(EvaluationMarkdown(all).find("| a | se3 by the first 20 poses | "), std::string::npos);
+  EXPECT_NE(EvaluationMarkdown(all).find("| b | origin | "), std::string::npos);
+  EXPECT_NE(EvaluationLatex(all).find("\na & se3 by the first 20 poses & "), std::string::npos);
+  EXPECT_NE(EvaluationText(all).find(" se3 by the first 20 poses "), std::string::npos);
+  EXPECT_NE(EvaluationText({all[0]}).find("aligned    se3 by the first 20 poses, scale 1.000000"),
+            std::string::npos);
+  EXPECT_NE(EvaluationText({all[1]}).find("aligned    origin, scale"), std::string::npos);
+}
+
 TEST(EvaluationReport, NamesAreQuotedWhereTheFormAsksForIt) {
   const std::vector<Evaluation> one = {Moved(Alignment::kNone, "a|b_{c}")};
   EXPECT_NE(EvaluationMarkdown(one).find("| a\\|b_{c} |"), std::string::npos);
   EXPECT_NE(EvaluationLatex(one).find("\na|b\\_\\{c\\} & none"), std::string::npos);
+  const std::vector<Evaluation> other = {Moved(Alignment::kNone, "a^b~c\\d")};
+  EXPECT_NE(EvaluationMarkdown(other).find("| a^b~c\\\\d |"), std::string::npos);
+  EXPECT_NE(EvaluationLatex(other).find("\na\\^{}b\\~{}c\\textbackslash{}d & none"),
+            std::string::npos)
+      << EvaluationLatex(other);
+}
+
+TEST(EvaluationReport, NeesSaysOfHowManyPosesItIs) {
+  Evaluation evaluation = Moved(Alignment::kNone, "a");
+  evaluation.position_nees = Nees{2, 1.5, 1.0};
+  EXPECT_NE(EvaluationText({evaluation})
+                .find("NEES position 1.5 per dof, 100 % within 95 %, 2 of 30 poses\n"),
+            std::string::npos)
+      << EvaluationText({evaluation});
 }
 
 TEST(EvaluationReport, JsonHasAllOfIt) {
@@ -167,6 +194,36 @@ TEST(SaveEvoResult, IsAZipAsEvoWritesIt) {
   EXPECT_NEAR(Numbers(relative.at("seconds_from_start.npy")).second[0], 0.1, 1e-9);
   EXPECT_NE(relative.at("info.json").find("for delta = 1 (frames) using consecutive pairs"),
             std::string::npos);
+}
+
+TEST(SaveEvoResult, DistancesAreThoseOfThePosesWhateverTheirOrder) {
+  const testing::TemporaryFolder folder;
+  Trajectory turning = Curve(6);
+  const double angles_deg[] = {0.0, 10.0, 20.0, 30.0, 5.0, 20.0};
+  for (std::size_t i = 0; i < 6; ++i) {
+    turning.orientations[i] =
+        Eigen::AngleAxisd(angles_deg[i] * 3.14159265358979323846 / 180.0, Vector3d::UnitX());
+  }
+  EvaluateOptions options;
+  options.alignment = Alignment::kSe3;
+  options.align_poses = 5;
+  options.pairs = {20.0, DeltaUnit::kDegrees, true, 0.01};
+  const Evaluation evaluation = Evaluate(turning, turning, options);
+  ASSERT_EQ(evaluation.pairs, (std::vector<std::pair<int, int>>{{0, 2}, {0, 5}, {1, 3}}));
+  SaveEvoResult(evaluation, SavedErrors::kRelative, folder / "r.zip", false);
+  const auto entries = Unzip(testing::Read(folder / "r.zip"));
+  const std::vector<double> reference = Numbers(entries.at("distances_from_start.npy")).second;
+  const std::vector<double> estimate = Numbers(entries.at("distances.npy")).second;
+  ASSERT_EQ(reference.size(), evaluation.pairs.size());
+  ASSERT_EQ(estimate.size(), evaluation.pairs.size());
+  for (std::size_t k = 0; k < evaluation.pairs.size(); ++k) {
+    const int end = evaluation.pairs[k].second;
+    EXPECT_NEAR(reference[k], evaluation.reference.PathLength(0, end), 1e-12) << k;
+    EXPECT_NEAR(estimate[k], evaluation.estimate.PathLength(0, end), 1e-12) << k;
+  }
+  EXPECT_NE(entries.at("info.json").find("Umeyama alignment) (aligned poses: 5)"),
+            std::string::npos)
+      << entries.at("info.json");
 }
 
 }  // namespace

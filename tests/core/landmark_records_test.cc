@@ -188,16 +188,19 @@ TEST(MapMetrics, ASimilarityIsNoErrorAfterAlignment) {
   EXPECT_NEAR(metrics.at("map.sim3.scale"), 0.5, 1e-12);
 }
 
-TEST(MapMetrics, PointsOnALineAreNotAligned) {
-  const Street source;
+TEST(MapMetrics, PointsOnALineHaveAScaleThoseAtOnePlaceNone) {
   std::vector<LandmarkEstimate> map(3);
   for (int id = 0; id < 3; ++id) {
-    map[static_cast<std::size_t>(id)].id = id;
-    const auto p = source.TrueLandmark(id);
-    map[static_cast<std::size_t>(id)].true_position = Eigen::Map<const Eigen::Vector3d>(p->data());
-    map[static_cast<std::size_t>(id)].position = Eigen::Vector3d(id, 0.0, 0.0);
+    LandmarkEstimate& one = map[static_cast<std::size_t>(id)];
+    one.id = id;
+    one.true_position = Eigen::Vector3d(1.0, 2.0, 3.0) + 0.5 * id * Eigen::Vector3d(2, -1, 2);
+    one.position = Eigen::Vector3d(id, 0.0, 0.0);
   }
-  const auto metrics = internal::MapMetrics(map);
+  auto metrics = internal::MapMetrics(map);
+  EXPECT_NEAR(metrics.at("map.sim3.scale"), 1.5, 1e-12);
+  EXPECT_LT(metrics.at("map.sim3.rmse"), 1e-12);
+  for (LandmarkEstimate& one : map) one.position = Eigen::Vector3d(0.1, 0.2, 0.3);
+  metrics = internal::MapMetrics(map);
   EXPECT_TRUE(metrics.contains("map.rmse"));
   EXPECT_FALSE(metrics.contains("map.sim3.rmse"));
 }

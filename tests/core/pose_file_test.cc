@@ -34,7 +34,7 @@ TEST(PoseFile, IsReadBackAsItWasWritten) {
   const testing::TemporaryFolder folder;
   const double position[] = {0.1, -2.0, 3e-7}, orientation[] = {0.8, 0.6, 0.0, 0.0};
   Eigen::Matrix3d p, r;
-  p << 1, 2, 3, 2, 4, 5, 3, 5, 6;
+  p << 6, 2, 3, 2, 8, 5, 3, 5, 9;
   r = 0.1 * p;
   const Eigen::Matrix3d known = p;
   {

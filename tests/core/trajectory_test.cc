@@ -71,11 +71,11 @@ TEST_F(TrajectoryFiles, TumIsReadExactlyWhateverTheLineEnds) {
 }
 
 TEST_F(TrajectoryFiles, TwentyColumnsAreTumWithCovariancesRotationFirst) {
-  const Trajectory t = Read("0 1 2 3 0 0 0 1 11 12 13 22 23 33 0.1 0.2 0.3 0.4 0.5 0.6\n");
+  const Trajectory t = Read("0 1 2 3 0 0 0 1 11 12 13 22 23 33 0.6 0.2 0.3 0.8 0.5 0.9\n");
   ASSERT_TRUE(t.has_covariances());
   Eigen::Matrix3d orientation, position;
   orientation << 11, 12, 13, 12, 22, 23, 13, 23, 33;
-  position << 0.1, 0.2, 0.3, 0.2, 0.4, 0.5, 0.3, 0.5, 0.6;
+  position << 0.6, 0.2, 0.3, 0.2, 0.8, 0.5, 0.3, 0.5, 0.9;
   EXPECT_EQ(t.orientation_covariances[0], orientation);
   EXPECT_EQ(t.position_covariances[0], position);
 }
@@ -155,7 +155,10 @@ TEST_F(TrajectoryFiles, StampsThatCannotBeSecondsAreReadAsWhatTheyLookLike) {
   };
   for (const Case& c : {Case{"1311868163869700001", "1311868163903000001", "ns"},
                         {"0", "33333333", "ns"},
+                        {"3600000000000", "3600033300000", "ns"},  // an hour after its start
                         {"1311868163869700", "1311868163903000", "us"},
+                        {"0", "33333", "us"},
+                        {"10800000000", "10800033300", "us"},  // three hours after its start
                         {"1311868163869.7", "1311868163903", "ms"}}) {
     SCOPED_TRACE(c.first + ' ' + c.unit);
     const std::string text = "# t\n" + c.first + pose + c.second + pose;
@@ -165,8 +168,51 @@ TEST_F(TrajectoryFiles, StampsThatCannotBeSecondsAreReadAsWhatTheyLookLike) {
     const Trajectory t = Read(text);
     EXPECT_NEAR(1e-9 * static_cast<double>(t.stamps[1] - t.stamps[0]), 0.0333, 1e-4);
   }
+  EXPECT_EQ(Read("0" + pose + "1000000" + pose).stamps[1], 1'000'000'000);  // us, each second
+  EXPECT_EQ(Read("1311868163869" + pose + "1311868168869" + pose).stamps[1],
+            1'311'868'168'869'000'000);  // ms, 5 s apart
   EXPECT_EQ(Read("1311868163869700001" + pose).stamps[0], 1311868163869700001);
   EXPECT_EQ(WarningsOf("1311868163.8697" + pose + "1311868200" + pose), "");
+}
+
+TEST_F(TrajectoryFiles, StampsThatNoStampHoldsAreRefusedWithTheirPlace) {
+  const std::string pose = " 1 2 3 0 0 0 1\n";
+  const std::string two = "1" + pose + "2" + pose;
+  const auto beyond = [](const std::string& stamp) {
+    return "poses.txt:3 t: '" + stamp + "' is beyond 292 years; expected seconds, as TUM has them";
+  };
+  for (const std::string stamp : {"99999999999999999999", "9223372036.854775808", "-9.3e9"}) {
+    EXPECT_EQ(Refusal(two + stamp + pose), beyond(stamp));
+  }
+  EXPECT_EQ(Refusal("9199999998" + pose + "9199999999" + pose + "9200000001" + pose),
+            beyond("9200000001"));
+  EXPECT_EQ(Refusal("1e20" + pose),
+            "poses.txt:1 t: '1e20' is beyond 292 years; expected seconds, as TUM has them");
+  EXPECT_EQ(Read("9199999998.123456789" + pose).stamps[0], 9199999998123456789);
+  // No difference of two stamps may be beyond either.
+  EXPECT_EQ(Refusal("-9000000000" + pose + "-8999999999" + pose + "-8999999998" + pose +
+                    "9000000000" + pose),
+            "poses.txt t: its stamps are more than 292 years apart; expected those of one clock");
+}
+
+TEST_F(TrajectoryFiles, ACovarianceThatIsNoneIsRefusedWithItsLine) {
+  const std::string pose = " 1 2 3 0 0 0 1 ", good = "1 0 0 1 0 1";
+  const auto refusal = [&](const std::string& orientation, const std::string& position) {
+    return Refusal("0" + pose + good + ' ' + good + "\n1" + pose + orientation + ' ' + position +
+                   '\n');
+  };
+  const std::string none = " is not positive semi-definite: its smallest eigenvalue is -";
+  EXPECT_EQ(refusal(good, "1 0 0 1 0 -1"),
+            "poses.txt:2: the covariance of the position" + none + "1; expected a covariance");
+  EXPECT_EQ(
+      refusal("0.01 0.03 0 0.01 0 1", good),
+      "poses.txt:2: the covariance of the orientation" + none + "0.02; expected a covariance");
+  EXPECT_EQ(
+      refusal("-1e-9 0 0 -1e-9 0 -1e-9", good),
+      "poses.txt:2: the covariance of the orientation" + none + "1e-09; expected a covariance");
+  // Singular is none of it, nor is what six digits make of it.
+  EXPECT_EQ(refusal("0 0 0 0 0 0", "1 1 0 1 0 0"), "");
+  EXPECT_EQ(refusal(good, "0.111111 0.111112 0 0.111111 0 1"), "");
 }
 
 TEST_F(TrajectoryFiles, StampsOutOfOrderAreSortedAndToldOf) {

@@ -37,8 +37,8 @@ struct Similarity {
 };
 
 /// The transformation of `estimate` to `reference`, of the same poses in the same order, by the
-/// first `poses` of them (0: all). Errors: kBadData where they are fewer than 3 for a rotation, or
-/// all at one place for a scale.
+/// first `poses` of them (0: all). Errors: kBadData where they are fewer than 3 for a rotation, and
+/// for a scale all at one place or without anything in common.
 Similarity Align(Alignment alignment, const Trajectory& reference, const Trajectory& estimate,
                  int poses = 0);
 
@@ -51,8 +51,8 @@ struct Matches {
 /// To each pose of the shorter trajectory the nearest of the longer in time, within `max_diff`;
 /// `offset` is added to the stamps of the estimate. No pose is taken twice: of those that are
 /// nearest to the same one, the nearest of them is. By row where both are of KITTI, or neither has
-/// stamps. Errors: kBadData where nothing matches, where there are not as many rows, and where only
-/// one has stamps.
+/// stamps. Errors: kBadData where nothing matches, where there are not as many rows, where only one
+/// has stamps, and where no stamp holds the offset.
 Matches Associate(const Trajectory& reference, const Trajectory& estimate, Stamp max_diff,
                   Stamp offset);
 
@@ -119,8 +119,8 @@ struct InnovationStatistics {
   double nis_cov95 = 0.0;  ///< share with r' S^-1 r <= chi2(0.95, dof); 0.95 is right
   /// Autocorrelation of the elements of r, over their standard deviations, from one measurement of
   /// the sensor (and landmark) to the next [BarShalom2001] sec. 5.4; white: 0.
-  double whiteness = 0.0;
-  double whiteness_bound = 0.0;  ///< 1.96 / sqrt(products): that of a white one lies within in 95 %
+  double autocorrelation = 0.0;
+  double white_within = 0.0;  ///< 1.96 / sqrt(products): that of a white one is within in 95 %
 };
 /// Of the sensors of a run's `NAME/innovations.csv`, sorted. Errors: kBadData, kInputMissing.
 std::vector<InnovationStatistics> ReadInnovations(const std::filesystem::path& file);
@@ -145,18 +145,19 @@ struct Evaluation {
   Similarity alignment;
   std::vector<std::pair<int, int>> pairs;  ///< of the relative errors
   std::vector<PoseErrors> absolute, relative;
-  std::optional<double> sim3_scale;   ///< that kSim3 finds; none of a path without extent
+  std::optional<double> sim3_scale;   ///< that kSim3 finds; none where Align finds none
   std::optional<double> scale_drift;  ///< scale of the second half over that of the first, - 1
   std::optional<Nees> position_nees, orientation_nees;
-  std::string nees_withheld;  ///< why there is none, where there are covariances
+  std::string nees_withheld;  ///< why one lacks, where there are covariances
   std::vector<InnovationStatistics> innovations;
   std::vector<std::string> warnings;  ///< a line each
+  std::string error;  ///< why there are no figures, where that is so; set by callers of Evaluate
 };
 
 /// Evaluates `estimate`. Warns of what makes the figures mean something else than they say: few
 /// matches, stamps that are off by a constant time, a scale that is not metric, other world or body
-/// frames, quaternions in the other order, a path that ends early. Errors: those of Associate,
-/// Align and PairsOf.
+/// frames, quaternions in the other order, a path that ends early, no pair of poses that is delta
+/// apart: then there are no relative errors. Errors: those of Associate and Align.
 Evaluation Evaluate(const Trajectory& reference, const Trajectory& estimate,
                     const EvaluateOptions& options);
 

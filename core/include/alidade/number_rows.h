@@ -80,7 +80,7 @@ class NumberRows {
   /// A time in seconds, exact to the ns.
   Stamp Time(std::size_t i, const char* name) const {
     const double t_s = Number(i, name);
-    if (!(std::abs(t_s) < 9.2e9)) FailCell(i, name, "is beyond 292 years", "seconds");
+    if (!(std::abs(t_s) < cell::kTimeLimit)) FailCell(i, name, "is beyond 292 years", "seconds");
     return cell::ParseStamp(text(i), t_s, 9);
   }
 

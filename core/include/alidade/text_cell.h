@@ -36,7 +36,11 @@ inline const char* ParseNumber(std::string_view text, double& value) {
   return std::isfinite(value) ? nullptr : "is not finite";
 }
 
-/// The nearest ns to a decimal number without exponent, in a unit of 10^digits ns.
+/// Times of a size below this, s, are stamps (292 years).
+inline constexpr double kTimeLimit = 9.2e9;
+
+/// The nearest ns to a decimal number without exponent, in a unit of 10^digits ns, of a time below
+/// kTimeLimit.
 inline Stamp ExactStamp(std::string_view text, std::size_t digits) {
   const bool negative = text.starts_with('-');
   if (negative || text.starts_with('+')) text.remove_prefix(1);
@@ -52,7 +56,7 @@ inline Stamp ExactStamp(std::string_view text, std::size_t digits) {
 }
 
 /// The stamp that `text` writes in a unit of 10^digits ns, `value` being the number it is; exact
-/// where it has no exponent.
+/// where it has no exponent. The time is below kTimeLimit.
 inline Stamp ParseStamp(std::string_view text, double value, std::size_t digits) {
   if (text.find_first_of("eE") == std::string_view::npos) return ExactStamp(text, digits);
   return StampFromSeconds(value * std::pow(10.0, static_cast<double>(digits) - 9.0));

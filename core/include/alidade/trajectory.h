@@ -50,12 +50,13 @@ struct Trajectory {
 /// first row has by its columns and commas. Blank lines and lines that begin with `#` are left out.
 /// KITTI's stamps are those of NAME_times.txt or times.txt beside NAME.txt, where there is one.
 ///
-/// Warns, with the line, of stamps of TUM that are no seconds by their size (they are read as what
-/// they look like, ns, us or ms), of poses out of order (they are sorted), of a stamp that is there
-/// twice (the first is taken), and of a first pose that would be the identity in the other order of
-/// the quaternion.
+/// Warns, with the line, of stamps of TUM that are no seconds by their size and distance (they are
+/// read as what they look like, ns, us or ms), of poses out of order (they are sorted), of a stamp
+/// that is there twice (the first is taken), and of a first pose that would be the identity in the
+/// other order of the quaternion.
 ///
-/// Errors: kBadData with file, line and column of a row that is none; kInputMissing.
+/// Errors: kBadData with file, line and column of a row that is none, of a stamp beyond 292 years
+/// and of a covariance that is not positive semi-definite; kInputMissing.
 Trajectory ReadTrajectory(const std::filesystem::path& file,
                           TrajectoryFormat format = TrajectoryFormat::kDetect);
 

@@ -201,13 +201,16 @@ void AddOptions(CLI::App& command, Arguments& arguments) {
   command
       .add_option("--first-seed", arguments.sweep.first_seed, "seeds count up from S; default 1")
       ->option_text("S")
-      ->check(IsInteger(0, std::int64_t{1} << 62));
+      ->check(IsInteger(0, std::int64_t{1} << 62))
+      ->needs("--runs");
   command.add_option("--jobs", arguments.sweep.jobs, "threads; default: all processors")
       ->option_text("J")
-      ->check(IsInteger(1, 1024));
+      ->check(IsInteger(1, 1024))
+      ->needs("--runs");
   command.add_option("--seed", arguments.seed, "seed of the source; overrides the config")
       ->option_text("N")
-      ->check(IsInteger(0, INT64_MAX));
+      ->check(IsInteger(0, INT64_MAX))
+      ->excludes("--first-seed");
   AddSets(command, arguments.input.sets,
           "set a key of the config, in dotted form; may be repeated");
   AddPluginPath(command, arguments.input.plugin_paths);
@@ -218,8 +221,11 @@ void AddOptions(CLI::App& command, Arguments& arguments) {
             "none is written");
   command.add_flag("--force", arguments.force, "replace the folder if it is there");
   command.add_flag("--json", arguments.json, "print all values as JSON");
-  command.add_flag("--markdown", arguments.markdown, "print the tables as Markdown");
-  command.add_flag("--latex", arguments.latex, "print the tables as LaTeX (booktabs)");
+  command.add_flag("--markdown", arguments.markdown, "print the tables as Markdown")
+      ->excludes("--json");
+  command.add_flag("--latex", arguments.latex, "print the tables as LaTeX (booktabs)")
+      ->excludes("--json")
+      ->excludes("--markdown");
   command.add_flag("--figures", arguments.figures, "draw the figures of the run too");
   command.add_flag("--quiet", arguments.quiet, "print the comparison and errors only");
 }

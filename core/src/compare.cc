@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <set>
 
 #include "names.h"
 #include "text_table.h"
@@ -44,22 +45,28 @@ const Candidate& Named(const std::string& name, const std::vector<Candidate>& ca
   for (const Candidate& one : candidates) {
     if (one.name == name || one.entry->result.name == name) return one;
   }
-  const std::vector<std::string> names = internal::NamesOf(candidates);
-  throw Error(ExitCode::kUsage, ErrorLine({}, option, "no estimator '" + name + "'",
-                                          "one of " + internal::Join(names), Nearest(name, names)));
+  internal::RefuseOption(option, "no estimator '" + name + "'", name,
+                         internal::NamesOf(candidates));
 }
 
-/// The first candidate that is so; null: there is none.
+/// The first candidate that is so, of those that are usable where one is; null: there is none.
 const Candidate* FirstOf(const std::vector<Candidate>& candidates,
                          const std::function<bool(const Candidate&)>& is_so) {
-  const auto found = std::ranges::find_if(candidates, is_so);
-  return found == candidates.end() ? nullptr : &*found;
+  const Candidate* first = nullptr;
+  for (const Candidate& one : candidates) {
+    if (!is_so(one)) continue;
+    if (one.entry->usable()) return &one;
+    if (first == nullptr) first = &one;
+  }
+  return first;
 }
 
-/// The batch of the data so far, or of all data; one that sees all measurements comes first.
-const Candidate* BatchOf(const std::vector<Candidate>& candidates, bool smoothed) {
+/// The batch of the same system as `of`, of the data so far or of all data; one that sees all
+/// measurements comes before one of those that a filter accepted.
+const Candidate* BatchFor(const Candidate& of, const std::vector<Candidate>& candidates,
+                          bool smoothed) {
   const auto fits = [&](const Candidate& one) {
-    return one.batch() && one.facts().smoothed == smoothed;
+    return one.batch() && one.facts().smoothed == smoothed && SameSystem(one.facts(), of.facts());
   };
   const Candidate* const of_all = FirstOf(candidates, [&](const Candidate& one) {
     return fits(one) && one.facts().accepted_by.empty();
@@ -73,67 +80,81 @@ bool HasErrors(const Candidate& one) {
                              [](const auto& metric) { return metric.first.starts_with("rmse:"); });
 }
 
-/// What the estimates of a comparison are held against.
-struct References {
-  bool truth = false;
-  const Candidate* online = nullptr;    ///< of filters
-  const Candidate* smoothed = nullptr;  ///< of estimates from all data
-  const Candidate* final = nullptr;     ///< at the end, where all have the same data
-};
-
-References FindReferences(const std::vector<Candidate>& candidates, const CompareOptions& options) {
-  References found;
+/// Whether errors are taken from truth. Error: kUsage where that is asked for and there is none.
+bool FromTruth(const std::vector<Candidate>& candidates, const CompareOptions& options) {
+  const bool asked = options.reference == "truth";
+  if (!options.reference.empty() && !asked) return false;
   const bool truth = std::ranges::any_of(candidates, HasErrors);
-  if (!options.reference.empty() && options.reference != "truth") {
-    found.online = found.smoothed = found.final =
-        &Named(options.reference, candidates, "--reference");
-    return found;
+  if (asked && !truth) {
+    internal::RefuseOption("--reference", "no run has errors from truth", "",
+                           internal::NamesOf(candidates));
   }
-  if (options.reference == "truth" && !truth) {
-    throw Error(ExitCode::kUsage,
-                ErrorLine({}, "--reference", "no run has errors from truth",
-                          "an estimator: " + internal::Join(internal::NamesOf(candidates))));
-  }
-  found.truth = truth;
-  found.online = BatchOf(candidates, false);
-  found.smoothed = BatchOf(candidates, true);
-  if (found.smoothed == nullptr) {
-    found.smoothed = FirstOf(candidates, [](const Candidate& c) { return c.facts().smoothed; });
-  }
-  if (!truth && found.online == nullptr) found.online = found.smoothed;
-  found.final = found.smoothed != nullptr ? found.smoothed : found.online;
-  return found;
+  return truth;
 }
 
-/// Why `reference` is none, or "".
-std::string WhyNone(const Candidate* reference) {
-  if (reference == nullptr) return "no reference: no truth, no batch and no smoother";
-  if (reference->entry->usable()) return "";
-  return "no reference: estimator '" + reference->name + "' " +
-         (reference->entry->result.failed ? "failed" : "has no estimates") +
-         ", the comparison with it is withheld";
+/// What the estimates of a candidate are held against; null: nothing.
+struct References {
+  const Candidate* along = nullptr;  ///< those along the run
+  const Candidate* final = nullptr;  ///< the last one, when all have the same data
+};
+
+References ReferencesOf(const Candidate& one, const std::vector<Candidate>& candidates, bool truth,
+                        const CompareOptions& options) {
+  if (!options.reference.empty() && options.reference != "truth") {
+    const Candidate& named = Named(options.reference, candidates, "--reference");
+    return {&named, &named};
+  }
+  const Candidate* const so_far = BatchFor(one, candidates, false);
+  const Candidate* smoothed = BatchFor(one, candidates, true);
+  if (smoothed == nullptr) {
+    smoothed = FirstOf(candidates, [&](const Candidate& other) {
+      return other.facts().smoothed && SameSystem(other.facts(), one.facts());
+    });
+  }
+  const bool later = one.facts().smoothed || (!truth && so_far == nullptr);
+  return {later ? smoothed : so_far, smoothed != nullptr ? smoothed : so_far};
+}
+
+/// Why a comparison with what is held against is withheld, or "".
+std::string WhyWithheld(const std::vector<References>& references, bool truth) {
+  bool any = truth;
+  for (const References& of_one : references) {
+    for (const Candidate* const reference : {of_one.final, of_one.along}) {
+      if (reference == nullptr) continue;
+      any = true;
+      if (reference->entry->usable()) continue;
+      return "no reference: estimator '" + reference->name + "' " +
+             (reference->entry->result.failed ? "failed" : "has no estimates") +
+             ", the comparison with it is withheld";
+    }
+  }
+  return any ? "" : "no reference: no truth, no batch and no smoother";
+}
+
+/// Which estimators are held against nothing while others are.
+std::vector<std::string> WithoutReference(const std::vector<Candidate>& candidates,
+                                          const std::vector<References>& references) {
+  bool final = false, online = false;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    final = final || references[i].final != nullptr;
+    online = online || (references[i].along != nullptr && !candidates[i].facts().smoothed);
+  }
+  std::vector<std::string> notes;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const std::string what = "'" + candidates[i].name + "' is held against nothing";
+    if (final && references[i].final == nullptr) {
+      notes.push_back(what + ": no batch has its sensors and overrides");
+    } else if (online && references[i].along == nullptr) {
+      notes.push_back(what + " along the run: no batch of the data so far has its sensors and " +
+                      "overrides");
+    }
+  }
+  return notes;
 }
 
 bool ScaleIsFree(const Candidate& one) {
   const std::vector<std::string> scale = {"scale"};
   return std::ranges::count(one.entry->result.unobservable, scale) > 0;
-}
-
-/// Landmarks that both maps have, as columns.
-std::optional<internal::Aligned> AlignMaps(const EstimatorResult& map, const EstimatorResult& ref) {
-  if (!map.landmarks || !ref.landmarks) return std::nullopt;
-  Eigen::Matrix3Xd points(3, std::ssize(*map.landmarks)), onto = points;
-  Eigen::Index count = 0;
-  for (const LandmarkEstimate& one : *map.landmarks) {
-    for (const LandmarkEstimate& other : *ref.landmarks) {
-      const bool same = one.id == other.id && one.generation == other.generation;
-      if (!same || !one.position.allFinite() || !other.position.allFinite()) continue;
-      points.col(count) = one.position;
-      onto.col(count++) = other.position;
-      break;
-    }
-  }
-  return internal::AlignBySimilarity(points.leftCols(count), onto.leftCols(count));
 }
 
 void AddAll(const std::map<std::string, double>& from, const std::string& kind,
@@ -149,6 +170,7 @@ void AddRatios(const ComparedEntry& one, const ComparedEntry& reference,
     const auto found = reference.result.metrics.find(key);
     if (std::ranges::none_of(kinds, begins) || key.find('@') != key.npos) continue;
     if (found == reference.result.metrics.end() || !(found->second > 0.0)) continue;
+    if (!std::isfinite(found->second)) continue;
     values["ratio." + key] = Single(value / found->second);
   }
 }
@@ -169,9 +191,8 @@ void AddFinal(const Candidate& one, const Candidate& reference, ComparedEstimato
   const Distance distance = internal::DistanceBetween(one.entry->series, reference.entry->series);
   AddAll(distance.final, "apart.final:", compared.values);
   AddAll(distance.final_sigmas, "apart.final.sigmas:", compared.values);
-  if (const auto aligned = AlignMaps(one.entry->result, reference.entry->result)) {
-    compared.values["apart.map.sim3"] = Single(aligned->rmse);
-  }
+  AddAll(internal::DistanceBetweenMaps(one.entry->result, reference.entry->result), "apart.",
+         compared.values);
 }
 
 /// Metrics of the run that need no truth.
@@ -182,16 +203,20 @@ bool NeedsNoTruth(const std::string& key) {
   return false;
 }
 
-ComparedEstimator Compare(const Candidate& one, const References& references) {
+ComparedEstimator Compare(const Candidate& one, const References& references, bool truth) {
   const EstimatorResult& result = one.entry->result;
-  ComparedEstimator compared{
-      one.name, one.facts().type,       one.facts().smoothed, "", "", {}, result.units,
-      1,        result.diverged ? 1 : 0};
+  ComparedEstimator compared;
+  compared.name = one.name;
+  compared.type = one.facts().type;
+  compared.smoothed = one.facts().smoothed;
+  compared.units = result.units;
+  compared.used = 1;
+  compared.diverged = result.diverged ? 1 : 0;
   for (const internal::SeriesBlock& block : one.entry->series.blocks) {
     if (!block.unit.empty()) compared.units[block.name] = block.unit;
   }
   for (const auto& [key, value] : result.metrics) {
-    const bool from_truth = references.truth && one.run->reference == "truth";
+    const bool from_truth = truth && one.run->reference == "truth";
     if (from_truth || NeedsNoTruth(key)) compared.values[key] = Single(value);
   }
   const std::int64_t count = one.entry->measurements();
@@ -199,55 +224,88 @@ ComparedEstimator Compare(const Candidate& one, const References& references) {
     compared.values["time_us"] = Single(1e6 * result.wall_s / static_cast<double>(count));
   }
   if (!one.entry->usable()) return compared;
-  const Candidate* const along = compared.smoothed ? references.smoothed : references.online;
-  if (along != nullptr && along->entry->usable()) {
-    compared.reference = along->name;
-    if (references.truth)
-      AddRatios(*one.entry, *along->entry, {"rmse:", "path.sim3.rmse"}, compared.values);
-    if (along->entry != one.entry) AddApart(one, *along, compared);
+  if (references.along != nullptr && references.along->entry->usable()) {
+    const Candidate& along = *references.along;
+    compared.reference = along.name;
+    compared.reference_runs = 1;
+    if (truth) AddRatios(*one.entry, *along.entry, {"rmse:", "path.sim3.rmse"}, compared.values);
+    if (along.entry != one.entry) AddApart(one, along, compared);
   }
   if (references.final != nullptr && references.final->entry->usable()) {
     const Candidate& final = *references.final;
     compared.final_reference = final.name;
-    if (references.truth)
+    compared.final_reference_runs = 1;
+    if (truth)
       AddRatios(*one.entry, *final.entry, {"final:", "map.rmse", "map.sim3.rmse"}, compared.values);
     if (final.entry != one.entry) AddFinal(one, final, compared);
   }
   return compared;
 }
 
-/// The filter whose gap is explained; null: there is none.
+/// The filter whose gap is explained; null: there is none. Error: kUsage.
 const Candidate* FilterOf(const std::vector<Candidate>& candidates, const CompareOptions& options) {
-  if (!options.filter.empty()) return &Named(options.filter, candidates, "--filter");
-  return FirstOf(candidates, [](const Candidate& one) {
-    return !one.facts().smoothed && !one.batch() && one.facts().accepted_by.empty();
-  });
+  const auto is_filter = [](const Candidate& one) {
+    return internal::IsFilter(one.facts().type, one.facts().smoothed);
+  };
+  if (options.filter.empty()) {
+    const auto first = std::ranges::find_if(candidates, [&](const Candidate& one) {
+      return is_filter(one) && one.facts().accepted_by.empty();
+    });
+    return first == candidates.end() ? nullptr : &*first;
+  }
+  std::vector<std::string> filters;
+  bool known = false;
+  for (const Candidate& one : candidates) {
+    const bool named = one.name == options.filter || one.entry->result.name == options.filter;
+    if (named && is_filter(one)) return &one;
+    known = known || named;
+    if (is_filter(one)) filters.push_back(one.name);
+  }
+  internal::RefuseFilter(options.filter, known, filters);
 }
 
 std::vector<std::string> NotesOf(const std::vector<Candidate>& candidates,
-                                 const References& references) {
-  std::vector<std::string> notes;
+                                 const std::vector<References>& references, bool truth) {
+  std::set<std::string> notes;
   if (std::ranges::any_of(candidates, ScaleIsFree)) {
-    notes.emplace_back(
+    notes.insert(
         "scale is what the priors make of it: paths and maps are to be compared by their Sim3 "
         "rows, after the similarity that brings them nearest");
   }
-  for (const Candidate* const one : {references.online, references.smoothed}) {
-    if (one == nullptr || one->entry->series.joint || !one->entry->usable()) continue;
-    notes.push_back("'" + one->name +
-                    "' has no covariance.bin: sigmas apart leave its correlations out");
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const Candidate* const along = references[i].along;
+    if (along == nullptr) continue;
+    if (!along->entry->series.joint && along->entry->usable()) {
+      notes.insert("'" + along->name +
+                   "' has no covariance.bin: Mahalanobis distances leave its correlations out");
+    }
+    if (!truth && along->facts().smoothed && !candidates[i].facts().smoothed) {
+      notes.insert("'" + along->name +
+                   "' knows later data, a filter does not: it lags behind by nature");
+    }
   }
-  std::ranges::sort(notes);
-  notes.erase(std::unique(notes.begin(), notes.end()), notes.end());
-  const Candidate* const reference = references.online;
-  if (!references.truth && reference != nullptr && reference->facts().smoothed) {
-    notes.push_back("'" + reference->name +
-                    "' knows later data, a filter does not: it lags behind by nature");
-  }
-  return notes;
+  std::vector<std::string> all(notes.begin(), notes.end());
+  const std::vector<std::string> without = WithoutReference(candidates, references);
+  all.insert(all.end(), without.begin(), without.end());
+  return all;
 }
 
 }  // namespace
+
+void internal::RefuseOption(const char* option, const std::string& what, const std::string& name,
+                            const std::vector<std::string>& choices) {
+  throw Error(ExitCode::kUsage,
+              ErrorLine({}, option, what,
+                        choices.empty() ? "a config that has one" : "one of " + Join(choices),
+                        Nearest(name, choices)));
+}
+
+void internal::RefuseFilter(const std::string& name, bool known,
+                            const std::vector<std::string>& filters) {
+  const std::string quoted = "'" + name + "'";
+  RefuseOption("--filter", known ? quoted + " is not an online filter" : "no estimator " + quoted,
+               known ? "" : name, filters);
+}
 
 const char* ToString(GapKind kind) {
   constexpr const char* kNames[] = {"linearisation", "smoothing", "lost data"};
@@ -258,25 +316,26 @@ Comparison internal::CompareRuns(const std::vector<ComparedRun>& runs,
                                  const CompareOptions& options) {
   ALIDADE_EXPECTS(!runs.empty());
   const std::vector<Candidate> candidates = CandidatesOf(runs);
-  const References references = FindReferences(candidates, options);
+  const bool truth = FromTruth(candidates, options);
+  std::vector<References> references;
+  for (const Candidate& one : candidates) {
+    references.push_back(ReferencesOf(one, candidates, truth, options));
+  }
   Comparison comparison;
   comparison.frames = runs.front().frames;
   comparison.measurements_sha256 = runs.front().measurements_sha256;
-  comparison.notes = NotesOf(candidates, references);
-  comparison.reference = references.truth              ? "truth"
-                         : references.final == nullptr ? ""
-                                                       : references.final->name;
-  for (const Candidate* const reference : {references.final, references.online}) {
-    const bool needed = !references.truth || reference != nullptr;
-    if (needed && comparison.withheld.empty()) comparison.withheld = WhyNone(reference);
-  }
-  for (const Candidate& one : candidates) {
-    comparison.estimators.push_back(Compare(one, references));
+  comparison.notes = NotesOf(candidates, references, truth);
+  comparison.withheld = WhyWithheld(references, truth);
+  comparison.reference = truth ? "truth" : "";
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    comparison.estimators.push_back(Compare(candidates[i], references[i], truth));
+    const Candidate* const final = references[i].final;
+    if (comparison.reference.empty() && final != nullptr) comparison.reference = final->name;
   }
   const Candidate* const filter = options.explain ? FilterOf(candidates, options) : nullptr;
   if (filter != nullptr) {
     comparison.explained = filter->name;
-    comparison.gap = ExplainGap(*filter, candidates, references.truth);
+    comparison.gap = ExplainGap(*filter, candidates, truth);
   }
   return comparison;
 }

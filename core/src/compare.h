@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
+#include <string>
 #include <vector>
 
 #include "alidade/compare.h"
@@ -17,6 +19,26 @@ struct Candidate {
   const EstimatorFacts& facts() const { return entry->facts; }
   bool batch() const { return facts().type == "ceres_batch"; }
 };
+
+/// Whether both are of the same models and sensors.
+bool SameSystem(const EstimatorFacts& a, const EstimatorFacts& b);
+
+/// Whether it is an online estimator and no batch: of one of these the gap to the batch is.
+inline bool IsFilter(const std::string& type, bool smoothed) {
+  return !smoothed && type != "ceres_batch";
+}
+
+/// Refuses what an option names. Error: kUsage.
+[[noreturn]] void RefuseOption(const char* option, const std::string& what, const std::string& name,
+                               const std::vector<std::string>& choices);
+/// Refuses a `--filter` that is not one of `filters`; `known`: there is an estimator of that name.
+[[noreturn]] void RefuseFilter(const std::string& name, bool known,
+                               const std::vector<std::string>& filters);
+
+/// Over the landmarks that both maps have, in m: `map`, the RMS difference of their places, and
+/// `map.sim3`, what is left of it after the similarity that makes it least [Umeyama1991].
+std::map<std::string, double> DistanceBetweenMaps(const EstimatorResult& map,
+                                                  const EstimatorResult& reference);
 
 /// Compares the estimators of runs over the same data. Error: kUsage.
 Comparison CompareRuns(const std::vector<ComparedRun>& runs, const CompareOptions& options);

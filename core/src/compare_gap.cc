@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
 
 #include "compare.h"
 
@@ -14,15 +15,11 @@ struct Partners {
   const Candidate* all = nullptr;       ///< the batch of all data
 };
 
-/// Whether both are of the same models and sensors.
-bool SameSystem(const EstimatorFacts& a, const EstimatorFacts& b) {
-  return a.overrides == b.overrides && std::ranges::is_permutation(a.sensors, b.sensors);
-}
-
 Partners PartnersOf(const Candidate& filter, const std::vector<Candidate>& candidates) {
   Partners found;
   const auto keep = [](const Candidate*& place, const Candidate& one) {
-    if (place == nullptr) place = &one;
+    const bool better = place != nullptr && !place->entry->usable() && one.entry->usable();
+    if (place == nullptr || better) place = &one;
   };
   for (const Candidate& one : candidates) {
     const EstimatorFacts& facts = one.facts();
@@ -41,9 +38,33 @@ Partners PartnersOf(const Candidate& filter, const std::vector<Candidate>& candi
   return found;
 }
 
+/// What an error is of, BLOCK of `rmse:BLOCK`, at the end of `final:BLOCK`, or `map`; "": it is
+/// not one that a step compares.
+std::string SubjectOf(const std::string& metric, bool at_end) {
+  if (at_end && metric == "map.rmse") return "map";
+  if (at_end && metric == "map.sim3.rmse") return "map.sim3";
+  const std::string kind = at_end ? "final:" : "rmse:";
+  const bool whole = metric.starts_with(kind) && metric.find('@') == metric.npos;
+  return whole ? metric.substr(kind.size()) : "";
+}
+
+void AddErrors(const EstimatorResult& from, const EstimatorResult& to, GapStep& step) {
+  for (const auto& [key, error] : from.metrics) {
+    const std::string subject = SubjectOf(key, step.at_end);
+    const auto other = to.metrics.find(key);
+    if (subject.empty() || other == to.metrics.end()) continue;
+    step.values["rmse.from:" + subject] = Single(error);
+    step.values["rmse.to:" + subject] = Single(other->second);
+    if (other->second > 0.0) step.values["error_ratio:" + subject] = Single(error / other->second);
+  }
+}
+
+/// The step between two; `missing` says what there is to be for it.
 GapStep Between(GapKind kind, const Candidate* from, const Candidate* to, bool with_truth,
-                const char* missing) {
-  GapStep step{kind, "", "", {}, ""};
+                const char* missing, bool at_end = false) {
+  GapStep step;
+  step.kind = kind;
+  step.at_end = at_end;
   if (from != nullptr) step.from = from->name;
   if (to != nullptr) step.to = to->name;
   if (from == nullptr || to == nullptr) {
@@ -55,47 +76,74 @@ GapStep Between(GapKind kind, const Candidate* from, const Candidate* to, bool w
   }
   if (!step.withheld.empty()) return step;
   const Distance distance = DistanceBetween(from->entry->series, to->entry->series);
-  for (const auto& [block, rms] : distance.rms) step.values["apart:" + block] = Single(rms);
-  for (const auto& [owner, sigmas] : distance.sigmas) {
+  for (const auto& [block, d] : at_end ? distance.final : distance.rms) {
+    step.values["apart:" + block] = Single(d);
+  }
+  for (const auto& [owner, sigmas] : at_end ? distance.final_sigmas : distance.sigmas) {
     step.values["apart.sigmas:" + owner] = Single(sigmas);
   }
-  if (!with_truth) return step;
-  for (const auto& [key, rmse] : from->entry->result.metrics) {
-    const auto other = to->entry->result.metrics.find(key);
-    if (!key.starts_with("rmse:") || key.find('@') != key.npos) continue;
-    if (other == to->entry->result.metrics.end()) continue;
-    const std::string block = key.substr(5);
-    step.values["rmse.from:" + block] = Single(rmse);
-    step.values["rmse.to:" + block] = Single(other->second);
-    if (other->second > 0.0) step.values["error_ratio:" + block] = Single(rmse / other->second);
+  if (at_end) {
+    for (const auto& [map, d] : DistanceBetweenMaps(from->entry->result, to->entry->result)) {
+      step.values["apart:" + map] = Single(d);
+    }
   }
+  const bool truth = from->run->reference == "truth" && to->run->reference == "truth";
+  if (with_truth && truth) AddErrors(from->entry->result, to->entry->result, step);
   return step;
+}
+
+/// The filter against the batch of the data so far. Where there is none, as with landmarks, at the
+/// last frame against a batch of all data: there the two are the same.
+GapStep Linearisation(const Candidate& filter, const Partners& partners, bool with_truth) {
+  const bool accepted = partners.accepted != nullptr && partners.accepted->entry->usable();
+  const Candidate* const of_end = accepted ? partners.accepted : partners.all;
+  const bool at_end = partners.so_far == nullptr && of_end != nullptr;
+  return Between(GapKind::kLinearisation, &filter, at_end ? of_end : partners.so_far, with_truth,
+                 "there is no batch of the data so far, {type: ceres_batch, data: so_far}", at_end);
 }
 
 }  // namespace
 
+bool SameSystem(const EstimatorFacts& a, const EstimatorFacts& b) {
+  return a.overrides == b.overrides && std::ranges::is_permutation(a.sensors, b.sensors);
+}
+
+std::map<std::string, double> DistanceBetweenMaps(const EstimatorResult& map,
+                                                  const EstimatorResult& reference) {
+  if (!map.landmarks || !reference.landmarks) return {};
+  Eigen::Matrix3Xd points(3, std::ssize(*map.landmarks)), onto = points;
+  Eigen::Index count = 0;
+  for (const LandmarkEstimate& one : *map.landmarks) {
+    for (const LandmarkEstimate& other : *reference.landmarks) {
+      const bool same = one.id == other.id && one.generation == other.generation;
+      if (!same || !one.position.allFinite() || !other.position.allFinite()) continue;
+      points.col(count) = one.position;
+      onto.col(count++) = other.position;
+      break;
+    }
+  }
+  if (count == 0) return {};
+  points.conservativeResize(Eigen::NoChange, count);
+  onto.conservativeResize(Eigen::NoChange, count);
+  std::map<std::string, double> distances;
+  distances["map"] = std::sqrt((points - onto).squaredNorm() / static_cast<double>(count));
+  if (const auto aligned = AlignBySimilarity(points, onto)) distances["map.sim3"] = aligned->rmse;
+  return distances;
+}
+
 std::vector<GapStep> ExplainGap(const Candidate& filter, const std::vector<Candidate>& candidates,
                                 bool with_truth) {
   const Partners partners = PartnersOf(filter, candidates);
-  const auto truth = [&](const Candidate* a, const Candidate* b) {
-    return with_truth && a != nullptr && b != nullptr && a->run->reference == "truth" &&
-           b->run->reference == "truth";
-  };
-  std::vector<GapStep> steps;
-  steps.push_back(
-      Between(GapKind::kLinearisation, &filter, partners.so_far, truth(&filter, partners.so_far),
-              "there is no batch of the data so far, {type: ceres_batch, data: so_far}"));
+  std::vector<GapStep> steps = {Linearisation(filter, partners, with_truth)};
   const bool smoother = partners.smoother != nullptr && partners.smoother->entry->usable();
-  const Candidate* const from = smoother ? &filter : partners.so_far;
-  const Candidate* const to = smoother                       ? partners.smoother
-                              : partners.accepted != nullptr ? partners.accepted
-                                                             : partners.all;
-  steps.push_back(
-      Between(GapKind::kSmoothing, from, to, truth(from, to),
-              "there is neither a smoother, {type: rts}, nor batches of all data and of "
-              "the data so far"));
-  steps.push_back(Between(GapKind::kLostData, partners.accepted, partners.all,
-                          truth(partners.accepted, partners.all),
+  steps.push_back(Between(GapKind::kSmoothing, smoother ? &filter : partners.so_far,
+                          smoother                       ? partners.smoother
+                          : partners.accepted != nullptr ? partners.accepted
+                                                         : partners.all,
+                          with_truth,
+                          "there is neither a smoother, {type: rts}, nor batches of all data and "
+                          "of the data so far"));
+  steps.push_back(Between(GapKind::kLostData, partners.accepted, partners.all, with_truth,
                           "there are no two batches, of all data and of what it accepted, {type: "
                           "ceres_batch, use: {accepted_by: FILTER}}"));
   const std::int64_t all = filter.entry->measurements(), used = filter.entry->used();

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 
 #include "alidade/compare.h"
 #include "comparison_table.h"
@@ -58,70 +59,94 @@ std::vector<std::string> Names(const std::vector<Column>& columns) {
   return names;
 }
 
-/// `BLOCK: ratio` and `apart` are to what.
-std::string HeldAgainst(const std::string& reference) {
-  return reference.empty() ? "" : "; ratio and apart: to " + reference;
+/// What the columns of a table are held against: in its title, or where they differ in a row.
+void TellReferences(const std::vector<std::string>& references, Section& section) {
+  std::set<std::string> distinct(references.begin(), references.end());
+  distinct.erase("");
+  if (distinct.size() == 1) {
+    section.title += "; ratio and difference: to " + *distinct.begin();
+  } else if (distinct.size() > 1) {
+    section.title += "; ratio and difference: to the reference of each";
+    ComparisonRow row{"reference", {}};
+    for (const std::string& one : references) row.cells.push_back(one.empty() ? "-" : one);
+    section.rows.push_back(row);
+  }
+}
+
+/// A table of `of`, with what they are held against, and over several runs in how many of them.
+Section TableOf(const std::vector<ComparedEstimator>& of, bool several, const std::string& title,
+                std::string ComparedEstimator::*reference,
+                std::int64_t ComparedEstimator::*reference_runs,
+                const std::vector<RowKind>& kinds) {
+  Section section;
+  section.title = title;
+  std::vector<Column> columns;
+  std::vector<std::string> references;
+  ComparisonRow with_reference{"runs with a reference", {}};
+  bool fewer = false;
+  for (const ComparedEstimator& one : of) {
+    columns.push_back({one.name, one.values, one.units});
+    references.push_back(one.*reference);
+    with_reference.cells.push_back(std::to_string(one.*reference_runs));
+    fewer = fewer || (one.*reference_runs > 0 && one.*reference_runs < one.used);
+  }
+  section.columns = Names(columns);
+  TellReferences(references, section);
+  const std::vector<ComparisonRow> rows = SpreadRows(columns, several, kinds);
+  section.rows.insert(section.rows.end(), rows.begin(), rows.end());
+  if (fewer) section.rows.push_back(with_reference);
+  return section;
 }
 
 /// The estimators along the run, of one kind: filters, or those that know later data.
 Section AlongSection(const Comparison& comparison, bool smoothed) {
-  Section section;
-  std::vector<Column> columns;
-  std::string reference;
+  std::vector<ComparedEstimator> of;
   ComparisonRow diverged{"diverged", {}}, used{"runs used", {}};
+  bool any_diverged = false;
   for (const ComparedEstimator& one : comparison.estimators) {
     if (one.smoothed != smoothed) continue;
-    columns.push_back({one.name, one.values, one.units});
-    reference = one.reference.empty() ? reference : one.reference;
+    of.push_back(one);
     diverged.cells.push_back(std::to_string(one.diverged));
     used.cells.push_back(std::to_string(one.used));
+    any_diverged = any_diverged || one.diverged > 0;
   }
-  section.title = smoothed ? "Smoothed: every estimate from all data"
-                           : "Online: every estimate from the data up to it";
-  section.title += HeldAgainst(reference);
-  section.columns = Names(columns);
-  if (columns.empty()) return section;
-  section.rows = SpreadRows(columns, comparison.runs > 1,
+  if (of.empty()) return {};
+  Section section = TableOf(of, comparison.runs > 1,
+                            smoothed ? "Smoothed: every estimate from all data"
+                                     : "Online: every estimate from the data up to it",
+                            &ComparedEstimator::reference, &ComparedEstimator::reference_runs,
                             {{"rmse", "rmse"},
                              {"ratio.rmse", "  ratio"},
                              {"path.sim3.rmse", "path, Sim3"},
                              {"path.sim3.scale", "path, scale"},
                              {"ratio.path.sim3.rmse", "  ratio, path, Sim3"},
-                             {"apart", "rms apart"},
-                             {"apart.path.sim3", "path apart, Sim3"},
-                             {"apart.sigmas", "sigmas apart"},
+                             {"apart", "RMSD"},
+                             {"apart.path.sim3", "RMSD, path, Sim3"},
+                             {"apart.sigmas", "Mahalanobis distance"},
                              {"nees.mean", "NEES"},
                              {"nees.cov95", "in the 95 % region"},
                              {"nis.mean", "NIS"},
                              {"time_us", "wall clock [us/measurement]"}});
-  const auto any = [](const std::string& cell) { return cell != "0"; };
-  if (std::ranges::any_of(diverged.cells, any)) section.rows.push_back(diverged);
+  if (any_diverged) section.rows.push_back(diverged);
   if (comparison.runs > 1) section.rows.push_back(used);
   return section;
 }
 
 Section FinalSection(const Comparison& comparison) {
-  Section section;
-  std::vector<Column> columns;
-  std::string reference;
-  for (const ComparedEstimator& one : comparison.estimators) {
-    columns.push_back({one.name, one.values, one.units});
-    reference = one.final_reference.empty() ? reference : one.final_reference;
-  }
-  section.title = "At the end, where all have the same data" + HeldAgainst(reference);
-  section.columns = Names(columns);
-  section.rows = SpreadRows(columns, comparison.runs > 1,
-                            {{"final", "error"},
-                             {"ratio.final", "  ratio"},
-                             {"apart.final", "apart"},
-                             {"apart.final.sigmas", "sigmas apart"},
-                             {"map.rmse", "map"},
-                             {"ratio.map.rmse", "  ratio, map"},
-                             {"map.sim3.rmse", "map, Sim3"},
-                             {"map.sim3.scale", "map, scale"},
-                             {"ratio.map.sim3.rmse", "  ratio, map, Sim3"},
-                             {"apart.map.sim3", "map apart, Sim3"}});
-  return section;
+  return TableOf(comparison.estimators, comparison.runs > 1,
+                 "At the end, where all have the same data", &ComparedEstimator::final_reference,
+                 &ComparedEstimator::final_reference_runs,
+                 {{"final", "error"},
+                  {"ratio.final", "  ratio"},
+                  {"apart.final", "difference"},
+                  {"apart.final.sigmas", "Mahalanobis distance"},
+                  {"map.rmse", "map"},
+                  {"ratio.map.rmse", "  ratio, map"},
+                  {"map.sim3.rmse", "map, Sim3"},
+                  {"map.sim3.scale", "map, scale"},
+                  {"ratio.map.sim3.rmse", "  ratio, map, Sim3"},
+                  {"apart.map", "RMSD, map"},
+                  {"apart.map.sim3", "RMSD, map, Sim3"}});
 }
 
 /// The values of one kind by their subject, under another kind.
@@ -134,8 +159,8 @@ std::map<std::string, Spread> Under(const std::map<std::string, Spread>& values,
   return found;
 }
 
-/// `0.06 sigma of target`, the largest first; the largest itself goes to `largest`.
-std::string SigmasText(const GapStep& step, double& largest) {
+/// `0.06 (target)`, the largest first; the largest itself goes to `largest`.
+std::string DistancesText(const GapStep& step, double& largest) {
   std::vector<std::pair<double, std::string>> sigmas;
   const std::string kind = "apart.sigmas:";
   for (const auto& [key, value] : step.values) {
@@ -165,9 +190,9 @@ std::string WordsOf(GapKind kind) {
 
 std::string LinesOf(const GapStep& step) {
   double largest = 0.0;
-  const std::string sigmas = SigmasText(step, largest);
-  if (sigmas.empty()) return "";
-  std::string line = "apart by " + sigmas + " sigma of " + step.to;
+  const std::string distances = DistancesText(step, largest);
+  if (distances.empty()) return "";
+  std::string line = "Mahalanobis distance " + distances + " in sigmas of " + step.to;
   if (step.kind == GapKind::kSmoothing) return line;
   constexpr double kNegligible = 0.1, kSmall = 0.5, kLarge = 1.0;
   return line + (largest < kNegligible ? ": negligible beside what neither of them knows"
@@ -188,8 +213,11 @@ Section GapSection(const Comparison& comparison, const GapStep& step) {
   Section section;
   const std::string pair =
       step.from.empty() || step.to.empty() ? "" : ", " + step.from + " against " + step.to;
-  section.title = ToString(step.kind) + pair;
+  section.title = ToString(step.kind) + pair + (step.at_end ? ", at the last frame" : "");
   section.lines.push_back(WordsOf(step.kind));
+  if (step.at_end) {
+    section.lines.emplace_back("there the batch of all data is that of the data so far");
+  }
   if (step.kind == GapKind::kLostData) {
     section.lines.push_back(LostText(step) + (comparison.runs > 1 ? ", mean of the runs" : ""));
   }
@@ -203,17 +231,20 @@ Section GapSection(const Comparison& comparison, const GapStep& step) {
   for (const ComparedEstimator& one : comparison.estimators) {
     units.insert(one.units.begin(), one.units.end());
   }
+  if (step.at_end) units["map"] = units["map.sim3"] = "m";
   const bool several = comparison.runs > 1;
-  std::vector<Column> columns = {{step.from, Under(step.values, "rmse.from:", "rmse:"), units},
-                                 {step.to, Under(step.values, "rmse.to:", "rmse:"), units},
-                                 {"ratio", {}, {}},
-                                 {"rms apart", Under(step.values, "apart:", "rmse:"), units}};
+  std::vector<Column> columns = {
+      {step.from, Under(step.values, "rmse.from:", "rmse:"), units},
+      {step.to, Under(step.values, "rmse.to:", "rmse:"), units},
+      {"ratio", {}, {}},
+      {step.at_end ? "difference" : "RMSD", Under(step.values, "apart:", "rmse:"), units}};
   if (columns[0].values.empty()) columns.erase(columns.begin(), columns.begin() + 3);
   section.columns = Names(columns);
   section.rows = SpreadRows(columns, several, {{"rmse", ""}});
   for (ComparisonRow& row : section.rows) {
     row.label.erase(0, row.label.find_first_not_of(' '));
     const std::string block = row.label.substr(0, row.label.find(' '));
+    if (block == "map.sim3") row.label.replace(0, block.size(), "map, Sim3");
     const auto ratio = step.values.find("error_ratio:" + block);
     if (ratio == step.values.end()) continue;
     const std::vector<ComparisonRow> text = SpreadRows(
@@ -224,6 +255,16 @@ Section GapSection(const Comparison& comparison, const GapStep& step) {
   return section;
 }
 
+/// All that estimators are held against at the end.
+std::string References(const Comparison& comparison) {
+  std::vector<std::string> names;
+  for (const ComparedEstimator& one : comparison.estimators) {
+    const std::string& name = one.final_reference;
+    if (!name.empty() && std::ranges::count(names, name) == 0) names.push_back(name);
+  }
+  return names.empty() ? comparison.reference : internal::Join(names);
+}
+
 std::vector<Section> SectionsOf(const Comparison& comparison) {
   std::vector<Section> sections;
   Section& head = sections.emplace_back();
@@ -231,7 +272,7 @@ std::vector<Section> SectionsOf(const Comparison& comparison) {
                                    : std::to_string(comparison.frames) + " frames";
   head.title += comparison.reference.empty()      ? ""
                 : comparison.reference == "truth" ? ", errors against truth"
-                                                  : ", differences from " + comparison.reference;
+                                                  : ", differences from " + References(comparison);
   if (!comparison.measurements_sha256.empty()) {
     head.lines.push_back("data sha256 " + comparison.measurements_sha256);
   }
@@ -268,6 +309,8 @@ void AppendEstimator(internal::Json& json, const ComparedEstimator& one, bool se
   json.Key("type").Text(one.type).Key("smoothed").Flag(one.smoothed);
   json.Key("reference").Text(one.reference).Key("final_reference").Text(one.final_reference);
   json.Key("diverged").Integer(one.diverged).Key("used").Integer(one.used);
+  json.Key("reference_runs").Integer(one.reference_runs);
+  json.Key("final_reference_runs").Integer(one.final_reference_runs);
   AppendValues(json, "values", one.values, several);
   json.Key("units").Object();
   for (const auto& [block, unit] : one.units) json.Key(block).Text(unit);
@@ -279,6 +322,7 @@ void AppendGap(internal::Json& json, const Comparison& comparison) {
   for (const GapStep& step : comparison.gap) {
     json.Object().Key("kind").Text(ToString(step.kind));
     json.Key("from").Text(step.from).Key("to").Text(step.to);
+    if (step.at_end) json.Key("at_end").Flag(true);
     if (!step.withheld.empty()) json.Key("withheld").Text(step.withheld);
     AppendValues(json, "values", step.values, comparison.runs > 1);
     json.End();

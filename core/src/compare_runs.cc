@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <mutex>
+#include <set>
 
 #include "compare.h"
 #include "data_hash.h"
 #include "sweep_spread.h"
+#include "text_table.h"
 
 namespace alidade {
 
@@ -52,12 +54,20 @@ Comparison RunComparer::Finish(const RunResult& result, const CompareOptions& op
     run.estimators[e].result.events.clear();
   }
   run.estimators.resize(result.estimators.size());
-  return internal::CompareRuns({run}, options);
+  std::vector<ComparedRun> runs;
+  runs.push_back(std::move(run));
+  return internal::CompareRuns(runs, options);
 }
 
 Comparison CompareFolders(const std::vector<std::filesystem::path>& folders,
                           const CompareOptions& options) {
   ALIDADE_EXPECTS(!folders.empty());
+  std::set<std::filesystem::path> distinct;
+  for (const auto& folder : folders) {
+    if (distinct.insert(std::filesystem::weakly_canonical(folder)).second) continue;
+    throw Error(ExitCode::kUsage, ErrorLine(Place{folder.string()}, {}, "is given twice",
+                                            "folders of different runs"));
+  }
   std::vector<ComparedRun> runs;
   for (const auto& folder : folders) runs.push_back(internal::ReadRun(folder));
   std::vector<std::string> notes = internal::CheckSameData(runs);
@@ -119,20 +129,49 @@ bool Diverged(const Comparison& comparison, const std::string& name) {
   return found != comparison.estimators.end() && found->diverged > 0;
 }
 
-/// Values that compare with another are taken of runs in which that one did not diverge either.
-std::map<std::string, Spread> WithoutDiverged(const Comparison& comparison,
-                                              const ComparedEstimator& one) {
-  std::map<std::string, Spread> values = one.values;
-  const bool along = Diverged(comparison, one.reference);
-  const bool final = Diverged(comparison, one.final_reference);
-  std::erase_if(values, [&](const auto& value) {
-    const std::string& key = value.first;
-    const bool of_final = key.starts_with("apart.final") || key.starts_with("apart.map") ||
-                          key.starts_with("ratio.final") || key.starts_with("ratio.map");
-    const bool compares = key.starts_with("apart") || key.starts_with("ratio");
-    return compares && (of_final ? final : along);
-  });
-  return values;
+/// Appends `name` to those before it, where it is new.
+void AddName(const std::string& name, std::vector<std::string>& names) {
+  if (!name.empty() && std::ranges::count(names, name) == 0) names.push_back(name);
+}
+
+ComparedEstimator SummariseEstimator(const std::vector<Comparison>& comparisons, std::size_t e) {
+  ComparedEstimator all = comparisons.front().estimators.at(e);
+  all.used = all.diverged = all.reference_runs = all.final_reference_runs = 0;
+  std::vector<std::string> references, final_references;
+  Gathered gathered;
+  for (const Comparison& one : comparisons) {
+    const ComparedEstimator& of_run = one.estimators.at(e);
+    all.diverged += of_run.diverged;
+    if (of_run.diverged > 0) continue;
+    all.used += 1;
+    all.reference_runs += of_run.reference_runs;
+    all.final_reference_runs += of_run.final_reference_runs;
+    AddName(of_run.reference, references);
+    AddName(of_run.final_reference, final_references);
+    gathered.Add(of_run.values);
+  }
+  all.reference = internal::Join(references);
+  all.final_reference = internal::Join(final_references);
+  all.values = std::move(gathered).Spreads();
+  return all;
+}
+
+/// Of the runs in which the filter did not diverge, those that have the step between the same two.
+GapStep SummariseStep(const std::vector<Comparison>& comparisons, std::size_t s) {
+  const GapStep* known = &comparisons.front().gap.at(s);
+  for (const Comparison& one : comparisons) {
+    if (known->withheld.empty()) break;
+    known = &one.gap.at(s);
+  }
+  GapStep all = *known;
+  Gathered gathered;
+  for (const Comparison& one : comparisons) {
+    const GapStep& of_run = one.gap.at(s);
+    const bool same = of_run.from == all.from && of_run.to == all.to;
+    if (same && !Diverged(one, one.explained)) gathered.Add(of_run.values);
+  }
+  all.values = std::move(gathered).Spreads();
+  return all;
 }
 
 }  // namespace
@@ -148,6 +187,7 @@ Comparison Summarise(const std::vector<Comparison>& comparisons) {
     for (const std::string& note : one.notes) {
       if (std::ranges::count(all.notes, note) == 0) all.notes.push_back(note);
     }
+    if (all.reference.empty()) all.reference = one.reference;
     if (one.withheld.empty()) continue;
     all.withheld = one.withheld;
     ++withheld;
@@ -156,29 +196,9 @@ Comparison Summarise(const std::vector<Comparison>& comparisons) {
     all.withheld += " (" + std::to_string(withheld) + " of " + std::to_string(all.runs) + " runs)";
   }
   for (std::size_t e = 0; e < all.estimators.size(); ++e) {
-    ComparedEstimator& estimator = all.estimators[e];
-    Gathered gathered;
-    estimator.used = estimator.diverged = 0;
-    for (const Comparison& one : comparisons) {
-      const ComparedEstimator& of_run = one.estimators.at(e);
-      estimator.diverged += of_run.diverged;
-      if (of_run.diverged > 0) continue;
-      estimator.used += 1;
-      gathered.Add(WithoutDiverged(one, of_run));
-    }
-    estimator.values = std::move(gathered).Spreads();
+    all.estimators[e] = SummariseEstimator(comparisons, e);
   }
-  for (std::size_t s = 0; s < all.gap.size(); ++s) {
-    GapStep& step = all.gap[s];
-    Gathered gathered;
-    for (const Comparison& one : comparisons) {
-      const GapStep& of_run = one.gap.at(s);
-      if (!Diverged(one, of_run.from) && !Diverged(one, of_run.to)) gathered.Add(of_run.values);
-      if (step.withheld.empty()) continue;
-      if (of_run.withheld.empty()) step = of_run;
-    }
-    step.values = std::move(gathered).Spreads();
-  }
+  for (std::size_t i = 0; i < all.gap.size(); ++i) all.gap[i] = SummariseStep(comparisons, i);
   return all;
 }
 

@@ -4,6 +4,7 @@
 
 #include "add_estimator.h"
 #include "alidade/compare.h"
+#include "compare.h"
 #include "names.h"
 #include "sweep_config.h"
 #include "text_table.h"
@@ -125,29 +126,23 @@ void CheckReference(const Experiment& experiment, const std::string& name) {
   const std::vector<std::string> names = internal::NamesOf(experiment.estimators);
   const bool truth = name == "truth" && !experiment.source->truths().empty();
   if (name.empty() || truth || std::ranges::count(names, name) > 0) return;
-  throw Error(ExitCode::kUsage, ErrorLine({}, "--reference",
-                                          name == "truth" ? "the source knows no truth"
-                                                          : "no estimator '" + name + "'",
-                                          "one of " + internal::Join(names), Nearest(name, names)));
+  internal::RefuseOption(
+      "--reference", name == "truth" ? "the source knows no truth" : "no estimator '" + name + "'",
+      name, names);
 }
 
-/// Index of the filter whose gap is to be explained; -1: there is none.
+/// Index of the filter whose gap is to be explained; -1: there is none. Error: kUsage.
 int FindFilter(const Experiment& experiment, const std::string& name) {
-  const std::vector<NamedEstimator>& all = experiment.estimators;
-  if (!name.empty()) {
-    const std::vector<std::string> names = internal::NamesOf(all);
-    const auto found = std::ranges::find(names, name);
-    if (found == names.end()) {
-      throw Error(ExitCode::kUsage,
-                  ErrorLine({}, "--filter", "no estimator '" + name + "'",
-                            "one of " + internal::Join(names), Nearest(name, names)));
-    }
-    return static_cast<int>(found - names.begin());
+  std::vector<std::string> filters;
+  for (std::size_t e = 0; e < experiment.estimators.size(); ++e) {
+    const NamedEstimator& one = experiment.estimators[e];
+    if (!internal::IsFilter(one.type, one.estimator->offline())) continue;
+    if (name.empty() ? one.accepted_by < 0 : one.name == name) return static_cast<int>(e);
+    filters.push_back(one.name);
   }
-  const auto found = std::ranges::find_if(all, [](const NamedEstimator& one) {
-    return !one.estimator->offline() && one.type != "ceres_batch" && one.accepted_by < 0;
-  });
-  return found == all.end() ? -1 : static_cast<int>(found - all.begin());
+  if (name.empty()) return -1;
+  const bool known = std::ranges::count(internal::NamesOf(experiment.estimators), name) > 0;
+  internal::RefuseFilter(name, known, filters);
 }
 
 }  // namespace

@@ -11,24 +11,58 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The stamp of a row of measurements.csv, for people.
-std::string StampOf(const std::string& row) {
-  const std::string t_s = row.substr(0, row.find(','));
-  return t_s.empty() ? "its end" : "t = " + t_s + " s";
+/// The rows of measurements.csv that follow each other with one stamp.
+struct StampRows {
+  std::string t_s;                ///< "": the file is at its end
+  std::vector<std::string> rows;  ///< by the name of their stream, as they are hashed
+};
+
+class MeasurementsFile {
+ public:
+  explicit MeasurementsFile(const fs::path& folder) : stream_(folder / "measurements.csv") {
+    Advance();  // to the header
+    Advance();
+  }
+  bool good() const { return stream_.is_open(); }
+
+  StampRows Next() {
+    const auto cell = [](const std::string& row, std::size_t at) {
+      return row.substr(at, row.find(',', at) - at);
+    };
+    StampRows next{cell(row_, 0), {}};
+    for (; !row_.empty() && cell(row_, 0) == next.t_s; Advance()) next.rows.push_back(row_);
+    std::ranges::stable_sort(
+        next.rows, {}, [&](const std::string& row) { return cell(row, next.t_s.size() + 1); });
+    return next;
+  }
+
+ private:
+  /// To the next row, without the empty cells that wider streams leave.
+  void Advance() {
+    row_.clear();
+    if (!std::getline(stream_, row_)) return;
+    row_.resize(row_.find_last_not_of(',') + 1);
+  }
+
+  std::ifstream stream_;
+  std::string row_;  ///< the next one
+};
+
+/// The stamp of rows, for people.
+std::string StampOf(const StampRows& rows) {
+  return rows.t_s.empty() ? "its end" : "t = " + rows.t_s + " s";
 }
 
 /// Where measurements.csv of two folders begin to differ, in words.
 std::string FirstDifference(const fs::path& a, const fs::path& b) {
-  std::ifstream first(a / "measurements.csv"), second(b / "measurements.csv");
-  if (!first || !second) return "measurements.csv cannot be read";
-  for (std::string row, other; true;) {
-    row.clear();
-    other.clear();
-    std::getline(first, row);
-    std::getline(second, other);
-    if (row == other && first && second) continue;
-    if (row == other) return "their own covariances or the stamps of empty frames differ";
-    return "first at " + StampOf(row) + " of the one, " + StampOf(other) + " of the other";
+  MeasurementsFile first(a), second(b);
+  if (!first.good() || !second.good()) return "measurements.csv cannot be read";
+  for (;;) {
+    const StampRows one = first.Next(), other = second.Next();
+    if (one.rows != other.rows) {
+      return "first at " + StampOf(one) + " of the one, " + StampOf(other) + " of the other";
+    }
+    if (one.t_s.empty()) return "their own covariances or the stamps of empty frames differ";
   }
 }
 

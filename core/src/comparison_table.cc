@@ -109,8 +109,8 @@ bool IsError(std::string_view kind) {
 
 /// Errors and differences of paths and maps, in m.
 bool IsLength(std::string_view kind) {
-  return kind == "map.rmse" || kind == "map.sim3.rmse" || kind == "apart.map.sim3" ||
-         kind == "apart.path.sim3" || kind == "path.sim3.rmse";
+  return kind == "map.rmse" || kind == "map.sim3.rmse" || kind == "apart.map" ||
+         kind == "apart.map.sim3" || kind == "apart.path.sim3" || kind == "path.sim3.rmse";
 }
 
 /// The largest finite RMSE of all blocks with that unit: one prefix serves the whole table. Without

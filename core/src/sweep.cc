@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <exception>
+#include <limits>
 #include <mutex>
 #include <system_error>
 #include <thread>
@@ -119,6 +120,9 @@ bool MayRunInParallel(const PluginHost& host) {
 }  // namespace
 
 Spread internal::SpreadOf(std::vector<double> values) {
+  std::erase_if(values, [](double value) { return std::isnan(value); });
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  if (values.empty()) return {kNan, kNan, kNan, kNan};
   std::sort(values.begin(), values.end());
   double sum = 0.0;
   for (const double value : values) sum += value;

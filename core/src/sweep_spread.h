@@ -7,7 +7,7 @@
 
 namespace alidade::internal {
 
-/// Mean and quantiles of at least one value.
+/// Mean and quantiles of those values that are numbers; NaN where there is none.
 Spread SpreadOf(std::vector<double> values);
 
 }  // namespace alidade::internal

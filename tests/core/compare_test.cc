@@ -170,46 +170,67 @@ TEST(Series, WhatHasNoValueOrVarianceIsLeftOut) {
 }
 
 /// A run of two estimators, the second one the reference of the first.
-Comparison OneRun(double error, bool reference_diverged) {
+Comparison OneRun(double error, bool filter_diverged = false) {
   Comparison one;
+  one.explained = "ekf";
   one.estimators.resize(2);
   ComparedEstimator& filter = one.estimators[0];
   filter.name = "ekf";
-  filter.reference = filter.final_reference = "batch";
+  filter.diverged = filter_diverged ? 1 : 0;
   filter.values["rmse:x"] = {error, error, error, error};
-  filter.values["ratio.rmse:x"] = filter.values["ratio.final:x"] = filter.values["rmse:x"];
+  if (!filter_diverged) {
+    filter.reference = filter.final_reference = "batch";
+    filter.reference_runs = filter.final_reference_runs = 1;
+    filter.values["ratio.rmse:x"] = filter.values["rmse:x"];
+  }
   one.estimators[1].name = "batch";
-  one.estimators[1].diverged = reference_diverged ? 1 : 0;
   GapStep& step = one.gap.emplace_back();
-  step.from = "ekf";
+  step.kind = GapKind::kLostData;
+  step.from = "accepted";
   step.to = "batch";
-  step.values["apart:x"] = {error, error, error, error};
+  step.values["lost"] = {error, error, error, error};
   return one;
 }
 
-TEST(Summarise, LeavesOutWhatIsHeldAgainstAReferenceThatDiverged) {
-  const Comparison all = Summarise({OneRun(1.0, false), OneRun(2.0, false), OneRun(6.0, true)});
+// What is lost by a filter that diverged is no figure of the filter.
+TEST(Summarise, LeavesOutTheRunsInWhichTheFilterDiverged) {
+  const Comparison all = Summarise({OneRun(6.0, true), OneRun(1.0), OneRun(2.0)});
   EXPECT_EQ(all.runs, 3);
   const ComparedEstimator& filter = all.estimators[0];
-  EXPECT_EQ(filter.used, 3);
-  EXPECT_EQ(filter.values.at("rmse:x").mean, 3.0);
+  EXPECT_EQ(filter.diverged, 1);
+  EXPECT_EQ(filter.used, 2);
+  EXPECT_EQ(filter.reference, "batch");
+  EXPECT_EQ(filter.reference_runs, 2);
+  EXPECT_EQ(filter.values.at("rmse:x").mean, 1.5);
+  EXPECT_NEAR(filter.values.at("rmse:x").p50, 1.5, 1e-15);
   EXPECT_EQ(filter.values.at("ratio.rmse:x").mean, 1.5);
-  EXPECT_EQ(filter.values.at("ratio.final:x").mean, 1.5);
-  EXPECT_NEAR(filter.values.at("rmse:x").p50, 2.0, 1e-15);
-  EXPECT_EQ(all.gap[0].values.at("apart:x").mean, 1.5);
-  EXPECT_EQ(all.estimators[1].diverged, 1);
-  EXPECT_EQ(all.estimators[1].used, 2);
+  EXPECT_EQ(all.estimators[1].used, 3);
+  EXPECT_EQ(all.gap[0].values.at("lost").mean, 1.5);
+}
+
+TEST(Summarise, TakesAStepBetweenTheSameTwoAlone) {
+  Comparison other = OneRun(7.0);
+  other.gap[0].to = "another";
+  EXPECT_EQ(Summarise({OneRun(1.0), other}).gap[0].values.at("lost").mean, 1.0);
+}
+
+TEST(Summarise, LeavesOutWhatIsNoNumber) {
+  const Comparison all = Summarise({OneRun(1.0), OneRun(std::nan("")), OneRun(3.0)});
+  const Spread spread = all.estimators[0].values.at("rmse:x");
+  EXPECT_EQ(spread.mean, 2.0);
+  EXPECT_NEAR(spread.p95, 2.9, 1e-15);
+  EXPECT_TRUE(std::isnan(Summarise({OneRun(std::nan(""))}).estimators[0].values.at("rmse:x").mean));
 }
 
 TEST(Summarise, CountsTheRunsWithoutAReference) {
-  Comparison without = OneRun(1.0, false);
+  Comparison without = OneRun(1.0);
   without.withheld = "no reference: estimator 'batch' failed, the comparison with it is withheld";
-  const Comparison all = Summarise({OneRun(1.0, false), without});
+  const Comparison all = Summarise({OneRun(1.0), without});
   EXPECT_EQ(all.withheld, without.withheld + " (1 of 2 runs)");
 }
 
 TEST(CompareReport, LatexIsSafe) {
-  Comparison one = OneRun(1.0, false);
+  Comparison one = OneRun(1.0);
   one.notes = {"50 % of $x_1$ {a} \\b ^ ~ # &"};
   const std::string text = CompareReport(one, TableStyle::kLatex);
   EXPECT_NE(text.find("50 \\% of \\$x\\_1\\$ \\{a\\} \\textbackslash{}b \\^{} \\~{} \\# \\&"),

@@ -250,7 +250,7 @@ TEST(ExplainExperiment, LeavesOutWithItsReasonWhatDoesNotSupportTheSystem) {
   EXPECT_EQ(explained.experiment.estimators.size(), 1u);
 }
 
-TEST(ExplainExperiment, RefusesNamesThatAreNotThere) {
+TEST(ExplainExperiment, RefusesNamesThatAreNotThereOrNoFilters) {
   const auto refuses = [](const CompareOptions& options, const std::string& words) {
     try {
       ExplainExperiment(Depth(), Shipped(), options);
@@ -262,6 +262,92 @@ TEST(ExplainExperiment, RefusesNamesThatAreNotThere) {
   };
   refuses({"bath", "", true}, "--reference: no estimator 'bath'; expected one of ekf, rts");
   refuses({"", "efk", true}, "--filter: no estimator 'efk'; expected one of ekf; did you mean");
+}
+
+TEST(ExplainExperiment, RefusesToExplainTheGapOfABatchOrASmoother) {
+  const Config config = Depth({{"estimators.rts", "{type: rts}"},
+                               {"estimators.best", "{type: ceres_batch}"},
+                               {"estimators.now", "{type: ceres_batch, data: so_far}"}});
+  for (const char* name : {"rts", "best", "now"}) {
+    try {
+      ExplainExperiment(config, Shipped(), {"", name, true});
+      ADD_FAILURE() << name;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::kUsage);
+      EXPECT_EQ(std::string(error.what()), std::string("--filter: '") + name +
+                                               "' is not an online filter; expected one of ekf");
+    }
+  }
+}
+
+// ---- with landmarks -----------------------------------------------------------------------------
+
+Comparison CompareScene(const std::string& more) {
+  Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml");
+  config.Set("source.frames", "10", "--set");
+  if (!more.empty()) config.Set("estimators.now", more, "--set");
+  ExplainedExperiment explained = ExplainExperiment(config, Shipped(), {});
+  RunComparer comparer(explained.experiment);
+  RunOptions observed;
+  comparer.Observe(observed);
+  const RunResult run = Run(explained.experiment, observed);
+  EXPECT_EQ(run.status, RunStatus::kOk) << run.reason;
+  return comparer.Finish(run, {});
+}
+
+// Beside a batch of the data so far, which solves at every frame.
+TEST(CompareLandmarks, AtTheLastFrameTheBatchOfAllDataIsThatOfTheDataSoFar) {
+  const GapStep step = CompareScene("").gap[0];
+  EXPECT_TRUE(step.at_end);
+  EXPECT_EQ(step.from + ' ' + step.to, "ekf batch_accepted");
+  const Comparison with =
+      CompareScene("{type: ceres_batch, data: so_far, use: {accepted_by: ekf}}");
+  EXPECT_FALSE(with.gap[0].at_end);
+  ASSERT_EQ(with.estimators[1].name, "now");
+  const std::map<std::string, Spread>& now = with.estimators[1].values;
+  EXPECT_LT(ValueOf(now, "apart.final.sigmas:cam"), 1e-5);
+  EXPECT_LT(ValueOf(now, "apart.map"), 1e-6);
+  const double of_end = ValueOf(now, "final:cam.position");
+  EXPECT_NEAR(ValueOf(step.values, "rmse.to:cam.position"), of_end, 1e-6 * of_end);
+  EXPECT_NEAR(ValueOf(step.values, "rmse.to:map"), ValueOf(now, "map.rmse"), 1e-6);
+  EXPECT_GT(ValueOf(step.values, "error_ratio:map"), 0.0);
+  EXPECT_GT(ValueOf(step.values, "apart.sigmas:cam"), 0.01);
+}
+
+// ---- over seeds ---------------------------------------------------------------------------------
+
+// Of example 01 the EKF diverges with seed 4, the UKF does not.
+TEST(CompareSeeds, WhatIsHeldAgainstAReferenceThatDivergedIsLeftOut) {
+  Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/01_depth_stereo_only/config.yaml");
+  config.Set("estimators.ukf", "{type: ukf}", "--set");
+  CompareOptions options;
+  options.reference = "ekf";
+  options.explain = false;
+  const ExplainedExperiment explained = ExplainExperiment(config, Shipped(), options);
+  const auto compare = [&](std::uint64_t first_seed, std::int64_t runs) {
+    SweepOptions sweep;
+    sweep.first_seed = first_seed;
+    sweep.runs = runs;
+    return CompareSeeds(explained, Shipped(), sweep, options).comparison;
+  };
+  const Comparison both = compare(4, 2), second = compare(5, 1);
+  ASSERT_EQ(both.estimators[0].diverged, 1);
+  const ComparedEstimator& ukf = both.estimators[1];
+  EXPECT_EQ(ukf.reference, "ekf");
+  EXPECT_EQ(ukf.final_reference, "ekf");
+  EXPECT_EQ(ukf.used, 2);
+  EXPECT_EQ(ukf.reference_runs, 1);
+  EXPECT_EQ(ukf.final_reference_runs, 1);
+  for (const char* key : {"apart:target.depth", "apart.final:target.depth"}) {
+    EXPECT_GT(ValueOf(ukf.values, key), 0.0) << key;
+    EXPECT_EQ(ValueOf(ukf.values, key), ValueOf(second.estimators[1].values, key)) << key;
+  }
+  EXPECT_EQ(both.withheld,
+            "no reference: estimator 'ekf' failed, the comparison with it is withheld (1 of 2 "
+            "runs)");
+  const std::string text = CompareReport(both, TableStyle::kText);
+  EXPECT_NE(text.find("ratio and difference: to ekf"), text.npos) << text;
+  EXPECT_NE(text.find("runs with a reference"), text.npos) << text;
 }
 
 }  // namespace

@@ -33,7 +33,8 @@ struct CompareOptions {
 ///   apart.sigmas:OWNER        sqrt(mean d' P_ref^-1 d / dof), in sigmas of the reference
 ///   apart.final.sigmas:OWNER  the same at the last stamp
 ///   apart.path.sim3           rms of the path after the similarity that makes it least, m
-///   apart.map.sim3            likewise of the map at the end, m
+///   apart.map                 rms of the places of landmarks at the end, m
+///   apart.map.sim3            likewise after that similarity of the map, m
 ///   ratio.KEY                 value of KEY over that of the reference; of rmse, final, map
 ///   time_us                   wall clock for each measurement
 struct ComparedEstimator {
@@ -41,6 +42,7 @@ struct ComparedEstimator {
   bool smoothed = false;        ///< its estimates rest on later data too
   std::string reference;        ///< of its estimates along the run; "": there is none
   std::string final_reference;  ///< of the last estimate and the map
+  std::int64_t reference_runs = 0, final_reference_runs = 0;  ///< of `used`, those with one
   std::map<std::string, Spread> values;
   std::map<std::string, std::string> units;  ///< of blocks
   std::int64_t used = 0;                     ///< runs that values are taken over
@@ -58,10 +60,12 @@ const char* ToString(GapKind kind);
 
 /// One step of the way from the filter to the batch. Values: `error_ratio:BLOCK`, the RMSE from
 /// truth of `from` over that of `to`; `apart:BLOCK` and `apart.sigmas:OWNER` between the two;
-/// `rmse.from:BLOCK`, `rmse.to:BLOCK`; `measurements` and `lost` of kLostData.
+/// `rmse.from:BLOCK`, `rmse.to:BLOCK`; `measurements` and `lost` of kLostData. At the end they are
+/// of the last frame alone, and of BLOCK `map` and `map.sim3` too.
 struct GapStep {
   GapKind kind = GapKind::kLinearisation;
   std::string from, to;
+  bool at_end = false;  ///< taken at the last frame, for want of a batch of the data so far
   std::map<std::string, Spread> values;
   std::string withheld;  ///< why there are no values, or ""
 };
@@ -69,7 +73,7 @@ struct GapStep {
 struct Comparison {
   std::int64_t runs = 1;  ///< seeds; values are spread over them
   std::int64_t frames = 0;
-  std::string reference;            ///< `truth`, or the estimator that all are compared with
+  std::string reference;            ///< `truth`, or the first estimator that one is held against
   std::string withheld;             ///< why there is no comparison with a reference, or ""
   std::string measurements_sha256;  ///< of the data; "": of several seeds
   std::vector<ComparedEstimator> estimators;
@@ -90,7 +94,8 @@ struct ExplainedExperiment {
 /// Builds the experiment of a config, and adds what its comparison lacks: the batch of all data, of
 /// the data so far, of what the filter accepted, and the smoother, each with the filter's sensors,
 /// overrides and steps. What does not support the system is left out. Errors: those of
-/// BuildExperiment; kBadConfig where `options` names an estimator that is not there.
+/// BuildExperiment; kUsage where `options` names an estimator that is not there, or one that is no
+/// filter as that whose gap is explained.
 ExplainedExperiment ExplainExperiment(const Config& config, const PluginHost& host,
                                       const CompareOptions& options);
 
@@ -113,8 +118,8 @@ class RunComparer {
 };
 
 /// Compares the estimators of finished runs, by their folders; names are `FOLDER/NAME` where there
-/// are several. Errors: kInputMissing, kBadData where they did not see the same measurements, those
-/// of RunComparer.
+/// are several. Errors: kUsage where a folder is given twice, kInputMissing, kBadData where they
+/// did not see the same measurements, those of RunComparer.
 Comparison CompareFolders(const std::vector<std::filesystem::path>& folders,
                           const CompareOptions& options);
 

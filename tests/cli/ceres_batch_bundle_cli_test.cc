@@ -155,6 +155,20 @@ TEST_F(BundleTracksCli, PlacesPointsOfAStereoPairByTheirRays) {
             Json("start/bundle.json").root().At("rms_after_px").Number());
 }
 
+/// The corner is beyond what this lens distorts a ray to; two rays place the point all the same.
+TEST_F(BundleTracksCli, PlacesAPointThatHasAPixelWithoutARay) {
+  Write("data/calibration.yaml",
+        "camera: {model: radtan, width: 640, height: 480, fx: 300, fy: 300, cx: 320, cy: 240, "
+        "k1: -0.4, k2: 0, p1: 0, p2: 0}");
+  Write("tracks.csv", "0,1,0,320\n0,1,1,240\n1,1,0,290.12\n1,1,1,240\n2,1,0,1\n2,1,1,1\n");
+  Write("start.tum", "0 0 0 0 0 0 0 1\n1 0.3 0 0 0 0 0 1\n2 0.6 0 0 0 0 0 1\n");
+  Bundle("tracks.csv", "start.tum", {"--iterations", "0", "-o", "out"});
+  EXPECT_TRUE(Contains(Read("out/points.csv"), "\n1,"));
+  const std::string points = Read("out/points.csv");
+  EXPECT_NEAR(std::stod("0" + points.substr(points.rfind(',') + 1)), 3.0, 1e-6)
+      << "0.3 m / 0.1, for 0.1 (1 - 0.4 0.01) 300 px = 29.88 px";
+}
+
 TEST_F(BundleTracksCli, CountsFramesWithoutAPose) {
   Write("start.tum", Start(5, 0.0, 0.0));
   const Outcome made = Bundle("data/tracks.csv", "start.tum");

@@ -282,6 +282,10 @@ bool Trajectory::FreezeEpoch(Epoch& epoch, const double* e, Point& point) {
   return true;
 }
 
+bool Trajectory::robust() const {
+  return std::ranges::any_of(parts_, [](const Part& p) { return p.loss.kind != LossKind::kNone; });
+}
+
 bool Trajectory::Freeze(const double* e) {
   change_ = 0.0;
   Point point;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <functional>
 #include <map>
 #include <string>
@@ -51,25 +50,20 @@ class Trajectory {
 
   /// Sets the time of the prior; else the first frame, or start_s, does.
   void Start(Stamp stamp) { stamp_ = stamp; }
-  /// One frame more; `report`, the filter's, says which of its measurements gave a block or a
-  /// landmark its first value. False, and problem(), where there would be too many inputs.
+  /// One frame more; the filter's report says which measurement gave a block or landmark its first
+  /// value. False, and problem(), where there would be too many inputs.
   bool Add(const Frame& frame, const UpdateReport& report, const Estimator& filter);
   /// The values of a filter's state as Linearised takes them.
   std::vector<double> ValuesOf(const State& state) const;
   int inputs() const { return inputs_; }        ///< N
   int residuals() const { return residuals_; }  ///< M
-  /// Residuals of one measurement, of which a loss takes the norm; or, without a loss, of all
-  /// measurements on end.
+  /// Residuals of a measurement, of which a loss takes the norm; or, without one, of all on end.
   struct Part {
     int row, size;
     RobustLoss loss;
   };
   const std::vector<Part>& parts() const { return parts_; }
-  /// Whether any of them has a loss.
-  bool robust() const {
-    return std::ranges::any_of(parts_,
-                               [](const Part& p) { return p.loss.kind != LossKind::kNone; });
-  }
+  bool robust() const;  ///< any of them has a loss
   std::size_t size() const { return epochs_.size(); }
   /// Makes the first frame, linearised at e, part of the prior, which is then that of the state at
   /// that frame; e becomes the same trajectory in the inputs that are left. L_0 is a square root:

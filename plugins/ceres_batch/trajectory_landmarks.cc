@@ -134,7 +134,7 @@ bool Trajectory::Place(const MapLandmark& landmark, const Eigen::VectorXd& l,
 }
 
 /// R of all observations of landmarks, these where they were found last. One that is not defined
-/// keeps what it had, if it had any.
+/// keeps what it had.
 bool Trajectory::FreezeLandmarks(const std::vector<Point>& points) {
   for (MapLandmark& landmark : landmarks_) {
     if (landmark.l.size() == 0) landmark.l = landmark.from;
@@ -151,9 +151,8 @@ bool Trajectory::FreezeLandmarks(const std::vector<Point>& points) {
       Factor& factor = epochs_[epoch].factors[index];
       std::vector<double> h(factor.measurement.values.size());
       const std::vector<const double*> roles = RolesOf(factor, points[epoch], place.y);
-      const bool keeps =
-          factor.l.size() > 0 && ModelOf(factor).Predict(roles.data(), h.data()) != Status::kOk;
-      if (!keeps && !FreezeFactor(factor, points[epoch], place.y)) return false;
+      const bool defined = ModelOf(factor).Predict(roles.data(), h.data()) == Status::kOk;
+      if (defined && !FreezeFactor(factor, points[epoch], place.y)) return false;
     }
   }
   return true;

@@ -191,7 +191,10 @@ bool Trajectory::Residual(const Factor& factor, const Point& point, const std::v
   const SensorBinding& sensor = SensorOf(factor);
   const SensorModel& model = ModelOf(factor);
   const Geometry& geometry = model.measurement().geometry;
-  if (factor.l.size() == 0) return Fail("sensor '" + sensor.name + "' has no noise yet");
+  if (factor.l.size() == 0) {
+    return Fail("sensor '" + sensor.name + "' at " +
+                internal::SecondsText(factor.measurement.stamp) + ": not defined at the start");
+  }
   const std::vector<const double*> roles = RolesOf(factor, point, y);
   std::vector<RowMajor> jacobians(roles.size());
   std::vector<double*> into(roles.size(), nullptr);

@@ -113,7 +113,9 @@ struct CostKind {
       }
     }
     for (std::size_t i = 0; i < blocks.size(); ++i) {
-      if (std::ranges::count(written[i], false) > 0) with_gaps.push_back(i);
+      for (int c = 0; c < blocks[i]; ++c) {
+        if (!written[i][static_cast<std::size_t>(c)]) gaps.push_back({static_cast<int>(i), c});
+      }
     }
     for (std::size_t i = 0; i < w.size(); ++i)
       isotropic = isotropic && w[i] == (i % (m + 1) == 0 ? w[0] : 0.0);
@@ -121,8 +123,8 @@ struct CostKind {
 
   const Sensor& sensor;
   std::vector<RolePlace> places;
-  std::vector<int> sizes;              ///< of the blocks
-  std::vector<std::size_t> with_gaps;  ///< blocks with columns that no role writes
+  std::vector<int> sizes;       ///< of the blocks
+  std::vector<RolePlace> gaps;  ///< columns that no role writes
   std::vector<double> w;
   bool isotropic = true;  ///< W is a multiple of the identity
 };
@@ -182,9 +184,9 @@ class SensorCost final : public ceres::CostFunction {
       strides[i] = wanted ? sizes[block] : 0;
     }
     if (jacobians == nullptr) return;
-    for (const std::size_t i : kind_.with_gaps) {
-      if (jacobians[i] != nullptr)
-        std::fill_n(jacobians[i], Traits::Rows(kind_.sensor) * sizes[i], 0.0);
+    for (const auto [block, column] : kind_.gaps) {
+      for (int r = 0; jacobians[block] != nullptr && r < Traits::Rows(kind_.sensor); ++r)
+        jacobians[block][r * sizes[block] + column] = 0.0;
     }
   }
 

@@ -112,7 +112,7 @@ Section AlongSection(const Comparison& comparison, bool smoothed) {
   }
   if (of.empty()) return {};
   Section section = TableOf(of, comparison.runs > 1,
-                            smoothed ? "Smoothed: every estimate from all data"
+                            smoothed ? "Smoothed: estimates from later data too"
                                      : "Online: every estimate from the data up to it",
                             &ComparedEstimator::reference, &ComparedEstimator::reference_runs,
                             {{"rmse", "rmse"},

@@ -18,16 +18,19 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 struct Shared {
   const SeriesBlock* block;
   int value, reference_value, reference_tangent;
+  bool reference_fixed;
 };
 
+/// Without those that are fixed in both.
 std::vector<Shared> SharedBlocks(const Series& series, const Series& reference) {
   std::vector<Shared> shared;
   int value = 0;
   for (const SeriesBlock& block : series.blocks) {
     int reference_value = 0, tangent = 0;
     for (const SeriesBlock& other : reference.blocks) {
-      if (other.name == block.name && other.geometry == block.geometry) {
-        shared.push_back({&block, value, reference_value, tangent});
+      const bool same = other.name == block.name && other.geometry == block.geometry;
+      if (same && !(block.fixed && other.fixed)) {
+        shared.push_back({&block, value, reference_value, tangent, other.fixed});
       }
       reference_value += other.geometry.ambient;
       tangent += other.geometry.tangent;
@@ -56,7 +59,7 @@ const double* RowOf(const Series& series, std::size_t row, int offset) {
   return series.values.data() + row * static_cast<std::size_t>(series.ambient()) + offset;
 }
 
-/// Blocks of one owner that follow each other in the reference, jointly.
+/// The blocks of one owner that the reference is uncertain of, jointly.
 struct Joint {
   std::string owner;
   std::vector<const Shared*> blocks;
@@ -67,6 +70,7 @@ struct Joint {
 std::vector<Joint> JointsOf(const std::vector<Shared>& shared) {
   std::vector<Joint> joints;
   for (const Shared& one : shared) {
+    if (one.reference_fixed) continue;
     const std::string owner = one.block->owner();
     auto joint = std::ranges::find(joints, owner, &Joint::owner);
     if (joint == joints.end()) joint = joints.insert(joint, {owner, {}});
@@ -93,7 +97,8 @@ std::vector<SeriesBlock> SeriesBlocksOf(const System& system) {
   std::vector<SeriesBlock> blocks;
   for (BlockId id = 0; id < static_cast<int>(system.layout.blocks().size()); ++id) {
     const Block& block = system.layout[id];
-    blocks.push_back({block.name, UnitOf(system, id), block.geometry()});
+    blocks.push_back(
+        {block.name, UnitOf(system, id), block.geometry(), block.status == BlockStatus::kFixed});
   }
   return blocks;
 }

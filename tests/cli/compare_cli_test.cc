@@ -41,7 +41,7 @@ TEST_F(CompareCli, AConfigIsRunAndItsGapExplained) {
   EXPECT_EQ(compared.code, 0) << compared.err;
   for (const char* words :
        {"added 'batch_so_far'", "RMSD target.depth [mm]",
-        "Online: every estimate from the data up to it", "Smoothed: every estimate from all data",
+        "Online: every estimate from the data up to it", "Smoothed: estimates from later data too",
         "At the end, where all have the same data", "linearisation, ekf against batch_so_far",
         "smoothing, ekf against rts", "lost data, batch_accepted against batch",
         "of 227 measurements were not used", "rmse target.depth [mm]",

@@ -169,6 +169,25 @@ TEST(Series, WhatHasNoValueOrVarianceIsLeftOut) {
   EXPECT_FALSE(distance.sigmas.contains("a"));  // one is no number, the other known exactly
 }
 
+// What is fixed in both says nothing; what the reference alone fixes has no share in its P.
+TEST(Series, FixedBlocksTakeNothingFromTheOthers) {
+  const double nan = std::nan("");
+  internal::Series series = TwoBlocks(), reference = TwoBlocks();
+  series.stamps = reference.stamps = {10};
+  series.values = {3, 1, 0, 0, 0};
+  reference.values = {1, 1, 0, 0, 0};
+  series.covariances = {1, 1, 1, 1};
+  reference.covariances = {4, nan, nan, nan};
+  reference.blocks[1].fixed = true;
+  internal::Distance distance = internal::DistanceBetween(series, reference);
+  EXPECT_NEAR(distance.sigmas.at("a"), 1.0, 1e-15);
+  EXPECT_TRUE(distance.rms.contains("a.q"));
+  series.blocks[1].fixed = true;
+  distance = internal::DistanceBetween(series, reference);
+  EXPECT_NEAR(distance.sigmas.at("a"), 1.0, 1e-15);
+  EXPECT_FALSE(distance.rms.contains("a.q"));
+}
+
 /// A run of two estimators, the second one the reference of the first.
 Comparison OneRun(double error, bool filter_diverged = false) {
   Comparison one;

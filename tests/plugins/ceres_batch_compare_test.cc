@@ -70,8 +70,10 @@ struct Compared {
   Comparison comparison;
 };
 
-Compared CompareLinear(bool with_outlier, const CompareOptions& options = {}) {
+Compared CompareLinear(bool with_outlier, const CompareOptions& options = {},
+                       const std::string& smoother = "rts") {
   Experiment experiment = MakeLinear(with_outlier);
+  experiment.estimators[1].type = smoother;
   RunComparer comparer(experiment);
   RunOptions observed;
   comparer.Observe(observed);
@@ -117,6 +119,11 @@ TEST(CompareLinear, OnlyMissingSmoothingIsLeftOfTheGap) {
   EXPECT_LT(ValueOf(rts.values, "apart:p.x"), 1e-9);
   EXPECT_LT(ValueOf(rts.values, "apart.sigmas:p"), 1e-9);
   EXPECT_NEAR(ValueOf(rts.values, "ratio.rmse:p.x"), 1.0, 1e-9);
+}
+
+TEST(CompareLinear, AWindowIsNoSmootherOfAllData) {
+  const GapStep smoothing = CompareLinear(false, {}, "fixed_lag").comparison.gap[1];
+  EXPECT_EQ(smoothing.from + ' ' + smoothing.to, "so_far accepted");
 }
 
 // At the end filter and batch have the same data.

@@ -62,16 +62,26 @@ const Candidate* FirstOf(const std::vector<Candidate>& candidates,
 }
 
 /// The batch of the same system as `of`, of the data so far or of all data; one that sees all
-/// measurements comes before one of those that a filter accepted.
+/// measurements comes before one of those that a filter accepted. Where none of these is usable,
+/// one that is, of the same sensors with other overrides: a robust loss, say.
 const Candidate* BatchFor(const Candidate& of, const std::vector<Candidate>& candidates,
                           bool smoothed) {
-  const auto fits = [&](const Candidate& one) {
-    return one.batch() && one.facts().smoothed == smoothed && SameSystem(one.facts(), of.facts());
+  const auto sees_the_same = [&](const Candidate& one) {
+    return one.batch() && one.facts().smoothed == smoothed && SameSensors(one.facts(), of.facts());
   };
-  const Candidate* const of_all = FirstOf(candidates, [&](const Candidate& one) {
-    return fits(one) && one.facts().accepted_by.empty();
-  });
-  return of_all != nullptr ? of_all : FirstOf(candidates, fits);
+  const auto fits = [&](const Candidate& one) {
+    return sees_the_same(one) && SameSystem(one.facts(), of.facts());
+  };
+  const auto of_all = [&](const auto& is_so) {
+    return FirstOf(candidates, [&](const Candidate& one) {
+      return is_so(one) && one.facts().accepted_by.empty();
+    });
+  };
+  const Candidate* own = of_all(fits);
+  if (own == nullptr) own = FirstOf(candidates, fits);
+  if (own != nullptr && own->entry->usable()) return own;
+  const Candidate* const other = of_all(sees_the_same);
+  return other != nullptr && other->entry->usable() ? other : own;
 }
 
 bool HasErrors(const Candidate& one) {
@@ -143,7 +153,7 @@ std::vector<std::string> WithoutReference(const std::vector<Candidate>& candidat
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const std::string what = "'" + candidates[i].name + "' is held against nothing";
     if (final && references[i].final == nullptr) {
-      notes.push_back(what + ": no batch has its sensors and overrides");
+      notes.push_back(what + ": no batch has its sensors");
     } else if (online && references[i].along == nullptr) {
       notes.push_back(what + " along the run: no batch of the data so far has its sensors and " +
                       "overrides");

@@ -20,6 +20,8 @@ struct Candidate {
   bool batch() const { return facts().type == "ceres_batch"; }
 };
 
+/// Whether both take the same measurements.
+bool SameSensors(const EstimatorFacts& a, const EstimatorFacts& b);
 /// Whether both are of the same models and sensors.
 bool SameSystem(const EstimatorFacts& a, const EstimatorFacts& b);
 

@@ -105,8 +105,12 @@ GapStep Linearisation(const Candidate& filter, const Partners& partners, bool wi
 
 }  // namespace
 
+bool SameSensors(const EstimatorFacts& a, const EstimatorFacts& b) {
+  return std::ranges::is_permutation(a.sensors, b.sensors);
+}
+
 bool SameSystem(const EstimatorFacts& a, const EstimatorFacts& b) {
-  return a.overrides == b.overrides && std::ranges::is_permutation(a.sensors, b.sensors);
+  return a.overrides == b.overrides && SameSensors(a, b);
 }
 
 std::map<std::string, double> DistanceBetweenMaps(const EstimatorResult& map,

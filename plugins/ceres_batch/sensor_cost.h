@@ -106,7 +106,8 @@ struct CostKind {
       ALIDADE_EXPECTS(block < blocks.size() && roles[i].offset >= 0 &&
                       roles[i].offset + geometries[i].ambient <= blocks[block]);
       for (int k = 0; k < geometries[i].ambient; ++k) {
-        const auto at = static_cast<std::size_t>(roles[i].offset + k);
+        const std::size_t at =
+            static_cast<std::size_t>(roles[i].offset) + static_cast<std::size_t>(k);
         ALIDADE_EXPECTS(!taken[block][at]);
         taken[block][at] = true;
         written[block][at] = k < geometries[i].tangent;

@@ -234,7 +234,7 @@ class Adjustment {
   int jacobian_evaluations_ = 0;
 };
 
-/// Sorted ratios of two series, taken together.
+/// Sorted ratios of two series, round by round.
 struct Ratio {
   std::vector<double> values;
   Ratio(const std::vector<double>& a, const std::vector<double>& b) {
@@ -245,6 +245,11 @@ struct Ratio {
     return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
   }
 };
+
+double Median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
 
 /// The ways to make costs: each adaptor beside what it is compared with.
 struct Ways {
@@ -319,11 +324,8 @@ int Main(int rounds) {
         return 1;
       }
       const Ratio ratio(ms[i], ms[ways.all[i].peer]);
-      std::sort(ms[i].begin(), ms[i].end());
-      std::sort(ns[i].begin(), ns[i].end());
-      std::printf("%-28s %12.2f %8.1f %10.3f (%.3f to %.3f)\n", ways.all[i].name,
-                  ms[i][ms[i].size() / 2], ns[i][ns[i].size() / 2], ratio.At(0.5), ratio.At(0.1),
-                  ratio.At(0.9));
+      std::printf("%-28s %12.2f %8.1f %10.3f (%.3f to %.3f)\n", ways.all[i].name, Median(ms[i]),
+                  Median(ns[i]), ratio.At(0.5), ratio.At(0.1), ratio.At(0.9));
     }
   }
   return 0;

@@ -39,9 +39,11 @@ struct SensorTraits {
     alidade::detail::ForEach(add, typename Roles::Indices{});
     return all;
   }
-  __attribute__((flatten)) static Status Linearise(const Sensor& sensor, const double* const* roles,
-                                                   double* z, double* const* jacobians,
-                                                   const int* strides) {
+  __attribute__((flatten)) ALIDADE_SCALAR_LOOPS static Status Linearise(const Sensor& sensor,
+                                                                        const double* const* roles,
+                                                                        double* z,
+                                                                        double* const* jacobians,
+                                                                        const int* strides) {
     return Evaluate(sensor, roles, z, jacobians, strides);
   }
 };

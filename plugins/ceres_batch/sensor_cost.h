@@ -5,6 +5,7 @@
 #include <ceres/jet.h>
 
 #include <algorithm>
+#include <type_traits>
 #include <vector>
 
 #include "alidade/autodiff.h"
@@ -124,12 +125,23 @@ struct CostKind {
       isotropic = isotropic && w[i] == (i % (m + 1) == 0 ? w[0] : 0.0);
   }
 
+  int role_count() const { return kStatic ? Traits::RoleCount(sensor) : role_count_; }
+  int rows() const { return kStatic ? Traits::Rows(sensor) : rows_; }
+  GeometryKind geometry() const { return kStatic ? Traits::Kind(sensor) : geometry_; }
+
   const Sensor& sensor;
   std::vector<RolePlace> places;
   std::vector<int> sizes;       ///< of the blocks
   std::vector<RolePlace> gaps;  ///< columns that no role writes
   std::vector<double> w;
   bool isotropic = true;  ///< W is a multiple of the identity
+
+ private:
+  using Traits = detail::SensorTraits<Sensor>;
+  /// Of a model that the compiler sees through they are constants.
+  static constexpr bool kStatic = !std::is_same_v<Sensor, SensorModel>;
+  int role_count_ = Traits::RoleCount(sensor), rows_ = Traits::Rows(sensor);
+  GeometryKind geometry_ = Traits::Kind(sensor);
 };
 
 /// The factor of a measurement, made of the sensor's own h:
@@ -157,14 +169,14 @@ class SensorCost final : public ceres::CostFunction {
     int strides[Traits::kMaxRoles];
     Bind(blocks, jacobians, roles, j, strides);
     double** const wanted = jacobians == nullptr ? nullptr : j;
-    const GeometryKind geometry = Traits::Kind(kind_.sensor);
+    const GeometryKind geometry = kind_.geometry();
     if (geometry == GeometryKind::kUnitQuaternion)
       return Curved<UnitQuaternion>(roles, wanted, strides, residuals, jacobians);
     if (geometry == GeometryKind::kUnitVector)
       return Curved<UnitVector>(roles, wanted, strides, residuals, jacobians);
     if (Traits::Linearise(kind_.sensor, roles, residuals, wanted, strides) != Status::kOk)
       return false;
-    const int m = Traits::Rows(kind_.sensor);
+    const int m = kind_.rows();
     for (int i = 0; i < m; ++i) residuals[i] = z_[i] - residuals[i];
     if (geometry == GeometryKind::kAngle) residuals[0] = Angle::Wrap(residuals[0]);
     Whiten(residuals, 1, 1.0);
@@ -178,7 +190,7 @@ class SensorCost final : public ceres::CostFunction {
             int* strides) const {
     const RolePlace* const places = kind_.places.data();
     const int* const sizes = kind_.sizes.data();
-    for (int i = 0; i < Traits::RoleCount(kind_.sensor); ++i) {
+    for (int i = 0; i < kind_.role_count(); ++i) {
       const auto [block, offset] = places[i];
       roles[i] = block < 0 ? nullptr : blocks[block] + offset;
       if (jacobians == nullptr) continue;
@@ -188,7 +200,7 @@ class SensorCost final : public ceres::CostFunction {
     }
     if (jacobians == nullptr) return;
     for (const auto [block, column] : kind_.gaps) {
-      for (int r = 0; jacobians[block] != nullptr && r < Traits::Rows(kind_.sensor); ++r)
+      for (int r = 0; jacobians[block] != nullptr && r < kind_.rows(); ++r)
         jacobians[block][r * sizes[block] + column] = 0.0;
     }
   }
@@ -228,7 +240,7 @@ class SensorCost final : public ceres::CostFunction {
   /// Not inlined: the loops of a function that is are the other one's.
   __attribute__((noinline)) ALIDADE_SCALAR_LOOPS void Whiten(double* a, int columns,
                                                              double sign) const {
-    const int m = Traits::Rows(kind_.sensor);
+    const int m = kind_.rows();
     if (kind_.isotropic) {
       const double factor = sign * kind_.w[0];
       for (int i = 0; i < m * columns; ++i) a[i] *= factor;

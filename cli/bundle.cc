@@ -75,7 +75,8 @@ std::string Describe(const BundleFile& file, int left_out) {
                      std::to_string(problem.points.size()) + " points, " +
                      std::to_string(problem.observations.size()) + " observations";
   if (left_out > 0)
-    text += "; " + std::to_string(left_out) + " not defined at the start, as behind the camera";
+    text += "; " + std::to_string(left_out) +
+            " not defined or not finite at the start, as behind the camera";
   if (file.invalid > 0)
     text += "; " + std::to_string(file.invalid) + " not valid, as outside the image";
   if (file.frames_left_out > 0)

@@ -50,12 +50,12 @@ void Tell(const Comparison& comparison, const Arguments& arguments, const fs::pa
   if (!folder.empty() && !arguments.quiet) PrintNote("wrote " + folder.string());
 }
 
+/// That a comparison is withheld counts for less than that the run failed.
 ExitCode CodeOf(const Comparison& comparison, ExitCode of_run) {
-  if (!comparison.withheld.empty()) {
-    PrintErrors(comparison.withheld);
-    return ExitCode::kFound;
-  }
-  return of_run;
+  const bool whole = of_run == ExitCode::kOk || of_run == ExitCode::kDiverged;
+  if (comparison.withheld.empty() || !whole) return of_run;
+  PrintErrors(comparison.withheld);
+  return ExitCode::kFound;
 }
 
 /// Whether what ended the run was an estimator that was added, of which the comparison tells.

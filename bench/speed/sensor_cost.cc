@@ -13,9 +13,13 @@
 #include <ceres/solver.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <functional>
 #include <memory>
 #include <numbers>
+#include <vector>
 
 #include "alidade/in_process.h"
 #include "bench/speed/interleaved.h"

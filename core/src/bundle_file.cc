@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/bundle_file.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -115,8 +116,13 @@ BundleFile ReadBundle(const std::filesystem::path& file) {
   const std::string_view view = text;
   if (view.find_first_not_of(" \t\r\n") == view.npos)
     FailFormat(name, "nothing in it", "a problem");
-  if (view.starts_with("\x1F\x8B") || view.starts_with("BZh")) {
-    FailFormat(name, "compressed", "the text: zcat or bzcat FILE | alidade bundle -");
+  constexpr std::string_view kCompressed[] = {"\x1F\x8B", "BZh",
+                                              "\xFD"
+                                              "7zXZ",
+                                              "\x28\xB5\x2F\xFD"};
+  if (std::ranges::any_of(kCompressed, [&](auto magic) { return view.starts_with(magic); })) {
+    FailFormat(name, "compressed",
+               "the text: zcat, bzcat, xzcat or zstdcat FILE | alidade bundle -");
   }
   if (view.size() > 1 && (view[0] == 'v' || view[0] == 'V') && (view[1] == 'P' || view[1] == 'N'))
     return internal::ReadLibmv(view, name);

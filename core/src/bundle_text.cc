@@ -50,11 +50,19 @@ std::array<double, 12> BundlerPose(const BundleFile& file, std::size_t i) {
   return pose;
 }
 
+/// f, k1, k2; f = 0 of a picture that was not registered, where there are such.
+void ReadLens(BundleCursor& cursor, bool may_be_missing, double* lens) {
+  lens[0] = cursor.Number("focal length of a camera");
+  if (!(lens[0] > 0.0) && !(may_be_missing && lens[0] == 0.0))
+    cursor.Fail("this focal length is not positive", "a number of px above 0");
+  cursor.Numbers("k1, k2 of a camera", 2, lens + 1);
+}
+
 /// One camera of a Bundler file.
 void ReadBundlerCamera(BundleCursor& cursor, BundleFile& file) {
   BundleProblem& problem = file.problem;
   std::vector<double> lens(3), pose(12);
-  cursor.Numbers("focal length, k1, k2 of a camera", 3, lens.data());
+  ReadLens(cursor, true, lens.data());
   cursor.Numbers("rotation of a camera", 9, pose.data());
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> r(pose.data());
   const bool missing = lens[0] == 0.0 && r.isZero();  // a picture that was not registered
@@ -148,7 +156,7 @@ BundleFile ReadBal(std::string_view text, const std::string& name) {
   for (int i = 0; i < cameras; ++i) {
     std::vector<double> pose(6), lens(3);
     cursor.Numbers("rotation and translation of a camera", 6, pose.data());
-    cursor.Numbers("focal length, k1, k2 of a camera", 3, lens.data());
+    ReadLens(cursor, false, lens.data());
     double q[4];
     UnitQuaternion::Exp(pose.data(), q);
     problem.cameras.push_back(CameraFrom(q, pose.data() + 3, true));

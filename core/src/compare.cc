@@ -78,7 +78,10 @@ const Candidate* BatchFor(const Candidate& of, const std::vector<Candidate>& can
     });
   };
   const Candidate* own = of_all(fits);
-  if (own == nullptr) own = FirstOf(candidates, fits);
+  if (own == nullptr || !own->entry->usable()) {
+    const Candidate* const any = FirstOf(candidates, fits);
+    if (own == nullptr || any->entry->usable()) own = any;
+  }
   if (own != nullptr && own->entry->usable()) return own;
   const Candidate* const other = of_all(sees_the_same);
   return other != nullptr && other->entry->usable() ? other : own;
@@ -118,7 +121,7 @@ References ReferencesOf(const Candidate& one, const std::vector<Candidate>& cand
   const Candidate* smoothed = BatchFor(one, candidates, true);
   if (smoothed == nullptr) {
     smoothed = FirstOf(candidates, [&](const Candidate& other) {
-      return other.facts().smoothed && SameSystem(other.facts(), one.facts());
+      return internal::SmoothsAllData(other.facts()) && SameSystem(other.facts(), one.facts());
     });
   }
   const bool later = one.facts().smoothed || (!truth && so_far == nullptr);
@@ -287,7 +290,7 @@ std::vector<std::string> NotesOf(const std::vector<Candidate>& candidates,
     if (along == nullptr) continue;
     if (!along->entry->series.joint && along->entry->usable()) {
       notes.insert("'" + along->name +
-                   "' has no covariance.bin: Mahalanobis distances leave its correlations out");
+                   "' has no covariance.bin: RMSD in sigmas leaves its correlations out");
     }
     if (!truth && along->facts().smoothed && !candidates[i].facts().smoothed) {
       notes.insert("'" + along->name +

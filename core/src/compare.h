@@ -25,9 +25,15 @@ bool SameSensors(const EstimatorFacts& a, const EstimatorFacts& b);
 /// Whether both are of the same models and sensors.
 bool SameSystem(const EstimatorFacts& a, const EstimatorFacts& b);
 
-/// Whether it is an online estimator and no batch: of one of these the gap to the batch is.
+/// Whether it is an online estimator, and neither a batch nor a window, which linearise again: of
+/// one of these the gap to the batch is.
 inline bool IsFilter(const std::string& type, bool smoothed) {
-  return !smoothed && type != "ceres_batch";
+  return !smoothed && type != "ceres_batch" && type != "fixed_lag";
+}
+
+/// Whether its estimates rest on all data; later data of a window end with it.
+inline bool SmoothsAllData(const EstimatorFacts& facts) {
+  return facts.smoothed && facts.type != "fixed_lag";
 }
 
 /// Refuses what an option names. Error: kUsage.

@@ -26,8 +26,7 @@ Partners PartnersOf(const Candidate& filter, const std::vector<Candidate>& candi
     if (!SameSystem(facts, filter.facts())) continue;
     const bool by_filter = one.run == filter.run && facts.accepted_by == filter.entry->result.name;
     if (!facts.accepted_by.empty() && !by_filter) continue;
-    const bool whole = facts.type != "fixed_lag";  // that one's later data end with its window
-    if (!one.batch() && facts.smoothed && whole && !by_filter) keep(found.smoother, one);
+    if (!one.batch() && SmoothsAllData(facts) && !by_filter) keep(found.smoother, one);
     if (!one.batch()) continue;
     if (facts.smoothed) keep(by_filter ? found.accepted : found.all, one);
     // What the filter did not accept is another step's.

@@ -122,7 +122,7 @@ Section AlongSection(const Comparison& comparison, bool smoothed) {
                              {"ratio.path.sim3.rmse", "  ratio, path, Sim3"},
                              {"apart", "RMSD"},
                              {"apart.path.sim3", "RMSD, path, Sim3"},
-                             {"apart.sigmas", "Mahalanobis distance"},
+                             {"apart.sigmas", "RMSD in sigmas"},
                              {"nees.mean", "NEES"},
                              {"nees.cov95", "in the 95 % region"},
                              {"nis.mean", "NIS"},
@@ -139,7 +139,7 @@ Section FinalSection(const Comparison& comparison) {
                  {{"final", "error"},
                   {"ratio.final", "  ratio"},
                   {"apart.final", "difference"},
-                  {"apart.final.sigmas", "Mahalanobis distance"},
+                  {"apart.final.sigmas", "difference in sigmas"},
                   {"map.rmse", "map"},
                   {"ratio.map.rmse", "  ratio, map"},
                   {"map.sim3.rmse", "map, Sim3"},
@@ -192,7 +192,7 @@ std::string LinesOf(const GapStep& step) {
   double largest = 0.0;
   const std::string distances = DistancesText(step, largest);
   if (distances.empty()) return "";
-  std::string line = "Mahalanobis distance " + distances + " in sigmas of " + step.to;
+  std::string line = "RMSD " + distances + " in sigmas of " + step.to;
   if (step.kind == GapKind::kSmoothing) return line;
   constexpr double kNegligible = 0.1, kSmall = 0.5, kLarge = 1.0;
   return line + (largest < kNegligible ? ": negligible beside what neither of them knows"

@@ -123,9 +123,10 @@ void AddVariant(const Variant& variant, const PluginHost& host, ExplainedExperim
 
 /// Refuses a reference that no estimator is, and truth where the source knows none. Error: kUsage.
 void CheckReference(const Experiment& experiment, const std::string& name) {
-  const std::vector<std::string> names = internal::NamesOf(experiment.estimators);
+  std::vector<std::string> names = internal::NamesOf(experiment.estimators);
   const bool truth = name == "truth" && !experiment.source->truths().empty();
   if (name.empty() || truth || std::ranges::count(names, name) > 0) return;
+  if (!experiment.source->truths().empty()) names.emplace_back("truth");
   internal::RefuseOption(
       "--reference", name == "truth" ? "the source knows no truth" : "no estimator '" + name + "'",
       name, names);

@@ -11,6 +11,7 @@
 
 #include "names.h"
 #include "number_text.h"
+#include "text_table.h"
 
 namespace alidade {
 namespace internal {
@@ -265,6 +266,20 @@ std::string EstimatorTable(const std::vector<std::string>& names,
     append_line("", names);
     for (const ComparisonRow& row : rows) append_line(row.label, row.cells);
   }
+  return text;
+}
+
+std::string MarkdownTable(const std::string& corner, const std::vector<std::string>& names,
+                          const std::vector<ComparisonRow>& rows) {
+  const auto row_of = [](const std::string& label, const std::vector<std::string>& cells) {
+    TextRow row = {label};
+    row.insert(row.end(), cells.begin(), cells.end());
+    return MarkdownRow(row);
+  };
+  std::string text = row_of(corner, names) + "|---|";
+  for (std::size_t c = 0; c < names.size(); ++c) text += "---:|";
+  text += '\n';
+  for (const ComparisonRow& row : rows) text += row_of(row.label, row.cells);
   return text;
 }
 

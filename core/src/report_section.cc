@@ -24,13 +24,7 @@ std::string Markdown(const Section& section) {
   for (const std::string& line : section.lines) text += "- " + line + '\n';
   if (section.rows.empty()) return text;
   if (!section.lines.empty()) text += '\n';
-  text += MarkdownRow(RowOf("", section.columns)) + "|---|";
-  for (std::size_t c = 0; c < section.columns.size(); ++c) text += "---:|";
-  text += '\n';
-  for (const ComparisonRow& row : section.rows) {
-    text += MarkdownRow(RowOf(row.label, row.cells));
-  }
-  return text;
+  return text + MarkdownTable("", section.columns, section.rows);
 }
 
 std::string Latex(const Section& section) {

@@ -9,7 +9,6 @@
 #include "run_folder.h"
 #include "sweep_text.h"
 #include "sweep_vary_files.h"
-#include "text_table.h"
 
 namespace alidade {
 
@@ -17,7 +16,6 @@ using internal::ComparisonRow;
 using internal::CountWhole;
 using internal::CountWithheld;
 using internal::CsvFile;
-using internal::Join;
 using internal::Json;
 using internal::NamesOf;
 using internal::ReferenceLines;
@@ -82,12 +80,7 @@ std::string Markdown(const SweepResult& result) {
                      ". Mean [5 %, 50 %, 95 % quantile] over the runs that did not diverge, "
                      "inconsistent ones among them.\n\n";
   const std::vector<SweepSummary> summaries = Summarise(result);
-  text += "|  | " + Join(NamesOf(summaries), " | ") + " |\n|---|";
-  for (std::size_t c = 0; c < summaries.size(); ++c) text += "---:|";
-  text += '\n';
-  for (const ComparisonRow& row : TableRows(summaries)) {
-    text += "| " + row.label + " | " + Join(row.cells, " | ") + " |\n";
-  }
+  text += internal::MarkdownTable("", NamesOf(summaries), TableRows(summaries));
   return text + ReferenceLines(result);
 }
 
@@ -112,9 +105,14 @@ void AppendEstimators(Json& json, const SweepResult& result) {
   json.End();
 }
 
+const char* StatusOf(bool stopped) {
+  return ToString(stopped ? RunStatus::kStopped : RunStatus::kOk);
+}
+
 std::string SweepJson(const SweepResult& result) {
   Json json;
   json.Object();
+  json.Key("status").Text(StatusOf(result.stopped));
   json.Key("runs").Integer(result.runs);
   json.Key("runs_used").Integer(CountWhole(result));
   json.Key("first_seed").Integer(static_cast<std::int64_t>(result.first_seed));
@@ -128,6 +126,7 @@ std::string SweepJson(const SweepResult& result) {
 std::string SweepJson(const VariedSweep& sweep) {
   Json json;
   json.Object();
+  json.Key("status").Text(StatusOf(sweep.stopped()));
   json.Key("runs").Integer(sweep.results.front().runs);
   json.Key("first_seed").Integer(static_cast<std::int64_t>(sweep.results.front().first_seed));
   json.Key("vary").Text(sweep.variation.key);

@@ -16,7 +16,6 @@
 #include "figures.h"
 #include "number_text.h"
 #include "sweep_text.h"
-#include "text_table.h"
 
 namespace alidade {
 namespace internal {
@@ -218,13 +217,8 @@ std::string VariedMarkdown(const VariedSweep& sweep) {
       "them.\n";
   for (const Column& column : ColumnsOf(sweep)) {
     const ValueTable table = TableOf(sweep, column);
-    text += "\n| `" + column.front().name + "`: " + sweep.variation.key + " | " +
-            Join(table.header, " | ") + " |\n|---|";
-    for (std::size_t c = 0; c < table.header.size(); ++c) text += "---:|";
-    text += '\n';
-    for (const ComparisonRow& row : table.rows) {
-      text += "| " + row.label + " | " + Join(row.cells, " | ") + " |\n";
-    }
+    text += '\n' + MarkdownTable('`' + column.front().name + "`: " + sweep.variation.key,
+                                 table.header, table.rows);
   }
   return text + ReferenceLines(sweep);
 }

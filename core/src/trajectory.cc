@@ -160,11 +160,18 @@ class TrajectoryReader {
   /// Of columns 1 to 7.
   void AddPose(const std::array<const char*, 7>& names) {
     const std::array<double, 7> v = rows_.PoseNumbers(names);
-    positions_.emplace_back(v[0], v[1], v[2]);
+    AddPosition({v[0], v[1], v[2]});
     const bool w_first = trajectory_.format == Format::kEuroc;
     const Eigen::Quaterniond q = w_first ? Eigen::Quaterniond(v[3], v[4], v[5], v[6])
                                          : Eigen::Quaterniond(v[6], v[3], v[4], v[5]);
     trajectory_.orientations.push_back(q.normalized());
+  }
+
+  void AddPosition(const Eigen::Vector3d& position) {
+    constexpr double kFar = 1e15;  // m; there doubles are 0.1 m apart
+    if (!(position.cwiseAbs().maxCoeff() <= kFar))
+      rows_.FailLine("the position is more than 1e15 m away", "metres");
+    positions_.push_back(position);
   }
 
   void AddKitti() {
@@ -179,7 +186,7 @@ class TrajectoryReader {
     if (!(defect <= kDefect) || !(rotation.determinant() > 0.0)) {
       rows_.FailLine("columns 1-3, 5-7, 9-11 are no rotation", "R R' = 1 to 1e-3, det R = 1");
     }
-    positions_.push_back(pose.col(3));
+    AddPosition(pose.col(3));
     trajectory_.orientations.push_back(Eigen::Quaterniond(rotation).normalized());
   }
 

@@ -143,6 +143,7 @@ class Bundle {
   void AddLens(std::vector<GeometryManifold::Part>& parts) const {
     for (const bool fixed : fixed_) parts.push_back({Geometry::Vector(1), fixed});
   }
+  double StepTolerance() const;
   ceres::Solver::Options SolverOptions() const;
   void Eliminate(ceres::Solver::Options& options);
   int Rank();
@@ -184,12 +185,25 @@ void Bundle::Eliminate(ceres::Solver::Options& options) {
       std::min(cameras, points) <= kDense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
 }
 
+/// Ceres compares a step with all unknowns together: a point that is too far away would let any one
+/// pass. So the tolerance is of points as far as half of them.
+double Bundle::StepTolerance() const {
+  constexpr double kTolerance = 1e-12;
+  std::vector<double> sizes;
+  for (const double x : points_) sizes.push_back(std::abs(x));
+  const auto middle = sizes.begin() + std::ssize(sizes) / 2;
+  std::ranges::nth_element(sizes, middle);
+  const double norm = Eigen::Map<const Eigen::VectorXd>(points_.data(), std::ssize(points_)).norm();
+  const double typical = *middle * std::sqrt(static_cast<double>(sizes.size()));
+  return norm > typical ? kTolerance * typical / norm : kTolerance;
+}
+
 ceres::Solver::Options Bundle::SolverOptions() const {
   ceres::Solver::Options options;
   options.max_num_iterations = options_.max_iterations;
   options.function_tolerance = 1e-12;
   options.gradient_tolerance = 1e-12;
-  options.parameter_tolerance = 1e-12;
+  options.parameter_tolerance = StepTolerance();
   options.logging_type = ceres::SILENT;
   options.num_threads = 1;
   return options;

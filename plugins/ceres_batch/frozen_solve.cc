@@ -130,7 +130,8 @@ bool GaussNewtonAt(Trajectory& trajectory, const Eigen::VectorXd& e, GaussNewton
     at.cost = reduced.cost;
     at.u = llt.matrixU();
     at.step = -llt.solve(reduced.g);
-    return llt.info() == Eigen::Success;
+    return llt.info() == Eigen::Success ||
+           trajectory.Fail("the normal matrix is not positive definite");
   }
   RowMajor j = RowMajor::Identity(n + m, n);
   Eigen::VectorXd r(m), weighted(n + m);

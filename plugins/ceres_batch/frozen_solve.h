@@ -23,7 +23,7 @@ struct GaussNewton {
   Eigen::MatrixXd u;     ///< U, N x N, upper, with Cov(e) = (U'U)^-1
   Eigen::VectorXd step;  ///< -(U'U)^-1 grad phi
 };
-/// False where a model is not defined, with `at` as it was or half done.
+/// False, with `at` as it was or half done, where a model is not defined or U'U is singular.
 bool GaussNewtonAt(Trajectory& trajectory, const Eigen::VectorXd& e, GaussNewton& at);
 
 }  // namespace alidade::ceres_batch

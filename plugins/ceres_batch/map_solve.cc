@@ -3,11 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iomanip>
-#include <locale>
-#include <sstream>
 
 #include "alidade/error.h"
+#include "core/src/number_text.h"
 
 namespace alidade::ceres_batch {
 namespace {
@@ -15,13 +13,6 @@ namespace {
 /// `key (50 here)`
 std::string Setting(const char* key, int value) {
   return std::string(key) + " (" + std::to_string(value) + " here)";
-}
-
-std::string Text(double value, int digits) {
-  std::ostringstream text;
-  text.imbue(std::locale::classic());
-  text << std::setprecision(digits) << value;
-  return text.str();
 }
 
 /// Freezes at e; false where a model is not defined there.
@@ -83,7 +74,7 @@ bool MapSolve::SolveFrom(Trajectory& trajectory, Eigen::VectorXd& e) {
   const std::string solved = Minimise(trajectory, e);
   HeedStop();
   const bool defined = TakeLastStep(trajectory, e);
-  summary_ = "cost " + Text(at_.cost, 9) + ", " + solved + summary_;
+  summary_ = "cost " + internal::RoundedText(at_.cost, 9) + ", " + solved + summary_;
   if (!defined) summary_ += "; then " + trajectory.problem();
   return defined;
 }
@@ -152,8 +143,8 @@ bool MapSolve::TakeLastStep(Trajectory& trajectory, Eigen::VectorXd& e) {
 }
 
 /// Iteratively reweighted least squares (IRLS) converges linearly where the squared error does so
-/// quadratically: what is left below Ceres' tolerances counts. A step that raises the cost is taken
-/// back, and ends it. How many steps it took.
+/// quadratically: what is left below Ceres' tolerances counts. A step that raises the cost is not
+/// taken, and ends it. How many steps it took.
 int MapSolve::IterateWeights(Trajectory& trajectory, Eigen::VectorXd& e) {
   // Of inputs whose sigma is 1; with landmarks a step takes longer.
   const double settled = trajectory.has_landmarks() ? 1e-6 : 1e-10;
@@ -167,8 +158,8 @@ int MapSolve::IterateWeights(Trajectory& trajectory, Eigen::VectorXd& e) {
     HeedStop();
     const bool spent = steps == options_.max_iterations;
     const Eigen::VectorXd moved = e + at_.step;
-    lower = !spent && GaussNewtonAt(trajectory, moved, next) &&
-            next.cost <= at_.cost * (1.0 + kRounding);
+    const bool defined = spent || GaussNewtonAt(trajectory, moved, next);
+    lower = !spent && defined && next.cost <= at_.cost * (1.0 + kRounding);
     const double left = (at_.u * at_.step).norm();
     if (lower) {
       e = moved;
@@ -176,9 +167,10 @@ int MapSolve::IterateWeights(Trajectory& trajectory, Eigen::VectorXd& e) {
       ++steps;
     } else if (left > kTells) {
       note_ = "the weights of the losses did not settle in " + std::to_string(steps) +
-              " steps: the next one is " + Text(left, 3) + " sigma long; " +
+              " steps: the next one is " + internal::RoundedText(left, 3) + " sigma long; " +
               (spent ? "a larger " + Setting("max_iterations", options_.max_iterations) + " may do"
-                     : "it does not lower the cost");
+               : defined ? "it does not lower the cost"
+                         : "then " + trajectory.problem());
     }
   }
   return steps;

@@ -112,6 +112,7 @@ class Trajectory {
 
   /// Why the last call failed.
   const std::string& problem() const { return problem_; }
+  bool Fail(std::string why) const;  ///< false, with this problem()
 
  private:
   struct Step {
@@ -163,7 +164,7 @@ class Trajectory {
     std::vector<std::size_t> epochs;    ///< that it is seen from, the first observation's first
     std::vector<Eigen::MatrixXd> ties;  ///< sum w J_x' J_l of each of them, d rows
   };
-  /// Where an observation is not defined, nor is the problem; or it counts for nothing.
+  /// An observation that is not defined makes the problem so, or is skipped.
   enum class Undefined { kFails, kSkipped };
 
   /// x_0 and S_0.
@@ -224,7 +225,6 @@ class Trajectory {
   void PutAbout(const std::vector<double>& about, Point& point) const;
   bool StepAbout(std::vector<std::vector<double>>& trajectory, const Eigen::VectorXd& e,
                  Eigen::VectorXd& step);
-  bool Fail(std::string why) const;
   bool FailTooMany() const;
 
   System system_;

@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/geometry.h"
 #include "core/src/number_text.h"
-#include "sensor_cost.h"
+#include "difference.h"
 #include "trajectory.h"
 
 /// The models of a Trajectory: their values, derivatives and noise at a point of it.
@@ -26,9 +27,9 @@ std::vector<int> RowsOf(const StateLayout& layout, const std::vector<BlockId>& b
 /// d = z (-) h and, unless null, j = dd/dh (row-major), in the tangent at h.
 void Difference(const Geometry& geometry, const double* z, const double* h, double* d, double* j) {
   if (geometry.kind == GeometryKind::kUnitQuaternion) {
-    detail::Difference<UnitQuaternion>(z, h, d, j);
+    ceres_batch::Difference<UnitQuaternion>(z, h, d, j);
   } else if (geometry.kind == GeometryKind::kUnitVector) {
-    detail::Difference<UnitVector>(z, h, d, j);
+    ceres_batch::Difference<UnitVector>(z, h, d, j);
   } else {
     const int t = geometry.tangent;
     geometry.Minus(z, h, d);
@@ -225,7 +226,8 @@ bool Trajectory::Residual(const Factor& factor, const Point& point, const std::v
   }
   const double* z = factor.measurement.values.data();
   r.resize(geometry.tangent);
-  RowMajor j_r_h(geometry.tangent, geometry.tangent);
+  RowMajor j_r_h;
+  if (a != nullptr) j_r_h.resize(geometry.tangent, geometry.tangent);
   Difference(geometry, z, h.data(), r.data(), a == nullptr ? nullptr : j_r_h.data());
   const auto whiten = factor.l.triangularView<Eigen::Lower>();
   whiten.solveInPlace(r);

@@ -172,9 +172,15 @@ TEST_F(CompareCli, WithholdsTheComparisonWhereTheBatchFailed) {
   EXPECT_TRUE(Contains(compared.out, words)) << compared.out;
   EXPECT_FALSE(Contains(compared.out, "difference target")) << compared.out;
   // Errors from truth need no batch, but what is held against it is withheld.
-  const Outcome truth = Call({"compare", "config.yaml", "-o", "two", "--set", failing});
+  const Outcome truth =
+      Call({"compare", "config.yaml", "-o", "two", "--no-explain", "--set", failing});
   EXPECT_EQ(truth.code, 1);
   EXPECT_TRUE(Contains(truth.out, "rmse target.depth [mm]")) << truth.out;
+  // Without a gate that of what the filter accepted is of all measurements too, and stands in.
+  const Outcome added = Call({"compare", "config.yaml", "-o", "three", "--set", failing});
+  EXPECT_EQ(added.code, 79) << "that of the run";
+  EXPECT_FALSE(Contains(added.out, words)) << added.out;
+  EXPECT_TRUE(Contains(added.out, "to batch_accepted")) << added.out;
   // A finished folder says the same.
   EXPECT_EQ(Call({"compare", "out", "--reference", "batch"}).code, 1);
 }
@@ -193,6 +199,20 @@ TEST_F(CompareCli, TheBatchOfAnotherFolderServesWhereOneFailed) {
     EXPECT_EQ(compared.code, 0) << compared.err;
     EXPECT_TRUE(Contains(compared.out, "to fb/batch")) << compared.out;
   }
+}
+
+// A window linearises again, and its later data end with it.
+TEST_F(CompareCli, AWindowIsNeitherAFilterNorASmootherOfAllData) {
+  const std::string window = "estimators.window={type: fixed_lag, window_s: 0.5";
+  const Outcome smoothed =
+      Call({"compare", "config.yaml", "-o", "out", "--no-explain", "--set",
+            window + ", estimate: oldest}", "--set", "estimators.rts={type: rts}"});
+  EXPECT_TRUE(Contains(smoothed.out, "later data too; ratio and difference: to rts"))
+      << smoothed.out << smoothed.err;
+  const Outcome online =
+      Call({"compare", "config.yaml", "-o", "two", "--filter", "window", "--set", window + '}'});
+  EXPECT_EQ(online.code, 2);
+  EXPECT_TRUE(Contains(online.err, "expected one of ekf")) << online.err;
 }
 
 TEST_F(CompareCli, WithoutTruthTheBatchIsTheReference) {

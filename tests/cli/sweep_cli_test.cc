@@ -178,6 +178,7 @@ TEST_F(SweepCli, EachValueOfAKeyIsSweptAsIfItWereSet) {
   EXPECT_TRUE(Contains(varied.out, "\n0.5    0 of 3  ")) << varied.out;
   const Config summary = Json("varied/sweep.json");
   EXPECT_EQ(summary.root().At("vary").Text(), "sensors.stereo.sigma_px");
+  EXPECT_EQ(summary.root().At("status").Text(), "ok");
   const std::vector<Node> values = summary.root().At("values").Items();
   ASSERT_EQ(values.size(), 2u);
   std::string rows;
@@ -370,6 +371,7 @@ TEST_F(SweepCli, StopsAtASignalWithTheRunsThatAreComplete) {
   EXPECT_EQ(stopped.code, 75) << stopped.err;
   const Config summary = Json("out/sweep.json");
   EXPECT_EQ(summary.root().At("runs").Number(), 1e6);
+  EXPECT_EQ(summary.root().At("status").Text(), "stopped");
   EXPECT_GT(summary.root().At("runs_used").Number(), 0);
   EXPECT_TRUE(Contains(stopped.err, "stopped after ")) << stopped.err;
 }

@@ -172,8 +172,15 @@ TEST_F(BundleFiles, RefusesBadBal) {
   ExpectBad("1 1 1\n0 0 1e999 3\n", {":2:5: '1e999' is too large or too small"});
   ExpectBad("1 x 1\n", {":1:3: 'x' is none; expected the number of points"});
   ExpectBad(kBal.substr(0, kBal.size() - 4), {"the file ends here; expected a point"});
+  std::string text = kBal;
+  ExpectBad(text.replace(text.find("100"), 3, "-10"),
+            {":9:1: this focal length is not positive", "px above 0"});
   ExpectBad(kBal + "5\n", {":15:1: more numbers than the file announces"});
-  ExpectBad("\x1F\x8B\x08", {":1:1: compressed; expected the text: zcat or bzcat"});
+  for (const char* magic : {"\x1F\x8B\x08", "BZh9",
+                            "\xFD"
+                            "7zXZ",
+                            "\x28\xB5\x2F\xFD"})
+    ExpectBad(magic, {":1:1: compressed; expected the text: zcat, bzcat, xzcat or zstdcat FILE"});
   ExpectBad("frame,feature,dim,value\n", {":1:1: columns with commas", "--camera FILE"});
 }
 
@@ -184,6 +191,8 @@ TEST_F(BundleFiles, RefusesBadBundler) {
   ExpectBad(text.replace(text.find("0 -1 0"), 6, "0 -2 0"), {":6:5:", "are no rotation"});
   text = kBundler;
   ExpectBad(text.replace(text.find("1 0 42"), 6, "1 1 42"), {"this camera is not registered"});
+  text = kBundler;
+  ExpectBad(text.replace(text.find("100"), 3, "-10"), {":3:1: this focal length is not positive"});
   text = kBundler;
   ExpectBad(text.replace(text.find("1 0 42"), 6, "1 2 42"), {"'2' is none; expected a camera"});
   ExpectBad(kBundler.substr(0, 60), {"the file ends here"});

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "core/src/comparison_table.h"
+
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -115,6 +117,11 @@ TEST(ComparisonTable, FoldsWhatIsWiderThanALine) {
   EXPECT_EQ(headers, 3);
   EXPECT_LE(widest, 100);
   EXPECT_GT(widest, 60);
+}
+
+TEST(MarkdownTable, KeepsWhatWouldEndACell) {
+  EXPECT_EQ(internal::MarkdownTable("`ekf`", {"rmse", "|e|"}, {{"a|b", {"1", "2"}}}),
+            "| `ekf` | rmse | \\|e\\| |\n|---|---:|---:|\n| a\\|b | 1 | 2 |\n");
 }
 
 TEST(ComparisonTable, WithoutEstimatorsIsEmpty) { EXPECT_EQ(ComparisonTable({}), ""); }

@@ -134,6 +134,8 @@ TEST_F(TrajectoryFiles, RowsThatAreNoneAreRefusedWithTheirPlace) {
             "poses.txt:2:17: 9 columns; expected 8, t x y z qx qy qz qw");
   EXPECT_EQ(Refusal(good + "1 1 nan 3 0 0 0 1\n"),
             "poses.txt:2:5 y: 'nan' is not finite; expected a finite number");
+  EXPECT_EQ(Refusal(good + "1 1 -1e300 3 0 0 0 1\n"),
+            "poses.txt:2: the position is more than 1e15 m away; expected metres");
   EXPECT_EQ(Refusal(good + "1 1 2.x 3 0 0 0 1\n"),
             "poses.txt:2:5 y: '2.x' is not a number; expected a finite number");
   EXPECT_EQ(Refusal(good + "1 1 2 3 0 0 0 1.01\n"),

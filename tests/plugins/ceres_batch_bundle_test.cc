@@ -144,6 +144,22 @@ TEST(CeresBundle, EndsAfterTheIterationWhereItIsTold) {
   EXPECT_LT(BundleRms(sensor, problem), 0.5 * before) << "what is reached is kept";
 }
 
+// All unknowns together are then so large that any step is small beside them.
+TEST(CeresBundle, APointFarAwayDoesNotEndIt) {
+  double cost[2] = {};
+  for (const double far : {1e9, 1e15}) {
+    BundleProblem problem = TrueBundle().problem;
+    Disturb(problem);
+    problem.points[0][0] = far;
+    BundleOptions options;
+    options.max_iterations = 20;
+    const BundleResult result = Adjusted(problem, options);
+    EXPECT_GE(result.iterations, 10) << result.message;
+    cost[far > 1e9] = result.cost_after;
+  }
+  EXPECT_NEAR(cost[1] / cost[0], 1.0, 0.1);
+}
+
 TEST(CeresBundle, LeavesOutWhatIsBehindItsCamera) {
   BundleProblem problem = TrueBundle().problem;
   const auto seen_before = problem.observations.size();

@@ -107,7 +107,7 @@ void ExpectTrueJacobians(const ceres::CostFunction& cost, const Values& values,
 
 GeometryManifold Of(const Geometry& geometry) { return GeometryManifold({{geometry, false}}); }
 
-// d = 20 / 2 = 10 px, z = 13 px, sigma = 2 px: r = 1.5, dr/dZ = 10 / 2 / 2 = 2.5 per m
+// d = 20 / 2 = 10 px, z = 13 px, sigma = 2 px: r = -1.5, dr/dZ = -10 / 2 / 2 = -2.5 per m
 TEST(SensorCost, IsTheWhitenedResidualOfTheSensor) {
   const StereoDisparity model(200.0, 0.1, 2.0);
   const SensorModel sealed = InProcessSensor(model, "stereo_disparity");
@@ -120,8 +120,8 @@ TEST(SensorCost, IsTheWhitenedResidualOfTheSensor) {
   for (const ceres::CostFunction* cost :
        {static_cast<const ceres::CostFunction*>(&a), static_cast<const ceres::CostFunction*>(&b)}) {
     const Evaluated at = At(*cost, {{2.0}});
-    EXPECT_DOUBLE_EQ(at.r[0], 1.5);
-    EXPECT_DOUBLE_EQ(at.j[0][0], 2.5);
+    EXPECT_DOUBLE_EQ(at.r[0], -1.5);
+    EXPECT_DOUBLE_EQ(at.j[0][0], -2.5);
     const Values behind_it{{-1.0}};
     double r = 7.0;
     EXPECT_FALSE(cost->Evaluate(Pointers(behind_it).data(), &r, nullptr));
@@ -153,8 +153,8 @@ TEST(SensorCost, PutsRolesIntoTheirPlacesInTheBlocks) {
   const double* const roles[] = {&values[1][3], &values[1][6], &values[1][0], &values[0][0]};
   ASSERT_EQ(sealed.Predict(roles, h), Status::kOk);
   const std::vector<double> r = ResidualAt(a, values);
-  EXPECT_NEAR(r[0], 2.0 * (z[0] - h[0]), 1e-12);
-  EXPECT_NEAR(r[1], 0.7 * (z[0] - h[0]) + 0.5 * (z[1] - h[1]), 1e-12);
+  EXPECT_NEAR(r[0], 2.0 * (h[0] - z[0]), 1e-12);
+  EXPECT_NEAR(r[1], 0.7 * (h[0] - z[0]) + 0.5 * (h[1] - z[1]), 1e-12);
 }
 
 TEST(SensorCost, LeavesOutWhatIsConstant) {
@@ -188,7 +188,7 @@ TEST(SensorCost, TakesMeasurementsOnManifolds) {
   const SensorModel heading = InProcessSensor(Seen<Angle>(), "seen");
   const CostKind<SensorModel> headings(heading, {{0, 0}}, {1}, {2.0});
   const SensorCost wraps(headings, &angle);
-  EXPECT_NEAR(ResidualAt(wraps, {{-3.0}})[0], 2.0 * (6.0 - 2.0 * M_PI), 1e-12);
+  EXPECT_NEAR(ResidualAt(wraps, {{-3.0}})[0], 2.0 * (2.0 * M_PI - 6.0), 1e-12);
   ExpectTrueJacobians(wraps, {{-3.0}}, {Of(Geometry::Angle())}, 1e-7);
 }
 
@@ -197,9 +197,9 @@ TEST(SensorCost, MayLackAnOptionalRole) {
   const double z = 5.0;
   const CostKind<SensorModel> with(sensor, {{0, 0}, {1, 0}}, {1, 1}, {1.0}),
       without(sensor, {{0, 0}, {}}, {1}, {1.0});
-  EXPECT_EQ(ResidualAt(SensorCost(with, &z), {{1.0}, {0.5}})[0], 3.5);
-  EXPECT_EQ(ResidualAt(SensorCost(without, &z), {{1.0}})[0], 4.0);
-  EXPECT_EQ(At(SensorCost(without, &z), {{1.0}}).j[0][0], -1.0);
+  EXPECT_EQ(ResidualAt(SensorCost(with, &z), {{1.0}, {0.5}})[0], -3.5);
+  EXPECT_EQ(ResidualAt(SensorCost(without, &z), {{1.0}})[0], -4.0);
+  EXPECT_EQ(At(SensorCost(without, &z), {{1.0}}).j[0][0], 1.0);
 }
 
 TEST(SensorCost, RefusesPlacesOutsideItsBlocks) {
@@ -219,7 +219,7 @@ TEST(SensorCost, RefusesRolesThatShareAPlace) {
   const double z = 5.0;
   const Kind apart(sensor, {{0, 2}, {0, 0}}, {4}, {1.0});
   EXPECT_EQ(At(SensorCost(apart, &z), {{0.5, 7.0, 1.0, 7.0}}).j[0],
-            (std::vector<double>{-1.0, 0.0, -1.0, 0.0}));
+            (std::vector<double>{1.0, 0.0, 1.0, 0.0}));
   const SelfCalibratingFeature<RadialLens> model(1.0);
   const std::vector<double> w{1.0, 0.0, 0.0, 1.0};
   using Direct = CostKind<SelfCalibratingFeature<RadialLens>>;

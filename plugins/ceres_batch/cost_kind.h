@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <type_traits>
+#include <vector>
+
+#include "alidade/autodiff.h"
+#include "alidade/error.h"
+#include "alidade/models.h"
+
+namespace alidade::ceres_batch {
+
+/// Where the value of a role stands: `offset` numbers into parameter block `block` of the cost.
+struct RolePlace {
+  int block = -1;  ///< -1: an optional role that is not bound
+  int offset = 0;
+};
+
+/// A column of the Jacobian by a parameter block.
+struct Column {
+  int block, column;
+};
+
+namespace detail {
+
+/// What is asked of a sensor: a model of alidade/model.h, which the compiler sees through.
+template <class Sensor>
+struct SensorTraits {
+  using Z = typename Sensor::Measurement;
+  using Roles = alidade::detail::Blocks<Sensor>;
+  static constexpr int kMaxRoles = Roles::kCount;
+  static constexpr Geometry Measured(const Sensor&) {
+    return {GeometryKind{Z::kGeometry}, Z::kAmbient, Z::kTangent};
+  }
+  static std::vector<Geometry> Geometries(const Sensor&) {
+    std::vector<Geometry> all;
+    const auto add = [&](auto index) {
+      using G = alidade::detail::SpaceAt<decltype(index)::value, Sensor>;
+      all.push_back({GeometryKind{G::kGeometry}, G::kAmbient, G::kTangent});
+    };
+    alidade::detail::ForEach(add, typename Roles::Indices{});
+    return all;
+  }
+  __attribute__((flatten)) ALIDADE_SCALAR_LOOPS static Status Linearise(const Sensor& sensor,
+                                                                        const double* const* roles,
+                                                                        double* z,
+                                                                        double* const* jacobians,
+                                                                        const int* strides) {
+    return Evaluate(sensor, roles, z, jacobians, strides);
+  }
+};
+
+/// And of one behind the boundary of plugins.
+template <>
+struct SensorTraits<SensorModel> {
+  static constexpr int kMaxRoles = 64;  // as many as a model may have
+  static Geometry Measured(const SensorModel& sensor) { return sensor.measurement().geometry; }
+  static std::vector<Geometry> Geometries(const SensorModel& sensor) {
+    std::vector<Geometry> all;
+    for (const Space& role : sensor.roles()) all.push_back(role.geometry);
+    return all;
+  }
+  static Status Linearise(const SensorModel& sensor, const double* const* roles, double* z,
+                          double* const* jacobians, const int* strides) {
+    return sensor.Linearise(roles, z, jacobians, strides);
+  }
+};
+
+}  // namespace detail
+
+/// What costs of a kind share: the sensor, the places of its roles in the parameter blocks, and the
+/// noise, by W = L^-1, R = L L'.
+template <class Sensor>
+struct CostKind {
+  /// `blocks` are the ambient sizes of the parameter blocks. `whiten` = W is lower triangular,
+  /// row-major, of the size of the tangent of z. No two roles may share a place; the sensor must
+  /// outlive this.
+  CostKind(const Sensor& model, const std::vector<RolePlace>& roles, const std::vector<int>& blocks,
+           const std::vector<double>& whiten)
+      : sensor(model), places(roles), sizes(blocks), w(whiten) {
+    const std::vector<Geometry> geometries = detail::SensorTraits<Sensor>::Geometries(model);
+    const auto m = static_cast<std::size_t>(detail::SensorTraits<Sensor>::Measured(model).tangent);
+    ALIDADE_EXPECTS(roles.size() == geometries.size() && w.size() == m * m);
+    std::vector<std::vector<bool>> taken, written;  // elements of each block
+    for (const int size : blocks) taken.emplace_back(static_cast<std::size_t>(size), false);
+    written = taken;
+    for (std::size_t i = 0; i < roles.size(); ++i) {
+      if (roles[i].block < 0) continue;
+      const auto block = static_cast<std::size_t>(roles[i].block);
+      ALIDADE_EXPECTS(block < blocks.size() && roles[i].offset >= 0 &&
+                      roles[i].offset + geometries[i].ambient <= blocks[block]);
+      for (int k = 0; k < geometries[i].ambient; ++k) {
+        const std::size_t at =
+            static_cast<std::size_t>(roles[i].offset) + static_cast<std::size_t>(k);
+        ALIDADE_EXPECTS(!taken[block][at]);
+        taken[block][at] = true;
+        written[block][at] = k < geometries[i].tangent;
+      }
+    }
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      for (int c = 0; c < blocks[i]; ++c) {
+        if (!written[i][static_cast<std::size_t>(c)]) gaps.push_back({static_cast<int>(i), c});
+      }
+    }
+    for (std::size_t i = 0; i < w.size(); ++i)
+      isotropic = isotropic && w[i] == (i % (m + 1) == 0 ? w[0] : 0.0);
+  }
+
+  int role_count() const { return kStatic ? Traits::kMaxRoles : role_count_; }
+  /// The geometry of z.
+  Geometry measured() const { return kStatic ? Traits::Measured(sensor) : measured_; }
+
+  const Sensor& sensor;
+  std::vector<RolePlace> places;
+  std::vector<int> sizes;    ///< of the blocks
+  std::vector<Column> gaps;  ///< that no role writes
+  std::vector<double> w;
+  bool isotropic = true;  ///< W is a multiple of the identity
+
+ private:
+  using Traits = detail::SensorTraits<Sensor>;
+  /// Of a model that the compiler sees through they are constants.
+  static constexpr bool kStatic = !std::is_same_v<Sensor, SensorModel>;
+  int role_count_ = static_cast<int>(places.size());
+  Geometry measured_ = Traits::Measured(sensor);
+};
+
+}  // namespace alidade::ceres_batch

@@ -50,10 +50,11 @@ void Tell(const Comparison& comparison, const Arguments& arguments, const fs::pa
   if (!folder.empty() && !arguments.quiet) PrintNote("wrote " + folder.string());
 }
 
-/// That a comparison is withheld counts for less than that the run failed.
+/// That a comparison is withheld counts for less than what ended a run.
 ExitCode CodeOf(const Comparison& comparison, ExitCode of_run) {
-  const bool whole = of_run == ExitCode::kOk || of_run == ExitCode::kDiverged;
-  if (comparison.withheld.empty() || !whole) return of_run;
+  const bool less = of_run == ExitCode::kOk || of_run == ExitCode::kDiverged ||
+                    of_run == ExitCode::kFound;  // of seeds: some failed, which is told
+  if (comparison.withheld.empty() || !less) return of_run;
   PrintErrors(comparison.withheld);
   return ExitCode::kFound;
 }

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "alidade/run.h"
+#include "alidade/sweep.h"
 
 namespace {
 
@@ -72,9 +73,8 @@ Choice Choose(const std::string& config, const std::string& estimator,
 }
 
 double Median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
+  std::ranges::sort(values);
+  return alidade::Quantile(values, 0.5);
 }
 
 double Mean(const std::vector<double>& values) {

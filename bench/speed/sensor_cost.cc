@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "alidade/in_process.h"
+#include "alidade/sweep.h"
 #include "bench/speed/interleaved.h"
 #include "plugins/ceres_batch/geometry_manifold.h"
 
@@ -238,21 +239,16 @@ class Adjustment {
   int jacobian_evaluations_ = 0;
 };
 
-/// Sorted ratios of two series, round by round.
-struct Ratio {
-  std::vector<double> values;
-  Ratio(const std::vector<double>& a, const std::vector<double>& b) {
-    for (std::size_t i = 0; i < a.size(); ++i) values.push_back(a[i] / b[i]);
-    std::sort(values.begin(), values.end());
-  }
-  double At(double q) const {
-    return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
-  }
-};
+/// Ratios of two series, round by round.
+std::vector<double> Ratios(const std::vector<double>& a, const std::vector<double>& b) {
+  std::vector<double> ratios(a.size());
+  std::ranges::transform(a, b, ratios.begin(), std::divides());
+  return ratios;
+}
 
-double Median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
+double QuantileOf(std::vector<double> values, double q) {
+  std::ranges::sort(values);
+  return Quantile(values, q);
 }
 
 /// The ways to make costs: each adaptor beside what it is compared with.
@@ -327,9 +323,10 @@ int Main(int rounds) {
                      adjustments[0]->jacobian_evaluations());
         return 1;
       }
-      const Ratio ratio(ms[i], ms[ways.all[i].peer]);
-      std::printf("%-28s %12.2f %8.1f %10.3f (%.3f to %.3f)\n", ways.all[i].name, Median(ms[i]),
-                  Median(ns[i]), ratio.At(0.5), ratio.At(0.1), ratio.At(0.9));
+      const std::vector<double> ratios = Ratios(ms[i], ms[ways.all[i].peer]);
+      std::printf("%-28s %12.2f %8.1f %10.3f (%.3f to %.3f)\n", ways.all[i].name,
+                  QuantileOf(ms[i], 0.5), QuantileOf(ns[i], 0.5), QuantileOf(ratios, 0.5),
+                  QuantileOf(ratios, 0.1), QuantileOf(ratios, 0.9));
     }
   }
   return 0;

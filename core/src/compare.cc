@@ -72,19 +72,16 @@ const Candidate* BatchFor(const Candidate& of, const std::vector<Candidate>& can
   const auto fits = [&](const Candidate& one) {
     return sees_the_same(one) && SameSystem(one.facts(), of.facts());
   };
-  const auto of_all = [&](const auto& is_so) {
-    return FirstOf(candidates, [&](const Candidate& one) {
-      return is_so(one) && one.facts().accepted_by.empty();
-    });
-  };
-  const Candidate* own = of_all(fits);
-  if (own == nullptr || !own->entry->usable()) {
-    const Candidate* const any = FirstOf(candidates, fits);
-    if (own == nullptr || any->entry->usable()) own = any;
+  const auto sees_all = [](const Candidate& one) { return one.facts().accepted_by.empty(); };
+  const std::function<bool(const Candidate&)> choices[] = {
+      [&](const Candidate& one) { return fits(one) && sees_all(one); }, fits,
+      [&](const Candidate& one) { return sees_the_same(one) && sees_all(one); }};
+  for (const auto& choice : choices) {
+    const Candidate* const found = FirstOf(candidates, choice);
+    if (found != nullptr && found->entry->usable()) return found;
   }
-  if (own != nullptr && own->entry->usable()) return own;
-  const Candidate* const other = of_all(sees_the_same);
-  return other != nullptr && other->entry->usable() ? other : own;
+  const Candidate* const own = FirstOf(candidates, choices[0]);
+  return own != nullptr ? own : FirstOf(candidates, fits);
 }
 
 bool HasErrors(const Candidate& one) {

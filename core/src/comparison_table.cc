@@ -269,17 +269,18 @@ std::string EstimatorTable(const std::vector<std::string>& names,
   return text;
 }
 
+std::vector<std::string> CellsOf(const ComparisonRow& row) {
+  std::vector<std::string> cells = {row.label};
+  cells.insert(cells.end(), row.cells.begin(), row.cells.end());
+  return cells;
+}
+
 std::string MarkdownTable(const std::string& corner, const std::vector<std::string>& names,
                           const std::vector<ComparisonRow>& rows) {
-  const auto row_of = [](const std::string& label, const std::vector<std::string>& cells) {
-    TextRow row = {label};
-    row.insert(row.end(), cells.begin(), cells.end());
-    return MarkdownRow(row);
-  };
-  std::string text = row_of(corner, names) + "|---|";
+  std::string text = MarkdownRow(CellsOf({corner, names})) + "|---|";
   for (std::size_t c = 0; c < names.size(); ++c) text += "---:|";
   text += '\n';
-  for (const ComparisonRow& row : rows) text += row_of(row.label, row.cells);
+  for (const ComparisonRow& row : rows) text += MarkdownRow(CellsOf(row));
   return text;
 }
 

@@ -36,6 +36,8 @@ std::string ReferenceText(const RunResult& result);
 /// the others in a line of 100 characters go into a table below.
 std::string EstimatorTable(const std::vector<std::string>& names,
                            const std::vector<ComparisonRow>& rows);
+/// The label of a row, then its cells.
+std::vector<std::string> CellsOf(const ComparisonRow& row);
 /// The rows as a table of Markdown, `corner` above their labels.
 std::string MarkdownTable(const std::string& corner, const std::vector<std::string>& names,
                           const std::vector<ComparisonRow>& rows);

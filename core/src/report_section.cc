@@ -6,12 +6,6 @@
 namespace alidade::internal {
 namespace {
 
-TextRow RowOf(const std::string& label, const std::vector<std::string>& cells) {
-  TextRow row = {label};
-  row.insert(row.end(), cells.begin(), cells.end());
-  return row;
-}
-
 std::string PlainText(const Section& section) {
   std::string text = section.title + '\n';
   for (const std::string& line : section.lines) text += "  " + line + '\n';
@@ -32,8 +26,8 @@ std::string Latex(const Section& section) {
   for (const std::string& line : section.lines) text += LatexText(line) + ".\n";
   if (section.rows.empty()) return text;
   text += "\n\\begin{tabular}{l" + std::string(section.columns.size(), 'r') + "}\n\\toprule\n";
-  text += LatexRow(RowOf("", section.columns)) + "\\midrule\n";
-  for (const ComparisonRow& row : section.rows) text += LatexRow(RowOf(row.label, row.cells));
+  text += LatexRow(CellsOf({"", section.columns})) + "\\midrule\n";
+  for (const ComparisonRow& row : section.rows) text += LatexRow(CellsOf(row));
   return text + "\\bottomrule\n\\end{tabular}\n";
 }
 

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+
 #include "alidade/autodiff.h"
 
 namespace alidade::ceres_batch {
 
 /// d = z (-) h and, where j is not null, dd/dh (row-major) in the tangent at h.
 template <class G>
-// NOLINTNEXTLINE(readability-non-const-parameter): written to below
 void Difference(const double* z, const double* h, double* d, double* j) {
   using Jet = ceres::Jet<double, G::kTangent>;
   Jet moved[G::kAmbient], difference[G::kTangent];
@@ -15,8 +16,7 @@ void Difference(const double* z, const double* h, double* d, double* j) {
   G::Minus(z, moved, difference);
   for (int i = 0; i < G::kTangent; ++i) {
     d[i] = difference[i].a;
-    for (int k = 0; j != nullptr && k < G::kTangent; ++k)
-      j[i * G::kTangent + k] = difference[i].v[k];
+    if (j != nullptr) std::copy_n(difference[i].v.data(), G::kTangent, j + i * G::kTangent);
   }
 }
 

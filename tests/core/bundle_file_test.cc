@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "support/bundles.h"
+#include "support/temporary_folder.h"
 
 namespace alidade {
 namespace {
@@ -17,12 +18,6 @@ using testing::TrueBundle;
 
 class BundleFiles : public ::testing::Test {
  protected:
-  BundleFiles() {
-    std::string name = (std::filesystem::temp_directory_path() / "alidade-bundle-XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
-  }
-  ~BundleFiles() override { std::filesystem::remove_all(folder_); }
-
   BundleFile ReadText(const std::string& text) const {
     std::ofstream(folder_ / "p", std::ios::binary) << text;
     return ReadBundle(folder_ / "p");
@@ -60,7 +55,7 @@ class BundleFiles : public ::testing::Test {
     EXPECT_EQ(a.colours, b.colours);
     EXPECT_EQ(a.keys, b.keys);
   }
-  std::filesystem::path folder_;
+  testing::TemporaryFolder folder_;
 };
 
 /// A camera turned by 90 degrees about its z axis, (x, y) -> (-y, x), and moved; f = 100 px,

@@ -4,11 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <limits>
 
 #include "core/src/compare.h"
+#include "support/temporary_folder.h"
 
 namespace alidade {
 namespace {
@@ -174,21 +174,16 @@ TEST(CompareRuns, TheLastFrameIsThatOfTheBatchOfWhatTheFilterAccepted) {
   EXPECT_FALSE(step.at_end);
 }
 
-/// A folder that has measurements.csv alone.
-std::filesystem::path FolderWith(const std::string& name, const std::string& measurements) {
-  const auto folder = std::filesystem::path(::testing::TempDir()) / ("alidade-compared-" + name);
-  std::filesystem::create_directories(folder);
-  std::ofstream(folder / "measurements.csv") << measurements;
-  return folder;
-}
-
-/// What is said of two runs whose measurements differ.
+/// What is said of two runs whose measurements.csv differ.
 std::string Refusal(const std::string& one, const std::string& other) {
+  const testing::TemporaryFolder folders[2];
+  std::ofstream(folders[0] / "measurements.csv") << one;
+  std::ofstream(folders[1] / "measurements.csv") << other;
   std::vector<ComparedRun> runs(2);
-  runs[0].folder = FolderWith("a", one);
-  runs[0].measurements_sha256 = "0";
-  runs[1].folder = FolderWith("b", other);
-  runs[1].measurements_sha256 = "1";
+  for (const std::size_t r : {0, 1}) {
+    runs[r].folder = folders[r].path();
+    runs[r].measurements_sha256 = std::to_string(r);
+  }
   try {
     internal::CheckSameData(runs);
   } catch (const Error& error) {

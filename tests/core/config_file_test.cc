@@ -9,6 +9,7 @@
 
 #include "alidade/config.h"
 #include "core/src/config_tree.h"
+#include "support/temporary_folder.h"
 
 namespace alidade {
 namespace {
@@ -47,15 +48,8 @@ std::string Repeated(std::string_view part, std::size_t size) {
   return text;
 }
 
-class ConfigFolder : public testing::Test {
+class ConfigFolder : public ::testing::Test {
  protected:
-  void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "alidade_config_XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    folder_ = name;
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   fs::path Write(const std::string& name, const std::string& text) const {
     const fs::path file = folder_ / name;
     fs::create_directories(file.parent_path());
@@ -66,14 +60,14 @@ class ConfigFolder : public testing::Test {
   /// The failure of reading `name`, with the folder shown as `D/`.
   std::string Fault(const std::string& name) const {
     std::string message = Failure([&] { Config::FromFile(folder_ / name); });
-    const std::string folder = folder_.string();
+    const std::string folder = folder_.path().string();
     for (std::size_t at; (at = message.find(folder)) != std::string::npos;) {
       message.replace(at, folder.size(), "D");
     }
     return message;
   }
 
-  fs::path folder_;
+  testing::TemporaryFolder folder_;
 };
 
 TEST(ConfigFile, RefusesWhatIsNotStrict) {
@@ -208,7 +202,7 @@ TEST_F(ConfigFolder, MissingFileAndFolderAreInputMissing) {
 
 TEST_F(ConfigFolder, UnreadableFileIsInputMissing) {
   const fs::path file = Write("f.yaml", "a: 1");
-  fs::permissions(folder_, fs::perms(0755));
+  fs::permissions(folder_.path(), fs::perms(0755));
   fs::permissions(file, fs::perms::none);
   const pid_t child = fork();
   ASSERT_GE(child, 0);
@@ -233,7 +227,7 @@ TEST_F(ConfigFolder, IncludeLiesBelowTheFile) {
   EXPECT_EQ(config.ToYaml(), "c: 3\nd: 5\nb:\n  x: 7\n  y: 6\na: [1]\n");
   const Node inherited = config.root().At("d");
   EXPECT_EQ(ToString(inherited.place()), (folder_ / "parts/deeper.yaml:2:4").string());
-  EXPECT_EQ(config.folder(), folder_);
+  EXPECT_EQ(config.folder(), folder_.path());
 }
 
 TEST_F(ConfigFolder, RelativePathsAreTakenFromTheFileThatHasThem) {
@@ -296,14 +290,15 @@ TEST_F(ConfigFolder, ResolveInsideKeepsWhatStaysInside) {
   Write("sub/f", "");
   fs::create_symlink("sub", folder_ / "link");
   const auto resolve = [&](const std::string& path) {
-    return ResolveInside(folder_, path, false, Place{"f"}, "source.path");
+    return ResolveInside(folder_.path(), path, false, Place{"f"}, "source.path");
   };
   EXPECT_EQ(resolve("link/f"), folder_ / "link/f");
   EXPECT_EQ(resolve("sub/../sub/f"), folder_ / "sub/../sub/f");
   EXPECT_EQ(resolve("new/file"), folder_ / "new/file");
   EXPECT_EQ(resolve((folder_ / "sub/f").string()), folder_ / "sub/f");
-  EXPECT_EQ(Failure([&] { resolve("../" + folder_.filename().string() + "2/f"); }).substr(0, 20),
-            "77 f source.path: '.");
+  EXPECT_EQ(
+      Failure([&] { resolve("../" + folder_.path().filename().string() + "2/f"); }).substr(0, 20),
+      "77 f source.path: '.");
 }
 
 }  // namespace

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <stdlib.h>
 
 #include <filesystem>
 #include <fstream>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "plugins/csv/csv.h"
+#include "support/temporary_folder.h"
 
 namespace alidade::testing {
 
@@ -25,12 +25,6 @@ inline constexpr const char* kHeader = "t_s,disparity_px,scale,reference_depth_m
 /// A folder of its own for each test, with `a.csv` in it.
 class Csv : public ::testing::Test {
  protected:
-  Csv() {
-    std::string name = (fs::temp_directory_path() / "alidade_csv_XXXXXX").string();
-    folder_ = mkdtemp(name.data());
-  }
-  ~Csv() override { fs::remove_all(folder_); }
-
   fs::path File() const { return folder_ / "a.csv"; }
   void Write(const std::string& text) const { std::ofstream(File(), std::ios::binary) << text; }
 
@@ -43,7 +37,7 @@ class Csv : public ::testing::Test {
     static const AlidadeHost kHost{};
     Params params(&kHost);
     auto source = std::make_unique<CsvSource>(
-        SourceArguments{config_->root(), params, 1, folder_, any_order_});
+        SourceArguments{config_->root(), params, 1, folder_.path(), any_order_});
     config_->root().RejectUnread();
     return source;
   }
@@ -80,7 +74,7 @@ class Csv : public ::testing::Test {
     ExpectError(ExitCode::kBadConfig, message, [&] { Frames(config); });
   }
 
-  fs::path folder_;
+  TemporaryFolder folder_;
   bool any_order_ = false;  ///< as the run says with `time.order`
   std::unique_ptr<Config> config_;
 };

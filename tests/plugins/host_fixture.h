@@ -10,22 +10,18 @@
 #include <vector>
 
 #include "alidade/plugin_host.h"
+#include "support/temporary_folder.h"
 
 namespace alidade {
 
 /// A folder of its own for each test, and no plugins of the user's.
-class HostTest : public testing::Test {
+class HostTest : public ::testing::Test {
  protected:
   HostTest() {
-    std::string name = (std::filesystem::temp_directory_path() / "alidade_XXXXXX").string();
-    folder_ = mkdtemp(name.data());
     setenv("XDG_DATA_HOME", (folder_ / "no_user_data").c_str(), 1);
     unsetenv("ALIDADE_PLUGIN_PATH");
   }
-  ~HostTest() override {
-    unsetenv("ALIDADE_PLUGIN_PATH");
-    std::filesystem::remove_all(folder_);
-  }
+  ~HostTest() override { unsetenv("ALIDADE_PLUGIN_PATH"); }
 
   /// A plugin that the build made.
   static std::filesystem::path Built(const std::string& name) {
@@ -65,7 +61,7 @@ class HostTest : public testing::Test {
     return *found;
   }
 
-  std::filesystem::path folder_;
+  testing::TemporaryFolder folder_;
 };
 
 }  // namespace alidade

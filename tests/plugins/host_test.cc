@@ -207,7 +207,7 @@ TEST_F(HostTest, APluginThatChangesTheProgramWhileLoadingIsRefused) {
 
 TEST_F(HostTest, TwoPluginsWithOneNameAreAnErrorOnceItIsAskedFor) {
   const fs::path a = Copy("good", "a.so"), b = Copy("good", "b.so");
-  const PluginHost host({folder_});
+  const PluginHost host({folder_.path()});
   const Config config = Parse("model: probe");
   ExpectError(ExitCode::kPlugin, {"two plugins offer the sensor 'probe'", a.string(), b.string()},
               [&] { host.CreateSensor("probe", config.root()); });
@@ -217,7 +217,7 @@ TEST_F(HostTest, OneFileUnderManyNamesIsLoadedOnce) {
   const fs::path file = Copy("good", "good.so");
   fs::create_symlink(file, folder_ / "link.so");
   fs::create_hard_link(file, folder_ / "hard.so");
-  const PluginHost host({file, folder_ / "link.so", folder_ / "." / "good.so", folder_});
+  const PluginHost host({file, folder_ / "link.so", folder_ / "." / "good.so", folder_.path()});
   const auto has_name = [](const PluginEntry& entry) { return entry.name == "probe"; };
   EXPECT_EQ(std::count_if(host.entries().begin(), host.entries().end(), has_name), 1);
 }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <stdlib.h>
 
 #include <filesystem>
 #include <fstream>
@@ -13,6 +12,7 @@
 
 #include "core/src/param_reader.h"
 #include "plugins/tracks/tracks.h"
+#include "support/temporary_folder.h"
 
 namespace alidade::testing {
 
@@ -21,12 +21,6 @@ namespace fs = std::filesystem;
 /// A folder of its own for each test, with tracks.csv and what is beside it.
 class TracksTest : public ::testing::Test {
  protected:
-  TracksTest() {
-    std::string name = (fs::temp_directory_path() / "alidade_tracks_XXXXXX").string();
-    folder_ = mkdtemp(name.data());
-  }
-  ~TracksTest() override { fs::remove_all(folder_); }
-
   void Write(const std::string& name, const std::string& text) const {
     std::ofstream(folder_ / name, std::ios::binary) << text;
   }
@@ -40,7 +34,7 @@ class TracksTest : public ::testing::Test {
     const Node entry = config_->root().At("source");
     internal::ParamReader reader(entry, "source 'tracks'");
     Params params(&reader.host());
-    auto source = std::make_unique<Tracks>(SourceArguments{entry, params, 1, folder_});
+    auto source = std::make_unique<Tracks>(SourceArguments{entry, params, 1, folder_.path()});
     reader.Check();
     entry.RejectUnread();
     return source;
@@ -60,7 +54,7 @@ class TracksTest : public ::testing::Test {
   /// That the work fails with `code` and exactly `message`, where each DIR/ stands for the folder.
   void ExpectError(ExitCode code, std::string message, const std::function<void()>& work) const {
     for (auto at = message.find("DIR/"); at != std::string::npos; at = message.find("DIR/")) {
-      message.replace(at, 3, folder_.string());
+      message.replace(at, 3, folder_.path().string());
     }
     try {
       work();
@@ -76,7 +70,7 @@ class TracksTest : public ::testing::Test {
     ExpectError(ExitCode::kBadData, message, [&] { Frames(keys); });
   }
 
-  fs::path folder_;
+  TemporaryFolder folder_;
   std::unique_ptr<Config> config_;
 };
 

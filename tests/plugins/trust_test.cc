@@ -105,7 +105,7 @@ TEST_F(TrustTest, ARelativePlaceOfTheEnvironmentIsNotSearched) {
   setenv("ALIDADE_PLUGIN_PATH", ".", 1);
   const fs::path before = fs::current_path();
   std::ofstream(folder_ / "no_plugin.so") << "refused for its place before it is looked at";
-  fs::current_path(folder_);
+  fs::current_path(folder_.path());
   const PluginHost host;
   fs::current_path(before);
   ASSERT_EQ(host.refusals().size(), 1u);

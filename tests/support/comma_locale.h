@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <unistd.h>
-
 #include <clocale>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <locale>
 #include <string>
+
+#include "support/temporary_folder.h"
 
 namespace alidade::testing {
 
@@ -17,15 +16,13 @@ namespace alidade::testing {
 class CommaLocale {
  public:
   CommaLocale() : before_(std::setlocale(LC_ALL, nullptr)) {
-    std::string name = (std::filesystem::temp_directory_path() / "alidade-locale-XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
     std::ofstream(folder_ / "comma.src") << "comment_char %\nescape_char /\nLC_NUMERIC\n"
                                             "decimal_point \",\"\nthousands_sep \".\"\n"
                                             "grouping 3;3\nEND LC_NUMERIC\n";
-    const std::string make = "cd '" + folder_.string() +
+    const std::string make = "cd '" + folder_.path().string() +
                              "' && localedef --quiet --force --no-archive -i comma.src ./comma";
     static_cast<void>(std::system((make + " >made 2>&1").c_str()));
-    ::setenv("LOCPATH", folder_.c_str(), 1);
+    ::setenv("LOCPATH", folder_.path().c_str(), 1);
     active_ = std::setlocale(LC_NUMERIC, "comma") != nullptr;
     ::unsetenv("LOCPATH");
     if (active_) std::locale::global(std::locale(std::locale::classic(), new Comma));
@@ -33,8 +30,6 @@ class CommaLocale {
   ~CommaLocale() {
     std::locale::global(std::locale::classic());
     std::setlocale(LC_ALL, before_.c_str());
-    std::error_code ignored;
-    std::filesystem::remove_all(folder_, ignored);
   }
   CommaLocale(const CommaLocale&) = delete;
   CommaLocale& operator=(const CommaLocale&) = delete;
@@ -50,7 +45,7 @@ class CommaLocale {
   };
 
   std::string before_;
-  std::filesystem::path folder_;
+  TemporaryFolder folder_;
   bool active_ = false;
 };
 

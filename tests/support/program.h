@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "alidade/config.h"
+#include "support/temporary_folder.h"
 
 namespace alidade::testing {
 
@@ -83,18 +84,11 @@ estimators: {ekf: {type: ekf}}
 class ProgramTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "alidade-cli-XXXXXX").string();
-    ASSERT_NE(::mkdtemp(name.data()), nullptr);
-    folder_ = fs::path(name) / "config";
     fs::create_directory(folder_);
     Write("config.yaml", kDepthConfig);
     Write("table.yaml", kTableConfig);
     ::unsetenv("ALIDADE_PLUGIN_PATH");
     ::setenv("XDG_DATA_HOME", (folder_ / "data").c_str(), 1);
-  }
-  void TearDown() override {
-    std::error_code ignored;
-    fs::remove_all(folder_.parent_path(), ignored);
   }
 
   void Write(const std::string& name, const std::string& text) const {
@@ -165,7 +159,8 @@ class ProgramTest : public ::testing::Test {
     return false;
   }
 
-  fs::path folder_;
+  const TemporaryFolder temporary_;
+  const fs::path folder_ = temporary_ / "config";
   std::string before_;
 };
 

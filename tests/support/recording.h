@@ -12,29 +12,12 @@
 
 #include "alidade/recorder.h"
 #include "support/systems.h"
+#include "support/temporary_folder.h"
 
 /// A small run to record, and what looks at the folder it leaves; for tests.
 namespace alidade::testing {
 
 namespace fs = std::filesystem;
-
-/// A folder that is gone with its owner.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = (fs::temp_directory_path() / "alidade-XXXXXX").string();
-    path_ = ::mkdtemp(name.data());
-  }
-  ~TemporaryFolder() { fs::remove_all(path_); }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  fs::path operator/(const fs::path& name) const { return path_ / name; }
-  const fs::path& path() const { return path_; }
-  bool empty() const { return fs::is_empty(path_); }
-
- private:
-  fs::path path_;
-};
 
 inline std::string Read(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);

@@ -47,9 +47,12 @@ Tracks ReadTracks(const std::filesystem::path& path, int& dims) {
     for (const auto& [feature, seen] : features) {
       for (int d = 0; d < dims; ++d) {
         if (seen.lines[static_cast<std::size_t>(d)] != 0) continue;
-        rows.FailLine("frame " + std::to_string(frame) + " has no dim " + std::to_string(d) +
-                          " of feature " + std::to_string(feature),
-                      "all of 0 to " + std::to_string(dims - 1));
+        const Place place{rows.name(), *std::ranges::max_element(seen.lines)};
+        throw Error(ExitCode::kBadData,
+                    ErrorLine(place, {},
+                              "frame " + std::to_string(frame) + " has no dim " +
+                                  std::to_string(d) + " of feature " + std::to_string(feature),
+                              "all of 0 to " + std::to_string(dims - 1)));
       }
     }
   }

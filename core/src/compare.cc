@@ -126,7 +126,11 @@ References ReferencesOf(const Candidate& one, const std::vector<Candidate>& cand
 }
 
 /// Why a comparison with what is held against is withheld, or "".
-std::string WhyWithheld(const std::vector<References>& references, bool truth) {
+std::string WhyWithheld(const std::vector<Candidate>& candidates,
+                        const std::vector<References>& references, bool truth) {
+  const bool measured = std::ranges::any_of(
+      candidates, [](const Candidate& one) { return one.entry->measurements() > 0; });
+  if (!measured) return "no estimator was given a measurement: what is compared is their start";
   bool any = truth;
   for (const References& of_one : references) {
     for (const Candidate* const reference : {of_one.final, of_one.along}) {
@@ -333,9 +337,10 @@ Comparison internal::CompareRuns(const std::vector<ComparedRun>& runs,
   }
   Comparison comparison;
   comparison.frames = runs.front().frames;
+  for (const ComparedRun& run : runs) comparison.status = std::max(comparison.status, run.status);
   comparison.measurements_sha256 = runs.front().measurements_sha256;
   comparison.notes = NotesOf(candidates, references, truth);
-  comparison.withheld = WhyWithheld(references, truth);
+  comparison.withheld = WhyWithheld(candidates, references, truth);
   comparison.reference = truth ? "truth" : "";
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     comparison.estimators.push_back(Compare(candidates[i], references[i], truth));
@@ -346,6 +351,12 @@ Comparison internal::CompareRuns(const std::vector<ComparedRun>& runs,
   if (filter != nullptr) {
     comparison.explained = filter->name;
     comparison.gap = ExplainGap(*filter, candidates, truth);
+    const std::int64_t lockouts = filter->entry->lockouts;
+    if (lockouts > 0) {
+      comparison.notes.push_back("'" + filter->name + "' recovered from a lock-out " +
+                                 (lockouts == 1 ? "once" : std::to_string(lockouts) + " times") +
+                                 ": what that cost is in its step to a batch or smoother");
+    }
   }
   return comparison;
 }

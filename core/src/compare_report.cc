@@ -340,6 +340,7 @@ std::string CompareJson(const Comparison& comparison) {
   internal::Json json;
   json.Object();
   json.Key("runs").Integer(comparison.runs).Key("frames").Integer(comparison.frames);
+  json.Key("status").Text(ToString(comparison.status));
   json.Key("reference").Text(comparison.reference);
   if (!comparison.withheld.empty()) json.Key("withheld").Text(comparison.withheld);
   if (!comparison.measurements_sha256.empty()) {

@@ -204,9 +204,9 @@ TEST_F(BundleTracksCli, SaysWhatIsWrong) {
   EXPECT_EQ(twice.code, 65);
   EXPECT_TRUE(Contains(twice.err, "twice.csv:4: the same frame, feature and dim as line 2"))
       << twice.err;
-  Write("half.csv", "0,1,0,10\n");
-  EXPECT_TRUE(
-      Contains(Bundle("half.csv", "data/truth.tum").err, "frame 0 has no dim 1 of feature 1"));
+  Write("half.csv", "0,1,0,10\n0,2,0,10\n0,2,1,20\n");
+  const Outcome half = Bundle("half.csv", "data/truth.tum");
+  EXPECT_TRUE(Contains(half.err, "half.csv:1: frame 0 has no dim 1 of feature 1")) << half.err;
   Write("late.tum", "1e300 0 0 0 0 0 0 1\n");
   const Outcome late = Bundle("data/tracks.csv", "late.tum");
   EXPECT_EQ(late.code, 65);

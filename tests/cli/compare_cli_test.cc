@@ -226,10 +226,36 @@ TEST_F(CompareCli, WithoutTruthTheBatchIsTheReference) {
   EXPECT_EQ(estimators.At("ekf").At("reference").Text(), "batch_so_far");
   EXPECT_EQ(estimators.At("rts").At("reference").Text(), "batch");
   EXPECT_GT(estimators.At("ekf").At("values").At("apart.sigmas:target").Number(), 0.0);
+  EXPECT_TRUE(Contains(Call({"compare", "config.yaml", "--reference", "turth"}).err,
+                       "did you mean 'truth'"));
   const Outcome truth = Call({"compare", "table.yaml", "-o", "two", "--reference", "truth"});
   EXPECT_EQ(truth.code, 2);
   EXPECT_TRUE(Contains(truth.err, "--reference: the source knows no truth")) << truth.err;
   EXPECT_FALSE(Exists("two"));
+}
+
+// Of a run that its data ended, what was there until then is compared.
+TEST_F(CompareCli, ExitsWithTheCodeOfARunThatFailed) {
+  WriteTable("table.csv", "no_number");
+  const Outcome compared = Call({"compare", "table.yaml", "-o", "out"});
+  EXPECT_EQ(compared.code, 65);
+  EXPECT_TRUE(Contains(compared.err, "table.csv:6:10 d: 'no_number' is not a number"))
+      << compared.err;
+  EXPECT_EQ(Json("out/compare.json").root().At("status").Text(), "failed");
+  EXPECT_EQ(Call({"compare", "out"}).code, 1) << "no batch came to its end";
+}
+
+// A run tells it of itself, and its folder of it.
+TEST_F(CompareCli, TellsOfLockOuts) {
+  WriteTable("table.csv");
+  std::string text = Read("table.csv");
+  for (int k = 21; k <= 50; ++k) text += std::to_string(0.1 * k) + ",26\n";
+  Write("table.csv", text);
+  const std::string words = "'ekf' recovered from a lock-out once";
+  const Outcome compared = Call({"compare", "table.yaml", "-o", "out", "--set",
+                                 "estimators.ekf={type: ekf, gate: 0.99, lockout: {after: 2}}"});
+  EXPECT_TRUE(Contains(compared.out, words)) << compared.out << compared.err;
+  EXPECT_TRUE(Contains(Call({"compare", "out"}).out, words)) << Read("out/ekf/events.csv");
 }
 
 TEST_F(CompareCli, OverSeedsValuesHaveASpread) {

@@ -29,6 +29,7 @@ ComparedEntry Entry(const std::string& name, const std::string& type, bool smoot
   entry.series.values = {error, error, error};
   entry.series.covariances = {1.0, 1.0, 1.0};
   entry.result.name = name;
+  entry.result.counts["accepted:" + sensors.front()] = 3;
   entry.result.metrics = {{"rmse:p.x", error}, {"final:p.x", error}};
   return entry;
 }
@@ -96,6 +97,34 @@ TEST(CompareRuns, ABatchThatFailedGivesWayToOneThatDidNot) {
   const Comparison alone = CompareRuns({RunOf({failed, ekf})}, {});
   EXPECT_EQ(alone.withheld,
             "no reference: estimator 'failed' failed, the comparison with it is withheld");
+}
+
+// The filter and the batch then agree, about what both were told before.
+TEST(CompareRuns, WithoutAMeasurementThereIsNothingToCompare) {
+  ComparedRun run =
+      RunOf({Entry("ekf", "ekf", false, 2.0), Entry("batch", "ceres_batch", true, 1.0)});
+  run.estimators[0].result.counts.clear();
+  EXPECT_EQ(CompareRuns({run}, {}).withheld, "");
+  run.estimators[1].result.counts = {{"landmarks.deleted", 2}};
+  EXPECT_EQ(CompareRuns({run}, {}).withheld,
+            "no estimator was given a measurement: what is compared is their start");
+}
+
+TEST(CompareRuns, TellsOfLockOutsOfTheFilter) {
+  ComparedRun run =
+      RunOf({Entry("ekf", "ekf", false, 2.0), Entry("batch", "ceres_batch", true, 1.0)});
+  EXPECT_TRUE(CompareRuns({run}, {}).notes.empty());
+  run.estimators[0].lockouts = 2;
+  EXPECT_EQ(CompareRuns({run}, {}).notes,
+            std::vector<std::string>{"'ekf' recovered from a lock-out 2 times: what that cost is "
+                                     "in its step to a batch or smoother"});
+}
+
+TEST(CompareRuns, HasTheWorstStatusOfTheRuns) {
+  std::vector<ComparedRun> runs(3, RunOf({Entry("ekf", "ekf", false, 2.0)}));
+  EXPECT_NE(CompareJson(CompareRuns(runs, {})).find("\"status\": \"ok\""), std::string::npos);
+  runs[1].status = RunStatus::kStopped;
+  EXPECT_NE(CompareJson(CompareRuns(runs, {})).find("\"status\": \"stopped\""), std::string::npos);
 }
 
 TEST(CompareRuns, GivesNoRatioToAnErrorWithoutBound) {

@@ -73,9 +73,10 @@ struct GapStep {
 struct Comparison {
   std::int64_t runs = 1;  ///< seeds; values are spread over them
   std::int64_t frames = 0;
-  std::string reference;            ///< `truth`, or the first estimator that one is held against
-  std::string withheld;             ///< why there is no comparison with a reference, or ""
-  std::string measurements_sha256;  ///< of the data; "": of several seeds
+  RunStatus status = RunStatus::kOk;  ///< the worst of the runs'; of seeds kOk or kStopped
+  std::string reference;              ///< `truth`, or the first estimator that one is held against
+  std::string withheld;               ///< why there is no comparison with a reference, or ""
+  std::string measurements_sha256;    ///< of the data; "": of several seeds
   std::vector<ComparedEstimator> estimators;
   std::string explained;  ///< the filter whose gap it is
   std::vector<GapStep> gap;

@@ -203,7 +203,7 @@ void Ekf::Landmarks::Count() {
     Landmark& landmark = at->second;
     if (is_new) landmark.generation = generations_.Of(at->first);
     if (landmark.first == kNoStamp) landmark.first = ekf_.stamp_;
-    if (landmark.sights == 0 || landmark.seen != map_.frame) ++landmark.sights;
+    if (landmark.observations == 0 || landmark.seen != map_.frame) ++landmark.observations;
     landmark.seen = map_.frame;
     landmark.last = ekf_.stamp_;
     if (row.plan == nullptr) continue;
@@ -320,7 +320,7 @@ void Ekf::Landmarks::Enter() {
     }
     const auto found = map_.landmarks.find(row.measurement->landmark);
     if (found == map_.landmarks.end() || found->second.in_state() ||
-        found->second.sights < options_.enter_after) {
+        found->second.observations < options_.enter_after) {
       continue;
     }
     if (!asked_map) prior_.inverse_distance = PriorInverseDistance(used);

@@ -17,7 +17,7 @@ struct LandmarkMap {
   struct Landmark {
     std::optional<LandmarkForm> form;
     std::vector<BlockId> blocks;  ///< by landmark role; empty: seen, but not in the state yet
-    int generation = 0, sights = 0, tried = 0, accepted = 0;
+    int generation = 0, observations = 0, tried = 0, accepted = 0;
     std::int64_t seen = 0;  ///< the last frame that measured it
     Stamp first = kNoStamp, last = kNoStamp;
     bool negative = false;  ///< its inverse distance is

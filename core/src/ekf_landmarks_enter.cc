@@ -9,17 +9,17 @@
 
 namespace alidade {
 
-/// Gives the landmark its blocks, correlated with those that the sight took. Of a shared role the
-/// first landmark of the frame makes the block, and the others of the same sensor take it.
+/// Gives the landmark its blocks, correlated with those that the observation took. Of a shared role
+/// the first landmark of the frame makes the block, and the others of the same sensor take it.
 Outcome Ekf::Landmarks::Initialise(std::int64_t id, Row& row, Landmark& landmark) {
   Family& family = families_[static_cast<std::size_t>(row.sensor)];
-  Inverse sight;
-  const Outcome outcome = ekf_.Invert(row, options_.prior ? &prior_ : nullptr, sight);
+  Inverse inverse;
+  const Outcome outcome = ekf_.Invert(row, options_.prior ? &prior_ : nullptr, inverse);
   if (outcome != Outcome::kAccepted) return outcome;
   std::vector<BlockId> fresh;
   std::vector<double> values;
   std::vector<int> kept;  // rows of y
-  const double* y = sight.y.data();
+  const double* y = inverse.y.data();
   int at = 0;
   for (std::size_t i = 0; i < family.roles.size(); ++i) {
     const Space& role = family.roles[i];
@@ -38,8 +38,8 @@ Outcome Ekf::Landmarks::Initialise(std::int64_t id, Row& row, Landmark& landmark
     at += role.geometry.tangent;
   }
   std::vector<Eigen::MatrixXd> jacobians;
-  for (const Eigen::MatrixXd& j : sight.jacobians) jacobians.emplace_back(j(kept, Eigen::all));
-  ekf_.state_.Initialise(fresh, values.data(), sight.from, jacobians, sight.own(kept, kept));
+  for (const Eigen::MatrixXd& j : inverse.jacobians) jacobians.emplace_back(j(kept, Eigen::all));
+  ekf_.state_.Initialise(fresh, values.data(), inverse.from, jacobians, inverse.own(kept, kept));
   landmark.form = family.form;
   moved_ = true;
   return Outcome::kInitialised;

@@ -24,8 +24,9 @@ std::vector<TextRow> LandmarkRows(const System& system) {
     }
     add("prior", prior);
   }
-  std::string enter = options.enter_after == 1 ? "at first sight"
-                                               : "at sight " + std::to_string(options.enter_after);
+  std::string enter = options.enter_after == 1
+                          ? "at first observation"
+                          : "at observation " + std::to_string(options.enter_after);
   enter += ", while fewer than " + std::to_string(options.keep) + " are measured";
   add("enter", enter);
   std::vector<std::string> leave;

@@ -69,8 +69,8 @@ LandmarkOptions LandmarkOptions::FromNode(const Node& node) {
   node.Declare("form");
   if (const auto prior = node.Find("prior")) options.prior = ReadPrior(*prior);
   if (const auto keep = node.Find("keep")) options.keep = static_cast<int>(keep->Integer(1, kMost));
-  if (const auto sights = node.Find("enter_after")) {
-    options.enter_after = static_cast<int>(sights->Integer(1, kMost));
+  if (const auto observations = node.Find("enter_after")) {
+    options.enter_after = static_cast<int>(observations->Integer(1, kMost));
   }
   if (const auto forget = node.Find("forget")) ReadForget(*forget, options);
   if (const auto to_xyz = node.Find("to_xyz")) {

@@ -38,7 +38,7 @@ inline constexpr const char* kSceneKeys =
 ///
 ///   stream     size     values            when
 ///   tracks     2, 4, 3  as `measures`     the point is seen; the landmark is its id
-///   known      3        u, v, depth       in place of the first sight of each of the first
+///   known      3        u, v, depth       in place of the first observation of each of the first
 ///                                         known.count points to be seen; with its covariance,
 ///                                         unless noise_px is 0
 ///   odometry   6        vx vy vz wx wy wz every frame but the last, for the way to the next
@@ -91,7 +91,7 @@ class Scene : public Source {
     };
     frame.truth = {list(state.position), list(state.orientation), list(state.velocity),
                    list(state.angular_velocity)};
-    for (const Sight& sight : Look(state)) EmitSight(sight, frame);
+    for (const Observation& observation : Look(state)) EmitObservation(observation, frame);
     if (odometry_stream_ >= 0 && index_ + 1 < count_) EmitOdometry(frame);
     ++index_;
     return true;
@@ -100,7 +100,7 @@ class Scene : public Source {
  private:
   enum Measures { kPixel, kStereo, kDepth };
   /// A point that is seen, with its noise of unit variance.
-  struct Sight {
+  struct Observation {
     std::size_t point;
     double pixel[2];  ///< exact
     double depth;     ///< hz, m
@@ -125,7 +125,8 @@ class Scene : public Source {
       depth_sigma_m_ = p.NonNegative("depth_sigma_m", "m", "noise of the depth, 1 sigma");
     }
     if (measures_ == kPixel) {
-      known_left_ = p.Integer("known.count", "points whose first sight tells depth", 0, 1 << 20, 0);
+      known_left_ =
+          p.Integer("known.count", "points whose first observation tells depth", 0, 1 << 20, 0);
       known_sigma_ = p.Number("known.relative_sigma", "", "noise of that depth, share of it",
                               {0.0, 1.0, true, false}, 0.005);
     }
@@ -151,55 +152,59 @@ class Scene : public Source {
   }
 
   /// What is seen from there, by id.
-  std::vector<Sight> Look(const scene::CameraState& state) {
-    std::vector<Sight> sights;
+  std::vector<Observation> Look(const scene::CameraState& state) {
+    std::vector<Observation> observations;
     for (std::size_t i = 0; i < points_.size(); ++i) {
-      Sight sight{i, {}, 0.0, {}};
-      for (double& noise : sight.noise) noise = pixel_noise_.Normal();
+      Observation observation{i, {}, 0.0, {}};
+      for (double& noise : observation.noise) noise = pixel_noise_.Normal();
       const auto at = scene::ToArray(points_[i]);
       double offset[3], h[3];
       Vec<3>::Minus(at.data(), state.position.data(), offset);
       UnitQuaternion::RotateBack(state.orientation.data(), offset, h);
-      sight.depth = h[2];
-      if (!(h[2] > 0.0) || !camera_.Project(h, sight.pixel)) continue;
-      const double noisy[2] = {sight.pixel[0] + noise_px_ * sight.noise[0],
-                               sight.pixel[1] + noise_px_ * sight.noise[1]};
-      if (camera_.Contains(sight.pixel) && camera_.Contains(noisy)) sights.push_back(sight);
+      observation.depth = h[2];
+      if (!(h[2] > 0.0) || !camera_.Project(h, observation.pixel)) continue;
+      const double noisy[2] = {observation.pixel[0] + noise_px_ * observation.noise[0],
+                               observation.pixel[1] + noise_px_ * observation.noise[1]};
+      if (camera_.Contains(observation.pixel) && camera_.Contains(noisy))
+        observations.push_back(observation);
     }
-    if (sights.size() > most_) {
-      const auto before = [&](const Sight& sight) { return bool(seen_before_[sight.point]); };
-      std::stable_partition(sights.begin(), sights.end(), before);
-      sights.resize(most_);
-      std::ranges::sort(sights, {}, &Sight::point);
+    if (observations.size() > most_) {
+      const auto before = [&](const Observation& observation) {
+        return bool(seen_before_[observation.point]);
+      };
+      std::stable_partition(observations.begin(), observations.end(), before);
+      observations.resize(most_);
+      std::ranges::sort(observations, {}, &Observation::point);
     }
     seen_before_.assign(points_.size(), false);
-    for (const Sight& sight : sights) seen_before_[sight.point] = true;
-    return sights;
+    for (const Observation& observation : observations) seen_before_[observation.point] = true;
+    return observations;
   }
 
-  void EmitSight(const Sight& sight, Frame& frame) {
+  void EmitObservation(const Observation& observation, Frame& frame) {
     Measurement measurement;
     measurement.stamp = frame.stamp;
-    measurement.landmark = static_cast<std::int64_t>(sight.point);
-    const double u = sight.pixel[0] + noise_px_ * sight.noise[0];
-    const double v = sight.pixel[1] + noise_px_ * sight.noise[1];
+    measurement.landmark = static_cast<std::int64_t>(observation.point);
+    const double u = observation.pixel[0] + noise_px_ * observation.noise[0];
+    const double v = observation.pixel[1] + noise_px_ * observation.noise[1];
     measurement.values = {u, v};
     if (measures_ == kStereo) {
-      measurement.values.push_back(sight.pixel[0] - camera_.fx * baseline_m_ / sight.depth +
-                                   noise_px_ * sight.noise[2]);
-      measurement.values.push_back(sight.pixel[1] + noise_px_ * sight.noise[3]);
+      measurement.values.push_back(observation.pixel[0] -
+                                   camera_.fx * baseline_m_ / observation.depth +
+                                   noise_px_ * observation.noise[2]);
+      measurement.values.push_back(observation.pixel[1] + noise_px_ * observation.noise[3]);
     } else if (measures_ == kDepth) {
-      measurement.values.push_back(sight.depth + depth_sigma_m_ * sight.noise[2]);
-    } else if (!seen_ever_[sight.point] && known_left_ > 0) {
+      measurement.values.push_back(observation.depth + depth_sigma_m_ * observation.noise[2]);
+    } else if (!seen_ever_[observation.point] && known_left_ > 0) {
       --known_left_;
-      const double sigma_m = known_sigma_ * sight.depth, variance_px = noise_px_ * noise_px_;
+      const double sigma_m = known_sigma_ * observation.depth, variance_px = noise_px_ * noise_px_;
       measurement.stream = 1;
-      measurement.values.push_back(sight.depth + sigma_m * sight.noise[2]);
+      measurement.values.push_back(observation.depth + sigma_m * observation.noise[2]);
       if (noise_px_ > 0.0) {
         measurement.covariance = {variance_px, 0, 0, 0, variance_px, 0, 0, 0, sigma_m * sigma_m};
       }
     }
-    seen_ever_[sight.point] = true;
+    seen_ever_[observation.point] = true;
     frame.measurements.push_back(std::move(measurement));
   }
 

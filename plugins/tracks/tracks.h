@@ -29,12 +29,13 @@ inline constexpr const char* kTracksKeys =
 /// Beside the file are `timestamps.csv` (`frame,t_s`), which then says what frames there are, or
 /// else frame_rate_hz gives frame k the time k / rate; and maybe `odometry.csv` (a header that
 /// names frame, vx_m_s, vy_m_s, vz_m_s, wx_rad_s, wy_rad_s, wz_rad_s) and `groundtruth.tum` or
-/// `truth.tum` (world_from_cam); and `known.csv`, rows of the same form: sights that tell depth.
+/// `truth.tum` (world_from_cam); and `known.csv`, rows of the same form: observations that tell
+/// depth.
 ///
 ///   stream     size     values            when
 ///   tracks     2, 4, 3  as `measures`     a feature has all of them; the landmark is its id
 ///   odometry   6        vx vy vz wx wy wz there is a row of the frame
-///   known      3        u, v, depth       there is a known.csv, and a sight in it
+///   known      3        u, v, depth       there is a known.csv, and an observation in it
 ///
 /// A feature without u or v is an error; one without what `measures` asks for besides is left out,
 /// and so is one that a frame before `features_from` has. A frame is given out once the first row
@@ -157,7 +158,7 @@ class Tracks : public Source {
     }
   }
 
-  /// The sights of frame_ that tell depth; those of frames that are not given out are dropped.
+  /// The observations of frame_ that tell depth; those of frames not given out are dropped.
   void EmitKnown(Frame& frame) {
     for (auto next = known_->next_frame(); next && *next <= frame_; next = known_->next_frame()) {
       const auto features = known_->Take(*next);

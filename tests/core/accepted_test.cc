@@ -152,9 +152,9 @@ TEST(AcceptedBy, PassesOnTheControlInputs) {
 Experiment MakeChainOfMaps() {
   const System system = MapSystem(InverseDepthPixels(0.001), WithPrior(), 0.01);
   return MakeChain(system, {{"tracks", 2}},
-                   {Sights(0.0, {{0, {0.1, 0.1}}, {1, {-0.1, 0.1}}}),
-                    Sights(0.1, {{0, {0.6, 0.1}}, {1, {-0.1, 0.1}}}),
-                    Sights(0.2, {{0, {0.1, 0.1}}, {1, {-0.1, 0.1}}})});
+                   {FrameOf(0.0, {{0, {0.1, 0.1}}, {1, {-0.1, 0.1}}}),
+                    FrameOf(0.1, {{0, {0.6, 0.1}}, {1, {-0.1, 0.1}}}),
+                    FrameOf(0.2, {{0, {0.1, 0.1}}, {1, {-0.1, 0.1}}})});
 }
 
 // Several measurements of one stream, of which one is gated, and those that enter a landmark.

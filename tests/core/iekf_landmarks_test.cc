@@ -25,13 +25,13 @@ TEST(IekfLandmarks, ALinearMapIsThatOfTheEkf) {
   Iekf iekf = Make<Iekf, IekfOptions>(system);
   Random random(3);
   for (int k = 0; k < 20; ++k) {
-    std::vector<Sighting> sights;
+    std::vector<Observation> observations;
     for (int i = 0; i < 5; ++i) {
       if ((k + 2 * i) % 5 > 2) continue;
-      sights.push_back({i, {0.3 * i + 0.1 * random.Normal(), random.Normal(), 2.0}});
+      observations.push_back({i, {0.3 * i + 0.1 * random.Normal(), random.Normal(), 2.0}});
     }
-    ekf.Process(Sights(0.1 * k, sights));
-    const UpdateReport& report = iekf.Process(Sights(0.1 * k, sights));
+    ekf.Process(FrameOf(0.1 * k, observations));
+    const UpdateReport& report = iekf.Process(FrameOf(0.1 * k, observations));
     ASSERT_TRUE(report.events.empty()) << report.events[0].text;
     ASSERT_LT((PositionOf(iekf) - PositionOf(ekf)).norm(), 1e-12) << k;
     ASSERT_LT((iekf.state().covariance().Dense() - ekf.state().covariance().Dense()).norm(), 1e-12);
@@ -85,10 +85,10 @@ TEST(IekfLandmarks, AnUpdateEndsWhereItsCostIsLeast) {
   IekfOptions options;
   options.max_iterations = 500;
   Iekf iekf = Make<Iekf>(system, options);
-  const Frame frame = Sights(1.0, {{0, later}});
+  const Frame frame = FrameOf(1.0, {{0, later}});
   for (Ekf* const filter : {&prediction, &ekf, static_cast<Ekf*>(&iekf)}) {
-    filter->Process(Sights(0.0, {{0, {0.3, 0.1}}}));
-    filter->Process(filter == &prediction ? Sights(1.0, {}) : frame);
+    filter->Process(FrameOf(0.0, {{0, {0.3, 0.1}}}));
+    filter->Process(filter == &prediction ? FrameOf(1.0, {}) : frame);
   }
   const Cost cost{prediction.state(), InProcessSensor(pixels, "tracks"), later, kSigma};
   ASSERT_EQ(prediction.state().layout().blocks().size(), 4u);

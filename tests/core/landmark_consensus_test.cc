@@ -36,14 +36,14 @@ Ekf Filter(bool ransac, double gate = 0.999, double sigma_0 = 0.1, const RobustL
 /// What the camera sees at `r`; each `every`-th match has moved sideways, all alike.
 Frame Matches(const Eigen::Vector3d& r, int every, double aside) {
   Random random(5);
-  std::vector<Sighting> sights;
+  std::vector<Observation> observations;
   for (int i = 0; i < kPoints; ++i) {
     const Eigen::Vector3d h = PointAt(i) - r;
     const double u = h[0] / h[2] + kNoise * random.Normal(),
                  v = h[1] / h[2] + kNoise * random.Normal();
-    sights.push_back({i, {u + (i % every == 0 ? aside : 0.0), v}});
+    observations.push_back({i, {u + (i % every == 0 ? aside : 0.0), v}});
   }
-  return Sights(0.0, sights);
+  return FrameOf(0.0, observations);
 }
 
 int Accepted(const UpdateReport& report, int every, bool wrong) {

@@ -22,13 +22,13 @@ class Street : public Source {
   bool Next(Frame& frame) override {
     if (next_ == 20) return false;
     const double x = 0.1 * next_;
-    std::vector<Sighting> sights;
+    std::vector<Observation> observations;
     for (int id = 0; id < 4; ++id) {
       const std::array<double, 3> p = *TrueLandmark(id);
       if (id == 3 && next_ < 10) continue;
-      sights.push_back({id, {p[0] - x, p[1], p[2]}});
+      observations.push_back({id, {p[0] - x, p[1], p[2]}});
     }
-    frame = Sights(0.1 * next_, sights);
+    frame = FrameOf(0.1 * next_, observations);
     frame.truth = {{x, 0.0, 0.0}};
     ++next_;
     return true;

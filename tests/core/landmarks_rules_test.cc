@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Landmarks where sensors share them, wait, or are linearised elsewhere, and ids that come back.
+// Which landmarks enter and leave, ids that come back, and landmarks where sensors share them, wait
+// or are linearised elsewhere.
 #include <gtest/gtest.h>
-
-#include <algorithm>
 
 #include "support/landmark_models.h"
 
@@ -18,9 +17,91 @@ System WithTwoSensors(System system) {
   return system;
 }
 
-const LandmarkEstimate* Find(const std::vector<LandmarkEstimate>& landmarks, std::int64_t id) {
-  const auto found = std::ranges::find(landmarks, id, &LandmarkEstimate::id);
-  return found == landmarks.end() ? nullptr : &*found;
+TEST(Landmarks, EnterWithTheObservationThatIsAskedFor) {
+  LandmarkOptions options;
+  options.enter_after = 3;
+  Ekf ekf = EkfOf(MapSystem(Offset(0.1), options));
+  const auto outcome = [&](double t_s) {
+    return OutcomeFor(ekf.Process(FrameOf(t_s, {{5, {0, 0, 1}}})), 5);
+  };
+  EXPECT_EQ(outcome(0.0), Outcome::kNotReady);
+  EXPECT_EQ(outcome(0.1), Outcome::kNotReady);
+  EXPECT_EQ(outcome(0.2), Outcome::kInitialised);
+  EXPECT_EQ(outcome(0.3), Outcome::kAccepted);
+}
+
+TEST(Landmarks, EnterOnlyBelowTheNumberToKeep) {
+  LandmarkOptions options;
+  options.keep = 2;
+  Ekf ekf = EkfOf(MapSystem(Offset(0.1), options));
+  const Frame three = FrameOf(0.0, {{1, {0, 0, 1}}, {2, {0, 1, 1}}, {3, {1, 0, 1}}});
+  EXPECT_EQ(ekf.Process(three).landmarks.initialised, 2);
+  EXPECT_EQ(OutcomeFor(ekf.Process(three), 3), Outcome::kNotReady);
+  // Where only one is measured there is room for another.
+  EXPECT_EQ(OutcomeFor(ekf.Process(FrameOf(0.1, {{1, {0, 0, 1}}, {3, {1, 0, 1}}})), 3),
+            Outcome::kInitialised);
+}
+
+// FAULTS 39
+TEST(Landmarks, AnIdThatComesBackIsTheNextGeneration) {
+  LandmarkOptions options;
+  options.unseen_frames = 2;
+  Ekf ekf = EkfOf(MapSystem(Offset(0.1), options));
+  ekf.Process(FrameOf(0.0, {{1, {0, 0, 1}}, {2, {0, 1, 1}}}));
+  for (int k = 1; k < 4; ++k) ekf.Process(FrameOf(0.1 * k, {{2, {0, 1, 1}}}));
+  EXPECT_EQ(ekf.landmarks().size(), 1u);
+  EXPECT_EQ(OutcomeFor(ekf.Process(FrameOf(0.5, {{1, {5, 0, 1}}})), 1), Outcome::kInitialised);
+  const LandmarkEstimate again = *Find(ekf.landmarks(), 1);
+  EXPECT_EQ(again.generation, 1);
+  EXPECT_EQ(again.first, StampFromSeconds(0.5));
+  EXPECT_NEAR(again.position[0], 5.0, 0.5);
+  EXPECT_EQ(Find(ekf.landmarks(), 2)->generation, 0);
+}
+
+TEST(Landmarks, ThatFailTooOftenAreForgotten) {
+  LandmarkOptions options;
+  options.success_ratio = 0.5;
+  options.minimum_tries = 4;
+  EkfOptions gated;
+  gated.gate = 0.99;
+  Ekf ekf = EkfOf(MapSystem(Offset(0.01), options), gated);
+  const std::vector<double> good = {0, 0, 1};
+  ekf.Process(FrameOf(0.0, {{1, good}, {2, good}}));
+  int deleted = 0;
+  for (int k = 1; k <= 4; ++k) {
+    EXPECT_EQ(deleted, 0);
+    deleted = ekf.Process(FrameOf(0.01 * k, {{1, good}, {2, {9, 9, 9}}})).landmarks.deleted;
+  }
+  EXPECT_EQ(deleted, 1);
+  EXPECT_EQ(ekf.landmarks().size(), 1u);
+  EXPECT_EQ(ekf.landmarks()[0].accepted, 4);
+}
+
+// FAULTS 83
+TEST(Landmarks, OfNegativeDepthAreCountedAndDeletedWhereAsked) {
+  using enum LandmarkOptions::NegativeDepth;
+  for (const auto policy : {kKeep, kDelete}) {
+    LandmarkOptions options = WithPrior(0.05, 0.5);
+    options.negative_depth = policy;
+    options.known = {{1, {0.0, 0.0, 2.0}, 0.0}, {2, {1.0, 0.0, 2.0}, 0.0}};
+    Ekf ekf = EkfOf(MapSystem(InverseDepthPixels(0.001), options));
+    LandmarkCounts counts;
+    for (int k = 0; k < 6; ++k) {
+      // The camera moves right, and so does the image of 7: beyond the infinite. Its prediction
+      // stands still, so that the first step tells nothing of depth: H = rho (a - r) + m.
+      const double x = 0.1 * k;
+      const UpdateReport& report = ekf.Process(FrameOf(
+          0.1 * k, {{1, {-x / 2.0, 0.0}}, {2, {(1.0 - x) / 2.0, 0.0}}, {7, {0.02 * k, 0.0}}}));
+      counts.negative += report.landmarks.negative;
+      counts.deleted += report.landmarks.deleted;
+    }
+    const bool keeps = policy == kKeep;
+    EXPECT_EQ(counts.negative, keeps ? 1 : 2);  // deleted, it comes back once
+    EXPECT_EQ(counts.deleted, keeps ? 0 : 2);
+    if (keeps) {
+      EXPECT_NEAR(Find(ekf.landmarks(), 7)->inverse_distance, -0.2, 0.05);
+    }
+  }
 }
 
 TEST(Landmarks, OfASensorThatWaitsForABlockDoNotEnter) {
@@ -34,7 +115,7 @@ TEST(Landmarks, OfASensorThatWaitsForABlockDoNotEnter) {
   system.priors.push_back(prior);
   system.sensors[0].roles[0].block = waits;
   Ekf ekf(system, {}, {{"tracks", 3}});
-  const UpdateReport& report = ekf.Process(Sights(0.0, {{5, {0, 0, 1}}}));
+  const UpdateReport& report = ekf.Process(FrameOf(0.0, {{5, {0, 0, 1}}}));
   ASSERT_EQ(report.measurements().size(), 2u);
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotReady);
   EXPECT_EQ(report.measurements()[1].outcome, Outcome::kInitialised);
@@ -70,7 +151,7 @@ TEST(Landmarks, AreLinearisedAtTheMeasurementWhereARoleIs) {
   system.sensors[0].roles[0].linearise_at = LineariseAt::kMeasurement;
   Ekf ekf(system, {}, {{"tracks", 3}});
   const double z = 1.5 * 1.5 * 1.5;  // r = 0.5, where H = -3 1.5^2
-  const UpdateReport& report = ekf.Process(Sights(0.0, {{1, {z, z, z}}}));
+  const UpdateReport& report = ekf.Process(FrameOf(0.0, {{1, {z, z, z}}}));
   EXPECT_NEAR(report.measurements()[0].s.at(0), 6.75 * 6.75 + 1e-6, 1e-9);
 }
 
@@ -79,8 +160,8 @@ TEST(Landmarks, ToKeepAreCountedOnceWhereTwoSensorsSeeThem) {
   options.keep = 3;
   const System system = WithTwoSensors(MapSystem(Offset(0.1), options, 0.3));
   Ekf ekf(system, {}, {{"tracks", 3}});
-  ekf.Process(Sights(0.0, {{1, {0, 0, 1}}, {2, {0, 1, 1}}}));
-  ekf.Process(Sights(0.1, {{1, {0, 0, 1}}, {2, {0, 1, 1}}, {3, {1, 0, 1}}, {4, {1, 1, 1}}}));
+  ekf.Process(FrameOf(0.0, {{1, {0, 0, 1}}, {2, {0, 1, 1}}}));
+  ekf.Process(FrameOf(0.1, {{1, {0, 0, 1}}, {2, {0, 1, 1}}, {3, {1, 0, 1}}, {4, {1, 1, 1}}}));
   EXPECT_EQ(ekf.landmarks().size(), 3u);
 }
 
@@ -90,7 +171,7 @@ TEST(Landmarks, CountOnceForThePriorWhereTwoSensorsSeeThem) {
   options.known = {{1, {0.0, 0.0, 2.0}, 0.1}, {2, {0.0, 0.1, 4.0}, 0.1}};
   const System system = WithTwoSensors(MapSystem(InverseDepthPixels(0.01), options));
   Ekf ekf(system, {}, {{"tracks", 2}});
-  ekf.Process(Sights(0.0, {{1, {0, 0}}, {2, {0, 0.025}}, {7, {0.1, 0.1}}}));
+  ekf.Process(FrameOf(0.0, {{1, {0, 0}}, {2, {0, 0.025}}, {7, {0.1, 0.1}}}));
   const std::vector<LandmarkEstimate> landmarks = ekf.landmarks();
   ASSERT_NE(Find(landmarks, 7), nullptr);
   EXPECT_EQ(Find(landmarks, 7)->inverse_distance, 1.0);  // two have converged, not four
@@ -100,9 +181,9 @@ TEST(Landmarks, ThatHaveNotConvergedAreNoPrior) {
   LandmarkOptions options = WithPrior(1.0, 0.5);
   options.prior->from_map = 2;
   Ekf ekf(MapSystem(InverseDepthPixels(0.01), options), {}, {{"tracks", 2}});
-  ekf.Process(Sights(0.0, {{1, {0, 0}}, {2, {0, 0.1}}, {3, {0.1, 0}}}));
-  ekf.Process(Sights(0.1, {{1, {0.05, 0}}, {2, {0.05, 0.1}}, {3, {0.15, 0}}}));
-  ekf.Process(Sights(0.2, {{1, {0.05, 0}}, {2, {0.05, 0.1}}, {3, {0.2, 0}}, {8, {0.1, 0.1}}}));
+  ekf.Process(FrameOf(0.0, {{1, {0, 0}}, {2, {0, 0.1}}, {3, {0.1, 0}}}));
+  ekf.Process(FrameOf(0.1, {{1, {0.05, 0}}, {2, {0.05, 0.1}}, {3, {0.15, 0}}}));
+  ekf.Process(FrameOf(0.2, {{1, {0.05, 0}}, {2, {0.05, 0.1}}, {3, {0.2, 0}}, {8, {0.1, 0.1}}}));
   const std::vector<LandmarkEstimate> landmarks = ekf.landmarks();
   ASSERT_NE(Find(landmarks, 1), nullptr);
   ASSERT_NE(Find(landmarks, 1)->inverse_distance, 1.0);
@@ -113,7 +194,7 @@ TEST(Landmarks, AreNotCorrelatedWithWhatTheirSensorHolds) {
   System system = MapSystem(Offset(0.1), {}, 0.3);
   system.sensors[0].roles[0].mode = RoleMode::kHold;
   Ekf ekf(system, {}, {{"tracks", 3}});
-  ekf.Process(Sights(0.0, {{1, {0, 0, 1}}}));
+  ekf.Process(FrameOf(0.0, {{1, {0, 0, 1}}}));
   // R alone; with the camera's own uncertainty it would be 0.1^2 + 0.3^2
   EXPECT_NEAR(ekf.landmarks().at(0).covariance(0, 0), 0.01, 1e-12);
 }
@@ -123,9 +204,9 @@ TEST(Landmarks, ThatWaitToEnterAreCountedAnewAfterThirtyFramesWithout) {
   options.enter_after = 2;
   Ekf ekf(MapSystem(Offset(0.1), options, 0.3), {}, {{"tracks", 3}});
   const auto enters = [&ekf](int frames_without) {
-    ekf.Process(Sights(0.0, {{1, {0, 0, 1}}}));
-    for (int k = 0; k < frames_without; ++k) ekf.Process(Sights(0.0, {{2, {1, 1, 1}}}));
-    ekf.Process(Sights(0.0, {{1, {0, 0, 1}}}));
+    ekf.Process(FrameOf(0.0, {{1, {0, 0, 1}}}));
+    for (int k = 0; k < frames_without; ++k) ekf.Process(FrameOf(0.0, {{2, {1, 1, 1}}}));
+    ekf.Process(FrameOf(0.0, {{1, {0, 0, 1}}}));
     return Find(ekf.landmarks(), 1) != nullptr;
   };
   EXPECT_FALSE(enters(30));
@@ -137,7 +218,7 @@ TEST(Landmarks, GoBackToTheGenerationsOfTheirPast) {
   options.unseen_frames = 1;
   Ekf ekf(MapSystem(Offset(0.1), options, 0.3), {}, {{"tracks", 3}});
   const auto see = [&ekf](std::int64_t id) {
-    ekf.Process(Sights(0.0, {{id, {0, 0, 1}}}));
+    ekf.Process(FrameOf(0.0, {{id, {0, 0, 1}}}));
     return Find(ekf.landmarks(), id)->generation;
   };
   EXPECT_EQ(see(1), 0);

@@ -49,10 +49,6 @@ System TwoElements(const Eigen::Matrix2d& p, double sigma) {
 /// Eigenvalues 2.1 and -0.1; S = 1 - 2.2 + 1 + 0.01 < 0.
 Eigen::Matrix2d Indefinite() { return (Eigen::Matrix2d() << 1.0, 1.1, 1.1, 1.0).finished(); }
 
-bool HasEvent(const UpdateReport& report, const std::string& kind) {
-  return std::ranges::count(report.events, kind, &Event::kind) > 0;
-}
-
 // FAULTS 75
 TEST(LostPositiveDefiniteness, IsRepairedReportedAndTheFilterGoesOn) {
   const System system = TwoElements(Indefinite(), 0.1);

@@ -78,14 +78,14 @@ struct Problem {
     }
     int count = 0;
     for (int k = 0; k < steps; ++k) {
-      std::vector<Sighting> sights;
+      std::vector<Observation> observations;
       for (int i = 0; i < points; ++i) {
         if (k < i / 3 || (k + i) % 7 == 0) continue;
         Vector2d z = Pixel(truth, k, i) + kPixel * Vector2d(random.Normal(), random.Normal());
         if (outlier_every > 0 && ++count % outlier_every == 0) z[0] += 0.1;
-        sights.push_back({i, {z[0], z[1]}});
+        observations.push_back({i, {z[0], z[1]}});
       }
-      frames.push_back(Sights(kDt * k, sights));
+      frames.push_back(FrameOf(kDt * k, observations));
     }
   }
   Vector3d Camera(const VectorXd& x, int k) const {
@@ -97,8 +97,8 @@ struct Problem {
   Vector2d Pixel(const VectorXd& x, int k, std::int64_t i) const {
     return (Point(x, i) - Camera(x, k)).hnormalized();
   }
-  /// All residuals over their sigma, and after which of them a sight of two ends.
-  VectorXd Residuals(const VectorXd& x, std::vector<Eigen::Index>* sights = nullptr) const {
+  /// All residuals over their sigma, and after which of them an observation of two ends.
+  VectorXd Residuals(const VectorXd& x, std::vector<Eigen::Index>* observations = nullptr) const {
     std::vector<double> r;
     for (int k = 1; k < steps; ++k) {
       const Vector3d w = (Camera(x, k) - Camera(x, k - 1)) / (kWalk * std::sqrt(kDt));
@@ -111,8 +111,8 @@ struct Problem {
         r.insert(r.end(), {d[0] / kPixel, d[1] / kPixel});
         const auto i = static_cast<std::size_t>(m.landmark);
         if (seen[i]) {
-          if (sights != nullptr) sights->push_back(std::ssize(r));
-        } else {  // the first sight and the prior give it its place
+          if (observations != nullptr) observations->push_back(std::ssize(r));
+        } else {  // the first observation and the prior give it its place
           seen[i] = true;
           r.push_back((1.0 / (Point(x, m.landmark) - Camera(x, k)).norm() - kRho) / kRhoSigma);
         }
@@ -121,19 +121,19 @@ struct Problem {
     return Eigen::Map<VectorXd>(r.data(), std::ssize(r));
   }
   double Cost(const VectorXd& x) const {
-    std::vector<Eigen::Index> sights;
-    const VectorXd r = Residuals(x, &sights);
+    std::vector<Eigen::Index> observations;
+    const VectorXd r = Residuals(x, &observations);
     double cost = 0.5 * r.squaredNorm();
-    for (const Eigen::Index end : sights) {
+    for (const Eigen::Index end : observations) {
       const double d = r.segment<2>(end - 2).norm();
       cost += Rho(loss, d) - 0.5 * d * d;
     }
     return cost;
   }
-  /// J' J and J' r by central differences, each sight counted with its weight at x.
+  /// J' J and J' r by central differences, each observation counted with its weight at x.
   void NormalEquations(const VectorXd& x, MatrixXd& a, VectorXd& b) const {
-    std::vector<Eigen::Index> sights;
-    const VectorXd r = Residuals(x, &sights);
+    std::vector<Eigen::Index> observations;
+    const VectorXd r = Residuals(x, &observations);
     MatrixXd j(r.size(), x.size());
     constexpr double kStep = 1e-5;
     for (Eigen::Index i = 0; i < x.size(); ++i) {
@@ -141,7 +141,7 @@ struct Problem {
       j.col(i) = (Residuals(x + d) - Residuals(x - d)) / (2.0 * kStep);
     }
     VectorXd w = VectorXd::Ones(r.size());
-    for (const Eigen::Index end : sights) {
+    for (const Eigen::Index end : observations) {
       w.segment<2>(end - 2).setConstant(Weight(loss, r.segment<2>(end - 2).norm()));
     }
     a = j.transpose() * w.asDiagonal() * j;

@@ -14,7 +14,7 @@ using testing::Solve;
 TEST(CeresBatchLandmarks, WhatTheFilterForgetsAndMeetsAgainIsAnotherLandmark) {
   const Problem problem(25, 12);
   std::vector<Frame> frames = problem.frames;
-  for (std::size_t k = 10; k < 14; ++k) {  // landmark 4 is out of sight
+  for (std::size_t k = 10; k < 14; ++k) {  // landmark 4 is out of view
     std::erase_if(frames[k].measurements, [](const Measurement& m) { return m.landmark == 4; });
   }
   System system = problem.Filter();

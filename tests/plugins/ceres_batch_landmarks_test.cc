@@ -11,15 +11,15 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 using testing::Found;
+using testing::FrameOf;
 using testing::InverseDepthPixels;
 using testing::kPixel;
 using testing::kRho;
 using testing::kRhoSigma;
 using testing::MapSystem;
+using testing::Observation;
 using testing::Offset;
 using testing::Problem;
-using testing::Sighting;
-using testing::Sights;
 using testing::Solve;
 
 /// The normal equations of positions x_0, x_1, .., 3 numbers each, of which differences are known.
@@ -68,14 +68,14 @@ TEST(CeresBatchLandmarks, ALinearMapIsThatOfLeastSquaresOverAllSteps) {
   Vector3d r = vector(kStart);
   for (int k = 0; k < kSteps; ++k, r += vector(step)) {
     if (k > 0) differences.Add(k - 1, k, Vector3d::Zero(), step);
-    std::vector<Sighting> sights;
+    std::vector<Observation> observations;
     for (int i = 0; i < kPoints; ++i) {
       if ((k + 2 * i) % 5 >= 3 || k < i / 2) continue;
       const Vector3d z = points[static_cast<std::size_t>(i)] - r + vector(kNoise);
-      sights.push_back({i, {z[0], z[1], z[2]}});
+      observations.push_back({i, {z[0], z[1], z[2]}});
       differences.Add(k, kSteps + i, z, kNoise);
     }
-    frames.push_back(Sights(0.1 * k, sights));
+    frames.push_back(FrameOf(0.1 * k, observations));
   }
   const Found found = Solve(MapSystem(Offset(kNoise), options, kStart), frames);
   const MatrixXd covariance = differences.information.inverse();
@@ -136,7 +136,7 @@ TEST(CeresBatchLandmarks, IsAtTheMinimumOfTheCostWrittenOutWithItsCovariance) {
   problem.ExpectSolved(Solve(problem.Filter(), problem.frames));
 }
 
-TEST(CeresBatchLandmarks, ALossCountsEachSightWithItsWeight) {
+TEST(CeresBatchLandmarks, ALossCountsEachObservationWithItsWeight) {
   for (const RobustLoss loss : {RobustLoss{LossKind::kHuber, 1.5}, {LossKind::kCauchy, 2.0}}) {
     Problem problem(25, 12, 23);
     problem.loss = loss;

@@ -118,7 +118,7 @@ TEST(CeresBatchNoInputs, AFixedCameraHasAMap) {
   system.layout.Declare("cam.position", "cam", place, BlockStatus::kFixed);
   std::vector<Frame> frames;
   for (int k = 0; k < 4; ++k) {
-    frames.push_back(testing::Sights(0.1 * k, {{0, {1.0 + 0.1 * k, 2.0, 3.0}}}));
+    frames.push_back(testing::FrameOf(0.1 * k, {{0, {1.0 + 0.1 * k, 2.0, 3.0}}}));
   }
   for (const std::string& options : {kAll[0], kAll[1]}) {
     SCOPED_TRACE(options);

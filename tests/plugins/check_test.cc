@@ -48,11 +48,11 @@ struct Fault {
   std::vector<const char*> words;
 };
 
-std::string Name(const testing::TestParamInfo<Fault>& info) {
+std::string Name(const ::testing::TestParamInfo<Fault>& info) {
   return "Fault" + std::to_string(info.param.number) + '_' + info.param.model;
 }
 
-class OneFault : public CheckTest, public testing::WithParamInterface<Fault> {};
+class OneFault : public CheckTest, public ::testing::WithParamInterface<Fault> {};
 
 TEST_P(OneFault, IsFoundByItsCheckAlone) {
 #if defined(__SANITIZE_ADDRESS__)
@@ -74,7 +74,7 @@ TEST_P(OneFault, IsFoundByItsCheckAlone) {
 
 INSTANTIATE_TEST_SUITE_P(
     Models, OneFault,
-    testing::Values(
+    ::testing::Values(
         Fault{58, "throws_in_create", "create", {"failed while being created: the dog ate it"}},
         Fault{58, "throws_in_noise", "calls", {"SqrtNoise at x = ", "failed: the dog ate it"}},
         Fault{58, "throws_in_destroy", "create", {"destroy crashed", "threw never let go"}},
@@ -124,7 +124,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST_F(CheckTest, EveryModelWithAFaultIsTested) {
   std::set<std::string> tested = {"leaves_daemons", "right",   "may_have_bias",
                                   "landmark",       "gravity", "turning"};
-  const auto* suite = testing::UnitTest::GetInstance();
+  const auto* suite = ::testing::UnitTest::GetInstance();
   for (int i = 0; i < suite->total_test_suite_count(); ++i) {
     const auto* tests = suite->GetTestSuite(i);
     for (int k = 0; k < tests->total_test_count(); ++k) {

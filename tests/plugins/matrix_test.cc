@@ -66,7 +66,7 @@ std::vector<double> Evaluate(const std::filesystem::path& plugin) {
   return out;
 }
 
-class MatrixTest : public HostTest, public testing::WithParamInterface<std::string> {};
+class MatrixTest : public HostTest, public ::testing::WithParamInterface<std::string> {};
 
 TEST_P(MatrixTest, AgreesWithTheBaseline) {
   const std::vector<double> expected = Evaluate(Built("matrix_baseline"));
@@ -83,7 +83,7 @@ TEST_P(MatrixTest, AgreesWithTheBaseline) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Builds, MatrixTest, testing::ValuesIn(Variants()),
+INSTANTIATE_TEST_SUITE_P(Builds, MatrixTest, ::testing::ValuesIn(Variants()),
                          [](const auto& test) { return test.param; });
 
 }  // namespace

@@ -110,7 +110,7 @@ TEST(Scene, SameSeedSameBytesAndOthersDiffer) {
   EXPECT_NE(values(3), values(4));
 }
 
-TEST(Scene, TellsTheDepthOfTheFirstSightOfTheKnown) {
+TEST(Scene, TellsTheDepthOfTheFirstObservationOfTheKnown) {
   const auto frames =
       SceneFrames("frames: 5, noise_px: 0.5, known: {count: 4}, " + kPoints + ", " + kSweep);
   const std::set<std::int64_t> known = Ids(frames[0], 1);

@@ -219,12 +219,12 @@ TEST_F(TracksTest, ReadsRealTracks) {
   if (!fs::exists(drive)) GTEST_SKIP() << "no " << drive;
   const auto frames = Frames("measures: stereo, odometry: mean", drive);
   ASSERT_EQ(frames.size(), 108u);
-  std::size_t sights = 0;
+  std::size_t observations = 0;
   for (const Frame& frame : frames) {
     EXPECT_EQ(frame.truth.at(0).size(), 3u);
-    for (const Measurement& m : frame.measurements) sights += m.stream == 0;
+    for (const Measurement& m : frame.measurements) observations += m.stream == 0;
   }
-  EXPECT_EQ(sights, (42005u - 1) / 4);  // rows below the header, four to a sight
+  EXPECT_EQ(observations, (42005u - 1) / 4);  // rows below the header, four to an observation
   EXPECT_EQ(frames[0].measurements[0].values[0], 343.4486);
   const Measurement& odometry = frames[0].measurements.back();
   EXPECT_NEAR(odometry.values[0], 0.5 * (13.172717 + 13.129880), 1e-12);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -42,17 +43,35 @@ inline LandmarkOptions WithPrior(double inverse_distance = 0.5, double sigma = 0
 }
 
 /// A frame of stream 0 with the given landmarks.
-struct Sighting {
+struct Observation {
   std::int64_t id;
   std::vector<double> z;
 };
-inline Frame Sights(double t_s, const std::vector<Sighting>& sights) {
+inline Frame FrameOf(double t_s, const std::vector<Observation>& observations) {
   Frame frame;
   frame.stamp = StampFromSeconds(t_s);
-  for (const Sighting& sight : sights) {
-    frame.measurements.push_back({frame.stamp, 0, sight.id, sight.z, {}});
+  for (const Observation& observation : observations) {
+    frame.measurements.push_back({frame.stamp, 0, observation.id, observation.z, {}});
   }
   return frame;
+}
+
+/// The filter of a system whose source has the stream `tracks` alone.
+inline Ekf EkfOf(const System& system, const EkfOptions& options = {}) {
+  return {system, options, {{"tracks", system.sensors[0].model.measurement().geometry.ambient}}};
+}
+
+/// What became of the measurement of a landmark; kFailed: there is none.
+inline Outcome OutcomeFor(const UpdateReport& report, std::int64_t id) {
+  const auto found = std::ranges::find(report.measurements(), id, &MeasurementReport::landmark);
+  return found == report.measurements().end() ? Outcome::kFailed : found->outcome;
+}
+
+/// null: there is none.
+inline const LandmarkEstimate* Find(const std::vector<LandmarkEstimate>& landmarks,
+                                    std::int64_t id) {
+  const auto found = std::ranges::find(landmarks, id, &LandmarkEstimate::id);
+  return found == landmarks.end() ? nullptr : &*found;
 }
 
 inline Eigen::Vector3d PositionOf(const Estimator& filter) {

@@ -160,7 +160,7 @@ class ProgramTest : public ::testing::Test {
   }
 
   const TemporaryFolder temporary_;
-  const fs::path folder_ = temporary_ / "config";
+  fs::path folder_ = temporary_ / "config";
   std::string before_;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -110,6 +111,10 @@ inline Frame FrameAt(double t_s, const std::vector<std::pair<int, double>>& valu
     frame.measurements.push_back({frame.stamp, stream, -1, {value}, {}});
   }
   return frame;
+}
+
+inline bool HasEvent(const UpdateReport& report, const std::string& kind) {
+  return std::ranges::count(report.events, kind, &Event::kind) > 0;
 }
 
 inline double ValueOf(const State& state, const std::string& block) {

@@ -24,7 +24,7 @@ struct KnownLandmark {
 
 /// How landmarks enter the state, change and leave it.
 struct LandmarkOptions {
-  /// What one sight does not tell: the inverse distance, 1/m, and its standard deviation.
+  /// What one observation does not tell: the inverse distance, 1/m, and its standard deviation.
   struct Prior {
     double inverse_distance = 0.5;
     double sigma = 0.25;
@@ -36,8 +36,8 @@ struct LandmarkOptions {
 
   std::optional<Prior> prior;
   int keep = 1'000'000;   ///< landmarks measured in a frame, below which new ones enter
-  int enter_after = 1;    ///< sights, the last of which it enters with
-  int unseen_frames = 0;  ///< after so many without a sight it is forgotten; 0: never
+  int enter_after = 1;    ///< observations, the last of which it enters with
+  int unseen_frames = 0;  ///< after so many without an observation it is forgotten; 0: never
   /// It is forgotten where a smaller share of at least `minimum_tries` measurements is accepted.
   double success_ratio = 0.0;
   int minimum_tries = 10;

@@ -22,7 +22,8 @@ constexpr const char* kFooter = R"(Examples:
   alidade compare config.yaml --no-explain --reference batch
   alidade compare runs/a runs/b                    finished runs over the same data
 
-Exit code 1: there was no reference to compare with; 65: runs over different data.)";
+Exit code 1: there was no reference, or no measurement, to compare with; 65: runs over different
+data.)";
 
 struct Arguments {
   std::string command;          ///< the whole line
@@ -50,11 +51,12 @@ void Tell(const Comparison& comparison, const Arguments& arguments, const fs::pa
   if (!folder.empty() && !arguments.quiet) PrintNote("wrote " + folder.string());
 }
 
-/// That a comparison is withheld counts for less than what ended a run.
+/// That a comparison is withheld counts for more than an estimator or a seed that failed, and for
+/// less than anything else that ended a run.
 ExitCode CodeOf(const Comparison& comparison, ExitCode of_run) {
-  const bool less = of_run == ExitCode::kOk || of_run == ExitCode::kDiverged ||
-                    of_run == ExitCode::kFound;  // of seeds: some failed, which is told
-  if (comparison.withheld.empty() || !less) return of_run;
+  const bool more =
+      of_run == ExitCode::kOk || of_run == ExitCode::kDiverged || of_run == ExitCode::kFound;
+  if (comparison.withheld.empty() || !more) return of_run;
   PrintErrors(comparison.withheld);
   return ExitCode::kFound;
 }

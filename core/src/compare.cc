@@ -142,7 +142,7 @@ std::string WhyWithheld(const std::vector<Candidate>& candidates,
              ", the comparison with it is withheld";
     }
   }
-  return any ? "" : "no reference: no truth, no batch and no smoother";
+  return any ? "" : "no reference: no truth, no batch and no smoother of all data";
 }
 
 /// Which estimators are held against nothing while others are.
@@ -351,11 +351,10 @@ Comparison internal::CompareRuns(const std::vector<ComparedRun>& runs,
   if (filter != nullptr) {
     comparison.explained = filter->name;
     comparison.gap = ExplainGap(*filter, candidates, truth);
-    const std::int64_t lockouts = filter->entry->lockouts;
-    if (lockouts > 0) {
-      comparison.notes.push_back("'" + filter->name + "' recovered from a lock-out " +
-                                 (lockouts == 1 ? "once" : std::to_string(lockouts) + " times") +
-                                 ": what that cost is in its step to a batch or smoother");
+    if (filter->entry->locked_out) {
+      comparison.notes.push_back("'" + filter->name +
+                                 "' was locked out, see its events: what that "
+                                 "cost is in its step to a batch or smoother");
     }
   }
   return comparison;

@@ -25,8 +25,8 @@ bool SameSensors(const EstimatorFacts& a, const EstimatorFacts& b);
 /// Whether both are of the same models and sensors.
 bool SameSystem(const EstimatorFacts& a, const EstimatorFacts& b);
 
-/// Whether it is an online estimator, and neither a batch nor a window, which linearise again: of
-/// one of these the gap to the batch is.
+/// Whether it is a filter, whose gap to the batch is explained: online, and neither a batch nor a
+/// window, which linearise again.
 inline bool IsFilter(const std::string& type, bool smoothed) {
   return !smoothed && type != "ceres_batch" && type != "fixed_lag";
 }

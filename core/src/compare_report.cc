@@ -192,7 +192,8 @@ std::string LinesOf(const GapStep& step) {
   double largest = 0.0;
   const std::string distances = DistancesText(step, largest);
   if (distances.empty()) return "";
-  std::string line = "RMSD " + distances + " in sigmas of " + step.to;
+  std::string line =
+      (step.at_end ? "difference " : "RMSD ") + distances + " in sigmas of " + step.to;
   if (step.kind == GapKind::kSmoothing) return line;
   constexpr double kNegligible = 0.1, kSmall = 0.5, kLarge = 1.0;
   return line + (largest < kNegligible ? ": negligible beside what neither of them knows"

@@ -51,8 +51,8 @@ Comparison RunComparer::Finish(const RunResult& result, const CompareOptions& op
   ALIDADE_EXPECTS(result.estimators.size() <= run.estimators.size());
   for (std::size_t e = 0; e < result.estimators.size(); ++e) {
     run.estimators[e].result = result.estimators[e];
-    run.estimators[e].lockouts =
-        std::ranges::count(result.estimators[e].events, "lockout", &Event::kind);
+    run.estimators[e].locked_out =
+        std::ranges::count(result.estimators[e].events, "lockout", &Event::kind) > 0;
     run.estimators[e].result.events.clear();
   }
   run.estimators.resize(result.estimators.size());
@@ -183,7 +183,7 @@ Comparison Summarise(const std::vector<Comparison>& comparisons) {
   ALIDADE_EXPECTS(!comparisons.empty());
   Comparison all = comparisons.front();
   all.runs = std::ssize(comparisons);
-  if (all.runs > 1) all.status = RunStatus::kOk;
+  all.status = RunStatus::kOk;  // what failed in a run is told of its estimators
   if (all.runs > 1) all.measurements_sha256.clear();
   all.notes.clear();
   std::int64_t withheld = 0;

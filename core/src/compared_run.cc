@@ -81,15 +81,14 @@ void AppendRow(Series& series, const std::vector<double>& row) {
   }
 }
 
-/// Of events.csv, `t_s,kind,text`.
-std::int64_t LockoutsIn(const fs::path& file) {
+/// Whether events.csv, `t_s,kind,text`, has one of a lock-out.
+bool HasLockout(const fs::path& file) {
   std::ifstream stream = Open(file);
-  std::int64_t count = 0;
-  for (std::string line; std::getline(stream, line);) {
-    const std::size_t kind = line.find(',') + 1;
-    count += line.compare(kind, std::min(line.find(',', kind), line.size()) - kind, "lockout") == 0;
+  bool found = false;
+  for (std::string line; !found && std::getline(stream, line);) {
+    found = line.compare(line.find(',') + 1, 8, "lockout,") == 0;
   }
-  return count;
+  return found;
 }
 
 void ReadEstimates(const fs::path& file, Series& series) {
@@ -228,7 +227,7 @@ ComparedRun ReadRun(const fs::path& folder) {
     one.result.wall_s = timing.root().At("estimators").At(name).At("wall_s").Number();
     one.series.blocks = one.facts.blocks;
     one.series.joint = false;
-    one.lockouts = LockoutsIn(folder / name / "events.csv");
+    one.locked_out = HasLockout(folder / name / "events.csv");
     ReadEstimates(folder / name / "estimates.csv", one.series);
     ReadCovariances(folder / name / "covariance.bin", one.series);
     const fs::path map = folder / name / "landmarks.csv";

@@ -18,7 +18,7 @@ struct ComparedEntry {
   EstimatorFacts facts;
   EstimatorResult result;  ///< without events
   Series series;
-  std::int64_t lockouts = 0;  ///< that it recovered from
+  bool locked_out = false;  ///< a sensor was rejected again and again, `lockout` in its events
 
   /// Whether its estimates are of use to compare with.
   bool usable() const { return !result.failed && !series.stamps.empty(); }

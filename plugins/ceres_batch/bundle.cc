@@ -185,8 +185,9 @@ void Bundle::Eliminate(ceres::Solver::Options& options) {
       std::min(cameras, points) <= kDense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
 }
 
-/// Ceres compares a step with all unknowns together: a point that is too far away would let any one
-/// pass. So the tolerance is of points as far as half of them.
+/// Ceres compares a step with the norm of all unknowns: one point very far away would let any step
+/// pass. So the tolerance is scaled to the norm that the points, of which there must be one, would
+/// have if all coordinates were of the median size.
 double Bundle::StepTolerance() const {
   constexpr double kTolerance = 1e-12;
   std::vector<double> sizes;

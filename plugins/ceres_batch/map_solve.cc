@@ -124,7 +124,7 @@ std::string MapSolve::WhyNot(const ceres::Solver::Summary& summary) const {
 
 /// U at e, and the Gauss-Newton step that it gives: Ceres stops before the last one. A solver that
 /// stopped where this step, |U step| sigmas, is long was not led down by the Jacobian that it was
-/// given. False where a model is not defined.
+/// given. False where GaussNewtonAt is, or the step leads to where a model is not defined.
 bool MapSolve::TakeLastStep(Trajectory& trajectory, Eigen::VectorXd& e) {
   constexpr double kLong = 1e-3, kRounding = 1e-6;
   if (!GaussNewtonAt(trajectory, e, at_)) return false;

@@ -3,6 +3,8 @@
 // What an evaluation compares: poses of the same time, after the alignment asked for.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "alidade/evaluate.h"
 #include "support/trajectories.h"
 

@@ -227,6 +227,14 @@ TEST(Summarise, LeavesOutTheRunsInWhichTheFilterDiverged) {
   EXPECT_EQ(all.gap[0].values.at("lost").mean, 1.5);
 }
 
+// That an estimator of one of them failed is told of it.
+TEST(Summarise, OfSeedsHasTheStatusOfTheSweep) {
+  Comparison failed = OneRun(1.0);
+  failed.status = RunStatus::kFailed;
+  EXPECT_EQ(Summarise({failed}).status, RunStatus::kOk);
+  EXPECT_EQ(Summarise({OneRun(1.0), failed}).status, RunStatus::kOk);
+}
+
 TEST(Summarise, TakesAStepBetweenTheSameTwoAlone) {
   Comparison other = OneRun(7.0);
   other.gap[0].to = "another";

@@ -114,10 +114,10 @@ TEST(CompareRuns, TellsOfLockOutsOfTheFilter) {
   ComparedRun run =
       RunOf({Entry("ekf", "ekf", false, 2.0), Entry("batch", "ceres_batch", true, 1.0)});
   EXPECT_TRUE(CompareRuns({run}, {}).notes.empty());
-  run.estimators[0].lockouts = 2;
+  run.estimators[0].locked_out = true;
   EXPECT_EQ(CompareRuns({run}, {}).notes,
-            std::vector<std::string>{"'ekf' recovered from a lock-out 2 times: what that cost is "
-                                     "in its step to a batch or smoother"});
+            std::vector<std::string>{"'ekf' was locked out, see its events: what that cost is in "
+                                     "its step to a batch or smoother"});
 }
 
 TEST(CompareRuns, HasTheWorstStatusOfTheRuns) {

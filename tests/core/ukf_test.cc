@@ -4,8 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
+#include <array>
 
 #include "alidade/random.h"
 #include "alidade/square_root_ekf.h"

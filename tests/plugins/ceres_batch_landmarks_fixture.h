@@ -98,7 +98,7 @@ struct Problem {
     return (Point(x, i) - Camera(x, k)).hnormalized();
   }
   /// All residuals over their sigma, and after which of them an observation of two ends.
-  VectorXd Residuals(const VectorXd& x, std::vector<Eigen::Index>* observations = nullptr) const {
+  VectorXd Residuals(const VectorXd& x, std::vector<Eigen::Index>* ends = nullptr) const {
     std::vector<double> r;
     for (int k = 1; k < steps; ++k) {
       const Vector3d w = (Camera(x, k) - Camera(x, k - 1)) / (kWalk * std::sqrt(kDt));
@@ -111,7 +111,7 @@ struct Problem {
         r.insert(r.end(), {d[0] / kPixel, d[1] / kPixel});
         const auto i = static_cast<std::size_t>(m.landmark);
         if (seen[i]) {
-          if (observations != nullptr) observations->push_back(std::ssize(r));
+          if (ends != nullptr) ends->push_back(std::ssize(r));
         } else {  // the first observation and the prior give it its place
           seen[i] = true;
           r.push_back((1.0 / (Point(x, m.landmark) - Camera(x, k)).norm() - kRho) / kRhoSigma);
@@ -121,10 +121,10 @@ struct Problem {
     return Eigen::Map<VectorXd>(r.data(), std::ssize(r));
   }
   double Cost(const VectorXd& x) const {
-    std::vector<Eigen::Index> observations;
-    const VectorXd r = Residuals(x, &observations);
+    std::vector<Eigen::Index> ends;
+    const VectorXd r = Residuals(x, &ends);
     double cost = 0.5 * r.squaredNorm();
-    for (const Eigen::Index end : observations) {
+    for (const Eigen::Index end : ends) {
       const double d = r.segment<2>(end - 2).norm();
       cost += Rho(loss, d) - 0.5 * d * d;
     }
@@ -132,8 +132,8 @@ struct Problem {
   }
   /// J' J and J' r by central differences, each observation counted with its weight at x.
   void NormalEquations(const VectorXd& x, MatrixXd& a, VectorXd& b) const {
-    std::vector<Eigen::Index> observations;
-    const VectorXd r = Residuals(x, &observations);
+    std::vector<Eigen::Index> ends;
+    const VectorXd r = Residuals(x, &ends);
     MatrixXd j(r.size(), x.size());
     constexpr double kStep = 1e-5;
     for (Eigen::Index i = 0; i < x.size(); ++i) {
@@ -141,7 +141,7 @@ struct Problem {
       j.col(i) = (Residuals(x + d) - Residuals(x - d)) / (2.0 * kStep);
     }
     VectorXd w = VectorXd::Ones(r.size());
-    for (const Eigen::Index end : observations) {
+    for (const Eigen::Index end : ends) {
       w.segment<2>(end - 2).setConstant(Weight(loss, r.segment<2>(end - 2).norm()));
     }
     a = j.transpose() * w.asDiagonal() * j;

@@ -111,12 +111,13 @@ GeometryManifold Of(const Geometry& geometry) { return GeometryManifold({{geomet
 TEST(SensorCost, IsTheWhitenedResidualOfTheSensor) {
   const StereoDisparity model(200.0, 0.1, 2.0);
   const SensorModel sealed = InProcessSensor(model, "stereo_disparity");
-  const double z = 13.0;
+  double z = 13.0;
   const std::vector<double> w{0.5};
   const CostKind<StereoDisparity> direct(model, {{0, 0}}, {1}, w);
   const CostKind<SensorModel> behind(sealed, {{0, 0}}, {1}, w);
   const SensorCost<StereoDisparity> a(direct, &z);
   const SensorCost<SensorModel> b(behind, &z);
+  z = 77.0;  // they have their own
   for (const ceres::CostFunction* cost :
        {static_cast<const ceres::CostFunction*>(&a), static_cast<const ceres::CostFunction*>(&b)}) {
     const Evaluated at = At(*cost, {{2.0}});

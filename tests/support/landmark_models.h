@@ -42,11 +42,12 @@ inline LandmarkOptions WithPrior(double inverse_distance = 0.5, double sigma = 0
   return options;
 }
 
-/// A frame of stream 0 with the given landmarks.
+/// A measurement of a landmark.
 struct Observation {
   std::int64_t id;
   std::vector<double> z;
 };
+/// A frame of stream 0 with the given landmarks.
 inline Frame FrameOf(double t_s, const std::vector<Observation>& observations) {
   Frame frame;
   frame.stamp = StampFromSeconds(t_s);
@@ -67,7 +68,7 @@ inline Outcome OutcomeFor(const UpdateReport& report, std::int64_t id) {
   return found == report.measurements().end() ? Outcome::kFailed : found->outcome;
 }
 
-/// null: there is none.
+/// The estimate of a landmark; null: there is none.
 inline const LandmarkEstimate* Find(const std::vector<LandmarkEstimate>& landmarks,
                                     std::int64_t id) {
   const auto found = std::ranges::find(landmarks, id, &LandmarkEstimate::id);

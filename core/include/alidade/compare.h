@@ -75,7 +75,7 @@ struct Comparison {
   std::int64_t frames = 0;
   RunStatus status = RunStatus::kOk;  ///< the worst of the runs'; of seeds kOk or kStopped
   std::string reference;              ///< `truth`, or the first estimator that one is held against
-  std::string withheld;               ///< why there is no comparison with a reference, or ""
+  std::string withheld;               ///< why there is no reference, or nothing to compare; or ""
   std::string measurements_sha256;    ///< of the data; "": of several seeds
   std::vector<ComparedEstimator> estimators;
   std::string explained;  ///< the filter whose gap it is

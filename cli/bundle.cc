@@ -101,6 +101,8 @@ ExitCode CodeOf(BundleEnd end) {
 }
 
 ExitCode RunBundle(const Arguments& arguments) {
+  KeepInputs(arguments.folder, {arguments.problem, arguments.tracks.camera.string(),
+                                arguments.tracks.start.string()});
   const PluginHost host(Absolute(arguments.plugin_paths));
   StopOnSignals();
   std::optional<BundleFolder> folder;

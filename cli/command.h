@@ -57,6 +57,13 @@ std::vector<std::filesystem::path> Absolute(const std::vector<std::string>& path
 std::function<std::string(const std::string&)> IsInteger(std::int64_t least, std::int64_t most);
 std::function<std::string(const std::string&)> IsNumber(double least, double most);
 
+/// Says that a sweep was stopped.
+void TellStopped(std::size_t done, std::int64_t runs);
+
+/// Refuses an output that is, or holds, what the command reads: --force would remove it. Paths may
+/// be empty. Error: kCannotCreate.
+void KeepInputs(const std::string& output, const std::vector<std::string>& inputs);
+
 /// Where output goes: `given`, or the config's `output:` inside runs/, or runs/PREFIX and the name
 /// of the config: of its folder where it is called config.yaml, else of the file. Errors:
 /// kCannotCreate where `given` is runs/ itself, kNotTrusted, kBadConfig.

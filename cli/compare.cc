@@ -131,7 +131,10 @@ ExitCode CompareOverSeeds(const Arguments& arguments, const ExplainedExperiment&
   if (any) AddFiles(out, comparison);
   out.Write(seeds.sweep, explained.config);
   if (any) Tell(comparison, arguments, folder);
-  if (seeds.sweep.stopped) return ExitCode::kStopped;
+  if (seeds.sweep.stopped) {
+    TellStopped(seeds.sweep.done.size(), options.runs);
+    return ExitCode::kStopped;
+  }
   return CodeOf(comparison, failed > 0 ? ExitCode::kFound : ExitCode::kOk);
 }
 
@@ -150,6 +153,7 @@ ExitCode CompareConfig(const Arguments& arguments) {
 }
 
 ExitCode CompareFinished(const Arguments& arguments) {
+  KeepInputs(arguments.folder, arguments.of);
   std::vector<fs::path> folders;
   for (const std::string& folder : arguments.of) folders.emplace_back(folder);
   const Comparison comparison = CompareFolders(folders, arguments.options);
@@ -229,7 +233,8 @@ void AddOptions(CLI::App& command, Arguments& arguments) {
   command.add_flag("--latex", arguments.latex, "print the tables as LaTeX (booktabs)")
       ->excludes("--json")
       ->excludes("--markdown");
-  command.add_flag("--figures", arguments.figures, "draw the figures of the run too");
+  command.add_flag("--figures", arguments.figures, "draw the figures of the run too")
+      ->excludes("--runs");
   command.add_flag("--quiet", arguments.quiet, "print the comparison and errors only");
 }
 

@@ -114,6 +114,10 @@ std::vector<TrajectoryFile> FilesOf(const Arguments& arguments) {
     throw Error(ExitCode::kUsage, "--save_results: " + std::to_string(files.size()) +
                                       " estimates; expected one, as a result of evo has one");
   }
+  std::vector<std::string> inputs = {ReferenceAt(arguments.reference).file.string()};
+  for (const TrajectoryFile& file : files) inputs.push_back(file.file.string());
+  KeepInputs(absolute, inputs);
+  KeepInputs(relative, inputs);
   if (!absolute.empty()) CheckEvoResult(absolute, arguments.force);
   if (!relative.empty()) CheckEvoResult(relative, arguments.force);
   return files;

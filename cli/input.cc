@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <charconv>
 #include <cstdio>
 
 #include "command.h"
+#include "console.h"
 
 namespace alidade::cli {
 namespace fs = std::filesystem;
@@ -122,6 +124,24 @@ PluginHost Input::Host(const Config& loaded) const {
   for (const fs::path& path : PluginPaths(loaded)) places.push_back(FullPath(path));
   for (const fs::path& path : Absolute(plugin_paths)) places.push_back(path);
   return PluginHost(places);
+}
+
+void TellStopped(std::size_t done, std::int64_t runs) {
+  PrintNote("stopped after " + std::to_string(done) + " of " + std::to_string(runs) + " runs");
+}
+
+void KeepInputs(const std::string& output, const std::vector<std::string>& inputs) {
+  if (output.empty()) return;
+  const fs::path taken = fs::weakly_canonical(output);
+  for (const std::string& input : inputs) {
+    const fs::path path = input.empty() ? fs::path() : fs::weakly_canonical(input);
+    if (std::mismatch(taken.begin(), taken.end(), path.begin(), path.end()).first != taken.end())
+      continue;
+    throw Error(ExitCode::kCannotCreate, ErrorLine(Place{output}, {},
+                                                   std::string(path == taken ? "is" : "holds") +
+                                                       " the input '" + input + "'",
+                                                   "another place"));
+  }
 }
 
 fs::path OutputFolder(const std::string& given, const Config& config, const Input& input,

@@ -67,10 +67,6 @@ bool ReportFailures(const SweepResult& result, const std::string& where) {
   return failed > 0;
 }
 
-void TellStopped(std::size_t done, std::int64_t runs) {
-  PrintNote("stopped after " + std::to_string(done) + " of " + std::to_string(runs) + " runs");
-}
-
 /// What both kinds of sweep start from.
 struct Task {
   const Arguments& arguments;

@@ -97,6 +97,7 @@ std::map<std::int64_t, std::size_t> PosesOf(const Tracks& tracks, const Start& s
     if (found != at.end() && found->first <= t + kSame)
       poses[rows.Index(0, "frame")] = found->second;
   }
+  if (rows.line() < 2) rows.FailLine("no rows", "frame,t_s");
   return poses;
 }
 

@@ -352,9 +352,9 @@ Comparison internal::CompareRuns(const std::vector<ComparedRun>& runs,
     comparison.explained = filter->name;
     comparison.gap = ExplainGap(*filter, candidates, truth);
     if (filter->entry->locked_out) {
-      comparison.notes.push_back("'" + filter->name +
-                                 "' was locked out, see its events: what that "
-                                 "cost is in its step to a batch or smoother");
+      comparison.notes.push_back(
+          "'" + filter->name +
+          "' was locked out: what that cost is in its step to a batch or smoother");
     }
   }
   return comparison;

@@ -159,6 +159,10 @@ ComparedEstimator SummariseEstimator(const std::vector<Comparison>& comparisons,
   return all;
 }
 
+std::string OfRuns(std::int64_t some, std::int64_t all) {
+  return std::to_string(some) + " of " + std::to_string(all) + " runs";
+}
+
 /// Of the runs in which the filter did not diverge, those that have the step between the same two.
 GapStep SummariseStep(const std::vector<Comparison>& comparisons, std::size_t s) {
   const GapStep* known = &comparisons.front().gap.at(s);
@@ -187,9 +191,10 @@ Comparison Summarise(const std::vector<Comparison>& comparisons) {
   if (all.runs > 1) all.measurements_sha256.clear();
   all.notes.clear();
   std::int64_t withheld = 0;
+  std::map<std::string, std::int64_t> with_note;
   for (const Comparison& one : comparisons) {
     for (const std::string& note : one.notes) {
-      if (std::ranges::count(all.notes, note) == 0) all.notes.push_back(note);
+      if (++with_note[note] == 1) all.notes.push_back(note);
     }
     if (all.reference.empty()) all.reference = one.reference;
     if (one.withheld.empty()) continue;
@@ -197,7 +202,11 @@ Comparison Summarise(const std::vector<Comparison>& comparisons) {
     ++withheld;
   }
   if (withheld > 0 && all.runs > 1) {
-    all.withheld += " (" + std::to_string(withheld) + " of " + std::to_string(all.runs) + " runs)";
+    all.withheld += " (" + OfRuns(withheld, all.runs) + ')';
+  }
+  for (std::string& note : all.notes) {
+    const std::int64_t runs = with_note[note];
+    if (runs < all.runs) note += " (" + OfRuns(runs, all.runs) + ')';
   }
   for (std::size_t e = 0; e < all.estimators.size(); ++e) {
     all.estimators[e] = SummariseEstimator(comparisons, e);

@@ -81,17 +81,7 @@ void AppendRow(Series& series, const std::vector<double>& row) {
   }
 }
 
-/// Whether events.csv, `t_s,kind,text`, has one of a lock-out.
-bool HasLockout(const fs::path& file) {
-  std::ifstream stream = Open(file);
-  bool found = false;
-  for (std::string line; !found && std::getline(stream, line);) {
-    found = line.compare(line.find(',') + 1, 8, "lockout,") == 0;
-  }
-  return found;
-}
-
-void ReadEstimates(const fs::path& file, Series& series) {
+void ReadEstimates(const fs::path& file, std::int64_t rows, Series& series) {
   std::ifstream stream = Open(file);
   std::string line;
   std::getline(stream, line);
@@ -99,8 +89,13 @@ void ReadEstimates(const fs::path& file, Series& series) {
   for (int number = 2; std::getline(stream, line); ++number) {
     const std::vector<double> row = NumbersOf(line, file, number);
     if (row.size() != columns) FailFile(file, number, "not as wide as run.json has it");
+    if (stream.eof()) FailFile(file, number, "the last line is cut short");
     series.stamps.push_back(cell::ExactStamp(line.substr(0, line.find(',')), 9));
     AppendRow(series, row);
+  }
+  if (std::ssize(series.stamps) != rows) {
+    FailFile(file, 0,
+             std::to_string(series.stamps.size()) + " rows, run.json has " + std::to_string(rows));
   }
 }
 
@@ -135,6 +130,7 @@ EstimatorFacts ReadFacts(const Node& entry) {
   facts.overrides = TextOf(entry, "overrides");
   facts.sensors = Texts(entry.At("sensors"));
   facts.path = TextOf(entry, "path");
+  facts.rows = entry.At("rows", "a comparison").Integer(0, INT64_MAX);
   for (const Node& block : entry.At("blocks").Items()) {
     facts.blocks.push_back({block.At("name").Text(), TextOf(block, "unit"), GeometryOf(block)});
   }
@@ -207,7 +203,9 @@ std::int64_t ComparedEntry::used() const {
   return CountOf(result, {ToString(Outcome::kAccepted), ToString(Outcome::kInitialised)});
 }
 
-ComparedRun ReadRun(const fs::path& folder) {
+namespace {
+
+ComparedRun ReadFiles(const fs::path& folder) {
   ComparedRun run;
   run.folder = folder;
   const Config json = ReadJson(folder / "run.json"), timing = ReadJson(folder / "timing.json");
@@ -227,13 +225,24 @@ ComparedRun ReadRun(const fs::path& folder) {
     one.result.wall_s = timing.root().At("estimators").At(name).At("wall_s").Number();
     one.series.blocks = one.facts.blocks;
     one.series.joint = false;
-    one.locked_out = HasLockout(folder / name / "events.csv");
-    ReadEstimates(folder / name / "estimates.csv", one.series);
+    one.locked_out = entry.At("events").Find("lockout").has_value();
+    ReadEstimates(folder / name / "estimates.csv", one.facts.rows, one.series);
     ReadCovariances(folder / name / "covariance.bin", one.series);
     const fs::path map = folder / name / "landmarks.csv";
     if (fs::exists(map)) one.result.landmarks = ReadMap(map);
   }
   return run;
+}
+
+}  // namespace
+
+ComparedRun ReadRun(const fs::path& folder) {
+  try {
+    return ReadFiles(folder);
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::kBadConfig) throw;
+    throw Error(ExitCode::kBadData, error.what());  // of a json file, which is data here
+  }
 }
 
 }  // namespace alidade::internal

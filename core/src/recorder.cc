@@ -211,6 +211,10 @@ void Recorder::AddFile(const std::string& name, std::string_view text) {
 void Recorder::Finish(const RunResult& result) {
   const std::string timing = impl_->TimingJson(result);
   internal::RecordedRun recorded = impl_->CloseFiles();
+  for (const auto& files : impl_->estimators) {
+    const internal::RecordedEstimator& closed = files->recorded();
+    impl_->facts.estimators.at(closed.name).rows = closed.estimate_rows;
+  }
   const internal::RunFolder& folder = impl_->folder;
   for (std::size_t e = 0; e < result.estimators.size(); ++e) {
     const EstimatorResult& one = result.estimators[e];

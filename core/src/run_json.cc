@@ -39,6 +39,7 @@ void WriteFacts(Json& json, const EstimatorFacts& facts) {
     json.Key("size").Integer(block.geometry.ambient).End();
   }
   json.End();
+  json.Key("rows").Integer(facts.rows);
 }
 
 void WriteEstimator(Json& json, const EstimatorResult& result, const RunFacts& facts) {
@@ -81,7 +82,8 @@ EstimatorFacts FactsOf(const NamedEstimator& named, const Experiment& experiment
           named.overrides,
           NamesOf(named.system.sensors),
           path < 0 ? "" : named.system.layout[path].name,
-          SeriesBlocksOf(named.system)};
+          SeriesBlocksOf(named.system),
+          0};
 }
 
 std::string RunJson(const RunResult& result, const RunFacts& facts) {

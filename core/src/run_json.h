@@ -19,6 +19,7 @@ struct EstimatorFacts {
   std::vector<std::string> sensors;
   std::string path;  ///< the block of a position that landmarks are seen from, or ""
   std::vector<SeriesBlock> blocks;
+  std::int64_t rows = 0;  ///< of estimates.csv
 };
 
 /// What run.json says beside the result.

@@ -193,7 +193,8 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Stamp
   if (!matches.estimate.empty()) return matches;
   Fail(estimate.name,
        "no pose within " + internal::NumberText(Seconds(max_diff)) + " s of one of " +
-           reference.name + ": " + Span(estimate) + " beside " + Span(reference),
+           reference.name + ": " + Span(estimate) + (offset == 0 ? "" : " and --t_offset") +
+           " beside " + Span(reference),
        "the same clock; or --t_offset, which is added to the estimate's stamps, or --t_max_diff");
 }
 

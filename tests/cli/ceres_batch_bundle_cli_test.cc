@@ -207,6 +207,15 @@ TEST_F(BundleTracksCli, SaysWhatIsWrong) {
   Write("half.csv", "0,1,0,10\n0,2,0,10\n0,2,1,20\n");
   const Outcome half = Bundle("half.csv", "data/truth.tum");
   EXPECT_TRUE(Contains(half.err, "half.csv:1: frame 0 has no dim 1 of feature 1")) << half.err;
+  const std::string start = Read("data/truth.tum");
+  const Outcome over = Bundle("data/tracks.csv", "data/truth.tum", {"-o", "data", "--force"});
+  EXPECT_EQ(over.code, 73);
+  EXPECT_TRUE(Contains(over.err, "data: holds the input 'data/tracks.csv'")) << over.err;
+  EXPECT_EQ(Read("data/truth.tum"), start);
+  const std::string times = Read("data/timestamps.csv");
+  Write("data/timestamps.csv", "");
+  EXPECT_TRUE(Contains(Bundle("data/tracks.csv", "data/truth.tum").err, "timestamps.csv: no rows"));
+  Write("data/timestamps.csv", times);
   Write("late.tum", "1e300 0 0 0 0 0 0 1\n");
   const Outcome late = Bundle("data/tracks.csv", "late.tum");
   EXPECT_EQ(late.code, 65);

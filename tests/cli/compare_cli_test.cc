@@ -249,7 +249,7 @@ TEST_F(CompareCli, TellsOfLockOuts) {
   std::string text = Read("table.csv");
   for (int k = 21; k <= 50; ++k) text += std::to_string(0.1 * k) + ",26\n";
   Write("table.csv", text);
-  const std::string words = "'ekf' was locked out, see its events";
+  const std::string words = "'ekf' was locked out: what that cost";
   const Outcome compared = Call({"compare", "table.yaml", "-o", "out", "--set",
                                  "estimators.ekf={type: ekf, gate: 0.99, lockout: {after: 2}}"});
   EXPECT_TRUE(Contains(compared.out, words)) << compared.out << compared.err;
@@ -285,7 +285,9 @@ TEST_F(CompareCli, StopsAtASignalWithTheSeedsThatAreComplete) {
   ASSERT_TRUE(Eventually([&] { return Exists(".out.partial-" + std::to_string(compare)); }));
   std::this_thread::sleep_for(4 * one_run);
   ::kill(compare, SIGTERM);
-  EXPECT_EQ(Wait(compare).code, 75);
+  const Outcome stopped = Wait(compare);
+  EXPECT_EQ(stopped.code, 75);
+  EXPECT_TRUE(Contains(stopped.err, " of 1000000 runs")) << stopped.err;
   const Config json = Json("out/compare.json");
   EXPECT_EQ(json.root().At("status").Text(), "stopped");
   EXPECT_GT(json.root().At("runs").Number(), 0);
@@ -315,8 +317,21 @@ TEST_F(CompareCli, RefusesWhatItCannotCompare) {
   fails({"compare", "a", "--json", "--markdown"}, 2, "--json");
   fails({"compare", "a", "--latex", "--json"}, 2, "--json");
   fails({"compare", "a", "--latex", "--markdown"}, 2, "--markdown");
+  fails({"compare", "a", "-o", "a", "--force"}, 73, "a: is the input 'a'; expected another place");
+  fails({"compare", "a", "-o", ".", "--force"}, 73, ".: holds the input 'a'");
+  EXPECT_TRUE(Exists("a/ekf/estimates.csv"));
+  fails({"compare", "config.yaml", "--runs", "2", "--figures"}, 2, "--figures");
+  const std::string whole = Read("a/ekf/estimates.csv");
+  const std::size_t last = whole.rfind('\n', whole.size() - 2) + 1;
+  Write("a/ekf/estimates.csv", whole.substr(0, last));
+  fails({"compare", "a"}, 65, "estimates.csv: 151 rows, run.json has 152; expected a run folder");
+  Write("a/ekf/estimates.csv", whole.substr(0, whole.size() - 1));
+  fails({"compare", "a"}, 65, "estimates.csv:153: the last line is cut short");
+  Write("a/ekf/estimates.csv", whole);
   Write("a/run.json", std::regex_replace(Read("a/run.json"), std::regex("\"data\""), "\"date\""));
   fails({"compare", "a"}, 65, "does not say which data the run saw");
+  Write("a/run.json", "{\"status\": ");
+  fails({"compare", "a"}, 65, "a/run.json:1");
 }
 
 }  // namespace

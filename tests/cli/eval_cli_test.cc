@@ -191,6 +191,15 @@ TEST_F(EvalCli, WarningsOfTheReferenceAreInJsonToo) {
   EXPECT_EQ(outcome.err.find("goes back"), outcome.err.rfind("goes back")) << outcome.err;
 }
 
+TEST_F(EvalCli, ResultsAreNotSavedOverWhatIsCompared) {
+  const std::string before = Read("truth.tum");
+  const Outcome over =
+      Call({"eval", "truth.tum", "mono.tum", "--save_results", "truth.tum", "--force"});
+  EXPECT_EQ(over.code, 73);
+  EXPECT_TRUE(over.err.starts_with("error: truth.tum: is the input 'truth.tum'")) << over.err;
+  EXPECT_EQ(Read("truth.tum"), before);
+}
+
 TEST_F(EvalCli, ResultsThatCannotBothBeSavedAreNotSaved) {
   const Outcome same = Call({"eval", "truth.tum", "mono.tum", "--save_results", "a.zip",
                              "--save_relative", "./a.zip", "--force"});

@@ -154,6 +154,19 @@ TEST(Associate, TheOffsetIsAddedToTheEstimate) {
   }
 }
 
+TEST(Associate, NamesTheOffsetWhereItIsToBlame) {
+  try {
+    Associate(At({0.0, 1.0}), At({0.0, 1.0}), 1'000'000, 5'000'000'000);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what())
+                  .find("0.000000 s to 1.000000 s and --t_offset beside "
+                        "0.000000 s to 1.000000 s"),
+              std::string::npos)
+        << error.what();
+  }
+}
+
 TEST(Associate, RefusesAnOffsetThatNoStampHolds) {
   const Trajectory two = At({1.6e9, 1.6e9 + 1.0}), one = At({1.6e9});
   constexpr Stamp kOffset = 9'000'000'000'000'000'000;

@@ -235,6 +235,14 @@ TEST(Summarise, OfSeedsHasTheStatusOfTheSweep) {
   EXPECT_EQ(Summarise({OneRun(1.0), failed}).status, RunStatus::kOk);
 }
 
+TEST(Summarise, SaysInHowManyRunsANoteHolds) {
+  Comparison one = OneRun(1.0), two = OneRun(2.0);
+  one.notes = {"both"};
+  two.notes = {"both", "second"};
+  EXPECT_EQ(Summarise({one, two}).notes,
+            (std::vector<std::string>{"both", "second (1 of 2 runs)"}));
+}
+
 TEST(Summarise, TakesAStepBetweenTheSameTwoAlone) {
   Comparison other = OneRun(7.0);
   other.gap[0].to = "another";

@@ -116,8 +116,8 @@ TEST(CompareRuns, TellsOfLockOutsOfTheFilter) {
   EXPECT_TRUE(CompareRuns({run}, {}).notes.empty());
   run.estimators[0].locked_out = true;
   EXPECT_EQ(CompareRuns({run}, {}).notes,
-            std::vector<std::string>{"'ekf' was locked out, see its events: what that cost is in "
-                                     "its step to a batch or smoother"});
+            std::vector<std::string>{"'ekf' was locked out: what that cost is in its step to a "
+                                     "batch or smoother"});
 }
 
 TEST(CompareRuns, HasTheWorstStatusOfTheRuns) {

@@ -289,6 +289,7 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
           "size": 1
         }
       ],
+      "rows": 0,
       "failed": false,
       "metrics": {
         "final:target.depth": null,

@@ -66,7 +66,8 @@ void KeepInputs(const std::string& output, const std::vector<std::string>& input
 
 /// Where output goes: `given`, or the config's `output:` inside runs/, or runs/PREFIX and the name
 /// of the config: of its folder where it is called config.yaml, else of the file. Errors:
-/// kCannotCreate where `given` is runs/ itself, kNotTrusted, kBadConfig.
+/// kCannotCreate where `given` is runs/ itself, or would replace the data that the config reads;
+/// kNotTrusted, kBadConfig.
 std::filesystem::path OutputFolder(const std::string& given, const Config& config,
                                    const Input& input, const std::string& prefix = "");
 

@@ -37,12 +37,21 @@ struct Arguments {
   bool force = false, quiet = false;
 };
 
-/// The names of the values of an enumeration, with which a command line gives them.
+/// An option takes the name of one of `values`.
 template <class T>
-std::map<std::string, T> ByName(std::initializer_list<T> values) {
-  std::map<std::string, T> names;
-  for (const T value : values) names.emplace(ToString(value), value);
-  return names;
+CLI::Validator OneOf(std::initializer_list<T> values) {
+  const auto choose = [all = std::vector<T>(values)](std::string& text) -> std::string {
+    std::string names;
+    for (const T value : all) {
+      if (text == ToString(value)) {
+        text = std::to_string(static_cast<int>(value));
+        return {};
+      }
+      names += (names.empty() ? "" : ", ") + std::string(ToString(value));
+    }
+    return "'" + text + "' is none of " + names;
+  };
+  return {choose, ""};
 }
 
 /// What -a, -s and --align_origin mean beside --align.
@@ -168,6 +177,9 @@ void CheckTogether(const Arguments& arguments) {
   if (pairs.unit == DeltaUnit::kFrames && pairs.delta != std::floor(pairs.delta)) {
     throw CLI::ValidationError("--delta: frames are a whole number");
   }
+  if (arguments.options.align_poses > 0 && Chosen(arguments) == Alignment::kNone) {
+    throw CLI::ValidationError("--n_to_align: nothing is aligned; expected -a, -s or --align too");
+  }
   const std::string &absolute = arguments.save_absolute, &relative = arguments.save_relative;
   const auto file = [](const std::string& path) {
     std::error_code ignored;
@@ -185,9 +197,8 @@ void AddAlignment(CLI::App& command, Arguments& a) {
           .add_option("--align", a.options.alignment,
                       "none (default), origin, yaw (and translation), se3, sim3, or scale alone")
           ->option_text("MODE")
-          ->transform(CLI::CheckedTransformer(
-              ByName({Alignment::kNone, Alignment::kScale, Alignment::kOrigin, Alignment::kYaw,
-                      Alignment::kSe3, Alignment::kSim3})));
+          ->transform(OneOf({Alignment::kNone, Alignment::kScale, Alignment::kOrigin,
+                             Alignment::kYaw, Alignment::kSe3, Alignment::kSim3}));
   CLI::Option* origin = command.add_flag("--align_origin", a.origin, "--align origin, as of evo");
   CLI::Option* se3 = command.add_flag("-a", a.se3, "--align se3; with -s sim3, as of evo");
   CLI::Option* scale =
@@ -206,9 +217,9 @@ void AddErrors(CLI::App& command, Arguments& a) {
                   "repeated; default trans_part and angle_deg")
       ->option_text("NAME")
       ->allow_extra_args(false)
-      ->transform(CLI::CheckedTransformer(
-          ByName({PoseRelation::kTranslation, PoseRelation::kRotation, PoseRelation::kAngleDeg,
-                  PoseRelation::kAngleRad, PoseRelation::kFull, PoseRelation::kPointDistance})));
+      ->transform(
+          OneOf({PoseRelation::kTranslation, PoseRelation::kRotation, PoseRelation::kAngleDeg,
+                 PoseRelation::kAngleRad, PoseRelation::kFull, PoseRelation::kPointDistance}));
   command
       .add_option("-d,--delta", a.options.pairs.delta,
                   "of relative errors: how far poses are apart; default 1")
@@ -218,9 +229,8 @@ void AddErrors(CLI::App& command, Arguments& a) {
       .add_option("-u,--delta_unit", a.options.pairs.unit,
                   "f (frames, default), m (of path), s, d (degrees), r (rad)")
       ->option_text("UNIT")
-      ->transform(CLI::CheckedTransformer(
-          ByName({DeltaUnit::kFrames, DeltaUnit::kMetres, DeltaUnit::kSeconds, DeltaUnit::kDegrees,
-                  DeltaUnit::kRadians})));
+      ->transform(OneOf({DeltaUnit::kFrames, DeltaUnit::kMetres, DeltaUnit::kSeconds,
+                         DeltaUnit::kDegrees, DeltaUnit::kRadians}));
   command.add_flag("--all_pairs", a.options.pairs.all, "from each pose on; default: one by one");
   command
       .add_option("-t,--delta_tol", a.options.pairs.tolerance,
@@ -239,9 +249,8 @@ void AddTimes(CLI::App& command, Arguments& a) {
   command
       .add_option("--format", a.format, "of files: tum, kitti, euroc; default: by their first row")
       ->option_text("NAME")
-      ->transform(
-          CLI::CheckedTransformer(ByName({TrajectoryFormat::kDetect, TrajectoryFormat::kTum,
-                                          TrajectoryFormat::kKitti, TrajectoryFormat::kEuroc})));
+      ->transform(OneOf({TrajectoryFormat::kDetect, TrajectoryFormat::kTum,
+                         TrajectoryFormat::kKitti, TrajectoryFormat::kEuroc}));
 }
 
 void AddForms(CLI::App& command, Arguments& a) {

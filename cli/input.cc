@@ -144,8 +144,10 @@ void KeepInputs(const std::string& output, const std::vector<std::string>& input
   }
 }
 
-fs::path OutputFolder(const std::string& given, const Config& config, const Input& input,
-                      const std::string& prefix) {
+namespace {
+
+fs::path NamedFolder(const std::string& given, const Config& config, const Input& input,
+                     const std::string& prefix) {
   constexpr const char* kHoldsAll = "is the folder that holds the runs";
   if (!given.empty()) {
     if (!HoldsAllRuns(given)) return given;
@@ -160,6 +162,24 @@ fs::path OutputFolder(const std::string& given, const Config& config, const Inpu
     return folder;
   }
   return fs::path(kRuns) / (prefix + NameOf(input.config));
+}
+
+/// Where the data are that the config reads; "" where it names none.
+std::string SourcePath(const Config& config) {
+  const Config copy = config.Merged(Config::FromText("{}", "output").root());  // asks, unrecorded
+  const auto source = copy.root().Find("source");
+  const auto path = source && source->is_map() ? source->Find("path") : std::nullopt;
+  if (!path || path->kind() != Node::Kind::kScalar || path->Text() == "-") return "";
+  return path->Text();
+}
+
+}  // namespace
+
+fs::path OutputFolder(const std::string& given, const Config& config, const Input& input,
+                      const std::string& prefix) {
+  fs::path folder = NamedFolder(given, config, input, prefix);
+  KeepInputs(folder.string(), {SourcePath(config)});
+  return folder;
 }
 
 }  // namespace alidade::cli

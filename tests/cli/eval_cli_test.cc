@@ -191,6 +191,19 @@ TEST_F(EvalCli, WarningsOfTheReferenceAreInJsonToo) {
   EXPECT_EQ(outcome.err.find("goes back"), outcome.err.rfind("goes back")) << outcome.err;
 }
 
+TEST_F(EvalCli, AChoiceIsNamedAmongThoseThereAre) {
+  for (const char* wrong : {"sim2", "3"}) {
+    const Outcome outcome = Call({"eval", "truth.tum", "mono.tum", "--align", wrong});
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_TRUE(outcome.err.starts_with("error: --align: '" + std::string(wrong) +
+                                        "' is none of none, scale, origin, yaw, se3, sim3\n"))
+        << outcome.err;
+  }
+  const Outcome first = Call({"eval", "truth.tum", "mono.tum", "--n_to_align", "10"});
+  EXPECT_EQ(first.code, 2);
+  EXPECT_TRUE(first.err.starts_with("error: --n_to_align: nothing is aligned")) << first.err;
+}
+
 TEST_F(EvalCli, ResultsAreNotSavedOverWhatIsCompared) {
   const std::string before = Read("truth.tum");
   const Outcome over =

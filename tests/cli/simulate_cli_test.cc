@@ -57,6 +57,19 @@ TEST_F(SimulateCli, WritesFilesThatSourceTracksReadsBack) {
   EXPECT_FALSE(Exists("again/map.csv"));
 }
 
+TEST_F(SimulateCli, NothingReplacesTheDataThatItReads) {
+  Write("scene.yaml", kScene);
+  ASSERT_EQ(Call({"simulate", "scene.yaml", "-o", "data"}).code, 0);
+  Write("again.yaml", "alidade: 1\nsource: {type: tracks, path: data}\n");
+  const std::string tracks = Read("data/tracks.csv");
+  for (const char* command : {"simulate", "run", "compare"}) {
+    const Outcome over = Call({command, "again.yaml", "-o", "data", "--force"});
+    EXPECT_EQ(over.code, 73) << command;
+    EXPECT_TRUE(over.err.starts_with("error: data: is the input '")) << over.err;
+  }
+  EXPECT_EQ(Read("data/tracks.csv"), tracks);
+}
+
 TEST_F(SimulateCli, DrawsBySeedAndReplacesOnlyByForce) {
   Write("scene.yaml", kScene);
   EXPECT_EQ(Call({"simulate", "scene.yaml", "-o", "a"}).code, 0);

@@ -47,9 +47,9 @@ struct Pinhole : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<3>> {
     T h[3];
     UnitQuaternion::RotateBack(orientation, along, h);
     if (!(h[2] > T(0.0))) return false;
-    const T inverse = kFocal / h[2];
-    z[0] = inverse * h[0];
-    z[1] = inverse * h[1];
+    const T inverse = 1.0 / h[2];  // as in the Jacobian: a compiler divides once for both
+    z[0] = kFocal * (h[0] * inverse);
+    z[1] = kFocal * (h[1] * inverse);
     return true;
   }
   template <class T>
@@ -239,13 +239,6 @@ class Adjustment {
   int jacobian_evaluations_ = 0;
 };
 
-/// Ratios of two series, round by round.
-std::vector<double> Ratios(const std::vector<double>& a, const std::vector<double>& b) {
-  std::vector<double> ratios(a.size());
-  std::ranges::transform(a, b, ratios.begin(), std::divides());
-  return ratios;
-}
-
 double QuantileOf(std::vector<double> values, double q) {
   std::ranges::sort(values);
   return Quantile(values, q);
@@ -296,22 +289,37 @@ struct Ways {
   };
 };
 
+/// What was measured of one way.
+struct Times {
+  std::vector<double> ms;      ///< of an iteration
+  std::vector<double> ns;      ///< of an evaluation
+  std::vector<double> ratios;  ///< of iterations to the peer's
+};
+
 int Main(int rounds) {
   const Scene scene;
   const Ways ways;
-  const std::size_t count = ways.all.size();
   for (const auto solver : {ceres::DENSE_SCHUR, ceres::SPARSE_SCHUR}) {
     std::vector<std::unique_ptr<Adjustment>> adjustments;
     for (const Ways::Way& way : ways.all)
       adjustments.push_back(std::make_unique<Adjustment>(scene, solver, way.make, way.manifold));
-    std::vector<std::vector<double>> ms(count), ns(count);
+    std::vector<Times> times(ways.all.size());
+    const auto iterate = [&](std::size_t i) {
+      times[i].ms.push_back(adjustments[i]->Iterate());
+      return times[i].ms.back();
+    };
     for (int round = 0; round < rounds; ++round) {
-      for (std::size_t i = 0; i < count; ++i) ms[i].push_back(adjustments[i]->Iterate());
-      for (std::size_t i = 0; i < count; ++i) ns[i].push_back(adjustments[i]->Evaluate());
+      for (std::size_t i = 0; i < times.size(); ++i) {
+        // Twice between two of the peer: a machine that becomes slower or faster cancels.
+        const double before = iterate(ways.all[i].peer), first = iterate(i), second = iterate(i);
+        times[i].ratios.push_back((first + second) / (before + iterate(ways.all[i].peer)));
+      }
+      for (std::size_t i = 0; i < times.size(); ++i)
+        times[i].ns.push_back(adjustments[i]->Evaluate());
     }
     std::printf("%s\n%-28s %12s %8s %26s\n", ceres::LinearSolverTypeToString(solver), "",
                 "ms/iteration", "ns/cost", "ratio (10 % to 90 %)");
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < times.size(); ++i) {
       if (std::abs(adjustments[i]->cost() / adjustments[0]->cost() - 1.0) > 1e-6) {
         std::fprintf(stderr, "error: %s ends at cost %.12g, by hand at %.12g\n", ways.all[i].name,
                      adjustments[i]->cost(), adjustments[0]->cost());
@@ -323,10 +331,10 @@ int Main(int rounds) {
                      adjustments[0]->jacobian_evaluations());
         return 1;
       }
-      const std::vector<double> ratios = Ratios(ms[i], ms[ways.all[i].peer]);
       std::printf("%-28s %12.2f %8.1f %10.3f (%.3f to %.3f)\n", ways.all[i].name,
-                  QuantileOf(ms[i], 0.5), QuantileOf(ns[i], 0.5), QuantileOf(ratios, 0.5),
-                  QuantileOf(ratios, 0.1), QuantileOf(ratios, 0.9));
+                  QuantileOf(times[i].ms, 0.5), QuantileOf(times[i].ns, 0.5),
+                  QuantileOf(times[i].ratios, 0.5), QuantileOf(times[i].ratios, 0.1),
+                  QuantileOf(times[i].ratios, 0.9));
     }
   }
   return 0;
@@ -338,7 +346,8 @@ int Main(int rounds) {
 int main(int argc, char** argv) {
   CLI::App app{"Time of an iteration of Ceres on costs made of sensor models, relative to others."};
   int rounds = 15;
-  app.add_option("--rounds", rounds, "Solves of three iterations for each contender")
+  app.add_option("--rounds", rounds,
+                 "Comparisons of each contender with its peer: two solves of three iterations each")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);

@@ -16,9 +16,9 @@ struct RolePlace {
   int offset = 0;
 };
 
-/// A column of the Jacobian by a parameter block.
-struct Column {
-  int block, column;
+/// An element of the Jacobian by a parameter block, row-major.
+struct JacobianElement {
+  int block, index;
 };
 
 namespace detail {
@@ -72,23 +72,28 @@ struct SensorTraits<SensorModel> {
 /// noise, by W = L^-1, R = L L'.
 template <class Sensor>
 struct CostKind {
+  using Traits = detail::SensorTraits<Sensor>;
+
   /// `blocks` are the ambient sizes of the parameter blocks. `whiten` = W is lower triangular,
   /// row-major, of the size of the tangent of z. No two roles may share a place; the sensor must
   /// outlive this.
   CostKind(const Sensor& model, const std::vector<RolePlace>& roles, const std::vector<int>& blocks,
            const std::vector<double>& whiten)
-      : sensor(model), places(roles), sizes(blocks), w(whiten) {
-    const std::vector<Geometry> geometries = detail::SensorTraits<Sensor>::Geometries(model);
-    const auto m = static_cast<std::size_t>(detail::SensorTraits<Sensor>::Measured(model).tangent);
+      : sensor(model), sizes(blocks), w(whiten) {
+    const std::vector<Geometry> geometries = Traits::Geometries(model);
+    const auto m = static_cast<std::size_t>(measured().tangent);
     ALIDADE_EXPECTS(roles.size() == geometries.size() && w.size() == m * m);
     std::vector<std::vector<bool>> taken, written;  // elements of each block
     for (const int size : blocks) taken.emplace_back(static_cast<std::size_t>(size), false);
     written = taken;
+    role_count_ = static_cast<int>(roles.size());
     for (std::size_t i = 0; i < roles.size(); ++i) {
+      places[i] = roles[i];
       if (roles[i].block < 0) continue;
       const auto block = static_cast<std::size_t>(roles[i].block);
       ALIDADE_EXPECTS(block < blocks.size() && roles[i].offset >= 0 &&
                       roles[i].offset + geometries[i].ambient <= blocks[block]);
+      strides[i] = blocks[block];
       for (int k = 0; k < geometries[i].ambient; ++k) {
         const std::size_t at =
             static_cast<std::size_t>(roles[i].offset) + static_cast<std::size_t>(k);
@@ -98,12 +103,14 @@ struct CostKind {
       }
     }
     for (std::size_t i = 0; i < blocks.size(); ++i) {
-      for (int c = 0; c < blocks[i]; ++c) {
-        if (!written[i][static_cast<std::size_t>(c)]) gaps.push_back({static_cast<int>(i), c});
+      for (int k = 0; k < static_cast<int>(m) * blocks[i]; ++k) {
+        if (!written[i][static_cast<std::size_t>(k % blocks[i])])
+          unwritten.push_back({static_cast<int>(i), k});
       }
     }
+    scale = w[0];
     for (std::size_t i = 0; i < w.size(); ++i)
-      isotropic = isotropic && w[i] == (i % (m + 1) == 0 ? w[0] : 0.0);
+      isotropic = isotropic && w[i] == (i % (m + 1) == 0 ? scale : 0.0);
   }
 
   int role_count() const { return kStatic ? Traits::kMaxRoles : role_count_; }
@@ -111,17 +118,18 @@ struct CostKind {
   Geometry measured() const { return kStatic ? Traits::Measured(sensor) : measured_; }
 
   const Sensor& sensor;
-  std::vector<RolePlace> places;
-  std::vector<int> sizes;    ///< of the blocks
-  std::vector<Column> gaps;  ///< that no role writes
-  std::vector<double> w;
-  bool isotropic = true;  ///< W is a multiple of the identity
+  double scale = 1.0;
+  bool isotropic = true;                   ///< W = scale I
+  RolePlace places[Traits::kMaxRoles];     ///< an array: without the way over a vector
+  int strides[Traits::kMaxRoles] = {};     ///< of the Jacobians by the roles
+  std::vector<int> sizes;                  ///< of the blocks
+  std::vector<double> w;                   ///< W, row-major
+  std::vector<JacobianElement> unwritten;  ///< by any role: zero
 
  private:
-  using Traits = detail::SensorTraits<Sensor>;
   /// Of a model that the compiler sees through they are constants.
   static constexpr bool kStatic = !std::is_same_v<Sensor, SensorModel>;
-  int role_count_ = static_cast<int>(places.size());
+  int role_count_ = 0;
   Geometry measured_ = Traits::Measured(sensor);
 };
 

@@ -40,61 +40,66 @@ class SensorCost final : public ceres::CostFunction {
     __builtin_prefetch(z);  // near or far, in another cache line; not needed until h is there
     const double* roles[Traits::kMaxRoles];
     double* j[Traits::kMaxRoles];
-    int strides[Traits::kMaxRoles];
-    Bind(blocks, jacobians, roles, j, strides);
+    Bind(blocks, jacobians, roles, j);
     double** const wanted = jacobians == nullptr ? nullptr : j;
-    const GeometryKind geometry = kind_.measured().kind;
-    if (geometry == GeometryKind::kUnitQuaternion)
-      return Curved<UnitQuaternion>(z, roles, wanted, strides, residuals, jacobians);
-    if (geometry == GeometryKind::kUnitVector)
-      return Curved<UnitVector>(z, roles, wanted, strides, residuals, jacobians);
-    if (Traits::Linearise(kind_.sensor, roles, residuals, wanted, strides) != Status::kOk)
+    if (kind_.measured().kind != GeometryKind::kVector || !kind_.isotropic)
+      return General(z, roles, wanted, residuals, jacobians);
+    if (Traits::Linearise(kind_.sensor, roles, residuals, wanted, kind_.strides) != Status::kOk)
       return false;
     const int m = kind_.measured().tangent;
-    const double* const w = kind_.w.data();
-    if (geometry == GeometryKind::kAngle) {
-      residuals[0] = -w[0] * Angle::Wrap(z[0] - residuals[0]);
-    } else if (kind_.isotropic) {
-      for (int i = 0; i < m; ++i) residuals[i] = w[0] * (residuals[i] - z[i]);
-    } else {
-      for (int i = 0; i < m; ++i) residuals[i] -= z[i];
-      Whiten(residuals, 1, 1.0);
-    }
-    WhitenAll(jacobians, 1.0);
+    const double scale = kind_.scale;
+    for (int i = 0; i < m; ++i) residuals[i] = scale * (residuals[i] - z[i]);
+    if (jacobians != nullptr && scale != 1.0) WhitenAll(jacobians, 1.0);
     return true;
   }
 
  private:
   /// Where the roles are, and where the Jacobian by each goes.
-  void Bind(const double* const* blocks, double** jacobians, const double** roles, double** j,
-            int* strides) const {
-    const RolePlace* const places = kind_.places.data();
-    const int* const sizes = kind_.sizes.data();
+  void Bind(const double* const* blocks, double** jacobians, const double** roles,
+            double** j) const {
     const int count = kind_.role_count();
+    if (jacobians == nullptr) {
+      for (int i = 0; i < count; ++i) {
+        const auto [block, offset] = kind_.places[i];
+        roles[i] = block < 0 ? nullptr : blocks[block] + offset;
+      }
+      return;
+    }
     for (int i = 0; i < count; ++i) {
-      const auto [block, offset] = places[i];
+      const auto [block, offset] = kind_.places[i];
       roles[i] = block < 0 ? nullptr : blocks[block] + offset;
-      strides[i] = block < 0 ? 0 : sizes[block];
+      double* const jacobian = block < 0 ? nullptr : jacobians[block];
+      j[i] = jacobian == nullptr ? nullptr : jacobian + offset;
     }
-    if (jacobians == nullptr) return;
-    for (int i = 0; i < count; ++i) {
-      const auto [block, offset] = places[i];
-      const bool wanted = block >= 0 && jacobians[block] != nullptr;
-      j[i] = wanted ? jacobians[block] + offset : nullptr;
+    for (const auto [block, index] : kind_.unwritten) {
+      if (jacobians[block] != nullptr) jacobians[block][index] = 0.0;
     }
-    for (const auto [block, column] : kind_.gaps) {
-      for (int r = 0; jacobians[block] != nullptr && r < kind_.measured().tangent; ++r)
-        jacobians[block][r * sizes[block] + column] = 0.0;
-    }
+  }
+
+  /// Where z is not a vector, or its noise correlated: away from the path of the many.
+  [[gnu::noinline]] bool General(const double* z, const double* const* roles, double* const* j,
+                                 double* residuals, double** jacobians) const {
+    const GeometryKind geometry = kind_.measured().kind;
+    if (geometry == GeometryKind::kUnitQuaternion)
+      return Curved<UnitQuaternion>(z, roles, j, residuals, jacobians);
+    if (geometry == GeometryKind::kUnitVector)
+      return Curved<UnitVector>(z, roles, j, residuals, jacobians);
+    if (Traits::Linearise(kind_.sensor, roles, residuals, j, kind_.strides) != Status::kOk)
+      return false;
+    for (int i = 0; i < kind_.measured().tangent; ++i) residuals[i] -= z[i];
+    if (geometry == GeometryKind::kAngle) residuals[0] = -Angle::Wrap(-residuals[0]);
+    Whiten(residuals, 1, 1.0);
+    WhitenAll(jacobians, 1.0);
+    return true;
   }
 
   /// Where z is on a manifold G, of 2 or 3 dimensions.
   template <class G>
-  bool Curved(const double* z, const double* const* roles, double* const* j, const int* strides,
-              double* residuals, double** jacobians) const {
+  bool Curved(const double* z, const double* const* roles, double* const* j, double* residuals,
+              double** jacobians) const {
     constexpr int m = G::kTangent;
     double h[G::kAmbient], slope[m * m];
-    if (Traits::Linearise(kind_.sensor, roles, h, j, strides) != Status::kOk) return false;
+    if (Traits::Linearise(kind_.sensor, roles, h, j, kind_.strides) != Status::kOk) return false;
     Difference<G>(z, h, residuals, j == nullptr ? nullptr : slope);
     Whiten(residuals, 1, -1.0);
     for (std::size_t i = 0; jacobians != nullptr && i < kind_.sizes.size(); ++i) {
@@ -112,7 +117,7 @@ class SensorCost final : public ceres::CostFunction {
     return true;
   }
 
-  ALIDADE_SCALAR_LOOPS void WhitenAll(double** jacobians, double sign) const {
+  [[gnu::noinline]] void WhitenAll(double** jacobians, double sign) const {
     if (jacobians == nullptr) return;
     const int* const sizes = kind_.sizes.data();
     for (std::size_t i = 0; i < kind_.sizes.size(); ++i) {
@@ -120,10 +125,10 @@ class SensorCost final : public ceres::CostFunction {
     }
   }
   /// a <- sign W a, in place: from the last row up, as W is lower triangular.
-  ALIDADE_SCALAR_LOOPS void Whiten(double* a, int columns, double sign) const {
+  void Whiten(double* a, int columns, double sign) const {
     const int m = kind_.measured().tangent;
     if (kind_.isotropic) {
-      const double factor = sign * kind_.w[0];
+      const double factor = sign * kind_.scale;
       if (factor == 1.0) return;
       for (int i = 0; i < m * columns; ++i) a[i] *= factor;
       return;

@@ -90,6 +90,13 @@ inline void Copy(MatrixRef from, int rows, int columns, MatrixRef to) {
   for (int r = 0; r < rows && columns > 0; ++r) std::copy_n(&from(r, 0), columns, &to(r, 0));
 }
 
+/// The same of a size known to the compiler, which then keeps nothing of `from` in memory. A copy
+/// of vectors would wait until the numbers, and all that was stored before them, are in the caches.
+template <int kColumns, std::size_t... I>
+void CopyUnrolled(const double* from, MatrixRef to, std::index_sequence<I...>) {
+  ((to(I / kColumns, I % kColumns) = from[I]), ...);
+}
+
 template <class Model, class T, std::size_t... I>
 bool CallPredict(const Model& model, const T* const* x, T* z, std::index_sequence<I...>) {
   return model.Predict(x[I]..., z);
@@ -113,8 +120,9 @@ void ClosedForm(const Model& model, const double* const* x, double* const* jacob
   model.Jacobian(x[I]..., j[I]...);
   const auto copy = [&](auto index) {
     constexpr int i = decltype(index)::value;
+    constexpr int n = SpaceAt<i, Model>::kTangent;
     if (jacobians[i] == nullptr) return;
-    Copy(j[i], m, SpaceAt<i, Model>::kTangent, {jacobians[i], strides[i]});
+    CopyUnrolled<n>(j[i].data, {jacobians[i], strides[i]}, std::make_index_sequence<m * n>());
   };
   ForEach(copy, indices);
 }
@@ -136,7 +144,7 @@ Status Evaluate(const Model& model, const double* const* roles, double* z, doubl
     if constexpr (kClosedForm) {
       if (jacobians != nullptr) detail::ClosedForm(model, roles, jacobians, strides, indices);
     }
-    std::copy_n(value, Z::kAmbient, z);
+    detail::CopyUnrolled<1>(value, {z, 1}, std::make_index_sequence<Z::kAmbient>());
     return Status::kOk;
   }
   if constexpr (!kClosedForm) {

@@ -136,7 +136,7 @@ ExitCode RunBundle(const Arguments& arguments) {
           std::to_string(result.residuals) + " residuals, " + std::to_string(result.unknowns) +
           " unknowns\n";
   for (const std::string& line : Undetermined(file.problem, sensor, result)) text += line + '\n';
-  if (folder) {
+  if (folder && result.end != BundleEnd::kFailed) {
     const std::vector<std::string> names = folder->Save(file, result, before, after);
     text += "wrote " + arguments.folder + '\n';
     for (const std::string& name : names)

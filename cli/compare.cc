@@ -94,7 +94,16 @@ ExitCode CompareRun(const Arguments& arguments, ExplainedExperiment& explained,
   FinishOnSignals();
   CompareOptions of_run = arguments.options;
   of_run.filter = explained.filter;
-  Comparison comparison = comparer.Finish(result, of_run);
+  Comparison comparison;
+  try {
+    comparison = comparer.Finish(result, of_run);
+  } catch (const Error&) {  // the run is kept, with its own reason where it has one
+    recorder.Finish(result);
+    if (result.status == RunStatus::kOk) throw;
+    if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
+    if (result.status == RunStatus::kStopped) PrintNote(result.reason);
+    return result.code;
+  }
   comparison.notes.insert(comparison.notes.begin(), explained.notes.begin(), explained.notes.end());
   if (result.status != RunStatus::kOk) comparison.notes.push_back(result.reason);
   AddFiles(recorder, comparison);

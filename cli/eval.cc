@@ -123,10 +123,6 @@ std::vector<TrajectoryFile> FilesOf(const Arguments& arguments) {
     throw Error(ExitCode::kUsage, "--save_results: " + std::to_string(files.size()) +
                                       " estimates; expected one, as a result of evo has one");
   }
-  std::vector<std::string> inputs = {ReferenceAt(arguments.reference).file.string()};
-  for (const TrajectoryFile& file : files) inputs.push_back(file.file.string());
-  KeepInputs(absolute, inputs);
-  KeepInputs(relative, inputs);
   if (!absolute.empty()) CheckEvoResult(absolute, arguments.force);
   if (!relative.empty()) CheckEvoResult(relative, arguments.force);
   return files;
@@ -177,8 +173,11 @@ void CheckTogether(const Arguments& arguments) {
   if (pairs.unit == DeltaUnit::kFrames && pairs.delta != std::floor(pairs.delta)) {
     throw CLI::ValidationError("--delta: frames are a whole number");
   }
-  if (arguments.options.align_poses > 0 && Chosen(arguments) == Alignment::kNone) {
-    throw CLI::ValidationError("--n_to_align: nothing is aligned; expected -a, -s or --align too");
+  const Alignment chosen = Chosen(arguments);
+  if (arguments.options.align_poses > 0 &&
+      (chosen == Alignment::kNone || chosen == Alignment::kOrigin)) {
+    throw CLI::ValidationError("--n_to_align: " + std::string(ToString(chosen)) +
+                               " aligns no N poses; expected -a, -s or --align too");
   }
   const std::string &absolute = arguments.save_absolute, &relative = arguments.save_relative;
   const auto file = [](const std::string& path) {
@@ -249,8 +248,8 @@ void AddTimes(CLI::App& command, Arguments& a) {
   command
       .add_option("--format", a.format, "of files: tum, kitti, euroc; default: by their first row")
       ->option_text("NAME")
-      ->transform(OneOf({TrajectoryFormat::kDetect, TrajectoryFormat::kTum,
-                         TrajectoryFormat::kKitti, TrajectoryFormat::kEuroc}));
+      ->transform(
+          OneOf({TrajectoryFormat::kTum, TrajectoryFormat::kKitti, TrajectoryFormat::kEuroc}));
 }
 
 void AddForms(CLI::App& command, Arguments& a) {

@@ -53,7 +53,12 @@ std::function<std::string(const std::string&)> IsInteger(std::int64_t least, std
     std::int64_t value = 0;
     const char* const end = text.data() + text.size();
     const auto [rest, error] = std::from_chars(text.data(), end, value);
-    if (error == std::errc() && rest == end && value >= least && value <= most) return {};
+    const bool whole = error == std::errc() && rest == end;
+    // Later it is read as C does, where 010 is 8.
+    const std::size_t first = text.starts_with('-') ? 1 : 0;
+    if (whole && text.size() > first + 1 && text[first] == '0')
+      return "'" + text + "' has a leading zero";
+    if (whole && value >= least && value <= most) return {};
     return "'" + text + "' is no integer from " + std::to_string(least) + " to " +
            std::to_string(most);
   };
@@ -131,10 +136,15 @@ void TellStopped(std::size_t done, std::int64_t runs) {
 }
 
 void KeepInputs(const std::string& output, const std::vector<std::string>& inputs) {
+  const auto resolved = [](const std::string& path) {
+    std::error_code error;
+    fs::path whole = fs::weakly_canonical(path, error);
+    return error ? fs::absolute(path, error).lexically_normal() : whole;
+  };
   if (output.empty()) return;
-  const fs::path taken = fs::weakly_canonical(output);
+  const fs::path taken = resolved(output);
   for (const std::string& input : inputs) {
-    const fs::path path = input.empty() ? fs::path() : fs::weakly_canonical(input);
+    const fs::path path = input.empty() ? fs::path() : resolved(input);
     if (std::mismatch(taken.begin(), taken.end(), path.begin(), path.end()).first != taken.end())
       continue;
     throw Error(ExitCode::kCannotCreate, ErrorLine(Place{output}, {},
@@ -164,21 +174,12 @@ fs::path NamedFolder(const std::string& given, const Config& config, const Input
   return fs::path(kRuns) / (prefix + NameOf(input.config));
 }
 
-/// Where the data are that the config reads; "" where it names none.
-std::string SourcePath(const Config& config) {
-  const Config copy = config.Merged(Config::FromText("{}", "output").root());  // asks, unrecorded
-  const auto source = copy.root().Find("source");
-  const auto path = source && source->is_map() ? source->Find("path") : std::nullopt;
-  if (!path || path->kind() != Node::Kind::kScalar || path->Text() == "-") return "";
-  return path->Text();
-}
-
 }  // namespace
 
 fs::path OutputFolder(const std::string& given, const Config& config, const Input& input,
                       const std::string& prefix) {
   fs::path folder = NamedFolder(given, config, input, prefix);
-  KeepInputs(folder.string(), {SourcePath(config)});
+  KeepInputs(folder.string(), config.inputs());
   return folder;
 }
 

@@ -52,7 +52,9 @@ ExitCode RunSimulate(const Arguments& arguments) {
     for (const std::string& file : result.files) text += "  " + (path / file).string() + '\n';
     Print(text);
   }
-  return result.stopped ? ExitCode::kStopped : ExitCode::kOk;
+  if (!result.stopped) return ExitCode::kOk;
+  PrintNote("stopped after " + std::to_string(result.frames) + " frames");
+  return ExitCode::kStopped;
 }
 
 }  // namespace

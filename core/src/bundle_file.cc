@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/bundle_file.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
-#include <iostream>
-#include <sstream>
 
 #include "bundle_formats.h"
 #include "json.h"
@@ -19,26 +19,36 @@ namespace {
 using internal::AppendNumber;
 using internal::RunFolder;
 
+/// All of a file, of a pipe, or of standard input where it is `-`. Errors: kInputMissing, kIo for a
+/// read that fails, kStopped where a signal ends the wait for more.
 std::string ReadAll(const std::filesystem::path& file) {
-  std::ostringstream bytes;
-  if (file == "-") {
-    bytes << std::cin.rdbuf();
-    return bytes.str();
-  }
-  const auto fail = [&](int error) {
-    throw Error(ExitCode::kInputMissing,
-                ErrorLine({file.string()}, {}, std::strerror(error), "a readable file"));
+  const bool standard_input = file == "-";
+  const Place place{standard_input ? "<stdin>" : file.string()};
+  const auto fail = [&](ExitCode code, int error) {
+    if (error == EINTR) {
+      throw Error(ExitCode::kStopped,
+                  ErrorLine(place, {}, "stopped by a signal while waiting for data"));
+    }
+    const char* const expected = code == ExitCode::kInputMissing ? "a readable file" : "";
+    throw Error(code, ErrorLine(place, {}, std::strerror(error), expected));
   };
   std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) fail(EISDIR);
-  errno = 0;
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) fail(errno != 0 ? errno : EIO);
-  if (stream.peek() != std::ifstream::traits_type::eof()) bytes << stream.rdbuf();
-  if (stream.bad() || bytes.fail()) {
-    throw Error(ExitCode::kIo, ErrorLine({file.string()}, {}, "reading failed half-way"));
+  if (std::filesystem::is_directory(file, ignored)) fail(ExitCode::kInputMissing, EISDIR);
+  struct Descriptor {
+    int number;
+    ~Descriptor() {
+      if (number > STDIN_FILENO) close(number);
+    }
+  };
+  const Descriptor opened{standard_input ? STDIN_FILENO : open(file.c_str(), O_RDONLY | O_CLOEXEC)};
+  if (opened.number < 0) fail(ExitCode::kInputMissing, errno);
+  std::string bytes;
+  for (char chunk[1 << 14];;) {
+    const ssize_t count = read(opened.number, chunk, sizeof chunk);
+    if (count == 0) return bytes;
+    if (count < 0) fail(ExitCode::kIo, errno);
+    bytes.append(chunk, static_cast<std::size_t>(count));
   }
-  return std::move(bytes).str();
 }
 
 [[noreturn]] void FailFormat(const std::string& name, const std::string& what,

@@ -19,9 +19,14 @@ using internal::Single;
 
 namespace {
 
-/// The folder of a run without those above it.
+/// The folder of a run without those above it; "" of one that has none.
 std::string FolderName(const ComparedRun& run) {
-  return (run.folder / ".").lexically_normal().parent_path().filename().string();
+  if (run.folder.empty()) return "";
+  return (std::filesystem::absolute(run.folder) / ".")
+      .lexically_normal()
+      .parent_path()
+      .filename()
+      .string();
 }
 
 /// What estimators are called by beside those of other runs: the folder of each run, by its name

@@ -30,8 +30,8 @@ Partners PartnersOf(const Candidate& filter, const std::vector<Candidate>& candi
     if (!one.batch()) continue;
     if (facts.smoothed) keep(by_filter ? found.accepted : found.all, one);
     // What the filter did not accept is another step's.
-    const bool better =
-        by_filter && found.so_far != nullptr && found.so_far->facts().accepted_by.empty();
+    const bool better = by_filter && one.entry->usable() && found.so_far != nullptr &&
+                        found.so_far->facts().accepted_by.empty();
     if (!facts.smoothed && better) found.so_far = &one;
     if (!facts.smoothed) keep(found.so_far, one);
   }

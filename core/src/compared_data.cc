@@ -27,7 +27,8 @@ class MeasurementsFile {
 
   StampRows Next() {
     const auto cell = [](const std::string& row, std::size_t at) {
-      return row.substr(at, row.find(',', at) - at);
+      const std::size_t from = std::min(at, row.size());
+      return row.substr(from, row.find(',', from) - from);
     };
     StampRows next{cell(row_, 0), {}};
     for (; !row_.empty() && cell(row_, 0) == next.t_s; Advance()) next.rows.push_back(row_);

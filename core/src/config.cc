@@ -152,13 +152,14 @@ class Loader {
   explicit Loader(bool allow_outside) : allow_outside_(allow_outside) {}
 
   std::unique_ptr<ConfigTree> Load(const fs::path& file, const Place& place, std::string_view key) {
-    constexpr int kMaxFiles = 64;
+    constexpr std::size_t kMaxFiles = 64;
     std::error_code ignored;
     const fs::path canonical = fs::weakly_canonical(file, ignored);
     if (std::find(open_.begin(), open_.end(), canonical) != open_.end()) {
       FailAt(place, key, "includes itself: " + Quoted(file.string()));
     }
-    if (++files_ > kMaxFiles) FailAt(place, key, "too many includes", "at most 64 files");
+    files_.push_back(file.string());
+    if (files_.size() > kMaxFiles) FailAt(place, key, "too many includes", "at most 64 files");
     auto own = ParseRoot(ReadFile(file, place, key), file.string(), &budget_);
     AnchorPaths(*own, file.parent_path());
     const auto include = TakeInclude(own.get());
@@ -170,6 +171,7 @@ class Loader {
     merged->place = own->place;
     return merged;
   }
+  const std::vector<std::string>& files() const { return files_; }
 
  private:
   std::unique_ptr<ConfigTree> LoadIncludes(const ConfigTree& include, const fs::path& folder) {
@@ -188,7 +190,7 @@ class Loader {
   }
 
   bool allow_outside_;
-  int files_ = 0;
+  std::vector<std::string> files_;
   Budget budget_;
   std::vector<fs::path> open_;
 };
@@ -256,7 +258,9 @@ std::unique_ptr<ConfigTree>* Descend(ConfigTree* at, const Step& step, const Pla
 
 Config Config::FromFile(const fs::path& file, bool allow_outside) {
   Config config;
-  config.tree_ = Loader(allow_outside).Load(file, Place{file.string()}, {});
+  Loader loader(allow_outside);
+  config.tree_ = loader.Load(file, Place{file.string()}, {});
+  config.files_ = loader.files();
   config.folder_ = file.has_parent_path() ? file.parent_path() : fs::path(".");
   config.name_ = file.string();
   return config;
@@ -301,6 +305,15 @@ void Config::Set(std::string_view dotted_key, std::string_view value, std::strin
   next->index = at->index;
   *slot = std::move(next);
   AnchorPaths(*tree_, {});
+}
+
+std::vector<std::string> Config::inputs() const {
+  std::vector<std::string> all = files_;
+  const ConfigTree* const source = Child(*tree_, "source");
+  const ConfigTree* const path = source == nullptr ? nullptr : Child(*source, "path");
+  if (path != nullptr && path->kind == Node::Kind::kScalar && path->text != "-")
+    all.push_back(path->text);
+  return all;
 }
 
 Config Config::Merged(const Node& overrides) const {

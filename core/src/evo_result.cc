@@ -5,7 +5,9 @@
 
 #include <bit>
 #include <cstdint>
+#include <fstream>
 #include <memory>
+#include <string_view>
 
 #include "alidade/error.h"
 #include "alidade/evaluation_report.h"
@@ -192,9 +194,15 @@ void WriteWhole(const fs::path& file, const std::string& content) {
 
 void CheckEvoResult(const fs::path& zip, bool force) {
   std::error_code ignored;
-  if (force || !fs::exists(zip, ignored)) return;
-  throw Error(ExitCode::kCannotCreate,
-              ErrorLine({zip.string()}, {}, "is there already", "--force, or another name"));
+  if (!fs::exists(zip, ignored)) return;
+  const auto refuse = [&](const char* why, const char* remedy) {
+    throw Error(ExitCode::kCannotCreate, ErrorLine({zip.string()}, {}, why, remedy));
+  };
+  if (!fs::is_regular_file(zip, ignored)) refuse("is no regular file", "another name");
+  if (!force) refuse("is there already", "--force, or another name");
+  char magic[4] = {};
+  std::ifstream(zip, std::ios::binary).read(magic, 4);
+  if (std::string_view(magic, 4) != "PK\3\4") refuse("is no zip", "another name");
 }
 
 void SaveEvoResult(const Evaluation& evaluation, SavedErrors which, const fs::path& zip,

@@ -120,7 +120,7 @@ struct CostKind {
   const Sensor& sensor;
   double scale = 1.0;
   bool isotropic = true;                   ///< W = scale I
-  RolePlace places[Traits::kMaxRoles];     ///< an array: without the way over a vector
+  RolePlace places[Traits::kMaxRoles];     ///< read at each evaluation, and so an array
   int strides[Traits::kMaxRoles] = {};     ///< of the Jacobians by the roles
   std::vector<int> sizes;                  ///< of the blocks
   std::vector<double> w;                   ///< W, row-major

@@ -57,26 +57,19 @@ class SensorCost final : public ceres::CostFunction {
   /// Where the roles are, and where the Jacobian by each goes.
   void Bind(const double* const* blocks, double** jacobians, const double** roles,
             double** j) const {
-    const int count = kind_.role_count();
-    if (jacobians == nullptr) {
-      for (int i = 0; i < count; ++i) {
-        const auto [block, offset] = kind_.places[i];
-        roles[i] = block < 0 ? nullptr : blocks[block] + offset;
-      }
-      return;
-    }
-    for (int i = 0; i < count; ++i) {
+    for (int i = 0; i < kind_.role_count(); ++i) {
       const auto [block, offset] = kind_.places[i];
       roles[i] = block < 0 ? nullptr : blocks[block] + offset;
-      double* const jacobian = block < 0 ? nullptr : jacobians[block];
-      j[i] = jacobian == nullptr ? nullptr : jacobian + offset;
+      const bool wanted = jacobians != nullptr && block >= 0 && jacobians[block] != nullptr;
+      j[i] = wanted ? jacobians[block] + offset : nullptr;
     }
+    if (jacobians == nullptr) return;
     for (const auto [block, index] : kind_.unwritten) {
       if (jacobians[block] != nullptr) jacobians[block][index] = 0.0;
     }
   }
 
-  /// Where z is not a vector, or its noise correlated: away from the path of the many.
+  /// Where z is no vector, or its noise correlated. Out of line, so that Evaluate stays small.
   [[gnu::noinline]] bool General(const double* z, const double* const* roles, double* const* j,
                                  double* residuals, double** jacobians) const {
     const GeometryKind geometry = kind_.measured().kind;

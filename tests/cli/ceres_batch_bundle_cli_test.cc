@@ -227,6 +227,13 @@ TEST_F(BundleTracksCli, SaysWhatIsWrong) {
 }
 
 /// A point behind its only camera; one so far away that its pixels are no numbers; nothing at all.
+TEST_F(BundleCli, AStandardInputThatCannotBeReadIsNotEmpty) {
+  before_ = "exec < .";
+  const Outcome folder = Call({"bundle", "-"});
+  EXPECT_EQ(folder.code, 74);
+  EXPECT_TRUE(folder.err.starts_with("error: <stdin>: Is a directory")) << folder.err;
+}
+
 TEST_F(BundleCli, RefusesAProblemOfWhichNothingIsDefined) {
   const std::string camera = "0\n0\n0\n0\n0\n0\n500\n0\n0\n";
   for (const std::string& text :

@@ -61,6 +61,23 @@ TEST_F(CompareCli, AConfigIsRunAndItsGapExplained) {
   EXPECT_TRUE(Contains(Read("out/compare.md"), "| rmse target.depth [mm] | "));
 }
 
+// Neither errors from truth nor an end: the run is kept, and says why.
+TEST_F(CompareCli, ARunThatCannotBeComparedIsKept) {
+  const auto compare = [&](const std::string& rows, const std::string& folder) {
+    Write("bad.csv", "t_s,d,z\n" + rows);
+    return Call({"compare", "table.yaml", "--set", "source.path=bad.csv", "--set",
+                 "source.truth={target.depth: z}", "--reference", "truth", "-o", folder});
+  };
+  const Outcome broken = compare("0,x,0.3\n", "broken");
+  EXPECT_EQ(broken.code, 65);
+  EXPECT_TRUE(Contains(broken.err, "bad.csv:2")) << broken.err;
+  EXPECT_TRUE(Contains(Read("broken/run.json"), "\"failed\""));
+  const Outcome blind = compare("0,86,\n0.1,86,\n", "blind");
+  EXPECT_EQ(blind.code, 2);
+  EXPECT_TRUE(Contains(blind.err, "--reference: no run has errors from truth")) << blind.err;
+  EXPECT_TRUE(Contains(Read("blind/run.json"), "\"ok\""));
+}
+
 // What a run shows of itself while it runs, its folder tells later: covariances too.
 TEST_F(CompareCli, TheFolderOfARunTellsTheSame) {
   ASSERT_EQ(Call({"compare", "config.yaml", "-o", "out", "--quiet"}).code, 0);
@@ -88,6 +105,8 @@ TEST_F(CompareCli, OfSeveralFoldersEstimatorsAreNamedByTheirs) {
   const Config both = Json("both/compare.json");
   const Node all = both.root().At("estimators");
   EXPECT_EQ(all.At("b/ekf").At("reference").Text(), "a/batch_so_far");
+  before_ = "cd runs/a";
+  EXPECT_TRUE(Contains(Call({"compare", ".", "../b"}).out, "  a/ekf"));
 }
 
 // FAULTS 86
@@ -106,6 +125,10 @@ TEST_F(CompareCli, RefusesRunsOverDifferentData) {
                               hash("a") +
                               ", first at t = 0.500000000 s of the one, t = 0.500000000 s of the "
                               "other; expected runs of the same source, seed and start\n");
+  Write("a/measurements.csv", "t_s,stereo\n0.1\n0.1\n");
+  const Outcome damaged = Call({"compare", "a", "b"});
+  EXPECT_EQ(damaged.code, 65);
+  EXPECT_TRUE(Contains(damaged.err, "b: saw other measurements than 'a'")) << damaged.err;
 }
 
 // FAULTS 86: the same numbers in another text are the same data.

@@ -199,9 +199,12 @@ TEST_F(EvalCli, AChoiceIsNamedAmongThoseThereAre) {
                                         "' is none of none, scale, origin, yaw, se3, sim3\n"))
         << outcome.err;
   }
-  const Outcome first = Call({"eval", "truth.tum", "mono.tum", "--n_to_align", "10"});
-  EXPECT_EQ(first.code, 2);
-  EXPECT_TRUE(first.err.starts_with("error: --n_to_align: nothing is aligned")) << first.err;
+  for (const char* mode : {"none", "origin"}) {
+    const Outcome first =
+        Call({"eval", "truth.tum", "mono.tum", "--n_to_align", "10", "--align", mode});
+    EXPECT_EQ(first.code, 2) << mode;
+    EXPECT_TRUE(first.err.starts_with("error: --n_to_align: " + std::string(mode))) << first.err;
+  }
 }
 
 TEST_F(EvalCli, ResultsAreNotSavedOverWhatIsCompared) {
@@ -209,8 +212,13 @@ TEST_F(EvalCli, ResultsAreNotSavedOverWhatIsCompared) {
   const Outcome over =
       Call({"eval", "truth.tum", "mono.tum", "--save_results", "truth.tum", "--force"});
   EXPECT_EQ(over.code, 73);
-  EXPECT_TRUE(over.err.starts_with("error: truth.tum: is the input 'truth.tum'")) << over.err;
+  EXPECT_TRUE(over.err.starts_with("error: truth.tum: is no zip; expected another name"))
+      << over.err;
   EXPECT_EQ(Read("truth.tum"), before);
+  ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  const Outcome pipe = Call({"eval", "truth.tum", "mono.tum", "--save_results", "pipe", "--force"});
+  EXPECT_EQ(pipe.code, 73);
+  EXPECT_TRUE(pipe.err.starts_with("error: pipe: is no regular file")) << pipe.err;
 }
 
 TEST_F(EvalCli, ResultsThatCannotBothBeSavedAreNotSaved) {

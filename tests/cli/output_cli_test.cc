@@ -73,6 +73,9 @@ TEST_F(OutputCli, OutputGoesWhereItIsNamed) {
   const Outcome again = Call({"run", "config.yaml", "-o", "out"});
   EXPECT_EQ(again.code, 73);
   EXPECT_TRUE(Contains(again.err, "--force")) << again.err;
+  const Outcome endless = Call({"run", "config.yaml", "-o", std::string(300, 'x')});
+  EXPECT_EQ(endless.code, 73);
+  EXPECT_TRUE(Contains(endless.err, "xxx: ")) << endless.err;
 }
 
 TEST_F(OutputCli, NumbersOutOfRangeAreShownAsTyped) {
@@ -86,6 +89,8 @@ TEST_F(OutputCli, NumbersOutOfRangeAreShownAsTyped) {
        {"99999999999999999999999", "9223372036854775808", "-1", "1e3", "0x10", " 1", "1.0"}) {
     expect({"run", "config.yaml", "--seed=" + seed}, "--seed: '" + seed + seeds);
   }
+  expect({"run", "config.yaml", "--seed", "010"}, "--seed: '010' has a leading zero");
+  expect({"sweep", "config.yaml", "--runs", "08"}, "--runs: '08' has a leading zero");
   expect({"sweep", "config.yaml", "--runs", "1000001"},
          "--runs: '1000001' is no integer from 1 to 1000000");
   expect({"sweep", "config.yaml", "--runs", "1", "--jobs", "4294967297"},

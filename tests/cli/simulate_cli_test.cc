@@ -68,6 +68,15 @@ TEST_F(SimulateCli, NothingReplacesTheDataThatItReads) {
     EXPECT_TRUE(over.err.starts_with("error: data: is the input '")) << over.err;
   }
   EXPECT_EQ(Read("data/tracks.csv"), tracks);
+  Write("lens.yaml",
+        "alidade: 1\ninclude: data/calibration.yaml\nsource: {type: tracks, path: "
+        "again}\n");
+  ASSERT_EQ(Call({"simulate", "again.yaml", "-o", "again"}).code, 0);
+  const Outcome included = Call({"simulate", "lens.yaml", "-o", "data", "--force"});
+  EXPECT_EQ(included.code, 73);
+  EXPECT_TRUE(Contains(included.err, "data: holds the input '")) << included.err;
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "out", "--no-figures"}).code, 0);
+  EXPECT_EQ(Call({"simulate", "out/config.resolved.yaml", "-o", "out", "--force"}).code, 73);
 }
 
 TEST_F(SimulateCli, DrawsBySeedAndReplacesOnlyByForce) {

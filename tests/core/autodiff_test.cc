@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 
 #include "support/model_checks.h"
@@ -248,6 +249,35 @@ struct Displacement : Sensor<Vec<2>, Vec<2>, Vec<3>> {
     return true;
   }
 };
+
+/// z = x, and a closed form of more numbers than are copied one by one.
+struct Wide : Sensor<Vec<20>, Vec<20>> {
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    std::copy_n(x, 20, z);
+    return true;
+  }
+  void Jacobian(const double*, MatrixRef J_z_x) const {
+    for (int r = 0; r < 20; ++r) {
+      for (int c = 0; c < 20; ++c) J_z_x(r, c) = 100.0 * r + c;
+    }
+  }
+};
+
+TEST(AutodiffSensor, AWideClosedFormKeepsTheStride) {
+  std::vector<double> x(20);
+  std::iota(x.begin(), x.end(), 1.0);
+  double z[20], j[20 * 25];
+  std::fill_n(j, 20 * 25, kPoison);
+  const double* const roles[] = {x.data()};
+  double* const jacobians[] = {j};
+  const int strides[] = {25};
+  ASSERT_EQ(Evaluate(Wide(), roles, z, jacobians, strides), Status::kOk);
+  for (int r = 0; r < 20; ++r) {
+    EXPECT_EQ(z[r], x[static_cast<std::size_t>(r)]);
+    for (int c = 0; c < 25; ++c) EXPECT_EQ(j[25 * r + c], c < 20 ? 100.0 * r + c : kPoison);
+  }
+}
 
 TEST(AutodiffSensor, InitialisesWithDenseJacobians) {
   const SensorModel sensor = MakeSensor<Displacement>();

@@ -136,11 +136,11 @@ TEST(SensorCost, PutsRolesIntoTheirPlacesInTheBlocks) {
   const std::vector<RolePlace> places{{1, 3}, {1, 6}, {1, 0}, {0, 0}};
   const std::vector<int> sizes{3, 10};
   const double z[2] = {3.0, -4.0};
-  const std::vector<double> w{2.0, 0.0, 0.7, 0.5};
+  const std::vector<double> w{2.0, 0.0, 0.7, 0.5}, half{0.5, 0.0, 0.0, 0.5};
   const CostKind<SelfCalibratingFeature<RadialLens>> direct(model, places, sizes, w);
-  const CostKind<SensorModel> behind(sealed, places, sizes, w);
+  const CostKind<SensorModel> behind(sealed, places, sizes, w), equal(sealed, places, sizes, half);
   const SensorCost a(direct, z);
-  const SensorCost b(behind, z);
+  const SensorCost b(behind, z), c(equal, z);
   const Values values{{-2.6, 1.1, 3.5}, {5.0, -0.3, 0.2, 0.4, -1.1, 0.3, 0.8, 0.2, -0.4, 0.4}};
   const std::vector<GeometryManifold> manifolds = {
       Of(Geometry::Vector(3)), GeometryManifold({{Geometry::Vector(3), false},
@@ -149,6 +149,7 @@ TEST(SensorCost, PutsRolesIntoTheirPlacesInTheBlocks) {
   // Rounding of pixels, 1e-13 px, over the step.
   ExpectTrueJacobians(a, values, manifolds, 1e-6);
   ExpectTrueJacobians(b, values, manifolds, 1e-6);
+  ExpectTrueJacobians(c, values, manifolds, 1e-6);
   EXPECT_EQ(At(a, values).j, At(b, values).j);
   double h[2];
   const double* const roles[] = {&values[1][3], &values[1][6], &values[1][0], &values[0][0]};

@@ -90,11 +90,21 @@ inline void Copy(MatrixRef from, int rows, int columns, MatrixRef to) {
   for (int r = 0; r < rows && columns > 0; ++r) std::copy_n(&from(r, 0), columns, &to(r, 0));
 }
 
-/// The same of a size known to the compiler, which then keeps nothing of `from` in memory. A copy
-/// of vectors would wait until the numbers, and all that was stored before them, are in the caches.
 template <int kColumns, std::size_t... I>
-void CopyUnrolled(const double* from, MatrixRef to, std::index_sequence<I...>) {
-  ((to(I / kColumns, I % kColumns) = from[I]), ...);
+void CopyUnrolled(MatrixRef from, MatrixRef to, std::index_sequence<I...>) {
+  ((to(I / kColumns, I % kColumns) = from(I / kColumns, I % kColumns)), ...);
+}
+
+/// The same of a size known to the compiler, number by number where it is small: what has been
+/// written so is then never in memory. A load of two numbers at once cannot be forwarded from two
+/// stores of one: it waits until they have left the store buffer.
+template <int kRows, int kColumns>
+void CopyFixed(MatrixRef from, MatrixRef to) {
+  if constexpr (kRows * kColumns <= 64) {
+    CopyUnrolled<kColumns>(from, to, std::make_index_sequence<kRows * kColumns>());
+  } else {
+    Copy(from, kRows, kColumns, to);
+  }
 }
 
 template <class Model, class T, std::size_t... I>
@@ -122,7 +132,7 @@ void ClosedForm(const Model& model, const double* const* x, double* const* jacob
     constexpr int i = decltype(index)::value;
     constexpr int n = SpaceAt<i, Model>::kTangent;
     if (jacobians[i] == nullptr) return;
-    CopyUnrolled<n>(j[i].data, {jacobians[i], strides[i]}, std::make_index_sequence<m * n>());
+    CopyFixed<m, n>(j[i], {jacobians[i], strides[i]});
   };
   ForEach(copy, indices);
 }
@@ -144,7 +154,7 @@ Status Evaluate(const Model& model, const double* const* roles, double* z, doubl
     if constexpr (kClosedForm) {
       if (jacobians != nullptr) detail::ClosedForm(model, roles, jacobians, strides, indices);
     }
-    detail::CopyUnrolled<1>(value, {z, 1}, std::make_index_sequence<Z::kAmbient>());
+    std::copy_n(value, Z::kAmbient, z);
     return Status::kOk;
   }
   if constexpr (!kClosedForm) {

@@ -102,6 +102,8 @@ class Config {
   /// The folder of the file; of a text, the current one.
   const std::filesystem::path& folder() const { return folder_; }
   const std::string& name() const { return name_; }
+  /// What an output must not replace: the files that it was read from, and `source.path`.
+  std::vector<std::string> inputs() const;
 
   /// Sets `dotted.key` to `value`, read as YAML; maps on the way are made. `origin` stands for the
   /// file in messages about it (as in `--set`). A lone `-` is a text; a relative path becomes
@@ -120,6 +122,7 @@ class Config {
   std::shared_ptr<ConfigTree> tree_;
   std::filesystem::path folder_;
   std::string name_;
+  std::vector<std::string> files_;  ///< that it was read from
 };
 
 /// `path` taken relative to `base`; Error kNotTrusted where it leaves `base` by `..`, an absolute

@@ -60,13 +60,16 @@ std::function<std::string(const std::string&)> IsNumber(double least, double mos
 /// Says that a sweep was stopped.
 void TellStopped(std::size_t done, std::int64_t runs);
 
+/// Absolute, links followed as far as they can be: the same for two names of one file.
+std::filesystem::path Resolved(const std::string& path);
+
 /// Refuses an output that is, or holds, what the command reads: --force would remove it. Paths may
 /// be empty. Error: kCannotCreate.
 void KeepInputs(const std::string& output, const std::vector<std::string>& inputs);
 
 /// Where output goes: `given`, or the config's `output:` inside runs/, or runs/PREFIX and the name
 /// of the config: of its folder where it is called config.yaml, else of the file. Errors:
-/// kCannotCreate where `given` is runs/ itself, or would replace the data that the config reads;
+/// kCannotCreate where `given` is runs/ itself, or it would replace the config or what that reads;
 /// kNotTrusted, kBadConfig.
 std::filesystem::path OutputFolder(const std::string& given, const Config& config,
                                    const Input& input, const std::string& prefix = "");

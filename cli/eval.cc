@@ -180,11 +180,7 @@ void CheckTogether(const Arguments& arguments) {
                                " aligns no N poses; expected -a, -s or --align too");
   }
   const std::string &absolute = arguments.save_absolute, &relative = arguments.save_relative;
-  const auto file = [](const std::string& path) {
-    std::error_code ignored;
-    return std::filesystem::weakly_canonical(std::filesystem::absolute(path, ignored), ignored);
-  };
-  if (!absolute.empty() && !relative.empty() && file(absolute) == file(relative)) {
+  if (!absolute.empty() && !relative.empty() && Resolved(absolute) == Resolved(relative)) {
     throw CLI::ValidationError("--save_relative: " + relative +
                                " is what --save_results writes; expected another file");
   }

@@ -135,16 +135,18 @@ void TellStopped(std::size_t done, std::int64_t runs) {
   PrintNote("stopped after " + std::to_string(done) + " of " + std::to_string(runs) + " runs");
 }
 
+fs::path Resolved(const std::string& path) {
+  std::error_code error;
+  const fs::path absolute = fs::absolute(path, error);
+  fs::path resolved = fs::weakly_canonical(absolute, error);
+  return error ? absolute.lexically_normal() : resolved;
+}
+
 void KeepInputs(const std::string& output, const std::vector<std::string>& inputs) {
-  const auto resolved = [](const std::string& path) {
-    std::error_code error;
-    fs::path whole = fs::weakly_canonical(path, error);
-    return error ? fs::absolute(path, error).lexically_normal() : whole;
-  };
   if (output.empty()) return;
-  const fs::path taken = resolved(output);
+  const fs::path taken = Resolved(output);
   for (const std::string& input : inputs) {
-    const fs::path path = input.empty() ? fs::path() : resolved(input);
+    const fs::path path = input.empty() ? fs::path() : Resolved(input);
     if (std::mismatch(taken.begin(), taken.end(), path.begin(), path.end()).first != taken.end())
       continue;
     throw Error(ExitCode::kCannotCreate, ErrorLine(Place{output}, {},

@@ -172,8 +172,7 @@ std::vector<LandmarkEstimate> ReadMap(const fs::path& file) {
     const std::string plain = line.substr(0, form + 1) + line.substr(after);
     const std::vector<double> row = NumbersOf(plain, file, number);
     if (row.size() < kPlace + 3) FailFile(file, number, "too few columns");
-    constexpr double kMost = 9e15;  // of integers that a double has
-    if (!(std::abs(row[0]) <= kMost && std::abs(row[1]) <= INT32_MAX))
+    if (!(std::abs(row[0]) < 0x1p63 && std::abs(row[1]) < 0x1p31))
       FailFile(file, number, "id and generation are no integers");
     LandmarkEstimate& one = map.emplace_back();
     one.id = static_cast<std::int64_t>(row[0]);

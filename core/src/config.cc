@@ -120,6 +120,12 @@ std::unique_ptr<ConfigTree> ParseRoot(std::string_view text, const std::string& 
   return root;
 }
 
+/// `source.path`; null where it is not given.
+ConfigTree* SourcePath(const ConfigTree& root) {
+  const ConfigTree* const source = Child(root, "source");
+  return source == nullptr ? nullptr : Child(*source, "path");
+}
+
 /// Makes the relative paths of a config absolute: `source.path`, and the items of `plugins`.
 void AnchorPaths(const ConfigTree& root, const fs::path& folder) {
   const auto anchor = [&](ConfigTree* node) {
@@ -128,9 +134,7 @@ void AnchorPaths(const ConfigTree& root, const fs::path& folder) {
     const fs::path absolute = fs::absolute(folder / node->text, error);
     if (!error) node->text = absolute.string();
   };
-  const ConfigTree* source = Child(root, "source");
-  ConfigTree* const path = source == nullptr ? nullptr : Child(*source, "path");
-  if (path != nullptr) anchor(path);
+  if (ConfigTree* const path = SourcePath(root)) anchor(path);
   const ConfigTree* plugins = Child(root, "plugins");
   if (plugins == nullptr) return;
   for (const auto& plugin : plugins->children) anchor(plugin.get());
@@ -309,8 +313,7 @@ void Config::Set(std::string_view dotted_key, std::string_view value, std::strin
 
 std::vector<std::string> Config::inputs() const {
   std::vector<std::string> all = files_;
-  const ConfigTree* const source = Child(*tree_, "source");
-  const ConfigTree* const path = source == nullptr ? nullptr : Child(*source, "path");
+  const ConfigTree* const path = SourcePath(*tree_);
   if (path != nullptr && path->kind == Node::Kind::kScalar && path->text != "-")
     all.push_back(path->text);
   return all;

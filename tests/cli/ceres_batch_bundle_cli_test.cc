@@ -226,7 +226,6 @@ TEST_F(BundleTracksCli, SaysWhatIsWrong) {
   EXPECT_EQ(Bundle("data/tracks.csv", "data/truth.tum", {"--fix", "intrinsics"}).code, 0);
 }
 
-/// A point behind its only camera; one so far away that its pixels are no numbers; nothing at all.
 TEST_F(BundleCli, AStandardInputThatCannotBeReadIsNotEmpty) {
   before_ = "exec < .";
   const Outcome folder = Call({"bundle", "-"});
@@ -234,6 +233,7 @@ TEST_F(BundleCli, AStandardInputThatCannotBeReadIsNotEmpty) {
   EXPECT_TRUE(folder.err.starts_with("error: <stdin>: Is a directory")) << folder.err;
 }
 
+/// A point behind its only camera; one so far away that its pixels are no numbers; nothing at all.
 TEST_F(BundleCli, RefusesAProblemOfWhichNothingIsDefined) {
   const std::string camera = "0\n0\n0\n0\n0\n0\n500\n0\n0\n";
   for (const std::string& text :

@@ -85,10 +85,9 @@ ExitCode CompareRun(const Arguments& arguments, ExplainedExperiment& explained,
   RunComparer comparer(explained.experiment);
   Progress progress("frames", arguments.quiet);
   RunOptions options;
-  options.recorder = &recorder;
+  options.observers = {&recorder, &comparer};
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
-  comparer.Observe(options);
   const RunResult result = Run(explained.experiment, options);
   progress.Clear();
   FinishOnSignals();

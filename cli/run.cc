@@ -106,7 +106,7 @@ ExitCode RunConfig(const Arguments& arguments) {
 
   Progress progress("frames", arguments.quiet);
   RunOptions options;
-  options.recorder = &recorder;
+  options.observers = {&recorder};
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
   const RunResult result = Run(experiment, options);

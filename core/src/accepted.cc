@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "names.h"
+#include "words.h"
 
 namespace alidade::internal {
 namespace {

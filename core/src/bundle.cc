@@ -9,7 +9,7 @@
 
 #include "alidade/build_plugin.h"
 #include "plugin_file.h"
-#include "text_table.h"
+#include "words.h"
 
 namespace alidade {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "columns.h"
+#include "element_names.h"
 
 namespace alidade::internal {
 

@@ -6,8 +6,9 @@
 #include <functional>
 #include <set>
 
-#include "names.h"
+#include "distance.h"
 #include "text_table.h"
+#include "words.h"
 
 namespace alidade {
 

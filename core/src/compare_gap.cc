@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "compare.h"
+#include "distance.h"
 
 namespace alidade::internal {
 namespace {

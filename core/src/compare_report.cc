@@ -11,13 +11,14 @@
 #include "report_section.h"
 #include "run_folder.h"
 #include "text_table.h"
+#include "words.h"
 
 namespace alidade {
 
-using internal::ComparisonRow;
 using internal::RowKind;
 using internal::RowsOf;
 using internal::Section;
+using internal::TableRow;
 
 namespace {
 
@@ -30,8 +31,8 @@ struct Column {
 
 /// Rows with the mean, and over several runs [p05, p95]. Each column stands as three, so that its
 /// numbers share their unit and decimals with all others of the row.
-std::vector<ComparisonRow> SpreadRows(const std::vector<Column>& columns, bool several,
-                                      const std::vector<RowKind>& kinds) {
+std::vector<TableRow> SpreadRows(const std::vector<Column>& columns, bool several,
+                                 const std::vector<RowKind>& kinds) {
   RunResult all;
   for (const Column& column : columns) {
     for (const auto member : {&Spread::mean, &Spread::p05, &Spread::p95}) {
@@ -40,8 +41,8 @@ std::vector<ComparisonRow> SpreadRows(const std::vector<Column>& columns, bool s
       for (const auto& [key, spread] : column.values) one.metrics[key] = spread.*member;
     }
   }
-  std::vector<ComparisonRow> rows = RowsOf(all, kinds);
-  for (ComparisonRow& row : rows) {
+  std::vector<TableRow> rows = RowsOf(all, kinds);
+  for (TableRow& row : rows) {
     std::vector<std::string> cells;
     for (std::size_t i = 0; i < row.cells.size(); i += 3) {
       const std::string* const c = &row.cells[i];
@@ -67,7 +68,7 @@ void TellReferences(const std::vector<std::string>& references, Section& section
     section.title += "; ratio and difference: to " + *distinct.begin();
   } else if (distinct.size() > 1) {
     section.title += "; ratio and difference: to the reference of each";
-    ComparisonRow row{"reference", {}};
+    TableRow row{"reference", {}};
     for (const std::string& one : references) row.cells.push_back(one.empty() ? "-" : one);
     section.rows.push_back(row);
   }
@@ -82,7 +83,7 @@ Section TableOf(const std::vector<ComparedEstimator>& of, bool several, const st
   section.title = title;
   std::vector<Column> columns;
   std::vector<std::string> references;
-  ComparisonRow with_reference{"runs with a reference", {}};
+  TableRow with_reference{"runs with a reference", {}};
   bool fewer = false;
   for (const ComparedEstimator& one : of) {
     columns.push_back({one.name, one.values, one.units});
@@ -92,7 +93,7 @@ Section TableOf(const std::vector<ComparedEstimator>& of, bool several, const st
   }
   section.columns = Names(columns);
   TellReferences(references, section);
-  const std::vector<ComparisonRow> rows = SpreadRows(columns, several, kinds);
+  const std::vector<TableRow> rows = SpreadRows(columns, several, kinds);
   section.rows.insert(section.rows.end(), rows.begin(), rows.end());
   if (fewer) section.rows.push_back(with_reference);
   return section;
@@ -101,7 +102,7 @@ Section TableOf(const std::vector<ComparedEstimator>& of, bool several, const st
 /// The estimators along the run, of one kind: filters, or those that know later data.
 Section AlongSection(const Comparison& comparison, bool smoothed) {
   std::vector<ComparedEstimator> of;
-  ComparisonRow diverged{"diverged", {}}, used{"runs used", {}};
+  TableRow diverged{"diverged", {}}, used{"runs used", {}};
   bool any_diverged = false;
   for (const ComparedEstimator& one : comparison.estimators) {
     if (one.smoothed != smoothed) continue;
@@ -242,13 +243,13 @@ Section GapSection(const Comparison& comparison, const GapStep& step) {
   if (columns[0].values.empty()) columns.erase(columns.begin(), columns.begin() + 3);
   section.columns = Names(columns);
   section.rows = SpreadRows(columns, several, {{"rmse", ""}});
-  for (ComparisonRow& row : section.rows) {
+  for (TableRow& row : section.rows) {
     row.label.erase(0, row.label.find_first_not_of(' '));
     const std::string block = row.label.substr(0, row.label.find(' '));
     if (block == "map.sim3") row.label.replace(0, block.size(), "map, Sim3");
     const auto ratio = step.values.find("error_ratio:" + block);
     if (ratio == step.values.end()) continue;
-    const std::vector<ComparisonRow> text = SpreadRows(
+    const std::vector<TableRow> text = SpreadRows(
         {{"", {{"ratio.rmse:" + block, ratio->second}}, {}}}, several, {{"ratio.rmse", ""}});
     if (!text.empty()) row.cells[2] = text[0].cells[0];
   }

@@ -5,8 +5,7 @@
 
 #include "compare.h"
 #include "data_hash.h"
-#include "sweep_spread.h"
-#include "text_table.h"
+#include "words.h"
 
 namespace alidade {
 
@@ -31,13 +30,12 @@ RunComparer::RunComparer(const Experiment& experiment)
 
 RunComparer::~RunComparer() = default;
 
-void RunComparer::Observe(RunOptions& options) {
-  options.observe = [this](int estimator, const Frame& frame, const State& state,
-                           const UpdateReport& report) {
-    if (report.stale) return;
-    impl_->run.estimators[static_cast<std::size_t>(estimator)].series.Append(frame.stamp, state);
-  };
-  options.observe_frame = [this](const Frame& frame) { impl_->data.Add(frame); };
+void RunComparer::OnFrame(const Frame& frame) { impl_->data.Add(frame); }
+
+void RunComparer::OnEstimate(int estimator, const Frame& frame, const State& state,
+                             const UpdateReport& report) {
+  if (report.stale) return;
+  impl_->run.estimators[static_cast<std::size_t>(estimator)].series.Append(frame.stamp, state);
 }
 
 Comparison RunComparer::Finish(const RunResult& result, const CompareOptions& options) {
@@ -90,7 +88,7 @@ ComparedSeeds CompareSeeds(const ExplainedExperiment& explained, const PluginHos
   with.run = [&](Experiment& experiment, const RunOptions& given) {
     RunComparer comparer(experiment);
     RunOptions observed = given;
-    comparer.Observe(observed);
+    observed.observers.push_back(&comparer);
     RunResult result = Run(experiment, observed);
     const bool whole = result.code == ExitCode::kDiverged || result.status == RunStatus::kOk;
     if (!whole) return result;
@@ -119,7 +117,7 @@ class Gathered {
   }
   std::map<std::string, Spread> Spreads() && {
     std::map<std::string, Spread> spreads;
-    for (auto& [key, list] : values_) spreads[key] = internal::SpreadOf(std::move(list));
+    for (auto& [key, list] : values_) spreads[key] = SpreadOf(std::move(list));
     return spreads;
   }
 

@@ -5,9 +5,9 @@
 #include "add_estimator.h"
 #include "alidade/compare.h"
 #include "compare.h"
-#include "names.h"
 #include "sweep_config.h"
 #include "text_table.h"
+#include "words.h"
 
 namespace alidade {
 namespace {

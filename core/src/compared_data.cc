@@ -4,7 +4,7 @@
 #include <map>
 
 #include "compared_run.h"
-#include "text_table.h"
+#include "words.h"
 
 namespace alidade::internal {
 namespace {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "alidade/run.h"
+#include "estimate_series.h"
 #include "run_json.h"
-#include "series.h"
 
 /// Runs as far as they are compared, from memory or from their folders.
 namespace alidade::internal {

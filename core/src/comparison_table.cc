@@ -9,9 +9,9 @@
 #include <string_view>
 #include <tuple>
 
-#include "names.h"
 #include "number_text.h"
 #include "text_table.h"
+#include "words.h"
 
 namespace alidade {
 namespace internal {
@@ -128,7 +128,7 @@ double LargestRmse(const RunResult& result, const std::string& unit) {
   return largest;
 }
 
-ComparisonRow RowOf(const RunResult& result, const std::string& key) {
+TableRow RowOf(const RunResult& result, const std::string& key) {
   const std::string_view kind = KindOf(key);
   Values values = ValuesOf(result, key);
   Scaled scaled;
@@ -187,13 +187,13 @@ std::vector<std::string> OrderedCounts(const RunResult& result) {
   return keys;
 }
 
-std::vector<ComparisonRow> MetricRows(const RunResult& result) {
-  std::vector<ComparisonRow> rows;
+std::vector<TableRow> MetricRows(const RunResult& result) {
+  std::vector<TableRow> rows;
   for (const std::string& key : OrderedMetrics(result)) {
     if (IsMain(result, key)) rows.push_back(RowOf(result, key));
   }
   for (const std::string& key : OrderedCounts(result)) {
-    ComparisonRow row{std::string(KindOf(key)) + ' ' + std::string(SubjectOf(key)), {}};
+    TableRow row{std::string(KindOf(key)) + ' ' + std::string(SubjectOf(key)), {}};
     for (const EstimatorResult& one : result.estimators) {
       const auto count = one.counts.find(key);
       row.cells.push_back(count == one.counts.end() ? "-" : std::to_string(count->second));
@@ -203,13 +203,13 @@ std::vector<ComparisonRow> MetricRows(const RunResult& result) {
   return rows;
 }
 
-std::vector<ComparisonRow> RowsOf(const RunResult& result, const std::vector<RowKind>& kinds) {
-  std::vector<ComparisonRow> rows;
+std::vector<TableRow> RowsOf(const RunResult& result, const std::vector<RowKind>& kinds) {
+  std::vector<TableRow> rows;
   for (const RowKind& kind : kinds) {
     for (const std::string& key : Keys(result, &EstimatorResult::metrics)) {
       if (KindOf(key) != kind.kind || key.find('@') != key.npos) continue;
       if (IsExact(result, SubjectOf(key))) continue;
-      ComparisonRow row = RowOf(result, key);
+      TableRow row = RowOf(result, key);
       row.label = kind.label + row.label.substr(std::min(KindOf(key).size(), row.label.size()));
       rows.push_back(std::move(row));
     }
@@ -217,9 +217,9 @@ std::vector<ComparisonRow> RowsOf(const RunResult& result, const std::vector<Row
   return rows;
 }
 
-std::vector<ComparisonRow> ComparisonRows(const RunResult& result) {
-  std::vector<ComparisonRow> rows = MetricRows(result);
-  ComparisonRow diverged{"diverged", {}}, inconsistent{"inconsistent", {}};
+std::vector<TableRow> ComparisonRows(const RunResult& result) {
+  std::vector<TableRow> rows = MetricRows(result);
+  TableRow diverged{"diverged", {}}, inconsistent{"inconsistent", {}};
   for (const EstimatorResult& one : result.estimators) {
     diverged.cells.emplace_back(one.diverged ? "yes" : "no");
     inconsistent.cells.emplace_back(one.inconsistent ? "yes" : "no");
@@ -236,60 +236,12 @@ std::string ReferenceText(const RunResult& result) {
          "', an estimate itself: no coverage, no NEES";
 }
 
-std::string EstimatorTable(const std::vector<std::string>& names,
-                           const std::vector<ComparisonRow>& rows) {
-  constexpr std::size_t kLineWidth = 100, kGap = 2;
-  std::size_t label_width = 0;
-  std::vector<std::size_t> widths;
-  for (const std::string& name : names) widths.push_back(name.size());
-  for (const ComparisonRow& row : rows) {
-    label_width = std::max(label_width, row.label.size());
-    for (std::size_t c = 0; c < widths.size(); ++c) {
-      widths[c] = std::max(widths[c], row.cells[c].size());
-    }
-  }
-  std::string text;
-  for (std::size_t first = 0, end = 0; first < names.size(); first = end) {
-    std::size_t width = label_width;
-    for (end = first; end < names.size(); ++end) {
-      width += kGap + widths[end];
-      if (width > kLineWidth && end > first) break;
-    }
-    if (first > 0) text += '\n';
-    const auto append_line = [&](std::string line, const std::vector<std::string>& cells) {
-      line.resize(label_width, ' ');
-      for (std::size_t c = first; c < end; ++c) {
-        line.append(kGap + widths[c] - cells[c].size(), ' ').append(cells[c]);
-      }
-      text += line + '\n';
-    };
-    append_line("", names);
-    for (const ComparisonRow& row : rows) append_line(row.label, row.cells);
-  }
-  return text;
-}
-
-std::vector<std::string> CellsOf(const ComparisonRow& row) {
-  std::vector<std::string> cells = {row.label};
-  cells.insert(cells.end(), row.cells.begin(), row.cells.end());
-  return cells;
-}
-
-std::string MarkdownTable(const std::string& corner, const std::vector<std::string>& names,
-                          const std::vector<ComparisonRow>& rows) {
-  std::string text = MarkdownRow(CellsOf({corner, names})) + "|---|";
-  for (std::size_t c = 0; c < names.size(); ++c) text += "---:|";
-  text += '\n';
-  for (const ComparisonRow& row : rows) text += MarkdownRow(CellsOf(row));
-  return text;
-}
-
 }  // namespace internal
 
 std::string ComparisonTable(const RunResult& result) {
   const std::string reference = internal::ReferenceText(result);
-  return internal::EstimatorTable(internal::NamesOf(result.estimators),
-                                  internal::ComparisonRows(result)) +
+  return internal::RightAlignedTable(internal::NamesOf(result.estimators),
+                                     internal::ComparisonRows(result)) +
          (reference.empty() ? "" : '\n' + reference + '\n');
 }
 

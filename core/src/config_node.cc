@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "config_tree.h"
-#include "text_table.h"
+#include "words.h"
 
 namespace alidade {
 
@@ -243,6 +243,15 @@ void Node::Declare(std::string_view key) const {
 void Node::Fail(std::string_view what, std::string_view expected,
                 std::string_view suggestion) const {
   FailAt(tree_->place, PathOf(*tree_), what, expected, suggestion);
+}
+
+void internal::ExpectName(const std::string& name, const Node& at, const std::string& of) {
+  const auto fits = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == '-';
+  };
+  if (!name.empty() && std::all_of(name.begin(), name.end(), fits)) return;
+  at.Fail(Quoted(name) + " cannot name " + of, "letters, digits, _ and -");
 }
 
 }  // namespace alidade

@@ -76,6 +76,10 @@ std::string Quoted(std::string_view text);
 [[noreturn]] void FailAt(const Place& place, std::string_view key, std::string_view what,
                          std::string_view expected = {}, std::string_view suggestion = {});
 
+/// Refuses a name that is not one word in columns (`target.depth`), metric keys
+/// (`rmse:target.depth@near`) and tables. `of` says of what, as in `a sensor`.
+void ExpectName(const std::string& name, const Node& at, const std::string& of);
+
 /// The unit of `written` where it differs from `known` in its unit alone, as in `baseline_mm` for
 /// `baseline_m`; else "". `same_dimension`: only where one unit converts to the other.
 std::string UnitSlip(std::string_view written, std::string_view known, bool same_dimension);

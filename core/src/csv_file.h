@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "alidade/source.h"
+#include "alidade/timestamp.h"
 #include "run_folder.h"
 
 namespace alidade::internal {

@@ -7,10 +7,11 @@
 #include <cmath>
 #include <map>
 
-#include "alidade/sweep.h"
-#include "columns.h"
+#include "alidade/statistics.h"
+#include "element_names.h"
+#include "estimate_series.h"
 #include "frame_innovation.h"
-#include "series.h"
+#include "truth_match.h"
 
 namespace alidade::internal {
 

@@ -6,7 +6,6 @@
 #include "alidade/geometry.h"
 #include "alidade/statistics.h"
 #include "mahalanobis.h"
-#include "similarity.h"
 #include "trajectory_errors.h"
 
 namespace alidade {

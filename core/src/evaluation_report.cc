@@ -61,12 +61,12 @@ std::string NeesText(const char* name, const Nees& nees, int poses) {
 std::string StatisticsTable(const Evaluation& evaluation) {
   std::vector<std::string> names;
   for (const auto& [name, member] : kStatistics) names.emplace_back(name);
-  std::vector<internal::ComparisonRow> rows;
+  std::vector<internal::TableRow> rows;
   const auto add = [&](const char* what, const std::vector<PoseErrors>& all) {
     for (const PoseErrors& errors : all) {
       const std::string label = std::string(what) + ' ' + ToString(errors.relation);
-      internal::ComparisonRow& row =
-          rows.emplace_back(internal::ComparisonRow{WithUnit(label, UnitOf(errors.relation)), {}});
+      internal::TableRow& row =
+          rows.emplace_back(internal::TableRow{WithUnit(label, UnitOf(errors.relation)), {}});
       for (const auto& [name, member] : kStatistics) {
         row.cells.push_back(FixedText(errors.statistics.*member, kDecimals));
       }
@@ -74,7 +74,7 @@ std::string StatisticsTable(const Evaluation& evaluation) {
   };
   add("ATE", evaluation.absolute);
   add("RPE", evaluation.relative);
-  return internal::EstimatorTable(names, rows);
+  return internal::RightAlignedTable(names, rows);
 }
 
 std::string ConsistencyText(const Evaluation& evaluation) {
@@ -181,13 +181,13 @@ std::string SharedText(const std::vector<Evaluation>& evaluations) {
 std::string SummaryText(const std::vector<Evaluation>& evaluations) {
   const std::vector<internal::TextRow> summary = SummaryRows(evaluations);
   std::vector<std::string> names;
-  std::vector<internal::ComparisonRow> rows;
+  std::vector<internal::TableRow> rows;
   for (std::size_t c = 1; c < summary.front().size(); ++c) {
     rows.push_back({summary.front()[c], {}});
     for (std::size_t e = 1; e < summary.size(); ++e) rows.back().cells.push_back(summary[e][c]);
   }
   for (const Evaluation& one : evaluations) names.push_back(one.label);
-  return internal::EstimatorTable(names, rows) + '\n' + SharedText(evaluations) + '\n';
+  return internal::RightAlignedTable(names, rows) + '\n' + SharedText(evaluations) + '\n';
 }
 
 void AddErrors(Json& json, const char* key, const std::vector<PoseErrors>& all) {

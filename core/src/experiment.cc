@@ -3,13 +3,14 @@
 
 #include "accepted.h"
 #include "add_estimator.h"
-#include "alidade/plugin_listing.h"
+#include "alidade/plugin_host.h"
 #include "alidade/run.h"
-#include "columns.h"
+#include "config_tree.h"
 #include "estimator_types.h"
-#include "names.h"
 #include "text_table.h"
+#include "truth_match.h"
 #include "truth_sigma.h"
+#include "words.h"
 
 namespace alidade {
 namespace {

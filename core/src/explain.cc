@@ -9,14 +9,14 @@
 #include <utility>
 
 #include "alidade/statistics.h"
-#include "columns.h"
 #include "estimator_types.h"
 #include "explain_landmarks.h"
-#include "names.h"
 #include "number_text.h"
 #include "observability.h"
 #include "observed_landmarks.h"
 #include "text_table.h"
+#include "truth_match.h"
+#include "words.h"
 
 namespace alidade {
 namespace {

@@ -3,9 +3,9 @@
 
 #include <iterator>
 
-#include "columns.h"
 #include "number_text.h"
 #include "quaternion_sign.h"
+#include "truth_match.h"
 
 namespace alidade::internal {
 namespace {

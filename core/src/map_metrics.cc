@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "series.h"
+#include "alidade/similarity.h"
 
 namespace alidade {
 namespace {

@@ -7,14 +7,15 @@
 #include <limits>
 
 #include "alidade/geometry.h"
+#include "alidade/similarity.h"
 #include "alidade/statistics.h"
-#include "columns.h"
+#include "element_names.h"
 #include "frame_innovation.h"
 #include "lag_series.h"
 #include "mahalanobis.h"
-#include "names.h"
 #include "number_text.h"
-#include "path_alignment.h"
+#include "truth_match.h"
+#include "words.h"
 
 namespace alidade {
 namespace {

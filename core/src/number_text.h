@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "alidade/source.h"
+#include "alidade/timestamp.h"
 
 namespace alidade::internal {
 

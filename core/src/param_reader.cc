@@ -12,7 +12,7 @@
 #include "abi_read.h"
 #include "config_tree.h"
 #include "number_text.h"
-#include "text_table.h"
+#include "words.h"
 
 namespace alidade::internal {
 namespace {

@@ -213,16 +213,15 @@ void PluginHost::FailMissing(PluginEntry::Kind kind, const std::string& name,
       what += std::string("; there is a ") + KindName(other.kind) + " of that name";
   }
   ExitCode code = ExitCode::kPlugin;
-  std::string lines;
-  for (const std::string& place : searched_) lines += "\n  searched " + place;
   for (const Refusal& refusal : refusals_) {
-    lines += "\n  refused " + refusal.file.string() + ": " + refusal.reason;
     if (refusal.code == ExitCode::kNotTrusted && code != ExitCode::kNotTrusted) {
       code = ExitCode::kNotTrusted;
       what += "; '" + refusal.file.string() + "' was refused because it is not trusted";
     }
   }
-  throw Error(code, ErrorLine(at.place(), at.path(), what, {}, Nearest(name, names)) + lines);
+  std::string places = PluginPlaces(*this);
+  if (!places.empty()) places.insert(0, "\n").pop_back();
+  throw Error(code, ErrorLine(at.place(), at.path(), what, {}, Nearest(name, names)) + places);
 }
 
 const PluginHost::Loaded& PluginHost::LoadedFrom(const fs::path& file) const {
@@ -230,6 +229,15 @@ const PluginHost::Loaded& PluginHost::LoadedFrom(const fs::path& file) const {
   const auto found = std::find_if(loaded_.begin(), loaded_.end(), same);
   ALIDADE_EXPECTS(found != loaded_.end());
   return **found;
+}
+
+std::string PluginPlaces(const PluginHost& host) {
+  std::string text;
+  for (const std::string& place : host.searched()) text += "  searched " + place + '\n';
+  for (const Refusal& refusal : host.refusals()) {
+    text += "  refused " + refusal.file.string() + ": " + refusal.reason + '\n';
+  }
+  return text;
 }
 
 }  // namespace alidade

@@ -9,6 +9,7 @@
 #include "json.h"
 #include "plugin_file.h"
 #include "text_table.h"
+#include "words.h"
 
 namespace alidade {
 namespace {
@@ -179,15 +180,6 @@ std::string PluginInfoJson(const PluginHost& host, const std::string& name) {
   }
   json.End();
   return json.text();
-}
-
-std::string PluginPlaces(const PluginHost& host) {
-  std::string text;
-  for (const std::string& place : host.searched()) text += "  searched " + place + '\n';
-  for (const Refusal& refusal : host.refusals()) {
-    text += "  refused " + refusal.file.string() + ": " + refusal.reason + '\n';
-  }
-  return text;
 }
 
 }  // namespace alidade

@@ -178,7 +178,7 @@ Recorder::Recorder(const Options& options, const Config& config, const PluginHos
 
 Recorder::~Recorder() = default;
 
-void Recorder::Start(const Experiment& experiment) {
+void Recorder::Begin(const Experiment& experiment) {
   impl_->facts.seed = experiment.seed;
   impl_->AddPlugins(experiment);
   impl_->source.emplace(impl_->folder, experiment);
@@ -192,14 +192,14 @@ void Recorder::Start(const Experiment& experiment) {
   impl_->started = Clock::now();
 }
 
-void Recorder::AddFrame(const Frame& frame) {
+void Recorder::OnFrame(const Frame& frame) {
   ALIDADE_EXPECTS(impl_->source.has_value());
   impl_->source->Add(frame);
   impl_->data->Add(frame);
 }
 
-void Recorder::AddEstimate(int estimator, const Frame& frame, const State& state,
-                           const UpdateReport& report) {
+void Recorder::OnEstimate(int estimator, const Frame& frame, const State& state,
+                          const UpdateReport& report) {
   ALIDADE_EXPECTS(estimator >= 0 && estimator < static_cast<int>(impl_->estimators.size()));
   impl_->estimators[static_cast<std::size_t>(estimator)]->Add(frame, state, report);
 }

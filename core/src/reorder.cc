@@ -11,7 +11,7 @@
 
 #include "accepted.h"
 #include "number_text.h"
-#include "text_table.h"
+#include "words.h"
 
 namespace alidade::internal {
 namespace {

@@ -4,6 +4,7 @@
 #include "comparison_table.h"
 #include "number_text.h"
 #include "text_table.h"
+#include "words.h"
 
 namespace alidade::internal {
 namespace {
@@ -84,7 +85,7 @@ std::string Comparison(const RunResult& result) {
     html += "<th>" + HtmlEscaped(one.name) + "</th>";
   }
   html += "</tr>\n";
-  for (const ComparisonRow& row : ComparisonRows(result)) {
+  for (const TableRow& row : ComparisonRows(result)) {
     html += "<tr><td>" + HtmlEscaped(row.label) + "</td>";
     for (const std::string& cell : row.cells) {
       html += cell == "yes" ? "<td class=\"alarm\">" : "<td>";

@@ -10,7 +10,8 @@ std::string PlainText(const Section& section) {
   std::string text = section.title + '\n';
   for (const std::string& line : section.lines) text += "  " + line + '\n';
   if (section.rows.empty()) return text;
-  return text + (section.lines.empty() ? "" : "\n") + EstimatorTable(section.columns, section.rows);
+  return text + (section.lines.empty() ? "" : "\n") +
+         RightAlignedTable(section.columns, section.rows);
 }
 
 std::string Markdown(const Section& section) {
@@ -27,7 +28,7 @@ std::string Latex(const Section& section) {
   if (section.rows.empty()) return text;
   text += "\n\\begin{tabular}{l" + std::string(section.columns.size(), 'r') + "}\n\\toprule\n";
   text += LatexRow(CellsOf({"", section.columns})) + "\\midrule\n";
-  for (const ComparisonRow& row : section.rows) text += LatexRow(CellsOf(row));
+  for (const TableRow& row : section.rows) text += LatexRow(CellsOf(row));
   return text + "\\bottomrule\n\\end{tabular}\n";
 }
 

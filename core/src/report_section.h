@@ -13,7 +13,7 @@ namespace alidade::internal {
 struct Section {
   std::string title;
   std::vector<std::string> columns;
-  std::vector<ComparisonRow> rows;
+  std::vector<TableRow> rows;
   std::vector<std::string> lines;
 };
 

@@ -6,7 +6,6 @@
 
 #include "accepted.h"
 #include "alidade/metrics.h"
-#include "alidade/recorder.h"
 #include "frame_check.h"
 #include "map_metrics.h"
 #include "number_text.h"
@@ -122,8 +121,7 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
     for (std::size_t i = 0; i < experiment.segments.size(); ++i) {
       seen.in_segment[i] = InSegment(experiment.segments[i], seen.frame);
     }
-    if (options.recorder != nullptr) options.recorder->AddFrame(seen.frame);
-    if (options.observe_frame) options.observe_frame(seen.frame);
+    for (RunObserver* const observer : options.observers) observer->OnFrame(seen.frame);
     if (keep) kept.push_back(seen);
     bool go_on = true;
     for (std::size_t e = 0; e < running.size(); ++e) {
@@ -281,7 +279,7 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
   };
   guarded([&] {
     running = BeginAll(experiment);
-    if (options.recorder != nullptr) options.recorder->Start(experiment);
+    for (RunObserver* const observer : options.observers) observer->Begin(experiment);
     RunFrames(experiment, running, options, result, kept);
     SmoothAll(running, kept, options, result);
   });

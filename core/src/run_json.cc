@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run_json.h"
 
-#include "columns.h"
 #include "comparison_table.h"
 #include "csv_file.h"
 #include "json.h"
-#include "names.h"
 #include "number_text.h"
+#include "words.h"
 
 namespace alidade::internal {
 namespace {

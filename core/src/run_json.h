@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "alidade/run.h"
-#include "series.h"
+#include "estimate_series.h"
 
 namespace alidade::internal {
 

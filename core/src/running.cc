@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "observability.h"
-#include "text_table.h"
+#include "words.h"
 
 namespace alidade::internal {
 
@@ -19,8 +19,9 @@ void Running::Take(std::size_t k, const Seen& seen, const State& state, const Up
       estimates.push_back({k, ValuesOf(state, named.system.layout.blocks().size())});
     }
   }
-  if (options.recorder != nullptr) options.recorder->AddEstimate(index, seen.frame, state, report);
-  if (options.observe) options.observe(index, seen.frame, state, report);
+  for (RunObserver* const observer : options.observers) {
+    observer->OnEstimate(index, seen.frame, state, report);
+  }
 }
 
 void Running::Note(const std::vector<Event>& events) {

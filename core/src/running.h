@@ -5,7 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "alidade/recorder.h"
+#include "alidade/metrics.h"
+#include "alidade/run.h"
 #include "reference.h"
 
 namespace alidade::internal {

@@ -9,8 +9,8 @@
 #include <set>
 
 #include "alidade/pictures.h"
-#include "columns.h"
 #include "csv_file.h"
+#include "element_names.h"
 #include "pose_file.h"
 
 namespace alidade {

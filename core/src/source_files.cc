@@ -6,7 +6,8 @@
 #include <map>
 #include <set>
 
-#include "columns.h"
+#include "element_names.h"
+#include "truth_match.h"
 
 namespace alidade::internal {
 namespace {

@@ -4,11 +4,11 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
+#include <cmath>
 #include <limits>
 #include <vector>
 
 #include "alidade/error.h"
-#include "alidade/sweep.h"
 
 namespace alidade {
 
@@ -121,6 +121,27 @@ double Lag(const std::vector<double>& signal, const std::vector<double>& referen
     scores[k + reach] = ramp ? Closeness(signal, reference, k) / variance : Correlation(s, r, k);
   }
   return Peak(scores) * step;
+}
+
+double Quantile(const std::vector<double>& ascending, double q) {
+  ALIDADE_EXPECTS(!ascending.empty() && q >= 0.0 && q <= 1.0);
+  const double h = static_cast<double>(ascending.size() - 1) * q;
+  const auto below = static_cast<std::size_t>(h);
+  const double low = ascending[below];
+  const double high = ascending[std::min(below + 1, ascending.size() - 1)];
+  const double share = h - static_cast<double>(below);
+  // Infinities next to one another have no difference.
+  return share == 0.0 || low == high ? low : low + share * (high - low);
+}
+
+Spread SpreadOf(std::vector<double> values) {
+  std::erase_if(values, [](double value) { return std::isnan(value); });
+  if (values.empty()) return {kNaN, kNaN, kNaN, kNaN};
+  std::sort(values.begin(), values.end());
+  double sum = 0.0;
+  for (const double value : values) sum += value;
+  return {sum / static_cast<double>(values.size()), Quantile(values, 0.05), Quantile(values, 0.5),
+          Quantile(values, 0.95)};
 }
 
 Settling SettlingOf(const std::vector<double>& rms) {

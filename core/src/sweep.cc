@@ -5,13 +5,11 @@
 #include <atomic>
 #include <cmath>
 #include <exception>
-#include <limits>
 #include <mutex>
 #include <system_error>
 #include <thread>
 
 #include "sweep_config.h"
-#include "sweep_spread.h"
 
 namespace alidade {
 
@@ -119,17 +117,6 @@ bool MayRunInParallel(const PluginHost& host) {
 
 }  // namespace
 
-Spread internal::SpreadOf(std::vector<double> values) {
-  std::erase_if(values, [](double value) { return std::isnan(value); });
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  if (values.empty()) return {kNan, kNan, kNan, kNan};
-  std::sort(values.begin(), values.end());
-  double sum = 0.0;
-  for (const double value : values) sum += value;
-  return {sum / static_cast<double>(values.size()), Quantile(values, 0.05), Quantile(values, 0.5),
-          Quantile(values, 0.95)};
-}
-
 SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptions& options) {
   ALIDADE_EXPECTS(options.runs > 0 && options.jobs >= 0);
   ALIDADE_EXPECTS(options.shard >= 1 && options.shard <= options.shards);
@@ -172,17 +159,6 @@ SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptio
   return result;
 }
 
-double Quantile(const std::vector<double>& ascending, double q) {
-  ALIDADE_EXPECTS(!ascending.empty() && q >= 0.0 && q <= 1.0);
-  const double h = static_cast<double>(ascending.size() - 1) * q;
-  const auto below = static_cast<std::size_t>(h);
-  const double low = ascending[below];
-  const double high = ascending[std::min(below + 1, ascending.size() - 1)];
-  const double share = h - static_cast<double>(below);
-  // Infinities next to one another have no difference.
-  return share == 0.0 || low == high ? low : low + share * (high - low);
-}
-
 std::vector<SweepSummary> Summarise(const SweepResult& result) {
   std::vector<SweepSummary> summaries;
   for (const std::string& name : result.estimators) {
@@ -202,7 +178,7 @@ std::vector<SweepSummary> Summarise(const SweepResult& result) {
         }
       }
     }
-    for (auto& [key, list] : values) summary.metrics[key] = internal::SpreadOf(std::move(list));
+    for (auto& [key, list] : values) summary.metrics[key] = SpreadOf(std::move(list));
   }
   return summaries;
 }

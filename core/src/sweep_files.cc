@@ -5,14 +5,13 @@
 #include "comparison_table.h"
 #include "csv_file.h"
 #include "json.h"
-#include "names.h"
 #include "run_folder.h"
 #include "sweep_text.h"
 #include "sweep_vary_files.h"
+#include "words.h"
 
 namespace alidade {
 
-using internal::ComparisonRow;
 using internal::CountWhole;
 using internal::CountWithheld;
 using internal::CsvFile;
@@ -20,6 +19,7 @@ using internal::Json;
 using internal::NamesOf;
 using internal::ReferenceLines;
 using internal::RunFolder;
+using internal::TableRow;
 
 struct SweepFolder::Impl {
   Impl(const std::filesystem::path& path, bool force) : folder(path, force) {}
@@ -45,7 +45,7 @@ Parts PartsOf(const VariedSweep& sweep) {
 
 /// A cell for each estimator. Each one stands as four in a comparison, so that its numbers share
 /// their unit and decimals with all others of the row.
-std::vector<ComparisonRow> TableRows(const std::vector<SweepSummary>& summaries) {
+std::vector<TableRow> TableRows(const std::vector<SweepSummary>& summaries) {
   RunResult columns;
   for (const SweepSummary& summary : summaries) {
     for (const auto member : {&Spread::mean, &Spread::p05, &Spread::p50, &Spread::p95}) {
@@ -54,15 +54,15 @@ std::vector<ComparisonRow> TableRows(const std::vector<SweepSummary>& summaries)
       for (const auto& [key, spread] : summary.metrics) column.metrics[key] = spread.*member;
     }
   }
-  std::vector<ComparisonRow> rows;
-  for (const ComparisonRow& from : internal::MetricRows(columns)) {
-    ComparisonRow& row = rows.emplace_back(ComparisonRow{from.label, {}});
+  std::vector<TableRow> rows;
+  for (const TableRow& from : internal::MetricRows(columns)) {
+    TableRow& row = rows.emplace_back(TableRow{from.label, {}});
     for (std::size_t i = 0; i < from.cells.size(); i += 4) {
       const std::string* const c = &from.cells[i];
       row.cells.push_back(c[0] == "-" ? "-" : c[0] + " [" + c[1] + ", " + c[2] + ", " + c[3] + ']');
     }
   }
-  ComparisonRow used{"runs used", {}}, diverged{"diverged", {}}, inconsistent{"inconsistent", {}};
+  TableRow used{"runs used", {}}, diverged{"diverged", {}}, inconsistent{"inconsistent", {}};
   for (const SweepSummary& summary : summaries) {
     used.cells.push_back(std::to_string(summary.used));
     diverged.cells.push_back(std::to_string(summary.diverged));
@@ -218,7 +218,7 @@ void WriteFailures(const RunFolder& folder, const Parts& parts, const std::strin
 
 std::string SweepTable(const SweepResult& result) {
   const std::vector<SweepSummary> summaries = Summarise(result);
-  return internal::EstimatorTable(NamesOf(summaries), TableRows(summaries)) +
+  return internal::RightAlignedTable(NamesOf(summaries), TableRows(summaries)) +
          ReferenceLines(result);
 }
 

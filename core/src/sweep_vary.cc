@@ -4,9 +4,9 @@
 
 #include "alidade/sweep.h"
 #include "config_tree.h"
-#include "names.h"
 #include "sweep_config.h"
 #include "text_table.h"
+#include "words.h"
 
 namespace alidade {
 namespace {

@@ -51,7 +51,7 @@ RunResult AsComparison(const Column& column) {
 /// One estimator as a table: a row for each value.
 struct ValueTable {
   std::vector<std::string> header;  ///< without the label's
-  std::vector<ComparisonRow> rows;
+  std::vector<TableRow> rows;
 };
 
 ValueTable TableOf(const VariedSweep& sweep, const Column& column) {
@@ -64,7 +64,7 @@ ValueTable TableOf(const VariedSweep& sweep, const Column& column) {
                            std::to_string(column[v].inconsistent) + of_all};
   }
   table.header = {"diverged", "inconsistent"};
-  for (const ComparisonRow& metric : MetricRows(AsComparison(column))) {
+  for (const TableRow& metric : MetricRows(AsComparison(column))) {
     table.header.push_back(metric.label);
     for (std::size_t v = 0; v < table.rows.size(); ++v) {
       table.rows[v].cells.push_back(metric.cells[v]);
@@ -243,7 +243,7 @@ std::string SweepTable(const VariedSweep& sweep) {
     const internal::ValueTable table = internal::TableOf(sweep, column);
     if (!text.empty()) text += '\n';
     text += column.front().name + ", by " + sweep.variation.key + '\n' +
-            internal::EstimatorTable(table.header, table.rows);
+            internal::RightAlignedTable(table.header, table.rows);
   }
   return text + internal::ReferenceLines(sweep);
 }

@@ -5,9 +5,10 @@
 #include <functional>
 #include <limits>
 
-#include "names.h"
+#include "config_tree.h"
 #include "quaternion_sign.h"
 #include "read_landmarks.h"
+#include "words.h"
 
 namespace alidade {
 namespace {
@@ -394,6 +395,29 @@ System BuildSystem(const Node& root, const PluginHost& host, const std::vector<s
   if (std::ranges::none_of(system.sensors, sees)) system.landmarks.reset();
   CheckInitialisation(root, system);
   return system;
+}
+
+BlockId internal::PathBlockOf(const System& system) {
+  BlockId path = -1;
+  for (const SensorBinding& binding : system.sensors) {
+    if (!binding.model.has_landmark()) continue;
+    for (std::size_t r = 0; r < binding.roles.size(); ++r) {
+      const BlockId id = binding.roles[r].block;
+      const bool position = binding.model.roles()[r].name == "position" && id >= 0;
+      if (position && system.layout[id].geometry().ambient == 3) path = id;
+    }
+  }
+  return path;
+}
+
+std::string internal::UnitOf(const System& system, BlockId id) {
+  if (!system.layout[id].space.unit.empty()) return system.layout[id].space.unit;
+  for (const SensorBinding& sensor : system.sensors) {
+    for (std::size_t r = 0; r < sensor.roles.size(); ++r) {
+      if (sensor.roles[r].block == id) return sensor.model.roles()[r].unit;
+    }
+  }
+  return {};
 }
 
 }  // namespace alidade

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <string_view>
 
+#include "words.h"
+
 namespace alidade::internal {
 
 std::string TextTable(const std::vector<TextRow>& rows, std::size_t indent) {
@@ -65,10 +67,51 @@ std::string LatexRow(const TextRow& cells) {
   return Join(safe, " & ") + " \\\\\n";
 }
 
-std::string Join(const std::vector<std::string>& parts, const char* separator) {
+std::string RightAlignedTable(const std::vector<std::string>& names,
+                              const std::vector<TableRow>& rows) {
+  constexpr std::size_t kLineWidth = 100, kGap = 2;
+  std::size_t label_width = 0;
+  std::vector<std::size_t> widths;
+  for (const std::string& name : names) widths.push_back(name.size());
+  for (const TableRow& row : rows) {
+    label_width = std::max(label_width, row.label.size());
+    for (std::size_t c = 0; c < widths.size(); ++c) {
+      widths[c] = std::max(widths[c], row.cells[c].size());
+    }
+  }
   std::string text;
-  for (std::size_t i = 0; i < parts.size(); ++i)
-    text.append(i > 0 ? separator : "").append(parts[i]);
+  for (std::size_t first = 0, end = 0; first < names.size(); first = end) {
+    std::size_t width = label_width;
+    for (end = first; end < names.size(); ++end) {
+      width += kGap + widths[end];
+      if (width > kLineWidth && end > first) break;
+    }
+    if (first > 0) text += '\n';
+    const auto append_line = [&](std::string line, const std::vector<std::string>& cells) {
+      line.resize(label_width, ' ');
+      for (std::size_t c = first; c < end; ++c) {
+        line.append(kGap + widths[c] - cells[c].size(), ' ').append(cells[c]);
+      }
+      text += line + '\n';
+    };
+    append_line("", names);
+    for (const TableRow& row : rows) append_line(row.label, row.cells);
+  }
+  return text;
+}
+
+std::vector<std::string> CellsOf(const TableRow& row) {
+  std::vector<std::string> cells = {row.label};
+  cells.insert(cells.end(), row.cells.begin(), row.cells.end());
+  return cells;
+}
+
+std::string MarkdownTable(const std::string& corner, const std::vector<std::string>& names,
+                          const std::vector<TableRow>& rows) {
+  std::string text = MarkdownRow(CellsOf({corner, names})) + "|---|";
+  for (std::size_t c = 0; c < names.size(); ++c) text += "---:|";
+  text += '\n';
+  for (const TableRow& row : rows) text += MarkdownRow(CellsOf(row));
   return text;
 }
 

@@ -20,7 +20,19 @@ std::string LatexText(const std::string& text);
 /// `a & b \\`, a line of a tabular, each cell as LatexText.
 std::string LatexRow(const TextRow& cells);
 
-/// `a, b, c`
-std::string Join(const std::vector<std::string>& parts, const char* separator = ", ");
+/// One line of a table: a label with its unit, and a cell for each column, `-` where it has no value.
+struct TableRow {
+  std::string label;
+  std::vector<std::string> cells;
+};
+/// Rows below the names of the columns, aligned to the right. Columns that do not fit next to the
+/// others in a line of 100 characters go into a table below.
+std::string RightAlignedTable(const std::vector<std::string>& names,
+                              const std::vector<TableRow>& rows);
+/// The label of a row, then its cells.
+std::vector<std::string> CellsOf(const TableRow& row);
+/// The rows as a table of Markdown, `corner` above their labels.
+std::string MarkdownTable(const std::string& corner, const std::vector<std::string>& names,
+                          const std::vector<TableRow>& rows);
 
 }  // namespace alidade::internal

@@ -1,38 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
 #include "alidade/evaluate.h"
 #include "alidade/text_cell.h"
 #include "number_text.h"
-#include "similarity.h"
 
 namespace alidade {
 namespace {
 
+using internal::SquaredExtent;
+using internal::Umeyama;
+
 [[noreturn]] void Fail(const std::string& name, const std::string& what,
                        const std::string& expected) {
   throw Error(ExitCode::kBadData, ErrorLine({name}, {}, what, expected));
-}
-
-/// Scale, rotation and translation of [Umeyama1991].
-Similarity Umeyama(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to, bool with_scale) {
-  const Eigen::Matrix4d matrix = Eigen::umeyama(from, to, with_scale);
-  Similarity found;
-  const Eigen::Matrix3d linear = matrix.topLeftCorner<3, 3>();
-  if (with_scale) found.scale = std::cbrt(linear.determinant());
-  found.rotation = linear / found.scale;
-  found.translation = matrix.topRightCorner<3, 1>();
-  return found;
-}
-
-/// Mean of |p - mean p|^2; exactly 0 where all points are one.
-double SquaredExtent(const Eigen::Matrix3Xd& points) {
-  const Eigen::Matrix3Xd from_first = points.colwise() - points.col(0);
-  return (from_first.colwise() - from_first.rowwise().mean()).squaredNorm() /
-         static_cast<double>(points.cols());
 }
 
 /// The rotation about z that maximises sum to' R from of centred points [Zhang2018].
@@ -96,7 +79,8 @@ const char* ToString(Alignment alignment) {
   return kNames[static_cast<std::size_t>(alignment)];
 }
 
-Trajectory Similarity::operator*(const Trajectory& estimate) const {
+Trajectory operator*(const Similarity& reference_from_estimate, const Trajectory& estimate) {
+  const auto& [scale, rotation, translation] = reference_from_estimate;
   Trajectory moved = estimate;
   moved.positions = ((scale * rotation) * estimate.positions).colwise() + translation;
   const Eigen::Quaterniond turn(rotation);
@@ -104,16 +88,6 @@ Trajectory Similarity::operator*(const Trajectory& estimate) const {
   moved.position_covariances.clear();
   moved.orientation_covariances.clear();
   return moved;
-}
-
-std::optional<Similarity> internal::FindSimilarity(const Eigen::Matrix3Xd& from,
-                                                   const Eigen::Matrix3Xd& to) {
-  if (from.cols() < 3) return std::nullopt;
-  const double variance = SquaredExtent(from), to_variance = SquaredExtent(to);
-  if (!(variance > 0.0)) return std::nullopt;
-  const Similarity found = Umeyama(from, to, true);
-  if (!DeterminesScale(found.scale, variance, to_variance)) return std::nullopt;
-  return found;
 }
 
 Similarity Align(Alignment alignment, const Trajectory& reference, const Trajectory& estimate,

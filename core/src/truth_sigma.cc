@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <limits>
 
-#include "names.h"
 #include "text_table.h"
+#include "words.h"
 
 namespace alidade::internal {
 

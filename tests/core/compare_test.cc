@@ -9,9 +9,10 @@
 #include <cmath>
 #include <limits>
 
+#include "alidade/similarity.h"
 #include "core/src/data_hash.h"
-#include "core/src/path_alignment.h"
-#include "core/src/series.h"
+#include "core/src/distance.h"
+#include "core/src/estimate_series.h"
 #include "support/systems.h"
 
 namespace alidade {

@@ -147,9 +147,9 @@ TEST(Recorder, WritesAbsentFixedAndRejected) {
   const TemporaryFolder folder;
   HandMade hand;
   Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
-  recorder.Start(hand.experiment);
-  recorder.AddFrame(hand.frame);
-  recorder.AddEstimate(0, hand.frame, hand.state, hand.report);
+  recorder.Begin(hand.experiment);
+  recorder.OnFrame(hand.frame);
+  recorder.OnEstimate(0, hand.frame, hand.state, hand.report);
   RunResult result;
   result.estimators.resize(1);
   result.estimators[0].name = "hand";
@@ -223,7 +223,7 @@ TEST(Recorder, TellsPluginsOfOneNameApart) {
         .append("\"\n    }");
   }
   Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
-  recorder.Start(experiment);
+  recorder.Begin(experiment);
   recorder.Finish({});
   const std::string json = Read(folder / "out/run.json");
   EXPECT_NE(json.find(expected + "\n  ]"), std::string::npos) << json;
@@ -246,7 +246,7 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
   result.estimators = {one};
   Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
   const Experiment experiment = MakeExperiment();
-  recorder.Start(experiment);
+  recorder.Begin(experiment);
   recorder.Finish(result);
   EXPECT_EQ(Read(folder / "out/run.json"), R"({
   "status": "failed",

@@ -76,7 +76,7 @@ Compared CompareLinear(bool with_outlier, const CompareOptions& options = {},
   experiment.estimators[1].type = smoother;
   RunComparer comparer(experiment);
   RunOptions observed;
-  comparer.Observe(observed);
+  observed.observers.push_back(&comparer);
   RunResult run = Run(experiment, observed);
   EXPECT_EQ(run.status, RunStatus::kOk) << run.reason;
   Comparison comparison = comparer.Finish(run, options);
@@ -296,7 +296,7 @@ Comparison CompareScene(const std::string& more) {
   ExplainedExperiment explained = ExplainExperiment(config, Shipped(), {});
   RunComparer comparer(explained.experiment);
   RunOptions observed;
-  comparer.Observe(observed);
+  observed.observers.push_back(&comparer);
   const RunResult run = Run(explained.experiment, observed);
   EXPECT_EQ(run.status, RunStatus::kOk) << run.reason;
   return comparer.Finish(run, {});

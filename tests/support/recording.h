@@ -107,7 +107,7 @@ inline Recorder::Options OptionsFor(const fs::path& folder, bool force = false,
 /// Runs what `recorder` is to record.
 inline RunResult RunInto(Recorder& recorder, Experiment& experiment) {
   RunOptions options;
-  options.recorder = &recorder;
+  options.observers = {&recorder};
   return Run(experiment, options);
 }
 

@@ -4,15 +4,19 @@
 #include <iterator>
 #include <memory>
 
-#include "alidade/bundle.h"
-#include "alidade/estimator.h"
 #include "alidade/fingerprint.h"
-#include "alidade/pictures.h"
+#include "alidade/plugin_host.h"
 #include "alidade/source.h"
 
 /// Exports of the build tier: plugins in C++ against alidade::core, loaded only into the very build
 /// that they were made with.
 namespace alidade {
+
+class PictureWriter;      // in alidade/pictures.h
+struct PictureArguments;  // likewise
+struct BundleProblem;     // in alidade/bundle.h
+struct BundleOptions;     // likewise
+struct BundleResult;      // likewise
 
 /// All that must be equal between the host and a build-tier plugin: version, compiler, and the
 /// flags that change layout.

@@ -101,15 +101,16 @@ ExplainedExperiment ExplainExperiment(const Config& config, const PluginHost& ho
                                       const CompareOptions& options);
 
 /// Compares the estimators of a run while it runs.
-class RunComparer {
+class RunComparer : public RunObserver {
  public:
   explicit RunComparer(const Experiment& experiment);
-  ~RunComparer();
+  ~RunComparer() override;
   RunComparer(const RunComparer&) = delete;
   RunComparer& operator=(const RunComparer&) = delete;
 
-  /// Has the run show its estimates; `options` must not outlive this.
-  void Observe(RunOptions& options);
+  void OnFrame(const Frame& frame) override;
+  void OnEstimate(int estimator, const Frame& frame, const State& state,
+                  const UpdateReport& report) override;
   /// Once, after the run. Errors: kUsage where `options` names an estimator that is not there.
   Comparison Finish(const RunResult& result, const CompareOptions& options);
 

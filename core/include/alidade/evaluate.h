@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "alidade/similarity.h"
 #include "alidade/trajectory.h"
 
 namespace alidade {
@@ -26,15 +27,8 @@ enum class Alignment {
 /// `none`, `scale`, `origin`, `yaw`, `se3`, `sim3`.
 const char* ToString(Alignment alignment);
 
-/// x_in_reference = scale rotation x_in_estimate + translation
-struct Similarity {
-  double scale = 1.0;
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-
-  /// The trajectory in the world of the reference; covariances are dropped.
-  Trajectory operator*(const Trajectory& estimate) const;
-};
+/// The trajectory in the world of the reference; covariances are dropped.
+Trajectory operator*(const Similarity& reference_from_estimate, const Trajectory& estimate);
 
 /// The transformation of `estimate` to `reference`, of the same poses in the same order, by the
 /// first `poses` of them (0: all). Errors: kBadData where they are fewer than 3 for a rotation, and

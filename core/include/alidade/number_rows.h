@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "alidade/line_reader.h"
-#include "alidade/source.h"
 #include "alidade/text_cell.h"
+#include "alidade/timestamp.h"
 
 namespace alidade {
 

@@ -115,6 +115,9 @@ class PluginHost {
   mutable std::mutex create_mutex_;
 };
 
+/// Every place searched and what was found there, and every file refused with the reason.
+std::string PluginPlaces(const PluginHost& host);
+
 /// The fingerprint in the `.alidade` section of an ELF file, read from its bytes, every offset
 /// checked. Errors: kPlugin (not ELF, truncated, malformed, no fingerprint, another ABI).
 AlidadeFingerprint ReadFingerprint(const std::filesystem::path& file);

@@ -21,7 +21,4 @@ std::string PluginInfo(const PluginHost& host, const std::string& name);
 /// `doc`). A built-in estimator has no `family`, `citation`, `file` and `describes`.
 std::string PluginInfoJson(const PluginHost& host, const std::string& name);
 
-/// Every place searched and what was found there, and every file refused with the reason.
-std::string PluginPlaces(const PluginHost& host);
-
 }  // namespace alidade

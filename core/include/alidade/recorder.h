@@ -15,7 +15,7 @@ namespace alidade {
 /// Writes a run folder (docs/run_folder.md). Everything goes to a temporary folder beside it, is
 /// synced, and takes its name at the end, also where the run failed: `run.json` then says why.
 /// Every write is checked. Errors: kCannotCreate, kIo with the path.
-class Recorder {
+class Recorder : public RunObserver {
  public:
   struct Options {
     std::filesystem::path folder;
@@ -28,15 +28,15 @@ class Recorder {
   };
   /// Creates the temporary folder. Errors: kCannotCreate where `folder` exists without `force`.
   Recorder(const Options& options, const Config& config, const PluginHost& host);
-  ~Recorder();
+  ~Recorder() override;
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
   /// Writes the headers, once the experiment is known.
-  void Start(const Experiment& experiment);
-  void AddFrame(const Frame& frame);
-  void AddEstimate(int estimator, const Frame& frame, const State& state,
-                   const UpdateReport& report);
+  void Begin(const Experiment& experiment) override;
+  void OnFrame(const Frame& frame) override;
+  void OnEstimate(int estimator, const Frame& frame, const State& state,
+                  const UpdateReport& report) override;
   /// Puts a file of that text into the folder too. Errors: kCannotCreate, kIo.
   void AddFile(const std::string& name, std::string_view text);
   /// Writes run.json, comparison.csv, timing.json, figures and report.html, syncs and renames.

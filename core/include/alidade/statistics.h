@@ -8,6 +8,18 @@ namespace alidade {
 /// Quantile q, in [0, 1], of chi-square with `dof` > 0 degrees of freedom.
 double ChiSquareQuantile(double q, int dof);
 
+/// Quantile q, in [0, 1], of ascending values x[0..n-1], n > 0, linear between order statistics
+/// (type 7 of Hyndman and Fan): with h = (n - 1) q, x[floor h] + (h - floor h) (x[floor h + 1] -
+/// x[floor h]).
+double Quantile(const std::vector<double>& ascending, double q);
+
+/// Mean and quantiles of values.
+struct Spread {
+  double mean = 0.0, p05 = 0.0, p50 = 0.0, p95 = 0.0;
+};
+/// Of those values that are numbers; NaN where there is none.
+Spread SpreadOf(std::vector<double> values);
+
 /// Delay of `signal` after `reference`, both sampled every `step`, in the unit of step: the shift
 /// k, |k| <= min(n/4, 2000), with the largest correlation coefficient over the n - |k| samples
 /// that overlap, refined by a parabola. On a ramp, where `reference` correlates with itself by more

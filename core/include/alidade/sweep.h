@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "alidade/run.h"
+#include "alidade/statistics.h"
 
 namespace alidade {
 
@@ -78,16 +79,6 @@ struct VariedSweep {
 /// for any of the values.
 VariedSweep SweepOver(const Config& config, const PluginHost& host, const SweepOptions& options,
                       const Variation& variation);
-
-/// Mean and quantiles of a metric.
-struct Spread {
-  double mean = 0.0, p05 = 0.0, p50 = 0.0, p95 = 0.0;
-};
-
-/// Quantile q, in [0, 1], of ascending values x[0..n-1], n > 0, linear between order statistics
-/// (type 7 of Hyndman and Fan): with h = (n - 1) q, x[floor h] + (h - floor h) (x[floor h + 1] -
-/// x[floor h]).
-double Quantile(const std::vector<double>& ascending, double q);
 
 /// One estimator over all runs.
 struct SweepSummary {

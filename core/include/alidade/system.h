@@ -90,6 +90,16 @@ struct System {
 /// Errors: kBadConfig with place and remedy, kPlugin.
 System BuildSystem(const Node& root, const PluginHost& host, const std::vector<std::string>& only);
 
+namespace internal {
+
+/// The block of a position that landmarks are seen from; -1: there is none.
+BlockId PathBlockOf(const System& system);
+
+/// The unit of a block, or else of a sensor's role that it fills.
+std::string UnitOf(const System& system, BlockId id);
+
+}  // namespace internal
+
 /// Directions of the initial state that no sensor can see, found at a generic point near the prior
 /// from the rank of the observability matrix [H; H F; H F^2; ...]: for each one the names of the
 /// block elements it moves. With landmarks, `scale` is that of path and map; exact priors are seen.

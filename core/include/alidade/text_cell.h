@@ -8,7 +8,7 @@
 #include <string_view>
 #include <system_error>
 
-#include "alidade/source.h"
+#include "alidade/timestamp.h"
 
 /// What the text of a single cell of a table means, whatever the locale.
 namespace alidade::cell {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/src/path_alignment.h"
+#include "alidade/similarity.h"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 
-#include "core/src/series.h"
+#include "core/src/estimate_series.h"
 
 namespace alidade {
 namespace {

@@ -2,15 +2,40 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 
-namespace alidade::internal {
+/// The similarity that brings points p, columns of `from`, nearest to q, those of `to`: s R p + t
+/// with sum |q - s R p - t|^2 least [Umeyama1991].
+namespace alidade {
+
+/// x_in_reference = scale rotation x_in_estimate + translation
+struct Similarity {
+  double scale = 1.0;
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+};
+
+namespace internal {
+
+/// With a scale, or with scale 1.
+Similarity Umeyama(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to, bool with_scale);
+
+/// Mean of |p - mean p|^2; exactly 0 where all points are one.
+double SquaredExtent(const Eigen::Matrix3Xd& points);
+
+/// Nothing of fewer than three points, and where the points do not determine s > 0.
+std::optional<Similarity> FindSimilarity(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to);
 
 /// What the similarity that brings points nearest to others leaves, and its scale.
 struct Aligned {
   double rmse = 0.0, scale = 1.0;
 };
+
+/// Of the columns; nothing where FindSimilarity finds none.
+std::optional<Aligned> AlignBySimilarity(const Eigen::Matrix3Xd& points,
+                                         const Eigen::Matrix3Xd& onto);
 
 /// The similarity that brings a path nearest to another [Umeyama1991], from sums alone, so that a
 /// long path takes no memory. Points p, q of both, n of them, with means p0, q0:
@@ -34,7 +59,7 @@ class PathAlignment {
     squares_ += p.squaredNorm();
     onto_squares_ += q.squaredNorm();
   }
-  /// Nothing where FindSimilarity finds none (similarity.h).
+  /// Nothing where FindSimilarity finds none.
   std::optional<Aligned> Result() const;
 
  private:
@@ -45,4 +70,5 @@ class PathAlignment {
   double squares_ = 0.0, onto_squares_ = 0.0;
 };
 
-}  // namespace alidade::internal
+}  // namespace internal
+}  // namespace alidade

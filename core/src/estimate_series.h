@@ -2,15 +2,11 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <limits>
-#include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "alidade/state.h"
 #include "alidade/system.h"
-#include "path_alignment.h"
 
 /// The estimates of a whole run, to be compared with those of another estimator.
 namespace alidade::internal {
@@ -52,27 +48,5 @@ struct Series {
   Eigen::MatrixXd Covariance(std::size_t row, int first, int size) const;
   void Append(Stamp stamp, const State& state);
 };
-
-/// How far the estimates of one series are from those of a reference, over the stamps of both. With
-/// d = x (-) x_ref in the tangent at the reference:
-struct Distance {
-  std::map<std::string, double> rms;    ///< by block: sqrt(mean |d|^2)
-  std::map<std::string, double> final;  ///< by block: |d| at the last stamp
-  /// By owner: sqrt(mean d' P_ref^-1 d / dof), in standard deviations of the reference; where P_ref
-  /// is singular a stamp is left out.
-  std::map<std::string, double> sigmas;
-  std::map<std::string, double> final_sigmas;  ///< by owner, at the last stamp
-};
-
-/// Blocks are the same where name and geometry are.
-Distance DistanceBetween(const Series& series, const Series& reference);
-
-/// What the similarity that brings columns nearest to others leaves; nothing where FindSimilarity
-/// finds none (similarity.h).
-std::optional<Aligned> AlignBySimilarity(const Eigen::Matrix3Xd& points,
-                                         const Eigen::Matrix3Xd& onto);
-/// Of the paths that two series have of a vector block of three elements.
-std::optional<Aligned> AlignPaths(const Series& series, const Series& reference,
-                                  const std::string& block);
 
 }  // namespace alidade::internal

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/source.h"
+#include "alidade/timestamp.h"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "columns.h"
+#include "truth_match.h"
 
 #include <algorithm>
 #include <string_view>
 
-#include "text_table.h"
+#include "words.h"
 
 namespace alidade::internal {
 namespace {
@@ -52,55 +52,6 @@ std::string WhyNoBlock(const StateLayout& layout, const std::vector<StreamInfo>&
   if (fitting.size() > 1) return "it may be of " + Join(fitting, " or ");
   if (size == truth.size) return fitting[0] + " has a truth of its full name";
   return fitting[0] + " has size " + std::to_string(size) + ", not " + std::to_string(truth.size);
-}
-
-std::vector<std::string> AmbientNames(const std::string& name, const Space& space) {
-  const auto size = static_cast<std::size_t>(space.geometry.ambient);
-  if (space.elements.size() == size) return ColumnNames(name, space);
-  return NumberedNames(name, size);
-}
-
-std::vector<std::string> NumberedNames(const std::string& name, std::size_t size) {
-  if (size == 1) return {name};
-  std::vector<std::string> names;
-  for (std::size_t i = 0; i < size; ++i) names.push_back(name + '.' + std::to_string(i));
-  return names;
-}
-
-std::vector<std::string> TangentNames(const std::string& name, const Space& space) {
-  switch (space.geometry.kind) {
-    case GeometryKind::kUnitQuaternion:
-      return {name + ".rx", name + ".ry", name + ".rz"};
-    case GeometryKind::kUnitVector:
-      return {name + ".d0", name + ".d1"};
-    case GeometryKind::kVector:
-    case GeometryKind::kAngle:
-      break;
-  }
-  return AmbientNames(name, space);
-}
-
-BlockId PathBlockOf(const System& system) {
-  BlockId path = -1;
-  for (const SensorBinding& binding : system.sensors) {
-    if (!binding.model.has_landmark()) continue;
-    for (std::size_t r = 0; r < binding.roles.size(); ++r) {
-      const BlockId id = binding.roles[r].block;
-      const bool position = binding.model.roles()[r].name == "position" && id >= 0;
-      if (position && system.layout[id].geometry().ambient == 3) path = id;
-    }
-  }
-  return path;
-}
-
-std::string UnitOf(const System& system, BlockId id) {
-  if (!system.layout[id].space.unit.empty()) return system.layout[id].space.unit;
-  for (const SensorBinding& sensor : system.sensors) {
-    for (std::size_t r = 0; r < sensor.roles.size(); ++r) {
-      if (sensor.roles[r].block == id) return sensor.model.roles()[r].unit;
-    }
-  }
-  return {};
 }
 
 }  // namespace alidade::internal

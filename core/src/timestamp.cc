@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/source.h"
+#include "alidade/timestamp.h"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "alidade/error.h"
 

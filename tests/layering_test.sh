@@ -83,7 +83,7 @@ sources() {
     }
     function foreign_to_core(path,    i) {
       if (path ~ /^alidade\//) return !exists("core/include/" path)
-      if (path ~ /\//) return path !~ /^(Eigen|sys|linux|ceres|boost|yaml-cpp)\//
+      if (path ~ /\//) return path !~ /^(Eigen|sys|linux|ceres|boost|yaml-cpp|openssl)\//
       for (i in others) if (exists(others[i] "/" path)) return !exists("core/src/" path)
       return 0
     }

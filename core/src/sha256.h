@@ -1,26 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <string_view>
 
+struct evp_md_ctx_st;  // of OpenSSL
+
 namespace alidade::internal {
 
-/// SHA-256 of bytes that come piece by piece, in constant memory. (FIPS 180-4)
+/// SHA-256 of bytes that come piece by piece, in constant memory. (FIPS 180-4, by OpenSSL)
 class Sha256Stream {
  public:
+  Sha256Stream();
   void Add(std::string_view bytes);
   /// 64 hexadecimal digits of all that was added so far; more may follow.
   std::string Digest() const;
 
  private:
-  std::array<std::uint32_t, 8> hash_ = {0x6a09e667, 0xbb67ae85, 0x3c6ef372, 0xa54ff53a,
-                                        0x510e527f, 0x9b05688c, 0x1f83d9ab, 0x5be0cd19};
-  std::string tail_;  ///< less than a block
-  std::uint64_t size_ = 0;
+  struct Free {
+    void operator()(evp_md_ctx_st* context) const;
+  };
+  std::unique_ptr<evp_md_ctx_st, Free> context_;
 };
 
 /// SHA-256 as 64 hexadecimal digits.

@@ -265,7 +265,7 @@ ComparedEstimator Compare(const Candidate& one, const References& references, bo
 /// The filter whose gap is explained; null: there is none. Error: kUsage.
 const Candidate* FilterOf(const std::vector<Candidate>& candidates, const CompareOptions& options) {
   const auto is_filter = [](const Candidate& one) {
-    return internal::IsFilter(one.facts().type, one.facts().smoothed);
+    return one.facts().kind == EstimatorKind::kFilter;
   };
   if (options.filter.empty()) {
     const auto first = std::ranges::find_if(candidates, [&](const Candidate& one) {

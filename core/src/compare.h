@@ -17,7 +17,7 @@ struct Candidate {
   const ComparedEntry* entry;
 
   const EstimatorFacts& facts() const { return entry->facts; }
-  bool batch() const { return facts().type == "ceres_batch"; }
+  bool batch() const { return facts().kind == EstimatorKind::kBatch; }
 };
 
 /// Whether both take the same measurements.
@@ -25,15 +25,9 @@ bool SameSensors(const EstimatorFacts& a, const EstimatorFacts& b);
 /// Whether both are of the same models and sensors.
 bool SameSystem(const EstimatorFacts& a, const EstimatorFacts& b);
 
-/// Whether it is a filter, whose gap to the batch is explained: online, and neither a batch nor a
-/// window, which linearise again.
-inline bool IsFilter(const std::string& type, bool smoothed) {
-  return !smoothed && type != "ceres_batch" && type != "fixed_lag";
-}
-
 /// Whether its estimates rest on all data; later data of a window end with it.
 inline bool SmoothsAllData(const EstimatorFacts& facts) {
-  return facts.smoothed && facts.type != "fixed_lag";
+  return facts.smoothed && facts.kind != EstimatorKind::kWindow;
 }
 
 /// Refuses what an option names. Error: kUsage.

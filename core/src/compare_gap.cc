@@ -100,7 +100,7 @@ GapStep Linearisation(const Candidate& filter, const Partners& partners, bool wi
   const Candidate* const of_end = accepted ? partners.accepted : partners.all;
   const bool at_end = partners.so_far == nullptr && of_end != nullptr;
   return Between(GapKind::kLinearisation, &filter, at_end ? of_end : partners.so_far, with_truth,
-                 "there is no batch of the data so far, {type: ceres_batch, data: so_far}", at_end);
+                 "there is no batch of the data so far, {type: BATCH, data: so_far}", at_end);
 }
 
 }  // namespace
@@ -150,7 +150,7 @@ std::vector<GapStep> ExplainGap(const Candidate& filter, const std::vector<Candi
                           "of the data so far"));
   steps.push_back(Between(GapKind::kLostData, partners.accepted, partners.all, with_truth,
                           "there are no two batches, of all data and of what it accepted, {type: "
-                          "ceres_batch, use: {accepted_by: FILTER}}"));
+                          "BATCH, use: {accepted_by: FILTER}}"));
   const std::int64_t all = filter.entry->measurements(), used = filter.entry->used();
   steps.back().values["measurements"] = Single(static_cast<double>(all));
   steps.back().values["lost"] = Single(static_cast<double>(all - used));

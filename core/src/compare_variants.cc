@@ -5,6 +5,7 @@
 #include "add_estimator.h"
 #include "alidade/compare.h"
 #include "compare.h"
+#include "estimator_types.h"
 #include "sweep_config.h"
 #include "text_table.h"
 #include "words.h"
@@ -17,7 +18,7 @@ constexpr const char* kOrigin = "alidade compare";
 /// An estimator that a comparison may lack.
 struct Variant {
   const char* name;
-  const char* type;
+  EstimatorKind kind;
   bool so_far;                    ///< the batch of the data so far
   bool accepted;                  ///< of what the filter accepted
   std::vector<const char*> keys;  ///< of the filter's entry, taken over where it has them
@@ -27,25 +28,25 @@ struct Variant {
 const std::vector<Variant>& Variants() {
   static const std::vector<Variant> variants = {
       {"rts",
-       "rts",
+       EstimatorKind::kSmoother,
        false,
        false,
        {"sensors", "overrides", "max_dt_s", "gate", "fuse"},
        "the smoother of all data"},
       {"batch",
-       "ceres_batch",
+       EstimatorKind::kBatch,
        false,
        false,
        {"sensors", "overrides", "max_dt_s"},
        "the batch of all data"},
       {"batch_so_far",
-       "ceres_batch",
+       EstimatorKind::kBatch,
        true,
        true,
        {"sensors", "overrides", "max_dt_s"},
        "the batch of the data so far that the filter accepted"},
       {"batch_accepted",
-       "ceres_batch",
+       EstimatorKind::kBatch,
        false,
        true,
        {"sensors", "overrides", "max_dt_s"},
@@ -65,8 +66,8 @@ std::vector<std::string> SensorsOf(const NamedEstimator& named) {
 /// data that a filter accepted: another line tells what these two differ by.
 bool IsThere(const Variant& variant, const NamedEstimator& named, const NamedEstimator& filter,
              int filter_index) {
-  const bool so_far = named.type == "ceres_batch" && !named.estimator->offline();
-  if (named.type != variant.type || so_far != variant.so_far) return false;
+  const bool so_far = named.kind == EstimatorKind::kBatch && !named.estimator->offline();
+  if (named.kind != variant.kind || so_far != variant.so_far) return false;
   if (named.overrides != filter.overrides || SensorsOf(named) != SensorsOf(filter)) return false;
   if (named.accepted_by >= 0) return variant.accepted && named.accepted_by == filter_index;
   return variant.so_far || !variant.accepted;
@@ -80,12 +81,23 @@ std::string FreeName(const std::string& name, const std::vector<NamedEstimator>&
   return free;
 }
 
+/// The first type of that kind, those of core before those of plugins; "": there is none.
+std::string TypeOf(EstimatorKind kind, const PluginHost& host) {
+  for (const internal::EstimatorType& type : internal::EstimatorTypes()) {
+    if (type.kind == kind) return type.name;
+  }
+  for (const PluginEntry& entry : host.entries()) {
+    if (entry.kind == PluginEntry::Kind::kEstimator && entry.estimator == kind) return entry.name;
+  }
+  return "";
+}
+
 /// The config with the variant's entry.
-Config WithVariant(const Config& config, const Variant& variant, const std::string& name,
-                   const std::string& filter) {
+Config WithVariant(const Config& config, const Variant& variant, const std::string& type,
+                   const std::string& name, const std::string& filter) {
   Config with = internal::Copy(config);
   const std::string entry = "estimators." + name;
-  with.Set(entry + ".type", variant.type, kOrigin);
+  with.Set(entry + ".type", type, kOrigin);
   if (variant.so_far) with.Set(entry + ".data", "so_far", kOrigin);
   if (variant.accepted) with.Set(entry + ".use.accepted_by", filter, kOrigin);
   for (const char* const key : variant.keys) {
@@ -110,8 +122,14 @@ std::string ReasonOf(const Error& error) {
 void AddVariant(const Variant& variant, const PluginHost& host, ExplainedExperiment& explained,
                 std::map<std::string, std::vector<std::string>>& left_out) {
   const std::string name = FreeName(variant.name, explained.experiment.estimators);
+  const std::string type = TypeOf(variant.kind, host);
+  if (type.empty()) {
+    left_out[std::string("no plugin offers an estimator of the kind ") + ToString(variant.kind)]
+        .emplace_back(variant.what);
+    return;
+  }
   try {
-    const Config with = WithVariant(explained.config, variant, name, explained.filter);
+    const Config with = WithVariant(explained.config, variant, type, name, explained.filter);
     internal::AddEstimator(with, host, name, explained.experiment);
     explained.config = with;
     explained.added.push_back(name);
@@ -137,7 +155,7 @@ int FindFilter(const Experiment& experiment, const std::string& name) {
   std::vector<std::string> filters;
   for (std::size_t e = 0; e < experiment.estimators.size(); ++e) {
     const NamedEstimator& one = experiment.estimators[e];
-    if (!internal::IsFilter(one.type, one.estimator->offline())) continue;
+    if (one.kind != EstimatorKind::kFilter) continue;
     if (name.empty() ? one.accepted_by < 0 : one.name == name) return static_cast<int>(e);
     filters.push_back(one.name);
   }

@@ -125,6 +125,10 @@ Geometry GeometryOf(const Node& block) {
 EstimatorFacts ReadFacts(const Node& entry) {
   EstimatorFacts facts;
   facts.type = TextOf(entry, "type");
+  using enum EstimatorKind;
+  facts.kind = static_cast<EstimatorKind>(
+      entry.At("kind", "a comparison")
+          .Choice({ToString(kFilter), ToString(kSmoother), ToString(kBatch), ToString(kWindow)}));
   facts.smoothed = entry.At("smoothed", "a comparison").Flag();
   facts.accepted_by = TextOf(entry, "accepted_by");
   facts.overrides = TextOf(entry, "overrides");

@@ -95,7 +95,7 @@ const std::vector<EstimatorType>& EstimatorTypes() {
        IekfOptions::Schema, DescribeIekf, Iekf::kSupport},
       {"rts",
        "Fixed-interval smoother after an extended Kalman filter; built in, for `estimators`.",
-       ReadRts, CommonSchema, DescribeCommon, RtsSmoother::kSupport},
+       ReadRts, CommonSchema, DescribeCommon, RtsSmoother::kSupport, EstimatorKind::kSmoother},
       {"square_root_ekf",
        "Extended Kalman filter that carries a square root of P; built in, for `estimators`.",
        ReadSquareRoot, CommonSchema, DescribeCommon, SquareRootEkf::kSupport},

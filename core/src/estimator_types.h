@@ -29,6 +29,7 @@ struct EstimatorType {
   /// The options that an entry sets, in words.
   Description (*describe)(const Node& entry);
   Support support;
+  EstimatorKind kind = EstimatorKind::kFilter;
 };
 
 /// All of them; the first is `ekf`.

@@ -101,32 +101,27 @@ void CheckName(const std::string& name, const Node& entry) {
   }
 }
 
-/// Refuses a type of estimator that is neither of core nor of a plugin.
-void CheckOffered(const std::string& type, const PluginHost& host, const Node& node) {
+/// The entry of a plugin's estimator. Error: kPlugin where none offers that type.
+const PluginEntry& FindOffered(const std::string& type, const PluginHost& host, const Node& node) {
   std::vector<std::string> of_core, of_plugins;
   for (const EstimatorType& one : EstimatorTypes()) of_core.emplace_back(one.name);
   for (const PluginEntry& entry : host.entries()) {
-    if (entry.kind == PluginEntry::Kind::kEstimator) of_plugins.push_back(entry.name);
+    if (entry.kind != PluginEntry::Kind::kEstimator) continue;
+    if (entry.name == type) return entry;
+    of_plugins.push_back(entry.name);
   }
-  if (std::ranges::find(of_plugins, type) != of_plugins.end()) return;
-  constexpr const char* kCeresHint =
-      "\n  'ceres_batch' and 'fixed_lag' come with a build that found the Ceres solver: "
-      "cmake --preset release && cmake --build --preset release";
   std::vector<std::string> names = of_core;
   names.insert(names.end(), of_plugins.begin(), of_plugins.end());
   const std::string expected = internal::Join(of_core) + ", built in, or of a plugin: " +
                                (of_plugins.empty() ? "none was found" : internal::Join(of_plugins));
+  constexpr const char* kHint =
+      "\n  batch estimators come with a build that found the Ceres solver: "
+      "cmake --preset release && cmake --build --preset release";
   throw Error(ExitCode::kPlugin,
               ErrorLine(node.place(), node.path(),
                         "no estimator '" + type + "' is built in, and no plugin offers it",
                         expected, Nearest(type, names)) +
-                  (of_plugins.empty() ? kCeresHint : "") + "\n" + PluginPlaces(host));
-}
-
-bool TakesLandmarks(const std::string& type, const PluginHost& host) {
-  return std::ranges::any_of(host.entries(), [&](const PluginEntry& entry) {
-    return entry.kind == PluginEntry::Kind::kEstimator && entry.name == type && entry.landmarks;
-  });
+                  (of_plugins.empty() ? kHint : "") + "\n" + PluginPlaces(host));
 }
 
 /// Refuses overrides of what all estimators share, and of an entry that `root` does not have and
@@ -159,7 +154,9 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   const Node type = entry.At("type", "an estimator");
   named.type = type.Text();
   const EstimatorType* const of_core = FindEstimatorType(named.type);
-  if (of_core == nullptr) CheckOffered(named.type, host, type);
+  const PluginEntry* const of_plugin =
+      of_core == nullptr ? &FindOffered(named.type, host, type) : nullptr;
+  named.kind = of_core != nullptr ? of_core->kind : of_plugin->estimator;
   const EstimatorMaker make =
       of_core != nullptr ? of_core->read(entry) : host.CreateEstimator(named.type, entry);
   if (const auto policy = entry.Find("on_divergence")) {
@@ -180,7 +177,7 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   if (of_core != nullptr) {
     internal::RefuseUnsupported(named.type, of_core->support, own.root(), named.system);
     internal::RefuseLoneMatches(entry, named.system);
-  } else if (named.system.landmarks && !TakesLandmarks(named.type, host)) {
+  } else if (named.system.landmarks && !of_plugin->landmarks) {
     type.Fail("estimator type '" + named.type + "' does not support landmarks",
               "`sensors` that measure none, or type: ekf");
   }

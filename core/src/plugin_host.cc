@@ -172,7 +172,7 @@ void PluginHost::AddEntries(const Loaded& plugin) {
     for (int i = 0; i < plugin.build_table->estimator_count; ++i) {
       const EstimatorEntry& one = plugin.build_table->estimators[i];
       entries_.push_back({PluginEntry::Kind::kEstimator, one.name, Text(one.doc),
-                          Text(one.citation), "", plugin.file, 0, one.landmarks});
+                          Text(one.citation), "", plugin.file, 0, one.kind, one.landmarks});
     }
     return;
   }
@@ -229,6 +229,11 @@ const PluginHost::Loaded& PluginHost::LoadedFrom(const fs::path& file) const {
   const auto found = std::find_if(loaded_.begin(), loaded_.end(), same);
   ALIDADE_EXPECTS(found != loaded_.end());
   return **found;
+}
+
+const char* ToString(EstimatorKind kind) {
+  constexpr const char* kNames[] = {"filter", "smoother", "batch", "window"};
+  return kNames[static_cast<std::size_t>(kind)];
 }
 
 std::string PluginPlaces(const PluginHost& host) {

@@ -128,7 +128,7 @@ std::string PluginListJson(const PluginHost& host) {
   }
   for (const EstimatorType& type : EstimatorTypes()) {
     json.Object();
-    AddEntry({PluginEntry::Kind::kEstimator, type.name, type.doc, "", "", "", 0}, json);
+    AddEntry({PluginEntry::Kind::kEstimator, type.name, type.doc, "", "", "", 0, type.kind}, json);
     json.End();
   }
   json.End();

@@ -23,7 +23,7 @@ void WriteTexts(Json& json, const std::map<std::string, std::string>& values) {
 }
 
 void WriteFacts(Json& json, const EstimatorFacts& facts) {
-  json.Key("type").Text(facts.type);
+  json.Key("type").Text(facts.type).Key("kind").Text(ToString(facts.kind));
   if (!facts.accepted_by.empty()) json.Key("accepted_by").Text(facts.accepted_by);
   if (!facts.overrides.empty()) json.Key("overrides").Text(facts.overrides);
   json.Key("sensors").Array();
@@ -76,6 +76,7 @@ EstimatorFacts FactsOf(const NamedEstimator& named, const Experiment& experiment
   const BlockId path = PathBlockOf(named.system);
   const auto by = static_cast<std::size_t>(named.accepted_by);
   return {named.type,
+          named.kind,
           named.estimator->offline(),
           named.accepted_by < 0 ? "" : experiment.estimators[by].name,
           named.overrides,

@@ -13,6 +13,7 @@ namespace alidade::internal {
 /// What run.json says of an estimator beside its result.
 struct EstimatorFacts {
   std::string type;
+  EstimatorKind kind = EstimatorKind::kFilter;
   bool smoothed = false;    ///< its estimates rest on later data too
   std::string accepted_by;  ///< the estimator that chose its measurements, or ""
   std::string overrides;    ///< of the config, as YAML, or ""

@@ -164,9 +164,8 @@ EstimatorMaker Create(const EstimatorArguments& arguments) {
 }  // namespace
 }  // namespace alidade::ceres_batch
 
-ALIDADE_ESTIMATOR_PLUGIN({"ceres_batch",
-                          "Maximum a posteriori of a whole run, by nonlinear least squares.",
-                          "[Bell1994]", &alidade::ceres_batch::Create, true},
-                         {"fixed_lag",
-                          "Maximum a posteriori of the last frames, by nonlinear least squares.",
-                          "[Sibley2010]", &alidade::ceres_batch::CreateFixedLag})
+ALIDADE_ESTIMATOR_PLUGIN(
+    {"ceres_batch", "Maximum a posteriori of a whole run, by nonlinear least squares.",
+     "[Bell1994]", &alidade::ceres_batch::Create, alidade::EstimatorKind::kBatch, true},
+    {"fixed_lag", "Maximum a posteriori of the last frames, by nonlinear least squares.",
+     "[Sibley2010]", &alidade::ceres_batch::CreateFixedLag, alidade::EstimatorKind::kWindow})

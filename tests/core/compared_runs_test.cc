@@ -17,11 +17,18 @@ using internal::ComparedEntry;
 using internal::ComparedRun;
 using internal::CompareRuns;
 
+EstimatorKind KindOf(const std::string& type) {
+  if (type == "rts") return EstimatorKind::kSmoother;
+  if (type == "fixed_lag") return EstimatorKind::kWindow;
+  return type == "ceres_batch" ? EstimatorKind::kBatch : EstimatorKind::kFilter;
+}
+
 /// An estimator of a block p.x that is `error` beside the truth, nought, at three stamps.
 ComparedEntry Entry(const std::string& name, const std::string& type, bool smoothed, double error,
                     const std::vector<std::string>& sensors = {"stereo"}) {
   ComparedEntry entry;
   entry.facts.type = type;
+  entry.facts.kind = KindOf(type);
   entry.facts.smoothed = smoothed;
   entry.facts.sensors = sensors;
   entry.facts.blocks = entry.series.blocks = {{"p.x", "m", Geometry::Vector(1)}};

@@ -39,11 +39,12 @@ class Swing : public Source {
   int next_ = 0;
 };
 
-void Add(Experiment& experiment, const std::string& name, const std::string& type,
+void Add(Experiment& experiment, const std::string& name, EstimatorKind kind,
          std::unique_ptr<Estimator> estimator, int accepted_by = -1) {
   NamedEstimator& named = experiment.estimators.emplace_back();
   named.name = name;
-  named.type = type;
+  named.type = name;
+  named.kind = kind;
   named.system = LinearSystem();
   named.estimator = std::move(estimator);
   named.accepted_by = accepted_by;
@@ -57,11 +58,12 @@ Experiment MakeLinear(bool with_outlier) {
   Experiment experiment;
   experiment.source = std::make_unique<Swing>(with_outlier);
   const std::vector<StreamInfo>& streams = experiment.source->streams();
-  Add(experiment, "ekf", "ekf", std::make_unique<Ekf>(system, options, streams));
-  Add(experiment, "rts", "rts", std::make_unique<RtsSmoother>(system, options, streams));
-  Add(experiment, "so_far", "ceres_batch", MakeBatch(system, "data: so_far\n"), 0);
-  Add(experiment, "accepted", "ceres_batch", MakeBatch(system), 0);
-  Add(experiment, "batch", "ceres_batch", MakeBatch(system));
+  Add(experiment, "ekf", EstimatorKind::kFilter, std::make_unique<Ekf>(system, options, streams));
+  Add(experiment, "rts", EstimatorKind::kSmoother,
+      std::make_unique<RtsSmoother>(system, options, streams));
+  Add(experiment, "so_far", EstimatorKind::kBatch, MakeBatch(system, "data: so_far\n"), 0);
+  Add(experiment, "accepted", EstimatorKind::kBatch, MakeBatch(system), 0);
+  Add(experiment, "batch", EstimatorKind::kBatch, MakeBatch(system));
   return experiment;
 }
 
@@ -71,9 +73,9 @@ struct Compared {
 };
 
 Compared CompareLinear(bool with_outlier, const CompareOptions& options = {},
-                       const std::string& smoother = "rts") {
+                       EstimatorKind smoother = EstimatorKind::kSmoother) {
   Experiment experiment = MakeLinear(with_outlier);
-  experiment.estimators[1].type = smoother;
+  experiment.estimators[1].kind = smoother;
   RunComparer comparer(experiment);
   RunOptions observed;
   observed.observers.push_back(&comparer);
@@ -122,7 +124,7 @@ TEST(CompareLinear, OnlyMissingSmoothingIsLeftOfTheGap) {
 }
 
 TEST(CompareLinear, AWindowIsNoSmootherOfAllData) {
-  const GapStep smoothing = CompareLinear(false, {}, "fixed_lag").comparison.gap[1];
+  const GapStep smoothing = CompareLinear(false, {}, EstimatorKind::kWindow).comparison.gap[1];
   EXPECT_EQ(smoothing.from + ' ' + smoothing.to, "so_far accepted");
 }
 

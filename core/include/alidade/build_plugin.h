@@ -54,6 +54,7 @@ struct EstimatorEntry {
   /// Reads the options; what it returns makes the estimator once its system is known. Errors of
   /// both: an Error with a place, as of Node::Fail.
   EstimatorMaker (*create)(const EstimatorArguments& arguments);
+  EstimatorKind kind = EstimatorKind::kFilter;
   bool landmarks = false;  ///< whether it takes a system that has some
 };
 

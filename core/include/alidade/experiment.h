@@ -23,6 +23,7 @@ enum class OnDivergence { kReport, kFail };
 struct NamedEstimator {
   std::string name;
   std::string type;
+  EstimatorKind kind = EstimatorKind::kFilter;
   System system;
   std::unique_ptr<Estimator> estimator;
   OnDivergence on_divergence = OnDivergence::kReport;

@@ -34,13 +34,25 @@ struct ParamInfo {
   std::string when;                  ///< `noise = fixed` where only that choice reads it, else ""
 };
 
+/// How the estimates of an estimator rest on the measurements, by which a comparison knows what it
+/// can be compared with.
+enum class EstimatorKind {
+  kFilter,    ///< takes each measurement once, as it comes
+  kSmoother,  ///< a filter, and then all later measurements, about its linearisation
+  kBatch,     ///< solves for all states anew, by all measurements or (`data: so_far`) those so far
+  kWindow,    ///< solves for the last states anew
+};
+/// `filter`, `smoother`, `batch`, `window`.
+const char* ToString(EstimatorKind kind);
+
 /// A model, source or estimator that a loaded plugin offers.
 struct PluginEntry {
   enum class Kind { kSensor, kMotion, kSource, kEstimator } kind;
   std::string name, doc, citation, family;
   std::filesystem::path plugin;  ///< the file it came from
   unsigned thread_flags = 0;     ///< ALIDADE_THREAD_*; of a source or estimator 0
-  bool landmarks = false;        ///< of an estimator: EstimatorEntry::landmarks
+  EstimatorKind estimator = EstimatorKind::kFilter;  ///< of an estimator
+  bool landmarks = false;                            ///< of an estimator: EstimatorEntry::landmarks
 };
 
 /// Why a file in a searched folder was not loaded.

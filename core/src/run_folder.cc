@@ -18,6 +18,12 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kList = "files.txt";
+/// The file that marks a hidden folder as this program's; its first line names the process.
+constexpr const char* kMarker = ".alidade";
+
+std::string MarkerLine(std::string_view process) {
+  return "alidade process " + std::string(process);
+}
 
 /// Holds the lock of a folder, where it can be had, until the end of its scope.
 class FolderLock {
@@ -50,6 +56,16 @@ bool IsAlive(std::string_view process) {
   return ::kill(pid, 0) == 0 || errno == EPERM;
 }
 
+/// True where this program made the folder, in `process`.
+bool IsMarked(const fs::path& folder, std::string_view process) {
+  std::error_code error;
+  if (!fs::is_directory(fs::symlink_status(folder, error))) return false;
+  if (!fs::is_regular_file(fs::symlink_status(folder / kMarker, error))) return false;
+  std::ifstream stream(folder / kMarker);
+  std::string line;
+  return std::getline(stream, line) && line == MarkerLine(process);
+}
+
 /// True where a living process holds the folder, which `process` has made. On a file system
 /// without locks it holds the folder as long as it lives.
 bool IsHeld(const fs::path& folder, std::string_view process) {
@@ -79,6 +95,31 @@ fs::path WithoutTrailingSlash(const fs::path& path) {
   return normal.has_filename() ? normal : normal.parent_path();
 }
 
+/// Where a link to something leads; anything else as it is.
+fs::path BehindLinks(const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_symlink(path, error)) return path;
+  const fs::path real = fs::canonical(path, error);
+  return error ? path : real;
+}
+
+/// Makes a hidden folder that later processes know as one of this process. Errors: those of an
+/// OutputFile called `shown`.
+void MakeMarked(const fs::path& folder, const std::string& shown) {
+  if (Exists(folder)) Refuse(folder, "is in the way", "move it elsewhere");
+  if (::mkdir(folder.c_str(), 0777) != 0) FailCreate(shown, errno);
+  try {
+    OutputFile marker(folder / kMarker, shown);
+    marker.Write(MarkerLine(std::to_string(::getpid())) +
+                 "\nIf this process died, the next run to the same place removes this folder.\n");
+    marker.Close();
+  } catch (...) {
+    std::error_code ignored;
+    fs::remove_all(folder, ignored);
+    throw;
+  }
+}
+
 /// The lines of the list in a run folder, sorted as they were written; none where there is no list.
 std::vector<std::string> ReadList(const fs::path& folder, std::error_code& error) {
   std::ifstream stream(folder / kList);
@@ -96,7 +137,8 @@ std::vector<std::string> Unlisted(const fs::path& folder, std::error_code& error
   for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
     const std::string name = entry->path().lexically_relative(folder).string();
-    if (std::binary_search(listed.begin(), listed.end(), name)) continue;
+    // A process that died right after Commit's rename leaves its marker.
+    if (name == kMarker || std::binary_search(listed.begin(), listed.end(), name)) continue;
     found.push_back(name);
     entry.disable_recursion_pending();
   }
@@ -118,19 +160,17 @@ std::string Few(const std::vector<std::string>& names) {
 }  // namespace
 
 RunFolder::RunFolder(const fs::path& target, bool force)
-    : shown_(target), target_(WithoutTrailingSlash(target)), force_(force) {
+    : shown_(target), target_(BehindLinks(WithoutTrailingSlash(target))), force_(force) {
   if (target.empty() || !target_.has_filename()) Refuse(target, "is no name for a run folder");
   try {
     MakeParents();
     const FolderLock lock(target_.parent_path());
-    RemoveLeftovers();
-    CheckTarget();
-    partial_ = Sibling("partial");
-    if (::mkdir(partial_.c_str(), 0777) != 0) {
-      const int error = errno;
-      partial_.clear();
-      FailCreate(shown_.string(), error);
-    }
+    const Leftovers leftovers = FindLeftovers();
+    CheckTarget(leftovers.lost);
+    CleanUp(leftovers);
+    const fs::path partial = Sibling("partial");
+    MakeMarked(partial, shown_.string());
+    partial_ = partial;
     lock_ = ::open(partial_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (lock_ >= 0) static_cast<void>(::flock(lock_, LOCK_EX | LOCK_NB));
   } catch (...) {
@@ -172,42 +212,54 @@ void RunFolder::MakeParents() {
   }
 }
 
-void RunFolder::RemoveLeftovers() const {
+RunFolder::Leftovers RunFolder::FindLeftovers() const {
   const std::string partial = '.' + target_.filename().string() + ".partial-";
   const std::string old = '.' + target_.filename().string() + ".old-";
+  Leftovers found;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(target_.parent_path(), error)) {
     const std::string name = entry.path().filename().string();
-    if (name.starts_with(partial)) {
-      const std::string process = name.substr(partial.size());
-      if (IsHeld(entry.path(), process)) {
-        Refuse(shown_, "process " + process + " is writing it now",
-               "wait for it or choose another folder");
-      }
-      fs::remove_all(entry.path(), error);
-    } else if (name.starts_with(old)) {
-      // A process died while it replaced the folder: the old one is whole.
-      if (Exists(target_)) {
-        fs::remove_all(entry.path(), error);
-      } else {
-        fs::rename(entry.path(), target_, error);
-      }
+    const bool replaced = name.starts_with(old);
+    if (!replaced && !name.starts_with(partial)) continue;
+    const std::string process = name.substr((replaced ? old : partial).size());
+    if (!IsMarked(entry.path(), process)) continue;
+    if (IsHeld(entry.path(), process)) {
+      Refuse(shown_, "process " + process + " is writing it now",
+             "wait for it or choose another folder");
     }
+    const fs::path whole = entry.path() / target_.filename();
+    if (replaced && found.lost.empty() && !Exists(target_) && Exists(whole)) found.lost = whole;
+    found.folders.push_back(entry.path());
   }
+  return found;
 }
 
-void RunFolder::CheckTarget() const {
-  if (!Exists(target_)) return;
+void RunFolder::CleanUp(const Leftovers& leftovers) const {
+  if (!leftovers.lost.empty() && ::rename(leftovers.lost.c_str(), target_.c_str()) != 0) {
+    FailIo(shown_.string(), "restore", errno);
+  }
+  std::error_code ignored;
+  for (const fs::path& folder : leftovers.folders) fs::remove_all(folder, ignored);
+}
+
+void RunFolder::CheckTarget(const fs::path& lost) const {
+  if (!lost.empty() && !force_) {
+    Refuse(shown_,
+           "a process died while it replaced it: the old folder is '" + lost.string() + '\'',
+           "move that back, or add --force to replace it");
+  }
+  const fs::path there = lost.empty() ? target_ : lost;
+  if (!Exists(there)) return;
   std::error_code error;
-  if (!fs::exists(target_, error)) {
+  if (!fs::exists(there, error)) {
     Refuse(shown_, "is a link to what does not exist", "remove it, or choose another folder");
   }
   if (!force_) Refuse(shown_, "exists already", "add --force to replace it");
-  if (!fs::is_directory(target_, error)) Refuse(shown_, "is a file", "choose another folder");
-  const std::vector<std::string> foreign = Unlisted(target_, error);
+  if (!fs::is_directory(there, error)) Refuse(shown_, "is a file", "choose another folder");
+  const std::vector<std::string> foreign = Unlisted(there, error);
   if (error) Refuse(shown_, "cannot be read: " + error.message(), "choose another folder");
   if (foreign.empty()) return;
-  if (!Exists(target_ / kList)) {
+  if (!Exists(there / kList)) {
     Refuse(shown_, std::string("is not a run folder (it has no ") + kList + ')',
            "--force replaces run folders only; remove it yourself, or choose another folder");
   }
@@ -232,7 +284,8 @@ void RunFolder::Write(const std::string& name, std::string_view text) const {
 void RunFolder::WriteList() const {
   std::vector<std::string> names = {kList};
   for (const auto& entry : fs::recursive_directory_iterator(partial_)) {
-    names.push_back(entry.path().lexically_relative(partial_).string());
+    const std::string name = entry.path().lexically_relative(partial_).string();
+    if (name != kMarker) names.push_back(name);
   }
   std::sort(names.begin(), names.end());
   std::string text;
@@ -251,22 +304,33 @@ void RunFolder::Commit() {
   WriteList();
   SyncAll();
   const FolderLock lock(target_.parent_path());
-  CheckTarget();
-  const fs::path old = Sibling("old");
-  const bool replace = Exists(target_);
-  if (replace && ::rename(target_.c_str(), old.c_str()) != 0) {
-    FailIo(shown_.string(), "replace", errno);
-  }
+  CheckTarget({});
+  const fs::path old = Exists(target_) ? MoveAway() : fs::path();
+  std::error_code ignored;
   if (::rename(partial_.c_str(), target_.c_str()) != 0) {
     const int error = errno;
-    if (replace) static_cast<void>(::rename(old.c_str(), target_.c_str()));
+    if (!old.empty() && ::rename((old / target_.filename()).c_str(), target_.c_str()) == 0) {
+      fs::remove_all(old, ignored);
+    }
     FailIo(shown_.string(), "move to its place", error);
   }
   partial_.clear();
   made_.clear();
+  fs::remove(target_ / kMarker, ignored);
   Sync(target_.parent_path(), shown_.string());
-  std::error_code ignored;
-  if (replace) fs::remove_all(old, ignored);
+  if (!old.empty()) fs::remove_all(old, ignored);
+}
+
+fs::path RunFolder::MoveAway() const {
+  const fs::path old = Sibling("old");
+  MakeMarked(old, shown_.string());
+  if (::rename(target_.c_str(), (old / target_.filename()).c_str()) != 0) {
+    const int error = errno;
+    std::error_code ignored;
+    fs::remove_all(old, ignored);
+    FailIo(shown_.string(), "replace", error);
+  }
+  return old;
 }
 
 }  // namespace alidade::internal

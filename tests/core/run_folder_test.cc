@@ -24,6 +24,8 @@ int fail_error = 0;
 std::size_t write_limit = 0;
 /// As on a file system without locks.
 bool no_locks = false;
+/// The n-th rename by this process kills it instead; 0: none does.
+int die_at_rename = 0;
 
 bool IsToFail() {
   if (fail_at == 0 || --fail_at > 0) return false;
@@ -49,6 +51,7 @@ __attribute__((visibility("default"))) int fsync(int fd) {
   return IsToFail() ? -1 : 0;
 }
 __attribute__((visibility("default"))) int rename(const char* from, const char* to) noexcept {
+  if (die_at_rename > 0 && --die_at_rename == 0) ::_exit(0);
   return IsToFail() ? -1
                     : static_cast<int>(syscall(SYS_renameat2, AT_FDCWD, from, AT_FDCWD, to, 0));
 }
@@ -195,40 +198,136 @@ TEST(RunFolder, AFolderBeingWrittenIsRefused) {
   Record(OptionsFor(folder / "other"));  // another name is free
 }
 
+/// The hidden folders beside `out`, by name.
+std::vector<std::string> HiddenIn(const TemporaryFolder& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder.path())) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with('.')) names.push_back(name);
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+/// What a process leaves that is killed while it writes `out`.
+void LeavePartialFolder(const TemporaryFolder& folder, bool force = false) {
+  const int code = InChild([&] {
+    const Recorder recorder(OptionsFor(folder / "out", force), MakeConfig(), Host());
+    ::_exit(0);
+  });
+  ASSERT_EQ(code, 0);
+}
+
+/// What a process leaves that is killed after it moved the old `out` away, before the new one came.
+void LeaveReplacedFolder(const TemporaryFolder& folder) {
+  const int code = InChild([&] {
+    die_at_rename = 2;
+    Record(OptionsFor(folder / "out", true), 5);
+    ::_exit(1);
+  });
+  ASSERT_EQ(code, 0);
+  ASSERT_FALSE(fs::exists(folder / "out"));
+}
+
 TEST(RunFolder, RemovesWhatADeadProcessLeft) {
   const TemporaryFolder folder;
-  fs::create_directories(folder / ".out.partial-1/ekf");  // process 1 lives, but does not hold it
-  fs::create_directories(folder / ".other.partial-1");
+  LeavePartialFolder(folder);
+  ASSERT_EQ(HiddenIn(folder).size(), 1u);
+  Record(OptionsFor(folder / "other"));  // another name
+  EXPECT_EQ(HiddenIn(folder).size(), 1u);
   Record(OptionsFor(folder / "out"));
-  EXPECT_FALSE(fs::exists(folder / ".out.partial-1"));
-  EXPECT_TRUE(fs::exists(folder / ".other.partial-1"));
+  EXPECT_EQ(HiddenIn(folder), std::vector<std::string>{});
+}
+
+TEST(RunFolder, TouchesNoFolderThatItDidNotMake) {
+  const std::vector<std::string> mine = {".out.old-1", ".out.old-2024", ".out.partial-1",
+                                         ".out.partial-999999999", ".out.partial-notes"};
+  const TemporaryFolder folder;
+  for (const std::string& name : mine) {
+    fs::create_directory(folder / name);
+    std::ofstream(folder / name / "notes.txt") << name;
+  }
+  const auto expect_untouched = [&](const char* when) {
+    EXPECT_EQ(HiddenIn(folder), mine) << when;
+    for (const std::string& name : mine) EXPECT_EQ(Read(folder / name / "notes.txt"), name) << when;
+  };
+  EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "out")); }), 0);
+  expect_untouched("a new folder");
+  EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "out")); }), 73);
+  expect_untouched("refused");
+  EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "out", true)); }), 0);
+  expect_untouched("replaced");
+}
+
+TEST(RunFolder, TouchesNoLeftoverUnderAnotherName) {
+  const TemporaryFolder folder;
+  LeavePartialFolder(folder);
+  fs::rename(folder / HiddenIn(folder).at(0), folder / ".out.partial-999999999");  // by the user
+  Record(OptionsFor(folder / "out"));
+  EXPECT_EQ(HiddenIn(folder), std::vector<std::string>{".out.partial-999999999"});
+}
+
+TEST(RunFolder, TouchesNoLeftoverWhereTheRunIsRefused) {
+  const TemporaryFolder folder;
+  Record(OptionsFor(folder / "out"), 3);
+  LeavePartialFolder(folder, true);
+  const std::vector<std::string> before = EntriesOf(folder.path());
+  EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "out")); }), 73);
+  std::ofstream(folder / "out/mine.txt") << "x";
+  EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "out", true)); }), 73);
+  fs::remove(folder / "out/mine.txt");
+  EXPECT_EQ(EntriesOf(folder.path()), before);
+  EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "out", true)); }), 0);
+  EXPECT_EQ(HiddenIn(folder), std::vector<std::string>{});
 }
 
 TEST(RunFolder, WithoutLocksALivingProcessHoldsItsFolder) {
   const TemporaryFolder folder;
-  fs::create_directories(folder / ".dead.partial-999999999");  // beyond Linux's largest pid
-  fs::create_directories(folder / ".odd.partial-x");
-  fs::create_directories(folder / ".out.partial-1");
+  LeavePartialFolder(folder);
   no_locks = true;
   std::string text;
-  const int dead = CodeOf([&] { Record(OptionsFor(folder / "dead")); });
-  const int odd = CodeOf([&] { Record(OptionsFor(folder / "odd")); });
-  const int living = CodeOf([&] { Record(OptionsFor(folder / "out")); }, &text);
+  const int dead = CodeOf([&] { Record(OptionsFor(folder / "out")); });
+  const Recorder first(OptionsFor(folder / "held"), MakeConfig(), Host());
+  const int living = CodeOf([&] { Record(OptionsFor(folder / "held")); }, &text);
   no_locks = false;
   EXPECT_EQ(dead, 0);
-  EXPECT_FALSE(fs::exists(folder / ".dead.partial-999999999"));
-  EXPECT_EQ(odd, 0);
+  const std::string process = std::to_string(::getpid());
+  EXPECT_EQ(HiddenIn(folder), std::vector<std::string>{".held.partial-" + process});
   EXPECT_EQ(living, 73);
-  EXPECT_NE(text.find("process 1 is writing it now"), std::string::npos) << text;
-  EXPECT_TRUE(fs::exists(folder / ".out.partial-1"));
+  EXPECT_NE(text.find("process " + process + " is writing it now"), std::string::npos) << text;
 }
 
-TEST(RunFolder, RestoresWhatADeadProcessWasReplacing) {
+TEST(RunFolder, KeepsWhatADeadProcessWasReplacingUnlessForced) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "out"), 3);
-  fs::rename(folder / "out", folder / ".out.old-1");
-  EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "out")); }), 73);
-  EXPECT_EQ(Lines(folder / "out/truth.csv").size(), 4u);
+  LeaveReplacedFolder(folder);
+  const std::vector<std::string> before = EntriesOf(folder.path());
+  std::string text;
+  EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "out")); }, &text), 73);
+  EXPECT_NE(text.find("died while it replaced it: the old folder is '"), std::string::npos) << text;
+  EXPECT_EQ(EntriesOf(folder.path()), before);
+  { const Recorder unfinished(OptionsFor(folder / "out", true), MakeConfig(), Host()); }
+  EXPECT_EQ(Lines(folder / "out/truth.csv").size(), 4u);  // it is back in its place
+  EXPECT_EQ(Lines(folder / "out/files.txt"), EntriesOf(folder / "out"));
+  EXPECT_EQ(HiddenIn(folder), std::vector<std::string>{});
+  LeaveReplacedFolder(folder);
+  EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "out", true), 5); }), 0);
+  EXPECT_EQ(Lines(folder / "out/truth.csv").size(), 6u);
+  EXPECT_EQ(HiddenIn(folder), std::vector<std::string>{});
+}
+
+TEST(RunFolder, WritesWhereALinkPoints) {
+  const TemporaryFolder folder;
+  fs::create_directories(folder / "disk/runs");
+  fs::create_directory_symlink("disk/runs", folder / "out");
+  EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "out"), 3); }), 73);
+  for (const int frames : {3, 5}) {
+    EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "out", true), frames); }), 0);
+    EXPECT_TRUE(fs::is_symlink(folder / "out"));
+    EXPECT_EQ(Lines(folder / "disk/runs/truth.csv").size(), 1u + frames);
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder / "disk"), {}), 1);
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 2);
+  }
 }
 
 TEST(RunFolder, LeavesNothingWithoutFinish) {

@@ -72,6 +72,12 @@ Comparison CompareFolders(const std::vector<std::filesystem::path>& folders,
   for (const auto& folder : folders) runs.push_back(internal::ReadRun(folder));
   std::vector<std::string> notes = internal::CheckSameData(runs);
   for (const ComparedRun& run : runs) {
+    for (const internal::ComparedEntry& entry : run.estimators) {
+      if (entry.not_finite == 0) continue;
+      notes.push_back("'" + (run.folder / entry.result.name / "estimates.csv").string() + "': " +
+                      std::to_string(entry.not_finite) + " of " + std::to_string(entry.facts.rows) +
+                      " rows have values that are not finite; the comparison leaves these out");
+    }
     if (run.status == RunStatus::kOk) continue;
     notes.push_back("'" + run.folder.string() + "' " + ToString(run.status) + ": " + run.reason);
   }

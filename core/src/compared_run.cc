@@ -81,7 +81,9 @@ void AppendRow(Series& series, const std::vector<double>& row) {
   }
 }
 
-void ReadEstimates(const fs::path& file, std::int64_t rows, Series& series) {
+/// Returns how many rows have cells that are not finite; an empty cell says that there is no value.
+std::int64_t ReadEstimates(const fs::path& file, std::int64_t rows, Series& series) {
+  std::int64_t not_finite = 0;
   std::ifstream stream = Open(file);
   std::string line;
   std::getline(stream, line);
@@ -92,11 +94,13 @@ void ReadEstimates(const fs::path& file, std::int64_t rows, Series& series) {
     if (stream.eof()) FailFile(file, number, "the last line is cut short");
     series.stamps.push_back(cell::ExactStamp(line.substr(0, line.find(',')), 9));
     AppendRow(series, row);
+    not_finite += line.find_first_of("nN") != line.npos ? 1 : 0;  // nan, inf
   }
   if (std::ssize(series.stamps) != rows) {
     FailFile(file, 0,
              std::to_string(series.stamps.size()) + " rows, run.json has " + std::to_string(rows));
   }
+  return not_finite;
 }
 
 /// P in place of its diagonal, where the file is there and P is not too large.
@@ -232,7 +236,7 @@ ComparedRun ReadFiles(const fs::path& folder) {
     one.series.blocks = one.facts.blocks;
     one.series.joint = false;
     one.locked_out = entry.At("events").Find("lockout").has_value();
-    ReadEstimates(folder / name / "estimates.csv", one.facts.rows, one.series);
+    one.not_finite = ReadEstimates(folder / name / "estimates.csv", one.facts.rows, one.series);
     ReadCovariances(folder / name / "covariance.bin", one.series);
     const fs::path map = folder / name / "landmarks.csv";
     if (fs::exists(map)) one.result.landmarks = ReadMap(map);

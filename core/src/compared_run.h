@@ -18,7 +18,8 @@ struct ComparedEntry {
   EstimatorFacts facts;
   EstimatorResult result;  ///< without events
   Series series;
-  bool locked_out = false;  ///< a sensor was rejected again and again, `lockout` in its events
+  std::int64_t not_finite = 0;  ///< rows of estimates.csv with a cell that is not finite
+  bool locked_out = false;      ///< a sensor was rejected again and again, `lockout` in its events
 
   /// Whether its estimates are of use to compare with.
   bool usable() const { return !result.failed && !series.stamps.empty(); }

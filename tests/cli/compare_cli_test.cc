@@ -12,6 +12,27 @@ using testing::Contains;
 using testing::Outcome;
 
 /// Comparisons need the batch, which a build without the Ceres solver does not have.
+class CompareFolderCli : public testing::ProgramTest {};
+
+TEST_F(CompareFolderCli, SaysHowManyRowsAreNotFinite) {
+  ASSERT_EQ(Call({"run", "config.yaml", "-o", "out", "--no-figures"}).code, 0);
+  EXPECT_FALSE(Contains(Call({"compare", "out"}).out, "not finite"));
+  std::istringstream rows(Read("out/ekf/estimates.csv"));
+  std::string text;
+  int count = -1;  // behind the header
+  for (std::string row; std::getline(rows, row); ++count) {
+    const std::size_t first = row.find(','), second = row.find(',', first + 1);
+    if (count == 3 || count == 7) row.replace(first + 1, second - first - 1, "nan");
+    if (count == 9) row.replace(first + 1, second - first - 1, "-inf");
+    text += row + '\n';
+  }
+  Write("out/ekf/estimates.csv", text);
+  const std::string note = "out/ekf/estimates.csv': 3 of " + std::to_string(count) +
+                           " rows have values that are not finite; the comparison leaves these out";
+  EXPECT_TRUE(Contains(Call({"compare", "out"}).out, note)) << Call({"compare", "out"}).out;
+  EXPECT_TRUE(Contains(Call({"compare", "out", "--json"}).out, note));
+}
+
 class CompareCli : public testing::ProgramTest {
  protected:
   void SetUp() override {

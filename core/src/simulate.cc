@@ -11,6 +11,7 @@
 #include "alidade/pictures.h"
 #include "csv_file.h"
 #include "element_names.h"
+#include "json.h"
 #include "pose_file.h"
 
 namespace alidade {
@@ -27,6 +28,7 @@ std::unique_ptr<Source> MakeSource(const Config& config, const PluginHost& host)
   }
   std::unique_ptr<Source> source =
       host.CreateSource(entry.At("type", "a source").Text(), entry, seed, config.folder());
+  entry.Declare("calibration");
   entry.RejectUnread();
   return source;
 }
@@ -207,6 +209,14 @@ std::string CameraYaml(const Config& config) {
   return alone.ToYaml();
 }
 
+/// Whether the data are all that the source has, for other programs.
+std::string SimulateJson(const SimulateResult& result) {
+  internal::Json json;
+  json.Object().Key("status").Text(result.stopped ? "stopped" : "ok");
+  json.Key("frames").Integer(result.frames).End();
+  return json.text();
+}
+
 }  // namespace
 
 SimulateResult Simulate(const Config& config, const PluginHost& host,
@@ -233,6 +243,8 @@ SimulateResult Simulate(const Config& config, const PluginHost& host,
     output.Write("calibration.yaml", camera);
     result.files.insert(result.files.begin(), "calibration.yaml");
   }
+  output.Write("simulate.json", SimulateJson(result));
+  result.files.push_back("simulate.json");
   output.Commit();
   return result;
 }

@@ -57,6 +57,24 @@ TEST_F(SimulateCli, WritesFilesThatSourceTracksReadsBack) {
   EXPECT_FALSE(Exists("again/map.csv"));
 }
 
+TEST_F(SimulateCli, SaysInItsFolderWhetherItWasStopped) {
+  Write("scene.yaml", kScene);
+  ASSERT_EQ(Call({"simulate", "scene.yaml", "-o", "whole"}).code, 0);
+  EXPECT_EQ(Json("whole/simulate.json").root().At("status").Text(), "ok");
+  EXPECT_EQ(Json("whole/simulate.json").root().At("frames").Number(), 20.0);
+  // 1e6 frames: more than a minute of work.
+  const pid_t simulate =
+      Start({"simulate", "scene.yaml", "-o", "data", "--set", "source.frames=1000000"});
+  const std::string partial = ".data.partial-" + std::to_string(simulate);
+  ASSERT_TRUE(Eventually([&] { return Exists(partial + "/tracks.csv"); }));
+  ::kill(simulate, SIGTERM);
+  EXPECT_EQ(Wait(simulate).code, 75);
+  const Config json = Json("data/simulate.json");
+  EXPECT_EQ(json.root().At("status").Text(), "stopped");
+  EXPECT_EQ(json.root().At("frames").Number(),
+            static_cast<double>(Lines("data/timestamps.csv") - 1));
+}
+
 TEST_F(SimulateCli, NothingReplacesTheDataThatItReads) {
   Write("scene.yaml", kScene);
   ASSERT_EQ(Call({"simulate", "scene.yaml", "-o", "data"}).code, 0);

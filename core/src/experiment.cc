@@ -5,6 +5,7 @@
 #include "add_estimator.h"
 #include "alidade/plugin_host.h"
 #include "alidade/run.h"
+#include "calibration.h"
 #include "config_tree.h"
 #include "estimator_types.h"
 #include "text_table.h"
@@ -293,6 +294,25 @@ void CheckCanRewind(const NamedEstimator& named, const Node& entry) {
                         "another type under 'time.order: rewind', or 'time.order: sort'");
 }
 
+/// Adds the estimator of a config that has the calibration of the data.
+void AddCalibrated(const Config& config, const PluginHost& host, const std::string& name,
+                   Experiment& experiment) {
+  const Node entry = config.root().At("estimators").At(name);
+  NamedEstimator named = BuildEstimator(name, entry, config, host, experiment.source->streams(),
+                                        experiment.estimators);
+  if (experiment.time.order == TimeOrder::kRewind) CheckCanRewind(named, entry);
+  experiment.estimators.push_back(std::move(named));
+}
+
+/// Keys of the root that are read before the calibration is there, or by other commands.
+void DeclareCommon(const Node& root) {
+  // `baseline_m`: of a calibration, for `alidade bundle`; a sensor has its own.
+  for (const char* key :
+       {"alidade", "plugins", "include", "baseline_m", "title", "output", "source", "time"}) {
+    root.Declare(key);
+  }
+}
+
 }  // namespace
 
 std::vector<std::filesystem::path> PluginPaths(const Config& config) {
@@ -309,32 +329,28 @@ std::vector<std::filesystem::path> PluginPaths(const Config& config) {
 
 void internal::AddEstimator(const Config& config, const PluginHost& host, const std::string& name,
                             Experiment& experiment) {
-  const Node entry = config.root().At("estimators").At(name);
-  NamedEstimator named = BuildEstimator(name, entry, config, host, experiment.source->streams(),
-                                        experiment.estimators);
-  if (experiment.time.order == TimeOrder::kRewind) CheckCanRewind(named, entry);
-  experiment.estimators.push_back(std::move(named));
+  AddCalibrated(WithCalibration(config, *experiment.source), host, name, experiment);
 }
 
 Experiment BuildExperiment(const Config& config, const PluginHost& host) {
-  const Node root = config.root();
-  CheckSchema(root);
-  // `baseline_m`: of a calibration, for `alidade bundle`; a sensor has its own.
-  for (const char* key : {"plugins", "include", "baseline_m"}) root.Declare(key);
+  CheckSchema(config.root());
   for (const char* key : {"title", "output"}) {
-    if (const auto text = root.Find(key)) static_cast<void>(text->Text());
+    if (const auto text = config.root().Find(key)) static_cast<void>(text->Text());
   }
 
   Experiment experiment;
-  const Node source = root.At("source", "a run: where measurements come from");
+  const Node source = config.root().At("source", "a run: where measurements come from");
   if (const auto seed = source.Find("seed")) {
     experiment.seed = static_cast<std::uint64_t>(seed->Integer(0, INT64_MAX));
   }
-  experiment.time = ReadTimePolicy(root);
+  experiment.time = ReadTimePolicy(config.root());
   experiment.source =
       host.CreateSource(source.At("type", "a source").Text(), source, experiment.seed,
                         config.folder(), experiment.time.order != TimeOrder::kReject);
+  const Config calibrated = internal::WithCalibration(config, *experiment.source);
   source.RejectUnread();
+  const Node root = calibrated.root();
+  DeclareCommon(root);
   const std::vector<StreamInfo>& streams = experiment.source->streams();
 
   // Every sensor is checked, whether or not an estimator uses it.
@@ -343,7 +359,7 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   experiment.time.ranks = RanksOf(streams, whole);
   experiment.segments = ReadSegments(root, whole, streams);
   for (const auto& [name, entry] : root.At("estimators", "a run").Entries()) {
-    internal::AddEstimator(config, host, name, experiment);
+    AddCalibrated(calibrated, host, name, experiment);
   }
   if (experiment.estimators.empty()) {
     root.At("estimators").Fail("empty", "at least one estimator");

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "alidade/statistics.h"
+#include "calibration.h"
 #include "estimator_types.h"
 #include "explain_landmarks.h"
 #include "number_text.h"
@@ -345,6 +346,29 @@ std::string LateFrames(const TimePolicy& time) {
          '\n';
 }
 
+/// A row for each parameter that the data tell: its key, value and place.
+void AddCalibration(const Node& map, const std::string& key, std::vector<TextRow>& rows) {
+  for (const auto& [name, value] : map.Entries()) {
+    const std::string path = key.empty() ? name : key + '.' + name;
+    if (value.is_map()) {
+      AddCalibration(value, path, rows);
+      continue;
+    }
+    std::vector<std::string> texts;
+    for (const Node& item : value.ItemsOrOne()) texts.push_back(item.Text());
+    rows.push_back({path, Join(texts), ToString(value.place())});
+  }
+}
+
+std::string CalibrationText(const Config& config, const Source& source) {
+  const Config with = internal::WithCalibration(config, source);
+  const auto calibration = with.root().Find("calibration");
+  if (!calibration) return "";
+  std::vector<TextRow> rows;
+  AddCalibration(*calibration, "", rows);
+  return "  calibration of the data\n" + TextTable(rows, kIndent);
+}
+
 std::string SourceText(const Config& config, const Experiment& experiment) {
   const Node source = config.root().At("source");
   std::string text = "source " + source.At("type").Text();
@@ -364,7 +388,7 @@ std::string SourceText(const Config& config, const Experiment& experiment) {
   const std::vector<std::string> truths = internal::NamesOf(experiment.source->truths());
   text += TextTable(rows, kIndent);
   return text + "  truth: " + (truths.empty() ? "not known" : Join(truths)) + '\n' +
-         LateFrames(experiment.time);
+         CalibrationText(config, *experiment.source) + LateFrames(experiment.time);
 }
 
 }  // namespace

@@ -55,13 +55,14 @@ bool HasFallback(const AlidadeParam& param) {
   return (param.flags & ALIDADE_PARAM_HAS_DEFAULT) != 0;
 }
 
-std::string FallbackText(const AlidadeParam& param) {
-  if (!HasFallback(param)) return {};
+std::string ValuesText(const AlidadeParam& param, const std::vector<double>& values) {
   std::string text;
-  for (const double value : Fallback(param)) {
-    text += (text.empty() ? "" : ", ") + ValueText(param, value);
-  }
+  for (const double value : values) text += (text.empty() ? "" : ", ") + ValueText(param, value);
   return param.count == 1 ? text : '[' + text + ']';
+}
+
+std::string FallbackText(const AlidadeParam& param) {
+  return HasFallback(param) ? ValuesText(param, Fallback(param)) : "";
 }
 
 std::vector<std::string> Choices(const AlidadeParam& param) {
@@ -251,11 +252,44 @@ std::vector<double> ParamReader::Values(const AlidadeParam& param) const {
     map = *child;
   }
   const std::optional<Node> node = map.Find(rest);
-  return node ? All(param, *node) : Absent(param, map, rest);
+  if (!node) return Absent(param, map, rest);
+  const std::vector<double> values = All(param, *node);
+  ExpectCalibrated(param, *node, values);
+  return values;
+}
+
+std::optional<Node> ParamReader::InCalibration(const std::string& key) const {
+  std::optional<Node> at = entry_.Root().Find("calibration");
+  std::string rest = key;
+  for (std::size_t dot = 0; at && dot != std::string::npos;) {
+    dot = rest.find('.');
+    at = at->is_map() ? at->Find(rest.substr(0, dot)) : std::nullopt;
+    rest.erase(0, dot == std::string::npos ? dot : dot + 1);
+  }
+  return at;
+}
+
+/// Refuses the `values` of the config at `node` where the data tell others.
+void ParamReader::ExpectCalibrated(const AlidadeParam& param, const Node& node,
+                                   const std::vector<double>& values) const {
+  const std::optional<Node> data = InCalibration(param.key);
+  if (!data) return;
+  const auto same = [](double a, double b) {
+    constexpr double kSame = 1e-6;  // of the value: digits that one of the two texts leaves out
+    return std::abs(a - b) <= kSame * std::max(std::abs(a), std::abs(b));
+  };
+  const std::vector<double> told = All(param, *data);
+  if (std::ranges::equal(values, told, same)) return;
+  node.Fail(ValuesText(param, values) + " differs from the calibration of the data, " +
+                ValuesText(param, told) + " in " + data->place().file,
+            "the same value, no such key (the data tell it), or 'source.calibration: ignore'");
 }
 
 std::vector<double> ParamReader::Absent(const AlidadeParam& param, const Node& map,
                                         const std::string& key_in_map) const {
+  const bool dotted = std::string_view(param.key).find('.') != std::string_view::npos;
+  const std::optional<Node> data = InCalibration(param.key);
+  if (data && (dotted || !HasFallback(param))) return All(param, *data);
   if (HasFallback(param)) return Fallback(param);
   const std::string first = key_in_map.substr(0, key_in_map.find('.'));
   try {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <exception>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,7 +14,10 @@ namespace alidade::internal {
 
 /// Lends a model the parameters of its config entry. A dotted key walks nested maps. What begins
 /// with `camera.` or `landmarks.` and is not in the entry is read from the map of that name at the
-/// root of the config, which sensors and source share. Everything wrong is collected, so that one
+/// root of the config, which sensors and source share. What is in neither is read from the
+/// calibration of the data, `calibration` at the root (WithCalibration); there a key without a dot
+/// stands only for a parameter that has no default. What is in the config and in the calibration
+/// must be the same to 1e-6 of its value. Everything wrong is collected, so that one
 /// run tells all; kPlugin where the model itself asks against the rules of plugin_abi.h.
 class ParamReader {
  public:
@@ -38,6 +42,9 @@ class ParamReader {
   AlidadeParam Expect(const AlidadeParam* param, const double* values, std::int32_t capacity);
   Node BaseOf(const std::string& key) const;
   std::vector<double> Values(const AlidadeParam& param) const;
+  std::optional<Node> InCalibration(const std::string& key) const;
+  void ExpectCalibrated(const AlidadeParam& param, const Node& node,
+                        const std::vector<double>& values) const;
   std::vector<double> Absent(const AlidadeParam& param, const Node& map,
                              const std::string& key_in_map) const;
 

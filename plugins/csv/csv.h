@@ -8,9 +8,11 @@
 #include <string_view>
 #include <vector>
 
+#include "alidade/calibration.h"
 #include "alidade/line_reader.h"
 #include "alidade/source.h"
 #include "alidade/text_cell.h"
+#include "csv_calibration.h"
 #include "csv_layout.h"
 
 namespace alidade {
@@ -20,12 +22,13 @@ namespace alidade {
 /// Each row is a frame. The first line that is neither blank nor a comment (`#`) names the columns;
 /// columns that the config does not name may hold anything. A cell that says "missing" leaves its
 /// stream, or truth value, out of the frame; nothing stands in for it. Time is read exactly where
-/// it is written without an exponent, so that ns since 1970 keep every digit.
+/// it is written without an exponent, so that ns since 1970 keep every digit. Comments above the
+/// names of the columns may tell the calibration, see CsvCalibration.
 ///
 /// Keys         kCsvKeys in csv_layout.h.
 /// Errors       kBadData with file, line and column of the first cell that is wrong; kInputMissing;
 ///              kIo where the file changes while it is read; kBadConfig.
-class CsvSource : public Source {
+class CsvSource : public Source, public CalibratedData {
  public:
   explicit CsvSource(const SourceArguments& arguments)
       : layout_(ReadCsvLayout(arguments.entry)),
@@ -41,6 +44,7 @@ class CsvSource : public Source {
   const std::vector<StreamInfo>& truths() const override { return truths_; }
   std::int64_t size() const override { return size_; }
   Place place() const override { return {reader_.name(), reader_.number(), 0}; }
+  Config Calibration() const override { return calibration_.Get(); }
 
   bool Next(Frame& frame) override {
     if (!NextRow()) {
@@ -88,7 +92,10 @@ class CsvSource : public Source {
   /// value of a single column, and a row of too few columns where rows count the time.
   bool NextRow() {
     while (reader_.Next(line_)) {
-      if (line_.starts_with('#')) continue;
+      if (line_.starts_with('#')) {
+        if (names_.empty()) calibration_.Note(line_, reader_.name(), reader_.number());
+        continue;
+      }
       const bool blank = line_.find_first_not_of(" \t") == std::string_view::npos;
       const bool skips_blank = names_.empty() || (names_.size() > 1 && layout_.rate_hz == 0.0);
       if (!blank || !skips_blank) return true;
@@ -215,6 +222,7 @@ class CsvSource : public Source {
 
   CsvLayout layout_;
   LineReader reader_;
+  CsvCalibration calibration_;
   bool any_order_;
   std::vector<StreamInfo> streams_, truths_;
   std::vector<std::string> names_;

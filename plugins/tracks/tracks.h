@@ -9,8 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "alidade/calibration.h"
 #include "alidade/source.h"
 #include "beside.h"
+#include "calibration_file.h"
 #include "feature_rows.h"
 #include "tracks_options.h"
 
@@ -30,7 +32,7 @@ inline constexpr const char* kTracksKeys =
 /// else frame_rate_hz gives frame k the time k / rate; and maybe `odometry.csv` (a header that
 /// names frame, vx_m_s, vy_m_s, vz_m_s, wx_rad_s, wy_rad_s, wz_rad_s) and `groundtruth.tum` or
 /// `truth.tum` (world_from_cam); and `known.csv`, rows of the same form: observations that tell
-/// depth.
+/// depth; and `calibration.yaml`, see CalibrationFile.
 ///
 ///   stream     size     values            when
 ///   tracks     2, 4, 3  as `measures`     a feature has all of them; the landmark is its id
@@ -44,7 +46,7 @@ inline constexpr const char* kTracksKeys =
 /// Keys         kTracksKeys.
 /// Errors       kBadData with file, line and column of the first thing that is wrong;
 ///              kInputMissing; kIo where a file changes while it is read; kBadConfig.
-class Tracks : public Source {
+class Tracks : public Source, public CalibratedData {
  public:
   explicit Tracks(const SourceArguments& arguments) : options_(arguments.params) {
     for (const char* key : {"path", "state"}) arguments.entry.Declare(key);
@@ -56,6 +58,10 @@ class Tracks : public Source {
   const std::vector<StreamInfo>& streams() const override { return streams_; }
   const std::vector<StreamInfo>& truths() const override { return truths_; }
   Place place() const override { return tracks_->place(); }
+  Config Calibration() const override {
+    return calibration_ ? CalibrationFile::Read(*calibration_)
+                        : Config::FromText("calibration: {}", "tracks");
+  }
 
   bool Next(Frame& frame) override {
     if (frames_ == options_.most || !NextFrame(frame.stamp)) return false;
@@ -114,6 +120,7 @@ class Tracks : public Source {
     if (const auto other = beside("known.csv")) {
       known_.emplace(*other, path.place(), path.path());
     }
+    calibration_ = beside("calibration.yaml");
     auto truth = beside("groundtruth.tum");
     if (!truth) truth = beside("truth.tum");
     if (truth) truth_.emplace(*truth, path.place(), path.path());
@@ -202,6 +209,7 @@ class Tracks : public Source {
   std::int64_t frames_ = 0, frame_ = -1;
   std::set<std::int64_t> left_out_;  ///< features of the frames before features_from
   Pose first_pose_{};
+  std::optional<std::filesystem::path> calibration_;
   std::optional<FeatureRows> tracks_, known_;
   std::optional<TimestampRows> times_;
   std::optional<OdometryRows> odometry_;

@@ -2,6 +2,7 @@
 //
 // examples/14_slam_stereo_tracks on real drives: the error at the end as a share of the path.
 #include <cmath>
+#include <tuple>
 
 #include "drives.h"
 
@@ -50,6 +51,24 @@ TEST_F(SlamStereoTracks, DoNotHangOnNoiseGateOrMoreFeatures) {
                            {"sensors.stereo.sigma_px", "5"},
                            {"state.cam.noise.linear_acceleration", "4"}};
   for (const auto& other : others) ExpectExact({other});
+}
+
+TEST_F(SlamStereoTracks, AreThoseOfTheirOwnCamera) {
+  for (const auto& [key, other, own] :
+       {std::tuple("camera.fx", "707.0912", "721.5377"),
+        std::tuple("sensors.stereo.baseline_m", "0.54", "0.537150")}) {
+    const Config config = ConfigOf("14_slam_stereo_tracks", "drive_0036", 5, {{key, other}});
+    const PluginHost host(PluginPaths(config));
+    try {
+      BuildExperiment(config, host);
+      FAIL() << key;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::kBadConfig);
+      const std::string words =
+          std::string(key) + ": " + other + " differs from the calibration of the data, " + own;
+      EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+    }
+  }
 }
 
 }  // namespace

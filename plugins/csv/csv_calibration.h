@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "alidade/config.h"
+#include "alidade/text_cell.h"
+
+namespace alidade {
+
+/// The calibration in the comments above the header of a table, as in
+/// `# fx_px=721.5377 baseline_m=0.5371505882506209; points 55 and 144`.
+///
+///   written as              unit  key by which models ask
+///   focal_px= or fx_px=     px    focal_px, camera.fx
+///   baseline_m=             m     baseline_m
+class CsvCalibration {
+ public:
+  /// Notes what a comment tells, which begins in column 1 of `line`.
+  void Note(std::string_view comment, const std::string& file, int line) {
+    constexpr std::string_view kBetween = " \t,;()";
+    for (std::size_t at = 0; at < comment.size();) {
+      const std::size_t end = std::min(comment.find_first_of(kBetween, at), comment.size());
+      const std::string_view word = comment.substr(at, end - at);
+      const std::size_t equals = std::min(word.find('='), word.size());
+      const std::string_view name = word.substr(0, equals);
+      if (equals < word.size() && (name == "focal_px" || name == "fx_px" || name == "baseline_m")) {
+        notes_.push_back({std::string(name == "fx_px" ? "focal_px" : name),
+                          std::string(word.substr(equals + 1)),
+                          {file, line, static_cast<int>(at + equals) + 2}});
+      }
+      at = end + 1;
+    }
+  }
+
+  /// As of CalibratedData. Errors: kBadData where a value is no number, or is there twice.
+  Config Get() const {
+    Config config = Config::FromText("calibration: {}", "the comments of a table");
+    for (const Written& note : notes_) {
+      double value = 0.0;
+      const char* const wrong = cell::ParseNumber(note.text, value);
+      if (wrong != nullptr) {
+        Fail(note, '\'' + cell::Harmless(note.text) + "' " + wrong, "a finite number");
+      }
+      const auto first = std::ranges::find(notes_, note.key, &Written::key);
+      if (&*first != &note) {
+        Fail(note, "is there twice, first in line " + std::to_string(first->place.line), "one");
+      }
+      const std::string origin = ToString(note.place);
+      config.Set("calibration." + note.key, note.text, origin);
+      if (note.key == "focal_px") config.Set("calibration.camera.fx", note.text, origin);
+    }
+    return config;
+  }
+
+ private:
+  struct Written {
+    std::string key, text;
+    Place place;
+  };
+  [[noreturn]] static void Fail(const Written& note, const std::string& what,
+                                std::string_view expected) {
+    throw Error(ExitCode::kBadData, ErrorLine(note.place, note.key, what, expected));
+  }
+
+  std::vector<Written> notes_;
+};
+
+}  // namespace alidade

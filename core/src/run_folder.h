@@ -17,11 +17,11 @@ namespace alidade::internal {
 /// file tells the hidden folders of this class from those of others, which it never touches.
 class RunFolder {
  public:
-  /// Creates the partial folder, and the folders above it where they are missing. A link to a folder
-  /// stands for that folder. Then removes the marked folders of dead processes, and puts back what
-  /// one of them was replacing; an error leaves them as they are. Errors: kCannotCreate where
-  /// `target` exists without `force`, holds anything that its own `files.txt` does not list, or is
-  /// being written by another process; kIo.
+  /// Creates the partial folder, and the folders above it where they are missing. A link to a
+  /// folder stands for that folder. Then removes the marked folders of dead processes, and puts
+  /// back what one of them was replacing; an error leaves them as they are. Errors: kCannotCreate
+  /// where `target` exists without `force`, holds anything that its own `files.txt` does not list,
+  /// or is being written by another process; kIo.
   RunFolder(const std::filesystem::path& target, bool force);
   /// Removes what was not committed, with the folders above it that were made for it.
   ~RunFolder();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Data that bring their own calibration: models read it where the config leaves it out. A config that
-// tells another is refused.
+// Data that bring their own calibration: models read it where the config leaves it out. A config
+// that tells another is refused.
 #include "support/program.h"
 
 namespace alidade {

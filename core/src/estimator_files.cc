@@ -57,12 +57,13 @@ void EstimatorFiles::OpenTrajectory(const RunFolder& folder, const System& syste
   }
   pose_ = FindPose(blocks);
   if (!pose_) return;
-  trajectory_.emplace(folder, recorded_.name + "/trajectory.tum");
+  trajectory_.emplace(folder, recorded_.name + "/trajectory.tum", *pose_);
   const auto fixed = [&](std::size_t id) {
     return system.layout.blocks()[id].status == BlockStatus::kFixed;
   };
   if (fixed(pose_->position) || fixed(pose_->orientation)) return;
-  trajectory_covariance_.emplace(folder, recorded_.name + "/trajectory_covariance.tum", true);
+  trajectory_covariance_.emplace(folder, recorded_.name + "/trajectory_covariance.tum", *pose_,
+                                 true);
 }
 
 void EstimatorFiles::FindPath(const System& system) {
@@ -194,7 +195,8 @@ void EstimatorFiles::AddPose(Stamp stamp, const State& state) {
   trajectory_->Add(stamp, state.value(position), state.value(orientation));
   if (!trajectory_covariance_ || !at.has_covariance() || !turned.has_covariance()) return;
   const auto covariance = [&](const Block& block) {
-    return state.covariance().Block(block.tangent_offset, 3, block.tangent_offset, 3);
+    const int size = block.geometry().tangent;
+    return state.covariance().Block(block.tangent_offset, size, block.tangent_offset, size);
   };
   trajectory_covariance_->Add(stamp, state.value(position), state.value(orientation),
                               covariance(at), covariance(turned));

@@ -44,8 +44,7 @@ std::vector<std::string> ColumnsOf(const StreamInfo& stream) {
 /// The files of one simulation.
 class DataFiles {
  public:
-  DataFiles(const RunFolder& folder, const Source& source)
-      : folder_(folder), source_(source), pose_(internal::FindPose(source.truths())) {
+  DataFiles(const RunFolder& folder, const Source& source) : folder_(folder), source_(source) {
     streams_.resize(source.streams().size());
     OpenCsv(times_, "timestamps.csv", {"frame", "t_s"});
     if (source.truths().empty()) return;
@@ -55,8 +54,9 @@ class DataFiles {
       header.insert(header.end(), names.begin(), names.end());
     }
     OpenCsv(truth_, "truth.csv", header);
-    if (!pose_) return;
-    tum_.emplace(folder, "truth.tum");
+    const std::optional<internal::PosePlace> pose = internal::FindPose(source.truths());
+    if (!pose) return;
+    tum_.emplace(folder, "truth.tum", *pose);
     names_.insert("truth.tum");
   }
 
@@ -71,7 +71,7 @@ class DataFiles {
       truth_->Numbers(known ? frame.truth[i].data() : nullptr, known ? size : 0, size);
     }
     truth_->EndRow();
-    if (pose_) tum_->AddTruth(frame, *pose_);
+    if (tum_) tum_->AddTruth(frame);
   }
 
   void Close() {
@@ -132,7 +132,6 @@ class DataFiles {
 
   const RunFolder& folder_;
   const Source& source_;
-  std::optional<internal::PosePlace> pose_;
   std::optional<CsvFile> times_, truth_;
   std::vector<std::optional<CsvFile>> streams_;
   std::optional<internal::PoseFile> tum_;

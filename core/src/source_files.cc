@@ -114,8 +114,7 @@ SourceFiles::SourceFiles(const RunFolder& folder, const Experiment& experiment)
     for (const auto& names : truth_columns_)
       header.insert(header.end(), names.begin(), names.end());
     truth_.emplace(folder, "truth.csv", header);
-    pose_ = FindPose(truths_);
-    if (pose_) poses_.emplace(folder, "truth.tum");
+    if (const auto pose = FindPose(truths_)) poses_.emplace(folder, "truth.tum", *pose);
   }
   FindInverses(experiment);
   if (!expectations_.empty()) {
@@ -171,7 +170,7 @@ void SourceFiles::Add(const Frame& frame) {
     AddImplied(frame, m);
   }
   if (!truth_) return;
-  if (poses_) poses_->AddTruth(frame, *pose_);
+  if (poses_) poses_->AddTruth(frame);
   truth_->Time(frame.stamp);
   for (std::size_t t = 0; t < truths_.size(); ++t) {
     const auto size = static_cast<std::size_t>(truths_[t].size);

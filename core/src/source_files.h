@@ -53,7 +53,6 @@ class SourceFiles {
   std::size_t width_ = 1, blocks_ = 0;
   Stamp first_ = kNoStamp, last_ = kNoStamp;
   std::optional<CsvFile> measurements_, truth_, expected_, implied_;
-  std::optional<PosePlace> pose_;  ///< among the truths
   std::optional<PoseFile> poses_;
 };
 

@@ -51,6 +51,8 @@ void AddSets(CLI::App& command, std::vector<std::string>& sets, const std::strin
 std::string IsNamed(const std::string& path);
 /// The option -o, a folder; "" where it is not given.
 void AddOutput(CLI::App& command, std::string& folder, const std::string& help);
+/// The option --seed.
+CLI::Option* AddSeed(CLI::App& command, std::optional<std::uint64_t>& seed);
 std::vector<std::filesystem::path> Absolute(const std::vector<std::string>& paths);
 
 /// A check of an option: says what is wrong with its text, or "".

@@ -222,10 +222,7 @@ void AddOptions(CLI::App& command, Arguments& arguments) {
       ->option_text("J")
       ->check(IsInteger(1, 1024))
       ->needs("--runs");
-  command.add_option("--seed", arguments.seed, "seed of the source; overrides the config")
-      ->option_text("N")
-      ->check(IsInteger(0, INT64_MAX))
-      ->excludes("--first-seed");
+  AddSeed(command, arguments.seed)->excludes("--first-seed");
   AddSets(command, arguments.input.sets,
           "set a key of the config, in dotted form; may be repeated");
   AddPluginPath(command, arguments.input.plugin_paths);

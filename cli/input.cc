@@ -98,6 +98,12 @@ void AddOutput(CLI::App& command, std::string& folder, const std::string& help) 
   command.add_option("-o,--output", folder, help)->option_text("DIR")->check(IsNamed);
 }
 
+CLI::Option* AddSeed(CLI::App& command, std::optional<std::uint64_t>& seed) {
+  return command.add_option("--seed", seed, "seed of the source; overrides the config")
+      ->option_text("N")
+      ->check(IsInteger(0, INT64_MAX));
+}
+
 void Input::AddTo(CLI::App& command) {
   command.add_option("CONFIG", config, "the config, a YAML file")
       ->option_text(" ")

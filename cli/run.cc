@@ -131,9 +131,7 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
   arguments->input.AddTo(command);
   AddOutput(command, arguments->folder,
             "run folder; default: the config's `output:`, or its name, in runs/");
-  command.add_option("--seed", arguments->seed, "seed of the source; overrides the config")
-      ->option_text("N")
-      ->check(IsInteger(0, INT64_MAX));
+  AddSeed(command, arguments->seed);
   command.add_flag("--force", arguments->force, "replace the run folder if it is there");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.add_flag("--no-figures", arguments->no_figures, "draw no figures");

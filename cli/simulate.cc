@@ -13,7 +13,7 @@ namespace {
 
 constexpr const char* kFooter = R"(Examples:
   alidade simulate config.yaml -o data/scene
-  alidade simulate config.yaml -o data/scene-7 --set source.seed=7
+  alidade simulate config.yaml -o data/scene-7 --seed 7
   alidade simulate config.yaml -o data/scene --video video.avi --images images
   alidade run other.yaml --set source.path=data/scene   with source.type: tracks
 
@@ -24,6 +24,7 @@ Pictures have an equal disc at the pixel of each landmark's measurement.)";
 struct Arguments {
   Input input;
   std::string folder;
+  std::optional<std::uint64_t> seed;
   SimulatePictures pictures;
   bool force = false, quiet = false;
 };
@@ -40,7 +41,8 @@ std::string IsInside(const std::string& name) {
 }
 
 ExitCode RunSimulate(const Arguments& arguments) {
-  const Config config = arguments.input.Load();
+  Config config = arguments.input.Load();
+  if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
   const std::filesystem::path path =
       OutputFolder(arguments.folder, config, arguments.input, "data-");
   const PluginHost host = arguments.input.Host(config);
@@ -66,6 +68,7 @@ void AddSimulate(CLI::App& program, Action& action) {
   arguments->input.AddTo(command);
   AddOutput(command, arguments->folder,
             "folder; default: the config's `output:`, or data-NAME, in runs/");
+  AddSeed(command, arguments->seed);
   command
       .add_option("--video", arguments->pictures.video,
                   "writes what the camera sees as a video, FILE.avi in the folder; needs OpenCV")

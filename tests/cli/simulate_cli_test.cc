@@ -75,6 +75,20 @@ TEST_F(SimulateCli, SaysInItsFolderWhetherItWasStopped) {
             static_cast<double>(Lines("data/timestamps.csv") - 1));
 }
 
+TEST_F(SimulateCli, TheSeedReplacesThatOfTheConfig) {
+  Write("scene.yaml", kScene);
+  const auto tracks = [&](const std::string& folder, const testing::Arguments& more) {
+    testing::Arguments all = {"simulate", "scene.yaml", "-o", folder, "--quiet"};
+    all.insert(all.end(), more.begin(), more.end());
+    EXPECT_EQ(Call(all).code, 0);
+    return Read(folder + "/tracks.csv");
+  };
+  const std::string other = tracks("a", {"--seed", "7"});
+  EXPECT_EQ(other, tracks("b", {"--set", "source.seed=7"}));
+  EXPECT_EQ(tracks("c", {"--seed", "3"}), tracks("d", {}));
+  EXPECT_NE(other, Read("d/tracks.csv"));
+}
+
 TEST_F(SimulateCli, NothingReplacesTheDataThatItReads) {
   Write("scene.yaml", kScene);
   ASSERT_EQ(Call({"simulate", "scene.yaml", "-o", "data"}).code, 0);

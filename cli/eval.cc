@@ -14,14 +14,15 @@ namespace alidade::cli {
 namespace {
 
 constexpr const char* kFooter = R"(Examples:
+  alidade eval runs/slam                           all estimators of a run against its truth
   alidade eval truth.tum estimate.tum -a           ATE and RPE after se3 alignment
   alidade eval truth.tum mono.tum -as              and scale, as a single camera needs it
-  alidade eval runs/slam runs/slam                 all estimators of a run against its truth
-  alidade eval KITTI_00_gt.txt KITTI_00_orb.txt -a -d 100 -u m --all_pairs
+  alidade eval KITTI_00_gt.txt KITTI_00_orb.txt -a -d 100 -u m --all-pairs
   alidade eval truth.tum a.tum b.tum -a --markdown
 
 Files: TUM (8 columns, or 20 with covariances), KITTI (12, times.txt beside), EuRoC (csv). A folder
-is a run, an estimator in one, or a sequence of EuRoC. Warnings go to standard error.)";
+is a run, an estimator in one, or a sequence of EuRoC. Warnings go to standard error. Options have
+the names of evo; underscores, as in --t_max_diff, mean the same.)";
 
 enum class Form { kText, kJson, kMarkdown, kLatex };
 
@@ -54,7 +55,7 @@ CLI::Validator OneOf(std::initializer_list<T> values) {
   return {choose, ""};
 }
 
-/// What -a, -s and --align_origin mean beside --align.
+/// What -a, -s and --align-origin mean beside --align-mode.
 Alignment Chosen(const Arguments& arguments) {
   if (arguments.origin) return Alignment::kOrigin;
   if (arguments.se3) return arguments.scale ? Alignment::kSim3 : Alignment::kSe3;
@@ -112,15 +113,20 @@ Evaluation Failed(const Trajectory& reference, const TrajectoryFile& file,
   return failed;
 }
 
+/// A run that stands alone is compared with its own truth.
+bool IsOfOneRun(const Arguments& arguments) { return arguments.estimates.empty(); }
+
 std::vector<TrajectoryFile> FilesOf(const Arguments& arguments) {
+  std::vector<std::string> paths = arguments.estimates;
+  if (IsOfOneRun(arguments)) paths = {arguments.reference};
   std::vector<TrajectoryFile> files;
-  for (const std::string& path : arguments.estimates) {
+  for (const std::string& path : paths) {
     const std::vector<TrajectoryFile> more = EstimatesAt(path);
     files.insert(files.end(), more.begin(), more.end());
   }
   const std::string &absolute = arguments.save_absolute, &relative = arguments.save_relative;
   if ((!absolute.empty() || !relative.empty()) && files.size() > 1) {
-    throw Error(ExitCode::kUsage, "--save_results: " + std::to_string(files.size()) +
+    throw Error(ExitCode::kUsage, "--save-results: " + std::to_string(files.size()) +
                                       " estimates; expected one, as a result of evo has one");
   }
   if (!absolute.empty()) CheckEvoResult(absolute, arguments.force);
@@ -134,9 +140,10 @@ ExitCode RunEval(const Arguments& arguments) {
   options.alignment = Chosen(arguments);
   options.max_diff = StampFromSeconds(arguments.max_diff_s);
   options.offset = StampFromSeconds(arguments.offset_s);
+  const TrajectoryFile truth =
+      IsOfOneRun(arguments) ? TruthOf(arguments.reference) : ReferenceAt(arguments.reference);
   const std::vector<TrajectoryFile> files = FilesOf(arguments);
-  const Trajectory reference =
-      ReadTrajectory(ReferenceAt(arguments.reference).file, arguments.format);
+  const Trajectory reference = ReadTrajectory(truth.file, arguments.format);
   WarnOf(reference.warnings, arguments);
   std::vector<Evaluation> evaluations;
   ExitCode code = ExitCode::kOk;
@@ -176,39 +183,41 @@ void CheckTogether(const Arguments& arguments) {
   const Alignment chosen = Chosen(arguments);
   if (arguments.options.align_poses > 0 &&
       (chosen == Alignment::kNone || chosen == Alignment::kOrigin)) {
-    throw CLI::ValidationError("--n_to_align: " + std::string(ToString(chosen)) +
-                               " aligns no N poses; expected -a, -s or --align too");
+    throw CLI::ValidationError("--n-to-align: " + std::string(ToString(chosen)) +
+                               " aligns no N poses; expected -a, -s or --align-mode too");
   }
   const std::string &absolute = arguments.save_absolute, &relative = arguments.save_relative;
   if (!absolute.empty() && !relative.empty() && Resolved(absolute) == Resolved(relative)) {
-    throw CLI::ValidationError("--save_relative: " + relative +
-                               " is what --save_results writes; expected another file");
+    throw CLI::ValidationError("--save-relative: " + relative +
+                               " is what --save-results writes; expected another file");
   }
 }
 
 void AddAlignment(CLI::App& command, Arguments& a) {
-  CLI::Option* align =
+  CLI::Option* se3 = command.add_flag(
+      "-a,--align", a.se3, "align by rotation and translation (se3); with -s by scale too (sim3)");
+  CLI::Option* scale =
+      command.add_flag("-s,--correct-scale", a.scale, "align by scale; with -a by sim3");
+  CLI::Option* origin =
+      command.add_flag("--align-origin", a.origin, "align so that the first poses are the same");
+  CLI::Option* mode =
       command
-          .add_option("--align", a.options.alignment,
-                      "none (default), origin, yaw (and translation), se3, sim3, or scale alone")
+          .add_option("--align-mode", a.options.alignment,
+                      "none (default), scale, origin, yaw (and translation), se3 or sim3")
           ->option_text("MODE")
           ->transform(OneOf({Alignment::kNone, Alignment::kScale, Alignment::kOrigin,
                              Alignment::kYaw, Alignment::kSe3, Alignment::kSim3}));
-  CLI::Option* origin = command.add_flag("--align_origin", a.origin, "--align origin, as of evo");
-  CLI::Option* se3 = command.add_flag("-a", a.se3, "--align se3; with -s sim3, as of evo");
-  CLI::Option* scale =
-      command.add_flag("-s,--correct_scale", a.scale, "--align scale; with -a sim3, as of evo");
-  align->excludes(origin)->excludes(se3)->excludes(scale);
+  mode->excludes(origin)->excludes(se3)->excludes(scale);
   origin->excludes(se3)->excludes(scale);
-  command.add_option("--n_to_align", a.options.align_poses, "align the first N poses alone")
+  command.add_option("--n-to-align", a.options.align_poses, "align by the first N poses alone")
       ->option_text("N")
       ->check(IsInteger(3, 1'000'000'000));
 }
 
 void AddErrors(CLI::App& command, Arguments& a) {
   command
-      .add_option("-r,--pose_relation", a.options.relations,
-                  "trans_part, rot_part, angle_deg, angle_rad, full, point_distance; may be "
+      .add_option("-r,--pose-relation", a.options.relations,
+                  "trans_part, rot_part, angle_deg, angle_rad, full or point_distance; may be "
                   "repeated; default trans_part and angle_deg")
       ->option_text("NAME")
       ->allow_extra_args(false)
@@ -217,28 +226,30 @@ void AddErrors(CLI::App& command, Arguments& a) {
                  PoseRelation::kAngleRad, PoseRelation::kFull, PoseRelation::kPointDistance}));
   command
       .add_option("-d,--delta", a.options.pairs.delta,
-                  "of relative errors: how far poses are apart; default 1")
+                  "RPE: distance between the two poses of a pair; default 1")
       ->option_text("X")
       ->check(IsNumber(1e-9, 1e9));
   command
-      .add_option("-u,--delta_unit", a.options.pairs.unit,
-                  "f (frames, default), m (of path), s, d (degrees), r (rad)")
+      .add_option("-u,--delta-unit", a.options.pairs.unit,
+                  "RPE: f (poses, default), m (of path), s, d (degrees) or r (rad)")
       ->option_text("UNIT")
       ->transform(OneOf({DeltaUnit::kFrames, DeltaUnit::kMetres, DeltaUnit::kSeconds,
                          DeltaUnit::kDegrees, DeltaUnit::kRadians}));
-  command.add_flag("--all_pairs", a.options.pairs.all, "from each pose on; default: one by one");
+  command.add_flag("--all-pairs", a.options.pairs.all, "RPE: use overlapping pairs");
   command
-      .add_option("-t,--delta_tol", a.options.pairs.tolerance,
-                  "of all pairs: how far off delta, as a share of it; default 0.1")
+      .add_option("-t,--delta-tol", a.options.pairs.tolerance,
+                  "RPE: tolerance of delta for --all-pairs, relative; default 0.1")
       ->option_text("X")
       ->check(IsNumber(0.0, 1.0));
 }
 
 void AddTimes(CLI::App& command, Arguments& a) {
-  command.add_option("--t_max_diff", a.max_diff_s, "poses match within this time, s; default 0.01")
+  command
+      .add_option("--t-max-diff", a.max_diff_s,
+                  "largest time difference of two poses that match, s; default 0.01")
       ->option_text("S")
       ->check(IsNumber(0.0, 1e9));
-  command.add_option("--t_offset", a.offset_s, "is added to the stamps of the estimate, s")
+  command.add_option("--t-offset", a.offset_s, "is added to the timestamps of the estimate, s")
       ->option_text("S")
       ->check(IsNumber(-9e9, 9e9));
   command
@@ -259,11 +270,11 @@ void AddForms(CLI::App& command, Arguments& a) {
   json->excludes(markdown)->excludes(latex);
   markdown->excludes(latex);
   command
-      .add_option("--save_results", a.save_absolute,
+      .add_option("--save-results", a.save_absolute,
                   "write the absolute errors of the first -r for evo_res")
       ->option_text("ZIP")
       ->check(IsNamed);
-  command.add_option("--save_relative", a.save_relative, "write the relative errors, likewise")
+  command.add_option("--save-relative", a.save_relative, "write the relative errors, likewise")
       ->option_text("ZIP")
       ->check(IsNamed);
   command.add_flag("--force", a.force, "replace ZIP if it is there");
@@ -276,13 +287,15 @@ void AddEval(CLI::App& program, Action& action) {
   CLI::App& command =
       *program.add_subcommand("eval", "Compare trajectories with a reference: ATE, RPE, NEES");
   const auto arguments = std::make_shared<Arguments>();
-  command.add_option("REF", arguments->reference, "the reference: a file, or the folder of a run")
+  command
+      .add_option("REF", arguments->reference,
+                  "the reference: a file, or the folder of a run; without EST a run, compared with "
+                  "its truth")
       ->option_text(" ")
       ->required()
       ->check(IsNamed);
   command.add_option("EST", arguments->estimates, "the estimates: files, or folders of runs")
       ->option_text(" ")
-      ->required()
       ->check(IsNamed);
   AddAlignment(command, *arguments);
   AddErrors(command, *arguments);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <exception>
 #include <new>
 
@@ -17,7 +18,7 @@ constexpr const char* kFooter = R"(Examples:
   alidade explain examples/05_depth_principled/config.yaml
   alidade run examples/05_depth_principled/config.yaml -o runs/first
   alidade sweep examples/05_depth_principled/config.yaml --runs 200
-  alidade eval runs/slam runs/slam                 trajectories against truth: ATE, RPE, NEES
+  alidade eval runs/slam                           trajectories against truth: ATE, RPE, NEES
   alidade compare examples/08_depth_all_estimators/config.yaml
 
 `alidade COMMAND --help` tells the rest. Exit codes: 0 ok, 1 something found wrong, 2 usage,
@@ -48,6 +49,20 @@ std::string CommandLine(int argc, char** argv) {
   std::string line = "alidade";
   for (int i = 1; i < argc; ++i) line += ' ' + ShellQuoted(argv[i]);
   return line;
+}
+
+/// The arguments, the last one first, as CLI11 takes them. An underscore in the name of an option
+/// means a hyphen: `--t_max_diff` of evo is `--t-max-diff`. What follows `--` is left as it is.
+std::vector<std::string> ReversedArguments(int argc, char** argv) {
+  std::vector<std::string> arguments(argv + 1, argv + std::max(argc, 1));
+  for (std::string& argument : arguments) {
+    if (argument == "--") break;
+    if (!argument.starts_with("--")) continue;
+    const std::size_t name = std::min(argument.find('='), argument.size());
+    std::replace(argument.begin(), argument.begin() + static_cast<std::ptrdiff_t>(name), '_', '-');
+  }
+  std::ranges::reverse(arguments);
+  return arguments;
 }
 
 void Describe(CLI::App& program, Action& action, const std::string& command_line) {
@@ -107,6 +122,18 @@ std::string Complaint(const CLI::App& command, const CLI::ParseError& error) {
   return what + word + "'" + Suggestion(command, word);
 }
 
+/// `alidade plugins info`
+std::string FullName(const CLI::App& command) {
+  const CLI::App* parent = command.get_parent();
+  return parent == nullptr ? command.get_name() : FullName(*parent) + ' ' + command.get_name();
+}
+
+ExitCode UsageError(const CLI::App& command, const std::string& complaint) {
+  PrintErrors(complaint);
+  PrintNote("see `" + FullName(command) + " --help`");
+  return ExitCode::kUsage;
+}
+
 ExitCode Fail(const CLI::App& program, const CLI::ParseError& error) {
   const CLI::App& command = Named(program);
   if (dynamic_cast<const CLI::CallForHelp*>(&error) != nullptr) {
@@ -117,9 +144,7 @@ ExitCode Fail(const CLI::App& program, const CLI::ParseError& error) {
     Print(std::string(error.what()) + '\n');
     return ExitCode::kOk;
   }
-  PrintErrors(Complaint(command, error));
-  PrintNote('\n' + program.help());
-  return ExitCode::kUsage;
+  return UsageError(command, Complaint(command, error));
 }
 
 ExitCode Main(int argc, char** argv) {
@@ -127,11 +152,16 @@ ExitCode Main(int argc, char** argv) {
   Action action;
   Describe(program, action, CommandLine(argc, argv));
   try {
-    program.parse(argc, argv);
+    program.parse(ReversedArguments(argc, argv));
   } catch (const CLI::ParseError& error) {
     return Fail(program, error);
   }
-  return action();
+  try {
+    return action();
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::kUsage) throw;
+    return UsageError(Named(program), error.what());
+  }
 }
 
 ExitCode Guarded(int argc, char** argv) {

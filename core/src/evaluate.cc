@@ -11,19 +11,30 @@
 namespace alidade {
 namespace {
 
-constexpr int kDof = 3;
+/// The axes whose variance is above 0 in one pose or more: of a planar pose not all three.
+std::vector<int> UncertainAxes(const std::vector<Eigen::Matrix3d>& covariances) {
+  std::vector<int> axes;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto uncertain = [axis](const Eigen::Matrix3d& c) { return c(axis, axis) > 0.0; };
+    if (std::ranges::any_of(covariances, uncertain)) axes.push_back(axis);
+  }
+  return axes;
+}
 
 /// Of the errors of all poses, columns of `errors`, with the covariances beside them.
 Nees NeesOf(const Eigen::Matrix3Xd& errors, const std::vector<Eigen::Matrix3d>& covariances) {
-  const double limit = ChiSquareQuantile(0.95, kDof);
+  const std::vector<int> axes = UncertainAxes(covariances);
   Nees nees;
+  if (axes.empty()) return nees;
+  nees.dof = static_cast<int>(axes.size());
+  const double limit = ChiSquareQuantile(0.95, nees.dof);
   double sum = 0.0, inside = 0.0;
   for (std::size_t i = 0; i < covariances.size(); ++i) {
-    const double squared =
-        internal::SquaredMahalanobis(covariances[i], errors.col(static_cast<Eigen::Index>(i)));
+    const Eigen::Vector3d error = errors.col(static_cast<Eigen::Index>(i));
+    const double squared = internal::SquaredMahalanobis(covariances[i](axes, axes), error(axes));
     if (squared < 0.0) continue;
     ++nees.poses;
-    sum += squared / kDof;
+    sum += squared / nees.dof;
     inside += squared <= limit ? 1.0 : 0.0;
   }
   nees.mean = sum / nees.poses;
@@ -106,7 +117,8 @@ Evaluation Evaluate(const Trajectory& reference, const Trajectory& estimate,
   } else {
     if (estimate.has_covariances()) {
       evaluation.nees_withheld = std::string("the alignment by ") + ToString(options.alignment) +
-                                 " takes errors away that the covariance is of; --align none";
+                                 " removes part of the error that the covariance describes; "
+                                 "leave it out";
     }
     evaluation.estimate = evaluation.alignment * evaluation.estimate;
   }

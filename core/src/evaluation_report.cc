@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "comparison_table.h"
 #include "evaluation_names.h"
@@ -52,9 +53,10 @@ std::string TrajectoryText(const Trajectory& trajectory) {
 }
 
 std::string NeesText(const char* name, const Nees& nees, int poses) {
-  return std::string("NEES ") + name + ' ' + RoundedText(nees.mean, 4) + " per dof, " +
-         RoundedText(100.0 * nees.cov95, 3) + " % within 95 %, " + std::to_string(nees.poses) +
-         " of " + std::to_string(poses) + " poses\n";
+  return std::string("NEES ") + name + " (" + std::to_string(nees.dof) + " dof) " +
+         RoundedText(nees.mean, 4) + " per dof, " + RoundedText(100.0 * nees.cov95, 3) +
+         " % within 95 %, " + std::to_string(nees.poses) + " of " + std::to_string(poses) +
+         " poses\n";
 }
 
 /// All statistics of one evaluation, a row for each relation.
@@ -83,6 +85,11 @@ std::string ConsistencyText(const Evaluation& evaluation) {
   if (evaluation.position_nees) text += NeesText("position", *evaluation.position_nees, poses);
   if (evaluation.orientation_nees) {
     text += NeesText("orientation", *evaluation.orientation_nees, poses);
+  }
+  if (!text.empty()) {
+    text +=
+        "NEES is marginal here: of each quantity alone. nees.mean in the run.json of a run is "
+        "joint, over all states of a model.\n";
   }
   if (!evaluation.nees_withheld.empty()) {
     text += "NEES withheld: " + evaluation.nees_withheld + '\n';
@@ -129,6 +136,19 @@ std::string DetailText(const Evaluation& evaluation) {
   return consistency.empty() ? text : text + '\n' + consistency;
 }
 
+/// `NEES position (3 dof)`, with every number of dof there is.
+std::string NeesHeader(const char* name, std::optional<Nees> Evaluation::*nees,
+                       const std::vector<Evaluation>& evaluations) {
+  std::set<int> dofs;
+  for (const Evaluation& one : evaluations) {
+    if (one.*nees) dofs.insert((one.*nees)->dof);
+  }
+  std::vector<std::string> texts;
+  for (const int dof : dofs) texts.push_back(std::to_string(dof));
+  const std::string header = std::string("NEES ") + name;
+  return texts.empty() ? header : header + " (" + internal::Join(texts, " or ") + " dof)";
+}
+
 /// A header, and a row for each evaluation.
 std::vector<internal::TextRow> SummaryRows(const std::vector<Evaluation>& evaluations) {
   internal::TextRow header = {"estimate", "align", "scale", "matched", "within [s]"};
@@ -139,7 +159,10 @@ std::vector<internal::TextRow> SummaryRows(const std::vector<Evaluation>& evalua
   }
   const bool nees = std::ranges::any_of(
       evaluations, [](const Evaluation& one) { return one.position_nees || one.orientation_nees; });
-  if (nees) header.insert(header.end(), {"NEES position", "NEES orientation"});
+  if (nees) {
+    header.push_back(NeesHeader("position", &Evaluation::position_nees, evaluations));
+    header.push_back(NeesHeader("orientation", &Evaluation::orientation_nees, evaluations));
+  }
   std::vector<internal::TextRow> rows = {header};
   for (const Evaluation& one : evaluations) {
     if (!one.error.empty()) {
@@ -208,6 +231,7 @@ void AddNees(Json& json, const char* key, const std::optional<Nees>& nees) {
   json.Key(key).Object();
   json.Key("mean").Number(nees->mean);
   json.Key("cov95").Number(nees->cov95);
+  json.Key("dof").Integer(nees->dof);
   json.Key("poses").Integer(nees->poses);
   json.End();
 }

@@ -2,8 +2,10 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 
 #include "alidade/error.h"
 #include "number_text.h"
@@ -22,10 +24,30 @@ constexpr double kShortPath = 0.5;     ///< share of the reference's
 constexpr double kOtherWorld = 10.0;   ///< error without alignment over that with
 constexpr double kBodyTurnDeg = 10.0;  ///< a turn of the body that is no error of an estimate
 constexpr double kClearly = 0.25;      ///< what explains the rest
+constexpr const char* kEurocTruth = "state_groundtruth_estimate0";
 constexpr double kDegrees = 180.0 / 3.14159265358979323846;
 
 double Rmse(const Trajectory& reference, const Trajectory& estimate) {
   return internal::AbsoluteErrors(PoseRelation::kTranslation, reference, estimate).statistics.rmse;
+}
+
+/// Whether a file is named like ground truth: its name, or that of EuRoC's folder, has `truth` in
+/// it, or `gt` as a word.
+bool IsNamedLikeTruth(const std::string& file) {
+  const std::filesystem::path path = file;
+  if (path.parent_path().filename() == kEurocTruth) return true;
+  std::string name = path.filename().string(), word;
+  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (name.find("truth") != name.npos) return true;
+  for (const char c : name + '.') {
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0) {
+      word += c;
+      continue;
+    }
+    if (word == "gt") return true;
+    word.clear();
+  }
+  return false;
 }
 
 /// How the orientations of two trajectories of one world differ: by one turn of the body,
@@ -72,6 +94,7 @@ class Warnings {
         whole_estimate_(estimate) {}
 
   std::vector<std::string> Take() {
+    CheckOrder();
     CheckMatches();
     CheckStamps();
     CheckPath();
@@ -95,13 +118,27 @@ class Warnings {
     warnings_.push_back(ErrorLine({whole_estimate_.name}, {}, what, remedy));
   }
 
+  /// Sees that the reference and the estimate are swapped. Numbers of poses would not do: truth may
+  /// be at a lower rate, too.
+  void CheckOrder() {
+    const Trajectory &reference = whole_reference_, &estimate = whole_estimate_;
+    const char* const remedy = "REF first, then EST";
+    if (IsNamedLikeTruth(estimate.name) && !IsNamedLikeTruth(reference.name)) {
+      Warn("is named like ground truth, but is compared with " + reference.name, remedy);
+    } else if (reference.has_covariances() && !estimate.has_covariances()) {
+      warnings_.push_back(ErrorLine(
+          {reference.name}, {},
+          "has covariances, as an estimate does, and " + estimate.name + " has none", remedy));
+    }
+  }
+
   void CheckMatches() {
     const int matched = evaluation_.estimate.size();
     if (matched >= kFewMatches * matches_.possible) return;
     Warn(std::to_string(matched) + " of " + std::to_string(matches_.possible) +
              " possible poses match within " + RoundedText(Seconds(evaluation_.options.max_diff)) +
              " s",
-         "the same clock and rate; --t_offset, --t_max_diff");
+         "the same clock and rate; --t-offset, --t-max-diff");
   }
 
   void CheckStamps() {
@@ -117,7 +154,7 @@ class Warnings {
     if (!(late_s > kLateStamps * Seconds(evaluation_.options.max_diff))) return;
     Warn("its stamps are " + RoundedText(late_s) + " s " + (*middle > 0 ? "before" : "after") +
              " those of the reference on the median",
-         "--t_offset " + RoundedText(Seconds(evaluation_.options.offset + *middle)));
+         "--t-offset " + RoundedText(Seconds(evaluation_.options.offset + *middle)));
   }
 
   void CheckPath() {
@@ -141,7 +178,7 @@ class Warnings {
     Warn("scale " + RoundedText(sim3.scale, 4) + " (error " + RoundedText(with_scale, 4) +
              " m by sim3, " + RoundedText(without, 4) +
              " m by se3): looks like a run without metric scale",
-         "--align sim3");
+         "-as");
   }
 
   void CheckWorld() {
@@ -152,7 +189,7 @@ class Warnings {
     if (!(as_is > kOtherWorld * aligned)) return;
     Warn("not aligned, the error is " + RoundedText(as_is, 4) + " m, and " +
              RoundedText(aligned, 4) + " m by se3: looks like another world frame",
-         "--align se3");
+         "--align");
   }
 
   void CheckLine() {
@@ -160,7 +197,7 @@ class Warnings {
     if (alignment != Alignment::kSe3 && alignment != Alignment::kSim3) return;
     Warn(std::string("its positions, or the reference's, lie on a line: the turn about it by ") +
              ToString(alignment) + " is arbitrary, and so are errors of orientation",
-         "--align none, origin or yaw for those");
+         "no alignment, --align-origin or --align-mode yaw for those");
   }
 
   void CheckOrientations(const Similarity& sim3) {

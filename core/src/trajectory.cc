@@ -222,36 +222,34 @@ class TrajectoryReader {
          w_first ? "qw qx qy qz, as EuRoC has it" : "qx qy qz qw, as TUM has it");
   }
 
-  /// Sorted, each stamp once.
+  /// Sorted; poses of one timestamp stay in the order of the file.
   Trajectory InOrder() {
     const std::vector<Stamp>& stamps = trajectory_.stamps;
     std::vector<int> order(stamps.size());
     std::iota(order.begin(), order.end(), 0);
     const auto earlier = [&](int a, int b) { return At(stamps, a) < At(stamps, b); };
     const auto back = std::is_sorted_until(order.begin(), order.end(), earlier);
-    if (back != order.end()) {
+    const bool sorted = back == order.end();
+    if (!sorted) {
       Warn(At(lines_, *back), "t", "goes back: " + internal::SecondsText(At(stamps, *back)),
            "poses in the order of their stamps; they are sorted");
+      std::stable_sort(order.begin(), order.end(), earlier);
     }
-    std::stable_sort(order.begin(), order.end(), earlier);
-    std::vector<int> kept;
-    std::string more;
-    int twice = -1, count = 0;
-    for (const int i : order) {
-      if (!kept.empty() && At(stamps, kept.back()) == At(stamps, i)) {
-        if (count++ == 0) twice = i;
-        continue;
-      }
-      kept.push_back(i);
+    WarnOfDuplicates(order);
+    return sorted ? std::move(trajectory_) : trajectory_.Select(order);
+  }
+
+  /// `order` sorts the timestamps.
+  void WarnOfDuplicates(const std::vector<int>& order) {
+    const std::vector<Stamp>& stamps = trajectory_.stamps;
+    int first = -1, count = 0;
+    for (std::size_t k = 1; k < order.size(); ++k) {
+      if (At(stamps, order[k]) == At(stamps, order[k - 1]) && count++ == 0) first = order[k];
     }
-    if (count == 0 && back == order.end()) return std::move(trajectory_);
-    if (count > 1) more = ", as are " + std::to_string(count - 1) + " more";
-    if (count > 0) {
-      Warn(At(lines_, twice), "t",
-           internal::SecondsText(At(stamps, twice)) + " is there already" + more,
-           "each stamp once; the first is taken");
-    }
-    return trajectory_.Select(kept);
+    if (count == 0) return;
+    std::string what = "duplicate timestamp " + internal::SecondsText(At(stamps, first));
+    if (count > 1) what += ", the first of " + std::to_string(count) + " such rows";
+    Warn(At(lines_, first), "t", what, "each timestamp once; all poses are kept");
   }
 
   template <class T>
@@ -271,10 +269,14 @@ class TrajectoryReader {
   std::vector<std::string> stamp_texts_;  ///< likewise
 };
 
+/// The name of the file that holds the times of one file of KITTI alone.
+std::filesystem::path OwnTimes(const std::filesystem::path& file) {
+  return file.stem().string() + "_times.txt";
+}
+
 /// The file of stamps beside a file of KITTI; empty where there is none.
 std::filesystem::path TimesBeside(const std::filesystem::path& file) {
-  const std::filesystem::path own = file.stem().string() + "_times.txt";
-  for (const std::filesystem::path& name : {own, std::filesystem::path("times.txt")}) {
+  for (const std::filesystem::path& name : {OwnTimes(file), std::filesystem::path("times.txt")}) {
     const std::filesystem::path beside = file.parent_path() / name;
     std::error_code error;
     if (std::filesystem::is_regular_file(beside, error)) return beside;
@@ -293,9 +295,11 @@ void ReadTimes(const std::filesystem::path& times, Trajectory& trajectory) {
     }
   }
   if (std::ssize(trajectory.stamps) == trajectory.size()) return;
+  const std::filesystem::path own = OwnTimes(trajectory.name);
+  const bool shared = times.filename() != own;
   rows.FailLine(std::to_string(trajectory.stamps.size()) + " times for " +
                     std::to_string(trajectory.size()) + " poses of " + trajectory.name,
-                "one for each");
+                "one for each pose" + (shared ? ", or " + own.string() + " beside it" : ""));
 }
 
 }  // namespace

@@ -46,12 +46,15 @@ double DoubleSeconds(Stamp stamp) {
 /// of two others, rounding decides, as it does in evo, whose figures would differ otherwise.
 double Apart(Stamp a, Stamp b) { return std::abs(DoubleSeconds(a) - DoubleSeconds(b)); }
 
-/// Index of the nearest stamp, of two as near the earlier.
+/// Index of the nearest stamp, of several as near the first.
 int NearestIndex(const std::vector<Stamp>& stamps, Stamp to) {
-  const auto after = std::lower_bound(stamps.begin(), stamps.end(), to);
-  if (after == stamps.begin()) return 0;
-  const bool before = after == stamps.end() || Apart(*(after - 1), to) <= Apart(*after, to);
-  return static_cast<int>(after - stamps.begin()) - (before ? 1 : 0);
+  auto nearest = std::lower_bound(stamps.begin(), stamps.end(), to);
+  const auto before = [&] {
+    if (nearest == stamps.begin()) return false;
+    return nearest == stamps.end() || Apart(*(nearest - 1), to) <= Apart(*nearest, to);
+  };
+  while (before()) --nearest;
+  return static_cast<int>(nearest - stamps.begin());
 }
 
 Matches ByRow(const Trajectory& reference, const Trajectory& estimate) {
@@ -61,10 +64,14 @@ Matches ByRow(const Trajectory& reference, const Trajectory& estimate) {
   for (int i = 0; i < reference.size(); ++i) matches.reference.push_back(i);
   matches.estimate = matches.reference;
   if (reference.size() == estimate.size()) return matches;
-  Fail(estimate.name,
-       std::to_string(estimate.size()) + " poses without stamps for " +
-           std::to_string(reference.size()) + " of " + reference.name,
-       "a row for each row of the reference, or stamps in both");
+  const bool of_reference = estimate.has_stamps();
+  const Trajectory& bare = of_reference ? reference : estimate;
+  const Trajectory& other = of_reference ? estimate : reference;
+  Fail(bare.name,
+       std::to_string(bare.size()) + " poses for " + std::to_string(other.size()) + " of " +
+           other.name + ", and no timestamps",
+       std::string("a row for each row of the ") + (of_reference ? "estimate" : "reference") +
+           ", or timestamps in both (KITTI: NAME_times.txt beside NAME.txt)");
 }
 
 std::string Span(const Trajectory& trajectory) {
@@ -112,7 +119,7 @@ Similarity Align(Alignment alignment, const Trajectory& reference, const Traject
     }
     Fail(estimate.name,
          "no scale: its positions have nothing in common with those of " + reference.name,
-         "poses of the same path, or --align se3");
+         "poses of the same path, or --align");
   }
   Similarity found = *similarity;
   if (alignment == Alignment::kScale) {
@@ -124,12 +131,13 @@ Similarity Align(Alignment alignment, const Trajectory& reference, const Traject
 
 Matches Associate(const Trajectory& reference, const Trajectory& estimate, Stamp max_diff,
                   Stamp offset) {
-  const auto by_row = [](const Trajectory& t) { return t.format == TrajectoryFormat::kKitti; };
-  if ((by_row(reference) && by_row(estimate)) ||
-      (!reference.has_stamps() && !estimate.has_stamps())) {
+  const bool both = reference.has_stamps() && estimate.has_stamps();
+  const bool neither = !reference.has_stamps() && !estimate.has_stamps();
+  const auto is_kitti = [](const Trajectory& t) { return t.format == TrajectoryFormat::kKitti; };
+  if (neither || (!both && is_kitti(reference) && is_kitti(estimate))) {
     return ByRow(reference, estimate);
   }
-  if (!reference.has_stamps() || !estimate.has_stamps()) {
+  if (!both) {
     Fail((reference.has_stamps() ? estimate : reference).name, "poses without stamps",
          "times.txt beside them, as the other trajectory has stamps");
   }
@@ -140,7 +148,7 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Stamp
   for (const Stamp end : {shorter.front(), shorter.back()}) {
     if (std::abs(Seconds(end) + Seconds(shift)) < cell::kTimeLimit) continue;
     throw Error(ExitCode::kBadData,
-                ErrorLine({estimate.name}, "--t_offset",
+                ErrorLine({estimate.name}, "--t-offset",
                           internal::SecondsText(offset) + " beside its stamps is beyond 292 years",
                           "the time between the two clocks"));
   }
@@ -148,28 +156,20 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Stamp
   matches.possible = static_cast<int>(shorter.size());
   std::vector<int>& of_shorter = estimate_longer ? matches.reference : matches.estimate;
   std::vector<int>& of_longer = estimate_longer ? matches.estimate : matches.reference;
-  double last_off = 0.0;
   for (int i = 0; i < matches.possible; ++i) {
     const Stamp at = shorter[static_cast<std::size_t>(i)] + shift;
     const int nearest = NearestIndex(longer, at);
-    const double off = Apart(longer[static_cast<std::size_t>(nearest)], at);
-    if (!(off <= DoubleSeconds(max_diff))) continue;
-    const bool taken = !of_longer.empty() && of_longer.back() == nearest;
-    if (taken && off >= last_off) continue;
-    if (taken) {
-      of_shorter.back() = i;
-    } else {
-      of_shorter.push_back(i);
-      of_longer.push_back(nearest);
-    }
-    last_off = off;
+    if (!(Apart(longer[static_cast<std::size_t>(nearest)], at) <= DoubleSeconds(max_diff)))
+      continue;
+    of_shorter.push_back(i);
+    of_longer.push_back(nearest);
   }
   if (!matches.estimate.empty()) return matches;
   Fail(estimate.name,
        "no pose within " + internal::NumberText(Seconds(max_diff)) + " s of one of " +
-           reference.name + ": " + Span(estimate) + (offset == 0 ? "" : " and --t_offset") +
+           reference.name + ": " + Span(estimate) + (offset == 0 ? "" : " and --t-offset") +
            " beside " + Span(reference),
-       "the same clock; or --t_offset, which is added to the estimate's stamps, or --t_max_diff");
+       "the same clock; or --t-offset, which is added to the estimate's stamps, or --t-max-diff");
 }
 
 }  // namespace alidade

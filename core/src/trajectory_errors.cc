@@ -157,7 +157,7 @@ Pairs PairsOf(const Trajectory& estimate, const PairOptions& options) {
     throw Error(ExitCode::kBadData, ErrorLine({estimate.name}, "--delta", what, expected));
   };
   if (options.unit == DeltaUnit::kSeconds && !estimate.has_stamps()) {
-    fail("seconds of poses without stamps", "--delta_unit f or m, or times.txt beside them");
+    fail("seconds of poses without timestamps", "--delta-unit f or m, or times.txt beside them");
   }
   const bool degrees = options.unit == DeltaUnit::kDegrees;
   const bool angles = degrees || options.unit == DeltaUnit::kRadians;
@@ -175,7 +175,7 @@ Pairs PairsOf(const Trajectory& estimate, const PairOptions& options) {
   if (pairs.empty()) {
     fail("no two of " + std::to_string(estimate.size()) + " poses are " +
              internal::NumberText(options.delta) + ' ' + ToString(options.unit) + " apart",
-         "a smaller --delta, or a larger --delta_tol");
+         "a smaller --delta, or a larger --delta-tol");
   }
   return pairs;
 }

@@ -8,6 +8,7 @@ namespace alidade {
 namespace fs = std::filesystem;
 namespace {
 
+constexpr const char* kTruth = "truth.tum";
 constexpr const char* kTrajectory = "trajectory.tum";
 constexpr const char* kWithCovariance = "trajectory_covariance.tum";
 constexpr const char* kEurocReference = "state_groundtruth_estimate0/data.csv";
@@ -50,12 +51,31 @@ TrajectoryFile ReferenceAt(const fs::path& path) {
     return TrajectoryFile{file, file.stem().string(), {}};
   };
   if (!IsFolder(path)) return named(path);
-  for (const fs::path& file : {path / "truth.tum", path / "groundtruth.tum",
+  for (const fs::path& file : {path / kTruth, path / "groundtruth.tum",
                                path / "mav0" / kEurocReference, path / kEurocReference}) {
     if (IsFile(file)) return named(file);
   }
   FailMissing(path, "no reference in this folder",
               "truth.tum of a run whose source knows a pose, or mav0/ of EuRoC; or name the file");
+}
+
+TrajectoryFile TruthOf(const fs::path& path) {
+  if (!IsFolder(path)) {
+    std::error_code error;
+    if (!fs::exists(path, error)) FailMissing(path, "no such folder", "the folder of a run");
+    throw Error(ExitCode::kUsage,
+                ErrorLine({path.string()}, {}, "one file has nothing to be compared with",
+                          "REF EST, or the folder of a run"));
+  }
+  std::vector<fs::path> places = {path / kTruth};
+  if (!OfEstimator(path).file.empty()) {
+    places.push_back((path / "..").lexically_normal() / kTruth);
+  }
+  for (const fs::path& file : places) {
+    if (IsFile(file)) return {file, file.stem().string(), {}};
+  }
+  FailMissing(path, std::string("no ") + kTruth + " in this run",
+              "a run whose source knows a pose; or REF EST");
 }
 
 std::vector<TrajectoryFile> EstimatesAt(const fs::path& path) {
@@ -71,7 +91,8 @@ std::vector<TrajectoryFile> EstimatesAt(const fs::path& path) {
   if (!found.empty()) return found;
   FailMissing(path, "no trajectory in this folder",
               std::string("NAME/") + kTrajectory +
-                  " of an estimator with blocks X.position and X.orientation; or name the file");
+                  " of an estimator with blocks X.position and X.orientation, or X.heading of a "
+                  "planar pose; or name the file");
 }
 
 }  // namespace alidade

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
 #include "alidade/config.h"
 #include "support/program.h"
 
@@ -24,16 +26,17 @@ TEST_F(Cli, HelpNamesEveryCommandAndExitsWithZero) {
   }
 }
 
-TEST_F(Cli, UsageErrorsExitWithTwoAndHelp) {
+TEST_F(Cli, UsageErrorsExitWithTwoAndNameHelp) {
   const Outcome mistyped = Call({"rnu"});
   EXPECT_EQ(mistyped.code, 2);
-  EXPECT_TRUE(mistyped.err.starts_with("error: no command 'rnu'; did you mean 'run'?\n"));
-  EXPECT_TRUE(Contains(mistyped.err, "Usage: alidade"));
+  EXPECT_EQ(mistyped.err, "error: no command 'rnu'; did you mean 'run'?\nsee `alidade --help`\n");
   EXPECT_EQ(mistyped.out, "");
 
-  EXPECT_TRUE(Call({}).err.starts_with("error: no command\n"));
-  EXPECT_TRUE(Call({"run", "config.yaml", "--forec"})
-                  .err.starts_with("error: no option '--forec'; did you mean '--force'?\n"));
+  EXPECT_EQ(Call({}).err, "error: no command\nsee `alidade --help`\n");
+  EXPECT_EQ(Call({"run", "config.yaml", "--forec"}).err,
+            "error: no option '--forec'; did you mean '--force'?\nsee `alidade run --help`\n");
+  EXPECT_EQ(Call({"plugins", "info"}).err,
+            "error: NAME is required\nsee `alidade plugins info --help`\n");
   for (const Arguments& bad : {Arguments{},
                                {"run"},
                                {"run", "a", "b"},
@@ -46,14 +49,44 @@ TEST_F(Cli, UsageErrorsExitWithTwoAndHelp) {
                                {"plugins", "list", "--plugin-path="},
                                {"plugins"},
                                {"plugins", "lst"},
+                               {"simulate"},
+                               {"simulate", "a", "--seed", "-1"},
+                               {"compare"},
+                               {"bundle"},
+                               {"explain"},
+                               {"check"},
+                               {"eval"},
+                               {"doctor", "a"},
+                               {"sweep", "config.yaml", "--runs", "2", "--vary", "source.seed"},
                                {"sweep", "a"},
                                {"sweep", "a", "--runs", "0"},
                                {"sweep", "a", "--runs", "4", "--shard", "5/4"}}) {
     const Outcome outcome = Call(bad);
     EXPECT_EQ(outcome.code, 2) << outcome.err;
     EXPECT_TRUE(outcome.err.starts_with("error: ")) << outcome.err;
-    EXPECT_TRUE(Contains(outcome.err, "Usage: alidade")) << outcome.err;
+    EXPECT_TRUE(Contains(outcome.err, "\nsee `alidade")) << outcome.err;
+    EXPECT_TRUE(outcome.err.ends_with(" --help`\n")) << outcome.err;
+    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 2) << outcome.err;
+    EXPECT_EQ(outcome.out, "");
   }
+}
+
+TEST_F(Cli, UnderscoresInTheNameOfAnOptionMeanHyphens) {
+  EXPECT_EQ(Call({"run", "config.yaml", "-o", "a", "--no_figures", "--allow_outside",
+                  "--plugin_path=" ALIDADE_BINARY_DIR "/lib/alidade/plugins"})
+                .code,
+            0);
+  // Values stay as they are, and so does the line that the record shows.
+  EXPECT_EQ(Call({"run", "config.yaml", "--output=b_c", "--no_figures",
+                  "--set=source.disparity_sigma_px=0"})
+                .code,
+            0);
+  EXPECT_TRUE(Exists("b_c/run.json"));
+  EXPECT_TRUE(Contains(Read("b_c/config.resolved.yaml"), "disparity_sigma_px: 0"));
+  EXPECT_TRUE(Contains(Read("b_c/timing.json"), "--no_figures"));
+  // What follows `--` is no option.
+  Write("--my_config.yaml", testing::kDepthConfig);
+  EXPECT_EQ(Call({"run", "-o", "d", "--no-figures", "--", "--my_config.yaml"}).code, 0);
 }
 
 TEST_F(Cli, VersionIsOneLine) {

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 #include "alidade/config.h"
+#include "alidade/trajectory.h"
 #include "support/program.h"
 
 namespace alidade {
 namespace {
 
+namespace fs = std::filesystem;
 using testing::Arguments;
 using testing::Contains;
 using testing::Outcome;
@@ -42,10 +46,10 @@ class EvalCli : public Cli {
   }
 };
 
-TEST_F(EvalCli, LettersOfEvoMeanTheSameAsAlign) {
-  const auto align = [&](const Arguments& options) {
+TEST_F(EvalCli, FlagsOfEvoMeanWhatTheyMeanInEvo) {
+  const auto align = [&](const Arguments& options, bool options_first = false) {
     Arguments all = {"truth.tum", "mono.tum"};
-    all.insert(all.end(), options.begin(), options.end());
+    all.insert(options_first ? all.begin() : all.end(), options.begin(), options.end());
     const Config json = Evaluated(all);
     return json.root().At("evaluations").Items().front().At("align").Text();
   };
@@ -53,12 +57,17 @@ TEST_F(EvalCli, LettersOfEvoMeanTheSameAsAlign) {
   EXPECT_EQ(align({"-a"}), "se3");
   EXPECT_EQ(align({"-s"}), "scale");
   EXPECT_EQ(align({"-as"}), "sim3");
+  EXPECT_EQ(align({"--align"}), "se3");
+  EXPECT_EQ(align({"--align"}, true), "se3");  // takes no value
+  EXPECT_EQ(align({"--align", "--correct_scale"}, true), "sim3");
   EXPECT_EQ(align({"--align_origin"}), "origin");
+  EXPECT_EQ(align({"--align-origin"}), "origin");
   for (const char* mode : {"none", "scale", "origin", "yaw", "se3", "sim3"}) {
-    EXPECT_EQ(align({"--align", mode}), mode);
+    EXPECT_EQ(align({"--align-mode", mode}), mode);
+    EXPECT_EQ(align({"--align_mode=" + std::string(mode)}), mode);
   }
-  for (const Arguments& bad : {Arguments{"--align", "se4"},
-                               {"--align", "se3", "-a"},
+  for (const Arguments& bad : {Arguments{"--align-mode", "se4"},
+                               {"--align-mode", "se3", "-a"},
                                {"-a", "--align_origin"},
                                {"-r", "translation"},
                                {"-u", "km"},
@@ -71,8 +80,92 @@ TEST_F(EvalCli, LettersOfEvoMeanTheSameAsAlign) {
     const Outcome outcome = Call(all);
     EXPECT_EQ(outcome.code, 2) << bad.back();
     EXPECT_TRUE(outcome.err.starts_with("error: ")) << outcome.err;
+    EXPECT_TRUE(outcome.err.ends_with("\nsee `alidade eval --help`\n")) << outcome.err;
+    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 2) << outcome.err;
   }
-  EXPECT_EQ(Call({"eval", "truth.tum"}).code, 2);
+  const Outcome alone = Call({"eval", "truth.tum"});
+  EXPECT_EQ(alone.code, 2);
+  EXPECT_EQ(alone.err,
+            "error: truth.tum: one file has nothing to be compared with; expected REF EST, or the "
+            "folder of a run\nsee `alidade eval --help`\n");
+}
+
+TEST_F(EvalCli, EachOptionOfEvoIsTakenWithUnderscoresAndWithHyphens) {
+  const Arguments options = {"--pose_relation",
+                             "full",
+                             "--delta",
+                             "2",
+                             "--delta_unit",
+                             "f",
+                             "--all_pairs",
+                             "--delta_tol",
+                             "0.2",
+                             "--t_max_diff",
+                             "0.02",
+                             "--t_offset",
+                             "0.001",
+                             "--n_to_align",
+                             "20",
+                             "--align"};
+  Arguments hyphens = options;
+  for (std::string& option : hyphens) std::ranges::replace(option, '_', '-');
+  const auto text = [&](const Arguments& arguments) {
+    Arguments all = {"eval", "truth.tum", "mono.tum", "--quiet", "--json"};
+    all.insert(all.end(), arguments.begin(), arguments.end());
+    const Outcome outcome = Call(all);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return outcome.out;
+  };
+  EXPECT_EQ(text(options), text(hyphens));
+  const Config json = Config::FromText(text(hyphens), "stdout");
+  const Node one = json.root().At("evaluations").Items().front();
+  EXPECT_EQ(one.At("align_poses").Integer(0, 100), 20);
+  EXPECT_EQ(one.At("pairs").At("delta").Number(), 2.0);
+  for (const char* save : {"--save_results", "--save-results"}) {
+    EXPECT_EQ(Call({"eval", "truth.tum", "mono.tum", save, "a_b.zip", "--force"}).code, 0);
+    EXPECT_TRUE(Exists("a_b.zip"));
+  }
+}
+
+/// Worked by hand: t = 0, 1, 2, 3 at x = 0, 1, 2, 3 against t = 0, 1, 1, 2 at x = 0, 1, 1.5, 2. The
+/// pairs are (0, 0), (1, 1), (1, 1.5), (2, 2).
+///
+///   ATE errors 0, 0, 0.5, 0                                   rmse 0.25
+///   RPE of steps 1, 0, 1 against 1, 0.5, 0.5: 0, 0.5, 0.5     rmse sqrt(0.5 / 3)
+TEST_F(EvalCli, BothPosesOfADuplicateTimestampCountAsInEvo) {
+  Write("ref.tum", "0 0 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n3 3 0 0 0 0 0 1\n");
+  Write("est.tum", "0 0 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n1 1.5 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n");
+  const Config json = Evaluated({"ref.tum", "est.tum", "-r", "trans_part"});
+  const Node one = json.root().At("evaluations").Items().front();
+  EXPECT_EQ(one.At("matched").Integer(0, 9), 4);
+  EXPECT_DOUBLE_EQ(one.At("ate").At("trans_part").At("rmse").Number(), 0.25);
+  EXPECT_DOUBLE_EQ(one.At("rpe").At("trans_part").At("rmse").Number(), std::sqrt(0.5 / 3.0));
+  EXPECT_EQ(Call({"eval", "ref.tum", "est.tum"}).err,
+            "warning: est.tum:3 t: duplicate timestamp 1.000000 s; expected each timestamp once; "
+            "all poses are kept\n");
+}
+
+TEST_F(EvalCli, TwoFilesOfKittiGoByTheTimesBesideThem) {
+  fs::create_directory(folder_ / "a");
+  fs::create_directory(folder_ / "b");
+  const auto row = [](double x) { return "1 0 0 " + std::to_string(x) + " 0 1 0 0 0 0 1 0\n"; };
+  Write("a/gt.txt", row(0) + row(1) + row(2) + row(3));
+  Write("a/times.txt", "0\n0.1\n0.2\n0.3\n");
+  Write("b/orb.txt", row(1) + row(3.5));
+  Write("b/times.txt", "0.1\n0.3\n");
+  const Config json = Evaluated({"a/gt.txt", "b/orb.txt"});
+  const Node one = json.root().At("evaluations").Items().front();
+  EXPECT_EQ(one.At("matched").Integer(0, 9), 2);
+  EXPECT_FALSE(one.At("by_row").Flag());
+  EXPECT_DOUBLE_EQ(one.At("ate").At("trans_part").At("max").Number(), 0.5);
+}
+
+TEST_F(EvalCli, SwappedFilesAreToldOf) {
+  const Outcome swapped = Call({"eval", "mono.tum", "truth.tum", "-as"});
+  EXPECT_EQ(swapped.code, 0);
+  EXPECT_EQ(swapped.err,
+            "warning: truth.tum: is named like ground truth, but is compared with mono.tum; "
+            "expected REF first, then EST\n");
 }
 
 TEST_F(EvalCli, WarningsGoToStandardErrorAndFiguresToStandardOutput) {
@@ -140,7 +233,7 @@ TEST_F(EvalCli, WithoutPairsTheOtherFiguresStand) {
   EXPECT_EQ(outcome.code, 0);
   EXPECT_EQ(outcome.err,
             "warning: mono.tum --delta: no two of 31 poses are 30 m apart; expected a smaller "
-            "--delta, or a larger --delta_tol\n");
+            "--delta, or a larger --delta-tol\n");
   EXPECT_TRUE(Contains(outcome.out, "ATE trans_part [m]")) << outcome.out;
   EXPECT_FALSE(Contains(outcome.out, "RPE")) << outcome.out;
   const Outcome saved = Call({"eval", "truth.tum", "mono.tum", "-as", "-d", "30", "-u", "m",
@@ -193,17 +286,17 @@ TEST_F(EvalCli, WarningsOfTheReferenceAreInJsonToo) {
 
 TEST_F(EvalCli, AChoiceIsNamedAmongThoseThereAre) {
   for (const char* wrong : {"sim2", "3"}) {
-    const Outcome outcome = Call({"eval", "truth.tum", "mono.tum", "--align", wrong});
+    const Outcome outcome = Call({"eval", "truth.tum", "mono.tum", "--align-mode", wrong});
     EXPECT_EQ(outcome.code, 2);
-    EXPECT_TRUE(outcome.err.starts_with("error: --align: '" + std::string(wrong) +
+    EXPECT_TRUE(outcome.err.starts_with("error: --align-mode: '" + std::string(wrong) +
                                         "' is none of none, scale, origin, yaw, se3, sim3\n"))
         << outcome.err;
   }
   for (const char* mode : {"none", "origin"}) {
     const Outcome first =
-        Call({"eval", "truth.tum", "mono.tum", "--n_to_align", "10", "--align", mode});
+        Call({"eval", "truth.tum", "mono.tum", "--n-to-align", "10", "--align-mode", mode});
     EXPECT_EQ(first.code, 2) << mode;
-    EXPECT_TRUE(first.err.starts_with("error: --n_to_align: " + std::string(mode))) << first.err;
+    EXPECT_TRUE(first.err.starts_with("error: --n-to-align: " + std::string(mode))) << first.err;
   }
 }
 
@@ -226,7 +319,7 @@ TEST_F(EvalCli, ResultsThatCannotBothBeSavedAreNotSaved) {
                              "--save_relative", "./a.zip", "--force"});
   EXPECT_EQ(same.code, 2);
   EXPECT_TRUE(
-      same.err.starts_with("error: --save_relative: ./a.zip is what --save_results writes; "
+      same.err.starts_with("error: --save-relative: ./a.zip is what --save-results writes; "
                            "expected another file\n"))
       << same.err;
   EXPECT_FALSE(Exists("a.zip"));
@@ -257,11 +350,94 @@ TEST_F(EvalCli, OfARunSaysWhatTheRunSaid) {
   // The first pose is known exactly, and has none.
   EXPECT_EQ(one.At("nees_position").At("poses").Integer(0, 1000), 149);
   EXPECT_TRUE(one.At("nees_orientation").Find("mean"));
+  // A run alone is compared with its own truth.
+  const auto text = [&](const Arguments& arguments) {
+    const Outcome outcome = Call(arguments);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return outcome.out;
+  };
+  EXPECT_EQ(text({"eval", "slam"}), text({"eval", "slam", "slam"}));
+  EXPECT_EQ(text({"eval", "slam/ekf"}), text({"eval", "slam/truth.tum", "slam/ekf"}));
   const Config twice = Evaluated({"slam", "slam", "./slam/ekf"});
   EXPECT_EQ(twice.root().At("evaluations").Items()[0].At("estimate").Text(),
             "slam/ekf/trajectory_covariance.tum");
   const Outcome aligned = Call({"eval", "slam", "slam/ekf", "-as"});
   EXPECT_TRUE(Contains(aligned.out, "NEES withheld: the alignment by sim3 ")) << aligned.out;
+}
+
+/// A robot in the plane, whose fixes are wrong by a known amount.
+const std::string kPlanarConfig = R"(alidade: 1
+state:
+  robot: {model: planar, input: {stream: odometry}, noise: {speed: 0.05, turn_rate: 0.05},
+          initial: {position: {mean: [0, 0], sigma: 0.2}, heading: {mean: 0.1, sigma: 0.2}}}
+sensors:
+  gps: {model: planar_fix, stream: gps, roles: {position: robot.position}, sigma_m: 0.3}
+source:
+  type: csv
+  path: drive.csv
+  streams: {gps: [gx, gy], odometry: [v, o]}
+  truth: {robot.position: [tx, ty], robot.heading: th}
+estimators: {ekf: {type: ekf}}
+)";
+
+/// On a circle of 5 m at 1 m/s, more than once around.
+std::string PlanarDrive() {
+  std::string text = "t_s,v,o,gx,gy,tx,ty,th\n";
+  for (int i = 0; i <= 400; ++i) {
+    const double t = 0.1 * i, heading = 0.2 * t;
+    const double x = 5.0 * std::sin(heading), y = 5.0 - 5.0 * std::cos(heading);
+    for (const double value :
+         {t, 1.0, 0.2, x + 0.3 * std::sin(7.0 * i), y + 0.3 * std::cos(9.0 * i), x, y}) {
+      text += std::to_string(value) + ',';
+    }
+    text += std::to_string(std::remainder(heading, 2.0 * std::acos(-1.0))) + '\n';
+  }
+  return text;
+}
+
+TEST_F(EvalCli, ARobotInThePlaneHasATrajectory) {
+  Write("planar.yaml", kPlanarConfig);
+  Write("drive.csv", PlanarDrive());
+  const std::string plugin = ALIDADE_BINARY_DIR "/tests/plugins/planar.so";
+  const Outcome run = Call(
+      {"run", "planar.yaml", "-o", "planar", "--plugin-path", plugin, "--no-figures", "--quiet"});
+  ASSERT_EQ(run.code, 0) << run.err;
+  const Config json = Evaluated({"planar", "-r", "trans_part", "-r", "angle_rad"});
+  const Node one = json.root().At("evaluations").Items().front();
+  EXPECT_EQ(one.At("matched").Integer(0, 1000), 401);
+  EXPECT_TRUE(one.At("warnings").Items().empty()) << one.At("warnings").Items()[0].Text();
+  const Config record = Json("planar/run.json");
+  const Node metrics = record.root().At("estimators").At("ekf").At("metrics");
+  EXPECT_NEAR(one.At("ate").At("trans_part").At("rmse").Number(),
+              metrics.At("rmse:robot.position").Number(), 1e-12);
+  EXPECT_NEAR(one.At("ate").At("angle_rad").At("rmse").Number(),
+              metrics.At("rmse:robot.heading").Number(), 1e-9);
+  EXPECT_TRUE(one.At("nis").Find("gps"));
+
+  // NEES of the files, written out.
+  const Trajectory truth = ReadTrajectory(folder_ / "planar/truth.tum");
+  const Trajectory ekf = ReadTrajectory(folder_ / "planar/ekf/trajectory_covariance.tum");
+  ASSERT_EQ(truth.size(), ekf.size());
+  double position = 0.0, heading = 0.0;
+  for (int i = 0; i < ekf.size(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    EXPECT_EQ(ekf.positions(2, i), 0.0);
+    const Eigen::Vector2d e = (truth.positions.col(i) - ekf.positions.col(i)).head<2>();
+    const Eigen::Matrix2d p = ekf.position_covariances[at].topLeftCorner<2, 2>();
+    position += e.dot(p.inverse() * e) / 2.0;
+    const Eigen::Quaterniond turn = ekf.orientations[at].conjugate() * truth.orientations[at];
+    heading +=
+        std::pow(2.0 * std::atan(turn.z() / turn.w()), 2) / ekf.orientation_covariances[at](2, 2);
+  }
+  EXPECT_EQ(one.At("nees_position").At("dof").Integer(0, 3), 2);
+  EXPECT_NEAR(one.At("nees_position").At("mean").Number(), position / ekf.size(), 1e-9);
+  EXPECT_EQ(one.At("nees_orientation").At("dof").Integer(0, 3), 1);
+  EXPECT_NEAR(one.At("nees_orientation").At("mean").Number(), heading / ekf.size(), 1e-9);
+  EXPECT_TRUE(Contains(Call({"eval", "planar"}).out, "NEES position (2 dof) "));
+
+  // Simulated data have the true poses too.
+  ASSERT_EQ(Call({"simulate", "planar.yaml", "-o", "data"}).code, 0);
+  EXPECT_EQ(Read("data/truth.tum"), Read("planar/truth.tum"));
 }
 
 }  // namespace

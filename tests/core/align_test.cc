@@ -105,7 +105,7 @@ TEST(Align, RefusesWhatDeterminesNoScale) {
         EXPECT_EQ(error.code(), ExitCode::kBadData);
         EXPECT_STREQ(error.what(),
                      "curve.tum: no scale: its positions have nothing in common with those of "
-                     "curve.tum; expected poses of the same path, or --align se3");
+                     "curve.tum; expected poses of the same path, or --align");
       }
     }
     const Evaluation e = Evaluate(reference, estimate, {});
@@ -121,18 +121,30 @@ Trajectory At(const std::vector<double>& seconds) {
   return t;
 }
 
-TEST(Associate, TakesTheNearestWithinTheToleranceEachOnce) {
+TEST(Associate, EachOfTheShorterTakesTheNearestOfTheLongerWithinTheTolerance) {
   const Trajectory reference = At({0.0, 1.0, 2.0, 3.0, 4.0});
-  // 0.004 is nearer to 0 than 0.006; 2.02 is too far; 3.01 just is not.
-  const Matches matches = Associate(reference, At({0.006, 0.004, 2.02, 3.01}), 10'000'000, 0);
+  // 0.004 and 0.006 are both nearest to 0; 2.02 is too far; 3.01 just is not.
+  const Matches matches = Associate(reference, At({0.004, 0.006, 2.02, 3.01}), 10'000'000, 0);
   EXPECT_EQ(matches.possible, 4);
-  EXPECT_EQ(matches.reference, (std::vector<int>{0, 3}));
-  EXPECT_EQ(matches.estimate, (std::vector<int>{1, 3}));
+  EXPECT_EQ(matches.reference, (std::vector<int>{0, 0, 3}));
+  EXPECT_EQ(matches.estimate, (std::vector<int>{0, 1, 3}));
   // The shorter one is asked, whichever it is.
   const Matches other = Associate(At({0.006, 3.01}), reference, 10'000'000, 0);
   EXPECT_EQ(other.possible, 2);
   EXPECT_EQ(other.reference, (std::vector<int>{0, 1}));
   EXPECT_EQ(other.estimate, (std::vector<int>{0, 3}));
+}
+
+TEST(Associate, DuplicatesOfTheShorterAllPairAndOfTheLongerTheFirstDoes) {
+  // The smallest |t - 1| of the longer, at indices 1 and 2, is first met at 1.
+  const Matches matches =
+      Associate(At({0.0, 1.0, 1.0, 2.0, 3.0}), At({1.0, 1.0, 2.0}), 10'000'000, 0);
+  EXPECT_EQ(matches.reference, (std::vector<int>{1, 1, 3}));
+  EXPECT_EQ(matches.estimate, (std::vector<int>{0, 1, 2}));
+  // So from above and from below.
+  const Trajectory longer = At({0.0, 1.0, 1.0, 2.0, 2.0});
+  EXPECT_EQ(Associate(longer, At({0.996, 1.004, 2.004}), 10'000'000, 0).reference,
+            (std::vector<int>{1, 1, 3}));
 }
 
 TEST(Associate, TheOffsetIsAddedToTheEstimate) {
@@ -149,8 +161,8 @@ TEST(Associate, TheOffsetIsAddedToTheEstimate) {
     EXPECT_EQ(error.code(), ExitCode::kBadData);
     EXPECT_STREQ(error.what(),
                  "curve.tum: no pose within 0.001 s of one of curve.tum: 0.000000 s to 2.000000 s "
-                 "beside 10.000000 s to 13.000000 s; expected the same clock; or --t_offset, which "
-                 "is added to the estimate's stamps, or --t_max_diff");
+                 "beside 10.000000 s to 13.000000 s; expected the same clock; or --t-offset, which "
+                 "is added to the estimate's stamps, or --t-max-diff");
   }
 }
 
@@ -160,7 +172,7 @@ TEST(Associate, NamesTheOffsetWhereItIsToBlame) {
     FAIL();
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what())
-                  .find("0.000000 s to 1.000000 s and --t_offset beside "
+                  .find("0.000000 s to 1.000000 s and --t-offset beside "
                         "0.000000 s to 1.000000 s"),
               std::string::npos)
         << error.what();
@@ -180,11 +192,11 @@ TEST(Associate, RefusesAnOffsetThatNoStampHolds) {
     return std::string();
   };
   EXPECT_EQ(refusal(two, one, kOffset),
-            "curve.tum --t_offset: 9000000000.000000 s beside its stamps is beyond 292 years; "
+            "curve.tum --t-offset: 9000000000.000000 s beside its stamps is beyond 292 years; "
             "expected the "
             "time between the two clocks");
   EXPECT_EQ(refusal(one, two, -kOffset),
-            "curve.tum --t_offset: -9000000000.000000 s beside its stamps is beyond 292 years; "
+            "curve.tum --t-offset: -9000000000.000000 s beside its stamps is beyond 292 years; "
             "expected the "
             "time between the two clocks");
 }
@@ -198,10 +210,36 @@ TEST(Associate, WithoutStampsByRow) {
   EXPECT_EQ(matches.estimate, (std::vector<int>{0, 1, 2, 3}));
   EXPECT_THROW(Associate(bare, five, 0, 0), Error);
   EXPECT_THROW(Associate(bare, Curve(4), 0, 0), Error);
-  // KITTI goes by row even with times beside.
+  // KITTI goes by row where either file has no times.
   Trajectory timed = Curve(4);
-  timed.format = bare.format = TrajectoryFormat::kKitti;
+  timed.format = bare.format = five.format = TrajectoryFormat::kKitti;
   EXPECT_TRUE(Associate(timed, bare, 0, 0).by_row);
+  EXPECT_TRUE(Associate(bare, timed, 0, 0).by_row);
+  const auto refusal = [](const Trajectory& reference, const Trajectory& estimate) {
+    try {
+      Associate(reference, estimate, 0, 0);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  timed.name = "timed.txt";
+  five.name = "five.txt";
+  EXPECT_EQ(refusal(timed, five),
+            "five.txt: 5 poses for 4 of timed.txt, and no timestamps; expected a row for each row "
+            "of the reference, or timestamps in both (KITTI: NAME_times.txt beside NAME.txt)");
+  EXPECT_EQ(refusal(five, timed),
+            "five.txt: 5 poses for 4 of timed.txt, and no timestamps; expected a row for each row "
+            "of the estimate, or timestamps in both (KITTI: NAME_times.txt beside NAME.txt)");
+}
+
+TEST(Associate, KittiWithTimesBesideBothGoesByThem) {
+  Trajectory reference = At({0.0, 0.1, 0.2, 0.3}), estimate = At({0.1, 0.3});
+  reference.format = estimate.format = TrajectoryFormat::kKitti;
+  const Matches matches = Associate(reference, estimate, 10'000'000, 0);
+  EXPECT_FALSE(matches.by_row);
+  EXPECT_EQ(matches.reference, (std::vector<int>{1, 3}));
+  EXPECT_EQ(matches.estimate, (std::vector<int>{0, 1}));
 }
 
 }  // namespace

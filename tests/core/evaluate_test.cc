@@ -152,7 +152,7 @@ TEST(Evaluate, WithoutPairsThereAreNoRelativeErrorsButAWarning) {
   EXPECT_TRUE(e.relative.empty());
   EXPECT_EQ(e.warnings, (std::vector<std::string>{
                             "curve.tum --delta: no two of 20 poses are 1000 m apart; expected a "
-                            "smaller --delta, or a larger --delta_tol"}));
+                            "smaller --delta, or a larger --delta-tol"}));
 }
 
 TEST(Evaluate, NeesIsThatOfTheCovariancesBesideThePoses) {
@@ -172,6 +172,7 @@ TEST(Evaluate, NeesIsThatOfTheCovariancesBesideThePoses) {
   }
   const Evaluation e = Evaluate(reference, estimate, {});
   ASSERT_TRUE(e.position_nees && e.orientation_nees);
+  EXPECT_EQ(e.position_nees->dof, 3);
   EXPECT_EQ(e.position_nees->poses, 39);
   // 9 of 16 / 3, 30 of 1 / 3; chi2(0.95, 3) = 7.8
   EXPECT_NEAR(e.position_nees->mean, (9.0 * 16.0 + 30.0) / 3.0 / 39.0, 1e-9);
@@ -179,6 +180,34 @@ TEST(Evaluate, NeesIsThatOfTheCovariancesBesideThePoses) {
   EXPECT_EQ(e.orientation_nees->poses, 40);
   EXPECT_NEAR(e.orientation_nees->mean, (10.0 * 16.0 + 30.0) / 3.0 / 40.0, 1e-9);
   EXPECT_EQ(e.nees_withheld, "");
+}
+
+TEST(Evaluate, NeesOfAPlanarPoseIsOfItsOwnDegreesOfFreedom) {
+  // x, y and the heading are uncertain in one pose or more; z, roll and pitch are in none.
+  Trajectory estimate = Curve(10);
+  Eigen::Matrix3d position = Eigen::Matrix3d::Zero(), orientation = position;
+  position.topLeftCorner<2, 2>() << 0.05, 0.03, 0.03, 0.05;
+  orientation(2, 2) = 0.0025;
+  estimate.position_covariances.assign(10, position);
+  estimate.orientation_covariances.assign(10, orientation);
+  estimate.position_covariances[0].setZero();  // known
+  for (int i = 0; i < 10; ++i) {
+    estimate.positions.col(i) -= Vector3d(0.2, -0.2, 7.0);
+    estimate.orientations[static_cast<std::size_t>(i)] *=
+        Eigen::Quaterniond(Eigen::AngleAxisd(-0.1, Vector3d::UnitZ()));
+  }
+  const Evaluation e = Evaluate(Curve(10), estimate, {});
+  ASSERT_TRUE(e.position_nees && e.orientation_nees);
+  // (0.2, -0.2) lies along the eigenvector of 0.05 - 0.03 = 0.02: 0.08 / 0.02 = 4, over 2.
+  EXPECT_EQ(e.position_nees->dof, 2);
+  EXPECT_EQ(e.position_nees->poses, 9);
+  EXPECT_NEAR(e.position_nees->mean, 2.0, 1e-9);
+  EXPECT_NEAR(e.position_nees->cov95, 1.0, 1e-12);  // 4 <= chi2(0.95, 2) = 5.99
+  // 0.1^2 / 0.05^2 = 4 > chi2(0.95, 1) = 3.84
+  EXPECT_EQ(e.orientation_nees->dof, 1);
+  EXPECT_EQ(e.orientation_nees->poses, 10);
+  EXPECT_NEAR(e.orientation_nees->mean, 4.0, 1e-9);
+  EXPECT_NEAR(e.orientation_nees->cov95, 0.0, 1e-12);
 }
 
 TEST(Evaluate, NeesThatLacksIsToldOf) {
@@ -206,8 +235,9 @@ TEST(Evaluate, NeesIsWithheldOfAnAlignedEstimate) {
     options.alignment = alignment;
     const Evaluation e = Evaluate(Curve(40), estimate, options);
     EXPECT_FALSE(e.position_nees || e.orientation_nees);
-    EXPECT_EQ(e.nees_withheld, std::string("the alignment by ") + ToString(alignment) +
-                                   " takes errors away that the covariance is of; --align none");
+    EXPECT_EQ(e.nees_withheld,
+              std::string("the alignment by ") + ToString(alignment) +
+                  " removes part of the error that the covariance describes; leave it out");
   }
 }
 

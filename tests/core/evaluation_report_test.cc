@@ -80,13 +80,25 @@ TEST(EvaluationReport, NamesAreQuotedWhereTheFormAsksForIt) {
       << EvaluationLatex(other);
 }
 
-TEST(EvaluationReport, NeesSaysOfHowManyPosesItIs) {
+TEST(EvaluationReport, NeesNamesItsQuantityItsDofAndItsPoses) {
   Evaluation evaluation = Moved(Alignment::kNone, "a");
   evaluation.position_nees = Nees{2, 1.5, 1.0};
   EXPECT_NE(EvaluationText({evaluation})
-                .find("NEES position 1.5 per dof, 100 % within 95 %, 2 of 30 poses\n"),
+                .find("NEES position (3 dof) 1.5 per dof, 100 % within 95 %, 2 of 30 poses\n"
+                      "NEES is marginal here: of each quantity alone. nees.mean in the run.json of "
+                      "a run is joint, over all states of a model.\n"),
             std::string::npos)
       << EvaluationText({evaluation});
+  EXPECT_NE(EvaluationMarkdown({evaluation}).find(" | NEES position (3 dof) | NEES orientation |"),
+            std::string::npos)
+      << EvaluationMarkdown({evaluation});
+  Evaluation planar = evaluation;
+  planar.position_nees->dof = 2;
+  planar.orientation_nees = Nees{2, 1.0, 1.0, 1};
+  EXPECT_NE(EvaluationMarkdown({evaluation, planar})
+                .find(" | NEES position (2 or 3 dof) | NEES orientation (1 dof) |"),
+            std::string::npos)
+      << EvaluationMarkdown({evaluation, planar});
 }
 
 TEST(EvaluationReport, JsonHasAllOfIt) {
@@ -105,6 +117,7 @@ TEST(EvaluationReport, JsonHasAllOfIt) {
   EXPECT_NEAR(one.At("ate").At("trans_part").At("rmse").Number(), 0.05, 1e-15);
   EXPECT_EQ(one.At("pairs").At("delta_unit").Text(), "f");
   EXPECT_EQ(one.At("nees_position").At("mean").Number(), 1.5);
+  EXPECT_EQ(one.At("nees_position").At("dof").Integer(0, 3), 3);
   EXPECT_EQ(one.At("nis").At("pixels").At("autocorrelation").Number(), 0.01);
   EXPECT_EQ(one.At("warnings").Items().front().Text(), "w");
 }

@@ -58,8 +58,8 @@ TEST(EvaluationWarnings, AScaleFarFromOneIsNoMetricScale) {
   const Trajectory mono = Estimate(Inverse(known) * Curve(60));
   const std::string warnings = WarningsOf(Curve(60), mono, Aligned(Alignment::kSe3));
   EXPECT_TRUE(warnings.starts_with("estimate.tum: scale 2.228 (error 0.0")) << warnings;
-  EXPECT_TRUE(warnings.ends_with(
-      "m by se3): looks like a run without metric scale; expected --align sim3\n"))
+  EXPECT_TRUE(
+      warnings.ends_with("m by se3): looks like a run without metric scale; expected -as\n"))
       << warnings;
   EXPECT_EQ(WarningsOf(Curve(60), mono, Aligned(Alignment::kSim3)), "");
 }
@@ -69,7 +69,7 @@ TEST(EvaluationWarnings, AnErrorThatAlignmentTakesAwayIsOfAnotherWorld) {
   const Trajectory estimate = Estimate(Inverse(known) * Curve(60));
   const std::string warnings = WarningsOf(Curve(60), estimate);
   EXPECT_TRUE(warnings.starts_with("estimate.tum: not aligned, the error is ")) << warnings;
-  EXPECT_TRUE(warnings.ends_with("by se3: looks like another world frame; expected --align se3\n"))
+  EXPECT_TRUE(warnings.ends_with("by se3: looks like another world frame; expected --align\n"))
       << warnings;
   EXPECT_EQ(WarningsOf(Curve(60), estimate, Aligned(Alignment::kSe3)), "");
 }
@@ -80,7 +80,7 @@ TEST(EvaluationWarnings, FewMatchesAreTold) {
   for (std::size_t i = 0; i < 60; ++i) estimate.stamps[i] += i % 4 == 0 ? 0 : 30'000'000;
   EXPECT_EQ(WarningsOf(Curve(60), estimate),
             "estimate.tum: 15 of 60 possible poses match within 0.01 s; expected the same clock "
-            "and rate; --t_offset, --t_max_diff\n");
+            "and rate; --t-offset, --t-max-diff\n");
 }
 
 TEST(EvaluationWarnings, AConstantTimeOffsetIsToldWithTheOptionThatTakesIt) {
@@ -88,7 +88,7 @@ TEST(EvaluationWarnings, AConstantTimeOffsetIsToldWithTheOptionThatTakesIt) {
   for (Stamp& stamp : estimate.stamps) stamp += 8'000'000;
   EXPECT_EQ(WarningsOf(Curve(60), estimate),
             "estimate.tum: its stamps are 0.008 s after those of the reference on the median; "
-            "expected --t_offset -0.008\n");
+            "expected --t-offset -0.008\n");
   EvaluateOptions options;
   options.offset = -8'000'000;
   EXPECT_EQ(WarningsOf(Curve(60), estimate, options), "");
@@ -121,8 +121,8 @@ TEST(EvaluationWarnings, PositionsOnALineDetermineNoTurnAboutIt) {
   estimate.name = "estimate.tum";
   EXPECT_EQ(WarningsOf(testing::Line(60, 0.5), estimate, Aligned(Alignment::kSe3)),
             "estimate.tum: its positions, or the reference's, lie on a line: the turn about it by "
-            "se3 is arbitrary, and so are errors of orientation; expected --align none, origin or "
-            "yaw for those\n");
+            "se3 is arbitrary, and so are errors of orientation; expected no alignment, "
+            "--align-origin or --align-mode yaw for those\n");
   EXPECT_EQ(WarningsOf(testing::Line(60, 0.5), estimate, Aligned(Alignment::kYaw)), "");
 }
 
@@ -150,6 +150,44 @@ TEST(EvaluationWarnings, QuaternionsInTheOtherOrderAreToldOfWithTheirFile) {
   warnings = WarningsOf(Curve(60), estimate);
   EXPECT_NE(warnings.find("are read w last, to "), std::string::npos) << warnings;
   EXPECT_TRUE(warnings.ends_with("expected qw qx qy qz\n")) << warnings;
+}
+
+TEST(EvaluationWarnings, ASwapOfReferenceAndEstimateIsSeenByTheirNames) {
+  struct Case {
+    const char *reference, *estimate;
+    bool swapped;
+  };
+  for (const Case& c : {Case{"orb.txt", "fr2_desk_groundtruth.txt", true},
+                        {"orb.txt", "KITTI_00_gt.txt", true},
+                        {"orb.txt", "V1/state_groundtruth_estimate0/data.csv", true},
+                        {"runs/slam/ekf/trajectory.tum", "runs/slam/truth.tum", true},
+                        {"orb.txt", "GT-office.txt", true},
+                        {"fr2_desk_groundtruth.txt", "orb.txt", false},
+                        {"V1/state_groundtruth_estimate0/data.csv", "V1.csv", false},
+                        {"runs/slam/truth.tum", "runs/truth.tum", false},
+                        {"orb.txt", "tgt_gtsam.txt", false},
+                        {"orb.txt", "sptam.txt", false}}) {
+    SCOPED_TRACE(c.estimate);
+    Trajectory reference = Curve(60), estimate = Estimate(Curve(60));
+    reference.name = c.reference;
+    estimate.name = c.estimate;
+    EXPECT_EQ(WarningsOf(reference, estimate),
+              c.swapped ? std::string(c.estimate) +
+                              ": is named like ground truth, but is compared with " + c.reference +
+                              "; expected REF first, then EST\n"
+                        : "");
+  }
+}
+
+TEST(EvaluationWarnings, ASwapOfReferenceAndEstimateIsSeenByTheCovariances) {
+  Trajectory with = Estimate(Curve(60));
+  with.position_covariances.assign(60, Eigen::Matrix3d::Identity());
+  with.orientation_covariances = with.position_covariances;
+  EXPECT_EQ(WarningsOf(with, Curve(60)),
+            "estimate.tum: has covariances, as an estimate does, and curve.tum has none; expected "
+            "REF first, then EST\n");
+  EXPECT_EQ(WarningsOf(Curve(60), with), "");
+  EXPECT_EQ(WarningsOf(with, with), "");
 }
 
 }  // namespace

@@ -95,6 +95,14 @@ TEST_F(TrajectoryFiles, KittiTakesItsStampsFromTheFileBeside) {
   EXPECT_EQ(Read(rows).stamps, (std::vector<Stamp>{5'000'000'000, 6'000'000'000}));
   Write("poses_times.txt", "5\n");
   EXPECT_NE(Refusal(rows).find("poses_times.txt:1: 1 times for 2 poses of "), std::string::npos);
+  EXPECT_NE(Refusal(rows).find("; expected one for each pose"), std::string::npos);
+  // A times.txt that others share says how this file comes to its own.
+  fs::remove(folder_ / "poses_times.txt");
+  Write("times.txt", "0\n1\n2\n");
+  EXPECT_NE(Refusal(rows).find("times.txt:3: 3 times for 2 poses of "), std::string::npos);
+  EXPECT_NE(Refusal(rows).find("; expected one for each pose, or poses_times.txt beside it"),
+            std::string::npos)
+      << Refusal(rows);
   Write("poses_times.txt", "5\n5\n");
   EXPECT_NE(Refusal(rows).find("poses_times.txt:2:1 t: '5' is not after the one before"),
             std::string::npos);
@@ -227,12 +235,21 @@ TEST_F(TrajectoryFiles, StampsOutOfOrderAreSortedAndToldOf) {
   EXPECT_TRUE(std::ranges::is_sorted(t.stamps));
 }
 
-TEST_F(TrajectoryFiles, OfAStampThatIsThereTwiceTheFirstPoseIsTaken) {
+TEST_F(TrajectoryFiles, PosesOfADuplicateTimestampAreAllKeptAndItsLineIsNamed) {
   const std::string text = "1 1 0 0 0 0 0 1\n1 9 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n";
   EXPECT_EQ(WarningsOf(text),
-            "poses.txt:2 t: 1.000000 s is there already, as are 1 more; expected each stamp once; "
-            "the first is taken\n");
-  EXPECT_EQ(Read(text).positions.row(0), Eigen::RowVector2d(1, 2));
+            "poses.txt:2 t: duplicate timestamp 1.000000 s, the first of 2 such rows; expected "
+            "each timestamp once; all poses are kept\n");
+  EXPECT_EQ(Read(text).positions.row(0), Eigen::RowVector4d(1, 9, 2, 9));
+  EXPECT_EQ(Read(text).stamps.size(), 4u);
+  // Where poses are sorted, those of one timestamp stay as they were.
+  EXPECT_EQ(WarningsOf("2 2 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n"),
+            "poses.txt:2 t: goes back: 1.000000 s; expected poses in the order of their stamps; "
+            "they are sorted\n"
+            "poses.txt:3 t: duplicate timestamp 2.000000 s; expected each timestamp once; all "
+            "poses are kept\n");
+  EXPECT_EQ(Read("2 2 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n").positions.row(0),
+            Eigen::RowVector3d(1, 2, 9));
 }
 
 TEST_F(TrajectoryFiles, AFirstPoseThatIsTheIdentityInTheOtherOrderIsToldOf) {
@@ -271,6 +288,31 @@ TEST_F(TrajectoryFiles, AFolderIsARunAnEstimatorOrASequenceOfEuroc) {
     EXPECT_THROW(EstimatesAt(folder_ / name), Error) << name;
   }
   EXPECT_THROW(ReferenceAt(folder_ / "run/figures"), Error);
+}
+
+TEST_F(TrajectoryFiles, TheTruthOfARunIsInItsFolderOrInThatOfItsEstimator) {
+  for (const char* name : {"run/truth.tum", "run/ekf/trajectory.tum", "bare/ekf/trajectory.tum"}) {
+    Write(name, "");
+  }
+  EXPECT_EQ(TruthOf(folder_ / "run").file, folder_ / "run/truth.tum");
+  EXPECT_EQ(TruthOf(folder_ / "run/ekf").file, folder_ / "run/truth.tum");
+  EXPECT_EQ(TruthOf(folder_ / "run/ekf/").file, folder_ / "run/truth.tum");
+  for (const char* name : {"bare", "bare/ekf"}) {
+    try {
+      TruthOf(folder_ / name);
+      FAIL() << name;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::kInputMissing);
+      EXPECT_NE(std::string(error.what()).find("no truth.tum in this run"), std::string::npos)
+          << error.what();
+    }
+  }
+  try {
+    TruthOf(folder_ / "run/truth.tum");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::kUsage);
+  }
 }
 
 }  // namespace

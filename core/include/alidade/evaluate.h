@@ -42,11 +42,11 @@ struct Matches {
   int possible = 0;     ///< poses of the shorter trajectory
   bool by_row = false;  ///< without stamps
 };
-/// To each pose of the shorter trajectory the nearest of the longer in time, within `max_diff`;
-/// `offset` is added to the stamps of the estimate. No pose is taken twice: of those that are
-/// nearest to the same one, the nearest of them is. By row where both are of KITTI, or neither has
-/// stamps. Errors: kBadData where nothing matches, where there are not as many rows, where only one
-/// has stamps, and where no stamp holds the offset.
+/// To each pose of the shorter trajectory, the estimate if both are as long, the nearest of the
+/// longer in time, the first of several, if it is within `max_diff`. `offset` is added to the
+/// timestamps of the estimate. Several poses of the shorter may take the same one, as in evo. By
+/// row if neither has timestamps, or both are of KITTI and one has none. Errors: kBadData if nothing
+/// matches, if there are not as many rows, if only one has timestamps, if none holds the offset.
 Matches Associate(const Trajectory& reference, const Trajectory& estimate, Stamp max_diff,
                   Stamp offset);
 
@@ -103,6 +103,7 @@ struct Nees {
   int poses = 0;
   double mean = 0.0;   ///< 1 is right
   double cov95 = 0.0;  ///< share with e' C^-1 e <= chi2(0.95, dof); 0.95 is right
+  int dof = 3;         ///< axes that are uncertain in one pose or more: 2 and 1 of a planar pose
 };
 
 /// Consistency of the accepted measurements of a sensor with what the filter predicted.
@@ -149,9 +150,10 @@ struct Evaluation {
 };
 
 /// Evaluates `estimate`. Warns of what makes the figures mean something else than they say: few
-/// matches, stamps that are off by a constant time, a scale that is not metric, other world or body
-/// frames, quaternions in the other order, a path that ends early, no pair of poses that is delta
-/// apart: then there are no relative errors. Errors: those of Associate and Align.
+/// matches, stamps that are off by a constant time, a swap of reference and estimate (seen by names
+/// and covariances), a scale that is not metric, other world or body frames, quaternions in the
+/// other order, a path that ends early, no pair of poses that is delta apart: then there are no
+/// relative errors. Errors: those of Associate and Align.
 Evaluation Evaluate(const Trajectory& reference, const Trajectory& estimate,
                     const EvaluateOptions& options);
 

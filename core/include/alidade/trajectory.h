@@ -26,7 +26,7 @@ const char* ToString(TrajectoryFormat format);
 struct Trajectory {
   std::string name;  ///< of the file
   TrajectoryFormat format = TrajectoryFormat::kTum;
-  std::vector<Stamp> stamps;                     ///< each once; empty where the file has none
+  std::vector<Stamp> stamps;                     ///< ascending; empty where the file has none
   Eigen::Matrix3Xd positions;                    ///< m, in the world
   std::vector<Eigen::Quaterniond> orientations;  ///< world_from_body
   /// Of each pose, or empty: of the error in position, in the world, m^2; and of that in
@@ -51,8 +51,8 @@ struct Trajectory {
 /// KITTI's stamps are those of NAME_times.txt or times.txt beside NAME.txt, where there is one.
 ///
 /// Warns, with the line, of stamps of TUM that are no seconds by their size and distance (they are
-/// read as what they look like, ns, us or ms), of poses out of order (they are sorted), of a stamp
-/// that is there twice (the first is taken), and of a first pose that would be the identity in the
+/// read as what they look like, ns, us or ms), of poses out of order (they are sorted), of
+/// duplicate timestamps (all poses are kept), and of a first pose that would be the identity in the
 /// other order of the quaternion.
 ///
 /// Errors: kBadData with file, line and column of a row that is none, of a stamp beyond 292 years
@@ -70,6 +70,10 @@ struct TrajectoryFile {
 /// What `path` means as a reference: the file itself; of a run folder truth.tum; of a sequence of
 /// EuRoC its state_groundtruth_estimate0. Errors: kInputMissing where a folder has none.
 TrajectoryFile ReferenceAt(const std::filesystem::path& path);
+
+/// The truth.tum that a run folder, or the folder that holds an estimator's, has. Errors:
+/// kInputMissing where there is none; kUsage where `path` is no folder.
+TrajectoryFile TruthOf(const std::filesystem::path& path);
 
 /// What `path` means as estimates: the file itself; of a run folder, or the folder of an estimator
 /// in it, the trajectories of its estimators, with covariances where they are there. Errors:

@@ -45,8 +45,9 @@ struct Matches {
 /// To each pose of the shorter trajectory, the estimate if both are as long, the nearest of the
 /// longer in time, the first of several, if it is within `max_diff`. `offset` is added to the
 /// timestamps of the estimate. Several poses of the shorter may take the same one, as in evo. By
-/// row if neither has timestamps, or both are of KITTI and one has none. Errors: kBadData if nothing
-/// matches, if there are not as many rows, if only one has timestamps, if none holds the offset.
+/// row if neither has timestamps, or both are of KITTI and one has none. Errors: kBadData if
+/// nothing matches, if there are not as many rows, if only one has timestamps, if none holds the
+/// offset.
 Matches Associate(const Trajectory& reference, const Trajectory& estimate, Stamp max_diff,
                   Stamp offset);
 

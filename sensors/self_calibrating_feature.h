@@ -101,7 +101,8 @@ struct RadtanLens {
 ///   p          3      m       world  the point
 ///   sigma      1      px      -      standard deviation of u and of v; > 0
 ///
-/// Defined for  hz > 0; else out_of_domain, outputs untouched.
+/// Defined for  hz > 0, or where the domain is projective hz != 0; else out_of_domain, outputs
+///              untouched. BAL and Bundler define their camera by p = -P / P_z on either side of it.
 /// Source       [Agarwal2010], [Brown1971].
 template <class Lens>
 struct SelfCalibratingFeature : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<Lens::kSize>, Vec<3>> {
@@ -112,18 +113,23 @@ struct SelfCalibratingFeature : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<Lens:
   static constexpr Quantity kMeasurement{"pixel", "px", "where the point is seen", "u,v"};
 
   double sigma_px;
+  bool projective;  ///< points behind the camera are seen too
 
-  explicit SelfCalibratingFeature(double sigma) : sigma_px(sigma) {}
+  explicit SelfCalibratingFeature(double sigma, bool both_sides = false)
+      : sigma_px(sigma), projective(both_sides) {}
   explicit SelfCalibratingFeature(Params& p)
-      : SelfCalibratingFeature(
-            p.Positive("sigma_px", "px", "noise of a pixel coordinate, 1 sigma")) {}
+      : SelfCalibratingFeature{
+            p.Positive("sigma_px", "px", "noise of a pixel coordinate, 1 sigma"),
+            p.Choice("domain", {"in_front", "projective"},
+                     "points it is defined for: in front of the camera, or behind it too",
+                     0) == 1} {}
 
   template <class T>
   bool Predict(const T* position, const T* orientation, const T* intrinsics, const T* point,
                T* pixel) const {
     T h[3];
     InCamera(position, orientation, point, h);
-    if (!(h[2] > T(0.0))) return false;
+    if (!(h[2] > T(0.0) || (projective && h[2] < T(0.0)))) return false;
     Lens::Project(intrinsics, T(h[0] / h[2]), T(h[1] / h[2]), pixel);
     return true;
   }

@@ -290,6 +290,7 @@ TEST_F(CheckTest, ShippedModelsPass) {
     parameters.emplace("self_calibrating_feature",
                        std::string("{sigma_px: 1, lens: ") + lens + "}");
   }
+  parameters.emplace("self_calibrating_feature", "{sigma_px: 1, domain: projective}");
   AddLandmarkSensors(parameters);
   const std::filesystem::path shipped = ALIDADE_BINARY_DIR "/lib/alidade/plugins";
   int checked = 0;

@@ -85,5 +85,23 @@ TEST(SelfCalibratingFeature, SeesNothingBehindIt) {
   }
 }
 
+/// The equation of BAL on the other side of the camera, P_z > 0: the image is the point mirrored.
+TEST(SelfCalibratingFeature, SeesPointsBehindItWhereItsDomainIsProjective) {
+  const SensorModel sensor =
+      InProcessSensor(SelfCalibratingFeature<RadialLens>(0.5, true), "self_calibrating_feature");
+  // h = (-0.3, 0.4, -1) m, the mirror image of h in PredictsWorkedNumbers: the same ray, x = h / hz
+  Blocks roles{{1, 0, 0}, {1, 0, 0, 0}, {500, -0.3, 0.2}, {0.7, 0.4, -1}};
+  const std::vector<double> z = Predicted(sensor, roles);
+  EXPECT_NEAR(z[0], 140.625, 1e-12);
+  EXPECT_NEAR(z[1], -187.5, 1e-12);
+  ExpectSame(Linearised(sensor, roles), NumericallyLinearised(sensor, roles), 1e-8);
+  std::vector<double> untouched(2, kPoison);
+  for (const double depth : {0.0, kNaN}) {
+    roles[3][2] = depth;
+    EXPECT_EQ(sensor.Predict(Pointers(roles).data(), untouched.data()), Status::kOutOfDomain);
+    EXPECT_EQ(untouched[0], kPoison);
+  }
+}
+
 }  // namespace
 }  // namespace alidade

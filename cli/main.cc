@@ -2,6 +2,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
+#include <cstdlib>
 #include <exception>
 #include <new>
 
@@ -178,6 +179,9 @@ ExitCode Guarded(int argc, char** argv) {
 }  // namespace alidade::cli
 
 int main(int argc, char** argv) {
+  // Ceres logs by glog, which is loaded with the plugins of Ceres and then reads this: nothing
+  // below a fatal error. What the solver reports is in its results. A value set by the user stays.
+  setenv("GLOG_minloglevel", "3", 0);
   alidade::cli::PrepareConsole();
   const alidade::ExitCode code = alidade::cli::Guarded(argc, argv);
   alidade::cli::FinishOnSignals();

@@ -20,16 +20,24 @@ constexpr const char* kFooter = R"(Examples:
   alidade bundle data/tracks.csv --camera data/calibration.yaml --start run/trajectory.tum -o runs/a
 
 Reads problems of BAL, Bundler v0.3 and libmv, told apart by their beginning, and tracks as
-`simulate` writes them. Ctrl-C ends after the iteration and keeps what is reached (exit code 75).)";
+`simulate` writes them. Ctrl-C ends after the iteration and keeps the result so far.
+Exit codes: 0 converged, 1 out of iterations, 75 stopped, 79 the solver failed.)";
 
 struct Arguments {
   std::string problem, folder, loss;
   std::vector<std::string> fixed;
   BundleTracks tracks;
   std::vector<std::string> plugin_paths;
-  int iterations = 500;
+  int iterations = BundleOptions().max_iterations;
+  double tolerance = BundleOptions().function_tolerance;
   bool force = false, quiet = false;
 };
+
+std::string Short(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
+}
 
 /// `huber`, `cauchy=2`
 bool ParseLoss(const std::string& text, RobustLoss& loss) {
@@ -43,15 +51,37 @@ bool ParseLoss(const std::string& text, RobustLoss& loss) {
   if (loss.kind == LossKind::kNone) return false;
   const char* const end = text.data() + text.size();
   const auto [rest, error] = std::from_chars(text.data() + equals + 1, end, loss.scale);
-  return error == std::errc() && rest == end && loss.scale > 0.0 && loss.scale < 1e300;
+  return error == std::errc() && rest == end;
 }
 
 std::string IsLoss(const std::string& text) {
   RobustLoss loss;
-  if (ParseLoss(text, loss)) return {};
+  if (ParseLoss(text, loss)) {
+    if (loss.scale >= kBundleLossScaleMin && loss.scale <= kBundleLossScaleMax) return {};
+    return "the scale of '" + text + "' is out of bounds; expected " + Short(kBundleLossScaleMin) +
+           " to " + Short(kBundleLossScaleMax) + " standard deviations";
+  }
   return "'" + text +
-         "' is no loss; expected none, huber or cauchy, or huber=SCALE, in standard "
-         "deviations, > 0";
+         "' is not a loss; expected none, huber or cauchy, or huber=SCALE, in standard deviations";
+}
+
+/// `k1,k2` as its names.
+std::vector<std::string> Names(const std::string& text) {
+  std::vector<std::string> names(1);
+  for (const char c : text) {
+    if (c == ',') {
+      names.emplace_back();
+    } else {
+      names.back() += c;
+    }
+  }
+  return names;
+}
+
+std::string AreNames(const std::string& text) {
+  const std::vector<std::string> names = Names(text);
+  if (std::ranges::find(names, "") == names.end()) return {};
+  return "'" + text + "' has an empty name; expected names with a comma between them, as k1,k2";
 }
 
 BundleFile Read(const Arguments& arguments, const PluginHost& host) {
@@ -62,10 +92,9 @@ BundleFile Read(const Arguments& arguments, const PluginHost& host) {
   return ReadBundleTracks(tracks, host);
 }
 
-std::string Short(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
+/// Whether the format's camera sees points behind it too.
+bool IsProjective(BundleFormat format) {
+  return format == BundleFormat::kBal || format == BundleFormat::kBundler;
 }
 
 std::string Describe(const BundleFile& file, int left_out) {
@@ -74,15 +103,19 @@ std::string Describe(const BundleFile& file, int left_out) {
                      std::to_string(problem.cameras.size()) + " cameras, " +
                      std::to_string(problem.points.size()) + " points, " +
                      std::to_string(problem.observations.size()) + " observations";
-  if (left_out > 0)
-    text += "; " + std::to_string(left_out) +
-            " not defined or not finite at the start, as behind the camera";
+  if (left_out > 0) {
+    text += "; " + std::to_string(left_out) + " left out, not " +
+            (IsProjective(file.format) ? "defined or not finite at the start: in the camera's plane"
+                                       : "defined or not finite at the start: behind the camera");
+  }
   if (file.invalid > 0)
     text += "; " + std::to_string(file.invalid) + " not valid, as outside the image";
   if (file.frames_left_out > 0)
     text += "; " + std::to_string(file.frames_left_out) + " frames without a pose left out";
   if (file.points_left_out > 0)
     text += "; " + std::to_string(file.points_left_out) + " points without parallax left out";
+  if (file.unplaced > 0)
+    text += "; " + std::to_string(file.unplaced) + " observations of these left out";
   return text;
 }
 
@@ -113,7 +146,8 @@ ExitCode RunBundle(const Arguments& arguments) {
   if (left_out == std::ssize(file.problem.observations)) {
     throw Error(ExitCode::kBadData,
                 ErrorLine(Place{arguments.problem}, {}, "no observation can be used",
-                          "cameras that see points before them") +
+                          IsProjective(file.format) ? "points beside the plane of their camera"
+                                                    : "points in front of their camera") +
                     "\n  " + Describe(file, left_out));
   }
   const double before = BundleRms(sensor, file.problem);
@@ -121,7 +155,9 @@ ExitCode RunBundle(const Arguments& arguments) {
   Progress progress("iterations", arguments.quiet);
   BundleOptions options;
   options.max_iterations = arguments.iterations;
-  options.fixed = arguments.fixed;
+  options.function_tolerance = arguments.tolerance;
+  for (const std::string& list : arguments.fixed)
+    for (const std::string& name : Names(list)) options.fixed.push_back(name);
   options.stop = StopRequested;
   options.progress = [&](int done) { progress.Show(done, -1); };
   if (!arguments.loss.empty()) ParseLoss(arguments.loss, options.loss);
@@ -145,7 +181,7 @@ ExitCode RunBundle(const Arguments& arguments) {
   if (!arguments.quiet) Print(text);
   if (result.end == BundleEnd::kFailed) PrintErrors(arguments.problem + ": " + result.message);
   if (result.end == BundleEnd::kOutOfIterations)
-    PrintNote("not converged: " + result.message + " (--iterations)");
+    PrintNote("not converged: " + result.message + " (--iterations, --tolerance)");
   return CodeOf(result.end);
 }
 
@@ -168,10 +204,13 @@ void AddBundle(CLI::App& program, Action& action) {
       ->check(IsLoss);
   add("--fix", arguments->fixed, "NAME,...",
       "leaves intrinsics as they are: all of them by `intrinsics`, or elements such as k1,k2")
-      ->delimiter(',')
+      ->check(AreNames)
       ->allow_extra_args(false);
   add("--iterations", arguments->iterations, "N", "at most; default 500")
       ->check(IsInteger(0, 1000000));
+  add("--tolerance", arguments->tolerance, "X",
+      "converged where a step changes the cost by no more than this fraction; default 1e-8")
+      ->check(IsNumber(0.0, 1.0));
   CLI::Option* const camera = add("--camera", arguments->tracks.camera, "FILE",
                                   "of tracks: YAML with `camera`, of a pair `baseline_m` too");
   CLI::Option* const start =

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -58,6 +59,66 @@ std::optional<double> SquaredError(const SensorModel& sensor, const BundleRoles&
   geometry.Minus(seen.z.data(), h, d);
   for (int i = 0; i < geometry.tangent; ++i) sum += d[i] * d[i];
   return std::isfinite(sum) ? std::optional(sum) : std::nullopt;
+}
+
+/// The first camera that is used, and what the scale is measured by: BundleResult::extent_before.
+class Gauge {
+ public:
+  explicit Gauge(const BundleProblem& problem)
+      : cameras_(problem.cameras.size()), points_(problem.points.size()) {
+    for (const BundleObservation& seen : problem.observations) {
+      if (!seen.used) continue;
+      cameras_[static_cast<std::size_t>(seen.camera)] = true;
+      points_[static_cast<std::size_t>(seen.point)] = true;
+    }
+    first_ = static_cast<std::size_t>(std::ranges::find(cameras_, true) - cameras_.begin());
+    by_points_ = !(Extent(problem) > 0.0);
+  }
+  double Extent(const BundleProblem& problem) const {
+    const std::array<double, 3> eye = problem.cameras[first_].position;
+    std::vector<double> distances;
+    const auto add = [&](const std::array<double, 3>& x) {
+      distances.push_back(std::hypot(x[0] - eye[0], x[1] - eye[1], x[2] - eye[2]));
+    };
+    for (std::size_t i = first_ + 1; !by_points_ && i < cameras_.size(); ++i) {
+      if (cameras_[i]) add(problem.cameras[i].position);
+    }
+    for (std::size_t i = 0; by_points_ && i < points_.size(); ++i) {
+      if (points_[i]) add(problem.points[i]);
+    }
+    if (distances.empty()) return 0.0;
+    const auto middle = distances.begin() + std::ssize(distances) / 2;
+    std::ranges::nth_element(distances, middle);
+    return *middle;
+  }
+  /// Scales what is used about the first camera. No pixel changes.
+  void Scale(double factor, BundleProblem& problem) const {
+    const std::array<double, 3> eye = problem.cameras[first_].position;
+    const auto scale = [&](std::array<double, 3>& x) {
+      for (std::size_t k = 0; k < 3; ++k) x[k] = eye[k] + factor * (x[k] - eye[k]);
+    };
+    for (std::size_t i = first_ + 1; i < cameras_.size(); ++i) {
+      if (cameras_[i]) scale(problem.cameras[i].position);
+    }
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      if (points_[i]) scale(problem.points[i]);
+    }
+  }
+
+ private:
+  std::vector<bool> cameras_, points_;  ///< those used
+  std::size_t first_ = 0;
+  bool by_points_ = false;  ///< the other cameras stand where the first does, or are none
+};
+
+/// Two numbers of a camera: nothing of the scale.
+bool TellsNoScale(const SensorModel& sensor) { return sensor.measurement().geometry.tangent < 3; }
+
+/// Five digits and more would say nothing to a reader.
+std::string Short(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.5g", value);
+  return text;
 }
 
 /// `1 point is`, `3 points are`
@@ -174,6 +235,14 @@ BundleResult AdjustBundle(const SensorModel& sensor, BundleProblem& problem,
                           const BundleOptions& options, const std::filesystem::path& folder) {
   if (std::ranges::none_of(problem.observations, &BundleObservation::used))
     throw Error(ExitCode::kBadData, ErrorLine({}, {}, "no observation can be used"));
+  const double scale = options.loss.scale;
+  if (options.loss.kind != LossKind::kNone &&
+      !(scale >= kBundleLossScaleMin && scale <= kBundleLossScaleMax)) {
+    throw Error(ExitCode::kUsage,
+                ErrorLine({}, "the scale of the loss", Short(scale) + " is out of bounds",
+                          Short(kBundleLossScaleMin) + " to " + Short(kBundleLossScaleMax) +
+                              " standard deviations"));
+  }
   const std::filesystem::path program = internal::FolderOfProgram();
   const bool known = !folder.empty() || !program.empty();  // never from the working folder
   const std::filesystem::path file = (folder.empty() ? program / "bundle" : folder) / kFile;
@@ -187,16 +256,27 @@ BundleResult AdjustBundle(const SensorModel& sensor, BundleProblem& problem,
   }
   const BuildTable& table = internal::OpenBuildTier(file);
   if (table.adjust == nullptr) internal::Refuse(file, "adjusts no bundles");
-  return table.adjust(sensor, problem, options);
+  const Gauge gauge(problem);
+  const double extent = gauge.Extent(problem);
+  BundleResult result = table.adjust(sensor, problem, options);
+  const double factor = extent / gauge.Extent(problem);
+  if (TellsNoScale(sensor) && factor > 0.0 && factor != 1.0 && std::isfinite(factor))
+    gauge.Scale(factor, problem);
+  result.extent_before = extent;
+  result.extent_after = gauge.Extent(problem);
+  return result;
 }
 
 std::vector<std::string> Undetermined(const BundleProblem& problem, const SensorModel& sensor,
                                       const BundleResult& result) {
   std::vector<std::string> lines;
-  const bool mono = sensor.measurement().geometry.tangent < 3;
-  lines.emplace_back(
-      "gauge: the pose of the first camera is held" +
-      std::string(mono ? "; pixels tell no scale: it stays near that of the start" : ""));
+  const bool mono = TellsNoScale(sensor);
+  lines.emplace_back(mono ? "gauge: the pose of the first camera and the scale are held"
+                          : "gauge: the pose of the first camera is held");
+  if (result.extent_before > 0.0) {
+    lines.push_back("extent: " + Short(result.extent_before) + " -> " + Short(result.extent_after) +
+                    ", median distance from the first camera");
+  }
   std::vector<int> seen_by(problem.points.size()), sees(problem.cameras.size());
   for (const BundleObservation& seen : problem.observations) {
     if (!seen.used) continue;

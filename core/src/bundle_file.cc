@@ -91,6 +91,26 @@ std::string PointsCsv(const BundleFile& file) {
   return text;
 }
 
+/// How much of what was read has no part in the solution.
+void AddLeftOut(const BundleFile& file, internal::Json& json) {
+  const BundleProblem& problem = file.problem;
+  std::vector<bool> camera_used(problem.cameras.size()), point_used(problem.points.size());
+  for (const BundleObservation& seen : problem.observations) {
+    if (!seen.used) continue;
+    camera_used[static_cast<std::size_t>(seen.camera)] = true;
+    point_used[static_cast<std::size_t>(seen.point)] = true;
+  }
+  json.Key("observations_undefined")
+      .Integer(std::ranges::count(problem.observations, false, &BundleObservation::used));
+  json.Key("cameras_unused").Integer(std::ranges::count(camera_used, false));
+  json.Key("points_unused").Integer(std::ranges::count(point_used, false));
+  if (file.format != BundleFormat::kTracks) return;
+  json.Key("observations_invalid").Integer(file.invalid);
+  json.Key("frames_without_pose").Integer(file.frames_left_out);
+  json.Key("points_without_parallax").Integer(file.points_left_out);
+  json.Key("observations_of_these").Integer(file.unplaced);
+}
+
 std::string ResultJson(const BundleFile& file, const BundleResult& result, double rms_before,
                        double rms_after) {
   internal::Json json;
@@ -101,6 +121,7 @@ std::string ResultJson(const BundleFile& file, const BundleResult& result, doubl
   json.Key("cameras").Integer(std::ssize(file.problem.cameras));
   json.Key("points").Integer(std::ssize(file.problem.points));
   json.Key("observations").Integer(std::ssize(file.problem.observations));
+  AddLeftOut(file, json);
   json.Key("rms_before_px").Number(rms_before);
   json.Key("rms_after_px").Number(rms_after);
   json.Key("cost_before").Number(result.cost_before);
@@ -108,6 +129,10 @@ std::string ResultJson(const BundleFile& file, const BundleResult& result, doubl
   json.Key("iterations").Integer(result.iterations);
   json.Key("residuals").Integer(result.residuals);
   json.Key("unknowns").Integer(result.unknowns);
+  if (result.extent_before > 0.0) {
+    json.Key("extent_before").Number(result.extent_before);
+    json.Key("extent_after").Number(result.extent_after);
+  }
   if (result.rank >= 0) json.Key("rank").Integer(result.rank);
   json.End();
   return json.text();

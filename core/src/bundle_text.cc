@@ -13,7 +13,9 @@ namespace {
 constexpr std::int64_t kMost = INT32_MAX;
 /// A turn by pi about x, which is its own inverse: y up and -z ahead, or y down and z ahead.
 constexpr double kTurn[4] = {0, 1, 0, 0};
-const char* const kRadial = "{model: self_calibrating_feature, lens: radial, sigma_px: 1}";
+/// Both formats project by p = -P / P_z, whatever the sign of P_z.
+const char* const kRadial =
+    "{model: self_calibrating_feature, lens: radial, domain: projective, sigma_px: 1}";
 
 void AppendLine(std::string& text, const double* values, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) {

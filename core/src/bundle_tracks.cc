@@ -172,6 +172,7 @@ BundleFile ReadBundleTracks(const BundleTracks& from, const PluginHost& host) {
     const auto pose = poses.find(frame);
     if (pose == poses.end()) {
       ++file.frames_left_out;
+      file.unplaced += static_cast<int>(all.size());
       continue;
     }
     const int camera = static_cast<int>(problem.cameras.size());
@@ -190,6 +191,7 @@ BundleFile ReadBundleTracks(const BundleTracks& from, const PluginHost& host) {
     const auto place = Triangulate(sensor, problem, seen);
     if (!place) {
       ++file.points_left_out;
+      file.unplaced += static_cast<int>(seen.size());
       continue;
     }
     for (BundleObservation& one : seen) {

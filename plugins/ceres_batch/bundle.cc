@@ -8,6 +8,8 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <map>
 #include <memory>
 
@@ -202,9 +204,14 @@ double Bundle::StepTolerance() const {
 ceres::Solver::Options Bundle::SolverOptions() const {
   ceres::Solver::Options options;
   options.max_num_iterations = options_.max_iterations;
-  options.function_tolerance = 1e-12;
+  // A cost is a sum of squares, known to about epsilon times the root of their number.
+  const double rounding = std::numeric_limits<double>::epsilon() *
+                          std::sqrt(static_cast<double>(std::max(1, problem_.NumResiduals())));
+  options.function_tolerance = std::max(options_.function_tolerance, rounding);
   options.gradient_tolerance = 1e-12;
   options.parameter_tolerance = StepTolerance();
+  // A step that cannot be computed halves the trust region; from a far start it takes some of them.
+  options.max_num_consecutive_invalid_steps = 50;
   options.logging_type = ceres::SILENT;
   options.num_threads = 1;
   return options;

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <map>
 #include <sstream>
 
+#include "support/bal_formula.h"
 #include "support/bundles.h"
 #include "support/program.h"
 
@@ -23,7 +26,8 @@ TEST_F(BundleCli, AdjustsAndWritesTheSameFormat) {
   ASSERT_EQ(made.code, 0) << made.err;
   EXPECT_TRUE(Contains(made.out, "bal: 6 cameras, 40 points, ")) << made.out;
   EXPECT_TRUE(Contains(made.out, " converged after ")) << made.out;
-  EXPECT_TRUE(Contains(made.out, "gauge: the pose of the first camera is held")) << made.out;
+  EXPECT_TRUE(Contains(made.out, "gauge: the pose of the first camera and the scale are held\n"))
+      << made.out;
   EXPECT_TRUE(Contains(made.out, "wrote out\n  out/bundle.json\n")) << made.out;
   const Outcome again = Call({"bundle", "out/problem.txt"});
   EXPECT_EQ(again.code, 0) << again.err;
@@ -42,6 +46,18 @@ TEST_F(BundleCli, SaysWhatIsWrong) {
   EXPECT_EQ(Call({"bundle", "p.txt", "--loss", "hubert"}).code, 2);
   EXPECT_EQ(Call({"bundle", "p.txt", "--loss", "none=5"}).code, 2);
   EXPECT_EQ(Call({"bundle", "p.txt", "--camera", "c.yaml"}).code, 2);
+  EXPECT_EQ(Call({"bundle", "p.txt", "--tolerance", "-1"}).code, 2);
+  const Outcome loss = Call({"bundle", "p.txt", "--loss", "huber=1e-20"});
+  EXPECT_EQ(loss.code, 2);
+  EXPECT_TRUE(Contains(loss.err, "the scale of 'huber=1e-20' is out of bounds; expected 0.001 to"))
+      << loss.err;
+  for (const char* names : {"k1,,k2", ",", "k1,", ""}) {
+    const Outcome empty = Call({"bundle", "p.txt", "--fix", names});
+    EXPECT_EQ(empty.code, 2) << names;
+    EXPECT_TRUE(Contains(empty.err, "error: --fix: '" + std::string(names) +
+                                        "' has an empty name; expected names with a comma"))
+        << empty.err;
+  }
   Write("p.txt", BundleText(testing::TrueBundle()));
   const Outcome fix = Call({"bundle", "p.txt", "--fix", "k1,k22"});
   EXPECT_EQ(fix.code, 2);
@@ -171,10 +187,19 @@ TEST_F(BundleTracksCli, PlacesAPointThatHasAPixelWithoutARay) {
 
 TEST_F(BundleTracksCli, CountsFramesWithoutAPose) {
   Write("start.tum", Start(5, 0.0, 0.0));
-  const Outcome made = Bundle("data/tracks.csv", "start.tum");
+  const Outcome made = Bundle("data/tracks.csv", "start.tum", {"-o", "out"});
   EXPECT_EQ(made.code, 0) << made.err;
   EXPECT_TRUE(Contains(made.out, "tracks: 5 cameras, ")) << made.out;
   EXPECT_TRUE(Contains(made.out, "; 10 frames without a pose left out")) << made.out;
+  const std::string rows = Read("data/tracks.csv");
+  const Config json = Json("out/bundle.json");
+  const auto number = [&](const char* key) { return json.root().At(key).Number(); };
+  EXPECT_EQ(number("frames_without_pose"), 10.0);
+  EXPECT_EQ(number("points_without_parallax"), 0.0);
+  EXPECT_EQ(
+      number("observations") + number("observations_of_these") + number("observations_invalid"),
+      static_cast<double>(std::count(rows.begin(), rows.end(), '\n') - 1) / 2)
+      << "a row each of u and v";
   Write("start.tum", Start(5, 100.0, 0.0));
   const Outcome none = Bundle("data/tracks.csv", "start.tum");
   EXPECT_EQ(none.code, 65);
@@ -233,11 +258,12 @@ TEST_F(BundleCli, AStandardInputThatCannotBeReadIsNotEmpty) {
   EXPECT_TRUE(folder.err.starts_with("error: <stdin>: Is a directory")) << folder.err;
 }
 
-/// A point behind its only camera; one so far away that its pixels are no numbers; nothing at all.
+/// A point in the plane of its only camera; one so far away that its pixels are no numbers; nothing
+/// at all.
 TEST_F(BundleCli, RefusesAProblemOfWhichNothingIsDefined) {
   const std::string camera = "0\n0\n0\n0\n0\n0\n500\n0\n0\n";
   for (const std::string& text :
-       {"1 1 1\n0 0 1 1\n" + camera + "0.1\n0.1\n3\n",
+       {"1 1 1\n0 0 1 1\n" + camera + "0.1\n0.1\n0\n",
         "1 1 1\n0 0 1 1\n" + camera + "1e200\n0.1\n-3\n", std::string("0 0 0\n")}) {
     Write("p.txt", text);
     const Outcome made = Call({"bundle", "p.txt"});
@@ -246,6 +272,89 @@ TEST_F(BundleCli, RefusesAProblemOfWhichNothingIsDefined) {
         << made.err;
     EXPECT_EQ(std::count(made.err.begin(), made.err.end(), '\n'), 2) << made.err;
   }
+}
+
+/// One observation in four is of a point behind its camera; the formula of BAL says what they cost.
+TEST_F(BundleCli, CountsAllObservationsOfABalFile) {
+  BundleFile file = testing::BundleOnBothSides();
+  testing::Disturb(file.problem);
+  Write("p.txt", BundleText(file));
+  const Outcome made = Call({"bundle", "p.txt", "-o", "out"});
+  EXPECT_EQ(made.code, 0) << made.err;
+  EXPECT_FALSE(Contains(made.out, "left out")) << made.out;
+  const Config json = Json("out/bundle.json");
+  const auto number = [&](const char* key) { return json.root().At(key).Number(); };
+  EXPECT_EQ(number("residuals"), 2.0 * static_cast<double>(file.problem.observations.size()));
+  EXPECT_EQ(number("observations_undefined"), 0.0);
+  EXPECT_EQ(number("points_unused"), 0.0);
+  std::istringstream before(Read("p.txt")), after(Read("out/problem.txt"));
+  EXPECT_NEAR(number("rms_before_px"), testing::BalFormula(before).Rms(), 1e-9);
+  EXPECT_NEAR(number("rms_after_px"), testing::BalFormula(after).Rms(), 1e-9);
+  EXPECT_LT(number("rms_after_px"), std::sqrt(0.5)) << "the noise";
+}
+
+/// A second point lies in the plane of the camera: it has no pixel, and is counted.
+TEST_F(BundleCli, CountsWhatIsLeftOut) {
+  Write("p.txt", "1 2 2\n0 0 1 1\n0 1 1 1\n0\n0\n0\n0\n0\n0\n500\n0\n0\n0.1\n0.1\n-3\n1\n1\n0\n");
+  const Outcome made = Call({"bundle", "p.txt", "-o", "out"});
+  EXPECT_EQ(made.code, 0) << made.err;
+  EXPECT_TRUE(Contains(made.out,
+                       "2 observations; 1 left out, not defined or not finite at the "
+                       "start: in the camera's plane"))
+      << made.out;
+  const Config json = Json("out/bundle.json");
+  EXPECT_EQ(json.root().At("observations").Number(), 2.0);
+  EXPECT_EQ(json.root().At("observations_undefined").Number(), 1.0);
+  EXPECT_EQ(json.root().At("points_unused").Number(), 1.0);
+  EXPECT_EQ(json.root().At("cameras_unused").Number(), 0.0);
+}
+
+TEST_F(BundleCli, HoldsTheScale) {
+  BundleFile file = testing::TrueBundle();
+  testing::AddOutliers(file.problem);
+  testing::Disturb(file.problem);
+  Write("p.txt", BundleText(file));
+  const auto extent = [&](const std::string& folder, const Arguments& more) {
+    Arguments all = {"bundle", "p.txt", "-o", folder};
+    all.insert(all.end(), more.begin(), more.end());
+    Call(all);
+    std::istringstream rows(Read(folder + "/poses.tum"));
+    std::vector<std::array<double, 3>> positions;
+    std::string line;
+    while (std::getline(rows, line)) {
+      double t = 0.0;
+      auto& p = positions.emplace_back();
+      std::istringstream(line) >> t >> p[0] >> p[1] >> p[2];
+    }
+    return testing::MedianDistance(positions);
+  };
+  const double before = extent("start", {"--iterations", "0"});
+  EXPECT_NEAR(extent("out", {}) / before, 1.0, 1e-12);
+  EXPECT_NEAR(Json("out/bundle.json").root().At("extent_after").Number() / before, 1.0, 1e-12);
+}
+
+/// The derivative of this pixel by k2 is beyond all numbers. Ceres writes half a page of it.
+TEST_F(BundleCli, TellsInItsOwnWordsWhatTheSolverSays) {
+  Write("p.txt", "1 1 1\n0 0 1 1\n0\n0\n0\n0\n0\n0\n500\n0\n0\n1e80\n0.1\n-1\n");
+  const Outcome made = Call({"bundle", "p.txt", "-o", "out"});
+  EXPECT_EQ(made.code, 79);
+  EXPECT_EQ(made.err, "error: p.txt: Residual and Jacobian evaluation failed.\n");
+  EXPECT_FALSE(Exists("out"));
+}
+
+TEST_F(BundleCli, ConvergesUnderALoss) {
+  BundleFile file = testing::BundleOnBothSides();
+  testing::AddOutliers(file.problem);
+  testing::Disturb(file.problem);
+  Write("p.txt", BundleText(file));
+  const auto iterations = [&](const Arguments& more) {
+    Arguments all = {"bundle", "p.txt", "-o", "out", "--force", "--loss", "huber=0.001"};
+    all.insert(all.end(), more.begin(), more.end());
+    const Outcome made = Call(all);
+    EXPECT_EQ(made.code, 0) << made.err;
+    return Json("out/bundle.json").root().At("iterations").Number();
+  };
+  EXPECT_LT(iterations({"--tolerance", "1e-4"}), iterations({}));
 }
 
 }  // namespace

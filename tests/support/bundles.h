@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "alidade/bundle_file.h"
 #include "alidade/geometry.h"
@@ -43,6 +46,61 @@ inline BundleFile TrueBundle(int cameras = 6, int points = 40) {
     }
   }
   return file;
+}
+
+/// Cameras side by side that have points in front of them and, one in four, behind them: seen with
+/// a noise of about half a pixel, the same in every run. Of BAL, whose camera is projective.
+inline BundleFile BundleOnBothSides(int cameras = 8, int points = 60) {
+  BundleFile file;
+  BundleProblem& problem = file.problem;
+  problem.sensor =
+      "{model: self_calibrating_feature, lens: radial, domain: projective, sigma_px: 1}";
+  for (int i = 0; i < points; ++i) {
+    const double side = i % 4 == 0 ? -1.0 : 1.0;
+    problem.points.push_back(
+        {3.0 * Wave(3 * i), 3.0 * Wave(3 * i + 1), side * (8.0 + Wave(3 * i + 2))});
+  }
+  const SelfCalibratingFeature<RadialLens> sensor(1.0, true);
+  int noise = 1000;
+  for (int i = 0; i < cameras; ++i) {
+    BundleCamera camera;
+    const double d[3] = {0.1 * Wave(7 * i), 0.1 * Wave(7 * i + 1), 0.1 * Wave(7 * i + 2)};
+    for (int k = 0; k < 3; ++k)
+      camera.position[static_cast<std::size_t>(k)] = 1.5 * Wave(7 * i + 3 + k);
+    UnitQuaternion::Exp(d, camera.orientation.data());
+    camera.intrinsics = i;
+    problem.cameras.push_back(camera);
+    problem.intrinsics.push_back({500.0 + i, -0.05, 0.01});
+    for (int k = 0; k < points; ++k) {
+      if ((i + k) % 5 == 0) continue;
+      BundleObservation seen{i, k, {}, true};
+      if (!sensor.Predict(camera.position.data(), camera.orientation.data(),
+                          problem.intrinsics.back().data(),
+                          problem.points[static_cast<std::size_t>(k)].data(), seen.z.data()))
+        continue;
+      for (std::size_t c = 0; c < 2; ++c) seen.z[c] += Wave(++noise);
+      problem.observations.push_back(seen);
+    }
+  }
+  return file;
+}
+
+/// Every 17th observation 80 px aside.
+inline void AddOutliers(BundleProblem& problem) {
+  for (std::size_t i = 0; i < problem.observations.size(); i += 17)
+    problem.observations[i].z[0] += 80.0;
+}
+
+/// Median distance of the other cameras from the first.
+inline double MedianDistance(const std::vector<std::array<double, 3>>& positions) {
+  std::vector<double> distances;
+  for (std::size_t i = 1; i < positions.size(); ++i) {
+    distances.push_back(std::hypot(positions[i][0] - positions[0][0],
+                                   positions[i][1] - positions[0][1],
+                                   positions[i][2] - positions[0][2]));
+  }
+  std::ranges::sort(distances);
+  return distances[distances.size() / 2];
 }
 
 /// Cameras but the first, and points, moved by about 5 cm, 0.01 rad and 1 % of the focal length.

@@ -41,8 +41,15 @@ struct BundleProblem {
   std::vector<BundleObservation> observations;
 };
 
+/// The scales of a robust loss that an adjustment accepts, in standard deviations. Below them all
+/// residuals lie beyond the scale and the gradient vanishes; above them none does.
+inline constexpr double kBundleLossScaleMin = 1e-3, kBundleLossScaleMax = 1e6;
+
 struct BundleOptions {
   int max_iterations = 500;
+  /// Converged where a step changes the cost by no more than this fraction. A change within the
+  /// rounding of the cost counts as none, whatever the tolerance.
+  double function_tolerance = 1e-8;
   RobustLoss loss;
   std::vector<std::string> fixed;     ///< elements of the intrinsics, or `intrinsics`: all of them
   std::function<bool()> stop;         ///< true: end after the iteration
@@ -61,6 +68,9 @@ struct BundleResult {
   double cost_before = 0.0, cost_after = 0.0;
   int residuals = 0;  ///< scalars
   int unknowns = 0;   ///< tangent elements that were estimated, the held first pose left out
+  /// Median distance from the first camera to the other cameras, or where these stand at one place
+  /// to the points, of those used; 0: there is none.
+  double extent_before = 0.0, extent_after = 0.0;
   /// Of the Jacobian at the solution; -1: of more than kBundleRankUnknowns, or where that has no
   /// finite one.
   int rank = -1;
@@ -86,8 +96,9 @@ std::vector<bool> FixedElements(const SensorModel& sensor, const std::vector<std
 /// The sensor that `problem` names. Errors: kPlugin, kBadConfig.
 SensorModel BundleSensor(const PluginHost& host, const BundleProblem& problem);
 
-/// Leaves out, by BundleObservation::used, what the sensor is not defined for where the problem
-/// stands (a point behind its camera), and where |z (-) h|^2 is not finite; returns how many.
+/// Leaves out, by BundleObservation::used, the observations for which the sensor is not defined at
+/// the problem's values (a point behind its camera; for a projective camera, in its plane), and
+/// those whose |z (-) h|^2 is not finite. Returns how many.
 int LeaveOutUndefined(const SensorModel& sensor, BundleProblem& problem);
 
 /// Errors of the observations used, all measured values alike:
@@ -98,10 +109,12 @@ int LeaveOutUndefined(const SensorModel& sensor, BundleProblem& problem);
 double BundleRms(const SensorModel& sensor, const BundleProblem& problem);
 
 /// Moves cameras, points and, but for what is fixed, intrinsics of `problem` to the minimum. The
-/// pose of the first camera that is used stays. Done by the plugin of the Ceres solver, which is
-/// loaded when it is first asked for, from `folder`, or where that is "" from beside the library.
+/// pose of the first camera that is used stays. If the sensor measures two numbers, which cannot
+/// determine the scale, cameras and points are scaled about the first camera after the solution, so
+/// that the extent (BundleResult) is that of the start. Done by the plugin of the Ceres solver,
+/// loaded when it is first asked for, from `folder`, or if that is "" from beside the library.
 /// Errors: kPlugin where there is none, kNotTrusted; kBadData where no observation is used; kUsage
-/// as FixedElements.
+/// as FixedElements, and for a scale of the loss out of its bounds.
 BundleResult AdjustBundle(const SensorModel& sensor, BundleProblem& problem,
                           const BundleOptions& options, const std::filesystem::path& folder = {});
 

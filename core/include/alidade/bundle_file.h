@@ -48,7 +48,8 @@ struct BundleFile {
   std::vector<Stamp> stamps;             ///< tracks: of the cameras; else empty
   int points_left_out = 0;               ///< tracks: without a place that their rays agree on
   int frames_left_out = 0;               ///< tracks: frames without a pose
-  int invalid = 0;  ///< tracks: observations that the sensor finds invalid, left out
+  int unplaced = 0;  ///< tracks: observations of these points and frames, left out
+  int invalid = 0;   ///< tracks: observations that the sensor finds invalid, left out
 };
 
 /// Reads a problem in the format that the file's beginning shows: bal, bundler or libmv; `-` is
@@ -81,7 +82,7 @@ std::string BundleText(const BundleFile& file);
 ///   poses.tum    t x y z qx qy qz qw, world_from_cam; t in s, or the number of the camera; not of
 ///                cameras that are not registered
 ///   points.csv   point,x,y,z
-///   bundle.json  what became of it, as AdjustBundle gives it
+///   bundle.json  the result of AdjustBundle, and how much was left out of what was read
 ///
 /// It appears when all is written; one that is there is replaced where `force`. Made before the
 /// problem is solved, it tells in time what is in its way, and keeps others from its place.

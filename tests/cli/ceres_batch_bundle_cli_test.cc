@@ -342,6 +342,18 @@ TEST_F(BundleCli, TellsInItsOwnWordsWhatTheSolverSays) {
   EXPECT_FALSE(Exists("out"));
 }
 
+/// On the way more than five steps in a row cannot be computed; a smaller trust region mends that.
+TEST_F(BundleCli, GoesOnAfterStepsThatCannotBeComputed) {
+  for (const int points : {28, 36}) {
+    BundleFile file = testing::BundleOnBothSides(3, points);
+    testing::AddOutliers(file.problem);
+    testing::Disturb(file.problem);
+    Write("p.txt", BundleText(file));
+    const Outcome made = Call({"bundle", "p.txt", "--loss", "cauchy=0.1", "--tolerance", "0"});
+    EXPECT_EQ(made.code, 0) << made.out << made.err;
+  }
+}
+
 TEST_F(BundleCli, ConvergesUnderALoss) {
   BundleFile file = testing::BundleOnBothSides();
   testing::AddOutliers(file.problem);

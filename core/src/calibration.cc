@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration.h"
 
-#include "alidade/calibration.h"
+#include <optional>
 
 namespace alidade::internal {
 namespace {
@@ -20,15 +20,12 @@ Config WithCalibration(const Config& config, const Source& source) {
   if (const auto written = root.Find("calibration")) {
     written->Fail("not a key of a config: calibration comes from the data", "'camera'");
   }
-  const auto* const data = dynamic_cast<const CalibratedData*>(&source);
   const auto use = root.At("source").Find("calibration");
-  if (use && data == nullptr) {
-    use->Fail("this source brings no calibration", "no such key");
-  }
-  if (data == nullptr || (use && use->Choice({"use", "ignore"}) == 1)) return config;
-  const Config calibration = data->Calibration();
-  if (calibration.root().At("calibration").Entries().empty()) return config;
-  Config with = config.Merged(calibration.root());
+  if (use && use->Choice({"use", "ignore"}) == 1) return config;
+  const std::optional<Config> calibration = source.Calibration();
+  if (use && !calibration) use->Fail("this source brings no calibration", "no such key");
+  if (!calibration) return config;
+  Config with = config.Merged(calibration->root());
   ReadAll(with.root().At("calibration"));
   return with;
 }

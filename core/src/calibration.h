@@ -8,7 +8,7 @@ namespace alidade::internal {
 
 /// The config with the calibration that the data of its source bring, below the root key
 /// `calibration`, where models find it (ParamReader); the config itself where they bring none, or
-/// where `source.calibration` is `ignore`. Errors: kBadConfig, those of CalibratedData.
+/// where `source.calibration` is `ignore`. Errors: kBadConfig, those of Source::Calibration.
 Config WithCalibration(const Config& config, const Source& source);
 
 }  // namespace alidade::internal

@@ -8,7 +8,6 @@
 #include <string_view>
 #include <vector>
 
-#include "alidade/calibration.h"
 #include "alidade/line_reader.h"
 #include "alidade/source.h"
 #include "alidade/text_cell.h"
@@ -28,7 +27,7 @@ namespace alidade {
 /// Keys         kCsvKeys in csv_layout.h.
 /// Errors       kBadData with file, line and column of the first cell that is wrong; kInputMissing;
 ///              kIo where the file changes while it is read; kBadConfig.
-class CsvSource : public Source, public CalibratedData {
+class CsvSource : public Source {
  public:
   explicit CsvSource(const SourceArguments& arguments)
       : layout_(ReadCsvLayout(arguments.entry)),
@@ -44,7 +43,7 @@ class CsvSource : public Source, public CalibratedData {
   const std::vector<StreamInfo>& truths() const override { return truths_; }
   std::int64_t size() const override { return size_; }
   Place place() const override { return {reader_.name(), reader_.number(), 0}; }
-  Config Calibration() const override { return calibration_.Get(); }
+  std::optional<Config> Calibration() const override { return calibration_.Get(); }
 
   bool Next(Frame& frame) override {
     if (!NextRow()) {

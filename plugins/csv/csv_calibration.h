@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -36,8 +37,9 @@ class CsvCalibration {
     }
   }
 
-  /// As of CalibratedData. Errors: kBadData where a value is no number, or is there twice.
-  Config Get() const {
+  /// As of Source::Calibration. Errors: kBadData where a value is no number, or is there twice.
+  std::optional<Config> Get() const {
+    if (notes_.empty()) return std::nullopt;
     Config config = Config::FromText("calibration: {}", "the comments of a table");
     for (const Written& note : notes_) {
       double value = 0.0;

@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "alidade/calibration.h"
 #include "alidade/source.h"
 #include "beside.h"
 #include "calibration_file.h"
@@ -46,7 +45,7 @@ inline constexpr const char* kTracksKeys =
 /// Keys         kTracksKeys.
 /// Errors       kBadData with file, line and column of the first thing that is wrong;
 ///              kInputMissing; kIo where a file changes while it is read; kBadConfig.
-class Tracks : public Source, public CalibratedData {
+class Tracks : public Source {
  public:
   explicit Tracks(const SourceArguments& arguments) : options_(arguments.params) {
     for (const char* key : {"path", "state"}) arguments.entry.Declare(key);
@@ -58,9 +57,9 @@ class Tracks : public Source, public CalibratedData {
   const std::vector<StreamInfo>& streams() const override { return streams_; }
   const std::vector<StreamInfo>& truths() const override { return truths_; }
   Place place() const override { return tracks_->place(); }
-  Config Calibration() const override {
-    return calibration_ ? CalibrationFile::Read(*calibration_)
-                        : Config::FromText("calibration: {}", "tracks");
+  std::optional<Config> Calibration() const override {
+    if (!calibration_) return std::nullopt;
+    return CalibrationFile::Read(*calibration_);
   }
 
   bool Next(Frame& frame) override {

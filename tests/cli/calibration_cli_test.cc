@@ -223,7 +223,7 @@ TEST_F(CalibrationCli, ACalibrationThatIsNotUnderstoodIsRefused) {
 }
 
 TEST_F(CalibrationCli, ASourceWithoutCalibrationRefusesTheKey) {
-  const Outcome outcome = Run("config.yaml", "source.calibration=ignore");
+  const Outcome outcome = Run("config.yaml", "source.calibration=use");
   EXPECT_EQ(outcome.code, 78);
   EXPECT_TRUE(Contains(outcome.err, "source.calibration: this source brings no calibration"))
       << outcome.err;

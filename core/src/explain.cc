@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "alidade/statistics.h"
@@ -197,6 +198,24 @@ std::string Touches(const System& system) {
   return TextTable(rows, kIndent);
 }
 
+/// "target.depth together with target.depth_rate"
+std::string DirectionText(const std::vector<std::string>& names) {
+  const std::string rest = Join({names.begin() + 1, names.end()});
+  return names[0] + (rest.empty() ? "" : " together with " + rest);
+}
+
+/// A line for each direction that is observable, but not while the control inputs are constant.
+std::string NeedExcitation(const System& system,
+                           const std::vector<std::vector<std::string>>& unobservable) {
+  const auto constant = internal::UnobservableDirections(system, internal::Excitation::kConstant);
+  std::string text;
+  for (const auto& names : std::set(constant.begin(), constant.end())) {
+    if (std::ranges::count(unobservable, names) > 0) continue;
+    text += "  observable only while the control input changes: " + DirectionText(names) + '\n';
+  }
+  return text;
+}
+
 std::string Unobservable(const System& system) {
   if (system.landmarks && !internal::PlaceLandmarks(system)) {
     return "  what can be observed depends on the landmarks\n";
@@ -205,13 +224,13 @@ std::string Unobservable(const System& system) {
     return "  what can be observed is not looked into: the state has more than " +
            std::to_string(internal::kMostObserved) + " elements\n";
   }
+  const std::vector<std::vector<std::string>> unobservable = UnobservableDirections(system);
   std::map<std::vector<std::string>, int> directions;
-  for (const auto& names : UnobservableDirections(system)) ++directions[names];
-  if (directions.empty()) return "  every direction of the state can be observed\n";
+  for (const auto& names : unobservable) ++directions[names];
   std::string text;
+  if (directions.empty()) text = "  every direction of the state can be observed\n";
   for (const auto& [names, count] : directions) {
-    text += "  cannot be observed: " + names[0];
-    if (names.size() > 1) text += " together with " + Join({names.begin() + 1, names.end()});
+    text += "  cannot be observed: " + DirectionText(names);
     text += " (" + std::to_string(count) + (count == 1 ? " direction)\n" : " directions)\n");
     if (names[0] == "scale") {
       text +=
@@ -219,7 +238,7 @@ std::string Unobservable(const System& system) {
           "odometry\n    or known landmarks tell it\n";
     }
   }
-  return text;
+  return text + NeedExcitation(system, unobservable);
 }
 
 std::string GateText(const EkfOptions& options, const System& system) {

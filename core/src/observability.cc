@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/random.h"
 #include "observed_landmarks.h"
 
 namespace alidade {
@@ -54,20 +55,25 @@ Trajectory StartNearPrior(const System& system) {
   return t;
 }
 
-/// A control input of no special value; empty where the model takes none.
-std::vector<double> GenericInput(const MotionModel& model) {
+/// A control input of no special value, each element times a random factor from 1/4 to 7/4 if there
+/// is a generator; empty where the model takes none.
+std::vector<double> GenericInput(const MotionModel& model, Random* random) {
   if (!model.has_input()) return {};
   const Geometry& geometry = model.input().geometry;
   std::vector<double> input(static_cast<std::size_t>(geometry.ambient));
   std::vector<double> nudge(static_cast<std::size_t>(geometry.tangent));
-  for (std::size_t i = 0; i < nudge.size(); ++i) nudge[i] = 1.0 + 0.1 * static_cast<double>(i % 7);
+  for (std::size_t i = 0; i < nudge.size(); ++i) {
+    nudge[i] = 1.0 + 0.1 * static_cast<double>(i % 7);
+    if (random != nullptr) nudge[i] *= 0.25 + 1.5 * random->Uniform();
+  }
   geometry.Identity(input.data());
   geometry.Plus(input.data(), nudge.data(), input.data());
   return input;
 }
 
 /// Moves the values by dt and phi <- F phi. False where a model cannot step.
-bool Advance(const System& system, double dt_s, Trajectory& t, Eigen::MatrixXd& phi) {
+bool Advance(const System& system, double dt_s, Random* random, Trajectory& t,
+             Eigen::MatrixXd& phi) {
   for (const MotionBinding& motion : system.motions) {
     const int n = motion.model.tangent_size();
     std::vector<const double*> x;
@@ -79,7 +85,7 @@ bool Advance(const System& system, double dt_s, Trajectory& t, Eigen::MatrixXd& 
     }
     for (auto& value : next) y.push_back(value.data());
     RowMajor f(n, n), g(n, std::max(1, motion.model.noise_size()));
-    const std::vector<double> u = GenericInput(motion.model);
+    const std::vector<double> u = GenericInput(motion.model, random);
     if (motion.model.Step(x.data(), u.data(), nullptr, dt_s, y.data(), f.data(), g.data()) !=
         Status::kOk) {
       return false;
@@ -232,7 +238,8 @@ bool internal::ObservabilityIsTold(const System& system) {
   return size <= internal::kMostObserved;
 }
 
-std::vector<std::vector<std::string>> UnobservableDirections(const System& given) {
+std::vector<std::vector<std::string>> internal::UnobservableDirections(const System& given,
+                                                                       Excitation excitation) {
   const auto with = internal::PlaceLandmarks(given);
   if ((given.landmarks && !with) || !internal::ObservabilityIsTold(given)) return {};
   const System& system = with ? with->system : given;
@@ -245,12 +252,15 @@ std::vector<std::vector<std::string>> UnobservableDirections(const System& given
   Eigen::MatrixXd phi = Eigen::MatrixXd::Identity(n, n);
   RowSpace rows(n);
   if (with) AddKnown(*with, t, rows);
-  // Once a step adds nothing to the rank, later ones do not either; twice, as trajectories turn.
+  Random random(1);
+  Random* const changing = excitation == Excitation::kChanging ? &random : nullptr;
+  // Once a step adds nothing to the rank, later ones do not either: what holds from this state and
+  // for these inputs, which are not special, holds from the next ones. Twice, as trajectories turn.
   for (int idle = 0; idle < kIdleSteps && rows.rank() < n;) {
     const Eigen::Index before = rows.rank();
     Observe(system, t, phi, rows);
     idle = rows.rank() == before ? idle + 1 : 0;
-    if (!Advance(system, kStep, t, phi)) break;
+    if (!Advance(system, kStep, changing, t, phi)) break;
   }
   if (rows.rank() == n) return {};
   Eigen::MatrixXd null_space = rows.Complement();
@@ -268,6 +278,10 @@ std::vector<std::vector<std::string>> UnobservableDirections(const System& given
     if (!with || names.front() != internal::kLandmarks) directions.push_back(std::move(names));
   }
   return directions;
+}
+
+std::vector<std::vector<std::string>> UnobservableDirections(const System& system) {
+  return internal::UnobservableDirections(system, internal::Excitation::kChanging);
 }
 
 }  // namespace alidade

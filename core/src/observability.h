@@ -13,4 +13,12 @@ inline constexpr int kMostObserved = 500;
 /// UnobservableDirections gives none.
 bool ObservabilityIsTold(const System& system);
 
+/// Whether control inputs change from step to step. A direction that only a change shows, such as
+/// the orientation of a body about its specific force, is unobservable under constant ones.
+enum class Excitation { kChanging, kConstant };
+
+/// As alidade::UnobservableDirections, which has changing inputs.
+std::vector<std::vector<std::string>> UnobservableDirections(const System& system,
+                                                             Excitation excitation);
+
 }  // namespace alidade::internal

@@ -5,7 +5,7 @@
 
 #include "alidade/model.h"
 
-/// The smallest model with a control input, for tests.
+/// Small models with a control input, and sensors for them, for tests.
 namespace alidade::testing {
 
 /// A position on a line, driven by its velocity.
@@ -30,6 +30,93 @@ struct Driven : Motion<1, Vec<1>> {
   }
   void SqrtQ(double dt_s, MatrixRef l) const {
     l(0, 0) = dt_s > 0.0 ? sigma / std::sqrt(dt_s) : 0.0;
+  }
+};
+
+/// A body driven by its accelerometer, its orientation unknown but for a prior.
+///
+///   model      p' = p + v dt,  v' = v + (R(q) u + g) dt,  q' = q Exp(w sqrt(dt))
+///
+///   symbol     shape  unit   frame  meaning
+///   p, v       3      m, m/s world  position, velocity
+///   q          4      -      -      world_from_body
+///   u          3      m/s^2  body   specific force, the control input
+///   g          3      m/s^2  world  gravity
+struct Accelerated : Motion<3, Vec<3>, Vec<3>, UnitQuaternion> {
+  static constexpr std::array kBlocks{Quantity{"position", "m", "", "x,y,z"},
+                                      Quantity{"velocity", "m/s", "", "x,y,z"},
+                                      Quantity{"orientation", "", "", "w,x,y,z"}};
+  using Input = Vec<3>;
+  static constexpr Quantity kInput{"specific_force", "m/s^2", "", "x,y,z"};
+  template <class T>
+  void Step(const T* p, const T* v, const T* q, const T* u, const T* w, double dt_s, T* p1, T* v1,
+            T* q1) const {
+    constexpr double kGravity[3] = {0.0, 0.0, -9.81};
+    T force[3], turn[3];
+    UnitQuaternion::Rotate(q, u, force);
+    for (int i = 0; i < 3; ++i) {
+      p1[i] = p[i] + v[i] * dt_s;
+      v1[i] = v[i] + (force[i] + kGravity[i]) * dt_s;
+      turn[i] = w[i];
+    }
+    UnitQuaternion::Plus(q, turn, q1);
+  }
+  void SqrtQ(double dt_s, MatrixRef l) const {
+    for (int i = 0; i < 3; ++i) l(i, i) = 0.01 * std::sqrt(dt_s);
+  }
+};
+
+/// z = x + n
+struct Position3 : Sensor<Vec<3>, Vec<3>> {
+  static constexpr std::array kRoles{Quantity{"position", "", "", "x,y,z"}};
+  static constexpr Quantity kMeasurement{"position", "", "", "x,y,z"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    for (int i = 0; i < 3; ++i) z[i] = x[i];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    for (int i = 0; i < 3; ++i) l[4 * i] = T(0.1);
+  }
+};
+
+/// A vehicle in the plane driven by its odometry, with a mast on it.
+///
+///   model      p' = p + v (cos h, sin h) dt,  h' = h + omega dt + w sqrt(dt),  mast' = mast
+struct Unicycle : Motion<1, Vec<2>, Angle, Vec<2>> {
+  static constexpr std::array kBlocks{Quantity{"position", "m", "", "x,y"},
+                                      Quantity{"heading", "rad"},
+                                      Quantity{"mast", "m", "in the vehicle", "x,y"}};
+  using Input = Vec<2>;
+  static constexpr Quantity kInput{"velocities", "", "m/s and rad/s", "v,omega"};
+  template <class T>
+  void Step(const T* p, const T* h, const T* mast, const T* u, const T* w, double dt_s, T* p1,
+            T* h1, T* mast1) const {
+    using std::cos, std::sin;
+    p1[0] = p[0] + u[0] * cos(h[0]) * dt_s;
+    p1[1] = p[1] + u[0] * sin(h[0]) * dt_s;
+    h1[0] = h[0] + u[1] * dt_s + w[0];
+    for (int i = 0; i < 2; ++i) mast1[i] = mast[i];
+  }
+  void SqrtQ(double dt_s, MatrixRef l) const { l(0, 0) = 0.01 * std::sqrt(dt_s); }
+};
+
+/// z = p + R(h) mast + n: a receiver of satellites on the mast.
+struct OnMast : Sensor<Vec<2>, Vec<2>, Angle, Vec<2>> {
+  static constexpr std::array kRoles{Quantity{"position", "m", "", "x,y"},
+                                     Quantity{"heading", "rad"}, Quantity{"mast", "m", "", "x,y"}};
+  static constexpr Quantity kMeasurement{"fix", "m", "", "x,y"};
+  template <class T>
+  bool Predict(const T* p, const T* h, const T* mast, T* z) const {
+    using std::cos, std::sin;
+    z[0] = p[0] + cos(h[0]) * mast[0] - sin(h[0]) * mast[1];
+    z[1] = p[1] + sin(h[0]) * mast[0] + cos(h[0]) * mast[1];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, const T*, T* l) const {
+    l[0] = l[3] = T(0.1);
   }
 };
 

@@ -118,6 +118,14 @@ bool MayRunInParallel(const PluginHost& host) {
 }  // namespace
 
 SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptions& options) {
+  if (options.runs > 1 && !internal::UsesSeed(config, host, options.first_seed)) {
+    internal::FailUnseeded(config);
+  }
+  return internal::SweepSeeds(config, host, options);
+}
+
+SweepResult internal::SweepSeeds(const Config& config, const PluginHost& host,
+                                 const SweepOptions& options) {
   ALIDADE_EXPECTS(options.runs > 0 && options.jobs >= 0);
   ALIDADE_EXPECTS(options.shard >= 1 && options.shard <= options.shards);
   SweepResult result;

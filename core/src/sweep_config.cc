@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sweep_config.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <optional>
 #include <system_error>
@@ -21,6 +22,50 @@ void CheckReadableAgain(const Config& config) {
   if (path->Text() != "-" && file) return;
   path->Fail("'" + path->Text() + "' can be read once, but a sweep reads it for every run",
              "a regular file");
+}
+
+namespace {
+
+Config WithSeed(const Config& config, std::uint64_t seed) {
+  Config copy = Copy(config);
+  copy.Set("source.seed", std::to_string(seed), "--first-seed");
+  return copy;
+}
+
+bool AreEqual(const Frame& a, const Frame& b) {
+  const auto same = [](const Measurement& m, const Measurement& n) {
+    return m.stamp == n.stamp && m.stream == n.stream && m.landmark == n.landmark &&
+           m.values == n.values && m.covariance == n.covariance;
+  };
+  return a.stamp == b.stamp && a.truth == b.truth &&
+         std::ranges::equal(a.measurements, b.measurements, same);
+}
+
+}  // namespace
+
+bool UsesSeed(const Config& config, const PluginHost& host, std::uint64_t seed) {
+  CheckReadableAgain(config);
+  const Config first = WithSeed(config, seed), second = WithSeed(config, seed + 1);
+  const Experiment one = BuildExperiment(first, host), another = BuildExperiment(second, host);
+  Frame a, b;
+  try {
+    for (;;) {
+      const bool more = one.source->Next(a);
+      if (more != another.source->Next(b)) return true;
+      if (!more) return false;
+      if (!AreEqual(a, b)) return true;
+    }
+  } catch (const Error&) {
+    return true;  // the runs report it
+  }
+}
+
+void FailUnseeded(const Config& config) {
+  const Config copy = Copy(config);
+  const Node type = copy.root().At("source").At("type");
+  type.Fail(
+      "source '" + type.Text() + "' gives the same data for every seed: all runs would be equal",
+      "one run, or a source that draws its data from the seed");
 }
 
 }  // namespace alidade::internal

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "alidade/config.h"
+#include <cstdint>
+
+#include "alidade/sweep.h"
 
 /// The configs of a sweep's runs.
 namespace alidade::internal {
@@ -12,5 +14,15 @@ Config Copy(const Config& config);
 /// Refuses a source that the second run would find empty: standard input, or a pipe. Error:
 /// kBadConfig.
 void CheckReadableAgain(const Config& config);
+
+/// Whether the source of `config` gives other data for `seed` than for the next one, by reading both
+/// up to their first difference. A source whose data have an error counts as one that does.
+bool UsesSeed(const Config& config, const PluginHost& host, std::uint64_t seed);
+
+/// Says that it does not. Error: kBadConfig.
+[[noreturn]] void FailUnseeded(const Config& config);
+
+/// As Sweep(), for data that depend on the seed or not.
+SweepResult SweepSeeds(const Config& config, const PluginHost& host, const SweepOptions& options);
 
 }  // namespace alidade::internal

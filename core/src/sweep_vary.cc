@@ -124,6 +124,12 @@ VariedSweep SweepOver(const Config& config, const PluginHost& host, const SweepO
   ALIDADE_EXPECTS(!variation.values.empty());
   CheckKey(ConfigWith(config, "alidade", "1"), variation.key);
   CheckValues(config, host, variation);
+  const auto uses_seed = [&](const std::string& value) {
+    return internal::UsesSeed(ConfigWith(config, variation.key, value), host, options.first_seed);
+  };
+  if (options.runs > 1 && std::ranges::none_of(variation.values, uses_seed)) {
+    internal::FailUnseeded(ConfigWith(config, variation.key, variation.values.front()));
+  }
   VariedSweep sweep{variation, {}};
   SweepOptions each = options;
   for (const std::string& value : variation.values) {
@@ -134,7 +140,8 @@ VariedSweep SweepOver(const Config& config, const PluginHost& host, const SweepO
         options.progress(before * total + done, values * total);
       };
     }
-    sweep.results.push_back(Sweep(ConfigWith(config, variation.key, value), host, each));
+    const Config with = ConfigWith(config, variation.key, value);
+    sweep.results.push_back(internal::SweepSeeds(with, host, each));
     if (sweep.stopped()) break;
   }
   return sweep;

@@ -235,6 +235,26 @@ TEST_F(SweepCli, ValuesAreReadWithoutTheBlanksAroundThem) {
   EXPECT_TRUE(Contains(twice.err, "has the value '1' twice")) << twice.err;
 }
 
+// A table has the same rows for every seed: its runs would be one run over and over.
+TEST_F(SweepCli, RefusesSeveralRunsOverDataThatNoSeedChanges) {
+  Write("table.csv", "t_s,d\n0,80\n0.1,81\n");
+  const Arguments several = {"sweep", "table.yaml", "--runs", "3", "-o", "out"};
+  const Outcome sweep = Call(several);
+  EXPECT_EQ(sweep.code, 78);
+  EXPECT_TRUE(Contains(sweep.err,
+                       "source 'csv' gives the same data for every seed: all runs would be equal; "
+                       "expected one run, or a source that draws its data from the seed"))
+      << sweep.err;
+  Arguments varied = several;
+  varied.insert(varied.end(), {"--vary", "sensors.stereo.sigma_px=1,2"});
+  EXPECT_EQ(Call(varied).code, 78);
+  varied[3] = "1";
+  EXPECT_EQ(Call(varied).code, 0);
+  const Outcome compared = Call({"compare", "table.yaml", "--runs", "3", "-o", "compared"});
+  EXPECT_EQ(compared.code, 78);
+  EXPECT_TRUE(Contains(compared.err, "gives the same data for every seed")) << compared.err;
+}
+
 TEST_F(SweepCli, FailuresOfAVariedSweepNameTheirValue) {
   Write("table.csv", "t_s,d\n0,80\n0.1,none\n");
   const Outcome sweep = Call(

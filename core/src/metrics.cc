@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "alidade/geometry.h"
 #include "alidade/similarity.h"
@@ -24,6 +25,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kInconsistentSigmas = 10.0;
 constexpr int kInconsistentStamps = 20;
 constexpr double kFarSigmas = 100.0;
+constexpr double kFarAngleSigmas = 5.0;
 constexpr std::size_t kOutcomes = static_cast<std::size_t>(Outcome::kFailed) + 1;
 
 /// Mean of a quantity, and the share of it that lies inside a bound.
@@ -65,10 +67,45 @@ struct Tracked {
   Eigen::VectorXd error;
 };
 
+/// Every n-th value of a series, n so that there are not too many for their autocorrelation.
+struct Thinned {
+  static constexpr std::size_t kMost = 10'000;
+  std::vector<double> values;
+  std::size_t count = 0, stride = 1;
+
+  void Add(double value) {
+    if (count++ % stride != 0) return;
+    values.push_back(value);
+    if (values.size() < kMost) return;
+    for (std::size_t i = 0; 2 * i < kMost; ++i) values[i] = values[2 * i];
+    values.resize(kMost / 2);
+    stride *= 2;
+  }
+};
+
 struct Owner {
   std::string name;
   std::vector<std::size_t> tracked;
+  Thinned nees = {};  ///< per dof
+  double dofs = 0.0;  ///< sum over all stamps
 };
+
+/// What the bounds of a sensor's NIS need.
+struct Whiteness {
+  bool told = false;  ///< its innovations are those of a filter, without a robust loss
+  int dof = 0;
+  std::int64_t frames = 0, last_frame = -1;  ///< with an accepted measurement
+  double cut = kInfinity;                    ///< the least NIS that was gated
+};
+
+/// Whether the innovation of an angle, which is never beyond pi, looks like one of another unit:
+/// far beyond its sigma, and either spread over the circle, or of a measurement beyond a turn.
+bool IsFarAngle(const MeasurementReport& m) {
+  if (!(m.nis > kFarAngleSigmas * kFarAngleSigmas)) return false;
+  if (m.innovation.empty() || m.z.empty()) return false;
+  return std::abs(m.innovation[0]) > 0.25 * std::numbers::pi ||
+         std::abs(m.z[0]) > 2.0 * std::numbers::pi;
+}
 
 }  // namespace
 
@@ -77,7 +114,10 @@ struct Metrics::Impl {
   std::vector<Owner> owners;
   std::vector<std::string> sensors, motions;
   bool has_landmarks = false, has_ransac = false;
-  std::vector<Tally> far;                                      ///< inside: beyond 100 sigma
+  std::vector<Tally> far;            ///< inside: far off
+  std::vector<bool> angle;           ///< sensors that measure one
+  std::vector<Whiteness> whiteness;  ///< by sensor
+  std::int64_t reports = 0;
   std::map<int, std::vector<double>> reprojection;             ///< rms of each frame, by sensor
   std::vector<Sums> sums;                                      ///< all stamps, then the segments
   std::vector<std::array<std::int64_t*, kOutcomes>> count_of;  ///< into counts, by sensor
@@ -93,12 +133,13 @@ struct Metrics::Impl {
   void AddErrors(const Frame& frame, const std::vector<Sums*>& into, const ValueOf& value_of);
   void AddConsistency(Stamp stamp, const std::vector<Sums*>& into, const State& state);
   void CheckElement(Stamp stamp, Tracked& block, int element, double sigma);
-  void AddNees(const Owner& owner, std::size_t index, const std::vector<Sums*>& into,
-               const State& state);
+  void AddNees(Owner& owner, std::size_t index, const std::vector<Sums*>& into, const State& state);
   void AddReport(const std::vector<Sums*>& into, const UpdateReport& report);
+  void AddInnovation(std::size_t sensor, const MeasurementReport& m);
   /// The sums over all stamps, and over the segments that a frame is in.
   std::vector<Sums*> SumsOf(const std::vector<bool>& in_segment);
   void Write(const Sums& sums_of, std::map<std::string, double>& metrics) const;
+  void WriteBounds(std::map<std::string, double>& metrics) const;
 };
 
 void Metrics::Impl::Track(const System& system, const std::vector<StreamInfo>& truths) {
@@ -192,7 +233,7 @@ void Metrics::Impl::AddConsistency(Stamp stamp, const std::vector<Sums*>& into,
   for (std::size_t o = 0; o < owners.size(); ++o) AddNees(owners[o], o, into, state);
 }
 
-void Metrics::Impl::AddNees(const Owner& owner, std::size_t index, const std::vector<Sums*>& into,
+void Metrics::Impl::AddNees(Owner& owner, std::size_t index, const std::vector<Sums*>& into,
                             const State& state) {
   std::vector<std::size_t> used;
   int dof = 0;
@@ -226,9 +267,25 @@ void Metrics::Impl::AddNees(const Owner& owner, std::size_t index, const std::ve
   const auto [bound, is_new] = quantiles.try_emplace(dof, 0.0);
   if (is_new) bound->second = ChiSquareQuantile(0.95, dof);
   for (Sums* s : into) s->nees[index].Add(nees / dof, nees <= bound->second);
+  owner.dofs += dof;
+  owner.nees.Add(nees / dof);
+}
+
+void Metrics::Impl::AddInnovation(std::size_t sensor, const MeasurementReport& m) {
+  const bool far_off = m.nis > kFarSigmas * kFarSigmas * m.dof || (angle[sensor] && IsFarAngle(m));
+  far[sensor].Add(0.0, far_off);
+  Whiteness& white = whiteness[sensor];
+  white.dof = m.dof;
+  if (m.outcome == Outcome::kGated) {
+    if (m.nis > 0.0) white.cut = std::min(white.cut, m.nis);
+  } else if (white.last_frame != reports) {
+    white.last_frame = reports;
+    ++white.frames;
+  }
 }
 
 void Metrics::Impl::AddReport(const std::vector<Sums*>& into, const UpdateReport& report) {
+  ++reports;
   if (has_landmarks) {
     counts["landmarks.initialised"] += report.landmarks.initialised;
     counts["landmarks.deleted"] += report.landmarks.deleted;
@@ -246,7 +303,7 @@ void Metrics::Impl::AddReport(const std::vector<Sums*>& into, const UpdateReport
     if (count == nullptr) count = &counts[std::string(ToString(m.outcome)) + ':' + sensors[sensor]];
     ++*count;
     const bool compared = m.outcome == Outcome::kAccepted || m.outcome == Outcome::kGated;
-    if (compared && m.dof > 0) far[sensor].Add(0.0, m.nis > kFarSigmas * kFarSigmas * m.dof);
+    if (compared && m.dof > 0) AddInnovation(sensor, m);
     if (m.outcome != Outcome::kAccepted || m.dof <= 0 || !std::isfinite(m.nis)) continue;
     for (Sums* s : into) s->nis[sensor].Add(m.nis / m.dof);
   }
@@ -284,6 +341,28 @@ void Metrics::Impl::Write(const Sums& s, std::map<std::string, double>& metrics)
   }
 }
 
+void Metrics::Impl::WriteBounds(std::map<std::string, double>& metrics) const {
+  const auto write = [&](const std::string& kind, const std::string& name, const Interval& bounds) {
+    metrics[kind + ".low:" + name] = bounds.low;
+    metrics[kind + ".high:" + name] = bounds.high;
+  };
+  for (std::size_t o = 0; o < owners.size(); ++o) {
+    const Owner& owner = owners[o];
+    const std::vector<double>& nees = owner.nees.values;
+    if (nees.empty()) continue;
+    const double dof = owner.dofs / static_cast<double>(sums[0].nees[o].count);
+    const double samples = static_cast<double>(nees.size()) / AutocorrelationTime(nees, 1.0);
+    write("nees", owner.name, ConsistencyBounds(dof, samples));
+    metrics["nees.dof:" + owner.name] = dof;
+  }
+  for (std::size_t i = 0; i < sensors.size(); ++i) {
+    const Whiteness& white = whiteness[i];
+    if (!white.told || white.frames == 0) continue;
+    write("nis", sensors[i],
+          ConsistencyBounds(white.dof, static_cast<double>(white.frames), white.cut));
+  }
+}
+
 Metrics::Metrics(const NamedEstimator& named, const std::vector<StreamInfo>& truths,
                  const std::vector<Segment>& segments)
     : impl_(std::make_unique<Impl>()) {
@@ -300,6 +379,12 @@ Metrics::Metrics(const NamedEstimator& named, const std::vector<StreamInfo>& tru
   }
   impl_->count_of.resize(impl_->sensors.size());
   impl_->far.resize(impl_->sensors.size());
+  const bool filters = named.estimator == nullptr || !named.estimator->offline();
+  for (const SensorBinding& sensor : named.system.sensors) {
+    const Geometry& measured = sensor.model.measurement().geometry;
+    impl_->angle.push_back(measured.kind == GeometryKind::kAngle);
+    impl_->whiteness.emplace_back().told = filters && sensor.loss.kind == LossKind::kNone;
+  }
   const auto add_sums = [&](std::string suffix) {
     const std::vector<Tally> blocks(impl_->tracked.size());
     impl_->sums.push_back({std::move(suffix), blocks, blocks,
@@ -363,6 +448,7 @@ const std::map<std::string, std::string>& Metrics::units() const { return impl_-
 std::map<std::string, double> Metrics::Finish() const {
   std::map<std::string, double> metrics;
   for (const Sums& sums : impl_->sums) impl_->Write(sums, metrics);
+  impl_->WriteBounds(metrics);
   for (const Tracked& block : impl_->tracked) {
     if (block.last_error >= 0.0) metrics["final:" + block.name] = block.last_error;
     if (!block.series.even()) continue;

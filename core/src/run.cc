@@ -300,6 +300,7 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
       if (experiment.reference < 0) internal::NoteTruths(one.metrics, one.result);
     }
     internal::NoteUnits(one.named.system, one.metrics, one.result);
+    if (one.took && !one.named.estimator->failed()) internal::NoteConsistency(one.result);
     one.Note(one.metrics.events());
     const Estimator& estimator = *one.named.estimator;
     one.result.diverged = one.diverged || (estimator.offline() && estimator.diverged());

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "number_text.h"
 #include "observability.h"
 #include "words.h"
 
@@ -55,12 +56,36 @@ EstimatorResult Begin(const NamedEstimator& named) {
 void NoteUnits(const System& system, const Metrics& metrics, EstimatorResult& result) {
   for (const int index : metrics.far_off()) {
     const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(index)];
-    const std::string& unit = sensor.model.measurement().unit;
+    const Space& measured = sensor.model.measurement();
+    const bool angle = measured.geometry.kind == GeometryKind::kAngle;
+    const std::string unit = measured.unit.empty() ? "the model's units" : measured.unit;
     result.events.push_back(
         {kNoStamp, "unit",
-         "sensor '" + sensor.name + "': the median of |z - h| is more than 100 sigma; is stream '" +
-             sensor.stream + "' in " + (unit.empty() ? "the model's units" : unit) + '?'});
+         "sensor '" + sensor.name + "': the median of |z - h| is more than " +
+             (angle ? "5 sigma, and |z - h| > pi / 4 or |z| > 2 pi" : "100 sigma") +
+             "; is stream '" + sensor.stream + "' in " + (angle ? "rad" : unit) + '?'});
   }
+}
+
+void NoteConsistency(EstimatorResult& result) {
+  const auto note = [&](const std::string& kind, const std::string& name, const std::string& what) {
+    const std::string prefix = kind + ".mean:";
+    for (const auto& [key, mean] : result.metrics) {
+      if (!key.starts_with(prefix)) continue;
+      const std::string subject = key.substr(prefix.size());
+      const auto low = result.metrics.find(kind + ".low:" + subject);
+      const auto high = result.metrics.find(kind + ".high:" + subject);
+      if (low == result.metrics.end() || high == result.metrics.end()) continue;
+      if (mean >= low->second && mean <= high->second) continue;
+      result.events.push_back({kNoStamp, kind + "_bounds",
+                               name + " mean " + RoundedText(mean, 3) + " of " + what + subject +
+                                   " is outside its 95 % bounds [" + RoundedText(low->second, 3) +
+                                   ", " + RoundedText(high->second, 3) + "]: the filter is " +
+                                   (mean > high->second ? "overconfident" : "underconfident")});
+    }
+  };
+  note("nees", "NEES", "");
+  note("nis", "NIS", "sensor ");
 }
 
 void NoteTruths(const Metrics& metrics, EstimatorResult& result) {

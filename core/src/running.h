@@ -39,6 +39,9 @@ EstimatorResult Begin(const NamedEstimator& named);
 /// An event `unit` for each sensor whose measurements are far from all that it predicts.
 void NoteUnits(const System& system, const Metrics& metrics, EstimatorResult& result);
 
+/// An event `nees_bounds` or `nis_bounds` for each mean of NEES or NIS outside its 95 % bounds.
+void NoteConsistency(EstimatorResult& result);
+
 /// An event `truth` where no frame had the truth that the source names.
 void NoteTruths(const Metrics& metrics, EstimatorResult& result);
 

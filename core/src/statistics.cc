@@ -12,10 +12,41 @@
 
 namespace alidade {
 
-double ChiSquareQuantile(double q, int dof) {
-  ALIDADE_EXPECTS(q >= 0.0 && q <= 1.0 && dof > 0);
+double ChiSquareQuantile(double q, double dof) {
+  ALIDADE_EXPECTS(q >= 0.0 && q <= 1.0 && dof > 0.0);
   if (q == 1.0) return std::numeric_limits<double>::infinity();
   return boost::math::quantile(boost::math::chi_squared(dof), q);
+}
+
+Interval ConsistencyBounds(double dof, double n, double cut) {
+  ALIDADE_EXPECTS(dof > 0.0 && n > 0.0 && cut > 0.0);
+  double m = 1.0, v = 2.0 / dof;
+  if (std::isfinite(cut)) {
+    // x chi2(x; dof) = dof chi2(x; dof + 2), of the densities.
+    const auto below = [cut](double k) {
+      return boost::math::cdf(boost::math::chi_squared(k), cut);
+    };
+    const double all = below(dof);
+    m = below(dof + 2.0) / all;
+    v = (dof + 2.0) / dof * below(dof + 4.0) / all - m * m;
+  }
+  const double nu = 2.0 * n * m * m / v;
+  return {m * ChiSquareQuantile(0.025, nu) / nu, m * ChiSquareQuantile(0.975, nu) / nu};
+}
+
+double AutocorrelationTime(const std::vector<double>& series, double mean) {
+  const Eigen::VectorXd x = Eigen::VectorXd::Map(series.data(), std::ssize(series)).array() - mean;
+  const Eigen::Index n = x.size();
+  const double square = x.squaredNorm();
+  if (!(square > 0.0) || !std::isfinite(square)) return 1.0;
+  const auto rho = [&](Eigen::Index k) { return x.head(n - k).dot(x.tail(n - k)) / square; };
+  double tau = -1.0;
+  for (Eigen::Index k = 0; k + 1 < n; k += 2) {
+    const double pair = rho(k) + rho(k + 1);
+    if (!(pair > 0.0)) break;
+    tau += 2.0 * pair;
+  }
+  return std::clamp(tau, 1.0, static_cast<double>(n));
 }
 
 namespace {

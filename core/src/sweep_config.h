@@ -15,8 +15,8 @@ Config Copy(const Config& config);
 /// kBadConfig.
 void CheckReadableAgain(const Config& config);
 
-/// Whether the source of `config` gives other data for `seed` than for the next one, by reading both
-/// up to their first difference. A source whose data have an error counts as one that does.
+/// Whether the source of `config` gives other data for `seed` than for the next one: reads both up
+/// to their first difference. A source whose data have an error counts as one that does.
 bool UsesSeed(const Config& config, const PluginHost& host, std::uint64_t seed);
 
 /// Says that it does not. Error: kBadConfig.

@@ -81,7 +81,7 @@ std::string Markdown(const SweepResult& result) {
                      "inconsistent ones among them.\n\n";
   const std::vector<SweepSummary> summaries = Summarise(result);
   text += internal::MarkdownTable("", NamesOf(summaries), TableRows(summaries));
-  return text + ReferenceLines(result);
+  return text + internal::NeesLines(summaries) + ReferenceLines(result);
 }
 
 void AppendEstimators(Json& json, const SweepResult& result) {
@@ -98,6 +98,11 @@ void AppendEstimators(Json& json, const SweepResult& result) {
       json.Key("p50").Number(spread.p50);
       json.Key("p95").Number(spread.p95);
       json.End();
+    }
+    json.End();
+    json.Key("bounds").Object();
+    for (const auto& [key, bounds] : internal::NeesBounds(summary)) {
+      json.Key(key).Object().Key("low").Number(bounds.low).Key("high").Number(bounds.high).End();
     }
     json.End();
     json.End();
@@ -219,7 +224,7 @@ void WriteFailures(const RunFolder& folder, const Parts& parts, const std::strin
 std::string SweepTable(const SweepResult& result) {
   const std::vector<SweepSummary> summaries = Summarise(result);
   return internal::RightAlignedTable(NamesOf(summaries), TableRows(summaries)) +
-         ReferenceLines(result);
+         internal::NeesLines(summaries) + ReferenceLines(result);
 }
 
 SweepFolder::SweepFolder(const std::filesystem::path& folder, bool force)

@@ -2,8 +2,10 @@
 #include "sweep_text.h"
 
 #include <algorithm>
+#include <string_view>
 
 #include "comparison_table.h"
+#include "number_text.h"
 
 namespace alidade::internal {
 namespace {
@@ -30,6 +32,35 @@ std::int64_t CountWithheld(const SweepResult& result) {
   return std::ranges::count_if(result.done, [](const SweepRun& run) {
     return run.status == RunStatus::kOk && run.withheld;
   });
+}
+
+std::map<std::string, Interval> NeesBounds(const SweepSummary& summary) {
+  constexpr std::string_view kDof = "nees.dof:";
+  std::map<std::string, Interval> bounds;
+  for (const auto& [key, dof] : summary.metrics) {
+    if (!key.starts_with(kDof) || summary.used == 0) continue;
+    bounds["nees.mean:" + key.substr(kDof.size())] =
+        ConsistencyBounds(dof.mean, static_cast<double>(summary.used));
+  }
+  return bounds;
+}
+
+std::string NeesLines(const std::vector<SweepSummary>& summaries) {
+  std::string lines;
+  for (const SweepSummary& summary : summaries) {
+    for (const auto& [key, bounds] : NeesBounds(summary)) {
+      const auto mean = summary.metrics.find(key);
+      if (mean == summary.metrics.end()) continue;
+      const double value = mean->second.mean;
+      if (value >= bounds.low && value <= bounds.high) continue;
+      lines += summary.name + ": NEES mean " + RoundedText(value, 3) + " of " +
+               key.substr(key.find(':') + 1) + " over " + std::to_string(summary.used) +
+               " runs is outside its 95 % bounds [" + RoundedText(bounds.low, 3) + ", " +
+               RoundedText(bounds.high, 3) + "]: the filter is " +
+               (value > bounds.high ? "overconfident" : "underconfident") + '\n';
+    }
+  }
+  return lines.empty() ? "" : '\n' + lines;
 }
 
 std::string ReferenceLines(const SweepResult& result) {

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "alidade/random.h"
+#include "alidade/statistics.h"
 #include "support/systems.h"
 
 namespace alidade {
@@ -224,6 +225,41 @@ TEST(Metrics, NeesOfErrorsDrawnFromPIsOne) {
   EXPECT_NEAR(metrics.at("cov95:a.x"), 0.95, 5.0 * std::sqrt(0.95 * 0.05 / n));
 }
 
+TEST(Metrics, BoundsOfTheNeesAreThoseOfIndependentErrors) {
+  MetricsOf one = OneScalar();
+  Random random(1);
+  for (int i = 0; i < 2000; ++i) one.Add({{2.0 * random.Normal()}});
+  const auto metrics = one.Finish();
+  // White errors: tau is 1, but for what chance makes of it.
+  const Interval bounds = ConsistencyBounds(1.0, 2000.0);
+  EXPECT_EQ(metrics.at("nees.dof:a"), 1.0);
+  EXPECT_NEAR(metrics.at("nees.low:a"), bounds.low, 0.3 * (1.0 - bounds.low));
+  EXPECT_NEAR(metrics.at("nees.high:a"), bounds.high, 0.3 * (bounds.high - 1.0));
+}
+
+TEST(Metrics, BoundsOfTheNeesAreWideWhereErrorsStay) {
+  MetricsOf one = OneScalar();
+  for (int i = 0; i < 2000; ++i) one.Add({{4.0}});
+  const auto metrics = one.Finish();
+  EXPECT_DOUBLE_EQ(metrics.at("nees.mean:a"), 4.0);
+  // One and the same error is one sample: chi2(0.975; 1) = 5.024.
+  EXPECT_NEAR(metrics.at("nees.high:a"), ChiSquareQuantile(0.975, 1), 1e-6);
+}
+
+TEST(Metrics, NeesIsOfEstimatedBlocksAlone) {
+  StateLayout layout = Scalars({"a.x"});
+  layout.Declare("a.y", "a", SpaceOf("y", "m", Geometry::Vector(1)), BlockStatus::kConsidered);
+  MetricsOf one(layout, {{"x", 1}, {"y", 1}});
+  const double zero = 0.0;
+  one.state().Add(0, &zero, Eigen::MatrixXd::Constant(1, 1, 4.0));
+  one.state().Add(1, &zero, Eigen::MatrixXd::Constant(1, 1, 1.0));
+  one.Add({{3.0}, {100.0}});
+  const auto metrics = one.Finish();
+  EXPECT_DOUBLE_EQ(metrics.at("nees.mean:a"), 9.0 / 4.0);
+  EXPECT_DOUBLE_EQ(metrics.at("nees.cov95:a"), 1.0);  // 2.25 <= 3.84
+  EXPECT_DOUBLE_EQ(metrics.at("rmse:a.y"), 100.0);
+}
+
 TEST(Metrics, NeesLeavesOutSingularCovariances) {
   const Eigen::Matrix2d singular = Eigen::Matrix2d::Ones();
   MetricsOf one(Scalars({"a.x", "a.y", "b.x"}), {{"a.x", 1}, {"a.y", 1}, {"b.x", 1}});
@@ -368,6 +404,22 @@ TEST(Metrics, CountsOutcomesAndTakesNisOfWhatIsAccepted) {
   EXPECT_EQ(one.metrics().counts().at("accepted:stereo"), 4);
   EXPECT_EQ(one.metrics().counts().at("gated:stereo"), 2);
   EXPECT_EQ(one.metrics().counts().size(), 2u);
+}
+
+TEST(Metrics, BoundsOfTheNisCountFrames) {
+  MetricsOf one = OneScalar();
+  UpdateReport report;
+  report.Add() = ReportOf(Outcome::kAccepted, 3.0, 2);
+  report.Add() = ReportOf(Outcome::kAccepted, 1.0, 2);
+  for (int i = 0; i < 50; ++i) one.Add({{0.0}}, report);
+  const Interval all = ConsistencyBounds(2.0, 50.0);
+  EXPECT_DOUBLE_EQ(one.Finish().at("nis.low:stereo"), all.low);
+  EXPECT_DOUBLE_EQ(one.Finish().at("nis.high:stereo"), all.high);
+  // What was gated had at least the threshold.
+  report.Clear();
+  report.Add() = ReportOf(Outcome::kGated, 9.0, 2);
+  one.Add({{0.0}}, report);
+  EXPECT_DOUBLE_EQ(one.Finish().at("nis.high:stereo"), ConsistencyBounds(2.0, 50.0, 9.0).high);
 }
 
 }  // namespace

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
+#include "alidade/random.h"
 #include "support/driven.h"
 #include "support/recording.h"
 
@@ -160,6 +162,208 @@ TEST(Run, AStopIsTakenAfterTheFrame) {
   EXPECT_EQ(result.status, RunStatus::kStopped);
   EXPECT_EQ(result.code, ExitCode::kStopped);
   EXPECT_EQ(result.frames, 7);
+}
+
+TEST(Run, AStopAfterAFailureIsStillAFailure) {
+  Experiment experiment = MakeExperiment();
+  experiment.estimators.push_back(ExplodingEstimator(experiment.source->streams()));
+  int frames = 0;
+  RunOptions options;
+  options.stop = [&] { return ++frames == 7; };
+  const RunResult result = alidade::Run(experiment, options);
+  EXPECT_EQ(result.frames, 7);
+  EXPECT_EQ(result.status, RunStatus::kFailed);
+  EXPECT_EQ(result.code, ExitCode::kDiverged);
+  EXPECT_NE(result.reason.find("estimator 'exploding'"), std::string::npos) << result.reason;
+}
+
+/// Is stopped in its smoothing.
+struct Interrupted : Hindsight {
+  using Hindsight::Hindsight;
+  void Smooth(const Emit&) override { throw Error(ExitCode::kStopped, "a signal"); }
+};
+
+TEST(Run, AStopOfASmootherAfterAFailureIsStillAFailure) {
+  const auto run = [](bool fails) {
+    Experiment experiment = MakeExperiment();
+    NamedEstimator& alone = experiment.estimators[1];
+    alone.estimator = std::make_unique<Interrupted>(alone.system);
+    if (fails) {
+      experiment.estimators.push_back(ExplodingEstimator(experiment.source->streams()));
+    }
+    return alidade::Run(experiment, {});
+  };
+  EXPECT_EQ(run(false).code, ExitCode::kStopped);
+  const RunResult failed = run(true);
+  EXPECT_EQ(failed.status, RunStatus::kFailed);
+  EXPECT_EQ(failed.code, ExitCode::kDiverged);
+  const std::vector<Event>& events = failed.estimators[1].events;
+  EXPECT_EQ(std::ranges::count(events, "stopped", &Event::kind), 1);
+}
+
+/// A value that walks by N(0, 0.1^2) each second, and is measured with noise of sigma 1.
+class Walking : public testing::SwingingTarget {
+ public:
+  explicit Walking(std::uint64_t seed) : SwingingTarget(0), random_(seed) {
+    x_ = 2.0 * random_.Normal();
+  }
+  bool Next(Frame& frame) override {
+    if (k_ == 200) return false;
+    frame = testing::FrameAt(k_++, {{0, x_ + random_.Normal()}});
+    frame.truth = {{x_}};
+    x_ += 0.1 * random_.Normal();
+    return true;
+  }
+
+ private:
+  Random random_;
+  double x_ = 0.0;
+  int k_ = 0;
+};
+
+/// Events of a filter of Walking that takes the noises for `factor` times what they are.
+EstimatorResult WalkWith(double factor, std::uint64_t seed = 1) {
+  Experiment experiment;
+  experiment.source = std::make_unique<Walking>(seed);
+  NamedEstimator& named = experiment.estimators.emplace_back();
+  named.name = "ekf";
+  testing::AddMotion(named.system, "p", InProcessMotion(Constant<>(1, 0.1 * factor), "constant"),
+                     {{"depth", 0.0, 2.0 * factor}});
+  testing::AddSensor(named.system, "disparity",
+                     InProcessSensor(testing::Linear(1.0, factor), "linear"), {"p.depth"});
+  named.estimator = std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+  return alidade::Run(experiment, {}).estimators[0];
+}
+
+std::vector<std::string> TextsOf(const EstimatorResult& result, const std::string& kind) {
+  std::vector<std::string> texts;
+  for (const Event& event : result.events) {
+    if (event.kind == kind) texts.push_back(event.text);
+  }
+  return texts;
+}
+
+TEST(Run, AnOverconfidentFilterIsAnEvent) {
+  const EstimatorResult result = WalkWith(0.13);
+  EXPECT_GT(result.metrics.at("nees.mean:p"), 30.0);
+  ASSERT_EQ(TextsOf(result, "nees_bounds").size(), 1u);
+  const std::string nees = TextsOf(result, "nees_bounds")[0];
+  EXPECT_TRUE(nees.starts_with("NEES mean ")) << nees;
+  EXPECT_NE(nees.find(" of p is outside its 95 % bounds ["), std::string::npos) << nees;
+  EXPECT_TRUE(nees.ends_with("]: the filter is overconfident")) << nees;
+  ASSERT_EQ(TextsOf(result, "nis_bounds").size(), 1u);
+  const std::string nis = TextsOf(result, "nis_bounds")[0];
+  EXPECT_TRUE(nis.starts_with("NIS mean ")) << nis;
+  EXPECT_NE(nis.find(" of sensor disparity is outside its 95 % bounds ["), std::string::npos)
+      << nis;
+}
+
+TEST(Run, AnUnderconfidentFilterIsAnEvent) {
+  const std::vector<std::string> texts = TextsOf(WalkWith(4.0), "nis_bounds");
+  ASSERT_EQ(texts.size(), 1u);
+  EXPECT_TRUE(texts[0].ends_with("]: the filter is underconfident")) << texts[0];
+}
+
+// 5 % of 200 runs are 10, with a standard deviation of 3; the bounds of the NEES are wider.
+TEST(Run, AConsistentFilterIsRarelyOutsideItsBounds) {
+  std::size_t nees = 0, nis = 0;
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    const EstimatorResult result = WalkWith(1.0, seed);
+    nees += TextsOf(result, "nees_bounds").size();
+    nis += TextsOf(result, "nis_bounds").size();
+  }
+  EXPECT_LE(nees, 20u);
+  EXPECT_LE(nis, 20u);
+  EXPECT_GE(nis, 2u);
+}
+
+/// z = x + n, all angles.
+struct Compass : Sensor<Angle, Angle> {
+  static constexpr std::array kRoles{Quantity{"heading", "rad"}};
+  static constexpr Quantity kMeasurement{"heading", "rad"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    z[0] = x[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(0.02);
+  }
+};
+
+/// A heading that turns at random.
+struct Turn : Motion<1, Angle> {
+  static constexpr std::array kBlocks{Quantity{"heading", "rad"}};
+  template <class T>
+  void Step(const T* x, const T* w, double, T* next) const {
+    next[0] = x[0] + w[0];
+  }
+  void SqrtQ(double dt_s, MatrixRef l) const { l(0, 0) = 0.2 * std::sqrt(dt_s); }
+};
+
+/// Turns at a steady rate, and measures its heading ten times a second in a unit of its own.
+class Turning : public testing::SwingingTarget {
+ public:
+  Turning(double rate_rad_s, double unit, bool wrapped)
+      : SwingingTarget(0), rate_rad_s_(rate_rad_s), unit_(unit), wrapped_(wrapped) {}
+  bool Next(Frame& frame) override {
+    if (k_ == 300) return false;
+    const double t_s = 0.1 * k_++;
+    const double angle = 0.6 + rate_rad_s_ * t_s + 0.02 * random_.Normal();
+    frame = testing::FrameAt(t_s, {{0, unit_ * (wrapped_ ? Angle::Wrap(angle) : angle)}});
+    return true;
+  }
+
+ private:
+  double rate_rad_s_, unit_;
+  bool wrapped_;
+  Random random_{4};
+  int k_ = 0;
+};
+
+std::vector<std::string> UnitEventsOf(const Turning& source, double gate) {
+  Experiment experiment;
+  experiment.source = std::make_unique<Turning>(source);
+  NamedEstimator& named = experiment.estimators.emplace_back();
+  named.name = "ekf";
+  const MotionModel model = InProcessMotion(Turn(), "turn");
+  const BlockId id = named.system.layout.Declare("car.heading", "car", model.blocks()[0]);
+  named.system.motions.push_back({"car", model, {id}});
+  named.system.priors.push_back({id, {0.6}, Eigen::MatrixXd::Constant(1, 1, 0.01), {}});
+  testing::AddSensor(named.system, "disparity", InProcessSensor(Compass(), "compass"),
+                     {"car.heading"});
+  EkfOptions options;
+  options.gate = gate;
+  named.estimator = std::make_unique<Ekf>(named.system, options, experiment.source->streams());
+  return TextsOf(alidade::Run(experiment, {}).estimators[0], "unit");
+}
+
+constexpr double kDegree = 180.0 / std::numbers::pi;
+
+TEST(Run, DegreesForRadiansAreAnEvent) {
+  for (const double gate : {1.0, 0.9999}) {
+    for (const double rate : {0.3, 0.05, -0.1}) {
+      const std::vector<std::string> texts = UnitEventsOf(Turning(rate, kDegree, true), gate);
+      ASSERT_EQ(texts.size(), 1u) << gate << ' ' << rate;
+      EXPECT_EQ(
+          texts[0],
+          "sensor 'disparity': the median of |z - h| is more than 5 sigma, and |z - h| > pi / "
+          "4 or |z| > 2 pi; is stream 'disparity' in rad?");
+    }
+  }
+}
+
+// Across the seam, or counted on over several turns.
+TEST(Run, RadiansAreNoEvent) {
+  for (const double gate : {1.0, 0.9999}) {
+    for (const double rate : {0.0, 0.3, 0.9, -0.9}) {
+      for (const bool wrapped : {true, false}) {
+        EXPECT_EQ(UnitEventsOf(Turning(rate, 1.0, wrapped), gate), std::vector<std::string>{})
+            << gate << ' ' << rate << ' ' << wrapped;
+      }
+    }
+  }
 }
 
 TEST(Run, FramesBeforeTheStartEnterTheCountsAlone) {

@@ -16,6 +16,58 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 
 // Quantiles that tables of chi-square give.
+TEST(ConsistencyBounds, AreThoseOfAChiSquareMean) {
+  // chi2(0.025; 200) = 162.728, chi2(0.975; 200) = 241.058: [BarShalom2001], table 1.5.4-1.
+  const Interval bounds = ConsistencyBounds(2.0, 100.0);
+  EXPECT_NEAR(bounds.low, 162.728 / 200.0, 1e-5);
+  EXPECT_NEAR(bounds.high, 241.058 / 200.0, 1e-5);
+}
+
+// The mean of 50 values of chi2(1) below the 90 % gate lies within in 95 % of 4000 cases, and that
+// of all values in fewer than 5 %: the gate takes its mean down to 0.62.
+TEST(ConsistencyBounds, KnowWhatAGateCutsOff) {
+  const double gate = ChiSquareQuantile(0.9, 1);
+  const Interval bounds = ConsistencyBounds(1.0, 50.0, gate);
+  Random random(3);
+  int inside = 0;
+  constexpr int kCases = 4000;
+  for (int i = 0; i < kCases; ++i) {
+    double sum = 0.0;
+    for (int n = 0; n < 50;) {
+      const double x = random.Normal();
+      if (x * x > gate) continue;
+      sum += x * x;
+      ++n;
+    }
+    inside += sum / 50.0 >= bounds.low && sum / 50.0 <= bounds.high;
+  }
+  // Five standard deviations, and 1 % for the shape: two moments of the sum are matched.
+  EXPECT_NEAR(inside / double{kCases}, 0.95, 5.0 * std::sqrt(0.95 * 0.05 / kCases) + 0.01);
+  EXPECT_LT(bounds.high, 1.0);
+}
+
+// Squares of x' = a x + sqrt(1 - a^2) w have rho(k) = a^(2 k), tau = (1 + a^2) / (1 - a^2).
+TEST(AutocorrelationTime, IsThatOfAFirstOrderProcess) {
+  for (const double a : {0.0, 0.7, 0.95}) {
+    Random random(5);
+    double x = random.Normal();
+    std::vector<double> squares;
+    for (int i = 0; i < 100'000; ++i) {
+      squares.push_back(x * x);
+      x = a * x + std::sqrt(1.0 - a * a) * random.Normal();
+    }
+    const double tau = (1.0 + a * a) / (1.0 - a * a);
+    EXPECT_NEAR(AutocorrelationTime(squares, 1.0) / tau, 1.0, 0.15) << a;
+  }
+}
+
+TEST(AutocorrelationTime, IsFromOneToTheLength) {
+  EXPECT_EQ(AutocorrelationTime({}, 1.0), 1.0);
+  EXPECT_EQ(AutocorrelationTime({1.0, 1.0}, 1.0), 1.0);
+  // Constant and far from its mean: rho(k) = (n - k) / n, all pairs: tau = n.
+  EXPECT_NEAR(AutocorrelationTime(std::vector<double>(100, 58.0), 1.0), 100.0, 1e-9);
+}
+
 TEST(ChiSquareQuantile, AgreesWithTables) {
   EXPECT_NEAR(ChiSquareQuantile(0.95, 1), 3.841458820694124, 1e-12);
   EXPECT_NEAR(ChiSquareQuantile(0.95, 2), 5.991464547107979, 1e-12);

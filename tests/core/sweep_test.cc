@@ -70,6 +70,21 @@ TEST(SweepTable, HasQuantilesAndCountsOfRuns) {
             "inconsistent                            1\n");
 }
 
+TEST(SweepTable, ReportsAMeanNeesOutsideItsBounds) {
+  SweepResult result = SixRuns();
+  for (SweepRun& run : result.done) {
+    run.estimators[0].metrics["nees.mean:x"] = 4.0;
+    run.estimators[0].metrics["nees.dof:x"] = 2.0;
+  }
+  // Three runs of two degrees of freedom: chi2(0.025; 6) / 6 = 0.2062, chi2(0.975; 6) / 6 = 2.408.
+  const std::string line =
+      "\nekf: NEES mean 4 of x over 3 runs is outside its 95 % bounds [0.206, 2.41]: the filter is "
+      "overconfident\n";
+  EXPECT_TRUE(SweepTable(result).ends_with(line)) << SweepTable(result);
+  for (SweepRun& run : result.done) run.estimators[0].metrics["nees.mean:x"] = 2.0;
+  EXPECT_EQ(SweepTable(result).find("bounds"), std::string::npos);
+}
+
 TEST(SweepTable, FoldsAsAComparisonDoes) {
   SweepResult result = SixRuns();
   result.estimators = {"ekf", "a", "b", "c"};

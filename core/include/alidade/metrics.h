@@ -19,8 +19,15 @@ namespace alidade {
 ///   cov95:BLOCK         share of stamps with |e| <= 1.96 sigma (scalar blocks)
 ///   nees.mean:OWNER     mean of e' C^-1 e / dof over the owner's estimated blocks of known truth,
 ///                       jointly; stamps where C is singular or not finite are left out
+///   nees.low:OWNER, nees.high:OWNER  bounds: nees.mean of a consistent filter lies between
+///                       them with probability 0.95 [BarShalom2001, sec. 5.4]. Errors of a run are
+///                       correlated over time: n stamps count as n / tau independent samples, tau
+///                       the integrated autocorrelation time of the NEES; n is 10 000 at most
+///   nees.dof:OWNER      elements that the NEES is taken over, mean over the stamps
 ///   nees.cov95:OWNER    share of those stamps with e' C^-1 e <= chi2(0.95, dof)
 ///   nis.mean:SENSOR     mean of r' S^-1 r / dof over accepted measurements
+///   nis.low:SENSOR, nis.high:SENSOR  bounds, likewise: innovations are white, but those of one
+///                       frame share the error of the prediction and count as one sample
 ///   final:BLOCK         |e| at the last stamp
 ///   path.sim3.rmse      of the position that landmarks are seen from, m, after the similarity that
 ///                       brings its path nearest to the true one [Umeyama1991]
@@ -60,8 +67,9 @@ class Metrics {
   /// `inconsistent`, once for each block element: truth is known and the error has been beyond 10
   /// sigma for 20 stamps on end.
   const std::vector<Event>& events() const;
-  /// Sensors, by index, whose measurements look as if they were in another unit: of those that
-  /// were accepted or gated, the median of sqrt(r' S^-1 r / dof) is above 100.
+  /// Sensors, by index, whose measurements look as if they were in another unit: more than half of
+  /// those that were accepted or gated are far off. That is sqrt(r' S^-1 r / dof) > 100; of angles,
+  /// whose r is never beyond pi, |r| > 5 sqrt(S) with |r| > pi / 4 or |z| > 2 pi.
   std::vector<int> far_off() const;
   /// Blocks whose truth the source names, but that no frame had a truth of.
   std::vector<std::string> without_truth() const;

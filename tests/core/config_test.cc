@@ -204,6 +204,9 @@ TEST(Node, CovarianceIsSquareSymmetricAndPositive) {
   const std::string mixed = "[[1e6, 0, 0], [0, 1e-14, 2e-14], [0, 2e-14, 1e-14]]";
   EXPECT_EQ(MessageOf(mixed, [](const Node& node) { return node.Covariance(3); }),
             "not positive semi-definite: its smallest eigenvalue is -1e-14; expected a covariance");
+  // A value that is known has no covariance with another: the eigenvalues are 1 and -1e-18.
+  EXPECT_EQ(error("[[0, 1e-9], [1e-9, 1]]"),
+            "not positive semi-definite: its smallest eigenvalue is -1e-18; expected a covariance");
   // A negative variance far below the other one's rounding is still seen.
   EXPECT_EQ(error("[[1e6, 0], [0, -1e-18]]"),
             "not positive semi-definite: its smallest eigenvalue is -1e-18; expected a covariance");
@@ -246,6 +249,28 @@ TEST(Node, WrongUnitNamesTheRightOne) {
   const std::string rejected = Message([&] { root.RejectUnread(); });
   EXPECT_NE(rejected.find("f.yaml:1:34 sigma_m: wrong unit 'm'; expected sigma_px"),
             std::string::npos);
+}
+
+TEST(Node, EveryUnitIsKnownForOneOfItsQuantity) {
+  const std::vector<std::vector<std::string>> quantities = {
+      {"m", "mm", "cm", "km", "um", "nm", "in", "inch", "ft"},
+      {"s", "sec", "ms", "us", "ns", "h"},
+      {"rad", "deg", "mrad"},
+      {"hz", "khz", "mhz"},
+      {"px", "pixel", "pixels"},
+      {"m2", "mm2", "cm2"},
+      {"s2", "ms2"},
+      {"rad2", "deg2"},
+      {"kg", "g"}};
+  for (const std::vector<std::string>& units : quantities) {
+    const std::string known = "rate_" + units[0];
+    for (std::size_t i = 1; i < units.size(); ++i) {
+      const std::string written = "rate_" + units[i];
+      const Config config = Read(written + ": 1");
+      EXPECT_EQ(Message([&] { config.root().At(known); }),
+                "f.yaml:1:1 " + written + ": wrong unit '" + units[i] + "'; expected " + known);
+    }
+  }
 }
 
 TEST(Node, MinimumIsNoUnit) {

@@ -2,6 +2,7 @@
 //
 // FAULTS 36, 37: late frames and equal stamps, frame by frame.
 #include <algorithm>
+#include <stdexcept>
 
 #include "support/recording.h"
 
@@ -244,6 +245,36 @@ TEST(Rewind, TakesAFrameAtOnceAndTheLaterOnesAgain) {
   alidade::Run(experiment, {});
   const Stamp ms = 1'000'000;
   EXPECT_EQ(seen.stamps, (std::vector<Stamp>{0, 50 * ms, 100 * ms, 20 * ms, 50 * ms, 100 * ms}));
+}
+
+/// Throws once, at the frame of that stamp.
+struct Throwing : Ekf {
+  using Ekf::Ekf;
+  const UpdateReport& Process(const Frame& frame) override {
+    if (frame.stamp == at) {
+      at = kNoStamp;
+      throw std::logic_error("an invariant");
+    }
+    return Ekf::Process(frame);
+  }
+  Stamp at = kNoStamp;
+};
+
+TEST(Rewind, AnEstimatorThatThrowsEndsTheRunAfterTheFramesBefore) {
+  // All are within the window: none is released before the third is tried.
+  Experiment experiment = MakeGiven({FrameAt(0.0, {{1, 1.0}}), FrameAt(0.02, {{1, 1.0}}),
+                                     FrameAt(0.04, {{1, 1.0}}), FrameAt(0.06, {{1, 1.0}})},
+                                    TimeOrder::kRewind);
+  NamedEstimator& named = experiment.estimators[0];
+  auto throwing =
+      std::make_unique<Throwing>(named.system, EkfOptions{}, experiment.source->streams());
+  throwing->at = StampFromSeconds(0.04);
+  named.estimator = std::move(throwing);
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.code, ExitCode::kInternal);
+  EXPECT_EQ(result.reason, "internal: an invariant");
+  EXPECT_EQ(result.frames, 2);
+  EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 2);
 }
 
 /// An estimator that cannot go back.

@@ -17,6 +17,8 @@ namespace {
 /// Four points beside a camera that moves right, and an odometer that a static block is read by.
 class Street : public Source {
  public:
+  /// With `outlier`, one measurement of landmark 3 is far off.
+  explicit Street(bool outlier = false) : outlier_(outlier) {}
   const std::vector<StreamInfo>& streams() const override { return streams_; }
   const std::vector<StreamInfo>& truths() const override { return truths_; }
   bool Next(Frame& frame) override {
@@ -26,7 +28,8 @@ class Street : public Source {
     for (int id = 0; id < 4; ++id) {
       const std::array<double, 3> p = *TrueLandmark(id);
       if (id == 3 && next_ < 10) continue;
-      observations.push_back({id, {p[0] - x, p[1], p[2]}});
+      const double error_m = outlier_ && id == 3 && next_ == 15 ? 5.0 : 0.0;
+      observations.push_back({id, {p[0] - x + error_m, p[1], p[2]}});
     }
     frame = FrameOf(0.1 * next_, observations);
     frame.truth = {{x, 0.0, 0.0}};
@@ -42,17 +45,20 @@ class Street : public Source {
  private:
   std::vector<StreamInfo> streams_ = {{"tracks", 3}};
   std::vector<StreamInfo> truths_ = {{"cam.position", 3}};
+  bool outlier_;
   int next_ = 0;
 };
 
-Experiment OnTheStreet() {
+Experiment OnTheStreet(bool outlier = false) {
   Experiment experiment;
-  experiment.source = std::make_unique<Street>();
+  experiment.source = std::make_unique<Street>(outlier);
   NamedEstimator named;
   named.name = "ekf";
   named.type = "ekf";
   named.system = MapSystem(Offset(0.05), {}, 0.1);
-  named.estimator = std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+  EkfOptions options;
+  if (outlier) options.gate = 0.9999;
+  named.estimator = std::make_unique<Ekf>(named.system, options, experiment.source->streams());
   experiment.estimators.push_back(std::move(named));
   return experiment;
 }
@@ -80,6 +86,29 @@ TEST(LandmarkRecords, TheMapAtTheEndIsWritten) {
   EXPECT_EQ(last[15] + ' ' + last[17], "2.5 1.7");
   const LandmarkEstimate estimate = experiment.estimators[0].estimator->landmarks()[3];
   EXPECT_DOUBLE_EQ(std::stod(last[6]), std::sqrt(estimate.covariance(0, 0)));
+}
+
+TEST(LandmarkRecords, EveryColumnOfTheMapIsItsOwn) {
+  const TemporaryFolder folder;
+  Experiment experiment = OnTheStreet(true);
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  recorder.Finish(RunInto(recorder, experiment));
+  const std::vector<std::string> last = Cells(Lines(folder / "out/ekf/landmarks.csv").at(4));
+  const LandmarkEstimate estimate = experiment.estimators[0].estimator->landmarks()[3];
+  ASSERT_EQ(last.size(), 18u);
+  EXPECT_EQ(last[0] + ' ' + last[1], "3 0");
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto e = static_cast<Eigen::Index>(i);
+    EXPECT_DOUBLE_EQ(std::stod(last[3 + i]), estimate.position[e]);
+    EXPECT_DOUBLE_EQ(std::stod(last[6 + i]), std::sqrt(estimate.covariance(e, e)));
+  }
+  EXPECT_EQ(last[9] + last[10], "");
+  EXPECT_EQ(last[11], "1.000000000");  // seen from frame 10 to 19; the first is no measurement
+  EXPECT_EQ(last[12], "1.900000000");
+  EXPECT_EQ(last[13], "9");
+  EXPECT_EQ(last[14], "8");  // one was gated
+  const std::array<double, 3> place = *Street().TrueLandmark(3);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(std::stod(last[15 + i]), place[i]);
 }
 
 TEST(LandmarkRecords, OtherFilesHaveTheBlocksOfTheSystemAlone) {

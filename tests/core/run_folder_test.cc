@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdarg>
 #include <fstream>
 
 #include "alidade/sweep.h"
@@ -26,6 +27,20 @@ std::size_t write_limit = 0;
 bool no_locks = false;
 /// The n-th rename by this process kills it instead; 0: none does.
 int die_at_rename = 0;
+/// What making a file or folder fails with; 0: it does not.
+int create_error = 0;
+/// Each write, fsync and rename with the path it is of, while this is there.
+std::vector<std::string>* calls_made = nullptr;
+
+void Note(const std::string& call, const std::string& path) {
+  if (calls_made != nullptr) calls_made->push_back(call + ' ' + path);
+}
+
+std::string PathOf(int fd) {
+  char path[4096] = {};
+  const std::string link = "/proc/self/fd/" + std::to_string(fd);
+  return ::readlink(link.c_str(), path, sizeof(path) - 1) > 0 ? path : "";
+}
 
 bool IsToFail() {
   if (fail_at == 0 || --fail_at > 0) return false;
@@ -38,6 +53,7 @@ bool IsToFail() {
 // These stand before those of the C library, for the shared libraries of this process too.
 extern "C" {
 __attribute__((visibility("default"))) ssize_t write(int fd, const void* data, size_t size) {
+  if (calls_made != nullptr) Note("write", PathOf(fd));
   const size_t taken = write_limit == 0 ? size : std::min(size, write_limit);
   return IsToFail() ? -1 : syscall(SYS_write, fd, data, taken);
 }
@@ -47,11 +63,29 @@ __attribute__((visibility("default"))) int flock(int fd, int operation) noexcept
   return -1;
 }
 __attribute__((visibility("default"))) int fsync(int fd) {
-  static_cast<void>(fd);  // tests need not survive a power cut
+  // No call of the system: tests need not survive a power cut.
+  if (calls_made != nullptr) Note("fsync", PathOf(fd));
   return IsToFail() ? -1 : 0;
+}
+__attribute__((visibility("default"))) int mkdir(const char* path, mode_t mode) noexcept {
+  if (create_error == 0) return static_cast<int>(syscall(SYS_mkdir, path, mode));
+  errno = create_error;
+  return -1;
+}
+__attribute__((visibility("default"))) int open(const char* path, int flags, ...) {
+  va_list rest;
+  va_start(rest, flags);
+  const mode_t mode = (flags & O_CREAT) != 0 ? va_arg(rest, mode_t) : 0;
+  va_end(rest);
+  if (create_error == 0 || (flags & O_CREAT) == 0) {
+    return static_cast<int>(syscall(SYS_openat, AT_FDCWD, path, flags, mode));
+  }
+  errno = create_error;
+  return -1;
 }
 __attribute__((visibility("default"))) int rename(const char* from, const char* to) noexcept {
   if (die_at_rename > 0 && --die_at_rename == 0) ::_exit(0);
+  if (calls_made != nullptr) Note("rename", from);
   return IsToFail() ? -1
                     : static_cast<int>(syscall(SYS_renameat2, AT_FDCWD, from, AT_FDCWD, to, 0));
 }
@@ -354,6 +388,52 @@ TEST(OutputFile, WritesNothingTwiceAfterAFailure) {
   EXPECT_EQ(Read(folder / "file"), text.substr(0, 3000));
   file.Close();
   EXPECT_TRUE(Read(folder / "file") == text);
+}
+
+// FAULTS 87: a disk or quota that is full is no matter of rights.
+TEST(RunFolder, WhatCannotBeCreatedHasTheCodeOfItsCause) {
+  for (const auto& [error, expected] :
+       {std::pair(ENOSPC, 74), {EDQUOT, 74}, {EIO, 74}, {EACCES, 73}, {EROFS, 73}}) {
+    const TemporaryFolder folder;
+    create_error = error;
+    std::string of_file, of_folder;
+    const int file = CodeOf([&] { internal::OutputFile(folder / "file", "file"); }, &of_file);
+    const int made = CodeOf([&] { internal::RunFolder(folder / "out", false); }, &of_folder);
+    create_error = 0;
+    EXPECT_EQ(file, expected) << of_file;
+    EXPECT_EQ(made, expected) << of_folder;
+    EXPECT_TRUE(of_file.starts_with("file: cannot create: ")) << of_file;
+    EXPECT_TRUE(of_folder.starts_with((folder / "out").string() + ": cannot create: "))
+        << of_folder;
+  }
+}
+
+// A power cut leaves no file with a part of what was written.
+TEST(RunFolder, EveryFileIsSyncedAfterItsLastWriteAndBeforeItsFolderTakesItsName) {
+  const TemporaryFolder folder;
+  std::vector<std::string> calls;
+  Experiment experiment = MakeExperiment(5);
+  calls_made = &calls;
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  recorder.Finish(RunInto(recorder, experiment));
+  calls_made = nullptr;
+  const auto renamed = std::ranges::find_if(
+      calls, [](const std::string& call) { return call.starts_with("rename "); });
+  ASSERT_NE(renamed, calls.end());
+  const std::string partial = renamed->substr(std::string("rename ").size());
+  const auto last = [&](const std::string& call) {
+    return std::ranges::find(calls.rbegin(), calls.rend(), call);  // before base() it is
+  };
+  for (const std::string& name : FilesIn(folder / "out")) {
+    const std::string path = partial + '/' + name;
+    const auto written = last("write " + path), synced = last("fsync " + path);
+    ASSERT_NE(written, calls.rend()) << path;
+    ASSERT_NE(synced, calls.rend()) << path;
+    EXPECT_LT(written.base(), synced.base()) << path;
+    EXPECT_LT(synced.base(), renamed + 1) << path;
+  }
+  EXPECT_LT(last("fsync " + partial).base(), renamed + 1);
+  EXPECT_EQ(calls.back(), "fsync " + folder.path().string());
 }
 
 // FAULTS 87: every write, fsync and rename in turn, on a new folder and on one to be replaced.

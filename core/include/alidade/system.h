@@ -100,9 +100,9 @@ std::string UnitOf(const System& system, BlockId id);
 
 }  // namespace internal
 
-/// Directions of the initial state that no sensor can see, found at a generic point near the prior
-/// from the rank of the observability matrix [H; H F; H F^2; ...]: for each one the names of the
-/// block elements it moves. With landmarks, `scale` is that of path and map; exact priors are seen.
+/// Directions of the initial state near the prior that no sensor can see, whatever the input,
+/// from the rank of [H0; H1 F0; H2 F1 F0; ...] under changing ones [Hermann1977]: the block
+/// elements each moves. With landmarks, `scale` is that of path and map; exact priors are seen.
 std::vector<std::vector<std::string>> UnobservableDirections(const System& system);
 
 }  // namespace alidade

@@ -74,21 +74,19 @@ std::vector<char> Ekf::Landmarks::Support(std::span<Row* const> matches) {
 }
 
 /// Which of the matches lie within their noise of what the state predicts that one of them corrects
-/// by itself; P stays as it is.
+/// by itself, as an update would: what is considered stays, and held roles are seen as they are.
 void Ekf::Landmarks::SupportOf(std::size_t hypothesis, std::span<Row* const> matches,
                                std::vector<char>& agrees) {
   const Row& one = *matches[hypothesis];
   const MeasurementReport& own = ekf_.EntryOf(one);
   const Eigen::Index n = ekf_.state_.covariance().size(), m = own.dof;
-  const Eigen::Map<const Eigen::MatrixXd> pht(one.pht.data(), n, m);
+  Eigen::MatrixXd pht = Eigen::Map<const Eigen::MatrixXd>(one.pht.data(), n, m);
+  ekf_.MaskConsidered(matches.subspan(hypothesis, 1), pht);
   const Eigen::Map<const Eigen::MatrixXd> s(own.s.data(), m, m);
   const Eigen::Map<const Eigen::VectorXd> innovation(own.innovation.data(), m);
   const Eigen::VectorXd dx = pht * s.llt().solve(innovation);
   std::vector<double> moved;
   ekf_.state_.Retract(dx.data(), moved);
-  std::vector<double>& values = ekf_.state_.values();
-  const std::vector<double> before = values;
-  std::ranges::copy(moved, values.begin());
   agrees.assign(matches.size(), 0);
   std::vector<double> h, r, work;
   for (std::size_t i = 0; i < matches.size(); ++i) {
@@ -97,13 +95,12 @@ void Ekf::Landmarks::SupportOf(std::size_t hypothesis, std::span<Row* const> mat
     const SensorModel& model = ekf_.ModelOf(row);
     h.resize(entry.z.size());
     r.resize(static_cast<std::size_t>(entry.dof));
-    if (model.Predict(ekf_.PlanOf(row).roles.data(), h.data()) != Status::kOk) continue;
+    if (model.Predict(ekf_.RolesAt(row, moved), h.data()) != Status::kOk) continue;
     model.measurement().geometry.Minus(entry.z.data(), h.data(), r.data());
     work.resize(r.size() * (r.size() + 1));
     const double d2 = internal::SquaredMahalanobis(row.r.data(), r.data(), entry.dof, work.data());
     agrees[i] = d2 <= support_[static_cast<std::size_t>(row.sensor)] ? 1 : 0;
   }
-  std::ranges::copy(before, values.begin());
 }
 
 }  // namespace alidade

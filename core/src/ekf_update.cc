@@ -39,9 +39,9 @@ Outcome Ekf::Linearise(Row& row) {
     row.l.resize(m * m);
     row.zeroed = &plan;
   }
-  entry.h.resize(static_cast<std::size_t>(geometry.ambient), std::nan(""));
-  Outcome outcome =
-      plan.linearised_elsewhere ? EvaluateElsewhere(row, entry) : Evaluate(row, entry);
+  entry.h.assign(static_cast<std::size_t>(geometry.ambient), std::nan(""));
+  Outcome outcome = plan.linearised_elsewhere ? EvaluateElsewhere(row, entry)
+                                              : Evaluate(row, entry, plan.roles.data());
   if (outcome == Outcome::kOutOfDomain || outcome == Outcome::kFailed) entry.h.clear();
   if (outcome == Outcome::kAccepted) outcome = NoiseOf(row, plan.roles.data());
   if (outcome == Outcome::kAccepted) {
@@ -69,8 +69,8 @@ void Ekf::NoteRefusal(const Row& row, Outcome outcome) {
   }
 }
 
-/// h and H, whose parts are not numbers until the model writes them.
-Outcome Ekf::Evaluate(Row& row, MeasurementReport& entry) {
+/// h and H at the values `roles`; the parts of H are not numbers until the model writes them.
+Outcome Ekf::Evaluate(Row& row, MeasurementReport& entry, const double* const* roles) {
   const SensorPlan& plan = PlanOf(row);
   jacobians_.resize(plan.roles.size());
   for (std::size_t i = 0; i < plan.roles.size(); ++i) {
@@ -81,8 +81,8 @@ Outcome Ekf::Evaluate(Row& row, MeasurementReport& entry) {
       std::fill_n(row.h.data() + i * plan.width + part.column, part.size, std::nan(""));
     }
   }
-  return OutcomeOf(ModelOf(row).Linearise(plan.roles.data(), entry.h.data(), jacobians_.data(),
-                                          plan.strides.data()));
+  return OutcomeOf(
+      ModelOf(row).Linearise(roles, entry.h.data(), jacobians_.data(), plan.strides.data()));
 }
 
 /// h at the prediction; H at the first estimates, and at what the measurement implies for the role
@@ -100,9 +100,7 @@ Outcome Ekf::EvaluateElsewhere(Row& row, MeasurementReport& entry) {
     if (outcome != Outcome::kAccepted) return outcome;
   }
   predicted_.assign(entry.h.begin(), entry.h.end());
-  plan.roles.swap(plan.linearised_at);
-  outcome = Evaluate(row, entry);
-  plan.roles.swap(plan.linearised_at);
+  outcome = Evaluate(row, entry, plan.linearised_at.data());
   entry.h.assign(predicted_.begin(), predicted_.end());
   for (std::size_t i = 0; i < plan.roles.size(); ++i) {
     const Geometry& geometry = model.roles()[i].geometry;
@@ -125,6 +123,17 @@ void Ekf::Chain(Row& row, int column, int size, const double* j) {
   Workspace::Matrix chained = work_.Take(m, size);
   chained.noalias() = own * Eigen::Map<const RowMajor>(j, size, size);
   own = chained;
+}
+
+const double* const* Ekf::RolesAt(const Row& row, const std::vector<double>& values) {
+  const std::vector<RoleBinding>& bound = BindingOf(row).roles;
+  roles_ = PlanOf(row).roles;
+  for (std::size_t i = 0; i < roles_.size(); ++i) {
+    const bool held = i < bound.size() && bound[i].mode == RoleMode::kHold;
+    if (roles_[i] == nullptr || held) continue;
+    roles_[i] = values.data() + (roles_[i] - state_.values().data());
+  }
+  return roles_.data();
 }
 
 /// R at the roles, or as the measurement itself says.

@@ -29,11 +29,9 @@ Iekf::Iekf(System system, const IekfOptions& options, const std::vector<StreamIn
 
 Outcome Iekf::Apply(std::span<Row* const> rows) {
   const Workspace::Use use(work_);
-  prior_ = state_.values();
   if (at_prediction_.size() < rows.size()) at_prediction_.resize(rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i) at_prediction_[i] = EntryOf(*rows[i]);
   const std::optional<Minimum> minimum = Minimise(rows);
-  std::ranges::copy(prior_, state_.values().begin());
   if (minimum) correction_ = minimum->dx.data();
   const Outcome outcome = Ekf::Apply(rows);
   correction_ = nullptr;
@@ -78,7 +76,7 @@ std::optional<Iekf::Minimum> Iekf::Minimise(std::span<Row* const> rows) {
     s.noalias() += at.h * pht;
     if (!defined || !internal::Factorise(s) || !internal::Factorise(r)) {
       if (minimum.iterations == 0) return std::nullopt;
-      MoveFromPrior(linearised.data());
+      MoveTo(linearised.data());
       Relinearise(rows, linearised.data());
       minimum.step.reset();
       break;
@@ -123,7 +121,7 @@ double Iekf::PartThatLowersTheCost(std::span<Row* const> rows, const Direction& 
   for (int halvings = 0; halvings <= kHalvings; ++halvings) {
     const double part = std::ldexp(1.0, -halvings);
     there = at.dx + part * at.step;
-    if (MoveFromPrior(there.data()) && Innovations(rows, residual) &&
+    if (MoveTo(there.data()) && Innovations(rows, residual) &&
         (at.v + part * at.step_v).dot(there) + SquaredNorm(r, residual) <= cost) {
       return part;
     }
@@ -131,36 +129,34 @@ double Iekf::PartThatLowersTheCost(std::span<Row* const> rows, const Direction& 
   return 0.0;
 }
 
-/// Puts the state at prior (+) dx; its covariance stays that at the prior. False where that is not
-/// finite.
-bool Iekf::MoveFromPrior(const double* dx) {
-  std::ranges::copy(prior_, state_.values().begin());
-  state_.Retract(dx, moved_);
-  std::ranges::copy(moved_, state_.values().begin());
-  return AllFinite(moved_);
+/// Puts the iterate at prior (+) dx. False where that is not finite.
+bool Iekf::MoveTo(const double* dx) {
+  state_.Retract(dx, iterate_);
+  return AllFinite(iterate_);
 }
 
-/// z (-) h at the state, of all rows; false where one is not defined or not finite.
+/// z (-) h at the iterate, of all rows; false where one is not defined or not finite.
 bool Iekf::Innovations(std::span<Row* const> rows, Workspace::Vector& innovations) {
   Eigen::Index at = 0;
   for (Row* row : rows) {
     MeasurementReport& entry = EntryOf(*row);
     const SensorModel& model = ModelOf(*row);
-    if (model.Predict(PlanOf(*row).roles.data(), entry.h.data()) != Status::kOk) return false;
+    if (model.Predict(RolesAt(*row, iterate_), entry.h.data()) != Status::kOk) return false;
     model.measurement().geometry.Minus(entry.z.data(), entry.h.data(), innovations.data() + at);
     at += entry.dof;
   }
   return innovations.allFinite();
 }
 
-/// h, R, d h / d dx and S of all rows at the state, which lies at prior (+) dx.
+/// h, R, d h / d dx and S of all rows at the iterate, which lies at prior (+) dx.
 bool Iekf::Relinearise(std::span<Row* const> rows, const double* dx) {
   for (Row* row : rows) {
     MeasurementReport& entry = EntryOf(*row);
     const SensorModel& model = ModelOf(*row);
     const SensorPlan& plan = PlanOf(*row);
-    if (Evaluate(*row, entry) != Outcome::kAccepted ||
-        NoiseOf(*row, plan.roles.data()) != Outcome::kAccepted) {
+    const double* const* const roles = RolesAt(*row, iterate_);
+    if (Evaluate(*row, entry, roles) != Outcome::kAccepted ||
+        NoiseOf(*row, roles) != Outcome::kAccepted) {
       return false;
     }
     for (double& r : row->r) r /= row->weight;
@@ -171,10 +167,9 @@ bool Iekf::Relinearise(std::span<Row* const> rows, const double* dx) {
       const int offset = plan.parts[part++].offset;
       const Geometry& geometry = model.roles()[i].geometry;
       if (geometry.kind == GeometryKind::kVector) continue;
-      const double* const prior = prior_.data() + (plan.roles[i] - state_.values().data());
       const Workspace::Use use(work_);
       Workspace::Vector j = work_.Take(geometry.tangent * geometry.tangent);
-      geometry.PlusJacobian(prior, dx + offset, j.data());
+      geometry.PlusJacobian(plan.roles[i], dx + offset, j.data());
       Chain(*row, plan.columns[i], geometry.tangent, j.data());
     }
     Project(*row);

@@ -236,18 +236,13 @@ Outcome Ukf::Predict(Row& row, int halvings) {
   const Eigen::MatrixXd& root = Root();
   const Eigen::Index n = root.cols();
   const Transform transform = TransformOf(n, halvings);
-  x_ = PlanOf(row).roles;  // as held, or fixed
   Workspace::Vector dx = work_.Take(n);
   Workspace::Matrix points = work_.Take(geometry.ambient, 2 * n);
   for (Eigen::Index i = 0; i < 2 * n; ++i) {
     dx = (i < n ? transform.c : -transform.c) * root.col(i % n);
     state_.Retract(dx.data(), moved_);
-    for (std::size_t k = 0; k < x_.size(); ++k) {
-      const RoleBinding& role = binding.roles[k];
-      if (role.block < 0 || role.mode == RoleMode::kHold) continue;
-      x_[k] = moved_.data() + state_.layout()[role.block].value_offset;
-    }
-    const Outcome outcome = OutcomeOf(binding.model.Predict(x_.data(), points.col(i).data()));
+    const Outcome outcome =
+        OutcomeOf(binding.model.Predict(RolesAt(row, moved_), points.col(i).data()));
     if (outcome != Outcome::kAccepted) return outcome;
   }
   Predicted& predicted = predicted_[row.report];

@@ -344,6 +344,75 @@ TEST(Ekf, ACovarianceMovesWithItsUnitVectorTheSameInSmallAndLargeFilters) {
       1e-12);
 }
 
+/// z = x^k c + n
+struct PowerTimes : Sensor<Vec<1>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}, Quantity{"c"}};
+  static constexpr Quantity kMeasurement{"z"};
+  int power;
+  explicit PowerTimes(int k) : power(k) {}
+  template <class T>
+  bool Predict(const T* x, const T* c, T* z) const {
+    z[0] = c[0];
+    for (int i = 0; i < power; ++i) z[0] = z[0] * x[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(0.1);
+  }
+};
+
+/// z = x - c + n. It leaves of P = 1.9 I the correlated P = [[1, .9], [.9, 1]]: .9 = 1.9^2 / S.
+struct Difference : Sensor<Vec<1>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}, Quantity{"c"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, const T* c, T* z) const {
+    z[0] = x[0] - c[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(std::sqrt(1.9 * 1.9 / 0.9 - 3.8));
+  }
+};
+
+/// After z = 2 = x^k c with R = .01 and c held; x = c = 1 before, as correlated as Difference says.
+State AfterAHeldRole(int power) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 1.0, std::sqrt(1.9)}});
+  AddMotion(system, "q", InProcessMotion(Constant<>(1), "constant"), {{"c", 1.0, std::sqrt(1.9)}});
+  AddSensor(system, "difference", InProcessSensor(Difference(), "difference"), {"p.x", "q.c"});
+  AddSensor(system, "power", InProcessSensor(PowerTimes(power), "power"), {"p.x", "q.c"});
+  system.sensors[1].roles[1].mode = RoleMode::kHold;
+  IekfOptions options;
+  options.max_iterations = 50;
+  options.tolerance = 1e-9;
+  Iekf iekf(system, options, StreamsOf(system));
+  iekf.Process(FrameAt(0.0, {{0, 0.0}}));
+  EXPECT_NEAR(CovarianceOf(iekf.state(), "p.x", "q.c"), 0.9, 1e-12);
+  EXPECT_NEAR(CovarianceOf(iekf.state(), "p.x", "p.x"), 1.0, 1e-12);
+  const UpdateReport& report = iekf.Process(FrameAt(0.0, {{1, 2.0}}));
+  EXPECT_TRUE(report.events.empty()) << report.events[0].text;
+  return iekf.state();
+}
+
+// With c held h = x is linear: K = (1, .9) / 1.01.
+TEST(Iekf, HoldsARoleInEveryIteration) {
+  const State linear = AfterAHeldRole(1);
+  EXPECT_NEAR(ValueOf(linear, "p.x"), 1.0 + 1.0 / 1.01, 1e-9);
+  EXPECT_NEAR(ValueOf(linear, "q.c"), 1.0 + 0.9 / 1.01, 1e-9);
+  EXPECT_NEAR(CovarianceOf(linear, "p.x", "p.x"), 0.01 / 1.01, 1e-9);
+  EXPECT_NEAR(CovarianceOf(linear, "q.c", "q.c"), 1.0 - 0.81 / 1.01, 1e-9);
+  const State cubic = AfterAHeldRole(3);
+  const auto cost = [](double x) {
+    return std::pow(x - 1.0, 2) + std::pow((2.0 - x * x * x) / 0.1, 2);
+  };
+  const double x = Least(cost, 1.0, 1.5);
+  EXPECT_NEAR(ValueOf(cubic, "p.x"), x, 1e-7);  // of golden sections: the root of rounding
+  EXPECT_NEAR(ValueOf(cubic, "q.c"), 1.0 + 0.9 * (x - 1.0), 1e-7);
+}
+
 TEST(Iekf, RefusesWhatItCannotDo) {
   System considered = DepthFilter();
   considered.sensors[1].roles[1].mode = RoleMode::kConsider;

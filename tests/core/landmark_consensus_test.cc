@@ -19,13 +19,17 @@ Eigen::Vector3d PointAt(int i) {
 }
 
 /// A known map, and a camera that may have moved by 0.1 m, or `sigma_0`, since.
-Ekf Filter(bool ransac, double gate = 0.999, double sigma_0 = 0.1, const RobustLoss& loss = {}) {
+System KnownMap(double sigma_0 = 0.1) {
   LandmarkOptions options = WithPrior();
   for (int i = 0; i < kPoints; ++i) {
     const Eigen::Vector3d p = PointAt(i);
     options.known.push_back({i, {p[0], p[1], p[2]}, 0.002});
   }
-  System system = MapSystem(InverseDepthPixels(kNoise), options, sigma_0);
+  return MapSystem(InverseDepthPixels(kNoise), options, sigma_0);
+}
+
+Ekf Filter(bool ransac, double gate = 0.999, double sigma_0 = 0.1, const RobustLoss& loss = {}) {
+  System system = KnownMap(sigma_0);
   system.sensors[0].loss = loss;
   if (ransac) system.sensors[0].association = OnePointRansac{};
   EkfOptions gated;
@@ -118,6 +122,70 @@ TEST(OnePointRansac, TestsAgainstTheSensorsNoiseWhateverTheLoss) {
   Ekf plain = Filter(false, 1.0, 0.001);
   plain.Process(right);
   EXPECT_GT((PositionOf(plain) - PositionOf(told)).norm(), 5e-5);
+}
+
+// What fits must fit by the threshold of its own, whatever the support is asked for.
+TEST(OnePointRansac, RescuesByItsOwnThreshold) {
+  const Frame frame = Matches({0.05, -0.03, 0.08}, 1000, 0.0);
+  int rescued[2];
+  for (const int strict : {0, 1}) {
+    System system = KnownMap();
+    system.sensors[0].association = OnePointRansac{.rescue = strict == 1 ? 1e-6 : 0.99};
+    rescued[strict] = EkfOf(system).Process(frame).landmarks.rescued;
+  }
+  EXPECT_GT(rescued[0], 0);
+  EXPECT_EQ(rescued[1], 0);
+}
+
+// No match moves a camera that is only considered, so none explains 0.05 m, 25 times the noise. All
+// join afterwards, by the uncertainty of the camera.
+TEST(OnePointRansac, AHypothesisDoesNotMoveWhatIsConsidered) {
+  const Frame frame = Matches({0.05, -0.03, 0.0}, 1000, 0.0);
+  for (const bool by_role : {false, true}) {
+    System system = KnownMap();
+    system.sensors[0].association = OnePointRansac{};
+    if (by_role) {
+      system.sensors[0].roles[0].mode = RoleMode::kConsider;
+    } else {
+      StateLayout layout;
+      for (const Block& block : system.layout.blocks()) {
+        layout.Declare(block.name, block.owner, block.space, BlockStatus::kConsidered);
+      }
+      system.layout = layout;
+    }
+    Ekf ekf = EkfOf(system);
+    const UpdateReport& report = ekf.Process(frame);
+    EXPECT_EQ(report.landmarks.hypotheses, kPoints) << by_role;
+    EXPECT_EQ(report.landmarks.rescued, kPoints) << by_role;
+    EXPECT_EQ(PositionOf(ekf), Eigen::Vector3d::Zero()) << by_role;
+  }
+}
+
+// Points that entered from one camera share its uncertainty. A sensor that holds the camera sees
+// them all 0.1 m aside: one match moves them all, and all agree.
+TEST(OnePointRansac, AHypothesisIsSeenFromWhereARoleIsHeld) {
+  System system = MapSystem(Offset(0.01), {}, 0.3);
+  SensorBinding held = system.sensors[0];
+  held.name = held.stream = "held";
+  held.roles[0].mode = RoleMode::kHold;
+  held.association = OnePointRansac{};
+  system.sensors.push_back(held);
+  Ekf ekf(system, {}, {{"tracks", 3}, {"held", 3}});
+  std::vector<Observation> seen, aside;
+  for (int i = 0; i < 10; ++i) {
+    const Eigen::Vector3d p = PointAt(i);
+    seen.push_back({i, {p[0], p[1], p[2]}});
+    aside.push_back({i, {p[0] + 0.1, p[1], p[2]}});
+  }
+  EXPECT_EQ(ekf.Process(FrameOf(0.0, seen)).landmarks.initialised, 10);
+  Frame frame = FrameOf(0.0, aside);
+  for (Measurement& m : frame.measurements) m.stream = 1;
+  const UpdateReport& report = ekf.Process(frame);
+  EXPECT_EQ(report.landmarks.hypotheses, 1);
+  EXPECT_EQ(report.landmarks.rescued, 0);
+  for (const MeasurementReport& entry : report.measurements()) {
+    EXPECT_EQ(entry.outcome, Outcome::kAccepted);
+  }
 }
 
 TEST(OnePointRansac, IsTheSameTwice) {

@@ -106,6 +106,9 @@ class Ekf : public Estimator {
   bool StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s);
   /// h, the innovation, R and what the estimator makes of h, in `row` and its report.
   virtual Outcome Linearise(Row& row);
+  /// The row's roles where the state has `values`, but those that its sensor holds as they are in
+  /// the state. Until the next call.
+  const double* const* RolesAt(const Row& row, const std::vector<double>& values);
   /// R at the values `roles`, or as the measurement itself says, in `row`.
   Outcome NoiseOf(Row& row, const double* const* roles);
   /// S of one measurement by itself, in its report.
@@ -171,7 +174,7 @@ class Ekf : public Estimator {
 
   void Collect(const Frame& frame);
   void Fuse(std::span<Row* const> group);
-  Outcome Evaluate(Row& row, MeasurementReport& entry);
+  Outcome Evaluate(Row& row, MeasurementReport& entry, const double* const* roles);
   Outcome EvaluateElsewhere(Row& row, MeasurementReport& entry);
   void Chain(Row& row, int column, int size, const double* j);
   Outcome Gate(Row& row);
@@ -227,6 +230,7 @@ class Ekf : public Estimator {
   std::vector<Row*> group_, passed_;
   std::vector<double> next_, moved_, predicted_;
   std::vector<double*> jacobians_;
+  std::vector<const double*> roles_;
   Stamp stamp_ = kNoStamp;
   ControlInputs inputs_;
   Stamp most_parts_ = 1;                ///< of a gap, as far as they were noted

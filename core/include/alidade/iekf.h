@@ -63,13 +63,13 @@ class Iekf : public Ekf {
   std::optional<Minimum> Minimise(std::span<Row* const> rows);
   double PartThatLowersTheCost(std::span<Row* const> rows, const Direction& at,
                                const Workspace::Matrix& r, Workspace::Vector& residual);
-  bool MoveFromPrior(const double* dx);
+  bool MoveTo(const double* dx);
   bool Innovations(std::span<Row* const> rows, Workspace::Vector& innovations);
   bool Relinearise(std::span<Row* const> rows, const double* dx);
 
   int max_iterations_;
   double tolerance_;
-  std::vector<double> prior_;                     ///< values before the update
+  std::vector<double> iterate_;                   ///< values on the way; the state is the prior
   std::vector<MeasurementReport> at_prediction_;  ///< reports of its rows
 };
 

@@ -255,15 +255,19 @@ void Ekf::PropagateModels() {
   }
 }
 
-/// What one motion model makes of its blocks: next_, and F and G Q G' of the plan. False where the
-/// filter cannot go on.
-bool Ekf::StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s) {
+/// What one motion model makes of its blocks: next_, L, and with `derivatives` F and G Q G' of the
+/// plan. False where the filter cannot go on.
+bool Ekf::StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s, bool derivatives) {
   const double unwritten = std::nan("");
-  std::fill(plan.f.begin(), plan.f.end(), unwritten);
-  std::fill(plan.g.begin(), plan.g.end(), unwritten);
-  std::fill(plan.l.begin(), plan.l.end(), 0.0);
+  std::ranges::fill(plan.f, unwritten);
+  std::ranges::fill(plan.g, unwritten);
+  std::ranges::fill(plan.l, unwritten);
+  for (std::size_t i = 0; i < motion.blocks.size(); ++i) {
+    std::fill_n(plan.next[i], state_.layout()[motion.blocks[i]].geometry().ambient, unwritten);
+  }
   Status status = motion.model.Step(plan.x.data(), plan.u, nullptr, dt_s, plan.next.data(),
-                                    plan.f.data(), plan.g.data());
+                                    derivatives ? plan.f.data() : nullptr,
+                                    derivatives ? plan.g.data() : nullptr);
   if (status == Status::kOk) status = motion.model.SqrtQ(plan.x.data(), dt_s, plan.l.data());
   if (status != Status::kOk) {
     GiveUp(status == Status::kError ? "plugin_failed" : "diverged",
@@ -271,9 +275,12 @@ bool Ekf::StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s) 
                (status == Status::kError ? motion.model.error_text() : "out of its domain"));
     return false;
   }
-  internal::SpreadNoise(plan.g.data(), plan.l.data(), motion.model.tangent_size(),
-                        motion.model.noise_size(), plan.gl.data(), plan.q.data());
-  bool finite = AllFinite(plan.f) && AllFinite(plan.q);
+  bool finite = AllFinite(plan.l);
+  if (derivatives) {
+    internal::SpreadNoise(plan.g.data(), plan.l.data(), motion.model.tangent_size(),
+                          motion.model.noise_size(), plan.gl.data(), plan.q.data());
+    finite = finite && AllFinite(plan.f) && AllFinite(plan.q);
+  }
   for (std::size_t i = 0; i < motion.blocks.size(); ++i) {
     const auto size =
         static_cast<std::size_t>(state_.layout()[motion.blocks[i]].geometry().ambient);

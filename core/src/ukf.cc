@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "cholesky.h"
 #include "ekf_kept.h"
@@ -14,16 +15,20 @@ namespace alidade {
 namespace {
 
 /// Mean of the points that `centre` and the columns of `points` are, and f_i = (y_i (-) mean) -
-/// (centre (-) mean): `f` (tangent x 2N) and m = w sum f_i. False where the iteration does not
-/// settle, the points being too far apart.
+/// (centre (-) mean): `f` (tangent x 2N) and m = w sum f_i. The mean is found where the step to the
+/// next one is rounding: each of the 2N f_i, and the centre in all of them, may be 16 eps off.
+/// False where the iteration does not settle, the points being too far apart.
 bool MeanOf(const Geometry& geometry, const double* centre,
             const Eigen::Ref<const Eigen::MatrixXd>& points, double w, Workspace& work,
             double* mean, Eigen::Ref<Eigen::MatrixXd> f, Eigen::Ref<Eigen::VectorXd> m) {
   constexpr int kMostIterations = 200;
-  constexpr double kSettled = 1e-14;
+  constexpr double kRounding = 16.0 * std::numeric_limits<double>::epsilon();
   const Workspace::Use use(work);
+  const Eigen::Map<const Eigen::VectorXd> x(centre, geometry.ambient);
+  const double settled = kRounding * (1.0 + w * static_cast<double>(points.cols())) *
+                         std::max(1.0, x.lpNorm<Eigen::Infinity>());
   std::copy_n(centre, geometry.ambient, mean);
-  Workspace::Vector from_mean = work.Take(geometry.tangent), last = work.Take(geometry.ambient);
+  Workspace::Vector from_mean = work.Take(geometry.tangent);
   for (int k = 0; k < kMostIterations; ++k) {
     geometry.Minus(centre, mean, from_mean.data());
     for (Eigen::Index i = 0; i < points.cols(); ++i) {
@@ -35,11 +40,9 @@ bool MeanOf(const Geometry& geometry, const double* centre,
       geometry.Plus(centre, m.data(), mean);
       return true;
     }
-    std::copy_n(mean, geometry.ambient, last.data());
     from_mean += m;
-    geometry.Plus(last.data(), from_mean.data(), mean);
-    geometry.Minus(mean, last.data(), from_mean.data());
-    if (from_mean.norm() <= kSettled) return true;
+    if (k > 0 && from_mean.norm() <= settled) return true;
+    geometry.Plus(mean, from_mean.data(), mean);
   }
   return false;
 }
@@ -88,6 +91,7 @@ void Ukf::Restore(const Snapshot& snapshot) {
 
 Ukf::Transform Ukf::TransformOf(Eigen::Index directions, int halvings) const {
   const double alpha = std::ldexp(spread_.alpha, -halvings);
+  if (directions == 0) return {0.0, 0.0, spread_.beta - alpha * alpha};  // no point but the centre
   const double c2 = alpha * alpha * (static_cast<double>(directions) + spread_.kappa);
   return {std::sqrt(c2), 0.5 / c2, spread_.beta - alpha * alpha};
 }
@@ -211,7 +215,8 @@ bool Ukf::StepOnce(double dt_s) {
   if (std::ranges::none_of(motions_, &MotionPlan::active)) return true;
   for (std::size_t i = 0; i < motions_.size(); ++i) {
     if (!motions_[i].active) continue;
-    if (!StepModel(system_.motions[i], motions_[i], dt_s)) return false;  // the centre, and Lq
+    // The centre, and Lq.
+    if (!StepModel(system_.motions[i], motions_[i], dt_s, /*derivatives=*/false)) return false;
   }
   int halvings = 0;
   Status status = StepPoints(halvings, dt_s);

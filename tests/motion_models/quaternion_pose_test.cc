@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include "alidade/in_process.h"
+#include "alidade/random.h"
+#include "alidade/ukf.h"
 #include "support/model_checks.h"
 #include "support/model_maker.h"
 
@@ -58,6 +61,93 @@ TEST(QuaternionPose, NoiseIsOneNumberOrOneForEachAxis) {
     ASSERT_EQ(host.failures().size(), 1u) << bad.size();
     EXPECT_EQ(host.failures()[0],
               "noise.linear_acceleration: needs one number, or one for each axis");
+  }
+}
+
+/// z = x (+) n, n ~ N(0, 0.02^2 I)
+template <class G>
+struct Itself : Sensor<G, G> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    for (int i = 0; i < G::kAmbient; ++i) z[i] = x[i];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    for (int i = 0; i < G::kTangent; ++i) l[(G::kTangent + 1) * i] = T(0.02);
+  }
+};
+
+/// A body at rest at first, whose position and orientation are measured.
+System MeasuredPose(const MotionModel& model) {
+  System system;
+  MotionBinding binding{"body", model, {}};
+  const Blocks means{{0, 0, 0}, {1, 0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
+  for (std::size_t i = 0; i < means.size(); ++i) {
+    const Space& space = model.blocks()[i];
+    const BlockId id = system.layout.Declare("body." + space.name, "body", space);
+    binding.blocks.push_back(id);
+    system.priors.push_back({id, means[i], 0.0025 * Eigen::Matrix3d::Identity(), ""});
+  }
+  system.motions.push_back(binding);
+  const auto add = [&](const std::string& name, const SensorModel& sensor, BlockId id) {
+    SensorBinding& bound = system.sensors.emplace_back(name, name, sensor);
+    bound.roles.resize(1);
+    bound.roles[0].block = id;
+  };
+  add("position", InProcessSensor(Itself<Vec<3>>(), "position"), 0);
+  add("orientation", InProcessSensor(Itself<UnitQuaternion>(), "orientation"), 1);
+  return system;
+}
+
+// Velocities of some 0.3 m/s and rad/s: the filters differ by what a step of 0.03 rad bends.
+TEST(QuaternionPose, IsFollowedByTheUnscentedFilterAtEverySpread) {
+  const MotionModel motion = MakeMotion<QuaternionPose>(kNoise);
+  const System system = MeasuredPose(motion);
+  for (const double alpha : {1e-4, 1e-3, 0.01, 0.1, 1.0}) {
+    UkfOptions options;
+    options.alpha = alpha;
+    const std::vector<StreamInfo> streams{{"position", 3}, {"orientation", 4}};
+    Ukf ukf(system, options, streams);
+    Ekf ekf(system, {}, streams);
+    Random random(43);
+    Blocks x{{0, 0, 0}, {1, 0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
+    for (int k = 0; k < 1000; ++k) {
+      Blocks next = testing::Filled(motion.blocks(), 0.0);
+      double w[6];
+      for (double& element : w) element = 0.2 * random.Normal();
+      ASSERT_EQ(motion.Step(testing::Pointers(x).data(), nullptr, w, 0.1,
+                            testing::Pointers(next).data(), nullptr, nullptr),
+                Status::kOk);
+      x = next;
+      for (const std::size_t i : {2u, 3u}) {
+        for (double& element : x[i]) element *= 0.98;
+      }
+      Frame frame;
+      frame.stamp = StampFromSeconds(0.1 * (k + 1));
+      for (int i = 0; i < 2; ++i) {
+        const Geometry& geometry = motion.blocks()[static_cast<std::size_t>(i)].geometry;
+        std::vector<double> z(x[static_cast<std::size_t>(i)]);
+        const double n[3] = {0.02 * random.Normal(), 0.02 * random.Normal(),
+                             0.02 * random.Normal()};
+        geometry.Plus(z.data(), n, z.data());
+        frame.measurements.push_back({frame.stamp, i, -1, z, {}});
+      }
+      const UpdateReport& report = ukf.Process(frame);
+      ASSERT_TRUE(report.events.empty()) << alpha << ' ' << k << ": " << report.events[0].text;
+      for (const MeasurementReport& entry : report.measurements()) {
+        ASSERT_EQ(entry.outcome, Outcome::kAccepted) << alpha << ' ' << k;
+      }
+      ekf.Process(frame);
+      for (BlockId id = 0; id < 4; ++id) {
+        double between[3];
+        motion.blocks()[static_cast<std::size_t>(id)].geometry.Minus(
+            ukf.state().value(id), ekf.state().value(id), between);
+        for (const double d : between) ASSERT_LT(std::abs(d), 0.01) << alpha << ' ' << k;
+      }
+    }
   }
 }
 

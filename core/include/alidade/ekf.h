@@ -101,9 +101,10 @@ class Ekf : public Estimator {
 
   /// Moves state and covariance by dt_s; false, and GiveUp called, where that cannot be.
   virtual bool StepOnce(double dt_s);
-  /// x', F, G and Lq of one motion model in its plan, x' in next_; false, and GiveUp called, where
-  /// that cannot be or is not finite.
-  bool StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s);
+  /// x', F, G and Lq of one motion model in its plan, x' in next_; without `derivatives` x' and Lq
+  /// alone. False, and GiveUp called, where that cannot be or is not finite.
+  bool StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s,
+                 bool derivatives = true);
   /// h, the innovation, R and what the estimator makes of h, in `row` and its report.
   virtual Outcome Linearise(Row& row);
   /// The row's roles where the state has `values`, but those that its sensor holds as they are in

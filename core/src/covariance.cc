@@ -158,7 +158,7 @@ void Covariance::Propagate(int offset, int k, const double* f, const double* q) 
 }
 
 void Covariance::Project(const JacobianRows& h, double* pht, double* s) const {
-  if (small() && h.stride == size_) {
+  if (small() && h.whole) {
     const int ld = static_cast<int>(p_.rows());
     return internal::SmallKernelsFor(size_).project(p_.data(), ld, h.data, h.rows, pht, s);
   }

@@ -46,7 +46,8 @@ void Ekf::Bind() {
       plan.considered.push_back(role.mode == RoleMode::kConsider);
       plan.width += block.geometry().tangent;
     }
-    if (small && apart && !sensor.model.has_landmark()) {  // whole rows of H
+    plan.whole = small && apart && !sensor.model.has_landmark();
+    if (plan.whole) {
       plan.width = state_.covariance().size();
       std::size_t part = 0;
       for (int& column : plan.columns) {

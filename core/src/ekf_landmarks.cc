@@ -165,14 +165,6 @@ void Ekf::Landmarks::Plan(Row& row, const Landmark& landmark) {
     plan.considered.push_back(false);
     plan.width += block.geometry().tangent;
   }
-  if (plan.width == ekf_.state_.covariance().size()) {  // rows of that width are whole
-    std::size_t part = 0;
-    for (int& column : plan.columns) {
-      if (column < 0) continue;
-      column = plan.parts[part].column = plan.parts[part].offset;
-      ++part;
-    }
-  }
   plan.strides.assign(plan.roles.size(), plan.width);
   row.plan = &plan;
   row.model = landmark.form == family.form ? nullptr : &*sensor.xyz;

@@ -298,9 +298,8 @@ bool Ekf::Small::AddSensors() {
     const SensorPlan& plan = ekf_.plans_[k];
     const SensorModel& model = ekf_.system_.sensors[k].model;
     const Geometry& geometry = model.measurement().geometry;
-    if (geometry.kind != GeometryKind::kVector || geometry.tangent > kMostOfOne ||
-        plan.width != ekf_.state_.covariance().size() || plan.linearised_elsewhere ||
-        ekf_.system_.sensors[k].loss.kind != LossKind::kNone ||
+    if (geometry.kind != GeometryKind::kVector || geometry.tangent > kMostOfOne || !plan.whole ||
+        plan.linearised_elsewhere || ekf_.system_.sensors[k].loss.kind != LossKind::kNone ||
         std::ranges::count(plan.considered, true) > 0) {
       return false;
     }

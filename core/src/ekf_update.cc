@@ -162,7 +162,7 @@ Outcome Ekf::NoiseOf(Row& row, const double* const* roles) {
 JacobianRows Ekf::JacobianOf(const Row& row) const {
   const SensorPlan& plan = PlanOf(row);
   const int m = BindingOf(row).model.measurement().geometry.tangent;
-  return {row.h.data(), m, plan.width, plan.parts};
+  return {row.h.data(), m, plan.width, plan.parts, plan.whole};
 }
 
 /// P H' and S = H P H' + R of one measurement by itself.

@@ -256,5 +256,93 @@ TEST(Ekf, FixedBlocksAreNeitherMovedNorCorrected) {
   EXPECT_NEAR(CovarianceOf(ekf.state(), "p.x", "p.x"), 4.0 + std::pow(0.125, 2), 1e-14);
 }
 
+/// z = a b
+struct Product : Sensor<Vec<1>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"a"}, Quantity{"b"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* a, const T* b, T* z) const {
+    z[0] = a[0] * b[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(1.0);
+  }
+};
+
+// z = x^2 at x = 2: H = (4, 0), S = 17. The two roles are as many as the states.
+TEST(Ekf, TwoRolesOfOneBlockAddUpInItsColumn) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 2.0, 1.0}});
+  AddMotion(system, "q", InProcessMotion(Constant<>(1), "constant"), {{"x", 5.0, 1.0}});
+  AddSensor(system, "square", InProcessSensor(Product(), "product"), {"p.x", "p.x"});
+  for (const Fuse fuse : {Fuse::kJoint, Fuse::kPerMeasurement}) {
+    EkfOptions options;
+    options.fuse = fuse;
+    Ekf ekf(system, options, StreamsOf(system));
+    ekf.Start(0);
+    const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 5.0}}));
+    EXPECT_NEAR(report.measurements()[0].s[0], 17.0, 1e-13);
+    EXPECT_NEAR(ValueOf(ekf.state(), "p.x"), 2.0 + 4.0 / 17.0, 1e-14);
+    EXPECT_EQ(ValueOf(ekf.state(), "q.x"), 5.0);
+    EXPECT_NEAR(CovarianceOf(ekf.state(), "p.x", "p.x"), 1.0 / 17.0, 1e-14);
+    EXPECT_EQ(CovarianceOf(ekf.state(), "q.x", "q.x"), 1.0);
+  }
+}
+
+/// z = p - r, a sensor of landmarks.
+struct OffsetOf : Sensor<Vec<1>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"position"},
+                                     Quantity{"landmark", "", "", "", ALIDADE_ROLE_LANDMARK}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* r, const T* p, T* z) const {
+    z[0] = p[0] - r[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(1.0);
+  }
+};
+
+// p ~ N(0, 4), r ~ N(0, 1), z = 6: S = 6, so p = 4 and r = -1. The blocks fill the state in another
+// order than the roles.
+TEST(Ekf, ASensorOfLandmarksMayReadBlocksInAnyOrder) {
+  System system;
+  AddMotion(system, "map", InProcessMotion(Constant<>(1), "constant"), {{"p", 0.0, 2.0}});
+  AddMotion(system, "cam", InProcessMotion(Constant<>(1), "constant"), {{"r", 0.0, 1.0}});
+  AddSensor(system, "offset", InProcessSensor(OffsetOf(), "offset"), {"cam.r", "map.p"});
+  for (const Fuse fuse : {Fuse::kJoint, Fuse::kPerMeasurement}) {
+    EkfOptions options;
+    options.fuse = fuse;
+    Ekf ekf(system, options, StreamsOf(system));
+    ekf.Start(0);
+    ekf.Process(FrameAt(0.0, {{0, 6.0}}));
+    EXPECT_NEAR(ValueOf(ekf.state(), "map.p"), 4.0, 1e-14);
+    EXPECT_NEAR(ValueOf(ekf.state(), "cam.r"), -1.0, 1e-14);
+  }
+}
+
+// P R / (P + R) is R but for 1e-14 of it; the difference P - P^2 / (P + R) has the last digit of P,
+// 1.5 % of R.
+TEST(Ekf, AVarianceThatNearlyVanishesKeepsItsDigitsInLargeFilters) {
+  for (const int n : {3, 20}) {
+    System system;
+    constexpr double kP = 0.7, kR = 7e-15;
+    for (int i = 0; i < n; ++i) {
+      AddMotion(system, "b" + std::to_string(i), InProcessMotion(Constant<>(1), "constant"),
+                {{"x", 1.0, std::sqrt(kP)}});
+    }
+    AddSensor(system, "direct", InProcessSensor(Linear(1.0, std::sqrt(kR)), "linear"), {"b0.x"});
+    Ekf ekf(system, {}, StreamsOf(system));
+    ASSERT_EQ(ekf.state().covariance().small(), n == 3);
+    EXPECT_EQ(ekf.Process(FrameAt(0.0, {{0, 1.1}})).measurements()[0].outcome, Outcome::kAccepted);
+    EXPECT_NEAR(CovarianceOf(ekf.state(), "b0.x", "b0.x") / kR, 1.0, 1e-6) << n;
+    EXPECT_NEAR(CovarianceOf(ekf.state(), "b1.x", "b1.x"), kP, 1e-15) << n;
+  }
+}
+
 }  // namespace
 }  // namespace alidade

@@ -28,8 +28,9 @@ struct JacobianPart {
 struct JacobianRows {
   const double* data;
   int rows;
-  int stride;  ///< numbers in a row; the size of the covariance: rows are whole, zeros included
+  int stride;  ///< numbers in a row
   std::span<const JacobianPart> parts;
+  bool whole = false;  ///< rows are as wide as the covariance, zeros included
 };
 
 /// H times `columns` (n x k), for H given by the blocks that it touches; `rows` is that of H.

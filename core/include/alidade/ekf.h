@@ -69,7 +69,8 @@ class Ekf : public Estimator {
     std::vector<int> strides;                  ///< for the model: `width` for each role
     std::vector<JacobianPart> parts;
     std::vector<bool> considered;       ///< of the parts
-    int width = 0;                      ///< of a row of H: n where the covariance is small
+    int width = 0;                      ///< of a row of H
+    bool whole = false;                 ///< a row of H is n wide, with the columns of P
     bool ready = true;                  ///< all roles have a value
     bool linearised_elsewhere = false;  ///< H is taken elsewhere than h
     std::vector<double> implied;        ///< of the role that is linearised at what z implies

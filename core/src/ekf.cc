@@ -31,7 +31,7 @@ Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>
     : system_(std::move(system)),
       options_(options),
       stream_of_sensor_(system_.sensors.size(), -1),
-      state_(system_.InitialState()),
+      state_(system_.InitialState(true)),
       steps_(steps),
       inputs_(system_, streams),
       rejections_(system_.sensors.size(), 0),

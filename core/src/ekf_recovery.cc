@@ -58,7 +58,7 @@ void Ekf::InitialiseFromMeasurements() {
 }
 
 /// Gives the block of the sensor's initialised role the value that the measurement implies, with
-/// its covariance and correlations; a block that has a value loses it. kInitialised, or why not.
+/// its covariance and correlations, in place of any that it has. kInitialised, or why not.
 Outcome Ekf::InitialiseBlock(Row& row) {
   const SensorBinding& binding = BindingOf(row);
   const BlockId id =
@@ -66,7 +66,6 @@ Outcome Ekf::InitialiseBlock(Row& row) {
   Inverse inverse;
   const Outcome outcome = Invert(row, nullptr, inverse);
   if (outcome != Outcome::kAccepted) return outcome;
-  if (state_.layout()[id].present) state_.Marginalise(id);
   state_.Initialise(id, inverse.y.data(), inverse.from, inverse.jacobians, inverse.own);
   if (!first_.empty()) FirstEstimate(id).clear();
   Bind();
@@ -163,7 +162,6 @@ void Ekf::ForgetMotionOf(BlockId id) {
       const std::vector<double> value(
           state_.value(prior.block),
           state_.value(prior.block) + state_.layout()[prior.block].geometry().ambient);
-      state_.Marginalise(prior.block);
       state_.Add(prior.block, value.data(), prior.covariance);
     }
   }

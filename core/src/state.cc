@@ -34,9 +34,9 @@ BlockId State::Declare(std::string name, std::string owner, Space space, BlockSt
   return layout_.Declare(std::move(name), std::move(owner), std::move(space), status);
 }
 
-void State::PlaceValue(BlockId id, const double* value) {
+void State::Reserve(BlockId id) {
   Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
-  ALIDADE_EXPECTS(!block.present);
+  if (block.value_offset >= 0) return;
   const int size = block.geometry().ambient;
   const auto gap = std::find_if(value_gaps_.begin(), value_gaps_.end(),
                                 [size](const auto& g) { return g.second == size; });
@@ -47,31 +47,38 @@ void State::PlaceValue(BlockId id, const double* value) {
     block.value_offset = static_cast<int>(values_.size());
     values_.resize(values_.size() + static_cast<std::size_t>(size));
   }
+  if (block.status == BlockStatus::kFixed) return;
+  block.tangent_offset = covariance_.Add(block.geometry().tangent);
+}
+
+void State::PlaceValue(BlockId id, const double* value) {
+  Reserve(id);
+  Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
   block.present = true;
-  std::copy_n(value, size, this->value(id));
+  std::copy_n(value, block.geometry().ambient, this->value(id));
 }
 
 void State::Add(BlockId id, const double* value, const Eigen::MatrixXd& covariance) {
   PlaceValue(id, value);
-  Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
+  const Block& block = layout_[id];
   if (block.status == BlockStatus::kFixed) return;
   ALIDADE_EXPECTS(covariance.rows() == block.geometry().tangent);
-  block.tangent_offset = covariance_.Add(block.geometry().tangent);
-  covariance_.SetBlock(block.tangent_offset, block.tangent_offset, covariance);
+  covariance_.SetRows(block.tangent_offset, covariance,
+                      Eigen::MatrixXd::Zero(covariance_.size(), covariance.rows()));
 }
 
 void State::Initialise(BlockId id, const double* value, const std::vector<BlockId>& from,
                        const std::vector<Eigen::MatrixXd>& jacobians, const Eigen::MatrixXd& own) {
   ALIDADE_EXPECTS(from.size() == jacobians.size());
   PlaceValue(id, value);
-  Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
+  const Block& block = layout_[id];
   if (block.status == BlockStatus::kFixed) return;
   const int rows = block.geometry().tangent;
-  block.tangent_offset = covariance_.Add(rows);
   std::vector<JacobianBlock> j;
   for (std::size_t i = 0; i < from.size(); ++i) {
     const Block& source = layout_[from[i]];
-    if (source.has_covariance()) j.push_back({source.tangent_offset, jacobians[i]});
+    const bool counts = source.has_covariance() && from[i] != id;
+    if (counts) j.push_back({source.tangent_offset, jacobians[i]});
   }
   const Eigen::MatrixXd cross = covariance_.TimesTransposed(j, rows);
   covariance_.SetRows(block.tangent_offset, Times(j, rows, cross) + own, cross);
@@ -118,10 +125,15 @@ BlockId State::Clone(BlockId source, std::string name) {
 }
 
 void State::Marginalise(BlockId id) {
+  ALIDADE_EXPECTS(layout_[id].present);
+  Release(id);
+}
+
+/// Gives the place of a block back.
+void State::Release(BlockId id) {
   Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
-  ALIDADE_EXPECTS(block.present);
   value_gaps_.emplace_back(block.value_offset, block.geometry().ambient);
-  if (block.has_covariance()) {
+  if (block.tangent_offset >= 0) {
     covariance_.Release(block.tangent_offset, block.geometry().tangent);
   }
   block.present = false;
@@ -145,7 +157,7 @@ void State::FillGaps() {
 }
 
 void State::Drop(BlockId id) {
-  if (layout_[id].present) Marginalise(id);
+  if (layout_[id].value_offset >= 0) Release(id);
   layout_.blocks_[static_cast<std::size_t>(id)] = {};
   layout_.dropped_.push_back(id);
 }

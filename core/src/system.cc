@@ -349,9 +349,10 @@ System WithoutUntouched(System system) {
 
 }  // namespace
 
-State System::InitialState() const {
+State System::InitialState(bool reserved) const {
   State state(layout);
   for (const Prior& prior : priors) {
+    if (!prior.from.empty() && reserved) state.Reserve(prior.block);
     if (!prior.from.empty()) continue;
     ALIDADE_EXPECTS(std::ssize(prior.mean) == layout[prior.block].geometry().ambient);
     state.Add(prior.block, prior.mean.data(), prior.covariance);

@@ -35,6 +35,18 @@ struct Pair : Sensor<Vec<2>, Vec<2>> {
   }
 };
 
+/// A filter that tells which path took a frame.
+class Watched : public Ekf {
+ public:
+  using Ekf::Ekf;
+  const UpdateReport& Process(const Frame& frame) override {
+    row_count_ = 0;  // the fast path leaves it
+    return Ekf::Process(frame);
+  }
+  /// Of the last frame, which had measurements.
+  bool fast() const { return row_count_ == 0; }
+};
+
 /// The same system, which a block of no sensor's keeps from the fast path.
 System WithFixedBlock(System system) {
   const BlockId id =
@@ -59,17 +71,24 @@ void ExpectEqual(const std::vector<double>& a, const std::vector<double>& b) {
   }
 }
 
-/// Both filters over the same frames; counts how often each outcome and kind of event was seen.
+/// Both filters over the same frames; counts how often each outcome and kind of event was seen, and
+/// the frames that the fast path took, in all and since the last event.
 std::map<std::string, int> Compare(const System& system, const EkfOptions& options,
                                    const std::vector<Frame>& frames) {
   const System other = WithFixedBlock(system);
-  Ekf fast(system, options, StreamsOf(system)), general(other, options, StreamsOf(other));
+  Watched fast(system, options, StreamsOf(system)), general(other, options, StreamsOf(other));
   std::map<std::string, int> seen;
   for (const Frame& frame : frames) {
     const UpdateReport& a = fast.Process(frame);
     const UpdateReport& b = general.Process(frame);
     EXPECT_EQ(a.events.size(), b.events.size());
     for (const Event& event : b.events) ++seen[event.kind];
+    if (!b.events.empty()) seen["fast since"] = 0;
+    if (!frame.measurements.empty()) {
+      EXPECT_FALSE(general.fast());
+      seen["fast"] += fast.fast();
+      seen["fast since"] += fast.fast();
+    }
     EXPECT_EQ(a.measurements().size(), b.measurements().size());
     for (std::size_t i = 0; i < a.measurements().size(); ++i) {
       const MeasurementReport& one = a.measurements()[i];
@@ -134,10 +153,57 @@ TEST(SmallEkf, DoesWhatTheGeneralPathDoes) {
     if (k % 23 == 5 && k % 7 != 3) frames.back().measurements[0].covariance = {2.0};
     if (k == 300) frames.back().stamp -= StampFromSeconds(1.0);
   }
-  const auto seen = Compare(DepthFilter(), options, frames);
+  auto seen = Compare(DepthFilter(), options, frames);
   for (const char* what : {"accepted", "gated", "invalid", "not_finite", "stale", "lockout"}) {
     EXPECT_GT(seen.count(what), 0u) << what;
   }
+  // Of the 190 frames since the reset, one in seven has no measurement, one two of a sensor.
+  EXPECT_GT(seen["fast since"], 100);
+}
+
+/// Frames 0.1 s apart with a disparity that fits a depth of 0.3 m, but in [first, last).
+std::vector<Frame> WildFrom(int first, int last, int count) {
+  std::vector<Frame> frames;
+  for (int k = 0; k < count; ++k) {
+    const double wild = k >= first && k < last ? 60.0 : 0.0;
+    frames.push_back(FrameAt(0.01 * k, {{0, 26.0 / 0.3 + wild + 0.5 * std::sin(3.0 * k)}}));
+  }
+  return frames;
+}
+
+// Every reset leaves each block where it was, whichever it resets.
+TEST(SmallEkf, ServesAgainAfterAReset) {
+  EkfOptions options;
+  options.gate = 0.999;
+  options.lockout_after = 3;
+  auto seen = Compare(DepthFilter(), options, WildFrom(20, 30, 80));
+  EXPECT_GE(seen["lockout"], 2);  // to the wild depth and back
+  EXPECT_GT(seen["fast since"], 40);
+}
+
+// The block that waits lies before others that have a prior.
+TEST(SmallEkf, ServesOnceABlockHasItsValueFromAMeasurement) {
+  System system = DepthFilter();
+  system.priors[0] = {0, {}, {}, "disparity"};
+  auto seen = Compare(system, {}, WildFrom(0, 0, 20));
+  EXPECT_EQ(seen["initialised"], 1);
+  EXPECT_EQ(seen["accepted"], 19);
+  EXPECT_EQ(seen["fast"], 19);
+}
+
+// What the fast path accepts in between ends the first lock-out: the second inflates anew.
+TEST(SmallEkf, AnAcceptedMeasurementEndsALockOut) {
+  EkfOptions options;
+  options.gate = 0.999;
+  options.lockout_after = 3;
+  options.lockout = Lockout::kInflate;
+  std::vector<Frame> frames = WildFrom(20, 23, 40);
+  const std::vector<Frame> again = WildFrom(33, 36, 40);
+  std::copy(again.begin() + 30, again.end(), frames.begin() + 30);
+  auto seen = Compare(DepthFilter(), options, frames);
+  EXPECT_EQ(seen["lockout"], 2);
+  EXPECT_EQ(seen["gated"], 6);
+  EXPECT_GT(seen["fast"], 30);
 }
 
 TEST(SmallEkf, StacksMeasurementsOfSeveralRows) {
@@ -313,6 +379,7 @@ TEST_P(SmallEkfOfSize, DoesWhatTheGeneralPathDoes) {
   auto seen = Compare(system, options, frames);
   EXPECT_GT(seen["accepted"], 60);
   EXPECT_GT(seen["gated"], 0);
+  EXPECT_GT(seen["fast"], 60);
 }
 
 INSTANTIATE_TEST_SUITE_P(UpToSixteen, SmallEkfOfSize, ::testing::Range(1, 17));

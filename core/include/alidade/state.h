@@ -24,8 +24,8 @@ struct Block {
   Space space;
   BlockStatus status = BlockStatus::kEstimated;
   bool present = false;     ///< has a value; else declared only, waiting to be initialised
-  int value_offset = -1;    ///< into StateValue, where present
-  int tangent_offset = -1;  ///< into Covariance, where present and not fixed
+  int value_offset = -1;    ///< into StateValue, where present or reserved
+  int tangent_offset = -1;  ///< into Covariance, where present or reserved, and not fixed
 
   const Geometry& geometry() const { return space.geometry; }
   bool has_covariance() const { return present && status != BlockStatus::kFixed; }
@@ -52,7 +52,7 @@ class StateLayout {
 ///
 /// x is one buffer of ambient values, P the covariance in the tangent. Adding or removing
 /// a block moves O(n) numbers: a removed block leaves a gap that the last block fills where it is
-/// no larger, or that a later one takes.
+/// no larger, or that a later one takes. A block that has a value takes another one in place.
 class State {
  public:
   State() = default;
@@ -71,6 +71,8 @@ class State {
   /// Declares a block and its place for a dynamic state (a landmark, a clone).
   BlockId Declare(std::string name, std::string owner, Space space,
                   BlockStatus status = BlockStatus::kEstimated);
+  /// Gives a declared block the place that its value will have, and rows of zeros.
+  void Reserve(BlockId id);
   /// Gives a declared block a value and a covariance (tangent, row-major; ignored where fixed),
   /// uncorrelated with the rest.
   void Add(BlockId id, const double* value, const Eigen::MatrixXd& covariance);
@@ -103,6 +105,7 @@ class State {
 
  private:
   void PlaceValue(BlockId id, const double* value);
+  void Release(BlockId id);
   void FillGaps();
 
   StateLayout layout_;

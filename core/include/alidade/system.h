@@ -79,8 +79,9 @@ struct System {
   std::optional<double> start_s;             ///< time of the priors; else the first frame's
   std::optional<LandmarkOptions> landmarks;  ///< there where a sensor measures landmarks
 
-  /// The state before the first measurement: all blocks with a given prior are present.
-  State InitialState() const;
+  /// The state before the first measurement: all blocks with a given prior are present. `reserved`:
+  /// those that start from a measurement have their places, in the order of the priors.
+  State InitialState(bool reserved = false) const;
   /// -1 where there is none.
   int FindSensor(std::string_view name) const;
 };

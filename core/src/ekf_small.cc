@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "small_kernels.h"
@@ -32,6 +33,9 @@ ALIDADE_INLINE void Copy(const double* from, int size, std::vector<double>& to) 
   for (int i = 0; i < size; ++i) at[i] = from[i];
 }
 
+/// What a model has not written yet.
+constexpr double kUnwritten = std::numeric_limits<double>::quiet_NaN();
+
 /// 0 where all are finite, else not a number.
 ALIDADE_INLINE double Defect(const double* values, int size) {
   double sum = 0.0;
@@ -46,19 +50,23 @@ ALIDADE_INLINE double Defect(const double* values, int size) {
 template <int N, int K, int W>
 ALIDADE_INLINE bool Ekf::Small::StepModel(const Motion& motion, double dt_s, double (&p)[N][N]) {
   MotionPlan& plan = *motion.plan;
+  double* const f = plan.f.data();
   double* const l = plan.l.data();
   double* const g = plan.g.data();
   const int k = K > 0 ? K : motion.size, w = W > 0 ? W : motion.noise;
-  for (int i = 0; i < w * w; ++i) l[i] = 0.0;
-  if (motion.model->Step(plan.x.data(), plan.u, nullptr, dt_s, plan.next.data(), plan.f.data(),
-                         g) != Status::kOk ||
+  for (int i = 0; i < k; ++i) ekf_.next_[static_cast<std::size_t>(motion.offset + i)] = kUnwritten;
+  for (int i = 0; i < k * k; ++i) f[i] = kUnwritten;
+  for (int i = 0; i < k * w; ++i) g[i] = kUnwritten;
+  for (int i = 0; i < w * w; ++i) l[i] = kUnwritten;
+  if (motion.model->Step(plan.x.data(), plan.u, nullptr, dt_s, plan.next.data(), f, g) !=
+          Status::kOk ||
       motion.model->SqrtQ(plan.x.data(), dt_s, l) != Status::kOk) {
     return false;
   }
   double own[K > 0 ? K * K : 1];
   double* const q = K > 0 ? own : plan.q.data();
   internal::SpreadNoise(g, l, k, w, plan.gl.data(), q);
-  internal::Propagate<N, K>(p, motion.offset, k, plan.f.data(), q);
+  internal::Propagate<N, K>(p, motion.offset, k, f, q);
   return Defect(ekf_.next_.data() + motion.offset, k) == 0.0;
 }
 
@@ -100,7 +108,9 @@ ALIDADE_INLINE bool Ekf::Small::Linearise(Sensor& sensor, const double* z, Measu
   const int m = M > 0 ? M : sensor.rows;
   const Covariance& p = ekf_.state_.covariance();
   double h[kMost], l[kMost * kMost], r[kMost], noise[kMost], s[kMost * kMost];
-  for (int i = 0; i < m * m; ++i) l[i] = 0.0;
+  for (int i = 0; i < m; ++i) h[i] = kUnwritten;
+  for (int i = 0; i < m * m; ++i) l[i] = kUnwritten;
+  for (const int i : sensor.written) sensor.h[static_cast<std::size_t>(i)] = kUnwritten;
   const double* const* const roles = sensor.roles.data();
   if (sensor.model->Linearise(roles, h, sensor.jacobians.data(), sensor.strides.data()) !=
           Status::kOk ||
@@ -309,6 +319,11 @@ bool Ekf::Small::AddSensors() {
     sensor.model = &model;
     sensor.roles = plan.roles;
     sensor.strides = plan.strides;
+    for (const JacobianPart& part : plan.parts) {
+      for (int i = 0; i < geometry.tangent * part.size; ++i) {
+        sensor.written.push_back(i / part.size * plan.width + part.column + i % part.size);
+      }
+    }
     for (const int column : plan.columns) {
       sensor.jacobians.push_back(column < 0 ? nullptr : sensor.h.data() + column);
     }

@@ -35,6 +35,7 @@ class Ekf::Small {
     std::vector<double*> jacobians;  ///< into h
     std::vector<int> strides;
     std::array<double, kMostOfOne * Covariance::kSmall> h{};  ///< H, its zeros included
+    std::vector<int> written;                                 ///< of h: by the model
     int index, stream, rows;
     int* rejections;
     double gate;

@@ -2,7 +2,6 @@
 #pragma once
 
 /* The sealed boundary between alidade and a model plugin: plain C data, nothing else.
- *
  * A plugin exports one function, `alidade_plugin`, that returns its table, and one fingerprint in
  * the ELF section `.alidade`, which the host reads before it opens the file. Rules:
  *
@@ -10,9 +9,10 @@
  *     what lies beyond as zero. Reserved tails are zero;
  *   - tables are walked by the stride that they state;
  *   - matrices are row-major with an explicit row stride, in doubles; buffers are the caller's;
- *   - a call that does not return ALIDADE_OK leaves its outputs untouched, and never throws;
+ *   - a call that returns ALIDADE_OK writes every element of its outputs, zeros included: both
+ *     triangles of L, all of F, G and each Jacobian. What it leaves out counts as not a number;
+ *   - a call that returns another code leaves its outputs untouched. None throws;
  *   - Jacobians are in the tangent of each block; angles rad, lengths m unless a unit says else.
- *
  * Authors do not write against this header: alidade/model.h does it for them. It compiles as C. */
 
 #include <stdint.h>

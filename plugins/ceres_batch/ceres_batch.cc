@@ -18,7 +18,6 @@ constexpr int kManyInputs = 1000;  // of which a solve takes seconds
 struct Options {
   enum class Data { kAll, kSoFar } data = Data::kAll;
   SolveOptions solve;
-  bool lent = false;  ///< it sees what another estimator accepted
 };
 
 /// Maximum a posteriori of all states given all data, or given the data so far (the
@@ -30,7 +29,7 @@ class CeresBatch : public Estimator {
         trajectory_(system, streams, options.solve.max_dt_s),
         solve_(options.solve),
         state_(system.InitialState()),
-        initialiser_(FilterSystem(system, options), options.solve.max_dt_s, streams) {}
+        initialiser_(system, options.solve.max_dt_s, streams) {}
 
   void Start(Stamp stamp) override {
     trajectory_.Start(stamp);
@@ -89,11 +88,6 @@ class CeresBatch : public Estimator {
   }
 
  private:
-  /// A landmark that another estimator let enter has waited long enough.
-  static System FilterSystem(System system, const Options& options) {
-    if (system.landmarks && options.lent) system.landmarks->enter_after = 1;
-    return system;
-  }
   [[noreturn]] void FailAll(const std::string& why) {
     failed_ = true;
     throw Error(ExitCode::kDiverged, why);
@@ -152,8 +146,6 @@ EstimatorMaker Create(const EstimatorArguments& arguments) {
   options.data = static_cast<Options::Data>(
       p.Choice("data", {"all", "so_far"}, "what an estimate sees: all frames, or none later", 0));
   options.solve = ReadSolveOptions(p);
-  const auto use = arguments.entry.Find("use");
-  options.lent = use && use->is_map();
   return [options, entry = arguments.entry](const System& system,
                                             const std::vector<StreamInfo>& streams) {
     CheckSupported(system, entry, "ceres_batch", kSupport);

@@ -368,5 +368,15 @@ TEST(ControlInputs, OfTheStaticFilterAreThoseOfTheEngine) {
   }
 }
 
+// Of two frames at one stamp, taken as they come, the later has the last word.
+TEST(ControlInputs, OfTwoAtOneStampTheLaterActs) {
+  const System system = Car();
+  Ekf ekf(system, {}, kStreams);
+  ekf.Process(FrameAt(0.0, {{kOdometry, 2.0}}));
+  ekf.Process(FrameAt(0.0, {{kOdometry, -1.0}}));
+  ekf.Process(FrameAt(1.5, {}));
+  EXPECT_NEAR(ValueOf(ekf.state(), "car.position"), 1.0 - 1.5, 1e-12);
+}
+
 }  // namespace
 }  // namespace alidade

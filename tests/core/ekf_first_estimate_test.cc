@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <cmath>
 
@@ -85,6 +86,61 @@ TEST(Ekf, AResetMakesANewFirstEstimate) {
   const double sigma = 2.0 / 300.0 * 8.0;  // of 1/scale = 2
   const UpdateReport& next = ekf.Process(FrameAt(0.0, {{0, 2.0}}));
   EXPECT_NEAR(next.measurements()[0].s[0], h * p * h.transpose() + sigma * sigma, 1e-12);
+}
+
+/// A direction that stays.
+struct StillDirection : Motion<0, UnitVector> {
+  static constexpr std::array kBlocks{Quantity{"u", "", "", "x,y,z"}};
+  template <class T>
+  void Step(const T* u, const T*, double, T* next) const {
+    for (int i = 0; i < 3; ++i) next[i] = u[i];
+  }
+  void SqrtQ(double, MatrixRef) const {}
+  bool Stationary() const { return true; }
+};
+
+/// z = u
+struct Direction : Sensor<Vec<3>, UnitVector> {
+  static constexpr std::array kRoles{Quantity{"u", "", "", "x,y,z"}};
+  static constexpr Quantity kMeasurement{"z", "", "", "x,y,z"};
+  template <class T>
+  bool Predict(const T* u, T* z) const {
+    for (int i = 0; i < 3; ++i) z[i] = u[i];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    for (int i = 0; i < 3; ++i) l[4 * i] = T(0.2);
+  }
+};
+
+// H d = R B(u) d: the tangent at the latest u, turned the short way to the first, R u = u0.
+TEST(Ekf, UnderFirstEstimateADirectionIsCarriedFromItsLatestTangentToItsFirst) {
+  System system;
+  MotionBinding binding{"s", InProcessMotion(StillDirection(), "still"), {}};
+  binding.blocks.push_back(system.layout.Declare("s.u", "s", binding.model.blocks()[0]));
+  const Eigen::Vector3d first = Eigen::Vector3d(0.8, 0.1, -0.5).normalized();
+  const Eigen::Matrix2d prior{{0.9, 0.2}, {0.2, 0.1}};
+  system.priors.push_back({0, {first[0], first[1], first[2]}, prior, ""});
+  system.motions.push_back(binding);
+  AddSensor(system, "direction", InProcessSensor(Direction(), "direction"), {"s.u"});
+  EkfOptions options;
+  options.jacobian = JacobianAt::kFirstEstimate;
+  Ekf ekf(system, options, {{"direction", 3}});
+  Frame frame = FrameAt(0.0, {});
+  frame.measurements.push_back({0, 0, -1, {-0.2, 0.9, 0.3}, {}});
+  ekf.Process(frame);
+  const Eigen::Vector3d latest = Eigen::Map<const Eigen::Vector3d>(ekf.state().value(0));
+  ASSERT_GT(std::acos(first.dot(latest)), 0.5);
+  Eigen::Matrix<double, 3, 2, Eigen::RowMajor> basis;
+  UnitVector::Basis(latest.data(), basis.data());
+  const Eigen::Matrix<double, 3, 2> h =
+      Eigen::Quaterniond::FromTwoVectors(latest, first).toRotationMatrix() * basis;
+  const Eigen::Matrix3d s =
+      h * ekf.state().covariance().Dense() * h.transpose() + 0.04 * Eigen::Matrix3d::Identity();
+  const UpdateReport& report = ekf.Process(frame);
+  const Eigen::Map<const Eigen::Matrix3d> found(report.measurements()[0].s.data());
+  EXPECT_LT((found - s).norm(), 1e-12) << found << "\n\n" << s;
 }
 
 }  // namespace

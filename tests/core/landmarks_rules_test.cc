@@ -234,5 +234,20 @@ TEST(Landmarks, GoBackToTheGenerationsOfTheirPast) {
   EXPECT_EQ(see(2), 2);
 }
 
+TEST(Landmarks, WhoseFirstEndIsGoneBackOverAreTheFirstOfTheirId) {
+  LandmarkOptions options;
+  options.unseen_frames = 1;
+  Ekf ekf(MapSystem(Offset(0.1), options, 0.3), {}, {{"tracks", 3}});
+  const auto see = [&ekf](std::int64_t id) {
+    ekf.Process(FrameOf(0.0, {{id, {0, 0, 1}}}));
+    return Find(ekf.landmarks(), id)->generation;
+  };
+  const auto saved = ekf.Save();
+  EXPECT_EQ(see(5), 0);
+  EXPECT_EQ(see(6), 0);  // ends 5
+  ekf.Restore(*saved);
+  EXPECT_EQ(see(5), 0);
+}
+
 }  // namespace
 }  // namespace alidade::testing

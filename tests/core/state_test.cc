@@ -61,6 +61,45 @@ TEST(State, InitialiseCarriesTheCorrelationsOfWhatItCameFrom) {
   EXPECT_EQ(*state.value(y), 7.0);
 }
 
+TEST(State, ABlockThatHasAValueTakesAnotherInItsPlace) {
+  State state = Abc(), moved = Abc();
+  const BlockId a = state.layout().Find("s.a"), b = state.layout().Find("s.b");
+  const Eigen::MatrixXd ja = Eigen::RowVector2d(1.0, -2.0);
+  const Eigen::MatrixXd own = Eigen::MatrixXd::Constant(1, 1, 0.25);
+  const double value = 7.0;
+  moved.Marginalise(b);
+  for (State* one : {&state, &moved}) one->Initialise(b, &value, {a}, {ja}, own);
+  for (const char* x : {"s.a", "s.b", "s.c"}) {
+    for (const char* y : {"s.a", "s.b", "s.c"}) EXPECT_EQ(Cross(state, x, y), Cross(moved, x, y));
+  }
+  EXPECT_EQ(*state.value(b), 7.0);
+  EXPECT_EQ(state.layout()[b].tangent_offset, 2);
+  state.Add(b, &value, own);
+  EXPECT_EQ(Cross(state, "s.b", "s.b"), own);
+  EXPECT_EQ(Cross(state, "s.a", "s.b").norm() + Cross(state, "s.b", "s.c").norm(), 0.0);
+  EXPECT_EQ(state.layout()[b].tangent_offset, 2);
+}
+
+TEST(State, AReservedPlaceIsTakenByItsBlockAlone) {
+  State state;
+  const double value = 3.0;
+  const BlockId first = state.Declare("s.first", "s", Named(Geometry::Vector(1)));
+  const BlockId second = state.Declare("s.second", "s", Named(Geometry::Vector(1)));
+  const BlockId third = state.Declare("s.third", "s", Named(Geometry::Vector(1)));
+  state.Reserve(first);
+  for (const BlockId id : {second, third}) {
+    state.Add(id, &value, Eigen::MatrixXd::Constant(1, 1, 4.0));
+  }
+  EXPECT_FALSE(state.layout()[first].present);
+  EXPECT_EQ(state.covariance().Dense(),
+            Eigen::Vector3d(0.0, 4.0, 4.0).asDiagonal().toDenseMatrix());
+  state.Marginalise(third);
+  state.Add(first, &value, Eigen::MatrixXd::Constant(1, 1, 9.0));
+  EXPECT_EQ(state.layout()[first].tangent_offset, 0);
+  EXPECT_EQ(state.layout()[first].value_offset, 0);
+  EXPECT_EQ(state.covariance().Dense(), Eigen::Vector2d(9.0, 4.0).asDiagonal().toDenseMatrix());
+}
+
 TEST(State, MarginaliseKeepsTheRestAndFillsTheGap) {
   State state = Abc();
   const Eigen::MatrixXd bc = Cross(state, "s.b", "s.c");

@@ -12,8 +12,7 @@
 namespace alidade {
 namespace {
 
-// The ekf counts to `enter_after`; what it then passes on has waited. Without a gate of its own, and
-// with the same models, the follower is that ekf.
+// The ekf counts to `enter_after`; what it then passes on has waited.
 TEST(AcceptedBy, LandmarksEnterAtTheSameObservation) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml");
   for (const auto& [key, value] :

@@ -108,8 +108,7 @@ class Ekf : public Estimator {
                  bool derivatives = true);
   /// h, the innovation, R and what the estimator makes of h, in `row` and its report.
   virtual Outcome Linearise(Row& row);
-  /// The row's roles where the state has `values`, but those that its sensor holds as they are in
-  /// the state. Until the next call.
+  /// The row's roles where the state has `values`; held ones as they are. Until the next call.
   const double* const* RolesAt(const Row& row, const std::vector<double>& values);
   /// R at the values `roles`, or as the measurement itself says, in `row`.
   Outcome NoiseOf(Row& row, const double* const* roles);
@@ -173,7 +172,6 @@ class Ekf : public Estimator {
   bool StepIsBounded() const;
   bool Propagate();
   void PropagateModels();
-
   void Collect(const Frame& frame);
   void Fuse(std::span<Row* const> group);
   Outcome Evaluate(Row& row, MeasurementReport& entry, const double* const* roles);
@@ -188,7 +186,6 @@ class Ekf : public Estimator {
   bool Correct(const Eigen::MatrixXd& w, const Eigen::MatrixXd& gain, bool masked,
                const Eigen::MatrixXd& h, const Eigen::MatrixXd& r);
   Workspace::Matrix ProjectionOf(std::span<Row* const> rows);
-
   void InitialiseFromMeasurements();
   /// What the inverse observation makes of one measurement.
   struct Inverse {
@@ -203,14 +200,12 @@ class Ekf : public Estimator {
   void CountRejections();
   void Recover(Row& row);
   void ForgetMotionOf(BlockId id);
-
   std::span<Row> rows() { return {rows_.data(), row_count_}; }
   JacobianRows JacobianOf(const Row& row) const;
   std::vector<double>& FirstEstimate(BlockId id) { return first_[static_cast<std::size_t>(id)]; }
   void NotePluginFailure(const SensorBinding& sensor);
   void NoteDivergence(const char* kind, std::string text);
   std::string Describe(const std::vector<BlockId>& blocks) const;
-
   System system_;
   EkfOptions options_;
   std::vector<int> stream_of_sensor_;  ///< -1: the source has none of that name

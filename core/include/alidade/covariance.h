@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "alidade/eigen_alignment.h"
+
 namespace alidade {
 
 /// Matrices as they cross the plugin boundary.

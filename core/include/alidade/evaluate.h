@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "alidade/eigen_alignment.h"
 #include "alidade/similarity.h"
 #include "alidade/trajectory.h"
 

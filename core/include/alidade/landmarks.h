@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "alidade/config.h"
+#include "alidade/eigen_alignment.h"
 #include "alidade/landmark_form.h"
 #include "alidade/source.h"
 

@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <vector>
 
+#include "alidade/eigen_alignment.h"
 #include "alidade/ekf.h"
 
 namespace alidade {

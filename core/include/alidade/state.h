@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "alidade/covariance.h"
+#include "alidade/eigen_alignment.h"
 #include "alidade/space.h"
 
 namespace alidade {

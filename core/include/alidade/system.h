@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "alidade/config.h"
+#include "alidade/eigen_alignment.h"
 #include "alidade/landmarks.h"
 #include "alidade/models.h"
 #include "alidade/plugin_host.h"

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "alidade/eigen_alignment.h"
 #include "alidade/source.h"
 
 namespace alidade {

@@ -4,6 +4,8 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "alidade/eigen_alignment.h"
+
 namespace alidade {
 
 /// Memory for the matrices of a step or an update, kept from one to the next: where no more and no

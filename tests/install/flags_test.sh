@@ -1,0 +1,50 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+#
+# tests/install/flags_test.sh FLAG LIBRARY OPTIONS COMPILER [CXXFLAG...] INCLUDE...
+#
+# Compiles tests/install/outsider/filter.cc with -FLAG, and with the OPTIONS (separated by `;`) that
+# the target alidade::core adds, and runs it against LIBRARY, which was built without it. Where the
+# processor lacks the instructions it is compiled only. Without OPTIONS the program must either mean
+# the same or be refused in words that name the remedy.
+set -euo pipefail
+flag=-$1 library=$2 compiler=$4
+IFS=';' read -ra options <<<"$3"
+shift 4
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+flags=(-std=c++20 -O1 -Icore/include)
+for argument in "$@"; do
+  [[ $argument == -* ]] && flags+=("$argument") || flags+=(-isystem "$argument")
+done
+flags+=("$flag")
+source=tests/install/outsider/filter.cc
+
+"$compiler" "${flags[@]}" "${options[@]}" "$source" "$library" -Wl,-rpath,"$(dirname "$library")" \
+  -o "$work/filter"
+if [[ $flag == -mavx2 ]] && ! grep -qw avx2 /proc/cpuinfo; then
+  echo "$flag: compiled; the processor cannot run it"
+else
+  "$work/filter"
+  echo "$flag: compiled and run"
+fi
+
+# What the flags mean to Eigen.
+macros=$("$compiler" "${flags[@]}" -dM -E -x c++ - </dev/null)
+remedy=
+grep -q '__SANITIZE_ADDRESS__' <<<"$macros" && remedy=-DEIGEN_MALLOC_ALREADY_ALIGNED=1
+grep -q '__AVX__' <<<"$macros" && remedy=-DEIGEN_MAX_ALIGN_BYTES=16
+if "$compiler" "${flags[@]}" -fsyntax-only "$source" 2>"$work/errors"; then
+  [[ -z $remedy ]] && exit
+  echo "error: $flag is not refused without the options of alidade::core" >&2
+  exit 1
+fi
+if [[ -z $remedy ]] || ! grep -qF -- "link the CMake target alidade::core" "$work/errors" ||
+  ! grep -qF -- "$remedy" "$work/errors"; then
+  cat "$work/errors" >&2
+  echo "error: $flag is not refused in the words expected, with the remedy '$remedy'" >&2
+  exit 1
+fi
+echo "$flag: refused without the options of alidade::core"

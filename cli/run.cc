@@ -84,6 +84,9 @@ std::string EventSummary(const RunResult& result) {
 std::string Summary(const RunResult& result, const Recorder& recorder) {
   std::string text = ComparisonTable(result);
   if (const std::string events = EventSummary(result); !events.empty()) text += '\n' + events;
+  if (const std::string note = UnoptimisedText(result.unoptimised); !note.empty()) {
+    text += '\n' + note + '\n';
+  }
   text += "\nwrote " + recorder.folder().string() + '\n';
   for (const std::string& path : recorder.highlights()) {
     text += "  " + (recorder.folder() / path).string() + '\n';

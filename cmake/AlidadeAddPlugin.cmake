@@ -6,6 +6,9 @@
 # instruction-set flags. A sealed plugin (models) needs the headers alone; BUILD_TIER (sources,
 # estimators) links alidade::core and loads only into the very build it was made with.
 # What lies in another FOLDER than `plugins` is not searched, but loaded when it is needed.
+#
+# Without optimisation a plugin is many times slower. If neither CMAKE_BUILD_TYPE nor CMAKE_CXX_FLAGS
+# chooses a level, the plugin is compiled with -O2.
 function(alidade_add_plugin name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "BUILD_TIER" "FOLDER" "SOURCES;LIBRARIES")
   if(NOT arg_FOLDER)
@@ -18,6 +21,9 @@ function(alidade_add_plugin name)
     LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib/alidade/${arg_FOLDER}
     ALIDADE_FOLDER ${arg_FOLDER})
   target_link_options(${name} PRIVATE -Wl,-z,defs)
+  if(NOT CMAKE_CXX_FLAGS MATCHES "(^| )-O")
+    target_compile_options(${name} PRIVATE $<$<CONFIG:>:-O2>)
+  endif()
   if(arg_BUILD_TIER)
     target_link_libraries(${name} PRIVATE alidade::core ${arg_LIBRARIES})
   else()

@@ -228,6 +228,9 @@ ComparedRun ReadFiles(const fs::path& folder) {
   if (!data) FailFile(folder / "run.json", 0, "does not say which data the run saw");
   run.measurements_sha256 = data->At("measurements").Text();
   run.truth_sha256 = TextOf(*data, "truth");
+  if (const auto plugins = timing.root().Find("unoptimised")) {
+    for (const Node& plugin : plugins->Items()) run.unoptimised.insert(plugin.Text());
+  }
   for (const auto& [name, entry] : root.At("estimators").Entries()) {
     ComparedEntry& one = run.estimators.emplace_back();
     one.facts = ReadFacts(entry);

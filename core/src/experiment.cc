@@ -315,6 +315,28 @@ void DeclareCommon(const Node& root) {
   }
 }
 
+/// The plugins that the source, the estimators and their models come from, as far as they were
+/// built without optimisation.
+std::set<std::string> UnoptimisedOf(const Experiment& experiment, const std::string& source,
+                                    const PluginHost& host) {
+  std::set<std::filesystem::path> models;
+  std::set<std::string> estimators;
+  for (const NamedEstimator& one : experiment.estimators) {
+    estimators.insert(one.type);
+    for (const auto& sensor : one.system.sensors) models.insert(sensor.model.instance().plugin());
+    for (const auto& motion : one.system.motions) models.insert(motion.model.instance().plugin());
+  }
+  std::set<std::string> files;
+  for (const PluginEntry& entry : host.entries()) {
+    const bool used = entry.kind == PluginEntry::Kind::kSource ? entry.name == source
+                      : entry.kind == PluginEntry::Kind::kEstimator
+                          ? estimators.contains(entry.name)
+                          : models.contains(entry.plugin);
+    if (used && entry.unoptimised) files.insert(entry.plugin.filename().string());
+  }
+  return files;
+}
+
 }  // namespace
 
 std::vector<std::filesystem::path> PluginPaths(const Config& config) {
@@ -370,6 +392,7 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   experiment.truth_sigmas =
       internal::ReadTruthSigmas(root, experiment.source->truths(), experiment.reference < 0);
   CheckTruths(source, experiment, whole);
+  experiment.unoptimised = UnoptimisedOf(experiment, source.At("type").Text(), host);
   root.RejectUnread();
   return experiment;
 }

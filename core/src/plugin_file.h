@@ -16,6 +16,7 @@ struct PluginHost::Loaded {
   std::filesystem::path file;     ///< canonical
   const AlidadeTable* table;      ///< sealed tier, else null
   const BuildTable* build_table;  ///< build tier, else null
+  bool unoptimised;               ///< by its fingerprint
 };
 
 namespace internal {

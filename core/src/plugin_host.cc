@@ -143,7 +143,8 @@ void PluginHost::Load(const fs::path& file) {
   const std::string failure = internal::TrialLoad(canonical, fingerprint.tier);
   if (!failure.empty()) Refuse(file, failure);
 
-  auto plugin = std::make_unique<Loaded>(Loaded{canonical, nullptr, nullptr});
+  const bool unoptimised = (fingerprint.flags & ALIDADE_BUILT_UNOPTIMISED) != 0;
+  auto plugin = std::make_unique<Loaded>(Loaded{canonical, nullptr, nullptr, unoptimised});
   std::string defect;
   try {
     const boost::dll::shared_library& library = OpenForGood(canonical);
@@ -166,13 +167,14 @@ void PluginHost::AddEntries(const Loaded& plugin) {
   if (plugin.build_table != nullptr) {
     for (int i = 0; i < plugin.build_table->source_count; ++i) {
       const SourceEntry& source = plugin.build_table->sources[i];
-      entries_.push_back(
-          {PluginEntry::Kind::kSource, source.name, Text(source.doc), "", "", plugin.file, 0});
+      entries_.push_back({PluginEntry::Kind::kSource, source.name, Text(source.doc), "", "",
+                          plugin.file, 0, false, plugin.unoptimised});
     }
     for (int i = 0; i < plugin.build_table->estimator_count; ++i) {
       const EstimatorEntry& one = plugin.build_table->estimators[i];
       entries_.push_back({PluginEntry::Kind::kEstimator, one.name, Text(one.doc),
-                          Text(one.citation), "", plugin.file, 0, one.kind, one.landmarks});
+                          Text(one.citation), "", plugin.file, 0, one.landmarks,
+                          plugin.unoptimised, one.kind});
     }
     return;
   }
@@ -180,7 +182,8 @@ void PluginHost::AddEntries(const Loaded& plugin) {
   for (std::uint32_t i = 0; i < table.entry_count; ++i) {
     const AlidadeEntry entry = internal::ReadEntry(table.entries, table.entry_stride, i);
     entries_.push_back({ToKind(entry.kind), entry.name, Text(entry.doc), Text(entry.citation),
-                        Text(entry.family), plugin.file, entry.thread_flags});
+                        Text(entry.family), plugin.file, entry.thread_flags, false,
+                        plugin.unoptimised});
   }
 }
 

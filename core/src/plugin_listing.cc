@@ -87,6 +87,7 @@ void AddEntry(const PluginEntry& entry, Json& json) {
   json.Key("doc").Text(entry.doc);
   json.Key("citation").Text(entry.citation);
   json.Key("file").Text(entry.plugin.string());
+  json.Key("unoptimised").Flag(entry.unoptimised);
 }
 
 void AddParameter(const ParamInfo& info, Json& json) {
@@ -128,7 +129,7 @@ std::string PluginListJson(const PluginHost& host) {
   }
   for (const EstimatorType& type : EstimatorTypes()) {
     json.Object();
-    AddEntry({PluginEntry::Kind::kEstimator, type.name, type.doc, "", "", "", 0, type.kind}, json);
+    AddEntry({PluginEntry::Kind::kEstimator, type.name, type.doc, "", "", "", 0, false, false, type.kind}, json);
     json.End();
   }
   json.End();
@@ -145,7 +146,11 @@ std::string PluginInfo(const PluginHost& host, const std::string& name) {
     if (!text.empty()) text += '\n';
     text += entry->name + ": " + KindName(entry->kind) + "\n  " + entry->doc + '\n';
     if (!entry->citation.empty()) text += "  source: " + entry->citation + '\n';
-    text += "  plugin: " + entry->plugin.string() + "\n\n";
+    text += "  plugin: " + entry->plugin.string() + '\n';
+    if (entry->unoptimised) {
+      text += std::string("  built without optimisation: ") + kBuildOptimised + '\n';
+    }
+    text += '\n';
     const std::vector<std::string> lines = host.Describe(*entry);
     for (const std::string& line : lines) text += "  " + line + '\n';
     if (!lines.empty()) text += '\n';

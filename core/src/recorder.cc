@@ -143,6 +143,9 @@ std::string Recorder::Impl::TimingJson(const RunResult& result) const {
     json.Key(one.name).Object().Key("wall_s").Number(one.wall_s).End();
   }
   json.End();
+  json.Key("unoptimised").Array();
+  for (const std::string& plugin : result.unoptimised) json.Text(plugin);
+  json.End();
   json.Key("arrivals").Object();
   json.Key("late").Integer(result.arrivals.late);
   json.Key("merged").Integer(result.arrivals.merged);

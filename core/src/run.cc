@@ -6,12 +6,15 @@
 
 #include "accepted.h"
 #include "alidade/metrics.h"
+#include "alidade/plugin_listing.h"
+#include "alidade/recorder.h"
 #include "frame_check.h"
 #include "map_metrics.h"
 #include "number_text.h"
 #include "reference.h"
 #include "reorder.h"
 #include "running.h"
+#include "text_table.h"
 
 namespace alidade {
 namespace {
@@ -259,8 +262,15 @@ const char* ToString(RunStatus status) {
   return "failed";
 }
 
+std::string UnoptimisedText(const std::set<std::string>& plugins) {
+  if (plugins.empty()) return "";
+  return "wall clock: built without optimisation, and so many times slower: " +
+         internal::Join({plugins.begin(), plugins.end()}) + "; " + kBuildOptimised;
+}
+
 RunResult Run(Experiment& experiment, const RunOptions& options) {
   RunResult result;
+  result.unoptimised = experiment.unoptimised;
   const int reference = experiment.reference;
   if (reference >= 0) {
     result.reference = experiment.estimators[static_cast<std::size_t>(reference)].name;

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -67,6 +68,8 @@ struct Experiment {
   TimePolicy time;
   int reference = -1;  ///< index of the estimator that metrics compare with; -1: truth
   std::vector<double> truth_sigmas;  ///< StreamInfo::sigma of the source's truths; empty: its own
+  /// Files, without folder, of the plugins in use that were built without optimisation.
+  std::set<std::string> unoptimised;
 };
 
 /// The files and folders that a config's `plugins:` names, relative ones taken from its folder.

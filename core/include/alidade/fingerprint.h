@@ -27,6 +27,9 @@ constexpr AlidadeFingerprint MakeFingerprint(std::uint32_t tier, const char* bui
 #if defined(_GLIBCXX_DEBUG)
   f.flags |= ALIDADE_BUILT_DEBUG_STL;
 #endif
+#if !defined(__OPTIMIZE__)
+  f.flags |= ALIDADE_BUILT_UNOPTIMISED;
+#endif
 #if defined(__AVX__)
   f.isa |= ALIDADE_ISA_AVX;
 #endif

@@ -38,7 +38,7 @@ enum {
 enum { ALIDADE_TIER_SEALED = 1, ALIDADE_TIER_BUILD = 2 };
 
 /* Bits of AlidadeFingerprint.flags. */
-enum { ALIDADE_BUILT_FAST_MATH = 1, ALIDADE_BUILT_DEBUG_STL = 2 };
+enum { ALIDADE_BUILT_FAST_MATH = 1, ALIDADE_BUILT_DEBUG_STL = 2, ALIDADE_BUILT_UNOPTIMISED = 4 };
 
 /* Bits of AlidadeFingerprint.isa: what the code needs of the processor. */
 enum { ALIDADE_ISA_AVX = 1, ALIDADE_ISA_AVX2 = 2, ALIDADE_ISA_FMA = 4, ALIDADE_ISA_AVX512F = 8 };
@@ -134,7 +134,7 @@ enum {
   ALIDADE_CAN_INITIALISE = 1,
   ALIDADE_HAS_VALIDITY = 2,
   ALIDADE_RESIDUAL_ONLY = 4, /* recursive estimators refuse it */
-  ALIDADE_CLOSED_FORM = 8,   /* Jacobians written by the author, not derived */
+  ALIDADE_CLOSED_FORM = 8,   /* analytic Jacobians, else by automatic differentiation */
   ALIDADE_STATIONARY = 16    /* motion: x' = x without noise; step need not be called */
 };
 

@@ -51,8 +51,9 @@ struct PluginEntry {
   std::string name, doc, citation, family;
   std::filesystem::path plugin;  ///< the file it came from
   unsigned thread_flags = 0;     ///< ALIDADE_THREAD_*; of a source or estimator 0
+  bool landmarks = false;        ///< of an estimator: EstimatorEntry::landmarks
+  bool unoptimised = false;      ///< the plugin was built without optimisation
   EstimatorKind estimator = EstimatorKind::kFilter;  ///< of an estimator
-  bool landmarks = false;                            ///< of an estimator: EstimatorEntry::landmarks
 };
 
 /// Why a file in a searched folder was not loaded.

@@ -7,9 +7,14 @@
 
 namespace alidade {
 
+/// The remedy for a plugin that was built without optimisation.
+inline constexpr const char* kBuildOptimised =
+    "build it with -O2, in CMake with -DCMAKE_BUILD_TYPE=Release";
+
 /// The models, sources and estimators on offer: name, kind, doc, file.
 std::string PluginList(const PluginHost& host);
-/// The same as a JSON array of objects with `name`, `kind`, `family`, `doc`, `citation`, `file`.
+/// The same as a JSON array of objects with `name`, `kind`, `family`, `doc`, `citation`, `file`,
+/// `unoptimised`.
 std::string PluginListJson(const PluginHost& host);
 
 /// All there is to know of the entries called `name`: doc, citation, what they measure or move, and
@@ -18,7 +23,7 @@ std::string PluginListJson(const PluginHost& host);
 std::string PluginInfo(const PluginHost& host, const std::string& name);
 /// The same as a JSON array: the keys of PluginListJson, `describes` (lines) and `parameters`
 /// (objects with `key`, `unit`, `type`, `range`, `default` where there is one, `choices`, `when`,
-/// `doc`). A built-in estimator has no `family`, `citation`, `file` and `describes`.
+/// `doc`). A built-in estimator has no `family`, `citation`, `file`, `unoptimised` and `describes`.
 std::string PluginInfoJson(const PluginHost& host, const std::string& name);
 
 }  // namespace alidade

@@ -146,6 +146,19 @@ void TestJacobian(const Context& context, const Function& f, const State& state,
   }
 }
 
+/// `Predict: analytic Jacobian, Initialise: automatic differentiation`
+std::string KindsText(const Model& model) {
+  const bool analytic = (model.instance->capabilities() & ALIDADE_CLOSED_FORM) != 0;
+  std::string text;
+  for (const Function& f : model.functions) {
+    if (f.differentiated == 0) continue;
+    const bool written = analytic && f.name != "Initialise";  // of which a model writes none
+    text += (text.empty() ? "" : ", ") + f.name +
+            (written ? ": analytic Jacobian" : ": automatic differentiation");
+  }
+  return text;
+}
+
 }  // namespace
 
 Finding CheckSameValue(Context& context) {
@@ -175,7 +188,8 @@ Finding CheckJacobian(Context& context) {
   }
   if (!tally.failure.empty()) return Fail(tally.failure);
   if (tally.judged == 0) return Skip("differences are nowhere good enough");
-  return Ok(std::to_string(tally.judged) + " entries agree with differences");
+  return Ok(KindsText(context.model()) + "; " + std::to_string(tally.judged) +
+            " entries agree with differences");
 }
 
 }  // namespace alidade::internal

@@ -63,8 +63,9 @@ std::string Line(const std::string& what, const Space& space) {
 /// What the model says of itself beside its blocks.
 std::vector<std::string> Capabilities(const ModelInstance& model) {
   const auto can = [&](unsigned what) { return (model.capabilities() & what) != 0; };
-  std::vector<std::string> lines = {std::string("Jacobians: ") +
-                                    (can(ALIDADE_CLOSED_FORM) ? "closed form" : "derived")};
+  std::vector<std::string> lines = {
+      std::string("Jacobians: ") +
+      (can(ALIDADE_CLOSED_FORM) ? "analytic" : "automatic differentiation")};
   if (can(ALIDADE_HAS_VALIDITY)) lines.emplace_back("refuses measurements of no use by itself");
   if (can(ALIDADE_CAN_INITIALISE)) {
     const AlidadeDescription& description = *model.c().description;

@@ -26,6 +26,19 @@ TEST_F(CheckProgram, SaysALineForEachCheckAndEndsWithZero) {
   EXPECT_FALSE(Contains(outcome.out, "FAIL"));
 }
 
+TEST_F(CheckProgram, SaysWhichJacobiansAreAnalytic) {
+  const Outcome stereo = Call(kStereo);
+  EXPECT_TRUE(Contains(stereo.out,
+                       "Predict: analytic Jacobian, Initialise: automatic "
+                       "differentiation; "))
+      << stereo.out;
+  const Outcome pose = Call({"check", "quaternion_pose", "--set", "noise.linear_acceleration=0.4",
+                             "--set", "noise.angular_acceleration=0.2"});
+  EXPECT_TRUE(Contains(pose.out, "Step: automatic differentiation; ")) << pose.out;
+  const Outcome motion = Call({"check", "constant"});
+  EXPECT_TRUE(Contains(motion.out, "Step: analytic Jacobian; ")) << motion.out;
+}
+
 TEST_F(CheckProgram, EndsWithOneWhereACheckFails) {
   // Time enough for nothing: the first call is too late.
   const Outcome outcome = Call(With(kStereo, {"--states", "100000", "--timeout", "0.01"}));

@@ -330,7 +330,7 @@ TEST_F(HostTest, DescribesRolesAndMeasurement) {
   ASSERT_EQ(lines.size(), 4u);
   EXPECT_EQ(lines[0], "role position: vector(2), m; of the point");
   EXPECT_EQ(lines[2], "measurement range_rate: vector(1), m/s; closing is negative");
-  EXPECT_EQ(lines[3], "Jacobians: derived");
+  EXPECT_EQ(lines[3], "Jacobians: automatic differentiation");
 }
 
 TEST_F(HostTest, DescribesWhatAModelCanDo) {
@@ -343,9 +343,9 @@ TEST_F(HostTest, DescribesWhatAModelCanDo) {
   };
   using Lines = std::vector<std::string>;
   EXPECT_EQ(behind_the_blocks("stereo_disparity", 2),
-            (Lines{"Jacobians: closed form", "refuses measurements of no use by itself",
+            (Lines{"Jacobians: analytic", "refuses measurements of no use by itself",
                    "can initialise depth"}));
-  EXPECT_EQ(behind_the_blocks("constant", 1), Lines{"Jacobians: closed form"});
+  EXPECT_EQ(behind_the_blocks("constant", 1), Lines{"Jacobians: analytic"});
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "alidade/model.h"
+#include "alidade/model_members.h"
 #include "alidade/status.h"
 #include "ceres/jet.h"
 
@@ -144,6 +144,7 @@ void ClosedForm(const Model& model, const double* const* x, double* const* jacob
 template <class Model>
 Status Evaluate(const Model& model, const double* const* roles, double* z, double* const* jacobians,
                 const int* strides) {
+  static_assert(detail::CheckSensorMembers<Model>());
   using Z = typename Model::Measurement;
   using Blocks = detail::Blocks<Model>;
   constexpr typename Blocks::Indices indices{};

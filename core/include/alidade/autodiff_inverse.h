@@ -35,13 +35,6 @@ constexpr std::size_t OtherRole(std::size_t k) {
   }
 }
 
-template <class Model>
-constexpr std::size_t OtherCount() {
-  std::size_t count = 0;
-  for (int i = 0; i < Blocks<Model>::kCount; ++i) count += IsInitialised<Model>(i) ? 0u : 1u;
-  return count;
-}
-
 template <class Model, class T, std::size_t... I>
 bool CallInitialise(const Model& model, const T* const* x, const T* z, const T* prior, T* y,
                     std::index_sequence<I...>) {

@@ -111,7 +111,6 @@ Status StepWithNoise(const Model& model, const double* const* x, const double* u
     return Buffered<Model>(next, step) ? Status::kOk : Status::kOutOfDomain;
   }
   if constexpr (HasStepJacobian<Model, typename Blocks<Model>::Indices>::value) {
-    static_assert(Model::Input::kAmbient == 0, "closed forms take no control input");
     const auto step = [&](double* const* to) {
       if (!CallStep(model, x, u, w, dt_s, to, indices)) return false;
       ClosedFormStep(model, x, w, dt_s, f, g, indices);
@@ -130,6 +129,7 @@ Status StepWithNoise(const Model& model, const double* const* x, const double* u
 template <class Model>
 Status Step(const Model& model, const double* const* x, const double* u, const double* w,
             double dt_s, double* const* next, MatrixRef f, MatrixRef g) {
+  static_assert(detail::CheckMotionMembers<Model>());
   const int n = detail::TangentSizeOf(model), n_w = detail::NoiseSizeOf(model);
   std::vector<double> unwanted;  // where one of the two is asked for: rare
   if (static_cast<bool>(f) != static_cast<bool>(g) && n_w > 0) {

@@ -48,11 +48,11 @@ struct MatrixRef {
 ///   static constexpr int kInitialises;                                  the role y below
 ///   template <class T> bool Initialise(const T* other..., const T* z[, prior], T* y) const;
 ///   static constexpr int kPrior;         numbers of the prior, which z does not tell; default 0
-///   void Jacobian(const double* role..., MatrixRef J_z_role...) const;  closed form, zeroed
+///   void Jacobian(const double* role..., MatrixRef J_z_role...) const;  analytic, zeroed
 ///
 /// Roles with the flag ALIDADE_ROLE_LANDMARK stand side by side and are filled by the landmark that
 /// a measurement names. Where kInitialises is the first of them, y holds them all, one after the
-/// other.
+/// other. An optional member of another signature is a compile error (alidade/model_members.h).
 template <class MeasurementGeometry, class... RoleGeometries>
 struct Sensor {
   using Measurement = MeasurementGeometry;
@@ -73,7 +73,7 @@ struct Sensor {
 ///
 ///   using Input = Vec<2>; static constexpr Quantity kInput{...};        a control input u
 ///   void StepJacobian(const double* block..., const double* w, double dt_s, MatrixRef F,
-///                     MatrixRef G) const;      closed form, zeroed; only without control input
+///                     MatrixRef G) const;      analytic, zeroed; only without control input
 ///   bool Stationary() const;                   x' = x and no noise: estimators skip the step
 ///
 /// A block with the flag ALIDADE_ROLE_OWNED, a bias or an extrinsic, is fixed at the neutral
@@ -152,12 +152,6 @@ struct HasNoiseOfMeasurement<Model, std::index_sequence<I...>,
     : std::true_type {};
 
 template <class Model, class = void>
-struct HasValid : std::false_type {};
-template <class Model>
-struct HasValid<Model, std::void_t<decltype(std::declval<const Model&>().Valid(nullptr))>>
-    : std::true_type {};
-
-template <class Model, class = void>
 struct HasSimpleSqrtQ : std::false_type {};
 template <class Model>
 struct HasSimpleSqrtQ<Model, std::void_t<decltype(std::declval<const Model&>().SqrtQ(
@@ -218,12 +212,6 @@ struct HasStepJacobian<Model, std::index_sequence<I...>,
                        std::void_t<decltype(std::declval<const Model&>().StepJacobian(
                            std::declval<Pointer<double, I>>()..., std::declval<const double*>(),
                            1.0, std::declval<MatrixRef>(), std::declval<MatrixRef>()))>>
-    : std::true_type {};
-
-template <class Model, class = void>
-struct HasStationary : std::false_type {};
-template <class Model>
-struct HasStationary<Model, std::void_t<decltype(std::declval<const Model&>().Stationary())>>
     : std::true_type {};
 
 template <class Model, class = void>

@@ -1,0 +1,43 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+#
+# tests/faults/bad_members_test.sh COMPILER INCLUDE...
+#
+# Compiles tests/faults/plugins/bad_member.cc with every value of BAD_MEMBER: a member of a model
+# that cannot be called must be refused, in words that name the member, the call and the model.
+set -euo pipefail
+compiler=$1
+shift
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+flags=(-std=c++17 -Wall -Wextra -Wpedantic -Werror -Icore/include)
+for include in "$@"; do flags+=(-isystem "$include"); done
+errors=$(mktemp)
+trap 'rm -f "$errors"' EXIT
+
+compiles() {
+  "$compiler" "${flags[@]}" -fsyntax-only "-DBAD_MEMBER=$1" tests/faults/plugins/bad_member.cc \
+    2>"$errors"
+}
+refused() {
+  local number=$1 model=$2 words=$3
+  if ! compiles "$number"; then
+    grep -qF "$words" "$errors" && grep -qF "$model" "$errors" && return
+    cat "$errors" >&2
+  fi
+  echo "error: BAD_MEMBER=$number is not refused with '$words' of $model" >&2
+  exit 1
+}
+
+compiles 0 || { cat "$errors" >&2; exit 1; }
+jacobian='Jacobian exists but cannot be called as Jacobian(const double* role..., MatrixRef J_z_role...) const'
+for number in 1 2 3 4; do refused "$number" Seen "$jacobian"; done
+for number in 5 6; do
+  refused "$number" Seen 'Valid exists but cannot be called as bool Valid(const double* z) const'
+done
+refused 7 Seen 'Initialise exists but kInitialises, the index of the role that it computes, does not'
+refused 8 Seen 'Initialise cannot be called as bool Initialise(const T* other_role..., const T* z, [const T* prior,] T* y) const'
+for number in 10 11; do
+  refused "$number" Moved 'StepJacobian exists but cannot be called as StepJacobian(const double* block..., const double* w, double dt_s, MatrixRef F, MatrixRef G) const'
+done
+refused 12 Moved 'Stationary exists but cannot be called as bool Stationary() const'
+echo "all are refused in words"

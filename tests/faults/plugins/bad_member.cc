@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// Models with an optional member that cannot be called, one for each value of BAD_MEMBER, and 0: a
+// model without one. Each must be refused in words: see bad_members_test.sh.
+#include "alidade/plugin.h"
+
+using alidade::MatrixRef;
+using alidade::Params;
+using alidade::Quantity;
+using alidade::Vec;
+
+struct Base : alidade::Sensor<Vec<1>, Vec<1>, Vec<2>> {
+  static constexpr std::array kRoles{Quantity{"a"}, Quantity{"b", "", "", "x,y"}};
+  static constexpr Quantity kMeasurement{"z"};
+  explicit Base(Params&) {}
+  template <class T>
+  bool Predict(const T* a, const T* b, T* z) const {
+    z[0] = a[0] + b[1];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(1.0);
+  }
+};
+
+struct Seen : Base {
+  using Base::Base;
+#if BAD_MEMBER == 0
+  void Jacobian(const double*, const double*, MatrixRef, MatrixRef) const {}
+  bool Valid(const double*) const { return true; }
+  template <class T>
+  bool Initialise(const T*, const T*, T*) const {
+    return true;
+  }
+  static constexpr int kInitialises = 0;
+#elif BAD_MEMBER == 1
+  void Jacobian(const double*, MatrixRef, MatrixRef) const {}  // a role is missing
+#elif BAD_MEMBER == 2
+  void Jacobian(const double*, const double*, MatrixRef, MatrixRef) {}  // not const
+#elif BAD_MEMBER == 3
+  template <class T>
+  void Jacobian(const T*, const T*, T*, T*) const {}
+  void Jacobian(double) const {}  // neither of the two
+#elif BAD_MEMBER == 4
+ private:
+  void Jacobian(const double*, const double*, MatrixRef, MatrixRef) const {}
+#elif BAD_MEMBER == 5
+  bool Valid(double) const { return true; }
+#elif BAD_MEMBER == 6
+  void Valid(const double*) const {}  // no answer
+#elif BAD_MEMBER == 7
+  template <class T>
+  bool Initialise(const T*, const T*, T*) const {
+    return true;
+  }
+#elif BAD_MEMBER == 8
+  static constexpr int kInitialises = 0;
+  template <class T>
+  bool Initialise(const T*, T*) const {  // the role b is missing
+    return true;
+  }
+#endif
+};
+
+struct MotionBase : alidade::Motion<1, Vec<1>> {
+  static constexpr std::array kBlocks{Quantity{"x"}};
+  explicit MotionBase(Params&) {}
+  void SqrtQ(double, MatrixRef l) const { l(0, 0) = 1.0; }
+};
+
+struct Moved : MotionBase {
+  using MotionBase::MotionBase;
+#if BAD_MEMBER == 11
+  using Input = Vec<2>;
+  static constexpr Quantity kInput{"u", "", "", "x,y"};
+  template <class T>
+  void Step(const T* x, const T*, const T* w, double, T* next) const {
+    next[0] = x[0] + w[0];
+  }
+  void StepJacobian(const double*, const double*, const double*, double, MatrixRef,
+                    MatrixRef) const {}
+#else
+  template <class T>
+  void Step(const T* x, const T* w, double, T* next) const {
+    next[0] = x[0] + w[0];
+  }
+#endif
+#if BAD_MEMBER == 0
+  void StepJacobian(const double*, const double*, double, MatrixRef f, MatrixRef g) const {
+    f(0, 0) = g(0, 0) = 1.0;
+  }
+  bool Stationary() const { return false; }
+#elif BAD_MEMBER == 10
+  void StepJacobian(const double*, double, MatrixRef, MatrixRef) const {}  // no noise
+#elif BAD_MEMBER == 12
+  bool Stationary(double) const { return false; }
+#endif
+};
+
+ALIDADE_PLUGIN(ALIDADE_SENSOR(Seen, "seen", "", ""), ALIDADE_MOTION(Moved, "moved", "", ""))

@@ -41,11 +41,10 @@ struct SensorTraits {
     alidade::detail::ForEach(add, typename Roles::Indices{});
     return all;
   }
-  __attribute__((flatten)) ALIDADE_SCALAR_LOOPS static Status Linearise(const Sensor& sensor,
-                                                                        const double* const* roles,
-                                                                        double* z,
-                                                                        double* const* jacobians,
-                                                                        const int* strides) {
+  ALIDADE_FLATTEN ALIDADE_SCALAR_LOOPS static Status Linearise(const Sensor& sensor,
+                                                               const double* const* roles,
+                                                               double* z, double* const* jacobians,
+                                                               const int* strides) {
     return Evaluate(sensor, roles, z, jacobians, strides);
   }
 };

@@ -20,6 +20,14 @@
 #define ALIDADE_SCALAR_LOOPS
 #endif
 
+/// Of a function into which all that it calls is inlined, down to the arithmetic of the model. With
+/// the checks of a sanitizer in it, that would take minutes and gigabytes to compile.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define ALIDADE_FLATTEN
+#else
+#define ALIDADE_FLATTEN __attribute__((flatten))
+#endif
+
 namespace alidade {
 namespace detail {
 

@@ -92,17 +92,16 @@ template <class Model>
 struct __attribute__((visibility("hidden"))) SensorCalls {
   static constexpr bool kInitialises = Model::kInitialises >= 0;
 
-  __attribute__((flatten)) ALIDADE_SCALAR_LOOPS static std::int32_t Eval(
+  ALIDADE_FLATTEN ALIDADE_SCALAR_LOOPS static std::int32_t Eval(
       const void* self, const double* const* roles, double* z, double* const* jacobians,
       const std::int32_t* strides) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
       return static_cast<std::int32_t>(Evaluate(model, roles, z, jacobians, strides));
     });
   }
-  __attribute__((flatten)) static std::int32_t SqrtNoise(const void* self,
-                                                         const double* const* roles,
-                                                         const double* z, double* l,
-                                                         std::int32_t stride) noexcept {
+  ALIDADE_FLATTEN static std::int32_t SqrtNoise(const void* self, const double* const* roles,
+                                                const double* z, double* l,
+                                                std::int32_t stride) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
       constexpr int m = Model::Measurement::kTangent;
       double dense[m * m] = {};
@@ -111,7 +110,7 @@ struct __attribute__((visibility("hidden"))) SensorCalls {
       return std::int32_t{ALIDADE_OK};
     });
   }
-  __attribute__((flatten)) static std::int32_t Valid(const void* self, const double* z) noexcept {
+  ALIDADE_FLATTEN static std::int32_t Valid(const void* self, const double* z) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
       if constexpr (HasValid<Model>::value) {
         return std::int32_t{model.Valid(z) ? ALIDADE_OK : ALIDADE_INVALID};
@@ -146,19 +145,17 @@ struct __attribute__((visibility("hidden"))) SensorCalls {
 
 template <class Model>
 struct __attribute__((visibility("hidden"))) MotionCalls {
-  __attribute__((flatten)) static std::int32_t Step(const void* self, const double* const* blocks,
-                                                    const double* input, const double* w,
-                                                    double dt_s, double* const* next, double* f,
-                                                    std::int32_t f_stride, double* g,
-                                                    std::int32_t g_stride) noexcept {
+  ALIDADE_FLATTEN static std::int32_t Step(const void* self, const double* const* blocks,
+                                           const double* input, const double* w, double dt_s,
+                                           double* const* next, double* f, std::int32_t f_stride,
+                                           double* g, std::int32_t g_stride) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
       return static_cast<std::int32_t>(
           alidade::Step(model, blocks, input, w, dt_s, next, {f, f_stride}, {g, g_stride}));
     });
   }
-  __attribute__((flatten)) static std::int32_t SqrtQ(const void* self, const double* const* blocks,
-                                                     double dt_s, double* l,
-                                                     std::int32_t stride) noexcept {
+  ALIDADE_FLATTEN static std::int32_t SqrtQ(const void* self, const double* const* blocks,
+                                            double dt_s, double* l, std::int32_t stride) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
       constexpr typename Blocks<Model>::Indices indices{};
       if constexpr (Model::kNoise != kDynamic) {

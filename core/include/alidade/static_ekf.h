@@ -78,7 +78,7 @@ class StaticEkf {
   /// models that take one, in order. Not kOk, and nothing moved, where a model is not defined, and
   /// kError where x' or P' is not finite.
   template <class... Inputs>
-  __attribute__((flatten)) Status Predict(double dt_s, Inputs... u) {
+  ALIDADE_FLATTEN Status Predict(double dt_s, Inputs... u) {
     static_assert(sizeof...(Inputs) == InputsBefore(sizeof...(Motions)),
                   "one control input for each model that takes one");
     const double* const inputs[] = {u..., nullptr};
@@ -87,8 +87,8 @@ class StaticEkf {
 
   /// Uses z (ambient), a measurement of `sensor` whose roles are filled by the blocks `Roles`.
   template <int... Roles, class Model>
-  __attribute__((flatten)) StaticOutcome Update(
-      const Model& sensor, const double* z, double gate = std::numeric_limits<double>::infinity());
+  ALIDADE_FLATTEN StaticOutcome Update(const Model& sensor, const double* z,
+                                       double gate = std::numeric_limits<double>::infinity());
 
  private:
   using Indices = std::make_index_sequence<static_cast<std::size_t>(kBlocks)>;

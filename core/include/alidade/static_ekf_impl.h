@@ -10,8 +10,13 @@
 /// lower triangle.
 namespace alidade {
 
-// Loops of constant length, unrolled at any level of optimisation.
+// Loops of constant length, unrolled at any level of optimisation; not under sanitizers, for the
+// reason of ALIDADE_FLATTEN.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define ALIDADE_UNROLL
+#else
 #define ALIDADE_UNROLL _Pragma("GCC unroll 16")
+#endif
 
 template <class... Motions>
 template <class Change>

@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <ostream>
+#include <set>
+
+#include "alidade/camera.h"
+#include "alidade/static_ekf.h"
+#include "host_fixture.h"
+#include "support/systems.h"
+
+/// A shipped model from its one struct, as a plugin under the engine and the batch, and composed at
+/// compile time. Each composition takes seconds to compile: the rows stand in several sources.
+namespace alidade::testing {
+
+/// x' = x (+) w: moves the roles of a sensor.
+template <class G>
+struct Wander : Motion<G::kTangent, G> {
+  static constexpr std::array kBlocks{Quantity{"x"}};
+  template <class T>
+  void Step(const T* x, const T* w, double, T* next) const {
+    G::Plus(x, w, next);
+  }
+  void SqrtQ(double dt_s, MatrixRef l) const {
+    for (int i = 0; i < G::kTangent; ++i) l(i, i) = 0.01 * std::sqrt(dt_s);
+  }
+};
+
+/// z = x (+) n: sees the blocks of a motion model.
+template <class G>
+struct Seen : Sensor<G, G> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    std::copy_n(x, G::kAmbient, z);
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    for (int i = 0; i < G::kTangent; ++i) l[i * (G::kTangent + 1)] = T(0.05);
+  }
+};
+
+using Means = std::vector<std::vector<double>>;
+
+/// Adds the state entry `name`, whose blocks start at `means`, each element known to 0.05. A
+/// control input comes on the stream `NAME.input`.
+inline void AddMotion(System& system, const std::string& name, const MotionModel& model,
+                      const Means& means) {
+  MotionBinding binding{name, model, {}};
+  if (model.has_input()) binding.input = {name + ".input"};
+  for (std::size_t i = 0; i < means.size(); ++i) {
+    const Space& space = model.blocks()[i];
+    Prior prior;
+    prior.block = system.layout.Declare(name + "." + space.name, name, space);
+    prior.mean = means[i];
+    const int n = space.geometry.tangent;
+    prior.covariance = 0.0025 * Eigen::MatrixXd::Identity(n, n);
+    binding.blocks.push_back(prior.block);
+    system.priors.push_back(prior);
+  }
+  system.motions.push_back(binding);
+}
+
+template <class G>
+void AddSeen(System& system) {
+  const std::string number = std::to_string(system.sensors.size());
+  AddSensor(system, "seen" + number, InProcessSensor(Seen<G>(), "seen"),
+            {system.layout.blocks()[system.sensors.size()].name});
+}
+template <class... G>
+void AddAllSeen(System& system, std::tuple<G...>*) {
+  (AddSeen<G>(system), ...);
+}
+
+/// The streams of the sensors, then those of the control inputs.
+inline std::vector<StreamInfo> AllStreams(const System& system) {
+  std::vector<StreamInfo> streams = StreamsOf(system);
+  for (const MotionBinding& motion : system.motions) {
+    if (!motion.model.has_input()) continue;
+    streams.push_back({motion.input.stream, motion.model.input().geometry.ambient});
+  }
+  return streams;
+}
+
+/// A control input of `size` elements that goes on for ever.
+inline std::vector<double> InputOf(int size) {
+  std::vector<double> u;
+  for (int i = 0; i < size; ++i) u.push_back(0.03 - 0.01 * i);
+  return u;
+}
+
+/// Frames in which every sensor sees the means of the priors, with noise of about its own size, and
+/// the control inputs come.
+inline std::vector<Frame> FramesOf(const System& system, int count) {
+  std::vector<Frame> frames(static_cast<std::size_t>(count));
+  for (int k = 0; k < count; ++k) {
+    Frame& frame = frames[static_cast<std::size_t>(k)];
+    frame.stamp = StampFromSeconds(0.1 * k);
+    for (std::size_t s = 0; s < system.sensors.size(); ++s) {
+      const SensorBinding& sensor = system.sensors[s];
+      std::vector<const double*> roles;
+      for (const RoleBinding& role : sensor.roles) {
+        roles.push_back(system.priors[static_cast<std::size_t>(role.block)].mean.data());
+      }
+      const Geometry& geometry = sensor.model.measurement().geometry;
+      const int m = geometry.tangent;
+      std::vector<double> z(static_cast<std::size_t>(geometry.ambient)), l(m * m), d(m);
+      EXPECT_EQ(sensor.model.Predict(roles.data(), z.data()), Status::kOk);
+      EXPECT_EQ(sensor.model.SqrtNoise(roles.data(), z.data(), l.data()), Status::kOk);
+      for (int r = 0; r < m; ++r) {
+        for (int c = 0; c <= r; ++c)
+          d[r] += l[r * m + c] * std::sin(1.7 * k + 2.0 * static_cast<double>(s) + c);
+      }
+      geometry.Plus(z.data(), d.data(), z.data());
+      frame.measurements.push_back({frame.stamp, static_cast<int>(s), -1, z, {}});
+    }
+    const std::vector<StreamInfo> streams = AllStreams(system);
+    for (std::size_t s = system.sensors.size(); s < streams.size(); ++s) {
+      frame.measurements.push_back(
+          {frame.stamp, static_cast<int>(s), -1, InputOf(streams[s].size), {}});
+    }
+  }
+  return frames;
+}
+
+/// The engine and `filter`, whose blocks are seen one by one, then by `last`, over the same frames;
+/// `inputs` are the control inputs that `filter` takes.
+template <class Filter, class Last, class... Inputs>
+void ExpectSame(const System& system, Filter filter, const Last& last, Inputs... inputs) {
+  EkfOptions options;
+  options.fuse = Fuse::kPerMeasurement;
+  Ekf engine(system, options, AllStreams(system));
+  constexpr std::make_index_sequence<static_cast<std::size_t>(Filter::kBlocks)> blocks{};
+  const auto set = [&](auto b) {
+    const Prior& prior = system.priors[b];
+    filter.template Set<b>(prior.mean.data(), prior.covariance);
+  };
+  detail::ForEach(set, blocks);
+  Stamp before = 0;
+  for (const Frame& frame : FramesOf(system, 100)) {
+    for (const MeasurementReport& m : engine.Process(frame).measurements()) {
+      ASSERT_EQ(m.outcome, Outcome::kAccepted);
+    }
+    if (frame.stamp > 0) {
+      ASSERT_EQ(filter.Predict(Seconds(frame.stamp - before), inputs...), Status::kOk);
+    }
+    before = frame.stamp;
+    const auto see = [&](auto b) {
+      const Seen<typename Filter::template Space<b>> seen;
+      ASSERT_EQ(filter.template Update<b>(seen, frame.measurements[b].values.data()),
+                StaticOutcome::kAccepted);
+    };
+    detail::ForEach(see, blocks);
+    last(filter, frame);
+    const auto compare = [&](auto b) {
+      const double* expected = engine.state().value(b);
+      for (int i = 0; i < Filter::template Space<b>::kAmbient; ++i) {
+        ASSERT_NEAR(filter.template value<b>()[i], expected[i], 1e-12) << "block " << b;
+      }
+    };
+    detail::ForEach(compare, blocks);
+    ASSERT_LT((filter.covariance() - engine.state().covariance().Dense()).norm(), 1e-12);
+  }
+}
+
+/// A model with parameters, and what the tests below need of it.
+struct Row {
+  std::string model, parameters;
+  /// Around the plugin.
+  std::function<System(const PluginHost&, const Node&)> system;
+  std::function<void(const System&)> expect_static_is_engine;
+  double nonlinearity;  ///< by which batch and filter may differ at the end, in sigmas
+};
+inline void PrintTo(const Row& row, std::ostream* out) { *out << row.model << row.parameters; }
+
+template <class Model>
+Row MotionRow(const std::string& name, const std::string& parameters, const Model& model,
+              const Means& means, double nonlinearity = 1e-9) {
+  const auto system = [=](const PluginHost& host, const Node& entry) {
+    System result;
+    AddMotion(result, "m", host.CreateMotion(name, entry), means);
+    AddAllSeen(result, static_cast<typename Model::Spaces*>(nullptr));
+    return result;
+  };
+  const auto expect = [=](const System& around) {
+    const auto nothing = [](auto&, const Frame&) {};
+    if constexpr (Model::Input::kAmbient > 0) {
+      const std::vector<double> u = InputOf(Model::Input::kAmbient);
+      ExpectSame(around, StaticEkf<Model>(model), nothing, u.data());
+    } else {
+      ExpectSame(around, StaticEkf<Model>(model), nothing);
+    }
+  };
+  return {name, parameters, system, expect, nonlinearity};
+}
+
+template <class... G>
+StaticEkf<Wander<G>...> FilterOf(std::tuple<G...>*) {
+  return StaticEkf<Wander<G>...>(Wander<G>()...);
+}
+template <class... G>
+void AddWanders(System& system, const Means& means, std::tuple<G...>*) {
+  std::size_t i = 0;
+  const auto add = [&](const MotionModel& model) {
+    AddMotion(system, "w" + std::to_string(i), model, {means[i]});
+    ++i;
+  };
+  (add(InProcessMotion(Wander<G>(), "wander")), ...);
+}
+template <class Filter, class Model, std::size_t... I>
+StaticOutcome UpdateAll(Filter& filter, const Model& model, const double* z,
+                        std::index_sequence<I...>) {
+  return filter.template Update<static_cast<int>(I)...>(model, z);
+}
+
+template <class Model>
+Row SensorRow(const std::string& name, const std::string& parameters, const Model& model,
+              const Means& means) {
+  const auto spaces = static_cast<typename Model::Spaces*>(nullptr);
+  const auto system = [=](const PluginHost& host, const Node& entry) {
+    System result;
+    AddWanders(result, means, spaces);
+    AddAllSeen(result, spaces);
+    std::vector<std::string> roles;
+    for (const Block& block : result.layout.blocks()) roles.push_back(block.name);
+    AddSensor(result, "s", host.CreateSensor(name, entry), roles);
+    return result;
+  };
+  const auto expect = [=](const System& around) {
+    ExpectSame(around, FilterOf(spaces), [&](auto& filter, const Frame& frame) {
+      ASSERT_EQ(UpdateAll(filter, model, frame.measurements.back().values.data(),
+                          typename detail::Blocks<Model>::Indices{}),
+                StaticOutcome::kAccepted);
+    });
+  };
+  return {name, parameters, system, expect, 0.05};
+}
+
+/// A landmark 2 m before a camera on whose image the uncertainties here, of 0.05, are a pixel.
+inline const std::string kCamera =
+    "camera: {width: 32, height: 24, fx: 20, fy: 20, cx: 16, cy: 12}";
+inline const Camera kSmallCamera(32, 24, 20, 20, 16, 12);
+inline const std::vector<double> kPosition{0.1, -0.1, 0.2}, kOrientation{1, 0, 0, 0};
+
+/// The plugins of this build.
+inline const std::filesystem::path& ShippedFolder() {
+  static const std::filesystem::path folder =
+      std::filesystem::path(ALIDADE_BINARY_DIR) / "lib/alidade/plugins";
+  return folder;
+}
+inline const PluginHost& Shipped() {
+  static const PluginHost host({ShippedFolder()});
+  return host;
+}
+
+/// Its tests are in every_model_test.cc, its rows in every_model_*_test.cc.
+class EveryModel : public ::testing::TestWithParam<Row> {
+ protected:
+  const Row& row_ = GetParam();
+  Config parameters_ = Config::FromText(row_.parameters, row_.model);
+  void SetUp() override { system_ = row_.system(Shipped(), parameters_.root()); }
+  System system_;
+};
+
+/// `stereo_disparity_0`: the model, and which of the rows of its source.
+inline std::string RowName(const ::testing::TestParamInfo<Row>& row) {
+  return row.param.model + '_' + std::to_string(row.index);
+}
+
+}  // namespace alidade::testing

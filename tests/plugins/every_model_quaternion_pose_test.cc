@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "every_model_fixture.h"
+#include "motion_models/quaternion_pose.h"
+
+namespace alidade::testing {
+namespace {
+
+INSTANTIATE_TEST_SUITE_P(
+    QuaternionPose, EveryModel,
+    ::testing::Values(
+        MotionRow("quaternion_pose",
+                  "{noise: {linear_acceleration: 0.4, angular_acceleration: [0.2, 0.3, 0.4]}}",
+                  QuaternionPose({0.4, 0.4, 0.4}, {0.2, 0.3, 0.4}),
+                  {{1.0, 2.0, 3.0}, {1, 0, 0, 0}, {0.1, 0.0, -0.1}, {0.1, -0.1, 0.0}}, 0.05)),
+    RowName);
+
+}  // namespace
+}  // namespace alidade::testing

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "every_model_fixture.h"
+#include "sensors/self_calibrating_feature.h"
+
+namespace alidade::testing {
+namespace {
+
+INSTANTIATE_TEST_SUITE_P(
+    Radial, EveryModel,
+    ::testing::Values(SensorRow("self_calibrating_feature", "{sigma_px: 1}",
+                                SelfCalibratingFeature<RadialLens>(1.0),
+                                {kPosition, kOrientation, {20, -0.1, 0.05}, {0.2, 0.4, 2.0}})),
+    RowName);
+
+}  // namespace
+}  // namespace alidade::testing

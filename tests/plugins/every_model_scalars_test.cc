@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "every_model_fixture.h"
+
+namespace alidade::testing {
+namespace {
+
+INSTANTIATE_TEST_SUITE_P(
+    Scalars, EveryModel,
+    ::testing::Values(
+        MotionRow("constant", "{}", Constant<1>(1), {{0.7}}),
+        MotionRow("constant", "{size: 2, noise: {random_walk: 0.3}}", Constant<2>(2, 0.3),
+                  {{0.7, -0.2}}),
+        MotionRow("constant_velocity", "{noise: {acceleration: 0.4}}",
+                  ConstantVelocity<1, false>(0.4), {{1.0}, {0.1}}),
+        MotionRow("constant_velocity", "{dimensions: 2, noise: {kind: white, acceleration: 0.4}}",
+                  ConstantVelocity<2, true>(0.4), {{1.0, 2.0}, {0.1, -0.1}}),
+        MotionRow("constant_velocity", "{dimensions: 3, noise: {acceleration: 0.4}}",
+                  ConstantVelocity<3, false>(0.4), {{1.0, 2.0, 3.0}, {0.1, 0.0, -0.1}}),
+        SensorRow("stereo_disparity", "{focal_px: 400, baseline_m: 0.065, sigma_px: 1.0}",
+                  StereoDisparity(400.0, 0.065, 1.0), {{0.7}}),
+        SensorRow("scale_2d", "{template_px: 300, sigma_px: 1.0}", Scale2d::FromPixels(300.0, 1.0),
+                  {{0.7}, {1.4}}),
+        SensorRow("scale_2d", "{noise: fixed, variance: 0.0025}", Scale2d::FromVariance(0.0025),
+                  {{0.7}, {1.4}})),
+    RowName);
+
+}  // namespace
+}  // namespace alidade::testing

@@ -10,6 +10,7 @@
 #include "json.h"
 #include "number_text.h"
 #include "text_table.h"
+#include "words.h"
 
 namespace alidade {
 namespace {

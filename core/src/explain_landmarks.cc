@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "number_text.h"
+#include "words.h"
 
 namespace alidade::internal {
 

@@ -72,6 +72,8 @@ std::string GnuplotQuoted(std::string_view text) {
   return quoted += '\'';
 }
 
+std::string GnuplotColumn(std::string_view name) { return "column(" + GnuplotQuoted(name) + ')'; }
+
 std::string InBrackets(std::string_view unit) {
   return unit.empty() ? "" : std::string("[").append(unit).append("]");
 }

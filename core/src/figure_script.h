@@ -66,6 +66,8 @@ class FigureScript {
 
 /// `text` as a gnuplot string.
 std::string GnuplotQuoted(std::string_view text);
+/// The column of that name.
+std::string GnuplotColumn(std::string_view name);
 /// `[unit]`, or "".
 std::string InBrackets(std::string_view unit);
 

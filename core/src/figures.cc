@@ -13,8 +13,7 @@ namespace {
 constexpr std::size_t kMaxPanels = 12;
 constexpr std::size_t kMaxCurves = 8;
 
-std::string Column(std::string_view name) { return "column(" + GnuplotQuoted(name) + ')'; }
-std::string Sigma(const RecordedElement& element) { return Column("sigma:" + element.name); }
+std::string Sigma(const RecordedElement& element) { return GnuplotColumn("sigma:" + element.name); }
 
 std::string Is(const char* column, std::string_view text) {
   return "strcol('" + std::string(column) + "') eq " + GnuplotQuoted(text);
@@ -23,7 +22,7 @@ std::string Is(const char* column, std::string_view text) {
 std::string OverTime(const std::string& y) { return FigureScript::kTime + y; }
 
 std::string Line(std::string_view column, int style) {
-  return OverTime('(' + Column(column) + ')') + " with lines ls " + std::to_string(style);
+  return OverTime('(' + GnuplotColumn(column) + ')') + " with lines ls " + std::to_string(style);
 }
 
 /// The line of an element; that of an angle is broken where it leaps from one end of (-pi, pi] to
@@ -31,7 +30,7 @@ std::string Line(std::string_view column, int style) {
 void ElementCurve(FigureScript& script, const FigureFile& file, const std::string& column,
                   const std::string& unit, int style, std::string_view key) {
   if (unit != "rad") return script.Curve(file, Line(column, style), key);
-  const std::string broken = "(now = " + Column(column) +
+  const std::string broken = "(now = " + GnuplotColumn(column) +
                              ", leap = column(0) > 0 && abs(now - before) > pi, before = now, "
                              "leap ? NaN : now)";
   script.Curve(file, OverTime('(' + broken + ')') + " with lines ls " + std::to_string(style), key);
@@ -61,11 +60,11 @@ void TruthCurve(FigureScript& script, const RecordedRun& run, const RecordedElem
 /// The y range that shows estimate and truth in full, and most of the band.
 void StateRange(FigureScript& script, const RecordedEstimator& estimator,
                 const RecordedElement& element) {
-  script.Quartiles("E", Estimates(estimator).name, Column(element.name));
+  script.Quartiles("E", Estimates(estimator).name, GnuplotColumn(element.name));
   if (element.is_random) script.Quartiles("S", Estimates(estimator).name, Sigma(element));
   std::string low = "E_min", high = "E_max";
   if (element.has_truth) {
-    script.Quartiles("T", "truth.csv", Column(element.truth));
+    script.Quartiles("T", "truth.csv", GnuplotColumn(element.truth));
     low = "min(E_min, T_min)";
     high = "max(E_max, T_max)";
   }
@@ -82,7 +81,7 @@ FigureScript StateFigure(const RecordedRun& run, const RecordedEstimator& estima
     if (!element.has_value || panels++ >= kMaxPanels) continue;
     script.Panel(element.name, InBrackets(element.unit));
     StateRange(script, estimator, element);
-    const std::string value = Column(element.name), sigma = Sigma(element);
+    const std::string value = GnuplotColumn(element.name), sigma = Sigma(element);
     if (element.is_random) {
       script.Curve(Estimates(estimator),
                    OverTime("(" + value + "-3*" + sigma + "):(" + value + "+3*" + sigma + ")") +
@@ -141,8 +140,8 @@ FigureScript GainFigure(const RecordedRun& run, const RecordedEstimator& estimat
     for (const RecordedGain& gain : sensor.gains) {
       if (!gain.used || curves == kMaxCurves || panels > kMaxPanels) continue;
       if (curves == 0 && panels++ < kMaxPanels) script.Panel(sensor.name, "K");
-      script.LineOf(file, Is("sensor", sensor.name), Column(gain.name), EstimatorStyle(curves++),
-                    KeyOf(gain, sensor));
+      script.LineOf(file, Is("sensor", sensor.name), GnuplotColumn(gain.name),
+                    EstimatorStyle(curves++), KeyOf(gain, sensor));
     }
   }
   return script;
@@ -165,8 +164,8 @@ void EachMeasurement(FigureScript& script, const FigureFile& file, bool landmark
 void InnovationPanel(FigureScript& script, const RecordedEstimator& estimator,
                      const RecordedSensor& sensor, int element) {
   const FigureFile file = Innovations(estimator);
-  const std::string r = Column('r' + std::to_string(element));
-  const std::string s = Column('s' + std::to_string(element));
+  const std::string r = GnuplotColumn('r' + std::to_string(element));
+  const std::string s = GnuplotColumn('s' + std::to_string(element));
   const std::string mine = Is("sensor", sensor.name);
   const std::string count = sensor.tangent > 1 ? " " + std::to_string(element) : "";
   script.Panel(sensor.name + count, "z - h " + InBrackets(sensor.unit));
@@ -202,7 +201,7 @@ FigureScript InnovationFigure(const RecordedRun& run, const RecordedEstimator& e
 /// What the measurements tell of a block by themselves, beside truth and estimates.
 void ImpliedPanel(FigureScript& script, const RecordedRun& run, const RecordedImplied& implied) {
   script.Panel(implied.block + " from single measurements", InBrackets(implied.unit));
-  script.Quartiles("I", "implied.csv", Column(implied.block));
+  script.Quartiles("I", "implied.csv", GnuplotColumn(implied.block));
   script.Set("low = max(I_min, I_lo_quartile - 2 * (I_up_quartile - I_lo_quartile))");
   script.Set("high = min(I_max, I_up_quartile + 2 * (I_up_quartile - I_lo_quartile))");
   const RecordedElement* truth = nullptr;
@@ -212,7 +211,7 @@ void ImpliedPanel(FigureScript& script, const RecordedRun& run, const RecordedIm
     }
   }
   if (truth != nullptr) {
-    script.Quartiles("T", "truth.csv", Column(truth->truth));
+    script.Quartiles("T", "truth.csv", GnuplotColumn(truth->truth));
     script.Set("low = min(low, T_min)\nhigh = max(high, T_max)");
   }
   script.Set("set yrange [low - margin(low, high) : high + margin(low, high)]");
@@ -220,8 +219,8 @@ void ImpliedPanel(FigureScript& script, const RecordedRun& run, const RecordedIm
   for (const RecordedImplied& one : run.implied) {
     if (one.block != implied.block || one.rows == 0) continue;
     script.Curve({"implied.csv", run.implied_rows, Kinds(run.implied.size())},
-                 OverTime(Where(Is("sensor", one.sensor), Column(one.block))) + " with points ls " +
-                     std::to_string(style),
+                 OverTime(Where(Is("sensor", one.sensor), GnuplotColumn(one.block))) +
+                     " with points ls " + std::to_string(style),
                  "measured: " + one.sensor + (one.rest_at_truth ? ", rest true" : ""));
     style = style == 15 ? 13 : style + 1;
   }
@@ -252,7 +251,8 @@ void StreamPanel(FigureScript& script, const RecordedRun& run, const RecordedStr
   const std::string count = stream.size > 1 ? " " + std::to_string(element) : "";
   script.Panel("stream " + stream.name + count + ", as measured",
                InBrackets(sensor != nullptr ? sensor->unit : ""));
-  const std::string value = Where(Is("stream", stream.name), Column('v' + std::to_string(element)));
+  const std::string value =
+      Where(Is("stream", stream.name), GnuplotColumn('v' + std::to_string(element)));
   script.Quartiles("M", "measurements.csv", value);
   script.Set("low = max(M_min, M_lo_quartile - 3 * (M_up_quartile - M_lo_quartile))");
   script.Set("high = min(M_max, M_up_quartile + 3 * (M_up_quartile - M_lo_quartile))");
@@ -262,12 +262,12 @@ void StreamPanel(FigureScript& script, const RecordedRun& run, const RecordedStr
   const bool landmarks = sensor != nullptr && sensor->has_landmark;
   if (stream.expected_rows > 0) {
     EachMeasurement(script, {"expected.csv", run.expected_rows, Kinds(run.streams.size())},
-                    landmarks, Is("stream", stream.name), Column('v' + std::to_string(element)), 11,
-                    "truth");
+                    landmarks, Is("stream", stream.name),
+                    GnuplotColumn('v' + std::to_string(element)), 11, "truth");
   }
   if (estimator == nullptr) return;
   EachMeasurement(script, Innovations(*estimator), landmarks, Is("sensor", sensor->name),
-                  Column('h' + std::to_string(element)), 1, "predicted: " + estimator->name);
+                  GnuplotColumn('h' + std::to_string(element)), 1, "predicted: " + estimator->name);
 }
 
 FigureScript MeasurementFigure(const RecordedRun& run) {

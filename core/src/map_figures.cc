@@ -4,13 +4,11 @@
 namespace alidade::internal {
 namespace {
 
-std::string Column(std::string_view name) { return "column(" + GnuplotQuoted(name) + ')'; }
-
 /// The range of an axis that shows the path in full, and most of the landmarks.
 void MapRange(FigureScript& script, const FigureFile& path_file, std::string_view path,
               const FigureFile& map_file, std::string_view axis, std::string_view range) {
-  script.Quartiles("P", path_file.name, Column(path));
-  script.Quartiles("L", map_file.name, Column(axis));
+  script.Quartiles("P", path_file.name, GnuplotColumn(path));
+  script.Quartiles("L", map_file.name, GnuplotColumn(axis));
   script.Set("reach = 3 * (L_up_quartile - L_lo_quartile)");
   script.Set("low = min(P_min, max(L_min, L_lo_quartile - reach))");
   script.Set("high = max(P_max, min(L_max, L_up_quartile + reach))");
@@ -32,7 +30,7 @@ FigureScript MapFigure(const RecordedRun& run, const RecordedEstimator& estimato
   const FigureFile map_file{estimator.name + "/landmarks.csv", placed};
   const auto curve = [&](const FigureFile& file, const std::string& x, const std::string& y,
                          const char* style, const char* key) {
-    script.Curve(file, '(' + Column(x) + "):(" + Column(y) + ") with " + style, key);
+    script.Curve(file, '(' + GnuplotColumn(x) + "):(" + GnuplotColumn(y) + ") with " + style, key);
   };
   script.PanelHeight(kHeight);
   script.Panel("", v + " [m]");
@@ -58,7 +56,8 @@ FigureScript ReprojectionFigure(const RecordedRun& run, const RecordedEstimator&
     if (!sensor.has_reprojection || !sensor.has_innovations) continue;
     script.Panel(sensor.name, "rms of z - h " + InBrackets(sensor.unit));
     script.Set("set yrange [0:]");
-    script.LineOf(file, "strcol('sensor') eq " + GnuplotQuoted(sensor.name), Column("rms"), 1, "");
+    script.LineOf(file, "strcol('sensor') eq " + GnuplotQuoted(sensor.name), GnuplotColumn("rms"),
+                  1, "");
   }
   return script;
 }

@@ -173,8 +173,8 @@ void PluginHost::AddEntries(const Loaded& plugin) {
     for (int i = 0; i < plugin.build_table->estimator_count; ++i) {
       const EstimatorEntry& one = plugin.build_table->estimators[i];
       entries_.push_back({PluginEntry::Kind::kEstimator, one.name, Text(one.doc),
-                          Text(one.citation), "", plugin.file, 0, one.landmarks,
-                          plugin.unoptimised, one.kind});
+                          Text(one.citation), "", plugin.file, 0, one.landmarks, plugin.unoptimised,
+                          one.kind});
     }
     return;
   }

@@ -129,7 +129,9 @@ std::string PluginListJson(const PluginHost& host) {
   }
   for (const EstimatorType& type : EstimatorTypes()) {
     json.Object();
-    AddEntry({PluginEntry::Kind::kEstimator, type.name, type.doc, "", "", "", 0, false, false, type.kind}, json);
+    AddEntry({PluginEntry::Kind::kEstimator, type.name, type.doc, "", "", "", 0, false, false,
+              type.kind},
+             json);
     json.End();
   }
   json.End();

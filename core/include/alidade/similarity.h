@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <optional>
 
+#include "alidade/eigen_alignment.h"
+
 /// The similarity that brings points p, columns of `from`, nearest to q, those of `to`: s R p + t
 /// with sum |q - s R p - t|^2 least [Umeyama1991].
 namespace alidade {

@@ -6,8 +6,6 @@
 
 #include "accepted.h"
 #include "alidade/metrics.h"
-#include "alidade/plugin_listing.h"
-#include "alidade/recorder.h"
 #include "frame_check.h"
 #include "map_metrics.h"
 #include "number_text.h"

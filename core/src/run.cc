@@ -12,7 +12,7 @@
 #include "reference.h"
 #include "reorder.h"
 #include "running.h"
-#include "text_table.h"
+#include "words.h"
 
 namespace alidade {
 namespace {

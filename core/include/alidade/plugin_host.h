@@ -128,6 +128,10 @@ class PluginHost {
   mutable std::mutex create_mutex_;
 };
 
+/// The remedy for a plugin that was built without optimisation.
+inline constexpr const char* kBuildOptimised =
+    "build it with -O2, in CMake with -DCMAKE_BUILD_TYPE=Release";
+
 /// Every place searched and what was found there, and every file refused with the reason.
 std::string PluginPlaces(const PluginHost& host);
 

@@ -7,10 +7,6 @@
 
 namespace alidade {
 
-/// The remedy for a plugin that was built without optimisation.
-inline constexpr const char* kBuildOptimised =
-    "build it with -O2, in CMake with -DCMAKE_BUILD_TYPE=Release";
-
 /// The models, sources and estimators on offer: name, kind, doc, file.
 std::string PluginList(const PluginHost& host);
 /// The same as a JSON array of objects with `name`, `kind`, `family`, `doc`, `citation`, `file`,

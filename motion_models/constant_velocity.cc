@@ -5,19 +5,19 @@
 
 namespace {
 
-template <bool kWhite>
+template <bool kContinuous>
 void Make(int dimensions, alidade::Params& p, AlidadeInstance* instance) {
   using alidade::ConstantVelocity;
-  if (dimensions == 1) alidade::EmplaceMotion<ConstantVelocity<1, kWhite>>(p, instance);
-  if (dimensions == 2) alidade::EmplaceMotion<ConstantVelocity<2, kWhite>>(p, instance);
-  if (dimensions == 3) alidade::EmplaceMotion<ConstantVelocity<3, kWhite>>(p, instance);
+  if (dimensions == 1) alidade::EmplaceMotion<ConstantVelocity<1, kContinuous>>(p, instance);
+  if (dimensions == 2) alidade::EmplaceMotion<ConstantVelocity<2, kContinuous>>(p, instance);
+  if (dimensions == 3) alidade::EmplaceMotion<ConstantVelocity<3, kContinuous>>(p, instance);
 }
 
 void MakeConstantVelocity(alidade::Params& p, AlidadeInstance* instance) {
   const int dimensions = p.Integer("dimensions", "number of axes", 1, 3, 1);
-  const int kind = p.Choice("noise.kind", {"piecewise_constant", "white"},
-                            "acceleration constant during a step, or continuous and white", 0);
-  if (kind == 1) {
+  const int kind = p.Choice("noise.kind", {"continuous", "discrete"},
+                            "white acceleration that adds up, or one held between updates", 0);
+  if (kind == 0) {
     Make<true>(dimensions, p, instance);
   } else {
     Make<false>(dimensions, p, instance);

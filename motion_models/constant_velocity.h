@@ -8,21 +8,24 @@ namespace alidade {
 /// A point that moves with constant velocity but for a random acceleration, in D dimensions.
 ///
 ///   model      p' = p + v dt + g_p(w),  v' = v + g_v(w)
-///   piecewise  w = a ~ N(0, sigma^2 I), constant during a step: g_p = a dt^2/2, g_v = a dt;
-///              rank 1 per axis
-///   white      continuous acceleration of density sigma^2: Cov(g_p, g_v) =
-///              sigma^2 [dt^3/3 dt^2/2; dt^2/2 dt] per axis, w ~ N(0, I) of its Cholesky factor
+///   noise      continuous (CWNA): a white acceleration of spectral density sigma^2, w ~ N(0, I)
+///              of the Cholesky factor of Cov(g_p, g_v) = sigma^2 [dt^3/3 dt^2/2; dt^2/2 dt] per
+///              axis; adds up: Q does not depend on how dt is split
+///   noise      discrete (DWNA): w = a ~ N(0, sigma^2 I), held over the interval between two
+///              updates: g_p = a dt^2/2, g_v = a dt; rank 1 per axis. In a second n intervals add
+///              sigma^2 / n to Var(v): it depends on the rate of the measurements
 ///   Jacobian   F = [I  dt I; 0  I]                     2D x 2D
 ///
 ///   symbol     shape  unit                     frame  meaning
 ///   p, v       D      m, m/s                   any    position, velocity
-///   sigma      1      m/s^2 or m/s^2/Hz^0.5    any    acceleration; >= 0
+///   sigma      1      m/s^1.5 (continuous)     any    root of the acceleration's density: m/s^2
+///                     m/s^2 (discrete)                for each Hz^0.5; or its standard deviation
 ///   D          -      -                        -      1 to 3
 ///
-/// Defined everywhere.
-/// Source       piecewise [Ekf2017] sec. 4.1 (code), [BarShalom2001] sec. 6.3; white sec. 6.2.
-template <int D, bool kWhite>
-struct ConstantVelocity : Motion<kWhite ? 2 * D : D, Vec<D>, Vec<D>> {
+/// Defined everywhere. docs/noise_models.md compares the kinds and converts sigma.
+/// Source       CWNA [BarShalom2001] sec. 6.2; DWNA sec. 6.3, [Ekf2017] sec. 4.1 (code).
+template <int D, bool kContinuous>
+struct ConstantVelocity : Motion<kContinuous ? 2 * D : D, Vec<D>, Vec<D>> {
   static constexpr const char* kElements = D == 1 ? "" : D == 2 ? "x,y" : "x,y,z";
   static constexpr std::array kBlocks{Quantity{"position", "m", "position", kElements},
                                       Quantity{"velocity", "m/s", "velocity", kElements}};
@@ -31,14 +34,18 @@ struct ConstantVelocity : Motion<kWhite ? 2 * D : D, Vec<D>, Vec<D>> {
 
   explicit ConstantVelocity(double acceleration) : sigma(acceleration) {}
   explicit ConstantVelocity(Params& p)
-      : sigma(p.NonNegative("noise.acceleration", kWhite ? "m/s^2/Hz^0.5" : "m/s^2",
-                            "random acceleration, 1 sigma")) {}
+      : sigma(p.NonNegative("noise.acceleration", kContinuous ? "m/s^1.5" : "m/s^2",
+                            kContinuous ? "random acceleration, root of its spectral density"
+                                        : "random acceleration, 1 sigma")) {}
 
+  NoiseKind noise_kind() const {
+    return kContinuous ? NoiseKind::kContinuous : NoiseKind::kDiscrete;
+  }
   template <class T>
   void Step(const T* p, const T* v, const T* w, double dt_s, T* p1, T* v1) const {
     for (int i = 0; i < D; ++i) {
-      p1[i] = p[i] + dt_s * v[i] + (kWhite ? w[i] : 0.5 * dt_s * dt_s * w[i]);
-      v1[i] = v[i] + (kWhite ? w[kWhite ? D + i : i] : dt_s * w[i]);
+      p1[i] = p[i] + dt_s * v[i] + (kContinuous ? w[i] : 0.5 * dt_s * dt_s * w[i]);
+      v1[i] = v[i] + (kContinuous ? w[kContinuous ? D + i : i] : dt_s * w[i]);
     }
   }
   void StepJacobian(const double*, const double*, const double*, double dt_s, MatrixRef f,
@@ -46,15 +53,15 @@ struct ConstantVelocity : Motion<kWhite ? 2 * D : D, Vec<D>, Vec<D>> {
     for (int i = 0; i < D; ++i) {
       f(i, i) = f(D + i, D + i) = 1.0;
       f(i, D + i) = dt_s;
-      g(i, i) = kWhite ? 1.0 : 0.5 * dt_s * dt_s;
-      g(D + i, kWhite ? D + i : i) = kWhite ? 1.0 : dt_s;
+      g(i, i) = kContinuous ? 1.0 : 0.5 * dt_s * dt_s;
+      g(D + i, kContinuous ? D + i : i) = kContinuous ? 1.0 : dt_s;
     }
   }
   void SqrtQ(double dt_s, MatrixRef l) const {
     const double root = sigma * std::sqrt(dt_s);
     for (int i = 0; i < D; ++i) {
-      l(i, i) = kWhite ? root * dt_s / std::sqrt(3.0) : sigma;
-      if (!kWhite) continue;
+      l(i, i) = kContinuous ? root * dt_s / std::sqrt(3.0) : sigma;
+      if (!kContinuous) continue;
       l(D + i, i) = root * std::sqrt(3.0) / 2.0;
       l(D + i, D + i) = root / 2.0;
     }

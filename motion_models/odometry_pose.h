@@ -16,20 +16,25 @@ namespace alidade {
 ///              V(phi) = I + (1 - cos)/|phi|^2 [phi]x + (|phi| - sin)/|phi|^3 [phi]x^2
 ///              t = t_0 + dt_m,  R_VC = R_m R_0;  dt_m, R_m and e are constant: owned blocks,
 ///              0, I and 0, known, where the config gives them no initial value
-///   noise      w = (w_v, w_omega) ~ N(0, diag(sigma_v^2, sigma_omega^2)), constant during a step
+///   noise      w = (w_v, w_omega) ~ N(0, diag(sigma_v^2, sigma_omega^2) / dt) where continuous:
+///              white velocities, position and orientation are random walks; adds up over steps
+///              w ~ N(0, diag(sigma_v^2, sigma_omega^2)) where discrete: held over the interval
+///              between two updates, so that a walk depends on the rate of the measurements
 ///   Jacobian   derived                                 13 x 13; exact at omega = 0
 ///
 ///   symbol       shape  unit      frame    meaning
 ///   r, q         3, 4   m, -      world    position and orientation (world_from_cam) of the camera
 ///   v, omega     3      m/s       vehicle  control input: measured velocities, constant over dt;
 ///                       rad/s              v of the vehicle's origin
-///   sigma_v      3      m/s       vehicle  noise of v, per axis; >= 0
-///   sigma_omega  3      rad/s     vehicle  noise of omega, per axis; >= 0
+///   sigma_v      3      m/s^0.5   vehicle  noise of v, per axis, >= 0: root of its spectral
+///                                          density; m/s where discrete: standard deviation
+///   sigma_omega  3      rad/s^0.5 vehicle  noise of omega likewise; rad/s where discrete
 ///   t_0, R_0     3, -   m, -      vehicle  vehicle_from_cam: where and how the camera is mounted
 ///   dt_m, R_m    3, 4   m, -      vehicle  what the mounting differs from that
 ///   e            1      -         -        relative error of v: true speed / measured - 1
 ///
-/// Defined everywhere. Additive in dt without noise.
+/// Defined everywhere. Additive in dt without noise; continuous noise is, but for dt^3 of the way
+/// that a turn takes sideways. docs/noise_models.md compares the kinds and converts sigma.
 /// Source       [Sola2017] sec. 4.6 (integration); V is that of exp on SE(3).
 struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, Vec<1>> {
   static constexpr std::array kBlocks{
@@ -45,24 +50,39 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
                                    "of the vehicle, in its frame: linear, m/s, and angular, rad/s",
                                    "vx,vy,vz,wx,wy,wz"};
 
+  NoiseKind kind;
   std::array<double, 3> sigma_v, sigma_omega, mount;  ///< mount: t_0 above
   std::array<double, 4> vehicle_from_cam;             ///< R_0
 
-  OdometryPose(const std::array<double, 3>& linear, const std::array<double, 3>& angular,
-               const std::array<double, 3>& position = {},
+  OdometryPose(NoiseKind noise, const std::array<double, 3>& linear,
+               const std::array<double, 3>& angular, const std::array<double, 3>& position = {},
                const std::array<double, 4>& orientation = {1.0, 0.0, 0.0, 0.0})
-      : sigma_v(linear), sigma_omega(angular), mount(position), vehicle_from_cam(orientation) {
+      : kind(noise),
+        sigma_v(linear),
+        sigma_omega(angular),
+        mount(position),
+        vehicle_from_cam(orientation) {
     Normalise<UnitQuaternion>(vehicle_from_cam.data());
   }
   explicit OdometryPose(Params& p)
-      : OdometryPose(p.PerAxis<3>("noise.linear_velocity", "m/s",
-                                  "noise of the linear velocity, 1 sigma", kNonNegative),
-                     p.PerAxis<3>("noise.angular_velocity", "rad/s",
-                                  "noise of the angular velocity, 1 sigma", kNonNegative),
+      : OdometryPose(p, p.Choice("noise.kind", {"continuous", "discrete"},
+                                 "white velocities that add up, or one error held between updates",
+                                 0) == 1) {}
+  OdometryPose(Params& p, bool discrete)
+      : OdometryPose(discrete ? NoiseKind::kDiscrete : NoiseKind::kContinuous,
+                     p.PerAxis<3>("noise.linear_velocity", discrete ? "m/s" : "m/s^0.5",
+                                  discrete ? "noise of the linear velocity, 1 sigma"
+                                           : "noise of the linear velocity, root of its density",
+                                  kNonNegative),
+                     p.PerAxis<3>("noise.angular_velocity", discrete ? "rad/s" : "rad/s^0.5",
+                                  discrete ? "noise of the angular velocity, 1 sigma"
+                                           : "noise of the angular velocity, root of its density",
+                                  kNonNegative),
                      p.Vector<3>("vehicle_from_cam.position", "m", "where the camera is mounted",
                                  {}, std::array<double, 3>{}),
                      ReadMounting(p)) {}
 
+  NoiseKind noise_kind() const { return kind; }
   template <class T>
   void Step(const T* r, const T* q, const T* shift, const T* tilt, const T* speed_error, const T* u,
             const T* w, double dt_s, T* r1, T* q1, T* shift1, T* tilt1, T* speed_error1) const {
@@ -85,11 +105,13 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
     std::copy(tilt, tilt + 4, tilt1);
     speed_error1[0] = speed_error[0];
   }
-  void SqrtQ(double, MatrixRef Lq) const {
+  void SqrtQ(double dt_s, MatrixRef Lq) const {
+    double scale = 1.0;  // of the mean velocities of the step
+    if (kind == NoiseKind::kContinuous) scale = dt_s > 0.0 ? 1.0 / std::sqrt(dt_s) : 0.0;
     for (std::size_t i = 0; i < 3; ++i) {
       const int k = static_cast<int>(i);
-      Lq(k, k) = sigma_v[i];
-      Lq(3 + k, 3 + k) = sigma_omega[i];
+      Lq(k, k) = scale * sigma_v[i];
+      Lq(3 + k, 3 + k) = scale * sigma_omega[i];
     }
   }
 

@@ -3,6 +3,21 @@
 
 #include "alidade/plugin.h"
 
-ALIDADE_PLUGIN(ALIDADE_MOTION(alidade::QuaternionPose, "quaternion_pose",
-                              "a rigid body with constant velocities but for random accelerations",
-                              "[MonoSlam2015] sec. 4.3, [Davison2007]"))
+namespace {
+
+void MakeQuaternionPose(alidade::Params& p, AlidadeInstance* instance) {
+  const int kind = p.Choice("noise.kind", {"continuous", "discrete"},
+                            "white accelerations that add up, or held between updates", 0);
+  if (kind == 0) {
+    alidade::EmplaceMotion<alidade::ContinuousQuaternionPose>(p, instance);
+  } else {
+    alidade::EmplaceMotion<alidade::QuaternionPose>(p, instance);
+  }
+}
+
+}  // namespace
+
+ALIDADE_PLUGIN(ALIDADE_MOTION_BY(MakeQuaternionPose, "quaternion_pose",
+                                 "a rigid body with constant velocities but for random "
+                                 "accelerations",
+                                 "[MonoSlam2015] sec. 4.3, [Davison2007]; [BarShalom2001]"))

@@ -5,12 +5,14 @@
 
 namespace alidade {
 
-/// A rigid body that moves and turns with constant velocity but for random accelerations.
+/// A rigid body that moves and turns with constant velocity but for random accelerations, held over
+/// the interval between two updates (discrete noise, DWNA).
 ///
 ///   model      v' = v + a dt,           r' = r + v' dt
 ///              omega' = omega + alpha dt,   q' = q Exp(omega' dt)
-///   noise      w = (a, alpha) ~ N(0, diag(sigma_a^2, sigma_alpha^2)), constant during a step;
-///              G is 12 x 6: rank 6
+///   noise      w = (a, alpha) ~ N(0, diag(sigma_a^2, sigma_alpha^2)); G is 12 x 6: rank 6.
+///              In a second n intervals add sigma_a^2 / n to Var(v): it depends on the rate of the
+///              measurements
 ///   Jacobian   derived                                 12 x 12; exact at omega = 0
 ///
 ///   symbol          shape  unit           frame  meaning
@@ -21,7 +23,8 @@ namespace alidade {
 ///   sigma_a         3      m/s^2          world  acceleration, per axis; >= 0
 ///   sigma_alpha     3      rad/s^2        body   angular acceleration, per axis; >= 0
 ///
-/// Defined everywhere. Additive in dt without noise. For a camera, body is cam.
+/// Defined everywhere. Additive in dt without noise. For a camera, body is cam. r' has v', so that
+/// the noise of r over a split interval is that of the whole to first order in dt.
 /// Source       [MonoSlam2015] sec. 4.3, [Davison2007] sec. 3.4.
 struct QuaternionPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
   static constexpr std::array kBlocks{
@@ -41,6 +44,7 @@ struct QuaternionPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
                        p.PerAxis<3>("noise.angular_acceleration", "rad/s^2",
                                     "random angular acceleration, 1 sigma", kNonNegative)) {}
 
+  NoiseKind noise_kind() const { return NoiseKind::kDiscrete; }
   template <class T>
   void Step(const T* r, const T* q, const T* v, const T* omega, const T* w, double dt_s, T* r1,
             T* q1, T* v1, T* omega1) const {
@@ -59,6 +63,108 @@ struct QuaternionPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
       Lq(k, k) = sigma_a[i];
       Lq(3 + k, 3 + k) = sigma_alpha[i];
     }
+  }
+};
+
+/// The same body under white accelerations (continuous noise, CWNA), which add up: Q does not depend
+/// on how dt is split.
+///
+///   model      r' = r + v dt + w_r,     q' = q Exp(omega dt + w_q)
+///              v' = v + w_v,            omega' = omega + w_omega
+///   noise      w ~ N(0, Lq Lq'): per axis Cov(w_r, w_v) = sigma_a^2 [dt^3/3 dt^2/2; dt^2/2 dt],
+///              and so (w_q, w_omega) with sigma_alpha; exact where omega = 0, else to first order
+///   Jacobian   F = [I 0 dt I 0; 0 R(Exp(-phi)) 0 dt J(phi); 0 0 I 0; 0 0 0 I],  phi = omega dt + w_q
+///              G = diag(I, J(phi), I, I),  J(phi) = d Log(Exp(-phi) Exp(phi + d))/dd
+///                = I - (1 - cos)/|phi|^2 [phi]x + (|phi| - sin)/|phi|^3 [phi]x^2      12 x 12
+///
+///   symbol          shape  unit           frame  meaning
+///   sigma_a         3      m/s^1.5        world  root of the density of the acceleration, per
+///                                                axis: m/s^2 for each Hz^0.5; >= 0
+///   sigma_alpha     3      rad/s^1.5      body   root of that of the angular acceleration; >= 0
+///
+/// Defined everywhere. docs/noise_models.md compares the kinds and converts sigma.
+/// Source       [BarShalom2001] sec. 6.2; J: [Sola2017] sec. 4.3.
+struct ContinuousQuaternionPose : Motion<12, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
+  static constexpr std::array kBlocks = QuaternionPose::kBlocks;
+
+  std::array<double, 3> sigma_a, sigma_alpha;
+
+  ContinuousQuaternionPose(const std::array<double, 3>& acceleration,
+                           const std::array<double, 3>& angular_acceleration)
+      : sigma_a(acceleration), sigma_alpha(angular_acceleration) {}
+  explicit ContinuousQuaternionPose(Params& p)
+      : ContinuousQuaternionPose(
+            p.PerAxis<3>("noise.linear_acceleration", "m/s^1.5",
+                         "random acceleration, root of its spectral density", kNonNegative),
+            p.PerAxis<3>("noise.angular_acceleration", "rad/s^1.5",
+                         "random angular acceleration, root of its spectral density",
+                         kNonNegative)) {}
+
+  template <class T>
+  void Step(const T* r, const T* q, const T* v, const T* omega, const T* w, double dt_s, T* r1,
+            T* q1, T* v1, T* omega1) const {
+    T turn[3];
+    for (int i = 0; i < 3; ++i) {
+      r1[i] = r[i] + dt_s * v[i] + w[i];
+      turn[i] = dt_s * omega[i] + w[3 + i];
+      v1[i] = v[i] + w[6 + i];
+      omega1[i] = omega[i] + w[9 + i];
+    }
+    UnitQuaternion::Plus(q, turn, q1);
+  }
+  void StepJacobian(const double*, const double*, const double*, const double* omega,
+                    const double* w, double dt_s, MatrixRef f, MatrixRef g) const {
+    double phi[3], back[3], rotation[4];
+    for (int i = 0; i < 3; ++i) phi[i] = dt_s * omega[i] + w[3 + i];
+    for (int i = 0; i < 3; ++i) back[i] = -phi[i];
+    UnitQuaternion::Exp(back, rotation);
+    for (int c = 0; c < 3; ++c) {
+      f(c, c) = f(6 + c, 6 + c) = f(9 + c, 9 + c) = 1.0;
+      g(c, c) = g(6 + c, 6 + c) = g(9 + c, 9 + c) = 1.0;
+      f(c, 6 + c) = dt_s;
+      const double axis[3] = {c == 0 ? 1.0 : 0.0, c == 1 ? 1.0 : 0.0, c == 2 ? 1.0 : 0.0};
+      double turned[3], moved[3];
+      UnitQuaternion::Rotate(rotation, axis, turned);
+      RightJacobian(phi, axis, moved);
+      for (int i = 0; i < 3; ++i) {
+        f(3 + i, 3 + c) = turned[i];
+        f(3 + i, 9 + c) = dt_s * moved[i];
+        g(3 + i, 3 + c) = moved[i];
+      }
+    }
+  }
+  void SqrtQ(double dt_s, MatrixRef Lq) const {
+    const double root = std::sqrt(dt_s);
+    for (std::size_t i = 0; i < 6; ++i) {
+      const int k = static_cast<int>(i);
+      const double sigma = root * (i < 3 ? sigma_a[i] : sigma_alpha[i - 3]);
+      Lq(k, k) = sigma * dt_s / std::sqrt(3.0);
+      Lq(6 + k, k) = sigma * std::sqrt(3.0) / 2.0;
+      Lq(6 + k, 6 + k) = sigma / 2.0;
+    }
+  }
+
+ private:
+  /// to = J(phi) from
+  static void RightJacobian(const double* phi, const double* from, double* to) {
+    constexpr double kSeries = 1e-4;  // of the angle squared: the next term is 1e-16
+    const double angle2 = phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2];
+    double a = 0.5 - angle2 / 24.0 * (1.0 - angle2 / 30.0);
+    double b = 1.0 / 6.0 - angle2 / 120.0 * (1.0 - angle2 / 42.0);
+    if (angle2 > kSeries) {
+      const double angle = std::sqrt(angle2);
+      a = (1.0 - std::cos(angle)) / angle2;
+      b = (angle - std::sin(angle)) / (angle2 * angle);
+    }
+    double once[3], twice[3];
+    Cross(phi, from, once);
+    Cross(phi, once, twice);
+    for (int i = 0; i < 3; ++i) to[i] = from[i] - a * once[i] + b * twice[i];
+  }
+  static void Cross(const double* x, const double* y, double* z) {
+    z[0] = x[1] * y[2] - x[2] * y[1];
+    z[1] = x[2] * y[0] - x[0] * y[2];
+    z[2] = x[0] * y[1] - x[1] * y[0];
   }
 };
 

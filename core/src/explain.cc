@@ -119,8 +119,9 @@ std::string Motions(const System& system) {
       blocks.push_back(system.layout[id].name);
     }
     const int noise = motion.model.noise_size();
+    const char* const kind = motion.model.discrete_noise() ? " discrete" : " continuous";
     rows.push_back({motion.name, motion.model.name(), blocks.empty() ? "none" : Join(blocks),
-                    noise == 0 ? "none" : std::to_string(noise)});
+                    noise == 0 ? "none" : std::to_string(noise) + kind});
     if (driven) rows.back().push_back(InputText(motion));
   }
   return TextTable(rows, kIndent);

@@ -66,6 +66,11 @@ std::vector<std::string> Capabilities(const ModelInstance& model) {
   std::vector<std::string> lines = {
       std::string("Jacobians: ") +
       (can(ALIDADE_CLOSED_FORM) ? "analytic" : "automatic differentiation")};
+  if (model.c().kind == ALIDADE_KIND_MOTION && model.c().description->noise_count > 0) {
+    lines.emplace_back(can(ALIDADE_DISCRETE_NOISE)
+                           ? "noise: discrete, held from one update to the next"
+                           : "noise: continuous, adds up over steps");
+  }
   if (can(ALIDADE_HAS_VALIDITY)) lines.emplace_back("refuses measurements of no use by itself");
   if (can(ALIDADE_CAN_INITIALISE)) {
     const AlidadeDescription& description = *model.c().description;

@@ -13,7 +13,7 @@ namespace {
 constexpr const char* kConfig = R"(alidade: 1
 state:
   target: {model: constant_velocity, blocks: {position: depth, velocity: depth_rate},
-           noise: {acceleration: 1.25},
+           noise: {kind: discrete, acceleration: 1.25},
            initial: {depth: {mean: 0.3, sigma: 0.1}, depth_rate: {mean: 0, sigma: 0.5}}}
 sensors:
   stereo: {model: stereo_disparity, stream: disparity, roles: {depth: target.depth},

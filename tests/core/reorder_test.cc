@@ -18,7 +18,7 @@ constexpr double kWindow_s = 0.2;  // six frames of the simulator
 constexpr const char* kFilters = R"(alidade: 1
 state:
   target: {model: constant_velocity, blocks: {position: depth, velocity: depth_rate},
-           noise: {acceleration: 1.0},
+           noise: {kind: discrete, acceleration: 1.0},
            initial: {depth: {mean: 0.3, sigma: 0.1}, depth_rate: {mean: 0, sigma: 0.5}}}
   template: {model: constant, blocks: {value: inverse_distance},
              initial: {inverse_distance: {mean: 3.3, sigma: 0.5}}}
@@ -46,7 +46,7 @@ evaluate:
 constexpr const char* kEventful = R"(alidade: 1
 state:
   target: {model: constant_velocity, blocks: {position: depth, velocity: depth_rate},
-           noise: {acceleration: 0.1},
+           noise: {kind: discrete, acceleration: 0.1},
            initial: {depth: {from: stereo}, depth_rate: {mean: 0, sigma: 0.5}}}
   template: {model: constant, blocks: {value: inverse_distance},
              initial: {inverse_distance: {from: scale}}}

@@ -18,7 +18,7 @@ state:
     model: odometry_pose
     input: {stream: odometry}
     vehicle_from_cam: {orientation: {w: 0.99983751, x: 0.01499919, y: 0.00999946, z: 0.0}}
-    noise: {linear_velocity: 0.004, angular_velocity: 0.002}
+    noise: {kind: discrete, linear_velocity: 0.004, angular_velocity: 0.002}
     initial:
       position: {mean: [-0.6, 0, 0], sigma: 0}
       orientation: {mean: {w: 0.997230252466, x: 0, y: 0.074376229844, z: 0}, sigma: 0}

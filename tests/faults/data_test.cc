@@ -18,7 +18,7 @@ camera: {width: 640, height: 480, fx: 525, fy: 525, cx: 320, cy: 240}
 state:
   cam:
     model: quaternion_pose
-    noise: {linear_acceleration: 0.3, angular_acceleration: 0.05}
+    noise: {kind: discrete, linear_acceleration: 0.3, angular_acceleration: 0.05}
     initial:
       position: {mean: [0, 0, 0], sigma: 0}
       orientation: {mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0}

@@ -16,12 +16,13 @@ using testing::MakeMotion;
 using testing::Step;
 using testing::Stepped;
 
-template <int D, bool kWhite>
+template <int D, bool kContinuous>
 void CheckConstantVelocity() {
   const double sigma = 0.7, dt_s = 0.2;
   const MotionModel motion =
-      MakeMotion<ConstantVelocity<D, kWhite>>({{"noise.acceleration", {sigma}}});
-  ASSERT_EQ(motion.noise_size(), kWhite ? 2 * D : D);
+      MakeMotion<ConstantVelocity<D, kContinuous>>({{"noise.acceleration", {sigma}}});
+  ASSERT_EQ(motion.noise_size(), kContinuous ? 2 * D : D);
+  EXPECT_EQ(motion.discrete_noise(), !kContinuous);
   Blocks x{std::vector<double>(D), std::vector<double>(D)};
   std::vector<double> w(motion.noise_size());
   for (int i = 0; i < D; ++i) x[0][i] = 1.0 + i, x[1][i] = -0.5 * i + 0.25;
@@ -32,12 +33,13 @@ void CheckConstantVelocity() {
     EXPECT_EQ(out.next[1][i], x[1][i]);
   }
   ExpectTrueJacobians(motion, x, nullptr, w, dt_s);
-  // G Qw G' per axis: piecewise sigma^2 [dt^4/4 dt^3/2; . dt^2], white sigma^2 [dt^3/3 dt^2/2; .
-  // dt]
+  EXPECT_LT(testing::DefectOfParts(motion, x, nullptr, 0.03, 0.17), 1e-15);
+  // G Qw G' per axis: discrete sigma^2 [dt^4/4 dt^3/2; . dt^2], continuous
+  // sigma^2 [dt^3/3 dt^2/2; . dt]
   const double s2 = sigma * sigma, t = dt_s;
-  const double pp = kWhite ? t * t * t / 3 : t * t * t * t / 4;
-  const double pv = kWhite ? t * t / 2 : t * t * t / 2;
-  const double vv = kWhite ? t : t * t;
+  const double pp = kContinuous ? t * t * t / 3 : t * t * t * t / 4;
+  const double pv = kContinuous ? t * t / 2 : t * t * t / 2;
+  const double vv = kContinuous ? t : t * t;
   const std::vector<double> q = Covariance(motion, x, dt_s);
   const int n = 2 * D, m = motion.noise_size();
   for (int r = 0; r < n; ++r) {

@@ -18,11 +18,14 @@ const double kPi = 3.14159265358979323846;
 
 // The camera looks ahead of a vehicle whose x is forward and z up: x_cam = -y, y_cam = -z,
 // z_cam = x; it stands 1 m ahead of the vehicle's origin and 1.5 m above.
-const MapHost::Values kMounted{
-    {"noise.linear_velocity", {0.03, 0.3, 0.3}}, {"noise.angular_velocity", {0.002}},
-    {"vehicle_from_cam.position", {1, 0, 1.5}},  {"vehicle_from_cam.orientation.w", {0.5}},
-    {"vehicle_from_cam.orientation.x", {-0.5}},  {"vehicle_from_cam.orientation.y", {0.5}},
-    {"vehicle_from_cam.orientation.z", {-0.5}}};
+const MapHost::Values kMounted{{"noise.kind", {1}},  // discrete
+                               {"noise.linear_velocity", {0.03, 0.3, 0.3}},
+                               {"noise.angular_velocity", {0.002}},
+                               {"vehicle_from_cam.position", {1, 0, 1.5}},
+                               {"vehicle_from_cam.orientation.w", {0.5}},
+                               {"vehicle_from_cam.orientation.x", {-0.5}},
+                               {"vehicle_from_cam.orientation.y", {0.5}},
+                               {"vehicle_from_cam.orientation.z", {-0.5}}};
 
 /// Owned blocks: the mounting and the speed are as the parameters and the input have them.
 const Blocks kAsGiven{{0, 0, 0}, {1, 0, 0, 0}, {0}};
@@ -110,6 +113,25 @@ TEST(OdometryPose, NoiseIsPerAxis) {
   const std::vector<double> q = testing::Covariance(motion, Camera(0, 0, 0), 0.1);
   const double sigma[6] = {0.03, 0.3, 0.3, 0.002, 0.002, 0.002};
   for (int i = 0; i < 6; ++i) EXPECT_NEAR(q[7 * i], sigma[i] * sigma[i], 1e-17);
+}
+
+// One error of the velocities is held, or white ones add up: along a straight way exactly but for
+// what turning makes of it sideways.
+TEST(OdometryPose, NoiseOfEitherKindIsThatOfTheWholeGap) {
+  MapHost::Values values = kMounted;
+  values["noise.kind"] = {0};
+  const MotionModel held = MakeMotion<OdometryPose>(kMounted),
+                    adds = MakeMotion<OdometryPose>(values);
+  EXPECT_TRUE(held.discrete_noise());
+  EXPECT_FALSE(adds.discrete_noise());
+  const double still[6] = {}, straight[6] = {2, 0, 0, 0, 0, 0}, turning[6] = {2, 0, 0, 0, 0, 0.5};
+  for (const MotionModel& motion : {held, adds}) {
+    EXPECT_LT(testing::DefectOfParts(motion, Camera(5, 6, 1), still, 0.03, 0.07), 1e-14);
+    EXPECT_LT(testing::DefectOfParts(motion, Camera(5, 6, 1), straight, 0.5e-3, 0.5e-3), 1e-5);
+    EXPECT_LT(testing::DefectOfParts(motion, Camera(5, 6, 1), turning, 0.5e-3, 0.5e-3), 1e-3);
+  }
+  const std::vector<double> q = testing::Covariance(adds, Camera(0, 0, 0), 0.1);
+  EXPECT_NEAR(q[0], 0.03 * 0.03 / 0.1, 1e-17);
 }
 
 TEST(OdometryPose, IsMountedByAUnitQuaternion) {

@@ -6,6 +6,7 @@
 #include "alidade/in_process.h"
 #include "alidade/random.h"
 #include "alidade/ukf.h"
+#include <cmath>
 #include "support/model_checks.h"
 #include "support/model_maker.h"
 
@@ -149,6 +150,64 @@ TEST(QuaternionPose, IsFollowedByTheUnscentedFilterAtEverySpread) {
       }
     }
   }
+}
+
+// One w is held: r' has v', so that half of a sigma_a dt^2 hangs on the parts, and no more.
+TEST(QuaternionPose, HoldsItsNoiseToFirstOrder) {
+  const MotionModel motion = MakeMotion<QuaternionPose>(kNoise);
+  EXPECT_TRUE(motion.discrete_noise());
+  const Blocks x{{1, 2, 3}, {0.8, 0.2, -0.4, 0.4}, {0.5, -1, 0.2}, {0.7, -0.4, 1.1}};
+  EXPECT_LT(testing::DefectOfParts(motion, x, nullptr, 0.5e-3, 0.5e-3), 1e-3);
+  EXPECT_LT(testing::DefectOfParts(motion, x, nullptr, 0.5e-6, 0.5e-6), 1e-6);
+}
+
+TEST(ContinuousQuaternionPose, MovesAndTurnsByWorkedNumbers) {
+  // A quarter turn per second about z, 1 s, and a quarter turn of w: a half turn.
+  const double pi = 3.14159265358979323846;
+  const Blocks x{{0, 0, 3}, {1, 0, 0, 0}, {1, 0, 0}, {0, 0, pi / 2}};
+  const double w[12] = {0, 2, 0, 0, 0, pi / 2, 0, 0, 4, 0, 1, 0};
+  const Stepped out =
+      testing::Step(MakeMotion<ContinuousQuaternionPose>(kNoise), x, nullptr, w, 1.0);
+  EXPECT_EQ(out.next[0], (std::vector<double>{1, 2, 3}));
+  EXPECT_EQ(out.next[2], (std::vector<double>{1, 0, 4}));
+  EXPECT_EQ(out.next[3], (std::vector<double>{0, 1, pi / 2}));
+  const double q[4] = {0, 0, 0, 1};
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(out.next[1][i], q[i], 1e-15);
+}
+
+TEST(ContinuousQuaternionPose, HasTrueJacobiansAlsoWithoutTurning) {
+  const MotionModel motion = MakeMotion<ContinuousQuaternionPose>(kNoise);
+  std::vector<double> w(12);
+  for (std::size_t i = 0; i < w.size(); ++i) w[i] = 0.3 * std::sin(2.0 * static_cast<double>(i));
+  const Blocks moving{{1, 2, 3}, {0.8, 0.2, -0.4, 0.4}, {0.5, -1, 0.2}, {0.7, -0.4, 1.1}};
+  Blocks still = moving, slow = moving;
+  still[3] = {0, 0, 0};
+  slow[3] = {0.02, -0.03, 0.025};  // where the series of the Jacobian ends
+  const std::vector<double> none(12);
+  testing::ExpectTrueJacobians(motion, moving, nullptr, w, 0.2);
+  testing::ExpectTrueJacobians(motion, still, nullptr, none, 0.2);
+  testing::ExpectTrueJacobians(motion, slow, nullptr, none, 0.2);
+  testing::ExpectTrueJacobians(motion, slow, nullptr, none, 0.3);
+}
+
+// Per axis sigma^2 [dt^3/3 dt^2/2; dt^2/2 dt] of (r, v) and, without turning, of (q, omega).
+TEST(ContinuousQuaternionPose, NoiseAddsUp) {
+  const MotionModel motion = MakeMotion<ContinuousQuaternionPose>(kNoise);
+  EXPECT_FALSE(motion.discrete_noise());
+  const Blocks still{{1, 2, 3}, {0.8, 0.2, -0.4, 0.4}, {0.5, -1, 0.2}, {0, 0, 0}};
+  Blocks turning = still;
+  turning[3] = {0.7, -0.4, 1.1};
+  const double sigma[6] = {0.6, 0.6, 0.6, 0.1, 0.2, 0.3}, t = 0.1;
+  const Eigen::MatrixXd n = testing::StepWithNoise(motion, still, nullptr, t, still, t).n;
+  const Eigen::MatrixXd q = n * n.transpose();
+  for (int i = 0; i < 6; ++i) {
+    const double density = sigma[i] * sigma[i];
+    EXPECT_NEAR(q(i, i), density * t * t * t / 3.0, 1e-17);
+    EXPECT_NEAR(q(i, 6 + i), density * t * t / 2.0, 1e-17);
+    EXPECT_NEAR(q(6 + i, 6 + i), density * t, 1e-17);
+  }
+  EXPECT_LT(testing::DefectOfParts(motion, still, nullptr, 0.03, 0.17), 1e-15);
+  EXPECT_LT(testing::DefectOfParts(motion, turning, nullptr, 0.5e-3, 0.5e-3), 1e-6);
 }
 
 }  // namespace

@@ -59,7 +59,7 @@ TEST(CeresBatchLandmarks, GivesTheSameBytesTwice) {
 // ---- a camera that turns ------------------------------------------------------------------------
 
 const std::string kMotion =
-    "state: {cam: {model: quaternion_pose, noise: {linear_acceleration: 0.3, "
+    "state: {cam: {model: quaternion_pose, noise: {kind: discrete, linear_acceleration: 0.3, "
     "angular_acceleration: 0.05}, initial: {position: {mean: [0, 0, 0], sigma: 0}, orientation: "
     "{mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0}, velocity: {mean: [0.2, 0, 0], sigma: 0.1}, "
     "angular_velocity: {mean: [0, 0, 0], sigma: 0.05}}}}\n";

@@ -9,8 +9,13 @@ INSTANTIATE_TEST_SUITE_P(
     QuaternionPose, EveryModel,
     ::testing::Values(
         MotionRow("quaternion_pose",
-                  "{noise: {linear_acceleration: 0.4, angular_acceleration: [0.2, 0.3, 0.4]}}",
+                  "{noise: {kind: discrete, linear_acceleration: 0.4, angular_acceleration: [0.2, "
+                  "0.3, 0.4]}}",
                   QuaternionPose({0.4, 0.4, 0.4}, {0.2, 0.3, 0.4}),
+                  {{1.0, 2.0, 3.0}, {1, 0, 0, 0}, {0.1, 0.0, -0.1}, {0.1, -0.1, 0.0}}, 0.05),
+        MotionRow("quaternion_pose",
+                  "{noise: {linear_acceleration: 0.1, angular_acceleration: [0.05, 0.1, 0.15]}}",
+                  ContinuousQuaternionPose({0.1, 0.1, 0.1}, {0.05, 0.1, 0.15}),
                   {{1.0, 2.0, 3.0}, {1, 0, 0, 0}, {0.1, 0.0, -0.1}, {0.1, -0.1, 0.0}}, 0.05)),
     RowName);
 

@@ -283,11 +283,12 @@ TEST_F(HostTest, AllBadParametersAreToldAtOnce) {
 
 TEST_F(HostTest, ADottedKeyWalksNestedMaps) {
   const PluginHost host;
-  const Config good = Parse("{model: constant_velocity, noise: {acceleration: 2, kind: white}}");
+  const Config good =
+      Parse("{model: constant_velocity, noise: {acceleration: 2, kind: continuous}}");
   EXPECT_EQ(host.CreateMotion("constant_velocity", good.root()).noise_size(), 2);
   EXPECT_NO_THROW(good.root().At("noise").RejectUnread());
   const Config none = Parse("state: {cam: {model: constant_velocity}}");
-  ExpectError(ExitCode::kBadConfig, {"state.cam.noise.acceleration: missing", "(m/s^2, >= 0"},
+  ExpectError(ExitCode::kBadConfig, {"state.cam.noise.acceleration: missing", "(m/s^1.5, >= 0"},
               [&] { host.CreateMotion("constant_velocity", none.root().At("state").At("cam")); });
   const Config scalar = Parse("{model: constant_velocity, noise: 3}");
   ExpectError(ExitCode::kBadConfig, {"noise: ", "map"},
@@ -321,7 +322,7 @@ TEST_F(HostTest, TheSchemaTellsWhatEachChoiceReads) {
   EXPECT_EQ(Param(motion, "dimensions").range, "[1, 3]");
   EXPECT_EQ(Param(motion, "dimensions").fallback, "1");
   EXPECT_EQ(Param(motion, "noise.acceleration").when, "");
-  EXPECT_EQ(Param(motion, "noise.acceleration").unit, "m/s^2 or m/s^2/Hz^0.5");
+  EXPECT_EQ(Param(motion, "noise.acceleration").unit, "m/s^1.5 or m/s^2");
 }
 
 TEST_F(HostTest, DescribesRolesAndMeasurement) {

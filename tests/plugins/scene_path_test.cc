@@ -198,7 +198,7 @@ TEST(ScenePath, OdometryLeadsAlongTheTruth) {
   const auto frames =
       SceneFrames("frames: 100, odometry: true, " + kPoints +
                   ", trajectory: {model: {linear_acceleration: 3, angular_acceleration: 3}}");
-  const OdometryPose model({}, {});
+  const OdometryPose model(NoiseKind::kDiscrete, {}, {});
   std::vector<double> r = frames[0].truth[0], q = frames[0].truth[1];
   const double still[6] = {};
   for (std::size_t k = 0; k + 1 < frames.size(); ++k) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Core>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -102,6 +103,39 @@ inline std::vector<double> Covariance(const MotionModel& motion, const Blocks& x
     }
   }
   return q;
+}
+
+/// A step without noise as matrices: F, and N = G Lq with Lq taken at `noise_of` over noise_dt_s.
+struct NoisyStep {
+  Blocks next;
+  Eigen::MatrixXd f, n;
+};
+inline NoisyStep StepWithNoise(const MotionModel& motion, const Blocks& x, const double* u,
+                               double dt_s, const Blocks& noise_of, double noise_dt_s) {
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  const int n = motion.tangent_size(), n_w = motion.noise_size();
+  const Stepped step = Step(motion, x, u, nullptr, dt_s);
+  Rows l = Rows::Zero(n_w, n_w);
+  EXPECT_EQ(motion.SqrtQ(Pointers(noise_of).data(), noise_dt_s, l.data()), Status::kOk);
+  return {step.next, Eigen::Map<const Rows>(step.f.data(), n, n),
+          Eigen::Map<const Rows>(step.g.data(), n, n_w) * l};
+}
+
+/// How far the noise of two steps is from that of one over both, of the kind that the model
+/// declares, relative to it.
+inline double DefectOfParts(const MotionModel& motion, const Blocks& x, const double* u,
+                            double first_s, double second_s) {
+  const double both_s = first_s + second_s;
+  const Eigen::MatrixXd n = StepWithNoise(motion, x, u, both_s, x, both_s).n;
+  const NoisyStep first = StepWithNoise(motion, x, u, first_s, x, first_s);
+  if (motion.discrete_noise()) {
+    const NoisyStep second = StepWithNoise(motion, first.next, u, second_s, x, first_s);
+    return (second.f * first.n + second.n - n).norm() / n.norm();
+  }
+  const NoisyStep second = StepWithNoise(motion, first.next, u, second_s, first.next, second_s);
+  const Eigen::MatrixXd moved = second.f * first.n;
+  const Eigen::MatrixXd q = moved * moved.transpose() + second.n * second.n.transpose();
+  return (q - n * n.transpose()).norm() / (n * n.transpose()).norm();
 }
 
 }  // namespace alidade::testing

@@ -50,7 +50,7 @@ state:
   target:
     model: constant_velocity
     blocks: {position: depth, velocity: depth_rate}
-    noise: {acceleration: 1.0}
+    noise: {kind: discrete, acceleration: 1.0}
     initial: {depth: {mean: 0.3, sigma: 0.1}, depth_rate: {mean: 0, sigma: 0.5}}
 )";
 inline const std::string kStereoConfig = R"(sensors:

@@ -33,6 +33,13 @@ struct MatrixRef {
   explicit operator bool() const { return data != nullptr; }
 };
 
+/// Process noise over a time that is stepped in parts; both kinds are white from one interval to the
+/// next. An interval lies between two updates.
+enum class NoiseKind {
+  kContinuous,  ///< each step has a w of its own: Q of the whole is F_2 Q_1 F_2' + Q_2
+  kDiscrete,    ///< one w is held over the interval: G Lq of the whole is (F_2 G_1 + G_2) Lq
+};
+
 /// Base of a sensor z = h(roles) + n, n ~ N(0, L L'). The model has
 ///
 ///   static constexpr std::array kRoles{Quantity{...}, ...};      one for each role geometry
@@ -75,6 +82,9 @@ struct Sensor {
 ///   void StepJacobian(const double* block..., const double* w, double dt_s, MatrixRef F,
 ///                     MatrixRef G) const;      analytic, zeroed; only without control input
 ///   bool Stationary() const;                   x' = x and no noise: estimators skip the step
+///   NoiseKind noise_kind() const;              default kContinuous; `alidade check` compares
+///
+/// Lq of discrete noise is taken at the start of its interval and does not depend on dt_s.
 ///
 /// A block with the flag ALIDADE_ROLE_OWNED, a bias or an extrinsic, is fixed at the neutral
 /// element of its geometry, unless the config gives it an initial value.
@@ -88,6 +98,7 @@ struct Motion {
   using Input = Vec<0>;
   static constexpr Quantity kInput{""};
   static constexpr int kNoise = NoiseSize;
+  NoiseKind noise_kind() const { return NoiseKind::kContinuous; }
 };
 
 namespace detail {

@@ -122,6 +122,8 @@ class MotionModel {
   int noise_size() const { return noise_size_; }
   /// Its blocks stay as they are, without noise: Step need not be called.
   bool stationary() const { return (instance_->capabilities() & ALIDADE_STATIONARY) != 0; }
+  /// Whether w is held over the whole of an interval between updates, or drawn for each step.
+  bool discrete_noise() const { return (instance_->capabilities() & ALIDADE_DISCRETE_NOISE) != 0; }
   int tangent_size() const { return tangent_size_; }
   bool has_input() const { return instance_->c().description->input != nullptr; }
   /// The control input, where it has one.

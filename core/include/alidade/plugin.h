@@ -60,6 +60,8 @@ void PublishMotion(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* insta
   if constexpr (HasStationary<Model>::value) {
     if (holder->model.Stationary()) holder->description.capabilities |= ALIDADE_STATIONARY;
   }
+  const NoiseKind kind = holder->model.noise_kind();
+  if (kind == NoiseKind::kDiscrete) holder->description.capabilities |= ALIDADE_DISCRETE_NOISE;
   holder->description.initialise_role = -1;
   instance->motion = &MotionCalls<Model>::kCalls;
   Publish(std::move(holder), ALIDADE_KIND_MOTION, instance);

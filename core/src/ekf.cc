@@ -72,6 +72,7 @@ void Ekf::Restore(const Snapshot& snapshot) {
   Kept::Members(*this) = kept.values;
   if (landmarks_ != nullptr) landmarks_->Restore(kept.landmarks);
   Bind();
+  kept.RestoreInterval(*this);
 }
 
 const UpdateReport& Ekf::Process(const Frame& frame) {
@@ -180,6 +181,7 @@ bool Ekf::StepEvenly(Stamp end) {
   const Stamp start = stamp_;
   for (Stamp i = 1; i <= count; ++i) {
     if (!StepOnce(Seconds(elapsed) / static_cast<double>(count))) return false;
+    ++interval_steps_;
     stamp_ = i == count ? end : start + elapsed / count * i;
   }
   return true;
@@ -259,16 +261,20 @@ void Ekf::PropagateModels() {
 /// plan. False where the filter cannot go on.
 bool Ekf::StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s, bool derivatives) {
   const double unwritten = std::nan("");
+  const bool goes_on = plan.holds && InInterval();
+  if (goes_on && interval_steps_ == 1) plan.m = plan.gl;
   std::ranges::fill(plan.f, unwritten);
   std::ranges::fill(plan.g, unwritten);
-  std::ranges::fill(plan.l, unwritten);
+  if (!goes_on) std::ranges::fill(plan.l, unwritten);
   for (std::size_t i = 0; i < motion.blocks.size(); ++i) {
     std::fill_n(plan.next[i], state_.layout()[motion.blocks[i]].geometry().ambient, unwritten);
   }
   Status status = motion.model.Step(plan.x.data(), plan.u, nullptr, dt_s, plan.next.data(),
                                     derivatives ? plan.f.data() : nullptr,
                                     derivatives ? plan.g.data() : nullptr);
-  if (status == Status::kOk) status = motion.model.SqrtQ(plan.x.data(), dt_s, plan.l.data());
+  if (status == Status::kOk && !goes_on) {
+    status = motion.model.SqrtQ(plan.x.data(), dt_s, plan.l.data());
+  }
   if (status != Status::kOk) {
     GiveUp(status == Status::kError ? "plugin_failed" : "diverged",
            "motion model of '" + motion.name + "' cannot step: " +
@@ -279,6 +285,11 @@ bool Ekf::StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s, 
   if (derivatives) {
     internal::SpreadNoise(plan.g.data(), plan.l.data(), motion.model.tangent_size(),
                           motion.model.noise_size(), plan.gl.data(), plan.q.data());
+    if (goes_on) {
+      CarryHeld(motion.model, plan);
+    } else if (plan.holds) {
+      plan.m = plan.gl;
+    }
     finite = finite && AllFinite(plan.f) && AllFinite(plan.q);
   }
   for (std::size_t i = 0; i < motion.blocks.size(); ++i) {
@@ -291,6 +302,24 @@ bool Ekf::StepModel(const MotionBinding& motion, MotionPlan& plan, double dt_s, 
            "motion model of '" + motion.name + "' steps to a state that is not finite");
   }
   return finite;
+}
+
+/// With A = F M and N = G Lq: q <- N N' + A N' + N A' (its lower triangle), M <- A + N. Blocks
+/// without a covariance have no M.
+void Ekf::CarryHeld(const MotionModel& model, MotionPlan& plan) {
+  const Workspace::Use use(work_);
+  const Eigen::Index n = model.tangent_size(), w = model.noise_size();
+  const Eigen::Map<const RowMajor> f(plan.f.data(), n, n), input(plan.gl.data(), n, w);
+  Eigen::Map<RowMajor> m(plan.m.data(), n, w), q(plan.q.data(), n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (plan.at[static_cast<std::size_t>(i)] < 0) m.row(i).setZero();
+  }
+  Workspace::Matrix moved = work_.Take(n, w), both = work_.Take(n, n);
+  moved.noalias() = f * m;
+  both.noalias() = moved * input.transpose();
+  q.triangularView<Eigen::Lower>() += both;
+  q.triangularView<Eigen::Lower>() += both.transpose();
+  m = moved + input;
 }
 
 void Ekf::NotePluginFailure(const SensorBinding& sensor) {

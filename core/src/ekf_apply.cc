@@ -28,6 +28,7 @@ Outcome Ekf::Apply(std::span<Row* const> rows) {
 }
 
 void Ekf::RecordUpdate(std::span<Row* const> rows, const double* gain) {
+  interval_steps_ = 0;
   const int n = state_.covariance().size();
   for (const Row* row : rows) {
     MeasurementReport& entry = EntryOf(*row);

@@ -61,6 +61,7 @@ void Ekf::Bind() {
   }
   for (Row& row : rows_) row.zeroed = nullptr;
   BindMotions();
+  interval_steps_ = 0;
   small_ = steps_ == Steps::kOwn ? Small::For(*this) : nullptr;
 }
 
@@ -81,10 +82,12 @@ void Ekf::KeepFirstEstimates() {
 void Ekf::BindMotions() {
   next_.resize(state_.values().size());
   motions_.assign(system_.motions.size(), {});
+  holds_ = false;
   for (std::size_t i = 0; i < motions_.size(); ++i) {
     const MotionBinding& motion = system_.motions[i];
     MotionPlan& plan = motions_[i];
     plan.active = !motion.model.stationary();
+    plan.holds = motion.model.discrete_noise() && motion.model.noise_size() > 0;
     bool whole = true;  // every block has a covariance
     int row = 0;
     for (const BlockId id : motion.blocks) {
@@ -108,12 +111,14 @@ void Ekf::BindMotions() {
         plan.segments.emplace_back(block.tangent_offset, size);
       }
     }
+    holds_ = holds_ || (plan.active && plan.holds);
     if (whole) plan.rows.clear();
     const auto n = static_cast<std::size_t>(motion.model.tangent_size());
     const auto n_w = static_cast<std::size_t>(motion.model.noise_size());
     plan.f.resize(n * n);
     plan.g.resize(n * n_w);
     plan.gl.resize(n * n_w);
+    if (plan.holds) plan.m.resize(n * n_w);
     plan.l.resize(n_w * n_w);
     plan.q.resize(n * n);
   }

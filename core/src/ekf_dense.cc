@@ -32,7 +32,9 @@ Workspace::Matrix Ekf::Transition() {
   return transition;
 }
 
-Workspace::Matrix Ekf::NoiseInput() {
+/// A matrix of the plans (n x n_w each) in the rows of the covariance, beside one another; with
+/// `held_only` the columns of continuous noise are zero.
+Workspace::Matrix Ekf::Spread(std::vector<double> MotionPlan::*matrix, bool held_only) {
   Workspace::Matrix input = work_.Take(state_.covariance().size(), NoiseSize());
   input.setZero();
   Eigen::Index columns = 0;
@@ -40,15 +42,20 @@ Workspace::Matrix Ekf::NoiseInput() {
     const MotionPlan& plan = motions_[i];
     if (!plan.active) continue;
     const MotionModel& model = system_.motions[i].model;
-    const Eigen::Map<const RowMajor> gl(plan.gl.data(), model.tangent_size(), model.noise_size());
-    for (std::size_t row = 0; row < plan.at.size(); ++row) {
+    const Eigen::Index width = model.noise_size();
+    for (std::size_t row = 0; row < plan.at.size() && (plan.holds || !held_only); ++row) {
       if (plan.at[row] < 0) continue;
-      input.row(plan.at[row]).segment(columns, gl.cols()) = gl.row(static_cast<Eigen::Index>(row));
+      const Eigen::Map<const RowMajor> from((plan.*matrix).data(), model.tangent_size(), width);
+      input.row(plan.at[row]).segment(columns, width) = from.row(static_cast<Eigen::Index>(row));
     }
-    columns += gl.cols();
+    columns += width;
   }
   return input;
 }
+
+Workspace::Matrix Ekf::NoiseInput() { return Spread(&MotionPlan::gl, false); }
+Workspace::Matrix Ekf::HeldInput() { return Spread(&MotionPlan::gl, true); }
+Workspace::Matrix Ekf::HeldNoise() { return Spread(&MotionPlan::m, true); }
 
 Ekf::Stacked Ekf::Stack(std::span<Row* const> rows) {
   Eigen::Index m = 0;

@@ -19,13 +19,33 @@ struct Ekf::Kept : Snapshot {
   }
   explicit Kept(const Ekf& ekf) : Snapshot(ekf.state_), values(Members(ekf)) {
     if (ekf.landmarks_ != nullptr) landmarks = ekf.landmarks_->map();
+    interval_steps = ekf.interval_steps_;
+    for (const MotionPlan& plan : ekf.motions_) {
+      held.push_back(plan.holds ? Held{plan.l, plan.gl, plan.m} : Held{});
+    }
   }
+  /// Into the plans, once they are bound.
+  void RestoreInterval(Ekf& ekf) const {
+    ekf.interval_steps_ = interval_steps;
+    for (std::size_t i = 0; i < held.size(); ++i) {
+      MotionPlan& plan = ekf.motions_[i];
+      if (plan.holds)
+        std::tie(plan.l, plan.gl, plan.m) = std::tie(held[i].l, held[i].gl, held[i].m);
+    }
+  }
+
+  /// The noise that a motion model holds.
+  struct Held {
+    std::vector<double> l, gl, m;
+  };
 
   std::tuple<Stamp, ControlInputs, Stamp, std::vector<std::vector<double>>, std::vector<int>,
              std::vector<char>, std::vector<char>, std::vector<bool>, int, decltype(last_used_),
              bool, bool>
       values;
   LandmarkMap landmarks;
+  Stamp interval_steps = 0;
+  std::vector<Held> held;  ///< by motion
 };
 
 }  // namespace alidade

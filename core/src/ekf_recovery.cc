@@ -89,6 +89,7 @@ void Ekf::RepairCovariance() {
     return GiveUp("not_pd", text + ", after " + std::to_string(repairs_) + " repairs");
   }
   ++repairs_;
+  interval_steps_ = 0;
   p.SetBlock(0, 0, root * root.transpose());
   Note("repaired", text + "; negative pivots count as zero (repair " + std::to_string(repairs_) +
                        " of " + std::to_string(options_.repairs) + ")");
@@ -142,6 +143,7 @@ void Ekf::Recover(Row& row) {
     state_.covariance().Transform(block.tangent_offset,
                                   kInflation * Eigen::MatrixXd::Identity(n, n));
   }
+  if (any) interval_steps_ = 0;
   Note("lockout",
        why + (any ? "inflated the covariance of its blocks" : "it corrects no block to inflate"));
 }

@@ -178,6 +178,7 @@ ALIDADE_INLINE bool Ekf::Small::Correct(const Rows<N>& rows, int count) {
     for (int r = c; r < N; ++r) p.data()[c * p.stride() + r] = updated[c * N + r];
   }
   for (int i = 0; i < N; ++i) x[i] = moved[i];
+  ekf_.interval_steps_ = 0;
   for (int i = 0; i < m; ++i) {
     for (int n = 0; n < N; ++n) rows.gain[i][n] = gain[i * N + n];
   }
@@ -279,6 +280,7 @@ bool Ekf::Small::ProcessSized(const Frame& frame) {
     return false;
   }
   if (elapsed > 0) {
+    if (ekf_.InInterval()) return false;
     const double dt_s = Seconds(elapsed);
     if (!ekf_.inputs_.empty()) {
       if (!ekf_.inputs_.AllAct(ekf_.stamp_, frame.stamp)) return false;
@@ -286,6 +288,7 @@ bool Ekf::Small::ProcessSized(const Frame& frame) {
     }
     if (!(dt_s <= ekf_.options_.max_dt_s) || !Step<N>(dt_s)) return false;
     ekf_.stamp_ = frame.stamp;
+    ++ekf_.interval_steps_;
   }
   return Update<N>(frame);
 }

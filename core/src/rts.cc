@@ -20,12 +20,27 @@ void RtsSmoother::Adjoint::Append(const Eigen::MatrixXd& later_a, const Eigen::V
   a = later_a * a;
 }
 
+/// `held`: of lambda and Lambda at the end of the frame, the rows of w behind those of x.
+void RtsSmoother::Adjoint::GoBack(Eigen::Index held, Eigen::VectorXd& lambda,
+                                  Eigen::MatrixXd& later_information) const {
+  const Eigen::Index n = a.rows(), before = a.cols() - n;
+  Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(n + held, n + before);
+  whole.topRows(n) = a;
+  if (before > 0) whole.bottomRightCorner(held, before).setIdentity();
+  lambda = whole.transpose() * lambda + b;
+  later_information = whole.transpose() * later_information * whole + information;
+  later_information = 0.5 * (later_information + later_information.transpose()).eval();
+}
+
 const UpdateReport& RtsSmoother::Process(const Frame& frame) {
-  const Eigen::Index n = state_.covariance().size();
-  current_ = {Eigen::MatrixXd::Identity(n, n), Eigen::VectorXd::Zero(n),
-              Eigen::MatrixXd::Zero(n, n)};
+  const Workspace::Use use(work_);
+  const Eigen::Index n = state_.covariance().size(), all = n + (InInterval() ? NoiseSize() : 0);
+  current_ = {Eigen::MatrixXd::Identity(n, all), Eigen::VectorXd::Zero(all),
+              Eigen::MatrixXd::Zero(all, all)};
   const UpdateReport& report = Ekf::Process(frame);
-  passed_frames_.push_back({current_, state_.values(), state_.covariance().Dense(), report});
+  passed_frames_.push_back({current_, state_.values(), state_.covariance().Dense(),
+                            InInterval() ? Eigen::MatrixXd(HeldNoise()) : Eigen::MatrixXd(n, 0),
+                            report});
   passed_frames_.back().report.events.clear();  // told already
   return report;
 }
@@ -34,6 +49,8 @@ bool RtsSmoother::StepOnce(double dt_s) {
   if (!Ekf::StepOnce(dt_s)) return false;
   const Workspace::Use use(work_);
   current_.a = Transition() * current_.a;
+  const Eigen::Index held = current_.a.cols() - current_.a.rows();
+  if (held > 0) current_.a.rightCols(held) += HeldInput();
   return true;
 }
 
@@ -62,7 +79,11 @@ void RtsSmoother::Smooth(const Emit& emit) {
   std::vector<Event> events;
   State smoothed = state_;
   for (auto passed = passed_frames_.rbegin(); passed != passed_frames_.rend(); ++passed) {
-    const Eigen::MatrixXd p = passed->p - passed->p * information * passed->p;
+    const Eigen::Index held = lambda.size() - n;  // noise inputs, of an interval that goes on
+    Eigen::MatrixXd with(n, n + held);            // Cov(x, (x, w))
+    with.leftCols(n) = passed->p;
+    with.rightCols(held) = passed->m.leftCols(held);
+    const Eigen::MatrixXd p = passed->p - with * information * with.transpose();
     const bool positive = (p.diagonal().array() >= 0.0).all();
     if (!positive) {
       events.push_back({stamp_, "not_pd",
@@ -71,15 +92,12 @@ void RtsSmoother::Smooth(const Emit& emit) {
                             "; its covariance is the filter's"});
     }
     smoothed.values() = passed->x;
-    smoothed.Retract((passed->p * lambda).eval().data(), passed->x);
+    smoothed.Retract((with * lambda).eval().data(), passed->x);
     if (positive) passed->p = p;
     smoothed.covariance().SetBlock(0, 0, passed->p);
     smoothed.MoveTo(passed->x);
     passed->p = smoothed.covariance().Dense();
-    const Adjoint& adjoint = passed->adjoint;
-    lambda = adjoint.a.transpose() * lambda + adjoint.b;
-    information = adjoint.a.transpose() * information * adjoint.a + adjoint.information;
-    information = 0.5 * (information + information.transpose()).eval();
+    passed->adjoint.GoBack(held, lambda, information);
   }
   for (std::size_t k = 0; k < passed_frames_.size(); ++k) {
     Passed& passed = passed_frames_[k];

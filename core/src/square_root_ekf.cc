@@ -18,9 +18,10 @@ SquareRootEkf::SquareRootEkf(System system, const EkfOptions& options,
 }
 
 struct SquareRootEkf::Kept : Ekf::Kept {
-  explicit Kept(const SquareRootEkf& ekf) : Ekf::Kept(ekf), root(ekf.root_) {}
+  explicit Kept(const SquareRootEkf& ekf)
+      : Ekf::Kept(ekf), root(ekf.root_), without_held(ekf.without_held_) {}
 
-  Eigen::MatrixXd root;
+  Eigen::MatrixXd root, without_held;
 };
 
 std::unique_ptr<Estimator::Snapshot> SquareRootEkf::Save() const {
@@ -29,7 +30,9 @@ std::unique_ptr<Estimator::Snapshot> SquareRootEkf::Save() const {
 
 void SquareRootEkf::Restore(const Snapshot& snapshot) {
   Ekf::Restore(snapshot);
-  root_ = dynamic_cast<const Kept&>(snapshot).root;
+  const auto& kept = dynamic_cast<const Kept&>(snapshot);
+  root_ = kept.root;
+  without_held_ = kept.without_held;
 }
 
 /// P = L L'.
@@ -40,18 +43,36 @@ void SquareRootEkf::SetCovarianceOfRoot() {
   SetCovariance(p);
 }
 
-bool SquareRootEkf::StepOnce(double dt_s) {
-  if (!Ekf::StepOnce(dt_s)) return false;
+/// root, n x n, with root root' = a a' + b b', for a n x n.
+void SquareRootEkf::TakeRoot(const Workspace::Matrix& a, const Workspace::Matrix& b,
+                             Eigen::MatrixXd& root) {
   const Workspace::Use use(work_);
-  const Workspace::Matrix transition = Transition(), noise = NoiseInput();
-  const Eigen::Index n = root_.rows();
-  Workspace::Matrix moved = work_.Take(n, n), tall = work_.Take(n + noise.cols(), n);
-  moved.noalias() = transition * root_;
-  tall.topRows(n) = moved.transpose();
-  tall.bottomRows(noise.cols()) = noise.transpose();
+  const Eigen::Index n = a.rows();
+  Workspace::Matrix tall = work_.Take(n + b.cols(), n);
+  tall.topRows(n) = a.transpose();
+  tall.bottomRows(b.cols()) = b.transpose();
   internal::Triangularise(tall, work_.Take(n).data());
   tall.topRows(n).triangularView<Eigen::StrictlyLower>().setZero();
-  root_ = tall.topRows(n).transpose();
+  root = tall.topRows(n).transpose();
+}
+
+bool SquareRootEkf::StepOnce(double dt_s) {
+  const bool goes_on = InInterval();
+  if (!Ekf::StepOnce(dt_s)) return false;
+  const Workspace::Use use(work_);
+  const Workspace::Matrix transition = Transition();
+  Workspace::Matrix moved = work_.Take(root_.rows(), root_.cols()), noise = NoiseInput();
+  moved.noalias() = transition * (goes_on ? without_held_ : root_);
+  if (holds_) {
+    noise -= HeldInput();
+    if ((noise.array() != 0.0).any()) {
+      TakeRoot(moved, noise, without_held_);
+    } else {
+      without_held_ = moved;
+    }
+    noise += HeldNoise();
+  }
+  TakeRoot(moved, noise, root_);
   SetCovarianceOfRoot();
   return true;
 }

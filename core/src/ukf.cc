@@ -72,10 +72,12 @@ struct Ukf::Kept : Ekf::Kept {
       : Ekf::Kept(ukf),
         root(ukf.root_),
         root_is_current(ukf.root_is_current_),
+        held(ukf.held_),
         guarded(ukf.guarded_) {}
 
   Eigen::MatrixXd root;
   bool root_is_current;
+  Eigen::MatrixXd held;
   std::vector<bool> guarded;
 };
 
@@ -86,6 +88,7 @@ void Ukf::Restore(const Snapshot& snapshot) {
   const auto& kept = dynamic_cast<const Kept&>(snapshot);
   root_ = kept.root;
   root_is_current_ = kept.root_is_current;
+  held_ = kept.held;
   guarded_ = kept.guarded;
 }
 
@@ -111,12 +114,38 @@ const Eigen::MatrixXd& Ukf::Root() {
       p.data(), p.size(), p.size(), Eigen::OuterStride<>(p.stride()));
   const double defect = internal::SquareRootOf(lower, ldlt_, root_);
   if (defect < -kRounding) {
+    interval_steps_ = 0;
     p.SetBlock(0, 0, root_ * root_.transpose());
     Note("repaired", "the covariance has no square root: a pivot is " +
                          internal::RoundedText(defect, 3) +
                          " of its largest variance; negative pivots count as zero");
   }
   return root_;
+}
+
+/// B with P - M M' = B B', the covariance of x given the noise that is held; M M' is a part of P, so
+/// that a negative pivot is rounding.
+const Eigen::MatrixXd& Ukf::RootWithoutHeld() {
+  const Covariance& p = state_.covariance();
+  rest_ = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>(
+      p.data(), p.size(), p.size(), Eigen::OuterStride<>(p.stride()));  // its lower triangle
+  rest_.noalias() -= held_ * held_.transpose();
+  internal::SquareRootOf(rest_, ldlt_, root_of_rest_);
+  return root_of_rest_;
+}
+
+/// M from the deviations of the points: along w_j alone they are those at +c and -c.
+void Ukf::TakeHeld(const Workspace::Matrix& f, double c) {
+  if (!holds_) return;
+  const Eigen::Index n = f.rows(), all = f.cols() / 2;
+  held_ = (f.middleCols(n, all - n) - f.rightCols(all - n)) / (2.0 * c);
+  Eigen::Index column = 0;
+  for (std::size_t i = 0; i < motions_.size(); ++i) {
+    if (!motions_[i].active) continue;
+    const Eigen::Index inputs = system_.motions[i].model.noise_size();
+    if (!motions_[i].holds) held_.middleCols(column, inputs).setZero();
+    column += inputs;
+  }
 }
 
 /// Of sensor `index`, or of the motion, where that is beyond them; `narrow_enough`: the points at
@@ -165,7 +194,8 @@ Status Ukf::StepPoint(const double* from, const double* noise, double dt_s, doub
 /// Moves state and covariance, which stay as they are where a point is out of its domain.
 Status Ukf::StepPoints(int halvings, double dt_s) {
   const Workspace::Use use(work_);
-  const Eigen::MatrixXd& root = Root();
+  const bool goes_on = InInterval();
+  const Eigen::MatrixXd& root = goes_on ? RootWithoutHeld() : Root();
   const auto size = static_cast<Eigen::Index>(state_.values().size());
   const Eigen::Index n = root.cols(), noises = NoiseSize(), all = n + noises;
   const Transform transform = TransformOf(all, halvings);
@@ -182,6 +212,7 @@ Status Ukf::StepPoints(int halvings, double dt_s) {
       dx = c * root.col(direction);
     } else {
       noise[direction - n] = c;
+      if (goes_on) dx = c * held_.col(direction - n);
     }
     state_.Retract(dx.data(), moved_);
     status = StepPoint(moved_.data(), noise.data(), dt_s, points.col(i).data());
@@ -207,6 +238,7 @@ Status Ukf::StepPoints(int halvings, double dt_s) {
   if (!mean.allFinite() || !p.allFinite()) return Status::kOutOfDomain;
   std::copy_n(mean.data(), size, state_.values().data());
   SetCovariance(p);
+  TakeHeld(f, transform.c);
   root_is_current_ = false;
   return Status::kOk;
 }

@@ -78,6 +78,20 @@ TEST(StaticEkf, IsTheEngineComposedAtCompileTime) {
   EXPECT_GT(invalid, 10);
 }
 
+TEST(StaticEkf, HoldsDiscreteNoiseOverAGapOfManySteps) {
+  DepthEkf whole = StaticDepthFilter(), split = StaticDepthFilter();
+  const StereoDisparity stereo(400.0, 0.065, 1.0);
+  for (int k = 0; k < 20; ++k) {
+    ASSERT_EQ(whole.Predict(0.05), Status::kOk);
+    for (const double dt : {0.01, 0.005, 0.035}) ASSERT_EQ(split.Predict(dt), Status::kOk);
+    const double d = 80.0 + std::sin(7.0 * k);
+    ASSERT_EQ(whole.Update<kDepth>(stereo, &d), StaticOutcome::kAccepted);
+    ASSERT_EQ(split.Update<kDepth>(stereo, &d), StaticOutcome::kAccepted);
+    ASSERT_NEAR(*whole.value<kDepth>(), *split.value<kDepth>(), 1e-13);
+    ASSERT_LT((whole.covariance() - split.covariance()).norm(), 1e-13);
+  }
+}
+
 /// Two numbers at once, correlated noise, two roles of two numbers each.
 struct Difference : Sensor<Vec<2>, Vec<2>, Vec<2>> {
   static constexpr std::array kRoles{Quantity{"a", "m", "", "x,y"}, Quantity{"b", "m", "", "x,y"}};

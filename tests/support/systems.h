@@ -70,13 +70,24 @@ inline void AddSensor(System& system, const std::string& name, const SensorModel
   system.sensors.push_back(binding);
 }
 
-/// A point that moves with constant velocity: blocks `p.x`, `p.v`.
-inline System MovingPoint(double acceleration = 1.0) {
+/// Constant velocity but for an acceleration that each step has by itself, constant during it.
+struct Jolted : ConstantVelocity<1, false> {
+  using ConstantVelocity<1, false>::ConstantVelocity;
+  NoiseKind noise_kind() const { return NoiseKind::kContinuous; }
+};
+
+inline System PointOf(const MotionModel& model) {
   System system;
-  AddMotion(system, "p",
-            InProcessMotion(ConstantVelocity<1, false>(acceleration), "constant_velocity"),
-            {{"x", 1.0, 2.0}, {"v", -0.5, 3.0}});
+  AddMotion(system, "p", model, {{"x", 1.0, 2.0}, {"v", -0.5, 3.0}});
   return system;
+}
+/// A point that moves with constant velocity, jolted at each step: blocks `p.x`, `p.v`.
+inline System MovingPoint(double acceleration = 1.0) {
+  return PointOf(InProcessMotion(Jolted(acceleration), "jolted"));
+}
+/// The same, with an acceleration that is held from one update to the next.
+inline System HeldPoint(double acceleration = 1.0) {
+  return PointOf(InProcessMotion(ConstantVelocity<1, false>(acceleration), "constant_velocity"));
 }
 
 /// The depth filter: blocks `target.depth`, `target.depth_rate`, `template.inverse_distance`;

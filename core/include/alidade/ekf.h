@@ -22,6 +22,12 @@ namespace alidade {
 /// Control inputs act as ControlInputs has it. A gap stepped in parts is noted as the event
 /// `substeps`, where it takes at least twice as many as any noted before.
 ///
+/// Discrete noise w ~ N(0, I) is held over an interval, which ends with whatever changes the state
+/// but a step: frames without an accepted measurement are part of it. With Lq of its start and
+/// M = Cov(x, w), 0 there, each step of it makes
+///
+///   N = G Lq,  A = F M:   P' = F P F' + A N' + N A' + N N',   M' = A + N
+///
 /// An update is a transaction: what would leave the state not finite or not positive definite is
 /// rolled back and reported. Where S is not positive definite because P is not positive
 /// semi-definite, P is repaired (event `repaired`: negative pivots of its L D L' count as zero);
@@ -85,6 +91,8 @@ class Ekf : public Estimator {
     std::vector<int> rows;                      ///< of F that have a covariance; empty: all
     std::vector<int> at;                        ///< of the covariance, of each row of F; -1: none
     std::vector<double> f, g, l, gl, q;  ///< F, G, L of Qw, G L, G Qw G' (its lower triangle)
+    bool holds = false;                  ///< its noise is discrete
+    std::vector<double> m;               ///< then M; q holds A N' + N A' too
   };
   /// One measurement on its way into an update.
   struct Row {
@@ -124,6 +132,12 @@ class Ekf : public Estimator {
   Workspace::Matrix Transition();
   /// G Lq (n x NoiseSize()) of the last StepOnce.
   Workspace::Matrix NoiseInput();
+  /// The same, the columns of continuous noise zero.
+  Workspace::Matrix HeldInput();
+  /// M (n x NoiseSize()) after the last StepOnce, the columns of continuous noise zero.
+  Workspace::Matrix HeldNoise();
+  /// Whether noise that the last step held goes on being held.
+  bool InInterval() const { return holds_ && interval_steps_ > 0; }
   /// Rows below one another: H (m x n), R (m x m) and the innovation.
   struct Stacked {
     Workspace::Matrix h, noise;
@@ -136,7 +150,7 @@ class Ekf : public Estimator {
   /// P <- p, of which the lower triangle counts.
   void SetCovariance(const Workspace::Matrix& p);
   /// Writes the gain of all rows (n x m by columns, its rows as they lie in P) down in their
-  /// reports, and remembers the last one used.
+  /// reports, remembers the last one used, and ends the interval of held noise.
   void RecordUpdate(std::span<Row* const> rows, const double* gain);
 
   /// The report, the sensor and the plan that belong to a row.
@@ -169,6 +183,8 @@ class Ekf : public Estimator {
   void StepTo(Stamp stamp);
   bool StepEvenly(Stamp end);
   void UseInputs();
+  void CarryHeld(const MotionModel& model, MotionPlan& plan);
+  Workspace::Matrix Spread(std::vector<double> MotionPlan::*matrix, bool held_only);
   bool StepIsBounded() const;
   bool Propagate();
   void PropagateModels();
@@ -217,6 +233,7 @@ class Ekf : public Estimator {
   std::unique_ptr<Small> small_;          ///< null where the general path is the only one
   std::vector<int> order_;  ///< rows of P in the order of the layout; empty: as they are
   bool waiting_ = false, considering_ = false;  ///< a block has no value yet; one is considered
+  bool holds_ = false;                          ///< the noise of a model is discrete
   std::vector<std::vector<double>> first_;      ///< estimates of stationary blocks, by block
   const double* correction_ = nullptr;          ///< dx of the update; null: K r
   // Memory that is kept from frame to frame.
@@ -231,6 +248,7 @@ class Ekf : public Estimator {
   Stamp stamp_ = kNoStamp;
   ControlInputs inputs_;
   Stamp most_parts_ = 1;                ///< of a gap, as far as they were noted
+  Stamp interval_steps_ = 0;            ///< since the state was last changed by anything else
   std::vector<double> gate_threshold_;  ///< on r' S^-1 r, by sensor
   std::vector<int> rejections_;         ///< consecutive, by sensor
   std::vector<char> out_of_domain_;     ///< since the last acceptance, by sensor

@@ -19,6 +19,10 @@ namespace alidade {
 ///   update     lambda <- A' lambda + H' S^-1 r,   Lambda <- A' Lambda A + H' S^-1 H,
 ///              A = I - K H
 ///
+/// Discrete noise w, held over an interval, goes back beside x: M = Cov(x, w), and lambda, Lambda are
+/// those of (x, w) at frames inside an interval, with [P M] for P and [F G Lq; 0 I] for F. Where the
+/// interval starts, what they have of w is dropped.
+///
 /// All Jacobians are those of the filter, and so are R and its weight under a robust loss.
 ///
 /// Source       [Rauch1965]; [Bierman1977] ch. X, modified Bryson-Frazier.
@@ -47,21 +51,23 @@ class RtsSmoother : public Ekf {
 
  private:
   /// How the adjoint goes back over a frame: lambda <- A' lambda + b, Lambda <- A' Lambda A +
-  /// information.
+  /// information. Where the frame starts inside an interval, A has columns for w behind those of x.
   struct Adjoint {
-    Eigen::MatrixXd a;  ///< n x n
+    Eigen::MatrixXd a;  ///< n x n, or n x (n + n_w)
     Eigen::VectorXd b;
     Eigen::MatrixXd information;
 
     /// This one, and then what comes later in time.
     void Append(const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
                 const Eigen::MatrixXd& information);
+    void GoBack(Eigen::Index held, Eigen::VectorXd& lambda, Eigen::MatrixXd& later) const;
   };
   /// One frame, and the filter's estimate after it.
   struct Passed {
     Adjoint adjoint;
     std::vector<double> x;
     Eigen::MatrixXd p;
+    Eigen::MatrixXd m;  ///< M inside an interval, else n x 0
     UpdateReport report;
   };
 

@@ -18,6 +18,10 @@ namespace alidade {
 ///             [0   L  ]  = [W   L+] Q'                                     (m + n) x (m + n)
 ///             S = Ls Ls',  dx = W Ls^-1 r,  K = W Ls^-1
 ///
+/// Of discrete noise w, held over an interval, M = Cov(x, w) and the root B of P - M M' are carried:
+/// each step takes B <- F B (with continuous noise below it, as above) and M <- F M + G Lq, and L
+/// is the root of [B M].
+///
 /// All Jacobians are those of Ekf, and so is the weight of a robust loss, R / w for R.
 /// O((m + n)^3) for each update.
 ///
@@ -47,6 +51,7 @@ class SquareRootEkf : public Ekf {
  private:
   struct Kept;
   void SetCovarianceOfRoot();
+  void TakeRoot(const Workspace::Matrix& a, const Workspace::Matrix& b, Eigen::MatrixXd& root);
 
   /// Of a sensor's R.
   struct NoiseRoot {
@@ -55,6 +60,7 @@ class SquareRootEkf : public Ekf {
   };
 
   Eigen::MatrixXd root_;
+  Eigen::MatrixXd without_held_;        ///< B, while an interval goes on
   std::vector<NoiseRoot> noise_roots_;  ///< by sensor; memory
   /// @endcond
 };

@@ -35,7 +35,8 @@ enum class StaticOutcome {
 /// Measurements are used one after the other, each linearised at the state that the one before has
 /// left, as the engine does under `fuse: per_measurement`. As there, P is carried along where the
 /// tangent basis of a unit vector turns with it. Sizes are known at compile time: Constant<1>, not
-/// Constant<>. Control inputs are given to Predict: to hold them is up to the caller.
+/// Constant<>. Control inputs are given to Predict: to hold them is up to the caller. Discrete noise
+/// is held from one accepted measurement (or Set) to the next, as Ekf has it.
 template <class... Motions>
 class StaticEkf {
  public:
@@ -58,6 +59,7 @@ class StaticEkf {
     p_.template middleRows<k>(o).setZero();
     p_.template middleCols<k>(o).setZero();
     p_.template block<k, k>(o, o) = p;
+    in_interval_ = false;
   }
   /// Sets a scalar block to `value`, standard deviation `sigma`.
   template <int B>
@@ -129,14 +131,23 @@ class StaticEkf {
   template <class Model>
   using TransitionOf = Transition<detail::Blocks<Model>::kTangent>;
 
+  /// Discrete noise over an interval: Lq of its start, and M = Cov(x, w).
+  template <class Model>
+  struct Held {
+    Eigen::Matrix<double, Model::kNoise, Model::kNoise> l;
+    Eigen::Matrix<double, detail::Blocks<Model>::kTangent, Model::kNoise> m;
+  };
+
   template <std::size_t... M>
   Status PredictAll(double dt_s, const double* const* inputs, std::index_sequence<M...>) {
     double next[kAmbient];
     std::tuple<TransitionOf<Motions>...> transitions;
+    std::tuple<Held<Motions>...> held;
     Status status = Status::kOk;
-    const bool all = (((status = StepOne<M>(dt_s, inputs[InputsBefore(M)], next,
-                                            std::get<M>(transitions))) == Status::kOk) &&
-                      ...);
+    const bool all =
+        (((status = StepOne<M>(dt_s, inputs[InputsBefore(M)], next, std::get<M>(transitions),
+                               std::get<M>(held))) == Status::kOk) &&
+         ...);
     if (!all) return status;
     const auto step = [&] {
       std::copy_n(next, kAmbient, x_);
@@ -147,15 +158,22 @@ class StaticEkf {
       detail::ForEach(normalise, Indices{});
       (Propagate<TangentOffset(FirstBlock(M))>(std::get<M>(transitions)), ...);
     };
-    return Try(step) ? Status::kOk : Status::kError;
+    if (!Try(step)) return Status::kError;
+    (Hold<M>(std::get<M>(held)), ...);
+    in_interval_ = true;
+    return Status::kOk;
   }
   /// Makes a change of x and P; false, and both as they were, where what it leaves is not finite.
   template <class Change>
   bool Try(const Change& change);
-  template <std::size_t M, int N>
+  template <std::size_t M, class NoiseHeld>
+  void Hold(const NoiseHeld& held) {
+    if (std::get<M>(motions_).noise_kind() == NoiseKind::kDiscrete) std::get<M>(held_) = held;
+  }
+  template <std::size_t M, int N, class NoiseHeld>
   Status StepOne(double dt_s, const double* u,
                  double* next,  // NOLINT(readability-non-const-parameter): y points into it
-                 Transition<N>& transition) const {
+                 Transition<N>& transition, NoiseHeld& held) const {
     using Model = std::tuple_element_t<M, std::tuple<Motions...>>;
     constexpr typename detail::Blocks<Model>::Indices indices{};
     constexpr int n_w = Model::kNoise;
@@ -171,11 +189,23 @@ class StaticEkf {
     double f[N * N], g[N * n_w + 1] = {}, l[n_w * n_w + 1] = {};
     const Status status = Step(model, x, u, nullptr, dt_s, y, {f, N}, {g, n_w});
     if (status != Status::kOk) return status;
-    detail::CallSqrtQ(model, x, dt_s, {l, n_w}, indices);
-    const Eigen::Matrix<double, N, n_w> gl =
-        RowMajorMap<N, n_w>(g).lazyProduct(RowMajorMap<n_w, n_w>(l));
+    const bool discrete = model.noise_kind() == NoiseKind::kDiscrete;
+    const bool goes_on = discrete && in_interval_;
+    if (!goes_on) detail::CallSqrtQ(model, x, dt_s, {l, n_w}, indices);
+    if (goes_on) {
+      held.l = std::get<M>(held_).l;
+    } else {
+      held.l = RowMajorMap<n_w, n_w>(l);
+    }
+    held.m = RowMajorMap<N, n_w>(g).lazyProduct(held.l);
     transition.f = RowMajorMap<N, N>(f);
-    transition.q = gl.lazyProduct(gl.transpose());
+    transition.q = held.m.lazyProduct(held.m.transpose());
+    if (goes_on) {  // A = F M: q += A N' + N A', M' = A + N
+      const Eigen::Matrix<double, N, n_w> moved = transition.f.lazyProduct(std::get<M>(held_).m);
+      const Eigen::Matrix<double, N, N> both = moved.lazyProduct(held.m.transpose());
+      transition.q += both + both.transpose();
+      held.m += moved;
+    }
     return Status::kOk;
   }
 
@@ -209,6 +239,8 @@ class StaticEkf {
   std::tuple<Motions...> motions_;
   double x_[kAmbient] = {};
   Covariance p_ = Covariance::Zero();
+  std::tuple<Held<Motions>...> held_;  ///< of discrete noise, while an interval goes on
+  bool in_interval_ = false;           ///< P has been stepped since anything else changed it
 };
 
 }  // namespace alidade

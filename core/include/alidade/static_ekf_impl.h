@@ -143,7 +143,9 @@ StaticOutcome StaticEkf<Motions...>::Correct(const Eigen::Matrix<double, kTangen
     }
     Move(dx.data());
   };
-  return Try(correct) ? StaticOutcome::kAccepted : StaticOutcome::kNotFinite;
+  if (!Try(correct)) return StaticOutcome::kNotFinite;
+  in_interval_ = false;
+  return StaticOutcome::kAccepted;
 }
 
 #undef ALIDADE_UNROLL

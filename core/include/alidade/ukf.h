@@ -34,8 +34,9 @@ struct UkfOptions {
 ///   moments    Cov(y) = w sum f_i f_i' + (beta - alpha^2) m m',   Cov(x, y) = w sum dx_i f_i'
 ///
 /// This is the scaled transform without its large weight of the centre, which cancels. The mean on
-/// a manifold is found by iteration. Process noise is augmented: N = n + noise inputs. A
-/// measurement's R is that at x0; S = Cov(h) + R, K = Cov(x, h) S^-1, and with dx_i - K f_i in
+/// a manifold is found by iteration. Process noise is augmented: N = n + noise inputs. Discrete
+/// noise w is held over an interval: from its second step on the points are those of (x, w) with
+/// Cov(x, w) = M, in the directions (b_i, 0), B B' = P - M M', and (m_j, e_j). A measurement's R is that at x0; S = Cov(h) + R, K = Cov(x, h) S^-1, and with dx_i - K f_i in
 /// place of f_i the new P is Cov(x - K h) + K R K', a sum of squares where beta >= alpha^2. A
 /// robust loss takes R / w for R. The spread of a joint update is that of its narrowest
 /// measurement; h, S and NIS are reported as the gate saw them.
@@ -89,6 +90,8 @@ class Ukf : public Ekf {
   Transform TransformOf(Eigen::Index directions, int halvings) const;
   bool MayHalve(int halvings) const;
   const Eigen::MatrixXd& Root();
+  const Eigen::MatrixXd& RootWithoutHeld();
+  void TakeHeld(const Workspace::Matrix& f, double c);
   Status StepPoints(int halvings, double dt_s);
   Status StepPoint(const double* from, const double* noise, double dt_s, double* to);
   Outcome Predict(Row& row, int halvings);
@@ -100,9 +103,11 @@ class Ukf : public Ekf {
   UkfOptions spread_;
   Eigen::MatrixXd root_;  ///< of P
   bool root_is_current_ = false;
+  Eigen::MatrixXd held_;              ///< M, while an interval goes on
   std::vector<Predicted> predicted_;  ///< by report
   std::vector<bool> guarded_;         ///< by sensor; the last: the motion
   // Memory that is kept from step to step.
+  Eigen::MatrixXd rest_, root_of_rest_;
   Eigen::LDLT<Eigen::MatrixXd> ldlt_;
   std::vector<const double*> x_;
   std::vector<double*> stepped_;

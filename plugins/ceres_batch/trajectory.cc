@@ -47,7 +47,14 @@ Trajectory::Trajectory(System system, const std::vector<StreamInfo>& streams, do
   has_unit_vector_ = std::ranges::any_of(initial_.layout().blocks(), [](const Block& block) {
     return block.has_covariance() && block.geometry().kind == GeometryKind::kUnitVector;
   });
+  held_.assign(system_.motions.size(), -1);
+  held_l_.resize(system_.motions.size());
   if (has_landmarks()) AddKnown();
+}
+
+bool Trajectory::Holds(std::size_t motion) const {
+  const MotionModel& model = system_.motions[motion].model;
+  return model.discrete_noise() && !model.stationary() && model.noise_size() > 0;
 }
 
 bool Trajectory::Fail(std::string why) const {
@@ -82,6 +89,7 @@ bool Trajectory::Add(const Frame& frame, const UpdateReport& report, const Estim
     stamp_ = system_.start_s ? StampFromSeconds(*system_.start_s) : frame.stamp;
   }
   Epoch epoch;
+  epoch.steps.swap(passed_on_);
   epoch.stale = frame.stamp < stamp_;
   const int inputs = inputs_;
   if (!epochs_.empty()) epoch.column = inputs;
@@ -99,8 +107,18 @@ bool Trajectory::Add(const Frame& frame, const UpdateReport& report, const Estim
   epoch.inputs = std::move(taken.inputs);
   AddFactors(frame, report, epoch);
   if (has_landmarks()) AddLandmarks(report, filter, epoch);
+  EndInterval(epoch);
   epochs_.push_back(std::move(epoch));
   return inputs_ <= kMostInputs || FailTooMany();
+}
+
+/// Noise is held no longer where the frame has a measurement in use, as in a filter.
+void Trajectory::EndInterval(Epoch& epoch) {
+  const auto in_use = [](const Factor& f) { return f.row >= 0 || f.landmark >= 0; };
+  if (!epoch.first_values.empty() || std::ranges::any_of(epoch.factors, in_use)) {
+    std::ranges::fill(held_, -1);
+  }
+  epoch.ends = std::ranges::all_of(held_, [](int column) { return column < 0; });
 }
 
 /// The steps of all models from `from` to `end`, over which the control inputs are constant.
@@ -121,9 +139,12 @@ bool Trajectory::AddSteps(Stamp from, Stamp end, Epoch& epoch) {
       Step& step = epoch.steps.emplace_back();
       step.motion = i;
       step.dt_s = Seconds(elapsed) / static_cast<double>(parts);
-      step.column = inputs_;
+      step.begins = held_[i] < 0;
+      step.column = step.begins ? inputs_ : held_[i];
+      step.columns = inputs_;
       if (u != nullptr) step.u.assign(u, u + motion.model.input().geometry.ambient);
-      inputs_ += motion.model.noise_size();
+      if (step.begins) inputs_ += motion.model.noise_size();
+      if (Holds(i)) held_[i] = step.column;
     }
     if (inputs_ > kMostInputs) return FailTooMany();
   }

@@ -24,7 +24,8 @@ namespace alidade::ceres_batch {
 ///                 with J = d(m (+) d)/dd,  J_r_e = L_i^-1 d(z (-) h)/dh H S_k
 ///
 /// So P_0 and Q may have any rank, nothing is inverted but L_i, and the motion holds exactly at
-/// every e. What depends on the state in Q and R stands at where it was last frozen.
+/// every e. Discrete noise is held over an interval: all steps from one frame with a measurement in
+/// use to the next have the same L and the same inputs. What depends on the state in Q and R stands at where it was last frozen.
 ///
 /// Landmarks are functions of the camera that saw them first and of inputs of their own, l, which
 /// are not in e: see MapLandmark. Where there are any, Reduce stands for Evaluate.
@@ -67,7 +68,8 @@ class Trajectory {
   std::size_t size() const { return epochs_.size(); }
   /// Makes the first frame, linearised at e, part of the prior, which is then that of the state at
   /// that frame; e becomes the same trajectory in the inputs that are left. L_0 is a square root:
-  /// P_0 may stay singular. Q, R and the weights of losses are those at e. Not with landmarks.
+  /// P_0 may stay singular. Q, R and the weights of losses are those at e. Not with landmarks. A
+  /// frame after which noise goes on being held has no measurement: its steps become the next one's.
   /// False where a model is not defined: nothing has changed.
   bool MarginaliseFirst(Eigen::VectorXd& e);
   Stamp stamp() const { return stamp_; }
@@ -119,6 +121,8 @@ class Trajectory {
     std::size_t motion;
     double dt_s;
     int column;
+    int columns;            ///< inputs before it: of which the state depends on some
+    bool begins;            ///< it has inputs of its own, else those that the step before held
     std::vector<double> u;  ///< control input; empty: the model takes none
     RowMajor l;             ///< frozen
   };
@@ -141,6 +145,7 @@ class Trajectory {
     std::vector<Factor> factors;
     std::vector<FirstValue> first_values;  ///< after the steps
     bool stale = false;
+    bool ends = false;        ///< no noise goes on being held after it
     std::vector<int> inputs;  ///< UpdateReport::inputs
     LandmarkCounts counts;    ///< of the filter
     int column = 0;           ///< the first of its inputs; of the first epoch 0: the prior's too
@@ -191,6 +196,9 @@ class Trajectory {
               const Point& point, const std::string& name, Inverse& inverse) const;
   bool FreezeEpoch(Epoch& epoch, const double* e, Point& point);
   bool FreezeStep(Step& step, const Point& point);
+  bool Holds(std::size_t motion) const;
+  void EndInterval(Epoch& epoch);
+  void PassOnFirst();
   bool FreezeFactor(Factor& factor, const Point& point, const std::vector<double>& y = {});
   bool Residual(const Factor& factor, const Point& point, const std::vector<double>& y,
                 Eigen::VectorXd& r, Eigen::MatrixXd* a) const;
@@ -230,8 +238,10 @@ class Trajectory {
   System system_;
   std::vector<int> stream_of_sensor_;
   double max_dt_s_;
-  State initial_;              ///< all blocks have a place in it
-  std::vector<bool> present_;  ///< at the last frame, by block
+  State initial_;                 ///< all blocks have a place in it
+  std::vector<bool> present_;     ///< at the last frame, by block
+  std::vector<int> held_;         ///< by motion: column of the inputs that go on being held, or -1
+  std::vector<RowMajor> held_l_;  ///< by motion: L of the last step that begins
   Eigen::MatrixXd l0_;
   Eigen::VectorXd d0_;  ///< x_0 = m (+) (d_0 + L_0 e_0); 0 but after MarginaliseFirst
   std::vector<Epoch> epochs_;
@@ -245,6 +255,7 @@ class Trajectory {
   bool has_unit_vector_ = false;
   double change_ = 0.0;
   mutable std::string problem_;
+  std::vector<Step> passed_on_;  ///< of frames that were dropped, to the next one
 };
 
 }  // namespace alidade::ceres_batch

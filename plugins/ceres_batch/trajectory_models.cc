@@ -44,7 +44,7 @@ std::string Why(Status status, const std::string& error) {
 
 }  // namespace
 
-/// x = f(x, u, L e, dt); S = F S + [0  G L  0] and offset = F offset, in the rows of the model.
+/// x = f(x, u, L e, dt); S = F S + [0  G L  0], which adds to what held inputs did before, and offset = F offset, in the rows of the model.
 bool Trajectory::Move(const Step& step, const double* e, Point& point) const {
   const MotionBinding& motion = system_.motions[step.motion];
   const StateLayout& layout = initial_.layout();
@@ -88,9 +88,12 @@ bool Trajectory::Move(const Step& step, const double* e, Point& point) const {
       const int column = rows[static_cast<std::size_t>(k)];
       if (column >= 0) a(row, column) = f(i, k);
     }
-    point.s.row(row).segment(step.column, n_w) = gl.row(i);
   }
-  point.s.leftCols(step.column) = a * point.s.leftCols(step.column);
+  point.s.leftCols(step.columns) = a * point.s.leftCols(step.columns);
+  for (int i = 0; i < n; ++i) {
+    const int row = rows[static_cast<std::size_t>(i)];
+    if (row >= 0) point.s.row(row).segment(step.column, n_w) += gl.row(i);
+  }
   point.offset = a * point.offset;
   return true;
 }
@@ -244,6 +247,10 @@ bool Trajectory::Residual(const Factor& factor, const Point& point, const std::v
 }
 
 bool Trajectory::FreezeStep(Step& step, const Point& point) {
+  if (!step.begins) {
+    step.l = held_l_[step.motion];
+    return true;
+  }
   const MotionBinding& motion = system_.motions[step.motion];
   const int n_w = motion.model.noise_size();
   std::vector<const double*> blocks;
@@ -258,6 +265,7 @@ bool Trajectory::FreezeStep(Step& step, const Point& point) {
   }
   NoteChange(step.l, l);
   step.l = std::move(l);
+  if (Holds(step.motion)) held_l_[step.motion] = step.l;
   return true;
 }
 

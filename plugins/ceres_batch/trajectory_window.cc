@@ -15,6 +15,10 @@ namespace alidade::ceres_batch {
 ///   L'     = triangle of U^-T S' = Q_L L',   e_0 = -Q_L' U s   is where x = x^
 bool Trajectory::MarginaliseFirst(Eigen::VectorXd& e) {
   ALIDADE_EXPECTS(!has_landmarks() && !epochs_.empty() && e.size() == inputs_);
+  if (!epochs_.front().ends) {
+    PassOnFirst();
+    return true;
+  }
   const Eigen::Index c = epochs_.size() > 1 ? epochs_[1].column : inputs_;
   const Eigen::Index n = initial_.covariance().size();
   Point point;
@@ -56,14 +60,29 @@ bool Trajectory::MarginaliseFirst(Eigen::VectorXd& e) {
   return true;
 }
 
+/// Drops the first frame, which tells nothing; the steps to it lead to the next one.
+void Trajectory::PassOnFirst() {
+  passed_on_.swap(epochs_.front().steps);
+  epochs_.erase(epochs_.begin());
+  if (epochs_.empty()) return;
+  Epoch& next = epochs_.front();
+  next.column = 0;
+  next.steps.insert(next.steps.begin(), passed_on_.begin(), passed_on_.end());
+  passed_on_.clear();
+}
+
 /// The places of inputs and residuals, once those of the first frame are gone.
 void Trajectory::Shift(int columns, int rows) {
   inputs_ += columns;
+  for (int& column : held_) column += column < 0 ? 0 : columns;
   residuals_ = 0;
   parts_.clear();
   for (Epoch& epoch : epochs_) {
     epoch.column = &epoch == &epochs_.front() ? 0 : epoch.column + columns;
-    for (Step& step : epoch.steps) step.column += columns;
+    for (Step& step : epoch.steps) {
+      step.column += columns;
+      step.columns += columns;
+    }
     for (FirstValue& first : epoch.first_values) first.column += columns;
     for (Factor& factor : epoch.factors) {
       if (factor.row < 0) continue;

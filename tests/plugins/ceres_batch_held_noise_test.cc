@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Batch and fixed lag over gaps that are split: noise that a model holds is one input of each gap.
+#include <cmath>
+
+#include "alidade/rts.h"
+#include "ceres_batch_fixture.h"
+
+namespace alidade {
+namespace {
+
+using testing::FrameAt;
+
+struct Estimate {
+  std::vector<double> x;
+  Eigen::MatrixXd p;
+};
+
+/// Every estimate of a frame that `wanted` holds for.
+template <class Wanted>
+std::vector<Estimate> EstimatesOf(Estimator& estimator, const std::vector<Frame>& frames,
+                                  const Wanted& wanted) {
+  std::vector<Estimate> result;
+  const auto take = [&](std::size_t k, const State& state) {
+    if (wanted(frames[k])) result.push_back({state.values(), state.covariance().Dense()});
+  };
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    estimator.Process(frames[k]);
+    if (!estimator.offline()) take(k, estimator.state());
+  }
+  if (estimator.offline()) {
+    estimator.Smooth(
+        [&](std::size_t k, const State& state, const UpdateReport&) { take(k, state); });
+  }
+  EXPECT_FALSE(estimator.failed());
+  return result;
+}
+
+bool All(const Frame&) { return true; }
+bool Measured(const Frame& frame) { return !frame.measurements.empty(); }
+
+void ExpectNear(const std::vector<Estimate>& found, const std::vector<Estimate>& expected,
+                double tolerance) {
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    for (std::size_t i = 0; i < found[k].x.size(); ++i) {
+      EXPECT_NEAR(found[k].x[i], expected[k].x[i], tolerance) << k << ' ' << i;
+    }
+    EXPECT_LT((found[k].p - expected[k].p).cwiseAbs().maxCoeff(), tolerance) << k;
+  }
+}
+
+System HeldSystem() {
+  System system = testing::HeldPoint(0.7);
+  testing::AddSensor(system, "z", InProcessSensor(testing::Linear(2.0, 0.3), "linear"), {"p.x"});
+  return system;
+}
+
+/// 10 frames a second with a measurement, `parts` - 1 without one before each.
+std::vector<Frame> Frames(int count, int parts) {
+  std::vector<Frame> frames;
+  for (int k = 0; k <= (count - 1) * parts; ++k) {
+    const double t_s = 0.1 * k / parts;
+    frames.push_back(FrameAt(t_s, {}));
+    if (k % parts != 0) continue;
+    const double z = 2.0 * std::cos(t_s) + 0.3 * std::sin(37.0 * (k / parts));
+    frames.back().measurements.push_back({frames.back().stamp, 0, -1, {z}, {}});
+  }
+  return frames;
+}
+
+std::unique_ptr<Estimator> Make(const char* type, const std::string& options) {
+  const System system = HeldSystem();
+  const Config config = Config::FromText(std::string("type: ") + type + "\n" + options, "e.yaml");
+  return testing::Shipped().CreateEstimator(type, config.root())(system,
+                                                                 testing::StreamsOf(system));
+}
+
+struct Case {
+  const char* type;
+  const char* options;
+};
+constexpr Case kCases[] = {{"ceres_batch", ""},
+                           {"ceres_batch", "data: so_far\n"},
+                           {"fixed_lag", "window_s: 0.25\n"},
+                           {"fixed_lag", "window_s: 0.25\nestimate: oldest\n"}};
+
+TEST(CeresBatchHeldNoise, AGapIsAGapHoweverItIsSplit) {
+  for (const Case& c : kCases) {
+    SCOPED_TRACE(std::string(c.type) + ' ' + c.options);
+    const auto whole = EstimatesOf(*Make(c.type, c.options), Frames(25, 1), All);
+    const std::string parts = std::string(c.options) + "max_dt_s: 0.021\n";
+    ExpectNear(EstimatesOf(*Make(c.type, parts), Frames(25, 1), All), whole, 1e-9);
+    // The oldest frame of a window sees as many seconds, but for the frames that lie between.
+    ExpectNear(EstimatesOf(*Make(c.type, c.options), Frames(25, 4), Measured), whole, 1e-9);
+  }
+}
+
+// Also at the frames inside a gap, whose noise is still being held.
+TEST(CeresBatchHeldNoise, IsTheSmootherAtEveryFrame) {
+  const System system = HeldSystem();
+  const std::vector<Frame> frames = Frames(12, 3);
+  RtsSmoother rts(system, {.max_dt_s = 0.02}, testing::StreamsOf(system));
+  ExpectNear(EstimatesOf(*Make("ceres_batch", "max_dt_s: 0.02\n"), frames, All),
+             EstimatesOf(rts, frames, All), 1e-9);
+}
+
+// The window is the filter; its edge lies inside a gap at most frames.
+TEST(CeresBatchHeldNoise, ALinearWindowIsTheFilterAtEveryFrame) {
+  const System system = HeldSystem();
+  const std::vector<Frame> frames = Frames(20, 4);
+  for (const char* window : {"0.01", "0.06", "0.13", "0.5"}) {
+    Ekf ekf(system, {}, testing::StreamsOf(system));
+    const auto lag = Make("fixed_lag", std::string("window_s: ") + window + "\n");
+    ExpectNear(EstimatesOf(*lag, frames, All), EstimatesOf(ekf, frames, All), 1e-9);
+  }
+}
+
+// 1000 gaps of 10 parts: 2 inputs of the prior and one of each gap, where 4000 are the most.
+TEST(CeresBatchHeldNoise, HasOneInputForEachGap) {
+  const auto batch = Make("ceres_batch", "max_dt_s: 0.011\n");
+  const std::vector<Frame> frames = Frames(1001, 2);
+  for (const Frame& frame : frames) batch->Process(frame);
+  EXPECT_FALSE(batch->failed());
+}
+
+}  // namespace
+}  // namespace alidade

@@ -88,6 +88,80 @@ double OrderOf(const Context& context, const Function& f, const Values& inputs,
   return coarse && fine ? std::log2(coarse->defect / fine->defect) : 0.0;
 }
 
+/// A step without noise: x', F, and N = G Lq.
+struct NoisyStep {
+  Values next;
+  MatrixXd f, n;
+};
+
+/// Over dt_s from `blocks`, with Lq as it is at `noise_of`, for a step of noise_dt_s.
+std::optional<NoisyStep> StepWithNoise(const Context& context, Values inputs, const Values& blocks,
+                                       double dt_s, const Values& noise_of, double noise_dt_s) {
+  std::copy(blocks.begin(), blocks.end(), inputs.begin());
+  std::fill(inputs[blocks.size()].begin(), inputs[blocks.size()].end(), 0.0);
+  inputs.back()[0] = dt_s;
+  Values of_noise = noise_of;
+  of_noise.push_back({noise_dt_s});
+  const Answer step = context.CallWith(context.main(), inputs, kAllMatrices);
+  const Answer noise = context.CallWith(*context.model().Find("SqrtQ"), of_noise, kAllMatrices);
+  if (!step.ok() || !noise.ok()) return std::nullopt;
+  return NoisyStep{OutputValues(step), ToMatrix(step.matrices[0]),
+                   ToMatrix(step.matrices[1]) * ToMatrix(noise.matrices[0])};
+}
+
+/// How far the covariance of the noise over two parts of dt is from that over dt, relative to it.
+struct PartsDefect {
+  double discrete = 0.0, continuous = 0.0;  ///< for one w in both parts, for one in each
+};
+
+std::optional<PartsDefect> DefectOfParts(const Context& context, const Values& inputs,
+                                         const Values& blocks, double dt_s) {
+  const double first_s = 0.375 * dt_s, second_s = dt_s - first_s;
+  const auto whole = StepWithNoise(context, inputs, blocks, dt_s, blocks, dt_s);
+  const auto first = StepWithNoise(context, inputs, blocks, first_s, blocks, first_s);
+  if (!whole || !first) return std::nullopt;
+  const Values& between = first->next;
+  const auto held = StepWithNoise(context, inputs, between, second_s, blocks, first_s);
+  const auto anew = StepWithNoise(context, inputs, between, second_s, between, second_s);
+  if (!held || !anew) return std::nullopt;
+  const MatrixXd q = whole->n * whole->n.transpose();
+  const MatrixXd m = held->f * first->n + held->n, moved = anew->f * first->n;
+  const MatrixXd discrete = m * m.transpose();
+  const MatrixXd continuous = moved * moved.transpose() + anew->n * anew->n.transpose();
+  if (!(q.norm() > 0.0 && q.allFinite())) return std::nullopt;
+  return PartsDefect{(discrete - q).norm() / q.norm(), (continuous - q).norm() / q.norm()};
+}
+
+/// Where dt goes to 0, and with it what integration leaves.
+std::optional<PartsDefect> LimitOfParts(const Context& context, const State& state) {
+  const Values inputs = Context::Inputs(context.main(), state);
+  const Values blocks(inputs.begin(),
+                      inputs.begin() + static_cast<std::ptrdiff_t>(context.main().outputs.size()));
+  std::optional<PartsDefect> least;
+  for (const double scale : {1e-3, 1e-6, 1e-9}) {
+    const auto defect = DefectOfParts(context, inputs, blocks, scale * inputs.back()[0]);
+    if (!defect) continue;
+    if (!least) least = defect;
+    least->discrete = std::min(least->discrete, defect->discrete);
+    least->continuous = std::min(least->continuous, defect->continuous);
+  }
+  return least;
+}
+
+/// The remedy for noise that is not of the kind that the model declares.
+std::string RemedyOfParts(bool discrete, bool other_fits) {
+  if (!other_fits) {
+    return "its noise depends on the number of steps. Discrete noise has an Lq that does not "
+           "depend "
+           "on dt and enters as what is held, such as an acceleration; continuous noise has "
+           "Q(dt) = F Q(dt_1) F' + Q(dt_2)";
+  }
+  return discrete ? "the noise adds up over the parts: leave noise_kind() out, or let it return "
+                    "NoiseKind::kContinuous"
+                  : "the noise is held over the parts: declare it by `NoiseKind noise_kind() const "
+                    "{ return NoiseKind::kDiscrete; }`, or let Q grow with dt";
+}
+
 }  // namespace
 
 Finding CheckNoise(Context& context) {
@@ -219,6 +293,40 @@ Finding CheckStep(Context& context) {
   }
   return Fail(additive.failure + "; of order " + RoundedText(order, 2) +
               " in dt. A discretisation of order N passes with --step-order N");
+}
+
+// A wrong kind leaves 0.47 or more however small dt is, a right one what goes with dt.
+Finding CheckNoiseKind(Context& context) {
+  constexpr double kMost = 0.1;
+  if (context.model().is_sensor()) return Skip("not a motion model");
+  if (context.model().Find("SqrtQ") == nullptr) return Skip("it has no noise input");
+  const bool discrete = (context.model().instance->capabilities() & ALIDADE_DISCRETE_NOISE) != 0;
+  const std::string kind = discrete ? "discrete" : "continuous";
+  PartsDefect worst;
+  bool any = false;
+  std::string where;
+  for (const State& state : context.states()) {
+    const auto defect = LimitOfParts(context, state);
+    if (!defect) continue;
+    any = true;
+    const double before = discrete ? worst.discrete : worst.continuous;
+    if ((discrete ? defect->discrete : defect->continuous) > before) {
+      where = context.Where(context.main(), state);
+    }
+    worst.discrete = std::max(worst.discrete, defect->discrete);
+    worst.continuous = std::max(worst.continuous, defect->continuous);
+  }
+  if (!any) return Skip("its noise is 0");
+  const double own = discrete ? worst.discrete : worst.continuous;
+  const double other = discrete ? worst.continuous : worst.discrete;
+  if (own <= kMost) {
+    return Ok(kind + " noise: over two parts of dt it is that over dt, but for integration");
+  }
+  return Fail("declares " + kind +
+              " noise, but over two parts of a dt that goes to 0 its covariance "
+              "is " +
+              std::to_string(std::lround(100.0 * own)) + " % off that over dt, at " + where + "; " +
+              RemedyOfParts(discrete, other <= kMost));
 }
 
 }  // namespace alidade::internal

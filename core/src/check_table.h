@@ -90,6 +90,7 @@ Finding CheckNoise(Context& context);
 Finding CheckDoubleCover(Context& context);
 Finding CheckInitialise(Context& context);
 Finding CheckStep(Context& context);
+Finding CheckNoiseKind(Context& context);
 
 inline constexpr Check kChecks[] = {
     {"create", CheckCreate, true},
@@ -106,6 +107,7 @@ inline constexpr Check kChecks[] = {
     {"double_cover", CheckDoubleCover, false},
     {"initialise", CheckInitialise, false},
     {"step", CheckStep, false},
+    {"noise_kind", CheckNoiseKind, false},
     {"leaks", CheckLeaks, false},
 };
 

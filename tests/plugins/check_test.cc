@@ -118,12 +118,24 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{0, "two_covers", "double_cover", {"q and -q of orientation are not the same"}},
         Fault{0, "ignores_dt", "step", {"a step over dt = 0 without noise moves it"}},
         Fault{0, "euler", "step", {"apart in distance", "of order 2 in dt", "--step-order N"}},
-        Fault{0, "drifts", "step", {"a step over dt = 0 without noise moves it"}}),
+        Fault{0, "drifts", "step", {"a step over dt = 0 without noise moves it"}},
+        Fault{0,
+              "held_undeclared",
+              "noise_kind",
+              {"declares continuous noise, but", "47 % off", "NoiseKind::kDiscrete; }`"}},
+        Fault{0,
+              "adds_up_undeclared",
+              "noise_kind",
+              {"declares discrete noise, but", "50 % off", "NoiseKind::kContinuous"}},
+        Fault{0,
+              "noise_of_each_step",
+              "noise_kind",
+              {"declares continuous noise, but", "100 % off", "depends on the number of steps"}}),
     Name);
 
 TEST_F(CheckTest, EveryModelWithAFaultIsTested) {
-  std::set<std::string> tested = {"leaves_daemons", "right",   "may_have_bias",
-                                  "landmark",       "gravity", "turning"};
+  std::set<std::string> tested = {"leaves_daemons", "right",   "may_have_bias", "landmark",
+                                  "gravity",        "turning", "held"};
   const auto* suite = ::testing::UnitTest::GetInstance();
   for (int i = 0; i < suite->total_test_suite_count(); ++i) {
     const auto* tests = suite->GetTestSuite(i);
@@ -159,7 +171,7 @@ TEST_F(CheckTest, NoProcessThatAModelStartedIsLeft) {
 }
 
 TEST_F(CheckTest, ModelsWithoutFaultPass) {
-  for (const char* model : {"right", "may_have_bias", "landmark", "gravity", "turning"}) {
+  for (const char* model : {"right", "may_have_bias", "landmark", "gravity", "turning", "held"}) {
     const auto findings = Checked(model);
     EXPECT_EQ(Joined(Failures(findings)), "") << model;
     EXPECT_FALSE(AnyFailure(findings));
@@ -275,13 +287,18 @@ TEST_F(CheckTest, ShippedModelsPass) {
   std::multimap<std::string, std::string> parameters = {
       {"constant", "{}"},
       {"constant", "{size: 3, noise: {random_walk: 0.1}}"},
-      {"constant_velocity", "{noise: {acceleration: 1}}"},
-      {"constant_velocity", "{dimensions: 3, noise: {acceleration: 2, kind: white}}"},
+      {"constant_velocity", "{noise: {acceleration: 1, kind: discrete}}"},
+      {"constant_velocity", "{dimensions: 3, noise: {acceleration: 2}}"},
       {"stereo_disparity", "{focal_px: 400, baseline_m: 0.065, sigma_px: 1}"},
       {"stereo_disparity", "{focal_px: 400, baseline_m: 0.065, sigma_px: 1, near_m: 0.3}"},
       {"scale_2d", "{template_px: 300, sigma_px: 1}"},
       {"scale_2d", "{noise: fixed, variance: 0.01}"},
       {"quaternion_pose", "{noise: {linear_acceleration: 0.6, angular_acceleration: [1, 2, 3]}}"},
+      {"quaternion_pose",
+       "{noise: {kind: discrete, linear_acceleration: 0.6, angular_acceleration: [1, 2, 3]}}"},
+      {"odometry_pose",
+       "{noise: {kind: discrete, linear_velocity: 0.3, angular_velocity: 0.002}, "
+       "vehicle_from_cam: {position: [1, 0, 1.5]}}"},
       {"odometry_pose",
        "{noise: {linear_velocity: [0.03, 0.3, 0.3], angular_velocity: 0.002}, vehicle_from_cam: "
        "{position: [1, 0, 1.5], orientation: {w: 0.5, x: -0.5, y: 0.5, z: -0.5}}}"},

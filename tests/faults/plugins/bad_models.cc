@@ -375,14 +375,35 @@ struct Turning : alidade::Motion<4, Vec<1>, UnitQuaternion> {
   explicit Turning(Params&) {}
   template <class T>
   void Step(const T* s, const T* q, const T* u, const T* w, double dt_s, T* s1, T* q1) const {
-    s1[0] = s[0] + (u[0] + w[0]) * (kWhat == 1 ? 0.1 : dt_s);
+    s1[0] = s[0] + u[0] * (kWhat == 1 ? 0.1 : dt_s) + w[0];
     if (kWhat == 2) s1[0] = s1[0] - 0.3 * s[0] * dt_s;  // Euler's step of s' = u - 0.3 s
     if (kWhat == 3) s1[0] = s1[0] + T(1e-3);
     const T d[3] = {w[1], w[2] + 0.4 * dt_s, w[3]};
     UnitQuaternion::Plus(q, d, q1);
   }
   void SqrtQ(double dt_s, MatrixRef l) const {
-    for (int i = 0; i < 4; ++i) l(i, i) = kWhat == 4 ? std::log(0.0 * dt_s) : 0.1 * dt_s;
+    for (int i = 0; i < 4; ++i) l(i, i) = kWhat == 4 ? std::log(0.0 * dt_s) : 0.1 * std::sqrt(dt_s);
+  }
+};
+
+/// A point whose noise is of one kind and declared as another, as kWhat says.
+enum class Noise { kHeld, kHeldUndeclared, kAddsUpUndeclared, kOfEachStep };
+template <Noise kWhat>
+struct Noisy : alidade::Motion<1, Vec<1>, Vec<1>> {
+  static constexpr std::array kBlocks{Quantity{"p", "m"}, Quantity{"v", "m/s"}};
+  static constexpr bool kAcceleration = kWhat == Noise::kHeld || kWhat == Noise::kHeldUndeclared;
+  explicit Noisy(Params&) {}
+  alidade::NoiseKind noise_kind() const {
+    const bool discrete = kWhat == Noise::kHeld || kWhat == Noise::kAddsUpUndeclared;
+    return discrete ? alidade::NoiseKind::kDiscrete : alidade::NoiseKind::kContinuous;
+  }
+  template <class T>
+  void Step(const T* p, const T* v, const T* w, double dt_s, T* p1, T* v1) const {
+    p1[0] = p[0] + dt_s * v[0] + (kAcceleration ? 0.5 * dt_s * dt_s : 0.0) * w[0];
+    v1[0] = v[0] + (kAcceleration ? dt_s : 1.0) * w[0];
+  }
+  void SqrtQ(double dt_s, MatrixRef l) const {
+    l(0, 0) = kWhat == Noise::kAddsUpUndeclared ? 0.3 * std::sqrt(dt_s) : 0.3;
   }
 };
 
@@ -414,4 +435,7 @@ ALIDADE_PLUGIN(SENSOR(Right, "right"), SENSOR(MayHaveBias, "may_have_bias"),
                ALIDADE_SENSOR_BY(MakePastTheLandmark, "past_the_landmark", "", ""),
                SENSOR(TwoCovers, "two_covers"), MOTION(Turning<1>, "ignores_dt"),
                MOTION(Turning<2>, "euler"), MOTION(Turning<3>, "drifts"),
-               MOTION(Turning<4>, "infinite_q"))
+               MOTION(Turning<4>, "infinite_q"), MOTION(Noisy<Noise::kHeld>, "held"),
+               MOTION(Noisy<Noise::kHeldUndeclared>, "held_undeclared"),
+               MOTION(Noisy<Noise::kAddsUpUndeclared>, "adds_up_undeclared"),
+               MOTION(Noisy<Noise::kOfEachStep>, "noise_of_each_step"))

@@ -66,14 +66,15 @@ struct QuaternionPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, Vec<3>> {
   }
 };
 
-/// The same body under white accelerations (continuous noise, CWNA), which add up: Q does not depend
-/// on how dt is split.
+/// The same body under white accelerations (continuous noise, CWNA), which add up: Q does not
+/// depend on how dt is split.
 ///
 ///   model      r' = r + v dt + w_r,     q' = q Exp(omega dt + w_q)
 ///              v' = v + w_v,            omega' = omega + w_omega
 ///   noise      w ~ N(0, Lq Lq'): per axis Cov(w_r, w_v) = sigma_a^2 [dt^3/3 dt^2/2; dt^2/2 dt],
 ///              and so (w_q, w_omega) with sigma_alpha; exact where omega = 0, else to first order
-///   Jacobian   F = [I 0 dt I 0; 0 R(Exp(-phi)) 0 dt J(phi); 0 0 I 0; 0 0 0 I],  phi = omega dt + w_q
+///   Jacobian   F = [I 0 dt I 0; 0 R(Exp(-phi)) 0 dt J(phi); 0 0 I 0; 0 0 0 I],
+///              phi = omega dt + w_q
 ///              G = diag(I, J(phi), I, I),  J(phi) = d Log(Exp(-phi) Exp(phi + d))/dd
 ///                = I - (1 - cos)/|phi|^2 [phi]x + (|phi| - sin)/|phi|^3 [phi]x^2      12 x 12
 ///

@@ -123,8 +123,8 @@ const Eigen::MatrixXd& Ukf::Root() {
   return root_;
 }
 
-/// B with P - M M' = B B', the covariance of x given the noise that is held; M M' is a part of P, so
-/// that a negative pivot is rounding.
+/// B with P - M M' = B B', the covariance of x given the noise that is held. M M' is a part of P: a
+/// negative pivot is rounding.
 const Eigen::MatrixXd& Ukf::RootWithoutHeld() {
   const Covariance& p = state_.covariance();
   rest_ = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>(

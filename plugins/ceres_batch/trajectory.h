@@ -25,7 +25,8 @@ namespace alidade::ceres_batch {
 ///
 /// So P_0 and Q may have any rank, nothing is inverted but L_i, and the motion holds exactly at
 /// every e. Discrete noise is held over an interval: all steps from one frame with a measurement in
-/// use to the next have the same L and the same inputs. What depends on the state in Q and R stands at where it was last frozen.
+/// use to the next have the same L and the same inputs. What depends on the state in Q and R stands
+/// at where it was last frozen.
 ///
 /// Landmarks are functions of the camera that saw them first and of inputs of their own, l, which
 /// are not in e: see MapLandmark. Where there are any, Reduce stands for Evaluate.
@@ -69,8 +70,8 @@ class Trajectory {
   /// Makes the first frame, linearised at e, part of the prior, which is then that of the state at
   /// that frame; e becomes the same trajectory in the inputs that are left. L_0 is a square root:
   /// P_0 may stay singular. Q, R and the weights of losses are those at e. Not with landmarks. A
-  /// frame after which noise goes on being held has no measurement: its steps become the next one's.
-  /// False where a model is not defined: nothing has changed.
+  /// frame after which noise goes on being held has no measurement: its steps become those of the
+  /// next one. False where a model is not defined: nothing has changed.
   bool MarginaliseFirst(Eigen::VectorXd& e);
   Stamp stamp() const { return stamp_; }
 

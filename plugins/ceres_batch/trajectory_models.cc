@@ -44,7 +44,8 @@ std::string Why(Status status, const std::string& error) {
 
 }  // namespace
 
-/// x = f(x, u, L e, dt); S = F S + [0  G L  0], which adds to what held inputs did before, and offset = F offset, in the rows of the model.
+/// x = f(x, u, L e, dt); S = F S + [0  G L  0], which adds to what held inputs did before, and
+/// offset = F offset, in the rows of the model.
 bool Trajectory::Move(const Step& step, const double* e, Point& point) const {
   const MotionBinding& motion = system_.motions[step.motion];
   const StateLayout& layout = initial_.layout();

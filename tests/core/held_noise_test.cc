@@ -114,8 +114,8 @@ class HeldNoise : public ::testing::Test {
                                 const Options& options = {}) {
     return StatesOf(*Make<Filter>(system, options, StreamsOf(system)), frames);
   }
-  /// Rounding; that of sigma points goes with eps / alpha^2, alpha = 0.01, that of the smoother with
-  /// P / P_s, up to 1e4 here.
+  /// Rounding; that of sigma points goes with eps / alpha^2, alpha = 0.01, that of the smoother
+  /// with P / P_s, up to 1e4 here.
   static constexpr bool kCancels =
       std::is_same_v<Filter, Ukf> || std::is_same_v<Filter, RtsSmoother>;
   static constexpr double kTolerance = kCancels ? 1e-9 : 1e-11;

@@ -33,8 +33,8 @@ struct MatrixRef {
   explicit operator bool() const { return data != nullptr; }
 };
 
-/// Process noise over a time that is stepped in parts; both kinds are white from one interval to the
-/// next. An interval lies between two updates.
+/// Process noise over a time that is stepped in parts. An interval lies between two updates; both
+/// kinds are white from one interval to the next.
 enum class NoiseKind {
   kContinuous,  ///< each step has a w of its own: Q of the whole is F_2 Q_1 F_2' + Q_2
   kDiscrete,    ///< one w is held over the interval: G Lq of the whole is (F_2 G_1 + G_2) Lq

@@ -19,9 +19,9 @@ namespace alidade {
 ///   update     lambda <- A' lambda + H' S^-1 r,   Lambda <- A' Lambda A + H' S^-1 H,
 ///              A = I - K H
 ///
-/// Discrete noise w, held over an interval, goes back beside x: M = Cov(x, w), and lambda, Lambda are
-/// those of (x, w) at frames inside an interval, with [P M] for P and [F G Lq; 0 I] for F. Where the
-/// interval starts, what they have of w is dropped.
+/// Discrete noise w, held over an interval, goes back beside x. At frames inside an interval lambda
+/// and Lambda are those of (x, w), with [P M] for P, M = Cov(x, w), and [F G Lq; 0 I] for F. Where
+/// the interval starts, what they have of w is dropped.
 ///
 /// All Jacobians are those of the filter, and so are R and its weight under a robust loss.
 ///

@@ -18,9 +18,9 @@ namespace alidade {
 ///             [0   L  ]  = [W   L+] Q'                                     (m + n) x (m + n)
 ///             S = Ls Ls',  dx = W Ls^-1 r,  K = W Ls^-1
 ///
-/// Of discrete noise w, held over an interval, M = Cov(x, w) and the root B of P - M M' are carried:
-/// each step takes B <- F B (with continuous noise below it, as above) and M <- F M + G Lq, and L
-/// is the root of [B M].
+/// Of discrete noise w, held over an interval, it carries M = Cov(x, w) and the root B of P - M M'.
+/// Each step takes B <- F B (with continuous noise as above) and M <- F M + G Lq; L is the triangle
+/// of [B M].
 ///
 /// All Jacobians are those of Ekf, and so is the weight of a robust loss, R / w for R.
 /// O((m + n)^3) for each update.

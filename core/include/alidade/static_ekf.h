@@ -35,8 +35,8 @@ enum class StaticOutcome {
 /// Measurements are used one after the other, each linearised at the state that the one before has
 /// left, as the engine does under `fuse: per_measurement`. As there, P is carried along where the
 /// tangent basis of a unit vector turns with it. Sizes are known at compile time: Constant<1>, not
-/// Constant<>. Control inputs are given to Predict: to hold them is up to the caller. Discrete noise
-/// is held from one accepted measurement (or Set) to the next, as Ekf has it.
+/// Constant<>. Control inputs are given to Predict: to hold them is up to the caller. Discrete
+/// noise is held from one accepted measurement (or Set) to the next, as Ekf has it.
 template <class... Motions>
 class StaticEkf {
  public:

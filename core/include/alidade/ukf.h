@@ -36,8 +36,9 @@ struct UkfOptions {
 /// This is the scaled transform without its large weight of the centre, which cancels. The mean on
 /// a manifold is found by iteration. Process noise is augmented: N = n + noise inputs. Discrete
 /// noise w is held over an interval: from its second step on the points are those of (x, w) with
-/// Cov(x, w) = M, in the directions (b_i, 0), B B' = P - M M', and (m_j, e_j). A measurement's R is that at x0; S = Cov(h) + R, K = Cov(x, h) S^-1, and with dx_i - K f_i in
-/// place of f_i the new P is Cov(x - K h) + K R K', a sum of squares where beta >= alpha^2. A
+/// Cov(x, w) = M, in the directions (b_i, 0), B B' = P - M M', and (m_j, e_j). A measurement's R is
+/// that at x0; S = Cov(h) + R, K = Cov(x, h) S^-1, and with dx_i - K f_i in place of f_i the new P
+/// is Cov(x - K h) + K R K', a sum of squares where beta >= alpha^2. A
 /// robust loss takes R / w for R. The spread of a joint update is that of its narrowest
 /// measurement; h, S and NIS are reported as the gate saw them.
 ///

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/check.h"
+#include "alidade/inspect/check.h"
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>

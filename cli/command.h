@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "alidade/config.h"
-#include "alidade/plugin_host.h"
-#include "alidade/run.h"
+#include "alidade/config/config.h"
+#include "alidade/host/plugin_host.h"
+#include "alidade/run/run.h"
 
 /// The commands of the program. Each one reads its arguments, calls core and prints.
 namespace alidade::cli {

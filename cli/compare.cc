@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/compare.h"
+#include "alidade/compare/compare.h"
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
@@ -7,7 +7,7 @@
 #include <memory>
 #include <system_error>
 
-#include "alidade/recorder.h"
+#include "alidade/record/recorder.h"
 #include "command.h"
 #include "console.h"
 

@@ -12,7 +12,7 @@
 #include <cstring>
 #include <system_error>
 
-#include "alidade/error.h"
+#include "alidade/base/error.h"
 
 namespace alidade::cli {
 namespace {

@@ -11,7 +11,7 @@
 #include <system_error>
 #include <thread>
 
-#include "alidade/plugin_listing.h"
+#include "alidade/inspect/plugin_listing.h"
 #include "command.h"
 #include "console.h"
 

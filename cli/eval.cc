@@ -6,7 +6,7 @@
 #include <map>
 #include <memory>
 
-#include "alidade/evaluation_report.h"
+#include "alidade/evaluate/report.h"
 #include "command.h"
 #include "console.h"
 

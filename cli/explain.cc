@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/explain.h"
+#include "alidade/inspect/explain.h"
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>

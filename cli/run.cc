@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/run.h"
+#include "alidade/run/run.h"
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
@@ -10,7 +10,7 @@
 #include <memory>
 #include <sstream>
 
-#include "alidade/recorder.h"
+#include "alidade/record/recorder.h"
 #include "command.h"
 #include "console.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/simulate.h"
+#include "alidade/record/simulate.h"
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/sweep.h"
+#include "alidade/sweep/sweep.h"
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>

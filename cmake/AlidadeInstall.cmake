@@ -28,7 +28,8 @@ set(plugin_folder ${CMAKE_INSTALL_LIBDIR}/alidade/plugins)
 file(RELATIVE_PATH bin_to_lib /${CMAKE_INSTALL_BINDIR} /${CMAKE_INSTALL_LIBDIR})
 set_target_properties(alidade PROPERTIES INSTALL_RPATH "$ORIGIN/${bin_to_lib}")
 install(TARGETS alidade)
-install(TARGETS alidade_core alidade_model EXPORT alidadeTargets)
+install(TARGETS alidade_model alidade_core alidade_tools EXPORT alidadeTargets
+        FILE_SET HEADERS)
 
 foreach(folder IN ITEMS motion_models sensors plugins)
   alidade_plugins_of(${PROJECT_SOURCE_DIR}/${folder} plugins)
@@ -40,7 +41,6 @@ foreach(folder IN ITEMS motion_models sensors plugins)
   endforeach()
 endforeach()
 
-install(DIRECTORY core/include/ TYPE INCLUDE FILES_MATCHING PATTERN "*.h")
 foreach(folder IN ITEMS motion_models sensors)
   install(DIRECTORY ${folder}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/alidade/${folder}
           FILES_MATCHING PATTERN "*.h")

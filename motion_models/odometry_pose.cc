@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "odometry_pose.h"
 
-#include "alidade/plugin.h"
+#include "alidade/model/plugin.h"
 
 ALIDADE_PLUGIN(ALIDADE_MOTION(alidade::OdometryPose, "odometry_pose",
                               "a camera on a vehicle whose velocities are measured", ""))

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "alidade/model.h"
+#include "alidade/model/model.h"
 
 namespace alidade {
 

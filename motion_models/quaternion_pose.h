@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "alidade/model.h"
+#include "alidade/model/model.h"
 
 namespace alidade {
 

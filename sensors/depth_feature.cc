@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "depth_feature.h"
 
-#include "alidade/plugin.h"
+#include "alidade/model/plugin.h"
 
 namespace {
 

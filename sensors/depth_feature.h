@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "alidade/camera.h"
-#include "alidade/landmark_sensor.h"
+#include "alidade/model/camera.h"
+#include "alidade/model/landmark_sensor.h"
 
 namespace alidade {
 
@@ -18,7 +18,7 @@ namespace alidade {
 ///   d          1      m       cam    depth along the optical axis
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_cam) of the camera
 ///   a, m, rho  form   -       world  the landmark, p = a + m / rho
-///   K          -      -       cam    projection with distortion, see alidade/camera.h
+///   K          -      -       cam    projection with distortion, see alidade/model/camera.h
 ///   sigma      1      px      -      standard deviation of u and of v; > 0
 ///   s0, s2     1      m, 1/m  -      standard deviation of d: a constant part, > 0, and one that
 ///                                    grows with d^2, >= 0 (that of a disparity behind it)

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "alidade/camera.h"
-#include "alidade/landmark_sensor.h"
+#include "alidade/model/camera.h"
+#include "alidade/model/landmark_sensor.h"
 
 namespace alidade {
 
@@ -17,7 +17,7 @@ namespace alidade {
 ///   u, v       2      px      -      the pixel
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_cam) of the camera
 ///   a, m, rho  form   -       world  the landmark, p = a + m / rho
-///   K          -      -       cam    projection with distortion, see alidade/camera.h
+///   K          -      -       cam    projection with distortion, see alidade/model/camera.h
 ///   sigma      1      px      -      standard deviation of u and of v; > 0
 ///   rho0       1      1/m     -      prior, from the camera to the landmark (xyz: > 0)
 ///

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "self_calibrating_feature.h"
 
-#include "alidade/plugin.h"
+#include "alidade/model/plugin.h"
 
 namespace {
 

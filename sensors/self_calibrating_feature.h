@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "alidade/model.h"
+#include "alidade/model/model.h"
 
 namespace alidade {
 
@@ -38,7 +38,7 @@ struct RadialLens {
 };
 
 /// Focal length, principal point, radial and tangential distortion, the `radtan` of
-/// alidade/camera.h with square pixels:
+/// alidade/model/camera.h with square pixels:
 ///
 ///   z = c + f (x s(q) + 2 p1 x y + p2 (q + 2 x^2),  y s(q) + p1 (q + 2 y^2) + 2 p2 x y)
 ///   s(q) = 1 + k1 q + k2 q^2 + k3 q^3,   q = x^2 + y^2

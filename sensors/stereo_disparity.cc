@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "stereo_disparity.h"
 
-#include "alidade/plugin.h"
+#include "alidade/model/plugin.h"
 
 ALIDADE_PLUGIN(ALIDADE_SENSOR(alidade::StereoDisparity, "stereo_disparity",
                               "disparity of one point seen by a rectified stereo pair: d = f B / Z",

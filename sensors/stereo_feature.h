@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "alidade/camera.h"
-#include "alidade/landmark_sensor.h"
+#include "alidade/model/camera.h"
+#include "alidade/model/landmark_sensor.h"
 
 namespace alidade {
 

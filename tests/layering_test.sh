@@ -9,16 +9,19 @@
 # plants violations of every rule in a copy of the tree and fails unless each is caught.
 #
 #   spdx      every source, CMake file and script begins with the licence line
-#   core      core includes headers of core alone
-#   model     motion_models and sensors include core, Eigen, the standard library and their own stem
+#   core      core includes headers of core alone, tools those of core and tools, each by its full
+#             path, "alidade/ROOM/FILE.h"
+#   order     a room of core or tools includes itself and those before it, in the order of `rooms`
+#   model     motion_models and sensors include alidade/model/, Eigen, the standard library and
+#             their own stem
 #   plugin    nothing includes from plugins/, but a plugin from its own folder and tests/plugins,
-#             which test the class behind the export; bench includes the costs of plugins/ceres_batch
+#             which test the class behind the export; bench includes the costs of plugins/ceres
 #   upward    what lies below does not include cli, bench, tests or examples
-#   library   yaml-cpp and Boost in core/src alone; CLI11 in cli, OpenCV in image plugins and
-#             tests/images, and both in bench, alone; of Ceres only jet.h and rotation.h outside
-#             plugins/ceres_batch and bench
-#   exit      core, models and plugins neither exit nor abort (but `_exit` where the file forks)
-#   print     core, models and plugins do not print
+#   library   yaml-cpp and Boost in sources of core, libarchive in those of tools, alone; CLI11 in
+#             cli, OpenCV in image plugins and tests/images, and both in bench, alone; of Ceres only
+#             jet.h and rotation.h outside plugins/ceres and bench
+#   exit      core, tools, models and plugins neither exit nor abort (but `_exit` where the file forks)
+#   print     core, tools, models and plugins do not print
 #   flags     no instruction-set or fast-math flag in CMake files (but those of the deliberately
 #             bad plugins in tests/faults and tests/plugins)
 set -euo pipefail
@@ -28,12 +31,13 @@ if [[ ${1:-} == --self-test ]]; then
   self_test=true
   shift
 fi
+rooms="model base config state host system filter run evaluate bundle inspect record sweep compare"
 root=$(cd "${1:-$(dirname "${BASH_SOURCE[0]}")/..}" && pwd)
-folders=(core motion_models sensors plugins cli bench tests examples)
+folders=(core tools motion_models sensors plugins cli bench tests examples)
 
 # Violations in the sources given as arguments.
 sources() {
-  awk '
+  awk -v rooms="$rooms" '
     function report(rule, text) { print FILENAME ":" FNR ": [" rule "] " text }
     function exists(path,    line, status) {
       status = (getline line < path)
@@ -75,45 +79,59 @@ sources() {
     function of_plugin(path,    base) {
       base = path
       while (sub(/^(\.\.?\/)+/, "", base)) {}
-      if (folder == "bench" && base ~ /^plugins\/ceres_batch\/[a-z_]+\.h$/) return 0
+      if (own_plugin != "" && index(base, "plugins/" own_plugin "/") == 1) return 0
+      if (folder == "bench" && base ~ /^plugins\/ceres\/[a-z_\/]+\.h$/) return 0
       if (base ~ /^plugins\//) return !(folder == "tests" && exists("tests/" base))
       if (own_plugin != "" && exists("plugins/" own_plugin "/" path)) return path ~ /^\.\.\//
       if (own_plugin != "" && base ~ /\// && exists("plugins/" base)) return 1
       return path ~ /\/plugins\//
     }
-    function foreign_to_core(path,    i) {
-      if (path ~ /^alidade\//) return !exists("core/include/" path)
-      if (path ~ /\//) return path !~ /^(Eigen|sys|linux|ceres|boost|yaml-cpp|openssl)\//
-      for (i in others) if (exists(others[i] "/" path)) return !exists("core/src/" path)
-      return 0
+    function foreign_to_library(path, bracket) {
+      if (path ~ /^alidade\//)
+        return !exists("core/" path) && !(folder == "tools" && exists("tools/" path))
+      if (bracket) return path !~ /^[a-z_0-9.]+$/ && path !~ /^(Eigen|sys|linux|ceres|boost|yaml-cpp|spdlog|openssl|nlohmann)\//
+      return path !~ /^ceres\//
+    }
+    # The place of the room of `path`, "core/alidade/base/x.h" or "alidade/base/x.h", in the order.
+    function floor_of(path) {
+      sub(/^(core|tools)\//, "", path)
+      sub(/^alidade\//, "", path)
+      sub(/\/.*/, "", path)
+      return path in floor ? floor[path] : 0
     }
     function foreign_to_model(path, bracket) {
-      if (path ~ /^alidade\//) return !exists("core/include/" path)
+      if (path ~ /^alidade\//) return path !~ /^alidade\/model\// || !exists("core/" path)
       if (bracket) return path !~ /^(Eigen\/[A-Za-z]+|[a-z_0-9]+)$/
       return path != stem ".h"
     }
     function check_include(path, bracket) {
-      if (path ~ /^(yaml-cpp|boost)\// && FILENAME !~ /^core\/src\//)
-        report("library", "only core/src includes " path)
+      if (path ~ /^(yaml-cpp|boost|spdlog|openssl|nlohmann)\// && FILENAME !~ /^(core|tools)\/.*\.cc$/)
+        report("library", "only sources of core and tools include " path)
+      if (path ~ /^archive/ && FILENAME !~ /^tools\/.*\.cc$/)
+        report("library", "only sources of tools include " path)
       if (path ~ /^CLI\// && folder != "cli" && folder != "bench")
         report("library", "only cli and bench include " path)
       if (path ~ /^ceres\// && path !~ /^ceres\/(jet|rotation)\.h$/ &&
-          own_plugin != "ceres_batch" && folder != "bench")
-        report("library", "only plugins/ceres_batch and bench include " path)
+          own_plugin != "ceres" && folder != "bench")
+        report("library", "only plugins/ceres and bench include " path)
       if (path ~ /^opencv/ && own_plugin !~ /image/ && folder != "bench" &&
           FILENAME !~ /^tests\/images\//)
         report("library", "only image plugins, their tests and bench include " path)
       if (FILENAME !~ /^tests\/plugins\// && of_plugin(path))
         report("plugin", "plugins are loaded, not included: " path)
-      if (folder == "core" && foreign_to_core(path)) report("core", "not a header of core: " path)
+      if (folder ~ /^(core|tools)$/ && foreign_to_library(path, bracket))
+        report("core", "not a header of " folder ", or not by its full path: " path)
+      if (folder ~ /^(core|tools)$/ && path ~ /^alidade\// && floor_of(path) > floor_of(FILENAME))
+        report("order", "a room that stands above: " path)
       if (folder ~ /^(sensors|motion_models)$/ && foreign_to_model(path, bracket))
-        report("model", "a model includes core, Eigen and its own header alone: " path)
-      if (folder ~ /^(core|sensors|motion_models|plugins|cli)$/ &&
+        report("model", "a model includes alidade/model, Eigen and its own header alone: " path)
+      if (folder ~ /^(core|tools|sensors|motion_models|plugins|cli)$/ &&
           path ~ /^(\.\.\/)*(cli|bench|tests|examples)\//)
         report("upward", "a layer above: " path)
     }
     BEGIN {
-      split("sensors motion_models cli", others, " ")
+      count = split(rooms, name, " ")
+      for (i = 1; i <= count; i++) floor[name[i]] = i
     }
     FNR == 1 {
       in_comment = 0
@@ -139,7 +157,7 @@ sources() {
       check_include(path, bracket)
       next
     }
-    folder ~ /^(core|sensors|motion_models|plugins)$/ {
+    folder ~ /^(core|tools|sensors|motion_models|plugins)$/ {
       code = " " code_of($0) " "
       if (code ~ /[^A-Za-z0-9_.>:](std::|::)?(exit|_Exit|quick_exit|abort|terminate)[ \t]*\(/ ||
           code ~ /[^A-Za-z0-9_.>:](::)?_exit[ \t]*\(/ && !forks(FILENAME))
@@ -261,22 +279,28 @@ allow() {
 
 check "$copy" || { echo "the tree itself is not clean"; failed=1; }
 
-plant spdx core/src/new.cc 'int x;'
+plant spdx core/alidade/run/new.cc 'int x;'
 plant spdx sensors/new.h '#pragma once'
 plant spdx cmake/New.cmake 'set(x 1)'
 plant spdx scripts/new '#!/bin/sh\ntrue'
 plant spdx tests/new/CMakeLists.txt 'project(x)'
-for header in sensors/scale_2d.h motion_models/constant.h alidade/no_such.h ../../sensors/scale_2d.h scale_2d.h \
-  alidade/sensors/scale_2d.h; do
-  plant core core/src/new.cc "$licence\n#include \"$header\""
+for header in sensors/scale_2d.h motion_models/constant.h alidade/run/no_such.h ../../sensors/scale_2d.h scale_2d.h \
+  alidade/sensors/scale_2d.h run.h ../base/error.h alidade/record/recorder.h; do
+  plant core core/alidade/run/new.cc "$licence\n#include \"$header\""
 done
-plant core core/include/alidade/new.h "$licence\n#  include <sensors/scale_2d.h>"
+plant core core/alidade/run/new.h "$licence\n#  include <sensors/scale_2d.h>"
+plant core tools/alidade/sweep/new.cc "$licence\n#include \"sensors/scale_2d.h\""
+plant core tools/alidade/sweep/new.cc "$licence\n#include \"sweep.h\""
+plant order core/alidade/base/new.h "$licence\n#include \"alidade/config/config.h\""
+plant order core/alidade/model/new.h "$licence\n#include \"alidade/base/error.h\""
+plant order core/alidade/filter/new.cc "$licence\n#include \"alidade/run/run.h\""
+plant order tools/alidade/evaluate/new.cc "$licence\n#  include \"alidade/sweep/sweep.h\""
 for header in '"stereo_disparity.h"' '"motion_models/constant.h"' '"../motion_models/constant.h"' '<vector.h>' \
-  '<unistd.h>' '<sys/stat.h>' '"ceres/jet.h"' '<yaml-cpp/yaml.h>' '"alidade/no_such.h"'; do
+  '<unistd.h>' '<sys/stat.h>' '"ceres/jet.h"' '<yaml-cpp/yaml.h>' '"alidade/model/no_such.h"' '"alidade/base/error.h"'; do
   plant model sensors/new.cc "$licence\n#include $header"
   plant model motion_models/new.cc "$licence\n#include ${header/stereo_disparity/scale_2d}"
 done
-for file in core/src/new.cc sensors/new.h cli/new.cc tests/core/new.cc bench/speed/new.cc examples/new.cc; do
+for file in core/alidade/run/new.cc sensors/new.h cli/new.cc tests/core/new.cc bench/speed/new.cc examples/new.cc; do
   plant plugin "$file" "$licence\n#include \"plugins/csv/csv.h\""
 done
 plant plugin tests/sensors/new.cc "$licence\n#include \"../../plugins/csv/csv.h\""
@@ -287,29 +311,29 @@ for header in cli/main.h bench/speed/x.h tests/support/x.h ../tests/support/x.h;
   plant upward plugins/csv/new.cc "$licence\n#include \"$header\""
   plant upward sensors/new.cc "$licence\n#include \"$header\""
 done
-for header in yaml-cpp/yaml.h boost/dll.hpp; do
-  for file in core/include/alidade/new.h plugins/csv/new.cc cli/new.cc tests/core/new.cc; do
+for header in yaml-cpp/yaml.h boost/dll.hpp spdlog/spdlog.h openssl/evp.h nlohmann/json.hpp; do
+  for file in core/alidade/run/new.h plugins/csv/new.cc cli/new.cc tests/core/new.cc; do
     plant library "$file" "$licence\n#include <$header>"
   done
 done
-for file in core/src/new.cc plugins/csv/new.cc tests/core/new.cc; do
+for file in core/alidade/run/new.cc plugins/csv/new.cc tests/core/new.cc; do
   plant library "$file" "$licence\n#include <CLI/App.hpp>"
 done
-plant core core/src/new.cc "$licence\n#include <spdlog/spdlog.h>"
-plant library core/src/new.cc "$licence\n#include <ceres/problem.h>"
+plant library core/alidade/run/new.cc "$licence\n#include <archive.h>"
+plant library core/alidade/run/new.cc "$licence\n#include <ceres/problem.h>"
 plant library plugins/csv/new.cc "$licence\n#include \"ceres/ceres.h\""
-plant library core/src/new.cc "$licence\n#include <opencv2/core.hpp>"
+plant library core/alidade/run/new.cc "$licence\n#include <opencv2/core.hpp>"
 plant library plugins/csv/new.cc "$licence\n#include <opencv2/core.hpp>"
 plant library tests/plugins/new.cc "$licence\n#include <opencv2/core.hpp>"
 for call in 'std::exit(1);' 'exit (1);' 'std::abort();' 'abort();' '::_exit(0);' 'if (x) std::quick_exit(1);' \
   'std::terminate();' '/* why */ abort();'; do
-  for file in core/src/new.cc sensors/new.cc motion_models/new.h plugins/csv/new.cc; do
+  for file in core/alidade/run/new.cc sensors/new.cc motion_models/new.h plugins/csv/new.cc; do
     plant exit "$file" "$licence\n$call"
   done
 done
 for call in 'std::cout << 1;' 'std::cerr << 1;' 'printf("x");' 'std::printf("//");' 'puts("x");' \
   'fprintf(stdout, "x");' 'std::fputs("x", stderr);' 'std::print("x");'; do
-  for file in core/src/new.cc sensors/new.cc motion_models/new.h plugins/csv/new.cc; do
+  for file in core/alidade/run/new.cc sensors/new.cc motion_models/new.h plugins/csv/new.cc; do
     plant print "$file" "$licence\n$call"
   done
 done
@@ -320,19 +344,19 @@ for flag in -march=native -ffast-math -Ofast -mavx2; do
   plant flags CMakePresets.json "\"CMAKE_CXX_FLAGS\": \"$flag\""
 done
 
-allow core/src/new.cc "$licence\n#include <yaml-cpp/yaml.h>\n#include <boost/dll.hpp>\n#include <sys/stat.h>\n#include \"error.h\""
-allow core/src/new.cc "$licence\n// std::cout, abort()\n/* exit(1);\n printf(\"x\") */ int a = std::snprintf(b, 3, \"exit(1)\");"
-allow core/src/new.cc "$licence\nloop.abort(); p->exit(); my_exit(); stop::exit_code(); char c = '\"'; f(\"std::cout <<\");"
-allow core/src/new.cc "$licence\nif (fork() == 0) _exit(0);"
-allow sensors/new.cc "$licence\n#include \"new.h\"\n#include <cmath>\n#include <Eigen/Dense>\n#include \"alidade/model.h\""
+allow core/alidade/run/new.cc "$licence\n#include <yaml-cpp/yaml.h>\n#include <boost/dll.hpp>\n#include <spdlog/spdlog.h>\n#include <sys/stat.h>\n#include \"alidade/base/error.h\""
+allow core/alidade/run/new.cc "$licence\n// std::cout, abort()\n/* exit(1);\n printf(\"x\") */ int a = std::snprintf(b, 3, \"exit(1)\");"
+allow core/alidade/run/new.cc "$licence\nloop.abort(); p->exit(); my_exit(); stop::exit_code(); char c = '\"'; f(\"std::cout <<\");"
+allow core/alidade/run/new.cc "$licence\nif (fork() == 0) _exit(0);"
+allow sensors/new.cc "$licence\n#include \"new.h\"\n#include <cmath>\n#include <Eigen/Dense>\n#include \"alidade/model/model.h\""
 allow plugins/csv/new.cc "$licence\n#include \"own.h\"\n#include <fcntl.h>\n#include \"sensors/scale_2d.h\""
-allow plugins/ceres_batch/new.cc "$licence\n#include <ceres/ceres.h>"
+allow plugins/ceres/batch/new.cc "$licence\n#include <ceres/ceres.h>"
 allow plugins/image_sequence/new.cc "$licence\n#include <opencv2/core.hpp>"
 allow tests/images/new.cc "$licence\n#include <opencv2/core.hpp>"
-allow bench/speed/new.cc "$licence\n#include <ceres/problem.h>\n#include \"plugins/ceres_batch/sensor_cost.h\""
+allow bench/speed/new.cc "$licence\n#include <ceres/problem.h>\n#include \"plugins/ceres/bundle/sensor_cost.h\""
 allow bench/speed/new.cc "$licence\n#include <CLI/CLI.hpp>\n#include <opencv2/core.hpp>"
 allow cli/new.cc "$licence\n#include <CLI/CLI.hpp>\nint main() { std::cout << 1; }"
-allow tests/core/new.cc "$licence\n#include \"sensors/scale_2d.h\"\n#include \"core/src/config_tree.h\"\n#include \"ceres/rotation.h\""
+allow tests/core/new.cc "$licence\n#include \"sensors/scale_2d.h\"\n#include \"alidade/config/tree.h\"\n#include \"ceres/rotation.h\""
 allow tests/plugins/new.cc "$licence\n#include \"plugins/csv/csv.h\""
 allow tests/faults/CMakeLists.txt '# SPDX-License-Identifier: Apache-2.0\nadd_compile_options(-ffast-math)'
 allow tests/plugins/CMakeLists.txt '# SPDX-License-Identifier: Apache-2.0\nadd_compile_options(-march=native)'

@@ -15,8 +15,8 @@
 #include <string>
 #include <vector>
 
-#include "alidade/run.h"
-#include "alidade/sweep.h"
+#include "alidade/run/run.h"
+#include "alidade/sweep/sweep.h"
 
 namespace {
 

@@ -21,10 +21,10 @@
 #include <string>
 #include <vector>
 
-#include "alidade/run.h"
+#include "alidade/record/figure_script.h"
+#include "alidade/record/gnuplot.h"
+#include "alidade/run/run.h"
 #include "bench/speed/interleaved.h"
-#include "core/src/figure_script.h"
-#include "core/src/gnuplot.h"
 
 namespace {
 

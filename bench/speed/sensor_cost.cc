@@ -2,7 +2,7 @@
 //
 // Time of an iteration of Ceres on one bundle adjustment, where the costs are made of a sensor
 // model, relative to cost functions written by hand for it. 50 cameras, 2000 points, 20 000 pixels.
-#include "plugins/ceres_batch/sensor_cost.h"
+#include "plugins/ceres/bundle/sensor_cost.h"
 
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/manifold.h>
@@ -21,10 +21,10 @@
 #include <numbers>
 #include <vector>
 
-#include "alidade/in_process.h"
-#include "alidade/sweep.h"
+#include "alidade/host/in_process.h"
+#include "alidade/sweep/sweep.h"
 #include "bench/speed/interleaved.h"
-#include "plugins/ceres_batch/geometry_manifold.h"
+#include "plugins/ceres/bundle/geometry_manifold.h"
 
 namespace alidade::bench {
 namespace {

@@ -5,9 +5,9 @@
 #include <CLI/CLI.hpp>
 #include <Eigen/Core>
 
-#include "alidade/ekf.h"
-#include "alidade/static_ekf.h"
-#include "alidade/statistics.h"
+#include "alidade/base/statistics.h"
+#include "alidade/filter/ekf.h"
+#include "alidade/model/static_ekf.h"
 #include "bench/speed/depth_step.h"
 #include "bench/speed/interleaved.h"
 #include "tests/support/systems.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "alidade/static_ekf.h"
+#include "alidade/model/static_ekf.h"
 #include "measurements.h"
 #include "motion_models/constant.h"
 #include "motion_models/constant_velocity.h"

@@ -8,9 +8,9 @@
 #include <string_view>
 #include <vector>
 
-#include "alidade/line_reader.h"
-#include "alidade/source.h"
-#include "alidade/text_cell.h"
+#include "alidade/base/line_reader.h"
+#include "alidade/base/text_cell.h"
+#include "alidade/host/source.h"
 #include "csv_calibration.h"
 #include "csv_layout.h"
 

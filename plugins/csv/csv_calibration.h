@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "alidade/config.h"
-#include "alidade/text_cell.h"
+#include "alidade/base/text_cell.h"
+#include "alidade/config/config.h"
 
 namespace alidade {
 

@@ -7,9 +7,9 @@
 #include <string_view>
 #include <vector>
 
-#include "alidade/config.h"
-#include "alidade/source.h"
-#include "alidade/text_cell.h"
+#include "alidade/base/text_cell.h"
+#include "alidade/config/config.h"
+#include "alidade/host/source.h"
 
 namespace alidade {
 

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <vector>
 
-#include "alidade/random.h"
-#include "alidade/source.h"
+#include "alidade/base/random.h"
+#include "alidade/host/source.h"
 
 namespace alidade {
 

@@ -14,8 +14,8 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/error.h"
-#include "alidade/pictures.h"
+#include "alidade/base/error.h"
+#include "alidade/record/pictures.h"
 
 namespace alidade {
 

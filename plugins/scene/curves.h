@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "alidade/geometry.h"
+#include "alidade/model/geometry.h"
 
 /// Smooth curves through values at given times, which increase.
 namespace alidade {

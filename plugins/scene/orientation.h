@@ -8,7 +8,7 @@
 #include <numbers>
 #include <vector>
 
-#include "alidade/config.h"
+#include "alidade/config/config.h"
 #include "curves.h"
 #include "points.h"
 

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/config.h"
-#include "alidade/random.h"
+#include "alidade/base/random.h"
+#include "alidade/config/config.h"
 #include "curves.h"
 #include "motion_models/quaternion_pose.h"
 #include "orientation.h"

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/config.h"
-#include "alidade/random.h"
+#include "alidade/base/random.h"
+#include "alidade/config/config.h"
 
 /// The points of a scene, from the config's `source.points`. Their places in the list are ids.
 namespace alidade::scene {

@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/camera.h"
-#include "alidade/random.h"
-#include "alidade/source.h"
+#include "alidade/base/random.h"
+#include "alidade/host/source.h"
+#include "alidade/model/camera.h"
 #include "path.h"
 #include "points.h"
 
@@ -52,7 +52,7 @@ inline constexpr const char* kSceneKeys =
 /// Points, path, pixels and odometry are drawn from streams 0 to 3 of the seed; of the pixels four
 /// numbers for each point and frame, seen or not.
 ///
-/// Keys         kSceneKeys; the camera by the keys of alidade/camera.h.
+/// Keys         kSceneKeys; the camera by the keys of alidade/model/camera.h.
 /// Errors       kBadConfig.
 /// Source       [MonoSlam2015] sec. 3.
 class Scene : public Source {

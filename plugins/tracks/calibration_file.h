@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "alidade/config.h"
+#include "alidade/config/config.h"
 
 namespace alidade {
 

@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "alidade/number_rows.h"
+#include "alidade/base/number_rows.h"
 
 namespace alidade {
 

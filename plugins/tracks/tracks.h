@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "alidade/source.h"
-#include "beside.h"
+#include "alidade/host/source.h"
 #include "calibration_file.h"
+#include "companion_files.h"
 #include "feature_rows.h"
 #include "tracks_options.h"
 

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "alidade/source.h"
+#include "alidade/host/source.h"
 
 namespace alidade {
 

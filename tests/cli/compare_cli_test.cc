@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <regex>
 
-#include "alidade/config.h"
+#include "alidade/config/config.h"
 #include "support/program.h"
 
 namespace alidade {

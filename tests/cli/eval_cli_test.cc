@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/config.h"
-#include "alidade/trajectory.h"
+#include "alidade/config/config.h"
+#include "alidade/evaluate/trajectory.h"
 #include "support/program.h"
 
 namespace alidade {

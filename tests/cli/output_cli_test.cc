@@ -3,7 +3,7 @@
 // Where the program writes, and how it says what is wrong.
 #include <cmath>
 
-#include "alidade/config.h"
+#include "alidade/config/config.h"
 #include "support/program.h"
 
 namespace alidade {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "alidade/config.h"
+#include "alidade/config/config.h"
 #include "support/program.h"
 
 namespace alidade {

@@ -3,7 +3,7 @@
 // The batch on path and map, beside the filter: examples/10_slam_scene and 13_slam_odometry_tracks.
 #include <filesystem>
 
-#include "alidade/sweep.h"
+#include "alidade/sweep/sweep.h"
 #include "drives.h"
 
 namespace alidade {

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/run.h"
+#include "alidade/run/run.h"
 
 namespace alidade::testing {
 

@@ -16,13 +16,13 @@ if ! command -v "$compiler" >/dev/null; then
   exit 77
 fi
 flags=(-std=c++17 -O2 -fno-exceptions -fno-rtti -Wall -Wextra -Wpedantic -Werror -Wno-psabi
-  -Icore/include -I.)
+  -Icore -I.)
 for include in "$@"; do flags+=(-isystem "$include"); done
 object=$(mktemp --suffix .o)
 trap 'rm -f "$object"' EXIT
 
 for header in motion_models/*.h sensors/*.h; do
-  printf '#include "%s"\n' alidade/static_ekf.h "$header" |
+  printf '#include "%s"\n' alidade/model/static_ekf.h "$header" |
     "$compiler" "${flags[@]}" -fsyntax-only -x c++ -
 done
 "$compiler" "${flags[@]}" -c examples/09_static_depth/main.cc -o "$object"

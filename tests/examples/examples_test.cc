@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <map>
 
-#include "alidade/run.h"
+#include "alidade/run/run.h"
 
 namespace alidade {
 namespace {

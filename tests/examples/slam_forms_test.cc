@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <map>
 
-#include "alidade/sweep.h"
+#include "alidade/sweep/sweep.h"
 
 namespace alidade {
 namespace {

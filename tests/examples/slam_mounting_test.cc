@@ -3,7 +3,7 @@
 // The mounting of a camera on a vehicle with odometry, and the speed of the odometry, in the state.
 #include <gtest/gtest.h>
 
-#include "alidade/sweep.h"
+#include "alidade/sweep/sweep.h"
 
 namespace alidade {
 namespace {

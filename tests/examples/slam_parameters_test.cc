@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "alidade/sweep.h"
+#include "alidade/sweep/sweep.h"
 
 namespace alidade {
 namespace {

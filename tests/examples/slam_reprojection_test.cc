@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "alidade/sweep.h"
+#include "alidade/sweep/sweep.h"
 
 namespace alidade {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "alidade/sweep.h"
+#include "alidade/sweep/sweep.h"
 
 namespace alidade {
 namespace {

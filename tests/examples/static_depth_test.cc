@@ -7,8 +7,8 @@
 #include <cstdio>
 #include <memory>
 
-#include "alidade/ekf.h"
-#include "alidade/run.h"
+#include "alidade/filter/ekf.h"
+#include "alidade/run/run.h"
 #include "examples/09_static_depth/measurements.h"
 
 namespace alidade {

@@ -9,7 +9,7 @@ set -euo pipefail
 compiler=$1
 shift
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
-flags=(-std=c++17 -Wall -Wextra -Wpedantic -Werror -Icore/include)
+flags=(-std=c++17 -Wall -Wextra -Wpedantic -Werror -Icore)
 for include in "$@"; do flags+=(-isystem "$include"); done
 errors=$(mktemp)
 trap 'rm -f "$errors"' EXIT

@@ -6,7 +6,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
-#include "alidade/iekf.h"
+#include "alidade/filter/iekf.h"
 #include "support/recording.h"
 
 namespace alidade {

@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <optional>
 
-#include "alidade/run.h"
+#include "alidade/run/run.h"
 #include "support/program.h"
 
 namespace alidade {

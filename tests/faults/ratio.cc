@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <memory>
 
-#include "alidade/plugin.h"
+#include "alidade/model/plugin.h"
 #include "support/landmark_sensors.h"
 
 namespace {

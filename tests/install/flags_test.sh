@@ -15,7 +15,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-flags=(-std=c++20 -O1 -Icore/include)
+flags=(-std=c++20 -O1 -Icore)
 for argument in "$@"; do
   [[ $argument == -* ]] && flags+=("$argument") || flags+=(-isystem "$argument")
 done

@@ -3,10 +3,11 @@
 
 #include <gtest/gtest.h>
 
-#include "alidade/in_process.h"
-#include "alidade/random.h"
-#include "alidade/ukf.h"
 #include <cmath>
+
+#include "alidade/base/random.h"
+#include "alidade/filter/ukf.h"
+#include "alidade/host/in_process.h"
 #include "support/model_checks.h"
 #include "support/model_maker.h"
 

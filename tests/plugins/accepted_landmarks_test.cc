@@ -6,8 +6,8 @@
 #include <map>
 #include <string>
 
-#include "alidade/plugin_host.h"
-#include "alidade/run.h"
+#include "alidade/host/plugin_host.h"
+#include "alidade/run/run.h"
 
 namespace alidade {
 namespace {

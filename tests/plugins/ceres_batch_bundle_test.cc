@@ -6,7 +6,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "alidade/bundle_file.h"
+#include "alidade/bundle/bundle_file.h"
 #include "ceres_batch_fixture.h"
 #include "support/bal_formula.h"
 #include "support/bundles.h"

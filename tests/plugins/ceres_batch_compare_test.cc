@@ -4,8 +4,8 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "alidade/compare.h"
-#include "alidade/rts.h"
+#include "alidade/compare/compare.h"
+#include "alidade/filter/rts.h"
 #include "ceres_batch_fixture.h"
 
 namespace alidade {

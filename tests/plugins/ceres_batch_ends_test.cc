@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 
-#include "alidade/random.h"
-#include "alidade/rts.h"
-#include "alidade/run.h"
+#include "alidade/base/random.h"
+#include "alidade/filter/rts.h"
+#include "alidade/run/run.h"
 #include "ceres_batch_fixture.h"
 #include "support/comma_locale.h"
 

@@ -3,7 +3,7 @@
 // The fixed-lag smoother against the batch, the Kalman filter, and itself before frames left it.
 #include <cmath>
 
-#include "alidade/run.h"
+#include "alidade/run/run.h"
 #include "ceres_batch_fixture.h"
 
 namespace alidade {

@@ -3,7 +3,7 @@
 // Batch and fixed lag over gaps that are split: noise that a model holds is one input of each gap.
 #include <cmath>
 
-#include "alidade/rts.h"
+#include "alidade/filter/rts.h"
 #include "ceres_batch_fixture.h"
 
 namespace alidade {

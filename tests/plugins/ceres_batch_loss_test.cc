@@ -2,7 +2,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
-#include "alidade/run.h"
+#include "alidade/run/run.h"
 #include "ceres_batch_fixture.h"
 
 namespace alidade {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/plugin_listing.h"
-#include "alidade/run.h"
+#include "alidade/inspect/plugin_listing.h"
+#include "alidade/run/run.h"
 #include "ceres_batch_fixture.h"
 
 namespace alidade {

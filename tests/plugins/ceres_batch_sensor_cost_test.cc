@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "alidade/in_process.h"
-#include "plugins/ceres_batch/geometry_manifold.h"
-#include "plugins/ceres_batch/sensor_cost.h"
+#include "alidade/host/in_process.h"
+#include "plugins/ceres/bundle/geometry_manifold.h"
+#include "plugins/ceres/bundle/sensor_cost.h"
 #include "sensors/self_calibrating_feature.h"
 #include "sensors/stereo_disparity.h"
 

@@ -2,8 +2,8 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "alidade/plugin_listing.h"
-#include "alidade/run.h"
+#include "alidade/inspect/plugin_listing.h"
+#include "alidade/run/run.h"
 #include "ceres_batch_fixture.h"
 #include "plugins/depth_target/depth_target.h"
 

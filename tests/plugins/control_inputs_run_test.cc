@@ -5,9 +5,9 @@
 #include <cmath>
 #include <sstream>
 
-#include "alidade/check.h"
-#include "alidade/explain.h"
-#include "alidade/run.h"
+#include "alidade/inspect/check.h"
+#include "alidade/inspect/explain.h"
+#include "alidade/run/run.h"
 #include "host_fixture.h"
 #include "support/recording.h"
 

@@ -7,8 +7,8 @@
 #include <ostream>
 #include <set>
 
-#include "alidade/camera.h"
-#include "alidade/static_ekf.h"
+#include "alidade/model/camera.h"
+#include "alidade/model/static_ekf.h"
 #include "host_fixture.h"
 #include "support/systems.h"
 

@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <vector>
 
-#include "alidade/plugin.h"
+#include "alidade/model/plugin.h"
 
 /// One source for every compiler and set of flags of the build matrix: transcendental functions,
 /// quaternions, fixed and heap-allocated Eigen matrices, the standard library.

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "alidade/config.h"
-#include "core/src/param_reader.h"
+#include "alidade/config/config.h"
+#include "alidade/host/param_reader.h"
 #include "plugins/scene/scene.h"
 
 namespace alidade::testing {

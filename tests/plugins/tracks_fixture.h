@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "core/src/param_reader.h"
+#include "alidade/host/param_reader.h"
 #include "plugins/tracks/tracks.h"
 #include "support/temporary_folder.h"
 

@@ -3,10 +3,10 @@
 // Plugins that were built without optimisation, and what is said of them.
 #include <set>
 
-#include "alidade/check.h"
-#include "alidade/compare.h"
-#include "alidade/plugin_listing.h"
-#include "alidade/run.h"
+#include "alidade/compare/compare.h"
+#include "alidade/inspect/check.h"
+#include "alidade/inspect/plugin_listing.h"
+#include "alidade/run/run.h"
 #include "host_fixture.h"
 #include "support/recording.h"
 

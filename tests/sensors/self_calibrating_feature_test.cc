@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "alidade/camera.h"
-#include "alidade/in_process.h"
+#include "alidade/host/in_process.h"
+#include "alidade/model/camera.h"
 #include "support/model_checks.h"
 
 namespace alidade {

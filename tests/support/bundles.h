@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "alidade/bundle_file.h"
-#include "alidade/geometry.h"
-#include "alidade/in_process.h"
+#include "alidade/bundle/bundle_file.h"
+#include "alidade/host/in_process.h"
+#include "alidade/model/geometry.h"
 #include "sensors/self_calibrating_feature.h"
 
 /// Bundles that tests make.

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "alidade/config.h"
+#include "alidade/config/config.h"
 
 /// Configs given as text, for tests.
 namespace alidade::testing {

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "alidade/model.h"
+#include "alidade/model/model.h"
 
 /// Small models with a control input, and sensors for them, for tests.
 namespace alidade::testing {

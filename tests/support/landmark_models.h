@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "alidade/ekf.h"
-#include "alidade/in_process.h"
-#include "alidade/random.h"
+#include "alidade/base/random.h"
+#include "alidade/filter/ekf.h"
+#include "alidade/host/in_process.h"
 #include "support/landmark_sensors.h"
 
 /// Small systems with landmarks composed in C++, for tests.

@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
-#include "alidade/model.h"
-#include "alidade/plugin_abi.h"
+#include "alidade/model/model.h"
+#include "alidade/model/plugin_abi.h"
 
 /// A camera that walks at random without turning, and sensors of landmarks in each form.
 namespace alidade::testing {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "alidade/camera.h"
-#include "alidade/in_process.h"
-#include "alidade/landmark.h"
+#include "alidade/host/in_process.h"
+#include "alidade/model/camera.h"
+#include "alidade/model/landmark.h"
 #include "support/model_checks.h"
 
 /// Landmarks of every form before a camera, and what tests of sensors of landmarks ask of them.

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "alidade/models.h"
-#include "alidade/plugin.h"
+#include "alidade/host/model_instance.h"
+#include "alidade/model/plugin.h"
 
 namespace alidade::testing {
 

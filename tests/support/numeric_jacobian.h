@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "alidade/space.h"
+#include "alidade/state/manifold.h"
 
 namespace alidade::testing {
 

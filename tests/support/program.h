@@ -18,7 +18,7 @@
 #include <thread>
 #include <vector>
 
-#include "alidade/config.h"
+#include "alidade/config/config.h"
 #include "support/temporary_folder.h"
 
 namespace alidade::testing {

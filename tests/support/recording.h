@@ -10,7 +10,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "alidade/recorder.h"
+#include "alidade/record/recorder.h"
 #include "support/systems.h"
 #include "support/temporary_folder.h"
 

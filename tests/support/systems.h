@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "alidade/ekf.h"
-#include "alidade/in_process.h"
+#include "alidade/filter/ekf.h"
+#include "alidade/host/in_process.h"
 #include "motion_models/constant.h"
 #include "motion_models/constant_velocity.h"
 #include "sensors/scale_2d.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "alidade/evaluate.h"
+#include "alidade/evaluate/evaluate.h"
 
 /// Trajectories made by formula, for tests of their evaluation.
 namespace alidade::testing {

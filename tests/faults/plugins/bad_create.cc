@@ -2,7 +2,7 @@
 // Models that fail while they are created.
 #include <stdexcept>
 
-#include "alidade/plugin.h"
+#include "alidade/model/plugin.h"
 #include "probe.h"
 
 struct Throws : Probe {

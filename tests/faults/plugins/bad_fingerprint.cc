@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A fingerprint of another ABI, of another processor or build, as BAD_FINGERPRINT says.
-#include "alidade/plugin.h"
+#include "alidade/model/plugin.h"
 #include "probe.h"
 
 #define OTHER_ABI 1

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Models with an optional member that cannot be called, one for each value of BAD_MEMBER, and 0: a
 // model without one. Each must be refused in words: see bad_members_test.sh.
-#include "alidade/plugin.h"
+#include "alidade/model/plugin.h"
 
 using alidade::MatrixRef;
 using alidade::Params;

@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/plugin.h"
+#include "alidade/model/plugin.h"
 
 using alidade::MatrixRef;
 using alidade::Params;

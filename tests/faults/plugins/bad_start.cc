@@ -7,7 +7,7 @@
 #include <csignal>
 #include <cstdlib>
 
-#include "alidade/plugin.h"
+#include "alidade/model/plugin.h"
 #include "probe.h"
 
 #define CRASH 1

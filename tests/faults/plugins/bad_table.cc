@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A table spoiled in the way that BAD_TABLE names.
-#include "alidade/plugin.h"
+#include "alidade/model/plugin.h"
 #include "probe.h"
 
 #define MAGIC 1

@@ -2,7 +2,7 @@
 // Build tier: an estimator that throws while its options are read, and one without a maker.
 #include <stdexcept>
 
-#include "alidade/build_plugin.h"
+#include "alidade/host/build_plugin.h"
 
 namespace {
 

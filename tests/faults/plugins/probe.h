@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "alidade/model.h"
+#include "alidade/model/model.h"
 
 /// z = PROBE_GAIN x: the model of the plugins that are spoiled on purpose.
 #ifndef PROBE_GAIN

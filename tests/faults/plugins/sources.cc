@@ -2,8 +2,8 @@
 // Build tier: sources that work and one that throws.
 #include <stdexcept>
 
-#include "alidade/build_plugin.h"
-#include "alidade/camera.h"
+#include "alidade/host/build_plugin.h"
+#include "alidade/model/camera.h"
 
 namespace {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/plugin.h"
+#include "alidade/model/plugin.h"
 
 /// Time from a pulse to its echo, where the emitter and the microphone stand apart.
 ///

@@ -2,9 +2,9 @@
 #include <cmath>
 #include <cstdio>
 
-#include "alidade/ekf.h"
-#include "alidade/in_process.h"
-#include "alidade/trajectory.h"
+#include "alidade/evaluate/trajectory.h"
+#include "alidade/filter/ekf.h"
+#include "alidade/host/in_process.h"
 
 namespace {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/plugin.h"
+#include "alidade/model/plugin.h"
 
 /// Range rate of a point, as a Doppler radar at the origin measures it: all of a third party's
 /// sensor in one file.

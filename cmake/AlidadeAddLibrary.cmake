@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+
+# alidade_unity(TARGET COUNT)
+#
+# With ALIDADE_UNITY, compiles up to COUNT sources of a folder as one: headers are read once, and
+# what several sources instantiate is compiled once.
+function(alidade_unity target count)
+  if(NOT ALIDADE_UNITY)
+    return()
+  endif()
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+  get_target_property(sources ${target} SOURCES)
+  set(last "")
+  foreach(source IN LISTS sources)
+    cmake_path(GET source PARENT_PATH folder)
+    if(NOT folder STREQUAL last)
+      set(index 0)
+    endif()
+    set(last ${folder})
+    cmake_path(GET folder FILENAME room)
+    math(EXPR group "${index} / ${count}")
+    math(EXPR index "${index} + 1")
+    set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${room}_${group})
+  endforeach()
+endfunction()
+
+# alidade_add_library(NAME SOURCES file... HEADERS file...)
+#
+# The shared library alidade::NAME of this folder, libalidade-NAME: exports the names of alidade
+# alone and leaves none undefined. HEADERS are those that are installed, relative to the folder;
+# the target all_verify_interface_header_sets compiles each by itself.
+function(alidade_add_library name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;HEADERS")
+  set(target alidade_${name})
+  set(exports ${PROJECT_SOURCE_DIR}/cmake/exports.map)
+  add_library(${target} SHARED ${arg_SOURCES})
+  add_library(alidade::${name} ALIAS ${target})
+  target_sources(${target} PUBLIC
+    FILE_SET HEADERS BASE_DIRS ${CMAKE_CURRENT_SOURCE_DIR} FILES ${arg_HEADERS})
+  set_target_properties(${target} PROPERTIES
+    OUTPUT_NAME alidade-${name} EXPORT_NAME ${name} VERSION ${PROJECT_VERSION} SOVERSION 0
+    CXX_VISIBILITY_PRESET default VISIBILITY_INLINES_HIDDEN OFF
+    LINK_DEPENDS ${exports})
+  alidade_warnings(${target})
+  alidade_unity(${target} 8)
+  target_compile_features(${target} PUBLIC cxx_std_20)
+  target_link_options(${target} PRIVATE -Wl,-z,defs -Wl,--version-script=${exports})
+  target_compile_definitions(${target} PRIVATE ALIDADE_VERSION="${PROJECT_VERSION}")
+endfunction()

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/base/error.h"
+
+#include <algorithm>
+#include <new>
+#include <numeric>
+#include <vector>
+
+namespace alidade {
+
+std::string ToString(const Place& place) {
+  std::string text = place.file;
+  for (const int number : {place.line, place.column}) {
+    if (number <= 0) break;
+    if (!text.empty()) text += ':';
+    text += std::to_string(number);
+  }
+  return text;
+}
+
+std::string ErrorLine(const Place& place, std::string_view key, std::string_view what,
+                      std::string_view expected, std::string_view suggestion) {
+  std::string line = ToString(place);
+  if (!key.empty()) {
+    if (!line.empty()) line += ' ';
+    line += key;
+  }
+  if (!line.empty() && !what.empty()) line += ": ";
+  line += what;
+  if (!expected.empty()) {
+    line += expected.starts_with("expected") ? "; " : "; expected ";
+    line += expected;
+  }
+  if (!suggestion.empty()) line.append("; did you mean '").append(suggestion).append("'?");
+  return line;
+}
+
+Failure CaughtFailure() {
+  try {
+    throw;
+  } catch (const Error& error) {
+    return {error.code(), error.what()};
+  } catch (const std::bad_alloc&) {
+    return {ExitCode::kInternal, "out of memory"};
+  } catch (const std::exception& error) {
+    return {ExitCode::kInternal, std::string("internal: ") + error.what()};
+  } catch (...) {
+    return {ExitCode::kInternal, "internal: an exception of unknown type"};
+  }
+}
+
+int EditDistance(std::string_view a, std::string_view b) {
+  std::vector<int> before_last, last(b.size() + 1), row(b.size() + 1);
+  std::iota(last.begin(), last.end(), 0);
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    row[0] = static_cast<int>(i);
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (a[i - 1] != b[j - 1])});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
+        row[j] = std::min(row[j], before_last[j - 2] + 1);
+      }
+    }
+    before_last = last;
+    last.swap(row);
+  }
+  return last[b.size()];
+}
+
+void FailContract(const char* expression, const char* file, int line) {
+  throw ContractViolation(
+      ErrorLine(Place{file, line, 0}, {}, std::string("requires ") + expression));
+}
+
+}  // namespace alidade

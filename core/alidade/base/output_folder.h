@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "alidade/base/output_file.h"
+
+namespace alidade::internal {
+
+/// A folder that is there in full or not at all: it grows as `.NAME.partial-PID` beside its place,
+/// and takes its name in Commit(). It is locked meanwhile, so that nobody else writes to that name,
+/// and so that what a killed process left can be told from what a living one is writing. A marker
+/// file tells the hidden folders of this class from those of others, which it never touches.
+class RunFolder {
+ public:
+  /// Creates the partial folder, and the folders above it where they are missing. A link to a
+  /// folder stands for that folder. Then removes the marked folders of dead processes, and puts
+  /// back what one of them was replacing; an error leaves them as they are. Errors: kCannotCreate
+  /// where `target` exists without `force`, holds anything that its own `files.txt` does not list,
+  /// or is being written by another process; kIo.
+  RunFolder(const std::filesystem::path& target, bool force);
+  /// Removes what was not committed, with the folders above it that were made for it.
+  ~RunFolder();
+  RunFolder(const RunFolder&) = delete;
+  RunFolder& operator=(const RunFolder&) = delete;
+
+  /// Opens a new file; `name` may lie in a sub-folder, which is made. Errors: kCannotCreate, kIo.
+  std::unique_ptr<OutputFile> Create(const std::string& name) const;
+  void Write(const std::string& name, std::string_view text) const;
+  /// Where the files are for now.
+  const std::filesystem::path& partial() const { return partial_; }
+  /// The path of `name` as messages give it: in the folder's place.
+  std::string Shown(const std::string& name) const { return (shown_ / name).string(); }
+  /// Lists all that was written in `files.txt`, syncs it and moves it to its place; an old folder
+  /// goes. Errors: kCannotCreate, kIo.
+  void Commit();
+
+ private:
+  /// Marked folders of dead processes.
+  struct Leftovers {
+    std::vector<std::filesystem::path> folders;
+    std::filesystem::path lost;  ///< in one of them: what stood at the target; "": nothing did
+  };
+
+  void Discard();
+  Leftovers FindLeftovers() const;
+  void CleanUp(const Leftovers& leftovers) const;
+  /// Refuses to replace what is at the target, or `lost`, which was.
+  void CheckTarget(const std::filesystem::path& lost) const;
+  /// Moves the old folder into a marked one, and returns that.
+  std::filesystem::path MoveAway() const;
+  void MakeParents();
+  std::filesystem::path Sibling(const char* kind) const;
+  void WriteList() const;
+  void SyncAll() const;
+
+  std::filesystem::path shown_;   ///< as given
+  std::filesystem::path target_;  ///< absolute, behind links
+  std::filesystem::path partial_;
+  std::vector<std::filesystem::path> made_;  ///< parents, the outermost first
+  bool force_;
+  int lock_ = -1;  ///< of the partial folder
+};
+
+}  // namespace alidade::internal

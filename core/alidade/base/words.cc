@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/base/words.h"
+
+namespace alidade::internal {
+
+std::string Join(const std::vector<std::string>& parts, const char* separator) {
+  std::string text;
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    text.append(i > 0 ? separator : "").append(parts[i]);
+  return text;
+}
+
+}  // namespace alidade::internal

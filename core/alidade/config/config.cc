@@ -1,0 +1,336 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/config/config.h"
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cstdio>
+#include <cstring>
+#include <unordered_map>
+
+#include "alidade/config/tree.h"
+
+namespace alidade {
+namespace fs = std::filesystem;
+using internal::Budget;
+using internal::Child;
+using internal::Clone;
+using internal::FailAt;
+using internal::KeyPlace;
+using internal::Origin;
+using internal::PathOf;
+using internal::Quoted;
+
+namespace internal {
+
+std::unique_ptr<ConfigTree> Clone(const ConfigTree& tree) {
+  auto copy = std::make_unique<ConfigTree>();
+  copy->kind = tree.kind;
+  copy->quoted = tree.quoted;
+  copy->place = tree.place;
+  copy->text = tree.text;
+  copy->key = tree.key;
+  copy->index = tree.index;
+  copy->key_line = tree.key_line;
+  copy->key_column = tree.key_column;
+  copy->children.reserve(tree.children.size());
+  for (const auto& child : tree.children) {
+    copy->children.push_back(Clone(*child));
+    copy->children.back()->parent = copy.get();
+  }
+  return copy;
+}
+
+}  // namespace internal
+
+namespace {
+
+bool NamesAnotherModel(const ConfigTree& old, const ConfigTree& next) {
+  for (const char* key : {"model", "type"}) {
+    const ConfigTree* from = Child(old, key);
+    const ConfigTree* to = Child(next, key);
+    if (from != nullptr && to != nullptr && from->text != to->text) return true;
+  }
+  return false;
+}
+
+/// Fixes the key paths of `copy` and what is below it as those of `original`.
+void KeepPaths(const ConfigTree& original, const ConfigTree& copy) {
+  copy.path = PathOf(original);
+  for (std::size_t i = 0; i < copy.children.size(); ++i) {
+    KeepPaths(*original.children[i], *copy.children[i]);
+  }
+}
+
+/// Moves the children of `over` into `base`; both are maps.
+void Merge(ConfigTree* base, ConfigTree* over) {
+  std::unordered_map<std::string, std::size_t> at;
+  for (std::size_t i = 0; i < base->children.size(); ++i) at.emplace(base->children[i]->key, i);
+  for (auto& child : over->children) {
+    child->parent = base;
+    const auto found = at.find(child->key);
+    if (found == at.end()) {
+      base->children.push_back(std::move(child));
+      continue;
+    }
+    auto& old = base->children[found->second];
+    const bool maps = old->kind == Node::Kind::kMap && child->kind == Node::Kind::kMap;
+    if (maps && !NamesAnotherModel(*old, *child)) {
+      Merge(old.get(), child.get());
+    } else {
+      old = std::move(child);
+    }
+  }
+}
+
+/// The whole file, or just more of it than a config may have.
+std::string ReadFile(const fs::path& file, const Place& place, std::string_view key) {
+  constexpr std::size_t kLimit = (1 << 20) + 1;
+  const auto fail = [&](ExitCode code, const char* reason) {
+    const std::string name = key.empty() ? "" : Quoted(file.string()) + ' ';
+    throw Error(code, ErrorLine(place, key, name + "cannot be read: " + reason));
+  };
+  errno = 0;
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "rb"),
+                                                               &std::fclose);
+  if (stream == nullptr) fail(ExitCode::kInputMissing, std::strerror(errno));
+  struct stat status {};
+  if (fstat(fileno(stream.get()), &status) == 0 && S_ISDIR(status.st_mode)) {
+    fail(ExitCode::kInputMissing, "it is a directory");
+  }
+  std::string text(kLimit, '\0');
+  text.resize(std::fread(text.data(), 1, kLimit, stream.get()));
+  if (std::ferror(stream.get()) != 0) fail(ExitCode::kIo, std::strerror(errno));
+  return text;
+}
+
+std::unique_ptr<ConfigTree> ParseRoot(std::string_view text, const std::string& name,
+                                      Budget* budget) {
+  auto root = internal::ParseYaml(text, Origin{name}, budget);
+  if (root == nullptr || root->kind == Node::Kind::kNull) {
+    FailAt(Place{name}, {}, "file is empty", "a map of keys");
+  }
+  if (root->kind != Node::Kind::kMap) {
+    const bool scalar = root->kind == Node::Kind::kScalar;
+    FailAt(root->place, {}, scalar ? Quoted(root->text) : "a list",
+           "a map of keys, as in 'key: value'");
+  }
+  return root;
+}
+
+/// `source.path`; null where it is not given.
+ConfigTree* SourcePath(const ConfigTree& root) {
+  const ConfigTree* const source = Child(root, "source");
+  return source == nullptr ? nullptr : Child(*source, "path");
+}
+
+/// Makes the relative paths of a config absolute: `source.path`, and the items of `plugins`.
+void AnchorPaths(const ConfigTree& root, const fs::path& folder) {
+  const auto anchor = [&](ConfigTree* node) {
+    if (node->kind != Node::Kind::kScalar || node->text.empty() || node->text == "-") return;
+    std::error_code error;
+    const fs::path absolute = fs::absolute(folder / node->text, error);
+    if (!error) node->text = absolute.string();
+  };
+  if (ConfigTree* const path = SourcePath(root)) anchor(path);
+  const ConfigTree* plugins = Child(root, "plugins");
+  if (plugins == nullptr) return;
+  for (const auto& plugin : plugins->children) anchor(plugin.get());
+}
+
+/// Takes `include:` out of the map.
+std::unique_ptr<ConfigTree> TakeInclude(ConfigTree* root) {
+  auto& children = root->children;
+  const auto found = std::find_if(children.begin(), children.end(),
+                                  [](const auto& child) { return child->key == "include"; });
+  if (found == children.end()) return nullptr;
+  auto include = std::move(*found);
+  children.erase(found);
+  return include;
+}
+
+class Loader {
+ public:
+  explicit Loader(bool allow_outside) : allow_outside_(allow_outside) {}
+
+  std::unique_ptr<ConfigTree> Load(const fs::path& file, const Place& place, std::string_view key) {
+    constexpr std::size_t kMaxFiles = 64;
+    std::error_code ignored;
+    const fs::path canonical = fs::weakly_canonical(file, ignored);
+    if (std::find(open_.begin(), open_.end(), canonical) != open_.end()) {
+      FailAt(place, key, "includes itself: " + Quoted(file.string()));
+    }
+    files_.push_back(file.string());
+    if (files_.size() > kMaxFiles) FailAt(place, key, "too many includes", "at most 64 files");
+    auto own = ParseRoot(ReadFile(file, place, key), file.string(), &budget_);
+    AnchorPaths(*own, file.parent_path());
+    const auto include = TakeInclude(own.get());
+    if (include == nullptr) return own;
+    open_.push_back(canonical);
+    auto merged = LoadIncludes(*include, file.parent_path());
+    open_.pop_back();
+    Merge(merged.get(), own.get());
+    merged->place = own->place;
+    return merged;
+  }
+  const std::vector<std::string>& files() const { return files_; }
+
+ private:
+  std::unique_ptr<ConfigTree> LoadIncludes(const ConfigTree& include, const fs::path& folder) {
+    const Node node(&include);
+    auto merged = std::make_unique<ConfigTree>();
+    merged->kind = Node::Kind::kMap;
+    for (const Node& name : node.ItemsOrOne()) {
+      if (name.kind() != Node::Kind::kScalar)
+        name.Fail("not a file name", "a file or a list of files");
+      const fs::path file =
+          ResolveInside(folder, name.Text(), allow_outside_, name.place(), name.path());
+      const auto part = Load(file, name.place(), name.path());
+      Merge(merged.get(), part.get());
+    }
+    return merged;
+  }
+
+  bool allow_outside_;
+  std::vector<std::string> files_;
+  Budget budget_;
+  std::vector<fs::path> open_;
+};
+
+/// One step of a dotted key: the name of an entry, or the index of an item where it is empty.
+struct Step {
+  std::string name;
+  std::size_t index = 0;
+};
+
+std::vector<Step> ParseDotted(std::string_view dotted, const Place& place) {
+  std::vector<Step> steps;
+  const auto fail = [&] { FailAt(place, dotted, "not a key path", "one like 'a.b' or 'a.b[0]'"); };
+  for (std::string_view rest = dotted;;) {
+    const std::size_t end = std::min(rest.find('.'), rest.size());
+    std::string_view part = rest.substr(0, end);
+    const std::size_t name_end = std::min(part.find('['), part.size());
+    if (name_end == 0) fail();
+    steps.push_back({std::string(part.substr(0, name_end))});
+    part.remove_prefix(name_end);
+    while (!part.empty()) {
+      Step step;
+      const char* last = part.data() + part.size();
+      const auto [digits_end, error] = std::from_chars(part.data() + 1, last, step.index);
+      if (part[0] != '[' || error != std::errc() || digits_end == last || *digits_end != ']')
+        fail();
+      part.remove_prefix(static_cast<std::size_t>(digits_end + 1 - part.data()));
+      steps.push_back(step);
+    }
+    if (end == rest.size()) return steps;
+    rest.remove_prefix(end + 1);
+  }
+}
+
+/// The place of one step below `at`, made where a map has none.
+std::unique_ptr<ConfigTree>* Descend(ConfigTree* at, const Step& step, const Place& place,
+                                     std::string_view dotted) {
+  const bool wants_map = !step.name.empty();
+  if (wants_map && at->kind == Node::Kind::kNull) {
+    at->kind = Node::Kind::kMap;
+    at->place = place;
+    at->key_line = at->key_column = 0;
+  }
+  const std::string& path = PathOf(*at);
+  if (at->kind != (wants_map ? Node::Kind::kMap : Node::Kind::kList)) {
+    FailAt(place, dotted, Quoted(path) + (wants_map ? " is not a map" : " is not a list"),
+           wants_map ? "the key of a map" : "the key of a list");
+  }
+  auto& children = at->children;
+  if (!wants_map) {
+    if (step.index < children.size()) return &children[step.index];
+    FailAt(place, dotted, Quoted(path) + " has " + std::to_string(children.size()) + " items");
+  }
+  const auto found = std::find_if(children.begin(), children.end(),
+                                  [&](const auto& child) { return child->key == step.name; });
+  if (found != children.end()) return &*found;
+  children.push_back(std::make_unique<ConfigTree>());
+  children.back()->parent = at;
+  children.back()->key = step.name;
+  children.back()->place = place;
+  return &children.back();
+}
+
+}  // namespace
+
+Config Config::FromFile(const fs::path& file, bool allow_outside) {
+  Config config;
+  Loader loader(allow_outside);
+  config.tree_ = loader.Load(file, Place{file.string()}, {});
+  config.files_ = loader.files();
+  config.folder_ = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  config.name_ = file.string();
+  return config;
+}
+
+Config Config::FromText(std::string_view text, std::string_view name) {
+  Config config;
+  Budget budget;
+  config.name_ = name;
+  config.folder_ = ".";
+  auto root = ParseRoot(text, config.name_, &budget);
+  if (const ConfigTree* include = Child(*root, "include")) {
+    FailAt(KeyPlace(*include), "include", "a config that is not a file cannot include another");
+  }
+  config.tree_ = std::move(root);
+  return config;
+}
+
+Node Config::root() const { return Node(tree_.get()); }
+
+void Config::Set(std::string_view dotted_key, std::string_view value, std::string_view origin) {
+  const Place place{std::string(origin)};
+  const std::vector<Step> steps = ParseDotted(dotted_key, place);
+  if (steps[0].name == "include") {
+    FailAt(place, dotted_key, "files are included before it is set", "a key of the file");
+  }
+  const int depth = internal::kMaxDepth - static_cast<int>(steps.size());
+  if (depth < 0) FailAt(place, dotted_key, "nested too deep", "at most 64 levels");
+  Budget budget;
+  if (value == "-") value = "'-'";  // alone it would be a list of nothing
+  auto next = internal::ParseYaml(value, Origin{place.file, std::string(dotted_key), false, depth},
+                                  &budget);
+  if (next == nullptr) FailAt(place, dotted_key, "no value", "a value, or \"\" for an empty text");
+  ConfigTree* at = tree_.get();
+  std::unique_ptr<ConfigTree>* slot = nullptr;
+  for (const Step& step : steps) {
+    slot = Descend(at, step, place, dotted_key);
+    at = slot->get();
+  }
+  next->parent = at->parent;
+  next->key = at->key;
+  next->index = at->index;
+  *slot = std::move(next);
+  AnchorPaths(*tree_, {});
+}
+
+std::vector<std::string> Config::inputs() const {
+  std::vector<std::string> all = files_;
+  const ConfigTree* const path = SourcePath(*tree_);
+  if (path != nullptr && path->kind == Node::Kind::kScalar && path->text != "-")
+    all.push_back(path->text);
+  return all;
+}
+
+Config Config::Merged(const Node& overrides) const {
+  if (!overrides.is_map()) overrides.Fail("not a map", "a map of keys to override");
+  const auto over = Clone(*overrides.tree_);
+  KeepPaths(*overrides.tree_, *over);
+  Config config(*this);
+  config.tree_ = Clone(*tree_);
+  Merge(config.tree_.get(), over.get());
+  return config;
+}
+
+std::string Node::ToYaml() const { return internal::ToYaml(*tree_); }
+
+std::string Config::ToYaml() const { return internal::ToYaml(*tree_); }
+
+}  // namespace alidade

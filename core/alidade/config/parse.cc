@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <yaml-cpp/eventhandler.h>
+#include <yaml-cpp/exceptions.h>
+#include <yaml-cpp/mark.h>
+#include <yaml-cpp/parser.h>
+
+#include <algorithm>
+#include <sstream>
+#include <unordered_map>
+
+#include "alidade/config/tree.h"
+
+namespace alidade::internal {
+namespace {
+
+constexpr std::size_t kMaxKeyLength = 256;
+
+struct Extent {
+  int depth = 0;
+  int nodes = 0;
+  std::size_t bytes = 0;
+};
+
+Extent Measure(const ConfigTree& tree) {
+  Extent extent{0, 1, tree.text.size() + tree.key.size()};
+  for (const auto& child : tree.children) {
+    const Extent part = Measure(*child);
+    extent.depth = std::max(extent.depth, part.depth);
+    extent.nodes += part.nodes;
+    extent.bytes += part.bytes;
+  }
+  if (tree.kind == Node::Kind::kMap || tree.kind == Node::Kind::kList) ++extent.depth;
+  return extent;
+}
+
+/// What the short messages of yaml-cpp mean to someone who wrote the file.
+std::string Reworded(const std::string& message) {
+  struct Phrase {
+    std::string_view from, to;
+  };
+  static constexpr Phrase kPhrases[] = {
+      {"end of map not found", "wrong indentation, or text after a value"},
+      {"end of sequence not found", "wrong indentation in a list"},
+      {"end of map flow not found", "'{' is not closed, or a comma is missing"},
+      {"end of sequence flow not found", "'[' is not closed, or a comma is missing"},
+      {"illegal flow end", "']' or '}' closes nothing"},
+      {"illegal EOF in scalar", "quote is not closed"},
+      {"illegal map value", "':' not expected here"},
+      {"illegal block entry", "'-' not expected here"},
+      {"unknown token", "text that starts like this must be quoted"},
+  };
+  for (const Phrase& phrase : kPhrases) {
+    if (message == phrase.from) return std::string(phrase.to);
+  }
+  return message;
+}
+
+class TreeBuilder : public YAML::EventHandler {
+ public:
+  TreeBuilder(std::string_view text, const Origin& origin, Budget* budget)
+      : text_(text), origin_(origin), budget_(budget) {}
+
+  std::unique_ptr<ConfigTree> Take() { return std::move(root_); }
+
+  void OnDocumentStart(const YAML::Mark& mark) override {
+    if (++documents_ < 2) return;
+    const bool marker =
+        text_.substr(std::min<std::size_t>(mark.pos, text_.size())).starts_with("---");
+    Fail(mark, marker ? "second document" : "text after the end of the document",
+         "one document in a file");
+  }
+  void OnDocumentEnd() override {}
+
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
+    RefuseKey(mark, "empty key");
+    ConfigTree* node = Add(mark, anchor, Node::Kind::kNull);
+    if (node->key_line > 0 && node->place.line != node->key_line) node->place = KeyPlace(*node);
+  }
+
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
+    RefuseKey(mark, "an alias is used as a key");
+    const auto target = anchors_.find(anchor);
+    if (target == anchors_.end()) Fail(mark, "alias of a key is not supported");
+    for (const Frame& frame : stack_) {
+      if (frame.node == target->second) Fail(mark, "alias refers to itself");
+    }
+    const Extent extent = Measure(*target->second);
+    Spend(mark, extent.nodes, extent.bytes);
+    CheckDepth(mark, extent.depth);
+    Attach(Clone(*target->second));
+  }
+
+  void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                const std::string& value) override {
+    RefuseTag(mark, tag);
+    if (value.find('\0') != std::string::npos) Fail(mark, "NUL character in a text");
+    // The escapes \N and \_ of yaml-cpp 0.7 give lone bytes.
+    if (!IsUtf8(value)) Fail(mark, "escape that is not a character");
+    if (WantsKey()) return SetKey(mark, tag, value);
+    ConfigTree* node = Add(mark, anchor, Node::Kind::kScalar, value.size());
+    node->quoted = tag != "?";
+    node->text = value;
+  }
+
+  void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                       YAML::EmitterStyle::value) override {
+    RefuseKey(mark, "a list is used as a key, or '[' is not closed");
+    Open(mark, tag, anchor, Node::Kind::kList);
+  }
+  void OnSequenceEnd() override { stack_.pop_back(); }
+
+  void OnMapStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                  YAML::EmitterStyle::value) override {
+    RefuseKey(mark, "a map is used as a key, or '{' is not closed");
+    Open(mark, tag, anchor, Node::Kind::kMap);
+  }
+  void OnMapEnd() override { stack_.pop_back(); }
+
+  [[noreturn]] void FailSyntax(const YAML::Exception& error) const {
+    const std::string what = "not valid YAML: " + Reworded(error.msg);
+    if (stack_.empty() || error.msg.find("flow not found") == std::string::npos) {
+      Fail(error.mark, what);
+    }
+    const ConfigTree& unclosed = *stack_.back().node;
+    FailAt(unclosed.place, FullPath({}), what);
+  }
+
+  [[noreturn]] void Fail(const YAML::Mark& mark, std::string_view what,
+                         std::string_view expected = {}, std::string_view key = {}) const {
+    FailAt(PlaceOf(mark), FullPath(key), what, expected);
+  }
+
+ private:
+  struct Frame {
+    ConfigTree* node = nullptr;
+    bool has_key = false;
+    std::string key = {};
+    YAML::Mark key_mark = {};
+    std::unordered_map<std::string, int> key_lines = {};
+  };
+
+  Place PlaceOf(const YAML::Mark& mark) const {
+    if (!origin_.has_lines) return Place{origin_.file};
+    return Place{origin_.file, mark.line + 1, mark.column + 1};
+  }
+
+  /// The path of what is being read, or of `key` in it.
+  std::string FullPath(std::string_view key) const {
+    std::string path = origin_.key_prefix;
+    const auto append = [&](std::string_view part) {
+      if (!path.empty() && !part.empty() && part[0] != '[') path += '.';
+      path += part;
+    };
+    if (stack_.empty()) return path;
+    append(PathOf(*stack_.back().node));
+    append(stack_.back().has_key ? stack_.back().key : key);
+    return path;
+  }
+
+  bool WantsKey() const {
+    return !stack_.empty() && stack_.back().node->kind == Node::Kind::kMap &&
+           !stack_.back().has_key;
+  }
+
+  void RefuseKey(const YAML::Mark& mark, std::string_view what) const {
+    if (WantsKey()) Fail(mark, what, "text");
+  }
+
+  void RefuseTag(const YAML::Mark& mark, const std::string& tag) const {
+    if (tag.empty() || tag == "?" || tag == "!") return;
+    constexpr std::string_view kStandard = "tag:yaml.org,2002:";
+    const std::string shown =
+        tag.starts_with(kStandard) ? "!!" + tag.substr(kStandard.size()) : tag;
+    Fail(mark, "tag " + Quoted(shown) + " is not supported");
+  }
+
+  void SetKey(const YAML::Mark& mark, const std::string& tag, const std::string& key) {
+    Frame& frame = stack_.back();
+    if (key.empty()) Fail(mark, "empty key", "text");
+    if (key == "<<" && tag == "?")
+      Fail(mark, "merge key '<<' is not supported", "the keys themselves");
+    if (key.size() > kMaxKeyLength) Fail(mark, "key longer than 256 bytes: " + Quoted(key));
+    if (std::any_of(key.begin(), key.end(),
+                    [](char c) { return (c >= 0 && c < ' ') || c == 0x7F; }))
+      Fail(mark, "control character in the key " + Quoted(key));
+    const auto [first, is_new] = frame.key_lines.emplace(key, mark.line + 1);
+    if (!is_new) {
+      std::string what = "duplicate key";
+      if (origin_.has_lines) what += "; first at line " + std::to_string(first->second);
+      Fail(mark, what, {}, key);
+    }
+    Spend(mark, 0, key.size());
+    frame.has_key = true;
+    frame.key = key;
+    frame.key_mark = mark;
+  }
+
+  void Spend(const YAML::Mark& mark, int nodes, std::size_t bytes) {
+    budget_->nodes += nodes;
+    budget_->bytes += bytes;
+    if (budget_->within()) return;
+    Fail(mark, "too large with its aliases expanded",
+         budget_->nodes > Budget::kMaxNodes ? "at most 100000 values" : "at most 8 MiB of text");
+  }
+
+  void CheckDepth(const YAML::Mark& mark, int added) const {
+    if (static_cast<int>(stack_.size()) + added <= origin_.max_depth) return;
+    FailAt(PlaceOf(mark), origin_.key_prefix, "nested too deep",
+           "at most " + std::to_string(kMaxDepth) + " levels");
+  }
+
+  ConfigTree* Add(const YAML::Mark& mark, YAML::anchor_t anchor, Node::Kind kind,
+                  std::size_t bytes = 0) {
+    Spend(mark, 1, bytes);
+    auto node = std::make_unique<ConfigTree>();
+    node->kind = kind;
+    node->place = PlaceOf(mark);
+    if (anchor != YAML::NullAnchor) anchors_[anchor] = node.get();
+    return Attach(std::move(node));
+  }
+
+  ConfigTree* Attach(std::unique_ptr<ConfigTree> node) {
+    node->key.clear();
+    node->index = -1;
+    node->key_line = node->key_column = 0;
+    node->parent = nullptr;
+    if (stack_.empty()) {
+      root_ = std::move(node);
+      return root_.get();
+    }
+    Frame& frame = stack_.back();
+    auto& siblings = frame.node->children;
+    node->parent = frame.node;
+    if (frame.node->kind == Node::Kind::kMap) {
+      const Place key_place = PlaceOf(frame.key_mark);
+      node->key = std::move(frame.key);
+      node->key_line = key_place.line;
+      node->key_column = key_place.column;
+      frame.has_key = false;
+    } else {
+      node->index = static_cast<int>(siblings.size());
+    }
+    siblings.push_back(std::move(node));
+    return siblings.back().get();
+  }
+
+  void Open(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+            Node::Kind kind) {
+    RefuseTag(mark, tag);
+    CheckDepth(mark, 1);
+    stack_.push_back(Frame{Add(mark, anchor, kind)});
+  }
+
+  std::string_view text_;
+  const Origin& origin_;
+  Budget* budget_;
+  int documents_ = 0;
+  std::unique_ptr<ConfigTree> root_;
+  std::vector<Frame> stack_;
+  std::unordered_map<YAML::anchor_t, const ConfigTree*> anchors_;
+};
+
+}  // namespace
+
+std::unique_ptr<ConfigTree> ParseYaml(std::string_view text, const Origin& origin, Budget* budget) {
+  const std::string clean = CleanText(text, origin);
+  std::istringstream stream(clean);
+  TreeBuilder builder(clean, origin, budget);
+  try {
+    YAML::Parser parser(stream);
+    while (parser.HandleNextDocument(builder)) {
+    }
+  } catch (const YAML::Exception& e) {
+    builder.FailSyntax(e);
+  }
+  return builder.Take();
+}
+
+}  // namespace alidade::internal

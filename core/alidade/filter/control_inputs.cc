@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/filter/control_inputs.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "alidade/base/number_text.h"
+
+namespace alidade {
+namespace {
+
+constexpr Stamp kForever = std::numeric_limits<Stamp>::max();
+
+/// max_age_s in whole nanoseconds, at least one.
+Stamp MostAge(double max_age_s) {
+  constexpr double kBeyond = 9.2e9;  // what a Stamp cannot hold
+  return max_age_s < kBeyond ? std::max<Stamp>(1, StampFromSeconds(max_age_s)) : kForever;
+}
+
+/// Why an input cannot be used; empty: it can.
+std::string Defect(const Geometry& geometry, const std::vector<double>& value) {
+  constexpr double kTolerance = 1e-3;
+  if (!AllFinite(value)) return "not finite";
+  if (geometry.Defect(value.data()) > kTolerance) return "not of unit length";
+  return {};
+}
+
+}  // namespace
+
+ControlInputs::ControlInputs(const System& system, const std::vector<StreamInfo>& streams) {
+  for (std::size_t i = 0; i < system.motions.size(); ++i) {
+    const MotionBinding& motion = system.motions[i];
+    if (!motion.model.has_input()) continue;
+    Held held;
+    held.motion = i;
+    held.name = motion.name;
+    held.binding = motion.input;
+    held.geometry = motion.model.input().geometry;
+    held.max_age = MostAge(motion.input.max_age_s);
+    held.neutral.resize(static_cast<std::size_t>(held.geometry.ambient));
+    held.geometry.Identity(held.neutral.data());
+    held.value = held.neutral;
+    const auto stream = std::ranges::find(streams, motion.input.stream, &StreamInfo::name);
+    if (stream != streams.end()) {
+      ALIDADE_EXPECTS(stream->size == held.geometry.ambient);
+      held.stream = static_cast<int>(stream - streams.begin());
+    }
+    held_.push_back(std::move(held));
+  }
+}
+
+Stamp ControlInputs::StepEnd(Stamp from, Stamp to) const {
+  for (const Held& held : held_) {
+    if (Acts(held, from)) to = std::min(to, held.until);
+  }
+  return to;
+}
+
+bool ControlInputs::AllAct(Stamp from, Stamp to) const {
+  return std::ranges::all_of(
+      held_, [&](const Held& held) { return Acts(held, from) && to <= held.until; });
+}
+
+std::string ControlInputs::WhyNone(const Held& held) {
+  const std::string input =
+      "control input of '" + held.name + "' from stream '" + held.binding.stream + "'";
+  if (held.stamp == kNoStamp) return "no " + input + " has come yet: steps with u = 0";
+  return "the " + input + " is older than " + internal::NumberText(held.binding.max_age_s) +
+         " s: steps with u = 0";
+}
+
+const double* ControlInputs::Use(std::size_t motion, Stamp from, std::vector<Event>& events) {
+  const auto found = std::ranges::find(held_, motion, &Held::motion);
+  if (found == held_.end()) return nullptr;
+  if (Acts(*found, from)) {
+    found->stale_noted = false;
+    return found->value.data();
+  }
+  if (!found->stale_noted) events.push_back({from, "input_stale", WhyNone(*found)});
+  found->stale_noted = true;
+  return found->neutral.data();
+}
+
+void ControlInputs::Take(const Frame& frame, UpdateReport& report) {
+  for (Held& held : held_) {
+    for (const Measurement& m : frame.measurements) {
+      if (m.stream != held.stream || frame.stamp < held.stamp) continue;
+      ALIDADE_EXPECTS(m.values.size() == held.value.size());
+      const std::string defect = Defect(held.geometry, m.values);
+      if (!defect.empty()) {
+        if (!held.refusal_noted) {
+          report.events.push_back({frame.stamp, "input_refused",
+                                   "a control input of '" + held.name + "' from stream '" +
+                                       held.binding.stream + "' is " + defect +
+                                       ": the one before it goes on acting"});
+        }
+        held.refusal_noted = true;
+        continue;
+      }
+      std::ranges::copy(m.values, held.value.begin());
+      held.geometry.Normalise(held.value.data());
+      held.stamp = frame.stamp;
+      if (__builtin_add_overflow(frame.stamp, held.max_age, &held.until)) held.until = kForever;
+      held.refusal_noted = false;
+      report.inputs.push_back(static_cast<int>(held.motion));
+    }
+  }
+}
+
+}  // namespace alidade

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <limits>
+#include <vector>
+
+#include "alidade/config/config.h"
+#include "alidade/host/plugin_host.h"
+
+namespace alidade {
+
+/// How the measurements of one stamp are put into updates.
+enum class Fuse {
+  kJoint,           ///< one stacked update
+  kPerSensor,       ///< one update for each sensor, in the order of the config
+  kPerMeasurement,  ///< one update for each measurement, in the order of the sensors
+};
+
+/// What happens after `lockout_after` consecutive rejections of one sensor.
+enum class Lockout {
+  kReset,    ///< re-initialise its blocks from the measurement where it can, else inflate
+  kInflate,  ///< multiply the covariance of its blocks by 100
+  kNone,
+};
+
+/// Where H is taken for the blocks of stationary motion models (`constant`) [Huang2010].
+enum class JacobianAt {
+  kLatest,         ///< their estimate
+  kFirstEstimate,  ///< what they started from: the prior's mean, or what a measurement implied
+};
+
+/// What the Kalman filters have in common to choose.
+struct EkfOptions {
+  /// Probability with which a measurement that fits passes the gate; 1: no gate.
+  double gate = 1.0;
+  Fuse fuse = Fuse::kJoint;
+  JacobianAt jacobian = JacobianAt::kLatest;
+  Lockout lockout = Lockout::kReset;
+  int lockout_after = 20;  ///< consecutive rejections of one sensor
+  int repairs = 10;        ///< of a covariance that lost its positive definiteness; then it ends
+  /// Longer gaps are stepped in equal parts of at most this, to whole ns, and at least 1 ns.
+  double max_dt_s = std::numeric_limits<double>::infinity();
+
+  /// Reads `gate`, `fuse` (`joint`, `per_sensor`, `per_measurement`), `jacobian` (`latest`,
+  /// `first_estimate`), `lockout` (`after`; `action`: `reset`, `inflate`, `none`), `repairs` and
+  /// `max_dt_s` from an estimator's entry of the config; what is not there keeps its default.
+  /// Errors: kBadConfig.
+  static EkfOptions FromNode(const Node& entry);
+  /// What FromNode reads.
+  static std::vector<ParamInfo> Schema();
+};
+
+}  // namespace alidade

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/host/source.h"
+#include "alidade/state/state.h"
+#include "alidade/system/landmarks.h"
+#include "alidade/system/system.h"
+
+namespace alidade {
+
+/// What became of one measurement.
+enum class Outcome {
+  kAccepted,
+  kInitialised,  ///< used up to initialise a block
+  kGated,
+  kOutOfDomain,  ///< h is not defined at the prediction
+  kInvalid,      ///< of no use: beyond the sensor's limits
+  kNotFinite,    ///< the update would have been not finite, and was rolled back
+  kNotPd,        ///< the update would have lost positive definiteness, and was rolled back
+  kStale,        ///< older than the state
+  kNotReady,     ///< a block it needs has no value yet
+  kFailed,       ///< the plugin failed
+};
+const char* ToString(Outcome outcome);
+/// What a model's status means for the measurement; kOk is kAccepted.
+Outcome OutcomeOf(Status status);
+/// Number of equal parts in which a gap of `elapsed` > 0 is stepped: at most max_dt_s each, to
+/// whole ns, and at least 1 ns.
+Stamp StepParts(Stamp elapsed, double max_dt_s);
+/// Whether none of the values is infinite or not a number.
+inline bool AllFinite(std::span<const double> values) {
+  double sum = 0.0;  // 0 times what is not finite is not a number
+  for (const double value : values) sum += 0.0 * value;
+  return sum == 0.0;
+}
+
+/// All that is known of one measurement; m = dof, its tangent size. Empty: not reached.
+struct MeasurementReport {
+  int sensor = -1;  ///< index into System::sensors
+  Outcome outcome = Outcome::kAccepted;
+  std::int64_t landmark = -1;
+  int dof = 0;
+  double nis = 0.0;                ///< r' S^-1 r, not divided by dof; S without the loss
+  std::vector<double> z, h;        ///< ambient
+  std::vector<double> innovation;  ///< r = z (-) h, m
+  std::vector<double> s;           ///< S = H P H' + R / w, m x m; w < 1 by a robust loss alone
+  /// K by columns, its rows those of the blocks with a covariance in the order of the layout; empty
+  /// unless accepted.
+  std::vector<double> gain;
+
+  /// Makes it that of a new measurement, nothing reached yet. The memory is kept.
+  void Reset(int of_sensor, std::int64_t of_landmark, int of_dof) {
+    sensor = of_sensor;
+    landmark = of_landmark;
+    dof = of_dof;
+    outcome = Outcome::kAccepted;
+    nis = 0.0;
+    for (std::vector<double>* part : {&z, &h, &innovation, &s, &gain}) part->clear();
+  }
+};
+
+/// Something that happened to the filter, worth a line to its user.
+struct Event {
+  Stamp stamp = kNoStamp;
+  std::string kind;  ///< one word: diverged, lockout, conditioning, not_finite, ...
+  std::string text;
+  bool divergence = false;  ///< the estimator diverged or failed by this
+};
+
+/// What one frame did. Filled again and again without allocating.
+class UpdateReport {
+ public:
+  std::span<const MeasurementReport> measurements() const { return {pool_.data(), count_}; }
+  std::span<MeasurementReport> measurements() { return {pool_.data(), count_}; }
+  /// One more; references to the others end.
+  MeasurementReport& Add() {
+    if (count_ == pool_.size()) pool_.emplace_back();
+    return pool_[count_++];
+  }
+  void Clear() {
+    stale = false;
+    inputs.clear();
+    landmarks = {};
+    ClearMeasurements();
+    events.clear();
+  }
+  void ClearMeasurements() { count_ = 0; }
+
+  bool stale = false;       ///< the frame is older than the state, which stays as it was
+  std::vector<int> inputs;  ///< motion models whose control input was taken, as in System::motions
+  std::vector<Event> events;
+  LandmarkCounts landmarks;
+
+ private:
+  std::vector<MeasurementReport> pool_;  ///< the first count_ are in use
+  std::size_t count_ = 0;
+};
+
+/// An estimator over one system. It takes values and returns values: it neither reads files nor
+/// prints nor exits.
+class Estimator {
+ public:
+  /// Takes the estimate of frame `index`, counted from the first call of Process, and its report.
+  using Emit = std::function<void(std::size_t index, const State&, const UpdateReport&)>;
+
+  /// All that what comes after a frame depends on; each type of estimator adds its own.
+  struct Snapshot {
+    explicit Snapshot(State after) : state(std::move(after)) {}
+    virtual ~Snapshot() = default;
+    State state;
+  };
+
+  virtual ~Estimator() = default;
+  /// Sets the time of the initial state.
+  virtual void Start(Stamp stamp) = 0;
+  /// Steps to the frame's stamp and uses those of its measurements that a sensor is bound to. The
+  /// report is good until the next call.
+  virtual const UpdateReport& Process(const Frame& frame) = 0;
+  /// True where an estimate depends on later frames too (a smoother, a batch): state() after
+  /// Process is then of no use to anyone but the estimator, and Smooth gives the estimates.
+  virtual bool offline() const { return false; }
+  /// Once, after the last frame: the estimates of all frames, in their order. The events of the
+  /// smoothing itself come with the last report. Errors: where there is nothing to emit, failed()
+  /// turns true and the text of the error says why; whatever `emit` throws.
+  virtual void Smooth(const Emit& /*emit*/) {}
+  /// Where Smooth takes long, it asks `stop` now and then; where that is true it ends by an Error
+  /// of kStopped. A null function never stops.
+  virtual void StopWhen(const std::function<bool()>& /*stop*/) {}
+  /// The estimator as it is after the last frame; null: it cannot go back to one.
+  virtual std::unique_ptr<Snapshot> Save() const { return nullptr; }
+  /// Goes back to where this estimator gave `snapshot`: every result from there on has the same
+  /// bits as if nothing had come between.
+  virtual void Restore(const Snapshot& /*snapshot*/) {}
+  virtual const State& state() const = 0;
+  /// The landmarks in the state, by id.
+  virtual std::vector<LandmarkEstimate> landmarks() const { return {}; }
+  virtual Stamp stamp() const = 0;
+  /// True once the filter left the domain of its sensors or lost its numbers; see the events.
+  virtual bool diverged() const = 0;
+  /// True where there is nothing left to go on with (not finite, unrecoverable).
+  virtual bool failed() const = 0;
+};
+
+}  // namespace alidade

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/filter/filter_options.h"
+
+#include "alidade/filter/ekf_options.h"
+#include "alidade/filter/iekf.h"
+
+namespace alidade {
+namespace {
+
+EkfOptions ReadRecovering(Params& p) {
+  EkfOptions options = internal::ReadCommonOptions(p);
+  options.lockout = static_cast<Lockout>(p.Choice("lockout.action", {"reset", "inflate", "none"},
+                                                  "what is done after so many rejections",
+                                                  static_cast<int>(options.lockout)));
+  options.lockout_after = p.Integer("lockout.after", "rejections of one sensor in a row", 1,
+                                    1'000'000, options.lockout_after);
+  options.repairs = p.Integer("repairs", "of a covariance that lost its positive definiteness", 0,
+                              1'000'000, options.repairs);
+  return options;
+}
+
+EkfOptions ReadEkf(Params& p) {
+  EkfOptions options = ReadRecovering(p);
+  options.jacobian = static_cast<JacobianAt>(p.Choice(
+      "jacobian", {"latest", "first_estimate"}, "where H is taken for blocks of stationary models",
+      static_cast<int>(options.jacobian)));
+  return options;
+}
+
+IekfOptions ReadIekf(Params& p) {
+  IekfOptions options{ReadRecovering(p)};
+  options.max_iterations = p.Integer("max_iterations", "most linearisations of an update", 2, 1000,
+                                     options.max_iterations);
+  options.tolerance = p.Number(
+      "tolerance", "", "step, in posterior standard deviations, at which an update has converged",
+      {0.0, 1.0, true, false}, options.tolerance);
+  return options;
+}
+
+}  // namespace
+
+EkfOptions internal::ReadCommonOptions(Params& p) {
+  EkfOptions options;
+  options.gate =
+      p.Number("gate", "", "probability with which a measurement that fits passes; 1: no gate",
+               {0.0, 1.0, true, false}, options.gate);
+  options.fuse = static_cast<Fuse>(p.Choice("fuse", {"joint", "per_sensor", "per_measurement"},
+                                            "how the measurements of one stamp make updates",
+                                            static_cast<int>(options.fuse)));
+  options.max_dt_s =
+      p.Positive("max_dt_s", "s", "longer gaps are stepped in equal parts", options.max_dt_s);
+  return options;
+}
+
+EkfOptions EkfOptions::FromNode(const Node& entry) {
+  return internal::OptionsFromNode(entry, "ekf", ReadEkf);
+}
+
+std::vector<ParamInfo> EkfOptions::Schema() { return internal::SchemaOf(ReadEkf); }
+
+IekfOptions IekfOptions::FromNode(const Node& entry) {
+  return internal::OptionsFromNode(entry, "iekf", ReadIekf);
+}
+
+std::vector<ParamInfo> IekfOptions::Schema() { return internal::SchemaOf(ReadIekf); }
+
+}  // namespace alidade

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "alidade/filter/ekf.h"
+
+namespace alidade {
+
+struct IekfOptions : EkfOptions {
+  int max_iterations = 10;  ///< most linearisations of an update; at least 2
+  /// An update has converged where its next step is at most this, in posterior standard deviations;
+  /// > 0.
+  double tolerance = 1e-4;
+
+  /// Reads what EkfOptions reads but `jacobian`, and `max_iterations`, `tolerance`.
+  /// Errors: kBadConfig.
+  static IekfOptions FromNode(const Node& entry);
+  /// What FromNode reads.
+  static std::vector<ParamInfo> Schema();
+};
+
+/// Iterated extended Kalman filter [Bell1993]: an Ekf whose updates minimise
+///
+///   c(dx) = dx' P^-1 dx + r' R^-1 r,   r = z (-) h(x (+) dx)
+///
+/// over dx by Gauss-Newton, P the prediction's covariance. At each iterate, H = d h / d dx there,
+///
+///   dx+ = K (r + H dx),   K = P H' S^-1,   S = H P H' + R
+///
+/// and the step dx+ - dx is halved while c rises, or h is not defined. R is that of the iterate,
+/// kept during a step. The covariance is P - K S K' of the last linearisation. Gate and robust loss
+/// are decided at the prediction, and h, S and NIS are reported as they are there.
+///
+/// An update that does not converge keeps its last iterate and notes the event `not_converged`; so
+/// does one that comes to where h has no Jacobian. One with R not positive definite has no such c:
+/// it is that of the Ekf.
+class Iekf : public Ekf {
+ public:
+  /// No considered blocks and roles, no role linearised at the measurement.
+  static constexpr Support kSupport = {
+      .from_measurement = true, .recovery = true, .landmarks = true};
+
+  /// ContractViolation where `system` asks for more than kSupport, `jacobian` is not kLatest, or an
+  /// option is out of its range.
+  Iekf(System system, const IekfOptions& options, const std::vector<StreamInfo>& streams);
+
+ private:
+  struct Minimum {
+    Workspace::Vector dx;
+    int iterations = 0;
+    /// That is left, in posterior standard deviations; none where h has no Jacobian.
+    std::optional<double> step = std::nullopt;
+    bool converged = false;
+  };
+  /// dx = P v, and a step from there, step = P step_v.
+  struct Direction {
+    const Workspace::Vector &dx, &v, &step, &step_v;
+  };
+  Outcome Apply(std::span<Row* const> rows) override;
+  std::optional<Minimum> Minimise(std::span<Row* const> rows);
+  double PartThatLowersTheCost(std::span<Row* const> rows, const Direction& at,
+                               const Workspace::Matrix& r, Workspace::Vector& residual);
+  bool MoveTo(const double* dx);
+  bool Innovations(std::span<Row* const> rows, Workspace::Vector& innovations);
+  bool Relinearise(std::span<Row* const> rows, const double* dx);
+
+  int max_iterations_;
+  double tolerance_;
+  std::vector<double> iterate_;                   ///< values on the way; the state is the prior
+  std::vector<MeasurementReport> at_prediction_;  ///< reports of its rows
+};
+
+}  // namespace alidade

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/filter/support.h"
+
+namespace alidade {
+namespace {
+
+std::optional<Unsupported> OfBlocks(const System& system, const Support& support) {
+  const std::vector<Block>& blocks = system.layout.blocks();
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    if (blocks[b].status != BlockStatus::kConsidered || support.considered) continue;
+    return Unsupported{"considered blocks", "the block estimated or fixed",
+                       static_cast<BlockId>(b)};
+  }
+  for (const Prior& prior : system.priors) {
+    if (prior.from.empty() || support.from_measurement) continue;
+    return Unsupported{"blocks that start from a measurement", "mean and sigma", prior.block};
+  }
+  if (system.landmarks && !support.landmarks) {
+    return Unsupported{"landmarks", "`sensors` that measure none"};
+  }
+  return std::nullopt;
+}
+
+std::optional<Unsupported> OfRole(const RoleBinding& role, const Support& support) {
+  if (role.mode == RoleMode::kConsider && !support.considered) {
+    return Unsupported{"considered roles", support.held ? "estimate or hold" : "estimate"};
+  }
+  if (role.mode == RoleMode::kHold && !support.held) return Unsupported{"held roles", "estimate"};
+  if (role.linearise_at == LineariseAt::kMeasurement && !support.at_measurement) {
+    return Unsupported{"linearise_at: measurement", "prediction"};
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<Unsupported> FindUnsupported(const System& system, const Support& support) {
+  if (auto found = OfBlocks(system, support)) return found;
+  for (std::size_t s = 0; s < system.sensors.size(); ++s) {
+    const SensorBinding& sensor = system.sensors[s];
+    for (std::size_t r = 0; r < sensor.roles.size(); ++r) {
+      auto found = OfRole(sensor.roles[r], support);
+      if (!found) continue;
+      found->sensor = static_cast<int>(s);
+      found->role = static_cast<int>(r);
+      return found;
+    }
+    if (sensor.loss.kind != LossKind::kNone && !support.robust_loss) {
+      return Unsupported{"robust losses", "the sensor without one", -1, static_cast<int>(s)};
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace alidade

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <iterator>
+#include <memory>
+
+#include "alidade/host/plugin_host.h"
+#include "alidade/host/source.h"
+#include "alidade/model/fingerprint.h"
+
+/// Exports of the build tier: plugins in C++ against alidade::core, loaded only into the very build
+/// that they were made with.
+namespace alidade {
+
+class PictureWriter;      // in alidade/record/pictures.h
+struct PictureArguments;  // likewise
+struct BundleProblem;     // in alidade/bundle/bundle.h
+struct BundleOptions;     // likewise
+struct BundleResult;      // likewise
+
+/// All that must be equal between the host and a build-tier plugin: version, compiler, and the
+/// flags that change layout.
+#define ALIDADE_STRINGISE_(x) #x
+#define ALIDADE_STRINGISE(x) ALIDADE_STRINGISE_(x)
+#if defined(_GLIBCXX_DEBUG)
+#define ALIDADE_BUILD_STL "debug-stl"
+#else
+#define ALIDADE_BUILD_STL "stl"
+#endif
+#define ALIDADE_BUILD_VERSION "0.1.0"  // of the project: plugin_host.cc checks it
+#define ALIDADE_BUILD_ID                                                          \
+  ALIDADE_BUILD_VERSION                                                           \
+  " " __VERSION__ " cxx" ALIDADE_STRINGISE(__cplusplus) " abi" ALIDADE_STRINGISE( \
+      __GXX_ABI_VERSION) " align" ALIDADE_STRINGISE(__BIGGEST_ALIGNMENT__) " " ALIDADE_BUILD_STL
+
+struct SourceEntry {
+  const char* name;
+  const char* doc;
+  /// Keys that are not read through Params, one a line: `key  meaning`.
+  const char* keys;
+  std::unique_ptr<Source> (*create)(const SourceArguments& arguments);
+};
+
+/// What an estimator reads its options from.
+struct EstimatorArguments {
+  Node entry;      ///< the config's entry of `estimators`
+  Params& params;  ///< the same entry, read by declaration (numbers, flags, choices)
+};
+
+struct EstimatorEntry {
+  const char* name;
+  const char* doc;
+  const char* citation;
+  /// Reads the options; what it returns makes the estimator once its system is known. Errors of
+  /// both: an Error with a place, as of Node::Fail.
+  EstimatorMaker (*create)(const EstimatorArguments& arguments);
+  EstimatorKind kind = EstimatorKind::kFilter;
+  bool landmarks = false;  ///< whether it takes a system that has some
+};
+
+struct BuildTable {
+  std::uint32_t struct_size = sizeof(BuildTable);
+  const SourceEntry* sources = nullptr;
+  int source_count = 0;
+  const EstimatorEntry* estimators = nullptr;
+  int estimator_count = 0;
+  /// Of the plugin that draws pictures: see OpenPictures.
+  std::unique_ptr<PictureWriter> (*pictures)(const PictureArguments& arguments) = nullptr;
+  /// Of the plugin that adjusts bundles: see AdjustBundle.
+  BundleResult (*adjust)(const SensorModel& sensor, BundleProblem& problem,
+                         const BundleOptions& options) = nullptr;
+};
+
+inline constexpr const char* kBuildEntrySymbol = "alidade_build_plugin";
+
+}  // namespace alidade
+
+/// Exports a table of this plugin; `...` are the members of BuildTable after the size.
+#define ALIDADE_BUILD_PLUGIN_(...)                                                       \
+  ALIDADE_FINGERPRINT(ALIDADE_TIER_BUILD, ALIDADE_BUILD_ID)                              \
+  extern "C" __attribute__((visibility("default"))) const alidade::BuildTable*           \
+  alidade_build_plugin() {                                                               \
+    static const alidade::BuildTable table = {sizeof(alidade::BuildTable), __VA_ARGS__}; \
+    return &table;                                                                       \
+  }
+
+/// Exports the sources of this plugin: ALIDADE_SOURCE_PLUGIN({"name", "doc", "keys", &Create}, ...)
+#define ALIDADE_SOURCE_PLUGIN(...)                                     \
+  static const alidade::SourceEntry alidade_sources[] = {__VA_ARGS__}; \
+  ALIDADE_BUILD_PLUGIN_(alidade_sources, std::size(alidade_sources), nullptr, 0)
+
+/// Exports the estimators of this plugin:
+/// ALIDADE_ESTIMATOR_PLUGIN({"name", "doc", "citation", &Create}, ...)
+#define ALIDADE_ESTIMATOR_PLUGIN(...)                                        \
+  static const alidade::EstimatorEntry alidade_estimators[] = {__VA_ARGS__}; \
+  ALIDADE_BUILD_PLUGIN_(nullptr, 0, alidade_estimators, std::size(alidade_estimators))
+
+/// Exports the picture writer of this plugin: ALIDADE_PICTURE_PLUGIN(&Create)
+#define ALIDADE_PICTURE_PLUGIN(create) ALIDADE_BUILD_PLUGIN_(nullptr, 0, nullptr, 0, create)
+
+/// Exports the bundle adjustment of this plugin: ALIDADE_BUNDLE_PLUGIN(&Adjust)
+#define ALIDADE_BUNDLE_PLUGIN(adjust) ALIDADE_BUILD_PLUGIN_(nullptr, 0, nullptr, 0, nullptr, adjust)

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/host/model_instance.h"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "alidade/base/error.h"
+#include "alidade/host/abi_read.h"
+
+namespace alidade {
+namespace {
+
+using internal::ReadPrefix;
+using internal::Text;
+
+constexpr int kMaxRoles = 64;
+constexpr int kMaxSize = 1 << 20;
+
+/// Whether the sizes are those of a geometry that this version knows.
+bool KnownGeometry(const AlidadeSpace& space) {
+  const auto is = [&](const Geometry& g) {
+    return space.ambient == g.ambient && space.tangent == g.tangent;
+  };
+  switch (space.geometry) {
+    case ALIDADE_VECTOR:
+      return space.ambient >= 1 && space.ambient <= kMaxSize && space.tangent == space.ambient;
+    case ALIDADE_ANGLE:
+      return is(Geometry::Angle());
+    case ALIDADE_UNIT_QUATERNION:
+      return is(Geometry::UnitQuaternion());
+    case ALIDADE_UNIT_VECTOR:
+      return is(Geometry::UnitVector());
+    default:
+      return false;
+  }
+}
+
+std::vector<std::string> SplitAtCommas(const std::string& text) {
+  std::vector<std::string> parts{""};
+  for (const char c : text) {
+    if (c == ',') {
+      parts.emplace_back();
+    } else if (c != ' ') {
+      parts.back() += c;
+    }
+  }
+  return parts;
+}
+
+/// Names of the elements where the model gives none.
+std::vector<std::string> DefaultElements(const AlidadeSpace& space) {
+  if (space.ambient == 1) return {""};
+  if (space.geometry == ALIDADE_UNIT_QUATERNION) return {"w", "x", "y", "z"};
+  if (space.geometry == ALIDADE_UNIT_VECTOR) return {"x", "y", "z"};
+  std::vector<std::string> names;
+  for (int i = 0; i < space.ambient; ++i) names.push_back(std::to_string(i));
+  return names;
+}
+
+/// What is wrong with `space`, or "".
+std::string Defect(const AlidadeSpace& space) {
+  if (Text(space.name).empty()) return "has no name";
+  if (!KnownGeometry(space)) {
+    return "has geometry " + std::to_string(space.geometry) + " with sizes " +
+           std::to_string(space.ambient) + " and " + std::to_string(space.tangent) +
+           ", which this version does not know";
+  }
+  const std::string elements = Text(space.elements);
+  if (!elements.empty() && std::ssize(SplitAtCommas(elements)) != space.ambient) {
+    return "names its elements '" + elements + "', but has " + std::to_string(space.ambient);
+  }
+  if ((space.flags & ALIDADE_ROLE_SHARED) != 0 && (space.flags & ALIDADE_ROLE_LANDMARK) == 0) {
+    return "is shared, but not a landmark's";
+  }
+  return {};
+}
+
+Space ToSpace(const AlidadeSpace& from) {
+  Space space;
+  space.name = Text(from.name);
+  space.unit = Text(from.unit);
+  space.doc = Text(from.doc);
+  const std::string elements = Text(from.elements);
+  space.elements = elements.empty() ? DefaultElements(from) : SplitAtCommas(elements);
+  space.geometry = {static_cast<GeometryKind>(from.geometry), from.ambient, from.tangent};
+  space.flags = from.flags;
+  return space;
+}
+
+}  // namespace
+
+ModelInstance::ModelInstance(const AlidadeInstance& instance, std::string name, std::string plugin)
+    : instance_(ReadPrefix(&instance)), name_(std::move(name)), plugin_(std::move(plugin)) {
+  if (instance_.self == nullptr || instance_.destroy == nullptr) {
+    Refuse("was created without an object or without a way to destroy it");
+  }
+  std::unique_ptr<void, void (*)(void*)> until_checked(instance_.self, instance_.destroy);
+  ReadCalls();
+  ReadDescription();
+  static_cast<void>(until_checked.release());
+}
+
+ModelInstance::~ModelInstance() { instance_.destroy(instance_.self); }
+
+void ModelInstance::Refuse(const std::string& why) const {
+  throw Error(ExitCode::kPlugin, ErrorLine({plugin_}, {}, "model '" + name_ + "' " + why));
+}
+
+void ModelInstance::ReadCalls() {
+  if (instance_.kind == ALIDADE_KIND_SENSOR && instance_.sensor != nullptr) {
+    sensor_ = ReadPrefix(instance_.sensor);
+    instance_.sensor = &sensor_;
+  } else if (instance_.kind == ALIDADE_KIND_MOTION && instance_.motion != nullptr) {
+    motion_ = ReadPrefix(instance_.motion);
+    instance_.motion = &motion_;
+    if (motion_.step == nullptr || motion_.sqrt_q == nullptr) {
+      Refuse("lacks a function that every motion model must have: step, sqrt_q");
+    }
+  } else {
+    Refuse("is of kind " + std::to_string(instance_.kind) + " or lacks the functions of its kind");
+  }
+}
+
+void ModelInstance::ReadDescription() {
+  if (instance_.description == nullptr) Refuse("has no description");
+  description_ = ReadPrefix(instance_.description);
+  instance_.description = &description_;
+  capabilities_ = description_.capabilities;
+  const bool is_sensor = instance_.kind == ALIDADE_KIND_SENSOR;
+  if ((capabilities_ & ALIDADE_RESIDUAL_ONLY) != 0) {
+    Refuse("gives a residual alone, which this version does not support");
+  }
+  if (is_sensor && (sensor_.eval == nullptr || sensor_.sqrt_noise == nullptr)) {
+    Refuse("lacks a function that every sensor must have: eval, sqrt_noise");
+  }
+  const int count = static_cast<int>(std::min<std::uint32_t>(description_.role_count, 1 << 16));
+  if (count < 1 || count > kMaxRoles || description_.roles == nullptr) {
+    Refuse("has " + std::to_string(count) + " roles; 1 to 64 are allowed");
+  }
+  if (!internal::GoodStride<AlidadeSpace>(description_.role_stride)) {
+    Refuse("states a role stride of " + std::to_string(description_.role_stride) + " bytes");
+  }
+  const auto read = [&](const AlidadeSpace& space, const std::string& what) {
+    const std::string defect = Defect(space);
+    if (!defect.empty()) Refuse(": " + what + ' ' + defect);
+    return ToSpace(space);
+  };
+  for (int i = 0; i < count; ++i) {
+    const auto role = internal::ReadEntry(description_.roles, description_.role_stride, i);
+    spaces_.push_back(read(role, "role '" + Text(role.name) + "'"));
+    if (is_sensor && (role.flags & ALIDADE_ROLE_OWNED) != 0) {
+      Refuse(": role '" + spaces_.back().name +
+             "' is owned by the sensor, which this version does not support");
+    }
+    tangents_.push_back(role.tangent);
+    const auto same = [&](const Space& other) { return other.name == spaces_.back().name; };
+    if (std::count_if(spaces_.begin(), spaces_.end(), same) > 1) {
+      Refuse("has two roles named '" + spaces_.back().name + "'");
+    }
+  }
+  const AlidadeSpace* space = is_sensor ? description_.output : description_.input;
+  if (is_sensor && space == nullptr) Refuse("does not describe its measurement");
+  if (space != nullptr) {
+    space_ = read(ReadPrefix(space), is_sensor ? "the measurement" : "the control input");
+  }
+  const int y = description_.initialise_role;
+  if (is_sensor && (capabilities_ & ALIDADE_CAN_INITIALISE) != 0 &&
+      (y < 0 || y >= count || sensor_.initialise == nullptr)) {
+    Refuse("says that it can initialise, but not what or how");
+  }
+  if (is_sensor && (description_.prior_count < 0 || description_.prior_count > kMaxSize)) {
+    Refuse("states a prior of size " + std::to_string(description_.prior_count));
+  }
+  if (!is_sensor && (description_.noise_count < 0 || description_.noise_count > kMaxSize)) {
+    Refuse("states a noise of size " + std::to_string(description_.noise_count));
+  }
+}
+
+std::string ModelInstance::error_text() const {
+  return instance_.error_text == nullptr ? "" : Text(instance_.error_text(instance_.self));
+}
+
+SensorModel::SensorModel(std::shared_ptr<const ModelInstance> instance)
+    : instance_(std::move(instance)), sensor_(instance_->c().sensor), self_(instance_->c().self) {
+  ALIDADE_EXPECTS(instance_->c().kind == ALIDADE_KIND_SENSOR);
+  if ((instance_->capabilities() & ALIDADE_CAN_INITIALISE) != 0) {
+    const AlidadeDescription& description = *instance_->c().description;
+    initialised_role_ = description.initialise_role;
+    prior_size_ = description.prior_count;
+    const auto is_landmark = [&](int i) {
+      return i < std::ssize(roles()) && roles()[static_cast<std::size_t>(i)].landmark();
+    };
+    initialised_count_ = 1;
+    while (is_landmark(initialised_role_) && is_landmark(initialised_role_ + initialised_count_))
+      ++initialised_count_;
+  }
+}
+
+bool SensorModel::has_landmark() const {
+  return std::any_of(roles().begin(), roles().end(), [](const Space& r) { return r.landmark(); });
+}
+
+Status SensorModel::Initialise(const double* const* roles, const double* z, const double* prior,
+                               double* y, double* const* jx, double* jz, double* jp) const {
+  ALIDADE_EXPECTS(initialised_role_ >= 0);
+  return detail::ToStatus(sensor_->initialise(self_, roles, z, prior, y, jx,
+                                              instance_->tangents().data(), jz,
+                                              measurement().geometry.tangent, jp, prior_size_));
+}
+
+MotionModel::MotionModel(std::shared_ptr<const ModelInstance> instance)
+    : instance_(std::move(instance)), motion_(instance_->c().motion), self_(instance_->c().self) {
+  ALIDADE_EXPECTS(instance_->c().kind == ALIDADE_KIND_MOTION);
+  noise_size_ = instance_->c().description->noise_count;
+  for (const std::int32_t tangent : instance_->tangents()) tangent_size_ += tangent;
+  zero_noise_.assign(static_cast<std::size_t>(noise_size_) + 1, 0.0);
+}
+
+}  // namespace alidade

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "alidade/model/plugin_abi.h"
+#include "alidade/model/status.h"
+#include "alidade/state/manifold.h"
+
+namespace alidade {
+
+namespace detail {
+/// What a plugin returned; a code that the ABI does not have is a failure of the plugin.
+inline Status ToStatus(std::int32_t code) {
+  return code < ALIDADE_OK || code > ALIDADE_ERROR ? Status::kError : static_cast<Status>(code);
+}
+}  // namespace detail
+
+/// Owns one instance that a plugin created, and its description as C++ values.
+class ModelInstance {
+ public:
+  /// Takes `instance` over. `name` is the model's, `plugin` the file it came from, for messages.
+  /// Errors: kPlugin where the description breaks the rules of plugin_abi.h.
+  ModelInstance(const AlidadeInstance& instance, std::string name, std::string plugin);
+  ~ModelInstance();
+  ModelInstance(const ModelInstance&) = delete;
+  ModelInstance& operator=(const ModelInstance&) = delete;
+
+  const AlidadeInstance& c() const { return instance_; }
+  const std::string& name() const { return name_; }
+  const std::string& plugin() const { return plugin_; }
+  const std::vector<Space>& spaces() const { return spaces_; }             ///< roles, or blocks
+  const std::vector<std::int32_t>& tangents() const { return tangents_; }  ///< of the spaces
+  /// The measurement of a sensor, the control input of a motion model (empty name: none).
+  const Space& space() const { return space_; }
+  unsigned capabilities() const { return capabilities_; }
+  std::string error_text() const;
+
+ private:
+  void ReadCalls();
+  void ReadDescription();
+  [[noreturn]] void Refuse(const std::string& why) const;
+
+  AlidadeInstance instance_;  ///< its pointers lead to the copies below
+  AlidadeDescription description_{};
+  AlidadeSensor sensor_{};
+  AlidadeMotion motion_{};
+  std::string name_, plugin_;
+  std::vector<Space> spaces_;
+  std::vector<std::int32_t> tangents_;
+  Space space_;
+  unsigned capabilities_ = 0;
+};
+
+/// A sensor z = h(roles) + n behind the sealed boundary. Cheap to copy; calls as in plugin_abi.h.
+class SensorModel {
+ public:
+  explicit SensorModel(std::shared_ptr<const ModelInstance> instance);
+
+  const std::string& name() const { return instance_->name(); }
+  const ModelInstance& instance() const { return *instance_; }
+  const std::vector<Space>& roles() const { return instance_->spaces(); }
+  const Space& measurement() const { return instance_->space(); }
+  /// Index of the role that Initialise computes, of a landmark the first; -1 where there is none.
+  int initialised_role() const { return initialised_role_; }
+  /// How many roles from there on Initialise computes: those of a landmark together, else one.
+  int initialised_count() const { return initialised_count_; }
+  /// Numbers that Initialise needs beside the measurement.
+  int prior_size() const { return prior_size_; }
+  /// Whether its roles are filled by the landmark that a measurement names.
+  bool has_landmark() const;
+
+  /// z = h(roles), ambient values; kOutOfDomain where h is not defined.
+  Status Predict(const double* const* roles, double* z) const {
+    return detail::ToStatus(sensor_->eval(self_, roles, z, nullptr, nullptr));
+  }
+  /// z and jacobians[i] = dz/d role_i, row stride strides[i]; a null jacobian is skipped.
+  Status Linearise(const double* const* roles, double* z, double* const* jacobians,
+                   const int* strides) const {
+    return detail::ToStatus(sensor_->eval(self_, roles, z, jacobians, strides));
+  }
+  /// l, row-major m x m, with R = l l'.
+  Status SqrtNoise(const double* const* roles, const double* z, double* l) const {
+    return detail::ToStatus(
+        sensor_->sqrt_noise(self_, roles, z, l, measurement().geometry.tangent));
+  }
+  Status Valid(const double* z) const {
+    return sensor_->valid == nullptr ? Status::kOk : detail::ToStatus(sensor_->valid(self_, z));
+  }
+  /// y = g(other roles, z), dense row-major Jacobians jx[i] = dy/d role_i and jz = dy/dz. kInvalid
+  /// where a prior is needed.
+  Status Initialise(const double* const* roles, const double* z, double* y, double* const* jx,
+                    double* jz) const {
+    return Initialise(roles, z, nullptr, y, jx, jz, nullptr);
+  }
+  /// y = g(other roles, z, prior), the initialised roles one after the other; Jacobians dense and
+  /// row-major, jp = dy/d prior; each may be null.
+  Status Initialise(const double* const* roles, const double* z, const double* prior, double* y,
+                    double* const* jx, double* jz, double* jp) const;
+  std::string error_text() const { return instance_->error_text(); }
+
+ private:
+  std::shared_ptr<const ModelInstance> instance_;
+  const AlidadeSensor* sensor_;
+  const void* self_;
+  int initialised_role_ = -1;
+  int initialised_count_ = 0;
+  int prior_size_ = 0;
+};
+
+/// A motion model x' = f(x, u, w, dt) behind the sealed boundary. Cheap to copy.
+class MotionModel {
+ public:
+  explicit MotionModel(std::shared_ptr<const ModelInstance> instance);
+
+  const std::string& name() const { return instance_->name(); }
+  const ModelInstance& instance() const { return *instance_; }
+  const std::vector<Space>& blocks() const { return instance_->spaces(); }
+  int noise_size() const { return noise_size_; }
+  /// Its blocks stay as they are, without noise: Step need not be called.
+  bool stationary() const { return (instance_->capabilities() & ALIDADE_STATIONARY) != 0; }
+  /// Whether w is held over the whole of an interval between updates, or drawn for each step.
+  bool discrete_noise() const { return (instance_->capabilities() & ALIDADE_DISCRETE_NOISE) != 0; }
+  int tangent_size() const { return tangent_size_; }
+  bool has_input() const { return instance_->c().description->input != nullptr; }
+  /// The control input, where it has one.
+  const Space& input() const { return instance_->space(); }
+
+  /// x', where `w` may be null (zero), F (n x n) and G (n x n_w) dense row-major; F and G may both
+  /// be null.
+  Status Step(const double* const* blocks, const double* input, const double* w, double dt_s,
+              double* const* next, double* f, double* g) const {
+    return detail::ToStatus(motion_->step(self_, blocks, input,
+                                          w != nullptr ? w : zero_noise_.data(), dt_s, next, f,
+                                          tangent_size_, g, noise_size_));
+  }
+  /// l, row-major n_w x n_w, with Qw = l l'.
+  Status SqrtQ(const double* const* blocks, double dt_s, double* l) const {
+    return detail::ToStatus(motion_->sqrt_q(self_, blocks, dt_s, l, noise_size_));
+  }
+  std::string error_text() const { return instance_->error_text(); }
+
+ private:
+  std::shared_ptr<const ModelInstance> instance_;
+  const AlidadeMotion* motion_;
+  const void* self_;
+  int noise_size_ = 0;
+  int tangent_size_ = 0;
+  std::vector<double> zero_noise_;  ///< so that a model of dynamic noise allocates none in a step
+};
+
+}  // namespace alidade

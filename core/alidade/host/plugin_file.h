@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "alidade/host/plugin_host.h"
+#include "alidade/model/plugin_abi.h"
+
+/// What PluginHost asks of a plugin file before and while opening it.
+namespace alidade {
+
+struct BuildTable;
+
+struct PluginHost::Loaded {
+  std::filesystem::path file;     ///< canonical
+  const AlidadeTable* table;      ///< sealed tier, else null
+  const BuildTable* build_table;  ///< build tier, else null
+  bool unoptimised;               ///< by its fingerprint
+};
+
+namespace internal {
+
+/// The build id that a build-tier plugin must have: that of this library.
+const char* HostBuildId();
+
+[[noreturn]] inline void Refuse(const std::filesystem::path& file, const std::string& why) {
+  throw Error(ExitCode::kPlugin, ErrorLine({file.string()}, {}, why));
+}
+
+/// Where the plugins of this very build lie: `lib/alidade` beside this library, of the build tree
+/// or of the installation; "" where that cannot be told.
+std::filesystem::path FolderOfProgram();
+
+/// Refuses a build that this host cannot run: fast-math, instructions that this processor lacks, a
+/// build-tier plugin of another build. Errors: kPlugin.
+void CheckBuild(const AlidadeFingerprint& fingerprint, const std::filesystem::path& file);
+
+/// Opens the plugin in a child process, looks its entry up and walks its table. Returns "" or why
+/// that failed.
+std::string TrialLoad(const std::filesystem::path& file, std::uint32_t tier);
+
+/// Opens a build-tier plugin for the rest of the process, checked as PluginHost checks all.
+/// Errors: kPlugin, kNotTrusted.
+const BuildTable& OpenBuildTier(const std::filesystem::path& file);
+
+/// What breaks the rules of plugin_abi.h or build_plugin.h in a table, or "".
+std::string Defect(const AlidadeTable* table);
+std::string Defect(const BuildTable* table);
+
+/// `sensor`, `motion model`, `source`, `estimator`.
+const char* KindName(PluginEntry::Kind kind);
+
+}  // namespace internal
+}  // namespace alidade

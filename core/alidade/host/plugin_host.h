@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "alidade/config/config.h"
+#include "alidade/host/model_instance.h"
+#include "alidade/host/source.h"
+
+namespace alidade {
+
+class Estimator;        // in alidade/filter/estimator.h
+struct System;          // in alidade/system/system.h
+struct SourceEntry;     // in alidade/host/build_plugin.h
+struct EstimatorEntry;  // likewise
+
+/// Makes an estimator, its options read, once its system is known; `streams` are the source's.
+using EstimatorMaker = std::function<std::unique_ptr<Estimator>(
+    const System& system, const std::vector<StreamInfo>& streams)>;
+
+/// One parameter of a model, as declared by being read.
+struct ParamInfo {
+  std::string key, unit, doc;
+  std::string type;                  ///< number, integer, flag, choice, or `number[3]`
+  std::string range;                 ///< `> 0`, `[1, 3]`, or "" where everything is allowed
+  std::string fallback;              ///< the default as text, "" where the key is required
+  std::vector<std::string> choices;  ///< of a choice
+  std::string when;                  ///< `noise = fixed` where only that choice reads it, else ""
+};
+
+/// How the estimates of an estimator rest on the measurements, by which a comparison knows what it
+/// can be compared with.
+enum class EstimatorKind {
+  kFilter,    ///< takes each measurement once, as it comes
+  kSmoother,  ///< a filter, and then all later measurements, about its linearisation
+  kBatch,     ///< solves for all states anew, by all measurements or (`data: so_far`) those so far
+  kWindow,    ///< solves for the last states anew
+};
+/// `filter`, `smoother`, `batch`, `window`.
+const char* ToString(EstimatorKind kind);
+
+/// A model, source or estimator that a loaded plugin offers.
+struct PluginEntry {
+  enum class Kind { kSensor, kMotion, kSource, kEstimator } kind;
+  std::string name, doc, citation, family;
+  std::filesystem::path plugin;  ///< the file it came from
+  unsigned thread_flags = 0;     ///< ALIDADE_THREAD_*; of a source or estimator 0
+  bool landmarks = false;        ///< of an estimator: EstimatorEntry::landmarks
+  bool unoptimised = false;      ///< the plugin was built without optimisation
+  EstimatorKind estimator = EstimatorKind::kFilter;  ///< of an estimator
+};
+
+/// Why a file in a searched folder was not loaded.
+struct Refusal {
+  std::filesystem::path file;
+  std::string reason;
+  ExitCode code;
+};
+
+/// What becomes of a given file or folder that is missing or refused: an error, or an entry of
+/// PluginHost::searched() and refusals().
+enum class OnRefusal { kThrow, kList };
+
+/// Finds, checks, loads and lends plugins. A file is opened only when its fingerprint, read from
+/// the bytes beforehand, fits, and nobody but root, the caller or the owner of the program could
+/// have written it. Plugins are never unloaded. Creation is safe from several threads.
+class PluginHost {
+ public:
+  /// Searches, in this order: `files_and_folders` (config `plugins:`, then `--plugin-path`),
+  /// ALIDADE_PLUGIN_PATH, the user data folder, the build tree, the install folder. What is refused
+  /// elsewhere than in `files_and_folders` is always listed. Errors: kPlugin, kNotTrusted.
+  explicit PluginHost(const std::vector<std::filesystem::path>& files_and_folders = {},
+                      OnRefusal on_refusal = OnRefusal::kThrow);
+  ~PluginHost();
+
+  /// A model from its config entry: reads its parameters there, leaving unread keys to
+  /// Node::RejectUnread. `form` stands for the parameter `landmarks.form` of a sensor that has this
+  /// choice; "": as it is written. Errors: kPlugin with the places searched, kBadConfig.
+  SensorModel CreateSensor(const std::string& name, const Node& entry,
+                           const std::string& form = {}) const;
+  MotionModel CreateMotion(const std::string& name, const Node& entry) const;
+  /// The model `entry` of entries(), also where another plugin offers its name.
+  std::shared_ptr<const ModelInstance> Create(const PluginEntry& entry, const Node& node,
+                                              const std::string& form = {}) const;
+  /// `any_order` as in SourceArguments.
+  std::unique_ptr<Source> CreateSource(const std::string& name, const Node& entry,
+                                       std::uint64_t seed, const std::filesystem::path& folder,
+                                       bool any_order = false) const;
+  /// The maker of an estimator whose options are in `entry`; its errors are the same.
+  EstimatorMaker CreateEstimator(const std::string& name, const Node& entry) const;
+
+  const std::vector<PluginEntry>& entries() const { return entries_; }
+  /// The parameters of a model, found by creating it with stand-in values, each choice in turn.
+  std::vector<ParamInfo> Schema(const PluginEntry& entry) const;
+  /// Roles, measurement or blocks of a model with stand-in parameters, and what it can do, a line
+  /// each, for `plugins info`.
+  std::vector<std::string> Describe(const PluginEntry& entry) const;
+  /// Every place looked at, in order, with what was found there.
+  const std::vector<std::string>& searched() const { return searched_; }
+  const std::vector<Refusal>& refusals() const { return refusals_; }
+
+ private:
+  struct Loaded;
+  void LoadPlace(const std::filesystem::path& place, const std::string& origin, bool required);
+  void LoadFolder(const std::filesystem::path& folder, bool required);
+  void LoadFile(const std::filesystem::path& file, bool required);
+  void Load(const std::filesystem::path& file);
+  void AddEntries(const Loaded& plugin);
+
+  const PluginEntry& Find(PluginEntry::Kind kind, const std::string& name, const Node& entry) const;
+  [[noreturn]] void FailMissing(PluginEntry::Kind kind, const std::string& name,
+                                const Node& entry) const;
+  const Loaded& LoadedFrom(const std::filesystem::path& file) const;
+  AlidadeEntry EntryOf(const PluginEntry& entry) const;
+  const SourceEntry& SourceOf(const PluginEntry& entry) const;
+  const EstimatorEntry& EstimatorOf(const PluginEntry& entry) const;
+
+  std::vector<std::unique_ptr<Loaded>> loaded_;
+  std::vector<PluginEntry> entries_;
+  std::vector<std::string> searched_;
+  std::vector<Refusal> refusals_;
+  mutable std::mutex create_mutex_;
+};
+
+/// The remedy for a plugin that was built without optimisation.
+inline constexpr const char* kBuildOptimised =
+    "build it with -O2, in CMake with -DCMAKE_BUILD_TYPE=Release";
+
+/// Every place searched and what was found there, and every file refused with the reason.
+std::string PluginPlaces(const PluginHost& host);
+
+/// The fingerprint in the `.alidade` section of an ELF file, read from its bytes, every offset
+/// checked. Errors: kPlugin (not ELF, truncated, malformed, no fingerprint, another ABI).
+AlidadeFingerprint ReadFingerprint(const std::filesystem::path& file);
+
+/// Refuses a file that someone else could have written: not absolute; it, its folder or a folder
+/// above it owned by another than root, the caller or the owner of the running program; writable
+/// for group or world (sticky folders above excepted). Follows symlinks and checks what they pass.
+/// Errors: kNotTrusted.
+void CheckTrusted(const std::filesystem::path& file);
+
+}  // namespace alidade

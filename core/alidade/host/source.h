@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "alidade/base/timestamp.h"
+#include "alidade/config/config.h"
+#include "alidade/model/params.h"
+
+namespace alidade {
+
+/// One value of one stream.
+struct Measurement {
+  Stamp stamp = 0;
+  int stream = 0;  ///< index into Source::streams()
+  std::int64_t landmark = -1;
+  std::vector<double> values;
+  std::vector<double> covariance;  ///< row-major, overrides the model's noise; empty: none
+};
+
+/// All that is known at one stamp, in the order of the source.
+struct Frame {
+  Stamp stamp = 0;
+  std::vector<Measurement> measurements;
+  /// One value list for each entry of Source::truths(), of its size; what is empty, or lacks at the
+  /// end, is unknown at this stamp.
+  std::vector<std::vector<double>> truth;
+};
+
+/// A named stream or truth value of a source.
+struct StreamInfo {
+  std::string name;
+  int size = 1;
+  double sigma = 0.0;  ///< of a truth: standard deviation of each element, in its tangent
+};
+
+/// Where measurements come from: a simulator, a file, a pipe. A build-tier plugin.
+class Source {
+ public:
+  virtual ~Source() = default;
+  virtual const std::vector<StreamInfo>& streams() const = 0;
+  /// Values that the source knows, named like the blocks they are truth of.
+  virtual const std::vector<StreamInfo>& truths() const = 0;
+  /// Fills `frame` with the next one; false at the end. Its streams are indices into streams(), its
+  /// values as many as streams() and truths() say: what is not ends the run as internal.
+  /// Errors: kBadData, kIo.
+  virtual bool Next(Frame& frame) = 0;
+  /// Where the landmark of that id is in the world, m, where the source knows the true map.
+  virtual std::optional<std::array<double, 3>> TrueLandmark(std::int64_t /*id*/) const {
+    return std::nullopt;
+  }
+  /// The calibration of the camera that took the data: a config of the one map `calibration`, with
+  /// parameters under the keys by which models ask for them,
+  /// `calibration: {camera: {fx: 721.5}, baseline_m: 0.54}`. None: the data bring none. Errors:
+  /// kBadData, kInputMissing.
+  virtual std::optional<Config> Calibration() const { return std::nullopt; }
+  /// Frames in all, or -1 where that is not known (for progress only).
+  virtual std::int64_t size() const { return -1; }
+  /// Where the last frame is written, for messages; empty where that means nothing.
+  virtual Place place() const { return {}; }
+};
+
+/// What a source is made from.
+struct SourceArguments {
+  Node entry;      ///< the config's `source` map
+  Params& params;  ///< the same map, read by declaration (numbers, flags, choices)
+  std::uint64_t seed;
+  std::filesystem::path folder;  ///< relative paths are taken from here
+  bool any_order = false;        ///< times may go back or repeat: the run deals with it
+};
+
+}  // namespace alidade

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+
+#include "alidade/model/model_members.h"
+#include "alidade/model/status.h"
+#include "ceres/jet.h"
+
+/// Evaluates models with their Jacobians in the tangent, by forward-mode automatic differentiation
+/// through (+) and (-), or by the author's closed form where there is one. Plugins, the static
+/// filter, costs of a batch and tests share it. Matrices are row-major with a row stride; outputs
+/// are untouched unless the result is kOk.
+
+/// Of a function whose loops are not vectorised: what a model has just written number by number
+/// would be read as vectors, which waits for the stores.
+#if defined(__GNUC__) && !defined(__clang__)
+#define ALIDADE_SCALAR_LOOPS __attribute__((optimize("no-tree-loop-vectorize")))
+#else
+#define ALIDADE_SCALAR_LOOPS
+#endif
+
+/// Of a function into which all that it calls is inlined, down to the arithmetic of the model. With
+/// the checks of a sanitizer in it, that would take minutes and gigabytes to compile.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define ALIDADE_FLATTEN
+#else
+#define ALIDADE_FLATTEN __attribute__((flatten))
+#endif
+
+namespace alidade {
+namespace detail {
+
+/// No block.
+constexpr bool None(int) { return false; }
+
+/// x (+) d at d = 0 as dual numbers, d being the seeds from `seed` on.
+template <class G, class Jet>
+void LiftOne(const double* x, int seed, Jet* lifted) {
+  if constexpr (G::kGeometry == ALIDADE_VECTOR) {
+    for (int k = 0; k < G::kTangent; ++k) lifted[k] = Jet(x[k], seed + k);
+  } else if constexpr (G::kGeometry == ALIDADE_UNIT_QUATERNION) {  // x Exp(d) = x (1, d/2)
+    const double w = 0.5 * x[0], i = 0.5 * x[1], j = 0.5 * x[2], k = 0.5 * x[3];
+    const double slope[4][3] = {{-i, -j, -k}, {w, -k, j}, {k, w, -i}, {-j, i, w}};
+    for (int r = 0; r < 4; ++r) {
+      lifted[r] = Jet(x[r]);
+      for (int c = 0; c < 3; ++c) lifted[r].v[seed + c] = slope[r][c];
+    }
+  } else {
+    Jet d[G::kTangent];
+    for (int k = 0; k < G::kTangent; ++k) d[k] = Jet(0.0, seed + k);
+    G::Plus(x, d, lifted);
+  }
+}
+
+/// All blocks x (+) 0 as dual numbers, seeded in order; those that kSkip names get neither value
+/// nor seed.
+template <class Model, bool (*kSkip)(int) = None, class Jet>
+void Lift(const double* const* x, Jet* lifted, const Jet** pointers) {
+  int seed = 0, offset = 0;
+  const auto lift = [&](auto index) {
+    constexpr int i = decltype(index)::value;
+    using G = SpaceAt<i, Model>;
+    pointers[i] = nullptr;
+    if (!kSkip(i) && x[i] != nullptr) {
+      LiftOne<G>(x[i], seed, lifted + offset);
+      pointers[i] = lifted + offset;
+    }
+    if (!kSkip(i)) seed += G::kTangent;
+    offset += G::kAmbient;
+  };
+  ForEach(lift, typename Blocks<Model>::Indices{});
+}
+
+/// d value / d seeds [first, first + count), in the tangent of G at the value itself.
+template <class G, class Jet>
+void ReadTangent(const Jet* value, int first, int count, MatrixRef j) {
+  if constexpr (G::kGeometry == ALIDADE_VECTOR) {
+    for (int r = 0; r < G::kTangent; ++r) {
+      for (int c = 0; c < count; ++c) j(r, c) = value[r].v[first + c];
+    }
+    return;
+  }
+  double base[G::kAmbient];
+  for (int i = 0; i < G::kAmbient; ++i) base[i] = value[i].a;
+  Jet d[G::kTangent];
+  G::Minus(value, base, d);
+  for (int r = 0; r < G::kTangent; ++r) {
+    for (int c = 0; c < count; ++c) j(r, c) = d[r].v[first + c];
+  }
+}
+
+inline void Zero(MatrixRef m, int rows, int columns) {
+  for (int r = 0; r < rows && columns > 0; ++r) std::fill_n(&m(r, 0), columns, 0.0);
+}
+
+inline void Copy(MatrixRef from, int rows, int columns, MatrixRef to) {
+  for (int r = 0; r < rows && columns > 0; ++r) std::copy_n(&from(r, 0), columns, &to(r, 0));
+}
+
+template <int kColumns, std::size_t... I>
+void CopyUnrolled(MatrixRef from, MatrixRef to, std::index_sequence<I...>) {
+  ((to(I / kColumns, I % kColumns) = from(I / kColumns, I % kColumns)), ...);
+}
+
+/// The same of a size known to the compiler, number by number where it is small: what has been
+/// written so is then never in memory. A load of two numbers at once cannot be forwarded from two
+/// stores of one: it waits until they have left the store buffer.
+template <int kRows, int kColumns>
+void CopyFixed(MatrixRef from, MatrixRef to) {
+  if constexpr (kRows * kColumns <= 64) {
+    CopyUnrolled<kColumns>(from, to, std::make_index_sequence<kRows * kColumns>());
+  } else {
+    Copy(from, kRows, kColumns, to);
+  }
+}
+
+template <class Model, class T, std::size_t... I>
+bool CallPredict(const Model& model, const T* const* x, T* z, std::index_sequence<I...>) {
+  return model.Predict(x[I]..., z);
+}
+
+/// By way of a buffer, so that a Jacobian that throws leaves `jacobians` untouched.
+template <class Model, std::size_t... I>
+void ClosedForm(const Model& model, const double* const* x, double* const* jacobians,
+                const int* strides, std::index_sequence<I...> indices) {
+  constexpr int m = Model::Measurement::kTangent;
+  double buffer[m * Blocks<Model>::kTangent] = {};
+  MatrixRef j[sizeof...(I)];
+  int used = 0;
+  const auto bind = [&](auto index) {
+    constexpr int i = decltype(index)::value;
+    constexpr int n = SpaceAt<i, Model>::kTangent;
+    j[i] = {buffer + used, n};
+    used += m * n;
+  };
+  ForEach(bind, indices);
+  model.Jacobian(x[I]..., j[I]...);
+  const auto copy = [&](auto index) {
+    constexpr int i = decltype(index)::value;
+    constexpr int n = SpaceAt<i, Model>::kTangent;
+    if (jacobians[i] == nullptr) return;
+    CopyFixed<m, n>(j[i], {jacobians[i], strides[i]});
+  };
+  ForEach(copy, indices);
+}
+
+}  // namespace detail
+
+/// z = h(roles); where `jacobians` is not null, jacobians[i] = d z / d role_i. A null entry, or a
+/// role that is not bound, is skipped.
+template <class Model>
+Status Evaluate(const Model& model, const double* const* roles, double* z, double* const* jacobians,
+                const int* strides) {
+  static_assert(detail::CheckSensorMembers<Model>());
+  using Z = typename Model::Measurement;
+  using Blocks = detail::Blocks<Model>;
+  constexpr typename Blocks::Indices indices{};
+  constexpr bool kClosedForm = detail::HasJacobian<Model, typename Blocks::Indices>::value;
+  if (kClosedForm || jacobians == nullptr) {
+    double value[Z::kAmbient];
+    if (!detail::CallPredict(model, roles, value, indices)) return Status::kOutOfDomain;
+    if constexpr (kClosedForm) {
+      if (jacobians != nullptr) detail::ClosedForm(model, roles, jacobians, strides, indices);
+    }
+    std::copy_n(value, Z::kAmbient, z);
+    return Status::kOk;
+  }
+  if constexpr (!kClosedForm) {
+    using Jet = ceres::Jet<double, Blocks::kTangent>;
+    Jet lifted[Blocks::kAmbient], value[Z::kAmbient];
+    const Jet* x[Blocks::kCount];
+    detail::Lift<Model>(roles, lifted, x);
+    if (!detail::CallPredict(model, x, value, indices)) return Status::kOutOfDomain;
+    for (int i = 0; i < Z::kAmbient; ++i) z[i] = value[i].a;
+    int first = 0;
+    const auto read = [&](auto index) {
+      constexpr int i = decltype(index)::value;
+      constexpr int n = detail::SpaceAt<i, Model>::kTangent;
+      if (jacobians[i] != nullptr) {
+        detail::ReadTangent<Z>(value, first, n, MatrixRef{jacobians[i], strides[i]});
+      }
+      first += n;
+    };
+    detail::ForEach(read, indices);
+  }
+  return Status::kOk;
+}
+
+}  // namespace alidade

@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cmath>
+
+#include "alidade/model/params.h"
+#include "alidade/model/radial_polynomial.h"
+
+/// How cameras map rays to pixels and back. Scalars are templates: double or a dual number, which
+/// then carries derivatives also through what is solved by iteration.
+namespace alidade {
+
+/// Projections. All but the pinhole have radial coefficients k.
+enum class CameraModel { kPinhole, kRadtan, kEquidistant, kPhotogrammetric };
+
+/// A camera: projection, lens distortion and image size.
+///
+///   pixel             u = cx + fx x,  v = cy + fy y          (x, y) by the model from h
+///   pinhole           (x, y) = (hx, hy) / hz =: (x0, y0)
+///   radtan            x = x0 s(q) + 2 p1 x0 y0 + p2 (q + 2 x0^2)
+///                     y = y0 s(q) + p1 (q + 2 y0^2) + 2 p2 x0 y0,     q = x0^2 + y0^2
+///   equidistant       (x, y) = t s(t^2) (hx, hy) / |(hx, hy)|,        t = atan2(|(hx, hy)|, hz)
+///   photogrammetric   (x0, y0) = (x, y) s(x^2 + y^2), solved for (x, y)
+///                     s(q) = 1 + k1 q + k2 q^2 + k3 q^3 + k4 q^4
+///
+///   symbol        shape  unit  frame  meaning
+///   h             3      any   cam    the point, up to a positive factor; x right, y down, z ahead
+///   (u, v)        2      px    -      the centre of the upper left pixel is (0, 0)
+///   fx, fy        1      px    -      focal length; > 0
+///   cx, cy        1      px    -      principal point
+///   k1 to k4      1      -     -      radial: radtan k1 to k3, equidistant k1 to k4,
+///                                     photogrammetric k1, k2
+///   p1, p2        1      -     -      tangential: radtan
+///
+/// radtan and equidistant are those of OpenCV and Kalibr. photogrammetric is the 2-parameter form
+/// of MonoSLAM, whose closed form is the other way round: from the image to the ray. There k1 is
+/// often given per mm^2 of the sensor; times the squared focal length in mm it is the one here (k2:
+/// times its fourth power).
+///
+/// Defined for  hz > 0 (equidistant: h not on the negative z axis), within the radius up to which
+///              the distortion grows, so that the lens maps no two rays to one pixel.
+/// Source       [Brown1971], [Kannala2006]; photogrammetric [Civera2008].
+struct Camera {
+  CameraModel model;
+  int width, height;  ///< px
+  double fx, fy, cx, cy;
+  detail::RadialPolynomial radial;
+  std::array<double, 2> p;
+
+  Camera(int width_px, int height_px, double focal_x, double focal_y, double centre_x,
+         double centre_y, CameraModel type = CameraModel::kPinhole,
+         const std::array<double, 4>& k = {}, const std::array<double, 2>& tangential = {})
+      : model(type),
+        width(width_px),
+        height(height_px),
+        fx(focal_x),
+        fy(focal_y),
+        cx(centre_x),
+        cy(centre_y),
+        radial(k, type == CameraModel::kEquidistant ? kPi * kPi : kWidest),
+        p(tangential) {}
+  explicit Camera(Params& params)
+      : Camera(params, static_cast<CameraModel>(params.Choice(
+                           "camera.model", {"pinhole", "radtan", "equidistant", "photogrammetric"},
+                           "projection and lens distortion", 0))) {}
+
+  /// z = (u, v) of h; false where h is out of the domain.
+  template <class T>
+  bool Project(const T* h, T* z) const {
+    T x[2];
+    if (model == CameraModel::kEquidistant) {
+      if (!FromAngle(h, x)) return false;
+    } else {
+      if (!(h[2] > T(0.0))) return false;
+      const T x0[2] = {h[0] / h[2], h[1] / h[2]};
+      if (!Distort(x0, x)) return false;
+    }
+    z[0] = cx + fx * x[0];
+    z[1] = cy + fy * x[1];
+    return true;
+  }
+  /// h that is seen at z = (u, v), of some positive length; false where there is none.
+  template <class T>
+  bool Unproject(const T* z, T* h) const {
+    const T x[2] = {(z[0] - cx) / fx, (z[1] - cy) / fy};
+    if (model == CameraModel::kEquidistant) return ToAngle(x, h);
+    h[2] = T(1.0);
+    return Undistort(x, h);
+  }
+  /// Whether z = (u, v) lies on the image.
+  bool Contains(const double* z) const {
+    return z[0] >= -0.5 && z[0] <= width - 0.5 && z[1] >= -0.5 && z[1] <= height - 0.5;
+  }
+
+ private:
+  static constexpr double kPi = 3.14159265358979323846;
+  static constexpr double kWidest = 1e4;  ///< of x0^2 + y0^2: 89.4 degrees
+  static constexpr double kSmall = 1e-6;  ///< of a squared angle, below which series are exact
+
+  Camera(Params& params, CameraModel type)
+      : Camera(params.Integer("camera.width", "image width in px", 1, 1 << 20),
+               params.Integer("camera.height", "image height in px", 1, 1 << 20),
+               params.Positive("camera.fx", "px", "focal length, horizontal"),
+               params.Positive("camera.fy", "px", "focal length, vertical"),
+               params.Number("camera.cx", "px", "principal point"),
+               params.Number("camera.cy", "px", "principal point"), type, ReadRadial(params, type),
+               ReadTangential(params, type)) {}
+  static std::array<double, 4> ReadRadial(Params& params, CameraModel type) {
+    std::array<double, 4> k{};
+    if (type == CameraModel::kPinhole) return k;
+    k[0] = params.Number("camera.k1", "", "radial distortion");
+    k[1] = params.Number("camera.k2", "", "radial distortion");
+    if (type == CameraModel::kPhotogrammetric) return k;
+    k[2] = params.Number("camera.k3", "", "radial distortion", {}, 0.0);
+    if (type == CameraModel::kRadtan) return k;
+    k[3] = params.Number("camera.k4", "", "radial distortion", {}, 0.0);
+    return k;
+  }
+  static std::array<double, 2> ReadTangential(Params& params, CameraModel type) {
+    if (type != CameraModel::kRadtan) return {};
+    return {params.Number("camera.p1", "", "tangential distortion"),
+            params.Number("camera.p2", "", "tangential distortion")};
+  }
+
+  template <class T>
+  bool Distort(const T* x0, T* x) const {
+    T factor = T(1.0);
+    if (model == CameraModel::kPhotogrammetric) {
+      T q;
+      if (!radial.Invert(T(x0[0] * x0[0] + x0[1] * x0[1]), &q)) return false;
+      factor = 1.0 / radial.Factor(q);
+    } else if (model == CameraModel::kRadtan) {
+      return DistortRadtan(x0, x);
+    }
+    for (int i = 0; i < 2; ++i) x[i] = factor * x0[i];
+    return true;
+  }
+  template <class T>
+  bool Undistort(const T* x, T* x0) const {
+    if (model == CameraModel::kRadtan) return UndistortRadtan(x, x0);
+    const T q = x[0] * x[0] + x[1] * x[1];
+    const bool lens = model == CameraModel::kPhotogrammetric;
+    if (lens && !(detail::ValueOf(q) <= radial.q_max)) return false;
+    for (int i = 0; i < 2; ++i) x0[i] = lens ? T(x[i] * radial.Factor(q)) : x[i];
+    return true;
+  }
+  template <class T>
+  bool DistortRadtan(const T* x0, T* x) const {
+    const T q = x0[0] * x0[0] + x0[1] * x0[1], xy = x0[0] * x0[1];
+    if (!(detail::ValueOf(q) <= radial.q_max)) return false;
+    const T s = radial.Factor(q);
+    x[0] = x0[0] * s + 2.0 * p[0] * xy + p[1] * (q + 2.0 * x0[0] * x0[0]);
+    x[1] = x0[1] * s + p[0] * (q + 2.0 * x0[1] * x0[1]) + 2.0 * p[1] * xy;
+    return true;
+  }
+  /// Newton from the solution without tangential part, the last step with the derivatives of x.
+  template <class T>
+  bool UndistortRadtan(const T* x, T* x0) const {
+    const double wanted[2] = {detail::ValueOf(x[0]), detail::ValueOf(x[1])};
+    double q, at[2], now[2];
+    if (!radial.Invert(wanted[0] * wanted[0] + wanted[1] * wanted[1], &q)) return false;
+    for (int i = 0; i < 2; ++i) at[i] = wanted[i] / radial.Factor(q);
+    constexpr int kSteps = 20;  // it takes about 5
+    for (int k = 0; k < kSteps; ++k) {
+      if (!DistortRadtan(at, now)) return false;
+      SolveRadtan(at, wanted, now, at);
+    }
+    constexpr double kRounding = 1e-12;
+    if (!DistortRadtan(at, now)) return false;
+    if (!(std::hypot(wanted[0] - now[0], wanted[1] - now[1]) < kRounding)) return false;
+    SolveRadtan(at, x, now, x0);
+    return true;
+  }
+  /// to = at + J^-1 (wanted - now), J the Jacobian of DistortRadtan at `at`.
+  template <class T>
+  void SolveRadtan(const double* at, const T* wanted, const double* now, T* to) const {
+    const double x = at[0], y = at[1], q = x * x + y * y;
+    const double s = radial.Factor(q), ds = radial.FactorSlope(q);
+    const double a = s + 2.0 * x * x * ds + 2.0 * p[0] * y + 6.0 * p[1] * x;
+    const double b = 2.0 * x * y * ds + 2.0 * p[0] * x + 2.0 * p[1] * y;
+    const double d = s + 2.0 * y * y * ds + 6.0 * p[0] * y + 2.0 * p[1] * x;
+    const double determinant = a * d - b * b;
+    const T left[2] = {wanted[0] - now[0], wanted[1] - now[1]};
+    to[0] = x + (d * left[0] - b * left[1]) / determinant;
+    to[1] = y + (a * left[1] - b * left[0]) / determinant;
+  }
+  template <class T>
+  bool FromAngle(const T* h, T* x) const {
+    using std::atan2;
+    using std::sqrt;
+    const T r2 = h[0] * h[0] + h[1] * h[1];
+    T scale;  // t / r
+    if (h[2] > T(0.0) && r2 < kSmall * h[2] * h[2]) {
+      const T tan2 = r2 / (h[2] * h[2]);
+      scale = (1.0 - tan2 * (1.0 / 3.0 - tan2 / 5.0)) / h[2];
+    } else {
+      if (!(r2 > T(0.0))) return false;
+      const T r = sqrt(r2);
+      scale = atan2(r, h[2]) / r;
+    }
+    const T q = scale * scale * r2;
+    if (!(detail::ValueOf(q) <= radial.q_max)) return false;
+    for (int i = 0; i < 2; ++i) x[i] = scale * radial.Factor(q) * h[i];
+    return true;
+  }
+  template <class T>
+  bool ToAngle(const T* x, T* h) const {
+    using std::cos;
+    using std::sin;
+    using std::sqrt;
+    T q;
+    if (!radial.Invert(T(x[0] * x[0] + x[1] * x[1]), &q)) return false;
+    T sine = 1.0 - q / 6.0 * (1.0 - q / 20.0);  // sin t / t
+    h[2] = 1.0 - q / 2.0 * (1.0 - q / 12.0);
+    if (q > T(kSmall)) {
+      const T t = sqrt(q);
+      sine = sin(t) / t;
+      h[2] = cos(t);
+    }
+    for (int i = 0; i < 2; ++i) h[i] = sine / radial.Factor(q) * x[i];
+    return true;
+  }
+};
+
+}  // namespace alidade

@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "alidade/model/plugin_abi.h"
+
+/// Geometries of state blocks, measurements and inputs: how a small vector d is added to a value,
+/// y = x (+) d, and how two values differ, d = y (-) x. For every geometry
+///
+///   (1)  x (+) 0 = x
+///   (2)  (x (+) d) (-) x = d          for small d
+///   (3)  x (+) (y (-) x) = y
+///
+/// Scalars are templates: double, or a dual number in x, d or both.
+namespace alidade {
+
+/// Size known only when the model exists.
+inline constexpr int kDynamic = -1;
+
+/// R^N: y = x + d.
+template <int N>
+struct Vec {
+  static constexpr std::uint32_t kGeometry = ALIDADE_VECTOR;
+  static constexpr int kAmbient = N, kTangent = N;
+  template <class X, class D, class Y>
+  static void Plus(const X* x, const D* d, Y* y, int size = N) {
+    for (int i = 0; i < size; ++i) y[i] = x[i] + d[i];
+  }
+  template <class Y, class X, class D>
+  static void Minus(const Y* y, const X* x, D* d, int size = N) {
+    for (int i = 0; i < size; ++i) d[i] = y[i] - x[i];
+  }
+};
+
+/// SO(2) as one number in (-pi, pi]: y = wrap(x + d).
+struct Angle {
+  static constexpr std::uint32_t kGeometry = ALIDADE_ANGLE;
+  static constexpr int kAmbient = 1, kTangent = 1;
+
+  /// a - 2 pi k, the one in (-pi, pi].
+  template <class T>
+  static T Wrap(const T& a) {
+    constexpr double kPi = 3.14159265358979323846;
+    using std::ceil;
+    const T wrapped = a - 2.0 * kPi * ceil((a - kPi) / (2.0 * kPi));
+    // Rounding may have missed the interval by an ulp.
+    if (wrapped > T(kPi)) return wrapped - 2.0 * kPi;
+    if (wrapped <= T(-kPi)) return wrapped + 2.0 * kPi;
+    return wrapped;
+  }
+  template <class X, class D, class Y>
+  static void Plus(const X* x, const D* d, Y* y, int = 1) {
+    y[0] = Wrap(Y(x[0] + d[0]));
+  }
+  template <class Y, class X, class D>
+  static void Minus(const Y* y, const X* x, D* d, int = 1) {
+    d[0] = Wrap(D(y[0] - x[0]));
+  }
+};
+
+/// S^3, Hamilton, stored w x y z: q (+) d = q Exp(d), Exp(d) = (cos |d|/2, sin(|d|/2) d/|d|).
+/// q and -q are one rotation: (-) takes the shorter way, |d| <= pi.  [Sola2017] ch. 4.
+struct UnitQuaternion {
+  static constexpr std::uint32_t kGeometry = ALIDADE_UNIT_QUATERNION;
+  static constexpr int kAmbient = 4, kTangent = 3;
+
+  /// c = a b
+  template <class A, class B, class C>
+  static void Multiply(const A* a, const B* b, C* c) {
+    c[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3];
+    c[1] = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2];
+    c[2] = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1];
+    c[3] = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];
+  }
+  /// q = Exp(d), d in rad; exact to rounding at d = 0.
+  template <class T>
+  static void Exp(const T* d, T* q) {
+    using std::cos;
+    using std::sin;
+    using std::sqrt;
+    const T angle2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    T s;  // sin(|d|/2) / |d|
+    if (angle2 > T(1e-12)) {
+      const T angle = sqrt(angle2);
+      s = sin(0.5 * angle) / angle;
+      q[0] = cos(0.5 * angle);
+    } else {
+      s = T(0.5) - angle2 / 48.0;
+      q[0] = T(1.0) - angle2 / 8.0;
+    }
+    for (int i = 0; i < 3; ++i) q[i + 1] = s * d[i];
+  }
+  /// d = Log(q), |d| <= pi.
+  template <class T>
+  static void Log(const T* q, T* d) {
+    using std::atan2;
+    using std::sqrt;
+    const double sign = q[0] < T(0.0) ? -1.0 : 1.0;
+    const T s2 = q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+    T k;  // |d| / sin(|d|/2)
+    if (s2 > T(1e-12)) {
+      const T s = sqrt(s2);
+      k = 2.0 * sign * atan2(s, sign * q[0]) / s;
+    } else {
+      k = 2.0 / q[0] - 2.0 * s2 / (3.0 * q[0] * q[0] * q[0]);
+    }
+    for (int i = 0; i < 3; ++i) d[i] = k * q[i + 1];
+  }
+  /// y = R(q) x
+  template <class Q, class X, class Y>
+  static void Rotate(const Q* q, const X* x, Y* y) {
+    // x + 2 q0 (qv x x) + 2 qv x (qv x x)
+    const Y t[3] = {2.0 * (q[2] * x[2] - q[3] * x[1]), 2.0 * (q[3] * x[0] - q[1] * x[2]),
+                    2.0 * (q[1] * x[1] - q[2] * x[0])};
+    y[0] = x[0] + q[0] * t[0] + q[2] * t[2] - q[3] * t[1];
+    y[1] = x[1] + q[0] * t[1] + q[3] * t[0] - q[1] * t[2];
+    y[2] = x[2] + q[0] * t[2] + q[1] * t[1] - q[2] * t[0];
+  }
+  /// y = R(q)' x
+  template <class Q, class X, class Y>
+  static void RotateBack(const Q* q, const X* x, Y* y) {
+    const Q conjugate[4] = {q[0], -q[1], -q[2], -q[3]};
+    Rotate(conjugate, x, y);
+  }
+  template <class X, class D, class Y>
+  static void Plus(const X* x, const D* d, Y* y, int = 4) {
+    D dq[4];
+    Exp(d, dq);
+    Multiply(x, dq, y);
+  }
+  template <class Y, class X, class D>
+  static void Minus(const Y* y, const X* x, D* d, int = 4) {
+    const X conjugate[4] = {x[0], -x[1], -x[2], -x[3]};
+    D q[4];
+    Multiply(conjugate, y, q);
+    Log(q, d);
+  }
+};
+
+/// S^2: y = cos|d| x + sin|d|/|d| B(x) d, with B(x) (3x2) an orthonormal basis of the plane normal
+/// to x. To the antipode of x every way is as short: (-) gives (pi, 0).  Basis: [Duff2017].
+struct UnitVector {
+  static constexpr std::uint32_t kGeometry = ALIDADE_UNIT_VECTOR;
+  static constexpr int kAmbient = 3, kTangent = 2;
+
+  /// b = B(x), row-major 3x2.
+  template <class T>
+  static void Basis(const T* x, T* b) {
+    const double sign = x[2] < T(0.0) ? -1.0 : 1.0;
+    const T a = -1.0 / (sign + x[2]);
+    const T c = x[0] * x[1] * a;
+    b[0] = 1.0 + sign * x[0] * x[0] * a;
+    b[1] = c;
+    b[2] = sign * c;
+    b[3] = sign + x[1] * x[1] * a;
+    b[4] = -sign * x[0];
+    b[5] = -x[1];
+  }
+  template <class X, class D, class Y>
+  static void Plus(const X* x, const D* d, Y* y, int = 3) {
+    using std::cos;
+    using std::sin;
+    using std::sqrt;
+    X b[6];
+    Basis(x, b);
+    const D angle2 = d[0] * d[0] + d[1] * d[1];
+    D s, c;
+    if (angle2 > D(1e-12)) {
+      const D angle = sqrt(angle2);
+      s = sin(angle) / angle;
+      c = cos(angle);
+    } else {
+      s = 1.0 - angle2 / 6.0;
+      c = 1.0 - angle2 / 2.0;
+    }
+    for (int i = 0; i < 3; ++i) y[i] = c * x[i] + s * (b[2 * i] * d[0] + b[2 * i + 1] * d[1]);
+  }
+  template <class Y, class X, class D>
+  static void Minus(const Y* y, const X* x, D* d, int = 3) {
+    using std::atan2;
+    using std::sqrt;
+    X b[6];
+    Basis(x, b);
+    const D c = x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
+    D p[2];
+    for (int j = 0; j < 2; ++j) p[j] = b[j] * y[0] + b[2 + j] * y[1] + b[4 + j] * y[2];
+    const D s2 = p[0] * p[0] + p[1] * p[1];
+    D k;  // angle / sin(angle)
+    if (c > D(0.0) && !(s2 > D(1e-12))) {
+      k = 1.0 + s2 / 6.0;
+    } else if (s2 > D(1e-300)) {  // below, sqrt has lost its digits
+      const D s = sqrt(s2);
+      k = atan2(s, c) / s;
+    } else {
+      d[0] = D(3.14159265358979323846);
+      d[1] = D(0.0);
+      return;
+    }
+    d[0] = k * p[0];
+    d[1] = k * p[1];
+  }
+  /// j (2x2, row-major): parallel transport, J = B(to)' R B(from), where R turns `from` into `to`
+  /// the short way, R v = v - (from + to) (to . v) / (1 + from . to). From a point to its antipode
+  /// every way is as short; the one along the first basis vector is taken.
+  static void Transport(const double* from, const double* to, double* j) {
+    double b_from[6], b_to[6];
+    Basis(from, b_from);
+    Basis(to, b_to);
+    const double c = from[0] * to[0] + from[1] * to[1] + from[2] * to[2];
+    constexpr double kAntipode = 1e-14;
+    for (int column = 0; column < 2; ++column) {
+      double v[3];
+      for (int i = 0; i < 3; ++i) v[i] = b_from[2 * i + column];
+      if (1.0 + c > kAntipode) {
+        const double k = (to[0] * v[0] + to[1] * v[1] + to[2] * v[2]) / (1.0 + c);
+        for (int i = 0; i < 3; ++i) v[i] -= k * (from[i] + to[i]);
+      } else if (column == 0) {
+        for (int i = 0; i < 3; ++i) v[i] = -v[i];
+      }
+      for (int row = 0; row < 2; ++row) {
+        j[2 * row + column] = b_to[row] * v[0] + b_to[2 + row] * v[1] + b_to[4 + row] * v[2];
+      }
+    }
+  }
+};
+
+/// Brings x, off the manifold of G by rounding, back to it: else rounding would add up over many
+/// steps. An angle is wrapped.
+template <class G>
+void Normalise(double* x) {
+  if constexpr (G::kGeometry == ALIDADE_ANGLE) x[0] = G::Wrap(x[0]);
+  if constexpr (G::kAmbient > G::kTangent) {  // of unit length
+    double sum = 0.0;
+    for (int i = 0; i < G::kAmbient; ++i) sum += x[i] * x[i];
+    const double norm = std::sqrt(sum);
+    constexpr double kRounding = 4e-16;
+    if (!(std::abs(norm - 1.0) > kRounding)) return;
+    for (int i = 0; i < G::kAmbient; ++i) x[i] *= 1.0 / norm;
+  }
+}
+
+}  // namespace alidade

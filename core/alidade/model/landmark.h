@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <tuple>
+
+#include "alidade/model/autodiff.h"
+#include "alidade/model/params.h"
+
+/// Forms of a landmark, a point of the world as it is written in the state. Every form says where
+/// the point is as p = a + m / rho, which serves the rest:
+///
+///   (1)  h = R_CW (rho (a - r) + m) = rho p_in_cam      finite at rho = 0, a point infinitely far
+///
+/// with the camera at r, turned by q = world_from_cam. A form has
+///
+///   using Spaces = std::tuple<...>;                      geometries of its blocks
+///   static constexpr std::array kRoles{Quantity{...}};   one for each, ALIDADE_ROLE_LANDMARK
+///   static Ray<T> ToRay(const T* y);                     y: values of the blocks side by side
+///   static bool FromRay(const Ray<T>& ray, T* y);        false: there is no such y
+///
+/// The last element of the tangent of inverse_depth and anchored is rho.
+namespace alidade {
+
+/// p = a + m / rho.
+template <class T>
+struct Ray {
+  T origin[3];     ///< a, m
+  T direction[3];  ///< m
+  T rho;           ///< 1/m where m is of unit length
+};
+
+/// Six numbers, the form of MonoSLAM: where the camera was that saw the point first, azimuth and
+/// elevation of the ray, and the inverse distance along it.
+///
+///   y = (x0, y0, z0, theta, phi, rho),  a = (x0, y0, z0)
+///   m = (cos phi sin theta, -sin phi, cos phi cos theta)
+///
+/// At the poles, where the world's y axis points to, theta is undefined: FromRay is false there.
+/// Source  [MonoSlam2015] sec. 4.3, [Civera2008] sec. II-B.
+struct InverseDepth {
+  using Spaces = std::tuple<Vec<6>>;
+  static constexpr std::array kRoles{
+      Quantity{"landmark", "", "anchor in m, azimuth and elevation in rad, inverse distance in 1/m",
+               "x0,y0,z0,theta,phi,rho", ALIDADE_ROLE_LANDMARK}};
+
+  /// p = a + m / rho of y, and y of it, as above.
+  template <class T>
+  static Ray<T> ToRay(const T* y) {
+    using std::cos;
+    using std::sin;
+    const T cos_phi = cos(y[4]);
+    return {{y[0], y[1], y[2]}, {cos_phi * sin(y[3]), -sin(y[4]), cos_phi * cos(y[3])}, y[5]};
+  }
+  template <class T>
+  static bool FromRay(const Ray<T>& ray, T* y) {
+    using std::atan2;
+    using std::sqrt;
+    const T* m = ray.direction;
+    const T across2 = m[0] * m[0] + m[2] * m[2];
+    constexpr double kPole = 1e-20;
+    if (!(across2 > T(kPole))) return false;
+    std::copy_n(ray.origin, 3, y);
+    y[3] = atan2(m[0], m[2]);
+    y[4] = atan2(T(-m[1]), T(sqrt(across2)));
+    y[5] = ray.rho;
+    return true;
+  }
+};
+
+/// A unit vector and the inverse distance from an anchor, which all landmarks share that were first
+/// seen in one frame. No pole, three degrees of freedom of its own.
+///
+///   y = (a, m, rho)
+///
+/// Source  [Sola2012], anchored points.
+struct Anchored {
+  using Spaces = std::tuple<Vec<3>, UnitVector, Vec<1>>;
+  static constexpr std::array kRoles{
+      Quantity{"anchor", "m", "where the camera was that saw it first", "x,y,z",
+               ALIDADE_ROLE_LANDMARK | ALIDADE_ROLE_SHARED},
+      Quantity{"direction", "", "from the anchor to the landmark, in the world", "x,y,z",
+               ALIDADE_ROLE_LANDMARK},
+      Quantity{"inverse_distance", "1/m", "from the anchor", "", ALIDADE_ROLE_LANDMARK}};
+
+  /// p = a + m / rho of y, and y of it, as above.
+  template <class T>
+  static Ray<T> ToRay(const T* y) {
+    return {{y[0], y[1], y[2]}, {y[3], y[4], y[5]}, y[6]};
+  }
+  template <class T>
+  static bool FromRay(const Ray<T>& ray, T* y) {
+    std::copy_n(ray.origin, 3, y);
+    std::copy_n(ray.direction, 3, y + 3);
+    y[6] = ray.rho;
+    return true;
+  }
+};
+
+/// The point itself, y = p: a ray of length zero, so that (1) is h = R_CW (p - r). FromRay is false
+/// unless rho > 0.
+struct Xyz {
+  using Spaces = std::tuple<Vec<3>>;
+  static constexpr std::array kRoles{
+      Quantity{"landmark", "m", "the point in the world", "x,y,z", ALIDADE_ROLE_LANDMARK}};
+
+  /// p = a + m / rho of y, and y of it, as above.
+  template <class T>
+  static Ray<T> ToRay(const T* y) {
+    return {{y[0], y[1], y[2]}, {T(0.0), T(0.0), T(0.0)}, T(1.0)};
+  }
+  template <class T>
+  static bool FromRay(const Ray<T>& ray, T* y) {
+    if (!(ray.rho > T(0.0))) return false;
+    for (int i = 0; i < 3; ++i) y[i] = ray.origin[i] + ray.direction[i] / ray.rho;
+    return true;
+  }
+};
+
+/// The forms by name, as `landmarks.form` chooses one.
+enum class LandmarkForm { kInverseDepth, kAnchored, kXyz };
+
+/// Names of LandmarkForm, in its order.
+inline constexpr const char* kLandmarkForms[] = {"inverse_depth", "anchored", "xyz"};
+
+/// Reads the parameter `landmarks.form`.
+inline LandmarkForm ReadLandmarkForm(Params& params) {
+  return static_cast<LandmarkForm>(
+      params.Choice("landmarks.form", {kLandmarkForms[0], kLandmarkForms[1], kLandmarkForms[2]},
+                    "how a landmark is written in the state", 0));
+}
+
+/// f(Form{}) of the struct that `form` names.
+template <class F>
+auto WithForm(LandmarkForm form, const F& f) {
+  if (form == LandmarkForm::kAnchored) return f(Anchored{});
+  if (form == LandmarkForm::kXyz) return f(Xyz{});
+  return f(InverseDepth{});
+}
+
+/// h of (1), 3 numbers.
+template <class T>
+void InCamera(const Ray<T>& ray, const T* position, const T* orientation, T* h) {
+  T along[3];
+  for (int i = 0; i < 3; ++i) {
+    along[i] = ray.rho * (ray.origin[i] - position[i]) + ray.direction[i];
+  }
+  UnitQuaternion::RotateBack(orientation, along, h);
+}
+
+/// Inverse observation: y of the point that a camera sees along h (in the camera, of any length) at
+/// the inverse distance rho, 1/m. False where the form has no such y.
+template <class Form, class T>
+bool PlaceLandmark(const T* position, const T* orientation, const T* h, const T& rho, T* y) {
+  using std::sqrt;
+  const T length = sqrt(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]);
+  const T unit[3] = {h[0] / length, h[1] / length, h[2] / length};
+  Ray<T> ray{{position[0], position[1], position[2]}, {}, rho};
+  UnitQuaternion::Rotate(orientation, unit, ray.direction);
+  return Form::FromRay(ray, y);
+}
+
+/// The ray of a landmark whose blocks have these values.
+template <class Form>
+Ray<double> RayOf(const double* const* blocks) {
+  double y[detail::Blocks<Form>::kAmbient];
+  int offset = 0;
+  const auto copy = [&](auto index) {
+    constexpr int i = decltype(index)::value;
+    constexpr int n = detail::SpaceAt<i, Form>::kAmbient;
+    std::copy_n(blocks[i], n, y + offset);
+    offset += n;
+  };
+  detail::ForEach(copy, typename detail::Blocks<Form>::Indices{});
+  return Form::ToRay(y);
+}
+
+/// p = a + m / rho of a landmark, with the Jacobian J_p_y, 3 x tangent of its blocks, where that is
+/// not empty. kOutOfDomain unless rho > 0.
+template <class Form>
+Status ToXyz(const double* const* blocks, double* p, MatrixRef J_p_y = {}) {
+  constexpr int n = detail::Blocks<Form>::kTangent;
+  using Jet = ceres::Jet<double, n>;
+  Jet y[detail::Blocks<Form>::kAmbient], lifted[3];
+  const Jet* pointers[detail::Blocks<Form>::kCount];
+  detail::Lift<Form>(blocks, y, pointers);
+  if (!Xyz::FromRay(Form::ToRay(y), lifted)) return Status::kOutOfDomain;
+  for (int i = 0; i < 3; ++i) p[i] = lifted[i].a;
+  if (J_p_y) detail::ReadTangent<Vec<3>>(lifted, 0, n, J_p_y);
+  return Status::kOk;
+}
+
+/// L_d = 4 sigma_rho |cos alpha| / (rho^2 d1), d1 = |p - r|, alpha the angle between the rays to p
+/// from the anchor and from the camera at r; sigma_rho in 1/m. Small where p is all but Gaussian;
+/// infinite at rho = 0, zero for Xyz.  [Civera2008] sec. III.
+inline double LinearityIndex(const Ray<double>& ray, double sigma_rho, const double* position) {
+  double dot = 0.0, length2 = 0.0;  // with rho (p - r), so that nothing is divided by rho^2
+  for (int i = 0; i < 3; ++i) {
+    const double along = ray.rho * (ray.origin[i] - position[i]) + ray.direction[i];
+    dot += along * ray.direction[i];
+    length2 += along * along;
+  }
+  if (dot == 0.0) return 0.0;
+  if (ray.rho == 0.0) return std::numeric_limits<double>::infinity();
+  return 4.0 * sigma_rho * std::abs(dot) / (std::abs(ray.rho) * length2);
+}
+
+}  // namespace alidade

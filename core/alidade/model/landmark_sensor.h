@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "alidade/model/landmark.h"
+
+namespace alidade {
+namespace detail {
+
+template <class Z, class Spaces>
+struct PoseAnd;
+template <class Z, class... G>
+struct PoseAnd<Z, std::tuple<G...>> {
+  using Type = Sensor<Z, Vec<3>, UnitQuaternion, G...>;
+};
+
+/// The roles of a camera's pose, then those of a landmark.
+template <std::size_t N>
+constexpr std::array<Quantity, N + 2> BehindPose(const std::array<Quantity, N>& landmark) {
+  std::array<Quantity, N + 2> roles{
+      Quantity{"position", "m", "of the camera in the world", "x,y,z"},
+      Quantity{"orientation", "", "world_from_cam", "w,x,y,z"}};
+  for (std::size_t i = 0; i < N; ++i) roles[i + 2] = landmark[i];
+  return roles;
+}
+
+}  // namespace detail
+
+/// Base of a sensor that sees landmarks of the form `Form` from a camera: the roles position and
+/// orientation, then those of the form. All forms look the same to the model, which has
+///
+///   template <class T> bool PredictInCamera(const T* h, const T& rho, T* z) const;
+///   template <class T> void SqrtNoiseInCamera(const T* h, const T& rho, T* L) const;
+///
+/// of the point h / rho in the camera (infinitely far at rho = 0), and Initialise as any sensor.
+/// Where Predict is false the noise is not asked for.
+template <class Model, class Z, class Form>
+struct LandmarkSensor : detail::PoseAnd<Z, typename Form::Spaces>::Type {
+  static constexpr auto kRoles = detail::BehindPose(Form::kRoles);
+  static constexpr int kInitialises = 2;
+
+  /// z of a form of one block.
+  template <class T>
+  bool Predict(const T* position, const T* orientation, const T* y, T* z) const {
+    T h[3];
+    const Ray<T> ray = Form::ToRay(y);
+    InCamera(ray, position, orientation, h);
+    return static_cast<const Model&>(*this).PredictInCamera(h, ray.rho, z);
+  }
+  /// L of a form of one block, m x m row-major.
+  template <class T>
+  void SqrtNoise(const T* position, const T* orientation, const T* y, T* L) const {
+    T h[3];
+    const Ray<T> ray = Form::ToRay(y);
+    InCamera(ray, position, orientation, h);
+    static_cast<const Model&>(*this).SqrtNoiseInCamera(h, ray.rho, L);
+  }
+  /// z of a form of three blocks.
+  template <class T>
+  bool Predict(const T* position, const T* orientation, const T* anchor, const T* direction,
+               const T* inverse_distance, T* z) const {
+    return Predict(position, orientation, Packed<T>(anchor, direction, inverse_distance).y, z);
+  }
+  /// L of a form of three blocks, m x m row-major.
+  template <class T>
+  void SqrtNoise(const T* position, const T* orientation, const T* anchor, const T* direction,
+                 const T* inverse_distance, T* L) const {
+    SqrtNoise(position, orientation, Packed<T>(anchor, direction, inverse_distance).y, L);
+  }
+
+ private:
+  template <class T>
+  struct Packed {
+    T y[7];
+    Packed(const T* anchor, const T* direction, const T* inverse_distance) {
+      std::copy_n(anchor, 3, y);
+      std::copy_n(direction, 3, y + 3);
+      y[6] = inverse_distance[0];
+    }
+  };
+};
+
+}  // namespace alidade

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <type_traits>
+#include <utility>
+
+#include "alidade/model/model.h"
+
+/// Compile errors, in words, for optional members of a model that exist but cannot be called: else
+/// they would be left out without a sign. A final struct is not examined.
+namespace alidade {
+namespace detail {
+
+struct Nothing {};
+
+/// DeclaresNAME<Model>::value: whether the model has a member NAME of any kind. If it has, NAME is
+/// ambiguous in a struct that derives from the model and from another struct with that name.
+#define ALIDADE_DECLARES(NAME)                                                         \
+  struct With##NAME {                                                                  \
+    int NAME;                                                                          \
+  };                                                                                   \
+  template <class Model>                                                               \
+  struct TwiceWith##NAME : std::conditional_t<std::is_final_v<Model>, Nothing, Model>, \
+                           With##NAME {};                                              \
+  template <class Model, class = void>                                                 \
+  struct Declares##NAME : std::true_type {};                                           \
+  template <class Model>                                                               \
+  struct Declares##NAME<Model, std::void_t<decltype(&TwiceWith##NAME<Model>::NAME)>>   \
+      : std::false_type {};
+ALIDADE_DECLARES(Jacobian)
+ALIDADE_DECLARES(Valid)
+ALIDADE_DECLARES(Initialise)
+ALIDADE_DECLARES(StepJacobian)
+ALIDADE_DECLARES(Stationary)
+#undef ALIDADE_DECLARES
+
+template <class Model, class = void>
+struct HasValid : std::false_type {};
+template <class Model>
+struct HasValid<
+    Model, std::enable_if_t<std::is_convertible_v<
+               decltype(std::declval<const Model&>().Valid(std::declval<const double*>())), bool>>>
+    : std::true_type {};
+
+template <class Model, class = void>
+struct HasStationary : std::false_type {};
+template <class Model>
+struct HasStationary<Model, std::enable_if_t<std::is_convertible_v<
+                                decltype(std::declval<const Model&>().Stationary()), bool>>>
+    : std::true_type {};
+
+/// How many roles Initialise does not compute.
+template <class Model>
+constexpr std::size_t OtherCount() {
+  std::size_t count = 0;
+  for (int i = 0; i < Blocks<Model>::kCount; ++i) count += IsInitialised<Model>(i) ? 0u : 1u;
+  return count;
+}
+
+template <class Model, class Others, class = void>
+struct CanInitialise : std::false_type {};
+template <class Model, std::size_t... I>
+struct CanInitialise<
+    Model, std::index_sequence<I...>,
+    std::enable_if_t<(Model::kPrior > 0) &&
+                     std::is_convertible_v<
+                         decltype(std::declval<const Model&>().Initialise(
+                             std::declval<Pointer<double, I>>()..., std::declval<const double*>(),
+                             std::declval<const double*>(), std::declval<double*>())),
+                         bool>>> : std::true_type {};
+template <class Model, std::size_t... I>
+struct CanInitialise<
+    Model, std::index_sequence<I...>,
+    std::enable_if_t<
+        Model::kPrior == 0 &&
+        std::is_convertible_v<decltype(std::declval<const Model&>().Initialise(
+                                  std::declval<Pointer<double, I>>()...,
+                                  std::declval<const double*>(), std::declval<double*>())),
+                              bool>>> : std::true_type {};
+
+/// Always true: the errors are its own.
+template <class Model>
+constexpr bool CheckSensorMembers() {
+  using Indices = typename Blocks<Model>::Indices;
+  using Others = std::make_index_sequence<OtherCount<Model>()>;
+  static_assert(!DeclaresJacobian<Model>::value || HasJacobian<Model, Indices>::value,
+                "Jacobian exists but cannot be called as Jacobian(const double* role..., "
+                "MatrixRef J_z_role...) const: see docs/add_a_sensor.md");
+  static_assert(!DeclaresValid<Model>::value || HasValid<Model>::value,
+                "Valid exists but cannot be called as bool Valid(const double* z) const: see "
+                "docs/add_a_sensor.md");
+  static_assert(!DeclaresInitialise<Model>::value || Model::kInitialises >= 0,
+                "Initialise exists but kInitialises, the index of the role that it computes, does "
+                "not: see docs/add_a_sensor.md");
+  static_assert(Model::kInitialises < 0 || CanInitialise<Model, Others>::value,
+                "kInitialises exists but Initialise cannot be called as bool Initialise(const T* "
+                "other_role..., const T* z, [const T* prior,] T* y) const: see "
+                "docs/add_a_sensor.md");
+  return true;
+}
+
+/// Likewise.
+template <class Model>
+constexpr bool CheckMotionMembers() {
+  using Indices = typename Blocks<Model>::Indices;
+  static_assert(!DeclaresStepJacobian<Model>::value || HasStepJacobian<Model, Indices>::value,
+                "StepJacobian exists but cannot be called as StepJacobian(const double* block..., "
+                "const double* w, double dt_s, MatrixRef F, MatrixRef G) const: see "
+                "alidade/model/model.h");
+  static_assert(!HasStepJacobian<Model, Indices>::value || Model::Input::kAmbient == 0,
+                "StepJacobian takes no control input: a model that has one leaves its Jacobians to "
+                "automatic differentiation");
+  static_assert(!DeclaresStationary<Model>::value || HasStationary<Model>::value,
+                "Stationary exists but cannot be called as bool Stationary() const: see "
+                "alidade/model/model.h");
+  static_assert(
+      Blocks<Model>::kStatic || HasSize<Model>::value,
+      "a block of size kDynamic needs int Size(int block) const: see alidade/model/model.h");
+  return true;
+}
+
+}  // namespace detail
+}  // namespace alidade

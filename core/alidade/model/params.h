@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <initializer_list>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "alidade/model/plugin_abi.h"
+
+namespace alidade {
+
+/// Bounds of a parameter; an open end excludes its value.
+struct Range {
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+  bool low_open = false, high_open = false;
+};
+
+inline constexpr Range kPositive{0.0, std::numeric_limits<double>::infinity(), true, false};
+inline constexpr Range kNonNegative{0.0, std::numeric_limits<double>::infinity(), false, false};
+
+/// The parameters of a model, read from its entry in the config. Reading declares: the key, unit,
+/// range, default and doc of every read make the model's schema (`alidade plugins info`), and keys
+/// that nobody reads are refused. A bad value never stops the constructor: a valid stand-in is
+/// returned and the host refuses the model afterwards, with all its errors at once.
+class Params {
+ public:
+  explicit Params(const AlidadeHost* host) : host_(host) {}
+
+  /// One value of `key`; `fallback` makes it optional. A bad value gives a stand-in within `range`.
+  double Number(const char* key, const char* unit, const char* doc, Range range = {},
+                std::optional<double> fallback = std::nullopt) {
+    double value = fallback.value_or(StandIn(range));
+    Read(ALIDADE_PARAM_NUMBER, key, unit, doc, range, 1, fallback ? &*fallback : nullptr, &value,
+         1);
+    return value;
+  }
+  double Positive(const char* key, const char* unit, const char* doc,
+                  std::optional<double> fallback = std::nullopt) {
+    return Number(key, unit, doc, kPositive, fallback);
+  }
+  double NonNegative(const char* key, const char* unit, const char* doc,
+                     std::optional<double> fallback = std::nullopt) {
+    return Number(key, unit, doc, kNonNegative, fallback);
+  }
+  int Integer(const char* key, const char* doc, int low, int high,
+              std::optional<int> fallback = std::nullopt) {
+    double value = fallback.value_or(low);
+    const double default_value = value;
+    Read(ALIDADE_PARAM_INTEGER, key, "", doc, {double(low), double(high)}, 1,
+         fallback ? &default_value : nullptr, &value, 1);
+    return static_cast<int>(value);
+  }
+  bool Flag(const char* key, const char* doc, std::optional<bool> fallback = std::nullopt) {
+    double value = fallback.value_or(false) ? 1.0 : 0.0;
+    const double default_value = value;
+    Read(ALIDADE_PARAM_FLAG, key, "", doc, {0.0, 1.0}, 1, fallback ? &default_value : nullptr,
+         &value, 1);
+    return value != 0.0;
+  }
+  /// Index of the chosen name in `choices`; `fallback` is an index.
+  int Choice(const char* key, std::initializer_list<const char*> choices, const char* doc,
+             std::optional<int> fallback = std::nullopt) {
+    double value = fallback.value_or(0);
+    const double default_value = value;
+    AlidadeParam param =
+        Describe(ALIDADE_PARAM_CHOICE, key, "", doc, {}, 1, fallback ? &default_value : nullptr);
+    param.choices = choices.begin();
+    param.choice_count = static_cast<std::int32_t>(choices.size());
+    host_->read(host_->context, &param, &value, 1);
+    return static_cast<int>(value);
+  }
+  /// `N` numbers with one unit and range.
+  template <int N>
+  std::array<double, N> Vector(const char* key, const char* unit, const char* doc, Range range = {},
+                               std::optional<std::array<double, N>> fallback = std::nullopt) {
+    std::array<double, N> values;
+    values.fill(StandIn(range));
+    if (fallback) values = *fallback;
+    Read(ALIDADE_PARAM_NUMBER, key, unit, doc, range, N, fallback ? fallback->data() : nullptr,
+         values.data(), N);
+    return values;
+  }
+  /// `N` numbers with one unit and range, or one that goes for all.
+  template <int N>
+  std::array<double, N> PerAxis(const char* key, const char* unit, const char* doc,
+                                Range range = {}) {
+    double values[N + 1];  // one more shows a list that is too long
+    const std::int32_t count =
+        Read(ALIDADE_PARAM_NUMBER, key, unit, doc, range, -1, nullptr, values, N + 1);
+    std::array<double, N> result;
+    result.fill(count >= 1 ? values[0] : StandIn(range));
+    if (count == N) std::copy_n(values, N, result.begin());
+    if (count > 1 && count != N) Fail(key, "needs one number, or one for each axis");
+    return result;
+  }
+  /// Says that parameters, each valid, do not fit together.
+  void Fail(const char* key, const char* text) { host_->fail(host_->context, key, text); }
+
+ private:
+  static double StandIn(const Range& r) {
+    const double inf = std::numeric_limits<double>::infinity();
+    if (r.low > -inf && r.high < inf) return 0.5 * (r.low + r.high);
+    if (r.low > -inf) return r.low + 1.0;
+    return r.high < inf ? r.high - 1.0 : 0.0;
+  }
+  static AlidadeParam Describe(std::uint32_t kind, const char* key, const char* unit,
+                               const char* doc, const Range& range, int count,
+                               const double* fallback) {
+    AlidadeParam param{};
+    param.struct_size = sizeof(AlidadeParam);
+    param.kind = kind;
+    param.key = key;
+    param.unit = unit;
+    param.doc = doc;
+    param.count = count;
+    if (fallback != nullptr) param.flags |= ALIDADE_PARAM_HAS_DEFAULT;
+    if (range.low_open) param.flags |= ALIDADE_PARAM_LOW_OPEN;
+    if (range.high_open) param.flags |= ALIDADE_PARAM_HIGH_OPEN;
+    param.low = range.low;
+    param.high = range.high;
+    param.fallback = fallback;
+    return param;
+  }
+  std::int32_t Read(std::uint32_t kind, const char* key, const char* unit, const char* doc,
+                    const Range& range, int count, const double* fallback, double* values,
+                    int capacity) {
+    const AlidadeParam param = Describe(kind, key, unit, doc, range, count, fallback);
+    return host_->read(host_->context, &param, values, capacity);
+  }
+
+  const AlidadeHost* host_;
+};
+
+}  // namespace alidade

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <exception>
+#include <memory>
+#include <utility>
+
+#include "alidade/model/fingerprint.h"
+#include "alidade/model/plugin_thunks.h"
+
+/// Puts models behind the sealed boundary of plugin_abi.h. In the .cc of a plugin:
+///
+///   ALIDADE_PLUGIN(ALIDADE_SENSOR(Model, "name", "doc", "citation"), ...)
+namespace alidade {
+namespace detail {
+
+/// Hands `holder` over as `instance`.
+template <class Model>
+void Publish(std::unique_ptr<Holder<Model>> holder, std::uint32_t kind, AlidadeInstance* instance) {
+  instance->kind = kind;
+  instance->destroy = [](void* self) { delete static_cast<Holder<Model>*>(self); };
+  instance->error_text = [](const void*) -> const char* { return LastError::Text(); };
+  instance->description = &holder->description;
+  instance->self = holder.release();
+}
+
+template <class Model>
+void PublishSensor(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* instance) {
+  using Z = typename Model::Measurement;
+  constexpr auto roles = Model::kRoles;  // copies, lest they too be shared
+  constexpr Quantity measurement = Model::kMeasurement;
+  holder->DescribeRoles(roles);
+  holder->space = Describe(measurement, Z::kGeometry, Z::kAmbient, Z::kTangent);
+  holder->description.output = &holder->space;
+  holder->description.initialise_role = Model::kInitialises;
+  holder->description.prior_count = Model::kPrior;
+  holder->description.capabilities =
+      (Model::kInitialises >= 0 ? unsigned{ALIDADE_CAN_INITIALISE} : 0u) |
+      (HasValid<Model>::value ? unsigned{ALIDADE_HAS_VALIDITY} : 0u) |
+      (HasJacobian<Model, typename Blocks<Model>::Indices>::value ? unsigned{ALIDADE_CLOSED_FORM}
+                                                                  : 0u);
+  instance->sensor = &SensorCalls<Model>::kCalls;
+  Publish(std::move(holder), ALIDADE_KIND_SENSOR, instance);
+}
+
+template <class Model>
+void PublishMotion(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* instance) {
+  using U = typename Model::Input;
+  constexpr auto blocks = Model::kBlocks;
+  holder->DescribeRoles(blocks);
+  if (U::kAmbient > 0) {
+    constexpr Quantity input = Model::kInput;
+    holder->space = Describe(input, U::kGeometry, U::kAmbient, U::kTangent);
+    holder->description.input = &holder->space;
+  }
+  holder->description.noise_count = NoiseSizeOf(holder->model);
+  if constexpr (HasStepJacobian<Model, typename Blocks<Model>::Indices>::value) {
+    holder->description.capabilities |= ALIDADE_CLOSED_FORM;
+  }
+  if constexpr (HasStationary<Model>::value) {
+    if (holder->model.Stationary()) holder->description.capabilities |= ALIDADE_STATIONARY;
+  }
+  const NoiseKind kind = holder->model.noise_kind();
+  if (kind == NoiseKind::kDiscrete) holder->description.capabilities |= ALIDADE_DISCRETE_NOISE;
+  holder->description.initialise_role = -1;
+  instance->motion = &MotionCalls<Model>::kCalls;
+  Publish(std::move(holder), ALIDADE_KIND_MOTION, instance);
+}
+
+/// Runs f(params) for an entry's `create`; an exception is noted with the host.
+template <class F>
+std::int32_t GuardedCreate(const AlidadeHost* host, const F& f) noexcept {
+  Params params(host);
+#if defined(__cpp_exceptions)
+  try {
+    f(params);
+    return ALIDADE_OK;
+  } catch (const std::exception& e) {
+    params.Fail("", e.what());
+  } catch (...) {
+    params.Fail("", "an exception of unknown type");
+  }
+  return ALIDADE_ERROR;
+#else
+  f(params);
+  return ALIDADE_OK;
+#endif
+}
+
+using Maker = void (*)(Params&, AlidadeInstance*);
+
+template <Maker kMake>
+constexpr AlidadeEntry Entry(std::uint32_t kind, const char* name, const char* doc,
+                             const char* citation) {
+  AlidadeEntry entry{};
+  entry.struct_size = sizeof(AlidadeEntry);
+  entry.kind = kind;
+  entry.family = "";
+  entry.name = name;
+  entry.doc = doc;
+  entry.citation = citation;
+  entry.thread_flags = ALIDADE_THREAD_INSTANCES | ALIDADE_THREAD_CALLS;
+  entry.create = [](const AlidadeHost* host, AlidadeInstance* instance) -> std::int32_t {
+    return GuardedCreate(host, [&](Params& params) { kMake(params, instance); });
+  };
+  return entry;
+}
+
+}  // namespace detail
+
+/// Makes a model from its parameters and hands it over as `instance`.
+template <class Model>
+void EmplaceSensor(Params& params, AlidadeInstance* instance) {
+  detail::PublishSensor(std::make_unique<detail::Holder<Model>>(params), instance);
+}
+template <class Model>
+void EmplaceMotion(Params& params, AlidadeInstance* instance) {
+  detail::PublishMotion(std::make_unique<detail::Holder<Model>>(params), instance);
+}
+
+}  // namespace alidade
+
+/// One model of a plugin. The _BY forms take a function `void (alidade::Params&, AlidadeInstance*)`
+/// that reads a parameter to choose which struct to emplace.
+#define ALIDADE_SENSOR(Model, name, doc, citation) \
+  ALIDADE_SENSOR_BY(alidade::EmplaceSensor<Model>, name, doc, citation)
+#define ALIDADE_MOTION(Model, name, doc, citation) \
+  ALIDADE_MOTION_BY(alidade::EmplaceMotion<Model>, name, doc, citation)
+#define ALIDADE_SENSOR_BY(make, name, doc, citation) \
+  (alidade::detail::Entry<make>(ALIDADE_KIND_SENSOR, name, doc, citation))
+#define ALIDADE_MOTION_BY(make, name, doc, citation) \
+  (alidade::detail::Entry<make>(ALIDADE_KIND_MOTION, name, doc, citation))
+
+/// Exports the models as this plugin's table. Once for each plugin.
+#define ALIDADE_PLUGIN(...)                                                                    \
+  ALIDADE_FINGERPRINT(ALIDADE_TIER_SEALED, "")                                                 \
+  extern "C" __attribute__((visibility("default"))) const AlidadeTable* alidade_plugin(void) { \
+    static const AlidadeEntry entries[] = {__VA_ARGS__};                                       \
+    static const AlidadeTable table = alidade::detail::Table(entries, &alidade_fingerprint);   \
+    return &table;                                                                             \
+  }

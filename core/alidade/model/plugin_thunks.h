@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdio>
+#include <exception>
+
+#include "alidade/model/autodiff_inverse.h"
+#include "alidade/model/autodiff_step.h"
+#include "alidade/model/plugin_abi.h"
+
+/// Calls of plugin_abi.h that lead to a model: noexcept, an exception becomes ALIDADE_ERROR.
+namespace alidade {
+namespace detail {
+
+inline AlidadeSpace Describe(const Quantity& q, std::uint32_t geometry, int ambient, int tangent) {
+  AlidadeSpace space{};
+  space.struct_size = sizeof(AlidadeSpace);
+  space.geometry = geometry;
+  space.ambient = ambient;
+  space.tangent = tangent;
+  space.flags = q.flags;
+  space.name = q.name;
+  space.unit = q.unit;
+  space.elements = q.elements;
+  space.doc = q.doc;
+  return space;
+}
+
+/// A model with its description, as the instance's `self`.
+template <class Model>
+struct Holder {
+  explicit Holder(Params& p) : Holder(Model(p)) {}
+  explicit Holder(Model m) : model(std::move(m)) { description.struct_size = sizeof(description); }
+  Holder(const Holder&) = delete;
+  Holder& operator=(const Holder&) = delete;
+
+  template <class Quantities>
+  void DescribeRoles(const Quantities& quantities) {
+    static_assert(std::tuple_size<Quantities>::value == Blocks<Model>::kCount,
+                  "one Quantity for each role or block");
+    const auto describe = [&](auto index) {
+      constexpr int i = decltype(index)::value;
+      using G = SpaceAt<i, Model>;
+      if constexpr (HasSize<Model>::value) {
+        roles[i] = Describe(quantities[i], G::kGeometry, model.Size(i), model.Size(i));
+      } else {
+        roles[i] = Describe(quantities[i], G::kGeometry, G::kAmbient, G::kTangent);
+      }
+    };
+    ForEach(describe, typename Blocks<Model>::Indices{});
+    description.role_count = Blocks<Model>::kCount;
+    description.role_stride = sizeof(AlidadeSpace);
+    description.roles = roles;
+  }
+
+  Model model;
+  AlidadeDescription description{};
+  AlidadeSpace roles[Blocks<Model>::kCount];
+  AlidadeSpace space;  ///< the measurement, or the control input
+};
+
+/// What the last ALIDADE_ERROR of this thread was about. Hidden: one for each plugin.
+struct __attribute__((visibility("hidden"))) LastError {
+  static char* Text() {
+    static thread_local char text[256] = "";
+    return text;
+  }
+  static void Set(const char* what) { std::snprintf(Text(), 256, "%s", what); }
+};
+
+/// Runs f on the holder behind `self`; an exception becomes ALIDADE_ERROR and its text.
+template <class Model, class F>
+std::int32_t Guarded(const void* self, const F& f) noexcept {
+  const auto* holder = static_cast<const Holder<Model>*>(self);
+#if defined(__cpp_exceptions)
+  try {
+    return f(holder->model);
+  } catch (const std::exception& e) {
+    LastError::Set(e.what());
+  } catch (...) {
+    LastError::Set("an exception of unknown type");
+  }
+  return ALIDADE_ERROR;
+#else
+  return f(holder->model);
+#endif
+}
+
+/// Hidden, as is MotionCalls: were its table exported, two plugins with a struct of one name would
+/// share the table of the first (STB_GNU_UNIQUE), whatever dlopen is told.
+template <class Model>
+struct __attribute__((visibility("hidden"))) SensorCalls {
+  static constexpr bool kInitialises = Model::kInitialises >= 0;
+
+  ALIDADE_FLATTEN ALIDADE_SCALAR_LOOPS static std::int32_t Eval(
+      const void* self, const double* const* roles, double* z, double* const* jacobians,
+      const std::int32_t* strides) noexcept {
+    return Guarded<Model>(self, [&](const Model& model) {
+      return static_cast<std::int32_t>(Evaluate(model, roles, z, jacobians, strides));
+    });
+  }
+  ALIDADE_FLATTEN static std::int32_t SqrtNoise(const void* self, const double* const* roles,
+                                                const double* z, double* l,
+                                                std::int32_t stride) noexcept {
+    return Guarded<Model>(self, [&](const Model& model) {
+      constexpr int m = Model::Measurement::kTangent;
+      double dense[m * m] = {};
+      CallSqrtNoise(model, roles, z, dense, typename Blocks<Model>::Indices{});
+      for (int i = 0; i < m; ++i) std::copy_n(dense + i * m, m, l + i * stride);
+      return std::int32_t{ALIDADE_OK};
+    });
+  }
+  ALIDADE_FLATTEN static std::int32_t Valid(const void* self, const double* z) noexcept {
+    return Guarded<Model>(self, [&](const Model& model) {
+      if constexpr (HasValid<Model>::value) {
+        return std::int32_t{model.Valid(z) ? ALIDADE_OK : ALIDADE_INVALID};
+      } else {
+        static_cast<void>(model);
+        return std::int32_t{ALIDADE_OK};
+      }
+    });
+  }
+  static std::int32_t Initialise(const void* self, const double* const* roles, const double* z,
+                                 const double* prior, double* y, double* const* jx,
+                                 const std::int32_t* jx_strides, double* jz, std::int32_t jz_stride,
+                                 double* jp, std::int32_t jp_stride) noexcept {
+    return Guarded<Model>(self, [&](const Model& model) {
+      if constexpr (kInitialises) {
+        return static_cast<std::int32_t>(InitialiseRole(model, roles, z, prior, y, jx, jx_strides,
+                                                        {jz, jz_stride}, {jp, jp_stride}));
+      } else {
+        return std::int32_t{ALIDADE_ERROR};
+      }
+    });
+  }
+  static constexpr AlidadeSensor kCalls{sizeof(AlidadeSensor),
+                                        0,
+                                        Eval,
+                                        SqrtNoise,
+                                        HasValid<Model>::value ? Valid : nullptr,
+                                        kInitialises ? Initialise : nullptr,
+                                        nullptr,
+                                        {}};
+};
+
+template <class Model>
+struct __attribute__((visibility("hidden"))) MotionCalls {
+  ALIDADE_FLATTEN static std::int32_t Step(const void* self, const double* const* blocks,
+                                           const double* input, const double* w, double dt_s,
+                                           double* const* next, double* f, std::int32_t f_stride,
+                                           double* g, std::int32_t g_stride) noexcept {
+    return Guarded<Model>(self, [&](const Model& model) {
+      return static_cast<std::int32_t>(
+          alidade::Step(model, blocks, input, w, dt_s, next, {f, f_stride}, {g, g_stride}));
+    });
+  }
+  ALIDADE_FLATTEN static std::int32_t SqrtQ(const void* self, const double* const* blocks,
+                                            double dt_s, double* l, std::int32_t stride) noexcept {
+    return Guarded<Model>(self, [&](const Model& model) {
+      constexpr typename Blocks<Model>::Indices indices{};
+      if constexpr (Model::kNoise != kDynamic) {
+        constexpr int n = Model::kNoise;
+        double buffer[n * n + 1] = {};
+        CallSqrtQ(model, blocks, dt_s, {buffer, n}, indices);
+        Copy({buffer, n}, NoiseSizeOf(model), NoiseSizeOf(model), {l, stride});
+      } else {
+        const int n = NoiseSizeOf(model);
+        Zero({l, stride}, n, n);
+        CallSqrtQ(model, blocks, dt_s, {l, stride}, indices);
+      }
+      return std::int32_t{ALIDADE_OK};
+    });
+  }
+  static constexpr AlidadeMotion kCalls{sizeof(AlidadeMotion), 0, Step, SqrtQ, {}};
+};
+
+}  // namespace detail
+}  // namespace alidade

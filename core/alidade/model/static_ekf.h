@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <limits>
+#include <tuple>
+#include <utility>
+
+#include "alidade/model/autodiff_step.h"
+
+/// The models of a filter combined at compile time: no plugins, no config, no allocation, no
+/// exceptions; C++17 and Eigen. For embedded systems, and as a yardstick of the engine.
+namespace alidade {
+
+/// What became of a measurement that a StaticEkf was given.
+enum class StaticOutcome {
+  kAccepted,
+  kGated,
+  kOutOfDomain,  ///< h is not defined at the prediction
+  kInvalid,      ///< beyond the sensor's limits
+  kNotFinite,    ///< S is not positive definite, or something is not finite; nothing has changed
+};
+
+/// Extended Kalman filter over the blocks of `Motions`, numbered in order.
+///
+///   predict    x' = f(x, u, 0, dt),  P' = F P F' + G Q G'
+///   update     S = H P H' + R,  K = P H' S^-1,  x' = x (+) K r,  P' = P - K S K'
+///
+///   symbol     shape                  meaning
+///   x          sum of ambient sizes   state; P, n x n, in its tangent, is its covariance
+///   r          m                      innovation z (-) h(x)
+///   gate       1                      bound on r' S^-1 r; infinity: none
+///
+/// Measurements are used one after the other, each linearised at the state that the one before has
+/// left, as the engine does under `fuse: per_measurement`. As there, P is carried along where the
+/// tangent basis of a unit vector turns with it. Sizes are known at compile time: Constant<1>, not
+/// Constant<>. Control inputs are given to Predict: to hold them is up to the caller. Discrete
+/// noise is held from one accepted measurement (or Set) to the next, as Ekf has it.
+template <class... Motions>
+class StaticEkf {
+ public:
+  using Spaces = decltype(std::tuple_cat(std::declval<typename Motions::Spaces>()...));
+  static constexpr int kBlocks = static_cast<int>(std::tuple_size<Spaces>::value);
+  static constexpr int kAmbient = detail::SpacesOf<Spaces>::kAmbient;
+  static constexpr int kTangent = detail::SpacesOf<Spaces>::kTangent;
+  static_assert(detail::SpacesOf<Spaces>::kStatic, "sizes have to be known at compile time");
+  template <int B>
+  using Space = std::tuple_element_t<static_cast<std::size_t>(B), Spaces>;
+  using Covariance = Eigen::Matrix<double, kTangent, kTangent>;
+
+  explicit StaticEkf(Motions... motions) : motions_(std::move(motions)...) {}
+
+  /// Sets block B to `value` (ambient) with the covariance `p` (tangent), uncorrelated with others.
+  template <int B, class Matrix>
+  void Set(const double* value, const Eigen::MatrixBase<Matrix>& p) {
+    constexpr int o = TangentOffset(B), k = Space<B>::kTangent;
+    std::copy_n(value, Space<B>::kAmbient, x_ + AmbientOffset(B));
+    p_.template middleRows<k>(o).setZero();
+    p_.template middleCols<k>(o).setZero();
+    p_.template block<k, k>(o, o) = p;
+    in_interval_ = false;
+  }
+  /// Sets a scalar block to `value`, standard deviation `sigma`.
+  template <int B>
+  void Set(double value, double sigma) {
+    static_assert(Space<B>::kTangent == 1 && Space<B>::kAmbient == 1, "a scalar block");
+    Set<B>(&value, Eigen::Matrix<double, 1, 1>::Constant(sigma * sigma));
+  }
+
+  /// Ambient values of block B.
+  template <int B>
+  const double* value() const {
+    return x_ + AmbientOffset(B);
+  }
+  /// P, n x n, in the order of the blocks.
+  Covariance covariance() const { return p_.template selfadjointView<Eigen::Lower>(); }
+
+  /// Steps by dt_s seconds with the control inputs `u` (ambient), `const double*` each, of those
+  /// models that take one, in order. Not kOk, and nothing moved, where a model is not defined, and
+  /// kError where x' or P' is not finite.
+  template <class... Inputs>
+  ALIDADE_FLATTEN Status Predict(double dt_s, Inputs... u) {
+    static_assert(sizeof...(Inputs) == InputsBefore(sizeof...(Motions)),
+                  "one control input for each model that takes one");
+    const double* const inputs[] = {u..., nullptr};
+    return PredictAll(dt_s, inputs, std::index_sequence_for<Motions...>{});
+  }
+
+  /// Uses z (ambient), a measurement of `sensor` whose roles are filled by the blocks `Roles`.
+  template <int... Roles, class Model>
+  ALIDADE_FLATTEN StaticOutcome Update(const Model& sensor, const double* z,
+                                       double gate = std::numeric_limits<double>::infinity());
+
+ private:
+  using Indices = std::make_index_sequence<static_cast<std::size_t>(kBlocks)>;
+  static constexpr int AmbientOffset(int block) { return OffsetOf<true>(block, Indices{}); }
+  static constexpr int TangentOffset(int block) { return OffsetOf<false>(block, Indices{}); }
+  template <bool kOfAmbient, std::size_t... I>
+  static constexpr int OffsetOf(int block, std::index_sequence<I...>) {
+    const int sizes[] = {(kOfAmbient ? Space<static_cast<int>(I)>::kAmbient
+                                     : Space<static_cast<int>(I)>::kTangent)...};
+    int offset = 0;
+    for (int i = 0; i < block; ++i) offset += sizes[i];
+    return offset;
+  }
+  /// Number of the first block of motion model M.
+  static constexpr int FirstBlock(std::size_t m) {
+    const int counts[] = {detail::Blocks<Motions>::kCount...};
+    int first = 0;
+    for (std::size_t i = 0; i < m; ++i) first += counts[i];
+    return first;
+  }
+  /// How many of the motion models before M take a control input.
+  static constexpr std::size_t InputsBefore(std::size_t m) {
+    const bool takes[] = {(Motions::Input::kAmbient > 0)...};
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < m; ++i) count += takes[i] ? 1 : 0;
+    return count;
+  }
+  /// What models write, as a matrix. (Eigen wants a single column in column order.)
+  template <int R, int C>
+  using RowMajorMap = Eigen::Map<
+      const Eigen::Matrix<double, R, C, C == 1 && R != 1 ? Eigen::ColMajor : Eigen::RowMajor>>;
+
+  /// Part of a step of n elements: F, and G Q G'.
+  template <int N>
+  struct Transition {
+    Eigen::Matrix<double, N, N> f, q;
+  };
+  template <class Model>
+  using TransitionOf = Transition<detail::Blocks<Model>::kTangent>;
+
+  /// Discrete noise over an interval: Lq of its start, and M = Cov(x, w).
+  template <class Model>
+  struct Held {
+    Eigen::Matrix<double, Model::kNoise, Model::kNoise> l;
+    Eigen::Matrix<double, detail::Blocks<Model>::kTangent, Model::kNoise> m;
+  };
+
+  template <std::size_t... M>
+  Status PredictAll(double dt_s, const double* const* inputs, std::index_sequence<M...>) {
+    double next[kAmbient];
+    std::tuple<TransitionOf<Motions>...> transitions;
+    std::tuple<Held<Motions>...> held;
+    Status status = Status::kOk;
+    const bool all =
+        (((status = StepOne<M>(dt_s, inputs[InputsBefore(M)], next, std::get<M>(transitions),
+                               std::get<M>(held))) == Status::kOk) &&
+         ...);
+    if (!all) return status;
+    const auto step = [&] {
+      std::copy_n(next, kAmbient, x_);
+      const auto normalise = [&](auto index) {
+        constexpr int b = decltype(index)::value;
+        Normalise<Space<b>>(x_ + AmbientOffset(b));
+      };
+      detail::ForEach(normalise, Indices{});
+      (Propagate<TangentOffset(FirstBlock(M))>(std::get<M>(transitions)), ...);
+    };
+    if (!Try(step)) return Status::kError;
+    (Hold<M>(std::get<M>(held)), ...);
+    in_interval_ = true;
+    return Status::kOk;
+  }
+  /// Makes a change of x and P; false, and both as they were, where what it leaves is not finite.
+  template <class Change>
+  bool Try(const Change& change);
+  template <std::size_t M, class NoiseHeld>
+  void Hold(const NoiseHeld& held) {
+    if (std::get<M>(motions_).noise_kind() == NoiseKind::kDiscrete) std::get<M>(held_) = held;
+  }
+  template <std::size_t M, int N, class NoiseHeld>
+  Status StepOne(double dt_s, const double* u,
+                 double* next,  // NOLINT(readability-non-const-parameter): y points into it
+                 Transition<N>& transition, NoiseHeld& held) const {
+    using Model = std::tuple_element_t<M, std::tuple<Motions...>>;
+    constexpr typename detail::Blocks<Model>::Indices indices{};
+    constexpr int n_w = Model::kNoise;
+    const Model& model = std::get<M>(motions_);
+    const double* x[detail::Blocks<Model>::kCount];
+    double* y[detail::Blocks<Model>::kCount];
+    const auto place = [&](auto index) {
+      constexpr int i = decltype(index)::value, o = AmbientOffset(FirstBlock(M) + i);
+      x[i] = x_ + o;
+      y[i] = next + o;
+    };
+    detail::ForEach(place, indices);
+    double f[N * N], g[N * n_w + 1] = {}, l[n_w * n_w + 1] = {};
+    const Status status = Step(model, x, u, nullptr, dt_s, y, {f, N}, {g, n_w});
+    if (status != Status::kOk) return status;
+    const bool discrete = model.noise_kind() == NoiseKind::kDiscrete;
+    const bool goes_on = discrete && in_interval_;
+    if (!goes_on) detail::CallSqrtQ(model, x, dt_s, {l, n_w}, indices);
+    if (goes_on) {
+      held.l = std::get<M>(held_).l;
+    } else {
+      held.l = RowMajorMap<n_w, n_w>(l);
+    }
+    held.m = RowMajorMap<N, n_w>(g).lazyProduct(held.l);
+    transition.f = RowMajorMap<N, N>(f);
+    transition.q = held.m.lazyProduct(held.m.transpose());
+    if (goes_on) {  // A = F M: q += A N' + N A', M' = A + N
+      const Eigen::Matrix<double, N, n_w> moved = transition.f.lazyProduct(std::get<M>(held_).m);
+      const Eigen::Matrix<double, N, N> both = moved.lazyProduct(held.m.transpose());
+      transition.q += both + both.transpose();
+      held.m += moved;
+    }
+    return Status::kOk;
+  }
+
+  /// P(i, j), of which the lower triangle is kept.
+  double& P(int i, int j) { return i >= j ? p_(i, j) : p_(j, i); }
+  /// P of the rows [O, O + N): P_aa <- F P_aa F' + Q, P_ai <- F P_ai.
+  template <int O, int N>
+  void Propagate(const Transition<N>& t);
+  template <int M>
+  StaticOutcome Correct(const Eigen::Matrix<double, kTangent, M>& pht,
+                        const Eigen::Matrix<double, M, M>& s, const Eigen::Matrix<double, M, 1>& r,
+                        double gate);
+  /// x <- x (+) dx, and P turns with the tangent planes of unit vectors
+  void Move(const double* dx) {
+    const auto move = [&](auto index) {
+      constexpr int b = decltype(index)::value, n = Space<b>::kTangent;
+      double moved[Space<b>::kAmbient];
+      Space<b>::Plus(value<b>(), dx + TangentOffset(b), moved);
+      Normalise<Space<b>>(moved);
+      if constexpr (Space<b>::kGeometry == ALIDADE_UNIT_VECTOR) {
+        double j[n * n];
+        Space<b>::Transport(value<b>(), moved, j);
+        const Transition<n> turn{RowMajorMap<n, n>(j), Eigen::Matrix<double, n, n>::Zero()};
+        Propagate<TangentOffset(b)>(turn);
+      }
+      std::copy_n(moved, Space<b>::kAmbient, x_ + AmbientOffset(b));
+    };
+    detail::ForEach(move, Indices{});
+  }
+
+  std::tuple<Motions...> motions_;
+  double x_[kAmbient] = {};
+  Covariance p_ = Covariance::Zero();
+  std::tuple<Held<Motions>...> held_;  ///< of discrete noise, while an interval goes on
+  bool in_interval_ = false;           ///< P has been stepped since anything else changed it
+};
+
+}  // namespace alidade
+
+#include "alidade/model/static_ekf_arithmetic.h"

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "alidade/config/config.h"
+#include "alidade/filter/estimator.h"
+#include "alidade/host/plugin_host.h"
+#include "alidade/system/system.h"
+
+namespace alidade {
+
+/// What Estimator::diverged() does to the run. The event `inconsistent` of the metrics, which takes
+/// truth, never ends one.
+enum class OnDivergence { kReport, kFail };
+
+/// One estimator of a run, on its own system (the config with the estimator's overrides merged in).
+struct NamedEstimator {
+  std::string name;
+  std::string type;
+  EstimatorKind kind = EstimatorKind::kFilter;
+  System system;
+  std::unique_ptr<Estimator> estimator;
+  OnDivergence on_divergence = OnDivergence::kReport;
+  std::string overrides;  ///< of its entry, as YAML; "": none
+  /// Index of an estimator before it, not an offline one: it sees the measurements alone that this
+  /// one accepted or took as first values. -1: it sees all.
+  int accepted_by = -1;
+};
+
+/// A share of the stamps over which metrics are taken apart: those with (or without) a valid
+/// measurement of a sensor.
+struct Segment {
+  std::string name;
+  int stream = -1;
+  bool with = true;    ///< stamps with one, or stamps without
+  SensorModel sensor;  ///< decides validity
+};
+
+/// What is done with a frame whose stamp is before that of a frame that came earlier.
+enum class TimeOrder {
+  kReject,  ///< estimators are given it as it comes, and count its measurements as stale
+  kSort,    ///< frames are held back while one before them can still come
+  kRewind,  ///< as kSort, but estimators take frames as they come, and go back for a late one
+};
+
+/// How a run takes frames that are not in the order of their stamps. But under kReject, frames of
+/// equal stamps are merged.
+struct TimePolicy {
+  TimeOrder order = TimeOrder::kReject;
+  /// A frame farther behind the newest is dropped, with the event `late`; none: no frame is.
+  std::optional<Stamp> window;
+  std::vector<int> ranks;  ///< of the streams, among the measurements of merged frames
+};
+
+/// All that a config describes, made and checked, ready to run.
+struct Experiment {
+  std::unique_ptr<Source> source;
+  std::vector<NamedEstimator> estimators;
+  std::vector<Segment> segments;
+  std::uint64_t seed = 1;
+  TimePolicy time;
+  int reference = -1;  ///< index of the estimator that metrics compare with; -1: truth
+  std::vector<double> truth_sigmas;  ///< StreamInfo::sigma of the source's truths; empty: its own
+  /// Files, without folder, of the plugins in use that were built without optimisation.
+  std::set<std::string> unoptimised;
+};
+
+/// The files and folders that a config's `plugins:` names, relative ones taken from its folder.
+std::vector<std::filesystem::path> PluginPaths(const Config& config);
+
+/// Makes everything a config names. Errors: kBadConfig, kPlugin, kInputMissing, ...
+Experiment BuildExperiment(const Config& config, const PluginHost& host);
+
+}  // namespace alidade

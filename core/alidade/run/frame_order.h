@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <deque>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "alidade/run/run.h"
+
+namespace alidade::internal {
+
+/// What an estimator made of a frame that may have to be taken again.
+struct Processed {
+  std::unique_ptr<Estimator::Snapshot> after;
+  UpdateReport report;
+  bool failed = false;
+  bool diverged = false;
+};
+
+/// The frames of an experiment's source in the order of its TimePolicy. Under kRewind it also
+/// steers the estimators: they take each frame as it comes, and what came after a late one again.
+class FrameOrder {
+ public:
+  using Check = std::function<void(Frame&)>;
+
+  /// `check` takes each frame first; it throws for one that the estimators must not see.
+  FrameOrder(Experiment& experiment, Check check);
+
+  /// The next frame that no other can come before; false at the end. An error of the source, of
+  /// `check` or of an estimator is thrown once the frames held back are out. Errors: kBadData where
+  /// a stream, or another value of a truth, comes twice at one stamp.
+  bool Next(Frame& frame);
+  /// What the estimator made of the frame that Next gave; null: it has not been given the frame.
+  const Processed* processed(std::size_t estimator) const;
+  const Arrivals& arrivals() const { return arrivals_; }
+  /// `late` of each frame dropped since the last call.
+  std::vector<Event> TakeEvents() { return std::exchange(events_, {}); }
+
+ private:
+  struct Held {
+    Frame frame;
+    std::vector<Place> places;         ///< of the measurements
+    std::vector<Processed> processed;  ///< by estimator; empty but under kRewind
+  };
+
+  bool Accept(const Frame& frame);
+  void Receive();
+  std::size_t Insert(Held&& received);
+  void CheckMerge(const Held& held, const Frame& part) const;
+  void Merge(Held& held, Held&& received) const;
+  void Replay(std::size_t from, bool is_newest);
+  Frame Accepted(const Held& held, int by) const;
+  Processed Process(Estimator& estimator, const Frame& frame) const;
+  bool IsTooLate(Stamp stamp) const;
+  std::string Names(const Frame& frame) const;
+
+  Experiment& experiment_;
+  Check check_;
+  std::deque<Held> held_;  ///< by stamp
+  Held released_;          ///< the one that Next gave last, or what was before the first
+  Stamp newest_ = kNoStamp;
+  bool ended_ = false;
+  std::exception_ptr failure_;
+  Arrivals arrivals_;
+  std::vector<Event> events_;
+};
+
+}  // namespace alidade::internal

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "alidade/base/text_table.h"
+#include "alidade/run/run.h"
+
+namespace alidade::internal {
+
+/// Keys of all metrics of all estimators, the ones a person wants first: rmse, rmse over segments,
+/// lag, coverage, NEES, NIS, then what else there is.
+std::vector<std::string> OrderedMetrics(const RunResult& result);
+/// Keys of all counts, those accepted first.
+std::vector<std::string> OrderedCounts(const RunResult& result);
+
+/// The main metrics and all counts.
+std::vector<TableRow> MetricRows(const RunResult& result);
+/// These, whether it diverged and whether its errors were inconsistent.
+std::vector<TableRow> ComparisonRows(const RunResult& result);
+/// Metrics whose keys begin alike, `rmse` of `rmse:target.depth`, and what a row calls them.
+struct RowKind {
+  std::string kind, label;
+};
+/// The metrics of these kinds, in their order, over whole runs.
+std::vector<TableRow> RowsOf(const RunResult& result, const std::vector<RowKind>& kinds);
+/// What the metrics compare with, in words; "" where that is truth.
+std::string ReferenceText(const RunResult& result);
+
+}  // namespace alidade::internal

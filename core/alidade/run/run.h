@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "alidade/run/experiment.h"
+#include "alidade/run/run_observer.h"
+
+namespace alidade {
+
+/// How the frames of a run came.
+struct Arrivals {
+  std::int64_t late = 0;     ///< before one that came earlier
+  std::int64_t merged = 0;   ///< into another of the same stamp
+  std::int64_t dropped = 0;  ///< of the late ones: beyond the window
+  Stamp longest_lag = 0;     ///< of a late one behind the newest, ns
+};
+
+enum class RunStatus { kOk, kStopped, kFailed };
+/// `ok`, `stopped`, `failed`, as in run.json.
+const char* ToString(RunStatus status);
+
+/// What became of one estimator.
+struct EstimatorResult {
+  std::string name;
+  std::map<std::string, double> metrics;       ///< as in docs/run_folder.md
+  std::map<std::string, std::int64_t> counts;  ///< `accepted:stereo`
+  std::map<std::string, std::string> units;    ///< of blocks, {"target.depth", "m"}; may lack some
+  bool diverged = false;                       ///< the estimator said so
+  bool inconsistent = false;                   ///< its error was; the event of that name
+  bool failed = false;                         ///< it diverged, or had nothing to go on with
+  std::vector<Event> events;
+  std::vector<std::vector<std::string>> unobservable;
+  /// The map at the end, for `landmarks.csv`; none where the estimator has no landmarks at all.
+  std::optional<std::vector<LandmarkEstimate>> landmarks;
+  /// Time of the wall clock that its frames and smoothing took; not under kRewind.
+  double wall_s = 0.0;
+};
+
+struct RunResult {
+  RunStatus status = RunStatus::kOk;
+  ExitCode code = ExitCode::kOk;
+  std::string reason;
+  std::int64_t frames = 0;
+  Arrivals arrivals;
+  /// Quaternions and directions of a stream or truth that were brought to unit length.
+  std::map<std::string, std::int64_t> normalised;
+  std::string reference = "truth";  ///< what metrics compare with: truth, or an estimator's name
+  std::string withheld;             ///< why there is no comparison with that estimator, or ""
+  std::vector<EstimatorResult> estimators;
+  std::set<std::string> unoptimised;  ///< as of the experiment
+};
+
+struct RunOptions {
+  std::vector<RunObserver*> observers;  ///< given all that happens, in this order
+  std::function<void(std::int64_t, std::int64_t)> progress;  ///< frames done, frames in all or -1
+  std::function<bool()> stop;                                ///< true: finish the frame and stop
+};
+
+/// Runs all estimators over the source, frame by frame, so that all see the same data. Data errors
+/// and divergence under `fail` end the run early; an estimator that has nothing left to go on with
+/// ends by itself; a frame that is not as the source's streams() and truths() say ends the run, as
+/// does a quaternion or direction that is not of unit length to 1e-3. All that, and whatever else
+/// goes wrong, is in the result; nothing is thrown.
+RunResult Run(Experiment& experiment, const RunOptions& options);
+
+/// What plugins built without optimisation mean for the wall clock; "" where there are none.
+std::string UnoptimisedText(const std::set<std::string>& plugins);
+
+/// A table of the estimators' main metrics, one column each, for a terminal; below it what they
+/// compare with, where that is not truth.
+std::string ComparisonTable(const RunResult& result);
+
+}  // namespace alidade

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "alidade/base/eigen_alignment.h"
+#include "alidade/state/covariance.h"
+#include "alidade/state/manifold.h"
+
+namespace alidade {
+
+/// Index of a block in its layout; stays valid while other blocks come and go.
+using BlockId = int;
+
+/// What the estimator does with a block: correct it; keep it and its correlations, never correct it
+/// (Schmidt); take it as known.
+enum class BlockStatus { kEstimated, kConsidered, kFixed };
+
+/// One named part of the state.
+struct Block {
+  std::string name;   ///< `owner.block`, as in `target.depth`
+  std::string owner;  ///< the entry of the config that brought it
+  Space space;
+  BlockStatus status = BlockStatus::kEstimated;
+  bool present = false;     ///< has a value; else declared only, waiting to be initialised
+  int value_offset = -1;    ///< into StateValue, where present or reserved
+  int tangent_offset = -1;  ///< into Covariance, where present or reserved, and not fixed
+
+  const Geometry& geometry() const { return space.geometry; }
+  bool has_covariance() const { return present && status != BlockStatus::kFixed; }
+};
+
+/// Names, geometries and places of the blocks; knows no values.
+class StateLayout {
+ public:
+  /// Adds a block without a value; ContractViolation where the name is taken.
+  BlockId Declare(std::string name, std::string owner, Space space,
+                  BlockStatus status = BlockStatus::kEstimated);
+  const std::vector<Block>& blocks() const { return blocks_; }
+  const Block& operator[](BlockId id) const { return blocks_[static_cast<std::size_t>(id)]; }
+  /// -1 where there is none.
+  BlockId Find(std::string_view name) const;
+
+ private:
+  friend class State;
+  std::vector<Block> blocks_;
+  std::vector<BlockId> dropped_;  ///< their places wait for the next block
+};
+
+/// Layout, values and covariance of the blocks, kept consistent. Copying it is a snapshot.
+///
+/// x is one buffer of ambient values, P the covariance in the tangent. Adding or removing
+/// a block moves O(n) numbers: a removed block leaves a gap that the last block fills where it is
+/// no larger, or that a later one takes. A block that has a value takes another one in place.
+class State {
+ public:
+  State() = default;
+  explicit State(StateLayout layout) : layout_(std::move(layout)) {}
+
+  const StateLayout& layout() const { return layout_; }
+  const Covariance& covariance() const { return covariance_; }
+  Covariance& covariance() { return covariance_; }
+
+  /// The ambient value of a present block; valid until a block is added or values() is replaced.
+  const double* value(BlockId id) const { return values_.data() + layout_[id].value_offset; }
+  double* value(BlockId id) { return values_.data() + layout_[id].value_offset; }
+  const std::vector<double>& values() const { return values_; }
+  std::vector<double>& values() { return values_; }
+
+  /// Declares a block and its place for a dynamic state (a landmark, a clone).
+  BlockId Declare(std::string name, std::string owner, Space space,
+                  BlockStatus status = BlockStatus::kEstimated);
+  /// Gives a declared block the place that its value will have, and rows of zeros.
+  void Reserve(BlockId id);
+  /// Gives a declared block a value and a covariance (tangent, row-major; ignored where fixed),
+  /// uncorrelated with the rest.
+  void Add(BlockId id, const double* value, const Eigen::MatrixXd& covariance);
+  /// Gives a declared block the value y = g(x, n), with dy = J_y_x dx + J_y_n dn: its covariance is
+  /// J_y_x P J_y_x' + own, its correlation J_y_x P. `from` names the blocks of x, `jacobians` dy/d
+  /// block; `own` = J_y_n R J_y_n'.
+  void Initialise(BlockId id, const double* value, const std::vector<BlockId>& from,
+                  const std::vector<Eigen::MatrixXd>& jacobians, const Eigen::MatrixXd& own);
+  /// The same of several blocks at once, correlated through n: the values, and the rows of
+  /// `jacobians` and `own`, one block after the other.
+  void Initialise(const std::vector<BlockId>& ids, const double* values,
+                  const std::vector<BlockId>& from, const std::vector<Eigen::MatrixXd>& jacobians,
+                  const Eigen::MatrixXd& own);
+  /// Declares `name` as a copy of `source`, fully correlated with it.
+  BlockId Clone(BlockId source, std::string name);
+  /// Drops the block; the rest keeps its value and covariance.
+  void Marginalise(BlockId id);
+  /// Marginalise, and gives the id back too: a block declared later may have it.
+  void Drop(BlockId id);
+  /// Estimated <-> considered; the correlations stay.
+  void Consider(BlockId id, bool considered);
+  /// Replaces the block by y = g(x_id) of another geometry, J = dy/dx in the tangents.
+  void Reparametrise(BlockId id, Space space, const double* value, const Eigen::MatrixXd& jacobian);
+  /// moved = the values x_i (+) dx_i of all blocks with a covariance, the rest as it is; dx is
+  /// indexed like the covariance. Changes nothing: see MoveTo.
+  void Retract(const double* dx, std::vector<double>& moved) const;
+  /// Takes the values over, transporting P where the tangent basis of a block turns with its value.
+  /// They stay where they are in memory.
+  void MoveTo(const std::vector<double>& values);
+
+ private:
+  void PlaceValue(BlockId id, const double* value);
+  void Release(BlockId id);
+  void FillGaps();
+
+  StateLayout layout_;
+  std::vector<double> values_;
+  std::vector<std::pair<int, int>> value_gaps_;  ///< (offset, size)
+  Covariance covariance_;
+};
+
+}  // namespace alidade

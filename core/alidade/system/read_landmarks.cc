@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/system/read_landmarks.h"
+
+#include <algorithm>
+#include <functional>
+
+#include "alidade/system/landmark_forms.h"
+
+namespace alidade {
+namespace {
+
+std::vector<Space> LandmarkRoles(const SensorBinding& sensor) {
+  std::vector<Space> roles;
+  for (const Space& role : sensor.model.roles()) {
+    if (role.landmark()) roles.push_back(role);
+  }
+  return roles;
+}
+
+std::string FormText(const SensorBinding& sensor) {
+  const auto form = FormOf(sensor.model.roles());
+  return form ? ToString(*form) : "a form of its own";
+}
+
+/// Refuses a sensor that cannot share landmarks with `first`, or whose roles are not in order.
+void CheckRoles(const Node& model, const SensorBinding& sensor, const SensorBinding& first) {
+  const auto is_landmark = [](const Space& role) { return role.landmark(); };
+  if (!std::ranges::is_partitioned(sensor.model.roles(), std::not_fn(is_landmark))) {
+    model.Fail("model '" + sensor.model.name() + "' has roles behind those of its landmark",
+               "a model whose landmark comes last");
+  }
+  if (sensor.model.prior_size() > 1) {
+    model.Fail("model '" + sensor.model.name() + "' needs a prior of " +
+                   std::to_string(sensor.model.prior_size()) + " numbers",
+               "a model that needs one, the inverse distance, or none");
+  }
+  const auto same = [](const Space& a, const Space& b) {
+    return a.name == b.name && a.geometry == b.geometry;
+  };
+  if (!std::ranges::equal(LandmarkRoles(sensor), LandmarkRoles(first), same)) {
+    model.Fail("model '" + sensor.model.name() + "' writes landmarks otherwise than sensor '" +
+                   first.name + "', as " + FormText(sensor),
+               "the same form, " + FormText(first));
+  }
+}
+
+/// Refuses a sensor that does not say where it is seen from, which `key` needs to know.
+void CheckPosition(const Node& key, const SensorBinding& sensor) {
+  if (std::ranges::find(sensor.model.roles(), "position", &Space::name) !=
+      sensor.model.roles().end()) {
+    return;
+  }
+  key.Fail("model '" + sensor.model.name() + "' of sensor '" + sensor.name +
+               "' has no role 'position', the place that landmarks are seen from",
+           "the key left out");
+}
+
+/// Refuses what one sensor cannot do that `options` ask for.
+void CheckOptions(const Node& node, const LandmarkOptions& options, const SensorBinding& sensor) {
+  const auto form = FormOf(sensor.model.roles());
+  const std::string model = "model '" + sensor.model.name() + "' of sensor '" + sensor.name + "'";
+  if (sensor.model.prior_size() > 0 && !options.prior) {
+    node.Fail("no prior: " + model + " does not tell the distance of a landmark",
+              "prior: {inverse_distance: ..., sigma: ...}");
+  }
+  if (options.prior) {
+    const Node prior = node.At("prior");
+    if (form == internal::XyzForm() && sensor.model.prior_size() > 0 &&
+        !(options.prior->inverse_distance > 0.0)) {
+      prior.At("inverse_distance").Fail("a landmark at infinity is no xyz", "above 0, 1/m");
+    }
+    if (options.prior->from_map > 0) CheckPosition(prior.At("from_map"), sensor);
+  }
+  const bool has_xyz = form == internal::XyzForm() || sensor.xyz.has_value();
+  if (!options.known.empty() && !has_xyz) {
+    node.At("known").Fail(model + " has no landmarks of the form xyz", "no known landmarks");
+  }
+  if (!(options.to_xyz > 0.0)) return;
+  if (form == internal::XyzForm()) {
+    node.At("to_xyz").Fail("landmarks are xyz already", "form: inverse_depth, or the key left out");
+  }
+  if (!has_xyz) node.At("to_xyz").Fail(model + " has no form xyz", "the key left out");
+  CheckPosition(node.At("to_xyz"), sensor);
+}
+
+}  // namespace
+
+void internal::ReadLandmarkKeys(const Node& entry, const PluginHost& host, SensorBinding& binding) {
+  const Node role = entry.At("roles").At("landmark", "sensor '" + binding.name + "'");
+  if (role.is_map() || role.Text() != "landmarks") {
+    role.Fail("not the landmarks", "`landmarks`: the one that a measurement names");
+  }
+  if (const auto node = entry.Find("association")) {
+    binding.association = OnePointRansac::FromNode(*node);
+  }
+  const auto form = FormOf(binding.model.roles());
+  if (!form || IsXyz(*form)) return;
+  SensorModel xyz = host.CreateSensor(binding.model.name(), entry, ToString(internal::XyzForm()));
+  if (FormOf(xyz.roles()) == internal::XyzForm()) binding.xyz = std::move(xyz);
+}
+
+std::optional<LandmarkOptions> internal::ReadLandmarks(const Node& root,
+                                                       const std::vector<SensorBinding>& sensors) {
+  const auto sees = [](const SensorBinding& sensor) { return sensor.model.has_landmark(); };
+  const auto first = std::ranges::find_if(sensors, sees);
+  if (first == sensors.end()) {
+    if (const auto node = root.Find("landmarks")) {
+      node->Fail("no sensor measures landmarks", "a sensor with a landmark, or the key left out");
+    }
+    return std::nullopt;
+  }
+  const Node node = root.At("landmarks", "sensor '" + first->name + "'");
+  LandmarkOptions options = LandmarkOptions::FromNode(node);
+  bool can_begin = !options.known.empty();
+  for (const SensorBinding& sensor : sensors) {
+    if (!sees(sensor)) continue;
+    const Node model = root.At("sensors").At(sensor.name).At("model");
+    CheckRoles(model, sensor, *first);
+    CheckOptions(node, options, sensor);
+    const int role = sensor.model.initialised_role();
+    can_begin =
+        can_begin || (role >= 0 && sensor.model.roles()[static_cast<std::size_t>(role)].landmark());
+  }
+  if (!can_begin) {
+    node.Fail("no sensor tells where a landmark is when it is first seen", "known landmarks");
+  }
+  node.RejectUnread();
+  return options;
+}
+
+}  // namespace alidade

@@ -1,0 +1,424 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/system/system.h"
+
+#include <algorithm>
+#include <functional>
+#include <limits>
+
+#include "alidade/base/words.h"
+#include "alidade/config/tree.h"
+#include "alidade/state/quaternion_sign.h"
+#include "alidade/system/read_landmarks.h"
+
+namespace alidade {
+namespace {
+
+using internal::NamesOf;
+
+constexpr double kQuaternionTolerance = 1e-3;
+
+/// The value of a block: a number, a list, or {w, x, y, z} for a unit quaternion.
+std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
+  std::vector<double> mean;
+  if (geometry.kind == GeometryKind::kUnitQuaternion) {
+    for (const char* part : {"w", "x", "y", "z"}) mean.push_back(node.At(part).Number());
+    node.RejectUnread();
+  } else {
+    mean = node.Numbers(geometry.ambient);
+  }
+  if (geometry.Defect(mean.data()) > kQuaternionTolerance) {
+    node.Fail("not of unit length", "a unit vector or quaternion to 1e-3");
+  }
+  geometry.Normalise(mean.data());
+  if (geometry.kind == GeometryKind::kUnitQuaternion) internal::ChooseSign({}, mean);
+  return mean;
+}
+
+/// Exactly one of sigma, variance, covariance.
+Eigen::MatrixXd ReadCovariance(const Node& node, int size) {
+  const auto sigma = node.Find("sigma"), variance = node.Find("variance"),
+             covariance = node.Find("covariance");
+  if (int{sigma.has_value()} + int{variance.has_value()} + int{covariance.has_value()} != 1) {
+    node.Fail("needs its uncertainty once", "one of sigma, variance, covariance");
+  }
+  if (covariance) {
+    const std::vector<double> values = covariance->Covariance(size);
+    return Eigen::Map<const Eigen::MatrixXd>(values.data(), size, size);
+  }
+  const Node& spread = sigma ? *sigma : *variance;
+  std::vector<double> values = spread.Numbers();
+  if (values.size() == 1) values.assign(static_cast<std::size_t>(size), values[0]);
+  if (values.size() != static_cast<std::size_t>(size)) {
+    spread.Fail(std::to_string(values.size()) + " numbers", std::to_string(size) + ", or one");
+  }
+  Eigen::VectorXd diagonal = Eigen::Map<const Eigen::VectorXd>(values.data(), size);
+  if (diagonal.minCoeff() < 0.0) spread.Fail("negative", ">= 0");
+  if (sigma) diagonal = diagonal.cwiseAbs2();
+  return diagonal.asDiagonal();
+}
+
+/// Blocks of the entry that a list such as `consider: [depth]` names.
+std::vector<std::string> ReadNames(const Node& entry, const char* key,
+                                   const std::vector<std::string>& accepted) {
+  std::vector<std::string> names;
+  const auto list = entry.Find(key);
+  if (!list) return names;
+  for (const Node& item : list->Items()) {
+    const std::string name = item.Text();
+    if (std::find(accepted.begin(), accepted.end(), name) == accepted.end()) {
+      item.Fail("no block '" + name + "' in this entry", {}, Nearest(name, accepted));
+    }
+    names.push_back(name);
+  }
+  return names;
+}
+
+bool Contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+/// Names of the blocks as the entry renames them, in the order of the model.
+std::vector<std::string> ReadBlockNames(const Node& entry, const MotionModel& model) {
+  std::vector<std::string> names = NamesOf(model.blocks());
+  const auto renamed = entry.Find("blocks");
+  for (std::string& name : names) {
+    const auto given = renamed ? renamed->Find(name) : std::nullopt;
+    if (given) name = given->Text();
+    internal::ExpectName(name, given.value_or(entry), "a block");
+  }
+  if (!renamed) return names;
+  renamed->RejectUnread();
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (std::count(names.begin(), names.end(), names[i]) > 1) {
+      renamed->Fail("two blocks are called '" + names[i] + "'", "a name of its own for each block");
+    }
+  }
+  return names;
+}
+
+void ReadPrior(const Node& initial, const Block& block, BlockId id, System& system) {
+  Prior prior;
+  prior.block = id;
+  if (const auto from = initial.Find("from")) {
+    prior.from = from->Text();
+  } else {
+    prior.mean = ReadMean(initial.At("mean", "the initial value"), block.geometry());
+    if (block.status != BlockStatus::kFixed) {
+      prior.covariance = ReadCovariance(initial, block.geometry().tangent);
+    } else {
+      for (const char* key : {"sigma", "variance", "covariance"}) initial.Declare(key);
+    }
+  }
+  initial.RejectUnread();
+  system.priors.push_back(std::move(prior));
+}
+
+/// `input: {stream: NAME, max_age_s: S}` of a model that takes a control input.
+InputBinding ReadInput(const Node& entry, const MotionModel& model) {
+  constexpr double kMostSeconds = 1e9;
+  InputBinding binding;
+  if (!model.has_input()) {
+    if (const auto input = entry.Find("input")) {
+      input->Fail("model '" + model.name() + "' takes no control input", "the key left out");
+    }
+    return binding;
+  }
+  const std::string needed_by =
+      "the control input " + model.input().name + " of model " + model.name();
+  const Node input = entry.At("input", needed_by);
+  if (!input.is_map()) input.Fail("not a map", "{stream: NAME}, or {stream: NAME, max_age_s: S}");
+  binding.stream = input.At("stream", needed_by).Text();
+  if (const auto max_age = input.Find("max_age_s")) {
+    binding.max_age_s = max_age->Number(0.0, kMostSeconds, true);
+  }
+  input.RejectUnread();
+  return binding;
+}
+
+void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost& host,
+                    System& system) {
+  const std::string model_name = entry.At("model", "a state entry").Text();
+  MotionBinding binding{name, host.CreateMotion(model_name, entry), {}};
+  binding.input = ReadInput(entry, binding.model);
+  const std::vector<std::string> names = ReadBlockNames(entry, binding.model);
+  const auto considered = ReadNames(entry, "consider", names);
+  const auto fixed = ReadNames(entry, "fixed", names);
+  for (const std::string& both : fixed) {
+    if (!Contains(considered, both)) continue;
+    entry.At("fixed").Fail("block '" + both + "' is in `consider` too",
+                           "a block in one of them: fixed is known, considered is uncertain");
+  }
+  const Node initial = entry.At("initial", "the state entry '" + name + "'");
+  const std::vector<Space>& spaces = binding.model.blocks();
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const bool known = (spaces[i].flags & ALIDADE_ROLE_OWNED) != 0 && !initial.Find(names[i]) &&
+                       !Contains(considered, names[i]);
+    const BlockStatus status = known || Contains(fixed, names[i]) ? BlockStatus::kFixed
+                               : Contains(considered, names[i])   ? BlockStatus::kConsidered
+                                                                  : BlockStatus::kEstimated;
+    const BlockId id = system.layout.Declare(name + "." + names[i], name, spaces[i], status);
+    binding.blocks.push_back(id);
+    if (known) {
+      Prior prior{
+          id, std::vector<double>(static_cast<std::size_t>(spaces[i].geometry.ambient)), {}, {}};
+      spaces[i].geometry.Identity(prior.mean.data());
+      system.priors.push_back(std::move(prior));
+      continue;
+    }
+    ReadPrior(initial.At(names[i], "block '" + name + "." + names[i] + "'"), system.layout[id], id,
+              system);
+  }
+  initial.RejectUnread();
+  entry.RejectUnread();
+  system.motions.push_back(std::move(binding));
+}
+
+BlockId FindBlock(const Node& node, const System& system) {
+  const std::string name = node.Text();
+  const BlockId id = system.layout.Find(name);
+  if (id >= 0) return id;
+  const std::vector<std::string> names = NamesOf(system.layout.blocks());
+  node.Fail("no state block '" + name + "'", "a block of `state`, as in ENTRY.BLOCK",
+            Nearest(name, names));
+}
+
+RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& model,
+                     const System& system) {
+  RoleBinding binding;
+  if (!node.is_map()) {
+    binding.block = FindBlock(node, system);
+  } else {
+    binding.block = FindBlock(node.At("block", "a role"), system);
+    if (const auto mode = node.Find("mode")) {
+      binding.mode = static_cast<RoleMode>(mode->Choice({"estimate", "consider", "hold"}));
+    }
+    if (const auto at = node.Find("linearise_at")) {
+      binding.linearise_at = static_cast<LineariseAt>(at->Choice({"prediction", "measurement"}));
+      const int initialised = model.initialised_role();
+      if (binding.linearise_at == LineariseAt::kMeasurement &&
+          (initialised < 0 ||
+           model.roles()[static_cast<std::size_t>(initialised)].name != role.name)) {
+        at->Fail(
+            "model '" + model.name() + "' has no inverse observation of role '" + role.name + "'",
+            "prediction");
+      }
+    }
+    node.RejectUnread();
+  }
+  const Block& block = system.layout[binding.block];
+  if (!(block.geometry() == role.geometry)) {
+    node.Fail(
+        "block '" + block.name + "' is of geometry " + ToString(block.geometry()),
+        ToString(role.geometry) + ", as role '" + role.name + "' of model '" + model.name() + "'");
+  }
+  return binding;
+}
+
+/// `{huber: k}` or `{cauchy: k}`.
+RobustLoss ReadLoss(const Node& node) {
+  const auto huber = node.Find("huber"), cauchy = node.Find("cauchy");
+  if (huber.has_value() == cauchy.has_value()) {
+    node.RejectUnread();
+    node.Fail("not one loss with its scale", "one of {huber: SCALE}, {cauchy: SCALE}");
+  }
+  const Node& scale = huber ? *huber : *cauchy;
+  node.RejectUnread();
+  return {huber ? LossKind::kHuber : LossKind::kCauchy,
+          scale.Number(0.0, std::numeric_limits<double>::infinity(), true, true)};
+}
+
+SensorBinding ReadSensor(const std::string& name, const Node& entry, const PluginHost& host,
+                         const System& system) {
+  const std::string model_name = entry.At("model", "a sensor entry").Text();
+  SensorBinding binding{name,
+                        entry.At("stream", "sensor '" + name + "'").Text(),
+                        host.CreateSensor(model_name, entry),
+                        {},
+                        {}};
+  if (const auto loss = entry.Find("loss")) binding.loss = ReadLoss(*loss);
+  const Node roles = entry.At("roles", "sensor '" + name + "'");
+  for (const Space& role : binding.model.roles()) {
+    if (role.landmark()) {
+      binding.roles.push_back({});
+      continue;
+    }
+    const auto node = roles.Find(role.name);
+    if (!node && role.optional()) {
+      binding.roles.push_back({});
+      continue;
+    }
+    const Node given = node ? *node : roles.At(role.name, "model '" + model_name + "'");
+    binding.roles.push_back(ReadRole(given, role, binding.model, system));
+    const BlockId block = binding.roles.back().block;
+    const auto same = [block](const RoleBinding& r) { return r.block == block; };
+    if (std::count_if(binding.roles.begin(), binding.roles.end(), same) > 1) {
+      given.Fail("block '" + system.layout[block].name + "' already fills another role",
+                 "a block of its own for each role");
+    }
+  }
+  if (binding.model.has_landmark()) internal::ReadLandmarkKeys(entry, host, binding);
+  roles.RejectUnread();
+  entry.RejectUnread();
+  return binding;
+}
+
+/// Checks that every block that starts from a sensor can do so: the sensor measures it, and the
+/// blocks it needs start without waiting for this one.
+void CheckInitialisation(const Node& root, const System& system) {
+  const auto place = [&](BlockId id) {
+    const Block& block = system.layout[id];
+    const std::string name = block.name.substr(block.owner.size() + 1);
+    return root.At("state").At(block.owner).At("initial").At(name).At("from");
+  };
+  const auto prior_of = [&](BlockId id) -> const Prior& {
+    return *std::find_if(system.priors.begin(), system.priors.end(),
+                         [id](const Prior& p) { return p.block == id; });
+  };
+  for (const Prior& prior : system.priors) {
+    if (prior.from.empty()) continue;
+    const int sensor = system.FindSensor(prior.from);
+    if (sensor < 0) {
+      place(prior.block)
+          .Fail("no sensor '" + prior.from + "' here", "a sensor of this estimator",
+                Nearest(prior.from, NamesOf(system.sensors)));
+    }
+    const SensorBinding& binding = system.sensors[static_cast<std::size_t>(sensor)];
+    const int role = binding.model.initialised_role();
+    if (role < 0 || binding.roles[static_cast<std::size_t>(role)].block != prior.block) {
+      place(prior.block)
+          .Fail("sensor '" + prior.from + "' does not determine this block",
+                "a sensor whose inverse observation is this block");
+    }
+  }
+  std::vector<BlockId> chain;
+  const std::function<void(BlockId)> follow = [&](BlockId id) {
+    const Prior& prior = prior_of(id);
+    if (prior.from.empty()) return;
+    if (std::find(chain.begin(), chain.end(), id) != chain.end()) {
+      std::string text;
+      for (const BlockId b : chain) text += system.layout[b].name + " <- ";
+      place(id).Fail("cyclic: " + text + system.layout[id].name,
+                     "one block of the cycle with a mean of its own");
+    }
+    chain.push_back(id);
+    const SensorBinding& binding =
+        system.sensors[static_cast<std::size_t>(system.FindSensor(prior.from))];
+    for (const RoleBinding& role : binding.roles) {
+      if (role.block >= 0 && role.block != id) follow(role.block);
+    }
+    chain.pop_back();
+  };
+  for (const Prior& prior : system.priors) follow(prior.block);
+}
+
+/// The system without the state entries that no sensor touches.
+System WithoutUntouched(System system) {
+  std::vector<std::string> touched;
+  for (const SensorBinding& sensor : system.sensors) {
+    for (const RoleBinding& role : sensor.roles) {
+      if (role.block >= 0) touched.push_back(system.layout[role.block].owner);
+    }
+  }
+  System kept;
+  kept.start_s = system.start_s;
+  kept.landmarks = std::move(system.landmarks);
+  std::vector<BlockId> moved;
+  for (const Block& block : system.layout.blocks()) {
+    moved.push_back(Contains(touched, block.owner)
+                        ? kept.layout.Declare(block.name, block.owner, block.space, block.status)
+                        : -1);
+  }
+  const auto follow = [&moved](BlockId& id) {
+    if (id >= 0) id = moved[static_cast<std::size_t>(id)];
+  };
+  for (MotionBinding& motion : system.motions) {
+    if (!Contains(touched, motion.name)) continue;
+    for (BlockId& id : motion.blocks) follow(id);
+    kept.motions.push_back(std::move(motion));
+  }
+  for (Prior& prior : system.priors) {
+    follow(prior.block);
+    if (prior.block >= 0) kept.priors.push_back(std::move(prior));
+  }
+  for (SensorBinding& sensor : system.sensors) {
+    for (RoleBinding& role : sensor.roles) follow(role.block);
+    kept.sensors.push_back(std::move(sensor));
+  }
+  return kept;
+}
+
+}  // namespace
+
+State System::InitialState(bool reserved) const {
+  State state(layout);
+  for (const Prior& prior : priors) {
+    if (!prior.from.empty() && reserved) state.Reserve(prior.block);
+    if (!prior.from.empty()) continue;
+    ALIDADE_EXPECTS(std::ssize(prior.mean) == layout[prior.block].geometry().ambient);
+    state.Add(prior.block, prior.mean.data(), prior.covariance);
+  }
+  return state;
+}
+
+int System::FindSensor(std::string_view name) const {
+  const auto found = std::find_if(sensors.begin(), sensors.end(),
+                                  [name](const SensorBinding& s) { return s.name == name; });
+  return found == sensors.end() ? -1 : static_cast<int>(found - sensors.begin());
+}
+
+System BuildSystem(const Node& root, const PluginHost& host, const std::vector<std::string>& only) {
+  System system;
+  for (const auto& [name, entry] : root.At("state", "a run").Entries()) {
+    internal::ExpectName(name, entry, "a state entry");
+    if (name == "landmarks") entry.Fail("'landmarks' are no state entry", "another name");
+    ReadStateEntry(name, entry, host, system);
+  }
+  std::vector<SensorBinding> sensors;
+  for (const auto& [name, entry] : root.At("sensors", "a run").Entries()) {
+    internal::ExpectName(name, entry, "a sensor");
+    sensors.push_back(ReadSensor(name, entry, host, system));
+  }
+  system.landmarks = internal::ReadLandmarks(root, sensors);
+  if (only.empty()) {
+    system.sensors = std::move(sensors);
+  } else {
+    for (const std::string& name : only) {
+      for (const SensorBinding& sensor : sensors) {
+        if (sensor.name == name) system.sensors.push_back(sensor);
+      }
+    }
+  }
+  constexpr double kLatestSeconds = 4.6e9;  // two stamps may differ by twice that
+  if (const auto start = root.Find("start_s"))
+    system.start_s = start->Number(-kLatestSeconds, kLatestSeconds);
+  if (!only.empty()) system = WithoutUntouched(std::move(system));
+  const auto sees = [](const SensorBinding& sensor) { return sensor.model.has_landmark(); };
+  if (std::ranges::none_of(system.sensors, sees)) system.landmarks.reset();
+  CheckInitialisation(root, system);
+  return system;
+}
+
+BlockId internal::PathBlockOf(const System& system) {
+  BlockId path = -1;
+  for (const SensorBinding& binding : system.sensors) {
+    if (!binding.model.has_landmark()) continue;
+    for (std::size_t r = 0; r < binding.roles.size(); ++r) {
+      const BlockId id = binding.roles[r].block;
+      const bool position = binding.model.roles()[r].name == "position" && id >= 0;
+      if (position && system.layout[id].geometry().ambient == 3) path = id;
+    }
+  }
+  return path;
+}
+
+std::string internal::UnitOf(const System& system, BlockId id) {
+  if (!system.layout[id].space.unit.empty()) return system.layout[id].space.unit;
+  for (const SensorBinding& sensor : system.sensors) {
+    for (std::size_t r = 0; r < sensor.roles.size(); ++r) {
+      if (sensor.roles[r].block == id) return sensor.model.roles()[r].unit;
+    }
+  }
+  return {};
+}
+
+}  // namespace alidade

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "alidade/host/build_plugin.h"
+#include "condensed_run.h"
+#include "fixed_lag.h"
+#include "initialising_filter.h"
+#include "map_solve.h"
+#include "supported.h"
+
+namespace alidade::ceres_batch {
+namespace {
+
+constexpr int kManyInputs = 1000;  // of which a solve takes seconds
+
+struct Options {
+  enum class Data { kAll, kSoFar } data = Data::kAll;
+  SolveOptions solve;
+};
+
+/// Maximum a posteriori of all states given all data, or given the data so far (the
+/// full-information filter): see Trajectory for the problem, MapSolve for its solution.
+class CeresBatch : public Estimator {
+ public:
+  CeresBatch(const System& system, const Options& options, const std::vector<StreamInfo>& streams)
+      : data_(options.data),
+        trajectory_(system, streams, options.solve.max_dt_s),
+        solve_(options.solve),
+        state_(system.InitialState()),
+        initialiser_(system, options.solve.max_dt_s, streams) {}
+
+  void Start(Stamp stamp) override {
+    trajectory_.Start(stamp);
+    initialiser_.filter().Start(stamp);
+  }
+  bool offline() const override { return data_ == Options::Data::kAll; }
+  const State& state() const override { return state_; }
+  std::vector<LandmarkEstimate> landmarks() const override { return map_; }
+  Stamp stamp() const override { return trajectory_.stamp(); }
+  bool diverged() const override { return failed_; }
+  bool failed() const override { return failed_; }
+
+  const UpdateReport& Process(const Frame& frame) override {
+    report_.Clear();
+    const Ekf& ekf = initialiser_.filter();
+    const UpdateReport& filter = initialiser_.Process(frame);
+    const bool were_few = trajectory_.inputs() <= kManyInputs;
+    if (!trajectory_.Add(frame, filter, ekf)) {
+      failed_ = true;
+      report_.events.push_back({frame.stamp, "batch", trajectory_.problem()});
+      return report_;
+    }
+    if (!ekf.failed()) filtered_.push_back(trajectory_.ValuesOf(ekf.state()));
+    if (!offline()) SolveSoFar(frame.stamp);
+    if (were_few && trajectory_.inputs() > kManyInputs) {
+      report_.events.push_back({frame.stamp, "slow",
+                                "more than " + std::to_string(kManyInputs) +
+                                    " noise inputs: the time of a solve grows with their cube"});
+    }
+    initialiser_.Tell(frame.stamp, filter, report_.events);
+    return report_;
+  }
+
+  void StopWhen(const std::function<bool()>& stop) override {
+    if (offline()) solve_.StopWhen(stop);
+  }
+
+  void Smooth(const Emit& emit) override {
+    if (trajectory_.size() == 0) return;
+    const bool solved = solve_.SolveAll(trajectory_, filtered_, e_);
+    failed_ = solve_.failed();
+    if (!solved) FailAll(solve_.summary());
+    const auto put = [&](std::size_t k, const Trajectory::Point& point) {
+      solve_.HeedStop();
+      const bool last = k + 1 == trajectory_.size();
+      trajectory_.Report(k, point, report_);
+      PutState(k, point);
+      if (last) solve_.Note(trajectory_.stamp(), report_.events);
+      if (last) report_.events.push_back({trajectory_.stamp(), "batch", solve_.summary()});
+      emit(k, state_, report_);
+    };
+    map_ = initialiser_.filter().landmarks();
+    if (!trajectory_.ForEachFrame(e_, trajectory_.size(), put) || !PutMap()) {
+      FailAll(solve_.summary() + "; then " + trajectory_.problem());
+    }
+  }
+
+ private:
+  [[noreturn]] void FailAll(const std::string& why) {
+    failed_ = true;
+    throw Error(ExitCode::kDiverged, why);
+  }
+
+  void SolveSoFar(Stamp stamp) {
+    const bool solved = solve_.SolveAnew(trajectory_, filtered_, e_);
+    failed_ = solve_.failed();
+    if (!solved) {
+      NoteFailure(stamp, solve_.summary());
+      return;
+    }
+    const auto put = [&](std::size_t k, const Trajectory::Point& point) {
+      if (k + 1 < trajectory_.size()) return;
+      trajectory_.Report(k, point, report_);
+      PutState(k, point);
+    };
+    map_ = initialiser_.filter().landmarks();
+    const bool put_all = trajectory_.ForEachFrame(e_, trajectory_.size(), put) && PutMap();
+    solve_.Note(stamp, report_.events);
+    if (!put_all) {
+      NoteFailure(stamp, solve_.summary() + "; then " + trajectory_.problem());
+    } else if (failed_) {
+      NoteFailure(stamp, solve_.summary());
+    }
+  }
+
+  void NoteFailure(Stamp stamp, const std::string& why) {
+    failed_ = true;
+    report_.events.push_back({stamp, "batch", why});
+  }
+
+  bool PutMap() { return map_.empty() || trajectory_.PutMap(e_.data(), solve_.u(), map_); }
+
+  void PutState(std::size_t k, const Trajectory::Point& point) {
+    trajectory_.Put(k, point, solve_.Whitened(point), state_);
+  }
+
+  Options::Data data_;
+  Trajectory trajectory_;
+  MapSolve solve_;
+  State state_;
+  InitialisingFilter initialiser_;  ///< gives the trajectory to start from
+  std::vector<std::vector<double>> filtered_;
+  Eigen::VectorXd e_;
+  std::vector<LandmarkEstimate> map_;
+  UpdateReport report_;
+  bool failed_ = false;
+};
+
+constexpr Support kSupport = {.held = false, .from_measurement = true, .landmarks = true};
+
+EstimatorMaker Create(const EstimatorArguments& arguments) {
+  Params& p = arguments.params;
+  Options options;
+  options.data = static_cast<Options::Data>(
+      p.Choice("data", {"all", "so_far"}, "what an estimate sees: all frames, or none later", 0));
+  options.solve = ReadSolveOptions(p);
+  return [options, entry = arguments.entry](const System& system,
+                                            const std::vector<StreamInfo>& streams) {
+    CheckSupported(system, entry, "ceres_batch", kSupport);
+    return std::make_unique<CeresBatch>(system, options, streams);
+  };
+}
+
+}  // namespace
+}  // namespace alidade::ceres_batch
+
+ALIDADE_ESTIMATOR_PLUGIN(
+    {"ceres_batch", "Maximum a posteriori of a whole run, by nonlinear least squares.",
+     "[Bell1994]", &alidade::ceres_batch::Create, alidade::EstimatorKind::kBatch, true},
+    {"fixed_lag", "Maximum a posteriori of the last frames, by nonlinear least squares.",
+     "[Sibley2010]", &alidade::ceres_batch::CreateFixedLag, alidade::EstimatorKind::kWindow})

@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "alidade/filter/control_inputs.h"
+#include "alidade/filter/estimator.h"
+#include "map_landmark.h"
+
+namespace alidade::ceres_batch {
+
+/// A whole run as a function of its random inputs e, all of them N(0, 1):
+///
+///   prior         x_0     = m (+) L_0 e_0,             P_0 = L_0 L_0'
+///   motion        x_{k+1} = f(x_k, u_k, L_k e_{k+1}, dt),   Q_k = L_k L_k'
+///   measurement   r_i     = L_i^-1 (z_i (-) h(x_k)),   R_i = L_i L_i'
+///   MAP           e*      = argmin |e|^2 / 2 + sum_i rho_i(|r_i(e)|)   rho(d) = d^2 / 2, or a loss
+///   first value   y       = g(x_k, z (+) L_i e_k)      of a block that starts from a measurement
+///   sensitivity   S_k = dx_k/de:  S_0 = [J L_0  0],  S_{k+1} = F S_k + [0  G L_k  0]
+///                 with J = d(m (+) d)/dd,  J_r_e = L_i^-1 d(z (-) h)/dh H S_k
+///
+/// So P_0 and Q may have any rank, nothing is inverted but L_i, and the motion holds exactly at
+/// every e. Discrete noise is held over an interval: all steps from one frame with a measurement in
+/// use to the next have the same L and the same inputs. What depends on the state in Q and R stands
+/// at where it was last frozen.
+///
+/// Landmarks are functions of the camera that saw them first and of inputs of their own, l, which
+/// are not in e: see MapLandmark. Where there are any, Reduce stands for Evaluate.
+///
+///   symbol   shape      meaning
+///   e        N          inputs: of the prior, then frame by frame of its steps and first values
+///   r        M          residuals: of the measurements in use, in their order
+///   x, S     -, n x N   values of all blocks; n: their tangents, those of fixed blocks apart
+///
+/// Source       [Bock1984] (condensing), [Bell1994] (smoothing as least squares).
+class Trajectory {
+ public:
+  /// x_k, and S_k where it was asked for (columns of later inputs are zero). About a given
+  /// trajectory x is that one's, and the linearised state is x (+) (offset + S e).
+  struct Point {
+    std::vector<double> x;
+    Eigen::MatrixXd s;
+    Eigen::VectorXd offset;
+  };
+
+  /// Gaps longer than `max_dt_s` are stepped in equal parts.
+  Trajectory(System system, const std::vector<StreamInfo>& streams, double max_dt_s);
+
+  /// Sets the time of the prior; else the first frame, or start_s, does.
+  void Start(Stamp stamp) { stamp_ = stamp; }
+  /// One frame more; the filter's report says which measurement gave a block or landmark its first
+  /// value. False, and problem(), where there would be too many inputs.
+  bool Add(const Frame& frame, const UpdateReport& report, const Estimator& filter);
+  /// The values of a filter's state as Linearised takes them.
+  std::vector<double> ValuesOf(const State& state) const;
+  int inputs() const { return inputs_; }        ///< N
+  int residuals() const { return residuals_; }  ///< M
+  /// Residuals of a measurement, of which a loss takes the norm; or, without one, of all on end.
+  struct Part {
+    int row, size;
+    RobustLoss loss;
+  };
+  const std::vector<Part>& parts() const { return parts_; }
+  bool robust() const;  ///< any of them has a loss
+  std::size_t size() const { return epochs_.size(); }
+  /// Makes the first frame, linearised at e, part of the prior, which is then that of the state at
+  /// that frame; e becomes the same trajectory in the inputs that are left. L_0 is a square root:
+  /// P_0 may stay singular. Q, R and the weights of losses are those at e. Not with landmarks. A
+  /// frame after which noise goes on being held has no measurement: its steps become those of the
+  /// next one. False where a model is not defined: nothing has changed.
+  bool MarginaliseFirst(Eigen::VectorXd& e);
+  Stamp stamp() const { return stamp_; }
+
+  /// Takes Q and R at the states of e. False where that cannot be.
+  bool Freeze(const double* e);
+  /// Largest relative change of a factor of Q or R in the last Freeze.
+  double change() const { return change_; }
+  /// r (M) and, unless null, its row-major Jacobian (M x N). False where a model is not defined.
+  bool Evaluate(const double* e, double* r, double* j) const;
+  bool has_landmarks() const { return system_.landmarks.has_value(); }
+  /// The problem in e alone, the landmarks where they cost least given e (variable projection
+  /// [Golub2003]):  phi(e) = min_l |e|^2 / 2 + |l|^2 / 2 + sum_i rho_i(|r_i(e, l)|).
+  struct Reduced {
+    double cost = 0.0;  ///< phi
+    Eigen::VectorXd g;  ///< its gradient, N
+    Eigen::MatrixXd a;  ///< its Gauss-Newton matrix, N x N: a Schur complement; lower triangle
+  };
+  /// phi and, where asked for, its derivatives, which also makes the landmarks there those that the
+  /// next call starts from. False where a model is not defined.
+  bool Reduce(const double* e, bool derivatives, Reduced& reduced);
+  /// Puts place and covariance at e into `map`, the landmarks that a filter has at the end, for
+  /// Cov(e) = (U'U)^-1. False where a model is not defined.
+  bool PutMap(const double* e, const Eigen::MatrixXd& u, std::vector<LandmarkEstimate>& map);
+  /// The inputs that solve the problem linearised about `trajectory`, the values of a filter frame
+  /// by frame (it may end early). Freezes there. False where that cannot be. With a unit vector it
+  /// is linearised about its own solution again until that settles.
+  bool Linearised(std::vector<std::vector<double>> trajectory, Eigen::VectorXd& e);
+  /// Whether a block is a unit vector: its basis turns over at z = 0, and with it what an input of
+  /// its motion means, so that x(e) jumps.
+  bool has_unit_vector() const { return has_unit_vector_; }
+
+  /// Gives the points of e, of the first `count` frames, in turn. False where a model is not
+  /// defined, which ends it.
+  bool ForEachFrame(const Eigen::VectorXd& e, std::size_t count,
+                    const std::function<void(std::size_t, const Point&)>& take) const;
+  /// `state`, that of frame k - 1, becomes the one of frame k: the values of `point`, with the
+  /// covariance y' y for y = U^-T S'.
+  void Put(std::size_t k, const Point& point, const Eigen::MatrixXd& y, State& state) const;
+  /// What became of the measurements of frame k, seen from `point`.
+  void Report(std::size_t k, const Point& point, UpdateReport& report) const;
+
+  /// Why the last call failed.
+  const std::string& problem() const { return problem_; }
+  bool Fail(std::string why) const;  ///< false, with this problem()
+
+ private:
+  struct Step {
+    std::size_t motion;
+    double dt_s;
+    int column;
+    int columns;            ///< inputs before it: of which the state depends on some
+    bool begins;            ///< it has inputs of its own, else those that the step before held
+    std::vector<double> u;  ///< control input; empty: the model takes none
+    RowMajor l;             ///< frozen
+  };
+  struct Factor {
+    int sensor;
+    Measurement measurement;
+    Outcome outcome;
+    int row = -1;       ///< of r; -1: not in use, or of a landmark
+    int landmark = -1;  ///< index into landmarks_ of the one that it sees
+    Eigen::MatrixXd l;  ///< frozen
+  };
+  /// A factor whose measurement gives a block its first value.
+  struct FirstValue {
+    std::size_t factor;
+    BlockId block;
+    int column;
+  };
+  struct Epoch {
+    std::vector<Step> steps;  ///< that lead to it
+    std::vector<Factor> factors;
+    std::vector<FirstValue> first_values;  ///< after the steps
+    bool stale = false;
+    bool ends = false;        ///< no noise goes on being held after it
+    std::vector<int> inputs;  ///< UpdateReport::inputs
+    LandmarkCounts counts;    ///< of the filter
+    int column = 0;           ///< the first of its inputs; of the first epoch 0: the prior's too
+  };
+  /// What a measurement tells of the roles that its sensor initialises, t in the tangent.
+  struct Inverse {
+    std::vector<double> y;
+    Eigen::MatrixXd by_x, by_d, by_prior;  ///< t x n, t x m of d in z (+) d, t x prior
+  };
+  /// The normal equations in the states of all frames, d rows of each: those that a sensor reads.
+  struct Information {
+    Eigen::MatrixXd h;  ///< lower triangle
+    Eigen::VectorXd g;
+    std::vector<std::size_t> first;  ///< by frame: the earliest that h ties it to
+  };
+  /// Those of one landmark in its inputs l, and what ties l to the states.
+  struct Normal {
+    double cost = 0.0;
+    Eigen::MatrixXd c;                  ///< I + sum w J_l' J_l
+    Eigen::VectorXd b;                  ///< l + sum w J_l' r
+    std::vector<std::size_t> epochs;    ///< that it is seen from, the first observation's first
+    std::vector<Eigen::MatrixXd> ties;  ///< sum w J_x' J_l of each of them, d rows
+  };
+  /// An observation that is not defined makes the problem so, or is skipped.
+  enum class Undefined { kFails, kSkipped };
+
+  /// x_0 and S_0.
+  bool Begin(const double* e, bool sensitivity, Point& point) const;
+  /// From frame k - 1 (or the prior) to frame k.
+  bool Advance(std::size_t k, const double* e, Point& point) const;
+  bool AddSteps(Stamp from, Stamp end, Epoch& epoch);
+  void AddFactors(const Frame& frame, const UpdateReport& report, Epoch& epoch);
+  void AddLandmarks(const UpdateReport& report, const Estimator& filter, Epoch& epoch);
+  void AddKnown();
+  void Begin(const Factor& factor, std::size_t index, const Estimator& filter);
+  void AddFirstValues(Epoch& epoch);
+  void AddPart(int size, const RobustLoss& loss);
+  /// Whether its landmark roles are filled by what a measurement names, not by blocks.
+  bool ObservesLandmarks(const SensorBinding& sensor) const {
+    return has_landmarks() && sensor.model.has_landmark();
+  }
+  void Shift(int columns, int rows);
+  bool AllPresent(const std::vector<BlockId>& blocks) const;
+  bool Move(const Step& step, const double* e, Point& point) const;
+  bool Initialise(const FirstValue& first, const Factor& factor, const double* e,
+                  Point& point) const;
+  bool Invert(const Factor& factor, const Eigen::VectorXd& d, const double* prior,
+              const Point& point, const std::string& name, Inverse& inverse) const;
+  bool FreezeEpoch(Epoch& epoch, const double* e, Point& point);
+  bool FreezeStep(Step& step, const Point& point);
+  bool Holds(std::size_t motion) const;
+  void EndInterval(Epoch& epoch);
+  void PassOnFirst();
+  bool FreezeFactor(Factor& factor, const Point& point, const std::vector<double>& y = {});
+  bool Residual(const Factor& factor, const Point& point, const std::vector<double>& y,
+                Eigen::VectorXd& r, Eigen::MatrixXd* a) const;
+  void NoteChange(const Eigen::MatrixXd& before, const Eigen::MatrixXd& after);
+  const SensorModel& ModelOf(const Factor& factor) const;
+  std::vector<const double*> RolesOf(const Factor& factor, const Point& point,
+                                     const std::vector<double>& y = {}) const;
+  const SensorBinding& SensorOf(const Factor& factor) const {
+    return system_.sensors[static_cast<std::size_t>(factor.sensor)];
+  }
+  bool PointsOf(const double* e, bool sensitivity, std::vector<Point>& points) const;
+  bool Place(const MapLandmark& landmark, const Eigen::VectorXd& l,
+             const std::vector<Point>& points, Inverse& place) const;
+  bool FreezeLandmarks(const std::vector<Point>& points);
+  bool NormalOf(const MapLandmark& landmark, const Eigen::VectorXd& l,
+                const std::vector<Point>& points, Undefined undefined, Normal& normal,
+                Information* information) const;
+  bool AddObservation(const Factor& factor, std::size_t epoch, const MapLandmark& landmark,
+                      const Inverse& place, const Point& point, Normal& normal,
+                      Information* information) const;
+  bool OptimiseLandmark(MapLandmark& landmark, const std::vector<Point>& points,
+                        Undefined undefined) const;
+  bool Project(const double* e, const std::vector<Point>& points, Undefined undefined,
+               bool derivatives, Reduced& reduced);
+  bool AddPlain(const std::vector<Point>& points, Undefined undefined, Information* information,
+                double& cost) const;
+  void Assemble(const double* e, const std::vector<Point>& points, const Information& information,
+                Reduced& reduced) const;
+  Eigen::MatrixXd Packed(const Eigen::MatrixXd& rows) const;
+  void Describe(const MapLandmark& landmark, const Eigen::MatrixXd& p,
+                LandmarkEstimate& estimate) const;
+  void PutAbout(const std::vector<double>& about, Point& point) const;
+  bool StepAbout(std::vector<std::vector<double>>& trajectory, const Eigen::VectorXd& e,
+                 Eigen::VectorXd& step);
+  bool FailTooMany() const;
+
+  System system_;
+  std::vector<int> stream_of_sensor_;
+  double max_dt_s_;
+  State initial_;                 ///< all blocks have a place in it
+  std::vector<bool> present_;     ///< at the last frame, by block
+  std::vector<int> held_;         ///< by motion: column of the inputs that go on being held, or -1
+  std::vector<RowMajor> held_l_;  ///< by motion: L of the last step that begins
+  Eigen::MatrixXd l0_;
+  Eigen::VectorXd d0_;  ///< x_0 = m (+) (d_0 + L_0 e_0); 0 but after MarginaliseFirst
+  std::vector<Epoch> epochs_;
+  std::vector<MapLandmark> landmarks_;
+  std::map<std::int64_t, int> current_;  ///< by id: the last of landmarks_
+  std::vector<int> read_;                ///< tangent rows of a state that sensors read
+  std::vector<Part> parts_;
+  Stamp stamp_ = kNoStamp;
+  ControlInputs controls_;
+  int inputs_ = 0, residuals_ = 0;
+  bool has_unit_vector_ = false;
+  double change_ = 0.0;
+  mutable std::string problem_;
+  std::vector<Step> passed_on_;  ///< of frames that were dropped, to the next one
+};
+
+}  // namespace alidade::ceres_batch

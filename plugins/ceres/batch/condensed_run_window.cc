@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "condensed_run.h"
+
+/// The first frame of a Trajectory becomes part of its prior.
+namespace alidade::ceres_batch {
+
+/// Of the inputs up to the first frame, c of them, with its residuals r(e^) and A = dr/de, weighed:
+///
+///   [I; A] = Q U,   e ~ N(e^ + s, (U'U)^-1),   s = -(U'U)^-1 (e^ + A' r)
+///   x      = x^ (+) (S s + S U^-1 n),   n ~ N(0, I)
+///   L'     = triangle of U^-T S' = Q_L L',   e_0 = -Q_L' U s   is where x = x^
+bool Trajectory::MarginaliseFirst(Eigen::VectorXd& e) {
+  ALIDADE_EXPECTS(!has_landmarks() && !epochs_.empty() && e.size() == inputs_);
+  if (!epochs_.front().ends) {
+    PassOnFirst();
+    return true;
+  }
+  const Eigen::Index c = epochs_.size() > 1 ? epochs_[1].column : inputs_;
+  const Eigen::Index n = initial_.covariance().size();
+  Point point;
+  if (!Begin(e.data(), true, point) || !Advance(0, e.data(), point)) return false;
+  const Eigen::MatrixXd s = point.s.leftCols(c);
+  Eigen::MatrixXd j = Eigen::MatrixXd::Identity(c, c), a;
+  Eigen::VectorXd r = e.head(c), residual;
+  int gone = 0;  // residuals
+  for (const Factor& factor : epochs_.front().factors) {
+    if (factor.row < 0) continue;
+    if (!Residual(factor, point, {}, residual, &a)) return false;
+    const double root = std::sqrt(Weight(SensorOf(factor).loss, residual.norm()));
+    const Eigen::Index rows = residual.size(), before = j.rows();
+    gone += static_cast<int>(rows);
+    j.conservativeResize(before + rows, Eigen::NoChange);
+    r.conservativeResize(before + rows);
+    j.bottomRows(rows) = root * a * s;
+    r.tail(rows) = root * residual;
+  }
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(j);
+  const Eigen::MatrixXd u = qr.matrixQR().topRows(c).triangularView<Eigen::Upper>();
+  const Eigen::VectorXd step = -qr.solve(r);
+  Eigen::MatrixXd y = Eigen::MatrixXd::Zero(std::max(c, n), n);
+  y.topRows(c) = u.transpose().triangularView<Eigen::Lower>().solve(s.transpose());
+  const Eigen::HouseholderQR<Eigen::MatrixXd> of_y(y);
+  Eigen::VectorXd e0 = Eigen::VectorXd::Zero(y.rows());
+  e0.head(c) = -u * step;
+  e0.applyOnTheLeft(of_y.householderQ().adjoint());
+  if (!step.allFinite() || !y.allFinite()) return Fail("the prior of the window is not finite");
+
+  initial_.values() = point.x;
+  d0_ = s * step;
+  l0_ = of_y.matrixQR().topRows(n).triangularView<Eigen::Upper>().toDenseMatrix().transpose();
+  Eigen::VectorXd moved(n + e.size() - c);
+  moved << e0.head(n), e.tail(e.size() - c);
+  e = std::move(moved);
+  epochs_.erase(epochs_.begin());
+  Shift(static_cast<int>(n - c), gone);
+  return true;
+}
+
+/// Drops the first frame, which tells nothing; the steps to it lead to the next one.
+void Trajectory::PassOnFirst() {
+  passed_on_.swap(epochs_.front().steps);
+  epochs_.erase(epochs_.begin());
+  if (epochs_.empty()) return;
+  Epoch& next = epochs_.front();
+  next.column = 0;
+  next.steps.insert(next.steps.begin(), passed_on_.begin(), passed_on_.end());
+  passed_on_.clear();
+}
+
+/// The places of inputs and residuals, once those of the first frame are gone.
+void Trajectory::Shift(int columns, int rows) {
+  inputs_ += columns;
+  for (int& column : held_) column += column < 0 ? 0 : columns;
+  residuals_ = 0;
+  parts_.clear();
+  for (Epoch& epoch : epochs_) {
+    epoch.column = &epoch == &epochs_.front() ? 0 : epoch.column + columns;
+    for (Step& step : epoch.steps) {
+      step.column += columns;
+      step.columns += columns;
+    }
+    for (FirstValue& first : epoch.first_values) first.column += columns;
+    for (Factor& factor : epoch.factors) {
+      if (factor.row < 0) continue;
+      factor.row -= rows;
+      AddPart(SensorOf(factor).model.measurement().geometry.tangent, SensorOf(factor).loss);
+    }
+  }
+}
+
+}  // namespace alidade::ceres_batch

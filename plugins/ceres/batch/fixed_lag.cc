@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fixed_lag.h"
+
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "condensed_run.h"
+#include "initialising_filter.h"
+#include "map_solve.h"
+#include "supported.h"
+
+namespace alidade::ceres_batch {
+namespace {
+
+/// No held roles, considered blocks, roles linearised at the measurement, landmarks.
+constexpr Support kFixedLagSupport = {.held = false, .from_measurement = true};
+
+struct FixedLagOptions {
+  enum class Estimate { kNewest, kOldest } estimate = Estimate::kNewest;
+  double window_s = 0.0;
+  SolveOptions solve;
+};
+
+/// window_s in whole ns; beyond what a Stamp holds, no frame leaves the window.
+Stamp WindowOf(double window_s) {
+  constexpr double kBeyond = 9e9;
+  return window_s < kBeyond ? StampFromSeconds(window_s) : std::numeric_limits<Stamp>::max();
+}
+
+/// Fixed-lag smoother: the maximum a posteriori of the frames of the last window_s, of the factors
+/// of Trajectory, given a prior that holds all that came before.
+///
+///   window   frames j with t_k - t_j <= window_s, k the newest
+///   prior    x_0 = x^ (+) (d_0 + L_0 e_0), of the state at the last frame that left
+///
+/// A frame that leaves is linearised at the last solution, and stays so: see
+/// Trajectory::MarginaliseFirst. On a linear problem the window is the batch of the data so far.
+///
+/// Source       [Sibley2010].
+class FixedLag : public Estimator {
+ public:
+  FixedLag(const System& system, const FixedLagOptions& options,
+           const std::vector<StreamInfo>& streams)
+      : estimate_(options.estimate),
+        window_(WindowOf(options.window_s)),
+        trajectory_(system, streams, options.solve.max_dt_s),
+        solve_(options.solve),
+        state_(system.InitialState()),
+        initialiser_(system, options.solve.max_dt_s, streams) {}
+
+  void Start(Stamp stamp) override {
+    trajectory_.Start(stamp);
+    initialiser_.filter().Start(stamp);
+  }
+  bool offline() const override { return estimate_ == FixedLagOptions::Estimate::kOldest; }
+  const State& state() const override { return state_; }
+  Stamp stamp() const override { return trajectory_.stamp(); }
+  bool diverged() const override { return failed_; }
+  bool failed() const override { return failed_; }
+
+  const UpdateReport& Process(const Frame& frame) override {
+    report_.Clear();
+    if (failed_) return report_;
+    const UpdateReport& filter = initialiser_.Process(frame);
+    if (!MoveWindow(frame.stamp) || !trajectory_.Add(frame, filter, initialiser_.filter())) {
+      return Fail(frame.stamp, trajectory_.problem());
+    }
+    stamps_.push_back(trajectory_.stamp());
+    if (!initialiser_.filter().failed()) {
+      about_.push_back(trajectory_.ValuesOf(initialiser_.filter().state()));
+    }
+    SolveWindow(frame.stamp);
+    initialiser_.Tell(frame.stamp, filter, report_.events);
+    return report_;
+  }
+
+  /// Of the frames that left the window, then of those still in it.
+  void Smooth(const Emit& emit) override {
+    if (!Keep(trajectory_.size())) {
+      failed_ = true;
+      throw Error(ExitCode::kDiverged, trajectory_.problem());
+    }
+    for (std::size_t k = 0; k < kept_.size(); ++k) emit(k, kept_[k].state, kept_[k].report);
+  }
+
+ private:
+  /// The estimate of a frame when it left the window.
+  struct Kept {
+    State state;
+    UpdateReport report;
+  };
+
+  const UpdateReport& Fail(Stamp stamp, const std::string& why) {
+    failed_ = true;
+    report_.events.push_back({stamp, "fixed_lag", why});
+    return report_;
+  }
+
+  bool Leaves(Stamp stamp, Stamp newest) const {
+    Stamp age = 0;
+    return __builtin_sub_overflow(newest, stamp, &age) || age > window_;
+  }
+
+  /// Lets go of the frames that are too old once there is one at `newest`.
+  bool MoveWindow(Stamp newest) {
+    std::size_t leaving = 0;
+    while (leaving < stamps_.size() && Leaves(stamps_[leaving], newest)) ++leaving;
+    if (offline() && !Keep(leaving)) return false;
+    for (std::size_t i = 0; i < leaving; ++i) {
+      if (!trajectory_.MarginaliseFirst(e_)) return false;
+    }
+    const auto count = static_cast<std::ptrdiff_t>(leaving);
+    stamps_.erase(stamps_.begin(), stamps_.begin() + count);
+    about_.erase(about_.begin(), about_.begin() + count);
+    return true;
+  }
+
+  /// Keeps the estimates of the first `count` frames of the window.
+  bool Keep(std::size_t count) {
+    return trajectory_.ForEachFrame(e_, count, [&](std::size_t k, const Trajectory::Point& point) {
+      Kept kept;
+      trajectory_.Report(k, point, kept.report);
+      trajectory_.Put(k, point, solve_.Whitened(point), state_);
+      kept.state = state_;
+      kept_.push_back(std::move(kept));
+    });
+  }
+
+  void SolveWindow(Stamp stamp) {
+    if (!solve_.SolveAnew(trajectory_, about_, e_)) {
+      Fail(stamp, solve_.summary());
+      return;
+    }
+    about_.clear();
+    const bool good = trajectory_.ForEachFrame(
+        e_, trajectory_.size(), [&](std::size_t k, const Trajectory::Point& point) {
+          about_.push_back(point.x);
+          if (offline() || k + 1 < trajectory_.size()) return;
+          trajectory_.Report(k, point, report_);
+          trajectory_.Put(k, point, solve_.Whitened(point), state_);
+        });
+    solve_.Note(stamp, report_.events);
+    if (!good) {
+      Fail(stamp, solve_.summary() + "; then " + trajectory_.problem());
+    } else if (solve_.failed()) {
+      Fail(stamp, solve_.summary());
+    }
+  }
+
+  FixedLagOptions::Estimate estimate_;
+  Stamp window_;
+  Trajectory trajectory_;  ///< that of the window
+  MapSolve solve_;
+  State state_;  ///< newest: of the last frame; oldest: of the last that left
+  InitialisingFilter
+      initialiser_;  ///< gives the newest frame a start, and blocks their first values
+  std::vector<Stamp> stamps_;
+  std::vector<std::vector<double>> about_;  ///< the last solution
+  std::vector<Kept> kept_;
+  Eigen::VectorXd e_;
+  UpdateReport report_;
+  bool failed_ = false;
+};
+
+}  // namespace
+
+EstimatorMaker CreateFixedLag(const EstimatorArguments& arguments) {
+  Params& p = arguments.params;
+  FixedLagOptions options;
+  options.window_s = p.Positive("window_s", "s", "age of the oldest frame that is smoothed");
+  options.estimate = static_cast<FixedLagOptions::Estimate>(p.Choice(
+      "estimate", {"newest", "oldest"},
+      "newest: of each frame when it comes; oldest: when it leaves the window, at the end", 0));
+  options.solve = ReadSolveOptions(p);
+  return [options, entry = arguments.entry](const System& system,
+                                            const std::vector<StreamInfo>& streams) {
+    CheckSupported(system, entry, "fixed_lag", kFixedLagSupport);
+    return std::make_unique<FixedLag>(system, options, streams);
+  };
+}
+
+}  // namespace alidade::ceres_batch

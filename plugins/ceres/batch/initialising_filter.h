@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <iterator>
+#include <vector>
+
+#include "alidade/filter/ekf.h"
+
+namespace alidade::ceres_batch {
+
+/// The EKF without gate that goes along: it gives a Trajectory values to start from, and says which
+/// measurements give blocks their first values.
+class InitialisingFilter {
+ public:
+  InitialisingFilter(const System& system, double max_dt_s, const std::vector<StreamInfo>& streams)
+      : filter_(system, OptionsOf(max_dt_s), streams) {}
+
+  Ekf& filter() { return filter_; }
+  /// Its report of a frame.
+  const UpdateReport& Process(const Frame& frame) {
+    had_failed_ = filter_.failed();
+    return filter_.Process(frame);
+  }
+  /// Adds what the last report tells of the data, and, once, why the filter ended.
+  void Tell(Stamp stamp, const UpdateReport& report, std::vector<Event>& events) const {
+    std::ranges::copy_if(report.events, std::back_inserter(events), TellsOfTheData);
+    if (!filter_.failed() || had_failed_) return;
+    const auto cause = std::ranges::find(report.events, true, &Event::divergence);
+    events.push_back({stamp, "start",
+                      "the filter that the batch starts from, and that gives blocks their first "
+                      "values, ended" +
+                          (cause == report.events.end() ? "" : ": " + cause->text)});
+  }
+
+ private:
+  static EkfOptions OptionsOf(double max_dt_s) {
+    EkfOptions options;
+    options.lockout = Lockout::kNone;
+    options.max_dt_s = max_dt_s;
+    return options;
+  }
+  static bool TellsOfTheData(const Event& event) {
+    return event.kind == "input_stale" || event.kind == "input_refused" || event.kind == "substeps";
+  }
+
+  Ekf filter_;
+  bool had_failed_ = false;
+};
+
+}  // namespace alidade::ceres_batch

@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "condensed_run.h"
+
+/// The landmarks of a Trajectory: how they enter it, and where they cost least.
+namespace alidade::ceres_batch {
+namespace {
+
+/// The value of the camera's role `position`; null where the sensor has none.
+const double* CameraOf(const SensorBinding& sensor, const State& state) {
+  for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
+    if (sensor.model.roles()[i].name == "position") return state.value(sensor.roles[i].block);
+  }
+  return nullptr;
+}
+
+/// The prior of the inverse distance that the filter gave a landmark in this frame, 1/m.
+double PriorOf(std::int64_t id, const SensorBinding& sensor, const LandmarkOptions::Prior& prior,
+               const Estimator& filter) {
+  if (prior.from_map == 0) return prior.inverse_distance;
+  const std::vector<LandmarkEstimate> map = filter.landmarks();
+  const auto found = std::ranges::find(map, id, &LandmarkEstimate::id);
+  const double* const camera = CameraOf(sensor, filter.state());
+  if (found == map.end() || camera == nullptr) return prior.inverse_distance;
+  if (!std::isnan(found->inverse_distance)) return found->inverse_distance;
+  return 1.0 / (found->position - Eigen::Map<const Eigen::Vector3d>(camera)).norm();
+}
+
+}  // namespace
+
+/// What no filter has to say: landmarks known beforehand, and which rows of a state sensors read.
+void Trajectory::AddKnown() {
+  std::vector<bool> reads(static_cast<std::size_t>(initial_.covariance().size()), false);
+  for (const SensorBinding& sensor : system_.sensors) {
+    for (const RoleBinding& role : sensor.roles) {
+      if (role.block < 0 || !initial_.layout()[role.block].has_covariance()) continue;
+      const Block& block = initial_.layout()[role.block];
+      std::fill_n(reads.begin() + block.tangent_offset, block.geometry().tangent, true);
+    }
+  }
+  for (std::size_t i = 0; i < reads.size(); ++i) {
+    if (reads[i]) read_.push_back(static_cast<int>(i));
+  }
+  for (const KnownLandmark& known : system_.landmarks->known) {
+    current_[known.id] = static_cast<int>(landmarks_.size());
+    MapLandmark& landmark = landmarks_.emplace_back();
+    landmark.id = known.id;
+    landmark.sigma = known.sigma;
+    landmark.mean.assign(known.position.begin(), known.position.end());
+    landmark.from = Eigen::VectorXd::Zero(known.sigma > 0.0 ? 3 : 0);
+  }
+}
+
+/// The observations of a frame. A landmark begins with the one that the filter began it with; what
+/// the filter had no landmark for, or could not predict, is left out.
+void Trajectory::AddLandmarks(const UpdateReport& report, const Estimator& filter, Epoch& epoch) {
+  epoch.counts.initialised = report.landmarks.initialised;
+  epoch.counts.deleted = report.landmarks.deleted;
+  std::vector<std::size_t> begin;
+  for (std::size_t i = 0; i < epoch.factors.size(); ++i) {
+    Factor& factor = epoch.factors[i];
+    if (!ObservesLandmarks(SensorOf(factor))) continue;
+    if (factor.outcome == Outcome::kInitialised) begin.push_back(i);
+    if (factor.outcome != Outcome::kAccepted) continue;
+    const Outcome told = report.measurements()[i].outcome;
+    const auto current = current_.find(factor.measurement.landmark);
+    const bool lost = told == Outcome::kNotReady || told == Outcome::kOutOfDomain ||
+                      told == Outcome::kInvalid || told == Outcome::kFailed;
+    if (lost || current == current_.end()) {
+      factor.outcome = lost ? told : Outcome::kNotReady;
+      continue;
+    }
+    factor.landmark = current->second;
+    landmarks_[static_cast<std::size_t>(current->second)].observations.push_back(
+        {epochs_.size(), i});
+  }
+  for (const std::size_t i : begin) {
+    Begin(epoch.factors[i], i, filter);
+    epoch.factors[i].landmark = static_cast<int>(landmarks_.size()) - 1;
+  }
+}
+
+void Trajectory::Begin(const Factor& factor, std::size_t index, const Estimator& filter) {
+  const SensorBinding& sensor = SensorOf(factor);
+  const std::int64_t id = factor.measurement.landmark;
+  const auto before = current_.find(id);
+  MapLandmark landmark;
+  landmark.id = id;
+  landmark.first = {epochs_.size(), index};
+  if (before != current_.end()) {
+    landmark.generation = landmarks_[static_cast<std::size_t>(before->second)].generation + 1;
+  }
+  if (sensor.model.prior_size() > 0) {
+    landmark.prior = PriorOf(id, sensor, *system_.landmarks->prior, filter);
+    landmark.sigma = system_.landmarks->prior->sigma;
+  }
+  landmark.from = Eigen::VectorXd::Zero(sensor.model.measurement().geometry.tangent +
+                                        sensor.model.prior_size());
+  current_[id] = static_cast<int>(landmarks_.size());
+  landmarks_.push_back(std::move(landmark));
+}
+
+/// y at the inputs l, and in by_d its derivative by all of them.
+bool Trajectory::Place(const MapLandmark& landmark, const Eigen::VectorXd& l,
+                       const std::vector<Point>& points, Inverse& place) const {
+  if (!landmark.first) {
+    place.y = landmark.mean;
+    for (Eigen::Index i = 0; i < l.size(); ++i) {
+      place.y[static_cast<std::size_t>(i)] += landmark.sigma * l[i];
+    }
+    place.by_x = Eigen::MatrixXd::Zero(3, initial_.covariance().size());
+    place.by_d = landmark.sigma * Eigen::MatrixXd::Identity(3, l.size());
+    return true;
+  }
+  const auto [epoch, index] = *landmark.first;
+  const Factor& factor = epochs_[epoch].factors[index];
+  const int m = SensorOf(factor).model.measurement().geometry.tangent;
+  const bool has_noise = factor.l.size() > 0;
+  Eigen::VectorXd d = Eigen::VectorXd::Zero(m);
+  if (has_noise) d = factor.l * l.head(m);
+  const Eigen::VectorXd prior = landmark.prior + (landmark.sigma * l.tail(l.size() - m)).array();
+  if (!Invert(factor, d, l.size() > m ? prior.data() : nullptr, points[epoch],
+              "landmark " + std::to_string(landmark.id), place)) {
+    return false;
+  }
+  Eigen::MatrixXd by_l = Eigen::MatrixXd::Zero(place.by_d.rows(), l.size());
+  if (has_noise) by_l.leftCols(m) = place.by_d * factor.l;
+  by_l.rightCols(l.size() - m) = landmark.sigma * place.by_prior;
+  place.by_d = std::move(by_l);
+  return true;
+}
+
+/// R of all observations of landmarks, these where they were found last. One that is not defined
+/// keeps what it had.
+bool Trajectory::FreezeLandmarks(const std::vector<Point>& points) {
+  for (MapLandmark& landmark : landmarks_) {
+    if (landmark.l.size() == 0) landmark.l = landmark.from;
+    Inverse place;
+    if (!Place(landmark, landmark.l, points, place)) return false;
+    if (landmark.first) {
+      const auto [epoch, index] = *landmark.first;
+      if (!FreezeFactor(epochs_[epoch].factors[index], points[epoch], place.y) ||
+          !Place(landmark, landmark.l, points, place)) {
+        return false;
+      }
+    }
+    for (const auto& [epoch, index] : landmark.observations) {
+      Factor& factor = epochs_[epoch].factors[index];
+      std::vector<double> h(factor.measurement.values.size());
+      const std::vector<const double*> roles = RolesOf(factor, points[epoch], place.y);
+      const bool defined = ModelOf(factor).Predict(roles.data(), h.data()) == Status::kOk;
+      if (defined && !FreezeFactor(factor, points[epoch], place.y)) return false;
+    }
+  }
+  return true;
+}
+
+/// The rows that sensors read.
+Eigen::MatrixXd Trajectory::Packed(const Eigen::MatrixXd& rows) const {
+  return rows(read_, Eigen::all);
+}
+
+/// One observation: J_x = a_x at its frame, a_y J_y_x at the first observation's, J_l = a_y J_y_l.
+bool Trajectory::AddObservation(const Factor& factor, std::size_t epoch,
+                                const MapLandmark& landmark, const Inverse& place,
+                                const Point& point, Normal& normal,
+                                Information* information) const {
+  const int n = initial_.covariance().size();
+  const auto d = std::ssize(read_);
+  Eigen::VectorXd r;
+  Eigen::MatrixXd a;
+  if (!Residual(factor, point, place.y, r, &a)) return false;
+  const RobustLoss& loss = SensorOf(factor).loss;
+  normal.cost += Rho(loss, r.norm());
+  const double root = std::sqrt(Weight(loss, r.norm()));
+  r *= root;
+  a *= root;
+  const Eigen::MatrixXd a_y = a.rightCols(a.cols() - n), a_l = a_y * place.by_d;
+  normal.c.noalias() += a_l.transpose() * a_l;
+  normal.b.noalias() += a_l.transpose() * r;
+  if (information == nullptr) return true;
+  Eigen::MatrixXd a_x = Packed(a.leftCols(n).transpose()), a_first;
+  if (landmark.first) {
+    a_first = Packed((a_y * place.by_x).transpose());
+    if (landmark.first->epoch == epoch) {
+      a_x += a_first;
+      a_first.resize(0, 0);
+    }
+  }
+  const auto here = d * static_cast<Eigen::Index>(epoch);
+  information->h.block(here, here, d, d).noalias() += a_x * a_x.transpose();
+  information->g.segment(here, d).noalias() += a_x * r;
+  if (normal.epochs.empty() || normal.epochs.back() != epoch) {
+    normal.epochs.push_back(epoch);
+    normal.ties.emplace_back(Eigen::MatrixXd::Zero(d, normal.b.size()));
+  }
+  normal.ties.back().noalias() += a_x * a_l;
+  if (a_first.size() == 0) return true;
+  const auto first = d * static_cast<Eigen::Index>(landmark.first->epoch);
+  information->h.block(first, first, d, d).noalias() += a_first * a_first.transpose();
+  information->h.block(here, first, d, d).noalias() += a_x * a_first.transpose();
+  information->g.segment(first, d).noalias() += a_first * r;
+  normal.ties.front().noalias() += a_first * a_l;
+  return true;
+}
+
+/// The normal equations of a landmark at the inputs l; into `information`, unless null, what its
+/// observations tell of the states, l apart.
+bool Trajectory::NormalOf(const MapLandmark& landmark, const Eigen::VectorXd& l,
+                          const std::vector<Point>& points, Undefined undefined, Normal& normal,
+                          Information* information) const {
+  Inverse place;
+  if (!Place(landmark, l, points, place)) return false;
+  normal.cost = 0.5 * l.squaredNorm();
+  normal.c = Eigen::MatrixXd::Identity(l.size(), l.size());
+  normal.b = l;
+  normal.epochs.clear();
+  normal.ties.clear();
+  if (landmark.first && information != nullptr) {
+    normal.epochs.push_back(landmark.first->epoch);
+    normal.ties.emplace_back(Eigen::MatrixXd::Zero(std::ssize(read_), l.size()));
+  }
+  for (const auto& [epoch, index] : landmark.observations) {
+    const Factor& factor = epochs_[epoch].factors[index];
+    const bool added =
+        AddObservation(factor, epoch, landmark, place, points[epoch], normal, information);
+    if (!added && undefined == Undefined::kFails) return false;
+  }
+  return true;
+}
+
+/// Puts the landmark where it costs least, seen from the points: Gauss-Newton steps, halved until
+/// the cost falls.
+bool Trajectory::OptimiseLandmark(MapLandmark& landmark, const std::vector<Point>& points,
+                                  Undefined undefined) const {
+  constexpr int kMostSteps = 50, kMostHalvings = 20;
+  constexpr double kSettled = 1e-10;  // sigma of what is left to go
+  Normal now, next;
+  landmark.l = landmark.from;
+  if (!NormalOf(landmark, landmark.l, points, undefined, now, nullptr)) {
+    landmark.l.setZero();
+    if (!NormalOf(landmark, landmark.l, points, undefined, now, nullptr)) return false;
+  }
+  for (int i = 0; i < kMostSteps && landmark.l.size() > 0; ++i) {
+    Eigen::VectorXd step = -now.c.llt().solve(now.b);
+    if (!(-step.dot(now.b) > kSettled * kSettled)) break;
+    bool fell = false;
+    for (int k = 0; k < kMostHalvings && !fell; ++k, step *= 0.5) {
+      fell = NormalOf(landmark, landmark.l + step, points, undefined, next, nullptr) &&
+             next.cost < now.cost;
+      if (fell) landmark.l += step;
+    }
+    if (!fell) break;
+    std::swap(now, next);
+  }
+  Inverse place;
+  if (!Place(landmark, landmark.l, points, place)) return false;
+  landmark.y = place.y;
+  return true;
+}
+
+}  // namespace alidade::ceres_batch

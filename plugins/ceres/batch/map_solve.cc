@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "map_solve.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/base/error.h"
+#include "alidade/base/number_text.h"
+
+namespace alidade::ceres_batch {
+namespace {
+
+/// `key (50 here)`
+std::string Setting(const char* key, int value) {
+  return std::string(key) + " (" + std::to_string(value) + " here)";
+}
+
+/// Freezes at e; false where a model is not defined there.
+bool CanStart(Trajectory& trajectory, const Eigen::VectorXd& e) {
+  double unused = 0.0;
+  return trajectory.Freeze(e.data()) && CostAt(trajectory, e, unused);
+}
+
+}  // namespace
+
+SolveOptions ReadSolveOptions(Params& params) {
+  SolveOptions options;
+  options.max_iterations =
+      params.Integer("max_iterations", "of one solve", 1, 1'000'000, options.max_iterations);
+  options.max_outer_iterations = params.Integer(
+      "max_outer_iterations", "solves, with noise that depends on the state taken anew", 1,
+      1'000'000, options.max_outer_iterations);
+  options.max_dt_s =
+      params.Positive("max_dt_s", "s", "longer gaps are stepped in equal parts", options.max_dt_s);
+  return options;
+}
+
+void MapSolve::HeedStop() const {
+  if (Stopped()) throw Error(ExitCode::kStopped, "stopped while the batch was solved");
+}
+
+void MapSolve::Note(Stamp stamp, std::vector<Event>& events) const {
+  if (!note_.empty()) events.push_back({stamp, "not_converged", note_});
+}
+
+bool MapSolve::SolveAll(Trajectory& trajectory, const Values& about, Eigen::VectorXd& e) {
+  if (!trajectory.Linearised(about, e) || !CanStart(trajectory, e)) {
+    e.setZero(trajectory.inputs());
+    if (!CanStart(trajectory, e)) return NowhereToStart(trajectory);
+  }
+  return SolveFrom(trajectory, e);
+}
+
+bool MapSolve::SolveAnew(Trajectory& trajectory, const Values& about, Eigen::VectorXd& e) {
+  const Eigen::Index before = e.size();
+  e.conservativeResize(trajectory.inputs());
+  e.tail(e.size() - before).setZero();
+  const bool old = !trajectory.has_unit_vector() && CanStart(trajectory, e);
+  if (!old && !(trajectory.Linearised(about, e) && CanStart(trajectory, e))) {
+    return NowhereToStart(trajectory);
+  }
+  return SolveFrom(trajectory, e);
+}
+
+bool MapSolve::NowhereToStart(const Trajectory& trajectory) {
+  failed_ = true;
+  note_.clear();
+  summary_ = "nowhere to start: " + trajectory.problem();
+  return false;
+}
+
+/// From e, at which Q and R are frozen.
+bool MapSolve::SolveFrom(Trajectory& trajectory, Eigen::VectorXd& e) {
+  const std::string solved = Minimise(trajectory, e);
+  HeedStop();
+  const bool defined = TakeLastStep(trajectory, e);
+  summary_ = "cost " + internal::RoundedText(at_.cost, 9) + ", " + solved + summary_;
+  if (!defined) summary_ += "; then " + trajectory.problem();
+  return defined;
+}
+
+/// Until Q and R settle. How it went; in summary_, why it failed.
+std::string MapSolve::Minimise(Trajectory& trajectory, Eigen::VectorXd& e) {
+  constexpr double kSettled = 1e-9;
+  int iterations = 0, outer = 0;
+  bool settled = false;
+  note_.clear();
+  summary_ = "the noise that depends on the state did not settle; a larger " +
+             Setting("max_outer_iterations", options_.max_outer_iterations) + " may do";
+  do {
+    HeedStop();
+    const ceres::Solver::Summary summary =
+        SolveFrozen(trajectory, e, options_.max_iterations, [this] { return Stopped(); });
+    HeedStop();
+    iterations += std::max(0, static_cast<int>(summary.iterations.size()) - 1);
+    ++outer;
+    at_.cost = summary.final_cost;
+    failed_ = summary.termination_type != ceres::CONVERGENCE || !std::isfinite(summary.final_cost);
+    if (failed_) summary_ = WhyNot(summary);
+    if (!failed_ && trajectory.robust()) iterations += IterateWeights(trajectory, e);
+    if (failed_) break;
+    if (!trajectory.Freeze(e.data())) {
+      summary_ = trajectory.problem();
+      break;
+    }
+    settled = trajectory.change() <= kSettled;
+  } while (!settled && outer < options_.max_outer_iterations);
+  failed_ = failed_ || !settled;
+  if (!failed_) summary_.clear();
+  return std::to_string(iterations) + " iterations in " + std::to_string(outer) +
+         (outer == 1 ? " solve: " : " solves: ");
+}
+
+std::string MapSolve::WhyNot(const ceres::Solver::Summary& summary) const {
+  if (!std::isfinite(summary.final_cost)) {
+    return "not converged, the cost is not finite: a measurement lies too far out; `use: "
+           "{accepted_by: FILTER}` leaves out what a filter gates";
+  }
+  const bool by_count = summary.termination_type == ceres::NO_CONVERGENCE;
+  return "not converged, " + summary.message +
+         (by_count ? " A larger " + Setting("max_iterations", options_.max_iterations) + " may do."
+                   : "");
+}
+
+/// U at e, and the Gauss-Newton step that it gives: Ceres stops before the last one. A solver that
+/// stopped where this step, |U step| sigmas, is long was not led down by the Jacobian that it was
+/// given. False where GaussNewtonAt is, or the step leads to where a model is not defined.
+bool MapSolve::TakeLastStep(Trajectory& trajectory, Eigen::VectorXd& e) {
+  constexpr double kLong = 1e-3, kRounding = 1e-6;
+  if (!GaussNewtonAt(trajectory, e, at_)) return false;
+  if (failed_) return true;
+  failed_ = !((at_.u * at_.step).norm() <= kLong + kRounding * std::sqrt(2.0 * at_.cost));
+  if (failed_) {
+    summary_ =
+        "not converged: no step lowers the cost although the gradient is not zero; check the "
+        "models' Jacobians with alidade check";
+    return true;
+  }
+  summary_ = "converged";
+  e += at_.step;
+  double unused = 0.0;
+  return !trajectory.has_landmarks() || CostAt(trajectory, e, unused);
+}
+
+/// Iteratively reweighted least squares (IRLS) converges linearly where the squared error does so
+/// quadratically: what is left below Ceres' tolerances counts. A step that raises the cost is not
+/// taken, and ends it. How many steps it took.
+int MapSolve::IterateWeights(Trajectory& trajectory, Eigen::VectorXd& e) {
+  // Of inputs whose sigma is 1; with landmarks a step takes longer.
+  const double settled = trajectory.has_landmarks() ? 1e-6 : 1e-10;
+  constexpr double kRounding = 1e-9;  // of the cost
+  constexpr double kTells = 1e-8;     // sigma
+  GaussNewton next;
+  note_.clear();
+  if (!GaussNewtonAt(trajectory, e, at_)) return 0;
+  int steps = 0;
+  for (bool lower = true; lower && at_.step.norm() > settled;) {
+    HeedStop();
+    const bool spent = steps == options_.max_iterations;
+    const Eigen::VectorXd moved = e + at_.step;
+    const bool defined = spent || GaussNewtonAt(trajectory, moved, next);
+    lower = !spent && defined && next.cost <= at_.cost * (1.0 + kRounding);
+    const double left = (at_.u * at_.step).norm();
+    if (lower) {
+      e = moved;
+      std::swap(at_, next);
+      ++steps;
+    } else if (left > kTells) {
+      note_ = "the weights of the losses did not settle in " + std::to_string(steps) +
+              " steps: the next one is " + internal::RoundedText(left, 3) + " sigma long; " +
+              (spent ? "a larger " + Setting("max_iterations", options_.max_iterations) + " may do"
+               : defined ? "it does not lower the cost"
+                         : "then " + trajectory.problem());
+    }
+  }
+  return steps;
+}
+
+}  // namespace alidade::ceres_batch

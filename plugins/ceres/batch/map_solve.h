@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "alidade/host/build_plugin.h"
+#include "condensed_run.h"
+#include "frozen_solve.h"
+
+namespace alidade::ceres_batch {
+
+struct SolveOptions {
+  int max_iterations = 50;
+  int max_outer_iterations = 20;
+  double max_dt_s = std::numeric_limits<double>::infinity();  ///< of a step of the motion
+};
+SolveOptions ReadSolveOptions(Params& params);
+
+/// The maximum a posteriori of a Trajectory: Q and R that depend on the state are frozen, the
+/// problem is solved, and so on until they settle.
+///
+/// With [I; sqrt(w) J_r_e] = Q U at the solution, where w are the weights of robust losses, 1
+/// without, Cov(e) = (U'U)^-1 and P_k = (U^-T S_k')'(U^-T S_k').
+class MapSolve {
+ public:
+  /// The values of all states, frame by frame.
+  using Values = std::vector<std::vector<double>>;
+
+  explicit MapSolve(const SolveOptions& options) : options_(options) {}
+
+  /// Where `stop` is true, a solve ends by an Error of kStopped.
+  void StopWhen(std::function<bool()> stop) { stop_ = std::move(stop); }
+  /// Solves from the problem linearised about `about`, or where that leaves the domain of a model,
+  /// from e = 0. False, and summary(), where there are no estimates.
+  bool SolveAll(Trajectory& trajectory, const Values& about, Eigen::VectorXd& e);
+  /// Solves from e, the solution before the last frame came, and new inputs at their mean. Where
+  /// that leaves the domain of a model, and with unit vectors, from the problem linearised about
+  /// `about`. False, and summary(), where there are no estimates.
+  bool SolveAnew(Trajectory& trajectory, const Values& about, Eigen::VectorXd& e);
+  /// y = U^-T S' of a point, as Trajectory::Put takes it.
+  Eigen::MatrixXd Whitened(const Trajectory::Point& point) const {
+    return at_.u.transpose().triangularView<Eigen::Lower>().solve(point.s.transpose());
+  }
+
+  bool failed() const { return failed_; }  ///< not converged, or not settled
+  const std::string& summary() const { return summary_; }
+  const Eigen::MatrixXd& u() const { return at_.u; }
+  /// The event `not_converged` where the weights of robust losses did not settle.
+  void Note(Stamp stamp, std::vector<Event>& events) const;
+  void HeedStop() const;
+
+ private:
+  bool SolveFrom(Trajectory& trajectory, Eigen::VectorXd& e);
+  bool NowhereToStart(const Trajectory& trajectory);
+  std::string Minimise(Trajectory& trajectory, Eigen::VectorXd& e);
+  int IterateWeights(Trajectory& trajectory, Eigen::VectorXd& e);
+  bool TakeLastStep(Trajectory& trajectory, Eigen::VectorXd& e);
+  std::string WhyNot(const ceres::Solver::Summary& summary) const;
+  bool Stopped() const { return stop_ && stop_(); }
+
+  SolveOptions options_;
+  std::function<bool()> stop_;
+  GaussNewton at_;  ///< at the solution
+  std::string summary_, note_;
+  bool failed_ = false;
+};
+
+}  // namespace alidade::ceres_batch

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "alidade/system/landmark_forms.h"
+#include "condensed_run.h"
+
+/// A Trajectory with landmarks as a problem in e alone, and the map that belongs to a solution.
+namespace alidade::ceres_batch {
+
+/// The points of e, by frame.
+bool Trajectory::PointsOf(const double* e, bool sensitivity, std::vector<Point>& points) const {
+  Point point;
+  if (!Begin(e, sensitivity, point)) return false;
+  for (std::size_t k = 0; k < epochs_.size(); ++k) {
+    if (!Advance(k, e, point)) return false;
+    points.push_back(point);
+  }
+  return true;
+}
+
+bool Trajectory::Reduce(const double* e, bool derivatives, Reduced& reduced) {
+  std::vector<Point> points;
+  return PointsOf(e, derivatives, points) &&
+         Project(e, points, Undefined::kFails, derivatives, reduced);
+}
+
+/// The measurements of no landmark.
+bool Trajectory::AddPlain(const std::vector<Point>& points, Undefined undefined,
+                          Information* information, double& cost) const {
+  const int n = initial_.covariance().size();
+  const auto d = std::ssize(read_);
+  Eigen::VectorXd r;
+  Eigen::MatrixXd a;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    for (const Factor& factor : epochs_[k].factors) {
+      if (factor.row < 0) continue;
+      if (!Residual(factor, points[k], {}, r, information != nullptr ? &a : nullptr)) {
+        if (undefined == Undefined::kFails) return false;
+        continue;
+      }
+      const RobustLoss& loss = SensorOf(factor).loss;
+      cost += Rho(loss, r.norm());
+      if (information == nullptr) continue;
+      const double w = Weight(loss, r.norm());
+      const Eigen::MatrixXd a_x = Packed(a.leftCols(n).transpose());
+      const auto here = d * static_cast<Eigen::Index>(k);
+      information->h.block(here, here, d, d).noalias() += w * a_x * a_x.transpose();
+      information->g.segment(here, d).noalias() += w * a_x * r;
+    }
+  }
+  return true;
+}
+
+/// phi and its derivatives at the points, from the landmarks settled there.
+bool Trajectory::Project(const double* e, const std::vector<Point>& points, Undefined undefined,
+                         bool derivatives, Reduced& reduced) {
+  const auto d = std::ssize(read_), size = d * std::ssize(points);
+  Information information;
+  if (derivatives) {
+    information.h = Eigen::MatrixXd::Zero(size, size);
+    information.g = Eigen::VectorXd::Zero(size);
+    information.first.resize(points.size());
+    std::iota(information.first.begin(), information.first.end(), std::size_t{0});
+  }
+  Information* const into = derivatives ? &information : nullptr;
+  reduced.cost = 0.5 * Eigen::Map<const Eigen::VectorXd>(e, inputs_).squaredNorm();
+  if (!AddPlain(points, undefined, into, reduced.cost)) return false;
+  Normal normal;
+  for (MapLandmark& landmark : landmarks_) {
+    if (!OptimiseLandmark(landmark, points, undefined) ||
+        !NormalOf(landmark, landmark.l, points, undefined, normal, into)) {
+      return false;
+    }
+    reduced.cost += normal.cost;
+    if (!derivatives || normal.b.size() == 0) continue;
+    // H -= B C^-1 B', g -= B C^-1 b
+    const Eigen::LLT<Eigen::MatrixXd> c(normal.c);
+    for (std::size_t i = 0; i < normal.epochs.size(); ++i) {
+      const auto row = d * static_cast<Eigen::Index>(normal.epochs[i]);
+      const Eigen::MatrixXd gain = c.solve(normal.ties[i].transpose()).transpose();
+      information.g.segment(row, d).noalias() -= gain * normal.b;
+      std::size_t& earliest = information.first[normal.epochs[i]];
+      earliest = std::min(earliest, normal.epochs.front());
+      for (std::size_t k = 0; k <= i; ++k) {
+        const auto column = d * static_cast<Eigen::Index>(normal.epochs[k]);
+        information.h.block(row, column, d, d).noalias() -= gain * normal.ties[k].transpose();
+      }
+    }
+  }
+  if (!derivatives) return true;
+  for (MapLandmark& landmark : landmarks_) landmark.from = landmark.l;
+  Assemble(e, points, information, reduced);
+  return (reduced.g.allFinite() && reduced.a.allFinite()) ||
+         Fail("the normal equations of the batch are not finite");
+}
+
+/// A = I + S' H S, g = e + S' (g_x + H offset), for S of all points, which is lower triangular by
+/// frames: no state depends on a later input.
+void Trajectory::Assemble(const double* e, const std::vector<Point>& points,
+                          const Information& information, Reduced& reduced) const {
+  const auto d = std::ssize(read_), size = d * std::ssize(points);
+  const Eigen::MatrixXd& h = information.h;
+  Eigen::MatrixXd s(size, inputs_), hs = Eigen::MatrixXd::Zero(size, inputs_);
+  Eigen::VectorXd offset(size);
+  const auto begin = [&](std::size_t k) {
+    return k < points.size() ? Eigen::Index{epochs_[k].column} : Eigen::Index{inputs_};
+  };
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const auto row = d * static_cast<Eigen::Index>(k);
+    s.middleRows(row, d) = Packed(points[k].s);
+    offset.segment(row, d) = points[k].offset(read_);
+  }
+  for (std::size_t k = 0; k < points.size(); ++k) {  // H S, H = L + L' by blocks
+    const auto row = d * static_cast<Eigen::Index>(k);
+    const auto first = d * static_cast<Eigen::Index>(information.first[k]);
+    const Eigen::MatrixXd own = h.block(row, row, d, d).selfadjointView<Eigen::Lower>();
+    const auto before = h.block(row, first, d, row - first);
+    const auto here = s.block(row, 0, d, begin(k + 1));
+    hs.block(row, 0, d, here.cols()).noalias() += own * here;
+    hs.block(row, 0, d, begin(k)).noalias() += before * s.block(first, 0, row - first, begin(k));
+    hs.block(first, 0, row - first, here.cols()).noalias() += before.transpose() * here;
+  }
+  reduced.a = Eigen::MatrixXd::Identity(inputs_, inputs_);
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const auto row = d * static_cast<Eigen::Index>(k), from = begin(k), to = begin(k + 1);
+    reduced.a.block(from, 0, to - from, to).noalias() +=
+        s.block(row, from, size - row, to - from).transpose() * hs.block(row, 0, size - row, to);
+  }
+  const Eigen::VectorXd g = information.g + h.selfadjointView<Eigen::Lower>() * offset;
+  reduced.g = Eigen::Map<const Eigen::VectorXd>(e, inputs_) + s.transpose() * g;
+}
+
+/// A landmark moves with e by M = J (J_y_x S_k - J_y_l C^-1 B' S), and by its own inputs besides:
+/// P = M Cov(e) M' + J J_y_l C^-1 J_y_l' J', with J = dp/dy.
+bool Trajectory::PutMap(const double* e, const Eigen::MatrixXd& u,
+                        std::vector<LandmarkEstimate>& map) {
+  std::vector<Point> points;
+  if (!PointsOf(e, true, points)) return false;
+  const auto size = std::ssize(read_) * std::ssize(points);
+  Information unused{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size), {}};
+  for (LandmarkEstimate& estimate : map) {
+    const auto found = std::ranges::find_if(landmarks_, [&](const MapLandmark& landmark) {
+      return landmark.id == estimate.id && landmark.generation == estimate.generation;
+    });
+    if (found == landmarks_.end() || found->l.size() == 0) continue;  // known exactly
+    Inverse place;
+    Normal normal;
+    if (!Place(*found, found->l, points, place) ||
+        !NormalOf(*found, found->l, points, Undefined::kSkipped, normal, &unused)) {
+      return false;
+    }
+    Eigen::MatrixXd m = Eigen::MatrixXd::Zero(normal.b.size(), inputs_);
+    for (std::size_t i = 0; i < normal.epochs.size(); ++i) {
+      m.noalias() += normal.ties[i].transpose() * Packed(points[normal.epochs[i]].s);
+    }
+    const Eigen::LLT<Eigen::MatrixXd> c(normal.c);
+    m = -place.by_d * c.solve(m);
+    if (found->first) m += place.by_x * points[found->first->epoch].s;
+    const Eigen::MatrixXd y = u.transpose().triangularView<Eigen::Lower>().solve(m.transpose());
+    const Eigen::MatrixXd p =
+        y.transpose() * y + place.by_d * c.solve(Eigen::MatrixXd(place.by_d.transpose()));
+    Describe(*found, p, estimate);
+  }
+  return true;
+}
+
+/// Place and covariance of a landmark whose blocks have the covariance p.
+void Trajectory::Describe(const MapLandmark& landmark, const Eigen::MatrixXd& p,
+                          LandmarkEstimate& estimate) const {
+  const std::optional<MapLandmark::Observation> any =
+      landmark.first ? landmark.first
+                     : (landmark.observations.empty() ? std::nullopt
+                                                      : std::optional(landmark.observations[0]));
+  if (!any) return;
+  const Factor& factor = epochs_[any->epoch].factors[any->factor];
+  const std::vector<Space>& roles = ModelOf(factor).roles();
+  estimate.form = FormOf(roles);
+  estimate.tried = estimate.accepted = static_cast<int>(landmark.observations.size());
+  if (!estimate.form) return;
+  const auto last = p.rows() - 1;
+  estimate.inverse_distance = IsXyz(*estimate.form) ? std::nan("") : landmark.y.back();
+  estimate.sigma = IsXyz(*estimate.form) ? std::nan("") : std::sqrt(p(last, last));
+  std::vector<const double*> blocks;
+  const double* next = landmark.y.data();
+  for (const Space& role : roles) {
+    if (!role.landmark()) continue;
+    blocks.push_back(next);
+    next += role.geometry.ambient;
+  }
+  estimate.position.setConstant(std::nan(""));
+  estimate.covariance.setConstant(std::nan(""));
+  const auto point = internal::PointOf(*estimate.form, blocks.data());
+  if (!point) return;
+  estimate.position = point->position;
+  estimate.covariance = point->jacobian * p * point->jacobian.transpose();
+}
+
+}  // namespace alidade::ceres_batch

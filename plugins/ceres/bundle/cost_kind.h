@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <type_traits>
+#include <vector>
+
+#include "alidade/base/error.h"
+#include "alidade/host/model_instance.h"
+#include "alidade/model/autodiff.h"
+
+namespace alidade::ceres_batch {
+
+/// Where the value of a role stands: `offset` numbers into parameter block `block` of the cost.
+struct RolePlace {
+  int block = -1;  ///< -1: an optional role that is not bound
+  int offset = 0;
+};
+
+/// An element of the Jacobian by a parameter block, row-major.
+struct JacobianElement {
+  int block, index;
+};
+
+namespace detail {
+
+/// What is asked of a sensor: a model of alidade/model/model.h, which the compiler sees through.
+template <class Sensor>
+struct SensorTraits {
+  using Z = typename Sensor::Measurement;
+  using Roles = alidade::detail::Blocks<Sensor>;
+  static constexpr int kMaxRoles = Roles::kCount;
+  static constexpr Geometry Measured(const Sensor&) {
+    return {GeometryKind{Z::kGeometry}, Z::kAmbient, Z::kTangent};
+  }
+  static std::vector<Geometry> Geometries(const Sensor&) {
+    std::vector<Geometry> all;
+    const auto add = [&](auto index) {
+      using G = alidade::detail::SpaceAt<decltype(index)::value, Sensor>;
+      all.push_back({GeometryKind{G::kGeometry}, G::kAmbient, G::kTangent});
+    };
+    alidade::detail::ForEach(add, typename Roles::Indices{});
+    return all;
+  }
+  ALIDADE_FLATTEN ALIDADE_SCALAR_LOOPS static Status Linearise(const Sensor& sensor,
+                                                               const double* const* roles,
+                                                               double* z, double* const* jacobians,
+                                                               const int* strides) {
+    return Evaluate(sensor, roles, z, jacobians, strides);
+  }
+};
+
+/// And of one behind the boundary of plugins.
+template <>
+struct SensorTraits<SensorModel> {
+  static constexpr int kMaxRoles = 64;  // as many as a model may have
+  static Geometry Measured(const SensorModel& sensor) { return sensor.measurement().geometry; }
+  static std::vector<Geometry> Geometries(const SensorModel& sensor) {
+    std::vector<Geometry> all;
+    for (const Space& role : sensor.roles()) all.push_back(role.geometry);
+    return all;
+  }
+  static Status Linearise(const SensorModel& sensor, const double* const* roles, double* z,
+                          double* const* jacobians, const int* strides) {
+    return sensor.Linearise(roles, z, jacobians, strides);
+  }
+};
+
+}  // namespace detail
+
+/// What costs of a kind share: the sensor, the places of its roles in the parameter blocks, and the
+/// noise, by W = L^-1, R = L L'.
+template <class Sensor>
+struct CostKind {
+  using Traits = detail::SensorTraits<Sensor>;
+
+  /// `blocks` are the ambient sizes of the parameter blocks. `whiten` = W is lower triangular,
+  /// row-major, of the size of the tangent of z. No two roles may share a place; the sensor must
+  /// outlive this.
+  CostKind(const Sensor& model, const std::vector<RolePlace>& roles, const std::vector<int>& blocks,
+           const std::vector<double>& whiten)
+      : sensor(model), sizes(blocks), w(whiten) {
+    const std::vector<Geometry> geometries = Traits::Geometries(model);
+    const auto m = static_cast<std::size_t>(measured().tangent);
+    ALIDADE_EXPECTS(roles.size() == geometries.size() && w.size() == m * m);
+    std::vector<std::vector<bool>> taken, written;  // elements of each block
+    for (const int size : blocks) taken.emplace_back(static_cast<std::size_t>(size), false);
+    written = taken;
+    role_count_ = static_cast<int>(roles.size());
+    for (std::size_t i = 0; i < roles.size(); ++i) {
+      places[i] = roles[i];
+      if (roles[i].block < 0) continue;
+      const auto block = static_cast<std::size_t>(roles[i].block);
+      ALIDADE_EXPECTS(block < blocks.size() && roles[i].offset >= 0 &&
+                      roles[i].offset + geometries[i].ambient <= blocks[block]);
+      strides[i] = blocks[block];
+      for (int k = 0; k < geometries[i].ambient; ++k) {
+        const std::size_t at =
+            static_cast<std::size_t>(roles[i].offset) + static_cast<std::size_t>(k);
+        ALIDADE_EXPECTS(!taken[block][at]);
+        taken[block][at] = true;
+        written[block][at] = k < geometries[i].tangent;
+      }
+    }
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      for (int k = 0; k < static_cast<int>(m) * blocks[i]; ++k) {
+        if (!written[i][static_cast<std::size_t>(k % blocks[i])])
+          unwritten.push_back({static_cast<int>(i), k});
+      }
+    }
+    scale = w[0];
+    for (std::size_t i = 0; i < w.size(); ++i)
+      isotropic = isotropic && w[i] == (i % (m + 1) == 0 ? scale : 0.0);
+  }
+
+  int role_count() const { return kStatic ? Traits::kMaxRoles : role_count_; }
+  /// The geometry of z.
+  Geometry measured() const { return kStatic ? Traits::Measured(sensor) : measured_; }
+
+  const Sensor& sensor;
+  double scale = 1.0;
+  bool isotropic = true;                   ///< W = scale I
+  RolePlace places[Traits::kMaxRoles];     ///< read at each evaluation, and so an array
+  int strides[Traits::kMaxRoles] = {};     ///< of the Jacobians by the roles
+  std::vector<int> sizes;                  ///< of the blocks
+  std::vector<double> w;                   ///< W, row-major
+  std::vector<JacobianElement> unwritten;  ///< by any role: zero
+
+ private:
+  /// Of a model that the compiler sees through they are constants.
+  static constexpr bool kStatic = !std::is_same_v<Sensor, SensorModel>;
+  int role_count_ = 0;
+  Geometry measured_ = Traits::Measured(sensor);
+};
+
+}  // namespace alidade::ceres_batch

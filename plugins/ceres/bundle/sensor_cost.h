@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <ceres/cost_function.h>
+
+#include <algorithm>
+
+#include "cost_kind.h"
+#include "plugins/ceres/difference.h"
+
+namespace alidade::ceres_batch {
+
+/// The factor of a measurement, made of the sensor's own h:
+///
+///   r = -W (z (-) h(roles)),   W = L^-1,   R = L L'
+///
+/// The sign is of no account to a cost, and so the Jacobian W H needs no pass where W is 1.
+/// Jacobians are in the tangent of each role, [J | 0] in its ambient columns: see GeometryManifold.
+/// `Sensor` is a SensorModel or a model itself. Evaluate is false where h is not defined, and
+/// allocates nothing. In a large problem each cost is far memory: it is as small as may be.
+template <class Sensor>
+class SensorCost final : public ceres::CostFunction {
+  using Traits = detail::SensorTraits<Sensor>;
+
+ public:
+  /// `z`, ambient. The kind must outlive the cost, and z of more than three numbers too.
+  SensorCost(const CostKind<Sensor>& kind, const double* z) : kind_(kind) {
+    if (kind.measured().ambient <= kNear) {
+      std::copy_n(z, kind.measured().ambient, z_.near);
+    } else {
+      z_.far = z;
+    }
+    set_num_residuals(kind.measured().tangent);
+    *mutable_parameter_block_sizes() = kind.sizes;
+  }
+
+  ALIDADE_SCALAR_LOOPS bool Evaluate(const double* const* blocks, double* residuals,
+                                     double** jacobians) const override {
+    const double* const z = kind_.measured().ambient <= kNear ? z_.near : z_.far;
+    __builtin_prefetch(z);  // near or far, in another cache line; not needed until h is there
+    const double* roles[Traits::kMaxRoles];
+    double* j[Traits::kMaxRoles];
+    Bind(blocks, jacobians, roles, j);
+    double** const wanted = jacobians == nullptr ? nullptr : j;
+    if (kind_.measured().kind != GeometryKind::kVector || !kind_.isotropic)
+      return General(z, roles, wanted, residuals, jacobians);
+    if (Traits::Linearise(kind_.sensor, roles, residuals, wanted, kind_.strides) != Status::kOk)
+      return false;
+    const int m = kind_.measured().tangent;
+    const double scale = kind_.scale;
+    for (int i = 0; i < m; ++i) residuals[i] = scale * (residuals[i] - z[i]);
+    if (jacobians != nullptr && scale != 1.0) WhitenAll(jacobians, 1.0);
+    return true;
+  }
+
+ private:
+  /// Where the roles are, and where the Jacobian by each goes.
+  void Bind(const double* const* blocks, double** jacobians, const double** roles,
+            double** j) const {
+    for (int i = 0; i < kind_.role_count(); ++i) {
+      const auto [block, offset] = kind_.places[i];
+      roles[i] = block < 0 ? nullptr : blocks[block] + offset;
+      const bool wanted = jacobians != nullptr && block >= 0 && jacobians[block] != nullptr;
+      j[i] = wanted ? jacobians[block] + offset : nullptr;
+    }
+    if (jacobians == nullptr) return;
+    for (const auto [block, index] : kind_.unwritten) {
+      if (jacobians[block] != nullptr) jacobians[block][index] = 0.0;
+    }
+  }
+
+  /// Where z is no vector, or its noise correlated. Out of line, so that Evaluate stays small.
+  [[gnu::noinline]] bool General(const double* z, const double* const* roles, double* const* j,
+                                 double* residuals, double** jacobians) const {
+    const GeometryKind geometry = kind_.measured().kind;
+    if (geometry == GeometryKind::kUnitQuaternion)
+      return Curved<UnitQuaternion>(z, roles, j, residuals, jacobians);
+    if (geometry == GeometryKind::kUnitVector)
+      return Curved<UnitVector>(z, roles, j, residuals, jacobians);
+    if (Traits::Linearise(kind_.sensor, roles, residuals, j, kind_.strides) != Status::kOk)
+      return false;
+    for (int i = 0; i < kind_.measured().tangent; ++i) residuals[i] -= z[i];
+    if (geometry == GeometryKind::kAngle) residuals[0] = -Angle::Wrap(-residuals[0]);
+    Whiten(residuals, 1, 1.0);
+    WhitenAll(jacobians, 1.0);
+    return true;
+  }
+
+  /// Where z is on a manifold G, of 2 or 3 dimensions.
+  template <class G>
+  bool Curved(const double* z, const double* const* roles, double* const* j, double* residuals,
+              double** jacobians) const {
+    constexpr int m = G::kTangent;
+    double h[G::kAmbient], slope[m * m];
+    if (Traits::Linearise(kind_.sensor, roles, h, j, kind_.strides) != Status::kOk) return false;
+    Difference<G>(z, h, residuals, j == nullptr ? nullptr : slope);
+    Whiten(residuals, 1, -1.0);
+    for (std::size_t i = 0; jacobians != nullptr && i < kind_.sizes.size(); ++i) {
+      for (int c = 0; jacobians[i] != nullptr && c < kind_.sizes[i]; ++c) {
+        double before[m];
+        for (int r = 0; r < m; ++r) before[r] = jacobians[i][r * kind_.sizes[i] + c];
+        for (int r = 0; r < m; ++r) {
+          double sum = 0.0;
+          for (int k = 0; k < m; ++k) sum += slope[r * m + k] * before[k];
+          jacobians[i][r * kind_.sizes[i] + c] = sum;
+        }
+      }
+    }
+    WhitenAll(jacobians, -1.0);
+    return true;
+  }
+
+  [[gnu::noinline]] void WhitenAll(double** jacobians, double sign) const {
+    if (jacobians == nullptr) return;
+    const int* const sizes = kind_.sizes.data();
+    for (std::size_t i = 0; i < kind_.sizes.size(); ++i) {
+      if (jacobians[i] != nullptr) Whiten(jacobians[i], sizes[i], sign);
+    }
+  }
+  /// a <- sign W a, in place: from the last row up, as W is lower triangular.
+  void Whiten(double* a, int columns, double sign) const {
+    const int m = kind_.measured().tangent;
+    if (kind_.isotropic) {
+      const double factor = sign * kind_.scale;
+      if (factor == 1.0) return;
+      for (int i = 0; i < m * columns; ++i) a[i] *= factor;
+      return;
+    }
+    for (int r = m - 1; r >= 0; --r) {
+      double* const row = a + r * columns;
+      const double* const w = kind_.w.data() + r * m;
+      for (int c = 0; c < columns; ++c) {
+        double sum = w[r] * row[c];
+        for (int k = 0; k < r; ++k) sum += w[k] * a[k * columns + c];
+        row[c] = sign * sum;
+      }
+    }
+  }
+
+  const CostKind<Sensor>& kind_;
+  static constexpr int kNear = 3;
+  union {
+    double near[kNear];  ///< z of no more numbers than these
+    const double* far;   ///< where a longer one is
+  } z_;
+};
+
+}  // namespace alidade::ceres_batch

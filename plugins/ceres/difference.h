@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+
+#include "alidade/model/autodiff.h"
+
+namespace alidade::ceres_batch {
+
+/// d = z (-) h and, where j is not null, dd/dh (row-major) in the tangent at h.
+template <class G>
+void Difference(const double* z, const double* h, double* d, double* j) {
+  using Jet = ceres::Jet<double, G::kTangent>;
+  Jet moved[G::kAmbient], difference[G::kTangent];
+  alidade::detail::LiftOne<G>(h, 0, moved);
+  G::Minus(z, moved, difference);
+  for (int i = 0; i < G::kTangent; ++i) {
+    d[i] = difference[i].a;
+    if (j != nullptr) std::copy_n(difference[i].v.data(), G::kTangent, j + i * G::kTangent);
+  }
+}
+
+}  // namespace alidade::ceres_batch

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/base/statistics.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "alidade/base/error.h"
+#include "alidade/base/random.h"
+
+namespace alidade {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+// Quantiles that tables of chi-square give.
+TEST(ConsistencyBounds, AreThoseOfAChiSquareMean) {
+  // chi2(0.025; 200) = 162.728, chi2(0.975; 200) = 241.058: [BarShalom2001], table 1.5.4-1.
+  const Interval bounds = ConsistencyBounds(2.0, 100.0);
+  EXPECT_NEAR(bounds.low, 162.728 / 200.0, 1e-5);
+  EXPECT_NEAR(bounds.high, 241.058 / 200.0, 1e-5);
+}
+
+// The mean of 50 values of chi2(1) below the 90 % gate lies within in 95 % of 4000 cases, and that
+// of all values in fewer than 5 %: the gate takes its mean down to 0.62.
+TEST(ConsistencyBounds, KnowWhatAGateCutsOff) {
+  const double gate = ChiSquareQuantile(0.9, 1);
+  const Interval bounds = ConsistencyBounds(1.0, 50.0, gate);
+  Random random(3);
+  int inside = 0;
+  constexpr int kCases = 4000;
+  for (int i = 0; i < kCases; ++i) {
+    double sum = 0.0;
+    for (int n = 0; n < 50;) {
+      const double x = random.Normal();
+      if (x * x > gate) continue;
+      sum += x * x;
+      ++n;
+    }
+    inside += sum / 50.0 >= bounds.low && sum / 50.0 <= bounds.high;
+  }
+  // Five standard deviations, and 1 % for the shape: two moments of the sum are matched.
+  EXPECT_NEAR(inside / double{kCases}, 0.95, 5.0 * std::sqrt(0.95 * 0.05 / kCases) + 0.01);
+  EXPECT_LT(bounds.high, 1.0);
+}
+
+// Squares of x' = a x + sqrt(1 - a^2) w have rho(k) = a^(2 k), tau = (1 + a^2) / (1 - a^2).
+TEST(AutocorrelationTime, IsThatOfAFirstOrderProcess) {
+  for (const double a : {0.0, 0.7, 0.95}) {
+    Random random(5);
+    double x = random.Normal();
+    std::vector<double> squares;
+    for (int i = 0; i < 100'000; ++i) {
+      squares.push_back(x * x);
+      x = a * x + std::sqrt(1.0 - a * a) * random.Normal();
+    }
+    const double tau = (1.0 + a * a) / (1.0 - a * a);
+    EXPECT_NEAR(AutocorrelationTime(squares, 1.0) / tau, 1.0, 0.15) << a;
+  }
+}
+
+TEST(AutocorrelationTime, IsFromOneToTheLength) {
+  EXPECT_EQ(AutocorrelationTime({}, 1.0), 1.0);
+  EXPECT_EQ(AutocorrelationTime({1.0, 1.0}, 1.0), 1.0);
+  // Constant and far from its mean: rho(k) = (n - k) / n, all pairs: tau = n.
+  EXPECT_NEAR(AutocorrelationTime(std::vector<double>(100, 58.0), 1.0), 100.0, 1e-9);
+}
+
+TEST(ChiSquareQuantile, AgreesWithTables) {
+  EXPECT_NEAR(ChiSquareQuantile(0.95, 1), 3.841458820694124, 1e-12);
+  EXPECT_NEAR(ChiSquareQuantile(0.95, 2), 5.991464547107979, 1e-12);
+  EXPECT_NEAR(ChiSquareQuantile(0.5, 3), 2.365973884375338, 1e-12);
+  EXPECT_NEAR(ChiSquareQuantile(0.99, 6), 16.811893829770927, 1e-11);
+  EXPECT_NEAR(ChiSquareQuantile(0.999, 2), -2.0 * std::log(0.001), 1e-11);
+  EXPECT_EQ(ChiSquareQuantile(0.0, 2), 0.0);
+  EXPECT_TRUE(std::isinf(ChiSquareQuantile(1.0, 2)));
+  EXPECT_THROW(ChiSquareQuantile(0.5, 0), ContractViolation);
+  EXPECT_THROW(ChiSquareQuantile(1.5, 1), ContractViolation);
+}
+
+TEST(Lag, FindsTheShiftOfASineToAHundredthOfASample) {
+  // Two periods of 75.76 samples, as in [Ekf2017]; scale and offset do not matter.
+  const double rate = 2.0 * kPi * 0.4 * 0.033;
+  for (const double shift : {0.0, 0.3, -0.45, 0.5, 3.7, -6.25, 11.2}) {
+    std::vector<double> reference, signal;
+    for (int i = 0; i < 152; ++i) {
+      reference.push_back(0.3 + 0.1 * std::sin(rate * i));
+      signal.push_back(-2.0 + 0.07 * std::sin(rate * (i - shift)));
+    }
+    EXPECT_NEAR(Lag(signal, reference, 1.0), shift, 0.01) << shift;
+    EXPECT_NEAR(Lag(signal, reference, 33.0), 33.0 * shift, 0.33) << shift;
+  }
+}
+
+/// f(i - shift) for i = 0 .. n - 1.
+template <class Function>
+std::vector<double> Sampled(int n, double shift, const Function& f) {
+  std::vector<double> values;
+  for (int i = 0; i < n; ++i) values.push_back(f(i - shift));
+  return values;
+}
+
+TEST(Lag, FindsTheShiftOfARamp) {
+  const auto straight = [](double i) { return 50.0 - 0.8 * i; };
+  const auto bent = [](double i) { return 50.0 - 0.8 * i + 0.002 * i * i; };
+  for (const double shift : {0.0, 0.3, -3.6, 11.2}) {
+    // Exact for a straight line: the mean square is a parabola of the shift.
+    EXPECT_NEAR(Lag(Sampled(100, shift, straight), Sampled(100, 0.0, straight), 1.0), shift, 1e-9);
+    EXPECT_NEAR(Lag(Sampled(100, shift, bent), Sampled(100, 0.0, bent), 1.0), shift, 0.02);
+  }
+  // Noise of 0.3, of which the mean over 100 samples is worth 0.3 / sqrt(100) / 0.8 samples.
+  Random random(1);
+  const auto noisy = [&](double i) { return straight(i) + 0.3 * random.Normal(); };
+  EXPECT_NEAR(Lag(Sampled(100, 2.5, noisy), Sampled(100, 0.0, straight), 1.0), 2.5, 0.15);
+}
+
+TEST(Lag, OfARampTakesAnOffsetForDelay) {
+  const auto ramp = [](double i) { return 0.5 * i; };
+  const auto low = [&](double i) { return ramp(i) - 1.0; };  // 1 at 0.5 a sample: 2 samples
+  EXPECT_NEAR(Lag(Sampled(60, 3.0, low), Sampled(60, 0.0, ramp), 1.0), 5.0, 1e-9);
+}
+
+TEST(Lag, IsUnknownAtTheEdgeOfTheSearch) {
+  // A quarter of 80 samples is as far as it looks.
+  const auto ramp = [](double i) { return 0.5 * i; };
+  const auto pulse = [](double i) { return std::exp(-0.02 * (i - 25.0) * (i - 25.0)); };
+  EXPECT_NEAR(Lag(Sampled(80, 19.0, ramp), Sampled(80, 0.0, ramp), 1.0), 19.0, 1e-9);
+  EXPECT_TRUE(std::isnan(Lag(Sampled(80, 20.0, ramp), Sampled(80, 0.0, ramp), 1.0)));
+  EXPECT_TRUE(std::isnan(Lag(Sampled(80, -31.0, ramp), Sampled(80, 0.0, ramp), 1.0)));
+  EXPECT_NEAR(Lag(Sampled(80, 12.0, pulse), Sampled(80, 0.0, pulse), 1.0), 12.0, 0.1);
+  EXPECT_TRUE(std::isnan(Lag(Sampled(80, 25.0, pulse), Sampled(80, 0.0, pulse), 1.0)));
+}
+
+TEST(Lag, IsUnknownWithoutAnythingToMatch) {
+  const std::vector<double> constant(50, 0.1), few = {1.0, 2.0, 1.0};
+  std::vector<double> wave, broken;
+  for (int i = 0; i < 50; ++i) wave.push_back(std::sin(0.3 * i));
+  broken = wave;
+  broken[7] = std::nan("");
+  EXPECT_TRUE(std::isnan(Lag(wave, constant, 1.0)));
+  EXPECT_TRUE(std::isnan(Lag(constant, wave, 1.0)));
+  EXPECT_TRUE(std::isnan(Lag(broken, wave, 1.0)));
+  EXPECT_TRUE(std::isnan(Lag(few, few, 1.0)));
+}
+
+// 3, 3, 1.5, then 1: the first window in the band begins at the third value, sqrt((1.5^2 + 9) / 10)
+// = 1.06, and ends at the 12th.
+TEST(Settling, CountsUntilTheWindowStaysInTheBand) {
+  std::vector<double> rms(60, 1.0);
+  rms[0] = rms[1] = 3.0;
+  rms[2] = 1.5;
+  EXPECT_EQ(SettlingOf(rms).level, 1.0);
+  EXPECT_EQ(SettlingOf(rms).count, 12.0);
+  for (double& value : rms) value *= 1e-6;
+  EXPECT_EQ(SettlingOf(rms).count, 12.0);
+  rms[30] = 3e-6;  // the median does not see it; sqrt((9 + 9) / 10) = 1.34 until it has passed
+  EXPECT_EQ(SettlingOf(rms).count, 41.0);
+  EXPECT_EQ(SettlingOf(std::vector<double>(40, 0.0)).count, 10.0);
+}
+
+TEST(Settling, IsInfiniteWhereTheEndIsOffTheLevel) {
+  std::vector<double> rms(60, 1.0);
+  rms.back() = 3.0;
+  EXPECT_TRUE(std::isinf(SettlingOf(rms).count));
+  EXPECT_TRUE(std::isnan(SettlingOf(std::vector<double>(39, 1.0)).count));
+}
+
+}  // namespace
+}  // namespace alidade

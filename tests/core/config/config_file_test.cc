@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <ctime>
+#include <fstream>
+#include <string>
+
+#include "alidade/config/config.h"
+#include "alidade/config/tree.h"
+#include "support/temporary_folder.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kFaults = fs::path(ALIDADE_SOURCE_DIR) / "tests/faults/config";
+
+/// The error that `call` must fail with, as `CODE message`.
+template <class Call>
+std::string Failure(const Call& call) {
+  try {
+    call();
+  } catch (const Error& e) {
+    return std::to_string(static_cast<int>(e.code())) + ' ' + e.what();
+  }
+  return "no error";
+}
+
+/// The failure of a file in tests/faults/config, without the name of the folder.
+std::string FaultOf(const std::string& name) {
+  std::string message = Failure([&] { Config::FromFile(kFaults / name); });
+  const std::string folder = kFaults.string() + '/';
+  if (const auto at = message.find(folder); at != std::string::npos)
+    message.erase(at, folder.size());
+  return message;
+}
+
+std::string TextError(std::string_view text) {
+  return Failure([&] { Config::FromText(text, "f"); });
+}
+
+std::string Repeated(std::string_view part, std::size_t size) {
+  std::string text;
+  while (text.size() < size) text += part;
+  return text;
+}
+
+class ConfigFolder : public ::testing::Test {
+ protected:
+  fs::path Write(const std::string& name, const std::string& text) const {
+    const fs::path file = folder_ / name;
+    fs::create_directories(file.parent_path());
+    std::ofstream(file, std::ios::binary) << text;
+    return file;
+  }
+
+  /// The failure of reading `name`, with the folder shown as `D/`.
+  std::string Fault(const std::string& name) const {
+    std::string message = Failure([&] { Config::FromFile(folder_ / name); });
+    const std::string folder = folder_.path().string();
+    for (std::size_t at; (at = message.find(folder)) != std::string::npos;) {
+      message.replace(at, folder.size(), "D");
+    }
+    return message;
+  }
+
+  testing::TemporaryFolder folder_;
+};
+
+TEST(ConfigFile, RefusesWhatIsNotStrict) {
+  EXPECT_EQ(FaultOf("01_duplicate_key.yaml"),
+            "78 01_duplicate_key.yaml:5:3 sensors.stereo: duplicate key; first at line 3");
+  EXPECT_EQ(FaultOf("13_self_reference.yaml"),
+            "78 13_self_reference.yaml:2:8 a: alias refers to itself");
+  EXPECT_EQ(FaultOf("16_tab.yaml"), "78 16_tab.yaml:2:1: tab in the indentation; expected spaces");
+  EXPECT_EQ(FaultOf("17_invalid_utf8.yaml"),
+            "78 17_invalid_utf8.yaml:2:10: invalid UTF-8; expected UTF-8 text");
+  EXPECT_EQ(FaultOf("17_nul.yaml"), "78 17_nul.yaml:2:8: NUL byte; expected text");
+  EXPECT_EQ(FaultOf("19_merge_key.yaml"),
+            "78 19_merge_key.yaml:3:3 stereo: merge key '<<' is not supported; "
+            "expected the keys themselves");
+  EXPECT_EQ(FaultOf("20_second_document.yaml"),
+            "78 20_second_document.yaml:2:1: second document; expected one document in a file");
+  EXPECT_EQ(FaultOf("21_empty.yaml"), "78 21_empty.yaml: file is empty; expected a map of keys");
+}
+
+TEST(ConfigFile, AcceptsByteOrderMarkAndCrlf) {
+  const Config config = Config::FromFile(kFaults / "18_bom_crlf.yaml");
+  EXPECT_EQ(config.root().At("alidade").Integer(1, 1), 1);
+  EXPECT_EQ(config.root().At("name").Text(), "stereo");
+  EXPECT_EQ(config.root().At("name").place().line, 2);
+}
+
+TEST(ConfigFile, NeverExpandsShellText) {
+  const Config config = Config::FromFile(kFaults / "24_shell.yaml");
+  EXPECT_EQ(config.root().At("home").Text(), "$HOME");
+  EXPECT_EQ(config.root().At("list").Text(), "`ls` $(ls) ${HOME}");
+  EXPECT_EQ(config.root().At("tilde").Text(), "~/data");
+}
+
+TEST(ConfigFile, AliasBombStaysSmall) {
+  static_assert(internal::Budget::kMaxNodes * sizeof(ConfigTree) < 32u << 20);
+  EXPECT_EQ(FaultOf("12_alias_bomb.yaml"),
+            "78 12_alias_bomb.yaml:6:8 f: too large with its aliases expanded; "
+            "expected at most 100000 values");
+  const std::string lines = "a: &a \"" + std::string(500'000, 'x') + "\"\nb: [";
+  EXPECT_EQ(TextError(lines + Repeated("*a, ", 40'000) + "]"),
+            "78 f:2:65 b: too large with its aliases expanded; expected at most 8 MiB of text");
+}
+
+TEST(ConfigFile, AliasIsACopy) {
+  const Config config = Config::FromText("a: &x {b: [1, 2]}\nc: *x\n", "f");
+  const Node copy = config.root().At("c").At("b").Items()[1];
+  EXPECT_EQ(copy.Number(), 2.0);
+  EXPECT_EQ(copy.path(), "c.b[1]");
+  EXPECT_EQ(copy.place().line, 1);
+}
+
+TEST(ConfigFile, DeepNestingFailsEarly) {
+  constexpr std::size_t kSize = 1'000'000;
+  const std::clock_t start = std::clock();
+  for (const char* part : {"[", "{a: ", "- ", "[\n", "[{"}) {
+    const std::string message = TextError(Repeated(part, kSize));
+    EXPECT_NE(message.find("nested too deep; expected at most 64 levels"), std::string::npos)
+        << part << message;
+  }
+  std::string chain = "a0: &a0 [1]\n";
+  for (int i = 1; i < 20'000; ++i) {
+    const std::string last = std::to_string(i - 1), next = std::to_string(i);
+    chain += "a" + next + ": &a" + next + " [*a" + last + "]\n";
+  }
+  EXPECT_NE(TextError(Repeated("? ", kSize)), "no error");
+  EXPECT_EQ(TextError(chain), "78 f:64:12: nested too deep; expected at most 64 levels");
+  // About 10 ms; a scanner that reads on to the end takes seconds in a debug build.
+  EXPECT_LT(std::clock() - start, 2 * CLOCKS_PER_SEC);
+}
+
+TEST(ConfigFile, SixtyFourLevelsAreRead) {
+  const std::string open = "a: " + Repeated("[", 63), close = Repeated("]", 63);
+  EXPECT_EQ(TextError(open + close), "no error");
+  EXPECT_EQ(TextError(open + "[" + "]" + close),
+            "78 f:1:67: nested too deep; expected at most 64 levels");
+}
+
+TEST(ConfigFile, OneMebibyteIsTheLimit) {
+  const std::string text = "a: 1\n#";
+  constexpr std::size_t kLimit = 1 << 20;
+  EXPECT_EQ(TextError(text + std::string(kLimit - text.size(), 'x')), "no error");
+  EXPECT_EQ(TextError(text + std::string(kLimit + 1 - text.size(), 'x')),
+            "78 f: larger than 1 MiB; expected a config of at most 1 MiB");
+}
+
+TEST(ConfigFile, RefusesOddEncodings) {
+  EXPECT_EQ(TextError("a: \xC0\x80"), "78 f:1:4: invalid UTF-8; expected UTF-8 text");
+  EXPECT_EQ(TextError("a: \xED\xA0\x80"), "78 f:1:4: invalid UTF-8; expected UTF-8 text");
+  EXPECT_EQ(TextError("a: \xF4\x90\x80\x80"), "78 f:1:4: invalid UTF-8; expected UTF-8 text");
+  EXPECT_EQ(TextError("a: \xE2\x82"), "78 f:1:4: invalid UTF-8; expected UTF-8 text");
+  EXPECT_EQ(TextError("\xFF\xFE"
+                      "a"),
+            "78 f:1:1: invalid UTF-8; expected UTF-8 text");
+  EXPECT_EQ(TextError("a: 1\n\xEF\xBB\xBF"
+                      "b: 1"),
+            "78 f:2:1: byte order mark inside the text");
+  EXPECT_EQ(TextError("a: 1\rb: 1"), "78 f:1:5: carriage return without a line feed");
+  EXPECT_EQ(TextError("a: \x07"), "78 f:1:4: control character 0x07");
+  EXPECT_EQ(TextError("a: \"\\0\""), "78 f:1:4 a: NUL character in a text");
+  EXPECT_EQ(TextError("a: \"\\_\""), "78 f:1:4 a: escape that is not a character");
+  EXPECT_EQ(TextError("a: \xF0\x9F\xA7\xAD \xC3\xA9 \xE2\x82\xAC"), "no error");
+}
+
+TEST(ConfigFile, RefusesOddKeysAndTags) {
+  EXPECT_EQ(TextError("? [a]\n: 1"),
+            "78 f:1:3: a list is used as a key, or '[' is not closed; expected text");
+  EXPECT_EQ(TextError("{{a: 1}: 1}"),
+            "78 f:1:2: a map is used as a key, or '{' is not closed; expected text");
+  EXPECT_EQ(TextError("a: {'': 1}"), "78 f:1:5 a: empty key; expected text");
+  EXPECT_EQ(TextError("~: 1"), "78 f:1:1: empty key; expected text");
+  EXPECT_EQ(TextError("a: &x b\n*x : 1"), "78 f:2:1: an alias is used as a key; expected text");
+  EXPECT_EQ(TextError("a: !env HOME"), "78 f:1:4 a: tag '!env' is not supported");
+  EXPECT_EQ(TextError("a: !!int 1"), "78 f:1:4 a: tag '!!int' is not supported");
+}
+
+TEST(ConfigFile, SyntaxErrorsHavePlaceAndKey) {
+  EXPECT_EQ(TextError("a:\n  b: [1, 2\n"),
+            "78 f:2:6 a.b: not valid YAML: '[' is not closed, or a comma is missing");
+  EXPECT_EQ(TextError("a:\n    b: 1\n  c: 2\n"),
+            "78 f:3:3: not valid YAML: wrong indentation, or text after a value");
+  EXPECT_EQ(TextError("a: *nothing"),
+            "78 f:1:4 a: not valid YAML: the referenced anchor is not defined");
+  EXPECT_EQ(TextError("a:1"), "78 f:1:1: 'a:1'; expected a map of keys, as in 'key: value'");
+  EXPECT_EQ(TextError("a: 1\n...\nb: 1"),
+            "78 f:3:1: text after the end of the document; expected one document in a file");
+}
+
+TEST_F(ConfigFolder, MissingFileAndFolderAreInputMissing) {
+  EXPECT_EQ(Fault("no.yaml"), "66 D/no.yaml: cannot be read: No such file or directory");
+  EXPECT_EQ(Fault(""), "66 D/: cannot be read: it is a directory");
+}
+
+TEST_F(ConfigFolder, UnreadableFileIsInputMissing) {
+  const fs::path file = Write("f.yaml", "a: 1");
+  fs::permissions(folder_.path(), fs::perms(0755));
+  fs::permissions(file, fs::perms::none);
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {  // root reads everything
+    const bool dropped = geteuid() != 0 || seteuid(65534) == 0;
+    _exit(!dropped                                                              ? 2
+          : Fault("f.yaml") == "66 D/f.yaml: cannot be read: Permission denied" ? 0
+                                                                                : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  if (WEXITSTATUS(status) == 2) GTEST_SKIP() << "cannot give up root";
+  EXPECT_EQ(status, 0);
+}
+
+TEST_F(ConfigFolder, IncludeLiesBelowTheFile) {
+  Write("parts/base.yaml", "include: deeper.yaml\nb: {x: 1, y: 2}\nc: 3\n");
+  Write("parts/deeper.yaml", "c: 4\nd: 5\n");
+  Write("second.yaml", "b: {y: 6}\n");
+  const Config config = Config::FromFile(
+      Write("f.yaml", "include: [parts/base.yaml, second.yaml]\nb: {x: 7}\na: [1]\n"));
+  EXPECT_EQ(config.ToYaml(), "c: 3\nd: 5\nb:\n  x: 7\n  y: 6\na: [1]\n");
+  const Node inherited = config.root().At("d");
+  EXPECT_EQ(ToString(inherited.place()), (folder_ / "parts/deeper.yaml:2:4").string());
+  EXPECT_EQ(config.folder(), folder_.path());
+}
+
+TEST_F(ConfigFolder, RelativePathsAreTakenFromTheFileThatHasThem) {
+  Write("parts/base.yaml", "source: {path: a.csv}\nplugins: [../x.so, /y.so]\n");
+  const fs::path file = Write("f.yaml", "include: parts/base.yaml\nsource: {type: csv}\n");
+  const Config config = Config::FromFile(file);
+  EXPECT_EQ(config.root().At("source").At("path").Text(), (folder_ / "parts/a.csv").string());
+  const std::vector<Node> plugins = config.root().At("plugins").Items();
+  EXPECT_EQ(plugins[0].Text(), (folder_ / "parts/../x.so").string());
+  EXPECT_EQ(plugins[1].Text(), "/y.so");
+  // What a run writes down means the same wherever it lies.
+  const Config again = Config::FromFile(Write("elsewhere/g.yaml", config.ToYaml()));
+  EXPECT_EQ(again.ToYaml(), config.ToYaml());
+}
+
+TEST_F(ConfigFolder, CyclicIncludeIsRefused) {
+  Write("a.yaml", "include: b.yaml");
+  Write("b.yaml", "x: 1\ninclude: ./a.yaml");
+  EXPECT_EQ(Fault("a.yaml"), "78 D/b.yaml:2:10 include: includes itself: 'D/./a.yaml'");
+}
+
+TEST_F(ConfigFolder, IncludesThatMultiplyAreRefused) {
+  for (int i = 0; i < 30; ++i) {
+    const std::string next = std::to_string(i + 1) + ".yaml";
+    Write(std::to_string(i) + ".yaml", "include: [" + next + ", " + next + "]");
+  }
+  Write("30.yaml", "a: 1");
+  EXPECT_NE(Fault("0.yaml").find("too many includes; expected at most 64 files"),
+            std::string::npos);
+}
+
+TEST_F(ConfigFolder, IncludeErrorsNameTheInclude) {
+  Write("f.yaml", "a: 1\ninclude: no.yaml");
+  EXPECT_EQ(Fault("f.yaml"),
+            "66 D/f.yaml:2:10 include: 'D/no.yaml' cannot be read: No such file or directory");
+  Write("f.yaml", "include: [{a: 1}]");
+  EXPECT_EQ(Fault("f.yaml"),
+            "78 D/f.yaml:1:11 include[0]: not a file name; expected a file or a list of files");
+}
+
+TEST_F(ConfigFolder, IncludeOutsideIsNotTrusted) {
+  Write("secret.yaml", "a: 1");
+  const fs::path outside = folder_ / "secret.yaml";
+  fs::create_directory(folder_ / "run");
+  fs::create_symlink(outside, folder_ / "run/link.yaml");
+  fs::create_symlink(folder_ / "nothing", folder_ / "run/dangling.yaml");
+  fs::create_symlink("loop.yaml", folder_ / "run/loop.yaml");
+  for (const std::string& name :
+       {std::string("../secret.yaml"), outside.string(), std::string("link.yaml"),
+        std::string("dangling.yaml"), std::string("loop.yaml"), std::string("x/../../run2/a")}) {
+    Write("run/f.yaml", "include: " + name);
+    const std::string message = Fault("run/f.yaml");
+    EXPECT_EQ(message.substr(0, 31), "77 D/run/f.yaml:1:10 include: '") << name;
+  }
+  Write("run/f.yaml", "include: ../secret.yaml");
+  EXPECT_EQ(Config::FromFile(folder_ / "run/f.yaml", true).ToYaml(), "a: 1\n");
+}
+
+TEST_F(ConfigFolder, ResolveInsideKeepsWhatStaysInside) {
+  Write("sub/f", "");
+  fs::create_symlink("sub", folder_ / "link");
+  const auto resolve = [&](const std::string& path) {
+    return ResolveInside(folder_.path(), path, false, Place{"f"}, "source.path");
+  };
+  EXPECT_EQ(resolve("link/f"), folder_ / "link/f");
+  EXPECT_EQ(resolve("sub/../sub/f"), folder_ / "sub/../sub/f");
+  EXPECT_EQ(resolve("new/file"), folder_ / "new/file");
+  EXPECT_EQ(resolve((folder_ / "sub/f").string()), folder_ / "sub/f");
+  EXPECT_EQ(
+      Failure([&] { resolve("../" + folder_.path().filename().string() + "2/f"); }).substr(0, 20),
+      "77 f source.path: '.");
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/filter/support.h"
+
+#include <gtest/gtest.h>
+
+#include "alidade/filter/iekf.h"
+#include "alidade/filter/rts.h"
+#include "alidade/filter/square_root_ekf.h"
+#include "alidade/filter/ukf.h"
+#include "support/systems.h"
+
+namespace alidade {
+namespace {
+
+using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
+
+System WithAConsideredBlock() {
+  System system = DepthFilter();
+  StateLayout layout;
+  for (const Block& block : system.layout.blocks()) {
+    const bool considered = block.name == "template.inverse_distance";
+    layout.Declare(block.name, block.owner, block.space,
+                   considered ? BlockStatus::kConsidered : block.status);
+  }
+  system.layout = layout;
+  return system;
+}
+
+System WithABlockFromAMeasurement() {
+  System system = DepthFilter();
+  system.priors[0].from = "stereo";
+  return system;
+}
+
+System WithARole(RoleMode mode, LineariseAt at) {
+  System system = DepthFilter();
+  system.sensors[1].roles[1].mode = mode;
+  system.sensors[1].roles[1].linearise_at = at;
+  return system;
+}
+
+System WithALoss() {
+  System system = DepthFilter();
+  system.sensors[1].loss = {LossKind::kHuber, 1.345};
+  return system;
+}
+
+System WithLandmarks() {
+  System system = DepthFilter();
+  system.landmarks.emplace();
+  return system;
+}
+
+TEST(Support, NamesTheFirstThingThatIsLacking) {
+  const Support nothing = {.held = false, .robust_loss = false};
+  EXPECT_FALSE(FindUnsupported(DepthFilter(), nothing));
+  const auto expect = [&](const System& system, const Support& enough, const char* what, int block,
+                          int sensor, int role) {
+    const auto found = FindUnsupported(system, nothing);
+    ASSERT_TRUE(found) << what;
+    EXPECT_EQ(found->what, what);
+    EXPECT_EQ(found->block, block) << what;
+    EXPECT_EQ(found->sensor, sensor) << what;
+    EXPECT_EQ(found->role, role) << what;
+    EXPECT_FALSE(FindUnsupported(system, enough)) << what;
+  };
+  expect(WithAConsideredBlock(), {.considered = true, .held = false}, "considered blocks", 2, -1,
+         -1);
+  expect(WithABlockFromAMeasurement(), {.from_measurement = true},
+         "blocks that start from a measurement", 0, -1, -1);
+  expect(WithARole(RoleMode::kConsider, LineariseAt::kPrediction), {.considered = true},
+         "considered roles", -1, 1, 1);
+  expect(WithARole(RoleMode::kHold, LineariseAt::kPrediction), {}, "held roles", -1, 1, 1);
+  expect(WithARole(RoleMode::kEstimate, LineariseAt::kMeasurement), {.at_measurement = true},
+         "linearise_at: measurement", -1, 1, 1);
+  expect(WithALoss(), {}, "robust losses", -1, 1, -1);
+  expect(WithLandmarks(), {.landmarks = true}, "landmarks", -1, -1, -1);
+}
+
+template <class Filter>
+bool Makes(const System& system) {
+  try {
+    Filter(system, {}, StreamsOf(system));
+  } catch (const ContractViolation&) {
+    return false;
+  }
+  return true;
+}
+
+/// Whether the filter is made from exactly the systems that its kSupport allows.
+template <class Filter>
+void ExpectAsSupported() {
+  const Support& can = Filter::kSupport;
+  EXPECT_EQ(Makes<Filter>(WithAConsideredBlock()), can.considered);
+  EXPECT_EQ(Makes<Filter>(WithABlockFromAMeasurement()), can.from_measurement);
+  EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kConsider, LineariseAt::kPrediction)),
+            can.considered);
+  EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kHold, LineariseAt::kPrediction)), can.held);
+  EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kEstimate, LineariseAt::kMeasurement)),
+            can.at_measurement);
+  EXPECT_EQ(Makes<Filter>(WithALoss()), can.robust_loss);
+  EXPECT_EQ(Makes<Filter>(WithLandmarks()), can.landmarks);
+}
+
+TEST(Support, IsWhatTheConstructorsTake) {
+  ExpectAsSupported<Ekf>();
+  ExpectAsSupported<Iekf>();
+  ExpectAsSupported<SquareRootEkf>();
+  ExpectAsSupported<Ukf>();
+  ExpectAsSupported<RtsSmoother>();
+}
+
+}  // namespace
+}  // namespace alidade

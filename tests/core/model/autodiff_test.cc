@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: Apache-2.0
+// Dual numbers and thunks: what an author's model is behind the boundary.
+#include "alidade/model/autodiff.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+
+#include "support/model_checks.h"
+#include "support/model_maker.h"
+
+namespace alidade {
+namespace {
+
+using testing::Blocks;
+using testing::ExpectSame;
+using testing::ExpectTrueJacobians;
+using testing::Filled;
+using testing::kNumeric;
+using testing::kPoison;
+using testing::Linearised;
+using testing::MakeMotion;
+using testing::MakeSensor;
+using testing::NumericallyLinearised;
+using testing::Pointers;
+using testing::Step;
+using testing::Stepped;
+
+/// q' = q Exp((u + w) dt)
+struct Turn : Motion<3, UnitQuaternion> {
+  using Input = Vec<3>;
+  static constexpr std::array kBlocks{Quantity{"orientation"}};
+  static constexpr Quantity kInput{"rate", "rad/s", "angular velocity", "x,y,z"};
+  explicit Turn(Params&) {}
+  template <class T>
+  bool Step(const T* q, const T* u, const T* w, double dt_s, T* next) const {
+    if (!(q[0] * q[0] < T(4.0))) return false;
+    T d[3];
+    for (int i = 0; i < 3; ++i) d[i] = (u[i] + w[i]) * dt_s;
+    UnitQuaternion::Plus(q, d, next);
+    return true;
+  }
+  void SqrtQ(const double*, double dt_s, MatrixRef l) const {
+    for (int i = 0; i < 3; ++i) l(i, i) = 0.1 / std::sqrt(dt_s);
+  }
+};
+
+TEST(AutodiffMotion, TakesControlInputAndTurnsQuaternions) {
+  const MotionModel turn = MakeMotion<Turn>();
+  EXPECT_TRUE(turn.has_input());
+  EXPECT_EQ(turn.instance().space().name, "rate");
+  const Blocks x{{0.5, -0.5, 0.5, 0.5}};
+  const double rate[3] = {0.3, -1.0, 2.0};
+  ExpectTrueJacobians(turn, x, rate, {0.05, 0.02, -0.1}, 0.1);
+}
+
+TEST(AutodiffMotion, GivesFOrGAlone) {
+  const MotionModel turn = MakeMotion<Turn>();
+  const Blocks x{{0.5, -0.5, 0.5, 0.5}};
+  const double rate[3] = {0.3, -1.0, 2.0};
+  const Stepped both = Step(turn, x, rate, nullptr, 0.1);
+  Blocks next = Filled(turn.blocks(), kPoison);
+  std::vector<double> f(9, kPoison), g(9, kPoison);
+  const auto blocks = Pointers(x);
+  auto out = Pointers(next);
+  ASSERT_EQ(turn.Step(blocks.data(), rate, nullptr, 0.1, out.data(), f.data(), nullptr),
+            Status::kOk);
+  ASSERT_EQ(turn.Step(blocks.data(), rate, nullptr, 0.1, out.data(), nullptr, g.data()),
+            Status::kOk);
+  EXPECT_EQ(f, both.f);
+  EXPECT_EQ(g, both.g);
+}
+
+TEST(AutodiffMotion, OutOfDomainWritesNothing) {
+  const MotionModel turn = MakeMotion<Turn>();
+  const Blocks x{{3.0, 0, 0, 0}};
+  const double rate[3] = {0, 0, 0};
+  Blocks next = Filled(turn.blocks(), kPoison);
+  std::vector<double> f(9, kPoison), g(9, kPoison);
+  for (double* jacobian : {f.data(), static_cast<double*>(nullptr)}) {
+    EXPECT_EQ(turn.Step(Pointers(x).data(), rate, nullptr, 0.1, Pointers(next).data(), jacobian,
+                        jacobian == nullptr ? nullptr : g.data()),
+              Status::kOutOfDomain);
+  }
+  EXPECT_EQ(next, Filled(turn.blocks(), kPoison));
+  EXPECT_EQ(f, std::vector<double>(9, kPoison));
+  EXPECT_EQ(g, std::vector<double>(9, kPoison));
+}
+
+TEST(AutodiffMotion, NullNoiseIsZeroInThePluginItself) {
+  // The host passes zeros; another host may pass null, as the ABI allows.
+  const MotionModel turn = MakeMotion<Turn>();
+  const AlidadeInstance& c = turn.instance().c();
+  const Blocks x{{1, 0, 0, 0}};
+  const double rate[3] = {0, 0, 1};
+  Blocks next = Filled(turn.blocks(), kPoison);
+  std::vector<double> f(9, kPoison), g(9, kPoison);
+  EXPECT_EQ(c.motion->step(c.self, Pointers(x).data(), rate, nullptr, 0.1, Pointers(next).data(),
+                           f.data(), 3, g.data(), 3),
+            ALIDADE_OK);
+  EXPECT_NEAR(next[0][3], std::sin(0.05), 1e-16);
+}
+
+/// x' = x + w, with a closed form that throws once it has written.
+struct Faulty : Motion<1, Vec<1>> {
+  static constexpr std::array kBlocks{Quantity{"x"}};
+  explicit Faulty(Params&) {}
+  template <class T>
+  void Step(const T* x, const T* w, double, T* next) const {
+    next[0] = x[0] + w[0];
+  }
+  void StepJacobian(const double*, const double*, double, MatrixRef f, MatrixRef g) const {
+    f(0, 0) = g(0, 0) = 1.0;
+    throw std::runtime_error("faulty");
+  }
+  void SqrtQ(double, MatrixRef l) const {
+    l(0, 0) = 1.0;
+    throw std::runtime_error("faulty");
+  }
+};
+
+TEST(AutodiffMotion, AClosedFormThatThrowsWritesNothing) {
+  const MotionModel faulty = MakeMotion<Faulty>();
+  const Blocks x{{1.0}};
+  Blocks next = Filled(faulty.blocks(), kPoison);
+  double f = kPoison, g = kPoison, l = kPoison;
+  EXPECT_EQ(faulty.Step(Pointers(x).data(), nullptr, nullptr, 0.1, Pointers(next).data(), &f, &g),
+            Status::kError);
+  EXPECT_EQ(faulty.SqrtQ(Pointers(x).data(), 0.1, &l), Status::kError);
+  EXPECT_EQ(next, Filled(faulty.blocks(), kPoison));
+  EXPECT_EQ(f, kPoison);
+  EXPECT_EQ(g, kPoison);
+  EXPECT_EQ(l, kPoison);
+}
+
+/// Bearing of a point from a pose: an angle measured, an optional bias role.
+struct Bearing : Sensor<Angle, Vec<2>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"point", "m", "", "x,y"},
+                                     Quantity{"bias", "rad", "", "", ALIDADE_ROLE_OPTIONAL}};
+  static constexpr Quantity kMeasurement{"bearing", "rad"};
+  explicit Bearing(Params&) {}
+  template <class T>
+  bool Predict(const T* point, const T* bias, T* z) const {
+    using std::atan2;
+    if (point[0] == T(13.0)) throw std::runtime_error("unlucky");
+    if (point[0] == T(14.0)) throw 14;
+    z[0] = atan2(point[1], point[0]);
+    if (bias != nullptr) z[0] = Angle::Wrap(T(z[0] + bias[0]));
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(0.01);
+  }
+};
+
+TEST(AutodiffSensor, JacobianOfAnAngleIsTrueAcrossTheWrap) {
+  const SensorModel bearing = MakeSensor<Bearing>();
+  for (const double y : {0.5, 1e-4, -1e-4}) {
+    const Blocks roles{{-2.0, y}, {0.1}};
+    ExpectSame(Linearised(bearing, roles), NumericallyLinearised(bearing, roles), kNumeric);
+  }
+}
+
+TEST(AutodiffSensor, AnUnboundOptionalRoleIsSkipped) {
+  const SensorModel bearing = MakeSensor<Bearing>();
+  const double point[2] = {3.0, 4.0};
+  const double* roles[] = {point, nullptr};
+  double z = kPoison, j[2] = {kPoison, kPoison};
+  double* jacobians[] = {j, nullptr};
+  const int strides[] = {2, 0};
+  ASSERT_EQ(bearing.Linearise(roles, &z, jacobians, strides), Status::kOk);
+  EXPECT_NEAR(j[0], -4.0 / 25.0, 1e-16);
+  EXPECT_NEAR(j[1], 3.0 / 25.0, 1e-16);
+  EXPECT_TRUE(bearing.roles()[1].optional());
+}
+
+TEST(AutodiffSensor, AnExceptionIsAnErrorWithItsText) {
+  const SensorModel bearing = MakeSensor<Bearing>();
+  double z = kPoison;
+  const double unlucky[2] = {13.0, 0}, unluckier[2] = {14.0, 0}, bias = 0.0;
+  const double* roles[] = {unlucky, &bias};
+  EXPECT_EQ(bearing.Predict(roles, &z), Status::kError);
+  EXPECT_EQ(bearing.error_text(), "unlucky");
+  roles[0] = unluckier;
+  EXPECT_EQ(bearing.Predict(roles, &z), Status::kError);
+  EXPECT_EQ(bearing.error_text(), "an exception of unknown type");
+  EXPECT_EQ(z, kPoison);
+}
+
+/// z = x, with a closed form that throws once it has written, where x < 0.
+struct FaultySensor : Sensor<Vec<1>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}, Quantity{"y"}};
+  static constexpr Quantity kMeasurement{"z"};
+  explicit FaultySensor(Params&) {}
+  template <class T>
+  bool Predict(const T* x, const T*, T* z) const {
+    z[0] = x[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(1.0);
+  }
+  void Jacobian(const double* x, const double*, MatrixRef by_x, MatrixRef) const {
+    by_x(0, 0) = 1.0;
+    if (x[0] < 0.0) throw std::runtime_error("faulty");
+  }
+};
+
+TEST(AutodiffSensor, AClosedFormThatThrowsWritesNothing) {
+  const SensorModel faulty = MakeSensor<FaultySensor>();
+  const int strides[] = {1, 1};
+  double x = -1.0, y = 0.0, z = kPoison, by_x = kPoison, by_y = kPoison;
+  const double* roles[] = {&x, &y};
+  double* jacobians[] = {&by_x, &by_y};
+  EXPECT_EQ(faulty.Linearise(roles, &z, jacobians, strides), Status::kError);
+  EXPECT_EQ(z, kPoison);
+  EXPECT_EQ(by_x, kPoison);
+  EXPECT_EQ(by_y, kPoison);
+  x = 2.0;
+  jacobians[0] = nullptr;
+  EXPECT_EQ(faulty.Linearise(roles, &z, jacobians, strides), Status::kOk);
+  EXPECT_EQ(z, 2.0);
+  EXPECT_EQ(by_y, 0.0);
+}
+
+/// Inverse observation of a point at a known position: roles of different sizes.
+struct Displacement : Sensor<Vec<2>, Vec<2>, Vec<3>> {
+  static constexpr std::array kRoles{Quantity{"point", "m", "", "x,y"},
+                                     Quantity{"camera", "m", "", "x,y,z"}};
+  static constexpr Quantity kMeasurement{"z", "m", "", "x,y"};
+  static constexpr int kInitialises = 0;
+  explicit Displacement(Params&) {}
+  template <class T>
+  bool Predict(const T* point, const T* camera, T* z) const {
+    for (int i = 0; i < 2; ++i) z[i] = (point[i] - camera[i]) / camera[2];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = l[3] = T(1.0);
+  }
+  template <class T>
+  bool Initialise(const T* camera, const T* z, T* point) const {
+    for (int i = 0; i < 2; ++i) point[i] = camera[i] + z[i] * camera[2];
+    return true;
+  }
+};
+
+/// z = x, and a closed form of more numbers than are copied one by one.
+struct Wide : Sensor<Vec<20>, Vec<20>> {
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    std::copy_n(x, 20, z);
+    return true;
+  }
+  void Jacobian(const double*, MatrixRef J_z_x) const {
+    for (int r = 0; r < 20; ++r) {
+      for (int c = 0; c < 20; ++c) J_z_x(r, c) = 100.0 * r + c;
+    }
+  }
+};
+
+TEST(AutodiffSensor, AWideClosedFormKeepsTheStride) {
+  std::vector<double> x(20);
+  std::iota(x.begin(), x.end(), 1.0);
+  double z[20], j[20 * 25];
+  std::fill_n(j, 20 * 25, kPoison);
+  const double* const roles[] = {x.data()};
+  double* const jacobians[] = {j};
+  const int strides[] = {25};
+  ASSERT_EQ(Evaluate(Wide(), roles, z, jacobians, strides), Status::kOk);
+  for (int r = 0; r < 20; ++r) {
+    EXPECT_EQ(z[r], x[static_cast<std::size_t>(r)]);
+    for (int c = 0; c < 25; ++c) EXPECT_EQ(j[25 * r + c], c < 20 ? 100.0 * r + c : kPoison);
+  }
+}
+
+TEST(AutodiffSensor, InitialisesWithDenseJacobians) {
+  const SensorModel sensor = MakeSensor<Displacement>();
+  const double camera[3] = {1, 2, 4}, z[2] = {0.5, 0.25};
+  const double* roles[] = {nullptr, camera};
+  std::vector<double> point(2, kPoison), by_camera(6, kPoison), by_z(4, kPoison);
+  double* jx[] = {nullptr, by_camera.data()};
+  ASSERT_EQ(sensor.Initialise(roles, z, point.data(), jx, by_z.data()), Status::kOk);
+  EXPECT_EQ(point, (std::vector<double>{3, 3}));
+  EXPECT_EQ(by_camera, (std::vector<double>{1, 0, 0.5, 0, 1, 0.25}));
+  EXPECT_EQ(by_z, (std::vector<double>{4, 0, 0, 4}));
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/model/landmark.h"
+
+#include <gtest/gtest.h>
+
+#include "support/landmarks.h"
+
+namespace alidade {
+namespace {
+
+using testing::Blocks;
+using testing::ForEachForm;
+using testing::kNumeric;
+using testing::LandmarkAt;
+using testing::Pointers;
+using testing::Vec3;
+
+constexpr double kPi = 3.14159265358979323846;
+
+// A camera at r, turned by q, and a point 4 m away.
+const Vec3 kPosition{0.4, -1.1, 0.3};
+const std::array<double, 4> kTurn{0.8, 0.2, -0.4, 0.4};
+const Vec3 kPoint{1.4, 0.9, 3.6};
+
+Vec3 HOf(const Ray<double>& ray, const Vec3& position = kPosition) {
+  Vec3 h;
+  InCamera(ray, position.data(), kTurn.data(), h.data());
+  return h;
+}
+
+template <class Form>
+Ray<double> RayOf(const Blocks& blocks) {
+  return alidade::RayOf<Form>(Pointers(blocks).data());
+}
+
+TEST(Landmark, InverseDepthHasTheAnglesOfMonoSlam) {
+  // theta = 90 deg, phi = 30 deg: m = (cos 30, -sin 30, 0)
+  const double y[6] = {1, 2, 3, kPi / 2, kPi / 6, 0.25};
+  const Ray<double> ray = InverseDepth::ToRay(y);
+  EXPECT_NEAR(ray.direction[0], std::sqrt(3.0) / 2, 1e-15);
+  EXPECT_NEAR(ray.direction[1], -0.5, 1e-15);
+  EXPECT_NEAR(ray.direction[2], 0.0, 1e-15);
+  // 4 m from the anchor
+  double p[3];
+  ASSERT_TRUE(Xyz::FromRay(ray, p));
+  EXPECT_NEAR(p[0], 1 + 2 * std::sqrt(3.0), 1e-14);
+  EXPECT_NEAR(p[1], 0.0, 1e-14);
+  EXPECT_NEAR(p[2], 3.0, 1e-14);
+}
+
+TEST(Landmark, AllFormsAreSeenAlike) {
+  Vec3 along, seen;  // R_CW (p - r)
+  for (std::size_t i = 0; i < 3; ++i) along[i] = kPoint[i] - kPosition[i];
+  UnitQuaternion::RotateBack(kTurn.data(), along.data(), seen.data());
+  const Vec3 anchor{-0.5, 0.2, -0.8};
+  ForEachForm([&](auto form) {
+    const Ray<double> ray = RayOf<decltype(form)>(LandmarkAt<decltype(form)>(anchor, kPoint));
+    const Vec3 h = HOf(ray);
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(h[i] / ray.rho, seen[i], 1e-14);
+  });
+}
+
+TEST(Landmark, IsSeenAtInfinityTheSameFromEverywhere) {
+  const double y[6] = {1, 2, 3, 0.4, -0.3, 0.0};
+  const Ray<double> ray = InverseDepth::ToRay(y);
+  const Vec3 here = HOf(ray), there = HOf(ray, {50, -70, 90});
+  EXPECT_EQ(here, there);
+  double p[3];
+  EXPECT_FALSE(Xyz::FromRay(ray, p));
+}
+
+TEST(Landmark, IsPlacedWhereItIsSeen) {
+  const Vec3 h{0.3, -0.2, 1.7};  // of any length
+  ForEachForm([&](auto form) {
+    using Form = decltype(form);
+    double y[detail::Blocks<Form>::kAmbient], p[3];
+    ASSERT_TRUE(PlaceLandmark<Form>(kPosition.data(), kTurn.data(), h.data(), 0.25, y));
+    ASSERT_TRUE(Xyz::FromRay(Form::ToRay(y), p));
+    Vec3 along, seen;
+    for (std::size_t i = 0; i < 3; ++i) along[i] = p[i] - kPosition[i];
+    UnitQuaternion::RotateBack(kTurn.data(), along.data(), seen.data());
+    const double scale = 4.0 / std::sqrt(0.09 + 0.04 + 1.7 * 1.7);  // 4 m away, along h
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(seen[i], scale * h[i], 1e-14);
+  });
+}
+
+TEST(Landmark, IsNotPlacedWhereTheFormHasNoValue) {
+  const Vec3 down{0, 1, 0};
+  const std::array<double, 4> straight{1, 0, 0, 0};
+  double y[7] = {7, 7, 7, 7, 7, 7, 7};
+  EXPECT_FALSE(PlaceLandmark<InverseDepth>(kPosition.data(), straight.data(), down.data(), 0.5, y));
+  EXPECT_FALSE(PlaceLandmark<Xyz>(kPosition.data(), straight.data(), down.data(), 0.0, y));
+  EXPECT_EQ(y[0], 7);
+  EXPECT_TRUE(PlaceLandmark<Anchored>(kPosition.data(), straight.data(), down.data(), 0.0, y));
+}
+
+TEST(Landmark, ConversionToXyzHasTrueJacobians) {
+  const Vec3 anchor{-0.5, 0.2, -0.8};
+  Space xyz;
+  xyz.geometry = Geometry::Vector(3);
+  ForEachForm([&](auto form) {
+    using Form = decltype(form);
+    const Blocks blocks = LandmarkAt<Form>(anchor, kPoint);
+    constexpr int n = detail::Blocks<Form>::kTangent;
+    double p[3], j[3 * n];
+    ASSERT_EQ(ToXyz<Form>(Pointers(blocks).data(), p, {j, n}), Status::kOk);
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(p[i], kPoint[i], 1e-14);
+    std::vector<Space> spaces;
+    const auto add = [&](auto index) {
+      using G = detail::SpaceAt<decltype(index)::value, Form>;
+      spaces.emplace_back();
+      spaces.back().geometry = {static_cast<GeometryKind>(G::kGeometry), G::kAmbient, G::kTangent};
+    };
+    detail::ForEach(add, typename detail::Blocks<Form>::Indices{});
+    const auto convert = [](const Blocks& x) {
+      Blocks point{std::vector<double>(3)};
+      EXPECT_EQ(ToXyz<Form>(Pointers(x).data(), point[0].data()), Status::kOk);
+      return point;
+    };
+    testing::ExpectSame(std::vector<double>(j, j + 3 * n),
+                        testing::NumericJacobian(spaces, blocks, {xyz}, convert), 10 * kNumeric);
+  });
+}
+
+// FAULTS 40, 83
+TEST(Landmark, IsNotConvertedAtInfinityOrBehindIt) {
+  for (const double rho : {0.0, -0.1}) {
+    const Blocks blocks{{0, 0, 0, 0.1, 0.2, rho}};
+    double p[3] = {7, 7, 7};
+    EXPECT_EQ(ToXyz<InverseDepth>(Pointers(blocks).data(), p), Status::kOutOfDomain);
+    EXPECT_EQ(p[0], 7);
+  }
+}
+
+TEST(Landmark, LinearityIndexIsThatOfCivera) {
+  // The anchor at the origin, the point 4 m ahead, the camera 3 m beside the anchor: d1 = 5 m,
+  // cos alpha = 0.8, sigma_d = 0.02 / 0.25^2 = 0.32 m; L_d = 4 0.32 / 5 0.8 = 0.2048
+  const double y[6] = {0, 0, 0, 0, 0, 0.25};
+  const double beside[3] = {3, 0, 0};
+  EXPECT_NEAR(LinearityIndex(InverseDepth::ToRay(y), 0.02, beside), 0.2048, 1e-15);
+  const double infinite[6] = {0, 0, 0, 0, 0, 0};
+  EXPECT_EQ(LinearityIndex(InverseDepth::ToRay(infinite), 0.02, beside),
+            std::numeric_limits<double>::infinity());
+  EXPECT_EQ(LinearityIndex(Xyz::ToRay(y), 0.02, beside), 0.0);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/run/metric_rows.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <sstream>
+
+#include "alidade/run/run.h"
+
+namespace alidade {
+namespace {
+
+EstimatorResult Named(const std::string& name, std::map<std::string, double> metrics) {
+  EstimatorResult result;
+  result.name = name;
+  result.metrics = std::move(metrics);
+  result.units = {{"target.depth", "m"}, {"cam.heading", "rad"}, {"cam.pixel", "px"}};
+  return result;
+}
+
+TEST(ComparisonTable, OrdersScalesAndAligns) {
+  RunResult result;
+  result.estimators = {Named("fused", {{"rmse:target.depth", 0.002145},
+                                       {"rmse:target.depth@blind", 0.00121},
+                                       {"rmse:cam.pixel", 0.31},
+                                       {"lag_ms:target.depth", -1.42},
+                                       {"cov95:target.depth", 0.9342},
+                                       {"cov95:target.depth@blind", 0.9},
+                                       {"nees.mean:target", 0.8948},
+                                       {"nees.cov95:target", 1.0},
+                                       {"nis.mean:stereo", 0.9059},
+                                       {"final:target.depth", 1.0}}),
+                       Named("stereo_only", {{"rmse:target.depth", 0.206534}})};
+  result.estimators[0].counts = {{"accepted:stereo", 74}, {"gated:stereo", 1}};
+  result.estimators[1].diverged = true;
+  result.estimators[0].inconsistent = true;
+  EXPECT_EQ(ComparisonTable(result),
+            "                                fused  stereo_only\n"
+            "rmse cam.pixel [px]            0.3100            -\n"
+            "rmse target.depth [mm]          2.145        206.5\n"
+            "rmse target.depth @blind [mm]   1.210            -\n"
+            "lag target.depth [ms]          -1.420            -\n"
+            "cov95 target.depth [%]          93.42            -\n"
+            "cov95 target.depth @blind [%]   90.00            -\n"
+            "nees.mean target               0.8948            -\n"
+            "nees.cov95 target [%]           100.0            -\n"
+            "nis.mean stereo                0.9059            -\n"
+            "accepted stereo                    74            -\n"
+            "gated stereo                        1            -\n"
+            "diverged                           no          yes\n"
+            "inconsistent                      yes           no\n");
+}
+
+TEST(ComparisonTable, PrintsNumbersThatLieFarApart) {
+  RunResult result;
+  const double inf = std::numeric_limits<double>::infinity();
+  for (const double rmse : {1.95e-5, 0.0, 250.0, 3e12, 4e-7, inf}) {
+    const std::string name = std::string(1, static_cast<char>('a' + result.estimators.size()));
+    result.estimators.push_back(Named(name, {{"rmse:cam.pixel", rmse}}));
+  }
+  const std::string table = ComparisonTable(result);
+  EXPECT_NE(table.find("rmse cam.pixel [px]  0.00001950   0  250.0  3.000e+12  4.000e-07  inf\n"),
+            std::string::npos)
+      << table;
+}
+
+TEST(ComparisonTable, KeepsOneUnitThroughoutTheTable) {
+  RunResult result;
+  result.estimators = {Named("ekf", {{"rmse:target.depth", 0.9},
+                                     {"rmse:target.depth@blind", 1.2},
+                                     {"rmse:target.depth@seeing", 0.004}})};
+  EXPECT_EQ(ComparisonTable(result),
+            "                                    ekf\n"
+            "rmse target.depth [m]            0.9000\n"
+            "rmse target.depth @blind [m]      1.200\n"
+            "rmse target.depth @seeing [m]  0.004000\n"
+            "diverged                             no\n"
+            "inconsistent                         no\n");
+}
+
+TEST(ComparisonTable, SmallNumbersKeepTheirDigits) {
+  RunResult result;
+  result.estimators = {Named("a", {{"nees.mean:target", 3.21e-6}}),
+                       Named("b", {{"nees.mean:target", 4.5e-6}})};
+  EXPECT_NE(ComparisonTable(result).find("nees.mean target  3.210e-06  4.500e-06\n"),
+            std::string::npos)
+      << ComparisonTable(result);
+}
+
+TEST(ComparisonTable, LeavesOutWhatIsHeldAtTruth) {
+  RunResult result;
+  result.estimators = {Named("a", {{"rmse:target.depth", 0.0},
+                                   {"cov95:target.depth", 1.0},
+                                   {"nees.mean:target", 0.0},
+                                   {"nees.cov95:target", 1.0}}),
+                       Named("b", {})};
+  EXPECT_EQ(ComparisonTable(result),
+            "               a   b\ndiverged      no  no\ninconsistent  no  no\n");
+  result.estimators[1].metrics = {{"rmse:target.depth", 0.1}};  // b has it to estimate
+  EXPECT_NE(ComparisonTable(result).find("rmse target.depth"), std::string::npos);
+}
+
+TEST(ComparisonTable, FoldsWhatIsWiderThanALine) {
+  RunResult result;
+  for (int i = 0; i < 12; ++i) {
+    result.estimators.push_back(
+        Named("estimator_" + std::to_string(i), {{"rmse:target.depth", 1.0 + i}}));
+  }
+  std::istringstream table(ComparisonTable(result));
+  std::string line;
+  int headers = 0, widest = 0;
+  while (std::getline(table, line)) {
+    headers += line.starts_with("   ");
+    widest = std::max(widest, static_cast<int>(line.size()));
+  }
+  EXPECT_EQ(headers, 3);
+  EXPECT_LE(widest, 100);
+  EXPECT_GT(widest, 60);
+}
+
+TEST(MarkdownTable, KeepsWhatWouldEndACell) {
+  EXPECT_EQ(internal::MarkdownTable("`ekf`", {"rmse", "|e|"}, {{"a|b", {"1", "2"}}}),
+            "| `ekf` | rmse | \\|e\\| |\n|---|---:|---:|\n| a\\|b | 1 | 2 |\n");
+}
+
+TEST(ComparisonTable, WithoutEstimatorsIsEmpty) { EXPECT_EQ(ComparisonTable({}), ""); }
+
+}  // namespace
+}  // namespace alidade

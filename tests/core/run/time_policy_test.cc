@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// FAULTS 36, 37: frames that are not in the order of their stamps.
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <random>
+
+#include "alidade/inspect/explain.h"
+#include "support/recording.h"
+
+namespace alidade::testing {
+namespace {
+
+constexpr double kWindow_s = 0.2;  // six frames of the simulator
+
+/// All types of filter, and a smoother, which waits for all frames.
+constexpr const char* kFilters = R"(alidade: 1
+state:
+  target: {model: constant_velocity, blocks: {position: depth, velocity: depth_rate},
+           noise: {kind: discrete, acceleration: 1.0},
+           initial: {depth: {mean: 0.3, sigma: 0.1}, depth_rate: {mean: 0, sigma: 0.5}}}
+  template: {model: constant, blocks: {value: inverse_distance},
+             initial: {inverse_distance: {mean: 3.3, sigma: 0.5}}}
+sensors:
+  stereo: {model: stereo_disparity, stream: disparity, roles: {depth: target.depth},
+           focal_px: 400, baseline_m: 0.065, sigma_px: 1.0}
+  scale: {model: scale_2d, stream: inverse_scale,
+          roles: {depth: target.depth, inverse_distance: template.inverse_distance},
+          template_px: 300, sigma_px: 1.0}
+source: {type: depth_target, seed: 1}
+estimators:
+  ekf: {type: ekf, gate: 0.999}
+  first: {type: ekf, jacobian: first_estimate, fuse: per_measurement}
+  iekf: {type: iekf, gate: 0.999}
+  ukf: {type: ukf, alpha: 1, gate: 0.9,
+        overrides: {state: {target: {initial: {depth: {sigma: 0.2}}}}}}  # guarded at first
+  root: {type: square_root_ekf}
+  rts: {type: rts}
+evaluate:
+  segments: {seeing: {with: stereo}, blind: {without: stereo}}
+)";
+
+/// Blocks that wait for their first measurement, and a gate so narrow that sensors are locked out:
+/// what the filter keeps besides its state decides what comes.
+constexpr const char* kEventful = R"(alidade: 1
+state:
+  target: {model: constant_velocity, blocks: {position: depth, velocity: depth_rate},
+           noise: {kind: discrete, acceleration: 0.1},
+           initial: {depth: {from: stereo}, depth_rate: {mean: 0, sigma: 0.5}}}
+  template: {model: constant, blocks: {value: inverse_distance},
+             initial: {inverse_distance: {from: scale}}}
+sensors:
+  stereo: {model: stereo_disparity, stream: disparity, roles: {depth: target.depth},
+           focal_px: 400, baseline_m: 0.065, sigma_px: 0.5}
+  scale: {model: scale_2d, stream: inverse_scale,
+          roles: {depth: target.depth, inverse_distance: template.inverse_distance},
+          template_px: 300, sigma_px: 1.0}
+source: {type: depth_target, seed: 3}
+estimators:
+  reset: {type: ekf, gate: 0.5, lockout: {after: 3}, jacobian: first_estimate}
+  inflate: {type: ekf, gate: 0.5, lockout: {after: 3, action: inflate}}
+)";
+
+/// The frames of a source, each late by up to `most_s`, the first by all of it; with `split` each
+/// measurement comes by itself, and truth too.
+class Delayed : public Source {
+ public:
+  Delayed(std::unique_ptr<Source> source, double most_s, bool split) : source_(std::move(source)) {
+    std::mt19937_64 random(7);
+    std::multimap<Stamp, Frame> arrivals;  // in the order of insertion where equal
+    const auto add = [&](Frame frame) {
+      const auto most = static_cast<std::uint64_t>(StampFromSeconds(most_s));
+      const auto delay = static_cast<Stamp>(arrivals.empty() ? most : random() % (most + 1));
+      const Stamp at = frame.stamp + delay;
+      arrivals.emplace(at, std::move(frame));
+    };
+    for (Frame frame; source_->Next(frame);) {
+      if (!split) {
+        add(frame);
+        continue;
+      }
+      for (const Measurement& m : frame.measurements) add({frame.stamp, {m}, {}});
+      add({frame.stamp, {}, frame.truth});
+    }
+    for (auto& [at, frame] : arrivals) frames_.push_back(std::move(frame));
+  }
+  const std::vector<StreamInfo>& streams() const override { return source_->streams(); }
+  const std::vector<StreamInfo>& truths() const override { return source_->truths(); }
+  bool Next(Frame& frame) override {
+    if (next_ == frames_.size()) return false;
+    frame = frames_[next_++];
+    return true;
+  }
+
+ private:
+  std::unique_ptr<Source> source_;
+  std::vector<Frame> frames_;
+  std::size_t next_ = 0;
+};
+
+/// The config's experiment with delays, recorded in `folder`.
+RunResult RecordDelayed(const std::string& text, const fs::path& folder, TimeOrder order,
+                        double most_s, bool split = false) {
+  const Config config = Config::FromText(text, "order.yaml");
+  Experiment experiment = BuildExperiment(config, Host());
+  experiment.source = std::make_unique<Delayed>(std::move(experiment.source), most_s, split);
+  experiment.time.order = order;
+  experiment.time.window = StampFromSeconds(kWindow_s);
+  Recorder recorder(OptionsFor(folder), config, Host());
+  RunResult result = RunInto(recorder, experiment);
+  recorder.Finish(result);
+  return result;
+}
+
+void ExpectSameBytes(const fs::path& one, const fs::path& another) {
+  const std::vector<std::string> files = FilesIn(one);
+  EXPECT_GT(files.size(), 10u);
+  EXPECT_EQ(files, FilesIn(another));
+  for (const std::string& file : files) {
+    if (file == "timing.json") continue;
+    EXPECT_TRUE(Read(one / file) == Read(another / file)) << another / file;
+  }
+}
+
+class Reordered : public ::testing::TestWithParam<TimeOrder> {
+ protected:
+  const TemporaryFolder folder_;
+};
+
+INSTANTIATE_TEST_SUITE_P(Policies, Reordered,
+                         ::testing::Values(TimeOrder::kSort, TimeOrder::kRewind),
+                         [](const auto& of) {
+                           return of.param == TimeOrder::kSort ? "sort" : "rewind";
+                         });
+
+TEST_P(Reordered, LateFramesGiveTheBytesOfTheInOrderRun) {
+  for (const char* config : {kFilters, kEventful}) {
+    const fs::path here = folder_ / (config == kFilters ? "filters" : "eventful");
+    // In order no policy is asked, and the estimators are given the frames directly.
+    const RunResult in_order = RecordDelayed(config, here / "in_order", TimeOrder::kReject, 0.0);
+    EXPECT_EQ(in_order.status, RunStatus::kOk);
+    EXPECT_EQ(in_order.arrivals.late, 0);
+    if (config == kEventful) {
+      for (const EstimatorResult& one : in_order.estimators) {
+        EXPECT_GT(std::ranges::count(one.events, "lockout", &Event::kind), 3) << one.name;
+        EXPECT_EQ(one.counts.at("initialised:stereo"), 1) << one.name;
+        EXPECT_EQ(one.counts.at("initialised:scale"), 1) << one.name;
+      }
+    }
+    const RunResult late = RecordDelayed(config, here / "late", GetParam(), kWindow_s);
+    EXPECT_GT(late.arrivals.late, 50);
+    EXPECT_LE(late.arrivals.longest_lag, StampFromSeconds(kWindow_s));
+    EXPECT_EQ(late.arrivals.dropped, 0);
+    ExpectSameBytes(here / "in_order", here / "late");
+    // Unsorted, the same frames tell another story.
+    const RunResult rejected =
+        RecordDelayed(config, here / "rejected", TimeOrder::kReject, kWindow_s);
+    EXPECT_NE(rejected.estimators[0].counts, in_order.estimators[0].counts);
+  }
+}
+
+TEST_P(Reordered, MeasurementsThatComeOneByOneAreMergedIntoTheirStamp) {
+  const RunResult whole = RecordDelayed(kFilters, folder_ / "whole", TimeOrder::kReject, 0.0);
+  const RunResult in_order = RecordDelayed(kFilters, folder_ / "in_order", GetParam(), 0.0, true);
+  const RunResult late = RecordDelayed(kFilters, folder_ / "late", GetParam(), kWindow_s, true);
+  EXPECT_GT(in_order.arrivals.merged, whole.frames);
+  EXPECT_EQ(in_order.arrivals.merged, late.arrivals.merged);
+  EXPECT_EQ(late.frames, whole.frames);
+  ExpectSameBytes(folder_ / "in_order", folder_ / "late");
+  for (const EstimatorResult& one : whole.estimators) {
+    for (const char* file : {"estimates.csv", "innovations.csv", "gains.csv"}) {
+      EXPECT_TRUE(Read(folder_ / "whole" / one.name / file) ==
+                  Read(folder_ / "late" / one.name / file))
+          << one.name << ' ' << file;
+    }
+  }
+  EXPECT_TRUE(Read(folder_ / "whole/truth.csv") == Read(folder_ / "late/truth.csv"));
+}
+
+/// What BuildExperiment makes of the filters with `time` in their config.
+std::string Refused(const std::string& time) {
+  std::string text;
+  const Config config = Config::FromText(std::string(kFilters) + time + '\n', "order.yaml");
+  EXPECT_EQ(CodeOf([&] { BuildExperiment(config, Host()); }, &text), 78) << time;
+  return text;
+}
+
+TEST(TimePolicy, IsReadStrictly) {
+  const Config config = Config::FromText(
+      std::string(kFilters) + "time: {order: rewind, window_s: 0.25}\n", "order.yaml");
+  const Experiment experiment = BuildExperiment(config, Host());
+  const TimePolicy& policy = experiment.time;
+  EXPECT_EQ(policy.order, TimeOrder::kRewind);
+  EXPECT_EQ(policy.window, 250'000'000);
+  EXPECT_NE(Explain(config, experiment)
+                .find("late frames: the estimators go back for them, up to 0.25 s behind"),
+            std::string::npos);
+  std::map<std::string, int> ranks;
+  for (std::size_t s = 0; s < policy.ranks.size(); ++s) {
+    ranks[experiment.source->streams()[s].name] = policy.ranks[s];
+  }
+  EXPECT_EQ(ranks.size(), experiment.source->streams().size());
+  EXPECT_EQ(ranks["disparity"], 0);
+  EXPECT_EQ(ranks["inverse_scale"], 1);
+  EXPECT_EQ(ranks["disparity_all"], 2);  // of no sensor
+  EXPECT_EQ(Refused("time: {order: rewind}"),
+            "order.yaml:25:15 time.order: 'rewind' without 'window_s'; expected 'window_s', how "
+            "late a frame may be");
+  EXPECT_EQ(Refused("time: {order: reject, window_s: 1}"),
+            "order.yaml:25:33 time.window_s: without a use: 'order: reject' holds nothing back; "
+            "expected 'order: sort' or 'rewind'");
+  EXPECT_NE(Refused("time: {order: sorted}").find("did you mean 'sort'?"), std::string::npos);
+  EXPECT_NE(Refused("time: {order: sort, window_s: -1}").find("25:31 time.window_s"),
+            std::string::npos);
+  EXPECT_NE(Refused("time: {window_s: 1}").find("order"), std::string::npos);
+}
+
+TEST(Sort, LetsATableHaveItsRowsInAnyOrder) {
+  const TemporaryFolder folder;
+  const auto run = [&](const std::string& rows, const std::string& time) {
+    std::ofstream(folder / "rows.csv") << "t_s,d,s\n" << rows;
+    std::string text = kFilters;
+    const std::string source = "{type: depth_target, seed: 1}";
+    text.replace(text.find(source), source.size(),
+                 "{type: csv, path: '" + (folder / "rows.csv").string() +
+                     "', streams: {disparity: d, inverse_scale: s}}");
+    const Config config = Config::FromText(text + time, "order.yaml");
+    Experiment experiment = BuildExperiment(config, Host());
+    return alidade::Run(experiment, {});
+  };
+  const std::string sort = "time: {order: sort}\n";
+  const RunResult whole = run("0,80,1\n0.1,81,1.01\n0.2,82,1.02\n", "");
+  const RunResult mixed = run("0.2,82,\n0.1,81,1.01\n0,80,1\n0.2,,1.02\n", sort);
+  ASSERT_EQ(whole.status, RunStatus::kOk) << whole.reason;
+  ASSERT_EQ(mixed.status, RunStatus::kOk) << mixed.reason;
+  EXPECT_EQ(mixed.frames, 3);
+  for (std::size_t e = 0; e < whole.estimators.size(); ++e) {
+    EXPECT_EQ(mixed.estimators[e].metrics, whole.estimators[e].metrics);
+  }
+  EXPECT_EQ(run("0.2,82,\n0.1,81,1\n0.2,83,1\n", sort).reason,
+            (folder / "rows.csv").string() +
+                ":4: stream 'disparity' twice at t = 0.200000 s; expected one measurement at a "
+                "stamp; the first is in " +
+                (folder / "rows.csv").string() + ":2");
+}
+
+}  // namespace
+}  // namespace alidade::testing

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/state/covariance.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include "alidade/base/random.h"
+
+namespace alidade {
+namespace {
+
+Eigen::MatrixXd RandomMatrix(int rows, int columns, Random& random) {
+  Eigen::MatrixXd m(rows, columns);
+  for (int c = 0; c < columns; ++c) {
+    for (int r = 0; r < rows; ++r) m(r, c) = random.Normal();
+  }
+  return m;
+}
+
+/// A covariance of blocks of the given sizes, all correlated, and its dense copy.
+Covariance Make(const std::vector<int>& sizes, Random& random) {
+  Covariance p;
+  std::vector<int> offsets;
+  int n = 0;
+  for (const int size : sizes) {
+    offsets.push_back(p.Add(size));
+    n += size;
+  }
+  const Eigen::MatrixXd a = RandomMatrix(n, n, random);
+  p.SetBlock(0, 0, a * a.transpose());
+  return p;
+}
+
+constexpr double kRounding = 1e-12;  // products of order 10 numbers of order 10
+
+TEST(Covariance, BlocksAreThoseOfTheSymmetricMatrix) {
+  Random random(1);
+  const Covariance p = Make({2, 3, 1}, random);
+  const Eigen::MatrixXd dense = p.Dense();
+  EXPECT_EQ(dense, dense.transpose());
+  EXPECT_EQ(p.Block(0, 2, 2, 3), dense.block(0, 2, 2, 3));
+  EXPECT_EQ(p.Block(2, 3, 0, 2), dense.block(2, 0, 3, 2));
+  EXPECT_EQ(p.Block(2, 3, 2, 3), dense.block(2, 2, 3, 3));
+}
+
+TEST(Covariance, TimesTransposedEqualsTheDenseProduct) {
+  Random random(2);
+  const Covariance p = Make({2, 3, 1, 2}, random);
+  const std::vector<JacobianBlock> h = {{5, RandomMatrix(2, 1, random)},
+                                        {2, RandomMatrix(2, 3, random)}};
+  Eigen::MatrixXd dense_h = Eigen::MatrixXd::Zero(2, 8);
+  dense_h.middleCols(5, 1) = h[0].block;
+  dense_h.middleCols(2, 3) = h[1].block;
+  const Eigen::MatrixXd pht = p.TimesTransposed(h, 2);
+  EXPECT_LT((pht - p.Dense() * dense_h.transpose()).norm(), kRounding * pht.norm());
+  EXPECT_LT((Times(h, 2, pht) - dense_h * pht).norm(), kRounding * pht.norm());
+}
+
+TEST(Covariance, PropagateEqualsTheDenseFormForScatteredRows) {
+  Random random(3);
+  Covariance p = Make({2, 3, 1, 2}, random);
+  const Eigen::MatrixXd before = p.Dense();
+  const Eigen::MatrixXd f = RandomMatrix(3, 3, random);
+  const Eigen::MatrixXd root = RandomMatrix(3, 1, random);
+  p.Propagate({{6, 2}, {5, 1}}, f, root * root.transpose());
+  // Gathered rows 6, 7, 5 in this order.
+  const std::vector<int> rows = {6, 7, 5};
+  Eigen::MatrixXd whole_f = Eigen::MatrixXd::Identity(8, 8);
+  Eigen::MatrixXd whole_q = Eigen::MatrixXd::Zero(8, 8);
+  whole_f(rows, rows) = f;
+  whole_q(rows, rows) = root * root.transpose();
+  const Eigen::MatrixXd expected = whole_f * before * whole_f.transpose() + whole_q;
+  EXPECT_LT((p.Dense() - expected).norm(), kRounding * expected.norm());
+}
+
+TEST(Covariance, JosephAndSubtractOuterAgreeForTheOptimalGain) {
+  Random random(4);
+  Covariance a = Make({4}, random);
+  Covariance b = a;
+  const Eigen::MatrixXd h = RandomMatrix(2, 4, random), r = Eigen::MatrixXd::Identity(2, 2);
+  const Eigen::MatrixXd pht = a.TimesTransposed({{0, h}}, 2);
+  const Eigen::MatrixXd s = h * pht + r;
+  const Eigen::MatrixXd gain = pht * s.inverse();
+  const Eigen::LLT<Eigen::MatrixXd> llt(s);
+  a.SubtractOuter(llt.matrixL().solve(pht.transpose()).transpose());
+  b.Joseph(gain, h, r);
+  EXPECT_LT((a.Dense() - b.Dense()).norm(), 1e-11 * a.Dense().norm());
+}
+
+TEST(Covariance, ReleasedRowsAreReusedAndLeaveNoTrace) {
+  Random random(5);
+  Covariance p = Make({2, 3, 2, 1}, random);
+  const Eigen::MatrixXd before = p.Dense();
+  p.Release(2, 3);
+  EXPECT_EQ(p.size(), 8);
+  EXPECT_EQ(p.Block(2, 3, 2, 3).norm(), 0.0);
+  EXPECT_EQ(p.Block(0, 2, 5, 2), before.block(0, 5, 2, 2));
+  EXPECT_EQ(p.Add(3), 2);
+  EXPECT_EQ(p.Block(2, 3, 5, 2).norm(), 0.0);
+}
+
+TEST(Covariance, ReleasingTheEndShrinksPastOlderGaps) {
+  Random random(6);
+  Covariance p = Make({2, 3, 1}, random);
+  p.Release(2, 3);
+  p.Release(5, 1);
+  EXPECT_EQ(p.size(), 2);
+}
+
+TEST(Covariance, MoveCarriesCorrelationsAlong) {
+  Random random(7);
+  Covariance p = Make({2, 2, 1, 2}, random);
+  const Eigen::MatrixXd before = p.Dense();
+  p.Release(0, 2);
+  p.Move(5, 0, 2);
+  EXPECT_EQ(p.size(), 5);
+  EXPECT_EQ(p.Block(0, 2, 0, 2), before.block(5, 5, 2, 2));
+  EXPECT_EQ(p.Block(0, 2, 2, 2), before.block(5, 2, 2, 2));
+  EXPECT_EQ(p.Block(4, 1, 0, 2), before.block(4, 5, 1, 2));
+  EXPECT_EQ(p.Block(4, 1, 2, 2), before.block(4, 2, 1, 2));
+}
+
+}  // namespace
+}  // namespace alidade

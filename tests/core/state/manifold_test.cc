@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/state/manifold.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <random>
+#include <vector>
+
+namespace alidade {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr int kPoints = 200;
+// Rounding of a dozen operations on numbers up to 10.
+constexpr double kTolerance = 2e-14;
+
+using Values = std::array<double, 5>;
+
+struct Case {
+  const char* name;
+  Geometry geometry;
+  double largest;  ///< step for which (2) holds
+};
+
+class GeometryLaws : public testing::TestWithParam<Case> {
+ protected:
+  Values Point() {
+    Values x{};
+    for (int i = 0; i < geometry_.ambient; ++i) x[i] = uniform_(engine_) * 3.0;
+    geometry_.Normalise(x.data());
+    return x;
+  }
+  Values Step(double length) {
+    Values d{};
+    double norm = 0.0;
+    for (int i = 0; i < geometry_.tangent; ++i) norm = std::hypot(norm, d[i] = uniform_(engine_));
+    for (double& element : d) element *= length / norm;
+    return d;
+  }
+  Values Plus(const Values& x, const Values& d) const {
+    Values y{};
+    geometry_.Plus(x.data(), d.data(), y.data());
+    return y;
+  }
+  Values Minus(const Values& y, const Values& x) const {
+    Values d{};
+    geometry_.Minus(y.data(), x.data(), d.data());
+    return d;
+  }
+  static void ExpectNear(const Values& a, const Values& b, double tolerance, const char* law) {
+    for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i], b[i], tolerance) << law;
+  }
+
+  Geometry geometry_ = GetParam().geometry;
+  std::mt19937_64 engine_{17};
+  std::uniform_real_distribution<double> uniform_{-1.0, 1.0};
+};
+
+TEST_P(GeometryLaws, HoldAtRandomPointsAndStepsOfEverySize) {
+  for (int i = 0; i < kPoints; ++i) {
+    const Values x = Point(), y = Point();
+    ExpectNear(Plus(x, {}), x, 1e-15, "(1) x (+) 0 = x");
+    for (const double length : {1e-300, 1e-15, 1e-8, 0.99e-6, 1.01e-6, 1e-3, 1.0, 3.0}) {
+      if (length > GetParam().largest) continue;
+      const Values d = Step(length);
+      ExpectNear(Minus(Plus(x, d), x), d, kTolerance, "(2) (x (+) d) (-) x = d");
+    }
+    const double sign =
+        geometry_.kind == GeometryKind::kUnitQuaternion && Plus(x, Minus(y, x))[0] * y[0] < 0.0
+            ? -1.0
+            : 1.0;
+    Values same = y;
+    for (double& element : same) element *= sign;
+    ExpectNear(Plus(x, Minus(y, x)), same, kTolerance, "(3) x (+) (y (-) x) = y");
+  }
+}
+
+TEST_P(GeometryLaws, SmallStepsKeepTheirDigits) {
+  // Where sin(d)/d changes to its series the derivative must not jump: relative error, not
+  // absolute.
+  const Values x = [&] {
+    Values identity{};
+    geometry_.Identity(identity.data());
+    return identity;
+  }();
+  for (double length = 1e-12; length < 1e-3; length *= 1.7) {
+    const Values d = Step(length), back = Minus(Plus(x, d), x);
+    for (int i = 0; i < geometry_.tangent; ++i) EXPECT_NEAR(back[i], d[i], 1e-12 * length);
+  }
+}
+
+TEST_P(GeometryLaws, PlusStaysOnTheManifoldAndMayWriteOverItsArgument) {
+  Values x = Point();
+  for (int i = 0; i < 100000; ++i) {
+    const Values d = Step(0.1);
+    geometry_.Plus(x.data(), d.data(), x.data());
+  }
+  EXPECT_LE(geometry_.Defect(x.data()), 1e-15);
+}
+
+TEST_P(GeometryLaws, ThePlusJacobianIsThatOfPlus) {
+  constexpr double kStep = 1e-6;
+  const auto n = static_cast<std::size_t>(geometry_.tangent);
+  for (int k = 0; k < kPoints; ++k) {
+    const Values x = Point(), d = Step(k % 4 == 0 ? 1e-5 : 0.02 * k / 2.0);
+    const Values y = Plus(x, d);
+    std::vector<double> j(n * n);
+    geometry_.PlusJacobian(x.data(), d.data(), j.data());
+    for (std::size_t c = 0; c < n; ++c) {
+      Values above = d, below = d;
+      above[c] += kStep;
+      below[c] -= kStep;
+      const Values up = Minus(Plus(x, above), y), down = Minus(Plus(x, below), y);
+      for (std::size_t r = 0; r < n; ++r) {
+        // Rounding of 1e-16 over the step, and its square.
+        EXPECT_NEAR(j[r * n + c], (up[r] - down[r]) / (2.0 * kStep), 1e-8) << k;
+      }
+    }
+  }
+}
+
+TEST_P(GeometryLaws, TransportIsOrthogonalAndTheIdentityAtOnePoint) {
+  constexpr double kTransport = 1e-11;  // rounding / (1 + from . to), whose smallest is 1e-4 here
+  const int n = geometry_.tangent;
+  for (int i = 0; i < kPoints; ++i) {
+    const Values from = Point(), to = Point();
+    std::array<double, 25> j{}, back{}, same{};
+    geometry_.Transport(from.data(), to.data(), j.data());
+    geometry_.Transport(to.data(), from.data(), back.data());
+    geometry_.Transport(from.data(), from.data(), same.data());
+    for (int r = 0; r < n; ++r) {
+      for (int c = 0; c < n; ++c) {
+        double jtj = 0.0;
+        for (int k = 0; k < n; ++k) jtj += j[k * n + r] * j[k * n + c];
+        EXPECT_NEAR(jtj, r == c, kTransport);
+        EXPECT_NEAR(back[r * n + c], j[c * n + r], kTransport) << "the way back is the inverse";
+        EXPECT_NEAR(same[r * n + c], r == c, 1e-15);
+      }
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(AllKinds, GeometryLaws,
+                         testing::Values(Case{"vector", Geometry::Vector(5), 1e9},
+                                         Case{"angle", Geometry::Angle(), kPi},
+                                         Case{"unit_quaternion", Geometry::UnitQuaternion(), kPi},
+                                         Case{"unit_vector", Geometry::UnitVector(), kPi}),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+// FAULTS 84
+TEST(Angle, WrapsAtPlusAndMinusPi) {
+  const Geometry angle = Geometry::Angle();
+  const auto plus = [&](double x, double d) {
+    double y;
+    angle.Plus(&x, &d, &y);
+    return y;
+  };
+  const auto minus = [&](double y, double x) {
+    double d;
+    angle.Minus(&y, &x, &d);
+    return d;
+  };
+  EXPECT_EQ(plus(kPi, 0.0), kPi);
+  EXPECT_EQ(plus(-kPi, 0.0), kPi) << "(-pi, pi]: -pi is written pi";
+  EXPECT_NEAR(plus(kPi, 1e-3), -kPi + 1e-3, 1e-15);
+  EXPECT_NEAR(plus(-kPi, -1e-3), kPi - 1e-3, 1e-15);
+  EXPECT_NEAR(plus(3.0, 20.0 * kPi), 3.0, 1e-13);
+  EXPECT_NEAR(minus(-kPi + 0.01, kPi - 0.01), 0.02, 1e-15);
+  EXPECT_NEAR(minus(kPi - 0.01, -kPi + 0.01), -0.02, 1e-15);
+}
+
+TEST(Angle, NeverLeavesItsIntervalByRounding) {
+  const Geometry angle = Geometry::Angle();
+  const double ulp_inside = std::nextafter(-kPi, 0.0), zero = 0.0;
+  double y;
+  angle.Plus(&ulp_inside, &zero, &y);
+  EXPECT_EQ(y, ulp_inside);
+  for (int turns = -50; turns <= 50; ++turns) {
+    double x = (2 * turns + 1) * kPi;
+    for (int i = 0; i < 10; ++i) x = std::nextafter(x, -1e9);
+    for (int i = 0; i < 20; ++i, x = std::nextafter(x, 1e9)) {
+      angle.Plus(&x, &zero, &y);
+      EXPECT_GT(y, -kPi) << x;
+      EXPECT_LE(y, kPi) << x;
+    }
+  }
+}
+
+TEST(UnitQuaternion, AndItsNegativeAreOneRotation) {
+  const Geometry geometry = Geometry::UnitQuaternion();
+  const double q[4] = {0.5, -0.5, 0.5, 0.5}, negative[4] = {-0.5, 0.5, -0.5, -0.5};
+  double d[3];
+  geometry.Minus(q, negative, d);
+  for (const double element : d) EXPECT_NEAR(element, 0.0, 1e-15);
+  const double step[3] = {0.1, -0.2, 0.3};
+  double moved[4], from_q[3], from_negative[3];
+  geometry.Plus(q, step, moved);
+  geometry.Minus(moved, q, from_q);
+  geometry.Minus(moved, negative, from_negative);
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(from_q[i], from_negative[i], 1e-15);
+}
+
+TEST(UnitQuaternion, QuarterTurnAboutZ) {
+  // Exp((0, 0, pi/2)) = (cos pi/4, 0, 0, sin pi/4)
+  const double one[4] = {1, 0, 0, 0}, turn[3] = {0, 0, kPi / 2};
+  double q[4];
+  Geometry::UnitQuaternion().Plus(one, turn, q);
+  EXPECT_NEAR(q[0], std::sqrt(0.5), 1e-15);
+  EXPECT_NEAR(q[3], std::sqrt(0.5), 1e-15);
+}
+
+/// d/dt of x (+) t d at t = 1, in the tangent of the point reached there, by central differences.
+std::array<double, 2> VelocityAtTheEnd(const double* x, const double* d) {
+  const Geometry geometry = Geometry::UnitVector();
+  constexpr double kStep = 1e-5;
+  double end[3], ahead[3], behind[3], forth[2], back[2];
+  const double d_ahead[2] = {d[0] * (1 + kStep), d[1] * (1 + kStep)};
+  const double d_behind[2] = {d[0] * (1 - kStep), d[1] * (1 - kStep)};
+  geometry.Plus(x, d, end);
+  geometry.Plus(x, d_ahead, ahead);
+  geometry.Plus(x, d_behind, behind);
+  geometry.Minus(ahead, end, forth);
+  geometry.Minus(behind, end, back);
+  return {(forth[0] - back[0]) / (2 * kStep), (forth[1] - back[1]) / (2 * kStep)};
+}
+
+TEST(UnitVector, TransportCarriesTheVelocityOfAGeodesicAlongIt) {
+  const Geometry geometry = Geometry::UnitVector();
+  std::mt19937_64 engine(3);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  for (int i = 0; i < kPoints; ++i) {
+    double x[3] = {uniform(engine), uniform(engine), uniform(engine)};
+    geometry.Normalise(x);
+    const double d[2] = {2.0 * uniform(engine), 2.0 * uniform(engine)};
+    double end[3], j[4], homeward[2];
+    geometry.Plus(x, d, end);
+    geometry.Transport(x, end, j);
+    geometry.Minus(x, end, homeward);
+    const auto velocity = VelocityAtTheEnd(x, d);
+    for (int row = 0; row < 2; ++row) {
+      const double carried = j[2 * row] * d[0] + j[2 * row + 1] * d[1];
+      EXPECT_NEAR(carried, velocity[row], 1e-8);  // central differences: step^2 and rounding / step
+      EXPECT_NEAR(carried, -homeward[row], 1e-12);
+    }
+  }
+}
+
+TEST(UnitVector, TransportKeepsOrientation) {
+  // An orthogonal J could still mirror; det J = 1 everywhere, also across the seam of the basis.
+  const Geometry geometry = Geometry::UnitVector();
+  const double from[3] = {std::sqrt(1 - 1e-6), 0, 1e-3}, to[3] = {std::sqrt(1 - 1e-6), 0, -1e-3};
+  double j[4];
+  geometry.Transport(from, to, j);
+  EXPECT_NEAR(j[0] * j[3] - j[1] * j[2], 1.0, 1e-12);
+}
+
+TEST(UnitVector, MinusIsTrueUpToTheAntipode) {
+  const Geometry geometry = Geometry::UnitVector();
+  const double x[3] = {0.6, 0.0, 0.8};
+  for (const double short_of : {1e-3, 1.01e-6, 0.99e-6, 1e-8, 1e-12}) {
+    const double angle = kPi - short_of, d[2] = {0.6 * angle, -0.8 * angle};
+    double y[3], back[2];
+    geometry.Plus(x, d, y);
+    geometry.Minus(y, x, back);
+    // The direction is that of a vector of length `short_of`, known to rounding.
+    const double tolerance = 2e-15 / short_of;
+    EXPECT_NEAR(back[0], d[0], tolerance);
+    EXPECT_NEAR(back[1], d[1], tolerance);
+    EXPECT_NEAR(std::hypot(back[0], back[1]), angle, 1e-14);
+  }
+}
+
+TEST(UnitVector, MinusToTheAntipodeIsHalfATurn) {
+  const Geometry geometry = Geometry::UnitVector();
+  const double x[3] = {0.0, 0.0, 1.0};
+  for (const double sideways : {0.0, 1e-170, 1e-160}) {
+    const double y[3] = {0.0, sideways, -1.0};
+    double d[2], there[3];
+    geometry.Minus(y, x, d);
+    EXPECT_EQ(d[0], kPi);
+    EXPECT_EQ(d[1], 0.0);
+    geometry.Plus(x, d, there);
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(there[i], y[i], 1e-15);
+  }
+}
+
+TEST(UnitVector, TransportToTheAntipodeIsFiniteAndOrthogonal) {
+  const double from[3] = {0.6, 0.0, 0.8}, to[3] = {-0.6, 0.0, -0.8};
+  double j[4];
+  Geometry::UnitVector().Transport(from, to, j);
+  EXPECT_NEAR(std::abs(j[0] * j[3] - j[1] * j[2]), 1.0, 1e-12);
+}
+
+TEST(Geometry, NormaliseGivesTheNearestPoint) {
+  double q[4] = {0.0, 3.0, 0.0, 4.0};
+  EXPECT_DOUBLE_EQ(Geometry::UnitQuaternion().Defect(q), 4.0);
+  Geometry::UnitQuaternion().Normalise(q);
+  EXPECT_DOUBLE_EQ(q[1], 0.6);
+  EXPECT_DOUBLE_EQ(q[3], 0.8);
+  double zero[3] = {0, 0, 0};
+  Geometry::UnitVector().Normalise(zero);
+  EXPECT_EQ(zero[2], 1.0) << "no direction: the neutral one";
+  double angle = 7.0;
+  Geometry::Angle().Normalise(&angle);
+  EXPECT_NEAR(angle, 7.0 - 2.0 * kPi, 1e-15);
+}
+
+TEST(ColumnNames, AreTheBlockOrBlockAndElement) {
+  Space space;
+  space.elements = {""};
+  EXPECT_EQ(ColumnNames("target.depth", space), std::vector<std::string>{"target.depth"});
+  space.elements = {"x", "y"};
+  const std::vector<std::string> expected{"cam.position.x", "cam.position.y"};
+  EXPECT_EQ(ColumnNames("cam.position", space), expected);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/bundle/bundle_file.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "support/bundles.h"
+#include "support/temporary_folder.h"
+
+namespace alidade {
+namespace {
+
+using testing::TrueBundle;
+
+class BundleFiles : public ::testing::Test {
+ protected:
+  BundleFile ReadText(const std::string& text) const {
+    std::ofstream(folder_ / "p", std::ios::binary) << text;
+    return ReadBundle(folder_ / "p");
+  }
+  /// Reading `text` fails, and says all of `words`.
+  void ExpectBad(const std::string& text, const std::vector<std::string>& words) const {
+    try {
+      ReadText(text);
+      ADD_FAILURE() << "no error; expected: " << words.front();
+    } catch (const Error& e) {
+      EXPECT_EQ(e.code(), ExitCode::kBadData);
+      const std::string what = e.what();
+      EXPECT_EQ(what.find((folder_ / "p").string() + ":"), 0u) << what;
+      for (const std::string& word : words)
+        EXPECT_NE(what.find(word), what.npos) << "'" << word << "' is not in: " << what;
+    }
+  }
+  static void ExpectSame(const BundleFile& a, const BundleFile& b) {
+    ASSERT_EQ(a.problem.cameras.size(), b.problem.cameras.size());
+    for (std::size_t i = 0; i < a.problem.cameras.size(); ++i) {
+      EXPECT_EQ(a.problem.cameras[i].position, b.problem.cameras[i].position);
+      EXPECT_EQ(a.problem.cameras[i].orientation, b.problem.cameras[i].orientation);
+      EXPECT_EQ(a.problem.cameras[i].intrinsics, b.problem.cameras[i].intrinsics);
+    }
+    EXPECT_EQ(a.problem.intrinsics, b.problem.intrinsics);
+    EXPECT_EQ(a.problem.points, b.problem.points);
+    ASSERT_EQ(a.problem.observations.size(), b.problem.observations.size());
+    for (std::size_t i = 0; i < a.problem.observations.size(); ++i) {
+      EXPECT_EQ(a.problem.observations[i].camera, b.problem.observations[i].camera);
+      EXPECT_EQ(a.problem.observations[i].point, b.problem.observations[i].point);
+      EXPECT_EQ(a.problem.observations[i].z, b.problem.observations[i].z);
+    }
+    EXPECT_EQ(a.camera_ids, b.camera_ids);
+    EXPECT_EQ(a.point_ids, b.point_ids);
+    EXPECT_EQ(a.colours, b.colours);
+    EXPECT_EQ(a.keys, b.keys);
+  }
+  testing::TemporaryFolder folder_;
+};
+
+/// A camera turned by 90 degrees about its z axis, (x, y) -> (-y, x), and moved; f = 100 px,
+/// k1 = 1. The point (0.2, 0.1, -3) comes to (-0.1, 0.2, -3) + (0, 0, 1): p = (-0.05, 0.1),
+/// q = 0.0125, z = 101.25 p.
+const std::string kBal =
+    "1 1 1\n0 0 -5.0625e+00 1.0125e+01\n"
+    "0\n0\n1.5707963267948966\n0\n0\n1\n100\n1\n0\n0.2\n0.1\n-3\n";
+
+TEST_F(BundleFiles, ReadsBal) {
+  const BundleFile file = ReadText(kBal);
+  EXPECT_EQ(file.format, BundleFormat::kBal);
+  ASSERT_EQ(file.problem.observations.size(), 1u);
+  EXPECT_EQ(file.problem.observations[0].z[1], -10.125) << "v grows downwards";
+  const SensorModel sensor =
+      InProcessSensor(SelfCalibratingFeature<RadialLens>(1.0), "self_calibrating_feature");
+  EXPECT_LT(BundleRms(sensor, file.problem), 1e-12);
+}
+
+TEST_F(BundleFiles, BalIsReadAndWrittenWithoutALoss) {
+  BundleFile file = TrueBundle();
+  file.problem.points[0] = {0.1, 1e-17, -1e22};
+  const BundleFile once = ReadText(BundleText(file));
+  const BundleFile twice = ReadText(BundleText(once));
+  ExpectSame(once, twice);
+  EXPECT_EQ(BundleText(once), BundleText(twice));
+  EXPECT_EQ(once.problem.points, file.problem.points);
+  for (std::size_t i = 0; i < file.problem.cameras.size(); ++i) {
+    double d[3];
+    UnitQuaternion::Minus(once.problem.cameras[i].orientation.data(),
+                          file.problem.cameras[i].orientation.data(), d);
+    for (std::size_t k = 0; k < 3; ++k) {
+      EXPECT_NEAR(d[k], 0.0, 1e-14);
+      EXPECT_NEAR(once.problem.cameras[i].position[k], file.problem.cameras[i].position[k], 1e-14);
+    }
+  }
+}
+
+/// The camera of kBal, one that was not registered, and a point that both were asked for.
+const std::string kBundler =
+    "# Bundle file v0.3\n2 2\n100 1 0\n0 -1 0\n1 0 0\n0 0 1\n0 0 1\n"
+    "0 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n"
+    "0.2 0.1 -3\n255 0 7\n1 0 42 -5.0625 10.125\n0 0 0\n1 2 3\n0\n";
+
+TEST_F(BundleFiles, ReadsBundler) {
+  const BundleFile file = ReadText(kBundler);
+  EXPECT_EQ(file.format, BundleFormat::kBundler);
+  EXPECT_EQ(file.colours, (std::vector<std::string>{"255 0 7", "1 2 3"}));
+  EXPECT_EQ(file.keys, std::vector<std::int64_t>{42});
+  const SensorModel sensor =
+      InProcessSensor(SelfCalibratingFeature<RadialLens>(1.0), "self_calibrating_feature");
+  EXPECT_LT(BundleRms(sensor, file.problem), 1e-12);
+  EXPECT_EQ(BundleText(file), kBundler);
+}
+
+TEST_F(BundleFiles, WritesBundlerOfCamerasThatMoved) {
+  BundleFile file = ReadText(kBundler);
+  file.problem.cameras[0].position[0] += 1e-9;
+  const BundleFile again = ReadText(BundleText(file));
+  for (std::size_t k = 0; k < 3; ++k)
+    EXPECT_NEAR(again.problem.cameras[0].position[k], file.problem.cameras[0].position[k], 1e-15);
+}
+
+std::string Libmv(bool little) {
+  std::string bytes = little ? "vP" : "VP";
+  const auto add = [&](std::uint32_t word) {
+    for (int i = 0; i < 4; ++i)
+      bytes += static_cast<char>(word >> 8 * (little ? i : 3 - i) & 0xFFu);
+  };
+  const auto number = [&](float value) {
+    std::uint32_t word = 0;
+    std::memcpy(&word, &value, 4);
+    add(word);
+  };
+  for (const float k : {100.f, 320.f, 240.f, 1.f, 0.f, 0.f, 0.f, 0.f}) number(k);
+  add(1);  // camera of image 7: columns of R, t
+  add(7);
+  for (const float k : {0.f, 1.f, 0.f, -1.f, 0.f, 0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 1.f}) number(k);
+  add(1);  // point of track 9, which comes to (-0.1, 0.2, 2)
+  add(9);
+  for (const float k : {0.2f, 0.1f, 1.f}) number(k);
+  add(1);
+  add(7);
+  add(9);
+  number(314.9375f);
+  number(250.125f);
+  return bytes;
+}
+
+TEST_F(BundleFiles, ReadsLibmvOfEitherByteOrder) {
+  const SensorModel sensor =
+      InProcessSensor(SelfCalibratingFeature<RadtanLens>(1.0), "self_calibrating_feature");
+  for (const bool little : {true, false}) {
+    const BundleFile file = ReadText(Libmv(little));
+    EXPECT_EQ(file.format, BundleFormat::kLibmv);
+    EXPECT_EQ(file.camera_ids, std::vector<std::int64_t>{7});
+    EXPECT_EQ(file.point_ids, std::vector<std::int64_t>{9});
+    EXPECT_LT(BundleRms(sensor, file.problem), 1e-4) << "32-bit numbers";
+    EXPECT_EQ(BundleText(file), Libmv(true));
+  }
+}
+
+TEST_F(BundleFiles, RefusesBadBal) {
+  ExpectBad("", {":1:1: nothing in it"});
+  ExpectBad("1 1 1\n0 1 2 3\n", {":2:3: '1' is none; expected the point", "from 0 to 0"});
+  ExpectBad("1 1 1\n-1 0 2 3\n", {":2:1: '-1' is none", "from 0 to 0"});
+  ExpectBad("1 1 1\n0 0 nan 3\n", {":2:5: 'nan' is not finite", "u of an observation"});
+  ExpectBad("1 1 1\n0 0 2,5 3\n", {":2:5:"});
+  ExpectBad("1 1 1\n0 0 1e999 3\n", {":2:5: '1e999' is too large or too small"});
+  ExpectBad("1 x 1\n", {":1:3: 'x' is none; expected the number of points"});
+  ExpectBad(kBal.substr(0, kBal.size() - 4), {"the file ends here; expected a point"});
+  std::string text = kBal;
+  ExpectBad(text.replace(text.find("100"), 3, "-10"),
+            {":9:1: this focal length is not positive", "px above 0"});
+  ExpectBad(kBal + "5\n", {":15:1: more numbers than the file announces"});
+  for (const char* magic : {"\x1F\x8B\x08", "BZh9",
+                            "\xFD"
+                            "7zXZ",
+                            "\x28\xB5\x2F\xFD"})
+    ExpectBad(magic, {":1:1: compressed; expected the text: zcat, bzcat, xzcat or zstdcat FILE"});
+  ExpectBad("frame,feature,dim,value\n", {":1:1: columns with commas", "--camera FILE"});
+}
+
+TEST_F(BundleFiles, RefusesBadBundler) {
+  ExpectBad("# Bundle file v0.4\n1 1\n",
+            {":1:1: '# Bundle file v0.4'; expected # Bundle file v0.3"});
+  std::string text = kBundler;
+  ExpectBad(text.replace(text.find("0 -1 0"), 6, "0 -2 0"), {":6:5:", "are no rotation"});
+  text = kBundler;
+  ExpectBad(text.replace(text.find("1 0 42"), 6, "1 1 42"), {"this camera is not registered"});
+  text = kBundler;
+  ExpectBad(text.replace(text.find("100"), 3, "-10"), {":3:1: this focal length is not positive"});
+  text = kBundler;
+  ExpectBad(text.replace(text.find("1 0 42"), 6, "1 2 42"), {"'2' is none; expected a camera"});
+  ExpectBad(kBundler.substr(0, 60), {"the file ends here"});
+}
+
+TEST_F(BundleFiles, RefusesBadLibmv) {
+  const std::string good = Libmv(true);
+  std::string bad = good;
+  bad[1] = 'N';
+  ExpectBad(bad, {"byte 1: markers in normalised coordinates"});
+  ExpectBad(good.substr(0, good.size() - 2), {"byte 128: the file ends before a marker"});
+  ExpectBad(good + "x", {"byte 130: bytes behind the last marker"});
+  bad = good;
+  bad[bad.size() - 16] = 8;
+  ExpectBad(bad, {"byte 114: a marker in an image that has no camera"});
+  bad = good;
+  bad[5] = static_cast<char>(0x7F), bad[4] = static_cast<char>(0xC0);
+  ExpectBad(bad, {"byte 2: intrinsics is not finite"});
+}
+
+TEST_F(BundleFiles, SavesTheProblemPosesAndPoints) {
+  const BundleFile file = ReadText(kBal);
+  BundleResult result;
+  result.end = BundleEnd::kConverged;
+  const std::vector<std::string> names =
+      BundleFolder(folder_ / "o", false).Save(file, result, 2.0, 1.0);
+  EXPECT_EQ(names,
+            (std::vector<std::string>{"bundle.json", "points.csv", "poses.tum", "problem.txt"}));
+  const auto line = [&](const char* name, int number) {
+    std::ifstream stream(folder_ / "o" / name);
+    std::string text;
+    for (int i = 0; i < number; ++i) std::getline(stream, text);
+    return text;
+  };
+  EXPECT_EQ(line("points.csv", 2), "0,0.2,0.1,-3");
+  EXPECT_TRUE(line("poses.tum", 1).starts_with("0 ")) << line("poses.tum", 1);
+  EXPECT_NE(line("bundle.json", 3).find("\"status\": \"converged\""), std::string::npos);
+  ExpectSame(ReadBundle(folder_ / "o" / "problem.txt"), file);
+  EXPECT_THROW(BundleFolder(folder_ / "o", false), Error) << "it is there";
+}
+
+/// The camera of kBundler that was not registered has no pose, and what is 0 has no sign.
+TEST_F(BundleFiles, SavesPosesOfRegisteredCamerasOnly) {
+  std::string text = kBundler;
+  text.replace(text.find("0 -1 0\n1 0 0\n0 0 1\n0 0 1\n"), 25, "1 0 0\n0 1 0\n0 0 1\n0 0 0\n");
+  BundleFolder(folder_ / "o", false).Save(ReadText(text), {}, 2.0, 1.0);
+  std::ostringstream poses;
+  poses << std::ifstream(folder_ / "o" / "poses.tum").rdbuf();
+  EXPECT_EQ(poses.str(), "0 0 0 0 1 0 0 0\n");
+}
+
+}  // namespace
+}  // namespace alidade

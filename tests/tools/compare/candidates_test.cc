@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Comparisons of runs made by hand: which estimator is held against which, and where data differ.
+#include "alidade/compare/candidates.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+
+#include "support/temporary_folder.h"
+
+namespace alidade {
+namespace {
+
+using internal::ComparedEntry;
+using internal::ComparedRun;
+using internal::CompareRuns;
+
+EstimatorKind KindOf(const std::string& type) {
+  if (type == "rts") return EstimatorKind::kSmoother;
+  if (type == "fixed_lag") return EstimatorKind::kWindow;
+  return type == "ceres_batch" ? EstimatorKind::kBatch : EstimatorKind::kFilter;
+}
+
+/// An estimator of a block p.x that is `error` beside the truth, nought, at three stamps.
+ComparedEntry Entry(const std::string& name, const std::string& type, bool smoothed, double error,
+                    const std::vector<std::string>& sensors = {"stereo"}) {
+  ComparedEntry entry;
+  entry.facts.type = type;
+  entry.facts.kind = KindOf(type);
+  entry.facts.smoothed = smoothed;
+  entry.facts.sensors = sensors;
+  entry.facts.blocks = entry.series.blocks = {{"p.x", "m", Geometry::Vector(1)}};
+  entry.series.stamps = {10, 20, 30};
+  entry.series.values = {error, error, error};
+  entry.series.covariances = {1.0, 1.0, 1.0};
+  entry.result.name = name;
+  entry.result.counts["accepted:" + sensors.front()] = 3;
+  entry.result.metrics = {{"rmse:p.x", error}, {"final:p.x", error}};
+  return entry;
+}
+
+ComparedRun RunOf(const std::vector<ComparedEntry>& estimators) {
+  ComparedRun run;
+  run.frames = 3;
+  run.estimators = estimators;
+  return run;
+}
+
+const ComparedEstimator& Find(const Comparison& comparison, const std::string& name) {
+  for (const ComparedEstimator& one : comparison.estimators) {
+    if (one.name == name) return one;
+  }
+  throw std::out_of_range(name);
+}
+
+TEST(CompareRuns, HoldsAnEstimatorAgainstTheBatchOfItsSensors) {
+  const ComparedRun run =
+      RunOf({Entry("stereo_batch", "ceres_batch", true, 8.0),
+             Entry("both", "ekf", false, 2.0, {"scale", "stereo"}),
+             Entry("stereo", "ekf", false, 16.0), Entry("scale", "ekf", false, 5.0, {"scale"}),
+             Entry("both_batch", "ceres_batch", true, 1.0, {"stereo", "scale"}),
+             Entry("both_rts", "rts", true, 3.0, {"stereo", "scale"})});
+  const Comparison comparison = CompareRuns({run}, {});
+  EXPECT_EQ(Find(comparison, "both").final_reference, "both_batch");
+  EXPECT_EQ(Find(comparison, "both").values.at("ratio.final:p.x").mean, 2.0);
+  EXPECT_EQ(Find(comparison, "both_rts").reference, "both_batch");
+  EXPECT_EQ(Find(comparison, "stereo").final_reference, "stereo_batch");
+  EXPECT_EQ(Find(comparison, "stereo").values.at("ratio.final:p.x").mean, 2.0);
+  EXPECT_EQ(Find(comparison, "scale").final_reference, "");
+  EXPECT_FALSE(Find(comparison, "scale").values.contains("apart.final:p.x"));
+  EXPECT_EQ(comparison.notes, (std::vector<std::string>{"'scale' is held against nothing: no "
+                                                        "batch has its sensors"}));
+  const std::string text = CompareReport(comparison, TableStyle::kText);
+  EXPECT_NE(text.find("ratio and difference: to the reference of each"), text.npos) << text;
+}
+
+// Only where no batch of the same system served does one with other overrides, a robust loss, say.
+TEST(CompareRuns, OverridesMakeAnotherSystem) {
+  ComparedEntry other = Entry("other", "ceres_batch", true, 8.0);
+  other.facts.overrides = "{sensors: {stereo: {loss: {cauchy: 1}}}}";
+  ComparedRun run =
+      RunOf({other, Entry("ekf", "ekf", false, 2.0), Entry("batch", "ceres_batch", true, 1.0)});
+  EXPECT_EQ(Find(CompareRuns({run}, {}), "ekf").final_reference, "batch");
+  // Whoever names a reference gets it.
+  EXPECT_EQ(Find(CompareRuns({run}, {"other", "", true}), "ekf").final_reference, "other");
+  run.estimators[2].result.failed = true;
+  EXPECT_EQ(Find(CompareRuns({run}, {}), "ekf").final_reference, "other");
+  EXPECT_EQ(CompareRuns({run}, {}).withheld, "");
+}
+
+TEST(CompareRuns, ABatchThatFailedGivesWayToOneThatDidNot) {
+  ComparedEntry failed = Entry("failed", "ceres_batch", true, 8.0);
+  failed.result.failed = true;
+  const ComparedEntry ekf = Entry("ekf", "ekf", false, 2.0);
+  const ComparedEntry batch = Entry("batch", "ceres_batch", true, 1.0);
+  for (const auto& entries : {std::vector{failed, ekf, batch}, std::vector{batch, ekf, failed}}) {
+    const Comparison comparison = CompareRuns({RunOf(entries)}, {});
+    EXPECT_EQ(comparison.withheld, "");
+    EXPECT_EQ(Find(comparison, "ekf").final_reference, "batch");
+    EXPECT_EQ(comparison.gap[0].to, "batch");
+  }
+  const Comparison alone = CompareRuns({RunOf({failed, ekf})}, {});
+  EXPECT_EQ(alone.withheld,
+            "no reference: estimator 'failed' failed, the comparison with it is withheld");
+}
+
+// The filter and the batch then agree, about what both were told before.
+TEST(CompareRuns, WithoutAMeasurementThereIsNothingToCompare) {
+  ComparedRun run =
+      RunOf({Entry("ekf", "ekf", false, 2.0), Entry("batch", "ceres_batch", true, 1.0)});
+  run.estimators[0].result.counts.clear();
+  EXPECT_EQ(CompareRuns({run}, {}).withheld, "");
+  run.estimators[1].result.counts = {{"landmarks.deleted", 2}};
+  EXPECT_EQ(CompareRuns({run}, {}).withheld,
+            "no estimator was given a measurement: what is compared is their start");
+}
+
+TEST(CompareRuns, TellsOfLockOutsOfTheFilter) {
+  ComparedRun run =
+      RunOf({Entry("ekf", "ekf", false, 2.0), Entry("batch", "ceres_batch", true, 1.0)});
+  EXPECT_TRUE(CompareRuns({run}, {}).notes.empty());
+  run.estimators[0].locked_out = true;
+  EXPECT_EQ(CompareRuns({run}, {}).notes,
+            std::vector<std::string>{"'ekf' was locked out: what that cost is in its step to a "
+                                     "batch or smoother"});
+}
+
+TEST(CompareRuns, HasTheWorstStatusOfTheRuns) {
+  std::vector<ComparedRun> runs(3, RunOf({Entry("ekf", "ekf", false, 2.0)}));
+  EXPECT_NE(CompareJson(CompareRuns(runs, {})).find("\"status\": \"ok\""), std::string::npos);
+  runs[1].status = RunStatus::kStopped;
+  EXPECT_NE(CompareJson(CompareRuns(runs, {})).find("\"status\": \"stopped\""), std::string::npos);
+}
+
+TEST(CompareRuns, GivesNoRatioToAnErrorWithoutBound) {
+  const double inf = std::numeric_limits<double>::infinity();
+  const ComparedRun run =
+      RunOf({Entry("rts", "rts", true, inf), Entry("batch", "ceres_batch", true, inf)});
+  EXPECT_FALSE(Find(CompareRuns({run}, {}), "rts").values.contains("ratio.rmse:p.x"));
+}
+
+TEST(CompareRuns, ExplainsTheGapOfAFilterAlone) {
+  const ComparedRun run =
+      RunOf({Entry("ekf", "ekf", false, 2.0), Entry("rts", "rts", true, 1.0),
+             Entry("now", "ceres_batch", false, 1.0), Entry("batch", "ceres_batch", true, 1.0)});
+  for (const char* name : {"rts", "now", "batch"}) {
+    try {
+      CompareRuns({run}, {"", name, true});
+      ADD_FAILURE() << name;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::kUsage);
+      EXPECT_EQ(std::string(error.what()), std::string("--filter: '") + name +
+                                               "' is not an online filter; expected one of ekf");
+    }
+  }
+  EXPECT_EQ(CompareRuns({run}, {"", "ekf", true}).explained, "ekf");
+}
+
+/// With a map of three landmarks at distance `error` of the true ones, along x.
+ComparedEntry WithMap(ComparedEntry entry, double error) {
+  const Eigen::Vector3d places[] = {{0, 0, 1}, {1, 0, 2}, {0, 1, 3}};
+  entry.result.landmarks.emplace();
+  for (int i = 0; i < 3; ++i) {
+    LandmarkEstimate& one = entry.result.landmarks->emplace_back();
+    one.id = i;
+    one.position = places[i] + Eigen::Vector3d(error, 0.0, 0.0);
+  }
+  entry.result.metrics["map.rmse"] = error;
+  return entry;
+}
+
+// With landmarks no batch solves at every frame, but at the last one that of all data is that of
+// the data so far.
+TEST(CompareRuns, WithoutABatchSoFarLinearisationIsToldFromTheLastFrame) {
+  ComparedEntry ekf = WithMap(Entry("ekf", "ekf", false, 2.0), 0.5);
+  ekf.series.values = {9.0, 9.0, 2.0};
+  ekf.result.metrics["rmse:p.x"] = 7.5;
+  ComparedEntry batch = WithMap(Entry("batch", "ceres_batch", true, 0.5), 0.125);
+  batch.series.covariances = {4.0, 4.0, 0.25};
+  const Comparison comparison = CompareRuns({RunOf({ekf, batch})}, {});
+  const GapStep& step = comparison.gap[0];
+  EXPECT_TRUE(step.at_end);
+  EXPECT_EQ(step.withheld, "");
+  EXPECT_EQ(step.to, "batch");
+  const auto value = [&](const char* key) { return step.values.at(key).mean; };
+  EXPECT_EQ(value("apart:p.x"), 1.5);
+  EXPECT_EQ(value("apart.sigmas:p"), 3.0);
+  EXPECT_EQ(value("error_ratio:p.x"), 4.0);
+  EXPECT_EQ(value("error_ratio:map"), 4.0);
+  EXPECT_EQ(value("apart:map"), 0.375);
+  EXPECT_LT(value("apart:map.sim3"), 1e-12);
+  const std::string text = CompareReport(comparison, TableStyle::kText);
+  EXPECT_NE(text.find("linearisation, ekf against batch, at the last frame\n"), text.npos) << text;
+  EXPECT_NE(text.find("\nmap [m]"), text.npos) << text;
+  EXPECT_NE(CompareJson(comparison).find("\"at_end\": true"), std::string::npos);
+}
+
+// What the gate kept out is another step's, where both batches are there.
+TEST(CompareRuns, TheLastFrameIsThatOfTheBatchOfWhatTheFilterAccepted) {
+  ComparedEntry accepted = Entry("accepted", "ceres_batch", true, 1.0);
+  accepted.facts.accepted_by = "ekf";
+  const ComparedEntry ekf = Entry("ekf", "ekf", false, 2.0);
+  const ComparedEntry batch = Entry("batch", "ceres_batch", true, 0.5);
+  EXPECT_EQ(CompareRuns({RunOf({ekf, batch, accepted})}, {}).gap[0].to, "accepted");
+  ComparedEntry so_far = Entry("so_far", "ceres_batch", false, 1.5);
+  const GapStep step = CompareRuns({RunOf({ekf, batch, accepted, so_far})}, {}).gap[0];
+  EXPECT_EQ(step.to, "so_far");
+  EXPECT_FALSE(step.at_end);
+}
+
+/// What is said of two runs whose measurements.csv differ.
+std::string Refusal(const std::string& one, const std::string& other) {
+  const testing::TemporaryFolder folders[2];
+  std::ofstream(folders[0] / "measurements.csv") << one;
+  std::ofstream(folders[1] / "measurements.csv") << other;
+  std::vector<ComparedRun> runs(2);
+  for (const std::size_t r : {0, 1}) {
+    runs[r].folder = folders[r].path();
+    runs[r].measurements_sha256 = std::to_string(r);
+  }
+  try {
+    internal::CheckSameData(runs);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(CheckSameData, TellsTheFirstStampWhateverTheColumnsAndTheOrderOfStreams) {
+  const std::string text =
+      Refusal("t_s,stream,landmark,v0,v1\n0.1,a,,1,\n0.1,b,,2,3\n0.2,a,,4,\n0.3,a,,5,\n",
+              "t_s,stream,landmark,v0,v1,v2\n0.1,b,,2,3,\n0.1,a,,1,,\n0.2,a,,4,,\n0.3,a,,6,,\n");
+  EXPECT_NE(text.find("first at t = 0.3 s of the one, t = 0.3 s of the other"), text.npos) << text;
+}
+
+TEST(CheckSameData, TheOrderWithinAStreamIsData) {
+  const std::string header = "t_s,stream,landmark,v0\n";
+  const std::string text =
+      Refusal(header + "0.1,a,,1\n0.2,a,,1\n0.2,a,,2\n", header + "0.1,a,,1\n0.2,a,,2\n0.2,a,,1\n");
+  EXPECT_NE(text.find("first at t = 0.2 s of the one, t = 0.2 s of the other"), text.npos) << text;
+}
+
+TEST(CheckSameData, SaysWhereARunHasLessAndWhereTheFilesDoNotTell) {
+  const std::string rows = "t_s,stream,landmark,v0\n0.1,a,,1\n";
+  EXPECT_NE(Refusal(rows + "0.2,a,,1\n", rows)
+                .find("first at t = 0.2 s of the one, its end of the other"),
+            std::string::npos);
+  EXPECT_NE(Refusal(rows, rows).find("their own covariances or the stamps of empty frames differ"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace alidade

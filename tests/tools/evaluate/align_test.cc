@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What an evaluation compares: poses of the same time, after the alignment asked for.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "alidade/evaluate/evaluate.h"
+#include "support/trajectories.h"
+
+namespace alidade {
+namespace {
+
+using Eigen::Vector3d;
+using testing::Curve;
+using testing::Inverse;
+using testing::Turn;
+
+Similarity Known() { return {2.5, Turn(1.1).toRotationMatrix(), Vector3d(10.0, -20.0, 3.0)}; }
+
+void ExpectSame(const Similarity& found, const Similarity& known) {
+  EXPECT_NEAR(found.scale, known.scale, 1e-12);
+  EXPECT_TRUE(found.rotation.isApprox(known.rotation, 1e-12)) << found.rotation;
+  EXPECT_TRUE(found.translation.isApprox(known.translation, 1e-12)) << found.translation;
+}
+
+double SquaredError(const Similarity& s, const Trajectory& reference, const Trajectory& estimate) {
+  return ((s * estimate).positions - reference.positions).squaredNorm();
+}
+
+TEST(Align, FindsAKnownSimilarity) {
+  const Trajectory reference = Curve(50);
+  Similarity known = Known();
+  ExpectSame(Align(Alignment::kSim3, reference, Inverse(known) * reference), known);
+  const Similarity scale = Align(Alignment::kScale, reference, Inverse(known) * reference);
+  ExpectSame(scale, {2.5, Eigen::Matrix3d::Identity(), Vector3d::Zero()});
+  ExpectSame(Align(Alignment::kNone, reference, Inverse(known) * reference), {});
+  known.scale = 1.0;
+  ExpectSame(Align(Alignment::kSe3, reference, Inverse(known) * reference), known);
+  ExpectSame(Align(Alignment::kOrigin, reference, Inverse(known) * reference), known);
+  known.rotation = Eigen::AngleAxisd(-2.0, Vector3d::UnitZ()).toRotationMatrix();
+  ExpectSame(Align(Alignment::kYaw, reference, Inverse(known) * reference), known);
+}
+
+TEST(Align, OfPathsThatDifferNothingNearbyFitsBetter) {
+  const Trajectory reference = Curve(50);
+  Trajectory estimate = Inverse(Known()) * reference;
+  for (int i = 0; i < 50; ++i) estimate.positions(i % 3, i) += 0.05 * std::sin(7.0 * i);
+  for (const Alignment alignment : {Alignment::kYaw, Alignment::kSe3, Alignment::kSim3}) {
+    SCOPED_TRACE(ToString(alignment));
+    const Similarity best = Align(alignment, reference, estimate);
+    const double least = SquaredError(best, reference, estimate);
+    for (const double step : {-1e-4, 1e-4}) {
+      for (int axis = 0; axis < 3; ++axis) {
+        Similarity near = best;
+        near.translation[axis] += step;
+        EXPECT_GT(SquaredError(near, reference, estimate), least);
+        near = best;
+        near.rotation = Eigen::AngleAxisd(step, Vector3d::Unit(axis)) * best.rotation;
+        near.translation +=
+            reference.positions.rowwise().mean() - (near * estimate).positions.rowwise().mean();
+        if (alignment == Alignment::kYaw && axis < 2) continue;
+        EXPECT_GT(SquaredError(near, reference, estimate), least);
+      }
+      if (alignment != Alignment::kSim3) continue;
+      Similarity near = best;
+      near.scale += step;
+      near.translation +=
+          reference.positions.rowwise().mean() - (near * estimate).positions.rowwise().mean();
+      EXPECT_GT(SquaredError(near, reference, estimate), least);
+    }
+  }
+}
+
+TEST(Align, TakesTheFirstPosesAloneWhereAsked) {
+  const Trajectory reference = Curve(50);
+  Trajectory estimate = Inverse(Known()) * reference;
+  estimate.positions.rightCols(25).array() += 100.0;
+  ExpectSame(Align(Alignment::kSim3, reference, estimate, 25), Known());
+}
+
+TEST(Align, RefusesWhatDeterminesNothing) {
+  EXPECT_THROW(Align(Alignment::kSe3, Curve(2), Curve(2)), Error);
+  Trajectory still = Curve(5);
+  still.positions.setConstant(4.0);
+  EXPECT_THROW(Align(Alignment::kSim3, Curve(5), still), Error);
+  EXPECT_THROW(Align(Alignment::kScale, still, Curve(5)), Error);
+  EXPECT_THROW(Align(Alignment::kSe3, Curve(5), Curve(4)), ContractViolation);
+}
+
+TEST(Align, RefusesWhatDeterminesNoScale) {
+  // Of the squares of x and y no one says anything about the other.
+  Trajectory reference = Curve(12), estimate = Curve(12);
+  for (int i = 0; i < 12; ++i) {
+    reference.positions.col(i) << (i % 2 == 0 ? -1.0 : 1.0), 0.0, 0.0;
+    estimate.positions.col(i) << (i % 4 < 2 ? -1.0 : 1.0), 0.0, 0.0;
+  }
+  for (const double off : {0.0, 0.1}) {  // by 0.1, rounding leaves a scale of 1e-17
+    estimate.positions.row(0).array() += off;
+    for (const Alignment alignment : {Alignment::kSim3, Alignment::kScale}) {
+      try {
+        Align(alignment, reference, estimate);
+        FAIL() << off;
+      } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ExitCode::kBadData);
+        EXPECT_STREQ(error.what(),
+                     "curve.tum: no scale: its positions have nothing in common with those of "
+                     "curve.tum; expected poses of the same path, or --align");
+      }
+    }
+    const Evaluation e = Evaluate(reference, estimate, {});
+    EXPECT_FALSE(e.sim3_scale);
+    EXPECT_TRUE(std::isfinite(e.absolute[0].statistics.rmse));
+  }
+}
+
+Trajectory At(const std::vector<double>& seconds) {
+  Trajectory t = Curve(static_cast<int>(seconds.size()));
+  t.stamps.clear();
+  for (const double s : seconds) t.stamps.push_back(StampFromSeconds(s));
+  return t;
+}
+
+TEST(Associate, EachOfTheShorterTakesTheNearestOfTheLongerWithinTheTolerance) {
+  const Trajectory reference = At({0.0, 1.0, 2.0, 3.0, 4.0});
+  // 0.004 and 0.006 are both nearest to 0; 2.02 is too far; 3.01 just is not.
+  const Matches matches = Associate(reference, At({0.004, 0.006, 2.02, 3.01}), 10'000'000, 0);
+  EXPECT_EQ(matches.possible, 4);
+  EXPECT_EQ(matches.reference, (std::vector<int>{0, 0, 3}));
+  EXPECT_EQ(matches.estimate, (std::vector<int>{0, 1, 3}));
+  // The shorter one is asked, whichever it is.
+  const Matches other = Associate(At({0.006, 3.01}), reference, 10'000'000, 0);
+  EXPECT_EQ(other.possible, 2);
+  EXPECT_EQ(other.reference, (std::vector<int>{0, 1}));
+  EXPECT_EQ(other.estimate, (std::vector<int>{0, 3}));
+}
+
+TEST(Associate, DuplicatesOfTheShorterAllPairAndOfTheLongerTheFirstDoes) {
+  // The smallest |t - 1| of the longer, at indices 1 and 2, is first met at 1.
+  const Matches matches =
+      Associate(At({0.0, 1.0, 1.0, 2.0, 3.0}), At({1.0, 1.0, 2.0}), 10'000'000, 0);
+  EXPECT_EQ(matches.reference, (std::vector<int>{1, 1, 3}));
+  EXPECT_EQ(matches.estimate, (std::vector<int>{0, 1, 2}));
+  // So from above and from below.
+  const Trajectory longer = At({0.0, 1.0, 1.0, 2.0, 2.0});
+  EXPECT_EQ(Associate(longer, At({0.996, 1.004, 2.004}), 10'000'000, 0).reference,
+            (std::vector<int>{1, 1, 3}));
+}
+
+TEST(Associate, TheOffsetIsAddedToTheEstimate) {
+  const Trajectory longer = At({10.0, 11.0, 12.0, 13.0});
+  const Trajectory shorter = At({0.0, 1.0, 2.0});
+  EXPECT_EQ(Associate(longer, shorter, 1'000'000, 11'000'000'000).reference,
+            (std::vector<int>{1, 2, 3}));
+  EXPECT_EQ(Associate(shorter, longer, 1'000'000, -11'000'000'000).estimate,
+            (std::vector<int>{1, 2, 3}));
+  try {
+    Associate(longer, shorter, 1'000'000, 0);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::kBadData);
+    EXPECT_STREQ(error.what(),
+                 "curve.tum: no pose within 0.001 s of one of curve.tum: 0.000000 s to 2.000000 s "
+                 "beside 10.000000 s to 13.000000 s; expected the same clock; or --t-offset, which "
+                 "is added to the estimate's stamps, or --t-max-diff");
+  }
+}
+
+TEST(Associate, NamesTheOffsetWhereItIsToBlame) {
+  try {
+    Associate(At({0.0, 1.0}), At({0.0, 1.0}), 1'000'000, 5'000'000'000);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what())
+                  .find("0.000000 s to 1.000000 s and --t-offset beside "
+                        "0.000000 s to 1.000000 s"),
+              std::string::npos)
+        << error.what();
+  }
+}
+
+TEST(Associate, RefusesAnOffsetThatNoStampHolds) {
+  const Trajectory two = At({1.6e9, 1.6e9 + 1.0}), one = At({1.6e9});
+  constexpr Stamp kOffset = 9'000'000'000'000'000'000;
+  const auto refusal = [](const Trajectory& reference, const Trajectory& estimate, Stamp offset) {
+    try {
+      Associate(reference, estimate, 10'000'000, offset);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::kBadData);
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(refusal(two, one, kOffset),
+            "curve.tum --t-offset: 9000000000.000000 s beside its stamps is beyond 292 years; "
+            "expected the "
+            "time between the two clocks");
+  EXPECT_EQ(refusal(one, two, -kOffset),
+            "curve.tum --t-offset: -9000000000.000000 s beside its stamps is beyond 292 years; "
+            "expected the "
+            "time between the two clocks");
+}
+
+TEST(Associate, WithoutStampsByRow) {
+  Trajectory bare = Curve(4), five = Curve(5);
+  bare.stamps.clear();
+  five.stamps.clear();
+  const Matches matches = Associate(bare, bare, 0, 0);
+  EXPECT_TRUE(matches.by_row);
+  EXPECT_EQ(matches.estimate, (std::vector<int>{0, 1, 2, 3}));
+  EXPECT_THROW(Associate(bare, five, 0, 0), Error);
+  EXPECT_THROW(Associate(bare, Curve(4), 0, 0), Error);
+  // KITTI goes by row where either file has no times.
+  Trajectory timed = Curve(4);
+  timed.format = bare.format = five.format = TrajectoryFormat::kKitti;
+  EXPECT_TRUE(Associate(timed, bare, 0, 0).by_row);
+  EXPECT_TRUE(Associate(bare, timed, 0, 0).by_row);
+  const auto refusal = [](const Trajectory& reference, const Trajectory& estimate) {
+    try {
+      Associate(reference, estimate, 0, 0);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  timed.name = "timed.txt";
+  five.name = "five.txt";
+  EXPECT_EQ(refusal(timed, five),
+            "five.txt: 5 poses for 4 of timed.txt, and no timestamps; expected a row for each row "
+            "of the reference, or timestamps in both (KITTI: NAME_times.txt beside NAME.txt)");
+  EXPECT_EQ(refusal(five, timed),
+            "five.txt: 5 poses for 4 of timed.txt, and no timestamps; expected a row for each row "
+            "of the estimate, or timestamps in both (KITTI: NAME_times.txt beside NAME.txt)");
+}
+
+TEST(Associate, KittiWithTimesBesideBothGoesByThem) {
+  Trajectory reference = At({0.0, 0.1, 0.2, 0.3}), estimate = At({0.1, 0.3});
+  reference.format = estimate.format = TrajectoryFormat::kKitti;
+  const Matches matches = Associate(reference, estimate, 10'000'000, 0);
+  EXPECT_FALSE(matches.by_row);
+  EXPECT_EQ(matches.reference, (std::vector<int>{1, 3}));
+  EXPECT_EQ(matches.estimate, (std::vector<int>{0, 1}));
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/evaluate/trajectory.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "support/recording.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+
+class TrajectoryFiles : public ::testing::Test {
+ protected:
+  void Write(const fs::path& name, const std::string& text) const {
+    fs::create_directories((folder_ / name).parent_path());
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+  }
+  /// Of a file of that text.
+  Trajectory Read(const std::string& text,
+                  TrajectoryFormat format = TrajectoryFormat::kDetect) const {
+    Write("poses.txt", text);
+    return ReadTrajectory(folder_ / "poses.txt", format);
+  }
+  /// What Read says, behind the folder; "" where it says nothing.
+  std::string Refusal(const std::string& text,
+                      TrajectoryFormat format = TrajectoryFormat::kDetect) const {
+    try {
+      Read(text, format);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::kBadData);
+      return std::string(error.what()).substr(folder_.path().string().size() + 1);
+    }
+    return {};
+  }
+  /// The warnings of a file of that text, one below the other, behind the folder.
+  std::string WarningsOf(const std::string& text) const {
+    std::string all;
+    for (const std::string& warning : Read(text).warnings) {
+      all += warning.substr(folder_.path().string().size() + 1) + '\n';
+    }
+    return all;
+  }
+
+  testing::TemporaryFolder folder_;
+};
+
+using Eigen::Vector3d;
+
+TEST_F(TrajectoryFiles, TumIsReadExactlyWhateverTheLineEnds) {
+  const Trajectory t = Read(
+      "\xEF\xBB\xBF# t x y z qx qy qz qw\r\n"
+      "1311868163.869700001 -0.5 1e-1 +2 0 0 0 1\r\n"
+      "\r\n"
+      "# between\n"
+      "1311868163.9\t1  2 3 0.6 0 0 0.8  \n"
+      "1311868164 4 5 6 0 0 -1.0005 0");
+  EXPECT_EQ(t.format, TrajectoryFormat::kTum);
+  ASSERT_EQ(t.size(), 3);
+  EXPECT_EQ(t.stamps,
+            (std::vector<Stamp>{1311868163869700001, 1311868163900000000, 1311868164000000000}));
+  EXPECT_EQ(t.positions.col(0), Vector3d(-0.5, 0.1, 2.0));
+  EXPECT_EQ(t.positions.col(1), Vector3d(1, 2, 3));
+  EXPECT_TRUE(t.orientations[1].isApprox(Eigen::Quaterniond(0.8, 0.6, 0, 0), 1e-15));
+  EXPECT_DOUBLE_EQ(t.orientations[2].norm(), 1.0);
+  EXPECT_EQ(t.first_line, 2);
+  EXPECT_FALSE(t.has_covariances());
+  EXPECT_TRUE(t.warnings.empty());
+}
+
+TEST_F(TrajectoryFiles, TwentyColumnsAreTumWithCovariancesRotationFirst) {
+  const Trajectory t = Read("0 1 2 3 0 0 0 1 11 12 13 22 23 33 0.6 0.2 0.3 0.8 0.5 0.9\n");
+  ASSERT_TRUE(t.has_covariances());
+  Eigen::Matrix3d orientation, position;
+  orientation << 11, 12, 13, 12, 22, 23, 13, 23, 33;
+  position << 0.6, 0.2, 0.3, 0.2, 0.8, 0.5, 0.3, 0.5, 0.9;
+  EXPECT_EQ(t.orientation_covariances[0], orientation);
+  EXPECT_EQ(t.position_covariances[0], position);
+}
+
+TEST_F(TrajectoryFiles, KittiTakesItsStampsFromTheFileBeside) {
+  // A quarter turn about z.
+  const std::string rows = "0 -1 0 7 1 0 0 8 0 0 1 9\n1 0 0 0 0 1 0 0 0 0 1 0\n";
+  const Trajectory bare = Read(rows);
+  EXPECT_EQ(bare.format, TrajectoryFormat::kKitti);
+  EXPECT_FALSE(bare.has_stamps());
+  EXPECT_EQ(bare.positions.col(0), Vector3d(7, 8, 9));
+  EXPECT_TRUE((bare.orientations[0] * Vector3d::UnitX()).isApprox(Vector3d::UnitY(), 1e-15));
+
+  Write("times.txt", "0.000000e+00\n1.037359e-01\n");
+  EXPECT_EQ(Read(rows).stamps, (std::vector<Stamp>{0, 103735900}));
+  Write("poses_times.txt", "5\n6\n");
+  EXPECT_EQ(Read(rows).stamps, (std::vector<Stamp>{5'000'000'000, 6'000'000'000}));
+  Write("poses_times.txt", "5\n");
+  EXPECT_NE(Refusal(rows).find("poses_times.txt:1: 1 times for 2 poses of "), std::string::npos);
+  EXPECT_NE(Refusal(rows).find("; expected one for each pose"), std::string::npos);
+  // A times.txt that others share says how this file comes to its own.
+  fs::remove(folder_ / "poses_times.txt");
+  Write("times.txt", "0\n1\n2\n");
+  EXPECT_NE(Refusal(rows).find("times.txt:3: 3 times for 2 poses of "), std::string::npos);
+  EXPECT_NE(Refusal(rows).find("; expected one for each pose, or poses_times.txt beside it"),
+            std::string::npos)
+      << Refusal(rows);
+  Write("poses_times.txt", "5\n5\n");
+  EXPECT_NE(Refusal(rows).find("poses_times.txt:2:1 t: '5' is not after the one before"),
+            std::string::npos);
+}
+
+TEST_F(TrajectoryFiles, EurocHasNanosecondsAndWFirst) {
+  for (const char* more : {"", ",0,0,0,0,0,0,0,0,0"}) {
+    const Trajectory t = Read(
+        "#timestamp, p_RS_R_x [m], p_RS_R_y [m]\n"
+        "1403636580838555648,4.6,-1.7,0.7,0.8,0.6,0,0" +
+        std::string(more) + "\n");
+    EXPECT_EQ(t.format, TrajectoryFormat::kEuroc);
+    EXPECT_EQ(t.stamps[0], 1403636580838555648);
+    EXPECT_TRUE(t.orientations[0].isApprox(Eigen::Quaterniond(0.8, 0.6, 0, 0), 1e-15));
+  }
+}
+
+TEST_F(TrajectoryFiles, AGivenFormatOverridesTheRow) {
+  const Trajectory t = Read("1.5,1,2,3,0,0,0,1\n", TrajectoryFormat::kTum);
+  EXPECT_EQ(t.stamps[0], 1'500'000'000);
+  EXPECT_EQ(t.orientations[0].w(), 1.0);
+  EXPECT_EQ(Refusal("0 1 2 3 0 0 0 1\n", TrajectoryFormat::kKitti),
+            "poses.txt:1:16: 8 columns; expected 12, the upper three rows of world_from_body");
+}
+
+TEST_F(TrajectoryFiles, RowsThatAreNoneAreRefusedWithTheirPlace) {
+  const std::string good = "0 1 2 3 0 0 0 1\n";
+  EXPECT_EQ(Refusal("1 2 3\n"),
+            "poses.txt:1: 3 columns; expected 8 columns (TUM), 20 (TUM with covariances), 12 "
+            "(KITTI), or with commas 8 or 17 (EuRoC)");
+  EXPECT_EQ(Refusal(good + "1 1 2 3 0 0 0\n"),
+            "poses.txt:2:14: 7 columns; expected 8, t x y z qx qy qz qw");
+  EXPECT_EQ(Refusal(good + "1 1 2 3 0 0 0"),
+            "poses.txt:2:14: the last line is cut short: 7 columns; expected 8, t x y z qx qy qz "
+            "qw");
+  EXPECT_EQ(Refusal(good + "1 1 2 3 0 0 0 1 5\n"),
+            "poses.txt:2:17: 9 columns; expected 8, t x y z qx qy qz qw");
+  EXPECT_EQ(Refusal(good + "1 1 nan 3 0 0 0 1\n"),
+            "poses.txt:2:5 y: 'nan' is not finite; expected a finite number");
+  EXPECT_EQ(Refusal(good + "1 1 -1e300 3 0 0 0 1\n"),
+            "poses.txt:2: the position is more than 1e15 m away; expected metres");
+  EXPECT_EQ(Refusal(good + "1 1 2.x 3 0 0 0 1\n"),
+            "poses.txt:2:5 y: '2.x' is not a number; expected a finite number");
+  EXPECT_EQ(Refusal(good + "1 1 2 3 0 0 0 1.01\n"),
+            "poses.txt:2: quaternion of length 1.010000; expected length 1 to 1e-3");
+  EXPECT_EQ(Refusal("1.5,1,2,3,1,0,0,0\n"),
+            "poses.txt:1:1 t: '1.5' is no whole number; expected a whole number of 0 or more");
+  const std::string no_rotation =
+      "poses.txt:1: columns 1-3, 5-7, 9-11 are no rotation; expected R R' = 1 to 1e-3, det R = 1";
+  EXPECT_EQ(Refusal("1.1 0 0 0 0 1 0 0 0 0 1 0\n"), no_rotation);
+  EXPECT_EQ(Refusal("-1 0 0 0 0 1 0 0 0 0 1 0\n"), no_rotation);
+  EXPECT_EQ(Refusal("# nothing\n").substr(0, 23), "poses.txt:1: no poses; ");
+  EXPECT_THROW(ReadTrajectory(folder_ / "missing.txt"), Error);
+}
+
+TEST_F(TrajectoryFiles, StampsThatCannotBeSecondsAreReadAsWhatTheyLookLike) {
+  const std::string pose = " 1 2 3 0 0 0 1\n";
+  struct Case {
+    std::string first, second, unit;
+  };
+  for (const Case& c : {Case{"1311868163869700001", "1311868163903000001", "ns"},
+                        {"0", "33333333", "ns"},
+                        {"3600000000000", "3600033300000", "ns"},  // an hour after its start
+                        {"1311868163869700", "1311868163903000", "us"},
+                        {"0", "33333", "us"},
+                        {"10800000000", "10800033300", "us"},  // three hours after its start
+                        {"1311868163869.7", "1311868163903", "ms"}}) {
+    SCOPED_TRACE(c.first + ' ' + c.unit);
+    const std::string text = "# t\n" + c.first + pose + c.second + pose;
+    EXPECT_EQ(WarningsOf(text), "poses.txt:2 t: '" + c.first +
+                                    "' and what follows cannot be seconds; read as " + c.unit +
+                                    "; expected seconds, as TUM has them\n");
+    const Trajectory t = Read(text);
+    EXPECT_NEAR(1e-9 * static_cast<double>(t.stamps[1] - t.stamps[0]), 0.0333, 1e-4);
+  }
+  EXPECT_EQ(Read("0" + pose + "1000000" + pose).stamps[1], 1'000'000'000);  // us, each second
+  EXPECT_EQ(Read("1311868163869" + pose + "1311868168869" + pose).stamps[1],
+            1'311'868'168'869'000'000);  // ms, 5 s apart
+  EXPECT_EQ(Read("1311868163869700001" + pose).stamps[0], 1311868163869700001);
+  EXPECT_EQ(WarningsOf("1311868163.8697" + pose + "1311868200" + pose), "");
+}
+
+TEST_F(TrajectoryFiles, StampsThatNoStampHoldsAreRefusedWithTheirPlace) {
+  const std::string pose = " 1 2 3 0 0 0 1\n";
+  const std::string two = "1" + pose + "2" + pose;
+  const auto beyond = [](const std::string& stamp) {
+    return "poses.txt:3 t: '" + stamp + "' is beyond 292 years; expected seconds, as TUM has them";
+  };
+  for (const std::string stamp : {"99999999999999999999", "9223372036.854775808", "-9.3e9"}) {
+    EXPECT_EQ(Refusal(two + stamp + pose), beyond(stamp));
+  }
+  EXPECT_EQ(Refusal("9199999998" + pose + "9199999999" + pose + "9200000001" + pose),
+            beyond("9200000001"));
+  EXPECT_EQ(Refusal("1e20" + pose),
+            "poses.txt:1 t: '1e20' is beyond 292 years; expected seconds, as TUM has them");
+  EXPECT_EQ(Read("9199999998.123456789" + pose).stamps[0], 9199999998123456789);
+  // No difference of two stamps may be beyond either.
+  EXPECT_EQ(Refusal("-9000000000" + pose + "-8999999999" + pose + "-8999999998" + pose +
+                    "9000000000" + pose),
+            "poses.txt t: its stamps are more than 292 years apart; expected those of one clock");
+}
+
+TEST_F(TrajectoryFiles, ACovarianceThatIsNoneIsRefusedWithItsLine) {
+  const std::string pose = " 1 2 3 0 0 0 1 ", good = "1 0 0 1 0 1";
+  const auto refusal = [&](const std::string& orientation, const std::string& position) {
+    return Refusal("0" + pose + good + ' ' + good + "\n1" + pose + orientation + ' ' + position +
+                   '\n');
+  };
+  const std::string none = " is not positive semi-definite: its smallest eigenvalue is -";
+  EXPECT_EQ(refusal(good, "1 0 0 1 0 -1"),
+            "poses.txt:2: the covariance of the position" + none + "1; expected a covariance");
+  EXPECT_EQ(
+      refusal("0.01 0.03 0 0.01 0 1", good),
+      "poses.txt:2: the covariance of the orientation" + none + "0.02; expected a covariance");
+  EXPECT_EQ(
+      refusal("-1e-9 0 0 -1e-9 0 -1e-9", good),
+      "poses.txt:2: the covariance of the orientation" + none + "1e-09; expected a covariance");
+  // Singular is none of it, nor is what six digits make of it.
+  EXPECT_EQ(refusal("0 0 0 0 0 0", "1 1 0 1 0 0"), "");
+  EXPECT_EQ(refusal(good, "0.111111 0.111112 0 0.111111 0 1"), "");
+}
+
+TEST_F(TrajectoryFiles, StampsOutOfOrderAreSortedAndToldOf) {
+  const std::string text = "1 1 0 0 0 0 0 1\n3 3 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n4 4 0 0 0 0 0 1\n";
+  EXPECT_EQ(WarningsOf(text),
+            "poses.txt:3 t: goes back: 2.000000 s; expected poses in the order of their stamps; "
+            "they are sorted\n");
+  const Trajectory t = Read(text);
+  EXPECT_EQ(t.positions.row(0), Eigen::RowVector4d(1, 2, 3, 4));
+  EXPECT_TRUE(std::ranges::is_sorted(t.stamps));
+}
+
+TEST_F(TrajectoryFiles, PosesOfADuplicateTimestampAreAllKeptAndItsLineIsNamed) {
+  const std::string text = "1 1 0 0 0 0 0 1\n1 9 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n";
+  EXPECT_EQ(WarningsOf(text),
+            "poses.txt:2 t: duplicate timestamp 1.000000 s, the first of 2 such rows; expected "
+            "each timestamp once; all poses are kept\n");
+  EXPECT_EQ(Read(text).positions.row(0), Eigen::RowVector4d(1, 9, 2, 9));
+  EXPECT_EQ(Read(text).stamps.size(), 4u);
+  // Where poses are sorted, those of one timestamp stay as they were.
+  EXPECT_EQ(WarningsOf("2 2 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n"),
+            "poses.txt:2 t: goes back: 1.000000 s; expected poses in the order of their stamps; "
+            "they are sorted\n"
+            "poses.txt:3 t: duplicate timestamp 2.000000 s; expected each timestamp once; all "
+            "poses are kept\n");
+  EXPECT_EQ(Read("2 2 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n").positions.row(0),
+            Eigen::RowVector3d(1, 2, 9));
+}
+
+TEST_F(TrajectoryFiles, AFirstPoseThatIsTheIdentityInTheOtherOrderIsToldOf) {
+  EXPECT_EQ(WarningsOf("0 0 0 0 1 0 0 0\n1 1 2 3 0.8 0.6 0 0\n"),
+            "poses.txt:1 qx: the first pose is the identity if its quaternion is written w first; "
+            "expected qx qy qz qw, as TUM has it\n");
+  EXPECT_EQ(WarningsOf("0,0,0,0,0,0,0,1\n"),
+            "poses.txt:1 qw: the first pose is the identity if its quaternion is written w last; "
+            "expected qw qx qy qz, as EuRoC has it\n");
+  EXPECT_EQ(WarningsOf("0 0 0 0 0 0 0 1\n"), "");
+  EXPECT_EQ(WarningsOf("0 0.1 0 0 1 0 0 0\n"), "");  // half a turn somewhere else
+}
+
+TEST_F(TrajectoryFiles, AFolderIsARunAnEstimatorOrASequenceOfEuroc) {
+  for (const char* name :
+       {"run/truth.tum", "run/ekf/trajectory.tum", "run/ekf/trajectory_covariance.tum",
+        "run/ekf/innovations.csv", "run/batch/trajectory.tum", "run/figures/a.svg",
+        "euroc/mav0/state_groundtruth_estimate0/data.csv"}) {
+    Write(name, "");
+  }
+  EXPECT_EQ(ReferenceAt(folder_ / "run").file, folder_ / "run/truth.tum");
+  EXPECT_EQ(ReferenceAt(folder_ / "euroc").file,
+            folder_ / "euroc/mav0/state_groundtruth_estimate0/data.csv");
+  EXPECT_EQ(ReferenceAt(folder_ / "any.txt").file, folder_ / "any.txt");
+  const std::vector<TrajectoryFile> all = EstimatesAt(folder_ / "run");
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_EQ(all[0].label, "batch");
+  EXPECT_EQ(all[0].file, folder_ / "run/batch/trajectory.tum");
+  EXPECT_TRUE(all[0].innovations.empty());
+  EXPECT_EQ(all[1].label, "ekf");
+  EXPECT_EQ(all[1].file, folder_ / "run/ekf/trajectory_covariance.tum");
+  EXPECT_EQ(all[1].innovations, folder_ / "run/ekf/innovations.csv");
+  EXPECT_EQ(EstimatesAt(folder_ / "run/ekf/").front().label, "ekf");
+  EXPECT_EQ(EstimatesAt(folder_ / "any.txt").front().label, "any");
+  for (const char* name : {"run/figures", "euroc"}) {
+    EXPECT_THROW(EstimatesAt(folder_ / name), Error) << name;
+  }
+  EXPECT_THROW(ReferenceAt(folder_ / "run/figures"), Error);
+}
+
+TEST_F(TrajectoryFiles, TheTruthOfARunIsInItsFolderOrInThatOfItsEstimator) {
+  for (const char* name : {"run/truth.tum", "run/ekf/trajectory.tum", "bare/ekf/trajectory.tum"}) {
+    Write(name, "");
+  }
+  EXPECT_EQ(TruthOf(folder_ / "run").file, folder_ / "run/truth.tum");
+  EXPECT_EQ(TruthOf(folder_ / "run/ekf").file, folder_ / "run/truth.tum");
+  EXPECT_EQ(TruthOf(folder_ / "run/ekf/").file, folder_ / "run/truth.tum");
+  for (const char* name : {"bare", "bare/ekf"}) {
+    try {
+      TruthOf(folder_ / name);
+      FAIL() << name;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::kInputMissing);
+      EXPECT_NE(std::string(error.what()).find("no truth.tum in this run"), std::string::npos)
+          << error.what();
+    }
+  }
+  try {
+    TruthOf(folder_ / "run/truth.tum");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::kUsage);
+  }
+}
+
+}  // namespace
+}  // namespace alidade

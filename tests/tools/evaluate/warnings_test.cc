@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "alidade/evaluate/evaluate.h"
+#include "support/trajectories.h"
+
+namespace alidade {
+namespace {
+
+using Eigen::Vector3d;
+using testing::Curve;
+using testing::Inverse;
+using testing::Turn;
+
+/// The warnings, one below the other.
+std::string WarningsOf(const Trajectory& reference, const Trajectory& estimate,
+                       const EvaluateOptions& options = {}) {
+  std::string all;
+  for (const std::string& warning : Evaluate(reference, estimate, options).warnings) {
+    all += warning + '\n';
+  }
+  return all;
+}
+
+EvaluateOptions Aligned(Alignment alignment) {
+  EvaluateOptions options;
+  options.alignment = alignment;
+  return options;
+}
+
+/// With errors of about 1 cm and 0.6 degrees, as an estimate has them.
+Trajectory Estimate(Trajectory t) {
+  for (int i = 0; i < t.size(); ++i) {
+    t.positions.col(i) += 0.01 * Vector3d(std::sin(5.0 * i), std::cos(3.0 * i), std::sin(7.0 * i));
+    t.orientations[static_cast<std::size_t>(i)] *= Turn(0.01 * std::sin(4.0 * i));
+  }
+  t.name = "estimate.tum";
+  return t;
+}
+
+std::vector<int> Range(int first, int last) {
+  std::vector<int> range(static_cast<std::size_t>(last - first));
+  std::iota(range.begin(), range.end(), first);
+  return range;
+}
+
+TEST(EvaluationWarnings, OfAGoodEstimateThereAreNone) {
+  for (const Alignment alignment : {Alignment::kNone, Alignment::kSe3, Alignment::kSim3}) {
+    EXPECT_EQ(WarningsOf(Curve(60), Estimate(Curve(60)), Aligned(alignment)), "");
+  }
+}
+
+TEST(EvaluationWarnings, AScaleFarFromOneIsNoMetricScale) {
+  Similarity known;
+  known.scale = 2.228;
+  const Trajectory mono = Estimate(Inverse(known) * Curve(60));
+  const std::string warnings = WarningsOf(Curve(60), mono, Aligned(Alignment::kSe3));
+  EXPECT_TRUE(warnings.starts_with("estimate.tum: scale 2.228 (error 0.0")) << warnings;
+  EXPECT_TRUE(
+      warnings.ends_with("m by se3): looks like a run without metric scale; expected -as\n"))
+      << warnings;
+  EXPECT_EQ(WarningsOf(Curve(60), mono, Aligned(Alignment::kSim3)), "");
+}
+
+TEST(EvaluationWarnings, AnErrorThatAlignmentTakesAwayIsOfAnotherWorld) {
+  const Similarity known{1.0, Turn(0.5).toRotationMatrix(), Vector3d(3.0, 4.0, 0.0)};
+  const Trajectory estimate = Estimate(Inverse(known) * Curve(60));
+  const std::string warnings = WarningsOf(Curve(60), estimate);
+  EXPECT_TRUE(warnings.starts_with("estimate.tum: not aligned, the error is ")) << warnings;
+  EXPECT_TRUE(warnings.ends_with("by se3: looks like another world frame; expected --align\n"))
+      << warnings;
+  EXPECT_EQ(WarningsOf(Curve(60), estimate, Aligned(Alignment::kSe3)), "");
+}
+
+TEST(EvaluationWarnings, FewMatchesAreTold) {
+  Trajectory estimate = Estimate(Curve(60));
+  for (std::size_t i = 0; i < 60; i += 4) estimate.stamps[i] += 1;
+  for (std::size_t i = 0; i < 60; ++i) estimate.stamps[i] += i % 4 == 0 ? 0 : 30'000'000;
+  EXPECT_EQ(WarningsOf(Curve(60), estimate),
+            "estimate.tum: 15 of 60 possible poses match within 0.01 s; expected the same clock "
+            "and rate; --t-offset, --t-max-diff\n");
+}
+
+TEST(EvaluationWarnings, AConstantTimeOffsetIsToldWithTheOptionThatTakesIt) {
+  Trajectory estimate = Estimate(Curve(60));
+  for (Stamp& stamp : estimate.stamps) stamp += 8'000'000;
+  EXPECT_EQ(WarningsOf(Curve(60), estimate),
+            "estimate.tum: its stamps are 0.008 s after those of the reference on the median; "
+            "expected --t-offset -0.008\n");
+  EvaluateOptions options;
+  options.offset = -8'000'000;
+  EXPECT_EQ(WarningsOf(Curve(60), estimate, options), "");
+}
+
+TEST(EvaluationWarnings, APathThatEndsEarlyIsTold) {
+  const Trajectory estimate = Estimate(Curve(60));
+  const std::string warnings = WarningsOf(Curve(60), estimate.Select(Range(0, 20)));
+  EXPECT_TRUE(warnings.starts_with("estimate.tum: it covers ")) << warnings;
+  EXPECT_TRUE(warnings.ends_with(" m; expected a figure of the whole path\n")) << warnings;
+  EXPECT_EQ(WarningsOf(Curve(60), estimate.Select(Range(0, 40))), "");
+}
+
+TEST(EvaluationWarnings, OrientationsTurnedAllAlikeAreOfAnotherBody) {
+  Trajectory estimate = Estimate(Curve(60));
+  for (Eigen::Quaterniond& q : estimate.orientations) q = q * Turn(1.5);
+  const std::string warnings = WarningsOf(Curve(60), estimate);
+  // 1.5 rad, to the wobble
+  EXPECT_TRUE(warnings.starts_with("estimate.tum: its orientations are turned by 85.")) << warnings;
+  EXPECT_TRUE(
+      warnings.ends_with("deg, the same for all poses: looks like another body frame; "
+                         "expected poses of the same body; its positions may be of "
+                         "another point too\n"))
+      << warnings;
+}
+
+TEST(EvaluationWarnings, PositionsOnALineDetermineNoTurnAboutIt) {
+  Trajectory estimate = testing::Line(60, 0.5);
+  estimate.positions.row(1) = 1e-4 * estimate.positions.row(0).array().sin();
+  estimate.name = "estimate.tum";
+  EXPECT_EQ(WarningsOf(testing::Line(60, 0.5), estimate, Aligned(Alignment::kSe3)),
+            "estimate.tum: its positions, or the reference's, lie on a line: the turn about it by "
+            "se3 is arbitrary, and so are errors of orientation; expected no alignment, "
+            "--align-origin or --align-mode yaw for those\n");
+  EXPECT_EQ(WarningsOf(testing::Line(60, 0.5), estimate, Aligned(Alignment::kYaw)), "");
+}
+
+TEST(EvaluationWarnings, QuaternionsInTheOtherOrderAreToldOfWithTheirFile) {
+  Trajectory estimate = Estimate(Curve(60));
+  Trajectory swapped = estimate;
+  // As a file of TUM with qw qx qy qz is read.
+  for (Eigen::Quaterniond& q : swapped.orientations) {
+    q = Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y());
+  }
+  swapped.first_line = 7;
+  std::string warnings = WarningsOf(Curve(60), swapped);
+  EXPECT_TRUE(warnings.starts_with("estimate.tum:7: the orientations fit to 0.")) << warnings;
+  EXPECT_NE(warnings.find(" deg if quaternions are read w first, to "), std::string::npos);
+  EXPECT_TRUE(warnings.ends_with(" deg as they are; expected qx qy qz qw\n")) << warnings;
+  // So is the reference.
+  swapped.name = "reference.tum";
+  warnings = WarningsOf(swapped, Curve(60));
+  EXPECT_TRUE(warnings.starts_with("reference.tum:7: the orientations fit to 0.")) << warnings;
+  // A file of EuRoC with w last.
+  for (Eigen::Quaterniond& q : estimate.orientations) {
+    q = Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w());
+  }
+  estimate.format = TrajectoryFormat::kEuroc;
+  warnings = WarningsOf(Curve(60), estimate);
+  EXPECT_NE(warnings.find("are read w last, to "), std::string::npos) << warnings;
+  EXPECT_TRUE(warnings.ends_with("expected qw qx qy qz\n")) << warnings;
+}
+
+TEST(EvaluationWarnings, ASwapOfReferenceAndEstimateIsSeenByTheirNames) {
+  struct Case {
+    const char *reference, *estimate;
+    bool swapped;
+  };
+  for (const Case& c : {Case{"orb.txt", "fr2_desk_groundtruth.txt", true},
+                        {"orb.txt", "KITTI_00_gt.txt", true},
+                        {"orb.txt", "V1/state_groundtruth_estimate0/data.csv", true},
+                        {"runs/slam/ekf/trajectory.tum", "runs/slam/truth.tum", true},
+                        {"orb.txt", "GT-office.txt", true},
+                        {"fr2_desk_groundtruth.txt", "orb.txt", false},
+                        {"V1/state_groundtruth_estimate0/data.csv", "V1.csv", false},
+                        {"runs/slam/truth.tum", "runs/truth.tum", false},
+                        {"orb.txt", "tgt_gtsam.txt", false},
+                        {"orb.txt", "sptam.txt", false}}) {
+    SCOPED_TRACE(c.estimate);
+    Trajectory reference = Curve(60), estimate = Estimate(Curve(60));
+    reference.name = c.reference;
+    estimate.name = c.estimate;
+    EXPECT_EQ(WarningsOf(reference, estimate),
+              c.swapped ? std::string(c.estimate) +
+                              ": is named like ground truth, but is compared with " + c.reference +
+                              "; expected REF first, then EST\n"
+                        : "");
+  }
+}
+
+TEST(EvaluationWarnings, ASwapOfReferenceAndEstimateIsSeenByTheCovariances) {
+  Trajectory with = Estimate(Curve(60));
+  with.position_covariances.assign(60, Eigen::Matrix3d::Identity());
+  with.orientation_covariances = with.position_covariances;
+  EXPECT_EQ(WarningsOf(with, Curve(60)),
+            "estimate.tum: has covariances, as an estimate does, and curve.tum has none; expected "
+            "REF first, then EST\n");
+  EXPECT_EQ(WarningsOf(Curve(60), with), "");
+  EXPECT_EQ(WarningsOf(with, with), "");
+}
+
+}  // namespace
+}  // namespace alidade

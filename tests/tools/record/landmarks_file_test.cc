@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What a run tells of its landmarks.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "alidade/record/estimator_files.h"
+#include "alidade/run/map_metrics.h"
+#include "support/landmark_models.h"
+#include "support/recording.h"
+
+namespace alidade::testing {
+namespace {
+
+/// Four points beside a camera that moves right, and an odometer that a static block is read by.
+class Street : public Source {
+ public:
+  /// With `outlier`, one measurement of landmark 3 is far off.
+  explicit Street(bool outlier = false) : outlier_(outlier) {}
+  const std::vector<StreamInfo>& streams() const override { return streams_; }
+  const std::vector<StreamInfo>& truths() const override { return truths_; }
+  bool Next(Frame& frame) override {
+    if (next_ == 20) return false;
+    const double x = 0.1 * next_;
+    std::vector<Observation> observations;
+    for (int id = 0; id < 4; ++id) {
+      const std::array<double, 3> p = *TrueLandmark(id);
+      if (id == 3 && next_ < 10) continue;
+      const double error_m = outlier_ && id == 3 && next_ == 15 ? 5.0 : 0.0;
+      observations.push_back({id, {p[0] - x + error_m, p[1], p[2]}});
+    }
+    frame = FrameOf(0.1 * next_, observations);
+    frame.truth = {{x, 0.0, 0.0}};
+    ++next_;
+    return true;
+  }
+  std::optional<std::array<double, 3>> TrueLandmark(std::int64_t id) const override {
+    if (id > 3) return std::nullopt;
+    const auto i = static_cast<double>(id);
+    return std::array{1.0 + 0.5 * i, 0.3 * i * i, 2.0 - 0.1 * i};
+  }
+
+ private:
+  std::vector<StreamInfo> streams_ = {{"tracks", 3}};
+  std::vector<StreamInfo> truths_ = {{"cam.position", 3}};
+  bool outlier_;
+  int next_ = 0;
+};
+
+Experiment OnTheStreet(bool outlier = false) {
+  Experiment experiment;
+  experiment.source = std::make_unique<Street>(outlier);
+  NamedEstimator named;
+  named.name = "ekf";
+  named.type = "ekf";
+  named.system = MapSystem(Offset(0.05), {}, 0.1);
+  EkfOptions options;
+  if (outlier) options.gate = 0.9999;
+  named.estimator = std::make_unique<Ekf>(named.system, options, experiment.source->streams());
+  experiment.estimators.push_back(std::move(named));
+  return experiment;
+}
+
+TEST(LandmarkRecords, TheMapAtTheEndIsWritten) {
+  const TemporaryFolder folder;
+  Experiment experiment = OnTheStreet();
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  const RunResult result = RunInto(recorder, experiment);
+  recorder.Finish(result);
+  ASSERT_EQ(result.status, RunStatus::kOk) << result.reason;
+  const std::vector<std::string> lines = Lines(folder / "out/ekf/landmarks.csv");
+  ASSERT_EQ(lines.size(), 5u);
+  EXPECT_EQ(lines[0],
+            "id,generation,form,x,y,z,sigma_x,sigma_y,sigma_z,inverse_distance,"
+            "sigma_inverse_distance,first_s,last_s,tried,accepted,true_x,true_y,true_z");
+  const std::vector<std::string> last = Cells(lines[4]);
+  ASSERT_EQ(last.size(), 18u);
+  EXPECT_EQ(last[0], "3");
+  EXPECT_EQ(last[2], "xyz");
+  EXPECT_NEAR(std::stod(last[3]), 2.5, 3.0 * std::stod(last[6]));
+  EXPECT_EQ(last[9], "");
+  EXPECT_EQ(last[11], "1.000000000");
+  EXPECT_EQ(last[13], "9");
+  EXPECT_EQ(last[15] + ' ' + last[17], "2.5 1.7");
+  const LandmarkEstimate estimate = experiment.estimators[0].estimator->landmarks()[3];
+  EXPECT_DOUBLE_EQ(std::stod(last[6]), std::sqrt(estimate.covariance(0, 0)));
+}
+
+TEST(LandmarkRecords, EveryColumnOfTheMapIsItsOwn) {
+  const TemporaryFolder folder;
+  Experiment experiment = OnTheStreet(true);
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  recorder.Finish(RunInto(recorder, experiment));
+  const std::vector<std::string> last = Cells(Lines(folder / "out/ekf/landmarks.csv").at(4));
+  const LandmarkEstimate estimate = experiment.estimators[0].estimator->landmarks()[3];
+  ASSERT_EQ(last.size(), 18u);
+  EXPECT_EQ(last[0] + ' ' + last[1], "3 0");
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto e = static_cast<Eigen::Index>(i);
+    EXPECT_DOUBLE_EQ(std::stod(last[3 + i]), estimate.position[e]);
+    EXPECT_DOUBLE_EQ(std::stod(last[6 + i]), std::sqrt(estimate.covariance(e, e)));
+  }
+  EXPECT_EQ(last[9] + last[10], "");
+  EXPECT_EQ(last[11], "1.000000000");  // seen from frame 10 to 19; the first is no measurement
+  EXPECT_EQ(last[12], "1.900000000");
+  EXPECT_EQ(last[13], "9");
+  EXPECT_EQ(last[14], "8");  // one was gated
+  const std::array<double, 3> place = *Street().TrueLandmark(3);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(std::stod(last[15 + i]), place[i]);
+}
+
+TEST(LandmarkRecords, OtherFilesHaveTheBlocksOfTheSystemAlone) {
+  const TemporaryFolder folder;
+  Experiment experiment = OnTheStreet();
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  recorder.Finish(RunInto(recorder, experiment));
+  EXPECT_EQ(Lines(folder / "out/ekf/estimates.csv")[0],
+            "t_s,cam.position.x,cam.position.y,cam.position.z,sigma:cam.position.x,"
+            "sigma:cam.position.y,sigma:cam.position.z");
+  EXPECT_EQ(Lines(folder / "out/ekf/gains.csv"), std::vector<std::string>{"t_s,sensor"});
+  EXPECT_EQ(Cells(Lines(folder / "out/ekf/innovations.csv")[1])[3], "0");
+}
+
+TEST(LandmarkRecords, ResultsHaveCountsAndTheMapsErrors) {
+  Experiment experiment = OnTheStreet();
+  const RunResult result = alidade::Run(experiment, {});
+  const EstimatorResult& one = result.estimators.at(0);
+  EXPECT_EQ(one.counts.at("initialised:tracks"), 4);
+  EXPECT_EQ(one.counts.at("landmarks.initialised"), 4);
+  EXPECT_EQ(one.counts.at("landmarks.deleted"), 0);
+  EXPECT_TRUE(one.counts.contains("landmarks.converted"));
+  EXPECT_TRUE(one.counts.contains("landmarks.negative"));
+  for (const char* key :
+       {"map.rmse", "map.sim3.rmse", "map.sim3.scale", "final:cam.position", "nees.mean:cam"}) {
+    EXPECT_TRUE(one.metrics.contains(key)) << key;
+  }
+  double sum = 0.0;
+  for (const LandmarkEstimate& landmark : *one.landmarks) {
+    const auto p = experiment.source->TrueLandmark(landmark.id);
+    sum += (landmark.position - Eigen::Map<const Eigen::Vector3d>(p->data())).squaredNorm();
+  }
+  EXPECT_NEAR(one.metrics.at("map.rmse"), std::sqrt(sum / 4.0), 1e-12);
+}
+
+TEST(LandmarkRecords, TheReprojectionErrorOfEachFrameIsWritten) {
+  const TemporaryFolder folder;
+  Experiment experiment = OnTheStreet();
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  recorder.Finish(RunInto(recorder, experiment));
+  // By hand from what innovations.csv has of the last frame, of four landmarks.
+  const std::vector<std::string> innovations = Lines(folder / "out/ekf/innovations.csv");
+  double sum = 0.0;
+  for (std::size_t i = innovations.size() - 4; i < innovations.size(); ++i) {
+    const std::vector<std::string> cells = Cells(innovations[i]);
+    ASSERT_EQ(cells[0] + cells[4], "1.900000000accepted");
+    for (std::size_t r = cells.size() - 3; r < cells.size(); ++r)
+      sum += std::pow(std::stod(cells[r]), 2);
+  }
+  const std::vector<std::string> lines = Lines(folder / "out/ekf/reprojection.csv");
+  EXPECT_EQ(lines[0], "t_s,sensor,landmarks,rms");
+  EXPECT_EQ(lines.size(), 20u);  // the first frame enters the landmarks
+  const std::vector<std::string> last = Cells(lines.back());
+  EXPECT_EQ(last[0] + last[1] + last[2], "1.900000000tracks4");
+  EXPECT_NEAR(std::stod(last[3]), std::sqrt(sum / 12.0), 1e-12);
+}
+
+TEST(LandmarkRecords, TheMapIsDrawnBesideTruth) {
+  const TemporaryFolder folder;
+  Experiment experiment = OnTheStreet();
+  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+  recorder.Finish(RunInto(recorder, experiment));
+  EXPECT_TRUE(recorder.note() == "" || recorder.note().ends_with("not installed"))
+      << recorder.note();
+  const std::string map = Read(folder / "out/figures/ekf.map.gp");
+  EXPECT_NE(map.find("(column('true_x')):(column('true_y'))"), std::string::npos) << map;
+  EXPECT_NE(map.find("(column('cam.position.x')):(column('cam.position.y')) with lines"),
+            std::string::npos)
+      << map;
+  EXPECT_NE(Read(folder / "out/figures/ekf.reprojection.gp").find("column('rms')"),
+            std::string::npos);
+}
+
+TEST(LandmarkRecords, AMapIsDrawnOverTheAxesOfPathAndLandmarks) {
+  std::vector<LandmarkEstimate> map;
+  for (int i = 0; i < 20; ++i) {
+    map.emplace_back().position = Eigen::Vector3d(0.2 * i, 0.1 * i, 3.0);  // a wall 4 m x 2 m
+  }
+  map.back().position.y() = 1000.0;  // one far off
+  const internal::RecordedMap wall = internal::DescribeMap(map, {});
+  EXPECT_EQ(wall.across, 0);
+  EXPECT_EQ(wall.along, 1);
+  const Eigen::AlignedBox3d path(Eigen::Vector3d::Zero(), Eigen::Vector3d(0.0, 0.0, 2.0));
+  const internal::RecordedMap from_above = internal::DescribeMap(map, path);
+  EXPECT_EQ(from_above.across, 0);
+  EXPECT_EQ(from_above.along, 2);
+  EXPECT_EQ(from_above.placed, 20);
+}
+
+TEST(MapMetrics, ASimilarityIsNoErrorAfterAlignment) {
+  const Street source;
+  const Eigen::AngleAxisd turn(0.3, Eigen::Vector3d(1, 2, 3).normalized());
+  std::vector<LandmarkEstimate> map;
+  for (int id = 0; id < 4; ++id) {
+    const auto p = source.TrueLandmark(id);
+    LandmarkEstimate& one = map.emplace_back();
+    one.id = id;
+    one.true_position = Eigen::Map<const Eigen::Vector3d>(p->data());
+    one.position = 2.0 * (turn * one.true_position) + Eigen::Vector3d(1.0, -2.0, 0.5);
+  }
+  map.emplace_back().id = 77;  // of no known place
+  map.back().position = Eigen::Vector3d(9, 9, 9);
+  const auto metrics = internal::MapMetrics(map);
+  EXPECT_GT(metrics.at("map.rmse"), 1.0);
+  EXPECT_LT(metrics.at("map.sim3.rmse"), 1e-12);
+  EXPECT_NEAR(metrics.at("map.sim3.scale"), 0.5, 1e-12);
+}
+
+TEST(MapMetrics, PointsOnALineHaveAScaleThoseAtOnePlaceNone) {
+  std::vector<LandmarkEstimate> map(3);
+  for (int id = 0; id < 3; ++id) {
+    LandmarkEstimate& one = map[static_cast<std::size_t>(id)];
+    one.id = id;
+    one.true_position = Eigen::Vector3d(1.0, 2.0, 3.0) + 0.5 * id * Eigen::Vector3d(2, -1, 2);
+    one.position = Eigen::Vector3d(id, 0.0, 0.0);
+  }
+  auto metrics = internal::MapMetrics(map);
+  EXPECT_NEAR(metrics.at("map.sim3.scale"), 1.5, 1e-12);
+  EXPECT_LT(metrics.at("map.sim3.rmse"), 1e-12);
+  for (LandmarkEstimate& one : map) one.position = Eigen::Vector3d(0.1, 0.2, 0.3);
+  metrics = internal::MapMetrics(map);
+  EXPECT_TRUE(metrics.contains("map.rmse"));
+  EXPECT_FALSE(metrics.contains("map.sim3.rmse"));
+}
+
+}  // namespace
+}  // namespace alidade::testing

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/sweep/sweep.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace alidade {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+TEST(Quantile, IsLinearBetweenOrderStatistics) {
+  // numpy.quantile([1, 2, 4, 8], q): h = 3 q
+  const std::vector<double> x = {1, 2, 4, 8};
+  EXPECT_DOUBLE_EQ(Quantile(x, 0.0), 1.0);
+  EXPECT_DOUBLE_EQ(Quantile(x, 0.05), 1.15);
+  EXPECT_DOUBLE_EQ(Quantile(x, 0.5), 3.0);
+  EXPECT_DOUBLE_EQ(Quantile(x, 0.95), 7.4);
+  EXPECT_DOUBLE_EQ(Quantile(x, 1.0), 8.0);
+  EXPECT_EQ(Quantile({5.0}, 0.95), 5.0);
+  EXPECT_THROW(static_cast<void>(Quantile({}, 0.5)), ContractViolation);
+}
+
+TEST(Quantile, OfInfiniteValuesIsNotNan) {
+  EXPECT_EQ(Quantile({1.0, kInfinity, kInfinity}, 0.95), kInfinity);
+  EXPECT_EQ(Quantile({1.0, 2.0, kInfinity}, 0.5), 2.0);
+}
+
+EstimatorResult Result(double rmse, bool diverged = false, bool inconsistent = false) {
+  EstimatorResult one;
+  one.name = "ekf";
+  one.diverged = diverged;
+  one.inconsistent = inconsistent;
+  one.metrics["rmse:x"] = rmse;
+  return one;
+}
+
+/// Three runs that count, one of them inconsistent, two that diverged, one that failed (and was
+/// inconsistent).
+SweepResult SixRuns() {
+  SweepResult result;
+  result.runs = 6;
+  result.estimators = {"ekf"};
+  result.done = {{1, RunStatus::kOk, ExitCode::kOk, "", {Result(1.0)}},
+                 {2, RunStatus::kOk, ExitCode::kOk, "", {Result(2.0)}},
+                 {3, RunStatus::kOk, ExitCode::kOk, "", {Result(100.0, true)}},
+                 {4, RunStatus::kFailed, ExitCode::kBadData, "", {Result(50.0, false, true)}},
+                 {5, RunStatus::kOk, ExitCode::kOk, "", {Result(6.0, false, true)}},
+                 {6, RunStatus::kOk, ExitCode::kOk, "", {Result(100.0, true, true)}}};
+  return result;
+}
+
+TEST(Summarise, TakesMetricsOverWholeRunsThatDidNotDiverge) {
+  const std::vector<SweepSummary> summaries = Summarise(SixRuns());
+  ASSERT_EQ(summaries.size(), 1u);
+  EXPECT_EQ(summaries[0].used, 3);
+  EXPECT_EQ(summaries[0].diverged, 2);
+  EXPECT_EQ(summaries[0].inconsistent, 1);
+  EXPECT_DOUBLE_EQ(summaries[0].metrics.at("rmse:x").mean, 3.0);
+  EXPECT_DOUBLE_EQ(summaries[0].metrics.at("rmse:x").p95, 5.6);
+}
+
+TEST(SweepTable, HasQuantilesAndCountsOfRuns) {
+  EXPECT_EQ(SweepTable(SixRuns()),
+            "                                      ekf\n"
+            "rmse x        3.000 [1.100, 2.000, 5.600]\n"
+            "runs used                               3\n"
+            "diverged                                2\n"
+            "inconsistent                            1\n");
+}
+
+TEST(SweepTable, ReportsAMeanNeesOutsideItsBounds) {
+  SweepResult result = SixRuns();
+  for (SweepRun& run : result.done) {
+    run.estimators[0].metrics["nees.mean:x"] = 4.0;
+    run.estimators[0].metrics["nees.dof:x"] = 2.0;
+  }
+  // Three runs of two degrees of freedom: chi2(0.025; 6) / 6 = 0.2062, chi2(0.975; 6) / 6 = 2.408.
+  const std::string line =
+      "\nekf: NEES mean 4 of x over 3 runs is outside its 95 % bounds [0.206, 2.41]: the filter is "
+      "overconfident\n";
+  EXPECT_TRUE(SweepTable(result).ends_with(line)) << SweepTable(result);
+  for (SweepRun& run : result.done) run.estimators[0].metrics["nees.mean:x"] = 2.0;
+  EXPECT_EQ(SweepTable(result).find("bounds"), std::string::npos);
+}
+
+TEST(SweepTable, FoldsAsAComparisonDoes) {
+  SweepResult result = SixRuns();
+  result.estimators = {"ekf", "a", "b", "c"};
+  for (SweepRun& run : result.done) {
+    for (const char* name : {"a", "b", "c"}) {
+      run.estimators.push_back(run.estimators[0]);
+      run.estimators.back().name = name;
+    }
+  }
+  // 12 of the label and three times 29 are 99 characters; the fourth goes below.
+  const std::string table = SweepTable(result);
+  EXPECT_EQ(table.find('\n'), 99u) << table;
+  EXPECT_NE(table.find("\n\n" + std::string(40, ' ') + "c\nrmse x "), std::string::npos) << table;
+}
+
+}  // namespace
+}  // namespace alidade

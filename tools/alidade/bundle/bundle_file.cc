@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/bundle/bundle_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include "alidade/base/json.h"
+#include "alidade/base/number_text.h"
+#include "alidade/base/output_folder.h"
+#include "alidade/bundle/formats.h"
+
+namespace alidade {
+namespace {
+
+using internal::AppendNumber;
+using internal::RunFolder;
+
+/// All of a file, of a pipe, or of standard input where it is `-`. Errors: kInputMissing, kIo for a
+/// read that fails, kStopped where a signal ends the wait for more.
+std::string ReadAll(const std::filesystem::path& file) {
+  const bool standard_input = file == "-";
+  const Place place{standard_input ? "<stdin>" : file.string()};
+  const auto fail = [&](ExitCode code, int error) {
+    if (error == EINTR) {
+      throw Error(ExitCode::kStopped,
+                  ErrorLine(place, {}, "stopped by a signal while waiting for data"));
+    }
+    const char* const expected = code == ExitCode::kInputMissing ? "a readable file" : "";
+    throw Error(code, ErrorLine(place, {}, std::strerror(error), expected));
+  };
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored)) fail(ExitCode::kInputMissing, EISDIR);
+  struct Descriptor {
+    int number;
+    ~Descriptor() {
+      if (number > STDIN_FILENO) close(number);
+    }
+  };
+  const Descriptor opened{standard_input ? STDIN_FILENO : open(file.c_str(), O_RDONLY | O_CLOEXEC)};
+  if (opened.number < 0) fail(ExitCode::kInputMissing, errno);
+  std::string bytes;
+  for (char chunk[1 << 14];;) {
+    const ssize_t count = read(opened.number, chunk, sizeof chunk);
+    if (count == 0) return bytes;
+    if (count < 0) fail(ExitCode::kIo, errno);
+    bytes.append(chunk, static_cast<std::size_t>(count));
+  }
+}
+
+[[noreturn]] void FailFormat(const std::string& name, const std::string& what,
+                             const std::string& expected) {
+  throw Error(ExitCode::kBadData, ErrorLine(Place{name, 1, 1}, {}, what, expected));
+}
+
+const char* ExtensionOf(BundleFormat format) {
+  constexpr const char* kExtensions[] = {".txt", ".out", ".bin", ""};
+  return kExtensions[static_cast<int>(format)];
+}
+
+std::string PosesTum(const BundleFile& file) {
+  std::string text;
+  for (std::size_t i = 0; i < file.problem.cameras.size(); ++i) {
+    if (i < file.poses.size() && !file.poses[i].registered) continue;
+    const BundleCamera& camera = file.problem.cameras[i];
+    if (!file.stamps.empty()) {
+      internal::AppendSeconds(text, file.stamps[i]);
+    } else {
+      text += std::to_string(file.camera_ids.empty() ? static_cast<std::int64_t>(i)
+                                                     : file.camera_ids[i]);
+    }
+    const auto& q = camera.orientation;
+    for (const double value : camera.position) AppendNumber(text += ' ', value);
+    for (const double value : {q[1], q[2], q[3], q[0]}) AppendNumber(text += ' ', value);
+    text += '\n';
+  }
+  return text;
+}
+
+std::string PointsCsv(const BundleFile& file) {
+  std::string text = "point,x,y,z\n";
+  for (std::size_t i = 0; i < file.problem.points.size(); ++i) {
+    text +=
+        std::to_string(file.point_ids.empty() ? static_cast<std::int64_t>(i) : file.point_ids[i]);
+    for (const double value : file.problem.points[i]) AppendNumber(text += ',', value);
+    text += '\n';
+  }
+  return text;
+}
+
+/// How much of what was read has no part in the solution.
+void AddLeftOut(const BundleFile& file, internal::Json& json) {
+  const BundleProblem& problem = file.problem;
+  std::vector<bool> camera_used(problem.cameras.size()), point_used(problem.points.size());
+  for (const BundleObservation& seen : problem.observations) {
+    if (!seen.used) continue;
+    camera_used[static_cast<std::size_t>(seen.camera)] = true;
+    point_used[static_cast<std::size_t>(seen.point)] = true;
+  }
+  json.Key("observations_undefined")
+      .Integer(std::ranges::count(problem.observations, false, &BundleObservation::used));
+  json.Key("cameras_unused").Integer(std::ranges::count(camera_used, false));
+  json.Key("points_unused").Integer(std::ranges::count(point_used, false));
+  if (file.format != BundleFormat::kTracks) return;
+  json.Key("observations_invalid").Integer(file.invalid);
+  json.Key("frames_without_pose").Integer(file.frames_left_out);
+  json.Key("points_without_parallax").Integer(file.points_left_out);
+  json.Key("observations_of_these").Integer(file.unplaced);
+}
+
+std::string ResultJson(const BundleFile& file, const BundleResult& result, double rms_before,
+                       double rms_after) {
+  internal::Json json;
+  json.Object();
+  json.Key("format").Text(ToString(file.format));
+  json.Key("status").Text(ToString(result.end));
+  json.Key("message").Text(result.message);
+  json.Key("cameras").Integer(std::ssize(file.problem.cameras));
+  json.Key("points").Integer(std::ssize(file.problem.points));
+  json.Key("observations").Integer(std::ssize(file.problem.observations));
+  AddLeftOut(file, json);
+  json.Key("rms_before_px").Number(rms_before);
+  json.Key("rms_after_px").Number(rms_after);
+  json.Key("cost_before").Number(result.cost_before);
+  json.Key("cost_after").Number(result.cost_after);
+  json.Key("iterations").Integer(result.iterations);
+  json.Key("residuals").Integer(result.residuals);
+  json.Key("unknowns").Integer(result.unknowns);
+  if (result.extent_before > 0.0) {
+    json.Key("extent_before").Number(result.extent_before);
+    json.Key("extent_after").Number(result.extent_after);
+  }
+  if (result.rank >= 0) json.Key("rank").Integer(result.rank);
+  json.End();
+  return json.text();
+}
+
+}  // namespace
+
+const char* ToString(BundleFormat format) {
+  constexpr const char* kNames[] = {"bal", "bundler", "libmv", "tracks"};
+  return kNames[static_cast<int>(format)];
+}
+
+BundleFile ReadBundle(const std::filesystem::path& file) {
+  const std::string name = file == "-" ? "<stdin>" : file.string();
+  const std::string text = ReadAll(file);
+  const std::string_view view = text;
+  if (view.find_first_not_of(" \t\r\n") == view.npos)
+    FailFormat(name, "nothing in it", "a problem");
+  constexpr std::string_view kCompressed[] = {"\x1F\x8B", "BZh",
+                                              "\xFD"
+                                              "7zXZ",
+                                              "\x28\xB5\x2F\xFD"};
+  if (std::ranges::any_of(kCompressed, [&](auto magic) { return view.starts_with(magic); })) {
+    FailFormat(name, "compressed",
+               "the text: zcat, bzcat, xzcat or zstdcat FILE | alidade bundle -");
+  }
+  if (view.size() > 1 && (view[0] == 'v' || view[0] == 'V') && (view[1] == 'P' || view[1] == 'N'))
+    return internal::ReadLibmv(view, name);
+  if (view.starts_with(internal::kBundlerHeader)) return internal::ReadBundler(view, name);
+  if (view.starts_with("# Bundle")) {
+    FailFormat(name, '\'' + std::string(view.substr(0, view.find_first_of("\r\n"))) + '\'',
+               std::string(internal::kBundlerHeader));
+  }
+  const std::size_t first = std::min(view.find('\n'), view.size());
+  if (view.substr(0, first).find(',') != view.npos) {
+    FailFormat(name, "columns with commas: tracks",
+               "their calibration and start beside them, --camera FILE and --start FILE");
+  }
+  return internal::ReadBal(view, name);
+}
+
+std::string BundleText(const BundleFile& file) {
+  ALIDADE_EXPECTS(file.format != BundleFormat::kTracks);
+  if (file.format == BundleFormat::kBundler) return internal::BundlerText(file);
+  if (file.format == BundleFormat::kLibmv) return internal::LibmvBytes(file);
+  return internal::BalText(file);
+}
+
+BundleFolder::BundleFolder(const std::filesystem::path& folder, bool force)
+    : output_(std::make_unique<RunFolder>(folder, force)) {}
+BundleFolder::~BundleFolder() = default;
+
+std::vector<std::string> BundleFolder::Save(const BundleFile& file, const BundleResult& result,
+                                            double rms_before, double rms_after) {
+  std::vector<std::string> names = {"bundle.json", "points.csv", "poses.tum"};
+  output_->Write(names[0], ResultJson(file, result, rms_before, rms_after));
+  output_->Write(names[1], PointsCsv(file));
+  output_->Write(names[2], PosesTum(file));
+  if (file.format != BundleFormat::kTracks) {
+    names.push_back(std::string("problem") + ExtensionOf(file.format));
+    output_->Write(names.back(), BundleText(file));
+  }
+  output_->Commit();
+  return names;
+}
+
+}  // namespace alidade

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <Eigen/Geometry>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <map>
+
+#include "alidade/bundle/formats.h"
+#include "alidade/model/geometry.h"
+
+namespace alidade::internal {
+namespace {
+
+constexpr std::size_t kLens = 8;  // f, cx, cy, k1, k2, k3, p1, p2
+
+/// 32-bit numbers one after the other, of either byte order.
+class Bytes {
+ public:
+  Bytes(std::string_view bytes, const std::string& name) : bytes_(bytes), name_(name) {
+    const bool little = bytes_[0] == 'v';
+    swap_ = little != (std::endian::native == std::endian::little);
+    at_ = 2;
+  }
+  std::int32_t Integer(const char* what) { return std::bit_cast<std::int32_t>(Word(what)); }
+  double Number(const char* what) {
+    const float value = std::bit_cast<float>(Word(what));
+    if (!std::isfinite(value)) Fail(at_ - 4, std::string(what) + " is not finite");
+    return value;
+  }
+  void Numbers(const char* what, std::size_t count, double* values) {
+    for (std::size_t i = 0; i < count; ++i) values[i] = Number(what);
+  }
+  int Count(const char* what) {
+    const std::int32_t count = Integer(what);
+    if (count < 0) Fail(at_ - 4, std::string(what) + " is negative: " + std::to_string(count));
+    return count;
+  }
+  void ExpectEnd() const {
+    if (at_ != bytes_.size()) Fail(at_, "bytes behind the last marker");
+  }
+  std::size_t at() const { return at_; }
+  [[noreturn]] void Fail(std::size_t at, const std::string& what) const {
+    throw Error(ExitCode::kBadData,
+                ErrorLine(Place{name_}, {}, "byte " + std::to_string(at) + ": " + what));
+  }
+
+ private:
+  std::uint32_t Word(const char* what) {
+    if (bytes_.size() - at_ < 4) Fail(bytes_.size(), std::string("the file ends before ") + what);
+    std::uint32_t word = 0;
+    std::memcpy(&word, bytes_.data() + at_, 4);
+    at_ += 4;
+    return swap_ ? __builtin_bswap32(word) : word;
+  }
+
+  std::string_view bytes_;
+  std::string name_;
+  std::size_t at_ = 0;
+  bool swap_ = false;
+};
+
+void ReadCamera(Bytes& bytes, BundleFile& file, std::map<std::int64_t, int>& index) {
+  const std::size_t at = bytes.at();
+  const std::int32_t image = bytes.Integer("the image of a camera");
+  const auto number = static_cast<int>(file.problem.cameras.size());
+  if (!index.emplace(image, number).second)
+    bytes.Fail(at, "a second camera of image " + std::to_string(image));
+  std::vector<double> pose(12);
+  bytes.Numbers("rotation and translation of a camera", 12, pose.data());
+  const Eigen::Map<const Eigen::Matrix3d> r(pose.data());  // column-major
+  constexpr double kRounding = 1e-3;
+  if (!(r * r.transpose()).isIdentity(kRounding) || !(r.determinant() > 0.0))
+    bytes.Fail(at + 4, "no rotation");
+  const Eigen::Quaterniond q{Eigen::Matrix3d(r)};
+  const double wxyz[4] = {q.w(), q.x(), q.y(), q.z()};
+  file.problem.cameras.push_back(CameraFrom(wxyz, pose.data() + 9, false));
+  file.poses.push_back({file.problem.cameras.back(), pose});
+  file.camera_ids.push_back(image);
+}
+
+void ReadPoint(Bytes& bytes, BundleFile& file, std::map<std::int64_t, int>& index) {
+  const std::size_t at = bytes.at();
+  const std::int32_t track = bytes.Integer("the track of a point");
+  const auto number = static_cast<int>(file.problem.points.size());
+  if (!index.emplace(track, number).second)
+    bytes.Fail(at, "a second point of track " + std::to_string(track));
+  bytes.Numbers("a point", 3, file.problem.points.emplace_back().data());
+  file.point_ids.push_back(track);
+}
+
+void AppendWord(std::string& bytes, std::uint32_t word) {
+  if constexpr (std::endian::native == std::endian::big) word = __builtin_bswap32(word);
+  char raw[4];
+  std::memcpy(raw, &word, 4);
+  bytes.append(raw, 4);
+}
+void AppendInteger(std::string& bytes, std::int64_t value) {
+  AppendWord(bytes, static_cast<std::uint32_t>(value));
+}
+void AppendFloats(std::string& bytes, const double* values, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i)
+    AppendWord(bytes, std::bit_cast<std::uint32_t>(static_cast<float>(values[i])));
+}
+
+}  // namespace
+
+BundleFile ReadLibmv(std::string_view text, const std::string& name) {
+  Bytes bytes(text, name);
+  if (text[1] != 'P')
+    bytes.Fail(1, "markers in normalised coordinates ('N'); expected markers in pixels ('P')");
+  BundleFile file;
+  file.format = BundleFormat::kLibmv;
+  BundleProblem& problem = file.problem;
+  problem.sensor = "{model: self_calibrating_feature, lens: radtan, sigma_px: 1}";
+  problem.intrinsics.assign(1, std::vector<double>(kLens));
+  bytes.Numbers("intrinsics", kLens, problem.intrinsics[0].data());
+  std::map<std::int64_t, int> cameras, points;
+  const int camera_count = bytes.Count("the number of cameras");
+  for (int i = 0; i < camera_count; ++i) ReadCamera(bytes, file, cameras);
+  const int point_count = bytes.Count("the number of points");
+  for (int i = 0; i < point_count; ++i) ReadPoint(bytes, file, points);
+  const int marker_count = bytes.Count("the number of markers");
+  for (int i = 0; i < marker_count; ++i) {
+    const std::size_t at = bytes.at();
+    const auto camera = cameras.find(bytes.Integer("the image of a marker"));
+    const auto point = points.find(bytes.Integer("the track of a marker"));
+    if (camera == cameras.end()) bytes.Fail(at, "a marker in an image that has no camera");
+    if (point == points.end()) bytes.Fail(at + 4, "a marker of a track that has no point");
+    BundleObservation& seen = problem.observations.emplace_back();
+    seen.camera = camera->second;
+    seen.point = point->second;
+    bytes.Numbers("a marker", 2, seen.z.data());
+  }
+  bytes.ExpectEnd();
+  return file;
+}
+
+std::string LibmvBytes(const BundleFile& file) {
+  const BundleProblem& problem = file.problem;
+  std::string bytes = "vP";
+  AppendFloats(bytes, problem.intrinsics[0].data(), kLens);
+  AppendInteger(bytes, std::ssize(problem.cameras));
+  for (std::size_t i = 0; i < problem.cameras.size(); ++i) {
+    AppendInteger(bytes, file.camera_ids[i]);
+    double pose[12], q[4];
+    if (const double* const numbers = UnmovedNumbers(file, i)) {
+      std::copy_n(numbers, 12, pose);
+    } else {
+      CameraTo(problem.cameras[i], false, q, pose + 9);
+      Eigen::Map<Eigen::Matrix3d>{pose} =
+          Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
+    }
+    AppendFloats(bytes, pose, 12);
+  }
+  AppendInteger(bytes, std::ssize(problem.points));
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    AppendInteger(bytes, file.point_ids[i]);
+    AppendFloats(bytes, problem.points[i].data(), 3);
+  }
+  AppendInteger(bytes, std::ssize(problem.observations));
+  for (const BundleObservation& seen : problem.observations) {
+    AppendInteger(bytes, file.camera_ids[static_cast<std::size_t>(seen.camera)]);
+    AppendInteger(bytes, file.point_ids[static_cast<std::size_t>(seen.point)]);
+    AppendFloats(bytes, seen.z.data(), 2);
+  }
+  return bytes;
+}
+
+}  // namespace alidade::internal

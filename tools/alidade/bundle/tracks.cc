@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <Eigen/Dense>
+#include <algorithm>
+#include <map>
+#include <optional>
+
+#include "alidade/base/number_rows.h"
+#include "alidade/bundle/bundle_file.h"
+#include "alidade/model/geometry.h"
+
+namespace alidade {
+namespace {
+
+/// The next row behind a header `frame,...`, of `count` columns `names`; false at the end.
+bool NextRow(NumberRows& rows, std::size_t count, const char* names) {
+  const bool first = rows.line() == 0;
+  if (!rows.Next() || (first && rows.text(0) == "frame" && !rows.Next())) return false;
+  rows.ExpectColumns(count, names);
+  return true;
+}
+
+/// What one frame sees of one feature: values by dim, and the lines that they stand in.
+struct Seen {
+  std::array<double, 4> z{};
+  std::array<int, 4> lines{};
+};
+using Tracks = std::map<std::int64_t, std::map<std::int64_t, Seen>>;  // frame, feature
+
+Tracks ReadTracks(const std::filesystem::path& path, int& dims) {
+  Tracks tracks;
+  NumberRows rows(path, {}, {});
+  while (NextRow(rows, 4, "frame,feature,dim,value")) {
+    const std::int64_t dim = rows.Index(2, "dim");
+    if (dim > 3) rows.FailCell(2, "dim", "is unknown", "0 u, 1 v, 2 u_right, 3 v_right");
+    Seen& seen = tracks[rows.Index(0, "frame")][rows.Index(1, "feature")];
+    const auto d = static_cast<std::size_t>(dim);
+    if (seen.lines[d] != 0) {
+      rows.FailLine("the same frame, feature and dim as line " + std::to_string(seen.lines[d]),
+                    "each once");
+    }
+    seen.z[d] = rows.Number(3, "value");
+    seen.lines[d] = rows.line();
+    dims = std::max(dims, dim > 1 ? 4 : 2);
+  }
+  if (tracks.empty()) rows.FailLine("no rows", "frame,feature,dim,value");
+  for (const auto& [frame, features] : tracks) {
+    for (const auto& [feature, seen] : features) {
+      for (int d = 0; d < dims; ++d) {
+        if (seen.lines[static_cast<std::size_t>(d)] != 0) continue;
+        const Place place{rows.name(), *std::ranges::max_element(seen.lines)};
+        throw Error(ExitCode::kBadData,
+                    ErrorLine(place, {},
+                              "frame " + std::to_string(frame) + " has no dim " +
+                                  std::to_string(d) + " of feature " + std::to_string(feature),
+                              "all of 0 to " + std::to_string(dims - 1)));
+      }
+    }
+  }
+  return tracks;
+}
+
+struct Start {
+  std::vector<Stamp> stamps;
+  std::vector<BundleCamera> cameras;
+};
+
+Start ReadStart(const std::filesystem::path& path) {
+  Start start;
+  NumberRows rows(path, {}, {}, ' ');
+  while (rows.Next()) {
+    rows.ExpectColumns(8, "t x y z qx qy qz qw");
+    start.stamps.push_back(rows.Time(0, "t"));
+    const auto [x, y, z, qx, qy, qz, qw] = rows.PoseNumbers(NumberRows::kTumPose);
+    BundleCamera& camera = start.cameras.emplace_back(BundleCamera{{x, y, z}, {qw, qx, qy, qz}});
+    Normalise<UnitQuaternion>(camera.orientation.data());
+  }
+  return start;
+}
+
+/// Of each frame the index of its pose. `times` "": there are none.
+std::map<std::int64_t, std::size_t> PosesOf(const Tracks& tracks, const Start& start,
+                                            const std::filesystem::path& times) {
+  std::map<std::int64_t, std::size_t> poses;
+  if (!std::filesystem::exists(times)) {
+    for (const auto& [frame, features] : tracks) {
+      if (frame < std::ssize(start.cameras)) poses[frame] = static_cast<std::size_t>(frame);
+    }
+    return poses;
+  }
+  std::map<Stamp, std::size_t> at;
+  for (std::size_t i = 0; i < start.stamps.size(); ++i) at.emplace(start.stamps[i], i);
+  constexpr Stamp kSame = 1000;  // ns
+  NumberRows rows(times, {}, {});
+  while (NextRow(rows, 2, "frame,t_s")) {
+    const Stamp t = rows.Time(1, "t_s");
+    const auto found = at.lower_bound(t - kSame);
+    if (found != at.end() && found->first <= t + kSame)
+      poses[rows.Index(0, "frame")] = found->second;
+  }
+  if (rows.line() < 2) rows.FailLine("no rows", "frame,t_s");
+  return poses;
+}
+
+/// Where the points meet that the sensor tells of each observation: y, with J = dy/dz,
+///
+///   point = (sum W)^-1 sum W y,   W = (J J')^+
+///
+/// so that one camera counts across its ray alone, and a pair the less along it the farther y is.
+/// None where all of this leaves a direction all but open: rays that are almost parallel.
+std::optional<std::array<double, 3>> Triangulate(const SensorModel& sensor,
+                                                 const BundleProblem& problem,
+                                                 const std::vector<BundleObservation>& seen) {
+  constexpr double kParallel = 1e-6;  // of the squared sine of an angle, 0.06 degrees
+  constexpr double kAlongRay = 1e-12;
+  const BundleRoles roles = RolesOf(sensor);
+  Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor> j(
+      3, sensor.measurement().geometry.tangent);
+  for (const BundleObservation& one : seen) {
+    std::vector<const double*> values(3);
+    const BundleCamera& camera = problem.cameras[static_cast<std::size_t>(one.camera)];
+    values[roles.position] = camera.position.data();
+    values[roles.orientation] = camera.orientation.data();
+    Eigen::Vector3d y;
+    const double prior = 1.0;
+    if (sensor.Initialise(values.data(), one.z.data(), &prior, y.data(), nullptr, j.data(),
+                          nullptr) != Status::kOk)
+      continue;
+    Eigen::CompleteOrthogonalDecomposition<Eigen::Matrix3d> spread;
+    spread.setThreshold(kAlongRay);
+    const Eigen::Matrix3d w = spread.compute(j * j.transpose()).pseudoInverse();
+    a += w;
+    b += w * y;
+  }
+  const Eigen::Vector3d told = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(a).eigenvalues();
+  if (!(told[0] > kParallel * told[2])) return std::nullopt;
+  std::array<double, 3> point;
+  Eigen::Map<Eigen::Vector3d>{point.data()} = a.ldlt().solve(b);
+  return point;
+}
+
+/// The sensor of tracks, checked while its file is known.
+SensorModel MakeSensor(const BundleTracks& from, int dims, const PluginHost& host,
+                       std::string& text) {
+  Config config = Config::FromFile(from.camera);
+  const char* const model = dims == 4 ? "stereo_feature" : "inverse_depth_feature";
+  config.Set("model", model, "bundle");
+  if (!config.root().HasUnread("sigma_px")) config.Set("sigma_px", "1", "bundle");
+  const SensorModel sensor = host.CreateSensor(model, config.root(), "xyz");
+  config.root().Declare("model");
+  config.root().RejectUnread();
+  text = config.ToYaml();
+  return sensor;
+}
+
+}  // namespace
+
+BundleFile ReadBundleTracks(const BundleTracks& from, const PluginHost& host) {
+  BundleFile file;
+  file.format = BundleFormat::kTracks;
+  BundleProblem& problem = file.problem;
+  int dims = 2;
+  const Tracks tracks = ReadTracks(from.tracks, dims);
+  const Start start = ReadStart(from.start);
+  const auto poses = PosesOf(
+      tracks, start, from.tracks == "-" ? "" : from.tracks.parent_path() / "timestamps.csv");
+  const SensorModel sensor = MakeSensor(from, dims, host, problem.sensor);
+
+  std::map<std::int64_t, std::vector<BundleObservation>> features;
+  for (const auto& [frame, all] : tracks) {
+    const auto pose = poses.find(frame);
+    if (pose == poses.end()) {
+      ++file.frames_left_out;
+      file.unplaced += static_cast<int>(all.size());
+      continue;
+    }
+    const int camera = static_cast<int>(problem.cameras.size());
+    problem.cameras.push_back(start.cameras[pose->second]);
+    file.camera_ids.push_back(frame);
+    file.stamps.push_back(start.stamps[pose->second]);
+    for (const auto& [feature, seen] : all) {
+      if (sensor.Valid(seen.z.data()) == Status::kOk) {
+        features[feature].push_back({camera, 0, seen.z, true});
+      } else {
+        ++file.invalid;
+      }
+    }
+  }
+  for (auto& [feature, seen] : features) {
+    const auto place = Triangulate(sensor, problem, seen);
+    if (!place) {
+      ++file.points_left_out;
+      file.unplaced += static_cast<int>(seen.size());
+      continue;
+    }
+    for (BundleObservation& one : seen) {
+      one.point = static_cast<int>(problem.points.size());
+      problem.observations.push_back(one);
+    }
+    problem.points.push_back(*place);
+    file.point_ids.push_back(feature);
+  }
+  if (problem.cameras.empty()) {
+    throw Error(ExitCode::kBadData,
+                ErrorLine(Place{from.start.string()}, {}, "no pose at the time of any frame",
+                          "the times of timestamps.csv beside the tracks"));
+  }
+  return file;
+}
+
+}  // namespace alidade

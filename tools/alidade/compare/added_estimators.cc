@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <map>
+
+#include "alidade/base/text_table.h"
+#include "alidade/base/words.h"
+#include "alidade/compare/candidates.h"
+#include "alidade/compare/compare.h"
+#include "alidade/filter/built_in.h"
+#include "alidade/run/named_estimator.h"
+#include "alidade/sweep/sweep_config.h"
+
+namespace alidade {
+namespace {
+
+constexpr const char* kOrigin = "alidade compare";
+
+/// An estimator that a comparison may lack.
+struct Variant {
+  const char* name;
+  EstimatorKind kind;
+  bool so_far;                    ///< the batch of the data so far
+  bool accepted;                  ///< of what the filter accepted
+  std::vector<const char*> keys;  ///< of the filter's entry, taken over where it has them
+  const char* what;
+};
+
+const std::vector<Variant>& Variants() {
+  static const std::vector<Variant> variants = {
+      {"rts",
+       EstimatorKind::kSmoother,
+       false,
+       false,
+       {"sensors", "overrides", "max_dt_s", "gate", "fuse"},
+       "the smoother of all data"},
+      {"batch",
+       EstimatorKind::kBatch,
+       false,
+       false,
+       {"sensors", "overrides", "max_dt_s"},
+       "the batch of all data"},
+      {"batch_so_far",
+       EstimatorKind::kBatch,
+       true,
+       true,
+       {"sensors", "overrides", "max_dt_s"},
+       "the batch of the data so far that the filter accepted"},
+      {"batch_accepted",
+       EstimatorKind::kBatch,
+       false,
+       true,
+       {"sensors", "overrides", "max_dt_s"},
+       "the batch of all that the filter accepted"},
+  };
+  return variants;
+}
+
+/// Names of the sensors of a system, sorted.
+std::vector<std::string> SensorsOf(const NamedEstimator& named) {
+  std::vector<std::string> names = internal::NamesOf(named.system.sensors);
+  std::ranges::sort(names);
+  return names;
+}
+
+/// Whether `named` is what the variant would be. A batch of all data so far does for one of the
+/// data that a filter accepted: another line tells what these two differ by.
+bool IsThere(const Variant& variant, const NamedEstimator& named, const NamedEstimator& filter,
+             int filter_index) {
+  const bool so_far = named.kind == EstimatorKind::kBatch && !named.estimator->offline();
+  if (named.kind != variant.kind || so_far != variant.so_far) return false;
+  if (named.overrides != filter.overrides || SensorsOf(named) != SensorsOf(filter)) return false;
+  if (named.accepted_by >= 0) return variant.accepted && named.accepted_by == filter_index;
+  return variant.so_far || !variant.accepted;
+}
+
+/// A name that no estimator has.
+std::string FreeName(const std::string& name, const std::vector<NamedEstimator>& taken) {
+  const std::vector<std::string> names = internal::NamesOf(taken);
+  std::string free = name;
+  for (int i = 2; std::ranges::count(names, free) > 0; ++i) free = name + '_' + std::to_string(i);
+  return free;
+}
+
+/// The first type of that kind, those of core before those of plugins; "": there is none.
+std::string TypeOf(EstimatorKind kind, const PluginHost& host) {
+  for (const internal::EstimatorType& type : internal::EstimatorTypes()) {
+    if (type.kind == kind) return type.name;
+  }
+  for (const PluginEntry& entry : host.entries()) {
+    if (entry.kind == PluginEntry::Kind::kEstimator && entry.estimator == kind) return entry.name;
+  }
+  return "";
+}
+
+/// The config with the variant's entry.
+Config WithVariant(const Config& config, const Variant& variant, const std::string& type,
+                   const std::string& name, const std::string& filter) {
+  Config with = internal::Copy(config);
+  const std::string entry = "estimators." + name;
+  with.Set(entry + ".type", type, kOrigin);
+  if (variant.so_far) with.Set(entry + ".data", "so_far", kOrigin);
+  if (variant.accepted) with.Set(entry + ".use.accepted_by", filter, kOrigin);
+  for (const char* const key : variant.keys) {
+    const auto value = with.root().At("estimators").At(filter).Find(key);
+    if (!value) continue;
+    const std::string text = value->ToYaml();
+    with.Set(entry + '.' + key, text, kOrigin);
+  }
+  return with;
+}
+
+/// What an error says, without its place and what it would have expected.
+std::string ReasonOf(const Error& error) {
+  std::string reason = error.what();
+  reason = reason.substr(0, reason.find('\n'));
+  reason = reason.substr(0, reason.find("; expected"));
+  const std::size_t place = reason.find(": ");
+  return place == reason.npos ? reason : reason.substr(place + 2);
+}
+
+/// Adds the variant, or puts what it is below the reason why it cannot be.
+void AddVariant(const Variant& variant, const PluginHost& host, ExplainedExperiment& explained,
+                std::map<std::string, std::vector<std::string>>& left_out) {
+  const std::string name = FreeName(variant.name, explained.experiment.estimators);
+  const std::string type = TypeOf(variant.kind, host);
+  if (type.empty()) {
+    left_out[std::string("no plugin offers an estimator of the kind ") + ToString(variant.kind)]
+        .emplace_back(variant.what);
+    return;
+  }
+  try {
+    const Config with = WithVariant(explained.config, variant, type, name, explained.filter);
+    internal::AddEstimator(with, host, name, explained.experiment);
+    explained.config = with;
+    explained.added.push_back(name);
+    explained.notes.push_back("added '" + name + "': " + variant.what);
+  } catch (const Error& error) {
+    left_out[ReasonOf(error)].emplace_back(variant.what);
+  }
+}
+
+/// Refuses a reference that no estimator is, and truth where the source knows none. Error: kUsage.
+void CheckReference(const Experiment& experiment, const std::string& name) {
+  std::vector<std::string> names = internal::NamesOf(experiment.estimators);
+  const bool truth = name == "truth" && !experiment.source->truths().empty();
+  if (name.empty() || truth || std::ranges::count(names, name) > 0) return;
+  if (!experiment.source->truths().empty()) names.emplace_back("truth");
+  internal::RefuseOption(
+      "--reference", name == "truth" ? "the source knows no truth" : "no estimator '" + name + "'",
+      name, names);
+}
+
+/// Index of the filter whose gap is to be explained; -1: there is none. Error: kUsage.
+int FindFilter(const Experiment& experiment, const std::string& name) {
+  std::vector<std::string> filters;
+  for (std::size_t e = 0; e < experiment.estimators.size(); ++e) {
+    const NamedEstimator& one = experiment.estimators[e];
+    if (one.kind != EstimatorKind::kFilter) continue;
+    if (name.empty() ? one.accepted_by < 0 : one.name == name) return static_cast<int>(e);
+    filters.push_back(one.name);
+  }
+  if (name.empty()) return -1;
+  const bool known = std::ranges::count(internal::NamesOf(experiment.estimators), name) > 0;
+  internal::RefuseFilter(name, known, filters);
+}
+
+}  // namespace
+
+ExplainedExperiment ExplainExperiment(const Config& config, const PluginHost& host,
+                                      const CompareOptions& options) {
+  if (options.over_seeds) internal::CheckReadableAgain(config);
+  // Errors are taken from truth: what a config compares with besides is done here.
+  Config own = internal::Copy(config);
+  if (own.root().is_map() && own.root().Find("reference")) {
+    own.Set("reference", "truth", kOrigin);
+    own = internal::Copy(own);
+  }
+  ExplainedExperiment explained{own, BuildExperiment(own, host), "", {}, {}};
+  const int filter = FindFilter(explained.experiment, options.filter);
+  if (filter < 0 || !options.explain) CheckReference(explained.experiment, options.reference);
+  if (filter < 0) return explained;
+  explained.filter = explained.experiment.estimators[static_cast<std::size_t>(filter)].name;
+  if (!options.explain) return explained;
+  std::map<std::string, std::vector<std::string>> left_out;  // by reason
+  for (const Variant& variant : Variants()) {
+    const std::vector<NamedEstimator>& all = explained.experiment.estimators;
+    const NamedEstimator& of = all[static_cast<std::size_t>(filter)];
+    const bool there = std::ranges::any_of(
+        all, [&](const NamedEstimator& one) { return IsThere(variant, one, of, filter); });
+    if (there) continue;
+    if (variant.so_far && of.system.landmarks) {
+      left_out["with landmarks a solve at every frame takes long; the config may have it"]
+          .emplace_back(variant.what);
+      continue;
+    }
+    AddVariant(variant, host, explained, left_out);
+  }
+  for (const auto& [reason, what] : left_out) {
+    explained.notes.push_back("left out " + internal::Join(what, "; ") + ": " + reason);
+  }
+  CheckReference(explained.experiment, options.reference);
+  return explained;
+}
+
+}  // namespace alidade

@@ -1,0 +1,376 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/compare/candidates.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <set>
+
+#include "alidade/base/text_table.h"
+#include "alidade/base/words.h"
+#include "alidade/compare/distance.h"
+
+namespace alidade {
+
+using internal::Candidate;
+using internal::ComparedEntry;
+using internal::ComparedRun;
+using internal::Distance;
+using internal::Single;
+
+namespace {
+
+/// The folder of a run without those above it; "" of one that has none.
+std::string FolderName(const ComparedRun& run) {
+  if (run.folder.empty()) return "";
+  return (std::filesystem::absolute(run.folder) / ".")
+      .lexically_normal()
+      .parent_path()
+      .filename()
+      .string();
+}
+
+/// What estimators are called by beside those of other runs: the folder of each run, by its name
+/// alone where no other has that.
+std::vector<Candidate> CandidatesOf(const std::vector<ComparedRun>& runs) {
+  std::vector<Candidate> candidates;
+  for (const ComparedRun& run : runs) {
+    const std::string name = FolderName(run);
+    const bool unique = std::ranges::count(runs, name, FolderName) == 1;
+    const std::string prefix = (unique ? name : run.folder.string()) + '/';
+    for (const ComparedEntry& entry : run.estimators) {
+      candidates.push_back({(runs.size() > 1 ? prefix : "") + entry.result.name, &run, &entry});
+    }
+  }
+  return candidates;
+}
+
+/// The candidate that an option names; where several runs have it, the first. Error: kUsage.
+const Candidate& Named(const std::string& name, const std::vector<Candidate>& candidates,
+                       const char* option) {
+  for (const Candidate& one : candidates) {
+    if (one.name == name || one.entry->result.name == name) return one;
+  }
+  internal::RefuseOption(option, "no estimator '" + name + "'", name,
+                         internal::NamesOf(candidates));
+}
+
+/// The first candidate that is so, of those that are usable where one is; null: there is none.
+const Candidate* FirstOf(const std::vector<Candidate>& candidates,
+                         const std::function<bool(const Candidate&)>& is_so) {
+  const Candidate* first = nullptr;
+  for (const Candidate& one : candidates) {
+    if (!is_so(one)) continue;
+    if (one.entry->usable()) return &one;
+    if (first == nullptr) first = &one;
+  }
+  return first;
+}
+
+/// The batch of the same system as `of`, of the data so far or of all data; one that sees all
+/// measurements comes before one of those that a filter accepted. Where none of these is usable,
+/// one that is, of the same sensors with other overrides: a robust loss, say.
+const Candidate* BatchFor(const Candidate& of, const std::vector<Candidate>& candidates,
+                          bool smoothed) {
+  const auto sees_the_same = [&](const Candidate& one) {
+    return one.batch() && one.facts().smoothed == smoothed && SameSensors(one.facts(), of.facts());
+  };
+  const auto fits = [&](const Candidate& one) {
+    return sees_the_same(one) && SameSystem(one.facts(), of.facts());
+  };
+  const auto sees_all = [](const Candidate& one) { return one.facts().accepted_by.empty(); };
+  const std::function<bool(const Candidate&)> choices[] = {
+      [&](const Candidate& one) { return fits(one) && sees_all(one); }, fits,
+      [&](const Candidate& one) { return sees_the_same(one) && sees_all(one); }};
+  for (const auto& choice : choices) {
+    const Candidate* const found = FirstOf(candidates, choice);
+    if (found != nullptr && found->entry->usable()) return found;
+  }
+  const Candidate* const own = FirstOf(candidates, choices[0]);
+  return own != nullptr ? own : FirstOf(candidates, fits);
+}
+
+bool HasErrors(const Candidate& one) {
+  return one.run->reference == "truth" &&
+         std::ranges::any_of(one.entry->result.metrics,
+                             [](const auto& metric) { return metric.first.starts_with("rmse:"); });
+}
+
+/// Whether errors are taken from truth. Error: kUsage where that is asked for and there is none.
+bool FromTruth(const std::vector<Candidate>& candidates, const CompareOptions& options) {
+  const bool asked = options.reference == "truth";
+  if (!options.reference.empty() && !asked) return false;
+  const bool truth = std::ranges::any_of(candidates, HasErrors);
+  if (asked && !truth) {
+    internal::RefuseOption("--reference", "no run has errors from truth", "",
+                           internal::NamesOf(candidates));
+  }
+  return truth;
+}
+
+/// What the estimates of a candidate are held against; null: nothing.
+struct References {
+  const Candidate* along = nullptr;  ///< those along the run
+  const Candidate* final = nullptr;  ///< the last one, when all have the same data
+};
+
+References ReferencesOf(const Candidate& one, const std::vector<Candidate>& candidates, bool truth,
+                        const CompareOptions& options) {
+  if (!options.reference.empty() && options.reference != "truth") {
+    const Candidate& named = Named(options.reference, candidates, "--reference");
+    return {&named, &named};
+  }
+  const Candidate* const so_far = BatchFor(one, candidates, false);
+  const Candidate* smoothed = BatchFor(one, candidates, true);
+  if (smoothed == nullptr) {
+    smoothed = FirstOf(candidates, [&](const Candidate& other) {
+      return internal::SmoothsAllData(other.facts()) && SameSystem(other.facts(), one.facts());
+    });
+  }
+  const bool later = one.facts().smoothed || (!truth && so_far == nullptr);
+  return {later ? smoothed : so_far, smoothed != nullptr ? smoothed : so_far};
+}
+
+/// Why a comparison with what is held against is withheld, or "".
+std::string WhyWithheld(const std::vector<Candidate>& candidates,
+                        const std::vector<References>& references, bool truth) {
+  const bool measured = std::ranges::any_of(
+      candidates, [](const Candidate& one) { return one.entry->measurements() > 0; });
+  if (!measured) return "no estimator was given a measurement: what is compared is their start";
+  bool any = truth;
+  for (const References& of_one : references) {
+    for (const Candidate* const reference : {of_one.final, of_one.along}) {
+      if (reference == nullptr) continue;
+      any = true;
+      if (reference->entry->usable()) continue;
+      return "no reference: estimator '" + reference->name + "' " +
+             (reference->entry->result.failed ? "failed" : "has no estimates") +
+             ", the comparison with it is withheld";
+    }
+  }
+  return any ? "" : "no reference: no truth, no batch and no smoother of all data";
+}
+
+/// Which estimators are held against nothing while others are.
+std::vector<std::string> WithoutReference(const std::vector<Candidate>& candidates,
+                                          const std::vector<References>& references) {
+  bool final = false, online = false;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    final = final || references[i].final != nullptr;
+    online = online || (references[i].along != nullptr && !candidates[i].facts().smoothed);
+  }
+  std::vector<std::string> notes;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const std::string what = "'" + candidates[i].name + "' is held against nothing";
+    if (final && references[i].final == nullptr) {
+      notes.push_back(what + ": no batch has its sensors");
+    } else if (online && references[i].along == nullptr) {
+      notes.push_back(what + " along the run: no batch of the data so far has its sensors and " +
+                      "overrides");
+    }
+  }
+  return notes;
+}
+
+bool ScaleIsFree(const Candidate& one) {
+  const std::vector<std::string> scale = {"scale"};
+  return std::ranges::count(one.entry->result.unobservable, scale) > 0;
+}
+
+void AddAll(const std::map<std::string, double>& from, const std::string& kind,
+            std::map<std::string, Spread>& values) {
+  for (const auto& [key, value] : from) values[kind + key] = Single(value);
+}
+
+/// `ratio.KEY` of the keys that begin like one of `kinds`.
+void AddRatios(const ComparedEntry& one, const ComparedEntry& reference,
+               const std::vector<std::string>& kinds, std::map<std::string, Spread>& values) {
+  for (const auto& [key, value] : one.result.metrics) {
+    const auto begins = [&key = key](const std::string& kind) { return key.starts_with(kind); };
+    const auto found = reference.result.metrics.find(key);
+    if (std::ranges::none_of(kinds, begins) || key.find('@') != key.npos) continue;
+    if (found == reference.result.metrics.end() || !(found->second > 0.0)) continue;
+    if (!std::isfinite(found->second)) continue;
+    values["ratio." + key] = Single(value / found->second);
+  }
+}
+
+/// The distance from `reference` along the run, and where scale is free that of the path.
+void AddApart(const Candidate& one, const Candidate& reference, ComparedEstimator& compared) {
+  const Distance distance = internal::DistanceBetween(one.entry->series, reference.entry->series);
+  AddAll(distance.rms, "apart:", compared.values);
+  AddAll(distance.sigmas, "apart.sigmas:", compared.values);
+  const std::string& path = one.facts().path;
+  if (path.empty() || !ScaleIsFree(one)) return;
+  if (const auto aligned = AlignPaths(one.entry->series, reference.entry->series, path)) {
+    compared.values["apart.path.sim3"] = Single(aligned->rmse);
+  }
+}
+
+void AddFinal(const Candidate& one, const Candidate& reference, ComparedEstimator& compared) {
+  const Distance distance = internal::DistanceBetween(one.entry->series, reference.entry->series);
+  AddAll(distance.final, "apart.final:", compared.values);
+  AddAll(distance.final_sigmas, "apart.final.sigmas:", compared.values);
+  AddAll(internal::DistanceBetweenMaps(one.entry->result, reference.entry->result), "apart.",
+         compared.values);
+}
+
+/// Metrics of the run that need no truth.
+bool NeedsNoTruth(const std::string& key) {
+  for (const char* kind : {"nis.", "reprojection:", "settling_frames:"}) {
+    if (key.starts_with(kind)) return true;
+  }
+  return false;
+}
+
+ComparedEstimator Compare(const Candidate& one, const References& references, bool truth) {
+  const EstimatorResult& result = one.entry->result;
+  ComparedEstimator compared;
+  compared.name = one.name;
+  compared.type = one.facts().type;
+  compared.smoothed = one.facts().smoothed;
+  compared.units = result.units;
+  compared.used = 1;
+  compared.diverged = result.diverged ? 1 : 0;
+  for (const internal::SeriesBlock& block : one.entry->series.blocks) {
+    if (!block.unit.empty()) compared.units[block.name] = block.unit;
+  }
+  for (const auto& [key, value] : result.metrics) {
+    const bool from_truth = truth && one.run->reference == "truth";
+    if (from_truth || NeedsNoTruth(key)) compared.values[key] = Single(value);
+  }
+  const std::int64_t count = one.entry->measurements();
+  if (count > 0 && result.wall_s > 0.0) {
+    compared.values["time_us"] = Single(1e6 * result.wall_s / static_cast<double>(count));
+  }
+  if (!one.entry->usable()) return compared;
+  if (references.along != nullptr && references.along->entry->usable()) {
+    const Candidate& along = *references.along;
+    compared.reference = along.name;
+    compared.reference_runs = 1;
+    if (truth) AddRatios(*one.entry, *along.entry, {"rmse:", "path.sim3.rmse"}, compared.values);
+    if (along.entry != one.entry) AddApart(one, along, compared);
+  }
+  if (references.final != nullptr && references.final->entry->usable()) {
+    const Candidate& final = *references.final;
+    compared.final_reference = final.name;
+    compared.final_reference_runs = 1;
+    if (truth)
+      AddRatios(*one.entry, *final.entry, {"final:", "map.rmse", "map.sim3.rmse"}, compared.values);
+    if (final.entry != one.entry) AddFinal(one, final, compared);
+  }
+  return compared;
+}
+
+/// The filter whose gap is explained; null: there is none. Error: kUsage.
+const Candidate* FilterOf(const std::vector<Candidate>& candidates, const CompareOptions& options) {
+  const auto is_filter = [](const Candidate& one) {
+    return one.facts().kind == EstimatorKind::kFilter;
+  };
+  if (options.filter.empty()) {
+    const auto first = std::ranges::find_if(candidates, [&](const Candidate& one) {
+      return is_filter(one) && one.facts().accepted_by.empty();
+    });
+    return first == candidates.end() ? nullptr : &*first;
+  }
+  std::vector<std::string> filters;
+  bool known = false;
+  for (const Candidate& one : candidates) {
+    const bool named = one.name == options.filter || one.entry->result.name == options.filter;
+    if (named && is_filter(one)) return &one;
+    known = known || named;
+    if (is_filter(one)) filters.push_back(one.name);
+  }
+  internal::RefuseFilter(options.filter, known, filters);
+}
+
+std::vector<std::string> NotesOf(const std::vector<Candidate>& candidates,
+                                 const std::vector<References>& references, bool truth) {
+  std::set<std::string> notes;
+  if (std::ranges::any_of(candidates, ScaleIsFree)) {
+    notes.insert(
+        "scale is what the priors make of it: paths and maps are to be compared by their Sim3 "
+        "rows, after the similarity that brings them nearest");
+  }
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const Candidate* const along = references[i].along;
+    if (along == nullptr) continue;
+    if (!along->entry->series.joint && along->entry->usable()) {
+      notes.insert("'" + along->name +
+                   "' has no covariance.bin: RMSD in sigmas leaves its correlations out");
+    }
+    if (!truth && along->facts().smoothed && !candidates[i].facts().smoothed) {
+      notes.insert("'" + along->name +
+                   "' knows later data, a filter does not: it lags behind by nature");
+    }
+  }
+  std::vector<std::string> all(notes.begin(), notes.end());
+  const std::vector<std::string> without = WithoutReference(candidates, references);
+  all.insert(all.end(), without.begin(), without.end());
+  return all;
+}
+
+}  // namespace
+
+void internal::RefuseOption(const char* option, const std::string& what, const std::string& name,
+                            const std::vector<std::string>& choices) {
+  throw Error(ExitCode::kUsage,
+              ErrorLine({}, option, what,
+                        choices.empty() ? "a config that has one" : "one of " + Join(choices),
+                        Nearest(name, choices)));
+}
+
+void internal::RefuseFilter(const std::string& name, bool known,
+                            const std::vector<std::string>& filters) {
+  const std::string quoted = "'" + name + "'";
+  RefuseOption("--filter", known ? quoted + " is not an online filter" : "no estimator " + quoted,
+               known ? "" : name, filters);
+}
+
+const char* ToString(GapKind kind) {
+  constexpr const char* kNames[] = {"linearisation", "smoothing", "lost data"};
+  return kNames[static_cast<int>(kind)];
+}
+
+Comparison internal::CompareRuns(const std::vector<ComparedRun>& runs,
+                                 const CompareOptions& options) {
+  ALIDADE_EXPECTS(!runs.empty());
+  const std::vector<Candidate> candidates = CandidatesOf(runs);
+  const bool truth = FromTruth(candidates, options);
+  std::vector<References> references;
+  for (const Candidate& one : candidates) {
+    references.push_back(ReferencesOf(one, candidates, truth, options));
+  }
+  Comparison comparison;
+  comparison.frames = runs.front().frames;
+  for (const ComparedRun& run : runs) comparison.status = std::max(comparison.status, run.status);
+  comparison.measurements_sha256 = runs.front().measurements_sha256;
+  comparison.notes = NotesOf(candidates, references, truth);
+  std::set<std::string> unoptimised;
+  for (const ComparedRun& run : runs) {
+    unoptimised.insert(run.unoptimised.begin(), run.unoptimised.end());
+  }
+  if (const std::string note = UnoptimisedText(unoptimised); !note.empty()) {
+    comparison.notes.push_back(note);
+  }
+  comparison.withheld = WhyWithheld(candidates, references, truth);
+  comparison.reference = truth ? "truth" : "";
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    comparison.estimators.push_back(Compare(candidates[i], references[i], truth));
+    const Candidate* const final = references[i].final;
+    if (comparison.reference.empty() && final != nullptr) comparison.reference = final->name;
+  }
+  const Candidate* const filter = options.explain ? FilterOf(candidates, options) : nullptr;
+  if (filter != nullptr) {
+    comparison.explained = filter->name;
+    comparison.gap = ExplainGap(*filter, candidates, truth);
+    if (filter->entry->locked_out) {
+      comparison.notes.push_back(
+          "'" + filter->name +
+          "' was locked out: what that cost is in its step to a batch or smoother");
+    }
+  }
+  return comparison;
+}
+
+}  // namespace alidade

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "alidade/run/run.h"
+#include "alidade/sweep/sweep.h"
+
+/// Estimators over the same data beside each other, and where their difference comes from
+/// (docs/compare.md). What a filter makes of the past is never held against what a smoother makes
+/// of all data: each is compared with the batch of the data that it had.
+namespace alidade {
+
+struct CompareOptions {
+  /// What errors are taken from: `truth`, or an estimator. "": truth where it is known, else the
+  /// batch.
+  std::string reference;
+  std::string filter;       ///< the one whose gap is explained; "": the first
+  bool explain = true;      ///< else no gap, and nothing is added to a config for it
+  bool over_seeds = false;  ///< the source is read for each of several seeds
+};
+
+/// One estimator of a comparison. Values are those of run.json by their keys, where these are
+/// errors from truth, and
+///
+///   apart:BLOCK               sqrt(mean |d|^2), d = x (-) x_ref            unit of the block
+///   apart.final:BLOCK         |d| at the last stamp
+///   apart.sigmas:OWNER        sqrt(mean d' P_ref^-1 d / dof), in sigmas of the reference
+///   apart.final.sigmas:OWNER  the same at the last stamp
+///   apart.path.sim3           rms of the path after the similarity that makes it least, m
+///   apart.map                 rms of the places of landmarks at the end, m
+///   apart.map.sim3            likewise after that similarity of the map, m
+///   ratio.KEY                 value of KEY over that of the reference; of rmse, final, map
+///   time_us                   wall clock for each measurement
+struct ComparedEstimator {
+  std::string name, type;
+  bool smoothed = false;        ///< its estimates rest on later data too
+  std::string reference;        ///< of its estimates along the run; "": there is none
+  std::string final_reference;  ///< of the last estimate and the map
+  std::int64_t reference_runs = 0, final_reference_runs = 0;  ///< of `used`, those with one
+  std::map<std::string, Spread> values;
+  std::map<std::string, std::string> units;  ///< of blocks
+  std::int64_t used = 0;                     ///< runs that values are taken over
+  std::int64_t diverged = 0;                 ///< runs in which it did
+};
+
+/// Where a part of the difference between a filter and the batch of all data comes from.
+enum class GapKind {
+  kLinearisation,  ///< the filter against the batch of the data so far that it accepted
+  kSmoothing,      ///< the filter against a smoother of the same models: what later data tell
+  kLostData,       ///< the batch of what the filter accepted against the batch of all data
+};
+/// `linearisation`, `smoothing`, `lost data`.
+const char* ToString(GapKind kind);
+
+/// One step of the way from the filter to the batch. Values: `error_ratio:BLOCK`, the RMSE from
+/// truth of `from` over that of `to`; `apart:BLOCK` and `apart.sigmas:OWNER` between the two;
+/// `rmse.from:BLOCK`, `rmse.to:BLOCK`; `measurements` and `lost` of kLostData. At the end they are
+/// of the last frame alone, and of BLOCK `map` and `map.sim3` too.
+struct GapStep {
+  GapKind kind = GapKind::kLinearisation;
+  std::string from, to;
+  bool at_end = false;  ///< taken at the last frame, for want of a batch of the data so far
+  std::map<std::string, Spread> values;
+  std::string withheld;  ///< why there are no values, or ""
+};
+
+struct Comparison {
+  std::int64_t runs = 1;  ///< seeds; values are spread over them
+  std::int64_t frames = 0;
+  RunStatus status = RunStatus::kOk;  ///< the worst of the runs'; of seeds kOk or kStopped
+  std::string reference;              ///< `truth`, or the first estimator that one is held against
+  std::string withheld;               ///< why there is no reference, or nothing to compare; or ""
+  std::string measurements_sha256;    ///< of the data; "": of several seeds
+  std::vector<ComparedEstimator> estimators;
+  std::string explained;  ///< the filter whose gap it is
+  std::vector<GapStep> gap;
+  std::vector<std::string> notes;  ///< what a reader has to know, a line each
+};
+
+/// An experiment with the estimators that explain the gap of a filter.
+struct ExplainedExperiment {
+  Config config;  ///< with those that were added
+  Experiment experiment;
+  std::string filter;              ///< whose gap it is; "": there is no filter
+  std::vector<std::string> added;  ///< names
+  std::vector<std::string> notes;  ///< what was added and what could not be, with the reason
+};
+
+/// Builds the experiment of a config, and adds what its comparison lacks: the batch of all data, of
+/// the data so far, of what the filter accepted, and the smoother, each with the filter's sensors,
+/// overrides and steps. What does not support the system is left out. Errors: those of
+/// BuildExperiment; kUsage where `options` names an estimator that is not there, or one that is no
+/// filter as that whose gap is explained.
+ExplainedExperiment ExplainExperiment(const Config& config, const PluginHost& host,
+                                      const CompareOptions& options);
+
+/// Compares the estimators of a run while it runs.
+class RunComparer : public RunObserver {
+ public:
+  explicit RunComparer(const Experiment& experiment);
+  ~RunComparer() override;
+  RunComparer(const RunComparer&) = delete;
+  RunComparer& operator=(const RunComparer&) = delete;
+
+  void OnFrame(const Frame& frame) override;
+  void OnEstimate(int estimator, const Frame& frame, const State& state,
+                  const UpdateReport& report) override;
+  /// Once, after the run. Errors: kUsage where `options` names an estimator that is not there.
+  Comparison Finish(const RunResult& result, const CompareOptions& options);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Compares the estimators of finished runs, by their folders; names are `FOLDER/NAME` where there
+/// are several. Errors: kUsage where a folder is given twice, kInputMissing, kBadData where they
+/// did not see the same measurements, those of RunComparer.
+Comparison CompareFolders(const std::vector<std::filesystem::path>& folders,
+                          const CompareOptions& options);
+
+/// A comparison over seeds, and the sweep that it is of.
+struct ComparedSeeds {
+  Comparison comparison;
+  SweepResult sweep;
+};
+/// Runs and compares a config once for each seed; the runs in which an estimator diverged count for
+/// none of its values. Errors: those of Sweep and of RunComparer.
+ComparedSeeds CompareSeeds(const ExplainedExperiment& explained, const PluginHost& host,
+                           const SweepOptions& sweep, const CompareOptions& options);
+
+/// The values of comparisons of the same estimators, at least one, as mean and quantiles over them.
+Comparison Summarise(const std::vector<Comparison>& comparisons);
+
+/// How a comparison is written for people.
+enum class TableStyle { kText, kMarkdown, kLatex };
+/// Its tables and the explanation of the gap.
+std::string CompareReport(const Comparison& comparison, TableStyle style);
+/// All values, for other programs (docs/compare.md).
+std::string CompareJson(const Comparison& comparison);
+
+/// A new folder with compare.json, compare.md and compare.tex. Errors: kCannotCreate where it
+/// exists without `force`, kIo.
+void WriteComparison(const Comparison& comparison, const std::filesystem::path& folder, bool force);
+
+}  // namespace alidade

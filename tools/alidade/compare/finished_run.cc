@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/compare/finished_run.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "alidade/base/text_cell.h"
+
+namespace alidade::internal {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+[[noreturn]] void FailFile(const fs::path& file, int line, const std::string& what) {
+  throw Error(ExitCode::kBadData, ErrorLine(Place{file.string(), line}, {}, what,
+                                            "a run folder as alidade wrote it; run it again"));
+}
+
+std::ifstream Open(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (stream) return stream;
+  throw Error(ExitCode::kInputMissing, ErrorLine(Place{file.string()}, {}, "cannot be read",
+                                                 "the folder of a run that came to its end"));
+}
+
+Config ReadJson(const fs::path& file) {
+  std::ostringstream text;
+  text << Open(file).rdbuf();
+  return Config::FromText(text.str(), file.string());
+}
+
+/// The number of a json value; NaN for null, which stands for what is not finite.
+double NumberOf(const Node& node) {
+  return node.kind() == Node::Kind::kNull ? kNan : node.Number();
+}
+
+std::string TextOf(const Node& map, const char* key) {
+  const auto node = map.Find(key);
+  return node ? node->Text() : "";
+}
+
+std::vector<std::string> Texts(const Node& list) {
+  std::vector<std::string> texts;
+  for (const Node& item : list.Items()) texts.push_back(item.Text());
+  return texts;
+}
+
+/// Cells of a row without quotes; an empty one is NaN.
+std::vector<double> NumbersOf(std::string_view row, const fs::path& file, int line) {
+  std::vector<double> numbers;
+  for (std::size_t at = 0; at <= row.size();) {
+    const std::size_t end = std::min(row.find(',', at), row.size());
+    double value = kNan;
+    const char* const last = row.data() + end;
+    const auto [rest, error] = std::from_chars(row.data() + at, last, value);
+    if (end > at && (error != std::errc() || rest != last)) FailFile(file, line, "not a number");
+    numbers.push_back(value);
+    at = end + 1;
+  }
+  return numbers;
+}
+
+/// A row of estimates.csv behind its stamp: for each block its values, then its sigmas.
+void AppendRow(Series& series, const std::vector<double>& row) {
+  std::size_t at = 1;
+  const auto take = [&](int count) {
+    at += static_cast<std::size_t>(count);
+    return row.begin() + static_cast<std::ptrdiff_t>(at) - count;
+  };
+  for (const SeriesBlock& block : series.blocks) {
+    const int values = block.geometry.ambient, sigmas = block.geometry.tangent;
+    const auto value = take(values);
+    series.values.insert(series.values.end(), value, value + values);
+    const auto sigma = take(sigmas);
+    for (int i = 0; i < sigmas; ++i) series.covariances.push_back(sigma[i] * sigma[i]);
+  }
+}
+
+/// Returns how many rows have cells that are not finite; an empty cell says that there is no value.
+std::int64_t ReadEstimates(const fs::path& file, std::int64_t rows, Series& series) {
+  std::int64_t not_finite = 0;
+  std::ifstream stream = Open(file);
+  std::string line;
+  std::getline(stream, line);
+  const auto columns = 1 + static_cast<std::size_t>(series.ambient() + series.tangent());
+  for (int number = 2; std::getline(stream, line); ++number) {
+    const std::vector<double> row = NumbersOf(line, file, number);
+    if (row.size() != columns) FailFile(file, number, "not as wide as run.json has it");
+    if (stream.eof()) FailFile(file, number, "the last line is cut short");
+    series.stamps.push_back(cell::ExactStamp(line.substr(0, line.find(',')), 9));
+    AppendRow(series, row);
+    not_finite += line.find_first_of("nN") != line.npos ? 1 : 0;  // nan, inf
+  }
+  if (std::ssize(series.stamps) != rows) {
+    FailFile(file, 0,
+             std::to_string(series.stamps.size()) + " rows, run.json has " + std::to_string(rows));
+  }
+  return not_finite;
+}
+
+/// P in place of its diagonal, where the file is there and P is not too large.
+void ReadCovariances(const fs::path& file, Series& series) {
+  if (series.tangent() > Series::kMostJoint || !fs::exists(file)) return;
+  series.joint = true;
+  std::vector<double> cells(series.cells() * series.stamps.size());
+  const auto bytes = static_cast<std::streamsize>(8 * cells.size());
+  if (fs::file_size(file) != static_cast<std::uintmax_t>(bytes)) {
+    FailFile(file, 0, "not as long as estimates.csv has rows");
+  }
+  Open(file).read(reinterpret_cast<char*>(cells.data()), bytes);
+  series.covariances = std::move(cells);
+}
+
+Geometry GeometryOf(const Node& block) {
+  const int size = static_cast<int>(block.At("size").Integer(1, 1'000'000));
+  const Geometry all[] = {Geometry::Vector(size), Geometry::Angle(), Geometry::UnitQuaternion(),
+                          Geometry::UnitVector()};
+  const auto kind = block.At("geometry")
+                        .Choice({ToString(all[0].kind), ToString(all[1].kind),
+                                 ToString(all[2].kind), ToString(all[3].kind)});
+  return all[kind];
+}
+
+EstimatorFacts ReadFacts(const Node& entry) {
+  EstimatorFacts facts;
+  facts.type = TextOf(entry, "type");
+  using enum EstimatorKind;
+  facts.kind = static_cast<EstimatorKind>(
+      entry.At("kind", "a comparison")
+          .Choice({ToString(kFilter), ToString(kSmoother), ToString(kBatch), ToString(kWindow)}));
+  facts.smoothed = entry.At("smoothed", "a comparison").Flag();
+  facts.accepted_by = TextOf(entry, "accepted_by");
+  facts.overrides = TextOf(entry, "overrides");
+  facts.sensors = Texts(entry.At("sensors"));
+  facts.path = TextOf(entry, "path");
+  facts.rows = entry.At("rows", "a comparison").Integer(0, INT64_MAX);
+  for (const Node& block : entry.At("blocks").Items()) {
+    facts.blocks.push_back({block.At("name").Text(), TextOf(block, "unit"), GeometryOf(block)});
+  }
+  return facts;
+}
+
+EstimatorResult ReadResult(const std::string& name, const Node& entry) {
+  EstimatorResult result;
+  result.name = name;
+  result.failed = entry.At("failed").Flag();
+  for (const auto& [key, value] : entry.At("metrics").Entries()) {
+    if (key == "diverged") {
+      result.diverged = value.Flag();
+    } else if (key == "inconsistent") {
+      result.inconsistent = value.Flag();
+    } else {
+      result.metrics[key] = NumberOf(value);
+    }
+  }
+  for (const auto& [key, value] : entry.At("counts").Entries()) {
+    result.counts[key] = value.Integer(0, INT64_MAX);
+  }
+  for (const auto& [key, value] : entry.At("units").Entries()) result.units[key] = value.Text();
+  for (const Node& direction : entry.At("unobservable").Items()) {
+    result.unobservable.push_back(Texts(direction));
+  }
+  return result;
+}
+
+std::vector<LandmarkEstimate> ReadMap(const fs::path& file) {
+  constexpr std::size_t kPlace = 3;  // the columns x, y, z, behind id, generation and form
+  std::vector<LandmarkEstimate> map;
+  std::ifstream stream = Open(file);
+  std::string line;
+  std::getline(stream, line);
+  for (int number = 2; std::getline(stream, line); ++number) {
+    const std::size_t form = line.find(',', line.find(',') + 1);
+    const std::size_t after = std::min(line.find(',', form + 1), line.size());
+    const std::string plain = line.substr(0, form + 1) + line.substr(after);
+    const std::vector<double> row = NumbersOf(plain, file, number);
+    if (row.size() < kPlace + 3) FailFile(file, number, "too few columns");
+    if (!(std::abs(row[0]) < 0x1p63 && std::abs(row[1]) < 0x1p31))
+      FailFile(file, number, "id and generation are no integers");
+    LandmarkEstimate& one = map.emplace_back();
+    one.id = static_cast<std::int64_t>(row[0]);
+    one.generation = static_cast<int>(row[1]);
+    one.position = {row[kPlace], row[kPlace + 1], row[kPlace + 2]};
+  }
+  return map;
+}
+
+std::int64_t CountOf(const EstimatorResult& result, const std::vector<std::string>& outcomes) {
+  std::int64_t sum = 0;
+  for (const auto& [key, count] : result.counts) {
+    const std::string outcome = key.substr(0, key.find(':'));
+    if (outcome.size() < key.size() && std::ranges::count(outcomes, outcome) > 0) sum += count;
+  }
+  return sum;
+}
+
+}  // namespace
+
+std::int64_t ComparedEntry::measurements() const {
+  std::vector<std::string> all;
+  for (int i = 0; i <= static_cast<int>(Outcome::kFailed); ++i) {
+    all.emplace_back(ToString(static_cast<Outcome>(i)));
+  }
+  return CountOf(result, all);
+}
+
+std::int64_t ComparedEntry::used() const {
+  return CountOf(result, {ToString(Outcome::kAccepted), ToString(Outcome::kInitialised)});
+}
+
+namespace {
+
+ComparedRun ReadFiles(const fs::path& folder) {
+  ComparedRun run;
+  run.folder = folder;
+  const Config json = ReadJson(folder / "run.json"), timing = ReadJson(folder / "timing.json");
+  const Node root = json.root();
+  run.status = static_cast<RunStatus>(root.At("status").Choice({"ok", "stopped", "failed"}));
+  run.reason = root.At("reason").Text();
+  run.reference = root.At("reference").Text();
+  run.frames = root.At("frames").Integer(0, INT64_MAX);
+  const auto data = root.Find("data");
+  if (!data) FailFile(folder / "run.json", 0, "does not say which data the run saw");
+  run.measurements_sha256 = data->At("measurements").Text();
+  run.truth_sha256 = TextOf(*data, "truth");
+  if (const auto plugins = timing.root().Find("unoptimised")) {
+    for (const Node& plugin : plugins->Items()) run.unoptimised.insert(plugin.Text());
+  }
+  for (const auto& [name, entry] : root.At("estimators").Entries()) {
+    ComparedEntry& one = run.estimators.emplace_back();
+    one.facts = ReadFacts(entry);
+    one.result = ReadResult(name, entry);
+    one.result.wall_s = timing.root().At("estimators").At(name).At("wall_s").Number();
+    one.series.blocks = one.facts.blocks;
+    one.series.joint = false;
+    one.locked_out = entry.At("events").Find("lockout").has_value();
+    one.not_finite = ReadEstimates(folder / name / "estimates.csv", one.facts.rows, one.series);
+    ReadCovariances(folder / name / "covariance.bin", one.series);
+    const fs::path map = folder / name / "landmarks.csv";
+    if (fs::exists(map)) one.result.landmarks = ReadMap(map);
+  }
+  return run;
+}
+
+}  // namespace
+
+ComparedRun ReadRun(const fs::path& folder) {
+  try {
+    return ReadFiles(folder);
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::kBadConfig) throw;
+    throw Error(ExitCode::kBadData, error.what());  // of a json file, which is data here
+  }
+}
+
+}  // namespace alidade::internal

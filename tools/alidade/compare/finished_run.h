@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "alidade/record/estimate_series.h"
+#include "alidade/record/run_json.h"
+#include "alidade/run/run.h"
+
+/// Runs as far as they are compared, from memory or from their folders.
+namespace alidade::internal {
+
+/// One estimator of a run.
+struct ComparedEntry {
+  EstimatorFacts facts;
+  EstimatorResult result;  ///< without events
+  Series series;
+  std::int64_t not_finite = 0;  ///< rows of estimates.csv with a cell that is not finite
+  bool locked_out = false;      ///< a sensor was rejected again and again, `lockout` in its events
+
+  /// Whether its estimates are of use to compare with.
+  bool usable() const { return !result.failed && !series.stamps.empty(); }
+  /// Measurements that it was given, and those of them that it used.
+  std::int64_t measurements() const;
+  std::int64_t used() const;
+};
+
+struct ComparedRun {
+  std::filesystem::path folder;  ///< "": it has none
+  RunStatus status = RunStatus::kOk;
+  std::string reason;
+  std::string reference = "truth";  ///< what its metrics compare with
+  std::string measurements_sha256, truth_sha256;
+  std::int64_t frames = 0;
+  std::vector<ComparedEntry> estimators;
+  std::set<std::string> unoptimised;  ///< RunResult::unoptimised
+};
+
+/// A run folder. Errors: kInputMissing where it is none, kBadData where its files do not fit
+/// together.
+ComparedRun ReadRun(const std::filesystem::path& folder);
+
+/// Refuses runs whose measurements differ, by their hashes; what else differs between them, their
+/// truth or the settings that all their estimators share, is told. Errors: kBadData with both
+/// folders, both hashes and the first stamp that differs.
+std::vector<std::string> CheckSameData(const std::vector<ComparedRun>& runs);
+
+}  // namespace alidade::internal

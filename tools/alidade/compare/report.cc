@@ -1,0 +1,372 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+#include "alidade/base/json.h"
+#include "alidade/base/number_text.h"
+#include "alidade/base/output_folder.h"
+#include "alidade/base/text_table.h"
+#include "alidade/base/words.h"
+#include "alidade/compare/compare.h"
+#include "alidade/compare/section.h"
+#include "alidade/run/metric_rows.h"
+
+namespace alidade {
+
+using internal::RowKind;
+using internal::RowsOf;
+using internal::Section;
+using internal::TableRow;
+
+namespace {
+
+/// A column of a table, in the form that rows are made of.
+struct Column {
+  std::string name;
+  std::map<std::string, Spread> values;
+  std::map<std::string, std::string> units;
+};
+
+/// Rows with the mean, and over several runs [p05, p95]. Each column stands as three, so that its
+/// numbers share their unit and decimals with all others of the row.
+std::vector<TableRow> SpreadRows(const std::vector<Column>& columns, bool several,
+                                 const std::vector<RowKind>& kinds) {
+  RunResult all;
+  for (const Column& column : columns) {
+    for (const auto member : {&Spread::mean, &Spread::p05, &Spread::p95}) {
+      EstimatorResult& one = all.estimators.emplace_back();
+      one.units = column.units;
+      for (const auto& [key, spread] : column.values) one.metrics[key] = spread.*member;
+    }
+  }
+  std::vector<TableRow> rows = RowsOf(all, kinds);
+  for (TableRow& row : rows) {
+    std::vector<std::string> cells;
+    for (std::size_t i = 0; i < row.cells.size(); i += 3) {
+      const std::string* const c = &row.cells[i];
+      const bool spread = several && c[0] != "-";
+      cells.push_back(spread ? c[0] + " [" + c[1] + ", " + c[2] + ']' : c[0]);
+    }
+    row.cells = std::move(cells);
+  }
+  return rows;
+}
+
+std::vector<std::string> Names(const std::vector<Column>& columns) {
+  std::vector<std::string> names;
+  for (const Column& column : columns) names.push_back(column.name);
+  return names;
+}
+
+/// What the columns of a table are held against: in its title, or where they differ in a row.
+void TellReferences(const std::vector<std::string>& references, Section& section) {
+  std::set<std::string> distinct(references.begin(), references.end());
+  distinct.erase("");
+  if (distinct.size() == 1) {
+    section.title += "; ratio and difference: to " + *distinct.begin();
+  } else if (distinct.size() > 1) {
+    section.title += "; ratio and difference: to the reference of each";
+    TableRow row{"reference", {}};
+    for (const std::string& one : references) row.cells.push_back(one.empty() ? "-" : one);
+    section.rows.push_back(row);
+  }
+}
+
+/// A table of `of`, with what they are held against, and over several runs in how many of them.
+Section TableOf(const std::vector<ComparedEstimator>& of, bool several, const std::string& title,
+                std::string ComparedEstimator::*reference,
+                std::int64_t ComparedEstimator::*reference_runs,
+                const std::vector<RowKind>& kinds) {
+  Section section;
+  section.title = title;
+  std::vector<Column> columns;
+  std::vector<std::string> references;
+  TableRow with_reference{"runs with a reference", {}};
+  bool fewer = false;
+  for (const ComparedEstimator& one : of) {
+    columns.push_back({one.name, one.values, one.units});
+    references.push_back(one.*reference);
+    with_reference.cells.push_back(std::to_string(one.*reference_runs));
+    fewer = fewer || (one.*reference_runs > 0 && one.*reference_runs < one.used);
+  }
+  section.columns = Names(columns);
+  TellReferences(references, section);
+  const std::vector<TableRow> rows = SpreadRows(columns, several, kinds);
+  section.rows.insert(section.rows.end(), rows.begin(), rows.end());
+  if (fewer) section.rows.push_back(with_reference);
+  return section;
+}
+
+/// The estimators along the run, of one kind: filters, or those that know later data.
+Section AlongSection(const Comparison& comparison, bool smoothed) {
+  std::vector<ComparedEstimator> of;
+  TableRow diverged{"diverged", {}}, used{"runs used", {}};
+  bool any_diverged = false;
+  for (const ComparedEstimator& one : comparison.estimators) {
+    if (one.smoothed != smoothed) continue;
+    of.push_back(one);
+    diverged.cells.push_back(std::to_string(one.diverged));
+    used.cells.push_back(std::to_string(one.used));
+    any_diverged = any_diverged || one.diverged > 0;
+  }
+  if (of.empty()) return {};
+  Section section = TableOf(of, comparison.runs > 1,
+                            smoothed ? "Smoothed: estimates from later data too"
+                                     : "Online: every estimate from the data up to it",
+                            &ComparedEstimator::reference, &ComparedEstimator::reference_runs,
+                            {{"rmse", "rmse"},
+                             {"ratio.rmse", "  ratio"},
+                             {"path.sim3.rmse", "path, Sim3"},
+                             {"path.sim3.scale", "path, scale"},
+                             {"ratio.path.sim3.rmse", "  ratio, path, Sim3"},
+                             {"apart", "RMSD"},
+                             {"apart.path.sim3", "RMSD, path, Sim3"},
+                             {"apart.sigmas", "RMSD in sigmas"},
+                             {"nees.mean", "NEES"},
+                             {"nees.cov95", "in the 95 % region"},
+                             {"nis.mean", "NIS"},
+                             {"time_us", "wall clock [us/measurement]"}});
+  if (any_diverged) section.rows.push_back(diverged);
+  if (comparison.runs > 1) section.rows.push_back(used);
+  return section;
+}
+
+Section FinalSection(const Comparison& comparison) {
+  return TableOf(comparison.estimators, comparison.runs > 1,
+                 "At the end, where all have the same data", &ComparedEstimator::final_reference,
+                 &ComparedEstimator::final_reference_runs,
+                 {{"final", "error"},
+                  {"ratio.final", "  ratio"},
+                  {"apart.final", "difference"},
+                  {"apart.final.sigmas", "difference in sigmas"},
+                  {"map.rmse", "map"},
+                  {"ratio.map.rmse", "  ratio, map"},
+                  {"map.sim3.rmse", "map, Sim3"},
+                  {"map.sim3.scale", "map, scale"},
+                  {"ratio.map.sim3.rmse", "  ratio, map, Sim3"},
+                  {"apart.map", "RMSD, map"},
+                  {"apart.map.sim3", "RMSD, map, Sim3"}});
+}
+
+/// The values of one kind by their subject, under another kind.
+std::map<std::string, Spread> Under(const std::map<std::string, Spread>& values,
+                                    const std::string& kind, const std::string& as) {
+  std::map<std::string, Spread> found;
+  for (const auto& [key, value] : values) {
+    if (key.starts_with(kind)) found[as + key.substr(kind.size())] = value;
+  }
+  return found;
+}
+
+/// `0.06 (target)`, the largest first; the largest itself goes to `largest`.
+std::string DistancesText(const GapStep& step, double& largest) {
+  std::vector<std::pair<double, std::string>> sigmas;
+  const std::string kind = "apart.sigmas:";
+  for (const auto& [key, value] : step.values) {
+    if (key.starts_with(kind)) sigmas.emplace_back(value.mean, key.substr(kind.size()));
+  }
+  std::ranges::sort(sigmas, std::greater());
+  largest = sigmas.empty() ? 0.0 : sigmas.front().first;
+  std::vector<std::string> parts;
+  for (const auto& [value, owner] : sigmas) {
+    parts.push_back(internal::RoundedText(value, 3) + " (" + owner + ')');
+  }
+  return internal::Join(parts);
+}
+
+/// What a step of the gap means, in words.
+std::string WordsOf(GapKind kind) {
+  switch (kind) {
+    case GapKind::kLinearisation:
+      return "what it costs that each measurement is linearised once, where the filter then was";
+    case GapKind::kSmoothing:
+      return "what later data tell of each estimate: no filter can have it, a smoother can";
+    case GapKind::kLostData:
+      break;
+  }
+  return "what the filter would have gained from what its gate and its other checks kept out";
+}
+
+std::string LinesOf(const GapStep& step) {
+  double largest = 0.0;
+  const std::string distances = DistancesText(step, largest);
+  if (distances.empty()) return "";
+  std::string line =
+      (step.at_end ? "difference " : "RMSD ") + distances + " in sigmas of " + step.to;
+  if (step.kind == GapKind::kSmoothing) return line;
+  constexpr double kNegligible = 0.1, kSmall = 0.5, kLarge = 1.0;
+  return line + (largest < kNegligible ? ": negligible beside what neither of them knows"
+                 : largest < kSmall    ? ": small beside what neither of them knows"
+                 : largest < kLarge    ? ": not small beside what neither of them knows"
+                                    : ": more than the uncertainty that is left: here it matters");
+}
+
+/// `3 of 226 measurements were not used`
+std::string LostText(const GapStep& step) {
+  const auto lost = step.values.find("lost"), all = step.values.find("measurements");
+  if (lost == step.values.end() || all == step.values.end()) return "";
+  return internal::RoundedText(lost->second.mean, 6) + " of " +
+         internal::RoundedText(all->second.mean, 6) + " measurements were not used by the filter";
+}
+
+Section GapSection(const Comparison& comparison, const GapStep& step) {
+  Section section;
+  const std::string pair =
+      step.from.empty() || step.to.empty() ? "" : ", " + step.from + " against " + step.to;
+  section.title = ToString(step.kind) + pair + (step.at_end ? ", at the last frame" : "");
+  section.lines.push_back(WordsOf(step.kind));
+  if (step.at_end) {
+    section.lines.emplace_back("there the batch of all data is that of the data so far");
+  }
+  if (step.kind == GapKind::kLostData) {
+    section.lines.push_back(LostText(step) + (comparison.runs > 1 ? ", mean of the runs" : ""));
+  }
+  const auto lost = step.values.find("lost");
+  if (lost != step.values.end() && lost->second.mean == 0.0) return section;
+  if (!step.withheld.empty()) {
+    section.lines.push_back("not known: " + step.withheld);
+    return section;
+  }
+  std::map<std::string, std::string> units;
+  for (const ComparedEstimator& one : comparison.estimators) {
+    units.insert(one.units.begin(), one.units.end());
+  }
+  if (step.at_end) units["map"] = units["map.sim3"] = "m";
+  const bool several = comparison.runs > 1;
+  std::vector<Column> columns = {
+      {step.from, Under(step.values, "rmse.from:", "rmse:"), units},
+      {step.to, Under(step.values, "rmse.to:", "rmse:"), units},
+      {"ratio", {}, {}},
+      {step.at_end ? "difference" : "RMSD", Under(step.values, "apart:", "rmse:"), units}};
+  if (columns[0].values.empty()) columns.erase(columns.begin(), columns.begin() + 3);
+  section.columns = Names(columns);
+  section.rows = SpreadRows(columns, several, {{"rmse", ""}});
+  for (TableRow& row : section.rows) {
+    row.label.erase(0, row.label.find_first_not_of(' '));
+    const std::string block = row.label.substr(0, row.label.find(' '));
+    if (block == "map.sim3") row.label.replace(0, block.size(), "map, Sim3");
+    const auto ratio = step.values.find("error_ratio:" + block);
+    if (ratio == step.values.end()) continue;
+    const std::vector<TableRow> text = SpreadRows(
+        {{"", {{"ratio.rmse:" + block, ratio->second}}, {}}}, several, {{"ratio.rmse", ""}});
+    if (!text.empty()) row.cells[2] = text[0].cells[0];
+  }
+  if (const std::string line = LinesOf(step); !line.empty()) section.lines.push_back(line);
+  return section;
+}
+
+/// All that estimators are held against at the end.
+std::string References(const Comparison& comparison) {
+  std::vector<std::string> names;
+  for (const ComparedEstimator& one : comparison.estimators) {
+    const std::string& name = one.final_reference;
+    if (!name.empty() && std::ranges::count(names, name) == 0) names.push_back(name);
+  }
+  return names.empty() ? comparison.reference : internal::Join(names);
+}
+
+std::vector<Section> SectionsOf(const Comparison& comparison) {
+  std::vector<Section> sections;
+  Section& head = sections.emplace_back();
+  head.title = comparison.runs > 1 ? std::to_string(comparison.runs) + " runs, mean [5 %, 95 %]"
+                                   : std::to_string(comparison.frames) + " frames";
+  head.title += comparison.reference.empty()      ? ""
+                : comparison.reference == "truth" ? ", errors against truth"
+                                                  : ", differences from " + References(comparison);
+  if (!comparison.measurements_sha256.empty()) {
+    head.lines.push_back("data sha256 " + comparison.measurements_sha256);
+  }
+  head.lines.insert(head.lines.end(), comparison.notes.begin(), comparison.notes.end());
+  if (!comparison.withheld.empty()) head.lines.push_back(comparison.withheld);
+  for (const bool smoothed : {false, true}) {
+    Section section = AlongSection(comparison, smoothed);
+    if (!section.columns.empty()) sections.push_back(std::move(section));
+  }
+  sections.push_back(FinalSection(comparison));
+  if (comparison.gap.empty()) return sections;
+  sections.push_back({"The gap of " + comparison.explained + " explained", {}, {}, {}});
+  for (const GapStep& step : comparison.gap) sections.push_back(GapSection(comparison, step));
+  return sections;
+}
+
+void AppendValues(internal::Json& json, const char* key,
+                  const std::map<std::string, Spread>& values, bool several) {
+  json.Key(key).Object();
+  for (const auto& [name, spread] : values) {
+    json.Key(name);
+    if (!several) {
+      json.Number(spread.mean);
+      continue;
+    }
+    json.Object().Key("mean").Number(spread.mean).Key("p05").Number(spread.p05);
+    json.Key("p50").Number(spread.p50).Key("p95").Number(spread.p95).End();
+  }
+  json.End();
+}
+
+void AppendEstimator(internal::Json& json, const ComparedEstimator& one, bool several) {
+  json.Key(one.name).Object();
+  json.Key("type").Text(one.type).Key("smoothed").Flag(one.smoothed);
+  json.Key("reference").Text(one.reference).Key("final_reference").Text(one.final_reference);
+  json.Key("diverged").Integer(one.diverged).Key("used").Integer(one.used);
+  json.Key("reference_runs").Integer(one.reference_runs);
+  json.Key("final_reference_runs").Integer(one.final_reference_runs);
+  AppendValues(json, "values", one.values, several);
+  json.Key("units").Object();
+  for (const auto& [block, unit] : one.units) json.Key(block).Text(unit);
+  json.End().End();
+}
+
+void AppendGap(internal::Json& json, const Comparison& comparison) {
+  json.Key("gap").Object().Key("filter").Text(comparison.explained).Key("steps").Array();
+  for (const GapStep& step : comparison.gap) {
+    json.Object().Key("kind").Text(ToString(step.kind));
+    json.Key("from").Text(step.from).Key("to").Text(step.to);
+    if (step.at_end) json.Key("at_end").Flag(true);
+    if (!step.withheld.empty()) json.Key("withheld").Text(step.withheld);
+    AppendValues(json, "values", step.values, comparison.runs > 1);
+    json.End();
+  }
+  json.End().End();
+}
+
+}  // namespace
+
+std::string CompareReport(const Comparison& comparison, TableStyle style) {
+  return internal::SectionsText(SectionsOf(comparison), style);
+}
+
+std::string CompareJson(const Comparison& comparison) {
+  internal::Json json;
+  json.Object();
+  json.Key("runs").Integer(comparison.runs).Key("frames").Integer(comparison.frames);
+  json.Key("status").Text(ToString(comparison.status));
+  json.Key("reference").Text(comparison.reference);
+  if (!comparison.withheld.empty()) json.Key("withheld").Text(comparison.withheld);
+  if (!comparison.measurements_sha256.empty()) {
+    json.Key("measurements_sha256").Text(comparison.measurements_sha256);
+  }
+  json.Key("estimators").Object();
+  for (const ComparedEstimator& one : comparison.estimators) {
+    AppendEstimator(json, one, comparison.runs > 1);
+  }
+  json.End();
+  if (!comparison.gap.empty()) AppendGap(json, comparison);
+  json.Key("notes").Array();
+  for (const std::string& note : comparison.notes) json.Text(note);
+  json.End().End();
+  return json.text();
+}
+
+void WriteComparison(const Comparison& comparison, const std::filesystem::path& folder,
+                     bool force) {
+  internal::RunFolder out(folder, force);
+  out.Write("compare.json", CompareJson(comparison));
+  out.Write("compare.md", CompareReport(comparison, TableStyle::kMarkdown));
+  out.Write("compare.tex", CompareReport(comparison, TableStyle::kLatex));
+  out.Commit();
+}
+
+}  // namespace alidade

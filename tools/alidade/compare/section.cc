@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/compare/section.h"
+
+#include "alidade/base/text_table.h"
+
+namespace alidade::internal {
+namespace {
+
+std::string PlainText(const Section& section) {
+  std::string text = section.title + '\n';
+  for (const std::string& line : section.lines) text += "  " + line + '\n';
+  if (section.rows.empty()) return text;
+  return text + (section.lines.empty() ? "" : "\n") +
+         RightAlignedTable(section.columns, section.rows);
+}
+
+std::string Markdown(const Section& section) {
+  std::string text = "**" + section.title + "**\n\n";
+  for (const std::string& line : section.lines) text += "- " + line + '\n';
+  if (section.rows.empty()) return text;
+  if (!section.lines.empty()) text += '\n';
+  return text + MarkdownTable("", section.columns, section.rows);
+}
+
+std::string Latex(const Section& section) {
+  std::string text = "\\paragraph{" + LatexText(section.title) + "}\n";
+  for (const std::string& line : section.lines) text += LatexText(line) + ".\n";
+  if (section.rows.empty()) return text;
+  text += "\n\\begin{tabular}{l" + std::string(section.columns.size(), 'r') + "}\n\\toprule\n";
+  text += LatexRow(CellsOf({"", section.columns})) + "\\midrule\n";
+  for (const TableRow& row : section.rows) text += LatexRow(CellsOf(row));
+  return text + "\\bottomrule\n\\end{tabular}\n";
+}
+
+}  // namespace
+
+std::string SectionsText(const std::vector<Section>& sections, TableStyle style) {
+  std::string text;
+  for (const Section& section : sections) {
+    if (!text.empty()) text += '\n';
+    text += style == TableStyle::kMarkdown ? Markdown(section)
+            : style == TableStyle::kLatex  ? Latex(section)
+                                           : PlainText(section);
+  }
+  return text;
+}
+
+}  // namespace alidade::internal

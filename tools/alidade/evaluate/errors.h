@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "alidade/evaluate/evaluate.h"
+
+namespace alidade::internal {
+
+/// Of each pose; both trajectories have the same ones, in one world.
+PoseErrors AbsoluteErrors(PoseRelation relation, const Trajectory& reference,
+                          const Trajectory& estimate);
+/// Of each pair.
+PoseErrors RelativeErrors(PoseRelation relation, const Trajectory& reference,
+                          const Trajectory& estimate,
+                          const std::vector<std::pair<int, int>>& pairs);
+
+/// How far each pose is after the first: frames, metres of path, rad of turns for both units of
+/// angle, and ns for seconds, as these are exact.
+std::vector<double> Progress(const Trajectory& trajectory, DeltaUnit unit);
+
+/// What makes the figures of an evaluation mean something else than they say. `matches` are the
+/// poses of `reference` and `estimate`, as they were read, that the evaluation is of.
+std::vector<std::string> EvaluationWarnings(const Evaluation& evaluation, const Matches& matches,
+                                            const Trajectory& reference,
+                                            const Trajectory& estimate);
+
+}  // namespace alidade::internal

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/evaluate/evaluate.h"
+
+#include <algorithm>
+
+#include "alidade/base/mahalanobis.h"
+#include "alidade/base/statistics.h"
+#include "alidade/evaluate/errors.h"
+#include "alidade/model/geometry.h"
+
+namespace alidade {
+namespace {
+
+/// The axes whose variance is above 0 in one pose or more: of a planar pose not all three.
+std::vector<int> UncertainAxes(const std::vector<Eigen::Matrix3d>& covariances) {
+  std::vector<int> axes;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto uncertain = [axis](const Eigen::Matrix3d& c) { return c(axis, axis) > 0.0; };
+    if (std::ranges::any_of(covariances, uncertain)) axes.push_back(axis);
+  }
+  return axes;
+}
+
+/// Of the errors of all poses, columns of `errors`, with the covariances beside them.
+Nees NeesOf(const Eigen::Matrix3Xd& errors, const std::vector<Eigen::Matrix3d>& covariances) {
+  const std::vector<int> axes = UncertainAxes(covariances);
+  Nees nees;
+  if (axes.empty()) return nees;
+  nees.dof = static_cast<int>(axes.size());
+  const double limit = ChiSquareQuantile(0.95, nees.dof);
+  double sum = 0.0, inside = 0.0;
+  for (std::size_t i = 0; i < covariances.size(); ++i) {
+    const Eigen::Vector3d error = errors.col(static_cast<Eigen::Index>(i));
+    const double squared = internal::SquaredMahalanobis(covariances[i](axes, axes), error(axes));
+    if (squared < 0.0) continue;
+    ++nees.poses;
+    sum += squared / nees.dof;
+    inside += squared <= limit ? 1.0 : 0.0;
+  }
+  nees.mean = sum / nees.poses;
+  nees.cov95 = inside / nees.poses;
+  return nees;
+}
+
+/// d = q_true (-) q of each pose, in the body, rad.
+Eigen::Matrix3Xd OrientationErrors(const Trajectory& reference, const Trajectory& estimate) {
+  Eigen::Matrix3Xd errors(3, estimate.size());
+  for (int i = 0; i < estimate.size(); ++i) {
+    const auto stored = [i](const Trajectory& t) {
+      const Eigen::Quaterniond& q = t.orientations[static_cast<std::size_t>(i)];
+      return Eigen::Vector4d(q.w(), q.x(), q.y(), q.z());
+    };
+    const Eigen::Vector4d truth = stored(reference), estimated = stored(estimate);
+    UnitQuaternion::Minus(truth.data(), estimated.data(), errors.col(i).data());
+  }
+  return errors;
+}
+
+void AddNees(Evaluation& evaluation) {
+  const Trajectory& estimate = evaluation.estimate;
+  if (!estimate.has_covariances()) return;
+  const auto add = [&](const char* of, const Nees& nees, std::optional<Nees>& to) {
+    if (nees.poses > 0) {
+      to = nees;
+      return;
+    }
+    std::string& withheld = evaluation.nees_withheld;
+    withheld += std::string(withheld.empty() ? "" : "; ") + "every covariance of the " + of +
+                " is singular";
+  };
+  add("position",
+      NeesOf(evaluation.reference.positions - estimate.positions, estimate.position_covariances),
+      evaluation.position_nees);
+  add("orientation",
+      NeesOf(OrientationErrors(evaluation.reference, estimate), estimate.orientation_covariances),
+      evaluation.orientation_nees);
+}
+
+std::optional<double> ScaleOf(const Trajectory& reference, const Trajectory& estimate) {
+  const auto found = internal::FindSimilarity(estimate.positions, reference.positions);
+  return found ? std::optional(found->scale) : std::nullopt;
+}
+
+/// Scale of the second half over that of the first, - 1.
+std::optional<double> ScaleDrift(const Trajectory& reference, const Trajectory& estimate) {
+  constexpr int kFewest = 10;
+  std::vector<int> halves[2];
+  for (int i = 0; i < estimate.size(); ++i) halves[2 * i < estimate.size() ? 0 : 1].push_back(i);
+  if (std::ssize(halves[1]) < kFewest) return std::nullopt;
+  const auto scale = [&](const std::vector<int>& half) {
+    return ScaleOf(reference.Select(half), estimate.Select(half));
+  };
+  const auto first = scale(halves[0]), second = scale(halves[1]);
+  if (!first || !second) return std::nullopt;
+  return *second / *first - 1.0;
+}
+
+}  // namespace
+
+Evaluation Evaluate(const Trajectory& reference, const Trajectory& estimate,
+                    const EvaluateOptions& options) {
+  const Matches matches = Associate(reference, estimate, options.max_diff, options.offset);
+  Evaluation evaluation;
+  evaluation.label = estimate.name;
+  evaluation.options = options;
+  evaluation.possible = matches.possible;
+  evaluation.by_row = matches.by_row;
+  evaluation.reference = reference.Select(matches.reference);
+  evaluation.estimate = estimate.Select(matches.estimate);
+  evaluation.sim3_scale = ScaleOf(evaluation.reference, evaluation.estimate);
+  evaluation.scale_drift = ScaleDrift(evaluation.reference, evaluation.estimate);
+  evaluation.alignment =
+      Align(options.alignment, evaluation.reference, evaluation.estimate, options.align_poses);
+  evaluation.warnings = internal::EvaluationWarnings(evaluation, matches, reference, estimate);
+  if (options.alignment == Alignment::kNone) {
+    AddNees(evaluation);
+  } else {
+    if (estimate.has_covariances()) {
+      evaluation.nees_withheld = std::string("the alignment by ") + ToString(options.alignment) +
+                                 " removes part of the error that the covariance describes; "
+                                 "leave it out";
+    }
+    evaluation.estimate = evaluation.alignment * evaluation.estimate;
+  }
+  for (const PoseRelation relation : options.relations) {
+    evaluation.absolute.push_back(
+        internal::AbsoluteErrors(relation, evaluation.reference, evaluation.estimate));
+  }
+  if (evaluation.estimate.size() < 2) return evaluation;
+  try {
+    evaluation.pairs = PairsOf(evaluation.estimate, options.pairs);
+  } catch (const Error& error) {  // the other figures stand
+    evaluation.warnings.emplace_back(error.what());
+    return evaluation;
+  }
+  for (const PoseRelation relation : options.relations) {
+    evaluation.relative.push_back(internal::RelativeErrors(relation, evaluation.reference,
+                                                           evaluation.estimate, evaluation.pairs));
+  }
+  return evaluation;
+}
+
+}  // namespace alidade

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "alidade/base/number_rows.h"
+#include "alidade/base/statistics.h"
+#include "alidade/evaluate/evaluate.h"
+
+namespace alidade {
+namespace {
+
+/// Sums over the accepted measurements of one sensor.
+struct SensorSums {
+  std::int64_t measurements = 0, inside = 0, products = 0;
+  double nis = 0.0;
+  double product = 0.0, before2 = 0.0, after2 = 0.0;  ///< of elements that follow one another
+  std::map<std::string, std::vector<double>> last;    ///< r / s, by landmark
+};
+
+/// The columns of `NAME/innovations.csv` that are read, by their places.
+struct Columns {
+  std::size_t sensor, landmark, outcome, dof, nis, s0, r0;
+};
+
+std::size_t Find(const NumberRows& rows, std::string_view name) {
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (rows.text(i) == name) return i;
+  }
+  rows.FailLine("no column '" + std::string(name) + '\'', "innovations.csv of a run folder");
+}
+
+void AddProducts(const std::string& landmark, const std::vector<double>& r, SensorSums& sums) {
+  std::vector<double>& last = sums.last[landmark];
+  for (std::size_t k = 0; k < last.size() && k < r.size(); ++k) {
+    sums.product += last[k] * r[k];
+    sums.before2 += last[k] * last[k];
+    sums.after2 += r[k] * r[k];
+    ++sums.products;
+  }
+  last = r;
+}
+
+void AddRow(const NumberRows& rows, const Columns& at, std::map<std::int64_t, double>& limits,
+            SensorSums& sums) {
+  const std::int64_t dof = rows.Index(at.dof, "dof");
+  const double nis = rows.Number(at.nis, "nis");
+  if (dof < 1) rows.FailCell(at.dof, "dof", "is no number of elements", "1 or more");
+  ++sums.measurements;
+  sums.nis += nis / static_cast<double>(dof);
+  const auto [limit, is_new] = limits.try_emplace(dof, 0.0);
+  if (is_new) limit->second = ChiSquareQuantile(0.95, static_cast<int>(dof));
+  sums.inside += nis <= limit->second ? 1 : 0;
+  std::vector<double> r;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(dof); ++k) {
+    if (std::max(at.s0, at.r0) + k >= rows.size())
+      rows.FailLine("too few columns", "as many as dof");
+    r.push_back(rows.Number(at.r0 + k, "r") / rows.Number(at.s0 + k, "s"));
+  }
+  AddProducts(std::string(rows.text(at.landmark)), r, sums);
+}
+
+InnovationStatistics Finish(const std::string& sensor, const SensorSums& sums) {
+  const auto n = static_cast<double>(sums.measurements);
+  InnovationStatistics statistics;
+  statistics.sensor = sensor;
+  statistics.measurements = sums.measurements;
+  statistics.nis_mean = sums.nis / n;
+  statistics.nis_cov95 = static_cast<double>(sums.inside) / n;
+  statistics.autocorrelation = sums.product / std::sqrt(sums.before2 * sums.after2);
+  statistics.white_within = 1.96 / std::sqrt(static_cast<double>(sums.products));
+  return statistics;
+}
+
+}  // namespace
+
+std::vector<InnovationStatistics> ReadInnovations(const std::filesystem::path& file) {
+  NumberRows rows(file, {}, {});
+  if (!rows.Next()) rows.FailLine("no header line", "innovations.csv of a run folder");
+  const std::size_t width = rows.size();
+  const Columns at{Find(rows, "sensor"), Find(rows, "landmark"), Find(rows, "outcome"),
+                   Find(rows, "dof"),    Find(rows, "nis"),      Find(rows, "s0"),
+                   Find(rows, "r0")};
+  std::map<std::string, SensorSums> sensors;
+  std::map<std::int64_t, double> limits;  // chi2(0.95, dof)
+  while (rows.Next()) {
+    rows.ExpectColumns(width, "as in the header");
+    if (rows.text(at.outcome) != "accepted" || rows.text(at.nis).empty()) continue;
+    AddRow(rows, at, limits, sensors[std::string(rows.text(at.sensor))]);
+  }
+  std::vector<InnovationStatistics> statistics;
+  for (const auto& [sensor, sums] : sensors) statistics.push_back(Finish(sensor, sums));
+  return statistics;
+}
+
+}  // namespace alidade

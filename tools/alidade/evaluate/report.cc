@@ -1,0 +1,339 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/evaluate/report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "alidade/base/json.h"
+#include "alidade/base/number_text.h"
+#include "alidade/base/text_table.h"
+#include "alidade/base/words.h"
+#include "alidade/evaluate/statistics_names.h"
+#include "alidade/run/metric_rows.h"
+
+namespace alidade {
+namespace {
+
+using internal::FixedText;
+using internal::Json;
+using internal::kStatistics;
+using internal::NumberText;
+using internal::RoundedText;
+
+constexpr int kDecimals = 6;  // as evo has them
+
+std::string WithUnit(const std::string& text, const std::string& unit) {
+  return unit.empty() ? text : text + " [" + unit + ']';
+}
+
+std::string MatchedText(const Evaluation& evaluation) {
+  return std::to_string(evaluation.estimate.size()) + " of " + std::to_string(evaluation.possible);
+}
+
+std::string ToleranceText(const Evaluation& evaluation) {
+  return evaluation.by_row ? "by row" : NumberText(Seconds(evaluation.options.max_diff));
+}
+
+std::string AlignText(const Evaluation& evaluation) {
+  const EvaluateOptions& options = evaluation.options;
+  std::string text = ToString(options.alignment);
+  if (!internal::LimitsAlignment(options)) return text;
+  return text + " by the first " + std::to_string(options.align_poses) + " poses";
+}
+
+std::string PairsText(const Evaluation& evaluation) {
+  const PairOptions& pairs = evaluation.options.pairs;
+  return std::to_string(evaluation.pairs.size()) + (pairs.all ? " of all" : " consecutive") +
+         " pairs, " + NumberText(pairs.delta) + ' ' + ToString(pairs.unit) + " apart";
+}
+
+std::string TrajectoryText(const Trajectory& trajectory) {
+  return trajectory.name + ": " + ToString(trajectory.format) + ", path " +
+         RoundedText(trajectory.PathLength(0, trajectory.size() - 1)) + " m";
+}
+
+std::string NeesText(const char* name, const Nees& nees, int poses) {
+  return std::string("NEES ") + name + " (" + std::to_string(nees.dof) + " dof) " +
+         RoundedText(nees.mean, 4) + " per dof, " + RoundedText(100.0 * nees.cov95, 3) +
+         " % within 95 %, " + std::to_string(nees.poses) + " of " + std::to_string(poses) +
+         " poses\n";
+}
+
+/// All statistics of one evaluation, a row for each relation.
+std::string StatisticsTable(const Evaluation& evaluation) {
+  std::vector<std::string> names;
+  for (const auto& [name, member] : kStatistics) names.emplace_back(name);
+  std::vector<internal::TableRow> rows;
+  const auto add = [&](const char* what, const std::vector<PoseErrors>& all) {
+    for (const PoseErrors& errors : all) {
+      const std::string label = std::string(what) + ' ' + ToString(errors.relation);
+      internal::TableRow& row =
+          rows.emplace_back(internal::TableRow{WithUnit(label, UnitOf(errors.relation)), {}});
+      for (const auto& [name, member] : kStatistics) {
+        row.cells.push_back(FixedText(errors.statistics.*member, kDecimals));
+      }
+    }
+  };
+  add("ATE", evaluation.absolute);
+  add("RPE", evaluation.relative);
+  return internal::RightAlignedTable(names, rows);
+}
+
+std::string ConsistencyText(const Evaluation& evaluation) {
+  const int poses = evaluation.estimate.size();
+  std::string text;
+  if (evaluation.position_nees) text += NeesText("position", *evaluation.position_nees, poses);
+  if (evaluation.orientation_nees) {
+    text += NeesText("orientation", *evaluation.orientation_nees, poses);
+  }
+  if (!text.empty()) {
+    text +=
+        "NEES is marginal here: of each quantity alone. nees.mean in the run.json of a run is "
+        "joint, over all states of a model.\n";
+  }
+  if (!evaluation.nees_withheld.empty()) {
+    text += "NEES withheld: " + evaluation.nees_withheld + '\n';
+  }
+  for (const InnovationStatistics& one : evaluation.innovations) {
+    text += "NIS " + one.sensor + ' ' + RoundedText(one.nis_mean, 4) + " per dof, " +
+            RoundedText(100.0 * one.nis_cov95, 3) + " % within 95 %, " +
+            std::to_string(one.measurements) + " measurements";
+    if (std::isfinite(one.autocorrelation)) {
+      text += "; autocorrelation " + RoundedText(one.autocorrelation, 3) + ", white within " +
+              RoundedText(one.white_within, 2);
+    }
+    text += '\n';
+  }
+  return text;
+}
+
+std::string DetailText(const Evaluation& evaluation) {
+  std::string text = "reference  " + TrajectoryText(evaluation.reference) + '\n';
+  text += "estimate   " + TrajectoryText(evaluation.estimate) + '\n';
+  text += "matched    " + MatchedText(evaluation) + " possible poses, ";
+  if (evaluation.by_row) {
+    text += "by row\n";
+  } else {
+    text += "within " + ToleranceText(evaluation) + " s";
+    if (evaluation.options.offset != 0) {
+      text += ", " + NumberText(Seconds(evaluation.options.offset)) + " s added to the estimate's";
+    }
+    text += '\n';
+  }
+  text += "aligned    " + AlignText(evaluation) + ", scale " +
+          FixedText(evaluation.alignment.scale, kDecimals) + '\n';
+  if (evaluation.sim3_scale) {
+    text += "scale      " + FixedText(*evaluation.sim3_scale, kDecimals) + " by sim3";
+    if (evaluation.scale_drift) {
+      text += ", drift " + FixedText(100.0 * *evaluation.scale_drift, 2) +
+              " % from the first half to the second";
+    }
+    text += '\n';
+  }
+  if (!evaluation.pairs.empty()) text += "RPE        " + PairsText(evaluation) + '\n';
+  text += '\n' + StatisticsTable(evaluation);
+  const std::string consistency = ConsistencyText(evaluation);
+  return consistency.empty() ? text : text + '\n' + consistency;
+}
+
+/// `NEES position (3 dof)`, with every number of dof there is.
+std::string NeesHeader(const char* name, std::optional<Nees> Evaluation::*nees,
+                       const std::vector<Evaluation>& evaluations) {
+  std::set<int> dofs;
+  for (const Evaluation& one : evaluations) {
+    if (one.*nees) dofs.insert((one.*nees)->dof);
+  }
+  std::vector<std::string> texts;
+  for (const int dof : dofs) texts.push_back(std::to_string(dof));
+  const std::string header = std::string("NEES ") + name;
+  return texts.empty() ? header : header + " (" + internal::Join(texts, " or ") + " dof)";
+}
+
+/// A header, and a row for each evaluation.
+std::vector<internal::TextRow> SummaryRows(const std::vector<Evaluation>& evaluations) {
+  internal::TextRow header = {"estimate", "align", "scale", "matched", "within [s]"};
+  for (const char* what : {"ATE", "RPE"}) {
+    for (const PoseRelation relation : evaluations.front().options.relations) {
+      header.push_back(WithUnit(std::string(what) + ' ' + ToString(relation), UnitOf(relation)));
+    }
+  }
+  const bool nees = std::ranges::any_of(
+      evaluations, [](const Evaluation& one) { return one.position_nees || one.orientation_nees; });
+  if (nees) {
+    header.push_back(NeesHeader("position", &Evaluation::position_nees, evaluations));
+    header.push_back(NeesHeader("orientation", &Evaluation::orientation_nees, evaluations));
+  }
+  std::vector<internal::TextRow> rows = {header};
+  for (const Evaluation& one : evaluations) {
+    if (!one.error.empty()) {
+      rows.push_back({one.label, "failed"});
+      rows.back().resize(header.size(), "-");
+      continue;
+    }
+    internal::TextRow row = {one.label, AlignText(one), FixedText(one.alignment.scale, kDecimals),
+                             MatchedText(one), ToleranceText(one)};
+    for (const auto* all : {&one.absolute, &one.relative}) {
+      for (std::size_t r = 0; r < one.options.relations.size(); ++r) {
+        row.push_back(r < all->size() ? FixedText((*all)[r].statistics.rmse, kDecimals) : "-");
+      }
+    }
+    for (const auto& one_nees : {one.position_nees, one.orientation_nees}) {
+      if (nees) row.push_back(one_nees ? RoundedText(one_nees->mean, 4) : "-");
+    }
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+/// What all rows of a table share.
+std::string SharedText(const std::vector<Evaluation>& evaluations) {
+  const Evaluation& first = evaluations.front();
+  std::string text = "Rmse against " + first.reference.name;
+  if (std::ranges::any_of(evaluations, [](const auto& one) { return !one.pairs.empty(); })) {
+    text += "; RPE of " + std::string(first.options.pairs.all ? "all" : "consecutive") +
+            " pairs, " + NumberText(first.options.pairs.delta) + ' ' +
+            ToString(first.options.pairs.unit) + " apart";
+  }
+  if (first.options.offset != 0) {
+    text += "; " + NumberText(Seconds(first.options.offset)) + " s added to the estimates' stamps";
+  }
+  return text + '.';
+}
+
+/// The summary with a column for each evaluation, as wide as a terminal.
+std::string SummaryText(const std::vector<Evaluation>& evaluations) {
+  const std::vector<internal::TextRow> summary = SummaryRows(evaluations);
+  std::vector<std::string> names;
+  std::vector<internal::TableRow> rows;
+  for (std::size_t c = 1; c < summary.front().size(); ++c) {
+    rows.push_back({summary.front()[c], {}});
+    for (std::size_t e = 1; e < summary.size(); ++e) rows.back().cells.push_back(summary[e][c]);
+  }
+  for (const Evaluation& one : evaluations) names.push_back(one.label);
+  return internal::RightAlignedTable(names, rows) + '\n' + SharedText(evaluations) + '\n';
+}
+
+void AddErrors(Json& json, const char* key, const std::vector<PoseErrors>& all) {
+  json.Key(key).Object();
+  for (const PoseErrors& errors : all) {
+    json.Key(ToString(errors.relation)).Object();
+    json.Key("unit").Text(UnitOf(errors.relation));
+    for (const auto& [name, member] : kStatistics) {
+      json.Key(name).Number(errors.statistics.*member);
+    }
+    json.End();
+  }
+  json.End();
+}
+
+void AddNees(Json& json, const char* key, const std::optional<Nees>& nees) {
+  if (!nees) return;
+  json.Key(key).Object();
+  json.Key("mean").Number(nees->mean);
+  json.Key("cov95").Number(nees->cov95);
+  json.Key("dof").Integer(nees->dof);
+  json.Key("poses").Integer(nees->poses);
+  json.End();
+}
+
+void AddInnovations(Json& json, const std::vector<InnovationStatistics>& innovations) {
+  if (innovations.empty()) return;
+  json.Key("nis").Object();
+  for (const InnovationStatistics& one : innovations) {
+    json.Key(one.sensor).Object();
+    json.Key("mean").Number(one.nis_mean);
+    json.Key("cov95").Number(one.nis_cov95);
+    json.Key("measurements").Integer(one.measurements);
+    json.Key("autocorrelation").Number(one.autocorrelation);
+    json.Key("white_within").Number(one.white_within);
+    json.End();
+  }
+  json.End();
+}
+
+void AddEvaluation(Json& json, const Evaluation& one) {
+  json.Object();
+  json.Key("estimate").Text(one.label);
+  json.Key("file").Text(one.estimate.name);
+  json.Key("reference").Text(one.reference.name);
+  if (!one.error.empty()) {
+    json.Key("error").Text(one.error);
+    json.End();
+    return;
+  }
+  json.Key("align").Text(ToString(one.options.alignment));
+  json.Key("align_poses").Integer(one.options.align_poses);
+  json.Key("scale").Number(one.alignment.scale);
+  json.Key("matched").Integer(one.estimate.size());
+  json.Key("possible").Integer(one.possible);
+  json.Key("by_row").Flag(one.by_row);
+  json.Key("t_max_diff").Number(Seconds(one.options.max_diff));
+  json.Key("t_offset").Number(Seconds(one.options.offset));
+  json.Key("reference_path_m").Number(one.reference.PathLength(0, one.reference.size() - 1));
+  json.Key("estimate_path_m").Number(one.estimate.PathLength(0, one.estimate.size() - 1));
+  if (one.sim3_scale) json.Key("sim3_scale").Number(*one.sim3_scale);
+  if (one.scale_drift) json.Key("scale_drift").Number(*one.scale_drift);
+  AddErrors(json, "ate", one.absolute);
+  AddErrors(json, "rpe", one.relative);
+  json.Key("pairs").Object();
+  json.Key("count").Integer(std::ssize(one.pairs));
+  json.Key("delta").Number(one.options.pairs.delta);
+  json.Key("delta_unit").Text(ToString(one.options.pairs.unit));
+  json.Key("all_pairs").Flag(one.options.pairs.all);
+  json.End();
+  AddNees(json, "nees_position", one.position_nees);
+  AddNees(json, "nees_orientation", one.orientation_nees);
+  if (!one.nees_withheld.empty()) json.Key("nees_withheld").Text(one.nees_withheld);
+  AddInnovations(json, one.innovations);
+  json.Key("warnings").Array();
+  for (const std::string& warning : one.warnings) json.Text(warning);
+  json.End();
+  json.End();
+}
+
+}  // namespace
+
+std::string EvaluationText(const std::vector<Evaluation>& evaluations) {
+  ALIDADE_EXPECTS(!evaluations.empty());
+  const bool details = evaluations.size() == 1 && evaluations.front().error.empty();
+  if (details) return DetailText(evaluations.front());
+  return SummaryText(evaluations);
+}
+
+std::string EvaluationMarkdown(const std::vector<Evaluation>& evaluations) {
+  ALIDADE_EXPECTS(!evaluations.empty());
+  std::string text;
+  for (const internal::TextRow& row : SummaryRows(evaluations)) {
+    const bool header = text.empty();
+    text += internal::MarkdownRow(row);
+    if (!header) continue;
+    text += '|';
+    for (std::size_t c = 0; c < row.size(); ++c) text += c < 2 ? "---|" : "---:|";
+    text += '\n';
+  }
+  return text + '\n' + SharedText(evaluations) + '\n';
+}
+
+std::string EvaluationLatex(const std::vector<Evaluation>& evaluations) {
+  ALIDADE_EXPECTS(!evaluations.empty());
+  const std::vector<internal::TextRow> rows = SummaryRows(evaluations);
+  std::string text = "% " + SharedText(evaluations) + "\n\\begin{tabular}{ll";
+  text.append(rows.front().size() - 2, 'r').append("}\n\\hline\n");
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    text += internal::LatexRow(rows[r]) + (r == 0 ? "\\hline\n" : "");
+  }
+  return text + "\\hline\n\\end{tabular}\n";
+}
+
+std::string EvaluationJson(const std::vector<Evaluation>& evaluations) {
+  Json json;
+  json.Object();
+  json.Key("evaluations").Array();
+  for (const Evaluation& one : evaluations) AddEvaluation(json, one);
+  json.End();
+  json.End();
+  return json.text();
+}
+
+}  // namespace alidade

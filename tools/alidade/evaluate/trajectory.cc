@@ -1,0 +1,363 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/evaluate/trajectory.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+#include "alidade/base/number_rows.h"
+#include "alidade/base/number_text.h"
+
+namespace alidade {
+namespace {
+
+using Format = TrajectoryFormat;
+
+constexpr const char* kTumColumns = "t x y z qx qy qz qw";
+constexpr const char* kForms =
+    "8 columns (TUM), 20 (TUM with covariances), 12 (KITTI), or with commas 8 or 17 (EuRoC)";
+constexpr const char* kCovarianceNames[] = {"Pr11", "Pr12", "Pr13", "Pr22", "Pr23", "Pr33",
+                                            "Pt11", "Pt12", "Pt13", "Pt22", "Pt23", "Pt33"};
+
+/// What a number of columns of a row is called.
+Format Detect(const NumberRows& rows) {
+  const std::size_t columns = rows.size();
+  if (rows.has_commas() && (columns == 8 || columns == 17)) return Format::kEuroc;
+  if (!rows.has_commas() && (columns == 8 || columns == 20)) return Format::kTum;
+  if (!rows.has_commas() && columns == 12) return Format::kKitti;
+  rows.FailLine(std::to_string(columns) + (columns == 1 ? " column" : " columns"), kForms);
+}
+
+/// A unit of time that stamps of TUM may be written in by mistake.
+struct TimeUnit {
+  const char* name;
+  std::size_t digits;  ///< it is 10^digits ns
+
+  double seconds() const { return std::pow(10.0, static_cast<double>(digits) - 9.0); }
+};
+
+/// Of two in the middle the smaller; 0 of none.
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + (std::ssize(values) - 1) / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// The unit of stamps t that are d apart, on their medians: the first of s, ms, us and ns in which
+/// they are of a clock that counts from 1970, or else of one that counts from its own start.
+///
+///   from 1970        1e9 s <= t < 9.2e9 s,  d < 1000 s
+///   from its start           t < 9.2e9 s,   d < 1000 s in s, else d < 2 s
+TimeUnit UnitOf(const std::vector<double>& stamps) {
+  constexpr TimeUnit kUnits[] = {{"s", 9}, {"ms", 6}, {"us", 3}, {"ns", 0}};
+  std::vector<double> sizes, steps;
+  for (std::size_t i = 0; i < stamps.size(); ++i) {
+    sizes.push_back(std::abs(stamps[i]));
+    if (i > 0) steps.push_back(std::abs(stamps[i] - stamps[i - 1]));
+  }
+  const double size = Median(sizes), step = Median(steps);
+  for (const bool since_1970 : {true, false}) {
+    for (const TimeUnit& unit : kUnits) {
+      const double t_s = size * unit.seconds();
+      const double most_step_s = since_1970 || unit.digits == 9 ? 1000.0 : 2.0;
+      if (since_1970 && t_s < 1e9) continue;
+      if (t_s < cell::kTimeLimit && step * unit.seconds() < most_step_s) return unit;
+    }
+  }
+  return kUnits[3];
+}
+
+/// Reads one file, row by row.
+class TrajectoryReader {
+ public:
+  TrajectoryReader(const std::filesystem::path& file, Format format)
+      : rows_(file, {}, {}, NumberRows::kCommaOrBlanks) {
+    trajectory_.format = format;
+  }
+
+  Trajectory Read() {
+    trajectory_.name = rows_.name();
+    while (rows_.Next()) AddRow();
+    if (lines_.empty()) rows_.FailLine("no poses", kForms);
+    trajectory_.first_line = lines_.front();
+    trajectory_.positions.resize(3, std::ssize(positions_));
+    for (std::size_t i = 0; i < positions_.size(); ++i) {
+      trajectory_.positions.col(static_cast<Eigen::Index>(i)) = positions_[i];
+    }
+    if (trajectory_.format == Format::kTum) TakeTumStamps();
+    CheckFirstQuaternion();
+    if (trajectory_.format == Format::kKitti) return std::move(trajectory_);
+    return InOrder();
+  }
+
+ private:
+  void AddRow() {
+    if (lines_.empty()) {
+      if (trajectory_.format == Format::kDetect) trajectory_.format = Detect(rows_);
+      columns_ = ExpectedColumns();
+    }
+    rows_.ExpectColumns(columns_, ColumnNames());
+    switch (trajectory_.format) {
+      case Format::kKitti:
+        AddKitti();
+        break;
+      case Format::kEuroc:
+        trajectory_.stamps.push_back(rows_.Index(0, "t"));
+        AddPose({"x", "y", "z", "qw", "qx", "qy", "qz"});
+        break;
+      default:
+        AddTum();
+    }
+    lines_.push_back(rows_.line());
+  }
+
+  /// Of the format, of those that the first row may have.
+  std::size_t ExpectedColumns() const {
+    const std::size_t columns = rows_.size();
+    if (trajectory_.format == Format::kKitti) return 12;
+    if (trajectory_.format == Format::kEuroc) return columns == 17 ? 17 : 8;
+    return columns == 20 ? 20 : 8;
+  }
+  std::string ColumnNames() const {
+    if (trajectory_.format == Format::kKitti) return "the upper three rows of world_from_body";
+    if (trajectory_.format == Format::kEuroc) return "t,x,y,z,qw,qx,qy,qz and maybe nine more";
+    return columns_ == 20 ? "t x y z qx qy qz qw and two covariances" : kTumColumns;
+  }
+
+  void AddTum() {
+    seconds_.push_back(rows_.Number(0, "t"));
+    stamp_texts_.emplace_back(rows_.text(0));
+    AddPose(NumberRows::kTumPose);
+    if (columns_ != 20) return;
+    double upper[12];
+    for (std::size_t i = 0; i < 12; ++i) upper[i] = rows_.Number(8 + i, kCovarianceNames[i]);
+    trajectory_.orientation_covariances.push_back(Covariance(upper, "orientation"));
+    trajectory_.position_covariances.push_back(Covariance(upper + 6, "position"));
+  }
+
+  /// The symmetric matrix of its upper triangle, row by row. Its numbers may be rounded to six
+  /// digits: only an eigenvalue that is negative beyond that is refused.
+  Eigen::Matrix3d Covariance(const double* upper, const char* of) const {
+    constexpr double kRounding = 1e-5;
+    Eigen::Matrix3d matrix;
+    matrix << upper[0], upper[1], upper[2], upper[1], upper[3], upper[4], upper[2], upper[4],
+        upper[5];
+    const Eigen::Vector3d eigenvalues =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(matrix, Eigen::EigenvaluesOnly)
+            .eigenvalues();
+    if (eigenvalues[0] >= -kRounding * eigenvalues.cwiseAbs().maxCoeff()) return matrix;
+    rows_.FailLine(std::string("the covariance of the ") + of +
+                       " is not positive semi-definite: its smallest eigenvalue is " +
+                       internal::RoundedText(eigenvalues[0]),
+                   "a covariance");
+  }
+
+  /// Of columns 1 to 7.
+  void AddPose(const std::array<const char*, 7>& names) {
+    const std::array<double, 7> v = rows_.PoseNumbers(names);
+    AddPosition({v[0], v[1], v[2]});
+    const bool w_first = trajectory_.format == Format::kEuroc;
+    const Eigen::Quaterniond q = w_first ? Eigen::Quaterniond(v[3], v[4], v[5], v[6])
+                                         : Eigen::Quaterniond(v[6], v[3], v[4], v[5]);
+    trajectory_.orientations.push_back(q.normalized());
+  }
+
+  void AddPosition(const Eigen::Vector3d& position) {
+    constexpr double kFar = 1e15;  // m; there doubles are 0.1 m apart
+    if (!(position.cwiseAbs().maxCoeff() <= kFar))
+      rows_.FailLine("the position is more than 1e15 m away", "metres");
+    positions_.push_back(position);
+  }
+
+  void AddKitti() {
+    constexpr double kDefect = 1e-3;
+    Eigen::Matrix<double, 3, 4, Eigen::RowMajor> pose;
+    for (std::size_t i = 0; i < 12; ++i) {
+      pose.data()[i] = rows_.Number(i, "element");
+    }
+    const Eigen::Matrix3d rotation = pose.leftCols<3>();
+    const double defect =
+        (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+    if (!(defect <= kDefect) || !(rotation.determinant() > 0.0)) {
+      rows_.FailLine("columns 1-3, 5-7, 9-11 are no rotation", "R R' = 1 to 1e-3, det R = 1");
+    }
+    AddPosition(pose.col(3));
+    trajectory_.orientations.push_back(Eigen::Quaterniond(rotation).normalized());
+  }
+
+  void TakeTumStamps() {
+    const TimeUnit unit = UnitOf(seconds_);
+    const char* const expected = "seconds, as TUM has them";
+    if (unit.digits != 9) {
+      Warn(lines_.front(), "t",
+           '\'' + stamp_texts_.front() + "' and what follows cannot be seconds; read as " +
+               unit.name,
+           expected);
+    }
+    for (std::size_t i = 0; i < seconds_.size(); ++i) {
+      if (!(std::abs(seconds_[i]) * unit.seconds() < cell::kTimeLimit)) {
+        throw Error(
+            ExitCode::kBadData,
+            ErrorLine({rows_.name(), lines_[i], 0}, "t",
+                      '\'' + cell::Harmless(stamp_texts_[i]) + "' is beyond 292 years", expected));
+      }
+      trajectory_.stamps.push_back(cell::ParseStamp(stamp_texts_[i], seconds_[i], unit.digits));
+    }
+  }
+
+  /// A path that starts at the origin starts at the identity too, as a rule.
+  void CheckFirstQuaternion() {
+    if (!positions_.front().isZero(0.0) || trajectory_.format == Format::kKitti) return;
+    const Trajectory other = trajectory_.Select({0}).WithOtherQuaternionOrder();
+    if (other.orientations[0].vec() != Eigen::Vector3d::Zero()) return;
+    const bool w_first = trajectory_.format == Format::kEuroc;
+    Warn(lines_.front(), w_first ? "qw" : "qx",
+         std::string("the first pose is the identity if its quaternion is written w ") +
+             (w_first ? "last" : "first"),
+         w_first ? "qw qx qy qz, as EuRoC has it" : "qx qy qz qw, as TUM has it");
+  }
+
+  /// Sorted; poses of one timestamp stay in the order of the file.
+  Trajectory InOrder() {
+    const std::vector<Stamp>& stamps = trajectory_.stamps;
+    std::vector<int> order(stamps.size());
+    std::iota(order.begin(), order.end(), 0);
+    const auto earlier = [&](int a, int b) { return At(stamps, a) < At(stamps, b); };
+    const auto back = std::is_sorted_until(order.begin(), order.end(), earlier);
+    const bool sorted = back == order.end();
+    if (!sorted) {
+      Warn(At(lines_, *back), "t", "goes back: " + internal::SecondsText(At(stamps, *back)),
+           "poses in the order of their stamps; they are sorted");
+      std::stable_sort(order.begin(), order.end(), earlier);
+    }
+    WarnOfDuplicates(order);
+    return sorted ? std::move(trajectory_) : trajectory_.Select(order);
+  }
+
+  /// `order` sorts the timestamps.
+  void WarnOfDuplicates(const std::vector<int>& order) {
+    const std::vector<Stamp>& stamps = trajectory_.stamps;
+    int first = -1, count = 0;
+    for (std::size_t k = 1; k < order.size(); ++k) {
+      if (At(stamps, order[k]) == At(stamps, order[k - 1]) && count++ == 0) first = order[k];
+    }
+    if (count == 0) return;
+    std::string what = "duplicate timestamp " + internal::SecondsText(At(stamps, first));
+    if (count > 1) what += ", the first of " + std::to_string(count) + " such rows";
+    Warn(At(lines_, first), "t", what, "each timestamp once; all poses are kept");
+  }
+
+  template <class T>
+  static const T& At(const std::vector<T>& values, int i) {
+    return values[static_cast<std::size_t>(i)];
+  }
+  void Warn(int line, const char* key, const std::string& what, const std::string& expected) {
+    trajectory_.warnings.push_back(ErrorLine({rows_.name(), line, 0}, key, what, expected));
+  }
+
+  NumberRows rows_;
+  Trajectory trajectory_;
+  std::size_t columns_ = 0;
+  std::vector<int> lines_;
+  std::vector<Eigen::Vector3d> positions_;
+  std::vector<double> seconds_;           ///< of TUM, before their unit is known
+  std::vector<std::string> stamp_texts_;  ///< likewise
+};
+
+/// The name of the file that holds the times of one file of KITTI alone.
+std::filesystem::path OwnTimes(const std::filesystem::path& file) {
+  return file.stem().string() + "_times.txt";
+}
+
+/// The file of stamps beside a file of KITTI; empty where there is none.
+std::filesystem::path TimesBeside(const std::filesystem::path& file) {
+  for (const std::filesystem::path& name : {OwnTimes(file), std::filesystem::path("times.txt")}) {
+    const std::filesystem::path beside = file.parent_path() / name;
+    std::error_code error;
+    if (std::filesystem::is_regular_file(beside, error)) return beside;
+  }
+  return {};
+}
+
+void ReadTimes(const std::filesystem::path& times, Trajectory& trajectory) {
+  NumberRows rows(times, {}, {}, ' ');
+  while (rows.Next()) {
+    rows.ExpectColumns(1, "t");
+    trajectory.stamps.push_back(rows.Time(0, "t"));
+    const std::size_t n = trajectory.stamps.size();
+    if (n > 1 && trajectory.stamps[n - 2] >= trajectory.stamps[n - 1]) {
+      rows.FailCell(0, "t", "is not after the one before", "times that increase");
+    }
+  }
+  if (std::ssize(trajectory.stamps) == trajectory.size()) return;
+  const std::filesystem::path own = OwnTimes(trajectory.name);
+  const bool shared = times.filename() != own;
+  rows.FailLine(std::to_string(trajectory.stamps.size()) + " times for " +
+                    std::to_string(trajectory.size()) + " poses of " + trajectory.name,
+                "one for each pose" + (shared ? ", or " + own.string() + " beside it" : ""));
+}
+
+}  // namespace
+
+const char* ToString(TrajectoryFormat format) {
+  constexpr const char* kNames[] = {"detect", "tum", "kitti", "euroc"};
+  return kNames[static_cast<std::size_t>(format)];
+}
+
+double Trajectory::PathLength(int first, int last) const {
+  double length = 0.0;
+  for (int i = first + 1; i <= last; ++i) {
+    length += (positions.col(i) - positions.col(i - 1)).norm();
+  }
+  return length;
+}
+
+Trajectory Trajectory::Select(const std::vector<int>& indices) const {
+  Trajectory part;
+  part.name = name;
+  part.format = format;
+  part.first_line = first_line;
+  part.warnings = warnings;
+  part.positions.resize(3, std::ssize(indices));
+  for (std::size_t k = 0; k < indices.size(); ++k) {
+    const auto i = static_cast<std::size_t>(indices[k]);
+    part.positions.col(static_cast<Eigen::Index>(k)) = positions.col(indices[k]);
+    part.orientations.push_back(orientations[i]);
+    if (has_stamps()) part.stamps.push_back(stamps[i]);
+    if (!has_covariances()) continue;
+    part.position_covariances.push_back(position_covariances[i]);
+    part.orientation_covariances.push_back(orientation_covariances[i]);
+  }
+  return part;
+}
+
+Trajectory Trajectory::WithOtherQuaternionOrder() const {
+  Trajectory other = *this;
+  for (Eigen::Quaterniond& q : other.orientations) {
+    q = format == TrajectoryFormat::kEuroc ? Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y())
+                                           : Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w());
+  }
+  return other;
+}
+
+Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat format) {
+  Trajectory trajectory = TrajectoryReader(file, format).Read();
+  if (trajectory.format == TrajectoryFormat::kKitti) {
+    const std::filesystem::path times = TimesBeside(file);
+    if (!times.empty()) ReadTimes(times, trajectory);
+  }
+  const std::vector<Stamp>& stamps = trajectory.stamps;
+  if (stamps.empty() || Seconds(stamps.back()) - Seconds(stamps.front()) < cell::kTimeLimit) {
+    return trajectory;
+  }
+  throw Error(ExitCode::kBadData,
+              ErrorLine({trajectory.name}, "t", "its stamps are more than 292 years apart",
+                        "those of one clock"));
+}
+
+}  // namespace alidade

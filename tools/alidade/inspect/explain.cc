@@ -1,0 +1,437 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/inspect/explain.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "alidade/base/number_text.h"
+#include "alidade/base/statistics.h"
+#include "alidade/base/text_table.h"
+#include "alidade/base/words.h"
+#include "alidade/filter/built_in.h"
+#include "alidade/host/calibration.h"
+#include "alidade/inspect/explain_parts.h"
+#include "alidade/system/observability.h"
+#include "alidade/system/observed_landmarks.h"
+#include "alidade/system/truth_match.h"
+
+namespace alidade {
+namespace {
+
+using internal::Join;
+using internal::NumberText;
+using internal::TextRow;
+using internal::TextTable;
+
+constexpr std::size_t kIndent = 4;
+
+const char* StatusText(BlockStatus status) {
+  switch (status) {
+    case BlockStatus::kEstimated:
+      return "estimated";
+    case BlockStatus::kConsidered:
+      return "considered";
+    case BlockStatus::kFixed:
+      break;
+  }
+  return "fixed";
+}
+
+/// A number, or a list; the number alone where all are equal and `same` allows it.
+std::string ListText(const std::vector<double>& values, bool same = false) {
+  const bool equal = std::equal(values.begin() + 1, values.end(), values.begin());
+  if (values.size() == 1 || (same && equal)) return NumberText(values[0]);
+  std::vector<std::string> parts;
+  for (const double value : values) parts.push_back(NumberText(value));
+  return '[' + Join(parts) + ']';
+}
+
+std::string PriorText(const Prior& prior, const Block& block) {
+  const bool measured = !prior.from.empty();
+  std::string text = measured ? "first measurement of " + prior.from : ListText(prior.mean);
+  if (block.status == BlockStatus::kFixed) return text + ", exact";
+  if (measured) return text;
+  std::vector<double> sigmas;
+  for (Eigen::Index i = 0; i < prior.covariance.rows(); ++i) {
+    // Six digits hide the rounding of sigma -> variance -> sigma.
+    char sigma[32];
+    std::snprintf(sigma, sizeof(sigma), "%.6g", std::sqrt(prior.covariance(i, i)));
+    sigmas.push_back(std::strtod(sigma, nullptr));
+  }
+  return text + " +- " + ListText(sigmas, true);
+}
+
+/// A line for each block; what fixed ones are; for each truth that is of no block, why.
+std::string States(const System& system, const std::vector<StreamInfo>& truths) {
+  const std::vector<int> match = internal::MatchTruths(system.layout, truths);
+  std::vector<TextRow> rows = {
+      {"block", "geometry", "size", "unit", "owner", "status", "truth", "starts from"}};
+  for (const Prior& prior : system.priors) {
+    const Block& block = system.layout[prior.block];
+    const Geometry& geometry = block.geometry();
+    std::string size = std::to_string(geometry.ambient);
+    if (geometry.tangent != geometry.ambient) {
+      size.append(" (").append(std::to_string(geometry.tangent)).append(" free)");
+    }
+    const int truth = match[static_cast<std::size_t>(prior.block)];
+    rows.push_back({block.name, ToString(geometry.kind), size, block.space.unit, block.owner,
+                    StatusText(block.status),
+                    truth >= 0       ? truths[static_cast<std::size_t>(truth)].name
+                    : truths.empty() ? ""
+                                     : "-",
+                    PriorText(prior, block)});
+  }
+  std::string text = TextTable(rows, kIndent);
+  const auto is_fixed = [](const Block& block) { return block.status == BlockStatus::kFixed; };
+  if (std::ranges::any_of(system.layout.blocks(), is_fixed)) {
+    text += "    fixed: known exactly, without covariance; nothing moves or corrects it\n";
+  }
+  for (std::size_t t = 0; t < truths.size(); ++t) {
+    const std::string why = internal::WhyNoBlock(system.layout, truths, t);
+    if (!why.empty()) text += "    truth not used: " + truths[t].name + ", " + why + '\n';
+  }
+  return text;
+}
+
+/// The control input of a motion model, as in `speed <- odom, up to 0.2 s old`.
+std::string InputText(const MotionBinding& motion) {
+  if (!motion.model.has_input()) return "none";
+  const InputBinding& input = motion.input;
+  return motion.model.input().name + " <- " + input.stream +
+         (std::isfinite(input.max_age_s) ? ", up to " + NumberText(input.max_age_s) + " s old"
+                                         : "");
+}
+
+std::string Motions(const System& system) {
+  const bool driven = std::ranges::any_of(
+      system.motions, [](const MotionBinding& motion) { return motion.model.has_input(); });
+  std::vector<TextRow> rows = {{"entry", "model", "moves", "noise inputs"}};
+  if (driven) rows[0].emplace_back("control input");
+  for (const MotionBinding& motion : system.motions) {
+    std::vector<std::string> blocks;
+    for (const BlockId id : motion.blocks) {
+      if (system.layout[id].status == BlockStatus::kFixed) continue;
+      blocks.push_back(system.layout[id].name);
+    }
+    const int noise = motion.model.noise_size();
+    const char* const kind = motion.model.discrete_noise() ? " discrete" : " continuous";
+    rows.push_back({motion.name, motion.model.name(), blocks.empty() ? "none" : Join(blocks),
+                    noise == 0 ? "none" : std::to_string(noise) + kind});
+    if (driven) rows.back().push_back(InputText(motion));
+  }
+  return TextTable(rows, kIndent);
+}
+
+const char* ModeText(RoleMode mode) {
+  switch (mode) {
+    case RoleMode::kEstimate:
+      return "estimate";
+    case RoleMode::kConsider:
+      return "consider";
+    case RoleMode::kHold:
+      break;
+  }
+  return "hold";
+}
+
+std::string Sensors(const System& system) {
+  std::vector<TextRow> rows = {
+      {"sensor", "stream", "model", "role", "block", "mode", "linearise_at"}};
+  for (const SensorBinding& sensor : system.sensors) {
+    TextRow front = {sensor.name, sensor.stream, sensor.model.name()};
+    for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
+      const RoleBinding& role = sensor.roles[i];
+      TextRow row = std::exchange(front, TextRow(3));
+      row.push_back(sensor.model.roles()[i].name);
+      if (sensor.model.roles()[i].landmark()) {
+        row.insert(row.end(), {"landmarks", ModeText(RoleMode::kEstimate), "prediction"});
+      } else if (role.block < 0) {
+        row.insert(row.end(), {"(unbound)", "", ""});
+      } else {
+        const bool prediction = role.linearise_at == LineariseAt::kPrediction;
+        row.insert(row.end(), {system.layout[role.block].name, ModeText(role.mode),
+                               prediction ? "prediction" : "measurement"});
+      }
+      rows.push_back(std::move(row));
+    }
+  }
+  return TextTable(rows, kIndent);
+}
+
+/// What a sensor does with the block that fills a role.
+const char* EffectText(const Block& block, RoleMode mode) {
+  if (block.status == BlockStatus::kFixed || mode == RoleMode::kHold) return "holds";
+  const bool considers = block.status == BlockStatus::kConsidered || mode == RoleMode::kConsider;
+  return considers ? "considers" : "corrects";
+}
+
+/// A line for each block, a column for each motion entry and sensor.
+std::string Touches(const System& system) {
+  std::vector<TextRow> rows(1 + system.layout.blocks().size());
+  rows[0].push_back("block");
+  for (std::size_t b = 0; b + 1 < rows.size(); ++b) {
+    rows[b + 1].push_back(system.layout.blocks()[b].name);
+  }
+  const auto add_column = [&](const std::string& name) {
+    for (TextRow& row : rows) row.emplace_back("-");
+    rows[0].back() = name;
+  };
+  for (const MotionBinding& motion : system.motions) {
+    add_column(motion.name);
+    for (const BlockId id : motion.blocks) {
+      const bool fixed = system.layout[id].status == BlockStatus::kFixed;
+      rows[static_cast<std::size_t>(id) + 1].back() = fixed ? "holds" : "moves";
+    }
+  }
+  for (const SensorBinding& sensor : system.sensors) {
+    add_column(sensor.name);
+    for (const RoleBinding& role : sensor.roles) {
+      if (role.block < 0) continue;
+      rows[static_cast<std::size_t>(role.block) + 1].back() =
+          EffectText(system.layout[role.block], role.mode);
+    }
+  }
+  return TextTable(rows, kIndent);
+}
+
+/// "target.depth together with target.depth_rate"
+std::string DirectionText(const std::vector<std::string>& names) {
+  const std::string rest = Join({names.begin() + 1, names.end()});
+  return names[0] + (rest.empty() ? "" : " together with " + rest);
+}
+
+/// A line for each direction that is observable, but not while the control inputs are constant.
+std::string NeedExcitation(const System& system,
+                           const std::vector<std::vector<std::string>>& unobservable) {
+  const auto constant = internal::UnobservableDirections(system, internal::Excitation::kConstant);
+  std::string text;
+  for (const auto& names : std::set(constant.begin(), constant.end())) {
+    if (std::ranges::count(unobservable, names) > 0) continue;
+    text += "  observable only while the control input changes: " + DirectionText(names) + '\n';
+  }
+  return text;
+}
+
+std::string Unobservable(const System& system) {
+  if (system.landmarks && !internal::PlaceLandmarks(system)) {
+    return "  what can be observed depends on the landmarks\n";
+  }
+  if (!internal::ObservabilityIsTold(system)) {
+    return "  what can be observed is not looked into: the state has more than " +
+           std::to_string(internal::kMostObserved) + " elements\n";
+  }
+  const std::vector<std::vector<std::string>> unobservable = UnobservableDirections(system);
+  std::map<std::vector<std::string>, int> directions;
+  for (const auto& names : unobservable) ++directions[names];
+  std::string text;
+  if (directions.empty()) text = "  every direction of the state can be observed\n";
+  for (const auto& [names, count] : directions) {
+    text += "  cannot be observed: " + DirectionText(names);
+    text += " (" + std::to_string(count) + (count == 1 ? " direction)\n" : " directions)\n");
+    if (names[0] == "scale") {
+      text +=
+          "    scale, of path and map alike, is what the prior makes of it: depth, a stereo pair, "
+          "odometry\n    or known landmarks tell it\n";
+    }
+  }
+  return text + NeedExcitation(system, unobservable);
+}
+
+std::string GateText(const EkfOptions& options, const System& system) {
+  if (options.gate >= 1.0) return "none: every measurement is used";
+  std::map<int, std::string> thresholds;
+  for (const SensorBinding& sensor : system.sensors) {
+    const int dof = sensor.model.measurement().geometry.tangent;
+    thresholds[dof] = internal::FixedText(ChiSquareQuantile(options.gate, dof), 2);
+  }
+  std::vector<std::string> parts;
+  for (const auto& [dof, threshold] : thresholds) {
+    parts.push_back(threshold + " at " + std::to_string(dof) + " dof");
+  }
+  return NumberText(options.gate) + ": accepts r' S^-1 r up to " + Join(parts);
+}
+
+std::string FuseText(Fuse fuse, const System& system) {
+  const std::vector<std::string> names = internal::NamesOf(system.sensors);
+  switch (fuse) {
+    case Fuse::kJoint:
+      return "joint: one stacked update for each stamp";
+    case Fuse::kPerSensor:
+      return "per_sensor: one update for each sensor, in the order " + Join(names);
+    case Fuse::kPerMeasurement:
+      break;
+  }
+  return "per_measurement: one update for each measurement, in the order " + Join(names);
+}
+
+std::string LockoutText(const EkfOptions& options, const System& system) {
+  const auto corrects = [&](const RoleBinding& role) {
+    return role.block >= 0 && role.mode == RoleMode::kEstimate &&
+           system.layout[role.block].status == BlockStatus::kEstimated;
+  };
+  std::vector<std::string> without;
+  for (const SensorBinding& sensor : system.sensors) {
+    if (std::ranges::none_of(sensor.roles, corrects)) without.push_back(sensor.name);
+  }
+  std::string after =
+      " after " + std::to_string(options.lockout_after) + " rejections of a sensor in a row";
+  if (!without.empty()) after += "; nothing for " + Join(without);
+  switch (options.lockout) {
+    case Lockout::kReset:
+      return "reset its blocks from the measurement, or inflate them," + after;
+    case Lockout::kInflate:
+      return "inflate its blocks," + after;
+    case Lockout::kNone:
+      break;
+  }
+  return "none";
+}
+
+std::string LossText(const System& system) {
+  std::vector<std::string> losses;
+  for (const SensorBinding& sensor : system.sensors) {
+    if (sensor.loss.kind == LossKind::kNone) continue;
+    losses.push_back(sensor.name + ": " + ToString(sensor.loss.kind) + ' ' +
+                     NumberText(sensor.loss.scale));
+  }
+  return Join(losses);
+}
+
+std::string Options(const Node& entry, const NamedEstimator& named) {
+  const System& system = named.system;
+  std::vector<TextRow> rows;
+  if (const internal::EstimatorType* const type = internal::FindEstimatorType(named.type)) {
+    const auto [options, own] = type->describe(entry);
+    rows = {{"gate", GateText(options, system)}, {"fuse", FuseText(options.fuse, system)}};
+    if (type->support.recovery) rows.push_back({"lockout", LockoutText(options, system)});
+    rows.push_back({"max_dt_s", std::isfinite(options.max_dt_s) ? NumberText(options.max_dt_s)
+                                                                : "none: a gap is one step"});
+    rows.insert(rows.end(), own.begin(), own.end());
+  }
+  if (const auto use = entry.Find("use"); use && use->is_map()) {
+    rows.push_back({"use", "the measurements that " + use->At("accepted_by").Text() + " accepts"});
+  }
+  rows.push_back({"on_divergence", named.on_divergence == OnDivergence::kFail
+                                       ? "fail: the run ends with exit code 79"
+                                       : "report: the run goes on"});
+  if (const std::string losses = LossText(system); !losses.empty()) {
+    rows.push_back({"loss", losses});
+  }
+  if (system.start_s) rows.push_back({"start_s", NumberText(*system.start_s)});
+  return TextTable(rows, kIndent);
+}
+
+std::string SupportText(const std::string& type) {
+  const internal::EstimatorType* known = internal::FindEstimatorType(type);
+  if (known == nullptr) return {};
+  const Support& can = known->support;
+  const auto either = [](bool can_do, const char* with, const char* without) {
+    return std::string(can_do ? with : without);
+  };
+  std::string lacks;
+  const auto lack = [&](bool can_do, const char* what) {
+    if (!can_do) lacks += (lacks.empty() ? "" : ", ") + std::string(what);
+  };
+  lack(can.considered, "considered blocks and roles");
+  lack(can.at_measurement, "linearise_at measurement");
+  lack(can.from_measurement, "blocks that start from a measurement");
+  lack(can.recovery, "recovery from a\n    lock-out");
+  lack(can.landmarks, "landmarks");
+  return either(can.considered,
+                "    blocks estimated, considered (Schmidt) or fixed; roles estimate, consider, "
+                "hold;\n",
+                "    blocks estimated or fixed; roles estimate, hold;\n") +
+         "    control inputs; linearise_at prediction" +
+         either(can.at_measurement, " or measurement", "") +
+         either(can.from_measurement, "; blocks that start from a measurement", "") +
+         either(can.robust_loss, ";\n    robust losses", "") +
+         either(can.landmarks, "; landmarks", "") + '.' +
+         (lacks.empty() ? "" : "\n    Not: " + lacks + '.') + '\n';
+}
+
+/// What is done with late frames, where it is not the default.
+std::string LateFrames(const TimePolicy& time) {
+  if (time.order == TimeOrder::kReject) return "";
+  const char* const done = time.order == TimeOrder::kSort ? "sorted, frames held back"
+                                                          : "the estimators go back for them";
+  return std::string("  late frames: ") + done +
+         (time.window ? ", up to " + internal::RoundedText(Seconds(*time.window), 6) +
+                            " s behind the newest"
+                      : " to the end of the run") +
+         '\n';
+}
+
+/// A row for each parameter that the data tell: its key, value and place.
+void AddCalibration(const Node& map, const std::string& key, std::vector<TextRow>& rows) {
+  for (const auto& [name, value] : map.Entries()) {
+    const std::string path = key.empty() ? name : key + '.' + name;
+    if (value.is_map()) {
+      AddCalibration(value, path, rows);
+      continue;
+    }
+    std::vector<std::string> texts;
+    for (const Node& item : value.ItemsOrOne()) texts.push_back(item.Text());
+    rows.push_back({path, Join(texts), ToString(value.place())});
+  }
+}
+
+std::string CalibrationText(const Config& config, const Source& source) {
+  const Config with = internal::WithCalibration(config, source);
+  const auto calibration = with.root().Find("calibration");
+  if (!calibration) return "";
+  std::vector<TextRow> rows;
+  AddCalibration(*calibration, "", rows);
+  return "  calibration of the data\n" + TextTable(rows, kIndent);
+}
+
+std::string SourceText(const Config& config, const Experiment& experiment) {
+  const Node source = config.root().At("source");
+  std::string text = "source " + source.At("type").Text();
+  text += ", seed " + std::to_string(experiment.seed) + '\n';
+  std::vector<TextRow> rows = {{"stream", "size", "used by"}};
+  for (const StreamInfo& stream : experiment.source->streams()) {
+    std::vector<std::string> users;
+    for (const auto& [name, sensor] : config.root().At("sensors").Entries()) {
+      if (sensor.At("stream").Text() == stream.name) users.push_back(name);
+    }
+    for (const auto& [name, state] : config.root().At("state").Entries()) {
+      const auto input = state.Find("input");
+      if (input && input->At("stream").Text() == stream.name) users.push_back(name + " (input)");
+    }
+    rows.push_back({stream.name, std::to_string(stream.size), users.empty() ? "-" : Join(users)});
+  }
+  const std::vector<std::string> truths = internal::NamesOf(experiment.source->truths());
+  text += TextTable(rows, kIndent);
+  return text + "  truth: " + (truths.empty() ? "not known" : Join(truths)) + '\n' +
+         CalibrationText(config, *experiment.source) + LateFrames(experiment.time);
+}
+
+}  // namespace
+
+std::string Explain(const Config& config, const Experiment& experiment) {
+  std::string text = SourceText(config, experiment);
+  for (const NamedEstimator& named : experiment.estimators) {
+    const System& system = named.system;
+    const Node entry = config.root().At("estimators").At(named.name);
+    text += "\nestimator " + named.name + " (" + named.type + ")\n";
+    text += "  state\n" + States(system, experiment.source->truths());
+    text += "  motion\n" + Motions(system);
+    text += "  sensors\n" + Sensors(system);
+    if (system.landmarks)
+      text += "  landmarks\n" + TextTable(internal::LandmarkRows(system), kIndent);
+    text += "  who touches which block\n" + Touches(system);
+    text += Unobservable(system);
+    text += "  options\n" + Options(entry, named);
+    if (const std::string support = SupportText(named.type); !support.empty()) {
+      text += "  type " + named.type + " supports\n" + support;
+    }
+  }
+  return text;
+}
+
+}  // namespace alidade

@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/inspect/model_under_test.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <numeric>
+#include <utility>
+
+#include "alidade/base/number_text.h"
+
+namespace alidade::internal {
+namespace {
+
+constexpr double kPoison = 1e302;
+constexpr double kGuardWord = -7.0546875e-251;  // no value that a model would compute
+
+bool Same(double a, double b) {
+  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+}
+
+/// Leaves kPoison where the locals of the next call will lie, so that one which is read before it
+/// is written shows.
+[[gnu::noinline]] void PoisonStack() {
+  volatile double cells[4096];
+  for (volatile double& cell : cells) cell = kPoison;
+}
+
+Space Named(const char* name, Geometry geometry) {
+  Space space;
+  space.name = name;
+  space.geometry = geometry;
+  space.elements.resize(static_cast<std::size_t>(geometry.ambient));
+  for (int i = 0; i < geometry.ambient && geometry.ambient > 1; ++i) {
+    space.elements[static_cast<std::size_t>(i)] = std::to_string(i);
+  }
+  return space;
+}
+
+std::vector<int> FirstSlots(int count) {
+  std::vector<int> slots;
+  for (int i = 0; i < count; ++i) slots.push_back(i);
+  return slots;
+}
+
+void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const Space& z,
+               Model& model) {
+  const AlidadeSensor sensor = *c.sensor;
+  const void* const self = c.self;
+  const int count = static_cast<int>(roles.size()), m = z.geometry.tangent;
+  Function predict{"Predict", FirstSlots(count), {z}, {}, count, false, {}};
+  for (const Space& role : roles) predict.matrices.push_back({m, role.geometry.tangent});
+  predict.call = [=](const double* const* in, double* const* out, double* const* jacobians,
+                     const std::int32_t* strides) {
+    const bool any = std::any_of(jacobians, jacobians + count, [](auto* j) { return j; });
+    return sensor.eval(self, in, out[0], any ? jacobians : nullptr, any ? strides : nullptr);
+  };
+  model.functions.push_back(std::move(predict));
+  model.functions.push_back(
+      {"SqrtNoise",
+       FirstSlots(count + 1),
+       {},
+       {{m, m}},
+       0,
+       true,
+       [=](const double* const* in, double* const*, double* const* l, const std::int32_t* strides) {
+         return sensor.sqrt_noise(self, in, in[count], l[0], strides[0]);
+       }});
+  if (sensor.valid != nullptr) {
+    model.functions.push_back({"Valid",
+                               {count},
+                               {},
+                               {},
+                               0,
+                               false,
+                               [=](const double* const* in, double* const*, double* const*,
+                                   const std::int32_t*) { return sensor.valid(self, in[0]); }});
+  }
+}
+
+/// The values of several outputs, which lie apart, in one row: in front what is in them, behind the
+/// words after the last one.
+std::vector<double> Gather(const std::vector<Space>& outputs, const double* const* out) {
+  constexpr int kBehind = 8;
+  std::vector<double> row;
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    const int behind = i + 1 == outputs.size() ? kBehind : 0;
+    row.insert(row.end(), out[i], out[i] + outputs[i].geometry.ambient + behind);
+  }
+  return row;
+}
+
+/// Puts what Gather took back, as a call has left it.
+void Scatter(const std::vector<double>& row, const std::vector<Space>& outputs,
+             double* const* out) {
+  const double* from = row.data();
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    const double* const end = from + outputs[i].geometry.ambient;
+    std::copy(from, i + 1 == outputs.size() ? row.data() + row.size() : end, out[i]);
+    from = end;
+  }
+}
+
+/// y = g(other roles, z, prior), y one role or those of a landmark.
+void AddInitialise(const AlidadeInstance& c, const std::vector<Space>& roles, const Space& z,
+                   Model& model) {
+  const AlidadeSensor sensor = *c.sensor;
+  const void* const self = c.self;
+  const auto count = roles.size();
+  const std::vector<int> y = model.Initialised();
+  const auto is_y = [y](std::size_t i) { return std::ranges::count(y, static_cast<int>(i)) > 0; };
+  const int prior = c.description->prior_count;
+  Function f{"Initialise", {}, {}, {}, 0, false, {}};
+  int n = 0;
+  for (const int i : y) {
+    f.outputs.push_back(roles[static_cast<std::size_t>(i)]);
+    n += f.outputs.back().geometry.tangent;
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    if (is_y(i)) continue;
+    f.slots.push_back(static_cast<int>(i));
+    f.matrices.push_back({n, roles[i].geometry.tangent});
+  }
+  f.slots.push_back(model.measurement_slot());
+  f.matrices.push_back({n, z.geometry.tangent});
+  if (prior > 0) {
+    f.slots.push_back(model.measurement_slot() + 1);
+    f.matrices.push_back({n, prior});
+  }
+  f.differentiated = static_cast<int>(f.slots.size());
+  f.call = [=, outputs = f.outputs](const double* const* in, double* const* out, double* const* j,
+                                    const std::int32_t* strides) {
+    std::vector<const double*> all(count, nullptr);
+    std::vector<double*> jx(count, nullptr);
+    std::vector<std::int32_t> jx_strides(count, 0);
+    std::size_t k = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (is_y(i)) continue;
+      all[i] = in[k];
+      jx[i] = j[k];
+      jx_strides[i] = strides[k++];
+    }
+    const bool has_prior = prior > 0, apart = outputs.size() > 1;
+    std::vector<double> row = apart ? Gather(outputs, out) : std::vector<double>();
+    const std::int32_t code = sensor.initialise(
+        self, all.data(), in[k], has_prior ? in[k + 1] : nullptr, apart ? row.data() : out[0],
+        jx.data(), jx_strides.data(), j[k], strides[k], has_prior ? j[k + 1] : nullptr,
+        has_prior ? strides[k + 1] : 0);
+    if (apart) Scatter(row, outputs, out);
+    return code;
+  };
+  model.functions.push_back(std::move(f));
+}
+
+void AddMotion(const AlidadeInstance& c, const std::vector<Space>& blocks, bool has_input,
+               Model& model) {
+  const AlidadeMotion motion = *c.motion;
+  const void* const self = c.self;
+  const int count = static_cast<int>(blocks.size()), n_w = c.description->noise_count;
+  const int dt = static_cast<int>(model.slots.size()) - 1;
+  int n = 0;
+  for (const Space& block : blocks) n += block.geometry.tangent;
+  model.functions.push_back({"Step",
+                             FirstSlots(dt + 1),
+                             blocks,
+                             {{n, n}, {n, n_w}},
+                             count + 1,
+                             false,
+                             [=](const double* const* in, double* const* out, double* const* j,
+                                 const std::int32_t* strides) {
+                               return motion.step(self, in, has_input ? in[count + 1] : nullptr,
+                                                  in[count], in[dt][0], out, j[0], strides[0], j[1],
+                                                  strides[1]);
+                             }});
+  if (n_w == 0) return;
+  std::vector<int> slots = FirstSlots(count);
+  slots.push_back(dt);
+  model.functions.push_back(
+      {"SqrtQ",
+       std::move(slots),
+       {},
+       {{n_w, n_w}},
+       0,
+       true,
+       [=](const double* const* in, double* const*, double* const* l, const std::int32_t* strides) {
+         return motion.sqrt_q(self, in, in[count][0], l[0], strides[0]);
+       }});
+}
+
+std::string ValueText(const std::vector<double>& value) {
+  if (value.empty()) return "none";
+  std::string text;
+  for (std::size_t i = 0; i < value.size() && i < 16; ++i) {
+    text += (i > 0 ? ", " : "") + RoundedText(value[i], 6);
+  }
+  if (value.size() > 16) text += ", ...";
+  return value.size() == 1 ? text : '(' + text + ')';
+}
+
+}  // namespace
+
+Buffer::Buffer(int rows, int columns)
+    : rows_(rows),
+      columns_(columns),
+      cells_(static_cast<std::size_t>(2 * kGuard + rows * (columns + kGap)), kGuardWord) {
+  for (int r = 0; r < rows; ++r) {
+    for (int c = 0; c < columns; ++c) cells_[Index(r, c)] = kPoison;
+  }
+}
+
+bool Buffer::Untouched() const { return *this == Buffer(rows_, columns_); }
+
+bool Buffer::GuardsWhole() const {
+  const Buffer fresh(rows_, columns_);
+  for (std::size_t i = 0; i < cells_.size(); ++i) {
+    if (Same(fresh.cells_[i], kGuardWord) && !Same(cells_[i], kGuardWord)) return false;
+  }
+  return true;
+}
+
+bool operator==(const Buffer& a, const Buffer& b) {
+  return a.rows_ == b.rows_ && a.columns_ == b.columns_ &&
+         std::equal(a.cells_.begin(), a.cells_.end(), b.cells_.begin(), Same);
+}
+
+bool Unwritten(double cell) { return Same(cell, kPoison); }
+
+Model::Model(std::shared_ptr<const ModelInstance> from) : instance(std::move(from)) {
+  const AlidadeInstance& c = instance->c();
+  slots = instance->spaces();
+  if (is_sensor()) {
+    slots.push_back(instance->space());
+    const int prior = c.description->prior_count;
+    if (prior > 0) slots.push_back(Named("prior", Geometry::Vector(prior)));
+    AddSensor(c, instance->spaces(), instance->space(), *this);
+    if ((instance->capabilities() & ALIDADE_CAN_INITIALISE) != 0) {
+      AddInitialise(c, instance->spaces(), instance->space(), *this);
+    }
+    return;
+  }
+  const bool has_input = c.description->input != nullptr;
+  slots.push_back(Named("w", Geometry::Vector(c.description->noise_count)));
+  if (has_input) slots.push_back(instance->space());
+  slots.push_back(Named("dt", Geometry::Vector(1)));
+  AddMotion(c, instance->spaces(), has_input, *this);
+}
+
+std::vector<int> Model::Initialised() const {
+  const SensorModel sensor(instance);
+  std::vector<int> roles(static_cast<std::size_t>(sensor.initialised_count()));
+  std::iota(roles.begin(), roles.end(), sensor.initialised_role());
+  return roles;
+}
+
+const Function* Model::Find(const std::string& name) const {
+  const auto found = std::find_if(functions.begin(), functions.end(),
+                                  [&](const Function& f) { return f.name == name; });
+  return found == functions.end() ? nullptr : &*found;
+}
+
+Answer CallFunction(const Function& function, const Values& inputs, int matrices) {
+  Answer answer;
+  std::vector<const double*> in;
+  std::vector<double*> out, wanted;
+  std::vector<std::int32_t> strides;
+  for (const auto& input : inputs) in.push_back(input.empty() ? nullptr : input.data());
+  for (const Space& space : function.outputs)
+    answer.outputs.emplace_back(1, space.geometry.ambient);
+  for (const Shape& shape : function.matrices) {
+    answer.matrices.emplace_back(shape.rows, shape.columns);
+  }
+  for (Buffer& buffer : answer.outputs) out.push_back(buffer.data());
+  for (std::size_t i = 0; i < function.matrices.size(); ++i) {
+    Buffer& buffer = answer.matrices[i];
+    // The Jacobian by a role that is not bound does not exist.
+    const bool exists =
+        buffer.columns() > 0 && (!function.jacobian_per_input() || in[i] != nullptr);
+    const bool asked = matrices == kAllMatrices || matrices == static_cast<int>(i);
+    wanted.push_back(exists && (asked || function.is_noise) ? buffer.data() : nullptr);
+    strides.push_back(buffer.stride());
+  }
+  PoisonStack();
+  answer.code = function.call(in.data(), out.data(), wanted.data(), strides.data());
+  return answer;
+}
+
+std::string StateText(const std::vector<Space>& spaces, const Values& values) {
+  std::string text;
+  for (std::size_t i = 0; i < spaces.size(); ++i) {
+    if (spaces[i].geometry.ambient == 0) continue;
+    text += (text.empty() ? "" : ", ") + spaces[i].name + " = " + ValueText(values[i]);
+  }
+  return text;
+}
+
+}  // namespace alidade::internal

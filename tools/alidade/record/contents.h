@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "alidade/host/source.h"
+
+/// What the csv files of a run folder hold, for those who draw them. Columns go by their names.
+namespace alidade::internal {
+
+/// One element of a block in `NAME/estimates.csv`. Value and truth are ambient elements, sigma is a
+/// tangent one: beside a value only where both are the same, in vectors and angles.
+struct RecordedElement {
+  std::string name;  ///< the column of its value too
+  std::string unit;
+  bool has_sigma = false;  ///< in column `sigma:NAME`
+  std::string truth;       ///< column in truth.csv, or ""
+  bool has_value = false;  ///< at some stamp
+  bool has_truth = false;
+  bool is_random = false;  ///< its variance was above zero at some stamp
+};
+
+struct RecordedGain {
+  std::string name;      ///< the column in `NAME/gains.csv`: `target.depth<-disparity`
+  std::size_t cell = 0;  ///< of a row, behind time and sensor
+  bool used = false;
+};
+
+struct RecordedSensor {
+  std::string name;
+  std::string stream;
+  std::string unit;
+  int tangent = 1;
+  bool has_landmark = false;  ///< many measurements at a time, each of another landmark
+  std::vector<RecordedGain> gains;
+  bool has_innovations = false;
+  bool has_reprojection = false;  ///< rows in `NAME/reprojection.csv`
+};
+
+/// Landmarks of `NAME/landmarks.csv` that have a place, and those whose true one is known too.
+struct RecordedMap {
+  std::int64_t placed = 0, known = 0;
+  /// The two axes along which path and landmarks reach farthest: horizontal, vertical.
+  int across = 0, along = 2;
+};
+
+struct RecordedEstimator {
+  std::string name;
+  std::vector<RecordedElement> elements;
+  std::vector<RecordedSensor> sensors;
+  int width = 0;  ///< of the widest measurement: columns z0 .. z<width - 1>, then h, s and r
+  int path = -1;  ///< the first of the three elements that landmarks are seen from; -1: none
+  Eigen::AlignedBox3d path_box = {};
+  std::int64_t estimate_rows = 0, innovation_rows = 0, gain_rows = 0;
+  std::int64_t reprojection_rows = 0;
+  RecordedMap map;
+};
+
+struct RecordedStream {
+  std::string name;
+  int size = 1;
+  std::int64_t rows = 0;
+  std::int64_t expected_rows = 0;  ///< in expected.csv
+};
+
+/// A block whose value each measurement of a sensor implies, in `implied.csv`: by itself, or with
+/// the sensor's other roles at truth.
+struct RecordedImplied {
+  std::string sensor;
+  std::string block;  ///< the column too
+  std::string unit;
+  bool rest_at_truth = false;
+  std::size_t cell = 0;  ///< of a row, behind time and sensor
+  std::int64_t rows = 0;
+};
+
+struct RecordedRun {
+  std::vector<RecordedEstimator> estimators;
+  std::vector<RecordedStream> streams;
+  std::vector<RecordedImplied> implied;
+  Stamp first = 0, last = 0;
+  std::int64_t truth_rows = 0, measurement_rows = 0, implied_rows = 0, expected_rows = 0;
+};
+
+}  // namespace alidade::internal

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/record/estimate_series.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/filter/estimator.h"
+
+namespace alidade::internal {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+}  // namespace
+
+std::vector<SeriesBlock> SeriesBlocksOf(const System& system) {
+  std::vector<SeriesBlock> blocks;
+  for (BlockId id = 0; id < static_cast<int>(system.layout.blocks().size()); ++id) {
+    const Block& block = system.layout[id];
+    blocks.push_back(
+        {block.name, UnitOf(system, id), block.geometry(), block.status == BlockStatus::kFixed});
+  }
+  return blocks;
+}
+
+void AppendCovariance(const State& state, std::size_t blocks, std::vector<double>& cells) {
+  std::vector<int> places;  // of each tangent element; -1: it has no covariance
+  for (std::size_t b = 0; b < blocks; ++b) {
+    const Block& block = state.layout()[static_cast<BlockId>(b)];
+    for (int i = 0; i < block.geometry().tangent; ++i) {
+      places.push_back(block.has_covariance() ? block.tangent_offset + i : -1);
+    }
+  }
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      const bool known = places[i] >= 0 && places[j] >= 0;
+      cells.push_back(known ? state.covariance().Block(places[i], 1, places[j], 1)(0, 0) : kNan);
+    }
+  }
+}
+
+int Series::ambient() const {
+  int sum = 0;
+  for (const SeriesBlock& block : blocks) sum += block.geometry.ambient;
+  return sum;
+}
+
+int Series::tangent() const {
+  int sum = 0;
+  for (const SeriesBlock& block : blocks) sum += block.geometry.tangent;
+  return sum;
+}
+
+std::size_t Series::cells() const {
+  const auto n = static_cast<std::size_t>(tangent());
+  return joint ? n * (n + 1) / 2 : n;
+}
+
+Eigen::MatrixXd Series::Covariance(std::size_t row, int first, int size) const {
+  Eigen::MatrixXd p = Eigen::MatrixXd::Zero(size, size);
+  const double* const at = covariances.data() + row * cells();
+  for (int i = 0; i < size; ++i) {
+    const int a = first + i;
+    if (!joint) p(i, i) = at[a];
+    for (int j = 0; joint && j <= i; ++j) p(i, j) = p(j, i) = at[a * (a + 1) / 2 + first + j];
+  }
+  return p;
+}
+
+void Series::Append(Stamp stamp, const State& state) {
+  stamps.push_back(stamp);
+  for (BlockId id = 0; id < static_cast<int>(blocks.size()); ++id) {
+    const Block& block = state.layout()[id];
+    const auto size = static_cast<std::size_t>(block.geometry().ambient);
+    if (block.present) {
+      values.insert(values.end(), state.value(id), state.value(id) + size);
+    } else {
+      values.insert(values.end(), size, kNan);
+    }
+    for (int i = 0; !joint && i < block.geometry().tangent; ++i) {
+      const bool known = block.has_covariance();
+      covariances.push_back(known ? state.covariance().Variance(block.tangent_offset + i) : kNan);
+    }
+  }
+  if (joint) AppendCovariance(state, blocks.size(), covariances);
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,328 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/record/estimator_files.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <map>
+
+#include "alidade/base/statistics.h"
+#include "alidade/record/estimate_series.h"
+#include "alidade/run/frame_innovation.h"
+#include "alidade/state/element_names.h"
+#include "alidade/system/truth_match.h"
+
+namespace alidade::internal {
+
+RecordedEstimator EstimatorFiles::Describe(const NamedEstimator& named) {
+  RecordedEstimator recorded;
+  recorded.name = named.name;
+  for (const SensorBinding& binding : named.system.sensors) {
+    const Space& space = binding.model.measurement();
+    RecordedSensor& sensor = recorded.sensors.emplace_back();
+    sensor.name = binding.name;
+    sensor.stream = binding.stream;
+    sensor.unit = space.unit;
+    sensor.tangent = space.geometry.tangent;
+    sensor.has_landmark = binding.model.has_landmark();
+    recorded.width = std::max(recorded.width, space.geometry.ambient);
+  }
+  return recorded;
+}
+
+EstimatorFiles::EstimatorFiles(const RunFolder& folder, const NamedEstimator& named,
+                               const std::vector<StreamInfo>& truths,
+                               const std::vector<std::vector<std::string>>& truth_columns,
+                               bool covariances)
+    : recorded_(Describe(named)),
+      estimates_(
+          folder, named.name + "/estimates.csv",
+          EstimatesHeader(named.system, MatchTruths(named.system.layout, truths), truth_columns)),
+      innovations_(folder, named.name + "/innovations.csv", InnovationsHeader()),
+      gains_(folder, named.name + "/gains.csv", GainsHeader(named.system)) {
+  FindPath(named.system);
+  OpenTrajectory(folder, named.system);
+  if (covariances) covariances_ = folder.Create(named.name + "/covariance.bin");
+  if (std::ranges::any_of(named.system.sensors, HasReprojection)) {
+    reprojection_.emplace(folder, named.name + "/reprojection.csv",
+                          std::vector<std::string>{"t_s", "sensor", "landmarks", "rms"});
+  }
+}
+
+void EstimatorFiles::OpenTrajectory(const RunFolder& folder, const System& system) {
+  std::vector<StreamInfo> blocks;
+  for (const Block& block : system.layout.blocks()) {
+    blocks.push_back({block.name, block.geometry().ambient});
+  }
+  pose_ = FindPose(blocks);
+  if (!pose_) return;
+  trajectory_.emplace(folder, recorded_.name + "/trajectory.tum", *pose_);
+  const auto fixed = [&](std::size_t id) {
+    return system.layout.blocks()[id].status == BlockStatus::kFixed;
+  };
+  if (fixed(pose_->position) || fixed(pose_->orientation)) return;
+  trajectory_covariance_.emplace(folder, recorded_.name + "/trajectory_covariance.tum", *pose_,
+                                 true);
+}
+
+void EstimatorFiles::FindPath(const System& system) {
+  for (std::size_t s = 0; s < system.sensors.size(); ++s) {
+    recorded_.sensors[s].has_reprojection = HasReprojection(system.sensors[s]);
+  }
+  const BlockId path = PathBlockOf(system);
+  for (const BlockColumns& columns : blocks_) {
+    if (columns.id == path) recorded_.path = static_cast<int>(columns.element);
+  }
+}
+
+std::vector<std::string> EstimatorFiles::EstimatesHeader(
+    const System& system, const std::vector<int>& truth_of,
+    const std::vector<std::vector<std::string>>& truth_columns) {
+  std::vector<std::string> header = {"t_s"};
+  for (BlockId id = 0; id < static_cast<int>(system.layout.blocks().size()); ++id) {
+    const Block& block = system.layout[id];
+    const std::vector<std::string> names = AmbientNames(block.name, block.space);
+    const std::vector<std::string> tangents = TangentNames(block.name, block.space);
+    const int truth = truth_of[static_cast<std::size_t>(id)];
+    blocks_.push_back({id, names.size(), tangents.size(), recorded_.elements.size(), truth});
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      recorded_.elements.push_back({names[i], UnitOf(system, id), names == tangents,
+                                    truth >= 0 ? truth_columns[truth][i] : ""});
+    }
+    header.insert(header.end(), names.begin(), names.end());
+    for (const std::string& name : tangents) header.push_back("sigma:" + name);
+  }
+  return header;
+}
+
+std::vector<std::string> EstimatorFiles::InnovationsHeader() const {
+  std::vector<std::string> header = {"t_s",     "stream", "sensor", "landmark",
+                                     "outcome", "dof",    "nis"};
+  for (const char* what : {"z", "h", "s", "r"}) {
+    for (int i = 0; i < recorded_.width; ++i) header.push_back(what + std::to_string(i));
+  }
+  return header;
+}
+
+std::vector<std::string> EstimatorFiles::GainsHeader(const System& system) {
+  std::vector<std::string> header = {"t_s", "sensor"};
+  std::map<std::string, std::size_t> known;  // sensors that measure alike share columns
+  for (std::size_t s = 0; s < system.sensors.size(); ++s) {
+    const Space& space = system.sensors[s].model.measurement();
+    if (system.sensors[s].model.has_landmark()) continue;
+    for (const BlockColumns& columns : blocks_) {
+      const Block& block = system.layout[columns.id];
+      if (block.status == BlockStatus::kFixed) continue;
+      for (const std::string& element : TangentNames(block.name, block.space)) {
+        for (const std::string& measured : TangentNames(space.name, space)) {
+          const std::string name = element + "<-" + measured;
+          const auto [cell, is_new] = known.try_emplace(name, known.size());
+          if (is_new) header.push_back(name);
+          recorded_.sensors[s].gains.push_back({name, cell->second});
+        }
+      }
+    }
+  }
+  gain_columns_ = header.size() - 2;
+  return header;
+}
+
+void EstimatorFiles::Add(const Frame& frame, const State& state, const UpdateReport& report) {
+  if (!report.stale) {
+    AddEstimate(frame, state);
+    if (pose_) AddPose(frame.stamp, state);
+  }
+  for (const MeasurementReport& one : report.measurements()) {
+    if (one.sensor < 0 || one.sensor >= static_cast<int>(recorded_.sensors.size())) continue;
+    AddInnovation(frame.stamp, one);
+    if (!one.gain.empty()) AddGain(frame.stamp, state, one);
+  }
+  for (std::size_t s = 0; s < recorded_.sensors.size(); ++s) {
+    if (!recorded_.sensors[s].has_reprojection) continue;
+    const FrameInnovation innovation = FrameInnovationOf(report, static_cast<int>(s));
+    if (innovation.measurements == 0) continue;
+    reprojection_->Time(frame.stamp).Text(recorded_.sensors[s].name);
+    reprojection_->Integer(innovation.measurements).Number(innovation.rms).EndRow();
+  }
+}
+
+void EstimatorFiles::AddEstimate(const Frame& frame, const State& state) {
+  estimates_.Time(frame.stamp);
+  for (const BlockColumns& columns : blocks_) {
+    const Block& block = state.layout()[columns.id];
+    if (!block.present) {
+      estimates_.Empty(columns.ambient + columns.tangent);
+      continue;
+    }
+    estimates_.Numbers(state.value(columns.id), columns.ambient, columns.ambient);
+    const auto truth = static_cast<std::size_t>(columns.truth);
+    const bool known = truth < frame.truth.size() && !frame.truth[truth].empty();
+    if (static_cast<int>(columns.element) == recorded_.path) {
+      recorded_.path_box.extend(Eigen::Map<const Eigen::Vector3d>(state.value(columns.id)));
+    }
+    for (std::size_t i = 0; i < columns.ambient; ++i) {
+      RecordedElement& element = recorded_.elements[columns.element + i];
+      element.has_value = true;
+      element.has_truth = element.has_truth || known;
+    }
+    if (!block.has_covariance()) {
+      estimates_.Empty(columns.tangent);
+      continue;
+    }
+    for (std::size_t i = 0; i < columns.tangent; ++i) {
+      const double variance =
+          state.covariance().Variance(block.tangent_offset + static_cast<int>(i));
+      estimates_.Number(std::sqrt(variance));
+      RecordedElement& element = recorded_.elements[columns.element + i];
+      if (element.has_sigma && variance > 0.0) element.is_random = true;
+    }
+  }
+  estimates_.EndRow();
+  if (!covariances_) return;
+  static_assert(std::endian::native == std::endian::little);
+  std::vector<double> cells;
+  AppendCovariance(state, blocks_.size(), cells);
+  covariances_->Write({reinterpret_cast<const char*>(cells.data()), 8 * cells.size()});
+}
+
+void EstimatorFiles::AddPose(Stamp stamp, const State& state) {
+  const auto position = static_cast<BlockId>(pose_->position);
+  const auto orientation = static_cast<BlockId>(pose_->orientation);
+  const Block& at = state.layout()[position];
+  const Block& turned = state.layout()[orientation];
+  if (!at.present || !turned.present) return;
+  trajectory_->Add(stamp, state.value(position), state.value(orientation));
+  if (!trajectory_covariance_ || !at.has_covariance() || !turned.has_covariance()) return;
+  const auto covariance = [&](const Block& block) {
+    const int size = block.geometry().tangent;
+    return state.covariance().Block(block.tangent_offset, size, block.tangent_offset, size);
+  };
+  trajectory_covariance_->Add(stamp, state.value(position), state.value(orientation),
+                              covariance(at), covariance(turned));
+}
+
+void EstimatorFiles::AddInnovation(Stamp stamp, const MeasurementReport& report) {
+  RecordedSensor& sensor = recorded_.sensors[static_cast<std::size_t>(report.sensor)];
+  const auto width = static_cast<std::size_t>(recorded_.width);
+  innovations_.Time(stamp).Text(sensor.stream).Text(sensor.name).Landmark(report.landmark);
+  innovations_.Text(ToString(report.outcome)).Integer(report.dof);
+  const bool reached = !report.s.empty();
+  if (reached) {
+    innovations_.Number(report.nis);
+  } else {
+    innovations_.Empty();
+  }
+  std::vector<double> sigma;
+  const auto m = static_cast<std::size_t>(report.dof);
+  for (std::size_t i = 0; i < m && reached; ++i) sigma.push_back(std::sqrt(report.s[i * m + i]));
+  innovations_.Numbers(report.z.data(), report.z.size(), width)
+      .Numbers(report.h.data(), report.h.size(), width)
+      .Numbers(sigma.data(), sigma.size(), width)
+      .Numbers(report.innovation.data(), report.innovation.size(), width)
+      .EndRow();
+  sensor.has_innovations = sensor.has_innovations || (reached && !report.innovation.empty());
+}
+
+void EstimatorFiles::AddGain(Stamp stamp, const State& state, const MeasurementReport& report) {
+  RecordedSensor& sensor = recorded_.sensors[static_cast<std::size_t>(report.sensor)];
+  std::vector<const double*> cells(gain_columns_, nullptr);
+  const std::size_t rows = report.gain.size() / static_cast<std::size_t>(sensor.tangent);
+  std::size_t next = 0;  // of sensor.gains, which lists blocks, elements, measured elements
+  std::size_t row = 0;   // of K
+  for (const BlockColumns& columns : blocks_) {
+    if (state.layout()[columns.id].status == BlockStatus::kFixed) continue;
+    const bool present = state.layout()[columns.id].present;
+    for (std::size_t i = 0; i < columns.tangent; ++i) {
+      for (int j = 0; j < sensor.tangent && next < sensor.gains.size(); ++j, ++next) {
+        if (!present) continue;
+        const double& k = report.gain[row + rows * static_cast<std::size_t>(j)];
+        RecordedGain& gain = sensor.gains[next];
+        cells[gain.cell] = &k;
+        gain.used = gain.used || k != 0.0;
+      }
+      row += present ? 1 : 0;
+    }
+  }
+  gains_.Time(stamp).Text(sensor.name);
+  for (const double* cell : cells) {
+    if (cell != nullptr) {
+      gains_.Number(*cell);
+    } else {
+      gains_.Empty();
+    }
+  }
+  gains_.EndRow();
+}
+
+RecordedMap DescribeMap(const std::vector<LandmarkEstimate>& landmarks,
+                        const Eigen::AlignedBox3d& path) {
+  RecordedMap map;
+  std::array<std::vector<double>, 3> places;
+  for (const LandmarkEstimate& one : landmarks) {
+    if (!one.position.allFinite()) continue;
+    ++map.placed;
+    map.known += one.true_position.allFinite() ? 1 : 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      places[axis].push_back(one.position[static_cast<Eigen::Index>(axis)]);
+    }
+  }
+  if (map.placed == 0) return map;
+  Eigen::Vector3d low, high;  // of 8 in 10: a few lie far off
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::ranges::sort(places[axis]);
+    low[static_cast<Eigen::Index>(axis)] = Quantile(places[axis], 0.1);
+    high[static_cast<Eigen::Index>(axis)] = Quantile(places[axis], 0.9);
+  }
+  Eigen::AlignedBox3d box = path;
+  box.extend(low).extend(high);
+  Eigen::Index thin = 0;
+  box.sizes().minCoeff(&thin);
+  map.across = thin == 0 ? 1 : 0;
+  map.along = thin == 2 ? 1 : 2;
+  return map;
+}
+
+void WriteLandmarks(const RunFolder& folder, const std::string& estimator,
+                    const std::vector<LandmarkEstimate>& landmarks) {
+  CsvFile file(folder, estimator + "/landmarks.csv",
+               {"id", "generation", "form", "x", "y", "z", "sigma_x", "sigma_y", "sigma_z",
+                "inverse_distance", "sigma_inverse_distance", "first_s", "last_s", "tried",
+                "accepted", "true_x", "true_y", "true_z"});
+  const auto number = [&file](double value) {
+    if (std::isfinite(value)) {
+      file.Number(value);
+    } else {
+      file.Empty();
+    }
+  };
+  for (const LandmarkEstimate& one : landmarks) {
+    file.Integer(one.id).Integer(one.generation).Text(one.form ? ToString(*one.form) : "");
+    for (const double x : one.position) number(x);
+    for (int i = 0; i < 3; ++i) number(std::sqrt(one.covariance(i, i)));
+    number(one.inverse_distance);
+    number(one.sigma);
+    file.Time(one.first).Time(one.last).Integer(one.tried).Integer(one.accepted);
+    for (const double x : one.true_position) number(x);
+    file.EndRow();
+  }
+  file.Close();
+}
+
+void EstimatorFiles::Close() {
+  estimates_.Close();
+  innovations_.Close();
+  gains_.Close();
+  if (trajectory_) trajectory_->Close();
+  if (trajectory_covariance_) trajectory_covariance_->Close();
+  if (covariances_) covariances_->Close();
+  if (reprojection_) {
+    reprojection_->Close();
+    recorded_.reprojection_rows = reprojection_->rows();
+  }
+  recorded_.estimate_rows = estimates_.rows();
+  recorded_.innovation_rows = innovations_.rows();
+  recorded_.gain_rows = gains_.rows();
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "alidade/base/csv_file.h"
+#include "alidade/record/contents.h"
+#include "alidade/record/pose_file.h"
+#include "alidade/run/run.h"
+
+namespace alidade::internal {
+
+/// The files of one estimator that grow frame by frame: `estimates.csv`, `innovations.csv`,
+/// `gains.csv`, of sensors of landmarks `reprojection.csv`, and of blocks X.position and
+/// X.orientation `trajectory.tum`, with a covariance `trajectory_covariance.tum`. They hold the
+/// blocks and sensors that the system has from the start.
+class EstimatorFiles {
+ public:
+  /// `truth_columns` names the columns of truth.csv, by truth and element; `covariances` asks for
+  /// `covariance.bin` too.
+  EstimatorFiles(const RunFolder& folder, const NamedEstimator& named,
+                 const std::vector<StreamInfo>& truths,
+                 const std::vector<std::vector<std::string>>& truth_columns, bool covariances);
+
+  /// A frame older than the state has no row in estimates.csv: the state is not of its stamp.
+  /// Error: kIo.
+  void Add(const Frame& frame, const State& state, const UpdateReport& report);
+  void Close();
+  const RecordedEstimator& recorded() const { return recorded_; }
+
+ private:
+  struct BlockColumns {
+    BlockId id;
+    std::size_t ambient, tangent;
+    std::size_t element;  ///< the first of it in recorded_.elements
+    int truth;            ///< index into Frame::truth, or -1
+  };
+
+  static RecordedEstimator Describe(const NamedEstimator& named);
+  std::vector<std::string> EstimatesHeader(
+      const System& system, const std::vector<int>& truth_of,
+      const std::vector<std::vector<std::string>>& truth_columns);
+  std::vector<std::string> InnovationsHeader() const;
+  std::vector<std::string> GainsHeader(const System& system);
+  /// The position that landmarks are seen from, among the elements.
+  void FindPath(const System& system);
+  void OpenTrajectory(const RunFolder& folder, const System& system);
+  void AddEstimate(const Frame& frame, const State& state);
+  void AddPose(Stamp stamp, const State& state);
+  void AddInnovation(Stamp stamp, const MeasurementReport& report);
+  void AddGain(Stamp stamp, const State& state, const MeasurementReport& report);
+
+  RecordedEstimator recorded_;
+  std::vector<BlockColumns> blocks_;
+  std::size_t gain_columns_ = 0;
+  CsvFile estimates_, innovations_, gains_;
+  std::optional<CsvFile> reprojection_;
+  std::optional<PosePlace> pose_;  ///< among the blocks
+  std::optional<PoseFile> trajectory_, trajectory_covariance_;
+  std::unique_ptr<OutputFile> covariances_;  ///< null: not asked for
+};
+
+/// What a figure of the map has to know.
+RecordedMap DescribeMap(const std::vector<LandmarkEstimate>& landmarks,
+                        const Eigen::AlignedBox3d& path);
+
+/// `NAME/landmarks.csv`: the map at the end. A number that is not finite is left empty. Error: kIo.
+void WriteLandmarks(const RunFolder& folder, const std::string& estimator,
+                    const std::vector<LandmarkEstimate>& landmarks);
+
+}  // namespace alidade::internal

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "alidade/host/source.h"
+
+namespace alidade::internal {
+
+/// A csv file to draw from. Rows of `kinds` kinds take turns in it, as those of several sensors.
+struct FigureFile {
+  std::string name;
+  std::int64_t rows = 0;
+  int kinds = 1;
+};
+
+/// A gnuplot script that draws panels, one above the other over the same axis, from the csv files
+/// of a run or sweep folder into `figures/NAME.svg` (or .png). It is kept in the folder, so it is
+/// written to be read and changed.
+class FigureScript {
+ public:
+  /// The x of every curve.
+  static constexpr const char* kTime = "(column('t_s')-t0):";
+
+  /// All panels show the time from `first` to `last`.
+  FigureScript(std::string name, std::string title, Stamp first, Stamp last);
+  /// All panels are over something else than time.
+  FigureScript(std::string name, std::string title, std::string x_label);
+
+  /// Starts the next panel.
+  void Panel(std::string_view title, std::string_view y_label);
+  /// All panels are this high, px; by default as high as their key asks for.
+  void PanelHeight(int height) { panel_height_ = height; }
+  /// A line of the panel's settings.
+  void Set(std::string_view line);
+  /// Adds a curve: what stands behind `using`, and its entry in the key ("": none). Of a long file
+  /// it draws every n-th row.
+  void Curve(const FigureFile& file, std::string_view how, std::string_view key);
+  /// Adds a line through the rows for which the expression `mine` is true, broken at gaps.
+  void LineOf(const FigureFile& file, std::string_view mine, std::string_view value, int style,
+              std::string_view key);
+  /// Names the quartiles of an expression over a file NAME_lo_quartile, NAME_up_quartile.
+  void Quartiles(std::string_view name, std::string_view file, std::string_view expression);
+
+  bool empty() const { return panels_ == 0; }
+  const std::string& name() const { return name_; }
+  const std::string& title() const { return title_; }
+  /// The whole script.
+  std::string Text() const;
+
+ private:
+  void EndPanel();
+  std::string TimeAxis(std::string& label) const;
+
+  std::string name_, title_, body_, plot_;
+  std::string x_label_;  ///< "": time
+  Stamp first_, last_;
+  double span_s_;
+  int panels_ = 0, panel_height_ = 170;
+  int keys_ = 0, most_keys_ = 0;  ///< entries in the key of the panel at hand, and of the fullest
+  std::size_t longest_key_ = 0;
+};
+
+/// `text` as a gnuplot string.
+std::string GnuplotQuoted(std::string_view text);
+/// The column of that name.
+std::string GnuplotColumn(std::string_view name);
+/// `[unit]`, or "".
+std::string InBrackets(std::string_view unit);
+
+}  // namespace alidade::internal

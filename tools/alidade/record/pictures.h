@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "alidade/host/source.h"
+
+namespace alidade {
+
+/// What a camera sees, frame by frame: a video or a folder of images.
+class PictureWriter {
+ public:
+  virtual ~PictureWriter() = default;
+  /// Adds the picture of frame `number`, of whose points `pixels` are the centres (u, v); the
+  /// stamps of the first two frames give the rate of a video. Errors: kCannotCreate, kIo.
+  virtual void Add(std::int64_t number, Stamp stamp,
+                   const std::vector<std::array<double, 2>>& pixels) = 0;
+  /// Completes what was written. Error: kIo.
+  virtual void Close() = 0;
+};
+
+/// What a picture writer is made from.
+struct PictureArguments {
+  enum class Form { kVideo, kImages } form;
+  std::filesystem::path path;  ///< of the video, or of the folder of images; its folder is there
+  std::string shown;           ///< the path in messages
+  int width, height;           ///< px
+};
+
+/// Makes the picture writer of the build-tier plugin in `folder`; of the one that was built with
+/// this library where "". It is loaded when it is first asked for, because its libraries are slow
+/// to load. Errors: kPlugin, kNotTrusted, kCannotCreate, kIo.
+std::unique_ptr<PictureWriter> OpenPictures(const PictureArguments& arguments,
+                                            const std::filesystem::path& folder = {});
+
+}  // namespace alidade

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/record/recorder.h"
+
+#include <chrono>
+#include <ctime>
+#include <fstream>
+#include <optional>
+#include <set>
+#include <sstream>
+
+#include "alidade/base/json.h"
+#include "alidade/base/output_folder.h"
+#include "alidade/base/sha256.h"
+#include "alidade/record/data_hash.h"
+#include "alidade/record/estimator_files.h"
+#include "alidade/record/figures.h"
+#include "alidade/record/report_html.h"
+#include "alidade/record/run_json.h"
+#include "alidade/record/source_files.h"
+
+namespace alidade {
+
+using internal::CsvFile;
+using Clock = std::chrono::steady_clock;
+
+struct Recorder::Impl {
+  Impl(const Options& given, const Config& config, const PluginHost& plugin_host);
+
+  void AddPlugin(const std::filesystem::path& file);
+  void AddPlugins(const Experiment& experiment);
+  internal::RecordedRun CloseFiles();
+  void WriteEvents(const EstimatorResult& result) const;
+  std::string TimingJson(const RunResult& result) const;
+  void WriteReport(const RunResult& result, const internal::RecordedRun& recorded);
+
+  Options options;
+  internal::RunFolder folder;
+  const PluginHost& host;
+  std::string title, config_text, source_type;
+  internal::RunFacts facts;
+  std::set<std::filesystem::path> hashed;  ///< plugins that are in the facts
+  std::optional<internal::SourceFiles> source;
+  std::optional<internal::DataHash> data;
+  std::vector<std::unique_ptr<internal::EstimatorFiles>> estimators;
+  std::vector<std::string> highlights;
+  std::string note;
+  Clock::time_point started = Clock::now();
+  std::time_t started_at = std::time(nullptr);
+};
+
+namespace {
+
+std::string ReadText(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+/// The text of a key where there is one, else `fallback`.
+std::string TextOf(const Node& map, std::string_view key, const std::string& fallback) {
+  const std::optional<Node> node = map.is_map() ? map.Find(key) : std::nullopt;
+  return node && node->kind() == Node::Kind::kScalar ? node->Text() : fallback;
+}
+
+/// An svg file as an element of a page: without its XML prolog.
+std::string AsElement(const std::string& svg) {
+  const std::size_t at = svg.find("<svg");
+  return at == svg.npos ? "" : svg.substr(at);
+}
+
+}  // namespace
+
+Recorder::Impl::Impl(const Options& given, const Config& config, const PluginHost& plugin_host)
+    : options(given),
+      folder(given.folder, given.force),
+      host(plugin_host),
+      title(TextOf(config.root(), "title", std::filesystem::path(config.name()).stem().string())),
+      config_text(config.ToYaml()) {
+  if (const auto entry = config.root().is_map() ? config.root().Find("source") : std::nullopt) {
+    source_type = TextOf(*entry, "type", "");
+  }
+  folder.Write("config.resolved.yaml", config_text);
+}
+
+void Recorder::Impl::AddPlugin(const std::filesystem::path& file) {
+  if (!file.is_absolute()) return;  // a model made in this process
+  if (!hashed.insert(file).second) return;
+  facts.plugins.emplace(file.filename().string(), internal::Sha256OfFile(file));
+}
+
+void Recorder::Impl::AddPlugins(const Experiment& experiment) {
+  for (const NamedEstimator& named : experiment.estimators) {
+    for (const auto& sensor : named.system.sensors) AddPlugin(sensor.model.instance().plugin());
+    for (const auto& motion : named.system.motions) AddPlugin(motion.model.instance().plugin());
+  }
+  for (const PluginEntry& entry : host.entries()) {
+    const auto is_used = [&](const NamedEstimator& named) { return named.type == entry.name; };
+    const bool used = entry.kind == PluginEntry::Kind::kSource
+                          ? entry.name == source_type
+                          : entry.kind == PluginEntry::Kind::kEstimator &&
+                                std::ranges::any_of(experiment.estimators, is_used);
+    if (used) AddPlugin(entry.plugin);
+  }
+}
+
+internal::RecordedRun Recorder::Impl::CloseFiles() {
+  internal::RecordedRun recorded;
+  if (source) {
+    source->Close();
+    source->Describe(recorded);
+  }
+  for (const auto& estimator : estimators) {
+    estimator->Close();
+    recorded.estimators.push_back(estimator->recorded());
+  }
+  return recorded;
+}
+
+void Recorder::Impl::WriteEvents(const EstimatorResult& result) const {
+  CsvFile events(folder, result.name + "/events.csv", {"t_s", "kind", "text"});
+  for (const Event& event : result.events) {
+    events.Time(event.stamp).Text(event.kind).Text(event.text).EndRow();
+  }
+  events.Close();
+}
+
+std::string Recorder::Impl::TimingJson(const RunResult& result) const {
+  const double wall_s = std::chrono::duration<double>(Clock::now() - started).count();
+  char at[32] = "";
+  std::tm utc{};
+  if (gmtime_r(&started_at, &utc) != nullptr) {
+    std::strftime(at, sizeof at, "%Y-%m-%dT%H:%M:%SZ", &utc);
+  }
+  internal::Json json;
+  json.Object();
+  json.Key("started").Text(at);
+  json.Key("command").Text(options.command);
+  json.Key("wall_s").Number(wall_s);
+  json.Key("frames_per_s").Number(static_cast<double>(result.frames) / wall_s);
+  json.Key("estimators").Object();
+  for (const EstimatorResult& one : result.estimators) {
+    json.Key(one.name).Object().Key("wall_s").Number(one.wall_s).End();
+  }
+  json.End();
+  json.Key("unoptimised").Array();
+  for (const std::string& plugin : result.unoptimised) json.Text(plugin);
+  json.End();
+  json.Key("arrivals").Object();
+  json.Key("late").Integer(result.arrivals.late);
+  json.Key("merged").Integer(result.arrivals.merged);
+  json.Key("dropped").Integer(result.arrivals.dropped);
+  json.Key("longest_lag_s").Number(Seconds(result.arrivals.longest_lag));
+  json.End();
+  json.End();
+  return json.text();
+}
+
+void Recorder::Impl::WriteReport(const RunResult& result, const internal::RecordedRun& recorded) {
+  internal::Report report{title, config_text, facts, {}, {}};
+  if (options.figures) {
+    const auto limit = std::chrono::duration<double>(options.drawing_s);
+    const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(limit);
+    report.figures = internal::DrawFigures(folder, recorded, {options.stop, end});
+  } else {
+    report.figures.note = "figures were not asked for";
+  }
+  for (const internal::Figure& figure : report.figures.drawn) {
+    const std::filesystem::path svg = folder.partial() / ("figures/" + figure.name + ".svg");
+    report.svgs[figure.name] = AsElement(ReadText(svg));
+  }
+  folder.Write("report.html", internal::ReportHtml(result, report));
+  highlights = {"report.html"};
+  if (report.figures.has_png) highlights.emplace_back("figures/measurements.png");
+  highlights.insert(highlights.end(), {"comparison.csv", "run.json"});
+  if (options.figures) note = report.figures.note;
+}
+
+Recorder::Recorder(const Options& options, const Config& config, const PluginHost& host)
+    : impl_(std::make_unique<Impl>(options, config, host)) {}
+
+Recorder::~Recorder() = default;
+
+void Recorder::Begin(const Experiment& experiment) {
+  impl_->facts.seed = experiment.seed;
+  impl_->AddPlugins(experiment);
+  impl_->source.emplace(impl_->folder, experiment);
+  impl_->data.emplace(experiment.source->streams(), experiment.source->truths());
+  for (const NamedEstimator& named : experiment.estimators) {
+    impl_->facts.estimators.emplace(named.name, internal::FactsOf(named, experiment));
+    impl_->estimators.push_back(std::make_unique<internal::EstimatorFiles>(
+        impl_->folder, named, experiment.source->truths(), impl_->source->truth_columns(),
+        impl_->options.covariances));
+  }
+  impl_->started = Clock::now();
+}
+
+void Recorder::OnFrame(const Frame& frame) {
+  ALIDADE_EXPECTS(impl_->source.has_value());
+  impl_->source->Add(frame);
+  impl_->data->Add(frame);
+}
+
+void Recorder::OnEstimate(int estimator, const Frame& frame, const State& state,
+                          const UpdateReport& report) {
+  ALIDADE_EXPECTS(estimator >= 0 && estimator < static_cast<int>(impl_->estimators.size()));
+  impl_->estimators[static_cast<std::size_t>(estimator)]->Add(frame, state, report);
+}
+
+void Recorder::AddFile(const std::string& name, std::string_view text) {
+  impl_->folder.Write(name, text);
+}
+
+void Recorder::Finish(const RunResult& result) {
+  const std::string timing = impl_->TimingJson(result);
+  internal::RecordedRun recorded = impl_->CloseFiles();
+  for (const auto& files : impl_->estimators) {
+    const internal::RecordedEstimator& closed = files->recorded();
+    impl_->facts.estimators.at(closed.name).rows = closed.estimate_rows;
+  }
+  const internal::RunFolder& folder = impl_->folder;
+  for (std::size_t e = 0; e < result.estimators.size(); ++e) {
+    const EstimatorResult& one = result.estimators[e];
+    impl_->WriteEvents(one);
+    if (!one.landmarks) continue;
+    internal::WriteLandmarks(folder, one.name, *one.landmarks);
+    if (e >= recorded.estimators.size()) continue;
+    internal::RecordedEstimator& estimator = recorded.estimators[e];
+    estimator.map = internal::DescribeMap(*one.landmarks, estimator.path_box);
+  }
+  if (impl_->data) {
+    impl_->facts.measurements_sha256 = impl_->data->measurements();
+    impl_->facts.truth_sha256 = impl_->data->truth();
+  }
+  folder.Write("run.json", internal::RunJson(result, impl_->facts));
+  folder.Write("comparison.csv", internal::ComparisonCsv(result));
+  folder.Write("timing.json", timing);
+  impl_->WriteReport(result, recorded);
+  impl_->folder.Commit();
+}
+
+const std::vector<std::string>& Recorder::highlights() const { return impl_->highlights; }
+const std::string& Recorder::note() const { return impl_->note; }
+const std::filesystem::path& Recorder::folder() const { return impl_->options.folder; }
+
+}  // namespace alidade

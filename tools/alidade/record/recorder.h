@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "alidade/run/run.h"
+
+namespace alidade {
+
+/// Writes a run folder (docs/run_folder.md). Everything goes to a temporary folder beside it, is
+/// synced, and takes its name at the end, also where the run failed: `run.json` then says why.
+/// Every write is checked. Errors: kCannotCreate, kIo with the path.
+class Recorder : public RunObserver {
+ public:
+  struct Options {
+    std::filesystem::path folder;
+    bool force = false;               ///< replace what is there
+    bool figures = true;              ///< draw with gnuplot where it is installed
+    std::string command;              ///< of the program, for timing.json
+    std::function<bool()> stop = {};  ///< true: leave out the figures that are not drawn yet
+    double drawing_s = 60.0;          ///< the most that all figures may take
+    bool covariances = false;         ///< write `NAME/covariance.bin` too
+  };
+  /// Creates the temporary folder. Errors: kCannotCreate where `folder` exists without `force`.
+  Recorder(const Options& options, const Config& config, const PluginHost& host);
+  ~Recorder() override;
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  /// Writes the headers, once the experiment is known.
+  void Begin(const Experiment& experiment) override;
+  void OnFrame(const Frame& frame) override;
+  void OnEstimate(int estimator, const Frame& frame, const State& state,
+                  const UpdateReport& report) override;
+  /// Puts a file of that text into the folder too. Errors: kCannotCreate, kIo.
+  void AddFile(const std::string& name, std::string_view text);
+  /// Writes run.json, comparison.csv, timing.json, figures and report.html, syncs and renames.
+  void Finish(const RunResult& result);
+
+  /// Paths that Finish made, relative to the folder, those a person wants first: report.html, ...
+  const std::vector<std::string>& highlights() const;
+  /// What was left out and why ("gnuplot is not installed: no figures"), or "".
+  const std::string& note() const;
+  const std::filesystem::path& folder() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace alidade

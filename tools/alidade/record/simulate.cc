@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/record/simulate.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+
+#include "alidade/base/csv_file.h"
+#include "alidade/base/json.h"
+#include "alidade/record/pictures.h"
+#include "alidade/record/pose_file.h"
+#include "alidade/state/element_names.h"
+
+namespace alidade {
+namespace {
+
+using internal::CsvFile;
+using internal::RunFolder;
+
+std::unique_ptr<Source> MakeSource(const Config& config, const PluginHost& host) {
+  const Node entry = config.root().At("source", "a simulation: where measurements come from");
+  std::uint64_t seed = 1;
+  if (const auto node = entry.Find("seed")) {
+    seed = static_cast<std::uint64_t>(node->Integer(0, INT64_MAX));
+  }
+  std::unique_ptr<Source> source =
+      host.CreateSource(entry.At("type", "a source").Text(), entry, seed, config.folder());
+  entry.Declare("calibration");
+  entry.RejectUnread();
+  return source;
+}
+
+/// Names of the columns of a stream without landmarks.
+std::vector<std::string> ColumnsOf(const StreamInfo& stream) {
+  if (stream.name == "odometry" && stream.size == 6) {  // as source `tracks` reads it
+    return {"vx_m_s", "vy_m_s", "vz_m_s", "wx_rad_s", "wy_rad_s", "wz_rad_s"};
+  }
+  return internal::NumberedNames(stream.name, static_cast<std::size_t>(stream.size));
+}
+
+/// The files of one simulation.
+class DataFiles {
+ public:
+  DataFiles(const RunFolder& folder, const Source& source) : folder_(folder), source_(source) {
+    streams_.resize(source.streams().size());
+    OpenCsv(times_, "timestamps.csv", {"frame", "t_s"});
+    if (source.truths().empty()) return;
+    std::vector<std::string> header{"t_s"};
+    for (const StreamInfo& truth : source.truths()) {
+      const auto names = internal::NumberedNames(truth.name, static_cast<std::size_t>(truth.size));
+      header.insert(header.end(), names.begin(), names.end());
+    }
+    OpenCsv(truth_, "truth.csv", header);
+    const std::optional<internal::PosePlace> pose = internal::FindPose(source.truths());
+    if (!pose) return;
+    tum_.emplace(folder, "truth.tum", *pose);
+    names_.insert("truth.tum");
+  }
+
+  void Add(std::int64_t number, const Frame& frame) {
+    times_->Integer(number).Time(frame.stamp).EndRow();
+    for (const Measurement& measurement : frame.measurements) AddRow(number, measurement);
+    if (!truth_) return;
+    truth_->Time(frame.stamp);
+    for (std::size_t i = 0; i < source_.truths().size(); ++i) {
+      const auto size = static_cast<std::size_t>(source_.truths()[i].size);
+      const bool known = i < frame.truth.size() && !frame.truth[i].empty();
+      truth_->Numbers(known ? frame.truth[i].data() : nullptr, known ? size : 0, size);
+    }
+    truth_->EndRow();
+    if (tum_) tum_->AddTruth(frame);
+  }
+
+  void Close() {
+    WriteMap();
+    times_->Close();
+    if (truth_) truth_->Close();
+    if (tum_) tum_->Close();
+    for (std::optional<CsvFile>& stream : streams_) {
+      if (stream) stream->Close();
+    }
+  }
+
+  const std::set<std::string>& names() const { return names_; }
+
+ private:
+  void OpenCsv(std::optional<CsvFile>& file, const std::string& name,
+               const std::vector<std::string>& header) {
+    file.emplace(folder_, name, header);
+    names_.insert(name);
+  }
+
+  void AddRow(std::int64_t number, const Measurement& measurement) {
+    const auto index = static_cast<std::size_t>(measurement.stream);
+    const StreamInfo& stream = source_.streams()[index];
+    const bool landmark = measurement.landmark >= 0;
+    std::optional<CsvFile>& file = streams_[index];
+    if (!file) {
+      std::vector<std::string> header{"frame", "feature", "dim", "value"};
+      if (!landmark) {
+        header = {"frame", "t_s"};
+        for (const std::string& name : ColumnsOf(stream)) header.push_back(name);
+      }
+      OpenCsv(file, stream.name + ".csv", header);
+    }
+    if (!landmark) {
+      file->Integer(number).Time(measurement.stamp);
+      file->Numbers(measurement.values.data(), measurement.values.size(),
+                    measurement.values.size());
+      return file->EndRow();
+    }
+    seen_.insert(measurement.landmark);
+    for (std::size_t dim = 0; dim < measurement.values.size(); ++dim) {
+      file->Integer(number).Integer(measurement.landmark);
+      file->Integer(static_cast<std::int64_t>(dim)).Number(measurement.values[dim]).EndRow();
+    }
+  }
+
+  void WriteMap() {
+    std::optional<CsvFile> map;
+    for (const std::int64_t id : seen_) {
+      const auto place = source_.TrueLandmark(id);
+      if (!place) continue;
+      if (!map) OpenCsv(map, "map.csv", {"feature", "x", "y", "z"});
+      map->Integer(id).Numbers(place->data(), 3, 3).EndRow();
+    }
+    if (map) map->Close();
+  }
+
+  const RunFolder& folder_;
+  const Source& source_;
+  std::optional<CsvFile> times_, truth_;
+  std::vector<std::optional<CsvFile>> streams_;
+  std::optional<internal::PoseFile> tum_;
+  std::set<std::int64_t> seen_;
+  std::set<std::string> names_;
+};
+
+/// The pictures of one simulation.
+class PictureFiles {
+ public:
+  PictureFiles(const SimulatePictures& names, const Config& config, const RunFolder& folder) {
+    if (!names.video.empty()) {
+      const std::filesystem::path path = Inside(folder, names.video, "--video");
+      MakeFolder(path.parent_path(), folder.Shown(names.video));
+      Open({PictureArguments::Form::kVideo, path, folder.Shown(names.video), 0, 0}, config);
+    }
+    if (!names.images.empty()) {
+      const std::filesystem::path path = Inside(folder, names.images, "--images");
+      MakeFolder(path, folder.Shown(names.images));
+      Open({PictureArguments::Form::kImages, path, folder.Shown(names.images), 0, 0}, config);
+    }
+  }
+
+  void Add(std::int64_t number, const Frame& frame) {
+    if (writers_.empty()) return;
+    pixels_.clear();
+    for (const Measurement& measurement : frame.measurements) {
+      if (measurement.landmark < 0 || measurement.values.size() < 2) continue;
+      pixels_.push_back({measurement.values[0], measurement.values[1]});
+    }
+    for (const auto& writer : writers_) writer->Add(number, frame.stamp, pixels_);
+  }
+
+  void Close() {
+    for (const auto& writer : writers_) writer->Close();
+  }
+
+ private:
+  static std::filesystem::path Inside(const RunFolder& folder, const std::string& name,
+                                      const char* option) {
+    return ResolveInside(folder.partial(), name, false, {}, option);
+  }
+  static void MakeFolder(const std::filesystem::path& path, const std::string& shown) {
+    std::error_code error;
+    std::filesystem::create_directories(path, error);
+    if (error) internal::FailCreate(shown, error.value());
+  }
+  void Open(PictureArguments arguments, const Config& config) {
+    constexpr int kMost = 16384;
+    const Node camera = config.root().At("camera", "pictures of a simulation");
+    arguments.width = static_cast<int>(camera.At("width").Integer(1, kMost));
+    arguments.height = static_cast<int>(camera.At("height").Integer(1, kMost));
+    writers_.push_back(OpenPictures(arguments));
+  }
+
+  std::vector<std::unique_ptr<PictureWriter>> writers_;
+  std::vector<std::array<double, 2>> pixels_;
+};
+
+/// The config's `camera` alone, and `baseline_m` of a stereo pair; "" where it has no camera.
+std::string CameraYaml(const Config& config) {
+  const bool source_reads_it = !config.root().HasUnread("camera");
+  const auto camera = config.root().Find("camera");
+  if (!camera) return {};
+  if (source_reads_it) camera->RejectUnread();
+  Config alone = Config::FromText("camera: {}", "calibration.yaml");
+  for (const auto& [key, value] : camera->Entries()) {
+    alone.Set("camera." + key, value.Text(), "calibration.yaml");
+  }
+  for (const Node& from : {config.root(), config.root().At("source")}) {
+    if (const auto baseline = from.Find("baseline_m"))
+      alone.Set("baseline_m", baseline->Text(), "calibration.yaml");
+  }
+  return alone.ToYaml();
+}
+
+/// Whether the data are all that the source has, for other programs.
+std::string SimulateJson(const SimulateResult& result) {
+  internal::Json json;
+  json.Object().Key("status").Text(result.stopped ? "stopped" : "ok");
+  json.Key("frames").Integer(result.frames).End();
+  return json.text();
+}
+
+}  // namespace
+
+SimulateResult Simulate(const Config& config, const PluginHost& host,
+                        const std::filesystem::path& folder, bool force,
+                        const std::function<bool()>& stop, const SimulatePictures& pictures) {
+  const std::unique_ptr<Source> source = MakeSource(config, host);
+  const std::string camera = CameraYaml(config);
+  RunFolder output(folder, force);
+  DataFiles files(output, *source);
+  PictureFiles drawn(pictures, config, output);
+  SimulateResult result;
+  for (Frame frame; !result.stopped && source->Next(frame);) {
+    files.Add(result.frames, frame);
+    drawn.Add(result.frames++, frame);
+    result.stopped = stop && stop();
+  }
+  files.Close();
+  drawn.Close();
+  result.files.assign(files.names().begin(), files.names().end());
+  for (const std::string& name : {pictures.images, pictures.video}) {
+    if (!name.empty()) result.files.push_back(name);
+  }
+  if (!camera.empty()) {
+    output.Write("calibration.yaml", camera);
+    result.files.insert(result.files.begin(), "calibration.yaml");
+  }
+  output.Write("simulate.json", SimulateJson(result));
+  result.files.push_back("simulate.json");
+  output.Commit();
+  return result;
+}
+
+}  // namespace alidade

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "alidade/base/csv_file.h"
+#include "alidade/record/contents.h"
+#include "alidade/record/pose_file.h"
+#include "alidade/run/run.h"
+
+namespace alidade::internal {
+
+/// What the source gave, frame by frame: `measurements.csv`, `truth.csv` where it knows truths,
+/// `expected.csv` where these tell what a sensor measures, and `implied.csv` where a sensor can be
+/// inverted without knowing anything else, or knowing truth.
+class SourceFiles {
+ public:
+  SourceFiles(const RunFolder& folder, const Experiment& experiment);
+
+  /// Error: kIo.
+  void Add(const Frame& frame);
+  void Close();
+  /// The columns of truth.csv, by truth and element.
+  const std::vector<std::vector<std::string>>& truth_columns() const { return truth_columns_; }
+  /// Fills what the source gave.
+  void Describe(RecordedRun& run) const;
+
+ private:
+  struct Inverse {
+    int stream;
+    SensorModel model;
+    RecordedImplied recorded;
+    std::vector<int> truths;  ///< by role; empty: inverted by itself
+  };
+  /// The first sensor of a stream whose roles all have a truth.
+  struct Expectation {
+    SensorModel model;
+    std::vector<int> truths;
+  };
+
+  void FindInverses(const Experiment& experiment);
+  void AddExpected(const Frame& frame, const Measurement& measurement);
+  void AddImplied(const Frame& frame, const Measurement& measurement);
+
+  std::vector<StreamInfo> streams_, truths_;
+  std::vector<std::vector<std::string>> truth_columns_;
+  std::vector<std::int64_t> stream_rows_;    ///< in measurements.csv
+  std::vector<std::int64_t> expected_rows_;  ///< in expected.csv, by stream
+  std::map<int, Expectation> expectations_;  ///< by stream
+  std::vector<Inverse> inverses_;
+  std::size_t width_ = 1, blocks_ = 0;
+  Stamp first_ = kNoStamp, last_ = kNoStamp;
+  std::optional<CsvFile> measurements_, truth_, expected_, implied_;
+  std::optional<PoseFile> poses_;
+};
+
+}  // namespace alidade::internal

@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "alidade/base/csv_file.h"
+#include "alidade/base/json.h"
+#include "alidade/base/output_folder.h"
+#include "alidade/base/words.h"
+#include "alidade/run/metric_rows.h"
+#include "alidade/sweep/sweep.h"
+#include "alidade/sweep/table.h"
+#include "alidade/sweep/vary_files.h"
+
+namespace alidade {
+
+using internal::CountWhole;
+using internal::CountWithheld;
+using internal::CsvFile;
+using internal::Json;
+using internal::NamesOf;
+using internal::ReferenceLines;
+using internal::RunFolder;
+using internal::TableRow;
+
+struct SweepFolder::Impl {
+  Impl(const std::filesystem::path& path, bool force) : folder(path, force) {}
+  RunFolder folder;
+};
+
+namespace {
+
+/// A sweep, and the value of the varied key that it is of, "" where none is varied.
+struct Part {
+  const SweepResult* result;
+  std::string value;
+};
+using Parts = std::vector<Part>;
+
+Parts PartsOf(const VariedSweep& sweep) {
+  Parts parts;
+  for (const SweepResult& result : sweep.results) {
+    parts.push_back({&result, sweep.variation.values[parts.size()]});
+  }
+  return parts;
+}
+
+/// A cell for each estimator. Each one stands as four in a comparison, so that its numbers share
+/// their unit and decimals with all others of the row.
+std::vector<TableRow> TableRows(const std::vector<SweepSummary>& summaries) {
+  RunResult columns;
+  for (const SweepSummary& summary : summaries) {
+    for (const auto member : {&Spread::mean, &Spread::p05, &Spread::p50, &Spread::p95}) {
+      EstimatorResult& column = columns.estimators.emplace_back();
+      column.units = summary.units;
+      for (const auto& [key, spread] : summary.metrics) column.metrics[key] = spread.*member;
+    }
+  }
+  std::vector<TableRow> rows;
+  for (const TableRow& from : internal::MetricRows(columns)) {
+    TableRow& row = rows.emplace_back(TableRow{from.label, {}});
+    for (std::size_t i = 0; i < from.cells.size(); i += 4) {
+      const std::string* const c = &from.cells[i];
+      row.cells.push_back(c[0] == "-" ? "-" : c[0] + " [" + c[1] + ", " + c[2] + ", " + c[3] + ']');
+    }
+  }
+  TableRow used{"runs used", {}}, diverged{"diverged", {}}, inconsistent{"inconsistent", {}};
+  for (const SweepSummary& summary : summaries) {
+    used.cells.push_back(std::to_string(summary.used));
+    diverged.cells.push_back(std::to_string(summary.diverged));
+    inconsistent.cells.push_back(std::to_string(summary.inconsistent));
+  }
+  rows.push_back(used);
+  rows.push_back(diverged);
+  rows.push_back(inconsistent);
+  return rows;
+}
+
+std::string Markdown(const SweepResult& result) {
+  std::string text = std::to_string(CountWhole(result)) + " of " + std::to_string(result.runs) +
+                     " runs, seeds from " + std::to_string(result.first_seed) +
+                     ". Mean [5 %, 50 %, 95 % quantile] over the runs that did not diverge, "
+                     "inconsistent ones among them.\n\n";
+  const std::vector<SweepSummary> summaries = Summarise(result);
+  text += internal::MarkdownTable("", NamesOf(summaries), TableRows(summaries));
+  return text + internal::NeesLines(summaries) + ReferenceLines(result);
+}
+
+void AppendEstimators(Json& json, const SweepResult& result) {
+  json.Key("estimators").Object();
+  for (const SweepSummary& summary : Summarise(result)) {
+    json.Key(summary.name).Object();
+    json.Key("diverged").Integer(summary.diverged);
+    json.Key("inconsistent").Integer(summary.inconsistent);
+    json.Key("metrics").Object();
+    for (const auto& [key, spread] : summary.metrics) {
+      json.Key(key).Object();
+      json.Key("mean").Number(spread.mean);
+      json.Key("p05").Number(spread.p05);
+      json.Key("p50").Number(spread.p50);
+      json.Key("p95").Number(spread.p95);
+      json.End();
+    }
+    json.End();
+    json.Key("bounds").Object();
+    for (const auto& [key, bounds] : internal::NeesBounds(summary)) {
+      json.Key(key).Object().Key("low").Number(bounds.low).Key("high").Number(bounds.high).End();
+    }
+    json.End();
+    json.End();
+  }
+  json.End();
+}
+
+const char* StatusOf(bool stopped) {
+  return ToString(stopped ? RunStatus::kStopped : RunStatus::kOk);
+}
+
+std::string SweepJson(const SweepResult& result) {
+  Json json;
+  json.Object();
+  json.Key("status").Text(StatusOf(result.stopped));
+  json.Key("runs").Integer(result.runs);
+  json.Key("runs_used").Integer(CountWhole(result));
+  json.Key("first_seed").Integer(static_cast<std::int64_t>(result.first_seed));
+  json.Key("reference").Text(result.reference);
+  json.Key("withheld").Integer(CountWithheld(result));
+  AppendEstimators(json, result);
+  json.End();
+  return json.text();
+}
+
+std::string SweepJson(const VariedSweep& sweep) {
+  Json json;
+  json.Object();
+  json.Key("status").Text(StatusOf(sweep.stopped()));
+  json.Key("runs").Integer(sweep.results.front().runs);
+  json.Key("first_seed").Integer(static_cast<std::int64_t>(sweep.results.front().first_seed));
+  json.Key("vary").Text(sweep.variation.key);
+  json.Key("values").Array();
+  for (const Part& part : PartsOf(sweep)) {
+    json.Object();
+    json.Key("value").Text(part.value);
+    json.Key("runs_used").Integer(CountWhole(*part.result));
+    json.Key("reference").Text(part.result->reference);
+    json.Key("withheld").Integer(CountWithheld(*part.result));
+    AppendEstimators(json, *part.result);
+    json.End();
+  }
+  json.End();
+  json.End();
+  return json.text();
+}
+
+/// Keys that any run has, in the order of a comparison.
+RunResult AllKeys(const Parts& parts) {
+  RunResult all;
+  EstimatorResult& keys = all.estimators.emplace_back();
+  for (const Part& part : parts) {
+    for (const SweepRun& run : part.result->done) {
+      for (const EstimatorResult& one : run.estimators) {
+        keys.metrics.insert(one.metrics.begin(), one.metrics.end());
+        keys.counts.insert(one.counts.begin(), one.counts.end());
+      }
+    }
+  }
+  return all;
+}
+
+/// `header`, below the varied key where there is one.
+std::vector<std::string> Header(const std::string& key, std::vector<std::string> header) {
+  if (!key.empty()) header.insert(header.begin(), key);
+  return header;
+}
+
+void WriteRuns(const RunFolder& folder, const Parts& parts, const std::string& key) {
+  const RunResult all = AllKeys(parts);
+  const std::vector<std::string> metrics = internal::OrderedMetrics(all);
+  const std::vector<std::string> counts = internal::OrderedCounts(all);
+  std::vector<std::string> header = Header(key, {"seed", "estimator", "diverged", "inconsistent"});
+  header.insert(header.end(), metrics.begin(), metrics.end());
+  header.insert(header.end(), counts.begin(), counts.end());
+  CsvFile csv(folder, "runs.csv", header);
+  const auto write_run = [&](const Part& part, const SweepRun& run, const EstimatorResult& one) {
+    if (!key.empty()) csv.Text(part.value);
+    csv.Integer(static_cast<std::int64_t>(run.seed)).Text(one.name);
+    csv.Text(one.diverged ? "true" : "false").Text(one.inconsistent ? "true" : "false");
+    for (const std::string& metric : metrics) {
+      const auto found = one.metrics.find(metric);
+      found == one.metrics.end() ? csv.Empty() : csv.Number(found->second);
+    }
+    for (const std::string& count : counts) {
+      const auto found = one.counts.find(count);
+      csv.Integer(found == one.counts.end() ? 0 : found->second);
+    }
+    csv.EndRow();
+  };
+  for (const Part& part : parts) {
+    for (const SweepRun& run : part.result->done) {
+      for (const EstimatorResult& one : run.estimators) {
+        if (run.Uses(one) || one.diverged) write_run(part, run, one);
+      }
+    }
+  }
+  csv.Close();
+}
+
+void WriteFailures(const RunFolder& folder, const Parts& parts, const std::string& key) {
+  const auto failed = [](const SweepRun& run) { return run.status == RunStatus::kFailed; };
+  const auto any = [&](const Part& part) { return std::ranges::any_of(part.result->done, failed); };
+  if (std::ranges::none_of(parts, any)) return;
+  CsvFile csv(folder, "failures.csv", Header(key, {"seed", "exit_code", "reason"}));
+  for (const Part& part : parts) {
+    for (const SweepRun& run : part.result->done) {
+      if (!failed(run)) continue;
+      if (!key.empty()) csv.Text(part.value);
+      csv.Integer(static_cast<std::int64_t>(run.seed)).Integer(static_cast<int>(run.code));
+      csv.Text(run.reason).EndRow();
+    }
+  }
+  csv.Close();
+}
+
+}  // namespace
+
+std::string SweepTable(const SweepResult& result) {
+  const std::vector<SweepSummary> summaries = Summarise(result);
+  return internal::RightAlignedTable(NamesOf(summaries), TableRows(summaries)) +
+         internal::NeesLines(summaries) + ReferenceLines(result);
+}
+
+SweepFolder::SweepFolder(const std::filesystem::path& folder, bool force)
+    : impl_(std::make_unique<Impl>(folder, force)) {}
+
+SweepFolder::~SweepFolder() = default;
+
+void SweepFolder::AddFile(const std::string& name, const std::string& text) {
+  impl_->folder.Write(name, text);
+}
+
+void SweepFolder::Write(const SweepResult& result, const Config& config) {
+  const RunFolder& folder = impl_->folder;
+  folder.Write("config.resolved.yaml", config.ToYaml());
+  folder.Write("sweep.json", SweepJson(result));
+  const Parts parts = {{&result, ""}};
+  WriteRuns(folder, parts, "");
+  WriteFailures(folder, parts, "");
+  folder.Write("table.md", Markdown(result));
+  impl_->folder.Commit();
+}
+
+std::string SweepFolder::Write(const VariedSweep& sweep, const Config& config,
+                               const std::function<bool()>& stop) {
+  const RunFolder& folder = impl_->folder;
+  const Parts parts = PartsOf(sweep);
+  folder.Write("config.resolved.yaml", config.ToYaml());
+  folder.Write("sweep.json", SweepJson(sweep));
+  internal::WriteSweepCsv(folder, sweep);
+  WriteRuns(folder, parts, sweep.variation.key);
+  WriteFailures(folder, parts, sweep.variation.key);
+  folder.Write("table.md", internal::VariedMarkdown(sweep));
+  const std::string note = internal::DrawVariation(folder, sweep, stop);
+  impl_->folder.Commit();
+  return note;
+}
+
+}  // namespace alidade

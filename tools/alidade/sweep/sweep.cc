@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/sweep/sweep.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <exception>
+#include <mutex>
+#include <system_error>
+#include <thread>
+
+#include "alidade/sweep/sweep_config.h"
+
+namespace alidade {
+
+using internal::CheckReadableAgain;
+using internal::Copy;
+
+namespace {
+
+/// The runs of a sweep, handed out to threads one after the other.
+class Queue {
+ public:
+  Queue(const Config& config, const PluginHost& host, const SweepOptions& options,
+        std::uint64_t first_seed, std::int64_t runs)
+      : config_(config), host_(host), options_(options), first_seed_(first_seed), runs_(runs) {}
+
+  /// Takes runs until there are none left. What ends it before that, Take() throws.
+  void Work() noexcept {
+    try {
+      while (!Stopped() && TakeOne()) continue;
+    } catch (...) {
+      const std::lock_guard lock(mutex_);
+      thrown_ = std::current_exception();
+      next_ = runs_;
+    }
+  }
+
+  /// The finished ones, by seed.
+  std::vector<SweepRun> Take() {
+    if (thrown_) std::rethrow_exception(thrown_);
+    std::sort(done_.begin(), done_.end(),
+              [](const SweepRun& a, const SweepRun& b) { return a.seed < b.seed; });
+    return std::move(done_);
+  }
+
+ private:
+  bool Stopped() const { return options_.stop && options_.stop(); }
+
+  /// False where none is left, or it was stopped.
+  bool TakeOne() {
+    const std::int64_t index = next_++;
+    if (index >= runs_) return false;
+    SweepRun run = RunSeed(first_seed_ + static_cast<std::uint64_t>(index));
+    if (run.status == RunStatus::kStopped) return false;
+    const std::lock_guard lock(mutex_);
+    done_.push_back(std::move(run));
+    if (options_.progress) options_.progress(static_cast<std::int64_t>(done_.size()), runs_);
+    return true;
+  }
+
+  Config CopyFor(std::uint64_t seed) {
+    const std::lock_guard lock(mutex_);
+    Config copy = Copy(config_);
+    copy.Set("source.seed", std::to_string(seed), "--first-seed");
+    return copy;
+  }
+
+  SweepRun RunSeed(std::uint64_t seed) {
+    SweepRun run;
+    run.seed = seed;
+    try {
+      const Config config = CopyFor(seed);
+      Experiment experiment = BuildExperiment(config, host_);
+      for (NamedEstimator& named : experiment.estimators) {
+        named.on_divergence = OnDivergence::kReport;
+      }
+      RunOptions options;
+      options.stop = options_.stop;
+      RunResult result =
+          options_.run ? options_.run(experiment, options) : Run(experiment, options);
+      run.status = result.code == ExitCode::kDiverged ? RunStatus::kOk : result.status;
+      run.code = result.code;
+      run.reason = std::move(result.reason);
+      run.withheld = !result.withheld.empty();
+      run.estimators = std::move(result.estimators);
+      for (EstimatorResult& one : run.estimators) one.events = {};
+    } catch (...) {
+      Failure failure = CaughtFailure();
+      run.status = RunStatus::kFailed;
+      run.code = failure.code;
+      run.reason = std::move(failure.reason);
+    }
+    return run;
+  }
+
+  const Config& config_;
+  const PluginHost& host_;
+  const SweepOptions& options_;
+  const std::uint64_t first_seed_;
+  const std::int64_t runs_;
+  std::atomic<std::int64_t> next_{0};
+  std::mutex mutex_;
+  std::vector<SweepRun> done_;
+  std::exception_ptr thrown_;
+};
+
+/// Whether every model on offer may work in several instances at once. Asked of all, used or not:
+/// which ones a config uses is known only to those who build it.
+bool MayRunInParallel(const PluginHost& host) {
+  return std::ranges::all_of(host.entries(), [](const PluginEntry& entry) {
+    return entry.kind == PluginEntry::Kind::kSource ||
+           entry.kind == PluginEntry::Kind::kEstimator ||
+           (entry.thread_flags & ALIDADE_THREAD_INSTANCES) != 0;
+  });
+}
+
+}  // namespace
+
+SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptions& options) {
+  if (options.runs > 1 && !internal::UsesSeed(config, host, options.first_seed)) {
+    internal::FailUnseeded(config);
+  }
+  return internal::SweepSeeds(config, host, options);
+}
+
+SweepResult internal::SweepSeeds(const Config& config, const PluginHost& host,
+                                 const SweepOptions& options) {
+  ALIDADE_EXPECTS(options.runs > 0 && options.jobs >= 0);
+  ALIDADE_EXPECTS(options.shard >= 1 && options.shard <= options.shards);
+  SweepResult result;
+  CheckReadableAgain(config);
+  // What is wrong with the config is said once, before the first run.
+  {
+    const Experiment experiment = BuildExperiment(config, host);
+    for (const NamedEstimator& named : experiment.estimators) {
+      result.estimators.push_back(named.name);
+    }
+    if (experiment.reference >= 0) {
+      result.reference = result.estimators[static_cast<std::size_t>(experiment.reference)];
+    }
+  }
+  const auto share = [&](int i) {
+    return options.runs / options.shards * i + options.runs % options.shards * i / options.shards;
+  };
+  const std::int64_t first = share(options.shard - 1);
+  result.runs = share(options.shard) - first;
+  result.first_seed = options.first_seed + static_cast<std::uint64_t>(first);
+
+  Queue queue(config, host, options, result.first_seed, result.runs);
+  const auto hardware = static_cast<std::int64_t>(std::thread::hardware_concurrency());
+  const std::int64_t jobs = options.jobs > 0 ? options.jobs : std::max<std::int64_t>(1, hardware);
+  const std::int64_t wanted = MayRunInParallel(host) ? jobs : 1;
+  {
+    std::vector<std::jthread> threads;
+    for (std::int64_t i = 1; i < std::min(wanted, result.runs); ++i) {
+      try {
+        threads.emplace_back([&queue] { queue.Work(); });
+      } catch (const std::system_error&) {
+        break;  // no more threads are to be had; these do
+      }
+    }
+    queue.Work();
+  }
+  result.done = queue.Take();
+  result.stopped = static_cast<std::int64_t>(result.done.size()) < result.runs;
+  return result;
+}
+
+std::vector<SweepSummary> Summarise(const SweepResult& result) {
+  std::vector<SweepSummary> summaries;
+  for (const std::string& name : result.estimators) {
+    SweepSummary& summary = summaries.emplace_back();
+    summary.name = name;
+    std::map<std::string, std::vector<double>> values;
+    for (const SweepRun& run : result.done) {
+      for (const EstimatorResult& one : run.estimators) {
+        if (one.name != name) continue;
+        summary.units.insert(one.units.begin(), one.units.end());
+        summary.diverged += one.diverged ? 1 : 0;
+        if (!run.Uses(one)) continue;
+        ++summary.used;
+        summary.inconsistent += one.inconsistent ? 1 : 0;
+        for (const auto& [key, value] : one.metrics) {
+          if (!std::isnan(value)) values[key].push_back(value);
+        }
+      }
+    }
+    for (auto& [key, list] : values) summary.metrics[key] = SpreadOf(std::move(list));
+  }
+  return summaries;
+}
+
+}  // namespace alidade

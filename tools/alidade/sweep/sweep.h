@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "alidade/base/statistics.h"
+#include "alidade/run/run.h"
+
+namespace alidade {
+
+struct SweepOptions {
+  std::int64_t runs = 1;  ///< of all shards together; their seeds count up from first_seed
+  std::uint64_t first_seed = 1;
+  /// Threads; 0: as many as the processor has. One where a model on offer does not allow several
+  /// instances at once (no ALIDADE_THREAD_INSTANCES).
+  int jobs = 0;
+  int shard = 1, shards = 1;  ///< which of the equal shares of the seeds, in order
+  /// What makes a run, from several threads at once; empty: alidade::Run.
+  std::function<RunResult(Experiment&, const RunOptions&)> run;
+  std::function<void(std::int64_t, std::int64_t)> progress;  ///< runs done, runs in all
+  std::function<bool()> stop;                                ///< true: drop unfinished runs
+};
+
+/// One run of a sweep.
+struct SweepRun {
+  std::uint64_t seed = 0;
+  RunStatus status = RunStatus::kOk;
+  ExitCode code = ExitCode::kOk;
+  std::string reason;
+  std::vector<EstimatorResult> estimators;  ///< without events
+  bool withheld = false;                    ///< no reference to compare with, as in RunResult
+
+  /// Whether the metrics of `one` count: the run is whole, and it did not diverge.
+  bool Uses(const EstimatorResult& one) const { return status == RunStatus::kOk && !one.diverged; }
+};
+
+struct SweepResult {
+  std::int64_t runs = 0;  ///< asked for, of this shard
+  std::uint64_t first_seed = 1;
+  bool stopped = false;
+  std::string reference = "truth";      ///< as in RunResult
+  std::vector<std::string> estimators;  ///< in the order of the config
+  std::vector<SweepRun> done;           ///< by seed, those that failed too
+};
+
+/// Runs `config` once for each seed (key `source.seed`), in memory, each run built afresh from its
+/// own copy of the config. Results do not depend on the number of threads. A run in which an
+/// estimator diverges goes on also under `on_divergence: fail`. What ends one run, ends that one
+/// only. Errors: those of BuildExperiment, before the first run.
+SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptions& options);
+
+/// A key of the config, and the values that it takes one after the other.
+struct Variation {
+  std::string key;                  ///< dotted, as Config::Set takes it
+  std::vector<std::string> values;  ///< each read as YAML
+
+  /// Reads `KEY=v1,v2,v3`; commas inside brackets, braces and quotes belong to their value. Error:
+  /// kUsage where a key or a value is missing, a bracket is left open, or a value comes twice.
+  static Variation FromText(const std::string& text);
+};
+
+/// One sweep for each value, with the same seeds.
+struct VariedSweep {
+  Variation variation;
+  std::vector<SweepResult> results;  ///< by value; fewer where it was stopped
+
+  bool stopped() const { return !results.empty() && results.back().stopped; }
+};
+
+/// Sweeps over `config` with each value of the variation in turn; `options.progress` counts the
+/// runs of all. Errors, before the first run: kBadConfig where the key is `source.seed`, the map
+/// that it is in is not there, or the values have different estimators; those of BuildExperiment
+/// for any of the values.
+VariedSweep SweepOver(const Config& config, const PluginHost& host, const SweepOptions& options,
+                      const Variation& variation);
+
+/// One estimator over all runs.
+struct SweepSummary {
+  std::string name;
+  std::int64_t used = 0;          ///< runs that metrics are taken over
+  std::int64_t diverged = 0;      ///< runs left out because it diverged
+  std::int64_t inconsistent = 0;  ///< those of `used` in which its error was
+  std::map<std::string, Spread> metrics;
+  std::map<std::string, std::string> units;  ///< as in EstimatorResult
+};
+std::vector<SweepSummary> Summarise(const SweepResult& result);
+
+/// Mean [p05, p50, p95] of the main metrics, one column for each estimator, for a terminal.
+std::string SweepTable(const SweepResult& result);
+/// For each estimator a table with a row for each value: means of the main metrics.
+std::string SweepTable(const VariedSweep& sweep);
+
+/// The folder of a sweep (docs/cli.md): sweep.json, runs.csv, table.md, config.resolved.yaml, and
+/// failures.csv where a run failed; of a varied one sweep.csv and a figure too. It is there in full
+/// or not at all.
+class SweepFolder {
+ public:
+  /// Takes the name. Errors: kCannotCreate where it exists without `force`; kIo.
+  SweepFolder(const std::filesystem::path& folder, bool force);
+  ~SweepFolder();
+  SweepFolder(const SweepFolder&) = delete;
+  SweepFolder& operator=(const SweepFolder&) = delete;
+
+  /// Puts a file of that text into the folder too. Errors: kCannotCreate, kIo.
+  void AddFile(const std::string& name, const std::string& text);
+  /// Errors: kCannotCreate, kIo.
+  void Write(const SweepResult& result, const Config& config);
+  /// Returns why there is no figure, or "". `stop` ends the drawing. Errors: kCannotCreate, kIo.
+  std::string Write(const VariedSweep& sweep, const Config& config,
+                    const std::function<bool()>& stop = {});
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace alidade

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/sweep/sweep_config.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+#include <system_error>
+
+namespace alidade::internal {
+
+Config Copy(const Config& config) { return config.Merged(Config::FromText("{}", "sweep").root()); }
+
+void CheckReadableAgain(const Config& config) {
+  const Config copy = Copy(config);
+  const auto source = copy.root().Find("source");
+  const auto path = source && source->is_map() ? source->Find("path") : std::nullopt;
+  if (!path || path->kind() != Node::Kind::kScalar) return;
+  std::error_code error;
+  const auto status = std::filesystem::status(config.folder() / path->Text(), error);
+  const bool file =
+      !std::filesystem::exists(status) || is_regular_file(status) || is_directory(status);
+  if (path->Text() != "-" && file) return;
+  path->Fail("'" + path->Text() + "' can be read once, but a sweep reads it for every run",
+             "a regular file");
+}
+
+namespace {
+
+Config WithSeed(const Config& config, std::uint64_t seed) {
+  Config copy = Copy(config);
+  copy.Set("source.seed", std::to_string(seed), "--first-seed");
+  return copy;
+}
+
+bool AreEqual(const Frame& a, const Frame& b) {
+  const auto same = [](const Measurement& m, const Measurement& n) {
+    return m.stamp == n.stamp && m.stream == n.stream && m.landmark == n.landmark &&
+           m.values == n.values && m.covariance == n.covariance;
+  };
+  return a.stamp == b.stamp && a.truth == b.truth &&
+         std::ranges::equal(a.measurements, b.measurements, same);
+}
+
+}  // namespace
+
+bool UsesSeed(const Config& config, const PluginHost& host, std::uint64_t seed) {
+  CheckReadableAgain(config);
+  const Config first = WithSeed(config, seed), second = WithSeed(config, seed + 1);
+  const Experiment one = BuildExperiment(first, host), another = BuildExperiment(second, host);
+  Frame a, b;
+  try {
+    for (;;) {
+      const bool more = one.source->Next(a);
+      if (more != another.source->Next(b)) return true;
+      if (!more) return false;
+      if (!AreEqual(a, b)) return true;
+    }
+  } catch (const Error&) {
+    return true;  // the runs report it
+  }
+}
+
+void FailUnseeded(const Config& config) {
+  const Config copy = Copy(config);
+  const Node type = copy.root().At("source").At("type");
+  type.Fail(
+      "source '" + type.Text() + "' gives the same data for every seed: all runs would be equal",
+      "one run, or a source that draws its data from the seed");
+}
+
+}  // namespace alidade::internal

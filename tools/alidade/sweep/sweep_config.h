@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "alidade/sweep/sweep.h"
+
+/// The configs of a sweep's runs.
+namespace alidade::internal {
+
+/// A config of its own: reading one marks what was read.
+Config Copy(const Config& config);
+
+/// Refuses a source that the second run would find empty: standard input, or a pipe. Error:
+/// kBadConfig.
+void CheckReadableAgain(const Config& config);
+
+/// Whether the source of `config` gives other data for `seed` than for the next one: reads both up
+/// to their first difference. A source whose data have an error counts as one that does.
+bool UsesSeed(const Config& config, const PluginHost& host, std::uint64_t seed);
+
+/// Says that it does not. Error: kBadConfig.
+[[noreturn]] void FailUnseeded(const Config& config);
+
+/// As Sweep(), for data that depend on the seed or not.
+SweepResult SweepSeeds(const Config& config, const PluginHost& host, const SweepOptions& options);
+
+}  // namespace alidade::internal

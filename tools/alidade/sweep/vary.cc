@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <optional>
+
+#include "alidade/base/text_table.h"
+#include "alidade/base/words.h"
+#include "alidade/config/tree.h"
+#include "alidade/sweep/sweep.h"
+#include "alidade/sweep/sweep_config.h"
+
+namespace alidade {
+namespace {
+
+using internal::Quoted;
+
+constexpr const char* kOrigin = "--vary";
+
+[[noreturn]] void FailUsage(const std::string& what) {
+  throw Error(ExitCode::kUsage, ErrorLine(Place{kOrigin}, {}, what,
+                                          "KEY=v1,v2,... as in sensors.stereo.sigma_px=0.5,1,2"));
+}
+
+/// Without the blanks around it.
+std::string Trimmed(const std::string& text) {
+  const std::size_t first = text.find_first_not_of(" \t");
+  if (first == text.npos) return "";
+  return text.substr(first, text.find_last_not_of(" \t") + 1 - first);
+}
+
+/// Splits at the commas outside of brackets, braces and quotes.
+std::vector<std::string> SplitValues(const std::string& text) {
+  std::vector<std::string> values(1);
+  int depth = 0;
+  char quote = '\0';
+  for (const char c : text) {
+    if (quote != '\0') {
+      if (c == quote) quote = '\0';
+    } else if (c == '\'' || c == '"') {
+      quote = c;
+    } else if (c == '[' || c == '{') {
+      ++depth;
+    } else if (c == ']' || c == '}') {
+      --depth;
+    } else if (c == ',' && depth == 0) {
+      values.emplace_back();
+      continue;
+    }
+    values.back() += c;
+  }
+  if (depth != 0 || quote != '\0') FailUsage(Quoted(text) + " leaves a bracket or quote open");
+  std::ranges::transform(values, values.begin(), Trimmed);
+  return values;
+}
+
+/// Refuses a key whose map is not there: written wrong, it would make a map that nobody wants.
+void CheckKey(const Config& config, const std::string& key) {
+  const Place place{kOrigin};
+  if (key == "source.seed") {
+    internal::FailAt(place, key, "every value is run with the same seeds",
+                     "another key; --first-seed and --runs for the seeds");
+  }
+  Node map = config.root();
+  std::size_t start = 0;
+  for (std::size_t dot = key.find('.'); dot != key.npos; dot = key.find('.', start)) {
+    const std::string name = key.substr(start, dot - start);
+    if (name.find('[') != name.npos || !map.is_map()) return;  // Config::Set tells
+    std::vector<std::string> names;
+    std::optional<Node> next;
+    for (const auto& [entry, node] : map.Entries()) {
+      names.push_back(entry);
+      if (entry == name) next = node;
+    }
+    if (!next) {
+      internal::FailAt(place, key, "no " + Quoted(key.substr(0, dot)) + " in the config",
+                       "a key of a map that is there", Nearest(name, names));
+    }
+    map = *next;
+    start = dot + 1;
+  }
+}
+
+/// A config of its own for each value.
+Config ConfigWith(const Config& config, const std::string& key, const std::string& value) {
+  Config copy = internal::Copy(config);
+  copy.Set(key, value, kOrigin);
+  return copy;
+}
+
+/// Refuses a value with which the config is wrong, or has other estimators than with the first.
+void CheckValues(const Config& config, const PluginHost& host, const Variation& variation) {
+  std::vector<std::string> first;
+  for (const std::string& value : variation.values) {
+    const Config with = ConfigWith(config, variation.key, value);
+    internal::CheckReadableAgain(with);
+    const auto names = internal::NamesOf(BuildExperiment(with, host).estimators);
+    if (first.empty()) first = names;
+    if (names == first) continue;
+    internal::FailAt(Place{kOrigin}, variation.key,
+                     "the estimators are " + internal::Join(names) + " with " + Quoted(value) +
+                         ", but " + internal::Join(first) + " with " +
+                         Quoted(variation.values.front()),
+                     "the same names for every value, to compare each with itself");
+  }
+}
+
+}  // namespace
+
+Variation Variation::FromText(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == text.npos || equals == 0) FailUsage(Quoted(text) + " varies no key");
+  Variation variation{text.substr(0, equals), SplitValues(text.substr(equals + 1))};
+  const std::vector<std::string>& values = variation.values;
+  for (auto value = values.begin(); value != values.end(); ++value) {
+    if (value->empty()) FailUsage(Quoted(text) + " lacks a value");
+    if (std::find(values.begin(), value, *value) != value) {
+      FailUsage(Quoted(text) + " has the value " + Quoted(*value) + " twice");
+    }
+  }
+  return variation;
+}
+
+VariedSweep SweepOver(const Config& config, const PluginHost& host, const SweepOptions& options,
+                      const Variation& variation) {
+  ALIDADE_EXPECTS(!variation.values.empty());
+  CheckKey(ConfigWith(config, "alidade", "1"), variation.key);
+  CheckValues(config, host, variation);
+  const auto uses_seed = [&](const std::string& value) {
+    return internal::UsesSeed(ConfigWith(config, variation.key, value), host, options.first_seed);
+  };
+  if (options.runs > 1 && std::ranges::none_of(variation.values, uses_seed)) {
+    internal::FailUnseeded(ConfigWith(config, variation.key, variation.values.front()));
+  }
+  VariedSweep sweep{variation, {}};
+  SweepOptions each = options;
+  for (const std::string& value : variation.values) {
+    const auto before = static_cast<std::int64_t>(sweep.results.size());
+    if (options.progress) {
+      each.progress = [&options, before, &variation](std::int64_t done, std::int64_t total) {
+        const auto values = static_cast<std::int64_t>(variation.values.size());
+        options.progress(before * total + done, values * total);
+      };
+    }
+    const Config with = ConfigWith(config, variation.key, value);
+    sweep.results.push_back(internal::SweepSeeds(with, host, each));
+    if (sweep.stopped()) break;
+  }
+  return sweep;
+}
+
+}  // namespace alidade

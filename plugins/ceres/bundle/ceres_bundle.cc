@@ -13,6 +13,7 @@
 
 #include "alidade/bundle/bundle.h"
 #include "alidade/host/build_plugin.h"
+#include "alidade/state/covariance.h"
 #include "geometry_manifold.h"
 #include "plugins/ceres/loss.h"
 #include "sensor_cost.h"

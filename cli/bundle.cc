@@ -13,7 +13,7 @@
 namespace alidade::cli {
 namespace {
 
-constexpr const char* kFooter = R"(Examples:
+constexpr const char* kBundleFooter = R"(Examples:
   alidade bundle problem-16-22106-pre.txt -o runs/bal
   bzcat problem-16-22106-pre.txt.bz2 | alidade bundle - --loss huber=1.5
   alidade bundle bundle.out --fix intrinsics -o runs/bundler
@@ -23,7 +23,7 @@ Reads problems of BAL, Bundler v0.3 and libmv, told apart by their beginning, an
 `simulate` writes them. Ctrl-C ends after the iteration and keeps the result so far.
 Exit codes: 0 converged, 1 out of iterations, 75 stopped, 79 the solver failed.)";
 
-struct Arguments {
+struct BundleArguments {
   std::string problem, folder, loss;
   std::vector<std::string> fixed;
   BundleTracks tracks;
@@ -84,7 +84,7 @@ std::string AreNames(const std::string& text) {
   return "'" + text + "' has an empty name; expected names with a comma between them, as k1,k2";
 }
 
-BundleFile Read(const Arguments& arguments, const PluginHost& host) {
+BundleFile Read(const BundleArguments& arguments, const PluginHost& host) {
   if (arguments.tracks.camera.empty() && arguments.tracks.start.empty())
     return ReadBundle(arguments.problem);
   BundleTracks tracks = arguments.tracks;
@@ -133,7 +133,7 @@ ExitCode CodeOf(BundleEnd end) {
   return ExitCode::kDiverged;
 }
 
-ExitCode RunBundle(const Arguments& arguments) {
+ExitCode RunBundle(const BundleArguments& arguments) {
   KeepInputs(arguments.folder, {arguments.problem, arguments.tracks.camera.string(),
                                 arguments.tracks.start.string()});
   const PluginHost host(Absolute(arguments.plugin_paths));
@@ -190,7 +190,7 @@ ExitCode RunBundle(const Arguments& arguments) {
 void AddBundle(CLI::App& program, Action& action) {
   CLI::App& command = *program.add_subcommand(
       "bundle", "Adjust cameras and the points that they see: BAL, Bundler, libmv, tracks");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<BundleArguments>();
   command.add_option("PROBLEM", arguments->problem, "the problem, a file; `-`: standard input")
       ->option_text(" ")
       ->required()
@@ -220,7 +220,7 @@ void AddBundle(CLI::App& program, Action& action) {
   AddPluginPath(command, arguments->plugin_paths);
   command.add_flag("--force", arguments->force, "replace the folder if it is there");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
-  command.footer(kFooter);
+  command.footer(kBundleFooter);
   command.callback(
       [&action, arguments] { action = [arguments] { return RunBundle(*arguments); }; });
 }

@@ -15,7 +15,7 @@ namespace alidade::cli {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr const char* kFooter = R"(Examples:
+constexpr const char* kCheckFooter = R"(Examples:
   alidade check build/alidade_range_rate.so --set sigma_m_s=0.5
   alidade check constant_velocity --set noise.acceleration=1
   alidade check mine.so radar --set sigma_m_s=0.5 --states 500 --seed 7
@@ -25,7 +25,7 @@ Each check is a line: ok, FAIL or skipped, and what was seen. A plugin that cras
 process, hangs or eats memory ends nothing but its check. Exits with 1 where a line says FAIL, 78
 where a parameter is missing or wrong. Of a plugin with several models, `--set MODEL.key=value`.)";
 
-struct Arguments {
+struct CheckArguments {
   std::string plugin, model, config;
   std::vector<std::string> sets, plugin_paths;
   CheckOptions options;
@@ -36,7 +36,7 @@ bool IsFile(const std::string& plugin) {
 }
 
 /// The parameters that the command line gives the model `entry`, which is the only one or not.
-Config Parameters(const Arguments& arguments, const PluginEntry& entry, bool only) {
+Config Parameters(const CheckArguments& arguments, const PluginEntry& entry, bool only) {
   Config config = Config::FromText("{}", entry.name);
   for (const std::string& set : arguments.sets) {
     const std::string prefix = only ? "" : entry.name + '.';
@@ -49,7 +49,7 @@ Config Parameters(const Arguments& arguments, const PluginEntry& entry, bool onl
 }
 
 /// Refuses a `--set` that is of none of several models.
-void RequireModels(const Arguments& arguments, const std::vector<PluginEntry>& entries) {
+void RequireModels(const CheckArguments& arguments, const std::vector<PluginEntry>& entries) {
   for (const std::string& set : arguments.sets) {
     const auto is_of = [&](const PluginEntry& entry) { return set.starts_with(entry.name + '.'); };
     if (entries.size() == 1 || std::any_of(entries.begin(), entries.end(), is_of)) continue;
@@ -86,7 +86,7 @@ std::string OfModel(const std::string& name, const std::string& lines) {
 
 /// The models as the command line sets them.
 bool AnyFails(const PluginHost& host, const std::vector<PluginEntry>& entries,
-              const Arguments& arguments) {
+              const CheckArguments& arguments) {
   RequireModels(arguments, entries);
   bool failed = false;
   for (const PluginEntry& entry : entries) {
@@ -130,7 +130,7 @@ bool AnyFails(const PluginHost& host, const std::vector<PluginEntry>& entries, c
   return failed;
 }
 
-ExitCode Check(const Arguments& arguments) {
+ExitCode Check(const CheckArguments& arguments) {
   std::optional<Config> config;
   std::vector<fs::path> places;
   if (IsFile(arguments.plugin)) places = Absolute({arguments.plugin});
@@ -151,7 +151,7 @@ ExitCode Check(const Arguments& arguments) {
 void AddCheck(CLI::App& program, Action& action) {
   CLI::App& command =
       *program.add_subcommand("check", "Check that the models of a plugin keep the rules");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<CheckArguments>();
   CheckOptions& options = arguments->options;
   command
       .add_option("PLUGIN", arguments->plugin, "a plugin file, or the name of one or of a model")
@@ -180,7 +180,7 @@ void AddCheck(CLI::App& program, Action& action) {
                   "let a Step that is additive in dt to this order only pass (2: Euler)")
       ->option_text("N")
       ->check(IsInteger(1, 8));
-  command.footer(kFooter);
+  command.footer(kCheckFooter);
   command.callback([&action, arguments] { action = [arguments] { return Check(*arguments); }; });
 }
 

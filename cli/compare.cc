@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kFooter = R"(Examples:
+constexpr const char* kCompareFooter = R"(Examples:
   alidade compare config.yaml                      run it, with what explains the gap to the batch
   alidade compare config.yaml --runs 100           over seeds 1 to 100
   alidade compare config.yaml --no-explain --reference batch
@@ -25,7 +25,7 @@ constexpr const char* kFooter = R"(Examples:
 Exit code 1: there was no reference, or no measurement, to compare with; 65: runs over different
 data.)";
 
-struct Arguments {
+struct CompareArguments {
   std::string command;          ///< the whole line
   Input input;                  ///< without its config
   std::vector<std::string> of;  ///< a config, or folders
@@ -38,7 +38,7 @@ struct Arguments {
   bool force = false, quiet = false, figures = false;
 };
 
-std::string Shown(const Comparison& comparison, const Arguments& arguments) {
+std::string Shown(const Comparison& comparison, const CompareArguments& arguments) {
   if (arguments.json) return CompareJson(comparison);
   return CompareReport(comparison, arguments.markdown ? TableStyle::kMarkdown
                                    : arguments.latex  ? TableStyle::kLatex
@@ -46,7 +46,7 @@ std::string Shown(const Comparison& comparison, const Arguments& arguments) {
 }
 
 /// Prints the comparison, and where it lies.
-void Tell(const Comparison& comparison, const Arguments& arguments, const fs::path& folder) {
+void Tell(const Comparison& comparison, const CompareArguments& arguments, const fs::path& folder) {
   Print(Shown(comparison, arguments));
   if (!folder.empty() && !arguments.quiet) PrintNote("wrote " + folder.string());
 }
@@ -76,7 +76,7 @@ void AddFiles(auto& folder, const Comparison& comparison) {
   folder.AddFile("compare.tex", CompareReport(comparison, TableStyle::kLatex));
 }
 
-ExitCode CompareRun(const Arguments& arguments, ExplainedExperiment& explained,
+ExitCode CompareRun(const CompareArguments& arguments, ExplainedExperiment& explained,
                     const PluginHost& host, const fs::path& folder) {
   Recorder::Options record{folder, arguments.force, arguments.figures, arguments.command,
                            StopRequested};
@@ -117,7 +117,7 @@ ExitCode CompareRun(const Arguments& arguments, ExplainedExperiment& explained,
   return CodeOf(comparison, result.code);
 }
 
-ExitCode CompareOverSeeds(const Arguments& arguments, const ExplainedExperiment& explained,
+ExitCode CompareOverSeeds(const CompareArguments& arguments, const ExplainedExperiment& explained,
                           const PluginHost& host, const fs::path& folder) {
   Progress progress("runs", arguments.quiet);
   SweepOptions options = arguments.sweep;
@@ -146,7 +146,7 @@ ExitCode CompareOverSeeds(const Arguments& arguments, const ExplainedExperiment&
   return CodeOf(comparison, failed > 0 ? ExitCode::kFound : ExitCode::kOk);
 }
 
-ExitCode CompareConfig(const Arguments& arguments) {
+ExitCode CompareConfig(const CompareArguments& arguments) {
   Input input = arguments.input;
   input.config = arguments.of.front();
   Config config = input.Load();
@@ -160,7 +160,7 @@ ExitCode CompareConfig(const Arguments& arguments) {
                               : CompareRun(arguments, explained, host, folder);
 }
 
-ExitCode CompareFinished(const Arguments& arguments) {
+ExitCode CompareFinished(const CompareArguments& arguments) {
   KeepInputs(arguments.folder, arguments.of);
   std::vector<fs::path> folders;
   for (const std::string& folder : arguments.of) folders.emplace_back(folder);
@@ -185,7 +185,7 @@ bool AreFolders(const std::vector<std::string>& of) {
                              "'" + *file + "' is no folder; expected one config, or run folders");
 }
 
-void CheckOptions(const Arguments& arguments, const CLI::App& command) {
+void CheckOptions(const CompareArguments& arguments, const CLI::App& command) {
   if (!AreFolders(arguments.of)) return;
   for (const char* option : {"--runs", "--first-seed", "--jobs", "--seed", "--set", "--plugin-path",
                              "--allow-outside", "--figures"}) {
@@ -194,7 +194,7 @@ void CheckOptions(const Arguments& arguments, const CLI::App& command) {
   }
 }
 
-void AddOptions(CLI::App& command, Arguments& arguments) {
+void AddOptions(CLI::App& command, CompareArguments& arguments) {
   command.add_option("CONFIG | DIR", arguments.of, "a config to run, or folders of finished runs")
       ->option_text(" ")
       ->required()
@@ -248,10 +248,10 @@ void AddOptions(CLI::App& command, Arguments& arguments) {
 void AddCompare(CLI::App& program, Action& action, const std::string& command_line) {
   CLI::App& command = *program.add_subcommand(
       "compare", "Compare estimators over the same data, and explain the gap to the batch");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<CompareArguments>();
   arguments->command = command_line;
   AddOptions(command, *arguments);
-  command.footer(kFooter);
+  command.footer(kCompareFooter);
   command.callback([&action, &command, arguments] {
     CheckOptions(*arguments, command);
     arguments->over_seeds = command.count("--runs") > 0;

@@ -19,7 +19,7 @@ namespace alidade::cli {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* kDoctorFooter =
     R"(Each line is ok, warn or fail, with a remedy where one is needed. The exit code is 1 where a
 line says fail, else 0.)";
 
@@ -178,7 +178,7 @@ void AddDoctor(CLI::App& program, Action& action) {
   CLI::App& command = *program.add_subcommand("doctor", "Check that everything is in place");
   const auto paths = std::make_shared<std::vector<std::string>>();
   AddPluginPath(command, *paths);
-  command.footer(kFooter);
+  command.footer(kDoctorFooter);
   command.callback([&action, paths] { action = [paths] { return Examine(*paths); }; });
 }
 

@@ -13,7 +13,7 @@
 namespace alidade::cli {
 namespace {
 
-constexpr const char* kFooter = R"(Examples:
+constexpr const char* kEvalFooter = R"(Examples:
   alidade eval runs/slam                           all estimators of a run against its truth
   alidade eval truth.tum estimate.tum -a           ATE and RPE after se3 alignment
   alidade eval truth.tum mono.tum -as              and scale, as a single camera needs it
@@ -26,7 +26,7 @@ the names of evo; underscores, as in --t_max_diff, mean the same.)";
 
 enum class Form { kText, kJson, kMarkdown, kLatex };
 
-struct Arguments {
+struct EvalArguments {
   std::string reference;
   std::vector<std::string> estimates;
   TrajectoryFormat format = TrajectoryFormat::kDetect;
@@ -56,13 +56,13 @@ CLI::Validator OneOf(std::initializer_list<T> values) {
 }
 
 /// What -a, -s and --align-origin mean beside --align-mode.
-Alignment Chosen(const Arguments& arguments) {
+Alignment Chosen(const EvalArguments& arguments) {
   if (arguments.origin) return Alignment::kOrigin;
   if (arguments.se3) return arguments.scale ? Alignment::kSim3 : Alignment::kSe3;
   return arguments.scale ? Alignment::kScale : arguments.options.alignment;
 }
 
-void WarnOf(const std::vector<std::string>& warnings, const Arguments& arguments) {
+void WarnOf(const std::vector<std::string>& warnings, const EvalArguments& arguments) {
   if (arguments.quiet) return;
   for (const std::string& warning : warnings) PrintNote("warning: " + warning);
 }
@@ -114,9 +114,9 @@ Evaluation Failed(const Trajectory& reference, const TrajectoryFile& file,
 }
 
 /// A run that stands alone is compared with its own truth.
-bool IsOfOneRun(const Arguments& arguments) { return arguments.estimates.empty(); }
+bool IsOfOneRun(const EvalArguments& arguments) { return arguments.estimates.empty(); }
 
-std::vector<TrajectoryFile> FilesOf(const Arguments& arguments) {
+std::vector<TrajectoryFile> FilesOf(const EvalArguments& arguments) {
   std::vector<std::string> paths = arguments.estimates;
   if (IsOfOneRun(arguments)) paths = {arguments.reference};
   std::vector<TrajectoryFile> files;
@@ -135,7 +135,7 @@ std::vector<TrajectoryFile> FilesOf(const Arguments& arguments) {
 }
 
 /// Of several estimates one that fails leaves the others theirs; the exit code is the first one's.
-ExitCode RunEval(const Arguments& arguments) {
+ExitCode RunEval(const EvalArguments& arguments) {
   EvaluateOptions options = arguments.options;
   options.alignment = Chosen(arguments);
   options.max_diff = StampFromSeconds(arguments.max_diff_s);
@@ -175,7 +175,7 @@ ExitCode RunEval(const Arguments& arguments) {
 }
 
 /// Says what is wrong with options that fit one by one, but not together.
-void CheckTogether(const Arguments& arguments) {
+void CheckTogether(const EvalArguments& arguments) {
   const PairOptions& pairs = arguments.options.pairs;
   if (pairs.unit == DeltaUnit::kFrames && pairs.delta != std::floor(pairs.delta)) {
     throw CLI::ValidationError("--delta: frames are a whole number");
@@ -193,7 +193,7 @@ void CheckTogether(const Arguments& arguments) {
   }
 }
 
-void AddAlignment(CLI::App& command, Arguments& a) {
+void AddAlignment(CLI::App& command, EvalArguments& a) {
   CLI::Option* se3 = command.add_flag(
       "-a,--align", a.se3, "align by rotation and translation (se3); with -s by scale too (sim3)");
   CLI::Option* scale =
@@ -214,7 +214,7 @@ void AddAlignment(CLI::App& command, Arguments& a) {
       ->check(IsInteger(3, 1'000'000'000));
 }
 
-void AddErrors(CLI::App& command, Arguments& a) {
+void AddErrors(CLI::App& command, EvalArguments& a) {
   command
       .add_option("-r,--pose-relation", a.options.relations,
                   "trans_part, rot_part, angle_deg, angle_rad, full or point_distance; may be "
@@ -243,7 +243,7 @@ void AddErrors(CLI::App& command, Arguments& a) {
       ->check(IsNumber(0.0, 1.0));
 }
 
-void AddTimes(CLI::App& command, Arguments& a) {
+void AddTimes(CLI::App& command, EvalArguments& a) {
   command
       .add_option("--t-max-diff", a.max_diff_s,
                   "largest time difference of two poses that match, s; default 0.01")
@@ -259,7 +259,7 @@ void AddTimes(CLI::App& command, Arguments& a) {
           OneOf({TrajectoryFormat::kTum, TrajectoryFormat::kKitti, TrajectoryFormat::kEuroc}));
 }
 
-void AddForms(CLI::App& command, Arguments& a) {
+void AddForms(CLI::App& command, EvalArguments& a) {
   const auto add = [&](const char* name, Form form, const char* help) {
     return command.add_flag_callback(
         name, [&a, form] { a.form = form; }, help);
@@ -286,7 +286,7 @@ void AddForms(CLI::App& command, Arguments& a) {
 void AddEval(CLI::App& program, Action& action) {
   CLI::App& command =
       *program.add_subcommand("eval", "Compare trajectories with a reference: ATE, RPE, NEES");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<EvalArguments>();
   command
       .add_option("REF", arguments->reference,
                   "the reference: a file, or the folder of a run; without EST a run, compared with "
@@ -301,7 +301,7 @@ void AddEval(CLI::App& program, Action& action) {
   AddErrors(command, *arguments);
   AddTimes(command, *arguments);
   AddForms(command, *arguments);
-  command.footer(kFooter);
+  command.footer(kEvalFooter);
   command.callback([&action, arguments] {
     CheckTogether(*arguments);
     action = [arguments] { return RunEval(*arguments); };

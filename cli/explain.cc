@@ -11,7 +11,7 @@
 namespace alidade::cli {
 namespace {
 
-constexpr const char* kFooter = R"(Example:
+constexpr const char* kExplainFooter = R"(Example:
   alidade explain examples/05_depth_principled/config.yaml --set estimators.ekf.fuse=per_sensor)";
 
 ExitCode ExplainConfig(const Input& input) {
@@ -28,7 +28,7 @@ void AddExplain(CLI::App& program, Action& action) {
       "explain", "Tell what a config does: state, models, who touches what, what cannot be seen");
   const auto input = std::make_shared<Input>();
   input->AddTo(command);
-  command.footer(kFooter);
+  command.footer(kExplainFooter);
   command.callback([&action, input] { action = [input] { return ExplainConfig(*input); }; });
 }
 

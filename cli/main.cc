@@ -12,7 +12,7 @@
 namespace alidade::cli {
 namespace {
 
-constexpr const char* kFooter = R"(Examples:
+constexpr const char* kProgramFooter = R"(Examples:
   alidade doctor                                   is everything in place?
   alidade plugins list                             sensors, motion models, sources, estimators
   alidade check stereo_disparity --config examples/05_depth_principled/config.yaml
@@ -30,7 +30,7 @@ class Format : public CLI::Formatter {
  public:
   Format() {
     label("SUBCOMMAND", "COMMAND");
-    label("Positionals", "Arguments");
+    label("Positionals", "ProgramArguments");
     column_width(28);
   }
 };
@@ -68,7 +68,7 @@ std::vector<std::string> ReversedArguments(int argc, char** argv) {
 
 void Describe(CLI::App& program, Action& action, const std::string& command_line) {
   program.formatter(std::make_shared<Format>());
-  program.footer(kFooter);
+  program.footer(kProgramFooter);
   program.set_version_flag("--version", "alidade " ALIDADE_VERSION, "print the version and leave");
   program.require_subcommand(1);
   AddRun(program, action, command_line);

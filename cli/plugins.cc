@@ -10,7 +10,7 @@
 namespace alidade::cli {
 namespace {
 
-constexpr const char* kFooter = R"(Examples:
+constexpr const char* kPluginsFooter = R"(Examples:
   alidade plugins list
   alidade plugins info stereo_disparity
   alidade plugins info scale_2d --json
@@ -20,20 +20,20 @@ constexpr const char* kFooter = R"(Examples:
 Plugins are looked for in the config's `plugins:`, --plugin-path, ALIDADE_PLUGIN_PATH, the user's
 data folder ($XDG_DATA_HOME/alidade/plugins) and beside the program.)";
 
-struct Arguments {
+struct PluginsArguments {
   std::vector<std::string> paths;
   std::string name;
   bool json = false;
 };
 
-using Listing = std::string (*)(const PluginHost&, const Arguments&);
+using Listing = std::string (*)(const PluginHost&, const PluginsArguments&);
 
 /// A subcommand that prints what `listing` makes of the plugins.
-std::shared_ptr<Arguments> AddListing(CLI::App& command, Action& action, Listing listing,
-                                      OnRefusal on_refusal = OnRefusal::kThrow) {
-  const auto arguments = std::make_shared<Arguments>();
+std::shared_ptr<PluginsArguments> AddListing(CLI::App& command, Action& action, Listing listing,
+                                             OnRefusal on_refusal = OnRefusal::kThrow) {
+  const auto arguments = std::make_shared<PluginsArguments>();
   AddPluginPath(command, arguments->paths);
-  command.footer(kFooter);
+  command.footer(kPluginsFooter);
   command.callback([&action, arguments, listing, on_refusal] {
     action = [arguments, listing, on_refusal] {
       const PluginHost host(Absolute(arguments->paths), on_refusal);
@@ -44,25 +44,25 @@ std::shared_ptr<Arguments> AddListing(CLI::App& command, Action& action, Listing
   return arguments;
 }
 
-std::string List(const PluginHost& host, const Arguments& arguments) {
+std::string List(const PluginHost& host, const PluginsArguments& arguments) {
   if (const std::size_t count = host.refusals().size(); count > 0) {
     PrintNote(std::to_string(count) + " refused: `alidade plugins where` tells why");
   }
   return arguments.json ? PluginListJson(host) : PluginList(host);
 }
 
-std::string Info(const PluginHost& host, const Arguments& arguments) {
+std::string Info(const PluginHost& host, const PluginsArguments& arguments) {
   return arguments.json ? PluginInfoJson(host, arguments.name) : PluginInfo(host, arguments.name);
 }
 
-std::string Where(const PluginHost& host, const Arguments&) { return PluginPlaces(host); }
+std::string Where(const PluginHost& host, const PluginsArguments&) { return PluginPlaces(host); }
 
 }  // namespace
 
 void AddPlugins(CLI::App& program, Action& action) {
   CLI::App& plugins = *program.add_subcommand("plugins", "Tell which plugins there are");
   plugins.require_subcommand(1);
-  plugins.footer(kFooter);
+  plugins.footer(kPluginsFooter);
   CLI::App& list =
       *plugins.add_subcommand("list", "List the models, sources and estimators on offer");
   const auto list_arguments = AddListing(list, action, List);

@@ -17,7 +17,7 @@
 namespace alidade::cli {
 namespace {
 
-constexpr const char* kFooter = R"(Examples:
+constexpr const char* kRunFooter = R"(Examples:
   alidade run base.yaml                            into runs/base
   alidade run near/config.yaml                     into runs/near
   alidade run config.yaml -o runs/b --seed 2 --set estimators.ekf.gate=0.99
@@ -26,7 +26,7 @@ constexpr const char* kFooter = R"(Examples:
 Ctrl-C finishes the frame, writes all that is done and ends with exit code 75; twice: at once. While
 figures are drawn it leaves out the rest of them.)";
 
-struct Arguments {
+struct RunArguments {
   std::string command;  ///< the whole line
   Input input;
   std::string folder;
@@ -94,7 +94,7 @@ std::string Summary(const RunResult& result, const Recorder& recorder) {
   return text;
 }
 
-ExitCode RunConfig(const Arguments& arguments) {
+ExitCode RunConfig(const RunArguments& arguments) {
   Config config = arguments.input.Load();
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
   const std::filesystem::path folder = OutputFolder(arguments.folder, config, arguments.input);
@@ -129,7 +129,7 @@ ExitCode RunConfig(const Arguments& arguments) {
 
 void AddRun(CLI::App& program, Action& action, const std::string& command_line) {
   CLI::App& command = *program.add_subcommand("run", "Run the estimators of a config");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<RunArguments>();
   arguments->command = command_line;
   arguments->input.AddTo(command);
   AddOutput(command, arguments->folder,
@@ -140,7 +140,7 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
   command.add_flag("--no-figures", arguments->no_figures, "draw no figures");
   command.add_flag("--covariances", arguments->covariances,
                    "write P of every estimate, for `alidade compare`");
-  command.footer(kFooter);
+  command.footer(kRunFooter);
   command.callback(
       [&action, arguments] { action = [arguments] { return RunConfig(*arguments); }; });
 }

@@ -11,7 +11,7 @@
 namespace alidade::cli {
 namespace {
 
-constexpr const char* kFooter = R"(Examples:
+constexpr const char* kSimulateFooter = R"(Examples:
   alidade simulate config.yaml -o data/scene
   alidade simulate config.yaml -o data/scene-7 --seed 7
   alidade simulate config.yaml -o data/scene --video video.avi --images images
@@ -21,7 +21,7 @@ No estimator is made. Measurements of landmarks go to STREAM.csv as frame,featur
 as frame,t_s and their values; beside them timestamps.csv, truth, map.csv and calibration.yaml.
 Pictures have an equal disc at the pixel of each landmark's measurement.)";
 
-struct Arguments {
+struct SimulateArguments {
   Input input;
   std::string folder;
   std::optional<std::uint64_t> seed;
@@ -40,7 +40,7 @@ std::string IsInside(const std::string& name) {
   return "'" + name + "' is the folder itself; expected a name in it, like images";
 }
 
-ExitCode RunSimulate(const Arguments& arguments) {
+ExitCode RunSimulate(const SimulateArguments& arguments) {
   Config config = arguments.input.Load();
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
   const std::filesystem::path path =
@@ -64,7 +64,7 @@ ExitCode RunSimulate(const Arguments& arguments) {
 void AddSimulate(CLI::App& program, Action& action) {
   CLI::App& command = *program.add_subcommand(
       "simulate", "Write what the source of a config gives, as files to be read again");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<SimulateArguments>();
   arguments->input.AddTo(command);
   AddOutput(command, arguments->folder,
             "folder; default: the config's `output:`, or data-NAME, in runs/");
@@ -82,7 +82,7 @@ void AddSimulate(CLI::App& program, Action& action) {
       ->check(IsInside);
   command.add_flag("--force", arguments->force, "replace the folder if it is there");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
-  command.footer(kFooter);
+  command.footer(kSimulateFooter);
   command.callback(
       [&action, arguments] { action = [arguments] { return RunSimulate(*arguments); }; });
 }

@@ -12,7 +12,7 @@
 namespace alidade::cli {
 namespace {
 
-constexpr const char* kFooter = R"(Examples:
+constexpr const char* kSweepFooter = R"(Examples:
   alidade sweep config.yaml --runs 200             seeds 1 to 200, all processors
   alidade sweep config.yaml --runs 200 --first-seed 1001 -o runs/test
   alidade sweep config.yaml --runs 10000 --shard 3/16 -o runs/share-03
@@ -22,7 +22,7 @@ The folder gets sweep.json, runs.csv and table.md; with --vary, sweep.csv and a 
 number of jobs does not change a byte of them. Exit code 1: some runs failed; 75: stopped by a
 signal, with what was complete written.)";
 
-struct Arguments {
+struct SweepArguments {
   Input input;
   std::string folder;
   std::string vary;
@@ -69,7 +69,7 @@ bool ReportFailures(const SweepResult& result, const std::string& where) {
 
 /// What both kinds of sweep start from.
 struct Task {
-  const Arguments& arguments;
+  const SweepArguments& arguments;
   const Config& config;
   const PluginHost& host;
   const SweepOptions& options;
@@ -120,7 +120,7 @@ ExitCode SweepValues(const Task& task) {
   return failed ? ExitCode::kFound : ExitCode::kOk;
 }
 
-ExitCode RunSweep(const Arguments& arguments) {
+ExitCode RunSweep(const SweepArguments& arguments) {
   const Config config = arguments.input.Load();
   const std::filesystem::path path =
       OutputFolder(arguments.folder, config, arguments.input, "sweep-");
@@ -140,7 +140,7 @@ ExitCode RunSweep(const Arguments& arguments) {
 
 void AddSweep(CLI::App& program, Action& action) {
   CLI::App& command = *program.add_subcommand("sweep", "Run a config with many seeds");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<SweepArguments>();
   arguments->input.AddTo(command);
   command.add_option("--runs", arguments->options.runs, "number of runs, of all shards together")
       ->option_text("N")
@@ -168,7 +168,7 @@ void AddSweep(CLI::App& program, Action& action) {
             "folder; default: the config's `output:`, or sweep-NAME, in runs/");
   command.add_flag("--force", arguments->force, "replace the folder if it is there");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
-  command.footer(kFooter);
+  command.footer(kSweepFooter);
   command.callback([&action, arguments] {
     CheckShares(arguments->options);
     action = [arguments] { return RunSweep(*arguments); };

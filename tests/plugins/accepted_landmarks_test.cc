@@ -12,6 +12,18 @@
 namespace alidade {
 namespace {
 
+/// When each landmark was initialised, by estimator.
+class Entries : public RunObserver {
+ public:
+  void OnEstimate(int estimator, const Frame& frame, const State&,
+                  const UpdateReport& report) override {
+    for (const MeasurementReport& entry : report.measurements()) {
+      if (entry.outcome == Outcome::kInitialised) entered[estimator][entry.landmark] = frame.stamp;
+    }
+  }
+  std::map<int, std::map<std::int64_t, Stamp>> entered;
+};
+
 // The ekf counts to `enter_after`; what it then passes on has waited.
 TEST(AcceptedBy, LandmarksEnterAtTheSameObservation) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml");
@@ -24,18 +36,13 @@ TEST(AcceptedBy, LandmarksEnterAtTheSameObservation) {
   }
   const PluginHost host;
   Experiment experiment = BuildExperiment(config, host);
-  std::map<std::int64_t, Stamp> entered[2];
+  Entries entries;
   RunOptions options;
-  options.observe = [&](int index, const Frame& frame, const State&, const UpdateReport& report) {
-    for (const MeasurementReport& entry : report.measurements()) {
-      if (entry.outcome == Outcome::kInitialised)
-        entered[index == 0 ? 0 : 1][entry.landmark] = frame.stamp;
-    }
-  };
+  options.observers = {&entries};
   const RunResult run = alidade::Run(experiment, options);
   ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
-  EXPECT_GT(entered[0].size(), 20u);
-  EXPECT_EQ(entered[1], entered[0]);
+  EXPECT_GT(entries.entered[0].size(), 20u);
+  EXPECT_EQ(entries.entered[1], entries.entered[0]);
 }
 
 }  // namespace

@@ -66,9 +66,9 @@ Experiment MakeWithBatch(bool outliers, bool accepted) {
   options.gate = 0.9999;
   auto ekf = std::make_unique<Ekf>(system, options, testing::StreamsOf(system));
   experiment.estimators.push_back(
-      {"ekf", "ekf", system, std::move(ekf), OnDivergence::kReport, ""});
-  experiment.estimators.push_back(
-      {"batch", "ceres_batch", system, std::make_unique<Told>(system), OnDivergence::kReport, ""});
+      {"ekf", "ekf", EstimatorKind::kFilter, system, std::move(ekf), OnDivergence::kReport, ""});
+  experiment.estimators.push_back({"batch", "ceres_batch", EstimatorKind::kBatch, system,
+                                   std::make_unique<Told>(system), OnDivergence::kReport, ""});
   if (accepted) experiment.estimators[1].accepted_by = 0;
   return experiment;
 }

@@ -275,7 +275,7 @@ TEST(ControlInputs, DriveTheSmootherToo) {
 }
 
 /// x' = x + q_w dt for a unit quaternion q: its neutral element is not all zeros.
-struct Turned : Motion<1, Vec<1>> {
+struct TurnedByInput : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   using Input = UnitQuaternion;
   static constexpr Quantity kInput{"orientation", "", "", "w,x,y,z"};
@@ -288,7 +288,7 @@ struct Turned : Motion<1, Vec<1>> {
 
 TEST(ControlInputs, OnAManifoldStartAtItsNeutralElementAndStayOnIt) {
   System system;
-  AddMotion(system, "body", InProcessMotion(Turned(), "turned"), {{"x", 0.0, 1.0}});
+  AddMotion(system, "body", InProcessMotion(TurnedByInput(), "turned"), {{"x", 0.0, 1.0}});
   system.motions[0].input = {"attitude", kInfinity};
   system.start_s = -1.0;
   Ekf ekf(system, {}, {{"attitude", 4}});

@@ -100,7 +100,7 @@ struct StillDirection : Motion<0, UnitVector> {
 };
 
 /// z = u
-struct Direction : Sensor<Vec<3>, UnitVector> {
+struct DirectionFromVector : Sensor<Vec<3>, UnitVector> {
   static constexpr std::array kRoles{Quantity{"u", "", "", "x,y,z"}};
   static constexpr Quantity kMeasurement{"z", "", "", "x,y,z"};
   template <class T>
@@ -123,7 +123,7 @@ TEST(Ekf, UnderFirstEstimateADirectionIsCarriedFromItsLatestTangentToItsFirst) {
   const Eigen::Matrix2d prior{{0.9, 0.2}, {0.2, 0.1}};
   system.priors.push_back({0, {first[0], first[1], first[2]}, prior, ""});
   system.motions.push_back(binding);
-  AddSensor(system, "direction", InProcessSensor(Direction(), "direction"), {"s.u"});
+  AddSensor(system, "direction", InProcessSensor(DirectionFromVector(), "direction"), {"s.u"});
   EkfOptions options;
   options.jacobian = JacobianAt::kFirstEstimate;
   Ekf ekf(system, options, {{"direction", 3}});

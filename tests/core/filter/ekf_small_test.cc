@@ -18,7 +18,7 @@ namespace {
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
 /// Two numbers from one state entry of two, with correlated noise.
-struct Pair : Sensor<Vec<2>, Vec<2>> {
+struct CorrelatedPair : Sensor<Vec<2>, Vec<2>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
   template <class T>
@@ -216,8 +216,8 @@ TEST(SmallEkf, StacksMeasurementsOfSeveralRows) {
   prior.mean = {1.5, 0.7};
   prior.covariance = Eigen::Matrix2d{{0.5, 0.1}, {0.1, 0.3}};
   system.priors.push_back(prior);
-  AddSensor(system, "first", InProcessSensor(Pair(), "pair"), {"a.x"});
-  AddSensor(system, "second", InProcessSensor(Pair(), "pair"), {"a.x"});
+  AddSensor(system, "first", InProcessSensor(CorrelatedPair(), "pair"), {"a.x"});
+  AddSensor(system, "second", InProcessSensor(CorrelatedPair(), "pair"), {"a.x"});
   EkfOptions options;
   options.gate = 0.999;
   std::vector<Frame> frames;
@@ -249,7 +249,7 @@ struct Shaken : Motion<2, Vec<2>> {
 };
 
 /// x' = x + dt (x_2, -x_1), without noise.
-struct Turning : Motion<0, Vec<2>> {
+struct Spinning : Motion<0, Vec<2>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   template <class T>
   void Step(const T* x, const T*, double dt_s, T* next) const {
@@ -261,7 +261,7 @@ struct Turning : Motion<0, Vec<2>> {
 
 TEST(SmallEkf, TakesAnySquareRootOfTheNoiseAndMotionWithoutNoise) {
   for (const MotionModel& model :
-       {InProcessMotion(Shaken(), "shaken"), InProcessMotion(Turning(), "turning")}) {
+       {InProcessMotion(Shaken(), "shaken"), InProcessMotion(Spinning(), "turning")}) {
     System system;
     const BlockId x = system.layout.Declare("a.x", "a", model.blocks()[0]);
     system.motions.push_back({"a", model, {x}});
@@ -270,7 +270,7 @@ TEST(SmallEkf, TakesAnySquareRootOfTheNoiseAndMotionWithoutNoise) {
     prior.mean = {1.5, 0.7};
     prior.covariance = Eigen::Matrix2d{{0.5, 0.1}, {0.1, 0.3}};
     system.priors.push_back(prior);
-    AddSensor(system, "pair", InProcessSensor(Pair(), "pair"), {"a.x"});
+    AddSensor(system, "pair", InProcessSensor(CorrelatedPair(), "pair"), {"a.x"});
     std::vector<Frame> frames;
     for (int k = 0; k < 20; ++k) {
       Frame frame = FrameAt(0.1 * k, {});

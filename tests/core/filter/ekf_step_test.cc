@@ -83,7 +83,7 @@ TEST(EkfStep, ACovarianceCloseToTheLargestNumberStillSteps) {
 }
 
 /// The angle grows by 1 rad a step; a quaternion turns about z, and its length by 0.1 %.
-struct Turning : Motion<0, Angle, UnitQuaternion> {
+struct TurningBlocks : Motion<0, Angle, UnitQuaternion> {
   static constexpr std::array kBlocks{Quantity{"a", "rad"}, Quantity{"q"}};
   template <class T>
   void Step(const T* a, const T* q, const T*, double, T* next_a, T* next_q) const {
@@ -117,7 +117,7 @@ struct Opposite : Sensor<Angle, Angle> {
 
 System Turn() {
   System system;
-  MotionBinding binding{"t", InProcessMotion(Turning(), "turning"), {}};
+  MotionBinding binding{"t", InProcessMotion(TurningBlocks(), "turning"), {}};
   for (std::size_t i = 0; i < 2; ++i) {
     const Space& space = binding.model.blocks()[i];
     const BlockId id = system.layout.Declare("t." + space.name, "t", space);

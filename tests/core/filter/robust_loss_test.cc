@@ -102,7 +102,7 @@ TYPED_TEST(RobustFilter, LeavesOutWhatItsWeightOfZeroIsFor) {
 }
 
 /// z = x + n of two elements.
-struct Pair : Sensor<Vec<2>, Vec<2>> {
+struct PairOfElements : Sensor<Vec<2>, Vec<2>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   static constexpr Quantity kMeasurement{"z"};
   template <class T>
@@ -148,7 +148,7 @@ TYPED_TEST(RobustFilter, WeighsAMeasurementOfTwoElementsAsAWhole) {
   const Eigen::Matrix2d p0 = (Eigen::Matrix2d() << 4.0, 1.0, 1.0, 2.0).finished();
   system.priors.push_back({id, {0.0, 0.0}, p0, ""});
   for (const char* name : {"one", "two"}) {
-    AddSensor(system, name, InProcessSensor(Pair{}, "pair"), {"p.x"});
+    AddSensor(system, name, InProcessSensor(PairOfElements{}, "pair"), {"p.x"});
     system.sensors.back().loss = kCauchy;
   }
   const Eigen::Matrix2d r = (Eigen::Matrix2d() << 0.25, 0.15, 0.15, 0.16).finished();

@@ -107,13 +107,13 @@ struct DirectionBatch {
 };
 
 /// How far smoother and batch are apart, at most: in standard deviations, and of P relatively.
-struct Apart {
+struct SeamDistance {
   double estimate = 0.0, covariance = 0.0;
 };
 
 /// Follows a direction that crosses z = 0, where the basis turns over, again and again. All angles
 /// are `sigma` times the same numbers.
-Apart Follow(double sigma) {
+SeamDistance Follow(double sigma) {
   System system;
   MotionBinding binding{"d", InProcessMotion(Wander(sigma), "wander"), {}};
   binding.blocks.push_back(system.layout.Declare("d.n", "d", binding.model.blocks()[0]));
@@ -145,7 +145,7 @@ Apart Follow(double sigma) {
   EXPECT_GE(crossings, 3);
   batch.n.assign(batch.z.size(), Eigen::Vector3d(prior.mean.data()));
   for (int i = 0; i < 6; ++i) batch.Iterate();
-  Apart most;
+  SeamDistance most;
   rts.Smooth([&](std::size_t k, const State& state, const UpdateReport&) {
     const auto at = 2 * static_cast<Eigen::Index>(k);
     const Eigen::Matrix<double, 3, 2> b = BasisAt(batch.n[k].data()), c = BasisAt(state.value(0));
@@ -163,7 +163,7 @@ Apart Follow(double sigma) {
 // quarter of all angles leaves a sixteenth. A first order would leave a quarter; 8 lies halfway, on
 // a scale of factors. What goes wrong at the seam does not become less.
 TEST(RtsSmoother, FollowsADirectionAcrossTheSeamOfItsBasisAsTheBatchDoes) {
-  const Apart wide = Follow(2e-3), narrow = Follow(0.5e-3);
+  const SeamDistance wide = Follow(2e-3), narrow = Follow(0.5e-3);
   EXPECT_GT(wide.estimate, 8.0 * narrow.estimate) << wide.estimate << ' ' << narrow.estimate;
   EXPECT_GT(wide.covariance, 8.0 * narrow.covariance)
       << wide.covariance << ' ' << narrow.covariance;

@@ -33,7 +33,7 @@ struct Sum : Sensor<Vec<1>, Vec<1>, Vec<1>> {
 };
 
 /// Kalman filter of MovingPoint(0.7) with one direct measurement, the inverse of S written out.
-struct Textbook {
+struct DirectTextbook {
   Eigen::Vector2d x{1.0, -0.5};
   Eigen::Matrix2d p = Eigen::Vector2d(4.0, 9.0).asDiagonal();
   void Step(double dt) {
@@ -54,7 +54,7 @@ TEST(SquareRootEkf, EqualsTheClosedFormKalmanFilterOnALinearProblem) {
   AddSensor(system, "direct", InProcessSensor(Linear(1.0, 0.3), "linear"), {"p.x"});
   SquareRootEkf filter(system, {}, StreamsOf(system));
   filter.Start(0);
-  Textbook textbook;
+  DirectTextbook textbook;
   Random random(21);
   for (int k = 1; k <= 300; ++k) {
     const double z = random.Normal();
@@ -152,7 +152,7 @@ TEST(SquareRootEkf, ASingularPriorStaysSingular) {
 }
 
 /// Measures a direction.
-struct Direction : Sensor<UnitVector, UnitVector> {
+struct MeasuredDirection : Sensor<UnitVector, UnitVector> {
   static constexpr std::array kRoles{Quantity{"n", "", "", "x,y,z"}};
   static constexpr Quantity kMeasurement{"z", "", "", "x,y,z"};
   template <class T>
@@ -189,7 +189,7 @@ System DirectionNearTheSeam() {
   prior.covariance = (Eigen::Matrix2d() << 0.04, 0.01, 0.01, 0.01).finished();
   system.priors.push_back(prior);
   system.motions.push_back(binding);
-  AddSensor(system, "seen", InProcessSensor(Direction{}, "direction"), {"d.n"});
+  AddSensor(system, "seen", InProcessSensor(MeasuredDirection{}, "direction"), {"d.n"});
   return system;
 }
 

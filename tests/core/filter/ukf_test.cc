@@ -91,10 +91,10 @@ TEST(Ukf, GetsTheMomentsOfASquareExactly) {
 }
 
 /// An orientation that turns by w, w ~ N(0, sigma^2 I): q' = q Exp(w).
-struct Turning : Motion<3, UnitQuaternion> {
+struct TurningOrientation : Motion<3, UnitQuaternion> {
   static constexpr std::array kBlocks{Quantity{"q", "", "", "w,x,y,z"}};
   double sigma;
-  explicit Turning(double s) : sigma(s) {}
+  explicit TurningOrientation(double s) : sigma(s) {}
   template <class T>
   void Step(const T* q, const T* w, double, T* next) const {
     UnitQuaternion::Plus(q, w, next);
@@ -122,7 +122,7 @@ struct Compass : Sensor<UnitQuaternion, UnitQuaternion> {
 /// Orientation that starts at (1, 0, 0, 0) +- 0.05 rad.
 System Orientation() {
   System system;
-  MotionBinding binding{"body", InProcessMotion(Turning(0.01), "turning"), {}};
+  MotionBinding binding{"body", InProcessMotion(TurningOrientation(0.01), "turning"), {}};
   const BlockId id = system.layout.Declare("body.q", "body", binding.model.blocks()[0]);
   binding.blocks.push_back(id);
   Prior prior;

@@ -252,6 +252,7 @@ struct Displacement : Sensor<Vec<2>, Vec<2>, Vec<3>> {
 
 /// z = x, and a closed form of more numbers than are copied one by one.
 struct Wide : Sensor<Vec<20>, Vec<20>> {
+  static constexpr std::array kRoles{Quantity{"x"}};
   template <class T>
   bool Predict(const T* x, T* z) const {
     std::copy_n(x, 20, z);

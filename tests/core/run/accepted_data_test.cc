@@ -91,9 +91,9 @@ TEST(AcceptedBy, HoldsWhereTheEstimatorsGoBackForLateFrames) {
 }
 
 /// The given frames, of the given streams.
-class Given : public Source {
+class GivenFrames : public Source {
  public:
-  Given(std::vector<StreamInfo> streams, std::vector<Frame> frames)
+  GivenFrames(std::vector<StreamInfo> streams, std::vector<Frame> frames)
       : streams_(std::move(streams)), frames_(std::move(frames)) {}
   const std::vector<StreamInfo>& streams() const override { return streams_; }
   const std::vector<StreamInfo>& truths() const override { return truths_; }
@@ -122,7 +122,7 @@ Experiment MakeChain(const System& system, std::vector<StreamInfo> streams,
     named.estimator = std::make_unique<Ekf>(system, options, streams);
     named.accepted_by = i - 1;
   }
-  experiment.source = std::make_unique<Given>(std::move(streams), std::move(frames));
+  experiment.source = std::make_unique<GivenFrames>(std::move(streams), std::move(frames));
   return experiment;
 }
 

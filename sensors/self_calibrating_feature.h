@@ -102,7 +102,7 @@ struct RadtanLens {
 ///   sigma      1      px      -      standard deviation of u and of v; > 0
 ///
 /// Defined for  hz > 0, or where the domain is projective hz != 0; else out_of_domain, outputs
-///              untouched. BAL and Bundler define their camera by p = -P / P_z on either side of it.
+///              untouched. BAL and Bundler define their camera by p = -P / P_z on both sides.
 /// Source       [Agarwal2010], [Brown1971].
 template <class Lens>
 struct SelfCalibratingFeature : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<Lens::kSize>, Vec<3>> {

@@ -32,8 +32,9 @@ TEST_F(CheckProgram, SaysWhichJacobiansAreAnalytic) {
                        "Predict: analytic Jacobian, Initialise: automatic "
                        "differentiation; "))
       << stereo.out;
-  const Outcome pose = Call({"check", "quaternion_pose", "--set", "noise.linear_acceleration=0.4",
-                             "--set", "noise.angular_acceleration=0.2"});
+  const Outcome pose =
+      Call({"check", "quaternion_pose", "--set", "noise.kind=discrete", "--set",
+            "noise.linear_acceleration=0.4", "--set", "noise.angular_acceleration=0.2"});
   EXPECT_TRUE(Contains(pose.out, "Step: automatic differentiation; ")) << pose.out;
   const Outcome motion = Call({"check", "constant"});
   EXPECT_TRUE(Contains(motion.out, "Step: analytic Jacobian; ")) << motion.out;

@@ -25,7 +25,21 @@ struct Estimate {
   Eigen::MatrixXd p;
 };
 
-Estimate EstimateOf(const State& state) { return {state.values(), state.covariance().Dense()}; }
+/// Of the blocks that have a value, in the order of the layout: an estimator may keep places for
+/// others between them.
+Estimate EstimateOf(const State& state) {
+  Estimate estimate;
+  std::vector<int> rows;
+  for (std::size_t id = 0; id < state.layout().blocks().size(); ++id) {
+    const Block& block = state.layout().blocks()[id];
+    if (!block.present) continue;
+    const double* const value = state.value(static_cast<BlockId>(id));
+    estimate.x.insert(estimate.x.end(), value, value + block.geometry().ambient);
+    for (int i = 0; i < block.geometry().tangent; ++i) rows.push_back(block.tangent_offset + i);
+  }
+  estimate.p = state.covariance().Dense()(rows, rows);
+  return estimate;
+}
 
 void ExpectNear(const Estimate& found, const Estimate& expected, double tolerance, std::size_t k) {
   ASSERT_EQ(found.x.size(), expected.x.size()) << k;

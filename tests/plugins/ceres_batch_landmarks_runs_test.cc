@@ -34,18 +34,19 @@ TEST(CeresBatchLandmarks, WhatTheFilterForgetsAndMeetsAgainIsAnotherLandmark) {
   EXPECT_LT((other.Landmark(104).position - found.Landmark(4).position).norm(), 1e-9);
 }
 
-// What waits in the filter that lends its measurements is not lent: it would wait twice.
+// What waits in the filter whose measurements it uses is not passed on: it would wait twice.
 TEST(CeresBatchLandmarks, WhatAFilterAcceptedEntersAtOnce) {
-  const Problem problem(12, 8);
-  System system = problem.Filter();
-  system.landmarks->enter_after = 3;
-  const auto initialised = [&](const std::string& options) {
-    const auto batch = testing::MakeBatch(system, options + "data: so_far\n");
-    return batch->Process(problem.frames[0]).landmarks.initialised;
-  };
-  EXPECT_EQ(initialised(""), 0);
-  EXPECT_EQ(initialised("use: {accepted_by: ekf}\n"),
-            static_cast<int>(problem.frames[0].measurements.size()));
+  Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml");
+  for (const auto& [key, value] :
+       std::map<std::string, std::string>{{"landmarks.enter_after", "3"},
+                                          {"estimators.batch.type", "ceres_batch"},
+                                          {"estimators.batch.use.accepted_by", "ekf"}}) {
+    config.Set(key, value, "--set");
+  }
+  const Experiment experiment = BuildExperiment(config, testing::Shipped());
+  ASSERT_EQ(experiment.estimators.size(), 2u);
+  EXPECT_EQ(experiment.estimators[0].system.landmarks->enter_after, 3);
+  EXPECT_EQ(experiment.estimators[1].system.landmarks->enter_after, 1);
 }
 
 TEST(CeresBatchLandmarks, GivesTheSameBytesTwice) {

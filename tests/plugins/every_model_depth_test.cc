@@ -9,7 +9,7 @@ INSTANTIATE_TEST_SUITE_P(
     Depth, EveryModel,
     ::testing::Values(SensorRow("depth_feature",
                                 "{sigma_px: 1, sigma_depth_m: 0.1, landmarks: {form: xyz}, " +
-                                    kCamera + "}",
+                                    kSmallCameraText + "}",
                                 DepthFeature<Xyz>(kSmallCamera, 1.0, 0.1),
                                 {kPosition, kOrientation, {0.2, 0.4, 2.0}})),
     RowName);

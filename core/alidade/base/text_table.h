@@ -20,7 +20,7 @@ std::string LatexText(const std::string& text);
 /// `a & b \\`, a line of a tabular, each cell as LatexText.
 std::string LatexRow(const TextRow& cells);
 
-/// One line of a table: a label with its unit, and a cell for each column, `-` where it has no value.
+/// One line of a table: a label with its unit, and a cell for each column, `-` if it has no value.
 struct TableRow {
   std::string label;
   std::vector<std::string> cells;

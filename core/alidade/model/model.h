@@ -59,7 +59,7 @@ enum class NoiseKind {
 ///
 /// Roles with the flag ALIDADE_ROLE_LANDMARK stand side by side and are filled by the landmark that
 /// a measurement names. Where kInitialises is the first of them, y holds them all, one after the
-/// other. An optional member of another signature is a compile error (alidade/model/model_members.h).
+/// other. An optional member of another signature is a compile error (model_members.h).
 template <class MeasurementGeometry, class... RoleGeometries>
 struct Sensor {
   using Measurement = MeasurementGeometry;

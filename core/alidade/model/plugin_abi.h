@@ -13,7 +13,7 @@
  *     triangles of L, all of F, G and each Jacobian. What it leaves out counts as not a number;
  *   - a call that returns another code leaves its outputs untouched. None throws;
  *   - Jacobians are in the tangent of each block; angles rad, lengths m unless a unit says else.
- * Authors do not write against this header: alidade/model/model.h does it for them. It compiles as C. */
+ * Authors do not write against this header: model.h does it for them. It compiles as C. */
 
 #include <stdint.h>
 

@@ -6,8 +6,8 @@
 
 #include "alidade/state/manifold.h"
 
-/// Which of the forms of alidade/model/landmark.h a landmark is written in, where that is known at run
-/// time only.
+/// Which of the forms of alidade/model/landmark.h a landmark is written in, where that is known at
+/// run time only.
 namespace alidade {
 
 enum class LandmarkForm;  // in alidade/model/landmark.h

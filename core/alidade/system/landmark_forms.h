@@ -6,8 +6,8 @@
 
 #include "alidade/system/landmark_form.h"
 
-/// The forms of alidade/model/landmark.h, chosen at run time. `blocks` are the values of a landmark's
-/// blocks, in the order of its roles.
+/// The forms of alidade/model/landmark.h, chosen at run time. `blocks` are the values of the blocks
+/// of a landmark, in the order of its roles.
 namespace alidade::internal {
 
 struct LandmarkPoint {

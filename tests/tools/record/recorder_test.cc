@@ -266,6 +266,7 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
   "estimators": {
     "ekf": {
       "type": "ekf",
+      "kind": "filter",
       "sensors": [
         "disparity",
         "inverse_scale"

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Which landmarks a batch has, and how its camera moves.
+#include <map>
+#include <string>
+
+#include "alidade/run/experiment.h"
 #include "ceres_batch_landmarks_fixture.h"
 #include "scene_fixture.h"
 

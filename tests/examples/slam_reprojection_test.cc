@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/11_slam_reprojection and the scenes of 10, held against the claim of 2015: after its
+// examples/11_slam_reprojection and the scenes of 10, compared with the claim of 2015: after its
 // initial peak the reprojection error settles in a number of frames that noise does not change.
+// The claim holds only if the filter knows the noise.
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
+#include <span>
+#include <string>
 
 #include "alidade/sweep/sweep.h"
 
@@ -14,12 +18,15 @@ namespace {
 
 const std::filesystem::path kExamples = std::filesystem::path(ALIDADE_SOURCE_DIR) / "examples";
 
-/// Seeds 1001 to 1020 with this noise, which the filter knows.
-SweepSummary Twenty(const std::string& name, const std::string& noise_px) {
+constexpr std::array kNoise = {"source.noise_px"};
+constexpr std::array kNoiseAndR = {"source.noise_px", "sensors.pixels.sigma_px",
+                                   "sensors.known.sigma_px"};
+
+/// Seeds 1001 to 1020 with these keys at `noise_px`.
+SweepSummary Twenty(const std::string& name, std::span<const char* const> keys,
+                    const std::string& noise_px) {
   Config config = Config::FromFile(kExamples / name);
-  for (const char* key : {"source.noise_px", "sensors.pixels.sigma_px", "sensors.known.sigma_px"}) {
-    config.Set(key, noise_px, "--set");
-  }
+  for (const char* key : keys) config.Set(key, noise_px, "--set");
   const PluginHost host(PluginPaths(config));
   SweepOptions options;
   options.runs = 20;
@@ -27,23 +34,36 @@ SweepSummary Twenty(const std::string& name, const std::string& noise_px) {
   return Summarise(Sweep(config, host, options)).at(0);
 }
 
-TEST(SlamReprojection, SettlesInAsManyFramesWhateverTheNoise) {
+TEST(SlamReprojection, SettlesInAsManyFramesIfTheFilterKnowsTheNoise) {
   for (const char* name : {"11_slam_reprojection/config.yaml", "10_slam_scene/config.yaml",
                            "10_slam_scene/sweep.yaml"}) {
     SCOPED_TRACE(name);
     double least = 1e9, most = 0.0;
     for (const auto& [noise_px, level_px] : {std::pair("0.5", 0.5), {"1", 1.0}, {"2", 2.0}}) {
-      const SweepSummary ekf = Twenty(name, noise_px);
+      const SweepSummary ekf = Twenty(name, kNoiseAndR, noise_px);
       EXPECT_EQ(ekf.used, 20);
       const Spread frames = ekf.metrics.at("settling_frames:pixels");
-      EXPECT_LE(frames.p95, 20.0) << noise_px;
+      EXPECT_LE(frames.p95, 12.0) << noise_px;  // measured: 6 to 11
       least = std::min(least, frames.mean);
       most = std::max(most, frames.mean);
       // The innovation is the noise, and a little of what the prediction is off.
       EXPECT_NEAR(ekf.metrics.at("reprojection:pixels").mean, 1.03 * level_px, 0.04 * level_px);
     }
-    EXPECT_LE(most - least, 5.0);
+    EXPECT_LE(most - least, 4.0);  // measured: 2.7, 3.1, 2.8
   }
+}
+
+// A filter that assumes 1 px settles at frame 5.8 if that is the noise. Measured: 11.8 with 0.25 px,
+// 50 with 4 px, NEES 710. The bounds are halfway, in the ratio.
+TEST(SlamReprojection, SettlesLaterIfTheFilterAssumesAnotherNoise) {
+  const char* const name = "11_slam_reprojection/config.yaml";
+  const auto frames = [](const SweepSummary& ekf) {
+    return ekf.metrics.at("settling_frames:pixels").mean;
+  };
+  EXPECT_GE(frames(Twenty(name, kNoise, "0.25")), 8.3);
+  const SweepSummary noisy = Twenty(name, kNoise, "4");
+  EXPECT_GE(frames(noisy), 17.0);
+  EXPECT_GE(noisy.metrics.at("nees.mean:cam").mean, 27.0);
 }
 
 }  // namespace

@@ -176,23 +176,24 @@ Spread SpreadOf(std::vector<double> values) {
 }
 
 Settling SettlingOf(const std::vector<double>& rms) {
-  constexpr std::ptrdiff_t kWindow = 10;
+  constexpr std::ptrdiff_t kFewest = 40, kReach = 4;
   constexpr double kBand = 0.2;
   const std::ptrdiff_t n = std::ssize(rms);
-  if (n < 4 * kWindow) return {kNaN, kNaN};
+  if (n < kFewest) return {kNaN, kNaN};
   std::vector<double> last(rms.begin() + n / 2, rms.end());
   std::ranges::sort(last);
   const double level = Quantile(last, 0.5);
   const auto values = Eigen::VectorXd::Map(rms.data(), n);
-  std::ptrdiff_t first = n - kWindow + 1;
-  while (first > 0) {
-    const double window = values.segment(first - 1, kWindow).norm() / std::sqrt(kWindow);
-    if (!(std::abs(window - level) <= kBand * level)) break;
-    --first;
+  std::ptrdiff_t outside = n - kReach - 1;  // the last centre that is outside the band, or -1
+  for (; outside >= 0; --outside) {
+    const std::ptrdiff_t reach = std::min(outside, kReach);
+    const auto window = values.segment(outside - reach, 2 * reach + 1);
+    const double centred = window.norm() / std::sqrt(static_cast<double>(window.size()));
+    if (!(std::abs(centred - level) <= kBand * level)) break;
   }
-  const bool never = first > n - kWindow;
+  const bool never = outside == n - kReach - 1;
   return {level,
-          never ? std::numeric_limits<double>::infinity() : static_cast<double>(first + kWindow)};
+          never ? std::numeric_limits<double>::infinity() : static_cast<double>(outside + 2)};
 }
 
 }  // namespace alidade

@@ -49,11 +49,12 @@ Spread SpreadOf(std::vector<double> values);
 /// constant, the best k lies at the edge or is no better than its neighbours, or n < 8.
 double Lag(const std::vector<double>& signal, const std::vector<double>& reference, double step);
 
-/// How a series of rms values comes to its steady level; NaN of fewer than 40 values.
+/// How a series of rms values comes to its steady level; NaN if there are fewer than 40 values.
 struct Settling {
-  double level;  ///< the median of its last half
-  /// How many values it takes until the rms of the last 10 of them is within 20 % of the level and
-  /// stays there: at least 10; infinity where it is not there at the end.
+  double level;  ///< the median of the last half
+  /// The number, from 1, of the first value from which on the centred rms stays within 20 % of the
+  /// level; infinity if it is outside at the end. The centred rms of value i is that of the values
+  /// i - r to i + r, r = min(i - 1, 4). The last four values have none of their own.
   double count;
 };
 /// When a series of rms values, one for each frame say, has settled.

@@ -145,19 +145,31 @@ TEST(Lag, IsUnknownWithoutAnythingToMatch) {
   EXPECT_TRUE(std::isnan(Lag(few, few, 1.0)));
 }
 
-// 3, 3, 1.5, then 1: the first window in the band begins at the third value, sqrt((1.5^2 + 9) / 10)
-// = 1.06, and ends at the 12th.
-TEST(Settling, CountsUntilTheWindowStaysInTheBand) {
+// 3, 3, 1.5, then 1. The centred rms of value 4 is sqrt((9 + 9 + 2.25 + 4) / 7) = 1.86, of value 5
+// sqrt((18 + 2.25 + 6) / 9) = 1.71, of value 6 sqrt((9 + 2.25 + 7) / 9) = 1.42, and of value 7
+// sqrt((2.25 + 8) / 9) = 1.07, the first within 20 % of 1.
+TEST(Settling, CountsUntilTheCentredRmsStaysInTheBand) {
   std::vector<double> rms(60, 1.0);
   rms[0] = rms[1] = 3.0;
   rms[2] = 1.5;
   EXPECT_EQ(SettlingOf(rms).level, 1.0);
-  EXPECT_EQ(SettlingOf(rms).count, 12.0);
+  EXPECT_EQ(SettlingOf(rms).count, 7.0);
   for (double& value : rms) value *= 1e-6;
-  EXPECT_EQ(SettlingOf(rms).count, 12.0);
-  rms[30] = 3e-6;  // the median does not see it; sqrt((9 + 9) / 10) = 1.34 until it has passed
-  EXPECT_EQ(SettlingOf(rms).count, 41.0);
-  EXPECT_EQ(SettlingOf(std::vector<double>(40, 0.0)).count, 10.0);
+  EXPECT_EQ(SettlingOf(rms).count, 7.0);
+  rms[30] = 3e-6;  // the median does not see it; sqrt((9 + 8) / 9) = 1.37 up to value 35
+  EXPECT_EQ(SettlingOf(rms).count, 36.0);
+}
+
+// A peak in the first value alone: the centred rms is 1.4, sqrt((1.96 + 2) / 3) = 1.15, ...: settled
+// from the second value on. A series without a peak is settled from its first value on.
+TEST(Settling, ResolvesSingleValues) {
+  std::vector<double> rms(60, 1.0);
+  EXPECT_EQ(SettlingOf(rms).count, 1.0);
+  rms[0] = 1.4;
+  EXPECT_EQ(SettlingOf(rms).count, 2.0);
+  rms[1] = 1.4;  // sqrt((2 * 1.96 + 1) / 3) = 1.28, sqrt((2 * 1.96 + 3) / 5) = 1.18
+  EXPECT_EQ(SettlingOf(rms).count, 3.0);
+  EXPECT_EQ(SettlingOf(std::vector<double>(40, 0.0)).count, 1.0);
 }
 
 TEST(Settling, IsInfiniteWhereTheEndIsOffTheLevel) {

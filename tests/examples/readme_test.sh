@@ -1,0 +1,88 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+#
+# tests/examples/readme_test.sh PROGRAM COMPILER [README]
+#
+# Runs the code blocks of README.md in a temporary folder. A block below `<!-- test: FILE -->` is
+# written to FILE. Of a block below `<!-- test: output -->` each line that begins with `$ ` is run,
+# with PROGRAM for `alidade` and COMPILER for `g++`. The lines below it must be printed by it in
+# that order, perhaps with others between them. Their numbers may differ by 1 %: the seed is fixed,
+# the last digits depend on the compiler. `output batch` needs the batch estimators. In a block of
+# the language sh each scripts/NAME must exist.
+set -euo pipefail
+program=$(realpath "$1")
+compiler=$(command -v "$2")
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+readme=${3:-README.md}
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+unset ALIDADE_PLUGIN_PATH
+
+mkdir "$work/bin"
+ln -s "$PWD/core" "$PWD/examples" "$work"
+printf '#!/bin/sh\nexec "%s" "$@"\n' "$program" >"$work/bin/alidade"
+printf '#!/bin/sh\nexec "%s" "$@"\n' "$compiler" >"$work/bin/g++"
+chmod +x "$work/bin/alidade" "$work/bin/g++"
+export PATH=$work/bin:$PATH
+
+# The blocks: files, and the commands with the lines that follow them in $work/N.command, N.lines.
+awk -v work="$work" '
+  /^<!-- test: / { kind = $3; needs = $4; next }
+  /^```/ && !inside { inside = 1; sh = $0 == "```sh"; next }
+  /^```/ { inside = 0; kind = ""; next }
+  !inside { next }
+  sh { if ($1 ~ /^scripts\//) print $1 > (work "/scripts"); next }
+  kind == "" { print "error: a block without a test: " $0; exit 1 }
+  kind != "output" { print > (work "/" kind); next }
+  /^\$ / {
+    n++
+    print substr($0, 3) > (work "/" n ".command")
+    printf "" > (work "/" n ".lines")
+    if (needs != "") print needs > (work "/" n ".needs")
+    next
+  }
+  { print > (work "/" n ".lines") }' "$readme"
+
+while read -r script; do
+  [[ -x $script ]] || { echo "error: $script does not exist" >&2; exit 1; }
+done <"$work/scripts"
+
+# compare SHOWN PRINTED: every line of SHOWN is in PRINTED, in order.
+compare() {
+  awk '
+    function number(word) { return word ~ /^[-+]?[0-9][0-9.]*(e[-+]?[0-9]+)?$/ }
+    function near(a, b,    size) {
+      if (!number(a) || !number(b)) return a == b
+      size = b < 0 ? -b : b
+      return a - b <= 0.01 * size && b - a <= 0.01 * size
+    }
+    function same(shown, printed,    a, b, n, i) {
+      n = split(shown, a, " ")
+      if (n != split(printed, b, " ")) return 0
+      for (i = 1; i <= n; i++) if (!near(a[i], b[i])) return 0
+      return 1
+    }
+    NR == FNR { shown[++lines] = $0; next }
+    at < lines && same(shown[at + 1], $0) { at++ }
+    END { if (at < lines) { print shown[at + 1]; exit 1 } }' "$1" "$2"
+}
+
+commands=0
+cd "$work"
+plugins=$(alidade plugins list)
+for ((n = 1; ; n++)); do
+  [[ -e $n.command ]] || break
+  if [[ -e $n.needs && $plugins != *ceres_batch* ]]; then
+    echo "skipped, no batch: $(cat $n.command)"
+    continue
+  fi
+  bash -e "$n.command" >"$n.printed" 2>&1 || { cat "$n.printed" >&2; exit 1; }
+  if ! missing=$(compare "$n.lines" "$n.printed"); then
+    cat "$n.printed"
+    echo "error: '$(cat "$n.command")' does not print the line '$missing' of $readme" >&2
+    exit 1
+  fi
+  commands=$((commands + 1))
+done
+((commands >= 3)) || { echo "error: only $commands commands in $readme" >&2; exit 1; }
+echo "readme: $commands commands print what $readme shows"

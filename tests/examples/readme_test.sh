@@ -27,7 +27,7 @@ export PATH=$work/bin:$PATH
 
 # The blocks: files, and the commands with the lines that follow them in $work/N.command, N.lines.
 awk -v work="$work" '
-  /^<!-- test: / { kind = $3; needs = $4; next }
+  /^<!-- test: / { kind = $3; needs = $4 == "batch"; next }
   /^```/ && !inside { inside = 1; sh = $0 == "```sh"; next }
   /^```/ { inside = 0; kind = ""; next }
   !inside { next }
@@ -38,7 +38,7 @@ awk -v work="$work" '
     n++
     print substr($0, 3) > (work "/" n ".command")
     printf "" > (work "/" n ".lines")
-    if (needs != "") print needs > (work "/" n ".needs")
+    if (needs) printf "" > (work "/" n ".needs_batch")
     next
   }
   { print > (work "/" n ".lines") }' "$readme"
@@ -72,7 +72,7 @@ cd "$work"
 plugins=$(alidade plugins list)
 for ((n = 1; ; n++)); do
   [[ -e $n.command ]] || break
-  if [[ -e $n.needs && $plugins != *ceres_batch* ]]; then
+  if [[ -e $n.needs_batch && $plugins != *ceres_batch* ]]; then
     echo "skipped, no batch: $(cat $n.command)"
     continue
   fi

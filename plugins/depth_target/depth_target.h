@@ -44,9 +44,10 @@ namespace alidade {
 ///
 /// What the notebook does differently, or says twice: it thresholds the NOISY disparity, so that
 /// the disparities that pass are biased: -0.85 px where F B / Z is within 1 px of the limit, -0.33
-/// px within 3 px (sigma_d 1 px, example 01). `near_on: true` thresholds F B / Z instead. Its text says 25 cm and 1 Hz, its code 30 cm and 0.4 Hz, the defaults here. A
-/// blind disparity is a sentinel of 1e9 px there; here it is missing. Its noise of the scale counts
-/// both edges linearly, 2 sigma_e, as is done here.
+/// px within 3 px (sigma_d 1 px, example 01). `near_on: true` thresholds F B / Z instead. Its text
+/// says 25 cm and 1 Hz, its code 30 cm and 0.4 Hz, the defaults here. A blind disparity is a
+/// sentinel of 1e9 px there; here it is missing. Its noise of the scale counts both edges
+/// linearly, 2 sigma_e, as is done here.
 ///
 /// Defined for  A < Zm; else the configuration is refused.
 /// Source       [Ekf2017] sec. 2-4.

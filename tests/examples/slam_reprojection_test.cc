@@ -53,8 +53,8 @@ TEST(SlamReprojection, SettlesInAsManyFramesIfTheFilterKnowsTheNoise) {
   }
 }
 
-// A filter that assumes 1 px settles at frame 5.8 if that is the noise. Measured: 11.8 with 0.25 px,
-// 50 with 4 px, NEES 710. The bounds are halfway, in the ratio.
+// A filter that assumes 1 px settles at frame 5.8 if that is the noise. Measured: 11.8 with
+// 0.25 px, 50 with 4 px, NEES 710. The bounds are halfway, in the ratio.
 TEST(SlamReprojection, SettlesLaterIfTheFilterAssumesAnotherNoise) {
   const char* const name = "11_slam_reprojection/config.yaml";
   const auto frames = [](const SweepSummary& ekf) {

@@ -160,8 +160,8 @@ TEST(Settling, CountsUntilTheCentredRmsStaysInTheBand) {
   EXPECT_EQ(SettlingOf(rms).count, 36.0);
 }
 
-// A peak in the first value alone: the centred rms is 1.4, sqrt((1.96 + 2) / 3) = 1.15, ...: settled
-// from the second value on. A series without a peak is settled from its first value on.
+// A peak in the first value alone: the centred rms is 1.4, sqrt((1.96 + 2) / 3) = 1.15, ... It is
+// settled from the second value on. A series without a peak is settled from its first value on.
 TEST(Settling, ResolvesSingleValues) {
   std::vector<double> rms(60, 1.0);
   EXPECT_EQ(SettlingOf(rms).count, 1.0);

@@ -1,28 +1,29 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# tests/install/flags_test.sh FLAG LIBRARY OPTIONS COMPILER [CXXFLAG...] INCLUDE...
+# tests/install/flags_test.sh FLAG FOLDER OPTIONS COMPILER [CXXFLAG...] INCLUDE...
 #
 # Compiles tests/install/outsider/filter.cc with -FLAG, and with the OPTIONS (separated by `;`) that
-# the target alidade::core adds, and runs it against LIBRARY, which was built without it. Where the
+# the target alidade::core adds, and runs it against the libraries in FOLDER, which were built without it. Where the
 # processor lacks the instructions it is compiled only. Without OPTIONS the program must either mean
 # the same or be refused in words that name the remedy.
 set -euo pipefail
-flag=-$1 library=$2 compiler=$4
+flag=-$1 folder=$2 compiler=$4
 IFS=';' read -ra options <<<"$3"
 shift 4
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-flags=(-std=c++20 -O1 -Icore)
+flags=(-std=c++20 -O1 -Icore -Itools)
 for argument in "$@"; do
   [[ $argument == -* ]] && flags+=("$argument") || flags+=(-isystem "$argument")
 done
 flags+=("$flag")
 source=tests/install/outsider/filter.cc
 
-"$compiler" "${flags[@]}" "${options[@]}" "$source" "$library" -Wl,-rpath,"$(dirname "$library")" \
+"$compiler" "${flags[@]}" "${options[@]}" "$source" -L"$folder" -lalidade-tools -lalidade-core \
+  -Wl,-rpath,"$folder" \
   -o "$work/filter"
 if [[ $flag == -mavx2 ]] && ! grep -qw avx2 /proc/cpuinfo; then
   echo "$flag: compiled; the processor cannot run it"

@@ -3,10 +3,10 @@
 
 namespace alidade {
 
-struct Experiment;    // in alidade/run/run.h
-struct Frame;         // in alidade/host/source.h
-struct UpdateReport;  // in alidade/filter/estimator.h
-class State;          // in alidade/state/state.h
+struct Experiment;   // in alidade/run/run.h
+struct Frame;        // in alidade/host/source.h
+class UpdateReport;  // in alidade/filter/estimator.h
+class State;         // in alidade/state/state.h
 
 /// Follows a run on its own thread. What it throws ends the run, and is its reason.
 class RunObserver {

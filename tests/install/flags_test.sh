@@ -4,9 +4,9 @@
 # tests/install/flags_test.sh FLAG FOLDER OPTIONS COMPILER [CXXFLAG...] INCLUDE...
 #
 # Compiles tests/install/outsider/filter.cc with -FLAG, and with the OPTIONS (separated by `;`) that
-# the target alidade::core adds, and runs it against the libraries in FOLDER, which were built without it. Where the
-# processor lacks the instructions it is compiled only. Without OPTIONS the program must either mean
-# the same or be refused in words that name the remedy.
+# the target alidade::core adds, and runs it against the libraries in FOLDER, built without it. If
+# the processor lacks the instructions it is compiled only. Without OPTIONS the program must either
+# mean the same or be refused in words that name the remedy.
 set -euo pipefail
 flag=-$1 folder=$2 compiler=$4
 IFS=';' read -ra options <<<"$3"

@@ -54,7 +54,8 @@ ALIDADE_INLINE bool Ekf::Small::StepModel(const Motion& motion, double dt_s, dou
   double* const l = plan.l.data();
   double* const g = plan.g.data();
   const int k = K > 0 ? K : motion.size, w = W > 0 ? W : motion.noise;
-  for (int i = 0; i < k; ++i) ekf_.next_[static_cast<std::size_t>(motion.offset + i)] = kUnwritten;
+  double* const next = ekf_.next_.data() + motion.offset;
+  for (int i = 0; i < k; ++i) next[i] = kUnwritten;
   for (int i = 0; i < k * k; ++i) f[i] = kUnwritten;
   for (int i = 0; i < k * w; ++i) g[i] = kUnwritten;
   for (int i = 0; i < w * w; ++i) l[i] = kUnwritten;

@@ -27,8 +27,7 @@ endfunction()
 # alidade_add_library(NAME SOURCES file... HEADERS file...)
 #
 # The shared library alidade::NAME of this folder, libalidade-NAME: exports the names of alidade
-# alone and leaves none undefined. HEADERS are those that are installed, relative to the folder;
-# the target all_verify_interface_header_sets compiles each by itself.
+# alone and leaves none undefined. HEADERS are those that are installed, relative to the folder.
 function(alidade_add_library name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;HEADERS")
   set(target alidade_${name})

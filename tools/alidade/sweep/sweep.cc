@@ -13,7 +13,6 @@
 
 namespace alidade {
 
-using internal::CheckReadableAgain;
 using internal::Copy;
 
 namespace {

@@ -354,8 +354,9 @@ TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
   EXPECT_TRUE(Contains(scale.out, "noise = fixed")) << scale.out;
 
   const Outcome ekf = Call({"plugins", "info", "ekf"});
-  for (const char* part : {"ekf: estimator", "(0, 1]", "joint | per_sensor | per_measurement",
-                           "lockout.after", "[1, 1e+06]", "inf", "on_divergence"}) {
+  for (const char* part :
+       {"ekf: estimator", "(0, 1) or none", "joint | per_sensor | per_measurement",
+        "rejection_recovery.after", "[1, 1e+06]", "inf", "on_divergence"}) {
     EXPECT_TRUE(Contains(ekf.out, part)) << part << '\n' << ekf.out;
   }
   EXPECT_TRUE(Contains(ekf.out, "its own state, sensors, landmarks and start_s, merged in"));
@@ -370,7 +371,7 @@ TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
     EXPECT_TRUE(Contains(estimator.out, type + ": estimator")) << estimator.out;
     EXPECT_TRUE(Contains(estimator.out, "max_dt_s")) << estimator.out;
     EXPECT_EQ(Contains(estimator.out, "kappa"), type == "ukf") << estimator.out;
-    EXPECT_FALSE(Contains(estimator.out, "lockout")) << estimator.out;
+    EXPECT_FALSE(Contains(estimator.out, "rejection_recovery")) << estimator.out;
   }
 
   const Outcome missing = Call({"plugins", "info", "stereo_disparit"});

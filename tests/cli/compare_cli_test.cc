@@ -288,14 +288,15 @@ TEST_F(CompareCli, ExitsWithTheCodeOfARunThatFailed) {
 }
 
 // A run tells it of itself, and its folder of it.
-TEST_F(CompareCli, TellsOfLockOuts) {
+TEST_F(CompareCli, TellsOfRejectionRecovery) {
   WriteTable("table.csv");
   std::string text = Read("table.csv");
   for (int k = 21; k <= 50; ++k) text += std::to_string(0.1 * k) + ",26\n";
   Write("table.csv", text);
-  const std::string words = "'ekf' was locked out: what that cost";
-  const Outcome compared = Call({"compare", "table.yaml", "-o", "out", "--set",
-                                 "estimators.ekf={type: ekf, gate: 0.99, lockout: {after: 2}}"});
+  const std::string words = "'ekf' recovered from rejections: what that cost";
+  const Outcome compared =
+      Call({"compare", "table.yaml", "-o", "out", "--set",
+            "estimators.ekf={type: ekf, gate: 0.99, rejection_recovery: {after: 2}}"});
   EXPECT_TRUE(Contains(compared.out, words)) << compared.out << compared.err;
   EXPECT_TRUE(Contains(Call({"compare", "out"}).out, words)) << Read("out/ekf/events.csv");
 }

@@ -51,7 +51,7 @@ TEST_F(SweepCli, SharesMakeTheWhole) {
   // Without a gate all shares count the same outcomes, so that they have the same columns.
   const auto rows = [&](const std::string& folder, const std::string& shard) {
     const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "5", "-o", folder, "--shard",
-                                shard, "--set", "estimators.ekf.gate=1"});
+                                shard, "--set", "estimators.ekf.gate=none"});
     EXPECT_EQ(sweep.code, 0) << sweep.err;
     return Rows(Read(folder + "/runs.csv"));
   };
@@ -130,7 +130,7 @@ TEST_F(SweepCli, CountsDivergedRunsAndLeavesTheirMetricsOut) {
 TEST_F(SweepCli, InconsistentRunsCountAndAreTold) {
   const Arguments too_sure = {"--set", "sensors.stereo.sigma_px=0.01",
                               "--set", "sensors.scale.sigma_px=0.01",
-                              "--set", "estimators.ekf.gate=1"};
+                              "--set", "estimators.ekf.gate=none"};
   Arguments arguments = {"sweep", "config.yaml", "--runs", "1", "--first-seed", "7", "-o", "out"};
   arguments.insert(arguments.end(), too_sure.begin(), too_sure.end());
   const Outcome sweep = Call(arguments);
@@ -169,7 +169,7 @@ TEST_F(SweepCli, ReplacesItsFolderOnlyByForce) {
 
 TEST_F(SweepCli, EachValueOfAKeyIsSweptAsIfItWereSet) {
   // Without a gate all values count the same outcomes, so that they have the same columns.
-  const std::string no_gate = "estimators.ekf.gate=1";
+  const std::string no_gate = "estimators.ekf.gate=none";
   const Outcome varied =
       Call({"sweep", "config.yaml", "--runs", "3", "--first-seed", "5", "-o", "varied", "--vary",
             "sensors.stereo.sigma_px=0.5,2", "--set", no_gate});
@@ -208,8 +208,9 @@ TEST_F(SweepCli, EachValueOfAKeyIsSweptAsIfItWereSet) {
 }
 
 TEST_F(SweepCli, ValuesMayBeMapsAndTheirFigureIsDrawn) {
-  const Outcome varied = Call({"sweep", "config.yaml", "--runs", "2", "-o", "out", "--vary",
-                               "estimators.ekf.lockout={after: 5, action: none},{after: 6}"});
+  const Outcome varied =
+      Call({"sweep", "config.yaml", "--runs", "2", "-o", "out", "--vary",
+            "estimators.ekf.rejection_recovery={after: 5, action: none},{after: 6}"});
   ASSERT_EQ(varied.code, 0) << varied.err;
   EXPECT_EQ(Json("out/sweep.json").root().At("values").Items().size(), 2u);
   const bool drawn = Exists("out/figures/vary.svg");

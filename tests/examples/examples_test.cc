@@ -374,7 +374,7 @@ TEST(Examples, WhatAnEstimatorTypeDoesNotHaveIsRefusedByName) {
       {"sensors.scale.roles.inverse_distance",
        "{block: template.inverse_distance, mode: consider}"},
       {"sensors.stereo.roles.depth", "{block: target.depth, linearise_at: measurement}"},
-      {"estimators.one.lockout", "{after: 20}"}};
+      {"estimators.one.rejection_recovery", "{after: 20}"}};
   for (const std::string type : {"rts", "square_root_ekf", "ukf"}) {
     for (const auto& [key, value] : unsupported) {
       try {

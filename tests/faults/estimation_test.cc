@@ -76,12 +76,12 @@ TEST(LostPositiveDefiniteness, IsRepairedReportedAndTheFilterGoesOn) {
 TEST(LostPositiveDefiniteness, EndsTheFilterOnceItsRepairsAreUsedUp) {
   const System system = TwoElements(Indefinite(), 0.1);
   EkfOptions options;
-  options.repairs = 3;
+  options.max_covariance_repairs = 3;
   Ekf ekf(system, options, StreamsOf(system));
-  for (int k = 0; k <= options.repairs; ++k) {
+  for (int k = 0; k <= options.max_covariance_repairs; ++k) {
     const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, -1.0}}));
-    EXPECT_EQ(HasEvent(report, "repaired"), k < options.repairs) << k;
-    EXPECT_EQ(ekf.failed(), k == options.repairs) << k;
+    EXPECT_EQ(HasEvent(report, "repaired"), k < options.max_covariance_repairs) << k;
+    EXPECT_EQ(ekf.failed(), k == options.max_covariance_repairs) << k;
     // Spoilt again, from where it is.
     const auto kept = ekf.Save();
     kept->state.covariance().SetBlock(0, 0, Indefinite());
@@ -93,7 +93,7 @@ TEST(LostPositiveDefiniteness, EndsTheFilterOnceItsRepairsAreUsedUp) {
 TEST(LostPositiveDefiniteness, WhatIsTakenBackIsNotCounted) {
   const System system = TwoElements(Indefinite(), 0.1);
   EkfOptions options;
-  options.repairs = 1;
+  options.max_covariance_repairs = 1;
   Ekf ekf(system, options, StreamsOf(system));
   const auto before = ekf.Save();
   for (int k = 0; k < 3; ++k) {
@@ -111,7 +111,7 @@ TEST(LostPositiveDefiniteness, BeyondItsRepairsIsExitCode79) {
   named.system = TwoElements(Indefinite(), 0.1);
   named.system.sensors[0].stream = "inverse_scale";
   EkfOptions options;
-  options.repairs = 0;
+  options.max_covariance_repairs = 0;
   named.estimator = std::make_unique<Ekf>(named.system, options, experiment.source->streams());
   experiment.estimators.push_back(std::move(named));
   const RunResult result = alidade::Run(experiment, {});

@@ -107,7 +107,7 @@ TEST_F(CeresBatchConfig, KeysOfTheFiltersAreRefusedByName) {
   expect("gate", "0.99", "'ceres_batch' has no gate; expected the key left out");
   expect("fuse", "joint", "'ceres_batch' has no choice of updates");
   expect("jacobian", "latest", "'ceres_batch' has no choice of Jacobian");
-  expect("lockout", "{after: 3}", "'ceres_batch' has no recovery from a lock-out");
+  expect("rejection_recovery", "{after: 3}", "'ceres_batch' has no rejection recovery");
 }
 
 TEST_F(CeresBatchConfig, IsListedWithItsKeysAndThoseOfEveryEstimator) {

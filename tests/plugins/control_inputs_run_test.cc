@@ -222,15 +222,15 @@ TEST_F(DrivenTest, WhatIsNotAnInputIsRefusedWithItsPlace) {
             "driven");
   EXPECT_EQ(Refusal("state.car.input", "odometry"),
             "--set state.car.input: not a map; expected {stream: NAME}, or {stream: NAME, "
-            "max_age_s: S}");
-  EXPECT_EQ(Refusal("state.car.input", "{max_age_s: 1}"),
+            "timeout_s: S}");
+  EXPECT_EQ(Refusal("state.car.input", "{timeout_s: 1}"),
             "--set state.car.input.stream: missing key, needed by the control input speed of "
             "model driven");
-  EXPECT_EQ(Refusal("state.car.input.max_age_s", "0"),
-            "--set state.car.input.max_age_s: '0' is out of range; expected a number in (0, "
+  EXPECT_EQ(Refusal("state.car.input.timeout_s", "0"),
+            "--set state.car.input.timeout_s: '0' is out of range; expected a number in (0, "
             "1e+09]");
-  EXPECT_EQ(Refusal("state.car.input.max_age", "1"),
-            "--set state.car.input.max_age: unknown key; did you mean 'max_age_s'?");
+  EXPECT_EQ(Refusal("state.car.input.timeout", "1"),
+            "--set state.car.input.timeout: unknown key; did you mean 'timeout_s'?");
   EXPECT_EQ(Refusal("state.car.inputs", "{odom: odometry}"),
             "--set state.car.inputs: unknown key; did you mean 'input'?");
   EXPECT_EQ(Refusal("state.other", "{model: constant, input: {stream: odometry}, initial: {}}"),

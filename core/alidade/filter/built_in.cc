@@ -112,10 +112,11 @@ const EstimatorType* FindEstimatorType(std::string_view name) {
 }
 
 void RefuseUnsupportedKeys(const std::string& type, const Node& entry) {
-  constexpr std::pair<const char*, const char*> kKeys[] = {{"gate", "gate"},
-                                                           {"fuse", "choice of updates"},
-                                                           {"jacobian", "choice of Jacobian"},
-                                                           {"lockout", "recovery from a lock-out"}};
+  constexpr std::pair<const char*, const char*> kKeys[] = {
+      {"gate", "gate"},
+      {"fuse", "choice of updates"},
+      {"jacobian", "choice of Jacobian"},
+      {"rejection_recovery", "rejection recovery"}};
   for (const auto& [key, what] : kKeys) {
     if (!entry.HasUnread(key)) continue;
     entry.At(key).Fail("estimator type '" + type + "' has no " + what,

@@ -11,10 +11,10 @@ namespace {
 
 constexpr Stamp kForever = std::numeric_limits<Stamp>::max();
 
-/// max_age_s in whole nanoseconds, at least one.
-Stamp MostAge(double max_age_s) {
+/// timeout_s in whole nanoseconds, at least one.
+Stamp TimeoutOf(double timeout_s) {
   constexpr double kBeyond = 9.2e9;  // what a Stamp cannot hold
-  return max_age_s < kBeyond ? std::max<Stamp>(1, StampFromSeconds(max_age_s)) : kForever;
+  return timeout_s < kBeyond ? std::max<Stamp>(1, StampFromSeconds(timeout_s)) : kForever;
 }
 
 /// Why an input cannot be used; empty: it can.
@@ -36,7 +36,7 @@ ControlInputs::ControlInputs(const System& system, const std::vector<StreamInfo>
     held.name = motion.name;
     held.binding = motion.input;
     held.geometry = motion.model.input().geometry;
-    held.max_age = MostAge(motion.input.max_age_s);
+    held.max_age = TimeoutOf(motion.input.timeout_s);
     held.neutral.resize(static_cast<std::size_t>(held.geometry.ambient));
     held.geometry.Identity(held.neutral.data());
     held.value = held.neutral;
@@ -65,7 +65,7 @@ std::string ControlInputs::WhyNone(const Held& held) {
   const std::string input =
       "control input of '" + held.name + "' from stream '" + held.binding.stream + "'";
   if (held.stamp == kNoStamp) return "no " + input + " has come yet: steps with u = 0";
-  return "the " + input + " is older than " + internal::NumberText(held.binding.max_age_s) +
+  return "the " + input + " is older than " + internal::NumberText(held.binding.timeout_s) +
          " s: steps with u = 0";
 }
 

@@ -18,7 +18,7 @@ namespace alidade {
 ///   symbol    unit         meaning
 ///   u_k       the model's  an input that was taken
 ///   t_k       s            stamp of its frame
-///   max_age   s            InputBinding::max_age_s
+///   max_age   s            InputBinding::timeout_s
 ///
 /// A copy is a snapshot.
 class ControlInputs {

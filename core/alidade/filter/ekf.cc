@@ -85,7 +85,7 @@ const UpdateReport& Ekf::Process(const Frame& frame) {
 /// The step and the updates of a frame on the general path.
 void Ekf::ProcessFully(const Frame& frame) {
   if (stamp_ == kNoStamp) {
-    Start(system_.start_s ? StampFromSeconds(*system_.start_s) : frame.stamp);
+    Start(system_.initial_time_s ? StampFromSeconds(*system_.initial_time_s) : frame.stamp);
   }
   report_.stale = frame.stamp < stamp_;
   if (!report_.stale && !failed_) StepTo(frame.stamp);

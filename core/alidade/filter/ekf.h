@@ -31,7 +31,7 @@ namespace alidade {
 /// An update is a transaction: what would leave the state not finite or not positive definite is
 /// rolled back and reported. Where S is not positive definite because P is not positive
 /// semi-definite, P is repaired (event `repaired`: negative pivots of its L D L' count as zero);
-/// after `repairs` of that the next ends the filter.
+/// after `max_covariance_repairs` of that the next ends the filter.
 class Ekf : public Estimator {
  public:
   /// All there is.

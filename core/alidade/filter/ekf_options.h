@@ -16,8 +16,8 @@ enum class Fuse {
   kPerMeasurement,  ///< one update for each measurement, in the order of the sensors
 };
 
-/// What happens after `lockout_after` consecutive rejections of one sensor.
-enum class Lockout {
+/// What happens after `rejection_recovery_after` consecutive rejections of one sensor.
+enum class RejectionRecovery {
   kReset,    ///< re-initialise its blocks from the measurement where it can, else inflate
   kInflate,  ///< multiply the covariance of its blocks by 100
   kNone,
@@ -31,19 +31,20 @@ enum class JacobianAt {
 
 /// What the Kalman filters have in common to choose.
 struct EkfOptions {
-  /// Probability with which a measurement that fits passes the gate; 1: no gate.
+  /// Probability with which a measurement that fits passes the gate; 1: no gate (`gate: none`).
   double gate = 1.0;
   Fuse fuse = Fuse::kJoint;
   JacobianAt jacobian = JacobianAt::kLatest;
-  Lockout lockout = Lockout::kReset;
-  int lockout_after = 20;  ///< consecutive rejections of one sensor
-  int repairs = 10;        ///< of a covariance that lost its positive definiteness; then it ends
+  RejectionRecovery rejection_recovery = RejectionRecovery::kReset;
+  int rejection_recovery_after = 20;  ///< consecutive rejections of one sensor
+  int max_covariance_repairs = 10;    ///< of one that is not positive definite; then it ends
   /// Longer gaps are stepped in equal parts of at most this, to whole ns, and at least 1 ns.
   double max_dt_s = std::numeric_limits<double>::infinity();
 
   /// Reads `gate`, `fuse` (`joint`, `per_sensor`, `per_measurement`), `jacobian` (`latest`,
-  /// `first_estimate`), `lockout` (`after`; `action`: `reset`, `inflate`, `none`), `repairs` and
-  /// `max_dt_s` from an estimator's entry of the config; what is not there keeps its default.
+  /// `first_estimate`), `rejection_recovery` (`after`; `action`: `reset`, `inflate`, `none`),
+  /// `max_covariance_repairs` and `max_dt_s` from an estimator's entry of the config; an absent key
+  /// keeps its default.
   /// Errors: kBadConfig.
   static EkfOptions FromNode(const Node& entry);
   /// What FromNode reads.

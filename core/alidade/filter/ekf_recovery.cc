@@ -85,17 +85,17 @@ void Ekf::RepairCovariance() {
   if (!(defect < -kRounding)) return;
   const std::string text = "the covariance is not positive semi-definite: a pivot is " +
                            internal::RoundedText(defect, 3) + " of its largest variance";
-  if (repairs_ == options_.repairs) {
+  if (repairs_ == options_.max_covariance_repairs) {
     return GiveUp("not_pd", text + ", after " + std::to_string(repairs_) + " repairs");
   }
   ++repairs_;
   interval_steps_ = 0;
   p.SetBlock(0, 0, root * root.transpose());
   Note("repaired", text + "; negative pivots count as zero (repair " + std::to_string(repairs_) +
-                       " of " + std::to_string(options_.repairs) + ")");
+                       " of " + std::to_string(options_.max_covariance_repairs) + ")");
 }
 
-/// Counts rejections in a row for each sensor, and recovers one that is locked out.
+/// Counts rejections in a row for each sensor, and recovers one that was rejected too often.
 void Ekf::CountRejections() {
   for (Row& row : rows()) {
     if (landmarks_ != nullptr && landmarks_->Has(row.sensor)) continue;  // no landmark locks it out
@@ -106,8 +106,8 @@ void Ekf::CountRejections() {
       out_of_domain_[sensor] = inflated_[sensor] = false;
     }
     if (!Rejected(entry)) continue;
-    if (++rejections_[sensor] < options_.lockout_after) continue;
-    if (options_.lockout == Lockout::kNone) continue;
+    if (++rejections_[sensor] < options_.rejection_recovery_after) continue;
+    if (options_.rejection_recovery == RejectionRecovery::kNone) continue;
     rejections_[sensor] = 0;
     Recover(row);
   }
@@ -119,15 +119,16 @@ void Ekf::CountRejections() {
 void Ekf::Recover(Row& row) {
   const SensorBinding& binding = BindingOf(row);
   const std::string why = "sensor '" + binding.name + "' rejected " +
-                          std::to_string(options_.lockout_after) + " times in a row: ";
+                          std::to_string(options_.rejection_recovery_after) + " times in a row: ";
   const int role = binding.model.initialised_role();
   const RoleBinding* target = role < 0 ? nullptr : &binding.roles[static_cast<std::size_t>(role)];
-  if (options_.lockout == Lockout::kReset && target != nullptr && target->block >= 0 &&
-      target->mode == RoleMode::kEstimate &&
+  if (options_.rejection_recovery == RejectionRecovery::kReset && target != nullptr &&
+      target->block >= 0 && target->mode == RoleMode::kEstimate &&
       state_.layout()[target->block].status == BlockStatus::kEstimated &&
       InitialiseBlock(row) == Outcome::kInitialised) {
     ForgetMotionOf(target->block);
-    Note("lockout", why + "reset " + state_.layout()[target->block].name + " from its measurement");
+    Note("rejection_recovery",
+         why + "reset " + state_.layout()[target->block].name + " from its measurement");
     return;
   }
   if (inflated_[static_cast<std::size_t>(row.sensor)]) return;
@@ -144,7 +145,7 @@ void Ekf::Recover(Row& row) {
                                   kInflation * Eigen::MatrixXd::Identity(n, n));
   }
   if (any) interval_steps_ = 0;
-  Note("lockout",
+  Note("rejection_recovery",
        why + (any ? "inflated the covariance of its blocks" : "it corrects no block to inflate"));
 }
 

@@ -215,7 +215,7 @@ ALIDADE_INLINE Ekf::Small::Taken Ekf::Small::Take(Sensor& sensor, const Measurem
       size == 1 ? Linearise<N, 1>(sensor, z, entry, pht) : Linearise<N, 0>(sensor, z, entry, pht);
   if (!usual) return Taken::kUnusual;
   if (!(entry.nis <= sensor.gate)) {
-    if (*sensor.rejections + 1 >= ekf_.options_.lockout_after) return Taken::kUnusual;
+    if (*sensor.rejections + 1 >= ekf_.options_.rejection_recovery_after) return Taken::kUnusual;
     entry.outcome = Outcome::kGated;
     entry.gain.clear();
     return Taken::kLeftOut;

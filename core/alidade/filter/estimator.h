@@ -68,7 +68,7 @@ struct MeasurementReport {
 /// Something that happened to the filter, worth a line to its user.
 struct Event {
   Stamp stamp = kNoStamp;
-  std::string kind;  ///< one word: diverged, lockout, conditioning, not_finite, ...
+  std::string kind;  ///< one word: diverged, rejection_recovery, conditioning, not_finite, ...
   std::string text;
   bool divergence = false;  ///< the estimator diverged or failed by this
 };

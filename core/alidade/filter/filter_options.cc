@@ -9,13 +9,15 @@ namespace {
 
 EkfOptions ReadRecovering(Params& p) {
   EkfOptions options = internal::ReadCommonOptions(p);
-  options.lockout = static_cast<Lockout>(p.Choice("lockout.action", {"reset", "inflate", "none"},
-                                                  "what is done after so many rejections",
-                                                  static_cast<int>(options.lockout)));
-  options.lockout_after = p.Integer("lockout.after", "rejections of one sensor in a row", 1,
-                                    1'000'000, options.lockout_after);
-  options.repairs = p.Integer("repairs", "of a covariance that lost its positive definiteness", 0,
-                              1'000'000, options.repairs);
+  options.rejection_recovery = static_cast<RejectionRecovery>(p.Choice(
+      "rejection_recovery.action", {"reset", "inflate", "none"},
+      "what is done after so many rejections", static_cast<int>(options.rejection_recovery)));
+  options.rejection_recovery_after =
+      p.Integer("rejection_recovery.after", "rejections of one sensor in a row", 1, 1'000'000,
+                options.rejection_recovery_after);
+  options.max_covariance_repairs =
+      p.Integer("max_covariance_repairs", "of a covariance that lost its positive definiteness", 0,
+                1'000'000, options.max_covariance_repairs);
   return options;
 }
 
@@ -41,9 +43,9 @@ IekfOptions ReadIekf(Params& p) {
 
 EkfOptions internal::ReadCommonOptions(Params& p) {
   EkfOptions options;
-  options.gate =
-      p.Number("gate", "", "probability with which a measurement that fits passes; 1: no gate",
-               {0.0, 1.0, true, false}, options.gate);
+  options.gate = p.NumberOrNone("gate", "", "probability with which a measurement that fits passes",
+                                {0.0, 1.0, true, true})
+                     .value_or(options.gate);
   options.fuse = static_cast<Fuse>(p.Choice("fuse", {"joint", "per_sensor", "per_measurement"},
                                             "how the measurements of one stamp make updates",
                                             static_cast<int>(options.fuse)));

@@ -11,7 +11,7 @@ namespace alidade::internal {
 EkfOptions ReadCommonOptions(Params& p);
 
 inline EkfOptions WithoutRecovery(EkfOptions options) {
-  options.lockout = Lockout::kNone;
+  options.rejection_recovery = RejectionRecovery::kNone;
   return options;
 }
 

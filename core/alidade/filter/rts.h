@@ -29,10 +29,10 @@ namespace alidade {
 class RtsSmoother : public Ekf {
  public:
   /// No considered blocks and roles, none that start or are linearised at a measurement, no
-  /// recovery from a lock-out, no landmarks.
+  /// rejection recovery, no landmarks.
   static constexpr Support kSupport = {};
 
-  /// `options.lockout` counts as kNone. ContractViolation where `system` asks for more than
+  /// `options.rejection_recovery` counts as kNone. ContractViolation where `system` asks for more than
   /// kSupport.
   RtsSmoother(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
 

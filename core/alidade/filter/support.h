@@ -14,7 +14,7 @@ struct Support {
   bool held = true;               ///< held roles
   bool at_measurement = false;    ///< linearise_at: measurement
   bool from_measurement = false;  ///< blocks that start from their first measurement
-  bool recovery = false;          ///< from a lock-out
+  bool recovery = false;          ///< after consecutive rejections
   bool robust_loss = true;        ///< of a sensor
   bool landmarks = false;         ///< that come and go
 };

@@ -13,7 +13,7 @@ struct UkfOptions {
   /// The mean of values y loses eps |y| / (2 alpha^2) to rounding: 1e-8 |y| here.
   static constexpr double kLeastAlpha = 1e-4;
 
-  EkfOptions filter;    ///< gate, fuse and max_dt_s; `lockout` counts as kNone
+  EkfOptions filter;    ///< gate, fuse and max_dt_s; `rejection_recovery` counts as kNone
   double alpha = 0.01;  ///< spread of the sigma points, in [1e-4, 1]
   double beta = 2.0;    ///< weight of what the centre adds, >= 0; 2: best for a Gaussian
   double kappa = 0.0;   ///< spread beyond the number of directions, >= 0
@@ -53,7 +53,7 @@ struct UkfOptions {
 class Ukf : public Ekf {
  public:
   /// No considered blocks and roles, none that start or are linearised at a measurement, no
-  /// recovery from a lock-out, no landmarks.
+  /// rejection recovery, no landmarks.
   static constexpr Support kSupport = {};
 
   /// ContractViolation where `system` asks for more than kSupport or an option is out of its range.

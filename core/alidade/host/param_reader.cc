@@ -41,6 +41,7 @@ std::string TypeText(const AlidadeParam& param) {
 
 std::string ValueText(const AlidadeParam& param, double value) {
   if (param.kind == ALIDADE_PARAM_FLAG) return value != 0.0 ? "true" : "false";
+  if ((param.flags & ALIDADE_PARAM_OR_NONE) != 0 && value == kInfinity) return "none";
   if (param.kind != ALIDADE_PARAM_CHOICE) return NumberText(value);
   const bool known = value >= 0.0 && value < param.choice_count;
   return known ? Text(param.choices[static_cast<int>(value)]) : "";
@@ -79,6 +80,7 @@ ParamInfo Describe(const AlidadeParam& param) {
   info.type = TypeText(param);
   const bool number = param.kind == ALIDADE_PARAM_NUMBER || param.kind == ALIDADE_PARAM_INTEGER;
   if (number) info.range = RangeText(param);
+  if ((param.flags & ALIDADE_PARAM_OR_NONE) != 0) info.range += " or none";
   info.fallback = FallbackText(param);
   info.choices = Choices(param);
   return info;
@@ -120,6 +122,15 @@ std::string Meaning(const AlidadeParam& param) {
   return '(' + text + info.doc + ')';
 }
 
+double NumberOrNone(const AlidadeParam& param, const Node& node, bool low_open, bool high_open) {
+  if (node.kind() == Node::Kind::kScalar && node.Text() == "none") return kInfinity;
+  try {
+    return node.Number(param.low, param.high, low_open, high_open);
+  } catch (const Error& e) {
+    throw Error(e.code(), std::string(e.what()) + ", or none");
+  }
+}
+
 double One(const AlidadeParam& param, const Node& node) {
   const bool low_open = (param.flags & ALIDADE_PARAM_LOW_OPEN) != 0;
   const bool high_open = (param.flags & ALIDADE_PARAM_HIGH_OPEN) != 0;
@@ -134,7 +145,9 @@ double One(const AlidadeParam& param, const Node& node) {
     case ALIDADE_PARAM_CHOICE:
       return node.Choice(Choices(param));
     default:
-      return node.Number(param.low, param.high, low_open, high_open);
+      return (param.flags & ALIDADE_PARAM_OR_NONE) != 0
+                 ? NumberOrNone(param, node, low_open, high_open)
+                 : node.Number(param.low, param.high, low_open, high_open);
   }
 }
 

@@ -39,6 +39,16 @@ class Params {
          1);
     return value;
   }
+  /// One value of `key`; nullopt for the word `none`, which is the default.
+  std::optional<double> NumberOrNone(const char* key, const char* unit, const char* doc,
+                                     Range range) {
+    const double none = std::numeric_limits<double>::infinity();
+    double value = none;
+    AlidadeParam param = Describe(ALIDADE_PARAM_NUMBER, key, unit, doc, range, 1, &none);
+    param.flags |= ALIDADE_PARAM_OR_NONE;
+    host_->read(host_->context, &param, &value, 1);
+    return value < none ? std::optional(value) : std::nullopt;
+  }
   double Positive(const char* key, const char* unit, const char* doc,
                   std::optional<double> fallback = std::nullopt) {
     return Number(key, unit, doc, kPositive, fallback);

@@ -93,7 +93,8 @@ enum {
 enum {
   ALIDADE_PARAM_HAS_DEFAULT = 1,
   ALIDADE_PARAM_LOW_OPEN = 2, /* the bound itself is excluded */
-  ALIDADE_PARAM_HIGH_OPEN = 4
+  ALIDADE_PARAM_HIGH_OPEN = 4,
+  ALIDADE_PARAM_OR_NONE = 8 /* a number, or the word `none`: read as infinity */
 };
 
 /* A parameter is declared by being read. */

@@ -129,10 +129,10 @@ const PluginEntry& FindOffered(const std::string& type, const PluginHost& host, 
 /// that is none of `merged` either, for it has no model.
 void CheckOverrides(const Node& overrides, const Node& root, const Node& merged) {
   for (const auto& [key, value] : overrides.Entries()) {
-    if (key == "start_s" || key == "landmarks") continue;
+    if (key == "initial_time_s" || key == "landmarks") continue;
     if (key != "state" && key != "sensors") {
       value.Fail("'" + key + "' is common to all estimators of a run",
-                 "state, sensors, landmarks or start_s");
+                 "state, sensors, landmarks or initial_time_s");
     }
     std::vector<std::string> known;
     for (const auto& [name, entry] : root.At(key).Entries()) known.push_back(name);

@@ -43,7 +43,7 @@ namespace alidade {
 /// `OUTCOME:SENSOR`, of control inputs `inputs:ENTRY`, and of landmarks `landmarks.initialised`,
 /// `.deleted`, `.converted` and `.negative`. A
 /// truth is named like the block, `target.depth`, or like its last component where that is unique.
-/// A frame older than the state, as before `start_s`, adds to the counts alone.
+/// A frame older than the state, as before `initial_time_s`, adds to the counts alone.
 /// A metric without a stamp to take it from is left out; an estimate that is not finite makes its
 /// rmse infinite.
 class Metrics {

@@ -113,7 +113,7 @@ void ReadPrior(const Node& initial, const Block& block, BlockId id, System& syst
   system.priors.push_back(std::move(prior));
 }
 
-/// `input: {stream: NAME, max_age_s: S}` of a model that takes a control input.
+/// `input: {stream: NAME, timeout_s: S}` of a model that takes a control input.
 InputBinding ReadInput(const Node& entry, const MotionModel& model) {
   constexpr double kMostSeconds = 1e9;
   InputBinding binding;
@@ -126,10 +126,10 @@ InputBinding ReadInput(const Node& entry, const MotionModel& model) {
   const std::string needed_by =
       "the control input " + model.input().name + " of model " + model.name();
   const Node input = entry.At("input", needed_by);
-  if (!input.is_map()) input.Fail("not a map", "{stream: NAME}, or {stream: NAME, max_age_s: S}");
+  if (!input.is_map()) input.Fail("not a map", "{stream: NAME}, or {stream: NAME, timeout_s: S}");
   binding.stream = input.At("stream", needed_by).Text();
-  if (const auto max_age = input.Find("max_age_s")) {
-    binding.max_age_s = max_age->Number(0.0, kMostSeconds, true);
+  if (const auto max_age = input.Find("timeout_s")) {
+    binding.timeout_s = max_age->Number(0.0, kMostSeconds, true);
   }
   input.RejectUnread();
   return binding;
@@ -320,7 +320,7 @@ System WithoutUntouched(System system) {
     }
   }
   System kept;
-  kept.start_s = system.start_s;
+  kept.initial_time_s = system.initial_time_s;
   kept.landmarks = std::move(system.landmarks);
   std::vector<BlockId> moved;
   for (const Block& block : system.layout.blocks()) {
@@ -389,8 +389,8 @@ System BuildSystem(const Node& root, const PluginHost& host, const std::vector<s
     }
   }
   constexpr double kLatestSeconds = 4.6e9;  // two stamps may differ by twice that
-  if (const auto start = root.Find("start_s"))
-    system.start_s = start->Number(-kLatestSeconds, kLatestSeconds);
+  if (const auto start = root.Find("initial_time_s"))
+    system.initial_time_s = start->Number(-kLatestSeconds, kLatestSeconds);
   if (!only.empty()) system = WithoutUntouched(std::move(system));
   const auto sees = [](const SensorBinding& sensor) { return sensor.model.has_landmark(); };
   if (std::ranges::none_of(system.sensors, sees)) system.landmarks.reset();

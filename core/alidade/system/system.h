@@ -51,7 +51,7 @@ struct SensorBinding {
 struct InputBinding {
   std::string stream;  ///< "" where the model takes none
   /// From this age on an input does not act any more.
-  double max_age_s = std::numeric_limits<double>::infinity();
+  double timeout_s = std::numeric_limits<double>::infinity();
 };
 
 /// Motion model -> the blocks it moves, and what drives it.
@@ -77,7 +77,7 @@ struct System {
   std::vector<MotionBinding> motions;
   std::vector<SensorBinding> sensors;
   std::vector<Prior> priors;
-  std::optional<double> start_s;             ///< time of the priors; else the first frame's
+  std::optional<double> initial_time_s;      ///< time of the priors; else the first frame's
   std::optional<LandmarkOptions> landmarks;  ///< there where a sensor measures landmarks
 
   /// The state before the first measurement: all blocks with a given prior are present. `reserved`:
@@ -87,7 +87,7 @@ struct System {
   int FindSensor(std::string_view name) const;
 };
 
-/// Reads `state`, `sensors`, `landmarks`, `camera` and `start_s` of a config's root. `only` keeps
+/// Reads `state`, `sensors`, `landmarks`, `camera` and `initial_time_s` of a config's root. `only` keeps
 /// named sensors, in its own order, and the state entries that they touch; empty: everything.
 /// Errors: kBadConfig with place and remedy, kPlugin.
 System BuildSystem(const Node& root, const PluginHost& host, const std::vector<std::string>& only);

@@ -86,7 +86,7 @@ std::vector<double> Trajectory::ValuesOf(const State& state) const {
 
 bool Trajectory::Add(const Frame& frame, const UpdateReport& report, const Estimator& filter) {
   if (stamp_ == kNoStamp) {
-    stamp_ = system_.start_s ? StampFromSeconds(*system_.start_s) : frame.stamp;
+    stamp_ = system_.initial_time_s ? StampFromSeconds(*system_.initial_time_s) : frame.stamp;
   }
   Epoch epoch;
   epoch.steps.swap(passed_on_);

@@ -50,7 +50,7 @@ class Trajectory {
   /// Gaps longer than `max_dt_s` are stepped in equal parts.
   Trajectory(System system, const std::vector<StreamInfo>& streams, double max_dt_s);
 
-  /// Sets the time of the prior; else the first frame, or start_s, does.
+  /// Sets the time of the prior; else the first frame, or initial_time_s, does.
   void Start(Stamp stamp) { stamp_ = stamp; }
   /// One frame more; the filter's report says which measurement gave a block or landmark its first
   /// value. False, and problem(), where there would be too many inputs.

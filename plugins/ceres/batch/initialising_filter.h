@@ -36,7 +36,7 @@ class InitialisingFilter {
  private:
   static EkfOptions OptionsOf(double max_dt_s) {
     EkfOptions options;
-    options.lockout = Lockout::kNone;
+    options.rejection_recovery = RejectionRecovery::kNone;
     options.max_dt_s = max_dt_s;
     return options;
   }

@@ -27,10 +27,10 @@ constexpr double kNoise = 0.2, kSigma = 0.3;  // m/s^0.5, m
 const std::vector<StreamInfo> kStreams = {{"fix", 1}, {"odometry", 1}};
 
 /// `car.position`, 1 +- 0.5 m, driven by stream `odometry`; sensor `fix` measures it.
-System Car(double max_age_s = kInfinity) {
+System Car(double timeout_s = kInfinity) {
   System system;
   AddMotion(system, "car", InProcessMotion(Driven(kNoise), "driven"), {{"position", 1.0, 0.5}});
-  system.motions[0].input = {"odometry", max_age_s};
+  system.motions[0].input = {"odometry", timeout_s};
   AddSensor(system, "fix", InProcessSensor(Linear(1.0, kSigma), "linear"), {"car.position"});
   return system;
 }
@@ -59,11 +59,11 @@ struct Gaussian {
 
 /// The Kalman filter written out: between two rows the distance is the integral of u(t), which is
 /// the last speed until max_age after it, and then 0; P grows by kNoise^2 dt.
-std::vector<Gaussian> WrittenOut(const std::vector<Seen>& drive, double max_age_s) {
+std::vector<Gaussian> WrittenOut(const std::vector<Seen>& drive, double timeout_s) {
   std::vector<Gaussian> estimates;
   double x = 1.0, p = 0.25, t = drive[0].t_s, speed = 0.0, since = t;
   for (const Seen& row : drive) {
-    const double acting = std::clamp(since + max_age_s - t, 0.0, row.t_s - t);
+    const double acting = std::clamp(since + timeout_s - t, 0.0, row.t_s - t);
     x += speed * acting;
     p += kNoise * kNoise * (row.t_s - t);
     t = row.t_s;
@@ -83,9 +83,9 @@ std::vector<Gaussian> WrittenOut(const std::vector<Seen>& drive, double max_age_
 
 /// Kinds of all events, in their order; what the filter makes is held against the written out.
 std::vector<std::string> ExpectWrittenOut(Estimator& filter, const std::vector<Seen>& drive,
-                                          double max_age_s, double tolerance) {
+                                          double timeout_s, double tolerance) {
   std::vector<std::string> kinds;
-  const std::vector<Gaussian> expected = WrittenOut(drive, max_age_s);
+  const std::vector<Gaussian> expected = WrittenOut(drive, timeout_s);
   for (std::size_t k = 0; k < drive.size(); ++k) {
     const UpdateReport& report = filter.Process(FrameOf(drive[k]));
     for (const Event& event : report.events) kinds.push_back(event.kind);
@@ -138,12 +138,12 @@ TEST(ControlInputs, StopActingInTheMiddleOfAStepWhenTheyAreTooOld) {
 TEST(ControlInputs, ActInEveryPartOfAGapThatIsSteppedInParts) {
   EkfOptions options;
   options.max_dt_s = 0.1;
-  for (const double max_age_s : {kInfinity, 0.45}) {
-    Ekf ekf(Car(max_age_s), options, kStreams);
-    std::vector<std::string> kinds = ExpectWrittenOut(ekf, kDrive, max_age_s, 1e-12);
+  for (const double timeout_s : {kInfinity, 0.45}) {
+    Ekf ekf(Car(timeout_s), options, kStreams);
+    std::vector<std::string> kinds = ExpectWrittenOut(ekf, kDrive, timeout_s, 1e-12);
     std::erase(kinds, "input_stale");
     // 0.5 s: 5 parts; 3 s: 30, the only gap of at least twice as many.
-    EXPECT_EQ(kinds, std::vector<std::string>(2, "substeps")) << max_age_s;
+    EXPECT_EQ(kinds, std::vector<std::string>(2, "substeps")) << timeout_s;
   }
   Ekf ekf(Car(), options, kStreams);
   ekf.Process(FrameOf(kDrive[0]));
@@ -290,7 +290,7 @@ TEST(ControlInputs, OnAManifoldStartAtItsNeutralElementAndStayOnIt) {
   System system;
   AddMotion(system, "body", InProcessMotion(TurnedByInput(), "turned"), {{"x", 0.0, 1.0}});
   system.motions[0].input = {"attitude", kInfinity};
-  system.start_s = -1.0;
+  system.initial_time_s = -1.0;
   Ekf ekf(system, {}, {{"attitude", 4}});
   const auto frame = [](double t_s, const std::vector<double>& q) {
     return Frame{StampFromSeconds(t_s), {{StampFromSeconds(t_s), 0, -1, q, {}}}, {}};

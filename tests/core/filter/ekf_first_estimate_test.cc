@@ -66,7 +66,7 @@ TEST(Ekf, AFirstEstimateIsThatOfTheMeasurementABlockStartsFrom) {
 }
 
 TEST(Ekf, AResetMakesANewFirstEstimate) {
-  // The scale alone, its lambda far off: a lock-out resets it to z / Z.
+  // The scale alone, its lambda far off: rejection recovery resets it to z / Z.
   System system = DepthFilter();
   system.sensors.erase(system.sensors.begin());
   system.priors[0].covariance(0, 0) = 1e-6;
@@ -78,7 +78,7 @@ TEST(Ekf, AResetMakesANewFirstEstimate) {
   Ekf ekf(system, options, StreamsOf(system));
   UpdateReport report;
   for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(0.0, {{0, 2.0}}));
-  ASSERT_EQ(report.events.back().kind, "lockout");
+  ASSERT_EQ(report.events.back().kind, "rejection_recovery");
   const double lambda = ValueOf(ekf.state(), "template.inverse_distance");
   ASSERT_NEAR(lambda, 2.0 / 0.35, 1e-12);
   const Eigen::Matrix3d p = ekf.state().covariance().Dense();

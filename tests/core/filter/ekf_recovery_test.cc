@@ -148,7 +148,7 @@ TEST(Ekf, AMeasurementThatIsNotFiniteIsNotUsed) {
 }
 
 // FAULTS 77
-TEST(Ekf, ALockedOutSensorResetsItsBlockFromTheMeasurement) {
+TEST(Ekf, ASensorThatIsRejectedRepeatedlyResetsItsBlockFromTheMeasurement) {
   System system = DepthFilter();
   system.priors[0].mean = {3.0};
   system.priors[0].covariance(0, 0) = 1e-6;
@@ -158,7 +158,7 @@ TEST(Ekf, ALockedOutSensorResetsItsBlockFromTheMeasurement) {
   UpdateReport report;
   for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(0.0, {{0, 65.0}}));
   ASSERT_FALSE(report.events.empty());
-  EXPECT_EQ(report.events.back().kind, "lockout");
+  EXPECT_EQ(report.events.back().kind, "rejection_recovery");
   EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), 26.0 / 65.0, 1e-15);
   // sigma_Z = Z^2 / BF sigma_d, uncorrelated with the rest; the rate is back at its prior.
   EXPECT_NEAR(std::sqrt(CovarianceOf(ekf.state(), "target.depth", "target.depth")),
@@ -202,14 +202,14 @@ TEST(Ekf, AHeldRoleIsExactWhereABlockStartsFromIt) {
               std::pow(2.0 / 300.0 / 0.35, 2), 1e-15);
 }
 
-TEST(Ekf, ALockedOutSensorOfFixedBlocksInflatesNothing) {
+TEST(Ekf, ASensorThatIsRejectedRepeatedlyOfFixedBlocksInflatesNothing) {
   const auto event_of = [](BlockStatus status) {
     System system = WithStatus(DepthFilter(), "target.depth", status);
     system.priors[0].mean = {3.0};
     system.priors[0].covariance(0, 0) = 1e-6;
     EkfOptions options;
     options.gate = 0.999;
-    options.lockout = Lockout::kInflate;
+    options.rejection_recovery = RejectionRecovery::kInflate;
     Ekf ekf(system, options, StreamsOf(system));
     UpdateReport report;
     for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(0.0, {{0, 65.0}}));
@@ -231,7 +231,7 @@ TEST(Ekf, AResetLeavesConsideredBlocksAsTheyAre) {
   ekf.Start(0);
   UpdateReport report;
   for (int k = 0; k < 20; ++k) report = ekf.Process(FrameAt(1.0, {{0, 65.0}}));
-  ASSERT_EQ(report.events.back().kind, "lockout");
+  ASSERT_EQ(report.events.back().kind, "rejection_recovery");
   EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), 0.4, 1e-15);
   // 0.25 of the prior and 1 of the acceleration over the second.
   EXPECT_EQ(CovarianceOf(ekf.state(), "target.depth_rate", "target.depth_rate"), 1.25);
@@ -259,7 +259,7 @@ struct WithOptional : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-TEST(Ekf, ALockedOutSensorWhoseRoleIsUnboundInflatesWhatItCorrects) {
+TEST(Ekf, ASensorThatIsRejectedRepeatedlyWhoseRoleIsUnboundInflatesWhatItCorrects) {
   System system;
   AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.0, 1.0}});
   AddSensor(system, "s", InProcessSensor(WithOptional(), "with_optional"), {"p.x"});

@@ -127,7 +127,7 @@ std::map<std::string, int> Compare(const System& system, const EkfOptions& optio
 TEST(SmallEkf, DoesWhatTheGeneralPathDoes) {
   EkfOptions options;
   options.gate = 0.99;
-  options.lockout_after = 4;
+  options.rejection_recovery_after = 4;
   std::vector<Frame> frames;
   for (int k = 0; k < 400; ++k) {
     const double t = 0.033 * k, depth = 0.3 + 0.1 * std::sin(2.5 * t);
@@ -154,7 +154,8 @@ TEST(SmallEkf, DoesWhatTheGeneralPathDoes) {
     if (k == 300) frames.back().stamp -= StampFromSeconds(1.0);
   }
   auto seen = Compare(DepthFilter(), options, frames);
-  for (const char* what : {"accepted", "gated", "invalid", "not_finite", "stale", "lockout"}) {
+  for (const char* what :
+       {"accepted", "gated", "invalid", "not_finite", "stale", "rejection_recovery"}) {
     EXPECT_GT(seen.count(what), 0u) << what;
   }
   // Of the 190 frames since the reset, one in seven has no measurement, one two of a sensor.
@@ -175,9 +176,9 @@ std::vector<Frame> WildFrom(int first, int last, int count) {
 TEST(SmallEkf, ServesAgainAfterAReset) {
   EkfOptions options;
   options.gate = 0.999;
-  options.lockout_after = 3;
+  options.rejection_recovery_after = 3;
   auto seen = Compare(DepthFilter(), options, WildFrom(20, 30, 80));
-  EXPECT_GE(seen["lockout"], 2);  // to the wild depth and back
+  EXPECT_GE(seen["rejection_recovery"], 2);  // to the wild depth and back
   EXPECT_GT(seen["fast since"], 40);
 }
 
@@ -191,17 +192,17 @@ TEST(SmallEkf, ServesOnceABlockHasItsValueFromAMeasurement) {
   EXPECT_EQ(seen["fast"], 19);
 }
 
-// What the fast path accepts in between ends the first lock-out: the second inflates anew.
-TEST(SmallEkf, AnAcceptedMeasurementEndsALockOut) {
+// What the fast path accepts in between ends the first run of rejections: the second inflates anew.
+TEST(SmallEkf, AnAcceptedMeasurementEndsARecovery) {
   EkfOptions options;
   options.gate = 0.999;
-  options.lockout_after = 3;
-  options.lockout = Lockout::kInflate;
+  options.rejection_recovery_after = 3;
+  options.rejection_recovery = RejectionRecovery::kInflate;
   std::vector<Frame> frames = WildFrom(20, 23, 40);
   const std::vector<Frame> again = WildFrom(33, 36, 40);
   std::copy(again.begin() + 30, again.end(), frames.begin() + 30);
   auto seen = Compare(DepthFilter(), options, frames);
-  EXPECT_EQ(seen["lockout"], 2);
+  EXPECT_EQ(seen["rejection_recovery"], 2);
   EXPECT_EQ(seen["gated"], 6);
   EXPECT_GT(seen["fast"], 30);
 }

@@ -111,7 +111,7 @@ TEST(Ekf, TheGatePassesTheShareThatItsProbabilityStates) {
   AddSensor(system, "direct", InProcessSensor(Linear(1.0, 1.0), "linear"), {"p.x"});
   EkfOptions options;
   options.gate = 0.9;
-  options.lockout = Lockout::kNone;
+  options.rejection_recovery = RejectionRecovery::kNone;
   Ekf ekf(system, options, StreamsOf(system));
   Random random(13);
   constexpr int kTrials = 20000;
@@ -191,7 +191,7 @@ TEST(Ekf, ASensorOutsideItsDomainIsReportedAsDivergenceOnce) {
   System system = DepthFilter();
   system.priors[0].mean = {-0.2};
   EkfOptions options;
-  options.lockout = Lockout::kNone;
+  options.rejection_recovery = RejectionRecovery::kNone;
   Ekf ekf(system, options, StreamsOf(system));
   int events = 0;
   for (int k = 0; k < 5; ++k) {

@@ -132,7 +132,7 @@ TEST(RtsSmoother, EqualsTheRecursionOfRauchTungAndStriebelOnTheDepthFilter) {
   const System system = DepthFilter();
   EkfOptions options;
   options.gate = 0.999;
-  options.lockout = Lockout::kNone;
+  options.rejection_recovery = RejectionRecovery::kNone;
   RtsSmoother rts(system, options, StreamsOf(system));
   Ekf ekf(system, options, StreamsOf(system));
   struct Pass {

@@ -78,7 +78,7 @@ TEST(SquareRootEkf, EqualsTheEkfOnTheDepthFilterInEveryOrderOfUpdates) {
     EkfOptions options;
     options.fuse = fuse;
     options.gate = 0.999;
-    options.lockout = Lockout::kNone;
+    options.rejection_recovery = RejectionRecovery::kNone;
     options.max_dt_s = 0.02;
     SquareRootEkf filter(system, options, StreamsOf(system));
     Ekf ekf(system, options, StreamsOf(system));

@@ -206,7 +206,7 @@ TEST(AcceptedBy, ASensorOfWhichTheFilterTookNothingIsNamed) {
   NamedEstimator& filter = experiment.estimators[0];
   EkfOptions options;
   options.gate = 1e-9;
-  options.lockout = Lockout::kNone;
+  options.rejection_recovery = RejectionRecovery::kNone;
   filter.estimator = std::make_unique<Ekf>(filter.system, options, StreamsOf(filter.system));
   const RunResult run = alidade::Run(experiment, {});
   const auto event = std::ranges::find(run.estimators[1].events, "unused", &Event::kind);

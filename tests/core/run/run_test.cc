@@ -72,12 +72,12 @@ TEST(Run, TheReasonOfAFailureIsTheEventThatCausedIt) {
   alone.on_divergence = OnDivergence::kFail;
   alone.system.priors[0].mean = {-0.2};
   EkfOptions options;
-  options.lockout_after = 1;
+  options.rejection_recovery_after = 1;
   alone.estimator = std::make_unique<Ekf>(alone.system, options, experiment.source->streams());
   const RunResult result = alidade::Run(experiment, {});
   ASSERT_EQ(result.code, ExitCode::kDiverged);
   const std::vector<Event>& events = result.estimators[1].events;
-  EXPECT_EQ(std::ranges::count(events, "lockout", &Event::kind), 1);
+  EXPECT_EQ(std::ranges::count(events, "rejection_recovery", &Event::kind), 1);
   EXPECT_NE(result.reason.find("not defined at target.depth = -0.2"), std::string::npos)
       << result.reason;
 }
@@ -369,7 +369,7 @@ TEST(Run, RadiansAreNoEvent) {
 TEST(Run, FramesBeforeTheStartEnterTheCountsAlone) {
   Experiment experiment = MakeExperiment();  // 60 frames, one each 33 ms
   NamedEstimator& ekf = experiment.estimators[0];
-  ekf.system.start_s = 49.5 * 0.033;
+  ekf.system.initial_time_s = 49.5 * 0.033;
   ekf.estimator = std::make_unique<Ekf>(ekf.system, EkfOptions{}, experiment.source->streams());
   const EstimatorResult late = alidade::Run(experiment, {}).estimators[0];
   EXPECT_EQ(late.counts.at("stale:inverse_scale"), 50);
@@ -398,7 +398,7 @@ TEST(Run, ASensorOfWhichNothingWasUsedIsAnEvent) {
   for (Prior& prior : ekf.system.priors) prior.covariance *= 1e-12;  // sure of what is wrong
   EkfOptions options;
   options.gate = 1e-6;
-  options.lockout = Lockout::kNone;
+  options.rejection_recovery = RejectionRecovery::kNone;
   ekf.system.motions.clear();
   ekf.estimator = std::make_unique<Ekf>(ekf.system, options, experiment.source->streams());
   EXPECT_EQ(unused(alidade::Run(experiment, {}).estimators[0]),

@@ -41,7 +41,7 @@ evaluate:
   segments: {seeing: {with: stereo}, blind: {without: stereo}}
 )";
 
-/// Blocks that wait for their first measurement, and a gate so narrow that sensors are locked out:
+/// Blocks that wait for their first measurement, and a gate so narrow that sensors need rejection recovery:
 /// what the filter keeps besides its state decides what comes.
 constexpr const char* kEventful = R"(alidade: 1
 state:
@@ -58,8 +58,8 @@ sensors:
           template_px: 300, sigma_px: 1.0}
 source: {type: depth_target, seed: 3}
 estimators:
-  reset: {type: ekf, gate: 0.5, lockout: {after: 3}, jacobian: first_estimate}
-  inflate: {type: ekf, gate: 0.5, lockout: {after: 3, action: inflate}}
+  reset: {type: ekf, gate: 0.5, rejection_recovery: {after: 3}, jacobian: first_estimate}
+  inflate: {type: ekf, gate: 0.5, rejection_recovery: {after: 3, action: inflate}}
 )";
 
 /// The frames of a source, each late by up to `most_s`, the first by all of it; with `split` each
@@ -143,7 +143,8 @@ TEST_P(Reordered, LateFramesGiveTheBytesOfTheInOrderRun) {
     EXPECT_EQ(in_order.arrivals.late, 0);
     if (config == kEventful) {
       for (const EstimatorResult& one : in_order.estimators) {
-        EXPECT_GT(std::ranges::count(one.events, "lockout", &Event::kind), 3) << one.name;
+        EXPECT_GT(std::ranges::count(one.events, "rejection_recovery", &Event::kind), 3)
+            << one.name;
         EXPECT_EQ(one.counts.at("initialised:stereo"), 1) << one.name;
         EXPECT_EQ(one.counts.at("initialised:scale"), 1) << one.name;
       }

@@ -118,14 +118,15 @@ TEST(CompareRuns, WithoutAMeasurementThereIsNothingToCompare) {
             "no estimator was given a measurement: what is compared is their start");
 }
 
-TEST(CompareRuns, TellsOfLockOutsOfTheFilter) {
+TEST(CompareRuns, TellsOfRejectionRecoveryOfTheFilter) {
   ComparedRun run =
       RunOf({Entry("ekf", "ekf", false, 2.0), Entry("batch", "ceres_batch", true, 1.0)});
   EXPECT_TRUE(CompareRuns({run}, {}).notes.empty());
-  run.estimators[0].locked_out = true;
+  run.estimators[0].had_rejection_recovery = true;
   EXPECT_EQ(CompareRuns({run}, {}).notes,
-            std::vector<std::string>{"'ekf' was locked out: what that cost is in its step to a "
-                                     "batch or smoother"});
+            std::vector<std::string>{
+                "'ekf' recovered from rejections: what that cost is in its step to a "
+                "batch or smoother"});
 }
 
 TEST(CompareRuns, HasTheWorstStatusOfTheRuns) {

@@ -174,7 +174,7 @@ TEST(Recorder, AFrameOlderThanTheStateHasNoEstimate) {
   const TemporaryFolder folder;
   Experiment experiment = MakeExperiment(6);  // one frame each 33 ms
   NamedEstimator& ekf = experiment.estimators[0];
-  ekf.system.start_s = 0.066;
+  ekf.system.initial_time_s = 0.066;
   ekf.estimator = std::make_unique<Ekf>(ekf.system, EkfOptions{}, experiment.source->streams());
   Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
   recorder.Finish(RunInto(recorder, experiment));
@@ -243,7 +243,7 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
   one.counts = {{"accepted:stereo", 151}};
   one.units = {{"target.depth", "m"}};
   one.diverged = true;
-  one.events = {{0, "lockout", ""}, {1, "lockout", ""}, {2, "diverged", ""}};
+  one.events = {{0, "rejection_recovery", ""}, {1, "rejection_recovery", ""}, {2, "diverged", ""}};
   one.unobservable = {{"a.x", "b.y"}};
   result.estimators = {one};
   Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
@@ -308,7 +308,7 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
       },
       "events": {
         "diverged": 1,
-        "lockout": 2
+        "rejection_recovery": 2
       },
       "unobservable": [
         [

@@ -364,10 +364,10 @@ Comparison internal::CompareRuns(const std::vector<ComparedRun>& runs,
   if (filter != nullptr) {
     comparison.explained = filter->name;
     comparison.gap = ExplainGap(*filter, candidates, truth);
-    if (filter->entry->locked_out) {
+    if (filter->entry->had_rejection_recovery) {
       comparison.notes.push_back(
           "'" + filter->name +
-          "' was locked out: what that cost is in its step to a batch or smoother");
+          "' recovered from rejections: what that cost is in its step to a batch or smoother");
     }
   }
   return comparison;

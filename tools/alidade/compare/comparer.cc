@@ -50,8 +50,8 @@ Comparison RunComparer::Finish(const RunResult& result, const CompareOptions& op
   ALIDADE_EXPECTS(result.estimators.size() <= run.estimators.size());
   for (std::size_t e = 0; e < result.estimators.size(); ++e) {
     run.estimators[e].result = result.estimators[e];
-    run.estimators[e].locked_out =
-        std::ranges::count(result.estimators[e].events, "lockout", &Event::kind) > 0;
+    run.estimators[e].had_rejection_recovery =
+        std::ranges::count(result.estimators[e].events, "rejection_recovery", &Event::kind) > 0;
     run.estimators[e].result.events.clear();
   }
   run.estimators.resize(result.estimators.size());

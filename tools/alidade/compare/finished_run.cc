@@ -238,7 +238,7 @@ ComparedRun ReadFiles(const fs::path& folder) {
     one.result.wall_s = timing.root().At("estimators").At(name).At("wall_s").Number();
     one.series.blocks = one.facts.blocks;
     one.series.joint = false;
-    one.locked_out = entry.At("events").Find("lockout").has_value();
+    one.had_rejection_recovery = entry.At("events").Find("rejection_recovery").has_value();
     one.not_finite = ReadEstimates(folder / name / "estimates.csv", one.facts.rows, one.series);
     ReadCovariances(folder / name / "covariance.bin", one.series);
     const fs::path map = folder / name / "landmarks.csv";

@@ -20,7 +20,8 @@ struct ComparedEntry {
   EstimatorResult result;  ///< without events
   Series series;
   std::int64_t not_finite = 0;  ///< rows of estimates.csv with a cell that is not finite
-  bool locked_out = false;      ///< a sensor was rejected again and again, `lockout` in its events
+  bool had_rejection_recovery =
+      false;  ///< a sensor was rejected again and again, `rejection_recovery` in its events
 
   /// Whether its estimates are of use to compare with.
   bool usable() const { return !result.failed && !series.stamps.empty(); }

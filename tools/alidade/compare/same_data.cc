@@ -81,7 +81,7 @@ void Flatten(const Node& node, std::map<std::string, std::string>& values) {
 std::map<std::string, std::string> SharedSettings(const fs::path& folder) {
   std::map<std::string, std::string> values;
   const Config config = Config::FromFile(folder / "config.resolved.yaml", true);
-  for (const char* key : {"state", "sensors", "landmarks", "camera", "start_s"}) {
+  for (const char* key : {"state", "sensors", "landmarks", "camera", "initial_time_s"}) {
     if (const auto node = config.root().Find(key)) Flatten(*node, values);
   }
   return values;

@@ -103,7 +103,7 @@ std::string InputText(const MotionBinding& motion) {
   if (!motion.model.has_input()) return "none";
   const InputBinding& input = motion.input;
   return motion.model.input().name + " <- " + input.stream +
-         (std::isfinite(input.max_age_s) ? ", up to " + NumberText(input.max_age_s) + " s old"
+         (std::isfinite(input.timeout_s) ? ", up to " + NumberText(input.timeout_s) + " s old"
                                          : "");
 }
 
@@ -269,7 +269,7 @@ std::string FuseText(Fuse fuse, const System& system) {
   return "per_measurement: one update for each measurement, in the order " + Join(names);
 }
 
-std::string LockoutText(const EkfOptions& options, const System& system) {
+std::string RejectionRecoveryText(const EkfOptions& options, const System& system) {
   const auto corrects = [&](const RoleBinding& role) {
     return role.block >= 0 && role.mode == RoleMode::kEstimate &&
            system.layout[role.block].status == BlockStatus::kEstimated;
@@ -278,15 +278,15 @@ std::string LockoutText(const EkfOptions& options, const System& system) {
   for (const SensorBinding& sensor : system.sensors) {
     if (std::ranges::none_of(sensor.roles, corrects)) without.push_back(sensor.name);
   }
-  std::string after =
-      " after " + std::to_string(options.lockout_after) + " rejections of a sensor in a row";
+  std::string after = " after " + std::to_string(options.rejection_recovery_after) +
+                      " rejections of a sensor in a row";
   if (!without.empty()) after += "; nothing for " + Join(without);
-  switch (options.lockout) {
-    case Lockout::kReset:
+  switch (options.rejection_recovery) {
+    case RejectionRecovery::kReset:
       return "reset its blocks from the measurement, or inflate them," + after;
-    case Lockout::kInflate:
+    case RejectionRecovery::kInflate:
       return "inflate its blocks," + after;
-    case Lockout::kNone:
+    case RejectionRecovery::kNone:
       break;
   }
   return "none";
@@ -308,7 +308,8 @@ std::string Options(const Node& entry, const NamedEstimator& named) {
   if (const internal::EstimatorType* const type = internal::FindEstimatorType(named.type)) {
     const auto [options, own] = type->describe(entry);
     rows = {{"gate", GateText(options, system)}, {"fuse", FuseText(options.fuse, system)}};
-    if (type->support.recovery) rows.push_back({"lockout", LockoutText(options, system)});
+    if (type->support.recovery)
+      rows.push_back({"rejection_recovery", RejectionRecoveryText(options, system)});
     rows.push_back({"max_dt_s", std::isfinite(options.max_dt_s) ? NumberText(options.max_dt_s)
                                                                 : "none: a gap is one step"});
     rows.insert(rows.end(), own.begin(), own.end());
@@ -322,7 +323,7 @@ std::string Options(const Node& entry, const NamedEstimator& named) {
   if (const std::string losses = LossText(system); !losses.empty()) {
     rows.push_back({"loss", losses});
   }
-  if (system.start_s) rows.push_back({"start_s", NumberText(*system.start_s)});
+  if (system.initial_time_s) rows.push_back({"initial_time_s", NumberText(*system.initial_time_s)});
   return TextTable(rows, kIndent);
 }
 
@@ -340,7 +341,7 @@ std::string SupportText(const std::string& type) {
   lack(can.considered, "considered blocks and roles");
   lack(can.at_measurement, "linearise_at measurement");
   lack(can.from_measurement, "blocks that start from a measurement");
-  lack(can.recovery, "recovery from a\n    lock-out");
+  lack(can.recovery, "rejection\n    recovery");
   lack(can.landmarks, "landmarks");
   return either(can.considered,
                 "    blocks estimated, considered (Schmidt) or fixed; roles estimate, consider, "

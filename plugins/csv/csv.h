@@ -127,8 +127,8 @@ class CsvSource : public Source {
   void CountRows() {
     if (any_order_) {
       layout_.blind_after_node->Fail(
-          "counts rows as the file has them, not as 'time.order' puts them",
-          "'time.order: reject', which asks for a file in the order of time");
+          "counts rows as the file has them, not as 'out_of_sequence.policy' puts them",
+          "'out_of_sequence.policy: reject', which asks for a file in the order of time");
     }
     if (!reader_.regular()) {
       layout_.blind_after_node->Fail(
@@ -197,8 +197,9 @@ class CsvSource : public Source {
       FailCell(
           column,
           (late ? "is before line " : "is the same time as line ") + std::to_string(last_line_),
-          late ? "times that increase, or 'time.order: sort' or 'rewind'"
-               : "times that increase, or 'time.order: sort', which joins rows of different "
+          late ? "times that increase, or 'out_of_sequence.policy: buffer' or 'rollback'"
+               : "times that increase, or 'out_of_sequence.policy: buffer', which joins rows of "
+                 "different "
                  "streams");
     }
     return stamp;

@@ -340,7 +340,7 @@ TEST_F(DataFault, SignsOfATruthDoNotDependOnTheOrderOfArrival) {
       "--set",
       "source={type: csv, path: turn.csv, streams: {tracks: [w, x]}, truth: {orientation: [w, x, "
       "y, z]}}",
-      "--set", "time={order: sort, window_s: 1}"};
+      "--set", "out_of_sequence={policy: buffer, window_s: 1}"};
   const std::string header = "t_s,w,x,y,z\n", first = "0,0.6,0.8,0,0\n",
                     last = "0.1,-0.6,0.8,0,0\n";
   Write("turn.csv", header + first + last);

@@ -192,11 +192,12 @@ TEST_F(DrivenTest, FramesThatComeLateGiveTheBytesOfThoseInOrder) {
   std::ofstream late(folder_ / "late.csv");
   for (const std::size_t k : {0, 1, 3, 2, 5, 6, 4, 7, 10, 9, 8}) late << lines[k] << '\n';
   late.close();
-  for (const std::string order : {"sort", "rewind"}) {
-    const RunResult run = RunInto(Read({{"estimators", estimators},
-                                        {"source.path", (folder_ / "late.csv").string()},
-                                        {"time", "{order: " + order + ", window_s: 1}"}}),
-                                  folder_ / order);
+  for (const std::string order : {"buffer", "rollback"}) {
+    const RunResult run =
+        RunInto(Read({{"estimators", estimators},
+                      {"source.path", (folder_ / "late.csv").string()},
+                      {"out_of_sequence", "{policy: " + order + ", window_s: 1}"}}),
+                folder_ / order);
     ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
     EXPECT_EQ(run.arrivals.late, 4);
     EXPECT_EQ(run.arrivals.dropped, 0);

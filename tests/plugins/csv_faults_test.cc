@@ -96,10 +96,11 @@ TEST_F(Csv, LongestLineMayEndAcrossTheBuffer) {
 TEST_F(Csv, TimeMustIncrease) {
   ExpectBadData(std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n# c\n0.1,1,2,3\n",
                 "FILE:5:1 t_s: '0.1' is before line 3; expected times that increase, or "
-                "'time.order: sort' or 'rewind'");
-  ExpectBadData(std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n0.2000000001,1,2,3\n",
-                "FILE:4:1 t_s: '0.2000000001' is the same time as line 3; expected times that "
-                "increase, or 'time.order: sort', which joins rows of different streams");
+                "'out_of_sequence.policy: buffer' or 'rollback'");
+  ExpectBadData(
+      std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n0.2000000001,1,2,3\n",
+      "FILE:4:1 t_s: '0.2000000001' is the same time as line 3; expected times that "
+      "increase, or 'out_of_sequence.policy: buffer', which joins rows of different streams");
 }
 
 TEST_F(Csv, TimeBeyondTheStamps) {

@@ -75,7 +75,7 @@ class Csv : public ::testing::Test {
   }
 
   TemporaryFolder folder_;
-  bool any_order_ = false;  ///< as the run says with `time.order`
+  bool any_order_ = false;  ///< as the run says with `out_of_sequence.policy`
   std::unique_ptr<Config> config_;
 };
 

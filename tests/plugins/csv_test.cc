@@ -222,7 +222,8 @@ TEST_F(Csv, BlindAfterNeedsRowsInTheOrderOfTime) {
   any_order_ = true;
   ExpectBadConfig(kDepthConfig + std::string("blind_after: 0.5\n"),
                   "run.yaml:4:14 blind_after: counts rows as the file has them, not as "
-                  "'time.order' puts them; expected 'time.order: reject', which asks for a file in "
+                  "'out_of_sequence.policy' puts them; expected 'out_of_sequence.policy: reject', "
+                  "which asks for a file in "
                   "the order of time");
   EXPECT_EQ(Frames(kDepthConfig + std::string("blind_after: 1\n")).size(), 2u);
 }

@@ -38,8 +38,8 @@ const std::vector<EstimatorType>& EstimatorTypes();
 const EstimatorType* FindEstimatorType(std::string_view name);
 
 /// Refuses by name the keys of an estimator's entry that are left unread but other types have:
-/// `gate`, `fuse`, `jacobian`, `rejection_recovery`. To be called once the entry's own keys have been read.
-/// Errors: kBadConfig.
+/// `gate`, `fuse`, `jacobian`, `rejection_recovery`. To be called once the entry's own keys have
+/// been read. Errors: kBadConfig.
 void RefuseUnsupportedKeys(const std::string& type, const Node& entry);
 /// The same for what `system`, built from the config `root`, asks for beyond `support`.
 /// Errors: kBadConfig.

@@ -32,8 +32,8 @@ class RtsSmoother : public Ekf {
   /// rejection recovery, no landmarks.
   static constexpr Support kSupport = {};
 
-  /// `options.rejection_recovery` counts as kNone. ContractViolation where `system` asks for more than
-  /// kSupport.
+  /// `options.rejection_recovery` counts as kNone. ContractViolation where `system` asks for more
+  /// than kSupport.
   RtsSmoother(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
 
   const UpdateReport& Process(const Frame& frame) override;

@@ -32,8 +32,8 @@ class SquareRootEkf : public Ekf {
   /// rejection recovery, no landmarks.
   static constexpr Support kSupport = {};
 
-  /// `options.rejection_recovery` counts as kNone. ContractViolation where `system` asks for more than
-  /// kSupport.
+  /// `options.rejection_recovery` counts as kNone. ContractViolation where `system` asks for more
+  /// than kSupport.
   SquareRootEkf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
 
   /// L, n x n. state().covariance() is L L' in double precision, and so has half its digits.

@@ -246,21 +246,22 @@ void CheckTruths(const Node& source, const Experiment& experiment, const System&
 }
 
 /// How the run takes frames that are not in the order of their stamps.
-TimePolicy ReadTimePolicy(const Node& root) {
-  TimePolicy policy;
-  const auto time = root.Find("time");
-  if (!time) return policy;
-  const Node order = time->At("order", "time");
-  policy.order = static_cast<TimeOrder>(order.Choice({"reject", "sort", "rewind"}));
-  const auto window = time->Find("window_s");
-  if (window && policy.order == TimeOrder::kReject) {
-    window->Fail("without a use: 'order: reject' holds nothing back", "'order: sort' or 'rewind'");
+OutOfSequencePolicy ReadOutOfSequence(const Node& root) {
+  OutOfSequencePolicy policy;
+  const auto entry = root.Find("out_of_sequence");
+  if (!entry) return policy;
+  const Node chosen = entry->At("policy", "out_of_sequence");
+  policy.policy = static_cast<OutOfSequence>(chosen.Choice({"reject", "buffer", "rollback"}));
+  const auto window = entry->Find("window_s");
+  if (window && policy.policy == OutOfSequence::kReject) {
+    window->Fail("without a use: 'policy: reject' holds nothing back",
+                 "'policy: buffer' or 'rollback'");
   }
   if (window) policy.window = StampFromSeconds(window->Number(0.0, 1e9));
-  if (!window && policy.order == TimeOrder::kRewind) {
-    order.Fail("'rewind' without 'window_s'", "'window_s', how late a frame may be");
+  if (!window && policy.policy == OutOfSequence::kRollback) {
+    chosen.Fail("'rollback' without 'window_s'", "'window_s', how late a frame may be");
   }
-  time->RejectUnread();
+  entry->RejectUnread();
   return policy;
 }
 
@@ -289,11 +290,12 @@ int ReadReference(const Node& root, const std::vector<NamedEstimator>& estimator
   return static_cast<int>(found - estimators.begin());
 }
 
-/// Refuses an estimator that cannot do what the run's order of time asks of it.
-void CheckCanRewind(const NamedEstimator& named, const Node& entry) {
+/// Refuses an estimator that cannot do what the run asks for out-of-sequence frames.
+void CheckCanRollBack(const NamedEstimator& named, const Node& entry) {
   if (named.estimator->offline() || named.estimator->Save() != nullptr) return;
-  entry.At("type").Fail("'" + named.type + "' cannot go back for a late frame",
-                        "another type under 'time.order: rewind', or 'time.order: sort'");
+  entry.At("type").Fail(
+      "'" + named.type + "' cannot roll back for an out-of-sequence frame",
+      "another type under 'out_of_sequence.policy: rollback', or 'out_of_sequence.policy: buffer'");
 }
 
 /// Adds the estimator of a config that has the calibration of the data.
@@ -302,15 +304,15 @@ void AddCalibrated(const Config& config, const PluginHost& host, const std::stri
   const Node entry = config.root().At("estimators").At(name);
   NamedEstimator named = BuildEstimator(name, entry, config, host, experiment.source->streams(),
                                         experiment.estimators);
-  if (experiment.time.order == TimeOrder::kRewind) CheckCanRewind(named, entry);
+  if (experiment.out_of_sequence.policy == OutOfSequence::kRollback) CheckCanRollBack(named, entry);
   experiment.estimators.push_back(std::move(named));
 }
 
 /// Keys of the root that are read before the calibration is there, or by other commands.
 void DeclareCommon(const Node& root) {
   // `baseline_m`: of a calibration, for `alidade bundle`; a sensor has its own.
-  for (const char* key :
-       {"alidade", "plugins", "include", "baseline_m", "title", "output", "source", "time"}) {
+  for (const char* key : {"alidade", "plugins", "include", "baseline_m", "title", "output",
+                          "source", "out_of_sequence"}) {
     root.Declare(key);
   }
 }
@@ -367,10 +369,10 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   if (const auto seed = source.Find("seed")) {
     experiment.seed = static_cast<std::uint64_t>(seed->Integer(0, INT64_MAX));
   }
-  experiment.time = ReadTimePolicy(config.root());
-  experiment.source =
-      host.CreateSource(source.At("type", "a source").Text(), source, experiment.seed,
-                        config.folder(), experiment.time.order != TimeOrder::kReject);
+  experiment.out_of_sequence = ReadOutOfSequence(config.root());
+  experiment.source = host.CreateSource(
+      source.At("type", "a source").Text(), source, experiment.seed, config.folder(),
+      experiment.out_of_sequence.policy != OutOfSequence::kReject);
   const Config calibrated = internal::WithCalibration(config, *experiment.source);
   source.RejectUnread();
   const Node root = calibrated.root();
@@ -380,7 +382,7 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   // Every sensor is checked, whether or not an estimator uses it.
   const System whole = BuildSystem(root, host, {});
   CheckStreams(root, whole, streams);
-  experiment.time.ranks = RanksOf(streams, whole);
+  experiment.out_of_sequence.ranks = RanksOf(streams, whole);
   experiment.segments = ReadSegments(root, whole, streams);
   for (const auto& [name, entry] : root.At("estimators", "a run").Entries()) {
     AddCalibrated(calibrated, host, name, experiment);

@@ -44,16 +44,16 @@ struct Segment {
 };
 
 /// What is done with a frame whose stamp is before that of a frame that came earlier.
-enum class TimeOrder {
-  kReject,  ///< estimators are given it as it comes, and count its measurements as stale
-  kSort,    ///< frames are held back while one before them can still come
-  kRewind,  ///< as kSort, but estimators take frames as they come, and go back for a late one
+enum class OutOfSequence {
+  kReject,    ///< estimators are given it as it comes, and count its measurements as stale
+  kBuffer,    ///< frames are held back while one before them can still come
+  kRollback,  ///< as kBuffer, but estimators take frames as they come, and go back for a late one
 };
 
 /// How a run takes frames that are not in the order of their stamps. But under kReject, frames of
 /// equal stamps are merged.
-struct TimePolicy {
-  TimeOrder order = TimeOrder::kReject;
+struct OutOfSequencePolicy {
+  OutOfSequence policy = OutOfSequence::kReject;
   /// A frame farther behind the newest is dropped, with the event `late`; none: no frame is.
   std::optional<Stamp> window;
   std::vector<int> ranks;  ///< of the streams, among the measurements of merged frames
@@ -65,7 +65,7 @@ struct Experiment {
   std::vector<NamedEstimator> estimators;
   std::vector<Segment> segments;
   std::uint64_t seed = 1;
-  TimePolicy time;
+  OutOfSequencePolicy out_of_sequence;
   int reference = -1;  ///< index of the estimator that metrics compare with; -1: truth
   std::vector<double> truth_sigmas;  ///< StreamInfo::sigma of the source's truths; empty: its own
   /// Files, without folder, of the plugins in use that were built without optimisation.

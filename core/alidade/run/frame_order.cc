@@ -33,7 +33,7 @@ std::string In(const Place& place) {
 
 FrameOrder::FrameOrder(Experiment& experiment, Check check)
     : experiment_(experiment), check_(std::move(check)) {
-  if (experiment.time.order != TimeOrder::kRewind) return;
+  if (experiment.out_of_sequence.policy != OutOfSequence::kRollback) return;
   for (const NamedEstimator& named : experiment.estimators) {
     Processed& before = released_.processed.emplace_back();
     if (named.estimator->offline()) continue;
@@ -43,7 +43,7 @@ FrameOrder::FrameOrder(Experiment& experiment, Check check)
 }
 
 bool FrameOrder::Next(Frame& frame) {
-  if (experiment_.time.order == TimeOrder::kReject) {
+  if (experiment_.out_of_sequence.policy == OutOfSequence::kReject) {
     if (!experiment_.source->Next(frame)) return false;
     check_(frame);
     Accept(frame);
@@ -75,7 +75,8 @@ const Processed* FrameOrder::processed(std::size_t estimator) const {
 
 /// Whether a frame of this stamp, were it to come now, would come too late.
 bool FrameOrder::IsTooLate(Stamp stamp) const {
-  return experiment_.time.window && Lag(newest_, stamp) > *experiment_.time.window;
+  return experiment_.out_of_sequence.window &&
+         Lag(newest_, stamp) > *experiment_.out_of_sequence.window;
 }
 
 /// Counts the frame; false where it is to be dropped.
@@ -92,7 +93,7 @@ bool FrameOrder::Accept(const Frame& frame) {
   events_.push_back({frame.stamp, "late",
                      "a frame " + Names(frame) + "came " + SecondsText(lag) +
                          " behind the newest, beyond the window of " +
-                         SecondsText(*experiment_.time.window) + ": dropped"});
+                         SecondsText(*experiment_.out_of_sequence.window) + ": dropped"});
   return false;
 }
 
@@ -116,7 +117,7 @@ void FrameOrder::Receive() {
   const bool is_newest = received.frame.stamp > newest_;
   if (!Accept(received.frame)) return;
   const std::size_t at = Insert(std::move(received));
-  if (experiment_.time.order != TimeOrder::kRewind) return;
+  if (experiment_.out_of_sequence.policy != OutOfSequence::kRollback) return;
   try {
     Replay(at, is_newest);
   } catch (...) {
@@ -171,7 +172,7 @@ void FrameOrder::CheckMerge(const Held& held, const Frame& part) const {
 void FrameOrder::Merge(Held& held, Held&& received) const {
   Frame &whole = held.frame, &part = received.frame;
   const auto key = [this](const Measurement& one) {
-    const std::vector<int>& ranks = experiment_.time.ranks;
+    const std::vector<int>& ranks = experiment_.out_of_sequence.ranks;
     const auto stream = static_cast<std::size_t>(one.stream);
     return std::tuple(stream < ranks.size() ? ranks[stream] : 0, one.stream, one.landmark);
   };

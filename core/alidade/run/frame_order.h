@@ -21,8 +21,9 @@ struct Processed {
   bool diverged = false;
 };
 
-/// The frames of an experiment's source in the order of its TimePolicy. Under kRewind it also
-/// steers the estimators: they take each frame as it comes, and what came after a late one again.
+/// The frames of an experiment's source in the order of its OutOfSequencePolicy. Under kRollback it
+/// also steers the estimators: they take each frame as it comes, and what came after a late one
+/// again.
 class FrameOrder {
  public:
   using Check = std::function<void(Frame&)>;
@@ -44,7 +45,7 @@ class FrameOrder {
   struct Held {
     Frame frame;
     std::vector<Place> places;         ///< of the measurements
-    std::vector<Processed> processed;  ///< by estimator; empty but under kRewind
+    std::vector<Processed> processed;  ///< by estimator; empty but under kRollback
   };
 
   bool Accept(const Frame& frame);

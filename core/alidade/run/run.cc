@@ -87,8 +87,8 @@ Frame AcceptedBy(int by, const std::vector<Running>& running, const Frame& frame
                               filter.last ? *filter.last : UpdateReport());
 }
 
-/// The next frame, as the experiment's TimePolicy has it; false at the end. What became of others
-/// on the way is noted.
+/// The next frame, as the experiment's OutOfSequencePolicy has it; false at the end. What became of
+/// others on the way is noted.
 bool NextFrame(internal::FrameOrder& frames, std::vector<Running>& running, RunResult& result,
                Frame& frame) {
   const auto note = [&] {

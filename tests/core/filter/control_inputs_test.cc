@@ -196,7 +196,7 @@ TEST(ControlInputs, OneThatIsNotFiniteIsRefusedAndTheOneBeforeGoesOn) {
   EXPECT_FALSE(ekf.failed());
 }
 
-// Under `order: reject` a frame may come late.
+// Under `policy: reject` a frame may come late.
 TEST(ControlInputs, ALateOneActsFromTheNextStepOnUnlessANewerOneIsHeld) {
   Ekf ekf(Car(), {}, kStreams);
   ekf.Process(FrameOf({0.0, kNone, 2.0}));

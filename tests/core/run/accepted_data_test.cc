@@ -81,8 +81,8 @@ TEST(AcceptedBy, LeavesOutWhatTheFilterGated) {
 
 TEST(AcceptedBy, HoldsWhereTheEstimatorsGoBackForLateFrames) {
   Experiment experiment = MakeFiltered(true);
-  experiment.time.order = TimeOrder::kRewind;
-  experiment.time.window = StampFromSeconds(0.2);
+  experiment.out_of_sequence.policy = OutOfSequence::kRollback;
+  experiment.out_of_sequence.window = StampFromSeconds(0.2);
   const RunResult run = alidade::Run(experiment, {});
   EXPECT_EQ(run.status, RunStatus::kOk) << run.reason;
   EXPECT_GT(run.arrivals.late, 20);
@@ -159,10 +159,11 @@ Experiment MakeChainOfMaps() {
 
 // Several measurements of one stream, of which one is gated, and those that enter a landmark.
 TEST(AcceptedBy, MayFollowAFollower) {
-  for (const TimeOrder order : {TimeOrder::kReject, TimeOrder::kRewind}) {
+  for (const OutOfSequence order : {OutOfSequence::kReject, OutOfSequence::kRollback}) {
     Experiment experiment = MakeChainOfMaps();
-    if (order == TimeOrder::kRewind) experiment.time.window = StampFromSeconds(1.0);
-    experiment.time.order = order;
+    if (order == OutOfSequence::kRollback)
+      experiment.out_of_sequence.window = StampFromSeconds(1.0);
+    experiment.out_of_sequence.policy = order;
     const RunResult run = alidade::Run(experiment, {});
     ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
     EXPECT_EQ(run.estimators[0].counts.at("gated:tracks"), 1);

@@ -9,12 +9,12 @@
 namespace alidade::testing {
 namespace {
 
-class FrameOrder : public ::testing::TestWithParam<TimeOrder> {};
+class FrameOrder : public ::testing::TestWithParam<OutOfSequence> {};
 
 INSTANTIATE_TEST_SUITE_P(Policies, FrameOrder,
-                         ::testing::Values(TimeOrder::kSort, TimeOrder::kRewind),
+                         ::testing::Values(OutOfSequence::kBuffer, OutOfSequence::kRollback),
                          [](const auto& of) {
-                           return of.param == TimeOrder::kSort ? "sort" : "rewind";
+                           return of.param == OutOfSequence::kBuffer ? "buffer" : "rollback";
                          });
 
 /// What the test says, frame by frame; frame k is in line k + 2 of rows.csv.
@@ -38,11 +38,11 @@ class Given : public SwingingTarget {
   bool then_fails_;
 };
 
-Experiment MakeGiven(std::vector<Frame> frames, TimeOrder order, bool then_fails = false) {
+Experiment MakeGiven(std::vector<Frame> frames, OutOfSequence order, bool then_fails = false) {
   Experiment experiment = MakeExperiment();
   experiment.source = std::make_unique<Given>(std::move(frames), then_fails);
-  experiment.time.order = order;
-  experiment.time.window = StampFromSeconds(0.1);
+  experiment.out_of_sequence.policy = order;
+  experiment.out_of_sequence.window = StampFromSeconds(0.1);
   return experiment;
 }
 
@@ -72,7 +72,7 @@ TEST_P(FrameOrder, AFrameBeyondTheWindowIsDroppedWithAnEvent) {
 
 TEST_P(FrameOrder, AFrameBeforeTheFirstIsWhereTheRunStarts) {
   const Frame first = FrameAt(0.0, {{1, 1.0}}), second = FrameAt(0.1, {{1, 1.1}});
-  Experiment in_order = MakeGiven({first, second}, TimeOrder::kReject);
+  Experiment in_order = MakeGiven({first, second}, OutOfSequence::kReject);
   Experiment late = MakeGiven({second, first}, GetParam());
   alidade::Run(in_order, {});
   alidade::Run(late, {});
@@ -99,7 +99,7 @@ TEST_P(FrameOrder, MergedMeasurementsHaveTheOrderOfTheSensors) {
     const TemporaryFolder folder;
     const std::vector<Frame> frames = {FrameAt(0.0, {{0, 80.0}}), FrameAt(0.0, {{1, 1.0}})};
     Experiment experiment = MakeGiven({frames[swapped], frames[!swapped]}, GetParam());
-    experiment.time.ranks = {1, 0};
+    experiment.out_of_sequence.ranks = {1, 0};
     Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
     recorder.Finish(RunInto(recorder, experiment));
     EXPECT_EQ(Lines(folder / "out/measurements.csv"),
@@ -117,7 +117,7 @@ TEST_P(FrameOrder, MergedFramesOfSeveralMeasurementsToo) {
     const std::vector<Frame> frames = {FrameAt(0.0, {{0, 80.0}, {1, 1.0}}),
                                        FrameAt(0.0, {{2, 5.0}})};
     Experiment experiment = MakeGiven({frames[swapped], frames[!swapped]}, GetParam());
-    experiment.time.ranks = {2, 1, 0};
+    experiment.out_of_sequence.ranks = {2, 1, 0};
     Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
     recorder.Finish(RunInto(recorder, experiment));
     EXPECT_EQ(
@@ -133,7 +133,7 @@ TEST_P(FrameOrder, AStreamTwiceInMergedFramesNamesTheFirstOfItsOwn) {
   Experiment experiment = MakeGiven(
       {FrameAt(0.0, {{0, 80.0}, {1, 1.0}}), FrameAt(0.0, {{2, 5.0}}), FrameAt(0.0, {{2, 5.0}})},
       GetParam());
-  experiment.time.ranks = {2, 1, 0};
+  experiment.out_of_sequence.ranks = {2, 1, 0};
   EXPECT_EQ(alidade::Run(experiment, {}).reason,
             "rows.csv:4: stream 'aside' twice at t = 0.000000 s; expected one measurement at a "
             "stamp; the first is in rows.csv:3");
@@ -191,7 +191,7 @@ TEST_P(FrameOrder, DivergenceUnderFailEndsTheRunAtTheFrameOfTheInOrderRun) {
   // A negative depth is outside of the domain of both sensors, from the second frame on.
   const std::vector<Frame> frames = {FrameAt(0.0, {}), FrameAt(0.05, {{0, 80.0}}),
                                      FrameAt(0.1, {{0, 80.0}}), FrameAt(0.15, {{0, 80.0}})};
-  const auto run = [](std::vector<Frame> given, TimeOrder order) {
+  const auto run = [](std::vector<Frame> given, OutOfSequence order) {
     Experiment experiment = MakeGiven(std::move(given), order);
     NamedEstimator& alone = experiment.estimators[1];
     alone.system.priors[0].mean = {-0.2};
@@ -200,7 +200,7 @@ TEST_P(FrameOrder, DivergenceUnderFailEndsTheRunAtTheFrameOfTheInOrderRun) {
         std::make_unique<Ekf>(alone.system, EkfOptions{}, experiment.source->streams());
     return alidade::Run(experiment, {});
   };
-  const RunResult in_order = run(frames, TimeOrder::kReject);
+  const RunResult in_order = run(frames, OutOfSequence::kReject);
   ASSERT_EQ(in_order.code, ExitCode::kDiverged);
   EXPECT_EQ(in_order.frames, 2);
   const RunResult late = run({frames[2], frames[0], frames[3], frames[1]}, GetParam());
@@ -215,8 +215,8 @@ TEST_P(FrameOrder, DivergenceUnderFailEndsTheRunAtTheFrameOfTheInOrderRun) {
 TEST(Sort, WithoutAWindowTakesTheWholeRun) {
   std::vector<Frame> frames;
   for (int k = 0; k < 50; ++k) frames.push_back(FrameAt(100.0 - k, {{1, 1.0}}));
-  Experiment experiment = MakeGiven(frames, TimeOrder::kSort);
-  experiment.time.window.reset();
+  Experiment experiment = MakeGiven(frames, OutOfSequence::kBuffer);
+  experiment.out_of_sequence.window.reset();
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.frames, 50);
   EXPECT_EQ(result.arrivals.late, 49);
@@ -233,10 +233,10 @@ struct Watching : Ekf {
   std::vector<Stamp> stamps;
 };
 
-TEST(Rewind, TakesAFrameAtOnceAndTheLaterOnesAgain) {
+TEST(Rollback, TakesAFrameAtOnceAndTheLaterOnesAgain) {
   Experiment experiment = MakeGiven({FrameAt(0.0, {{1, 1.0}}), FrameAt(0.05, {{1, 1.0}}),
                                      FrameAt(0.1, {{1, 1.0}}), FrameAt(0.02, {{1, 1.0}})},
-                                    TimeOrder::kRewind);
+                                    OutOfSequence::kRollback);
   NamedEstimator& named = experiment.estimators[0];
   auto watching =
       std::make_unique<Watching>(named.system, EkfOptions{}, experiment.source->streams());
@@ -260,11 +260,11 @@ struct Throwing : Ekf {
   Stamp at = kNoStamp;
 };
 
-TEST(Rewind, AnEstimatorThatThrowsEndsTheRunAfterTheFramesBefore) {
+TEST(Rollback, AnEstimatorThatThrowsEndsTheRunAfterTheFramesBefore) {
   // All are within the window: none is released before the third is tried.
   Experiment experiment = MakeGiven({FrameAt(0.0, {{1, 1.0}}), FrameAt(0.02, {{1, 1.0}}),
                                      FrameAt(0.04, {{1, 1.0}}), FrameAt(0.06, {{1, 1.0}})},
-                                    TimeOrder::kRewind);
+                                    OutOfSequence::kRollback);
   NamedEstimator& named = experiment.estimators[0];
   auto throwing =
       std::make_unique<Throwing>(named.system, EkfOptions{}, experiment.source->streams());
@@ -293,8 +293,8 @@ class Forward : public Estimator {
   UpdateReport report_;
 };
 
-TEST(Rewind, IsNotForAnEstimatorThatCannotGoBack) {
-  Experiment experiment = MakeGiven({FrameAt(0.0, {})}, TimeOrder::kRewind);
+TEST(Rollback, IsNotForAnEstimatorThatCannotGoBack) {
+  Experiment experiment = MakeGiven({FrameAt(0.0, {})}, OutOfSequence::kRollback);
   experiment.estimators[0].estimator = std::make_unique<Forward>(experiment.estimators[0].system);
   EXPECT_EQ(alidade::Run(experiment, {}).code, ExitCode::kInternal);
 }

@@ -355,15 +355,16 @@ std::string SupportText(const std::string& type) {
          (lacks.empty() ? "" : "\n    Not: " + lacks + '.') + '\n';
 }
 
-/// What is done with late frames, where it is not the default.
-std::string LateFrames(const TimePolicy& time) {
-  if (time.order == TimeOrder::kReject) return "";
-  const char* const done = time.order == TimeOrder::kSort ? "sorted, frames held back"
-                                                          : "the estimators go back for them";
-  return std::string("  late frames: ") + done +
-         (time.window ? ", up to " + internal::RoundedText(Seconds(*time.window), 6) +
-                            " s behind the newest"
-                      : " to the end of the run") +
+/// What is done with out-of-sequence frames, if not the default.
+std::string OutOfSequenceText(const OutOfSequencePolicy& given) {
+  if (given.policy == OutOfSequence::kReject) return "";
+  const bool buffer = given.policy == OutOfSequence::kBuffer;
+  const char* const done =
+      buffer ? "buffer: frames are held back" : "rollback: the estimators go back for them";
+  return std::string("  out-of-sequence frames: ") + done +
+         (given.window ? ", up to " + internal::RoundedText(Seconds(*given.window), 6) +
+                             " s behind the newest"
+                       : " to the end of the run") +
          '\n';
 }
 
@@ -409,7 +410,8 @@ std::string SourceText(const Config& config, const Experiment& experiment) {
   const std::vector<std::string> truths = internal::NamesOf(experiment.source->truths());
   text += TextTable(rows, kIndent);
   return text + "  truth: " + (truths.empty() ? "not known" : Join(truths)) + '\n' +
-         CalibrationText(config, *experiment.source) + LateFrames(experiment.time);
+         CalibrationText(config, *experiment.source) +
+         OutOfSequenceText(experiment.out_of_sequence);
 }
 
 }  // namespace

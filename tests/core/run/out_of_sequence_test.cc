@@ -41,8 +41,8 @@ evaluate:
   segments: {seeing: {with: stereo}, blind: {without: stereo}}
 )";
 
-/// Blocks that wait for their first measurement, and a gate so narrow that sensors need rejection recovery:
-/// what the filter keeps besides its state decides what comes.
+/// Blocks that wait for their first measurement, and a gate so narrow that sensors need rejection
+/// recovery: what the filter keeps besides its state decides what comes.
 constexpr const char* kEventful = R"(alidade: 1
 state:
   target: {model: constant_velocity, blocks: {position: depth, velocity: depth_rate},
@@ -100,13 +100,13 @@ class Delayed : public Source {
 };
 
 /// The config's experiment with delays, recorded in `folder`.
-RunResult RecordDelayed(const std::string& text, const fs::path& folder, TimeOrder order,
+RunResult RecordDelayed(const std::string& text, const fs::path& folder, OutOfSequence order,
                         double most_s, bool split = false) {
   const Config config = Config::FromText(text, "order.yaml");
   Experiment experiment = BuildExperiment(config, Host());
   experiment.source = std::make_unique<Delayed>(std::move(experiment.source), most_s, split);
-  experiment.time.order = order;
-  experiment.time.window = StampFromSeconds(kWindow_s);
+  experiment.out_of_sequence.policy = order;
+  experiment.out_of_sequence.window = StampFromSeconds(kWindow_s);
   Recorder recorder(OptionsFor(folder), config, Host());
   RunResult result = RunInto(recorder, experiment);
   recorder.Finish(result);
@@ -123,22 +123,23 @@ void ExpectSameBytes(const fs::path& one, const fs::path& another) {
   }
 }
 
-class Reordered : public ::testing::TestWithParam<TimeOrder> {
+class Reordered : public ::testing::TestWithParam<OutOfSequence> {
  protected:
   const TemporaryFolder folder_;
 };
 
 INSTANTIATE_TEST_SUITE_P(Policies, Reordered,
-                         ::testing::Values(TimeOrder::kSort, TimeOrder::kRewind),
+                         ::testing::Values(OutOfSequence::kBuffer, OutOfSequence::kRollback),
                          [](const auto& of) {
-                           return of.param == TimeOrder::kSort ? "sort" : "rewind";
+                           return of.param == OutOfSequence::kBuffer ? "buffer" : "rollback";
                          });
 
 TEST_P(Reordered, LateFramesGiveTheBytesOfTheInOrderRun) {
   for (const char* config : {kFilters, kEventful}) {
     const fs::path here = folder_ / (config == kFilters ? "filters" : "eventful");
     // In order no policy is asked, and the estimators are given the frames directly.
-    const RunResult in_order = RecordDelayed(config, here / "in_order", TimeOrder::kReject, 0.0);
+    const RunResult in_order =
+        RecordDelayed(config, here / "in_order", OutOfSequence::kReject, 0.0);
     EXPECT_EQ(in_order.status, RunStatus::kOk);
     EXPECT_EQ(in_order.arrivals.late, 0);
     if (config == kEventful) {
@@ -156,13 +157,13 @@ TEST_P(Reordered, LateFramesGiveTheBytesOfTheInOrderRun) {
     ExpectSameBytes(here / "in_order", here / "late");
     // Unsorted, the same frames tell another story.
     const RunResult rejected =
-        RecordDelayed(config, here / "rejected", TimeOrder::kReject, kWindow_s);
+        RecordDelayed(config, here / "rejected", OutOfSequence::kReject, kWindow_s);
     EXPECT_NE(rejected.estimators[0].counts, in_order.estimators[0].counts);
   }
 }
 
 TEST_P(Reordered, MeasurementsThatComeOneByOneAreMergedIntoTheirStamp) {
-  const RunResult whole = RecordDelayed(kFilters, folder_ / "whole", TimeOrder::kReject, 0.0);
+  const RunResult whole = RecordDelayed(kFilters, folder_ / "whole", OutOfSequence::kReject, 0.0);
   const RunResult in_order = RecordDelayed(kFilters, folder_ / "in_order", GetParam(), 0.0, true);
   const RunResult late = RecordDelayed(kFilters, folder_ / "late", GetParam(), kWindow_s, true);
   EXPECT_GT(in_order.arrivals.merged, whole.frames);
@@ -187,15 +188,17 @@ std::string Refused(const std::string& time) {
   return text;
 }
 
-TEST(TimePolicy, IsReadStrictly) {
+TEST(OutOfSequencePolicy, IsReadStrictly) {
   const Config config = Config::FromText(
-      std::string(kFilters) + "time: {order: rewind, window_s: 0.25}\n", "order.yaml");
+      std::string(kFilters) + "out_of_sequence: {policy: rollback, window_s: 0.25}\n",
+      "order.yaml");
   const Experiment experiment = BuildExperiment(config, Host());
-  const TimePolicy& policy = experiment.time;
-  EXPECT_EQ(policy.order, TimeOrder::kRewind);
+  const OutOfSequencePolicy& policy = experiment.out_of_sequence;
+  EXPECT_EQ(policy.policy, OutOfSequence::kRollback);
   EXPECT_EQ(policy.window, 250'000'000);
   EXPECT_NE(Explain(config, experiment)
-                .find("late frames: the estimators go back for them, up to 0.25 s behind"),
+                .find("out-of-sequence frames: rollback: the estimators go back for them, up to "
+                      "0.25 s behind"),
             std::string::npos);
   std::map<std::string, int> ranks;
   for (std::size_t s = 0; s < policy.ranks.size(); ++s) {
@@ -205,16 +208,20 @@ TEST(TimePolicy, IsReadStrictly) {
   EXPECT_EQ(ranks["disparity"], 0);
   EXPECT_EQ(ranks["inverse_scale"], 1);
   EXPECT_EQ(ranks["disparity_all"], 2);  // of no sensor
-  EXPECT_EQ(Refused("time: {order: rewind}"),
-            "order.yaml:25:15 time.order: 'rewind' without 'window_s'; expected 'window_s', how "
+  EXPECT_EQ(Refused("out_of_sequence: {policy: rollback}"),
+            "order.yaml:25:27 out_of_sequence.policy: 'rollback' without 'window_s'; expected "
+            "'window_s', how "
             "late a frame may be");
-  EXPECT_EQ(Refused("time: {order: reject, window_s: 1}"),
-            "order.yaml:25:33 time.window_s: without a use: 'order: reject' holds nothing back; "
-            "expected 'order: sort' or 'rewind'");
-  EXPECT_NE(Refused("time: {order: sorted}").find("did you mean 'sort'?"), std::string::npos);
-  EXPECT_NE(Refused("time: {order: sort, window_s: -1}").find("25:31 time.window_s"),
+  EXPECT_EQ(Refused("out_of_sequence: {policy: reject, window_s: 1}"),
+            "order.yaml:25:45 out_of_sequence.window_s: without a use: 'policy: reject' holds "
+            "nothing back; "
+            "expected 'policy: buffer' or 'rollback'");
+  EXPECT_NE(Refused("out_of_sequence: {policy: buffered}").find("did you mean 'buffer'?"),
             std::string::npos);
-  EXPECT_NE(Refused("time: {window_s: 1}").find("order"), std::string::npos);
+  EXPECT_NE(Refused("out_of_sequence: {policy: buffer, window_s: -1}")
+                .find("25:45 out_of_sequence.window_s"),
+            std::string::npos);
+  EXPECT_NE(Refused("out_of_sequence: {window_s: 1}").find("policy"), std::string::npos);
 }
 
 TEST(Sort, LetsATableHaveItsRowsInAnyOrder) {
@@ -230,16 +237,16 @@ TEST(Sort, LetsATableHaveItsRowsInAnyOrder) {
     Experiment experiment = BuildExperiment(config, Host());
     return alidade::Run(experiment, {});
   };
-  const std::string sort = "time: {order: sort}\n";
+  const std::string buffer = "out_of_sequence: {policy: buffer}\n";
   const RunResult whole = run("0,80,1\n0.1,81,1.01\n0.2,82,1.02\n", "");
-  const RunResult mixed = run("0.2,82,\n0.1,81,1.01\n0,80,1\n0.2,,1.02\n", sort);
+  const RunResult mixed = run("0.2,82,\n0.1,81,1.01\n0,80,1\n0.2,,1.02\n", buffer);
   ASSERT_EQ(whole.status, RunStatus::kOk) << whole.reason;
   ASSERT_EQ(mixed.status, RunStatus::kOk) << mixed.reason;
   EXPECT_EQ(mixed.frames, 3);
   for (std::size_t e = 0; e < whole.estimators.size(); ++e) {
     EXPECT_EQ(mixed.estimators[e].metrics, whole.estimators[e].metrics);
   }
-  EXPECT_EQ(run("0.2,82,\n0.1,81,1\n0.2,83,1\n", sort).reason,
+  EXPECT_EQ(run("0.2,82,\n0.1,81,1\n0.2,83,1\n", buffer).reason,
             (folder / "rows.csv").string() +
                 ":4: stream 'disparity' twice at t = 0.200000 s; expected one measurement at a "
                 "stamp; the first is in " +

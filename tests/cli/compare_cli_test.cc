@@ -247,10 +247,10 @@ TEST_F(CompareCli, TheBatchOfAnotherFolderServesWhereOneFailed) {
 
 // A window linearises again, and its later data end with it.
 TEST_F(CompareCli, AWindowIsNeitherAFilterNorASmootherOfAllData) {
-  const std::string window = "estimators.window={type: fixed_lag, window_s: 0.5";
+  const std::string window = "estimators.window={type: fixed_lag, lag_s: 0.5";
   const Outcome smoothed =
       Call({"compare", "config.yaml", "-o", "out", "--no-explain", "--set",
-            window + ", estimate: oldest}", "--set", "estimators.rts={type: rts}"});
+            window + ", output: lagged}", "--set", "estimators.rts={type: rts}"});
   EXPECT_TRUE(Contains(smoothed.out, "later data too; ratio and difference: to rts"))
       << smoothed.out << smoothed.err;
   const Outcome online =

@@ -13,7 +13,7 @@ TEST_F(ExplainCli, TellsWhatCannotBeObserved) {
   EXPECT_EQ(both.code, 0) << both.err;
   EXPECT_FALSE(Contains(both.out, "cannot be observed")) << both.out;
   for (const char* part : {"target.depth ", "0.3 +- 0.1", "constant_velocity", "scale_2d",
-                           "linearise_at", "corrects", "gate ", "joint"}) {
+                           "jacobian_at", "corrects", "gate ", "joint"}) {
     EXPECT_TRUE(Contains(both.out, part)) << part << '\n' << both.out;
   }
   const Outcome scale = Call({"explain", "config.yaml", "--set", "estimators.ekf.sensors=[scale]"});
@@ -58,7 +58,7 @@ TEST_F(ExplainCli, TellsTheOptionsOfEachTypeOfEstimator) {
   for (const char* part :
        {"(iekf)", "max_iterations  10", "tolerance       1e-04 sigma of the posterior",
         "blocks estimated or fixed; roles estimate, hold;",
-        "Not: considered blocks and roles, linearise_at measurement"}) {
+        "Not: considered blocks and roles, jacobian_at measurement"}) {
     EXPECT_TRUE(Contains(iekf.out, part)) << part << '\n' << iekf.out;
   }
   EXPECT_FALSE(Contains(iekf.out, "loss  ")) << iekf.out;

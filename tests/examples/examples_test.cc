@@ -370,10 +370,10 @@ TEST(Examples, APoorStartDoesNotMakeTheUnscentedFilterDiverge) {
 TEST(Examples, WhatAnEstimatorTypeDoesNotHaveIsRefusedByName) {
   const std::vector<std::pair<std::string, std::string>> unsupported = {
       {"state.template.consider", "[inverse_distance]"},
-      {"state.target.initial.depth", "{from: stereo}"},
+      {"state.target.initial.depth", "{from_measurement: stereo}"},
       {"sensors.scale.roles.inverse_distance",
        "{block: template.inverse_distance, mode: consider}"},
-      {"sensors.stereo.roles.depth", "{block: target.depth, linearise_at: measurement}"},
+      {"sensors.stereo.roles.depth", "{block: target.depth, jacobian_at: measurement}"},
       {"estimators.one.rejection_recovery", "{after: 20}"}};
   for (const std::string type : {"rts", "square_root_ekf", "ukf"}) {
     for (const auto& [key, value] : unsupported) {

@@ -61,7 +61,7 @@ Experiment MakeLinear(bool with_outlier) {
   Add(experiment, "ekf", EstimatorKind::kFilter, std::make_unique<Ekf>(system, options, streams));
   Add(experiment, "rts", EstimatorKind::kSmoother,
       std::make_unique<RtsSmoother>(system, options, streams));
-  Add(experiment, "so_far", EstimatorKind::kBatch, MakeBatch(system, "data: so_far\n"), 0);
+  Add(experiment, "so_far", EstimatorKind::kBatch, MakeBatch(system, "mode: filtering\n"), 0);
   Add(experiment, "accepted", EstimatorKind::kBatch, MakeBatch(system), 0);
   Add(experiment, "batch", EstimatorKind::kBatch, MakeBatch(system));
   return experiment;
@@ -215,7 +215,7 @@ TEST(ExplainExperiment, AddsWhatTheComparisonLacks) {
   EXPECT_EQ(explained.added,
             (std::vector<std::string>{"rts", "batch", "batch_so_far", "batch_accepted"}));
   const Node estimators = explained.config.root().At("estimators");
-  EXPECT_EQ(estimators.At("batch_so_far").At("data").Text(), "so_far");
+  EXPECT_EQ(estimators.At("batch_so_far").At("mode").Text(), "filtering");
   EXPECT_EQ(estimators.At("batch_accepted").At("use").At("accepted_by").Text(), "ekf");
   EXPECT_EQ(estimators.At("rts").At("gate").Text(), estimators.At("ekf").At("gate").Text());
   // What it gives is the config of a run.
@@ -224,7 +224,7 @@ TEST(ExplainExperiment, AddsWhatTheComparisonLacks) {
 
 TEST(ExplainExperiment, AddsNothingThatIsThereOrNotAskedFor) {
   const Config config = Depth({{"estimators.best", "{type: ceres_batch}"},
-                               {"estimators.best_now", "{type: ceres_batch, data: so_far}"}});
+                               {"estimators.best_now", "{type: ceres_batch, mode: filtering}"}});
   EXPECT_EQ(ExplainExperiment(config, Shipped(), {}).added,
             (std::vector<std::string>{"rts", "batch_accepted"}));
   EXPECT_TRUE(ExplainExperiment(config, Shipped(), {"", "", false}).added.empty());
@@ -255,7 +255,7 @@ TEST(ExplainExperiment, LeavesOutWithItsReasonWhatDoesNotSupportTheSystem) {
       << explained.notes[0];
   EXPECT_EQ(explained.notes[1],
             "left out the smoother of all data: estimator type 'rts' does not support "
-            "linearise_at: measurement");
+            "jacobian_at: measurement");
   EXPECT_EQ(explained.experiment.estimators.size(), 1u);
 }
 
@@ -276,7 +276,7 @@ TEST(ExplainExperiment, RefusesNamesThatAreNotThereOrNoFilters) {
 TEST(ExplainExperiment, RefusesToExplainTheGapOfABatchOrASmoother) {
   const Config config = Depth({{"estimators.rts", "{type: rts}"},
                                {"estimators.best", "{type: ceres_batch}"},
-                               {"estimators.now", "{type: ceres_batch, data: so_far}"}});
+                               {"estimators.now", "{type: ceres_batch, mode: filtering}"}});
   for (const char* name : {"rts", "best", "now"}) {
     try {
       ExplainExperiment(config, Shipped(), {"", name, true});
@@ -310,7 +310,7 @@ TEST(CompareLandmarks, AtTheLastFrameTheBatchOfAllDataIsThatOfTheDataSoFar) {
   EXPECT_TRUE(step.at_end);
   EXPECT_EQ(step.from + ' ' + step.to, "ekf batch_accepted");
   const Comparison with =
-      CompareScene("{type: ceres_batch, data: so_far, use: {accepted_by: ekf}}");
+      CompareScene("{type: ceres_batch, mode: filtering, use: {accepted_by: ekf}}");
   EXPECT_FALSE(with.gap[0].at_end);
   ASSERT_EQ(with.estimators[1].name, "now");
   const std::map<std::string, Spread>& now = with.estimators[1].values;

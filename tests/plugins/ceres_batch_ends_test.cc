@@ -20,7 +20,7 @@ using testing::Shipped;
 // The velocity is not measured at the first frame: its variance is that of the step before it.
 TEST(CeresBatchEnds, StartsAtTheGivenTime) {
   const System system = LinearSystem();
-  const auto so_far = MakeBatch(system, "data: so_far\n"), batch = MakeBatch(system);
+  const auto so_far = MakeBatch(system, "mode: filtering\n"), batch = MakeBatch(system);
   Ekf ekf(system, {}, testing::StreamsOf(system));
   const Frame frame = FrameAt(1.0, {{0, 1.0}});
   for (Estimator* one : {so_far.get(), batch.get(), static_cast<Estimator*>(&ekf)}) {
@@ -84,7 +84,7 @@ struct Failing : Motion<1, Vec<1>> {
 /// Whether the batch says that it failed, the first `budget` steps of the model apart.
 void ExpectSaid(const System& system, int budget, bool so_far) {
   Failing::budget = budget;
-  const auto batch = MakeBatch(system, so_far ? "data: so_far\n" : "");
+  const auto batch = MakeBatch(system, so_far ? "mode: filtering\n" : "");
   std::string said;
   const auto note = [&](const UpdateReport& report) {
     for (const Event& event : report.events) said += event.text;
@@ -108,7 +108,7 @@ TEST(CeresBatchEnds, AModelThatFailsAtTheEndIsSaid) {
   AddSensor(system, "z", InProcessSensor(testing::Linear(2.0, 0.3), "linear"), {"p.x"});
   for (const bool so_far : {false, true}) {
     Failing::budget = kMany;
-    const auto batch = MakeBatch(system, so_far ? "data: so_far\n" : "");
+    const auto batch = MakeBatch(system, so_far ? "mode: filtering\n" : "");
     for (int k = 0; k < 4; ++k) batch->Process(FrameAt(0.1 * k, {{0, 0.2 * k}}));
     if (!so_far) batch->Smooth([](std::size_t, const State&, const UpdateReport&) {});
     ASSERT_FALSE(batch->failed());
@@ -288,7 +288,7 @@ TEST(CeresBatchEnds, AUnitVectorMayCrossTheSeamOfItsBasis) {
   const Eigen::Matrix2d p = (Eigen::Matrix2d() << 1e-5, 2e-6, 2e-6, 4e-6).finished();
   system.priors.push_back({id, mean, p, ""});
   AddSensor(system, "z", InProcessSensor(Seen(), "seen"), {"d.n"});
-  const auto batch = MakeBatch(system), so_far = MakeBatch(system, "data: so_far\n");
+  const auto batch = MakeBatch(system), so_far = MakeBatch(system, "mode: filtering\n");
   RtsSmoother rts(system, {}, testing::StreamsOf(system));
   Random random(3);
   const auto drawn = [&](std::vector<double> x) {

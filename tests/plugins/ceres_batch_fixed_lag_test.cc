@@ -83,11 +83,11 @@ std::vector<Frame> LinearFrames(int count) {
   return frames;
 }
 
-constexpr const char* kThreeFrames = "window_s: 0.1\n";
+constexpr const char* kThreeFrames = "lag_s: 0.1\n";
 
 TEST(FixedLag, OverAllFramesIsTheBatchOfTheDataSoFar) {
-  const auto lag = MakeFixedLag(LinearSystem(), "window_s: 1e12\n");
-  const auto batch = MakeBatch(LinearSystem(), "data: so_far\n");
+  const auto lag = MakeFixedLag(LinearSystem(), "lag_s: 1e12\n");
+  const auto batch = MakeBatch(LinearSystem(), "mode: filtering\n");
   EXPECT_FALSE(lag->offline());
   const std::vector<Frame> frames = LinearFrames(40);
   for (std::size_t k = 0; k < frames.size(); ++k) {
@@ -115,8 +115,8 @@ void ExpectTheKalmanFilter(const System& system, const std::vector<Frame>& frame
 TEST(FixedLag, OfALinearProblemIsTheKalmanFilterWhateverTheWindow) {
   const std::vector<Frame> frames = LinearFrames(60);
   ExpectTheKalmanFilter(LinearSystem(), frames);
-  ExpectTheKalmanFilter(LinearSystem(), frames, "window_s: 0.04\n");  // less than a frame
-  ExpectTheKalmanFilter(LinearSystem(), frames, "window_s: 0.7\n");
+  ExpectTheKalmanFilter(LinearSystem(), frames, "lag_s: 0.04\n");  // less than a frame
+  ExpectTheKalmanFilter(LinearSystem(), frames, "lag_s: 0.7\n");
   std::vector<Frame> gap = LinearFrames(10);  // all of the window leaves at once
   gap.push_back(FrameAt(4.0, {{0, 1.2}}));
   gap.push_back(FrameAt(4.05, {{1, 0.3}}));
@@ -126,7 +126,7 @@ TEST(FixedLag, OfALinearProblemIsTheKalmanFilterWhateverTheWindow) {
 // Each frame with two more: the batch of the first k + 3 frames.
 TEST(FixedLag, OfTheOldestFrameIsTheBatchWithAsManyLaterOnes) {
   const std::vector<Frame> frames = LinearFrames(30);
-  const auto lag = MakeFixedLag(LinearSystem(), std::string(kThreeFrames) + "estimate: oldest\n");
+  const auto lag = MakeFixedLag(LinearSystem(), std::string(kThreeFrames) + "output: lagged\n");
   EXPECT_TRUE(lag->offline());
   const std::vector<Estimate> found = SmoothOver(*lag, frames);
   ASSERT_EQ(found.size(), frames.size());
@@ -160,7 +160,7 @@ TEST(FixedLag, ABlockMayStartFromAMeasurement) {
     std::erase_if(frames[k].measurements, [](const Measurement& m) { return m.stream == 0; });
   const BlockId x = system.layout.Find("p.x");
   const auto lag = MakeFixedLag(system, kThreeFrames);
-  const auto late = MakeFixedLag(system, std::string(kThreeFrames) + "estimate: oldest\n");
+  const auto late = MakeFixedLag(system, std::string(kThreeFrames) + "output: lagged\n");
   Ekf ekf(system, {}, testing::StreamsOf(system));
   for (std::size_t k = 0; k < frames.size(); ++k) {
     lag->Process(frames[k]);
@@ -196,10 +196,10 @@ std::vector<Frame> DepthFrames(int count) {
 /// Whole windows leave at the last solution, and a frame that tells nothing comes: what was
 /// linearised was so at the optimum, so that the estimate is that of the batch, which keeps all.
 void ExpectLeavingChangesNothing(const System& system, std::vector<Frame> frames) {
-  const double window_s = Seconds(frames.back().stamp - frames.front().stamp);
-  frames.push_back({frames.back().stamp + StampFromSeconds(window_s + 0.1), {}, {}});
-  const auto lag = MakeFixedLag(system, "window_s: " + std::to_string(window_s + 0.01) + "\n");
-  const auto batch = MakeBatch(system, "data: so_far\n");
+  const double lag_s = Seconds(frames.back().stamp - frames.front().stamp);
+  frames.push_back({frames.back().stamp + StampFromSeconds(lag_s + 0.1), {}, {}});
+  const auto lag = MakeFixedLag(system, "lag_s: " + std::to_string(lag_s + 0.01) + "\n");
+  const auto batch = MakeBatch(system, "mode: filtering\n");
   for (const Frame& frame : frames) {
     lag->Process(frame);
     batch->Process(frame);
@@ -278,8 +278,8 @@ template <class G>
 void ExpectNearTheBatch(const Geometry& geometry, double tolerance) {
   const System system = OnManifold<G>(geometry);
   ExpectLeavingChangesNothing(system, FramesOnManifold(geometry, 4));
-  const auto lag = MakeFixedLag(system, "window_s: 0.3\n");
-  const auto batch = MakeBatch(system, "data: so_far\n");
+  const auto lag = MakeFixedLag(system, "lag_s: 0.3\n");
+  const auto batch = MakeBatch(system, "mode: filtering\n");
   double worst = 0.0;
   for (const Frame& frame : FramesOnManifold(geometry, 20)) {
     lag->Process(frame);
@@ -331,8 +331,8 @@ TEST(FixedLag, LiesBetweenTheFilterAndTheBatchAndIsHonest) {
   std::vector<RunResult> runs;
   for (int seed = 1001; seed <= 1012; ++seed) {
     runs.push_back(RunDepth(
-        "{ekf: {type: ekf}, newest: {type: fixed_lag, window_s: 0.5}, "
-        "delayed: {type: fixed_lag, window_s: 0.5, estimate: oldest}, batch: {type: ceres_batch}}",
+        "{ekf: {type: ekf}, newest: {type: fixed_lag, lag_s: 0.5}, "
+        "delayed: {type: fixed_lag, lag_s: 0.5, output: lagged}, batch: {type: ceres_batch}}",
         {{"source.seed", std::to_string(seed)},
          {"state.template.initial.inverse_distance", "{mean: 3.3333333333333335, sigma: 0}"},
          {"state.target.initial.depth", "{mean: 0.35, sigma: 0.1}"},
@@ -358,7 +358,7 @@ TEST(FixedLag, LiesBetweenTheFilterAndTheBatchAndIsHonest) {
 // It has no gate; but its stereo sees nothing nearer than 0.3 m, where the target is half the time.
 TEST(FixedLag, LendsWhatItAccepted) {
   const RunResult run = RunDepth(
-      "{one: {type: fixed_lag, window_s: 0.3, overrides: {sensors: {stereo: {near_m: 0.3}}}}, "
+      "{one: {type: fixed_lag, lag_s: 0.3, overrides: {sensors: {stereo: {near_m: 0.3}}}}, "
       "two: {type: ekf, use: {accepted_by: one}}, all: {type: ekf}}",
       {{"source.near_m", "0"}});
   ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
@@ -382,7 +382,7 @@ TEST(FixedLag, IsRefusedWhatItCannotDo) {
       EXPECT_NE(std::string(error.what()).find(what), std::string::npos) << error.what();
     }
   };
-  const std::string window = ", window_s: 0.3";
+  const std::string window = ", lag_s: 0.3";
   expect_refused(window, "sensors.scale.roles.inverse_distance",
                  "{block: template.inverse_distance, mode: hold}",
                  "estimator type 'fixed_lag' does not support held roles: "
@@ -390,9 +390,9 @@ TEST(FixedLag, IsRefusedWhatItCannotDo) {
   expect_refused(window, "state.template.consider", "[inverse_distance]",
                  "estimator type 'fixed_lag' does not support considered blocks");
   expect_refused(window, "estimators.one.gate", "0.99", "estimator type 'fixed_lag' has no gate");
-  expect_refused("", "source.seed", "1", "window_s");
-  expect_refused(", window_s: 0", "source.seed", "1", "window_s");
-  expect_refused(window, "estimators.one.estimate", "eldest", "oldest");
+  expect_refused("", "source.seed", "1", "lag_s");
+  expect_refused(", lag_s: 0", "source.seed", "1", "lag_s");
+  expect_refused(window, "estimators.one.output", "lag", "lagged");
 }
 
 }  // namespace

@@ -81,9 +81,9 @@ struct Case {
   const char* options;
 };
 constexpr Case kCases[] = {{"ceres_batch", ""},
-                           {"ceres_batch", "data: so_far\n"},
-                           {"fixed_lag", "window_s: 0.25\n"},
-                           {"fixed_lag", "window_s: 0.25\nestimate: oldest\n"}};
+                           {"ceres_batch", "mode: filtering\n"},
+                           {"fixed_lag", "lag_s: 0.25\n"},
+                           {"fixed_lag", "lag_s: 0.25\noutput: lagged\n"}};
 
 TEST(CeresBatchHeldNoise, AGapIsAGapHoweverItIsSplit) {
   for (const Case& c : kCases) {
@@ -111,7 +111,7 @@ TEST(CeresBatchHeldNoise, ALinearWindowIsTheFilterAtEveryFrame) {
   const std::vector<Frame> frames = Frames(20, 4);
   for (const char* window : {"0.01", "0.06", "0.13", "0.5"}) {
     Ekf ekf(system, {}, testing::StreamsOf(system));
-    const auto lag = Make("fixed_lag", std::string("window_s: ") + window + "\n");
+    const auto lag = Make("fixed_lag", std::string("lag_s: ") + window + "\n");
     ExpectNear(EstimatesOf(*lag, frames, All), EstimatesOf(ekf, frames, All), 1e-9);
   }
 }

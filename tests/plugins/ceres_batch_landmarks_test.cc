@@ -169,7 +169,7 @@ TEST(CeresBatchLandmarks, AnchorsGiveTheSameAsSixNumbers) {
 TEST(CeresBatchLandmarks, AnotherStartLeadsToTheSameSolution) {
   const Problem problem(12, 8);
   const Found all = Solve(problem.Filter(), problem.frames);
-  const auto so_far = testing::MakeBatch(problem.Filter(), "data: so_far\n");
+  const auto so_far = testing::MakeBatch(problem.Filter(), "mode: filtering\n");
   for (const Frame& frame : problem.frames) so_far->Process(frame);
   ASSERT_FALSE(so_far->failed());
   EXPECT_LT((testing::PositionOf(*so_far) - all.Camera(problem.frames.size() - 1)).norm(), 1e-7);

@@ -124,7 +124,7 @@ TEST(CeresBatchLoss, EqualsIterativelyReweightedLeastSquares) {
 TEST(CeresBatchLoss, OfTheDataSoFarEndsWhereTheSmootherDoes) {
   const System system = PointWith({LossKind::kHuber, 1.345});
   const std::vector<Frame> frames = FramesWithOutliers(30);
-  const auto batch = MakeBatch(system, "data: so_far\n");
+  const auto batch = MakeBatch(system, "mode: filtering\n");
   for (const Frame& frame : frames) batch->Process(frame);
   const Solution smoothed = SmoothOver(system, frames);
   EXPECT_NEAR(testing::ValueOf(batch->state(), "p.x"), smoothed.x.back()(0), 1e-8);
@@ -174,7 +174,7 @@ TEST(CeresBatchLoss, WeightsThatDoNotSettleAreSaid) {
   expect_said();
   EXPECT_NE(early, settled);
   EXPECT_NEAR(early, settled, 1e-2);
-  last_of("max_iterations: 12\ndata: so_far\n");
+  last_of("max_iterations: 12\nmode: filtering\n");
   expect_said();
 }
 

@@ -60,9 +60,9 @@ Estimated Estimate(const std::string& options, const System& system,
   return result;
 }
 
-const std::vector<std::string> kAll = {"ceres_batch", "ceres_batch\ndata: so_far",
+const std::vector<std::string> kAll = {"ceres_batch", "ceres_batch\nmode: filtering",
                                        "fixed_lag\nwindow_s: 0.15",
-                                       "fixed_lag\nwindow_s: 0.15\nestimate: oldest"};
+                                       "fixed_lag\nwindow_s: 0.15\noutput: lagged"};
 
 // Its value is the mean of what was measured, z / gain: P = sigma^2 / (gain^2 n).
 TEST(CeresBatchNoInputs, AFirstValueMayComeLate) {

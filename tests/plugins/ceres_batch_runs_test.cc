@@ -38,7 +38,7 @@ TEST(CeresBatch, TheFilterIsNearlyAsGoodAsFullInformation) {
   double filter = 0.0, full = 0.0;
   for (int seed = 1001; seed <= 1005; ++seed) {
     const RunResult run = RunDepth(
-        seed, {{"estimators.full.type", "ceres_batch"}, {"estimators.full.data", "so_far"}});
+        seed, {{"estimators.full.type", "ceres_batch"}, {"estimators.full.mode", "filtering"}});
     ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
     filter += run.estimators[0].metrics.at("rmse:target.depth");
     full += run.estimators[1].metrics.at("rmse:target.depth");
@@ -91,8 +91,8 @@ TEST_F(CeresBatchConfig, WhatItCannotDoIsRefusedByName) {
   };
   expect("sensors.scale.roles.inverse_distance", "{block: template.inverse_distance, mode: hold}",
          "held roles: sensors.scale.roles.inverse_distance.mode");
-  expect("sensors.stereo.roles.depth", "{block: target.depth, linearise_at: measurement}",
-         "linearise_at: measurement: sensors.stereo.roles.depth.linearise_at");
+  expect("sensors.stereo.roles.depth", "{block: target.depth, jacobian_at: measurement}",
+         "jacobian_at: measurement: sensors.stereo.roles.depth.jacobian_at");
   expect("state.template.consider", "[inverse_distance]",
          "considered blocks: state.template.consider names 'template.inverse_distance'");
 }
@@ -112,7 +112,7 @@ TEST_F(CeresBatchConfig, KeysOfTheFiltersAreRefusedByName) {
 
 TEST_F(CeresBatchConfig, IsListedWithItsKeysAndThoseOfEveryEstimator) {
   const std::string info = PluginInfo(Shipped(), "ceres_batch");
-  for (const char* words : {"ceres_batch: estimator", "[Bell1994]", "all | so_far",
+  for (const char* words : {"ceres_batch: estimator", "[Bell1994]", "smoothing | filtering",
                             "max_outer_iterations", "on_divergence", "overrides"}) {
     EXPECT_NE(info.find(words), std::string::npos) << words << " is not in\n" << info;
   }
@@ -122,7 +122,7 @@ TEST_F(CeresBatchConfig, BadOptionsAndTypesAreErrorsWithAPlace) {
   const auto run = [](const std::string& key, const std::string& value) {
     RunDepth(1, {{"estimators.batch.type", "ceres_batch"}, {key, value}});
   };
-  ExpectError(ExitCode::kBadConfig, {"estimators.batch.data", "some", "all, so_far"},
+  ExpectError(ExitCode::kBadConfig, {"estimators.batch.mode", "some", "smoothing, filtering"},
               [&] { run("estimators.batch.data", "some"); });
   ExpectError(ExitCode::kBadConfig, {"estimators.batch.max_iterations", "[1, 1000000]"},
               [&] { run("estimators.batch.max_iterations", "0"); });

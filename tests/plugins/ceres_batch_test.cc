@@ -189,7 +189,7 @@ TEST(CeresBatch, EndsWhereTheKalmanFilterDoes) {
 // On a linear problem the full-information filter is the Kalman filter, at every frame.
 TEST(CeresBatch, OfTheDataSoFarIsTheKalmanFilter) {
   const System system = LinearSystem();
-  const auto batch = MakeBatch(system, "data: so_far\n");
+  const auto batch = MakeBatch(system, "mode: filtering\n");
   EXPECT_FALSE(batch->offline());
   Ekf ekf(system, {}, testing::StreamsOf(system));
   for (const Frame& frame : LinearFrames(40)) {
@@ -232,7 +232,7 @@ TEST(CeresBatch, ABlockMayStartFromAMeasurement) {
   std::vector<Frame> frames = LinearFrames(30);
   frames[0].measurements.clear();
   frames[1].measurements.clear();
-  const auto batch = MakeBatch(system), so_far = MakeBatch(system, "data: so_far\n");
+  const auto batch = MakeBatch(system), so_far = MakeBatch(system, "mode: filtering\n");
   const BlockId x = system.layout.Find("p.x");
   Ekf ekf(system, {}, testing::StreamsOf(system));
   const auto expect_equal = [&](const State& found, const State& expected, std::size_t k) {

@@ -122,7 +122,7 @@ TEST_F(DrivenTest, WhatAFilterAcceptedComesWithAllInputs) {
   const RunResult run =
       RunInto(Read({{"estimators",
                      "{ekf: {type: ekf}, same: {type: ekf, use: {accepted_by: ekf}}, batch: {type: "
-                     "ceres_batch, use: {accepted_by: ekf}}, lag: {type: fixed_lag, window_s: "
+                     "ceres_batch, use: {accepted_by: ekf}}, lag: {type: fixed_lag, lag_s: "
                      "0.5}}"}}),
               folder_ / "run");
   ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
@@ -247,7 +247,7 @@ TEST_F(DrivenTest, ExplainShowsWhereTheInputComesFrom) {
   const Experiment experiment = BuildExperiment(config, host_);
   const std::string text = Explain(config, experiment);
   for (const char* words : {"control input", "speed <- odometry, up to 1.5 s old", "car (input)",
-                            "control inputs; linearise_at prediction"}) {
+                            "control inputs; jacobian_at prediction"}) {
     EXPECT_NE(text.find(words), std::string::npos) << words << "\n" << text;
   }
   EXPECT_EQ(text.find("Not: control inputs"), std::string::npos);

@@ -73,7 +73,7 @@ Node NodeOf(const Unsupported& asked, const Node& root, const System& system) {
     const Block& block = system.layout[asked.block];
     const Node state = root.At("state").At(block.owner);
     if (block.status == BlockStatus::kConsidered) return ConsiderOf(state, block);
-    return state.At("initial").At(NameIn(block)).At("from");
+    return state.At("initial").At(NameIn(block)).At("from_measurement");
   }
   if (asked.sensor < 0) return root.At("landmarks");
   const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(asked.sensor)];
@@ -81,8 +81,8 @@ Node NodeOf(const Unsupported& asked, const Node& root, const System& system) {
   if (asked.role < 0) return entry.At("loss");
   const auto role = static_cast<std::size_t>(asked.role);
   const Node node = entry.At("roles").At(sensor.model.roles()[role].name);
-  // A mode that cannot be done comes before linearise_at.
-  return node.At(asked.what.starts_with("linearise_at") ? "linearise_at" : "mode");
+  // A mode that cannot be done comes before jacobian_at.
+  return node.At(asked.what.starts_with("jacobian_at") ? "jacobian_at" : "mode");
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ void Ekf::Bind() {
       plan.linearised_at.push_back(plan.roles.back());
       plan.columns.push_back(-1);
       plan.ready = plan.ready && (role.block < 0 || present);
-      if (present && role.linearise_at == LineariseAt::kMeasurement) {
+      if (present && role.jacobian_at == RoleJacobianAt::kMeasurement) {
         plan.implied.resize(static_cast<std::size_t>(layout[role.block].geometry().ambient));
         plan.linearised_at.back() = plan.implied.data();
       } else if (present && !first_.empty() && !FirstEstimate(role.block).empty()) {

@@ -26,8 +26,8 @@ std::optional<Unsupported> OfRole(const RoleBinding& role, const Support& suppor
     return Unsupported{"considered roles", support.held ? "estimate or hold" : "estimate"};
   }
   if (role.mode == RoleMode::kHold && !support.held) return Unsupported{"held roles", "estimate"};
-  if (role.linearise_at == LineariseAt::kMeasurement && !support.at_measurement) {
-    return Unsupported{"linearise_at: measurement", "prediction"};
+  if (role.jacobian_at == RoleJacobianAt::kMeasurement && !support.at_measurement) {
+    return Unsupported{"jacobian_at: measurement", "prediction"};
   }
   return std::nullopt;
 }

@@ -12,7 +12,7 @@ namespace alidade {
 struct Support {
   bool considered = false;        ///< considered blocks and roles (Schmidt)
   bool held = true;               ///< held roles
-  bool at_measurement = false;    ///< linearise_at: measurement
+  bool at_measurement = false;    ///< jacobian_at: measurement
   bool from_measurement = false;  ///< blocks that start from their first measurement
   bool recovery = false;          ///< after consecutive rejections
   bool robust_loss = true;        ///< of a sensor

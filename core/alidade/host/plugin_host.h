@@ -39,8 +39,8 @@ struct ParamInfo {
 enum class EstimatorKind {
   kFilter,    ///< takes each measurement once, as it comes
   kSmoother,  ///< a filter, and then all later measurements, about its linearisation
-  kBatch,     ///< solves for all states anew, by all measurements or (`data: so_far`) those so far
-  kWindow,    ///< solves for the last states anew
+  kBatch,   ///< solves for all states anew, by all measurements or (`mode: filtering`) those so far
+  kWindow,  ///< solves for the last states anew
 };
 /// `filter`, `smoother`, `batch`, `window`.
 const char* ToString(EstimatorKind kind);

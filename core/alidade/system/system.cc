@@ -99,7 +99,7 @@ std::vector<std::string> ReadBlockNames(const Node& entry, const MotionModel& mo
 void ReadPrior(const Node& initial, const Block& block, BlockId id, System& system) {
   Prior prior;
   prior.block = id;
-  if (const auto from = initial.Find("from")) {
+  if (const auto from = initial.Find("from_measurement")) {
     prior.from = from->Text();
   } else {
     prior.mean = ReadMean(initial.At("mean", "the initial value"), block.geometry());
@@ -192,10 +192,10 @@ RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& mod
     if (const auto mode = node.Find("mode")) {
       binding.mode = static_cast<RoleMode>(mode->Choice({"estimate", "consider", "hold"}));
     }
-    if (const auto at = node.Find("linearise_at")) {
-      binding.linearise_at = static_cast<LineariseAt>(at->Choice({"prediction", "measurement"}));
+    if (const auto at = node.Find("jacobian_at")) {
+      binding.jacobian_at = static_cast<RoleJacobianAt>(at->Choice({"prediction", "measurement"}));
       const int initialised = model.initialised_role();
-      if (binding.linearise_at == LineariseAt::kMeasurement &&
+      if (binding.jacobian_at == RoleJacobianAt::kMeasurement &&
           (initialised < 0 ||
            model.roles()[static_cast<std::size_t>(initialised)].name != role.name)) {
         at->Fail(
@@ -268,7 +268,7 @@ void CheckInitialisation(const Node& root, const System& system) {
   const auto place = [&](BlockId id) {
     const Block& block = system.layout[id];
     const std::string name = block.name.substr(block.owner.size() + 1);
-    return root.At("state").At(block.owner).At("initial").At(name).At("from");
+    return root.At("state").At(block.owner).At("initial").At(name).At("from_measurement");
   };
   const auto prior_of = [&](BlockId id) -> const Prior& {
     return *std::find_if(system.priors.begin(), system.priors.end(),

@@ -24,12 +24,12 @@ enum class RoleMode { kEstimate, kConsider, kHold };
 
 /// Where a sensor's Jacobian is taken for the value of a role: the prediction, or the value the
 /// measurement itself implies (Initialise of that role).
-enum class LineariseAt { kPrediction, kMeasurement };
+enum class RoleJacobianAt { kPrediction, kMeasurement };
 
 struct RoleBinding {
   BlockId block = -1;  ///< -1: an optional role left unbound
   RoleMode mode = RoleMode::kEstimate;
-  LineariseAt linearise_at = LineariseAt::kPrediction;
+  RoleJacobianAt jacobian_at = RoleJacobianAt::kPrediction;
 };
 
 /// stream -> sensor model -> the blocks that fill its roles. The roles of a landmark, which come

@@ -16,7 +16,7 @@ namespace {
 constexpr int kManyInputs = 1000;  // of which a solve takes seconds
 
 struct Options {
-  enum class Data { kAll, kSoFar } data = Data::kAll;
+  enum class Mode { kSmoothing, kFiltering } mode = Mode::kSmoothing;
   SolveOptions solve;
 };
 
@@ -25,7 +25,7 @@ struct Options {
 class CeresBatch : public Estimator {
  public:
   CeresBatch(const System& system, const Options& options, const std::vector<StreamInfo>& streams)
-      : data_(options.data),
+      : mode_(options.mode),
         trajectory_(system, streams, options.solve.max_dt_s),
         solve_(options.solve),
         state_(system.InitialState()),
@@ -35,7 +35,7 @@ class CeresBatch : public Estimator {
     trajectory_.Start(stamp);
     initialiser_.filter().Start(stamp);
   }
-  bool offline() const override { return data_ == Options::Data::kAll; }
+  bool offline() const override { return mode_ == Options::Mode::kSmoothing; }
   const State& state() const override { return state_; }
   std::vector<LandmarkEstimate> landmarks() const override { return map_; }
   Stamp stamp() const override { return trajectory_.stamp(); }
@@ -126,7 +126,7 @@ class CeresBatch : public Estimator {
     trajectory_.Put(k, point, solve_.Whitened(point), state_);
   }
 
-  Options::Data data_;
+  Options::Mode mode_;
   Trajectory trajectory_;
   MapSolve solve_;
   State state_;
@@ -143,8 +143,8 @@ constexpr Support kSupport = {.held = false, .from_measurement = true, .landmark
 EstimatorMaker Create(const EstimatorArguments& arguments) {
   Params& p = arguments.params;
   Options options;
-  options.data = static_cast<Options::Data>(
-      p.Choice("data", {"all", "so_far"}, "what an estimate sees: all frames, or none later", 0));
+  options.mode = static_cast<Options::Mode>(p.Choice(
+      "mode", {"smoothing", "filtering"}, "what an estimate sees: all frames, or none later", 0));
   options.solve = ReadSolveOptions(p);
   return [options, entry = arguments.entry](const System& system,
                                             const std::vector<StreamInfo>& streams) {

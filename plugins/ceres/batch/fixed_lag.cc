@@ -18,21 +18,21 @@ namespace {
 constexpr Support kFixedLagSupport = {.held = false, .from_measurement = true};
 
 struct FixedLagOptions {
-  enum class Estimate { kNewest, kOldest } estimate = Estimate::kNewest;
-  double window_s = 0.0;
+  enum class Output { kCurrent, kLagged } output = Output::kCurrent;
+  double lag_s = 0.0;
   SolveOptions solve;
 };
 
-/// window_s in whole ns; beyond what a Stamp holds, no frame leaves the window.
-Stamp WindowOf(double window_s) {
+/// lag_s in whole ns; beyond what a Stamp holds, no frame leaves the window.
+Stamp LagOf(double lag_s) {
   constexpr double kBeyond = 9e9;
-  return window_s < kBeyond ? StampFromSeconds(window_s) : std::numeric_limits<Stamp>::max();
+  return lag_s < kBeyond ? StampFromSeconds(lag_s) : std::numeric_limits<Stamp>::max();
 }
 
-/// Fixed-lag smoother: the maximum a posteriori of the frames of the last window_s, of the factors
+/// Fixed-lag smoother: the maximum a posteriori of the frames of the last lag_s, of the factors
 /// of Trajectory, given a prior that holds all that came before.
 ///
-///   window   frames j with t_k - t_j <= window_s, k the newest
+///   window   frames j with t_k - t_j <= lag_s, k the newest
 ///   prior    x_0 = x^ (+) (d_0 + L_0 e_0), of the state at the last frame that left
 ///
 /// A frame that leaves is linearised at the last solution, and stays so: see
@@ -43,8 +43,8 @@ class FixedLag : public Estimator {
  public:
   FixedLag(const System& system, const FixedLagOptions& options,
            const std::vector<StreamInfo>& streams)
-      : estimate_(options.estimate),
-        window_(WindowOf(options.window_s)),
+      : output_(options.output),
+        window_(LagOf(options.lag_s)),
         trajectory_(system, streams, options.solve.max_dt_s),
         solve_(options.solve),
         state_(system.InitialState()),
@@ -54,7 +54,7 @@ class FixedLag : public Estimator {
     trajectory_.Start(stamp);
     initialiser_.filter().Start(stamp);
   }
-  bool offline() const override { return estimate_ == FixedLagOptions::Estimate::kOldest; }
+  bool offline() const override { return output_ == FixedLagOptions::Output::kLagged; }
   const State& state() const override { return state_; }
   Stamp stamp() const override { return trajectory_.stamp(); }
   bool diverged() const override { return failed_; }
@@ -149,11 +149,11 @@ class FixedLag : public Estimator {
     }
   }
 
-  FixedLagOptions::Estimate estimate_;
+  FixedLagOptions::Output output_;
   Stamp window_;
   Trajectory trajectory_;  ///< that of the window
   MapSolve solve_;
-  State state_;  ///< newest: of the last frame; oldest: of the last that left
+  State state_;  ///< current: of the last frame; lagged: of the last that left
   InitialisingFilter
       initialiser_;  ///< gives the newest frame a start, and blocks their first values
   std::vector<Stamp> stamps_;
@@ -169,10 +169,10 @@ class FixedLag : public Estimator {
 EstimatorMaker CreateFixedLag(const EstimatorArguments& arguments) {
   Params& p = arguments.params;
   FixedLagOptions options;
-  options.window_s = p.Positive("window_s", "s", "age of the oldest frame that is smoothed");
-  options.estimate = static_cast<FixedLagOptions::Estimate>(p.Choice(
-      "estimate", {"newest", "oldest"},
-      "newest: of each frame when it comes; oldest: when it leaves the window, at the end", 0));
+  options.lag_s = p.Positive("lag_s", "s", "age of the oldest frame that is smoothed");
+  options.output = static_cast<FixedLagOptions::Output>(p.Choice(
+      "output", {"current", "lagged"},
+      "current: of each frame when it comes; lagged: when it leaves the window, at the end", 0));
   options.solve = ReadSolveOptions(p);
   return [options, entry = arguments.entry](const System& system,
                                             const std::vector<StreamInfo>& streams) {

@@ -16,7 +16,7 @@ std::string KeyOf(const Unsupported& asked, const System& system) {
   const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(asked.sensor)];
   const auto role = static_cast<std::size_t>(asked.role);
   return "sensors." + sensor.name + ".roles." + sensor.model.roles()[role].name +
-         (asked.what.starts_with("linearise_at") ? ".linearise_at" : ".mode");
+         (asked.what.starts_with("jacobian_at") ? ".jacobian_at" : ".mode");
 }
 
 }  // namespace

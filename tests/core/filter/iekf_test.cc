@@ -418,7 +418,7 @@ TEST(Iekf, RefusesWhatItCannotDo) {
   considered.sensors[1].roles[1].mode = RoleMode::kConsider;
   EXPECT_THROW(Iekf(considered, {}, StreamsOf(considered)), ContractViolation);
   System measured = DepthFilter();
-  measured.sensors[0].roles[0].linearise_at = LineariseAt::kMeasurement;
+  measured.sensors[0].roles[0].jacobian_at = RoleJacobianAt::kMeasurement;
   EXPECT_THROW(Iekf(measured, {}, StreamsOf(measured)), ContractViolation);
   IekfOptions first;
   first.jacobian = JacobianAt::kFirstEstimate;

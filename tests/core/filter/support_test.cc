@@ -32,10 +32,10 @@ System WithABlockFromAMeasurement() {
   return system;
 }
 
-System WithARole(RoleMode mode, LineariseAt at) {
+System WithARole(RoleMode mode, RoleJacobianAt at) {
   System system = DepthFilter();
   system.sensors[1].roles[1].mode = mode;
-  system.sensors[1].roles[1].linearise_at = at;
+  system.sensors[1].roles[1].jacobian_at = at;
   return system;
 }
 
@@ -68,11 +68,11 @@ TEST(Support, NamesTheFirstThingThatIsLacking) {
          -1);
   expect(WithABlockFromAMeasurement(), {.from_measurement = true},
          "blocks that start from a measurement", 0, -1, -1);
-  expect(WithARole(RoleMode::kConsider, LineariseAt::kPrediction), {.considered = true},
+  expect(WithARole(RoleMode::kConsider, RoleJacobianAt::kPrediction), {.considered = true},
          "considered roles", -1, 1, 1);
-  expect(WithARole(RoleMode::kHold, LineariseAt::kPrediction), {}, "held roles", -1, 1, 1);
-  expect(WithARole(RoleMode::kEstimate, LineariseAt::kMeasurement), {.at_measurement = true},
-         "linearise_at: measurement", -1, 1, 1);
+  expect(WithARole(RoleMode::kHold, RoleJacobianAt::kPrediction), {}, "held roles", -1, 1, 1);
+  expect(WithARole(RoleMode::kEstimate, RoleJacobianAt::kMeasurement), {.at_measurement = true},
+         "jacobian_at: measurement", -1, 1, 1);
   expect(WithALoss(), {}, "robust losses", -1, 1, -1);
   expect(WithLandmarks(), {.landmarks = true}, "landmarks", -1, -1, -1);
 }
@@ -93,10 +93,10 @@ void ExpectAsSupported() {
   const Support& can = Filter::kSupport;
   EXPECT_EQ(Makes<Filter>(WithAConsideredBlock()), can.considered);
   EXPECT_EQ(Makes<Filter>(WithABlockFromAMeasurement()), can.from_measurement);
-  EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kConsider, LineariseAt::kPrediction)),
+  EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kConsider, RoleJacobianAt::kPrediction)),
             can.considered);
-  EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kHold, LineariseAt::kPrediction)), can.held);
-  EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kEstimate, LineariseAt::kMeasurement)),
+  EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kHold, RoleJacobianAt::kPrediction)), can.held);
+  EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kEstimate, RoleJacobianAt::kMeasurement)),
             can.at_measurement);
   EXPECT_EQ(Makes<Filter>(WithALoss()), can.robust_loss);
   EXPECT_EQ(Makes<Filter>(WithLandmarks()), can.landmarks);

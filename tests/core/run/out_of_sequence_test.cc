@@ -47,9 +47,9 @@ constexpr const char* kEventful = R"(alidade: 1
 state:
   target: {model: constant_velocity, blocks: {position: depth, velocity: depth_rate},
            noise: {kind: discrete, acceleration: 0.1},
-           initial: {depth: {from: stereo}, depth_rate: {mean: 0, sigma: 0.5}}}
+           initial: {depth: {from_measurement: stereo}, depth_rate: {mean: 0, sigma: 0.5}}}
   template: {model: constant, blocks: {value: inverse_distance},
-             initial: {inverse_distance: {from: scale}}}
+             initial: {inverse_distance: {from_measurement: scale}}}
 sensors:
   stereo: {model: stereo_disparity, stream: disparity, roles: {depth: target.depth},
            focal_px: 400, baseline_m: 0.065, sigma_px: 0.5}

@@ -98,7 +98,7 @@ Config WithVariant(const Config& config, const Variant& variant, const std::stri
   Config with = internal::Copy(config);
   const std::string entry = "estimators." + name;
   with.Set(entry + ".type", type, kOrigin);
-  if (variant.so_far) with.Set(entry + ".data", "so_far", kOrigin);
+  if (variant.so_far) with.Set(entry + ".mode", "filtering", kOrigin);
   if (variant.accepted) with.Set(entry + ".use.accepted_by", filter, kOrigin);
   for (const char* const key : variant.keys) {
     const auto value = with.root().At("estimators").At(filter).Find(key);

@@ -100,7 +100,7 @@ GapStep Linearisation(const Candidate& filter, const Partners& partners, bool wi
   const Candidate* const of_end = accepted ? partners.accepted : partners.all;
   const bool at_end = partners.so_far == nullptr && of_end != nullptr;
   return Between(GapKind::kLinearisation, &filter, at_end ? of_end : partners.so_far, with_truth,
-                 "there is no batch of the data so far, {type: BATCH, data: so_far}", at_end);
+                 "there is no batch of the data so far, {type: BATCH, mode: filtering}", at_end);
 }
 
 }  // namespace

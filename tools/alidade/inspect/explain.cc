@@ -141,7 +141,7 @@ const char* ModeText(RoleMode mode) {
 
 std::string Sensors(const System& system) {
   std::vector<TextRow> rows = {
-      {"sensor", "stream", "model", "role", "block", "mode", "linearise_at"}};
+      {"sensor", "stream", "model", "role", "block", "mode", "jacobian_at"}};
   for (const SensorBinding& sensor : system.sensors) {
     TextRow front = {sensor.name, sensor.stream, sensor.model.name()};
     for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
@@ -153,7 +153,7 @@ std::string Sensors(const System& system) {
       } else if (role.block < 0) {
         row.insert(row.end(), {"(unbound)", "", ""});
       } else {
-        const bool prediction = role.linearise_at == LineariseAt::kPrediction;
+        const bool prediction = role.jacobian_at == RoleJacobianAt::kPrediction;
         row.insert(row.end(), {system.layout[role.block].name, ModeText(role.mode),
                                prediction ? "prediction" : "measurement"});
       }
@@ -339,7 +339,7 @@ std::string SupportText(const std::string& type) {
     if (!can_do) lacks += (lacks.empty() ? "" : ", ") + std::string(what);
   };
   lack(can.considered, "considered blocks and roles");
-  lack(can.at_measurement, "linearise_at measurement");
+  lack(can.at_measurement, "jacobian_at measurement");
   lack(can.from_measurement, "blocks that start from a measurement");
   lack(can.recovery, "rejection\n    recovery");
   lack(can.landmarks, "landmarks");
@@ -347,7 +347,7 @@ std::string SupportText(const std::string& type) {
                 "    blocks estimated, considered (Schmidt) or fixed; roles estimate, consider, "
                 "hold;\n",
                 "    blocks estimated or fixed; roles estimate, hold;\n") +
-         "    control inputs; linearise_at prediction" +
+         "    control inputs; jacobian_at prediction" +
          either(can.at_measurement, " or measurement", "") +
          either(can.from_measurement, "; blocks that start from a measurement", "") +
          either(can.robust_loss, ";\n    robust losses", "") +

@@ -75,7 +75,7 @@ state:
       orientation: {mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0.1}
       velocity: {mean: [0, 0, 0], sigma: 1}
       angular_velocity: {mean: [0, 0, 0], sigma: 0.1}
-landmarks: {form: anchored}
+landmarks: {representation: anchored}
 sensors:
   stereo:
     model: stereo_feature

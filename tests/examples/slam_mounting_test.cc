@@ -22,7 +22,7 @@ state:
     initial:
       position: {mean: [-0.6, 0, 0], sigma: 0}
       orientation: {mean: {w: 0.997230252466, x: 0, y: 0.074376229844, z: 0}, sigma: 0}
-landmarks: {form: anchored, prior: {inverse_distance: 0.27, sigma: 0.07}}
+landmarks: {representation: anchored, prior: {inverse_distance: 0.27, sigma: 0.07}}
 sensors:
   pixels:
     model: inverse_depth_feature

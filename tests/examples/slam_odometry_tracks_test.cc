@@ -59,9 +59,12 @@ TEST_F(SlamOdometryTracks, IsInconsistentOnlyWhereTheOdometryIs) {
 }
 
 TEST_F(SlamOdometryTracks, DoesNotHangOnTheNoiseOrTheNumberOfFeatures) {
-  const Settings others = {{"sensors.pixels.sigma_px", "1"}, {"sensors.pixels.sigma_px", "4"},
-                           {"landmarks.keep", "30"},         {"landmarks.keep", "200"},
-                           {"landmarks.form", "anchored"},   {"landmarks.to_xyz.linearity", "0.1"}};
+  const Settings others = {{"sensors.pixels.sigma_px", "1"},
+                           {"sensors.pixels.sigma_px", "4"},
+                           {"landmarks.max_per_frame", "30"},
+                           {"landmarks.max_per_frame", "200"},
+                           {"landmarks.representation", "anchored"},
+                           {"landmarks.convert_to_xyz.max_linearity_index", "0.1"}};
   for (const auto& other : others) {
     for (const Drive& drive : kDrives) {
       const EstimatorResult ekf = Ekf(drive, {other});

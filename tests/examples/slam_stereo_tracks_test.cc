@@ -46,7 +46,7 @@ TEST_F(SlamStereoTracks, EndWithinThreePercentOfThePath) { ExpectExact({}); }
 
 TEST_F(SlamStereoTracks, DoNotHangOnNoiseGateOrMoreFeatures) {
   const Settings others = {{"sensors.stereo.sigma_px", "2"},
-                           {"landmarks.keep", "200"},
+                           {"landmarks.max_per_frame", "200"},
                            {"estimators.ekf.gate", "0.9"},
                            {"sensors.stereo.sigma_px", "5"},
                            {"state.cam.noise.linear_acceleration", "4"}};

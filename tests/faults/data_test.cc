@@ -24,7 +24,7 @@ state:
       orientation: {mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0}
       velocity: {mean: [0, 0, 0], sigma: 0.1}
       angular_velocity: {mean: [0, 0, 0], sigma: 0.05}
-landmarks: {form: inverse_depth, prior: {inverse_distance: 0.5, sigma: 0.25}}
+landmarks: {representation: inverse_depth, prior: {inverse_distance: 0.5, sigma: 0.25}}
 sensors:
   pixels: {model: inverse_depth_feature, stream: tracks, sigma_px: 1.0,
            roles: {position: cam.position, orientation: cam.orientation, landmark: landmarks}}
@@ -101,7 +101,7 @@ TEST_F(DataFault, AnIdUsedAgainIsTheNextGeneration) {
     if (frame >= 33) rows += Row(frame, 7, 0, 500) + Row(frame, 7, 1, 300);
   }
   Write("tracks.csv", rows);
-  Run("map.yaml", {"--set", "landmarks.forget.unseen_frames=5"});
+  Run("map.yaml", {"--set", "landmarks.prune.max_missed_frames=5"});
   const std::string map = Read("out/ekf/landmarks.csv");
   EXPECT_TRUE(Contains(map, "\n7,1,inverse_depth,")) << map;
   EXPECT_TRUE(Contains(map, "\n0,0,inverse_depth,")) << map;
@@ -116,7 +116,7 @@ TEST_F(DataFault, WithoutParallaxLandmarksStayInverseDepth) {
     for (int frame = 0; frame < 60; ++frame) rows += Plane(frame, moves ? 0.03 * frame : 0.0);
     Write("tracks.csv", rows);
     Run("map.yaml",
-        {"--set", "landmarks.to_xyz={linearity: 0.1}", "--set",
+        {"--set", "landmarks.convert_to_xyz={max_linearity_index: 0.1}", "--set",
          "state.cam.initial.velocity={mean: [0.9, 0, 0], sigma: 0}", "--set",
          "estimators.ekf.gate=none", "--set", "state.cam.noise.linear_acceleration=0.01"});
     EXPECT_EQ(Contains(Read("out/ekf/landmarks.csv"), ",xyz,"), moves);

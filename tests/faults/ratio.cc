@@ -35,10 +35,10 @@ void Emplace(double sigma, AlidadeInstance* instance) {
   alidade::detail::PublishSensor(std::make_unique<Holder>(Model(sigma)), instance);
 }
 
-/// Pixels of a landmark, in the form that `landmarks.form` says.
+/// Pixels of a landmark, in the form that `landmarks.representation` says.
 void MakePixels(alidade::Params& p, AlidadeInstance* instance) {
   using namespace alidade::testing;  // NOLINT(google-build-using-namespace): the test sensors
-  const int form = p.Choice("landmarks.form", {"inverse_depth", "anchored", "xyz"},
+  const int form = p.Choice("landmarks.representation", {"inverse_depth", "anchored", "xyz"},
                             "how landmarks are written", 0);
   const double sigma = p.Positive("sigma_px", "px", "noise, 1 sigma") /
                        p.Positive("camera.focal_px", "px", "focal length");

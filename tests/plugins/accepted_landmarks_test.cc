@@ -24,12 +24,12 @@ class Entries : public RunObserver {
   std::map<int, std::map<std::int64_t, Stamp>> entered;
 };
 
-// The ekf counts to `enter_after`; what it then passes on has waited.
+// The ekf counts to `min_observations`; what it then passes on has waited.
 TEST(AcceptedBy, LandmarksEnterAtTheSameObservation) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml");
   for (const auto& [key, value] :
        std::map<std::string, std::string>{{"source.frames", "12"},
-                                          {"landmarks.enter_after", "3"},
+                                          {"landmarks.min_observations", "3"},
                                           {"estimators.follower.type", "ekf"},
                                           {"estimators.follower.use.accepted_by", "ekf"}}) {
     config.Set(key, value, "--set");

@@ -22,7 +22,7 @@ TEST(CeresBatchLandmarks, WhatTheFilterForgetsAndMeetsAgainIsAnotherLandmark) {
     std::erase_if(frames[k].measurements, [](const Measurement& m) { return m.landmark == 4; });
   }
   System system = problem.Filter();
-  system.landmarks->unseen_frames = 3;
+  system.landmarks->max_missed_frames = 3;
   const Found found = Solve(system, frames);
   ASSERT_FALSE(found.failed);
   EXPECT_EQ(found.Landmark(4).generation, 1);
@@ -69,7 +69,7 @@ const std::string kMotion =
     "{mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0}, velocity: {mean: [0.2, 0, 0], sigma: 0.1}, "
     "angular_velocity: {mean: [0, 0, 0], sigma: 0.05}}}}\n";
 const std::string kSensors =
-    "landmarks: {form: inverse_depth, prior: {inverse_distance: 0.39, sigma: 0.09}}\n"
+    "landmarks: {representation: inverse_depth, prior: {inverse_distance: 0.39, sigma: 0.09}}\n"
     "sensors:\n"
     "  pixels: {model: inverse_depth_feature, stream: tracks, sigma_px: 1, roles: {position: "
     "cam.position, orientation: cam.orientation, landmark: landmarks}}\n"

@@ -263,8 +263,8 @@ void AddLandmarkSensors(std::multimap<std::string, std::string>& parameters) {
                                ", model: photogrammetric, k1: 0.3, k2: 0.3"}) {
         const bool other_lens = *lens != '\0', other_form = *form != 'i';
         if (other_lens && (other_form || model == "stereo_feature")) continue;
-        parameters.emplace(model, "{sigma_px: 1" + keys + ", landmarks: {form: " + form + "}, " +
-                                      camera + lens + "}}");
+        parameters.emplace(model, "{sigma_px: 1" + keys + ", landmarks: {representation: " + form +
+                                      "}, " + camera + lens + "}}");
       }
     }
   }

@@ -35,7 +35,8 @@ double U(const SensorModel& xyz) {
 }
 
 TEST_F(SharedParametersTest, AreReadFromTheRoot) {
-  const Config config = Parse(kCamera + "landmarks: {form: xyz}\nsensors: {pixels: {sigma_px: 1}}");
+  const Config config =
+      Parse(kCamera + "landmarks: {representation: xyz}\nsensors: {pixels: {sigma_px: 1}}");
   const SensorModel pixels = Pixels(config);
   EXPECT_EQ(pixels.roles()[2].geometry, Geometry::Vector(3));
   EXPECT_EQ(U(pixels), 320.0 + 500.0 / 2);
@@ -43,11 +44,12 @@ TEST_F(SharedParametersTest, AreReadFromTheRoot) {
 }
 
 TEST_F(SharedParametersTest, TheEntryComesFirstKeyByKey) {
-  const Config config = Parse(kCamera +
-                              "landmarks: {form: anchored}\n"
-                              "sensors:\n"
-                              "  pixels: {sigma_px: 1, camera: {fx: 400}, landmarks: {form: xyz}}\n"
-                              "  others: {sigma_px: 1}");
+  const Config config =
+      Parse(kCamera +
+            "landmarks: {representation: anchored}\n"
+            "sensors:\n"
+            "  pixels: {sigma_px: 1, camera: {fx: 400}, landmarks: {representation: xyz}}\n"
+            "  others: {sigma_px: 1}");
   EXPECT_EQ(U(Pixels(config)), 320.0 + 400.0 / 2);
   EXPECT_EQ(Pixels(config, "others").roles().size(), 5u);
 }
@@ -71,8 +73,9 @@ TEST_F(SharedParametersTest, ErrorsNameTheMapThatIsWrong) {
   refused({"test.yaml:2:81 camera.fz: unknown key", "did you mean 'fx'?"},
           sensors + kCamera.substr(0, kCamera.size() - 2) + ",           fz: 3}");
   refused({"camera.k1: unknown key"}, sensors + kCamera.substr(0, kCamera.size() - 2) + ", k1: 3}");
-  refused({"landmarks.form: 'xzy'", "one of inverse_depth, anchored, xyz", "did you mean 'xyz'?"},
-          sensors + kCamera + "landmarks: {form: xzy}");
+  refused({"landmarks.representation: 'xzy'", "one of inverse_depth, anchored, xyz",
+           "did you mean 'xyz'?"},
+          sensors + kCamera + "landmarks: {representation: xzy}");
   // in the entry
   refused({"sensors.pixels.camera.fx: '-5'"},
           kCamera + "sensors: {pixels: {sigma_px: 1, camera: {fx: -5}}}");

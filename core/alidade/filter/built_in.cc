@@ -137,9 +137,9 @@ void RefuseLoneMatches(const Node& entry, const System& system) {
   const auto fuse = entry.Find("fuse");
   if (!fuse || fuse->Text() != "per_measurement") return;
   for (const SensorBinding& sensor : system.sensors) {
-    if (!sensor.association) continue;
+    if (!sensor.outlier_rejection) continue;
     fuse->Fail("one match has no others to agree with, as sensor '" + sensor.name +
-                   "' asks by its `association`",
+                   "' asks by its `outlier_rejection`",
                "joint or per_sensor");
   }
 }

@@ -65,11 +65,11 @@ Ekf::Landmarks::Landmarks(Ekf& ekf) : ekf_(ekf), options_(*ekf.system_.landmarks
     ALIDADE_EXPECTS(family.first < 0 || sensor.model.prior_size() == 0 || options_.prior);
     ALIDADE_EXPECTS(family.first < 0 || sensor.model.prior_size() <= 1);
     ALIDADE_EXPECTS(family.first < 0 || family.form == internal::XyzForm() || sensor.xyz ||
-                    (options_.known.empty() && !(options_.to_xyz > 0.0)));
+                    (options_.known.empty() && !(options_.max_linearity_index > 0.0)));
     const int dof = sensor.model.measurement().geometry.tangent;
-    const OnePointRansac ransac = sensor.association.value_or(OnePointRansac{});
-    support_.push_back(ChiSquareQuantile(ransac.support, dof));
-    rescue_.push_back(ChiSquareQuantile(ransac.rescue, dof));
+    const OnePointRansac ransac = sensor.outlier_rejection.value_or(OnePointRansac{});
+    support_.push_back(ChiSquareQuantile(ransac.inlier_probability, dof));
+    rescue_.push_back(ChiSquareQuantile(ransac.rescue_probability, dof));
   }
 }
 
@@ -224,10 +224,10 @@ void Ekf::Landmarks::Forget() {
   for (auto at = map_.landmarks.begin(); at != map_.landmarks.end();) {
     const Landmark& landmark = at->second;
     const std::int64_t unseen = map_.frame - landmark.seen;
-    const int most = landmark.in_state() ? options_.unseen_frames : kWaitingFrames;
+    const int most = landmark.in_state() ? options_.max_missed_frames : kWaitingFrames;
     const bool lost = most > 0 && unseen >= most;
-    const bool fails = landmark.tried >= options_.minimum_tries &&
-                       landmark.accepted < options_.success_ratio * landmark.tried;
+    const bool fails = landmark.tried >= options_.min_attempts &&
+                       landmark.accepted < options_.min_match_ratio * landmark.tried;
     if ((lost || fails) && !landmark.known) {
       at = Delete(at);
     } else {
@@ -261,7 +261,7 @@ void Ekf::Landmarks::DropBlocks(Landmark& landmark) {
 
 /// Turns those landmarks of the frame into xyz that are linear enough.
 void Ekf::Landmarks::Convert() {
-  if (!(options_.to_xyz > 0.0)) return;
+  if (!(options_.max_linearity_index > 0.0)) return;
   for (const Row& row : ekf_.rows()) {
     if (row.plan == nullptr || row.model != nullptr || !Used(ekf_.EntryOf(row))) continue;
     const auto found = map_.landmarks.find(row.measurement->landmark);
@@ -277,7 +277,7 @@ bool Ekf::Landmarks::ConvertToXyz(std::int64_t id, Landmark& landmark, const Fam
   const double linearity =
       internal::LinearityOf(*landmark.form, values.data(), InverseDistanceSigma(landmark), camera);
   const auto point = internal::PointOf(*landmark.form, values.data());
-  if (!point || !(linearity < options_.to_xyz)) return false;
+  if (!point || !(linearity < options_.max_linearity_index)) return false;
   std::vector<Eigen::MatrixXd> jacobians;
   Eigen::Index column = 0;
   for (const BlockId block : landmark.blocks) {
@@ -300,9 +300,9 @@ void Ekf::Landmarks::Enter() {
   auto measured = std::ssize(used);
   for (Family& family : families_) family.shared.clear();
   if (options_.prior) prior_ = *options_.prior;
-  bool asked_map = prior_.from_map == 0;
+  bool asked_map = prior_.adapt_after == 0;
   for (Row& row : ekf_.rows()) {
-    if (measured >= options_.keep) return;
+    if (measured >= options_.max_per_frame) return;
     Outcome& outcome = ekf_.EntryOf(row).outcome;
     const SensorModel& model = ekf_.BindingOf(row).model;
     if (!Has(row.sensor) || outcome != Outcome::kNotReady ||
@@ -312,7 +312,7 @@ void Ekf::Landmarks::Enter() {
     }
     const auto found = map_.landmarks.find(row.measurement->landmark);
     if (found == map_.landmarks.end() || found->second.in_state() ||
-        found->second.observations < options_.enter_after) {
+        found->second.observations < options_.min_observations) {
       continue;
     }
     if (!asked_map) prior_.inverse_distance = PriorInverseDistance(used);
@@ -347,7 +347,8 @@ double Ekf::Landmarks::PriorInverseDistance(std::span<const Row* const> measured
     const double* const camera = CameraOf(FamilyOf(*row));
     const Landmark& landmark = map_.landmarks.at(row->measurement->landmark);
     constexpr double kConverged = 0.1;  // of the index of linearity, where nothing is converted
-    const double limit = options_.to_xyz > 0.0 ? options_.to_xyz : kConverged;
+    const double limit =
+        options_.max_linearity_index > 0.0 ? options_.max_linearity_index : kConverged;
     if (camera == nullptr || !landmark.form) continue;
     const std::vector<const double*> values = ValuesOf(landmark);
     if (HasInverseDistance(landmark) &&
@@ -359,7 +360,7 @@ double Ekf::Landmarks::PriorInverseDistance(std::span<const Row* const> measured
     const Eigen::Map<const Eigen::Vector3d> r(camera);
     if (point) converged.push_back(1.0 / (point->position - r).norm());
   }
-  if (converged.empty() || std::ssize(converged) < options_.prior->from_map) {
+  if (converged.empty() || std::ssize(converged) < options_.prior->adapt_after) {
     return options_.prior->inverse_distance;
   }
   const auto middle = converged.begin() + std::ssize(converged) / 2;

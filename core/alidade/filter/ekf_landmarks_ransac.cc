@@ -14,7 +14,7 @@ namespace alidade {
 bool Ekf::Landmarks::FuseByConsensus(std::span<Row* const> passed) {
   std::vector<Row*> matches, agreed, rest;
   for (Row* const row : passed) {
-    const bool asks = ekf_.BindingOf(*row).association.has_value();
+    const bool asks = ekf_.BindingOf(*row).outlier_rejection.has_value();
     (asks ? matches : agreed).push_back(row);
   }
   if (matches.empty()) return false;
@@ -54,7 +54,7 @@ std::vector<char> Ekf::Landmarks::Support(std::span<Row* const> matches) {
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
   std::vector<char> agrees, best;
   std::ptrdiff_t most = 0;
-  const double failure = 1.0 - ekf_.BindingOf(*matches[0]).association->confidence;
+  const double failure = 1.0 - ekf_.BindingOf(*matches[0]).outlier_rejection->confidence;
   double tries = static_cast<double>(order.size());
   for (std::size_t k = 0; static_cast<double>(k) < tries; ++k) {
     const auto left = static_cast<double>(order.size() - k);

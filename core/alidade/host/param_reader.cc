@@ -255,7 +255,7 @@ std::vector<double> ParamReader::Values(const AlidadeParam& param) const {
   std::string rest = param.key;
   const std::vector<std::string> choices = Choices(param);
   const auto form = std::ranges::find(choices, form_);
-  if (rest == "landmarks.form" && form != choices.end()) {
+  if (rest == "landmarks.representation" && form != choices.end()) {
     return {static_cast<double>(form - choices.begin())};
   }
   Node map = BaseOf(rest);

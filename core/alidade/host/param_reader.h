@@ -22,7 +22,8 @@ namespace alidade::internal {
 class ParamReader {
  public:
   /// `owner` names the model in messages, as in `model 'scale_2d'`.
-  /// `form` is the value of `landmarks.form` where it is one of the choices; "": what is written.
+  /// `form` is the value of `landmarks.representation` where it is one of the choices; "": what is
+  /// written.
   ParamReader(const Node& entry, std::string owner, std::string form = {});
   ParamReader(const ParamReader&) = delete;
   ParamReader& operator=(const ParamReader&) = delete;

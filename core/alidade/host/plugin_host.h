@@ -80,8 +80,9 @@ class PluginHost {
   ~PluginHost();
 
   /// A model from its config entry: reads its parameters there, leaving unread keys to
-  /// Node::RejectUnread. `form` stands for the parameter `landmarks.form` of a sensor that has this
-  /// choice; "": as it is written. Errors: kPlugin with the places searched, kBadConfig.
+  /// Node::RejectUnread. `form` stands for the parameter `landmarks.representation` of a sensor
+  /// that has this choice; "": as it is written. Errors: kPlugin with the places searched,
+  /// kBadConfig.
   SensorModel CreateSensor(const std::string& name, const Node& entry,
                            const std::string& form = {}) const;
   MotionModel CreateMotion(const std::string& name, const Node& entry) const;

@@ -120,17 +120,17 @@ struct Xyz {
   }
 };
 
-/// The forms by name, as `landmarks.form` chooses one.
+/// The forms by name, as `landmarks.representation` chooses one.
 enum class LandmarkForm { kInverseDepth, kAnchored, kXyz };
 
 /// Names of LandmarkForm, in its order.
 inline constexpr const char* kLandmarkForms[] = {"inverse_depth", "anchored", "xyz"};
 
-/// Reads the parameter `landmarks.form`.
+/// Reads the parameter `landmarks.representation`.
 inline LandmarkForm ReadLandmarkForm(Params& params) {
-  return static_cast<LandmarkForm>(
-      params.Choice("landmarks.form", {kLandmarkForms[0], kLandmarkForms[1], kLandmarkForms[2]},
-                    "how a landmark is written in the state", 0));
+  return static_cast<LandmarkForm>(params.Choice(
+      "landmarks.representation", {kLandmarkForms[0], kLandmarkForms[1], kLandmarkForms[2]},
+      "how a landmark is written in the state", 0));
 }
 
 /// f(Form{}) of the struct that `form` names.

@@ -184,7 +184,7 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   }
   CheckStreams(own.root(), named.system, streams);
   const bool lent = use && use->is_map();  // landmarks enter as the other estimator let them
-  if (lent && named.system.landmarks) named.system.landmarks->enter_after = 1;
+  if (lent && named.system.landmarks) named.system.landmarks->min_observations = 1;
   named.estimator = make(named.system, streams);
   if (use)
     named.accepted_by = internal::ReadUse(*use, named, config.root().At("estimators"), before);

@@ -372,7 +372,7 @@ Metrics::Metrics(const NamedEstimator& named, const std::vector<StreamInfo>& tru
   impl_->motions = internal::NamesOf(named.system.motions);
   impl_->has_landmarks = named.system.landmarks.has_value();
   impl_->has_ransac = std::ranges::any_of(
-      named.system.sensors, [](const SensorBinding& s) { return s.association.has_value(); });
+      named.system.sensors, [](const SensorBinding& s) { return s.outlier_rejection.has_value(); });
   for (std::size_t s = 0; s < named.system.sensors.size(); ++s) {
     if (!internal::HasReprojection(named.system.sensors[s])) continue;
     impl_->reprojection[static_cast<int>(s)] = {};

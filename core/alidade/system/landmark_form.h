@@ -12,7 +12,7 @@ namespace alidade {
 
 enum class LandmarkForm;  // in alidade/model/landmark.h
 
-/// `inverse_depth`, `anchored`, `xyz`: the choices of `landmarks.form`.
+/// `inverse_depth`, `anchored`, `xyz`: the choices of `landmarks.representation`.
 const char* ToString(LandmarkForm form);
 /// Whether it is the form `xyz`, the point itself.
 bool IsXyz(LandmarkForm form);

@@ -15,19 +15,20 @@ LandmarkOptions::Prior ReadPrior(const Node& node) {
   LandmarkOptions::Prior prior;
   prior.inverse_distance = node.At("inverse_distance", "landmarks.prior").Number(0.0, kInfinity);
   prior.sigma = node.At("sigma", "landmarks.prior").Number(0.0, kInfinity, true);
-  if (const auto n = node.Find("from_map")) prior.from_map = static_cast<int>(n->Integer(1, kMost));
+  if (const auto n = node.Find("adapt_after"))
+    prior.adapt_after = static_cast<int>(n->Integer(1, kMost));
   node.RejectUnread();
   return prior;
 }
 
-void ReadForget(const Node& node, LandmarkOptions& options) {
-  if (const auto frames = node.Find("unseen_frames")) {
-    options.unseen_frames = static_cast<int>(frames->Integer(1, kMost));
+void ReadPrune(const Node& node, LandmarkOptions& options) {
+  if (const auto frames = node.Find("max_missed_frames")) {
+    options.max_missed_frames = static_cast<int>(frames->Integer(1, kMost));
   }
-  const auto ratio = node.Find("success_ratio"), tries = node.Find("minimum_tries");
-  if (ratio) options.success_ratio = ratio->Number(0.0, 1.0);
-  if (tries && !ratio) tries->Fail("without a use", "success_ratio beside it");
-  if (tries) options.minimum_tries = static_cast<int>(tries->Integer(1, kMost));
+  const auto ratio = node.Find("min_match_ratio"), attempts = node.Find("min_attempts");
+  if (ratio) options.min_match_ratio = ratio->Number(0.0, 1.0);
+  if (attempts && !ratio) attempts->Fail("without a use", "min_match_ratio in addition");
+  if (attempts) options.min_attempts = static_cast<int>(attempts->Integer(1, kMost));
   node.RejectUnread();
 }
 
@@ -53,29 +54,33 @@ std::vector<KnownLandmark> ReadKnown(const Node& list) {
 
 OnePointRansac OnePointRansac::FromNode(const Node& node) {
   OnePointRansac ransac;
-  static_cast<void>(node.At("ransac", "association").Choice({"one_point"}));
+  static_cast<void>(node.At("method", "outlier_rejection").Choice({"one_point_ransac"}));
   const auto read = [&node](const char* key, double& value) {
     if (const auto given = node.Find(key)) value = given->Number(0.0, 1.0, true, true);
   };
-  read("support", ransac.support);
+  read("inlier_probability", ransac.inlier_probability);
   read("confidence", ransac.confidence);
-  read("rescue", ransac.rescue);
+  read("rescue_probability", ransac.rescue_probability);
   node.RejectUnread();
   return ransac;
 }
 
 LandmarkOptions LandmarkOptions::FromNode(const Node& node) {
   LandmarkOptions options;
-  node.Declare("form");
+  node.Declare("representation");
   if (const auto prior = node.Find("prior")) options.prior = ReadPrior(*prior);
-  if (const auto keep = node.Find("keep")) options.keep = static_cast<int>(keep->Integer(1, kMost));
-  if (const auto observations = node.Find("enter_after")) {
-    options.enter_after = static_cast<int>(observations->Integer(1, kMost));
+  const auto most = node.Find("max_per_frame");
+  if (most && (most->kind() != Node::Kind::kScalar || most->Text() != "unlimited")) {
+    options.max_per_frame = static_cast<int>(most->Integer(1, kMost));
   }
-  if (const auto forget = node.Find("forget")) ReadForget(*forget, options);
-  if (const auto to_xyz = node.Find("to_xyz")) {
-    options.to_xyz = to_xyz->At("linearity", "landmarks.to_xyz").Number(0.0, kInfinity, true);
-    to_xyz->RejectUnread();
+  if (const auto observations = node.Find("min_observations")) {
+    options.min_observations = static_cast<int>(observations->Integer(1, kMost));
+  }
+  if (const auto prune = node.Find("prune")) ReadPrune(*prune, options);
+  if (const auto convert = node.Find("convert_to_xyz")) {
+    options.max_linearity_index =
+        convert->At("max_linearity_index", "landmarks.convert_to_xyz").Number(0.0, kInfinity, true);
+    convert->RejectUnread();
   }
   if (const auto negative = node.Find("negative_depth")) {
     options.negative_depth = static_cast<NegativeDepth>(negative->Choice({"keep", "delete"}));

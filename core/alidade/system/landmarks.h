@@ -31,24 +31,26 @@ struct LandmarkOptions {
     double sigma = 0.25;
     /// Once so many landmarks that a frame measures have converged, the median of their inverse
     /// distances stands for `inverse_distance`; 0: never.
-    int from_map = 0;
+    int adapt_after = 0;
   };
   enum class NegativeDepth { kKeep, kDelete };
 
+  static constexpr int kUnlimited = std::numeric_limits<int>::max();
+
   std::optional<Prior> prior;
-  int keep = 1'000'000;   ///< landmarks measured in a frame, below which new ones enter
-  int enter_after = 1;    ///< observations, the last of which it enters with
-  int unseen_frames = 0;  ///< after so many without an observation it is forgotten; 0: never
-  /// It is forgotten where a smaller share of at least `minimum_tries` measurements is accepted.
-  double success_ratio = 0.0;
-  int minimum_tries = 10;
+  int max_per_frame = kUnlimited;  ///< landmarks measured in a frame, below which new ones enter
+  int min_observations = 1;        ///< observations, the last of which it enters with
+  int max_missed_frames = 0;       ///< after so many without an observation it is deleted; 0: never
+  /// It is deleted where a smaller share of at least `min_attempts` measurements is accepted.
+  double min_match_ratio = 0.0;
+  int min_attempts = 10;
   /// It becomes xyz once its index of linearity [Civera2008] is below this; 0: never.
-  double to_xyz = 0.0;
+  double max_linearity_index = 0.0;
   /// What is done where an update leaves an inverse distance at or below zero.
   NegativeDepth negative_depth = NegativeDepth::kKeep;
   std::vector<KnownLandmark> known;
 
-  /// Reads the config's map `landmarks`. `form`, which the sensors read, is left to them.
+  /// Reads the config's map `landmarks`. `representation`, which the sensors read, is left to them.
   /// Errors: kBadConfig.
   static LandmarkOptions FromNode(const Node& node);
 };
@@ -57,12 +59,14 @@ struct LandmarkOptions {
 /// the state, and those that it then predicts to within pixel noise support it. The matches of the
 /// best support make an update; of the rest, those join that fit the state that it leaves.
 struct OnePointRansac {
-  double support = 0.99;     ///< probability with which a match that agrees is within its own noise
+  double inlier_probability =
+      0.99;                  ///< probability with which a match that agrees is within its own noise
   double confidence = 0.99;  ///< of having tried one match that is right, when no more are tried
-  double rescue = 0.99;      ///< probability with which a match that fits joins after the update
+  double rescue_probability =
+      0.99;  ///< probability with which a match that fits joins after the update
 
-  /// Reads a sensor's map `association`: `ransac: one_point`, and the numbers by these names.
-  /// Errors: kBadConfig.
+  /// Reads a sensor's map `outlier_rejection`: `method: one_point_ransac`, and the numbers by these
+  /// names. Errors: kBadConfig.
   static OnePointRansac FromNode(const Node& node);
 };
 

@@ -69,18 +69,20 @@ void CheckOptions(const Node& node, const LandmarkOptions& options, const Sensor
         !(options.prior->inverse_distance > 0.0)) {
       prior.At("inverse_distance").Fail("a landmark at infinity is no xyz", "above 0, 1/m");
     }
-    if (options.prior->from_map > 0) CheckPosition(prior.At("from_map"), sensor);
+    if (options.prior->adapt_after > 0) CheckPosition(prior.At("adapt_after"), sensor);
   }
   const bool has_xyz = form == internal::XyzForm() || sensor.xyz.has_value();
   if (!options.known.empty() && !has_xyz) {
-    node.At("known").Fail(model + " has no landmarks of the form xyz", "no known landmarks");
+    node.At("known").Fail(model + " has no landmarks of representation xyz", "no known landmarks");
   }
-  if (!(options.to_xyz > 0.0)) return;
+  if (!(options.max_linearity_index > 0.0)) return;
   if (form == internal::XyzForm()) {
-    node.At("to_xyz").Fail("landmarks are xyz already", "form: inverse_depth, or the key left out");
+    node.At("convert_to_xyz")
+        .Fail("landmarks are xyz already", "representation: inverse_depth, or the key left out");
   }
-  if (!has_xyz) node.At("to_xyz").Fail(model + " has no form xyz", "the key left out");
-  CheckPosition(node.At("to_xyz"), sensor);
+  if (!has_xyz)
+    node.At("convert_to_xyz").Fail(model + " has no representation xyz", "the key left out");
+  CheckPosition(node.At("convert_to_xyz"), sensor);
 }
 
 }  // namespace
@@ -90,8 +92,8 @@ void internal::ReadLandmarkKeys(const Node& entry, const PluginHost& host, Senso
   if (role.is_map() || role.Text() != "landmarks") {
     role.Fail("not the landmarks", "`landmarks`: the one that a measurement names");
   }
-  if (const auto node = entry.Find("association")) {
-    binding.association = OnePointRansac::FromNode(*node);
+  if (const auto node = entry.Find("outlier_rejection")) {
+    binding.outlier_rejection = OnePointRansac::FromNode(*node);
   }
   const auto form = FormOf(binding.model.roles());
   if (!form || IsXyz(*form)) return;

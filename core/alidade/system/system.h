@@ -44,7 +44,7 @@ struct SensorBinding {
   /// become xyz or start as such. Its other roles are those of `model`.
   std::optional<SensorModel> xyz = {};
   /// How those of its matches are found that agree; none: each is gated on its own alone.
-  std::optional<OnePointRansac> association = {};
+  std::optional<OnePointRansac> outlier_rejection = {};
 };
 
 /// Stream -> the control input of a motion model.

@@ -20,7 +20,7 @@ const double* CameraOf(const SensorBinding& sensor, const State& state) {
 /// The prior of the inverse distance that the filter gave a landmark in this frame, 1/m.
 double PriorOf(std::int64_t id, const SensorBinding& sensor, const LandmarkOptions::Prior& prior,
                const Estimator& filter) {
-  if (prior.from_map == 0) return prior.inverse_distance;
+  if (prior.adapt_after == 0) return prior.inverse_distance;
   const std::vector<LandmarkEstimate> map = filter.landmarks();
   const auto found = std::ranges::find(map, id, &LandmarkEstimate::id);
   const double* const camera = CameraOf(sensor, filter.state());

@@ -31,7 +31,7 @@ System KnownMap(double sigma_0 = 0.1) {
 Ekf Filter(bool ransac, double gate = 0.999, double sigma_0 = 0.1, const RobustLoss& loss = {}) {
   System system = KnownMap(sigma_0);
   system.sensors[0].loss = loss;
-  if (ransac) system.sensors[0].association = OnePointRansac{};
+  if (ransac) system.sensors[0].outlier_rejection = OnePointRansac{};
   EkfOptions gated;
   gated.gate = gate;
   return {system, gated, {{"tracks", 2}}};
@@ -130,7 +130,8 @@ TEST(OnePointRansac, RescuesByItsOwnThreshold) {
   int rescued[2];
   for (const int strict : {0, 1}) {
     System system = KnownMap();
-    system.sensors[0].association = OnePointRansac{.rescue = strict == 1 ? 1e-6 : 0.99};
+    system.sensors[0].outlier_rejection =
+        OnePointRansac{.rescue_probability = strict == 1 ? 1e-6 : 0.99};
     rescued[strict] = EkfOf(system).Process(frame).landmarks.rescued;
   }
   EXPECT_GT(rescued[0], 0);
@@ -143,7 +144,7 @@ TEST(OnePointRansac, AHypothesisDoesNotMoveWhatIsConsidered) {
   const Frame frame = Matches({0.05, -0.03, 0.0}, 1000, 0.0);
   for (const bool by_role : {false, true}) {
     System system = KnownMap();
-    system.sensors[0].association = OnePointRansac{};
+    system.sensors[0].outlier_rejection = OnePointRansac{};
     if (by_role) {
       system.sensors[0].roles[0].mode = RoleMode::kConsider;
     } else {
@@ -168,7 +169,7 @@ TEST(OnePointRansac, AHypothesisIsSeenFromWhereARoleIsHeld) {
   SensorBinding held = system.sensors[0];
   held.name = held.stream = "held";
   held.roles[0].mode = RoleMode::kHold;
-  held.association = OnePointRansac{};
+  held.outlier_rejection = OnePointRansac{};
   system.sensors.push_back(held);
   Ekf ekf(system, {}, {{"tracks", 3}, {"held", 3}});
   std::vector<Observation> seen, aside;

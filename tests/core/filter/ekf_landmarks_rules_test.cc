@@ -19,7 +19,7 @@ System WithTwoSensors(System system) {
 
 TEST(Landmarks, EnterWithTheObservationThatIsAskedFor) {
   LandmarkOptions options;
-  options.enter_after = 3;
+  options.min_observations = 3;
   Ekf ekf = EkfOf(MapSystem(Offset(0.1), options));
   const auto outcome = [&](double t_s) {
     return OutcomeFor(ekf.Process(FrameOf(t_s, {{5, {0, 0, 1}}})), 5);
@@ -32,7 +32,7 @@ TEST(Landmarks, EnterWithTheObservationThatIsAskedFor) {
 
 TEST(Landmarks, EnterOnlyBelowTheNumberToKeep) {
   LandmarkOptions options;
-  options.keep = 2;
+  options.max_per_frame = 2;
   Ekf ekf = EkfOf(MapSystem(Offset(0.1), options));
   const Frame three = FrameOf(0.0, {{1, {0, 0, 1}}, {2, {0, 1, 1}}, {3, {1, 0, 1}}});
   EXPECT_EQ(ekf.Process(three).landmarks.initialised, 2);
@@ -45,7 +45,7 @@ TEST(Landmarks, EnterOnlyBelowTheNumberToKeep) {
 // FAULTS 39
 TEST(Landmarks, AnIdThatComesBackIsTheNextGeneration) {
   LandmarkOptions options;
-  options.unseen_frames = 2;
+  options.max_missed_frames = 2;
   Ekf ekf = EkfOf(MapSystem(Offset(0.1), options));
   ekf.Process(FrameOf(0.0, {{1, {0, 0, 1}}, {2, {0, 1, 1}}}));
   for (int k = 1; k < 4; ++k) ekf.Process(FrameOf(0.1 * k, {{2, {0, 1, 1}}}));
@@ -60,8 +60,8 @@ TEST(Landmarks, AnIdThatComesBackIsTheNextGeneration) {
 
 TEST(Landmarks, ThatFailTooOftenAreForgotten) {
   LandmarkOptions options;
-  options.success_ratio = 0.5;
-  options.minimum_tries = 4;
+  options.min_match_ratio = 0.5;
+  options.min_attempts = 4;
   EkfOptions gated;
   gated.gate = 0.99;
   Ekf ekf = EkfOf(MapSystem(Offset(0.01), options), gated);
@@ -157,7 +157,7 @@ TEST(Landmarks, AreLinearisedAtTheMeasurementWhereARoleIs) {
 
 TEST(Landmarks, ToKeepAreCountedOnceWhereTwoSensorsSeeThem) {
   LandmarkOptions options;
-  options.keep = 3;
+  options.max_per_frame = 3;
   const System system = WithTwoSensors(MapSystem(Offset(0.1), options, 0.3));
   Ekf ekf(system, {}, {{"tracks", 3}});
   ekf.Process(FrameOf(0.0, {{1, {0, 0, 1}}, {2, {0, 1, 1}}}));
@@ -167,7 +167,7 @@ TEST(Landmarks, ToKeepAreCountedOnceWhereTwoSensorsSeeThem) {
 
 TEST(Landmarks, CountOnceForThePriorWhereTwoSensorsSeeThem) {
   LandmarkOptions options = WithPrior(1.0, 0.5);
-  options.prior->from_map = 3;
+  options.prior->adapt_after = 3;
   options.known = {{1, {0.0, 0.0, 2.0}, 0.1}, {2, {0.0, 0.1, 4.0}, 0.1}};
   const System system = WithTwoSensors(MapSystem(InverseDepthPixels(0.01), options));
   Ekf ekf(system, {}, {{"tracks", 2}});
@@ -179,7 +179,7 @@ TEST(Landmarks, CountOnceForThePriorWhereTwoSensorsSeeThem) {
 
 TEST(Landmarks, ThatHaveNotConvergedAreNoPrior) {
   LandmarkOptions options = WithPrior(1.0, 0.5);
-  options.prior->from_map = 2;
+  options.prior->adapt_after = 2;
   Ekf ekf(MapSystem(InverseDepthPixels(0.01), options), {}, {{"tracks", 2}});
   ekf.Process(FrameOf(0.0, {{1, {0, 0}}, {2, {0, 0.1}}, {3, {0.1, 0}}}));
   ekf.Process(FrameOf(0.1, {{1, {0.05, 0}}, {2, {0.05, 0.1}}, {3, {0.15, 0}}}));
@@ -201,7 +201,7 @@ TEST(Landmarks, AreNotCorrelatedWithWhatTheirSensorHolds) {
 
 TEST(Landmarks, ThatWaitToEnterAreCountedAnewAfterThirtyFramesWithout) {
   LandmarkOptions options;
-  options.enter_after = 2;
+  options.min_observations = 2;
   Ekf ekf(MapSystem(Offset(0.1), options, 0.3), {}, {{"tracks", 3}});
   const auto enters = [&ekf](int frames_without) {
     ekf.Process(FrameOf(0.0, {{1, {0, 0, 1}}}));
@@ -215,7 +215,7 @@ TEST(Landmarks, ThatWaitToEnterAreCountedAnewAfterThirtyFramesWithout) {
 
 TEST(Landmarks, GoBackToTheGenerationsOfTheirPast) {
   LandmarkOptions options;
-  options.unseen_frames = 1;
+  options.max_missed_frames = 1;
   Ekf ekf(MapSystem(Offset(0.1), options, 0.3), {}, {{"tracks", 3}});
   const auto see = [&ekf](std::int64_t id) {
     ekf.Process(FrameOf(0.0, {{id, {0, 0, 1}}}));
@@ -236,7 +236,7 @@ TEST(Landmarks, GoBackToTheGenerationsOfTheirPast) {
 
 TEST(Landmarks, WhoseFirstEndIsGoneBackOverAreTheFirstOfTheirId) {
   LandmarkOptions options;
-  options.unseen_frames = 1;
+  options.max_missed_frames = 1;
   Ekf ekf(MapSystem(Offset(0.1), options, 0.3), {}, {{"tracks", 3}});
   const auto see = [&ekf](std::int64_t id) {
     ekf.Process(FrameOf(0.0, {{id, {0, 0, 1}}}));

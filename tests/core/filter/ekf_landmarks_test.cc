@@ -158,7 +158,7 @@ TEST(Landmarks, ASharedAnchorGivesWhatAnchorsOfTheirOwnGive) {
 
 TEST(Landmarks, ASharedAnchorGoesWithItsLastLandmark) {
   LandmarkOptions options = WithPrior();
-  options.unseen_frames = 2;
+  options.max_missed_frames = 2;
   Ekf ekf = EkfOf(MapSystem(AnchoredPixels<ALIDADE_ROLE_SHARED>(0.01), options));
   ekf.Process(FrameOf(0.0, {{1, {0.1, 0.0}}, {2, {0.0, 0.1}}}));
   EXPECT_EQ(ekf.state().covariance().size(), 3 + 3 + 2 * 3);
@@ -175,7 +175,7 @@ TEST(Landmarks, ForgettingOneLeavesTheRestAsItWouldBeWithIt) {
   constexpr int kSteps = 20;
   Scene scene(kSteps, 3);
   LandmarkOptions forgetting;
-  forgetting.unseen_frames = 3;
+  forgetting.max_missed_frames = 3;
   Ekf with = EkfOf(MapSystem(Offset(0.05), {}, 0.3));
   Ekf without = EkfOf(MapSystem(Offset(0.05), forgetting, 0.3));
   int deleted = 0;
@@ -218,7 +218,7 @@ TEST(Landmarks, BecomeXyzOnceTheyAreLinear) {
       return FrameOf(0.1 * k, observations);
     };
     Ekf never = EkfOf(make());
-    options.to_xyz = 0.1;
+    options.max_linearity_index = 0.1;
     Ekf ekf = EkfOf(make());
     int converted = 0, k = 0;
     for (; k < kSteps && converted == 0; ++k) {
@@ -254,8 +254,8 @@ TEST(Landmarks, BecomeXyzOnceTheyAreLinear) {
 
 TEST(Landmarks, ThatComeAndGoKeepStateAndLayoutSmall) {
   LandmarkOptions options = WithPrior();
-  options.unseen_frames = 2;
-  options.to_xyz = 2.0;
+  options.max_missed_frames = 2;
+  options.max_linearity_index = 2.0;
   Ekf ekf = EkfOf(MapSystem(AnchoredPixels<ALIDADE_ROLE_SHARED>(0.002), options));
   Random random(3);
   constexpr int kInView = 10;
@@ -286,7 +286,7 @@ TEST(Landmarks, ThatComeAndGoKeepStateAndLayoutSmall) {
 
 TEST(Landmarks, KnownOnesStartAsXyzAndStay) {
   LandmarkOptions options = WithPrior();
-  options.unseen_frames = 1;
+  options.max_missed_frames = 1;
   options.known = {
       {1, {0.0, 0.0, 2.0}, 0.0}, {2, {1.0, 0.0, 2.0}, 0.01}, {3, {0.0, 1.0, 2.0}, 0.0}};
   Ekf ekf = EkfOf(MapSystem(InverseDepthPixels(0.001), options, 0.5));
@@ -329,9 +329,9 @@ TEST(Landmarks, AreGoneBackToWithTheFilter) {
   constexpr int kSteps = 30, kPoints = 12;
   Scene scene(kSteps, kPoints);
   LandmarkOptions options = WithPrior();
-  options.unseen_frames = 3;
-  options.to_xyz = 0.1;
-  options.enter_after = 2;
+  options.max_missed_frames = 3;
+  options.max_linearity_index = 0.1;
+  options.min_observations = 2;
   Ekf ekf = EkfOf(MapSystem(AnchoredPixels<ALIDADE_ROLE_SHARED>(0.002), options));
   std::vector<Frame> frames;
   for (int k = 0; k < kSteps; ++k) {
@@ -359,7 +359,7 @@ TEST(Landmarks, AreGoneBackToWithTheFilter) {
 
 TEST(Landmarks, ThePriorIsTakenFromTheMapOnceThatHasConverged) {
   LandmarkOptions options = WithPrior(1.0, 0.5);
-  options.prior->from_map = 3;
+  options.prior->adapt_after = 3;
   options.known = {{1, {0.0, 0.0, 2.0}, 0.1}, {2, {0.0, 0.1, 4.0}, 0.1}, {3, {0.1, 0.0, 8.0}, 0.1}};
   Ekf ekf = EkfOf(MapSystem(InverseDepthPixels(0.01), options));
   ekf.Process(FrameOf(0.0, {{1, {0, 0}}, {2, {0, 0.025}}, {7, {0.1, 0.1}}}));

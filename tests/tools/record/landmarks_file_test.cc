@@ -73,7 +73,7 @@ TEST(LandmarkRecords, TheMapAtTheEndIsWritten) {
   const std::vector<std::string> lines = Lines(folder / "out/ekf/landmarks.csv");
   ASSERT_EQ(lines.size(), 5u);
   EXPECT_EQ(lines[0],
-            "id,generation,form,x,y,z,sigma_x,sigma_y,sigma_z,inverse_distance,"
+            "id,generation,representation,x,y,z,sigma_x,sigma_y,sigma_z,inverse_distance,"
             "sigma_inverse_distance,first_s,last_s,tried,accepted,true_x,true_y,true_z");
   const std::vector<std::string> last = Cells(lines[4]);
   ASSERT_EQ(last.size(), 18u);

@@ -12,38 +12,40 @@ std::vector<TextRow> LandmarkRows(const System& system) {
   const auto sees = [](const SensorBinding& sensor) { return sensor.model.has_landmark(); };
   const auto sensor = std::ranges::find_if(system.sensors, sees);
   const auto form = FormOf(sensor->model.roles());
-  std::vector<TextRow> rows = {{"form", form ? ToString(*form) : "the sensor's own"}};
+  std::vector<TextRow> rows = {{"representation", form ? ToString(*form) : "the sensor's own"}};
   const auto add = [&rows](const std::string& what, const std::string& text) {
     rows.push_back({what, text});
   };
   if (options.prior) {
     std::string prior = "inverse distance " + NumberText(options.prior->inverse_distance) + " +- " +
                         NumberText(options.prior->sigma) + " 1/m";
-    if (const int n = options.prior->from_map; n > 0) {
+    if (const int n = options.prior->adapt_after; n > 0) {
       prior += "; once " + std::to_string(n) + " in view have converged, their median";
     }
     add("prior", prior);
   }
-  std::string enter = options.enter_after == 1
+  std::string enter = options.min_observations == 1
                           ? "at first observation"
-                          : "at observation " + std::to_string(options.enter_after);
-  enter += ", while fewer than " + std::to_string(options.keep) + " are measured";
+                          : "at observation " + std::to_string(options.min_observations);
+  if (options.max_per_frame < LandmarkOptions::kUnlimited) {
+    enter += ", while fewer than " + std::to_string(options.max_per_frame) + " are measured";
+  }
   add("enter", enter);
   std::vector<std::string> leave;
-  if (options.unseen_frames > 0) {
-    leave.push_back("unseen for " + std::to_string(options.unseen_frames) + " frames");
+  if (options.max_missed_frames > 0) {
+    leave.push_back("unseen for " + std::to_string(options.max_missed_frames) + " frames");
   }
-  if (options.success_ratio > 0.0) {
-    leave.push_back("fewer than " + NumberText(options.success_ratio) + " of " +
-                    std::to_string(options.minimum_tries) + " or more measurements accepted");
+  if (options.min_match_ratio > 0.0) {
+    leave.push_back("fewer than " + NumberText(options.min_match_ratio) + " of " +
+                    std::to_string(options.min_attempts) + " or more measurements accepted");
   }
   if (options.negative_depth == LandmarkOptions::NegativeDepth::kDelete) {
     leave.emplace_back("inverse distance not above 0");
   }
   add("leave", leave.empty() ? "never" : Join(leave, "; "));
-  add("become xyz", options.to_xyz > 0.0
-                        ? "below an index of linearity of " + NumberText(options.to_xyz)
-                        : "never");
+  add("become xyz", options.max_linearity_index > 0.0 ? "below an index of linearity of " +
+                                                            NumberText(options.max_linearity_index)
+                                                      : "never");
   if (!options.known.empty()) add("known", std::to_string(options.known.size()));
   return rows;
 }

@@ -286,9 +286,9 @@ RecordedMap DescribeMap(const std::vector<LandmarkEstimate>& landmarks,
 void WriteLandmarks(const RunFolder& folder, const std::string& estimator,
                     const std::vector<LandmarkEstimate>& landmarks) {
   CsvFile file(folder, estimator + "/landmarks.csv",
-               {"id", "generation", "form", "x", "y", "z", "sigma_x", "sigma_y", "sigma_z",
-                "inverse_distance", "sigma_inverse_distance", "first_s", "last_s", "tried",
-                "accepted", "true_x", "true_y", "true_z"});
+               {"id", "generation", "representation", "x", "y", "z", "sigma_x", "sigma_y",
+                "sigma_z", "inverse_distance", "sigma_inverse_distance", "first_s", "last_s",
+                "tried", "accepted", "true_x", "true_y", "true_z"});
   const auto number = [&file](double value) {
     if (std::isfinite(value)) {
       file.Number(value);

@@ -109,7 +109,7 @@ TEST_F(CompareCli, TheFolderOfARunTellsTheSame) {
     return text.substr(0, text.find("\"notes\""));
   };
   EXPECT_EQ(values(compared.out), values(Read("out/compare.json")));
-  EXPECT_TRUE(Contains(compared.out, "apart.sigmas:target"));
+  EXPECT_TRUE(Contains(compared.out, "rmsd.sigmas:target"));
 }
 
 TEST_F(CompareCli, OfSeveralFoldersEstimatorsAreNamedByTheirs) {
@@ -269,7 +269,7 @@ TEST_F(CompareCli, WithoutTruthTheBatchIsTheReference) {
   const Node estimators = json.root().At("estimators");
   EXPECT_EQ(estimators.At("ekf").At("reference").Text(), "batch_so_far");
   EXPECT_EQ(estimators.At("rts").At("reference").Text(), "batch");
-  EXPECT_GT(estimators.At("ekf").At("values").At("apart.sigmas:target").Number(), 0.0);
+  EXPECT_GT(estimators.At("ekf").At("values").At("rmsd.sigmas:target").Number(), 0.0);
   const Outcome truth = Call({"compare", "table.yaml", "-o", "two", "--reference", "truth"});
   EXPECT_EQ(truth.code, 2);
   EXPECT_TRUE(Contains(truth.err, "--reference: the source knows no truth")) << truth.err;

@@ -55,7 +55,8 @@ TEST(BatchReference, IsRightWhereScaleIsAnchored) {
   EXPECT_NEAR(Of(means.batch, "nees.mean:cam"), 1.0, 0.5);
   EXPECT_NEAR(Of(means.ekf, "map.sim3.rmse") / Of(means.batch, "map.sim3.rmse"), 1.0, 0.1);
   const double path = Of(means.ekf, "rmse:cam.position") / Of(means.batch, "rmse:cam.position");
-  const double last = Of(means.ekf, "final:cam.position") / Of(means.batch, "final:cam.position");
+  const double last =
+      Of(means.ekf, "final_error:cam.position") / Of(means.batch, "final_error:cam.position");
   EXPECT_GE(path, 1.3);
   EXPECT_LE(last, 1.25);
 }

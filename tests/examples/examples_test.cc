@@ -152,7 +152,7 @@ TEST(Examples, ThePrincipledFilterBeatsTheFusedFilterOf2017) {
   EXPECT_LE(principled["rmse:target.depth_rate"], 0.035);
   EXPECT_LE(principled["rmse:target.depth"], 0.93 * fused["rmse:target.depth"]);
   EXPECT_LE(principled["rmse:target.depth_rate"], 0.90 * fused["rmse:target.depth_rate"]);
-  for (const char* key : {"nees.cov95:target@blind", "nees.cov95:target@seeing"}) {
+  for (const char* key : {"nees.within95:target@blind", "nees.within95:target@seeing"}) {
     EXPECT_GE(principled[key], 0.95) << key;
     EXPECT_LE(principled[key], 0.995) << key;
   }
@@ -165,7 +165,7 @@ TEST(Examples, TheIteratedFilterStartsFromFarAway) {
   EXPECT_EQ(iekf.diverged + iekf.inconsistent, 0);
   EXPECT_LE(iekf["rmse:target.depth"], 0.0021);
   EXPECT_LT(iekf["rmse:target.depth"], 0.95 * ekf["rmse:target.depth"]);
-  for (const char* key : {"nees.cov95:target@blind", "nees.cov95:target@seeing"}) {
+  for (const char* key : {"nees.within95:target@blind", "nees.within95:target@seeing"}) {
     EXPECT_GE(iekf[key], 0.95) << key;
     EXPECT_LE(iekf[key], 0.995) << key;
   }
@@ -332,15 +332,15 @@ TEST(Examples, TheSmootherHalvesTheErrorOfTheFilter) {
   EXPECT_GE(rts["rmse:target.depth"], 0.00095);
   EXPECT_LE(rts["rmse:target.depth"], 0.0012);
   EXPECT_LE(rts["rmse:target.depth_rate"], 0.0125);
-  EXPECT_GE(rts["nees.cov95:target"], 0.98);
-  EXPECT_LE(rts["nees.cov95:target"], 0.999);
+  EXPECT_GE(rts["nees.within95:target"], 0.98);
+  EXPECT_LE(rts["nees.within95:target"], 0.999);
   EXPECT_LE(rts["rmse:target.depth"], 0.6 * ekf["rmse:target.depth"]);
   EXPECT_LE(batch["rmse:target.depth"], 0.0012);
   EXPECT_NEAR(rts["rmse:target.depth"] / batch["rmse:target.depth"], 1.0, 0.05);
   for (const char* key : {"rmse:target.depth", "nees.mean:target", "nis.mean:stereo"}) {
     EXPECT_NEAR(root[key], ekf[key], 1e-6 * ekf[key]) << key;
   }
-  EXPECT_GE(means.at("ukf")["nees.cov95:target"], 0.95);
+  EXPECT_GE(means.at("ukf")["nees.within95:target"], 0.95);
   EXPECT_LE(means.at("ukf")["rmse:target.depth"], 0.0032);
 }
 
@@ -350,7 +350,7 @@ TEST(Examples, APoorStartDoesNotMakeTheUnscentedFilterDiverge) {
   const Means ukf = Sweep("08_depth_all_estimators", kPoorStart).at("ukf");
   EXPECT_EQ(ukf.diverged + ukf.inconsistent, 0);
   EXPECT_LE(ukf["rmse:target.depth"], 0.0042);
-  EXPECT_GE(ukf["nees.cov95:target"], 0.95);
+  EXPECT_GE(ukf["nees.within95:target"], 0.95);
   if (!kHasCeres) GTEST_SKIP() << "built without Ceres";
   Settings wide = kPoorStart;
   wide.emplace_back("estimators.ukf", "{type: ukf, alpha: 1, kappa: 12}");

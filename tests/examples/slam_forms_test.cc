@@ -39,12 +39,12 @@ TEST(SlamForms, AgreeAndConversionIsHarmlessOnlyWhereItIsLinear) {
     EXPECT_NEAR(mean("xyz_10", key), six, 0.03 * six) << key;
   }
   EXPECT_LE(mean("inverse_depth", "nees.mean:cam"), 1.4);
-  EXPECT_GE(mean("inverse_depth", "nees.cov95:cam"), 0.85);
+  EXPECT_GE(mean("inverse_depth", "nees.within95:cam"), 0.85);
   // [Civera2008]: a threshold of 40 % is inconsistent, one of 60 % more so.
   EXPECT_GE(mean("xyz_40", "nees.mean:cam"), 1.6);
-  EXPECT_LE(mean("xyz_40", "nees.cov95:cam"), 0.75);
+  EXPECT_LE(mean("xyz_40", "nees.within95:cam"), 0.75);
   EXPECT_GT(mean("xyz_60", "nees.mean:cam"), mean("xyz_40", "nees.mean:cam"));
-  EXPECT_LT(mean("xyz_60", "nees.cov95:cam"), mean("xyz_40", "nees.cov95:cam"));
+  EXPECT_LT(mean("xyz_60", "nees.within95:cam"), mean("xyz_40", "nees.within95:cam"));
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ class SlamStereoTracks : public testing::DrivesTest {
       EXPECT_EQ(run.status, RunStatus::kOk) << told << ": " << run.reason;
       EXPECT_EQ(run.frames, drive.frames) << told;
       const EstimatorResult& ekf = run.estimators.at(0);
-      EXPECT_LE(ekf.metrics.at("final:cam.position"), kMost * drive.path_m) << told;
+      EXPECT_LE(ekf.metrics.at("final_error:cam.position"), kMost * drive.path_m) << told;
       EXPECT_FALSE(ekf.diverged) << told;
       EXPECT_FALSE(settings.empty() && ekf.inconsistent) << told;
     }

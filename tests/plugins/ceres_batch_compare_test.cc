@@ -97,9 +97,9 @@ TEST(CompareLinear, OnlyMissingSmoothingIsLeftOfTheGap) {
   EXPECT_EQ(comparison.explained, "ekf");
   const GapStep& linearisation = comparison.gap[0];
   EXPECT_EQ(linearisation.from + ' ' + linearisation.to, "ekf so_far");
-  EXPECT_LT(ValueOf(linearisation.values, "apart:p.x"), 1e-9);
-  EXPECT_LT(ValueOf(linearisation.values, "apart:p.v"), 1e-9);
-  EXPECT_LT(ValueOf(linearisation.values, "apart.sigmas:p"), 1e-9);
+  EXPECT_LT(ValueOf(linearisation.values, "rmsd:p.x"), 1e-9);
+  EXPECT_LT(ValueOf(linearisation.values, "rmsd:p.v"), 1e-9);
+  EXPECT_LT(ValueOf(linearisation.values, "rmsd.sigmas:p"), 1e-9);
   EXPECT_NEAR(ValueOf(linearisation.values, "error_ratio:p.x"), 1.0, 1e-9);
 
   const GapStep& smoothing = comparison.gap[1];
@@ -113,13 +113,13 @@ TEST(CompareLinear, OnlyMissingSmoothingIsLeftOfTheGap) {
   const GapStep& lost = comparison.gap[2];
   EXPECT_EQ(lost.from + ' ' + lost.to, "accepted batch");
   EXPECT_EQ(ValueOf(lost.values, "lost"), 0.0);
-  EXPECT_LT(ValueOf(lost.values, "apart:p.x"), 1e-12);
+  EXPECT_LT(ValueOf(lost.values, "rmsd:p.x"), 1e-12);
 
   const ComparedEstimator& rts = comparison.estimators[1];
   EXPECT_TRUE(rts.smoothed);
   EXPECT_EQ(rts.reference, "batch");
-  EXPECT_LT(ValueOf(rts.values, "apart:p.x"), 1e-9);
-  EXPECT_LT(ValueOf(rts.values, "apart.sigmas:p"), 1e-9);
+  EXPECT_LT(ValueOf(rts.values, "rmsd:p.x"), 1e-9);
+  EXPECT_LT(ValueOf(rts.values, "rmsd.sigmas:p"), 1e-9);
   EXPECT_NEAR(ValueOf(rts.values, "ratio.rmse:p.x"), 1.0, 1e-9);
 }
 
@@ -134,9 +134,9 @@ TEST(CompareLinear, TheLastEstimateOfAFilterIsThatOfTheBatch) {
   const ComparedEstimator& ekf = comparison.estimators[0];
   EXPECT_EQ(ekf.reference, "so_far");
   EXPECT_EQ(ekf.final_reference, "batch");
-  EXPECT_LT(ValueOf(ekf.values, "apart.final:p.x"), 1e-9);
-  EXPECT_LT(ValueOf(ekf.values, "apart.final.sigmas:p"), 1e-9);
-  EXPECT_NEAR(ValueOf(ekf.values, "ratio.final:p.x"), 1.0, 1e-7);
+  EXPECT_LT(ValueOf(ekf.values, "final_difference:p.x"), 1e-9);
+  EXPECT_LT(ValueOf(ekf.values, "final_difference.sigmas:p"), 1e-9);
+  EXPECT_NEAR(ValueOf(ekf.values, "ratio.final_error:p.x"), 1.0, 1e-7);
 }
 
 /// x of the smoother and of the filter, and sigma^2 of p.x and p.v of the smoother, by frame.
@@ -176,18 +176,18 @@ TEST(CompareLinear, DistancesAreThoseWrittenOut) {
   }
   const auto n = static_cast<double>(by_hand.filter.size());
   const GapStep smoothing = CompareLinear(false).comparison.gap[1];
-  EXPECT_NEAR(ValueOf(smoothing.values, "apart:p.x"), std::sqrt(squares / n), 1e-12);
-  EXPECT_NEAR(ValueOf(smoothing.values, "apart.sigmas:p"), std::sqrt(sigmas / n), 1e-9);
+  EXPECT_NEAR(ValueOf(smoothing.values, "rmsd:p.x"), std::sqrt(squares / n), 1e-12);
+  EXPECT_NEAR(ValueOf(smoothing.values, "rmsd.sigmas:p"), std::sqrt(sigmas / n), 1e-9);
 }
 
 // The batch takes the outlier for true, the filter and what it lends its gate to do not.
 TEST(CompareLinear, WhatTheGateKeptOutIsLostData) {
   const Comparison comparison = CompareLinear(true).comparison;
-  EXPECT_LT(ValueOf(comparison.gap[0].values, "apart:p.x"), 1e-9);
+  EXPECT_LT(ValueOf(comparison.gap[0].values, "rmsd:p.x"), 1e-9);
   const GapStep& lost = comparison.gap[2];
   EXPECT_EQ(ValueOf(lost.values, "lost"), 1.0);
   EXPECT_EQ(ValueOf(lost.values, "measurements"), 23.0);
-  EXPECT_GT(ValueOf(lost.values, "apart:p.x"), 0.5);
+  EXPECT_GT(ValueOf(lost.values, "rmsd:p.x"), 0.5);
   EXPECT_LT(ValueOf(lost.values, "error_ratio:p.x"), 0.5);
 }
 
@@ -197,7 +197,7 @@ TEST(CompareLinear, ANamedReferenceServesAll) {
   for (const ComparedEstimator& one : comparison.estimators) {
     EXPECT_EQ(one.reference, "rts") << one.name;
     EXPECT_FALSE(one.values.contains("rmse:p.x")) << one.name;
-    EXPECT_EQ(one.values.contains("apart:p.x"), one.name != "rts");
+    EXPECT_EQ(one.values.contains("rmsd:p.x"), one.name != "rts");
   }
 }
 
@@ -314,13 +314,13 @@ TEST(CompareLandmarks, AtTheLastFrameTheBatchOfAllDataIsThatOfTheDataSoFar) {
   EXPECT_FALSE(with.gap[0].at_end);
   ASSERT_EQ(with.estimators[1].name, "now");
   const std::map<std::string, Spread>& now = with.estimators[1].values;
-  EXPECT_LT(ValueOf(now, "apart.final.sigmas:cam"), 1e-5);
-  EXPECT_LT(ValueOf(now, "apart.map"), 1e-6);
-  const double of_end = ValueOf(now, "final:cam.position");
+  EXPECT_LT(ValueOf(now, "final_difference.sigmas:cam"), 1e-5);
+  EXPECT_LT(ValueOf(now, "rmsd.map"), 1e-6);
+  const double of_end = ValueOf(now, "final_error:cam.position");
   EXPECT_NEAR(ValueOf(step.values, "rmse.to:cam.position"), of_end, 1e-6 * of_end);
   EXPECT_NEAR(ValueOf(step.values, "rmse.to:map"), ValueOf(now, "map.rmse"), 1e-6);
   EXPECT_GT(ValueOf(step.values, "error_ratio:map"), 0.0);
-  EXPECT_GT(ValueOf(step.values, "apart.sigmas:cam"), 0.01);
+  EXPECT_GT(ValueOf(step.values, "rmsd.sigmas:cam"), 0.01);
 }
 
 // ---- over seeds ---------------------------------------------------------------------------------
@@ -347,7 +347,7 @@ TEST(CompareSeeds, WhatIsHeldAgainstAReferenceThatDivergedIsLeftOut) {
   EXPECT_EQ(ukf.used, 2);
   EXPECT_EQ(ukf.reference_runs, 1);
   EXPECT_EQ(ukf.final_reference_runs, 1);
-  for (const char* key : {"apart:target.depth", "apart.final:target.depth"}) {
+  for (const char* key : {"rmsd:target.depth", "final_difference:target.depth"}) {
     EXPECT_GT(ValueOf(ukf.values, key), 0.0) << key;
     EXPECT_EQ(ValueOf(ukf.values, key), ValueOf(second.estimators[1].values, key)) << key;
   }

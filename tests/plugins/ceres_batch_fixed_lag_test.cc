@@ -352,7 +352,7 @@ TEST(FixedLag, LiesBetweenTheFilterAndTheBatchAndIsHonest) {
   const std::vector<double> nees = Means(runs, "nees.mean:target");
   EXPECT_NEAR(nees[1], nees[0], 0.02);
   EXPECT_NEAR(nees[2], nees[3], 0.02);
-  for (const double share : Means(runs, "nees.cov95:target")) EXPECT_GT(share, 0.97);
+  for (const double share : Means(runs, "nees.within95:target")) EXPECT_GT(share, 0.97);
 }
 
 // It has no gate; but its stereo sees nothing nearer than 0.3 m, where the target is half the time.

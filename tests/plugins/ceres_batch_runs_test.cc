@@ -26,7 +26,7 @@ TEST(CeresBatch, SmoothsDepthToAMillimetre) {
     const EstimatorResult& batch = run.estimators[1];
     EXPECT_FALSE(batch.diverged);
     rmse += batch.metrics.at("rmse:target.depth") / 20.0;
-    coverage += batch.metrics.at("nees.cov95:target") / 20.0;
+    coverage += batch.metrics.at("nees.within95:target") / 20.0;
   }
   RecordProperty("rmse_mm", std::to_string(1e3 * rmse));
   RecordProperty("coverage", std::to_string(coverage));

@@ -18,7 +18,7 @@ namespace internal {
 namespace {
 
 constexpr std::array<std::string_view, 10> kOrder = {
-    "rmse",     "lag_ms",        "cov95",          "nees.mean",    "nees.cov95",
+    "rmse",     "lag_ms",        "coverage95",     "nees.mean",    "nees.within95",
     "nis.mean", "map.sim3.rmse", "map.sim3.scale", "reprojection", "settling_frames"};
 
 std::string_view KindOf(std::string_view key) { return key.substr(0, key.find(':')); }
@@ -105,13 +105,14 @@ Values ValuesOf(const RunResult& result, const std::string& key) {
 
 /// Errors and differences, in the unit of their block.
 bool IsError(std::string_view kind) {
-  return kind == "rmse" || kind == "final" || kind == "apart" || kind == "apart.final";
+  return kind == "rmse" || kind == "final_error" || kind == "rmsd" || kind == "final_difference";
 }
 
 /// Errors and differences of paths and maps, in m.
 bool IsLength(std::string_view kind) {
-  return kind == "map.rmse" || kind == "map.sim3.rmse" || kind == "apart.map" ||
-         kind == "apart.map.sim3" || kind == "apart.path.sim3" || kind == "path.sim3.rmse";
+  return kind == "map.rmse" || kind == "map.sim3.rmse" || kind == "rmsd.map" ||
+         kind == "rmsd.map.sim3" || kind == "rmsd.trajectory.sim3" ||
+         kind == "trajectory.sim3.rmse";
 }
 
 /// The largest finite RMSE of all blocks with that unit: one prefix serves the whole table. Without
@@ -119,7 +120,7 @@ bool IsLength(std::string_view kind) {
 double LargestRmse(const RunResult& result, const std::string& unit) {
   double largest = 0.0;
   for (const std::string& key : Keys(result, &EstimatorResult::metrics)) {
-    const bool along = KindOf(key) == "rmse" || KindOf(key) == "apart";
+    const bool along = KindOf(key) == "rmse" || KindOf(key) == "rmsd";
     if (!along || UnitOfKey(result, key) != unit) continue;
     for (const auto& value : ValuesOf(result, key)) {
       if (value && std::isfinite(*value)) largest = std::max(largest, *value);
@@ -138,7 +139,7 @@ TableRow RowOf(const RunResult& result, const std::string& key) {
   }
   if (kind == "lag_ms") scaled.unit = "ms";
   if (IsLength(kind)) scaled = ScaleUnit("m", LargestRmse(result, "m"));
-  if (kind == "cov95" || kind == "nees.cov95") scaled = {100.0, "%"};
+  if (kind == "coverage95" || kind == "nees.within95") scaled = {100.0, "%"};
   for (auto& value : values) {
     if (value) *value *= scaled.factor;
   }
@@ -166,7 +167,7 @@ bool IsMain(const RunResult& result, const std::string& key) {
   const std::string_view kind = KindOf(key);
   if (IsExact(result, SubjectOf(key))) return false;
   if (key.find('@') != key.npos) {
-    return kind == "rmse" || kind == "cov95" || kind == "nees.cov95";
+    return kind == "rmse" || kind == "coverage95" || kind == "nees.within95";
   }
   return std::find(kOrder.begin(), kOrder.end(), kind) != kOrder.end();
 }

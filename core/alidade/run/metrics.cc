@@ -329,12 +329,12 @@ void Metrics::Impl::Write(const Sums& s, std::map<std::string, double>& metrics)
   for (std::size_t i = 0; i < tracked.size(); ++i) {
     const std::string key = tracked[i].name + s.suffix;
     if (s.squares[i].count > 0) metrics["rmse:" + key] = std::sqrt(s.squares[i].mean());
-    if (s.covered[i].count > 0) metrics["cov95:" + key] = s.covered[i].share();
+    if (s.covered[i].count > 0) metrics["coverage95:" + key] = s.covered[i].share();
   }
   for (std::size_t o = 0; o < owners.size(); ++o) {
     if (s.nees[o].count == 0) continue;
     metrics["nees.mean:" + owners[o].name + s.suffix] = s.nees[o].mean();
-    metrics["nees.cov95:" + owners[o].name + s.suffix] = s.nees[o].share();
+    metrics["nees.within95:" + owners[o].name + s.suffix] = s.nees[o].share();
   }
   for (std::size_t i = 0; i < sensors.size(); ++i) {
     if (s.nis[i].count > 0) metrics["nis.mean:" + sensors[i] + s.suffix] = s.nis[i].mean();
@@ -450,14 +450,14 @@ std::map<std::string, double> Metrics::Finish() const {
   for (const Sums& sums : impl_->sums) impl_->Write(sums, metrics);
   impl_->WriteBounds(metrics);
   for (const Tracked& block : impl_->tracked) {
-    if (block.last_error >= 0.0) metrics["final:" + block.name] = block.last_error;
+    if (block.last_error >= 0.0) metrics["final_error:" + block.name] = block.last_error;
     if (!block.series.even()) continue;
     const double lag = Lag(block.series.estimate, block.series.truth, block.series.step_ms());
     if (std::isfinite(lag)) metrics["lag_ms:" + block.name] = lag;
   }
   if (const auto aligned = impl_->alignment.Result()) {
-    metrics["path.sim3.rmse"] = aligned->rmse;
-    metrics["path.sim3.scale"] = aligned->scale;
+    metrics["trajectory.sim3.rmse"] = aligned->rmse;
+    metrics["trajectory.sim3.scale"] = aligned->scale;
   }
   for (const auto& [sensor, frames] : impl_->reprojection) {
     const Settling settling = SettlingOf(frames);

@@ -16,7 +16,7 @@ namespace alidade {
 ///   rmse:BLOCK          sqrt(mean |e|^2),  e = x_true (-) x            unit of the block
 ///   lag_ms:BLOCK        delay after truth as Lag() has it, of the first 100 000 stamps; > 0: late.
 ///                       Scalar blocks, steps within 5 % of their mean, a truth that changes
-///   cov95:BLOCK         share of stamps with |e| <= 1.96 sigma (scalar blocks)
+///   coverage95:BLOCK    share of stamps with |e| <= 1.96 sigma (scalar blocks)
 ///   nees.mean:OWNER     mean of e' C^-1 e / dof over the owner's estimated blocks of known truth,
 ///                       jointly; stamps where C is singular or not finite are left out
 ///   nees.low:OWNER, nees.high:OWNER  bounds: nees.mean of a consistent filter lies between
@@ -24,14 +24,14 @@ namespace alidade {
 ///                       correlated over time: n stamps count as n / tau independent samples, tau
 ///                       the integrated autocorrelation time of the NEES; n is 10 000 at most
 ///   nees.dof:OWNER      elements that the NEES is taken over, mean over the stamps
-///   nees.cov95:OWNER    share of those stamps with e' C^-1 e <= chi2(0.95, dof)
+///   nees.within95:OWNER share of those stamps with e' C^-1 e <= chi2(0.95, dof)
 ///   nis.mean:SENSOR     mean of r' S^-1 r / dof over accepted measurements
 ///   nis.low:SENSOR, nis.high:SENSOR  bounds, likewise: innovations are white, but those of one
 ///                       frame share the error of the prediction and count as one sample
-///   final:BLOCK         |e| at the last stamp
-///   path.sim3.rmse      of the position that landmarks are seen from, m, after the similarity that
-///                       brings its path nearest to the true one [Umeyama1991]
-///   path.sim3.scale     of that similarity; true = scale x estimate
+///   final_error:BLOCK   |e| at the last stamp
+///   trajectory.sim3.rmse   of the position that landmarks are seen from, m, after the similarity
+///                       that brings its trajectory nearest to the true one [Umeyama1991]
+///   trajectory.sim3.scale  of that similarity; true = scale x estimate
 ///   reprojection:SENSOR     of landmarks, in the unit of the measurement: the rms of the
 ///                           innovations that a frame accepts, median of the run's last half
 ///   settling_frames:SENSOR  frames until that rms stays at this level, as SettlingOf() counts
@@ -39,7 +39,7 @@ namespace alidade {
 ///
 /// C = P + T is the covariance of e, T = diag(StreamInfo::sigma^2) that of the truth, which knows
 /// nothing of the filter; sigma^2 is its diagonal. An exact truth has T = 0.
-/// Over a segment the key ends in `@SEGMENT` (not lag_ms, final and the last two). Counts are
+/// Over a segment the key ends in `@SEGMENT` (not lag_ms, final_error and the last two). Counts are
 /// `OUTCOME:SENSOR`, of control inputs `inputs:ENTRY`, and of landmarks `landmarks.initialised`,
 /// `.deleted`, `.converted` and `.negative`. A
 /// truth is named like the block, `target.depth`, or like its last component where that is unique.
@@ -60,8 +60,8 @@ class Metrics {
   /// The part of Add that needs no truth: counts and NIS.
   void AddReport(const std::vector<bool>& in_segment, const UpdateReport& report);
   /// The errors of an estimate, its values by block of the estimator's system and empty where there
-  /// is none, where `frame.truth` is an estimate itself: rmse, lag and final alone. How far the two
-  /// may be apart P does not tell, as they share their data.
+  /// is none, where `frame.truth` is an estimate itself: rmse, lag_ms and final_error alone. How
+  /// far the two may be apart P does not tell, as they share their data.
   void AddDifference(const Frame& frame, const std::vector<bool>& in_segment,
                      const std::vector<std::vector<double>>& estimate);
   /// `inconsistent`, once for each block element: truth is known and the error has been beyond 10

@@ -25,31 +25,31 @@ TEST(ComparisonTable, OrdersScalesAndAligns) {
                                        {"rmse:target.depth@blind", 0.00121},
                                        {"rmse:cam.pixel", 0.31},
                                        {"lag_ms:target.depth", -1.42},
-                                       {"cov95:target.depth", 0.9342},
-                                       {"cov95:target.depth@blind", 0.9},
+                                       {"coverage95:target.depth", 0.9342},
+                                       {"coverage95:target.depth@blind", 0.9},
                                        {"nees.mean:target", 0.8948},
-                                       {"nees.cov95:target", 1.0},
+                                       {"nees.within95:target", 1.0},
                                        {"nis.mean:stereo", 0.9059},
-                                       {"final:target.depth", 1.0}}),
+                                       {"final_error:target.depth", 1.0}}),
                        Named("stereo_only", {{"rmse:target.depth", 0.206534}})};
   result.estimators[0].counts = {{"accepted:stereo", 74}, {"gated:stereo", 1}};
   result.estimators[1].diverged = true;
   result.estimators[0].inconsistent = true;
   EXPECT_EQ(ComparisonTable(result),
-            "                                fused  stereo_only\n"
-            "rmse cam.pixel [px]            0.3100            -\n"
-            "rmse target.depth [mm]          2.145        206.5\n"
-            "rmse target.depth @blind [mm]   1.210            -\n"
-            "lag target.depth [ms]          -1.420            -\n"
-            "cov95 target.depth [%]          93.42            -\n"
-            "cov95 target.depth @blind [%]   90.00            -\n"
-            "nees.mean target               0.8948            -\n"
-            "nees.cov95 target [%]           100.0            -\n"
-            "nis.mean stereo                0.9059            -\n"
-            "accepted stereo                    74            -\n"
-            "gated stereo                        1            -\n"
-            "diverged                           no          yes\n"
-            "inconsistent                      yes           no\n");
+            "                                     fused  stereo_only\n"
+            "rmse cam.pixel [px]                 0.3100            -\n"
+            "rmse target.depth [mm]               2.145        206.5\n"
+            "rmse target.depth @blind [mm]        1.210            -\n"
+            "lag target.depth [ms]               -1.420            -\n"
+            "coverage95 target.depth [%]          93.42            -\n"
+            "coverage95 target.depth @blind [%]   90.00            -\n"
+            "nees.mean target                    0.8948            -\n"
+            "nees.within95 target [%]             100.0            -\n"
+            "nis.mean stereo                     0.9059            -\n"
+            "accepted stereo                         74            -\n"
+            "gated stereo                             1            -\n"
+            "diverged                                no          yes\n"
+            "inconsistent                           yes           no\n");
 }
 
 TEST(ComparisonTable, PrintsNumbersThatLieFarApart) {
@@ -91,9 +91,9 @@ TEST(ComparisonTable, SmallNumbersKeepTheirDigits) {
 TEST(ComparisonTable, LeavesOutWhatIsHeldAtTruth) {
   RunResult result;
   result.estimators = {Named("a", {{"rmse:target.depth", 0.0},
-                                   {"cov95:target.depth", 1.0},
+                                   {"coverage95:target.depth", 1.0},
                                    {"nees.mean:target", 0.0},
-                                   {"nees.cov95:target", 1.0}}),
+                                   {"nees.within95:target", 1.0}}),
                        Named("b", {})};
   EXPECT_EQ(ComparisonTable(result),
             "               a   b\ndiverged      no  no\ninconsistent  no  no\n");

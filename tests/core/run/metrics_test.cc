@@ -102,10 +102,10 @@ TEST(Metrics, TakesErrorsByHand) {
   one.Add({{}});      // unknown
   const auto metrics = one.Finish();
   EXPECT_DOUBLE_EQ(metrics.at("rmse:a.x"), std::sqrt(12.5));
-  EXPECT_DOUBLE_EQ(metrics.at("final:a.x"), 4.0);
-  EXPECT_DOUBLE_EQ(metrics.at("cov95:a.x"), 0.5);
+  EXPECT_DOUBLE_EQ(metrics.at("final_error:a.x"), 4.0);
+  EXPECT_DOUBLE_EQ(metrics.at("coverage95:a.x"), 0.5);
   EXPECT_DOUBLE_EQ(metrics.at("nees.mean:a"), (9.0 / 4.0 + 16.0 / 4.0) / 2.0);
-  EXPECT_DOUBLE_EQ(metrics.at("nees.cov95:a"), 0.5);  // 2.25 <= 3.84 < 4
+  EXPECT_DOUBLE_EQ(metrics.at("nees.within95:a"), 0.5);  // 2.25 <= 3.84 < 4
   EXPECT_EQ(metrics.count("lag_ms:a.x"), 0u);
   EXPECT_EQ(one.metrics().units().at("a.x"), "m");
 }
@@ -198,7 +198,7 @@ TEST(Metrics, LeavesOutBlocksWithoutValueOrCovariance) {
   const auto metrics = one.Finish();
   EXPECT_EQ(metrics.count("rmse:a.waits"), 0u);
   EXPECT_EQ(metrics.at("rmse:a.fixed"), 1.0);
-  EXPECT_EQ(metrics.count("cov95:a.fixed"), 0u);
+  EXPECT_EQ(metrics.count("coverage95:a.fixed"), 0u);
   EXPECT_EQ(metrics.count("nees.mean:a"), 0u);
 }
 
@@ -221,8 +221,8 @@ TEST(Metrics, NeesOfErrorsDrawnFromPIsOne) {
   const auto metrics = one.Finish();
   // chi2(2) / 2 has variance 1; a share s has variance s (1 - s). Five standard deviations.
   EXPECT_NEAR(metrics.at("nees.mean:a"), 1.0, 5.0 / std::sqrt(n));
-  EXPECT_NEAR(metrics.at("nees.cov95:a"), 0.95, 5.0 * std::sqrt(0.95 * 0.05 / n));
-  EXPECT_NEAR(metrics.at("cov95:a.x"), 0.95, 5.0 * std::sqrt(0.95 * 0.05 / n));
+  EXPECT_NEAR(metrics.at("nees.within95:a"), 0.95, 5.0 * std::sqrt(0.95 * 0.05 / n));
+  EXPECT_NEAR(metrics.at("coverage95:a.x"), 0.95, 5.0 * std::sqrt(0.95 * 0.05 / n));
 }
 
 TEST(Metrics, BoundsOfTheNeesAreThoseOfIndependentErrors) {
@@ -256,7 +256,7 @@ TEST(Metrics, NeesIsOfEstimatedBlocksAlone) {
   one.Add({{3.0}, {100.0}});
   const auto metrics = one.Finish();
   EXPECT_DOUBLE_EQ(metrics.at("nees.mean:a"), 9.0 / 4.0);
-  EXPECT_DOUBLE_EQ(metrics.at("nees.cov95:a"), 1.0);  // 2.25 <= 3.84
+  EXPECT_DOUBLE_EQ(metrics.at("nees.within95:a"), 1.0);  // 2.25 <= 3.84
   EXPECT_DOUBLE_EQ(metrics.at("rmse:a.y"), 100.0);
 }
 
@@ -348,7 +348,7 @@ TEST(Metrics, TheUncertaintyOfTheTruthBelongsToTheError) {
   EXPECT_NEAR(one.Finish().at("nees.mean:a"), 36.0 * 36.0 / 13.0, 1e-9);
   EXPECT_EQ(one.Finish().at("rmse:a.x"), 36.0);
   for (int i = 0; i < 70; ++i) one.Add({{7.06}});  // 1.96 sigma are 7.067 m
-  EXPECT_NEAR(one.Finish().at("cov95:a.x"), 0.7, 1e-12);
+  EXPECT_NEAR(one.Finish().at("coverage95:a.x"), 0.7, 1e-12);
   for (int i = 0; i < 20; ++i) one.Add({{36.1}});
   ASSERT_EQ(one.metrics().events().size(), 1u);
 }

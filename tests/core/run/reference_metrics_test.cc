@@ -88,7 +88,7 @@ TEST(Reference, ErrorsAreDifferencesFromTheEstimatesOfTheNamedOne) {
   for (std::size_t k = 1; k < depths.size(); ++k) squares += std::pow(depths[k] - 0.3, 2);
   const std::map<std::string, double>& metrics = run.estimators[0].metrics;
   EXPECT_NEAR(metrics.at("rmse:target.depth"), std::sqrt(squares / 59.0), 1e-12);
-  EXPECT_NEAR(metrics.at("final:target.depth"), std::abs(depths.back() - 0.3), 1e-12);
+  EXPECT_NEAR(metrics.at("final_error:target.depth"), std::abs(depths.back() - 0.3), 1e-12);
   EXPECT_EQ(run.estimators[0].units.at("target.depth"), "m");
 }
 
@@ -100,8 +100,8 @@ TEST(Reference, MayBeAnyEstimatorOfTheRun) {
   double squares = 0.0;
   for (std::size_t k = 0; k < ekf.size(); ++k) squares += std::pow(ekf[k] - alone[k], 2);
   EXPECT_NEAR(run.estimators[0].metrics.at("rmse:target.depth"), std::sqrt(squares / 60.0), 1e-12);
-  EXPECT_NEAR(run.estimators[2].metrics.at("final:target.depth"), std::abs(0.3 - alone.back()),
-              1e-12);
+  EXPECT_NEAR(run.estimators[2].metrics.at("final_error:target.depth"),
+              std::abs(0.3 - alone.back()), 1e-12);
 }
 
 // What an estimator's covariance says of its distance from truth it does not say of that from
@@ -110,7 +110,7 @@ TEST(Reference, WithholdsWhatTheCovarianceDoesNotTell) {
   Experiment experiment = MakeCompared();
   const RunResult run = alidade::Run(experiment, {});
   for (const EstimatorResult& one : run.estimators) {
-    EXPECT_EQ(one.metrics.count("cov95:target.depth"), 0u);
+    EXPECT_EQ(one.metrics.count("coverage95:target.depth"), 0u);
     EXPECT_EQ(one.metrics.count("nees.mean:target"), 0u);
     EXPECT_FALSE(one.diverged);  // the ekf is a hundred sigma off
   }

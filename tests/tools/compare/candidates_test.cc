@@ -38,7 +38,7 @@ ComparedEntry Entry(const std::string& name, const std::string& type, bool smoot
   entry.series.covariances = {1.0, 1.0, 1.0};
   entry.result.name = name;
   entry.result.counts["accepted:" + sensors.front()] = 3;
-  entry.result.metrics = {{"rmse:p.x", error}, {"final:p.x", error}};
+  entry.result.metrics = {{"rmse:p.x", error}, {"final_error:p.x", error}};
   return entry;
 }
 
@@ -65,12 +65,12 @@ TEST(CompareRuns, HoldsAnEstimatorAgainstTheBatchOfItsSensors) {
              Entry("both_rts", "rts", true, 3.0, {"stereo", "scale"})});
   const Comparison comparison = CompareRuns({run}, {});
   EXPECT_EQ(Find(comparison, "both").final_reference, "both_batch");
-  EXPECT_EQ(Find(comparison, "both").values.at("ratio.final:p.x").mean, 2.0);
+  EXPECT_EQ(Find(comparison, "both").values.at("ratio.final_error:p.x").mean, 2.0);
   EXPECT_EQ(Find(comparison, "both_rts").reference, "both_batch");
   EXPECT_EQ(Find(comparison, "stereo").final_reference, "stereo_batch");
-  EXPECT_EQ(Find(comparison, "stereo").values.at("ratio.final:p.x").mean, 2.0);
+  EXPECT_EQ(Find(comparison, "stereo").values.at("ratio.final_error:p.x").mean, 2.0);
   EXPECT_EQ(Find(comparison, "scale").final_reference, "");
-  EXPECT_FALSE(Find(comparison, "scale").values.contains("apart.final:p.x"));
+  EXPECT_FALSE(Find(comparison, "scale").values.contains("final_difference:p.x"));
   EXPECT_EQ(comparison.notes, (std::vector<std::string>{"'scale' is held against nothing: no "
                                                         "batch has its sensors"}));
   const std::string text = CompareReport(comparison, TableStyle::kText);
@@ -187,12 +187,12 @@ TEST(CompareRuns, WithoutABatchSoFarLinearisationIsToldFromTheLastFrame) {
   EXPECT_EQ(step.withheld, "");
   EXPECT_EQ(step.to, "batch");
   const auto value = [&](const char* key) { return step.values.at(key).mean; };
-  EXPECT_EQ(value("apart:p.x"), 1.5);
-  EXPECT_EQ(value("apart.sigmas:p"), 3.0);
+  EXPECT_EQ(value("rmsd:p.x"), 1.5);
+  EXPECT_EQ(value("rmsd.sigmas:p"), 3.0);
   EXPECT_EQ(value("error_ratio:p.x"), 4.0);
   EXPECT_EQ(value("error_ratio:map"), 4.0);
-  EXPECT_EQ(value("apart:map"), 0.375);
-  EXPECT_LT(value("apart:map.sim3"), 1e-12);
+  EXPECT_EQ(value("rmsd:map"), 0.375);
+  EXPECT_LT(value("rmsd:map.sim3"), 1e-12);
   const std::string text = CompareReport(comparison, TableStyle::kText);
   EXPECT_NE(text.find("linearisation, ekf against batch, at the last frame\n"), text.npos) << text;
   EXPECT_NE(text.find("\nmap [m]"), text.npos) << text;

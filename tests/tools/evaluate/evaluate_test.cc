@@ -176,7 +176,7 @@ TEST(Evaluate, NeesIsThatOfTheCovariancesBesideThePoses) {
   EXPECT_EQ(e.position_nees->poses, 39);
   // 9 of 16 / 3, 30 of 1 / 3; chi2(0.95, 3) = 7.8
   EXPECT_NEAR(e.position_nees->mean, (9.0 * 16.0 + 30.0) / 3.0 / 39.0, 1e-9);
-  EXPECT_NEAR(e.position_nees->cov95, 30.0 / 39.0, 1e-12);
+  EXPECT_NEAR(e.position_nees->within95, 30.0 / 39.0, 1e-12);
   EXPECT_EQ(e.orientation_nees->poses, 40);
   EXPECT_NEAR(e.orientation_nees->mean, (10.0 * 16.0 + 30.0) / 3.0 / 40.0, 1e-9);
   EXPECT_EQ(e.nees_withheld, "");
@@ -202,12 +202,12 @@ TEST(Evaluate, NeesOfAPlanarPoseIsOfItsOwnDegreesOfFreedom) {
   EXPECT_EQ(e.position_nees->dof, 2);
   EXPECT_EQ(e.position_nees->poses, 9);
   EXPECT_NEAR(e.position_nees->mean, 2.0, 1e-9);
-  EXPECT_NEAR(e.position_nees->cov95, 1.0, 1e-12);  // 4 <= chi2(0.95, 2) = 5.99
+  EXPECT_NEAR(e.position_nees->within95, 1.0, 1e-12);  // 4 <= chi2(0.95, 2) = 5.99
   // 0.1^2 / 0.05^2 = 4 > chi2(0.95, 1) = 3.84
   EXPECT_EQ(e.orientation_nees->dof, 1);
   EXPECT_EQ(e.orientation_nees->poses, 10);
   EXPECT_NEAR(e.orientation_nees->mean, 4.0, 1e-9);
-  EXPECT_NEAR(e.orientation_nees->cov95, 0.0, 1e-12);
+  EXPECT_NEAR(e.orientation_nees->within95, 0.0, 1e-12);
 }
 
 TEST(Evaluate, NeesThatLacksIsToldOf) {
@@ -272,12 +272,12 @@ TEST(ReadInnovations, TellsNisAndAutocorrelation) {
   EXPECT_EQ(all[0].sensor, "pixel");
   EXPECT_EQ(all[0].measurements, 10);
   EXPECT_DOUBLE_EQ(all[0].nis_mean, 6.0);
-  EXPECT_DOUBLE_EQ(all[0].nis_cov95, 0.0);  // chi2(0.95, 1) = 3.84
+  EXPECT_DOUBLE_EQ(all[0].nis_within95, 0.0);  // chi2(0.95, 1) = 3.84
   EXPECT_DOUBLE_EQ(all[0].autocorrelation, 1.0);
   EXPECT_DOUBLE_EQ(all[0].white_within, 1.96 / std::sqrt(8.0));
   EXPECT_EQ(all[1].sensor, "range");
   EXPECT_DOUBLE_EQ(all[1].nis_mean, 1.0);
-  EXPECT_DOUBLE_EQ(all[1].nis_cov95, 1.0);
+  EXPECT_DOUBLE_EQ(all[1].nis_within95, 1.0);
   EXPECT_DOUBLE_EQ(all[1].autocorrelation, -1.0);
   EXPECT_DOUBLE_EQ(all[1].white_within, 1.96 / 3.0);
   std::ofstream(folder / "innovations.csv") << "t_s,sensor\n";

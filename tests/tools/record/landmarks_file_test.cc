@@ -132,8 +132,8 @@ TEST(LandmarkRecords, ResultsHaveCountsAndTheMapsErrors) {
   EXPECT_EQ(one.counts.at("landmarks.deleted"), 0);
   EXPECT_TRUE(one.counts.contains("landmarks.converted"));
   EXPECT_TRUE(one.counts.contains("landmarks.negative"));
-  for (const char* key :
-       {"map.rmse", "map.sim3.rmse", "map.sim3.scale", "final:cam.position", "nees.mean:cam"}) {
+  for (const char* key : {"map.rmse", "map.sim3.rmse", "map.sim3.scale", "final_error:cam.position",
+                          "nees.mean:cam"}) {
     EXPECT_TRUE(one.metrics.contains(key)) << key;
   }
   double sum = 0.0;

@@ -239,7 +239,7 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
   result.frames = 7;
   EstimatorResult one;
   one.name = "ekf";
-  one.metrics = {{"rmse:target.depth", 0.00195}, {"final:target.depth", INFINITY}};
+  one.metrics = {{"rmse:target.depth", 0.00195}, {"final_error:target.depth", INFINITY}};
   one.counts = {{"accepted:stereo", 151}};
   one.units = {{"target.depth", "m"}};
   one.diverged = true;
@@ -295,7 +295,7 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
       "rows": 0,
       "failed": false,
       "metrics": {
-        "final:target.depth": null,
+        "final_error:target.depth": null,
         "rmse:target.depth": 0.00195,
         "diverged": true,
         "inconsistent": false

@@ -198,20 +198,20 @@ void AddRatios(const ComparedEntry& one, const ComparedEntry& reference,
 /// The distance from `reference` along the run, and where scale is free that of the path.
 void AddApart(const Candidate& one, const Candidate& reference, ComparedEstimator& compared) {
   const Distance distance = internal::DistanceBetween(one.entry->series, reference.entry->series);
-  AddAll(distance.rms, "apart:", compared.values);
-  AddAll(distance.sigmas, "apart.sigmas:", compared.values);
+  AddAll(distance.rms, "rmsd:", compared.values);
+  AddAll(distance.sigmas, "rmsd.sigmas:", compared.values);
   const std::string& path = one.facts().path;
   if (path.empty() || !ScaleIsFree(one)) return;
   if (const auto aligned = AlignPaths(one.entry->series, reference.entry->series, path)) {
-    compared.values["apart.path.sim3"] = Single(aligned->rmse);
+    compared.values["rmsd.trajectory.sim3"] = Single(aligned->rmse);
   }
 }
 
 void AddFinal(const Candidate& one, const Candidate& reference, ComparedEstimator& compared) {
   const Distance distance = internal::DistanceBetween(one.entry->series, reference.entry->series);
-  AddAll(distance.final, "apart.final:", compared.values);
-  AddAll(distance.final_sigmas, "apart.final.sigmas:", compared.values);
-  AddAll(internal::DistanceBetweenMaps(one.entry->result, reference.entry->result), "apart.",
+  AddAll(distance.final, "final_difference:", compared.values);
+  AddAll(distance.final_sigmas, "final_difference.sigmas:", compared.values);
+  AddAll(internal::DistanceBetweenMaps(one.entry->result, reference.entry->result), "rmsd.",
          compared.values);
 }
 
@@ -248,7 +248,8 @@ ComparedEstimator Compare(const Candidate& one, const References& references, bo
     const Candidate& along = *references.along;
     compared.reference = along.name;
     compared.reference_runs = 1;
-    if (truth) AddRatios(*one.entry, *along.entry, {"rmse:", "path.sim3.rmse"}, compared.values);
+    if (truth)
+      AddRatios(*one.entry, *along.entry, {"rmse:", "trajectory.sim3.rmse"}, compared.values);
     if (along.entry != one.entry) AddApart(one, along, compared);
   }
   if (references.final != nullptr && references.final->entry->usable()) {
@@ -256,7 +257,8 @@ ComparedEstimator Compare(const Candidate& one, const References& references, bo
     compared.final_reference = final.name;
     compared.final_reference_runs = 1;
     if (truth)
-      AddRatios(*one.entry, *final.entry, {"final:", "map.rmse", "map.sim3.rmse"}, compared.values);
+      AddRatios(*one.entry, *final.entry, {"final_error:", "map.rmse", "map.sim3.rmse"},
+                compared.values);
     if (final.entry != one.entry) AddFinal(one, final, compared);
   }
   return compared;

@@ -28,15 +28,15 @@ struct CompareOptions {
 /// One estimator of a comparison. Values are those of run.json by their keys, where these are
 /// errors from truth, and
 ///
-///   apart:BLOCK               sqrt(mean |d|^2), d = x (-) x_ref            unit of the block
-///   apart.final:BLOCK         |d| at the last stamp
-///   apart.sigmas:OWNER        sqrt(mean d' P_ref^-1 d / dof), in sigmas of the reference
-///   apart.final.sigmas:OWNER  the same at the last stamp
-///   apart.path.sim3           rms of the path after the similarity that makes it least, m
-///   apart.map                 rms of the places of landmarks at the end, m
-///   apart.map.sim3            likewise after that similarity of the map, m
-///   ratio.KEY                 value of KEY over that of the reference; of rmse, final, map
-///   time_us                   wall clock for each measurement
+///   rmsd:BLOCK                     sqrt(mean |d|^2), d = x (-) x_ref      unit of the block
+///   final_difference:BLOCK         |d| at the last stamp
+///   rmsd.sigmas:OWNER              sqrt(mean d' P_ref^-1 d / dof), in sigmas of the reference
+///   final_difference.sigmas:OWNER  the same at the last stamp
+///   rmsd.trajectory.sim3           rms of the trajectory after the similarity that makes it least, m
+///   rmsd.map                       rms of the places of landmarks at the end, m
+///   rmsd.map.sim3                  likewise after that similarity of the map, m
+///   ratio.KEY                      KEY over that of the reference; of rmse, final_error, map
+///   time_us                        wall clock for each measurement
 struct ComparedEstimator {
   std::string name, type;
   bool smoothed = false;        ///< its estimates rest on later data too
@@ -59,7 +59,7 @@ enum class GapKind {
 const char* ToString(GapKind kind);
 
 /// One step of the way from the filter to the batch. Values: `error_ratio:BLOCK`, the RMSE from
-/// truth of `from` over that of `to`; `apart:BLOCK` and `apart.sigmas:OWNER` between the two;
+/// truth of `from` over that of `to`; `rmsd:BLOCK` and `rmsd.sigmas:OWNER` between the two;
 /// `rmse.from:BLOCK`, `rmse.to:BLOCK`; `measurements` and `lost` of kLostData. At the end they are
 /// of the last frame alone, and of BLOCK `map` and `map.sim3` too.
 struct GapStep {

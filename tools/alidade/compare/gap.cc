@@ -39,12 +39,12 @@ Partners PartnersOf(const Candidate& filter, const std::vector<Candidate>& candi
   return found;
 }
 
-/// What an error is of, BLOCK of `rmse:BLOCK`, at the end of `final:BLOCK`, or `map`; "": it is
-/// not one that a step compares.
+/// What an error is of, BLOCK of `rmse:BLOCK`, at the end of `final_error:BLOCK`, or `map`; "": it
+/// is not one that a step compares.
 std::string SubjectOf(const std::string& metric, bool at_end) {
   if (at_end && metric == "map.rmse") return "map";
   if (at_end && metric == "map.sim3.rmse") return "map.sim3";
-  const std::string kind = at_end ? "final:" : "rmse:";
+  const std::string kind = at_end ? "final_error:" : "rmse:";
   const bool whole = metric.starts_with(kind) && metric.find('@') == metric.npos;
   return whole ? metric.substr(kind.size()) : "";
 }
@@ -78,14 +78,14 @@ GapStep Between(GapKind kind, const Candidate* from, const Candidate* to, bool w
   if (!step.withheld.empty()) return step;
   const Distance distance = DistanceBetween(from->entry->series, to->entry->series);
   for (const auto& [block, d] : at_end ? distance.final : distance.rms) {
-    step.values["apart:" + block] = Single(d);
+    step.values["rmsd:" + block] = Single(d);
   }
   for (const auto& [owner, sigmas] : at_end ? distance.final_sigmas : distance.sigmas) {
-    step.values["apart.sigmas:" + owner] = Single(sigmas);
+    step.values["rmsd.sigmas:" + owner] = Single(sigmas);
   }
   if (at_end) {
     for (const auto& [map, d] : DistanceBetweenMaps(from->entry->result, to->entry->result)) {
-      step.values["apart:" + map] = Single(d);
+      step.values["rmsd:" + map] = Single(d);
     }
   }
   const bool truth = from->run->reference == "truth" && to->run->reference == "truth";

@@ -118,14 +118,14 @@ Section AlongSection(const Comparison& comparison, bool smoothed) {
                             &ComparedEstimator::reference, &ComparedEstimator::reference_runs,
                             {{"rmse", "rmse"},
                              {"ratio.rmse", "  ratio"},
-                             {"path.sim3.rmse", "path, Sim3"},
-                             {"path.sim3.scale", "path, scale"},
-                             {"ratio.path.sim3.rmse", "  ratio, path, Sim3"},
-                             {"apart", "RMSD"},
-                             {"apart.path.sim3", "RMSD, path, Sim3"},
-                             {"apart.sigmas", "RMSD in sigmas"},
+                             {"trajectory.sim3.rmse", "trajectory, Sim3"},
+                             {"trajectory.sim3.scale", "trajectory, scale"},
+                             {"ratio.trajectory.sim3.rmse", "  ratio, trajectory, Sim3"},
+                             {"rmsd", "RMSD"},
+                             {"rmsd.trajectory.sim3", "RMSD, trajectory, Sim3"},
+                             {"rmsd.sigmas", "RMSD in sigmas"},
                              {"nees.mean", "NEES"},
-                             {"nees.cov95", "in the 95 % region"},
+                             {"nees.within95", "in the 95 % region"},
                              {"nis.mean", "NIS"},
                              {"time_us", "wall clock [us/measurement]"}});
   if (any_diverged) section.rows.push_back(diverged);
@@ -137,17 +137,17 @@ Section FinalSection(const Comparison& comparison) {
   return TableOf(comparison.estimators, comparison.runs > 1,
                  "At the end, where all have the same data", &ComparedEstimator::final_reference,
                  &ComparedEstimator::final_reference_runs,
-                 {{"final", "error"},
-                  {"ratio.final", "  ratio"},
-                  {"apart.final", "difference"},
-                  {"apart.final.sigmas", "difference in sigmas"},
+                 {{"final_error", "error"},
+                  {"ratio.final_error", "  ratio"},
+                  {"final_difference", "difference"},
+                  {"final_difference.sigmas", "difference in sigmas"},
                   {"map.rmse", "map"},
                   {"ratio.map.rmse", "  ratio, map"},
                   {"map.sim3.rmse", "map, Sim3"},
                   {"map.sim3.scale", "map, scale"},
                   {"ratio.map.sim3.rmse", "  ratio, map, Sim3"},
-                  {"apart.map", "RMSD, map"},
-                  {"apart.map.sim3", "RMSD, map, Sim3"}});
+                  {"rmsd.map", "RMSD, map"},
+                  {"rmsd.map.sim3", "RMSD, map, Sim3"}});
 }
 
 /// The values of one kind by their subject, under another kind.
@@ -163,7 +163,7 @@ std::map<std::string, Spread> Under(const std::map<std::string, Spread>& values,
 /// `0.06 (target)`, the largest first; the largest itself goes to `largest`.
 std::string DistancesText(const GapStep& step, double& largest) {
   std::vector<std::pair<double, std::string>> sigmas;
-  const std::string kind = "apart.sigmas:";
+  const std::string kind = "rmsd.sigmas:";
   for (const auto& [key, value] : step.values) {
     if (key.starts_with(kind)) sigmas.emplace_back(value.mean, key.substr(kind.size()));
   }
@@ -239,7 +239,7 @@ Section GapSection(const Comparison& comparison, const GapStep& step) {
       {step.from, Under(step.values, "rmse.from:", "rmse:"), units},
       {step.to, Under(step.values, "rmse.to:", "rmse:"), units},
       {"ratio", {}, {}},
-      {step.at_end ? "difference" : "RMSD", Under(step.values, "apart:", "rmse:"), units}};
+      {step.at_end ? "difference" : "RMSD", Under(step.values, "rmsd:", "rmse:"), units}};
   if (columns[0].values.empty()) columns.erase(columns.begin(), columns.begin() + 3);
   section.columns = Names(columns);
   section.rows = SpreadRows(columns, several, {{"rmse", ""}});

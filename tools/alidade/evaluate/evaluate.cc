@@ -38,7 +38,7 @@ Nees NeesOf(const Eigen::Matrix3Xd& errors, const std::vector<Eigen::Matrix3d>& 
     inside += squared <= limit ? 1.0 : 0.0;
   }
   nees.mean = sum / nees.poses;
-  nees.cov95 = inside / nees.poses;
+  nees.within95 = inside / nees.poses;
   return nees;
 }
 

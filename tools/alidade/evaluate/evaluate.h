@@ -67,7 +67,7 @@ const char* ToString(PoseRelation relation);
 /// `m`, `deg`, `rad`, or "" of what has none.
 const char* UnitOf(PoseRelation relation);
 
-/// What the two poses of a relative error are apart: frames, metres of path, seconds, degrees and
+/// What the two poses of a relative error are rmsd: frames, metres of path, seconds, degrees and
 /// rad of rotation.
 enum class DeltaUnit { kFrames, kMetres, kSeconds, kDegrees, kRadians };
 /// `f`, `m`, `s`, `d`, `r`.
@@ -103,17 +103,17 @@ struct PoseErrors {
 /// Consistency of e with its covariance C over the poses where C is regular: e' C^-1 e / dof.
 struct Nees {
   int poses = 0;
-  double mean = 0.0;   ///< 1 is right
-  double cov95 = 0.0;  ///< share with e' C^-1 e <= chi2(0.95, dof); 0.95 is right
-  int dof = 3;         ///< axes that are uncertain in one pose or more: 2 and 1 of a planar pose
+  double mean = 0.0;      ///< 1 is right
+  double within95 = 0.0;  ///< share with e' C^-1 e <= chi2(0.95, dof); 0.95 is right
+  int dof = 3;            ///< axes that are uncertain in one pose or more: 2 and 1 of a planar pose
 };
 
 /// Consistency of the accepted measurements of a sensor with what the filter predicted.
 struct InnovationStatistics {
   std::string sensor;
   std::int64_t measurements = 0;
-  double nis_mean = 0.0;   ///< mean of r' S^-1 r / dof; 1 is right
-  double nis_cov95 = 0.0;  ///< share with r' S^-1 r <= chi2(0.95, dof); 0.95 is right
+  double nis_mean = 0.0;      ///< mean of r' S^-1 r / dof; 1 is right
+  double nis_within95 = 0.0;  ///< share with r' S^-1 r <= chi2(0.95, dof); 0.95 is right
   /// Autocorrelation of the elements of r, over their standard deviations, from one measurement of
   /// the sensor (and landmark) to the next [BarShalom2001] sec. 5.4; white: 0.
   double autocorrelation = 0.0;
@@ -154,7 +154,7 @@ struct Evaluation {
 /// Evaluates `estimate`. Warns of what makes the figures mean something else than they say: few
 /// matches, stamps that are off by a constant time, a swap of reference and estimate (seen by names
 /// and covariances), a scale that is not metric, other world or body frames, quaternions in the
-/// other order, a path that ends early, no pair of poses that is delta apart: then there are no
+/// other order, a path that ends early, no pair of poses that is delta rmsd: then there are no
 /// relative errors. Errors: those of Associate and Align.
 Evaluation Evaluate(const Trajectory& reference, const Trajectory& estimate,
                     const EvaluateOptions& options);

@@ -66,7 +66,7 @@ InnovationStatistics Finish(const std::string& sensor, const SensorSums& sums) {
   statistics.sensor = sensor;
   statistics.measurements = sums.measurements;
   statistics.nis_mean = sums.nis / n;
-  statistics.nis_cov95 = static_cast<double>(sums.inside) / n;
+  statistics.nis_within95 = static_cast<double>(sums.inside) / n;
   statistics.autocorrelation = sums.product / std::sqrt(sums.before2 * sums.after2);
   statistics.white_within = 1.96 / std::sqrt(static_cast<double>(sums.products));
   return statistics;

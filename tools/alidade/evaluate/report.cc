@@ -55,7 +55,7 @@ std::string TrajectoryText(const Trajectory& trajectory) {
 
 std::string NeesText(const char* name, const Nees& nees, int poses) {
   return std::string("NEES ") + name + " (" + std::to_string(nees.dof) + " dof) " +
-         RoundedText(nees.mean, 4) + " per dof, " + RoundedText(100.0 * nees.cov95, 3) +
+         RoundedText(nees.mean, 4) + " per dof, " + RoundedText(100.0 * nees.within95, 3) +
          " % within 95 %, " + std::to_string(nees.poses) + " of " + std::to_string(poses) +
          " poses\n";
 }
@@ -97,7 +97,7 @@ std::string ConsistencyText(const Evaluation& evaluation) {
   }
   for (const InnovationStatistics& one : evaluation.innovations) {
     text += "NIS " + one.sensor + ' ' + RoundedText(one.nis_mean, 4) + " per dof, " +
-            RoundedText(100.0 * one.nis_cov95, 3) + " % within 95 %, " +
+            RoundedText(100.0 * one.nis_within95, 3) + " % within 95 %, " +
             std::to_string(one.measurements) + " measurements";
     if (std::isfinite(one.autocorrelation)) {
       text += "; autocorrelation " + RoundedText(one.autocorrelation, 3) + ", white within " +
@@ -231,7 +231,7 @@ void AddNees(Json& json, const char* key, const std::optional<Nees>& nees) {
   if (!nees) return;
   json.Key(key).Object();
   json.Key("mean").Number(nees->mean);
-  json.Key("cov95").Number(nees->cov95);
+  json.Key("within95").Number(nees->within95);
   json.Key("dof").Integer(nees->dof);
   json.Key("poses").Integer(nees->poses);
   json.End();
@@ -243,7 +243,7 @@ void AddInnovations(Json& json, const std::vector<InnovationStatistics>& innovat
   for (const InnovationStatistics& one : innovations) {
     json.Key(one.sensor).Object();
     json.Key("mean").Number(one.nis_mean);
-    json.Key("cov95").Number(one.nis_cov95);
+    json.Key("within95").Number(one.nis_within95);
     json.Key("measurements").Integer(one.measurements);
     json.Key("autocorrelation").Number(one.autocorrelation);
     json.Key("white_within").Number(one.white_within);

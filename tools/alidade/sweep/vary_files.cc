@@ -159,7 +159,7 @@ FigureScript VariationFigure(const VariedSweep& sweep) {
   }
   const std::string x = SetAxis(script, sweep);
   for (const std::string& key : OrderedMetrics(all)) {
-    const bool shown = std::ranges::any_of(std::array{"rmse:", "lag_ms:", "nees.cov95:"},
+    const bool shown = std::ranges::any_of(std::array{"rmse:", "lag_ms:", "nees.within95:"},
                                            [&](const char* kind) { return key.starts_with(kind); });
     if (shown && key.find('@') == key.npos) MetricPanel(script, columns, key, x, rows);
   }

@@ -42,15 +42,15 @@ TEST(CeresBatchLandmarks, WhatTheFilterForgetsAndMeetsAgainIsAnotherLandmark) {
 TEST(CeresBatchLandmarks, WhatAFilterAcceptedEntersAtOnce) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml");
   for (const auto& [key, value] :
-       std::map<std::string, std::string>{{"landmarks.enter_after", "3"},
+       std::map<std::string, std::string>{{"landmarks.min_observations", "3"},
                                           {"estimators.batch.type", "ceres_batch"},
                                           {"estimators.batch.use.accepted_by", "ekf"}}) {
     config.Set(key, value, "--set");
   }
   const Experiment experiment = BuildExperiment(config, testing::Shipped());
   ASSERT_EQ(experiment.estimators.size(), 2u);
-  EXPECT_EQ(experiment.estimators[0].system.landmarks->enter_after, 3);
-  EXPECT_EQ(experiment.estimators[1].system.landmarks->enter_after, 1);
+  EXPECT_EQ(experiment.estimators[0].system.landmarks->min_observations, 3);
+  EXPECT_EQ(experiment.estimators[1].system.landmarks->min_observations, 1);
 }
 
 TEST(CeresBatchLandmarks, GivesTheSameBytesTwice) {

@@ -7,11 +7,11 @@ namespace {
 
 INSTANTIATE_TEST_SUITE_P(
     Depth, EveryModel,
-    ::testing::Values(SensorRow("depth_feature",
-                                "{sigma_px: 1, sigma_depth_m: 0.1, landmarks: {form: xyz}, " +
-                                    kSmallCameraText + "}",
-                                DepthFeature<Xyz>(kSmallCamera, 1.0, 0.1),
-                                {kPosition, kOrientation, {0.2, 0.4, 2.0}})),
+    ::testing::Values(SensorRow(
+        "depth_feature",
+        "{sigma_px: 1, sigma_depth_m: 0.1, landmarks: {representation: xyz}, " + kSmallCameraText +
+            "}",
+        DepthFeature<Xyz>(kSmallCamera, 1.0, 0.1), {kPosition, kOrientation, {0.2, 0.4, 2.0}})),
     RowName);
 
 }  // namespace

@@ -32,7 +32,7 @@ struct CompareOptions {
 ///   final_difference:BLOCK         |d| at the last stamp
 ///   rmsd.sigmas:OWNER              sqrt(mean d' P_ref^-1 d / dof), in sigmas of the reference
 ///   final_difference.sigmas:OWNER  the same at the last stamp
-///   rmsd.trajectory.sim3           rms of the trajectory after the similarity that makes it least, m
+///   rmsd.trajectory.sim3           RMSD of the trajectory after the similarity that fits best, m
 ///   rmsd.map                       rms of the places of landmarks at the end, m
 ///   rmsd.map.sim3                  likewise after that similarity of the map, m
 ///   ratio.KEY                      KEY over that of the reference; of rmse, final_error, map

@@ -41,7 +41,8 @@ std::vector<ParamInfo> WithCommonKeys(std::vector<ParamInfo> keys) {
   add("sensors", "list", "all", "names of those it uses, in the order of their updates");
   add("use", "choice or map", "all", "or {accepted_by: NAME}: what that filter accepted");
   add("on_divergence", "choice", "report", "fail ends the run", {"report", "fail"});
-  add("overrides", "map", "none", "its own state, sensors, landmarks and start_s, merged in");
+  add("overrides", "map", "none",
+      "its own state, sensors, landmarks and initial_time_s, merged in");
   return keys;
 }
 

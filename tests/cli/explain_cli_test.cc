@@ -50,13 +50,13 @@ TEST_F(ExplainCli, TellsTheOptionsOfEachTypeOfEstimator) {
       Call({"explain", "config.yaml", "--set", "estimators.ekf.jacobian=first_estimate", "--set",
             "sensors.stereo.loss={huber: 1.345}"});
   for (const char* part :
-       {"jacobian       first_estimate: H where", "loss           stereo: huber 1.345",
+       {"jacobian            first_estimate: H where", "loss                stereo: huber 1.345",
         "considered (Schmidt)", "robust losses"}) {
     EXPECT_TRUE(Contains(ekf.out, part)) << part << '\n' << ekf.out;
   }
   const Outcome iekf = Call({"explain", "config.yaml", "--set", "estimators.ekf.type=iekf"});
   for (const char* part :
-       {"(iekf)", "max_iterations  10", "tolerance       1e-04 sigma of the posterior",
+       {"(iekf)", "max_iterations      10", "tolerance           1e-04 sigma of the posterior",
         "blocks estimated or fixed; roles estimate, hold;",
         "Not: considered blocks and roles, jacobian_at measurement"}) {
     EXPECT_TRUE(Contains(iekf.out, part)) << part << '\n' << iekf.out;

@@ -62,7 +62,9 @@ Ekf::Landmarks::Landmarks(Ekf& ekf) : ekf_(ekf), options_(*ekf.system_.landmarks
       if (family.first < 0) family.first = static_cast<int>(i);
       family.roles.push_back(roles[i]);
     }
-    ALIDADE_EXPECTS(family.first < 0 || sensor.model.prior_size() == 0 || options_.prior);
+    ALIDADE_EXPECTS(family.first < 0 || sensor.model.prior_size() == 0 ||
+                    (options_.prior && std::isfinite(options_.prior->inverse_distance) &&
+                     options_.prior->sigma >= 0.0));
     ALIDADE_EXPECTS(family.first < 0 || sensor.model.prior_size() <= 1);
     ALIDADE_EXPECTS(family.first < 0 || family.form == internal::XyzForm() || sensor.xyz ||
                     (options_.known.empty() && !(options_.max_linearity_index > 0.0)));

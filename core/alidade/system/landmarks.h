@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -26,9 +27,10 @@ struct KnownLandmark {
 /// How landmarks enter the state, change and leave it.
 struct LandmarkOptions {
   /// What one observation does not tell: the inverse distance, 1/m, and its standard deviation.
+  /// Neither has a default: they depend on the scene.
   struct Prior {
-    double inverse_distance = 0.5;
-    double sigma = 0.25;
+    double inverse_distance = std::numeric_limits<double>::quiet_NaN();
+    double sigma = std::numeric_limits<double>::quiet_NaN();
     /// Once so many landmarks that a frame measures have converged, the median of their inverse
     /// distances stands for `inverse_distance`; 0: never.
     int adapt_after = 0;

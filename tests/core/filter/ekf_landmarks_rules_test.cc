@@ -177,6 +177,16 @@ TEST(Landmarks, CountOnceForThePriorWhereTwoSensorsSeeThem) {
   EXPECT_EQ(Find(landmarks, 7)->inverse_distance, 1.0);  // two have converged, not four
 }
 
+TEST(Landmarks, NeedAPriorWithBothNumbers) {
+  LandmarkOptions options;
+  options.prior.emplace();  // no number has a default
+  EXPECT_THROW(EkfOf(MapSystem(InverseDepthPixels(0.01), options)), ContractViolation);
+  options.prior->inverse_distance = 1.0;
+  EXPECT_THROW(EkfOf(MapSystem(InverseDepthPixels(0.01), options)), ContractViolation);
+  options.prior->sigma = 0.5;
+  EXPECT_NO_THROW(EkfOf(MapSystem(InverseDepthPixels(0.01), options)));
+}
+
 TEST(Landmarks, ThatHaveNotConvergedAreNoPrior) {
   LandmarkOptions options = WithPrior(1.0, 0.5);
   options.prior->adapt_after = 2;

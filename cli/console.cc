@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <mutex>
 #include <system_error>
 
 #include "alidade/base/error.h"
@@ -91,6 +92,33 @@ bool OnTerminal() {
   return !dumb && ::isatty(STDERR_FILENO) == 1;
 }
 
+bool TakesColour() { return OnTerminal() && !IsSet("NO_COLOR"); }
+
+/// `warning: `, in that colour of a terminal.
+std::string Marked(const char* word, const char* colour, bool coloured) {
+  const std::string mark = std::string(word) + ':';
+  return (coloured ? "\033[1;" + std::string(colour) + 'm' + mark + "\033[0m" : mark) + ' ';
+}
+
+/// What stands on the line of progress: messages of any thread go above it.
+std::mutex progress_mutex;
+std::size_t progress_width = 0;
+
+/// Takes the line of progress off the terminal. The mutex is locked.
+void ClearProgress() {
+  if (progress_width > 0) WriteError('\r' + std::string(progress_width, ' ') + '\r');
+  progress_width = 0;
+}
+
+void WriteMessage(LogLevel level, std::string_view text, bool coloured) {
+  const char* const colour = level == LogLevel::kError     ? "31"
+                             : level == LogLevel::kWarning ? "33"
+                                                           : "36";
+  const std::lock_guard lock(progress_mutex);
+  ClearProgress();
+  WriteError(Marked(ToString(level), colour, coloured) + Harmless(text) + '\n');
+}
+
 }  // namespace
 
 void PrepareConsole() {
@@ -110,20 +138,27 @@ void Print(std::string_view text) {
 }
 
 void PrintErrors(std::string_view text) {
-  const bool colour = OnTerminal() && !IsSet("NO_COLOR");
+  const bool colour = TakesColour();
   std::string lines;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
     const std::string_view line = text.substr(0, end);
     text.remove_prefix(std::min(end + 1, text.size()));
     if (line.empty()) continue;
-    if (line[0] != ' ') lines += colour ? "\033[1;31merror:\033[0m " : "error: ";
+    if (line[0] != ' ') lines += Marked("error", "31", colour);
     lines.append(Harmless(line)).append("\n");
   }
   WriteError(lines);
 }
 
 void PrintNote(std::string_view text) { WriteError(Harmless(text) + '\n'); }
+
+void ShowLog(LogLevel least) {
+  static const LogSubscription terminal(
+      least, [coloured = TakesColour()](LogLevel level, std::string_view text) {
+        WriteMessage(level, text, coloured);
+      });
+}
 
 Progress::Progress(const char* unit, bool quiet) : unit_(unit), enabled_(!quiet && OnTerminal()) {}
 
@@ -137,16 +172,16 @@ void Progress::Show(std::int64_t done, std::int64_t total) {
   line.append(" ").append(unit_);
   if (total > 0) line += ", " + std::to_string(100 * done / total) + " %";
   // Blanks, not an escape sequence, cover what a longer line left.
+  const std::lock_guard lock(progress_mutex);
   const std::size_t width = line.size();
-  if (width < width_) line.append(width_ - width, ' ');
-  width_ = width;
+  if (width < progress_width) line.append(progress_width - width, ' ');
+  progress_width = width;
   WriteError('\r' + line);
 }
 
 void Progress::Clear() {
-  if (width_ == 0) return;
-  WriteError('\r' + std::string(width_, ' ') + '\r');
-  width_ = 0;
+  const std::lock_guard lock(progress_mutex);
+  ClearProgress();
 }
 
 void ReportCrashes() {

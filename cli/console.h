@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "alidade/base/log.h"
+
 namespace alidade::cli {
 
 /// Makes the three standard descriptors safe to use: one that is closed becomes one that fails, so
@@ -20,6 +22,10 @@ void Print(std::string_view text);
 /// Control characters, as a file may hold them, are shown as `?`; in notes too.
 void PrintErrors(std::string_view text);
 void PrintNote(std::string_view text);
+
+/// From now on messages of the log, of level `least` and above, are lines `LEVEL: TEXT` on standard
+/// error, the level in colour on a terminal.
+void ShowLog(LogLevel least);
 
 /// A line on the terminal of standard error that says how far a command is; nothing where that is
 /// no terminal, or where `quiet`.
@@ -37,7 +43,6 @@ class Progress {
  private:
   const char* unit_;
   bool enabled_;
-  std::size_t width_ = 0;  ///< of what stands on the line
   std::chrono::steady_clock::time_point next_;
 };
 

@@ -35,7 +35,7 @@ struct EvalArguments {
   double max_diff_s = 0.01, offset_s = 0.0;
   std::string save_absolute, save_relative;
   Form form = Form::kText;
-  bool force = false, quiet = false;
+  bool force = false;
 };
 
 /// An option takes the name of one of `values`.
@@ -62,9 +62,8 @@ Alignment Chosen(const EvalArguments& arguments) {
   return arguments.scale ? Alignment::kScale : arguments.options.alignment;
 }
 
-void WarnOf(const std::vector<std::string>& warnings, const EvalArguments& arguments) {
-  if (arguments.quiet) return;
-  for (const std::string& warning : warnings) PrintNote("warning: " + warning);
+void WarnOf(const std::vector<std::string>& warnings) {
+  for (const std::string& warning : warnings) Log(LogLevel::kWarning, warning);
 }
 
 Evaluation EvaluateFile(const Trajectory& reference, const TrajectoryFile& file,
@@ -144,14 +143,14 @@ ExitCode RunEval(const EvalArguments& arguments) {
       IsOfOneRun(arguments) ? TruthOf(arguments.reference) : ReferenceAt(arguments.reference);
   const std::vector<TrajectoryFile> files = FilesOf(arguments);
   const Trajectory reference = ReadTrajectory(truth.file, arguments.format);
-  WarnOf(reference.warnings, arguments);
+  WarnOf(reference.warnings);
   std::vector<Evaluation> evaluations;
   ExitCode code = ExitCode::kOk;
   for (const TrajectoryFile& file : files) {
     try {
       evaluations.push_back(EvaluateFile(reference, file, options, arguments.format));
       std::vector<std::string>& warnings = evaluations.back().warnings;
-      WarnOf(warnings, arguments);
+      WarnOf(warnings);
       warnings.insert(warnings.begin(), reference.warnings.begin(), reference.warnings.end());
     } catch (const Error& error) {
       if (files.size() == 1) throw;
@@ -278,7 +277,7 @@ void AddForms(CLI::App& command, EvalArguments& a) {
       ->option_text("ZIP")
       ->check(IsNamed);
   command.add_flag("--force", a.force, "replace ZIP if it is there");
-  command.add_flag("--quiet", a.quiet, "no warnings");
+  command.add_flag("--quiet")->description("no warnings");
 }
 
 }  // namespace

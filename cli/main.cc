@@ -66,7 +66,26 @@ std::vector<std::string> ReversedArguments(int argc, char** argv) {
   return arguments;
 }
 
-void Describe(CLI::App& program, Action& action, const std::string& command_line) {
+constexpr const char* kLogLevels = "trace, debug, info, warning, error, off";
+
+std::string IsLogLevel(const std::string& text) {
+  return LogLevelOf(text) ? "" : "'" + text + "' is not a level; expected " + kLogLevels;
+}
+
+/// What the terminal shows of the log: `given` by --log-level, else errors under --quiet, else
+/// ALIDADE_LOG, else warnings.
+LogLevel LogLevelFor(const CLI::App& command, const std::string& given) {
+  if (!given.empty()) return *LogLevelOf(given);
+  const CLI::Option* quiet = command.get_option_no_throw("--quiet");
+  if (quiet != nullptr && quiet->count() > 0) return LogLevel::kError;
+  const char* const variable = std::getenv("ALIDADE_LOG");
+  if (variable == nullptr || *variable == '\0') return LogLevel::kWarning;
+  if (const auto level = LogLevelOf(variable)) return *level;
+  throw Error(ExitCode::kUsage, "ALIDADE_LOG: " + IsLogLevel(variable));
+}
+
+void Describe(CLI::App& program, Action& action, const std::string& command_line,
+              std::string& log_level) {
   program.formatter(std::make_shared<Format>());
   program.footer(kProgramFooter);
   program.set_version_flag("--version", "alidade " ALIDADE_VERSION, "print the version and leave");
@@ -81,8 +100,14 @@ void Describe(CLI::App& program, Action& action, const std::string& command_line
   AddCheck(program, action);
   AddEval(program, action);
   AddDoctor(program, action);
-  const auto polish = [](const auto& self, CLI::App& app) -> void {
+  const auto polish = [&log_level](const auto& self, CLI::App& app) -> void {
     app.get_help_ptr()->description("print this help and leave");
+    if (app.get_subcommands({}).empty()) {
+      app.add_option("--log-level", log_level,
+                     std::string("least level of messages on standard error: ") + kLogLevels)
+          ->option_text("LEVEL")
+          ->check(IsLogLevel);
+    }
     for (CLI::App* command : app.get_subcommands({})) {
       command->group("Commands");
       self(self, *command);
@@ -151,13 +176,15 @@ ExitCode Fail(const CLI::App& program, const CLI::ParseError& error) {
 ExitCode Main(int argc, char** argv) {
   CLI::App program("Recursive state estimation from plugins: write h(x) once.", "alidade");
   Action action;
-  Describe(program, action, CommandLine(argc, argv));
+  std::string log_level;
+  Describe(program, action, CommandLine(argc, argv), log_level);
   try {
     program.parse(ReversedArguments(argc, argv));
   } catch (const CLI::ParseError& error) {
     return Fail(program, error);
   }
   try {
+    ShowLog(LogLevelFor(Named(program), log_level));
     return action();
   } catch (const Error& error) {
     if (error.code() != ExitCode::kUsage) throw;

@@ -118,10 +118,7 @@ ExitCode RunConfig(const RunArguments& arguments) {
   if (result.status == RunStatus::kStopped) PrintNote(result.reason);
   FinishOnSignals();
   recorder.Finish(result);
-  if (!arguments.quiet) {
-    Print(Summary(result, recorder));
-    if (!recorder.note().empty()) PrintNote(recorder.note());
-  }
+  if (!arguments.quiet) Print(Summary(result, recorder));
   return result.code;
 }
 

@@ -115,7 +115,7 @@ ExitCode SweepValues(const Task& task) {
   std::vector<std::string> names = {"table.md", "sweep.csv", "sweep.json", "runs.csv"};
   if (note.empty()) names.insert(names.begin(), "figures/vary.svg");
   TellWritten(task, SweepTable(sweep), names);
-  if (!note.empty() && !task.arguments.quiet) PrintNote("no figure drawn: " + note);
+  if (!note.empty()) Log(LogLevel::kWarning, "no figure drawn: " + note);
   if (sweep.stopped()) return ExitCode::kStopped;
   return failed ? ExitCode::kFound : ExitCode::kOk;
 }

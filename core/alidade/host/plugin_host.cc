@@ -11,6 +11,7 @@
 #include <set>
 #include <string_view>
 
+#include "alidade/base/log.h"
 #include "alidade/host/abi_read.h"
 #include "alidade/host/build_plugin.h"
 #include "alidade/host/plugin_file.h"
@@ -125,6 +126,9 @@ void PluginHost::LoadFile(const fs::path& file, bool required) {
     std::string reason = e.what();
     if (reason.starts_with(prefix)) reason.erase(0, prefix.size());
     refusals_.push_back({file, reason, e.code()});
+    if (IsLogged(LogLevel::kInfo)) {
+      Log(LogLevel::kInfo, "plugin refused: " + file.string() + ": " + reason);
+    }
   }
 }
 
@@ -159,8 +163,15 @@ void PluginHost::Load(const fs::path& file) {
     Refuse(file, std::string("cannot be loaded: ") + e.what());
   }
   if (!defect.empty()) Refuse(file, defect);
+  const std::size_t before = entries_.size();
   AddEntries(*plugin);
   loaded_.push_back(std::move(plugin));
+  if (!IsLogged(LogLevel::kDebug)) return;
+  std::string names;
+  for (std::size_t i = before; i < entries_.size(); ++i) {
+    names += (i > before ? ", " : "") + entries_[i].name;
+  }
+  Log(LogLevel::kDebug, "plugin loaded: " + canonical.string() + ": " + names);
 }
 
 void PluginHost::AddEntries(const Loaded& plugin) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <span>
 
 #include "alidade/base/number_text.h"
 #include "alidade/base/words.h"
@@ -12,6 +13,7 @@
 #include "alidade/run/map_metrics.h"
 #include "alidade/run/metrics.h"
 #include "alidade/run/reference_metrics.h"
+#include "alidade/run/run_log.h"
 #include "alidade/run/running_estimator.h"
 
 namespace alidade {
@@ -246,6 +248,33 @@ std::vector<Running> BeginAll(Experiment& experiment) {
   return running;
 }
 
+/// Notes of `one` what the whole run shows, and puts its result behind those before it.
+void Conclude(Running& one, const std::vector<Running>& running, const Experiment& experiment,
+              RunResult& result) {
+  Measure(one, result);
+  one.result.counts = one.metrics.counts();
+  if (one.stale_inputs > 0) one.result.counts["input_stale"] = one.stale_inputs;
+  one.result.units = one.metrics.units();
+  const std::size_t before = one.result.events.size();
+  internal::NoteMap(one.named, *experiment.source, one.result);
+  const Estimator& estimator = *one.named.estimator;
+  if (one.took && !estimator.failed()) {
+    const int by = one.named.accepted_by;
+    internal::NoteUnused(one.named.system,
+                         by < 0 ? "" : running[static_cast<std::size_t>(by)].named.name,
+                         one.result);
+    if (experiment.reference < 0) internal::NoteTruths(one.metrics, one.result);
+  }
+  internal::NoteUnits(one.named.system, one.metrics, one.result);
+  if (one.took && !estimator.failed()) internal::NoteConsistency(one.result);
+  internal::LogEvents(one.named.name, std::span(one.result.events).subspan(before));
+  one.Note(one.metrics.events());
+  one.result.diverged = one.diverged || (estimator.offline() && estimator.diverged());
+  one.result.inconsistent = !one.metrics.events().empty();
+  one.result.failed = one.ended || one.diverged || estimator.failed() || estimator.diverged();
+  result.estimators.push_back(std::move(one.result));
+}
+
 }  // namespace
 
 const char* ToString(RunStatus status) {
@@ -288,34 +317,16 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
   guarded([&] {
     running = BeginAll(experiment);
     for (RunObserver* const observer : options.observers) observer->Begin(experiment);
+    internal::LogExperiment(experiment);
+    for (const Running& one : running) internal::LogEvents(one.named.name, one.result.events);
     RunFrames(experiment, running, options, result, kept);
     SmoothAll(running, kept, options, result);
   });
   if (reference >= 0 && !running.empty()) {
     guarded([&] { Compare(running, reference, kept, result); });
   }
-  for (Running& one : running) {
-    Measure(one, result);
-    one.result.counts = one.metrics.counts();
-    if (one.stale_inputs > 0) one.result.counts["input_stale"] = one.stale_inputs;
-    one.result.units = one.metrics.units();
-    internal::NoteMap(one.named, *experiment.source, one.result);
-    if (one.took && !one.named.estimator->failed()) {
-      const int by = one.named.accepted_by;
-      internal::NoteUnused(one.named.system,
-                           by < 0 ? "" : running[static_cast<std::size_t>(by)].named.name,
-                           one.result);
-      if (experiment.reference < 0) internal::NoteTruths(one.metrics, one.result);
-    }
-    internal::NoteUnits(one.named.system, one.metrics, one.result);
-    if (one.took && !one.named.estimator->failed()) internal::NoteConsistency(one.result);
-    one.Note(one.metrics.events());
-    const Estimator& estimator = *one.named.estimator;
-    one.result.diverged = one.diverged || (estimator.offline() && estimator.diverged());
-    one.result.inconsistent = !one.metrics.events().empty();
-    one.result.failed = one.ended || one.diverged || estimator.failed() || estimator.diverged();
-    result.estimators.push_back(std::move(one.result));
-  }
+  for (Running& one : running) Conclude(one, running, experiment, result);
+  internal::LogDurations(result);
   return result;
 }
 

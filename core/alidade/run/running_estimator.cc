@@ -5,6 +5,7 @@
 
 #include "alidade/base/number_text.h"
 #include "alidade/base/words.h"
+#include "alidade/run/run_log.h"
 #include "alidade/system/observability.h"
 
 namespace alidade::internal {
@@ -32,7 +33,10 @@ void Running::Note(const std::vector<Event>& events) {
     };
     const bool stale = event.kind == "input_stale";
     if (stale) ++stale_inputs;
-    if (!stale || std::ranges::none_of(result.events, same)) result.events.push_back(event);
+    if (stale && std::ranges::any_of(result.events, same)) continue;
+    result.events.push_back(event);
+    const bool ends = named.on_divergence == OnDivergence::kFail || named.estimator->failed();
+    LogEvents(named.name, {&event, 1}, ends);
   }
 }
 

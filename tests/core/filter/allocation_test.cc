@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "alidade/base/log.h"
 #include "alidade/filter/iekf.h"
 #include "alidade/filter/square_root_ekf.h"
 #include "alidade/filter/ukf.h"
@@ -48,6 +49,12 @@ TEST(ControlInput, TakesNoAllocation) {
   for (std::size_t k = 0; k < 20; ++k) ekf.Process(frames[k]);
   const long before = allocations;
   for (std::size_t k = 20; k < frames.size(); ++k) ekf.Process(frames[k]);
+  EXPECT_EQ(allocations - before, 0);
+}
+
+TEST(Log, TakesNoAllocationWithoutASink) {
+  const long before = allocations;
+  for (int i = 0; i < 100; ++i) Log(LogLevel::kError, "nobody hears this text of 40 characters");
   EXPECT_EQ(allocations - before, 0);
 }
 

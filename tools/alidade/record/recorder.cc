@@ -9,11 +9,13 @@
 #include <sstream>
 
 #include "alidade/base/json.h"
+#include "alidade/base/log.h"
 #include "alidade/base/output_folder.h"
 #include "alidade/base/sha256.h"
 #include "alidade/record/data_hash.h"
 #include "alidade/record/estimator_files.h"
 #include "alidade/record/figures.h"
+#include "alidade/record/log_file.h"
 #include "alidade/record/report_html.h"
 #include "alidade/record/run_json.h"
 #include "alidade/record/source_files.h"
@@ -35,6 +37,7 @@ struct Recorder::Impl {
 
   Options options;
   internal::RunFolder folder;
+  internal::LogFile log{folder};
   const PluginHost& host;
   std::string title, config_text, source_type;
   internal::RunFacts facts;
@@ -174,6 +177,7 @@ void Recorder::Impl::WriteReport(const RunResult& result, const internal::Record
   if (report.figures.has_png) highlights.emplace_back("figures/measurements.png");
   highlights.insert(highlights.end(), {"comparison.csv", "run.json"});
   if (options.figures) note = report.figures.note;
+  if (!note.empty()) Log(LogLevel::kWarning, note);
 }
 
 Recorder::Recorder(const Options& options, const Config& config, const PluginHost& host)
@@ -236,7 +240,9 @@ void Recorder::Finish(const RunResult& result) {
   folder.Write("comparison.csv", internal::ComparisonCsv(result));
   folder.Write("timing.json", timing);
   impl_->WriteReport(result, recorded);
+  impl_->log.Close();
   impl_->folder.Commit();
+  if (IsLogged(LogLevel::kInfo)) Log(LogLevel::kInfo, "wrote " + impl_->options.folder.string());
 }
 
 const std::vector<std::string>& Recorder::highlights() const { return impl_->highlights; }

@@ -9,6 +9,7 @@
 #include <system_error>
 #include <thread>
 
+#include "alidade/base/log.h"
 #include "alidade/sweep/sweep_config.h"
 
 namespace alidade {
@@ -68,6 +69,7 @@ class Queue {
   SweepRun RunSeed(std::uint64_t seed) {
     SweepRun run;
     run.seed = seed;
+    const LogScope log("seed " + std::to_string(seed) + ": ", LogLevel::kInfo);
     try {
       const Config config = CopyFor(seed);
       Experiment experiment = BuildExperiment(config, host_);

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What the program says while it works.
+#include "support/program.h"
+
+namespace alidade {
+namespace {
+
+using testing::Arguments;
+using testing::Contains;
+using testing::Outcome;
+
+class LogCli : public testing::ProgramTest {
+ protected:
+  void SetUp() override {
+    ProgramTest::SetUp();
+    ::unsetenv("ALIDADE_LOG");
+  }
+  void TearDown() override { ::unsetenv("ALIDADE_LOG"); }
+
+  static Arguments Run(Arguments more) {
+    more.insert(more.begin(), {"run", "config.yaml", "-o", "out", "--force", "--no-figures"});
+    return more;
+  }
+};
+
+TEST_F(LogCli, OptionQuietAndEnvironmentSetTheLevel) {
+  const auto has = [&](const Arguments& more, bool info, bool debug) {
+    const Outcome run = Call(Run(more));
+    EXPECT_EQ(run.code, 0) << run.err;
+    EXPECT_EQ(Contains(run.err, "info: source: streams disparity, inverse_scale; truth "), info)
+        << run.err;
+    EXPECT_EQ(Contains(run.err, "debug: plugin loaded: "), debug) << run.err;
+    EXPECT_EQ(Contains(run.err, "debug: ekf: "), debug) << run.err;  // the duration
+    EXPECT_EQ(run.err.empty(), !info) << run.err;
+    EXPECT_FALSE(Contains(run.err, "\033[")) << "colour goes to a terminal alone";
+  };
+  has({}, false, false);
+  has({"--log-level", "info"}, true, false);
+  has({"--log-level=debug", "--quiet"}, true, true);
+  ::setenv("ALIDADE_LOG", "debug", 1);
+  has({}, true, true);
+  has({"--quiet"}, false, false);
+  has({"--log-level", "off"}, false, false);
+  ::setenv("ALIDADE_LOG", "", 1);
+  has({}, false, false);
+}
+
+TEST_F(LogCli, AnUnknownLevelIsAUsageError) {
+  const std::string what =
+      "'loud' is not a level; expected trace, debug, info, warning, error, off";
+  const Outcome option = Call({"doctor", "--log-level", "loud"});
+  EXPECT_EQ(option.code, 2);
+  EXPECT_EQ(option.err, "error: --log-level: " + what + "\nsee `alidade doctor --help`\n");
+  ::setenv("ALIDADE_LOG", "loud", 1);
+  const Outcome variable = Call(Run({}));
+  EXPECT_EQ(variable.code, 2);
+  EXPECT_EQ(variable.err, "error: ALIDADE_LOG: " + what + "\nsee `alidade run --help`\n");
+  EXPECT_FALSE(Exists("out"));
+}
+
+TEST_F(LogCli, EveryCommandTakesALevel) {
+  for (const Arguments& command : {Arguments{"run"},
+                                   {"compare"},
+                                   {"sweep"},
+                                   {"simulate"},
+                                   {"bundle"},
+                                   {"explain"},
+                                   {"plugins", "list"},
+                                   {"plugins", "info"},
+                                   {"plugins", "where"},
+                                   {"check"},
+                                   {"eval"},
+                                   {"doctor"}}) {
+    Arguments help = command;
+    help.push_back("--help");
+    EXPECT_TRUE(Contains(Call(help).out, "--log-level LEVEL")) << command.front();
+  }
+}
+
+// The folder holds no level below info, no clock and no place: another folder, another terminal
+// level, the same bytes.
+TEST_F(LogCli, TheLogOfARunHasTheSameBytes) {
+  const Arguments run = Diverging({"run", "config.yaml", "--no-figures", "-o"});
+  const auto into = [&](const std::string& folder, const Arguments& more) {
+    Arguments all = Diverging({"run", "config.yaml", "--no-figures", "-o", folder});
+    all.insert(all.end(), more.begin(), more.end());
+    Call(all);
+    return Read(folder + "/log.txt");
+  };
+  const std::string one = into("one", {}), two = into("two", {"--log-level", "trace"});
+  EXPECT_EQ(one, two);
+  EXPECT_TRUE(one.starts_with("info: source: streams disparity, inverse_scale; truth ")) << one;
+  EXPECT_TRUE(Contains(one,
+                       "\ninfo: ekf: type ekf; sensors stereo, scale; blocks target.depth, "
+                       "target.depth_rate, template.inverse_distance\n"))
+      << one;
+  EXPECT_TRUE(Contains(one, "ekf: diverged at t = ")) << one;
+  EXPECT_FALSE(Contains(one, "debug")) << one;
+  EXPECT_TRUE(Contains(Read("one/files.txt"), "log.txt\n"));
+}
+
+// A divergence is a warning as it happens; where it ends the run it is the error alone.
+TEST_F(LogCli, ADivergenceIsAWarningOrTheErrorThatEndsTheRun) {
+  const Outcome reported = Call(Diverging(Run({})));
+  EXPECT_EQ(reported.code, 0) << reported.err;
+  EXPECT_TRUE(reported.err.starts_with("warning: ekf: diverged at t = ")) << reported.err;
+  const Outcome failed = Call(Diverging(Run({"--set", "estimators.ekf.on_divergence=fail"})));
+  EXPECT_EQ(failed.code, 79) << failed.err;
+  EXPECT_TRUE(failed.err.starts_with("error: estimator 'ekf' at t = ")) << failed.err;
+  EXPECT_FALSE(Contains(failed.err, "warning: ")) << failed.err;
+  EXPECT_EQ(Call(Diverging(Run({"--quiet"}))).err, "");
+}
+
+// Each run of a sweep is named, and none of them warns.
+TEST_F(LogCli, ASweepNamesTheRunOfAMessage) {
+  const Outcome quiet = Call(Diverging({"sweep", "config.yaml", "--runs", "2", "-o", "a"}));
+  EXPECT_FALSE(Contains(quiet.err, "warning: ")) << quiet.err;
+  const Outcome told =
+      Call(Diverging({"sweep", "config.yaml", "--runs", "2", "-o", "b", "--log-level", "info"}));
+  for (const char* seed : {"1", "2"}) {
+    EXPECT_TRUE(Contains(told.err, "info: seed " + std::string(seed) + ": ekf: diverged at t = "))
+        << told.err;
+  }
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/record/log_file.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <fstream>
+#include <sstream>
+#include <thread>
+#include <vector>
+
+#include "support/temporary_folder.h"
+
+namespace alidade::internal {
+namespace {
+
+std::string LogOf(const std::filesystem::path& folder) {
+  std::ifstream stream(folder / "log.txt");
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+/// Keeps the warnings of this scope.
+struct Warnings {
+  std::vector<std::string> texts;
+  LogSubscription sink{LogLevel::kWarning,
+                       [this](LogLevel, std::string_view text) { texts.emplace_back(text); }};
+};
+
+TEST(LogFile, HoldsTheMessagesOfItsThreadFromInfoOn) {
+  const testing::TemporaryFolder temporary;
+  RunFolder folder(temporary / "out", false);
+  LogFile file(folder);
+  Log(LogLevel::kDebug, "left out");
+  Log(LogLevel::kInfo, "a");
+  std::thread([] { Log(LogLevel::kWarning, "another run"); }).join();
+  Log(LogLevel::kWarning, "b");
+  file.Close();
+  Log(LogLevel::kWarning, "after");
+  folder.Commit();
+  EXPECT_EQ(LogOf(temporary / "out"), "info: a\nwarning: b\n");
+}
+
+TEST(LogFile, ThatCannotBeCreatedIsAWarning) {
+  const testing::TemporaryFolder temporary;
+  RunFolder folder(temporary / "out", false);
+  std::filesystem::create_directory(folder.partial() / "log.txt");
+  const Warnings warnings;
+  LogFile file(folder);
+  Log(LogLevel::kInfo, "a");
+  file.Close();
+  ASSERT_EQ(warnings.texts.size(), 1u);
+  EXPECT_TRUE(
+      warnings.texts[0].starts_with((temporary / "out/log.txt").string() + ": cannot create: "))
+      << warnings.texts[0];
+  EXPECT_TRUE(warnings.texts[0].ends_with("; the run goes on without its log"));
+}
+
+// 100: a limit of 4 bytes stands for a full disk. The buffer holds 64 KiB: one message is written at
+// the end, a thousand of 100 bytes are not.
+TEST(LogFile, ThatCannotBeWrittenIsAWarning) {
+  for (const int messages : {1, 1000}) {
+    const testing::TemporaryFolder temporary;
+    RunFolder folder(temporary / "out", false);
+    const Warnings warnings;
+    LogFile file(folder);
+    rlimit before{};
+    ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+    const rlimit little{4, before.rlim_max};
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &little), 0);
+    for (int i = 0; i < messages; ++i) Log(LogLevel::kInfo, std::string(100, 'x'));
+    file.Close();
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+    ASSERT_EQ(warnings.texts.size(), 1u) << messages;
+    EXPECT_TRUE(warnings.texts[0].find("out/log.txt: cannot write: ") != std::string::npos)
+        << warnings.texts[0];
+    folder.Write("run.json", "{}");
+    folder.Commit();
+    EXPECT_TRUE(std::filesystem::exists(temporary / "out/run.json"));
+  }
+}
+
+}  // namespace
+}  // namespace alidade::internal

@@ -11,7 +11,7 @@ namespace alidade::cli {
 namespace {
 
 constexpr const char* kPluginsFooter = R"(Examples:
-  alidade plugins list
+  alidade plugins list -v
   alidade plugins info stereo_disparity
   alidade plugins info scale_2d --json
   alidade plugins info ekf
@@ -23,7 +23,7 @@ data folder ($XDG_DATA_HOME/alidade/plugins) and beside the program.)";
 struct PluginsArguments {
   std::vector<std::string> paths;
   std::string name;
-  bool json = false;
+  bool json = false, files = false;
 };
 
 using Listing = std::string (*)(const PluginHost&, const PluginsArguments&);
@@ -48,7 +48,7 @@ std::string List(const PluginHost& host, const PluginsArguments& arguments) {
   if (const std::size_t count = host.refusals().size(); count > 0) {
     PrintNote(std::to_string(count) + " refused: `alidade plugins where` tells why");
   }
-  return arguments.json ? PluginListJson(host) : PluginList(host);
+  return arguments.json ? PluginListJson(host) : PluginList(host, arguments.files);
 }
 
 std::string Info(const PluginHost& host, const PluginsArguments& arguments) {
@@ -66,6 +66,7 @@ void AddPlugins(CLI::App& program, Action& action) {
   CLI::App& list =
       *plugins.add_subcommand("list", "List the models, sources and estimators on offer");
   const auto list_arguments = AddListing(list, action, List);
+  list.add_flag("-v,--verbose", list_arguments->files, "print the file of each plugin too");
   list.add_flag("--json", list_arguments->json, "print JSON");
   CLI::App& info = *plugins.add_subcommand("info", "Tell all about one of them");
   const auto info_arguments = AddListing(info, action, Info);

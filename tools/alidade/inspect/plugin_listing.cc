@@ -108,14 +108,17 @@ void AddParameter(const ParamInfo& info, Json& json) {
 
 }  // namespace
 
-std::string PluginList(const PluginHost& host) {
-  std::vector<TextRow> rows = {{"name", "kind", "what it is", "file"}};
+std::string PluginList(const PluginHost& host, bool files) {
+  std::vector<TextRow> rows = {{"name", "kind", "description", "file"}};
   for (const PluginEntry* entry : Sorted(host)) {
     rows.push_back({entry->name, KindName(entry->kind), entry->doc, entry->plugin.string()});
   }
   const std::string none = rows.size() > 1 ? "" : "\nno plugin was found\n";
   for (const EstimatorType& type : EstimatorTypes()) {
     rows.push_back({type.name, KindName(PluginEntry::Kind::kEstimator), type.doc, "built in"});
+  }
+  for (TextRow& row : rows) {
+    if (!files) row.pop_back();
   }
   return TextTable(rows) + none;
 }

@@ -7,9 +7,9 @@
 
 namespace alidade {
 
-/// The models, sources and estimators on offer: name, kind, doc, file.
-std::string PluginList(const PluginHost& host);
-/// The same as a JSON array of objects with `name`, `kind`, `family`, `doc`, `citation`, `file`,
+/// The models, sources and estimators on offer: name, kind, doc and, with `files`, the file.
+std::string PluginList(const PluginHost& host, bool files = false);
+/// The same, with files, as a JSON array of objects with `name`, `kind`, `family`, `doc`, `citation`, `file`,
 /// `unoptimised`.
 std::string PluginListJson(const PluginHost& host);
 

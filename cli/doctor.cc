@@ -88,6 +88,20 @@ std::string RemedyFor(const Refusal& refusal) {
   return "build it anew against this alidade, or remove it";
 }
 
+/// A filter is compared with a batch, which is built only if its solver is installed.
+void CheckBatch(const PluginHost& host, Diagnosis& diagnosis) {
+  const auto is_batch = [](const PluginEntry& entry) {
+    return entry.kind == PluginEntry::Kind::kEstimator && entry.estimator == EstimatorKind::kBatch;
+  };
+  const auto batch = std::ranges::find_if(host.entries(), is_batch);
+  if (batch != host.entries().end()) {
+    diagnosis.Ok("batch estimator: " + batch->name);
+  } else {
+    diagnosis.Warn("the batch estimator is not built: no filter can be compared with a batch",
+                   "apt-get install libceres-dev, then configure and build all targets");
+  }
+}
+
 void CheckPlugins(const std::vector<std::string>& paths, Diagnosis& diagnosis) {
   const PluginHost host(Absolute(paths), OnRefusal::kList);
   for (const std::string& place : host.searched()) diagnosis.Ok("searched " + place);
@@ -118,6 +132,7 @@ void CheckPlugins(const std::vector<std::string>& paths, Diagnosis& diagnosis) {
     diagnosis.Fail("plugins: " + found,
                    "build or install them all, or name their folder: ALIDADE_PLUGIN_PATH=FOLDER");
   }
+  CheckBatch(host, diagnosis);
 }
 
 bool OnPath(const char* program) {

@@ -428,5 +428,19 @@ TEST_F(Cli, DoctorFindsThisBuildHealthy) {
   EXPECT_TRUE(Contains(doctor.out, "yaml-cpp 0.")) << doctor.out;
 }
 
+TEST_F(Cli, DoctorTellsWhetherTheBatchIsBuilt) {
+  const bool is_built =
+      fs::exists(ALIDADE_BINARY_DIR "/lib/alidade/plugins/alidade_ceres_batch.so");
+  const Outcome doctor = Call({"doctor"});
+  EXPECT_EQ(Contains(doctor.out, "ok    batch estimator: ceres_batch\n"), is_built) << doctor.out;
+  EXPECT_EQ(
+      Contains(doctor.out,
+               "warn  the batch estimator is not built: no filter can be compared with a "
+               "batch\n      remedy: apt-get install libceres-dev, then configure and build all "
+               "targets\n"),
+      !is_built)
+      << doctor.out;
+}
+
 }  // namespace
 }  // namespace alidade

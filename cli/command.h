@@ -70,10 +70,12 @@ std::filesystem::path Resolved(const std::string& path);
 void KeepInputs(const std::string& output, const std::vector<std::string>& inputs);
 
 /// Where output goes: `given`, or the config's `output:` inside runs/, or runs/PREFIX and the name
-/// of the config: of its folder where it is called config.yaml, else of the file. Errors:
-/// kCannotCreate where `given` is runs/ itself, or it would replace the config or what that reads;
-/// kNotTrusted, kBadConfig.
+/// of the config: of its folder where it is called config.yaml, else of the file. If nothing is
+/// given, and the folder exists without `force`, it is the first of NAME-2, NAME-3, ... that does
+/// not, which is said unless `quiet`. Errors: kCannotCreate where `given` is runs/ itself, or it
+/// would replace the config or what that reads; kNotTrusted, kBadConfig.
 std::filesystem::path OutputFolder(const std::string& given, const Config& config,
-                                   const Input& input, const std::string& prefix = "");
+                                   const Input& input, bool force, bool quiet,
+                                   const std::string& prefix = "");
 
 }  // namespace alidade::cli

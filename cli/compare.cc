@@ -151,7 +151,8 @@ ExitCode CompareConfig(const CompareArguments& arguments) {
   input.config = arguments.of.front();
   Config config = input.Load();
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
-  const fs::path folder = OutputFolder(arguments.folder, config, input, "compare-");
+  const fs::path folder =
+      OutputFolder(arguments.folder, config, input, arguments.force, arguments.quiet, "compare-");
   const PluginHost host = input.Host(config);
   ReportCrashes();
   StopOnSignals();

@@ -182,12 +182,28 @@ fs::path NamedFolder(const std::string& given, const Config& config, const Input
   return fs::path(kRuns) / (prefix + NameOf(input.config));
 }
 
+/// `folder`, or the first of FOLDER-2, FOLDER-3, ... that does not exist.
+fs::path FreeFolder(const fs::path& folder) {
+  const auto is_there = [](const fs::path& path) {
+    std::error_code error;
+    return fs::exists(fs::symlink_status(path, error));
+  };
+  fs::path free = folder;
+  for (int n = 2; is_there(free); ++n) free = folder.string() + '-' + std::to_string(n);
+  return free;
+}
+
 }  // namespace
 
 fs::path OutputFolder(const std::string& given, const Config& config, const Input& input,
-                      const std::string& prefix) {
-  fs::path folder = NamedFolder(given, config, input, prefix);
+                      bool force, bool quiet, const std::string& prefix) {
+  const fs::path named = NamedFolder(given, config, input, prefix);
+  const fs::path folder = given.empty() && !force ? FreeFolder(named) : named;
   KeepInputs(folder.string(), config.inputs());
+  if (folder != named && !quiet) {
+    PrintNote(named.string() + " exists: the output is " + folder.string() + " (--force replaces " +
+              named.string() + ')');
+  }
   return folder;
 }
 

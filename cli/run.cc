@@ -18,7 +18,7 @@ namespace alidade::cli {
 namespace {
 
 constexpr const char* kRunFooter = R"(Examples:
-  alidade run base.yaml                            into runs/base
+  alidade run base.yaml                            into runs/base, then runs/base-2
   alidade run near/config.yaml                     into runs/near
   alidade run config.yaml -o runs/b --seed 2 --set estimators.ekf.gate=0.99
   alidade run config.yaml --set source.path=other.csv --force
@@ -97,7 +97,8 @@ std::string Summary(const RunResult& result, const Recorder& recorder) {
 ExitCode RunConfig(const RunArguments& arguments) {
   Config config = arguments.input.Load();
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
-  const std::filesystem::path folder = OutputFolder(arguments.folder, config, arguments.input);
+  const std::filesystem::path folder =
+      OutputFolder(arguments.folder, config, arguments.input, arguments.force, arguments.quiet);
   const PluginHost host = arguments.input.Host(config);
   ReportCrashes();
   StopOnSignals();  // before a source that waits for its pipe is made

@@ -43,8 +43,8 @@ std::string IsInside(const std::string& name) {
 ExitCode RunSimulate(const SimulateArguments& arguments) {
   Config config = arguments.input.Load();
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
-  const std::filesystem::path path =
-      OutputFolder(arguments.folder, config, arguments.input, "data-");
+  const std::filesystem::path path = OutputFolder(arguments.folder, config, arguments.input,
+                                                  arguments.force, arguments.quiet, "data-");
   const PluginHost host = arguments.input.Host(config);
   StopOnSignals();
   const SimulateResult result =

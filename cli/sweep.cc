@@ -122,8 +122,8 @@ ExitCode SweepValues(const Task& task) {
 
 ExitCode RunSweep(const SweepArguments& arguments) {
   const Config config = arguments.input.Load();
-  const std::filesystem::path path =
-      OutputFolder(arguments.folder, config, arguments.input, "sweep-");
+  const std::filesystem::path path = OutputFolder(arguments.folder, config, arguments.input,
+                                                  arguments.force, arguments.quiet, "sweep-");
   const PluginHost host = arguments.input.Host(config);
 
   ReportCrashes();

@@ -163,7 +163,9 @@ TEST_F(SweepCli, ReportsFailedRunsWithTheirSeeds) {
 TEST_F(SweepCli, ReplacesItsFolderOnlyByForce) {
   EXPECT_EQ(Call({"sweep", "config.yaml", "--runs", "1"}).code, 0);
   EXPECT_TRUE(Exists("runs/sweep-config/sweep.json"));
-  EXPECT_EQ(Call({"sweep", "config.yaml", "--runs", "1"}).code, 73);
+  EXPECT_EQ(Call({"sweep", "config.yaml", "--runs", "1"}).code, 0);
+  EXPECT_TRUE(Exists("runs/sweep-config-2/sweep.json"));
+  EXPECT_EQ(Call({"sweep", "config.yaml", "--runs", "1", "-o", "runs/sweep-config"}).code, 73);
   EXPECT_EQ(Call({"sweep", "config.yaml", "--runs", "1", "--force"}).code, 0);
 }
 

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "alidade/record/recorder.h"
+#include "alidade/run/metric_rows.h"
 #include "command.h"
 #include "console.h"
 
@@ -31,7 +32,7 @@ struct RunArguments {
   Input input;
   std::string folder;
   std::optional<std::uint64_t> seed;
-  bool force = false, quiet = false, no_figures = false, covariances = false;
+  bool force = false, quiet = false, no_figures = false, covariances = false, all = false;
 };
 
 /// Events of one estimator and one kind.
@@ -81,8 +82,8 @@ std::string EventSummary(const RunResult& result) {
   return text;
 }
 
-std::string Summary(const RunResult& result, const Recorder& recorder) {
-  std::string text = ComparisonTable(result);
+std::string Summary(const RunResult& result, const std::string& table, const Recorder& recorder) {
+  std::string text = table;
   if (const std::string events = EventSummary(result); !events.empty()) text += '\n' + events;
   if (const std::string note = UnoptimisedText(result.unoptimised); !note.empty()) {
     text += '\n' + note + '\n';
@@ -119,7 +120,12 @@ ExitCode RunConfig(const RunArguments& arguments) {
   if (result.status == RunStatus::kStopped) PrintNote(result.reason);
   FinishOnSignals();
   recorder.Finish(result);
-  if (!arguments.quiet) Print(Summary(result, recorder));
+  if (!arguments.quiet) {
+    const std::string table = arguments.all
+                                  ? ComparisonTable(result)
+                                  : internal::MainTable(result, internal::SubjectsOf(experiment));
+    Print(Summary(result, table, recorder));
+  }
   return result.code;
 }
 
@@ -134,6 +140,7 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
             "run folder; default: the config's `output:`, or its name, in runs/");
   AddSeed(command, arguments->seed);
   command.add_flag("--force", arguments->force, "replace the run folder if it is there");
+  command.add_flag("--all", arguments->all, "print all rows of the table, not ten");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.add_flag("--no-figures", arguments->no_figures, "draw no figures");
   command.add_flag("--covariances", arguments->covariances,

@@ -141,6 +141,61 @@ TEST_F(OutputCli, MeasurementsStandBesideWhatTruthMakesOfThem) {
   EXPECT_TRUE(Contains(figure, "'expected.csv'")) << figure;
 }
 
+// Without -o no run is lost and none is refused.
+TEST_F(OutputCli, ASecondRunGoesToANumberedFolder) {
+  const Arguments run = {"run", "config.yaml", "--no-figures"};
+  const Outcome first = Call(run), second = Call(run);
+  EXPECT_EQ(first.err, "");
+  EXPECT_EQ(second.code, 0) << second.err;
+  EXPECT_EQ(second.err,
+            "runs/config exists: the output is runs/config-2 (--force replaces runs/config)\n");
+  EXPECT_TRUE(Contains(second.out, "\nwrote runs/config-2\n")) << second.out;
+  EXPECT_TRUE(Exists("runs/config-2/run.json"));
+  const Outcome third = Call({"run", "config.yaml", "--no-figures", "--quiet"});
+  EXPECT_EQ(third.err, "");
+  EXPECT_TRUE(Exists("runs/config-3/run.json"));
+  EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "--force"}).err, "");
+  EXPECT_FALSE(Exists("runs/config-4"));
+  for (const std::string name : {"own", "own-2"}) {
+    EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "--set", "output=own"}).code, 0);
+    EXPECT_TRUE(Exists("runs/" + name + "/run.json"));
+  }
+  EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "-o", "runs/own"}).code, 73);
+}
+
+// The first turn takes five of the eight rows, the second three: it ends before the second sensor's
+// `accepted`.
+TEST_F(OutputCli, RunPrintsTenRowsAndAllOfThemIfAsked) {
+  const auto labels = [](const std::string& out) {
+    std::vector<std::string> found;
+    std::istringstream lines(out);
+    std::string line;
+    std::getline(lines, line);  // the names of the columns
+    while (std::getline(lines, line) && !line.empty()) {
+      found.push_back(line.substr(0, line.find("  ")));
+    }
+    return found;
+  };
+  const Outcome ten = Call({"run", "config.yaml", "--no-figures"});
+  EXPECT_EQ(labels(ten.out),
+            (std::vector<std::string>{"rmse target.depth [mm]", "rmse target.depth_rate [mm/s]",
+                                      "cov95 target.depth [%]", "nees.mean target",
+                                      "nees.mean template", "nis.mean scale", "nis.mean stereo",
+                                      "accepted stereo", "diverged", "inconsistent"}))
+      << ten.out;
+  const Outcome all = Call({"run", "config.yaml", "--no-figures", "--all"});
+  const std::size_t rows = labels(all.out).size();
+  EXPECT_GT(rows, 10u) << all.out;
+  EXPECT_TRUE(Contains(ten.out, '\n' + std::to_string(rows - 10) + " more rows: --all\n"))
+      << ten.out;
+  EXPECT_FALSE(Contains(all.out, "more rows")) << all.out;
+  const std::string report = Read("runs/config/report.html");
+  const std::size_t details = report.find("<details><summary>all rows</summary>");
+  ASSERT_NE(details, report.npos);
+  EXPECT_LT(report.find("<td>nis.mean stereo</td>"), details);
+  EXPECT_GT(report.find("<td>lag target.depth [ms]</td>"), details);
+}
+
 TEST_F(OutputCli, SaysThatTheCurrentFolderIsGone) {
   fs::create_directory(folder_ / "gone");
   before_ = "cd gone; rmdir ../gone";

@@ -6,12 +6,15 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <set>
 #include <string_view>
 #include <tuple>
+#include <utility>
 
 #include "alidade/base/number_text.h"
 #include "alidade/base/text_table.h"
 #include "alidade/base/words.h"
+#include "alidade/run/experiment.h"
 
 namespace alidade {
 namespace internal {
@@ -172,6 +175,74 @@ bool IsMain(const RunResult& result, const std::string& key) {
   return std::find(kOrder.begin(), kOrder.end(), kind) != kOrder.end();
 }
 
+/// The main metrics and the counts whose keys are `wanted`.
+template <class Wanted>
+std::vector<TableRow> RowsWhere(const RunResult& result, const Wanted& wanted) {
+  std::vector<TableRow> rows;
+  for (const std::string& key : OrderedMetrics(result)) {
+    if (IsMain(result, key) && wanted(key)) rows.push_back(RowOf(result, key));
+  }
+  for (const std::string& key : OrderedCounts(result)) {
+    if (!wanted(key)) continue;
+    TableRow row{std::string(KindOf(key)) + ' ' + std::string(SubjectOf(key)), {}};
+    for (const EstimatorResult& one : result.estimators) {
+      const auto count = one.counts.find(key);
+      row.cells.push_back(count == one.counts.end() ? "-" : std::to_string(count->second));
+    }
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+void AddHealthRows(const RunResult& result, std::vector<TableRow>& rows) {
+  TableRow diverged{"diverged", {}}, inconsistent{"inconsistent", {}};
+  for (const EstimatorResult& one : result.estimators) {
+    diverged.cells.emplace_back(one.diverged ? "yes" : "no");
+    inconsistent.cells.emplace_back(one.inconsistent ? "yes" : "no");
+  }
+  rows.push_back(std::move(diverged));
+  rows.push_back(std::move(inconsistent));
+}
+
+constexpr std::size_t kMainRows = 10;
+
+/// The keys of MainRows but for the two of health.
+std::set<std::string> MainKeys(const RunResult& result, const std::vector<std::string>& subjects) {
+  constexpr std::array<std::string_view, 7> kDealt = {
+      "rmse", "nees.mean", "nis.mean", "accepted", "cov95", "map.sim3.rmse", "reprojection"};
+  // Turn, kind, key.
+  std::vector<std::tuple<std::size_t, std::size_t, std::string>> dealt;
+  for (std::size_t kind = 0; kind < kDealt.size(); ++kind) {
+    std::vector<std::pair<std::size_t, std::string>> keys;
+    const auto take = [&](const std::vector<std::string>& candidates, bool is_count) {
+      for (const std::string& key : candidates) {
+        if (KindOf(key) != kDealt[kind] || key.find('@') != key.npos) continue;
+        if (!is_count && !IsMain(result, key)) continue;
+        const auto place = std::find(subjects.begin(), subjects.end(), SubjectOf(key));
+        keys.emplace_back(static_cast<std::size_t>(place - subjects.begin()), key);
+      }
+    };
+    take(Keys(result, &EstimatorResult::metrics), false);
+    take(Keys(result, &EstimatorResult::counts), true);
+    std::sort(keys.begin(), keys.end());
+    for (std::size_t turn = 0; turn < keys.size(); ++turn) {
+      dealt.emplace_back(turn, kind, keys[turn].second);
+    }
+  }
+  std::sort(dealt.begin(), dealt.end());
+  std::set<std::string> chosen;
+  for (std::size_t i = 0; i < std::min(dealt.size(), kMainRows - 2); ++i) {
+    chosen.insert(std::get<2>(dealt[i]));
+  }
+  return chosen;
+}
+
+std::string TableOf(const RunResult& result, const std::vector<TableRow>& rows) {
+  const std::string reference = ReferenceText(result);
+  return RightAlignedTable(NamesOf(result.estimators), rows) +
+         (reference.empty() ? "" : '\n' + reference + '\n');
+}
+
 }  // namespace
 
 std::vector<std::string> OrderedMetrics(const RunResult& result) {
@@ -189,19 +260,7 @@ std::vector<std::string> OrderedCounts(const RunResult& result) {
 }
 
 std::vector<TableRow> MetricRows(const RunResult& result) {
-  std::vector<TableRow> rows;
-  for (const std::string& key : OrderedMetrics(result)) {
-    if (IsMain(result, key)) rows.push_back(RowOf(result, key));
-  }
-  for (const std::string& key : OrderedCounts(result)) {
-    TableRow row{std::string(KindOf(key)) + ' ' + std::string(SubjectOf(key)), {}};
-    for (const EstimatorResult& one : result.estimators) {
-      const auto count = one.counts.find(key);
-      row.cells.push_back(count == one.counts.end() ? "-" : std::to_string(count->second));
-    }
-    rows.push_back(std::move(row));
-  }
-  return rows;
+  return RowsWhere(result, [](const std::string&) { return true; });
 }
 
 std::vector<TableRow> RowsOf(const RunResult& result, const std::vector<RowKind>& kinds) {
@@ -220,14 +279,40 @@ std::vector<TableRow> RowsOf(const RunResult& result, const std::vector<RowKind>
 
 std::vector<TableRow> ComparisonRows(const RunResult& result) {
   std::vector<TableRow> rows = MetricRows(result);
-  TableRow diverged{"diverged", {}}, inconsistent{"inconsistent", {}};
-  for (const EstimatorResult& one : result.estimators) {
-    diverged.cells.emplace_back(one.diverged ? "yes" : "no");
-    inconsistent.cells.emplace_back(one.inconsistent ? "yes" : "no");
-  }
-  rows.push_back(std::move(diverged));
-  rows.push_back(std::move(inconsistent));
+  AddHealthRows(result, rows);
   return rows;
+}
+
+std::vector<std::string> SubjectsOf(const Experiment& experiment) {
+  std::vector<std::string> subjects;
+  const auto add = [&](const std::string& name) {
+    if (std::ranges::count(subjects, name) == 0) subjects.push_back(name);
+  };
+  for (const NamedEstimator& named : experiment.estimators) {
+    for (const Block& block : named.system.layout.blocks()) {
+      add(block.name);
+      add(block.owner);
+    }
+    for (const SensorBinding& sensor : named.system.sensors) add(sensor.name);
+  }
+  return subjects;
+}
+
+std::vector<TableRow> MainRows(const RunResult& result, const std::vector<std::string>& subjects) {
+  std::vector<TableRow> all = ComparisonRows(result);
+  if (all.size() <= kMainRows) return all;
+  const std::set<std::string> keys = MainKeys(result, subjects);
+  std::vector<TableRow> rows =
+      RowsWhere(result, [&](const std::string& key) { return keys.contains(key); });
+  AddHealthRows(result, rows);
+  return rows;
+}
+
+std::string MainTable(const RunResult& result, const std::vector<std::string>& subjects) {
+  const std::vector<TableRow> rows = MainRows(result, subjects);
+  const std::size_t left_out = ComparisonRows(result).size() - rows.size();
+  return TableOf(result, rows) +
+         (left_out > 0 ? '\n' + std::to_string(left_out) + " more rows: --all\n" : "");
 }
 
 std::string ReferenceText(const RunResult& result) {
@@ -240,10 +325,7 @@ std::string ReferenceText(const RunResult& result) {
 }  // namespace internal
 
 std::string ComparisonTable(const RunResult& result) {
-  const std::string reference = internal::ReferenceText(result);
-  return internal::RightAlignedTable(internal::NamesOf(result.estimators),
-                                     internal::ComparisonRows(result)) +
-         (reference.empty() ? "" : '\n' + reference + '\n');
+  return internal::TableOf(result, internal::ComparisonRows(result));
 }
 
 }  // namespace alidade

@@ -19,6 +19,16 @@ std::vector<std::string> OrderedCounts(const RunResult& result);
 std::vector<TableRow> MetricRows(const RunResult& result);
 /// These, whether it diverged and whether its errors were inconsistent.
 std::vector<TableRow> ComparisonRows(const RunResult& result);
+/// What rows are about, in the order of the config: the blocks, their owners and the sensors of
+/// each estimator.
+std::vector<std::string> SubjectsOf(const Experiment& experiment);
+/// The ten rows of ComparisonRows that matter most, in its order; all of them if they are no more.
+/// `diverged` and `inconsistent` are two. The others are dealt out in turns: the first subject's
+/// rmse, nees.mean, nis.mean, accepted, cov95, map.sim3.rmse and reprojection, then the second
+/// subject's, and so on. Segments are left out; unknown subjects come last, by name.
+std::vector<TableRow> MainRows(const RunResult& result, const std::vector<std::string>& subjects);
+/// ComparisonTable() of these rows, with the number of those left out.
+std::string MainTable(const RunResult& result, const std::vector<std::string>& subjects);
 /// Metrics whose keys begin alike, `rmse` of `rmse:target.depth`, and what a row calls them.
 struct RowKind {
   std::string kind, label;

@@ -119,6 +119,41 @@ TEST(ComparisonTable, FoldsWhatIsWiderThanALine) {
   EXPECT_GT(widest, 60);
 }
 
+// Two of health, five of the first turn; of the second the first three. In all 9 rows of blocks, 6
+// over segments (without lag), 4 means, 3 counts and 2 of health: 24, of which 14 are left out.
+TEST(MainRows, AreDealtOutInTheOrderOfTheConfig) {
+  RunResult result;
+  std::map<std::string, double> metrics;
+  for (const char* block : {"cam.heading", "cam.position", "cam.velocity"}) {
+    for (const char* kind : {"rmse:", "cov95:", "lag_ms:"}) {
+      metrics[kind + std::string(block)] = 0.5;
+      metrics[kind + std::string(block) + "@blind"] = 0.5;
+    }
+  }
+  for (const char* owner : {"cam", "map"}) metrics[std::string("nees.mean:") + owner] = 0.5;
+  for (const char* sensor : {"left", "right"}) metrics[std::string("nis.mean:") + sensor] = 0.5;
+  result.estimators = {Named("ekf", metrics)};
+  result.estimators[0].counts = {{"accepted:left", 3}, {"accepted:right", 4}, {"gated:left", 1}};
+  const std::vector<std::string> subjects = {"cam.position", "cam",   "cam.heading",
+                                             "cam.velocity", "right", "left"};
+  std::vector<std::string> labels;
+  for (const auto& row : internal::MainRows(result, subjects)) labels.push_back(row.label);
+  EXPECT_EQ(labels, (std::vector<std::string>{"rmse cam.heading [mrad]", "rmse cam.position",
+                                              "cov95 cam.position [%]", "nees.mean cam",
+                                              "nees.mean map", "nis.mean left", "nis.mean right",
+                                              "accepted right", "diverged", "inconsistent"}));
+  EXPECT_NE(internal::MainTable(result, subjects).find("\n14 more rows: --all\n"),
+            std::string::npos)
+      << internal::MainTable(result, subjects);
+}
+
+TEST(MainRows, AreAllOfThemWhereTheyAreNoMoreThanTen) {
+  RunResult result;
+  result.estimators = {Named("ekf", {{"rmse:target.depth", 0.5}, {"lag_ms:target.depth", 1.0}})};
+  EXPECT_EQ(internal::MainRows(result, {}).size(), 4u);
+  EXPECT_EQ(internal::MainTable(result, {}), ComparisonTable(result));
+}
+
 TEST(MarkdownTable, KeepsWhatWouldEndACell) {
   EXPECT_EQ(internal::MarkdownTable("`ekf`", {"rmse", "|e|"}, {{"a|b", {"1", "2"}}}),
             "| `ekf` | rmse | \\|e\\| |\n|---|---:|---:|\n| a\\|b | 1 | 2 |\n");

@@ -19,6 +19,7 @@
 #include "alidade/record/report_html.h"
 #include "alidade/record/run_json.h"
 #include "alidade/record/source_files.h"
+#include "alidade/run/metric_rows.h"
 
 namespace alidade {
 
@@ -41,6 +42,7 @@ struct Recorder::Impl {
   const PluginHost& host;
   std::string title, config_text, source_type;
   internal::RunFacts facts;
+  std::vector<std::string> subjects;       ///< of the rows, as SubjectsOf
   std::set<std::filesystem::path> hashed;  ///< plugins that are in the facts
   std::optional<internal::SourceFiles> source;
   std::optional<internal::DataHash> data;
@@ -160,7 +162,7 @@ std::string Recorder::Impl::TimingJson(const RunResult& result) const {
 }
 
 void Recorder::Impl::WriteReport(const RunResult& result, const internal::RecordedRun& recorded) {
-  internal::Report report{title, config_text, facts, {}, {}};
+  internal::Report report{title, config_text, facts, {}, {}, subjects};
   if (options.figures) {
     const auto limit = std::chrono::duration<double>(options.drawing_s);
     const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(limit);
@@ -187,6 +189,7 @@ Recorder::~Recorder() = default;
 
 void Recorder::Begin(const Experiment& experiment) {
   impl_->facts.seed = experiment.seed;
+  impl_->subjects = internal::SubjectsOf(experiment);
   impl_->AddPlugins(experiment);
   impl_->source.emplace(impl_->folder, experiment);
   impl_->data.emplace(experiment.source->streams(), experiment.source->truths());

@@ -78,14 +78,13 @@ std::string Head(const RunResult& result, const Report& report) {
   return html + "<a href=\"#config\">Config</a></nav>\n";
 }
 
-std::string Comparison(const RunResult& result) {
-  std::string html =
-      "<h2 id=\"comparison\">Comparison</h2>\n<div class=\"scroll\"><table>\n<tr><th></th>";
+std::string Table(const RunResult& result, const std::vector<TableRow>& rows) {
+  std::string html = "<div class=\"scroll\"><table>\n<tr><th></th>";
   for (const EstimatorResult& one : result.estimators) {
     html += "<th>" + HtmlEscaped(one.name) + "</th>";
   }
   html += "</tr>\n";
-  for (const TableRow& row : ComparisonRows(result)) {
+  for (const TableRow& row : rows) {
     html += "<tr><td>" + HtmlEscaped(row.label) + "</td>";
     for (const std::string& cell : row.cells) {
       html += cell == "yes" ? "<td class=\"alarm\">" : "<td>";
@@ -93,7 +92,15 @@ std::string Comparison(const RunResult& result) {
     }
     html += "</tr>\n";
   }
-  html += "</table></div>\n";
+  return html + "</table></div>\n";
+}
+
+std::string Comparison(const RunResult& result, const std::vector<std::string>& subjects) {
+  const std::vector<TableRow> rows = MainRows(result, subjects), all = ComparisonRows(result);
+  std::string html = "<h2 id=\"comparison\">Comparison</h2>\n" + Table(result, rows);
+  if (all.size() > rows.size()) {
+    html += "<details><summary>all rows</summary>\n" + Table(result, all) + "</details>\n";
+  }
   if (const std::string reference = ReferenceText(result); !reference.empty()) {
     html += Element("p", reference);
   }
@@ -182,7 +189,7 @@ std::string ReportHtml(const RunResult& result, const Report& report) {
   std::string html = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
   html += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n";
   html += Element("title", report.title) + "<style>" + kStyle + "</style>\n</head>\n<body><main>\n";
-  html += Head(result, report) + Comparison(result);
+  html += Head(result, report) + Comparison(result, report.subjects);
   html += "<h2 id=\"figures\">Figures</h2>\n" + FiguresOf(report, "");
   if (!report.figures.note.empty()) html += Element("p", report.figures.note);
   for (std::size_t i = 0; i < result.estimators.size(); ++i) {

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "alidade/record/figures.h"
 #include "alidade/record/run_json.h"
@@ -16,6 +17,7 @@ struct Report {
   RunFacts facts;
   Figures figures;
   std::map<std::string, std::string> svgs;  ///< by name of the figure
+  std::vector<std::string> subjects = {};   ///< SubjectsOf the experiment
 };
 
 /// One page with all in it: no script, no other file, no clock.

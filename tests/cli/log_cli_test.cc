@@ -28,7 +28,7 @@ TEST_F(LogCli, OptionQuietAndEnvironmentSetTheLevel) {
   const auto has = [&](const Arguments& more, bool info, bool debug) {
     const Outcome run = Call(Run(more));
     EXPECT_EQ(run.code, 0) << run.err;
-    EXPECT_EQ(Contains(run.err, "info: source: streams disparity, inverse_scale; truth "), info)
+    EXPECT_EQ(Contains(run.err, "info: source: streams disparity, disparity_all, "), info)
         << run.err;
     EXPECT_EQ(Contains(run.err, "debug: plugin loaded: "), debug) << run.err;
     EXPECT_EQ(Contains(run.err, "debug: ekf: "), debug) << run.err;  // the duration
@@ -90,7 +90,7 @@ TEST_F(LogCli, TheLogOfARunHasTheSameBytes) {
   };
   const std::string one = into("one", {}), two = into("two", {"--log-level", "trace"});
   EXPECT_EQ(one, two);
-  EXPECT_TRUE(one.starts_with("info: source: streams disparity, inverse_scale; truth ")) << one;
+  EXPECT_TRUE(one.starts_with("info: source: streams disparity, disparity_all, ")) << one;
   EXPECT_TRUE(Contains(one,
                        "\ninfo: ekf: type ekf; sensors stereo, scale; blocks target.depth, "
                        "target.depth_rate, template.inverse_distance\n"))

@@ -23,8 +23,8 @@ TEST(Recorder, WritesEveryFile) {
           "alone/estimates.csv", "alone/events.csv", "alone/gains.csv", "alone/innovations.csv",
           "comparison.csv", "config.resolved.yaml", "ekf/estimates.csv", "ekf/events.csv",
           "ekf/gains.csv", "ekf/innovations.csv", "expected.csv", "files.txt", "implied.csv",
-          "measurements.csv", "report.html", "run.json", "timing.json", "truth.csv"}));
-  EXPECT_EQ(FilesIn(folder.path()).size(), 18u);  // nothing beside it
+          "log.txt", "measurements.csv", "report.html", "run.json", "timing.json", "truth.csv"}));
+  EXPECT_EQ(FilesIn(folder.path()).size(), 19u);  // nothing beside it
 }
 
 TEST(Recorder, EstimatesRoundTrip) {

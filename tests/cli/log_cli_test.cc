@@ -81,7 +81,6 @@ TEST_F(LogCli, EveryCommandTakesALevel) {
 // The folder holds no level below info, no clock and no place: another folder, another terminal
 // level, the same bytes.
 TEST_F(LogCli, TheLogOfARunHasTheSameBytes) {
-  const Arguments run = Diverging({"run", "config.yaml", "--no-figures", "-o"});
   const auto into = [&](const std::string& folder, const Arguments& more) {
     Arguments all = Diverging({"run", "config.yaml", "--no-figures", "-o", folder});
     all.insert(all.end(), more.begin(), more.end());

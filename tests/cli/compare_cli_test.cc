@@ -373,10 +373,20 @@ TEST_F(CompareCli, RefusesWhatItCannotCompare) {
   Write("a/ekf/estimates.csv", whole.substr(0, whole.size() - 1));
   fails({"compare", "a"}, 65, "estimates.csv:153: the last line is cut short");
   Write("a/ekf/estimates.csv", whole);
-  Write("a/run.json", std::regex_replace(Read("a/run.json"), std::regex("\"data\""), "\"date\""));
+  const std::string json = Read("a/run.json");
+  const auto with = [&](const char* text, const char* other) {
+    Write("a/run.json", std::regex_replace(json, std::regex(text), other));
+  };
+  with("\"data\"", "\"date\"");
   fails({"compare", "a"}, 65, "does not say which data the run saw");
-  Write("a/run.json", "{\"status\": ");
-  fails({"compare", "a"}, 65, "a/run.json:1");
+  with("\"frames\": 152", "\"frames\": \"many\"");
+  fails({"compare", "a"}, 65, "a/run.json frames: \"many\"; expected a whole number from 0 to");
+  with("\"rows\": 152", "\"rows\": -152");
+  fails({"compare", "a"}, 65, "a/run.json estimators.ekf.rows: -152; expected a whole number");
+  with("\"smoothed\"", "\"smooth\"");
+  fails({"compare", "a"}, 65, "a/run.json estimators.ekf: the key 'smoothed' is missing");
+  Write("a/run.json", "{\n  \"status\": ");
+  fails({"compare", "a"}, 65, "a/run.json:2:13: ");
 }
 
 }  // namespace

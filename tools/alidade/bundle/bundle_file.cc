@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <nlohmann/json.hpp>
 
 #include "alidade/base/json.h"
 #include "alidade/base/number_text.h"
@@ -100,42 +101,39 @@ void AddLeftOut(const BundleFile& file, internal::Json& json) {
     camera_used[static_cast<std::size_t>(seen.camera)] = true;
     point_used[static_cast<std::size_t>(seen.point)] = true;
   }
-  json.Key("observations_undefined")
-      .Integer(std::ranges::count(problem.observations, false, &BundleObservation::used));
-  json.Key("cameras_unused").Integer(std::ranges::count(camera_used, false));
-  json.Key("points_unused").Integer(std::ranges::count(point_used, false));
+  json["observations_undefined"] =
+      std::ranges::count(problem.observations, false, &BundleObservation::used);
+  json["cameras_unused"] = std::ranges::count(camera_used, false);
+  json["points_unused"] = std::ranges::count(point_used, false);
   if (file.format != BundleFormat::kTracks) return;
-  json.Key("observations_invalid").Integer(file.invalid);
-  json.Key("frames_without_pose").Integer(file.frames_left_out);
-  json.Key("points_without_parallax").Integer(file.points_left_out);
-  json.Key("observations_of_these").Integer(file.unplaced);
+  json["observations_invalid"] = file.invalid;
+  json["frames_without_pose"] = file.frames_left_out;
+  json["points_without_parallax"] = file.points_left_out;
+  json["observations_of_these"] = file.unplaced;
 }
 
 std::string ResultJson(const BundleFile& file, const BundleResult& result, double rms_before,
                        double rms_after) {
-  internal::Json json;
-  json.Object();
-  json.Key("format").Text(ToString(file.format));
-  json.Key("status").Text(ToString(result.end));
-  json.Key("message").Text(result.message);
-  json.Key("cameras").Integer(std::ssize(file.problem.cameras));
-  json.Key("points").Integer(std::ssize(file.problem.points));
-  json.Key("observations").Integer(std::ssize(file.problem.observations));
+  internal::Json json = {{"format", ToString(file.format)},
+                         {"status", ToString(result.end)},
+                         {"message", result.message},
+                         {"cameras", file.problem.cameras.size()},
+                         {"points", file.problem.points.size()},
+                         {"observations", file.problem.observations.size()}};
   AddLeftOut(file, json);
-  json.Key("rms_before_px").Number(rms_before);
-  json.Key("rms_after_px").Number(rms_after);
-  json.Key("cost_before").Number(result.cost_before);
-  json.Key("cost_after").Number(result.cost_after);
-  json.Key("iterations").Integer(result.iterations);
-  json.Key("residuals").Integer(result.residuals);
-  json.Key("unknowns").Integer(result.unknowns);
+  json["rms_before_px"] = rms_before;
+  json["rms_after_px"] = rms_after;
+  json["cost_before"] = result.cost_before;
+  json["cost_after"] = result.cost_after;
+  json["iterations"] = result.iterations;
+  json["residuals"] = result.residuals;
+  json["unknowns"] = result.unknowns;
   if (result.extent_before > 0.0) {
-    json.Key("extent_before").Number(result.extent_before);
-    json.Key("extent_after").Number(result.extent_after);
+    json["extent_before"] = result.extent_before;
+    json["extent_after"] = result.extent_after;
   }
-  if (result.rank >= 0) json.Key("rank").Integer(result.rank);
-  json.End();
-  return json.text();
+  if (result.rank >= 0) json["rank"] = result.rank;
+  return internal::JsonText(json);
 }
 
 }  // namespace

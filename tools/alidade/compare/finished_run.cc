@@ -5,9 +5,11 @@
 #include <charconv>
 #include <cmath>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "alidade/base/text_cell.h"
+#include "alidade/compare/json_node.h"
 
 namespace alidade::internal {
 namespace {
@@ -28,26 +30,15 @@ std::ifstream Open(const fs::path& file) {
                                                  "the folder of a run that came to its end"));
 }
 
-Config ReadJson(const fs::path& file) {
+Json ReadJson(const fs::path& file) {
   std::ostringstream text;
   text << Open(file).rdbuf();
-  return Config::FromText(text.str(), file.string());
+  return ParseJson(text.str(), file.string());
 }
 
-/// The number of a json value; NaN for null, which stands for what is not finite.
-double NumberOf(const Node& node) {
-  return node.kind() == Node::Kind::kNull ? kNan : node.Number();
-}
-
-std::string TextOf(const Node& map, const char* key) {
+std::string TextOf(const JsonNode& map, const char* key) {
   const auto node = map.Find(key);
   return node ? node->Text() : "";
-}
-
-std::vector<std::string> Texts(const Node& list) {
-  std::vector<std::string> texts;
-  for (const Node& item : list.Items()) texts.push_back(item.Text());
-  return texts;
 }
 
 /// Cells of a row without quotes; an empty one is NaN.
@@ -116,8 +107,8 @@ void ReadCovariances(const fs::path& file, Series& series) {
   series.covariances = std::move(cells);
 }
 
-Geometry GeometryOf(const Node& block) {
-  const int size = static_cast<int>(block.At("size").Integer(1, 1'000'000));
+Geometry GeometryOf(const JsonNode& block) {
+  const int size = static_cast<int>(block.At("size").Count(1'000'000));
   const Geometry all[] = {Geometry::Vector(size), Geometry::Angle(), Geometry::UnitQuaternion(),
                           Geometry::UnitVector()};
   const auto kind = block.At("geometry")
@@ -126,26 +117,25 @@ Geometry GeometryOf(const Node& block) {
   return all[kind];
 }
 
-EstimatorFacts ReadFacts(const Node& entry) {
+EstimatorFacts ReadFacts(const JsonNode& entry) {
   EstimatorFacts facts;
   facts.type = TextOf(entry, "type");
   using enum EstimatorKind;
-  facts.kind = static_cast<EstimatorKind>(
-      entry.At("kind", "a comparison")
-          .Choice({ToString(kFilter), ToString(kSmoother), ToString(kBatch), ToString(kWindow)}));
-  facts.smoothed = entry.At("smoothed", "a comparison").Flag();
+  facts.kind = static_cast<EstimatorKind>(entry.At("kind").Choice(
+      {ToString(kFilter), ToString(kSmoother), ToString(kBatch), ToString(kWindow)}));
+  facts.smoothed = entry.At("smoothed").Flag();
   facts.accepted_by = TextOf(entry, "accepted_by");
   facts.overrides = TextOf(entry, "overrides");
-  facts.sensors = Texts(entry.At("sensors"));
+  facts.sensors = entry.At("sensors").Texts();
   facts.path = TextOf(entry, "path");
-  facts.rows = entry.At("rows", "a comparison").Integer(0, INT64_MAX);
-  for (const Node& block : entry.At("blocks").Items()) {
+  facts.rows = entry.At("rows").Count();
+  for (const JsonNode& block : entry.At("blocks").Items()) {
     facts.blocks.push_back({block.At("name").Text(), TextOf(block, "unit"), GeometryOf(block)});
   }
   return facts;
 }
 
-EstimatorResult ReadResult(const std::string& name, const Node& entry) {
+EstimatorResult ReadResult(const std::string& name, const JsonNode& entry) {
   EstimatorResult result;
   result.name = name;
   result.failed = entry.At("failed").Flag();
@@ -155,15 +145,15 @@ EstimatorResult ReadResult(const std::string& name, const Node& entry) {
     } else if (key == "inconsistent") {
       result.inconsistent = value.Flag();
     } else {
-      result.metrics[key] = NumberOf(value);
+      result.metrics[key] = value.Number();
     }
   }
   for (const auto& [key, value] : entry.At("counts").Entries()) {
-    result.counts[key] = value.Integer(0, INT64_MAX);
+    result.counts[key] = value.Count();
   }
   for (const auto& [key, value] : entry.At("units").Entries()) result.units[key] = value.Text();
-  for (const Node& direction : entry.At("unobservable").Items()) {
-    result.unobservable.push_back(Texts(direction));
+  for (const JsonNode& direction : entry.At("unobservable").Items()) {
+    result.unobservable.push_back(direction.Texts());
   }
   return result;
 }
@@ -213,29 +203,28 @@ std::int64_t ComparedEntry::used() const {
   return CountOf(result, {ToString(Outcome::kAccepted), ToString(Outcome::kInitialised)});
 }
 
-namespace {
-
-ComparedRun ReadFiles(const fs::path& folder) {
+ComparedRun ReadRun(const fs::path& folder) {
   ComparedRun run;
   run.folder = folder;
-  const Config json = ReadJson(folder / "run.json"), timing = ReadJson(folder / "timing.json");
-  const Node root = json.root();
+  const fs::path run_file = folder / "run.json", timing_file = folder / "timing.json";
+  const Json run_json = ReadJson(run_file), timing_json = ReadJson(timing_file);
+  const JsonNode root(run_json, run_file.string()), timing(timing_json, timing_file.string());
   run.status = static_cast<RunStatus>(root.At("status").Choice({"ok", "stopped", "failed"}));
   run.reason = root.At("reason").Text();
   run.reference = root.At("reference").Text();
-  run.frames = root.At("frames").Integer(0, INT64_MAX);
+  run.frames = root.At("frames").Count();
   const auto data = root.Find("data");
-  if (!data) FailFile(folder / "run.json", 0, "does not say which data the run saw");
+  if (!data) FailFile(run_file, 0, "does not say which data the run saw");
   run.measurements_sha256 = data->At("measurements").Text();
   run.truth_sha256 = TextOf(*data, "truth");
-  if (const auto plugins = timing.root().Find("unoptimised")) {
-    for (const Node& plugin : plugins->Items()) run.unoptimised.insert(plugin.Text());
+  if (const auto plugins = timing.Find("unoptimised")) {
+    for (const std::string& plugin : plugins->Texts()) run.unoptimised.insert(plugin);
   }
   for (const auto& [name, entry] : root.At("estimators").Entries()) {
     ComparedEntry& one = run.estimators.emplace_back();
     one.facts = ReadFacts(entry);
     one.result = ReadResult(name, entry);
-    one.result.wall_s = timing.root().At("estimators").At(name).At("wall_s").Number();
+    one.result.wall_s = timing.At("estimators").At(name).At("wall_s").Number();
     one.series.blocks = one.facts.blocks;
     one.series.joint = false;
     one.had_rejection_recovery = entry.At("events").Find("rejection_recovery").has_value();
@@ -245,17 +234,6 @@ ComparedRun ReadFiles(const fs::path& folder) {
     if (fs::exists(map)) one.result.landmarks = ReadMap(map);
   }
   return run;
-}
-
-}  // namespace
-
-ComparedRun ReadRun(const fs::path& folder) {
-  try {
-    return ReadFiles(folder);
-  } catch (const Error& error) {
-    if (error.code() != ExitCode::kBadConfig) throw;
-    throw Error(ExitCode::kBadData, error.what());  // of a json file, which is data here
-  }
 }
 
 }  // namespace alidade::internal

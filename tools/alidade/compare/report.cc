@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "alidade/base/json.h"
@@ -258,7 +259,7 @@ Section GapSection(const Comparison& comparison, const GapStep& step) {
 }
 
 /// All that estimators are held against at the end.
-std::string References(const Comparison& comparison) {
+std::string ReferencesText(const Comparison& comparison) {
   std::vector<std::string> names;
   for (const ComparedEstimator& one : comparison.estimators) {
     const std::string& name = one.final_reference;
@@ -272,9 +273,10 @@ std::vector<Section> SectionsOf(const Comparison& comparison) {
   Section& head = sections.emplace_back();
   head.title = comparison.runs > 1 ? std::to_string(comparison.runs) + " runs, mean [5 %, 95 %]"
                                    : std::to_string(comparison.frames) + " frames";
-  head.title += comparison.reference.empty()      ? ""
-                : comparison.reference == "truth" ? ", errors against truth"
-                                                  : ", differences from " + References(comparison);
+  head.title += comparison.reference.empty() ? ""
+                : comparison.reference == "truth"
+                    ? ", errors against truth"
+                    : ", differences from " + ReferencesText(comparison);
   if (!comparison.measurements_sha256.empty()) {
     head.lines.push_back("data sha256 " + comparison.measurements_sha256);
   }
@@ -291,45 +293,42 @@ std::vector<Section> SectionsOf(const Comparison& comparison) {
   return sections;
 }
 
-void AppendValues(internal::Json& json, const char* key,
-                  const std::map<std::string, Spread>& values, bool several) {
-  json.Key(key).Object();
+internal::Json JsonOf(const std::map<std::string, Spread>& values, bool several) {
+  internal::Json json = internal::Json::object();
   for (const auto& [name, spread] : values) {
-    json.Key(name);
+    internal::Json& value = json[name];
     if (!several) {
-      json.Number(spread.mean);
+      value = spread.mean;
       continue;
     }
-    json.Object().Key("mean").Number(spread.mean).Key("p05").Number(spread.p05);
-    json.Key("p50").Number(spread.p50).Key("p95").Number(spread.p95).End();
+    value = {{"mean", spread.mean}, {"p05", spread.p05}, {"p50", spread.p50}, {"p95", spread.p95}};
   }
-  json.End();
+  return json;
 }
 
-void AppendEstimator(internal::Json& json, const ComparedEstimator& one, bool several) {
-  json.Key(one.name).Object();
-  json.Key("type").Text(one.type).Key("smoothed").Flag(one.smoothed);
-  json.Key("reference").Text(one.reference).Key("final_reference").Text(one.final_reference);
-  json.Key("diverged").Integer(one.diverged).Key("used").Integer(one.used);
-  json.Key("reference_runs").Integer(one.reference_runs);
-  json.Key("final_reference_runs").Integer(one.final_reference_runs);
-  AppendValues(json, "values", one.values, several);
-  json.Key("units").Object();
-  for (const auto& [block, unit] : one.units) json.Key(block).Text(unit);
-  json.End().End();
+internal::Json JsonOf(const ComparedEstimator& one, bool several) {
+  return {{"type", one.type},
+          {"smoothed", one.smoothed},
+          {"reference", one.reference},
+          {"final_reference", one.final_reference},
+          {"diverged", one.diverged},
+          {"used", one.used},
+          {"reference_runs", one.reference_runs},
+          {"final_reference_runs", one.final_reference_runs},
+          {"values", JsonOf(one.values, several)},
+          {"units", one.units}};
 }
 
-void AppendGap(internal::Json& json, const Comparison& comparison) {
-  json.Key("gap").Object().Key("filter").Text(comparison.explained).Key("steps").Array();
+internal::Json JsonOfGap(const Comparison& comparison) {
+  internal::Json steps = internal::Json::array();
   for (const GapStep& step : comparison.gap) {
-    json.Object().Key("kind").Text(ToString(step.kind));
-    json.Key("from").Text(step.from).Key("to").Text(step.to);
-    if (step.at_end) json.Key("at_end").Flag(true);
-    if (!step.withheld.empty()) json.Key("withheld").Text(step.withheld);
-    AppendValues(json, "values", step.values, comparison.runs > 1);
-    json.End();
+    internal::Json json = {{"kind", ToString(step.kind)}, {"from", step.from}, {"to", step.to}};
+    if (step.at_end) json["at_end"] = true;
+    if (!step.withheld.empty()) json["withheld"] = step.withheld;
+    json["values"] = JsonOf(step.values, comparison.runs > 1);
+    steps.push_back(std::move(json));
   }
-  json.End().End();
+  return {{"filter", comparison.explained}, {"steps", std::move(steps)}};
 }
 
 }  // namespace
@@ -339,25 +338,21 @@ std::string CompareReport(const Comparison& comparison, TableStyle style) {
 }
 
 std::string CompareJson(const Comparison& comparison) {
-  internal::Json json;
-  json.Object();
-  json.Key("runs").Integer(comparison.runs).Key("frames").Integer(comparison.frames);
-  json.Key("status").Text(ToString(comparison.status));
-  json.Key("reference").Text(comparison.reference);
-  if (!comparison.withheld.empty()) json.Key("withheld").Text(comparison.withheld);
+  internal::Json json = {{"runs", comparison.runs},
+                         {"frames", comparison.frames},
+                         {"status", ToString(comparison.status)},
+                         {"reference", comparison.reference}};
+  if (!comparison.withheld.empty()) json["withheld"] = comparison.withheld;
   if (!comparison.measurements_sha256.empty()) {
-    json.Key("measurements_sha256").Text(comparison.measurements_sha256);
+    json["measurements_sha256"] = comparison.measurements_sha256;
   }
-  json.Key("estimators").Object();
+  internal::Json& estimators = json["estimators"] = internal::Json::object();
   for (const ComparedEstimator& one : comparison.estimators) {
-    AppendEstimator(json, one, comparison.runs > 1);
+    estimators[one.name] = JsonOf(one, comparison.runs > 1);
   }
-  json.End();
-  if (!comparison.gap.empty()) AppendGap(json, comparison);
-  json.Key("notes").Array();
-  for (const std::string& note : comparison.notes) json.Text(note);
-  json.End().End();
-  return json.text();
+  if (!comparison.gap.empty()) json["gap"] = JsonOfGap(comparison);
+  json["notes"] = comparison.notes;
+  return internal::JsonText(json);
 }
 
 void WriteComparison(const Comparison& comparison, const std::filesystem::path& folder,

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <fstream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string_view>
 
 #include "alidade/base/error.h"
@@ -117,25 +118,17 @@ std::string Title(const Evaluation& evaluation, SavedErrors which, PoseRelation 
 
 std::string InfoJson(const Evaluation& evaluation, SavedErrors which, PoseRelation relation) {
   const std::string unit = UnitOf(relation);
-  internal::Json json;
-  json.Object();
-  json.Key("title").Text(Title(evaluation, which, relation));
-  json.Key("ref_name").Text(evaluation.reference.name);
-  json.Key("est_name").Text(evaluation.label);
-  json.Key("label").Text((which == SavedErrors::kRelative ? "RPE (" : "APE (") +
-                         (unit.empty() ? "unit-less" : unit) + ')');
-  json.End();
-  return json.text();
+  return internal::JsonText({{"title", Title(evaluation, which, relation)},
+                             {"ref_name", evaluation.reference.name},
+                             {"est_name", evaluation.label},
+                             {"label", (which == SavedErrors::kRelative ? "RPE (" : "APE (") +
+                                           (unit.empty() ? "unit-less" : unit) + ')'}});
 }
 
 std::string StatsJson(const ErrorStatistics& statistics) {
   internal::Json json;
-  json.Object();
-  for (const auto& [name, member] : internal::kStatistics) {
-    json.Key(name).Number(statistics.*member);
-  }
-  json.End();
-  return json.text();
+  for (const auto& [name, member] : internal::kStatistics) json[name] = statistics.*member;
+  return internal::JsonText(json);
 }
 
 /// When and where along the path the errors are: arrays as long as they.

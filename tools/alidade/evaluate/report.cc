@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "alidade/base/json.h"
@@ -214,82 +215,63 @@ std::string SummaryText(const std::vector<Evaluation>& evaluations) {
   return internal::RightAlignedTable(names, rows) + '\n' + SharedText(evaluations) + '\n';
 }
 
-void AddErrors(Json& json, const char* key, const std::vector<PoseErrors>& all) {
-  json.Key(key).Object();
+Json JsonOf(const std::vector<PoseErrors>& all) {
+  Json json = Json::object();
   for (const PoseErrors& errors : all) {
-    json.Key(ToString(errors.relation)).Object();
-    json.Key("unit").Text(UnitOf(errors.relation));
-    for (const auto& [name, member] : kStatistics) {
-      json.Key(name).Number(errors.statistics.*member);
-    }
-    json.End();
+    Json& one = json[ToString(errors.relation)];
+    one["unit"] = UnitOf(errors.relation);
+    for (const auto& [name, member] : kStatistics) one[name] = errors.statistics.*member;
   }
-  json.End();
+  return json;
 }
 
-void AddNees(Json& json, const char* key, const std::optional<Nees>& nees) {
-  if (!nees) return;
-  json.Key(key).Object();
-  json.Key("mean").Number(nees->mean);
-  json.Key("within95").Number(nees->within95);
-  json.Key("dof").Integer(nees->dof);
-  json.Key("poses").Integer(nees->poses);
-  json.End();
+Json JsonOf(const Nees& nees) {
+  return {{"mean", nees.mean}, {"within95", nees.within95}, {"dof", nees.dof}, {"poses", nees.poses}};
 }
 
-void AddInnovations(Json& json, const std::vector<InnovationStatistics>& innovations) {
-  if (innovations.empty()) return;
-  json.Key("nis").Object();
+Json JsonOf(const std::vector<InnovationStatistics>& innovations) {
+  Json json = Json::object();
   for (const InnovationStatistics& one : innovations) {
-    json.Key(one.sensor).Object();
-    json.Key("mean").Number(one.nis_mean);
-    json.Key("within95").Number(one.nis_within95);
-    json.Key("measurements").Integer(one.measurements);
-    json.Key("autocorrelation").Number(one.autocorrelation);
-    json.Key("white_within").Number(one.white_within);
-    json.End();
+    json[one.sensor] = {{"mean", one.nis_mean},
+                        {"within95", one.nis_within95},
+                        {"measurements", one.measurements},
+                        {"autocorrelation", one.autocorrelation},
+                        {"white_within", one.white_within}};
   }
-  json.End();
+  return json;
 }
 
-void AddEvaluation(Json& json, const Evaluation& one) {
-  json.Object();
-  json.Key("estimate").Text(one.label);
-  json.Key("file").Text(one.estimate.name);
-  json.Key("reference").Text(one.reference.name);
+Json JsonOf(const Evaluation& one) {
+  Json json = {
+      {"estimate", one.label}, {"file", one.estimate.name}, {"reference", one.reference.name}};
   if (!one.error.empty()) {
-    json.Key("error").Text(one.error);
-    json.End();
-    return;
+    json["error"] = one.error;
+    return json;
   }
-  json.Key("align").Text(ToString(one.options.alignment));
-  json.Key("align_poses").Integer(one.options.align_poses);
-  json.Key("scale").Number(one.alignment.scale);
-  json.Key("matched").Integer(one.estimate.size());
-  json.Key("possible").Integer(one.possible);
-  json.Key("by_row").Flag(one.by_row);
-  json.Key("t_max_diff").Number(Seconds(one.options.max_diff));
-  json.Key("t_offset").Number(Seconds(one.options.offset));
-  json.Key("reference_path_m").Number(one.reference.PathLength(0, one.reference.size() - 1));
-  json.Key("estimate_path_m").Number(one.estimate.PathLength(0, one.estimate.size() - 1));
-  if (one.sim3_scale) json.Key("sim3_scale").Number(*one.sim3_scale);
-  if (one.scale_drift) json.Key("scale_drift").Number(*one.scale_drift);
-  AddErrors(json, "ate", one.absolute);
-  AddErrors(json, "rpe", one.relative);
-  json.Key("pairs").Object();
-  json.Key("count").Integer(std::ssize(one.pairs));
-  json.Key("delta").Number(one.options.pairs.delta);
-  json.Key("delta_unit").Text(ToString(one.options.pairs.unit));
-  json.Key("all_pairs").Flag(one.options.pairs.all);
-  json.End();
-  AddNees(json, "nees_position", one.position_nees);
-  AddNees(json, "nees_orientation", one.orientation_nees);
-  if (!one.nees_withheld.empty()) json.Key("nees_withheld").Text(one.nees_withheld);
-  AddInnovations(json, one.innovations);
-  json.Key("warnings").Array();
-  for (const std::string& warning : one.warnings) json.Text(warning);
-  json.End();
-  json.End();
+  json["align"] = ToString(one.options.alignment);
+  json["align_poses"] = one.options.align_poses;
+  json["scale"] = one.alignment.scale;
+  json["matched"] = one.estimate.size();
+  json["possible"] = one.possible;
+  json["by_row"] = one.by_row;
+  json["t_max_diff"] = Seconds(one.options.max_diff);
+  json["t_offset"] = Seconds(one.options.offset);
+  json["reference_path_m"] = one.reference.PathLength(0, one.reference.size() - 1);
+  json["estimate_path_m"] = one.estimate.PathLength(0, one.estimate.size() - 1);
+  if (one.sim3_scale) json["sim3_scale"] = *one.sim3_scale;
+  if (one.scale_drift) json["scale_drift"] = *one.scale_drift;
+  json["ate"] = JsonOf(one.absolute);
+  json["rpe"] = JsonOf(one.relative);
+  json["pairs"] = {{"count", one.pairs.size()},
+                   {"delta", one.options.pairs.delta},
+                   {"delta_unit", ToString(one.options.pairs.unit)},
+                   {"all_pairs", one.options.pairs.all}};
+  if (one.position_nees) json["nees_position"] = JsonOf(*one.position_nees);
+  if (one.orientation_nees) json["nees_orientation"] = JsonOf(*one.orientation_nees);
+  if (!one.nees_withheld.empty()) json["nees_withheld"] = one.nees_withheld;
+  if (!one.innovations.empty()) json["nis"] = JsonOf(one.innovations);
+  json["warnings"] = one.warnings;
+  return json;
 }
 
 }  // namespace
@@ -327,13 +309,9 @@ std::string EvaluationLatex(const std::vector<Evaluation>& evaluations) {
 }
 
 std::string EvaluationJson(const std::vector<Evaluation>& evaluations) {
-  Json json;
-  json.Object();
-  json.Key("evaluations").Array();
-  for (const Evaluation& one : evaluations) AddEvaluation(json, one);
-  json.End();
-  json.End();
-  return json.text();
+  Json all = Json::array();
+  for (const Evaluation& one : evaluations) all.push_back(JsonOf(one));
+  return internal::JsonText({{"evaluations", std::move(all)}});
 }
 
 }  // namespace alidade

@@ -2,6 +2,7 @@
 #include "alidade/inspect/plugin_listing.h"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <tuple>
 #include <utility>
 
@@ -81,29 +82,28 @@ std::string Parameters(const std::vector<ParamInfo>& schema) {
   return rows.size() > 1 ? TextTable(rows, 2) : "  no parameters\n";
 }
 
-void AddEntry(const PluginEntry& entry, Json& json) {
-  json.Key("name").Text(entry.name);
-  json.Key("kind").Text(KindName(entry.kind));
-  json.Key("family").Text(entry.family);
-  json.Key("doc").Text(entry.doc);
-  json.Key("citation").Text(entry.citation);
-  json.Key("file").Text(entry.plugin.string());
-  json.Key("unoptimised").Flag(entry.unoptimised);
+Json JsonOf(const PluginEntry& entry) {
+  return {{"name", entry.name},
+          {"kind", KindName(entry.kind)},
+          {"family", entry.family},
+          {"doc", entry.doc},
+          {"citation", entry.citation},
+          {"file", entry.plugin.string()},
+          {"unoptimised", entry.unoptimised}};
 }
 
-void AddParameter(const ParamInfo& info, Json& json) {
-  json.Object();
-  json.Key("key").Text(info.key);
-  json.Key("unit").Text(info.unit);
-  json.Key("type").Text(info.type);
-  json.Key("range").Text(info.range);
-  if (!info.fallback.empty()) json.Key("default").Text(info.fallback);
-  json.Key("choices").Array();
-  for (const std::string& choice : info.choices) json.Text(choice);
-  json.End();
-  json.Key("when").Text(info.when);
-  json.Key("doc").Text(info.doc);
-  json.End();
+Json JsonOf(const std::vector<ParamInfo>& schema) {
+  Json parameters = Json::array();
+  for (const ParamInfo& info : schema) {
+    Json json = {
+        {"key", info.key}, {"unit", info.unit}, {"type", info.type}, {"range", info.range}};
+    if (!info.fallback.empty()) json["default"] = info.fallback;
+    json["choices"] = info.choices;
+    json["when"] = info.when;
+    json["doc"] = info.doc;
+    parameters.push_back(std::move(json));
+  }
+  return parameters;
 }
 
 }  // namespace
@@ -124,22 +124,13 @@ std::string PluginList(const PluginHost& host, bool files) {
 }
 
 std::string PluginListJson(const PluginHost& host) {
-  Json json;
-  json.Array();
-  for (const PluginEntry* entry : Sorted(host)) {
-    json.Object();
-    AddEntry(*entry, json);
-    json.End();
-  }
+  Json json = Json::array();
+  for (const PluginEntry* entry : Sorted(host)) json.push_back(JsonOf(*entry));
   for (const EstimatorType& type : EstimatorTypes()) {
-    json.Object();
-    AddEntry({PluginEntry::Kind::kEstimator, type.name, type.doc, "", "", "", 0, false, false,
-              type.kind},
-             json);
-    json.End();
+    json.push_back(JsonOf({PluginEntry::Kind::kEstimator, type.name, type.doc, "", "", "", 0, false,
+                           false, type.kind}));
   }
-  json.End();
-  return json.text();
+  return internal::JsonText(json);
 }
 
 std::string PluginInfo(const PluginHost& host, const std::string& name) {
@@ -166,31 +157,19 @@ std::string PluginInfo(const PluginHost& host, const std::string& name) {
 }
 
 std::string PluginInfoJson(const PluginHost& host, const std::string& name) {
-  Json json;
-  json.Array();
+  Json json = Json::array();
   if (const EstimatorType* type = FindEstimatorType(name)) {
-    json.Object();
-    json.Key("name").Text(type->name);
-    json.Key("kind").Text("estimator");
-    json.Key("doc").Text(type->doc);
-    json.Key("parameters").Array();
-    for (const ParamInfo& info : WithCommonKeys(type->schema())) AddParameter(info, json);
-    json.End();
-    json.End();
+    json.push_back({{"name", type->name},
+                    {"kind", "estimator"},
+                    {"doc", type->doc},
+                    {"parameters", JsonOf(WithCommonKeys(type->schema()))}});
   }
   for (const PluginEntry* entry : Named(host, name)) {
-    json.Object();
-    AddEntry(*entry, json);
-    json.Key("describes").Array();
-    for (const std::string& line : host.Describe(*entry)) json.Text(line);
-    json.End();
-    json.Key("parameters").Array();
-    for (const ParamInfo& info : KeysOf(host, *entry)) AddParameter(info, json);
-    json.End();
-    json.End();
+    Json& one = json.emplace_back(JsonOf(*entry));
+    one["describes"] = host.Describe(*entry);
+    one["parameters"] = JsonOf(KeysOf(host, *entry));
   }
-  json.End();
-  return json.text();
+  return internal::JsonText(json);
 }
 
 }  // namespace alidade

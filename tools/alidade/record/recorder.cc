@@ -4,6 +4,7 @@
 #include <chrono>
 #include <ctime>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -137,28 +138,18 @@ std::string Recorder::Impl::TimingJson(const RunResult& result) const {
   if (gmtime_r(&started_at, &utc) != nullptr) {
     std::strftime(at, sizeof at, "%Y-%m-%dT%H:%M:%SZ", &utc);
   }
-  internal::Json json;
-  json.Object();
-  json.Key("started").Text(at);
-  json.Key("command").Text(options.command);
-  json.Key("wall_s").Number(wall_s);
-  json.Key("frames_per_s").Number(static_cast<double>(result.frames) / wall_s);
-  json.Key("estimators").Object();
-  for (const EstimatorResult& one : result.estimators) {
-    json.Key(one.name).Object().Key("wall_s").Number(one.wall_s).End();
-  }
-  json.End();
-  json.Key("unoptimised").Array();
-  for (const std::string& plugin : result.unoptimised) json.Text(plugin);
-  json.End();
-  json.Key("arrivals").Object();
-  json.Key("late").Integer(result.arrivals.late);
-  json.Key("merged").Integer(result.arrivals.merged);
-  json.Key("dropped").Integer(result.arrivals.dropped);
-  json.Key("longest_lag_s").Number(Seconds(result.arrivals.longest_lag));
-  json.End();
-  json.End();
-  return json.text();
+  internal::Json json = {{"started", at},
+                         {"command", options.command},
+                         {"wall_s", wall_s},
+                         {"frames_per_s", static_cast<double>(result.frames) / wall_s}};
+  internal::Json& times = json["estimators"] = internal::Json::object();
+  for (const EstimatorResult& one : result.estimators) times[one.name]["wall_s"] = one.wall_s;
+  json["unoptimised"] = result.unoptimised;
+  json["arrivals"] = {{"late", result.arrivals.late},
+                      {"merged", result.arrivals.merged},
+                      {"dropped", result.arrivals.dropped},
+                      {"longest_lag_s", Seconds(result.arrivals.longest_lag)}};
+  return internal::JsonText(json);
 }
 
 void Recorder::Impl::WriteReport(const RunResult& result, const internal::RecordedRun& recorded) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/record/run_json.h"
 
+#include <nlohmann/json.hpp>
+
 #include "alidade/base/csv_file.h"
 #include "alidade/base/json.h"
 #include "alidade/base/number_text.h"
@@ -10,58 +12,36 @@
 namespace alidade::internal {
 namespace {
 
-void WriteIntegers(Json& json, const std::map<std::string, std::int64_t>& values) {
-  json.Object();
-  for (const auto& [key, value] : values) json.Key(key).Integer(value);
-  json.End();
-}
-
-void WriteTexts(Json& json, const std::map<std::string, std::string>& values) {
-  json.Object();
-  for (const auto& [key, value] : values) json.Key(key).Text(value);
-  json.End();
-}
-
-void WriteFacts(Json& json, const EstimatorFacts& facts) {
-  json.Key("type").Text(facts.type).Key("kind").Text(ToString(facts.kind));
-  if (!facts.accepted_by.empty()) json.Key("accepted_by").Text(facts.accepted_by);
-  if (!facts.overrides.empty()) json.Key("overrides").Text(facts.overrides);
-  json.Key("sensors").Array();
-  for (const std::string& sensor : facts.sensors) json.Text(sensor);
-  json.End();
-  json.Key("smoothed").Flag(facts.smoothed);
-  if (!facts.path.empty()) json.Key("path").Text(facts.path);
-  json.Key("blocks").Array();
+Json JsonOf(const EstimatorFacts& facts) {
+  Json json = {{"type", facts.type}, {"kind", ToString(facts.kind)}};
+  if (!facts.accepted_by.empty()) json["accepted_by"] = facts.accepted_by;
+  if (!facts.overrides.empty()) json["overrides"] = facts.overrides;
+  json["sensors"] = facts.sensors;
+  json["smoothed"] = facts.smoothed;
+  if (!facts.path.empty()) json["path"] = facts.path;
+  Json& blocks = json["blocks"] = Json::array();
   for (const SeriesBlock& block : facts.blocks) {
-    json.Object().Key("name").Text(block.name).Key("unit").Text(block.unit);
-    json.Key("geometry").Text(ToString(block.geometry.kind));
-    json.Key("size").Integer(block.geometry.ambient).End();
+    blocks.push_back({{"name", block.name},
+                      {"unit", block.unit},
+                      {"geometry", ToString(block.geometry.kind)},
+                      {"size", block.geometry.ambient}});
   }
-  json.End();
-  json.Key("rows").Integer(facts.rows);
+  json["rows"] = facts.rows;
+  return json;
 }
 
-void WriteEstimator(Json& json, const EstimatorResult& result, const RunFacts& facts) {
-  json.Key(result.name).Object();
-  if (const auto known = facts.estimators.find(result.name); known != facts.estimators.end()) {
-    WriteFacts(json, known->second);
-  }
-  json.Key("failed").Flag(result.failed);
-  json.Key("metrics").Object();
-  for (const auto& [key, value] : result.metrics) json.Key(key).Number(value);
-  json.Key("diverged").Flag(result.diverged);
-  json.Key("inconsistent").Flag(result.inconsistent).End();
-  WriteIntegers(json.Key("counts"), result.counts);
-  WriteTexts(json.Key("units"), result.units);
-  WriteIntegers(json.Key("events"), CountEvents(result));
-  json.Key("unobservable").Array();
-  for (const std::vector<std::string>& direction : result.unobservable) {
-    json.Array();
-    for (const std::string& element : direction) json.Text(element);
-    json.End();
-  }
-  json.End();
-  json.End();
+Json JsonOf(const EstimatorResult& result, const RunFacts& facts) {
+  const auto known = facts.estimators.find(result.name);
+  Json json = known == facts.estimators.end() ? Json::object() : JsonOf(known->second);
+  json["failed"] = result.failed;
+  Json& metrics = json["metrics"] = result.metrics;
+  metrics["diverged"] = result.diverged;
+  metrics["inconsistent"] = result.inconsistent;
+  json["counts"] = result.counts;
+  json["units"] = result.units;
+  json["events"] = CountEvents(result);
+  json["unobservable"] = result.unobservable;
+  return json;
 }
 
 }  // namespace
@@ -87,30 +67,25 @@ EstimatorFacts FactsOf(const NamedEstimator& named, const Experiment& experiment
 }
 
 std::string RunJson(const RunResult& result, const RunFacts& facts) {
-  Json json;
-  json.Object();
-  json.Key("status").Text(ToString(result.status));
-  json.Key("reason").Text(result.reason);
-  WriteTexts(json.Key("versions"), {{"alidade", ALIDADE_VERSION}});
-  json.Key("seed").Integer(static_cast<std::int64_t>(facts.seed));
-  json.Key("frames").Integer(result.frames);
+  Json json = {{"status", ToString(result.status)},
+               {"reason", result.reason},
+               {"versions", {{"alidade", ALIDADE_VERSION}}},
+               {"seed", facts.seed},
+               {"frames", result.frames}};
   if (!facts.measurements_sha256.empty()) {
-    json.Key("data").Object().Key("measurements").Text(facts.measurements_sha256);
-    if (!facts.truth_sha256.empty()) json.Key("truth").Text(facts.truth_sha256);
-    json.End();
+    Json& data = json["data"] = {{"measurements", facts.measurements_sha256}};
+    if (!facts.truth_sha256.empty()) data["truth"] = facts.truth_sha256;
   }
-  if (!result.normalised.empty()) WriteIntegers(json.Key("normalised"), result.normalised);
-  json.Key("reference").Text(result.reference);
-  if (!result.withheld.empty()) json.Key("withheld").Text(result.withheld);
-  json.Key("plugins").Array();
+  if (!result.normalised.empty()) json["normalised"] = result.normalised;
+  json["reference"] = result.reference;
+  if (!result.withheld.empty()) json["withheld"] = result.withheld;
+  Json& plugins = json["plugins"] = Json::array();
   for (const auto& [file, hash] : facts.plugins) {
-    json.Object().Key("file").Text(file).Key("sha256").Text(hash).End();
+    plugins.push_back({{"file", file}, {"sha256", hash}});
   }
-  json.End();
-  json.Key("estimators").Object();
-  for (const EstimatorResult& one : result.estimators) WriteEstimator(json, one, facts);
-  json.End().End();
-  return json.text();
+  Json& estimators = json["estimators"] = Json::object();
+  for (const EstimatorResult& one : result.estimators) estimators[one.name] = JsonOf(one, facts);
+  return JsonText(json);
 }
 
 std::string ComparisonCsv(const RunResult& result) {

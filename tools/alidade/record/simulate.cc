@@ -5,6 +5,7 @@
 #include <array>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 
@@ -210,10 +211,8 @@ std::string CameraYaml(const Config& config) {
 
 /// Whether the data are all that the source has, for other programs.
 std::string SimulateJson(const SimulateResult& result) {
-  internal::Json json;
-  json.Object().Key("status").Text(result.stopped ? "stopped" : "ok");
-  json.Key("frames").Integer(result.frames).End();
-  return json.text();
+  return internal::JsonText(
+      {{"status", result.stopped ? "stopped" : "ok"}, {"frames", result.frames}});
 }
 
 }  // namespace

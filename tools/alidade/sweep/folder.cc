@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "alidade/base/csv_file.h"
 #include "alidade/base/json.h"
@@ -84,30 +85,22 @@ std::string Markdown(const SweepResult& result) {
   return text + internal::NeesLines(summaries) + ReferenceLines(result);
 }
 
-void AppendEstimators(Json& json, const SweepResult& result) {
-  json.Key("estimators").Object();
+Json EstimatorsOf(const SweepResult& result) {
+  Json json = Json::object();
   for (const SweepSummary& summary : Summarise(result)) {
-    json.Key(summary.name).Object();
-    json.Key("diverged").Integer(summary.diverged);
-    json.Key("inconsistent").Integer(summary.inconsistent);
-    json.Key("metrics").Object();
+    Json& one = json[summary.name];
+    one = {{"diverged", summary.diverged}, {"inconsistent", summary.inconsistent}};
+    Json& metrics = one["metrics"] = Json::object();
     for (const auto& [key, spread] : summary.metrics) {
-      json.Key(key).Object();
-      json.Key("mean").Number(spread.mean);
-      json.Key("p05").Number(spread.p05);
-      json.Key("p50").Number(spread.p50);
-      json.Key("p95").Number(spread.p95);
-      json.End();
+      metrics[key] = {
+          {"mean", spread.mean}, {"p05", spread.p05}, {"p50", spread.p50}, {"p95", spread.p95}};
     }
-    json.End();
-    json.Key("bounds").Object();
+    Json& nees = one["bounds"] = Json::object();
     for (const auto& [key, bounds] : internal::NeesBounds(summary)) {
-      json.Key(key).Object().Key("low").Number(bounds.low).Key("high").Number(bounds.high).End();
+      nees[key] = {{"low", bounds.low}, {"high", bounds.high}};
     }
-    json.End();
-    json.End();
   }
-  json.End();
+  return json;
 }
 
 const char* StatusOf(bool stopped) {
@@ -115,39 +108,29 @@ const char* StatusOf(bool stopped) {
 }
 
 std::string SweepJson(const SweepResult& result) {
-  Json json;
-  json.Object();
-  json.Key("status").Text(StatusOf(result.stopped));
-  json.Key("runs").Integer(result.runs);
-  json.Key("runs_used").Integer(CountWhole(result));
-  json.Key("first_seed").Integer(static_cast<std::int64_t>(result.first_seed));
-  json.Key("reference").Text(result.reference);
-  json.Key("withheld").Integer(CountWithheld(result));
-  AppendEstimators(json, result);
-  json.End();
-  return json.text();
+  return internal::JsonText({{"status", StatusOf(result.stopped)},
+                             {"runs", result.runs},
+                             {"runs_used", CountWhole(result)},
+                             {"first_seed", result.first_seed},
+                             {"reference", result.reference},
+                             {"withheld", CountWithheld(result)},
+                             {"estimators", EstimatorsOf(result)}});
 }
 
 std::string SweepJson(const VariedSweep& sweep) {
-  Json json;
-  json.Object();
-  json.Key("status").Text(StatusOf(sweep.stopped()));
-  json.Key("runs").Integer(sweep.results.front().runs);
-  json.Key("first_seed").Integer(static_cast<std::int64_t>(sweep.results.front().first_seed));
-  json.Key("vary").Text(sweep.variation.key);
-  json.Key("values").Array();
+  Json values = Json::array();
   for (const Part& part : PartsOf(sweep)) {
-    json.Object();
-    json.Key("value").Text(part.value);
-    json.Key("runs_used").Integer(CountWhole(*part.result));
-    json.Key("reference").Text(part.result->reference);
-    json.Key("withheld").Integer(CountWithheld(*part.result));
-    AppendEstimators(json, *part.result);
-    json.End();
+    values.push_back({{"value", part.value},
+                      {"runs_used", CountWhole(*part.result)},
+                      {"reference", part.result->reference},
+                      {"withheld", CountWithheld(*part.result)},
+                      {"estimators", EstimatorsOf(*part.result)}});
   }
-  json.End();
-  json.End();
-  return json.text();
+  return internal::JsonText({{"status", StatusOf(sweep.stopped())},
+                             {"runs", sweep.results.front().runs},
+                             {"first_seed", sweep.results.front().first_seed},
+                             {"vary", sweep.variation.key},
+                             {"values", std::move(values)}});
 }
 
 /// Keys that any run has, in the order of a comparison.

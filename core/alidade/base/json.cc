@@ -9,12 +9,13 @@
 namespace alidade::internal {
 namespace {
 
-/// Why the parser gave up: its message without its number and place, `[...] parse error at line 1,
-/// column 5: syntax error while parsing value - ...`.
+/// Why the parser gave up, `syntax error while parsing value - invalid literal`: its message without
+/// its number and place in front, and without the bytes of the file and the tokens behind.
 std::string ReasonOf(const Json::parse_error& error) {
-  const std::string_view what = error.what();
+  const std::string what = error.what();
   const std::size_t colon = what.find(": ");
-  return std::string(colon == what.npos ? what : what.substr(colon + 2));
+  const std::size_t from = colon == what.npos ? 0 : colon + 2;
+  return what.substr(from, what.find(';', from) - from);
 }
 
 }  // namespace

@@ -4,48 +4,11 @@
 #include "alidade/base/number_text.h"
 #include "alidade/base/text_table.h"
 #include "alidade/base/words.h"
+#include "alidade/record/embedded.h"
 #include "alidade/run/metric_rows.h"
 
 namespace alidade::internal {
 namespace {
-
-constexpr const char* kStyle = R"(
-:root { --ink: #1c2733; --soft: #5b6875; --line: #dde3e9; --wash: #f5f7f9; --blue: #0072b2; }
-* { box-sizing: border-box; }
-body { margin: 0; color: var(--ink); background: #fff;
-  font: 15px/1.5 system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }
-main { max-width: 1040px; margin: 0 auto; padding: 32px 24px 64px; }
-h1 { font-size: 26px; margin: 0 0 4px; }
-h2 { font-size: 20px; margin: 44px 0 12px; padding-bottom: 6px;
-  border-bottom: 2px solid var(--line); }
-h3 { font-size: 15px; margin: 24px 0 8px; color: var(--soft); font-weight: 600; }
-p { margin: 6px 0; }
-.soft { color: var(--soft); }
-.badge { display: inline-block; padding: 1px 10px; border-radius: 10px; color: #fff;
-  font-size: 13px; font-weight: 600; vertical-align: 2px; }
-.ok { background: #2f855a; } .stopped { background: #b7791f; }
-.failed, .diverged { background: #c53030; }
-.scroll { overflow-x: auto; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { padding: 4px 14px; border-bottom: 1px solid var(--line); text-align: right;
-  white-space: nowrap; }
-th { background: var(--wash); font-weight: 600; }
-th:first-child, td:first-child { text-align: left; padding-left: 8px; }
-td.text { text-align: left; white-space: normal; }
-td.alarm { color: #c53030; font-weight: 600; }
-.columns { display: flex; flex-wrap: wrap; gap: 8px 40px; align-items: flex-start; }
-figure { margin: 14px 0; border: 1px solid var(--line); border-radius: 6px; padding: 8px; }
-figure svg { display: block; width: 100%; height: auto; }
-figcaption { color: var(--soft); font-size: 13px; padding: 4px 8px; }
-pre { background: var(--wash); border: 1px solid var(--line); border-radius: 6px; padding: 14px;
-  overflow-x: auto; font: 13px/1.45 ui-monospace, Menlo, "DejaVu Sans Mono", monospace; }
-code { font: 13px ui-monospace, Menlo, "DejaVu Sans Mono", monospace; word-break: break-all; }
-details { margin: 12px 0; } summary { cursor: pointer; color: var(--blue); }
-nav a { margin-right: 18px; }
-a { color: var(--blue); text-decoration: none; }
-a:hover { text-decoration: underline; }
-@media print { figure, table { break-inside: avoid; } nav { display: none; } }
-)";
 
 std::string Element(const std::string& tag, std::string_view text) {
   return '<' + tag + '>' + HtmlEscaped(text) + "</" + tag + ">\n";
@@ -188,7 +151,8 @@ std::string HtmlEscaped(std::string_view text) {
 std::string ReportHtml(const RunResult& result, const Report& report) {
   std::string html = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
   html += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n";
-  html += Element("title", report.title) + "<style>" + kStyle + "</style>\n</head>\n<body><main>\n";
+  html +=
+      Element("title", report.title) + "<style>" + kReportCss + "</style>\n</head>\n<body><main>\n";
   html += Head(result, report) + Comparison(result, report.subjects);
   html += "<h2 id=\"figures\">Figures</h2>\n" + FiguresOf(report, "");
   if (!report.figures.note.empty()) html += Element("p", report.figures.note);

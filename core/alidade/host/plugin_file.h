@@ -44,6 +44,18 @@ std::string TrialLoad(const std::filesystem::path& file, std::uint32_t tier);
 /// Errors: kPlugin, kNotTrusted.
 const BuildTable& OpenBuildTier(const std::filesystem::path& file);
 
+/// A C++ plugin that is loaded only when it is needed.
+struct PluginOnDemand {
+  std::filesystem::path file;
+  const BuildTable* table;
+};
+
+/// Opens the only plugin in `folder`, or if that is "" in `lib/alidade/NAME` beside this library.
+/// Errors: kPlugin if there is none, made of `missing` and where it was searched, or more than one;
+/// those of OpenBuildTier.
+PluginOnDemand OpenOnDemand(const std::string& name, const std::filesystem::path& folder,
+                            const std::string& missing);
+
 /// What breaks the rules of plugin_abi.h or build_plugin.h in a table, or "".
 std::string Defect(const AlidadeTable* table);
 std::string Defect(const BuildTable* table);

@@ -22,7 +22,7 @@ TEST(Pictures, ABuildWithoutThePluginSaysWhatToInstall) {
                         "OpenCV: apt-get install libopencv-dev"),
               0u)
         << text;
-    EXPECT_NE(text.find("searched /nonexistent/alidade_image_writer.so"), std::string::npos);
+    EXPECT_NE(text.find("searched /nonexistent"), std::string::npos);
   }
 }
 

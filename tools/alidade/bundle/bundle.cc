@@ -15,8 +15,6 @@
 namespace alidade {
 namespace {
 
-constexpr const char* kFile = "alidade_ceres_bundle.so";
-
 [[noreturn]] void FailRoles(const SensorModel& sensor, const std::string& why) {
   throw Error(ExitCode::kInternal,
               ErrorLine({}, {}, "sensor '" + sensor.name() + "' cannot adjust a bundle: " + why));
@@ -243,22 +241,15 @@ BundleResult AdjustBundle(const SensorModel& sensor, BundleProblem& problem,
                           Short(kBundleLossScaleMin) + " to " + Short(kBundleLossScaleMax) +
                               " standard deviations"));
   }
-  const std::filesystem::path program = internal::FolderOfProgram();
-  const bool known = !folder.empty() || !program.empty();  // never from the working folder
-  const std::filesystem::path file = (folder.empty() ? program / "bundle" : folder) / kFile;
-  std::error_code error;
-  if (!known || !std::filesystem::exists(file, error)) {
-    throw Error(ExitCode::kPlugin,
-                ErrorLine({}, {}, "this build of alidade adjusts no bundles",
-                          "one that found the Ceres solver: apt-get install libceres-dev, then "
-                          "configure and build again") +
-                    "\n  searched " + file.string());
-  }
-  const BuildTable& table = internal::OpenBuildTier(file);
-  if (table.adjust == nullptr) internal::Refuse(file, "adjusts no bundles");
+  const internal::PluginOnDemand plugin = internal::OpenOnDemand(
+      "bundle", folder,
+      ErrorLine({}, {}, "this build of alidade adjusts no bundles",
+                "one that found the Ceres solver: apt-get install libceres-dev, then configure and "
+                "build again"));
+  if (plugin.table->adjust == nullptr) internal::Refuse(plugin.file, "adjusts no bundles");
   const Gauge gauge(problem);
   const double extent = gauge.Extent(problem);
-  BundleResult result = table.adjust(sensor, problem, options);
+  BundleResult result = plugin.table->adjust(sensor, problem, options);
   const double factor = extent / gauge.Extent(problem);
   if (TellsNoScale(sensor) && factor > 0.0 && factor != 1.0 && std::isfinite(factor))
     gauge.Scale(factor, problem);

@@ -14,11 +14,17 @@ if command -v ccache >/dev/null; then
   export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
 fi
 
-# Shows the last `[done/all]` of its input, in one line and on a terminal only.
+# Shows the last `[done/all]` of its input: in place on a terminal, else a line for each tenth.
 progress() {
-  local line
+  local line tenth=0
   while IFS= read -r line; do
-    [[ -t 2 && $line =~ ^\[[0-9]+/[0-9]+\] ]] && printf '\r%-12s' "${BASH_REMATCH[0]}" >&2
+    [[ $line =~ ^\[([0-9]+)/([0-9]+)\] ]] || continue
+    if [[ -t 2 ]]; then
+      printf '\r%-12s' "${BASH_REMATCH[0]}" >&2
+    elif ((BASH_REMATCH[1] * 10 / BASH_REMATCH[2] > tenth)); then
+      tenth=$((BASH_REMATCH[1] * 10 / BASH_REMATCH[2]))
+      printf '  %s\n' "${BASH_REMATCH[0]}" >&2
+    fi
   done
   [[ ! -t 2 ]] || printf '\r%12s\r' '' >&2
 }

@@ -179,7 +179,7 @@ TEST_F(OutputCli, RunPrintsTenRowsAndAllOfThemIfAsked) {
   const Outcome ten = Call({"run", "config.yaml", "--no-figures"});
   EXPECT_EQ(labels(ten.out),
             (std::vector<std::string>{"rmse target.depth [mm]", "rmse target.depth_rate [mm/s]",
-                                      "cov95 target.depth [%]", "nees.mean target",
+                                      "coverage95 target.depth [%]", "nees.mean target",
                                       "nees.mean template", "nis.mean scale", "nis.mean stereo",
                                       "accepted stereo", "diverged", "inconsistent"}))
       << ten.out;

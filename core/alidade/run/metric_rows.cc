@@ -209,7 +209,7 @@ constexpr std::size_t kMainRows = 10;
 /// The keys of MainRows but for the two of health.
 std::set<std::string> MainKeys(const RunResult& result, const std::vector<std::string>& subjects) {
   constexpr std::array<std::string_view, 7> kDealt = {
-      "rmse", "nees.mean", "nis.mean", "accepted", "cov95", "map.sim3.rmse", "reprojection"};
+      "rmse", "nees.mean", "nis.mean", "accepted", "coverage95", "map.sim3.rmse", "reprojection"};
   // Turn, kind, key.
   std::vector<std::tuple<std::size_t, std::size_t, std::string>> dealt;
   for (std::size_t kind = 0; kind < kDealt.size(); ++kind) {

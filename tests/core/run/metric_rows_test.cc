@@ -125,7 +125,7 @@ TEST(MainRows, AreDealtOutInTheOrderOfTheConfig) {
   RunResult result;
   std::map<std::string, double> metrics;
   for (const char* block : {"cam.heading", "cam.position", "cam.velocity"}) {
-    for (const char* kind : {"rmse:", "cov95:", "lag_ms:"}) {
+    for (const char* kind : {"rmse:", "coverage95:", "lag_ms:"}) {
       metrics[kind + std::string(block)] = 0.5;
       metrics[kind + std::string(block) + "@blind"] = 0.5;
     }
@@ -139,7 +139,7 @@ TEST(MainRows, AreDealtOutInTheOrderOfTheConfig) {
   std::vector<std::string> labels;
   for (const auto& row : internal::MainRows(result, subjects)) labels.push_back(row.label);
   EXPECT_EQ(labels, (std::vector<std::string>{"rmse cam.heading [mrad]", "rmse cam.position",
-                                              "cov95 cam.position [%]", "nees.mean cam",
+                                              "coverage95 cam.position [%]", "nees.mean cam",
                                               "nees.mean map", "nis.mean left", "nis.mean right",
                                               "accepted right", "diverged", "inconsistent"}));
   EXPECT_NE(internal::MainTable(result, subjects).find("\n14 more rows: --all\n"),

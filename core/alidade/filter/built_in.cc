@@ -89,18 +89,14 @@ Node NodeOf(const Unsupported& asked, const Node& root, const System& system) {
 
 const std::vector<EstimatorType>& EstimatorTypes() {
   static const std::vector<EstimatorType> types = {
-      {"ekf", "Extended Kalman filter; built in, for `estimators`.", ReadEkf, EkfOptions::Schema,
-       DescribeEkf, Ekf::kSupport},
-      {"iekf", "Iterated extended Kalman filter; built in, for `estimators`.", ReadIekf,
-       IekfOptions::Schema, DescribeIekf, Iekf::kSupport},
-      {"rts",
-       "Fixed-interval smoother after an extended Kalman filter; built in, for `estimators`.",
-       ReadRts, CommonSchema, DescribeCommon, RtsSmoother::kSupport, EstimatorKind::kSmoother},
-      {"square_root_ekf",
-       "Extended Kalman filter that carries a square root of P; built in, for `estimators`.",
-       ReadSquareRoot, CommonSchema, DescribeCommon, SquareRootEkf::kSupport},
-      {"ukf", "Unscented Kalman filter; built in, for `estimators`.", ReadUkf, UkfOptions::Schema,
-       DescribeUkf, Ukf::kSupport},
+      {"ekf", "Extended Kalman filter.", ReadEkf, EkfOptions::Schema, DescribeEkf, Ekf::kSupport},
+      {"iekf", "Iterated extended Kalman filter.", ReadIekf, IekfOptions::Schema, DescribeIekf,
+       Iekf::kSupport},
+      {"rts", "Fixed-interval smoother after an extended Kalman filter.", ReadRts, CommonSchema,
+       DescribeCommon, RtsSmoother::kSupport, EstimatorKind::kSmoother},
+      {"square_root_ekf", "Extended Kalman filter that carries a square root of P.", ReadSquareRoot,
+       CommonSchema, DescribeCommon, SquareRootEkf::kSupport},
+      {"ukf", "Unscented Kalman filter.", ReadUkf, UkfOptions::Schema, DescribeUkf, Ukf::kSupport},
   };
   return types;
 }

@@ -320,9 +320,10 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
   }
 }
 )");
-  EXPECT_EQ(Read(folder / "out/comparison.csv"),
-            "metric,ekf\nrmse:target.depth,0.00195\nfinal:target.depth,inf\naccepted:stereo,151\n"
-            "diverged,true\ninconsistent,false\n");
+  EXPECT_EQ(
+      Read(folder / "out/comparison.csv"),
+      "metric,ekf\nrmse:target.depth,0.00195\nfinal_error:target.depth,inf\naccepted:stereo,151\n"
+      "diverged,true\ninconsistent,false\n");
 }
 
 TEST(Recorder, SaysWhatFailedBeforeTheExperimentWasKnown) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/inspect/plugin_listing.h"
 #include "alidade/run/run.h"
-#include "ceres_batch_fixture.h"
+#include "batch_fixture.h"
 
 namespace alidade {
 namespace {

@@ -3,7 +3,7 @@
 // Problems without a noise input: no prior, no process noise. There is nothing to solve for.
 #include <cmath>
 
-#include "ceres_batch_fixture.h"
+#include "batch_fixture.h"
 #include "support/landmark_models.h"
 
 namespace alidade {

@@ -61,8 +61,8 @@ Estimated Estimate(const std::string& options, const System& system,
 }
 
 const std::vector<std::string> kAll = {"ceres_batch", "ceres_batch\nmode: filtering",
-                                       "fixed_lag\nwindow_s: 0.15",
-                                       "fixed_lag\nwindow_s: 0.15\noutput: lagged"};
+                                       "fixed_lag\nlag_s: 0.15",
+                                       "fixed_lag\nlag_s: 0.15\noutput: lagged"};
 
 // Its value is the mean of what was measured, z / gain: P = sigma^2 / (gain^2 n).
 TEST(CeresBatchNoInputs, AFirstValueMayComeLate) {

@@ -123,7 +123,7 @@ TEST_F(CeresBatchConfig, BadOptionsAndTypesAreErrorsWithAPlace) {
     RunDepth(1, {{"estimators.batch.type", "ceres_batch"}, {key, value}});
   };
   ExpectError(ExitCode::kBadConfig, {"estimators.batch.mode", "some", "smoothing, filtering"},
-              [&] { run("estimators.batch.data", "some"); });
+              [&] { run("estimators.batch.mode", "some"); });
   ExpectError(ExitCode::kBadConfig, {"estimators.batch.max_iterations", "[1, 1000000]"},
               [&] { run("estimators.batch.max_iterations", "0"); });
   ExpectError(ExitCode::kBadConfig, {"max_iteration", "did you mean 'max_iterations'?"},

@@ -6,7 +6,7 @@
 #include <memory>
 #include <optional>
 
-#include "alidade/bundle/bundle_file.h"
+#include "alidade/bundle/bundle_folder.h"
 #include "command.h"
 #include "console.h"
 

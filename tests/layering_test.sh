@@ -26,6 +26,8 @@
 #   print     core, tools, models and plugins do not print
 #   flags     no instruction-set or fast-math flag in CMake files (but those of the deliberately
 #             bad plugins in tests/faults and tests/plugins)
+#   named     core and tools name no shipped plugin of C++, nor its file: what is on offer says what
+#             it can do (`csv`, `scene` and `tracks` are words of their own)
 set -euo pipefail
 
 self_test=false
@@ -160,6 +162,9 @@ sources() {
       sub(/[>"].*/, "", path)
       check_include(path, bracket)
       next
+    }
+    folder ~ /^(core|tools)$/ && " " $0 " " ~ /[^a-z_](ceres_batch|fixed_lag|ceres_bundle|image_writer|depth_target|alidade_[a-z_0-9]+\.so)[^a-z_]/ {
+      report("named", $0)
     }
     folder ~ /^(core|tools|sensors|motion_models|plugins)$/ {
       code = " " code_of($0) " "
@@ -343,6 +348,12 @@ for call in 'std::cout << 1;' 'std::cerr << 1;' 'printf("x");' 'std::printf("//"
     plant print "$file" "$licence\n$call"
   done
 done
+for name in ceres_batch fixed_lag ceres_bundle image_writer depth_target alidade_ceres_bundle.so; do
+  for file in core/alidade/run/new.cc tools/alidade/compare/new.h; do
+    plant named "$file" "$licence\nif (entry.name == \"$name\") return;"
+  done
+done
+plant named core/alidade/run/new.h "$licence\n/// As of ceres_batch."
 for flag in -march=native -ffast-math -Ofast -mavx2; do
   plant flags sensors/CMakeLists.txt "add_compile_options($flag)"
   plant flags cmake/AlidadeAddPlugin.cmake "  target_compile_options(x PRIVATE $flag)  # fast"
@@ -358,6 +369,8 @@ allow tests/core/base/json_test.cc '#include <nlohmann/json.hpp>'
 allow core/alidade/run/new.cc "$licence\n// std::cout, abort()\n/* exit(1);\n printf(\"x\") */ int a = std::snprintf(b, 3, \"exit(1)\");"
 allow core/alidade/run/new.cc "$licence\nloop.abort(); p->exit(); my_exit(); stop::exit_code(); char c = '\"'; f(\"std::cout <<\");"
 allow core/alidade/run/new.cc "$licence\nif (fork() == 0) _exit(0);"
+allow core/alidade/run/new.cc "$licence\nf(\"tracks\", \"csv\", EstimatorKind::kWindow);  // my_fixed_lag_s"
+allow plugins/csv/new.cc "$licence\nconst char* kName = \"ceres_batch\";"
 allow sensors/new.cc "$licence\n#include \"new.h\"\n#include <cmath>\n#include <Eigen/Dense>\n#include \"alidade/model/model.h\""
 allow plugins/csv/new.cc "$licence\n#include \"own.h\"\n#include <fcntl.h>\n#include \"sensors/scale_2d.h\""
 allow plugins/ceres/batch/new.cc "$licence\n#include <ceres/ceres.h>"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Data with a fault, through the whole program. The number of each fault is in the comment above
-// its test; what the readers of files say of a fault is in tests/plugins/*_faults_test.cc.
+// its test; what the readers of files say of a fault is in tests/plugins/*/*_faults_test.cc.
 #include <cmath>
 
 #include "support/program.h"

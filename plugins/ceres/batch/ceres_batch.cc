@@ -21,24 +21,24 @@ struct Options {
 };
 
 /// Maximum a posteriori of all states given all data, or given the data so far (the
-/// full-information filter): see Trajectory for the problem, MapSolve for its solution.
+/// full-information filter): see CondensedRun for the problem, MapSolve for its solution.
 class CeresBatch : public Estimator {
  public:
   CeresBatch(const System& system, const Options& options, const std::vector<StreamInfo>& streams)
       : mode_(options.mode),
-        trajectory_(system, streams, options.solve.max_dt_s),
+        run_(system, streams, options.solve.max_dt_s),
         solve_(options.solve),
         state_(system.InitialState()),
         initialiser_(system, options.solve.max_dt_s, streams) {}
 
   void Start(Stamp stamp) override {
-    trajectory_.Start(stamp);
+    run_.Start(stamp);
     initialiser_.filter().Start(stamp);
   }
   bool offline() const override { return mode_ == Options::Mode::kSmoothing; }
   const State& state() const override { return state_; }
   std::vector<LandmarkEstimate> landmarks() const override { return map_; }
-  Stamp stamp() const override { return trajectory_.stamp(); }
+  Stamp stamp() const override { return run_.stamp(); }
   bool diverged() const override { return failed_; }
   bool failed() const override { return failed_; }
 
@@ -46,15 +46,15 @@ class CeresBatch : public Estimator {
     report_.Clear();
     const Ekf& ekf = initialiser_.filter();
     const UpdateReport& filter = initialiser_.Process(frame);
-    const bool were_few = trajectory_.inputs() <= kManyInputs;
-    if (!trajectory_.Add(frame, filter, ekf)) {
+    const bool were_few = run_.inputs() <= kManyInputs;
+    if (!run_.Add(frame, filter, ekf)) {
       failed_ = true;
-      report_.events.push_back({frame.stamp, "batch", trajectory_.problem()});
+      report_.events.push_back({frame.stamp, "batch", run_.problem()});
       return report_;
     }
-    if (!ekf.failed()) filtered_.push_back(trajectory_.ValuesOf(ekf.state()));
+    if (!ekf.failed()) filtered_.push_back(run_.ValuesOf(ekf.state()));
     if (!offline()) SolveSoFar(frame.stamp);
-    if (were_few && trajectory_.inputs() > kManyInputs) {
+    if (were_few && run_.inputs() > kManyInputs) {
       report_.events.push_back({frame.stamp, "slow",
                                 "more than " + std::to_string(kManyInputs) +
                                     " noise inputs: the time of a solve grows with their cube"});
@@ -68,22 +68,22 @@ class CeresBatch : public Estimator {
   }
 
   void Smooth(const Emit& emit) override {
-    if (trajectory_.size() == 0) return;
-    const bool solved = solve_.SolveAll(trajectory_, filtered_, e_);
+    if (run_.size() == 0) return;
+    const bool solved = solve_.SolveAll(run_, filtered_, e_);
     failed_ = solve_.failed();
     if (!solved) FailAll(solve_.summary());
-    const auto put = [&](std::size_t k, const Trajectory::Point& point) {
+    const auto put = [&](std::size_t k, const CondensedRun::Point& point) {
       solve_.HeedStop();
-      const bool last = k + 1 == trajectory_.size();
-      trajectory_.Report(k, point, report_);
+      const bool last = k + 1 == run_.size();
+      run_.Report(k, point, report_);
       PutState(k, point);
-      if (last) solve_.Note(trajectory_.stamp(), report_.events);
-      if (last) report_.events.push_back({trajectory_.stamp(), "batch", solve_.summary()});
+      if (last) solve_.Note(run_.stamp(), report_.events);
+      if (last) report_.events.push_back({run_.stamp(), "batch", solve_.summary()});
       emit(k, state_, report_);
     };
     map_ = initialiser_.filter().landmarks();
-    if (!trajectory_.ForEachFrame(e_, trajectory_.size(), put) || !PutMap()) {
-      FailAll(solve_.summary() + "; then " + trajectory_.problem());
+    if (!run_.ForEachFrame(e_, run_.size(), put) || !PutMap()) {
+      FailAll(solve_.summary() + "; then " + run_.problem());
     }
   }
 
@@ -94,22 +94,22 @@ class CeresBatch : public Estimator {
   }
 
   void SolveSoFar(Stamp stamp) {
-    const bool solved = solve_.SolveAnew(trajectory_, filtered_, e_);
+    const bool solved = solve_.SolveAnew(run_, filtered_, e_);
     failed_ = solve_.failed();
     if (!solved) {
       NoteFailure(stamp, solve_.summary());
       return;
     }
-    const auto put = [&](std::size_t k, const Trajectory::Point& point) {
-      if (k + 1 < trajectory_.size()) return;
-      trajectory_.Report(k, point, report_);
+    const auto put = [&](std::size_t k, const CondensedRun::Point& point) {
+      if (k + 1 < run_.size()) return;
+      run_.Report(k, point, report_);
       PutState(k, point);
     };
     map_ = initialiser_.filter().landmarks();
-    const bool put_all = trajectory_.ForEachFrame(e_, trajectory_.size(), put) && PutMap();
+    const bool put_all = run_.ForEachFrame(e_, run_.size(), put) && PutMap();
     solve_.Note(stamp, report_.events);
     if (!put_all) {
-      NoteFailure(stamp, solve_.summary() + "; then " + trajectory_.problem());
+      NoteFailure(stamp, solve_.summary() + "; then " + run_.problem());
     } else if (failed_) {
       NoteFailure(stamp, solve_.summary());
     }
@@ -120,14 +120,14 @@ class CeresBatch : public Estimator {
     report_.events.push_back({stamp, "batch", why});
   }
 
-  bool PutMap() { return map_.empty() || trajectory_.PutMap(e_.data(), solve_.u(), map_); }
+  bool PutMap() { return map_.empty() || run_.PutMap(e_.data(), solve_.u(), map_); }
 
-  void PutState(std::size_t k, const Trajectory::Point& point) {
-    trajectory_.Put(k, point, solve_.Whitened(point), state_);
+  void PutState(std::size_t k, const CondensedRun::Point& point) {
+    run_.Put(k, point, solve_.Whitened(point), state_);
   }
 
   Options::Mode mode_;
-  Trajectory trajectory_;
+  CondensedRun run_;
   MapSolve solve_;
   State state_;
   InitialisingFilter initialiser_;  ///< gives the trajectory to start from

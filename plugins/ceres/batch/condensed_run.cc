@@ -22,7 +22,7 @@ Eigen::MatrixXd SquareRoot(const Eigen::MatrixXd& p) {
 
 }  // namespace
 
-Trajectory::Trajectory(System system, const std::vector<StreamInfo>& streams, double max_dt_s)
+CondensedRun::CondensedRun(System system, const std::vector<StreamInfo>& streams, double max_dt_s)
     : system_(std::move(system)),
       max_dt_s_(max_dt_s),
       initial_(system_.InitialState()),
@@ -52,28 +52,28 @@ Trajectory::Trajectory(System system, const std::vector<StreamInfo>& streams, do
   if (has_landmarks()) AddKnown();
 }
 
-bool Trajectory::Holds(std::size_t motion) const {
+bool CondensedRun::Holds(std::size_t motion) const {
   const MotionModel& model = system_.motions[motion].model;
   return model.discrete_noise() && !model.stationary() && model.noise_size() > 0;
 }
 
-bool Trajectory::Fail(std::string why) const {
+bool CondensedRun::Fail(std::string why) const {
   problem_ = std::move(why);
   return false;
 }
 
-bool Trajectory::FailTooMany() const {
+bool CondensedRun::FailTooMany() const {
   return Fail("more than " + std::to_string(kMostInputs) +
               " noise inputs: the batch solves for all of them at once; a shorter series, or a "
               "longer time between frames, has fewer");
 }
 
-bool Trajectory::AllPresent(const std::vector<BlockId>& blocks) const {
+bool CondensedRun::AllPresent(const std::vector<BlockId>& blocks) const {
   return std::ranges::all_of(
       blocks, [&](BlockId id) { return id < 0 || present_[static_cast<std::size_t>(id)]; });
 }
 
-std::vector<double> Trajectory::ValuesOf(const State& state) const {
+std::vector<double> CondensedRun::ValuesOf(const State& state) const {
   std::vector<double> values = initial_.values();
   for (std::size_t i = 0; i < present_.size(); ++i) {
     const BlockId id = static_cast<BlockId>(i);
@@ -84,7 +84,7 @@ std::vector<double> Trajectory::ValuesOf(const State& state) const {
   return values;
 }
 
-bool Trajectory::Add(const Frame& frame, const UpdateReport& report, const Estimator& filter) {
+bool CondensedRun::Add(const Frame& frame, const UpdateReport& report, const Estimator& filter) {
   if (stamp_ == kNoStamp) {
     stamp_ = system_.initial_time_s ? StampFromSeconds(*system_.initial_time_s) : frame.stamp;
   }
@@ -113,7 +113,7 @@ bool Trajectory::Add(const Frame& frame, const UpdateReport& report, const Estim
 }
 
 /// Noise is held no longer where the frame has a measurement in use, as in a filter.
-void Trajectory::EndInterval(Epoch& epoch) {
+void CondensedRun::EndInterval(Epoch& epoch) {
   const auto in_use = [](const Factor& f) { return f.row >= 0 || f.landmark >= 0; };
   if (!epoch.first_values.empty() || std::ranges::any_of(epoch.factors, in_use)) {
     std::ranges::fill(held_, -1);
@@ -122,7 +122,7 @@ void Trajectory::EndInterval(Epoch& epoch) {
 }
 
 /// The steps of all models from `from` to `end`, over which the control inputs are constant.
-bool Trajectory::AddSteps(Stamp from, Stamp end, Epoch& epoch) {
+bool CondensedRun::AddSteps(Stamp from, Stamp end, Epoch& epoch) {
   Stamp elapsed = 0;
   const bool overflow = __builtin_sub_overflow(end, from, &elapsed);
   const Stamp parts = overflow ? 0 : StepParts(elapsed, max_dt_s_);
@@ -152,7 +152,7 @@ bool Trajectory::AddSteps(Stamp from, Stamp end, Epoch& epoch) {
 }
 
 /// One factor for each measurement and sensor bound to its stream, in the order of the sensors.
-void Trajectory::AddFactors(const Frame& frame, const UpdateReport& report, Epoch& epoch) {
+void CondensedRun::AddFactors(const Frame& frame, const UpdateReport& report, Epoch& epoch) {
   for (std::size_t i = 0; i < system_.sensors.size(); ++i) {
     const SensorModel& model = system_.sensors[i].model;
     for (const Measurement& m : frame.measurements) {
@@ -184,7 +184,7 @@ void Trajectory::AddFactors(const Frame& frame, const UpdateReport& report, Epoc
   }
 }
 
-void Trajectory::AddPart(int size, const RobustLoss& loss) {
+void CondensedRun::AddPart(int size, const RobustLoss& loss) {
   const bool plain = loss.kind == LossKind::kNone;
   if (plain && !parts_.empty() && parts_.back().loss.kind == LossKind::kNone) {
     parts_.back().size += size;
@@ -195,7 +195,7 @@ void Trajectory::AddPart(int size, const RobustLoss& loss) {
 }
 
 /// First values in an order in which each finds the blocks that it needs.
-void Trajectory::AddFirstValues(Epoch& epoch) {
+void CondensedRun::AddFirstValues(Epoch& epoch) {
   for (bool progress = true; progress;) {
     progress = false;
     for (std::size_t i = 0; i < epoch.factors.size(); ++i) {
@@ -217,7 +217,7 @@ void Trajectory::AddFirstValues(Epoch& epoch) {
   }
 }
 
-bool Trajectory::Begin(const double* e, bool sensitivity, Point& point) const {
+bool CondensedRun::Begin(const double* e, bool sensitivity, Point& point) const {
   const Eigen::Index n = initial_.covariance().size(), n0 = l0_.rows();
   Eigen::VectorXd d = Eigen::VectorXd::Zero(n);
   d.head(n0) = d0_ + l0_ * Eigen::Map<const Eigen::VectorXd>(e, n0);
@@ -239,7 +239,7 @@ bool Trajectory::Begin(const double* e, bool sensitivity, Point& point) const {
   return true;
 }
 
-bool Trajectory::Advance(std::size_t k, const double* e, Point& point) const {
+bool CondensedRun::Advance(std::size_t k, const double* e, Point& point) const {
   const Epoch& epoch = epochs_[k];
   return std::ranges::all_of(epoch.steps, [&](const Step& step) { return Move(step, e, point); }) &&
          std::ranges::all_of(epoch.first_values, [&](const FirstValue& first) {
@@ -247,8 +247,8 @@ bool Trajectory::Advance(std::size_t k, const double* e, Point& point) const {
          });
 }
 
-bool Trajectory::ForEachFrame(const Eigen::VectorXd& e, std::size_t count,
-                              const std::function<void(std::size_t, const Point&)>& take) const {
+bool CondensedRun::ForEachFrame(const Eigen::VectorXd& e, std::size_t count,
+                                const std::function<void(std::size_t, const Point&)>& take) const {
   Point point;
   if (count > 0 && !Begin(e.data(), true, point)) return false;
   for (std::size_t k = 0; k < count; ++k) {
@@ -258,7 +258,7 @@ bool Trajectory::ForEachFrame(const Eigen::VectorXd& e, std::size_t count,
   return true;
 }
 
-bool Trajectory::Evaluate(const double* e, double* r, double* j) const {
+bool CondensedRun::Evaluate(const double* e, double* r, double* j) const {
   Point point;
   if (!Begin(e, j != nullptr, point)) return false;
   Eigen::VectorXd residual;
@@ -277,7 +277,7 @@ bool Trajectory::Evaluate(const double* e, double* r, double* j) const {
   return true;
 }
 
-void Trajectory::NoteChange(const Eigen::MatrixXd& before, const Eigen::MatrixXd& after) {
+void CondensedRun::NoteChange(const Eigen::MatrixXd& before, const Eigen::MatrixXd& after) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   if (after.size() == 0) return;
   const double scale = after.cwiseAbs().maxCoeff();
@@ -287,7 +287,7 @@ void Trajectory::NoteChange(const Eigen::MatrixXd& before, const Eigen::MatrixXd
 }
 
 /// Advances to the epoch, taking Q of its steps and R of its first values on the way.
-bool Trajectory::FreezeEpoch(Epoch& epoch, const double* e, Point& point) {
+bool CondensedRun::FreezeEpoch(Epoch& epoch, const double* e, Point& point) {
   for (Step& step : epoch.steps) {
     if (!FreezeStep(step, point) || !Move(step, e, point)) return false;
   }
@@ -303,11 +303,11 @@ bool Trajectory::FreezeEpoch(Epoch& epoch, const double* e, Point& point) {
   return true;
 }
 
-bool Trajectory::robust() const {
+bool CondensedRun::robust() const {
   return std::ranges::any_of(parts_, [](const Part& p) { return p.loss.kind != LossKind::kNone; });
 }
 
-bool Trajectory::Freeze(const double* e) {
+bool CondensedRun::Freeze(const double* e) {
   change_ = 0.0;
   Point point;
   std::vector<Point> points;
@@ -322,8 +322,8 @@ bool Trajectory::Freeze(const double* e) {
   return FreezeLandmarks(points);
 }
 
-void Trajectory::Put(std::size_t k, const Point& point, const Eigen::MatrixXd& y,
-                     State& state) const {
+void CondensedRun::Put(std::size_t k, const Point& point, const Eigen::MatrixXd& y,
+                       State& state) const {
   const std::vector<Block>& places = initial_.layout().blocks();
   for (const FirstValue& first : epochs_[k].first_values) {
     const Block& place = places[static_cast<std::size_t>(first.block)];
@@ -347,7 +347,7 @@ void Trajectory::Put(std::size_t k, const Point& point, const Eigen::MatrixXd& y
   }
 }
 
-void Trajectory::Report(std::size_t k, const Point& point, UpdateReport& report) const {
+void CondensedRun::Report(std::size_t k, const Point& point, UpdateReport& report) const {
   report.Clear();
   report.stale = epochs_[k].stale;
   report.inputs = epochs_[k].inputs;

@@ -37,7 +37,7 @@ namespace alidade::ceres_batch {
 ///   x, S     -, n x N   values of all blocks; n: their tangents, those of fixed blocks apart
 ///
 /// Source       [Bock1984] (condensing), [Bell1994] (smoothing as least squares).
-class Trajectory {
+class CondensedRun {
  public:
   /// x_k, and S_k where it was asked for (columns of later inputs are zero). About a given
   /// trajectory x is that one's, and the linearised state is x (+) (offset + S e).
@@ -48,7 +48,7 @@ class Trajectory {
   };
 
   /// Gaps longer than `max_dt_s` are stepped in equal parts.
-  Trajectory(System system, const std::vector<StreamInfo>& streams, double max_dt_s);
+  CondensedRun(System system, const std::vector<StreamInfo>& streams, double max_dt_s);
 
   /// Sets the time of the prior; else the first frame, or initial_time_s, does.
   void Start(Stamp stamp) { stamp_ = stamp; }

@@ -5,10 +5,10 @@
 
 #include "condensed_run.h"
 
-/// The solution of a Trajectory linearised about a given one.
+/// The solution of a CondensedRun linearised about a given one.
 namespace alidade::ceres_batch {
 
-bool Trajectory::Linearised(std::vector<std::vector<double>> trajectory, Eigen::VectorXd& e) {
+bool CondensedRun::Linearised(std::vector<std::vector<double>> trajectory, Eigen::VectorXd& e) {
   constexpr int kMostPasses = 20;
   constexpr double kSettled = 1e-9;  // of inputs whose sigma is 1
   Eigen::VectorXd step;
@@ -23,7 +23,7 @@ bool Trajectory::Linearised(std::vector<std::vector<double>> trajectory, Eigen::
 
 /// To the values of `about`, where a filter has them: x' becomes x, and offset and S are carried
 /// from the tangent at x' to the one at x, where x' (-) x adds to the offset.
-void Trajectory::PutAbout(const std::vector<double>& about, Point& point) const {
+void CondensedRun::PutAbout(const std::vector<double>& about, Point& point) const {
   for (const Block& block : initial_.layout().blocks()) {
     if (!block.has_covariance()) continue;
     const Geometry& geometry = block.geometry();
@@ -40,8 +40,8 @@ void Trajectory::PutAbout(const std::vector<double>& about, Point& point) const 
   }
 }
 
-bool Trajectory::StepAbout(std::vector<std::vector<double>>& trajectory, const Eigen::VectorXd& e,
-                           Eigen::VectorXd& step) {
+bool CondensedRun::StepAbout(std::vector<std::vector<double>>& trajectory, const Eigen::VectorXd& e,
+                             Eigen::VectorXd& step) {
   const int residuals = has_landmarks() ? 0 : residuals_;
   Eigen::MatrixXd j = Eigen::MatrixXd::Identity(inputs_ + residuals, inputs_);
   j.bottomRows(residuals).setZero();

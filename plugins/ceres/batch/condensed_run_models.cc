@@ -8,7 +8,7 @@
 #include "condensed_run.h"
 #include "plugins/ceres/difference.h"
 
-/// The models of a Trajectory: their values, derivatives and noise at a point of it.
+/// The models of a CondensedRun: their values, derivatives and noise at a point of it.
 namespace alidade::ceres_batch {
 namespace {
 
@@ -46,7 +46,7 @@ std::string Why(Status status, const std::string& error) {
 
 /// x = f(x, u, L e, dt); S = F S + [0  G L  0], which adds to what held inputs did before, and
 /// offset = F offset, in the rows of the model.
-bool Trajectory::Move(const Step& step, const double* e, Point& point) const {
+bool CondensedRun::Move(const Step& step, const double* e, Point& point) const {
   const MotionBinding& motion = system_.motions[step.motion];
   const StateLayout& layout = initial_.layout();
   const int n = motion.model.tangent_size(), n_w = motion.model.noise_size();
@@ -100,8 +100,8 @@ bool Trajectory::Move(const Step& step, const double* e, Point& point) const {
 }
 
 /// y = g(x, z (+) d, prior) and its Jacobians; roles without a covariance have none.
-bool Trajectory::Invert(const Factor& factor, const Eigen::VectorXd& d, const double* prior,
-                        const Point& point, const std::string& name, Inverse& inverse) const {
+bool CondensedRun::Invert(const Factor& factor, const Eigen::VectorXd& d, const double* prior,
+                          const Point& point, const std::string& name, Inverse& inverse) const {
   const SensorBinding& sensor = SensorOf(factor);
   const SensorModel& model = sensor.model;
   const Geometry& measured = model.measurement().geometry;
@@ -145,8 +145,8 @@ bool Trajectory::Invert(const Factor& factor, const Eigen::VectorXd& d, const do
 }
 
 /// y = g(x, z'), z' = z (+) L e; S_y = J_y_x S + [0  J_y_z' J_z' L  0], offset_y = J_y_x offset.
-bool Trajectory::Initialise(const FirstValue& first, const Factor& factor, const double* e,
-                            Point& point) const {
+bool CondensedRun::Initialise(const FirstValue& first, const Factor& factor, const double* e,
+                              Point& point) const {
   const Block& block = initial_.layout()[first.block];
   const int m = SensorOf(factor).model.measurement().geometry.tangent;
   Eigen::VectorXd d = Eigen::VectorXd::Zero(m);
@@ -165,7 +165,7 @@ bool Trajectory::Initialise(const FirstValue& first, const Factor& factor, const
 }
 
 /// Known landmarks are points, whatever the form of the others.
-const SensorModel& Trajectory::ModelOf(const Factor& factor) const {
+const SensorModel& CondensedRun::ModelOf(const Factor& factor) const {
   const SensorBinding& sensor = SensorOf(factor);
   const bool known =
       factor.landmark >= 0 && !landmarks_[static_cast<std::size_t>(factor.landmark)].first;
@@ -173,8 +173,8 @@ const SensorModel& Trajectory::ModelOf(const Factor& factor) const {
 }
 
 /// Those of a landmark have the values `y`, one after the other; null where that is empty.
-std::vector<const double*> Trajectory::RolesOf(const Factor& factor, const Point& point,
-                                               const std::vector<double>& y) const {
+std::vector<const double*> CondensedRun::RolesOf(const Factor& factor, const Point& point,
+                                                 const std::vector<double>& y) const {
   const SensorBinding& sensor = SensorOf(factor);
   std::vector<const double*> roles;
   const double* next = y.empty() ? nullptr : y.data();
@@ -191,8 +191,8 @@ std::vector<const double*> Trajectory::RolesOf(const Factor& factor, const Point
 }
 
 /// r = L^-1 (z (-) h), m, and unless null a = dr/d(x, y), m x (n + t_y); y is the landmark's.
-bool Trajectory::Residual(const Factor& factor, const Point& point, const std::vector<double>& y,
-                          Eigen::VectorXd& r, Eigen::MatrixXd* a) const {
+bool CondensedRun::Residual(const Factor& factor, const Point& point, const std::vector<double>& y,
+                            Eigen::VectorXd& r, Eigen::MatrixXd* a) const {
   const SensorBinding& sensor = SensorOf(factor);
   const SensorModel& model = ModelOf(factor);
   const Geometry& geometry = model.measurement().geometry;
@@ -247,7 +247,7 @@ bool Trajectory::Residual(const Factor& factor, const Point& point, const std::v
   return finite || Fail("sensor '" + sensor.name + "' predicts what is not finite");
 }
 
-bool Trajectory::FreezeStep(Step& step, const Point& point) {
+bool CondensedRun::FreezeStep(Step& step, const Point& point) {
   if (!step.begins) {
     step.l = held_l_[step.motion];
     return true;
@@ -270,7 +270,7 @@ bool Trajectory::FreezeStep(Step& step, const Point& point) {
   return true;
 }
 
-bool Trajectory::FreezeFactor(Factor& factor, const Point& point, const std::vector<double>& y) {
+bool CondensedRun::FreezeFactor(Factor& factor, const Point& point, const std::vector<double>& y) {
   const SensorBinding& sensor = SensorOf(factor);
   const SensorModel& model = ModelOf(factor);
   const int m = model.measurement().geometry.tangent;

@@ -5,7 +5,7 @@
 
 #include "condensed_run.h"
 
-/// The first frame of a Trajectory becomes part of its prior.
+/// The first frame of a CondensedRun becomes part of its prior.
 namespace alidade::ceres_batch {
 
 /// Of the inputs up to the first frame, c of them, with its residuals r(e^) and A = dr/de, weighed:
@@ -13,7 +13,7 @@ namespace alidade::ceres_batch {
 ///   [I; A] = Q U,   e ~ N(e^ + s, (U'U)^-1),   s = -(U'U)^-1 (e^ + A' r)
 ///   x      = x^ (+) (S s + S U^-1 n),   n ~ N(0, I)
 ///   L'     = triangle of U^-T S' = Q_L L',   e_0 = -Q_L' U s   is where x = x^
-bool Trajectory::MarginaliseFirst(Eigen::VectorXd& e) {
+bool CondensedRun::MarginaliseFirst(Eigen::VectorXd& e) {
   ALIDADE_EXPECTS(!has_landmarks() && !epochs_.empty() && e.size() == inputs_);
   if (!epochs_.front().ends) {
     PassOnFirst();
@@ -61,7 +61,7 @@ bool Trajectory::MarginaliseFirst(Eigen::VectorXd& e) {
 }
 
 /// Drops the first frame, which tells nothing; the steps to it lead to the next one.
-void Trajectory::PassOnFirst() {
+void CondensedRun::PassOnFirst() {
   passed_on_.swap(epochs_.front().steps);
   epochs_.erase(epochs_.begin());
   if (epochs_.empty()) return;
@@ -72,7 +72,7 @@ void Trajectory::PassOnFirst() {
 }
 
 /// The places of inputs and residuals, once those of the first frame are gone.
-void Trajectory::Shift(int columns, int rows) {
+void CondensedRun::Shift(int columns, int rows) {
   inputs_ += columns;
   for (int& column : held_) column += column < 0 ? 0 : columns;
   residuals_ = 0;

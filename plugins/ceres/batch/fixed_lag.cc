@@ -30,13 +30,13 @@ Stamp LagOf(double lag_s) {
 }
 
 /// Fixed-lag smoother: the maximum a posteriori of the frames of the last lag_s, of the factors
-/// of Trajectory, given a prior that holds all that came before.
+/// of CondensedRun, given a prior that holds all that came before.
 ///
 ///   window   frames j with t_k - t_j <= lag_s, k the newest
 ///   prior    x_0 = x^ (+) (d_0 + L_0 e_0), of the state at the last frame that left
 ///
 /// A frame that leaves is linearised at the last solution, and stays so: see
-/// Trajectory::MarginaliseFirst. On a linear problem the window is the batch of the data so far.
+/// CondensedRun::MarginaliseFirst. On a linear problem the window is the batch of the data so far.
 ///
 /// Source       [Sibley2010].
 class FixedLag : public Estimator {
@@ -45,18 +45,18 @@ class FixedLag : public Estimator {
            const std::vector<StreamInfo>& streams)
       : output_(options.output),
         window_(LagOf(options.lag_s)),
-        trajectory_(system, streams, options.solve.max_dt_s),
+        run_(system, streams, options.solve.max_dt_s),
         solve_(options.solve),
         state_(system.InitialState()),
         initialiser_(system, options.solve.max_dt_s, streams) {}
 
   void Start(Stamp stamp) override {
-    trajectory_.Start(stamp);
+    run_.Start(stamp);
     initialiser_.filter().Start(stamp);
   }
   bool offline() const override { return output_ == FixedLagOptions::Output::kLagged; }
   const State& state() const override { return state_; }
-  Stamp stamp() const override { return trajectory_.stamp(); }
+  Stamp stamp() const override { return run_.stamp(); }
   bool diverged() const override { return failed_; }
   bool failed() const override { return failed_; }
 
@@ -64,12 +64,12 @@ class FixedLag : public Estimator {
     report_.Clear();
     if (failed_) return report_;
     const UpdateReport& filter = initialiser_.Process(frame);
-    if (!MoveWindow(frame.stamp) || !trajectory_.Add(frame, filter, initialiser_.filter())) {
-      return Fail(frame.stamp, trajectory_.problem());
+    if (!MoveWindow(frame.stamp) || !run_.Add(frame, filter, initialiser_.filter())) {
+      return Fail(frame.stamp, run_.problem());
     }
-    stamps_.push_back(trajectory_.stamp());
+    stamps_.push_back(run_.stamp());
     if (!initialiser_.filter().failed()) {
-      about_.push_back(trajectory_.ValuesOf(initialiser_.filter().state()));
+      about_.push_back(run_.ValuesOf(initialiser_.filter().state()));
     }
     SolveWindow(frame.stamp);
     initialiser_.Tell(frame.stamp, filter, report_.events);
@@ -78,9 +78,9 @@ class FixedLag : public Estimator {
 
   /// Of the frames that left the window, then of those still in it.
   void Smooth(const Emit& emit) override {
-    if (!Keep(trajectory_.size())) {
+    if (!Keep(run_.size())) {
       failed_ = true;
-      throw Error(ExitCode::kDiverged, trajectory_.problem());
+      throw Error(ExitCode::kDiverged, run_.problem());
     }
     for (std::size_t k = 0; k < kept_.size(); ++k) emit(k, kept_[k].state, kept_[k].report);
   }
@@ -109,7 +109,7 @@ class FixedLag : public Estimator {
     while (leaving < stamps_.size() && Leaves(stamps_[leaving], newest)) ++leaving;
     if (offline() && !Keep(leaving)) return false;
     for (std::size_t i = 0; i < leaving; ++i) {
-      if (!trajectory_.MarginaliseFirst(e_)) return false;
+      if (!run_.MarginaliseFirst(e_)) return false;
     }
     const auto count = static_cast<std::ptrdiff_t>(leaving);
     stamps_.erase(stamps_.begin(), stamps_.begin() + count);
@@ -119,31 +119,31 @@ class FixedLag : public Estimator {
 
   /// Keeps the estimates of the first `count` frames of the window.
   bool Keep(std::size_t count) {
-    return trajectory_.ForEachFrame(e_, count, [&](std::size_t k, const Trajectory::Point& point) {
+    return run_.ForEachFrame(e_, count, [&](std::size_t k, const CondensedRun::Point& point) {
       Kept kept;
-      trajectory_.Report(k, point, kept.report);
-      trajectory_.Put(k, point, solve_.Whitened(point), state_);
+      run_.Report(k, point, kept.report);
+      run_.Put(k, point, solve_.Whitened(point), state_);
       kept.state = state_;
       kept_.push_back(std::move(kept));
     });
   }
 
   void SolveWindow(Stamp stamp) {
-    if (!solve_.SolveAnew(trajectory_, about_, e_)) {
+    if (!solve_.SolveAnew(run_, about_, e_)) {
       Fail(stamp, solve_.summary());
       return;
     }
     about_.clear();
-    const bool good = trajectory_.ForEachFrame(
-        e_, trajectory_.size(), [&](std::size_t k, const Trajectory::Point& point) {
+    const bool good =
+        run_.ForEachFrame(e_, run_.size(), [&](std::size_t k, const CondensedRun::Point& point) {
           about_.push_back(point.x);
-          if (offline() || k + 1 < trajectory_.size()) return;
-          trajectory_.Report(k, point, report_);
-          trajectory_.Put(k, point, solve_.Whitened(point), state_);
+          if (offline() || k + 1 < run_.size()) return;
+          run_.Report(k, point, report_);
+          run_.Put(k, point, solve_.Whitened(point), state_);
         });
     solve_.Note(stamp, report_.events);
     if (!good) {
-      Fail(stamp, solve_.summary() + "; then " + trajectory_.problem());
+      Fail(stamp, solve_.summary() + "; then " + run_.problem());
     } else if (solve_.failed()) {
       Fail(stamp, solve_.summary());
     }
@@ -151,7 +151,7 @@ class FixedLag : public Estimator {
 
   FixedLagOptions::Output output_;
   Stamp window_;
-  Trajectory trajectory_;  ///< that of the window
+  CondensedRun run_;  ///< that of the window
   MapSolve solve_;
   State state_;  ///< current: of the last frame; lagged: of the last that left
   InitialisingFilter

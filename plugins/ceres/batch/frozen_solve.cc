@@ -34,15 +34,15 @@ class StopCallback : public ceres::IterationCallback {
 /// Where no Jacobian is asked for, r = (0, sqrt(2 phi)).
 class ReducedCost : public ceres::CostFunction {
  public:
-  explicit ReducedCost(Trajectory& trajectory) : trajectory_(trajectory) {
-    set_num_residuals(trajectory.inputs() + 1);
-    mutable_parameter_block_sizes()->push_back(trajectory.inputs());
+  explicit ReducedCost(CondensedRun& run) : run_(run) {
+    set_num_residuals(run.inputs() + 1);
+    mutable_parameter_block_sizes()->push_back(run.inputs());
   }
   bool Evaluate(const double* const* e, double* residuals, double** jacobians) const override {
     const bool derivatives = jacobians != nullptr && jacobians[0] != nullptr;
-    const int n = trajectory_.inputs();
-    Trajectory::Reduced reduced;
-    if (!trajectory_.Reduce(e[0], derivatives, reduced)) return false;
+    const int n = run_.inputs();
+    CondensedRun::Reduced reduced;
+    if (!run_.Reduce(e[0], derivatives, reduced)) return false;
     Eigen::Map<Eigen::VectorXd> r(residuals, n);
     r.setZero();
     if (derivatives) {
@@ -58,12 +58,12 @@ class ReducedCost : public ceres::CostFunction {
   }
 
  private:
-  Trajectory& trajectory_;
+  CondensedRun& run_;
 };
 
-double CostOf(const Trajectory& trajectory, const Eigen::VectorXd& e, const Eigen::VectorXd& r) {
+double CostOf(const CondensedRun& run, const Eigen::VectorXd& e, const Eigen::VectorXd& r) {
   double cost = 0.5 * e.squaredNorm();
-  for (const Trajectory::Part& part : trajectory.parts()) {
+  for (const CondensedRun::Part& part : run.parts()) {
     cost += Rho(part.loss, r.segment(part.row, part.size).norm());
   }
   return cost;
@@ -71,35 +71,35 @@ double CostOf(const Trajectory& trajectory, const Eigen::VectorXd& e, const Eige
 
 }  // namespace
 
-bool CostAt(Trajectory& trajectory, const Eigen::VectorXd& e, double& cost) {
-  if (trajectory.has_landmarks()) {
-    Trajectory::Reduced reduced;
-    if (!trajectory.Reduce(e.data(), false, reduced)) return false;
+bool CostAt(CondensedRun& run, const Eigen::VectorXd& e, double& cost) {
+  if (run.has_landmarks()) {
+    CondensedRun::Reduced reduced;
+    if (!run.Reduce(e.data(), false, reduced)) return false;
     cost = reduced.cost;
     return true;
   }
-  Eigen::VectorXd r(trajectory.residuals());
-  if (!trajectory.Evaluate(e.data(), r.data(), nullptr)) return false;
-  cost = CostOf(trajectory, e, r);
+  Eigen::VectorXd r(run.residuals());
+  if (!run.Evaluate(e.data(), r.data(), nullptr)) return false;
+  cost = CostOf(run, e, r);
   return true;
 }
 
-ceres::Solver::Summary SolveFrozen(Trajectory& trajectory, Eigen::VectorXd& e, int max_iterations,
+ceres::Solver::Summary SolveFrozen(CondensedRun& run, Eigen::VectorXd& e, int max_iterations,
                                    const std::function<bool()>& stop) {
   const Eigen::Index n = e.size();
   ceres::Solver::Summary summary;
   if (n == 0) {  // Ceres knows no block of size 0
-    const bool defined = CostAt(trajectory, e, summary.final_cost);
+    const bool defined = CostAt(run, e, summary.final_cost);
     summary.termination_type = defined ? ceres::CONVERGENCE : ceres::FAILURE;
     return summary;
   }
-  Residuals residuals(trajectory, e);
-  const bool reduced = trajectory.has_landmarks();
+  Residuals residuals(run, e);
+  const bool reduced = run.has_landmarks();
   ceres::Problem::Options of_problem;
   if (!reduced) of_problem.evaluation_callback = &residuals;
   ceres::Problem problem(of_problem);
   if (reduced) {
-    problem.AddResidualBlock(new ReducedCost(trajectory), nullptr, e.data());
+    problem.AddResidualBlock(new ReducedCost(run), nullptr, e.data());
   } else {
     problem.AddResidualBlock(
         new ceres::NormalPrior(Eigen::MatrixXd::Identity(n, n), Eigen::VectorXd::Zero(n)), nullptr,
@@ -121,24 +121,23 @@ ceres::Solver::Summary SolveFrozen(Trajectory& trajectory, Eigen::VectorXd& e, i
   return summary;
 }
 
-bool GaussNewtonAt(Trajectory& trajectory, const Eigen::VectorXd& e, GaussNewton& at) {
-  const Eigen::Index n = e.size(), m = trajectory.residuals();
-  if (trajectory.has_landmarks()) {
-    Trajectory::Reduced reduced;
-    if (!trajectory.Reduce(e.data(), true, reduced)) return false;
+bool GaussNewtonAt(CondensedRun& run, const Eigen::VectorXd& e, GaussNewton& at) {
+  const Eigen::Index n = e.size(), m = run.residuals();
+  if (run.has_landmarks()) {
+    CondensedRun::Reduced reduced;
+    if (!run.Reduce(e.data(), true, reduced)) return false;
     const Eigen::LLT<Eigen::MatrixXd> llt(reduced.a);
     at.cost = reduced.cost;
     at.u = llt.matrixU();
     at.step = -llt.solve(reduced.g);
-    return llt.info() == Eigen::Success ||
-           trajectory.Fail("the normal matrix is not positive definite");
+    return llt.info() == Eigen::Success || run.Fail("the normal matrix is not positive definite");
   }
   RowMajor j = RowMajor::Identity(n + m, n);
   Eigen::VectorXd r(m), weighted(n + m);
-  if (!trajectory.Evaluate(e.data(), r.data(), j.data() + n * n)) return false;
-  at.cost = CostOf(trajectory, e, r);
+  if (!run.Evaluate(e.data(), r.data(), j.data() + n * n)) return false;
+  at.cost = CostOf(run, e, r);
   weighted << e, r;
-  for (const Trajectory::Part& part : trajectory.parts()) {
+  for (const CondensedRun::Part& part : run.parts()) {
     if (part.loss.kind == LossKind::kNone) continue;
     const double root = std::sqrt(Weight(part.loss, r.segment(part.row, part.size).norm()));
     weighted.segment(n + part.row, part.size) *= root;

@@ -8,14 +8,14 @@
 
 #include "condensed_run.h"
 
-/// The least squares problem of a Trajectory whose Q and R stand where they were frozen.
+/// The least squares problem of a CondensedRun whose Q and R stand where they were frozen.
 namespace alidade::ceres_batch {
 
 /// phi(e) = |e|^2 / 2 + sum_i rho_i(|r_i(e)|), the landmarks where they cost least. False where a
 /// model is not defined.
-bool CostAt(Trajectory& trajectory, const Eigen::VectorXd& e, double& cost);
+bool CostAt(CondensedRun& run, const Eigen::VectorXd& e, double& cost);
 /// Minimises phi from e, until `stop` is true. Where there are no inputs it converges at once.
-ceres::Solver::Summary SolveFrozen(Trajectory& trajectory, Eigen::VectorXd& e, int max_iterations,
+ceres::Solver::Summary SolveFrozen(CondensedRun& run, Eigen::VectorXd& e, int max_iterations,
                                    const std::function<bool()>& stop);
 /// phi about e, with the weights of robust losses as they are there.
 struct GaussNewton {
@@ -24,6 +24,6 @@ struct GaussNewton {
   Eigen::VectorXd step;  ///< -(U'U)^-1 grad phi
 };
 /// False, with `at` as it was or half done, where a model is not defined or U'U is singular.
-bool GaussNewtonAt(Trajectory& trajectory, const Eigen::VectorXd& e, GaussNewton& at);
+bool GaussNewtonAt(CondensedRun& run, const Eigen::VectorXd& e, GaussNewton& at);
 
 }  // namespace alidade::ceres_batch

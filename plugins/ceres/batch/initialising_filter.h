@@ -9,8 +9,8 @@
 
 namespace alidade::ceres_batch {
 
-/// The EKF without gate that goes along: it gives a Trajectory values to start from, and says which
-/// measurements give blocks their first values.
+/// The EKF without gate that goes along: it gives a CondensedRun values to start from, and says
+/// which measurements give blocks their first values.
 class InitialisingFilter {
  public:
   InitialisingFilter(const System& system, double max_dt_s, const std::vector<StreamInfo>& streams)

@@ -5,7 +5,7 @@
 
 #include "condensed_run.h"
 
-/// The landmarks of a Trajectory: how they enter it, and where they cost least.
+/// The landmarks of a CondensedRun: how they enter it, and where they cost least.
 namespace alidade::ceres_batch {
 namespace {
 
@@ -32,7 +32,7 @@ double PriorOf(std::int64_t id, const SensorBinding& sensor, const LandmarkOptio
 }  // namespace
 
 /// What no filter has to say: landmarks known beforehand, and which rows of a state sensors read.
-void Trajectory::AddKnown() {
+void CondensedRun::AddKnown() {
   std::vector<bool> reads(static_cast<std::size_t>(initial_.covariance().size()), false);
   for (const SensorBinding& sensor : system_.sensors) {
     for (const RoleBinding& role : sensor.roles) {
@@ -56,7 +56,7 @@ void Trajectory::AddKnown() {
 
 /// The observations of a frame. A landmark begins with the one that the filter began it with; what
 /// the filter had no landmark for, or could not predict, is left out.
-void Trajectory::AddLandmarks(const UpdateReport& report, const Estimator& filter, Epoch& epoch) {
+void CondensedRun::AddLandmarks(const UpdateReport& report, const Estimator& filter, Epoch& epoch) {
   epoch.counts.initialised = report.landmarks.initialised;
   epoch.counts.deleted = report.landmarks.deleted;
   std::vector<std::size_t> begin;
@@ -83,7 +83,7 @@ void Trajectory::AddLandmarks(const UpdateReport& report, const Estimator& filte
   }
 }
 
-void Trajectory::Begin(const Factor& factor, std::size_t index, const Estimator& filter) {
+void CondensedRun::Begin(const Factor& factor, std::size_t index, const Estimator& filter) {
   const SensorBinding& sensor = SensorOf(factor);
   const std::int64_t id = factor.measurement.landmark;
   const auto before = current_.find(id);
@@ -104,8 +104,8 @@ void Trajectory::Begin(const Factor& factor, std::size_t index, const Estimator&
 }
 
 /// y at the inputs l, and in by_d its derivative by all of them.
-bool Trajectory::Place(const MapLandmark& landmark, const Eigen::VectorXd& l,
-                       const std::vector<Point>& points, Inverse& place) const {
+bool CondensedRun::Place(const MapLandmark& landmark, const Eigen::VectorXd& l,
+                         const std::vector<Point>& points, Inverse& place) const {
   if (!landmark.first) {
     place.y = landmark.mean;
     for (Eigen::Index i = 0; i < l.size(); ++i) {
@@ -135,7 +135,7 @@ bool Trajectory::Place(const MapLandmark& landmark, const Eigen::VectorXd& l,
 
 /// R of all observations of landmarks, these where they were found last. One that is not defined
 /// keeps what it had.
-bool Trajectory::FreezeLandmarks(const std::vector<Point>& points) {
+bool CondensedRun::FreezeLandmarks(const std::vector<Point>& points) {
   for (MapLandmark& landmark : landmarks_) {
     if (landmark.l.size() == 0) landmark.l = landmark.from;
     Inverse place;
@@ -159,15 +159,15 @@ bool Trajectory::FreezeLandmarks(const std::vector<Point>& points) {
 }
 
 /// The rows that sensors read.
-Eigen::MatrixXd Trajectory::Packed(const Eigen::MatrixXd& rows) const {
+Eigen::MatrixXd CondensedRun::Packed(const Eigen::MatrixXd& rows) const {
   return rows(read_, Eigen::all);
 }
 
 /// One observation: J_x = a_x at its frame, a_y J_y_x at the first observation's, J_l = a_y J_y_l.
-bool Trajectory::AddObservation(const Factor& factor, std::size_t epoch,
-                                const MapLandmark& landmark, const Inverse& place,
-                                const Point& point, Normal& normal,
-                                Information* information) const {
+bool CondensedRun::AddObservation(const Factor& factor, std::size_t epoch,
+                                  const MapLandmark& landmark, const Inverse& place,
+                                  const Point& point, Normal& normal,
+                                  Information* information) const {
   const int n = initial_.covariance().size();
   const auto d = std::ssize(read_);
   Eigen::VectorXd r;
@@ -209,9 +209,9 @@ bool Trajectory::AddObservation(const Factor& factor, std::size_t epoch,
 
 /// The normal equations of a landmark at the inputs l; into `information`, unless null, what its
 /// observations tell of the states, l apart.
-bool Trajectory::NormalOf(const MapLandmark& landmark, const Eigen::VectorXd& l,
-                          const std::vector<Point>& points, Undefined undefined, Normal& normal,
-                          Information* information) const {
+bool CondensedRun::NormalOf(const MapLandmark& landmark, const Eigen::VectorXd& l,
+                            const std::vector<Point>& points, Undefined undefined, Normal& normal,
+                            Information* information) const {
   Inverse place;
   if (!Place(landmark, l, points, place)) return false;
   normal.cost = 0.5 * l.squaredNorm();
@@ -234,8 +234,8 @@ bool Trajectory::NormalOf(const MapLandmark& landmark, const Eigen::VectorXd& l,
 
 /// Puts the landmark where it costs least, seen from the points: Gauss-Newton steps, halved until
 /// the cost falls.
-bool Trajectory::OptimiseLandmark(MapLandmark& landmark, const std::vector<Point>& points,
-                                  Undefined undefined) const {
+bool CondensedRun::OptimiseLandmark(MapLandmark& landmark, const std::vector<Point>& points,
+                                    Undefined undefined) const {
   constexpr int kMostSteps = 50, kMostHalvings = 20;
   constexpr double kSettled = 1e-10;  // sigma of what is left to go
   Normal now, next;

@@ -16,9 +16,9 @@ std::string Setting(const char* key, int value) {
 }
 
 /// Freezes at e; false where a model is not defined there.
-bool CanStart(Trajectory& trajectory, const Eigen::VectorXd& e) {
+bool CanStart(CondensedRun& run, const Eigen::VectorXd& e) {
   double unused = 0.0;
-  return trajectory.Freeze(e.data()) && CostAt(trajectory, e, unused);
+  return run.Freeze(e.data()) && CostAt(run, e, unused);
 }
 
 }  // namespace
@@ -43,44 +43,44 @@ void MapSolve::Note(Stamp stamp, std::vector<Event>& events) const {
   if (!note_.empty()) events.push_back({stamp, "not_converged", note_});
 }
 
-bool MapSolve::SolveAll(Trajectory& trajectory, const Values& about, Eigen::VectorXd& e) {
-  if (!trajectory.Linearised(about, e) || !CanStart(trajectory, e)) {
-    e.setZero(trajectory.inputs());
-    if (!CanStart(trajectory, e)) return NowhereToStart(trajectory);
+bool MapSolve::SolveAll(CondensedRun& run, const Values& about, Eigen::VectorXd& e) {
+  if (!run.Linearised(about, e) || !CanStart(run, e)) {
+    e.setZero(run.inputs());
+    if (!CanStart(run, e)) return NowhereToStart(run);
   }
-  return SolveFrom(trajectory, e);
+  return SolveFrom(run, e);
 }
 
-bool MapSolve::SolveAnew(Trajectory& trajectory, const Values& about, Eigen::VectorXd& e) {
+bool MapSolve::SolveAnew(CondensedRun& run, const Values& about, Eigen::VectorXd& e) {
   const Eigen::Index before = e.size();
-  e.conservativeResize(trajectory.inputs());
+  e.conservativeResize(run.inputs());
   e.tail(e.size() - before).setZero();
-  const bool old = !trajectory.has_unit_vector() && CanStart(trajectory, e);
-  if (!old && !(trajectory.Linearised(about, e) && CanStart(trajectory, e))) {
-    return NowhereToStart(trajectory);
+  const bool old = !run.has_unit_vector() && CanStart(run, e);
+  if (!old && !(run.Linearised(about, e) && CanStart(run, e))) {
+    return NowhereToStart(run);
   }
-  return SolveFrom(trajectory, e);
+  return SolveFrom(run, e);
 }
 
-bool MapSolve::NowhereToStart(const Trajectory& trajectory) {
+bool MapSolve::NowhereToStart(const CondensedRun& run) {
   failed_ = true;
   note_.clear();
-  summary_ = "nowhere to start: " + trajectory.problem();
+  summary_ = "nowhere to start: " + run.problem();
   return false;
 }
 
 /// From e, at which Q and R are frozen.
-bool MapSolve::SolveFrom(Trajectory& trajectory, Eigen::VectorXd& e) {
-  const std::string solved = Minimise(trajectory, e);
+bool MapSolve::SolveFrom(CondensedRun& run, Eigen::VectorXd& e) {
+  const std::string solved = Minimise(run, e);
   HeedStop();
-  const bool defined = TakeLastStep(trajectory, e);
+  const bool defined = TakeLastStep(run, e);
   summary_ = "cost " + internal::RoundedText(at_.cost, 9) + ", " + solved + summary_;
-  if (!defined) summary_ += "; then " + trajectory.problem();
+  if (!defined) summary_ += "; then " + run.problem();
   return defined;
 }
 
 /// Until Q and R settle. How it went; in summary_, why it failed.
-std::string MapSolve::Minimise(Trajectory& trajectory, Eigen::VectorXd& e) {
+std::string MapSolve::Minimise(CondensedRun& run, Eigen::VectorXd& e) {
   constexpr double kSettled = 1e-9;
   int iterations = 0, outer = 0;
   bool settled = false;
@@ -90,20 +90,20 @@ std::string MapSolve::Minimise(Trajectory& trajectory, Eigen::VectorXd& e) {
   do {
     HeedStop();
     const ceres::Solver::Summary summary =
-        SolveFrozen(trajectory, e, options_.max_iterations, [this] { return Stopped(); });
+        SolveFrozen(run, e, options_.max_iterations, [this] { return Stopped(); });
     HeedStop();
     iterations += std::max(0, static_cast<int>(summary.iterations.size()) - 1);
     ++outer;
     at_.cost = summary.final_cost;
     failed_ = summary.termination_type != ceres::CONVERGENCE || !std::isfinite(summary.final_cost);
     if (failed_) summary_ = WhyNot(summary);
-    if (!failed_ && trajectory.robust()) iterations += IterateWeights(trajectory, e);
+    if (!failed_ && run.robust()) iterations += IterateWeights(run, e);
     if (failed_) break;
-    if (!trajectory.Freeze(e.data())) {
-      summary_ = trajectory.problem();
+    if (!run.Freeze(e.data())) {
+      summary_ = run.problem();
       break;
     }
-    settled = trajectory.change() <= kSettled;
+    settled = run.change() <= kSettled;
   } while (!settled && outer < options_.max_outer_iterations);
   failed_ = failed_ || !settled;
   if (!failed_) summary_.clear();
@@ -125,9 +125,9 @@ std::string MapSolve::WhyNot(const ceres::Solver::Summary& summary) const {
 /// U at e, and the Gauss-Newton step that it gives: Ceres stops before the last one. A solver that
 /// stopped where this step, |U step| sigmas, is long was not led down by the Jacobian that it was
 /// given. False where GaussNewtonAt is, or the step leads to where a model is not defined.
-bool MapSolve::TakeLastStep(Trajectory& trajectory, Eigen::VectorXd& e) {
+bool MapSolve::TakeLastStep(CondensedRun& run, Eigen::VectorXd& e) {
   constexpr double kLong = 1e-3, kRounding = 1e-6;
-  if (!GaussNewtonAt(trajectory, e, at_)) return false;
+  if (!GaussNewtonAt(run, e, at_)) return false;
   if (failed_) return true;
   failed_ = !((at_.u * at_.step).norm() <= kLong + kRounding * std::sqrt(2.0 * at_.cost));
   if (failed_) {
@@ -139,26 +139,26 @@ bool MapSolve::TakeLastStep(Trajectory& trajectory, Eigen::VectorXd& e) {
   summary_ = "converged";
   e += at_.step;
   double unused = 0.0;
-  return !trajectory.has_landmarks() || CostAt(trajectory, e, unused);
+  return !run.has_landmarks() || CostAt(run, e, unused);
 }
 
 /// Iteratively reweighted least squares (IRLS) converges linearly where the squared error does so
 /// quadratically: what is left below Ceres' tolerances counts. A step that raises the cost is not
 /// taken, and ends it. How many steps it took.
-int MapSolve::IterateWeights(Trajectory& trajectory, Eigen::VectorXd& e) {
+int MapSolve::IterateWeights(CondensedRun& run, Eigen::VectorXd& e) {
   // Of inputs whose sigma is 1; with landmarks a step takes longer.
-  const double settled = trajectory.has_landmarks() ? 1e-6 : 1e-10;
+  const double settled = run.has_landmarks() ? 1e-6 : 1e-10;
   constexpr double kRounding = 1e-9;  // of the cost
   constexpr double kTells = 1e-8;     // sigma
   GaussNewton next;
   note_.clear();
-  if (!GaussNewtonAt(trajectory, e, at_)) return 0;
+  if (!GaussNewtonAt(run, e, at_)) return 0;
   int steps = 0;
   for (bool lower = true; lower && at_.step.norm() > settled;) {
     HeedStop();
     const bool spent = steps == options_.max_iterations;
     const Eigen::VectorXd moved = e + at_.step;
-    const bool defined = spent || GaussNewtonAt(trajectory, moved, next);
+    const bool defined = spent || GaussNewtonAt(run, moved, next);
     lower = !spent && defined && next.cost <= at_.cost * (1.0 + kRounding);
     const double left = (at_.u * at_.step).norm();
     if (lower) {
@@ -170,7 +170,7 @@ int MapSolve::IterateWeights(Trajectory& trajectory, Eigen::VectorXd& e) {
               " steps: the next one is " + internal::RoundedText(left, 3) + " sigma long; " +
               (spent ? "a larger " + Setting("max_iterations", options_.max_iterations) + " may do"
                : defined ? "it does not lower the cost"
-                         : "then " + trajectory.problem());
+                         : "then " + run.problem());
     }
   }
   return steps;

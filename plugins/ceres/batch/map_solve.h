@@ -21,7 +21,7 @@ struct SolveOptions {
 };
 SolveOptions ReadSolveOptions(Params& params);
 
-/// The maximum a posteriori of a Trajectory: Q and R that depend on the state are frozen, the
+/// The maximum a posteriori of a CondensedRun: Q and R that depend on the state are frozen, the
 /// problem is solved, and so on until they settle.
 ///
 /// With [I; sqrt(w) J_r_e] = Q U at the solution, where w are the weights of robust losses, 1
@@ -37,13 +37,13 @@ class MapSolve {
   void StopWhen(std::function<bool()> stop) { stop_ = std::move(stop); }
   /// Solves from the problem linearised about `about`, or where that leaves the domain of a model,
   /// from e = 0. False, and summary(), where there are no estimates.
-  bool SolveAll(Trajectory& trajectory, const Values& about, Eigen::VectorXd& e);
+  bool SolveAll(CondensedRun& run, const Values& about, Eigen::VectorXd& e);
   /// Solves from e, the solution before the last frame came, and new inputs at their mean. Where
   /// that leaves the domain of a model, and with unit vectors, from the problem linearised about
   /// `about`. False, and summary(), where there are no estimates.
-  bool SolveAnew(Trajectory& trajectory, const Values& about, Eigen::VectorXd& e);
-  /// y = U^-T S' of a point, as Trajectory::Put takes it.
-  Eigen::MatrixXd Whitened(const Trajectory::Point& point) const {
+  bool SolveAnew(CondensedRun& run, const Values& about, Eigen::VectorXd& e);
+  /// y = U^-T S' of a point, as CondensedRun::Put takes it.
+  Eigen::MatrixXd Whitened(const CondensedRun::Point& point) const {
     return at_.u.transpose().triangularView<Eigen::Lower>().solve(point.s.transpose());
   }
 
@@ -55,11 +55,11 @@ class MapSolve {
   void HeedStop() const;
 
  private:
-  bool SolveFrom(Trajectory& trajectory, Eigen::VectorXd& e);
-  bool NowhereToStart(const Trajectory& trajectory);
-  std::string Minimise(Trajectory& trajectory, Eigen::VectorXd& e);
-  int IterateWeights(Trajectory& trajectory, Eigen::VectorXd& e);
-  bool TakeLastStep(Trajectory& trajectory, Eigen::VectorXd& e);
+  bool SolveFrom(CondensedRun& run, Eigen::VectorXd& e);
+  bool NowhereToStart(const CondensedRun& run);
+  std::string Minimise(CondensedRun& run, Eigen::VectorXd& e);
+  int IterateWeights(CondensedRun& run, Eigen::VectorXd& e);
+  bool TakeLastStep(CondensedRun& run, Eigen::VectorXd& e);
   std::string WhyNot(const ceres::Solver::Summary& summary) const;
   bool Stopped() const { return stop_ && stop_(); }
 

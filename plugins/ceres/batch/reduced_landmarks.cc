@@ -7,11 +7,11 @@
 #include "alidade/system/landmark_forms.h"
 #include "condensed_run.h"
 
-/// A Trajectory with landmarks as a problem in e alone, and the map that belongs to a solution.
+/// A CondensedRun with landmarks as a problem in e alone, and the map that belongs to a solution.
 namespace alidade::ceres_batch {
 
 /// The points of e, by frame.
-bool Trajectory::PointsOf(const double* e, bool sensitivity, std::vector<Point>& points) const {
+bool CondensedRun::PointsOf(const double* e, bool sensitivity, std::vector<Point>& points) const {
   Point point;
   if (!Begin(e, sensitivity, point)) return false;
   for (std::size_t k = 0; k < epochs_.size(); ++k) {
@@ -21,15 +21,15 @@ bool Trajectory::PointsOf(const double* e, bool sensitivity, std::vector<Point>&
   return true;
 }
 
-bool Trajectory::Reduce(const double* e, bool derivatives, Reduced& reduced) {
+bool CondensedRun::Reduce(const double* e, bool derivatives, Reduced& reduced) {
   std::vector<Point> points;
   return PointsOf(e, derivatives, points) &&
          Project(e, points, Undefined::kFails, derivatives, reduced);
 }
 
 /// The measurements of no landmark.
-bool Trajectory::AddPlain(const std::vector<Point>& points, Undefined undefined,
-                          Information* information, double& cost) const {
+bool CondensedRun::AddPlain(const std::vector<Point>& points, Undefined undefined,
+                            Information* information, double& cost) const {
   const int n = initial_.covariance().size();
   const auto d = std::ssize(read_);
   Eigen::VectorXd r;
@@ -55,8 +55,8 @@ bool Trajectory::AddPlain(const std::vector<Point>& points, Undefined undefined,
 }
 
 /// phi and its derivatives at the points, from the landmarks settled there.
-bool Trajectory::Project(const double* e, const std::vector<Point>& points, Undefined undefined,
-                         bool derivatives, Reduced& reduced) {
+bool CondensedRun::Project(const double* e, const std::vector<Point>& points, Undefined undefined,
+                           bool derivatives, Reduced& reduced) {
   const auto d = std::ssize(read_), size = d * std::ssize(points);
   Information information;
   if (derivatives) {
@@ -99,8 +99,8 @@ bool Trajectory::Project(const double* e, const std::vector<Point>& points, Unde
 
 /// A = I + S' H S, g = e + S' (g_x + H offset), for S of all points, which is lower triangular by
 /// frames: no state depends on a later input.
-void Trajectory::Assemble(const double* e, const std::vector<Point>& points,
-                          const Information& information, Reduced& reduced) const {
+void CondensedRun::Assemble(const double* e, const std::vector<Point>& points,
+                            const Information& information, Reduced& reduced) const {
   const auto d = std::ssize(read_), size = d * std::ssize(points);
   const Eigen::MatrixXd& h = information.h;
   Eigen::MatrixXd s(size, inputs_), hs = Eigen::MatrixXd::Zero(size, inputs_);
@@ -135,8 +135,8 @@ void Trajectory::Assemble(const double* e, const std::vector<Point>& points,
 
 /// A landmark moves with e by M = J (J_y_x S_k - J_y_l C^-1 B' S), and by its own inputs besides:
 /// P = M Cov(e) M' + J J_y_l C^-1 J_y_l' J', with J = dp/dy.
-bool Trajectory::PutMap(const double* e, const Eigen::MatrixXd& u,
-                        std::vector<LandmarkEstimate>& map) {
+bool CondensedRun::PutMap(const double* e, const Eigen::MatrixXd& u,
+                          std::vector<LandmarkEstimate>& map) {
   std::vector<Point> points;
   if (!PointsOf(e, true, points)) return false;
   const auto size = std::ssize(read_) * std::ssize(points);
@@ -168,8 +168,8 @@ bool Trajectory::PutMap(const double* e, const Eigen::MatrixXd& u,
 }
 
 /// Place and covariance of a landmark whose blocks have the covariance p.
-void Trajectory::Describe(const MapLandmark& landmark, const Eigen::MatrixXd& p,
-                          LandmarkEstimate& estimate) const {
+void CondensedRun::Describe(const MapLandmark& landmark, const Eigen::MatrixXd& p,
+                            LandmarkEstimate& estimate) const {
   const std::optional<MapLandmark::Observation> any =
       landmark.first ? landmark.first
                      : (landmark.observations.empty() ? std::nullopt

@@ -12,23 +12,23 @@
 
 namespace alidade::ceres_batch {
 
-/// r and dr/de of a trajectory at e, evaluated once for all its parts.
+/// r and dr/de of a condensed run at e, evaluated once for all its parts.
 class Residuals : public ceres::EvaluationCallback {
  public:
   /// Both must outlive it; Ceres puts the point to evaluate at into `e`.
-  Residuals(const Trajectory& trajectory, const Eigen::VectorXd& e)
-      : trajectory_(trajectory), e_(e), r_(trajectory.residuals()) {}
+  Residuals(const CondensedRun& run, const Eigen::VectorXd& e)
+      : run_(run), e_(e), r_(run.residuals()) {}
 
   void PrepareForEvaluation(bool jacobians, bool new_point) override {
     if (!new_point && (has_jacobian_ || !jacobians)) return;
     if (jacobians) j_.resize(r_.size(), e_.size());
-    good_ = trajectory_.Evaluate(e_.data(), r_.data(), jacobians ? j_.data() : nullptr);
+    good_ = run_.Evaluate(e_.data(), r_.data(), jacobians ? j_.data() : nullptr);
     has_jacobian_ = jacobians;
   }
 
   /// Adds all parts to the problem, each below its loss. `e` is the data of the constructor's.
   void AddTo(ceres::Problem& problem, double* e) const {
-    for (const Trajectory::Part& part : trajectory_.parts()) {
+    for (const CondensedRun::Part& part : run_.parts()) {
       const bool robust = part.loss.kind != LossKind::kNone;
       problem.AddResidualBlock(new Rows(*this, part), robust ? new Loss(part.loss) : nullptr, e);
     }
@@ -38,7 +38,7 @@ class Residuals : public ceres::EvaluationCallback {
   /// Those of one part.
   class Rows : public ceres::CostFunction {
    public:
-    Rows(const Residuals& all, const Trajectory::Part& part) : all_(all), row_(part.row) {
+    Rows(const Residuals& all, const CondensedRun::Part& part) : all_(all), row_(part.row) {
       set_num_residuals(part.size);
       mutable_parameter_block_sizes()->push_back(static_cast<int>(all.e_.size()));
     }
@@ -56,7 +56,7 @@ class Residuals : public ceres::EvaluationCallback {
     int row_;
   };
 
-  const Trajectory& trajectory_;
+  const CondensedRun& run_;
   const Eigen::VectorXd& e_;
   Eigen::VectorXd r_;
   RowMajor j_;

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <cmath>
+#include <vector>
 
 #include "alidade/record/estimate_series.h"
 
@@ -70,6 +72,56 @@ TEST(AlignBySimilarity, AndPathAlignmentRefuseTheSame) {
     other(0, k) += k % 4 < 2 ? 1.0 : -1.0;
   }
   EXPECT_TRUE(refused(one, other));
+}
+
+/// A path that turns, and what a similarity makes of it.
+std::vector<Eigen::Vector3d> TurningPath() {
+  std::vector<Eigen::Vector3d> path;
+  for (int k = 0; k < 40; ++k) {
+    const double t = 0.2 * k;
+    path.emplace_back(100.0 + t, std::sin(t), std::cos(2.0 * t));
+  }
+  return path;
+}
+
+TEST(PathAlignment, FindsASimilarity) {
+  const Eigen::AngleAxisd turn(0.7, Eigen::Vector3d(1, -2, 3).normalized());
+  internal::PathAlignment alignment;
+  for (const Eigen::Vector3d& p : TurningPath()) {
+    alignment.Add(p, 2.0 * (turn * p) + Eigen::Vector3d(1.0, -2.0, 0.5));
+  }
+  const auto aligned = alignment.Result();
+  ASSERT_TRUE(aligned);
+  EXPECT_NEAR(aligned->scale, 2.0, 1e-12);
+  EXPECT_LT(aligned->rmse, 1e-6);
+}
+
+// Against Eigen's, which takes all points at once; a mirrored path needs the sign of D.
+TEST(PathAlignment, AgreesWithUmeyamaOnNoisyAndMirroredPaths) {
+  for (const double mirror : {1.0, -1.0}) {
+    const std::vector<Eigen::Vector3d> path = TurningPath();
+    Eigen::Matrix3Xd points(3, 40), onto = points;
+    internal::PathAlignment alignment;
+    for (Eigen::Index k = 0; k < 40; ++k) {
+      points.col(k) = path[static_cast<std::size_t>(k)];
+      const auto t = static_cast<double>(k);
+      const Eigen::Vector3d noise(std::sin(37.0 * t), std::cos(11.0 * t), std::sin(5.0 * t));
+      onto.col(k) = points.col(k) + 0.1 * noise;
+      onto(2, k) *= mirror;
+      alignment.Add(points.col(k), onto.col(k));
+    }
+    const auto expected = internal::AlignBySimilarity(points, onto);
+    const auto aligned = alignment.Result();
+    ASSERT_TRUE(expected && aligned);
+    EXPECT_NEAR(aligned->rmse, expected->rmse, 1e-9 * expected->rmse) << mirror;
+    EXPECT_NEAR(aligned->scale, expected->scale, 1e-9) << mirror;
+  }
+}
+
+TEST(PathAlignment, OfAPointThereIsNone) {
+  internal::PathAlignment alignment;
+  for (int k = 0; k < 5; ++k) alignment.Add({1, 2, 3}, {1, 2, 3});
+  EXPECT_FALSE(alignment.Result());
 }
 
 }  // namespace

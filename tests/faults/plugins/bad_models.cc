@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One fault each, for tests/plugins/check_test.cc; and five models without fault.
+// One fault each, for tests/plugins/host/check_test.cc; and five models without fault.
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "alidade/bundle/bundle_folder.h"
 #include "support/bundles.h"
 #include "support/temporary_folder.h"
 

@@ -6,7 +6,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "alidade/record/estimator_files.h"
+#include "alidade/record/landmarks_file.h"
 #include "alidade/run/map_metrics.h"
 #include "support/landmark_models.h"
 #include "support/recording.h"

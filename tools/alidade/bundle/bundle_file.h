@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -21,10 +20,6 @@
 ///
 /// Whatever the file's, in the problem a camera looks along +z, y down, v grows downwards.
 namespace alidade {
-namespace internal {
-class RunFolder;
-}
-
 enum class BundleFormat { kBal, kBundler, kLibmv, kTracks };
 /// `bal`, `bundler`, `libmv`, `tracks`.
 const char* ToString(BundleFormat format);
@@ -74,30 +69,5 @@ BundleFile ReadBundleTracks(const BundleTracks& from, const PluginHost& host);
 /// The problem as a file of its own format; numbers in the shortest form that reads back (libmv: to
 /// the nearest 32-bit number). Not of tracks, which hold no poses.
 std::string BundleText(const BundleFile& file);
-
-/// The folder that a solution goes to.
-///
-///   file         rows
-///   problem.EXT  the problem, adjusted, in its own format: .txt, .out or .bin; not of tracks
-///   poses.tum    t x y z qx qy qz qw, world_from_cam; t in s, or the number of the camera; not of
-///                cameras that are not registered
-///   points.csv   point,x,y,z
-///   bundle.json  the result of AdjustBundle, and how much was left out of what was read
-///
-/// It appears when all is written; one that is there is replaced where `force`. Made before the
-/// problem is solved, it tells in time what is in its way, and keeps others from its place.
-class BundleFolder {
- public:
-  /// Errors: kCannotCreate, kIo.
-  BundleFolder(const std::filesystem::path& folder, bool force);
-  ~BundleFolder();
-
-  /// Returns the names of the files; once. Errors: kCannotCreate, kIo.
-  std::vector<std::string> Save(const BundleFile& file, const BundleResult& result,
-                                double rms_before, double rms_after);
-
- private:
-  std::unique_ptr<internal::RunFolder> output_;
-};
 
 }  // namespace alidade

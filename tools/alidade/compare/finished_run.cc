@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "alidade/base/number_rows.h"
 #include "alidade/base/text_cell.h"
 #include "alidade/compare/json_node.h"
 
@@ -160,22 +160,20 @@ EstimatorResult ReadResult(const std::string& name, const JsonNode& entry) {
 
 std::vector<LandmarkEstimate> ReadMap(const fs::path& file) {
   constexpr std::size_t kPlace = 3;  // the columns x, y, z, behind id, generation and form
+  constexpr const char* kAxes[] = {"x", "y", "z"};
   std::vector<LandmarkEstimate> map;
-  std::ifstream stream = Open(file);
-  std::string line;
-  std::getline(stream, line);
-  for (int number = 2; std::getline(stream, line); ++number) {
-    const std::size_t form = line.find(',', line.find(',') + 1);
-    const std::size_t after = std::min(line.find(',', form + 1), line.size());
-    const std::string plain = line.substr(0, form + 1) + line.substr(after);
-    const std::vector<double> row = NumbersOf(plain, file, number);
-    if (row.size() < kPlace + 3) FailFile(file, number, "too few columns");
-    if (!(std::abs(row[0]) < 0x1p63 && std::abs(row[1]) < 0x1p31))
-      FailFile(file, number, "id and generation are no integers");
+  NumberRows rows(file, Place{file.string()}, {});
+  rows.Next();  // the header
+  while (rows.Next()) {
+    if (rows.size() < kPlace + 3) FailFile(file, rows.line(), "too few columns");
     LandmarkEstimate& one = map.emplace_back();
-    one.id = static_cast<std::int64_t>(row[0]);
-    one.generation = static_cast<int>(row[1]);
-    one.position = {row[kPlace], row[kPlace + 1], row[kPlace + 2]};
+    one.id = rows.Index(0, "id");
+    one.generation = static_cast<int>(rows.Index(1, "generation"));
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::size_t cell = kPlace + i;
+      const bool none = rows.text(cell).empty();
+      one.position[static_cast<Eigen::Index>(i)] = none ? kNan : rows.Number(cell, kAxes[i]);
+    }
   }
   return map;
 }

@@ -20,10 +20,4 @@ PoseErrors RelativeErrors(PoseRelation relation, const Trajectory& reference,
 /// angle, and ns for seconds, as these are exact.
 std::vector<double> Progress(const Trajectory& trajectory, DeltaUnit unit);
 
-/// What makes the figures of an evaluation mean something else than they say. `matches` are the
-/// poses of `reference` and `estimate`, as they were read, that the evaluation is of.
-std::vector<std::string> EvaluationWarnings(const Evaluation& evaluation, const Matches& matches,
-                                            const Trajectory& reference,
-                                            const Trajectory& estimate);
-
 }  // namespace alidade::internal

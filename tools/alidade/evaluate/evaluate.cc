@@ -6,6 +6,7 @@
 #include "alidade/base/mahalanobis.h"
 #include "alidade/base/statistics.h"
 #include "alidade/evaluate/errors.h"
+#include "alidade/evaluate/warnings.h"
 #include "alidade/model/geometry.h"
 
 namespace alidade {

@@ -3,15 +3,13 @@
 
 #include <cmath>
 
-#include "alidade/inspect/check_states.h"
-
 namespace alidade::internal {
 namespace {
 
 constexpr double kLarge = 1e6;  // the largest edge of RandomStates
 
 /// Whether a large state has an infinite value, which says nothing against the model.
-bool Overflows(const State& state, const Answer& answer) {
+bool Overflows(const CheckedState& state, const Answer& answer) {
   bool large = false, infinite = false;
   for (const auto& value : state.values) {
     for (const double element : value) large = large || std::abs(element) >= kLarge;
@@ -30,10 +28,10 @@ Context::Context(const PluginHost& host, const PluginEntry& entry, const Node& p
   model_ = Create();
 }
 
-const std::vector<State>& Context::states() {
+const std::vector<CheckedState>& Context::states() {
   if (!states_.empty()) return states_;
   for (Values& values : RandomStates(*model_, options_.states, options_.seed)) {
-    State state{std::move(values), false};
+    CheckedState state{std::move(values), false};
     const Answer answer = Call(main(), state, kNoMatrix);
     if (answer.ok() && Overflows(state, answer)) continue;
     state.defined = answer.ok();
@@ -48,12 +46,12 @@ const std::vector<State>& Context::states() {
   return states_;
 }
 
-std::unique_ptr<Model> Context::Create() const {
+std::unique_ptr<ModelUnderTest> Context::Create() const {
   journal_.Enter("create");
-  return std::make_unique<Model>(host_.Create(entry_, parameters_));
+  return std::make_unique<ModelUnderTest>(host_.Create(entry_, parameters_));
 }
 
-void Context::Destroy(std::unique_ptr<Model> model) const {
+void Context::Destroy(std::unique_ptr<ModelUnderTest> model) const {
   journal_.Enter("destroy");
   model.reset();
   journal_.Enter("");
@@ -61,7 +59,7 @@ void Context::Destroy(std::unique_ptr<Model> model) const {
 
 void Context::Close() { Destroy(std::move(model_)); }
 
-Values Context::Inputs(const Function& f, const State& state) {
+Values Context::Inputs(const Function& f, const CheckedState& state) {
   Values inputs;
   for (const int slot : f.slots) inputs.push_back(state.values[static_cast<std::size_t>(slot)]);
   return inputs;
@@ -73,7 +71,7 @@ std::vector<Space> Context::InputSpaces(const Function& f) const {
   return spaces;
 }
 
-Answer Context::Call(const Function& f, const State& state, int matrices) const {
+Answer Context::Call(const Function& f, const CheckedState& state, int matrices) const {
   return CallWith(f, Inputs(f, state), matrices);
 }
 

@@ -14,7 +14,7 @@ namespace alidade::internal {
 
 /// Values of all slots of a model. `defined`: Predict or Step is defined there; then the slot of a
 /// sensor's measurement holds what Predict gave.
-struct State {
+struct CheckedState {
   Values values;
   bool defined = false;
 };
@@ -25,25 +25,25 @@ class Context {
   Context(const PluginHost& host, const PluginEntry& entry, const Node& parameters,
           const CheckOptions& options, Journal& journal);
 
-  const Model& model() const { return *model_; }
+  const ModelUnderTest& model() const { return *model_; }
   const CheckOptions& options() const { return options_; }
-  const std::vector<State>& states();
+  const std::vector<CheckedState>& states();
   /// Sensor: Predict. Motion: Step.
   const Function& main() const { return model_->functions.front(); }
 
   /// Error kBadConfig where a parameter is given that the model does not read.
   void RejectUnread() const { parameters_.RejectUnread(); }
   /// Another instance with the same parameters.
-  std::unique_ptr<Model> Create() const;
+  std::unique_ptr<ModelUnderTest> Create() const;
   /// Destroys `model`, which is written down as a call.
-  void Destroy(std::unique_ptr<Model> model) const;
+  void Destroy(std::unique_ptr<ModelUnderTest> model) const;
   /// The inputs of `f` at a state.
-  static Values Inputs(const Function& f, const State& state);
-  Answer Call(const Function& f, const State& state, int matrices = kAllMatrices) const;
+  static Values Inputs(const Function& f, const CheckedState& state);
+  Answer Call(const Function& f, const CheckedState& state, int matrices = kAllMatrices) const;
   Answer CallWith(const Function& f, const Values& inputs, int matrices) const;
   /// `Predict at depth = 0.3`
   std::string Where(const Function& f, const Values& inputs) const;
-  std::string Where(const Function& f, const State& state) const {
+  std::string Where(const Function& f, const CheckedState& state) const {
     return Where(f, Inputs(f, state));
   }
   /// Destroys the model; nothing else may be called after it.
@@ -57,8 +57,8 @@ class Context {
   const Node& parameters_;
   const CheckOptions& options_;
   Journal& journal_;
-  std::unique_ptr<Model> model_;
-  std::vector<State> states_;
+  std::unique_ptr<ModelUnderTest> model_;
+  std::vector<CheckedState> states_;
 };
 
 inline Finding Ok(std::string words) { return {Finding::Verdict::kOk, "", std::move(words)}; }

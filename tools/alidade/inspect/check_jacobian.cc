@@ -121,7 +121,7 @@ struct JacobianTally {
   std::string failure;
 };
 
-void TestJacobian(const Context& context, const Function& f, const State& state,
+void TestJacobian(const Context& context, const Function& f, const CheckedState& state,
                   JacobianTally& tally) {
   const Values inputs = Context::Inputs(f, state);
   const JacobianTest test(context, f, inputs);
@@ -147,7 +147,7 @@ void TestJacobian(const Context& context, const Function& f, const State& state,
 }
 
 /// `Predict: analytic Jacobian, Initialise: automatic differentiation`
-std::string KindsText(const Model& model) {
+std::string KindsText(const ModelUnderTest& model) {
   const bool analytic = (model.instance->capabilities() & ALIDADE_CLOSED_FORM) != 0;
   std::string text;
   for (const Function& f : model.functions) {
@@ -163,7 +163,7 @@ std::string KindsText(const Model& model) {
 
 Finding CheckSameValue(Context& context) {
   for (const Function& f : context.model().functions) {
-    for (const State& state : context.states()) {
+    for (const CheckedState& state : context.states()) {
       if (f.differentiated == 0) continue;
       const Answer with = context.Call(f, state);
       const int count = static_cast<int>(f.matrices.size());
@@ -182,7 +182,7 @@ Finding CheckSameValue(Context& context) {
 Finding CheckJacobian(Context& context) {
   JacobianTally tally;
   for (const Function& f : context.model().functions) {
-    for (const State& state : context.states()) {
+    for (const CheckedState& state : context.states()) {
       if (f.differentiated > 0) TestJacobian(context, f, state, tally);
     }
   }

@@ -133,7 +133,7 @@ std::optional<PartsDefect> DefectOfParts(const Context& context, const Values& i
 }
 
 /// Where dt goes to 0, and with it what integration leaves.
-std::optional<PartsDefect> LimitOfParts(const Context& context, const State& state) {
+std::optional<PartsDefect> LimitOfParts(const Context& context, const CheckedState& state) {
   const Values inputs = Context::Inputs(context.main(), state);
   const Values blocks(inputs.begin(),
                       inputs.begin() + static_cast<std::ptrdiff_t>(context.main().outputs.size()));
@@ -168,7 +168,7 @@ Finding CheckNoise(Context& context) {
   const Function* const f =
       context.model().Find(context.model().is_sensor() ? "SqrtNoise" : "SqrtQ");
   if (f == nullptr) return Skip("it has no noise input");
-  for (const State& state : context.states()) {
+  for (const CheckedState& state : context.states()) {
     if (!state.defined) continue;
     const Buffer factor = context.Call(*f, state).matrices.front();
     const MatrixXd l = ToMatrix(factor);
@@ -195,7 +195,7 @@ Finding CheckDoubleCover(Context& context) {
       const Space& space = context.model().slots[static_cast<std::size_t>(f.slots[i])];
       if (space.geometry.kind != GeometryKind::kUnitQuaternion || f.outputs.empty()) continue;
       any = true;
-      for (const State& state : context.states()) {
+      for (const CheckedState& state : context.states()) {
         Values turned = Context::Inputs(f, state);
         // Of a half turn, -0 apart from 0 decides which way round its logarithm goes.
         if (turned[i].empty() || turned[i][0] == 0.0) continue;
@@ -225,12 +225,12 @@ Finding CheckInitialise(Context& context) {
   const std::vector<int> y = context.model().Initialised();
   Farthest farthest;
   int inverted = 0;
-  for (const State& state : context.states()) {
+  for (const CheckedState& state : context.states()) {
     if (!state.defined) continue;
     const Answer answer = context.Call(*f, state, kNoMatrix);
     if (!answer.ok()) continue;
     ++inverted;
-    State back = state;
+    CheckedState back = state;
     const Values initialised = OutputValues(answer);
     for (std::size_t i = 0; i < y.size(); ++i) {
       back.values[static_cast<std::size_t>(y[i])] = initialised[i];
@@ -262,7 +262,7 @@ Finding CheckStep(Context& context) {
   const bool stationary = (context.model().instance->capabilities() & ALIDADE_STATIONARY) != 0;
   Farthest identity, additive;
   double order = 0.0;
-  for (const State& state : context.states()) {
+  for (const CheckedState& state : context.states()) {
     const Values inputs = Context::Inputs(f, state);
     const Values blocks(inputs.begin(),
                         inputs.begin() + static_cast<std::ptrdiff_t>(f.outputs.size()));
@@ -305,7 +305,7 @@ Finding CheckNoiseKind(Context& context) {
   PartsDefect worst;
   bool any = false;
   std::string where;
-  for (const State& state : context.states()) {
+  for (const CheckedState& state : context.states()) {
     const auto defect = LimitOfParts(context, state);
     if (!defect) continue;
     any = true;

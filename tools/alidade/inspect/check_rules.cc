@@ -23,7 +23,7 @@ namespace {
 template <class Test>
 std::string FirstFailure(Context& context, const Test& test) {
   for (const Function& f : context.model().functions) {
-    for (const State& state : context.states()) {
+    for (const CheckedState& state : context.states()) {
       if (f.is_noise && !state.defined) continue;
       if (std::string failure = test(f, state); !failure.empty()) return failure;
     }
@@ -97,7 +97,7 @@ std::string ValueDefect(const Function& f, const Answer& answer) {
 }
 
 /// What is wrong with the Jacobians of an answer, or "".
-std::string JacobianDefect(const Function& f, const State& state, const Answer& answer) {
+std::string JacobianDefect(const Function& f, const CheckedState& state, const Answer& answer) {
   for (std::size_t i = 0; i < answer.matrices.size(); ++i) {
     const Buffer& j = answer.matrices[i];
     if (f.jacobian_per_input() && state.values[static_cast<std::size_t>(f.slots[i])].empty()) {
@@ -124,11 +124,12 @@ Finding CheckCreate(Context& context) {
 
 Finding CheckCalls(Context& context) {
   int defined = 0;
-  for (const State& state : context.states()) defined += state.defined ? 1 : 0;
-  const std::string failure = FirstFailure(context, [&](const Function& f, const State& state) {
-    const std::string defect = CodeDefect(context, f, context.Call(f, state).code);
-    return defect.empty() ? defect : context.Where(f, state) + ": " + defect;
-  });
+  for (const CheckedState& state : context.states()) defined += state.defined ? 1 : 0;
+  const std::string failure =
+      FirstFailure(context, [&](const Function& f, const CheckedState& state) {
+        const std::string defect = CodeDefect(context, f, context.Call(f, state).code);
+        return defect.empty() ? defect : context.Where(f, state) + ": " + defect;
+      });
   if (!failure.empty()) return Fail(failure);
   const std::string text =
       context.main().name + " is defined at " + std::to_string(defined) + " of " + Count(context);
@@ -137,19 +138,20 @@ Finding CheckCalls(Context& context) {
 }
 
 Finding CheckBounds(Context& context) {
-  const std::string failure = FirstFailure(context, [&](const Function& f, const State& state) {
-    const Answer answer = context.Call(f, state);
-    for (const auto* buffers : {&answer.outputs, &answer.matrices}) {
-      for (std::size_t i = 0; i < buffers->size(); ++i) {
-        if ((*buffers)[i].GuardsWhole()) continue;
-        const std::string what = buffers == &answer.outputs ? f.outputs[i].name
-                                 : f.is_noise               ? "factor"
-                                                            : "Jacobian " + std::to_string(i);
-        return context.Where(f, state) + ": writes past its buffer of " + what;
-      }
-    }
-    return std::string();
-  });
+  const std::string failure =
+      FirstFailure(context, [&](const Function& f, const CheckedState& state) {
+        const Answer answer = context.Call(f, state);
+        for (const auto* buffers : {&answer.outputs, &answer.matrices}) {
+          for (std::size_t i = 0; i < buffers->size(); ++i) {
+            if ((*buffers)[i].GuardsWhole()) continue;
+            const std::string what = buffers == &answer.outputs ? f.outputs[i].name
+                                     : f.is_noise               ? "factor"
+                                                                : "Jacobian " + std::to_string(i);
+            return context.Where(f, state) + ": writes past its buffer of " + what;
+          }
+        }
+        return std::string();
+      });
   return Verdict(failure, "nothing written beside the buffers");
 }
 
@@ -159,12 +161,12 @@ Finding CheckEnvironment(Context& context) {
     const std::string change = Surroundings().ChangeSince(before);
     return change.empty() ? change : call + ' ' + change;
   };
-  std::unique_ptr<Model> other = context.Create();
+  std::unique_ptr<ModelUnderTest> other = context.Create();
   std::string failure = changed("create");
   context.Destroy(std::move(other));
   if (failure.empty()) failure = changed("destroy");
   if (failure.empty()) {
-    failure = FirstFailure(context, [&](const Function& f, const State& state) {
+    failure = FirstFailure(context, [&](const Function& f, const CheckedState& state) {
       static_cast<void>(context.Call(f, state));
       return changed(f.name);
     });
@@ -173,30 +175,32 @@ Finding CheckEnvironment(Context& context) {
 }
 
 Finding CheckDeterministic(Context& context) {
-  const std::string failure = FirstFailure(context, [&](const Function& f, const State& state) {
-    static_cast<void>(context.Call(f, state));
-    const Answer second = context.Call(f, state), third = context.Call(f, state);
-    return second == third ? "" : context.Where(f, state) + ": two calls in a row differ";
-  });
+  const std::string failure =
+      FirstFailure(context, [&](const Function& f, const CheckedState& state) {
+        static_cast<void>(context.Call(f, state));
+        const Answer second = context.Call(f, state), third = context.Call(f, state);
+        return second == third ? "" : context.Where(f, state) + ": two calls in a row differ";
+      });
   return Verdict(failure, "calls in a row give the same bits");
 }
 
 Finding CheckPure(Context& context) {
   std::vector<Answer> first;
-  const auto remember = [&](const Function& f, const State& state) {
+  const auto remember = [&](const Function& f, const CheckedState& state) {
     first.push_back(context.Call(f, state));
     return std::string();
   };
   static_cast<void>(FirstFailure(context, remember));
   // The same in the opposite order, first by an instance that has not been called before.
-  std::unique_ptr<Model> other = context.Create();
+  std::unique_ptr<ModelUnderTest> other = context.Create();
   std::string failure;
-  for (const Model* model : {const_cast<const Model*>(other.get()), &context.model()}) {
+  for (const ModelUnderTest* model :
+       {const_cast<const ModelUnderTest*>(other.get()), &context.model()}) {
     std::size_t k = first.size();
     for (std::size_t i = model->functions.size(); i-- > 0 && failure.empty();) {
       const Function& f = model->functions[i];
       for (std::size_t s = context.states().size(); s-- > 0 && failure.empty();) {
-        const State& state = context.states()[s];
+        const CheckedState& state = context.states()[s];
         if (f.is_noise && !state.defined) continue;
         if (context.Call(f, state) == first[--k]) continue;
         failure = context.Where(f, state) + ": depends on what was called before";
@@ -208,31 +212,34 @@ Finding CheckPure(Context& context) {
 }
 
 Finding CheckOutputs(Context& context) {
-  const std::string failure = FirstFailure(context, [&](const Function& f, const State& state) {
-    if (f.is_noise) return std::string();  // of `noise`
-    const Answer with = context.Call(f, state), without = context.Call(f, state, kNoMatrix);
-    std::string defect;
-    if (without.ok()) defect = ValueDefect(f, without);
-    if (defect.empty() && with.ok()) defect = ValueDefect(f, with);
-    if (defect.empty() && with.ok()) defect = JacobianDefect(f, state, with);
-    return defect.empty() ? defect : context.Where(f, state) + ": " + defect;
-  });
+  const std::string failure =
+      FirstFailure(context, [&](const Function& f, const CheckedState& state) {
+        if (f.is_noise) return std::string();  // of `noise`
+        const Answer with = context.Call(f, state), without = context.Call(f, state, kNoMatrix);
+        std::string defect;
+        if (without.ok()) defect = ValueDefect(f, without);
+        if (defect.empty() && with.ok()) defect = ValueDefect(f, with);
+        if (defect.empty() && with.ok()) defect = JacobianDefect(f, state, with);
+        return defect.empty() ? defect : context.Where(f, state) + ": " + defect;
+      });
   return Verdict(failure, "all written, finite and on their geometries");
 }
 
 Finding CheckFailure(Context& context) {
   int failed = 0;
-  const std::string failure = FirstFailure(context, [&](const Function& f, const State& state) {
-    const Answer answer = context.Call(f, state);
-    if (answer.ok()) return std::string();
-    ++failed;
-    for (const auto* buffers : {&answer.outputs, &answer.matrices}) {
-      for (const Buffer& buffer : *buffers) {
-        if (!buffer.Untouched()) return context.Where(f, state) + ": fails, but wrote an output";
-      }
-    }
-    return std::string();
-  });
+  const std::string failure =
+      FirstFailure(context, [&](const Function& f, const CheckedState& state) {
+        const Answer answer = context.Call(f, state);
+        if (answer.ok()) return std::string();
+        ++failed;
+        for (const auto* buffers : {&answer.outputs, &answer.matrices}) {
+          for (const Buffer& buffer : *buffers) {
+            if (!buffer.Untouched())
+              return context.Where(f, state) + ": fails, but wrote an output";
+          }
+        }
+        return std::string();
+      });
   if (failure.empty() && failed == 0) return Skip("no call failed");
   return Verdict(failure, std::to_string(failed) + " failed calls left their outputs alone");
 }
@@ -255,8 +262,8 @@ Finding CheckLeaks(Context& context) {
   };
   std::string failure = grown("create and destroy", [&] { context.Destroy(context.Create()); });
   const auto& states = context.states();
-  const auto defined =
-      std::find_if(states.begin(), states.end(), [](const State& state) { return state.defined; });
+  const auto defined = std::find_if(states.begin(), states.end(),
+                                    [](const CheckedState& state) { return state.defined; });
   for (const Function& f : context.model().functions) {
     if (!failure.empty() || defined == states.end()) break;
     failure = grown(f.name.c_str(), [&] { static_cast<void>(context.Call(f, *defined)); });

@@ -4,11 +4,14 @@
 #include <vector>
 
 #include "alidade/base/text_table.h"
-#include "alidade/system/system.h"
+#include "alidade/run/experiment.h"
 
 namespace alidade::internal {
 
 /// How the landmarks of a system that has some enter the state, change and leave it: what, and how.
 std::vector<TextRow> LandmarkRows(const System& system);
+
+/// What the entry of an estimator sets, a key and its value in words each.
+std::vector<TextRow> OptionRows(const Node& entry, const NamedEstimator& named);
 
 }  // namespace alidade::internal

@@ -44,7 +44,7 @@ std::vector<int> FirstSlots(int count) {
 }
 
 void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const Space& z,
-               Model& model) {
+               ModelUnderTest& model) {
   const AlidadeSensor sensor = *c.sensor;
   const void* const self = c.self;
   const int count = static_cast<int>(roles.size()), m = z.geometry.tangent;
@@ -103,7 +103,7 @@ void Scatter(const std::vector<double>& row, const std::vector<Space>& outputs,
 
 /// y = g(other roles, z, prior), y one role or those of a landmark.
 void AddInitialise(const AlidadeInstance& c, const std::vector<Space>& roles, const Space& z,
-                   Model& model) {
+                   ModelUnderTest& model) {
   const AlidadeSensor sensor = *c.sensor;
   const void* const self = c.self;
   const auto count = roles.size();
@@ -153,7 +153,7 @@ void AddInitialise(const AlidadeInstance& c, const std::vector<Space>& roles, co
 }
 
 void AddMotion(const AlidadeInstance& c, const std::vector<Space>& blocks, bool has_input,
-               Model& model) {
+               ModelUnderTest& model) {
   const AlidadeMotion motion = *c.motion;
   const void* const self = c.self;
   const int count = static_cast<int>(blocks.size()), n_w = c.description->noise_count;
@@ -225,7 +225,8 @@ bool operator==(const Buffer& a, const Buffer& b) {
 
 bool Unwritten(double cell) { return Same(cell, kPoison); }
 
-Model::Model(std::shared_ptr<const ModelInstance> from) : instance(std::move(from)) {
+ModelUnderTest::ModelUnderTest(std::shared_ptr<const ModelInstance> from)
+    : instance(std::move(from)) {
   const AlidadeInstance& c = instance->c();
   slots = instance->spaces();
   if (is_sensor()) {
@@ -245,14 +246,14 @@ Model::Model(std::shared_ptr<const ModelInstance> from) : instance(std::move(fro
   AddMotion(c, instance->spaces(), has_input, *this);
 }
 
-std::vector<int> Model::Initialised() const {
+std::vector<int> ModelUnderTest::Initialised() const {
   const SensorModel sensor(instance);
   std::vector<int> roles(static_cast<std::size_t>(sensor.initialised_count()));
   std::iota(roles.begin(), roles.end(), sensor.initialised_role());
   return roles;
 }
 
-const Function* Model::Find(const std::string& name) const {
+const Function* ModelUnderTest::Find(const std::string& name) const {
   const auto found = std::find_if(functions.begin(), functions.end(),
                                   [&](const Function& f) { return f.name == name; });
   return found == functions.end() ? nullptr : &*found;

@@ -51,7 +51,7 @@ struct Shape {
 /// tangents, for the first `differentiated` inputs in order.
 struct Function {
   std::string name;        ///< as the author knows it: `Predict`
-  std::vector<int> slots;  ///< the inputs, as indices into Model::slots
+  std::vector<int> slots;  ///< the inputs, as indices into ModelUnderTest::slots
   std::vector<Space> outputs;
   std::vector<Shape> matrices;  ///< Jacobians; or the factor of a covariance
   int differentiated = 0;
@@ -77,8 +77,8 @@ struct Answer {
 enum : int { kNoMatrix = -1, kAllMatrices = -2 };
 
 /// A model under test: everything that its functions take, and the functions.
-struct Model {
-  explicit Model(std::shared_ptr<const ModelInstance> from);
+struct ModelUnderTest {
+  explicit ModelUnderTest(std::shared_ptr<const ModelInstance> from);
 
   bool is_sensor() const { return instance->c().kind == ALIDADE_KIND_SENSOR; }
   const Function* Find(const std::string& name) const;
@@ -98,5 +98,11 @@ Answer CallFunction(const Function& function, const Values& inputs, int matrices
 
 /// `depth = 0.3, orientation = (1, 0, 0, 0)`
 std::string StateText(const std::vector<Space>& spaces, const Values& values);
+
+/// `count` random values of the slots of a model, then states at the edges: each slot in turn zero,
+/// tiny, large or where its geometry wraps, turns over or is counted twice, the others random. The
+/// slot of a sensor's measurement is random here; half of the random states leave optional roles
+/// unbound.
+std::vector<Values> RandomStates(const ModelUnderTest& model, int count, std::uint64_t seed);
 
 }  // namespace alidade::internal

@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "alidade/base/random.h"
-#include "alidade/inspect/check_states.h"
+#include "alidade/inspect/model_under_test.h"
 
 namespace alidade::internal {
 namespace {
@@ -56,7 +56,7 @@ std::vector<double> RandomNoise(int size, Random& random) {
 
 }  // namespace
 
-std::vector<Values> RandomStates(const Model& model, int count, std::uint64_t seed) {
+std::vector<Values> RandomStates(const ModelUnderTest& model, int count, std::uint64_t seed) {
   Random random(seed);
   const std::size_t blocks = model.instance->spaces().size();
   const auto draw = [&](int i) {

@@ -61,12 +61,4 @@ class EstimatorFiles {
   std::unique_ptr<OutputFile> covariances_;  ///< null: not asked for
 };
 
-/// What a figure of the map has to know.
-RecordedMap DescribeMap(const std::vector<LandmarkEstimate>& landmarks,
-                        const Eigen::AlignedBox3d& path);
-
-/// `NAME/landmarks.csv`: the map at the end. A number that is not finite is left empty. Error: kIo.
-void WriteLandmarks(const RunFolder& folder, const std::string& estimator,
-                    const std::vector<LandmarkEstimate>& landmarks);
-
 }  // namespace alidade::internal

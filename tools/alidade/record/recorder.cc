@@ -16,6 +16,7 @@
 #include "alidade/record/data_hash.h"
 #include "alidade/record/estimator_files.h"
 #include "alidade/record/figures.h"
+#include "alidade/record/landmarks_file.h"
 #include "alidade/record/log_file.h"
 #include "alidade/record/report_html.h"
 #include "alidade/record/run_json.h"

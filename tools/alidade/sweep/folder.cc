@@ -5,7 +5,6 @@
 #include "alidade/base/csv_file.h"
 #include "alidade/base/json.h"
 #include "alidade/base/output_folder.h"
-#include "alidade/base/words.h"
 #include "alidade/run/metric_rows.h"
 #include "alidade/sweep/sweep.h"
 #include "alidade/sweep/table.h"
@@ -17,10 +16,7 @@ using internal::CountWhole;
 using internal::CountWithheld;
 using internal::CsvFile;
 using internal::Json;
-using internal::NamesOf;
-using internal::ReferenceLines;
 using internal::RunFolder;
-using internal::TableRow;
 
 struct SweepFolder::Impl {
   Impl(const std::filesystem::path& path, bool force) : folder(path, force) {}
@@ -42,47 +38,6 @@ Parts PartsOf(const VariedSweep& sweep) {
     parts.push_back({&result, sweep.variation.values[parts.size()]});
   }
   return parts;
-}
-
-/// A cell for each estimator. Each one stands as four in a comparison, so that its numbers share
-/// their unit and decimals with all others of the row.
-std::vector<TableRow> TableRows(const std::vector<SweepSummary>& summaries) {
-  RunResult columns;
-  for (const SweepSummary& summary : summaries) {
-    for (const auto member : {&Spread::mean, &Spread::p05, &Spread::p50, &Spread::p95}) {
-      EstimatorResult& column = columns.estimators.emplace_back();
-      column.units = summary.units;
-      for (const auto& [key, spread] : summary.metrics) column.metrics[key] = spread.*member;
-    }
-  }
-  std::vector<TableRow> rows;
-  for (const TableRow& from : internal::MetricRows(columns)) {
-    TableRow& row = rows.emplace_back(TableRow{from.label, {}});
-    for (std::size_t i = 0; i < from.cells.size(); i += 4) {
-      const std::string* const c = &from.cells[i];
-      row.cells.push_back(c[0] == "-" ? "-" : c[0] + " [" + c[1] + ", " + c[2] + ", " + c[3] + ']');
-    }
-  }
-  TableRow used{"runs used", {}}, diverged{"diverged", {}}, inconsistent{"inconsistent", {}};
-  for (const SweepSummary& summary : summaries) {
-    used.cells.push_back(std::to_string(summary.used));
-    diverged.cells.push_back(std::to_string(summary.diverged));
-    inconsistent.cells.push_back(std::to_string(summary.inconsistent));
-  }
-  rows.push_back(used);
-  rows.push_back(diverged);
-  rows.push_back(inconsistent);
-  return rows;
-}
-
-std::string Markdown(const SweepResult& result) {
-  std::string text = std::to_string(CountWhole(result)) + " of " + std::to_string(result.runs) +
-                     " runs, seeds from " + std::to_string(result.first_seed) +
-                     ". Mean [5 %, 50 %, 95 % quantile] over the runs that did not diverge, "
-                     "inconsistent ones among them.\n\n";
-  const std::vector<SweepSummary> summaries = Summarise(result);
-  text += internal::MarkdownTable("", NamesOf(summaries), TableRows(summaries));
-  return text + internal::NeesLines(summaries) + ReferenceLines(result);
 }
 
 Json EstimatorsOf(const SweepResult& result) {
@@ -204,12 +159,6 @@ void WriteFailures(const RunFolder& folder, const Parts& parts, const std::strin
 
 }  // namespace
 
-std::string SweepTable(const SweepResult& result) {
-  const std::vector<SweepSummary> summaries = Summarise(result);
-  return internal::RightAlignedTable(NamesOf(summaries), TableRows(summaries)) +
-         internal::NeesLines(summaries) + ReferenceLines(result);
-}
-
 SweepFolder::SweepFolder(const std::filesystem::path& folder, bool force)
     : impl_(std::make_unique<Impl>(folder, force)) {}
 
@@ -226,7 +175,7 @@ void SweepFolder::Write(const SweepResult& result, const Config& config) {
   const Parts parts = {{&result, ""}};
   WriteRuns(folder, parts, "");
   WriteFailures(folder, parts, "");
-  folder.Write("table.md", Markdown(result));
+  folder.Write("table.md", internal::SweepMarkdown(result));
   impl_->folder.Commit();
 }
 

@@ -5,6 +5,8 @@
 #include <string_view>
 
 #include "alidade/base/number_text.h"
+#include "alidade/base/text_table.h"
+#include "alidade/base/words.h"
 #include "alidade/run/metric_rows.h"
 
 namespace alidade::internal {
@@ -20,6 +22,37 @@ std::string ReferenceText(const SweepResult& result) {
   return text + "; withheld in " + std::to_string(withheld) + " of " +
          std::to_string(CountWhole(result)) +
          " runs, in which it failed, diverged or had no estimates";
+}
+
+/// A cell for each estimator. Each one stands as four in a comparison, so that its numbers share
+/// their unit and decimals with all others of the row.
+std::vector<TableRow> TableRows(const std::vector<SweepSummary>& summaries) {
+  RunResult columns;
+  for (const SweepSummary& summary : summaries) {
+    for (const auto member : {&Spread::mean, &Spread::p05, &Spread::p50, &Spread::p95}) {
+      EstimatorResult& column = columns.estimators.emplace_back();
+      column.units = summary.units;
+      for (const auto& [key, spread] : summary.metrics) column.metrics[key] = spread.*member;
+    }
+  }
+  std::vector<TableRow> rows;
+  for (const TableRow& from : MetricRows(columns)) {
+    TableRow& row = rows.emplace_back(TableRow{from.label, {}});
+    for (std::size_t i = 0; i < from.cells.size(); i += 4) {
+      const std::string* const c = &from.cells[i];
+      row.cells.push_back(c[0] == "-" ? "-" : c[0] + " [" + c[1] + ", " + c[2] + ", " + c[3] + ']');
+    }
+  }
+  TableRow used{"runs used", {}}, diverged{"diverged", {}}, inconsistent{"inconsistent", {}};
+  for (const SweepSummary& summary : summaries) {
+    used.cells.push_back(std::to_string(summary.used));
+    diverged.cells.push_back(std::to_string(summary.diverged));
+    inconsistent.cells.push_back(std::to_string(summary.inconsistent));
+  }
+  rows.push_back(used);
+  rows.push_back(diverged);
+  rows.push_back(inconsistent);
+  return rows;
 }
 
 }  // namespace
@@ -80,4 +113,24 @@ std::string ReferenceLines(const VariedSweep& sweep) {
   return all_same ? ReferenceLines(sweep.results.front()) : lines;
 }
 
+std::string SweepMarkdown(const SweepResult& result) {
+  std::string text = std::to_string(CountWhole(result)) + " of " + std::to_string(result.runs) +
+                     " runs, seeds from " + std::to_string(result.first_seed) +
+                     ". Mean [5 %, 50 %, 95 % quantile] over the runs that did not diverge, "
+                     "inconsistent ones among them.\n\n";
+  const std::vector<SweepSummary> summaries = Summarise(result);
+  text += MarkdownTable("", NamesOf(summaries), TableRows(summaries));
+  return text + NeesLines(summaries) + ReferenceLines(result);
+}
+
 }  // namespace alidade::internal
+
+namespace alidade {
+
+std::string SweepTable(const SweepResult& result) {
+  const std::vector<SweepSummary> summaries = Summarise(result);
+  return internal::RightAlignedTable(internal::NamesOf(summaries), internal::TableRows(summaries)) +
+         internal::NeesLines(summaries) + internal::ReferenceLines(result);
+}
+
+}  // namespace alidade

@@ -29,4 +29,7 @@ std::string NeesLines(const std::vector<SweepSummary>& summaries);
 std::string ReferenceLines(const SweepResult& result);
 std::string ReferenceLines(const VariedSweep& sweep);
 
+/// The text of `table.md`: a column for each estimator.
+std::string SweepMarkdown(const SweepResult& result);
+
 }  // namespace alidade::internal

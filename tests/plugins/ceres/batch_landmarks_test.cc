@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The batch of runs with landmarks, against least squares written out in the states themselves.
-#include "ceres_batch_landmarks_fixture.h"
+#include "batch_landmarks_fixture.h"
 
 namespace alidade {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ceres_batch_fixture.h"
+#include "batch_fixture.h"
 
 namespace alidade {
 namespace {

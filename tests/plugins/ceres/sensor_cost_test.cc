@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "plugins/ceres/bundle/sensor_cost.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "alidade/host/in_process.h"
 #include "plugins/ceres/bundle/geometry_manifold.h"
-#include "plugins/ceres/bundle/sensor_cost.h"
 #include "sensors/self_calibrating_feature.h"
 #include "sensors/stereo_disparity.h"
 

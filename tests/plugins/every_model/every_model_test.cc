@@ -79,7 +79,7 @@ TEST(Models, HaveARow) {
     if (model && fs::equivalent(entry.plugin.parent_path(), ShippedFolder()))
       shipped.insert(entry.name);
   }
-  EXPECT_EQ(rows, shipped) << "a row in every_model_*_test.cc for each model that is shipped";
+  EXPECT_EQ(rows, shipped) << "a row in tests/plugins/every_model for each model that is shipped";
 }
 
 }  // namespace alidade::testing

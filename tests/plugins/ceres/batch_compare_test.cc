@@ -6,7 +6,7 @@
 
 #include "alidade/compare/compare.h"
 #include "alidade/filter/rts.h"
-#include "ceres_batch_fixture.h"
+#include "batch_fixture.h"
 
 namespace alidade {
 namespace {

@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "alidade/bundle/bundle_file.h"
-#include "ceres_batch_fixture.h"
+#include "batch_fixture.h"
 #include "support/bal_formula.h"
 #include "support/bundles.h"
 

@@ -2,7 +2,7 @@
 //
 // A batch over what a filter accepted, and a batch in the place of truth.
 #include "alidade/run/run.h"
-#include "ceres_batch_fixture.h"
+#include "batch_fixture.h"
 #include "support/recording.h"
 
 namespace alidade {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "every_model_fixture.h"
 #include "motion_models/odometry_pose.h"
+
+#include "every_model_fixture.h"
 
 namespace alidade::testing {
 namespace {

@@ -4,7 +4,7 @@
 #include "alidade/base/random.h"
 #include "alidade/filter/rts.h"
 #include "alidade/run/run.h"
-#include "ceres_batch_fixture.h"
+#include "batch_fixture.h"
 #include "support/comma_locale.h"
 
 /// How a batch starts and ends: what it says where it is not at the optimum.

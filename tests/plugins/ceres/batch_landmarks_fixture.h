@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ceres_batch_fixture.h"
+#include "batch_fixture.h"
 #include "support/landmark_models.h"
 
 /// What the tests of the batch with landmarks share.

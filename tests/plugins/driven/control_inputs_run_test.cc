@@ -8,7 +8,7 @@
 #include "alidade/inspect/check.h"
 #include "alidade/inspect/explain.h"
 #include "alidade/run/run.h"
-#include "host_fixture.h"
+#include "plugins/host/host_fixture.h"
 #include "support/recording.h"
 
 namespace alidade {

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "alidade/run/experiment.h"
-#include "ceres_batch_landmarks_fixture.h"
-#include "scene_fixture.h"
+#include "batch_landmarks_fixture.h"
+#include "plugins/scene/scene_fixture.h"
 
 namespace alidade {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "alidade/filter/rts.h"
-#include "ceres_batch_fixture.h"
+#include "batch_fixture.h"
 
 namespace alidade {
 namespace {

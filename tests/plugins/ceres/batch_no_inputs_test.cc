@@ -3,7 +3,7 @@
 // Problems without a noise input: no prior, no process noise. There is nothing to solve for.
 #include <cmath>
 
-#include "ceres_batch_fixture.h"
+#include "batch_fixture.h"
 #include "support/landmark_models.h"
 
 namespace alidade {
@@ -61,8 +61,8 @@ Estimated Estimate(const std::string& options, const System& system,
 }
 
 const std::vector<std::string> kAll = {"ceres_batch", "ceres_batch\nmode: filtering",
-                                       "fixed_lag\nwindow_s: 0.15",
-                                       "fixed_lag\nwindow_s: 0.15\noutput: lagged"};
+                                       "fixed_lag\nlag_s: 0.15",
+                                       "fixed_lag\nlag_s: 0.15\noutput: lagged"};
 
 // Its value is the mean of what was measured, z / gain: P = sigma^2 / (gain^2 n).
 TEST(CeresBatchNoInputs, AFirstValueMayComeLate) {

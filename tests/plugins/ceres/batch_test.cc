@@ -4,7 +4,7 @@
 
 #include "alidade/inspect/plugin_listing.h"
 #include "alidade/run/run.h"
-#include "ceres_batch_fixture.h"
+#include "batch_fixture.h"
 #include "plugins/depth_target/depth_target.h"
 
 namespace alidade {

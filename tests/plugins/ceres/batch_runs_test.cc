@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/inspect/plugin_listing.h"
 #include "alidade/run/run.h"
-#include "ceres_batch_fixture.h"
+#include "batch_fixture.h"
 
 namespace alidade {
 namespace {
@@ -123,7 +123,7 @@ TEST_F(CeresBatchConfig, BadOptionsAndTypesAreErrorsWithAPlace) {
     RunDepth(1, {{"estimators.batch.type", "ceres_batch"}, {key, value}});
   };
   ExpectError(ExitCode::kBadConfig, {"estimators.batch.mode", "some", "smoothing, filtering"},
-              [&] { run("estimators.batch.data", "some"); });
+              [&] { run("estimators.batch.mode", "some"); });
   ExpectError(ExitCode::kBadConfig, {"estimators.batch.max_iterations", "[1, 1000000]"},
               [&] { run("estimators.batch.max_iterations", "0"); });
   ExpectError(ExitCode::kBadConfig, {"max_iteration", "did you mean 'max_iterations'?"},

@@ -9,7 +9,7 @@
 
 #include "alidade/model/camera.h"
 #include "alidade/model/static_ekf.h"
-#include "host_fixture.h"
+#include "plugins/host/host_fixture.h"
 #include "support/systems.h"
 
 /// A shipped model from its one struct, as a plugin under the engine and the batch, and composed at

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "host_fixture.h"
+#include "plugins/host/host_fixture.h"
 #include "support/systems.h"
 
 /// What the tests of the batch share.

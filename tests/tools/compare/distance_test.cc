@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/compare/distance.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace alidade {
+namespace {
+
+/// A series of one scalar block and a quaternion, with variances alone.
+internal::Series TwoBlocks() {
+  internal::Series series;
+  series.blocks = {{"a.x", "m", Geometry::Vector(1)}, {"a.q", "", Geometry::UnitQuaternion()}};
+  series.joint = false;
+  return series;
+}
+
+// q and -q are one rotation; distances are taken in the tangent of the reference.
+TEST(Series, DistancesAreOfTheTangentAndOfSharedStamps) {
+  internal::Series series = TwoBlocks(), reference = TwoBlocks();
+  series.stamps = {10, 20, 30};
+  series.values = {9, 1, 0, 0, 0, 1.5, -1, 0, 0, 0, 2.0, std::cos(0.1), std::sin(0.1), 0, 0};
+  series.covariances.assign(12, 1.0);
+  reference.stamps = {20, 30, 40};
+  reference.values = {1, 1, 0, 0, 0, 1, 1, 0, 0, 0, 1, 1, 0, 0, 0};
+  reference.covariances.assign(12, 0.25);
+  const internal::Distance distance = internal::DistanceBetween(series, reference);
+  EXPECT_NEAR(distance.rms.at("a.x"), std::sqrt((0.25 + 1.0) / 2.0), 1e-15);
+  EXPECT_NEAR(distance.final.at("a.x"), 1.0, 1e-15);
+  EXPECT_NEAR(distance.final.at("a.q"), 0.2, 1e-12);
+  // (0.5^2 + 1^2 + 0.2^2) / 0.25, over two stamps and four degrees of freedom.
+  EXPECT_NEAR(distance.sigmas.at("a"), std::sqrt((0.25 + 1.0 + 0.04) / 0.25 / 8.0), 1e-12);
+}
+
+TEST(Series, WhatHasNoValueOrVarianceIsLeftOut) {
+  const double nan = std::nan("");
+  internal::Series series = TwoBlocks(), reference = TwoBlocks();
+  series.stamps = reference.stamps = {10, 20};
+  series.values = {nan, 1, 0, 0, 0, 3, 1, 0, 0, 0};
+  reference.values = {1, 1, 0, 0, 0, 1, 1, 0, 0, 0};
+  series.covariances = reference.covariances = {1, 1, 1, 1, 0, 1, 1, 1};
+  const internal::Distance distance = internal::DistanceBetween(series, reference);
+  EXPECT_EQ(distance.rms.at("a.x"), 2.0);
+  EXPECT_FALSE(distance.sigmas.contains("a"));  // one is no number, the other known exactly
+}
+
+// What is fixed in both says nothing; what the reference alone fixes has no share in its P.
+TEST(Series, FixedBlocksTakeNothingFromTheOthers) {
+  const double nan = std::nan("");
+  internal::Series series = TwoBlocks(), reference = TwoBlocks();
+  series.stamps = reference.stamps = {10};
+  series.values = {3, 1, 0, 0, 0};
+  reference.values = {1, 1, 0, 0, 0};
+  series.covariances = {1, 1, 1, 1};
+  reference.covariances = {4, nan, nan, nan};
+  reference.blocks[1].fixed = true;
+  internal::Distance distance = internal::DistanceBetween(series, reference);
+  EXPECT_NEAR(distance.sigmas.at("a"), 1.0, 1e-15);
+  EXPECT_TRUE(distance.rms.contains("a.q"));
+  series.blocks[1].fixed = true;
+  distance = internal::DistanceBetween(series, reference);
+  EXPECT_NEAR(distance.sigmas.at("a"), 1.0, 1e-15);
+  EXPECT_FALSE(distance.rms.contains("a.q"));
+}
+
+}  // namespace
+}  // namespace alidade

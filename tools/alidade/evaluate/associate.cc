@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/base/number_text.h"
+#include "alidade/base/text_cell.h"
+#include "alidade/evaluate/evaluate.h"
+
+namespace alidade {
+namespace {
+
+[[noreturn]] void FailMatching(const std::string& name, const std::string& what,
+                               const std::string& expected) {
+  throw Error(ExitCode::kBadData, ErrorLine({name}, {}, what, expected));
+}
+
+/// The nearest double: what a reader of decimal seconds has.
+double DoubleSeconds(Stamp stamp) {
+  return static_cast<double>(static_cast<long double>(stamp) / 1e9L);
+}
+
+/// |a - b| of doubles: of a clock that counts from 1970 to 0.2 us. Where a stamp lies in the middle
+/// of two others, rounding decides, as it does in evo, whose figures would differ otherwise.
+double Apart(Stamp a, Stamp b) { return std::abs(DoubleSeconds(a) - DoubleSeconds(b)); }
+
+/// Index of the nearest stamp, of several as near the first.
+int NearestIndex(const std::vector<Stamp>& stamps, Stamp to) {
+  auto nearest = std::lower_bound(stamps.begin(), stamps.end(), to);
+  const auto before = [&] {
+    if (nearest == stamps.begin()) return false;
+    return nearest == stamps.end() || Apart(*(nearest - 1), to) <= Apart(*nearest, to);
+  };
+  while (before()) --nearest;
+  return static_cast<int>(nearest - stamps.begin());
+}
+
+Matches ByRow(const Trajectory& reference, const Trajectory& estimate) {
+  Matches matches;
+  matches.by_row = true;
+  matches.possible = reference.size();
+  for (int i = 0; i < reference.size(); ++i) matches.reference.push_back(i);
+  matches.estimate = matches.reference;
+  if (reference.size() == estimate.size()) return matches;
+  const bool of_reference = estimate.has_stamps();
+  const Trajectory& bare = of_reference ? reference : estimate;
+  const Trajectory& other = of_reference ? estimate : reference;
+  FailMatching(bare.name,
+               std::to_string(bare.size()) + " poses for " + std::to_string(other.size()) + " of " +
+                   other.name + ", and no timestamps",
+               std::string("a row for each row of the ") +
+                   (of_reference ? "estimate" : "reference") +
+                   ", or timestamps in both (KITTI: NAME_times.txt beside NAME.txt)");
+}
+
+std::string Span(const Trajectory& trajectory) {
+  return internal::SecondsText(trajectory.stamps.front()) + " to " +
+         internal::SecondsText(trajectory.stamps.back());
+}
+
+}  // namespace
+
+Matches Associate(const Trajectory& reference, const Trajectory& estimate, Stamp max_diff,
+                  Stamp offset) {
+  const bool both = reference.has_stamps() && estimate.has_stamps();
+  const bool neither = !reference.has_stamps() && !estimate.has_stamps();
+  const auto is_kitti = [](const Trajectory& t) { return t.format == TrajectoryFormat::kKitti; };
+  if (neither || (!both && is_kitti(reference) && is_kitti(estimate))) {
+    return ByRow(reference, estimate);
+  }
+  if (!both) {
+    FailMatching((reference.has_stamps() ? estimate : reference).name, "poses without stamps",
+                 "times.txt beside them, as the other trajectory has stamps");
+  }
+  const bool estimate_longer = estimate.size() > reference.size();
+  const std::vector<Stamp>& shorter = (estimate_longer ? reference : estimate).stamps;
+  const std::vector<Stamp>& longer = (estimate_longer ? estimate : reference).stamps;
+  const Stamp shift = estimate_longer ? -offset : offset;  // of the shorter
+  for (const Stamp end : {shorter.front(), shorter.back()}) {
+    if (std::abs(Seconds(end) + Seconds(shift)) < cell::kTimeLimit) continue;
+    throw Error(ExitCode::kBadData,
+                ErrorLine({estimate.name}, "--t-offset",
+                          internal::SecondsText(offset) + " beside its stamps is beyond 292 years",
+                          "the time between the two clocks"));
+  }
+  Matches matches;
+  matches.possible = static_cast<int>(shorter.size());
+  std::vector<int>& of_shorter = estimate_longer ? matches.reference : matches.estimate;
+  std::vector<int>& of_longer = estimate_longer ? matches.estimate : matches.reference;
+  for (int i = 0; i < matches.possible; ++i) {
+    const Stamp at = shorter[static_cast<std::size_t>(i)] + shift;
+    const int nearest = NearestIndex(longer, at);
+    if (!(Apart(longer[static_cast<std::size_t>(nearest)], at) <= DoubleSeconds(max_diff)))
+      continue;
+    of_shorter.push_back(i);
+    of_longer.push_back(nearest);
+  }
+  if (!matches.estimate.empty()) return matches;
+  FailMatching(
+      estimate.name,
+      "no pose within " + internal::NumberText(Seconds(max_diff)) + " s of one of " +
+          reference.name + ": " + Span(estimate) + (offset == 0 ? "" : " and --t-offset") +
+          " beside " + Span(reference),
+      "the same clock; or --t-offset, which is added to the estimate's stamps, or --t-max-diff");
+}
+
+}  // namespace alidade

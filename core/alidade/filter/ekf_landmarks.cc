@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "alidade/base/statistics.h"
-#include "alidade/system/landmark_forms.h"
+#include "alidade/system/landmark_form.h"
 
 namespace alidade {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "alidade/filter/ekf_landmarks.h"
-#include "alidade/system/landmark_forms.h"
+#include "alidade/system/landmark_form.h"
 
 namespace alidade {
 

@@ -18,7 +18,7 @@ namespace alidade {
 namespace {
 
 using internal::AppendNumber;
-using internal::RunFolder;
+using internal::OutputFolder;
 
 /// All of a file, of a pipe, or of standard input where it is `-`. Errors: kInputMissing, kIo for a
 /// read that fails, kStopped where a signal ends the wait for more.
@@ -180,7 +180,7 @@ std::string BundleText(const BundleFile& file) {
 }
 
 BundleFolder::BundleFolder(const std::filesystem::path& folder, bool force)
-    : output_(std::make_unique<RunFolder>(folder, force)) {}
+    : output_(std::make_unique<OutputFolder>(folder, force)) {}
 BundleFolder::~BundleFolder() = default;
 
 std::vector<std::string> BundleFolder::Save(const BundleFile& file, const BundleResult& result,

@@ -22,7 +22,7 @@
 /// Whatever the file's, in the problem a camera looks along +z, y down, v grows downwards.
 namespace alidade {
 namespace internal {
-class RunFolder;
+class OutputFolder;
 }
 
 enum class BundleFormat { kBal, kBundler, kLibmv, kTracks };
@@ -97,7 +97,7 @@ class BundleFolder {
                                 double rms_before, double rms_after);
 
  private:
-  std::unique_ptr<internal::RunFolder> output_;
+  std::unique_ptr<internal::OutputFolder> output_;
 };
 
 }  // namespace alidade

@@ -38,7 +38,7 @@ struct Recorder::Impl {
   void WriteReport(const RunResult& result, const internal::RecordedRun& recorded);
 
   Options options;
-  internal::RunFolder folder;
+  internal::OutputFolder folder;
   internal::LogFile log{folder};
   const PluginHost& host;
   std::string title, config_text, source_type;
@@ -216,7 +216,7 @@ void Recorder::Finish(const RunResult& result) {
     const internal::RecordedEstimator& closed = files->recorded();
     impl_->facts.estimators.at(closed.name).rows = closed.estimate_rows;
   }
-  const internal::RunFolder& folder = impl_->folder;
+  const internal::OutputFolder& folder = impl_->folder;
   for (std::size_t e = 0; e < result.estimators.size(); ++e) {
     const EstimatorResult& one = result.estimators[e];
     impl_->WriteEvents(one);

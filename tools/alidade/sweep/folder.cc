@@ -18,13 +18,13 @@ using internal::CountWithheld;
 using internal::CsvFile;
 using internal::Json;
 using internal::NamesOf;
+using internal::OutputFolder;
 using internal::ReferenceLines;
-using internal::RunFolder;
 using internal::TableRow;
 
 struct SweepFolder::Impl {
   Impl(const std::filesystem::path& path, bool force) : folder(path, force) {}
-  RunFolder folder;
+  OutputFolder folder;
 };
 
 namespace {
@@ -154,7 +154,7 @@ std::vector<std::string> Header(const std::string& key, std::vector<std::string>
   return header;
 }
 
-void WriteRuns(const RunFolder& folder, const Parts& parts, const std::string& key) {
+void WriteRuns(const OutputFolder& folder, const Parts& parts, const std::string& key) {
   const RunResult all = AllKeys(parts);
   const std::vector<std::string> metrics = internal::OrderedMetrics(all);
   const std::vector<std::string> counts = internal::OrderedCounts(all);
@@ -186,7 +186,7 @@ void WriteRuns(const RunFolder& folder, const Parts& parts, const std::string& k
   csv.Close();
 }
 
-void WriteFailures(const RunFolder& folder, const Parts& parts, const std::string& key) {
+void WriteFailures(const OutputFolder& folder, const Parts& parts, const std::string& key) {
   const auto failed = [](const SweepRun& run) { return run.status == RunStatus::kFailed; };
   const auto any = [&](const Part& part) { return std::ranges::any_of(part.result->done, failed); };
   if (std::ranges::none_of(parts, any)) return;
@@ -220,7 +220,7 @@ void SweepFolder::AddFile(const std::string& name, const std::string& text) {
 }
 
 void SweepFolder::Write(const SweepResult& result, const Config& config) {
-  const RunFolder& folder = impl_->folder;
+  const OutputFolder& folder = impl_->folder;
   folder.Write("config.resolved.yaml", config.ToYaml());
   folder.Write("sweep.json", SweepJson(result));
   const Parts parts = {{&result, ""}};
@@ -232,7 +232,7 @@ void SweepFolder::Write(const SweepResult& result, const Config& config) {
 
 std::string SweepFolder::Write(const VariedSweep& sweep, const Config& config,
                                const std::function<bool()>& stop) {
-  const RunFolder& folder = impl_->folder;
+  const OutputFolder& folder = impl_->folder;
   const Parts parts = PartsOf(sweep);
   folder.Write("config.resolved.yaml", config.ToYaml());
   folder.Write("sweep.json", SweepJson(sweep));

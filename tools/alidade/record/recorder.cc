@@ -3,15 +3,14 @@
 
 #include <chrono>
 #include <ctime>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
-#include <sstream>
 
 #include "alidade/base/json.h"
 #include "alidade/base/log.h"
 #include "alidade/base/output_folder.h"
+#include "alidade/base/read_file.h"
 #include "alidade/base/sha256.h"
 #include "alidade/record/data_hash.h"
 #include "alidade/record/estimator_files.h"
@@ -55,13 +54,6 @@ struct Recorder::Impl {
 };
 
 namespace {
-
-std::string ReadText(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return text.str();
-}
 
 /// The text of a key where there is one, else `fallback`.
 std::string TextOf(const Node& map, std::string_view key, const std::string& fallback) {
@@ -163,7 +155,7 @@ void Recorder::Impl::WriteReport(const RunResult& result, const internal::Record
   }
   for (const internal::Figure& figure : report.figures.drawn) {
     const std::filesystem::path svg = folder.partial() / ("figures/" + figure.name + ".svg");
-    report.svgs[figure.name] = AsElement(ReadText(svg));
+    report.svgs[figure.name] = AsElement(internal::ReadFile(svg, [](ExitCode, int) {}));
   }
   folder.Write("report.html", internal::ReportHtml(result, report));
   highlights = {"report.html"};

@@ -2,9 +2,9 @@
 //
 // What surrounds a run fails: disk, signals, memory, descriptors, other processes. The number of
 // each fault is in the comment above its test. These are tested elsewhere:
-//   87  RunFolder.EveryFailureOfTheDisk*, OutputFile.*
+//   87  OutputFolder.EveryFailureOfTheDisk*, OutputFile.*
 //   90  PipedRun.*, Cli.Stops*, Cli.Signals*, SweepCli.StopsAtASignal*
-//   93  RunFolder.AFolderThatCannotBeWrittenToIsRefused
+//   93  OutputFolder.AFolderThatCannotBeWrittenToIsRefused
 //   97  SweepCli.GivesTheSameBytesForAnyNumberOfJobs
 //   98  CommaLocale.*, Node.NumberIsReadTheSameInACommaLocale
 #include <algorithm>

@@ -15,7 +15,7 @@ std::string CsvQuoted(std::string_view text) {
   return quoted += '"';
 }
 
-CsvFile::CsvFile(const RunFolder& folder, const std::string& name,
+CsvFile::CsvFile(const OutputFolder& folder, const std::string& name,
                  const std::vector<std::string>& header)
     : file_(folder.Create(name)), columns_(header.size()) {
   for (const std::string& column : header) Text(column);

@@ -16,7 +16,8 @@ namespace alidade::internal {
 class CsvFile {
  public:
   /// Creates the file with its header. Errors: kCannotCreate, kIo.
-  CsvFile(const RunFolder& folder, const std::string& name, const std::vector<std::string>& header);
+  CsvFile(const OutputFolder& folder, const std::string& name,
+          const std::vector<std::string>& header);
 
   CsvFile& Time(Stamp stamp);  ///< empty for kNoStamp
   CsvFile& Number(double value);

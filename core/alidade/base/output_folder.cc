@@ -159,7 +159,7 @@ std::string Few(const std::vector<std::string>& names) {
 
 }  // namespace
 
-RunFolder::RunFolder(const fs::path& target, bool force)
+OutputFolder::OutputFolder(const fs::path& target, bool force)
     : shown_(target), target_(BehindLinks(WithoutTrailingSlash(target))), force_(force) {
   if (target.empty() || !target_.has_filename()) Refuse(target, "is no name for a run folder");
   try {
@@ -179,9 +179,9 @@ RunFolder::RunFolder(const fs::path& target, bool force)
   }
 }
 
-RunFolder::~RunFolder() { Discard(); }
+OutputFolder::~OutputFolder() { Discard(); }
 
-void RunFolder::Discard() {
+void OutputFolder::Discard() {
   std::error_code ignored;
   if (!partial_.empty()) {
     fs::remove_all(partial_, ignored);
@@ -192,12 +192,12 @@ void RunFolder::Discard() {
   lock_ = -1;
 }
 
-fs::path RunFolder::Sibling(const char* kind) const {
+fs::path OutputFolder::Sibling(const char* kind) const {
   return target_.parent_path() /
          ('.' + target_.filename().string() + '.' + kind + '-' + std::to_string(::getpid()));
 }
 
-void RunFolder::MakeParents() {
+void OutputFolder::MakeParents() {
   std::vector<fs::path> missing;
   for (fs::path p = target_.parent_path(); !Exists(p) && p.has_relative_path();
        p = p.parent_path()) {
@@ -212,7 +212,7 @@ void RunFolder::MakeParents() {
   }
 }
 
-RunFolder::Leftovers RunFolder::FindLeftovers() const {
+OutputFolder::Leftovers OutputFolder::FindLeftovers() const {
   const std::string partial = '.' + target_.filename().string() + ".partial-";
   const std::string old = '.' + target_.filename().string() + ".old-";
   Leftovers found;
@@ -234,7 +234,7 @@ RunFolder::Leftovers RunFolder::FindLeftovers() const {
   return found;
 }
 
-void RunFolder::CleanUp(const Leftovers& leftovers) const {
+void OutputFolder::CleanUp(const Leftovers& leftovers) const {
   if (!leftovers.lost.empty() && ::rename(leftovers.lost.c_str(), target_.c_str()) != 0) {
     FailIo(shown_.string(), "restore", errno);
   }
@@ -242,7 +242,7 @@ void RunFolder::CleanUp(const Leftovers& leftovers) const {
   for (const fs::path& folder : leftovers.folders) fs::remove_all(folder, ignored);
 }
 
-void RunFolder::CheckTarget(const fs::path& lost) const {
+void OutputFolder::CheckTarget(const fs::path& lost) const {
   if (!lost.empty() && !force_) {
     Refuse(shown_,
            "a process died while it replaced it: the old folder is '" + lost.string() + '\'',
@@ -267,7 +267,7 @@ void RunFolder::CheckTarget(const fs::path& lost) const {
          "move that elsewhere, or choose another folder");
 }
 
-std::unique_ptr<OutputFile> RunFolder::Create(const std::string& name) const {
+std::unique_ptr<OutputFile> OutputFolder::Create(const std::string& name) const {
   const fs::path file = partial_ / name;
   std::error_code error;
   fs::create_directories(file.parent_path(), error);
@@ -275,13 +275,13 @@ std::unique_ptr<OutputFile> RunFolder::Create(const std::string& name) const {
   return std::make_unique<OutputFile>(file, Shown(name));
 }
 
-void RunFolder::Write(const std::string& name, std::string_view text) const {
+void OutputFolder::Write(const std::string& name, std::string_view text) const {
   const std::unique_ptr<OutputFile> file = Create(name);
   file->Write(text);
   file->Close();
 }
 
-void RunFolder::WriteList() const {
+void OutputFolder::WriteList() const {
   std::vector<std::string> names = {kList};
   for (const auto& entry : fs::recursive_directory_iterator(partial_)) {
     const std::string name = entry.path().lexically_relative(partial_).string();
@@ -293,14 +293,14 @@ void RunFolder::WriteList() const {
   Write(kList, text);
 }
 
-void RunFolder::SyncAll() const {
+void OutputFolder::SyncAll() const {
   for (const auto& entry : fs::recursive_directory_iterator(partial_)) {
     Sync(entry.path(), Shown(entry.path().lexically_relative(partial_).string()));
   }
   Sync(partial_, shown_.string());
 }
 
-void RunFolder::Commit() {
+void OutputFolder::Commit() {
   WriteList();
   SyncAll();
   const FolderLock lock(target_.parent_path());
@@ -321,7 +321,7 @@ void RunFolder::Commit() {
   if (!old.empty()) fs::remove_all(old, ignored);
 }
 
-fs::path RunFolder::MoveAway() const {
+fs::path OutputFolder::MoveAway() const {
   const fs::path old = Sibling("old");
   MakeMarked(old, shown_.string());
   if (::rename(target_.c_str(), (old / target_.filename()).c_str()) != 0) {

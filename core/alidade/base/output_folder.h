@@ -15,18 +15,18 @@ namespace alidade::internal {
 /// and takes its name in Commit(). It is locked meanwhile, so that nobody else writes to that name,
 /// and so that what a killed process left can be told from what a living one is writing. A marker
 /// file tells the hidden folders of this class from those of others, which it never touches.
-class RunFolder {
+class OutputFolder {
  public:
   /// Creates the partial folder, and the folders above it where they are missing. A link to a
   /// folder stands for that folder. Then removes the marked folders of dead processes, and puts
   /// back what one of them was replacing; an error leaves them as they are. Errors: kCannotCreate
   /// where `target` exists without `force`, holds anything that its own `files.txt` does not list,
   /// or is being written by another process; kIo.
-  RunFolder(const std::filesystem::path& target, bool force);
+  OutputFolder(const std::filesystem::path& target, bool force);
   /// Removes what was not committed, with the folders above it that were made for it.
-  ~RunFolder();
-  RunFolder(const RunFolder&) = delete;
-  RunFolder& operator=(const RunFolder&) = delete;
+  ~OutputFolder();
+  OutputFolder(const OutputFolder&) = delete;
+  OutputFolder& operator=(const OutputFolder&) = delete;
 
   /// Opens a new file; `name` may lie in a sub-folder, which is made. Errors: kCannotCreate, kIo.
   std::unique_ptr<OutputFile> Create(const std::string& name) const;

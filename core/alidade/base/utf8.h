@@ -27,4 +27,14 @@ inline std::size_t Utf8Length(std::string_view text) {
   return size;
 }
 
+/// Whether `text` is UTF-8 throughout.
+inline bool IsUtf8(std::string_view text) {
+  while (!text.empty()) {
+    const std::size_t size = Utf8Length(text);
+    if (size == 0) return false;
+    text.remove_prefix(size);
+  }
+  return true;
+}
+
 }  // namespace alidade::internal

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/config/config.h"
 
-#include <sys/stat.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
-#include <cstdio>
 #include <cstring>
 #include <unordered_map>
 
+#include "alidade/base/read_file.h"
 #include "alidade/config/tree.h"
 
 namespace alidade {
@@ -86,24 +84,14 @@ void Merge(ConfigTree* base, ConfigTree* over) {
 }
 
 /// The whole file, or just more of it than a config may have.
-std::string ReadFile(const fs::path& file, const Place& place, std::string_view key) {
+std::string ReadConfig(const fs::path& file, const Place& place, std::string_view key) {
   constexpr std::size_t kLimit = (1 << 20) + 1;
-  const auto fail = [&](ExitCode code, const char* reason) {
+  const auto fail = [&](ExitCode code, int error) {
     const std::string name = key.empty() ? "" : Quoted(file.string()) + ' ';
+    const char* const reason = error == EISDIR ? "it is a directory" : std::strerror(error);
     throw Error(code, ErrorLine(place, key, name + "cannot be read: " + reason));
   };
-  errno = 0;
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "rb"),
-                                                               &std::fclose);
-  if (stream == nullptr) fail(ExitCode::kInputMissing, std::strerror(errno));
-  struct stat status {};
-  if (fstat(fileno(stream.get()), &status) == 0 && S_ISDIR(status.st_mode)) {
-    fail(ExitCode::kInputMissing, "it is a directory");
-  }
-  std::string text(kLimit, '\0');
-  text.resize(std::fread(text.data(), 1, kLimit, stream.get()));
-  if (std::ferror(stream.get()) != 0) fail(ExitCode::kIo, std::strerror(errno));
-  return text;
+  return internal::ReadFile(file, fail, kLimit);
 }
 
 std::unique_ptr<ConfigTree> ParseRoot(std::string_view text, const std::string& name,
@@ -164,7 +152,7 @@ class Loader {
     }
     files_.push_back(file.string());
     if (files_.size() > kMaxFiles) FailAt(place, key, "too many includes", "at most 64 files");
-    auto own = ParseRoot(ReadFile(file, place, key), file.string(), &budget_);
+    auto own = ParseRoot(ReadConfig(file, place, key), file.string(), &budget_);
     AnchorPaths(*own, file.parent_path());
     const auto include = TakeInclude(own.get());
     if (include == nullptr) return own;

@@ -85,6 +85,56 @@ void FailAt(const Place& place, std::string_view key, std::string_view what,
 
 namespace {
 
+struct Unit {
+  std::string_view name;
+  int dimension;
+};
+
+// "min" is left out: in a key it is a minimum more often than a minute.
+constexpr Unit kUnits[] = {
+    {"m", 0},    {"mm", 0},    {"cm", 0},     {"km", 0},   {"um", 0},  {"nm", 0},  {"in", 0},
+    {"inch", 0}, {"ft", 0},    {"s", 1},      {"sec", 1},  {"ms", 1},  {"us", 1},  {"ns", 1},
+    {"h", 1},    {"rad", 2},   {"deg", 2},    {"mrad", 2}, {"hz", 3},  {"khz", 3}, {"mhz", 3},
+    {"px", 4},   {"pixel", 4}, {"pixels", 4}, {"m2", 5},   {"mm2", 5}, {"cm2", 5}, {"s2", 6},
+    {"ms2", 6},  {"px2", 7},   {"rad2", 8},   {"deg2", 8}, {"kg", 9},  {"g", 9},   {"percent", 10},
+};
+
+const Unit* FindUnit(std::string_view name) {
+  const auto* unit = std::find_if(std::begin(kUnits), std::end(kUnits),
+                                  [&](const Unit& u) { return u.name == name; });
+  return unit == std::end(kUnits) ? nullptr : unit;
+}
+
+/// `rate_deg_s` as the stem `rate` and the unit `deg_s`.
+struct UnitOfKey {
+  std::string_view stem;
+  std::string_view unit;
+  std::vector<int> dimensions;
+};
+
+UnitOfKey SplitUnit(std::string_view key) {
+  UnitOfKey split{key, {}, {}};
+  for (;;) {
+    const std::size_t cut = split.stem.rfind('_');
+    if (cut == std::string_view::npos || cut == 0) return split;
+    const Unit* unit = FindUnit(split.stem.substr(cut + 1));
+    if (unit == nullptr) return split;
+    split.dimensions.push_back(unit->dimension);
+    split.stem = key.substr(0, cut);
+    split.unit = key.substr(cut + 1);
+  }
+}
+
+/// The unit of `written` where it differs from `known` in its unit alone, as in `baseline_mm` for
+/// `baseline_m`; else "". `same_dimension`: only where one unit converts to the other.
+std::string UnitSlip(std::string_view written, std::string_view known, bool same_dimension) {
+  const UnitOfKey a = SplitUnit(written);
+  const UnitOfKey b = SplitUnit(known);
+  if (a.unit.empty() || b.unit.empty() || a.stem != b.stem || a.unit == b.unit) return {};
+  if (same_dimension && a.dimensions != b.dimensions) return {};
+  return std::string(a.unit);
+}
+
 std::string Found(const ConfigTree& tree) {
   switch (tree.kind) {
     case Node::Kind::kNull:
@@ -109,7 +159,7 @@ const ConfigTree& Expect(const ConfigTree& tree, Node::Kind kind, const char* ex
   std::vector<std::string> unread;
   for (const auto& child : map.children) {
     if (map.asked.contains(child->key)) continue;
-    const std::string unit = internal::UnitSlip(child->key, key, true);
+    const std::string unit = UnitSlip(child->key, key, true);
     if (!unit.empty()) {
       FailAt(KeyPlace(*child), PathOf(*child), "wrong unit '" + unit + "'", key);
     }
@@ -129,7 +179,7 @@ const ConfigTree& Expect(const ConfigTree& tree, Node::Kind kind, const char* ex
 std::string UnknownKey(const ConfigTree& map, const ConfigTree& child) {
   std::vector<std::string> absent;
   for (const std::string& asked : map.asked) {
-    const std::string unit = internal::UnitSlip(child.key, asked, false);
+    const std::string unit = UnitSlip(child.key, asked, false);
     if (!unit.empty() && Child(map, asked) == nullptr) {
       return ErrorLine(KeyPlace(child), PathOf(child), "wrong unit '" + unit + "'", asked);
     }

@@ -1,39 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <vector>
 
+#include "alidade/base/follow_links.h"
 #include "alidade/config/tree.h"
 
 namespace alidade {
 namespace fs = std::filesystem;
 namespace {
-
-/// `path` with every symlink followed, also one to nothing; empty where they are endless.
-fs::path Followed(const fs::path& path) {
-  constexpr int kMaxLinks = 40;
-  const fs::path absolute = fs::absolute(path);
-  std::vector<fs::path> todo(absolute.begin(), absolute.end());
-  std::reverse(todo.begin(), todo.end());
-  fs::path done;
-  for (int links = 0; !todo.empty();) {
-    const fs::path part = todo.back();
-    todo.pop_back();
-    if (part.empty() || part == ".") continue;
-    if (part.is_absolute()) {
-      done = part;
-    } else if (part == "..") {
-      done = done.parent_path();
-    } else if (std::error_code error; fs::is_symlink(fs::symlink_status(done / part, error))) {
-      const fs::path target = fs::read_symlink(done / part, error);
-      if (error || ++links > kMaxLinks) return {};
-      std::vector<fs::path> parts(target.begin(), target.end());
-      todo.insert(todo.end(), parts.rbegin(), parts.rend());
-    } else {
-      done /= part;
-    }
-  }
-  return done;
-}
 
 bool Contains(const fs::path& folder, const fs::path& path) {
   return std::mismatch(folder.begin(), folder.end(), path.begin(), path.end()).first ==
@@ -50,8 +23,8 @@ fs::path ResolveInside(const fs::path& base, const std::string& path, bool allow
     internal::FailAt(place, key, "empty path", "a path");
   }
   if (allow_outside) return joined;
-  const fs::path inside = Followed(folder);
-  const fs::path target = Followed(joined);
+  const fs::path inside = internal::FollowLinks(fs::absolute(folder));
+  const fs::path target = internal::FollowLinks(fs::absolute(joined));
   if (inside.empty() || target.empty() || !Contains(inside, target)) {
     throw Error(ExitCode::kNotTrusted,
                 ErrorLine(place, key, internal::Quoted(path) + " leaves its folder",

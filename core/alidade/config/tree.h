@@ -53,11 +53,6 @@ struct Origin {
 /// Reads one YAML document strictly; null where the text holds none.
 std::unique_ptr<ConfigTree> ParseYaml(std::string_view text, const Origin& origin, Budget* budget);
 
-/// Checks size, encoding and indentation; gives the text without BOM and carriage returns.
-std::string CleanText(std::string_view text, const Origin& origin);
-
-bool IsUtf8(std::string_view text);
-
 const std::string& PathOf(const ConfigTree& tree);
 /// The key path of `key` in the map at `path`.
 std::string PathBelow(const std::string& path, std::string_view key);
@@ -79,10 +74,6 @@ std::string Quoted(std::string_view text);
 /// Refuses a name that is not one word in columns (`target.depth`), metric keys
 /// (`rmse:target.depth@near`) and tables. `of` says of what, as in `a sensor`.
 void ExpectName(const std::string& name, const Node& at, const std::string& of);
-
-/// The unit of `written` where it differs from `known` in its unit alone, as in `baseline_mm` for
-/// `baseline_m`; else "". `same_dimension`: only where one unit converts to the other.
-std::string UnitSlip(std::string_view written, std::string_view known, bool same_dimension);
 
 }  // namespace internal
 }  // namespace alidade

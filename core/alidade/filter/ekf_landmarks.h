@@ -84,6 +84,7 @@ class Ekf::Landmarks {
     std::map<std::size_t, BlockId> shared;  ///< by landmark role: blocks of this frame
   };
 
+  static bool Used(const MeasurementReport& entry) { return entry.outcome == Outcome::kAccepted; }
   void Plan(Row& row, const Landmark& landmark);
   void Count();
   void CheckDepths();

@@ -1,13 +1,86 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// How a landmark enters the state, and what is told of it.
+// How landmarks enter the state.
 #include <algorithm>
-#include <cmath>
 
 #include "alidade/filter/ekf_landmarks.h"
-#include "alidade/system/landmark_forms.h"
+#include "alidade/system/landmark_form.h"
 
 namespace alidade {
+
+/// Lets landmarks of this frame enter that wait, as long as too few are measured.
+void Ekf::Landmarks::Enter() {
+  const std::vector<const Row*> used = MeasuredOnce();
+  auto measured = std::ssize(used);
+  for (Family& family : families_) family.shared.clear();
+  if (options_.prior) prior_ = *options_.prior;
+  bool asked_map = prior_.adapt_after == 0;
+  for (Row& row : ekf_.rows()) {
+    if (measured >= options_.max_per_frame) return;
+    Outcome& outcome = ekf_.EntryOf(row).outcome;
+    const SensorModel& model = ekf_.BindingOf(row).model;
+    if (!Has(row.sensor) || outcome != Outcome::kNotReady ||
+        !ekf_.plans_[static_cast<std::size_t>(row.sensor)].ready ||
+        model.initialised_role() != FamilyOf(row).first) {
+      continue;
+    }
+    const auto found = map_.landmarks.find(row.measurement->landmark);
+    if (found == map_.landmarks.end() || found->second.in_state() ||
+        found->second.observations < options_.min_observations) {
+      continue;
+    }
+    if (!asked_map) prior_.inverse_distance = PriorInverseDistance(used);
+    asked_map = true;
+    outcome = Initialise(found->first, row, found->second);
+    if (outcome != Outcome::kInitialised) continue;
+    ++counts().initialised;
+    ++measured;
+  }
+}
+
+/// A row that was used of each landmark in the state, by id.
+std::vector<const Ekf::Row*> Ekf::Landmarks::MeasuredOnce() const {
+  std::vector<const Row*> used;
+  for (const Row& row : ekf_.rows()) {
+    if (row.plan == nullptr || !Used(ekf_.EntryOf(row))) continue;
+    const auto found = map_.landmarks.find(row.measurement->landmark);
+    if (found != map_.landmarks.end() && found->second.in_state()) used.push_back(&row);
+  }
+  const auto id = [](const Row* row) { return row->measurement->landmark; };
+  std::ranges::stable_sort(used, {}, id);
+  const auto same = [&](const Row* a, const Row* b) { return id(a) == id(b); };
+  used.erase(std::unique(used.begin(), used.end(), same), used.end());
+  return used;
+}
+
+/// The median of the converged inverse distances among landmarks that were measured, where there
+/// are enough; else the prior's.
+double Ekf::Landmarks::PriorInverseDistance(std::span<const Row* const> measured) const {
+  std::vector<double> converged;
+  for (const Row* const row : measured) {
+    const double* const camera = CameraOf(FamilyOf(*row));
+    const Landmark& landmark = map_.landmarks.at(row->measurement->landmark);
+    constexpr double kConverged = 0.1;  // of the index of linearity, where nothing is converted
+    const double limit =
+        options_.max_linearity_index > 0.0 ? options_.max_linearity_index : kConverged;
+    if (camera == nullptr || !landmark.form) continue;
+    const std::vector<const double*> values = ValuesOf(landmark);
+    if (HasInverseDistance(landmark) &&
+        !(internal::LinearityOf(*landmark.form, values.data(), InverseDistanceSigma(landmark),
+                                camera) < limit)) {
+      continue;
+    }
+    const auto point = internal::PointOf(*landmark.form, values.data());
+    const Eigen::Map<const Eigen::Vector3d> r(camera);
+    if (point) converged.push_back(1.0 / (point->position - r).norm());
+  }
+  if (converged.empty() || std::ssize(converged) < options_.prior->adapt_after) {
+    return options_.prior->inverse_distance;
+  }
+  const auto middle = converged.begin() + std::ssize(converged) / 2;
+  std::ranges::nth_element(converged, middle);
+  return *middle;
+}
 
 /// Gives the landmark its blocks, correlated with those that the observation took. Of a shared role
 /// the first landmark of the frame makes the block, and the others of the same sensor take it.
@@ -43,47 +116,6 @@ Outcome Ekf::Landmarks::Initialise(std::int64_t id, Row& row, Landmark& landmark
   landmark.form = family.form;
   moved_ = true;
   return Outcome::kInitialised;
-}
-
-std::vector<LandmarkEstimate> Ekf::Landmarks::Estimates() const {
-  std::vector<LandmarkEstimate> estimates;
-  for (const auto& [id, landmark] : map_.landmarks) {
-    if (!landmark.in_state()) continue;
-    LandmarkEstimate& one = estimates.emplace_back();
-    one.id = id;
-    one.generation = landmark.generation;
-    one.form = landmark.form;
-    one.first = landmark.first;
-    one.last = landmark.last;
-    one.tried = landmark.tried;
-    one.accepted = landmark.accepted;
-    if (HasInverseDistance(landmark)) {
-      one.inverse_distance = InverseDistance(landmark);
-      one.sigma = InverseDistanceSigma(landmark);
-    }
-    if (!landmark.form) continue;
-    const auto point = internal::PointOf(*landmark.form, ValuesOf(landmark).data());
-    if (!point) continue;
-    one.position = point->position;
-    one.covariance = CovarianceOf(landmark, point->jacobian);
-  }
-  return estimates;
-}
-
-/// J P J' of the blocks of a landmark.
-Eigen::Matrix3d Ekf::Landmarks::CovarianceOf(
-    const Landmark& landmark, const Eigen::Matrix<double, 3, Eigen::Dynamic>& jacobian) const {
-  std::vector<JacobianBlock> parts;
-  Eigen::Index column = 0;
-  for (const BlockId id : landmark.blocks) {
-    const Block& block = ekf_.state_.layout()[id];
-    const int size = block.geometry().tangent;
-    if (block.has_covariance()) {
-      parts.push_back({block.tangent_offset, jacobian.middleCols(column, size)});
-    }
-    column += size;
-  }
-  return Times(parts, 3, ekf_.state_.covariance().TimesTransposed(parts, 3));
 }
 
 }  // namespace alidade

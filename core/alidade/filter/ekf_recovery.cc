@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <cmath>
 
 #include "alidade/base/number_text.h"
 #include "alidade/filter/ekf.h"
 #include "alidade/filter/ekf_landmarks.h"
-#include "alidade/filter/square_root.h"
+#include "alidade/filter/factorise.h"
 
 namespace alidade {
 namespace {
@@ -25,52 +24,6 @@ bool Rejected(const MeasurementReport& entry) {
 }
 
 }  // namespace
-
-/// Initialises the blocks that wait for one of these measurements, each using up its measurement;
-/// what then still needs a block without a value is not ready.
-void Ekf::InitialiseFromMeasurements() {
-  const auto missing = [this](const RoleBinding& role) {
-    return role.block >= 0 && !state_.layout()[role.block].present;
-  };
-  for (bool progress = true; progress;) {
-    progress = false;
-    for (Row& row : rows()) {
-      Outcome& outcome = EntryOf(row).outcome;
-      const SensorBinding& binding = BindingOf(row);
-      const int role = binding.model.initialised_role();
-      if (outcome != Outcome::kAccepted || role < 0) continue;
-      const RoleBinding& target = binding.roles[static_cast<std::size_t>(role)];
-      const auto waits = [&](const Prior& prior) {
-        return prior.block == target.block && prior.from == binding.name;
-      };
-      if (std::count_if(binding.roles.begin(), binding.roles.end(), missing) != 1 ||
-          !missing(target) || std::none_of(system_.priors.begin(), system_.priors.end(), waits)) {
-        continue;
-      }
-      outcome = InitialiseBlock(row);
-      progress = progress || outcome == Outcome::kInitialised;
-    }
-  }
-  for (Row& row : rows()) {
-    Outcome& outcome = EntryOf(row).outcome;
-    if (outcome == Outcome::kAccepted && !PlanOf(row).ready) outcome = Outcome::kNotReady;
-  }
-}
-
-/// Gives the block of the sensor's initialised role the value that the measurement implies, with
-/// its covariance and correlations, in place of any that it has. kInitialised, or why not.
-Outcome Ekf::InitialiseBlock(Row& row) {
-  const SensorBinding& binding = BindingOf(row);
-  const BlockId id =
-      binding.roles[static_cast<std::size_t>(binding.model.initialised_role())].block;
-  Inverse inverse;
-  const Outcome outcome = Invert(row, nullptr, inverse);
-  if (outcome != Outcome::kAccepted) return outcome;
-  state_.Initialise(id, inverse.y.data(), inverse.from, inverse.jacobians, inverse.own);
-  if (!first_.empty()) FirstEstimate(id).clear();
-  Bind();
-  return Outcome::kInitialised;
-}
 
 /// After an update that left S not positive definite: where that is P's fault, makes P positive
 /// semi-definite; ends the filter where it needed that too often.

@@ -2,6 +2,9 @@
 #pragma once
 
 #include <Eigen/Cholesky>
+#include <Eigen/Householder>
+#include <algorithm>
+#include <cmath>
 
 namespace alidade::internal {
 
@@ -11,6 +14,36 @@ inline bool Factorise(Eigen::Ref<Eigen::MatrixXd> s) {
   if (!s.allFinite()) return false;
   const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(s);
   return llt.info() == Eigen::Success && (s.diagonal().array() > 0.0).all();
+}
+
+/// A square root A of a symmetric, positive semi-definite P = A A', singular or not, from the
+/// pivoted L D L' of its lower triangle. Returns the most negative pivot, over the largest
+/// variance; 0: none. Negative pivots count as zero. `ldlt` is memory.
+inline double SquareRootOf(const Eigen::Ref<const Eigen::MatrixXd>& p,
+                           Eigen::LDLT<Eigen::MatrixXd>& ldlt, Eigen::MatrixXd& root) {
+  root.resize(p.rows(), p.cols());
+  if (p.size() == 0) return 0.0;
+  ldlt.compute(p);
+  const auto d = ldlt.vectorD();
+  root = ldlt.matrixL();
+  for (Eigen::Index i = 0; i < d.size(); ++i) root.col(i) *= std::sqrt(std::max(d[i], 0.0));
+  root = ldlt.transpositionsP().transpose() * root;
+  const double least = d.minCoeff(), largest = p.diagonal().maxCoeff();
+  if (!(least < 0.0)) return 0.0;
+  return largest > 0.0 ? least / largest : -1.0;
+}
+
+/// Puts R of A = Q R, the upper triangle of the first n rows, in place of A, m x n, m >= n; below
+/// it lies what is of no use. `work`: n numbers.
+inline void Triangularise(Eigen::Ref<Eigen::MatrixXd> a, double* work) {
+  for (Eigen::Index k = 0; k < a.cols(); ++k) {
+    const Eigen::Index rows = a.rows() - k, columns = a.cols() - k - 1;
+    double tau = 0.0, beta = 0.0;
+    a.col(k).tail(rows).makeHouseholderInPlace(tau, beta);
+    a(k, k) = beta;
+    a.bottomRightCorner(rows, columns)
+        .applyHouseholderOnTheLeft(a.col(k).tail(rows - 1), tau, work);
+  }
 }
 
 }  // namespace alidade::internal

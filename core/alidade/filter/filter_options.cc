@@ -3,6 +3,7 @@
 
 #include "alidade/filter/ekf_options.h"
 #include "alidade/filter/iekf.h"
+#include "alidade/filter/ukf.h"
 
 namespace alidade {
 namespace {
@@ -39,6 +40,18 @@ IekfOptions ReadIekf(Params& p) {
   return options;
 }
 
+UkfOptions ReadUkf(Params& p) {
+  UkfOptions options;
+  options.alpha = p.Number("alpha", "", "spread of the sigma points",
+                           {UkfOptions::kLeastAlpha, 1.0, false, false}, options.alpha);
+  options.beta = p.NonNegative("beta", "", "weight of what the centre adds; 2: best for a Gaussian",
+                               options.beta);
+  options.kappa =
+      p.NonNegative("kappa", "", "spread beyond the number of directions", options.kappa);
+  options.filter = internal::ReadCommonOptions(p);
+  return options;
+}
+
 }  // namespace
 
 EkfOptions internal::ReadCommonOptions(Params& p) {
@@ -65,5 +78,11 @@ IekfOptions IekfOptions::FromNode(const Node& entry) {
 }
 
 std::vector<ParamInfo> IekfOptions::Schema() { return internal::SchemaOf(ReadIekf); }
+
+UkfOptions UkfOptions::FromNode(const Node& entry) {
+  return internal::OptionsFromNode(entry, "ukf", ReadUkf);
+}
+
+std::vector<ParamInfo> UkfOptions::Schema() { return internal::SchemaOf(ReadUkf); }
 
 }  // namespace alidade

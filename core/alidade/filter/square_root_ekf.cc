@@ -2,8 +2,8 @@
 #include "alidade/filter/square_root_ekf.h"
 
 #include "alidade/filter/ekf_snapshot.h"
+#include "alidade/filter/factorise.h"
 #include "alidade/filter/filter_options.h"
-#include "alidade/filter/square_root.h"
 
 namespace alidade {
 

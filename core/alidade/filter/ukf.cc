@@ -9,7 +9,6 @@
 #include "alidade/filter/ekf_snapshot.h"
 #include "alidade/filter/factorise.h"
 #include "alidade/filter/filter_options.h"
-#include "alidade/filter/square_root.h"
 
 namespace alidade {
 namespace {

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <dlfcn.h>
 
+#define BOOST_DLL_USE_STD_FS
+#include <boost/dll/shared_library.hpp>
+#include <system_error>
+#include <vector>
+
 #include "alidade/base/child_process.h"
 #include "alidade/host/build_plugin.h"
 #include "alidade/host/plugin_file.h"
@@ -37,8 +42,8 @@ std::string Try(const std::filesystem::path& file, std::uint32_t tier) {
   return defect;
 }
 
-}  // namespace
-
+/// Opens the plugin in a child process, looks its entry up and walks its table. Returns "" or why
+/// that failed.
 std::string TrialLoad(const std::filesystem::path& file, std::uint32_t tier) {
   const SharedJournal journal;
   const ChildEnd end = RunInChild({kTimeLimit_s, 0}, *journal, [&]() -> std::string {
@@ -49,6 +54,64 @@ std::string TrialLoad(const std::filesystem::path& file, std::uint32_t tier) {
     }
   });
   return end.answered ? end.text : end.text + " while loading";
+}
+
+/// Opens the library for the rest of the process.
+const boost::dll::shared_library& OpenForGood(const std::filesystem::path& file) {
+  using boost::dll::load_mode::rtld_local;
+  using boost::dll::load_mode::rtld_now;
+  return *new boost::dll::shared_library(file, rtld_now | rtld_local);
+}
+
+}  // namespace
+
+OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical) {
+  const AlidadeFingerprint fingerprint = ReadFingerprint(canonical);
+  CheckBuild(fingerprint, canonical);
+  CheckTrusted(file);
+  const std::string failure = TrialLoad(canonical, fingerprint.tier);
+  if (!failure.empty()) Refuse(file, failure);
+
+  const bool unoptimised = (fingerprint.flags & ALIDADE_BUILT_UNOPTIMISED) != 0;
+  OpenedPlugin plugin{canonical, nullptr, nullptr, unoptimised};
+  std::string defect;
+  try {
+    const boost::dll::shared_library& library = OpenForGood(canonical);
+    if (fingerprint.tier == ALIDADE_TIER_BUILD) {
+      plugin.build_table = library.get<const BuildTable*()>(kBuildEntrySymbol)();
+      defect = Defect(plugin.build_table);
+    } else {
+      plugin.table = library.get<const AlidadeTable*()>(ALIDADE_ENTRY_SYMBOL)();
+      defect = Defect(plugin.table);
+    }
+  } catch (const std::exception& e) {
+    Refuse(file, std::string("cannot be loaded: ") + e.what());
+  }
+  if (!defect.empty()) Refuse(file, defect);
+  return plugin;
+}
+
+PluginOnDemand OpenOnDemand(const std::string& name, const std::filesystem::path& folder,
+                            const std::string& missing) {
+  std::filesystem::path searched = folder;
+  if (searched.empty()) {
+    const std::filesystem::path program = FolderOfProgram();
+    if (!program.empty()) searched = program / name;  // never the working folder
+  }
+  std::vector<std::filesystem::path> files;
+  std::error_code error;
+  std::filesystem::directory_iterator at(searched, error);
+  for (; !error && at != std::filesystem::directory_iterator(); at.increment(error)) {
+    if (at->path().extension() == ".so") files.push_back(at->path());
+  }
+  if (files.empty()) {
+    throw Error(ExitCode::kPlugin, missing + "\n  searched " + searched.string());
+  }
+  if (files.size() > 1)
+    Refuse(searched, "holds " + std::to_string(files.size()) + " plugins; expected one");
+  const OpenedPlugin opened = OpenPlugin(files.front(), files.front());
+  if (opened.build_table == nullptr) Refuse(files.front(), "holds models alone");
+  return {files.front(), opened.build_table};
 }
 
 }  // namespace alidade::internal

@@ -12,14 +12,15 @@ namespace alidade {
 
 struct BuildTable;
 
-struct PluginHost::Loaded {
+namespace internal {
+
+/// A plugin that is open for the rest of the process.
+struct OpenedPlugin {
   std::filesystem::path file;     ///< canonical
   const AlidadeTable* table;      ///< sealed tier, else null
   const BuildTable* build_table;  ///< build tier, else null
   bool unoptimised;               ///< by its fingerprint
 };
-
-namespace internal {
 
 /// The build id that a build-tier plugin must have: that of this library.
 const char* HostBuildId();
@@ -36,13 +37,9 @@ std::filesystem::path FolderOfProgram();
 /// build-tier plugin of another build. Errors: kPlugin.
 void CheckBuild(const AlidadeFingerprint& fingerprint, const std::filesystem::path& file);
 
-/// Opens the plugin in a child process, looks its entry up and walks its table. Returns "" or why
-/// that failed.
-std::string TrialLoad(const std::filesystem::path& file, std::uint32_t tier);
-
-/// Opens a build-tier plugin for the rest of the process, checked as PluginHost checks all.
-/// Errors: kPlugin, kNotTrusted.
-const BuildTable& OpenBuildTier(const std::filesystem::path& file);
+/// Checks fingerprint, build and trust, tries the plugin in a child process, opens it and walks its
+/// table. `canonical` is `file` behind its links. Errors: kPlugin, kNotTrusted.
+OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical);
 
 /// A C++ plugin that is loaded only when it is needed.
 struct PluginOnDemand {
@@ -51,8 +48,8 @@ struct PluginOnDemand {
 };
 
 /// Opens the only plugin in `folder`, or if that is "" in `lib/alidade/NAME` beside this library.
-/// Errors: kPlugin if there is none, made of `missing` and where it was searched, or more than one;
-/// those of OpenBuildTier.
+/// Errors: kPlugin if there is none, made of `missing` and where it was searched, or more than one,
+/// or one of models; those of OpenPlugin.
 PluginOnDemand OpenOnDemand(const std::string& name, const std::filesystem::path& folder,
                             const std::string& missing);
 
@@ -64,4 +61,7 @@ std::string Defect(const BuildTable* table);
 const char* KindName(PluginEntry::Kind kind);
 
 }  // namespace internal
+
+struct PluginHost::Loaded : internal::OpenedPlugin {};
+
 }  // namespace alidade

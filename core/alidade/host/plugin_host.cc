@@ -3,9 +3,7 @@
 
 #include <dlfcn.h>
 
-#define BOOST_DLL_USE_STD_FS
 #include <algorithm>
-#include <boost/dll/shared_library.hpp>
 #include <cstdlib>
 #include <optional>
 #include <set>
@@ -48,13 +46,6 @@ std::optional<fs::path> UserFolder() {
 
 PluginEntry::Kind ToKind(std::uint32_t kind) {
   return kind == ALIDADE_KIND_SENSOR ? PluginEntry::Kind::kSensor : PluginEntry::Kind::kMotion;
-}
-
-/// Opens the library for the rest of the process.
-const boost::dll::shared_library& OpenForGood(const fs::path& file) {
-  using boost::dll::load_mode::rtld_local;
-  using boost::dll::load_mode::rtld_now;
-  return *new boost::dll::shared_library(file, rtld_now | rtld_local);
 }
 
 }  // namespace
@@ -141,31 +132,9 @@ void PluginHost::Load(const fs::path& file) {
     return other->file == canonical || fs::equivalent(other->file, canonical, error);
   };
   if (std::any_of(loaded_.begin(), loaded_.end(), same)) return;
-  const AlidadeFingerprint fingerprint = ReadFingerprint(canonical);
-  internal::CheckBuild(fingerprint, canonical);
-  CheckTrusted(file);
-  const std::string failure = internal::TrialLoad(canonical, fingerprint.tier);
-  if (!failure.empty()) Refuse(file, failure);
-
-  const bool unoptimised = (fingerprint.flags & ALIDADE_BUILT_UNOPTIMISED) != 0;
-  auto plugin = std::make_unique<Loaded>(Loaded{canonical, nullptr, nullptr, unoptimised});
-  std::string defect;
-  try {
-    const boost::dll::shared_library& library = OpenForGood(canonical);
-    if (fingerprint.tier == ALIDADE_TIER_BUILD) {
-      plugin->build_table = library.get<const BuildTable*()>(kBuildEntrySymbol)();
-      defect = internal::Defect(plugin->build_table);
-    } else {
-      plugin->table = library.get<const AlidadeTable*()>(ALIDADE_ENTRY_SYMBOL)();
-      defect = internal::Defect(plugin->table);
-    }
-  } catch (const std::exception& e) {
-    Refuse(file, std::string("cannot be loaded: ") + e.what());
-  }
-  if (!defect.empty()) Refuse(file, defect);
+  loaded_.push_back(std::make_unique<Loaded>(Loaded{internal::OpenPlugin(file, canonical)}));
   const std::size_t before = entries_.size();
-  AddEntries(*plugin);
-  loaded_.push_back(std::move(plugin));
+  AddEntries(*loaded_.back());
   if (!IsLogged(LogLevel::kDebug)) return;
   std::string names;
   for (std::size_t i = before; i < entries_.size(); ++i) {

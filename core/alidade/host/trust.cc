@@ -8,6 +8,7 @@
 #include <cstring>
 #include <vector>
 
+#include "alidade/base/follow_links.h"
 #include "alidade/host/plugin_host.h"
 
 namespace alidade {
@@ -24,44 +25,16 @@ class TrustCheck {
 
   /// Walks from / to the file, checking each folder, link and at last the file itself.
   void Run() {
-    std::vector<fs::path> todo = Reversed(file_);
-    fs::path at = "/";
-    for (int links = 0; !todo.empty();) {
-      const fs::path part = todo.back();
-      todo.pop_back();
-      if (part == "..") {
-        at = at.parent_path();
-        continue;
-      }
-      if (part.is_absolute()) {
-        at = "/";
-        continue;
-      }
-      const bool holds_the_file = todo.empty();
-      CheckFolder(at, holds_the_file);
-      const fs::path next = at / part;
-      const struct stat status = Status(next);
-      CheckOwner(next, status);
-      if (S_ISLNK(status.st_mode)) {
-        if (++links > kMaxLinks) Fail(next, "one of more than 40 symbolic links on the way");
-        const std::vector<fs::path> target = Reversed(fs::read_symlink(next));
-        todo.insert(todo.end(), target.begin(), target.end());
-      } else {
-        at = next;
-      }
-    }
-    CheckMode(at, Status(at), false);
+    const auto visit = [this](const fs::path& folder, const fs::path& entry, bool last) {
+      CheckFolder(folder, last);
+      CheckOwner(entry, Status(entry));
+    };
+    const fs::path end = internal::FollowLinks(file_, visit);
+    if (end.empty()) Fail(file_, "behind too many symbolic links, more than 40");
+    CheckMode(end, Status(end), false);
   }
 
  private:
-  static constexpr int kMaxLinks = 40;
-
-  static std::vector<fs::path> Reversed(const fs::path& path) {
-    std::vector<fs::path> parts(path.begin(), path.end());
-    std::erase_if(parts, [](const fs::path& part) { return part.empty() || part == "."; });
-    std::reverse(parts.begin(), parts.end());
-    return parts;
-  }
   [[noreturn]] void Fail(const fs::path& where, const std::string& why) const {
     const std::string what = where == file_ ? "it is " : "'" + where.string() + "' is ";
     throw Error(ExitCode::kNotTrusted,

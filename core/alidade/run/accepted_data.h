@@ -12,9 +12,4 @@ namespace alidade::internal {
 Frame AcceptedOf(const Frame& frame, const std::vector<StreamInfo>& streams, const System& system,
                  const UpdateReport& report);
 
-/// Index of the estimator whose accepted measurements `named` is to see, as the key `use` says; -1:
-/// it sees all. `before` are those listed before it. Error: kBadConfig.
-int ReadUse(const Node& use, const NamedEstimator& named, const Node& estimators,
-            const std::vector<NamedEstimator>& before);
-
 }  // namespace alidade::internal

@@ -28,76 +28,6 @@ constexpr double kFarSigmas = 100.0;
 constexpr double kFarAngleSigmas = 5.0;
 constexpr std::size_t kOutcomes = static_cast<std::size_t>(Outcome::kFailed) + 1;
 
-/// Mean of a quantity, and the share of it that lies inside a bound.
-struct Tally {
-  double sum = 0.0;
-  std::int64_t count = 0, inside = 0;
-
-  void Add(double value, bool is_inside = false) {
-    sum += value;
-    ++count;
-    inside += is_inside;
-  }
-  double mean() const { return sum / static_cast<double>(count); }
-  double share() const { return static_cast<double>(inside) / static_cast<double>(count); }
-};
-
-/// Sums over all stamps, or over those of one segment.
-struct Sums {
-  std::string suffix;                   ///< "" or `@SEGMENT`
-  std::vector<Tally> squares, covered;  ///< by tracked block
-  std::vector<Tally> nees;              ///< by owner
-  std::vector<Tally> nis;               ///< by sensor
-};
-
-/// A block whose truth is known.
-struct Tracked {
-  BlockId id;
-  std::size_t truth;
-  std::string name, unit;
-  Geometry geometry;
-  std::vector<std::string> elements;  ///< of the tangent
-  std::vector<int> outside;           ///< stamps on end beyond 10 sigma, by element; -1: reported
-  bool scalar;
-  double truth_variance;       ///< of each element
-  internal::LagSeries series;  ///< where scalar
-  double last_error = -1.0;
-
-  bool known = false;  ///< at this stamp, and so is what follows
-  Eigen::VectorXd error;
-};
-
-/// Every n-th value of a series, n so that there are not too many for their autocorrelation.
-struct Thinned {
-  static constexpr std::size_t kMost = 10'000;
-  std::vector<double> values;
-  std::size_t count = 0, stride = 1;
-
-  void Add(double value) {
-    if (count++ % stride != 0) return;
-    values.push_back(value);
-    if (values.size() < kMost) return;
-    for (std::size_t i = 0; 2 * i < kMost; ++i) values[i] = values[2 * i];
-    values.resize(kMost / 2);
-    stride *= 2;
-  }
-};
-
-struct Owner {
-  std::string name;
-  std::vector<std::size_t> tracked;
-  Thinned nees = {};  ///< per dof
-  double dofs = 0.0;  ///< sum over all stamps
-};
-
-/// What the bounds of a sensor's NIS need.
-struct Whiteness {
-  bool told = false;  ///< its innovations are those of a filter, without a robust loss
-  int dof = 0;
-  std::int64_t frames = 0, last_frame = -1;  ///< with an accepted measurement
-  double cut = kInfinity;                    ///< the least NIS that was gated
-};
-
 /// Whether the innovation of an angle, which is never beyond pi, looks like one of another unit:
 /// far beyond its sigma, and either spread over the circle, or of a measurement beyond a turn.
 bool IsFarAngle(const MeasurementReport& m) {
@@ -110,6 +40,76 @@ bool IsFarAngle(const MeasurementReport& m) {
 }  // namespace
 
 struct Metrics::Impl {
+  /// Mean of a quantity, and the share of it that lies inside a bound.
+  struct Tally {
+    double sum = 0.0;
+    std::int64_t count = 0, inside = 0;
+
+    void Add(double value, bool is_inside = false) {
+      sum += value;
+      ++count;
+      inside += is_inside;
+    }
+    double mean() const { return sum / static_cast<double>(count); }
+    double share() const { return static_cast<double>(inside) / static_cast<double>(count); }
+  };
+
+  /// Sums over all stamps, or over those of one segment.
+  struct Sums {
+    std::string suffix;                   ///< "" or `@SEGMENT`
+    std::vector<Tally> squares, covered;  ///< by tracked block
+    std::vector<Tally> nees;              ///< by owner
+    std::vector<Tally> nis;               ///< by sensor
+  };
+
+  /// A block whose truth is known.
+  struct Tracked {
+    BlockId id;
+    std::size_t truth;
+    std::string name, unit;
+    Geometry geometry;
+    std::vector<std::string> elements;  ///< of the tangent
+    std::vector<int> outside;           ///< stamps on end beyond 10 sigma, by element; -1: reported
+    bool scalar;
+    double truth_variance;       ///< of each element
+    internal::LagSeries series;  ///< where scalar
+    double last_error = -1.0;
+
+    bool known = false;  ///< at this stamp, and so is what follows
+    Eigen::VectorXd error;
+  };
+
+  /// Every n-th value of a series, n so that there are not too many for their autocorrelation.
+  struct Thinned {
+    static constexpr std::size_t kMost = 10'000;
+    std::vector<double> values;
+    std::size_t count = 0, stride = 1;
+
+    void Add(double value) {
+      if (count++ % stride != 0) return;
+      values.push_back(value);
+      if (values.size() < kMost) return;
+      for (std::size_t i = 0; 2 * i < kMost; ++i) values[i] = values[2 * i];
+      values.resize(kMost / 2);
+      stride *= 2;
+    }
+  };
+
+  struct Owner {
+    std::string name;
+    std::vector<std::size_t> tracked;
+    Thinned nees = {};  ///< per dof
+    double dofs = 0.0;  ///< sum over all stamps
+  };
+
+  /// What the bounds of a sensor's NIS need.
+  struct Whiteness {
+    bool told = false;  ///< its innovations are those of a filter, without a robust loss
+    int dof = 0;
+    std::int64_t frames = 0, last_frame = -1;  ///< with an accepted measurement
+    double cut = kInfinity;                    ///< the least NIS that was gated
+  };
+
   std::vector<Tracked> tracked;
   std::vector<Owner> owners;
   std::vector<std::string> sensors, motions;
@@ -316,7 +316,7 @@ void Metrics::Impl::AddReport(const std::vector<Sums*>& into, const UpdateReport
   }
 }
 
-std::vector<Sums*> Metrics::Impl::SumsOf(const std::vector<bool>& in_segment) {
+std::vector<Metrics::Impl::Sums*> Metrics::Impl::SumsOf(const std::vector<bool>& in_segment) {
   ALIDADE_EXPECTS(in_segment.size() + 1 == sums.size());
   std::vector<Sums*> into = {&sums[0]};
   for (std::size_t i = 0; i < in_segment.size(); ++i) {
@@ -386,10 +386,10 @@ Metrics::Metrics(const NamedEstimator& named, const std::vector<StreamInfo>& tru
     impl_->whiteness.emplace_back().told = filters && sensor.loss.kind == LossKind::kNone;
   }
   const auto add_sums = [&](std::string suffix) {
-    const std::vector<Tally> blocks(impl_->tracked.size());
+    const std::vector<Impl::Tally> blocks(impl_->tracked.size());
     impl_->sums.push_back({std::move(suffix), blocks, blocks,
-                           std::vector<Tally>(impl_->owners.size()),
-                           std::vector<Tally>(impl_->sensors.size())});
+                           std::vector<Impl::Tally>(impl_->owners.size()),
+                           std::vector<Impl::Tally>(impl_->sensors.size())});
   };
   add_sums("");
   for (const Segment& segment : segments) add_sums('@' + segment.name);
@@ -400,7 +400,7 @@ Metrics::Metrics(Metrics&&) noexcept = default;
 
 void Metrics::Add(const Frame& frame, const std::vector<bool>& in_segment, const State& state,
                   const UpdateReport& report) {
-  const std::vector<Sums*> into = impl_->SumsOf(in_segment);
+  const std::vector<Impl::Sums*> into = impl_->SumsOf(in_segment);
   if (!report.stale) {
     impl_->AddErrors(frame, into, [&](BlockId id) {
       return state.layout()[id].present ? state.value(id) : nullptr;
@@ -424,7 +424,7 @@ void Metrics::AddDifference(const Frame& frame, const std::vector<bool>& in_segm
 
 std::vector<std::string> Metrics::without_truth() const {
   std::vector<std::string> names;
-  for (const Tracked& block : impl_->tracked) {
+  for (const Impl::Tracked& block : impl_->tracked) {
     if (block.last_error < 0.0) names.push_back(block.name);
   }
   return names;
@@ -433,7 +433,7 @@ std::vector<std::string> Metrics::without_truth() const {
 std::vector<int> Metrics::far_off() const {
   std::vector<int> sensors;
   for (std::size_t i = 0; i < impl_->far.size(); ++i) {
-    const Tally& far = impl_->far[i];
+    const Impl::Tally& far = impl_->far[i];
     if (2 * far.inside > far.count) sensors.push_back(static_cast<int>(i));
   }
   return sensors;
@@ -447,9 +447,9 @@ const std::map<std::string, std::string>& Metrics::units() const { return impl_-
 
 std::map<std::string, double> Metrics::Finish() const {
   std::map<std::string, double> metrics;
-  for (const Sums& sums : impl_->sums) impl_->Write(sums, metrics);
+  for (const Impl::Sums& sums : impl_->sums) impl_->Write(sums, metrics);
   impl_->WriteBounds(metrics);
-  for (const Tracked& block : impl_->tracked) {
+  for (const Impl::Tracked& block : impl_->tracked) {
     if (block.last_error >= 0.0) metrics["final_error:" + block.name] = block.last_error;
     if (!block.series.even()) continue;
     const double lag = Lag(block.series.estimate, block.series.truth, block.series.step_ms());

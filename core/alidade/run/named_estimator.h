@@ -2,14 +2,27 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
-#include "alidade/run/run.h"
+#include "alidade/run/experiment.h"
 
 namespace alidade::internal {
+
+/// Index of the stream that `sensor`, an entry of the config with that model, names. Errors:
+/// kBadConfig for a stream that is not there, or of another size than the model measures.
+int FindStream(const Node& sensor, const SensorModel& model,
+               const std::vector<StreamInfo>& streams);
+
+/// Refuses a sensor or a control input whose stream the source does not have. Errors: kBadConfig.
+void CheckStreams(const Node& root, const System& system, const std::vector<StreamInfo>& streams);
 
 /// Makes the entry `name` of the config's `estimators:` and puts it behind those that the
 /// experiment has; nothing is added where that fails. Errors: those of BuildExperiment.
 void AddEstimator(const Config& config, const PluginHost& host, const std::string& name,
                   Experiment& experiment);
+
+/// As AddEstimator, of a config that has the calibration of the data.
+void AddCalibrated(const Config& config, const PluginHost& host, const std::string& name,
+                   Experiment& experiment);
 
 }  // namespace alidade::internal

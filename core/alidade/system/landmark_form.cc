@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "alidade/system/landmark_form.h"
+
 #include <algorithm>
 #include <iterator>
 
 #include "alidade/model/landmark.h"
-#include "alidade/system/landmark_forms.h"
 
 namespace alidade {
 namespace {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <optional>
 #include <vector>
 
@@ -20,4 +21,23 @@ bool IsXyz(LandmarkForm form);
 /// landmarks are never converted, and have no place in the record.
 std::optional<LandmarkForm> FormOf(const std::vector<Space>& roles);
 
+namespace internal {
+
+struct LandmarkPoint {
+  Eigen::Vector3d position;                           ///< in the world, m
+  Eigen::Matrix<double, 3, Eigen::Dynamic> jacobian;  ///< by the tangents of the blocks
+};
+
+/// The landmark as xyz, from the values of its blocks in the order of its roles; none unless its inverse distance is above 0.
+std::optional<LandmarkPoint> PointOf(LandmarkForm form, const double* const* blocks);
+
+/// The form of landmarks that have converged.
+LandmarkForm XyzForm();
+
+/// Its index of linearity, as seen from `camera` in the world, m; `sigma` is that of the inverse
+/// distance.
+double LinearityOf(LandmarkForm form, const double* const* blocks, double sigma,
+                   const double* camera);
+
+}  // namespace internal
 }  // namespace alidade

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <functional>
 
-#include "alidade/system/landmark_forms.h"
+#include "alidade/system/landmark_form.h"
 
 namespace alidade {
 namespace {

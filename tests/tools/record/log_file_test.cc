@@ -30,7 +30,7 @@ struct Warnings {
 
 TEST(LogFile, HoldsTheMessagesOfItsThreadFromInfoOn) {
   const testing::TemporaryFolder temporary;
-  RunFolder folder(temporary / "out", false);
+  OutputFolder folder(temporary / "out", false);
   LogFile file(folder);
   Log(LogLevel::kDebug, "left out");
   Log(LogLevel::kInfo, "a");
@@ -44,7 +44,7 @@ TEST(LogFile, HoldsTheMessagesOfItsThreadFromInfoOn) {
 
 TEST(LogFile, ThatCannotBeCreatedIsAWarning) {
   const testing::TemporaryFolder temporary;
-  RunFolder folder(temporary / "out", false);
+  OutputFolder folder(temporary / "out", false);
   std::filesystem::create_directory(folder.partial() / "log.txt");
   const Warnings warnings;
   LogFile file(folder);
@@ -62,7 +62,7 @@ TEST(LogFile, ThatCannotBeCreatedIsAWarning) {
 TEST(LogFile, ThatCannotBeWrittenIsAWarning) {
   for (const int messages : {1, 1000}) {
     const testing::TemporaryFolder temporary;
-    RunFolder folder(temporary / "out", false);
+    OutputFolder folder(temporary / "out", false);
     const Warnings warnings;
     LogFile file(folder);
     rlimit before{};

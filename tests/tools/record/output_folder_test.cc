@@ -109,7 +109,7 @@ std::vector<std::string> EntriesOf(const fs::path& folder) {
 }
 
 // FAULTS 92
-TEST(RunFolder, LeavesAnExistingFolderAlone) {
+TEST(OutputFolder, LeavesAnExistingFolderAlone) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "out"), 3);
   const std::string before = Read(folder / "out/run.json");
@@ -120,7 +120,7 @@ TEST(RunFolder, LeavesAnExistingFolderAlone) {
   EXPECT_EQ(CodeOf([&] { Record(OptionsFor(folder / "out/"), 5); }), 73);
 }
 
-TEST(RunFolder, ALinkToNothingIsCalledOne) {
+TEST(OutputFolder, ALinkToNothingIsCalledOne) {
   const TemporaryFolder folder;
   fs::create_symlink(folder / "nothing", folder / "out");
   for (const bool force : {false, true}) {
@@ -131,7 +131,7 @@ TEST(RunFolder, ALinkToNothingIsCalledOne) {
   }
 }
 
-TEST(RunFolder, ForceReplacesARunFolder) {
+TEST(OutputFolder, ForceReplacesARunFolder) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "out"), 3);
   EXPECT_EQ(Lines(folder / "out/files.txt"), EntriesOf(folder / "out"));
@@ -140,7 +140,7 @@ TEST(RunFolder, ForceReplacesARunFolder) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);  // the old one is gone
 }
 
-TEST(RunFolder, ForceSparesWhatWasNotWrittenWithTheRun) {
+TEST(OutputFolder, ForceSparesWhatWasNotWrittenWithTheRun) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "runs"), 3);
   const std::string start = (folder / "runs").string() + ": holds what was not written with it: ";
@@ -166,7 +166,7 @@ TEST(RunFolder, ForceSparesWhatWasNotWrittenWithTheRun) {
   EXPECT_EQ(Lines(folder / "runs/truth.csv").size(), 6u);
 }
 
-TEST(RunFolder, ForceSparesWhatCameWhileTheRunWasAtWork) {
+TEST(OutputFolder, ForceSparesWhatCameWhileTheRunWasAtWork) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "out"), 3);
   Recorder second(OptionsFor(folder / "out", true), MakeConfig(), Host());
@@ -175,7 +175,7 @@ TEST(RunFolder, ForceSparesWhatCameWhileTheRunWasAtWork) {
   EXPECT_EQ(Read(folder / "out/mine.txt"), "x");
 }
 
-TEST(RunFolder, SaysThatAFolderCannotBeRead) {
+TEST(OutputFolder, SaysThatAFolderCannotBeRead) {
   const TemporaryFolder folder;
   Host();  // a child without rights could not look for plugins
   Record(OptionsFor(folder / "out"), 3);
@@ -194,7 +194,7 @@ TEST(RunFolder, SaysThatAFolderCannotBeRead) {
   }
 }
 
-TEST(RunFolder, NeedsTheCurrentFolderForARelativeNameOnly) {
+TEST(OutputFolder, NeedsTheCurrentFolderForARelativeNameOnly) {
   const TemporaryFolder folder;
   fs::create_directory(folder / "gone");
   Host();
@@ -210,7 +210,7 @@ TEST(RunFolder, NeedsTheCurrentFolderForARelativeNameOnly) {
   EXPECT_TRUE(fs::exists(folder / "out/run.json"));
 }
 
-TEST(RunFolder, ForceSparesWhatIsNoRunFolder) {
+TEST(OutputFolder, ForceSparesWhatIsNoRunFolder) {
   const TemporaryFolder folder;
   fs::create_directories(folder / "home");
   std::ofstream(folder / "home/thesis.tex") << "x";
@@ -223,7 +223,7 @@ TEST(RunFolder, ForceSparesWhatIsNoRunFolder) {
 }
 
 // FAULTS 95
-TEST(RunFolder, AFolderBeingWrittenIsRefused) {
+TEST(OutputFolder, AFolderBeingWrittenIsRefused) {
   const TemporaryFolder folder;
   const Recorder first(OptionsFor(folder / "out"), MakeConfig(), Host());
   std::string text;
@@ -265,7 +265,7 @@ void LeaveReplacedFolder(const TemporaryFolder& folder) {
   ASSERT_FALSE(fs::exists(folder / "out"));
 }
 
-TEST(RunFolder, RemovesWhatADeadProcessLeft) {
+TEST(OutputFolder, RemovesWhatADeadProcessLeft) {
   const TemporaryFolder folder;
   LeavePartialFolder(folder);
   ASSERT_EQ(HiddenIn(folder).size(), 1u);
@@ -275,7 +275,7 @@ TEST(RunFolder, RemovesWhatADeadProcessLeft) {
   EXPECT_EQ(HiddenIn(folder), std::vector<std::string>{});
 }
 
-TEST(RunFolder, TouchesNoFolderThatItDidNotMake) {
+TEST(OutputFolder, TouchesNoFolderThatItDidNotMake) {
   const std::vector<std::string> mine = {".out.old-1", ".out.old-2024", ".out.partial-1",
                                          ".out.partial-999999999", ".out.partial-notes"};
   const TemporaryFolder folder;
@@ -295,7 +295,7 @@ TEST(RunFolder, TouchesNoFolderThatItDidNotMake) {
   expect_untouched("replaced");
 }
 
-TEST(RunFolder, TouchesNoLeftoverUnderAnotherName) {
+TEST(OutputFolder, TouchesNoLeftoverUnderAnotherName) {
   const TemporaryFolder folder;
   LeavePartialFolder(folder);
   fs::rename(folder / HiddenIn(folder).at(0), folder / ".out.partial-999999999");  // by the user
@@ -303,7 +303,7 @@ TEST(RunFolder, TouchesNoLeftoverUnderAnotherName) {
   EXPECT_EQ(HiddenIn(folder), std::vector<std::string>{".out.partial-999999999"});
 }
 
-TEST(RunFolder, TouchesNoLeftoverWhereTheRunIsRefused) {
+TEST(OutputFolder, TouchesNoLeftoverWhereTheRunIsRefused) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "out"), 3);
   LeavePartialFolder(folder, true);
@@ -317,7 +317,7 @@ TEST(RunFolder, TouchesNoLeftoverWhereTheRunIsRefused) {
   EXPECT_EQ(HiddenIn(folder), std::vector<std::string>{});
 }
 
-TEST(RunFolder, WithoutLocksALivingProcessHoldsItsFolder) {
+TEST(OutputFolder, WithoutLocksALivingProcessHoldsItsFolder) {
   const TemporaryFolder folder;
   LeavePartialFolder(folder);
   no_locks = true;
@@ -333,7 +333,7 @@ TEST(RunFolder, WithoutLocksALivingProcessHoldsItsFolder) {
   EXPECT_NE(text.find("process " + process + " is writing it now"), std::string::npos) << text;
 }
 
-TEST(RunFolder, KeepsWhatADeadProcessWasReplacingUnlessForced) {
+TEST(OutputFolder, KeepsWhatADeadProcessWasReplacingUnlessForced) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "out"), 3);
   LeaveReplacedFolder(folder);
@@ -352,7 +352,7 @@ TEST(RunFolder, KeepsWhatADeadProcessWasReplacingUnlessForced) {
   EXPECT_EQ(HiddenIn(folder), std::vector<std::string>{});
 }
 
-TEST(RunFolder, WritesWhereALinkPoints) {
+TEST(OutputFolder, WritesWhereALinkPoints) {
   const TemporaryFolder folder;
   fs::create_directories(folder / "disk/runs");
   fs::create_directory_symlink("disk/runs", folder / "out");
@@ -366,7 +366,7 @@ TEST(RunFolder, WritesWhereALinkPoints) {
   }
 }
 
-TEST(RunFolder, LeavesNothingWithoutFinish) {
+TEST(OutputFolder, LeavesNothingWithoutFinish) {
   const TemporaryFolder folder;
   {
     Recorder recorder(OptionsFor(folder / "above/out"), MakeConfig(), Host());
@@ -393,14 +393,14 @@ TEST(OutputFile, WritesNothingTwiceAfterAFailure) {
 }
 
 // FAULTS 87: a disk or quota that is full is no matter of rights.
-TEST(RunFolder, WhatCannotBeCreatedHasTheCodeOfItsCause) {
+TEST(OutputFolder, WhatCannotBeCreatedHasTheCodeOfItsCause) {
   for (const auto& [error, expected] :
        {std::pair(ENOSPC, 74), {EDQUOT, 74}, {EIO, 74}, {EACCES, 73}, {EROFS, 73}}) {
     const TemporaryFolder folder;
     create_error = error;
     std::string of_file, of_folder;
     const int file = CodeOf([&] { internal::OutputFile(folder / "file", "file"); }, &of_file);
-    const int made = CodeOf([&] { internal::RunFolder(folder / "out", false); }, &of_folder);
+    const int made = CodeOf([&] { internal::OutputFolder(folder / "out", false); }, &of_folder);
     create_error = 0;
     EXPECT_EQ(file, expected) << of_file;
     EXPECT_EQ(made, expected) << of_folder;
@@ -411,7 +411,7 @@ TEST(RunFolder, WhatCannotBeCreatedHasTheCodeOfItsCause) {
 }
 
 // A power cut leaves no file with a part of what was written.
-TEST(RunFolder, EveryFileIsSyncedAfterItsLastWriteAndBeforeItsFolderTakesItsName) {
+TEST(OutputFolder, EveryFileIsSyncedAfterItsLastWriteAndBeforeItsFolderTakesItsName) {
   const TemporaryFolder folder;
   std::vector<std::string> calls;
   Experiment experiment = MakeExperiment(5);
@@ -439,7 +439,7 @@ TEST(RunFolder, EveryFileIsSyncedAfterItsLastWriteAndBeforeItsFolderTakesItsName
 }
 
 // FAULTS 87: every write, fsync and rename in turn, on a new folder and on one to be replaced.
-TEST(RunFolder, EveryFailureOfTheDiskIsAnErrorThatLeavesNothing) {
+TEST(OutputFolder, EveryFailureOfTheDiskIsAnErrorThatLeavesNothing) {
   for (const bool replace : {false, true}) {
     const TemporaryFolder folder;
     if (replace) Record(OptionsFor(folder / "out"), 3);
@@ -479,7 +479,7 @@ TEST(RunFolder, EveryFailureOfTheDiskIsAnErrorThatLeavesNothing) {
 }
 
 // FAULTS 87: the folder of a sweep.
-TEST(RunFolder, EveryFailureOfTheDiskIsAnErrorForASweepToo) {
+TEST(OutputFolder, EveryFailureOfTheDiskIsAnErrorForASweepToo) {
   const Config config = MakeConfig();
   SweepResult result;
   result.runs = 1;
@@ -516,7 +516,7 @@ TEST(RunFolder, EveryFailureOfTheDiskIsAnErrorForASweepToo) {
 }
 
 // FAULTS 88
-TEST(RunFolder, ALimitOnTheFileSizeIsAnErrorNotTheEnd) {
+TEST(OutputFolder, ALimitOnTheFileSizeIsAnErrorNotTheEnd) {
   const TemporaryFolder folder;
   const int code = InChild([&] {
     const rlimit limit{2000, 2000};
@@ -528,7 +528,7 @@ TEST(RunFolder, ALimitOnTheFileSizeIsAnErrorNotTheEnd) {
 }
 
 // FAULTS 93
-TEST(RunFolder, AFolderThatCannotBeWrittenToIsRefused) {
+TEST(OutputFolder, AFolderThatCannotBeWrittenToIsRefused) {
   const TemporaryFolder folder;
   Host();  // a child without rights could not look for plugins
   fs::create_directories(folder / "mine");

@@ -13,8 +13,8 @@ namespace alidade {
 namespace {
 
 using internal::FindPose;
+using internal::OutputFolder;
 using internal::PoseFile;
-using internal::RunFolder;
 
 TEST(FindPose, TakesTheFirstPositionWithItsOrientation) {
   const auto place = FindPose({{"a.orientation", 4},
@@ -62,7 +62,7 @@ TEST(PoseFile, APlanarPoseIsWrittenAsOneInSpace) {
   p << 6, 2, 2, 8;
   r << 0.5;
   {
-    RunFolder run(folder / "run", false);
+    OutputFolder run(folder / "run", false);
     PoseFile with(run, "with.tum", {0, 1, true}, true);
     with.Add(1'000'000'000, position, heading, p, r);
     with.Close();
@@ -93,7 +93,7 @@ TEST(PoseFile, IsReadBackAsItWasWritten) {
   r = 0.1 * p;
   const Eigen::Matrix3d known = p;
   {
-    RunFolder run(folder / "run", false);
+    OutputFolder run(folder / "run", false);
     PoseFile poses(run, "ekf/trajectory.tum", {0, 1});
     poses.Add(-33'000'000, position, orientation);
     poses.Close();

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/bundle/bundle_file.h"
 
-#include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 
+#include "alidade/base/read_file.h"
 #include "alidade/bundle/formats.h"
 
 namespace alidade {
@@ -26,23 +26,8 @@ std::string ReadAll(const std::filesystem::path& file) {
     const char* const expected = code == ExitCode::kInputMissing ? "a readable file" : "";
     throw Error(code, ErrorLine(place, {}, std::strerror(error), expected));
   };
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) fail(ExitCode::kInputMissing, EISDIR);
-  struct Descriptor {
-    int number;
-    ~Descriptor() {
-      if (number > STDIN_FILENO) close(number);
-    }
-  };
-  const Descriptor opened{standard_input ? STDIN_FILENO : open(file.c_str(), O_RDONLY | O_CLOEXEC)};
-  if (opened.number < 0) fail(ExitCode::kInputMissing, errno);
-  std::string bytes;
-  for (char chunk[1 << 14];;) {
-    const ssize_t count = read(opened.number, chunk, sizeof chunk);
-    if (count == 0) return bytes;
-    if (count < 0) fail(ExitCode::kIo, errno);
-    bytes.append(chunk, static_cast<std::size_t>(count));
-  }
+  return standard_input ? internal::ReadDescriptor(STDIN_FILENO, fail)
+                        : internal::ReadFile(file, fail);
 }
 
 [[noreturn]] void FailFormat(const std::string& name, const std::string& what,

@@ -12,7 +12,7 @@ namespace alidade {
 namespace {
 
 using internal::AppendNumber;
-using internal::RunFolder;
+using internal::OutputFolder;
 
 const char* ExtensionOf(BundleFormat format) {
   constexpr const char* kExtensions[] = {".txt", ".out", ".bin", ""};
@@ -96,7 +96,7 @@ std::string ResultJson(const BundleFile& file, const BundleResult& result, doubl
 }  // namespace
 
 BundleFolder::BundleFolder(const std::filesystem::path& folder, bool force)
-    : output_(std::make_unique<RunFolder>(folder, force)) {}
+    : output_(std::make_unique<OutputFolder>(folder, force)) {}
 BundleFolder::~BundleFolder() = default;
 
 std::vector<std::string> BundleFolder::Save(const BundleFile& file, const BundleResult& result,

@@ -10,7 +10,7 @@
 
 namespace alidade {
 namespace internal {
-class RunFolder;
+class OutputFolder;
 }
 
 /// The folder that a solution goes to.
@@ -35,7 +35,7 @@ class BundleFolder {
                                 double rms_before, double rms_after);
 
  private:
-  std::unique_ptr<internal::RunFolder> output_;
+  std::unique_ptr<internal::OutputFolder> output_;
 };
 
 }  // namespace alidade

@@ -5,9 +5,9 @@
 #include <charconv>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "alidade/base/number_rows.h"
+#include "alidade/base/read_file.h"
 #include "alidade/base/text_cell.h"
 #include "alidade/compare/json_node.h"
 
@@ -23,17 +23,20 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
                                             "a run folder as alidade wrote it; run it again"));
 }
 
-std::ifstream Open(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (stream) return stream;
+[[noreturn]] void FailOpen(const fs::path& file) {
   throw Error(ExitCode::kInputMissing, ErrorLine(Place{file.string()}, {}, "cannot be read",
                                                  "the folder of a run that came to its end"));
 }
 
+std::ifstream Open(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) FailOpen(file);
+  return stream;
+}
+
 Json ReadJson(const fs::path& file) {
-  std::ostringstream text;
-  text << Open(file).rdbuf();
-  return ParseJson(text.str(), file.string());
+  const std::string text = ReadFile(file, [&](ExitCode, int) { FailOpen(file); });
+  return ParseJson(text, file.string());
 }
 
 std::string TextOf(const JsonNode& map, const char* key) {

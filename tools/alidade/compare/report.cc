@@ -357,7 +357,7 @@ std::string CompareJson(const Comparison& comparison) {
 
 void WriteComparison(const Comparison& comparison, const std::filesystem::path& folder,
                      bool force) {
-  internal::RunFolder out(folder, force);
+  internal::OutputFolder out(folder, force);
   out.Write("compare.json", CompareJson(comparison));
   out.Write("compare.md", CompareReport(comparison, TableStyle::kMarkdown));
   out.Write("compare.tex", CompareReport(comparison, TableStyle::kLatex));

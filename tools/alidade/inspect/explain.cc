@@ -16,7 +16,6 @@
 #include "alidade/host/calibration.h"
 #include "alidade/inspect/explain_parts.h"
 #include "alidade/system/observability.h"
-#include "alidade/system/observed_landmarks.h"
 #include "alidade/system/truth_match.h"
 
 namespace alidade {

@@ -29,7 +29,7 @@ RecordedEstimator EstimatorFiles::Describe(const NamedEstimator& named) {
   return recorded;
 }
 
-EstimatorFiles::EstimatorFiles(const RunFolder& folder, const NamedEstimator& named,
+EstimatorFiles::EstimatorFiles(const OutputFolder& folder, const NamedEstimator& named,
                                const std::vector<StreamInfo>& truths,
                                const std::vector<std::vector<std::string>>& truth_columns,
                                bool covariances)
@@ -48,7 +48,7 @@ EstimatorFiles::EstimatorFiles(const RunFolder& folder, const NamedEstimator& na
   }
 }
 
-void EstimatorFiles::OpenTrajectory(const RunFolder& folder, const System& system) {
+void EstimatorFiles::OpenTrajectory(const OutputFolder& folder, const System& system) {
   std::vector<StreamInfo> blocks;
   for (const Block& block : system.layout.blocks()) {
     blocks.push_back({block.name, block.geometry().ambient});

@@ -19,7 +19,7 @@ class EstimatorFiles {
  public:
   /// `truth_columns` names the columns of truth.csv, by truth and element; `covariances` asks for
   /// `covariance.bin` too.
-  EstimatorFiles(const RunFolder& folder, const NamedEstimator& named,
+  EstimatorFiles(const OutputFolder& folder, const NamedEstimator& named,
                  const std::vector<StreamInfo>& truths,
                  const std::vector<std::vector<std::string>>& truth_columns, bool covariances);
 
@@ -45,7 +45,7 @@ class EstimatorFiles {
   std::vector<std::string> GainsHeader(const System& system);
   /// The position that landmarks are seen from, among the elements.
   void FindPath(const System& system);
-  void OpenTrajectory(const RunFolder& folder, const System& system);
+  void OpenTrajectory(const OutputFolder& folder, const System& system);
   void AddEstimate(const Frame& frame, const State& state);
   void AddPose(Stamp stamp, const State& state);
   void AddInnovation(Stamp stamp, const MeasurementReport& report);

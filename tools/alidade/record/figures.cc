@@ -354,7 +354,7 @@ std::vector<Plan> PlanFigures(const RecordedRun& run) {
 
 }  // namespace
 
-GnuplotResult DrawFigure(const RunFolder& folder, const std::string& name,
+GnuplotResult DrawFigure(const OutputFolder& folder, const std::string& name,
                          const std::vector<std::string>& arguments, const DrawingLimits& limits) {
   const std::filesystem::path figure = folder.partial() / "figures" / name;
   const GnuplotResult result = RunGnuplot(folder.partial(), arguments, limits);
@@ -367,7 +367,8 @@ GnuplotResult DrawFigure(const RunFolder& folder, const std::string& name,
   return result;
 }
 
-Figures DrawFigures(const RunFolder& folder, const RecordedRun& run, const DrawingLimits& limits) {
+Figures DrawFigures(const OutputFolder& folder, const RecordedRun& run,
+                    const DrawingLimits& limits) {
   using End = GnuplotResult::End;
   Figures figures;
   const std::vector<Plan> plans = PlanFigures(run);

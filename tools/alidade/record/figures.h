@@ -24,12 +24,13 @@ struct Figures {
 };
 
 /// Draws `figures/NAME` by these arguments of gnuplot; half drawn is none.
-GnuplotResult DrawFigure(const RunFolder& folder, const std::string& name,
+GnuplotResult DrawFigure(const OutputFolder& folder, const std::string& name,
                          const std::vector<std::string>& arguments, const DrawingLimits& limits);
 
 /// Draws what the csv files hold: the measurements and what they tell, the estimators side by side,
 /// and for each estimator its state, variances, gains and innovations. The scripts are all written,
 /// and first. What gnuplot cannot do, or not within the limits, is noted, no error. Errors: kIo.
-Figures DrawFigures(const RunFolder& folder, const RecordedRun& run, const DrawingLimits& limits);
+Figures DrawFigures(const OutputFolder& folder, const RecordedRun& run,
+                    const DrawingLimits& limits);
 
 }  // namespace alidade::internal

@@ -38,7 +38,7 @@ RecordedMap DescribeMap(const std::vector<LandmarkEstimate>& landmarks,
   return map;
 }
 
-void WriteLandmarks(const RunFolder& folder, const std::string& estimator,
+void WriteLandmarks(const OutputFolder& folder, const std::string& estimator,
                     const std::vector<LandmarkEstimate>& landmarks) {
   CsvFile file(folder, estimator + "/landmarks.csv",
                {"id", "generation", "representation", "x", "y", "z", "sigma_x", "sigma_y",

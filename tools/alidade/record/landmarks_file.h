@@ -16,7 +16,7 @@ RecordedMap DescribeMap(const std::vector<LandmarkEstimate>& landmarks,
                         const Eigen::AlignedBox3d& path);
 
 /// `NAME/landmarks.csv`: the map at the end. A number that is not finite is left empty. Error: kIo.
-void WriteLandmarks(const RunFolder& folder, const std::string& estimator,
+void WriteLandmarks(const OutputFolder& folder, const std::string& estimator,
                     const std::vector<LandmarkEstimate>& landmarks);
 
 }  // namespace alidade::internal

@@ -5,7 +5,7 @@
 
 namespace alidade::internal {
 
-LogFile::LogFile(const RunFolder& folder) {
+LogFile::LogFile(const OutputFolder& folder) {
   try {
     file_ = folder.Create("log.txt");
   } catch (const Error& error) {

@@ -16,7 +16,7 @@ namespace alidade::internal {
 /// if it cannot be written, a warning says so.
 class LogFile {
  public:
-  explicit LogFile(const RunFolder& folder);
+  explicit LogFile(const OutputFolder& folder);
   /// Writes what is buffered; later messages are left out.
   void Close();
 

@@ -66,7 +66,7 @@ std::optional<PosePlace> FindPose(const std::vector<StreamInfo>& values) {
   return std::nullopt;
 }
 
-PoseFile::PoseFile(const RunFolder& folder, const std::string& name, const PosePlace& place,
+PoseFile::PoseFile(const OutputFolder& folder, const std::string& name, const PosePlace& place,
                    bool with_covariances)
     : place_(place), file_(folder.Create(name)) {
   file_->Write(std::string(kHeader) + (with_covariances ? kCovariances : "") + '\n');

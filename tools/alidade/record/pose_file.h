@@ -28,7 +28,7 @@ std::optional<PosePlace> FindPose(const std::vector<StreamInfo>& values);
 class PoseFile {
  public:
   /// Creates the file with a line of comment that names the columns. Errors: kCannotCreate, kIo.
-  PoseFile(const RunFolder& folder, const std::string& name, const PosePlace& place,
+  PoseFile(const OutputFolder& folder, const std::string& name, const PosePlace& place,
            bool with_covariances = false);
 
   /// The orientation is w x y z, or the angle, rad. Error: kIo.

@@ -3,15 +3,14 @@
 
 #include <chrono>
 #include <ctime>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
-#include <sstream>
 
 #include "alidade/base/json.h"
 #include "alidade/base/log.h"
 #include "alidade/base/output_folder.h"
+#include "alidade/base/read_file.h"
 #include "alidade/base/sha256.h"
 #include "alidade/record/data_hash.h"
 #include "alidade/record/estimator_files.h"
@@ -39,7 +38,7 @@ struct Recorder::Impl {
   void WriteReport(const RunResult& result, const internal::RecordedRun& recorded);
 
   Options options;
-  internal::RunFolder folder;
+  internal::OutputFolder folder;
   internal::LogFile log{folder};
   const PluginHost& host;
   std::string title, config_text, source_type;
@@ -56,13 +55,6 @@ struct Recorder::Impl {
 };
 
 namespace {
-
-std::string ReadText(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return text.str();
-}
 
 /// The text of a key where there is one, else `fallback`.
 std::string TextOf(const Node& map, std::string_view key, const std::string& fallback) {
@@ -164,7 +156,7 @@ void Recorder::Impl::WriteReport(const RunResult& result, const internal::Record
   }
   for (const internal::Figure& figure : report.figures.drawn) {
     const std::filesystem::path svg = folder.partial() / ("figures/" + figure.name + ".svg");
-    report.svgs[figure.name] = AsElement(ReadText(svg));
+    report.svgs[figure.name] = AsElement(internal::ReadFile(svg, [](ExitCode, int) {}));
   }
   folder.Write("report.html", internal::ReportHtml(result, report));
   highlights = {"report.html"};
@@ -217,7 +209,7 @@ void Recorder::Finish(const RunResult& result) {
     const internal::RecordedEstimator& closed = files->recorded();
     impl_->facts.estimators.at(closed.name).rows = closed.estimate_rows;
   }
-  const internal::RunFolder& folder = impl_->folder;
+  const internal::OutputFolder& folder = impl_->folder;
   for (std::size_t e = 0; e < result.estimators.size(); ++e) {
     const EstimatorResult& one = result.estimators[e];
     impl_->WriteEvents(one);

@@ -19,7 +19,7 @@ namespace alidade {
 namespace {
 
 using internal::CsvFile;
-using internal::RunFolder;
+using internal::OutputFolder;
 
 std::unique_ptr<Source> MakeSource(const Config& config, const PluginHost& host) {
   const Node entry = config.root().At("source", "a simulation: where measurements come from");
@@ -45,7 +45,7 @@ std::vector<std::string> ColumnsOf(const StreamInfo& stream) {
 /// The files of one simulation.
 class DataFiles {
  public:
-  DataFiles(const RunFolder& folder, const Source& source) : folder_(folder), source_(source) {
+  DataFiles(const OutputFolder& folder, const Source& source) : folder_(folder), source_(source) {
     streams_.resize(source.streams().size());
     OpenCsv(times_, "timestamps.csv", {"frame", "t_s"});
     if (source.truths().empty()) return;
@@ -131,7 +131,7 @@ class DataFiles {
     if (map) map->Close();
   }
 
-  const RunFolder& folder_;
+  const OutputFolder& folder_;
   const Source& source_;
   std::optional<CsvFile> times_, truth_;
   std::vector<std::optional<CsvFile>> streams_;
@@ -143,7 +143,7 @@ class DataFiles {
 /// The pictures of one simulation.
 class PictureFiles {
  public:
-  PictureFiles(const SimulatePictures& names, const Config& config, const RunFolder& folder) {
+  PictureFiles(const SimulatePictures& names, const Config& config, const OutputFolder& folder) {
     if (!names.video.empty()) {
       const std::filesystem::path path = Inside(folder, names.video, "--video");
       MakeFolder(path.parent_path(), folder.Shown(names.video));
@@ -171,7 +171,7 @@ class PictureFiles {
   }
 
  private:
-  static std::filesystem::path Inside(const RunFolder& folder, const std::string& name,
+  static std::filesystem::path Inside(const OutputFolder& folder, const std::string& name,
                                       const char* option) {
     return ResolveInside(folder.partial(), name, false, {}, option);
   }
@@ -222,7 +222,7 @@ SimulateResult Simulate(const Config& config, const PluginHost& host,
                         const std::function<bool()>& stop, const SimulatePictures& pictures) {
   const std::unique_ptr<Source> source = MakeSource(config, host);
   const std::string camera = CameraYaml(config);
-  RunFolder output(folder, force);
+  OutputFolder output(folder, force);
   DataFiles files(output, *source);
   PictureFiles drawn(pictures, config, output);
   SimulateResult result;

@@ -97,7 +97,7 @@ std::vector<std::vector<std::string>> TruthColumns(const Experiment& experiment)
 
 }  // namespace
 
-SourceFiles::SourceFiles(const RunFolder& folder, const Experiment& experiment)
+SourceFiles::SourceFiles(const OutputFolder& folder, const Experiment& experiment)
     : streams_(experiment.source->streams()),
       truths_(experiment.source->truths()),
       truth_columns_(TruthColumns(experiment)),

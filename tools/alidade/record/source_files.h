@@ -17,7 +17,7 @@ namespace alidade::internal {
 /// inverted without knowing anything else, or knowing truth.
 class SourceFiles {
  public:
-  SourceFiles(const RunFolder& folder, const Experiment& experiment);
+  SourceFiles(const OutputFolder& folder, const Experiment& experiment);
 
   /// Error: kIo.
   void Add(const Frame& frame);

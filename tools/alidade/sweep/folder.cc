@@ -16,11 +16,11 @@ using internal::CountWhole;
 using internal::CountWithheld;
 using internal::CsvFile;
 using internal::Json;
-using internal::RunFolder;
+using internal::OutputFolder;
 
 struct SweepFolder::Impl {
   Impl(const std::filesystem::path& path, bool force) : folder(path, force) {}
-  RunFolder folder;
+  OutputFolder folder;
 };
 
 namespace {
@@ -109,7 +109,7 @@ std::vector<std::string> Header(const std::string& key, std::vector<std::string>
   return header;
 }
 
-void WriteRuns(const RunFolder& folder, const Parts& parts, const std::string& key) {
+void WriteRuns(const OutputFolder& folder, const Parts& parts, const std::string& key) {
   const RunResult all = AllKeys(parts);
   const std::vector<std::string> metrics = internal::OrderedMetrics(all);
   const std::vector<std::string> counts = internal::OrderedCounts(all);
@@ -141,7 +141,7 @@ void WriteRuns(const RunFolder& folder, const Parts& parts, const std::string& k
   csv.Close();
 }
 
-void WriteFailures(const RunFolder& folder, const Parts& parts, const std::string& key) {
+void WriteFailures(const OutputFolder& folder, const Parts& parts, const std::string& key) {
   const auto failed = [](const SweepRun& run) { return run.status == RunStatus::kFailed; };
   const auto any = [&](const Part& part) { return std::ranges::any_of(part.result->done, failed); };
   if (std::ranges::none_of(parts, any)) return;
@@ -169,7 +169,7 @@ void SweepFolder::AddFile(const std::string& name, const std::string& text) {
 }
 
 void SweepFolder::Write(const SweepResult& result, const Config& config) {
-  const RunFolder& folder = impl_->folder;
+  const OutputFolder& folder = impl_->folder;
   folder.Write("config.resolved.yaml", config.ToYaml());
   folder.Write("sweep.json", SweepJson(result));
   const Parts parts = {{&result, ""}};
@@ -181,7 +181,7 @@ void SweepFolder::Write(const SweepResult& result, const Config& config) {
 
 std::string SweepFolder::Write(const VariedSweep& sweep, const Config& config,
                                const std::function<bool()>& stop) {
-  const RunFolder& folder = impl_->folder;
+  const OutputFolder& folder = impl_->folder;
   const Parts parts = PartsOf(sweep);
   folder.Write("config.resolved.yaml", config.ToYaml());
   folder.Write("sweep.json", SweepJson(sweep));

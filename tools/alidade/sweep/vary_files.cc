@@ -178,7 +178,7 @@ FigureScript VariationFigure(const VariedSweep& sweep) {
 
 }  // namespace
 
-void WriteSweepCsv(const RunFolder& folder, const VariedSweep& sweep) {
+void WriteSweepCsv(const OutputFolder& folder, const VariedSweep& sweep) {
   const std::vector<Column> columns = ColumnsOf(sweep);
   std::vector<std::string> header = {sweep.variation.key};
   std::vector<std::vector<std::string>> keys;
@@ -223,7 +223,7 @@ std::string VariedMarkdown(const VariedSweep& sweep) {
   return text + ReferenceLines(sweep);
 }
 
-std::string DrawVariation(const RunFolder& folder, const VariedSweep& sweep,
+std::string DrawVariation(const OutputFolder& folder, const VariedSweep& sweep,
                           const std::function<bool()>& stop) {
   if (sweep.stopped()) return "the sweep was stopped";
   const FigureScript script = VariationFigure(sweep);

@@ -11,14 +11,14 @@ namespace alidade::internal {
 
 /// Writes `sweep.csv`: a row for each value; for each estimator how many runs count and diverged,
 /// and mean and quantiles of every metric. Errors: kCannotCreate, kIo.
-void WriteSweepCsv(const RunFolder& folder, const VariedSweep& sweep);
+void WriteSweepCsv(const OutputFolder& folder, const VariedSweep& sweep);
 
 /// The text of `table.md`: for each estimator a row for each value.
 std::string VariedMarkdown(const VariedSweep& sweep);
 
 /// Draws `figures/vary.svg` from sweep.csv: errors, lags, coverage and divergence over the values.
 /// Returns why there is none, or "". Errors: kIo.
-std::string DrawVariation(const RunFolder& folder, const VariedSweep& sweep,
+std::string DrawVariation(const OutputFolder& folder, const VariedSweep& sweep,
                           const std::function<bool()>& stop);
 
 }  // namespace alidade::internal

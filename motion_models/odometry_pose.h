@@ -40,11 +40,11 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
   static constexpr std::array kBlocks{
       Quantity{"position", "m", "of the camera in the world", "x,y,z"},
       Quantity{"orientation", "", "world_from_cam", "w,x,y,z"},
-      Quantity{"mounting_position", "m", "added to vehicle_from_cam.position", "x,y,z",
+      Quantity{"extrinsics_position", "m", "added to vehicle_from_cam.position", "x,y,z",
                ALIDADE_ROLE_OWNED},
-      Quantity{"mounting_orientation", "", "times vehicle_from_cam.orientation", "w,x,y,z",
+      Quantity{"extrinsics_orientation", "", "times vehicle_from_cam.orientation", "w,x,y,z",
                ALIDADE_ROLE_OWNED},
-      Quantity{"speed_error", "", "true speed / measured speed - 1", "", ALIDADE_ROLE_OWNED}};
+      Quantity{"speed_scale_error", "", "true speed / measured speed - 1", "", ALIDADE_ROLE_OWNED}};
   using Input = Vec<6>;
   static constexpr Quantity kInput{"velocities", "",
                                    "of the vehicle, in its frame: linear, m/s, and angular, rad/s",
@@ -84,11 +84,12 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
 
   NoiseKind noise_kind() const { return kind; }
   template <class T>
-  void Step(const T* r, const T* q, const T* shift, const T* tilt, const T* speed_error, const T* u,
-            const T* w, double dt_s, T* r1, T* q1, T* shift1, T* tilt1, T* speed_error1) const {
+  void Step(const T* r, const T* q, const T* shift, const T* tilt, const T* speed_scale_error,
+            const T* u, const T* w, double dt_s, T* r1, T* q1, T* shift1, T* tilt1,
+            T* speed_scale_error1) const {
     T phi[3], way[3], t[3], turned[3], moved[3], turn[3], step[3];
     for (int i = 0; i < 3; ++i) phi[i] = dt_s * (u[3 + i] + w[3 + i]);
-    for (int i = 0; i < 3; ++i) way[i] = dt_s * ((1.0 + speed_error[0]) * u[i] + w[i]);
+    for (int i = 0; i < 3; ++i) way[i] = dt_s * ((1.0 + speed_scale_error[0]) * u[i] + w[i]);
     for (std::size_t i = 0; i < 3; ++i) t[i] = mount[i] + shift[i];
     T rotation[4], mounted[4];
     UnitQuaternion::Multiply(tilt, vehicle_from_cam.data(), mounted);
@@ -103,7 +104,7 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
     UnitQuaternion::Plus(q, turn, q1);
     std::copy(shift, shift + 3, shift1);
     std::copy(tilt, tilt + 4, tilt1);
-    speed_error1[0] = speed_error[0];
+    speed_scale_error1[0] = speed_scale_error[0];
   }
   void SqrtQ(double dt_s, MatrixRef Lq) const {
     double scale = 1.0;  // of the mean velocities of the step

@@ -32,15 +32,18 @@ struct DepthFeature : LandmarkSensor<DepthFeature<Form>, Vec<3>, Form> {
       "pixel_and_depth", "", "where the landmark is seen, px, and its depth, m", "u,v,depth"};
 
   Camera camera;
-  double sigma_px, sigma_depth_m, sigma_depth_per_m;
+  double sigma_px, sigma_depth_m, sigma_depth_quadratic_1_m;
 
   DepthFeature(const Camera& lens, double sigma, double depth_m, double depth_per_m = 0.0)
-      : camera(lens), sigma_px(sigma), sigma_depth_m(depth_m), sigma_depth_per_m(depth_per_m) {}
+      : camera(lens),
+        sigma_px(sigma),
+        sigma_depth_m(depth_m),
+        sigma_depth_quadratic_1_m(depth_per_m) {}
   explicit DepthFeature(Params& p)
       : DepthFeature(Camera(p),
                      p.Positive("sigma_px", "px", "noise of a pixel coordinate, 1 sigma"),
                      p.Positive("sigma_depth_m", "m", "noise of the depth, 1 sigma"),
-                     p.NonNegative("sigma_depth_per_m", "1/m",
+                     p.NonNegative("sigma_depth_quadratic_1_m", "1/m",
                                    "what is added to it, times the depth squared", 0.0)) {}
 
   template <class T>
@@ -53,7 +56,7 @@ struct DepthFeature : LandmarkSensor<DepthFeature<Form>, Vec<3>, Form> {
   void SqrtNoiseInCamera(const T* h, const T& rho, T* L) const {
     const T depth = h[2] / rho;
     L[0] = L[4] = T(sigma_px);
-    L[8] = sigma_depth_m + sigma_depth_per_m * depth * depth;
+    L[8] = sigma_depth_m + sigma_depth_quadratic_1_m * depth * depth;
   }
   bool Valid(const double* z) const { return camera.Contains(z) && z[2] > 0.0; }
   template <class T>

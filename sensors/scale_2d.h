@@ -10,7 +10,7 @@ namespace alidade {
 ///   model      s = lambda Z + n,   n ~ N(0, sigma_s^2),   lambda = 1 / Z0,  s = 1 / scale
 ///   Jacobian   ds/dZ = lambda, ds/dlambda = Z          1x1, 1/m and m
 ///   noise      propagated: sigma_s = (2 sigma / w) (lambda Z)^3      from pixels, see below
-///              fixed:      sigma_s^2 = variance
+///              fixed:      sigma_s = sigma_inverse_scale
 ///   inverse    lambda = s / Z
 ///
 ///   symbol     shape  unit    frame  meaning
@@ -38,10 +38,10 @@ struct Scale2d : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static Scale2d FromPixels(double template_px, double sigma_px) {
     return Scale2d(0.0, 2.0 * sigma_px / template_px);
   }
-  static Scale2d FromVariance(double variance) { return Scale2d(std::sqrt(variance), 0.0); }
+  static Scale2d FromSigma(double sigma) { return Scale2d(sigma, 0.0); }
   explicit Scale2d(Params& p)
-      : Scale2d(p.Choice("noise", {"propagated", "fixed"}, "noise of 1/scale", 0) == 1
-                    ? FromVariance(p.Positive("variance", "", "noise = fixed: variance of 1/scale"))
+      : Scale2d(p.Choice("noise_model", {"propagated", "fixed"}, "noise of 1/scale", 0) == 1
+                    ? FromSigma(p.Positive("sigma_inverse_scale", "", "noise of 1/scale, 1 sigma"))
                     : FromPixels(p.Positive("template_px", "px", "width of the template"),
                                  p.Positive("sigma_px", "px", "noise of an edge, 1 sigma"))) {}
 

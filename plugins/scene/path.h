@@ -169,7 +169,7 @@ inline std::vector<CameraState> DrawPath(const Node& node, std::size_t count, do
 inline std::vector<CameraState> ReadPath(const Node& node, std::size_t count, double dt_s,
                                          Random& random) {
   const auto up_node = node.Find("up");
-  const auto [kind, what] = OneOf(node, {"look_at", "keyframes", "model"});
+  const auto [kind, what] = OneOf(node, {"look_at", "keyframes", "random"});
   if (up_node && kind != "look_at") up_node->Fail("without a use", "'up' beside 'look_at'");
   const Eigen::Vector3d up = up_node ? ReadVector(*up_node) : Eigen::Vector3d(0.0, -1.0, 0.0);
   if (!(up.norm() > 0.0)) up_node->Fail("no direction", "a vector that is not 0");

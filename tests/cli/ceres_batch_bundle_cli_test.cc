@@ -78,7 +78,7 @@ camera: {width: 640, height: 480, fx: 525, fy: 525, cx: 320, cy: 240}
 source:
   type: scene
   seed: 3
-  frames: 15
+  max_frames: 15
   STEREO
   points: {box: {min: [-2, -1.5, 3], max: [2, 1.5, 6]}, count: 40}
   trajectory: {look_at: [{position: [-0.5, 0, 0], target: [0, 0, 4]},

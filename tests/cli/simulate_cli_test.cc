@@ -14,8 +14,8 @@ camera: {width: 640, height: 480, fx: 525, fy: 525, cx: 320, cy: 240}
 source:
   type: scene
   seed: 3
-  frames: 20
-  odometry: true
+  max_frames: 20
+  simulate_odometry: true
   known: {count: 3}
   points: {box: {min: [-2, -1.5, 2], max: [2, 1.5, 6]}, count: 40}
   trajectory: {look_at: [{position: [-0.5, 0, 0], target: [0, 0, 4]},
@@ -64,7 +64,7 @@ TEST_F(SimulateCli, SaysInItsFolderWhetherItWasStopped) {
   EXPECT_EQ(Json("whole/simulate.json").root().At("frames").Number(), 20.0);
   // 1e6 frames: more than a minute of work.
   const pid_t simulate =
-      Start({"simulate", "scene.yaml", "-o", "data", "--set", "source.frames=1000000"});
+      Start({"simulate", "scene.yaml", "-o", "data", "--set", "source.max_frames=1000000"});
   const std::string partial = ".data.partial-" + std::to_string(simulate);
   ASSERT_TRUE(Eventually([&] { return Exists(partial + "/tracks.csv"); }));
   ::kill(simulate, SIGTERM);
@@ -153,10 +153,10 @@ TEST_F(SimulateCli, ACalibrationOfAStereoPairHasItsBaseline) {
 }
 
 TEST_F(SimulateCli, RefusesAKeyThatNobodyReads) {
-  Write("scene.yaml", kScene + "  nose_px: 2\n");
+  Write("scene.yaml", kScene + "  sigma_p: 2\n");
   const Outcome made = Call({"simulate", "scene.yaml", "-o", "data"});
   EXPECT_EQ(made.code, 78);
-  EXPECT_TRUE(Contains(made.err, "source.nose_px: unknown key; did you mean 'noise_px'?"))
+  EXPECT_TRUE(Contains(made.err, "source.sigma_p: unknown key; did you mean 'sigma_px'?"))
       << made.err;
   Write("scene.yaml", kScene);
   const Outcome lens = Call({"simulate", "scene.yaml", "-o", "data", "--set", "camera.fz=3"});

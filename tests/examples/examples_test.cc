@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <map>
 
+#include "alidade/base/number_text.h"
 #include "alidade/run/run.h"
 
 namespace alidade {
@@ -227,10 +228,16 @@ double RiccatiSigma(double r, int updates) {
   return std::sqrt(p);
 }
 
+/// The standard deviation of a variance.
+std::string RootText(const char* variance) {
+  return NumberText(std::sqrt(std::strtod(variance, nullptr)));
+}
+
 // Experiment 4.3 over decades of R2: lag against noise, and both ends fail.
 TEST(Examples, LagAgainstNoiseHasAnOptimumAndTwoEndsThatFail) {
   const auto with = [](const char* r) {
-    return Sweep("18_depth_noise_lag", {{"sensors.scale.variance", r}}).at("ekf");
+    return Sweep("18_depth_noise_lag", {{"sensors.scale.sigma_inverse_scale", RootText(r)}})
+        .at("ekf");
   };
   const Means best = with("5e-5");
   EXPECT_EQ(best.diverged + best.inconsistent, 0);
@@ -257,7 +264,7 @@ TEST(Examples, TheGainSettlesWithinTheSeriesUpToR50) {
   const int updates = 152, many = 200'000;
   for (const char* r : {"5e-5", "0.5", "50", "500", "50000"}) {
     Config config = Config::FromFile(kExamples / "18_depth_noise_lag" / "config.yaml");
-    config.Set("sensors.scale.variance", r, "--set");
+    config.Set("sensors.scale.sigma_inverse_scale", RootText(r), "--set");
     Experiment experiment = BuildExperiment(config, Host());
     ASSERT_EQ(alidade::Run(experiment, {}).status, RunStatus::kOk);
     const State& state = experiment.estimators.at(0).estimator->state();

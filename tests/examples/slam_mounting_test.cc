@@ -31,10 +31,10 @@ sensors:
     sigma_px: 1.0
 source:
   type: scene
-  frames: 100
+  max_frames: 100
   rate_hz: 10
-  noise_px: 1.0
-  odometry: true
+  sigma_px: 1.0
+  simulate_odometry: true
   odometry_noise: {linear: 0.004, angular: 0.002}
   points: {box: {min: [-1.2, -0.9, 2.2], max: [1.2, 0.9, 5.5]}, count: 40}
   trajectory:
@@ -50,15 +50,17 @@ estimators:
     type: ekf
     gate: 0.9999
     overrides:
-      state: {cam: {initial: {mounting_orientation: {mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0.03}}}}
+      state:
+        cam:
+          initial: {extrinsics_orientation: {mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0.03}}
   considered:
     type: ekf
     gate: 0.9999
     overrides:
       state:
         cam:
-          consider: [mounting_orientation]
-          initial: {mounting_orientation: {mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0.03}}
+          consider: [extrinsics_orientation]
+          initial: {extrinsics_orientation: {mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0.03}}
 )";
 
 std::vector<SweepSummary> Ten() {

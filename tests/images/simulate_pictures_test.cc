@@ -23,9 +23,9 @@ camera: {model: radtan, width: 320, height: 240, fx: 260, fy: 265, cx: 160.5, cy
 source:
   type: scene
   seed: 5
-  frames: 6
+  max_frames: 6
   rate_hz: 20
-  noise_px: 0.7
+  sigma_px: 0.7
   known: {count: 3}
   points: {box: {min: [-3, -2, 2], max: [3, 2, 6]}, count: 30}
   trajectory: {look_at: [{position: [-0.5, 0, 0], target: [0, 0, 4]},
@@ -150,7 +150,7 @@ TEST_F(SimulatePictures, TheVideoHasTheRateOfTheSource) {
 }
 
 TEST_F(SimulatePictures, OneFrameIsAVideoToo) {
-  ASSERT_EQ(Simulate(kScene, {"--video", "v.avi", "--set", "source.frames=1"}).code, 0);
+  ASSERT_EQ(Simulate(kScene, {"--video", "v.avi", "--set", "source.max_frames=1"}).code, 0);
   EXPECT_EQ(Frames("data/v.avi").size(), 1u);
 }
 

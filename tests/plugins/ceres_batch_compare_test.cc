@@ -293,7 +293,7 @@ TEST(ExplainExperiment, RefusesToExplainTheGapOfABatchOrASmoother) {
 
 Comparison CompareScene(const std::string& more) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml");
-  config.Set("source.frames", "10", "--set");
+  config.Set("source.max_frames", "10", "--set");
   if (!more.empty()) config.Set("estimators.now", more, "--set");
   ExplainedExperiment explained = ExplainExperiment(config, Shipped(), {});
   RunComparer comparer(explained.experiment);

@@ -358,9 +358,9 @@ TEST(FixedLag, LiesBetweenTheFilterAndTheBatchAndIsHonest) {
 // It has no gate; but its stereo sees nothing nearer than 0.3 m, where the target is half the time.
 TEST(FixedLag, LendsWhatItAccepted) {
   const RunResult run = RunDepth(
-      "{one: {type: fixed_lag, lag_s: 0.3, overrides: {sensors: {stereo: {near_m: 0.3}}}}, "
+      "{one: {type: fixed_lag, lag_s: 0.3, overrides: {sensors: {stereo: {min_range_m: 0.3}}}}, "
       "two: {type: ekf, use: {accepted_by: one}}, all: {type: ekf}}",
-      {{"source.near_m", "0"}});
+      {{"source.min_range_m", "0"}});
   ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
   std::vector<std::int64_t> accepted;
   for (const auto& one : run.estimators) accepted.push_back(one.counts.at("accepted:stereo"));

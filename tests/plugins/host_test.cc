@@ -272,13 +272,14 @@ TEST_F(HostTest, AParameterDeclaredAgainstTheRulesIsRefused) {
 TEST_F(HostTest, AllBadParametersAreToldAtOnce) {
   const PluginHost host;
   const Config config =
-      Parse("sensors:\n  s: {model: stereo_disparity, focal_px: -1, near_m: [1]}");
+      Parse("sensors:\n  s: {model: stereo_disparity, focal_px: -1, min_range_m: [1]}");
   const Node entry = config.root().At("sensors").At("s");
-  ExpectError(ExitCode::kBadConfig,
-              {"sensors.s.baseline_m: missing; model 'stereo_disparity' needs it (m, > 0: stereo "
-               "baseline)",
-               "sensors.s.sigma_px: missing", "sensors.s.focal_px", "'-1'", "sensors.s.near_m"},
-              [&] { host.CreateSensor("stereo_disparity", entry); });
+  ExpectError(
+      ExitCode::kBadConfig,
+      {"sensors.s.baseline_m: missing; model 'stereo_disparity' needs it (m, > 0: stereo "
+       "baseline)",
+       "sensors.s.sigma_px: missing", "sensors.s.focal_px", "'-1'", "sensors.s.min_range_m"},
+      [&] { host.CreateSensor("stereo_disparity", entry); });
 }
 
 TEST_F(HostTest, ADottedKeyWalksNestedMaps) {
@@ -310,12 +311,12 @@ TEST_F(HostTest, TheSchemaTellsWhatEachChoiceReads) {
     return host.Schema(*std::find_if(host.entries().begin(), host.entries().end(), has_name));
   };
   const std::vector<ParamInfo> scale = schema("scale_2d");
-  EXPECT_EQ(Param(scale, "noise").type, "choice");
-  EXPECT_EQ(Param(scale, "noise").choices, (std::vector<std::string>{"propagated", "fixed"}));
-  EXPECT_EQ(Param(scale, "noise").fallback, "propagated");
-  EXPECT_EQ(Param(scale, "noise").when, "");
-  EXPECT_EQ(Param(scale, "variance").when, "noise = fixed");
-  EXPECT_EQ(Param(scale, "sigma_px").when, "noise = propagated");
+  EXPECT_EQ(Param(scale, "noise_model").type, "choice");
+  EXPECT_EQ(Param(scale, "noise_model").choices, (std::vector<std::string>{"propagated", "fixed"}));
+  EXPECT_EQ(Param(scale, "noise_model").fallback, "propagated");
+  EXPECT_EQ(Param(scale, "noise_model").when, "");
+  EXPECT_EQ(Param(scale, "sigma_inverse_scale").when, "noise_model = fixed");
+  EXPECT_EQ(Param(scale, "sigma_px").when, "noise_model = propagated");
   EXPECT_EQ(Param(scale, "sigma_px").range, "> 0");
   EXPECT_EQ(Param(scale, "sigma_px").unit, "px");
   const std::vector<ParamInfo> motion = schema("constant_velocity");

@@ -34,27 +34,24 @@ std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
   return mean;
 }
 
-/// Exactly one of sigma, variance, covariance.
+/// Exactly one of sigma, covariance.
 Eigen::MatrixXd ReadCovariance(const Node& node, int size) {
-  const auto sigma = node.Find("sigma"), variance = node.Find("variance"),
-             covariance = node.Find("covariance");
-  if (int{sigma.has_value()} + int{variance.has_value()} + int{covariance.has_value()} != 1) {
-    node.Fail("needs its uncertainty once", "one of sigma, variance, covariance");
+  const auto sigma = node.Find("sigma"), covariance = node.Find("covariance");
+  if (sigma.has_value() == covariance.has_value()) {
+    node.Fail("needs its uncertainty once", "sigma or covariance");
   }
   if (covariance) {
     const std::vector<double> values = covariance->Covariance(size);
     return Eigen::Map<const Eigen::MatrixXd>(values.data(), size, size);
   }
-  const Node& spread = sigma ? *sigma : *variance;
-  std::vector<double> values = spread.Numbers();
+  std::vector<double> values = sigma->Numbers();
   if (values.size() == 1) values.assign(static_cast<std::size_t>(size), values[0]);
   if (values.size() != static_cast<std::size_t>(size)) {
-    spread.Fail(std::to_string(values.size()) + " numbers", std::to_string(size) + ", or one");
+    sigma->Fail(std::to_string(values.size()) + " numbers", std::to_string(size) + ", or one");
   }
-  Eigen::VectorXd diagonal = Eigen::Map<const Eigen::VectorXd>(values.data(), size);
-  if (diagonal.minCoeff() < 0.0) spread.Fail("negative", ">= 0");
-  if (sigma) diagonal = diagonal.cwiseAbs2();
-  return diagonal.asDiagonal();
+  const Eigen::VectorXd sigmas = Eigen::Map<const Eigen::VectorXd>(values.data(), size);
+  if (sigmas.minCoeff() < 0.0) sigma->Fail("negative", ">= 0");
+  return sigmas.cwiseAbs2().asDiagonal();
 }
 
 /// Blocks of the entry that a list such as `consider: [depth]` names.
@@ -106,7 +103,7 @@ void ReadPrior(const Node& initial, const Block& block, BlockId id, System& syst
     if (block.status != BlockStatus::kFixed) {
       prior.covariance = ReadCovariance(initial, block.geometry().tangent);
     } else {
-      for (const char* key : {"sigma", "variance", "covariance"}) initial.Declare(key);
+      for (const char* key : {"sigma", "covariance"}) initial.Declare(key);
     }
   }
   initial.RejectUnread();

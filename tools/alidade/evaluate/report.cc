@@ -226,7 +226,8 @@ Json JsonOf(const std::vector<PoseErrors>& all) {
 }
 
 Json JsonOf(const Nees& nees) {
-  return {{"mean", nees.mean}, {"within95", nees.within95}, {"dof", nees.dof}, {"poses", nees.poses}};
+  return {
+      {"mean", nees.mean}, {"within95", nees.within95}, {"dof", nees.dof}, {"poses", nees.poses}};
 }
 
 Json JsonOf(const std::vector<InnovationStatistics>& innovations) {

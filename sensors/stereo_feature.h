@@ -36,7 +36,7 @@ struct StereoFeature : LandmarkSensor<StereoFeature<Form>, Vec<4>, Form> {
   StereoFeature(const Camera& left, double baseline, double sigma)
       : camera(left), baseline_m(baseline), sigma_px(sigma) {}
   explicit StereoFeature(Params& p)
-      : StereoFeature(Camera(p), p.Positive("baseline_m", "m", "stereo baseline"),
+      : StereoFeature(Camera(p), p.Positive("camera.baseline_m", "m", "stereo baseline"),
                       p.Positive("sigma_px", "px", "noise of a pixel coordinate, 1 sigma")) {
     if (camera.model != CameraModel::kPinhole) {
       p.Fail("camera.model", "not 'pinhole', but a rectified pair has no distortion");

@@ -30,7 +30,7 @@ inline constexpr const char* kSceneKeys =
 /// Points in space, seen by a camera that moves among them.
 ///
 ///   pixel      (u, v) = K(h) + n_px,   h = R_CW (p - r),   n_px ~ N(0, sigma_px^2 I)
-///   stereo     (u, v, u - fx B / hz, v) + n_px: a rectified pair, B = baseline_m; pinhole alone
+///   stereo     (u, v, u - fx B / hz, v) + n_px: a rectified pair of pinholes, B camera.baseline_m
 ///   depth      (u, v, hz) + (n_px, n_d),   n_d ~ N(0, sigma_depth_m^2)
 ///   known      (u, v, hz (1 + n)),   n ~ N(0, known.sigma_relative^2)
 ///   odometry   v, omega in cam, constant, that lead odometry_pose from this frame to the next,
@@ -116,7 +116,7 @@ class Scene : public Source {
     measures_ = static_cast<Measures>(p.Choice("measures", {"pixel", "stereo", "depth"},
                                                "what stream tracks holds of a point", kPixel));
     if (measures_ == kStereo) {
-      baseline_m_ = p.Positive("baseline_m", "m", "stereo baseline");
+      baseline_m_ = p.Positive("camera.baseline_m", "m", "stereo baseline");
       if (camera_.model != CameraModel::kPinhole) {
         p.Fail("camera.model", "not 'pinhole', but a rectified pair has no distortion");
       }

@@ -134,15 +134,17 @@ TEST_F(SimulateCli, WritesTheStreamsOfAnySource) {
 }
 
 TEST_F(SimulateCli, ACalibrationOfAStereoPairHasItsBaseline) {
-  std::string scene = kScene + "  measures: stereo\n  baseline_m: 0.2\n";
+  std::string scene = kScene + "  measures: stereo\n";
+  scene.insert(scene.find("width"), "baseline_m: 0.2, ");
   const std::string known = "  known: {count: 3}\n";
   Write("scene.yaml", scene.erase(scene.find(known), known.size()));
   const Outcome made = Call({"simulate", "scene.yaml", "-o", "data"});
   ASSERT_EQ(made.code, 0) << made.err;
-  EXPECT_EQ(Json("data/calibration.yaml").root().At("baseline_m").Number(), 0.2);
+  EXPECT_EQ(Json("data/calibration.yaml").root().At("camera").At("baseline_m").Number(), 0.2);
   // A config that includes it is none the worse, and hands it on.
-  Write("depth.yaml", testing::kDepthConfig + "baseline_m: 0.2\n");
-  const Outcome explained = Call({"explain", "depth.yaml"});
+  const Outcome explained =
+      Call({"explain", ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml", "--set",
+            "camera.baseline_m=0.2"});
   EXPECT_EQ(explained.code, 0) << explained.err;
   Write("again.yaml",
         "alidade: 1\ninclude: data/calibration.yaml\nsource: {type: tracks, path: data, measures: "

@@ -254,7 +254,7 @@ void AddLandmarkSensors(std::multimap<std::string, std::string>& parameters) {
   const std::string camera = "camera: {width: 640, height: 480, fx: 525, fy: 520, cx: 320, cy: 240";
   const std::pair<std::string, std::string> sensors[] = {
       {"inverse_depth_feature", ""},
-      {"stereo_feature", ", baseline_m: 0.1"},
+      {"stereo_feature", ""},
       {"depth_feature", ", sigma_depth_m: 0.01, sigma_depth_quadratic_1_m: 0.003"}};
   for (const auto& [model, keys] : sensors) {
     for (const char* form : {"inverse_depth", "anchored", "xyz"}) {
@@ -264,7 +264,8 @@ void AddLandmarkSensors(std::multimap<std::string, std::string>& parameters) {
         const bool other_lens = *lens != '\0', other_form = *form != 'i';
         if (other_lens && (other_form || model == "stereo_feature")) continue;
         parameters.emplace(model, "{sigma_px: 1" + keys + ", landmarks: {representation: " + form +
-                                      "}, " + camera + lens + "}}");
+                                      "}, " + camera + lens +
+                                      (model[0] == 's' ? ", baseline_m: 0.1}}" : "}}"));
       }
     }
   }

@@ -58,7 +58,7 @@ TEST(Scene, DistortsAsTheCameraDoes) {
 
 TEST(Scene, MeasuresStereoAndDepthToo) {
   const std::string point = "max_frames: 1, sigma_px: 0, points: {list: [[1, 0.5, 2]]}, " + kStill;
-  const auto stereo = SceneFrames("measures: stereo, baseline_m: 0.1, " + point);
+  const auto stereo = SceneFrames("measures: stereo, camera: {baseline_m: 0.1}, " + point);
   EXPECT_EQ(stereo[0].measurements[0].values,
             (std::vector<double>{582.5, 371.25, 582.5 - 525 * 0.1 / 2, 371.25}));
   const auto depth = SceneFrames("measures: depth, sigma_depth_m: 0, " + point);

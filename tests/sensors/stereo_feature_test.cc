@@ -90,10 +90,11 @@ TEST(StereoFeature, IsValidWhereBothCamerasSeeIt) {
 }
 
 TEST(StereoFeature, NeedsCamerasWithoutDistortion) {
-  MapHost::Values values{{"camera.model", {0}}, {"camera.width", {640}}, {"camera.height", {480}},
-                         {"camera.fx", {525}},  {"camera.fy", {525}},    {"camera.cx", {320}},
-                         {"camera.cy", {240}},  {"camera.k1", {0.1}},    {"camera.k2", {0.0}},
-                         {"baseline_m", {0.1}}, {"sigma_px", {1}}};
+  MapHost::Values values{
+      {"camera.model", {0}},        {"camera.width", {640}}, {"camera.height", {480}},
+      {"camera.fx", {525}},         {"camera.fy", {525}},    {"camera.cx", {320}},
+      {"camera.cy", {240}},         {"camera.k1", {0.1}},    {"camera.k2", {0.0}},
+      {"camera.baseline_m", {0.1}}, {"sigma_px", {1}}};
   const MapHost pinhole(values);
   static_cast<void>(MakeInstance(&EmplaceSensor<StereoFeature<Xyz>>, pinhole));
   EXPECT_TRUE(pinhole.failures().empty());

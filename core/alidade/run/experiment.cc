@@ -310,11 +310,12 @@ void AddCalibrated(const Config& config, const PluginHost& host, const std::stri
 
 /// Keys of the root that are read before the calibration is there, or by other commands.
 void DeclareCommon(const Node& root) {
-  // `baseline_m`: of a calibration, for `alidade bundle`; a sensor has its own.
-  for (const char* key : {"alidade", "plugins", "include", "baseline_m", "title", "output",
-                          "source", "out_of_sequence"}) {
+  for (const char* key :
+       {"alidade", "plugins", "include", "title", "output", "source", "out_of_sequence"}) {
     root.Declare(key);
   }
+  // Of the calibration of a pair, one of whose cameras may be used alone.
+  if (const auto camera = root.Find("camera")) camera->Declare("baseline_m");
 }
 
 /// The plugins that the source, the estimators and their models come from, as far as they were

@@ -59,7 +59,7 @@ BundleFile ReadBundle(const std::filesystem::path& file);
 /// What else a problem of tracks is made from.
 struct BundleTracks {
   std::filesystem::path tracks;  ///< `frame,feature,dim,value`
-  std::filesystem::path camera;  ///< YAML with `camera`, and for a stereo pair `baseline_m`
+  std::filesystem::path camera;  ///< YAML with `camera`; a stereo pair has `camera.baseline_m`
   std::filesystem::path start;   ///< trajectory TUM, `t x y z qx qy qz qw`, world_from_cam
 };
 

@@ -192,7 +192,7 @@ class PictureFiles {
   std::vector<std::array<double, 2>> pixels_;
 };
 
-/// The config's `camera` alone, and `baseline_m` of a stereo pair; "" where it has no camera.
+/// The config's `camera` alone; "" if it has none.
 std::string CameraYaml(const Config& config) {
   const bool source_reads_it = !config.root().HasUnread("camera");
   const auto camera = config.root().Find("camera");
@@ -201,10 +201,6 @@ std::string CameraYaml(const Config& config) {
   Config alone = Config::FromText("camera: {}", "calibration.yaml");
   for (const auto& [key, value] : camera->Entries()) {
     alone.Set("camera." + key, value.Text(), "calibration.yaml");
-  }
-  for (const Node& from : {config.root(), config.root().At("source")}) {
-    if (const auto baseline = from.Find("baseline_m"))
-      alone.Set("baseline_m", baseline->Text(), "calibration.yaml");
   }
   return alone.ToYaml();
 }

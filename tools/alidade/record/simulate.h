@@ -35,7 +35,7 @@ struct SimulatePictures {
 ///   truth.csv         t_s and the values of all truths
 ///   truth.tum         t x y z qx qy qz qw of the first truth X.position with an X.orientation
 ///   map.csv           feature,x,y,z, m: of each landmark that was seen, where the source knows
-///   calibration.yaml  the config's `camera`, for a config to include; of a pair `baseline_m`
+///   calibration.yaml  the config's `camera`, for a config to include
 ///   simulate.json     {"status": "ok", or "stopped" before the end, "frames": N}
 ///   pictures.video    a picture of each frame, MJPG: equal discs at the first two values (u, v),
 ///                     px, of all measurements of landmarks; as large as the config's `camera`

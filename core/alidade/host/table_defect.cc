@@ -91,7 +91,7 @@ std::string Defect(const BuildTable* table) {
   }
   const int sources = table->sources == nullptr ? 0 : table->source_count;
   const int estimators = table->estimators == nullptr ? 0 : table->estimator_count;
-  const bool other = table->pictures != nullptr || table->adjust != nullptr;
+  const bool other = table->images != nullptr || table->adjust != nullptr;
   if (sources < 1 && estimators < 1 && !other) return "its table is empty";
   std::string defect = BuildDefect(table->sources, sources, "a source");
   if (defect.empty()) defect = BuildDefect(table->estimators, estimators, "an estimator");

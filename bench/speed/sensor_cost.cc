@@ -248,14 +248,14 @@ double QuantileOf(std::vector<double> values, double q) {
 struct Ways {
   PinholeClosed closed;
   Pinhole derived;
-  SensorModel sealed_closed = InProcessSensor(closed, "closed");
-  SensorModel sealed_derived = InProcessSensor(derived, "derived");
+  SensorModel abi_closed = InProcessSensor(closed, "closed");
+  SensorModel abi_derived = InProcessSensor(derived, "derived");
   std::vector<ceres_batch::RolePlace> places{{0, 0}, {0, 3}, {1, 0}};
   std::vector<double> plain{1.0, 0.0, 0.0, 1.0};  // W of 1 px
   CostKind<PinholeClosed> closed_kind{closed, places, {kPose, 3}, plain};
   CostKind<Pinhole> derived_kind{derived, places, {kPose, 3}, plain};
-  CostKind<SensorModel> sealed_closed_kind{sealed_closed, places, {kPose, 3}, plain};
-  CostKind<SensorModel> sealed_derived_kind{sealed_derived, places, {kPose, 3}, plain};
+  CostKind<SensorModel> abi_closed_kind{abi_closed, places, {kPose, 3}, plain};
+  CostKind<SensorModel> abi_derived_kind{abi_derived, places, {kPose, 3}, plain};
 
   static ceres::Manifold* Tangent() {
     return new GeometryManifold(
@@ -275,7 +275,7 @@ struct Ways {
       {"closed form, static", 0, [this](const double* z) { return new SensorCost(closed_kind, z); },
        Tangent},
       {"closed form, plugin", 0,
-       [this](const double* z) { return new SensorCost(sealed_closed_kind, z); }, Tangent},
+       [this](const double* z) { return new SensorCost(abi_closed_kind, z); }, Tangent},
       {"by hand, again", 0, [](const double* z) { return new ByHand(z); }, Tangent},
       {"ceres::AutoDiffCostFunction", 4,
        [](const double* z) {
@@ -285,7 +285,7 @@ struct Ways {
       {"derived, static", 4, [this](const double* z) { return new SensorCost(derived_kind, z); },
        Tangent},
       {"derived, plugin", 4,
-       [this](const double* z) { return new SensorCost(sealed_derived_kind, z); }, Tangent},
+       [this](const double* z) { return new SensorCost(abi_derived_kind, z); }, Tangent},
   };
 };
 

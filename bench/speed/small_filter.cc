@@ -132,7 +132,7 @@ class Static {
       ConstantVelocity<1, false>(kAcceleration), Constant<1>(1)};
 };
 
-/// The engine with the shipped models behind the sealed boundary, as a config composes them: frames
+/// The engine with the shipped models behind the plugin ABI, as a config composes them: frames
 /// in, a report of every measurement out.
 class Plugin {
  public:

@@ -141,10 +141,10 @@ TEST_F(HostTest, AnExecutableIsNoPlugin) {
   ExpectRefused(file, {"another kind of processor"});
 }
 
-// ---- 52 to 55: fingerprint and load -------------------------------------------------------------
+// ---- 52 to 55: build tag and load -------------------------------------------------------------
 
-TEST_F(HostTest, AFileWithoutFingerprintIsRefused) {
-  ExpectRefused(Built("no_fingerprint"), {"has no alidade fingerprint"});
+TEST_F(HostTest, AFileWithoutBuildTagIsRefused) {
+  ExpectRefused(Built("no_build_tag"), {"has no alidade build tag"});
 }
 
 // FAULTS 53

@@ -8,7 +8,7 @@
 #include "alidade/host/source.h"
 #include "alidade/model/fingerprint.h"
 
-/// Exports of the build tier: plugins in C++ against alidade::core, loaded only into the very build
+/// Exports of C++ plugins, made against alidade::core, loaded only into the very build
 /// that they were made with.
 namespace alidade {
 
@@ -18,7 +18,7 @@ struct BundleProblem;   // in alidade/bundle/bundle.h
 struct BundleOptions;   // likewise
 struct BundleResult;    // likewise
 
-/// All that must be equal between the host and a build-tier plugin: version, compiler, and the
+/// All that must be equal between the host and a C++ plugin: version, compiler, and the
 /// flags that change layout.
 #define ALIDADE_STRINGISE_(x) #x
 #define ALIDADE_STRINGISE(x) ALIDADE_STRINGISE_(x)
@@ -77,7 +77,7 @@ inline constexpr const char* kBuildEntrySymbol = "alidade_build_plugin";
 
 /// Exports a table of this plugin; `...` are the members of BuildTable after the size.
 #define ALIDADE_BUILD_PLUGIN_(...)                                                       \
-  ALIDADE_FINGERPRINT(ALIDADE_TIER_BUILD, ALIDADE_BUILD_ID)                              \
+  ALIDADE_BUILD_TAG(ALIDADE_PLUGIN_CPP, ALIDADE_BUILD_ID)                                \
   extern "C" __attribute__((visibility("default"))) const alidade::BuildTable*           \
   alidade_build_plugin() {                                                               \
     static const alidade::BuildTable table = {sizeof(alidade::BuildTable), __VA_ARGS__}; \

@@ -84,7 +84,7 @@ std::vector<std::string> Capabilities(const ModelInstance& model) {
   return lines;
 }
 
-/// What `create` of a build-tier entry makes of its parameters, checked.
+/// What `create` of a C++ plugin makes of its parameters, checked.
 template <class Create>
 auto CreateBuilt(const PluginEntry& entry, const Node& node, std::mutex& mutex,
                  const Create& create) {

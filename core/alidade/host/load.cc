@@ -24,13 +24,13 @@ std::string WalkTable(void* library, const char* symbol) {
 }
 
 /// In the child.
-std::string Try(const std::filesystem::path& file, std::uint32_t tier) {
+std::string Try(const std::filesystem::path& file, std::uint32_t kind) {
   const Surroundings before;
   void* const library = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (library == nullptr) return "cannot be loaded: " + DlError();
   const std::string change = Surroundings().ChangeSince(before);
   if (!change.empty()) return change + " while loading";
-  if (tier == ALIDADE_TIER_BUILD) return WalkTable<BuildTable>(library, kBuildEntrySymbol);
+  if (kind == ALIDADE_PLUGIN_CPP) return WalkTable<BuildTable>(library, kBuildEntrySymbol);
   const std::string defect = WalkTable<AlidadeTable>(library, ALIDADE_ENTRY_SYMBOL);
   // The destructors of its statics run when the host ends; a crash is better found here.
   dlclose(library);
@@ -39,11 +39,11 @@ std::string Try(const std::filesystem::path& file, std::uint32_t tier) {
 
 }  // namespace
 
-std::string TrialLoad(const std::filesystem::path& file, std::uint32_t tier) {
+std::string TrialLoad(const std::filesystem::path& file, std::uint32_t kind) {
   const SharedJournal journal;
   const ChildEnd end = RunInChild({kTimeLimit_s, 0}, *journal, [&]() -> std::string {
     try {
-      return Try(file, tier);
+      return Try(file, kind);
     } catch (...) {
       return "threw an exception while loading";
     }

@@ -10,11 +10,11 @@
 namespace alidade::internal {
 
 const BuildTable& OpenBuildTier(const std::filesystem::path& file) {
-  const AlidadeFingerprint fingerprint = ReadFingerprint(file);
-  if (fingerprint.tier != ALIDADE_TIER_BUILD) Refuse(file, "holds models alone");
-  CheckBuild(fingerprint, file);
+  const AlidadeBuildTag build_tag = ReadBuildTag(file);
+  if (build_tag.kind != ALIDADE_PLUGIN_CPP) Refuse(file, "holds models alone");
+  CheckBuild(build_tag, file);
   CheckTrusted(file);
-  const std::string failure = TrialLoad(file, fingerprint.tier);
+  const std::string failure = TrialLoad(file, build_tag.kind);
   if (!failure.empty()) Refuse(file, failure);
   try {
     using boost::dll::load_mode::rtld_local;

@@ -14,14 +14,14 @@ struct BuildTable;
 
 struct PluginHost::Loaded {
   std::filesystem::path file;     ///< canonical
-  const AlidadeTable* table;      ///< sealed tier, else null
-  const BuildTable* build_table;  ///< build tier, else null
-  bool unoptimised;               ///< by its fingerprint
+  const AlidadeTable* table;      ///< of a C-ABI plugin, else null
+  const BuildTable* build_table;  ///< of a C++ plugin, else null
+  bool unoptimised;               ///< by its build tag
 };
 
 namespace internal {
 
-/// The build id that a build-tier plugin must have: that of this library.
+/// The build id that a C++ plugin must have: that of this library.
 const char* HostBuildId();
 
 [[noreturn]] inline void Refuse(const std::filesystem::path& file, const std::string& why) {
@@ -33,14 +33,14 @@ const char* HostBuildId();
 std::filesystem::path FolderOfProgram();
 
 /// Refuses a build that this host cannot run: fast-math, instructions that this processor lacks, a
-/// build-tier plugin of another build. Errors: kPlugin.
-void CheckBuild(const AlidadeFingerprint& fingerprint, const std::filesystem::path& file);
+/// C++ plugin of another build. Errors: kPlugin.
+void CheckBuild(const AlidadeBuildTag& build_tag, const std::filesystem::path& file);
 
 /// Opens the plugin in a child process, looks its entry up and walks its table. Returns "" or why
 /// that failed.
-std::string TrialLoad(const std::filesystem::path& file, std::uint32_t tier);
+std::string TrialLoad(const std::filesystem::path& file, std::uint32_t kind);
 
-/// Opens a build-tier plugin for the rest of the process, checked as PluginHost checks all.
+/// Opens a C++ plugin for the rest of the process, checked as PluginHost checks all.
 /// Errors: kPlugin, kNotTrusted.
 const BuildTable& OpenBuildTier(const std::filesystem::path& file);
 

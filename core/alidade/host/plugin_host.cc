@@ -141,18 +141,18 @@ void PluginHost::Load(const fs::path& file) {
     return other->file == canonical || fs::equivalent(other->file, canonical, error);
   };
   if (std::any_of(loaded_.begin(), loaded_.end(), same)) return;
-  const AlidadeFingerprint fingerprint = ReadFingerprint(canonical);
-  internal::CheckBuild(fingerprint, canonical);
+  const AlidadeBuildTag build_tag = ReadBuildTag(canonical);
+  internal::CheckBuild(build_tag, canonical);
   CheckTrusted(file);
-  const std::string failure = internal::TrialLoad(canonical, fingerprint.tier);
+  const std::string failure = internal::TrialLoad(canonical, build_tag.kind);
   if (!failure.empty()) Refuse(file, failure);
 
-  const bool unoptimised = (fingerprint.flags & ALIDADE_BUILT_UNOPTIMISED) != 0;
+  const bool unoptimised = (build_tag.flags & ALIDADE_BUILT_UNOPTIMISED) != 0;
   auto plugin = std::make_unique<Loaded>(Loaded{canonical, nullptr, nullptr, unoptimised});
   std::string defect;
   try {
     const boost::dll::shared_library& library = OpenForGood(canonical);
-    if (fingerprint.tier == ALIDADE_TIER_BUILD) {
+    if (build_tag.kind == ALIDADE_PLUGIN_CPP) {
       plugin->build_table = library.get<const BuildTable*()>(kBuildEntrySymbol)();
       defect = internal::Defect(plugin->build_table);
     } else {

@@ -67,7 +67,7 @@ struct Refusal {
 /// PluginHost::searched() and refusals().
 enum class OnRefusal { kThrow, kList };
 
-/// Finds, checks, loads and lends plugins. A file is opened only when its fingerprint, read from
+/// Finds, checks, loads and lends plugins. A file is opened only when its build tag, read from
 /// the bytes beforehand, fits, and nobody but root, the caller or the owner of the program could
 /// have written it. Plugins are never unloaded. Creation is safe from several threads.
 class PluginHost {
@@ -136,9 +136,9 @@ inline constexpr const char* kBuildOptimised =
 /// Every place searched and what was found there, and every file refused with the reason.
 std::string PluginPlaces(const PluginHost& host);
 
-/// The fingerprint in the `.alidade` section of an ELF file, read from its bytes, every offset
-/// checked. Errors: kPlugin (not ELF, truncated, malformed, no fingerprint, another ABI).
-AlidadeFingerprint ReadFingerprint(const std::filesystem::path& file);
+/// The build tag in the `.alidade` section of an ELF file, read from its bytes, every offset
+/// checked. Errors: kPlugin (not ELF, truncated, malformed, no build tag, another ABI).
+AlidadeBuildTag ReadBuildTag(const std::filesystem::path& file);
 
 /// Refuses a file that someone else could have written: not absolute; it, its folder or a folder
 /// above it owned by another than root, the caller or the owner of the running program; writable

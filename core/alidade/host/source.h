@@ -40,7 +40,7 @@ struct StreamInfo {
   double sigma = 0.0;  ///< of a truth: standard deviation of each element, in its tangent
 };
 
-/// Where measurements come from: a simulator, a file, a pipe. A build-tier plugin.
+/// Where measurements come from: a simulator, a file, a pipe. A C++ plugin.
 class Source {
  public:
   virtual ~Source() = default;

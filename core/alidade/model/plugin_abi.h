@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #pragma once
 
-/* The sealed boundary between alidade and a model plugin: plain C data, nothing else.
- * A plugin exports one function, `alidade_plugin`, that returns its table, and one fingerprint in
+/* The plugin ABI between alidade and a C-ABI plugin: plain C data, nothing else.
+ * A plugin exports one function, `alidade_plugin`, that returns its table, and one build tag in
  * the ELF section `.alidade`, which the host reads before it opens the file. Rules:
  *
  *   - every struct begins with its own size; the host reads only what the size covers and takes
@@ -25,7 +25,7 @@ extern "C" {
 #define ALIDADE_ABI_MINOR 1
 #define ALIDADE_MAGIC 0x4144494cu /* "LIDA" */
 #define ALIDADE_ENTRY_SYMBOL "alidade_plugin"
-#define ALIDADE_FINGERPRINT_SECTION ".alidade"
+#define ALIDADE_BUILD_TAG_SECTION ".alidade"
 
 /* What an evaluation returns. */
 enum {
@@ -35,25 +35,25 @@ enum {
   ALIDADE_ERROR = 3          /* the plugin failed (an exception was caught); see error_text */
 };
 
-enum { ALIDADE_TIER_SEALED = 1, ALIDADE_TIER_BUILD = 2 };
+enum { ALIDADE_PLUGIN_C_ABI = 1, ALIDADE_PLUGIN_CPP = 2 };
 
-/* Bits of AlidadeFingerprint.flags. */
+/* Bits of AlidadeBuildTag.flags. */
 enum { ALIDADE_BUILT_FAST_MATH = 1, ALIDADE_BUILT_DEBUG_STL = 2, ALIDADE_BUILT_UNOPTIMISED = 4 };
 
-/* Bits of AlidadeFingerprint.isa: what the code needs of the processor. */
+/* Bits of AlidadeBuildTag.isa: what the code needs of the processor. */
 enum { ALIDADE_ISA_AVX = 1, ALIDADE_ISA_AVX2 = 2, ALIDADE_ISA_FMA = 4, ALIDADE_ISA_AVX512F = 8 };
 
 /* Lies alone in the section `.alidade`. */
-typedef struct AlidadeFingerprint {
+typedef struct AlidadeBuildTag {
   char magic[8]; /* "ALIDADE" and a zero */
   uint32_t struct_size;
   uint16_t abi_major, abi_minor;
-  uint32_t tier, flags, isa;
+  uint32_t kind, flags, isa;
   uint32_t cplusplus; /* __cplusplus */
   char compiler[64];  /* __VERSION__ */
-  char build[160];    /* build tier: all that must equal the host's, else empty */
+  char build[160];    /* C++ plugin: all that must equal the host's, else empty */
   uint32_t reserved[8];
-} AlidadeFingerprint;
+} AlidadeBuildTag;
 
 enum {
   ALIDADE_VECTOR = 1,          /* ambient n, tangent n */
@@ -248,7 +248,7 @@ typedef struct AlidadeTable {
   uint16_t abi_major, abi_minor;
   uint32_t entry_stride, entry_count, reserved0;
   const AlidadeEntry* entries;
-  const AlidadeFingerprint* fingerprint;
+  const AlidadeBuildTag* build_tag;
   void* reserved[4];
 } AlidadeTable;
 

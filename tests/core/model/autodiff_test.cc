@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Dual numbers and thunks: what an author's model is behind the boundary.
+// Dual numbers and thunks: what an author's model is behind the plugin ABI.
 #include "alidade/model/autodiff.h"
 
 #include <gtest/gtest.h>

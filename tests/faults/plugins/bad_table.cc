@@ -15,13 +15,13 @@
 #define LANDMARK_FORM 10
 #define UNKNOWN_KIND 11
 
-ALIDADE_FINGERPRINT(ALIDADE_TIER_SEALED, "")
+ALIDADE_BUILD_TAG(ALIDADE_PLUGIN_C_ABI, "")
 
 #if BAD_TABLE != NO_ENTRY_SYMBOL
 extern "C" __attribute__((visibility("default"))) const AlidadeTable* alidade_plugin() {
   static AlidadeEntry entries[] = {ALIDADE_SENSOR(Probe, "probe", "", ""),
                                    ALIDADE_SENSOR(Probe, "other_probe", "", "")};
-  static AlidadeTable table = alidade::detail::Table(entries, &alidade_fingerprint);
+  static AlidadeTable table = alidade::detail::Table(entries, &alidade_build_tag);
   if (BAD_TABLE == MAGIC) table.magic = 0;
   if (BAD_TABLE == STRUCT_SIZE) table.struct_size = 8;
   if (BAD_TABLE == STRIDE) table.entry_stride = 3;

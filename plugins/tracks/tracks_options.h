@@ -10,7 +10,7 @@ namespace alidade {
 /// What source `tracks` gives of its files: the numbers, flags and choices of its config entry.
 struct TracksOptions {
   enum Measures { kPixel, kStereo, kDepth };
-  enum Odometry { kNone, kHeld, kMean };
+  enum Odometry { kNone, kZeroOrderHold, kMean };
   enum World { kFile, kFirstCamera };
 
   Measures measures;
@@ -34,9 +34,9 @@ struct TracksOptions {
                                 1 << 30, 0)),
         most(p.Integer("max_frames", "frames at most; 0: all", 0, 1 << 30, 0)),
         odometry(static_cast<Odometry>(
-            p.Choice("odometry", {"none", "held", "mean"},
+            p.Choice("odometry", {"none", "zero_order_hold", "mean"},
                      "a frame's odometry.csv: none, its row, or the mean with the next frame's row",
-                     kHeld))),
+                     kZeroOrderHold))),
         tolerance(StampFromSeconds(
             p.Number("truth_tolerance_s", "s",
                      "the true pose of a frame is at most so far off in time", {0.0, 1e3}, 1e-3))),

@@ -353,8 +353,8 @@ TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
     EXPECT_TRUE(Contains(info.out, part)) << part << '\n' << info.out;
   }
   const Outcome scale = Call({"plugins", "info", "scale_2d"});
-  EXPECT_TRUE(Contains(scale.out, "propagated | fixed")) << scale.out;
-  EXPECT_TRUE(Contains(scale.out, "noise_model = fixed")) << scale.out;
+  EXPECT_TRUE(Contains(scale.out, "propagated | constant")) << scale.out;
+  EXPECT_TRUE(Contains(scale.out, "noise_model = constant")) << scale.out;
 
   const Outcome ekf = Call({"plugins", "info", "ekf"});
   for (const char* part :

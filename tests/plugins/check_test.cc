@@ -293,7 +293,7 @@ TEST_F(CheckTest, ShippedModelsPass) {
       {"stereo_disparity", "{focal_px: 400, baseline_m: 0.065, sigma_px: 1}"},
       {"stereo_disparity", "{focal_px: 400, baseline_m: 0.065, sigma_px: 1, min_range_m: 0.3}"},
       {"scale_2d", "{template_px: 300, sigma_px: 1}"},
-      {"scale_2d", "{noise_model: fixed, sigma_inverse_scale: 0.1}"},
+      {"scale_2d", "{noise_model: constant, sigma_inverse_scale: 0.1}"},
       {"quaternion_pose", "{noise: {linear_acceleration: 0.6, angular_acceleration: [1, 2, 3]}}"},
       {"quaternion_pose",
        "{noise: {kind: discrete, linear_acceleration: 0.6, angular_acceleration: [1, 2, 3]}}"},

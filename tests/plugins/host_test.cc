@@ -312,10 +312,11 @@ TEST_F(HostTest, TheSchemaTellsWhatEachChoiceReads) {
   };
   const std::vector<ParamInfo> scale = schema("scale_2d");
   EXPECT_EQ(Param(scale, "noise_model").type, "choice");
-  EXPECT_EQ(Param(scale, "noise_model").choices, (std::vector<std::string>{"propagated", "fixed"}));
+  EXPECT_EQ(Param(scale, "noise_model").choices,
+            (std::vector<std::string>{"propagated", "constant"}));
   EXPECT_EQ(Param(scale, "noise_model").fallback, "propagated");
   EXPECT_EQ(Param(scale, "noise_model").when, "");
-  EXPECT_EQ(Param(scale, "sigma_inverse_scale").when, "noise_model = fixed");
+  EXPECT_EQ(Param(scale, "sigma_inverse_scale").when, "noise_model = constant");
   EXPECT_EQ(Param(scale, "sigma_px").when, "noise_model = propagated");
   EXPECT_EQ(Param(scale, "sigma_px").range, "> 0");
   EXPECT_EQ(Param(scale, "sigma_px").unit, "px");

@@ -37,7 +37,7 @@ TEST(Scale2d, PredictsWorkedNumbers) {
   EXPECT_DOUBLE_EQ(sigma, 0.0225);
 }
 
-TEST(Scale2d, NoiseMayBeFixed) {
+TEST(Scale2d, NoiseMayBeConstant) {
   const SensorModel scale =
       MakeSensor<Scale2d>({{"noise_model", {1}}, {"sigma_inverse_scale", {0.02}}});
   double s = 1.5, sigma = kPoison;

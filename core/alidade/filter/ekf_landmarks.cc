@@ -85,8 +85,8 @@ void Ekf::Landmarks::AddKnown() {
     Landmark& landmark = map_.landmarks[known.id];
     landmark.form = internal::XyzForm();
     landmark.known = true;
-    landmark.blocks = {Declare(known.id, Xyz(),
-                               known.sigma > 0.0 ? BlockStatus::kEstimated : BlockStatus::kFixed)};
+    landmark.blocks = {Declare(
+        known.id, Xyz(), known.sigma > 0.0 ? BlockStatus::kEstimated : BlockStatus::kConstant)};
     ekf_.state_.Add(landmark.blocks[0], known.position.data(),
                     known.sigma * known.sigma * Eigen::Matrix3d::Identity());
   }
@@ -164,7 +164,7 @@ void Ekf::Landmarks::Plan(Row& row, const Landmark& landmark) {
     plan.columns.push_back(block.has_covariance() ? plan.width : -1);
     if (!block.has_covariance()) continue;
     plan.parts.push_back({block.tangent_offset, block.geometry().tangent, plan.width});
-    plan.considered.push_back(false);
+    plan.consider.push_back(false);
     plan.width += block.geometry().tangent;
   }
   plan.strides.assign(plan.roles.size(), plan.width);

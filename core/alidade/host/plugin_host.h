@@ -31,7 +31,7 @@ struct ParamInfo {
   std::string range;                 ///< `> 0`, `[1, 3]`, or "" where everything is allowed
   std::string fallback;              ///< the default as text, "" where the key is required
   std::vector<std::string> choices;  ///< of a choice
-  std::string when;  ///< `noise_model = fixed` where only that choice reads it, else ""
+  std::string when;  ///< `noise_model = constant` where only that choice reads it, else ""
 };
 
 /// How the estimates of an estimator rest on the measurements, by which a comparison knows what it

@@ -40,7 +40,7 @@ Trajectory StartNearPrior(const System& system) {
       nudge[i] = size * (1.0 + 0.1 * static_cast<double>((prior.block + 3 * i) % 7));
     }
     geometry.Plus(value.data(), nudge.data(), value.data());
-    if (block.status == BlockStatus::kFixed) continue;
+    if (block.status == BlockStatus::kConstant) continue;
     t.columns[static_cast<std::size_t>(prior.block)] = static_cast<int>(t.names.size());
     const std::vector<std::string> names = ColumnNames(block.name, block.space);
     for (int i = 0; i < geometry.tangent; ++i) {
@@ -165,7 +165,7 @@ void Observe(const System& system, const Trajectory& t, const Eigen::MatrixXd& p
     Eigen::MatrixXd seen = Eigen::MatrixXd::Zero(m, phi.cols());
     for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
       const RoleBinding& role = sensor.roles[i];
-      if (role.block < 0 || role.mode == RoleMode::kHold) continue;
+      if (role.block < 0 || role.mode == RoleMode::kKnown) continue;
       const int column = t.columns[static_cast<std::size_t>(role.block)];
       if (column >= 0) seen += j[i] * phi.middleRows(column, j[i].cols());
     }
@@ -233,7 +233,7 @@ void Reduce(Eigen::MatrixXd& basis) {
 bool internal::ObservabilityIsTold(const System& system) {
   int size = 0;
   for (const Block& block : system.layout.blocks()) {
-    if (block.status != BlockStatus::kFixed) size += block.geometry().tangent;
+    if (block.status != BlockStatus::kConstant) size += block.geometry().tangent;
   }
   return size <= internal::kMostObserved;
 }

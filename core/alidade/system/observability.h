@@ -9,7 +9,7 @@ namespace alidade::internal {
 /// their number cubed.
 inline constexpr int kMostObserved = 500;
 
-/// Whether the estimated and considered blocks have at most kMostObserved elements; where not,
+/// Whether the estimated and consider blocks have at most kMostObserved elements; where not,
 /// UnobservableDirections gives none.
 bool ObservabilityIsTold(const System& system);
 

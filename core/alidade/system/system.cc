@@ -100,7 +100,7 @@ void ReadPrior(const Node& initial, const Block& block, BlockId id, System& syst
     prior.from = from->Text();
   } else {
     prior.mean = ReadMean(initial.At("mean", "the initial value"), block.geometry());
-    if (block.status != BlockStatus::kFixed) {
+    if (block.status != BlockStatus::kConstant) {
       prior.covariance = ReadCovariance(initial, block.geometry().tangent);
     } else {
       for (const char* key : {"sigma", "covariance"}) initial.Declare(key);
@@ -139,20 +139,21 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
   binding.input = ReadInput(entry, binding.model);
   const std::vector<std::string> names = ReadBlockNames(entry, binding.model);
   const auto considered = ReadNames(entry, "consider", names);
-  const auto fixed = ReadNames(entry, "fixed", names);
-  for (const std::string& both : fixed) {
+  const auto constant = ReadNames(entry, "constant", names);
+  for (const std::string& both : constant) {
     if (!Contains(considered, both)) continue;
-    entry.At("fixed").Fail("block '" + both + "' is in `consider` too",
-                           "a block in one of them: fixed is known, considered is uncertain");
+    entry.At("constant")
+        .Fail("block '" + both + "' is in `consider` too",
+              "a block in one of them: a constant is exact, a consider state uncertain");
   }
   const Node initial = entry.At("initial", "the state entry '" + name + "'");
   const std::vector<Space>& spaces = binding.model.blocks();
   for (std::size_t i = 0; i < names.size(); ++i) {
     const bool known = (spaces[i].flags & ALIDADE_ROLE_OWNED) != 0 && !initial.Find(names[i]) &&
                        !Contains(considered, names[i]);
-    const BlockStatus status = known || Contains(fixed, names[i]) ? BlockStatus::kFixed
-                               : Contains(considered, names[i])   ? BlockStatus::kConsidered
-                                                                  : BlockStatus::kEstimated;
+    const BlockStatus status = known || Contains(constant, names[i]) ? BlockStatus::kConstant
+                               : Contains(considered, names[i])      ? BlockStatus::kConsider
+                                                                     : BlockStatus::kEstimated;
     const BlockId id = system.layout.Declare(name + "." + names[i], name, spaces[i], status);
     binding.blocks.push_back(id);
     if (known) {
@@ -187,7 +188,7 @@ RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& mod
   } else {
     binding.block = FindBlock(node.At("block", "a role"), system);
     if (const auto mode = node.Find("mode")) {
-      binding.mode = static_cast<RoleMode>(mode->Choice({"estimate", "consider", "hold"}));
+      binding.mode = static_cast<RoleMode>(mode->Choice({"estimate", "consider", "known"}));
     }
     if (const auto at = node.Find("jacobian_at")) {
       binding.jacobian_at = static_cast<RoleJacobianAt>(at->Choice({"prediction", "measurement"}));

@@ -20,7 +20,7 @@ namespace alidade {
 
 /// What an update does with the block in a role: correct it; let its uncertainty count but leave it
 /// (Schmidt); take its value as exact (its Jacobian is zero).
-enum class RoleMode { kEstimate, kConsider, kHold };
+enum class RoleMode { kEstimate, kConsider, kKnown };
 
 /// Where a sensor's Jacobian is taken for the value of a role: the prediction, or the value the
 /// measurement itself implies (Initialise of that role).

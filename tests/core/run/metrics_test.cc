@@ -190,7 +190,7 @@ TEST(Metrics, PrefersTheFullName) {
 
 TEST(Metrics, LeavesOutBlocksWithoutValueOrCovariance) {
   StateLayout layout = Scalars({"a.waits"});
-  layout.Declare("a.fixed", "a", SpaceOf("fixed", "", Geometry::Vector(1)), BlockStatus::kFixed);
+  layout.Declare("a.fixed", "a", SpaceOf("fixed", "", Geometry::Vector(1)), BlockStatus::kConstant);
   MetricsOf one(layout, {{"waits", 1}, {"fixed", 1}});
   const double zero = 0.0;
   one.state().Add(1, &zero, Eigen::MatrixXd());
@@ -248,7 +248,7 @@ TEST(Metrics, BoundsOfTheNeesAreWideWhereErrorsStay) {
 
 TEST(Metrics, NeesIsOfEstimatedBlocksAlone) {
   StateLayout layout = Scalars({"a.x"});
-  layout.Declare("a.y", "a", SpaceOf("y", "m", Geometry::Vector(1)), BlockStatus::kConsidered);
+  layout.Declare("a.y", "a", SpaceOf("y", "m", Geometry::Vector(1)), BlockStatus::kConsider);
   MetricsOf one(layout, {{"x", 1}, {"y", 1}});
   const double zero = 0.0;
   one.state().Add(0, &zero, Eigen::MatrixXd::Constant(1, 1, 4.0));

@@ -111,7 +111,7 @@ struct HandMade {
     StateLayout& layout = named.system.layout;
     const Space scalar{"x", "m", "", {""}, Geometry::Vector(1)};
     layout.Declare("a.waits", "a", scalar);
-    layout.Declare("a.fixed", "a", scalar, BlockStatus::kFixed);
+    layout.Declare("a.fixed", "a", scalar, BlockStatus::kConstant);
     layout.Declare("a.attitude", "a",
                    {"q", "rad", "", {"w", "x", "y", "z"}, Geometry::UnitQuaternion()});
     testing::AddSensor(named.system, "disparity",

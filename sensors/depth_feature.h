@@ -17,7 +17,7 @@ namespace alidade {
 ///   u, v       2      px      -      the pixel
 ///   d          1      m       cam    depth along the optical axis
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_cam) of the camera
-///   a, m, rho  form   -       world  the landmark, p = a + m / rho
+///   a, m, rho  -      -       world  the landmark, p = a + m / rho, by its representation
 ///   K          -      -       cam    projection with distortion, see alidade/model/camera.h
 ///   sigma      1      px      -      standard deviation of u and of v; > 0
 ///   s0, s2     1      m, 1/m  -      standard deviation of d: a constant part, > 0, and one that
@@ -26,8 +26,8 @@ namespace alidade {
 /// Defined for  h within the lens, and hz > 0, rho > 0; else out_of_domain, outputs untouched.
 /// Valid for    pixels on the image, and d > 0; else the measurement is invalid.
 /// Source       [MonoSlam2015] sec. 2.1; noise [Khoshelham2012].
-template <class Form>
-struct DepthFeature : LandmarkSensor<DepthFeature<Form>, Vec<3>, Form> {
+template <class Representation>
+struct DepthFeature : LandmarkSensor<DepthFeature<Representation>, Vec<3>, Representation> {
   static constexpr Quantity kMeasurement{
       "pixel_and_depth", "", "where the landmark is seen, px, and its depth, m", "u,v,depth"};
 
@@ -65,7 +65,8 @@ struct DepthFeature : LandmarkSensor<DepthFeature<Form>, Vec<3>, Form> {
     T h[3];
     if (!(z[2] > T(0.0)) || !camera.Unproject(z, h) || !(h[2] > T(0.0))) return false;
     const T length = sqrt(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]);
-    return PlaceLandmark<Form>(position, orientation, h, T(h[2] / (z[2] * length)), landmark);
+    return PlaceLandmark<Representation>(position, orientation, h, T(h[2] / (z[2] * length)),
+                                         landmark);
   }
 };
 

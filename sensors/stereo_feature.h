@@ -17,7 +17,7 @@ namespace alidade {
 ///   symbol     shape  unit    frame  meaning
 ///   u, v       2      px      left   pixel of the left camera; likewise right
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_left)
-///   a, m, rho  form   -       world  the landmark, p = a + m / rho
+///   a, m, rho  -      -       world  the landmark, p = a + m / rho, by its representation
 ///   fx..cy     1      px      -      of both cameras, which have no distortion
 ///   B          1      m       -      baseline: the right camera is at +x of the left one; > 0
 ///   sigma      1      px      -      standard deviation of each coordinate; > 0
@@ -25,8 +25,8 @@ namespace alidade {
 /// Defined for  hz > 0; else out_of_domain, outputs untouched.
 /// Valid for    pixels on the images, and d > 0; else the measurement is invalid.
 /// Source       [MonoSlam2015] sec. 2.2; stereo [Ekf2017] sec. 1.2.
-template <class Form>
-struct StereoFeature : LandmarkSensor<StereoFeature<Form>, Vec<4>, Form> {
+template <class Representation>
+struct StereoFeature : LandmarkSensor<StereoFeature<Representation>, Vec<4>, Representation> {
   static constexpr Quantity kMeasurement{"pixels", "px", "where the landmark is seen",
                                          "u,v,u_right,v_right"};
 
@@ -66,7 +66,7 @@ struct StereoFeature : LandmarkSensor<StereoFeature<Form>, Vec<4>, Form> {
     if (!(disparity > T(0.0)) || !camera.Unproject(mean, h)) return false;
     const T length = sqrt(h[0] * h[0] + h[1] * h[1] + 1.0);  // of h, whose depth is 1
     const T rho = disparity / (camera.fx * baseline_m * length);
-    return PlaceLandmark<Form>(position, orientation, h, rho, landmark);
+    return PlaceLandmark<Representation>(position, orientation, h, rho, landmark);
   }
 };
 

@@ -181,7 +181,8 @@ TEST_F(HostTest, ABadTableIsRefused) {
       {"NO_CREATE", "entry 1 of its table cannot be created"},
       {"NAME_TWICE", "names 'probe' twice"},
       {"NO_ENTRY_SYMBOL", "does not export alidade_plugin"},
-      {"LANDMARK_FORM", "entry 1 of its table is a landmark form, which this version"},
+      {"LANDMARK_REPRESENTATION",
+       "entry 1 of its table is a landmark representation, which this version"},
       {"UNKNOWN_KIND", "entry 1 of its table is of unknown kind 9"},
       {"EMPTY", "table has 0 entries"}};
   for (const auto& [fault, words] : faults) {

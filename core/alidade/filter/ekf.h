@@ -105,7 +105,7 @@ class Ekf : public Estimator {
     double weight = 1.0;                 ///< w of the robust loss; R is divided by it
     const SensorPlan* zeroed = nullptr;  ///< whose zeros H holds
     SensorPlan* plan = nullptr;          ///< of the landmark that it measures; null: the sensor's
-    const SensorModel* model = nullptr;  ///< of the landmark's form; null: the sensor's
+    const SensorModel* model = nullptr;  ///< of the landmark's representation; null: the sensor's
   };
 
   /// Moves state and covariance by dt_s; false, and GiveUp called, where that cannot be.

@@ -54,7 +54,7 @@ Ekf::Landmarks::Landmarks(Ekf& ekf) : ekf_(ekf), options_(*ekf.system_.landmarks
   for (const SensorBinding& sensor : ekf_.system_.sensors) {
     Family& family = families_.emplace_back();
     const std::vector<Space>& roles = sensor.model.roles();
-    family.form = FormOf(roles);
+    family.representation = RepresentationOf(roles);
     for (std::size_t i = 0; i < roles.size(); ++i) {
       if (roles[i].name == "position") family.position = static_cast<int>(i);
       ALIDADE_EXPECTS(roles[i].landmark() || family.first < 0);
@@ -66,7 +66,8 @@ Ekf::Landmarks::Landmarks(Ekf& ekf) : ekf_(ekf), options_(*ekf.system_.landmarks
                     (options_.prior && std::isfinite(options_.prior->inverse_distance) &&
                      options_.prior->sigma >= 0.0));
     ALIDADE_EXPECTS(family.first < 0 || sensor.model.prior_size() <= 1);
-    ALIDADE_EXPECTS(family.first < 0 || family.form == internal::XyzForm() || sensor.xyz ||
+    ALIDADE_EXPECTS(family.first < 0 || family.representation == internal::XyzRepresentation() ||
+                    sensor.xyz ||
                     (options_.known.empty() && !(options_.max_linearity_index > 0.0)));
     const int dof = sensor.model.measurement().geometry.tangent;
     const OnePointRansac ransac = sensor.outlier_rejection.value_or(OnePointRansac{});
@@ -83,7 +84,7 @@ BlockId Ekf::Landmarks::Declare(std::int64_t id, const Space& role, BlockStatus 
 void Ekf::Landmarks::AddKnown() {
   for (const KnownLandmark& known : options_.known) {
     Landmark& landmark = map_.landmarks[known.id];
-    landmark.form = internal::XyzForm();
+    landmark.representation = internal::XyzRepresentation();
     landmark.known = true;
     landmark.blocks = {Declare(
         known.id, Xyz(), known.sigma > 0.0 ? BlockStatus::kEstimated : BlockStatus::kConstant)};
@@ -99,7 +100,7 @@ std::vector<const double*> Ekf::Landmarks::ValuesOf(const Landmark& landmark) co
 }
 
 bool Ekf::Landmarks::HasInverseDistance(const Landmark& landmark) const {
-  return landmark.in_state() && landmark.form && !IsXyz(*landmark.form);
+  return landmark.in_state() && landmark.representation && !IsXyz(*landmark.representation);
 }
 
 /// The last element of all that has one.
@@ -169,7 +170,7 @@ void Ekf::Landmarks::Plan(Row& row, const Landmark& landmark) {
   }
   plan.strides.assign(plan.roles.size(), plan.width);
   row.plan = &plan;
-  row.model = landmark.form == family.form ? nullptr : &*sensor.xyz;
+  row.model = landmark.representation == family.representation ? nullptr : &*sensor.xyz;
   row.zeroed = nullptr;
 }
 
@@ -276,9 +277,9 @@ bool Ekf::Landmarks::ConvertToXyz(std::int64_t id, Landmark& landmark, const Fam
   const double* const camera = CameraOf(family);
   if (!HasInverseDistance(landmark) || camera == nullptr) return false;
   const std::vector<const double*> values = ValuesOf(landmark);
-  const double linearity =
-      internal::LinearityOf(*landmark.form, values.data(), InverseDistanceSigma(landmark), camera);
-  const auto point = internal::PointOf(*landmark.form, values.data());
+  const double linearity = internal::LinearityOf(*landmark.representation, values.data(),
+                                                 InverseDistanceSigma(landmark), camera);
+  const auto point = internal::PointOf(*landmark.representation, values.data());
   if (!point || !(linearity < options_.max_linearity_index)) return false;
   std::vector<Eigen::MatrixXd> jacobians;
   Eigen::Index column = 0;
@@ -292,7 +293,7 @@ bool Ekf::Landmarks::ConvertToXyz(std::int64_t id, Landmark& landmark, const Fam
                          Eigen::Matrix3d::Zero());
   DropBlocks(landmark);
   landmark.blocks = {to};
-  landmark.form = internal::XyzForm();
+  landmark.representation = internal::XyzRepresentation();
   return true;
 }
 
@@ -351,14 +352,14 @@ double Ekf::Landmarks::PriorInverseDistance(std::span<const Row* const> measured
     constexpr double kConverged = 0.1;  // of the index of linearity, where nothing is converted
     const double limit =
         options_.max_linearity_index > 0.0 ? options_.max_linearity_index : kConverged;
-    if (camera == nullptr || !landmark.form) continue;
+    if (camera == nullptr || !landmark.representation) continue;
     const std::vector<const double*> values = ValuesOf(landmark);
     if (HasInverseDistance(landmark) &&
-        !(internal::LinearityOf(*landmark.form, values.data(), InverseDistanceSigma(landmark),
-                                camera) < limit)) {
+        !(internal::LinearityOf(*landmark.representation, values.data(),
+                                InverseDistanceSigma(landmark), camera) < limit)) {
       continue;
     }
-    const auto point = internal::PointOf(*landmark.form, values.data());
+    const auto point = internal::PointOf(*landmark.representation, values.data());
     const Eigen::Map<const Eigen::Vector3d> r(camera);
     if (point) converged.push_back(1.0 / (point->position - r).norm());
   }

@@ -15,7 +15,7 @@ namespace alidade {
 /// What passes from frame to frame beside the blocks of the state.
 struct LandmarkMap {
   struct Landmark {
-    std::optional<LandmarkForm> form;
+    std::optional<LandmarkRepresentation> representation;
     std::vector<BlockId> blocks;  ///< by landmark role; empty: seen, but not in the state yet
     int generation = 0, observations = 0, tried = 0, accepted = 0;
     std::int64_t seen = 0;  ///< the last frame that measured it
@@ -79,7 +79,7 @@ class Ekf::Landmarks {
   struct Family {
     int first = -1;     ///< of its landmark roles, which come last; -1: it sees none
     int position = -1;  ///< its role `position`, the camera's in the world
-    std::optional<LandmarkForm> form;
+    std::optional<LandmarkRepresentation> representation;
     std::vector<Space> roles;               ///< the landmark's
     std::map<std::size_t, BlockId> shared;  ///< by landmark role: blocks of this frame
   };

@@ -40,7 +40,7 @@ Outcome Ekf::Landmarks::Initialise(std::int64_t id, Row& row, Landmark& landmark
   std::vector<Eigen::MatrixXd> jacobians;
   for (const Eigen::MatrixXd& j : inverse.jacobians) jacobians.emplace_back(j(kept, Eigen::all));
   ekf_.state_.Initialise(fresh, values.data(), inverse.from, jacobians, inverse.own(kept, kept));
-  landmark.form = family.form;
+  landmark.representation = family.representation;
   moved_ = true;
   return Outcome::kInitialised;
 }
@@ -52,7 +52,7 @@ std::vector<LandmarkEstimate> Ekf::Landmarks::Estimates() const {
     LandmarkEstimate& one = estimates.emplace_back();
     one.id = id;
     one.generation = landmark.generation;
-    one.form = landmark.form;
+    one.representation = landmark.representation;
     one.first = landmark.first;
     one.last = landmark.last;
     one.tried = landmark.tried;
@@ -61,8 +61,8 @@ std::vector<LandmarkEstimate> Ekf::Landmarks::Estimates() const {
       one.inverse_distance = InverseDistance(landmark);
       one.sigma = InverseDistanceSigma(landmark);
     }
-    if (!landmark.form) continue;
-    const auto point = internal::PointOf(*landmark.form, ValuesOf(landmark).data());
+    if (!landmark.representation) continue;
+    const auto point = internal::PointOf(*landmark.representation, ValuesOf(landmark).data());
     if (!point) continue;
     one.position = point->position;
     one.covariance = CovarianceOf(landmark, point->jacobian);

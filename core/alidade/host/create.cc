@@ -152,9 +152,9 @@ const EstimatorEntry& PluginHost::EstimatorOf(const PluginEntry& entry) const {
 }
 
 std::shared_ptr<const ModelInstance> PluginHost::Create(const PluginEntry& entry, const Node& node,
-                                                        const std::string& form) const {
+                                                        const std::string& representation) const {
   const AlidadeEntry c = EntryOf(entry);
-  ParamReader reader(node, Named(entry.kind, entry.name), form);
+  ParamReader reader(node, Named(entry.kind, entry.name), representation);
   NewInstance instance;
   std::int32_t code;
   {
@@ -172,8 +172,8 @@ std::shared_ptr<const ModelInstance> PluginHost::Create(const PluginEntry& entry
 }
 
 SensorModel PluginHost::CreateSensor(const std::string& name, const Node& entry,
-                                     const std::string& form) const {
-  return SensorModel(Create(Find(PluginEntry::Kind::kSensor, name, entry), entry, form));
+                                     const std::string& representation) const {
+  return SensorModel(Create(Find(PluginEntry::Kind::kSensor, name, entry), entry, representation));
 }
 
 MotionModel PluginHost::CreateMotion(const std::string& name, const Node& entry) const {

@@ -80,15 +80,15 @@ class PluginHost {
   ~PluginHost();
 
   /// A model from its config entry: reads its parameters there, leaving unread keys to
-  /// Node::RejectUnread. `form` stands for the parameter `landmarks.representation` of a sensor
-  /// that has this choice; "": as it is written. Errors: kPlugin with the places searched,
+  /// Node::RejectUnread. `representation` stands for the parameter `landmarks.representation` of a
+  /// sensor that has this choice; "": as it is written. Errors: kPlugin with the places searched,
   /// kBadConfig.
   SensorModel CreateSensor(const std::string& name, const Node& entry,
-                           const std::string& form = {}) const;
+                           const std::string& representation = {}) const;
   MotionModel CreateMotion(const std::string& name, const Node& entry) const;
   /// The model `entry` of entries(), also where another plugin offers its name.
   std::shared_ptr<const ModelInstance> Create(const PluginEntry& entry, const Node& node,
-                                              const std::string& form = {}) const;
+                                              const std::string& representation = {}) const;
   /// `any_order` as in SourceArguments.
   std::unique_ptr<Source> CreateSource(const std::string& name, const Node& entry,
                                        std::uint64_t seed, const std::filesystem::path& folder,

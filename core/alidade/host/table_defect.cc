@@ -30,8 +30,8 @@ std::string EntryDefect(const AlidadeEntry& entry, std::uint32_t stride) {
     return "states a size of " + Number(entry.struct_size) + " bytes";
   }
   if (!GoodName(entry.name)) return "has no name";
-  if (entry.kind == ALIDADE_KIND_LANDMARK_FORM) {
-    return "is a landmark form, which this version does not support";
+  if (entry.kind == ALIDADE_KIND_LANDMARK_REPRESENTATION) {
+    return "is a landmark representation, which this version does not support";
   }
   if (entry.kind != ALIDADE_KIND_SENSOR && entry.kind != ALIDADE_KIND_MOTION) {
     return "is of unknown kind " + Number(entry.kind);

@@ -128,7 +128,7 @@ typedef struct AlidadeHost {
 
 /* ---- models ---------------------------------------------------------------------------------- */
 
-enum { ALIDADE_KIND_SENSOR = 1, ALIDADE_KIND_MOTION = 2, ALIDADE_KIND_LANDMARK_FORM = 3 };
+enum { ALIDADE_KIND_SENSOR = 1, ALIDADE_KIND_MOTION = 2, ALIDADE_KIND_LANDMARK_REPRESENTATION = 3 };
 
 /* Bits of AlidadeDescription.capabilities. */
 enum {
@@ -195,8 +195,8 @@ typedef struct AlidadeMotion {
   void* reserved[4];
 } AlidadeMotion;
 
-/* A landmark form: how a point of the world is written in the state. */
-typedef struct AlidadeLandmarkForm {
+/* A landmark representation: how a point of the world is written in the state. */
+typedef struct AlidadeLandmarkRepresentation {
   uint32_t struct_size, reserved0;
   /* Blocks of a landmark from camera position, orientation, bearing and prior. */
   int32_t (*initialise)(const void* self, const double* const* roles, const double* z,
@@ -210,7 +210,7 @@ typedef struct AlidadeLandmarkForm {
   int32_t (*linearity)(const void* self, const double* const* blocks, const double* camera,
                        double sigma, double* index);
   void* reserved[4];
-} AlidadeLandmarkForm;
+} AlidadeLandmarkRepresentation;
 
 /* One created model. The host zeroes it and sets struct_size; `create` fills it. */
 typedef struct AlidadeInstance {
@@ -221,7 +221,7 @@ typedef struct AlidadeInstance {
   const AlidadeDescription* description;       /* lives as long as self */
   const AlidadeSensor* sensor;                 /* the one that fits `kind`, others null */
   const AlidadeMotion* motion;
-  const AlidadeLandmarkForm* form;
+  const AlidadeLandmarkRepresentation* form;
   void* reserved[4];
 } AlidadeInstance;
 

@@ -6,8 +6,8 @@
 
 #include "alidade/system/landmark_form.h"
 
-/// The forms of alidade/model/landmark.h, chosen at run time. `blocks` are the values of the blocks
-/// of a landmark, in the order of its roles.
+/// The representations of alidade/model/landmark.h, chosen at run time. `blocks` are the values of
+/// the blocks of a landmark, in the order of its roles.
 namespace alidade::internal {
 
 struct LandmarkPoint {
@@ -16,14 +16,15 @@ struct LandmarkPoint {
 };
 
 /// The landmark as xyz; none unless its inverse distance is above 0.
-std::optional<LandmarkPoint> PointOf(LandmarkForm form, const double* const* blocks);
+std::optional<LandmarkPoint> PointOf(LandmarkRepresentation representation,
+                                     const double* const* blocks);
 
-/// The form of landmarks that have converged.
-LandmarkForm XyzForm();
+/// The representation of landmarks that have converged.
+LandmarkRepresentation XyzRepresentation();
 
 /// Its index of linearity, as seen from `camera` in the world, m; `sigma` is that of the inverse
 /// distance.
-double LinearityOf(LandmarkForm form, const double* const* blocks, double sigma,
+double LinearityOf(LandmarkRepresentation representation, const double* const* blocks, double sigma,
                    const double* camera);
 
 }  // namespace alidade::internal

@@ -76,7 +76,7 @@ struct OnePointRansac {
 struct LandmarkEstimate {
   std::int64_t id = 0;
   int generation = 0;  ///< landmarks of this id before it
-  std::optional<LandmarkForm> form;
+  std::optional<LandmarkRepresentation> representation;
   Eigen::Vector3d position = Eigen::Vector3d::Constant(std::nan(""));       ///< in the world, m
   Eigen::Vector3d true_position = Eigen::Vector3d::Constant(std::nan(""));  ///< where known, m
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Constant(std::nan(""));

@@ -14,9 +14,9 @@ namespace {
 constexpr double kPlaces[][3] = {{-0.2, 0.1, 1.0},   {0.23, -0.07, 1.3}, {0.1, 0.15, 0.8},
                                  {-0.1, -0.12, 1.6}, {0.02, 0.05, 2.1},  {0.17, 0.11, 1.15}};
 
-/// The sensor's model for landmarks of the form xyz; null where it has none.
+/// The sensor's model for landmarks of the representation xyz; null where it has none.
 const SensorModel* XyzModel(const SensorBinding& sensor) {
-  if (FormOf(sensor.model.roles()) == internal::XyzForm()) return &sensor.model;
+  if (RepresentationOf(sensor.model.roles()) == internal::XyzRepresentation()) return &sensor.model;
   return sensor.xyz ? &*sensor.xyz : nullptr;
 }
 

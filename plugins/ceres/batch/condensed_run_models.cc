@@ -164,7 +164,7 @@ bool Trajectory::Initialise(const FirstValue& first, const Factor& factor, const
   return true;
 }
 
-/// Known landmarks are points, whatever the form of the others.
+/// Known landmarks are points, whatever the representation of the others.
 const SensorModel& Trajectory::ModelOf(const Factor& factor) const {
   const SensorBinding& sensor = SensorOf(factor);
   const bool known =

@@ -14,8 +14,8 @@ namespace alidade::ceres_batch {
 /// Values side by side in one parameter block, each moved as its geometry says, or constant.
 ///
 ///   x (+) d           of each part by Geometry::Plus
-///   d(x (+) d)/dd  := [I; 0] of each part, its tangent into the first rows; of a constant part none
-///
+///   d(x (+) d)/dd  := [I; 0] of each part, its tangent into the first rows; none of a constant
+//part /
 /// That is not the derivative by the ambient values, which no model of alidade gives, but its
 /// counterpart: a cost writes [J | 0], J in the tangent, and Ceres forms [J | 0] [I; 0] = J. Only
 /// costs that do so, as SensorCost, may share a block with it; Ceres' own QuaternionManifold is

@@ -138,8 +138,8 @@ TEST(OnePointRansac, RescuesByItsOwnThreshold) {
   EXPECT_EQ(rescued[1], 0);
 }
 
-// No match moves a camera that is a consider state, so none explains 0.05 m, 25 times the noise. All
-// join afterwards, by the uncertainty of the camera.
+// No match moves a camera that is a consider state, so none explains 0.05 m, 25 times the noise.
+// All join afterwards, by the uncertainty of the camera.
 TEST(OnePointRansac, AHypothesisDoesNotMoveWhatIsConsidered) {
   const Frame frame = Matches({0.05, -0.03, 0.0}, 1000, 0.0);
   for (const bool by_role : {false, true}) {

@@ -15,7 +15,9 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-bool IsPoint(const LandmarkEstimate& landmark) { return landmark.form && IsXyz(*landmark.form); }
+bool IsPoint(const LandmarkEstimate& landmark) {
+  return landmark.representation && IsXyz(*landmark.representation);
+}
 
 std::vector<double> Vector(const Vector3d& v) { return {v[0], v[1], v[2]}; }
 
@@ -235,7 +237,7 @@ TEST(Landmarks, BecomeXyzOnceTheyAreLinear) {
       EXPECT_LT((before[i].covariance - after[i].covariance).norm(), 1e-9);
     }
     EXPECT_EQ(std::ranges::count_if(after, IsPoint), converted + kKnown);
-    // And it goes on: pixels of landmarks of both forms in one update.
+    // And it goes on: pixels of landmarks of both representations in one update.
     for (; k < kSteps; ++k) {
       for (const auto& entry : ekf.Process(frame_at(k)).measurements()) {
         EXPECT_EQ(entry.outcome, Outcome::kAccepted);

@@ -148,7 +148,8 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
          h.instance.motion = &kNoStep;
        }},
       {"lacks the functions of its kind", [](HandWritten& h) { h.instance.sensor = nullptr; }},
-      {"is of kind 3", [](HandWritten& h) { h.instance.kind = ALIDADE_KIND_LANDMARK_FORM; }},
+      {"is of kind 3",
+       [](HandWritten& h) { h.instance.kind = ALIDADE_KIND_LANDMARK_REPRESENTATION; }},
   };
   for (const Spoiled& test : cases) {
     HandWritten hand;

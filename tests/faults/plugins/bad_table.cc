@@ -12,7 +12,7 @@
 #define NAME_TWICE 7
 #define NO_ENTRY_SYMBOL 8
 #define EMPTY 9
-#define LANDMARK_FORM 10
+#define LANDMARK_REPRESENTATION 10
 #define UNKNOWN_KIND 11
 
 ALIDADE_BUILD_TAG(ALIDADE_PLUGIN_C_ABI, "")
@@ -28,7 +28,7 @@ extern "C" __attribute__((visibility("default"))) const AlidadeTable* alidade_pl
   if (BAD_TABLE == NULL_NAME) entries[1].name = nullptr;
   if (BAD_TABLE == NO_CREATE) entries[1].create = nullptr;
   if (BAD_TABLE == NAME_TWICE) entries[1].name = "probe";
-  if (BAD_TABLE == LANDMARK_FORM) entries[1].kind = ALIDADE_KIND_LANDMARK_FORM;
+  if (BAD_TABLE == LANDMARK_REPRESENTATION) entries[1].kind = ALIDADE_KIND_LANDMARK_REPRESENTATION;
   if (BAD_TABLE == UNKNOWN_KIND) entries[1].kind = 9;
   if (BAD_TABLE == EMPTY) table.entry_count = 0;
   return BAD_TABLE == NULL_TABLE ? nullptr : &table;

@@ -11,8 +11,9 @@ std::vector<TextRow> LandmarkRows(const System& system) {
   const LandmarkOptions& options = *system.landmarks;
   const auto sees = [](const SensorBinding& sensor) { return sensor.model.has_landmark(); };
   const auto sensor = std::ranges::find_if(system.sensors, sees);
-  const auto form = FormOf(sensor->model.roles());
-  std::vector<TextRow> rows = {{"representation", form ? ToString(*form) : "the sensor's own"}};
+  const auto representation = RepresentationOf(sensor->model.roles());
+  std::vector<TextRow> rows = {
+      {"representation", representation ? ToString(*representation) : "the sensor's own"}};
   const auto add = [&rows](const std::string& what, const std::string& text) {
     rows.push_back({what, text});
   };

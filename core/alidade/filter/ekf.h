@@ -215,7 +215,7 @@ class Ekf : public Estimator {
   void RepairCovariance();
   void CountRejections();
   void Recover(Row& row);
-  void ForgetMotionOf(BlockId id);
+  void DropMotionOf(BlockId id);
   std::span<Row> rows() { return {rows_.data(), row_count_}; }
   JacobianRows JacobianOf(const Row& row) const;
   std::vector<double>& FirstEstimate(BlockId id) { return first_[static_cast<std::size_t>(id)]; }

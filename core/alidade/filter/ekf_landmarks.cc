@@ -11,7 +11,7 @@
 namespace alidade {
 namespace {
 
-/// A landmark that waits to enter is no more counted after so many frames without it.
+/// A landmark that waits for its initialisation is no more counted after so many frames without it.
 constexpr int kWaitingFrames = 30;
 
 /// The role of a landmark that is a point, m.
@@ -178,9 +178,9 @@ void Ekf::Landmarks::Finish() {
   moved_ = false;
   Count();
   CheckDepths();
-  Forget();
+  Prune();
   Convert();
-  Enter();
+  InitialiseNew();
   for (Row& row : ekf_.rows()) {
     row.plan = nullptr;
     row.model = nullptr;
@@ -223,7 +223,7 @@ void Ekf::Landmarks::CheckDepths() {
 }
 
 /// Drops what was not seen for long, or fails too often. Known landmarks stay.
-void Ekf::Landmarks::Forget() {
+void Ekf::Landmarks::Prune() {
   for (auto at = map_.landmarks.begin(); at != map_.landmarks.end();) {
     const Landmark& landmark = at->second;
     const std::int64_t unseen = map_.frame - landmark.seen;
@@ -297,8 +297,8 @@ bool Ekf::Landmarks::ConvertToXyz(std::int64_t id, Landmark& landmark, const Fam
   return true;
 }
 
-/// Lets landmarks of this frame enter that wait, as long as too few are measured.
-void Ekf::Landmarks::Enter() {
+/// Initialises landmarks of this frame that wait, as long as too few are measured.
+void Ekf::Landmarks::InitialiseNew() {
   const std::vector<const Row*> used = MeasuredOnce();
   auto measured = std::ssize(used);
   for (Family& family : families_) family.shared.clear();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// How a landmark enters the state, and what is told of it.
+// How a landmark is initialised, and what is told of it.
 #include <algorithm>
 #include <cmath>
 

@@ -182,7 +182,7 @@ Ray<double> RayOf(const double* const* blocks) {
 /// p = a + m / rho of a landmark, with the Jacobian J_p_y, 3 x tangent of its blocks, where that is
 /// not empty. kOutOfDomain unless rho > 0.
 template <class Representation>
-Status ToXyz(const double* const* blocks, double* p, MatrixRef J_p_y = {}) {
+Status ConvertToXyz(const double* const* blocks, double* p, MatrixRef J_p_y = {}) {
   constexpr int n = detail::Blocks<Representation>::kTangent;
   using Jet = ceres::Jet<double, n>;
   Jet y[detail::Blocks<Representation>::kAmbient], lifted[3];

@@ -52,7 +52,8 @@ std::optional<internal::LandmarkPoint> internal::PointOf(LandmarkRepresentation 
     constexpr int n = detail::Blocks<Representation>::kTangent;
     LandmarkPoint point;
     Eigen::Matrix<double, 3, n, Eigen::RowMajor> jacobian;
-    if (ToXyz<Representation>(blocks, point.position.data(), {jacobian.data(), n}) != Status::kOk) {
+    if (ConvertToXyz<Representation>(blocks, point.position.data(), {jacobian.data(), n}) !=
+        Status::kOk) {
       return std::nullopt;
     }
     point.jacobian = jacobian;

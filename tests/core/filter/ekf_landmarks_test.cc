@@ -173,13 +173,13 @@ TEST(Landmarks, ASharedAnchorGoesWithItsLastLandmark) {
   EXPECT_EQ(ekf.state().covariance().size(), 3 + 3 + 3);
 }
 
-TEST(Landmarks, ForgettingOneLeavesTheRestAsItWouldBeWithIt) {
+TEST(Landmarks, PruningOneLeavesTheRestAsItWouldBeWithIt) {
   constexpr int kSteps = 20;
   Scene scene(kSteps, 3);
-  LandmarkOptions forgetting;
-  forgetting.max_missed_frames = 3;
+  LandmarkOptions pruning;
+  pruning.max_missed_frames = 3;
   Ekf with = EkfOf(MapSystem(Offset(0.05), {}, 0.3));
-  Ekf without = EkfOf(MapSystem(Offset(0.05), forgetting, 0.3));
+  Ekf without = EkfOf(MapSystem(Offset(0.05), pruning, 0.3));
   int deleted = 0;
   for (int k = 0; k < kSteps; ++k) {
     std::vector<Observation> observations;

@@ -104,7 +104,7 @@ TEST(Landmark, ConversionToXyzHasTrueJacobians) {
     const Blocks blocks = LandmarkAt<Representation>(anchor, kPoint);
     constexpr int n = detail::Blocks<Representation>::kTangent;
     double p[3], j[3 * n];
-    ASSERT_EQ(ToXyz<Representation>(Pointers(blocks).data(), p, {j, n}), Status::kOk);
+    ASSERT_EQ(ConvertToXyz<Representation>(Pointers(blocks).data(), p, {j, n}), Status::kOk);
     for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(p[i], kPoint[i], 1e-14);
     std::vector<Space> spaces;
     const auto add = [&](auto index) {
@@ -115,7 +115,7 @@ TEST(Landmark, ConversionToXyzHasTrueJacobians) {
     detail::ForEach(add, typename detail::Blocks<Representation>::Indices{});
     const auto convert = [](const Blocks& x) {
       Blocks point{std::vector<double>(3)};
-      EXPECT_EQ(ToXyz<Representation>(Pointers(x).data(), point[0].data()), Status::kOk);
+      EXPECT_EQ(ConvertToXyz<Representation>(Pointers(x).data(), point[0].data()), Status::kOk);
       return point;
     };
     testing::ExpectSame(std::vector<double>(j, j + 3 * n),
@@ -128,7 +128,7 @@ TEST(Landmark, IsNotConvertedAtInfinityOrBehindIt) {
   for (const double rho : {0.0, -0.1}) {
     const Blocks blocks{{0, 0, 0, 0.1, 0.2, rho}};
     double p[3] = {7, 7, 7};
-    EXPECT_EQ(ToXyz<InverseDepth>(Pointers(blocks).data(), p), Status::kOutOfDomain);
+    EXPECT_EQ(ConvertToXyz<InverseDepth>(Pointers(blocks).data(), p), Status::kOutOfDomain);
     EXPECT_EQ(p[0], 7);
   }
 }

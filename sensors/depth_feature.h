@@ -9,7 +9,7 @@ namespace alidade {
 /// Pixel and depth at which a depth camera sees a landmark.
 ///
 ///   model      (u, v) = K(h) + n_px,  d = hz / rho + n_d,     h = R_CW (rho (a - r) + m)
-///   Jacobian   derived                                 3 x (6 + landmark)
+///   Jacobian   automatic differentiation               3 x (6 + landmark)
 ///   noise      R = diag(sigma^2, sigma^2, (s0 + s2 d^2)^2)      3x3, px^2 and m^2, d predicted
 ///   inverse    the point on the pixel's ray that is d ahead
 ///

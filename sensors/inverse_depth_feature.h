@@ -9,7 +9,7 @@ namespace alidade {
 /// Pixel at which one camera sees a landmark.
 ///
 ///   model      (u, v) = K(h) + n,   n ~ N(0, sigma^2 I),   h = R_CW (rho (a - r) + m)
-///   Jacobian   derived                                 2 x (6 + landmark), px/m, px/rad, px m
+///   Jacobian   automatic differentiation               2 x (6 + landmark), px/m, px/rad, px m
 ///   noise      R = sigma^2 I                           2x2, px^2
 ///   inverse    the point along the pixel's ray, at the inverse distance rho0 of the prior
 ///

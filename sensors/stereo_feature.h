@@ -10,7 +10,7 @@ namespace alidade {
 ///
 ///   model      u = cx + fx hx/hz,  v = cy + fy hy/hz            h = R_CW (rho (a - r) + m)
 ///              u_right = u - fx B rho/hz,  v_right = v;  + n,  n ~ N(0, sigma^2 I)
-///   Jacobian   derived                                 4 x (6 + landmark), px/m, px/rad, px m
+///   Jacobian   automatic differentiation               4 x (6 + landmark), px/m, px/rad, px m
 ///   noise      R = sigma^2 I                           4x4, px^2
 ///   inverse    depth fx B / d of the ray through (u, (v + v_right)/2),  d = u - u_right
 ///

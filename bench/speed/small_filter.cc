@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kGate = 0.999;
 
-/// Everything by hand, as nobody wants to write it: the floor.
+/// Everything by hand, as nobody wants to write it: the baseline.
 class HandUnrolled {
  public:
   void Step(double disparity, double inverse_scale) {
@@ -204,7 +204,7 @@ int Main(int rounds) {
   // All solve the same problem; joint and sequential updates linearise at points of their own.
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (std::abs(depths[i] - depths[0]) < 1e-3) continue;
-    std::fprintf(stderr, "error: %s ends at a depth of %.9f m, the floor at %.9f m\n",
+    std::fprintf(stderr, "error: %s ends at a depth of %.9f m, the baseline at %.9f m\n",
                  all[i].name.c_str(), depths[i], depths[0]);
     return 1;
   }

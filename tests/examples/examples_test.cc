@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The shipped examples, run as they are, held against the figures that docs/experiments.md states.
+// The shipped examples, run as they are, compared with the figures that docs/experiments.md states.
 #include <gtest/gtest.h>
 
 #include <algorithm>

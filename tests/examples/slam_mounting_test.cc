@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The mounting of a camera on a vehicle with odometry, and the speed of the odometry, in the state.
+// The extrinsics of a camera on a vehicle with odometry, and the speed of the odometry, in the state.
 #include <gtest/gtest.h>
 
 #include "alidade/sweep/sweep.h"
@@ -64,7 +64,7 @@ estimators:
 )";
 
 std::vector<SweepSummary> Ten() {
-  const Config config = Config::FromText(kConfig, "mounting.yaml");
+  const Config config = Config::FromText(kConfig, "extrinsics.yaml");
   const PluginHost host(PluginPaths(config));
   SweepOptions options;
   options.runs = 10;
@@ -72,7 +72,7 @@ std::vector<SweepSummary> Ten() {
   return Summarise(Sweep(config, host, options));
 }
 
-// Estimated or considered, a wrong mounting costs neither the path nor the honesty of the filter.
+// Estimated or considered, wrong extrinsics cost neither the path nor the honesty of the filter.
 TEST(SlamMounting, MayBeWrongWhereItIsInTheState) {
   const auto summaries = Ten();
   const auto& without = summaries.at(0).metrics;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/10_slam_scene, held against the figures that its README states.
+// examples/10_slam_scene, compared with the figures that its README states.
 #include <gtest/gtest.h>
 
 #include <filesystem>

@@ -204,10 +204,10 @@ TEST(ScenePath, OdometryLeadsAlongTheTruth) {
   for (std::size_t k = 0; k + 1 < frames.size(); ++k) {
     const Measurement& odometry = frames[k].measurements.back();
     ASSERT_EQ(odometry.stream, 1);
-    std::vector<double> r1(3), q1(4), owned(8);
+    std::vector<double> r1(3), q1(4), parameters(8);
     const double nothing[3] = {}, no_turn[4] = {1, 0, 0, 0};
     model.Step(r.data(), q.data(), nothing, no_turn, nothing, odometry.values.data(), still,
-               1.0 / 30.0, r1.data(), q1.data(), &owned[0], &owned[3], &owned[7]);
+               1.0 / 30.0, r1.data(), q1.data(), &parameters[0], &parameters[3], &parameters[7]);
     r = r1;
     q = q1;
   }

@@ -203,7 +203,7 @@ class Ekf : public Estimator {
                const Eigen::MatrixXd& h, const Eigen::MatrixXd& r);
   Workspace::Matrix ProjectionOf(std::span<Row* const> rows);
   void InitialiseFromMeasurements();
-  /// What the inverse observation makes of one measurement.
+  /// What the inverse measurement model makes of one measurement.
   struct Inverse {
     std::vector<double> y;                   ///< values, one role after the other
     std::vector<BlockId> from;               ///< the blocks that it took

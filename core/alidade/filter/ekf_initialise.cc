@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The inverse observation: what one measurement tells of blocks that have no value yet.
+// The inverse measurement model: what one measurement tells of blocks that have no value yet.
 #include <algorithm>
 #include <cmath>
 

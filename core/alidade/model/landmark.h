@@ -152,8 +152,8 @@ void InCamera(const Ray<T>& ray, const T* position, const T* orientation, T* h) 
   UnitQuaternion::RotateBack(orientation, along, h);
 }
 
-/// Inverse observation: y of the point that a camera sees along h (in the camera, of any length) at
-/// the inverse distance rho, 1/m. False where the representation has no such y.
+/// Inverse measurement model: y of the point that a camera sees along h (in the camera, of any
+/// length) at the inverse distance rho, 1/m. False where the representation has no such y.
 template <class Representation, class T>
 bool PlaceLandmark(const T* position, const T* orientation, const T* h, const T& rho, T* y) {
   using std::sqrt;

@@ -64,10 +64,10 @@ enum {
 
 /* Bits of AlidadeSpace.flags. */
 enum {
-  ALIDADE_ROLE_OPTIONAL = 1, /* may stay unbound: its pointer is then null */
-  ALIDADE_ROLE_OWNED = 2,    /* the block arrives with its motion model: a bias, an extrinsic */
-  ALIDADE_ROLE_LANDMARK = 4, /* filled anew for each measurement, by its landmark id */
-  ALIDADE_ROLE_SHARED = 8    /* with LANDMARK: one block for all that are first seen at one stamp */
+  ALIDADE_ROLE_OPTIONAL = 1,  /* may stay unbound: its pointer is then null */
+  ALIDADE_ROLE_PARAMETER = 2, /* the block arrives with its motion model: a bias, an extrinsic */
+  ALIDADE_ROLE_LANDMARK = 4,  /* filled anew for each measurement, by its landmark id */
+  ALIDADE_ROLE_SHARED = 8 /* with LANDMARK: one block for all that are first seen at one stamp */
 };
 
 /* A role, a measurement or a control input: a named quantity with its geometry. */
@@ -168,7 +168,7 @@ typedef struct AlidadeSensor {
                         int32_t row_stride);
   /* ALIDADE_OK or ALIDADE_INVALID; null: every measurement is valid. */
   int32_t (*valid)(const void* self, const double* z);
-  /* Inverse observation: y, the value of role `initialise_role`, from the other roles, z and a
+  /* Inverse measurement model: y, the value of role `initialise_role`, from the other roles, z and a
    * prior of the part that z does not tell (null where it tells all). Where that role is a
    * landmark's, y are the values of it and of the landmark roles that follow it, one after the
    * other. Jacobians jx[i] of y by the other roles, jz by z, jp by the prior; each may be null. */

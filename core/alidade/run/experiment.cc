@@ -259,7 +259,8 @@ OutOfSequencePolicy ReadOutOfSequence(const Node& root) {
   }
   if (window) policy.window = StampFromSeconds(window->Number(0.0, 1e9));
   if (!window && policy.policy == OutOfSequence::kRollback) {
-    chosen.Fail("'rollback' without 'window_s'", "'window_s', how late a frame may be");
+    chosen.Fail("'rollback' without 'window_s'",
+                "'window_s', how far out of sequence a frame may be");
   }
   entry->RejectUnread();
   return policy;

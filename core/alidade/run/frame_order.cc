@@ -86,11 +86,11 @@ bool FrameOrder::Accept(const Frame& frame) {
     return true;
   }
   const Stamp lag = Lag(newest_, frame.stamp);
-  ++arrivals_.late;
+  ++arrivals_.out_of_sequence;
   arrivals_.longest_lag = std::max(arrivals_.longest_lag, lag);
   if (!IsTooLate(frame.stamp)) return true;
   ++arrivals_.dropped;
-  events_.push_back({frame.stamp, "late",
+  events_.push_back({frame.stamp, "out_of_sequence",
                      "a frame " + Names(frame) + "came " + SecondsText(lag) +
                          " behind the newest, beyond the window of " +
                          SecondsText(*experiment_.out_of_sequence.window) + ": dropped"});

@@ -149,7 +149,7 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
   const Node initial = entry.At("initial", "the state entry '" + name + "'");
   const std::vector<Space>& spaces = binding.model.blocks();
   for (std::size_t i = 0; i < names.size(); ++i) {
-    const bool known = (spaces[i].flags & ALIDADE_ROLE_OWNED) != 0 && !initial.Find(names[i]) &&
+    const bool known = (spaces[i].flags & ALIDADE_ROLE_PARAMETER) != 0 && !initial.Find(names[i]) &&
                        !Contains(considered, names[i]);
     const BlockStatus status = known || Contains(constant, names[i]) ? BlockStatus::kConstant
                                : Contains(considered, names[i])      ? BlockStatus::kConsider
@@ -196,9 +196,9 @@ RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& mod
       if (binding.jacobian_at == RoleJacobianAt::kMeasurement &&
           (initialised < 0 ||
            model.roles()[static_cast<std::size_t>(initialised)].name != role.name)) {
-        at->Fail(
-            "model '" + model.name() + "' has no inverse observation of role '" + role.name + "'",
-            "prediction");
+        at->Fail("model '" + model.name() + "' has no inverse measurement model of role '" +
+                     role.name + "'",
+                 "prediction");
       }
     }
     node.RejectUnread();
@@ -285,7 +285,7 @@ void CheckInitialisation(const Node& root, const System& system) {
     if (role < 0 || binding.roles[static_cast<std::size_t>(role)].block != prior.block) {
       place(prior.block)
           .Fail("sensor '" + prior.from + "' does not determine this block",
-                "a sensor whose inverse observation is this block");
+                "a sensor whose inverse measurement model is this block");
     }
   }
   std::vector<BlockId> chain;

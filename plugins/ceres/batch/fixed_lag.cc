@@ -36,7 +36,7 @@ Stamp LagOf(double lag_s) {
 ///   prior    x_0 = x^ (+) (d_0 + L_0 e_0), of the state at the last frame that left
 ///
 /// A frame that leaves is linearised at the last solution, and stays so: see
-/// Trajectory::MarginaliseFirst. On a linear problem the window is the batch of the data so far.
+/// Trajectory::MarginaliseFirst. On a linear problem the window is the full-information filter.
 ///
 /// Source       [Sibley2010].
 class FixedLag : public Estimator {

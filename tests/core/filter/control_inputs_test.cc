@@ -81,7 +81,7 @@ std::vector<Gaussian> WrittenOut(const std::vector<Seen>& drive, double timeout_
   return estimates;
 }
 
-/// Kinds of all events, in their order; what the filter makes is held against the written out.
+/// Kinds of all events, in their order; what the filter makes is compared with the written out.
 std::vector<std::string> ExpectWrittenOut(Estimator& filter, const std::vector<Seen>& drive,
                                           double timeout_s, double tolerance) {
   std::vector<std::string> kinds;

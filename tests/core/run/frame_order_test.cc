@@ -56,11 +56,11 @@ TEST_P(FrameOrder, AFrameBeyondTheWindowIsDroppedWithAnEvent) {
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.status, RunStatus::kOk) << result.reason;
   EXPECT_EQ(result.frames, 3);
-  EXPECT_EQ(result.arrivals.late, 2);
+  EXPECT_EQ(result.arrivals.out_of_sequence, 2);
   EXPECT_EQ(result.arrivals.dropped, 1);
   EXPECT_EQ(result.arrivals.longest_lag, 100'000'001);
   for (const EstimatorResult& one : result.estimators) {
-    const auto event = std::ranges::find(one.events, "late", &Event::kind);
+    const auto event = std::ranges::find(one.events, "out_of_sequence", &Event::kind);
     ASSERT_NE(event, one.events.end());
     EXPECT_EQ(event->stamp, beyond.stamp);
     EXPECT_EQ(event->text,
@@ -219,7 +219,7 @@ TEST(Sort, WithoutAWindowTakesTheWholeRun) {
   experiment.out_of_sequence.window.reset();
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.frames, 50);
-  EXPECT_EQ(result.arrivals.late, 49);
+  EXPECT_EQ(result.arrivals.out_of_sequence, 49);
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 50);
 }
 

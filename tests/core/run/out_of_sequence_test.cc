@@ -141,7 +141,7 @@ TEST_P(Reordered, LateFramesGiveTheBytesOfTheInOrderRun) {
     const RunResult in_order =
         RecordDelayed(config, here / "in_order", OutOfSequence::kReject, 0.0);
     EXPECT_EQ(in_order.status, RunStatus::kOk);
-    EXPECT_EQ(in_order.arrivals.late, 0);
+    EXPECT_EQ(in_order.arrivals.out_of_sequence, 0);
     if (config == kEventful) {
       for (const EstimatorResult& one : in_order.estimators) {
         EXPECT_GT(std::ranges::count(one.events, "rejection_recovery", &Event::kind), 3)
@@ -151,7 +151,7 @@ TEST_P(Reordered, LateFramesGiveTheBytesOfTheInOrderRun) {
       }
     }
     const RunResult late = RecordDelayed(config, here / "late", GetParam(), kWindow_s);
-    EXPECT_GT(late.arrivals.late, 50);
+    EXPECT_GT(late.arrivals.out_of_sequence, 50);
     EXPECT_LE(late.arrivals.longest_lag, StampFromSeconds(kWindow_s));
     EXPECT_EQ(late.arrivals.dropped, 0);
     ExpectSameBytes(here / "in_order", here / "late");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The extrinsics of a camera on a vehicle with odometry, and the speed of the odometry, in the state.
+// The extrinsics of a camera on a vehicle with odometry, and the speed of the odometry, in the
+// state.
 #include <gtest/gtest.h>
 
 #include "alidade/sweep/sweep.h"

@@ -27,7 +27,8 @@ const MapHost::Values kMounted{{"noise.kind", {1}},  // discrete
                                {"vehicle_from_cam.orientation.y", {0.5}},
                                {"vehicle_from_cam.orientation.z", {-0.5}}};
 
-/// Model parameter states: the extrinsics and the speed are as the parameters and the input have them.
+/// Model parameter states: the extrinsics and the speed are as the parameters and the input have
+/// them.
 const Blocks kAsGiven{{0, 0, 0}, {1, 0, 0, 0}, {0}};
 
 /// The pose of the camera of a vehicle at (x, y), turned by `yaw` about z up.

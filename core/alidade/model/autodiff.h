@@ -8,9 +8,9 @@
 #include "ceres/jet.h"
 
 /// Evaluates models with their Jacobians in the tangent, by forward-mode automatic differentiation
-/// through (+) and (-), or by the author's analytic Jacobian where there is one. Plugins, the static
-/// filter, costs of a batch and tests share it. Matrices are row-major with a row stride; outputs
-/// are untouched unless the result is kOk.
+/// through (+) and (-), or by the author's analytic Jacobian where there is one. Plugins, the
+/// static filter, costs of a batch and tests share it. Matrices are row-major with a row stride;
+/// outputs are untouched unless the result is kOk.
 
 /// Of a function whose loops are not vectorised: what a model has just written number by number
 /// would be read as vectors, which waits for the stores.

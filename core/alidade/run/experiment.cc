@@ -201,7 +201,7 @@ std::vector<Segment> ReadSegments(const Node& root, const System& system,
       internal::ExpectName(name, entry, "a segment");
       const auto with = entry.Find("with"), without = entry.Find("without");
       if (with.has_value() == without.has_value()) {
-        entry.Fail("a segment is the stamps with or without a valid measurement",
+        entry.Fail("a segment is the timestamps with or without a valid measurement",
                    "one of with: SENSOR, without: SENSOR");
       }
       const Node& sensor = with ? *with : *without;

@@ -54,7 +54,8 @@ enum class OutOfSequence {
 /// equal stamps are merged.
 struct OutOfSequencePolicy {
   OutOfSequence policy = OutOfSequence::kReject;
-  /// A frame farther behind the newest is dropped, with the event `out_of_sequence`; none: no frame is.
+  /// A frame farther behind the newest is dropped, with the event `out_of_sequence`; none: no frame
+  /// is.
   std::optional<Stamp> window;
   std::vector<int> ranks;  ///< of the streams, among the measurements of merged frames
 };

@@ -158,12 +158,12 @@ void FrameOrder::CheckMerge(const Held& held, const Frame& part) const {
     if (first == whole.measurements.end()) continue;
     const auto index = static_cast<std::size_t>(first - whole.measurements.begin());
     fail("stream '" + source.streams()[static_cast<std::size_t>(m.stream)].name + "' twice",
-         "one measurement at a stamp; the first is" + In(held.places[index]));
+         "one measurement at a timestamp; the first is" + In(held.places[index]));
   }
   for (std::size_t t = 0; t < std::min(whole.truth.size(), part.truth.size()); ++t) {
     if (part.truth[t].empty() || whole.truth[t].empty() || part.truth[t] == whole.truth[t])
       continue;
-    fail("another value of truth '" + source.truths()[t].name + "'", "one at a stamp");
+    fail("another value of truth '" + source.truths()[t].name + "'", "one at a timestamp");
   }
 }
 

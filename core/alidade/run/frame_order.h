@@ -22,8 +22,8 @@ struct Processed {
 };
 
 /// The frames of an experiment's source in the order of its OutOfSequencePolicy. Under kRollback it
-/// also steers the estimators: they take each frame as it comes, and what came after an out-of-sequence one
-/// again.
+/// also steers the estimators: they take each frame as it comes, and what came after an
+/// out-of-sequence one again.
 class FrameOrder {
  public:
   using Check = std::function<void(Frame&)>;

@@ -89,7 +89,7 @@ TEST_P(FrameOrder, AStreamTwiceAtOneStampIsAnErrorThatNamesBothPlaces) {
   EXPECT_EQ(result.code, ExitCode::kBadData);
   EXPECT_EQ(result.reason,
             "rows.csv:6: stream 'inverse_scale' twice at t = 0.050000 s; expected one measurement "
-            "at a stamp; the first is in rows.csv:3");
+            "at a timestamp; the first is in rows.csv:3");
   EXPECT_EQ(result.frames, 3);  // what came before it is kept
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 3);
 }
@@ -136,7 +136,7 @@ TEST_P(FrameOrder, AStreamTwiceInMergedFramesNamesTheFirstOfItsOwn) {
   experiment.out_of_sequence.ranks = {2, 1, 0};
   EXPECT_EQ(alidade::Run(experiment, {}).reason,
             "rows.csv:4: stream 'aside' twice at t = 0.000000 s; expected one measurement at a "
-            "stamp; the first is in rows.csv:3");
+            "timestamp; the first is in rows.csv:3");
 }
 
 TEST_P(FrameOrder, LandmarksOfOneStreamAreNotTheSameTwice) {
@@ -160,7 +160,7 @@ TEST_P(FrameOrder, TwoTruthsAtOneStampAreAnError) {
   EXPECT_EQ(result.code, ExitCode::kBadData);
   EXPECT_EQ(
       result.reason,
-      "rows.csv:4: another value of truth 'depth' at t = 0.000000 s; expected one at a stamp");
+      "rows.csv:4: another value of truth 'depth' at t = 0.000000 s; expected one at a timestamp");
 }
 
 TEST_P(FrameOrder, ARowThatIsRefusedForItsTruthIsNotUsedAtAll) {

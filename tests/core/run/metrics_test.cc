@@ -335,7 +335,7 @@ TEST(Metrics, TellsOnceOfErrorsBeyondTenSigma) {
   EXPECT_EQ(event.kind, "inconsistent");
   EXPECT_EQ(event.stamp, 39 * Stamp{100'000'000});
   EXPECT_EQ(event.text,
-            "a.x: the error, 21 m, has been beyond 10 sigma for 20 stamps; sigma is 2 m");
+            "a.x: the error, 21 m, has been beyond 10 sigma for 20 timestamps; sigma is 2 m");
 }
 
 // A truth of sigma 3 m beside a filter's 2 m: the error has the variance 13 m^2.

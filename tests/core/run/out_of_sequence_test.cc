@@ -249,7 +249,7 @@ TEST(Sort, LetsATableHaveItsRowsInAnyOrder) {
   EXPECT_EQ(run("0.2,82,\n0.1,81,1\n0.2,83,1\n", buffer).reason,
             (folder / "rows.csv").string() +
                 ":4: stream 'disparity' twice at t = 0.200000 s; expected one measurement at a "
-                "stamp; the first is in " +
+                "timestamp; the first is in " +
                 (folder / "rows.csv").string() + ":2");
 }
 

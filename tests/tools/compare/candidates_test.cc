@@ -250,8 +250,9 @@ TEST(CheckSameData, SaysWhereARunHasLessAndWhereTheFilesDoNotTell) {
   EXPECT_NE(Refusal(rows + "0.2,a,,1\n", rows)
                 .find("first at t = 0.2 s of the one, its end of the other"),
             std::string::npos);
-  EXPECT_NE(Refusal(rows, rows).find("their own covariances or the stamps of empty frames differ"),
-            std::string::npos);
+  EXPECT_NE(
+      Refusal(rows, rows).find("their own covariances or the timestamps of empty frames differ"),
+      std::string::npos);
 }
 
 }  // namespace

@@ -87,7 +87,7 @@ TEST(EvaluationWarnings, AConstantTimeOffsetIsToldWithTheOptionThatTakesIt) {
   Trajectory estimate = Estimate(Curve(60));
   for (Stamp& stamp : estimate.stamps) stamp += 8'000'000;
   EXPECT_EQ(WarningsOf(Curve(60), estimate),
-            "estimate.tum: its stamps are 0.008 s after those of the reference on the median; "
+            "estimate.tum: its timestamps are 0.008 s after those of the reference on the median; "
             "expected --t-offset -0.008\n");
   EvaluateOptions options;
   options.offset = -8'000'000;

@@ -138,8 +138,8 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Stamp
     return ByRow(reference, estimate);
   }
   if (!both) {
-    Fail((reference.has_stamps() ? estimate : reference).name, "poses without stamps",
-         "times.txt beside them, as the other trajectory has stamps");
+    Fail((reference.has_stamps() ? estimate : reference).name, "poses without timestamps",
+         "times.txt beside them, as the other trajectory has timestamps");
   }
   const bool estimate_longer = estimate.size() > reference.size();
   const std::vector<Stamp>& shorter = (estimate_longer ? reference : estimate).stamps;
@@ -147,10 +147,10 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Stamp
   const Stamp shift = estimate_longer ? -offset : offset;  // of the shorter
   for (const Stamp end : {shorter.front(), shorter.back()}) {
     if (std::abs(Seconds(end) + Seconds(shift)) < cell::kTimeLimit) continue;
-    throw Error(ExitCode::kBadData,
-                ErrorLine({estimate.name}, "--t-offset",
-                          internal::SecondsText(offset) + " beside its stamps is beyond 292 years",
-                          "the time between the two clocks"));
+    throw Error(ExitCode::kBadData, ErrorLine({estimate.name}, "--t-offset",
+                                              internal::SecondsText(offset) +
+                                                  " beside its timestamps is beyond 292 years",
+                                              "the time between the two clocks"));
   }
   Matches matches;
   matches.possible = static_cast<int>(shorter.size());
@@ -169,7 +169,8 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Stamp
        "no pose within " + internal::NumberText(Seconds(max_diff)) + " s of one of " +
            reference.name + ": " + Span(estimate) + (offset == 0 ? "" : " and --t-offset") +
            " beside " + Span(reference),
-       "the same clock; or --t-offset, which is added to the estimate's stamps, or --t-max-diff");
+       "the same clock; or --t-offset, which is added to the estimate's timestamps, or "
+       "--t-max-diff");
 }
 
 }  // namespace alidade

@@ -152,7 +152,7 @@ class Warnings {
     std::nth_element(off.begin(), middle, off.end());
     const double late_s = std::abs(Seconds(*middle));
     if (!(late_s > kLateStamps * Seconds(evaluation_.options.max_diff))) return;
-    Warn("its stamps are " + RoundedText(late_s) + " s " + (*middle > 0 ? "before" : "after") +
+    Warn("its timestamps are " + RoundedText(late_s) + " s " + (*middle > 0 ? "before" : "after") +
              " those of the reference on the median",
          "--t-offset " + RoundedText(Seconds(evaluation_.options.offset + *middle)));
   }

@@ -168,8 +168,8 @@ typedef struct AlidadeSensor {
                         int32_t row_stride);
   /* ALIDADE_OK or ALIDADE_INVALID; null: every measurement is valid. */
   int32_t (*valid)(const void* self, const double* z);
-  /* Inverse measurement model: y, the value of role `initialise_role`, from the other roles, z and a
-   * prior of the part that z does not tell (null where it tells all). Where that role is a
+  /* Inverse measurement model: y, the value of role `initialise_role`, from the other roles, z and
+   * a prior of the part that z does not tell (null where it tells all). Where that role is a
    * landmark's, y are the values of it and of the landmark roles that follow it, one after the
    * other. Jacobians jx[i] of y by the other roles, jz by z, jp by the prior; each may be null. */
   int32_t (*initialise)(const void* self, const double* const* roles, const double* z,

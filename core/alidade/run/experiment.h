@@ -45,9 +45,9 @@ struct Segment {
 
 /// What is done with a frame whose stamp is before that of a frame that came earlier.
 enum class OutOfSequence {
-  kReject,  ///< estimators are given it as it comes, and count its measurements as stale
-  kBuffer,  ///< frames are held back while one before them can still come
-  kRollback,  ///< as kBuffer, but estimators take frames as they come, and roll back for an out-of-sequence one
+  kReject,    ///< estimators are given it as it comes, and count its measurements as stale
+  kBuffer,    ///< frames are held back while one before them can still come
+  kRollback,  ///< estimators take frames as they come, and roll back for one out of sequence
 };
 
 /// How a run takes frames that are not in the order of their stamps. But under kReject, frames of

@@ -99,7 +99,7 @@ inline std::vector<CameraState> ReadLookAt(const Node& list, const Eigen::Vector
     Quaternion orientation;
     if (!LookAt(from, target.At(t_s), up, orientation)) {
       list.Fail("at " + std::to_string(t_s) + " s the camera has no orientation",
-                "targets off the path, and not straight above or below it");
+                "targets off the trajectory, and not straight above or below it");
     }
     return std::pair(from, orientation);
   };
@@ -136,8 +136,9 @@ inline Vector ReadSigmas(const Node& node) {
 /// Drawn from quaternion_pose itself, with its own discretisation.
 inline std::vector<CameraState> DrawPath(const Node& node, std::size_t count, double dt_s,
                                          Random& random) {
-  const QuaternionPose model(ReadSigmas(node.At("linear_acceleration", "a path that is drawn")),
-                             ReadSigmas(node.At("angular_acceleration", "a path that is drawn")));
+  const QuaternionPose model(
+      ReadSigmas(node.At("linear_acceleration", "a trajectory that is drawn")),
+      ReadSigmas(node.At("angular_acceleration", "a trajectory that is drawn")));
   CameraState state;
   const auto read = [&](const char* key, Vector& to) {
     if (const auto value = node.Find(key)) to = ToArray(ReadVector(*value));

@@ -24,7 +24,7 @@ inline constexpr const char* kSceneKeys =
     "trajectory.look_at    [{position, target, t_s}, ...]; trajectory.up beside it\n"
     "trajectory.keyframes  [{position, t_s, euler_deg | matrix | axis_angle_deg | quaternion}, "
     "...]\n"
-    "trajectory.random     noise and start of quaternion_pose, which the path is drawn from\n"
+    "trajectory.random     noise and start of quaternion_pose, which it is drawn from\n"
     "state                 state entry whose blocks the truth is named after; default cam";
 
 /// Points in space, seen by a camera that moves among them.

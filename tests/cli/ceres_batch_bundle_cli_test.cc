@@ -26,7 +26,8 @@ TEST_F(BundleCli, AdjustsAndWritesTheSameFormat) {
   ASSERT_EQ(made.code, 0) << made.err;
   EXPECT_TRUE(Contains(made.out, "bal: 6 cameras, 40 points, ")) << made.out;
   EXPECT_TRUE(Contains(made.out, " converged after ")) << made.out;
-  EXPECT_TRUE(Contains(made.out, "gauge: the pose of the first camera and the scale are held\n"))
+  EXPECT_TRUE(
+      Contains(made.out, "gauge: the pose of the first camera and the scale are constant\n"))
       << made.out;
   EXPECT_TRUE(Contains(made.out, "wrote out\n  out/bundle.json\n")) << made.out;
   const Outcome again = Call({"bundle", "out/problem.txt"});

@@ -105,7 +105,7 @@ TEST(Align, RefusesWhatDeterminesNoScale) {
         EXPECT_EQ(error.code(), ExitCode::kBadData);
         EXPECT_STREQ(error.what(),
                      "curve.tum: no scale: its positions have nothing in common with those of "
-                     "curve.tum; expected poses of the same path, or --align");
+                     "curve.tum; expected poses of the same trajectory, or --align");
       }
     }
     const Evaluation e = Evaluate(reference, estimate, {});

@@ -98,7 +98,7 @@ TEST(EvaluationWarnings, APathThatEndsEarlyIsTold) {
   const Trajectory estimate = Estimate(Curve(60));
   const std::string warnings = WarningsOf(Curve(60), estimate.Select(Range(0, 20)));
   EXPECT_TRUE(warnings.starts_with("estimate.tum: it covers ")) << warnings;
-  EXPECT_TRUE(warnings.ends_with(" m; expected a figure of the whole path\n")) << warnings;
+  EXPECT_TRUE(warnings.ends_with(" m; expected a figure of the whole trajectory\n")) << warnings;
   EXPECT_EQ(WarningsOf(Curve(60), estimate.Select(Range(0, 40))), "");
 }
 

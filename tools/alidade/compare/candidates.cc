@@ -291,7 +291,8 @@ std::vector<std::string> NotesOf(const std::vector<Candidate>& candidates,
   std::set<std::string> notes;
   if (std::ranges::any_of(candidates, ScaleIsFree)) {
     notes.insert(
-        "scale is what the priors make of it: paths and maps are to be compared by their Sim3 "
+        "scale is what the priors make of it: trajectories and maps are to be compared by their "
+        "Sim3 "
         "rows, after the similarity that brings them nearest");
   }
   for (std::size_t i = 0; i < candidates.size(); ++i) {

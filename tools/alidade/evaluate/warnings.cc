@@ -162,9 +162,9 @@ class Warnings {
     const double matched =
         whole_reference_.PathLength(matches_.reference.front(), matches_.reference.back());
     if (!(matched < kShortPath * whole)) return;
-    Warn("it covers " + RoundedText(matched, 3) + " m of the reference's path of " +
+    Warn("it covers " + RoundedText(matched, 3) + " m of the reference's trajectory of " +
              RoundedText(whole, 3) + " m",
-         "a figure of the whole path");
+         "a figure of the whole trajectory");
   }
 
   void CheckScale(const Similarity& sim3) {

@@ -235,7 +235,8 @@ std::string Unobservable(const System& system) {
     text += " (" + std::to_string(count) + (count == 1 ? " direction)\n" : " directions)\n");
     if (names[0] == "scale") {
       text +=
-          "    scale, of path and map alike, is what the prior makes of it: depth, a stereo pair, "
+          "    scale, of trajectory and map alike, is what the prior makes of it: depth, a stereo "
+          "pair, "
           "odometry\n    or known landmarks tell it\n";
     }
   }

@@ -25,21 +25,21 @@ inline constexpr const char* kSceneKeys =
     "trajectory.keyframes  [{position, t_s, euler_deg | matrix | axis_angle_deg | quaternion}, "
     "...]\n"
     "trajectory.random     noise and start of quaternion_pose, which it is drawn from\n"
-    "state                 state entry whose blocks the truth is named after; default cam";
+    "state_entry           state entry whose blocks the truth is named after; default cam";
 
 /// Points in space, seen by a camera that moves among them.
 ///
 ///   pixel      (u, v) = K(h) + n_px,   h = R_CW (p - r),   n_px ~ N(0, sigma_px^2 I)
 ///   stereo     (u, v, u - fx B / hz, v) + n_px: a rectified pair of pinholes, B camera.baseline_m
 ///   depth      (u, v, hz) + (n_px, n_d),   n_d ~ N(0, sigma_depth_m^2)
-///   known      (u, v, hz (1 + n)),   n ~ N(0, known.sigma_relative^2)
+///   known      (u, v, hz (1 + n)),   n ~ N(0, known_points.sigma_relative^2)
 ///   odometry   v, omega in cam, constant, that lead odometry_pose from this frame to the next,
 ///              + N(0, sigma^2)
 ///
 ///   stream     size     values            when
 ///   tracks     2, 4, 3  as `measures`     the point is seen; the landmark is its id
 ///   known      3        u, v, depth       in place of the first observation of each of the first
-///                                         known.count points to be seen; with its covariance,
+///                                         known_points.count points to be seen; with its covariance,
 ///                                         unless sigma_px is 0
 ///   odometry   6        vx vy vz wx wy wz every frame but the last, for the way to the next
 ///
@@ -62,13 +62,13 @@ class Scene : public Source {
   Scene(const Node& entry, Params& p, std::uint64_t seed)
       : camera_(p), pixel_noise_(seed, 2), odometry_noise_(seed, 3) {
     ReadNumbers(p);
-    for (const char* key : {"points", "trajectory", "state"}) entry.Declare(key);
+    for (const char* key : {"points", "trajectory", "state_entry"}) entry.Declare(key);
     Random of_points(seed, 0), of_path(seed, 1);
     points_ = scene::ReadPoints(entry.At("points", "scene"), of_points);
     path_ = scene::ReadPath(entry.At("trajectory", "scene"), count_, dt_s_, of_path);
     seen_before_.assign(points_.size(), false);
     seen_ever_.assign(points_.size(), false);
-    const auto state = entry.Find("state");
+    const auto state = entry.Find("state_entry");
     NameAll(state ? state->Text() : "cam");
   }
 
@@ -125,9 +125,9 @@ class Scene : public Source {
       sigma_depth_m_ = p.NonNegative("sigma_depth_m", "m", "noise of the depth, 1 sigma");
     }
     if (measures_ == kPixel) {
-      known_left_ =
-          p.Integer("known.count", "points whose first observation tells depth", 0, 1 << 20, 0);
-      known_sigma_ = p.Number("known.sigma_relative", "", "noise of that depth, share of it",
+      known_left_ = p.Integer("known_points.count", "points whose first observation tells depth", 0,
+                              1 << 20, 0);
+      known_sigma_ = p.Number("known_points.sigma_relative", "", "noise of that depth, share of it",
                               {0.0, 1.0, true, false}, 0.005);
     }
     if (p.Flag("simulate_odometry", "whether there is a stream odometry", false)) {

@@ -48,9 +48,9 @@ inline constexpr const char* kTracksKeys =
 class Tracks : public Source {
  public:
   explicit Tracks(const SourceArguments& arguments) : options_(arguments.params) {
-    for (const char* key : {"path", "state"}) arguments.entry.Declare(key);
+    for (const char* key : {"path", "state_entry"}) arguments.entry.Declare(key);
     Open(arguments.entry.At("path", "tracks"), arguments.folder);
-    const auto state = arguments.entry.Find("state");
+    const auto state = arguments.entry.Find("state_entry");
     NameAll(state ? state->Text() : "cam");
   }
 

@@ -16,7 +16,7 @@ source:
   seed: 3
   max_frames: 20
   simulate_odometry: true
-  known: {count: 3}
+  known_points: {count: 3}
   points: {box: {min: [-2, -1.5, 2], max: [2, 1.5, 6]}, count: 40}
   trajectory: {look_at: [{position: [-0.5, 0, 0], target: [0, 0, 4]},
                          {position: [0.5, 0, 0], target: [0, 0, 4]}]}
@@ -136,7 +136,7 @@ TEST_F(SimulateCli, WritesTheStreamsOfAnySource) {
 TEST_F(SimulateCli, ACalibrationOfAStereoPairHasItsBaseline) {
   std::string scene = kScene + "  measures: stereo\n";
   scene.insert(scene.find("width"), "baseline_m: 0.2, ");
-  const std::string known = "  known: {count: 3}\n";
+  const std::string known = "  known_points: {count: 3}\n";
   Write("scene.yaml", scene.erase(scene.find(known), known.size()));
   const Outcome made = Call({"simulate", "scene.yaml", "-o", "data"});
   ASSERT_EQ(made.code, 0) << made.err;

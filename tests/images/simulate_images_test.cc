@@ -26,7 +26,7 @@ source:
   max_frames: 6
   rate_hz: 20
   sigma_px: 0.7
-  known: {count: 3}
+  known_points: {count: 3}
   points: {box: {min: [-3, -2, 2], max: [3, 2, 6]}, count: 30}
   trajectory: {look_at: [{position: [-0.5, 0, 0], target: [0, 0, 4]},
                          {position: [0.5, 0, 0], target: [0, 0, 4]}]}

@@ -111,8 +111,8 @@ TEST(Scene, SameSeedSameBytesAndOthersDiffer) {
 }
 
 TEST(Scene, TellsTheDepthOfTheFirstObservationOfTheKnown) {
-  const auto frames =
-      SceneFrames("max_frames: 5, sigma_px: 0.5, known: {count: 4}, " + kPoints + ", " + kSweep);
+  const auto frames = SceneFrames("max_frames: 5, sigma_px: 0.5, known_points: {count: 4}, " +
+                                  kPoints + ", " + kSweep);
   const std::set<std::int64_t> known = Ids(frames[0], 1);
   EXPECT_EQ(known.size(), 4u);
   const MadeScene made = MakeScene("max_frames: 5, sigma_px: 0.5, " + kPoints + ", " + kSweep);
@@ -190,7 +190,7 @@ TEST(Scene, PointsLieWhereTheConfigPutsThem) {
 }
 
 TEST(Scene, NamesTruthAsTheStateIsNamed) {
-  const MadeScene made = MakeScene("max_frames: 3, state: robot, " + kPoints + ", " + kStill);
+  const MadeScene made = MakeScene("max_frames: 3, state_entry: robot, " + kPoints + ", " + kStill);
   EXPECT_EQ(made.scene->truths()[0].name, "robot.position");
   EXPECT_EQ(made.scene->truths()[3].name, "robot.angular_velocity");
   EXPECT_EQ(made.scene->size(), 3);
@@ -249,8 +249,9 @@ TEST(Scene, RefusesWhatMakesNoScene) {
   refused(kPoints + ", trajectory: {random: {linear_acceleration: -1, angular_acceleration: 1}}",
           "trajectory.random.linear_acceleration: negative");
   refused(kPoints + ", " + kStill + ", sigma_px: -1", "source.sigma_px: '-1'");
-  refused(kPoints + ", " + kStill + ", measures: depth, sigma_depth_m: 0.1, known: {count: 3}",
-          "source.known");
+  refused(
+      kPoints + ", " + kStill + ", measures: depth, sigma_depth_m: 0.1, known_points: {count: 3}",
+      "source.known");
 }
 
 }  // namespace

@@ -138,11 +138,11 @@ TEST_F(TracksTest, TruthIsTakenAtTheTimeOfAFrame) {
   Write("groundtruth.tum",
         "# t x y z qx qy qz qw\n-1 9 9 9 0 0 0 1\n0.0005 1 2 3  0.5 0.5 0.5 0.5005\n"
         "1.002 4 5 6 0 0 0 1\n2 7 8 9 0 0 0 -1\n");
-  const auto source = Open("state: robot");
+  const auto source = Open("state_entry: robot");
   ASSERT_EQ(source->truths().size(), 2u);
   EXPECT_EQ(source->truths()[0].name, "robot.position");
   EXPECT_EQ(source->truths()[1].name, "robot.orientation");
-  const auto frames = Frames("state: robot");
+  const auto frames = Frames("state_entry: robot");
   EXPECT_EQ(frames[0].truth.at(0), (Values{1, 2, 3}));
   EXPECT_EQ(frames[0].truth[1], (Values{0.5005, 0.5, 0.5, 0.5})) << "w first";
   EXPECT_TRUE(frames[1].truth[0].empty()) << "2 ms off";

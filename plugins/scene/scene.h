@@ -25,7 +25,7 @@ inline constexpr const char* kSceneKeys =
     "trajectory.keyframes  [{position, t_s, euler_deg | matrix | axis_angle_deg | quaternion}, "
     "...]\n"
     "trajectory.random     noise and start of quaternion_pose, which it is drawn from\n"
-    "state_entry           state entry whose blocks the truth is named after; default cam";
+    "state_entry           the state entry whose blocks the truth is named after; default cam";
 
 /// Points in space, seen by a camera that moves among them.
 ///
@@ -39,8 +39,8 @@ inline constexpr const char* kSceneKeys =
 ///   stream     size     values            when
 ///   tracks     2, 4, 3  as `measures`     the point is seen; the landmark is its id
 ///   known      3        u, v, depth       in place of the first observation of each of the first
-///                                         known_points.count points to be seen; with its covariance,
-///                                         unless sigma_px is 0
+///                                         known_points.count points to be seen; with its
+///                                         covariance, unless sigma_px is 0
 ///   odometry   6        vx vy vz wx wy wz every frame but the last, for the way to the next
 ///
 /// The camera looks along z, x to the right, y down. A point is seen where it lies ahead and both

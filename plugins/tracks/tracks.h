@@ -19,7 +19,7 @@ namespace alidade {
 
 inline constexpr const char* kTracksKeys =
     "path           rows frame,feature,dim,value: a file, a pipe, '-', or a folder of tracks.csv\n"
-    "state          the state entry whose blocks the truth is named after; default cam";
+    "state_entry    the state entry whose blocks the truth is named after; default cam";
 
 /// Features that were followed through images, from rows `frame,feature,dim,value`.
 ///

@@ -230,7 +230,7 @@ double RiccatiSigma(double r, int updates) {
 
 /// The standard deviation of a variance.
 std::string RootText(const char* variance) {
-  return NumberText(std::sqrt(std::strtod(variance, nullptr)));
+  return internal::NumberText(std::sqrt(std::strtod(variance, nullptr)));
 }
 
 // Experiment 4.3 over decades of R2: lag against noise, and both ends fail.

@@ -53,7 +53,7 @@ class CeresBatch : public Estimator {
       return report_;
     }
     if (!ekf.failed()) filtered_.push_back(trajectory_.ValuesOf(ekf.state()));
-    if (!offline()) SolveSoFar(frame.stamp);
+    if (!offline()) SolveUpTo(frame.stamp);
     if (were_few && trajectory_.inputs() > kManyInputs) {
       report_.events.push_back({frame.stamp, "slow",
                                 "more than " + std::to_string(kManyInputs) +
@@ -93,7 +93,7 @@ class CeresBatch : public Estimator {
     throw Error(ExitCode::kDiverged, why);
   }
 
-  void SolveSoFar(Stamp stamp) {
+  void SolveUpTo(Stamp stamp) {
     const bool solved = solve_.SolveAnew(trajectory_, filtered_, e_);
     failed_ = solve_.failed();
     if (!solved) {

@@ -83,8 +83,8 @@ TEST(SlamScene, ManyWrongPriorsShowInNeesAndNotInNis) {
   EXPECT_LE(ekf.metrics.at("nis.mean:pixels").mean, 1.05);
 }
 
-// Without known depth the same prior makes trajectory and map as much too small, and the map keeps its
-// shape.
+// Without known depth the same prior makes trajectory and map as much too small, and the map keeps
+// its shape.
 TEST(SlamScene, ScaleIsThePriorsWhereNoDepthIsKnown) {
   const SweepSummary ekf =
       Twenty("config.yaml", {{"estimators.ekf.sensors", "[pixels]"},

@@ -211,8 +211,8 @@ void AddBundle(CLI::App& program, Action& action) {
   add("--tolerance", arguments->tolerance, "X",
       "converged where a step changes the cost by no more than this fraction; default 1e-8")
       ->check(IsNumber(0.0, 1.0));
-  CLI::Option* const camera = add("--camera", arguments->tracks.camera, "FILE",
-                                  "of tracks: YAML with `camera`, of a pair `baseline_m` too");
+  CLI::Option* const camera =
+      add("--camera", arguments->tracks.camera, "FILE", "of tracks: YAML with `camera`");
   CLI::Option* const start =
       add("--start", arguments->tracks.start, "FILE", "of tracks: trajectory to start from, TUM");
   camera->needs(start);

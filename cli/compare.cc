@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kCompareFooter = R"(Examples:
-  alidade compare config.yaml                      run it, with what explains the gap to the batch
+  alidade compare config.yaml                      run it, and decompose the error of a filter
   alidade compare config.yaml --runs 100           over seeds 1 to 100
   alidade compare config.yaml --no-explain --reference batch
   alidade compare runs/a runs/b                    finished runs over the same data
@@ -207,10 +207,10 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
       ->option_text("truth|NAME");
   command
       .add_option("--filter", arguments.options.filter,
-                  "the filter whose gap is explained; default: the first")
+                  "the filter whose error is decomposed; default: the first")
       ->option_text("NAME");
   command.add_flag("--no-explain", arguments.no_explain,
-                   "explain no gap, and add no estimators for it");
+                   "decompose no error, and add no estimators for it");
   command.add_option("--runs", arguments.sweep.runs, "compare over that many seeds")
       ->option_text("N")
       ->check(IsInteger(1, 1'000'000));
@@ -248,7 +248,7 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
 
 void AddCompare(CLI::App& program, Action& action, const std::string& command_line) {
   CLI::App& command = *program.add_subcommand(
-      "compare", "Compare estimators over the same data, and explain the gap to the batch");
+      "compare", "Compare estimators over the same data, and decompose the error of a filter");
   const auto arguments = std::make_shared<CompareArguments>();
   arguments->command = command_line;
   AddOptions(command, *arguments);

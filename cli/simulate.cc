@@ -19,13 +19,13 @@ constexpr const char* kSimulateFooter = R"(Examples:
 
 No estimator is made. Measurements of landmarks go to STREAM.csv as frame,feature,dim,value, others
 as frame,t_s and their values; beside them timestamps.csv, truth, map.csv and calibration.yaml.
-Pictures have an equal disc at the pixel of each landmark's measurement.)";
+Images have an equal disc at the pixel of each landmark's measurement.)";
 
 struct SimulateArguments {
   Input input;
   std::string folder;
   std::optional<std::uint64_t> seed;
-  SimulatePictures pictures;
+  SimulateImages images;
   bool force = false, quiet = false;
 };
 
@@ -48,7 +48,7 @@ ExitCode RunSimulate(const SimulateArguments& arguments) {
   const PluginHost host = arguments.input.Host(config);
   StopOnSignals();
   const SimulateResult result =
-      Simulate(config, host, path, arguments.force, StopRequested, arguments.pictures);
+      Simulate(config, host, path, arguments.force, StopRequested, arguments.images);
   if (!arguments.quiet) {
     std::string text = std::to_string(result.frames) + " frames\nwrote " + path.string() + '\n';
     for (const std::string& file : result.files) text += "  " + (path / file).string() + '\n';
@@ -70,12 +70,12 @@ void AddSimulate(CLI::App& program, Action& action) {
             "folder; default: the config's `output:`, or data-NAME, in runs/");
   AddSeed(command, arguments->seed);
   command
-      .add_option("--video", arguments->pictures.video,
+      .add_option("--video", arguments->images.video,
                   "writes what the camera sees as a video, FILE.avi in the folder; needs OpenCV")
       ->option_text("FILE")
       ->check(IsAvi);
   command
-      .add_option("--images", arguments->pictures.images,
+      .add_option("--images", arguments->images.folder,
                   "writes it as a PNG for each frame, in DIR in the folder; needs OpenCV")
       ->option_text("DIR")
       ->check(IsNamed)

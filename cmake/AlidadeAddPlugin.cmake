@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 
-# alidade_add_plugin(NAME SOURCES file... [BUILD_TIER] [FOLDER folder] [LIBRARIES target...])
+# alidade_add_plugin(NAME SOURCES file... [CPP] [FOLDER folder] [LIBRARIES target...])
 #
 # Builds a plugin that alidade loads at run time: hidden visibility, no undefined symbols, no
-# instruction-set flags. A sealed plugin (models) needs the headers alone; BUILD_TIER (sources,
+# instruction-set flags. A C-ABI plugin (models) needs the headers alone; CPP (sources,
 # estimators) links alidade::core and loads only into the very build it was made with.
 # What lies in another FOLDER than `plugins` is not searched, but loaded when it is needed.
 #
 # Without optimisation a plugin is many times slower. If neither CMAKE_BUILD_TYPE nor CMAKE_CXX_FLAGS
 # chooses a level, the plugin is compiled with -O2.
 function(alidade_add_plugin name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "BUILD_TIER" "FOLDER" "SOURCES;LIBRARIES")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "CPP" "FOLDER" "SOURCES;LIBRARIES")
   if(NOT arg_FOLDER)
     set(arg_FOLDER plugins)
   endif()
@@ -24,7 +24,7 @@ function(alidade_add_plugin name)
   if(NOT CMAKE_CXX_FLAGS MATCHES "(^| )-O")
     target_compile_options(${name} PRIVATE $<$<CONFIG:>:-O2>)
   endif()
-  if(arg_BUILD_TIER)
+  if(arg_CPP)
     target_link_libraries(${name} PRIVATE alidade::core ${arg_LIBRARIES})
   else()
     target_link_libraries(${name} PRIVATE alidade::model ${arg_LIBRARIES})

@@ -33,7 +33,7 @@ install(TARGETS alidade_model alidade_core alidade_tools EXPORT alidadeTargets
 
 foreach(folder IN ITEMS motion_models sensors plugins)
   alidade_plugins_of(${PROJECT_SOURCE_DIR}/${folder} plugins)
-  # Build-tier plugins link the library; both may move together.
+  # C++ plugins link the library; both may move together.
   set_target_properties(${plugins} PROPERTIES INSTALL_RPATH "$ORIGIN/../..")
   foreach(plugin IN LISTS plugins)
     get_target_property(beside ${plugin} ALIDADE_FOLDER)

@@ -14,13 +14,13 @@ namespace alidade {
 ///              q' = q Exp(R_CV phi),  r' = r + R_WC R_CV (V(phi) nu dt + Exp(phi) t - t)
 ///              nu = (1 + e) v + w_v,  phi = (omega + w_omega) dt
 ///              V(phi) = I + (1 - cos)/|phi|^2 [phi]x + (|phi| - sin)/|phi|^3 [phi]x^2
-///              t = t_0 + dt_m,  R_VC = R_m R_0;  dt_m, R_m and e are constant: owned blocks,
+///              t = t_0 + dt_m,  R_VC = R_m R_0;  dt_m, R_m and e are model parameter states,
 ///              0, I and 0, known, where the config gives them no initial value
 ///   noise      w = (w_v, w_omega) ~ N(0, diag(sigma_v^2, sigma_omega^2) / dt) where continuous:
 ///              white velocities, position and orientation are random walks; adds up over steps
 ///              w ~ N(0, diag(sigma_v^2, sigma_omega^2)) where discrete: held over the interval
 ///              between two updates, so that a walk depends on the rate of the measurements
-///   Jacobian   derived                                 13 x 13; exact at omega = 0
+///   Jacobian   automatic differentiation               13 x 13; exact at omega = 0
 ///
 ///   symbol       shape  unit      frame    meaning
 ///   r, q         3, 4   m, -      world    position and orientation (world_from_cam) of the camera
@@ -30,7 +30,7 @@ namespace alidade {
 ///                                          density; m/s where discrete: standard deviation
 ///   sigma_omega  3      rad/s^0.5 vehicle  noise of omega likewise; rad/s where discrete
 ///   t_0, R_0     3, -   m, -      vehicle  vehicle_from_cam: where and how the camera is mounted
-///   dt_m, R_m    3, 4   m, -      vehicle  what the mounting differs from that
+///   dt_m, R_m    3, 4   m, -      vehicle  extrinsics, relative to t_0 and R_0
 ///   e            1      -         -        relative error of v: true speed / measured - 1
 ///
 /// Defined everywhere. Additive in dt without noise; continuous noise is, but for dt^3 of the way
@@ -40,11 +40,12 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
   static constexpr std::array kBlocks{
       Quantity{"position", "m", "of the camera in the world", "x,y,z"},
       Quantity{"orientation", "", "world_from_cam", "w,x,y,z"},
-      Quantity{"mounting_position", "m", "added to vehicle_from_cam.position", "x,y,z",
-               ALIDADE_ROLE_OWNED},
-      Quantity{"mounting_orientation", "", "times vehicle_from_cam.orientation", "w,x,y,z",
-               ALIDADE_ROLE_OWNED},
-      Quantity{"speed_error", "", "true speed / measured speed - 1", "", ALIDADE_ROLE_OWNED}};
+      Quantity{"extrinsics_position", "m", "added to vehicle_from_cam.position", "x,y,z",
+               ALIDADE_ROLE_PARAMETER},
+      Quantity{"extrinsics_orientation", "", "times vehicle_from_cam.orientation", "w,x,y,z",
+               ALIDADE_ROLE_PARAMETER},
+      Quantity{"speed_scale_error", "", "true speed / measured speed - 1", "",
+               ALIDADE_ROLE_PARAMETER}};
   using Input = Vec<6>;
   static constexpr Quantity kInput{"velocities", "",
                                    "of the vehicle, in its frame: linear, m/s, and angular, rad/s",
@@ -84,11 +85,12 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
 
   NoiseKind noise_kind() const { return kind; }
   template <class T>
-  void Step(const T* r, const T* q, const T* shift, const T* tilt, const T* speed_error, const T* u,
-            const T* w, double dt_s, T* r1, T* q1, T* shift1, T* tilt1, T* speed_error1) const {
+  void Step(const T* r, const T* q, const T* shift, const T* tilt, const T* speed_scale_error,
+            const T* u, const T* w, double dt_s, T* r1, T* q1, T* shift1, T* tilt1,
+            T* speed_scale_error1) const {
     T phi[3], way[3], t[3], turned[3], moved[3], turn[3], step[3];
     for (int i = 0; i < 3; ++i) phi[i] = dt_s * (u[3 + i] + w[3 + i]);
-    for (int i = 0; i < 3; ++i) way[i] = dt_s * ((1.0 + speed_error[0]) * u[i] + w[i]);
+    for (int i = 0; i < 3; ++i) way[i] = dt_s * ((1.0 + speed_scale_error[0]) * u[i] + w[i]);
     for (std::size_t i = 0; i < 3; ++i) t[i] = mount[i] + shift[i];
     T rotation[4], mounted[4];
     UnitQuaternion::Multiply(tilt, vehicle_from_cam.data(), mounted);
@@ -103,7 +105,7 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
     UnitQuaternion::Plus(q, turn, q1);
     std::copy(shift, shift + 3, shift1);
     std::copy(tilt, tilt + 4, tilt1);
-    speed_error1[0] = speed_error[0];
+    speed_scale_error1[0] = speed_scale_error[0];
   }
   void SqrtQ(double dt_s, MatrixRef Lq) const {
     double scale = 1.0;  // of the mean velocities of the step

@@ -13,7 +13,7 @@ namespace alidade {
 ///   noise      w = (a, alpha) ~ N(0, diag(sigma_a^2, sigma_alpha^2)); G is 12 x 6: rank 6.
 ///              In a second n intervals add sigma_a^2 / n to Var(v): it depends on the rate of the
 ///              measurements
-///   Jacobian   derived                                 12 x 12; exact at omega = 0
+///   Jacobian   automatic differentiation               12 x 12; exact at omega = 0
 ///
 ///   symbol          shape  unit           frame  meaning
 ///   r               3      m              world  position

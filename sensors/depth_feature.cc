@@ -6,8 +6,8 @@
 namespace {
 
 void Make(alidade::Params& p, AlidadeInstance* instance) {
-  alidade::WithForm(alidade::ReadLandmarkForm(p), [&](auto form) {
-    alidade::EmplaceSensor<alidade::DepthFeature<decltype(form)>>(p, instance);
+  alidade::WithRepresentation(alidade::ReadLandmarkRepresentation(p), [&](auto representation) {
+    alidade::EmplaceSensor<alidade::DepthFeature<decltype(representation)>>(p, instance);
   });
 }
 

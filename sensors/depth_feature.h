@@ -9,7 +9,7 @@ namespace alidade {
 /// Pixel and depth at which a depth camera sees a landmark.
 ///
 ///   model      (u, v) = K(h) + n_px,  d = hz / rho + n_d,     h = R_CW (rho (a - r) + m)
-///   Jacobian   derived                                 3 x (6 + landmark)
+///   Jacobian   automatic differentiation               3 x (6 + landmark)
 ///   noise      R = diag(sigma^2, sigma^2, (s0 + s2 d^2)^2)      3x3, px^2 and m^2, d predicted
 ///   inverse    the point on the pixel's ray that is d ahead
 ///
@@ -17,7 +17,7 @@ namespace alidade {
 ///   u, v       2      px      -      the pixel
 ///   d          1      m       cam    depth along the optical axis
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_cam) of the camera
-///   a, m, rho  form   -       world  the landmark, p = a + m / rho
+///   a, m, rho  -      -       world  the landmark, p = a + m / rho, by its representation
 ///   K          -      -       cam    projection with distortion, see alidade/model/camera.h
 ///   sigma      1      px      -      standard deviation of u and of v; > 0
 ///   s0, s2     1      m, 1/m  -      standard deviation of d: a constant part, > 0, and one that
@@ -26,21 +26,24 @@ namespace alidade {
 /// Defined for  h within the lens, and hz > 0, rho > 0; else out_of_domain, outputs untouched.
 /// Valid for    pixels on the image, and d > 0; else the measurement is invalid.
 /// Source       [MonoSlam2015] sec. 2.1; noise [Khoshelham2012].
-template <class Form>
-struct DepthFeature : LandmarkSensor<DepthFeature<Form>, Vec<3>, Form> {
+template <class Representation>
+struct DepthFeature : LandmarkSensor<DepthFeature<Representation>, Vec<3>, Representation> {
   static constexpr Quantity kMeasurement{
       "pixel_and_depth", "", "where the landmark is seen, px, and its depth, m", "u,v,depth"};
 
   Camera camera;
-  double sigma_px, sigma_depth_m, sigma_depth_per_m;
+  double sigma_px, sigma_depth_m, sigma_depth_quadratic_1_m;
 
   DepthFeature(const Camera& lens, double sigma, double depth_m, double depth_per_m = 0.0)
-      : camera(lens), sigma_px(sigma), sigma_depth_m(depth_m), sigma_depth_per_m(depth_per_m) {}
+      : camera(lens),
+        sigma_px(sigma),
+        sigma_depth_m(depth_m),
+        sigma_depth_quadratic_1_m(depth_per_m) {}
   explicit DepthFeature(Params& p)
       : DepthFeature(Camera(p),
                      p.Positive("sigma_px", "px", "noise of a pixel coordinate, 1 sigma"),
                      p.Positive("sigma_depth_m", "m", "noise of the depth, 1 sigma"),
-                     p.NonNegative("sigma_depth_per_m", "1/m",
+                     p.NonNegative("sigma_depth_quadratic_1_m", "1/m",
                                    "what is added to it, times the depth squared", 0.0)) {}
 
   template <class T>
@@ -53,7 +56,7 @@ struct DepthFeature : LandmarkSensor<DepthFeature<Form>, Vec<3>, Form> {
   void SqrtNoiseInCamera(const T* h, const T& rho, T* L) const {
     const T depth = h[2] / rho;
     L[0] = L[4] = T(sigma_px);
-    L[8] = sigma_depth_m + sigma_depth_per_m * depth * depth;
+    L[8] = sigma_depth_m + sigma_depth_quadratic_1_m * depth * depth;
   }
   bool Valid(const double* z) const { return camera.Contains(z) && z[2] > 0.0; }
   template <class T>
@@ -62,7 +65,8 @@ struct DepthFeature : LandmarkSensor<DepthFeature<Form>, Vec<3>, Form> {
     T h[3];
     if (!(z[2] > T(0.0)) || !camera.Unproject(z, h) || !(h[2] > T(0.0))) return false;
     const T length = sqrt(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]);
-    return PlaceLandmark<Form>(position, orientation, h, T(h[2] / (z[2] * length)), landmark);
+    return PlaceLandmark<Representation>(position, orientation, h, T(h[2] / (z[2] * length)),
+                                         landmark);
   }
 };
 

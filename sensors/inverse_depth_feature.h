@@ -9,14 +9,14 @@ namespace alidade {
 /// Pixel at which one camera sees a landmark.
 ///
 ///   model      (u, v) = K(h) + n,   n ~ N(0, sigma^2 I),   h = R_CW (rho (a - r) + m)
-///   Jacobian   derived                                 2 x (6 + landmark), px/m, px/rad, px m
+///   Jacobian   automatic differentiation               2 x (6 + landmark), px/m, px/rad, px m
 ///   noise      R = sigma^2 I                           2x2, px^2
 ///   inverse    the point along the pixel's ray, at the inverse distance rho0 of the prior
 ///
 ///   symbol     shape  unit    frame  meaning
 ///   u, v       2      px      -      the pixel
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_cam) of the camera
-///   a, m, rho  form   -       world  the landmark, p = a + m / rho
+///   a, m, rho  -      -       world  the landmark, p = a + m / rho, by its representation
 ///   K          -      -       cam    projection with distortion, see alidade/model/camera.h
 ///   sigma      1      px      -      standard deviation of u and of v; > 0
 ///   rho0       1      1/m     -      prior, from the camera to the landmark (xyz: > 0)
@@ -25,8 +25,9 @@ namespace alidade {
 ///              rho <= 0 is allowed: a ray that the camera sees, whatever lies along it.
 /// Valid for    pixels on the image; else the measurement is invalid.
 /// Source       [MonoSlam2015] sec. 4.3, [Civera2008] sec. II.
-template <class Form>
-struct InverseDepthFeature : LandmarkSensor<InverseDepthFeature<Form>, Vec<2>, Form> {
+template <class Representation>
+struct InverseDepthFeature
+    : LandmarkSensor<InverseDepthFeature<Representation>, Vec<2>, Representation> {
   static constexpr Quantity kMeasurement{"pixel", "px", "where the landmark is seen", "u,v"};
   static constexpr int kPrior = 1;
 
@@ -52,7 +53,7 @@ struct InverseDepthFeature : LandmarkSensor<InverseDepthFeature<Form>, Vec<2>, F
                   T* landmark) const {
     T h[3];
     return camera.Unproject(pixel, h) &&
-           PlaceLandmark<Form>(position, orientation, h, prior[0], landmark);
+           PlaceLandmark<Representation>(position, orientation, h, prior[0], landmark);
   }
 };
 

@@ -10,7 +10,7 @@ namespace alidade {
 ///   model      s = lambda Z + n,   n ~ N(0, sigma_s^2),   lambda = 1 / Z0,  s = 1 / scale
 ///   Jacobian   ds/dZ = lambda, ds/dlambda = Z          1x1, 1/m and m
 ///   noise      propagated: sigma_s = (2 sigma / w) (lambda Z)^3      from pixels, see below
-///              fixed:      sigma_s^2 = variance
+///              constant:   sigma_s = sigma_inverse_scale
 ///   inverse    lambda = s / Z
 ///
 ///   symbol     shape  unit    frame  meaning
@@ -32,16 +32,16 @@ struct Scale2d : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr Quantity kMeasurement{"inverse_scale", "", "template size / apparent size"};
   static constexpr int kInitialises = 1;
 
-  double fixed_sigma = 0.0;     ///< > 0: the noise is fixed
+  double constant_sigma = 0.0;  ///< > 0: the noise is constant
   double relative_sigma = 0.0;  ///< 2 sigma / w
 
   static Scale2d FromPixels(double template_px, double sigma_px) {
     return Scale2d(0.0, 2.0 * sigma_px / template_px);
   }
-  static Scale2d FromVariance(double variance) { return Scale2d(std::sqrt(variance), 0.0); }
+  static Scale2d FromSigma(double sigma) { return Scale2d(sigma, 0.0); }
   explicit Scale2d(Params& p)
-      : Scale2d(p.Choice("noise", {"propagated", "fixed"}, "noise of 1/scale", 0) == 1
-                    ? FromVariance(p.Positive("variance", "", "noise = fixed: variance of 1/scale"))
+      : Scale2d(p.Choice("noise_model", {"propagated", "constant"}, "noise of 1/scale", 0) == 1
+                    ? FromSigma(p.Positive("sigma_inverse_scale", "", "noise of 1/scale, 1 sigma"))
                     : FromPixels(p.Positive("template_px", "px", "width of the template"),
                                  p.Positive("sigma_px", "px", "noise of an edge, 1 sigma"))) {}
 
@@ -59,7 +59,7 @@ struct Scale2d : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   template <class T>
   void SqrtNoise(const T* depth, const T* inverse_distance, T* l) const {
     const T s = inverse_distance[0] * depth[0];
-    l[0] = fixed_sigma > 0.0 ? T(fixed_sigma) : relative_sigma * s * s * s;
+    l[0] = constant_sigma > 0.0 ? T(constant_sigma) : relative_sigma * s * s * s;
   }
   bool Valid(const double* inverse_scale) const { return inverse_scale[0] > 0.0; }
   template <class T>
@@ -70,7 +70,7 @@ struct Scale2d : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 
  private:
-  Scale2d(double fixed, double relative) : fixed_sigma(fixed), relative_sigma(relative) {}
+  Scale2d(double constant, double relative) : constant_sigma(constant), relative_sigma(relative) {}
 };
 
 }  // namespace alidade

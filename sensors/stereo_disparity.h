@@ -17,11 +17,11 @@ namespace alidade {
 ///   Z          1      m       left   depth along the optical axis
 ///   f, B       1      px, m   -      rectified focal length, baseline; > 0
 ///   sigma      1      px      -      standard deviation of d; > 0
-///   near       1      m       left   the pair measures nothing nearer than this; 0: no limit
+///   r          1      m       left   min_range_m: it measures nothing nearer; 0: no limit
 ///
 /// Defined for  Z > 0; else out_of_domain, outputs untouched.
-/// Valid for    0 < d <= f B / near; else the measurement is invalid.
-/// Source       [Ekf2017] sec. 1.2, h1; near limit sec. 4.
+/// Valid for    0 < d <= f B / r; else the measurement is invalid.
+/// Source       [Ekf2017] sec. 1.2, h1; r: sec. 4.
 struct StereoDisparity : Sensor<Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"depth", "m", "depth along the optical axis"}};
   static constexpr Quantity kMeasurement{"disparity", "px", "u_left - u_right"};
@@ -29,16 +29,17 @@ struct StereoDisparity : Sensor<Vec<1>, Vec<1>> {
 
   double bf_px_m, sigma_px, max_px;
 
-  StereoDisparity(double focal_px, double baseline_m, double sigma, double near_m = 0.0)
+  StereoDisparity(double focal_px, double baseline_m, double sigma, double min_range_m = 0.0)
       : bf_px_m(focal_px * baseline_m),
         sigma_px(sigma),
-        max_px(near_m > 0.0 ? bf_px_m / near_m : std::numeric_limits<double>::infinity()) {}
+        max_px(min_range_m > 0.0 ? bf_px_m / min_range_m
+                                 : std::numeric_limits<double>::infinity()) {}
   explicit StereoDisparity(Params& p)
       : StereoDisparity(
             p.Positive("focal_px", "px", "rectified focal length"),
             p.Positive("baseline_m", "m", "stereo baseline"),
             p.Positive("sigma_px", "px", "disparity noise, 1 sigma"),
-            p.NonNegative("near_m", "m", "nearest depth it measures; 0: no limit", 0.0)) {}
+            p.NonNegative("min_range_m", "m", "nearest depth it measures; 0: no limit", 0.0)) {}
 
   template <class T>
   bool Predict(const T* depth, T* disparity) const {

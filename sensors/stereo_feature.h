@@ -10,14 +10,14 @@ namespace alidade {
 ///
 ///   model      u = cx + fx hx/hz,  v = cy + fy hy/hz            h = R_CW (rho (a - r) + m)
 ///              u_right = u - fx B rho/hz,  v_right = v;  + n,  n ~ N(0, sigma^2 I)
-///   Jacobian   derived                                 4 x (6 + landmark), px/m, px/rad, px m
+///   Jacobian   automatic differentiation               4 x (6 + landmark), px/m, px/rad, px m
 ///   noise      R = sigma^2 I                           4x4, px^2
 ///   inverse    depth fx B / d of the ray through (u, (v + v_right)/2),  d = u - u_right
 ///
 ///   symbol     shape  unit    frame  meaning
 ///   u, v       2      px      left   pixel of the left camera; likewise right
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_left)
-///   a, m, rho  form   -       world  the landmark, p = a + m / rho
+///   a, m, rho  -      -       world  the landmark, p = a + m / rho, by its representation
 ///   fx..cy     1      px      -      of both cameras, which have no distortion
 ///   B          1      m       -      baseline: the right camera is at +x of the left one; > 0
 ///   sigma      1      px      -      standard deviation of each coordinate; > 0
@@ -25,8 +25,8 @@ namespace alidade {
 /// Defined for  hz > 0; else out_of_domain, outputs untouched.
 /// Valid for    pixels on the images, and d > 0; else the measurement is invalid.
 /// Source       [MonoSlam2015] sec. 2.2; stereo [Ekf2017] sec. 1.2.
-template <class Form>
-struct StereoFeature : LandmarkSensor<StereoFeature<Form>, Vec<4>, Form> {
+template <class Representation>
+struct StereoFeature : LandmarkSensor<StereoFeature<Representation>, Vec<4>, Representation> {
   static constexpr Quantity kMeasurement{"pixels", "px", "where the landmark is seen",
                                          "u,v,u_right,v_right"};
 
@@ -36,7 +36,7 @@ struct StereoFeature : LandmarkSensor<StereoFeature<Form>, Vec<4>, Form> {
   StereoFeature(const Camera& left, double baseline, double sigma)
       : camera(left), baseline_m(baseline), sigma_px(sigma) {}
   explicit StereoFeature(Params& p)
-      : StereoFeature(Camera(p), p.Positive("baseline_m", "m", "stereo baseline"),
+      : StereoFeature(Camera(p), p.Positive("camera.baseline_m", "m", "stereo baseline"),
                       p.Positive("sigma_px", "px", "noise of a pixel coordinate, 1 sigma")) {
     if (camera.model != CameraModel::kPinhole) {
       p.Fail("camera.model", "not 'pinhole', but a rectified pair has no distortion");
@@ -66,7 +66,7 @@ struct StereoFeature : LandmarkSensor<StereoFeature<Form>, Vec<4>, Form> {
     if (!(disparity > T(0.0)) || !camera.Unproject(mean, h)) return false;
     const T length = sqrt(h[0] * h[0] + h[1] * h[1] + 1.0);  // of h, whose depth is 1
     const T rho = disparity / (camera.fx * baseline_m * length);
-    return PlaceLandmark<Form>(position, orientation, h, rho, landmark);
+    return PlaceLandmark<Representation>(position, orientation, h, rho, landmark);
   }
 };
 

@@ -60,7 +60,7 @@ alidade::Config ConfigOf(const std::string& file, int points, int frames, int se
   };
   config.Set("source.seed", std::to_string(seed), "bench");
   config.Set("source.points.count", std::to_string(points), "bench");
-  config.Set("source.frames", std::to_string(frames), "bench");
+  config.Set("source.max_frames", std::to_string(frames), "bench");
   const double share = (frames - 1.0) / (kAllFrames - 1.0);  // of the steps of the same duration
   set("source.rate_hz", kAllRateHz * share);
   for (const char* key : {"linear_acceleration", "angular_acceleration"}) {

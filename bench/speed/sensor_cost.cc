@@ -36,7 +36,7 @@ using ceres_batch::SensorCost;
 constexpr double kFocal = 500.0;  // px
 constexpr int kPose = 7;          // position, world_from_cam
 
-/// z = f (hx, hy) / hz,  h = R_CW (p - r): the model, without closed Jacobians.
+/// z = f (hx, hy) / hz,  h = R_CW (p - r): the model, without analytic Jacobians.
 struct Pinhole : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<3>> {
   static constexpr std::array kRoles{Quantity{"position"}, Quantity{"orientation"},
                                      Quantity{"point"}};
@@ -69,7 +69,7 @@ inline void Row(const double* orientation, const double* h, double ax, double ay
   J_q[2] = a[0] * h[1] - a[1] * h[0];
 }
 
-/// The same with closed Jacobians.
+/// The same with analytic Jacobians.
 struct PinholeClosed : Pinhole {
   void Jacobian(const double* position, const double* orientation, const double* point,
                 MatrixRef J_r, MatrixRef J_q, MatrixRef J_p) const {
@@ -246,16 +246,16 @@ double QuantileOf(std::vector<double> values, double q) {
 
 /// The ways to make costs: each adaptor beside what it is compared with.
 struct Ways {
-  PinholeClosed closed;
-  Pinhole derived;
-  SensorModel sealed_closed = InProcessSensor(closed, "closed");
-  SensorModel sealed_derived = InProcessSensor(derived, "derived");
+  PinholeClosed analytic;
+  Pinhole automatic;
+  SensorModel abi_analytic = InProcessSensor(analytic, "analytic");
+  SensorModel abi_automatic = InProcessSensor(automatic, "automatic");
   std::vector<ceres_batch::RolePlace> places{{0, 0}, {0, 3}, {1, 0}};
   std::vector<double> plain{1.0, 0.0, 0.0, 1.0};  // W of 1 px
-  CostKind<PinholeClosed> closed_kind{closed, places, {kPose, 3}, plain};
-  CostKind<Pinhole> derived_kind{derived, places, {kPose, 3}, plain};
-  CostKind<SensorModel> sealed_closed_kind{sealed_closed, places, {kPose, 3}, plain};
-  CostKind<SensorModel> sealed_derived_kind{sealed_derived, places, {kPose, 3}, plain};
+  CostKind<PinholeClosed> analytic_kind{analytic, places, {kPose, 3}, plain};
+  CostKind<Pinhole> automatic_kind{automatic, places, {kPose, 3}, plain};
+  CostKind<SensorModel> abi_analytic_kind{abi_analytic, places, {kPose, 3}, plain};
+  CostKind<SensorModel> abi_automatic_kind{abi_automatic, places, {kPose, 3}, plain};
 
   static ceres::Manifold* Tangent() {
     return new GeometryManifold(
@@ -272,20 +272,20 @@ struct Ways {
   };
   std::vector<Way> all = {
       {"by hand", 0, [](const double* z) { return new ByHand(z); }, Tangent},
-      {"closed form, static", 0, [this](const double* z) { return new SensorCost(closed_kind, z); },
+      {"analytic, static", 0, [this](const double* z) { return new SensorCost(analytic_kind, z); },
        Tangent},
-      {"closed form, plugin", 0,
-       [this](const double* z) { return new SensorCost(sealed_closed_kind, z); }, Tangent},
+      {"analytic, plugin", 0,
+       [this](const double* z) { return new SensorCost(abi_analytic_kind, z); }, Tangent},
       {"by hand, again", 0, [](const double* z) { return new ByHand(z); }, Tangent},
       {"ceres::AutoDiffCostFunction", 4,
        [](const double* z) {
          return new ceres::AutoDiffCostFunction<Functor, 2, kPose, 3>(new Functor{z[0], z[1]});
        },
        Ambient},
-      {"derived, static", 4, [this](const double* z) { return new SensorCost(derived_kind, z); },
-       Tangent},
-      {"derived, plugin", 4,
-       [this](const double* z) { return new SensorCost(sealed_derived_kind, z); }, Tangent},
+      {"automatic, static", 4,
+       [this](const double* z) { return new SensorCost(automatic_kind, z); }, Tangent},
+      {"automatic, plugin", 4,
+       [this](const double* z) { return new SensorCost(abi_automatic_kind, z); }, Tangent},
   };
 };
 

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kGate = 0.999;
 
-/// Everything by hand, as nobody wants to write it: the floor.
+/// Everything by hand, as nobody wants to write it: the baseline.
 class HandUnrolled {
  public:
   void Step(double disparity, double inverse_scale) {
@@ -132,7 +132,7 @@ class Static {
       ConstantVelocity<1, false>(kAcceleration), Constant<1>(1)};
 };
 
-/// The engine with the shipped models behind the sealed boundary, as a config composes them: frames
+/// The engine with the shipped models behind the plugin ABI, as a config composes them: frames
 /// in, a report of every measurement out.
 class Plugin {
  public:
@@ -204,7 +204,7 @@ int Main(int rounds) {
   // All solve the same problem; joint and sequential updates linearise at points of their own.
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (std::abs(depths[i] - depths[0]) < 1e-3) continue;
-    std::fprintf(stderr, "error: %s ends at a depth of %.9f m, the floor at %.9f m\n",
+    std::fprintf(stderr, "error: %s ends at a depth of %.9f m, the baseline at %.9f m\n",
                  all[i].name.c_str(), depths[i], depths[0]);
     return 1;
   }

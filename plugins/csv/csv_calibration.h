@@ -17,7 +17,7 @@ namespace alidade {
 ///
 ///   written as              unit  key by which models ask
 ///   focal_px= or fx_px=     px    focal_px, camera.fx
-///   baseline_m=             m     baseline_m
+///   baseline_m=             m     baseline_m, camera.baseline_m
 class CsvCalibration {
  public:
   /// Notes what a comment tells, which begins in column 1 of `line`.
@@ -53,7 +53,8 @@ class CsvCalibration {
       }
       const std::string origin = ToString(note.place);
       config.Set("calibration." + note.key, note.text, origin);
-      if (note.key == "focal_px") config.Set("calibration.camera.fx", note.text, origin);
+      const std::string camera = note.key == "focal_px" ? "fx" : note.key;
+      config.Set("calibration.camera." + camera, note.text, origin);
     }
     return config;
   }

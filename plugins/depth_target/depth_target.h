@@ -23,15 +23,15 @@ namespace alidade {
 ///   Zm       depth_mean_m        m     cam    0.3    mean depth; > 0
 ///   A        amplitude_m         m     cam    0.1    amplitude; 0 <= A < Zm
 ///   f        frequency_hz        Hz    -      0.4    frequency of the swing
-///   t        step_s              s     -      0.033  t = 0, step_s, 2 step_s, ...
+///   t        rate_hz             Hz    -      30.3   t = 0, 1 / rate_hz, 2 / rate_hz, ...
 ///            duration_s          s     -      5      ... <= duration_s
 ///   F        focal_px            px    -      400    rectified focal length
 ///   B        baseline_m          m     -      0.065  stereo baseline
-///   sigma_d  disparity_sigma_px  px    left   1      disparity noise, 1 sigma
-///   Zn       near_m              m     left   0.3    stereo sees nothing nearer; 0: no limit
+///   sigma_d  sigma_disparity_px  px    left   1      disparity noise, 1 sigma
+///   Zn       min_range_m              m     left   0.3    stereo sees nothing nearer; 0: no limit
 ///   w        template_px         px    cam    300    width of the template
 ///   Z0       template_depth_m    m     cam    0.3    depth at which the template was taken
-///   sigma_e  scale_sigma_px      px    cam    1      noise of one edge of the target, 1 sigma
+///   sigma_e  sigma_edge_px      px    cam    1      noise of one edge of the target, 1 sigma
 ///
 ///   stream                  size  unit  when
 ///   disparity               1     px    while stereo sees
@@ -44,9 +44,9 @@ namespace alidade {
 ///
 /// What the notebook does differently, or says twice: it thresholds the NOISY disparity, so that
 /// the disparities that pass are biased: -0.85 px where F B / Z is within 1 px of the limit, -0.33
-/// px within 3 px (sigma_d 1 px, example 01). `near_on: true` thresholds F B / Z instead. Its text
-/// says 25 cm and 1 Hz, its code 30 cm and 0.4 Hz, the defaults here. A blind disparity is a
-/// sentinel of 1e9 px there; here it is missing. Its noise of the scale counts both edges
+/// px within 3 px (sigma_d 1 px, example 01). `blind_test: true_depth` thresholds F B / Z instead.
+/// Its text says 25 cm and 1 Hz, its code 30 cm and 0.4 Hz, the defaults here. A blind disparity is
+/// a sentinel of 1e9 px there; here it is missing. Its noise of the scale counts both edges
 /// linearly, 2 sigma_e, as is done here.
 ///
 /// Defined for  A < Zm; else the configuration is refused.
@@ -60,27 +60,28 @@ class DepthTarget : public Source {
     depth_mean_m_ = p.Positive("depth_mean_m", "m", "mean depth of the target", 0.3);
     amplitude_m_ = p.NonNegative("amplitude_m", "m", "amplitude; below depth_mean_m", 0.1);
     frequency_hz_ = p.NonNegative("frequency_hz", "Hz", "frequency of the swing", 0.4);
-    step_s_ = p.Number("step_s", "s", "time from sample to sample", {1e-6, 1e6}, 0.033);
+    step_s_ = 1.0 / p.Number("rate_hz", "Hz", "samples a second", {1e-6, 1e6}, 1.0 / 0.033);
     const double duration_s =
         p.Number("duration_s", "s", "time of the last sample, at most", {0.0, 1e9}, 5.0);
     bf_px_m_ = p.Positive("focal_px", "px", "rectified focal length", 400.0) *
                p.Positive("baseline_m", "m", "stereo baseline", 0.065);
-    disparity_sigma_px_ =
-        p.NonNegative("disparity_sigma_px", "px", "disparity noise, 1 sigma", 1.0);
-    const double near_m =
-        p.NonNegative("near_m", "m", "stereo is blind to what is nearer; 0: to nothing", 0.3);
-    near_on_true_ = p.Choice("near_on", {"measured", "true"},
-                             "disparity that near_m is compared with: noisy or exact", 0) == 1;
+    sigma_disparity_px_ =
+        p.NonNegative("sigma_disparity_px", "px", "disparity noise, 1 sigma", 1.0);
+    const double min_range_m =
+        p.NonNegative("min_range_m", "m", "stereo is blind to what is nearer; 0: to nothing", 0.3);
+    blind_by_true_depth_ =
+        p.Choice("blind_test", {"measured", "true_depth"},
+                 "disparity that min_range_m is compared with: noisy or exact", 0) == 1;
     const double template_px = p.Positive("template_px", "px", "width of the template", 300.0);
-    const double edge_sigma_px =
-        p.NonNegative("scale_sigma_px", "px", "noise of an edge of the target, 1 sigma", 1.0);
+    const double sigma_edge_px =
+        p.NonNegative("sigma_edge_px", "px", "noise of an edge of the target, 1 sigma", 1.0);
     template_depth_m_ =
         p.Positive("template_depth_m", "m", "depth at which the template was taken", 0.3);
     if (!(amplitude_m_ < depth_mean_m_)) {
       p.Fail("amplitude_m", "must be less than depth_mean_m: the target would reach the camera");
     }
-    disparity_limit_px_ = near_m > 0.0 ? bf_px_m_ / near_m : kInfinity;
-    relative_sigma_ = 2.0 * edge_sigma_px / template_px;
+    disparity_limit_px_ = min_range_m > 0.0 ? bf_px_m_ / min_range_m : kInfinity;
+    relative_sigma_ = 2.0 * sigma_edge_px / template_px;
     // A few units in the last place, for durations that are multiples of the step but for rounding.
     count_ = 1 + static_cast<std::int64_t>(duration_s / step_s_ * (1.0 + 4.0 * DBL_EPSILON));
   }
@@ -99,8 +100,8 @@ class DepthTarget : public Source {
     frame.truth = {{depth_m}, {rate_m_s}, {1.0 / template_depth_m_}};
 
     const double exact_px = bf_px_m_ / depth_m;
-    const double disparity_px = exact_px + disparity_sigma_px_ * disparity_noise_.Normal();
-    const bool sees = !((near_on_true_ ? exact_px : disparity_px) > disparity_limit_px_);
+    const double disparity_px = exact_px + sigma_disparity_px_ * disparity_noise_.Normal();
+    const bool sees = !((blind_by_true_depth_ ? exact_px : disparity_px) > disparity_limit_px_);
     const double exact_scale = template_depth_m_ / depth_m;
     const double scale = exact_scale + relative_sigma_ / exact_scale * scale_noise_.Normal();
 
@@ -129,9 +130,9 @@ class DepthTarget : public Source {
                                          {"inverse_scale_seeing", 1},
                                          {"inverse_scale_blind", 1}};
   const std::vector<StreamInfo> truths_{{"depth", 1}, {"depth_rate", 1}, {"inverse_distance", 1}};
-  double depth_mean_m_, amplitude_m_, frequency_hz_, step_s_, bf_px_m_, disparity_sigma_px_;
+  double depth_mean_m_, amplitude_m_, frequency_hz_, step_s_, bf_px_m_, sigma_disparity_px_;
   double disparity_limit_px_, relative_sigma_, template_depth_m_;
-  bool near_on_true_;
+  bool blind_by_true_depth_;
   std::int64_t count_, index_ = 0;
   Random disparity_noise_, scale_noise_;
 };

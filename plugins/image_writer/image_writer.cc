@@ -8,15 +8,15 @@
 namespace alidade {
 namespace {
 
-std::unique_ptr<PictureWriter> Create(const PictureArguments& arguments) {
+std::unique_ptr<ImageWriter> Create(const ImageArguments& arguments) {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
-  if (arguments.form == PictureArguments::Form::kVideo) {
+  if (arguments.form == ImageArguments::Form::kVideo) {
     return std::make_unique<VideoWriter>(arguments);
   }
-  return std::make_unique<ImageWriter>(arguments);
+  return std::make_unique<ImageSequenceWriter>(arguments);
 }
 
 }  // namespace
 }  // namespace alidade
 
-ALIDADE_PICTURE_PLUGIN(&alidade::Create)
+ALIDADE_IMAGE_PLUGIN(&alidade::Create)

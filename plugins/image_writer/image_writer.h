@@ -15,11 +15,11 @@
 #include <vector>
 
 #include "alidade/base/error.h"
-#include "alidade/record/pictures.h"
+#include "alidade/record/images.h"
 
 namespace alidade {
 
-/// The picture of one frame: on black a white disc of radius 4 px at each of the pixels (u, v),
+/// The image of one frame: on black a white disc of radius 4 px at each of the pixels (u, v),
 /// placed to 1/256 px, and the frame's number in dark grey at the lower left. The centre of the
 /// upper left pixel is (0, 0).
 inline cv::Mat Draw(std::int64_t number, const std::vector<std::array<double, 2>>& pixels,
@@ -27,21 +27,21 @@ inline cv::Mat Draw(std::int64_t number, const std::vector<std::array<double, 2>
   constexpr int kShift = 8, kRadius = 4;  // bits behind the point; px
   constexpr double kOne = 1 << kShift, kMargin = kRadius + 1.0;
   const cv::Scalar white(255, 255, 255), grey(50, 50, 50);
-  cv::Mat picture(height, width, CV_8UC3, cv::Scalar());
-  cv::putText(picture, std::to_string(number), {4, height - 5}, cv::FONT_HERSHEY_PLAIN, 1.0, grey);
+  cv::Mat image(height, width, CV_8UC3, cv::Scalar());
+  cv::putText(image, std::to_string(number), {4, height - 5}, cv::FONT_HERSHEY_PLAIN, 1.0, grey);
   for (const auto& [u, v] : pixels) {
     const bool seen = u > -kMargin && u < width + kMargin && v > -kMargin && v < height + kMargin;
     if (!seen) continue;
     const cv::Point centre(cvRound(u * kOne), cvRound(v * kOne));
-    cv::circle(picture, centre, kRadius << kShift, white, cv::FILLED, cv::LINE_AA, kShift);
+    cv::circle(image, centre, kRadius << kShift, white, cv::FILLED, cv::LINE_AA, kShift);
   }
-  return picture;
+  return image;
 }
 
 /// One PNG for each frame, `000000.png` and so on.
-class ImageWriter : public PictureWriter {
+class ImageSequenceWriter : public ImageWriter {
  public:
-  explicit ImageWriter(PictureArguments arguments) : to_(std::move(arguments)) {}
+  explicit ImageSequenceWriter(ImageArguments arguments) : to_(std::move(arguments)) {}
 
   void Add(std::int64_t number, Stamp /*stamp*/,
            const std::vector<std::array<double, 2>>& pixels) override {
@@ -59,22 +59,22 @@ class ImageWriter : public PictureWriter {
   void Close() override {}
 
  private:
-  PictureArguments to_;
+  ImageArguments to_;
 };
 
 /// A video, MJPG in AVI, of as many frames a second as the first two are apart, to whole numbers
 /// from 1; of a single frame 30.
-class VideoWriter : public PictureWriter {
+class VideoWriter : public ImageWriter {
  public:
   static constexpr double kRateOfOne = 30.0;  ///< where two frames do not tell
 
-  explicit VideoWriter(PictureArguments arguments) : to_(std::move(arguments)) {}
+  explicit VideoWriter(ImageArguments arguments) : to_(std::move(arguments)) {}
 
   void Add(std::int64_t number, Stamp stamp,
            const std::vector<std::array<double, 2>>& pixels) override {
-    cv::Mat picture = Draw(number, pixels, to_.width, to_.height);
+    cv::Mat image = Draw(number, pixels, to_.width, to_.height);
     if (count_++ == 0) {
-      first_ = picture;
+      first_ = image;
       first_stamp_ = stamp;
       return;
     }
@@ -82,7 +82,7 @@ class VideoWriter : public PictureWriter {
       const double gap_s = Seconds(stamp - first_stamp_);
       Open(gap_s > 0.0 ? std::round(1.0 / gap_s) : kRateOfOne);
     }
-    video_.write(picture);
+    video_.write(image);
   }
 
   /// The writer of OpenCV does not tell of a full disk; the index, which is written last, does.
@@ -106,7 +106,7 @@ class VideoWriter : public PictureWriter {
     video_.write(first_);
   }
 
-  PictureArguments to_;
+  ImageArguments to_;
   cv::VideoWriter video_;
   cv::Mat first_;
   Stamp first_stamp_ = 0;

@@ -99,7 +99,7 @@ inline std::vector<CameraState> ReadLookAt(const Node& list, const Eigen::Vector
     Quaternion orientation;
     if (!LookAt(from, target.At(t_s), up, orientation)) {
       list.Fail("at " + std::to_string(t_s) + " s the camera has no orientation",
-                "targets off the path, and not straight above or below it");
+                "targets off the trajectory, and not straight above or below it");
     }
     return std::pair(from, orientation);
   };
@@ -136,8 +136,9 @@ inline Vector ReadSigmas(const Node& node) {
 /// Drawn from quaternion_pose itself, with its own discretisation.
 inline std::vector<CameraState> DrawPath(const Node& node, std::size_t count, double dt_s,
                                          Random& random) {
-  const QuaternionPose model(ReadSigmas(node.At("linear_acceleration", "a path that is drawn")),
-                             ReadSigmas(node.At("angular_acceleration", "a path that is drawn")));
+  const QuaternionPose model(
+      ReadSigmas(node.At("linear_acceleration", "a trajectory that is drawn")),
+      ReadSigmas(node.At("angular_acceleration", "a trajectory that is drawn")));
   CameraState state;
   const auto read = [&](const char* key, Vector& to) {
     if (const auto value = node.Find(key)) to = ToArray(ReadVector(*value));
@@ -169,7 +170,7 @@ inline std::vector<CameraState> DrawPath(const Node& node, std::size_t count, do
 inline std::vector<CameraState> ReadPath(const Node& node, std::size_t count, double dt_s,
                                          Random& random) {
   const auto up_node = node.Find("up");
-  const auto [kind, what] = OneOf(node, {"look_at", "keyframes", "model"});
+  const auto [kind, what] = OneOf(node, {"look_at", "keyframes", "random"});
   if (up_node && kind != "look_at") up_node->Fail("without a use", "'up' beside 'look_at'");
   const Eigen::Vector3d up = up_node ? ReadVector(*up_node) : Eigen::Vector3d(0.0, -1.0, 0.0);
   if (!(up.norm() > 0.0)) up_node->Fail("no direction", "a vector that is not 0");

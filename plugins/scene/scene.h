@@ -24,23 +24,23 @@ inline constexpr const char* kSceneKeys =
     "trajectory.look_at    [{position, target, t_s}, ...]; trajectory.up beside it\n"
     "trajectory.keyframes  [{position, t_s, euler_deg | matrix | axis_angle_deg | quaternion}, "
     "...]\n"
-    "trajectory.model      noise and start of quaternion_pose, which the path is drawn from\n"
-    "state                 state entry whose blocks the truth is named after; default cam";
+    "trajectory.random     noise and start of quaternion_pose, which it is drawn from\n"
+    "state_entry           the state entry whose blocks the truth is named after; default cam";
 
 /// Points in space, seen by a camera that moves among them.
 ///
-///   pixel      (u, v) = K(h) + n_px,   h = R_CW (p - r),   n_px ~ N(0, noise_px^2 I)
-///   stereo     (u, v, u - fx B / hz, v) + n_px: a rectified pair, B = baseline_m; pinhole alone
-///   depth      (u, v, hz) + (n_px, n_d),   n_d ~ N(0, depth_sigma_m^2)
-///   known      (u, v, hz (1 + n)),   n ~ N(0, known.relative_sigma^2)
+///   pixel      (u, v) = K(h) + n_px,   h = R_CW (p - r),   n_px ~ N(0, sigma_px^2 I)
+///   stereo     (u, v, u - fx B / hz, v) + n_px: a rectified pair of pinholes, B camera.baseline_m
+///   depth      (u, v, hz) + (n_px, n_d),   n_d ~ N(0, sigma_depth_m^2)
+///   known      (u, v, hz (1 + n)),   n ~ N(0, known_points.sigma_relative^2)
 ///   odometry   v, omega in cam, constant, that lead odometry_pose from this frame to the next,
 ///              + N(0, sigma^2)
 ///
 ///   stream     size     values            when
 ///   tracks     2, 4, 3  as `measures`     the point is seen; the landmark is its id
 ///   known      3        u, v, depth       in place of the first observation of each of the first
-///                                         known.count points to be seen; with its covariance,
-///                                         unless noise_px is 0
+///                                         known_points.count points to be seen; with its
+///                                         covariance, unless sigma_px is 0
 ///   odometry   6        vx vy vz wx wy wz every frame but the last, for the way to the next
 ///
 /// The camera looks along z, x to the right, y down. A point is seen where it lies ahead and both
@@ -62,13 +62,13 @@ class Scene : public Source {
   Scene(const Node& entry, Params& p, std::uint64_t seed)
       : camera_(p), pixel_noise_(seed, 2), odometry_noise_(seed, 3) {
     ReadNumbers(p);
-    for (const char* key : {"points", "trajectory", "state"}) entry.Declare(key);
+    for (const char* key : {"points", "trajectory", "state_entry"}) entry.Declare(key);
     Random of_points(seed, 0), of_path(seed, 1);
     points_ = scene::ReadPoints(entry.At("points", "scene"), of_points);
     path_ = scene::ReadPath(entry.At("trajectory", "scene"), count_, dt_s_, of_path);
     seen_before_.assign(points_.size(), false);
     seen_ever_.assign(points_.size(), false);
-    const auto state = entry.Find("state");
+    const auto state = entry.Find("state_entry");
     NameAll(state ? state->Text() : "cam");
   }
 
@@ -108,29 +108,29 @@ class Scene : public Source {
   };
 
   void ReadNumbers(Params& p) {
-    count_ = static_cast<std::size_t>(p.Integer("frames", "frames in all", 1, 1'000'000, 150));
+    count_ = static_cast<std::size_t>(p.Integer("max_frames", "frames in all", 1, 1'000'000, 150));
     dt_s_ = 1.0 / p.Number("rate_hz", "Hz", "frames a second", {1e-3, 1e6}, 30.0);
-    noise_px_ = p.NonNegative("noise_px", "px", "noise of a pixel coordinate, 1 sigma", 1.0);
+    sigma_px_ = p.NonNegative("sigma_px", "px", "noise of a pixel coordinate, 1 sigma", 1.0);
     most_ = static_cast<std::size_t>(
         p.Integer("max_features_per_frame", "points seen at most", 1, 1 << 30, 1 << 30));
     measures_ = static_cast<Measures>(p.Choice("measures", {"pixel", "stereo", "depth"},
                                                "what stream tracks holds of a point", kPixel));
     if (measures_ == kStereo) {
-      baseline_m_ = p.Positive("baseline_m", "m", "stereo baseline");
+      baseline_m_ = p.Positive("camera.baseline_m", "m", "stereo baseline");
       if (camera_.model != CameraModel::kPinhole) {
         p.Fail("camera.model", "not 'pinhole', but a rectified pair has no distortion");
       }
     }
     if (measures_ == kDepth) {
-      depth_sigma_m_ = p.NonNegative("depth_sigma_m", "m", "noise of the depth, 1 sigma");
+      sigma_depth_m_ = p.NonNegative("sigma_depth_m", "m", "noise of the depth, 1 sigma");
     }
     if (measures_ == kPixel) {
-      known_left_ =
-          p.Integer("known.count", "points whose first observation tells depth", 0, 1 << 20, 0);
-      known_sigma_ = p.Number("known.relative_sigma", "", "noise of that depth, share of it",
+      known_left_ = p.Integer("known_points.count", "points whose first observation tells depth", 0,
+                              1 << 20, 0);
+      known_sigma_ = p.Number("known_points.sigma_relative", "", "noise of that depth, share of it",
                               {0.0, 1.0, true, false}, 0.005);
     }
-    if (p.Flag("odometry", "whether there is a stream odometry", false)) {
+    if (p.Flag("simulate_odometry", "whether there is a stream odometry", false)) {
       odometry_stream_ = 0;  // NameAll() gives it its place
       linear_sigma_ = p.NonNegative("odometry_noise.linear", "m/s", "1 sigma, per axis", 0.0);
       angular_sigma_ = p.NonNegative("odometry_noise.angular", "rad/s", "1 sigma, per axis", 0.0);
@@ -163,8 +163,8 @@ class Scene : public Source {
       UnitQuaternion::RotateBack(state.orientation.data(), offset, h);
       observation.depth = h[2];
       if (!(h[2] > 0.0) || !camera_.Project(h, observation.pixel)) continue;
-      const double noisy[2] = {observation.pixel[0] + noise_px_ * observation.noise[0],
-                               observation.pixel[1] + noise_px_ * observation.noise[1]};
+      const double noisy[2] = {observation.pixel[0] + sigma_px_ * observation.noise[0],
+                               observation.pixel[1] + sigma_px_ * observation.noise[1]};
       if (camera_.Contains(observation.pixel) && camera_.Contains(noisy))
         observations.push_back(observation);
     }
@@ -185,22 +185,22 @@ class Scene : public Source {
     Measurement measurement;
     measurement.stamp = frame.stamp;
     measurement.landmark = static_cast<std::int64_t>(observation.point);
-    const double u = observation.pixel[0] + noise_px_ * observation.noise[0];
-    const double v = observation.pixel[1] + noise_px_ * observation.noise[1];
+    const double u = observation.pixel[0] + sigma_px_ * observation.noise[0];
+    const double v = observation.pixel[1] + sigma_px_ * observation.noise[1];
     measurement.values = {u, v};
     if (measures_ == kStereo) {
       measurement.values.push_back(observation.pixel[0] -
                                    camera_.fx * baseline_m_ / observation.depth +
-                                   noise_px_ * observation.noise[2]);
-      measurement.values.push_back(observation.pixel[1] + noise_px_ * observation.noise[3]);
+                                   sigma_px_ * observation.noise[2]);
+      measurement.values.push_back(observation.pixel[1] + sigma_px_ * observation.noise[3]);
     } else if (measures_ == kDepth) {
-      measurement.values.push_back(observation.depth + depth_sigma_m_ * observation.noise[2]);
+      measurement.values.push_back(observation.depth + sigma_depth_m_ * observation.noise[2]);
     } else if (!seen_ever_[observation.point] && known_left_ > 0) {
       --known_left_;
-      const double sigma_m = known_sigma_ * observation.depth, variance_px = noise_px_ * noise_px_;
+      const double sigma_m = known_sigma_ * observation.depth, variance_px = sigma_px_ * sigma_px_;
       measurement.stream = 1;
       measurement.values.push_back(observation.depth + sigma_m * observation.noise[2]);
-      if (noise_px_ > 0.0) {
+      if (sigma_px_ > 0.0) {
         measurement.covariance = {variance_px, 0, 0, 0, variance_px, 0, 0, 0, sigma_m * sigma_m};
       }
     }
@@ -235,7 +235,7 @@ class Scene : public Source {
   std::vector<scene::CameraState> path_;
   std::vector<bool> seen_before_, seen_ever_;
   std::size_t count_ = 0, index_ = 0, most_ = 0;
-  double dt_s_ = 0.0, noise_px_ = 0.0, baseline_m_ = 0.0, depth_sigma_m_ = 0.0;
+  double dt_s_ = 0.0, sigma_px_ = 0.0, baseline_m_ = 0.0, sigma_depth_m_ = 0.0;
   Measures measures_ = kPixel;
   int known_left_ = 0, odometry_stream_ = -1;
   double known_sigma_ = 0.0, linear_sigma_ = 0.0, angular_sigma_ = 0.0;

@@ -13,11 +13,13 @@ namespace alidade {
 ///
 ///   written as                                        key
 ///   camera: {width, height, fx, fy, cx, cy, ...}      camera.*, as `alidade simulate` writes it
+///
 ///   image: {width, height}                            camera.width, camera.height
 ///   intrinsics_px: {fx, fy, cx, cy}                   camera.fx and so on, of a pinhole
+///   baseline_m                                        camera.baseline_m, of a rectified pair
 ///   vehicle_from_cam: {position_m, quaternion}        vehicle_from_cam.position, .orientation
 ///
-/// and in both `baseline_m`, m, of a rectified pair. `sigma_px`, for `alidade bundle`, is left out.
+/// `sigma_px`, for `alidade bundle`, is left out.
 ///
 /// Errors       kBadData with file, line and column; kInputMissing.
 class CalibrationFile {
@@ -43,7 +45,6 @@ class CalibrationFile {
     } else {
       ReadIntrinsics(root);
     }
-    if (const auto baseline = root.Find("baseline_m")) Copy(*baseline, "baseline_m");
     root.RejectUnread();
   }
 
@@ -56,6 +57,7 @@ class CalibrationFile {
     Set("camera.model", "pinhole", intrinsics->place());
     const Node image = root.At("image");
     for (const char* key : {"width", "height"}) Copy(image.At(key), std::string("camera.") + key);
+    if (const auto baseline = root.Find("baseline_m")) Copy(*baseline, "camera.baseline_m");
     if (const auto mount = root.Find("vehicle_from_cam")) {
       Copy(mount->At("position_m"), "vehicle_from_cam.position");
       const Node quaternion = mount->At("quaternion");

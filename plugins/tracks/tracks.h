@@ -19,7 +19,7 @@ namespace alidade {
 
 inline constexpr const char* kTracksKeys =
     "path           rows frame,feature,dim,value: a file, a pipe, '-', or a folder of tracks.csv\n"
-    "state          the state entry whose blocks the truth is named after; default cam";
+    "state_entry    the state entry whose blocks the truth is named after; default cam";
 
 /// Features that were followed through images, from rows `frame,feature,dim,value`.
 ///
@@ -28,7 +28,7 @@ inline constexpr const char* kTracksKeys =
 ///   2, 3  u_right, v_right, px; or 2: the depth, m
 ///
 /// Beside the file are `timestamps.csv` (`frame,t_s`), which then says what frames there are, or
-/// else frame_rate_hz gives frame k the time k / rate; and maybe `odometry.csv` (a header that
+/// else rate_hz gives frame k the time k / rate; and maybe `odometry.csv` (a header that
 /// names frame, vx_m_s, vy_m_s, vz_m_s, wx_rad_s, wy_rad_s, wz_rad_s) and `groundtruth.tum` or
 /// `truth.tum` (world_from_cam); and `known.csv`, rows of the same form: observations that tell
 /// depth; and `calibration.yaml`, see CalibrationFile.
@@ -48,9 +48,9 @@ inline constexpr const char* kTracksKeys =
 class Tracks : public Source {
  public:
   explicit Tracks(const SourceArguments& arguments) : options_(arguments.params) {
-    for (const char* key : {"path", "state"}) arguments.entry.Declare(key);
+    for (const char* key : {"path", "state_entry"}) arguments.entry.Declare(key);
     Open(arguments.entry.At("path", "tracks"), arguments.folder);
-    const auto state = arguments.entry.Find("state");
+    const auto state = arguments.entry.Find("state_entry");
     NameAll(state ? state->Text() : "cam");
   }
 
@@ -64,7 +64,7 @@ class Tracks : public Source {
 
   bool Next(Frame& frame) override {
     if (frames_ == options_.most || !NextFrame(frame.stamp)) return false;
-    while (frame_ < options_.first_frame) {
+    while (frame_ < options_.start_frame) {
       EmitTracks(nullptr);
       if (!NextFrame(frame.stamp)) return false;
     }
@@ -110,7 +110,7 @@ class Tracks : public Source {
     if (const auto times = beside("timestamps.csv"); times && options_.rate_hz == 0.0) {
       times_.emplace(*times, path.place(), path.path());
     } else if (options_.rate_hz == 0.0) {
-      path.Fail("no timestamps.csv beside the tracks", "that file, or 'frame_rate_hz'");
+      path.Fail("no timestamps.csv beside the tracks", "that file, or 'rate_hz'");
     }
     if (const auto other = beside("odometry.csv");
         other && options_.odometry != TracksOptions::kNone) {
@@ -142,7 +142,7 @@ class Tracks : public Source {
       const double t_s = static_cast<double>(frame_) / options_.rate_hz;
       if (!(t_s < 9.2e9)) {
         tracks_->FailLine("frame " + std::to_string(frame_) + " is beyond 292 years",
-                          "frames that count from 0, at frame_rate_hz");
+                          "frames that count from 0, at rate_hz");
       }
       stamp = StampFromSeconds(t_s);
       return true;

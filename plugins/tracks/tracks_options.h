@@ -10,12 +10,12 @@ namespace alidade {
 /// What source `tracks` gives of its files: the numbers, flags and choices of its config entry.
 struct TracksOptions {
   enum Measures { kPixel, kStereo, kDepth };
-  enum Odometry { kNone, kHeld, kMean };
+  enum Odometry { kNone, kZeroOrderHold, kMean };
   enum World { kFile, kFirstCamera };
 
   Measures measures;
   double rate_hz;
-  std::int64_t first_frame;    ///< the first that is given out
+  std::int64_t start_frame;    ///< the first that is given out
   std::int64_t features_from;  ///< features that an earlier frame has are left out
   std::int64_t most;           ///< frames at most
   Odometry odometry;
@@ -25,18 +25,18 @@ struct TracksOptions {
   explicit TracksOptions(Params& p)
       : measures(static_cast<Measures>(p.Choice("measures", {"pixel", "stereo", "depth"},
                                                 "what stream tracks holds of a feature", kPixel))),
-        rate_hz(p.Number("frame_rate_hz", "Hz",
+        rate_hz(p.Number("rate_hz", "Hz",
                          "frames a second, where there is no timestamps.csv; 0: there is",
                          {0.0, 1e6}, 0.0)),
-        first_frame(p.Integer("first_frame", "frames before it are left out", 0, 1 << 30, 0)),
+        start_frame(p.Integer("start_frame", "frames before it are left out", 0, 1 << 30, 0)),
         features_from(p.Integer("features_from",
                                 "features that a frame before it has are left out in all", 0,
                                 1 << 30, 0)),
-        most(p.Integer("frames", "frames at most; 0: all", 0, 1 << 30, 0)),
+        most(p.Integer("max_frames", "frames at most; 0: all", 0, 1 << 30, 0)),
         odometry(static_cast<Odometry>(
-            p.Choice("odometry", {"none", "held", "mean"},
+            p.Choice("odometry", {"none", "zero_order_hold", "mean"},
                      "a frame's odometry.csv: none, its row, or the mean with the next frame's row",
-                     kHeld))),
+                     kZeroOrderHold))),
         tolerance(StampFromSeconds(
             p.Number("truth_tolerance_s", "s",
                      "the true pose of a frame is at most so far off in time", {0.0, 1e3}, 1e-3))),

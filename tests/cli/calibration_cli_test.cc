@@ -158,17 +158,17 @@ vehicle_from_cam:
   quaternion: {w: 0.5, x: -0.5, y: 0.5, z: -0.5}
 )";
 constexpr const char* kSimulated =
-    "camera: {width: 640, height: 480, fx: 500, fy: 510, cx: 320, cy: 240}\nbaseline_m: 0.5\n";
+    "camera: {width: 640, height: 480, fx: 500, fy: 510, cx: 320, cy: 240, baseline_m: 0.5}\n";
 
 TEST_F(CalibrationCli, TheFileBesideTracksTellsTheCamera) {
   const std::string camera =
-      "camera: {width: 640, height: 480, fx: 500, fy: 510, cx: 320, cy: 240}\n";
+      "camera: {width: 640, height: 480, fx: 500, fy: 510, cx: 320, cy: 240, baseline_m: 0.5}\n";
   WriteTracks("");
-  WriteSlam(camera, "    baseline_m: 0.5\n");
+  WriteSlam(camera, "");
   const std::string written = Estimates("slam.yaml");
   for (const char* calibration : {kDrive, kSimulated}) {
     WriteTracks(calibration);
-    WriteSlam(camera, "    baseline_m: 0.5\n");
+    WriteSlam(camera, "");
     EXPECT_EQ(Estimates("slam.yaml"), written) << calibration;
     WriteSlam("", "");
     EXPECT_EQ(Estimates("slam.yaml"), written) << calibration;
@@ -189,15 +189,16 @@ TEST_F(CalibrationCli, ExplainShowsWhatTheDataTell) {
 
 TEST_F(CalibrationCli, TracksOfAnotherCameraAreRefused) {
   for (const auto& [calibration, fx, baseline] :
-       {std::tuple(kDrive, "3:21", "4:13"), std::tuple(kSimulated, "1:39", "2:13")}) {
+       {std::tuple(kDrive, "3:21", "4:13"), std::tuple(kSimulated, "1:39", "1:83")}) {
     WriteTracks(calibration);
-    WriteSlam("camera: {width: 640, fx: 525}\n", "    baseline_m: 0.4\n");
+    WriteSlam("camera: {width: 640, fx: 525}\n", "    camera: {baseline_m: 0.4}\n");
     const Outcome other = Run("slam.yaml");
     EXPECT_EQ(other.code, 78);
     for (const std::string& line :
          {"camera.fx: 525 differs from the calibration of the data, 500 in " +
               (folder_ / "drive/calibration.yaml:").string() + fx + kRemedy.substr(0, 20),
-          "sensors.stereo.baseline_m: 0.4 differs from the calibration of the data, 0.5 in " +
+          "sensors.stereo.camera.baseline_m: 0.4 differs from the calibration of the data, 0.5 "
+          "in " +
               (folder_ / "drive/calibration.yaml:").string() + baseline + kRemedy}) {
       EXPECT_TRUE(Contains(other.err, line)) << other.err;
     }

@@ -26,7 +26,8 @@ TEST_F(BundleCli, AdjustsAndWritesTheSameFormat) {
   ASSERT_EQ(made.code, 0) << made.err;
   EXPECT_TRUE(Contains(made.out, "bal: 6 cameras, 40 points, ")) << made.out;
   EXPECT_TRUE(Contains(made.out, " converged after ")) << made.out;
-  EXPECT_TRUE(Contains(made.out, "gauge: the pose of the first camera and the scale are held\n"))
+  EXPECT_TRUE(
+      Contains(made.out, "gauge: the pose of the first camera and the scale are constant\n"))
       << made.out;
   EXPECT_TRUE(Contains(made.out, "wrote out\n  out/bundle.json\n")) << made.out;
   const Outcome again = Call({"bundle", "out/problem.txt"});
@@ -78,7 +79,7 @@ camera: {width: 640, height: 480, fx: 525, fy: 525, cx: 320, cy: 240}
 source:
   type: scene
   seed: 3
-  frames: 15
+  max_frames: 15
   STEREO
   points: {box: {min: [-2, -1.5, 3], max: [2, 1.5, 6]}, count: 40}
   trajectory: {look_at: [{position: [-0.5, 0, 0], target: [0, 0, 4]},
@@ -143,12 +144,12 @@ TEST_F(BundleTracksCli, AdjustsTracks) {
 /// A pair of 0.2 m sees points 30 to 45 m away, by a disparity of 2 to 4 px with a noise of 1.4 px;
 /// rays from 5 m of path tell their depth to about 1.5 %.
 TEST_F(BundleTracksCli, PlacesPointsOfAStereoPairByTheirRays) {
-  Simulate(
-      "  measures: stereo\n  baseline_m: 0.2\n",
-      {"--set", "source.points={box: {min: [-12, -10, 30], max: [12, 10, 45]}, count: 60}", "--set",
-       "source.trajectory={look_at: [{position: [-2.5, 0, 0], target: [0, 0, 38]}, "
-       "{position: [2.5, 0, 0], target: [0, 0, 38]}]}"});
-  EXPECT_EQ(Json("data/calibration.yaml").root().At("baseline_m").Number(), 0.2);
+  Simulate("  measures: stereo\n",
+           {"--set", "camera.baseline_m=0.2", "--set",
+            "source.points={box: {min: [-12, -10, 30], max: [12, 10, 45]}, count: 60}", "--set",
+            "source.trajectory={look_at: [{position: [-2.5, 0, 0], target: [0, 0, 38]}, "
+            "{position: [2.5, 0, 0], target: [0, 0, 38]}]}"});
+  EXPECT_EQ(Json("data/calibration.yaml").root().At("camera").At("baseline_m").Number(), 0.2);
   const Outcome started =
       Bundle("data/tracks.csv", "data/truth.tum", {"-o", "start", "--iterations", "0"});
   EXPECT_EQ(started.code, 1) << started.err;

@@ -61,7 +61,7 @@ TEST_F(CheckProgram, NamesParametersThatAreMissingOrUnknown) {
   EXPECT_EQ(unknown.code, 78) << unknown.out;
   EXPECT_TRUE(Contains(unknown.err, "error: --set")) << unknown.err;
   EXPECT_TRUE(Contains(unknown.err, "near: unknown key")) << unknown.err;
-  EXPECT_TRUE(Contains(unknown.err, "did you mean 'near_m'?")) << unknown.err;
+  EXPECT_TRUE(Contains(unknown.err, "did you mean 'min_range_m'?")) << unknown.err;
 }
 
 TEST_F(CheckProgram, TakesParametersFromTheConfigOfARun) {

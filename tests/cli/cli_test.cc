@@ -78,11 +78,11 @@ TEST_F(Cli, UnderscoresInTheNameOfAnOptionMeanHyphens) {
             0);
   // Values stay as they are, and so does the line that the record shows.
   EXPECT_EQ(Call({"run", "config.yaml", "--output=b_c", "--no_figures",
-                  "--set=source.disparity_sigma_px=0"})
+                  "--set=source.sigma_disparity_px=0"})
                 .code,
             0);
   EXPECT_TRUE(Exists("b_c/run.json"));
-  EXPECT_TRUE(Contains(Read("b_c/config.resolved.yaml"), "disparity_sigma_px: 0"));
+  EXPECT_TRUE(Contains(Read("b_c/config.resolved.yaml"), "sigma_disparity_px: 0"));
   EXPECT_TRUE(Contains(Read("b_c/timing.json"), "--no_figures"));
   // What follows `--` is no option.
   Write("--my_config.yaml", testing::kDepthConfig);
@@ -120,8 +120,8 @@ TEST_F(Cli, SetAndSeedReplaceKeysOfTheConfig) {
   EXPECT_NE(rmse({"--seed", "2"}), base);
   EXPECT_EQ(rmse({"--set", "source.seed=2"}), rmse({"--seed", "2"}));
   // Without noise the depth is better.
-  EXPECT_LT(rmse({"--set", "source.disparity_sigma_px=0", "--set=source.scale_sigma_px=0"}), base);
-  EXPECT_TRUE(Contains(Read("out/config.resolved.yaml"), "disparity_sigma_px: 0"));
+  EXPECT_LT(rmse({"--set", "source.sigma_disparity_px=0", "--set=source.sigma_edge_px=0"}), base);
+  EXPECT_TRUE(Contains(Read("out/config.resolved.yaml"), "sigma_disparity_px: 0"));
 }
 
 TEST_F(Cli, ConfigErrorsHavePlaceAndRemedy) {
@@ -349,12 +349,12 @@ TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
   const Outcome info = Call({"plugins", "info", "stereo_disparity"});
   EXPECT_EQ(info.code, 0);
   for (const char* part : {"role depth: vector(1), m", "measurement disparity: vector(1), px",
-                           "focal_px", "required", "near_m", ">= 0", "[Ekf2017]"}) {
+                           "focal_px", "required", "min_range_m", ">= 0", "[Ekf2017]"}) {
     EXPECT_TRUE(Contains(info.out, part)) << part << '\n' << info.out;
   }
   const Outcome scale = Call({"plugins", "info", "scale_2d"});
-  EXPECT_TRUE(Contains(scale.out, "propagated | fixed")) << scale.out;
-  EXPECT_TRUE(Contains(scale.out, "noise = fixed")) << scale.out;
+  EXPECT_TRUE(Contains(scale.out, "propagated | constant")) << scale.out;
+  EXPECT_TRUE(Contains(scale.out, "noise_model = constant")) << scale.out;
 
   const Outcome ekf = Call({"plugins", "info", "ekf"});
   for (const char* part :

@@ -57,14 +57,14 @@ class CompareCli : public testing::ProgramTest {
   }
 };
 
-TEST_F(CompareCli, AConfigIsRunAndItsGapExplained) {
+TEST_F(CompareCli, AConfigIsRunAndItsErrorDecomposed) {
   const Outcome compared = Call({"compare", "config.yaml", "-o", "out"});
   EXPECT_EQ(compared.code, 0) << compared.err;
   for (const char* words :
-       {"added 'batch_so_far'", "RMSD target.depth [mm]",
+       {"added 'full_information'", "RMSD target.depth [mm]",
         "Online: every estimate from the data up to it", "Smoothed: estimates from later data too",
-        "At the end, where all have the same data", "linearisation, ekf against batch_so_far",
-        "smoothing, ekf against rts", "lost data, batch_accepted against batch",
+        "At the end, where all have the same data", "linearisation, ekf against full_information",
+        "smoothing, ekf against rts", "rejected measurements, batch_accepted against batch",
         "of 227 measurements were not used", "rmse target.depth [mm]",
         "wall clock [us/measurement]"}) {
     EXPECT_TRUE(Contains(compared.out, words)) << words << '\n' << compared.out;
@@ -125,7 +125,7 @@ TEST_F(CompareCli, OfSeveralFoldersEstimatorsAreNamedByTheirs) {
   EXPECT_FALSE(Contains(compared.out, "differ:")) << compared.out;
   const Config both = Json("both/compare.json");
   const Node all = both.root().At("estimators");
-  EXPECT_EQ(all.At("b/ekf").At("reference").Text(), "a/batch_so_far");
+  EXPECT_EQ(all.At("b/ekf").At("reference").Text(), "a/full_information");
   before_ = "cd runs/a";
   EXPECT_TRUE(Contains(Call({"compare", ".", "../b"}).out, "  a/ekf"));
 }
@@ -215,7 +215,7 @@ TEST_F(CompareCli, WithholdsTheComparisonWhereTheBatchFailed) {
   EXPECT_TRUE(Contains(compared.err, "error: " + words)) << compared.err;
   EXPECT_TRUE(Contains(compared.out, words)) << compared.out;
   EXPECT_FALSE(Contains(compared.out, "difference target")) << compared.out;
-  // Errors from truth need no batch, but what is held against it is withheld.
+  // Errors from truth need no batch, but what is compared with it is withheld.
   const Outcome truth =
       Call({"compare", "config.yaml", "-o", "two", "--no-explain", "--set", failing});
   EXPECT_EQ(truth.code, 1);
@@ -267,7 +267,7 @@ TEST_F(CompareCli, WithoutTruthTheBatchIsTheReference) {
   EXPECT_FALSE(Contains(compared.out, "rmse")) << compared.out;
   const Config json = Json("out/compare.json");
   const Node estimators = json.root().At("estimators");
-  EXPECT_EQ(estimators.At("ekf").At("reference").Text(), "batch_so_far");
+  EXPECT_EQ(estimators.At("ekf").At("reference").Text(), "full_information");
   EXPECT_EQ(estimators.At("rts").At("reference").Text(), "batch");
   EXPECT_GT(estimators.At("ekf").At("values").At("rmsd.sigmas:target").Number(), 0.0);
   const Outcome truth = Call({"compare", "table.yaml", "-o", "two", "--reference", "truth"});

@@ -21,12 +21,12 @@ TEST_F(ExplainCli, TellsWhatCannotBeObserved) {
                        "cannot be observed: target.depth together with target.depth_rate, "
                        "template.inverse_distance (1 direction)"))
       << scale.out;
-  const Outcome held = Call({"explain", "config.yaml", "--set",
-                             "sensors.scale.roles.inverse_distance={block: "
-                             "template.inverse_distance, mode: hold}"});
-  EXPECT_TRUE(Contains(held.out, "cannot be observed: template.inverse_distance (1 direction)"))
-      << held.out;
-  EXPECT_TRUE(Contains(held.out, "holds")) << held.out;
+  const Outcome known = Call({"explain", "config.yaml", "--set",
+                              "sensors.scale.roles.inverse_distance={block: "
+                              "template.inverse_distance, mode: known}"});
+  EXPECT_TRUE(Contains(known.out, "cannot be observed: template.inverse_distance (1 direction)"))
+      << known.out;
+  EXPECT_TRUE(Contains(known.out, "knows")) << known.out;
 }
 
 TEST_F(ExplainCli, TellsWhichTruthIsOfWhichBlock) {
@@ -51,14 +51,14 @@ TEST_F(ExplainCli, TellsTheOptionsOfEachTypeOfEstimator) {
             "sensors.stereo.loss={huber: 1.345}"});
   for (const char* part :
        {"jacobian            first_estimate: H where", "loss                stereo: huber 1.345",
-        "considered (Schmidt)", "robust losses"}) {
+        "consider (Schmidt)", "robust losses"}) {
     EXPECT_TRUE(Contains(ekf.out, part)) << part << '\n' << ekf.out;
   }
   const Outcome iekf = Call({"explain", "config.yaml", "--set", "estimators.ekf.type=iekf"});
   for (const char* part :
        {"(iekf)", "max_iterations      10", "tolerance           1e-04 sigma of the posterior",
-        "blocks estimated or fixed; roles estimate, hold;",
-        "Not: considered blocks and roles, jacobian_at measurement"}) {
+        "blocks estimated or constant; roles estimate, known;",
+        "Not: consider blocks and roles, jacobian_at measurement"}) {
     EXPECT_TRUE(Contains(iekf.out, part)) << part << '\n' << iekf.out;
   }
   EXPECT_FALSE(Contains(iekf.out, "loss  ")) << iekf.out;
@@ -66,24 +66,24 @@ TEST_F(ExplainCli, TellsTheOptionsOfEachTypeOfEstimator) {
 
 TEST_F(ExplainCli, TellsWhatAFixedBlockIs) {
   const Outcome none = Call({"explain", "config.yaml"});
-  EXPECT_FALSE(Contains(none.out, "fixed: ")) << none.out;
+  EXPECT_FALSE(Contains(none.out, "constant: ")) << none.out;
   EXPECT_FALSE(Contains(none.out, "nothing for")) << none.out;
   // 3.3 +- 0.5 in the config.
   const Outcome one =
-      Call({"explain", "config.yaml", "--set", "state.template.fixed=[inverse_distance]"});
-  for (const char* part :
-       {"inverse_distance  3.3, exact\n", "    fixed: known exactly, without covariance; nothing",
-        "template  constant           none ",
-        "template.inverse_distance  -       holds     -         holds\n"}) {
+      Call({"explain", "config.yaml", "--set", "state.template.constant=[inverse_distance]"});
+  for (const char* part : {"inverse_distance  3.3, exact\n",
+                           "    constant: known exactly, without covariance; nothing",
+                           "template  constant           none ",
+                           "template.inverse_distance  -       knows     -         knows\n"}) {
     EXPECT_TRUE(Contains(one.out, part)) << part << '\n' << one.out;
   }
   EXPECT_FALSE(Contains(one.out, "nothing for")) << one.out;
   const Outcome considered =
       Call({"explain", "config.yaml", "--set", "state.target.consider=[depth]"});
   EXPECT_TRUE(Contains(considered.out, "in a row; nothing for stereo\n")) << considered.out;
-  // Stereo sees nothing but a fixed block.
+  // Stereo sees nothing but a constant block.
   const Outcome all =
-      Call({"explain", "config.yaml", "--set", "state.target.fixed=[depth, depth_rate]"});
+      Call({"explain", "config.yaml", "--set", "state.target.constant=[depth, depth_rate]"});
   EXPECT_TRUE(Contains(all.out, "rejections of a sensor in a row; nothing for stereo\n"))
       << all.out;
 }

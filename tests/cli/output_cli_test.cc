@@ -127,7 +127,7 @@ TEST_F(OutputCli, MeasurementsStandBesideWhatTruthMakesOfThem) {
   const double depth = Cell(Read("out/truth.csv"), t, 1);
   const double lambda = Cell(Read("out/truth.csv"), t, 3);
   EXPECT_NEAR(depth, 0.3 + 0.1 * std::sin(2 * 3.14159265358979 * 0.4 * 0.33), 1e-12);
-  const std::string expected = Read("out/expected.csv"), implied = Read("out/implied.csv");
+  const std::string expected = Read("out/expected.csv"), implied = Read("out/implied_states.csv");
   EXPECT_NEAR(Cell(expected, t + "inverse_scale", 2), lambda * depth, 1e-12);
   EXPECT_NEAR(Cell(expected, t + "disparity,", 2), 26.0 / depth, 1e-9);
   // Z0 / scale

@@ -14,9 +14,9 @@ camera: {width: 640, height: 480, fx: 525, fy: 525, cx: 320, cy: 240}
 source:
   type: scene
   seed: 3
-  frames: 20
-  odometry: true
-  known: {count: 3}
+  max_frames: 20
+  simulate_odometry: true
+  known_points: {count: 3}
   points: {box: {min: [-2, -1.5, 2], max: [2, 1.5, 6]}, count: 40}
   trajectory: {look_at: [{position: [-0.5, 0, 0], target: [0, 0, 4]},
                          {position: [0.5, 0, 0], target: [0, 0, 4]}]}
@@ -64,7 +64,7 @@ TEST_F(SimulateCli, SaysInItsFolderWhetherItWasStopped) {
   EXPECT_EQ(Json("whole/simulate.json").root().At("frames").Number(), 20.0);
   // 1e6 frames: more than a minute of work.
   const pid_t simulate =
-      Start({"simulate", "scene.yaml", "-o", "data", "--set", "source.frames=1000000"});
+      Start({"simulate", "scene.yaml", "-o", "data", "--set", "source.max_frames=1000000"});
   const std::string partial = ".data.partial-" + std::to_string(simulate);
   ASSERT_TRUE(Eventually([&] { return Exists(partial + "/tracks.csv"); }));
   ::kill(simulate, SIGTERM);
@@ -134,15 +134,17 @@ TEST_F(SimulateCli, WritesTheStreamsOfAnySource) {
 }
 
 TEST_F(SimulateCli, ACalibrationOfAStereoPairHasItsBaseline) {
-  std::string scene = kScene + "  measures: stereo\n  baseline_m: 0.2\n";
-  const std::string known = "  known: {count: 3}\n";
+  std::string scene = kScene + "  measures: stereo\n";
+  scene.insert(scene.find("width"), "baseline_m: 0.2, ");
+  const std::string known = "  known_points: {count: 3}\n";
   Write("scene.yaml", scene.erase(scene.find(known), known.size()));
   const Outcome made = Call({"simulate", "scene.yaml", "-o", "data"});
   ASSERT_EQ(made.code, 0) << made.err;
-  EXPECT_EQ(Json("data/calibration.yaml").root().At("baseline_m").Number(), 0.2);
+  EXPECT_EQ(Json("data/calibration.yaml").root().At("camera").At("baseline_m").Number(), 0.2);
   // A config that includes it is none the worse, and hands it on.
-  Write("depth.yaml", testing::kDepthConfig + "baseline_m: 0.2\n");
-  const Outcome explained = Call({"explain", "depth.yaml"});
+  const Outcome explained =
+      Call({"explain", ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml", "--set",
+            "camera.baseline_m=0.2"});
   EXPECT_EQ(explained.code, 0) << explained.err;
   Write("again.yaml",
         "alidade: 1\ninclude: data/calibration.yaml\nsource: {type: tracks, path: data, measures: "
@@ -153,10 +155,10 @@ TEST_F(SimulateCli, ACalibrationOfAStereoPairHasItsBaseline) {
 }
 
 TEST_F(SimulateCli, RefusesAKeyThatNobodyReads) {
-  Write("scene.yaml", kScene + "  nose_px: 2\n");
+  Write("scene.yaml", kScene + "  sigma_p: 2\n");
   const Outcome made = Call({"simulate", "scene.yaml", "-o", "data"});
   EXPECT_EQ(made.code, 78);
-  EXPECT_TRUE(Contains(made.err, "source.nose_px: unknown key; did you mean 'noise_px'?"))
+  EXPECT_TRUE(Contains(made.err, "source.sigma_p: unknown key; did you mean 'sigma_px'?"))
       << made.err;
   Write("scene.yaml", kScene);
   const Outcome lens = Call({"simulate", "scene.yaml", "-o", "data", "--set", "camera.fz=3"});

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The batch on path and map, beside the filter: examples/10_slam_scene and 13_slam_odometry_tracks.
+// The batch on trajectory and map, and the filter: examples/10_slam_scene and
+// 13_slam_odometry_tracks.
 #include <filesystem>
 
 #include "alidade/sweep/sweep.h"

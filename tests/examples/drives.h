@@ -31,7 +31,7 @@ class DrivesTest : public ::testing::Test {
     Config config = Config::FromFile(std::filesystem::path(ALIDADE_SOURCE_DIR) / "examples" /
                                      example / "config.yaml");
     config.Set("source.path", (folder_ / drive).string(), "--set");
-    config.Set("source.frames", std::to_string(frames), "--set");
+    config.Set("source.max_frames", std::to_string(frames), "--set");
     for (const auto& [key, value] : settings) config.Set(key, value, "--set");
     return config;
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/15_slam_forms: one filter with landmarks in different forms.
+// examples/15_slam_forms: one filter with landmarks in different representations.
 #include <gtest/gtest.h>
 
 #include <filesystem>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The mounting of a camera on a vehicle with odometry, and the speed of the odometry, in the state.
+// The extrinsics of a camera on a vehicle with odometry, and the speed of the odometry, in the
+// state.
 #include <gtest/gtest.h>
 
 #include "alidade/sweep/sweep.h"
@@ -31,10 +32,10 @@ sensors:
     sigma_px: 1.0
 source:
   type: scene
-  frames: 100
+  max_frames: 100
   rate_hz: 10
-  noise_px: 1.0
-  odometry: true
+  sigma_px: 1.0
+  simulate_odometry: true
   odometry_noise: {linear: 0.004, angular: 0.002}
   points: {box: {min: [-1.2, -0.9, 2.2], max: [1.2, 0.9, 5.5]}, count: 40}
   trajectory:
@@ -50,19 +51,21 @@ estimators:
     type: ekf
     gate: 0.9999
     overrides:
-      state: {cam: {initial: {mounting_orientation: {mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0.03}}}}
+      state:
+        cam:
+          initial: {extrinsics_orientation: {mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0.03}}
   considered:
     type: ekf
     gate: 0.9999
     overrides:
       state:
         cam:
-          consider: [mounting_orientation]
-          initial: {mounting_orientation: {mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0.03}}
+          consider: [extrinsics_orientation]
+          initial: {extrinsics_orientation: {mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0.03}}
 )";
 
 std::vector<SweepSummary> Ten() {
-  const Config config = Config::FromText(kConfig, "mounting.yaml");
+  const Config config = Config::FromText(kConfig, "extrinsics.yaml");
   const PluginHost host(PluginPaths(config));
   SweepOptions options;
   options.runs = 10;
@@ -70,7 +73,7 @@ std::vector<SweepSummary> Ten() {
   return Summarise(Sweep(config, host, options));
 }
 
-// Estimated or considered, a wrong mounting costs neither the path nor the honesty of the filter.
+// Estimated or considered, wrong extrinsics cost neither the path nor the honesty of the filter.
 TEST(SlamMounting, MayBeWrongWhereItIsInTheState) {
   const auto summaries = Ten();
   const auto& without = summaries.at(0).metrics;

@@ -26,7 +26,7 @@ double Mean(const SweepSummary& ekf, const char* metric) { return ekf.metrics.at
 
 TEST(SlamParameters, VagueInitialVelocitiesCostLittle) {
   for (const char* key :
-       {"state.cam.initial.velocity.variance", "state.cam.initial.angular_velocity.variance"}) {
+       {"state.cam.initial.velocity.sigma", "state.cam.initial.angular_velocity.sigma"}) {
     const SweepSummary ekf = Ten(key, "1");
     EXPECT_EQ(ekf.diverged + ekf.inconsistent, 0) << key;
     EXPECT_LE(Mean(ekf, "final_error:cam.position"), 0.012) << key;

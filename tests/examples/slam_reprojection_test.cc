@@ -18,8 +18,8 @@ namespace {
 
 const std::filesystem::path kExamples = std::filesystem::path(ALIDADE_SOURCE_DIR) / "examples";
 
-constexpr std::array kNoise = {"source.noise_px"};
-constexpr std::array kNoiseAndR = {"source.noise_px", "sensors.pixels.sigma_px",
+constexpr std::array kNoise = {"source.sigma_px"};
+constexpr std::array kNoiseAndR = {"source.sigma_px", "sensors.pixels.sigma_px",
                                    "sensors.known.sigma_px"};
 
 /// Seeds 1001 to 1020 with these keys at `noise_px`.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/10_slam_scene, held against the figures that its README states.
+// examples/10_slam_scene, compared with the figures that its README states.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -56,7 +56,7 @@ TEST(SlamScene, IsExactAndHonestOnASidewaysSweep) {
 
 TEST(SlamScene, IsHonestAtOtherNoise) {
   for (const char* noise : {"0.5", "2"}) {
-    const Settings settings{{"source.noise_px", noise},
+    const Settings settings{{"source.sigma_px", noise},
                             {"sensors.pixels.sigma_px", noise},
                             {"sensors.known.sigma_px", noise}};
     for (const char* name : {"config.yaml", "sweep.yaml"}) {
@@ -67,7 +67,7 @@ TEST(SlamScene, IsHonestAtOtherNoise) {
 }
 
 TEST(SlamScene, WithoutNoiseTheMapIsExactButForLinearisation) {
-  const SweepSummary ekf = Twenty("config.yaml", {{"source.noise_px", "0"}});
+  const SweepSummary ekf = Twenty("config.yaml", {{"source.sigma_px", "0"}});
   EXPECT_EQ(ekf.diverged + ekf.inconsistent, 0);
   EXPECT_LE(ekf.metrics.at("final_error:cam.position").mean, 0.005);
   EXPECT_LE(ekf.metrics.at("map.sim3.rmse").mean, 0.0025);
@@ -83,8 +83,8 @@ TEST(SlamScene, ManyWrongPriorsShowInNeesAndNotInNis) {
   EXPECT_LE(ekf.metrics.at("nis.mean:pixels").mean, 1.05);
 }
 
-// Without known depth the same prior makes path and map as much too small, and the map keeps its
-// shape.
+// Without known depth the same prior makes trajectory and map as much too small, and the map keeps
+// its shape.
 TEST(SlamScene, ScaleIsThePriorsWhereNoDepthIsKnown) {
   const SweepSummary ekf =
       Twenty("config.yaml", {{"estimators.ekf.sensors", "[pixels]"},

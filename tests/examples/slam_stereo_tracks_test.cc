@@ -54,9 +54,8 @@ TEST_F(SlamStereoTracks, DoNotHangOnNoiseGateOrMoreFeatures) {
 }
 
 TEST_F(SlamStereoTracks, AreThoseOfTheirOwnCamera) {
-  for (const auto& [key, other, own] :
-       {std::tuple("camera.fx", "707.0912", "721.5377"),
-        std::tuple("sensors.stereo.baseline_m", "0.54", "0.537150")}) {
+  for (const auto& [key, other, own] : {std::tuple("camera.fx", "707.0912", "721.5377"),
+                                        std::tuple("camera.baseline_m", "0.54", "0.537150")}) {
     const Config config = ConfigOf("14_slam_stereo_tracks", "drive_0036", 5, {{key, other}});
     const PluginHost host(PluginPaths(config));
     try {

@@ -28,7 +28,7 @@ landmarks: {representation: inverse_depth, prior: {inverse_distance: 0.5, sigma:
 sensors:
   pixels: {model: inverse_depth_feature, stream: tracks, sigma_px: 1.0,
            roles: {position: cam.position, orientation: cam.orientation, landmark: landmarks}}
-source: {type: tracks, path: tracks.csv, frame_rate_hz: 30}
+source: {type: tracks, path: tracks.csv, rate_hz: 30}
 estimators: {ekf: {type: ekf, gate: 0.99}}
 )";
 
@@ -159,7 +159,7 @@ TEST_F(DataFault, AnEmptyFrameIsPredictedThrough) {
   EXPECT_EQ(Count("accepted:stereo"), 2);
   Write("tracks.csv", Plane(0, 0.0) + Plane(2, 0.0));
   Write("timestamps.csv", "0,0\n1,0.033\n2,0.066\n");
-  Run("map.yaml", {"--set", "source.frame_rate_hz=0"});
+  Run("map.yaml", {"--set", "source.rate_hz=0"});
   EXPECT_TRUE(Contains(Read("out/ekf/estimates.csv"), "\n0.033000000,"));
   EXPECT_EQ(Count("accepted:pixels"), 6);
 }

@@ -83,8 +83,8 @@ TEST_F(LongRun, MemoryDoesNotGrowWithTheTable) {
 TEST_F(LongRun, MemoryDoesNotGrowAsLandmarksComeAndGo) {
   if (kSanitized) GTEST_SKIP() << "the sanitizer keeps what was freed";
   const auto peak = [&](int frames) {
-    return PeakOf(kBench + "walk.yaml",
-                  {"source.frames=" + std::to_string(frames), "source.max_features_per_frame=20"});
+    return PeakOf(kBench + "walk.yaml", {"source.max_frames=" + std::to_string(frames),
+                                         "source.max_features_per_frame=20"});
   };
   // The path of the scene is drawn beforehand: 104 bytes a frame, 0.3 MB. Landmarks that stayed
   // would take 12 MB.

@@ -35,16 +35,17 @@ void Emplace(double sigma, AlidadeInstance* instance) {
   alidade::detail::PublishSensor(std::make_unique<Holder>(Model(sigma)), instance);
 }
 
-/// Pixels of a landmark, in the form that `landmarks.representation` says.
+/// Pixels of a landmark, in the representation that `landmarks.representation` says.
 void MakePixels(alidade::Params& p, AlidadeInstance* instance) {
   using namespace alidade::testing;  // NOLINT(google-build-using-namespace): the test sensors
-  const int form = p.Choice("landmarks.representation", {"inverse_depth", "anchored", "xyz"},
-                            "how landmarks are written", 0);
+  const int representation =
+      p.Choice("landmarks.representation", {"inverse_depth", "anchored", "xyz"},
+               "how landmarks are written", 0);
   const double sigma = p.Positive("sigma_px", "px", "noise, 1 sigma") /
                        p.Positive("camera.focal_px", "px", "focal length");
-  if (form == 0) Emplace<InverseDepthPixels>(sigma, instance);
-  if (form == 1) Emplace<AnchoredPixels<ALIDADE_ROLE_SHARED>>(sigma, instance);
-  if (form == 2) Emplace<XyzPixels>(sigma, instance);
+  if (representation == 0) Emplace<InverseDepthPixels>(sigma, instance);
+  if (representation == 1) Emplace<AnchoredPixels<ALIDADE_ROLE_SHARED>>(sigma, instance);
+  if (representation == 2) Emplace<XyzPixels>(sigma, instance);
 }
 
 }  // namespace

@@ -27,7 +27,8 @@ const MapHost::Values kMounted{{"noise.kind", {1}},  // discrete
                                {"vehicle_from_cam.orientation.y", {0.5}},
                                {"vehicle_from_cam.orientation.z", {-0.5}}};
 
-/// Owned blocks: the mounting and the speed are as the parameters and the input have them.
+/// Model parameter states: the extrinsics and the speed are as the parameters and the input have
+/// them.
 const Blocks kAsGiven{{0, 0, 0}, {1, 0, 0, 0}, {0}};
 
 /// The pose of the camera of a vehicle at (x, y), turned by `yaw` about z up.
@@ -71,7 +72,7 @@ TEST(OdometryPose, FollowsTheVehicle) {
              Camera(1, 10, kPi));
 }
 
-// What the owned blocks say is as if the parameters and the input had said it.
+// What the model parameter states say is as if the parameters and the input had said it.
 TEST(OdometryPose, MountingAndSpeedMayBeInTheState) {
   const double input[6] = {2, 0.1, -0.3, 0.2, 0.5, -0.9};
   const double wrong[6] = {2 / 1.25, 0.1 / 1.25, -0.3 / 1.25, 0.2, 0.5, -0.9};

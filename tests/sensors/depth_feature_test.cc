@@ -12,19 +12,19 @@ using namespace testing;  // NOLINT(google-build-using-namespace)
 
 const Blocks kPose{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}};
 
-template <class Form>
+template <class Representation>
 SensorModel Made(const Camera& camera) {
-  return InProcessSensor(DepthFeature<Form>(camera, 0.5, 0.01, 0.003), "depth_feature");
+  return InProcessSensor(DepthFeature<Representation>(camera, 0.5, 0.01, 0.003), "depth_feature");
 }
 
 TEST(DepthFeature, PredictsWorkedNumbers) {
   // The camera at (1, 0, 0) looks along z; the point is (0, 0.4, 2) m, 2 m deep
   // sigma_d = 0.01 + 0.003 2^2 = 0.022 m
-  ForEachForm([](auto form) {
-    using Form = decltype(form);
-    const Blocks roles =
-        Blocks{{1, 0, 0}, {1, 0, 0, 0}} + LandmarkAt<Form>({0.3, -0.2, 0.1}, {0.0, 0.4, 2.0});
-    const SensorModel sensor = Made<Form>(Pinhole());
+  ForEachRepresentation([](auto representation) {
+    using Representation = decltype(representation);
+    const Blocks roles = Blocks{{1, 0, 0}, {1, 0, 0, 0}} +
+                         LandmarkAt<Representation>({0.3, -0.2, 0.1}, {0.0, 0.4, 2.0});
+    const SensorModel sensor = Made<Representation>(Pinhole());
     const std::vector<double> z = Predicted(sensor, roles);
     EXPECT_NEAR(z[0], 57.5, 1e-12);
     EXPECT_NEAR(z[1], 345.0, 1e-12);
@@ -40,17 +40,17 @@ TEST(DepthFeature, HasTrueJacobians) {
   Vec3 ahead{0.2, -0.3, 5.0}, point;
   UnitQuaternion::Rotate(kPose[1].data(), ahead.data(), point.data());
   for (std::size_t i = 0; i < 3; ++i) point[i] += kPose[0][i];
-  ForEachForm([&](auto form) {
-    using Form = decltype(form);
-    const Blocks roles = kPose + LandmarkAt<Form>({-0.5, 0.2, -0.8}, point);
-    ExpectTrueJacobians(Made<Form>(Lens()), roles);
-    EXPECT_NEAR(Predicted(Made<Form>(Lens()), roles)[2], 5.0, 1e-14);
+  ForEachRepresentation([&](auto representation) {
+    using Representation = decltype(representation);
+    const Blocks roles = kPose + LandmarkAt<Representation>({-0.5, 0.2, -0.8}, point);
+    ExpectTrueJacobians(Made<Representation>(Lens()), roles);
+    EXPECT_NEAR(Predicted(Made<Representation>(Lens()), roles)[2], 5.0, 1e-14);
   });
 }
 
 TEST(DepthFeature, InitialisesWithoutAPrior) {
-  ForEachForm([](auto form) {
-    const SensorModel sensor = Made<decltype(form)>(Lens());
+  ForEachRepresentation([](auto representation) {
+    const SensorModel sensor = Made<decltype(representation)>(Lens());
     EXPECT_EQ(sensor.prior_size(), 0);
     ExpectTrueInverse(sensor, Blocks{kPose[0], kPose[1], {411, 87.5, 3.2}});
   });

@@ -13,29 +13,29 @@ using namespace testing;  // NOLINT(google-build-using-namespace)
 const Blocks kPose{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}};
 const Vec3 kAnchor{-0.5, 0.2, -0.8};
 
-template <class Form>
+template <class Representation>
 SensorModel Made(const Camera& camera) {
-  return InProcessSensor(InverseDepthFeature<Form>(camera, 1.5), "inverse_depth_feature");
+  return InProcessSensor(InverseDepthFeature<Representation>(camera, 1.5), "inverse_depth_feature");
 }
 
 /// The landmark that the camera at kPose sees at `pixel`, 4 m away, first seen from kAnchor.
-template <class Form>
+template <class Representation>
 Blocks SeenAt(const Camera& camera, const std::vector<double>& pixel) {
   Vec3 h;
   double p[3];
   EXPECT_TRUE(camera.Unproject(pixel.data(), h.data()));
   EXPECT_TRUE(PlaceLandmark<Xyz>(kPose[0].data(), kPose[1].data(), h.data(), 0.25, p));
-  return LandmarkAt<Form>(kAnchor, {p[0], p[1], p[2]});
+  return LandmarkAt<Representation>(kAnchor, {p[0], p[1], p[2]});
 }
 
 TEST(InverseDepthFeature, PredictsWorkedNumbers) {
   // The camera at (1, 0, 0) looks along z; the point is (0, 0.4, 2) m: h = (-1, 0.4, 2)
   // u = 320 + 525 (-1) / 2 = 57.5, v = 240 + 525 0.4 / 2 = 345 px
-  ForEachForm([](auto form) {
-    using Form = decltype(form);
-    const Blocks landmark = LandmarkAt<Form>({0.3, -0.2, 0.1}, {0.0, 0.4, 2.0});
+  ForEachRepresentation([](auto representation) {
+    using Representation = decltype(representation);
+    const Blocks landmark = LandmarkAt<Representation>({0.3, -0.2, 0.1}, {0.0, 0.4, 2.0});
     const Blocks roles = Blocks{{1, 0, 0}, {1, 0, 0, 0}} + landmark;
-    const SensorModel sensor = Made<Form>(Pinhole());
+    const SensorModel sensor = Made<Representation>(Pinhole());
     const std::vector<double> z = Predicted(sensor, roles);
     EXPECT_NEAR(z[0], 57.5, 1e-12);
     EXPECT_NEAR(z[1], 345.0, 1e-12);
@@ -47,15 +47,15 @@ TEST(InverseDepthFeature, PredictsWorkedNumbers) {
 
 TEST(InverseDepthFeature, HasTrueJacobiansOverTheImage) {
   const Camera camera = Lens();
-  ForEachForm([&](auto form) {
-    using Form = decltype(form);
+  ForEachRepresentation([&](auto representation) {
+    using Representation = decltype(representation);
     for (const std::vector<double>& pixel :
          {std::vector<double>{320.5, 239.25}, {-0.5, -0.5}, {639.5, 12.0}, {5.0, 479.5}}) {
-      const Blocks roles = kPose + SeenAt<Form>(camera, pixel);
-      const std::vector<double> z = Predicted(Made<Form>(camera), roles);
+      const Blocks roles = kPose + SeenAt<Representation>(camera, pixel);
+      const std::vector<double> z = Predicted(Made<Representation>(camera), roles);
       EXPECT_NEAR(z[0], pixel[0], 1e-9);
       EXPECT_NEAR(z[1], pixel[1], 1e-9);
-      ExpectTrueJacobians(Made<Form>(camera), roles);
+      ExpectTrueJacobians(Made<Representation>(camera), roles);
     }
   });
 }
@@ -89,8 +89,8 @@ TEST(InverseDepthFeature, SeesNearThePoles) {
 
 TEST(InverseDepthFeature, InitialisesFromAPrior) {
   for (const Camera& camera : {Pinhole(), Lens()}) {
-    ForEachForm([&](auto form) {
-      ExpectTrueInverse(Made<decltype(form)>(camera),
+    ForEachRepresentation([&](auto representation) {
+      ExpectTrueInverse(Made<decltype(representation)>(camera),
                         Blocks{kPose[0], kPose[1], {411.0, 87.5}, {0.25}});
     });
   }
@@ -102,12 +102,13 @@ TEST(InverseDepthFeature, InitialisesFromAPrior) {
 }
 
 TEST(InverseDepthFeature, IsUndefinedBehindTheCamera) {
-  ForEachForm([](auto form) {
-    using Form = decltype(form);
+  ForEachRepresentation([](auto representation) {
+    using Representation = decltype(representation);
     const Blocks roles =
-        Blocks{{0, 0, 3}, {1, 0, 0, 0}} + LandmarkAt<Form>({0, 0, 0}, {0.1, 0.2, 2.0});
+        Blocks{{0, 0, 3}, {1, 0, 0, 0}} + LandmarkAt<Representation>({0, 0, 0}, {0.1, 0.2, 2.0});
     double z[2] = {kPoison, kPoison};
-    EXPECT_EQ(Made<Form>(Pinhole()).Predict(Pointers(roles).data(), z), Status::kOutOfDomain);
+    EXPECT_EQ(Made<Representation>(Pinhole()).Predict(Pointers(roles).data(), z),
+              Status::kOutOfDomain);
     EXPECT_EQ(z[0], kPoison);
     EXPECT_EQ(z[1], kPoison);
   });

@@ -21,7 +21,7 @@ using testing::NumericallyLinearised;
 using testing::Pointers;
 
 // lambda = 3 1/m, Z = 0.5 m: s = 1.5
-const MapHost::Values kScale{{"noise", {0}}, {"template_px", {300}}, {"sigma_px", {1}}};
+const MapHost::Values kScale{{"noise_model", {0}}, {"template_px", {300}}, {"sigma_px", {1}}};
 const Blocks kScaleRoles{{0.5}, {3.0}};
 
 TEST(Scale2d, PredictsWorkedNumbers) {
@@ -37,8 +37,9 @@ TEST(Scale2d, PredictsWorkedNumbers) {
   EXPECT_DOUBLE_EQ(sigma, 0.0225);
 }
 
-TEST(Scale2d, NoiseMayBeFixed) {
-  const SensorModel scale = MakeSensor<Scale2d>({{"noise", {1}}, {"variance", {4e-4}}});
+TEST(Scale2d, NoiseMayBeConstant) {
+  const SensorModel scale =
+      MakeSensor<Scale2d>({{"noise_model", {1}}, {"sigma_inverse_scale", {0.02}}});
   double s = 1.5, sigma = kPoison;
   ASSERT_EQ(scale.SqrtNoise(Pointers(kScaleRoles).data(), &s, &sigma), Status::kOk);
   EXPECT_DOUBLE_EQ(sigma, 0.02);

@@ -22,7 +22,7 @@ using testing::NumericallyLinearised;
 
 // f = 400 px, B = 0.065 m, Z = 0.5 m: d = 400 0.065 / 0.5 = 52 px
 const MapHost::Values kStereo{
-    {"focal_px", {400}}, {"baseline_m", {0.065}}, {"sigma_px", {1.5}}, {"near_m", {0.2}}};
+    {"focal_px", {400}}, {"baseline_m", {0.065}}, {"sigma_px", {1.5}}, {"min_range_m", {0.2}}};
 
 TEST(StereoDisparity, PredictsWorkedNumbers) {
   const SensorModel stereo = MakeSensor<StereoDisparity>(kStereo);

@@ -11,23 +11,24 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace)
 
-template <class Form>
+template <class Representation>
 SensorModel Made() {
-  return InProcessSensor(StereoFeature<Form>(Pinhole(), 0.1, 0.5), "stereo_feature");
+  return InProcessSensor(StereoFeature<Representation>(Pinhole(), 0.1, 0.5), "stereo_feature");
 }
 
 TEST(StereoFeature, PredictsWorkedNumbers) {
   // The left camera at (1, 0, 0) looks along z; the point is (0, 0.4, 2) m, as mono sees it
   // d = 525 0.1 / 2 = 26.25 px: u_right = 57.5 - 26.25
-  ForEachForm([](auto form) {
-    using Form = decltype(form);
-    const Blocks roles =
-        Blocks{{1, 0, 0}, {1, 0, 0, 0}} + LandmarkAt<Form>({0.3, -0.2, 0.1}, {0.0, 0.4, 2.0});
-    const std::vector<double> z = Predicted(Made<Form>(), roles);
+  ForEachRepresentation([](auto representation) {
+    using Representation = decltype(representation);
+    const Blocks roles = Blocks{{1, 0, 0}, {1, 0, 0, 0}} +
+                         LandmarkAt<Representation>({0.3, -0.2, 0.1}, {0.0, 0.4, 2.0});
+    const std::vector<double> z = Predicted(Made<Representation>(), roles);
     const double expected[4] = {57.5, 345.0, 31.25, 345.0};
     for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(z[i], expected[i], 1e-12);
     std::vector<double> l(16, kPoison);
-    ASSERT_EQ(Made<Form>().SqrtNoise(Pointers(roles).data(), z.data(), l.data()), Status::kOk);
+    ASSERT_EQ(Made<Representation>().SqrtNoise(Pointers(roles).data(), z.data(), l.data()),
+              Status::kOk);
     for (std::size_t i = 0; i < 16; ++i) EXPECT_EQ(l[i], i % 5 == 0 ? 0.5 : 0.0);
   });
 }
@@ -44,13 +45,13 @@ TEST(StereoFeature, TheRightCameraIsBesideTheLeftOne) {
   double h[3], pixel[2];
   InCamera(Xyz::ToRay(point.data()), at.data(), pose[1].data(), h);
   ASSERT_TRUE(Pinhole().Project(h, pixel));
-  ForEachForm([&](auto form) {
-    using Form = decltype(form);
-    const Blocks roles = pose + LandmarkAt<Form>({-0.5, 0.2, -0.8}, point);
-    const std::vector<double> z = Predicted(Made<Form>(), roles);
+  ForEachRepresentation([&](auto representation) {
+    using Representation = decltype(representation);
+    const Blocks roles = pose + LandmarkAt<Representation>({-0.5, 0.2, -0.8}, point);
+    const std::vector<double> z = Predicted(Made<Representation>(), roles);
     EXPECT_NEAR(z[2], pixel[0], 1e-11);
     EXPECT_NEAR(z[3], pixel[1], 1e-11);
-    ExpectTrueJacobians(Made<Form>(), roles);
+    ExpectTrueJacobians(Made<Representation>(), roles);
   });
 }
 
@@ -62,8 +63,8 @@ TEST(StereoFeature, SeesNoDisparityAtInfinity) {
 }
 
 TEST(StereoFeature, InitialisesWithoutAPrior) {
-  ForEachForm([](auto form) {
-    const SensorModel sensor = Made<decltype(form)>();
+  ForEachRepresentation([](auto representation) {
+    const SensorModel sensor = Made<decltype(representation)>();
     EXPECT_EQ(sensor.prior_size(), 0);
     ExpectTrueInverse(sensor,
                       Blocks{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}, {411, 87.5, 390, 87.5}});
@@ -90,10 +91,11 @@ TEST(StereoFeature, IsValidWhereBothCamerasSeeIt) {
 }
 
 TEST(StereoFeature, NeedsCamerasWithoutDistortion) {
-  MapHost::Values values{{"camera.model", {0}}, {"camera.width", {640}}, {"camera.height", {480}},
-                         {"camera.fx", {525}},  {"camera.fy", {525}},    {"camera.cx", {320}},
-                         {"camera.cy", {240}},  {"camera.k1", {0.1}},    {"camera.k2", {0.0}},
-                         {"baseline_m", {0.1}}, {"sigma_px", {1}}};
+  MapHost::Values values{
+      {"camera.model", {0}},        {"camera.width", {640}}, {"camera.height", {480}},
+      {"camera.fx", {525}},         {"camera.fy", {525}},    {"camera.cx", {320}},
+      {"camera.cy", {240}},         {"camera.k1", {0.1}},    {"camera.k2", {0.0}},
+      {"camera.baseline_m", {0.1}}, {"sigma_px", {1}}};
   const MapHost pinhole(values);
   static_cast<void>(MakeInstance(&EmplaceSensor<StereoFeature<Xyz>>, pinhole));
   EXPECT_TRUE(pinhole.failures().empty());

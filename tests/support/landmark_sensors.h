@@ -7,7 +7,7 @@
 #include "alidade/model/model.h"
 #include "alidade/model/plugin_abi.h"
 
-/// A camera that walks at random without turning, and sensors of landmarks in each form.
+/// A camera that walks at random without turning, and sensors of landmarks in each representation.
 namespace alidade::testing {
 
 /// r' = r + sigma sqrt(dt) w

@@ -6,7 +6,8 @@
 #include "alidade/model/landmark.h"
 #include "support/model_checks.h"
 
-/// Landmarks of every form before a camera, and what tests of sensors of landmarks ask of them.
+/// Landmarks of every representation before a camera, and what tests of sensors of landmarks ask of
+/// them.
 namespace alidade::testing {
 
 using Vec3 = std::array<double, 3>;
@@ -18,45 +19,47 @@ inline Camera Lens() {
 }
 inline Camera Pinhole() { return Camera(640, 480, 525, 525, 320, 240); }
 
-/// f(Form{}) of each form.
+/// f(Representation{}) of each representation.
 template <class F>
-void ForEachForm(const F& f) {
-  for (const auto form :
-       {LandmarkForm::kInverseDepth, LandmarkForm::kAnchored, LandmarkForm::kXyz}) {
-    SCOPED_TRACE(kLandmarkForms[static_cast<int>(form)]);
-    WithForm(form, f);
+void ForEachRepresentation(const F& f) {
+  for (const auto representation :
+       {LandmarkRepresentation::kInverseDepth, LandmarkRepresentation::kAnchored,
+        LandmarkRepresentation::kXyz}) {
+    SCOPED_TRACE(kLandmarkRepresentations[static_cast<int>(representation)]);
+    WithRepresentation(representation, f);
   }
 }
 
-/// The values `y` as blocks of the form.
-template <class Form>
+/// The values `y` as blocks of the representation.
+template <class Representation>
 Blocks CutIntoBlocks(const double* y) {
   Blocks blocks;
   const auto cut = [&](auto index) {
-    constexpr int n = detail::SpaceAt<decltype(index)::value, Form>::kAmbient;
+    constexpr int n = detail::SpaceAt<decltype(index)::value, Representation>::kAmbient;
     blocks.emplace_back(y, y + n);
     y += n;
   };
-  detail::ForEach(cut, typename detail::Blocks<Form>::Indices{});
+  detail::ForEach(cut, typename detail::Blocks<Representation>::Indices{});
   return blocks;
 }
 
 /// The landmark a + m / rho, m of unit length.
-template <class Form>
+template <class Representation>
 Blocks LandmarkOn(const Ray<double>& ray) {
-  double y[detail::Blocks<Form>::kAmbient];
-  EXPECT_TRUE(Form::FromRay(ray, y));
-  return CutIntoBlocks<Form>(y);
+  double y[detail::Blocks<Representation>::kAmbient];
+  EXPECT_TRUE(Representation::FromRay(ray, y));
+  return CutIntoBlocks<Representation>(y);
 }
 
 /// The landmark at `point`, first seen from `anchor`.
-template <class Form>
+template <class Representation>
 Blocks LandmarkAt(const Vec3& anchor, const Vec3& point) {
   Vec3 m;
   for (std::size_t i = 0; i < 3; ++i) m[i] = point[i] - anchor[i];
   const double distance = std::hypot(m[0], m[1], m[2]);
   for (double& element : m) element /= distance;
-  return LandmarkOn<Form>({{anchor[0], anchor[1], anchor[2]}, {m[0], m[1], m[2]}, 1.0 / distance});
+  return LandmarkOn<Representation>(
+      {{anchor[0], anchor[1], anchor[2]}, {m[0], m[1], m[2]}, 1.0 / distance});
 }
 
 inline Blocks operator+(Blocks a, const Blocks& b) {
@@ -82,8 +85,8 @@ inline void ExpectTrueInverse(const SensorModel& sensor, const Blocks& from) {
   std::vector<Space> spaces{sensor.roles()[0], sensor.roles()[1], sensor.measurement()};
   spaces.resize(from.size());
   if (from.size() > 3) spaces[3].geometry = Geometry::Vector(sensor.prior_size());
-  const std::vector<Space> forms(sensor.roles().begin() + 2, sensor.roles().end());
-  const int n = TangentSize(forms), m = spaces[2].geometry.tangent;
+  const std::vector<Space> representations(sensor.roles().begin() + 2, sensor.roles().end());
+  const int n = TangentSize(representations), m = spaces[2].geometry.tangent;
   std::vector<double> jr(3 * n), jq(3 * n), jz(m * n), jp(n);
   const auto place = [&](const Blocks& x, bool jacobians) {
     std::vector<const double*> roles(sensor.roles().size());
@@ -98,7 +101,7 @@ inline void ExpectTrueInverse(const SensorModel& sensor, const Blocks& from) {
                           jacobians ? jx.data() : nullptr, jacobians ? jz.data() : nullptr,
                           jacobians && x.size() > 3 ? jp.data() : nullptr),
         Status::kOk);
-    Blocks blocks = Filled(forms, 0.0);
+    Blocks blocks = Filled(representations, 0.0);
     const double* at = y.data();
     for (auto& block : blocks) {
       std::copy_n(at, block.size(), block.begin());
@@ -120,7 +123,8 @@ inline void ExpectTrueInverse(const SensorModel& sensor, const Blocks& from) {
     if (from.size() > 3) append(jp, 1);
   }
   ExpectSame(all,
-             NumericJacobian(spaces, from, forms, [&](const Blocks& x) { return place(x, false); }),
+             NumericJacobian(spaces, from, representations,
+                             [&](const Blocks& x) { return place(x, false); }),
              10 * kNumeric);
 }
 

@@ -11,7 +11,7 @@
 #include "alidade/host/model_instance.h"
 #include "support/numeric_jacobian.h"
 
-/// What the tests of models ask of them, through the C boundary.
+/// What the tests of models ask of them, through the plugin ABI.
 namespace alidade::testing {
 
 inline constexpr double kPoison = 1e302;

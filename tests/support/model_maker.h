@@ -12,7 +12,7 @@
 
 namespace alidade::testing {
 
-/// A host that answers from a map: models through the C boundary without a plugin file.
+/// A host that answers from a map: models through the plugin ABI without a plugin file.
 class MapHost {
  public:
   using Values = std::map<std::string, std::vector<double>>;

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <type_traits>
 
-/// Matrices of Eigen cross the boundary of the library. It aligns them to 16 bytes and takes their
+/// Matrices of Eigen go in and out of the library. It aligns them to 16 bytes and takes their
 /// memory from malloc: so must a program that uses them, whatever its flags. The CMake target
 /// alidade::core sees to it.
 static_assert(EIGEN_MAX_ALIGN_BYTES == 16 && EIGEN_MAX_STATIC_ALIGN_BYTES == 16,

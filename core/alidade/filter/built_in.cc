@@ -72,7 +72,7 @@ Node NodeOf(const Unsupported& asked, const Node& root, const System& system) {
   if (asked.block >= 0) {
     const Block& block = system.layout[asked.block];
     const Node state = root.At("state").At(block.owner);
-    if (block.status == BlockStatus::kConsidered) return ConsiderOf(state, block);
+    if (block.status == BlockStatus::kConsider) return ConsiderOf(state, block);
     return state.At("initial").At(NameIn(block)).At("from_measurement");
   }
   if (asked.sensor < 0) return root.At("landmarks");

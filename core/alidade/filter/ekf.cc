@@ -200,7 +200,7 @@ bool Ekf::StepOnce(double dt_s) {
     if (!motions_[i].active) continue;
     for (const BlockId id : system_.motions[i].blocks) {
       const Block& block = state_.layout()[id];
-      if (block.status == BlockStatus::kFixed) continue;
+      if (block.status == BlockStatus::kConstant) continue;
       const Geometry& geometry = block.geometry();
       std::copy_n(next_.data() + block.value_offset, geometry.ambient, state_.value(id));
       if (geometry.kind != GeometryKind::kVector) geometry.Normalise(state_.value(id));

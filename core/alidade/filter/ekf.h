@@ -16,7 +16,7 @@ namespace alidade {
 
 /// Extended Kalman filter: x' = f(x, u, 0), P' = F P F' + G Q G'; an update with stacked Jacobian H
 /// of all accepted measurements, S = H P H' + R = L L', W = P H' L^-T, dx = W L^-1 r, P -= W W'.
-/// Where a gain is not the optimal one (considered blocks) the Joseph form takes its place. With a
+/// Where a gain is not the optimal one (consider blocks) the Joseph form takes its place. With a
 /// robust loss on the sensor R / w(d) stands for R, d^2 = r' S^-1 r.
 ///
 /// Control inputs act as ControlInputs has it. A gap stepped in parts is noted as the event
@@ -35,7 +35,7 @@ namespace alidade {
 class Ekf : public Estimator {
  public:
   /// All there is.
-  static constexpr Support kSupport = {.considered = true,
+  static constexpr Support kSupport = {.consider = true,
                                        .at_measurement = true,
                                        .from_measurement = true,
                                        .recovery = true,
@@ -74,7 +74,7 @@ class Ekf : public Estimator {
     std::vector<int> columns;                  ///< of each role in a row of H; -1: no Jacobian
     std::vector<int> strides;                  ///< for the model: `width` for each role
     std::vector<JacobianPart> parts;
-    std::vector<bool> considered;       ///< of the parts
+    std::vector<bool> consider;         ///< of the parts
     int width = 0;                      ///< of a row of H
     bool whole = false;                 ///< a row of H is n wide, with the columns of P
     bool ready = true;                  ///< all roles have a value
@@ -105,7 +105,7 @@ class Ekf : public Estimator {
     double weight = 1.0;                 ///< w of the robust loss; R is divided by it
     const SensorPlan* zeroed = nullptr;  ///< whose zeros H holds
     SensorPlan* plan = nullptr;          ///< of the landmark that it measures; null: the sensor's
-    const SensorModel* model = nullptr;  ///< of the landmark's form; null: the sensor's
+    const SensorModel* model = nullptr;  ///< of the landmark's representation; null: the sensor's
   };
 
   /// Moves state and covariance by dt_s; false, and GiveUp called, where that cannot be.
@@ -116,7 +116,7 @@ class Ekf : public Estimator {
                  bool derivatives = true);
   /// h, the innovation, R and what the estimator makes of h, in `row` and its report.
   virtual Outcome Linearise(Row& row);
-  /// The row's roles where the state has `values`; held ones as they are. Until the next call.
+  /// The row's roles where the state has `values`; known ones as they are. Until the next call.
   const double* const* RolesAt(const Row& row, const std::vector<double>& values);
   /// R at the values `roles`, or as the measurement itself says, in `row`.
   Outcome NoiseOf(Row& row, const double* const* roles);
@@ -203,7 +203,7 @@ class Ekf : public Estimator {
                const Eigen::MatrixXd& h, const Eigen::MatrixXd& r);
   Workspace::Matrix ProjectionOf(std::span<Row* const> rows);
   void InitialiseFromMeasurements();
-  /// What the inverse observation makes of one measurement.
+  /// What the inverse measurement model makes of one measurement.
   struct Inverse {
     std::vector<double> y;                   ///< values, one role after the other
     std::vector<BlockId> from;               ///< the blocks that it took
@@ -215,7 +215,7 @@ class Ekf : public Estimator {
   void RepairCovariance();
   void CountRejections();
   void Recover(Row& row);
-  void ForgetMotionOf(BlockId id);
+  void DropMotionOf(BlockId id);
   std::span<Row> rows() { return {rows_.data(), row_count_}; }
   JacobianRows JacobianOf(const Row& row) const;
   std::vector<double>& FirstEstimate(BlockId id) { return first_[static_cast<std::size_t>(id)]; }
@@ -232,10 +232,11 @@ class Ekf : public Estimator {
   std::unique_ptr<Landmarks> landmarks_;  ///< null where the system has none
   std::unique_ptr<Small> small_;          ///< null where the general path is the only one
   std::vector<int> order_;  ///< rows of P in the order of the layout; empty: as they are
-  bool waiting_ = false, considering_ = false;  ///< a block has no value yet; one is considered
-  bool holds_ = false;                          ///< the noise of a model is discrete
-  std::vector<std::vector<double>> first_;      ///< estimates of stationary blocks, by block
-  const double* correction_ = nullptr;          ///< dx of the update; null: K r
+  bool waiting_ = false,
+       considering_ = false;                ///< a block has no value yet; one is a consider state
+  bool holds_ = false;                      ///< the noise of a model is discrete
+  std::vector<std::vector<double>> first_;  ///< estimates of stationary blocks, by block
+  const double* correction_ = nullptr;      ///< dx of the update; null: K r
   // Memory that is kept from frame to frame.
   Workspace work_;
   UpdateReport report_;

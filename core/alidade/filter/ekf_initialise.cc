@@ -30,7 +30,7 @@ Outcome Ekf::Invert(Row& row, const LandmarkOptions::Prior* prior, Inverse& inve
     if ((i >= first && i < first + count) || role.block < 0) continue;
     roles[i] = state_.value(role.block);
     const Block& block = state_.layout()[role.block];
-    if (role.mode == RoleMode::kHold || !block.has_covariance()) continue;
+    if (role.mode == RoleMode::kKnown || !block.has_covariance()) continue;
     jacobians[i] = RowMajor::Constant(rows, block.geometry().tangent, std::nan(""));
     jx[i] = jacobians[i].data();
   }

@@ -11,7 +11,7 @@
 namespace alidade {
 namespace {
 
-/// A landmark that waits to enter is no more counted after so many frames without it.
+/// A landmark that waits for its initialisation is no more counted after so many frames without it.
 constexpr int kWaitingFrames = 30;
 
 /// The role of a landmark that is a point, m.
@@ -52,7 +52,7 @@ Ekf::Landmarks::Landmarks(Ekf& ekf) : ekf_(ekf), options_(*ekf.system_.landmarks
   for (const SensorBinding& sensor : ekf_.system_.sensors) {
     Family& family = families_.emplace_back();
     const std::vector<Space>& roles = sensor.model.roles();
-    family.form = FormOf(roles);
+    family.representation = RepresentationOf(roles);
     for (std::size_t i = 0; i < roles.size(); ++i) {
       if (roles[i].name == "position") family.position = static_cast<int>(i);
       ALIDADE_EXPECTS(roles[i].landmark() || family.first < 0);
@@ -64,7 +64,8 @@ Ekf::Landmarks::Landmarks(Ekf& ekf) : ekf_(ekf), options_(*ekf.system_.landmarks
                     (options_.prior && std::isfinite(options_.prior->inverse_distance) &&
                      options_.prior->sigma >= 0.0));
     ALIDADE_EXPECTS(family.first < 0 || sensor.model.prior_size() <= 1);
-    ALIDADE_EXPECTS(family.first < 0 || family.form == internal::XyzForm() || sensor.xyz ||
+    ALIDADE_EXPECTS(family.first < 0 || family.representation == internal::XyzRepresentation() ||
+                    sensor.xyz ||
                     (options_.known.empty() && !(options_.max_linearity_index > 0.0)));
     const int dof = sensor.model.measurement().geometry.tangent;
     const OnePointRansac ransac = sensor.outlier_rejection.value_or(OnePointRansac{});
@@ -81,10 +82,10 @@ BlockId Ekf::Landmarks::Declare(std::int64_t id, const Space& role, BlockStatus 
 void Ekf::Landmarks::AddKnown() {
   for (const KnownLandmark& known : options_.known) {
     Landmark& landmark = map_.landmarks[known.id];
-    landmark.form = internal::XyzForm();
+    landmark.representation = internal::XyzRepresentation();
     landmark.known = true;
-    landmark.blocks = {Declare(known.id, Xyz(),
-                               known.sigma > 0.0 ? BlockStatus::kEstimated : BlockStatus::kFixed)};
+    landmark.blocks = {Declare(
+        known.id, Xyz(), known.sigma > 0.0 ? BlockStatus::kEstimated : BlockStatus::kConstant)};
     ekf_.state_.Add(landmark.blocks[0], known.position.data(),
                     known.sigma * known.sigma * Eigen::Matrix3d::Identity());
   }
@@ -97,7 +98,7 @@ std::vector<const double*> Ekf::Landmarks::ValuesOf(const Landmark& landmark) co
 }
 
 bool Ekf::Landmarks::HasInverseDistance(const Landmark& landmark) const {
-  return landmark.in_state() && landmark.form && !IsXyz(*landmark.form);
+  return landmark.in_state() && landmark.representation && !IsXyz(*landmark.representation);
 }
 
 /// The last element of all that has one.
@@ -162,12 +163,12 @@ void Ekf::Landmarks::Plan(Row& row, const Landmark& landmark) {
     plan.columns.push_back(block.has_covariance() ? plan.width : -1);
     if (!block.has_covariance()) continue;
     plan.parts.push_back({block.tangent_offset, block.geometry().tangent, plan.width});
-    plan.considered.push_back(false);
+    plan.consider.push_back(false);
     plan.width += block.geometry().tangent;
   }
   plan.strides.assign(plan.roles.size(), plan.width);
   row.plan = &plan;
-  row.model = landmark.form == family.form ? nullptr : &*sensor.xyz;
+  row.model = landmark.representation == family.representation ? nullptr : &*sensor.xyz;
   row.zeroed = nullptr;
 }
 
@@ -175,9 +176,9 @@ void Ekf::Landmarks::Finish() {
   moved_ = false;
   Count();
   CheckDepths();
-  Forget();
+  Prune();
   Convert();
-  Enter();
+  InitialiseNew();
   for (Row& row : ekf_.rows()) {
     row.plan = nullptr;
     row.model = nullptr;
@@ -220,7 +221,7 @@ void Ekf::Landmarks::CheckDepths() {
 }
 
 /// Drops what was not seen for long, or fails too often. Known landmarks stay.
-void Ekf::Landmarks::Forget() {
+void Ekf::Landmarks::Prune() {
   for (auto at = map_.landmarks.begin(); at != map_.landmarks.end();) {
     const Landmark& landmark = at->second;
     const std::int64_t unseen = map_.frame - landmark.seen;
@@ -274,9 +275,9 @@ bool Ekf::Landmarks::ConvertToXyz(std::int64_t id, Landmark& landmark, const Fam
   const double* const camera = CameraOf(family);
   if (!HasInverseDistance(landmark) || camera == nullptr) return false;
   const std::vector<const double*> values = ValuesOf(landmark);
-  const double linearity =
-      internal::LinearityOf(*landmark.form, values.data(), InverseDistanceSigma(landmark), camera);
-  const auto point = internal::PointOf(*landmark.form, values.data());
+  const double linearity = internal::LinearityOf(*landmark.representation, values.data(),
+                                                 InverseDistanceSigma(landmark), camera);
+  const auto point = internal::PointOf(*landmark.representation, values.data());
   if (!point || !(linearity < options_.max_linearity_index)) return false;
   std::vector<Eigen::MatrixXd> jacobians;
   Eigen::Index column = 0;
@@ -290,7 +291,7 @@ bool Ekf::Landmarks::ConvertToXyz(std::int64_t id, Landmark& landmark, const Fam
                          Eigen::Matrix3d::Zero());
   DropBlocks(landmark);
   landmark.blocks = {to};
-  landmark.form = internal::XyzForm();
+  landmark.representation = internal::XyzRepresentation();
   return true;
 }
 
@@ -301,7 +302,7 @@ std::vector<LandmarkEstimate> Ekf::Landmarks::Estimates() const {
     LandmarkEstimate& one = estimates.emplace_back();
     one.id = id;
     one.generation = landmark.generation;
-    one.form = landmark.form;
+    one.representation = landmark.representation;
     one.first = landmark.first;
     one.last = landmark.last;
     one.tried = landmark.tried;
@@ -310,8 +311,8 @@ std::vector<LandmarkEstimate> Ekf::Landmarks::Estimates() const {
       one.inverse_distance = InverseDistance(landmark);
       one.sigma = InverseDistanceSigma(landmark);
     }
-    if (!landmark.form) continue;
-    const auto point = internal::PointOf(*landmark.form, ValuesOf(landmark).data());
+    if (!landmark.representation) continue;
+    const auto point = internal::PointOf(*landmark.representation, ValuesOf(landmark).data());
     if (!point) continue;
     one.position = point->position;
     one.covariance = CovarianceOf(landmark, point->jacobian);

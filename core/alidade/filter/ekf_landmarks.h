@@ -15,13 +15,13 @@ namespace alidade {
 /// What passes from frame to frame beside the blocks of the state.
 struct LandmarkMap {
   struct Landmark {
-    std::optional<LandmarkForm> form;
+    std::optional<LandmarkRepresentation> representation;
     std::vector<BlockId> blocks;  ///< by landmark role; empty: seen, but not in the state yet
     int generation = 0, observations = 0, tried = 0, accepted = 0;
     std::int64_t seen = 0;  ///< the last frame that measured it
     Stamp first = kNoStamp, last = kNoStamp;
     bool negative = false;  ///< its inverse distance is
-    bool known = false;     ///< from the config: never forgotten
+    bool known = false;     ///< from the config: never pruned
     bool in_state() const { return !blocks.empty(); }
   };
   std::map<std::int64_t, Landmark> landmarks;  ///< by the id of the measurements
@@ -48,8 +48,8 @@ class Generations {
   std::size_t ends_ = 0;
 };
 
-/// The landmarks of a filter: finds them for the measurements of a frame, and lets them enter,
-/// change and leave the state after its update.
+/// The landmarks of a filter: finds them for the measurements of a frame, and initialises,
+/// converts and prunes them after its update.
 class Ekf::Landmarks {
  public:
   explicit Landmarks(Ekf& ekf);
@@ -79,7 +79,7 @@ class Ekf::Landmarks {
   struct Family {
     int first = -1;     ///< of its landmark roles, which come last; -1: it sees none
     int position = -1;  ///< its role `position`, the camera's in the world
-    std::optional<LandmarkForm> form;
+    std::optional<LandmarkRepresentation> representation;
     std::vector<Space> roles;               ///< the landmark's
     std::map<std::size_t, BlockId> shared;  ///< by landmark role: blocks of this frame
   };
@@ -88,9 +88,9 @@ class Ekf::Landmarks {
   void Plan(Row& row, const Landmark& landmark);
   void Count();
   void CheckDepths();
-  void Forget();
+  void Prune();
   void Convert();
-  void Enter();
+  void InitialiseNew();
   bool ConvertToXyz(std::int64_t id, Landmark& landmark, const Family& family);
   std::vector<char> Support(std::span<Row* const> matches);
   void SupportOf(std::size_t hypothesis, std::span<Row* const> matches, std::vector<char>& agrees);
@@ -121,7 +121,7 @@ class Ekf::Landmarks {
   std::size_t used_ = 0;
   bool moved_ = false;                    ///< blocks came or went since the plans were made
   std::vector<double> support_, rescue_;  ///< bounds on r' R^-1 r and NIS, by sensor
-  LandmarkOptions::Prior prior_;          ///< of what enters in this frame
+  LandmarkOptions::Prior prior_;          ///< of what is initialised in this frame
 };
 
 }  // namespace alidade

@@ -63,14 +63,14 @@ double Ekf::Landmarks::PriorInverseDistance(std::span<const Row* const> measured
     constexpr double kConverged = 0.1;  // of the index of linearity, where nothing is converted
     const double limit =
         options_.max_linearity_index > 0.0 ? options_.max_linearity_index : kConverged;
-    if (camera == nullptr || !landmark.form) continue;
+    if (camera == nullptr || !landmark.representation) continue;
     const std::vector<const double*> values = ValuesOf(landmark);
     if (HasInverseDistance(landmark) &&
-        !(internal::LinearityOf(*landmark.form, values.data(), InverseDistanceSigma(landmark),
-                                camera) < limit)) {
+        !(internal::LinearityOf(*landmark.representation, values.data(),
+                                InverseDistanceSigma(landmark), camera) < limit)) {
       continue;
     }
-    const auto point = internal::PointOf(*landmark.form, values.data());
+    const auto point = internal::PointOf(*landmark.representation, values.data());
     const Eigen::Map<const Eigen::Vector3d> r(camera);
     if (point) converged.push_back(1.0 / (point->position - r).norm());
   }
@@ -113,7 +113,7 @@ Outcome Ekf::Landmarks::Initialise(std::int64_t id, Row& row, Landmark& landmark
   std::vector<Eigen::MatrixXd> jacobians;
   for (const Eigen::MatrixXd& j : inverse.jacobians) jacobians.emplace_back(j(kept, Eigen::all));
   ekf_.state_.Initialise(fresh, values.data(), inverse.from, jacobians, inverse.own(kept, kept));
-  landmark.form = family.form;
+  landmark.representation = family.representation;
   moved_ = true;
   return Outcome::kInitialised;
 }

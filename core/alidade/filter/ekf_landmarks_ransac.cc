@@ -74,7 +74,7 @@ std::vector<char> Ekf::Landmarks::Support(std::span<Row* const> matches) {
 }
 
 /// Which of the matches lie within their noise of what the state predicts that one of them corrects
-/// by itself, as an update would: what is considered stays, and held roles are seen as they are.
+/// by itself, as an update would: consider states stay, and known roles are seen as they are.
 void Ekf::Landmarks::SupportOf(std::size_t hypothesis, std::span<Row* const> matches,
                                std::vector<char>& agrees) {
   const Row& one = *matches[hypothesis];

@@ -129,8 +129,8 @@ const double* const* Ekf::RolesAt(const Row& row, const std::vector<double>& val
   const std::vector<RoleBinding>& bound = BindingOf(row).roles;
   roles_ = PlanOf(row).roles;
   for (std::size_t i = 0; i < roles_.size(); ++i) {
-    const bool held = i < bound.size() && bound[i].mode == RoleMode::kHold;
-    if (roles_[i] == nullptr || held) continue;
+    const bool known = i < bound.size() && bound[i].mode == RoleMode::kKnown;
+    if (roles_[i] == nullptr || known) continue;
     roles_[i] = values.data() + (roles_[i] - state_.values().data());
   }
   return roles_.data();

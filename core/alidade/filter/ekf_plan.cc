@@ -12,7 +12,7 @@ void Ekf::Bind() {
   // What comes after the blocks of the system are landmarks.
   for (const Block& block : std::span(layout.blocks()).first(system_.layout.blocks().size())) {
     waiting_ = waiting_ || !block.present;
-    considering_ = considering_ || (block.present && block.status == BlockStatus::kConsidered);
+    considering_ = considering_ || (block.present && block.status == BlockStatus::kConsider);
     if (!block.has_covariance()) continue;
     in_order = in_order && block.tangent_offset == std::ssize(order_);
     for (int i = 0; i < block.geometry().tangent; ++i) order_.push_back(block.tangent_offset + i);
@@ -37,13 +37,13 @@ void Ekf::Bind() {
       } else if (present && !first_.empty() && !FirstEstimate(role.block).empty()) {
         plan.linearised_at.back() = FirstEstimate(role.block).data();
       }
-      if (!present || role.mode == RoleMode::kHold || !layout[role.block].has_covariance())
+      if (!present || role.mode == RoleMode::kKnown || !layout[role.block].has_covariance())
         continue;
       const Block& block = layout[role.block];
       for (const JacobianPart& other : plan.parts) apart &= other.offset != block.tangent_offset;
       plan.columns.back() = plan.width;
       plan.parts.push_back({block.tangent_offset, block.geometry().tangent, plan.width});
-      plan.considered.push_back(role.mode == RoleMode::kConsider);
+      plan.consider.push_back(role.mode == RoleMode::kConsider);
       plan.width += block.geometry().tangent;
     }
     plan.whole = small && apart && !sensor.model.has_landmark();

@@ -79,7 +79,7 @@ void Ekf::Recover(Row& row) {
       target->block >= 0 && target->mode == RoleMode::kEstimate &&
       state_.layout()[target->block].status == BlockStatus::kEstimated &&
       InitialiseBlock(row) == Outcome::kInitialised) {
-    ForgetMotionOf(target->block);
+    DropMotionOf(target->block);
     Note("rejection_recovery",
          why + "reset " + state_.layout()[target->block].name + " from its measurement");
     return;
@@ -104,7 +104,7 @@ void Ekf::Recover(Row& row) {
 
 /// Puts the blocks that one motion model moves together with `id` back to their prior covariance,
 /// uncorrelated, with the values they have.
-void Ekf::ForgetMotionOf(BlockId id) {
+void Ekf::DropMotionOf(BlockId id) {
   for (const MotionBinding& motion : system_.motions) {
     if (std::find(motion.blocks.begin(), motion.blocks.end(), id) == motion.blocks.end()) continue;
     for (const Prior& prior : system_.priors) {

@@ -314,7 +314,7 @@ bool Ekf::Small::AddSensors() {
     const Geometry& geometry = model.measurement().geometry;
     if (geometry.kind != GeometryKind::kVector || geometry.tangent > kMostOfOne || !plan.whole ||
         plan.linearised_elsewhere || ekf_.system_.sensors[k].loss.kind != LossKind::kNone ||
-        std::ranges::count(plan.considered, true) > 0) {
+        std::ranges::count(plan.consider, true) > 0) {
       return false;
     }
     Sensor& sensor = sensors_.emplace_back();

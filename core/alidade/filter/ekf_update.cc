@@ -13,9 +13,9 @@ Outcome Ekf::Apply(std::span<Row* const> rows) {
   bool considering = considering_;
   for (const Row* row : rows) {
     m += BindingOf(*row).model.measurement().geometry.tangent;
-    const std::vector<bool>& considered = PlanOf(*row).considered;
+    const std::vector<bool>& consider = PlanOf(*row).consider;
     considering =
-        considering || std::find(considered.begin(), considered.end(), true) != considered.end();
+        considering || std::find(consider.begin(), consider.end(), true) != consider.end();
   }
   const bool small = state_.covariance().small() && m <= Covariance::kSmall && !considering;
   const Outcome outcome = small ? ApplySmall(rows, m) : ApplyLarge(rows);
@@ -138,11 +138,11 @@ Outcome Ekf::ApplyLarge(std::span<Row* const> rows) {
   return Outcome::kAccepted;
 }
 
-/// Zeroes the gain of considered blocks; true where that changed anything.
+/// Zeroes the gain of consider blocks; true where that changed anything.
 bool Ekf::MaskConsidered(std::span<Row* const> rows, Eigen::MatrixXd& gain) const {
   bool masked = false;
   for (const Block& block : state_.layout().blocks()) {
-    if (!block.present || block.status != BlockStatus::kConsidered) continue;
+    if (!block.present || block.status != BlockStatus::kConsider) continue;
     gain.middleRows(block.tangent_offset, block.geometry().tangent).setZero();
     masked = true;
   }
@@ -151,7 +151,7 @@ bool Ekf::MaskConsidered(std::span<Row* const> rows, Eigen::MatrixXd& gain) cons
     const SensorPlan& plan = PlanOf(*row);
     const Eigen::Index k = BindingOf(*row).model.measurement().geometry.tangent;
     for (std::size_t i = 0; i < plan.parts.size(); ++i) {
-      if (!plan.considered[i]) continue;
+      if (!plan.consider[i]) continue;
       gain.block(plan.parts[i].offset, at, plan.parts[i].size, k).setZero();
       masked = true;
     }

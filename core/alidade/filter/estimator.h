@@ -17,7 +17,7 @@ namespace alidade {
 /// What became of one measurement.
 enum class Outcome {
   kAccepted,
-  kInitialised,  ///< used up to initialise a block
+  kInitialised,  ///< consumed to initialise a block
   kGated,
   kOutOfDomain,  ///< h is not defined at the prediction
   kInvalid,      ///< of no use: beyond the sensor's limits

@@ -60,7 +60,7 @@ EkfOptions internal::ReadCommonOptions(Params& p) {
                                 {0.0, 1.0, true, true})
                      .value_or(options.gate);
   options.fuse = static_cast<Fuse>(p.Choice("fuse", {"joint", "per_sensor", "per_measurement"},
-                                            "how the measurements of one stamp make updates",
+                                            "how the measurements of one timestamp make updates",
                                             static_cast<int>(options.fuse)));
   options.max_dt_s =
       p.Positive("max_dt_s", "s", "longer gaps are stepped in equal parts", options.max_dt_s);

@@ -39,7 +39,7 @@ struct IekfOptions : EkfOptions {
 /// it is that of the Ekf.
 class Iekf : public Ekf {
  public:
-  /// No considered blocks and roles, no role linearised at the measurement.
+  /// No consider blocks and roles, no role linearised at the measurement.
   static constexpr Support kSupport = {
       .from_measurement = true, .recovery = true, .landmarks = true};
 

@@ -28,7 +28,7 @@ namespace alidade {
 /// Source       [Rauch1965]; [Bierman1977] ch. X, modified Bryson-Frazier.
 class RtsSmoother : public Ekf {
  public:
-  /// No considered blocks and roles, none that start or are linearised at a measurement, no
+  /// No consider blocks and roles, none that start or are linearised at a measurement, no
   /// rejection recovery, no landmarks.
   static constexpr Support kSupport = {};
 

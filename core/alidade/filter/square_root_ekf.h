@@ -28,7 +28,7 @@ namespace alidade {
 /// Source       [Bierman1977] ch. V; [Kailath2000] sec. 12.3, the array form.
 class SquareRootEkf : public Ekf {
  public:
-  /// No considered blocks and roles, none that start or are linearised at a measurement, no
+  /// No consider blocks and roles, none that start or are linearised at a measurement, no
   /// rejection recovery, no landmarks.
   static constexpr Support kSupport = {};
 

@@ -7,8 +7,8 @@ namespace {
 std::optional<Unsupported> OfBlocks(const System& system, const Support& support) {
   const std::vector<Block>& blocks = system.layout.blocks();
   for (std::size_t b = 0; b < blocks.size(); ++b) {
-    if (blocks[b].status != BlockStatus::kConsidered || support.considered) continue;
-    return Unsupported{"considered blocks", "the block estimated or fixed",
+    if (blocks[b].status != BlockStatus::kConsider || support.consider) continue;
+    return Unsupported{"consider blocks", "the block estimated or constant",
                        static_cast<BlockId>(b)};
   }
   for (const Prior& prior : system.priors) {
@@ -22,10 +22,11 @@ std::optional<Unsupported> OfBlocks(const System& system, const Support& support
 }
 
 std::optional<Unsupported> OfRole(const RoleBinding& role, const Support& support) {
-  if (role.mode == RoleMode::kConsider && !support.considered) {
-    return Unsupported{"considered roles", support.held ? "estimate or hold" : "estimate"};
+  if (role.mode == RoleMode::kConsider && !support.consider) {
+    return Unsupported{"consider roles", support.known ? "estimate or known" : "estimate"};
   }
-  if (role.mode == RoleMode::kHold && !support.held) return Unsupported{"held roles", "estimate"};
+  if (role.mode == RoleMode::kKnown && !support.known)
+    return Unsupported{"known roles", "estimate"};
   if (role.jacobian_at == RoleJacobianAt::kMeasurement && !support.at_measurement) {
     return Unsupported{"jacobian_at: measurement", "prediction"};
   }

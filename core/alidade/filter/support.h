@@ -8,10 +8,10 @@
 
 namespace alidade {
 
-/// What an estimator can do with a system, beyond blocks that are estimated or fixed.
+/// What an estimator can do with a system, beyond blocks that are estimated or constant.
 struct Support {
-  bool considered = false;        ///< considered blocks and roles (Schmidt)
-  bool held = true;               ///< held roles
+  bool consider = false;          ///< consider blocks and roles (Schmidt)
+  bool known = true;              ///< known roles
   bool at_measurement = false;    ///< jacobian_at: measurement
   bool from_measurement = false;  ///< blocks that start from their first measurement
   bool recovery = false;          ///< after consecutive rejections
@@ -22,8 +22,8 @@ struct Support {
 /// Something that a system asks for and an estimator cannot do: of a block, of a role of a sensor,
 /// where both `block` and `role` are -1 the loss of a sensor, and without a sensor the landmarks.
 struct Unsupported {
-  std::string what;    ///< `considered blocks`
-  std::string remedy;  ///< what to write in its place: `the block estimated or fixed`
+  std::string what;    ///< `consider blocks`
+  std::string remedy;  ///< what to write in its place: `the block estimated or constant`
   BlockId block = -1;
   int sensor = -1;  ///< index into System::sensors
   int role = -1;    ///< index into its roles

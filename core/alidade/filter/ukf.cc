@@ -174,9 +174,9 @@ Status Ukf::StepPoint(const double* from, const double* noise, double dt_s, doub
     stepped_.clear();
     for (const BlockId id : motion.blocks) {
       const Block& block = state_.layout()[id];
-      const bool fixed = block.status == BlockStatus::kFixed;
+      const bool constant = block.status == BlockStatus::kConstant;
       x_.push_back(from + block.value_offset);
-      stepped_.push_back((fixed ? unused.data() : to) + block.value_offset);
+      stepped_.push_back((constant ? unused.data() : to) + block.value_offset);
     }
     const Eigen::Index inputs = motion.model.noise_size();
     const Eigen::Map<const RowMajor> l(motions_[i].l.data(), inputs, inputs);

@@ -52,7 +52,7 @@ struct UkfOptions {
 /// Source       [Julier2004]; [Wan2000] alpha, beta, kappa.
 class Ukf : public Ekf {
  public:
-  /// No considered blocks and roles, none that start or are linearised at a measurement, no
+  /// No consider blocks and roles, none that start or are linearised at a measurement, no
   /// rejection recovery, no landmarks.
   static constexpr Support kSupport = {};
 

@@ -8,17 +8,17 @@
 #include "alidade/host/source.h"
 #include "alidade/model/fingerprint.h"
 
-/// Exports of the build tier: plugins in C++ against alidade::core, loaded only into the very build
+/// Exports of C++ plugins, made against alidade::core, loaded only into the very build
 /// that they were made with.
 namespace alidade {
 
-class PictureWriter;      // in alidade/record/pictures.h
-struct PictureArguments;  // likewise
-struct BundleProblem;     // in alidade/bundle/bundle.h
-struct BundleOptions;     // likewise
-struct BundleResult;      // likewise
+class ImageWriter;      // in alidade/record/images.h
+struct ImageArguments;  // likewise
+struct BundleProblem;   // in alidade/bundle/bundle.h
+struct BundleOptions;   // likewise
+struct BundleResult;    // likewise
 
-/// All that must be equal between the host and a build-tier plugin: version, compiler, and the
+/// All that must be equal between the host and a C++ plugin: version, compiler, and the
 /// flags that change layout.
 #define ALIDADE_STRINGISE_(x) #x
 #define ALIDADE_STRINGISE(x) ALIDADE_STRINGISE_(x)
@@ -64,8 +64,8 @@ struct BuildTable {
   int source_count = 0;
   const EstimatorEntry* estimators = nullptr;
   int estimator_count = 0;
-  /// Of the plugin that draws pictures: see OpenPictures.
-  std::unique_ptr<PictureWriter> (*pictures)(const PictureArguments& arguments) = nullptr;
+  /// Of the plugin that draws images: see OpenImageWriter.
+  std::unique_ptr<ImageWriter> (*images)(const ImageArguments& arguments) = nullptr;
   /// Of the plugin that adjusts bundles: see AdjustBundle.
   BundleResult (*adjust)(const SensorModel& sensor, BundleProblem& problem,
                          const BundleOptions& options) = nullptr;
@@ -77,7 +77,7 @@ inline constexpr const char* kBuildEntrySymbol = "alidade_build_plugin";
 
 /// Exports a table of this plugin; `...` are the members of BuildTable after the size.
 #define ALIDADE_BUILD_PLUGIN_(...)                                                       \
-  ALIDADE_FINGERPRINT(ALIDADE_TIER_BUILD, ALIDADE_BUILD_ID)                              \
+  ALIDADE_BUILD_TAG(ALIDADE_PLUGIN_CPP, ALIDADE_BUILD_ID)                                \
   extern "C" __attribute__((visibility("default"))) const alidade::BuildTable*           \
   alidade_build_plugin() {                                                               \
     static const alidade::BuildTable table = {sizeof(alidade::BuildTable), __VA_ARGS__}; \
@@ -95,8 +95,8 @@ inline constexpr const char* kBuildEntrySymbol = "alidade_build_plugin";
   static const alidade::EstimatorEntry alidade_estimators[] = {__VA_ARGS__}; \
   ALIDADE_BUILD_PLUGIN_(nullptr, 0, alidade_estimators, std::size(alidade_estimators))
 
-/// Exports the picture writer of this plugin: ALIDADE_PICTURE_PLUGIN(&Create)
-#define ALIDADE_PICTURE_PLUGIN(create) ALIDADE_BUILD_PLUGIN_(nullptr, 0, nullptr, 0, create)
+/// Exports the image writer of this plugin: ALIDADE_IMAGE_PLUGIN(&Create)
+#define ALIDADE_IMAGE_PLUGIN(create) ALIDADE_BUILD_PLUGIN_(nullptr, 0, nullptr, 0, create)
 
 /// Exports the bundle adjustment of this plugin: ALIDADE_BUNDLE_PLUGIN(&Adjust)
 #define ALIDADE_BUNDLE_PLUGIN(adjust) ALIDADE_BUILD_PLUGIN_(nullptr, 0, nullptr, 0, nullptr, adjust)

@@ -55,8 +55,8 @@ std::string Line(const std::string& what, const Space& space) {
   if (!space.doc.empty()) line += "; " + space.doc;
   if (space.optional()) line += " (optional)";
   if (space.landmark()) line += " (of a landmark)";
-  if ((space.flags & ALIDADE_ROLE_OWNED) != 0)
-    line += " (owned: known, unless it has an initial value)";
+  if ((space.flags & ALIDADE_ROLE_PARAMETER) != 0)
+    line += " (model parameter state: constant, unless it has an initial value)";
   return line;
 }
 
@@ -84,7 +84,7 @@ std::vector<std::string> Capabilities(const ModelInstance& model) {
   return lines;
 }
 
-/// What `create` of a build-tier entry makes of its parameters, checked.
+/// What `create` of a C++ plugin makes of its parameters, checked.
 template <class Create>
 auto CreateBuilt(const PluginEntry& entry, const Node& node, std::mutex& mutex,
                  const Create& create) {
@@ -152,9 +152,9 @@ const EstimatorEntry& PluginHost::EstimatorOf(const PluginEntry& entry) const {
 }
 
 std::shared_ptr<const ModelInstance> PluginHost::Create(const PluginEntry& entry, const Node& node,
-                                                        const std::string& form) const {
+                                                        const std::string& representation) const {
   const AlidadeEntry c = EntryOf(entry);
-  ParamReader reader(node, Named(entry.kind, entry.name), form);
+  ParamReader reader(node, Named(entry.kind, entry.name), representation);
   NewInstance instance;
   std::int32_t code;
   {
@@ -172,8 +172,8 @@ std::shared_ptr<const ModelInstance> PluginHost::Create(const PluginEntry& entry
 }
 
 SensorModel PluginHost::CreateSensor(const std::string& name, const Node& entry,
-                                     const std::string& form) const {
-  return SensorModel(Create(Find(PluginEntry::Kind::kSensor, name, entry), entry, form));
+                                     const std::string& representation) const {
+  return SensorModel(Create(Find(PluginEntry::Kind::kSensor, name, entry), entry, representation));
 }
 
 MotionModel PluginHost::CreateMotion(const std::string& name, const Node& entry) const {

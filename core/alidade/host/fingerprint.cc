@@ -87,7 +87,7 @@ void CheckSegments(ElfFile& file, const Elf64_Ehdr& header) {
 }
 
 bool HasName(ElfFile& file, const Elf64_Shdr& names, const Elf64_Shdr& section) {
-  constexpr char kName[] = ALIDADE_FINGERPRINT_SECTION;
+  constexpr char kName[] = ALIDADE_BUILD_TAG_SECTION;
   using Name = std::array<char, sizeof(kName)>;
   if (section.sh_name > names.sh_size || names.sh_size - section.sh_name < sizeof(kName)) {
     return false;
@@ -98,7 +98,7 @@ bool HasName(ElfFile& file, const Elf64_Shdr& names, const Elf64_Shdr& section) 
 
 Elf64_Shdr FindSection(ElfFile& file, const Elf64_Ehdr& header) {
   const char* const none =
-      "has no alidade fingerprint: not an alidade plugin, or built without "
+      "has no alidade build tag: not an alidade plugin, or built without "
       "ALIDADE_PLUGIN, or stripped of its section headers";
   if (header.e_shoff == 0 || header.e_shnum == 0) Refuse(file.path(), none);
   if (header.e_shentsize != sizeof(Elf64_Shdr) || header.e_shstrndx >= header.e_shnum) {
@@ -151,26 +151,26 @@ std::string IsaName(std::uint32_t isa) {
 
 }  // namespace
 
-AlidadeFingerprint ReadFingerprint(const fs::path& path) {
+AlidadeBuildTag ReadBuildTag(const fs::path& path) {
   ElfFile file(path);
   const Elf64_Ehdr header = ReadHeader(file);
   CheckSegments(file, header);
   const Elf64_Shdr section = FindSection(file, header);
-  const std::uint64_t size = std::min<std::uint64_t>(section.sh_size, sizeof(AlidadeFingerprint));
-  auto print = file.Read<AlidadeFingerprint>(section.sh_offset, "fingerprint", size);
-  constexpr std::uint32_t kFixed = offsetof(AlidadeFingerprint, tier);
+  const std::uint64_t size = std::min<std::uint64_t>(section.sh_size, sizeof(AlidadeBuildTag));
+  auto print = file.Read<AlidadeBuildTag>(section.sh_offset, "build tag", size);
+  constexpr std::uint32_t kFixed = offsetof(AlidadeBuildTag, kind);
   if (size < kFixed || std::memcmp(print.magic, "ALIDADE", sizeof(print.magic)) != 0) {
-    Refuse(path, "malformed fingerprint");
+    Refuse(path, "malformed build tag");
   }
   if (print.abi_major != ALIDADE_ABI_MAJOR) {
     Refuse(path, "built for plugin ABI " + Version(print.abi_major, print.abi_minor) +
                      ", this program has " + Version(ALIDADE_ABI_MAJOR, ALIDADE_ABI_MINOR) +
                      "; rebuild the plugin against this version");
   }
-  constexpr std::uint32_t kNeeded = offsetof(AlidadeFingerprint, reserved);
+  constexpr std::uint32_t kNeeded = offsetof(AlidadeBuildTag, reserved);
   if (print.struct_size < kNeeded || size < kNeeded ||
-      (print.tier != ALIDADE_TIER_SEALED && print.tier != ALIDADE_TIER_BUILD)) {
-    Refuse(path, "malformed fingerprint");
+      (print.kind != ALIDADE_PLUGIN_C_ABI && print.kind != ALIDADE_PLUGIN_CPP)) {
+    Refuse(path, "malformed build tag");
   }
   print.compiler[sizeof(print.compiler) - 1] = '\0';
   print.build[sizeof(print.build) - 1] = '\0';
@@ -181,20 +181,19 @@ namespace internal {
 
 const char* HostBuildId() { return ALIDADE_BUILD_ID; }
 
-void CheckBuild(const AlidadeFingerprint& fingerprint, const fs::path& file) {
-  if ((fingerprint.flags & ALIDADE_BUILT_FAST_MATH) != 0) {
+void CheckBuild(const AlidadeBuildTag& build_tag, const fs::path& file) {
+  if ((build_tag.flags & ALIDADE_BUILT_FAST_MATH) != 0) {
     Refuse(file,
            "built with -ffast-math, which makes NaN and infinity undetectable; build it without");
   }
   for (std::uint32_t bit = 1; bit != 0; bit <<= 1) {
-    if ((fingerprint.isa & bit) != 0 && !ProcessorHas(bit)) {
+    if ((build_tag.isa & bit) != 0 && !ProcessorHas(bit)) {
       Refuse(file, "needs an instruction set that this processor lacks (" + IsaName(bit) +
                        "); build it without -march");
     }
   }
-  if (fingerprint.tier == ALIDADE_TIER_BUILD &&
-      std::strcmp(fingerprint.build, HostBuildId()) != 0) {
-    Refuse(file, std::string("of another build than this program: '") + fingerprint.build +
+  if (build_tag.kind == ALIDADE_PLUGIN_CPP && std::strcmp(build_tag.build, HostBuildId()) != 0) {
+    Refuse(file, std::string("of another build than this program: '") + build_tag.build +
                      "'; expected '" + HostBuildId() + "'");
   }
 }

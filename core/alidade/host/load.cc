@@ -29,13 +29,13 @@ std::string WalkTable(void* library, const char* symbol) {
 }
 
 /// In the child.
-std::string Try(const std::filesystem::path& file, std::uint32_t tier) {
+std::string Try(const std::filesystem::path& file, std::uint32_t kind) {
   const Surroundings before;
   void* const library = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (library == nullptr) return "cannot be loaded: " + DlError();
   const std::string change = Surroundings().ChangeSince(before);
   if (!change.empty()) return change + " while loading";
-  if (tier == ALIDADE_TIER_BUILD) return WalkTable<BuildTable>(library, kBuildEntrySymbol);
+  if (kind == ALIDADE_PLUGIN_CPP) return WalkTable<BuildTable>(library, kBuildEntrySymbol);
   const std::string defect = WalkTable<AlidadeTable>(library, ALIDADE_ENTRY_SYMBOL);
   // The destructors of its statics run when the host ends; a crash is better found here.
   dlclose(library);
@@ -44,11 +44,11 @@ std::string Try(const std::filesystem::path& file, std::uint32_t tier) {
 
 /// Opens the plugin in a child process, looks its entry up and walks its table. Returns "" or why
 /// that failed.
-std::string TrialLoad(const std::filesystem::path& file, std::uint32_t tier) {
+std::string TrialLoad(const std::filesystem::path& file, std::uint32_t kind) {
   const SharedJournal journal;
   const ChildEnd end = RunInChild({kTimeLimit_s, 0}, *journal, [&]() -> std::string {
     try {
-      return Try(file, tier);
+      return Try(file, kind);
     } catch (...) {
       return "threw an exception while loading";
     }
@@ -66,18 +66,18 @@ const boost::dll::shared_library& OpenForGood(const std::filesystem::path& file)
 }  // namespace
 
 OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical) {
-  const AlidadeFingerprint fingerprint = ReadFingerprint(canonical);
-  CheckBuild(fingerprint, canonical);
+  const AlidadeBuildTag build_tag = ReadBuildTag(canonical);
+  CheckBuild(build_tag, canonical);
   CheckTrusted(file);
-  const std::string failure = TrialLoad(canonical, fingerprint.tier);
+  const std::string failure = TrialLoad(canonical, build_tag.kind);
   if (!failure.empty()) Refuse(file, failure);
 
-  const bool unoptimised = (fingerprint.flags & ALIDADE_BUILT_UNOPTIMISED) != 0;
+  const bool unoptimised = (build_tag.flags & ALIDADE_BUILT_UNOPTIMISED) != 0;
   OpenedPlugin plugin{canonical, nullptr, nullptr, unoptimised};
   std::string defect;
   try {
     const boost::dll::shared_library& library = OpenForGood(canonical);
-    if (fingerprint.tier == ALIDADE_TIER_BUILD) {
+    if (build_tag.kind == ALIDADE_PLUGIN_CPP) {
       plugin.build_table = library.get<const BuildTable*()>(kBuildEntrySymbol)();
       defect = Defect(plugin.build_table);
     } else {

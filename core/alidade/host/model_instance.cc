@@ -149,9 +149,9 @@ void ModelInstance::ReadDescription() {
   for (int i = 0; i < count; ++i) {
     const auto role = internal::ReadEntry(description_.roles, description_.role_stride, i);
     spaces_.push_back(read(role, "role '" + Text(role.name) + "'"));
-    if (is_sensor && (role.flags & ALIDADE_ROLE_OWNED) != 0) {
+    if (is_sensor && (role.flags & ALIDADE_ROLE_PARAMETER) != 0) {
       Refuse(": role '" + spaces_.back().name +
-             "' is owned by the sensor, which this version does not support");
+             "' is a model parameter state of the sensor, which this version does not support");
     }
     tangents_.push_back(role.tangent);
     const auto same = [&](const Space& other) { return other.name == spaces_.back().name; };

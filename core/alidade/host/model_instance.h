@@ -55,7 +55,7 @@ class ModelInstance {
   unsigned capabilities_ = 0;
 };
 
-/// A sensor z = h(roles) + n behind the sealed boundary. Cheap to copy; calls as in plugin_abi.h.
+/// A sensor z = h(roles) + n behind the plugin ABI. Cheap to copy; calls as in plugin_abi.h.
 class SensorModel {
  public:
   explicit SensorModel(std::shared_ptr<const ModelInstance> instance);
@@ -111,7 +111,7 @@ class SensorModel {
   int prior_size_ = 0;
 };
 
-/// A motion model x' = f(x, u, w, dt) behind the sealed boundary. Cheap to copy.
+/// A motion model x' = f(x, u, w, dt) behind the plugin ABI. Cheap to copy.
 class MotionModel {
  public:
   explicit MotionModel(std::shared_ptr<const ModelInstance> instance);

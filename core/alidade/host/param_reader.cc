@@ -166,8 +166,8 @@ std::vector<double> All(const AlidadeParam& param, const Node& node) {
 
 }  // namespace
 
-ParamReader::ParamReader(const Node& entry, std::string owner, std::string form)
-    : entry_(entry), owner_(std::move(owner)), form_(std::move(form)) {
+ParamReader::ParamReader(const Node& entry, std::string owner, std::string representation)
+    : entry_(entry), owner_(std::move(owner)), representation_(std::move(representation)) {
   host_.struct_size = sizeof(AlidadeHost);
   host_.abi_major = ALIDADE_ABI_MAJOR;
   host_.abi_minor = ALIDADE_ABI_MINOR;
@@ -254,9 +254,9 @@ Node ParamReader::BaseOf(const std::string& key) const {
 std::vector<double> ParamReader::Values(const AlidadeParam& param) const {
   std::string rest = param.key;
   const std::vector<std::string> choices = Choices(param);
-  const auto form = std::ranges::find(choices, form_);
-  if (rest == "landmarks.representation" && form != choices.end()) {
-    return {static_cast<double>(form - choices.begin())};
+  const auto representation = std::ranges::find(choices, representation_);
+  if (rest == "landmarks.representation" && representation != choices.end()) {
+    return {static_cast<double>(representation - choices.begin())};
   }
   Node map = BaseOf(rest);
   for (std::size_t dot; (dot = rest.find('.')) != std::string::npos; rest.erase(0, dot + 1)) {

@@ -22,9 +22,9 @@ namespace alidade::internal {
 class ParamReader {
  public:
   /// `owner` names the model in messages, as in `model 'scale_2d'`.
-  /// `form` is the value of `landmarks.representation` where it is one of the choices; "": what is
-  /// written.
-  ParamReader(const Node& entry, std::string owner, std::string form = {});
+  /// `representation` is the value of `landmarks.representation` where it is one of the choices;
+  /// "": what is written.
+  ParamReader(const Node& entry, std::string owner, std::string representation = {});
   ParamReader(const ParamReader&) = delete;
   ParamReader& operator=(const ParamReader&) = delete;
 
@@ -50,7 +50,7 @@ class ParamReader {
                              const std::string& key_in_map) const;
 
   Node entry_;
-  std::string owner_, form_;
+  std::string owner_, representation_;
   ExitCode code_ = ExitCode::kBadConfig;  ///< of the errors
   AlidadeHost host_{};
   std::vector<std::string> errors_;

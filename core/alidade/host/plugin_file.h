@@ -17,9 +17,9 @@ namespace internal {
 /// A plugin that is open for the rest of the process.
 struct OpenedPlugin {
   std::filesystem::path file;     ///< canonical
-  const AlidadeTable* table;      ///< sealed tier, else null
-  const BuildTable* build_table;  ///< build tier, else null
-  bool unoptimised;               ///< by its fingerprint
+  const AlidadeTable* table;      ///< of a C-ABI plugin, else null
+  const BuildTable* build_table;  ///< of a C++ plugin, else null
+  bool unoptimised;               ///< by its build tag
 };
 
 /// The build id that a build-tier plugin must have: that of this library.
@@ -34,10 +34,10 @@ const char* HostBuildId();
 std::filesystem::path FolderOfProgram();
 
 /// Refuses a build that this host cannot run: fast-math, instructions that this processor lacks, a
-/// build-tier plugin of another build. Errors: kPlugin.
-void CheckBuild(const AlidadeFingerprint& fingerprint, const std::filesystem::path& file);
+/// C++ plugin of another build. Errors: kPlugin.
+void CheckBuild(const AlidadeBuildTag& build_tag, const std::filesystem::path& file);
 
-/// Checks fingerprint, build and trust, tries the plugin in a child process, opens it and walks its
+/// Checks build tag, build and trust, tries the plugin in a child process, opens it and walks its
 /// table. `canonical` is `file` behind its links. Errors: kPlugin, kNotTrusted.
 OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical);
 

@@ -31,7 +31,7 @@ struct ParamInfo {
   std::string range;                 ///< `> 0`, `[1, 3]`, or "" where everything is allowed
   std::string fallback;              ///< the default as text, "" where the key is required
   std::vector<std::string> choices;  ///< of a choice
-  std::string when;                  ///< `noise = fixed` where only that choice reads it, else ""
+  std::string when;  ///< `noise_model = constant` where only that choice reads it, else ""
 };
 
 /// How the estimates of an estimator rest on the measurements, by which a comparison knows what it
@@ -67,7 +67,7 @@ struct Refusal {
 /// PluginHost::searched() and refusals().
 enum class OnRefusal { kThrow, kList };
 
-/// Finds, checks, loads and lends plugins. A file is opened only when its fingerprint, read from
+/// Finds, checks, loads and lends plugins. A file is opened only when its build tag, read from
 /// the bytes beforehand, fits, and nobody but root, the caller or the owner of the program could
 /// have written it. Plugins are never unloaded. Creation is safe from several threads.
 class PluginHost {
@@ -80,15 +80,15 @@ class PluginHost {
   ~PluginHost();
 
   /// A model from its config entry: reads its parameters there, leaving unread keys to
-  /// Node::RejectUnread. `form` stands for the parameter `landmarks.representation` of a sensor
-  /// that has this choice; "": as it is written. Errors: kPlugin with the places searched,
+  /// Node::RejectUnread. `representation` stands for the parameter `landmarks.representation` of a
+  /// sensor that has this choice; "": as it is written. Errors: kPlugin with the places searched,
   /// kBadConfig.
   SensorModel CreateSensor(const std::string& name, const Node& entry,
-                           const std::string& form = {}) const;
+                           const std::string& representation = {}) const;
   MotionModel CreateMotion(const std::string& name, const Node& entry) const;
   /// The model `entry` of entries(), also where another plugin offers its name.
   std::shared_ptr<const ModelInstance> Create(const PluginEntry& entry, const Node& node,
-                                              const std::string& form = {}) const;
+                                              const std::string& representation = {}) const;
   /// `any_order` as in SourceArguments.
   std::unique_ptr<Source> CreateSource(const std::string& name, const Node& entry,
                                        std::uint64_t seed, const std::filesystem::path& folder,
@@ -136,9 +136,9 @@ inline constexpr const char* kBuildOptimised =
 /// Every place searched and what was found there, and every file refused with the reason.
 std::string PluginPlaces(const PluginHost& host);
 
-/// The fingerprint in the `.alidade` section of an ELF file, read from its bytes, every offset
-/// checked. Errors: kPlugin (not ELF, truncated, malformed, no fingerprint, another ABI).
-AlidadeFingerprint ReadFingerprint(const std::filesystem::path& file);
+/// The build tag in the `.alidade` section of an ELF file, read from its bytes, every offset
+/// checked. Errors: kPlugin (not ELF, truncated, malformed, no build tag, another ABI).
+AlidadeBuildTag ReadBuildTag(const std::filesystem::path& file);
 
 /// Refuses a file that someone else could have written: not absolute; it, its folder or a folder
 /// above it owned by another than root, the caller or the owner of the running program; writable

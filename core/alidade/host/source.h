@@ -40,7 +40,7 @@ struct StreamInfo {
   double sigma = 0.0;  ///< of a truth: standard deviation of each element, in its tangent
 };
 
-/// Where measurements come from: a simulator, a file, a pipe. A build-tier plugin.
+/// Where measurements come from: a simulator, a file, a pipe. A C++ plugin.
 class Source {
  public:
   virtual ~Source() = default;
@@ -57,7 +57,7 @@ class Source {
   }
   /// The calibration of the camera that took the data: a config of the one map `calibration`, with
   /// parameters under the keys by which models ask for them,
-  /// `calibration: {camera: {fx: 721.5}, baseline_m: 0.54}`. None: the data bring none. Errors:
+  /// `calibration: {camera: {fx: 721.5, baseline_m: 0.54}}`. None: the data bring none. Errors:
   /// kBadData, kInputMissing.
   virtual std::optional<Config> Calibration() const { return std::nullopt; }
   /// Frames in all, or -1 where that is not known (for progress only).

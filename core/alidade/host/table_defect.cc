@@ -30,8 +30,8 @@ std::string EntryDefect(const AlidadeEntry& entry, std::uint32_t stride) {
     return "states a size of " + Number(entry.struct_size) + " bytes";
   }
   if (!GoodName(entry.name)) return "has no name";
-  if (entry.kind == ALIDADE_KIND_LANDMARK_FORM) {
-    return "is a landmark form, which this version does not support";
+  if (entry.kind == ALIDADE_KIND_LANDMARK_REPRESENTATION) {
+    return "is a landmark representation, which this version does not support";
   }
   if (entry.kind != ALIDADE_KIND_SENSOR && entry.kind != ALIDADE_KIND_MOTION) {
     return "is of unknown kind " + Number(entry.kind);
@@ -91,7 +91,7 @@ std::string Defect(const BuildTable* table) {
   }
   const int sources = table->sources == nullptr ? 0 : table->source_count;
   const int estimators = table->estimators == nullptr ? 0 : table->estimator_count;
-  const bool other = table->pictures != nullptr || table->adjust != nullptr;
+  const bool other = table->images != nullptr || table->adjust != nullptr;
   if (sources < 1 && estimators < 1 && !other) return "its table is empty";
   std::string defect = BuildDefect(table->sources, sources, "a source");
   if (defect.empty()) defect = BuildDefect(table->estimators, estimators, "an estimator");

@@ -8,9 +8,9 @@
 #include "ceres/jet.h"
 
 /// Evaluates models with their Jacobians in the tangent, by forward-mode automatic differentiation
-/// through (+) and (-), or by the author's closed form where there is one. Plugins, the static
-/// filter, costs of a batch and tests share it. Matrices are row-major with a row stride; outputs
-/// are untouched unless the result is kOk.
+/// through (+) and (-), or by the author's analytic Jacobian where there is one. Plugins, the
+/// static filter, costs of a batch and tests share it. Matrices are row-major with a row stride;
+/// outputs are untouched unless the result is kOk.
 
 /// Of a function whose loops are not vectorised: what a model has just written number by number
 /// would be read as vectors, which waits for the stores.
@@ -122,8 +122,8 @@ bool CallPredict(const Model& model, const T* const* x, T* z, std::index_sequenc
 
 /// By way of a buffer, so that a Jacobian that throws leaves `jacobians` untouched.
 template <class Model, std::size_t... I>
-void ClosedForm(const Model& model, const double* const* x, double* const* jacobians,
-                const int* strides, std::index_sequence<I...> indices) {
+void AnalyticJacobians(const Model& model, const double* const* x, double* const* jacobians,
+                       const int* strides, std::index_sequence<I...> indices) {
   constexpr int m = Model::Measurement::kTangent;
   double buffer[m * Blocks<Model>::kTangent] = {};
   MatrixRef j[sizeof...(I)];
@@ -156,17 +156,18 @@ Status Evaluate(const Model& model, const double* const* roles, double* z, doubl
   using Z = typename Model::Measurement;
   using Blocks = detail::Blocks<Model>;
   constexpr typename Blocks::Indices indices{};
-  constexpr bool kClosedForm = detail::HasJacobian<Model, typename Blocks::Indices>::value;
-  if (kClosedForm || jacobians == nullptr) {
+  constexpr bool kAnalytic = detail::HasJacobian<Model, typename Blocks::Indices>::value;
+  if (kAnalytic || jacobians == nullptr) {
     double value[Z::kAmbient];
     if (!detail::CallPredict(model, roles, value, indices)) return Status::kOutOfDomain;
-    if constexpr (kClosedForm) {
-      if (jacobians != nullptr) detail::ClosedForm(model, roles, jacobians, strides, indices);
+    if constexpr (kAnalytic) {
+      if (jacobians != nullptr)
+        detail::AnalyticJacobians(model, roles, jacobians, strides, indices);
     }
     std::copy_n(value, Z::kAmbient, z);
     return Status::kOk;
   }
-  if constexpr (!kClosedForm) {
+  if constexpr (!kAnalytic) {
     using Jet = ceres::Jet<double, Blocks::kTangent>;
     Jet lifted[Blocks::kAmbient], value[Z::kAmbient];
     const Jet* x[Blocks::kCount];

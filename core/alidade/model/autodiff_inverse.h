@@ -65,8 +65,9 @@ void ReadInitialised(const Jet* y, int first, int count, MatrixRef j) {
 }  // namespace detail
 
 /// y, the role Model::kInitialises (of a landmark: its roles one after the other), from the other
-/// roles, z and prior (inverse observation), with Jacobians jx[i] = d y / d role_i, jz = d y / d z,
-/// jp = d y / d prior; each may be null. kInvalid where the model needs a prior and has none.
+/// roles, z and prior (inverse measurement model), with Jacobians jx[i] = d y / d role_i, jz = d y
+/// / d z, jp = d y / d prior; each may be null. kInvalid where the model needs a prior and has
+/// none.
 template <class Model>
 Status InitialiseRole(const Model& model, const double* const* roles, const double* z,
                       const double* prior, double* y, double* const* jx, const int* jx_strides,

@@ -35,10 +35,10 @@ bool Buffered(double* const* next, const F& step) {
   }
 }
 
-/// F and G in closed form, buffered as `next` is.
+/// Analytic F and G, buffered as `next` is.
 template <class Model, std::size_t... I>
-void ClosedFormStep(const Model& model, const double* const* x, const double* w, double dt_s,
-                    MatrixRef f, MatrixRef g, std::index_sequence<I...>) {
+void AnalyticStep(const Model& model, const double* const* x, const double* w, double dt_s,
+                  MatrixRef f, MatrixRef g, std::index_sequence<I...>) {
   if constexpr (Blocks<Model>::kStatic && Model::kNoise != kDynamic) {
     constexpr int n = Blocks<Model>::kTangent, n_w = Model::kNoise;
     double f_buffer[n * n] = {}, g_buffer[n * n_w + 1] = {};
@@ -113,7 +113,7 @@ Status StepWithNoise(const Model& model, const double* const* x, const double* u
   if constexpr (HasStepJacobian<Model, typename Blocks<Model>::Indices>::value) {
     const auto step = [&](double* const* to) {
       if (!CallStep(model, x, u, w, dt_s, to, indices)) return false;
-      ClosedFormStep(model, x, w, dt_s, f, g, indices);
+      AnalyticStep(model, x, w, dt_s, f, g, indices);
       return true;
     };
     return Buffered<Model>(next, step) ? Status::kOk : Status::kOutOfDomain;

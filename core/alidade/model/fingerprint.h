@@ -14,13 +14,13 @@ constexpr void CopyText(const char* text, char (&to)[N]) {
   for (std::size_t i = 0; i + 1 < N && text[i] != '\0'; ++i) to[i] = text[i];
 }
 
-constexpr AlidadeFingerprint MakeFingerprint(std::uint32_t tier, const char* build) {
-  AlidadeFingerprint f{};
+constexpr AlidadeBuildTag MakeBuildTag(std::uint32_t kind, const char* build) {
+  AlidadeBuildTag f{};
   CopyText("ALIDADE", f.magic);
-  f.struct_size = sizeof(AlidadeFingerprint);
+  f.struct_size = sizeof(AlidadeBuildTag);
   f.abi_major = ALIDADE_ABI_MAJOR;
   f.abi_minor = ALIDADE_ABI_MINOR;
-  f.tier = tier;
+  f.kind = kind;
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
   f.flags |= ALIDADE_BUILT_FAST_MATH;
 #endif
@@ -49,8 +49,7 @@ constexpr AlidadeFingerprint MakeFingerprint(std::uint32_t tier, const char* bui
 }
 
 template <std::size_t N>
-constexpr AlidadeTable Table(const AlidadeEntry (&entries)[N],
-                             const AlidadeFingerprint* fingerprint) {
+constexpr AlidadeTable Table(const AlidadeEntry (&entries)[N], const AlidadeBuildTag* build_tag) {
   AlidadeTable table{};
   table.struct_size = sizeof(AlidadeTable);
   table.magic = ALIDADE_MAGIC;
@@ -59,16 +58,16 @@ constexpr AlidadeTable Table(const AlidadeEntry (&entries)[N],
   table.entry_stride = sizeof(AlidadeEntry);
   table.entry_count = N;
   table.entries = entries;
-  table.fingerprint = fingerprint;
+  table.build_tag = build_tag;
   return table;
 }
 
 }  // namespace alidade::detail
 
-/// Lays the fingerprint into its section: `tier` ALIDADE_TIER_*, `build` to equal the host's.
-#define ALIDADE_FINGERPRINT(tier, build)                                                       \
-  extern "C" {                                                                                 \
-  __attribute__((section(ALIDADE_FINGERPRINT_SECTION), used,                                   \
-                 visibility("default"))) extern const AlidadeFingerprint alidade_fingerprint = \
-      alidade::detail::MakeFingerprint(tier, build);                                           \
+/// Lays the build tag into its section: `kind` ALIDADE_PLUGIN_*, `build` to equal the host's.
+#define ALIDADE_BUILD_TAG(kind, build)                                                    \
+  extern "C" {                                                                            \
+  __attribute__((section(ALIDADE_BUILD_TAG_SECTION), used,                                \
+                 visibility("default"))) extern const AlidadeBuildTag alidade_build_tag = \
+      alidade::detail::MakeBuildTag(kind, build);                                         \
   }

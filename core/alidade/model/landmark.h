@@ -10,12 +10,12 @@
 #include "alidade/model/autodiff.h"
 #include "alidade/model/params.h"
 
-/// Forms of a landmark, a point of the world as it is written in the state. Every form says where
-/// the point is as p = a + m / rho, which serves the rest:
+/// Representations of a landmark, a point of the world as it is written in the state. Every
+/// representation says where the point is as p = a + m / rho, which serves the rest:
 ///
 ///   (1)  h = R_CW (rho (a - r) + m) = rho p_in_cam      finite at rho = 0, a point infinitely far
 ///
-/// with the camera at r, turned by q = world_from_cam. A form has
+/// with the camera at r, turned by q = world_from_cam. A representation has
 ///
 ///   using Spaces = std::tuple<...>;                      geometries of its blocks
 ///   static constexpr std::array kRoles{Quantity{...}};   one for each, ALIDADE_ROLE_LANDMARK
@@ -33,8 +33,8 @@ struct Ray {
   T rho;           ///< 1/m where m is of unit length
 };
 
-/// Six numbers, the form of MonoSLAM: where the camera was that saw the point first, azimuth and
-/// elevation of the ray, and the inverse distance along it.
+/// Six numbers, the representation of MonoSLAM: where the camera was that saw the point first,
+/// azimuth and elevation of the ray, and the inverse distance along it.
 ///
 ///   y = (x0, y0, z0, theta, phi, rho),  a = (x0, y0, z0)
 ///   m = (cos phi sin theta, -sin phi, cos phi cos theta)
@@ -120,24 +120,25 @@ struct Xyz {
   }
 };
 
-/// The forms by name, as `landmarks.representation` chooses one.
-enum class LandmarkForm { kInverseDepth, kAnchored, kXyz };
+/// The representations by name, as `landmarks.representation` chooses one.
+enum class LandmarkRepresentation { kInverseDepth, kAnchored, kXyz };
 
-/// Names of LandmarkForm, in its order.
-inline constexpr const char* kLandmarkForms[] = {"inverse_depth", "anchored", "xyz"};
+/// Names of LandmarkRepresentation, in its order.
+inline constexpr const char* kLandmarkRepresentations[] = {"inverse_depth", "anchored", "xyz"};
 
 /// Reads the parameter `landmarks.representation`.
-inline LandmarkForm ReadLandmarkForm(Params& params) {
-  return static_cast<LandmarkForm>(params.Choice(
-      "landmarks.representation", {kLandmarkForms[0], kLandmarkForms[1], kLandmarkForms[2]},
+inline LandmarkRepresentation ReadLandmarkRepresentation(Params& params) {
+  return static_cast<LandmarkRepresentation>(params.Choice(
+      "landmarks.representation",
+      {kLandmarkRepresentations[0], kLandmarkRepresentations[1], kLandmarkRepresentations[2]},
       "how a landmark is written in the state", 0));
 }
 
-/// f(Form{}) of the struct that `form` names.
+/// f(Representation{}) of the struct that `representation` names.
 template <class F>
-auto WithForm(LandmarkForm form, const F& f) {
-  if (form == LandmarkForm::kAnchored) return f(Anchored{});
-  if (form == LandmarkForm::kXyz) return f(Xyz{});
+auto WithRepresentation(LandmarkRepresentation representation, const F& f) {
+  if (representation == LandmarkRepresentation::kAnchored) return f(Anchored{});
+  if (representation == LandmarkRepresentation::kXyz) return f(Xyz{});
   return f(InverseDepth{});
 }
 
@@ -151,43 +152,43 @@ void InCamera(const Ray<T>& ray, const T* position, const T* orientation, T* h) 
   UnitQuaternion::RotateBack(orientation, along, h);
 }
 
-/// Inverse observation: y of the point that a camera sees along h (in the camera, of any length) at
-/// the inverse distance rho, 1/m. False where the form has no such y.
-template <class Form, class T>
+/// Inverse measurement model: y of the point that a camera sees along h (in the camera, of any
+/// length) at the inverse distance rho, 1/m. False where the representation has no such y.
+template <class Representation, class T>
 bool PlaceLandmark(const T* position, const T* orientation, const T* h, const T& rho, T* y) {
   using std::sqrt;
   const T length = sqrt(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]);
   const T unit[3] = {h[0] / length, h[1] / length, h[2] / length};
   Ray<T> ray{{position[0], position[1], position[2]}, {}, rho};
   UnitQuaternion::Rotate(orientation, unit, ray.direction);
-  return Form::FromRay(ray, y);
+  return Representation::FromRay(ray, y);
 }
 
 /// The ray of a landmark whose blocks have these values.
-template <class Form>
+template <class Representation>
 Ray<double> RayOf(const double* const* blocks) {
-  double y[detail::Blocks<Form>::kAmbient];
+  double y[detail::Blocks<Representation>::kAmbient];
   int offset = 0;
   const auto copy = [&](auto index) {
     constexpr int i = decltype(index)::value;
-    constexpr int n = detail::SpaceAt<i, Form>::kAmbient;
+    constexpr int n = detail::SpaceAt<i, Representation>::kAmbient;
     std::copy_n(blocks[i], n, y + offset);
     offset += n;
   };
-  detail::ForEach(copy, typename detail::Blocks<Form>::Indices{});
-  return Form::ToRay(y);
+  detail::ForEach(copy, typename detail::Blocks<Representation>::Indices{});
+  return Representation::ToRay(y);
 }
 
 /// p = a + m / rho of a landmark, with the Jacobian J_p_y, 3 x tangent of its blocks, where that is
 /// not empty. kOutOfDomain unless rho > 0.
-template <class Form>
-Status ToXyz(const double* const* blocks, double* p, MatrixRef J_p_y = {}) {
-  constexpr int n = detail::Blocks<Form>::kTangent;
+template <class Representation>
+Status ConvertToXyz(const double* const* blocks, double* p, MatrixRef J_p_y = {}) {
+  constexpr int n = detail::Blocks<Representation>::kTangent;
   using Jet = ceres::Jet<double, n>;
-  Jet y[detail::Blocks<Form>::kAmbient], lifted[3];
-  const Jet* pointers[detail::Blocks<Form>::kCount];
-  detail::Lift<Form>(blocks, y, pointers);
-  if (!Xyz::FromRay(Form::ToRay(y), lifted)) return Status::kOutOfDomain;
+  Jet y[detail::Blocks<Representation>::kAmbient], lifted[3];
+  const Jet* pointers[detail::Blocks<Representation>::kCount];
+  detail::Lift<Representation>(blocks, y, pointers);
+  if (!Xyz::FromRay(Representation::ToRay(y), lifted)) return Status::kOutOfDomain;
   for (int i = 0; i < 3; ++i) p[i] = lifted[i].a;
   if (J_p_y) detail::ReadTangent<Vec<3>>(lifted, 0, n, J_p_y);
   return Status::kOk;

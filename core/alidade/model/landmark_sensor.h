@@ -25,42 +25,43 @@ constexpr std::array<Quantity, N + 2> BehindPose(const std::array<Quantity, N>& 
 
 }  // namespace detail
 
-/// Base of a sensor that sees landmarks of the form `Form` from a camera: the roles position and
-/// orientation, then those of the form. All forms look the same to the model, which has
+/// Base of a sensor that sees landmarks of one `Representation` from a camera: the roles position
+/// and orientation, then those of the representation. All representations look the same to the
+/// model, which has
 ///
 ///   template <class T> bool PredictInCamera(const T* h, const T& rho, T* z) const;
 ///   template <class T> void SqrtNoiseInCamera(const T* h, const T& rho, T* L) const;
 ///
 /// of the point h / rho in the camera (infinitely far at rho = 0), and Initialise as any sensor.
 /// Where Predict is false the noise is not asked for.
-template <class Model, class Z, class Form>
-struct LandmarkSensor : detail::PoseAnd<Z, typename Form::Spaces>::Type {
-  static constexpr auto kRoles = detail::BehindPose(Form::kRoles);
+template <class Model, class Z, class Representation>
+struct LandmarkSensor : detail::PoseAnd<Z, typename Representation::Spaces>::Type {
+  static constexpr auto kRoles = detail::BehindPose(Representation::kRoles);
   static constexpr int kInitialises = 2;
 
-  /// z of a form of one block.
+  /// z of a representation of one block.
   template <class T>
   bool Predict(const T* position, const T* orientation, const T* y, T* z) const {
     T h[3];
-    const Ray<T> ray = Form::ToRay(y);
+    const Ray<T> ray = Representation::ToRay(y);
     InCamera(ray, position, orientation, h);
     return static_cast<const Model&>(*this).PredictInCamera(h, ray.rho, z);
   }
-  /// L of a form of one block, m x m row-major.
+  /// L of a representation of one block, m x m row-major.
   template <class T>
   void SqrtNoise(const T* position, const T* orientation, const T* y, T* L) const {
     T h[3];
-    const Ray<T> ray = Form::ToRay(y);
+    const Ray<T> ray = Representation::ToRay(y);
     InCamera(ray, position, orientation, h);
     static_cast<const Model&>(*this).SqrtNoiseInCamera(h, ray.rho, L);
   }
-  /// z of a form of three blocks.
+  /// z of a representation of three blocks.
   template <class T>
   bool Predict(const T* position, const T* orientation, const T* anchor, const T* direction,
                const T* inverse_distance, T* z) const {
     return Predict(position, orientation, Packed<T>(anchor, direction, inverse_distance).y, z);
   }
-  /// L of a form of three blocks, m x m row-major.
+  /// L of a representation of three blocks, m x m row-major.
   template <class T>
   void SqrtNoise(const T* position, const T* orientation, const T* anchor, const T* direction,
                  const T* inverse_distance, T* L) const {

@@ -86,7 +86,7 @@ struct Sensor {
 ///
 /// Lq of discrete noise is taken at the start of its interval and does not depend on dt_s.
 ///
-/// A block with the flag ALIDADE_ROLE_OWNED, a bias or an extrinsic, is fixed at the neutral
+/// A block with the flag ALIDADE_ROLE_PARAMETER, a bias or an extrinsic, is constant at the neutral
 /// element of its geometry, unless the config gives it an initial value.
 ///
 /// Blocks of size kDynamic need StepJacobian, `int Size(int block) const` and

@@ -8,7 +8,7 @@
 #include "alidade/model/fingerprint.h"
 #include "alidade/model/plugin_thunks.h"
 
-/// Puts models behind the sealed boundary of plugin_abi.h. In the .cc of a plugin:
+/// Puts models behind the plugin ABI, plugin_abi.h. In the .cc of a plugin:
 ///
 ///   ALIDADE_PLUGIN(ALIDADE_SENSOR(Model, "name", "doc", "citation"), ...)
 namespace alidade {
@@ -133,9 +133,9 @@ void EmplaceMotion(Params& params, AlidadeInstance* instance) {
 
 /// Exports the models as this plugin's table. Once for each plugin.
 #define ALIDADE_PLUGIN(...)                                                                    \
-  ALIDADE_FINGERPRINT(ALIDADE_TIER_SEALED, "")                                                 \
+  ALIDADE_BUILD_TAG(ALIDADE_PLUGIN_C_ABI, "")                                                  \
   extern "C" __attribute__((visibility("default"))) const AlidadeTable* alidade_plugin(void) { \
     static const AlidadeEntry entries[] = {__VA_ARGS__};                                       \
-    static const AlidadeTable table = alidade::detail::Table(entries, &alidade_fingerprint);   \
+    static const AlidadeTable table = alidade::detail::Table(entries, &alidade_build_tag);     \
     return &table;                                                                             \
   }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #pragma once
 
-/* The sealed boundary between alidade and a model plugin: plain C data, nothing else.
- * A plugin exports one function, `alidade_plugin`, that returns its table, and one fingerprint in
+/* The plugin ABI between alidade and a C-ABI plugin: plain C data, nothing else.
+ * A plugin exports one function, `alidade_plugin`, that returns its table, and one build tag in
  * the ELF section `.alidade`, which the host reads before it opens the file. Rules:
  *
  *   - every struct begins with its own size; the host reads only what the size covers and takes
@@ -25,7 +25,7 @@ extern "C" {
 #define ALIDADE_ABI_MINOR 1
 #define ALIDADE_MAGIC 0x4144494cu /* "LIDA" */
 #define ALIDADE_ENTRY_SYMBOL "alidade_plugin"
-#define ALIDADE_FINGERPRINT_SECTION ".alidade"
+#define ALIDADE_BUILD_TAG_SECTION ".alidade"
 
 /* What an evaluation returns. */
 enum {
@@ -35,25 +35,25 @@ enum {
   ALIDADE_ERROR = 3          /* the plugin failed (an exception was caught); see error_text */
 };
 
-enum { ALIDADE_TIER_SEALED = 1, ALIDADE_TIER_BUILD = 2 };
+enum { ALIDADE_PLUGIN_C_ABI = 1, ALIDADE_PLUGIN_CPP = 2 };
 
-/* Bits of AlidadeFingerprint.flags. */
+/* Bits of AlidadeBuildTag.flags. */
 enum { ALIDADE_BUILT_FAST_MATH = 1, ALIDADE_BUILT_DEBUG_STL = 2, ALIDADE_BUILT_UNOPTIMISED = 4 };
 
-/* Bits of AlidadeFingerprint.isa: what the code needs of the processor. */
+/* Bits of AlidadeBuildTag.isa: what the code needs of the processor. */
 enum { ALIDADE_ISA_AVX = 1, ALIDADE_ISA_AVX2 = 2, ALIDADE_ISA_FMA = 4, ALIDADE_ISA_AVX512F = 8 };
 
 /* Lies alone in the section `.alidade`. */
-typedef struct AlidadeFingerprint {
+typedef struct AlidadeBuildTag {
   char magic[8]; /* "ALIDADE" and a zero */
   uint32_t struct_size;
   uint16_t abi_major, abi_minor;
-  uint32_t tier, flags, isa;
+  uint32_t kind, flags, isa;
   uint32_t cplusplus; /* __cplusplus */
   char compiler[64];  /* __VERSION__ */
-  char build[160];    /* build tier: all that must equal the host's, else empty */
+  char build[160];    /* C++ plugin: all that must equal the host's, else empty */
   uint32_t reserved[8];
-} AlidadeFingerprint;
+} AlidadeBuildTag;
 
 enum {
   ALIDADE_VECTOR = 1,          /* ambient n, tangent n */
@@ -64,10 +64,10 @@ enum {
 
 /* Bits of AlidadeSpace.flags. */
 enum {
-  ALIDADE_ROLE_OPTIONAL = 1, /* may stay unbound: its pointer is then null */
-  ALIDADE_ROLE_OWNED = 2,    /* the block arrives with its motion model: a bias, an extrinsic */
-  ALIDADE_ROLE_LANDMARK = 4, /* filled anew for each measurement, by its landmark id */
-  ALIDADE_ROLE_SHARED = 8    /* with LANDMARK: one block for all that are first seen at one stamp */
+  ALIDADE_ROLE_OPTIONAL = 1,  /* may stay unbound: its pointer is then null */
+  ALIDADE_ROLE_PARAMETER = 2, /* the block arrives with its motion model: a bias, an extrinsic */
+  ALIDADE_ROLE_LANDMARK = 4,  /* filled anew for each measurement, by its landmark id */
+  ALIDADE_ROLE_SHARED = 8 /* with LANDMARK: one block for all that are first seen at one stamp */
 };
 
 /* A role, a measurement or a control input: a named quantity with its geometry. */
@@ -128,7 +128,7 @@ typedef struct AlidadeHost {
 
 /* ---- models ---------------------------------------------------------------------------------- */
 
-enum { ALIDADE_KIND_SENSOR = 1, ALIDADE_KIND_MOTION = 2, ALIDADE_KIND_LANDMARK_FORM = 3 };
+enum { ALIDADE_KIND_SENSOR = 1, ALIDADE_KIND_MOTION = 2, ALIDADE_KIND_LANDMARK_REPRESENTATION = 3 };
 
 /* Bits of AlidadeDescription.capabilities. */
 enum {
@@ -168,8 +168,8 @@ typedef struct AlidadeSensor {
                         int32_t row_stride);
   /* ALIDADE_OK or ALIDADE_INVALID; null: every measurement is valid. */
   int32_t (*valid)(const void* self, const double* z);
-  /* Inverse observation: y, the value of role `initialise_role`, from the other roles, z and a
-   * prior of the part that z does not tell (null where it tells all). Where that role is a
+  /* Inverse measurement model: y, the value of role `initialise_role`, from the other roles, z and
+   * a prior of the part that z does not tell (null where it tells all). Where that role is a
    * landmark's, y are the values of it and of the landmark roles that follow it, one after the
    * other. Jacobians jx[i] of y by the other roles, jz by z, jp by the prior; each may be null. */
   int32_t (*initialise)(const void* self, const double* const* roles, const double* z,
@@ -195,8 +195,8 @@ typedef struct AlidadeMotion {
   void* reserved[4];
 } AlidadeMotion;
 
-/* A landmark form: how a point of the world is written in the state. */
-typedef struct AlidadeLandmarkForm {
+/* A landmark representation: how a point of the world is written in the state. */
+typedef struct AlidadeLandmarkRepresentation {
   uint32_t struct_size, reserved0;
   /* Blocks of a landmark from camera position, orientation, bearing and prior. */
   int32_t (*initialise)(const void* self, const double* const* roles, const double* z,
@@ -210,7 +210,7 @@ typedef struct AlidadeLandmarkForm {
   int32_t (*linearity)(const void* self, const double* const* blocks, const double* camera,
                        double sigma, double* index);
   void* reserved[4];
-} AlidadeLandmarkForm;
+} AlidadeLandmarkRepresentation;
 
 /* One created model. The host zeroes it and sets struct_size; `create` fills it. */
 typedef struct AlidadeInstance {
@@ -221,7 +221,7 @@ typedef struct AlidadeInstance {
   const AlidadeDescription* description;       /* lives as long as self */
   const AlidadeSensor* sensor;                 /* the one that fits `kind`, others null */
   const AlidadeMotion* motion;
-  const AlidadeLandmarkForm* form;
+  const AlidadeLandmarkRepresentation* form;
   void* reserved[4];
 } AlidadeInstance;
 
@@ -248,7 +248,7 @@ typedef struct AlidadeTable {
   uint16_t abi_major, abi_minor;
   uint32_t entry_stride, entry_count, reserved0;
   const AlidadeEntry* entries;
-  const AlidadeFingerprint* fingerprint;
+  const AlidadeBuildTag* build_tag;
   void* reserved[4];
 } AlidadeTable;
 

@@ -38,7 +38,7 @@ std::vector<Segment> ReadSegments(const Node& root, const System& system,
       internal::ExpectName(name, entry, "a segment");
       const auto with = entry.Find("with"), without = entry.Find("without");
       if (with.has_value() == without.has_value()) {
-        entry.Fail("a segment is the stamps with or without a valid measurement",
+        entry.Fail("a segment is the timestamps with or without a valid measurement",
                    "one of with: SENSOR, without: SENSOR");
       }
       const Node& sensor = with ? *with : *without;
@@ -97,7 +97,8 @@ OutOfSequencePolicy ReadOutOfSequence(const Node& root) {
   }
   if (window) policy.window = StampFromSeconds(window->Number(0.0, 1e9));
   if (!window && policy.policy == OutOfSequence::kRollback) {
-    chosen.Fail("'rollback' without 'window_s'", "'window_s', how late a frame may be");
+    chosen.Fail("'rollback' without 'window_s'",
+                "'window_s', how far out of sequence a frame may be");
   }
   entry->RejectUnread();
   return policy;
@@ -130,11 +131,12 @@ int ReadReference(const Node& root, const std::vector<NamedEstimator>& estimator
 
 /// Keys of the root that are read before the calibration is there, or by other commands.
 void DeclareCommon(const Node& root) {
-  // `baseline_m`: of a calibration, for `alidade bundle`; a sensor has its own.
-  for (const char* key : {"alidade", "plugins", "include", "baseline_m", "title", "output",
-                          "source", "out_of_sequence"}) {
+  for (const char* key :
+       {"alidade", "plugins", "include", "title", "output", "source", "out_of_sequence"}) {
     root.Declare(key);
   }
+  // Of the calibration of a pair, one of whose cameras may be used alone.
+  if (const auto camera = root.Find("camera")) camera->Declare("baseline_m");
 }
 
 /// The plugins that the source, the estimators and their models come from, as far as they were

@@ -47,14 +47,15 @@ struct Segment {
 enum class OutOfSequence {
   kReject,    ///< estimators are given it as it comes, and count its measurements as stale
   kBuffer,    ///< frames are held back while one before them can still come
-  kRollback,  ///< as kBuffer, but estimators take frames as they come, and go back for a late one
+  kRollback,  ///< estimators take frames as they come, and roll back for one out of sequence
 };
 
 /// How a run takes frames that are not in the order of their stamps. But under kReject, frames of
 /// equal stamps are merged.
 struct OutOfSequencePolicy {
   OutOfSequence policy = OutOfSequence::kReject;
-  /// A frame farther behind the newest is dropped, with the event `late`; none: no frame is.
+  /// A frame farther behind the newest is dropped, with the event `out_of_sequence`; none: no frame
+  /// is.
   std::optional<Stamp> window;
   std::vector<int> ranks;  ///< of the streams, among the measurements of merged frames
 };

@@ -86,11 +86,11 @@ bool FrameOrder::Accept(const Frame& frame) {
     return true;
   }
   const Stamp lag = Lag(newest_, frame.stamp);
-  ++arrivals_.late;
+  ++arrivals_.out_of_sequence;
   arrivals_.longest_lag = std::max(arrivals_.longest_lag, lag);
   if (!IsTooLate(frame.stamp)) return true;
   ++arrivals_.dropped;
-  events_.push_back({frame.stamp, "late",
+  events_.push_back({frame.stamp, "out_of_sequence",
                      "a frame " + Names(frame) + "came " + SecondsText(lag) +
                          " behind the newest, beyond the window of " +
                          SecondsText(*experiment_.out_of_sequence.window) + ": dropped"});
@@ -158,12 +158,12 @@ void FrameOrder::CheckMerge(const Held& held, const Frame& part) const {
     if (first == whole.measurements.end()) continue;
     const auto index = static_cast<std::size_t>(first - whole.measurements.begin());
     fail("stream '" + source.streams()[static_cast<std::size_t>(m.stream)].name + "' twice",
-         "one measurement at a stamp; the first is" + In(held.places[index]));
+         "one measurement at a timestamp; the first is" + In(held.places[index]));
   }
   for (std::size_t t = 0; t < std::min(whole.truth.size(), part.truth.size()); ++t) {
     if (part.truth[t].empty() || whole.truth[t].empty() || part.truth[t] == whole.truth[t])
       continue;
-    fail("another value of truth '" + source.truths()[t].name + "'", "one at a stamp");
+    fail("another value of truth '" + source.truths()[t].name + "'", "one at a timestamp");
   }
 }
 

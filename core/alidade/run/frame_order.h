@@ -22,8 +22,8 @@ struct Processed {
 };
 
 /// The frames of an experiment's source in the order of its OutOfSequencePolicy. Under kRollback it
-/// also steers the estimators: they take each frame as it comes, and what came after a late one
-/// again.
+/// also steers the estimators: they take each frame as it comes, and what came after an
+/// out-of-sequence one again.
 class FrameOrder {
  public:
   using Check = std::function<void(Frame&)>;
@@ -38,7 +38,7 @@ class FrameOrder {
   /// What the estimator made of the frame that Next gave; null: it has not been given the frame.
   const Processed* processed(std::size_t estimator) const;
   const Arrivals& arrivals() const { return arrivals_; }
-  /// `late` of each frame dropped since the last call.
+  /// `out_of_sequence` of each frame dropped since the last call.
   std::vector<Event> TakeEvents() { return std::exchange(events_, {}); }
 
  private:

@@ -210,8 +210,8 @@ void Metrics::Impl::CheckElement(Stamp stamp, Tracked& block, int element, doubl
   events.push_back({stamp, "inconsistent",
                     block.elements[element] + ": the error, " + internal::RoundedText(error, 4) +
                         unit + ", has been beyond " + internal::NumberText(kInconsistentSigmas) +
-                        " sigma for " + std::to_string(kInconsistentStamps) + " stamps; sigma is " +
-                        internal::RoundedText(sigma, 4) + unit});
+                        " sigma for " + std::to_string(kInconsistentStamps) +
+                        " timestamps; sigma is " + internal::RoundedText(sigma, 4) + unit});
 }
 
 void Metrics::Impl::AddConsistency(Stamp stamp, const std::vector<Sums*>& into,

@@ -215,7 +215,7 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
               "`sensors` that measure none, or type: ekf");
   }
   CheckStreams(own.root(), named.system, streams);
-  const bool lent = use && use->is_map();  // landmarks enter as the other estimator let them
+  const bool lent = use && use->is_map();  // landmarks are initialised as in the other estimator
   if (lent && named.system.landmarks) named.system.landmarks->min_observations = 1;
   named.estimator = make(named.system, streams);
   if (use) named.accepted_by = ReadUse(*use, named, config.root().At("estimators"), before);

@@ -10,7 +10,7 @@
 
 namespace alidade {
 
-/// Matrices as they cross the plugin boundary.
+/// Matrices as they cross the plugin ABI.
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// Columns [offset, offset + block.cols()) of a Jacobian that is zero elsewhere.

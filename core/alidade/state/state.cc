@@ -47,7 +47,7 @@ void State::Reserve(BlockId id) {
     block.value_offset = static_cast<int>(values_.size());
     values_.resize(values_.size() + static_cast<std::size_t>(size));
   }
-  if (block.status == BlockStatus::kFixed) return;
+  if (block.status == BlockStatus::kConstant) return;
   block.tangent_offset = covariance_.Add(block.geometry().tangent);
 }
 
@@ -61,7 +61,7 @@ void State::PlaceValue(BlockId id, const double* value) {
 void State::Add(BlockId id, const double* value, const Eigen::MatrixXd& covariance) {
   PlaceValue(id, value);
   const Block& block = layout_[id];
-  if (block.status == BlockStatus::kFixed) return;
+  if (block.status == BlockStatus::kConstant) return;
   ALIDADE_EXPECTS(covariance.rows() == block.geometry().tangent);
   covariance_.SetRows(block.tangent_offset, covariance,
                       Eigen::MatrixXd::Zero(covariance_.size(), covariance.rows()));
@@ -72,7 +72,7 @@ void State::Initialise(BlockId id, const double* value, const std::vector<BlockI
   ALIDADE_EXPECTS(from.size() == jacobians.size());
   PlaceValue(id, value);
   const Block& block = layout_[id];
-  if (block.status == BlockStatus::kFixed) return;
+  if (block.status == BlockStatus::kConstant) return;
   const int rows = block.geometry().tangent;
   std::vector<JacobianBlock> j;
   for (std::size_t i = 0; i < from.size(); ++i) {
@@ -162,10 +162,10 @@ void State::Drop(BlockId id) {
   layout_.dropped_.push_back(id);
 }
 
-void State::Consider(BlockId id, bool considered) {
+void State::Consider(BlockId id, bool consider) {
   Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
-  ALIDADE_EXPECTS(block.status != BlockStatus::kFixed);
-  block.status = considered ? BlockStatus::kConsidered : BlockStatus::kEstimated;
+  ALIDADE_EXPECTS(block.status != BlockStatus::kConstant);
+  block.status = consider ? BlockStatus::kConsider : BlockStatus::kEstimated;
 }
 
 void State::Reparametrise(BlockId id, Space space, const double* value,

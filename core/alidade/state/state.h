@@ -16,7 +16,7 @@ using BlockId = int;
 
 /// What the estimator does with a block: correct it; keep it and its correlations, never correct it
 /// (Schmidt); take it as known.
-enum class BlockStatus { kEstimated, kConsidered, kFixed };
+enum class BlockStatus { kEstimated, kConsider, kConstant };
 
 /// One named part of the state.
 struct Block {
@@ -26,10 +26,10 @@ struct Block {
   BlockStatus status = BlockStatus::kEstimated;
   bool present = false;     ///< has a value; else declared only, waiting to be initialised
   int value_offset = -1;    ///< into StateValue, where present or reserved
-  int tangent_offset = -1;  ///< into Covariance, where present or reserved, and not fixed
+  int tangent_offset = -1;  ///< into Covariance, where present or reserved, and not constant
 
   const Geometry& geometry() const { return space.geometry; }
-  bool has_covariance() const { return present && status != BlockStatus::kFixed; }
+  bool has_covariance() const { return present && status != BlockStatus::kConstant; }
 };
 
 /// Names, geometries and places of the blocks; knows no values.
@@ -74,7 +74,7 @@ class State {
                   BlockStatus status = BlockStatus::kEstimated);
   /// Gives a declared block the place that its value will have, and rows of zeros.
   void Reserve(BlockId id);
-  /// Gives a declared block a value and a covariance (tangent, row-major; ignored where fixed),
+  /// Gives a declared block a value and a covariance (tangent, row-major; ignored where constant),
   /// uncorrelated with the rest.
   void Add(BlockId id, const double* value, const Eigen::MatrixXd& covariance);
   /// Gives a declared block the value y = g(x, n), with dy = J_y_x dx + J_y_n dn: its covariance is
@@ -93,8 +93,8 @@ class State {
   void Marginalise(BlockId id);
   /// Marginalise, and gives the id back too: a block declared later may have it.
   void Drop(BlockId id);
-  /// Estimated <-> considered; the correlations stay.
-  void Consider(BlockId id, bool considered);
+  /// Estimated <-> consider state; the correlations stay.
+  void Consider(BlockId id, bool consider);
   /// Replaces the block by y = g(x_id) of another geometry, J = dy/dx in the tangents.
   void Reparametrise(BlockId id, Space space, const double* value, const Eigen::MatrixXd& jacobian);
   /// moved = the values x_i (+) dx_i of all blocks with a covariance, the rest as it is; dx is

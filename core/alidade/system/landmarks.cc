@@ -32,6 +32,17 @@ void ReadPrune(const Node& node, LandmarkOptions& options) {
   node.RejectUnread();
 }
 
+int ReadMost(const Node& node) {
+  if (node.kind() == Node::Kind::kScalar && node.Text() == "unlimited") {
+    return LandmarkOptions::kUnlimited;
+  }
+  try {
+    return static_cast<int>(node.Integer(1, kMost));
+  } catch (const Error& error) {
+    throw Error(error.code(), std::string(error.what()) + ", or unlimited");
+  }
+}
+
 std::vector<KnownLandmark> ReadKnown(const Node& list) {
   std::vector<KnownLandmark> known;
   std::set<std::int64_t> ids;
@@ -69,10 +80,7 @@ LandmarkOptions LandmarkOptions::FromNode(const Node& node) {
   LandmarkOptions options;
   node.Declare("representation");
   if (const auto prior = node.Find("prior")) options.prior = ReadPrior(*prior);
-  const auto most = node.Find("max_per_frame");
-  if (most && (most->kind() != Node::Kind::kScalar || most->Text() != "unlimited")) {
-    options.max_per_frame = static_cast<int>(most->Integer(1, kMost));
-  }
+  if (const auto most = node.Find("max_per_frame")) options.max_per_frame = ReadMost(*most);
   if (const auto observations = node.Find("min_observations")) {
     options.min_observations = static_cast<int>(observations->Integer(1, kMost));
   }

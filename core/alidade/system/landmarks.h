@@ -24,7 +24,7 @@ struct KnownLandmark {
   double sigma = 0.0;  ///< of each element; 0: known exactly, never corrected
 };
 
-/// How landmarks enter the state, change and leave it.
+/// How landmarks are initialised, converted and pruned.
 struct LandmarkOptions {
   /// What one observation does not tell: the inverse distance, 1/m, and its standard deviation.
   /// Neither has a default: they depend on the scene.
@@ -40,9 +40,10 @@ struct LandmarkOptions {
   static constexpr int kUnlimited = std::numeric_limits<int>::max();
 
   std::optional<Prior> prior;
-  int max_per_frame = kUnlimited;  ///< landmarks measured in a frame, below which new ones enter
-  int min_observations = 1;        ///< observations, the last of which it enters with
-  int max_missed_frames = 0;       ///< after so many without an observation it is deleted; 0: never
+  int max_per_frame =
+      kUnlimited;  ///< landmarks measured in a frame, below which new ones are initialised
+  int min_observations = 1;   ///< observations, the last of which initialises it
+  int max_missed_frames = 0;  ///< after so many without an observation it is deleted; 0: never
   /// It is deleted where a smaller share of at least `min_attempts` measurements is accepted.
   double min_match_ratio = 0.0;
   int min_attempts = 10;
@@ -76,7 +77,7 @@ struct OnePointRansac {
 struct LandmarkEstimate {
   std::int64_t id = 0;
   int generation = 0;  ///< landmarks of this id before it
-  std::optional<LandmarkForm> form;
+  std::optional<LandmarkRepresentation> representation;
   Eigen::Vector3d position = Eigen::Vector3d::Constant(std::nan(""));       ///< in the world, m
   Eigen::Vector3d true_position = Eigen::Vector3d::Constant(std::nan(""));  ///< where known, m
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Constant(std::nan(""));

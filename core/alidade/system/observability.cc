@@ -16,9 +16,9 @@ namespace {
 constexpr double kPlaces[][3] = {{-0.2, 0.1, 1.0},   {0.23, -0.07, 1.3}, {0.1, 0.15, 0.8},
                                  {-0.1, -0.12, 1.6}, {0.02, 0.05, 2.1},  {0.17, 0.11, 1.15}};
 
-/// The sensor's model for landmarks of the form xyz; null where it has none.
+/// The sensor's model for landmarks of the representation xyz; null where it has none.
 const SensorModel* XyzModel(const SensorBinding& sensor) {
-  if (FormOf(sensor.model.roles()) == internal::XyzForm()) return &sensor.model;
+  if (RepresentationOf(sensor.model.roles()) == internal::XyzRepresentation()) return &sensor.model;
   return sensor.xyz ? &*sensor.xyz : nullptr;
 }
 
@@ -77,7 +77,7 @@ Trajectory StartNearPrior(const System& system) {
       nudge[i] = size * (1.0 + 0.1 * static_cast<double>((prior.block + 3 * i) % 7));
     }
     geometry.Plus(value.data(), nudge.data(), value.data());
-    if (block.status == BlockStatus::kFixed) continue;
+    if (block.status == BlockStatus::kConstant) continue;
     t.columns[static_cast<std::size_t>(prior.block)] = static_cast<int>(t.names.size());
     const std::vector<std::string> names = ColumnNames(block.name, block.space);
     for (int i = 0; i < geometry.tangent; ++i) {
@@ -202,7 +202,7 @@ void Observe(const System& system, const Trajectory& t, const Eigen::MatrixXd& p
     Eigen::MatrixXd seen = Eigen::MatrixXd::Zero(m, phi.cols());
     for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
       const RoleBinding& role = sensor.roles[i];
-      if (role.block < 0 || role.mode == RoleMode::kHold) continue;
+      if (role.block < 0 || role.mode == RoleMode::kKnown) continue;
       const int column = t.columns[static_cast<std::size_t>(role.block)];
       if (column >= 0) seen += j[i] * phi.middleRows(column, j[i].cols());
     }
@@ -305,7 +305,7 @@ std::optional<internal::WithLandmarks> internal::PlaceLandmarks(const System& sy
 bool internal::ObservabilityIsTold(const System& system) {
   int size = 0;
   for (const Block& block : system.layout.blocks()) {
-    if (block.status != BlockStatus::kFixed) size += block.geometry().tangent;
+    if (block.status != BlockStatus::kConstant) size += block.geometry().tangent;
   }
   return size <= internal::kMostObserved;
 }

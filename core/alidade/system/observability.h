@@ -13,7 +13,7 @@ namespace alidade::internal {
 /// their number cubed.
 inline constexpr int kMostObserved = 500;
 
-/// Whether the estimated and considered blocks have at most kMostObserved elements; where not,
+/// Whether the estimated and consider blocks have at most kMostObserved elements; where not,
 /// UnobservableDirections gives none.
 bool ObservabilityIsTold(const System& system);
 
@@ -31,13 +31,13 @@ inline constexpr const char* kLandmarks = "landmarks";
 /// A system whose landmarks are blocks of their own, to see what can be observed.
 struct WithLandmarks {
   System system;                   ///< has no `landmarks`; these blocks and priors come last
-  std::vector<BlockId> landmarks;  ///< of the form xyz
+  std::vector<BlockId> landmarks;  ///< of the representation xyz
   std::size_t known = 0;           ///< so many of them are where they are known to be
   BlockId camera = -1;             ///< its position; -1: no sensor has one
 };
 
 /// The system with a few points before the camera in the place of landmarks to come, seen by every
-/// sensor of landmarks. None where one of these has no landmarks of the form xyz.
+/// sensor of landmarks. None where one of these has no landmarks of the representation xyz.
 std::optional<WithLandmarks> PlaceLandmarks(const System& system);
 
 }  // namespace alidade::internal

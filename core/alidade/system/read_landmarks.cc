@@ -17,9 +17,9 @@ std::vector<Space> LandmarkRoles(const SensorBinding& sensor) {
   return roles;
 }
 
-std::string FormText(const SensorBinding& sensor) {
-  const auto form = FormOf(sensor.model.roles());
-  return form ? ToString(*form) : "a form of its own";
+std::string RepresentationText(const SensorBinding& sensor) {
+  const auto representation = RepresentationOf(sensor.model.roles());
+  return representation ? ToString(*representation) : "a representation of its own";
 }
 
 /// Refuses a sensor that cannot share landmarks with `first`, or whose roles are not in order.
@@ -39,8 +39,8 @@ void CheckRoles(const Node& model, const SensorBinding& sensor, const SensorBind
   };
   if (!std::ranges::equal(LandmarkRoles(sensor), LandmarkRoles(first), same)) {
     model.Fail("model '" + sensor.model.name() + "' writes landmarks otherwise than sensor '" +
-                   first.name + "', as " + FormText(sensor),
-               "the same form, " + FormText(first));
+                   first.name + "', as " + RepresentationText(sensor),
+               "the same representation, " + RepresentationText(first));
   }
 }
 
@@ -57,7 +57,7 @@ void CheckPosition(const Node& key, const SensorBinding& sensor) {
 
 /// Refuses what one sensor cannot do that `options` ask for.
 void CheckOptions(const Node& node, const LandmarkOptions& options, const SensorBinding& sensor) {
-  const auto form = FormOf(sensor.model.roles());
+  const auto representation = RepresentationOf(sensor.model.roles());
   const std::string model = "model '" + sensor.model.name() + "' of sensor '" + sensor.name + "'";
   if (sensor.model.prior_size() > 0 && !options.prior) {
     node.Fail("no prior: " + model + " does not tell the distance of a landmark",
@@ -65,18 +65,18 @@ void CheckOptions(const Node& node, const LandmarkOptions& options, const Sensor
   }
   if (options.prior) {
     const Node prior = node.At("prior");
-    if (form == internal::XyzForm() && sensor.model.prior_size() > 0 &&
+    if (representation == internal::XyzRepresentation() && sensor.model.prior_size() > 0 &&
         !(options.prior->inverse_distance > 0.0)) {
       prior.At("inverse_distance").Fail("a landmark at infinity is no xyz", "above 0, 1/m");
     }
     if (options.prior->adapt_after > 0) CheckPosition(prior.At("adapt_after"), sensor);
   }
-  const bool has_xyz = form == internal::XyzForm() || sensor.xyz.has_value();
+  const bool has_xyz = representation == internal::XyzRepresentation() || sensor.xyz.has_value();
   if (!options.known.empty() && !has_xyz) {
     node.At("known").Fail(model + " has no landmarks of representation xyz", "no known landmarks");
   }
   if (!(options.max_linearity_index > 0.0)) return;
-  if (form == internal::XyzForm()) {
+  if (representation == internal::XyzRepresentation()) {
     node.At("convert_to_xyz")
         .Fail("landmarks are xyz already", "representation: inverse_depth, or the key left out");
   }
@@ -95,10 +95,11 @@ void internal::ReadLandmarkKeys(const Node& entry, const PluginHost& host, Senso
   if (const auto node = entry.Find("outlier_rejection")) {
     binding.outlier_rejection = OnePointRansac::FromNode(*node);
   }
-  const auto form = FormOf(binding.model.roles());
-  if (!form || IsXyz(*form)) return;
-  SensorModel xyz = host.CreateSensor(binding.model.name(), entry, ToString(internal::XyzForm()));
-  if (FormOf(xyz.roles()) == internal::XyzForm()) binding.xyz = std::move(xyz);
+  const auto representation = RepresentationOf(binding.model.roles());
+  if (!representation || IsXyz(*representation)) return;
+  SensorModel xyz =
+      host.CreateSensor(binding.model.name(), entry, ToString(internal::XyzRepresentation()));
+  if (RepresentationOf(xyz.roles()) == internal::XyzRepresentation()) binding.xyz = std::move(xyz);
 }
 
 std::optional<LandmarkOptions> internal::ReadLandmarks(const Node& root,

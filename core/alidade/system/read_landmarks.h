@@ -9,7 +9,8 @@
 namespace alidade::internal {
 
 /// What the entry of a sensor of landmarks has besides: its landmark roles together, as the role
-/// `landmark`; `outlier_rejection`; and the model made for the form xyz. Errors: kBadConfig.
+/// `landmark`; `outlier_rejection`; and the model made for the representation xyz. Errors:
+/// kBadConfig.
 void ReadLandmarkKeys(const Node& entry, const PluginHost& host, SensorBinding& binding);
 
 /// The map `landmarks` of the config's root, as the sensors need it; none where no sensor measures

@@ -34,27 +34,24 @@ std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
   return mean;
 }
 
-/// Exactly one of sigma, variance, covariance.
+/// Exactly one of sigma, covariance.
 Eigen::MatrixXd ReadCovariance(const Node& node, int size) {
-  const auto sigma = node.Find("sigma"), variance = node.Find("variance"),
-             covariance = node.Find("covariance");
-  if (int{sigma.has_value()} + int{variance.has_value()} + int{covariance.has_value()} != 1) {
-    node.Fail("needs its uncertainty once", "one of sigma, variance, covariance");
+  const auto sigma = node.Find("sigma"), covariance = node.Find("covariance");
+  if (sigma.has_value() == covariance.has_value()) {
+    node.Fail("needs its uncertainty once", "sigma or covariance");
   }
   if (covariance) {
     const std::vector<double> values = covariance->Covariance(size);
     return Eigen::Map<const Eigen::MatrixXd>(values.data(), size, size);
   }
-  const Node& spread = sigma ? *sigma : *variance;
-  std::vector<double> values = spread.Numbers();
+  std::vector<double> values = sigma->Numbers();
   if (values.size() == 1) values.assign(static_cast<std::size_t>(size), values[0]);
   if (values.size() != static_cast<std::size_t>(size)) {
-    spread.Fail(std::to_string(values.size()) + " numbers", std::to_string(size) + ", or one");
+    sigma->Fail(std::to_string(values.size()) + " numbers", std::to_string(size) + ", or one");
   }
-  Eigen::VectorXd diagonal = Eigen::Map<const Eigen::VectorXd>(values.data(), size);
-  if (diagonal.minCoeff() < 0.0) spread.Fail("negative", ">= 0");
-  if (sigma) diagonal = diagonal.cwiseAbs2();
-  return diagonal.asDiagonal();
+  const Eigen::VectorXd sigmas = Eigen::Map<const Eigen::VectorXd>(values.data(), size);
+  if (sigmas.minCoeff() < 0.0) sigma->Fail("negative", ">= 0");
+  return sigmas.cwiseAbs2().asDiagonal();
 }
 
 /// Blocks of the entry that a list such as `consider: [depth]` names.
@@ -103,10 +100,10 @@ void ReadPrior(const Node& initial, const Block& block, BlockId id, System& syst
     prior.from = from->Text();
   } else {
     prior.mean = ReadMean(initial.At("mean", "the initial value"), block.geometry());
-    if (block.status != BlockStatus::kFixed) {
+    if (block.status != BlockStatus::kConstant) {
       prior.covariance = ReadCovariance(initial, block.geometry().tangent);
     } else {
-      for (const char* key : {"sigma", "variance", "covariance"}) initial.Declare(key);
+      for (const char* key : {"sigma", "covariance"}) initial.Declare(key);
     }
   }
   initial.RejectUnread();
@@ -142,20 +139,21 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
   binding.input = ReadInput(entry, binding.model);
   const std::vector<std::string> names = ReadBlockNames(entry, binding.model);
   const auto considered = ReadNames(entry, "consider", names);
-  const auto fixed = ReadNames(entry, "fixed", names);
-  for (const std::string& both : fixed) {
+  const auto constant = ReadNames(entry, "constant", names);
+  for (const std::string& both : constant) {
     if (!Contains(considered, both)) continue;
-    entry.At("fixed").Fail("block '" + both + "' is in `consider` too",
-                           "a block in one of them: fixed is known, considered is uncertain");
+    entry.At("constant")
+        .Fail("block '" + both + "' is in `consider` too",
+              "a block in one of them: a constant is exact, a consider state uncertain");
   }
   const Node initial = entry.At("initial", "the state entry '" + name + "'");
   const std::vector<Space>& spaces = binding.model.blocks();
   for (std::size_t i = 0; i < names.size(); ++i) {
-    const bool known = (spaces[i].flags & ALIDADE_ROLE_OWNED) != 0 && !initial.Find(names[i]) &&
+    const bool known = (spaces[i].flags & ALIDADE_ROLE_PARAMETER) != 0 && !initial.Find(names[i]) &&
                        !Contains(considered, names[i]);
-    const BlockStatus status = known || Contains(fixed, names[i]) ? BlockStatus::kFixed
-                               : Contains(considered, names[i])   ? BlockStatus::kConsidered
-                                                                  : BlockStatus::kEstimated;
+    const BlockStatus status = known || Contains(constant, names[i]) ? BlockStatus::kConstant
+                               : Contains(considered, names[i])      ? BlockStatus::kConsider
+                                                                     : BlockStatus::kEstimated;
     const BlockId id = system.layout.Declare(name + "." + names[i], name, spaces[i], status);
     binding.blocks.push_back(id);
     if (known) {
@@ -190,7 +188,7 @@ RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& mod
   } else {
     binding.block = FindBlock(node.At("block", "a role"), system);
     if (const auto mode = node.Find("mode")) {
-      binding.mode = static_cast<RoleMode>(mode->Choice({"estimate", "consider", "hold"}));
+      binding.mode = static_cast<RoleMode>(mode->Choice({"estimate", "consider", "known"}));
     }
     if (const auto at = node.Find("jacobian_at")) {
       binding.jacobian_at = static_cast<RoleJacobianAt>(at->Choice({"prediction", "measurement"}));
@@ -198,9 +196,9 @@ RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& mod
       if (binding.jacobian_at == RoleJacobianAt::kMeasurement &&
           (initialised < 0 ||
            model.roles()[static_cast<std::size_t>(initialised)].name != role.name)) {
-        at->Fail(
-            "model '" + model.name() + "' has no inverse observation of role '" + role.name + "'",
-            "prediction");
+        at->Fail("model '" + model.name() + "' has no inverse measurement model of role '" +
+                     role.name + "'",
+                 "prediction");
       }
     }
     node.RejectUnread();
@@ -287,7 +285,7 @@ void CheckInitialisation(const Node& root, const System& system) {
     if (role < 0 || binding.roles[static_cast<std::size_t>(role)].block != prior.block) {
       place(prior.block)
           .Fail("sensor '" + prior.from + "' does not determine this block",
-                "a sensor whose inverse observation is this block");
+                "a sensor whose inverse measurement model is this block");
     }
   }
   std::vector<BlockId> chain;

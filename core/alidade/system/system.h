@@ -20,7 +20,7 @@ namespace alidade {
 
 /// What an update does with the block in a role: correct it; let its uncertainty count but leave it
 /// (Schmidt); take its value as exact (its Jacobian is zero).
-enum class RoleMode { kEstimate, kConsider, kHold };
+enum class RoleMode { kEstimate, kConsider, kKnown };
 
 /// Where a sensor's Jacobian is taken for the value of a role: the prediction, or the value the
 /// measurement itself implies (Initialise of that role).
@@ -40,8 +40,8 @@ struct SensorBinding {
   SensorModel model;
   std::vector<RoleBinding> roles;
   RobustLoss loss = {};  ///< on the Mahalanobis distance of the innovation
-  /// The same sensor of landmarks that are xyz, where `model` is of another form and landmarks may
-  /// become xyz or start as such. Its other roles are those of `model`.
+  /// The same sensor of landmarks that are xyz, where `model` is of another representation and
+  /// landmarks may become xyz or start as such. Its other roles are those of `model`.
   std::optional<SensorModel> xyz = {};
   /// How those of its matches are found that agree; none: each is gated on its own alone.
   std::optional<OnePointRansac> outlier_rejection = {};

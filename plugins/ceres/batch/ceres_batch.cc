@@ -138,7 +138,7 @@ class CeresBatch : public Estimator {
   bool failed_ = false;
 };
 
-constexpr Support kSupport = {.held = false, .from_measurement = true, .landmarks = true};
+constexpr Support kSupport = {.known = false, .from_measurement = true, .landmarks = true};
 
 EstimatorMaker Create(const EstimatorArguments& arguments) {
   Params& p = arguments.params;

@@ -34,7 +34,7 @@ namespace alidade::ceres_batch {
 ///   symbol   shape      meaning
 ///   e        N          inputs: of the prior, then frame by frame of its steps and first values
 ///   r        M          residuals: of the measurements in use, in their order
-///   x, S     -, n x N   values of all blocks; n: their tangents, those of fixed blocks apart
+///   x, S     -, n x N   values of all blocks; n: their tangents, but those of constant blocks
 ///
 /// Source       [Bock1984] (condensing), [Bell1994] (smoothing as least squares).
 class CondensedRun {

@@ -12,7 +12,7 @@
 namespace alidade::ceres_batch {
 namespace {
 
-/// The rows of the covariance that belong to the blocks, in their order; -1: a fixed block's.
+/// The rows of the covariance that belong to the blocks, in their order; -1: a constant block's.
 std::vector<int> RowsOf(const StateLayout& layout, const std::vector<BlockId>& blocks) {
   std::vector<int> rows;
   for (const BlockId id : blocks) {
@@ -69,7 +69,7 @@ bool CondensedRun::Move(const Step& step, const double* e, Point& point) const {
   }
   for (const BlockId id : motion.blocks) {
     const Block& block = layout[id];
-    if (block.status != BlockStatus::kFixed) continue;
+    if (block.status != BlockStatus::kConstant) continue;
     std::copy_n(point.x.data() + block.value_offset, block.geometry().ambient,
                 next.data() + block.value_offset);
   }

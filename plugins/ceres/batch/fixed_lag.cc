@@ -14,8 +14,8 @@
 namespace alidade::ceres_batch {
 namespace {
 
-/// No held roles, considered blocks, roles linearised at the measurement, landmarks.
-constexpr Support kFixedLagSupport = {.held = false, .from_measurement = true};
+/// No known roles, consider blocks, roles linearised at the measurement, landmarks.
+constexpr Support kFixedLagSupport = {.known = false, .from_measurement = true};
 
 struct FixedLagOptions {
   enum class Output { kCurrent, kLagged } output = Output::kCurrent;

@@ -13,8 +13,8 @@ namespace alidade::ceres_batch {
 ///   y = g(x_k, z_k (+) L_k l_z, rho0 + sigma l_rho)     by the sensor's own Initialise
 ///   y = m + sigma l                                     where it is known beforehand
 ///
-/// So it has the information of the filter's initialisation: the observation k is used up by it, an
-/// anchor is the camera itself, and the prior of the inverse distance counts once.
+/// So it has the information of the filter's initialisation: the observation k is consumed by it,
+/// an anchor is the camera itself, and the prior of the inverse distance counts once.
 struct MapLandmark {
   /// A factor of a frame.
   struct Observation {

@@ -177,12 +177,12 @@ void CondensedRun::Describe(const MapLandmark& landmark, const Eigen::MatrixXd& 
   if (!any) return;
   const Factor& factor = epochs_[any->epoch].factors[any->factor];
   const std::vector<Space>& roles = ModelOf(factor).roles();
-  estimate.form = FormOf(roles);
+  estimate.representation = RepresentationOf(roles);
   estimate.tried = estimate.accepted = static_cast<int>(landmark.observations.size());
-  if (!estimate.form) return;
+  if (!estimate.representation) return;
   const auto last = p.rows() - 1;
-  estimate.inverse_distance = IsXyz(*estimate.form) ? std::nan("") : landmark.y.back();
-  estimate.sigma = IsXyz(*estimate.form) ? std::nan("") : std::sqrt(p(last, last));
+  estimate.inverse_distance = IsXyz(*estimate.representation) ? std::nan("") : landmark.y.back();
+  estimate.sigma = IsXyz(*estimate.representation) ? std::nan("") : std::sqrt(p(last, last));
   std::vector<const double*> blocks;
   const double* next = landmark.y.data();
   for (const Space& role : roles) {
@@ -192,7 +192,7 @@ void CondensedRun::Describe(const MapLandmark& landmark, const Eigen::MatrixXd& 
   }
   estimate.position.setConstant(std::nan(""));
   estimate.covariance.setConstant(std::nan(""));
-  const auto point = internal::PointOf(*estimate.form, blocks.data());
+  const auto point = internal::PointOf(*estimate.representation, blocks.data());
   if (!point) return;
   estimate.position = point->position;
   estimate.covariance = point->jacobian * p * point->jacobian.transpose();

@@ -49,7 +49,7 @@ struct SensorTraits {
   }
 };
 
-/// And of one behind the boundary of plugins.
+/// And of one behind the plugin ABI.
 template <>
 struct SensorTraits<SensorModel> {
   static constexpr int kMaxRoles = 64;  // as many as a model may have

@@ -11,11 +11,11 @@
 
 namespace alidade::ceres_batch {
 
-/// Values side by side in one parameter block, each moved as its geometry says or held as it is.
+/// Values side by side in one parameter block, each moved as its geometry says, or constant.
 ///
 ///   x (+) d           of each part by Geometry::Plus
-///   d(x (+) d)/dd  := [I; 0] of each part, its tangent into the first rows; of a held part none
-///
+///   d(x (+) d)/dd  := [I; 0] of each part, its tangent into the first rows; none of a constant
+//part /
 /// That is not the derivative by the ambient values, which no model of alidade gives, but its
 /// counterpart: a cost writes [J | 0], J in the tangent, and Ceres forms [J | 0] [I; 0] = J. Only
 /// costs that do so, as SensorCost, may share a block with it; Ceres' own QuaternionManifold is
@@ -24,12 +24,12 @@ class GeometryManifold : public ceres::Manifold {
  public:
   struct Part {
     Geometry geometry;
-    bool held = false;
+    bool constant = false;
   };
   explicit GeometryManifold(std::vector<Part> parts) : parts_(std::move(parts)) {
     for (const Part& part : parts_) {
       ambient_ += part.geometry.ambient;
-      tangent_ += part.held ? 0 : part.geometry.tangent;
+      tangent_ += part.constant ? 0 : part.geometry.tangent;
     }
   }
 
@@ -38,7 +38,7 @@ class GeometryManifold : public ceres::Manifold {
   bool Plus(const double* x, const double* d, double* y) const override {
     for (const Part& part : parts_) {
       const int n = part.geometry.ambient;
-      if (part.held) {
+      if (part.constant) {
         std::copy_n(x, n, y);
       } else {
         part.geometry.Plus(x, d, y);
@@ -55,7 +55,7 @@ class GeometryManifold : public ceres::Manifold {
   }
   bool Minus(const double* y, const double* x, double* d) const override {
     for (const Part& part : parts_) {
-      if (!part.held) {
+      if (!part.constant) {
         part.geometry.Minus(y, x, d);
         d += part.geometry.tangent;
       }
@@ -76,7 +76,7 @@ class GeometryManifold : public ceres::Manifold {
     std::fill_n(j, ambient_ * tangent_, 0.0);
     int row = 0, column = 0;
     for (const Part& part : parts_) {
-      const int moved = part.held ? 0 : part.geometry.tangent;
+      const int moved = part.constant ? 0 : part.geometry.tangent;
       for (int i = 0; i < moved; ++i)
         j[(row + i) * row_stride + (column + i) * column_stride] = 1.0;
       row += part.geometry.ambient;

@@ -81,7 +81,7 @@ std::vector<Gaussian> WrittenOut(const std::vector<Seen>& drive, double timeout_
   return estimates;
 }
 
-/// Kinds of all events, in their order; what the filter makes is held against the written out.
+/// Kinds of all events, in their order; what the filter makes is compared with the written out.
 std::vector<std::string> ExpectWrittenOut(Estimator& filter, const std::vector<Seen>& drive,
                                           double timeout_s, double tolerance) {
   std::vector<std::string> kinds;
@@ -102,7 +102,7 @@ std::vector<std::string> ExpectWrittenOut(Estimator& filter, const std::vector<S
 /// The system with a fixed block beside it, which keeps it from the fast path.
 System OnTheGeneralPath(System system) {
   const BlockId id =
-      system.layout.Declare("aside.x", "aside", system.layout[0].space, BlockStatus::kFixed);
+      system.layout.Declare("aside.x", "aside", system.layout[0].space, BlockStatus::kConstant);
   system.priors.push_back({id, {1.0}, Eigen::MatrixXd::Zero(1, 1), ""});
   return system;
 }

@@ -138,8 +138,8 @@ TEST(OnePointRansac, RescuesByItsOwnThreshold) {
   EXPECT_EQ(rescued[1], 0);
 }
 
-// No match moves a camera that is only considered, so none explains 0.05 m, 25 times the noise. All
-// join afterwards, by the uncertainty of the camera.
+// No match moves a camera that is a consider state, so none explains 0.05 m, 25 times the noise.
+// All join afterwards, by the uncertainty of the camera.
 TEST(OnePointRansac, AHypothesisDoesNotMoveWhatIsConsidered) {
   const Frame frame = Matches({0.05, -0.03, 0.0}, 1000, 0.0);
   for (const bool by_role : {false, true}) {
@@ -150,7 +150,7 @@ TEST(OnePointRansac, AHypothesisDoesNotMoveWhatIsConsidered) {
     } else {
       StateLayout layout;
       for (const Block& block : system.layout.blocks()) {
-        layout.Declare(block.name, block.owner, block.space, BlockStatus::kConsidered);
+        layout.Declare(block.name, block.owner, block.space, BlockStatus::kConsider);
       }
       system.layout = layout;
     }
@@ -168,7 +168,7 @@ TEST(OnePointRansac, AHypothesisIsSeenFromWhereARoleIsHeld) {
   System system = MapSystem(Offset(0.01), {}, 0.3);
   SensorBinding held = system.sensors[0];
   held.name = held.stream = "held";
-  held.roles[0].mode = RoleMode::kHold;
+  held.roles[0].mode = RoleMode::kKnown;
   held.outlier_rejection = OnePointRansac{};
   system.sensors.push_back(held);
   Ekf ekf(system, {}, {{"tracks", 3}, {"held", 3}});

@@ -202,7 +202,7 @@ TEST(Landmarks, ThatHaveNotConvergedAreNoPrior) {
 
 TEST(Landmarks, AreNotCorrelatedWithWhatTheirSensorHolds) {
   System system = MapSystem(Offset(0.1), {}, 0.3);
-  system.sensors[0].roles[0].mode = RoleMode::kHold;
+  system.sensors[0].roles[0].mode = RoleMode::kKnown;
   Ekf ekf(system, {}, {{"tracks", 3}});
   ekf.Process(FrameOf(0.0, {{1, {0, 0, 1}}}));
   // R alone; with the camera's own uncertainty it would be 0.1^2 + 0.3^2

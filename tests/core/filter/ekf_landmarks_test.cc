@@ -15,7 +15,9 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-bool IsPoint(const LandmarkEstimate& landmark) { return landmark.form && IsXyz(*landmark.form); }
+bool IsPoint(const LandmarkEstimate& landmark) {
+  return landmark.representation && IsXyz(*landmark.representation);
+}
 
 std::vector<double> Vector(const Vector3d& v) { return {v[0], v[1], v[2]}; }
 
@@ -171,13 +173,13 @@ TEST(Landmarks, ASharedAnchorGoesWithItsLastLandmark) {
   EXPECT_EQ(ekf.state().covariance().size(), 3 + 3 + 3);
 }
 
-TEST(Landmarks, ForgettingOneLeavesTheRestAsItWouldBeWithIt) {
+TEST(Landmarks, PruningOneLeavesTheRestAsItWouldBeWithIt) {
   constexpr int kSteps = 20;
   Scene scene(kSteps, 3);
-  LandmarkOptions forgetting;
-  forgetting.max_missed_frames = 3;
+  LandmarkOptions pruning;
+  pruning.max_missed_frames = 3;
   Ekf with = EkfOf(MapSystem(Offset(0.05), {}, 0.3));
-  Ekf without = EkfOf(MapSystem(Offset(0.05), forgetting, 0.3));
+  Ekf without = EkfOf(MapSystem(Offset(0.05), pruning, 0.3));
   int deleted = 0;
   for (int k = 0; k < kSteps; ++k) {
     std::vector<Observation> observations;
@@ -235,7 +237,7 @@ TEST(Landmarks, BecomeXyzOnceTheyAreLinear) {
       EXPECT_LT((before[i].covariance - after[i].covariance).norm(), 1e-9);
     }
     EXPECT_EQ(std::ranges::count_if(after, IsPoint), converted + kKnown);
-    // And it goes on: pixels of landmarks of both forms in one update.
+    // And it goes on: pixels of landmarks of both representations in one update.
     for (; k < kSteps; ++k) {
       for (const auto& entry : ekf.Process(frame_at(k)).measurements()) {
         EXPECT_EQ(entry.outcome, Outcome::kAccepted);

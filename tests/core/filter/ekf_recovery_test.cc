@@ -10,7 +10,7 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// The system with the block `name` estimated, considered or fixed.
+/// The system with the block `name` estimated, consider or constant.
 System WithStatus(System system, const std::string& name, BlockStatus status) {
   StateLayout layout;
   for (const Block& block : system.layout.blocks()) {
@@ -130,7 +130,7 @@ TEST(Ekf, NumbersThatAreNoneDoNotLockASensorOut) {
 TEST(Ekf, ASensorThatStaysOutOfItsDomainInflatesOnceAndNotWhatItHolds) {
   System system = DepthFilter();
   system.sensors.erase(system.sensors.begin());
-  system.sensors[0].roles[1].mode = RoleMode::kHold;
+  system.sensors[0].roles[1].mode = RoleMode::kKnown;
   system.priors[0].mean = {-1.0};
   Ekf ekf(system, {}, StreamsOf(system));
   for (int k = 0; k < 100; ++k) ekf.Process(FrameAt(0.0, {{0, 1.0}}));
@@ -191,7 +191,7 @@ TEST(Ekf, BlocksStartFromMeasurementsWithTheirCorrelation) {
 TEST(Ekf, AHeldRoleIsExactWhereABlockStartsFromIt) {
   System system = DepthFilter();
   system.sensors.erase(system.sensors.begin());
-  system.sensors[0].roles[0].mode = RoleMode::kHold;
+  system.sensors[0].roles[0].mode = RoleMode::kKnown;
   system.priors[2] = {2, {}, {}, "inverse_scale"};
   Ekf ekf(system, {}, StreamsOf(system));
   const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 1.0}}));
@@ -217,12 +217,12 @@ TEST(Ekf, ASensorThatIsRejectedRepeatedlyOfFixedBlocksInflatesNothing) {
   };
   const std::string why = "sensor 'disparity' rejected 20 times in a row: ";
   EXPECT_EQ(event_of(BlockStatus::kEstimated), why + "inflated the covariance of its blocks");
-  EXPECT_EQ(event_of(BlockStatus::kFixed), why + "it corrects no block to inflate");
-  EXPECT_EQ(event_of(BlockStatus::kConsidered), why + "it corrects no block to inflate");
+  EXPECT_EQ(event_of(BlockStatus::kConstant), why + "it corrects no block to inflate");
+  EXPECT_EQ(event_of(BlockStatus::kConsider), why + "it corrects no block to inflate");
 }
 
 TEST(Ekf, AResetLeavesConsideredBlocksAsTheyAre) {
-  System system = WithStatus(DepthFilter(), "target.depth_rate", BlockStatus::kConsidered);
+  System system = WithStatus(DepthFilter(), "target.depth_rate", BlockStatus::kConsider);
   system.priors[0].mean = {3.0};
   system.priors[0].covariance(0, 0) = 1e-6;
   EkfOptions options;

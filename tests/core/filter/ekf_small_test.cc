@@ -50,7 +50,7 @@ class Watched : public Ekf {
 /// The same system, which a block of no sensor's keeps from the fast path.
 System WithFixedBlock(System system) {
   const BlockId id =
-      system.layout.Declare("aside.x", "aside", system.layout[0].space, BlockStatus::kFixed);
+      system.layout.Declare("aside.x", "aside", system.layout[0].space, BlockStatus::kConstant);
   Prior prior;
   prior.block = id;
   const Geometry geometry = system.layout[0].geometry();

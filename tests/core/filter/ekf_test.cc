@@ -140,7 +140,7 @@ TEST(Ekf, PerSensorHoldsWhereTheLastMeasurementOfASensorIsNotUsed) {
 }
 
 TEST(Ekf, ConsideredBlocksKeepTheirValueAndTheirCorrelationsFollowSchmidt) {
-  // z = lambda Z, lambda considered; Schmidt's gain by hand.
+  // z = lambda Z, lambda a consider state; Schmidt's gain by hand.
   System system = DepthFilter();
   system.sensors.erase(system.sensors.begin());
   system.sensors[0].roles[1].mode = RoleMode::kConsider;
@@ -164,7 +164,7 @@ TEST(Ekf, ConsideredBlocksKeepTheirValueAndTheirCorrelationsFollowSchmidt) {
 TEST(Ekf, HeldRolesHaveNoJacobian) {
   System system = DepthFilter();
   system.sensors.erase(system.sensors.begin());
-  system.sensors[0].roles[1].mode = RoleMode::kHold;
+  system.sensors[0].roles[1].mode = RoleMode::kKnown;
   Ekf ekf(system, {}, StreamsOf(system));
   const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 1.1}}));
   const double z = 0.35, lambda = 3.3, h = z * lambda, sigma = 2.0 / 300.0 * h * h * h;
@@ -244,7 +244,7 @@ TEST(Ekf, FixedBlocksAreNeitherMovedNorCorrected) {
   System system;
   const MotionModel model = InProcessMotion(ConstantVelocity<1, false>(1.0), "constant_velocity");
   AddMotion(system, "p", model, {{"x", 1.0, 2.0}});
-  const BlockId v = system.layout.Declare("p.v", "p", model.blocks()[1], BlockStatus::kFixed);
+  const BlockId v = system.layout.Declare("p.v", "p", model.blocks()[1], BlockStatus::kConstant);
   system.motions[0].blocks.push_back(v);
   system.priors.push_back({v, {2.0}, {}, ""});
   Ekf ekf(system, {}, {});

@@ -219,7 +219,7 @@ TYPED_TEST(HeldNoise, OfAKnownBlockThereIsNone) {
         made.layout.Declare("p.x", "p", binding.model.blocks()[0], position),
         made.layout.Declare("p.v", "p", binding.model.blocks()[1], BlockStatus::kEstimated)};
     Prior x{binding.blocks[0], {1.0}, {}, {}}, v{binding.blocks[1], {0.5}, {}, {}};
-    if (position != BlockStatus::kFixed) x.covariance = Eigen::MatrixXd::Constant(1, 1, 0.1);
+    if (position != BlockStatus::kConstant) x.covariance = Eigen::MatrixXd::Constant(1, 1, 0.1);
     v.covariance = Eigen::MatrixXd::Constant(1, 1, 0.25);
     made.priors = {x, v};
     made.motions.push_back(binding);
@@ -228,7 +228,7 @@ TYPED_TEST(HeldNoise, OfAKnownBlockThereIsNone) {
   };
   std::vector<Frame> frames;
   for (int k = 0; k < 20; ++k) frames.push_back(FrameAt(0.1 * k, {{0, std::sin(0.7 * k)}}));
-  for (const BlockStatus status : {BlockStatus::kFixed, BlockStatus::kEstimated}) {
+  for (const BlockStatus status : {BlockStatus::kConstant, BlockStatus::kEstimated}) {
     const auto whole = this->Run(system(status), frames);
     EXPECT_LT(MostApart(whole, this->Run(system(status), frames, {0.03})), this->kTolerance);
   }

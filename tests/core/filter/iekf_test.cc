@@ -384,7 +384,7 @@ State AfterAHeldRole(int power) {
   AddMotion(system, "q", InProcessMotion(Constant<>(1), "constant"), {{"c", 1.0, std::sqrt(1.9)}});
   AddSensor(system, "difference", InProcessSensor(Difference(), "difference"), {"p.x", "q.c"});
   AddSensor(system, "power", InProcessSensor(PowerTimes(power), "power"), {"p.x", "q.c"});
-  system.sensors[1].roles[1].mode = RoleMode::kHold;
+  system.sensors[1].roles[1].mode = RoleMode::kKnown;
   IekfOptions options;
   options.max_iterations = 50;
   options.tolerance = 1e-9;

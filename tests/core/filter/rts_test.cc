@@ -180,7 +180,7 @@ TEST(RtsSmoother, IsNotMadeWithConsideredOrWaitingBlocks) {
   StateLayout layout;
   for (const Block& b : considered.layout.blocks()) {
     layout.Declare(b.name, b.owner, b.space,
-                   b.name == considered.layout[id].name ? BlockStatus::kConsidered : b.status);
+                   b.name == considered.layout[id].name ? BlockStatus::kConsider : b.status);
   }
   considered.layout = layout;
   EXPECT_THROW(RtsSmoother(considered, {}, StreamsOf(considered)), ContractViolation);

@@ -20,7 +20,7 @@ System WithAConsideredBlock() {
   for (const Block& block : system.layout.blocks()) {
     const bool considered = block.name == "template.inverse_distance";
     layout.Declare(block.name, block.owner, block.space,
-                   considered ? BlockStatus::kConsidered : block.status);
+                   considered ? BlockStatus::kConsider : block.status);
   }
   system.layout = layout;
   return system;
@@ -52,7 +52,7 @@ System WithLandmarks() {
 }
 
 TEST(Support, NamesTheFirstThingThatIsLacking) {
-  const Support nothing = {.held = false, .robust_loss = false};
+  const Support nothing = {.known = false, .robust_loss = false};
   EXPECT_FALSE(FindUnsupported(DepthFilter(), nothing));
   const auto expect = [&](const System& system, const Support& enough, const char* what, int block,
                           int sensor, int role) {
@@ -64,13 +64,12 @@ TEST(Support, NamesTheFirstThingThatIsLacking) {
     EXPECT_EQ(found->role, role) << what;
     EXPECT_FALSE(FindUnsupported(system, enough)) << what;
   };
-  expect(WithAConsideredBlock(), {.considered = true, .held = false}, "considered blocks", 2, -1,
-         -1);
+  expect(WithAConsideredBlock(), {.consider = true, .known = false}, "consider blocks", 2, -1, -1);
   expect(WithABlockFromAMeasurement(), {.from_measurement = true},
          "blocks that start from a measurement", 0, -1, -1);
-  expect(WithARole(RoleMode::kConsider, RoleJacobianAt::kPrediction), {.considered = true},
-         "considered roles", -1, 1, 1);
-  expect(WithARole(RoleMode::kHold, RoleJacobianAt::kPrediction), {}, "held roles", -1, 1, 1);
+  expect(WithARole(RoleMode::kConsider, RoleJacobianAt::kPrediction), {.consider = true},
+         "consider roles", -1, 1, 1);
+  expect(WithARole(RoleMode::kKnown, RoleJacobianAt::kPrediction), {}, "known roles", -1, 1, 1);
   expect(WithARole(RoleMode::kEstimate, RoleJacobianAt::kMeasurement), {.at_measurement = true},
          "jacobian_at: measurement", -1, 1, 1);
   expect(WithALoss(), {}, "robust losses", -1, 1, -1);
@@ -91,11 +90,11 @@ bool Makes(const System& system) {
 template <class Filter>
 void ExpectAsSupported() {
   const Support& can = Filter::kSupport;
-  EXPECT_EQ(Makes<Filter>(WithAConsideredBlock()), can.considered);
+  EXPECT_EQ(Makes<Filter>(WithAConsideredBlock()), can.consider);
   EXPECT_EQ(Makes<Filter>(WithABlockFromAMeasurement()), can.from_measurement);
   EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kConsider, RoleJacobianAt::kPrediction)),
-            can.considered);
-  EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kHold, RoleJacobianAt::kPrediction)), can.held);
+            can.consider);
+  EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kKnown, RoleJacobianAt::kPrediction)), can.known);
   EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kEstimate, RoleJacobianAt::kMeasurement)),
             can.at_measurement);
   EXPECT_EQ(Makes<Filter>(WithALoss()), can.robust_loss);

@@ -231,7 +231,7 @@ TEST(Ukf, AStepThatIsNotFiniteEndsItInTheWordsOfTheEkf) {
 System AllFixed(System system) {
   StateLayout layout;
   for (const Block& block : system.layout.blocks()) {
-    layout.Declare(block.name, block.owner, block.space, BlockStatus::kFixed);
+    layout.Declare(block.name, block.owner, block.space, BlockStatus::kConstant);
   }
   system.layout = layout;
   return system;

@@ -234,7 +234,7 @@ TEST(Ukf, ACovarianceWithoutASquareRootIsRepairedAndThatIsSaid) {
 
 TEST(Ukf, GatesAndHoldsAsTheEkfDoes) {
   System system = DepthFilter();
-  system.sensors[1].roles[1].mode = RoleMode::kHold;
+  system.sensors[1].roles[1].mode = RoleMode::kKnown;
   UkfOptions options;
   options.filter.gate = 0.999;
   Ukf ukf(system, options, StreamsOf(system));
@@ -253,7 +253,7 @@ TEST(Ukf, GatesAndHoldsAsTheEkfDoes) {
 TEST(Ukf, AFixedBlockIsNotMovedByItsModel) {
   System system;
   const MotionModel model = InProcessMotion(ConstantVelocity<1, false>(0.7), "constant_velocity");
-  const BlockId x = system.layout.Declare("p.x", "p", model.blocks()[0], BlockStatus::kFixed);
+  const BlockId x = system.layout.Declare("p.x", "p", model.blocks()[0], BlockStatus::kConstant);
   const BlockId v = system.layout.Declare("p.v", "p", model.blocks()[1]);
   system.motions.push_back({"p", model, {x, v}});
   system.priors.push_back({x, {1.0}, {}, ""});
@@ -269,7 +269,7 @@ TEST(Ukf, AFixedBlockIsNotMovedByItsModel) {
 TEST(Ukf, AFixedBlockEntersTheModelsAndStaysAsItIs) {
   System system;
   const MotionModel model = InProcessMotion(ConstantVelocity<1, false>(0.7), "constant_velocity");
-  const BlockId v = system.layout.Declare("p.v", "p", model.blocks()[1], BlockStatus::kFixed);
+  const BlockId v = system.layout.Declare("p.v", "p", model.blocks()[1], BlockStatus::kConstant);
   const BlockId x = system.layout.Declare("p.x", "p", model.blocks()[0]);
   system.motions.push_back({"p", model, {x, v}});
   system.priors.push_back({v, {-0.5}, {}, ""});

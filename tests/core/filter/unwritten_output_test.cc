@@ -101,7 +101,7 @@ System Direct(HandWritten& hand, bool aside) {
   system.priors.push_back({x, {1.0, 2.0}, Eigen::Matrix2d::Identity(), ""});
   if (aside) {
     const BlockId id =
-        system.layout.Declare("aside.x", "aside", model.blocks()[0], BlockStatus::kFixed);
+        system.layout.Declare("aside.x", "aside", model.blocks()[0], BlockStatus::kConstant);
     system.priors.push_back({id, {0.0, 0.0}, Eigen::Matrix2d::Zero(), ""});
   }
   AddSensor(system, "direct", SensorModel(hand.Make(ALIDADE_KIND_SENSOR)), {"a.x"});

@@ -127,7 +127,8 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
       {"has geometry 3 with sizes 1 and 1", [](HandWritten& h) { h.role.geometry = 3; }},
       {"the measurement has geometry 0", [](HandWritten& h) { h.output.geometry = 0; }},
       {"names its elements 'a,b', but has 1", [](HandWritten& h) { h.role.elements = "a,b"; }},
-      {"owned by the sensor", [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_OWNED; }},
+      {"is a model parameter state of the sensor",
+       [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_PARAMETER; }},
       {"is shared, but not", [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_SHARED; }},
       {"gives a residual alone",
        [](HandWritten& h) { h.description.capabilities = ALIDADE_RESIDUAL_ONLY; }},
@@ -148,7 +149,8 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
          h.instance.motion = &kNoStep;
        }},
       {"lacks the functions of its kind", [](HandWritten& h) { h.instance.sensor = nullptr; }},
-      {"is of kind 3", [](HandWritten& h) { h.instance.kind = ALIDADE_KIND_LANDMARK_FORM; }},
+      {"is of kind 3",
+       [](HandWritten& h) { h.instance.kind = ALIDADE_KIND_LANDMARK_REPRESENTATION; }},
   };
   for (const Spoiled& test : cases) {
     HandWritten hand;

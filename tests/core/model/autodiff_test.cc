@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Dual numbers and thunks: what an author's model is behind the boundary.
+// Dual numbers and thunks: what an author's model is behind the plugin ABI.
 #include "alidade/model/autodiff.h"
 
 #include <gtest/gtest.h>
@@ -103,7 +103,7 @@ TEST(AutodiffMotion, NullNoiseIsZeroInThePluginItself) {
   EXPECT_NEAR(next[0][3], std::sin(0.05), 1e-16);
 }
 
-/// x' = x + w, with a closed form that throws once it has written.
+/// x' = x + w, with an analytic Jacobian that throws once it has written.
 struct Faulty : Motion<1, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"x"}};
   explicit Faulty(Params&) {}
@@ -121,7 +121,7 @@ struct Faulty : Motion<1, Vec<1>> {
   }
 };
 
-TEST(AutodiffMotion, AClosedFormThatThrowsWritesNothing) {
+TEST(AutodiffMotion, AnAnalyticJacobianThatThrowsWritesNothing) {
   const MotionModel faulty = MakeMotion<Faulty>();
   const Blocks x{{1.0}};
   Blocks next = Filled(faulty.blocks(), kPoison);
@@ -190,7 +190,7 @@ TEST(AutodiffSensor, AnExceptionIsAnErrorWithItsText) {
   EXPECT_EQ(z, kPoison);
 }
 
-/// z = x, with a closed form that throws once it has written, where x < 0.
+/// z = x, with an analytic Jacobian that throws once it has written, where x < 0.
 struct FaultySensor : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   static constexpr std::array kRoles{Quantity{"x"}, Quantity{"y"}};
   static constexpr Quantity kMeasurement{"z"};
@@ -210,7 +210,7 @@ struct FaultySensor : Sensor<Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-TEST(AutodiffSensor, AClosedFormThatThrowsWritesNothing) {
+TEST(AutodiffSensor, AnAnalyticJacobianThatThrowsWritesNothing) {
   const SensorModel faulty = MakeSensor<FaultySensor>();
   const int strides[] = {1, 1};
   double x = -1.0, y = 0.0, z = kPoison, by_x = kPoison, by_y = kPoison;
@@ -227,7 +227,7 @@ TEST(AutodiffSensor, AClosedFormThatThrowsWritesNothing) {
   EXPECT_EQ(by_y, 0.0);
 }
 
-/// Inverse observation of a point at a known position: roles of different sizes.
+/// Inverse measurement model of a point at a known position: roles of different sizes.
 struct Displacement : Sensor<Vec<2>, Vec<2>, Vec<3>> {
   static constexpr std::array kRoles{Quantity{"point", "m", "", "x,y"},
                                      Quantity{"camera", "m", "", "x,y,z"}};
@@ -250,7 +250,7 @@ struct Displacement : Sensor<Vec<2>, Vec<2>, Vec<3>> {
   }
 };
 
-/// z = x, and a closed form of more numbers than are copied one by one.
+/// z = x, and an analytic Jacobian of more numbers than are copied one by one.
 struct Wide : Sensor<Vec<20>, Vec<20>> {
   static constexpr std::array kRoles{Quantity{"x"}};
   template <class T>
@@ -265,7 +265,7 @@ struct Wide : Sensor<Vec<20>, Vec<20>> {
   }
 };
 
-TEST(AutodiffSensor, AWideClosedFormKeepsTheStride) {
+TEST(AutodiffSensor, AWideAnalyticJacobianKeepsTheStride) {
   std::vector<double> x(20);
   std::iota(x.begin(), x.end(), 1.0);
   double z[20], j[20 * 25];

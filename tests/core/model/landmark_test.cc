@@ -9,7 +9,7 @@ namespace alidade {
 namespace {
 
 using testing::Blocks;
-using testing::ForEachForm;
+using testing::ForEachRepresentation;
 using testing::kNumeric;
 using testing::LandmarkAt;
 using testing::Pointers;
@@ -28,9 +28,9 @@ Vec3 HOf(const Ray<double>& ray, const Vec3& position = kPosition) {
   return h;
 }
 
-template <class Form>
+template <class Representation>
 Ray<double> RayOf(const Blocks& blocks) {
-  return alidade::RayOf<Form>(Pointers(blocks).data());
+  return alidade::RayOf<Representation>(Pointers(blocks).data());
 }
 
 TEST(Landmark, InverseDepthHasTheAnglesOfMonoSlam) {
@@ -53,8 +53,9 @@ TEST(Landmark, AllFormsAreSeenAlike) {
   for (std::size_t i = 0; i < 3; ++i) along[i] = kPoint[i] - kPosition[i];
   UnitQuaternion::RotateBack(kTurn.data(), along.data(), seen.data());
   const Vec3 anchor{-0.5, 0.2, -0.8};
-  ForEachForm([&](auto form) {
-    const Ray<double> ray = RayOf<decltype(form)>(LandmarkAt<decltype(form)>(anchor, kPoint));
+  ForEachRepresentation([&](auto representation) {
+    const Ray<double> ray =
+        RayOf<decltype(representation)>(LandmarkAt<decltype(representation)>(anchor, kPoint));
     const Vec3 h = HOf(ray);
     for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(h[i] / ray.rho, seen[i], 1e-14);
   });
@@ -71,11 +72,11 @@ TEST(Landmark, IsSeenAtInfinityTheSameFromEverywhere) {
 
 TEST(Landmark, IsPlacedWhereItIsSeen) {
   const Vec3 h{0.3, -0.2, 1.7};  // of any length
-  ForEachForm([&](auto form) {
-    using Form = decltype(form);
-    double y[detail::Blocks<Form>::kAmbient], p[3];
-    ASSERT_TRUE(PlaceLandmark<Form>(kPosition.data(), kTurn.data(), h.data(), 0.25, y));
-    ASSERT_TRUE(Xyz::FromRay(Form::ToRay(y), p));
+  ForEachRepresentation([&](auto representation) {
+    using Representation = decltype(representation);
+    double y[detail::Blocks<Representation>::kAmbient], p[3];
+    ASSERT_TRUE(PlaceLandmark<Representation>(kPosition.data(), kTurn.data(), h.data(), 0.25, y));
+    ASSERT_TRUE(Xyz::FromRay(Representation::ToRay(y), p));
     Vec3 along, seen;
     for (std::size_t i = 0; i < 3; ++i) along[i] = p[i] - kPosition[i];
     UnitQuaternion::RotateBack(kTurn.data(), along.data(), seen.data());
@@ -98,23 +99,23 @@ TEST(Landmark, ConversionToXyzHasTrueJacobians) {
   const Vec3 anchor{-0.5, 0.2, -0.8};
   Space xyz;
   xyz.geometry = Geometry::Vector(3);
-  ForEachForm([&](auto form) {
-    using Form = decltype(form);
-    const Blocks blocks = LandmarkAt<Form>(anchor, kPoint);
-    constexpr int n = detail::Blocks<Form>::kTangent;
+  ForEachRepresentation([&](auto representation) {
+    using Representation = decltype(representation);
+    const Blocks blocks = LandmarkAt<Representation>(anchor, kPoint);
+    constexpr int n = detail::Blocks<Representation>::kTangent;
     double p[3], j[3 * n];
-    ASSERT_EQ(ToXyz<Form>(Pointers(blocks).data(), p, {j, n}), Status::kOk);
+    ASSERT_EQ(ConvertToXyz<Representation>(Pointers(blocks).data(), p, {j, n}), Status::kOk);
     for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(p[i], kPoint[i], 1e-14);
     std::vector<Space> spaces;
     const auto add = [&](auto index) {
-      using G = detail::SpaceAt<decltype(index)::value, Form>;
+      using G = detail::SpaceAt<decltype(index)::value, Representation>;
       spaces.emplace_back();
       spaces.back().geometry = {static_cast<GeometryKind>(G::kGeometry), G::kAmbient, G::kTangent};
     };
-    detail::ForEach(add, typename detail::Blocks<Form>::Indices{});
+    detail::ForEach(add, typename detail::Blocks<Representation>::Indices{});
     const auto convert = [](const Blocks& x) {
       Blocks point{std::vector<double>(3)};
-      EXPECT_EQ(ToXyz<Form>(Pointers(x).data(), point[0].data()), Status::kOk);
+      EXPECT_EQ(ConvertToXyz<Representation>(Pointers(x).data(), point[0].data()), Status::kOk);
       return point;
     };
     testing::ExpectSame(std::vector<double>(j, j + 3 * n),
@@ -127,7 +128,7 @@ TEST(Landmark, IsNotConvertedAtInfinityOrBehindIt) {
   for (const double rho : {0.0, -0.1}) {
     const Blocks blocks{{0, 0, 0, 0.1, 0.2, rho}};
     double p[3] = {7, 7, 7};
-    EXPECT_EQ(ToXyz<InverseDepth>(Pointers(blocks).data(), p), Status::kOutOfDomain);
+    EXPECT_EQ(ConvertToXyz<InverseDepth>(Pointers(blocks).data(), p), Status::kOutOfDomain);
     EXPECT_EQ(p[0], 7);
   }
 }

@@ -310,7 +310,7 @@ TEST(StaticEkf, WhatCannotBeUsedChangesNothing) {
   EXPECT_EQ(filter.Update<kDepth>(stereo, &negative), StaticOutcome::kInvalid);
   EXPECT_EQ(filter.Update<kDepth>(stereo, &nan), StaticOutcome::kInvalid);
   EXPECT_EQ(filter.Update<kDepth>(stereo, &far, 10.0), StaticOutcome::kGated);
-  EXPECT_EQ((filter.Update<kDepth, kInverseDistance>(Scale2d::FromVariance(infinity), &far)),
+  EXPECT_EQ((filter.Update<kDepth, kInverseDistance>(Scale2d::FromSigma(infinity), &far)),
             StaticOutcome::kNotFinite);
   EXPECT_EQ(*filter.value<kDepth>(), 0.35);
   EXPECT_EQ(filter.covariance(), p);

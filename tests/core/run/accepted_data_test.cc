@@ -85,7 +85,7 @@ TEST(AcceptedBy, HoldsWhereTheEstimatorsGoBackForLateFrames) {
   experiment.out_of_sequence.window = StampFromSeconds(0.2);
   const RunResult run = alidade::Run(experiment, {});
   EXPECT_EQ(run.status, RunStatus::kOk) << run.reason;
-  EXPECT_GT(run.arrivals.late, 20);
+  EXPECT_GT(run.arrivals.out_of_sequence, 20);
   EXPECT_EQ(run.estimators[0].counts.at("gated:inverse_scale"), 7);
   EXPECT_EQ(experiment.estimators[1].estimator->state().values(), Clean());
 }

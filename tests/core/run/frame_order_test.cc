@@ -56,11 +56,11 @@ TEST_P(FrameOrder, AFrameBeyondTheWindowIsDroppedWithAnEvent) {
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.status, RunStatus::kOk) << result.reason;
   EXPECT_EQ(result.frames, 3);
-  EXPECT_EQ(result.arrivals.late, 2);
+  EXPECT_EQ(result.arrivals.out_of_sequence, 2);
   EXPECT_EQ(result.arrivals.dropped, 1);
   EXPECT_EQ(result.arrivals.longest_lag, 100'000'001);
   for (const EstimatorResult& one : result.estimators) {
-    const auto event = std::ranges::find(one.events, "late", &Event::kind);
+    const auto event = std::ranges::find(one.events, "out_of_sequence", &Event::kind);
     ASSERT_NE(event, one.events.end());
     EXPECT_EQ(event->stamp, beyond.stamp);
     EXPECT_EQ(event->text,
@@ -89,7 +89,7 @@ TEST_P(FrameOrder, AStreamTwiceAtOneStampIsAnErrorThatNamesBothPlaces) {
   EXPECT_EQ(result.code, ExitCode::kBadData);
   EXPECT_EQ(result.reason,
             "rows.csv:6: stream 'inverse_scale' twice at t = 0.050000 s; expected one measurement "
-            "at a stamp; the first is in rows.csv:3");
+            "at a timestamp; the first is in rows.csv:3");
   EXPECT_EQ(result.frames, 3);  // what came before it is kept
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 3);
 }
@@ -136,7 +136,7 @@ TEST_P(FrameOrder, AStreamTwiceInMergedFramesNamesTheFirstOfItsOwn) {
   experiment.out_of_sequence.ranks = {2, 1, 0};
   EXPECT_EQ(alidade::Run(experiment, {}).reason,
             "rows.csv:4: stream 'aside' twice at t = 0.000000 s; expected one measurement at a "
-            "stamp; the first is in rows.csv:3");
+            "timestamp; the first is in rows.csv:3");
 }
 
 TEST_P(FrameOrder, LandmarksOfOneStreamAreNotTheSameTwice) {
@@ -160,7 +160,7 @@ TEST_P(FrameOrder, TwoTruthsAtOneStampAreAnError) {
   EXPECT_EQ(result.code, ExitCode::kBadData);
   EXPECT_EQ(
       result.reason,
-      "rows.csv:4: another value of truth 'depth' at t = 0.000000 s; expected one at a stamp");
+      "rows.csv:4: another value of truth 'depth' at t = 0.000000 s; expected one at a timestamp");
 }
 
 TEST_P(FrameOrder, ARowThatIsRefusedForItsTruthIsNotUsedAtAll) {
@@ -219,7 +219,7 @@ TEST(Sort, WithoutAWindowTakesTheWholeRun) {
   experiment.out_of_sequence.window.reset();
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.frames, 50);
-  EXPECT_EQ(result.arrivals.late, 49);
+  EXPECT_EQ(result.arrivals.out_of_sequence, 49);
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 50);
 }
 

@@ -190,7 +190,7 @@ TEST(Metrics, PrefersTheFullName) {
 
 TEST(Metrics, LeavesOutBlocksWithoutValueOrCovariance) {
   StateLayout layout = Scalars({"a.waits"});
-  layout.Declare("a.fixed", "a", SpaceOf("fixed", "", Geometry::Vector(1)), BlockStatus::kFixed);
+  layout.Declare("a.fixed", "a", SpaceOf("fixed", "", Geometry::Vector(1)), BlockStatus::kConstant);
   MetricsOf one(layout, {{"waits", 1}, {"fixed", 1}});
   const double zero = 0.0;
   one.state().Add(1, &zero, Eigen::MatrixXd());
@@ -248,7 +248,7 @@ TEST(Metrics, BoundsOfTheNeesAreWideWhereErrorsStay) {
 
 TEST(Metrics, NeesIsOfEstimatedBlocksAlone) {
   StateLayout layout = Scalars({"a.x"});
-  layout.Declare("a.y", "a", SpaceOf("y", "m", Geometry::Vector(1)), BlockStatus::kConsidered);
+  layout.Declare("a.y", "a", SpaceOf("y", "m", Geometry::Vector(1)), BlockStatus::kConsider);
   MetricsOf one(layout, {{"x", 1}, {"y", 1}});
   const double zero = 0.0;
   one.state().Add(0, &zero, Eigen::MatrixXd::Constant(1, 1, 4.0));
@@ -335,7 +335,7 @@ TEST(Metrics, TellsOnceOfErrorsBeyondTenSigma) {
   EXPECT_EQ(event.kind, "inconsistent");
   EXPECT_EQ(event.stamp, 39 * Stamp{100'000'000});
   EXPECT_EQ(event.text,
-            "a.x: the error, 21 m, has been beyond 10 sigma for 20 stamps; sigma is 2 m");
+            "a.x: the error, 21 m, has been beyond 10 sigma for 20 timestamps; sigma is 2 m");
 }
 
 // A truth of sigma 3 m beside a filter's 2 m: the error has the variance 13 m^2.

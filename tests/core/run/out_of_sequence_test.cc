@@ -141,7 +141,7 @@ TEST_P(Reordered, LateFramesGiveTheBytesOfTheInOrderRun) {
     const RunResult in_order =
         RecordDelayed(config, here / "in_order", OutOfSequence::kReject, 0.0);
     EXPECT_EQ(in_order.status, RunStatus::kOk);
-    EXPECT_EQ(in_order.arrivals.late, 0);
+    EXPECT_EQ(in_order.arrivals.out_of_sequence, 0);
     if (config == kEventful) {
       for (const EstimatorResult& one : in_order.estimators) {
         EXPECT_GT(std::ranges::count(one.events, "rejection_recovery", &Event::kind), 3)
@@ -151,7 +151,7 @@ TEST_P(Reordered, LateFramesGiveTheBytesOfTheInOrderRun) {
       }
     }
     const RunResult late = RecordDelayed(config, here / "late", GetParam(), kWindow_s);
-    EXPECT_GT(late.arrivals.late, 50);
+    EXPECT_GT(late.arrivals.out_of_sequence, 50);
     EXPECT_LE(late.arrivals.longest_lag, StampFromSeconds(kWindow_s));
     EXPECT_EQ(late.arrivals.dropped, 0);
     ExpectSameBytes(here / "in_order", here / "late");
@@ -249,7 +249,7 @@ TEST(Sort, LetsATableHaveItsRowsInAnyOrder) {
   EXPECT_EQ(run("0.2,82,\n0.1,81,1\n0.2,83,1\n", buffer).reason,
             (folder / "rows.csv").string() +
                 ":4: stream 'disparity' twice at t = 0.200000 s; expected one measurement at a "
-                "stamp; the first is in " +
+                "timestamp; the first is in " +
                 (folder / "rows.csv").string() + ":2");
 }
 

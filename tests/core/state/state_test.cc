@@ -204,7 +204,7 @@ TEST(State, ReparametriseMapsCovarianceAndCorrelations) {
 
 TEST(State, FixedBlocksHaveAValueAndNoCovariance) {
   State state;
-  const BlockId id = state.Declare("s.f", "s", Named(Geometry::Vector(2)), BlockStatus::kFixed);
+  const BlockId id = state.Declare("s.f", "s", Named(Geometry::Vector(2)), BlockStatus::kConstant);
   const double value[2] = {1, 2};
   state.Add(id, value, {});
   EXPECT_EQ(state.covariance().size(), 0);

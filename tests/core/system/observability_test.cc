@@ -35,7 +35,7 @@ TEST(UnobservableDirections, StereoAloneSaysNothingOfLambda) {
 
 TEST(UnobservableDirections, AHeldBlockIsNotEstimated) {
   System system = testing::DepthFilter();
-  system.sensors[1].roles[1].mode = RoleMode::kHold;
+  system.sensors[1].roles[1].mode = RoleMode::kKnown;
   const auto directions = UnobservableDirections(system);
   ASSERT_EQ(directions.size(), 1u);
   EXPECT_EQ(directions[0], Names{"template.inverse_distance"});

@@ -239,7 +239,7 @@ struct LosesItself : Right {
   explicit LosesItself(Params&) { static_cast<void>(!new std::string(500, 'x')); }
 };
 
-// ---- written against the C boundary ------------------------------------------------------------
+// ---- written against the plugin ABI ------------------------------------------------------------
 
 using Eval = std::int32_t (*)(const void*, const double* const*, double*, double* const*,
                               const std::int32_t*);

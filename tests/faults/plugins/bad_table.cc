@@ -12,23 +12,23 @@
 #define NAME_TWICE 7
 #define NO_ENTRY_SYMBOL 8
 #define EMPTY 9
-#define LANDMARK_FORM 10
+#define LANDMARK_REPRESENTATION 10
 #define UNKNOWN_KIND 11
 
-ALIDADE_FINGERPRINT(ALIDADE_TIER_SEALED, "")
+ALIDADE_BUILD_TAG(ALIDADE_PLUGIN_C_ABI, "")
 
 #if BAD_TABLE != NO_ENTRY_SYMBOL
 extern "C" __attribute__((visibility("default"))) const AlidadeTable* alidade_plugin() {
   static AlidadeEntry entries[] = {ALIDADE_SENSOR(Probe, "probe", "", ""),
                                    ALIDADE_SENSOR(Probe, "other_probe", "", "")};
-  static AlidadeTable table = alidade::detail::Table(entries, &alidade_fingerprint);
+  static AlidadeTable table = alidade::detail::Table(entries, &alidade_build_tag);
   if (BAD_TABLE == MAGIC) table.magic = 0;
   if (BAD_TABLE == STRUCT_SIZE) table.struct_size = 8;
   if (BAD_TABLE == STRIDE) table.entry_stride = 3;
   if (BAD_TABLE == NULL_NAME) entries[1].name = nullptr;
   if (BAD_TABLE == NO_CREATE) entries[1].create = nullptr;
   if (BAD_TABLE == NAME_TWICE) entries[1].name = "probe";
-  if (BAD_TABLE == LANDMARK_FORM) entries[1].kind = ALIDADE_KIND_LANDMARK_FORM;
+  if (BAD_TABLE == LANDMARK_REPRESENTATION) entries[1].kind = ALIDADE_KIND_LANDMARK_REPRESENTATION;
   if (BAD_TABLE == UNKNOWN_KIND) entries[1].kind = 9;
   if (BAD_TABLE == EMPTY) table.entry_count = 0;
   return BAD_TABLE == NULL_TABLE ? nullptr : &table;

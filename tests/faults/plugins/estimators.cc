@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Build tier: an estimator that throws while its options are read, and one without a maker.
+// C++ plugin: an estimator that throws while its options are read, and one without a maker.
 #include <stdexcept>
 
 #include "alidade/host/build_plugin.h"

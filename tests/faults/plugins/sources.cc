@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Build tier: sources that work and one that throws.
+// C++ plugin: sources that work and one that throws.
 #include <stdexcept>
 
 #include "alidade/host/build_plugin.h"

@@ -4,7 +4,7 @@
 /// Time from a pulse to its echo, where the emitter and the microphone stand apart.
 ///
 ///   model      t = 2 sqrt(Z^2 + (b/2)^2) / c + n,   n ~ N(0, sigma^2)
-///   Jacobian   derived                                 1x1, s/m
+///   Jacobian   automatic differentiation               1x1, s/m
 ///   noise      R = sigma^2                             1x1, s^2
 ///
 ///   symbol     shape  unit    frame  meaning

@@ -50,7 +50,7 @@ void Add(Experiment& experiment, const std::string& name, EstimatorKind kind,
   named.accepted_by = accepted_by;
 }
 
-/// A filter, and all that its gap is explained by.
+/// A filter, and all that its error decomposition takes.
 Experiment MakeLinear(bool with_outlier) {
   const System system = LinearSystem();
   EkfOptions options;
@@ -61,7 +61,8 @@ Experiment MakeLinear(bool with_outlier) {
   Add(experiment, "ekf", EstimatorKind::kFilter, std::make_unique<Ekf>(system, options, streams));
   Add(experiment, "rts", EstimatorKind::kSmoother,
       std::make_unique<RtsSmoother>(system, options, streams));
-  Add(experiment, "so_far", EstimatorKind::kBatch, MakeBatch(system, "mode: filtering\n"), 0);
+  Add(experiment, "full_information", EstimatorKind::kBatch, MakeBatch(system, "mode: filtering\n"),
+      0);
   Add(experiment, "accepted", EstimatorKind::kBatch, MakeBatch(system), 0);
   Add(experiment, "batch", EstimatorKind::kBatch, MakeBatch(system));
   return experiment;
@@ -93,16 +94,16 @@ double ValueOf(const std::map<std::string, Spread>& values, const std::string& k
 // Where all is linear a filter loses nothing by linearising, and the smoother is the batch.
 TEST(CompareLinear, OnlyMissingSmoothingIsLeftOfTheGap) {
   const auto [run, comparison] = CompareLinear(false);
-  ASSERT_EQ(comparison.gap.size(), 3u);
+  ASSERT_EQ(comparison.decomposition.size(), 3u);
   EXPECT_EQ(comparison.explained, "ekf");
-  const GapStep& linearisation = comparison.gap[0];
-  EXPECT_EQ(linearisation.from + ' ' + linearisation.to, "ekf so_far");
+  const DecompositionStep& linearisation = comparison.decomposition[0];
+  EXPECT_EQ(linearisation.from + ' ' + linearisation.to, "ekf full_information");
   EXPECT_LT(ValueOf(linearisation.values, "rmsd:p.x"), 1e-9);
   EXPECT_LT(ValueOf(linearisation.values, "rmsd:p.v"), 1e-9);
   EXPECT_LT(ValueOf(linearisation.values, "rmsd.sigmas:p"), 1e-9);
   EXPECT_NEAR(ValueOf(linearisation.values, "error_ratio:p.x"), 1.0, 1e-9);
 
-  const GapStep& smoothing = comparison.gap[1];
+  const DecompositionStep& smoothing = comparison.decomposition[1];
   EXPECT_EQ(smoothing.from + ' ' + smoothing.to, "ekf rts");
   const auto rmse = [&run = run](std::size_t e) {
     return run.estimators[e].metrics.at("rmse:p.x");
@@ -110,10 +111,10 @@ TEST(CompareLinear, OnlyMissingSmoothingIsLeftOfTheGap) {
   EXPECT_GT(rmse(0) / rmse(1), 1.2);
   EXPECT_NEAR(ValueOf(smoothing.values, "error_ratio:p.x"), rmse(0) / rmse(1), 1e-12);
 
-  const GapStep& lost = comparison.gap[2];
-  EXPECT_EQ(lost.from + ' ' + lost.to, "accepted batch");
-  EXPECT_EQ(ValueOf(lost.values, "lost"), 0.0);
-  EXPECT_LT(ValueOf(lost.values, "rmsd:p.x"), 1e-12);
+  const DecompositionStep& rejected = comparison.decomposition[2];
+  EXPECT_EQ(rejected.from + ' ' + rejected.to, "accepted batch");
+  EXPECT_EQ(ValueOf(rejected.values, "rejected"), 0.0);
+  EXPECT_LT(ValueOf(rejected.values, "rmsd:p.x"), 1e-12);
 
   const ComparedEstimator& rts = comparison.estimators[1];
   EXPECT_TRUE(rts.smoothed);
@@ -124,15 +125,16 @@ TEST(CompareLinear, OnlyMissingSmoothingIsLeftOfTheGap) {
 }
 
 TEST(CompareLinear, AWindowIsNoSmootherOfAllData) {
-  const GapStep smoothing = CompareLinear(false, {}, EstimatorKind::kWindow).comparison.gap[1];
-  EXPECT_EQ(smoothing.from + ' ' + smoothing.to, "so_far accepted");
+  const DecompositionStep smoothing =
+      CompareLinear(false, {}, EstimatorKind::kWindow).comparison.decomposition[1];
+  EXPECT_EQ(smoothing.from + ' ' + smoothing.to, "full_information accepted");
 }
 
 // At the end filter and batch have the same data.
 TEST(CompareLinear, TheLastEstimateOfAFilterIsThatOfTheBatch) {
   const Comparison comparison = CompareLinear(false).comparison;
   const ComparedEstimator& ekf = comparison.estimators[0];
-  EXPECT_EQ(ekf.reference, "so_far");
+  EXPECT_EQ(ekf.reference, "full_information");
   EXPECT_EQ(ekf.final_reference, "batch");
   EXPECT_LT(ValueOf(ekf.values, "final_difference:p.x"), 1e-9);
   EXPECT_LT(ValueOf(ekf.values, "final_difference.sigmas:p"), 1e-9);
@@ -175,7 +177,7 @@ TEST(CompareLinear, DistancesAreThoseWrittenOut) {
     sigmas += d.dot(by_hand.p[k].inverse() * d) / 2.0;
   }
   const auto n = static_cast<double>(by_hand.filter.size());
-  const GapStep smoothing = CompareLinear(false).comparison.gap[1];
+  const DecompositionStep smoothing = CompareLinear(false).comparison.decomposition[1];
   EXPECT_NEAR(ValueOf(smoothing.values, "rmsd:p.x"), std::sqrt(squares / n), 1e-12);
   EXPECT_NEAR(ValueOf(smoothing.values, "rmsd.sigmas:p"), std::sqrt(sigmas / n), 1e-9);
 }
@@ -183,12 +185,12 @@ TEST(CompareLinear, DistancesAreThoseWrittenOut) {
 // The batch takes the outlier for true, the filter and what it lends its gate to do not.
 TEST(CompareLinear, WhatTheGateKeptOutIsLostData) {
   const Comparison comparison = CompareLinear(true).comparison;
-  EXPECT_LT(ValueOf(comparison.gap[0].values, "rmsd:p.x"), 1e-9);
-  const GapStep& lost = comparison.gap[2];
-  EXPECT_EQ(ValueOf(lost.values, "lost"), 1.0);
-  EXPECT_EQ(ValueOf(lost.values, "measurements"), 23.0);
-  EXPECT_GT(ValueOf(lost.values, "rmsd:p.x"), 0.5);
-  EXPECT_LT(ValueOf(lost.values, "error_ratio:p.x"), 0.5);
+  EXPECT_LT(ValueOf(comparison.decomposition[0].values, "rmsd:p.x"), 1e-9);
+  const DecompositionStep& rejected = comparison.decomposition[2];
+  EXPECT_EQ(ValueOf(rejected.values, "rejected"), 1.0);
+  EXPECT_EQ(ValueOf(rejected.values, "measurements"), 23.0);
+  EXPECT_GT(ValueOf(rejected.values, "rmsd:p.x"), 0.5);
+  EXPECT_LT(ValueOf(rejected.values, "error_ratio:p.x"), 0.5);
 }
 
 TEST(CompareLinear, ANamedReferenceServesAll) {
@@ -213,9 +215,9 @@ TEST(ExplainExperiment, AddsWhatTheComparisonLacks) {
   const ExplainedExperiment explained = ExplainExperiment(Depth(), Shipped(), {});
   EXPECT_EQ(explained.filter, "ekf");
   EXPECT_EQ(explained.added,
-            (std::vector<std::string>{"rts", "batch", "batch_so_far", "batch_accepted"}));
+            (std::vector<std::string>{"rts", "batch", "full_information", "batch_accepted"}));
   const Node estimators = explained.config.root().At("estimators");
-  EXPECT_EQ(estimators.At("batch_so_far").At("mode").Text(), "filtering");
+  EXPECT_EQ(estimators.At("full_information").At("mode").Text(), "filtering");
   EXPECT_EQ(estimators.At("batch_accepted").At("use").At("accepted_by").Text(), "ekf");
   EXPECT_EQ(estimators.At("rts").At("gate").Text(), estimators.At("ekf").At("gate").Text());
   // What it gives is the config of a run.
@@ -237,7 +239,7 @@ TEST(ExplainExperiment, TakesOverWhatTheFilterSees) {
   const ExplainedExperiment explained = ExplainExperiment(config, Shipped(), {});
   // `best` has another sensor and another noise.
   EXPECT_EQ(explained.added,
-            (std::vector<std::string>{"rts", "batch", "batch_so_far", "batch_accepted"}));
+            (std::vector<std::string>{"rts", "batch", "full_information", "batch_accepted"}));
   for (const NamedEstimator& named : explained.experiment.estimators) {
     EXPECT_EQ(named.system.sensors.size(), named.name == "best" ? 2u : 1u) << named.name;
     EXPECT_EQ(named.overrides.empty(), named.name == "best") << named.name;
@@ -250,8 +252,9 @@ TEST(ExplainExperiment, LeavesOutWithItsReasonWhatDoesNotSupportTheSystem) {
   const ExplainedExperiment explained = ExplainExperiment(config, Shipped(), {});
   EXPECT_TRUE(explained.added.empty());
   ASSERT_EQ(explained.notes.size(), 2u);
-  EXPECT_TRUE(explained.notes[0].starts_with(
-      "left out the batch of all data; the batch of the data so far that the filter accepted; "))
+  EXPECT_TRUE(
+      explained.notes[0].starts_with("left out the batch of all data; the full-information filter "
+                                     "over what the filter accepted; "))
       << explained.notes[0];
   EXPECT_EQ(explained.notes[1],
             "left out the smoother of all data: estimator type 'rts' does not support "
@@ -293,7 +296,7 @@ TEST(ExplainExperiment, RefusesToExplainTheGapOfABatchOrASmoother) {
 
 Comparison CompareScene(const std::string& more) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml");
-  config.Set("source.frames", "10", "--set");
+  config.Set("source.max_frames", "10", "--set");
   if (!more.empty()) config.Set("estimators.now", more, "--set");
   ExplainedExperiment explained = ExplainExperiment(config, Shipped(), {});
   RunComparer comparer(explained.experiment);
@@ -304,14 +307,14 @@ Comparison CompareScene(const std::string& more) {
   return comparer.Finish(run, {});
 }
 
-// Beside a batch of the data so far, which solves at every frame.
+// Beside a full-information filter, which solves at every frame.
 TEST(CompareLandmarks, AtTheLastFrameTheBatchOfAllDataIsThatOfTheDataSoFar) {
-  const GapStep step = CompareScene("").gap[0];
+  const DecompositionStep step = CompareScene("").decomposition[0];
   EXPECT_TRUE(step.at_end);
   EXPECT_EQ(step.from + ' ' + step.to, "ekf batch_accepted");
   const Comparison with =
       CompareScene("{type: ceres_batch, mode: filtering, use: {accepted_by: ekf}}");
-  EXPECT_FALSE(with.gap[0].at_end);
+  EXPECT_FALSE(with.decomposition[0].at_end);
   ASSERT_EQ(with.estimators[1].name, "now");
   const std::map<std::string, Spread>& now = with.estimators[1].values;
   EXPECT_LT(ValueOf(now, "final_difference.sigmas:cam"), 1e-5);

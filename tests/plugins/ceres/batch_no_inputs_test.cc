@@ -97,7 +97,7 @@ TEST(CeresBatchNoInputs, AFirstValueMayNeverCome) {
 TEST(CeresBatchNoInputs, WhatIsFixedStaysAndHasItsCost) {
   const std::vector<Frame> frames = {FrameAt(0.0, {{0, 3.3}}), FrameAt(0.1, {{0, 2.4}}),
                                      FrameAt(0.3, {{0, 4.2}})};
-  System system = Still(BlockStatus::kFixed);
+  System system = Still(BlockStatus::kConstant);
   for (const std::string& options : kAll) {
     const Estimated found = Estimate(options, system, frames);
     for (const State& state : found.states) EXPECT_EQ(*state.value(0), 1.5) << options;
@@ -115,7 +115,7 @@ TEST(CeresBatchNoInputs, AFixedCameraHasAMap) {
   system.layout = {};
   system.motions[0].model = InProcessMotion(Constant<>(3), "constant");
   const Space place = system.motions[0].model.blocks()[0];
-  system.layout.Declare("cam.position", "cam", place, BlockStatus::kFixed);
+  system.layout.Declare("cam.position", "cam", place, BlockStatus::kConstant);
   std::vector<Frame> frames;
   for (int k = 0; k < 4; ++k) {
     frames.push_back(testing::FrameOf(0.1 * k, {{0, {1.0 + 0.1 * k, 2.0, 3.0}}}));

@@ -89,12 +89,12 @@ TEST_F(CeresBatchConfig, WhatItCannotDoIsRefusedByName) {
                   RunDepth(1, {{"estimators.batch.type", "ceres_batch"}, {key, value}});
                 });
   };
-  expect("sensors.scale.roles.inverse_distance", "{block: template.inverse_distance, mode: hold}",
-         "held roles: sensors.scale.roles.inverse_distance.mode");
+  expect("sensors.scale.roles.inverse_distance", "{block: template.inverse_distance, mode: known}",
+         "known roles: sensors.scale.roles.inverse_distance.mode");
   expect("sensors.stereo.roles.depth", "{block: target.depth, jacobian_at: measurement}",
          "jacobian_at: measurement: sensors.stereo.roles.depth.jacobian_at");
   expect("state.template.consider", "[inverse_distance]",
-         "considered blocks: state.template.consider names 'template.inverse_distance'");
+         "consider blocks: state.template.consider names 'template.inverse_distance'");
 }
 
 TEST_F(CeresBatchConfig, KeysOfTheFiltersAreRefusedByName) {

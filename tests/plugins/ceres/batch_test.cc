@@ -277,7 +277,7 @@ TEST(CeresBatch, WhatIsKnownStays) {
   System fixed;
   MotionBinding binding{"p", model, {}};
   binding.blocks = {fixed.layout.Declare("p.x", "p", model.blocks()[0]),
-                    fixed.layout.Declare("p.v", "p", model.blocks()[1], BlockStatus::kFixed)};
+                    fixed.layout.Declare("p.v", "p", model.blocks()[1], BlockStatus::kConstant)};
   fixed.motions = {binding};
   fixed.priors = moving.priors;
   AddSensor(fixed, "z", moving.sensors[0].model, {"p.x"});

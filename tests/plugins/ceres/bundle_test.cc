@@ -40,7 +40,8 @@ TEST(CeresBundle, FindsCamerasPointsAndIntrinsics) {
   const BundleResult result = Adjusted(problem);
   EXPECT_EQ(result.end, BundleEnd::kConverged) << result.message;
   EXPECT_LT(BundleRms(sensor, problem), 1e-8);
-  EXPECT_EQ(problem.cameras[0].position, truth.cameras[0].position) << "the first camera is held";
+  EXPECT_EQ(problem.cameras[0].position, truth.cameras[0].position)
+      << "the first camera is constant";
   EXPECT_EQ(problem.cameras[0].orientation, truth.cameras[0].orientation);
   const auto& eye = truth.cameras[0].position;
   const double scale = Distance(problem.points[0], eye) / Distance(truth.points[0], eye);
@@ -65,7 +66,7 @@ TEST(CeresBundle, FindsCamerasPointsAndIntrinsics) {
   EXPECT_EQ(result.rank, result.unknowns - 1);
   const std::vector<std::string> words = Undetermined(problem, sensor, result);
   ASSERT_EQ(words.size(), 3u);
-  EXPECT_EQ(words[0], "gauge: the pose of the first camera and the scale are held");
+  EXPECT_EQ(words[0], "gauge: the pose of the first camera and the scale are constant");
   EXPECT_EQ(words[1].find("extent: "), 0u) << words[1];
   EXPECT_EQ(words[2], "rank: 167 of 168 unknowns: all but the scale is determined");
 }

@@ -358,9 +358,9 @@ TEST(FixedLag, LiesBetweenTheFilterAndTheBatchAndIsHonest) {
 // It has no gate; but its stereo sees nothing nearer than 0.3 m, where the target is half the time.
 TEST(FixedLag, LendsWhatItAccepted) {
   const RunResult run = RunDepth(
-      "{one: {type: fixed_lag, lag_s: 0.3, overrides: {sensors: {stereo: {near_m: 0.3}}}}, "
+      "{one: {type: fixed_lag, lag_s: 0.3, overrides: {sensors: {stereo: {min_range_m: 0.3}}}}, "
       "two: {type: ekf, use: {accepted_by: one}}, all: {type: ekf}}",
-      {{"source.near_m", "0"}});
+      {{"source.min_range_m", "0"}});
   ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
   std::vector<std::int64_t> accepted;
   for (const auto& one : run.estimators) accepted.push_back(one.counts.at("accepted:stereo"));
@@ -384,11 +384,11 @@ TEST(FixedLag, IsRefusedWhatItCannotDo) {
   };
   const std::string window = ", lag_s: 0.3";
   expect_refused(window, "sensors.scale.roles.inverse_distance",
-                 "{block: template.inverse_distance, mode: hold}",
-                 "estimator type 'fixed_lag' does not support held roles: "
+                 "{block: template.inverse_distance, mode: known}",
+                 "estimator type 'fixed_lag' does not support known roles: "
                  "sensors.scale.roles.inverse_distance.mode");
   expect_refused(window, "state.template.consider", "[inverse_distance]",
-                 "estimator type 'fixed_lag' does not support considered blocks");
+                 "estimator type 'fixed_lag' does not support consider blocks");
   expect_refused(window, "estimators.one.gate", "0.99", "estimator type 'fixed_lag' has no gate");
   expect_refused("", "source.seed", "1", "lag_s");
   expect_refused(", lag_s: 0", "source.seed", "1", "lag_s");

@@ -111,11 +111,11 @@ GeometryManifold Of(const Geometry& geometry) { return GeometryManifold({{geomet
 // d = 20 / 2 = 10 px, z = 13 px, sigma = 2 px: r = -1.5, dr/dZ = -10 / 2 / 2 = -2.5 per m
 TEST(SensorCost, IsTheWhitenedResidualOfTheSensor) {
   const StereoDisparity model(200.0, 0.1, 2.0);
-  const SensorModel sealed = InProcessSensor(model, "stereo_disparity");
+  const SensorModel by_abi = InProcessSensor(model, "stereo_disparity");
   double z = 13.0;
   const std::vector<double> w{0.5};
   const CostKind<StereoDisparity> direct(model, {{0, 0}}, {1}, w);
-  const CostKind<SensorModel> behind(sealed, {{0, 0}}, {1}, w);
+  const CostKind<SensorModel> behind(by_abi, {{0, 0}}, {1}, w);
   const SensorCost<StereoDisparity> a(direct, &z);
   const SensorCost<SensorModel> b(behind, &z);
   z = 77.0;  // they have their own
@@ -133,13 +133,13 @@ TEST(SensorCost, IsTheWhitenedResidualOfTheSensor) {
 /// Pose and intrinsics in one block, in another order than the roles; correlated noise.
 TEST(SensorCost, PutsRolesIntoTheirPlacesInTheBlocks) {
   const SelfCalibratingFeature<RadialLens> model(1.0);
-  const SensorModel sealed = InProcessSensor(model, "self_calibrating_feature");
+  const SensorModel by_abi = InProcessSensor(model, "self_calibrating_feature");
   const std::vector<RolePlace> places{{1, 3}, {1, 6}, {1, 0}, {0, 0}};
   const std::vector<int> sizes{3, 10};
   const double z[2] = {3.0, -4.0};
   const std::vector<double> w{2.0, 0.0, 0.7, 0.5}, half{0.5, 0.0, 0.0, 0.5};
   const CostKind<SelfCalibratingFeature<RadialLens>> direct(model, places, sizes, w);
-  const CostKind<SensorModel> behind(sealed, places, sizes, w), equal(sealed, places, sizes, half);
+  const CostKind<SensorModel> behind(by_abi, places, sizes, w), equal(by_abi, places, sizes, half);
   const SensorCost a(direct, z);
   const SensorCost b(behind, z), c(equal, z);
   const Values values{{-2.6, 1.1, 3.5}, {5.0, -0.3, 0.2, 0.4, -1.1, 0.3, 0.8, 0.2, -0.4, 0.4}};
@@ -154,7 +154,7 @@ TEST(SensorCost, PutsRolesIntoTheirPlacesInTheBlocks) {
   EXPECT_EQ(At(a, values).j, At(b, values).j);
   double h[2];
   const double* const roles[] = {&values[1][3], &values[1][6], &values[1][0], &values[0][0]};
-  ASSERT_EQ(sealed.Predict(roles, h), Status::kOk);
+  ASSERT_EQ(by_abi.Predict(roles, h), Status::kOk);
   const std::vector<double> r = ResidualAt(a, values);
   EXPECT_NEAR(r[0], 2.0 * (h[0] - z[0]), 1e-12);
   EXPECT_NEAR(r[1], 0.7 * (h[0] - z[0]) + 0.5 * (h[1] - z[1]), 1e-12);

@@ -124,8 +124,8 @@ TEST_F(Csv, UnknownColumn) {
   ExpectBadConfig("path: a.csv\nstreams: {d: [disparity_pc]}\n",
                   "run.yaml:2:15 streams.d[0]: no column 'disparity_pc' in FILE; expected one of "
                   "t_s, disparity_px, scale, reference_depth_m; did you mean 'disparity_px'?");
-  ExpectBadConfig("path: a.csv\nstreams: {d: scale}\ntime: {column: stamp}\n",
-                  "run.yaml:3:16 time.column: no column 'stamp' in FILE; expected one of t_s, "
+  ExpectBadConfig("path: a.csv\nstreams: {d: scale}\ntime: {column: timestamp}\n",
+                  "run.yaml:3:16 time.column: no column 'timestamp' in FILE; expected one of t_s, "
                   "disparity_px, scale, reference_depth_m");
 }
 

@@ -135,18 +135,18 @@ TEST(DepthTarget, NamesItsStreamsAndTruths) {
 
 TEST(DepthTarget, LastSampleSurvivesRounding) {
   // 0.3 / 0.1 is 2.9999999999999996 in doubles; t = 0, 0.1, 0.2, 0.3 s.
-  EXPECT_EQ(AllFrames({{"duration_s", 0.3}, {"step_s", 0.1}}).size(), 4u);
-  EXPECT_EQ(AllFrames({{"duration_s", 0.299999}, {"step_s", 0.1}}).size(), 3u);
+  EXPECT_EQ(AllFrames({{"duration_s", 0.3}, {"rate_hz", 10.0}}).size(), 4u);
+  EXPECT_EQ(AllFrames({{"duration_s", 0.299999}, {"rate_hz", 10.0}}).size(), 3u);
   EXPECT_EQ(AllFrames({{"duration_s", 0.0}}).size(), 1u);
 }
 
 TEST(DepthTarget, WithoutNoiseGivesTheFormulas) {
   // Quarter periods of 0.5 Hz: Z = 0.3, 0.4, 0.3, 0.2 m. d = 26 px m / Z; 1/scale = Z / 0.3 m.
   const std::vector<Frame> frames = AllFrames({{"frequency_hz", 0.5},
-                                               {"step_s", 0.5},
+                                               {"rate_hz", 2.0},
                                                {"duration_s", 1.5},
-                                               {"disparity_sigma_px", 0.0},
-                                               {"scale_sigma_px", 0.0}});
+                                               {"sigma_disparity_px", 0.0},
+                                               {"sigma_edge_px", 0.0}});
   const double disparity_px[] = {26.0 / 0.3, 65.0, 26.0 / 0.3, 130.0};
   const double inverse_scale[] = {1.0, 4.0 / 3.0, 1.0, 2.0 / 3.0};
   ASSERT_EQ(frames.size(), 4u);
@@ -163,7 +163,7 @@ TEST(DepthTarget, WithoutNoiseGivesTheFormulas) {
 TEST(DepthTarget, TemplateDepthScalesTheImage) {
   // Z = 0.3 m and a template from 0.6 m: the target looks twice as large; its truth is 1 / 0.6 m.
   const std::vector<Frame> frames =
-      AllFrames({{"template_depth_m", 0.6}, {"duration_s", 0.0}, {"scale_sigma_px", 0.0}});
+      AllFrames({{"template_depth_m", 0.6}, {"duration_s", 0.0}, {"sigma_edge_px", 0.0}});
   EXPECT_NEAR(*Value(frames[0], kInverseScale), 0.5, 1e-15);
   EXPECT_NEAR(frames[0].truth[2][0], 1.0 / 0.6, 1e-15);
 }
@@ -181,7 +181,7 @@ TEST(DepthTarget, SplitStreamsRepeatTheWholeOnes) {
 
 TEST(DepthTarget, NearOnMeasuredComparesTheNoisyDisparity) {
   int unlike_truth = 0;
-  for (const Frame& frame : AllFrames({{"near_on", 0}, {"step_s", 0.001}})) {
+  for (const Frame& frame : AllFrames({{"blind_test", 0}, {"rate_hz", 1000.0}})) {
     const bool sees = Value(frame, kDisparity).has_value();
     EXPECT_EQ(sees, *Value(frame, kDisparityAll) <= kBfPxM / 0.3);
     unlike_truth += sees != (frame.truth[0][0] >= 0.3) ? 1 : 0;
@@ -190,7 +190,7 @@ TEST(DepthTarget, NearOnMeasuredComparesTheNoisyDisparity) {
 }
 
 TEST(DepthTarget, NearOnTrueComparesTheExactDisparity) {
-  for (const Frame& frame : AllFrames({{"near_on", 1}, {"step_s", 0.001}})) {
+  for (const Frame& frame : AllFrames({{"blind_test", 1}, {"rate_hz", 1000.0}})) {
     EXPECT_EQ(Value(frame, kDisparity).has_value(), kBfPxM / frame.truth[0][0] <= kBfPxM / 0.3);
   }
 }
@@ -198,9 +198,9 @@ TEST(DepthTarget, NearOnTrueComparesTheExactDisparity) {
 TEST(DepthTarget, ThresholdOnTheNoisyDisparitySelects) {
   // At rest at the limit: of N(0, 1) only the lower half passes, its mean is -sqrt(2/pi) and its
   // variance 1 - 2/pi; on the exact disparity all pass. 5 sigma.
-  Values values{{"frequency_hz", 0.0}, {"step_s", 0.001}, {"duration_s", 20.0}};
+  Values values{{"frequency_hz", 0.0}, {"rate_hz", 1000.0}, {"duration_s", 20.0}};
   const std::vector<double> measured = Series(values, kDisparity);
-  values["near_on"] = 1;
+  values["blind_test"] = 1;
   const std::vector<double> exact = Series(values, kDisparity);
   EXPECT_EQ(exact.size(), 20001u);
   EXPECT_NEAR(static_cast<double>(measured.size()), 10000.5, 5.0 * std::sqrt(20001 * 0.25));
@@ -210,17 +210,17 @@ TEST(DepthTarget, ThresholdOnTheNoisyDisparitySelects) {
 }
 
 TEST(DepthTarget, NearZeroIsNeverBlind) {
-  EXPECT_EQ(Series({{"near_m", 0.0}}, kDisparity).size(), 152u);
-  EXPECT_TRUE(Series({{"near_m", 0.0}}, kInverseScaleBlind).empty());
+  EXPECT_EQ(Series({{"min_range_m", 0.0}}, kDisparity).size(), 152u);
+  EXPECT_TRUE(Series({{"min_range_m", 0.0}}, kInverseScaleBlind).empty());
 }
 
 TEST(DepthTarget, NoiseIsAsItsFormulasSay) {
   // Undone, both noises are N(0, 1) at every depth: mean 0, variance 1 in either half of the
   // depths, and no correlation; 5 sigma of N samples.
-  const std::vector<Frame> frames = AllFrames({{"step_s", 0.0001},
+  const std::vector<Frame> frames = AllFrames({{"rate_hz", 10000.0},
                                                {"duration_s", 5.0},
-                                               {"disparity_sigma_px", 0.5},
-                                               {"scale_sigma_px", 0.7}});
+                                               {"sigma_disparity_px", 0.5},
+                                               {"sigma_edge_px", 0.7}});
   std::vector<Frame> near, far;
   for (const Frame& frame : frames) (frame.truth[0][0] < 0.3 ? near : far).push_back(frame);
   for (const std::vector<Frame>* part : {&near, &far}) {
@@ -244,11 +244,11 @@ TEST(DepthTarget, SameSeedGivesTheSameBytes) {
 
 TEST(DepthTarget, OneNoiseNeverShiftsTheOther) {
   const std::vector<double> disparity = Series({}, kDisparityAll);
-  EXPECT_EQ(Series({{"scale_sigma_px", 0.0}}, kDisparityAll), disparity);
-  EXPECT_EQ(Series({{"near_m", 0.0}}, kDisparityAll), disparity);
+  EXPECT_EQ(Series({{"sigma_edge_px", 0.0}}, kDisparityAll), disparity);
+  EXPECT_EQ(Series({{"min_range_m", 0.0}}, kDisparityAll), disparity);
   const std::vector<double> scale = Series({}, kInverseScale);
-  EXPECT_EQ(Series({{"disparity_sigma_px", 0.0}}, kInverseScale), scale);
-  EXPECT_EQ(Series({{"near_m", 0.35}, {"near_on", 1}}, kInverseScale), scale);
+  EXPECT_EQ(Series({{"sigma_disparity_px", 0.0}}, kInverseScale), scale);
+  EXPECT_EQ(Series({{"min_range_m", 0.35}, {"blind_test", 1}}, kInverseScale), scale);
 }
 
 TEST(DepthTarget, RefusesADepthThatReachesTheCamera) {
@@ -268,11 +268,11 @@ TEST(DepthTarget, EveryParameterHasAUnitAndADefault) {
   EXPECT_EQ(host.failed(), "");
   const std::map<std::string, std::string> expected{
       {"depth_mean_m", "m"},    {"amplitude_m", "m"},
-      {"frequency_hz", "Hz"},   {"step_s", "s"},
+      {"frequency_hz", "Hz"},   {"rate_hz", "Hz"},
       {"duration_s", "s"},      {"focal_px", "px"},
-      {"baseline_m", "m"},      {"near_m", "m"},
-      {"near_on", ""},          {"disparity_sigma_px", "px"},
-      {"scale_sigma_px", "px"}, {"template_px", "px"},
+      {"baseline_m", "m"},      {"min_range_m", "m"},
+      {"blind_test", ""},       {"sigma_disparity_px", "px"},
+      {"sigma_edge_px", "px"},  {"template_px", "px"},
       {"template_depth_m", "m"}};
   EXPECT_EQ(host.units(), expected);
 }

@@ -199,7 +199,7 @@ TEST_F(DrivenTest, FramesThatComeLateGiveTheBytesOfThoseInOrder) {
                       {"out_of_sequence", "{policy: " + order + ", window_s: 1}"}}),
                 folder_ / order);
     ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;
-    EXPECT_EQ(run.arrivals.late, 4);
+    EXPECT_EQ(run.arrivals.out_of_sequence, 4);
     EXPECT_EQ(run.arrivals.dropped, 0);
     for (const std::string& file : testing::FilesIn(folder_ / "in_order")) {
       if (file == "timing.json" || file == "config.resolved.yaml" || file == "report.html")

@@ -242,8 +242,8 @@ Row SensorRow(const std::string& name, const std::string& parameters, const Mode
 }
 
 /// A landmark 2 m before a camera on whose image the uncertainties here, of 0.05, are a pixel.
-inline const std::string kSmallCameraText =
-    "camera: {width: 32, height: 24, fx: 20, fy: 20, cx: 16, cy: 12}";
+inline const std::string kSmallCameraKeys = "width: 32, height: 24, fx: 20, fy: 20, cx: 16, cy: 12";
+inline const std::string kSmallCameraText = "camera: {" + kSmallCameraKeys + '}';
 inline const Camera kSmallCamera(32, 24, 20, 20, 16, 12);
 inline const std::vector<double> kPosition{0.1, -0.1, 0.2}, kOrientation{1, 0, 0, 0};
 

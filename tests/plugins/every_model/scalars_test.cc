@@ -23,8 +23,8 @@ INSTANTIATE_TEST_SUITE_P(
                                 StereoDisparity(400.0, 0.065, 1.0), {{0.7}}),
                       SensorRow("scale_2d", "{template_px: 300, sigma_px: 1.0}",
                                 Scale2d::FromPixels(300.0, 1.0), {{0.7}, {1.4}}),
-                      SensorRow("scale_2d", "{noise: fixed, variance: 0.0025}",
-                                Scale2d::FromVariance(0.0025), {{0.7}, {1.4}})),
+                      SensorRow("scale_2d", "{noise_model: constant, sigma_inverse_scale: 0.05}",
+                                Scale2d::FromSigma(0.05), {{0.7}, {1.4}})),
     RowName);
 
 }  // namespace

@@ -5,13 +5,13 @@
 namespace alidade::testing {
 namespace {
 
-INSTANTIATE_TEST_SUITE_P(
-    Stereo, EveryModel,
-    ::testing::Values(SensorRow("stereo_feature",
-                                "{sigma_px: 1, baseline_m: 0.5, " + kSmallCameraText + "}",
-                                StereoFeature<InverseDepth>(kSmallCamera, 0.5, 1.0),
-                                {kPosition, kOrientation, {0, 0, 0, 0.1, -0.2, 0.5}})),
-    RowName);
+INSTANTIATE_TEST_SUITE_P(Stereo, EveryModel,
+                         ::testing::Values(SensorRow(
+                             "stereo_feature",
+                             "{sigma_px: 1, camera: {baseline_m: 0.5, " + kSmallCameraKeys + "}}",
+                             StereoFeature<InverseDepth>(kSmallCamera, 0.5, 1.0),
+                             {kPosition, kOrientation, {0, 0, 0, 0.1, -0.2, 0.5}})),
+                         RowName);
 
 }  // namespace
 }  // namespace alidade::testing

@@ -254,8 +254,8 @@ void AddLandmarkSensors(std::multimap<std::string, std::string>& parameters) {
   const std::string camera = "camera: {width: 640, height: 480, fx: 525, fy: 520, cx: 320, cy: 240";
   const std::pair<std::string, std::string> sensors[] = {
       {"inverse_depth_feature", ""},
-      {"stereo_feature", ", baseline_m: 0.1"},
-      {"depth_feature", ", sigma_depth_m: 0.01, sigma_depth_per_m: 0.003"}};
+      {"stereo_feature", ""},
+      {"depth_feature", ", sigma_depth_m: 0.01, sigma_depth_quadratic_1_m: 0.003"}};
   for (const auto& [model, keys] : sensors) {
     for (const char* form : {"inverse_depth", "anchored", "xyz"}) {
       for (const char* lens : {"", ", model: radtan, k1: -0.28, k2: 0.07, p1: 0.001, p2: -0.0007",
@@ -264,7 +264,8 @@ void AddLandmarkSensors(std::multimap<std::string, std::string>& parameters) {
         const bool other_lens = *lens != '\0', other_form = *form != 'i';
         if (other_lens && (other_form || model == "stereo_feature")) continue;
         parameters.emplace(model, "{sigma_px: 1" + keys + ", landmarks: {representation: " + form +
-                                      "}, " + camera + lens + "}}");
+                                      "}, " + camera + lens +
+                                      (model[0] == 's' ? ", baseline_m: 0.1}}" : "}}"));
       }
     }
   }
@@ -290,9 +291,9 @@ TEST_F(CheckTest, ShippedModelsPass) {
       {"constant_velocity", "{noise: {acceleration: 1, kind: discrete}}"},
       {"constant_velocity", "{dimensions: 3, noise: {acceleration: 2}}"},
       {"stereo_disparity", "{focal_px: 400, baseline_m: 0.065, sigma_px: 1}"},
-      {"stereo_disparity", "{focal_px: 400, baseline_m: 0.065, sigma_px: 1, near_m: 0.3}"},
+      {"stereo_disparity", "{focal_px: 400, baseline_m: 0.065, sigma_px: 1, min_range_m: 0.3}"},
       {"scale_2d", "{template_px: 300, sigma_px: 1}"},
-      {"scale_2d", "{noise: fixed, variance: 0.01}"},
+      {"scale_2d", "{noise_model: constant, sigma_inverse_scale: 0.1}"},
       {"quaternion_pose", "{noise: {linear_acceleration: 0.6, angular_acceleration: [1, 2, 3]}}"},
       {"quaternion_pose",
        "{noise: {kind: discrete, linear_acceleration: 0.6, angular_acceleration: [1, 2, 3]}}"},

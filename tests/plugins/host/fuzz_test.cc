@@ -52,11 +52,11 @@ class FuzzTest : public HostTest {
   std::mt19937_64 engine_{20260101};
 };
 
-TEST_F(FuzzTest, TheFingerprintReaderRefusesOrReads) {
+TEST_F(FuzzTest, TheBuildTagReaderRefusesOrReads) {
   int read = 0;
   for (int i = 0; i < 3000; ++i) {
     try {
-      static_cast<void>(ReadFingerprint(Write(Damaged())));
+      static_cast<void>(ReadBuildTag(Write(Damaged())));
       ++read;
     } catch (const Error& e) {
       EXPECT_EQ(e.code(), ExitCode::kPlugin);

@@ -141,10 +141,10 @@ TEST_F(HostTest, AnExecutableIsNoPlugin) {
   ExpectRefused(file, {"another kind of processor"});
 }
 
-// ---- 52 to 55: fingerprint and load -------------------------------------------------------------
+// ---- 52 to 55: build tag and load -------------------------------------------------------------
 
-TEST_F(HostTest, AFileWithoutFingerprintIsRefused) {
-  ExpectRefused(Built("no_fingerprint"), {"has no alidade fingerprint"});
+TEST_F(HostTest, AFileWithoutBuildTagIsRefused) {
+  ExpectRefused(Built("no_build_tag"), {"has no alidade build tag"});
 }
 
 // FAULTS 53
@@ -181,7 +181,8 @@ TEST_F(HostTest, ABadTableIsRefused) {
       {"NO_CREATE", "entry 1 of its table cannot be created"},
       {"NAME_TWICE", "names 'probe' twice"},
       {"NO_ENTRY_SYMBOL", "does not export alidade_plugin"},
-      {"LANDMARK_FORM", "entry 1 of its table is a landmark form, which this version"},
+      {"LANDMARK_REPRESENTATION",
+       "entry 1 of its table is a landmark representation, which this version"},
       {"UNKNOWN_KIND", "entry 1 of its table is of unknown kind 9"},
       {"EMPTY", "table has 0 entries"}};
   for (const auto& [fault, words] : faults) {
@@ -272,13 +273,14 @@ TEST_F(HostTest, AParameterDeclaredAgainstTheRulesIsRefused) {
 TEST_F(HostTest, AllBadParametersAreToldAtOnce) {
   const PluginHost host;
   const Config config =
-      Parse("sensors:\n  s: {model: stereo_disparity, focal_px: -1, near_m: [1]}");
+      Parse("sensors:\n  s: {model: stereo_disparity, focal_px: -1, min_range_m: [1]}");
   const Node entry = config.root().At("sensors").At("s");
-  ExpectError(ExitCode::kBadConfig,
-              {"sensors.s.baseline_m: missing; model 'stereo_disparity' needs it (m, > 0: stereo "
-               "baseline)",
-               "sensors.s.sigma_px: missing", "sensors.s.focal_px", "'-1'", "sensors.s.near_m"},
-              [&] { host.CreateSensor("stereo_disparity", entry); });
+  ExpectError(
+      ExitCode::kBadConfig,
+      {"sensors.s.baseline_m: missing; model 'stereo_disparity' needs it (m, > 0: stereo "
+       "baseline)",
+       "sensors.s.sigma_px: missing", "sensors.s.focal_px", "'-1'", "sensors.s.min_range_m"},
+      [&] { host.CreateSensor("stereo_disparity", entry); });
 }
 
 TEST_F(HostTest, ADottedKeyWalksNestedMaps) {
@@ -310,12 +312,13 @@ TEST_F(HostTest, TheSchemaTellsWhatEachChoiceReads) {
     return host.Schema(*std::find_if(host.entries().begin(), host.entries().end(), has_name));
   };
   const std::vector<ParamInfo> scale = schema("scale_2d");
-  EXPECT_EQ(Param(scale, "noise").type, "choice");
-  EXPECT_EQ(Param(scale, "noise").choices, (std::vector<std::string>{"propagated", "fixed"}));
-  EXPECT_EQ(Param(scale, "noise").fallback, "propagated");
-  EXPECT_EQ(Param(scale, "noise").when, "");
-  EXPECT_EQ(Param(scale, "variance").when, "noise = fixed");
-  EXPECT_EQ(Param(scale, "sigma_px").when, "noise = propagated");
+  EXPECT_EQ(Param(scale, "noise_model").type, "choice");
+  EXPECT_EQ(Param(scale, "noise_model").choices,
+            (std::vector<std::string>{"propagated", "constant"}));
+  EXPECT_EQ(Param(scale, "noise_model").fallback, "propagated");
+  EXPECT_EQ(Param(scale, "noise_model").when, "");
+  EXPECT_EQ(Param(scale, "sigma_inverse_scale").when, "noise_model = constant");
+  EXPECT_EQ(Param(scale, "sigma_px").when, "noise_model = propagated");
   EXPECT_EQ(Param(scale, "sigma_px").range, "> 0");
   EXPECT_EQ(Param(scale, "sigma_px").unit, "px");
   const std::vector<ParamInfo> motion = schema("constant_velocity");

@@ -22,9 +22,9 @@ class UnoptimisedTest : public HostTest {
   PluginHost host_{{Built("driven_unoptimised")}};
 };
 
-TEST_F(UnoptimisedTest, TheFingerprintKnows) {
-  EXPECT_NE(ReadFingerprint(Built("driven_unoptimised")).flags & ALIDADE_BUILT_UNOPTIMISED, 0u);
-  EXPECT_EQ(ReadFingerprint(Built("matrix_baseline")).flags & ALIDADE_BUILT_UNOPTIMISED, 0u);
+TEST_F(UnoptimisedTest, TheBuildTagKnows) {
+  EXPECT_NE(ReadBuildTag(Built("driven_unoptimised")).flags & ALIDADE_BUILT_UNOPTIMISED, 0u);
+  EXPECT_EQ(ReadBuildTag(Built("matrix_baseline")).flags & ALIDADE_BUILT_UNOPTIMISED, 0u);
   std::set<std::string> files;
   const PluginHost host({Built("driven_unoptimised"), Built("matrix_baseline")});
   for (const PluginEntry& entry : host.entries()) {

@@ -28,7 +28,7 @@ class Entries : public RunObserver {
 TEST(AcceptedBy, LandmarksEnterAtTheSameObservation) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml");
   for (const auto& [key, value] :
-       std::map<std::string, std::string>{{"source.frames", "12"},
+       std::map<std::string, std::string>{{"source.max_frames", "12"},
                                           {"landmarks.min_observations", "3"},
                                           {"estimators.follower.type", "ekf"},
                                           {"estimators.follower.use.accepted_by", "ekf"}}) {

@@ -120,7 +120,7 @@ Vector3d Rotated(const std::vector<double>& q, const Vector3d& x) {
 }
 
 TEST(ScenePath, LooksAtItsTargetWithTheHorizonLevel) {
-  const auto frames = SceneFrames("frames: 31, " + kPoints + ", " + kSweep);
+  const auto frames = SceneFrames("max_frames: 31, " + kPoints + ", " + kSweep);
   const std::vector<double> q = frames.front().truth[1];
   // From (-0.5, 0, 0) to (0, 0, 4).
   EXPECT_LT((Rotated(q, Vector3d::UnitZ()) - Vector3d(0.5, 0, 4).normalized()).norm(), 1e-14);
@@ -139,8 +139,8 @@ TEST(ScenePath, EveryFormOfAnOrientationSaysTheSame) {
   // 90 degrees about y: ahead is x.
   const auto ahead = [](const std::string& orientation) {
     const auto frames =
-        SceneFrames("frames: 1, " + kPoints + ", trajectory: {keyframes: [{position: [1, 2, 3], " +
-                    orientation + "}]}");
+        SceneFrames("max_frames: 1, " + kPoints +
+                    ", trajectory: {keyframes: [{position: [1, 2, 3], " + orientation + "}]}");
     EXPECT_EQ(frames.at(0).truth[0], (std::vector<double>{1, 2, 3}));
     return Rotated(frames[0].truth[1], Vector3d::UnitZ());
   };
@@ -159,9 +159,9 @@ TEST(ScenePath, VelocitiesLeadFromFrameToFrameAsQuaternionPoseHasIt) {
         std::string("trajectory: {keyframes: [{position: [0, 0, 0], euler_deg: [0, 0, 0]}, "
                     "{position: [1, 0, 1], euler_deg: [10, 20, 30]}, "
                     "{position: [0, 1, 1], euler_deg: [40, 0, -30]}]}"),
-        std::string("trajectory: {model: {linear_acceleration: 3, angular_acceleration: "
+        std::string("trajectory: {random: {linear_acceleration: 3, angular_acceleration: "
                     "[1, 2, 3], velocity: [0.4, 0, 0], angular_velocity: [0, 1, 0]}}")}) {
-    const auto frames = SceneFrames("frames: 50, rate_hz: 20, " + kPoints + ", " + path);
+    const auto frames = SceneFrames("max_frames: 50, rate_hz: 20, " + kPoints + ", " + path);
     for (std::size_t k = 1; k < frames.size(); ++k) {
       const auto &before = frames[k - 1].truth, &now = frames[k].truth;
       for (std::size_t i = 0; i < 3; ++i) {
@@ -178,8 +178,8 @@ TEST(ScenePath, VelocitiesLeadFromFrameToFrameAsQuaternionPoseHasIt) {
 
 TEST(ScenePath, DrawnFromTheModelHasItsAccelerations) {
   // Second differences of 5000 steps: standard deviations to 1 / sqrt(2 * 5000) = 1 %; 4 sigma.
-  const auto frames = SceneFrames("frames: 5001, rate_hz: 10, " + kPoints +
-                                  ", trajectory: {model: {linear_acceleration: [0.3, 0.6, 0], "
+  const auto frames = SceneFrames("max_frames: 5001, rate_hz: 10, " + kPoints +
+                                  ", trajectory: {random: {linear_acceleration: [0.3, 0.6, 0], "
                                   "angular_acceleration: 0.05}}");
   double linear[3] = {}, angular[3] = {};
   for (std::size_t k = 1; k < frames.size(); ++k) {
@@ -196,18 +196,18 @@ TEST(ScenePath, DrawnFromTheModelHasItsAccelerations) {
 
 TEST(ScenePath, OdometryLeadsAlongTheTruth) {
   const auto frames =
-      SceneFrames("frames: 100, odometry: true, " + kPoints +
-                  ", trajectory: {model: {linear_acceleration: 3, angular_acceleration: 3}}");
+      SceneFrames("max_frames: 100, simulate_odometry: true, " + kPoints +
+                  ", trajectory: {random: {linear_acceleration: 3, angular_acceleration: 3}}");
   const OdometryPose model(NoiseKind::kDiscrete, {}, {});
   std::vector<double> r = frames[0].truth[0], q = frames[0].truth[1];
   const double still[6] = {};
   for (std::size_t k = 0; k + 1 < frames.size(); ++k) {
     const Measurement& odometry = frames[k].measurements.back();
     ASSERT_EQ(odometry.stream, 1);
-    std::vector<double> r1(3), q1(4), owned(8);
+    std::vector<double> r1(3), q1(4), parameters(8);
     const double nothing[3] = {}, no_turn[4] = {1, 0, 0, 0};
     model.Step(r.data(), q.data(), nothing, no_turn, nothing, odometry.values.data(), still,
-               1.0 / 30.0, r1.data(), q1.data(), &owned[0], &owned[3], &owned[7]);
+               1.0 / 30.0, r1.data(), q1.data(), &parameters[0], &parameters[3], &parameters[7]);
     r = r1;
     q = q1;
   }

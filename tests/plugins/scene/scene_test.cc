@@ -25,7 +25,7 @@ std::set<std::int64_t> Ids(const Frame& frame, int stream = 0) {
 TEST(Scene, SeesAPointWhereThePinholePutsIt) {
   // 1 m right, 0.5 m down, 2 m ahead: u = 320 + 525 / 2, v = 240 + 525 / 4.
   const auto frames =
-      SceneFrames("frames: 2, noise_px: 0, points: {list: [[1, 0.5, 2]]}, " + kStill);
+      SceneFrames("max_frames: 2, sigma_px: 0, points: {list: [[1, 0.5, 2]]}, " + kStill);
   ASSERT_EQ(frames.size(), 2u);
   EXPECT_EQ(frames[1].stamp, 33333333);
   ASSERT_EQ(frames[0].measurements.size(), 1u);
@@ -38,7 +38,7 @@ TEST(Scene, SeesAPointWhereThePinholePutsIt) {
 TEST(Scene, SeesNothingBehindOrBesideTheImage) {
   // Of the six only 1 and 4 are ahead and on the image: half the width is 320.5 px, 1.221 m at 2 m.
   const auto frames = SceneFrames(
-      "frames: 1, noise_px: 0, points: {list: [[0, 0, -2], [0, 0, 2], [1.23, 0, 2], [0, 0, 0], "
+      "max_frames: 1, sigma_px: 0, points: {list: [[0, 0, -2], [0, 0, 2], [1.23, 0, 2], [0, 0, 0], "
       "[-1.21, 0, 2], [0, 0.93, 2]]}, " +
       kStill);
   EXPECT_EQ(Ids(frames[0]), (std::set<std::int64_t>{1, 4}));
@@ -46,7 +46,7 @@ TEST(Scene, SeesNothingBehindOrBesideTheImage) {
 
 TEST(Scene, DistortsAsTheCameraDoes) {
   const auto frames = SceneFrames(
-      "frames: 1, noise_px: 0, points: {list: [[0.4, 0.2, 2]]}, " + kStill, 1,
+      "max_frames: 1, sigma_px: 0, points: {list: [[0.4, 0.2, 2]]}, " + kStill, 1,
       "camera: {model: radtan, width: 640, height: 480, fx: 525, fy: 525, cx: 320, cy: 240, "
       "k1: -0.2, k2: 0.05, p1: 0.001, p2: 0.002}\n");
   // x = 0.2, y = 0.1, q = 0.05: s = 1 - 0.01 + 0.000125 = 0.990125.
@@ -57,23 +57,23 @@ TEST(Scene, DistortsAsTheCameraDoes) {
 }
 
 TEST(Scene, MeasuresStereoAndDepthToo) {
-  const std::string point = "frames: 1, noise_px: 0, points: {list: [[1, 0.5, 2]]}, " + kStill;
-  const auto stereo = SceneFrames("measures: stereo, baseline_m: 0.1, " + point);
+  const std::string point = "max_frames: 1, sigma_px: 0, points: {list: [[1, 0.5, 2]]}, " + kStill;
+  const auto stereo = SceneFrames("measures: stereo, camera: {baseline_m: 0.1}, " + point);
   EXPECT_EQ(stereo[0].measurements[0].values,
             (std::vector<double>{582.5, 371.25, 582.5 - 525 * 0.1 / 2, 371.25}));
-  const auto depth = SceneFrames("measures: depth, depth_sigma_m: 0, " + point);
+  const auto depth = SceneFrames("measures: depth, sigma_depth_m: 0, " + point);
   EXPECT_EQ(depth[0].measurements[0].values, (std::vector<double>{582.5, 371.25, 2.0}));
 }
 
 TEST(Scene, NoiseIsThatOfTheConfig) {
   // 500 points seen 20 times: 10000 samples of each, their variance to 1.4 %; 4 sigma.
   const std::string keys =
-      "frames: 20, points: {box: {min: [-1, -0.8, 2], max: [1, 0.8, 3]}, count: 500}, "
-      "measures: depth, depth_sigma_m: 0.01, trajectory: {keyframes: [{position: [0, 0, -1], "
+      "max_frames: 20, points: {box: {min: [-1, -0.8, 2], max: [1, 0.8, 3]}, count: 500}, "
+      "measures: depth, sigma_depth_m: 0.01, trajectory: {keyframes: [{position: [0, 0, -1], "
       "euler_deg: [0, 0, 0]}]}";
-  const auto exact = SceneFrames("noise_px: 0, " + keys);
-  const auto noisy = SceneFrames("noise_px: 2, " + keys);
-  const MadeScene made = MakeScene("noise_px: 2, " + keys);
+  const auto exact = SceneFrames("sigma_px: 0, " + keys);
+  const auto noisy = SceneFrames("sigma_px: 2, " + keys);
+  const MadeScene made = MakeScene("sigma_px: 2, " + keys);
   double sums[3] = {};
   int count = 0;
   for (std::size_t k = 0; k < exact.size(); ++k) {
@@ -93,8 +93,8 @@ TEST(Scene, NoiseIsThatOfTheConfig) {
 
 TEST(Scene, SameSeedSameBytesAndOthersDiffer) {
   const std::string keys =
-      "frames: 10, odometry: true, odometry_noise: {linear: 0.1, angular: 0.1}, "
-      "trajectory: {model: {linear_acceleration: 1, angular_acceleration: 1}}, " +
+      "max_frames: 10, simulate_odometry: true, odometry_noise: {linear: 0.1, angular: 0.1}, "
+      "trajectory: {random: {linear_acceleration: 1, angular_acceleration: 1}}, " +
       kPoints;
   const auto values = [&](std::uint64_t seed) {
     std::vector<double> all;
@@ -111,11 +111,11 @@ TEST(Scene, SameSeedSameBytesAndOthersDiffer) {
 }
 
 TEST(Scene, TellsTheDepthOfTheFirstObservationOfTheKnown) {
-  const auto frames =
-      SceneFrames("frames: 5, noise_px: 0.5, known: {count: 4}, " + kPoints + ", " + kSweep);
+  const auto frames = SceneFrames("max_frames: 5, sigma_px: 0.5, known_points: {count: 4}, " +
+                                  kPoints + ", " + kSweep);
   const std::set<std::int64_t> known = Ids(frames[0], 1);
   EXPECT_EQ(known.size(), 4u);
-  const MadeScene made = MakeScene("frames: 5, noise_px: 0.5, " + kPoints + ", " + kSweep);
+  const MadeScene made = MakeScene("max_frames: 5, sigma_px: 0.5, " + kPoints + ", " + kSweep);
   for (const Measurement& m : frames[0].measurements) {
     if (m.stream == 0) {
       EXPECT_FALSE(known.contains(m.landmark));
@@ -139,13 +139,15 @@ TEST(Scene, TellsTheDepthOfTheFirstObservationOfTheKnown) {
 TEST(Scene, OfTooManyPointsKeepsThoseItSaw) {
   // Point 0 comes into view from the right when two others are being seen already.
   const auto frames = SceneFrames(
-      "frames: 30, noise_px: 0, max_features_per_frame: 2, points: {list: [[3, 0, 4], [0, 0, 4], "
+      "max_frames: 30, sigma_px: 0, max_features_per_frame: 2, points: {list: [[3, 0, 4], [0, 0, "
+      "4], "
       "[0.5, 0, 4]]}, trajectory: {keyframes: [{position: [0, 0, 0], euler_deg: [0, 0, 0]}, "
       "{position: [1, 0, 0], euler_deg: [0, 0, 0]}]}");
   for (const Frame& frame : frames) EXPECT_EQ(Ids(frame), (std::set<std::int64_t>{1, 2}));
   // The next to go makes room.
   const auto all = SceneFrames(
-      "frames: 30, noise_px: 0, max_features_per_frame: 2, points: {list: [[3, 0, 4], [-2, 0, 4], "
+      "max_frames: 30, sigma_px: 0, max_features_per_frame: 2, points: {list: [[3, 0, 4], [-2, 0, "
+      "4], "
       "[0.5, 0, 4]]}, trajectory: {keyframes: [{position: [0, 0, 0], euler_deg: [0, 0, 0]}, "
       "{position: [1, 0, 0], euler_deg: [0, 0, 0]}]}");
   EXPECT_EQ(Ids(all.front()), (std::set<std::int64_t>{1, 2}));
@@ -154,7 +156,7 @@ TEST(Scene, OfTooManyPointsKeepsThoseItSaw) {
 
 TEST(Scene, PointsLieWhereTheConfigPutsThem) {
   const auto points = [](const std::string& keys) {
-    const MadeScene made = MakeScene("frames: 1, " + kStill + ", points: {" + keys + "}");
+    const MadeScene made = MakeScene("max_frames: 1, " + kStill + ", points: {" + keys + "}");
     std::vector<Vector3d> all;
     for (std::int64_t id = 0; const auto p = made.scene->TrueLandmark(id); ++id) {
       all.emplace_back(p->data());
@@ -188,7 +190,7 @@ TEST(Scene, PointsLieWhereTheConfigPutsThem) {
 }
 
 TEST(Scene, NamesTruthAsTheStateIsNamed) {
-  const MadeScene made = MakeScene("frames: 3, state: robot, " + kPoints + ", " + kStill);
+  const MadeScene made = MakeScene("max_frames: 3, state_entry: robot, " + kPoints + ", " + kStill);
   EXPECT_EQ(made.scene->truths()[0].name, "robot.position");
   EXPECT_EQ(made.scene->truths()[3].name, "robot.angular_velocity");
   EXPECT_EQ(made.scene->size(), 3);
@@ -240,15 +242,16 @@ TEST(Scene, RefusesWhatMakesNoScene) {
               "[0, 0, 0]}, {t_s: 0, position: [0, 0, 0], euler_deg: [0, 0, 0]}]}",
           "keyframes[1].t_s: not after the item before");
   refused(kPoints +
-              ", frames: 31, trajectory: {keyframes: [{t_s: 0, position: [0, 0, 0], "
+              ", max_frames: 31, trajectory: {keyframes: [{t_s: 0, position: [0, 0, 0], "
               "euler_deg: [0, 0, 0]}, {t_s: 0.5, position: [0, 0, 0], euler_deg: "
               "[0, 0, 0]}]}",
           "keyframes[1].t_s: before the last frame; expected at least 1.0");
-  refused(kPoints + ", trajectory: {model: {linear_acceleration: -1, angular_acceleration: 1}}",
-          "trajectory.model.linear_acceleration: negative");
-  refused(kPoints + ", " + kStill + ", noise_px: -1", "source.noise_px: '-1'");
-  refused(kPoints + ", " + kStill + ", measures: depth, depth_sigma_m: 0.1, known: {count: 3}",
-          "source.known");
+  refused(kPoints + ", trajectory: {random: {linear_acceleration: -1, angular_acceleration: 1}}",
+          "trajectory.random.linear_acceleration: negative");
+  refused(kPoints + ", " + kStill + ", sigma_px: -1", "source.sigma_px: '-1'");
+  refused(
+      kPoints + ", " + kStill + ", measures: depth, sigma_depth_m: 0.1, known_points: {count: 3}",
+      "source.known");
 }
 
 }  // namespace

@@ -53,7 +53,7 @@ TEST_F(TracksTest, Fault30Overflow) {
 TEST_F(TracksTest, Fault30AFrameBeyondAllTimes) {
   ExpectBadData("99999999999999,3,0,1\n99999999999999,3,1,1\n",
                 "DIR/tracks.csv:1: frame 99999999999999 is beyond 292 years; expected frames that "
-                "count from 0, at frame_rate_hz");
+                "count from 0, at rate_hz");
 }
 
 TEST_F(TracksTest, Fault31NegativeFrame) {
@@ -158,7 +158,7 @@ TEST_F(TracksTest, AFrameWithoutATime) {
   fs::remove(folder_ / "timestamps.csv");
   ExpectError(ExitCode::kBadConfig,
               "run.yaml:1:16 source.path: no timestamps.csv beside the tracks; expected that file, "
-              "or 'frame_rate_hz'",
+              "or 'rate_hz'",
               [&] { Open("measures: pixel"); });
 }
 

@@ -27,7 +27,7 @@ class TracksTest : public ::testing::Test {
   fs::path File() const { return folder_ / "tracks.csv"; }
 
   /// The source of `keys`, those of `source` in braces, of the folder.
-  std::unique_ptr<Tracks> Open(const std::string& keys = "frame_rate_hz: 10",
+  std::unique_ptr<Tracks> Open(const std::string& keys = "rate_hz: 10",
                                const std::string& path = "tracks.csv") {
     config_ = std::make_unique<Config>(
         Config::FromText("source: {path: \"" + path + "\", " + keys + "}", "run.yaml"));
@@ -39,7 +39,7 @@ class TracksTest : public ::testing::Test {
     entry.RejectUnread();
     return source;
   }
-  std::vector<Frame> Frames(const std::string& keys = "frame_rate_hz: 10",
+  std::vector<Frame> Frames(const std::string& keys = "rate_hz: 10",
                             const std::string& path = "tracks.csv") {
     const auto source = Open(keys, path);
     std::vector<Frame> frames;
@@ -65,7 +65,7 @@ class TracksTest : public ::testing::Test {
     }
   }
   void ExpectBadData(const std::string& text, const std::string& message,
-                     const std::string& keys = "frame_rate_hz: 10") {
+                     const std::string& keys = "rate_hz: 10") {
     Write("tracks.csv", text);
     ExpectError(ExitCode::kBadData, message, [&] { Frames(keys); });
   }

@@ -44,7 +44,7 @@ TEST_F(TracksTest, MeasuresWhatTheConfigSays) {
   Write("tracks.csv", "0,1,0,10\n0,1,1,11\n0,1,2,12\n0,1,3,13\n0,2,0,20\n0,2,1,21\n");
   const auto values = [&](const std::string& measures) {
     std::vector<Values> all;
-    const auto frames = Frames("frame_rate_hz: 10, measures: " + measures);
+    const auto frames = Frames("rate_hz: 10, measures: " + measures);
     for (const Measurement& m : frames.at(0).measurements) {
       all.push_back(m.values);
     }
@@ -53,7 +53,7 @@ TEST_F(TracksTest, MeasuresWhatTheConfigSays) {
   EXPECT_EQ(values("pixel"), (std::vector<Values>{{10, 11}, {20, 21}}));
   EXPECT_EQ(values("stereo"), (std::vector<Values>{{10, 11, 12, 13}}));
   EXPECT_EQ(values("depth"), (std::vector<Values>{{10, 11, 12}}));
-  EXPECT_EQ(Open("frame_rate_hz: 10, measures: stereo")->streams()[0].size, 4);
+  EXPECT_EQ(Open("rate_hz: 10, measures: stereo")->streams()[0].size, 4);
 }
 
 TEST_F(TracksTest, MayBeginLaterAndWithoutTheFeaturesOfBefore) {
@@ -62,24 +62,24 @@ TEST_F(TracksTest, MayBeginLaterAndWithoutTheFeaturesOfBefore) {
         "3,3,0,6\n3,3,1,6\n");
   const auto ids = [&](const std::string& keys) {
     std::vector<std::pair<Stamp, std::vector<std::int64_t>>> all;
-    for (const Frame& frame : Frames("frame_rate_hz: 10" + keys)) {
+    for (const Frame& frame : Frames("rate_hz: 10" + keys)) {
       all.emplace_back(frame.stamp / 100'000'000, std::vector<std::int64_t>());
       for (const Measurement& m : frame.measurements) all.back().second.push_back(m.landmark);
     }
     return all;
   };
   using Ids = decltype(ids(""));
-  EXPECT_EQ(ids(", first_frame: 2"), (Ids{{2, {1, 2}}, {3, {3}}}));
+  EXPECT_EQ(ids(", start_frame: 2"), (Ids{{2, {1, 2}}, {3, {3}}}));
   EXPECT_EQ(ids(", features_from: 1"), (Ids{{0, {}}, {1, {2}}, {2, {2}}, {3, {3}}}));
-  EXPECT_EQ(ids(", first_frame: 1, features_from: 2, frames: 2"), (Ids{{1, {}}, {2, {}}}));
-  EXPECT_EQ(ids(", first_frame: 4"), Ids{});
+  EXPECT_EQ(ids(", start_frame: 1, features_from: 2, max_frames: 2"), (Ids{{1, {}}, {2, {}}}));
+  EXPECT_EQ(ids(", start_frame: 4"), Ids{});
 }
 
 // The camera of frame 1 stands at (1, 2, 3), turned by 90 degrees about z: its x is the file's y.
 TEST_F(TracksTest, TheWorldMayBeTheFirstCamera) {
   Write("tracks.csv", "0,1,0,1\n0,1,1,1\n1,1,0,2\n1,1,1,2\n2,1,0,4\n2,1,1,4\n");
   Write("truth.tum", "0.1 1 2 3 0 0 0.7071067811865476 0.7071067811865476\n0.2 1 7 3.5 0 0 1 0\n");
-  const auto frames = Frames("frame_rate_hz: 10, first_frame: 1, world: first_camera");
+  const auto frames = Frames("rate_hz: 10, start_frame: 1, world: first_camera");
   ASSERT_EQ(frames.size(), 2u);
   const Values position{5, 0, 0.5}, turned{std::sqrt(0.5), 0, 0, std::sqrt(0.5)}, none{1, 0, 0, 0};
   for (std::size_t i = 0; i < 3; ++i) {
@@ -93,7 +93,7 @@ TEST_F(TracksTest, TheWorldMayBeTheFirstCamera) {
   ExpectError(ExitCode::kBadData,
               "DIR/tracks.csv:3: the world is to be the camera of frame 0, which has no true "
               "pose; expected one within truth_tolerance_s of it, or world: file",
-              [&] { Frames("frame_rate_hz: 10, world: first_camera"); });
+              [&] { Frames("rate_hz: 10, world: first_camera"); });
 }
 
 TEST_F(TracksTest, TimestampsSayWhatFramesThereAre) {
@@ -105,9 +105,9 @@ TEST_F(TracksTest, TimestampsSayWhatFramesThereAre) {
   EXPECT_EQ(frames[1].measurements.size(), 1u);
   EXPECT_TRUE(frames[2].measurements.empty());
   EXPECT_EQ(frames[1].stamp, 600'000'000);
-  EXPECT_EQ(Frames("frames: 2").size(), 2u);
-  EXPECT_EQ(Frames("frames: 2", ".").size(), 2u) << "a folder stands for its tracks.csv";
-  EXPECT_EQ(Frames("frame_rate_hz: 4")[0].stamp, 250'000'000) << "a rate comes first";
+  EXPECT_EQ(Frames("max_frames: 2").size(), 2u);
+  EXPECT_EQ(Frames("max_frames: 2", ".").size(), 2u) << "a folder stands for its tracks.csv";
+  EXPECT_EQ(Frames("rate_hz: 4")[0].stamp, 250'000'000) << "a rate comes first";
 }
 
 TEST_F(TracksTest, OdometryIsHeldOrTheMeanOfAStep) {
@@ -138,11 +138,11 @@ TEST_F(TracksTest, TruthIsTakenAtTheTimeOfAFrame) {
   Write("groundtruth.tum",
         "# t x y z qx qy qz qw\n-1 9 9 9 0 0 0 1\n0.0005 1 2 3  0.5 0.5 0.5 0.5005\n"
         "1.002 4 5 6 0 0 0 1\n2 7 8 9 0 0 0 -1\n");
-  const auto source = Open("state: robot");
+  const auto source = Open("state_entry: robot");
   ASSERT_EQ(source->truths().size(), 2u);
   EXPECT_EQ(source->truths()[0].name, "robot.position");
   EXPECT_EQ(source->truths()[1].name, "robot.orientation");
-  const auto frames = Frames("state: robot");
+  const auto frames = Frames("state_entry: robot");
   EXPECT_EQ(frames[0].truth.at(0), (Values{1, 2, 3}));
   EXPECT_EQ(frames[0].truth[1], (Values{0.5005, 0.5, 0.5, 0.5})) << "w first";
   EXPECT_TRUE(frames[1].truth[0].empty()) << "2 ms off";
@@ -155,7 +155,7 @@ TEST_F(TracksTest, TruthIsThePoseNearestInTime) {
   Write("truth.tum",
         "-0.02 1 0 0 0 0 0 1\n0.01 2 0 0 0 0 0 1\n0.08 3 0 0 0 0 0 1\n0.1 4 0 0 0 0 0 1\n"
         "0.11 5 0 0 0 0 0 1\n0.17 6 0 0 0 0 0 1\n");
-  const std::vector<Frame> frames = Frames("frame_rate_hz: 10, truth_tolerance_s: 0.03");
+  const std::vector<Frame> frames = Frames("rate_hz: 10, truth_tolerance_s: 0.03");
   ASSERT_EQ(frames.size(), 3u);
   EXPECT_EQ(frames[0].truth[0].at(0), 2.0);
   EXPECT_EQ(frames[1].truth[0].at(0), 4.0);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Comparisons of runs made by hand: which estimator is held against which, and where data differ.
+// Comparisons of runs made by hand: which estimator is compared with which, and where data differ.
 #include "alidade/compare/candidates.h"
 
 #include <gtest/gtest.h>
@@ -71,7 +71,7 @@ TEST(CompareRuns, HoldsAnEstimatorAgainstTheBatchOfItsSensors) {
   EXPECT_EQ(Find(comparison, "stereo").values.at("ratio.final_error:p.x").mean, 2.0);
   EXPECT_EQ(Find(comparison, "scale").final_reference, "");
   EXPECT_FALSE(Find(comparison, "scale").values.contains("final_difference:p.x"));
-  EXPECT_EQ(comparison.notes, (std::vector<std::string>{"'scale' is held against nothing: no "
+  EXPECT_EQ(comparison.notes, (std::vector<std::string>{"'scale' is compared with nothing: no "
                                                         "batch has its sensors"}));
   const std::string text = CompareReport(comparison, TableStyle::kText);
   EXPECT_NE(text.find("ratio and difference: to the reference of each"), text.npos) << text;
@@ -100,7 +100,7 @@ TEST(CompareRuns, ABatchThatFailedGivesWayToOneThatDidNot) {
     const Comparison comparison = CompareRuns({RunOf(entries)}, {});
     EXPECT_EQ(comparison.withheld, "");
     EXPECT_EQ(Find(comparison, "ekf").final_reference, "batch");
-    EXPECT_EQ(comparison.gap[0].to, "batch");
+    EXPECT_EQ(comparison.decomposition[0].to, "batch");
   }
   const Comparison alone = CompareRuns({RunOf({failed, ekf})}, {});
   EXPECT_EQ(alone.withheld,
@@ -174,7 +174,7 @@ ComparedEntry WithMap(ComparedEntry entry, double error) {
 }
 
 // With landmarks no batch solves at every frame, but at the last one that of all data is that of
-// the data so far.
+// the data up to it.
 TEST(CompareRuns, WithoutABatchSoFarLinearisationIsToldFromTheLastFrame) {
   ComparedEntry ekf = WithMap(Entry("ekf", "ekf", false, 2.0), 0.5);
   ekf.series.values = {9.0, 9.0, 2.0};
@@ -182,7 +182,7 @@ TEST(CompareRuns, WithoutABatchSoFarLinearisationIsToldFromTheLastFrame) {
   ComparedEntry batch = WithMap(Entry("batch", "ceres_batch", true, 0.5), 0.125);
   batch.series.covariances = {4.0, 4.0, 0.25};
   const Comparison comparison = CompareRuns({RunOf({ekf, batch})}, {});
-  const GapStep& step = comparison.gap[0];
+  const DecompositionStep& step = comparison.decomposition[0];
   EXPECT_TRUE(step.at_end);
   EXPECT_EQ(step.withheld, "");
   EXPECT_EQ(step.to, "batch");
@@ -205,10 +205,11 @@ TEST(CompareRuns, TheLastFrameIsThatOfTheBatchOfWhatTheFilterAccepted) {
   accepted.facts.accepted_by = "ekf";
   const ComparedEntry ekf = Entry("ekf", "ekf", false, 2.0);
   const ComparedEntry batch = Entry("batch", "ceres_batch", true, 0.5);
-  EXPECT_EQ(CompareRuns({RunOf({ekf, batch, accepted})}, {}).gap[0].to, "accepted");
-  ComparedEntry so_far = Entry("so_far", "ceres_batch", false, 1.5);
-  const GapStep step = CompareRuns({RunOf({ekf, batch, accepted, so_far})}, {}).gap[0];
-  EXPECT_EQ(step.to, "so_far");
+  EXPECT_EQ(CompareRuns({RunOf({ekf, batch, accepted})}, {}).decomposition[0].to, "accepted");
+  ComparedEntry full_information = Entry("full_information", "ceres_batch", false, 1.5);
+  const DecompositionStep step =
+      CompareRuns({RunOf({ekf, batch, accepted, full_information})}, {}).decomposition[0];
+  EXPECT_EQ(step.to, "full_information");
   EXPECT_FALSE(step.at_end);
 }
 
@@ -249,8 +250,9 @@ TEST(CheckSameData, SaysWhereARunHasLessAndWhereTheFilesDoNotTell) {
   EXPECT_NE(Refusal(rows + "0.2,a,,1\n", rows)
                 .find("first at t = 0.2 s of the one, its end of the other"),
             std::string::npos);
-  EXPECT_NE(Refusal(rows, rows).find("their own covariances or the stamps of empty frames differ"),
-            std::string::npos);
+  EXPECT_NE(
+      Refusal(rows, rows).find("their own covariances or the timestamps of empty frames differ"),
+      std::string::npos);
 }
 
 }  // namespace

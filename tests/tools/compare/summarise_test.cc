@@ -23,11 +23,11 @@ Comparison OneRun(double error, bool filter_diverged = false) {
     filter.values["ratio.rmse:x"] = filter.values["rmse:x"];
   }
   one.estimators[1].name = "batch";
-  GapStep& step = one.gap.emplace_back();
-  step.kind = GapKind::kLostData;
+  DecompositionStep& step = one.decomposition.emplace_back();
+  step.kind = DecompositionKind::kRejected;
   step.from = "accepted";
   step.to = "batch";
-  step.values["lost"] = {error, error, error, error};
+  step.values["rejected"] = {error, error, error, error};
   return one;
 }
 
@@ -44,7 +44,7 @@ TEST(Summarise, LeavesOutTheRunsInWhichTheFilterDiverged) {
   EXPECT_NEAR(filter.values.at("rmse:x").p50, 1.5, 1e-15);
   EXPECT_EQ(filter.values.at("ratio.rmse:x").mean, 1.5);
   EXPECT_EQ(all.estimators[1].used, 3);
-  EXPECT_EQ(all.gap[0].values.at("lost").mean, 1.5);
+  EXPECT_EQ(all.decomposition[0].values.at("rejected").mean, 1.5);
 }
 
 // That an estimator of one of them failed is told of it.
@@ -65,8 +65,8 @@ TEST(Summarise, SaysInHowManyRunsANoteHolds) {
 
 TEST(Summarise, TakesAStepBetweenTheSameTwoAlone) {
   Comparison other = OneRun(7.0);
-  other.gap[0].to = "another";
-  EXPECT_EQ(Summarise({OneRun(1.0), other}).gap[0].values.at("lost").mean, 1.0);
+  other.decomposition[0].to = "another";
+  EXPECT_EQ(Summarise({OneRun(1.0), other}).decomposition[0].values.at("rejected").mean, 1.0);
 }
 
 TEST(Summarise, LeavesOutWhatIsNoNumber) {

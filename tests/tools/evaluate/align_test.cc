@@ -105,7 +105,7 @@ TEST(Align, RefusesWhatDeterminesNoScale) {
         EXPECT_EQ(error.code(), ExitCode::kBadData);
         EXPECT_STREQ(error.what(),
                      "curve.tum: no scale: its positions have nothing in common with those of "
-                     "curve.tum; expected poses of the same path, or --align");
+                     "curve.tum; expected poses of the same trajectory, or --align");
       }
     }
     const Evaluation e = Evaluate(reference, estimate, {});
@@ -162,7 +162,7 @@ TEST(Associate, TheOffsetIsAddedToTheEstimate) {
     EXPECT_STREQ(error.what(),
                  "curve.tum: no pose within 0.001 s of one of curve.tum: 0.000000 s to 2.000000 s "
                  "beside 10.000000 s to 13.000000 s; expected the same clock; or --t-offset, which "
-                 "is added to the estimate's stamps, or --t-max-diff");
+                 "is added to the estimate's timestamps, or --t-max-diff");
   }
 }
 
@@ -192,11 +192,11 @@ TEST(Associate, RefusesAnOffsetThatNoStampHolds) {
     return std::string();
   };
   EXPECT_EQ(refusal(two, one, kOffset),
-            "curve.tum --t-offset: 9000000000.000000 s beside its stamps is beyond 292 years; "
+            "curve.tum --t-offset: 9000000000.000000 s beside its timestamps is beyond 292 years; "
             "expected the "
             "time between the two clocks");
   EXPECT_EQ(refusal(one, two, -kOffset),
-            "curve.tum --t-offset: -9000000000.000000 s beside its stamps is beyond 292 years; "
+            "curve.tum --t-offset: -9000000000.000000 s beside its timestamps is beyond 292 years; "
             "expected the "
             "time between the two clocks");
 }

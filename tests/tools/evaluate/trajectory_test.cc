@@ -200,9 +200,10 @@ TEST_F(TrajectoryFiles, StampsThatNoStampHoldsAreRefusedWithTheirPlace) {
             "poses.txt:1 t: '1e20' is beyond 292 years; expected seconds, as TUM has them");
   EXPECT_EQ(Read("9199999998.123456789" + pose).stamps[0], 9199999998123456789);
   // No difference of two stamps may be beyond either.
-  EXPECT_EQ(Refusal("-9000000000" + pose + "-8999999999" + pose + "-8999999998" + pose +
-                    "9000000000" + pose),
-            "poses.txt t: its stamps are more than 292 years apart; expected those of one clock");
+  EXPECT_EQ(
+      Refusal("-9000000000" + pose + "-8999999999" + pose + "-8999999998" + pose + "9000000000" +
+              pose),
+      "poses.txt t: its timestamps are more than 292 years apart; expected those of one clock");
 }
 
 TEST_F(TrajectoryFiles, ACovarianceThatIsNoneIsRefusedWithItsLine) {
@@ -227,9 +228,10 @@ TEST_F(TrajectoryFiles, ACovarianceThatIsNoneIsRefusedWithItsLine) {
 
 TEST_F(TrajectoryFiles, StampsOutOfOrderAreSortedAndToldOf) {
   const std::string text = "1 1 0 0 0 0 0 1\n3 3 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n4 4 0 0 0 0 0 1\n";
-  EXPECT_EQ(WarningsOf(text),
-            "poses.txt:3 t: goes back: 2.000000 s; expected poses in the order of their stamps; "
-            "they are sorted\n");
+  EXPECT_EQ(
+      WarningsOf(text),
+      "poses.txt:3 t: goes back: 2.000000 s; expected poses in the order of their timestamps; "
+      "they are sorted\n");
   const Trajectory t = Read(text);
   EXPECT_EQ(t.positions.row(0), Eigen::RowVector4d(1, 2, 3, 4));
   EXPECT_TRUE(std::ranges::is_sorted(t.stamps));
@@ -243,11 +245,12 @@ TEST_F(TrajectoryFiles, PosesOfADuplicateTimestampAreAllKeptAndItsLineIsNamed) {
   EXPECT_EQ(Read(text).positions.row(0), Eigen::RowVector4d(1, 9, 2, 9));
   EXPECT_EQ(Read(text).stamps.size(), 4u);
   // Where poses are sorted, those of one timestamp stay as they were.
-  EXPECT_EQ(WarningsOf("2 2 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n"),
-            "poses.txt:2 t: goes back: 1.000000 s; expected poses in the order of their stamps; "
-            "they are sorted\n"
-            "poses.txt:3 t: duplicate timestamp 2.000000 s; expected each timestamp once; all "
-            "poses are kept\n");
+  EXPECT_EQ(
+      WarningsOf("2 2 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n"),
+      "poses.txt:2 t: goes back: 1.000000 s; expected poses in the order of their timestamps; "
+      "they are sorted\n"
+      "poses.txt:3 t: duplicate timestamp 2.000000 s; expected each timestamp once; all "
+      "poses are kept\n");
   EXPECT_EQ(Read("2 2 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n").positions.row(0),
             Eigen::RowVector3d(1, 2, 9));
 }

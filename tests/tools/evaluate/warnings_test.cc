@@ -87,7 +87,7 @@ TEST(EvaluationWarnings, AConstantTimeOffsetIsToldWithTheOptionThatTakesIt) {
   Trajectory estimate = Estimate(Curve(60));
   for (Stamp& stamp : estimate.stamps) stamp += 8'000'000;
   EXPECT_EQ(WarningsOf(Curve(60), estimate),
-            "estimate.tum: its stamps are 0.008 s after those of the reference on the median; "
+            "estimate.tum: its timestamps are 0.008 s after those of the reference on the median; "
             "expected --t-offset -0.008\n");
   EvaluateOptions options;
   options.offset = -8'000'000;
@@ -98,7 +98,7 @@ TEST(EvaluationWarnings, APathThatEndsEarlyIsTold) {
   const Trajectory estimate = Estimate(Curve(60));
   const std::string warnings = WarningsOf(Curve(60), estimate.Select(Range(0, 20)));
   EXPECT_TRUE(warnings.starts_with("estimate.tum: it covers ")) << warnings;
-  EXPECT_TRUE(warnings.ends_with(" m; expected a figure of the whole path\n")) << warnings;
+  EXPECT_TRUE(warnings.ends_with(" m; expected a figure of the whole trajectory\n")) << warnings;
   EXPECT_EQ(WarningsOf(Curve(60), estimate.Select(Range(0, 40))), "");
 }
 

@@ -22,7 +22,7 @@ TEST(Recorder, WritesEveryFile) {
       (std::vector<std::string>{
           "alone/estimates.csv", "alone/events.csv", "alone/gains.csv", "alone/innovations.csv",
           "comparison.csv", "config.resolved.yaml", "ekf/estimates.csv", "ekf/events.csv",
-          "ekf/gains.csv", "ekf/innovations.csv", "expected.csv", "files.txt", "implied.csv",
+          "ekf/gains.csv", "ekf/innovations.csv", "expected.csv", "files.txt", "implied_states.csv",
           "log.txt", "measurements.csv", "report.html", "run.json", "timing.json", "truth.csv"}));
   EXPECT_EQ(FilesIn(folder.path()).size(), 19u);  // nothing beside it
 }
@@ -73,7 +73,7 @@ TEST(Recorder, ImpliedValuesInvertTheSensor) {
   SwingingTarget source(1);
   Frame frame;
   ASSERT_TRUE(source.Next(frame));
-  const std::vector<std::string> lines = Lines(folder / "out/implied.csv");
+  const std::vector<std::string> lines = Lines(folder / "out/implied_states.csv");
   ASSERT_EQ(lines.size(), 3u);  // of disparity alone: a scale tells no distance by itself
   EXPECT_EQ(lines[0], "t_s,sensor,target.depth");
   EXPECT_EQ(lines[1], "0.000000000,disparity," +
@@ -111,7 +111,7 @@ struct HandMade {
     StateLayout& layout = named.system.layout;
     const Space scalar{"x", "m", "", {""}, Geometry::Vector(1)};
     layout.Declare("a.waits", "a", scalar);
-    layout.Declare("a.fixed", "a", scalar, BlockStatus::kFixed);
+    layout.Declare("a.fixed", "a", scalar, BlockStatus::kConstant);
     layout.Declare("a.attitude", "a",
                    {"q", "rad", "", {"w", "x", "y", "z"}, Geometry::UnitQuaternion()});
     testing::AddSensor(named.system, "disparity",
@@ -167,7 +167,8 @@ TEST(Recorder, WritesAbsentFixedAndRejected) {
             "t_s,sensor,a.waits<-disparity,a.attitude.rx<-disparity,a.attitude.ry<-disparity,"
             "a.attitude.rz<-disparity\n"
             "0.000000005,disparity,,0.1,0,-0.3\n");
-  EXPECT_EQ(Read(folder / "out/implied.csv"), "t_s,sensor,a.waits\n");  // invalid: implies nothing
+  EXPECT_EQ(Read(folder / "out/implied_states.csv"),
+            "t_s,sensor,a.waits\n");  // invalid: implies nothing
 }
 
 TEST(Recorder, AFrameOlderThanTheStateHasNoEstimate) {

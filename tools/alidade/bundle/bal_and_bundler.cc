@@ -52,7 +52,7 @@ std::array<double, 12> BundlerPose(const BundleFile& file, std::size_t i) {
   return pose;
 }
 
-/// f, k1, k2; f = 0 of a picture that was not registered, where there are such.
+/// f, k1, k2; f = 0 of an image that was not registered, where there are such.
 void ReadLens(BundleCursor& cursor, bool may_be_missing, double* lens) {
   lens[0] = cursor.Number("focal length of a camera");
   if (!(lens[0] > 0.0) && !(may_be_missing && lens[0] == 0.0))
@@ -67,7 +67,7 @@ void ReadBundlerCamera(BundleCursor& cursor, BundleFile& file) {
   ReadLens(cursor, true, lens.data());
   cursor.Numbers("rotation of a camera", 9, pose.data());
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> r(pose.data());
-  const bool missing = lens[0] == 0.0 && r.isZero();  // a picture that was not registered
+  const bool missing = lens[0] == 0.0 && r.isZero();  // an image that was not registered
   constexpr double kRounding = 1e-3;
   if (!missing && (!(r * r.transpose()).isIdentity(kRounding) || !(r.determinant() > 0.0)))
     cursor.Fail("the 9 numbers up to here are no rotation", "an orthonormal matrix");

@@ -262,8 +262,8 @@ std::vector<std::string> Undetermined(const BundleProblem& problem, const Sensor
                                       const BundleResult& result) {
   std::vector<std::string> lines;
   const bool mono = TellsNoScale(sensor);
-  lines.emplace_back(mono ? "gauge: the pose of the first camera and the scale are held"
-                          : "gauge: the pose of the first camera is held");
+  lines.emplace_back(mono ? "gauge: the pose of the first camera and the scale are constant"
+                          : "gauge: the pose of the first camera is constant");
   if (result.extent_before > 0.0) {
     lines.push_back("extent: " + Short(result.extent_before) + " -> " + Short(result.extent_after) +
                     ", median distance from the first camera");

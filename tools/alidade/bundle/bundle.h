@@ -67,7 +67,7 @@ struct BundleResult {
   int iterations = 0;   ///< steps tried
   double cost_before = 0.0, cost_after = 0.0;
   int residuals = 0;  ///< scalars
-  int unknowns = 0;   ///< tangent elements that were estimated, the held first pose left out
+  int unknowns = 0;   ///< tangent elements that were estimated, the constant first pose left out
   /// Median distance from the first camera to the other cameras, or where these stand at one place
   /// to the points, of those used; 0: there is none.
   double extent_before = 0.0, extent_after = 0.0;

@@ -54,16 +54,16 @@ BundleFile ReadBundle(const std::filesystem::path& file);
 /// What else a problem of tracks is made from.
 struct BundleTracks {
   std::filesystem::path tracks;  ///< `frame,feature,dim,value`
-  std::filesystem::path camera;  ///< YAML with `camera`, and for a stereo pair `baseline_m`
+  std::filesystem::path camera;  ///< YAML with `camera`; a stereo pair has `camera.baseline_m`
   std::filesystem::path start;   ///< trajectory TUM, `t x y z qx qy qz qw`, world_from_cam
 };
 
 /// Reads tracks of one camera (dim 0, 1) or of a rectified pair (0 to 3). Frames have the stamps of
 /// `timestamps.csv` beside the tracks, and a pose to 1 us; where it is not there, as from standard
 /// input (`-`), the k-th pose is that of frame k. Frames without a pose are left out.
-/// Points are placed by triangulation from the start, by the inverse observations of the sensor
-/// that `host` gives; those that it cannot place are left out. Errors: kInputMissing, kBadData,
-/// kBadConfig, kPlugin.
+/// Points are placed by triangulation from the start, by the inverse measurement models of the
+/// sensor that `host` gives; those that it cannot place are left out. Errors: kInputMissing,
+/// kBadData, kBadConfig, kPlugin.
 BundleFile ReadBundleTracks(const BundleTracks& from, const PluginHost& host);
 
 /// The problem as a file of its own format; numbers in the shortest form that reads back (libmv: to

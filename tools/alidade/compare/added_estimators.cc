@@ -19,7 +19,7 @@ constexpr const char* kOrigin = "alidade compare";
 struct Variant {
   const char* name;
   EstimatorKind kind;
-  bool so_far;                    ///< the batch of the data so far
+  bool full_information;          ///< the full-information filter
   bool accepted;                  ///< of what the filter accepted
   std::vector<const char*> keys;  ///< of the filter's entry, taken over where it has them
   const char* what;
@@ -39,12 +39,12 @@ const std::vector<Variant>& Variants() {
        false,
        {"sensors", "overrides", "max_dt_s"},
        "the batch of all data"},
-      {"batch_so_far",
+      {"full_information",
        EstimatorKind::kBatch,
        true,
        true,
        {"sensors", "overrides", "max_dt_s"},
-       "the batch of the data so far that the filter accepted"},
+       "the full-information filter over what the filter accepted"},
       {"batch_accepted",
        EstimatorKind::kBatch,
        false,
@@ -62,15 +62,15 @@ std::vector<std::string> SensorsOf(const NamedEstimator& named) {
   return names;
 }
 
-/// Whether `named` is what the variant would be. A batch of all data so far does for one of the
+/// Whether `named` is what the variant would be. A full-information filter does for one of the
 /// data that a filter accepted: another line tells what these two differ by.
 bool IsThere(const Variant& variant, const NamedEstimator& named, const NamedEstimator& filter,
              int filter_index) {
-  const bool so_far = named.kind == EstimatorKind::kBatch && !named.estimator->offline();
-  if (named.kind != variant.kind || so_far != variant.so_far) return false;
+  const bool full_information = named.kind == EstimatorKind::kBatch && !named.estimator->offline();
+  if (named.kind != variant.kind || full_information != variant.full_information) return false;
   if (named.overrides != filter.overrides || SensorsOf(named) != SensorsOf(filter)) return false;
   if (named.accepted_by >= 0) return variant.accepted && named.accepted_by == filter_index;
-  return variant.so_far || !variant.accepted;
+  return variant.full_information || !variant.accepted;
 }
 
 /// A name that no estimator has.
@@ -98,7 +98,7 @@ Config WithVariant(const Config& config, const Variant& variant, const std::stri
   Config with = internal::Copy(config);
   const std::string entry = "estimators." + name;
   with.Set(entry + ".type", type, kOrigin);
-  if (variant.so_far) with.Set(entry + ".mode", "filtering", kOrigin);
+  if (variant.full_information) with.Set(entry + ".mode", "filtering", kOrigin);
   if (variant.accepted) with.Set(entry + ".use.accepted_by", filter, kOrigin);
   for (const char* const key : variant.keys) {
     const auto value = with.root().At("estimators").At(filter).Find(key);
@@ -150,7 +150,7 @@ void CheckReference(const Experiment& experiment, const std::string& name) {
       name, names);
 }
 
-/// Index of the filter whose gap is to be explained; -1: there is none. Error: kUsage.
+/// Index of the filter whose error is to be decomposed; -1: there is none. Error: kUsage.
 int FindFilter(const Experiment& experiment, const std::string& name) {
   std::vector<std::string> filters;
   for (std::size_t e = 0; e < experiment.estimators.size(); ++e) {
@@ -188,7 +188,7 @@ ExplainedExperiment ExplainExperiment(const Config& config, const PluginHost& ho
     const bool there = std::ranges::any_of(
         all, [&](const NamedEstimator& one) { return IsThere(variant, one, of, filter); });
     if (there) continue;
-    if (variant.so_far && of.system.landmarks) {
+    if (variant.full_information && of.system.landmarks) {
       left_out["with landmarks a solve at every frame takes long; the config may have it"]
           .emplace_back(variant.what);
       continue;

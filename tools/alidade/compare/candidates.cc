@@ -67,9 +67,9 @@ const Candidate* FirstOf(const std::vector<Candidate>& candidates,
   return first;
 }
 
-/// The batch of the same system as `of`, of the data so far or of all data; one that sees all
-/// measurements comes before one of those that a filter accepted. Where none of these is usable,
-/// one that is, of the same sensors with other overrides: a robust loss, say.
+/// The batch of the same system as `of`, of the data up to each frame or of all data; one that sees
+/// all measurements comes before one of those that a filter accepted. Where none of these is
+/// usable, one that is, of the same sensors with other overrides: a robust loss, say.
 const Candidate* BatchFor(const Candidate& of, const std::vector<Candidate>& candidates,
                           bool smoothed) {
   const auto sees_the_same = [&](const Candidate& one) {
@@ -108,7 +108,7 @@ bool FromTruth(const std::vector<Candidate>& candidates, const CompareOptions& o
   return truth;
 }
 
-/// What the estimates of a candidate are held against; null: nothing.
+/// What the estimates of a candidate are compared with; null: nothing.
 struct References {
   const Candidate* along = nullptr;  ///< those along the run
   const Candidate* final = nullptr;  ///< the last one, when all have the same data
@@ -120,18 +120,18 @@ References ReferencesOf(const Candidate& one, const std::vector<Candidate>& cand
     const Candidate& named = Named(options.reference, candidates, "--reference");
     return {&named, &named};
   }
-  const Candidate* const so_far = BatchFor(one, candidates, false);
+  const Candidate* const full_information = BatchFor(one, candidates, false);
   const Candidate* smoothed = BatchFor(one, candidates, true);
   if (smoothed == nullptr) {
     smoothed = FirstOf(candidates, [&](const Candidate& other) {
       return internal::SmoothsAllData(other.facts()) && SameSystem(other.facts(), one.facts());
     });
   }
-  const bool later = one.facts().smoothed || (!truth && so_far == nullptr);
-  return {later ? smoothed : so_far, smoothed != nullptr ? smoothed : so_far};
+  const bool later = one.facts().smoothed || (!truth && full_information == nullptr);
+  return {later ? smoothed : full_information, smoothed != nullptr ? smoothed : full_information};
 }
 
-/// Why a comparison with what is held against is withheld, or "".
+/// Why a comparison with the reference is withheld, or "".
 std::string WhyWithheld(const std::vector<Candidate>& candidates,
                         const std::vector<References>& references, bool truth) {
   const bool measured = std::ranges::any_of(
@@ -151,7 +151,7 @@ std::string WhyWithheld(const std::vector<Candidate>& candidates,
   return any ? "" : "no reference: no truth, no batch and no smoother of all data";
 }
 
-/// Which estimators are held against nothing while others are.
+/// Which estimators are compared with nothing while others are.
 std::vector<std::string> WithoutReference(const std::vector<Candidate>& candidates,
                                           const std::vector<References>& references) {
   bool final = false, online = false;
@@ -161,11 +161,11 @@ std::vector<std::string> WithoutReference(const std::vector<Candidate>& candidat
   }
   std::vector<std::string> notes;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
-    const std::string what = "'" + candidates[i].name + "' is held against nothing";
+    const std::string what = "'" + candidates[i].name + "' is compared with nothing";
     if (final && references[i].final == nullptr) {
       notes.push_back(what + ": no batch has its sensors");
     } else if (online && references[i].along == nullptr) {
-      notes.push_back(what + " along the run: no batch of the data so far has its sensors and " +
+      notes.push_back(what + " along the run: no full-information filter has its sensors and " +
                       "overrides");
     }
   }
@@ -264,7 +264,7 @@ ComparedEstimator Compare(const Candidate& one, const References& references, bo
   return compared;
 }
 
-/// The filter whose gap is explained; null: there is none. Error: kUsage.
+/// The filter whose error is decomposed; null: there is none. Error: kUsage.
 const Candidate* FilterOf(const std::vector<Candidate>& candidates, const CompareOptions& options) {
   const auto is_filter = [](const Candidate& one) {
     return one.facts().kind == EstimatorKind::kFilter;
@@ -291,7 +291,8 @@ std::vector<std::string> NotesOf(const std::vector<Candidate>& candidates,
   std::set<std::string> notes;
   if (std::ranges::any_of(candidates, ScaleIsFree)) {
     notes.insert(
-        "scale is what the priors make of it: paths and maps are to be compared by their Sim3 "
+        "scale is what the priors make of it: trajectories and maps are to be compared by their "
+        "Sim3 "
         "rows, after the similarity that brings them nearest");
   }
   for (std::size_t i = 0; i < candidates.size(); ++i) {
@@ -329,8 +330,8 @@ void internal::RefuseFilter(const std::string& name, bool known,
                known ? "" : name, filters);
 }
 
-const char* ToString(GapKind kind) {
-  constexpr const char* kNames[] = {"linearisation", "smoothing", "lost data"};
+const char* ToString(DecompositionKind kind) {
+  constexpr const char* kNames[] = {"linearisation", "smoothing", "rejected measurements"};
   return kNames[static_cast<int>(kind)];
 }
 
@@ -365,7 +366,7 @@ Comparison internal::CompareRuns(const std::vector<ComparedRun>& runs,
   const Candidate* const filter = options.explain ? FilterOf(candidates, options) : nullptr;
   if (filter != nullptr) {
     comparison.explained = filter->name;
-    comparison.gap = ExplainGap(*filter, candidates, truth);
+    comparison.decomposition = Decompose(*filter, candidates, truth);
     if (filter->entry->had_rejection_recovery) {
       comparison.notes.push_back(
           "'" + filter->name +

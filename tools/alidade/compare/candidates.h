@@ -46,8 +46,8 @@ std::map<std::string, double> DistanceBetweenMaps(const EstimatorResult& map,
 Comparison CompareRuns(const std::vector<ComparedRun>& runs, const CompareOptions& options);
 
 /// The steps from `filter` to the batch of all data, of those that the candidates allow.
-std::vector<GapStep> ExplainGap(const Candidate& filter, const std::vector<Candidate>& candidates,
-                                bool with_truth);
+std::vector<DecompositionStep> Decompose(const Candidate& filter,
+                                         const std::vector<Candidate>& candidates, bool with_truth);
 
 /// A number that was taken once.
 inline Spread Single(double value) { return {value, value, value, value}; }

@@ -12,7 +12,7 @@
 #include "alidade/sweep/sweep.h"
 
 /// Estimators over the same data beside each other, and where their difference comes from
-/// (docs/compare.md). What a filter makes of the past is never held against what a smoother makes
+/// (docs/compare.md). What a filter makes of the past is never compared with what a smoother makes
 /// of all data: each is compared with the batch of the data that it had.
 namespace alidade {
 
@@ -20,8 +20,8 @@ struct CompareOptions {
   /// What errors are taken from: `truth`, or an estimator. "": truth where it is known, else the
   /// batch.
   std::string reference;
-  std::string filter;       ///< the one whose gap is explained; "": the first
-  bool explain = true;      ///< else no gap, and nothing is added to a config for it
+  std::string filter;   ///< the one whose error is decomposed; "": the first
+  bool explain = true;  ///< else no error decomposition, and nothing is added to a config for it
   bool over_seeds = false;  ///< the source is read for each of several seeds
 };
 
@@ -50,22 +50,22 @@ struct ComparedEstimator {
 };
 
 /// Where a part of the difference between a filter and the batch of all data comes from.
-enum class GapKind {
-  kLinearisation,  ///< the filter against the batch of the data so far that it accepted
+enum class DecompositionKind {
+  kLinearisation,  ///< the filter, compared with the full-information filter over what it accepted
   kSmoothing,      ///< the filter against a smoother of the same models: what later data tell
-  kLostData,       ///< the batch of what the filter accepted against the batch of all data
+  kRejected,       ///< the batch of what the filter accepted against the batch of all data
 };
-/// `linearisation`, `smoothing`, `lost data`.
-const char* ToString(GapKind kind);
+/// `linearisation`, `smoothing`, `rejected measurements`.
+const char* ToString(DecompositionKind kind);
 
 /// One step of the way from the filter to the batch. Values: `error_ratio:BLOCK`, the RMSE from
 /// truth of `from` over that of `to`; `rmsd:BLOCK` and `rmsd.sigmas:OWNER` between the two;
-/// `rmse.from:BLOCK`, `rmse.to:BLOCK`; `measurements` and `lost` of kLostData. At the end they are
-/// of the last frame alone, and of BLOCK `map` and `map.sim3` too.
-struct GapStep {
-  GapKind kind = GapKind::kLinearisation;
+/// `rmse.from:BLOCK`, `rmse.to:BLOCK`; `measurements` and `rejected` of kRejected. At the end they
+/// are of the last frame alone, and of BLOCK `map` and `map.sim3` too.
+struct DecompositionStep {
+  DecompositionKind kind = DecompositionKind::kLinearisation;
   std::string from, to;
-  bool at_end = false;  ///< taken at the last frame, for want of a batch of the data so far
+  bool at_end = false;  ///< taken at the last frame, for want of a full-information filter
   std::map<std::string, Spread> values;
   std::string withheld;  ///< why there are no values, or ""
 };
@@ -74,29 +74,29 @@ struct Comparison {
   std::int64_t runs = 1;  ///< seeds; values are spread over them
   std::int64_t frames = 0;
   RunStatus status = RunStatus::kOk;  ///< the worst of the runs'; of seeds kOk or kStopped
-  std::string reference;              ///< `truth`, or the first estimator that one is held against
+  std::string reference;              ///< `truth`, or the first estimator that one is compared with
   std::string withheld;               ///< why there is no reference, or nothing to compare; or ""
   std::string measurements_sha256;    ///< of the data; "": of several seeds
   std::vector<ComparedEstimator> estimators;
-  std::string explained;  ///< the filter whose gap it is
-  std::vector<GapStep> gap;
+  std::string explained;  ///< the filter whose error it is
+  std::vector<DecompositionStep> decomposition;
   std::vector<std::string> notes;  ///< what a reader has to know, a line each
 };
 
-/// An experiment with the estimators that explain the gap of a filter.
+/// An experiment with the estimators that decompose the error of a filter.
 struct ExplainedExperiment {
   Config config;  ///< with those that were added
   Experiment experiment;
-  std::string filter;              ///< whose gap it is; "": there is no filter
+  std::string filter;              ///< whose error it is; "": there is no filter
   std::vector<std::string> added;  ///< names
   std::vector<std::string> notes;  ///< what was added and what could not be, with the reason
 };
 
 /// Builds the experiment of a config, and adds what its comparison lacks: the batch of all data, of
-/// the data so far, of what the filter accepted, and the smoother, each with the filter's sensors,
-/// overrides and steps. What does not support the system is left out. Errors: those of
+/// the data up to each frame, of what the filter accepted, and the smoother, each with the filter's
+/// sensors, overrides and steps. What does not support the system is left out. Errors: those of
 /// BuildExperiment; kUsage where `options` names an estimator that is not there, or one that is no
-/// filter as that whose gap is explained.
+/// filter as that whose error is decomposed.
 ExplainedExperiment ExplainExperiment(const Config& config, const PluginHost& host,
                                       const CompareOptions& options);
 
@@ -140,7 +140,7 @@ Comparison Summarise(const std::vector<Comparison>& comparisons);
 
 /// How a comparison is written for people.
 enum class TableStyle { kText, kMarkdown, kLatex };
-/// Its tables and the explanation of the gap.
+/// Its tables and the error decomposition.
 std::string CompareReport(const Comparison& comparison, TableStyle style);
 /// All values, for other programs (docs/compare.md).
 std::string CompareJson(const Comparison& comparison);

@@ -16,10 +16,10 @@ namespace {
 struct Shared {
   const SeriesBlock* block;
   int value, reference_value, reference_tangent;
-  bool reference_fixed;
+  bool reference_constant;
 };
 
-/// Without those that are fixed in both.
+/// Without those that are constant in both.
 std::vector<Shared> SharedBlocks(const Series& series, const Series& reference) {
   std::vector<Shared> shared;
   int value = 0;
@@ -27,8 +27,8 @@ std::vector<Shared> SharedBlocks(const Series& series, const Series& reference) 
     int reference_value = 0, tangent = 0;
     for (const SeriesBlock& other : reference.blocks) {
       const bool same = other.name == block.name && other.geometry == block.geometry;
-      if (same && !(block.fixed && other.fixed)) {
-        shared.push_back({&block, value, reference_value, tangent, other.fixed});
+      if (same && !(block.constant && other.constant)) {
+        shared.push_back({&block, value, reference_value, tangent, other.constant});
       }
       reference_value += other.geometry.ambient;
       tangent += other.geometry.tangent;
@@ -68,7 +68,7 @@ struct Joint {
 std::vector<Joint> JointsOf(const std::vector<Shared>& shared) {
   std::vector<Joint> joints;
   for (const Shared& one : shared) {
-    if (one.reference_fixed) continue;
+    if (one.reference_constant) continue;
     const std::string owner = one.block->owner();
     auto joint = std::ranges::find(joints, owner, &Joint::owner);
     if (joint == joints.end()) joint = joints.insert(joint, {owner, {}});

@@ -10,7 +10,7 @@ namespace {
 
 /// The estimators that the steps are taken between; null: not there.
 struct Partners {
-  const Candidate* so_far = nullptr;    ///< the batch of the data so far
+  const Candidate* full_information = nullptr;  ///< the full-information filter
   const Candidate* smoother = nullptr;  ///< of the same models, linearised where the filter was
   const Candidate* accepted = nullptr;  ///< the batch of all that the filter accepted
   const Candidate* all = nullptr;       ///< the batch of all data
@@ -31,10 +31,10 @@ Partners PartnersOf(const Candidate& filter, const std::vector<Candidate>& candi
     if (!one.batch()) continue;
     if (facts.smoothed) keep(by_filter ? found.accepted : found.all, one);
     // What the filter did not accept is another step's.
-    const bool better = by_filter && one.entry->usable() && found.so_far != nullptr &&
-                        found.so_far->facts().accepted_by.empty();
-    if (!facts.smoothed && better) found.so_far = &one;
-    if (!facts.smoothed) keep(found.so_far, one);
+    const bool better = by_filter && one.entry->usable() && found.full_information != nullptr &&
+                        found.full_information->facts().accepted_by.empty();
+    if (!facts.smoothed && better) found.full_information = &one;
+    if (!facts.smoothed) keep(found.full_information, one);
   }
   return found;
 }
@@ -49,7 +49,7 @@ std::string SubjectOf(const std::string& metric, bool at_end) {
   return whole ? metric.substr(kind.size()) : "";
 }
 
-void AddErrors(const EstimatorResult& from, const EstimatorResult& to, GapStep& step) {
+void AddErrors(const EstimatorResult& from, const EstimatorResult& to, DecompositionStep& step) {
   for (const auto& [key, error] : from.metrics) {
     const std::string subject = SubjectOf(key, step.at_end);
     const auto other = to.metrics.find(key);
@@ -61,9 +61,9 @@ void AddErrors(const EstimatorResult& from, const EstimatorResult& to, GapStep& 
 }
 
 /// The step between two; `missing` says what there is to be for it.
-GapStep Between(GapKind kind, const Candidate* from, const Candidate* to, bool with_truth,
-                const char* missing, bool at_end = false) {
-  GapStep step;
+DecompositionStep Between(DecompositionKind kind, const Candidate* from, const Candidate* to,
+                          bool with_truth, const char* missing, bool at_end = false) {
+  DecompositionStep step;
   step.kind = kind;
   step.at_end = at_end;
   if (from != nullptr) step.from = from->name;
@@ -93,14 +93,16 @@ GapStep Between(GapKind kind, const Candidate* from, const Candidate* to, bool w
   return step;
 }
 
-/// The filter against the batch of the data so far. Where there is none, as with landmarks, at the
+/// The filter against the full-information filter. Where there is none, as with landmarks, at the
 /// last frame against a batch of all data: there the two are the same.
-GapStep Linearisation(const Candidate& filter, const Partners& partners, bool with_truth) {
+DecompositionStep Linearisation(const Candidate& filter, const Partners& partners,
+                                bool with_truth) {
   const bool accepted = partners.accepted != nullptr && partners.accepted->entry->usable();
   const Candidate* const of_end = accepted ? partners.accepted : partners.all;
-  const bool at_end = partners.so_far == nullptr && of_end != nullptr;
-  return Between(GapKind::kLinearisation, &filter, at_end ? of_end : partners.so_far, with_truth,
-                 "there is no batch of the data so far, {type: BATCH, mode: filtering}", at_end);
+  const bool at_end = partners.full_information == nullptr && of_end != nullptr;
+  return Between(DecompositionKind::kLinearisation, &filter,
+                 at_end ? of_end : partners.full_information, with_truth,
+                 "there is no full-information filter, {type: BATCH, mode: filtering}", at_end);
 }
 
 }  // namespace
@@ -136,24 +138,26 @@ std::map<std::string, double> DistanceBetweenMaps(const EstimatorResult& map,
   return distances;
 }
 
-std::vector<GapStep> ExplainGap(const Candidate& filter, const std::vector<Candidate>& candidates,
-                                bool with_truth) {
+std::vector<DecompositionStep> Decompose(const Candidate& filter,
+                                         const std::vector<Candidate>& candidates,
+                                         bool with_truth) {
   const Partners partners = PartnersOf(filter, candidates);
-  std::vector<GapStep> steps = {Linearisation(filter, partners, with_truth)};
+  std::vector<DecompositionStep> steps = {Linearisation(filter, partners, with_truth)};
   const bool smoother = partners.smoother != nullptr && partners.smoother->entry->usable();
-  steps.push_back(Between(GapKind::kSmoothing, smoother ? &filter : partners.so_far,
-                          smoother                       ? partners.smoother
-                          : partners.accepted != nullptr ? partners.accepted
-                                                         : partners.all,
-                          with_truth,
-                          "there is neither a smoother, {type: rts}, nor batches of all data and "
-                          "of the data so far"));
-  steps.push_back(Between(GapKind::kLostData, partners.accepted, partners.all, with_truth,
+  steps.push_back(
+      Between(DecompositionKind::kSmoothing, smoother ? &filter : partners.full_information,
+              smoother                       ? partners.smoother
+              : partners.accepted != nullptr ? partners.accepted
+                                             : partners.all,
+              with_truth,
+              "there is neither a smoother, {type: rts}, nor a batch of all data with a "
+              "full-information filter"));
+  steps.push_back(Between(DecompositionKind::kRejected, partners.accepted, partners.all, with_truth,
                           "there are no two batches, of all data and of what it accepted, {type: "
                           "BATCH, use: {accepted_by: FILTER}}"));
   const std::int64_t all = filter.entry->measurements(), used = filter.entry->used();
   steps.back().values["measurements"] = Single(static_cast<double>(all));
-  steps.back().values["lost"] = Single(static_cast<double>(all - used));
+  steps.back().values["rejected"] = Single(static_cast<double>(all - used));
   return steps;
 }
 

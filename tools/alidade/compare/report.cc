@@ -61,7 +61,7 @@ std::vector<std::string> Names(const std::vector<Column>& columns) {
   return names;
 }
 
-/// What the columns of a table are held against: in its title, or where they differ in a row.
+/// What the columns of a table are compared with: in its title, or where they differ in a row.
 void TellReferences(const std::vector<std::string>& references, Section& section) {
   std::set<std::string> distinct(references.begin(), references.end());
   distinct.erase("");
@@ -75,7 +75,7 @@ void TellReferences(const std::vector<std::string>& references, Section& section
   }
 }
 
-/// A table of `of`, with what they are held against, and over several runs in how many of them.
+/// A table of `of`, with what they are compared with, and over several runs in how many of them.
 Section TableOf(const std::vector<ComparedEstimator>& of, bool several, const std::string& title,
                 std::string ComparedEstimator::*reference,
                 std::int64_t ComparedEstimator::*reference_runs,
@@ -162,7 +162,7 @@ std::map<std::string, Spread> Under(const std::map<std::string, Spread>& values,
 }
 
 /// `0.06 (target)`, the largest first; the largest itself goes to `largest`.
-std::string DistancesText(const GapStep& step, double& largest) {
+std::string DistancesText(const DecompositionStep& step, double& largest) {
   std::vector<std::pair<double, std::string>> sigmas;
   const std::string kind = "rmsd.sigmas:";
   for (const auto& [key, value] : step.values) {
@@ -177,26 +177,26 @@ std::string DistancesText(const GapStep& step, double& largest) {
   return internal::Join(parts);
 }
 
-/// What a step of the gap means, in words.
-std::string WordsOf(GapKind kind) {
+/// What a step of the decomposition means, in words.
+std::string WordsOf(DecompositionKind kind) {
   switch (kind) {
-    case GapKind::kLinearisation:
+    case DecompositionKind::kLinearisation:
       return "what it costs that each measurement is linearised once, where the filter then was";
-    case GapKind::kSmoothing:
+    case DecompositionKind::kSmoothing:
       return "what later data tell of each estimate: no filter can have it, a smoother can";
-    case GapKind::kLostData:
+    case DecompositionKind::kRejected:
       break;
   }
   return "what the filter would have gained from what its gate and its other checks kept out";
 }
 
-std::string LinesOf(const GapStep& step) {
+std::string LinesOf(const DecompositionStep& step) {
   double largest = 0.0;
   const std::string distances = DistancesText(step, largest);
   if (distances.empty()) return "";
   std::string line =
       (step.at_end ? "difference " : "RMSD ") + distances + " in sigmas of " + step.to;
-  if (step.kind == GapKind::kSmoothing) return line;
+  if (step.kind == DecompositionKind::kSmoothing) return line;
   constexpr double kNegligible = 0.1, kSmall = 0.5, kLarge = 1.0;
   return line + (largest < kNegligible ? ": negligible beside what neither of them knows"
                  : largest < kSmall    ? ": small beside what neither of them knows"
@@ -205,27 +205,27 @@ std::string LinesOf(const GapStep& step) {
 }
 
 /// `3 of 226 measurements were not used`
-std::string LostText(const GapStep& step) {
-  const auto lost = step.values.find("lost"), all = step.values.find("measurements");
-  if (lost == step.values.end() || all == step.values.end()) return "";
-  return internal::RoundedText(lost->second.mean, 6) + " of " +
+std::string RejectedText(const DecompositionStep& step) {
+  const auto rejected = step.values.find("rejected"), all = step.values.find("measurements");
+  if (rejected == step.values.end() || all == step.values.end()) return "";
+  return internal::RoundedText(rejected->second.mean, 6) + " of " +
          internal::RoundedText(all->second.mean, 6) + " measurements were not used by the filter";
 }
 
-Section GapSection(const Comparison& comparison, const GapStep& step) {
+Section DecompositionSection(const Comparison& comparison, const DecompositionStep& step) {
   Section section;
   const std::string pair =
       step.from.empty() || step.to.empty() ? "" : ", " + step.from + " against " + step.to;
   section.title = ToString(step.kind) + pair + (step.at_end ? ", at the last frame" : "");
   section.lines.push_back(WordsOf(step.kind));
   if (step.at_end) {
-    section.lines.emplace_back("there the batch of all data is that of the data so far");
+    section.lines.emplace_back("there the batch of all data is the full-information filter");
   }
-  if (step.kind == GapKind::kLostData) {
-    section.lines.push_back(LostText(step) + (comparison.runs > 1 ? ", mean of the runs" : ""));
+  if (step.kind == DecompositionKind::kRejected) {
+    section.lines.push_back(RejectedText(step) + (comparison.runs > 1 ? ", mean of the runs" : ""));
   }
-  const auto lost = step.values.find("lost");
-  if (lost != step.values.end() && lost->second.mean == 0.0) return section;
+  const auto rejected = step.values.find("rejected");
+  if (rejected != step.values.end() && rejected->second.mean == 0.0) return section;
   if (!step.withheld.empty()) {
     section.lines.push_back("not known: " + step.withheld);
     return section;
@@ -258,7 +258,7 @@ Section GapSection(const Comparison& comparison, const GapStep& step) {
   return section;
 }
 
-/// All that estimators are held against at the end.
+/// All that estimators are compared with at the end.
 std::string ReferencesText(const Comparison& comparison) {
   std::vector<std::string> names;
   for (const ComparedEstimator& one : comparison.estimators) {
@@ -287,9 +287,10 @@ std::vector<Section> SectionsOf(const Comparison& comparison) {
     if (!section.columns.empty()) sections.push_back(std::move(section));
   }
   sections.push_back(FinalSection(comparison));
-  if (comparison.gap.empty()) return sections;
-  sections.push_back({"The gap of " + comparison.explained + " explained", {}, {}, {}});
-  for (const GapStep& step : comparison.gap) sections.push_back(GapSection(comparison, step));
+  if (comparison.decomposition.empty()) return sections;
+  sections.push_back({"Error decomposition of " + comparison.explained, {}, {}, {}});
+  for (const DecompositionStep& step : comparison.decomposition)
+    sections.push_back(DecompositionSection(comparison, step));
   return sections;
 }
 
@@ -319,9 +320,9 @@ internal::Json JsonOf(const ComparedEstimator& one, bool several) {
           {"units", one.units}};
 }
 
-internal::Json JsonOfGap(const Comparison& comparison) {
+internal::Json JsonOfDecomposition(const Comparison& comparison) {
   internal::Json steps = internal::Json::array();
-  for (const GapStep& step : comparison.gap) {
+  for (const DecompositionStep& step : comparison.decomposition) {
     internal::Json json = {{"kind", ToString(step.kind)}, {"from", step.from}, {"to", step.to}};
     if (step.at_end) json["at_end"] = true;
     if (!step.withheld.empty()) json["withheld"] = step.withheld;
@@ -350,7 +351,7 @@ std::string CompareJson(const Comparison& comparison) {
   for (const ComparedEstimator& one : comparison.estimators) {
     estimators[one.name] = JsonOf(one, comparison.runs > 1);
   }
-  if (!comparison.gap.empty()) json["gap"] = JsonOfGap(comparison);
+  if (!comparison.decomposition.empty()) json["decomposition"] = JsonOfDecomposition(comparison);
   json["notes"] = comparison.notes;
   return internal::JsonText(json);
 }

@@ -63,7 +63,7 @@ std::string FirstDifference(const fs::path& a, const fs::path& b) {
     if (one.rows != other.rows) {
       return "first at " + StampOf(one) + " of the one, " + StampOf(other) + " of the other";
     }
-    if (one.t_s.empty()) return "their own covariances or the stamps of empty frames differ";
+    if (one.t_s.empty()) return "their own covariances or the timestamps of empty frames differ";
   }
 }
 

@@ -60,16 +60,16 @@ std::string OfRuns(std::int64_t some, std::int64_t all) {
 }
 
 /// Of the runs in which the filter did not diverge, those that have the step between the same two.
-GapStep SummariseStep(const std::vector<Comparison>& comparisons, std::size_t s) {
-  const GapStep* known = &comparisons.front().gap.at(s);
+DecompositionStep SummariseStep(const std::vector<Comparison>& comparisons, std::size_t s) {
+  const DecompositionStep* known = &comparisons.front().decomposition.at(s);
   for (const Comparison& one : comparisons) {
     if (known->withheld.empty()) break;
-    known = &one.gap.at(s);
+    known = &one.decomposition.at(s);
   }
-  GapStep all = *known;
+  DecompositionStep all = *known;
   Gathered gathered;
   for (const Comparison& one : comparisons) {
-    const GapStep& of_run = one.gap.at(s);
+    const DecompositionStep& of_run = one.decomposition.at(s);
     const bool same = of_run.from == all.from && of_run.to == all.to;
     if (same && !Diverged(one, one.explained)) gathered.Add(of_run.values);
   }
@@ -107,7 +107,8 @@ Comparison Summarise(const std::vector<Comparison>& comparisons) {
   for (std::size_t e = 0; e < all.estimators.size(); ++e) {
     all.estimators[e] = SummariseEstimator(comparisons, e);
   }
-  for (std::size_t i = 0; i < all.gap.size(); ++i) all.gap[i] = SummariseStep(comparisons, i);
+  for (std::size_t i = 0; i < all.decomposition.size(); ++i)
+    all.decomposition[i] = SummariseStep(comparisons, i);
   return all;
 }
 

@@ -71,11 +71,11 @@ Similarity Align(Alignment alignment, const Trajectory& reference, const Traject
     const auto at_one_place = [](const auto& points) { return !(SquaredExtent(points) > 0.0); };
     if (at_one_place(from) || at_one_place(to)) {
       Fail((at_one_place(from) ? estimate : reference).name, "all poses are at one place",
-           "a path, to take a scale from");
+           "a trajectory, to take a scale from");
     }
     Fail(estimate.name,
          "no scale: its positions have nothing in common with those of " + reference.name,
-         "poses of the same path, or --align");
+         "poses of the same trajectory, or --align");
   }
   Similarity found = *similarity;
   if (alignment == Alignment::kScale) {

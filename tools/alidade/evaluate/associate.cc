@@ -77,10 +77,10 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Stamp
   const Stamp shift = estimate_longer ? -offset : offset;  // of the shorter
   for (const Stamp end : {shorter.front(), shorter.back()}) {
     if (std::abs(Seconds(end) + Seconds(shift)) < cell::kTimeLimit) continue;
-    throw Error(ExitCode::kBadData,
-                ErrorLine({estimate.name}, "--t-offset",
-                          internal::SecondsText(offset) + " beside its stamps is beyond 292 years",
-                          "the time between the two clocks"));
+    throw Error(ExitCode::kBadData, ErrorLine({estimate.name}, "--t-offset",
+                                              internal::SecondsText(offset) +
+                                                  " beside its timestamps is beyond 292 years",
+                                              "the time between the two clocks"));
   }
   Matches matches;
   matches.possible = static_cast<int>(shorter.size());

@@ -197,7 +197,8 @@ std::string SharedText(const std::vector<Evaluation>& evaluations) {
             ToString(first.options.pairs.unit) + " apart";
   }
   if (first.options.offset != 0) {
-    text += "; " + NumberText(Seconds(first.options.offset)) + " s added to the estimates' stamps";
+    text +=
+        "; " + NumberText(Seconds(first.options.offset)) + " s added to the estimates' timestamps";
   }
   return text + '.';
 }

@@ -232,7 +232,7 @@ class TrajectoryReader {
     const bool sorted = back == order.end();
     if (!sorted) {
       Warn(At(lines_, *back), "t", "goes back: " + internal::SecondsText(At(stamps, *back)),
-           "poses in the order of their stamps; they are sorted");
+           "poses in the order of their timestamps; they are sorted");
       std::stable_sort(order.begin(), order.end(), earlier);
     }
     WarnOfDuplicates(order);
@@ -356,7 +356,7 @@ Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat fo
     return trajectory;
   }
   throw Error(ExitCode::kBadData,
-              ErrorLine({trajectory.name}, "t", "its stamps are more than 292 years apart",
+              ErrorLine({trajectory.name}, "t", "its timestamps are more than 292 years apart",
                         "those of one clock"));
 }
 

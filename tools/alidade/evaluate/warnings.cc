@@ -154,7 +154,7 @@ class Warnings {
     std::nth_element(off.begin(), middle, off.end());
     const double late_s = std::abs(Seconds(*middle));
     if (!(late_s > kLateStamps * Seconds(evaluation_.options.max_diff))) return;
-    Warn("its stamps are " + RoundedText(late_s) + " s " + (*middle > 0 ? "before" : "after") +
+    Warn("its timestamps are " + RoundedText(late_s) + " s " + (*middle > 0 ? "before" : "after") +
              " those of the reference on the median",
          "--t-offset " + RoundedText(Seconds(evaluation_.options.offset + *middle)));
   }
@@ -164,9 +164,9 @@ class Warnings {
     const double matched =
         whole_reference_.PathLength(matches_.reference.front(), matches_.reference.back());
     if (!(matched < kShortPath * whole)) return;
-    Warn("it covers " + RoundedText(matched, 3) + " m of the reference's path of " +
+    Warn("it covers " + RoundedText(matched, 3) + " m of the reference's trajectory of " +
              RoundedText(whole, 3) + " m",
-         "a figure of the whole path");
+         "a figure of the whole trajectory");
   }
 
   void CheckScale(const Similarity& sim3) {

@@ -73,7 +73,7 @@ struct Check {
   bool needed;  ///< by all that follow
 };
 
-// Of the rules of the boundary.
+// Of the rules of the plugin ABI.
 Finding CheckCreate(Context& context);
 Finding CheckCalls(Context& context);
 Finding CheckBounds(Context& context);

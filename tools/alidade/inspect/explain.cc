@@ -32,12 +32,12 @@ const char* StatusText(BlockStatus status) {
   switch (status) {
     case BlockStatus::kEstimated:
       return "estimated";
-    case BlockStatus::kConsidered:
-      return "considered";
-    case BlockStatus::kFixed:
+    case BlockStatus::kConsider:
+      return "consider";
+    case BlockStatus::kConstant:
       break;
   }
-  return "fixed";
+  return "constant";
 }
 
 /// A number, or a list; the number alone where all are equal and `same` allows it.
@@ -52,7 +52,7 @@ std::string ListText(const std::vector<double>& values, bool same = false) {
 std::string PriorText(const Prior& prior, const Block& block) {
   const bool measured = !prior.from.empty();
   std::string text = measured ? "first measurement of " + prior.from : ListText(prior.mean);
-  if (block.status == BlockStatus::kFixed) return text + ", exact";
+  if (block.status == BlockStatus::kConstant) return text + ", exact";
   if (measured) return text;
   std::vector<double> sigmas;
   for (Eigen::Index i = 0; i < prior.covariance.rows(); ++i) {
@@ -64,7 +64,7 @@ std::string PriorText(const Prior& prior, const Block& block) {
   return text + " +- " + ListText(sigmas, true);
 }
 
-/// A line for each block; what fixed ones are; for each truth that is of no block, why.
+/// A line for each block; what constant ones are; for each truth that is of no block, why.
 std::string States(const System& system, const std::vector<StreamInfo>& truths) {
   const std::vector<int> match = internal::MatchTruths(system.layout, truths);
   std::vector<TextRow> rows = {
@@ -85,9 +85,9 @@ std::string States(const System& system, const std::vector<StreamInfo>& truths) 
                     PriorText(prior, block)});
   }
   std::string text = TextTable(rows, kIndent);
-  const auto is_fixed = [](const Block& block) { return block.status == BlockStatus::kFixed; };
+  const auto is_fixed = [](const Block& block) { return block.status == BlockStatus::kConstant; };
   if (std::ranges::any_of(system.layout.blocks(), is_fixed)) {
-    text += "    fixed: known exactly, without covariance; nothing moves or corrects it\n";
+    text += "    constant: known exactly, without covariance; nothing moves or corrects it\n";
   }
   for (std::size_t t = 0; t < truths.size(); ++t) {
     const std::string why = internal::WhyNoBlock(system.layout, truths, t);
@@ -113,7 +113,7 @@ std::string Motions(const System& system) {
   for (const MotionBinding& motion : system.motions) {
     std::vector<std::string> blocks;
     for (const BlockId id : motion.blocks) {
-      if (system.layout[id].status == BlockStatus::kFixed) continue;
+      if (system.layout[id].status == BlockStatus::kConstant) continue;
       blocks.push_back(system.layout[id].name);
     }
     const int noise = motion.model.noise_size();
@@ -131,10 +131,10 @@ const char* ModeText(RoleMode mode) {
       return "estimate";
     case RoleMode::kConsider:
       return "consider";
-    case RoleMode::kHold:
+    case RoleMode::kKnown:
       break;
   }
-  return "hold";
+  return "known";
 }
 
 std::string Sensors(const System& system) {
@@ -163,8 +163,8 @@ std::string Sensors(const System& system) {
 
 /// What a sensor does with the block that fills a role.
 const char* EffectText(const Block& block, RoleMode mode) {
-  if (block.status == BlockStatus::kFixed || mode == RoleMode::kHold) return "holds";
-  const bool considers = block.status == BlockStatus::kConsidered || mode == RoleMode::kConsider;
+  if (block.status == BlockStatus::kConstant || mode == RoleMode::kKnown) return "knows";
+  const bool considers = block.status == BlockStatus::kConsider || mode == RoleMode::kConsider;
   return considers ? "considers" : "corrects";
 }
 
@@ -182,8 +182,8 @@ std::string Touches(const System& system) {
   for (const MotionBinding& motion : system.motions) {
     add_column(motion.name);
     for (const BlockId id : motion.blocks) {
-      const bool fixed = system.layout[id].status == BlockStatus::kFixed;
-      rows[static_cast<std::size_t>(id) + 1].back() = fixed ? "holds" : "moves";
+      const bool constant = system.layout[id].status == BlockStatus::kConstant;
+      rows[static_cast<std::size_t>(id) + 1].back() = constant ? "knows" : "moves";
     }
   }
   for (const SensorBinding& sensor : system.sensors) {
@@ -233,7 +233,8 @@ std::string Unobservable(const System& system) {
     text += " (" + std::to_string(count) + (count == 1 ? " direction)\n" : " directions)\n");
     if (names[0] == "scale") {
       text +=
-          "    scale, of path and map alike, is what the prior makes of it: depth, a stereo pair, "
+          "    scale, of trajectory and map alike, is what the prior makes of it: depth, a stereo "
+          "pair, "
           "odometry\n    or known landmarks tell it\n";
     }
   }
@@ -251,15 +252,15 @@ std::string SupportText(const std::string& type) {
   const auto lack = [&](bool can_do, const char* what) {
     if (!can_do) lacks += (lacks.empty() ? "" : ", ") + std::string(what);
   };
-  lack(can.considered, "considered blocks and roles");
+  lack(can.consider, "consider blocks and roles");
   lack(can.at_measurement, "jacobian_at measurement");
   lack(can.from_measurement, "blocks that start from a measurement");
   lack(can.recovery, "rejection\n    recovery");
   lack(can.landmarks, "landmarks");
-  return either(can.considered,
-                "    blocks estimated, considered (Schmidt) or fixed; roles estimate, consider, "
-                "hold;\n",
-                "    blocks estimated or fixed; roles estimate, hold;\n") +
+  return either(can.consider,
+                "    blocks estimated, consider (Schmidt) or constant; roles estimate, consider, "
+                "known;\n",
+                "    blocks estimated or constant; roles estimate, known;\n") +
          "    control inputs; jacobian_at prediction" +
          either(can.at_measurement, " or measurement", "") +
          either(can.from_measurement, "; blocks that start from a measurement", "") +

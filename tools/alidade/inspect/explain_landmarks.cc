@@ -11,8 +11,9 @@ std::vector<TextRow> LandmarkRows(const System& system) {
   const LandmarkOptions& options = *system.landmarks;
   const auto sees = [](const SensorBinding& sensor) { return sensor.model.has_landmark(); };
   const auto sensor = std::ranges::find_if(system.sensors, sees);
-  const auto form = FormOf(sensor->model.roles());
-  std::vector<TextRow> rows = {{"representation", form ? ToString(*form) : "the sensor's own"}};
+  const auto representation = RepresentationOf(sensor->model.roles());
+  std::vector<TextRow> rows = {
+      {"representation", representation ? ToString(*representation) : "the sensor's own"}};
   const auto add = [&rows](const std::string& what, const std::string& text) {
     rows.push_back({what, text});
   };
@@ -24,28 +25,29 @@ std::vector<TextRow> LandmarkRows(const System& system) {
     }
     add("prior", prior);
   }
-  std::string enter = options.min_observations == 1
-                          ? "at first observation"
-                          : "at observation " + std::to_string(options.min_observations);
+  std::string initialise = options.min_observations == 1
+                               ? "at first observation"
+                               : "at observation " + std::to_string(options.min_observations);
   if (options.max_per_frame < LandmarkOptions::kUnlimited) {
-    enter += ", while fewer than " + std::to_string(options.max_per_frame) + " are measured";
+    initialise += ", while fewer than " + std::to_string(options.max_per_frame) + " are measured";
   }
-  add("enter", enter);
-  std::vector<std::string> leave;
+  add("initialise", initialise);
+  std::vector<std::string> prune;
   if (options.max_missed_frames > 0) {
-    leave.push_back("unseen for " + std::to_string(options.max_missed_frames) + " frames");
+    prune.push_back("unseen for " + std::to_string(options.max_missed_frames) + " frames");
   }
   if (options.min_match_ratio > 0.0) {
-    leave.push_back("fewer than " + NumberText(options.min_match_ratio) + " of " +
+    prune.push_back("fewer than " + NumberText(options.min_match_ratio) + " of " +
                     std::to_string(options.min_attempts) + " or more measurements accepted");
   }
   if (options.negative_depth == LandmarkOptions::NegativeDepth::kDelete) {
-    leave.emplace_back("inverse distance not above 0");
+    prune.emplace_back("inverse distance not above 0");
   }
-  add("leave", leave.empty() ? "never" : Join(leave, "; "));
-  add("become xyz", options.max_linearity_index > 0.0 ? "below an index of linearity of " +
-                                                            NumberText(options.max_linearity_index)
-                                                      : "never");
+  add("prune", prune.empty() ? "never" : Join(prune, "; "));
+  add("convert to xyz",
+      options.max_linearity_index > 0.0
+          ? "below an index of linearity of " + NumberText(options.max_linearity_index)
+          : "never");
   if (!options.known.empty()) add("known", std::to_string(options.known.size()));
   return rows;
 }

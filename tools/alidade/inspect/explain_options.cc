@@ -30,7 +30,7 @@ std::string FuseText(Fuse fuse, const System& system) {
   const std::vector<std::string> names = NamesOf(system.sensors);
   switch (fuse) {
     case Fuse::kJoint:
-      return "joint: one stacked update for each stamp";
+      return "joint: one stacked update for each timestamp";
     case Fuse::kPerSensor:
       return "per_sensor: one update for each sensor, in the order " + Join(names);
     case Fuse::kPerMeasurement:

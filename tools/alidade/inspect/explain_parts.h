@@ -8,7 +8,8 @@
 
 namespace alidade::internal {
 
-/// How the landmarks of a system that has some enter the state, change and leave it: what, and how.
+/// How the landmarks of a system that has some are initialised, converted and pruned: what, and
+/// how.
 std::vector<TextRow> LandmarkRows(const System& system);
 
 /// What the entry of an estimator sets, a key and its value in words each.

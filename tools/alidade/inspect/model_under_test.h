@@ -47,7 +47,7 @@ struct Shape {
   int rows, columns;
 };
 
-/// One function of the C boundary. Its Jacobians side by side are d outputs / d inputs, in the
+/// One function of the plugin ABI. Its Jacobians side by side are d outputs / d inputs, in the
 /// tangents, for the first `differentiated` inputs in order.
 struct Function {
   std::string name;        ///< as the author knows it: `Predict`

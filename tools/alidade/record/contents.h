@@ -66,8 +66,8 @@ struct RecordedStream {
   std::int64_t expected_rows = 0;  ///< in expected.csv
 };
 
-/// A block whose value each measurement of a sensor implies, in `implied.csv`: by itself, or with
-/// the sensor's other roles at truth.
+/// A block whose value each measurement of a sensor implies, in `implied_states.csv`: by itself, or
+/// with the sensor's other roles at truth.
 struct RecordedImplied {
   std::string sensor;
   std::string block;  ///< the column too

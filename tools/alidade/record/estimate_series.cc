@@ -18,7 +18,7 @@ std::vector<SeriesBlock> SeriesBlocksOf(const System& system) {
   for (BlockId id = 0; id < static_cast<int>(system.layout.blocks().size()); ++id) {
     const Block& block = system.layout[id];
     blocks.push_back(
-        {block.name, UnitOf(system, id), block.geometry(), block.status == BlockStatus::kFixed});
+        {block.name, UnitOf(system, id), block.geometry(), block.status == BlockStatus::kConstant});
   }
   return blocks;
 }

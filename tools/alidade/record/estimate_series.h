@@ -15,7 +15,7 @@ namespace alidade::internal {
 struct SeriesBlock {
   std::string name, unit;
   Geometry geometry;
-  bool fixed = false;  ///< it has no covariance
+  bool constant = false;  ///< it has no covariance
 
   std::string owner() const { return name.substr(0, name.find('.')); }
 };

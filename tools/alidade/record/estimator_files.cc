@@ -56,10 +56,10 @@ void EstimatorFiles::OpenTrajectory(const OutputFolder& folder, const System& sy
   pose_ = FindPose(blocks);
   if (!pose_) return;
   trajectory_.emplace(folder, recorded_.name + "/trajectory.tum", *pose_);
-  const auto fixed = [&](std::size_t id) {
-    return system.layout.blocks()[id].status == BlockStatus::kFixed;
+  const auto constant = [&](std::size_t id) {
+    return system.layout.blocks()[id].status == BlockStatus::kConstant;
   };
-  if (fixed(pose_->position) || fixed(pose_->orientation)) return;
+  if (constant(pose_->position) || constant(pose_->orientation)) return;
   trajectory_covariance_.emplace(folder, recorded_.name + "/trajectory_covariance.tum", *pose_,
                                  true);
 }
@@ -111,7 +111,7 @@ std::vector<std::string> EstimatorFiles::GainsHeader(const System& system) {
     if (system.sensors[s].model.has_landmark()) continue;
     for (const BlockColumns& columns : blocks_) {
       const Block& block = system.layout[columns.id];
-      if (block.status == BlockStatus::kFixed) continue;
+      if (block.status == BlockStatus::kConstant) continue;
       for (const std::string& element : TangentNames(block.name, block.space)) {
         for (const std::string& measured : TangentNames(space.name, space)) {
           const std::string name = element + "<-" + measured;
@@ -229,7 +229,7 @@ void EstimatorFiles::AddGain(Stamp stamp, const State& state, const MeasurementR
   std::size_t next = 0;  // of sensor.gains, which lists blocks, elements, measured elements
   std::size_t row = 0;   // of K
   for (const BlockColumns& columns : blocks_) {
-    if (state.layout()[columns.id].status == BlockStatus::kFixed) continue;
+    if (state.layout()[columns.id].status == BlockStatus::kConstant) continue;
     const bool present = state.layout()[columns.id].present;
     for (std::size_t i = 0; i < columns.tangent; ++i) {
       for (int j = 0; j < sensor.tangent && next < sensor.gains.size(); ++j, ++next) {

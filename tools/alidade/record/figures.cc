@@ -201,7 +201,7 @@ FigureScript InnovationFigure(const RecordedRun& run, const RecordedEstimator& e
 /// What the measurements tell of a block by themselves, beside truth and estimates.
 void ImpliedPanel(FigureScript& script, const RecordedRun& run, const RecordedImplied& implied) {
   script.Panel(implied.block + " from single measurements", InBrackets(implied.unit));
-  script.Quartiles("I", "implied.csv", GnuplotColumn(implied.block));
+  script.Quartiles("I", "implied_states.csv", GnuplotColumn(implied.block));
   script.Set("low = max(I_min, I_lo_quartile - 2 * (I_up_quartile - I_lo_quartile))");
   script.Set("high = min(I_max, I_up_quartile + 2 * (I_up_quartile - I_lo_quartile))");
   const RecordedElement* truth = nullptr;
@@ -218,7 +218,7 @@ void ImpliedPanel(FigureScript& script, const RecordedRun& run, const RecordedIm
   int style = 13;
   for (const RecordedImplied& one : run.implied) {
     if (one.block != implied.block || one.rows == 0) continue;
-    script.Curve({"implied.csv", run.implied_rows, Kinds(run.implied.size())},
+    script.Curve({"implied_states.csv", run.implied_rows, Kinds(run.implied.size())},
                  OverTime(Where(Is("sensor", one.sensor), GnuplotColumn(one.block))) +
                      " with points ls " + std::to_string(style),
                  "measured: " + one.sensor + (one.rest_at_truth ? ", rest true" : ""));

@@ -52,7 +52,9 @@ void WriteLandmarks(const OutputFolder& folder, const std::string& estimator,
     }
   };
   for (const LandmarkEstimate& one : landmarks) {
-    file.Integer(one.id).Integer(one.generation).Text(one.form ? ToString(*one.form) : "");
+    file.Integer(one.id)
+        .Integer(one.generation)
+        .Text(one.representation ? ToString(*one.representation) : "");
     for (const double x : one.position) number(x);
     for (int i = 0; i < 3; ++i) number(std::sqrt(one.covariance(i, i)));
     number(one.inverse_distance);

@@ -23,7 +23,7 @@ FigureScript MapFigure(const RecordedRun& run, const RecordedEstimator& estimato
   const auto [placed, known, across, along] = estimator.map;
   const std::string &u = axes[across], &v = axes[along];
   FigureScript script(estimator.name + ".map",
-                      estimator.name + ": path and map, " + v + " over " + u, u + " [m]");
+                      estimator.name + ": trajectory and map, " + v + " over " + u, u + " [m]");
   if (estimator.path < 0 || placed == 0) return script;
   const RecordedElement* const path = &estimator.elements[static_cast<std::size_t>(estimator.path)];
   const FigureFile path_file{estimator.name + "/estimates.csv", estimator.estimate_rows};
@@ -39,10 +39,10 @@ FigureScript MapFigure(const RecordedRun& run, const RecordedEstimator& estimato
   MapRange(script, path_file, path[along].name, map_file, v, "yrange");
   if (known > 0) curve(map_file, "true_" + u, "true_" + v, "points ls 18", "landmarks, true");
   curve(map_file, u, v, "points ls 14 ps 0.6", "landmarks");
-  curve(path_file, path[across].name, path[along].name, "lines ls 2", "path");
+  curve(path_file, path[across].name, path[along].name, "lines ls 2", "trajectory");
   if (path->has_truth) {
     curve({"truth.csv", run.truth_rows}, path[across].truth, path[along].truth, "lines ls 11",
-          "path, true");
+          "trajectory, true");
   }
   return script;
 }

@@ -138,7 +138,7 @@ std::string Recorder::Impl::TimingJson(const RunResult& result) const {
   internal::Json& times = json["estimators"] = internal::Json::object();
   for (const EstimatorResult& one : result.estimators) times[one.name]["wall_s"] = one.wall_s;
   json["unoptimised"] = result.unoptimised;
-  json["arrivals"] = {{"late", result.arrivals.late},
+  json["arrivals"] = {{"out_of_sequence", result.arrivals.out_of_sequence},
                       {"merged", result.arrivals.merged},
                       {"dropped", result.arrivals.dropped},
                       {"longest_lag_s", Seconds(result.arrivals.longest_lag)}};

@@ -11,7 +11,7 @@
 
 #include "alidade/base/csv_file.h"
 #include "alidade/base/json.h"
-#include "alidade/record/pictures.h"
+#include "alidade/record/images.h"
 #include "alidade/record/pose_file.h"
 #include "alidade/state/element_names.h"
 
@@ -140,19 +140,19 @@ class DataFiles {
   std::set<std::string> names_;
 };
 
-/// The pictures of one simulation.
-class PictureFiles {
+/// The images of one simulation.
+class ImageFiles {
  public:
-  PictureFiles(const SimulatePictures& names, const Config& config, const OutputFolder& folder) {
+  ImageFiles(const SimulateImages& names, const Config& config, const OutputFolder& folder) {
     if (!names.video.empty()) {
       const std::filesystem::path path = Inside(folder, names.video, "--video");
       MakeFolder(path.parent_path(), folder.Shown(names.video));
-      Open({PictureArguments::Form::kVideo, path, folder.Shown(names.video), 0, 0}, config);
+      Open({ImageArguments::Form::kVideo, path, folder.Shown(names.video), 0, 0}, config);
     }
-    if (!names.images.empty()) {
-      const std::filesystem::path path = Inside(folder, names.images, "--images");
-      MakeFolder(path, folder.Shown(names.images));
-      Open({PictureArguments::Form::kImages, path, folder.Shown(names.images), 0, 0}, config);
+    if (!names.folder.empty()) {
+      const std::filesystem::path path = Inside(folder, names.folder, "--images");
+      MakeFolder(path, folder.Shown(names.folder));
+      Open({ImageArguments::Form::kImages, path, folder.Shown(names.folder), 0, 0}, config);
     }
   }
 
@@ -180,19 +180,19 @@ class PictureFiles {
     std::filesystem::create_directories(path, error);
     if (error) internal::FailCreate(shown, error.value());
   }
-  void Open(PictureArguments arguments, const Config& config) {
+  void Open(ImageArguments arguments, const Config& config) {
     constexpr int kMost = 16384;
-    const Node camera = config.root().At("camera", "pictures of a simulation");
+    const Node camera = config.root().At("camera", "images of a simulation");
     arguments.width = static_cast<int>(camera.At("width").Integer(1, kMost));
     arguments.height = static_cast<int>(camera.At("height").Integer(1, kMost));
-    writers_.push_back(OpenPictures(arguments));
+    writers_.push_back(OpenImageWriter(arguments));
   }
 
-  std::vector<std::unique_ptr<PictureWriter>> writers_;
+  std::vector<std::unique_ptr<ImageWriter>> writers_;
   std::vector<std::array<double, 2>> pixels_;
 };
 
-/// The config's `camera` alone, and `baseline_m` of a stereo pair; "" where it has no camera.
+/// The config's `camera` alone; "" if it has none.
 std::string CameraYaml(const Config& config) {
   const bool source_reads_it = !config.root().HasUnread("camera");
   const auto camera = config.root().Find("camera");
@@ -201,10 +201,6 @@ std::string CameraYaml(const Config& config) {
   Config alone = Config::FromText("camera: {}", "calibration.yaml");
   for (const auto& [key, value] : camera->Entries()) {
     alone.Set("camera." + key, value.Text(), "calibration.yaml");
-  }
-  for (const Node& from : {config.root(), config.root().At("source")}) {
-    if (const auto baseline = from.Find("baseline_m"))
-      alone.Set("baseline_m", baseline->Text(), "calibration.yaml");
   }
   return alone.ToYaml();
 }
@@ -219,12 +215,12 @@ std::string SimulateJson(const SimulateResult& result) {
 
 SimulateResult Simulate(const Config& config, const PluginHost& host,
                         const std::filesystem::path& folder, bool force,
-                        const std::function<bool()>& stop, const SimulatePictures& pictures) {
+                        const std::function<bool()>& stop, const SimulateImages& images) {
   const std::unique_ptr<Source> source = MakeSource(config, host);
   const std::string camera = CameraYaml(config);
   OutputFolder output(folder, force);
   DataFiles files(output, *source);
-  PictureFiles drawn(pictures, config, output);
+  ImageFiles drawn(images, config, output);
   SimulateResult result;
   for (Frame frame; !result.stopped && source->Next(frame);) {
     files.Add(result.frames, frame);
@@ -234,7 +230,7 @@ SimulateResult Simulate(const Config& config, const PluginHost& host,
   files.Close();
   drawn.Close();
   result.files.assign(files.names().begin(), files.names().end());
-  for (const std::string& name : {pictures.images, pictures.video}) {
+  for (const std::string& name : {images.folder, images.video}) {
     if (!name.empty()) result.files.push_back(name);
   }
   if (!camera.empty()) {

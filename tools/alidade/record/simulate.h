@@ -19,10 +19,10 @@ struct SimulateResult {
   std::vector<std::string> files;  ///< names in the folder, sorted
 };
 
-/// Pictures of what the camera sees, beside the data: their names in the folder, "" for none.
-struct SimulatePictures {
+/// Images of what the camera sees, beside the data: their names in the folder, "" for none.
+struct SimulateImages {
   std::string video;   ///< a file, NAME.avi
-  std::string images;  ///< a folder of PNG, one for each frame
+  std::string folder;  ///< of PNG, one for each frame
 };
 
 /// Writes what the source of `config` gives into `folder`, without any estimator: the files that
@@ -35,18 +35,17 @@ struct SimulatePictures {
 ///   truth.csv         t_s and the values of all truths
 ///   truth.tum         t x y z qx qy qz qw of the first truth X.position with an X.orientation
 ///   map.csv           feature,x,y,z, m: of each landmark that was seen, where the source knows
-///   calibration.yaml  the config's `camera`, for a config to include; of a pair `baseline_m`
+///   calibration.yaml  the config's `camera`, for a config to include
 ///   simulate.json     {"status": "ok", or "stopped" before the end, "frames": N}
-///   pictures.video    a picture of each frame, MJPG: equal discs at the first two values (u, v),
+///   images.video      an image of each frame, MJPG: equal discs at the first two values (u, v),
 ///                     px, of all measurements of landmarks; as large as the config's `camera`
-///   pictures.images   the same as NUMBER.png
+///   images.folder   the same as NUMBER.png
 ///
 /// Only files that have something to hold are there. The folder appears when all is written; one
 /// that is there is replaced where `force`. `stop` true: ends after the frame. Errors: kBadConfig,
-/// kPlugin, kBadData, kCannotCreate, kNotTrusted (a picture outside the folder), kIo, ...
+/// kPlugin, kBadData, kCannotCreate, kNotTrusted (an image outside the folder), kIo, ...
 SimulateResult Simulate(const Config& config, const PluginHost& host,
                         const std::filesystem::path& folder, bool force,
-                        const std::function<bool()>& stop = {},
-                        const SimulatePictures& pictures = {});
+                        const std::function<bool()>& stop = {}, const SimulateImages& images = {});
 
 }  // namespace alidade

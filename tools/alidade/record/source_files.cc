@@ -128,7 +128,7 @@ SourceFiles::SourceFiles(const OutputFolder& folder, const Experiment& experimen
     if (inverse.recorded.cell + 2 == header.size()) header.push_back(inverse.recorded.block);
   }
   blocks_ = header.size() - 2;
-  implied_.emplace(folder, "implied.csv", header);
+  implied_.emplace(folder, "implied_states.csv", header);
 }
 
 void SourceFiles::FindInverses(const Experiment& experiment) {

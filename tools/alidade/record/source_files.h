@@ -13,8 +13,8 @@
 namespace alidade::internal {
 
 /// What the source gave, frame by frame: `measurements.csv`, `truth.csv` where it knows truths,
-/// `expected.csv` where these tell what a sensor measures, and `implied.csv` where a sensor can be
-/// inverted without knowing anything else, or knowing truth.
+/// `expected.csv` where these tell what a sensor measures, and `implied_states.csv` where a sensor
+/// can be inverted without knowing anything else, or knowing truth.
 class SourceFiles {
  public:
   SourceFiles(const OutputFolder& folder, const Experiment& experiment);

@@ -23,10 +23,10 @@ camera: {model: radtan, width: 320, height: 240, fx: 260, fy: 265, cx: 160.5, cy
 source:
   type: scene
   seed: 5
-  frames: 6
+  max_frames: 6
   rate_hz: 20
-  noise_px: 0.7
-  known: {count: 3}
+  sigma_px: 0.7
+  known_points: {count: 3}
   points: {box: {min: [-3, -2, 2], max: [3, 2, 6]}, count: 30}
   trajectory: {look_at: [{position: [-0.5, 0, 0], target: [0, 0, 4]},
                          {position: [0.5, 0, 0], target: [0, 0, 4]}]}
@@ -35,7 +35,7 @@ source:
 using Pixel = std::array<double, 2>;
 using Pixels = std::map<int, std::map<int, Pixel>>;  ///< by frame and feature
 
-class SimulatePictures : public testing::ProgramTest {
+class SimulateImages : public testing::ProgramTest {
  protected:
   Outcome Simulate(const std::string& config, testing::Arguments more) {
     Write("scene.yaml", config);
@@ -106,7 +106,7 @@ double LargestError(const cv::Mat& image, const std::map<int, Pixel>& points, in
   return largest;
 }
 
-TEST_F(SimulatePictures, DiscsLieWhereTheTracksSay) {
+TEST_F(SimulateImages, DiscsLieWhereTheTracksSay) {
   const Outcome made = Simulate(kScene, {"--video", "video.avi", "--images", "images"});
   ASSERT_EQ(made.code, 0) << made.err;
   EXPECT_TRUE(Contains(made.out, "data/video.avi\n")) << made.out;
@@ -130,7 +130,7 @@ TEST_F(SimulatePictures, DiscsLieWhereTheTracksSay) {
   EXPECT_EQ(seen, seen_again);
 }
 
-TEST_F(SimulatePictures, AreAllAlikeAndOfNothingElse) {
+TEST_F(SimulateImages, AreAllAlikeAndOfNothingElse) {
   ASSERT_EQ(Simulate(kScene, {"--images", "images"}).code, 0);
   const Pixels pixels = AllPixels();
   const cv::Mat image = Image("data/images/000000.png");
@@ -142,19 +142,19 @@ TEST_F(SimulatePictures, AreAllAlikeAndOfNothingElse) {
   EXPECT_GT(total, 0.7 * count * one);  // some touch, or are cut by the border
 }
 
-TEST_F(SimulatePictures, TheVideoHasTheRateOfTheSource) {
+TEST_F(SimulateImages, TheVideoHasTheRateOfTheSource) {
   ASSERT_EQ(Simulate(kScene, {"--video", "film/of scene.avi"}).code, 0);
   const cv::VideoCapture video((folder_ / "data/film/of scene.avi").string(), cv::CAP_OPENCV_MJPEG);
   EXPECT_EQ(video.get(cv::CAP_PROP_FPS), 20.0);
   EXPECT_TRUE(Contains(ProgramTest::Read("data/files.txt"), "film/of scene.avi\n"));
 }
 
-TEST_F(SimulatePictures, OneFrameIsAVideoToo) {
-  ASSERT_EQ(Simulate(kScene, {"--video", "v.avi", "--set", "source.frames=1"}).code, 0);
+TEST_F(SimulateImages, OneFrameIsAVideoToo) {
+  ASSERT_EQ(Simulate(kScene, {"--video", "v.avi", "--set", "source.max_frames=1"}).code, 0);
   EXPECT_EQ(Frames("data/v.avi").size(), 1u);
 }
 
-TEST_F(SimulatePictures, RefusesWhatItCannotWrite) {
+TEST_F(SimulateImages, RefusesWhatItCannotWrite) {
   const Outcome other = Simulate(kScene, {"--video", "video.mp4"});
   EXPECT_EQ(other.code, 2);
   EXPECT_TRUE(Contains(other.err, "expected a name like video.avi")) << other.err;
@@ -163,13 +163,13 @@ TEST_F(SimulatePictures, RefusesWhatItCannotWrite) {
   EXPECT_TRUE(Contains(outside.err, "--images")) << outside.err;
   const Outcome blind = Call({"simulate", "config.yaml", "-o", "data", "--video", "v.avi"});
   EXPECT_EQ(blind.code, 78);
-  EXPECT_TRUE(Contains(blind.err, "camera: missing key, needed by pictures of a simulation"))
+  EXPECT_TRUE(Contains(blind.err, "camera: missing key, needed by images of a simulation"))
       << blind.err;
   EXPECT_FALSE(Exists("data"));
 }
 
 // Blocks are of 512 bytes: all other files fit into 16 of them, and an image is larger than 2.
-TEST_F(SimulatePictures, AFullDiskIsAnError) {
+TEST_F(SimulateImages, AFullDiskIsAnError) {
   before_ = "ulimit -f 16";
   const Outcome video = Simulate(kScene, {"--video", "v.avi"});
   EXPECT_EQ(video.code, 74) << video.err;

@@ -13,10 +13,10 @@
 namespace alidade {
 
 /// What a camera sees, frame by frame: a video or a folder of images.
-class PictureWriter {
+class ImageWriter {
  public:
-  virtual ~PictureWriter() = default;
-  /// Adds the picture of frame `number`, of whose points `pixels` are the centres (u, v); the
+  virtual ~ImageWriter() = default;
+  /// Adds the image of frame `number`, of whose points `pixels` are the centres (u, v); the
   /// stamps of the first two frames give the rate of a video. Errors: kCannotCreate, kIo.
   virtual void Add(std::int64_t number, Stamp stamp,
                    const std::vector<std::array<double, 2>>& pixels) = 0;
@@ -24,18 +24,18 @@ class PictureWriter {
   virtual void Close() = 0;
 };
 
-/// What a picture writer is made from.
-struct PictureArguments {
+/// What an image writer is made from.
+struct ImageArguments {
   enum class Form { kVideo, kImages } form;
   std::filesystem::path path;  ///< of the video, or of the folder of images; its folder is there
   std::string shown;           ///< the path in messages
   int width, height;           ///< px
 };
 
-/// Makes the picture writer of the build-tier plugin in `folder`; of the one that was built with
+/// Makes the image writer of the C++ plugin in `folder`; of the one that was built with
 /// this library where "". It is loaded when it is first asked for, because its libraries are slow
 /// to load. Errors: kPlugin, kNotTrusted, kCannotCreate, kIo.
-std::unique_ptr<PictureWriter> OpenPictures(const PictureArguments& arguments,
-                                            const std::filesystem::path& folder = {});
+std::unique_ptr<ImageWriter> OpenImageWriter(const ImageArguments& arguments,
+                                             const std::filesystem::path& folder = {});
 
 }  // namespace alidade

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/record/pictures.h"
+#include "alidade/record/images.h"
 
 #include <gtest/gtest.h>
 
@@ -10,15 +10,15 @@
 namespace alidade {
 namespace {
 
-TEST(Pictures, ABuildWithoutThePluginSaysWhatToInstall) {
-  const PictureArguments arguments{PictureArguments::Form::kVideo, "/tmp/v.avi", "v.avi", 4, 3};
+TEST(Images, ABuildWithoutThePluginSaysWhatToInstall) {
+  const ImageArguments arguments{ImageArguments::Form::kVideo, "/tmp/v.avi", "v.avi", 4, 3};
   try {
-    OpenPictures(arguments, "/nonexistent");
+    OpenImageWriter(arguments, "/nonexistent");
     FAIL();
   } catch (const Error& e) {
     const std::string text = e.what();
     EXPECT_EQ(e.code(), ExitCode::kPlugin);
-    EXPECT_EQ(text.find("v.avi: this build of alidade draws no pictures; expected one that found "
+    EXPECT_EQ(text.find("v.avi: this build of alidade draws no images; expected one that found "
                         "OpenCV: apt-get install libopencv-dev"),
               0u)
         << text;

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// A build tag of another ABI, of another processor or build, as BAD_BUILD_TAG says.
+#include "alidade/model/plugin.h"
+#include "probe.h"
+
+#define OTHER_ABI 1
+#define OTHER_PROCESSOR 2
+#define OTHER_BUILD 3
+
+namespace {
+
+constexpr AlidadeBuildTag Spoiled() {
+  AlidadeBuildTag f = alidade::detail::MakeBuildTag(
+      BAD_BUILD_TAG == OTHER_BUILD ? ALIDADE_PLUGIN_CPP : ALIDADE_PLUGIN_C_ABI, "0.0.9 other");
+  if (BAD_BUILD_TAG == OTHER_ABI) f.abi_major = 99;
+  if (BAD_BUILD_TAG == OTHER_PROCESSOR) f.isa = 1u << 30;
+  return f;
+}
+
+}  // namespace
+
+extern "C" {
+__attribute__((section(ALIDADE_BUILD_TAG_SECTION), used,
+               visibility("default"))) extern const AlidadeBuildTag alidade_build_tag = Spoiled();
+
+__attribute__((visibility("default"))) const AlidadeTable* alidade_plugin() {
+  static const AlidadeEntry entries[] = {ALIDADE_SENSOR(Probe, "probe", "", "")};
+  static const AlidadeTable table = alidade::detail::Table(entries, &alidade_build_tag);
+  return &table;
+}
+}

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/record/images.h"
+
+#include "alidade/host/build_plugin.h"
+#include "alidade/host/plugin_file.h"
+
+namespace alidade {
+
+std::unique_ptr<ImageWriter> OpenImageWriter(const ImageArguments& arguments,
+                                             const std::filesystem::path& folder) {
+  const internal::PluginOnDemand plugin = internal::OpenOnDemand(
+      "images", folder,
+      ErrorLine({arguments.shown}, {}, "this build of alidade draws no images",
+                "one that found OpenCV: apt-get install libopencv-dev, then configure and build "
+                "again"));
+  if (plugin.table->images == nullptr) internal::Refuse(plugin.file, "draws no images");
+  return plugin.table->images(arguments);
+}
+
+}  // namespace alidade

@@ -137,8 +137,8 @@ std::vector<TrajectoryFile> FilesOf(const EvalArguments& arguments) {
 ExitCode RunEval(const EvalArguments& arguments) {
   EvaluateOptions options = arguments.options;
   options.alignment = Chosen(arguments);
-  options.max_diff = StampFromSeconds(arguments.max_diff_s);
-  options.offset = StampFromSeconds(arguments.offset_s);
+  options.max_diff = TimestampFromSeconds(arguments.max_diff_s);
+  options.offset = TimestampFromSeconds(arguments.offset_s);
   const TrajectoryFile truth =
       IsOfOneRun(arguments) ? TruthOf(arguments.reference) : ReferenceAt(arguments.reference);
   const std::vector<TrajectoryFile> files = FilesOf(arguments);

@@ -53,10 +53,10 @@ std::vector<EventGroup> Group(const std::vector<Event>& events) {
 }
 
 std::string EventLine(const Event& event) {
-  if (event.stamp == kNoStamp) return event.text;
+  if (event.timestamp == kNoTimestamp) return event.text;
   std::ostringstream line;
   line.imbue(std::locale::classic());
-  line << "t = " << std::fixed << std::setprecision(3) << Seconds(event.stamp) << " s: ";
+  line << "t = " << std::fixed << std::setprecision(3) << Seconds(event.timestamp) << " s: ";
   return line.str() + event.text;
 }
 

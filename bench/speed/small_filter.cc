@@ -145,7 +145,7 @@ class Plugin {
     frame_ = testing::FrameAt(0.0, {{0, 0.0}, {1, 0.0}});
   }
   void Step(double disparity, double inverse_scale) {
-    frame_.stamp += kStep;
+    frame_.timestamp += kStep;
     frame_.measurements[0].values[0] = disparity;
     frame_.measurements[1].values[0] = inverse_scale;
     filter_->Process(frame_);
@@ -153,7 +153,7 @@ class Plugin {
   double depth() const { return testing::ValueOf(filter_->state(), "target.depth"); }
 
  private:
-  static inline const Stamp kStep = StampFromSeconds(kDt);
+  static inline const Timestamp kStep = TimestampFromSeconds(kDt);
   std::unique_ptr<Ekf> filter_;
   Frame frame_;
 };

@@ -52,14 +52,14 @@ class CsvSource : public Source {
     }
     Split();
     CheckColumns();
-    frame.stamp = ReadStamp();
+    frame.timestamp = ReadTimestamp();
     std::size_t used = 0;
     for (std::size_t i = 0; i < layout_.streams.size(); ++i) {
       if (used == frame.measurements.size()) frame.measurements.emplace_back();
       Measurement& measurement = frame.measurements[used];
       if (!ReadField(layout_.streams[i], measurement.values)) continue;
       if (layout_.streams[i].goes_blind && rows_ >= first_blind_row_) continue;
-      measurement.stamp = frame.stamp;
+      measurement.timestamp = frame.timestamp;
       measurement.stream = static_cast<int>(i);
       measurement.landmark = -1;
       measurement.covariance.clear();
@@ -70,7 +70,7 @@ class CsvSource : public Source {
     for (std::size_t i = 0; i < frame.truth.size(); ++i) {
       ReadField(layout_.truths[i], frame.truth[i]);
     }
-    last_stamp_ = frame.stamp;
+    last_timestamp_ = frame.timestamp;
     last_line_ = reader_.number();
     ++rows_;
     return true;
@@ -184,16 +184,16 @@ class CsvSource : public Source {
     return value;
   }
 
-  Stamp ReadStamp() const {
-    if (!layout_.time) return StampFromSeconds(static_cast<double>(rows_) / layout_.rate_hz);
+  Timestamp ReadTimestamp() const {
+    if (!layout_.time) return TimestampFromSeconds(static_cast<double>(rows_) / layout_.rate_hz);
     const CsvColumn& column = *layout_.time;
     const double value = ReadNumber(column);
     const double t_s = value * std::pow(10.0, static_cast<double>(layout_.time_digits) - 9.0);
     if (!(std::abs(t_s) < 9.2e9)) FailCell(column, "is beyond 292 years", "-9.2e9 s to 9.2e9 s");
-    const Stamp stamp =
-        cell::ParseStamp(cell::Trim(cells_[column.index]), value, layout_.time_digits);
-    if (!any_order_ && rows_ > 0 && stamp <= last_stamp_) {
-      const bool late = stamp < last_stamp_;
+    const Timestamp timestamp =
+        cell::ParseTimestamp(cell::Trim(cells_[column.index]), value, layout_.time_digits);
+    if (!any_order_ && rows_ > 0 && timestamp <= last_timestamp_) {
+      const bool late = timestamp < last_timestamp_;
       FailCell(
           column,
           (late ? "is before line " : "is the same time as line ") + std::to_string(last_line_),
@@ -202,7 +202,7 @@ class CsvSource : public Source {
                  "different "
                  "streams");
     }
-    return stamp;
+    return timestamp;
   }
 
   std::size_t Column(std::string_view cell) const {
@@ -232,7 +232,7 @@ class CsvSource : public Source {
   std::string_view line_;
   std::vector<std::string_view> cells_;
   std::int64_t rows_ = 0;  ///< given out so far
-  Stamp last_stamp_ = 0;
+  Timestamp last_timestamp_ = 0;
   int last_line_ = 0;
 };
 

@@ -96,7 +96,7 @@ class DepthTarget : public Source {
     const double omega = 2.0 * std::numbers::pi * frequency_hz_;
     const double depth_m = depth_mean_m_ + amplitude_m_ * std::sin(omega * t_s);
     const double rate_m_s = amplitude_m_ * omega * std::cos(omega * t_s);
-    frame.stamp = StampFromSeconds(t_s);
+    frame.timestamp = TimestampFromSeconds(t_s);
     frame.truth = {{depth_m}, {rate_m_s}, {1.0 / template_depth_m_}};
 
     const double exact_px = bf_px_m_ / depth_m;
@@ -118,7 +118,7 @@ class DepthTarget : public Source {
 
   static void Emit(Stream stream, double value, Frame& frame) {
     Measurement measurement;
-    measurement.stamp = frame.stamp;
+    measurement.timestamp = frame.timestamp;
     measurement.stream = stream;
     measurement.values = {value};
     frame.measurements.push_back(std::move(measurement));

@@ -43,7 +43,7 @@ class ImageSequenceWriter : public ImageWriter {
  public:
   explicit ImageSequenceWriter(ImageArguments arguments) : to_(std::move(arguments)) {}
 
-  void Add(std::int64_t number, Stamp /*stamp*/,
+  void Add(std::int64_t number, Timestamp /*timestamp*/,
            const std::vector<std::array<double, 2>>& pixels) override {
     std::vector<unsigned char> bytes;
     cv::imencode(".png", Draw(number, pixels, to_.width, to_.height), bytes);
@@ -70,16 +70,16 @@ class VideoWriter : public ImageWriter {
 
   explicit VideoWriter(ImageArguments arguments) : to_(std::move(arguments)) {}
 
-  void Add(std::int64_t number, Stamp stamp,
+  void Add(std::int64_t number, Timestamp timestamp,
            const std::vector<std::array<double, 2>>& pixels) override {
     cv::Mat image = Draw(number, pixels, to_.width, to_.height);
     if (count_++ == 0) {
       first_ = image;
-      first_stamp_ = stamp;
+      first_timestamp_ = timestamp;
       return;
     }
     if (!video_.isOpened()) {
-      const double gap_s = Seconds(stamp - first_stamp_);
+      const double gap_s = Seconds(timestamp - first_timestamp_);
       Open(gap_s > 0.0 ? std::round(1.0 / gap_s) : kRateOfOne);
     }
     video_.write(image);
@@ -109,7 +109,7 @@ class VideoWriter : public ImageWriter {
   ImageArguments to_;
   cv::VideoWriter video_;
   cv::Mat first_;
-  Stamp first_stamp_ = 0;
+  Timestamp first_timestamp_ = 0;
   int count_ = 0;
 };
 

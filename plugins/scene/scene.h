@@ -84,7 +84,7 @@ class Scene : public Source {
   bool Next(Frame& frame) override {
     if (index_ == count_) return false;
     const scene::CameraState& state = path_[index_];
-    frame.stamp = StampFromSeconds(static_cast<double>(index_) * dt_s_);
+    frame.timestamp = TimestampFromSeconds(static_cast<double>(index_) * dt_s_);
     frame.measurements.clear();
     const auto list = [](const auto& values) {
       return std::vector<double>(values.begin(), values.end());
@@ -183,7 +183,7 @@ class Scene : public Source {
 
   void EmitObservation(const Observation& observation, Frame& frame) {
     Measurement measurement;
-    measurement.stamp = frame.stamp;
+    measurement.timestamp = frame.timestamp;
     measurement.landmark = static_cast<std::int64_t>(observation.point);
     const double u = observation.pixel[0] + sigma_px_ * observation.noise[0];
     const double v = observation.pixel[1] + sigma_px_ * observation.noise[1];
@@ -218,7 +218,7 @@ class Scene : public Source {
     UnitQuaternion::RotateBack(now.orientation.data(), way.data(), moved.data());
     const Eigen::Vector3d linear = scene::UndoTurn(phi, moved) / dt_s_;
     Measurement measurement;
-    measurement.stamp = frame.stamp;
+    measurement.timestamp = frame.timestamp;
     measurement.stream = odometry_stream_;
     for (const double value : linear) {
       measurement.values.push_back(value + linear_sigma_ * odometry_noise_.Normal());

@@ -21,7 +21,7 @@ class TimestampRows {
 
   const std::string& name() const { return rows_.name(); }
   /// The next frame; false at the end.
-  bool Next(std::int64_t& frame, Stamp& stamp) {
+  bool Next(std::int64_t& frame, Timestamp& timestamp) {
     if (!rows_.Next()) {
       if (line_ == 0) rows_.FailLine("no rows", "a row `frame,t_s` for each frame");
       return false;
@@ -31,16 +31,16 @@ class TimestampRows {
     }
     rows_.ExpectColumns(2, "frame,t_s");
     frame = rows_.Index(0, "frame");
-    stamp = rows_.Time(1, "t_s");
+    timestamp = rows_.Time(1, "t_s");
     const std::string before = " line " + std::to_string(line_);
     if (line_ > 0 && frame <= frame_) {
       rows_.FailCell(0, "frame", "is not after that of" + before, "frames in order, each once");
     }
-    if (line_ > 0 && stamp <= stamp_) {
+    if (line_ > 0 && timestamp <= timestamp_) {
       rows_.FailCell(1, "t_s", "is not after that of" + before, "times that increase");
     }
     frame_ = frame;
-    stamp_ = stamp;
+    timestamp_ = timestamp;
     line_ = rows_.line();
     return true;
   }
@@ -48,7 +48,7 @@ class TimestampRows {
  private:
   NumberRows rows_;
   std::int64_t frame_ = 0;
-  Stamp stamp_ = 0;
+  Timestamp timestamp_ = 0;
   int line_ = 0;
 };
 
@@ -146,28 +146,28 @@ class TumRows {
     Advance();
   }
 
-  /// The pose nearest to `stamp`, of two as near the earlier, where it is within `tolerance`.
-  /// Stamps are asked for in order.
-  std::optional<Pose> At(Stamp stamp, Stamp tolerance) {
-    const auto off = [stamp](Stamp other) { return std::abs(other - stamp); };
-    while (has_next_ && (!nearest_ || off(stamp_) < off(nearest_stamp_))) {
+  /// The pose nearest to `timestamp`, of two as near the earlier, where it is within `tolerance`.
+  /// Timestamps are asked for in order.
+  std::optional<Pose> At(Timestamp timestamp, Timestamp tolerance) {
+    const auto off = [timestamp](Timestamp other) { return std::abs(other - timestamp); };
+    while (has_next_ && (!nearest_ || off(timestamp_) < off(nearest_timestamp_))) {
       nearest_ = pose_;
-      nearest_stamp_ = stamp_;
+      nearest_timestamp_ = timestamp_;
       Advance();
     }
-    return nearest_ && off(nearest_stamp_) <= tolerance ? nearest_ : std::nullopt;
+    return nearest_ && off(nearest_timestamp_) <= tolerance ? nearest_ : std::nullopt;
   }
 
  private:
   void Advance() {
     const int line_before = rows_.line();
     const bool first = !has_next_;
-    const Stamp before = stamp_;
+    const Timestamp before = timestamp_;
     has_next_ = rows_.Next();
     if (!has_next_) return;
     rows_.ExpectColumns(8, "t x y z qx qy qz qw");
-    stamp_ = rows_.Time(0, "t");
-    if (!first && stamp_ <= before) {
+    timestamp_ = rows_.Time(0, "t");
+    if (!first && timestamp_ <= before) {
       rows_.FailCell(0, "t", "is not after that of line " + std::to_string(line_before),
                      "times that increase");
     }
@@ -177,9 +177,9 @@ class TumRows {
 
   NumberRows rows_;
   bool has_next_ = false;
-  Stamp stamp_ = 0;  ///< of the row that was read last
+  Timestamp timestamp_ = 0;  ///< of the row that was read last
   Pose pose_{};
-  Stamp nearest_stamp_ = 0;  ///< of the row before it
+  Timestamp nearest_timestamp_ = 0;  ///< of the row before it
   std::optional<Pose> nearest_;
 };
 

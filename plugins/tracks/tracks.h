@@ -63,17 +63,17 @@ class Tracks : public Source {
   }
 
   bool Next(Frame& frame) override {
-    if (frames_ == options_.most || !NextFrame(frame.stamp)) return false;
+    if (frames_ == options_.most || !NextFrame(frame.timestamp)) return false;
     while (frame_ < options_.start_frame) {
       EmitTracks(nullptr);
-      if (!NextFrame(frame.stamp)) return false;
+      if (!NextFrame(frame.timestamp)) return false;
     }
     frame.measurements.clear();
     EmitTracks(&frame);
     if (odometry_) EmitOdometry(frame);
     if (known_) EmitKnown(frame);
     frame.truth.assign(truths_.size(), {});
-    auto pose = truth_ ? truth_->At(frame.stamp, options_.tolerance) : std::nullopt;
+    auto pose = truth_ ? truth_->At(frame.timestamp, options_.tolerance) : std::nullopt;
     if (truth_ && options_.world == TracksOptions::kFirstCamera) {
       if (frames_ == 0 && !pose) {
         tracks_->FailLine("the world is to be the camera of frame " + std::to_string(frame_) +
@@ -133,8 +133,8 @@ class Tracks : public Source {
     if (truth_) truths_ = {{state + ".position", 3}, {state + ".orientation", 4}};
   }
 
-  /// Number and stamp of the next frame; false at the end.
-  bool NextFrame(Stamp& stamp) {
+  /// Number and timestamp of the next frame; false at the end.
+  bool NextFrame(Timestamp& timestamp) {
     const std::optional<std::int64_t> next = tracks_->next_frame();
     if (!times_) {
       if (!next) return false;
@@ -144,10 +144,10 @@ class Tracks : public Source {
         tracks_->FailLine("frame " + std::to_string(frame_) + " is beyond 292 years",
                           "frames that count from 0, at rate_hz");
       }
-      stamp = StampFromSeconds(t_s);
+      timestamp = TimestampFromSeconds(t_s);
       return true;
     }
-    const bool more = times_->Next(frame_, stamp);
+    const bool more = times_->Next(frame_, timestamp);
     if (next && (!more || *next < frame_)) {
       tracks_->FailLine("frame " + std::to_string(*next) + " is not in " + times_->name(),
                         "a time for every frame");
@@ -181,7 +181,7 @@ class Tracks : public Source {
     auto values = rows.Values(frame_, id, feature, size);
     if (!values) return;
     Measurement measurement;
-    measurement.stamp = frame.stamp;
+    measurement.timestamp = frame.timestamp;
     measurement.stream = static_cast<int>(stream);
     measurement.landmark = id;
     measurement.values = std::move(*values);
@@ -192,7 +192,7 @@ class Tracks : public Source {
     const auto values = odometry_->At(frame_);
     if (!values) return;
     Measurement measurement;
-    measurement.stamp = frame.stamp;
+    measurement.timestamp = frame.timestamp;
     measurement.stream = 1;
     measurement.values.assign(values->begin(), values->end());
     const auto next =

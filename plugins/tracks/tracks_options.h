@@ -19,8 +19,8 @@ struct TracksOptions {
   std::int64_t features_from;  ///< features that an earlier frame has are left out
   std::int64_t most;           ///< frames at most
   Odometry odometry;
-  Stamp tolerance;  ///< between a frame and its true pose
-  World world;      ///< of the true poses
+  Timestamp tolerance;  ///< between a frame and its true pose
+  World world;          ///< of the true poses
 
   explicit TracksOptions(Params& p)
       : measures(static_cast<Measures>(p.Choice("measures", {"pixel", "stereo", "depth"},
@@ -37,7 +37,7 @@ struct TracksOptions {
             p.Choice("odometry", {"none", "zero_order_hold", "mean"},
                      "a frame's odometry.csv: none, its row, or the mean with the next frame's row",
                      kZeroOrderHold))),
-        tolerance(StampFromSeconds(
+        tolerance(TimestampFromSeconds(
             p.Number("truth_tolerance_s", "s",
                      "the true pose of a frame is at most so far off in time", {0.0, 1e3}, 1e-3))),
         world(static_cast<World>(p.Choice(

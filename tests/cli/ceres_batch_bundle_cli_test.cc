@@ -207,9 +207,9 @@ TEST_F(BundleTracksCli, CountsFramesWithoutAPose) {
   EXPECT_TRUE(Contains(none.err, "start.tum: no pose at the time of any frame")) << none.err;
 }
 
-/// Without stamps the k-th pose is that of frame k, whatever its time; so from standard input too,
-/// whatever lies in the working folder.
-TEST_F(BundleTracksCli, TakesPosesByTheirNumberWhereThereAreNoStamps) {
+/// Without timestamps the k-th pose is that of frame k, whatever its time; so from standard input
+/// too, whatever lies in the working folder.
+TEST_F(BundleTracksCli, TakesPosesByTheirNumberWhereThereAreNoTimestamps) {
   Write("start.tum", Start(5, 100.0, 0.0));
   Write("tracks.csv", Read("data/tracks.csv"));
   const Outcome file = Bundle("tracks.csv", "start.tum");

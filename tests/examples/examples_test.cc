@@ -104,7 +104,7 @@ TEST(Examples, StereoOnlyReportsItsDivergence) {
     ++diverged;
     for (const Event& event : ekf.events) {
       if (event.kind != "diverged") continue;
-      EXPECT_GT(Seconds(event.stamp), 1.0) << "seed " << seed;
+      EXPECT_GT(Seconds(event.timestamp), 1.0) << "seed " << seed;
     }
   }
   EXPECT_GT(diverged, 70);

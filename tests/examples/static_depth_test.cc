@@ -54,10 +54,10 @@ TEST(StaticDepth, PrintsWhatTheEngineEstimates) {
   int used = 0, k = 0;
   for (const static_depth::Row& row : kRows) {
     Frame frame;
-    frame.stamp = StampFromSeconds(kStep * k);
-    frame.measurements = {{frame.stamp, 1, -1, {row.inverse_scale}, {}}};
+    frame.timestamp = TimestampFromSeconds(kStep * k);
+    frame.measurements = {{frame.timestamp, 1, -1, {row.inverse_scale}, {}}};
     if (row.disparity_px > 0.0) {
-      frame.measurements.push_back({frame.stamp, 0, -1, {row.disparity_px}, {}});
+      frame.measurements.push_back({frame.timestamp, 0, -1, {row.disparity_px}, {}});
     }
     for (const MeasurementReport& m : engine.Process(frame).measurements()) {
       used += m.outcome == Outcome::kAccepted ? 1 : 0;
@@ -67,7 +67,7 @@ TEST(StaticDepth, PrintsWhatTheEngineEstimates) {
     ASSERT_NE(std::fgets(line, sizeof(line), printed), nullptr);
     ASSERT_EQ(std::sscanf(line, "%lf %lf %lf", &t, &depth, &sigma), 3) << line;
     constexpr double kPrinted = 5.01e-7;  // six digits
-    EXPECT_NEAR(t, Seconds(frame.stamp), 5e-4);
+    EXPECT_NEAR(t, Seconds(frame.timestamp), 5e-4);
     EXPECT_NEAR(depth, engine.state().values()[0], kPrinted);
     EXPECT_NEAR(sigma, std::sqrt(engine.state().covariance().Variance(0)), kPrinted);
   }

@@ -333,7 +333,7 @@ TEST_F(DataFault, ATruthThatNoFrameHasIsTold) {
   EXPECT_FALSE(Contains(Run("map.yaml").out, "no frame has the truth"));
 }
 
-// Which of q and -q is written is chosen in the order of the stamps, not of arrival.
+// Which of q and -q is written is chosen in the order of the timestamps, not of arrival.
 TEST_F(DataFault, SignsOfATruthDoNotDependOnTheOrderOfArrival) {
   Write("tracks.csv", Plane(0, 0.0));
   const testing::Arguments sorted = {

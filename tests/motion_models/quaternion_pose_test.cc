@@ -128,14 +128,14 @@ TEST(QuaternionPose, IsFollowedByTheUnscentedFilterAtEverySpread) {
         for (double& element : x[i]) element *= 0.98;
       }
       Frame frame;
-      frame.stamp = StampFromSeconds(0.1 * (k + 1));
+      frame.timestamp = TimestampFromSeconds(0.1 * (k + 1));
       for (int i = 0; i < 2; ++i) {
         const Geometry& geometry = motion.blocks()[static_cast<std::size_t>(i)].geometry;
         std::vector<double> z(x[static_cast<std::size_t>(i)]);
         const double n[3] = {0.02 * random.Normal(), 0.02 * random.Normal(),
                              0.02 * random.Normal()};
         geometry.Plus(z.data(), n, z.data());
-        frame.measurements.push_back({frame.stamp, i, -1, z, {}});
+        frame.measurements.push_back({frame.timestamp, i, -1, z, {}});
       }
       const UpdateReport& report = ukf.Process(frame);
       ASSERT_TRUE(report.events.empty()) << alpha << ' ' << k << ": " << report.events[0].text;

@@ -50,9 +50,9 @@ struct Observation {
 /// A frame of stream 0 with the given landmarks.
 inline Frame FrameOf(double t_s, const std::vector<Observation>& observations) {
   Frame frame;
-  frame.stamp = StampFromSeconds(t_s);
+  frame.timestamp = TimestampFromSeconds(t_s);
   for (const Observation& observation : observations) {
-    frame.measurements.push_back({frame.stamp, 0, observation.id, observation.z, {}});
+    frame.measurements.push_back({frame.timestamp, 0, observation.id, observation.z, {}});
   }
   return frame;
 }

@@ -59,7 +59,7 @@ class SwingingTarget : public Source {
     const double depth = 0.3 + 0.1 * std::sin(2.5133 * t_s), wobble = std::sin(37.0 * next_);
     frame = FrameAt(t_s, {{1, depth / 0.3 + 0.002 * wobble}});
     if (next_ % 2 == 0) {
-      frame.measurements.push_back({frame.stamp, 0, -1, {26.0 / depth + wobble}, {}});
+      frame.measurements.push_back({frame.timestamp, 0, -1, {26.0 / depth + wobble}, {}});
     }
     frame.truth = {{depth}};
     if (next_ == 3) frame.truth = {{}};
@@ -116,7 +116,7 @@ inline void Record(const Recorder::Options& options, int frames = 60) {
   Recorder recorder(options, MakeConfig(), Host());
   RunResult result = RunInto(recorder, experiment);
   result.estimators[0].events.push_back({33'000'000, "note", "a \"word\", and\nanother"});
-  result.estimators[0].events.push_back({kNoStamp, "note", "timeless"});
+  result.estimators[0].events.push_back({kNoTimestamp, "note", "timeless"});
   recorder.Finish(result);
 }
 

@@ -117,9 +117,9 @@ inline std::vector<StreamInfo> StreamsOf(const System& system) {
 /// A frame with one scalar for each (stream, value).
 inline Frame FrameAt(double t_s, const std::vector<std::pair<int, double>>& values) {
   Frame frame;
-  frame.stamp = StampFromSeconds(t_s);
+  frame.timestamp = TimestampFromSeconds(t_s);
   for (const auto& [stream, value] : values) {
-    frame.measurements.push_back({frame.stamp, stream, -1, {value}, {}});
+    frame.measurements.push_back({frame.timestamp, stream, -1, {value}, {}});
   }
   return frame;
 }

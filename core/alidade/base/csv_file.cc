@@ -27,9 +27,9 @@ void CsvFile::Separate() {
   if (cells_++ > 0) row_ += ',';
 }
 
-CsvFile& CsvFile::Time(Stamp stamp) {
+CsvFile& CsvFile::Time(Timestamp timestamp) {
   Separate();
-  if (stamp != kNoStamp) AppendSeconds(row_, stamp);
+  if (timestamp != kNoTimestamp) AppendSeconds(row_, timestamp);
   return *this;
 }
 

@@ -19,7 +19,7 @@ class CsvFile {
   CsvFile(const OutputFolder& folder, const std::string& name,
           const std::vector<std::string>& header);
 
-  CsvFile& Time(Stamp stamp);  ///< empty for kNoStamp
+  CsvFile& Time(Timestamp timestamp);  ///< empty for kNoTimestamp
   CsvFile& Number(double value);
   CsvFile& Integer(std::int64_t value);
   /// Empty where it is negative: there is none.

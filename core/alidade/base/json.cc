@@ -9,8 +9,8 @@
 namespace alidade::internal {
 namespace {
 
-/// Why the parser gave up, `syntax error while parsing value - invalid literal`: its message without
-/// its number and place in front, and without the bytes of the file and the tokens behind.
+/// Why the parser gave up, `syntax error while parsing value - invalid literal`: its message
+/// without its number and place in front, and without the bytes of the file and the tokens behind.
 std::string ReasonOf(const Json::parse_error& error) {
   const std::string what = error.what();
   const std::size_t colon = what.find(": ");

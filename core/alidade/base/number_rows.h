@@ -78,10 +78,10 @@ class NumberRows {
     return value;
   }
   /// A time in seconds, exact to the ns.
-  Stamp Time(std::size_t i, const char* name) const {
+  Timestamp Time(std::size_t i, const char* name) const {
     const double t_s = Number(i, name);
     if (!(std::abs(t_s) < cell::kTimeLimit)) FailCell(i, name, "is beyond 292 years", "seconds");
-    return cell::ParseStamp(text(i), t_s, 9);
+    return cell::ParseTimestamp(text(i), t_s, 9);
   }
 
   /// x y z and a quaternion of unit length to 1e-3, of columns 1 to 7, named by `names`.

@@ -42,14 +42,14 @@ std::string ScientificText(double value, int digits) {
   return {buffer, result.ptr};
 }
 
-std::string SecondsText(Stamp stamp) { return FixedText(Seconds(stamp), 6) + " s"; }
+std::string SecondsText(Timestamp timestamp) { return FixedText(Seconds(timestamp), 6) + " s"; }
 
-void AppendSeconds(std::string& text, Stamp stamp) {
+void AppendSeconds(std::string& text, Timestamp timestamp) {
   constexpr std::uint64_t kSecond = 1'000'000'000;
-  // Unsigned, for the magnitude of the smallest stamp is no stamp.
-  const std::uint64_t bits = static_cast<std::uint64_t>(stamp);
-  const std::uint64_t magnitude = stamp < 0 ? 0 - bits : bits;
-  if (stamp < 0) text += '-';
+  // Unsigned, for the magnitude of the smallest timestamp is no timestamp.
+  const std::uint64_t bits = static_cast<std::uint64_t>(timestamp);
+  const std::uint64_t magnitude = timestamp < 0 ? 0 - bits : bits;
+  if (timestamp < 0) text += '-';
   text += std::to_string(magnitude / kSecond);
   const std::string fraction = std::to_string(magnitude % kSecond);
   text += '.';

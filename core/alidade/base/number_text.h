@@ -22,9 +22,9 @@ std::string RoundedText(double value, int digits = 6);
 std::string ScientificText(double value, int digits);
 
 /// `1.500000 s`, for people to read.
-std::string SecondsText(Stamp stamp);
+std::string SecondsText(Timestamp timestamp);
 
 /// Seconds with nine decimals, exact: `-0.033000000`.
-void AppendSeconds(std::string& text, Stamp stamp);
+void AppendSeconds(std::string& text, Timestamp timestamp);
 
 }  // namespace alidade::internal

@@ -36,17 +36,17 @@ inline const char* ParseNumber(std::string_view text, double& value) {
   return std::isfinite(value) ? nullptr : "is not finite";
 }
 
-/// Times of a size below this, s, are stamps (292 years).
+/// Times of a size below this, s, are timestamps (292 years).
 inline constexpr double kTimeLimit = 9.2e9;
 
 /// The nearest ns to a decimal number without exponent, in a unit of 10^digits ns, of a time below
 /// kTimeLimit.
-inline Stamp ExactStamp(std::string_view text, std::size_t digits) {
+inline Timestamp ExactTimestamp(std::string_view text, std::size_t digits) {
   const bool negative = text.starts_with('-');
   if (negative || text.starts_with('+')) text.remove_prefix(1);
   const std::size_t point = std::min(text.find('.'), text.size());
   const std::string_view fraction = text.substr(std::min(point + 1, text.size()));
-  Stamp ns = 0;
+  Timestamp ns = 0;
   for (const char digit : text.substr(0, point)) ns = 10 * ns + (digit - '0');
   for (std::size_t i = 0; i < digits; ++i) {
     ns = 10 * ns + (i < fraction.size() ? fraction[i] - '0' : 0);
@@ -55,11 +55,11 @@ inline Stamp ExactStamp(std::string_view text, std::size_t digits) {
   return negative ? -ns : ns;
 }
 
-/// The stamp that `text` writes in a unit of 10^digits ns, `value` being the number it is; exact
-/// where it has no exponent. The time is below kTimeLimit.
-inline Stamp ParseStamp(std::string_view text, double value, std::size_t digits) {
-  if (text.find_first_of("eE") == std::string_view::npos) return ExactStamp(text, digits);
-  return StampFromSeconds(value * std::pow(10.0, static_cast<double>(digits) - 9.0));
+/// The timestamp that `text` writes in a unit of 10^digits ns, `value` being the number it is;
+/// exact where it has no exponent. The time is below kTimeLimit.
+inline Timestamp ParseTimestamp(std::string_view text, double value, std::size_t digits) {
+  if (text.find_first_of("eE") == std::string_view::npos) return ExactTimestamp(text, digits);
+  return TimestampFromSeconds(value * std::pow(10.0, static_cast<double>(digits) - 9.0));
 }
 
 /// The start of a cell for a message, without control characters.

@@ -8,11 +8,11 @@
 
 namespace alidade {
 
-Stamp StampFromSeconds(double t_s) {
-  constexpr Stamp kPerSecond = 1'000'000'000;
+Timestamp TimestampFromSeconds(double t_s) {
+  constexpr Timestamp kPerSecond = 1'000'000'000;
   ALIDADE_EXPECTS(std::abs(t_s) < 9.2e9);  // 2^63 ns; false for nan
   const double whole_s = std::floor(t_s);  // the rest is exact, so that only one step rounds
-  return static_cast<Stamp>(whole_s) * kPerSecond + std::llround(1e9 * (t_s - whole_s));
+  return static_cast<Timestamp>(whole_s) * kPerSecond + std::llround(1e9 * (t_s - whole_s));
 }
 
 }  // namespace alidade

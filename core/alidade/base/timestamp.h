@@ -5,13 +5,13 @@
 
 namespace alidade {
 
-/// Time stamps are int64 nanoseconds from the source's own origin.
-using Stamp = std::int64_t;
+/// Time timestamps are int64 nanoseconds from the source's own origin.
+using Timestamp = std::int64_t;
 
-inline constexpr Stamp kNoStamp = INT64_MIN;
+inline constexpr Timestamp kNoTimestamp = INT64_MIN;
 
-/// Nearest stamp to `t_s` seconds.
-Stamp StampFromSeconds(double t_s);
-inline double Seconds(Stamp t) { return 1e-9 * static_cast<double>(t); }
+/// Nearest timestamp to `t_s` seconds.
+Timestamp TimestampFromSeconds(double t_s);
+inline double Seconds(Timestamp t) { return 1e-9 * static_cast<double>(t); }
 
 }  // namespace alidade

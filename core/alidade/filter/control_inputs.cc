@@ -9,12 +9,12 @@
 namespace alidade {
 namespace {
 
-constexpr Stamp kForever = std::numeric_limits<Stamp>::max();
+constexpr Timestamp kForever = std::numeric_limits<Timestamp>::max();
 
 /// timeout_s in whole nanoseconds, at least one.
-Stamp TimeoutOf(double timeout_s) {
-  constexpr double kBeyond = 9.2e9;  // what a Stamp cannot hold
-  return timeout_s < kBeyond ? std::max<Stamp>(1, StampFromSeconds(timeout_s)) : kForever;
+Timestamp TimeoutOf(double timeout_s) {
+  constexpr double kBeyond = 9.2e9;  // what a Timestamp cannot hold
+  return timeout_s < kBeyond ? std::max<Timestamp>(1, TimestampFromSeconds(timeout_s)) : kForever;
 }
 
 /// Why an input cannot be used; empty: it can.
@@ -49,14 +49,14 @@ ControlInputs::ControlInputs(const System& system, const std::vector<StreamInfo>
   }
 }
 
-Stamp ControlInputs::StepEnd(Stamp from, Stamp to) const {
+Timestamp ControlInputs::StepEnd(Timestamp from, Timestamp to) const {
   for (const Held& held : held_) {
     if (Acts(held, from)) to = std::min(to, held.until);
   }
   return to;
 }
 
-bool ControlInputs::AllAct(Stamp from, Stamp to) const {
+bool ControlInputs::AllAct(Timestamp from, Timestamp to) const {
   return std::ranges::all_of(
       held_, [&](const Held& held) { return Acts(held, from) && to <= held.until; });
 }
@@ -64,12 +64,12 @@ bool ControlInputs::AllAct(Stamp from, Stamp to) const {
 std::string ControlInputs::WhyNone(const Held& held) {
   const std::string input =
       "control input of '" + held.name + "' from stream '" + held.binding.stream + "'";
-  if (held.stamp == kNoStamp) return "no " + input + " has come yet: steps with u = 0";
+  if (held.timestamp == kNoTimestamp) return "no " + input + " has come yet: steps with u = 0";
   return "the " + input + " is older than " + internal::NumberText(held.binding.timeout_s) +
          " s: steps with u = 0";
 }
 
-const double* ControlInputs::Use(std::size_t motion, Stamp from, std::vector<Event>& events) {
+const double* ControlInputs::Use(std::size_t motion, Timestamp from, std::vector<Event>& events) {
   const auto found = std::ranges::find(held_, motion, &Held::motion);
   if (found == held_.end()) return nullptr;
   if (Acts(*found, from)) {
@@ -84,12 +84,12 @@ const double* ControlInputs::Use(std::size_t motion, Stamp from, std::vector<Eve
 void ControlInputs::Take(const Frame& frame, UpdateReport& report) {
   for (Held& held : held_) {
     for (const Measurement& m : frame.measurements) {
-      if (m.stream != held.stream || frame.stamp < held.stamp) continue;
+      if (m.stream != held.stream || frame.timestamp < held.timestamp) continue;
       ALIDADE_EXPECTS(m.values.size() == held.value.size());
       const std::string defect = Defect(held.geometry, m.values);
       if (!defect.empty()) {
         if (!held.refusal_noted) {
-          report.events.push_back({frame.stamp, "input_refused",
+          report.events.push_back({frame.timestamp, "input_refused",
                                    "a control input of '" + held.name + "' from stream '" +
                                        held.binding.stream + "' is " + defect +
                                        ": the one before it goes on acting"});
@@ -99,8 +99,8 @@ void ControlInputs::Take(const Frame& frame, UpdateReport& report) {
       }
       std::ranges::copy(m.values, held.value.begin());
       held.geometry.Normalise(held.value.data());
-      held.stamp = frame.stamp;
-      if (__builtin_add_overflow(frame.stamp, held.max_age, &held.until)) held.until = kForever;
+      held.timestamp = frame.timestamp;
+      if (__builtin_add_overflow(frame.timestamp, held.max_age, &held.until)) held.until = kForever;
       held.refusal_noted = false;
       report.inputs.push_back(static_cast<int>(held.motion));
     }

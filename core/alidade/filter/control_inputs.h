@@ -17,7 +17,7 @@ namespace alidade {
 ///
 ///   symbol    unit         meaning
 ///   u_k       the model's  an input that was taken
-///   t_k       s            stamp of its frame
+///   t_k       s            timestamp of its frame
 ///   max_age   s            InputBinding::timeout_s
 ///
 /// A copy is a snapshot.
@@ -30,13 +30,13 @@ class ControlInputs {
   /// Whether no model takes one.
   bool empty() const { return held_.empty(); }
   /// The end of a step that starts at `from` and is to end at `to`, or before where u changes.
-  Stamp StepEnd(Stamp from, Stamp to) const;
+  Timestamp StepEnd(Timestamp from, Timestamp to) const;
   /// Whether all models have an input that acts from `from` to `to`.
-  bool AllAct(Stamp from, Stamp to) const;
+  bool AllAct(Timestamp from, Timestamp to) const;
   /// u (ambient) from `from` to StepEnd, for System::motions[motion]; null where it takes none.
   /// Where none acts, an event `input_stale`, once until one does. Good until the next Take.
-  const double* Use(std::size_t motion, Stamp from, std::vector<Event>& events);
-  /// Takes the inputs of a frame, which then act from its stamp on, and lists them in
+  const double* Use(std::size_t motion, Timestamp from, std::vector<Event>& events);
+  /// Takes the inputs of a frame, which then act from its timestamp on, and lists them in
   /// `report.inputs`. One that is older than the one held is passed over; one that is not finite or
   /// not of unit length is refused, with an event `input_refused`, once until one is taken. Their
   /// noise is that of the model: a covariance that comes with one is not used.
@@ -49,13 +49,13 @@ class ControlInputs {
     InputBinding binding;
     Geometry geometry;
     int stream = -1;  ///< -1: the source has none of that name
-    Stamp max_age = 0;
+    Timestamp max_age = 0;
     std::vector<double> value, neutral;
-    Stamp stamp = kNoStamp;  ///< of the value
-    Stamp until = kNoStamp;  ///< when it stops acting
+    Timestamp timestamp = kNoTimestamp;  ///< of the value
+    Timestamp until = kNoTimestamp;      ///< when it stops acting
     bool stale_noted = false, refusal_noted = false;
   };
-  static bool Acts(const Held& held, Stamp at) { return at < held.until; }
+  static bool Acts(const Held& held, Timestamp at) { return at < held.until; }
   static std::string WhyNone(const Held& held);
 
   std::vector<Held> held_;  ///< of the models that take one

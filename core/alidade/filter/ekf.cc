@@ -62,7 +62,7 @@ std::vector<LandmarkEstimate> Ekf::landmarks() const {
   return landmarks_ == nullptr ? std::vector<LandmarkEstimate>() : landmarks_->Estimates();
 }
 
-void Ekf::Start(Stamp stamp) { stamp_ = stamp; }
+void Ekf::Start(Timestamp timestamp) { timestamp_ = timestamp; }
 
 std::unique_ptr<Estimator::Snapshot> Ekf::Save() const { return std::make_unique<Kept>(*this); }
 
@@ -84,12 +84,13 @@ const UpdateReport& Ekf::Process(const Frame& frame) {
 
 /// The step and the updates of a frame on the general path.
 void Ekf::ProcessFully(const Frame& frame) {
-  if (stamp_ == kNoStamp) {
-    Start(system_.initial_time_s ? StampFromSeconds(*system_.initial_time_s) : frame.stamp);
+  if (timestamp_ == kNoTimestamp) {
+    Start(system_.initial_time_s ? TimestampFromSeconds(*system_.initial_time_s) : frame.timestamp);
   }
-  report_.stale = frame.stamp < stamp_;
-  if (!report_.stale && !failed_) StepTo(frame.stamp);
-  for (Event& event : report_.events) event.stamp = frame.stamp;  // also where it stays behind
+  report_.stale = frame.timestamp < timestamp_;
+  if (!report_.stale && !failed_) StepTo(frame.timestamp);
+  for (Event& event : report_.events)
+    event.timestamp = frame.timestamp;  // also where it stays behind
   Collect(frame);
   if (report_.stale || failed_) {
     for (MeasurementReport& entry : report_.measurements()) {
@@ -144,30 +145,30 @@ void Ekf::Collect(const Frame& frame) {
   }
 }
 
-/// Moves the state to `stamp`, piece by piece where a control input stops acting on the way.
-void Ekf::StepTo(Stamp stamp) {
-  while (stamp_ < stamp) {
+/// Moves the state to `timestamp`, piece by piece where a control input stops acting on the way.
+void Ekf::StepTo(Timestamp timestamp) {
+  while (timestamp_ < timestamp) {
     if (!inputs_.empty()) UseInputs();
-    if (!StepEvenly(inputs_.StepEnd(stamp_, stamp))) return;
+    if (!StepEvenly(inputs_.StepEnd(timestamp_, timestamp))) return;
   }
 }
 
 /// The control inputs from here on, for the models that move.
 void Ekf::UseInputs() {
   for (std::size_t i = 0; i < motions_.size(); ++i) {
-    if (motions_[i].active) motions_[i].u = inputs_.Use(i, stamp_, report_.events);
+    if (motions_[i].active) motions_[i].u = inputs_.Use(i, timestamp_, report_.events);
   }
 }
 
 /// Moves the state to `end`, in equal parts of at most max_dt_s. Where a part cannot be done the
 /// state stays at the end of the one before, and the filter has given up.
-bool Ekf::StepEvenly(Stamp end) {
-  constexpr Stamp kMostParts = 1'000'000;
-  Stamp elapsed = 0;
-  const bool overflow = __builtin_sub_overflow(end, stamp_, &elapsed);
-  const Stamp count = overflow ? 0 : StepParts(elapsed, options_.max_dt_s);
+bool Ekf::StepEvenly(Timestamp end) {
+  constexpr Timestamp kMostParts = 1'000'000;
+  Timestamp elapsed = 0;
+  const bool overflow = __builtin_sub_overflow(end, timestamp_, &elapsed);
+  const Timestamp count = overflow ? 0 : StepParts(elapsed, options_.max_dt_s);
   if (overflow || count > kMostParts) {
-    GiveUp("gap", "a gap of " + Rounded(Seconds(end) - Seconds(stamp_)) +
+    GiveUp("gap", "a gap of " + Rounded(Seconds(end) - Seconds(timestamp_)) +
                       " s would need more than " + Rounded(static_cast<double>(kMostParts)) +
                       " steps of " + Rounded(options_.max_dt_s) + " s");
     return false;
@@ -178,11 +179,11 @@ bool Ekf::StepEvenly(Stamp end) {
                          ", is stepped in " + std::to_string(count) + " equal parts");
     most_parts_ = count;
   }
-  const Stamp start = stamp_;
-  for (Stamp i = 1; i <= count; ++i) {
+  const Timestamp start = timestamp_;
+  for (Timestamp i = 1; i <= count; ++i) {
     if (!StepOnce(Seconds(elapsed) / static_cast<double>(count))) return false;
     ++interval_steps_;
-    stamp_ = i == count ? end : start + elapsed / count * i;
+    timestamp_ = i == count ? end : start + elapsed / count * i;
   }
   return true;
 }
@@ -327,7 +328,7 @@ void Ekf::NotePluginFailure(const SensorBinding& sensor) {
 }
 
 Event& Ekf::Note(const char* kind, std::string text) {
-  report_.events.push_back({stamp_, kind, std::move(text)});
+  report_.events.push_back({timestamp_, kind, std::move(text)});
   return report_.events.back();
 }
 
@@ -357,11 +358,11 @@ void Ekf::GiveUp(const char* kind, const std::string& what) {
   std::vector<BlockId> all(system_.layout.blocks().size());
   std::iota(all.begin(), all.end(), 0);
   std::string text =
-      what + "; last good state at " + internal::SecondsText(stamp_) + ": " + Describe(all);
+      what + "; last good state at " + internal::SecondsText(timestamp_) + ": " + Describe(all);
   if (last_used_.sensor >= 0) {
     text += "; last measurement used: sensor '" +
             system_.sensors[static_cast<std::size_t>(last_used_.sensor)].name + "' at " +
-            internal::SecondsText(last_used_.stamp) + ", z =";
+            internal::SecondsText(last_used_.timestamp) + ", z =";
     for (const double z : last_used_.z) text += ' ' + internal::RoundedText(z, 6);
   }
   NoteDivergence(kind, text);

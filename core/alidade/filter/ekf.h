@@ -48,10 +48,10 @@ class Ekf : public Estimator {
   Ekf(const Ekf&) = delete;  // its plans point into its state
   Ekf& operator=(const Ekf&) = delete;
 
-  void Start(Stamp stamp) override;
+  void Start(Timestamp timestamp) override;
   const UpdateReport& Process(const Frame& frame) override;
   const State& state() const override { return state_; }
-  Stamp stamp() const override { return stamp_; }
+  Timestamp timestamp() const override { return timestamp_; }
   bool diverged() const override { return diverged_; }
   bool failed() const override { return failed_; }
   /// An estimator derived from this one that keeps more from frame to frame overrides both.
@@ -180,8 +180,8 @@ class Ekf : public Estimator {
   void KeepFirstEstimates();
   void BindMotions();
   void ProcessFully(const Frame& frame);
-  void StepTo(Stamp stamp);
-  bool StepEvenly(Stamp end);
+  void StepTo(Timestamp timestamp);
+  bool StepEvenly(Timestamp end);
   void UseInputs();
   void CarryHeld(const MotionModel& model, MotionPlan& plan);
   Workspace::Matrix Spread(std::vector<double> MotionPlan::*matrix, bool held_only);
@@ -246,10 +246,10 @@ class Ekf : public Estimator {
   std::vector<double> next_, moved_, predicted_;
   std::vector<double*> jacobians_;
   std::vector<const double*> roles_;
-  Stamp stamp_ = kNoStamp;
+  Timestamp timestamp_ = kNoTimestamp;
   ControlInputs inputs_;
-  Stamp most_parts_ = 1;                ///< of a gap, as far as they were noted
-  Stamp interval_steps_ = 0;            ///< since the state was last changed by anything else
+  Timestamp most_parts_ = 1;            ///< of a gap, as far as they were noted
+  Timestamp interval_steps_ = 0;        ///< since the state was last changed by anything else
   std::vector<double> gate_threshold_;  ///< on r' S^-1 r, by sensor
   std::vector<int> rejections_;         ///< consecutive, by sensor
   std::vector<char> out_of_domain_;     ///< since the last acceptance, by sensor
@@ -259,7 +259,7 @@ class Ekf : public Estimator {
   /// The last accepted measurement, for the record of a failure.
   struct {
     int sensor = -1;
-    Stamp stamp = kNoStamp;
+    Timestamp timestamp = kNoTimestamp;
     std::vector<double> z;
   } last_used_;
   bool diverged_ = false, failed_ = false;

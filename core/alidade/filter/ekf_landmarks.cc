@@ -195,10 +195,10 @@ void Ekf::Landmarks::Count() {
     const auto [at, is_new] = map_.landmarks.try_emplace(row.measurement->landmark);
     Landmark& landmark = at->second;
     if (is_new) landmark.generation = generations_.Of(at->first);
-    if (landmark.first == kNoStamp) landmark.first = ekf_.stamp_;
+    if (landmark.first == kNoTimestamp) landmark.first = ekf_.timestamp_;
     if (landmark.observations == 0 || landmark.seen != map_.frame) ++landmark.observations;
     landmark.seen = map_.frame;
-    landmark.last = ekf_.stamp_;
+    landmark.last = ekf_.timestamp_;
     if (row.plan == nullptr) continue;
     ++landmark.tried;
     landmark.accepted += Used(entry);

@@ -19,7 +19,7 @@ struct LandmarkMap {
     std::vector<BlockId> blocks;  ///< by landmark role; empty: seen, but not in the state yet
     int generation = 0, observations = 0, tried = 0, accepted = 0;
     std::int64_t seen = 0;  ///< the last frame that measured it
-    Stamp first = kNoStamp, last = kNoStamp;
+    Timestamp first = kNoTimestamp, last = kNoTimestamp;
     bool negative = false;  ///< its inverse distance is
     bool known = false;     ///< from the config: never pruned
     bool in_state() const { return !blocks.empty(); }

@@ -9,7 +9,7 @@
 
 namespace alidade {
 
-/// How the measurements of one stamp are put into updates.
+/// How the measurements of one timestamp are put into updates.
 enum class Fuse {
   kJoint,           ///< one stacked update
   kPerSensor,       ///< one update for each sensor, in the order of the config

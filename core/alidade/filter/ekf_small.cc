@@ -252,7 +252,7 @@ ALIDADE_INLINE bool Ekf::Small::Update(const Frame& frame) {
                                : Correct<N, 0>(rows, m);
     if (!done) return false;
     ekf_.last_used_.sensor = last_sensor;
-    ekf_.last_used_.stamp = last->stamp;
+    ekf_.last_used_.timestamp = last->timestamp;
     Fit(ekf_.last_used_.z, static_cast<int>(std::ssize(last->values)));
     Copy(last->values.data(), static_cast<int>(std::ssize(last->values)), ekf_.last_used_.z);
   }
@@ -275,20 +275,20 @@ void Ekf::Small::CountRejections() {
 
 template <int N>
 bool Ekf::Small::ProcessSized(const Frame& frame) {
-  Stamp elapsed = 0;
-  if (ekf_.failed_ || ekf_.stamp_ == kNoStamp || frame.stamp < ekf_.stamp_ ||
-      __builtin_sub_overflow(frame.stamp, ekf_.stamp_, &elapsed)) {
+  Timestamp elapsed = 0;
+  if (ekf_.failed_ || ekf_.timestamp_ == kNoTimestamp || frame.timestamp < ekf_.timestamp_ ||
+      __builtin_sub_overflow(frame.timestamp, ekf_.timestamp_, &elapsed)) {
     return false;
   }
   if (elapsed > 0) {
     if (ekf_.InInterval()) return false;
     const double dt_s = Seconds(elapsed);
     if (!ekf_.inputs_.empty()) {
-      if (!ekf_.inputs_.AllAct(ekf_.stamp_, frame.stamp)) return false;
+      if (!ekf_.inputs_.AllAct(ekf_.timestamp_, frame.timestamp)) return false;
       ekf_.UseInputs();
     }
     if (!(dt_s <= ekf_.options_.max_dt_s) || !Step<N>(dt_s)) return false;
-    ekf_.stamp_ = frame.stamp;
+    ekf_.timestamp_ = frame.timestamp;
     ++ekf_.interval_steps_;
   }
   return Update<N>(frame);

@@ -13,7 +13,7 @@ namespace alidade {
 struct Ekf::Kept : Snapshot {
   /// All but the state and the map.
   static auto Members(auto& ekf) {
-    return std::tie(ekf.stamp_, ekf.inputs_, ekf.most_parts_, ekf.first_, ekf.rejections_,
+    return std::tie(ekf.timestamp_, ekf.inputs_, ekf.most_parts_, ekf.first_, ekf.rejections_,
                     ekf.out_of_domain_, ekf.inflated_, ekf.warned_, ekf.repairs_, ekf.last_used_,
                     ekf.diverged_, ekf.failed_);
   }
@@ -39,12 +39,12 @@ struct Ekf::Kept : Snapshot {
     std::vector<double> l, gl, m;
   };
 
-  std::tuple<Stamp, ControlInputs, Stamp, std::vector<std::vector<double>>, std::vector<int>,
-             std::vector<char>, std::vector<char>, std::vector<bool>, int, decltype(last_used_),
-             bool, bool>
+  std::tuple<Timestamp, ControlInputs, Timestamp, std::vector<std::vector<double>>,
+             std::vector<int>, std::vector<char>, std::vector<char>, std::vector<bool>, int,
+             decltype(last_used_), bool, bool>
       values;
   LandmarkMap landmarks;
-  Stamp interval_steps = 0;
+  Timestamp interval_steps = 0;
   std::vector<Held> held;  ///< by motion
 };
 

@@ -44,7 +44,7 @@ void Ekf::RecordUpdate(std::span<Row* const> rows, const double* gain) {
   }
   const Row& last = *rows.back();
   last_used_.sensor = last.sensor;
-  last_used_.stamp = last.measurement->stamp;
+  last_used_.timestamp = last.measurement->timestamp;
   last_used_.z.assign(last.measurement->values.begin(), last.measurement->values.end());
 }
 

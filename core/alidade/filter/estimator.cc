@@ -21,11 +21,11 @@ Outcome OutcomeOf(Status status) {
   return Outcome::kFailed;
 }
 
-Stamp StepParts(Stamp elapsed, double max_dt_s) {
-  constexpr double kBeyond = 9.2e18;  // what a Stamp cannot hold
+Timestamp StepParts(Timestamp elapsed, double max_dt_s) {
+  constexpr double kBeyond = 9.2e18;  // what a Timestamp cannot hold
   const double ns = std::round(1e9 * max_dt_s);
-  const Stamp longest =
-      ns < kBeyond ? std::max<Stamp>(1, static_cast<Stamp>(ns)) : std::numeric_limits<Stamp>::max();
+  const Timestamp longest = ns < kBeyond ? std::max<Timestamp>(1, static_cast<Timestamp>(ns))
+                                         : std::numeric_limits<Timestamp>::max();
   return (elapsed - 1) / longest + 1;
 }
 

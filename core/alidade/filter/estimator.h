@@ -32,7 +32,7 @@ const char* ToString(Outcome outcome);
 Outcome OutcomeOf(Status status);
 /// Number of equal parts in which a gap of `elapsed` > 0 is stepped: at most max_dt_s each, to
 /// whole ns, and at least 1 ns.
-Stamp StepParts(Stamp elapsed, double max_dt_s);
+Timestamp StepParts(Timestamp elapsed, double max_dt_s);
 /// Whether none of the values is infinite or not a number.
 inline bool AllFinite(std::span<const double> values) {
   double sum = 0.0;  // 0 times what is not finite is not a number
@@ -67,7 +67,7 @@ struct MeasurementReport {
 
 /// Something that happened to the filter, worth a line to its user.
 struct Event {
-  Stamp stamp = kNoStamp;
+  Timestamp timestamp = kNoTimestamp;
   std::string kind;  ///< one word: diverged, rejection_recovery, conditioning, not_finite, ...
   std::string text;
   bool divergence = false;  ///< the estimator diverged or failed by this
@@ -118,9 +118,9 @@ class Estimator {
 
   virtual ~Estimator() = default;
   /// Sets the time of the initial state.
-  virtual void Start(Stamp stamp) = 0;
-  /// Steps to the frame's stamp and uses those of its measurements that a sensor is bound to. The
-  /// report is good until the next call.
+  virtual void Start(Timestamp timestamp) = 0;
+  /// Steps to the frame's timestamp and uses those of its measurements that a sensor is bound to.
+  /// The report is good until the next call.
   virtual const UpdateReport& Process(const Frame& frame) = 0;
   /// True where an estimate depends on later frames too (a smoother, a batch): state() after
   /// Process is then of no use to anyone but the estimator, and Smooth gives the estimates.
@@ -140,7 +140,7 @@ class Estimator {
   virtual const State& state() const = 0;
   /// The landmarks in the state, by id.
   virtual std::vector<LandmarkEstimate> landmarks() const { return {}; }
-  virtual Stamp stamp() const = 0;
+  virtual Timestamp timestamp() const = 0;
   /// True once the filter left the domain of its sensors or lost its numbers; see the events.
   virtual bool diverged() const = 0;
   /// True where there is nothing left to go on with (not finite, unrecoverable).

@@ -86,7 +86,7 @@ void RtsSmoother::Smooth(const Emit& emit) {
     const Eigen::MatrixXd p = passed->p - with * information * with.transpose();
     const bool positive = (p.diagonal().array() >= 0.0).all();
     if (!positive) {
-      events.push_back({stamp_, "not_pd",
+      events.push_back({timestamp_, "not_pd",
                         "a smoothed variance is negative by rounding in frame " +
                             std::to_string(passed_frames_.rend() - passed - 1) +
                             "; its covariance is the filter's"});

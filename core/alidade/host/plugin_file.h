@@ -22,7 +22,7 @@ struct OpenedPlugin {
   bool unoptimised;               ///< by its build tag
 };
 
-/// The build id that a build-tier plugin must have: that of this library.
+/// The build id that a C++ plugin must have: that of this library.
 const char* HostBuildId();
 
 [[noreturn]] inline void Refuse(const std::filesystem::path& file, const std::string& why) {

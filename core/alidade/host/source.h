@@ -17,19 +17,19 @@ namespace alidade {
 
 /// One value of one stream.
 struct Measurement {
-  Stamp stamp = 0;
+  Timestamp timestamp = 0;
   int stream = 0;  ///< index into Source::streams()
   std::int64_t landmark = -1;
   std::vector<double> values;
   std::vector<double> covariance;  ///< row-major, overrides the model's noise; empty: none
 };
 
-/// All that is known at one stamp, in the order of the source.
+/// All that is known at one timestamp, in the order of the source.
 struct Frame {
-  Stamp stamp = 0;
+  Timestamp timestamp = 0;
   std::vector<Measurement> measurements;
   /// One value list for each entry of Source::truths(), of its size; what is empty, or lacks at the
-  /// end, is unknown at this stamp.
+  /// end, is unknown at this timestamp.
   std::vector<std::vector<double>> truth;
 };
 

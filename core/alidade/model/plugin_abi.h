@@ -67,7 +67,8 @@ enum {
   ALIDADE_ROLE_OPTIONAL = 1,  /* may stay unbound: its pointer is then null */
   ALIDADE_ROLE_PARAMETER = 2, /* the block arrives with its motion model: a bias, an extrinsic */
   ALIDADE_ROLE_LANDMARK = 4,  /* filled anew for each measurement, by its landmark id */
-  ALIDADE_ROLE_SHARED = 8 /* with LANDMARK: one block for all that are first seen at one stamp */
+  ALIDADE_ROLE_SHARED =
+      8 /* with LANDMARK: one block for all that are first seen at one timestamp */
 };
 
 /* A role, a measurement or a control input: a named quantity with its geometry. */

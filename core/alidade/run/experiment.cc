@@ -83,7 +83,7 @@ void CheckTruths(const Node& source, const Experiment& experiment, const System&
   }
 }
 
-/// How the run takes frames that are not in the order of their stamps.
+/// How the run takes frames that are not in the order of their timestamps.
 OutOfSequencePolicy ReadOutOfSequence(const Node& root) {
   OutOfSequencePolicy policy;
   const auto entry = root.Find("out_of_sequence");
@@ -95,7 +95,7 @@ OutOfSequencePolicy ReadOutOfSequence(const Node& root) {
     window->Fail("without a use: 'policy: reject' holds nothing back",
                  "'policy: buffer' or 'rollback'");
   }
-  if (window) policy.window = StampFromSeconds(window->Number(0.0, 1e9));
+  if (window) policy.window = TimestampFromSeconds(window->Number(0.0, 1e9));
   if (!window && policy.policy == OutOfSequence::kRollback) {
     chosen.Fail("'rollback' without 'window_s'",
                 "'window_s', how far out of sequence a frame may be");

@@ -34,29 +34,29 @@ struct NamedEstimator {
   int accepted_by = -1;
 };
 
-/// A share of the stamps over which metrics are taken rmsd: those with (or without) a valid
+/// A share of the timestamps over which metrics are taken rmsd: those with (or without) a valid
 /// measurement of a sensor.
 struct Segment {
   std::string name;
   int stream = -1;
-  bool with = true;    ///< stamps with one, or stamps without
+  bool with = true;    ///< timestamps with one, or timestamps without
   SensorModel sensor;  ///< decides validity
 };
 
-/// What is done with a frame whose stamp is before that of a frame that came earlier.
+/// What is done with a frame whose timestamp is before that of a frame that came earlier.
 enum class OutOfSequence {
   kReject,    ///< estimators are given it as it comes, and count its measurements as stale
   kBuffer,    ///< frames are held back while one before them can still come
   kRollback,  ///< estimators take frames as they come, and roll back for one out of sequence
 };
 
-/// How a run takes frames that are not in the order of their stamps. But under kReject, frames of
-/// equal stamps are merged.
+/// How a run takes frames that are not in the order of their timestamps. But under kReject, frames
+/// of equal timestamps are merged.
 struct OutOfSequencePolicy {
   OutOfSequence policy = OutOfSequence::kReject;
   /// A frame farther behind the newest is dropped, with the event `out_of_sequence`; none: no frame
   /// is.
-  std::optional<Stamp> window;
+  std::optional<Timestamp> window;
   std::vector<int> ranks;  ///< of the streams, among the measurements of merged frames
 };
 

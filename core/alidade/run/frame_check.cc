@@ -14,7 +14,7 @@ constexpr double kTolerance = 1e-3;  ///< on the length of a unit value, as for 
 constexpr double kCounted = 1e-9;
 
 [[noreturn]] void Refuse(const Frame& frame, const std::string& what) {
-  throw ContractViolation("the source gives " + what + " at t = " + SecondsText(frame.stamp));
+  throw ContractViolation("the source gives " + what + " at t = " + SecondsText(frame.timestamp));
 }
 
 void CheckSize(const Frame& frame, const StreamInfo& info, const std::vector<double>& values) {

@@ -16,11 +16,12 @@
 namespace alidade::internal {
 namespace {
 
-/// How far `stamp` is behind `newest`, which is not before it; the longest there is where that
+/// How far `timestamp` is behind `newest`, which is not before it; the longest there is where that
 /// does not fit.
-Stamp Lag(Stamp newest, Stamp stamp) {
-  Stamp lag = 0;
-  return __builtin_sub_overflow(newest, stamp, &lag) ? std::numeric_limits<Stamp>::max() : lag;
+Timestamp Lag(Timestamp newest, Timestamp timestamp) {
+  Timestamp lag = 0;
+  return __builtin_sub_overflow(newest, timestamp, &lag) ? std::numeric_limits<Timestamp>::max()
+                                                         : lag;
 }
 
 /// ` in FILE:LINE`, where the source knows.
@@ -49,7 +50,7 @@ bool FrameOrder::Next(Frame& frame) {
     Accept(frame);
     return true;
   }
-  while (!ended_ && (held_.empty() || !IsTooLate(held_.front().frame.stamp))) {
+  while (!ended_ && (held_.empty() || !IsTooLate(held_.front().frame.timestamp))) {
     try {
       Receive();
     } catch (...) {
@@ -73,24 +74,24 @@ const Processed* FrameOrder::processed(std::size_t estimator) const {
   return one.after != nullptr || one.failed ? &one : nullptr;
 }
 
-/// Whether a frame of this stamp, were it to come now, would come too late.
-bool FrameOrder::IsTooLate(Stamp stamp) const {
+/// Whether a frame of this timestamp, were it to come now, would come too late.
+bool FrameOrder::IsTooLate(Timestamp timestamp) const {
   return experiment_.out_of_sequence.window &&
-         Lag(newest_, stamp) > *experiment_.out_of_sequence.window;
+         Lag(newest_, timestamp) > *experiment_.out_of_sequence.window;
 }
 
 /// Counts the frame; false where it is to be dropped.
 bool FrameOrder::Accept(const Frame& frame) {
-  if (frame.stamp >= newest_) {
-    newest_ = frame.stamp;
+  if (frame.timestamp >= newest_) {
+    newest_ = frame.timestamp;
     return true;
   }
-  const Stamp lag = Lag(newest_, frame.stamp);
+  const Timestamp lag = Lag(newest_, frame.timestamp);
   ++arrivals_.out_of_sequence;
   arrivals_.longest_lag = std::max(arrivals_.longest_lag, lag);
-  if (!IsTooLate(frame.stamp)) return true;
+  if (!IsTooLate(frame.timestamp)) return true;
   ++arrivals_.dropped;
-  events_.push_back({frame.stamp, "out_of_sequence",
+  events_.push_back({frame.timestamp, "out_of_sequence",
                      "a frame " + Names(frame) + "came " + SecondsText(lag) +
                          " behind the newest, beyond the window of " +
                          SecondsText(*experiment_.out_of_sequence.window) + ": dropped"});
@@ -114,7 +115,7 @@ void FrameOrder::Receive() {
   if (ended_) return;
   check_(received.frame);
   received.places.assign(received.frame.measurements.size(), experiment_.source->place());
-  const bool is_newest = received.frame.stamp > newest_;
+  const bool is_newest = received.frame.timestamp > newest_;
   if (!Accept(received.frame)) return;
   const std::size_t at = Insert(std::move(received));
   if (experiment_.out_of_sequence.policy != OutOfSequence::kRollback) return;
@@ -128,10 +129,10 @@ void FrameOrder::Receive() {
 
 /// Where the frame is now in held_.
 std::size_t FrameOrder::Insert(Held&& received) {
-  const auto stamp = [](const Held& held) { return held.frame.stamp; };
-  const auto at = std::ranges::lower_bound(held_, received.frame.stamp, {}, stamp);
+  const auto timestamp = [](const Held& held) { return held.frame.timestamp; };
+  const auto at = std::ranges::lower_bound(held_, received.frame.timestamp, {}, timestamp);
   const auto index = static_cast<std::size_t>(at - held_.begin());
-  if (at == held_.end() || at->frame.stamp != received.frame.stamp) {
+  if (at == held_.end() || at->frame.timestamp != received.frame.timestamp) {
     held_.insert(at, std::move(received));
   } else {
     CheckMerge(*at, received.frame);
@@ -148,7 +149,7 @@ void FrameOrder::CheckMerge(const Held& held, const Frame& part) const {
   const auto fail = [&](const std::string& what, const std::string& expected) {
     throw Error(
         ExitCode::kBadData,
-        ErrorLine(source.place(), {}, what + " at t = " + SecondsText(whole.stamp), expected));
+        ErrorLine(source.place(), {}, what + " at t = " + SecondsText(whole.timestamp), expected));
   };
   for (const Measurement& m : part.measurements) {
     const auto same = [&](const Measurement& other) {

@@ -33,7 +33,7 @@ class FrameOrder {
 
   /// The next frame that no other can come before; false at the end. An error of the source, of
   /// `check` or of an estimator is thrown once the frames held back are out. Errors: kBadData where
-  /// a stream, or another value of a truth, comes twice at one stamp.
+  /// a stream, or another value of a truth, comes twice at one timestamp.
   bool Next(Frame& frame);
   /// What the estimator made of the frame that Next gave; null: it has not been given the frame.
   const Processed* processed(std::size_t estimator) const;
@@ -56,14 +56,14 @@ class FrameOrder {
   void Replay(std::size_t from, bool is_newest);
   Frame Accepted(const Held& held, int by) const;
   Processed Process(Estimator& estimator, const Frame& frame) const;
-  bool IsTooLate(Stamp stamp) const;
+  bool IsTooLate(Timestamp timestamp) const;
   std::string Names(const Frame& frame) const;
 
   Experiment& experiment_;
   Check check_;
-  std::deque<Held> held_;  ///< by stamp
+  std::deque<Held> held_;  ///< by timestamp
   Held released_;          ///< the one that Next gave last, or what was before the first
-  Stamp newest_ = kNoStamp;
+  Timestamp newest_ = kNoTimestamp;
   bool ended_ = false;
   std::exception_ptr failure_;
   Arrivals arrivals_;

@@ -9,24 +9,24 @@
 
 namespace alidade::internal {
 
-/// Estimate and truth of a scalar block over evenly spaced stamps, for its lag. Only the first ones
-/// are kept, so that memory and time of a long run do not grow with it.
+/// Estimate and truth of a scalar block over evenly spaced timestamps, for its lag. Only the first
+/// ones are kept, so that memory and time of a long run do not grow with it.
 struct LagSeries {
   static constexpr std::size_t kMost = 100'000;
 
   std::vector<double> estimate, truth;
-  Stamp first = 0, last = 0;
-  Stamp shortest = INT64_MAX, longest = 0;
+  Timestamp first = 0, last = 0;
+  Timestamp shortest = INT64_MAX, longest = 0;
 
-  void Add(Stamp stamp, double true_value, double error) {
+  void Add(Timestamp timestamp, double true_value, double error) {
     if (truth.size() == kMost) return;
     if (truth.empty()) {
-      first = stamp;
+      first = timestamp;
     } else {
-      shortest = std::min(shortest, stamp - last);
-      longest = std::max(longest, stamp - last);
+      shortest = std::min(shortest, timestamp - last);
+      longest = std::max(longest, timestamp - last);
     }
-    last = stamp;
+    last = timestamp;
     truth.push_back(true_value);
     estimate.push_back(true_value - error);
   }

@@ -23,7 +23,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kInconsistentSigmas = 10.0;
-constexpr int kInconsistentStamps = 20;
+constexpr int kInconsistentTimestamps = 20;
 constexpr double kFarSigmas = 100.0;
 constexpr double kFarAngleSigmas = 5.0;
 constexpr std::size_t kOutcomes = static_cast<std::size_t>(Outcome::kFailed) + 1;
@@ -54,7 +54,7 @@ struct Metrics::Impl {
     double share() const { return static_cast<double>(inside) / static_cast<double>(count); }
   };
 
-  /// Sums over all stamps, or over those of one segment.
+  /// Sums over all timestamps, or over those of one segment.
   struct Sums {
     std::string suffix;                   ///< "" or `@SEGMENT`
     std::vector<Tally> squares, covered;  ///< by tracked block
@@ -69,13 +69,13 @@ struct Metrics::Impl {
     std::string name, unit;
     Geometry geometry;
     std::vector<std::string> elements;  ///< of the tangent
-    std::vector<int> outside;           ///< stamps on end beyond 10 sigma, by element; -1: reported
+    std::vector<int> outside;  ///< timestamps on end beyond 10 sigma, by element; -1: reported
     bool scalar;
     double truth_variance;       ///< of each element
     internal::LagSeries series;  ///< where scalar
     double last_error = -1.0;
 
-    bool known = false;  ///< at this stamp, and so is what follows
+    bool known = false;  ///< at this timestamp, and so is what follows
     Eigen::VectorXd error;
   };
 
@@ -99,7 +99,7 @@ struct Metrics::Impl {
     std::string name;
     std::vector<std::size_t> tracked;
     Thinned nees = {};  ///< per dof
-    double dofs = 0.0;  ///< sum over all stamps
+    double dofs = 0.0;  ///< sum over all timestamps
   };
 
   /// What the bounds of a sensor's NIS need.
@@ -118,8 +118,8 @@ struct Metrics::Impl {
   std::vector<bool> angle;           ///< sensors that measure one
   std::vector<Whiteness> whiteness;  ///< by sensor
   std::int64_t reports = 0;
-  std::map<int, std::vector<double>> reprojection;             ///< rms of each frame, by sensor
-  std::vector<Sums> sums;                                      ///< all stamps, then the segments
+  std::map<int, std::vector<double>> reprojection;  ///< rms of each frame, by sensor
+  std::vector<Sums> sums;                           ///< all timestamps, then the segments
   std::vector<std::array<std::int64_t*, kOutcomes>> count_of;  ///< into counts, by sensor
   std::map<std::string, std::int64_t> counts;
   std::map<std::string, std::string> units;
@@ -131,12 +131,12 @@ struct Metrics::Impl {
   void Track(const System& system, const std::vector<StreamInfo>& truths);
   template <class ValueOf>
   void AddErrors(const Frame& frame, const std::vector<Sums*>& into, const ValueOf& value_of);
-  void AddConsistency(Stamp stamp, const std::vector<Sums*>& into, const State& state);
-  void CheckElement(Stamp stamp, Tracked& block, int element, double sigma);
+  void AddConsistency(Timestamp timestamp, const std::vector<Sums*>& into, const State& state);
+  void CheckElement(Timestamp timestamp, Tracked& block, int element, double sigma);
   void AddNees(Owner& owner, std::size_t index, const std::vector<Sums*>& into, const State& state);
   void AddReport(const std::vector<Sums*>& into, const UpdateReport& report);
   void AddInnovation(std::size_t sensor, const MeasurementReport& m);
-  /// The sums over all stamps, and over the segments that a frame is in.
+  /// The sums over all timestamps, and over the segments that a frame is in.
   std::vector<Sums*> SumsOf(const std::vector<bool>& in_segment);
   void Write(const Sums& sums_of, std::map<std::string, double>& metrics) const;
   void WriteBounds(std::map<std::string, double>& metrics) const;
@@ -193,28 +193,28 @@ void Metrics::Impl::AddErrors(const Frame& frame, const std::vector<Sums*>& into
       const double before = block.series.truth.back();  // unwrapped: lag needs no jumps
       value = before + Angle::Wrap(truth[0] - before);
     }
-    block.series.Add(frame.stamp, value, block.error[0]);
+    block.series.Add(frame.timestamp, value, block.error[0]);
   }
 }
 
-void Metrics::Impl::CheckElement(Stamp stamp, Tracked& block, int element, double sigma) {
+void Metrics::Impl::CheckElement(Timestamp timestamp, Tracked& block, int element, double sigma) {
   int& outside = block.outside[element];
   if (outside < 0) return;
   const double error = std::abs(block.error[element]);
   // A sigma of zero is a value taken as known: its errors are not the filter's.
   const bool inside = sigma == 0.0 || error <= kInconsistentSigmas * sigma;
   outside = inside ? 0 : outside + 1;
-  if (outside < kInconsistentStamps) return;
+  if (outside < kInconsistentTimestamps) return;
   outside = -1;
   const std::string unit = block.unit.empty() ? "" : ' ' + block.unit;
-  events.push_back({stamp, "inconsistent",
+  events.push_back({timestamp, "inconsistent",
                     block.elements[element] + ": the error, " + internal::RoundedText(error, 4) +
                         unit + ", has been beyond " + internal::NumberText(kInconsistentSigmas) +
-                        " sigma for " + std::to_string(kInconsistentStamps) +
+                        " sigma for " + std::to_string(kInconsistentTimestamps) +
                         " timestamps; sigma is " + internal::RoundedText(sigma, 4) + unit});
 }
 
-void Metrics::Impl::AddConsistency(Stamp stamp, const std::vector<Sums*>& into,
+void Metrics::Impl::AddConsistency(Timestamp timestamp, const std::vector<Sums*>& into,
                                    const State& state) {
   constexpr double kNormal95 = 1.959963984540054;
   for (std::size_t i = 0; i < tracked.size(); ++i) {
@@ -224,7 +224,7 @@ void Metrics::Impl::AddConsistency(Stamp stamp, const std::vector<Sums*>& into,
     for (int e = 0; e < place.geometry().tangent; ++e) {
       const double sigma =
           std::sqrt(state.covariance().Variance(place.tangent_offset + e) + block.truth_variance);
-      CheckElement(stamp, block, e, sigma);
+      CheckElement(timestamp, block, e, sigma);
       if (!block.scalar) continue;
       const bool covered = std::abs(block.error[0]) <= kNormal95 * sigma;
       for (Sums* s : into) s->covered[i].Add(0.0, covered);
@@ -405,7 +405,7 @@ void Metrics::Add(const Frame& frame, const std::vector<bool>& in_segment, const
     impl_->AddErrors(frame, into, [&](BlockId id) {
       return state.layout()[id].present ? state.value(id) : nullptr;
     });
-    impl_->AddConsistency(frame.stamp, into, state);
+    impl_->AddConsistency(frame.timestamp, into, state);
   }
   impl_->AddReport(into, report);
 }

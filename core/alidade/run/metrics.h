@@ -14,21 +14,22 @@ namespace alidade {
 /// Metrics of one estimator, taken frame by frame.
 ///
 ///   rmse:BLOCK          sqrt(mean |e|^2),  e = x_true (-) x            unit of the block
-///   lag_ms:BLOCK        delay after truth as Lag() has it, of the first 100 000 stamps; > 0: late.
+///   lag_ms:BLOCK        delay after truth as Lag() has it, of the first 100 000 timestamps; > 0:
+///   late.
 ///                       Scalar blocks, steps within 5 % of their mean, a truth that changes
-///   coverage95:BLOCK    share of stamps with |e| <= 1.96 sigma (scalar blocks)
+///   coverage95:BLOCK    share of timestamps with |e| <= 1.96 sigma (scalar blocks)
 ///   nees.mean:OWNER     mean of e' C^-1 e / dof over the owner's estimated blocks of known truth,
-///                       jointly; stamps where C is singular or not finite are left out
+///                       jointly; timestamps where C is singular or not finite are left out
 ///   nees.low:OWNER, nees.high:OWNER  bounds: nees.mean of a consistent filter lies between
 ///                       them with probability 0.95 [BarShalom2001, sec. 5.4]. Errors of a run are
-///                       correlated over time: n stamps count as n / tau independent samples, tau
-///                       the integrated autocorrelation time of the NEES; n is 10 000 at most
-///   nees.dof:OWNER      elements that the NEES is taken over, mean over the stamps
-///   nees.within95:OWNER share of those stamps with e' C^-1 e <= chi2(0.95, dof)
+///                       correlated over time: n timestamps count as n / tau independent samples,
+///                       tau the integrated autocorrelation time of the NEES; n is 10 000 at most
+///   nees.dof:OWNER      elements that the NEES is taken over, mean over the timestamps
+///   nees.within95:OWNER share of those timestamps with e' C^-1 e <= chi2(0.95, dof)
 ///   nis.mean:SENSOR     mean of r' S^-1 r / dof over accepted measurements
 ///   nis.low:SENSOR, nis.high:SENSOR  bounds, likewise: innovations are white, but those of one
 ///                       frame share the error of the prediction and count as one sample
-///   final_error:BLOCK   |e| at the last stamp
+///   final_error:BLOCK   |e| at the last timestamp
 ///   trajectory.sim3.rmse   of the position that landmarks are seen from, m, after the similarity
 ///                       that brings its trajectory nearest to the true one [Umeyama1991]
 ///   trajectory.sim3.scale  of that similarity; true = scale x estimate
@@ -44,8 +45,8 @@ namespace alidade {
 /// `.deleted`, `.converted` and `.negative`. A
 /// truth is named like the block, `target.depth`, or like its last component where that is unique.
 /// A frame older than the state, as before `initial_time_s`, adds to the counts alone.
-/// A metric without a stamp to take it from is left out; an estimate that is not finite makes its
-/// rmse infinite.
+/// A metric without a timestamp to take it from is left out; an estimate that is not finite makes
+/// its rmse infinite.
 class Metrics {
  public:
   /// `truths` are those of the source, or the blocks of an estimator that stands for them.
@@ -65,7 +66,7 @@ class Metrics {
   void AddDifference(const Frame& frame, const std::vector<bool>& in_segment,
                      const std::vector<std::vector<double>>& estimate);
   /// `inconsistent`, once for each block element: truth is known and the error has been beyond 10
-  /// sigma for 20 stamps on end.
+  /// sigma for 20 timestamps on end.
   const std::vector<Event>& events() const;
   /// Sensors, by index, whose measurements look as if they were in another unit: more than half of
   /// those that were accepted or gated are far off. That is sqrt(r' S^-1 r / dof) > 100; of angles,

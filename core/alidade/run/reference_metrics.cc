@@ -29,7 +29,7 @@ void AddDifferences(const std::vector<Estimate>& estimates, const std::vector<Es
   for (const Estimate& one : estimates) {
     if (at[one.frame] == nullptr) continue;
     const Seen& frame = seen[one.frame];
-    Frame known{frame.frame.stamp, {}, at[one.frame]->values};
+    Frame known{frame.frame.timestamp, {}, at[one.frame]->values};
     for (std::vector<double>& value : known.truth) {
       if (!AllFinite(value)) value.clear();
     }

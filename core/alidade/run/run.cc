@@ -20,7 +20,7 @@ namespace alidade {
 namespace {
 
 /// ` at t = 0.033000 s`
-std::string At(const Frame& frame) { return " at t = " + internal::SecondsText(frame.stamp); }
+std::string At(const Frame& frame) { return " at t = " + internal::SecondsText(frame.timestamp); }
 
 /// Whether the frame has a measurement of the segment's stream that its sensor finds valid.
 bool InSegment(const Segment& segment, const Frame& frame) {
@@ -161,7 +161,7 @@ void Measure(Running& one, RunResult& result) {
 
 /// The smoothing of `one` was stopped; the others keep theirs.
 void NoteStop(Running& one, const char* why, RunResult& result) {
-  one.Note({{one.named.estimator->stamp(), "stopped", why}});
+  one.Note({{one.named.estimator->timestamp(), "stopped", why}});
   if (result.status != RunStatus::kOk) return;
   result.status = RunStatus::kStopped;
   result.code = ExitCode::kStopped;
@@ -191,7 +191,7 @@ void SmoothAll(std::vector<Running>& running, const std::vector<Seen>& kept,
         continue;
       }
       if (!estimator.failed()) throw;  // it is the record, say, that failed
-      events.push_back({estimator.stamp(), "failed", e.what()});
+      events.push_back({estimator.timestamp(), "failed", e.what()});
     }
     one.Note(events);
     if (!estimator.failed()) continue;

@@ -17,9 +17,9 @@ namespace alidade {
 /// How the frames of a run came.
 struct Arrivals {
   std::int64_t out_of_sequence = 0;  ///< before one that came earlier
-  std::int64_t merged = 0;           ///< into another of the same stamp
+  std::int64_t merged = 0;           ///< into another of the same timestamp
   std::int64_t dropped = 0;          ///< of those out of sequence: beyond the window
-  Stamp longest_lag = 0;             ///< of one of those behind the newest, ns
+  Timestamp longest_lag = 0;         ///< of one of those behind the newest, ns
 };
 
 enum class RunStatus { kOk, kStopped, kFailed };

@@ -28,7 +28,8 @@ void LogEvents(const std::string& estimator, std::span<const Event> events, bool
   for (const Event& event : events) {
     const LogLevel level = event.divergence && !is_reason ? LogLevel::kWarning : LogLevel::kInfo;
     if (!IsLogged(level)) continue;
-    const std::string at = event.stamp == kNoStamp ? "" : " at t = " + SecondsText(event.stamp);
+    const std::string at =
+        event.timestamp == kNoTimestamp ? "" : " at t = " + SecondsText(event.timestamp);
     Log(level, estimator + ": " + event.kind + at + ": " + event.text);
   }
 }

@@ -45,12 +45,12 @@ EstimatorResult Begin(const NamedEstimator& named) {
   result.name = named.name;
   result.unobservable = UnobservableDirections(named.system);
   if (!ObservabilityIsTold(named.system)) {
-    result.events.push_back({kNoStamp, "observability",
+    result.events.push_back({kNoTimestamp, "observability",
                              "not looked into: the state has more than " +
                                  std::to_string(kMostObserved) + " elements"});
   }
   for (const auto& direction : result.unobservable) {
-    result.events.push_back({kNoStamp, "unobservable",
+    result.events.push_back({kNoTimestamp, "unobservable",
                              "no sensor of this estimator tells " + Join(direction, " and ") +
                                  (direction.size() > 1 ? " apart" : "")});
   }
@@ -64,7 +64,7 @@ void NoteUnits(const System& system, const Metrics& metrics, EstimatorResult& re
     const bool angle = measured.geometry.kind == GeometryKind::kAngle;
     const std::string unit = measured.unit.empty() ? "the model's units" : measured.unit;
     result.events.push_back(
-        {kNoStamp, "unit",
+        {kNoTimestamp, "unit",
          "sensor '" + sensor.name + "': the median of |z - h| is more than " +
              (angle ? "5 sigma, and |z - h| > pi / 4 or |z| > 2 pi" : "100 sigma") +
              "; is stream '" + sensor.stream + "' in " + (angle ? "rad" : unit) + '?'});
@@ -81,7 +81,7 @@ void NoteConsistency(EstimatorResult& result) {
       const auto high = result.metrics.find(kind + ".high:" + subject);
       if (low == result.metrics.end() || high == result.metrics.end()) continue;
       if (mean >= low->second && mean <= high->second) continue;
-      result.events.push_back({kNoStamp, kind + "_bounds",
+      result.events.push_back({kNoTimestamp, kind + "_bounds",
                                name + " mean " + RoundedText(mean, 3) + " of " + what + subject +
                                    " is outside its 95 % bounds [" + RoundedText(low->second, 3) +
                                    ", " + RoundedText(high->second, 3) + "]: the filter is " +
@@ -96,7 +96,7 @@ void NoteTruths(const Metrics& metrics, EstimatorResult& result) {
   const std::vector<std::string> names = metrics.without_truth();
   if (names.empty()) return;
   result.events.push_back(
-      {kNoStamp, "truth",
+      {kNoTimestamp, "truth",
        "no frame has the truth of " + Join(names) + "; are its times those of the measurements?"});
 }
 
@@ -120,7 +120,7 @@ void NoteUnused(const System& system, const std::string& accepted_by, EstimatorR
         all > 0 ? " used none of " + std::to_string(all) + " measurements: " + Join(others, ", ")
                 : ": stream '" + sensor.stream + "' had no measurement" +
                       (accepted_by.empty() ? "" : " that " + accepted_by + " accepted");
-    result.events.push_back({kNoStamp, "unused", "sensor '" + sensor.name + "'" + of_all});
+    result.events.push_back({kNoTimestamp, "unused", "sensor '" + sensor.name + "'" + of_all});
   }
 }
 

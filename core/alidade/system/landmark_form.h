@@ -28,7 +28,8 @@ struct LandmarkPoint {
   Eigen::Matrix<double, 3, Eigen::Dynamic> jacobian;  ///< by the tangents of the blocks
 };
 
-/// The landmark as xyz, from the values of its blocks in the order of its roles; none unless its inverse distance is above 0.
+/// The landmark as xyz, from the values of its blocks in the order of its roles; none unless its
+/// inverse distance is above 0.
 std::optional<LandmarkPoint> PointOf(LandmarkRepresentation representation,
                                      const double* const* blocks);
 

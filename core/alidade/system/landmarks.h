@@ -83,7 +83,7 @@ struct LandmarkEstimate {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Constant(std::nan(""));
   double inverse_distance = std::nan("");  ///< 1/m; not of xyz
   double sigma = std::nan("");             ///< of the inverse distance, 1/m
-  Stamp first = kNoStamp, last = kNoStamp;
+  Timestamp first = kNoTimestamp, last = kNoTimestamp;
   int tried = 0, accepted = 0;  ///< measurements
 };
 

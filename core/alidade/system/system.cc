@@ -386,7 +386,7 @@ System BuildSystem(const Node& root, const PluginHost& host, const std::vector<s
       }
     }
   }
-  constexpr double kLatestSeconds = 4.6e9;  // two stamps may differ by twice that
+  constexpr double kLatestSeconds = 4.6e9;  // two timestamps may differ by twice that
   if (const auto start = root.Find("initial_time_s"))
     system.initial_time_s = start->Number(-kLatestSeconds, kLatestSeconds);
   if (!only.empty()) system = WithoutUntouched(std::move(system));

@@ -31,14 +31,14 @@ class CeresBatch : public Estimator {
         state_(system.InitialState()),
         initialiser_(system, options.solve.max_dt_s, streams) {}
 
-  void Start(Stamp stamp) override {
-    run_.Start(stamp);
-    initialiser_.filter().Start(stamp);
+  void Start(Timestamp timestamp) override {
+    run_.Start(timestamp);
+    initialiser_.filter().Start(timestamp);
   }
   bool offline() const override { return mode_ == Options::Mode::kSmoothing; }
   const State& state() const override { return state_; }
   std::vector<LandmarkEstimate> landmarks() const override { return map_; }
-  Stamp stamp() const override { return run_.stamp(); }
+  Timestamp timestamp() const override { return run_.timestamp(); }
   bool diverged() const override { return failed_; }
   bool failed() const override { return failed_; }
 
@@ -49,17 +49,17 @@ class CeresBatch : public Estimator {
     const bool were_few = run_.inputs() <= kManyInputs;
     if (!run_.Add(frame, filter, ekf)) {
       failed_ = true;
-      report_.events.push_back({frame.stamp, "batch", run_.problem()});
+      report_.events.push_back({frame.timestamp, "batch", run_.problem()});
       return report_;
     }
     if (!ekf.failed()) filtered_.push_back(run_.ValuesOf(ekf.state()));
-    if (!offline()) SolveSoFar(frame.stamp);
+    if (!offline()) SolveSoFar(frame.timestamp);
     if (were_few && run_.inputs() > kManyInputs) {
-      report_.events.push_back({frame.stamp, "slow",
+      report_.events.push_back({frame.timestamp, "slow",
                                 "more than " + std::to_string(kManyInputs) +
                                     " noise inputs: the time of a solve grows with their cube"});
     }
-    initialiser_.Tell(frame.stamp, filter, report_.events);
+    initialiser_.Tell(frame.timestamp, filter, report_.events);
     return report_;
   }
 
@@ -77,8 +77,8 @@ class CeresBatch : public Estimator {
       const bool last = k + 1 == run_.size();
       run_.Report(k, point, report_);
       PutState(k, point);
-      if (last) solve_.Note(run_.stamp(), report_.events);
-      if (last) report_.events.push_back({run_.stamp(), "batch", solve_.summary()});
+      if (last) solve_.Note(run_.timestamp(), report_.events);
+      if (last) report_.events.push_back({run_.timestamp(), "batch", solve_.summary()});
       emit(k, state_, report_);
     };
     map_ = initialiser_.filter().landmarks();
@@ -93,11 +93,11 @@ class CeresBatch : public Estimator {
     throw Error(ExitCode::kDiverged, why);
   }
 
-  void SolveSoFar(Stamp stamp) {
+  void SolveSoFar(Timestamp timestamp) {
     const bool solved = solve_.SolveAnew(run_, filtered_, e_);
     failed_ = solve_.failed();
     if (!solved) {
-      NoteFailure(stamp, solve_.summary());
+      NoteFailure(timestamp, solve_.summary());
       return;
     }
     const auto put = [&](std::size_t k, const CondensedRun::Point& point) {
@@ -107,17 +107,17 @@ class CeresBatch : public Estimator {
     };
     map_ = initialiser_.filter().landmarks();
     const bool put_all = run_.ForEachFrame(e_, run_.size(), put) && PutMap();
-    solve_.Note(stamp, report_.events);
+    solve_.Note(timestamp, report_.events);
     if (!put_all) {
-      NoteFailure(stamp, solve_.summary() + "; then " + run_.problem());
+      NoteFailure(timestamp, solve_.summary() + "; then " + run_.problem());
     } else if (failed_) {
-      NoteFailure(stamp, solve_.summary());
+      NoteFailure(timestamp, solve_.summary());
     }
   }
 
-  void NoteFailure(Stamp stamp, const std::string& why) {
+  void NoteFailure(Timestamp timestamp, const std::string& why) {
     failed_ = true;
-    report_.events.push_back({stamp, "batch", why});
+    report_.events.push_back({timestamp, "batch", why});
   }
 
   bool PutMap() { return map_.empty() || run_.PutMap(e_.data(), solve_.u(), map_); }

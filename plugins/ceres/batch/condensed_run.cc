@@ -85,23 +85,24 @@ std::vector<double> CondensedRun::ValuesOf(const State& state) const {
 }
 
 bool CondensedRun::Add(const Frame& frame, const UpdateReport& report, const Estimator& filter) {
-  if (stamp_ == kNoStamp) {
-    stamp_ = system_.initial_time_s ? StampFromSeconds(*system_.initial_time_s) : frame.stamp;
+  if (timestamp_ == kNoTimestamp) {
+    timestamp_ =
+        system_.initial_time_s ? TimestampFromSeconds(*system_.initial_time_s) : frame.timestamp;
   }
   Epoch epoch;
   epoch.steps.swap(passed_on_);
-  epoch.stale = frame.stamp < stamp_;
+  epoch.stale = frame.timestamp < timestamp_;
   const int inputs = inputs_;
   if (!epochs_.empty()) epoch.column = inputs;
-  for (Stamp from = stamp_; from < frame.stamp;) {
-    const Stamp end = controls_.StepEnd(from, frame.stamp);
+  for (Timestamp from = timestamp_; from < frame.timestamp;) {
+    const Timestamp end = controls_.StepEnd(from, frame.timestamp);
     if (!AddSteps(from, end, epoch)) {
       inputs_ = inputs;
       return false;
     }
     from = end;
   }
-  if (!epoch.stale) stamp_ = frame.stamp;
+  if (!epoch.stale) timestamp_ = frame.timestamp;
   UpdateReport taken;
   controls_.Take(frame, taken);
   epoch.inputs = std::move(taken.inputs);
@@ -122,16 +123,16 @@ void CondensedRun::EndInterval(Epoch& epoch) {
 }
 
 /// The steps of all models from `from` to `end`, over which the control inputs are constant.
-bool CondensedRun::AddSteps(Stamp from, Stamp end, Epoch& epoch) {
-  Stamp elapsed = 0;
+bool CondensedRun::AddSteps(Timestamp from, Timestamp end, Epoch& epoch) {
+  Timestamp elapsed = 0;
   const bool overflow = __builtin_sub_overflow(end, from, &elapsed);
-  const Stamp parts = overflow ? 0 : StepParts(elapsed, max_dt_s_);
+  const Timestamp parts = overflow ? 0 : StepParts(elapsed, max_dt_s_);
   if (overflow || parts > kMostInputs) {
     return Fail("a gap before " + internal::SecondsText(end) + " needs more than " +
                 std::to_string(kMostInputs) + " steps of max_dt_s");
   }
   std::vector<Event> events;  // which the filter tells
-  for (Stamp part = 0; part < parts; ++part) {
+  for (Timestamp part = 0; part < parts; ++part) {
     for (std::size_t i = 0; i < system_.motions.size(); ++i) {
       const MotionBinding& motion = system_.motions[i];
       if (motion.model.stationary() || !AllPresent(motion.blocks)) continue;

@@ -51,7 +51,7 @@ class CondensedRun {
   CondensedRun(System system, const std::vector<StreamInfo>& streams, double max_dt_s);
 
   /// Sets the time of the prior; else the first frame, or initial_time_s, does.
-  void Start(Stamp stamp) { stamp_ = stamp; }
+  void Start(Timestamp timestamp) { timestamp_ = timestamp; }
   /// One frame more; the filter's report says which measurement gave a block or landmark its first
   /// value. False, and problem(), where there would be too many inputs.
   bool Add(const Frame& frame, const UpdateReport& report, const Estimator& filter);
@@ -73,7 +73,7 @@ class CondensedRun {
   /// frame after which noise goes on being held has no measurement: its steps become those of the
   /// next one. False where a model is not defined: nothing has changed.
   bool MarginaliseFirst(Eigen::VectorXd& e);
-  Stamp stamp() const { return stamp_; }
+  Timestamp timestamp() const { return timestamp_; }
 
   /// Takes Q and R at the states of e. False where that cannot be.
   bool Freeze(const double* e);
@@ -177,7 +177,7 @@ class CondensedRun {
   bool Begin(const double* e, bool sensitivity, Point& point) const;
   /// From frame k - 1 (or the prior) to frame k.
   bool Advance(std::size_t k, const double* e, Point& point) const;
-  bool AddSteps(Stamp from, Stamp end, Epoch& epoch);
+  bool AddSteps(Timestamp from, Timestamp end, Epoch& epoch);
   void AddFactors(const Frame& frame, const UpdateReport& report, Epoch& epoch);
   void AddLandmarks(const UpdateReport& report, const Estimator& filter, Epoch& epoch);
   void AddKnown();
@@ -250,7 +250,7 @@ class CondensedRun {
   std::map<std::int64_t, int> current_;  ///< by id: the last of landmarks_
   std::vector<int> read_;                ///< tangent rows of a state that sensors read
   std::vector<Part> parts_;
-  Stamp stamp_ = kNoStamp;
+  Timestamp timestamp_ = kNoTimestamp;
   ControlInputs controls_;
   int inputs_ = 0, residuals_ = 0;
   bool has_unit_vector_ = false;

@@ -198,7 +198,7 @@ bool CondensedRun::Residual(const Factor& factor, const Point& point, const std:
   const Geometry& geometry = model.measurement().geometry;
   if (factor.l.size() == 0) {
     return Fail("sensor '" + sensor.name + "' at " +
-                internal::SecondsText(factor.measurement.stamp) + ": not defined at the start");
+                internal::SecondsText(factor.measurement.timestamp) + ": not defined at the start");
   }
   const std::vector<const double*> roles = RolesOf(factor, point, y);
   std::vector<RowMajor> jacobians(roles.size());
@@ -225,7 +225,7 @@ bool CondensedRun::Residual(const Factor& factor, const Point& point, const std:
                             : model.Linearise(roles.data(), h.data(), into.data(), strides.data());
   if (status != Status::kOk) {
     return Fail("sensor '" + sensor.name + "' at " +
-                internal::SecondsText(factor.measurement.stamp) + ": " +
+                internal::SecondsText(factor.measurement.timestamp) + ": " +
                 Why(status, model.error_text()));
   }
   const double* z = factor.measurement.values.data();
@@ -281,7 +281,7 @@ bool CondensedRun::FreezeFactor(Factor& factor, const Point& point, const std::v
                                           factor.measurement.values.data(), root.data());
     if (status != Status::kOk) {
       return Fail("the noise of sensor '" + sensor.name + "' at " +
-                  internal::SecondsText(factor.measurement.stamp) + ": " +
+                  internal::SecondsText(factor.measurement.timestamp) + ": " +
                   Why(status, model.error_text()));
     }
     r = root * root.transpose();
@@ -291,7 +291,7 @@ bool CondensedRun::FreezeFactor(Factor& factor, const Point& point, const std::v
   const Eigen::LLT<Eigen::MatrixXd> llt(r);  // which takes what is not a number for a success
   if (!r.allFinite() || llt.info() != Eigen::Success) {
     return Fail("the noise of sensor '" + sensor.name + "' at " +
-                internal::SecondsText(factor.measurement.stamp) +
+                internal::SecondsText(factor.measurement.timestamp) +
                 " is not positive definite: a batch needs sigma > 0");
   }
   const Eigen::MatrixXd l = llt.matrixL();

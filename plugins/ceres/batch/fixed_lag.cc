@@ -23,10 +23,10 @@ struct FixedLagOptions {
   SolveOptions solve;
 };
 
-/// lag_s in whole ns; beyond what a Stamp holds, no frame leaves the window.
-Stamp LagOf(double lag_s) {
+/// lag_s in whole ns; beyond what a Timestamp holds, no frame leaves the window.
+Timestamp LagOf(double lag_s) {
   constexpr double kBeyond = 9e9;
-  return lag_s < kBeyond ? StampFromSeconds(lag_s) : std::numeric_limits<Stamp>::max();
+  return lag_s < kBeyond ? TimestampFromSeconds(lag_s) : std::numeric_limits<Timestamp>::max();
 }
 
 /// Fixed-lag smoother: the maximum a posteriori of the frames of the last lag_s, of the factors
@@ -50,13 +50,13 @@ class FixedLag : public Estimator {
         state_(system.InitialState()),
         initialiser_(system, options.solve.max_dt_s, streams) {}
 
-  void Start(Stamp stamp) override {
-    run_.Start(stamp);
-    initialiser_.filter().Start(stamp);
+  void Start(Timestamp timestamp) override {
+    run_.Start(timestamp);
+    initialiser_.filter().Start(timestamp);
   }
   bool offline() const override { return output_ == FixedLagOptions::Output::kLagged; }
   const State& state() const override { return state_; }
-  Stamp stamp() const override { return run_.stamp(); }
+  Timestamp timestamp() const override { return run_.timestamp(); }
   bool diverged() const override { return failed_; }
   bool failed() const override { return failed_; }
 
@@ -64,15 +64,15 @@ class FixedLag : public Estimator {
     report_.Clear();
     if (failed_) return report_;
     const UpdateReport& filter = initialiser_.Process(frame);
-    if (!MoveWindow(frame.stamp) || !run_.Add(frame, filter, initialiser_.filter())) {
-      return Fail(frame.stamp, run_.problem());
+    if (!MoveWindow(frame.timestamp) || !run_.Add(frame, filter, initialiser_.filter())) {
+      return Fail(frame.timestamp, run_.problem());
     }
-    stamps_.push_back(run_.stamp());
+    timestamps_.push_back(run_.timestamp());
     if (!initialiser_.filter().failed()) {
       about_.push_back(run_.ValuesOf(initialiser_.filter().state()));
     }
-    SolveWindow(frame.stamp);
-    initialiser_.Tell(frame.stamp, filter, report_.events);
+    SolveWindow(frame.timestamp);
+    initialiser_.Tell(frame.timestamp, filter, report_.events);
     return report_;
   }
 
@@ -92,27 +92,27 @@ class FixedLag : public Estimator {
     UpdateReport report;
   };
 
-  const UpdateReport& Fail(Stamp stamp, const std::string& why) {
+  const UpdateReport& Fail(Timestamp timestamp, const std::string& why) {
     failed_ = true;
-    report_.events.push_back({stamp, "fixed_lag", why});
+    report_.events.push_back({timestamp, "fixed_lag", why});
     return report_;
   }
 
-  bool Leaves(Stamp stamp, Stamp newest) const {
-    Stamp age = 0;
-    return __builtin_sub_overflow(newest, stamp, &age) || age > window_;
+  bool Leaves(Timestamp timestamp, Timestamp newest) const {
+    Timestamp age = 0;
+    return __builtin_sub_overflow(newest, timestamp, &age) || age > window_;
   }
 
   /// Lets go of the frames that are too old once there is one at `newest`.
-  bool MoveWindow(Stamp newest) {
+  bool MoveWindow(Timestamp newest) {
     std::size_t leaving = 0;
-    while (leaving < stamps_.size() && Leaves(stamps_[leaving], newest)) ++leaving;
+    while (leaving < timestamps_.size() && Leaves(timestamps_[leaving], newest)) ++leaving;
     if (offline() && !Keep(leaving)) return false;
     for (std::size_t i = 0; i < leaving; ++i) {
       if (!run_.MarginaliseFirst(e_)) return false;
     }
     const auto count = static_cast<std::ptrdiff_t>(leaving);
-    stamps_.erase(stamps_.begin(), stamps_.begin() + count);
+    timestamps_.erase(timestamps_.begin(), timestamps_.begin() + count);
     about_.erase(about_.begin(), about_.begin() + count);
     return true;
   }
@@ -128,9 +128,9 @@ class FixedLag : public Estimator {
     });
   }
 
-  void SolveWindow(Stamp stamp) {
+  void SolveWindow(Timestamp timestamp) {
     if (!solve_.SolveAnew(run_, about_, e_)) {
-      Fail(stamp, solve_.summary());
+      Fail(timestamp, solve_.summary());
       return;
     }
     about_.clear();
@@ -141,22 +141,22 @@ class FixedLag : public Estimator {
           run_.Report(k, point, report_);
           run_.Put(k, point, solve_.Whitened(point), state_);
         });
-    solve_.Note(stamp, report_.events);
+    solve_.Note(timestamp, report_.events);
     if (!good) {
-      Fail(stamp, solve_.summary() + "; then " + run_.problem());
+      Fail(timestamp, solve_.summary() + "; then " + run_.problem());
     } else if (solve_.failed()) {
-      Fail(stamp, solve_.summary());
+      Fail(timestamp, solve_.summary());
     }
   }
 
   FixedLagOptions::Output output_;
-  Stamp window_;
+  Timestamp window_;
   CondensedRun run_;  ///< that of the window
   MapSolve solve_;
   State state_;  ///< current: of the last frame; lagged: of the last that left
   InitialisingFilter
       initialiser_;  ///< gives the newest frame a start, and blocks their first values
-  std::vector<Stamp> stamps_;
+  std::vector<Timestamp> timestamps_;
   std::vector<std::vector<double>> about_;  ///< the last solution
   std::vector<Kept> kept_;
   Eigen::VectorXd e_;

@@ -39,8 +39,8 @@ void MapSolve::HeedStop() const {
   if (Stopped()) throw Error(ExitCode::kStopped, "stopped while the batch was solved");
 }
 
-void MapSolve::Note(Stamp stamp, std::vector<Event>& events) const {
-  if (!note_.empty()) events.push_back({stamp, "not_converged", note_});
+void MapSolve::Note(Timestamp timestamp, std::vector<Event>& events) const {
+  if (!note_.empty()) events.push_back({timestamp, "not_converged", note_});
 }
 
 bool MapSolve::SolveAll(CondensedRun& run, const Values& about, Eigen::VectorXd& e) {

@@ -51,7 +51,7 @@ class MapSolve {
   const std::string& summary() const { return summary_; }
   const Eigen::MatrixXd& u() const { return at_.u; }
   /// The event `not_converged` where the weights of robust losses did not settle.
-  void Note(Stamp stamp, std::vector<Event>& events) const;
+  void Note(Timestamp timestamp, std::vector<Event>& events) const;
   void HeedStop() const;
 
  private:

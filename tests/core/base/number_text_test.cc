@@ -25,9 +25,9 @@ TEST(RoundedText, HasAFewDigits) {
 }
 
 TEST(Seconds, AreExactToTheNanosecond) {
-  const auto text = [](Stamp stamp) {
+  const auto text = [](Timestamp timestamp) {
     std::string seconds;
-    AppendSeconds(seconds, stamp);
+    AppendSeconds(seconds, timestamp);
     return seconds;
   };
   EXPECT_EQ(text(0), "0.000000000");

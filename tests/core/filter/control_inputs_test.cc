@@ -46,9 +46,10 @@ const std::vector<Seen> kDrive = {
 
 Frame FrameOf(const Seen& seen) {
   Frame frame = FrameAt(seen.t_s, {});
-  if (!std::isnan(seen.fix)) frame.measurements.push_back({frame.stamp, kFix, -1, {seen.fix}, {}});
+  if (!std::isnan(seen.fix))
+    frame.measurements.push_back({frame.timestamp, kFix, -1, {seen.fix}, {}});
   if (!std::isnan(seen.speed)) {
-    frame.measurements.push_back({frame.stamp, kOdometry, -1, {seen.speed}, {}});
+    frame.measurements.push_back({frame.timestamp, kOdometry, -1, {seen.speed}, {}});
   }
   return frame;
 }
@@ -107,7 +108,7 @@ System OnTheGeneralPath(System system) {
   return system;
 }
 
-TEST(ControlInputs, AreHeldFromTheirStampOnByEveryFilter) {
+TEST(ControlInputs, AreHeldFromTheirTimestampOnByEveryFilter) {
   const std::vector<std::string> first = {"input_stale"};  // none yet from 0 s to 0.5 s
   for (const System& system : {Car(), OnTheGeneralPath(Car())}) {
     Ekf ekf(system, {}, kStreams);
@@ -153,7 +154,7 @@ TEST(ControlInputs, ActInEveryPartOfAGapThatIsSteppedInParts) {
             "no control input of 'car' from stream 'odometry' has come yet: steps with u = 0");
   EXPECT_EQ(report.events[1].text,
             "a gap of 0.5 s, longer than max_dt_s = 0.1, is stepped in 5 equal parts");
-  EXPECT_EQ(report.events[1].stamp, 500'000'000);
+  EXPECT_EQ(report.events[1].timestamp, 500'000'000);
 }
 
 TEST(ControlInputs, AnOldOneIsToldOnceUntilOneActsAgain) {
@@ -293,7 +294,7 @@ TEST(ControlInputs, OnAManifoldStartAtItsNeutralElementAndStayOnIt) {
   system.initial_time_s = -1.0;
   Ekf ekf(system, {}, {{"attitude", 4}});
   const auto frame = [](double t_s, const std::vector<double>& q) {
-    return Frame{StampFromSeconds(t_s), {{StampFromSeconds(t_s), 0, -1, q, {}}}, {}};
+    return Frame{TimestampFromSeconds(t_s), {{TimestampFromSeconds(t_s), 0, -1, q, {}}}, {}};
   };
   ekf.Process(frame(0.0, {0.60006, 0.80008, 0.0, 0.0}));  // 1e-4 too long
   EXPECT_NEAR(ValueOf(ekf.state(), "body.x"), 1.0, 1e-15);
@@ -368,8 +369,8 @@ TEST(ControlInputs, OfTheStaticFilterAreThoseOfTheEngine) {
   }
 }
 
-// Of two frames at one stamp, taken as they come, the later has the last word.
-TEST(ControlInputs, OfTwoAtOneStampTheLaterActs) {
+// Of two frames at one timestamp, taken as they come, the later has the last word.
+TEST(ControlInputs, OfTwoAtOneTimestampTheLaterActs) {
   const System system = Car();
   Ekf ekf(system, {}, kStreams);
   ekf.Process(FrameAt(0.0, {{kOdometry, 2.0}}));

@@ -53,7 +53,7 @@ TEST(Landmarks, AnIdThatComesBackIsTheNextGeneration) {
   EXPECT_EQ(OutcomeFor(ekf.Process(FrameOf(0.5, {{1, {5, 0, 1}}})), 1), Outcome::kInitialised);
   const LandmarkEstimate again = *Find(ekf.landmarks(), 1);
   EXPECT_EQ(again.generation, 1);
-  EXPECT_EQ(again.first, StampFromSeconds(0.5));
+  EXPECT_EQ(again.first, TimestampFromSeconds(0.5));
   EXPECT_NEAR(again.position[0], 5.0, 0.5);
   EXPECT_EQ(Find(ekf.landmarks(), 2)->generation, 0);
 }

@@ -151,7 +151,7 @@ TEST(SmallEkf, DoesWhatTheGeneralPathDoes) {
         frames.push_back(FrameAt(t, {{0, d}, {1, s}}));
     }
     if (k % 23 == 5 && k % 7 != 3) frames.back().measurements[0].covariance = {2.0};
-    if (k == 300) frames.back().stamp -= StampFromSeconds(1.0);
+    if (k == 300) frames.back().timestamp -= TimestampFromSeconds(1.0);
   }
   auto seen = Compare(DepthFilter(), options, frames);
   for (const char* what :
@@ -227,7 +227,7 @@ TEST(SmallEkf, StacksMeasurementsOfSeveralRows) {
     for (int stream = 0; stream < (k % 3 == 0 ? 1 : 2); ++stream) {
       const double wild = k % 10 == 9 ? 20.0 : 0.0;
       frame.measurements.push_back(
-          {frame.stamp, stream, -1, {1.0 + 0.2 * std::sin(k + stream), 3.0 + wild}, {}});
+          {frame.timestamp, stream, -1, {1.0 + 0.2 * std::sin(k + stream), 3.0 + wild}, {}});
     }
     frames.push_back(frame);
   }
@@ -275,7 +275,7 @@ TEST(SmallEkf, TakesAnySquareRootOfTheNoiseAndMotionWithoutNoise) {
     std::vector<Frame> frames;
     for (int k = 0; k < 20; ++k) {
       Frame frame = FrameAt(0.1 * k, {});
-      frame.measurements.push_back({frame.stamp, 0, -1, {1.0, 3.0}, {}});
+      frame.measurements.push_back({frame.timestamp, 0, -1, {1.0, 3.0}, {}});
       frames.push_back(frame);
     }
     EXPECT_EQ(Compare(system, {}, frames)["accepted"], 20);
@@ -371,7 +371,7 @@ TEST_P(SmallEkfOfSize, DoesWhatTheGeneralPathDoes) {
       std::vector<double> z = {2.0 + noise};
       if (name == "mixed") z = {3.0 + noise};
       if (name.starts_with("both")) z = {1.0 + noise, 3.0 - noise};
-      frame.measurements.push_back({frame.stamp, stream, -1, z, {}});
+      frame.measurements.push_back({frame.timestamp, stream, -1, z, {}});
     }
     frames.push_back(frame);
   }

@@ -54,7 +54,7 @@ TEST(EkfSnapshot, AFailureTellsTheLastMeasurementOfThePastThatCounts) {
   ekf.Restore(*saved);
   EXPECT_FALSE(ekf.failed());
   EXPECT_FALSE(ekf.diverged());
-  EXPECT_EQ(ekf.stamp(), 0);
+  EXPECT_EQ(ekf.timestamp(), 0);
   EXPECT_EQ(ekf.state().values(), values);
   const UpdateReport& report = ekf.Process(FrameAt(2.0, {{0, 1.0}}));
   ASSERT_TRUE(Has(report, "not_finite"));

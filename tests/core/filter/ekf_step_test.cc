@@ -16,15 +16,15 @@ constexpr double kPi = 3.14159265358979323846;
 
 /// Variance of the velocity after a gap of `gap` ns stepped in parts of at most `max_dt_s`. The
 /// acceleration is constant within a part: n parts of one gap add gap^2 / n to 9.
-double VelocityVarianceAfter(Stamp gap, double max_dt_s) {
+double VelocityVarianceAfter(Timestamp gap, double max_dt_s) {
   EkfOptions options;
   options.max_dt_s = max_dt_s;
   Ekf ekf(MovingPoint(1.0), options, {});
   ekf.Start(0);
   Frame frame;
-  frame.stamp = gap;
+  frame.timestamp = gap;
   ekf.Process(frame);
-  EXPECT_EQ(ekf.stamp(), gap);
+  EXPECT_EQ(ekf.timestamp(), gap);
   return CovarianceOf(ekf.state(), "p.v", "p.v");
 }
 
@@ -40,7 +40,7 @@ TEST(EkfStep, TheLongestStepMayBeOfAnySize) {
   for (const double longest : {infinity, 1e300, 1e10, 9.3e9}) {
     EXPECT_NEAR(VelocityVarianceAfter(2'000'000'000, longest), 9.0 + 4.0, 1e-12) << longest;
   }
-  // Stamps are of whole nanoseconds: so are the parts.
+  // Timestamps are of whole nanoseconds: so are the parts.
   EXPECT_NEAR(VelocityVarianceAfter(4, 1e-12) - 9.0, 0.0, 1e-12);
 }
 

@@ -56,7 +56,7 @@ TEST(Ekf, EqualsTheClosedFormKalmanFilterOnALinearProblem) {
     t += dt;
     const Eigen::Vector2d z(random.Normal(), random.Normal());
     ekf.Process(FrameAt(t, {{0, z[0]}, {1, z[1]}}));
-    textbook.Step(Seconds(StampFromSeconds(t)) - Seconds(StampFromSeconds(t - dt)), 1.0);
+    textbook.Step(Seconds(TimestampFromSeconds(t)) - Seconds(TimestampFromSeconds(t - dt)), 1.0);
     textbook.Update(h, z, r);
     ASSERT_NEAR(ValueOf(ekf.state(), "p.x"), textbook.x[0], 1e-10) << k;
     ASSERT_NEAR(ValueOf(ekf.state(), "p.v"), textbook.x[1], 1e-10) << k;
@@ -75,7 +75,7 @@ TEST(Ekf, JointEqualsSequentialOnALinearProblem) {
       measurements(system, per_measurement, StreamsOf(system));
   Random random(12);
   for (int k = 0; k < 200; ++k) {
-    // Two measurements of the first stream at one stamp, one of the second.
+    // Two measurements of the first stream at one timestamp, one of the second.
     const Frame frame =
         FrameAt(0.033 * k, {{0, random.Normal()}, {1, random.Normal()}, {0, random.Normal()}});
     for (Ekf* ekf : {&joint, &sensors, &measurements}) ekf->Process(frame);

@@ -66,7 +66,7 @@ std::vector<Frame> DepthFrames() {
     frames.push_back(FrameAt(t_s, {{1, depth / 0.3 + 0.01 * random.Normal()}}));
     if (k % 3 != 0) {
       frames.back().measurements.push_back(
-          {frames.back().stamp, 0, -1, {26.0 / depth + random.Normal()}, {}});
+          {frames.back().timestamp, 0, -1, {26.0 / depth + random.Normal()}, {}});
     }
   }
   return frames;
@@ -76,9 +76,9 @@ std::vector<Frame> DepthFrames() {
 std::vector<Frame> WithEmptyFrames(const std::vector<Frame>& frames, int parts) {
   std::vector<Frame> all;
   for (const Frame& frame : frames) {
-    const Stamp last = all.empty() ? frame.stamp : all.back().stamp;
+    const Timestamp last = all.empty() ? frame.timestamp : all.back().timestamp;
     for (int i = 1; i < parts && !all.empty(); ++i) {
-      all.emplace_back().stamp = last + (frame.stamp - last) * i / parts;
+      all.emplace_back().timestamp = last + (frame.timestamp - last) * i / parts;
     }
     all.push_back(frame);
   }
@@ -146,7 +146,7 @@ TYPED_TEST(HeldNoise, RejectedMeasurementsAreNone) {
   std::vector<Frame> frames = DepthFrames(), wild;
   for (const Frame& frame : frames) {
     if (!wild.empty()) {
-      wild.push_back(FrameAt(Seconds(frame.stamp) - 0.01, {{0, 1e5}, {1, 400.0}}));
+      wild.push_back(FrameAt(Seconds(frame.timestamp) - 0.01, {{0, 1e5}, {1, 400.0}}));
     }
     wild.push_back(frame);
   }
@@ -200,7 +200,7 @@ TYPED_TEST(HeldNoise, ControlInputsThatChangeInsideAGapDoNotSplitIt) {
   streams.push_back({"push", 1});
   std::vector<Frame> frames;
   for (const Frame& frame : DepthFrames()) {
-    if (!frames.empty()) frames.push_back(FrameAt(Seconds(frame.stamp) - 0.011, {{2, 3.0}}));
+    if (!frames.empty()) frames.push_back(FrameAt(Seconds(frame.timestamp) - 0.011, {{2, 3.0}}));
     frames.push_back(frame);
   }
   const auto all = StatesOf(*Make<TypeParam>(system, {}, streams), frames);
@@ -292,7 +292,7 @@ TEST(HeldNoiseSmoother, EqualsTheBatchAtFramesInsideAGap) {
     }
     if (k % 5 == 0 || k % 7 == 3) {
       const double z = random.Normal();
-      frame.measurements.push_back({frame.stamp, 0, -1, {z}, {}});
+      frame.measurements.push_back({frame.timestamp, 0, -1, {z}, {}});
       const Eigen::RowVectorXd row = 2.0 * map.back().row(0) / 0.3;
       normal += row.transpose() * row;
       right += row.transpose() * z / 0.3;

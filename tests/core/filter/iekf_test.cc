@@ -291,7 +291,7 @@ TEST(Iekf, FindsTheMostProbableRotationAndDirection) {
   options.tolerance = 1e-8;
   Iekf iekf(system, options, StreamsOf(system));
   Frame frame;
-  frame.stamp = 0;
+  frame.timestamp = 0;
   const double z[3] = {-0.3, 0.9, 0.2};
   frame.measurements.push_back({0, 0, -1, {z[0], z[1], z[2]}, {}});
   EXPECT_TRUE(iekf.Process(frame).events.empty());
@@ -332,7 +332,7 @@ TEST(Ekf, ACovarianceMovesWithItsUnitVectorTheSameInSmallAndLargeFilters) {
   }
   Ekf small(few, {}, StreamsOf(few)), large(many, {}, StreamsOf(many));
   Frame frame;
-  frame.stamp = 0;
+  frame.timestamp = 0;
   frame.measurements.push_back({0, 0, -1, {-0.3, 0.9, 0.2}, {}});
   small.Process(frame);
   large.Process(frame);

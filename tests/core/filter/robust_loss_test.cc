@@ -155,7 +155,7 @@ TYPED_TEST(RobustFilter, WeighsAMeasurementOfTwoElementsAsAWhole) {
   const Eigen::Vector2d z[] = {{7.0, -4.0}, {1.0, 0.5}};
   Frame frame = FrameAt(0.0, {});
   for (int i = 0; i < 2; ++i) {
-    frame.measurements.push_back({frame.stamp, i, -1, {z[i](0), z[i](1)}, {}});
+    frame.measurements.push_back({frame.timestamp, i, -1, {z[i](0), z[i](1)}, {}});
     frame.measurements.back().covariance = {r(0, 0), r(0, 1), r(1, 0), r(1, 1)};
   }
   Normal expected{Eigen::Vector2d::Zero(), p0};

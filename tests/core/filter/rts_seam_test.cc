@@ -136,7 +136,7 @@ SeamDistance Follow(double sigma) {
       const double y = sigma * (10.0 + random.Normal());
       const double z = sigma * (2.5 * std::sin(0.8 * k) + random.Normal());
       batch.z.back() = {std::sqrt(1.0 - y * y - z * z), y, z};
-      frame.measurements.push_back({frame.stamp, 0, -1, batch.z.back(), {}});
+      frame.measurements.push_back({frame.timestamp, 0, -1, batch.z.back(), {}});
     }
     const double before = rts.state().value(0)[2];
     rts.Process(frame);

@@ -63,8 +63,8 @@ TEST(RtsSmoother, EqualsTheBatchLeastSquaresSolutionWithSingularProcessNoise) {
     const double z0 = random.Normal(), z1 = random.Normal();
     if (k % 3 != 2) batch.Measure(Eigen::RowVector2d(1.0, 0.0), z0, 0.3);
     if (k % 5 == 0) batch.Measure(Eigen::RowVector2d(2.0, 0.0), z1, 0.7);
-    if (k % 3 != 2) frame.measurements.push_back({frame.stamp, 0, -1, {z0}, {}});
-    if (k % 5 == 0) frame.measurements.push_back({frame.stamp, 1, -1, {z1}, {}});
+    if (k % 3 != 2) frame.measurements.push_back({frame.timestamp, 0, -1, {z0}, {}});
+    if (k % 5 == 0) frame.measurements.push_back({frame.timestamp, 1, -1, {z1}, {}});
     joint.Process(frame);
     apart.Process(frame);
   }
@@ -114,7 +114,7 @@ TEST(RtsSmoother, GapsInPartsAndTheGateAreThoseOfTheFilter) {
   RtsSmoother in_frames(system, options, StreamsOf(system));
   std::vector<double> of_frames;
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    const Stamp last = i == 0 ? 0 : frames[i - 1].stamp, gap = frames[i].stamp - last;
+    const Timestamp last = i == 0 ? 0 : frames[i - 1].timestamp, gap = frames[i].timestamp - last;
     const int parts = std::array{1, 4, 1, 6}[i];
     for (int k = 1; k < parts; ++k) in_frames.Process(FrameAt(Seconds(last + gap * k / parts), {}));
     in_frames.Process(frames[i]);

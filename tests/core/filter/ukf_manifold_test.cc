@@ -117,7 +117,7 @@ TEST_P(UkfOf, FollowsBlocksForAThousandSteps) {
     }
     const std::size_t seen = static_cast<std::size_t>(k) % count;
     Frame frame = FrameAt(0.1 * k, {});
-    frame.measurements.push_back({frame.stamp,
+    frame.measurements.push_back({frame.timestamp,
                                   static_cast<int>(seen),
                                   -1,
                                   Disturbed(geometry, truth[seen], kSensorSigma, random),
@@ -247,7 +247,7 @@ void ExpectReportsOfTheEkf() {
     Frame frame = FrameAt(0.1 * k, {});
     const Prior& prior = system.priors[0];
     frame.measurements.push_back(
-        {frame.stamp,
+        {frame.timestamp,
          0,
          -1,
          Disturbed(system.layout[0].geometry(), prior.mean, kSensorSigma, random),

@@ -154,7 +154,7 @@ TEST(Ukf, FollowsAnOrientationFarFromWhereItBegan) {
     const Eigen::Quaterniond z =
         truth * Eigen::Quaterniond(Eigen::AngleAxisd(n.norm(), n.normalized()));
     Frame frame = FrameAt(0.1 * k, {});
-    frame.measurements.push_back({frame.stamp, 0, -1, {z.w(), z.x(), z.y(), z.z()}, {}});
+    frame.measurements.push_back({frame.timestamp, 0, -1, {z.w(), z.x(), z.y(), z.z()}, {}});
     const UpdateReport& report = ukf.Process(frame);
     ASSERT_EQ(report.measurements()[0].outcome, Outcome::kAccepted);
     ekf.Process(frame);

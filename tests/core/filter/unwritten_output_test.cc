@@ -118,7 +118,7 @@ TEST_P(Unwritten, OutputOfASensorIsNotFiniteAtEveryMeasurement) {
     ekf.Start(0);
     for (int k = 0; k < 4; ++k) {
       Frame frame = FrameAt(0.1 * k, {});
-      frame.measurements.push_back({frame.stamp, 0, -1, {1.5, 2.5}, {}});
+      frame.measurements.push_back({frame.timestamp, 0, -1, {1.5, 2.5}, {}});
       const UpdateReport& report = ekf.Process(frame);
       EXPECT_EQ(report.measurements()[0].outcome,
                 left == Left::kNothing ? Outcome::kAccepted : Outcome::kNotFinite)

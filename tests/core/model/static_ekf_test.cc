@@ -59,7 +59,7 @@ TEST(StaticEkf, IsTheEngineComposedAtCompileTime) {
     const double s = depth / 0.3 + 0.01 * std::cos(5.0 * k);
     const UpdateReport& report = engine.Process(FrameAt(t, {{0, d}, {1, s}}));
     if (k > 0) {
-      const double dt = Seconds(StampFromSeconds(t) - StampFromSeconds(0.033 * (k - 1)));
+      const double dt = Seconds(TimestampFromSeconds(t) - TimestampFromSeconds(0.033 * (k - 1)));
       ASSERT_EQ(filter.Predict(dt), Status::kOk);
     }
     const StaticOutcome of_d = filter.Update<kDepth>(stereo, &d, gate);
@@ -248,12 +248,13 @@ TEST(StaticEkf, CarriesCovariancesAndLengthsOnManifoldsAsTheEngineDoes) {
     std::vector<double> direction = {0.6 + 0.3 * std::sin(0.7 * k), std::cos(1.9 * k),
                                      std::sin(0.2 * k)};
     Geometry::UnitVector().Normalise(direction.data());
-    const Stamp before = frame.stamp;
-    frame.stamp = StampFromSeconds(0.05 * k);
-    frame.measurements = {{frame.stamp, 0, -1, turned, {}}, {frame.stamp, 1, -1, direction, {}}};
+    const Timestamp before = frame.timestamp;
+    frame.timestamp = TimestampFromSeconds(0.05 * k);
+    frame.measurements = {{frame.timestamp, 0, -1, turned, {}},
+                          {frame.timestamp, 1, -1, direction, {}}};
     engine.Process(frame);
     if (k > 0) {
-      ASSERT_EQ(filter.Predict(Seconds(frame.stamp - before)), Status::kOk);
+      ASSERT_EQ(filter.Predict(Seconds(frame.timestamp - before)), Status::kOk);
     }
     ASSERT_EQ((filter.Update<0, 1>(Turned(), turned.data())), StaticOutcome::kAccepted);
     ASSERT_EQ(filter.Update<1>(Direction(), direction.data()), StaticOutcome::kAccepted);

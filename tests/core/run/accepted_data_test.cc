@@ -82,7 +82,7 @@ TEST(AcceptedBy, LeavesOutWhatTheFilterGated) {
 TEST(AcceptedBy, HoldsWhereTheEstimatorsGoBackForLateFrames) {
   Experiment experiment = MakeFiltered(true);
   experiment.out_of_sequence.policy = OutOfSequence::kRollback;
-  experiment.out_of_sequence.window = StampFromSeconds(0.2);
+  experiment.out_of_sequence.window = TimestampFromSeconds(0.2);
   const RunResult run = alidade::Run(experiment, {});
   EXPECT_EQ(run.status, RunStatus::kOk) << run.reason;
   EXPECT_GT(run.arrivals.out_of_sequence, 20);
@@ -162,7 +162,7 @@ TEST(AcceptedBy, MayFollowAFollower) {
   for (const OutOfSequence order : {OutOfSequence::kReject, OutOfSequence::kRollback}) {
     Experiment experiment = MakeChainOfMaps();
     if (order == OutOfSequence::kRollback)
-      experiment.out_of_sequence.window = StampFromSeconds(1.0);
+      experiment.out_of_sequence.window = TimestampFromSeconds(1.0);
     experiment.out_of_sequence.policy = order;
     const RunResult run = alidade::Run(experiment, {});
     ASSERT_EQ(run.status, RunStatus::kOk) << run.reason;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// FAULTS 36, 37: late frames and equal stamps, frame by frame.
+// FAULTS 36, 37: late frames and equal timestamps, frame by frame.
 #include <algorithm>
 #include <stdexcept>
 
@@ -42,14 +42,14 @@ Experiment MakeGiven(std::vector<Frame> frames, OutOfSequence order, bool then_f
   Experiment experiment = MakeExperiment();
   experiment.source = std::make_unique<Given>(std::move(frames), then_fails);
   experiment.out_of_sequence.policy = order;
-  experiment.out_of_sequence.window = StampFromSeconds(0.1);
+  experiment.out_of_sequence.window = TimestampFromSeconds(0.1);
   return experiment;
 }
 
 TEST_P(FrameOrder, AFrameBeyondTheWindowIsDroppedWithAnEvent) {
   // 0.1 s behind the newest is in the window, a nanosecond more is not.
   Frame beyond = FrameAt(0.2, {{0, 80.0}, {1, 1.0}});
-  beyond.stamp -= 1;
+  beyond.timestamp -= 1;
   Experiment experiment = MakeGiven(
       {FrameAt(0.1, {{1, 1.0}}), FrameAt(0.3, {{1, 1.0}}), beyond, FrameAt(0.2, {{1, 1.0}})},
       GetParam());
@@ -62,7 +62,7 @@ TEST_P(FrameOrder, AFrameBeyondTheWindowIsDroppedWithAnEvent) {
   for (const EstimatorResult& one : result.estimators) {
     const auto event = std::ranges::find(one.events, "out_of_sequence", &Event::kind);
     ASSERT_NE(event, one.events.end());
-    EXPECT_EQ(event->stamp, beyond.stamp);
+    EXPECT_EQ(event->timestamp, beyond.timestamp);
     EXPECT_EQ(event->text,
               "a frame of disparity, inverse_scale came 0.100000 s behind the newest, beyond the "
               "window of 0.100000 s: dropped");
@@ -80,7 +80,7 @@ TEST_P(FrameOrder, AFrameBeforeTheFirstIsWhereTheRunStarts) {
             in_order.estimators[0].estimator->state().values());
 }
 
-TEST_P(FrameOrder, AStreamTwiceAtOneStampIsAnErrorThatNamesBothPlaces) {
+TEST_P(FrameOrder, AStreamTwiceAtOneTimestampIsAnErrorThatNamesBothPlaces) {
   Experiment experiment =
       MakeGiven({FrameAt(0.0, {{1, 1.0}}), FrameAt(0.05, {{1, 1.0}}), FrameAt(0.1, {{1, 1.0}}),
                  FrameAt(0.05, {{0, 80.0}}), FrameAt(0.05, {{1, 1.0}})},
@@ -149,7 +149,7 @@ TEST_P(FrameOrder, LandmarksOfOneStreamAreNotTheSameTwice) {
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 2);
 }
 
-TEST_P(FrameOrder, TwoTruthsAtOneStampAreAnError) {
+TEST_P(FrameOrder, TwoTruthsAtOneTimestampAreAnError) {
   Frame one = FrameAt(0.0, {{1, 1.0}}), same = FrameAt(0.0, {{0, 80.0}}), other = FrameAt(0.0, {});
   one.truth = same.truth = {{0.3}};
   other.truth = {{0.31}};
@@ -227,10 +227,10 @@ TEST(Sort, WithoutAWindowTakesTheWholeRun) {
 struct Watching : Ekf {
   using Ekf::Ekf;
   const UpdateReport& Process(const Frame& frame) override {
-    stamps.push_back(frame.stamp);
+    timestamps.push_back(frame.timestamp);
     return Ekf::Process(frame);
   }
-  std::vector<Stamp> stamps;
+  std::vector<Timestamp> timestamps;
 };
 
 TEST(Rollback, TakesAFrameAtOnceAndTheLaterOnesAgain) {
@@ -243,21 +243,22 @@ TEST(Rollback, TakesAFrameAtOnceAndTheLaterOnesAgain) {
   const Watching& seen = *watching;
   named.estimator = std::move(watching);
   alidade::Run(experiment, {});
-  const Stamp ms = 1'000'000;
-  EXPECT_EQ(seen.stamps, (std::vector<Stamp>{0, 50 * ms, 100 * ms, 20 * ms, 50 * ms, 100 * ms}));
+  const Timestamp ms = 1'000'000;
+  EXPECT_EQ(seen.timestamps,
+            (std::vector<Timestamp>{0, 50 * ms, 100 * ms, 20 * ms, 50 * ms, 100 * ms}));
 }
 
-/// Throws once, at the frame of that stamp.
+/// Throws once, at the frame of that timestamp.
 struct Throwing : Ekf {
   using Ekf::Ekf;
   const UpdateReport& Process(const Frame& frame) override {
-    if (frame.stamp == at) {
-      at = kNoStamp;
+    if (frame.timestamp == at) {
+      at = kNoTimestamp;
       throw std::logic_error("an invariant");
     }
     return Ekf::Process(frame);
   }
-  Stamp at = kNoStamp;
+  Timestamp at = kNoTimestamp;
 };
 
 TEST(Rollback, AnEstimatorThatThrowsEndsTheRunAfterTheFramesBefore) {
@@ -268,7 +269,7 @@ TEST(Rollback, AnEstimatorThatThrowsEndsTheRunAfterTheFramesBefore) {
   NamedEstimator& named = experiment.estimators[0];
   auto throwing =
       std::make_unique<Throwing>(named.system, EkfOptions{}, experiment.source->streams());
-  throwing->at = StampFromSeconds(0.04);
+  throwing->at = TimestampFromSeconds(0.04);
   named.estimator = std::move(throwing);
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.code, ExitCode::kInternal);
@@ -281,10 +282,10 @@ TEST(Rollback, AnEstimatorThatThrowsEndsTheRunAfterTheFramesBefore) {
 class Forward : public Estimator {
  public:
   explicit Forward(const System& system) : state_(system.InitialState()) {}
-  void Start(Stamp) override {}
+  void Start(Timestamp) override {}
   const UpdateReport& Process(const Frame&) override { return report_; }
   const State& state() const override { return state_; }
-  Stamp stamp() const override { return kNoStamp; }
+  Timestamp timestamp() const override { return kNoTimestamp; }
   bool diverged() const override { return false; }
   bool failed() const override { return false; }
 

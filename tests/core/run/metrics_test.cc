@@ -58,15 +58,15 @@ class MetricsOf {
 
   State& state() { return state_; }
   std::vector<bool>& in_segment() { return in_segment_; }
-  /// The state as it is, at the next stamp of 0.1 s.
+  /// The state as it is, at the next timestamp of 0.1 s.
   void Add(const std::vector<std::vector<double>>& truth, const UpdateReport& report = {}) {
     Frame frame;
-    frame.stamp = stamp_;
+    frame.timestamp = timestamp_;
     frame.truth = truth;
     metrics_->Add(frame, in_segment_, state_, report);
-    stamp_ += 100'000'000;
+    timestamp_ += 100'000'000;
   }
-  void Skip(Stamp dt) { stamp_ += dt; }
+  void Skip(Timestamp dt) { timestamp_ += dt; }
   std::map<std::string, double> Finish() const { return metrics_->Finish(); }
   const Metrics& metrics() const { return *metrics_; }
 
@@ -76,7 +76,7 @@ class MetricsOf {
   State state_;
   std::vector<bool> in_segment_;
   std::optional<Metrics> metrics_;
-  Stamp stamp_ = 0;
+  Timestamp timestamp_ = 0;
 };
 
 StateLayout Scalars(const std::vector<std::string>& names) {
@@ -333,7 +333,7 @@ TEST(Metrics, TellsOnceOfErrorsBeyondTenSigma) {
   ASSERT_EQ(one.metrics().events().size(), 1u);
   const Event& event = one.metrics().events()[0];
   EXPECT_EQ(event.kind, "inconsistent");
-  EXPECT_EQ(event.stamp, 39 * Stamp{100'000'000});
+  EXPECT_EQ(event.timestamp, 39 * Timestamp{100'000'000});
   EXPECT_EQ(event.text,
             "a.x: the error, 21 m, has been beyond 10 sigma for 20 timestamps; sigma is 2 m");
 }
@@ -358,7 +358,7 @@ TEST(Metrics, AMeasuredTruthTellsOfAFilterThatIsTooSure) {
   MetricsOf one(Scalars({"a.x"}), {{"x", 1, 0.1}});
   const double zero = 0.0;
   one.state().Add(0, &zero, Eigen::MatrixXd::Constant(1, 1, 1e-12));
-  for (int i = 0; i < 60; ++i) one.Add({{0.05 * i}});  // drifts away, 1 m at the 20th stamp
+  for (int i = 0; i < 60; ++i) one.Add({{0.05 * i}});  // drifts away, 1 m at the 20th timestamp
   ASSERT_EQ(one.metrics().events().size(), 1u);
   EXPECT_EQ(one.metrics().events()[0].kind, "inconsistent");
 }

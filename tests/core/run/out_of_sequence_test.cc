@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// FAULTS 36, 37: frames that are not in the order of their stamps.
+// FAULTS 36, 37: frames that are not in the order of their timestamps.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -68,11 +68,11 @@ class Delayed : public Source {
  public:
   Delayed(std::unique_ptr<Source> source, double most_s, bool split) : source_(std::move(source)) {
     std::mt19937_64 random(7);
-    std::multimap<Stamp, Frame> arrivals;  // in the order of insertion where equal
+    std::multimap<Timestamp, Frame> arrivals;  // in the order of insertion where equal
     const auto add = [&](Frame frame) {
-      const auto most = static_cast<std::uint64_t>(StampFromSeconds(most_s));
-      const auto delay = static_cast<Stamp>(arrivals.empty() ? most : random() % (most + 1));
-      const Stamp at = frame.stamp + delay;
+      const auto most = static_cast<std::uint64_t>(TimestampFromSeconds(most_s));
+      const auto delay = static_cast<Timestamp>(arrivals.empty() ? most : random() % (most + 1));
+      const Timestamp at = frame.timestamp + delay;
       arrivals.emplace(at, std::move(frame));
     };
     for (Frame frame; source_->Next(frame);) {
@@ -80,8 +80,8 @@ class Delayed : public Source {
         add(frame);
         continue;
       }
-      for (const Measurement& m : frame.measurements) add({frame.stamp, {m}, {}});
-      add({frame.stamp, {}, frame.truth});
+      for (const Measurement& m : frame.measurements) add({frame.timestamp, {m}, {}});
+      add({frame.timestamp, {}, frame.truth});
     }
     for (auto& [at, frame] : arrivals) frames_.push_back(std::move(frame));
   }
@@ -106,7 +106,7 @@ RunResult RecordDelayed(const std::string& text, const fs::path& folder, OutOfSe
   Experiment experiment = BuildExperiment(config, Host());
   experiment.source = std::make_unique<Delayed>(std::move(experiment.source), most_s, split);
   experiment.out_of_sequence.policy = order;
-  experiment.out_of_sequence.window = StampFromSeconds(kWindow_s);
+  experiment.out_of_sequence.window = TimestampFromSeconds(kWindow_s);
   Recorder recorder(OptionsFor(folder), config, Host());
   RunResult result = RunInto(recorder, experiment);
   recorder.Finish(result);
@@ -152,7 +152,7 @@ TEST_P(Reordered, LateFramesGiveTheBytesOfTheInOrderRun) {
     }
     const RunResult late = RecordDelayed(config, here / "late", GetParam(), kWindow_s);
     EXPECT_GT(late.arrivals.out_of_sequence, 50);
-    EXPECT_LE(late.arrivals.longest_lag, StampFromSeconds(kWindow_s));
+    EXPECT_LE(late.arrivals.longest_lag, TimestampFromSeconds(kWindow_s));
     EXPECT_EQ(late.arrivals.dropped, 0);
     ExpectSameBytes(here / "in_order", here / "late");
     // Unsorted, the same frames tell another story.
@@ -162,7 +162,7 @@ TEST_P(Reordered, LateFramesGiveTheBytesOfTheInOrderRun) {
   }
 }
 
-TEST_P(Reordered, MeasurementsThatComeOneByOneAreMergedIntoTheirStamp) {
+TEST_P(Reordered, MeasurementsThatComeOneByOneAreMergedIntoTheirTimestamp) {
   const RunResult whole = RecordDelayed(kFilters, folder_ / "whole", OutOfSequence::kReject, 0.0);
   const RunResult in_order = RecordDelayed(kFilters, folder_ / "in_order", GetParam(), 0.0, true);
   const RunResult late = RecordDelayed(kFilters, folder_ / "late", GetParam(), kWindow_s, true);

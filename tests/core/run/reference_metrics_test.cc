@@ -13,7 +13,7 @@ namespace {
 /// Knows at the end that the depth was 0.3 m, but not at the first frame; or fails to.
 struct Known : Estimator {
   Known(const System& system, bool fails) : state_(system.InitialState()), failed_(fails) {}
-  void Start(Stamp) override {}
+  void Start(Timestamp) override {}
   const UpdateReport& Process(const Frame&) override {
     ++frames_;
     return report_;
@@ -26,7 +26,7 @@ struct Known : Estimator {
     }
   }
   const State& state() const override { return state_; }
-  Stamp stamp() const override { return kNoStamp; }
+  Timestamp timestamp() const override { return kNoTimestamp; }
   bool diverged() const override { return false; }
   bool failed() const override { return failed_; }
 

@@ -48,7 +48,7 @@ TEST(Run, AnEstimatorThatCannotGoOnEndsAloneAndTheCodeSaysSo) {
   EXPECT_NE(result.reason.find("last good state at 0.000000 s: p.x = "), std::string::npos);
   EXPECT_NE(result.reason.find("last measurement used: sensor 'disparity'"), std::string::npos);
   // The event is at the frame of the failed step too.
-  EXPECT_EQ(result.estimators[2].events.back().stamp, StampFromSeconds(0.033));
+  EXPECT_EQ(result.estimators[2].events.back().timestamp, TimestampFromSeconds(0.033));
   // The others saw all frames.
   EXPECT_EQ(result.frames, 60);
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 60);
@@ -85,7 +85,7 @@ TEST(Run, TheReasonOfAFailureIsTheEventThatCausedIt) {
 /// Says at the end that the depth was 1 m at the first frame, and a millimetre more at each next.
 struct Hindsight : Estimator {
   explicit Hindsight(const System& system) : state_(system.InitialState()) {}
-  void Start(Stamp) override {}
+  void Start(Timestamp) override {}
   const UpdateReport& Process(const Frame&) override {
     ++frames_;
     return report_;
@@ -94,12 +94,12 @@ struct Hindsight : Estimator {
   void Smooth(const Emit& emit) override {
     for (std::size_t k = 0; k < frames_; ++k) {
       *state_.value(0) = 1.0 + 1e-3 * static_cast<double>(k);
-      if (k + 1 == frames_) report_.events.push_back({kNoStamp, "hindsight", "all is known"});
+      if (k + 1 == frames_) report_.events.push_back({kNoTimestamp, "hindsight", "all is known"});
       emit(k, state_, report_);
     }
   }
   const State& state() const override { return state_; }
-  Stamp stamp() const override { return kNoStamp; }
+  Timestamp timestamp() const override { return kNoTimestamp; }
   bool diverged() const override { return false; }
   bool failed() const override { return failed_; }
 

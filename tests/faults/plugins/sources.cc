@@ -13,7 +13,7 @@ class Counter : public alidade::Source {
   const std::vector<alidade::StreamInfo>& streams() const override { return streams_; }
   const std::vector<alidade::StreamInfo>& truths() const override { return truths_; }
   bool Next(alidade::Frame& frame) override {
-    frame.stamp = next_;
+    frame.timestamp = next_;
     return next_++ < last_;
   }
 

@@ -62,7 +62,7 @@ bool SharesTheHeap(const alidade::Ekf& ekf) {
   }
   alidade::Trajectory trajectory;
   for (int i = 0; i < 5; ++i) {
-    trajectory.stamps.push_back(i);
+    trajectory.timestamps.push_back(i);
     trajectory.orientations.emplace_back(1.0, 0.0, 0.0, 0.0);
   }
   trajectory.positions = Eigen::Matrix3Xd::Identity(3, 5);
@@ -80,8 +80,8 @@ int main() {
   for (int k = 0; k < 50; ++k) {
     const double z = std::sin(0.3 * k);
     alidade::Frame frame;
-    frame.stamp = alidade::StampFromSeconds(k);
-    frame.measurements.push_back({frame.stamp, 0, -1, {z, z, z}, {}});
+    frame.timestamp = alidade::TimestampFromSeconds(k);
+    frame.measurements.push_back({frame.timestamp, 0, -1, {z, z, z}, {}});
     ekf.Process(frame);
     p += k > 0 ? 1.0 : 0.0;
     const double gain = p / (p + 1.0);

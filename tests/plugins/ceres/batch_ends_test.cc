@@ -167,7 +167,7 @@ TEST(CeresBatchEnds, AFilterThatGaveUpStepsNoMore) {
   const UpdateReport& report = ekf.Process(FrameAt(0.2, {{0, 0.2}}));
   EXPECT_TRUE(report.events.empty());
   EXPECT_EQ(report.measurements()[0].outcome, Outcome::kFailed);
-  EXPECT_EQ(ekf.stamp(), 0);
+  EXPECT_EQ(ekf.timestamp(), 0);
   EXPECT_EQ(ekf.state().values(), good);
   EXPECT_EQ(ekf.state().covariance().Dense(), p);
 }
@@ -304,7 +304,7 @@ TEST(CeresBatchEnds, AUnitVectorMayCrossTheSeamOfItsBasis) {
     crossings += before * x[2] < 0.0;
     Frame frame = FrameAt(0.1 * k, {});
     const std::vector<double> z = drawn(x);
-    if (k % 4 != 1) frame.measurements.push_back({frame.stamp, 0, -1, z, {}});
+    if (k % 4 != 1) frame.measurements.push_back({frame.timestamp, 0, -1, z, {}});
     rts.Process(frame);
     batch->Process(frame);
     if (k < 30) so_far->Process(frame);

@@ -64,7 +64,7 @@ std::vector<Frame> Frames(int count, int parts) {
     frames.push_back(FrameAt(t_s, {}));
     if (k % parts != 0) continue;
     const double z = 2.0 * std::cos(t_s) + 0.3 * std::sin(37.0 * (k / parts));
-    frames.back().measurements.push_back({frames.back().stamp, 0, -1, {z}, {}});
+    frames.back().measurements.push_back({frames.back().timestamp, 0, -1, {z}, {}});
   }
   return frames;
 }

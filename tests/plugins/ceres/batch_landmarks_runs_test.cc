@@ -99,7 +99,7 @@ TEST(CeresBatchLandmarks, NoiseOfLowRankMovesTheCameraExactlyAsItsModelSays) {
   };
   double moved = 0.0;
   for (std::size_t k = 1; k < found.states.size(); ++k) {
-    const double dt_s = Seconds(frames[k].stamp - frames[k - 1].stamp);
+    const double dt_s = Seconds(frames[k].timestamp - frames[k - 1].timestamp);
     double turn[3], expected[4], defect[3];
     for (int i = 0; i < 3; ++i) {
       EXPECT_NEAR(value(k, "cam.position")[i],

@@ -138,8 +138,8 @@ TEST(CeresBatchLoss, WeightsThatDoNotSettleAreSaid) {
   testing::AddMotion(system, "c", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.0, 1.0}});
   AddSensor(system, "y", InProcessSensor(testing::Linear(1.0, 0.3), "linear"), {"c.x"});
   std::vector<Frame> frames = FramesWithOutliers(60);
-  frames[0].measurements.push_back({frames[0].stamp, 1, -1, {1e5}, {}});
-  frames[1].measurements.push_back({frames[1].stamp, 1, -1, {-1e5}, {}});
+  frames[0].measurements.push_back({frames[0].timestamp, 1, -1, {1e5}, {}});
+  frames[1].measurements.push_back({frames[1].timestamp, 1, -1, {-1e5}, {}});
   std::vector<std::string> said;
   const auto last_of = [&](const std::string& options) {
     const auto batch = MakeBatch(system, options);
@@ -241,9 +241,9 @@ TEST(CeresBatchLoss, IsOnTheWholeWhitenedResidual) {
   Eigen::Matrix2d r;
   r << 0.25, 0.15, 0.15, 0.16;
   for (std::size_t k = 0; k < z.size(); ++k) {
-    Measurement m{StampFromSeconds(double(k)), 0, -1, {z[k](0), z[k](1)}, {}};
+    Measurement m{TimestampFromSeconds(double(k)), 0, -1, {z[k](0), z[k](1)}, {}};
     m.covariance = {r(0, 0), r(0, 1), r(1, 0), r(1, 1)};
-    frames.push_back({m.stamp, {m}, {}});
+    frames.push_back({m.timestamp, {m}, {}});
   }
   const Eigen::Matrix2d inverse = r.llt().solve(Eigen::Matrix2d::Identity());
   Eigen::Vector2d x = Eigen::Vector2d::Zero();

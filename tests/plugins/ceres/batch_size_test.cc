@@ -15,7 +15,7 @@ TEST(CeresBatchSize, WhatTakesLongIsSaidOnce) {
   }
   ASSERT_EQ(events.size(), 1u);
   EXPECT_EQ(events[0].kind, "slow");
-  EXPECT_EQ(events[0].stamp, StampFromSeconds(49.95));
+  EXPECT_EQ(events[0].timestamp, TimestampFromSeconds(49.95));
   EXPECT_EQ(events[0].text,
             "more than 1000 noise inputs: the time of a solve grows with their cube");
 }

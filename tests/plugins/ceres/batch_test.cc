@@ -67,7 +67,7 @@ Smoothed WrittenOut(Eigen::VectorXd x, Eigen::MatrixXd p, double acceleration,
   std::vector<Eigen::MatrixXd> p_predicted, f_to;
   Smoothed result;
   for (std::size_t k = 0; k < frames.size(); ++k) {
-    const double dt = k == 0 ? 0.0 : Seconds(frames[k].stamp - frames[k - 1].stamp);
+    const double dt = k == 0 ? 0.0 : Seconds(frames[k].timestamp - frames[k - 1].timestamp);
     Eigen::MatrixXd f = Eigen::MatrixXd::Identity(n, n);
     f(0, 1) = dt;
     Eigen::VectorXd g = Eigen::VectorXd::Zero(n);
@@ -132,7 +132,8 @@ std::vector<Frame> DepthFrames(int count) {
     const double t_s = 0.033 * k, depth = 0.3 + 0.1 * std::sin(2.5 * t_s);
     Frame frame = FrameAt(t_s, {{1, depth / 0.3 + 0.006 * std::sin(37.0 * k)}});
     if (k % 7 < 4)
-      frame.measurements.push_back({frame.stamp, 0, -1, {26.0 / depth + std::cos(23.0 * k)}, {}});
+      frame.measurements.push_back(
+          {frame.timestamp, 0, -1, {26.0 / depth + std::cos(23.0 * k)}, {}});
     frames.push_back(frame);
   }
   return frames;
@@ -201,7 +202,7 @@ TEST(CeresBatch, OfTheDataSoFarIsTheKalmanFilter) {
                   .cwiseAbs()
                   .maxCoeff(),
               1e-9);
-    EXPECT_EQ(batch->stamp(), frame.stamp);
+    EXPECT_EQ(batch->timestamp(), frame.timestamp);
   }
 }
 
@@ -333,9 +334,9 @@ void ExpectStationary(const Geometry& geometry) {
   std::vector<Frame> frames;
   for (int k = 0; k < 3; ++k) {  // far from the mean and from one another
     const double d[3] = {0.9 + 0.4 * k, -0.5 * k, 0.3};
-    Measurement m{StampFromSeconds(k), 0, -1, std::vector<double>(G::kAmbient), {}};
+    Measurement m{TimestampFromSeconds(k), 0, -1, std::vector<double>(G::kAmbient), {}};
     geometry.Plus(mean.data(), d, m.values.data());
-    frames.push_back({m.stamp, {m}, {}});
+    frames.push_back({m.timestamp, {m}, {}});
   }
   const Smoothed found = SmoothOver(*MakeBatch(system), frames);
   ASSERT_EQ(found.x.size(), 3u);

@@ -37,7 +37,7 @@ class WithOutliers : public SwingingTarget {
 /// A batch that tells its estimates.
 struct Told : Estimator {
   explicit Told(const System& system) : batch(testing::MakeBatch(system)) {}
-  void Start(Stamp stamp) override { batch->Start(stamp); }
+  void Start(Timestamp timestamp) override { batch->Start(timestamp); }
   const UpdateReport& Process(const Frame& frame) override { return batch->Process(frame); }
   bool offline() const override { return true; }
   void Smooth(const Emit& emit) override {
@@ -48,7 +48,7 @@ struct Told : Estimator {
     });
   }
   const State& state() const override { return batch->state(); }
-  Stamp stamp() const override { return batch->stamp(); }
+  Timestamp timestamp() const override { return batch->timestamp(); }
   bool diverged() const override { return batch->diverged(); }
   bool failed() const override { return batch->failed(); }
 

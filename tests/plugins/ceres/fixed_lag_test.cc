@@ -94,7 +94,7 @@ TEST(FixedLag, OverAllFramesIsTheBatchOfTheDataSoFar) {
     EXPECT_EQ(lag->Process(frames[k]).measurements().size(), frames[k].measurements.size());
     batch->Process(frames[k]);
     ExpectNear(EstimateOf(lag->state()), EstimateOf(batch->state()), 1e-9, k);
-    EXPECT_EQ(lag->stamp(), frames[k].stamp);
+    EXPECT_EQ(lag->timestamp(), frames[k].timestamp);
   }
   EXPECT_FALSE(lag->failed());
 }
@@ -186,7 +186,7 @@ std::vector<Frame> DepthFrames(int count) {
     if (k % 7 < 4) {
       const double far_off = k % 10 == 6 ? 8.0 : 0.0;
       frame.measurements.push_back(
-          {frame.stamp, 0, -1, {26.0 / depth + std::cos(23.0 * k) + far_off}, {}});
+          {frame.timestamp, 0, -1, {26.0 / depth + std::cos(23.0 * k) + far_off}, {}});
     }
     frames.push_back(frame);
   }
@@ -196,8 +196,8 @@ std::vector<Frame> DepthFrames(int count) {
 /// Whole windows leave at the last solution, and a frame that tells nothing comes: what was
 /// linearised was so at the optimum, so that the estimate is that of the batch, which keeps all.
 void ExpectLeavingChangesNothing(const System& system, std::vector<Frame> frames) {
-  const double lag_s = Seconds(frames.back().stamp - frames.front().stamp);
-  frames.push_back({frames.back().stamp + StampFromSeconds(lag_s + 0.1), {}, {}});
+  const double lag_s = Seconds(frames.back().timestamp - frames.front().timestamp);
+  frames.push_back({frames.back().timestamp + TimestampFromSeconds(lag_s + 0.1), {}, {}});
   const auto lag = MakeFixedLag(system, "lag_s: " + std::to_string(lag_s + 0.01) + "\n");
   const auto batch = MakeBatch(system, "mode: filtering\n");
   for (const Frame& frame : frames) {
@@ -265,9 +265,9 @@ std::vector<Frame> FramesOnManifold(const Geometry& geometry, int count) {
   geometry.Identity(mean.data());
   for (int k = 0; k < count; ++k) {
     const double d[3] = {0.9 + 0.4 * std::sin(2.0 * k), -0.5 * std::cos(3.0 * k), 0.3};
-    Measurement m{StampFromSeconds(0.1 * k), 0, -1, mean, {}};
+    Measurement m{TimestampFromSeconds(0.1 * k), 0, -1, mean, {}};
     geometry.Plus(mean.data(), d, m.values.data());
-    frames.push_back({m.stamp, {m}, {}});
+    frames.push_back({m.timestamp, {m}, {}});
   }
   return frames;
 }

@@ -103,7 +103,7 @@ TEST_F(Csv, TimeMustIncrease) {
       "increase, or 'out_of_sequence.policy: buffer', which joins rows of different streams");
 }
 
-TEST_F(Csv, TimeBeyondTheStamps) {
+TEST_F(Csv, TimeBeyondTheTimestamps) {
   ExpectBadData(std::string(kHeader) + "9.3e9,1,2,3\n",
                 "FILE:2:1 t_s: '9.3e9' is beyond 292 years; expected -9.2e9 s to 9.2e9 s");
   ExpectBadData(std::string(kHeader) + ",1,2,3\n",

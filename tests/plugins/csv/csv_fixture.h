@@ -79,10 +79,10 @@ class Csv : public ::testing::Test {
   std::unique_ptr<Config> config_;
 };
 
-inline std::vector<Stamp> Stamps(const std::vector<Frame>& frames) {
-  std::vector<Stamp> stamps;
-  for (const Frame& frame : frames) stamps.push_back(frame.stamp);
-  return stamps;
+inline std::vector<Timestamp> Timestamps(const std::vector<Frame>& frames) {
+  std::vector<Timestamp> timestamps;
+  for (const Frame& frame : frames) timestamps.push_back(frame.timestamp);
+  return timestamps;
 }
 
 /// For each frame the names of what it holds, as `0 1 | 1`: streams and known truth values.

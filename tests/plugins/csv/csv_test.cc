@@ -19,11 +19,11 @@ TEST_F(Csv, ReadsNamedColumns) {
   const auto frames =
       Frames(std::string(kHeader) + "0,6.5,1.0,58\n0.103007,6.75,1.25,57\n", kDepthConfig);
   ASSERT_EQ(frames.size(), 2u);
-  EXPECT_EQ(Stamps(frames), (std::vector<Stamp>{0, 103'007'000}));
+  EXPECT_EQ(Timestamps(frames), (std::vector<Timestamp>{0, 103'007'000}));
   ASSERT_EQ(Held(frames[1]), "0 1 | 0");
   EXPECT_EQ(frames[1].measurements[0].values, std::vector<double>{6.75});
   EXPECT_EQ(frames[1].measurements[1].values, std::vector<double>{1.0 / 1.25});
-  EXPECT_EQ(frames[1].measurements[1].stamp, 103'007'000);
+  EXPECT_EQ(frames[1].measurements[1].timestamp, 103'007'000);
   EXPECT_EQ(frames[1].measurements[1].landmark, -1);
   EXPECT_EQ(frames[1].truth[0], std::vector<double>{57.0});
 }
@@ -113,33 +113,33 @@ TEST_F(Csv, MissingWordsReplaceTheEmptyCell) {
 }
 
 TEST_F(Csv, TimeHasAUnit) {
-  const auto stamps = [&](const std::string& unit, const std::string& rows) {
-    return Stamps(Frames("t\n" + rows,
-                         "path: a.csv\ntime: {column: t, unit: " + unit + "}\nstreams: {z: t}\n"));
+  const auto timestamps = [&](const std::string& unit, const std::string& rows) {
+    return Timestamps(Frames(
+        "t\n" + rows, "path: a.csv\ntime: {column: t, unit: " + unit + "}\nstreams: {z: t}\n"));
   };
-  EXPECT_EQ(stamps("s", "-0.5\n0.0000000014\n0.0000000016\n"),
-            (std::vector<Stamp>{-500'000'000, 1, 2}));
-  EXPECT_EQ(stamps("ms", "33\n+66.5\n1e2\n"),
-            (std::vector<Stamp>{33'000'000, 66'500'000, 100'000'000}));
-  EXPECT_EQ(stamps("us", "-.0006\n.5\n1.\n"), (std::vector<Stamp>{-1, 500, 1000}));
-  EXPECT_EQ(stamps("ns", "1\n2\n"), (std::vector<Stamp>{1, 2}));
+  EXPECT_EQ(timestamps("s", "-0.5\n0.0000000014\n0.0000000016\n"),
+            (std::vector<Timestamp>{-500'000'000, 1, 2}));
+  EXPECT_EQ(timestamps("ms", "33\n+66.5\n1e2\n"),
+            (std::vector<Timestamp>{33'000'000, 66'500'000, 100'000'000}));
+  EXPECT_EQ(timestamps("us", "-.0006\n.5\n1.\n"), (std::vector<Timestamp>{-1, 500, 1000}));
+  EXPECT_EQ(timestamps("ns", "1\n2\n"), (std::vector<Timestamp>{1, 2}));
 }
 
 TEST_F(Csv, TimeSince1970KeepsEveryNanosecond) {
   // Doubles near 1.4e18 are 256 apart, near 1.4e9 they are 2.4e-7 apart.
-  const Stamp first = 1'403'636'579'763'555'584;
-  EXPECT_EQ(Stamps(Frames("t,z\n1403636579763555584,1\n1403636579763555585,1\n",
-                          "path: a.csv\ntime: {column: t, unit: ns}\nstreams: {z: z}\n")),
-            (std::vector<Stamp>{first, first + 1}));
-  EXPECT_EQ(Stamps(Frames("t_s,z\n1403636579.763555584,1\n1403636579.763555585,1\n",
-                          "path: a.csv\nstreams: {z: z}\n")),
-            (std::vector<Stamp>{first, first + 1}));
+  const Timestamp first = 1'403'636'579'763'555'584;
+  EXPECT_EQ(Timestamps(Frames("t,z\n1403636579763555584,1\n1403636579763555585,1\n",
+                              "path: a.csv\ntime: {column: t, unit: ns}\nstreams: {z: z}\n")),
+            (std::vector<Timestamp>{first, first + 1}));
+  EXPECT_EQ(Timestamps(Frames("t_s,z\n1403636579.763555584,1\n1403636579.763555585,1\n",
+                              "path: a.csv\nstreams: {z: z}\n")),
+            (std::vector<Timestamp>{first, first + 1}));
 }
 
 TEST_F(Csv, RateStandsInForTime) {
   const std::string config = "path: a.csv\nrate_hz: 30\nstreams: {z: z}\n";
   const auto frames = Frames("z\n1\n\n2\n", config);  // the blank line is a missing value
-  EXPECT_EQ(Stamps(frames), (std::vector<Stamp>{0, 33'333'333, 66'666'667}));
+  EXPECT_EQ(Timestamps(frames), (std::vector<Timestamp>{0, 33'333'333, 66'666'667}));
   EXPECT_EQ(Held(frames[1]), "|");
   ExpectBadData("z,w\n1,2\n\n2,3\n", "FILE:3:1: 1 column; expected 2 columns, as in line 1",
                 config);

@@ -114,11 +114,11 @@ TEST(DepthTarget, DefaultsAreTheScenarioOf2017) {
   for (std::size_t k = 0; k < frames.size(); ++k) {
     const double t_s = 0.033 * static_cast<double>(k);
     const double omega = 2.0 * std::numbers::pi * 0.4;
-    EXPECT_EQ(frames[k].stamp, static_cast<Stamp>(33'000'000 * k));
+    EXPECT_EQ(frames[k].timestamp, static_cast<Timestamp>(33'000'000 * k));
     EXPECT_NEAR(frames[k].truth[0][0], 0.3 + 0.1 * std::sin(omega * t_s), 1e-15);
     EXPECT_NEAR(frames[k].truth[1][0], 0.1 * omega * std::cos(omega * t_s), 1e-15);
     EXPECT_EQ(frames[k].truth[2][0], 1.0 / 0.3);
-    for (const Measurement& m : frames[k].measurements) EXPECT_EQ(m.stamp, frames[k].stamp);
+    for (const Measurement& m : frames[k].measurements) EXPECT_EQ(m.timestamp, frames[k].timestamp);
   }
 }
 

@@ -100,7 +100,7 @@ inline std::vector<Frame> FramesOf(const System& system, int count) {
   std::vector<Frame> frames(static_cast<std::size_t>(count));
   for (int k = 0; k < count; ++k) {
     Frame& frame = frames[static_cast<std::size_t>(k)];
-    frame.stamp = StampFromSeconds(0.1 * k);
+    frame.timestamp = TimestampFromSeconds(0.1 * k);
     for (std::size_t s = 0; s < system.sensors.size(); ++s) {
       const SensorBinding& sensor = system.sensors[s];
       std::vector<const double*> roles;
@@ -117,12 +117,12 @@ inline std::vector<Frame> FramesOf(const System& system, int count) {
           d[r] += l[r * m + c] * std::sin(1.7 * k + 2.0 * static_cast<double>(s) + c);
       }
       geometry.Plus(z.data(), d.data(), z.data());
-      frame.measurements.push_back({frame.stamp, static_cast<int>(s), -1, z, {}});
+      frame.measurements.push_back({frame.timestamp, static_cast<int>(s), -1, z, {}});
     }
     const std::vector<StreamInfo> streams = AllStreams(system);
     for (std::size_t s = system.sensors.size(); s < streams.size(); ++s) {
       frame.measurements.push_back(
-          {frame.stamp, static_cast<int>(s), -1, InputOf(streams[s].size), {}});
+          {frame.timestamp, static_cast<int>(s), -1, InputOf(streams[s].size), {}});
     }
   }
   return frames;
@@ -141,15 +141,15 @@ void ExpectSame(const System& system, Filter filter, const Last& last, Inputs...
     filter.template Set<b>(prior.mean.data(), prior.covariance);
   };
   detail::ForEach(set, blocks);
-  Stamp before = 0;
+  Timestamp before = 0;
   for (const Frame& frame : FramesOf(system, 100)) {
     for (const MeasurementReport& m : engine.Process(frame).measurements()) {
       ASSERT_EQ(m.outcome, Outcome::kAccepted);
     }
-    if (frame.stamp > 0) {
-      ASSERT_EQ(filter.Predict(Seconds(frame.stamp - before), inputs...), Status::kOk);
+    if (frame.timestamp > 0) {
+      ASSERT_EQ(filter.Predict(Seconds(frame.timestamp - before), inputs...), Status::kOk);
     }
-    before = frame.stamp;
+    before = frame.timestamp;
     const auto see = [&](auto b) {
       const Seen<typename Filter::template Space<b>> seen;
       ASSERT_EQ(filter.template Update<b>(seen, frame.measurements[b].values.data()),

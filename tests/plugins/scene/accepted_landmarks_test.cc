@@ -18,10 +18,11 @@ class Entries : public RunObserver {
   void OnEstimate(int estimator, const Frame& frame, const State&,
                   const UpdateReport& report) override {
     for (const MeasurementReport& entry : report.measurements()) {
-      if (entry.outcome == Outcome::kInitialised) entered[estimator][entry.landmark] = frame.stamp;
+      if (entry.outcome == Outcome::kInitialised)
+        entered[estimator][entry.landmark] = frame.timestamp;
     }
   }
-  std::map<int, std::map<std::int64_t, Stamp>> entered;
+  std::map<int, std::map<std::int64_t, Timestamp>> entered;
 };
 
 // The ekf counts to `min_observations`; what it then passes on has waited.

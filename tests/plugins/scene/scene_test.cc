@@ -27,7 +27,7 @@ TEST(Scene, SeesAPointWhereThePinholePutsIt) {
   const auto frames =
       SceneFrames("max_frames: 2, sigma_px: 0, points: {list: [[1, 0.5, 2]]}, " + kStill);
   ASSERT_EQ(frames.size(), 2u);
-  EXPECT_EQ(frames[1].stamp, 33333333);
+  EXPECT_EQ(frames[1].timestamp, 33333333);
   ASSERT_EQ(frames[0].measurements.size(), 1u);
   const Measurement& seen = frames[0].measurements[0];
   EXPECT_EQ(seen.landmark, 0);

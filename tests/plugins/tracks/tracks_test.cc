@@ -19,14 +19,14 @@ TEST_F(TracksTest, ReadsTheRowsOfAFrameInAnyOrder) {
       "frame,feature,dim,value\n# c\n0,7,1,20\n0,3,0,1\n0,7,0,10\n"
       "0,3,1,2\n\n2,3,0,1.5\n2,3,1,2.5\n");
   ASSERT_EQ(frames.size(), 2u);
-  EXPECT_EQ(frames[0].stamp, 0);
-  EXPECT_EQ(frames[1].stamp, 200'000'000);  // frame 2 at 10 Hz
+  EXPECT_EQ(frames[0].timestamp, 0);
+  EXPECT_EQ(frames[1].timestamp, 200'000'000);  // frame 2 at 10 Hz
   ASSERT_EQ(frames[0].measurements.size(), 2u);
   EXPECT_EQ(frames[0].measurements[0].landmark, 3);
   EXPECT_EQ(frames[0].measurements[0].values, (Values{1, 2}));
   EXPECT_EQ(frames[0].measurements[1].landmark, 7);
   EXPECT_EQ(frames[0].measurements[1].values, (Values{10, 20}));
-  EXPECT_EQ(frames[1].measurements.at(0).stamp, frames[1].stamp);
+  EXPECT_EQ(frames[1].measurements.at(0).timestamp, frames[1].timestamp);
 }
 
 TEST_F(TracksTest, AHeaderAndByteOrderMarkAndCrLfMakeNoDifference) {
@@ -61,9 +61,9 @@ TEST_F(TracksTest, MayBeginLaterAndWithoutTheFeaturesOfBefore) {
         "0,1,0,1\n0,1,1,1\n1,1,0,2\n1,1,1,2\n1,2,0,3\n1,2,1,3\n2,1,0,4\n2,1,1,4\n2,2,0,5\n2,2,1,5\n"
         "3,3,0,6\n3,3,1,6\n");
   const auto ids = [&](const std::string& keys) {
-    std::vector<std::pair<Stamp, std::vector<std::int64_t>>> all;
+    std::vector<std::pair<Timestamp, std::vector<std::int64_t>>> all;
     for (const Frame& frame : Frames("rate_hz: 10" + keys)) {
-      all.emplace_back(frame.stamp / 100'000'000, std::vector<std::int64_t>());
+      all.emplace_back(frame.timestamp / 100'000'000, std::vector<std::int64_t>());
       for (const Measurement& m : frame.measurements) all.back().second.push_back(m.landmark);
     }
     return all;
@@ -104,10 +104,10 @@ TEST_F(TracksTest, TimestampsSayWhatFramesThereAre) {
   EXPECT_TRUE(frames[0].measurements.empty());
   EXPECT_EQ(frames[1].measurements.size(), 1u);
   EXPECT_TRUE(frames[2].measurements.empty());
-  EXPECT_EQ(frames[1].stamp, 600'000'000);
+  EXPECT_EQ(frames[1].timestamp, 600'000'000);
   EXPECT_EQ(Frames("max_frames: 2").size(), 2u);
   EXPECT_EQ(Frames("max_frames: 2", ".").size(), 2u) << "a folder stands for its tracks.csv";
-  EXPECT_EQ(Frames("rate_hz: 4")[0].stamp, 250'000'000) << "a rate comes first";
+  EXPECT_EQ(Frames("rate_hz: 4")[0].timestamp, 250'000'000) << "a rate comes first";
 }
 
 TEST_F(TracksTest, OdometryIsHeldOrTheMeanOfAStep) {

@@ -24,7 +24,7 @@ EstimatorKind KindOf(const std::string& type) {
   return type == "ceres_batch" ? EstimatorKind::kBatch : EstimatorKind::kFilter;
 }
 
-/// An estimator of a block p.x that is `error` beside the truth, nought, at three stamps.
+/// An estimator of a block p.x that is `error` beside the truth, nought, at three timestamps.
 ComparedEntry Entry(const std::string& name, const std::string& type, bool smoothed, double error,
                     const std::vector<std::string>& sensors = {"stereo"}) {
   ComparedEntry entry;
@@ -33,7 +33,7 @@ ComparedEntry Entry(const std::string& name, const std::string& type, bool smoot
   entry.facts.smoothed = smoothed;
   entry.facts.sensors = sensors;
   entry.facts.blocks = entry.series.blocks = {{"p.x", "m", Geometry::Vector(1)}};
-  entry.series.stamps = {10, 20, 30};
+  entry.series.timestamps = {10, 20, 30};
   entry.series.values = {error, error, error};
   entry.series.covariances = {1.0, 1.0, 1.0};
   entry.result.name = name;
@@ -231,7 +231,7 @@ std::string Refusal(const std::string& one, const std::string& other) {
   return "";
 }
 
-TEST(CheckSameData, TellsTheFirstStampWhateverTheColumnsAndTheOrderOfStreams) {
+TEST(CheckSameData, TellsTheFirstTimestampWhateverTheColumnsAndTheOrderOfStreams) {
   const std::string text =
       Refusal("t_s,stream,landmark,v0,v1\n0.1,a,,1,\n0.1,b,,2,3\n0.2,a,,4,\n0.3,a,,5,\n",
               "t_s,stream,landmark,v0,v1,v2\n0.1,b,,2,3,\n0.1,a,,1,,\n0.2,a,,4,,\n0.3,a,,6,,\n");

@@ -17,26 +17,26 @@ internal::Series TwoBlocks() {
 }
 
 // q and -q are one rotation; distances are taken in the tangent of the reference.
-TEST(Series, DistancesAreOfTheTangentAndOfSharedStamps) {
+TEST(Series, DistancesAreOfTheTangentAndOfSharedTimestamps) {
   internal::Series series = TwoBlocks(), reference = TwoBlocks();
-  series.stamps = {10, 20, 30};
+  series.timestamps = {10, 20, 30};
   series.values = {9, 1, 0, 0, 0, 1.5, -1, 0, 0, 0, 2.0, std::cos(0.1), std::sin(0.1), 0, 0};
   series.covariances.assign(12, 1.0);
-  reference.stamps = {20, 30, 40};
+  reference.timestamps = {20, 30, 40};
   reference.values = {1, 1, 0, 0, 0, 1, 1, 0, 0, 0, 1, 1, 0, 0, 0};
   reference.covariances.assign(12, 0.25);
   const internal::Distance distance = internal::DistanceBetween(series, reference);
   EXPECT_NEAR(distance.rms.at("a.x"), std::sqrt((0.25 + 1.0) / 2.0), 1e-15);
   EXPECT_NEAR(distance.final.at("a.x"), 1.0, 1e-15);
   EXPECT_NEAR(distance.final.at("a.q"), 0.2, 1e-12);
-  // (0.5^2 + 1^2 + 0.2^2) / 0.25, over two stamps and four degrees of freedom.
+  // (0.5^2 + 1^2 + 0.2^2) / 0.25, over two timestamps and four degrees of freedom.
   EXPECT_NEAR(distance.sigmas.at("a"), std::sqrt((0.25 + 1.0 + 0.04) / 0.25 / 8.0), 1e-12);
 }
 
 TEST(Series, WhatHasNoValueOrVarianceIsLeftOut) {
   const double nan = std::nan("");
   internal::Series series = TwoBlocks(), reference = TwoBlocks();
-  series.stamps = reference.stamps = {10, 20};
+  series.timestamps = reference.timestamps = {10, 20};
   series.values = {nan, 1, 0, 0, 0, 3, 1, 0, 0, 0};
   reference.values = {1, 1, 0, 0, 0, 1, 1, 0, 0, 0};
   series.covariances = reference.covariances = {1, 1, 1, 1, 0, 1, 1, 1};
@@ -49,7 +49,7 @@ TEST(Series, WhatHasNoValueOrVarianceIsLeftOut) {
 TEST(Series, FixedBlocksTakeNothingFromTheOthers) {
   const double nan = std::nan("");
   internal::Series series = TwoBlocks(), reference = TwoBlocks();
-  series.stamps = reference.stamps = {10};
+  series.timestamps = reference.timestamps = {10};
   series.values = {3, 1, 0, 0, 0};
   reference.values = {1, 1, 0, 0, 0};
   series.covariances = {1, 1, 1, 1};

@@ -116,8 +116,8 @@ TEST(Align, RefusesWhatDeterminesNoScale) {
 
 Trajectory At(const std::vector<double>& seconds) {
   Trajectory t = Curve(static_cast<int>(seconds.size()));
-  t.stamps.clear();
-  for (const double s : seconds) t.stamps.push_back(StampFromSeconds(s));
+  t.timestamps.clear();
+  for (const double s : seconds) t.timestamps.push_back(TimestampFromSeconds(s));
   return t;
 }
 
@@ -179,10 +179,11 @@ TEST(Associate, NamesTheOffsetWhereItIsToBlame) {
   }
 }
 
-TEST(Associate, RefusesAnOffsetThatNoStampHolds) {
+TEST(Associate, RefusesAnOffsetThatNoTimestampHolds) {
   const Trajectory two = At({1.6e9, 1.6e9 + 1.0}), one = At({1.6e9});
-  constexpr Stamp kOffset = 9'000'000'000'000'000'000;
-  const auto refusal = [](const Trajectory& reference, const Trajectory& estimate, Stamp offset) {
+  constexpr Timestamp kOffset = 9'000'000'000'000'000'000;
+  const auto refusal = [](const Trajectory& reference, const Trajectory& estimate,
+                          Timestamp offset) {
     try {
       Associate(reference, estimate, 10'000'000, offset);
     } catch (const Error& error) {
@@ -201,10 +202,10 @@ TEST(Associate, RefusesAnOffsetThatNoStampHolds) {
             "time between the two clocks");
 }
 
-TEST(Associate, WithoutStampsByRow) {
+TEST(Associate, WithoutTimestampsByRow) {
   Trajectory bare = Curve(4), five = Curve(5);
-  bare.stamps.clear();
-  five.stamps.clear();
+  bare.timestamps.clear();
+  five.timestamps.clear();
   const Matches matches = Associate(bare, bare, 0, 0);
   EXPECT_TRUE(matches.by_row);
   EXPECT_EQ(matches.estimate, (std::vector<int>{0, 1, 2, 3}));

@@ -126,7 +126,7 @@ TEST(PairsOf, AreDeltaApartInEachUnit) {
   EXPECT_EQ(PairsOf(t, {4.4, DeltaUnit::kMetres, true, 0.05}), (Pairs{{0, 9}, {1, 10}}));
   EXPECT_EQ(PairsOf(t, {0.45, DeltaUnit::kSeconds}), (Pairs{{0, 5}, {5, 10}}));
   EXPECT_EQ(PairsOf(t, {0.95, DeltaUnit::kSeconds, true}), (Pairs{{0, 9}, {1, 10}}));
-  // Stamps are exact: 0.3 s are 0.3 s, wherever they begin.
+  // Timestamps are exact: 0.3 s are 0.3 s, wherever they begin.
   EXPECT_EQ(PairsOf(t, {0.3, DeltaUnit::kSeconds}), (Pairs{{0, 3}, {3, 6}, {6, 9}}));
   EXPECT_EQ(PairsOf(t, {0.7, DeltaUnit::kSeconds, true, 0.0}),
             (Pairs{{0, 7}, {1, 8}, {2, 9}, {3, 10}}));
@@ -139,7 +139,7 @@ TEST(PairsOf, RefusesADeltaThatNoTwoPosesAreApart) {
   EXPECT_THROW(PairsOf(Line(5, 0.5), {5.0, DeltaUnit::kFrames}), Error);
   EXPECT_THROW(PairsOf(Line(5, 0.5), {1.2, DeltaUnit::kMetres, true, 0.1}), Error);
   Trajectory bare = Line(5, 0.5);
-  bare.stamps.clear();
+  bare.timestamps.clear();
   EXPECT_THROW(PairsOf(bare, {0.1, DeltaUnit::kSeconds}), Error);
   EXPECT_THROW(PairsOf(bare, {0.0, DeltaUnit::kFrames}), ContractViolation);
 }

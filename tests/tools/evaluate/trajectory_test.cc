@@ -59,8 +59,8 @@ TEST_F(TrajectoryFiles, TumIsReadExactlyWhateverTheLineEnds) {
       "1311868164 4 5 6 0 0 -1.0005 0");
   EXPECT_EQ(t.format, TrajectoryFormat::kTum);
   ASSERT_EQ(t.size(), 3);
-  EXPECT_EQ(t.stamps,
-            (std::vector<Stamp>{1311868163869700001, 1311868163900000000, 1311868164000000000}));
+  EXPECT_EQ(t.timestamps, (std::vector<Timestamp>{1311868163869700001, 1311868163900000000,
+                                                  1311868164000000000}));
   EXPECT_EQ(t.positions.col(0), Vector3d(-0.5, 0.1, 2.0));
   EXPECT_EQ(t.positions.col(1), Vector3d(1, 2, 3));
   EXPECT_TRUE(t.orientations[1].isApprox(Eigen::Quaterniond(0.8, 0.6, 0, 0), 1e-15));
@@ -80,19 +80,19 @@ TEST_F(TrajectoryFiles, TwentyColumnsAreTumWithCovariancesRotationFirst) {
   EXPECT_EQ(t.position_covariances[0], position);
 }
 
-TEST_F(TrajectoryFiles, KittiTakesItsStampsFromTheFileBeside) {
+TEST_F(TrajectoryFiles, KittiTakesItsTimestampsFromTheFileBeside) {
   // A quarter turn about z.
   const std::string rows = "0 -1 0 7 1 0 0 8 0 0 1 9\n1 0 0 0 0 1 0 0 0 0 1 0\n";
   const Trajectory bare = Read(rows);
   EXPECT_EQ(bare.format, TrajectoryFormat::kKitti);
-  EXPECT_FALSE(bare.has_stamps());
+  EXPECT_FALSE(bare.has_timestamps());
   EXPECT_EQ(bare.positions.col(0), Vector3d(7, 8, 9));
   EXPECT_TRUE((bare.orientations[0] * Vector3d::UnitX()).isApprox(Vector3d::UnitY(), 1e-15));
 
   Write("times.txt", "0.000000e+00\n1.037359e-01\n");
-  EXPECT_EQ(Read(rows).stamps, (std::vector<Stamp>{0, 103735900}));
+  EXPECT_EQ(Read(rows).timestamps, (std::vector<Timestamp>{0, 103735900}));
   Write("poses_times.txt", "5\n6\n");
-  EXPECT_EQ(Read(rows).stamps, (std::vector<Stamp>{5'000'000'000, 6'000'000'000}));
+  EXPECT_EQ(Read(rows).timestamps, (std::vector<Timestamp>{5'000'000'000, 6'000'000'000}));
   Write("poses_times.txt", "5\n");
   EXPECT_NE(Refusal(rows).find("poses_times.txt:1: 1 times for 2 poses of "), std::string::npos);
   EXPECT_NE(Refusal(rows).find("; expected one for each pose"), std::string::npos);
@@ -115,14 +115,14 @@ TEST_F(TrajectoryFiles, EurocHasNanosecondsAndWFirst) {
         "1403636580838555648,4.6,-1.7,0.7,0.8,0.6,0,0" +
         std::string(more) + "\n");
     EXPECT_EQ(t.format, TrajectoryFormat::kEuroc);
-    EXPECT_EQ(t.stamps[0], 1403636580838555648);
+    EXPECT_EQ(t.timestamps[0], 1403636580838555648);
     EXPECT_TRUE(t.orientations[0].isApprox(Eigen::Quaterniond(0.8, 0.6, 0, 0), 1e-15));
   }
 }
 
 TEST_F(TrajectoryFiles, AGivenFormatOverridesTheRow) {
   const Trajectory t = Read("1.5,1,2,3,0,0,0,1\n", TrajectoryFormat::kTum);
-  EXPECT_EQ(t.stamps[0], 1'500'000'000);
+  EXPECT_EQ(t.timestamps[0], 1'500'000'000);
   EXPECT_EQ(t.orientations[0].w(), 1.0);
   EXPECT_EQ(Refusal("0 1 2 3 0 0 0 1\n", TrajectoryFormat::kKitti),
             "poses.txt:1:16: 8 columns; expected 12, the upper three rows of world_from_body");
@@ -158,7 +158,7 @@ TEST_F(TrajectoryFiles, RowsThatAreNoneAreRefusedWithTheirPlace) {
   EXPECT_THROW(ReadTrajectory(folder_ / "missing.txt"), Error);
 }
 
-TEST_F(TrajectoryFiles, StampsThatCannotBeSecondsAreReadAsWhatTheyLookLike) {
+TEST_F(TrajectoryFiles, TimestampsThatCannotBeSecondsAreReadAsWhatTheyLookLike) {
   const std::string pose = " 1 2 3 0 0 0 1\n";
   struct Case {
     std::string first, second, unit;
@@ -176,30 +176,31 @@ TEST_F(TrajectoryFiles, StampsThatCannotBeSecondsAreReadAsWhatTheyLookLike) {
                                     "' and what follows cannot be seconds; read as " + c.unit +
                                     "; expected seconds, as TUM has them\n");
     const Trajectory t = Read(text);
-    EXPECT_NEAR(1e-9 * static_cast<double>(t.stamps[1] - t.stamps[0]), 0.0333, 1e-4);
+    EXPECT_NEAR(1e-9 * static_cast<double>(t.timestamps[1] - t.timestamps[0]), 0.0333, 1e-4);
   }
-  EXPECT_EQ(Read("0" + pose + "1000000" + pose).stamps[1], 1'000'000'000);  // us, each second
-  EXPECT_EQ(Read("1311868163869" + pose + "1311868168869" + pose).stamps[1],
+  EXPECT_EQ(Read("0" + pose + "1000000" + pose).timestamps[1], 1'000'000'000);  // us, each second
+  EXPECT_EQ(Read("1311868163869" + pose + "1311868168869" + pose).timestamps[1],
             1'311'868'168'869'000'000);  // ms, 5 s apart
-  EXPECT_EQ(Read("1311868163869700001" + pose).stamps[0], 1311868163869700001);
+  EXPECT_EQ(Read("1311868163869700001" + pose).timestamps[0], 1311868163869700001);
   EXPECT_EQ(WarningsOf("1311868163.8697" + pose + "1311868200" + pose), "");
 }
 
-TEST_F(TrajectoryFiles, StampsThatNoStampHoldsAreRefusedWithTheirPlace) {
+TEST_F(TrajectoryFiles, TimestampsThatNoTimestampHoldsAreRefusedWithTheirPlace) {
   const std::string pose = " 1 2 3 0 0 0 1\n";
   const std::string two = "1" + pose + "2" + pose;
-  const auto beyond = [](const std::string& stamp) {
-    return "poses.txt:3 t: '" + stamp + "' is beyond 292 years; expected seconds, as TUM has them";
+  const auto beyond = [](const std::string& timestamp) {
+    return "poses.txt:3 t: '" + timestamp +
+           "' is beyond 292 years; expected seconds, as TUM has them";
   };
-  for (const std::string stamp : {"99999999999999999999", "9223372036.854775808", "-9.3e9"}) {
-    EXPECT_EQ(Refusal(two + stamp + pose), beyond(stamp));
+  for (const std::string timestamp : {"99999999999999999999", "9223372036.854775808", "-9.3e9"}) {
+    EXPECT_EQ(Refusal(two + timestamp + pose), beyond(timestamp));
   }
   EXPECT_EQ(Refusal("9199999998" + pose + "9199999999" + pose + "9200000001" + pose),
             beyond("9200000001"));
   EXPECT_EQ(Refusal("1e20" + pose),
             "poses.txt:1 t: '1e20' is beyond 292 years; expected seconds, as TUM has them");
-  EXPECT_EQ(Read("9199999998.123456789" + pose).stamps[0], 9199999998123456789);
-  // No difference of two stamps may be beyond either.
+  EXPECT_EQ(Read("9199999998.123456789" + pose).timestamps[0], 9199999998123456789);
+  // No difference of two timestamps may be beyond either.
   EXPECT_EQ(
       Refusal("-9000000000" + pose + "-8999999999" + pose + "-8999999998" + pose + "9000000000" +
               pose),
@@ -226,7 +227,7 @@ TEST_F(TrajectoryFiles, ACovarianceThatIsNoneIsRefusedWithItsLine) {
   EXPECT_EQ(refusal(good, "0.111111 0.111112 0 0.111111 0 1"), "");
 }
 
-TEST_F(TrajectoryFiles, StampsOutOfOrderAreSortedAndToldOf) {
+TEST_F(TrajectoryFiles, TimestampsOutOfOrderAreSortedAndToldOf) {
   const std::string text = "1 1 0 0 0 0 0 1\n3 3 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n4 4 0 0 0 0 0 1\n";
   EXPECT_EQ(
       WarningsOf(text),
@@ -234,7 +235,7 @@ TEST_F(TrajectoryFiles, StampsOutOfOrderAreSortedAndToldOf) {
       "they are sorted\n");
   const Trajectory t = Read(text);
   EXPECT_EQ(t.positions.row(0), Eigen::RowVector4d(1, 2, 3, 4));
-  EXPECT_TRUE(std::ranges::is_sorted(t.stamps));
+  EXPECT_TRUE(std::ranges::is_sorted(t.timestamps));
 }
 
 TEST_F(TrajectoryFiles, PosesOfADuplicateTimestampAreAllKeptAndItsLineIsNamed) {
@@ -243,7 +244,7 @@ TEST_F(TrajectoryFiles, PosesOfADuplicateTimestampAreAllKeptAndItsLineIsNamed) {
             "poses.txt:2 t: duplicate timestamp 1.000000 s, the first of 2 such rows; expected "
             "each timestamp once; all poses are kept\n");
   EXPECT_EQ(Read(text).positions.row(0), Eigen::RowVector4d(1, 9, 2, 9));
-  EXPECT_EQ(Read(text).stamps.size(), 4u);
+  EXPECT_EQ(Read(text).timestamps.size(), 4u);
   // Where poses are sorted, those of one timestamp stay as they were.
   EXPECT_EQ(
       WarningsOf("2 2 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n"),

@@ -76,8 +76,8 @@ TEST(EvaluationWarnings, AnErrorThatAlignmentTakesAwayIsOfAnotherWorld) {
 
 TEST(EvaluationWarnings, FewMatchesAreTold) {
   Trajectory estimate = Estimate(Curve(60));
-  for (std::size_t i = 0; i < 60; i += 4) estimate.stamps[i] += 1;
-  for (std::size_t i = 0; i < 60; ++i) estimate.stamps[i] += i % 4 == 0 ? 0 : 30'000'000;
+  for (std::size_t i = 0; i < 60; i += 4) estimate.timestamps[i] += 1;
+  for (std::size_t i = 0; i < 60; ++i) estimate.timestamps[i] += i % 4 == 0 ? 0 : 30'000'000;
   EXPECT_EQ(WarningsOf(Curve(60), estimate),
             "estimate.tum: 15 of 60 possible poses match within 0.01 s; expected the same clock "
             "and rate; --t-offset, --t-max-diff\n");
@@ -85,7 +85,7 @@ TEST(EvaluationWarnings, FewMatchesAreTold) {
 
 TEST(EvaluationWarnings, AConstantTimeOffsetIsToldWithTheOptionThatTakesIt) {
   Trajectory estimate = Estimate(Curve(60));
-  for (Stamp& stamp : estimate.stamps) stamp += 8'000'000;
+  for (Timestamp& timestamp : estimate.timestamps) timestamp += 8'000'000;
   EXPECT_EQ(WarningsOf(Curve(60), estimate),
             "estimate.tum: its timestamps are 0.008 s after those of the reference on the median; "
             "expected --t-offset -0.008\n");

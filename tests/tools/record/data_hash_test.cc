@@ -33,8 +33,8 @@ TEST(DataHash, DependsOnAllThatAnEstimatorSees) {
     change(frame);
     return HashOf({frame}).measurements();
   };
-  EXPECT_NE(hash, changed([](Frame& f) { f.stamp += 1; }));
-  EXPECT_NE(hash, changed([](Frame& f) { f.measurements[0].stamp += 1; }));
+  EXPECT_NE(hash, changed([](Frame& f) { f.timestamp += 1; }));
+  EXPECT_NE(hash, changed([](Frame& f) { f.measurements[0].timestamp += 1; }));
   EXPECT_NE(hash, changed([](Frame& f) { f.measurements[0].stream = 1; }));
   EXPECT_NE(hash, changed([](Frame& f) { f.measurements[0].landmark = 3; }));
   EXPECT_NE(hash,

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // What a run tells of its landmarks.
+#include "alidade/record/landmarks_file.h"
+
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "alidade/record/landmarks_file.h"
 #include "alidade/run/map_metrics.h"
 #include "support/landmark_models.h"
 #include "support/recording.h"

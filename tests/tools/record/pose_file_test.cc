@@ -115,7 +115,7 @@ TEST(PoseFile, IsReadBackAsItWasWritten) {
   EXPECT_EQ(testing::Read(folder / "run/truth.tum"),
             "# t x y z qx qy qz qw\n0.000000005 0.1 -2 3e-07 0.6 0 0 0.8\n");
   const Trajectory t = ReadTrajectory(folder / "run/ekf/trajectory_covariance.tum");
-  EXPECT_EQ(t.stamps, (std::vector<Stamp>{1'000'000'001, 2'000'000'000}));
+  EXPECT_EQ(t.timestamps, (std::vector<Timestamp>{1'000'000'001, 2'000'000'000}));
   EXPECT_TRUE(t.orientations[0].isApprox(Eigen::Quaterniond(0.8, 0.6, 0.0, 0.0)));
   EXPECT_EQ(t.position_covariances[0], known);
   EXPECT_EQ(t.orientation_covariances[0], r);

@@ -55,7 +55,7 @@ TEST(Recorder, KeepsMeasurementsAndTruthAsTheyCame) {
   std::vector<std::string> measurements = {"t_s,stream,landmark,v0"}, truth = {"t_s,depth"};
   while (source.Next(frame)) {
     std::string t;
-    internal::AppendSeconds(t, frame.stamp);
+    internal::AppendSeconds(t, frame.timestamp);
     for (const Measurement& m : frame.measurements) {
       measurements.push_back(t + ',' + source.streams()[m.stream].name + ",," +
                              internal::NumberText(m.values[0]));
@@ -83,10 +83,10 @@ TEST(Recorder, ImpliedValuesInvertTheSensor) {
 /// The estimator of a report made by hand.
 class NoEstimator : public Estimator {
  public:
-  void Start(Stamp) override {}
+  void Start(Timestamp) override {}
   const UpdateReport& Process(const Frame&) override { return report_; }
   const State& state() const override { return state_; }
-  Stamp stamp() const override { return kNoStamp; }
+  Timestamp timestamp() const override { return kNoTimestamp; }
   bool diverged() const override { return false; }
   bool failed() const override { return false; }
 
@@ -179,12 +179,12 @@ TEST(Recorder, AFrameOlderThanTheStateHasNoEstimate) {
   ekf.estimator = std::make_unique<Ekf>(ekf.system, EkfOptions{}, experiment.source->streams());
   Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
   recorder.Finish(RunInto(recorder, experiment));
-  std::vector<std::string> stamps;
+  std::vector<std::string> timestamps;
   for (const std::string& line : Lines(folder / "out/ekf/estimates.csv")) {
-    stamps.push_back(Cells(line)[0]);
+    timestamps.push_back(Cells(line)[0]);
   }
-  EXPECT_EQ(stamps, (std::vector<std::string>{"t_s", "0.066000000", "0.099000000", "0.132000000",
-                                              "0.165000000"}));
+  EXPECT_EQ(timestamps, (std::vector<std::string>{"t_s", "0.066000000", "0.099000000",
+                                                  "0.132000000", "0.165000000"}));
   // 26 px m at 0.3 m
   EXPECT_EQ(Lines(folder / "out/ekf/innovations.csv")[1].substr(0, 46),
             "0.000000000,disparity,disparity,,stale,1,,86.6");

@@ -40,7 +40,7 @@ struct BundleFile {
   std::vector<std::int64_t> keys;        ///< bundler: of the observations
   std::vector<std::int64_t> camera_ids;  ///< libmv, tracks: image, frame; else empty
   std::vector<std::int64_t> point_ids;   ///< libmv, tracks: track, feature; else empty
-  std::vector<Stamp> stamps;             ///< tracks: of the cameras; else empty
+  std::vector<Timestamp> timestamps;     ///< tracks: of the cameras; else empty
   int points_left_out = 0;               ///< tracks: without a place that their rays agree on
   int frames_left_out = 0;               ///< tracks: frames without a pose
   int unplaced = 0;  ///< tracks: observations of these points and frames, left out
@@ -58,9 +58,9 @@ struct BundleTracks {
   std::filesystem::path start;   ///< trajectory TUM, `t x y z qx qy qz qw`, world_from_cam
 };
 
-/// Reads tracks of one camera (dim 0, 1) or of a rectified pair (0 to 3). Frames have the stamps of
-/// `timestamps.csv` beside the tracks, and a pose to 1 us; where it is not there, as from standard
-/// input (`-`), the k-th pose is that of frame k. Frames without a pose are left out.
+/// Reads tracks of one camera (dim 0, 1) or of a rectified pair (0 to 3). Frames have the
+/// timestamps of `timestamps.csv` beside the tracks, and a pose to 1 us; where it is not there, as
+/// from standard input (`-`), the k-th pose is that of frame k. Frames without a pose are left out.
 /// Points are placed by triangulation from the start, by the inverse measurement models of the
 /// sensor that `host` gives; those that it cannot place are left out. Errors: kInputMissing,
 /// kBadData, kBadConfig, kPlugin.

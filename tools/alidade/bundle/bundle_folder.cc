@@ -24,8 +24,8 @@ std::string PosesTum(const BundleFile& file) {
   for (std::size_t i = 0; i < file.problem.cameras.size(); ++i) {
     if (i < file.poses.size() && !file.poses[i].registered) continue;
     const BundleCamera& camera = file.problem.cameras[i];
-    if (!file.stamps.empty()) {
-      internal::AppendSeconds(text, file.stamps[i]);
+    if (!file.timestamps.empty()) {
+      internal::AppendSeconds(text, file.timestamps[i]);
     } else {
       text += std::to_string(file.camera_ids.empty() ? static_cast<std::int64_t>(i)
                                                      : file.camera_ids[i]);

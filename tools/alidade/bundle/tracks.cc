@@ -60,7 +60,7 @@ Tracks ReadTracks(const std::filesystem::path& path, int& dims) {
 }
 
 struct Start {
-  std::vector<Stamp> stamps;
+  std::vector<Timestamp> timestamps;
   std::vector<BundleCamera> cameras;
 };
 
@@ -69,7 +69,7 @@ Start ReadStart(const std::filesystem::path& path) {
   NumberRows rows(path, {}, {}, ' ');
   while (rows.Next()) {
     rows.ExpectColumns(8, "t x y z qx qy qz qw");
-    start.stamps.push_back(rows.Time(0, "t"));
+    start.timestamps.push_back(rows.Time(0, "t"));
     const auto [x, y, z, qx, qy, qz, qw] = rows.PoseNumbers(NumberRows::kTumPose);
     BundleCamera& camera = start.cameras.emplace_back(BundleCamera{{x, y, z}, {qw, qx, qy, qz}});
     Normalise<UnitQuaternion>(camera.orientation.data());
@@ -87,12 +87,12 @@ std::map<std::int64_t, std::size_t> PosesOf(const Tracks& tracks, const Start& s
     }
     return poses;
   }
-  std::map<Stamp, std::size_t> at;
-  for (std::size_t i = 0; i < start.stamps.size(); ++i) at.emplace(start.stamps[i], i);
-  constexpr Stamp kSame = 1000;  // ns
+  std::map<Timestamp, std::size_t> at;
+  for (std::size_t i = 0; i < start.timestamps.size(); ++i) at.emplace(start.timestamps[i], i);
+  constexpr Timestamp kSame = 1000;  // ns
   NumberRows rows(times, {}, {});
   while (NextRow(rows, 2, "frame,t_s")) {
-    const Stamp t = rows.Time(1, "t_s");
+    const Timestamp t = rows.Time(1, "t_s");
     const auto found = at.lower_bound(t - kSame);
     if (found != at.end() && found->first <= t + kSame)
       poses[rows.Index(0, "frame")] = found->second;
@@ -178,7 +178,7 @@ BundleFile ReadBundleTracks(const BundleTracks& from, const PluginHost& host) {
     const int camera = static_cast<int>(problem.cameras.size());
     problem.cameras.push_back(start.cameras[pose->second]);
     file.camera_ids.push_back(frame);
-    file.stamps.push_back(start.stamps[pose->second]);
+    file.timestamps.push_back(start.timestamps[pose->second]);
     for (const auto& [feature, seen] : all) {
       if (sensor.Valid(seen.z.data()) == Status::kOk) {
         features[feature].push_back({camera, 0, seen.z, true});

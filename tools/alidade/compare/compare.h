@@ -29,9 +29,9 @@ struct CompareOptions {
 /// errors from truth, and
 ///
 ///   rmsd:BLOCK                     sqrt(mean |d|^2), d = x (-) x_ref      unit of the block
-///   final_difference:BLOCK         |d| at the last stamp
+///   final_difference:BLOCK         |d| at the last timestamp
 ///   rmsd.sigmas:OWNER              sqrt(mean d' P_ref^-1 d / dof), in sigmas of the reference
-///   final_difference.sigmas:OWNER  the same at the last stamp
+///   final_difference.sigmas:OWNER  the same at the last timestamp
 ///   rmsd.trajectory.sim3           RMSD of the trajectory after the similarity that fits best, m
 ///   rmsd.map                       rms of the places of landmarks at the end, m
 ///   rmsd.map.sim3                  likewise after that similarity of the map, m

@@ -34,7 +34,7 @@ void RunComparer::OnFrame(const Frame& frame) { impl_->data.Add(frame); }
 void RunComparer::OnEstimate(int estimator, const Frame& frame, const State& state,
                              const UpdateReport& report) {
   if (report.stale) return;
-  impl_->run.estimators[static_cast<std::size_t>(estimator)].series.Append(frame.stamp, state);
+  impl_->run.estimators[static_cast<std::size_t>(estimator)].series.Append(frame.timestamp, state);
 }
 
 Comparison RunComparer::Finish(const RunResult& result, const CompareOptions& options) {

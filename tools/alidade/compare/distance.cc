@@ -38,13 +38,13 @@ std::vector<Shared> SharedBlocks(const Series& series, const Series& reference) 
   return shared;
 }
 
-/// Rows of both series that have the same stamp, in the order of time.
+/// Rows of both series that have the same timestamp, in the order of time.
 std::vector<std::pair<std::size_t, std::size_t>> SharedRows(const Series& a, const Series& b) {
   std::vector<std::pair<std::size_t, std::size_t>> rows;
-  for (std::size_t i = 0, j = 0; i < a.stamps.size() && j < b.stamps.size();) {
-    if (a.stamps[i] == b.stamps[j]) {
+  for (std::size_t i = 0, j = 0; i < a.timestamps.size() && j < b.timestamps.size();) {
+    if (a.timestamps[i] == b.timestamps[j]) {
       rows.emplace_back(i++, j++);
-    } else if (a.stamps[i] < b.stamps[j]) {
+    } else if (a.timestamps[i] < b.timestamps[j]) {
       ++i;
     } else {
       ++j;

@@ -59,7 +59,7 @@ std::vector<double> NumbersOf(std::string_view row, const fs::path& file, int li
   return numbers;
 }
 
-/// A row of estimates.csv behind its stamp: for each block its values, then its sigmas.
+/// A row of estimates.csv behind its timestamp: for each block its values, then its sigmas.
 void AppendRow(Series& series, const std::vector<double>& row) {
   std::size_t at = 1;
   const auto take = [&](int count) {
@@ -86,13 +86,14 @@ std::int64_t ReadEstimates(const fs::path& file, std::int64_t rows, Series& seri
     const std::vector<double> row = NumbersOf(line, file, number);
     if (row.size() != columns) FailFile(file, number, "not as wide as run.json has it");
     if (stream.eof()) FailFile(file, number, "the last line is cut short");
-    series.stamps.push_back(cell::ExactStamp(line.substr(0, line.find(',')), 9));
+    series.timestamps.push_back(cell::ExactTimestamp(line.substr(0, line.find(',')), 9));
     AppendRow(series, row);
     not_finite += line.find_first_of("nN") != line.npos ? 1 : 0;  // nan, inf
   }
-  if (std::ssize(series.stamps) != rows) {
-    FailFile(file, 0,
-             std::to_string(series.stamps.size()) + " rows, run.json has " + std::to_string(rows));
+  if (std::ssize(series.timestamps) != rows) {
+    FailFile(
+        file, 0,
+        std::to_string(series.timestamps.size()) + " rows, run.json has " + std::to_string(rows));
   }
   return not_finite;
 }
@@ -101,7 +102,7 @@ std::int64_t ReadEstimates(const fs::path& file, std::int64_t rows, Series& seri
 void ReadCovariances(const fs::path& file, Series& series) {
   if (series.tangent() > Series::kMostJoint || !fs::exists(file)) return;
   series.joint = true;
-  std::vector<double> cells(series.cells() * series.stamps.size());
+  std::vector<double> cells(series.cells() * series.timestamps.size());
   const auto bytes = static_cast<std::streamsize>(8 * cells.size());
   if (fs::file_size(file) != static_cast<std::uintmax_t>(bytes)) {
     FailFile(file, 0, "not as long as estimates.csv has rows");

@@ -24,7 +24,7 @@ struct ComparedEntry {
       false;  ///< a sensor was rejected again and again, `rejection_recovery` in its events
 
   /// Whether its estimates are of use to compare with.
-  bool usable() const { return !result.failed && !series.stamps.empty(); }
+  bool usable() const { return !result.failed && !series.timestamps.empty(); }
   /// Measurements that it was given, and those of them that it used.
   std::int64_t measurements() const;
   std::int64_t used() const;
@@ -47,7 +47,7 @@ ComparedRun ReadRun(const std::filesystem::path& folder);
 
 /// Refuses runs whose measurements differ, by their hashes; what else differs between them, their
 /// truth or the settings that all their estimators share, is told. Errors: kBadData with both
-/// folders, both hashes and the first stamp that differs.
+/// folders, both hashes and the first timestamp that differs.
 std::vector<std::string> CheckSameData(const std::vector<ComparedRun>& runs);
 
 }  // namespace alidade::internal

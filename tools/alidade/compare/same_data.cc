@@ -11,8 +11,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The rows of measurements.csv that follow each other with one stamp.
-struct StampRows {
+/// The rows of measurements.csv that follow each other with one timestamp.
+struct TimestampRows {
   std::string t_s;                ///< "": the file is at its end
   std::vector<std::string> rows;  ///< by the name of their stream, as they are hashed
 };
@@ -25,12 +25,12 @@ class MeasurementsFile {
   }
   bool good() const { return stream_.is_open(); }
 
-  StampRows Next() {
+  TimestampRows Next() {
     const auto cell = [](const std::string& row, std::size_t at) {
       const std::size_t from = std::min(at, row.size());
       return row.substr(from, row.find(',', from) - from);
     };
-    StampRows next{cell(row_, 0), {}};
+    TimestampRows next{cell(row_, 0), {}};
     for (; !row_.empty() && cell(row_, 0) == next.t_s; Advance()) next.rows.push_back(row_);
     std::ranges::stable_sort(
         next.rows, {}, [&](const std::string& row) { return cell(row, next.t_s.size() + 1); });
@@ -49,8 +49,8 @@ class MeasurementsFile {
   std::string row_;  ///< the next one
 };
 
-/// The stamp of rows, for people.
-std::string StampOf(const StampRows& rows) {
+/// The timestamp of rows, for people.
+std::string TimestampOf(const TimestampRows& rows) {
   return rows.t_s.empty() ? "its end" : "t = " + rows.t_s + " s";
 }
 
@@ -59,9 +59,10 @@ std::string FirstDifference(const fs::path& a, const fs::path& b) {
   MeasurementsFile first(a), second(b);
   if (!first.good() || !second.good()) return "measurements.csv cannot be read";
   for (;;) {
-    const StampRows one = first.Next(), other = second.Next();
+    const TimestampRows one = first.Next(), other = second.Next();
     if (one.rows != other.rows) {
-      return "first at " + StampOf(one) + " of the one, " + StampOf(other) + " of the other";
+      return "first at " + TimestampOf(one) + " of the one, " + TimestampOf(other) +
+             " of the other";
     }
     if (one.t_s.empty()) return "their own covariances or the timestamps of empty frames differ";
   }

@@ -15,23 +15,23 @@ namespace {
 }
 
 /// The nearest double: what a reader of decimal seconds has.
-double DoubleSeconds(Stamp stamp) {
-  return static_cast<double>(static_cast<long double>(stamp) / 1e9L);
+double DoubleSeconds(Timestamp timestamp) {
+  return static_cast<double>(static_cast<long double>(timestamp) / 1e9L);
 }
 
-/// |a - b| of doubles: of a clock that counts from 1970 to 0.2 us. Where a stamp lies in the middle
-/// of two others, rounding decides, as it does in evo, whose figures would differ otherwise.
-double Apart(Stamp a, Stamp b) { return std::abs(DoubleSeconds(a) - DoubleSeconds(b)); }
+/// |a - b| of doubles: of a clock that counts from 1970 to 0.2 us. Where a timestamp lies in the
+/// middle of two others, rounding decides, as it does in evo, whose figures would differ otherwise.
+double Apart(Timestamp a, Timestamp b) { return std::abs(DoubleSeconds(a) - DoubleSeconds(b)); }
 
-/// Index of the nearest stamp, of several as near the first.
-int NearestIndex(const std::vector<Stamp>& stamps, Stamp to) {
-  auto nearest = std::lower_bound(stamps.begin(), stamps.end(), to);
+/// Index of the nearest timestamp, of several as near the first.
+int NearestIndex(const std::vector<Timestamp>& timestamps, Timestamp to) {
+  auto nearest = std::lower_bound(timestamps.begin(), timestamps.end(), to);
   const auto before = [&] {
-    if (nearest == stamps.begin()) return false;
-    return nearest == stamps.end() || Apart(*(nearest - 1), to) <= Apart(*nearest, to);
+    if (nearest == timestamps.begin()) return false;
+    return nearest == timestamps.end() || Apart(*(nearest - 1), to) <= Apart(*nearest, to);
   };
   while (before()) --nearest;
-  return static_cast<int>(nearest - stamps.begin());
+  return static_cast<int>(nearest - timestamps.begin());
 }
 
 Matches ByRow(const Trajectory& reference, const Trajectory& estimate) {
@@ -41,7 +41,7 @@ Matches ByRow(const Trajectory& reference, const Trajectory& estimate) {
   for (int i = 0; i < reference.size(); ++i) matches.reference.push_back(i);
   matches.estimate = matches.reference;
   if (reference.size() == estimate.size()) return matches;
-  const bool of_reference = estimate.has_stamps();
+  const bool of_reference = estimate.has_timestamps();
   const Trajectory& bare = of_reference ? reference : estimate;
   const Trajectory& other = of_reference ? estimate : reference;
   FailMatching(bare.name,
@@ -53,29 +53,30 @@ Matches ByRow(const Trajectory& reference, const Trajectory& estimate) {
 }
 
 std::string Span(const Trajectory& trajectory) {
-  return internal::SecondsText(trajectory.stamps.front()) + " to " +
-         internal::SecondsText(trajectory.stamps.back());
+  return internal::SecondsText(trajectory.timestamps.front()) + " to " +
+         internal::SecondsText(trajectory.timestamps.back());
 }
 
 }  // namespace
 
-Matches Associate(const Trajectory& reference, const Trajectory& estimate, Stamp max_diff,
-                  Stamp offset) {
-  const bool both = reference.has_stamps() && estimate.has_stamps();
-  const bool neither = !reference.has_stamps() && !estimate.has_stamps();
+Matches Associate(const Trajectory& reference, const Trajectory& estimate, Timestamp max_diff,
+                  Timestamp offset) {
+  const bool both = reference.has_timestamps() && estimate.has_timestamps();
+  const bool neither = !reference.has_timestamps() && !estimate.has_timestamps();
   const auto is_kitti = [](const Trajectory& t) { return t.format == TrajectoryFormat::kKitti; };
   if (neither || (!both && is_kitti(reference) && is_kitti(estimate))) {
     return ByRow(reference, estimate);
   }
   if (!both) {
-    FailMatching((reference.has_stamps() ? estimate : reference).name, "poses without stamps",
-                 "times.txt beside them, as the other trajectory has stamps");
+    FailMatching((reference.has_timestamps() ? estimate : reference).name,
+                 "poses without timestamps",
+                 "times.txt beside them, as the other trajectory has timestamps");
   }
   const bool estimate_longer = estimate.size() > reference.size();
-  const std::vector<Stamp>& shorter = (estimate_longer ? reference : estimate).stamps;
-  const std::vector<Stamp>& longer = (estimate_longer ? estimate : reference).stamps;
-  const Stamp shift = estimate_longer ? -offset : offset;  // of the shorter
-  for (const Stamp end : {shorter.front(), shorter.back()}) {
+  const std::vector<Timestamp>& shorter = (estimate_longer ? reference : estimate).timestamps;
+  const std::vector<Timestamp>& longer = (estimate_longer ? estimate : reference).timestamps;
+  const Timestamp shift = estimate_longer ? -offset : offset;  // of the shorter
+  for (const Timestamp end : {shorter.front(), shorter.back()}) {
     if (std::abs(Seconds(end) + Seconds(shift)) < cell::kTimeLimit) continue;
     throw Error(ExitCode::kBadData, ErrorLine({estimate.name}, "--t-offset",
                                               internal::SecondsText(offset) +
@@ -87,7 +88,7 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Stamp
   std::vector<int>& of_shorter = estimate_longer ? matches.reference : matches.estimate;
   std::vector<int>& of_longer = estimate_longer ? matches.estimate : matches.reference;
   for (int i = 0; i < matches.possible; ++i) {
-    const Stamp at = shorter[static_cast<std::size_t>(i)] + shift;
+    const Timestamp at = shorter[static_cast<std::size_t>(i)] + shift;
     const int nearest = NearestIndex(longer, at);
     if (!(Apart(longer[static_cast<std::size_t>(nearest)], at) <= DoubleSeconds(max_diff)))
       continue;
@@ -95,12 +96,12 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Stamp
     of_longer.push_back(nearest);
   }
   if (!matches.estimate.empty()) return matches;
-  FailMatching(
-      estimate.name,
-      "no pose within " + internal::NumberText(Seconds(max_diff)) + " s of one of " +
-          reference.name + ": " + Span(estimate) + (offset == 0 ? "" : " and --t-offset") +
-          " beside " + Span(reference),
-      "the same clock; or --t-offset, which is added to the estimate's stamps, or --t-max-diff");
+  FailMatching(estimate.name,
+               "no pose within " + internal::NumberText(Seconds(max_diff)) + " s of one of " +
+                   reference.name + ": " + Span(estimate) + (offset == 0 ? "" : " and --t-offset") +
+                   " beside " + Span(reference),
+               "the same clock; or --t-offset, which is added to the estimate's timestamps, or "
+               "--t-max-diff");
 }
 
 }  // namespace alidade

@@ -142,7 +142,8 @@ std::vector<double> internal::Progress(const Trajectory& t, DeltaUnit unit) {
     const auto at = static_cast<std::size_t>(i);
     double step = 1.0;
     if (unit == DeltaUnit::kMetres) step = t.PathLength(i - 1, i);
-    if (unit == DeltaUnit::kSeconds) step = static_cast<double>(t.stamps[at] - t.stamps[at - 1]);
+    if (unit == DeltaUnit::kSeconds)
+      step = static_cast<double>(t.timestamps[at] - t.timestamps[at - 1]);
     if (unit == DeltaUnit::kDegrees || unit == DeltaUnit::kRadians) {
       step = AngleOf(Orientation(t, i - 1).conjugate() * Orientation(t, i));
     }
@@ -156,7 +157,7 @@ Pairs PairsOf(const Trajectory& estimate, const PairOptions& options) {
   const auto fail = [&](const std::string& what, const char* expected) {
     throw Error(ExitCode::kBadData, ErrorLine({estimate.name}, "--delta", what, expected));
   };
-  if (options.unit == DeltaUnit::kSeconds && !estimate.has_stamps()) {
+  if (options.unit == DeltaUnit::kSeconds && !estimate.has_timestamps()) {
     fail("seconds of poses without timestamps", "--delta-unit f or m, or times.txt beside them");
   }
   const bool degrees = options.unit == DeltaUnit::kDegrees;

@@ -41,7 +41,7 @@ Similarity Align(Alignment alignment, const Trajectory& reference, const Traject
 struct Matches {
   std::vector<int> reference, estimate;
   int possible = 0;     ///< poses of the shorter trajectory
-  bool by_row = false;  ///< without stamps
+  bool by_row = false;  ///< without timestamps
 };
 /// To each pose of the shorter trajectory, the estimate if both are as long, the nearest of the
 /// longer in time, the first of several, if it is within `max_diff`. `offset` is added to the
@@ -49,8 +49,8 @@ struct Matches {
 /// row if neither has timestamps, or both are of KITTI and one has none. Errors: kBadData if
 /// nothing matches, if there are not as many rows, if only one has timestamps, if none holds the
 /// offset.
-Matches Associate(const Trajectory& reference, const Trajectory& estimate, Stamp max_diff,
-                  Stamp offset);
+Matches Associate(const Trajectory& reference, const Trajectory& estimate, Timestamp max_diff,
+                  Timestamp offset);
 
 /// What of the error pose E is taken [Sturm2012]: of E = est^-1 ref absolutely, and of
 /// E = (ref_i^-1 ref_j)^-1 (est_i^-1 est_j) relatively. t its translation, R its rotation.
@@ -126,8 +126,8 @@ std::vector<InnovationStatistics> ReadInnovations(const std::filesystem::path& f
 struct EvaluateOptions {
   Alignment alignment = Alignment::kNone;
   int align_poses = 0;  ///< the first of them alone are aligned; 0: all
-  Stamp max_diff = 10'000'000;
-  Stamp offset = 0;  ///< is added to the stamps of the estimate
+  Timestamp max_diff = 10'000'000;
+  Timestamp offset = 0;  ///< is added to the timestamps of the estimate
   std::vector<PoseRelation> relations = {PoseRelation::kTranslation, PoseRelation::kAngleDeg};
   PairOptions pairs;
 };
@@ -152,9 +152,9 @@ struct Evaluation {
 };
 
 /// Evaluates `estimate`. Warns of what makes the figures mean something else than they say: few
-/// matches, stamps that are off by a constant time, a swap of reference and estimate (seen by names
-/// and covariances), a scale that is not metric, other world or body frames, quaternions in the
-/// other order, a path that ends early, no pair of poses that is delta rmsd: then there are no
+/// matches, timestamps that are off by a constant time, a swap of reference and estimate (seen by
+/// names and covariances), a scale that is not metric, other world or body frames, quaternions in
+/// the other order, a path that ends early, no pair of poses that is delta rmsd: then there are no
 /// relative errors. Errors: those of Associate and Align.
 Evaluation Evaluate(const Trajectory& reference, const Trajectory& estimate,
                     const EvaluateOptions& options);

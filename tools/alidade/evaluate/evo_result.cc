@@ -135,15 +135,15 @@ std::string StatsJson(const ErrorStatistics& statistics) {
 void AddPlaces(const Evaluation& evaluation, const std::vector<int>& poses,
                std::vector<ZipEntry>& entries) {
   const Trajectory& estimate = evaluation.estimate;
-  if (!estimate.has_stamps()) return;
+  if (!estimate.has_timestamps()) return;
   const std::vector<double> reference_path =
       internal::Progress(evaluation.reference, DeltaUnit::kMetres);
   const std::vector<double> path = internal::Progress(estimate, DeltaUnit::kMetres);
   std::vector<double> times, seconds, along_reference, along;
   for (const int i : poses) {
     const auto at = static_cast<std::size_t>(i);
-    times.push_back(Seconds(estimate.stamps[at]));
-    seconds.push_back(Seconds(estimate.stamps[at] - estimate.stamps.front()));
+    times.push_back(Seconds(estimate.timestamps[at]));
+    seconds.push_back(Seconds(estimate.timestamps[at] - estimate.timestamps.front()));
     along_reference.push_back(reference_path[at]);
     along.push_back(path[at]);
   }

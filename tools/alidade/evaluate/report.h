@@ -30,7 +30,7 @@ void CheckEvoResult(const std::filesystem::path& zip, bool force);
 /// Which errors of an evaluation are saved.
 enum class SavedErrors { kAbsolute, kRelative };
 /// Writes the errors of the first relation as a result of evo, which `evo_res` reads: a zip of
-/// info.json, stats.json, error_array.npy and, where there are stamps, timestamps.npy,
+/// info.json, stats.json, error_array.npy and, where there are timestamps, timestamps.npy,
 /// seconds_from_start.npy, distances_from_start.npy (along the reference) and distances.npy, of a
 /// pair those of its second pose; of an aligned estimate alignment_transformation_sim3.npy. Errors:
 /// that of CheckEvoResult; kBadData where there are no such errors; kIo.

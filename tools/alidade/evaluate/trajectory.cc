@@ -32,7 +32,7 @@ Format Detect(const NumberRows& rows) {
   rows.FailLine(std::to_string(columns) + (columns == 1 ? " column" : " columns"), kForms);
 }
 
-/// A unit of time that stamps of TUM may be written in by mistake.
+/// A unit of time that timestamps of TUM may be written in by mistake.
 struct TimeUnit {
   const char* name;
   std::size_t digits;  ///< it is 10^digits ns
@@ -48,17 +48,17 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-/// The unit of stamps t that are d apart, on their medians: the first of s, ms, us and ns in which
-/// they are of a clock that counts from 1970, or else of one that counts from its own start.
+/// The unit of timestamps t that are d apart, on their medians: the first of s, ms, us and ns in
+/// which they are of a clock that counts from 1970, or else of one that counts from its own start.
 ///
 ///   from 1970        1e9 s <= t < 9.2e9 s,  d < 1000 s
 ///   from its start           t < 9.2e9 s,   d < 1000 s in s, else d < 2 s
-TimeUnit UnitOf(const std::vector<double>& stamps) {
+TimeUnit UnitOf(const std::vector<double>& timestamps) {
   constexpr TimeUnit kUnits[] = {{"s", 9}, {"ms", 6}, {"us", 3}, {"ns", 0}};
   std::vector<double> sizes, steps;
-  for (std::size_t i = 0; i < stamps.size(); ++i) {
-    sizes.push_back(std::abs(stamps[i]));
-    if (i > 0) steps.push_back(std::abs(stamps[i] - stamps[i - 1]));
+  for (std::size_t i = 0; i < timestamps.size(); ++i) {
+    sizes.push_back(std::abs(timestamps[i]));
+    if (i > 0) steps.push_back(std::abs(timestamps[i] - timestamps[i - 1]));
   }
   const double size = Median(sizes), step = Median(steps);
   for (const bool since_1970 : {true, false}) {
@@ -89,7 +89,7 @@ class TrajectoryReader {
     for (std::size_t i = 0; i < positions_.size(); ++i) {
       trajectory_.positions.col(static_cast<Eigen::Index>(i)) = positions_[i];
     }
-    if (trajectory_.format == Format::kTum) TakeTumStamps();
+    if (trajectory_.format == Format::kTum) TakeTumTimestamps();
     CheckFirstQuaternion();
     if (trajectory_.format == Format::kKitti) return std::move(trajectory_);
     return InOrder();
@@ -107,7 +107,7 @@ class TrajectoryReader {
         AddKitti();
         break;
       case Format::kEuroc:
-        trajectory_.stamps.push_back(rows_.Index(0, "t"));
+        trajectory_.timestamps.push_back(rows_.Index(0, "t"));
         AddPose({"x", "y", "z", "qw", "qx", "qy", "qz"});
         break;
       default:
@@ -131,7 +131,7 @@ class TrajectoryReader {
 
   void AddTum() {
     seconds_.push_back(rows_.Number(0, "t"));
-    stamp_texts_.emplace_back(rows_.text(0));
+    timestamp_texts_.emplace_back(rows_.text(0));
     AddPose(NumberRows::kTumPose);
     if (columns_ != 20) return;
     double upper[12];
@@ -190,23 +190,24 @@ class TrajectoryReader {
     trajectory_.orientations.push_back(Eigen::Quaterniond(rotation).normalized());
   }
 
-  void TakeTumStamps() {
+  void TakeTumTimestamps() {
     const TimeUnit unit = UnitOf(seconds_);
     const char* const expected = "seconds, as TUM has them";
     if (unit.digits != 9) {
       Warn(lines_.front(), "t",
-           '\'' + stamp_texts_.front() + "' and what follows cannot be seconds; read as " +
+           '\'' + timestamp_texts_.front() + "' and what follows cannot be seconds; read as " +
                unit.name,
            expected);
     }
     for (std::size_t i = 0; i < seconds_.size(); ++i) {
       if (!(std::abs(seconds_[i]) * unit.seconds() < cell::kTimeLimit)) {
-        throw Error(
-            ExitCode::kBadData,
-            ErrorLine({rows_.name(), lines_[i], 0}, "t",
-                      '\'' + cell::Harmless(stamp_texts_[i]) + "' is beyond 292 years", expected));
+        throw Error(ExitCode::kBadData,
+                    ErrorLine({rows_.name(), lines_[i], 0}, "t",
+                              '\'' + cell::Harmless(timestamp_texts_[i]) + "' is beyond 292 years",
+                              expected));
       }
-      trajectory_.stamps.push_back(cell::ParseStamp(stamp_texts_[i], seconds_[i], unit.digits));
+      trajectory_.timestamps.push_back(
+          cell::ParseTimestamp(timestamp_texts_[i], seconds_[i], unit.digits));
     }
   }
 
@@ -224,14 +225,14 @@ class TrajectoryReader {
 
   /// Sorted; poses of one timestamp stay in the order of the file.
   Trajectory InOrder() {
-    const std::vector<Stamp>& stamps = trajectory_.stamps;
-    std::vector<int> order(stamps.size());
+    const std::vector<Timestamp>& timestamps = trajectory_.timestamps;
+    std::vector<int> order(timestamps.size());
     std::iota(order.begin(), order.end(), 0);
-    const auto earlier = [&](int a, int b) { return At(stamps, a) < At(stamps, b); };
+    const auto earlier = [&](int a, int b) { return At(timestamps, a) < At(timestamps, b); };
     const auto back = std::is_sorted_until(order.begin(), order.end(), earlier);
     const bool sorted = back == order.end();
     if (!sorted) {
-      Warn(At(lines_, *back), "t", "goes back: " + internal::SecondsText(At(stamps, *back)),
+      Warn(At(lines_, *back), "t", "goes back: " + internal::SecondsText(At(timestamps, *back)),
            "poses in the order of their timestamps; they are sorted");
       std::stable_sort(order.begin(), order.end(), earlier);
     }
@@ -241,13 +242,14 @@ class TrajectoryReader {
 
   /// `order` sorts the timestamps.
   void WarnOfDuplicates(const std::vector<int>& order) {
-    const std::vector<Stamp>& stamps = trajectory_.stamps;
+    const std::vector<Timestamp>& timestamps = trajectory_.timestamps;
     int first = -1, count = 0;
     for (std::size_t k = 1; k < order.size(); ++k) {
-      if (At(stamps, order[k]) == At(stamps, order[k - 1]) && count++ == 0) first = order[k];
+      if (At(timestamps, order[k]) == At(timestamps, order[k - 1]) && count++ == 0)
+        first = order[k];
     }
     if (count == 0) return;
-    std::string what = "duplicate timestamp " + internal::SecondsText(At(stamps, first));
+    std::string what = "duplicate timestamp " + internal::SecondsText(At(timestamps, first));
     if (count > 1) what += ", the first of " + std::to_string(count) + " such rows";
     Warn(At(lines_, first), "t", what, "each timestamp once; all poses are kept");
   }
@@ -265,8 +267,8 @@ class TrajectoryReader {
   std::size_t columns_ = 0;
   std::vector<int> lines_;
   std::vector<Eigen::Vector3d> positions_;
-  std::vector<double> seconds_;           ///< of TUM, before their unit is known
-  std::vector<std::string> stamp_texts_;  ///< likewise
+  std::vector<double> seconds_;               ///< of TUM, before their unit is known
+  std::vector<std::string> timestamp_texts_;  ///< likewise
 };
 
 /// The name of the file that holds the times of one file of KITTI alone.
@@ -274,7 +276,7 @@ std::filesystem::path OwnTimes(const std::filesystem::path& file) {
   return file.stem().string() + "_times.txt";
 }
 
-/// The file of stamps beside a file of KITTI; empty where there is none.
+/// The file of timestamps beside a file of KITTI; empty where there is none.
 std::filesystem::path TimesBeside(const std::filesystem::path& file) {
   for (const std::filesystem::path& name : {OwnTimes(file), std::filesystem::path("times.txt")}) {
     const std::filesystem::path beside = file.parent_path() / name;
@@ -288,16 +290,16 @@ void ReadTimes(const std::filesystem::path& times, Trajectory& trajectory) {
   NumberRows rows(times, {}, {}, ' ');
   while (rows.Next()) {
     rows.ExpectColumns(1, "t");
-    trajectory.stamps.push_back(rows.Time(0, "t"));
-    const std::size_t n = trajectory.stamps.size();
-    if (n > 1 && trajectory.stamps[n - 2] >= trajectory.stamps[n - 1]) {
+    trajectory.timestamps.push_back(rows.Time(0, "t"));
+    const std::size_t n = trajectory.timestamps.size();
+    if (n > 1 && trajectory.timestamps[n - 2] >= trajectory.timestamps[n - 1]) {
       rows.FailCell(0, "t", "is not after the one before", "times that increase");
     }
   }
-  if (std::ssize(trajectory.stamps) == trajectory.size()) return;
+  if (std::ssize(trajectory.timestamps) == trajectory.size()) return;
   const std::filesystem::path own = OwnTimes(trajectory.name);
   const bool shared = times.filename() != own;
-  rows.FailLine(std::to_string(trajectory.stamps.size()) + " times for " +
+  rows.FailLine(std::to_string(trajectory.timestamps.size()) + " times for " +
                     std::to_string(trajectory.size()) + " poses of " + trajectory.name,
                 "one for each pose" + (shared ? ", or " + own.string() + " beside it" : ""));
 }
@@ -328,7 +330,7 @@ Trajectory Trajectory::Select(const std::vector<int>& indices) const {
     const auto i = static_cast<std::size_t>(indices[k]);
     part.positions.col(static_cast<Eigen::Index>(k)) = positions.col(indices[k]);
     part.orientations.push_back(orientations[i]);
-    if (has_stamps()) part.stamps.push_back(stamps[i]);
+    if (has_timestamps()) part.timestamps.push_back(timestamps[i]);
     if (!has_covariances()) continue;
     part.position_covariances.push_back(position_covariances[i]);
     part.orientation_covariances.push_back(orientation_covariances[i]);
@@ -351,8 +353,9 @@ Trajectory ReadTrajectory(const std::filesystem::path& file, TrajectoryFormat fo
     const std::filesystem::path times = TimesBeside(file);
     if (!times.empty()) ReadTimes(times, trajectory);
   }
-  const std::vector<Stamp>& stamps = trajectory.stamps;
-  if (stamps.empty() || Seconds(stamps.back()) - Seconds(stamps.front()) < cell::kTimeLimit) {
+  const std::vector<Timestamp>& timestamps = trajectory.timestamps;
+  if (timestamps.empty() ||
+      Seconds(timestamps.back()) - Seconds(timestamps.front()) < cell::kTimeLimit) {
     return trajectory;
   }
   throw Error(ExitCode::kBadData,

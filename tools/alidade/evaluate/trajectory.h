@@ -17,17 +17,17 @@ namespace alidade {
 ///   kTum    the same, Pr11 Pr12 Pr13 Pr22 Pr23 Pr33 Pt11 Pt12 Pt13 Pt22 Pt23 Pt33
 ///                                              covariances of rotation, rad^2, in the body, and of
 ///                                              position, m^2, in the world
-///   kKitti  r11 r12 r13 x r21 r22 r23 y r31 r32 r33 z    no stamp
+///   kKitti  r11 r12 r13 x r21 r22 r23 y r31 r32 r33 z    no timestamp
 ///   kEuroc  t,x,y,z,qw,qx,qy,qz[,...]          t in ns, 8 or 17 columns; commas between
 enum class TrajectoryFormat { kDetect, kTum, kKitti, kEuroc };
 /// `detect`, `tum`, `kitti`, `euroc`.
 const char* ToString(TrajectoryFormat format);
 
-/// Poses of one body in one world, in the order of their stamps.
+/// Poses of one body in one world, in the order of their timestamps.
 struct Trajectory {
   std::string name;  ///< of the file
   TrajectoryFormat format = TrajectoryFormat::kTum;
-  std::vector<Stamp> stamps;                     ///< ascending; empty where the file has none
+  std::vector<Timestamp> timestamps;             ///< ascending; empty where the file has none
   Eigen::Matrix3Xd positions;                    ///< m, in the world
   std::vector<Eigen::Quaterniond> orientations;  ///< world_from_body
   /// Of each pose, or empty: of the error in position, in the world, m^2; and of that in
@@ -37,7 +37,7 @@ struct Trajectory {
   std::vector<std::string> warnings;  ///< what looks wrong in the file, FILE:LINE first
 
   int size() const { return static_cast<int>(orientations.size()); }
-  bool has_stamps() const { return !stamps.empty(); }
+  bool has_timestamps() const { return !timestamps.empty(); }
   bool has_covariances() const { return !position_covariances.empty(); }
   /// Length of the path along the poses [first, last], m.
   double PathLength(int first, int last) const;
@@ -49,15 +49,15 @@ struct Trajectory {
 
 /// Reads a file of poses, or standard input where it is `-`. kDetect takes the format that the
 /// first row has by its columns and commas. Blank lines and lines that begin with `#` are left out.
-/// KITTI's stamps are those of NAME_times.txt or times.txt beside NAME.txt, where there is one.
+/// KITTI's timestamps are those of NAME_times.txt or times.txt beside NAME.txt, where there is one.
 ///
-/// Warns, with the line, of stamps of TUM that are no seconds by their size and distance (they are
-/// read as what they look like, ns, us or ms), of poses out of order (they are sorted), of
+/// Warns, with the line, of timestamps of TUM that are no seconds by their size and distance (they
+/// are read as what they look like, ns, us or ms), of poses out of order (they are sorted), of
 /// duplicate timestamps (all poses are kept), and of a first pose that would be the identity in the
 /// other order of the quaternion.
 ///
-/// Errors: kBadData with file, line and column of a row that is none, of a stamp beyond 292 years
-/// and of a covariance that is not positive semi-definite; kInputMissing.
+/// Errors: kBadData with file, line and column of a row that is none, of a timestamp beyond 292
+/// years and of a covariance that is not positive semi-definite; kInputMissing.
 Trajectory ReadTrajectory(const std::filesystem::path& file,
                           TrajectoryFormat format = TrajectoryFormat::kDetect);
 

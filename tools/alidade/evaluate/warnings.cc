@@ -18,14 +18,14 @@ namespace {
 
 using internal::RoundedText;
 
-constexpr int kFewPoses = 10;          ///< tell nothing about frames and scale
-constexpr double kFewMatches = 0.5;    ///< share of those possible
-constexpr double kLateStamps = 0.5;    ///< median difference, as a share of the tolerance
-constexpr double kMetricScale = 0.1;   ///< off 1
-constexpr double kShortPath = 0.5;     ///< share of the reference's
-constexpr double kOtherWorld = 10.0;   ///< error without alignment over that with
-constexpr double kBodyTurnDeg = 10.0;  ///< a turn of the body that is no error of an estimate
-constexpr double kClearly = 0.25;      ///< what explains the rest
+constexpr int kFewPoses = 10;            ///< tell nothing about frames and scale
+constexpr double kFewMatches = 0.5;      ///< share of those possible
+constexpr double kLateTimestamps = 0.5;  ///< median difference, as a share of the tolerance
+constexpr double kMetricScale = 0.1;     ///< off 1
+constexpr double kShortPath = 0.5;       ///< share of the reference's
+constexpr double kOtherWorld = 10.0;     ///< error without alignment over that with
+constexpr double kBodyTurnDeg = 10.0;    ///< a turn of the body that is no error of an estimate
+constexpr double kClearly = 0.25;        ///< what explains the rest
 constexpr const char* kEurocTruth = "state_groundtruth_estimate0";
 constexpr double kDegrees = 180.0 / 3.14159265358979323846;
 
@@ -98,7 +98,7 @@ class Warnings {
   std::vector<std::string> Take() {
     CheckOrder();
     CheckMatches();
-    CheckStamps();
+    CheckTimestamps();
     CheckPath();
     if (evaluation_.estimate.size() < kFewPoses || !evaluation_.sim3_scale) return warnings_;
     const Trajectory& reference = evaluation_.reference;
@@ -143,17 +143,17 @@ class Warnings {
          "the same clock and rate; --t-offset, --t-max-diff");
   }
 
-  void CheckStamps() {
+  void CheckTimestamps() {
     if (matches_.by_row) return;
-    std::vector<Stamp> off;
+    std::vector<Timestamp> off;
     for (std::size_t k = 0; k < matches_.estimate.size(); ++k) {
-      off.push_back(evaluation_.reference.stamps[k] -
-                    (evaluation_.estimate.stamps[k] + evaluation_.options.offset));
+      off.push_back(evaluation_.reference.timestamps[k] -
+                    (evaluation_.estimate.timestamps[k] + evaluation_.options.offset));
     }
     const auto middle = off.begin() + std::ssize(off) / 2;
     std::nth_element(off.begin(), middle, off.end());
     const double late_s = std::abs(Seconds(*middle));
-    if (!(late_s > kLateStamps * Seconds(evaluation_.options.max_diff))) return;
+    if (!(late_s > kLateTimestamps * Seconds(evaluation_.options.max_diff))) return;
     Warn("its timestamps are " + RoundedText(late_s) + " s " + (*middle > 0 ? "before" : "after") +
              " those of the reference on the median",
          "--t-offset " + RoundedText(Seconds(evaluation_.options.offset + *middle)));

@@ -18,9 +18,9 @@ struct RecordedElement {
   std::string unit;
   bool has_sigma = false;  ///< in column `sigma:NAME`
   std::string truth;       ///< column in truth.csv, or ""
-  bool has_value = false;  ///< at some stamp
+  bool has_value = false;  ///< at some timestamp
   bool has_truth = false;
-  bool is_random = false;  ///< its variance was above zero at some stamp
+  bool is_random = false;  ///< its variance was above zero at some timestamp
 };
 
 struct RecordedGain {
@@ -81,7 +81,7 @@ struct RecordedRun {
   std::vector<RecordedEstimator> estimators;
   std::vector<RecordedStream> streams;
   std::vector<RecordedImplied> implied;
-  Stamp first = 0, last = 0;
+  Timestamp first = 0, last = 0;
   std::int64_t truth_rows = 0, measurement_rows = 0, implied_rows = 0, expected_rows = 0;
 };
 

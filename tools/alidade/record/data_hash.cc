@@ -40,10 +40,10 @@ void DataHash::Add(const Frame& frame) {
   for (const Measurement& m : frame.measurements) sorted.push_back(&m);
   std::ranges::stable_sort(sorted, {}, name_of);
   bytes_.clear();
-  Append(bytes_, static_cast<std::uint64_t>(frame.stamp));
+  Append(bytes_, static_cast<std::uint64_t>(frame.timestamp));
   Append(bytes_, sorted.size());
   for (const Measurement* const m : sorted) {
-    Append(bytes_, static_cast<std::uint64_t>(m->stamp));
+    Append(bytes_, static_cast<std::uint64_t>(m->timestamp));
     Append(bytes_, name_of(m));
     Append(bytes_, static_cast<std::uint64_t>(m->landmark));
     Append(bytes_, m->values);
@@ -54,7 +54,7 @@ void DataHash::Add(const Frame& frame) {
   bytes_.clear();
   for (std::size_t t = 0; t < std::min(frame.truth.size(), truths_.size()); ++t) {
     if (frame.truth[t].empty()) continue;
-    Append(bytes_, static_cast<std::uint64_t>(frame.stamp));
+    Append(bytes_, static_cast<std::uint64_t>(frame.timestamp));
     Append(bytes_, truths_[t].name);
     Append(bytes_, frame.truth[t]);
   }

@@ -12,9 +12,9 @@ namespace alidade::internal {
 /// SHA-256 of what the estimators of a run were given: of the values, whatever text or simulator
 /// they came from.
 ///
-///   measurements   of each frame its stamp, and of each of its measurements stream, landmark,
+///   measurements   of each frame its timestamp, and of each of its measurements stream, landmark,
 ///                  values and own covariance; those of one frame by the name of their stream
-///   truth          of each truth that a frame knows its stamp, name and values
+///   truth          of each truth that a frame knows its timestamp, name and values
 ///
 /// Numbers go in as 8 bytes, the lowest first; 0 and -0 are the same, and so is every NaN.
 class DataHash {

@@ -67,8 +67,8 @@ Eigen::MatrixXd Series::Covariance(std::size_t row, int first, int size) const {
   return p;
 }
 
-void Series::Append(Stamp stamp, const State& state) {
-  stamps.push_back(stamp);
+void Series::Append(Timestamp timestamp, const State& state) {
+  timestamps.push_back(timestamp);
   for (BlockId id = 0; id < static_cast<int>(blocks.size()); ++id) {
     const Block& block = state.layout()[id];
     const auto size = static_cast<std::size_t>(block.geometry().ambient);

@@ -27,26 +27,26 @@ std::vector<SeriesBlock> SeriesBlocksOf(const System& system);
 /// a block has none.
 void AppendCovariance(const State& state, std::size_t blocks, std::vector<double>& cells);
 
-/// Estimates of one estimator by stamp. N = sum of the ambient sizes, n = of the tangent ones.
+/// Estimates of one estimator by timestamp. N = sum of the ambient sizes, n = of the tangent ones.
 struct Series {
   /// More tangent elements than these have their variances alone: P of each frame is too much.
   static constexpr int kMostJoint = 64;
 
   std::vector<SeriesBlock> blocks;
-  std::vector<Stamp> stamps;
-  std::vector<double> values;  ///< N for each stamp; NaN where a block has no value
-  /// For each stamp the lower triangle of P, row by row, where joint, else its diagonal; NaN where
-  /// a block has none.
+  std::vector<Timestamp> timestamps;
+  std::vector<double> values;  ///< N for each timestamp; NaN where a block has no value
+  /// For each timestamp the lower triangle of P, row by row, where joint, else its diagonal; NaN
+  /// where a block has none.
   std::vector<double> covariances;
   bool joint = true;
 
   int ambient() const;
   int tangent() const;
-  /// How many numbers of `covariances` belong to a stamp.
+  /// How many numbers of `covariances` belong to a timestamp.
   std::size_t cells() const;
   /// P of `size` tangent elements from `first` on, at row `row`; diagonal where not joint.
   Eigen::MatrixXd Covariance(std::size_t row, int first, int size) const;
-  void Append(Stamp stamp, const State& state);
+  void Append(Timestamp timestamp, const State& state);
 };
 
 }  // namespace alidade::internal

@@ -129,24 +129,24 @@ std::vector<std::string> EstimatorFiles::GainsHeader(const System& system) {
 void EstimatorFiles::Add(const Frame& frame, const State& state, const UpdateReport& report) {
   if (!report.stale) {
     AddEstimate(frame, state);
-    if (pose_) AddPose(frame.stamp, state);
+    if (pose_) AddPose(frame.timestamp, state);
   }
   for (const MeasurementReport& one : report.measurements()) {
     if (one.sensor < 0 || one.sensor >= static_cast<int>(recorded_.sensors.size())) continue;
-    AddInnovation(frame.stamp, one);
-    if (!one.gain.empty()) AddGain(frame.stamp, state, one);
+    AddInnovation(frame.timestamp, one);
+    if (!one.gain.empty()) AddGain(frame.timestamp, state, one);
   }
   for (std::size_t s = 0; s < recorded_.sensors.size(); ++s) {
     if (!recorded_.sensors[s].has_reprojection) continue;
     const FrameInnovation innovation = FrameInnovationOf(report, static_cast<int>(s));
     if (innovation.measurements == 0) continue;
-    reprojection_->Time(frame.stamp).Text(recorded_.sensors[s].name);
+    reprojection_->Time(frame.timestamp).Text(recorded_.sensors[s].name);
     reprojection_->Integer(innovation.measurements).Number(innovation.rms).EndRow();
   }
 }
 
 void EstimatorFiles::AddEstimate(const Frame& frame, const State& state) {
-  estimates_.Time(frame.stamp);
+  estimates_.Time(frame.timestamp);
   for (const BlockColumns& columns : blocks_) {
     const Block& block = state.layout()[columns.id];
     if (!block.present) {
@@ -184,26 +184,26 @@ void EstimatorFiles::AddEstimate(const Frame& frame, const State& state) {
   covariances_->Write({reinterpret_cast<const char*>(cells.data()), 8 * cells.size()});
 }
 
-void EstimatorFiles::AddPose(Stamp stamp, const State& state) {
+void EstimatorFiles::AddPose(Timestamp timestamp, const State& state) {
   const auto position = static_cast<BlockId>(pose_->position);
   const auto orientation = static_cast<BlockId>(pose_->orientation);
   const Block& at = state.layout()[position];
   const Block& turned = state.layout()[orientation];
   if (!at.present || !turned.present) return;
-  trajectory_->Add(stamp, state.value(position), state.value(orientation));
+  trajectory_->Add(timestamp, state.value(position), state.value(orientation));
   if (!trajectory_covariance_ || !at.has_covariance() || !turned.has_covariance()) return;
   const auto covariance = [&](const Block& block) {
     const int size = block.geometry().tangent;
     return state.covariance().Block(block.tangent_offset, size, block.tangent_offset, size);
   };
-  trajectory_covariance_->Add(stamp, state.value(position), state.value(orientation),
+  trajectory_covariance_->Add(timestamp, state.value(position), state.value(orientation),
                               covariance(at), covariance(turned));
 }
 
-void EstimatorFiles::AddInnovation(Stamp stamp, const MeasurementReport& report) {
+void EstimatorFiles::AddInnovation(Timestamp timestamp, const MeasurementReport& report) {
   RecordedSensor& sensor = recorded_.sensors[static_cast<std::size_t>(report.sensor)];
   const auto width = static_cast<std::size_t>(recorded_.width);
-  innovations_.Time(stamp).Text(sensor.stream).Text(sensor.name).Landmark(report.landmark);
+  innovations_.Time(timestamp).Text(sensor.stream).Text(sensor.name).Landmark(report.landmark);
   innovations_.Text(ToString(report.outcome)).Integer(report.dof);
   const bool reached = !report.s.empty();
   if (reached) {
@@ -222,7 +222,8 @@ void EstimatorFiles::AddInnovation(Stamp stamp, const MeasurementReport& report)
   sensor.has_innovations = sensor.has_innovations || (reached && !report.innovation.empty());
 }
 
-void EstimatorFiles::AddGain(Stamp stamp, const State& state, const MeasurementReport& report) {
+void EstimatorFiles::AddGain(Timestamp timestamp, const State& state,
+                             const MeasurementReport& report) {
   RecordedSensor& sensor = recorded_.sensors[static_cast<std::size_t>(report.sensor)];
   std::vector<const double*> cells(gain_columns_, nullptr);
   const std::size_t rows = report.gain.size() / static_cast<std::size_t>(sensor.tangent);
@@ -242,7 +243,7 @@ void EstimatorFiles::AddGain(Stamp stamp, const State& state, const MeasurementR
       row += present ? 1 : 0;
     }
   }
-  gains_.Time(stamp).Text(sensor.name);
+  gains_.Time(timestamp).Text(sensor.name);
   for (const double* cell : cells) {
     if (cell != nullptr) {
       gains_.Number(*cell);

@@ -23,7 +23,7 @@ class EstimatorFiles {
                  const std::vector<StreamInfo>& truths,
                  const std::vector<std::vector<std::string>>& truth_columns, bool covariances);
 
-  /// A frame older than the state has no row in estimates.csv: the state is not of its stamp.
+  /// A frame older than the state has no row in estimates.csv: the state is not of its timestamp.
   /// Error: kIo.
   void Add(const Frame& frame, const State& state, const UpdateReport& report);
   void Close();
@@ -47,9 +47,9 @@ class EstimatorFiles {
   void FindPath(const System& system);
   void OpenTrajectory(const OutputFolder& folder, const System& system);
   void AddEstimate(const Frame& frame, const State& state);
-  void AddPose(Stamp stamp, const State& state);
-  void AddInnovation(Stamp stamp, const MeasurementReport& report);
-  void AddGain(Stamp stamp, const State& state, const MeasurementReport& report);
+  void AddPose(Timestamp timestamp, const State& state);
+  void AddInnovation(Timestamp timestamp, const MeasurementReport& report);
+  void AddGain(Timestamp timestamp, const State& state, const MeasurementReport& report);
 
   RecordedEstimator recorded_;
   std::vector<BlockColumns> blocks_;

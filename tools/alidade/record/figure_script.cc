@@ -38,7 +38,7 @@ std::string InBrackets(std::string_view unit) {
   return unit.empty() ? "" : std::string("[").append(unit).append("]");
 }
 
-FigureScript::FigureScript(std::string name, std::string title, Stamp first, Stamp last)
+FigureScript::FigureScript(std::string name, std::string title, Timestamp first, Timestamp last)
     : name_(std::move(name)),
       title_(std::move(title)),
       first_(first),
@@ -46,7 +46,7 @@ FigureScript::FigureScript(std::string name, std::string title, Stamp first, Sta
       span_s_(Seconds(last) - Seconds(first)) {}
 
 FigureScript::FigureScript(std::string name, std::string title, std::string x_label)
-    : FigureScript(std::move(name), std::move(title), Stamp{0}, Stamp{0}) {
+    : FigureScript(std::move(name), std::move(title), Timestamp{0}, Timestamp{0}) {
   x_label_ = std::move(x_label);
 }
 
@@ -97,10 +97,10 @@ void FigureScript::Quartiles(std::string_view name, std::string_view file,
 
 /// Its settings; and its label.
 std::string FigureScript::TimeAxis(std::string& label) const {
-  // Stamps that count from 1970 would leave no room for what differs.
-  const Stamp second = 1'000'000'000;
+  // Timestamps that count from 1970 would leave no room for what differs.
+  const Timestamp second = 1'000'000'000;
   const bool far = std::abs(first_ / second) > 100'000 && span_s_ < std::abs(Seconds(first_));
-  const Stamp origin = far ? first_ / second : 0;
+  const Timestamp origin = far ? first_ / second : 0;
   std::string first, last;
   AppendSeconds(first, first_ - origin * second);
   AppendSeconds(last, last_ - origin * second);

@@ -26,7 +26,7 @@ class FigureScript {
   static constexpr const char* kTime = "(column('t_s')-t0):";
 
   /// All panels show the time from `first` to `last`.
-  FigureScript(std::string name, std::string title, Stamp first, Stamp last);
+  FigureScript(std::string name, std::string title, Timestamp first, Timestamp last);
   /// All panels are over something else than time.
   FigureScript(std::string name, std::string title, std::string x_label);
 
@@ -57,7 +57,7 @@ class FigureScript {
 
   std::string name_, title_, body_, plot_;
   std::string x_label_;  ///< "": time
-  Stamp first_, last_;
+  Timestamp first_, last_;
   double span_s_;
   int panels_ = 0, panel_height_ = 170;
   int keys_ = 0, most_keys_ = 0;  ///< entries in the key of the panel at hand, and of the fullest

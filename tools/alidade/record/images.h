@@ -17,8 +17,8 @@ class ImageWriter {
  public:
   virtual ~ImageWriter() = default;
   /// Adds the image of frame `number`, of whose points `pixels` are the centres (u, v); the
-  /// stamps of the first two frames give the rate of a video. Errors: kCannotCreate, kIo.
-  virtual void Add(std::int64_t number, Stamp stamp,
+  /// timestamps of the first two frames give the rate of a video. Errors: kCannotCreate, kIo.
+  virtual void Add(std::int64_t number, Timestamp timestamp,
                    const std::vector<std::array<double, 2>>& pixels) = 0;
   /// Completes what was written. Error: kIo.
   virtual void Close() = 0;

@@ -72,7 +72,7 @@ PoseFile::PoseFile(const OutputFolder& folder, const std::string& name, const Po
   file_->Write(std::string(kHeader) + (with_covariances ? kCovariances : "") + '\n');
 }
 
-void PoseFile::AppendPose(std::string& row, Stamp stamp, const double* position,
+void PoseFile::AppendPose(std::string& row, Timestamp timestamp, const double* position,
                           const double* orientation) const {
   Eigen::Vector3d r = Eigen::Vector3d::Zero();
   Eigen::Vector4d q = Eigen::Vector4d::Zero();  // w x y z
@@ -83,24 +83,24 @@ void PoseFile::AppendPose(std::string& row, Stamp stamp, const double* position,
     r << position[0], position[1], position[2];
     q << orientation[0], orientation[1], orientation[2], orientation[3];
   }
-  AppendSeconds(row, stamp);
+  AppendSeconds(row, timestamp);
   for (const double value : {r[0], r[1], r[2], q[1], q[2], q[3], q[0]}) {
     row += ' ';
     AppendNumber(row, value);
   }
 }
 
-void PoseFile::Add(Stamp stamp, const double* position, const double* orientation) {
+void PoseFile::Add(Timestamp timestamp, const double* position, const double* orientation) {
   std::string row;
-  AppendPose(row, stamp, position, orientation);
+  AppendPose(row, timestamp, position, orientation);
   file_->Write(row + '\n');
 }
 
-void PoseFile::Add(Stamp stamp, const double* position, const double* orientation,
+void PoseFile::Add(Timestamp timestamp, const double* position, const double* orientation,
                    const Eigen::MatrixXd& position_covariance,
                    const Eigen::MatrixXd& orientation_covariance) {
   std::string row;
-  AppendPose(row, stamp, position, orientation);
+  AppendPose(row, timestamp, position, orientation);
   AppendUpper(row, orientation_covariance);
   AppendUpper(row, position_covariance);
   file_->Write(row + '\n');
@@ -110,7 +110,7 @@ void PoseFile::AddTruth(const Frame& frame) {
   if (frame.truth.size() <= std::max(place_.position, place_.orientation)) return;
   const std::vector<double>& r = frame.truth[place_.position];
   const std::vector<double>& q = frame.truth[place_.orientation];
-  if (!r.empty() && !q.empty()) Add(frame.stamp, r.data(), q.data());
+  if (!r.empty() && !q.empty()) Add(frame.timestamp, r.data(), q.data());
 }
 
 void PoseFile::Close() { file_->Close(); }

@@ -32,10 +32,10 @@ class PoseFile {
            bool with_covariances = false);
 
   /// The orientation is w x y z, or the angle, rad. Error: kIo.
-  void Add(Stamp stamp, const double* position, const double* orientation);
+  void Add(Timestamp timestamp, const double* position, const double* orientation);
   /// With covariances in the tangent, m^2 in the world and rad^2 in the body; one that is not
   /// finite is written as zeros.
-  void Add(Stamp stamp, const double* position, const double* orientation,
+  void Add(Timestamp timestamp, const double* position, const double* orientation,
            const Eigen::MatrixXd& position_covariance,
            const Eigen::MatrixXd& orientation_covariance);
   /// The pose among the truths of a frame; no row where it is not known.
@@ -43,7 +43,7 @@ class PoseFile {
   void Close();
 
  private:
-  void AppendPose(std::string& row, Stamp stamp, const double* position,
+  void AppendPose(std::string& row, Timestamp timestamp, const double* position,
                   const double* orientation) const;
 
   PosePlace place_;

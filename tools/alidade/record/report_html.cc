@@ -92,7 +92,7 @@ std::string Events(const EstimatorResult& result) {
   for (std::size_t i = 0; i < std::min(result.events.size(), kMaxEvents); ++i) {
     const Event& event = result.events[i];
     std::string time;
-    if (event.stamp != kNoStamp) AppendSeconds(time, event.stamp);
+    if (event.timestamp != kNoTimestamp) AppendSeconds(time, event.timestamp);
     html += "<tr><td>" + time + "</td><td>" + HtmlEscaped(event.kind) + "</td><td class=\"text\">" +
             HtmlEscaped(event.text) + "</td></tr>\n";
   }

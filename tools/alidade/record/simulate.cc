@@ -62,10 +62,10 @@ class DataFiles {
   }
 
   void Add(std::int64_t number, const Frame& frame) {
-    times_->Integer(number).Time(frame.stamp).EndRow();
+    times_->Integer(number).Time(frame.timestamp).EndRow();
     for (const Measurement& measurement : frame.measurements) AddRow(number, measurement);
     if (!truth_) return;
-    truth_->Time(frame.stamp);
+    truth_->Time(frame.timestamp);
     for (std::size_t i = 0; i < source_.truths().size(); ++i) {
       const auto size = static_cast<std::size_t>(source_.truths()[i].size);
       const bool known = i < frame.truth.size() && !frame.truth[i].empty();
@@ -108,7 +108,7 @@ class DataFiles {
       OpenCsv(file, stream.name + ".csv", header);
     }
     if (!landmark) {
-      file->Integer(number).Time(measurement.stamp);
+      file->Integer(number).Time(measurement.timestamp);
       file->Numbers(measurement.values.data(), measurement.values.size(),
                     measurement.values.size());
       return file->EndRow();
@@ -163,7 +163,7 @@ class ImageFiles {
       if (measurement.landmark < 0 || measurement.values.size() < 2) continue;
       pixels_.push_back({measurement.values[0], measurement.values[1]});
     }
-    for (const auto& writer : writers_) writer->Add(number, frame.stamp, pixels_);
+    for (const auto& writer : writers_) writer->Add(number, frame.timestamp, pixels_);
   }
 
   void Close() {

@@ -159,19 +159,19 @@ void SourceFiles::FindInverses(const Experiment& experiment) {
 }
 
 void SourceFiles::Add(const Frame& frame) {
-  if (first_ == kNoStamp) first_ = frame.stamp;
-  last_ = frame.stamp;
+  if (first_ == kNoTimestamp) first_ = frame.timestamp;
+  last_ = frame.timestamp;
   for (const Measurement& m : frame.measurements) {
     const auto stream = static_cast<std::size_t>(m.stream);
     ++stream_rows_[stream];
-    measurements_->Time(m.stamp).Text(streams_[stream].name).Landmark(m.landmark);
+    measurements_->Time(m.timestamp).Text(streams_[stream].name).Landmark(m.landmark);
     measurements_->Numbers(m.values.data(), m.values.size(), width_).EndRow();
     AddExpected(frame, m);
     AddImplied(frame, m);
   }
   if (!truth_) return;
   if (poses_) poses_->AddTruth(frame);
-  truth_->Time(frame.stamp);
+  truth_->Time(frame.timestamp);
   for (std::size_t t = 0; t < truths_.size(); ++t) {
     const auto size = static_cast<std::size_t>(truths_[t].size);
     if (t < frame.truth.size() && !frame.truth[t].empty()) {
@@ -191,7 +191,7 @@ void SourceFiles::AddExpected(const Frame& frame, const Measurement& m) {
   std::vector<double> z(m.values.size());
   if (roles.empty() || model.Predict(roles.data(), z.data()) != Status::kOk) return;
   const auto stream = static_cast<std::size_t>(m.stream);
-  expected_->Time(m.stamp).Text(streams_[stream].name);
+  expected_->Time(m.timestamp).Text(streams_[stream].name);
   expected_->Numbers(z.data(), z.size(), width_).EndRow();
   ++expected_rows_[stream];
 }
@@ -214,7 +214,7 @@ void SourceFiles::AddImplied(const Frame& frame, const Measurement& m) {
       }
     }
     const std::size_t before = inverse.recorded.cell;
-    implied_->Time(m.stamp).Text(inverse.recorded.sensor).Empty(before).Number(value);
+    implied_->Time(m.timestamp).Text(inverse.recorded.sensor).Empty(before).Number(value);
     implied_->Empty(blocks_ - before - 1).EndRow();
     ++inverse.recorded.rows;
   }
@@ -233,7 +233,7 @@ void SourceFiles::Describe(RecordedRun& run) const {
     run.streams.push_back({streams_[s].name, streams_[s].size, stream_rows_[s], expected_rows_[s]});
   }
   for (const Inverse& inverse : inverses_) run.implied.push_back(inverse.recorded);
-  if (first_ != kNoStamp) {
+  if (first_ != kNoTimestamp) {
     run.first = first_;
     run.last = last_;
   }

@@ -51,7 +51,7 @@ class SourceFiles {
   std::map<int, Expectation> expectations_;  ///< by stream
   std::vector<Inverse> inverses_;
   std::size_t width_ = 1, blocks_ = 0;
-  Stamp first_ = kNoStamp, last_ = kNoStamp;
+  Timestamp first_ = kNoTimestamp, last_ = kNoTimestamp;
   std::optional<CsvFile> measurements_, truth_, expected_, implied_;
   std::optional<PoseFile> poses_;
 };

@@ -34,10 +34,10 @@ Config WithSeed(const Config& config, std::uint64_t seed) {
 
 bool AreEqual(const Frame& a, const Frame& b) {
   const auto same = [](const Measurement& m, const Measurement& n) {
-    return m.stamp == n.stamp && m.stream == n.stream && m.landmark == n.landmark &&
+    return m.timestamp == n.timestamp && m.stream == n.stream && m.landmark == n.landmark &&
            m.values == n.values && m.covariance == n.covariance;
   };
-  return a.stamp == b.stamp && a.truth == b.truth &&
+  return a.timestamp == b.timestamp && a.truth == b.truth &&
          std::ranges::equal(a.measurements, b.measurements, same);
 }
 

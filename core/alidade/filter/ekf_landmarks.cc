@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "alidade/base/statistics.h"
-#include "alidade/system/landmark_form.h"
+#include "alidade/system/landmark_representation.h"
 
 namespace alidade {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "alidade/host/plugin_host.h"
 #include "alidade/host/source.h"
-#include "alidade/model/fingerprint.h"
+#include "alidade/model/build_tag.h"
 
 /// Exports of C++ plugins, made against alidade::core, loaded only into the very build
 /// that they were made with.

@@ -5,7 +5,7 @@
 #include <memory>
 #include <utility>
 
-#include "alidade/model/fingerprint.h"
+#include "alidade/model/build_tag.h"
 #include "alidade/model/plugin_thunks.h"
 
 /// Puts models behind the plugin ABI, plugin_abi.h. In the .cc of a plugin:

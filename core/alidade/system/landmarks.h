@@ -12,7 +12,7 @@
 #include "alidade/base/eigen_alignment.h"
 #include "alidade/config/config.h"
 #include "alidade/host/source.h"
-#include "alidade/system/landmark_form.h"
+#include "alidade/system/landmark_representation.h"
 
 /// Landmarks: the part of the state that comes and goes with what is seen.
 namespace alidade {

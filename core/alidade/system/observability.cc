@@ -7,7 +7,7 @@
 
 #include "alidade/base/random.h"
 #include "alidade/model/geometry.h"
-#include "alidade/system/landmark_form.h"
+#include "alidade/system/landmark_representation.h"
 
 namespace alidade {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <functional>
 
-#include "alidade/system/landmark_form.h"
+#include "alidade/system/landmark_representation.h"
 
 namespace alidade {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "alidade/system/landmark_form.h"
+#include "alidade/system/landmark_representation.h"
 #include "condensed_run.h"
 
 /// A CondensedRun with landmarks as a problem in e alone, and the map that belongs to a solution.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/system/landmark_form.h"
+#include "alidade/system/landmark_representation.h"
 
 #include <algorithm>
 #include <iterator>

@@ -4,12 +4,12 @@
 #include <algorithm>
 
 #include "alidade/filter/ekf_landmarks.h"
-#include "alidade/system/landmark_form.h"
+#include "alidade/system/landmark_representation.h"
 
 namespace alidade {
 
 /// Lets landmarks of this frame enter that wait, as long as too few are measured.
-void Ekf::Landmarks::Enter() {
+void Ekf::Landmarks::InitialiseNew() {
   const std::vector<const Row*> used = MeasuredOnce();
   auto measured = std::ssize(used);
   for (Family& family : families_) family.shared.clear();

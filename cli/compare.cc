@@ -34,15 +34,17 @@ struct CompareArguments {
   SweepOptions sweep;
   bool over_seeds = false;
   CompareOptions options;
+  bool all = false;
   bool no_explain = false, json = false, markdown = false, latex = false;
   bool force = false, quiet = false, figures = false;
 };
 
 std::string Shown(const Comparison& comparison, const CompareArguments& arguments) {
   if (arguments.json) return CompareJson(comparison);
-  return CompareReport(comparison, arguments.markdown ? TableStyle::kMarkdown
-                                   : arguments.latex  ? TableStyle::kLatex
-                                                      : TableStyle::kText);
+  if (arguments.markdown) return CompareReport(comparison, TableStyle::kMarkdown);
+  if (arguments.latex) return CompareReport(comparison, TableStyle::kLatex);
+  return CompareReport(comparison, TableStyle::kText,
+                       arguments.all ? ReportRows::kAll : ReportRows::kMain);
 }
 
 /// Prints the comparison, and where it lies.
@@ -233,6 +235,7 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
             "folder; default of a config: its `output:`, or compare-NAME, in runs/; of folders: "
             "none is written");
   command.add_flag("--force", arguments.force, "replace the folder if it is there");
+  command.add_flag("--all", arguments.all, "print all rows of the tables");
   command.add_flag("--json", arguments.json, "print all values as JSON");
   command.add_flag("--markdown", arguments.markdown, "print the tables as Markdown")
       ->excludes("--json");

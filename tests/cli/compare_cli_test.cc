@@ -78,7 +78,7 @@ TEST_F(CompareCli, AConfigIsRunAndItsErrorDecomposed) {
   EXPECT_TRUE(Contains(Read("out/files.txt"), "compare.json"));
   EXPECT_TRUE(Contains(Read("out/compare.tex"), "\\begin{tabular}{lrr}"))
       << Read("out/compare.tex");
-  EXPECT_TRUE(Contains(Read("out/compare.tex"), "batch\\_so\\_far"));
+  EXPECT_TRUE(Contains(Read("out/compare.tex"), "full\\_information"));
   EXPECT_TRUE(Contains(Read("out/compare.md"), "| rmse target.depth [mm] | "));
 }
 

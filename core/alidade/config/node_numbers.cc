@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <Eigen/Eigenvalues>
 #include <charconv>
 #include <cmath>
 #include <limits>
 
 #include "alidade/base/number_text.h"
+#include "alidade/base/symmetric_eigen.h"
 #include "alidade/config/tree.h"
 
 namespace alidade {
 namespace {
 
+using internal::EigenvaluesOf;
 using internal::NumberText;
 using internal::Quoted;
 
@@ -98,11 +99,6 @@ Eigen::MatrixXd Correlation(const Eigen::MatrixXd& covariance) {
   return scale.asDiagonal() * covariance * scale.asDiagonal();
 }
 
-double SmallestEigenvalue(const Eigen::MatrixXd& symmetric) {
-  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(symmetric, Eigen::EigenvaluesOnly)
-      .eigenvalues()[0];
-}
-
 void CheckSymmetric(const Node& node, const Eigen::MatrixXd& covariance) {
   constexpr double kTolerance = 1e-9;
   const Eigen::MatrixXd scaled = Correlation(covariance);
@@ -121,15 +117,15 @@ void CheckSymmetric(const Node& node, const Eigen::MatrixXd& covariance) {
 void CheckPositive(const Node& node, const Eigen::MatrixXd& covariance) {
   const Eigen::Index size = covariance.rows();
   const double tolerance = 1e-12 * static_cast<double>(size);
-  bool positive = SmallestEigenvalue(Correlation(covariance)) >= -tolerance;
+  bool positive = EigenvaluesOf(Correlation(covariance))[0] >= -tolerance;
   for (Eigen::Index i = 0; i < size; ++i) {
     const double variance = covariance(i, i);
     if (variance < 0 || (variance == 0 && !covariance.row(i).isZero(0))) positive = false;
   }
   if (positive) return;
-  double smallest = SmallestEigenvalue(covariance);
+  double smallest = EigenvaluesOf(covariance)[0];
   const bool drowned = smallest >= 0;  // in the rounding of a much larger one
-  if (drowned) smallest = SmallestEigenvalue(Correlation(covariance));
+  if (drowned) smallest = EigenvaluesOf(Correlation(covariance))[0];
   node.Fail(std::string("not positive semi-definite: ") + (drowned ? "its correlation's" : "its") +
                 " smallest eigenvalue is " + internal::RoundedText(smallest, 6),
             "a covariance");

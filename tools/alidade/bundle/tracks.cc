@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <map>
 #include <optional>
 
 #include "alidade/base/number_rows.h"
+#include "alidade/base/symmetric_eigen.h"
 #include "alidade/bundle/bundle_file.h"
 #include "alidade/model/geometry.h"
 
@@ -101,6 +102,17 @@ std::map<std::int64_t, std::size_t> PosesOf(const Tracks& tracks, const Start& s
   return poses;
 }
 
+/// A^+ of a symmetric A >= 0: eigenvalues up to `tolerance` of the largest count as zero.
+Eigen::Matrix3d PseudoInverse(const Eigen::Matrix3d& a, double tolerance) {
+  const auto [values, vectors] = internal::EigenOf(a);
+  Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    if (!(values[i] > tolerance * values[2])) continue;
+    inverse += vectors.col(i) * vectors.col(i).transpose() / values[i];
+  }
+  return inverse;
+}
+
 /// Where the points meet that the sensor tells of each observation: y, with J = dy/dz,
 ///
 ///   point = (sum W)^-1 sum W y,   W = (J J')^+
@@ -127,16 +139,14 @@ std::optional<std::array<double, 3>> Triangulate(const SensorModel& sensor,
     if (sensor.Initialise(values.data(), one.z.data(), &prior, y.data(), nullptr, j.data(),
                           nullptr) != Status::kOk)
       continue;
-    Eigen::CompleteOrthogonalDecomposition<Eigen::Matrix3d> spread;
-    spread.setThreshold(kAlongRay);
-    const Eigen::Matrix3d w = spread.compute(j * j.transpose()).pseudoInverse();
+    const Eigen::Matrix3d w = PseudoInverse(j * j.transpose(), kAlongRay);
     a += w;
     b += w * y;
   }
-  const Eigen::Vector3d told = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(a).eigenvalues();
+  const Eigen::VectorXd told = internal::EigenvaluesOf(a);
   if (!(told[0] > kParallel * told[2])) return std::nullopt;
   std::array<double, 3> point;
-  Eigen::Map<Eigen::Vector3d>{point.data()} = a.ldlt().solve(b);
+  Eigen::Map<Eigen::Vector3d>{point.data()} = PseudoInverse(a, 0.0) * b;
   return point;
 }
 

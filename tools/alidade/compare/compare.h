@@ -140,8 +140,12 @@ Comparison Summarise(const std::vector<Comparison>& comparisons);
 
 /// How a comparison is written for people.
 enum class TableStyle { kText, kMarkdown, kLatex };
+/// Which rows its tables have: all, or those that a person reads first, errors, their ratios, NEES
+/// and the wall clock (without truth differences), with the number of those left out.
+enum class ReportRows { kAll, kMain };
 /// Its tables and the error decomposition.
-std::string CompareReport(const Comparison& comparison, TableStyle style);
+std::string CompareReport(const Comparison& comparison, TableStyle style,
+                          ReportRows rows = ReportRows::kAll);
 /// All values, for other programs (docs/compare.md).
 std::string CompareJson(const Comparison& comparison);
 

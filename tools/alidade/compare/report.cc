@@ -93,15 +93,38 @@ Section TableOf(const std::vector<ComparedEstimator>& of, bool several, const st
     fewer = fewer || (one.*reference_runs > 0 && one.*reference_runs < one.used);
   }
   section.columns = Names(columns);
-  TellReferences(references, section);
   const std::vector<TableRow> rows = SpreadRows(columns, several, kinds);
+  if (rows.empty()) return section;
+  TellReferences(references, section);
   section.rows.insert(section.rows.end(), rows.begin(), rows.end());
   if (fewer) section.rows.push_back(with_reference);
   return section;
 }
 
+/// Those of `kinds` that `rows` asks for: a person first reads errors where truth is known, else
+/// differences.
+std::vector<RowKind> KindsOf(const Comparison& comparison, ReportRows rows,
+                             std::vector<RowKind> kinds) {
+  if (rows == ReportRows::kAll) return kinds;
+  static const std::set<std::string> kErrors = {"rmse",
+                                                "ratio.rmse",
+                                                "trajectory.sim3.rmse",
+                                                "ratio.trajectory.sim3.rmse",
+                                                "nees.mean",
+                                                "time_us",
+                                                "map.rmse",
+                                                "ratio.map.rmse",
+                                                "map.sim3.rmse",
+                                                "ratio.map.sim3.rmse"};
+  static const std::set<std::string> kDifferences = {
+      "rmsd", "rmsd.trajectory.sim3", "rmsd.sigmas", "time_us", "rmsd.map", "rmsd.map.sim3"};
+  const auto& main = comparison.reference == "truth" ? kErrors : kDifferences;
+  std::erase_if(kinds, [&](const RowKind& kind) { return !main.contains(kind.kind); });
+  return kinds;
+}
+
 /// The estimators along the run, of one kind: filters, or those that know later data.
-Section AlongSection(const Comparison& comparison, bool smoothed) {
+Section AlongSection(const Comparison& comparison, bool smoothed, ReportRows rows) {
   std::vector<ComparedEstimator> of;
   TableRow diverged{"diverged", {}}, used{"runs used", {}};
   bool any_diverged = false;
@@ -117,38 +140,40 @@ Section AlongSection(const Comparison& comparison, bool smoothed) {
                             smoothed ? "Smoothed: estimates from later data too"
                                      : "Online: every estimate from the data up to it",
                             &ComparedEstimator::reference, &ComparedEstimator::reference_runs,
-                            {{"rmse", "rmse"},
-                             {"ratio.rmse", "  ratio"},
-                             {"trajectory.sim3.rmse", "trajectory, Sim3"},
-                             {"trajectory.sim3.scale", "trajectory, scale"},
-                             {"ratio.trajectory.sim3.rmse", "  ratio, trajectory, Sim3"},
-                             {"rmsd", "RMSD"},
-                             {"rmsd.trajectory.sim3", "RMSD, trajectory, Sim3"},
-                             {"rmsd.sigmas", "RMSD in sigmas"},
-                             {"nees.mean", "NEES"},
-                             {"nees.within95", "in the 95 % region"},
-                             {"nis.mean", "NIS"},
-                             {"time_us", "wall clock [us/measurement]"}});
+                            KindsOf(comparison, rows,
+                                    {{"rmse", "rmse"},
+                                     {"ratio.rmse", "  ratio"},
+                                     {"trajectory.sim3.rmse", "trajectory, Sim3"},
+                                     {"trajectory.sim3.scale", "trajectory, scale"},
+                                     {"ratio.trajectory.sim3.rmse", "  ratio, trajectory, Sim3"},
+                                     {"rmsd", "RMSD"},
+                                     {"rmsd.trajectory.sim3", "RMSD, trajectory, Sim3"},
+                                     {"rmsd.sigmas", "RMSD in sigmas"},
+                                     {"nees.mean", "NEES"},
+                                     {"nees.within95", "in the 95 % region"},
+                                     {"nis.mean", "NIS"},
+                                     {"time_us", "wall clock [us/measurement]"}}));
   if (any_diverged) section.rows.push_back(diverged);
   if (comparison.runs > 1) section.rows.push_back(used);
   return section;
 }
 
-Section FinalSection(const Comparison& comparison) {
+Section FinalSection(const Comparison& comparison, ReportRows rows) {
   return TableOf(comparison.estimators, comparison.runs > 1,
                  "At the end, where all have the same data", &ComparedEstimator::final_reference,
                  &ComparedEstimator::final_reference_runs,
-                 {{"final_error", "error"},
-                  {"ratio.final_error", "  ratio"},
-                  {"final_difference", "difference"},
-                  {"final_difference.sigmas", "difference in sigmas"},
-                  {"map.rmse", "map"},
-                  {"ratio.map.rmse", "  ratio, map"},
-                  {"map.sim3.rmse", "map, Sim3"},
-                  {"map.sim3.scale", "map, scale"},
-                  {"ratio.map.sim3.rmse", "  ratio, map, Sim3"},
-                  {"rmsd.map", "RMSD, map"},
-                  {"rmsd.map.sim3", "RMSD, map, Sim3"}});
+                 KindsOf(comparison, rows,
+                         {{"final_error", "error"},
+                          {"ratio.final_error", "  ratio"},
+                          {"final_difference", "difference"},
+                          {"final_difference.sigmas", "difference in sigmas"},
+                          {"map.rmse", "map"},
+                          {"ratio.map.rmse", "  ratio, map"},
+                          {"map.sim3.rmse", "map, Sim3"},
+                          {"map.sim3.scale", "map, scale"},
+                          {"ratio.map.sim3.rmse", "  ratio, map, Sim3"},
+                          {"rmsd.map", "RMSD, map"},
+                          {"rmsd.map.sim3", "RMSD, map, Sim3"}}));
 }
 
 /// The values of one kind by their subject, under another kind.
@@ -268,7 +293,7 @@ std::string ReferencesText(const Comparison& comparison) {
   return names.empty() ? comparison.reference : internal::Join(names);
 }
 
-std::vector<Section> SectionsOf(const Comparison& comparison) {
+std::vector<Section> SectionsOf(const Comparison& comparison, ReportRows rows) {
   std::vector<Section> sections;
   Section& head = sections.emplace_back();
   head.title = comparison.runs > 1 ? std::to_string(comparison.runs) + " runs, mean [5 %, 95 %]"
@@ -283,10 +308,11 @@ std::vector<Section> SectionsOf(const Comparison& comparison) {
   head.lines.insert(head.lines.end(), comparison.notes.begin(), comparison.notes.end());
   if (!comparison.withheld.empty()) head.lines.push_back(comparison.withheld);
   for (const bool smoothed : {false, true}) {
-    Section section = AlongSection(comparison, smoothed);
+    Section section = AlongSection(comparison, smoothed, rows);
     if (!section.columns.empty()) sections.push_back(std::move(section));
   }
-  sections.push_back(FinalSection(comparison));
+  Section at_end = FinalSection(comparison, rows);
+  if (!at_end.rows.empty()) sections.push_back(std::move(at_end));
   if (comparison.decomposition.empty()) return sections;
   sections.push_back({"Error decomposition of " + comparison.explained, {}, {}, {}});
   for (const DecompositionStep& step : comparison.decomposition)
@@ -334,8 +360,18 @@ internal::Json JsonOfDecomposition(const Comparison& comparison) {
 
 }  // namespace
 
-std::string CompareReport(const Comparison& comparison, TableStyle style) {
-  return internal::SectionsText(SectionsOf(comparison), style);
+std::string CompareReport(const Comparison& comparison, TableStyle style, ReportRows rows) {
+  std::vector<Section> sections = SectionsOf(comparison, rows);
+  const auto count = [](const std::vector<Section>& all) {
+    std::size_t sum = 0;
+    for (const Section& one : all) sum += one.rows.size();
+    return sum;
+  };
+  const std::size_t left_out = count(SectionsOf(comparison, ReportRows::kAll)) - count(sections);
+  if (left_out > 0) {
+    sections.push_back({std::to_string(left_out) + " more rows: --all", {}, {}, {}});
+  }
+  return internal::SectionsText(sections, style);
 }
 
 std::string CompareJson(const Comparison& comparison) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/evaluate/trajectory.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
@@ -11,6 +10,7 @@
 
 #include "alidade/base/number_rows.h"
 #include "alidade/base/number_text.h"
+#include "alidade/base/symmetric_eigen.h"
 
 namespace alidade {
 namespace {
@@ -147,9 +147,7 @@ class TrajectoryReader {
     Eigen::Matrix3d matrix;
     matrix << upper[0], upper[1], upper[2], upper[1], upper[3], upper[4], upper[2], upper[4],
         upper[5];
-    const Eigen::Vector3d eigenvalues =
-        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(matrix, Eigen::EigenvaluesOnly)
-            .eigenvalues();
+    const Eigen::VectorXd eigenvalues = internal::EigenvaluesOf(matrix);
     if (eigenvalues[0] >= -kRounding * eigenvalues.cwiseAbs().maxCoeff()) return matrix;
     rows_.FailLine(std::string("the covariance of the ") + of +
                        " is not positive semi-definite: its smallest eigenvalue is " +

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/evaluate/warnings.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -11,11 +9,14 @@
 
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
+#include "alidade/base/symmetric_eigen.h"
 #include "alidade/evaluate/errors.h"
 
 namespace alidade {
 namespace {
 
+using internal::EigenOf;
+using internal::EigenvaluesOf;
 using internal::RoundedText;
 
 constexpr int kFewPoses = 10;            ///< tell nothing about frames and scale
@@ -66,8 +67,7 @@ BodyTurn BodyTurnOf(const Trajectory& reference, const Trajectory& estimate) {
     turns.push_back(estimate.orientations[i].conjugate() * reference.orientations[i]);
     moment += turns.back().coeffs() * turns.back().coeffs().transpose();
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(moment);
-  const Eigen::Quaterniond mean(Eigen::Vector4d(solver.eigenvectors().col(3)));
+  const Eigen::Quaterniond mean(Eigen::Vector4d(EigenOf(moment).vectors.col(3)));
   double sum = 0.0;
   for (const Eigen::Quaterniond& q : turns) {
     const double angle = mean.angularDistance(q);
@@ -81,8 +81,8 @@ BodyTurn BodyTurnOf(const Trajectory& reference, const Trajectory& estimate) {
 bool SpansAPlane(const Eigen::Matrix3Xd& points) {
   constexpr double kThin = 1e-3;
   const Eigen::Matrix3Xd centred = points.colwise() - points.rowwise().mean();
-  const Eigen::Vector3d widths = centred.jacobiSvd().singularValues();
-  return widths[1] > kThin * widths[0];
+  const Eigen::VectorXd squared_widths = EigenvaluesOf(centred * centred.transpose());
+  return squared_widths[1] > kThin * kThin * squared_widths[2];
 }
 
 /// Collects the warnings of one evaluation.

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "alidade/base/number_text.h"
+#include "alidade/base/symmetric_eigen.h"
 #include "alidade/inspect/check_context.h"
 #include "alidade/inspect/check_values.h"
 
@@ -42,8 +42,7 @@ std::string DefectOfR(const MatrixXd& l, const Space& z) {
   }
   const Eigen::VectorXd scale = r.diagonal().array().rsqrt();
   const MatrixXd correlation = scale.asDiagonal() * r * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(correlation, Eigen::EigenvaluesOnly);
-  const double smallest = solver.eigenvalues()[0];
+  const double smallest = EigenvaluesOf(correlation)[0];
   if (smallest > 1e-12) return {};
   return "R is singular: smallest eigenvalue of its correlations " + RoundedText(smallest);
 }

@@ -54,11 +54,11 @@ TEST(Series, FixedBlocksTakeNothingFromTheOthers) {
   reference.values = {1, 1, 0, 0, 0};
   series.covariances = {1, 1, 1, 1};
   reference.covariances = {4, nan, nan, nan};
-  reference.blocks[1].fixed = true;
+  reference.blocks[1].constant = true;
   internal::Distance distance = internal::DistanceBetween(series, reference);
   EXPECT_NEAR(distance.sigmas.at("a"), 1.0, 1e-15);
   EXPECT_TRUE(distance.rms.contains("a.q"));
-  series.blocks[1].fixed = true;
+  series.blocks[1].constant = true;
   distance = internal::DistanceBetween(series, reference);
   EXPECT_NEAR(distance.sigmas.at("a"), 1.0, 1e-15);
   EXPECT_FALSE(distance.rms.contains("a.q"));

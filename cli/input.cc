@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdio>
+#include <new>
 
 #include "command.h"
 #include "console.h"
@@ -23,6 +24,7 @@ fs::path FullPath(const fs::path& path) {
   std::error_code error;
   const fs::path full = fs::absolute(path, error).lexically_normal();
   if (!error) return full;
+  if (error == std::errc::not_enough_memory) throw std::bad_alloc();
   throw Error(ExitCode::kCannotCreate,
               ErrorLine(Place{path.string()}, {},
                         "the current folder is gone; change to one that exists, or give full "

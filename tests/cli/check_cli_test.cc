@@ -57,10 +57,10 @@ TEST_F(CheckProgram, NamesParametersThatAreMissingOrUnknown) {
   EXPECT_TRUE(Contains(missing.err, "model 'stereo_disparity': sigma_px: missing")) << missing.err;
   EXPECT_FALSE(Contains(missing.err, ":1:1")) << missing.err;
   EXPECT_TRUE(Contains(missing.err, "\n  parameters are given with --set KEY=VALUE"));
-  const Outcome unknown = Call(With(kStereo, {"--set", "near=1"}));
+  const Outcome unknown = Call(With(kStereo, {"--set", "min_range=1"}));
   EXPECT_EQ(unknown.code, 78) << unknown.out;
   EXPECT_TRUE(Contains(unknown.err, "error: --set")) << unknown.err;
-  EXPECT_TRUE(Contains(unknown.err, "near: unknown key")) << unknown.err;
+  EXPECT_TRUE(Contains(unknown.err, "min_range: unknown key")) << unknown.err;
   EXPECT_TRUE(Contains(unknown.err, "did you mean 'min_range_m'?")) << unknown.err;
 }
 

@@ -58,7 +58,7 @@ class CompareCli : public testing::ProgramTest {
 };
 
 TEST_F(CompareCli, AConfigIsRunAndItsErrorDecomposed) {
-  const Outcome compared = Call({"compare", "config.yaml", "-o", "out"});
+  const Outcome compared = Call({"compare", "config.yaml", "--all", "-o", "out"});
   EXPECT_EQ(compared.code, 0) << compared.err;
   for (const char* words :
        {"added 'full_information'", "RMSD target.depth [mm]",

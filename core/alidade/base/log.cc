@@ -34,7 +34,10 @@ thread_local bool in_log_sink = false;
 /// The innermost scope of this thread.
 thread_local const LogScope* log_scope = nullptr;
 
-/// The logger of the library, and the least level that one of its sinks takes.
+/// The least level that a sink takes: what is below it costs a load, and no logger.
+std::atomic<int> least_log_level{static_cast<int>(LogLevel::kOff)};
+
+/// The logger of the library.
 class Logger {
  public:
   /// Never destroyed: what ends after main() may log.
@@ -55,9 +58,6 @@ class Logger {
     sinks_->remove_sink(sink);
     Update();
   }
-  bool Takes(LogLevel level) const {
-    return level < LogLevel::kOff && static_cast<int>(level) >= least_.load();
-  }
   void Write(LogLevel level, std::string_view text) {
     logger_.log(ToSpdlog(level), spdlog::string_view_t(text.data(), text.size()));
   }
@@ -70,14 +70,13 @@ class Logger {
   void Update() {
     int least = static_cast<int>(LogLevel::kOff);
     for (const auto& sink : taken_) least = std::min(least, static_cast<int>(sink->level()));
-    least_ = least;
+    least_log_level = least;
   }
 
   std::shared_ptr<spdlog::sinks::dist_sink_mt> sinks_;
   spdlog::logger logger_;
   std::mutex mutex_;  ///< of the list
   std::vector<std::shared_ptr<spdlog::sinks::sink>> taken_;
-  std::atomic<int> least_{static_cast<int>(LogLevel::kOff)};
 };
 
 }  // namespace
@@ -125,7 +124,9 @@ LogScope::LogScope(std::string prefix, LogLevel highest)
 
 LogScope::~LogScope() { log_scope = outer_; }
 
-bool IsLogged(LogLevel level) { return Logger::Get().Takes(level); }
+bool IsLogged(LogLevel level) {
+  return level < LogLevel::kOff && static_cast<int>(level) >= least_log_level.load();
+}
 
 void Log(LogLevel level, std::string_view text) noexcept {
   if (log_scope != nullptr) level = std::min(level, log_scope->highest_);

@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <charconv>
 #include <fstream>
+#include <new>
 
 namespace alidade::internal {
 namespace {
@@ -88,6 +89,7 @@ bool IsHeld(const fs::path& folder, std::string_view process) {
 fs::path WithoutTrailingSlash(const fs::path& path) {
   std::error_code error;
   const fs::path normal = fs::absolute(path, error).lexically_normal();
+  if (error == std::errc::not_enough_memory) throw std::bad_alloc();
   if (error) {
     Refuse(path, "the current folder is gone",
            "change to one that exists, or name the output by its full path");

@@ -211,7 +211,7 @@ TEST(OutOfSequencePolicy, IsReadStrictly) {
   EXPECT_EQ(Refused("out_of_sequence: {policy: rollback}"),
             "order.yaml:25:27 out_of_sequence.policy: 'rollback' without 'window_s'; expected "
             "'window_s', how "
-            "late a frame may be");
+            "far out of sequence a frame may be");
   EXPECT_EQ(Refused("out_of_sequence: {policy: reject, window_s: 1}"),
             "order.yaml:25:45 out_of_sequence.window_s: without a use: 'policy: reject' holds "
             "nothing back; "

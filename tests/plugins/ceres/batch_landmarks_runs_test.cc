@@ -78,7 +78,7 @@ const std::string kSensors =
 const std::string kDrawn =
     "max_frames: 40, rate_hz: 30, sigma_px: 1, known_points: {count: 4, sigma_relative: 0.005}, "
     "points: {box: {min: [-0.8, -0.7, 1.6], max: [1.2, 0.7, 3.6]}, count: 40}, trajectory: "
-    "{model: {linear_acceleration: 0.3, angular_acceleration: 0.05, velocity: [0.2, 0, 0]}}";
+    "{random: {linear_acceleration: 0.3, angular_acceleration: 0.05, velocity: [0.2, 0, 0]}}";
 
 // Its noise is of rank 6 in 12: v' and omega' are what moves r and q.
 TEST(CeresBatchLandmarks, NoiseOfLowRankMovesTheCameraExactlyAsItsModelSays) {

@@ -218,11 +218,11 @@ TEST(Scene, RefusesWhatMakesNoScene) {
           "points.box.max: not above 'min' in x, y and z");
   refused(kStill + ", points: {shells: {radii: [1, -1]}, count: 3}",
           "points.shells.radii: a radius that is not positive");
-  refused(kPoints + ", trajectory: {}", "expected one of look_at, keyframes, model");
+  refused(kPoints + ", trajectory: {}", "expected one of look_at, keyframes, random");
   refused(kPoints + ", trajectory: {look_at: [{position: [0, 0, 0], target: [0, -2, 0]}]}",
           "trajectory.look_at: at -0.033333 s the camera has no orientation");
   refused(kPoints +
-              ", trajectory: {up: [0, 0, 1], model: {linear_acceleration: 1, "
+              ", trajectory: {up: [0, 0, 1], random: {linear_acceleration: 1, "
               "angular_acceleration: 1}}",
           "trajectory.up: without a use");
   refused(kPoints +

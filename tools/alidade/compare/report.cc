@@ -106,19 +106,19 @@ Section TableOf(const std::vector<ComparedEstimator>& of, bool several, const st
 std::vector<RowKind> KindsOf(const Comparison& comparison, ReportRows rows,
                              std::vector<RowKind> kinds) {
   if (rows == ReportRows::kAll) return kinds;
-  static const std::set<std::string> kErrors = {"rmse",
-                                                "ratio.rmse",
-                                                "trajectory.sim3.rmse",
-                                                "ratio.trajectory.sim3.rmse",
-                                                "nees.mean",
-                                                "time_us",
-                                                "map.rmse",
-                                                "ratio.map.rmse",
-                                                "map.sim3.rmse",
-                                                "ratio.map.sim3.rmse"};
-  static const std::set<std::string> kDifferences = {
+  static const std::set<std::string> errors = {"rmse",
+                                               "ratio.rmse",
+                                               "trajectory.sim3.rmse",
+                                               "ratio.trajectory.sim3.rmse",
+                                               "nees.mean",
+                                               "time_us",
+                                               "map.rmse",
+                                               "ratio.map.rmse",
+                                               "map.sim3.rmse",
+                                               "ratio.map.sim3.rmse"};
+  static const std::set<std::string> differences = {
       "rmsd", "rmsd.trajectory.sim3", "rmsd.sigmas", "time_us", "rmsd.map", "rmsd.map.sim3"};
-  const auto& main = comparison.reference == "truth" ? kErrors : kDifferences;
+  const auto& main = comparison.reference == "truth" ? errors : differences;
   std::erase_if(kinds, [&](const RowKind& kind) { return !main.contains(kind.kind); });
   return kinds;
 }

@@ -183,7 +183,7 @@ int Main(int rounds) {
   const Swing swing;
   std::vector<double> depths;
   std::vector<Contender> all;
-  all.push_back(Enter("hand-unrolled (floor)", std::make_shared<HandUnrolled>(), swing, depths));
+  all.push_back(Enter("hand-unrolled (baseline)", std::make_shared<HandUnrolled>(), swing, depths));
   all.push_back(Enter("Eigen, fixed size, by hand", std::make_shared<FixedEigen>(), swing, depths));
   all.push_back(Enter("alidade, static", std::make_shared<Static>(), swing, depths));
   all.push_back(Enter("alidade, plugins", std::make_shared<Plugin>(), swing, depths));
@@ -210,8 +210,8 @@ int Main(int rounds) {
   }
   Interleave(all, rounds);
   PrintTable(all);
-  PrintRatio("static/floor", all[2], all[0]);
-  PrintRatio("plugin/floor", all[3], all[0]);
+  PrintRatio("static/baseline", all[2], all[0]);
+  PrintRatio("plugin/baseline", all[3], all[0]);
   for (std::size_t i = 0; i < peers.size(); ++i) {
     PrintRatio(peers[i] + "/plugin", all[4 + i], all[3]);
   }

@@ -11,10 +11,10 @@ namespace {
 
 /// Why the parser gave up, `syntax error while parsing value - invalid literal`: its message
 /// without its number and place in front, and without the bytes of the file and the tokens behind.
-std::string ReasonOf(const Json::parse_error& error) {
+std::string ReasonOf(const Json::exception& error) {
   const std::string what = error.what();
-  const std::size_t colon = what.find(": ");
-  const std::size_t from = colon == what.npos ? 0 : colon + 2;
+  const std::size_t place = what.find(": ");
+  const std::size_t from = (place == what.npos ? what.find("] ") : place) + 2;
   return what.substr(from, what.find(';', from) - from);
 }
 
@@ -35,6 +35,8 @@ Json ParseJson(std::string_view text, const std::string& file) {
     const std::size_t column = at - (before.rfind('\n') + 1) + 1;
     const Place place{file, static_cast<int>(line), static_cast<int>(column)};
     throw Error(ExitCode::kBadData, ErrorLine(place, {}, ReasonOf(error), "JSON"));
+  } catch (const Json::exception& error) {  // a number that no double holds; it has no place
+    throw Error(ExitCode::kBadData, ErrorLine(Place{file}, {}, ReasonOf(error), "JSON"));
   }
 }
 

@@ -19,7 +19,8 @@ const char* ToString(LogLevel level);
 std::optional<LogLevel> LogLevelOf(std::string_view name);
 
 /// Takes one message: its level, and its text without a line end. Calls come one at a time. A sink
-/// that throws is given nothing more. What a sink logs itself is dropped.
+/// that throws is given nothing more. What a sink logs itself is dropped. A sink makes and destroys
+/// no LogSubscription: that would wait for itself.
 using LogSink = std::function<void(LogLevel level, std::string_view text)>;
 
 /// A sink in use, until the end of its scope.

@@ -5,7 +5,7 @@
 
 namespace alidade {
 
-/// Time timestamps are int64 nanoseconds from the source's own origin.
+/// Timestamps are int64 nanoseconds from the source's own origin.
 using Timestamp = std::int64_t;
 
 inline constexpr Timestamp kNoTimestamp = INT64_MIN;

@@ -68,7 +68,7 @@ Outcome Ekf::Invert(Row& row, const LandmarkOptions::Prior* prior, Inverse& inve
   return finite ? Outcome::kAccepted : Outcome::kNotFinite;
 }
 
-/// Initialises the blocks that wait for one of these measurements, each using up its measurement;
+/// Initialises the blocks that wait for one of these measurements, each consuming its measurement;
 /// what then still needs a block without a value is not ready.
 void Ekf::InitialiseFromMeasurements() {
   const auto missing = [this](const RoleBinding& role) {

@@ -16,9 +16,9 @@ EkfOptions ReadRecovering(Params& p) {
   options.rejection_recovery_after =
       p.Integer("rejection_recovery.after", "rejections of one sensor in a row", 1, 1'000'000,
                 options.rejection_recovery_after);
-  options.max_covariance_repairs =
-      p.Integer("max_covariance_repairs", "of a covariance that lost its positive definiteness", 0,
-                1'000'000, options.max_covariance_repairs);
+  options.max_covariance_repairs = p.Integer(
+      "max_covariance_repairs", "most repairs of a covariance; the next one ends the estimator", 0,
+      1'000'000, options.max_covariance_repairs);
   return options;
 }
 
@@ -63,7 +63,8 @@ EkfOptions internal::ReadCommonOptions(Params& p) {
                                             "how the measurements of one timestamp make updates",
                                             static_cast<int>(options.fuse)));
   options.max_dt_s =
-      p.Positive("max_dt_s", "s", "longer gaps are stepped in equal parts", options.max_dt_s);
+      p.NumberOrNone("max_dt_s", "s", "longer gaps are stepped in equal parts", kPositive)
+          .value_or(options.max_dt_s);
   return options;
 }
 

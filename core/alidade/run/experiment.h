@@ -34,7 +34,7 @@ struct NamedEstimator {
   int accepted_by = -1;
 };
 
-/// A share of the timestamps over which metrics are taken rmsd: those with (or without) a valid
+/// A share of the timestamps over which metrics are taken separately: those with (or without) a valid
 /// measurement of a sensor.
 struct Segment {
   std::string name;

@@ -14,8 +14,8 @@ namespace alidade {
 /// Metrics of one estimator, taken frame by frame.
 ///
 ///   rmse:BLOCK          sqrt(mean |e|^2),  e = x_true (-) x            unit of the block
-///   lag_ms:BLOCK        delay after truth as Lag() has it, of the first 100 000 timestamps; > 0:
-///   late.
+///   lag_ms:BLOCK        delay after truth as Lag() has it, of the first 100 000 timestamps; > 0 is
+///                       late.
 ///                       Scalar blocks, steps within 5 % of their mean, a truth that changes
 ///   coverage95:BLOCK    share of timestamps with |e| <= 1.96 sigma (scalar blocks)
 ///   nees.mean:OWNER     mean of e' C^-1 e / dof over the owner's estimated blocks of known truth,

@@ -29,7 +29,7 @@ const char* ToString(RunStatus status);
 /// What became of one estimator.
 struct EstimatorResult {
   std::string name;
-  std::map<std::string, double> metrics;       ///< as in docs/run_folder.md
+  std::map<std::string, double> metrics;       ///< as in docs/metrics.md
   std::map<std::string, std::int64_t> counts;  ///< `accepted:stereo`
   std::map<std::string, std::string> units;    ///< of blocks, {"target.depth", "m"}; may lack some
   bool diverged = false;                       ///< the estimator said so

@@ -25,7 +25,7 @@ struct Block {
   Space space;
   BlockStatus status = BlockStatus::kEstimated;
   bool present = false;     ///< has a value; else declared only, waiting to be initialised
-  int value_offset = -1;    ///< into StateValue, where present or reserved
+  int value_offset = -1;    ///< into State::values(), where present or reserved
   int tangent_offset = -1;  ///< into Covariance, where present or reserved, and not constant
 
   const Geometry& geometry() const { return space.geometry; }

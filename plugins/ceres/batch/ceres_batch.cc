@@ -144,7 +144,7 @@ EstimatorMaker Create(const EstimatorArguments& arguments) {
   Params& p = arguments.params;
   Options options;
   options.mode = static_cast<Options::Mode>(p.Choice(
-      "mode", {"smoothing", "filtering"}, "what an estimate sees: all frames, or none later", 0));
+      "mode", {"smoothing", "filtering"}, "data of an estimate: all frames, or those up to it", 0));
   options.solve = ReadSolveOptions(p);
   return [options, entry = arguments.entry](const System& system,
                                             const std::vector<StreamInfo>& streams) {

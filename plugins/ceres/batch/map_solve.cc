@@ -25,13 +25,14 @@ bool CanStart(CondensedRun& run, const Eigen::VectorXd& e) {
 
 SolveOptions ReadSolveOptions(Params& params) {
   SolveOptions options;
-  options.max_iterations =
-      params.Integer("max_iterations", "of one solve", 1, 1'000'000, options.max_iterations);
+  options.max_iterations = params.Integer("max_iterations", "most iterations of a solve", 1,
+                                          1'000'000, options.max_iterations);
   options.max_outer_iterations = params.Integer(
       "max_outer_iterations", "solves, with noise that depends on the state taken anew", 1,
       1'000'000, options.max_outer_iterations);
   options.max_dt_s =
-      params.Positive("max_dt_s", "s", "longer gaps are stepped in equal parts", options.max_dt_s);
+      params.NumberOrNone("max_dt_s", "s", "longer gaps are stepped in equal parts", kPositive)
+          .value_or(options.max_dt_s);
   return options;
 }
 

@@ -62,6 +62,7 @@ TEST(ParseJson, NamesThePlaceOfAFault) {
   EXPECT_EQ(
       JsonFault("\"\xFF\""),
       "a.json:1:2: " + error + "value - invalid string: ill-formed UTF-8 byte; expected JSON");
+  EXPECT_EQ(JsonFault("{\"a\": 1e999}"), "a.json: number overflow parsing '1e999'; expected JSON");
   EXPECT_EQ(JsonFault("{}\n"), "");
 }
 

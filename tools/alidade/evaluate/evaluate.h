@@ -67,7 +67,7 @@ const char* ToString(PoseRelation relation);
 /// `m`, `deg`, `rad`, or "" of what has none.
 const char* UnitOf(PoseRelation relation);
 
-/// What the two poses of a relative error are rmsd: frames, metres of path, seconds, degrees and
+/// What the two poses of a relative error are apart: frames, metres of path, seconds, degrees and
 /// rad of rotation.
 enum class DeltaUnit { kFrames, kMetres, kSeconds, kDegrees, kRadians };
 /// `f`, `m`, `s`, `d`, `r`.
@@ -154,7 +154,7 @@ struct Evaluation {
 /// Evaluates `estimate`. Warns of what makes the figures mean something else than they say: few
 /// matches, timestamps that are off by a constant time, a swap of reference and estimate (seen by
 /// names and covariances), a scale that is not metric, other world or body frames, quaternions in
-/// the other order, a path that ends early, no pair of poses that is delta rmsd: then there are no
+/// the other order, a path that ends early, no pair of poses that is delta apart: then there are no
 /// relative errors. Errors: those of Associate and Align.
 Evaluation Evaluate(const Trajectory& reference, const Trajectory& estimate,
                     const EvaluateOptions& options);

@@ -273,8 +273,8 @@ std::string SupportText(const std::string& type) {
 std::string OutOfSequenceText(const OutOfSequencePolicy& given) {
   if (given.policy == OutOfSequence::kReject) return "";
   const bool buffer = given.policy == OutOfSequence::kBuffer;
-  const char* const done =
-      buffer ? "buffer: frames are held back" : "rollback: the estimators go back for them";
+  const char* const done = buffer ? "buffer: frames are held back"
+                                  : "rollback: the estimators go back and process them in order";
   return std::string("  out-of-sequence frames: ") + done +
          (given.window ? ", up to " + internal::RoundedText(Seconds(*given.window), 6) +
                              " s behind the newest"

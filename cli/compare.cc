@@ -184,8 +184,8 @@ bool AreFolders(const std::vector<std::string>& of) {
   if (std::ranges::all_of(of, is_folder)) return true;
   if (of.size() == 1) return false;
   const auto file = std::ranges::find_if_not(of, is_folder);
-  throw CLI::ValidationError("CONFIG | DIR...",
-                             "'" + *file + "' is no folder; expected one config, or run folders");
+  throw CLI::ValidationError(
+      "CONFIG | DIR...", "'" + *file + "' is not a folder; expected one config, or run folders");
 }
 
 void CheckOptions(const CompareArguments& arguments, const CLI::App& command) {

@@ -158,7 +158,7 @@ void CheckSurroundings(Diagnosis& diagnosis) {
   if (data == nullptr || *data == '\0') {
     diagnosis.Warn("ALIDADE_DATA is not set: examples on real recordings need it", remedy);
   } else if (!fs::is_directory(data, error)) {
-    diagnosis.Warn(std::string("ALIDADE_DATA is no folder: ") + data, remedy);
+    diagnosis.Warn(std::string("ALIDADE_DATA is not a folder: ") + data, remedy);
   } else {
     diagnosis.Ok(std::string("ALIDADE_DATA is ") + data);
   }

@@ -50,7 +50,7 @@ CLI::Validator OneOf(std::initializer_list<T> values) {
       }
       names += (names.empty() ? "" : ", ") + std::string(ToString(value));
     }
-    return "'" + text + "' is none of " + names;
+    return "'" + text + "' is not one of " + names;
   };
   return {choose, ""};
 }

@@ -16,7 +16,7 @@ namespace {
 std::string IsAssignment(const std::string& text) {
   const std::size_t equals = text.find('=');
   if (equals != text.npos && equals > 0) return {};
-  return "'" + text + "' is no assignment; expected key=value, as in source.seed=7";
+  return "'" + text + "' is not an assignment; expected key=value, as in source.seed=7";
 }
 
 /// The full path, in its shortest form.
@@ -61,7 +61,7 @@ std::function<std::string(const std::string&)> IsInteger(std::int64_t least, std
     if (whole && text.size() > first + 1 && text[first] == '0')
       return "'" + text + "' has a leading zero";
     if (whole && value >= least && value <= most) return {};
-    return "'" + text + "' is no integer from " + std::to_string(least) + " to " +
+    return "'" + text + "' is not an integer from " + std::to_string(least) + " to " +
            std::to_string(most);
   };
 }
@@ -74,7 +74,7 @@ std::function<std::string(const std::string&)> IsNumber(double least, double mos
     if (error == std::errc() && rest == end && value >= least && value <= most) return {};
     char range[64];
     std::snprintf(range, sizeof range, "%g to %g", least, most);
-    return "'" + text + "' is no number from " + range;
+    return "'" + text + "' is not a number from " + range;
   };
 }
 

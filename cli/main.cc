@@ -22,7 +22,7 @@ constexpr const char* kProgramFooter = R"(Examples:
   alidade eval runs/slam                           trajectories against truth: ATE, RPE, NEES
   alidade compare examples/08_depth_all_estimators/config.yaml
 
-`alidade COMMAND --help` tells the rest. Exit codes: 0 ok, 1 something found wrong, 2 usage,
+`alidade COMMAND --help` describes each. Exit codes: 0 ok, 1 something found wrong, 2 usage,
 65 bad data, 66 input missing, 69 plugin missing or refused, 70 internal, 73 cannot create output,
 74 input/output, 75 stopped by a signal, 77 not trusted, 78 bad config, 79 diverged.)";
 

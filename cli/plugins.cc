@@ -46,7 +46,7 @@ std::shared_ptr<PluginsArguments> AddListing(CLI::App& command, Action& action, 
 
 std::string List(const PluginHost& host, const PluginsArguments& arguments) {
   if (const std::size_t count = host.refusals().size(); count > 0) {
-    PrintNote(std::to_string(count) + " refused: `alidade plugins where` tells why");
+    PrintNote(std::to_string(count) + " refused: `alidade plugins where` names the reasons");
   }
   return arguments.json ? PluginListJson(host) : PluginList(host, arguments.files);
 }
@@ -60,7 +60,7 @@ std::string Where(const PluginHost& host, const PluginsArguments&) { return Plug
 }  // namespace
 
 void AddPlugins(CLI::App& program, Action& action) {
-  CLI::App& plugins = *program.add_subcommand("plugins", "Tell which plugins there are");
+  CLI::App& plugins = *program.add_subcommand("plugins", "List plugins and describe one");
   plugins.require_subcommand(1);
   plugins.footer(kPluginsFooter);
   CLI::App& list =
@@ -68,7 +68,7 @@ void AddPlugins(CLI::App& program, Action& action) {
   const auto list_arguments = AddListing(list, action, List);
   list.add_flag("-v,--verbose", list_arguments->files, "print the file of each plugin too");
   list.add_flag("--json", list_arguments->json, "print JSON");
-  CLI::App& info = *plugins.add_subcommand("info", "Tell all about one of them");
+  CLI::App& info = *plugins.add_subcommand("info", "Describe one of them");
   const auto info_arguments = AddListing(info, action, Info);
   info.add_option("NAME", info_arguments->name, "of a sensor, motion model, source or estimator")
       ->option_text(" ")

@@ -31,7 +31,7 @@ struct SimulateArguments {
 
 std::string IsAvi(const std::string& name) {
   if (std::filesystem::path(name).extension() == ".avi") return {};
-  return "'" + name + "' is no video that can be written; expected a name like video.avi";
+  return "'" + name + "' is not a video that can be written; expected a name like video.avi";
 }
 
 std::string IsInside(const std::string& name) {

@@ -41,7 +41,7 @@ void ReadShard(const std::string& text, SweepOptions& options) {
                    read(text.substr(slash + 1), options.shards);
   if (two && options.shard >= 1 && options.shard <= options.shards) return;
   throw CLI::ValidationError("--shard",
-                             "'" + text + "' is no share; expected i/n with 1 <= i <= n");
+                             "'" + text + "' is not a share; expected i/n with 1 <= i <= n");
 }
 
 /// Every share has a run, so that each gives a result.

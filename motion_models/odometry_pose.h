@@ -81,7 +81,7 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
                                   kNonNegative),
                      p.Vector<3>("vehicle_from_cam.position", "m", "where the camera is mounted",
                                  {}, std::array<double, 3>{}),
-                     ReadMounting(p)) {}
+                     ReadVehicleFromCam(p)) {}
 
   NoiseKind noise_kind() const { return kind; }
   template <class T>
@@ -144,7 +144,7 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
     z[1] = x[2] * y[0] - x[0] * y[2];
     z[2] = x[0] * y[1] - x[1] * y[0];
   }
-  static std::array<double, 4> ReadMounting(Params& p) {
+  static std::array<double, 4> ReadVehicleFromCam(Params& p) {
     const char* const doc = "how the camera is turned, a unit quaternion";
     const std::array<double, 4> q{p.Number("vehicle_from_cam.orientation.w", "", doc, {}, 1.0),
                                   p.Number("vehicle_from_cam.orientation.x", "", doc, {}, 0.0),

@@ -109,9 +109,9 @@ TEST_F(CheckProgram, SaysWhichPluginsAreMissingOrRefused) {
   EXPECT_EQ(Call({"check"}).code, 2);
   const Outcome states = Call(With(kStereo, {"--states", "0"}));
   EXPECT_EQ(states.code, 2);
-  EXPECT_TRUE(Contains(states.err, "'0' is no integer from 1 to 1000000")) << states.err;
+  EXPECT_TRUE(Contains(states.err, "'0' is not an integer from 1 to 1000000")) << states.err;
   const Outcome timeout = Call(With(kStereo, {"--timeout", "0"}));
-  EXPECT_TRUE(Contains(timeout.err, "'0' is no number from 0.01 to 1e+06")) << timeout.err;
+  EXPECT_TRUE(Contains(timeout.err, "'0' is not a number from 0.01 to 1e+06")) << timeout.err;
 }
 
 }  // namespace

@@ -346,7 +346,7 @@ TEST_F(CompareCli, RefusesWhatItCannotCompare) {
   };
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "a", "--no-figures"}).code, 0);
   fails({"compare"}, 2, "CONFIG | DIR is required");
-  fails({"compare", "a", "config.yaml"}, 2, "'config.yaml' is no folder");
+  fails({"compare", "a", "config.yaml"}, 2, "'config.yaml' is not a folder");
   fails({"compare", "a", "--runs", "3"}, 2, "a finished run is not run again");
   fails({"compare", "a", "--reference", "bath"}, 2, "no estimator 'bath'; expected one of ekf");
   fails({"compare", "config.yaml", "--reference", "turth"}, 2, "did you mean 'truth'");

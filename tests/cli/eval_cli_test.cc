@@ -289,7 +289,7 @@ TEST_F(EvalCli, AChoiceIsNamedAmongThoseThereAre) {
     const Outcome outcome = Call({"eval", "truth.tum", "mono.tum", "--align-mode", wrong});
     EXPECT_EQ(outcome.code, 2);
     EXPECT_TRUE(outcome.err.starts_with("error: --align-mode: '" + std::string(wrong) +
-                                        "' is none of none, scale, origin, yaw, se3, sim3\n"))
+                                        "' is not one of none, scale, origin, yaw, se3, sim3\n"))
         << outcome.err;
   }
   for (const char* mode : {"none", "origin"}) {
@@ -305,13 +305,13 @@ TEST_F(EvalCli, ResultsAreNotSavedOverWhatIsCompared) {
   const Outcome over =
       Call({"eval", "truth.tum", "mono.tum", "--save_results", "truth.tum", "--force"});
   EXPECT_EQ(over.code, 73);
-  EXPECT_TRUE(over.err.starts_with("error: truth.tum: is no zip; expected another name"))
+  EXPECT_TRUE(over.err.starts_with("error: truth.tum: is not a zip; expected another name"))
       << over.err;
   EXPECT_EQ(Read("truth.tum"), before);
   ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
   const Outcome pipe = Call({"eval", "truth.tum", "mono.tum", "--save_results", "pipe", "--force"});
   EXPECT_EQ(pipe.code, 73);
-  EXPECT_TRUE(pipe.err.starts_with("error: pipe: is no regular file")) << pipe.err;
+  EXPECT_TRUE(pipe.err.starts_with("error: pipe: is not a regular file")) << pipe.err;
 }
 
 TEST_F(EvalCli, ResultsThatCannotBothBeSavedAreNotSaved) {

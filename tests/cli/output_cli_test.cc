@@ -84,7 +84,7 @@ TEST_F(OutputCli, NumbersOutOfRangeAreShownAsTyped) {
     EXPECT_EQ(outcome.code, 2);
     EXPECT_TRUE(outcome.err.starts_with("error: " + text + '\n')) << outcome.err;
   };
-  const std::string seeds = "' is no integer from 0 to 9223372036854775807";
+  const std::string seeds = "' is not an integer from 0 to 9223372036854775807";
   for (const std::string seed :
        {"99999999999999999999999", "9223372036854775808", "-1", "1e3", "0x10", " 1", "1.0"}) {
     expect({"run", "config.yaml", "--seed=" + seed}, "--seed: '" + seed + seeds);
@@ -92,11 +92,11 @@ TEST_F(OutputCli, NumbersOutOfRangeAreShownAsTyped) {
   expect({"run", "config.yaml", "--seed", "010"}, "--seed: '010' has a leading zero");
   expect({"sweep", "config.yaml", "--runs", "08"}, "--runs: '08' has a leading zero");
   expect({"sweep", "config.yaml", "--runs", "1000001"},
-         "--runs: '1000001' is no integer from 1 to 1000000");
+         "--runs: '1000001' is not an integer from 1 to 1000000");
   expect({"sweep", "config.yaml", "--runs", "1", "--jobs", "4294967297"},
-         "--jobs: '4294967297' is no integer from 1 to 1024");
+         "--jobs: '4294967297' is not an integer from 1 to 1024");
   expect({"sweep", "config.yaml", "--runs", "1", "--first-seed", "4611686018427387905"},
-         "--first-seed: '4611686018427387905' is no integer from 0 to 4611686018427387904");
+         "--first-seed: '4611686018427387905' is not an integer from 0 to 4611686018427387904");
   EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "--seed", "9223372036854775807"}).code, 0);
   EXPECT_TRUE(Contains(Read("runs/config/run.json"), "\"seed\": 9223372036854775807"));
 }

@@ -67,7 +67,7 @@ TEST_F(SweepCli, RefusesWhatIsNoShare) {
     EXPECT_EQ(sweep.code, 2) << shard;
   }
   const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "1", "--shard", "3/2"});
-  EXPECT_TRUE(Contains(sweep.err, "--shard: '3/2' is no share")) << sweep.err;
+  EXPECT_TRUE(Contains(sweep.err, "--shard: '3/2' is not a share")) << sweep.err;
 }
 
 TEST_F(SweepCli, EveryShareHasARun) {

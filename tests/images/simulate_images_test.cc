@@ -78,8 +78,8 @@ class SimulateImages : public testing::ProgramTest {
 
 constexpr double kRadius = 4.0, kDark = 60.0;  // px; brighter than the frame's number
 
-/// How far the discs lie from `points`, those that touch another or the border left out: the largest
-/// distance of a centroid from its point, px. Counts those that were looked at.
+/// How far the discs lie from `points`, those that touch another or the border left out: the
+/// largest distance of a centroid from its point, px. Counts those that were looked at.
 double LargestError(const cv::Mat& image, const std::map<int, Pixel>& points, int& count) {
   double largest = 0.0;
   for (const auto& [feature, p] : points) {

@@ -35,7 +35,7 @@ inline Trajectory Line(int poses, double step_m) {
   return t;
 }
 
-/// A turn by `angle` about an axis that is none of the three.
+/// A turn by `angle` about an axis that is not one of the three.
 inline Eigen::Quaterniond Turn(double angle) {
   return Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d(1.0, -2.0, 0.5).normalized()));
 }

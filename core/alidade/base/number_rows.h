@@ -71,7 +71,7 @@ class NumberRows {
     const auto [end, error] = std::from_chars(digits.data(), last, value);
     const char* const expected = "a whole number of 0 or more";
     if (end != last || error == std::errc::invalid_argument) {
-      FailCell(i, name, "is no whole number", expected);
+      FailCell(i, name, "is not a whole number", expected);
     }
     if (error != std::errc()) FailCell(i, name, "is too large", "at most 9223372036854775807");
     if (value < 0) FailCell(i, name, "is negative", expected);

@@ -163,7 +163,7 @@ std::string Few(const std::vector<std::string>& names) {
 
 OutputFolder::OutputFolder(const fs::path& target, bool force)
     : shown_(target), target_(BehindLinks(WithoutTrailingSlash(target))), force_(force) {
-  if (target.empty() || !target_.has_filename()) Refuse(target, "is no name for a run folder");
+  if (target.empty() || !target_.has_filename()) Refuse(target, "is not a name for a run folder");
   try {
     MakeParents();
     const FolderLock lock(target_.parent_path());

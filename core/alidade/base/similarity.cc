@@ -54,7 +54,7 @@ std::optional<Aligned> AlignBySimilarity(const Eigen::Matrix3Xd& points,
   return Aligned{std::sqrt(left.squaredNorm() / static_cast<double>(left.cols())), found->scale};
 }
 
-std::optional<Aligned> PathAlignment::Result() const {
+std::optional<Aligned> TrajectoryAlignment::Result() const {
   const auto n = static_cast<double>(count_);
   const Eigen::Vector3d mean = sum_ / n, onto_mean = onto_sum_ / n;
   const double variance = squares_ / n - mean.squaredNorm();

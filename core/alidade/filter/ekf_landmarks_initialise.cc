@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// How landmarks enter the state.
+// How landmarks are initialised in the state.
 #include <algorithm>
 
 #include "alidade/filter/ekf_landmarks.h"
@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-/// Lets landmarks of this frame enter that wait, as long as too few are measured.
+/// Initialises landmarks of this frame that wait, as long as too few are measured.
 void Ekf::Landmarks::InitialiseNew() {
   const std::vector<const Row*> used = MeasuredOnce();
   auto measured = std::ssize(used);

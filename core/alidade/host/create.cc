@@ -65,7 +65,7 @@ std::vector<std::string> Capabilities(const ModelInstance& model) {
   const auto can = [&](unsigned what) { return (model.capabilities() & what) != 0; };
   std::vector<std::string> lines = {
       std::string("Jacobians: ") +
-      (can(ALIDADE_CLOSED_FORM) ? "analytic" : "automatic differentiation")};
+      (can(ALIDADE_ANALYTIC_JACOBIAN) ? "analytic" : "automatic differentiation")};
   if (model.c().kind == ALIDADE_KIND_MOTION && model.c().description->noise_count > 0) {
     lines.emplace_back(can(ALIDADE_DISCRETE_NOISE)
                            ? "noise: discrete, held from one update to the next"

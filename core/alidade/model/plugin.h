@@ -37,8 +37,9 @@ void PublishSensor(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* insta
   holder->description.capabilities =
       (Model::kInitialises >= 0 ? unsigned{ALIDADE_CAN_INITIALISE} : 0u) |
       (HasValid<Model>::value ? unsigned{ALIDADE_HAS_VALIDITY} : 0u) |
-      (HasJacobian<Model, typename Blocks<Model>::Indices>::value ? unsigned{ALIDADE_CLOSED_FORM}
-                                                                  : 0u);
+      (HasJacobian<Model, typename Blocks<Model>::Indices>::value
+           ? unsigned{ALIDADE_ANALYTIC_JACOBIAN}
+           : 0u);
   instance->sensor = &SensorCalls<Model>::kCalls;
   Publish(std::move(holder), ALIDADE_KIND_SENSOR, instance);
 }
@@ -55,7 +56,7 @@ void PublishMotion(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* insta
   }
   holder->description.noise_count = NoiseSizeOf(holder->model);
   if constexpr (HasStepJacobian<Model, typename Blocks<Model>::Indices>::value) {
-    holder->description.capabilities |= ALIDADE_CLOSED_FORM;
+    holder->description.capabilities |= ALIDADE_ANALYTIC_JACOBIAN;
   }
   if constexpr (HasStationary<Model>::value) {
     if (holder->model.Stationary()) holder->description.capabilities |= ALIDADE_STATIONARY;

@@ -135,9 +135,9 @@ enum { ALIDADE_KIND_SENSOR = 1, ALIDADE_KIND_MOTION = 2, ALIDADE_KIND_LANDMARK_R
 enum {
   ALIDADE_CAN_INITIALISE = 1,
   ALIDADE_HAS_VALIDITY = 2,
-  ALIDADE_RESIDUAL_ONLY = 4, /* recursive estimators refuse it */
-  ALIDADE_CLOSED_FORM = 8,   /* analytic Jacobians, else by automatic differentiation */
-  ALIDADE_STATIONARY = 16,   /* motion: x' = x without noise; step need not be called */
+  ALIDADE_RESIDUAL_ONLY = 4,     /* recursive estimators refuse it */
+  ALIDADE_ANALYTIC_JACOBIAN = 8, /* analytic Jacobians, else by automatic differentiation */
+  ALIDADE_STATIONARY = 16,       /* motion: x' = x without noise; step need not be called */
   /* motion: w is held from one change of the state by a measurement to the next, however many steps
    * lead there (discrete white noise); else w of every step is independent of that of all others,
    * and adds up (continuous white noise) */

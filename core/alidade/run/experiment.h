@@ -34,8 +34,8 @@ struct NamedEstimator {
   int accepted_by = -1;
 };
 
-/// A share of the timestamps over which metrics are taken separately: those with (or without) a valid
-/// measurement of a sensor.
+/// A share of the timestamps over which metrics are taken separately: those with (or without) a
+/// valid measurement of a sensor.
 struct Segment {
   std::string name;
   int stream = -1;

@@ -125,7 +125,7 @@ struct Metrics::Impl {
   std::map<std::string, std::string> units;
   std::map<int, double> quantiles;  ///< chi2(0.95, dof)
   BlockId path = -1;                ///< that landmarks are seen from
-  internal::PathAlignment alignment;
+  internal::TrajectoryAlignment alignment;
   std::vector<Event> events;
 
   void Track(const System& system, const std::vector<StreamInfo>& truths);
@@ -368,7 +368,7 @@ Metrics::Metrics(const NamedEstimator& named, const std::vector<StreamInfo>& tru
     : impl_(std::make_unique<Impl>()) {
   impl_->Track(named.system, truths);
   impl_->sensors = internal::NamesOf(named.system.sensors);
-  impl_->path = internal::PathBlockOf(named.system);
+  impl_->path = internal::PositionBlockOf(named.system);
   impl_->motions = internal::NamesOf(named.system.motions);
   impl_->has_landmarks = named.system.landmarks.has_value();
   impl_->has_ransac = std::ranges::any_of(

@@ -85,7 +85,7 @@ const PluginEntry& FindOffered(const std::string& type, const PluginHost& host, 
 }
 
 /// Refuses overrides of what all estimators share, and of an entry that `root` does not have and
-/// that is none of `merged` either, for it has no model.
+/// that is not one of `merged` either, for it has no model.
 void CheckOverrides(const Node& overrides, const Node& root, const Node& merged) {
   for (const auto& [key, value] : overrides.Entries()) {
     if (key == "initial_time_s" || key == "landmarks") continue;

@@ -67,7 +67,7 @@ void CheckOptions(const Node& node, const LandmarkOptions& options, const Sensor
     const Node prior = node.At("prior");
     if (representation == internal::XyzRepresentation() && sensor.model.prior_size() > 0 &&
         !(options.prior->inverse_distance > 0.0)) {
-      prior.At("inverse_distance").Fail("a landmark at infinity is no xyz", "above 0, 1/m");
+      prior.At("inverse_distance").Fail("a landmark at infinity cannot be xyz", "above 0, 1/m");
     }
     if (options.prior->adapt_after > 0) CheckPosition(prior.At("adapt_after"), sensor);
   }

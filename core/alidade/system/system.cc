@@ -368,7 +368,7 @@ System BuildSystem(const Node& root, const PluginHost& host, const std::vector<s
   System system;
   for (const auto& [name, entry] : root.At("state", "a run").Entries()) {
     internal::ExpectName(name, entry, "a state entry");
-    if (name == "landmarks") entry.Fail("'landmarks' are no state entry", "another name");
+    if (name == "landmarks") entry.Fail("'landmarks' is not a state entry", "another name");
     ReadStateEntry(name, entry, host, system);
   }
   std::vector<SensorBinding> sensors;
@@ -396,7 +396,7 @@ System BuildSystem(const Node& root, const PluginHost& host, const std::vector<s
   return system;
 }
 
-BlockId internal::PathBlockOf(const System& system) {
+BlockId internal::PositionBlockOf(const System& system) {
   BlockId path = -1;
   for (const SensorBinding& binding : system.sensors) {
     if (!binding.model.has_landmark()) continue;

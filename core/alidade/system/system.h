@@ -95,7 +95,7 @@ System BuildSystem(const Node& root, const PluginHost& host, const std::vector<s
 namespace internal {
 
 /// The block of a position that landmarks are seen from; -1: there is none.
-BlockId PathBlockOf(const System& system);
+BlockId PositionBlockOf(const System& system);
 
 /// The unit of a block, or else of a sensor's role that it fills.
 std::string UnitOf(const System& system, BlockId id);

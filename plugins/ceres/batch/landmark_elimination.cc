@@ -5,7 +5,7 @@
 
 #include "condensed_run.h"
 
-/// The landmarks of a CondensedRun: how they enter it, and where they cost least.
+/// The landmarks of a CondensedRun: how they are initialised in it, and where they cost least.
 namespace alidade::ceres_batch {
 namespace {
 

@@ -15,7 +15,7 @@ namespace {
 using Eigen::Matrix3Xd;
 
 std::optional<internal::Aligned> FromSums(const Matrix3Xd& points, const Matrix3Xd& onto) {
-  internal::PathAlignment alignment;
+  internal::TrajectoryAlignment alignment;
   for (Eigen::Index k = 0; k < points.cols(); ++k) alignment.Add(points.col(k), onto.col(k));
   return alignment.Result();
 }
@@ -31,7 +31,7 @@ Matrix3Xd Points(int dimensions) {
   return points;
 }
 
-TEST(AlignBySimilarity, AndPathAlignmentAreThatOfUmeyama) {
+TEST(AlignBySimilarity, AndTrajectoryAlignmentAreThatOfUmeyama) {
   for (const int dimensions : {1, 2, 3}) {
     const Matrix3Xd points = Points(dimensions);
     Matrix3Xd onto = 2.0 * points;
@@ -52,7 +52,7 @@ TEST(AlignBySimilarity, AndPathAlignmentAreThatOfUmeyama) {
   }
 }
 
-TEST(AlignBySimilarity, AndPathAlignmentRefuseTheSame) {
+TEST(AlignBySimilarity, AndTrajectoryAlignmentRefuseTheSame) {
   const auto refused = [](const Matrix3Xd& points, const Matrix3Xd& onto) {
     const bool at_once = !internal::AlignBySimilarity(points, onto);
     EXPECT_EQ(at_once, !FromSums(points, onto));
@@ -84,9 +84,9 @@ std::vector<Eigen::Vector3d> TurningPath() {
   return path;
 }
 
-TEST(PathAlignment, FindsASimilarity) {
+TEST(TrajectoryAlignment, FindsASimilarity) {
   const Eigen::AngleAxisd turn(0.7, Eigen::Vector3d(1, -2, 3).normalized());
-  internal::PathAlignment alignment;
+  internal::TrajectoryAlignment alignment;
   for (const Eigen::Vector3d& p : TurningPath()) {
     alignment.Add(p, 2.0 * (turn * p) + Eigen::Vector3d(1.0, -2.0, 0.5));
   }
@@ -97,11 +97,11 @@ TEST(PathAlignment, FindsASimilarity) {
 }
 
 // Against Eigen's, which takes all points at once; a mirrored path needs the sign of D.
-TEST(PathAlignment, AgreesWithUmeyamaOnNoisyAndMirroredPaths) {
+TEST(TrajectoryAlignment, AgreesWithUmeyamaOnNoisyAndMirroredPaths) {
   for (const double mirror : {1.0, -1.0}) {
     const std::vector<Eigen::Vector3d> path = TurningPath();
     Eigen::Matrix3Xd points(3, 40), onto = points;
-    internal::PathAlignment alignment;
+    internal::TrajectoryAlignment alignment;
     for (Eigen::Index k = 0; k < 40; ++k) {
       points.col(k) = path[static_cast<std::size_t>(k)];
       const auto t = static_cast<double>(k);
@@ -118,8 +118,8 @@ TEST(PathAlignment, AgreesWithUmeyamaOnNoisyAndMirroredPaths) {
   }
 }
 
-TEST(PathAlignment, OfAPointThereIsNone) {
-  internal::PathAlignment alignment;
+TEST(TrajectoryAlignment, OfAPointThereIsNone) {
+  internal::TrajectoryAlignment alignment;
   for (int k = 0; k < 5; ++k) alignment.Add({1, 2, 3}, {1, 2, 3});
   EXPECT_FALSE(alignment.Result());
 }

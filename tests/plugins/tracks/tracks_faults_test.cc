@@ -27,10 +27,10 @@ TEST_F(TracksTest, Fault28NotANumber) {
                                               "' is not a number; expected a finite number");
   }
   ExpectBadData("0,3.5,0,1\n",
-                "DIR/tracks.csv:1:3 feature: '3.5' is no whole number; expected a "
+                "DIR/tracks.csv:1:3 feature: '3.5' is not a whole number; expected a "
                 "whole number of 0 or more");
   ExpectBadData(kGood + "x,3,0,1\n",
-                "DIR/tracks.csv:3:1 frame: 'x' is no whole number; expected "
+                "DIR/tracks.csv:3:1 frame: 'x' is not a whole number; expected "
                 "a whole number of 0 or more");
 }
 

@@ -149,7 +149,7 @@ TEST_F(TrajectoryFiles, RowsThatAreNoneAreRefusedWithTheirPlace) {
   EXPECT_EQ(Refusal(good + "1 1 2 3 0 0 0 1.01\n"),
             "poses.txt:2: quaternion of length 1.010000; expected length 1 to 1e-3");
   EXPECT_EQ(Refusal("1.5,1,2,3,1,0,0,0\n"),
-            "poses.txt:1:1 t: '1.5' is no whole number; expected a whole number of 0 or more");
+            "poses.txt:1:1 t: '1.5' is not a whole number; expected a whole number of 0 or more");
   const std::string no_rotation =
       "poses.txt:1: columns 1-3, 5-7, 9-11 are no rotation; expected R R' = 1 to 1e-3, det R = 1";
   EXPECT_EQ(Refusal("1.1 0 0 0 0 1 0 0 0 0 1 0\n"), no_rotation);

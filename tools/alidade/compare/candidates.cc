@@ -196,13 +196,13 @@ void AddRatios(const ComparedEntry& one, const ComparedEntry& reference,
 }
 
 /// The distance from `reference` along the run, and where scale is free that of the path.
-void AddApart(const Candidate& one, const Candidate& reference, ComparedEstimator& compared) {
+void AddRmsd(const Candidate& one, const Candidate& reference, ComparedEstimator& compared) {
   const Distance distance = internal::DistanceBetween(one.entry->series, reference.entry->series);
   AddAll(distance.rms, "rmsd:", compared.values);
   AddAll(distance.sigmas, "rmsd.sigmas:", compared.values);
-  const std::string& path = one.facts().path;
+  const std::string& path = one.facts().position_block;
   if (path.empty() || !ScaleIsFree(one)) return;
-  if (const auto aligned = AlignPaths(one.entry->series, reference.entry->series, path)) {
+  if (const auto aligned = AlignTrajectories(one.entry->series, reference.entry->series, path)) {
     compared.values["rmsd.trajectory.sim3"] = Single(aligned->rmse);
   }
 }
@@ -250,7 +250,7 @@ ComparedEstimator Compare(const Candidate& one, const References& references, bo
     compared.reference_runs = 1;
     if (truth)
       AddRatios(*one.entry, *along.entry, {"rmse:", "trajectory.sim3.rmse"}, compared.values);
-    if (along.entry != one.entry) AddApart(one, along, compared);
+    if (along.entry != one.entry) AddRmsd(one, along, compared);
   }
   if (references.final != nullptr && references.final->entry->usable()) {
     const Candidate& final = *references.final;

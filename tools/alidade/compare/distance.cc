@@ -135,11 +135,11 @@ Distance DistanceBetween(const Series& series, const Series& reference) {
   return distance;
 }
 
-std::optional<Aligned> AlignPaths(const Series& series, const Series& reference,
-                                  const std::string& block) {
+std::optional<Aligned> AlignTrajectories(const Series& series, const Series& reference,
+                                         const std::string& block) {
   for (const Shared& one : SharedBlocks(series, reference)) {
     if (one.block->name != block || one.block->geometry != Geometry::Vector(3)) continue;
-    PathAlignment alignment;
+    TrajectoryAlignment alignment;
     for (const auto& [row, reference_row] : SharedRows(series, reference)) {
       const Eigen::Map<const Eigen::Vector3d> point(RowOf(series, row, one.value));
       const Eigen::Map<const Eigen::Vector3d> onto(

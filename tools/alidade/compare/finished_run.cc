@@ -131,7 +131,7 @@ EstimatorFacts ReadFacts(const JsonNode& entry) {
   facts.accepted_by = TextOf(entry, "accepted_by");
   facts.overrides = TextOf(entry, "overrides");
   facts.sensors = entry.At("sensors").Texts();
-  facts.path = TextOf(entry, "path");
+  facts.position_block = TextOf(entry, "position_block");
   facts.rows = entry.At("rows").Count();
   for (const JsonNode& block : entry.At("blocks").Items()) {
     facts.blocks.push_back({block.At("name").Text(), TextOf(block, "unit"), GeometryOf(block)});

@@ -191,11 +191,11 @@ void CheckEvoResult(const fs::path& zip, bool force) {
   const auto refuse = [&](const char* why, const char* remedy) {
     throw Error(ExitCode::kCannotCreate, ErrorLine({zip.string()}, {}, why, remedy));
   };
-  if (!fs::is_regular_file(zip, ignored)) refuse("is no regular file", "another name");
+  if (!fs::is_regular_file(zip, ignored)) refuse("is not a regular file", "another name");
   if (!force) refuse("is there already", "--force, or another name");
   char magic[4] = {};
   std::ifstream(zip, std::ios::binary).read(magic, 4);
-  if (std::string_view(magic, 4) != "PK\3\4") refuse("is no zip", "another name");
+  if (std::string_view(magic, 4) != "PK\3\4") refuse("is not a zip", "another name");
 }
 
 void SaveEvoResult(const Evaluation& evaluation, SavedErrors which, const fs::path& zip,

@@ -45,7 +45,7 @@ void AddRow(const NumberRows& rows, const Columns& at, std::map<std::int64_t, do
             SensorSums& sums) {
   const std::int64_t dof = rows.Index(at.dof, "dof");
   const double nis = rows.Number(at.nis, "nis");
-  if (dof < 1) rows.FailCell(at.dof, "dof", "is no number of elements", "1 or more");
+  if (dof < 1) rows.FailCell(at.dof, "dof", "is not a number of elements", "1 or more");
   ++sums.measurements;
   sums.nis += nis / static_cast<double>(dof);
   const auto [limit, is_new] = limits.try_emplace(dof, 0.0);

@@ -73,7 +73,7 @@ struct TrajectoryFile {
 TrajectoryFile ReferenceAt(const std::filesystem::path& path);
 
 /// The truth.tum that a run folder, or the folder that holds an estimator's, has. Errors:
-/// kInputMissing where there is none; kUsage where `path` is no folder.
+/// kInputMissing where there is none; kUsage where `path` is not a folder.
 TrajectoryFile TruthOf(const std::filesystem::path& path);
 
 /// What `path` means as estimates: the file itself; of a run folder, or the folder of an estimator

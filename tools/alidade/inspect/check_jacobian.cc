@@ -148,7 +148,7 @@ void TestJacobian(const Context& context, const Function& f, const CheckedState&
 
 /// `Predict: analytic Jacobian, Initialise: automatic differentiation`
 std::string KindsText(const ModelUnderTest& model) {
-  const bool analytic = (model.instance->capabilities() & ALIDADE_CLOSED_FORM) != 0;
+  const bool analytic = (model.instance->capabilities() & ALIDADE_ANALYTIC_JACOBIAN) != 0;
   std::string text;
   for (const Function& f : model.functions) {
     if (f.differentiated == 0) continue;

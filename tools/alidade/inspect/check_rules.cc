@@ -51,7 +51,7 @@ std::string CodeDefect(const Context& context, const Function& f, std::int32_t c
   if (code == ALIDADE_OUT_OF_DOMAIN && f.name != "Valid") {
     return f.is_noise ? "is out of domain where " + context.main().name + " is not" : "";
   }
-  return "returned " + std::to_string(code) + ", which is no status of its";
+  return "returned " + std::to_string(code) + ", which is not a status of its";
 }
 
 /// Bytes on the heap.
@@ -90,7 +90,7 @@ std::string ValueDefect(const Function& f, const Answer& answer) {
       if (!defect.empty()) return names[static_cast<std::size_t>(c)] + ' ' + defect;
     }
     if (space.geometry.Defect(dense.data()) > 1e-9) {
-      return space.name + " is no " + ToString(space.geometry.kind);
+      return space.name + " is not a " + ToString(space.geometry.kind);
     }
   }
   return {};

@@ -53,7 +53,7 @@ struct RecordedEstimator {
   std::vector<RecordedSensor> sensors;
   int width = 0;  ///< of the widest measurement: columns z0 .. z<width - 1>, then h, s and r
   int path = -1;  ///< the first of the three elements that landmarks are seen from; -1: none
-  Eigen::AlignedBox3d path_box = {};
+  Eigen::AlignedBox3d trajectory_box = {};
   std::int64_t estimate_rows = 0, innovation_rows = 0, gain_rows = 0;
   std::int64_t reprojection_rows = 0;
   RecordedMap map;

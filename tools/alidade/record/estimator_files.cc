@@ -68,7 +68,7 @@ void EstimatorFiles::FindPath(const System& system) {
   for (std::size_t s = 0; s < system.sensors.size(); ++s) {
     recorded_.sensors[s].has_reprojection = HasReprojection(system.sensors[s]);
   }
-  const BlockId path = PathBlockOf(system);
+  const BlockId path = PositionBlockOf(system);
   for (const BlockColumns& columns : blocks_) {
     if (columns.id == path) recorded_.path = static_cast<int>(columns.element);
   }
@@ -157,7 +157,7 @@ void EstimatorFiles::AddEstimate(const Frame& frame, const State& state) {
     const auto truth = static_cast<std::size_t>(columns.truth);
     const bool known = truth < frame.truth.size() && !frame.truth[truth].empty();
     if (static_cast<int>(columns.element) == recorded_.path) {
-      recorded_.path_box.extend(Eigen::Map<const Eigen::Vector3d>(state.value(columns.id)));
+      recorded_.trajectory_box.extend(Eigen::Map<const Eigen::Vector3d>(state.value(columns.id)));
     }
     for (std::size_t i = 0; i < columns.ambient; ++i) {
       RecordedElement& element = recorded_.elements[columns.element + i];

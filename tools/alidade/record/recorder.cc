@@ -217,7 +217,7 @@ void Recorder::Finish(const RunResult& result) {
     internal::WriteLandmarks(folder, one.name, *one.landmarks);
     if (e >= recorded.estimators.size()) continue;
     internal::RecordedEstimator& estimator = recorded.estimators[e];
-    estimator.map = internal::DescribeMap(*one.landmarks, estimator.path_box);
+    estimator.map = internal::DescribeMap(*one.landmarks, estimator.trajectory_box);
   }
   if (impl_->data) {
     impl_->facts.measurements_sha256 = impl_->data->measurements();

@@ -18,7 +18,7 @@ Json JsonOf(const EstimatorFacts& facts) {
   if (!facts.overrides.empty()) json["overrides"] = facts.overrides;
   json["sensors"] = facts.sensors;
   json["smoothed"] = facts.smoothed;
-  if (!facts.path.empty()) json["path"] = facts.path;
+  if (!facts.position_block.empty()) json["position_block"] = facts.position_block;
   Json& blocks = json["blocks"] = Json::array();
   for (const SeriesBlock& block : facts.blocks) {
     blocks.push_back({{"name", block.name},
@@ -53,7 +53,7 @@ std::map<std::string, std::int64_t> CountEvents(const EstimatorResult& result) {
 }
 
 EstimatorFacts FactsOf(const NamedEstimator& named, const Experiment& experiment) {
-  const BlockId path = PathBlockOf(named.system);
+  const BlockId path = PositionBlockOf(named.system);
   const auto by = static_cast<std::size_t>(named.accepted_by);
   return {named.type,
           named.kind,

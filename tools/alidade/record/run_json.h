@@ -18,7 +18,7 @@ struct EstimatorFacts {
   std::string accepted_by;  ///< the estimator that chose its measurements, or ""
   std::string overrides;    ///< of the config, as YAML, or ""
   std::vector<std::string> sensors;
-  std::string path;  ///< the block of a position that landmarks are seen from, or ""
+  std::string position_block;  ///< the block of a position that landmarks are seen from, or ""
   std::vector<SeriesBlock> blocks;
   std::int64_t rows = 0;  ///< of estimates.csv
 };

@@ -39,8 +39,8 @@ struct Aligned {
 std::optional<Aligned> AlignBySimilarity(const Eigen::Matrix3Xd& points,
                                          const Eigen::Matrix3Xd& onto);
 
-/// The similarity that brings a trajectory nearest to another [Umeyama1991], from sums alone, so that a
-/// long trajectory takes no memory. Points p, q of both, n of them, with means p0, q0:
+/// The similarity that brings a trajectory nearest to another [Umeyama1991], from sums alone, so
+/// that a long trajectory takes no memory. Points p, q of both, n of them, with means p0, q0:
 ///
 ///   C = sum (q - q0) (p - p0)' / n = U D V',    S = diag(1, 1, det U det V)
 ///   scale = tr(D S) / var p,    rmse^2 = var q - tr(D S)^2 / var p

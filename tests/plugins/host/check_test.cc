@@ -110,7 +110,7 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{0, "singular_noise", "noise", {"R is singular: smallest eigenvalue"}},
         Fault{0, "no_noise", "noise", {"R is singular: no noise on z.second"}},
         Fault{0, "writes_and_fails", "failure", {"Predict at", "fails, but wrote an output"}},
-        Fault{0, "strange_status", "calls", {"returned 77, which is no status"}},
+        Fault{0, "strange_status", "calls", {"returned 77, which is not a status"}},
         Fault{0, "nowhere_defined", "calls", {"Predict is defined at 0 of", "--states N"}},
         Fault{0, "wrong_inverse", "initialise", {"Initialise at", "gives x = ", "Predict gives z"}},
         Fault{0, "wrong_landmark", "initialise", {"prior = ", "gives bearing = ", ", rho = "}},

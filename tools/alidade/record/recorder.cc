@@ -226,8 +226,8 @@ void Recorder::Finish(const RunResult& result) {
   folder.Write("run.json", internal::RunJson(result, impl_->facts));
   folder.Write("comparison.csv", internal::ComparisonCsv(result));
   folder.Write("timing.json", timing);
-  impl_->log.Close();  // before the figures, whose time is of the clock: same seed, same bytes
   impl_->WriteReport(result, recorded);
+  impl_->log.Close();
   impl_->folder.Commit();
   if (IsLogged(LogLevel::kInfo)) Log(LogLevel::kInfo, "wrote " + impl_->options.folder.string());
 }

@@ -19,7 +19,7 @@ constexpr const char* kBundleFooter = R"(Examples:
   alidade bundle bundle.out --fix intrinsics -o runs/bundler
   alidade bundle data/tracks.csv --camera data/calibration.yaml --start run/trajectory.tum -o runs/a
 
-Reads problems of BAL, Bundler v0.3 and libmv, told apart by their beginning, and tracks as
+Reads problems of BAL, Bundler v0.3 and libmv, distinguished by their beginning, and tracks as
 `simulate` writes them. Ctrl-C ends after the iteration and keeps the result so far.
 Exit codes: 0 converged, 1 out of iterations, 75 stopped, 79 the solver failed.)";
 
@@ -146,7 +146,7 @@ ExitCode RunBundle(const BundleArguments& arguments) {
   if (left_out == std::ssize(file.problem.observations)) {
     throw Error(ExitCode::kBadData,
                 ErrorLine(Place{arguments.problem}, {}, "no observation can be used",
-                          IsProjective(file.format) ? "points beside the plane of their camera"
+                          IsProjective(file.format) ? "points too near the plane of their camera"
                                                     : "points in front of their camera") +
                     "\n  " + Describe(file, left_out));
   }
@@ -181,7 +181,7 @@ ExitCode RunBundle(const BundleArguments& arguments) {
   if (!arguments.quiet) Print(text);
   if (result.end == BundleEnd::kFailed) PrintErrors(arguments.problem + ": " + result.message);
   if (result.end == BundleEnd::kOutOfIterations)
-    PrintNote("not converged: " + result.message + " (--iterations, --tolerance)");
+    PrintNote("not converged: " + result.message + " (--max-iterations, --tolerance)");
   return CodeOf(result.end);
 }
 
@@ -206,7 +206,7 @@ void AddBundle(CLI::App& program, Action& action) {
       "leaves intrinsics as they are: all of them by `intrinsics`, or elements such as k1,k2")
       ->check(AreNames)
       ->allow_extra_args(false);
-  add("--iterations", arguments->iterations, "N", "at most; default 500")
+  add("--max-iterations", arguments->iterations, "N", "at most; default 500")
       ->check(IsInteger(0, 1000000));
   add("--tolerance", arguments->tolerance, "X",
       "converged where a step changes the cost by no more than this fraction; default 1e-8")

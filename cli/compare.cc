@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 constexpr const char* kCompareFooter = R"(Examples:
   alidade compare config.yaml                      run it, and decompose the error of a filter
   alidade compare config.yaml --runs 100           over seeds 1 to 100
-  alidade compare config.yaml --no-explain --reference batch
+  alidade compare config.yaml --no-decomposition --reference batch
   alidade compare runs/a runs/b                    finished runs over the same data
 
 Exit code 1: there was no reference, or no measurement, to compare with; 65: runs over different
@@ -35,7 +35,7 @@ struct CompareArguments {
   bool over_seeds = false;
   CompareOptions options;
   bool all = false;
-  bool no_explain = false, json = false, markdown = false, latex = false;
+  bool no_decomposition = false, json = false, markdown = false, latex = false;
   bool force = false, quiet = false, figures = false;
 };
 
@@ -48,7 +48,8 @@ std::string Shown(const Comparison& comparison, const CompareArguments& argument
 }
 
 /// Prints the comparison, and where it lies.
-void Tell(const Comparison& comparison, const CompareArguments& arguments, const fs::path& folder) {
+void Report(const Comparison& comparison, const CompareArguments& arguments,
+            const fs::path& folder) {
   Print(Shown(comparison, arguments));
   if (!folder.empty() && !arguments.quiet) PrintNote("wrote " + folder.string());
 }
@@ -64,10 +65,10 @@ ExitCode CodeOf(const Comparison& comparison, ExitCode of_run) {
 }
 
 /// Whether what ended the run was an estimator that was added, of which the comparison tells.
-bool OnlyAddedFailed(const RunResult& result, const ExplainedExperiment& explained) {
+bool OnlyAddedFailed(const RunResult& result, const ComparedExperiment& compared) {
   return result.code == ExitCode::kDiverged &&
          std::ranges::all_of(result.estimators, [&](const EstimatorResult& one) {
-           return !one.failed || std::ranges::count(explained.added, one.name) > 0;
+           return !one.failed || std::ranges::count(compared.added, one.name) > 0;
          });
 }
 
@@ -78,23 +79,23 @@ void AddFiles(auto& folder, const Comparison& comparison) {
   folder.AddFile("compare.tex", CompareReport(comparison, TableStyle::kLatex));
 }
 
-ExitCode CompareRun(const CompareArguments& arguments, ExplainedExperiment& explained,
+ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compared,
                     const PluginHost& host, const fs::path& folder) {
   Recorder::Options record{folder, arguments.force, arguments.figures, arguments.command,
                            StopRequested};
   record.covariances = true;
-  Recorder recorder(record, explained.config, host);
-  RunComparer comparer(explained.experiment);
+  Recorder recorder(record, compared.config, host);
+  RunComparer comparer(compared.experiment);
   Progress progress("frames", arguments.quiet);
   RunOptions options;
   options.observers = {&recorder, &comparer};
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
-  const RunResult result = Run(explained.experiment, options);
+  const RunResult result = Run(compared.experiment, options);
   progress.Clear();
   FinishOnSignals();
   CompareOptions of_run = arguments.options;
-  of_run.filter = explained.filter;
+  of_run.filter = compared.filter;
   Comparison comparison;
   try {
     comparison = comparer.Finish(result, of_run);
@@ -105,21 +106,21 @@ ExitCode CompareRun(const CompareArguments& arguments, ExplainedExperiment& expl
     if (result.status == RunStatus::kStopped) PrintNote(result.reason);
     return result.code;
   }
-  comparison.notes.insert(comparison.notes.begin(), explained.notes.begin(), explained.notes.end());
+  comparison.notes.insert(comparison.notes.begin(), compared.notes.begin(), compared.notes.end());
   if (result.status != RunStatus::kOk) comparison.notes.push_back(result.reason);
   AddFiles(recorder, comparison);
   recorder.Finish(result);
-  Tell(comparison, arguments, folder);
+  Report(comparison, arguments, folder);
   if (result.status == RunStatus::kStopped) {
     PrintNote(result.reason);
     return result.code;
   }
-  if (OnlyAddedFailed(result, explained)) return CodeOf(comparison, ExitCode::kOk);
+  if (OnlyAddedFailed(result, compared)) return CodeOf(comparison, ExitCode::kOk);
   if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
   return CodeOf(comparison, result.code);
 }
 
-ExitCode CompareOverSeeds(const CompareArguments& arguments, const ExplainedExperiment& explained,
+ExitCode CompareOverSeeds(const CompareArguments& arguments, const ComparedExperiment& compared,
                           const PluginHost& host, const fs::path& folder) {
   Progress progress("runs", arguments.quiet);
   SweepOptions options = arguments.sweep;
@@ -127,10 +128,10 @@ ExitCode CompareOverSeeds(const CompareArguments& arguments, const ExplainedExpe
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
   SweepFolder out(folder, arguments.force);
-  ComparedSeeds seeds = CompareSeeds(explained, host, options, arguments.options);
+  ComparedSeeds seeds = CompareSeeds(compared, host, options, arguments.options);
   progress.Clear();
   Comparison& comparison = seeds.comparison;
-  comparison.notes.insert(comparison.notes.begin(), explained.notes.begin(), explained.notes.end());
+  comparison.notes.insert(comparison.notes.begin(), compared.notes.begin(), compared.notes.end());
   std::int64_t failed = 0;
   for (const SweepRun& run : seeds.sweep.done) {
     if (run.status != RunStatus::kFailed) continue;
@@ -139,8 +140,8 @@ ExitCode CompareOverSeeds(const CompareArguments& arguments, const ExplainedExpe
   if (failed > 1) PrintErrors(std::to_string(failed) + " runs failed: see failures.csv");
   const bool any = !comparison.estimators.empty();  // else no run came to its end
   if (any) AddFiles(out, comparison);
-  out.Write(seeds.sweep, explained.config);
-  if (any) Tell(comparison, arguments, folder);
+  out.Write(seeds.sweep, compared.config);
+  if (any) Report(comparison, arguments, folder);
   if (seeds.sweep.stopped) {
     TellStopped(seeds.sweep.done.size(), options.runs);
     return ExitCode::kStopped;
@@ -158,9 +159,9 @@ ExitCode CompareConfig(const CompareArguments& arguments) {
   const PluginHost host = input.Host(config);
   ReportCrashes();
   StopOnSignals();
-  ExplainedExperiment explained = ExplainExperiment(config, host, arguments.options);
-  return arguments.over_seeds ? CompareOverSeeds(arguments, explained, host, folder)
-                              : CompareRun(arguments, explained, host, folder);
+  ComparedExperiment compared = BuildComparedExperiment(config, host, arguments.options);
+  return arguments.over_seeds ? CompareOverSeeds(arguments, compared, host, folder)
+                              : CompareRun(arguments, compared, host, folder);
 }
 
 ExitCode CompareFinished(const CompareArguments& arguments) {
@@ -171,7 +172,7 @@ ExitCode CompareFinished(const CompareArguments& arguments) {
   if (!arguments.folder.empty()) {
     WriteComparison(comparison, arguments.folder, arguments.force);
   }
-  Tell(comparison, arguments, arguments.folder);
+  Report(comparison, arguments, arguments.folder);
   return CodeOf(comparison, ExitCode::kOk);
 }
 
@@ -211,7 +212,7 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
       .add_option("--filter", arguments.options.filter,
                   "the filter whose error is decomposed; default: the first")
       ->option_text("NAME");
-  command.add_flag("--no-explain", arguments.no_explain,
+  command.add_flag("--no-decomposition", arguments.no_decomposition,
                    "decompose no error, and add no estimators for it");
   command.add_option("--runs", arguments.sweep.runs, "compare over that many seeds")
       ->option_text("N")
@@ -259,7 +260,7 @@ void AddCompare(CLI::App& program, Action& action, const std::string& command_li
   command.callback([&action, &command, arguments] {
     CheckOptions(*arguments, command);
     arguments->over_seeds = command.count("--runs") > 0;
-    arguments->options.explain = !arguments->no_explain;
+    arguments->options.decompose = !arguments->no_decomposition;
     arguments->options.over_seeds = arguments->over_seeds;
     const bool folders = AreFolders(arguments->of);
     action = [arguments, folders] {

@@ -20,7 +20,7 @@ constexpr const char* kEvalFooter = R"(Examples:
   alidade eval KITTI_00_gt.txt KITTI_00_orb.txt -a -d 100 -u m --all-pairs
   alidade eval truth.tum a.tum b.tum -a --markdown
 
-Files: TUM (8 columns, or 20 with covariances), KITTI (12, times.txt beside), EuRoC (csv). A folder
+Files: TUM (8 columns, or 20 with covariances), KITTI (12, and times.txt), EuRoC (csv). A folder
 is a run, an estimator in one, or a sequence of EuRoC. Warnings go to standard error. Options have
 the names of evo; underscores, as in --t_max_diff, mean the same.)";
 
@@ -55,7 +55,7 @@ CLI::Validator OneOf(std::initializer_list<T> values) {
   return {choose, ""};
 }
 
-/// What -a, -s and --align-origin mean beside --align-mode.
+/// What -a, -s and --align-origin mean for --align-mode.
 Alignment Chosen(const EvalArguments& arguments) {
   if (arguments.origin) return Alignment::kOrigin;
   if (arguments.se3) return arguments.scale ? Alignment::kSim3 : Alignment::kSe3;
@@ -230,7 +230,7 @@ void AddErrors(CLI::App& command, EvalArguments& a) {
       ->check(IsNumber(1e-9, 1e9));
   command
       .add_option("-u,--delta-unit", a.options.pairs.unit,
-                  "RPE: f (poses, default), m (of path), s, d (degrees) or r (rad)")
+                  "RPE: f (poses, default), m (along the trajectory), s, d (degrees) or r (rad)")
       ->option_text("UNIT")
       ->transform(OneOf({DeltaUnit::kFrames, DeltaUnit::kMetres, DeltaUnit::kSeconds,
                          DeltaUnit::kDegrees, DeltaUnit::kRadians}));

@@ -18,7 +18,7 @@ constexpr const char* kPluginsFooter = R"(Examples:
   alidade plugins where --plugin-path build/lib
 
 Plugins are looked for in the config's `plugins:`, --plugin-path, ALIDADE_PLUGIN_PATH, the user's
-data folder ($XDG_DATA_HOME/alidade/plugins) and beside the program.)";
+data folder ($XDG_DATA_HOME/alidade/plugins) and next to the program.)";
 
 struct PluginsArguments {
   std::vector<std::string> paths;

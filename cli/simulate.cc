@@ -18,7 +18,7 @@ constexpr const char* kSimulateFooter = R"(Examples:
   alidade run other.yaml --set source.path=data/scene   with source.type: tracks
 
 No estimator is made. Measurements of landmarks go to STREAM.csv as frame,feature,dim,value, others
-as frame,t_s and their values; beside them timestamps.csv, truth, map.csv and calibration.yaml.
+as frame,t_s and their values; next to them timestamps.csv, truth, map.csv and calibration.yaml.
 Images have an equal disc at the pixel of each landmark's measurement.)";
 
 struct SimulateArguments {

@@ -369,7 +369,7 @@ allow tests/core/base/json_test.cc '#include <nlohmann/json.hpp>'
 allow core/alidade/run/new.cc "$licence\n// std::cout, abort()\n/* exit(1);\n printf(\"x\") */ int a = std::snprintf(b, 3, \"exit(1)\");"
 allow core/alidade/run/new.cc "$licence\nloop.abort(); p->exit(); my_exit(); stop::exit_code(); char c = '\"'; f(\"std::cout <<\");"
 allow core/alidade/run/new.cc "$licence\nif (fork() == 0) _exit(0);"
-allow core/alidade/run/new.cc "$licence\nf(\"tracks\", \"csv\", EstimatorKind::kWindow);  // my_fixed_lag_s"
+allow core/alidade/run/new.cc "$licence\nf(\"tracks\", \"csv\", EstimatorKind::kSlidingWindow);  // my_fixed_lag_s"
 allow plugins/csv/new.cc "$licence\nconst char* kName = \"ceres_batch\";"
 allow sensors/new.cc "$licence\n#include \"new.h\"\n#include <cmath>\n#include <Eigen/Dense>\n#include \"alidade/model/model.h\""
 allow plugins/csv/new.cc "$licence\n#include \"own.h\"\n#include <fcntl.h>\n#include \"sensors/scale_2d.h\""

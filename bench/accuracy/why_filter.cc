@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Accuracy against cost, of a filter and of the batch, as [Strasdat2012] drew it: the same path
-// with fewer or more points, and with fewer or more of its frames used.
+// Accuracy against cost, of a filter and of the batch, as [Strasdat2012] drew it: the same
+// trajectory with fewer or more points, and with fewer or more of its frames used.
 //
 //   accuracy_why_filter examples/10_slam_scene/sweep_batch.yaml FOLDER [SEEDS]
 //
@@ -10,7 +10,7 @@
 //   rmse      sqrt(mean |e|^2) of the position at the last frame
 //   bits      E = 1/2 log2(det C_0 / det C), C the covariance of the last pose, 6 x 6, C_0 that of
 //             the smallest filter: mean
-//   cpu       time of the whole path in units of the smallest filter's: median
+//   cpu       time of the whole trajectory in units of the smallest filter's: median
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -28,7 +28,7 @@
 
 namespace {
 
-constexpr int kAllFrames = 150;      // of the path
+constexpr int kAllFrames = 150;      // of the trajectory
 constexpr double kAllRateHz = 30.0;  // with all of them
 const std::vector<int> kFrames = {10, 19, 38, 75, kAllFrames};
 const std::vector<int> kPoints = {10, 20, 40, 80};
@@ -51,8 +51,8 @@ double Log2Det(const alidade::State& state) {
   return 2.0 * c.llt().matrixLLT().diagonal().array().log2().sum();
 }
 
-/// The path with so many points and frames. The noise of the motion is scaled so that a velocity is
-/// as uncertain after a second, however many steps that took.
+/// The trajectory with so many points and frames. The noise of the motion is scaled so that a
+/// velocity is as uncertain after a second, however many steps that took.
 alidade::Config ConfigOf(const std::string& file, int points, int frames, int seed) {
   alidade::Config config = alidade::Config::FromFile(file);
   const auto set = [&](const char* key, double value) {
@@ -194,7 +194,7 @@ void Write(const std::vector<Row>& rows, const std::filesystem::path& file) {
 void Draw(const std::vector<Row>& rows, const std::filesystem::path& folder) {
   using alidade::internal::FigureScript;
   FigureScript script("why_filter", "accuracy against cost: filter and batch",
-                      "CPU time of the path, in units of the smallest filter's");
+                      "CPU time of the trajectory, in units of the smallest filter's");
   script.PanelHeight(220);
   script.Set("set logscale x\nset format x '%g'");
   const alidade::internal::FigureFile file{"why_filter.csv",

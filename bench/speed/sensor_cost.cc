@@ -244,7 +244,7 @@ double QuantileOf(std::vector<double> values, double q) {
   return Quantile(values, q);
 }
 
-/// The ways to make costs: each adaptor beside what it is compared with.
+/// The ways to make costs: each adaptor and what it is compared with.
 struct Ways {
   PinholeClosed analytic;
   Pinhole automatic;

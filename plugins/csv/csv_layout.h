@@ -110,7 +110,7 @@ inline void ReadBlind(const Node& entry, CsvLayout& layout) {
   const std::optional<Node> after = entry.Find("blind_after");
   const std::optional<Node> blind = entry.Find("blind");
   if (!after) {
-    if (blind) blind->Fail("without 'blind_after' no stream goes blind", "'blind_after' beside it");
+    if (blind) blind->Fail("without 'blind_after' no stream goes blind", "'blind_after' with it");
     return;
   }
   layout.blind_after_node = after;

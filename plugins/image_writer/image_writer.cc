@@ -3,7 +3,7 @@
 
 #include <opencv2/core/utils/logger.hpp>
 
-#include "alidade/host/build_plugin.h"
+#include "alidade/host/cpp_plugin.h"
 
 namespace alidade {
 namespace {

@@ -57,15 +57,15 @@ inline Eigen::Vector3d Direction(Random& random) {
   return point.normalized();
 }
 
-/// Points on spheres about `center`, in turn on each of `radii`.
+/// Points on spheres about `centre`, in turn on each of `radii`.
 inline std::vector<Eigen::Vector3d> OnShells(const Node& node, std::size_t count, Random& random) {
   const Node radii_node = node.At("radii", "shells");
   const std::vector<double> radii = radii_node.Numbers();
   for (const double radius : radii) {
     if (!(radius > 0.0)) radii_node.Fail("a radius that is not positive", "radii > 0, m");
   }
-  const auto center = node.Find("center");
-  const Eigen::Vector3d origin = center ? ReadVector(*center) : Eigen::Vector3d::Zero().eval();
+  const auto centre = node.Find("centre");
+  const Eigen::Vector3d origin = centre ? ReadVector(*centre) : Eigen::Vector3d::Zero().eval();
   node.RejectUnread();
   std::vector<Eigen::Vector3d> points;
   for (std::size_t i = 0; i < count; ++i) {

@@ -10,8 +10,8 @@
 #include "alidade/base/random.h"
 #include "alidade/host/source.h"
 #include "alidade/model/camera.h"
-#include "path.h"
 #include "points.h"
+#include "trajectory.h"
 
 namespace alidade {
 
@@ -19,9 +19,9 @@ inline constexpr const char* kSceneKeys =
     "points.list           [[x, y, z], ...], m; the ids are the places in it\n"
     "points.box            {min: [x, y, z], max}, m: drawn in its volume\n"
     "points.room           {min: [x, y, z], max}, m: drawn on its six faces\n"
-    "points.shells         {center, radii}, m: drawn on spheres\n"
+    "points.shells         {centre, radii}, m: drawn on spheres\n"
     "points.count          how many are drawn\n"
-    "trajectory.look_at    [{position, target, t_s}, ...]; trajectory.up beside it\n"
+    "trajectory.look_at    [{position, target, t_s}, ...]; also trajectory.up\n"
     "trajectory.keyframes  [{position, t_s, euler_deg | matrix | axis_angle_deg | quaternion}, "
     "...]\n"
     "trajectory.random     noise and start of quaternion_pose, which it is drawn from\n"
@@ -32,7 +32,7 @@ inline constexpr const char* kSceneKeys =
 ///   pixel      (u, v) = K(h) + n_px,   h = R_CW (p - r),   n_px ~ N(0, sigma_px^2 I)
 ///   stereo     (u, v, u - fx B / hz, v) + n_px: a rectified pair of pinholes, B camera.baseline_m
 ///   depth      (u, v, hz) + (n_px, n_d),   n_d ~ N(0, sigma_depth_m^2)
-///   known      (u, v, hz (1 + n)),   n ~ N(0, known_points.sigma_relative^2)
+///   known      (u, v, hz (1 + n)),   n ~ N(0, known_points.sigma_depth_relative^2)
 ///   odometry   v, omega in cam, constant, that lead odometry_pose from this frame to the next,
 ///              + N(0, sigma^2)
 ///
@@ -63,9 +63,10 @@ class Scene : public Source {
       : camera_(p), pixel_noise_(seed, 2), odometry_noise_(seed, 3) {
     ReadNumbers(p);
     for (const char* key : {"points", "trajectory", "state_entry"}) entry.Declare(key);
-    Random of_points(seed, 0), of_path(seed, 1);
+    Random of_points(seed, 0), of_trajectory(seed, 1);
     points_ = scene::ReadPoints(entry.At("points", "scene"), of_points);
-    path_ = scene::ReadPath(entry.At("trajectory", "scene"), count_, dt_s_, of_path);
+    trajectory_ =
+        scene::ReadTrajectory(entry.At("trajectory", "scene"), count_, dt_s_, of_trajectory);
     seen_before_.assign(points_.size(), false);
     seen_ever_.assign(points_.size(), false);
     const auto state = entry.Find("state_entry");
@@ -83,7 +84,7 @@ class Scene : public Source {
 
   bool Next(Frame& frame) override {
     if (index_ == count_) return false;
-    const scene::CameraState& state = path_[index_];
+    const scene::CameraState& state = trajectory_[index_];
     frame.timestamp = TimestampFromSeconds(static_cast<double>(index_) * dt_s_);
     frame.measurements.clear();
     const auto list = [](const auto& values) {
@@ -125,15 +126,17 @@ class Scene : public Source {
       sigma_depth_m_ = p.NonNegative("sigma_depth_m", "m", "noise of the depth, 1 sigma");
     }
     if (measures_ == kPixel) {
-      known_left_ = p.Integer("known_points.count", "points whose first observation tells depth", 0,
-                              1 << 20, 0);
-      known_sigma_ = p.Number("known_points.sigma_relative", "", "noise of that depth, share of it",
-                              {0.0, 1.0, true, false}, 0.005);
+      known_left_ = p.Integer("known_points.count",
+                              "points whose first observation determines depth", 0, 1 << 20, 0);
+      known_sigma_ = p.Number("known_points.sigma_depth_relative", "",
+                              "noise of that depth, share of it", {0.0, 1.0, true, false}, 0.005);
     }
     if (p.Flag("simulate_odometry", "whether there is a stream odometry", false)) {
       odometry_stream_ = 0;  // NameAll() gives it its place
-      linear_sigma_ = p.NonNegative("odometry_noise.linear", "m/s", "1 sigma, per axis", 0.0);
-      angular_sigma_ = p.NonNegative("odometry_noise.angular", "rad/s", "1 sigma, per axis", 0.0);
+      linear_sigma_ =
+          p.NonNegative("odometry_noise.linear_velocity", "m/s", "1 sigma, per axis", 0.0);
+      angular_sigma_ =
+          p.NonNegative("odometry_noise.angular_velocity", "rad/s", "1 sigma, per axis", 0.0);
     }
   }
 
@@ -210,8 +213,8 @@ class Scene : public Source {
 
   /// v = V(phi)^-1 R_WC' (r' - r) / dt, phi = omega dt: as odometry_pose integrates it.
   void EmitOdometry(Frame& frame) {
-    const scene::CameraState& now = path_[index_];
-    const scene::CameraState& next = path_[index_ + 1];
+    const scene::CameraState& now = trajectory_[index_];
+    const scene::CameraState& next = trajectory_[index_ + 1];
     Eigen::Vector3d phi, way, moved;
     UnitQuaternion::Minus(next.orientation.data(), now.orientation.data(), phi.data());
     Vec<3>::Minus(next.position.data(), now.position.data(), way.data());
@@ -232,7 +235,7 @@ class Scene : public Source {
   Camera camera_;
   std::vector<StreamInfo> streams_, truths_;
   std::vector<Eigen::Vector3d> points_;
-  std::vector<scene::CameraState> path_;
+  std::vector<scene::CameraState> trajectory_;
   std::vector<bool> seen_before_, seen_ever_;
   std::size_t count_ = 0, index_ = 0, most_ = 0;
   double dt_s_ = 0.0, sigma_px_ = 0.0, baseline_m_ = 0.0, sigma_depth_m_ = 0.0;

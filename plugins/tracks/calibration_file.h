@@ -8,7 +8,7 @@
 
 namespace alidade {
 
-/// The `calibration.yaml` beside tracks, under the keys by which models ask. It has one of two
+/// The `calibration.yaml` next to tracks, under the keys by which models ask. It has one of two
 /// forms:
 ///
 ///   written as                                        key

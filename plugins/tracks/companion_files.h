@@ -10,7 +10,7 @@
 #include "alidade/base/number_rows.h"
 #include "alidade/model/geometry.h"
 
-/// The files beside a file of tracks, read along with it.
+/// The files next to a file of tracks, read along with it.
 namespace alidade {
 
 /// `frame,t_s` of each frame, both increasing; a header may stand first.

@@ -110,7 +110,7 @@ class Tracks : public Source {
     if (const auto times = beside("timestamps.csv"); times && options_.rate_hz == 0.0) {
       times_.emplace(*times, path.place(), path.path());
     } else if (options_.rate_hz == 0.0) {
-      path.Fail("no timestamps.csv beside the tracks", "that file, or 'rate_hz'");
+      path.Fail("no timestamps.csv next to the tracks", "that file, or 'rate_hz'");
     }
     if (const auto other = beside("odometry.csv");
         other && options_.odometry != TracksOptions::kNone) {

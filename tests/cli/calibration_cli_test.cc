@@ -12,7 +12,8 @@ using testing::Contains;
 using testing::Outcome;
 
 const std::string kRemedy =
-    "; expected the same value, no such key (the data tell it), or 'source.calibration: ignore'\n";
+    "; expected the same value, no such key (the data determine it), or 'source.calibration: "
+    "ignore'\n";
 
 class CalibrationCli : public testing::ProgramTest {
  protected:

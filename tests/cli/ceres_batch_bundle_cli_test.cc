@@ -69,7 +69,7 @@ TEST_F(BundleCli, SaysWhatIsWrong) {
   BundleFile file = testing::TrueBundle();
   testing::Disturb(file.problem);
   Write("p.txt", BundleText(file));
-  const Outcome few = Call({"bundle", "p.txt", "--iterations", "2"});
+  const Outcome few = Call({"bundle", "p.txt", "--max-iterations", "2"});
   EXPECT_EQ(few.code, 1);
   EXPECT_TRUE(Contains(few.err, "not converged: ")) << few.err;
 }
@@ -151,7 +151,7 @@ TEST_F(BundleTracksCli, PlacesPointsOfAStereoPairByTheirRays) {
             "{position: [2.5, 0, 0], target: [0, 0, 38]}]}"});
   EXPECT_EQ(Json("data/calibration.yaml").root().At("camera").At("baseline_m").Number(), 0.2);
   const Outcome started =
-      Bundle("data/tracks.csv", "data/truth.tum", {"-o", "start", "--iterations", "0"});
+      Bundle("data/tracks.csv", "data/truth.tum", {"-o", "start", "--max-iterations", "0"});
   EXPECT_EQ(started.code, 1) << started.err;
   const auto depths = [&](const std::string& file) {
     std::map<int, double> all;
@@ -179,7 +179,7 @@ TEST_F(BundleTracksCli, PlacesAPointThatHasAPixelWithoutARay) {
         "k1: -0.4, k2: 0, p1: 0, p2: 0}");
   Write("tracks.csv", "0,1,0,320\n0,1,1,240\n1,1,0,290.12\n1,1,1,240\n2,1,0,1\n2,1,1,1\n");
   Write("start.tum", "0 0 0 0 0 0 0 1\n1 0.3 0 0 0 0 0 1\n2 0.6 0 0 0 0 0 1\n");
-  Bundle("tracks.csv", "start.tum", {"--iterations", "0", "-o", "out"});
+  Bundle("tracks.csv", "start.tum", {"--max-iterations", "0", "-o", "out"});
   EXPECT_TRUE(Contains(Read("out/points.csv"), "\n1,"));
   const std::string points = Read("out/points.csv");
   EXPECT_NEAR(std::stod("0" + points.substr(points.rfind(',') + 1)), 3.0, 1e-6)
@@ -329,7 +329,7 @@ TEST_F(BundleCli, HoldsTheScale) {
     }
     return testing::MedianDistance(positions);
   };
-  const double before = extent("start", {"--iterations", "0"});
+  const double before = extent("start", {"--max-iterations", "0"});
   EXPECT_NEAR(extent("out", {}) / before, 1.0, 1e-12);
   EXPECT_NEAR(Json("out/bundle.json").root().At("extent_after").Number() / before, 1.0, 1e-12);
 }

@@ -166,7 +166,7 @@ TEST_F(Cli, UntrustedPluginIsRefusedWithSeventySeven) {
   EXPECT_EQ(where.code, 0) << where.err;
   EXPECT_TRUE(Contains(where.out, plugin.string() + " (given): 0 found, 1 refused\n")) << where.out;
   EXPECT_TRUE(Contains(where.out, "refused " + plugin.string() + ": not trusted")) << where.out;
-  EXPECT_TRUE(Contains(where.out, "(beside the program): ")) << where.out;
+  EXPECT_TRUE(Contains(where.out, "(next to the program): ")) << where.out;
   const Outcome nowhere = Call({"plugins", "where", "--plugin-path", "none.so"});
   EXPECT_TRUE(Contains(nowhere.out, "/none.so (given): not there\n")) << nowhere.out;
   const Outcome doctor = Call({"doctor", "--plugin-path", "alidade_constant.so"});
@@ -382,7 +382,7 @@ TEST_F(Cli, PluginsTellsNamesUnitsRangesAndDefaults) {
   EXPECT_TRUE(Contains(missing.err, "stereo_disparity")) << missing.err;
   const Outcome where = Call({"plugins", "where"});
   EXPECT_EQ(where.code, 0);
-  EXPECT_TRUE(Contains(where.out, "lib/alidade/plugins (beside the program)")) << where.out;
+  EXPECT_TRUE(Contains(where.out, "lib/alidade/plugins (next to the program)")) << where.out;
 }
 
 TEST_F(Cli, PluginsPrintsJson) {

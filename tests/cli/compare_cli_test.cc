@@ -208,7 +208,7 @@ TEST_F(CompareCli, RefusesASourceThatCanBeReadOnceForSeveralSeeds) {
 TEST_F(CompareCli, WithholdsTheComparisonWhereTheBatchFailed) {
   const std::string failing = "estimators.batch={type: ceres_batch, max_iterations: 1}";
   const Outcome compared = Call({"compare", "config.yaml", "-o", "out", "--reference", "batch",
-                                 "--no-explain", "--set", failing});
+                                 "--no-decomposition", "--set", failing});
   EXPECT_EQ(compared.code, 1);
   const std::string words =
       "no reference: estimator 'batch' failed, the comparison with it is withheld";
@@ -217,7 +217,7 @@ TEST_F(CompareCli, WithholdsTheComparisonWhereTheBatchFailed) {
   EXPECT_FALSE(Contains(compared.out, "difference target")) << compared.out;
   // Errors from truth need no batch, but what is compared with it is withheld.
   const Outcome truth =
-      Call({"compare", "config.yaml", "-o", "two", "--no-explain", "--set", failing});
+      Call({"compare", "config.yaml", "-o", "two", "--no-decomposition", "--set", failing});
   EXPECT_EQ(truth.code, 1);
   EXPECT_TRUE(Contains(truth.out, "rmse target.depth [mm]")) << truth.out;
   // Without a gate that of what the filter accepted is of all measurements too, and stands in.
@@ -249,7 +249,7 @@ TEST_F(CompareCli, TheBatchOfAnotherFolderServesWhereOneFailed) {
 TEST_F(CompareCli, AWindowIsNeitherAFilterNorASmootherOfAllData) {
   const std::string window = "estimators.window={type: fixed_lag, lag_s: 0.5";
   const Outcome smoothed =
-      Call({"compare", "config.yaml", "-o", "out", "--no-explain", "--set",
+      Call({"compare", "config.yaml", "-o", "out", "--no-decomposition", "--set",
             window + ", output: lagged}", "--set", "estimators.rts={type: rts}"});
   EXPECT_TRUE(Contains(smoothed.out, "later data too; ratio and difference: to rts"))
       << smoothed.out << smoothed.err;

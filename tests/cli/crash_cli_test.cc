@@ -4,6 +4,7 @@
 #include <csignal>
 
 #include "support/program.h"
+#include "support/sanitized.h"
 
 namespace alidade::testing {
 namespace {
@@ -12,9 +13,7 @@ class CrashCli : public ProgramTest {
  protected:
   void SetUp() override {
     ProgramTest::SetUp();
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-    GTEST_SKIP() << "a sanitizer ends such a process in its own way";
-#endif
+    if (kSanitized) GTEST_SKIP() << "a sanitizer ends such a process in its own way";
     if (!fs::exists(kPlugin)) GTEST_SKIP() << "built for test_plugins";
     Write("rows.csv", "t_s,u,v\n0,1,1\n1,1,1\n");
   }

@@ -254,7 +254,8 @@ TEST_F(EvalCli, AnEstimateThatFailsLeavesTheOthersTheirFigures) {
   EXPECT_EQ(table.err, "error: two.tum: 2 poses to align by; expected 3 or more\n");
   EXPECT_TRUE(Contains(table.out, "| two | failed | - | - | - | - | - | - | - |\n")) << table.out;
   EXPECT_TRUE(Contains(table.out, "| mono | se3 | 1.000000 | 31 of 31 |")) << table.out;
-  EXPECT_TRUE(Contains(table.out, "Rmse against truth.tum; RPE of consecutive pairs, 1 f apart"))
+  EXPECT_TRUE(
+      Contains(table.out, "RMSE, compared with truth.tum; RPE of consecutive pairs, 1 f apart"))
       << table.out;
   EXPECT_TRUE(Contains(Call(call).out, "failed")) << Call(call).out;
   const Outcome both = Call(json);

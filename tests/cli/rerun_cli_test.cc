@@ -14,7 +14,7 @@ const fs::path kExample = fs::path(ALIDADE_SOURCE_DIR) / "examples/07_depth_pair
 
 class Rerun : public testing::ProgramTest {
  protected:
-  /// The example with its table beside it, in a folder `made` below the current one.
+  /// The example with its table next to it, in a folder `made` below the current one.
   void SetUp() override {
     ProgramTest::SetUp();
     fs::create_directories(folder_ / "made");

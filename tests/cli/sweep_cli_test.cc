@@ -297,7 +297,7 @@ TEST_F(SweepCli, EveryValueHasTheSameEstimators) {
   EXPECT_EQ(rmse(0, "b"), rmse(1, "a"));
 }
 
-/// An estimator beside ekf that diverges in every run.
+/// An estimator next to ekf that diverges in every run.
 const Arguments kDiverging = {
     "--set",
     "estimators.bad={type: ekf, overrides: {state: {target: {initial: {depth: {mean: -0.2, sigma: "

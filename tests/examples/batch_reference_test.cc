@@ -17,11 +17,11 @@ const std::pair<std::string, std::string> kWrongPrior = {"landmarks.prior",
 const Settings kNoKnownDepth = {{"estimators.ekf.sensors", "[pixels]"},
                                 {"estimators.batch.sensors", "[pixels]"}};
 
-/// Means of the filter and the batch over seeds 1001 and 1002.
-struct Means {
+/// EkfAndBatch of the filter and the batch over seeds 1001 and 1002.
+struct EkfAndBatch {
   SweepSummary ekf, batch;
 
-  Means(const char* name, const Settings& settings) {
+  EkfAndBatch(const char* name, const Settings& settings) {
     Config config = Config::FromFile(std::filesystem::path(ALIDADE_SOURCE_DIR) /
                                      "examples/10_slam_scene" / name);
     for (const auto& [key, value] : settings) config.Set(key, value, "--set");
@@ -50,7 +50,7 @@ bool HasCeres() {
 // whole path is smoothed, so it compares with no filter's; the last frame does.
 TEST(BatchReference, IsRightWhereScaleIsAnchored) {
   if (!HasCeres()) GTEST_SKIP() << "built without the Ceres solver";
-  const Means means("batch.yaml", {});
+  const EkfAndBatch means("batch.yaml", {});
   EXPECT_NEAR(Of(means.batch, "map.sim3.scale"), 1.0, 0.005);
   EXPECT_NEAR(Of(means.batch, "nees.mean:cam"), 1.0, 0.5);
   EXPECT_NEAR(Of(means.ekf, "map.sim3.rmse") / Of(means.batch, "map.sim3.rmse"), 1.0, 0.1);
@@ -67,7 +67,7 @@ TEST(BatchReference, IsWrongWhereScaleIsVotedByPriors) {
   if (!HasCeres()) GTEST_SKIP() << "built without the Ceres solver";
   Settings settings = kNoKnownDepth;
   settings.push_back(kWrongPrior);
-  const Means means("batch.yaml", settings);
+  const EkfAndBatch means("batch.yaml", settings);
   EXPECT_NEAR(Of(means.batch, "map.sim3.scale"), 1.0 / 0.8, 0.08);
   EXPECT_GE(Of(means.batch, "nees.mean:cam"), 4.0);
   EXPECT_GE(Of(means.ekf, "nees.mean:cam"), 3.0);

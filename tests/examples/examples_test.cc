@@ -124,7 +124,7 @@ TEST(Examples, ScaleOnlyReportsThatLambdaIsUnobservable) {
 
 // Experiment 4.3: lag against noise.
 TEST(Examples, ScaleHeldTradesLagForNoise) {
-  const auto means = Sweep("03_depth_scale_held");
+  const auto means = Sweep("03_depth_scale_known");
   const Means &slow = means.at("R2_5"), &fast = means.at("R2_0_0005");
   EXPECT_EQ(slow.diverged + slow.inconsistent, 0);
   EXPECT_EQ(fast.diverged + fast.inconsistent, 0);
@@ -161,7 +161,7 @@ TEST(Examples, ThePrincipledFilterBeatsTheFusedFilterOf2017) {
 
 // A start that is off by 5 cm, and by 10 % in lambda, under priors that say so.
 TEST(Examples, TheIteratedFilterStartsFromFarAway) {
-  const auto means = Sweep("06_depth_poor_start");
+  const auto means = Sweep("06_depth_poor_initial");
   const Means &ekf = means.at("ekf"), &iekf = means.at("iekf");
   EXPECT_EQ(iekf.diverged + iekf.inconsistent, 0);
   EXPECT_LE(iekf["rmse:target.depth"], 0.0021);

@@ -363,7 +363,8 @@ TEST_F(DataFault, ScaleThatNobodyTellsIsReportedAndNoFailure) {
   EXPECT_TRUE(Contains(at_infinity.out, "  cannot be observed: scale (1 direction)\n"))
       << at_infinity.out;
   const Outcome run = Run("map.yaml");
-  EXPECT_TRUE(Contains(run.out, "ekf: unobservable\n  no sensor of this estimator tells scale\n"))
+  EXPECT_TRUE(
+      Contains(run.out, "ekf: unobservable\n  no sensor of this estimator determines scale\n"))
       << run.out;
   EXPECT_TRUE(Contains(Read("out/run.json"), "\"scale\"")) << Read("out/run.json");
   const char* const observed = "every direction of the state can be observed";

@@ -5,15 +5,12 @@
 #include <sys/ioctl.h>
 
 #include "support/program.h"
+#include "support/sanitized.h"
 
 namespace alidade {
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
+using testing::kSanitized;
 
 const std::string kBench = ALIDADE_SOURCE_DIR "/bench/long_run/";
 

@@ -10,15 +10,10 @@
 #include <algorithm>
 
 #include "support/program.h"
+#include "support/sanitized.h"
 
 namespace alidade::testing {
 namespace {
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
 
 class RunSafety : public ProgramTest {
  protected:

@@ -10,10 +10,8 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace)
 
-const Blocks kPose{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}};
-
 template <class Representation>
-SensorModel Made(const Camera& camera) {
+SensorModel DepthSensor(const Camera& camera) {
   return InProcessSensor(DepthFeature<Representation>(camera, 0.5, 0.01, 0.003), "depth_feature");
 }
 
@@ -24,7 +22,7 @@ TEST(DepthFeature, PredictsWorkedNumbers) {
     using Representation = decltype(representation);
     const Blocks roles = Blocks{{1, 0, 0}, {1, 0, 0, 0}} +
                          LandmarkAt<Representation>({0.3, -0.2, 0.1}, {0.0, 0.4, 2.0});
-    const SensorModel sensor = Made<Representation>(Pinhole());
+    const SensorModel sensor = DepthSensor<Representation>(Pinhole());
     const std::vector<double> z = Predicted(sensor, roles);
     EXPECT_NEAR(z[0], 57.5, 1e-12);
     EXPECT_NEAR(z[1], 345.0, 1e-12);
@@ -43,14 +41,14 @@ TEST(DepthFeature, HasTrueJacobians) {
   ForEachRepresentation([&](auto representation) {
     using Representation = decltype(representation);
     const Blocks roles = kPose + LandmarkAt<Representation>({-0.5, 0.2, -0.8}, point);
-    ExpectTrueJacobians(Made<Representation>(Lens()), roles);
-    EXPECT_NEAR(Predicted(Made<Representation>(Lens()), roles)[2], 5.0, 1e-14);
+    ExpectTrueJacobians(DepthSensor<Representation>(Lens()), roles);
+    EXPECT_NEAR(Predicted(DepthSensor<Representation>(Lens()), roles)[2], 5.0, 1e-14);
   });
 }
 
 TEST(DepthFeature, InitialisesWithoutAPrior) {
   ForEachRepresentation([](auto representation) {
-    const SensorModel sensor = Made<decltype(representation)>(Lens());
+    const SensorModel sensor = DepthSensor<decltype(representation)>(Lens());
     EXPECT_EQ(sensor.prior_size(), 0);
     ExpectTrueInverse(sensor, Blocks{kPose[0], kPose[1], {411, 87.5, 3.2}});
   });
@@ -60,14 +58,14 @@ TEST(DepthFeature, HasNoDepthAtInfinityOrBehind) {
   for (const double rho : {0.0, -0.1}) {
     const Blocks roles = Blocks{{0, 0, 0}, {1, 0, 0, 0}, {0, 0, 0, 0.1, 0.2, rho}};
     double z[3] = {kPoison, kPoison, kPoison};
-    EXPECT_EQ(Made<InverseDepth>(Pinhole()).Predict(Pointers(roles).data(), z),
+    EXPECT_EQ(DepthSensor<InverseDepth>(Pinhole()).Predict(Pointers(roles).data(), z),
               Status::kOutOfDomain);
     EXPECT_EQ(z[2], kPoison);
   }
 }
 
 TEST(DepthFeature, IsValidOnTheImageWithADepth) {
-  const SensorModel sensor = Made<Xyz>(Pinhole());
+  const SensorModel sensor = DepthSensor<Xyz>(Pinhole());
   const double good[3] = {10, 10, 1}, beside[3] = {-1, 10, 1}, none[3] = {10, 10, 0};
   EXPECT_EQ(sensor.Valid(good), Status::kOk);
   EXPECT_EQ(sensor.Valid(beside), Status::kInvalid);

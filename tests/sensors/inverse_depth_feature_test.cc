@@ -10,11 +10,10 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace)
 
-const Blocks kPose{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}};
 const Vec3 kAnchor{-0.5, 0.2, -0.8};
 
 template <class Representation>
-SensorModel Made(const Camera& camera) {
+SensorModel InverseDepthSensor(const Camera& camera) {
   return InProcessSensor(InverseDepthFeature<Representation>(camera, 1.5), "inverse_depth_feature");
 }
 
@@ -35,7 +34,7 @@ TEST(InverseDepthFeature, PredictsWorkedNumbers) {
     using Representation = decltype(representation);
     const Blocks landmark = LandmarkAt<Representation>({0.3, -0.2, 0.1}, {0.0, 0.4, 2.0});
     const Blocks roles = Blocks{{1, 0, 0}, {1, 0, 0, 0}} + landmark;
-    const SensorModel sensor = Made<Representation>(Pinhole());
+    const SensorModel sensor = InverseDepthSensor<Representation>(Pinhole());
     const std::vector<double> z = Predicted(sensor, roles);
     EXPECT_NEAR(z[0], 57.5, 1e-12);
     EXPECT_NEAR(z[1], 345.0, 1e-12);
@@ -52,10 +51,10 @@ TEST(InverseDepthFeature, HasTrueJacobiansOverTheImage) {
     for (const std::vector<double>& pixel :
          {std::vector<double>{320.5, 239.25}, {-0.5, -0.5}, {639.5, 12.0}, {5.0, 479.5}}) {
       const Blocks roles = kPose + SeenAt<Representation>(camera, pixel);
-      const std::vector<double> z = Predicted(Made<Representation>(camera), roles);
+      const std::vector<double> z = Predicted(InverseDepthSensor<Representation>(camera), roles);
       EXPECT_NEAR(z[0], pixel[0], 1e-9);
       EXPECT_NEAR(z[1], pixel[1], 1e-9);
-      ExpectTrueJacobians(Made<Representation>(camera), roles);
+      ExpectTrueJacobians(InverseDepthSensor<Representation>(camera), roles);
     }
   });
 }
@@ -64,8 +63,8 @@ TEST(InverseDepthFeature, SeesAtInfinityAndBeyond) {
   for (const double rho : {0.0, 1e-9, -0.01}) {
     const Blocks pose{{0.1, 0, 0}, {1, 0, 0, 0}};
     const Ray<double> ray{{0, 0, 0}, {0.0, 0.6, 0.8}, rho};
-    const SensorModel angles = Made<InverseDepth>(Pinhole());
-    const SensorModel anchored = Made<Anchored>(Pinhole());
+    const SensorModel angles = InverseDepthSensor<InverseDepth>(Pinhole());
+    const SensorModel anchored = InverseDepthSensor<Anchored>(Pinhole());
     const Blocks a = pose + LandmarkOn<InverseDepth>(ray), b = pose + LandmarkOn<Anchored>(ray);
     ExpectTrueJacobians(angles, a);
     ExpectTrueJacobians(anchored, b);
@@ -80,7 +79,7 @@ TEST(InverseDepthFeature, SeesNearThePoles) {
   const Blocks pose{{0, 0, 0}, {half, half, 0, 0}};
   const double phi = 1.5707963267948966 - 1e-6;
   const Blocks roles = pose + Blocks{{0, 0, 0, 0.7, phi, 0.2}};
-  const SensorModel sensor = Made<InverseDepth>(Pinhole());
+  const SensorModel sensor = InverseDepthSensor<InverseDepth>(Pinhole());
   ExpectTrueJacobians(sensor, roles);
   const std::vector<double> z = Predicted(sensor, roles);
   EXPECT_NEAR(z[0], 320.0 + 525.0 * 1e-6 * std::sin(0.7), 1e-9);
@@ -90,11 +89,11 @@ TEST(InverseDepthFeature, SeesNearThePoles) {
 TEST(InverseDepthFeature, InitialisesFromAPrior) {
   for (const Camera& camera : {Pinhole(), Lens()}) {
     ForEachRepresentation([&](auto representation) {
-      ExpectTrueInverse(Made<decltype(representation)>(camera),
+      ExpectTrueInverse(InverseDepthSensor<decltype(representation)>(camera),
                         Blocks{kPose[0], kPose[1], {411.0, 87.5}, {0.25}});
     });
   }
-  const SensorModel sensor = Made<InverseDepth>(Pinhole());
+  const SensorModel sensor = InverseDepthSensor<InverseDepth>(Pinhole());
   const double pixel[2] = {411.0, 87.5};
   double y[6];
   std::vector<const double*> roles{kPose[0].data(), kPose[1].data(), nullptr};
@@ -107,7 +106,7 @@ TEST(InverseDepthFeature, IsUndefinedBehindTheCamera) {
     const Blocks roles =
         Blocks{{0, 0, 3}, {1, 0, 0, 0}} + LandmarkAt<Representation>({0, 0, 0}, {0.1, 0.2, 2.0});
     double z[2] = {kPoison, kPoison};
-    EXPECT_EQ(Made<Representation>(Pinhole()).Predict(Pointers(roles).data(), z),
+    EXPECT_EQ(InverseDepthSensor<Representation>(Pinhole()).Predict(Pointers(roles).data(), z),
               Status::kOutOfDomain);
     EXPECT_EQ(z[0], kPoison);
     EXPECT_EQ(z[1], kPoison);
@@ -115,7 +114,7 @@ TEST(InverseDepthFeature, IsUndefinedBehindTheCamera) {
 }
 
 TEST(InverseDepthFeature, IsValidOnTheImage) {
-  const SensorModel sensor = Made<Xyz>(Pinhole());
+  const SensorModel sensor = InverseDepthSensor<Xyz>(Pinhole());
   const double on[2] = {639.4, -0.4}, beside[2] = {639.6, 10.0}, none[2] = {kNaN, 10.0};
   EXPECT_EQ(sensor.Valid(on), Status::kOk);
   EXPECT_EQ(sensor.Valid(beside), Status::kInvalid);
@@ -123,13 +122,13 @@ TEST(InverseDepthFeature, IsValidOnTheImage) {
 }
 
 TEST(InverseDepthFeature, DescribesItsLandmark) {
-  const SensorModel anchored = Made<Anchored>(Pinhole());
+  const SensorModel anchored = InverseDepthSensor<Anchored>(Pinhole());
   EXPECT_TRUE(anchored.has_landmark());
   EXPECT_EQ(anchored.initialised_role(), 2);
   EXPECT_EQ(anchored.initialised_count(), 3);
   EXPECT_EQ(anchored.prior_size(), 1);
   EXPECT_NE(anchored.roles()[2].flags & ALIDADE_ROLE_SHARED, 0u);
-  const SensorModel angles = Made<InverseDepth>(Pinhole());
+  const SensorModel angles = InverseDepthSensor<InverseDepth>(Pinhole());
   EXPECT_EQ(angles.initialised_count(), 1);
   EXPECT_FALSE(angles.roles()[1].landmark());
   EXPECT_EQ(angles.roles()[2].elements.back(), "rho");

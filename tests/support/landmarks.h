@@ -19,6 +19,9 @@ inline Camera Lens() {
 }
 inline Camera Pinhole() { return Camera(640, 480, 525, 525, 320, 240); }
 
+/// Position and orientation of a camera that is turned.
+inline const Blocks kPose{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}};
+
 /// f(Representation{}) of each representation.
 template <class F>
 void ForEachRepresentation(const F& f) {

@@ -10,7 +10,7 @@
 
 namespace alidade::testing {
 
-/// A folder of its own, which is gone with its owner: tests run beside each other.
+/// A folder of its own, which is gone with its owner: tests run next to each other.
 class TemporaryFolder {
  public:
   TemporaryFolder() {

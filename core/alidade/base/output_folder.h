@@ -11,7 +11,7 @@
 
 namespace alidade::internal {
 
-/// A folder that is there in full or not at all: it grows as `.NAME.partial-PID` beside its place,
+/// A folder that is there in full or not at all: it grows as `.NAME.partial-PID` next to its place,
 /// and takes its name in Commit(). It is locked meanwhile, so that nobody else writes to that name,
 /// and so that what a killed process left can be told from what a living one is writing. A marker
 /// file tells the hidden folders of this class from those of others, which it never touches.

@@ -2,9 +2,9 @@
 #include "alidade/base/similarity.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
+
+#include "alidade/base/decompositions.h"
 
 namespace alidade::internal {
 namespace {
@@ -18,15 +18,41 @@ bool DeterminesScale(double scale, double variance, double to_variance) {
          scale * std::sqrt(variance / to_variance) > kLeastCorrelation;
 }
 
+/// The symmetric N with q' N q = tr(R' C) for every unit quaternion q = (w, x, y, z) of R. Its
+/// largest eigenvalue is the greatest tr(R' C), the sum of the singular values of C, the last with
+/// the sign of det C; its vector is that R [Horn1987].
+Eigen::Matrix4d TurnsOf(const Eigen::Matrix3d& c) {
+  Eigen::Matrix4d n;
+  n(0, 0) = c(0, 0) + c(1, 1) + c(2, 2);
+  n(1, 0) = c(2, 1) - c(1, 2);
+  n(2, 0) = c(0, 2) - c(2, 0);
+  n(3, 0) = c(1, 0) - c(0, 1);
+  n(1, 1) = c(0, 0) - c(1, 1) - c(2, 2);
+  n(2, 1) = c(0, 1) + c(1, 0);
+  n(3, 1) = c(0, 2) + c(2, 0);
+  n(2, 2) = c(1, 1) - c(0, 0) - c(2, 2);
+  n(3, 2) = c(1, 2) + c(2, 1);
+  n(3, 3) = c(2, 2) - c(0, 0) - c(1, 1);
+  return n.selfadjointView<Eigen::Lower>();
+}
+
 }  // namespace
 
 Similarity Umeyama(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to, bool with_scale) {
-  const Eigen::Matrix4d matrix = Eigen::umeyama(from, to, with_scale);
+  const Eigen::Vector3d mean = from.rowwise().mean(), to_mean = to.rowwise().mean();
+  Eigen::Matrix3d c = Eigen::Matrix3d::Zero();
+  double squares = 0.0;
+  for (Eigen::Index i = 0; i < from.cols(); ++i) {
+    const Eigen::Vector3d p = from.col(i) - mean;
+    c += (to.col(i) - to_mean) * p.transpose();
+    squares += p.squaredNorm();
+  }
+  const SymmetricEigen turns = EigenOf(TurnsOf(c));
+  const Eigen::Vector4d q = turns.vectors.col(3);
   Similarity found;
-  const Eigen::Matrix3d linear = matrix.topLeftCorner<3, 3>();
-  if (with_scale) found.scale = std::cbrt(linear.determinant());
-  found.rotation = linear / found.scale;
-  found.translation = matrix.topRightCorner<3, 1>();
+  if (with_scale) found.scale = turns.values[3] / squares;
+  found.rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
+  found.translation = to_mean - found.scale * found.rotation * mean;
   return found;
 }
 
@@ -61,10 +87,7 @@ std::optional<Aligned> TrajectoryAlignment::Result() const {
   const double onto_variance = onto_squares_ / n - onto_mean.squaredNorm();
   if (count_ < 3 || !(variance > 0.0)) return std::nullopt;
   const Eigen::Matrix3d c = products_ / n - onto_mean * mean.transpose();
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(c, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::VectorXd d = svd.singularValues();
-  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0.0) d[2] = -d[2];
-  const double trace = d.sum();
+  const double trace = EigenvaluesOf(TurnsOf(c))[3];
   if (!DeterminesScale(trace / variance, variance, onto_variance)) return std::nullopt;
   const double square = onto_variance - trace * trace / variance;
   return Aligned{std::sqrt(std::max(0.0, square)), trace / variance};

@@ -42,8 +42,8 @@ std::optional<Aligned> AlignBySimilarity(const Eigen::Matrix3Xd& points,
 /// The similarity that brings a trajectory nearest to another [Umeyama1991], from sums alone, so
 /// that a long trajectory takes no memory. Points p, q of both, n of them, with means p0, q0:
 ///
-///   C = sum (q - q0) (p - p0)' / n = U D V',    S = diag(1, 1, det U det V)
-///   scale = tr(D S) / var p,    rmse^2 = var q - tr(D S)^2 / var p
+///   C = sum (q - q0) (p - p0)' / n,    t = max tr(R' C) over rotations R
+///   scale = t / var p,    rmse^2 = var q - t^2 / var p
 ///
 /// rmse is good to 1e-8 of the extent of the trajectory, as its square is a difference.
 class TrajectoryAlignment {

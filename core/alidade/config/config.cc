@@ -317,6 +317,12 @@ Config Config::Merged(const Node& overrides) const {
   return config;
 }
 
+Config Config::Copy() const {
+  Config config(*this);
+  config.tree_ = Clone(*tree_);
+  return config;
+}
+
 std::string Node::ToYaml() const { return internal::ToYaml(*tree_); }
 
 std::string Config::ToYaml() const { return internal::ToYaml(*tree_); }

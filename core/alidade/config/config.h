@@ -113,6 +113,8 @@ class Config {
   /// and a map that names another `model:` or `type:` replaces the old map whole. What is merged in
   /// keeps place and key path. Reads recorded in this config are not copied.
   Config Merged(const Node& overrides) const;
+  /// A config of its own, of which nothing has been read; a copied Config shares what was.
+  Config Copy() const;
 
   /// The tree as YAML, in the order written; reads back to the same tree.
   std::string ToYaml() const;

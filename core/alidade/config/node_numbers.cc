@@ -3,8 +3,8 @@
 #include <cmath>
 #include <limits>
 
+#include "alidade/base/decompositions.h"
 #include "alidade/base/number_text.h"
-#include "alidade/base/symmetric_eigen.h"
 #include "alidade/config/tree.h"
 
 namespace alidade {

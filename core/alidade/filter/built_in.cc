@@ -35,7 +35,7 @@ EstimatorMaker ReadUkf(const Node& entry) { return Maker<Ukf>(UkfOptions::FromNo
 
 Description DescribeEkf(const Node& entry) {
   const EkfOptions options = EkfOptions::FromNode(entry);
-  const bool latest = options.jacobian == JacobianAt::kLatest;
+  const bool latest = options.jacobian == JacobianPolicy::kLatest;
   return {options,
           {{"jacobian", latest ? "latest: H at the estimate"
                                : "first_estimate: H where stationary blocks started from"}}};

@@ -36,7 +36,7 @@ ControlInputs::ControlInputs(const System& system, const std::vector<StreamInfo>
     held.name = motion.name;
     held.binding = motion.input;
     held.geometry = motion.model.input().geometry;
-    held.max_age = TimeoutOf(motion.input.timeout_s);
+    held.timeout = TimeoutOf(motion.input.timeout_s);
     held.neutral.resize(static_cast<std::size_t>(held.geometry.ambient));
     held.geometry.Identity(held.neutral.data());
     held.value = held.neutral;
@@ -100,7 +100,7 @@ void ControlInputs::Take(const Frame& frame, UpdateReport& report) {
       std::ranges::copy(m.values, held.value.begin());
       held.geometry.Normalise(held.value.data());
       held.timestamp = frame.timestamp;
-      if (__builtin_add_overflow(frame.timestamp, held.max_age, &held.until)) held.until = kForever;
+      if (__builtin_add_overflow(frame.timestamp, held.timeout, &held.until)) held.until = kForever;
       held.refusal_noted = false;
       report.inputs.push_back(static_cast<int>(held.motion));
     }

@@ -12,13 +12,13 @@ namespace alidade {
 
 /// The control inputs of a system's motion models, held from one to the next (zero-order hold).
 ///
-///   u(t) = u_k   for t_k <= t < min(t_{k+1}, t_k + max_age)
+///   u(t) = u_k   for t_k <= t < min(t_{k+1}, t_k + timeout)
 ///   u(t) = 0     for any other t: the neutral element of the input's geometry
 ///
 ///   symbol    unit         meaning
 ///   u_k       the model's  an input that was taken
 ///   t_k       s            timestamp of its frame
-///   max_age   s            InputBinding::timeout_s
+///   timeout   s            InputBinding::timeout_s
 ///
 /// A copy is a snapshot.
 class ControlInputs {
@@ -49,7 +49,7 @@ class ControlInputs {
     InputBinding binding;
     Geometry geometry;
     int stream = -1;  ///< -1: the source has none of that name
-    Timestamp max_age = 0;
+    Timestamp timeout = 0;
     std::vector<double> value, neutral;
     Timestamp timestamp = kNoTimestamp;  ///< of the value
     Timestamp until = kNoTimestamp;      ///< when it stops acting

@@ -168,9 +168,10 @@ bool Ekf::StepEvenly(Timestamp end) {
   const bool overflow = __builtin_sub_overflow(end, timestamp_, &elapsed);
   const Timestamp count = overflow ? 0 : StepParts(elapsed, options_.max_dt_s);
   if (overflow || count > kMostParts) {
-    GiveUp("gap", "a gap of " + Rounded(Seconds(end) - Seconds(timestamp_)) +
-                      " s would need more than " + Rounded(static_cast<double>(kMostParts)) +
-                      " steps of " + Rounded(options_.max_dt_s) + " s");
+    GiveUp("too_many_substeps", "a gap of " + Rounded(Seconds(end) - Seconds(timestamp_)) +
+                                    " s would need more than " +
+                                    Rounded(static_cast<double>(kMostParts)) + " steps of " +
+                                    Rounded(options_.max_dt_s) + " s");
     return false;
   }
   if (count >= 2 * most_parts_) {

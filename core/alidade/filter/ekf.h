@@ -150,7 +150,8 @@ class Ekf : public Estimator {
   /// P <- p, of which the lower triangle counts.
   void SetCovariance(const Workspace::Matrix& p);
   /// Writes the gain of all rows (n x m by columns, its rows as they lie in P) down in their
-  /// reports, remembers the last one used, and ends the interval of held noise.
+  /// reports, remembers the last one used, and ends the interval of held noise. Null where no block
+  /// has a covariance.
   void RecordUpdate(std::span<Row* const> rows, const double* gain);
 
   /// The report, the sensor and the plan that belong to a row.

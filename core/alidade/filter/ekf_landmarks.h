@@ -12,7 +12,7 @@
 
 namespace alidade {
 
-/// What passes from frame to frame beside the blocks of the state.
+/// What passes from frame to frame besides the blocks of the state.
 struct LandmarkMap {
   struct Landmark {
     std::optional<LandmarkRepresentation> representation;

@@ -32,7 +32,7 @@ Workspace::Matrix Ekf::Transition() {
   return transition;
 }
 
-/// A matrix of the plans (n x n_w each) in the rows of the covariance, beside one another; with
+/// A matrix of the plans (n x n_w each) in the rows of the covariance, next to one another; with
 /// `held_only` the columns of continuous noise are zero.
 Workspace::Matrix Ekf::Spread(std::vector<double> MotionPlan::*matrix, bool held_only) {
   Workspace::Matrix input = work_.Take(state_.covariance().size(), NoiseSize());

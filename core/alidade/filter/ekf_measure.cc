@@ -212,7 +212,7 @@ void Ekf::Weigh(Row& row) {
   }
 }
 
-/// Warns once for each sensor whose noise vanishes beside H P H'.
+/// Warns once for each sensor whose noise vanishes compared with H P H'.
 void Ekf::CheckConditioning(const Row& row) {
   constexpr double kTiny = 1e-13;
   const auto sensor = static_cast<std::size_t>(row.sensor);
@@ -229,7 +229,7 @@ void Ekf::CheckConditioning(const Row& row) {
   if (!tiny) return;
   warned_[sensor] = true;
   Note("conditioning", "sensor '" + BindingOf(row).name + "': noise variance " +
-                           internal::RoundedText(noise, 3) + " vanishes beside H P H' = " +
+                           internal::RoundedText(noise, 3) + " vanishes compared with H P H' = " +
                            internal::RoundedText(total - noise, 3) + "; S is badly conditioned");
 }
 

@@ -24,7 +24,7 @@ enum class RejectionRecovery {
 };
 
 /// Where H is taken for the blocks of stationary motion models (`constant`) [Huang2010].
-enum class JacobianAt {
+enum class JacobianPolicy {
   kLatest,         ///< their estimate
   kFirstEstimate,  ///< what they started from: the prior's mean, or what a measurement implied
 };
@@ -34,7 +34,7 @@ struct EkfOptions {
   /// Probability with which a measurement that fits passes the gate; 1: no gate (`gate: none`).
   double gate = 1.0;
   Fuse fuse = Fuse::kJoint;
-  JacobianAt jacobian = JacobianAt::kLatest;
+  JacobianPolicy jacobian = JacobianPolicy::kLatest;
   RejectionRecovery rejection_recovery = RejectionRecovery::kReset;
   int rejection_recovery_after = 20;  ///< consecutive rejections of one sensor
   int max_covariance_repairs = 10;    ///< of one that is not positive definite; then it ends

@@ -31,7 +31,7 @@ void Ekf::Bind() {
       plan.linearised_at.push_back(plan.roles.back());
       plan.columns.push_back(-1);
       plan.ready = plan.ready && (role.block < 0 || present);
-      if (present && role.jacobian_at == RoleJacobianAt::kMeasurement) {
+      if (present && role.jacobian_at == JacobianAt::kMeasurement) {
         plan.implied.resize(static_cast<std::size_t>(layout[role.block].geometry().ambient));
         plan.linearised_at.back() = plan.implied.data();
       } else if (present && !first_.empty() && !FirstEstimate(role.block).empty()) {
@@ -67,7 +67,7 @@ void Ekf::Bind() {
 
 /// Under `first_estimate`: the values of stationary blocks that have none noted yet.
 void Ekf::KeepFirstEstimates() {
-  if (options_.jacobian != JacobianAt::kFirstEstimate) return;
+  if (options_.jacobian != JacobianPolicy::kFirstEstimate) return;
   first_.resize(system_.layout.blocks().size());
   for (const MotionBinding& motion : system_.motions) {
     if (!motion.model.stationary()) continue;

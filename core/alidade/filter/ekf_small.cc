@@ -13,12 +13,12 @@
 namespace alidade {
 namespace {
 
-void Fit(std::vector<double>& values, int size) {
+ALIDADE_INLINE void Fit(std::vector<double>& values, int size) {
   if (std::ssize(values) != size) values.resize(static_cast<std::size_t>(size));
 }
 
 /// Makes room in the report of an accepted measurement of m rows in a filter of n states.
-void Fit(MeasurementReport& entry, int m, int n) {
+[[gnu::noinline]] void Fit(MeasurementReport& entry, int m, int n) {
   Fit(entry.z, m);
   Fit(entry.h, m);
   Fit(entry.innovation, m);
@@ -94,7 +94,13 @@ ALIDADE_INLINE bool Ekf::Small::Step(double dt_s) {
   double* const x = ekf_.state_.values().data();
   const double* const next = ekf_.next_.data();
   for (const Motion& motion : motions_) {
-    for (int i = motion.offset; i < motion.offset + motion.size; ++i) x[i] = next[i];
+    const int i = motion.offset;
+    if (motion.size == 2) {
+      x[i] = next[i];
+      x[i + 1] = next[i + 1];
+    } else {
+      for (int k = i; k < i + motion.size; ++k) x[k] = next[k];
+    }
   }
   return true;
 }
@@ -111,7 +117,7 @@ ALIDADE_INLINE bool Ekf::Small::Linearise(Sensor& sensor, const double* z, Measu
   double h[kMost], l[kMost * kMost], r[kMost], noise[kMost], s[kMost * kMost];
   for (int i = 0; i < m; ++i) h[i] = kUnwritten;
   for (int i = 0; i < m * m; ++i) l[i] = kUnwritten;
-  for (const int i : sensor.written) sensor.h[static_cast<std::size_t>(i)] = kUnwritten;
+  for (int i = 0; i < m * N; ++i) sensor.h.data()[i] = sensor.blank.data()[i];
   const double* const* const roles = sensor.roles.data();
   if (sensor.model->Linearise(roles, h, sensor.jacobians.data(), sensor.strides.data()) !=
           Status::kOk ||
@@ -186,41 +192,39 @@ ALIDADE_INLINE bool Ekf::Small::Correct(const Rows<N>& rows, int count) {
   return true;
 }
 
-/// Reports a measurement and stacks it below the `at` rows before it, where it passes its gate.
-template <int N>
+/// Reports a measurement of M rows (0: known at run time only) and stacks it below the `at` rows
+/// before it, where it passes its gate.
+template <int N, int M>
 ALIDADE_INLINE Ekf::Small::Taken Ekf::Small::Take(Sensor& sensor, const Measurement& measurement,
                                                   Rows<N>& rows, int at) {
-  const int size = sensor.rows;
+  const int m = M > 0 ? M : sensor.rows;
   const double* const z = measurement.values.data();
-  if (std::ssize(measurement.values) != size || !measurement.covariance.empty() ||
-      Defect(z, size) != 0.0 || at + size > kRows) {
+  if (std::ssize(measurement.values) != m || !measurement.covariance.empty() ||
+      Defect(z, m) != 0.0 || at + m > kRows) {
     return Taken::kUnusual;
   }
   const Status valid = sensor.model->Valid(z);
   if (valid != Status::kOk && valid != Status::kInvalid) return Taken::kUnusual;
   MeasurementReport& entry = ekf_.report_.Add();
   if (valid == Status::kInvalid) {
-    entry.Reset(sensor.index, measurement.landmark, size);
-    entry.z.assign(z, z + size);
+    entry.Reset(sensor.index, measurement.landmark, m);
+    entry.z.assign(z, z + m);
     entry.outcome = Outcome::kInvalid;
     return Taken::kLeftOut;
   }
-  if (std::ssize(entry.gain) != size * N || std::ssize(entry.z) != size) Fit(entry, size, N);
+  if (std::ssize(entry.gain) != m * N || std::ssize(entry.z) != m) Fit(entry, m, N);
   entry.sensor = sensor.index;
   entry.landmark = measurement.landmark;
-  entry.dof = size;
+  entry.dof = m;
   entry.outcome = Outcome::kAccepted;
-  double* const pht = rows.pht + at * N;
-  const bool usual =
-      size == 1 ? Linearise<N, 1>(sensor, z, entry, pht) : Linearise<N, 0>(sensor, z, entry, pht);
-  if (!usual) return Taken::kUnusual;
+  if (!Linearise<N, M>(sensor, z, entry, rows.pht + at * N)) return Taken::kUnusual;
   if (!(entry.nis <= sensor.gate)) {
     if (*sensor.rejections + 1 >= ekf_.options_.rejection_recovery_after) return Taken::kUnusual;
     entry.outcome = Outcome::kGated;
     entry.gain.clear();
     return Taken::kLeftOut;
   }
-  size == 1 ? Stack<N, 1>(sensor, entry, rows, at) : Stack<N, 0>(sensor, entry, rows, at);
+  Stack<N, M>(sensor, entry, rows, at);
   return Taken::kStacked;
 }
 
@@ -239,7 +243,8 @@ ALIDADE_INLINE bool Ekf::Small::Update(const Frame& frame) {
       found = &one;
     }
     if (found == nullptr) continue;
-    const Taken taken = Take(sensor, *found, rows, m);
+    const Taken taken = sensor.rows == 1 ? Take<N, 1>(sensor, *found, rows, m)
+                                         : Take<N, 0>(sensor, *found, rows, m);
     if (taken == Taken::kUnusual) return false;
     if (taken == Taken::kLeftOut) continue;
     m += sensor.rows;
@@ -325,7 +330,8 @@ bool Ekf::Small::AddSensors() {
     sensor.strides = plan.strides;
     for (const JacobianPart& part : plan.parts) {
       for (int i = 0; i < geometry.tangent * part.size; ++i) {
-        sensor.written.push_back(i / part.size * plan.width + part.column + i % part.size);
+        const int at = i / part.size * plan.width + part.column + i % part.size;
+        sensor.blank[static_cast<std::size_t>(at)] = kUnwritten;
       }
     }
     for (const int column : plan.columns) {

@@ -34,8 +34,8 @@ class Ekf::Small {
     std::vector<const double*> roles;
     std::vector<double*> jacobians;  ///< into h
     std::vector<int> strides;
-    std::array<double, kMostOfOne * Covariance::kSmall> h{};  ///< H, its zeros included
-    std::vector<int> written;                                 ///< of h: by the model
+    std::array<double, kMostOfOne * Covariance::kSmall> h{};      ///< H, its zeros included
+    std::array<double, kMostOfOne * Covariance::kSmall> blank{};  ///< h before the model writes it
     int index, stream, rows;
     int* rejections;
     double gate;
@@ -60,7 +60,7 @@ class Ekf::Small {
   bool Step(double dt_s);
   template <int N, int K, int W>
   bool StepModel(const Motion& motion, double dt_s, double (&p)[N][N]);
-  template <int N>
+  template <int N, int M>
   Taken Take(Sensor& sensor, const Measurement& measurement, Rows<N>& rows, int at);
   template <int N>
   bool Update(const Frame& frame);

@@ -123,6 +123,10 @@ Outcome Ekf::ApplyLarge(std::span<Row* const> rows) {
     at += k;
   }
   if (!internal::Factorise(s)) return Outcome::kNotPd;
+  if (pht.rows() == 0) {  // nothing to correct, and Eigen solves for one column at least
+    RecordUpdate(rows, nullptr);
+    return Outcome::kAccepted;
+  }
   const auto l = s.triangularView<Eigen::Lower>();
   const auto l_transposed = s.transpose().triangularView<Eigen::Upper>();
   const Eigen::MatrixXd w = l.solve(pht.transpose()).transpose();

@@ -24,7 +24,7 @@ EkfOptions ReadRecovering(Params& p) {
 
 EkfOptions ReadEkf(Params& p) {
   EkfOptions options = ReadRecovering(p);
-  options.jacobian = static_cast<JacobianAt>(p.Choice(
+  options.jacobian = static_cast<JacobianPolicy>(p.Choice(
       "jacobian", {"latest", "first_estimate"}, "where H is taken for blocks of stationary models",
       static_cast<int>(options.jacobian)));
   return options;

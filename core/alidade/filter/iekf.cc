@@ -22,7 +22,7 @@ Iekf::Iekf(System system, const IekfOptions& options, const std::vector<StreamIn
     : Ekf(std::move(system), options, streams, Steps::kOverridden),
       max_iterations_(options.max_iterations),
       tolerance_(options.tolerance) {
-  ALIDADE_EXPECTS(options.jacobian == JacobianAt::kLatest);
+  ALIDADE_EXPECTS(options.jacobian == JacobianPolicy::kLatest);
   ALIDADE_EXPECTS(max_iterations_ > 1 && tolerance_ > 0.0);
   ALIDADE_EXPECTS(!FindUnsupported(system_, kSupport));
 }

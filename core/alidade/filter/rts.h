@@ -19,7 +19,7 @@ namespace alidade {
 ///   update     lambda <- A' lambda + H' S^-1 r,   Lambda <- A' Lambda A + H' S^-1 H,
 ///              A = I - K H
 ///
-/// Discrete noise w, held over an interval, goes back beside x. At frames inside an interval lambda
+/// Discrete noise w, held over an interval, is smoothed with x. At frames inside an interval lambda
 /// and Lambda are those of (x, w), with [P M] for P, M = Cov(x, w), and [F G Lq; 0 I] for F. Where
 /// the interval starts, what they have of w is dropped.
 ///

@@ -27,7 +27,7 @@ std::optional<Unsupported> OfRole(const RoleBinding& role, const Support& suppor
   }
   if (role.mode == RoleMode::kKnown && !support.known)
     return Unsupported{"known roles", "estimate"};
-  if (role.jacobian_at == RoleJacobianAt::kMeasurement && !support.at_measurement) {
+  if (role.jacobian_at == JacobianAt::kMeasurement && !support.at_measurement) {
     return Unsupported{"jacobian_at: measurement", "prediction"};
   }
   return std::nullopt;

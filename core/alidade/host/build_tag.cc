@@ -5,7 +5,7 @@
 #include <fstream>
 #include <vector>
 
-#include "alidade/host/build_plugin.h"
+#include "alidade/host/cpp_plugin.h"
 #include "alidade/host/plugin_file.h"
 #include "alidade/host/plugin_host.h"
 

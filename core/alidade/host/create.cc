@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "alidade/host/abi_read.h"
-#include "alidade/host/build_plugin.h"
+#include "alidade/host/cpp_plugin.h"
 #include "alidade/host/param_reader.h"
 #include "alidade/host/plugin_file.h"
 #include "alidade/host/plugin_host.h"
@@ -60,7 +60,7 @@ std::string Line(const std::string& what, const Space& space) {
   return line;
 }
 
-/// What the model says of itself beside its blocks.
+/// What the model says of itself besides its blocks.
 std::vector<std::string> Capabilities(const ModelInstance& model) {
   const auto can = [&](unsigned what) { return (model.capabilities() & what) != 0; };
   std::vector<std::string> lines = {
@@ -86,7 +86,7 @@ std::vector<std::string> Capabilities(const ModelInstance& model) {
 
 /// What `create` of a C++ plugin makes of its parameters, checked.
 template <class Create>
-auto CreateBuilt(const PluginEntry& entry, const Node& node, std::mutex& mutex,
+auto CreateBuilt(const PluginEntry& entry, const Node& node, std::recursive_mutex& mutex,
                  const Create& create) {
   ParamReader reader(node, Named(entry.kind, entry.name));
   Params params(&reader.host());
@@ -136,7 +136,7 @@ AlidadeEntry PluginHost::EntryOf(const PluginEntry& entry) const {
 }
 
 const SourceEntry& PluginHost::SourceOf(const PluginEntry& entry) const {
-  const BuildTable& table = *LoadedFrom(entry.plugin).build_table;
+  const CppPluginTable& table = *LoadedFrom(entry.plugin).cpp_table;
   for (int i = 0; i < table.source_count; ++i) {
     if (entry.name == table.sources[i].name) return table.sources[i];
   }
@@ -144,7 +144,7 @@ const SourceEntry& PluginHost::SourceOf(const PluginEntry& entry) const {
 }
 
 const EstimatorEntry& PluginHost::EstimatorOf(const PluginEntry& entry) const {
-  const BuildTable& table = *LoadedFrom(entry.plugin).build_table;
+  const CppPluginTable& table = *LoadedFrom(entry.plugin).cpp_table;
   for (int i = 0; i < table.estimator_count; ++i) {
     if (entry.name == table.estimators[i].name) return table.estimators[i];
   }
@@ -180,13 +180,14 @@ MotionModel PluginHost::CreateMotion(const std::string& name, const Node& entry)
   return MotionModel(Create(Find(PluginEntry::Kind::kMotion, name, entry), entry));
 }
 
-std::unique_ptr<Source> PluginHost::CreateSource(const std::string& name, const Node& node,
-                                                 std::uint64_t seed,
-                                                 const std::filesystem::path& folder,
+std::unique_ptr<Source> PluginHost::CreateSource(const Config& config, std::uint64_t seed,
                                                  bool any_order) const {
-  const PluginEntry& entry = Find(PluginEntry::Kind::kSource, name, node);
+  const Node node = config.root().At("source", "a run: where measurements come from");
+  const PluginEntry& entry =
+      Find(PluginEntry::Kind::kSource, node.At("type", "a source").Text(), node);
   return CreateBuilt(entry, node, create_mutex_, [&](Params& params) {
-    return SourceOf(entry).create(SourceArguments{node, params, seed, folder, any_order});
+    return SourceOf(entry).create(
+        SourceArguments{node, params, seed, config.folder(), any_order, &config, this});
   });
 }
 

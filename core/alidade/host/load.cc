@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "alidade/base/child_process.h"
-#include "alidade/host/build_plugin.h"
+#include "alidade/host/cpp_plugin.h"
 #include "alidade/host/plugin_file.h"
 #include "alidade/host/process_settings.h"
 
@@ -35,7 +35,7 @@ std::string Try(const std::filesystem::path& file, std::uint32_t kind) {
   if (library == nullptr) return "cannot be loaded: " + DlError();
   const std::string change = Surroundings().ChangeSince(before);
   if (!change.empty()) return change + " while loading";
-  if (kind == ALIDADE_PLUGIN_CPP) return WalkTable<BuildTable>(library, kBuildEntrySymbol);
+  if (kind == ALIDADE_PLUGIN_CPP) return WalkTable<CppPluginTable>(library, kCppEntrySymbol);
   const std::string defect = WalkTable<AlidadeTable>(library, ALIDADE_ENTRY_SYMBOL);
   // The destructors of its statics run when the host ends; a crash is better found here.
   dlclose(library);
@@ -78,8 +78,8 @@ OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem
   try {
     const boost::dll::shared_library& library = OpenForGood(canonical);
     if (build_tag.kind == ALIDADE_PLUGIN_CPP) {
-      plugin.build_table = library.get<const BuildTable*()>(kBuildEntrySymbol)();
-      defect = Defect(plugin.build_table);
+      plugin.cpp_table = library.get<const CppPluginTable*()>(kCppEntrySymbol)();
+      defect = Defect(plugin.cpp_table);
     } else {
       plugin.table = library.get<const AlidadeTable*()>(ALIDADE_ENTRY_SYMBOL)();
       defect = Defect(plugin.table);
@@ -110,8 +110,8 @@ PluginOnDemand OpenOnDemand(const std::string& name, const std::filesystem::path
   if (files.size() > 1)
     Refuse(searched, "holds " + std::to_string(files.size()) + " plugins; expected one");
   const OpenedPlugin opened = OpenPlugin(files.front(), files.front());
-  if (opened.build_table == nullptr) Refuse(files.front(), "holds models alone");
-  return {files.front(), opened.build_table};
+  if (opened.cpp_table == nullptr) Refuse(files.front(), "holds models alone");
+  return {files.front(), opened.cpp_table};
 }
 
 }  // namespace alidade::internal

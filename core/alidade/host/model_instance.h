@@ -68,7 +68,7 @@ class SensorModel {
   int initialised_role() const { return initialised_role_; }
   /// How many roles from there on Initialise computes: those of a landmark together, else one.
   int initialised_count() const { return initialised_count_; }
-  /// Numbers that Initialise needs beside the measurement.
+  /// Numbers that Initialise needs besides the measurement.
   int prior_size() const { return prior_size_; }
   /// Whether its roles are filled by the landmark that a measurement names.
   bool has_landmark() const;

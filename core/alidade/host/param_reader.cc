@@ -295,7 +295,7 @@ void ParamReader::ExpectCalibrated(const AlidadeParam& param, const Node& node,
   if (std::ranges::equal(values, told, same)) return;
   node.Fail(ValuesText(param, values) + " differs from the calibration of the data, " +
                 ValuesText(param, told) + " in " + data->place().file,
-            "the same value, no such key (the data tell it), or 'source.calibration: ignore'");
+            "the same value, no such key (the data determine it), or 'source.calibration: ignore'");
 }
 
 std::vector<double> ParamReader::Absent(const AlidadeParam& param, const Node& map,

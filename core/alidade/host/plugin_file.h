@@ -10,16 +10,16 @@
 /// What PluginHost asks of a plugin file before and while opening it.
 namespace alidade {
 
-struct BuildTable;
+struct CppPluginTable;
 
 namespace internal {
 
 /// A plugin that is open for the rest of the process.
 struct OpenedPlugin {
-  std::filesystem::path file;     ///< canonical
-  const AlidadeTable* table;      ///< of a C-ABI plugin, else null
-  const BuildTable* build_table;  ///< of a C++ plugin, else null
-  bool unoptimised;               ///< by its build tag
+  std::filesystem::path file;       ///< canonical
+  const AlidadeTable* table;        ///< of a C-ABI plugin, else null
+  const CppPluginTable* cpp_table;  ///< of a C++ plugin, else null
+  bool unoptimised;                 ///< by its build tag
 };
 
 /// The build id that a C++ plugin must have: that of this library.
@@ -29,7 +29,7 @@ const char* HostBuildId();
   throw Error(ExitCode::kPlugin, ErrorLine({file.string()}, {}, why));
 }
 
-/// Where the plugins of this very build lie: `lib/alidade` beside this library, of the build tree
+/// Where the plugins of this very build lie: `lib/alidade` next to this library, of the build tree
 /// or of the installation; "" where that cannot be told.
 std::filesystem::path FolderOfProgram();
 
@@ -44,18 +44,18 @@ OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem
 /// A C++ plugin that is loaded only when it is needed.
 struct PluginOnDemand {
   std::filesystem::path file;
-  const BuildTable* table;
+  const CppPluginTable* table;
 };
 
-/// Opens the only plugin in `folder`, or if that is "" in `lib/alidade/NAME` beside this library.
+/// Opens the only plugin in `folder`, or if that is "" in `lib/alidade/NAME` next to this library.
 /// Errors: kPlugin if there is none, made of `missing` and where it was searched, or more than one,
 /// or one of models; those of OpenPlugin.
 PluginOnDemand OpenOnDemand(const std::string& name, const std::filesystem::path& folder,
                             const std::string& missing);
 
-/// What breaks the rules of plugin_abi.h or build_plugin.h in a table, or "".
+/// What breaks the rules of plugin_abi.h or cpp_plugin.h in a table, or "".
 std::string Defect(const AlidadeTable* table);
-std::string Defect(const BuildTable* table);
+std::string Defect(const CppPluginTable* table);
 
 /// `sensor`, `motion model`, `source`, `estimator`.
 const char* KindName(PluginEntry::Kind kind);

@@ -11,7 +11,7 @@
 
 #include "alidade/base/log.h"
 #include "alidade/host/abi_read.h"
-#include "alidade/host/build_plugin.h"
+#include "alidade/host/cpp_plugin.h"
 #include "alidade/host/plugin_file.h"
 
 namespace alidade {
@@ -23,7 +23,7 @@ using internal::Refuse;
 using internal::Text;
 
 static_assert(std::string_view(ALIDADE_BUILD_VERSION) == ALIDADE_VERSION,
-              "build_plugin.h states another version than the project");
+              "cpp_plugin.h states another version than the project");
 
 std::vector<fs::path> FoldersOf(const char* variable) {
   std::vector<fs::path> folders;
@@ -67,7 +67,7 @@ PluginHost::PluginHost(const std::vector<fs::path>& files_and_folders, OnRefusal
   }
   if (const auto folder = UserFolder()) LoadPlace(*folder, "user data folder", false);
   const fs::path own = internal::FolderOfProgram();
-  if (!own.empty()) LoadPlace(own / "plugins", "beside the program", false);
+  if (!own.empty()) LoadPlace(own / "plugins", "next to the program", false);
 }
 
 PluginHost::~PluginHost() = default;
@@ -144,14 +144,14 @@ void PluginHost::Load(const fs::path& file) {
 }
 
 void PluginHost::AddEntries(const Loaded& plugin) {
-  if (plugin.build_table != nullptr) {
-    for (int i = 0; i < plugin.build_table->source_count; ++i) {
-      const SourceEntry& source = plugin.build_table->sources[i];
+  if (plugin.cpp_table != nullptr) {
+    for (int i = 0; i < plugin.cpp_table->source_count; ++i) {
+      const SourceEntry& source = plugin.cpp_table->sources[i];
       entries_.push_back({PluginEntry::Kind::kSource, source.name, Text(source.doc), "", "",
                           plugin.file, 0, false, plugin.unoptimised});
     }
-    for (int i = 0; i < plugin.build_table->estimator_count; ++i) {
-      const EstimatorEntry& one = plugin.build_table->estimators[i];
+    for (int i = 0; i < plugin.cpp_table->estimator_count; ++i) {
+      const EstimatorEntry& one = plugin.cpp_table->estimators[i];
       entries_.push_back({PluginEntry::Kind::kEstimator, one.name, Text(one.doc),
                           Text(one.citation), "", plugin.file, 0, one.landmarks, plugin.unoptimised,
                           one.kind});
@@ -215,7 +215,7 @@ const PluginHost::Loaded& PluginHost::LoadedFrom(const fs::path& file) const {
 }
 
 const char* ToString(EstimatorKind kind) {
-  constexpr const char* kNames[] = {"filter", "smoother", "batch", "window"};
+  constexpr const char* kNames[] = {"filter", "smoother", "batch", "sliding_window"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 

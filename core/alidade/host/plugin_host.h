@@ -17,7 +17,7 @@ namespace alidade {
 
 class Estimator;        // in alidade/filter/estimator.h
 struct System;          // in alidade/system/system.h
-struct SourceEntry;     // in alidade/host/build_plugin.h
+struct SourceEntry;     // in alidade/host/cpp_plugin.h
 struct EstimatorEntry;  // likewise
 
 /// Makes an estimator, its options read, once its system is known; `streams` are the source's.
@@ -39,10 +39,10 @@ struct ParamInfo {
 enum class EstimatorKind {
   kFilter,    ///< takes each measurement once, as it comes
   kSmoother,  ///< a filter, and then all later measurements, about its linearisation
-  kBatch,   ///< solves for all states anew, by all measurements or (`mode: filtering`) those so far
-  kWindow,  ///< solves for the last states anew
+  kBatch,  ///< solves for all states anew, by all measurements or (`mode: filtering`) those so far
+  kSlidingWindow,  ///< solves for the last states anew
 };
-/// `filter`, `smoother`, `batch`, `window`.
+/// `filter`, `smoother`, `batch`, `sliding_window`.
 const char* ToString(EstimatorKind kind);
 
 /// A model, source or estimator that a loaded plugin offers.
@@ -89,9 +89,8 @@ class PluginHost {
   /// The model `entry` of entries(), also where another plugin offers its name.
   std::shared_ptr<const ModelInstance> Create(const PluginEntry& entry, const Node& node,
                                               const std::string& representation = {}) const;
-  /// `any_order` as in SourceArguments.
-  std::unique_ptr<Source> CreateSource(const std::string& name, const Node& entry,
-                                       std::uint64_t seed, const std::filesystem::path& folder,
+  /// The source of a config, of its map `source`; `any_order` as in SourceArguments.
+  std::unique_ptr<Source> CreateSource(const Config& config, std::uint64_t seed,
                                        bool any_order = false) const;
   /// The maker of an estimator whose options are in `entry`; its errors are the same.
   EstimatorMaker CreateEstimator(const std::string& name, const Node& entry) const;
@@ -126,7 +125,7 @@ class PluginHost {
   std::vector<PluginEntry> entries_;
   std::vector<std::string> searched_;
   std::vector<Refusal> refusals_;
-  mutable std::mutex create_mutex_;
+  mutable std::recursive_mutex create_mutex_;  ///< a source may create models
 };
 
 /// The remedy for a plugin that was built without optimisation.

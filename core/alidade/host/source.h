@@ -66,6 +66,8 @@ class Source {
   virtual Place place() const { return {}; }
 };
 
+class PluginHost;  // in alidade/host/plugin_host.h
+
 /// What a source is made from.
 struct SourceArguments {
   Node entry;      ///< the config's `source` map
@@ -73,6 +75,10 @@ struct SourceArguments {
   std::uint64_t seed;
   std::filesystem::path folder;  ///< relative paths are taken from here
   bool any_order = false;        ///< times may go back or repeat: the run deals with it
+  /// All of the config and the plugins that make its models, for a source that draws from them;
+  /// null where only the keys are asked for.
+  const Config* config = nullptr;
+  const PluginHost* host = nullptr;
 };
 
 }  // namespace alidade

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "alidade/host/abi_read.h"
-#include "alidade/host/build_plugin.h"
+#include "alidade/host/cpp_plugin.h"
 #include "alidade/host/plugin_file.h"
 
 namespace alidade::internal {
@@ -84,9 +84,9 @@ std::string Defect(const AlidadeTable* from) {
   return {};
 }
 
-std::string Defect(const BuildTable* table) {
+std::string Defect(const CppPluginTable* table) {
   if (table == nullptr) return "its table is null";
-  if (table->struct_size != sizeof(BuildTable)) {
+  if (table->struct_size != sizeof(CppPluginTable)) {
     return "its table states a size of " + Number(table->struct_size) + " bytes";
   }
   const int sources = table->sources == nullptr ? 0 : table->source_count;

@@ -30,7 +30,9 @@ class TrustCheck {
       CheckOwner(entry, Status(entry));
     };
     const fs::path end = internal::FollowLinks(file_, visit);
-    if (end.empty()) Fail(file_, "behind too many symbolic links, more than 40");
+    if (end.empty()) {
+      Fail(file_, "behind a symbolic link that cannot be read, or more than 40 of them");
+    }
     CheckMode(end, Status(end), false);
   }
 

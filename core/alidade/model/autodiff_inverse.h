@@ -3,7 +3,7 @@
 
 #include "alidade/model/autodiff.h"
 
-/// Inverse observations with their Jacobians, as autodiff.h has models.
+/// Inverse measurement models with their Jacobians, as autodiff.h has models.
 namespace alidade {
 namespace detail {
 

@@ -153,7 +153,7 @@ typedef struct AlidadeDescription {
   int32_t noise_count;          /* motion: n_w */
   int32_t initialise_role;      /* the role that `initialise` computes, where it can */
   const uint8_t* step_sparsity; /* motion: n x n, 1 where F may be non-zero; null: dense */
-  int32_t prior_count;          /* numbers that `initialise` needs beside the measurement */
+  int32_t prior_count;          /* numbers that `initialise` needs besides the measurement */
   int32_t reserved0;
   void* reserved[3];
 } AlidadeDescription;
@@ -170,7 +170,7 @@ typedef struct AlidadeSensor {
   /* ALIDADE_OK or ALIDADE_INVALID; null: every measurement is valid. */
   int32_t (*valid)(const void* self, const double* z);
   /* Inverse measurement model: y, the value of role `initialise_role`, from the other roles, z and
-   * a prior of the part that z does not tell (null where it tells all). Where that role is a
+   * a prior of the part that z does not determine (null if it determines all). Where that role is a
    * landmark's, y are the values of it and of the landmark roles that follow it, one after the
    * other. Jacobians jx[i] of y by the other roles, jz by z, jp by the prior; each may be null. */
   int32_t (*initialise)(const void* self, const double* const* roles, const double* z,
@@ -204,7 +204,7 @@ typedef struct AlidadeLandmarkRepresentation {
                         const double* prior, double* const* blocks, double* const* jx,
                         const int32_t* jx_strides, double* jz, int32_t jz_stride, double* jp,
                         int32_t jp_stride);
-  /* The point in another form, with its Jacobian. */
+  /* The point in another representation, with its Jacobian. */
   int32_t (*convert)(const void* self, const double* const* blocks, const char* to,
                      double* const* target, double* j, int32_t j_stride);
   /* Index of linearity of the depth [Civera2008]; small is linear. */
@@ -222,7 +222,7 @@ typedef struct AlidadeInstance {
   const AlidadeDescription* description;       /* lives as long as self */
   const AlidadeSensor* sensor;                 /* the one that fits `kind`, others null */
   const AlidadeMotion* motion;
-  const AlidadeLandmarkRepresentation* form;
+  const AlidadeLandmarkRepresentation* representation;
   void* reserved[4];
 } AlidadeInstance;
 

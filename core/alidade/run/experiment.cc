@@ -213,8 +213,7 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   }
   experiment.out_of_sequence = ReadOutOfSequence(config.root());
   experiment.source = host.CreateSource(
-      source.At("type", "a source").Text(), source, experiment.seed, config.folder(),
-      experiment.out_of_sequence.policy != OutOfSequence::kReject);
+      config, experiment.seed, experiment.out_of_sequence.policy != OutOfSequence::kReject);
   const Config calibrated = internal::WithCalibration(config, *experiment.source);
   source.RejectUnread();
   const Node root = calibrated.root();

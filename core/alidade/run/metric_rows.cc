@@ -113,8 +113,8 @@ bool IsError(std::string_view kind) {
 
 /// Errors and differences of paths and maps, in m.
 bool IsLength(std::string_view kind) {
-  return kind == "map.rmse" || kind == "map.sim3.rmse" || kind == "rmsd.map" ||
-         kind == "rmsd.map.sim3" || kind == "rmsd.trajectory.sim3" ||
+  return kind == "map.rmse" || kind == "map.sim3.rmse" || kind == "map.rmsd" ||
+         kind == "map.sim3.rmsd" || kind == "trajectory.sim3.rmsd" ||
          kind == "trajectory.sim3.rmse";
 }
 

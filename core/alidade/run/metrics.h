@@ -40,9 +40,9 @@ namespace alidade {
 ///
 /// C = P + T is the covariance of e, T = diag(StreamInfo::sigma^2) that of the truth, which knows
 /// nothing of the filter; sigma^2 is its diagonal. An exact truth has T = 0.
-/// Over a segment the key ends in `@SEGMENT` (not lag_ms, final_error and the last two). Counts are
-/// `OUTCOME:SENSOR`, of control inputs `inputs:ENTRY`, and of landmarks `landmarks.initialised`,
-/// `.deleted`, `.converted` and `.negative`. A
+/// Over a segment the key ends in `@SEGMENT`: rmse, coverage95, nees.mean, nees.within95 and
+/// nis.mean. Counts are `OUTCOME:SENSOR`, of control inputs `inputs:ENTRY`, and of landmarks
+/// `landmarks.initialised`, `.deleted`, `.converted`, `.negative`, `.hypotheses`, `.rescued`. A
 /// truth is named like the block, `target.depth`, or like its last component where that is unique.
 /// A frame older than the state, as before `initial_time_s`, adds to the counts alone.
 /// A metric without a timestamp to take it from is left out; an estimate that is not finite makes
@@ -55,14 +55,14 @@ class Metrics {
   ~Metrics();
   Metrics(Metrics&&) noexcept;
 
-  /// Takes the state after `frame`; `in_segment[i]` tells whether the frame lies in segment i.
+  /// Takes the state after `frame`; `in_segment[i]` says whether the frame lies in segment i.
   void Add(const Frame& frame, const std::vector<bool>& in_segment, const State& state,
            const UpdateReport& report);
   /// The part of Add that needs no truth: counts and NIS.
   void AddReport(const std::vector<bool>& in_segment, const UpdateReport& report);
   /// The errors of an estimate, its values by block of the estimator's system and empty where there
   /// is none, where `frame.truth` is an estimate itself: rmse, lag_ms and final_error alone. How
-  /// far the two may be apart P does not tell, as they share their data.
+  /// far the two may be apart P does not say, as they share their data.
   void AddDifference(const Frame& frame, const std::vector<bool>& in_segment,
                      const std::vector<std::vector<double>>& estimate);
   /// `inconsistent`, once for each block element: truth is known and the error has been beyond 10

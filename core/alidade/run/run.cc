@@ -310,8 +310,10 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
     } catch (...) {
       // What was done so far is kept.
       Failure failure = CaughtFailure();
+      const bool stopped = failure.code == ExitCode::kStopped;
+      if (stopped && result.status != RunStatus::kOk) return;  // a failure stays one
       Fail(result, failure.code, std::move(failure.reason));
-      if (failure.code == ExitCode::kStopped) result.status = RunStatus::kStopped;
+      if (stopped) result.status = RunStatus::kStopped;
     }
   };
   guarded([&] {

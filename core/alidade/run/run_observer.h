@@ -3,7 +3,7 @@
 
 namespace alidade {
 
-struct Experiment;   // in alidade/run/run.h
+struct Experiment;   // in alidade/run/experiment.h
 struct Frame;        // in alidade/host/source.h
 class UpdateReport;  // in alidade/filter/estimator.h
 class State;         // in alidade/state/state.h

@@ -51,7 +51,7 @@ EstimatorResult Begin(const NamedEstimator& named) {
   }
   for (const auto& direction : result.unobservable) {
     result.events.push_back({kNoTimestamp, "unobservable",
-                             "no sensor of this estimator tells " + Join(direction, " and ") +
+                             "no sensor of this estimator determines " + Join(direction, " and ") +
                                  (direction.size() > 1 ? " apart" : "")});
   }
   return result;

@@ -162,12 +162,6 @@ void State::Drop(BlockId id) {
   layout_.dropped_.push_back(id);
 }
 
-void State::Consider(BlockId id, bool consider) {
-  Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
-  ALIDADE_EXPECTS(block.status != BlockStatus::kConstant);
-  block.status = consider ? BlockStatus::kConsider : BlockStatus::kEstimated;
-}
-
 void State::Reparametrise(BlockId id, Space space, const double* value,
                           const Eigen::MatrixXd& jacobian) {
   const Block old = layout_[id];

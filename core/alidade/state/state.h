@@ -93,8 +93,6 @@ class State {
   void Marginalise(BlockId id);
   /// Marginalise, and gives the id back too: a block declared later may have it.
   void Drop(BlockId id);
-  /// Estimated <-> consider state; the correlations stay.
-  void Consider(BlockId id, bool consider);
   /// Replaces the block by y = g(x_id) of another geometry, J = dy/dx in the tangents.
   void Reparametrise(BlockId id, Space space, const double* value, const Eigen::MatrixXd& jacobian);
   /// moved = the values x_i (+) dx_i of all blocks with a covariance, the rest as it is; dx is

@@ -26,8 +26,8 @@ struct KnownLandmark {
 
 /// How landmarks are initialised, converted and pruned.
 struct LandmarkOptions {
-  /// What one observation does not tell: the inverse distance, 1/m, and its standard deviation.
-  /// Neither has a default: they depend on the scene.
+  /// What one observation does not determine: the inverse distance, 1/m, and its standard
+  /// deviation. Neither has a default: they depend on the scene.
   struct Prior {
     double inverse_distance = std::numeric_limits<double>::quiet_NaN();
     double sigma = std::numeric_limits<double>::quiet_NaN();

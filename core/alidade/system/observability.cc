@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/system/observability.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/base/decompositions.h"
 #include "alidade/base/random.h"
 #include "alidade/model/geometry.h"
 #include "alidade/system/landmark_representation.h"
@@ -163,11 +163,7 @@ class RowSpace {
     if (outside > kRankTolerance) q_.col(rank_++) = row / outside;
   }
   /// Orthonormal columns which the rows do not see: n x (n - rank).
-  Eigen::MatrixXd Complement() const {
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(q_.leftCols(rank_));
-    const Eigen::MatrixXd q = qr.householderQ();
-    return q.rightCols(q_.rows() - rank_);
-  }
+  Eigen::MatrixXd Complement() const { return internal::ComplementOf(q_.leftCols(rank_)); }
 
  private:
   Eigen::MatrixXd q_;
@@ -239,11 +235,9 @@ bool TakeScale(const internal::WithLandmarks& with, const Trajectory& start,
     }
   }
   const Eigen::MatrixXd moved = basis.bottomRows(offsets.size());  // their columns come last
-  const Eigen::VectorXd scale = moved.colPivHouseholderQr().solve(offsets);
+  const Eigen::VectorXd scale = internal::SolveByPivoting(moved, offsets);
   if (!((moved * scale - offsets).norm() < kTolerance * offsets.norm())) return false;
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(scale);
-  const Eigen::MatrixXd q = qr.householderQ();
-  basis = (basis * q.rightCols(basis.cols() - 1)).eval();
+  basis = (basis * internal::ComplementOf(scale)).eval();
   return true;
 }
 

@@ -60,7 +60,7 @@ void CheckOptions(const Node& node, const LandmarkOptions& options, const Sensor
   const auto representation = RepresentationOf(sensor.model.roles());
   const std::string model = "model '" + sensor.model.name() + "' of sensor '" + sensor.name + "'";
   if (sensor.model.prior_size() > 0 && !options.prior) {
-    node.Fail("no prior: " + model + " does not tell the distance of a landmark",
+    node.Fail("no prior: " + model + " does not determine the distance of a landmark",
               "prior: {inverse_distance: ..., sigma: ...}");
   }
   if (options.prior) {
@@ -125,7 +125,7 @@ std::optional<LandmarkOptions> internal::ReadLandmarks(const Node& root,
         can_begin || (role >= 0 && sensor.model.roles()[static_cast<std::size_t>(role)].landmark());
   }
   if (!can_begin) {
-    node.Fail("no sensor tells where a landmark is when it is first seen", "known landmarks");
+    node.Fail("no sensor determines where a landmark is when it is first seen", "known landmarks");
   }
   node.RejectUnread();
   return options;

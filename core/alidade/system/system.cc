@@ -125,8 +125,8 @@ InputBinding ReadInput(const Node& entry, const MotionModel& model) {
   const Node input = entry.At("input", needed_by);
   if (!input.is_map()) input.Fail("not a map", "{stream: NAME}, or {stream: NAME, timeout_s: S}");
   binding.stream = input.At("stream", needed_by).Text();
-  if (const auto max_age = input.Find("timeout_s")) {
-    binding.timeout_s = max_age->Number(0.0, kMostSeconds, true);
+  if (const auto timeout = input.Find("timeout_s")) {
+    binding.timeout_s = timeout->Number(0.0, kMostSeconds, true);
   }
   input.RejectUnread();
   return binding;
@@ -191,9 +191,9 @@ RoleBinding ReadRole(const Node& node, const Space& role, const SensorModel& mod
       binding.mode = static_cast<RoleMode>(mode->Choice({"estimate", "consider", "known"}));
     }
     if (const auto at = node.Find("jacobian_at")) {
-      binding.jacobian_at = static_cast<RoleJacobianAt>(at->Choice({"prediction", "measurement"}));
+      binding.jacobian_at = static_cast<JacobianAt>(at->Choice({"prediction", "measurement"}));
       const int initialised = model.initialised_role();
-      if (binding.jacobian_at == RoleJacobianAt::kMeasurement &&
+      if (binding.jacobian_at == JacobianAt::kMeasurement &&
           (initialised < 0 ||
            model.roles()[static_cast<std::size_t>(initialised)].name != role.name)) {
         at->Fail("model '" + model.name() + "' has no inverse measurement model of role '" +

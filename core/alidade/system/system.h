@@ -24,12 +24,12 @@ enum class RoleMode { kEstimate, kConsider, kKnown };
 
 /// Where a sensor's Jacobian is taken for the value of a role: the prediction, or the value the
 /// measurement itself implies (Initialise of that role).
-enum class RoleJacobianAt { kPrediction, kMeasurement };
+enum class JacobianAt { kPrediction, kMeasurement };
 
 struct RoleBinding {
   BlockId block = -1;  ///< -1: an optional role left unbound
   RoleMode mode = RoleMode::kEstimate;
-  RoleJacobianAt jacobian_at = RoleJacobianAt::kPrediction;
+  JacobianAt jacobian_at = JacobianAt::kPrediction;
 };
 
 /// stream -> sensor model -> the blocks that fill its roles. The roles of a landmark, which come
@@ -104,7 +104,8 @@ std::string UnitOf(const System& system, BlockId id);
 
 /// Directions of the initial state near the prior that no sensor can see, whatever the input,
 /// from the rank of [H0; H1 F0; H2 F1 F0; ...] under changing ones [Hermann1977]: the block
-/// elements each moves. With landmarks, `scale` is that of path and map; exact priors are seen.
+/// elements each moves. With landmarks, `scale` is that of trajectory and map; exact priors are
+/// seen.
 std::vector<std::vector<std::string>> UnobservableDirections(const System& system);
 
 }  // namespace alidade

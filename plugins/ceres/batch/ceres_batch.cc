@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/host/build_plugin.h"
+#include "alidade/host/cpp_plugin.h"
 #include "condensed_run.h"
 #include "fixed_lag.h"
 #include "initialising_filter.h"
@@ -49,7 +49,7 @@ class CeresBatch : public Estimator {
     const bool were_few = run_.inputs() <= kManyInputs;
     if (!run_.Add(frame, filter, ekf)) {
       failed_ = true;
-      report_.events.push_back({frame.timestamp, "batch", run_.problem()});
+      report_.events.push_back({frame.timestamp, "no_solution", run_.problem()});
       return report_;
     }
     if (!ekf.failed()) filtered_.push_back(run_.ValuesOf(ekf.state()));
@@ -59,7 +59,7 @@ class CeresBatch : public Estimator {
                                 "more than " + std::to_string(kManyInputs) +
                                     " noise inputs: the time of a solve grows with their cube"});
     }
-    initialiser_.Tell(frame.timestamp, filter, report_.events);
+    initialiser_.AddReport(frame.timestamp, filter, report_.events);
     return report_;
   }
 
@@ -78,7 +78,7 @@ class CeresBatch : public Estimator {
       run_.Report(k, point, report_);
       PutState(k, point);
       if (last) solve_.Note(run_.timestamp(), report_.events);
-      if (last) report_.events.push_back({run_.timestamp(), "batch", solve_.summary()});
+      if (last) report_.events.push_back({run_.timestamp(), "solution", solve_.summary()});
       emit(k, state_, report_);
     };
     map_ = initialiser_.filter().landmarks();
@@ -117,7 +117,7 @@ class CeresBatch : public Estimator {
 
   void NoteFailure(Timestamp timestamp, const std::string& why) {
     failed_ = true;
-    report_.events.push_back({timestamp, "batch", why});
+    report_.events.push_back({timestamp, "no_solution", why});
   }
 
   bool PutMap() { return map_.empty() || run_.PutMap(e_.data(), solve_.u(), map_); }
@@ -160,4 +160,4 @@ ALIDADE_ESTIMATOR_PLUGIN(
     {"ceres_batch", "Maximum a posteriori of a whole run, by nonlinear least squares.",
      "[Bell1994]", &alidade::ceres_batch::Create, alidade::EstimatorKind::kBatch, true},
     {"fixed_lag", "Maximum a posteriori of the last frames, by nonlinear least squares.",
-     "[Sibley2010]", &alidade::ceres_batch::CreateFixedLag, alidade::EstimatorKind::kWindow})
+     "[Sibley2010]", &alidade::ceres_batch::CreateFixedLag, alidade::EstimatorKind::kSlidingWindow})

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/base/decompositions.h"
 #include "condensed_run.h"
 
 /// The solution of a CondensedRun linearised about a given one.
@@ -72,7 +72,7 @@ bool CondensedRun::StepAbout(std::vector<std::vector<double>>& trajectory, const
     }
     step = -reduced.a.selfadjointView<Eigen::Lower>().llt().solve(reduced.g);
   } else {
-    step = -j.householderQr().solve(r);
+    step = -internal::SolveLeastSquares(j, r).x;
   }
   if (!step.allFinite()) return Fail("the problem linearised about the filter has no solution");
   if (!has_unit_vector_) return true;

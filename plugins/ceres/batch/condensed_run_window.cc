@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/base/decompositions.h"
 #include "condensed_run.h"
 
 /// The first frame of a CondensedRun becomes part of its prior.
@@ -38,22 +38,21 @@ bool CondensedRun::MarginaliseFirst(Eigen::VectorXd& e) {
     j.bottomRows(rows) = root * a * s;
     r.tail(rows) = root * residual;
   }
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(j);
-  const Eigen::MatrixXd u = qr.matrixQR().topRows(c).triangularView<Eigen::Upper>();
-  const Eigen::VectorXd step = -qr.solve(r);
+  const internal::LeastSquares newest = internal::SolveLeastSquares(j, r);
+  const Eigen::MatrixXd& u = newest.r;
+  const Eigen::VectorXd step = -newest.x;
   Eigen::MatrixXd y = Eigen::MatrixXd::Zero(std::max(c, n), n);
   y.topRows(c) = u.transpose().triangularView<Eigen::Lower>().solve(s.transpose());
-  const Eigen::HouseholderQR<Eigen::MatrixXd> of_y(y);
   Eigen::VectorXd e0 = Eigen::VectorXd::Zero(y.rows());
   e0.head(c) = -u * step;
-  e0.applyOnTheLeft(of_y.householderQ().adjoint());
+  const internal::LeastSquares of_y = internal::SolveLeastSquares(y, e0);
   if (!step.allFinite() || !y.allFinite()) return Fail("the prior of the window is not finite");
 
   initial_.values() = point.x;
   d0_ = s * step;
-  l0_ = of_y.matrixQR().topRows(n).triangularView<Eigen::Upper>().toDenseMatrix().transpose();
+  l0_ = of_y.r.transpose();
   Eigen::VectorXd moved(n + e.size() - c);
-  moved << e0.head(n), e.tail(e.size() - c);
+  moved << of_y.q_adjoint_b.head(n), e.tail(e.size() - c);
   e = std::move(moved);
   epochs_.erase(epochs_.begin());
   Shift(static_cast<int>(n - c), gone);

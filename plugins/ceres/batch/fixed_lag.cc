@@ -72,7 +72,7 @@ class FixedLag : public Estimator {
       about_.push_back(run_.ValuesOf(initialiser_.filter().state()));
     }
     SolveWindow(frame.timestamp);
-    initialiser_.Tell(frame.timestamp, filter, report_.events);
+    initialiser_.AddReport(frame.timestamp, filter, report_.events);
     return report_;
   }
 
@@ -94,7 +94,7 @@ class FixedLag : public Estimator {
 
   const UpdateReport& Fail(Timestamp timestamp, const std::string& why) {
     failed_ = true;
-    report_.events.push_back({timestamp, "fixed_lag", why});
+    report_.events.push_back({timestamp, "no_solution", why});
     return report_;
   }
 

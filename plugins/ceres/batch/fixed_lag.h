@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "alidade/host/build_plugin.h"
+#include "alidade/host/cpp_plugin.h"
 
 namespace alidade::ceres_batch {
 

@@ -6,10 +6,10 @@
 #include <ceres/problem.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/base/decompositions.h"
 #include "residuals.h"
 
 namespace alidade::ceres_batch {
@@ -143,9 +143,9 @@ bool GaussNewtonAt(CondensedRun& run, const Eigen::VectorXd& e, GaussNewton& at)
     weighted.segment(n + part.row, part.size) *= root;
     j.middleRows(n + part.row, part.size) *= root;
   }
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(j);
-  at.u = qr.matrixQR().topRows(n).triangularView<Eigen::Upper>();
-  at.step = -qr.solve(weighted);
+  internal::LeastSquares found = internal::SolveLeastSquares(j, weighted);
+  at.u = std::move(found.r);
+  at.step = -found.x;
   return true;
 }
 

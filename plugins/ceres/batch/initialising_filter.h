@@ -23,11 +23,12 @@ class InitialisingFilter {
     return filter_.Process(frame);
   }
   /// Adds what the last report tells of the data, and, once, why the filter ended.
-  void Tell(Timestamp timestamp, const UpdateReport& report, std::vector<Event>& events) const {
+  void AddReport(Timestamp timestamp, const UpdateReport& report,
+                 std::vector<Event>& events) const {
     std::ranges::copy_if(report.events, std::back_inserter(events), TellsOfTheData);
     if (!filter_.failed() || had_failed_) return;
     const auto cause = std::ranges::find(report.events, true, &Event::divergence);
-    events.push_back({timestamp, "start",
+    events.push_back({timestamp, "initial_estimate",
                       "the filter that the batch starts from, and that gives blocks their first "
                       "values, ended" +
                           (cause == report.events.end() ? "" : ": " + cause->text)});

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "alidade/host/build_plugin.h"
+#include "alidade/host/cpp_plugin.h"
 #include "condensed_run.h"
 #include "frozen_solve.h"
 

@@ -75,7 +75,7 @@ bool CondensedRun::Project(const double* e, const std::vector<Point>& points, Un
       return false;
     }
     reduced.cost += normal.cost;
-    if (!derivatives || normal.b.size() == 0) continue;
+    if (!derivatives || d == 0 || normal.b.size() == 0) continue;
     // H -= B C^-1 B', g -= B C^-1 b
     const Eigen::LLT<Eigen::MatrixXd> c(normal.c);
     for (std::size_t i = 0; i < normal.epochs.size(); ++i) {

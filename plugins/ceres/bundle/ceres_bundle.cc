@@ -4,15 +4,15 @@
 #include <ceres/problem.h>
 #include <ceres/solver.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <memory>
 
+#include "alidade/base/decompositions.h"
 #include "alidade/bundle/bundle.h"
-#include "alidade/host/build_plugin.h"
+#include "alidade/host/cpp_plugin.h"
 #include "alidade/state/covariance.h"
 #include "geometry_manifold.h"
 #include "plugins/ceres/loss.h"
@@ -261,18 +261,16 @@ int Bundle::Rank() {
         rows(n + r - first, sparse.cols[k]) = sparse.values[k];
       }
     }
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(rows);
+    const Eigen::MatrixXd r = internal::UpperTriangleOf(rows);
     rows.setZero();
-    rows.topRows(n) = qr.matrixQR().topRows(n).triangularView<Eigen::Upper>();
+    rows.topRows(n) = r;
   }
   for (auto column : rows.colwise()) {
     const double norm = column.norm();
     if (norm > 0.0) column /= norm;
   }
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(rows.topRows(n));
   constexpr double kNothing = 1e-9;
-  qr.setThreshold(kNothing);
-  return static_cast<int>(qr.rank());
+  return internal::RankOf(rows.topRows(n), kNothing);
 }
 
 void Bundle::CopyTo(BundleProblem& to) const {

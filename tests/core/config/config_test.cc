@@ -273,6 +273,23 @@ TEST(Node, EveryUnitIsKnownForOneOfItsQuantity) {
   }
 }
 
+// Of another quantity it may be a key of its own: a slip only where nothing reads it.
+TEST(Node, UnitsOfDifferentQuantitiesDoNotConvert) {
+  const std::vector<std::string> units = {"m",  "s",   "rad",  "hz", "px",     "m2",
+                                          "s2", "px2", "rad2", "kg", "percent"};
+  for (const std::string& unit : units) {
+    for (const std::string& other : units) {
+      if (unit == other) continue;
+      const std::string written = "rate_" + unit, known = "rate_" + other;
+      const Config config = Read(written + ": 1");
+      const std::string missing = Message([&] { config.root().At(known); });
+      EXPECT_TRUE(missing.starts_with("f.yaml:1:1 " + known + ": missing key")) << missing;
+      EXPECT_EQ(Message([&] { config.root().RejectUnread(); }),
+                "f.yaml:1:1 " + written + ": wrong unit '" + unit + "'; expected " + known);
+    }
+  }
+}
+
 TEST(Node, MinimumIsNoUnit) {
   const Config config = Read("depth_min: 1");
   config.root().Find("depth_m");

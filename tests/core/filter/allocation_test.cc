@@ -10,6 +10,7 @@
 #include "alidade/filter/square_root_ekf.h"
 #include "alidade/filter/ukf.h"
 #include "support/driven.h"
+#include "support/sanitized.h"
 #include "support/systems.h"
 
 namespace {
@@ -82,9 +83,7 @@ std::vector<Frame> Frames() {
 }
 
 void ExpectNoAllocation(Estimator& filter) {
-#ifdef __SANITIZE_ADDRESS__
-  GTEST_SKIP() << "the sanitizer allocates by itself";
-#endif
+  if (testing::kSanitized) GTEST_SKIP() << "the sanitizer allocates by itself";
   const std::vector<Frame> frames = Frames();
   for (std::size_t k = 0; k < 20; ++k) filter.Process(frames[k]);
   const long before = allocations;

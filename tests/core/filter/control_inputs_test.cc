@@ -59,7 +59,7 @@ struct Gaussian {
 };
 
 /// The Kalman filter written out: between two rows the distance is the integral of u(t), which is
-/// the last speed until max_age after it, and then 0; P grows by kNoise^2 dt.
+/// the last speed until timeout after it, and then 0; P grows by kNoise^2 dt.
 std::vector<Gaussian> WrittenOut(const std::vector<Seen>& drive, double timeout_s) {
   std::vector<Gaussian> estimates;
   double x = 1.0, p = 0.25, t = drive[0].t_s, speed = 0.0, since = t;
@@ -100,7 +100,7 @@ std::vector<std::string> ExpectWrittenOut(Estimator& filter, const std::vector<S
   return kinds;
 }
 
-/// The system with a fixed block beside it, which keeps it from the fast path.
+/// The system with a fixed block next to it, which keeps it from the fast path.
 System OnTheGeneralPath(System system) {
   const BlockId id =
       system.layout.Declare("aside.x", "aside", system.layout[0].space, BlockStatus::kConstant);

@@ -17,7 +17,7 @@ TEST(Ekf, UnderFirstEstimateTheJacobianOfAStationaryBlockIsThatOfItsStart) {
   System system = DepthFilter();
   system.sensors.erase(system.sensors.begin());
   EkfOptions options;
-  options.jacobian = JacobianAt::kFirstEstimate;
+  options.jacobian = JacobianPolicy::kFirstEstimate;
   Ekf ekf(system, options, StreamsOf(system)), latest(system, {}, StreamsOf(system));
   Eigen::Vector3d x(0.35, 0.0, 3.3);
   Eigen::Matrix3d p = Eigen::Vector3d(0.01, 0.25, 0.25).asDiagonal();
@@ -49,7 +49,7 @@ TEST(Ekf, AFirstEstimateIsThatOfTheMeasurementABlockStartsFrom) {
   System system = DepthFilter();
   system.priors[2] = {2, {}, {}, "inverse_scale"};
   EkfOptions options;
-  options.jacobian = JacobianAt::kFirstEstimate;
+  options.jacobian = JacobianPolicy::kFirstEstimate;
   Ekf ekf(system, options, StreamsOf(system));
   ekf.Process(FrameAt(0.0, {{1, 1.05}}));
   const double lambda = 1.05 / 0.35;
@@ -73,7 +73,7 @@ TEST(Ekf, AResetMakesANewFirstEstimate) {
   system.priors[1].covariance(0, 0) = 1e-12;
   system.priors[2].covariance(0, 0) = 1e-12;
   EkfOptions options;
-  options.jacobian = JacobianAt::kFirstEstimate;
+  options.jacobian = JacobianPolicy::kFirstEstimate;
   options.gate = 0.999;
   Ekf ekf(system, options, StreamsOf(system));
   UpdateReport report;
@@ -125,7 +125,7 @@ TEST(Ekf, UnderFirstEstimateADirectionIsCarriedFromItsLatestTangentToItsFirst) {
   system.motions.push_back(binding);
   AddSensor(system, "direction", InProcessSensor(DirectionFromVector(), "direction"), {"s.u"});
   EkfOptions options;
-  options.jacobian = JacobianAt::kFirstEstimate;
+  options.jacobian = JacobianPolicy::kFirstEstimate;
   Ekf ekf(system, options, {{"direction", 3}});
   Frame frame = FrameAt(0.0, {});
   frame.measurements.push_back({0, 0, -1, {-0.2, 0.9, 0.3}, {}});

@@ -138,6 +138,16 @@ TEST(OnePointRansac, RescuesByItsOwnThreshold) {
   EXPECT_EQ(rescued[1], 0);
 }
 
+// By a support that no match meets all are tried and none agrees; all fit the state as it was.
+TEST(OnePointRansac, AgreesByItsOwnThreshold) {
+  System system = KnownMap();
+  system.sensors[0].outlier_rejection = OnePointRansac{.inlier_probability = 1e-9};
+  Ekf ekf = EkfOf(system);
+  const UpdateReport& report = ekf.Process(Matches({0.05, -0.03, 0.0}, 1000, 0.0));
+  EXPECT_EQ(report.landmarks.hypotheses, kPoints);
+  EXPECT_EQ(report.landmarks.rescued, kPoints);
+}
+
 // No match moves a camera that is a consider state, so none explains 0.05 m, 25 times the noise.
 // All join afterwards, by the uncertainty of the camera.
 TEST(OnePointRansac, AHypothesisDoesNotMoveWhatIsConsidered) {

@@ -148,7 +148,7 @@ TEST(Landmarks, AreLinearisedAtTheMeasurementWhereARoleIs) {
   LandmarkOptions options;
   options.known = {{1, {2.0, 2.0, 2.0}, 0.0}};
   System system = MapSystem(Cubes(), options, 1.0);
-  system.sensors[0].roles[0].jacobian_at = RoleJacobianAt::kMeasurement;
+  system.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
   Ekf ekf(system, {}, {{"tracks", 3}});
   const double z = 1.5 * 1.5 * 1.5;  // r = 0.5, where H = -3 1.5^2
   const UpdateReport& report = ekf.Process(FrameOf(0.0, {{1, {z, z, z}}}));

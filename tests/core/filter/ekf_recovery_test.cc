@@ -102,7 +102,7 @@ TEST(Ekf, AGapOfTooManyPartsIsGivenUpNotSkipped) {
   const UpdateReport& report = ekf.Process(FrameAt(10.0, {}));
   EXPECT_TRUE(ekf.failed());
   ASSERT_EQ(report.events.size(), 1u);
-  EXPECT_EQ(report.events[0].kind, "gap");
+  EXPECT_EQ(report.events[0].kind, "too_many_substeps");
 }
 
 TEST(Ekf, TheMeasurementsOwnCovarianceCountsAlsoWhereItInitialises) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The fast path of a small filter against the general path, which a fixed block beside the others
+// The fast path of a small filter against the general path, which a fixed block next to the others
 // makes the same filter take.
 #include <gtest/gtest.h>
 

@@ -55,7 +55,7 @@ struct Stretching : Motion<1, Vec<1>> {
 };
 
 TEST(EkfStep, ACovarianceThatOverflowsLeavesStateAndCovarianceAsTheyWere) {
-  // F P F' = 1e20 * 1e300; the point beside it steps without trouble.
+  // F P F' = 1e20 * 1e300; the point next to it steps without trouble.
   System system = MovingPoint();
   AddMotion(system, "q", InProcessMotion(Stretching(), "stretching"), {{"x", 1.0, 1e150}});
   Ekf ekf(system, {}, {});

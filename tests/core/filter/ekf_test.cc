@@ -177,7 +177,7 @@ TEST(Ekf, HeldRolesHaveNoJacobian) {
 TEST(Ekf, LinearisedAtTheMeasurementTheJacobianIsThatOfTheMeasuredDepth) {
   System system = DepthFilter();
   system.sensors.pop_back();
-  system.sensors[0].roles[0].jacobian_at = RoleJacobianAt::kMeasurement;
+  system.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
   Ekf ekf(system, {}, StreamsOf(system));
   const double d = 80.0, bf = 26.0;
   const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, d}}));

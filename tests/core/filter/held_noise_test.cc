@@ -157,7 +157,7 @@ TYPED_TEST(HeldNoise, RejectedMeasurementsAreNone) {
   EXPECT_LT(MostApart(this->Run(system, frames, {.gate = 1.0 - 1e-6}), states), this->kTolerance);
 }
 
-// A second model whose noise adds up, beside the one that holds it.
+// A second model whose noise adds up, next to the one that holds it.
 TYPED_TEST(HeldNoise, StandsBesideNoiseThatAddsUp) {
   System system = DepthFilter();
   system.motions[1].model = InProcessMotion(Constant<>(1, 0.3), "constant");
@@ -176,7 +176,7 @@ TYPED_TEST(HeldNoise, ContinuousNoiseAddsUp) {
   EXPECT_LT(MostApart(whole, this->Run(system, more)), this->kTolerance);
 }
 
-/// Moves with constant velocity beside a control input that has no effect.
+/// Moves with constant velocity next to a control input that has no effect.
 struct Pushed : Motion<1, Vec<1>, Vec<1>> {
   static constexpr std::array kBlocks{Quantity{"depth", "m"}, Quantity{"depth_rate", "m/s"}};
   using Input = Vec<1>;

@@ -418,10 +418,10 @@ TEST(Iekf, RefusesWhatItCannotDo) {
   considered.sensors[1].roles[1].mode = RoleMode::kConsider;
   EXPECT_THROW(Iekf(considered, {}, StreamsOf(considered)), ContractViolation);
   System measured = DepthFilter();
-  measured.sensors[0].roles[0].jacobian_at = RoleJacobianAt::kMeasurement;
+  measured.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
   EXPECT_THROW(Iekf(measured, {}, StreamsOf(measured)), ContractViolation);
   IekfOptions first;
-  first.jacobian = JacobianAt::kFirstEstimate;
+  first.jacobian = JacobianPolicy::kFirstEstimate;
   EXPECT_THROW(Iekf(DepthFilter(), first, {}), ContractViolation);
 }
 

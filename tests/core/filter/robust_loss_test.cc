@@ -79,7 +79,7 @@ TYPED_TEST(RobustFilter, TakesAnOutlierWithROverW) {
   }
 }
 
-// R / w is beyond any number: the measurement is left out, and the good one beside it is used.
+// R / w is beyond any number: the measurement is left out, and the good one next to it is used.
 TYPED_TEST(RobustFilter, LeavesOutWhatItsWeightOfZeroIsFor) {
   for (const RobustLoss& loss : {kCauchy, kHuber}) {
     System system = Measured({});

@@ -32,7 +32,7 @@ System WithABlockFromAMeasurement() {
   return system;
 }
 
-System WithARole(RoleMode mode, RoleJacobianAt at) {
+System WithARole(RoleMode mode, JacobianAt at) {
   System system = DepthFilter();
   system.sensors[1].roles[1].mode = mode;
   system.sensors[1].roles[1].jacobian_at = at;
@@ -67,10 +67,10 @@ TEST(Support, NamesTheFirstThingThatIsLacking) {
   expect(WithAConsideredBlock(), {.consider = true, .known = false}, "consider blocks", 2, -1, -1);
   expect(WithABlockFromAMeasurement(), {.from_measurement = true},
          "blocks that start from a measurement", 0, -1, -1);
-  expect(WithARole(RoleMode::kConsider, RoleJacobianAt::kPrediction), {.consider = true},
+  expect(WithARole(RoleMode::kConsider, JacobianAt::kPrediction), {.consider = true},
          "consider roles", -1, 1, 1);
-  expect(WithARole(RoleMode::kKnown, RoleJacobianAt::kPrediction), {}, "known roles", -1, 1, 1);
-  expect(WithARole(RoleMode::kEstimate, RoleJacobianAt::kMeasurement), {.at_measurement = true},
+  expect(WithARole(RoleMode::kKnown, JacobianAt::kPrediction), {}, "known roles", -1, 1, 1);
+  expect(WithARole(RoleMode::kEstimate, JacobianAt::kMeasurement), {.at_measurement = true},
          "jacobian_at: measurement", -1, 1, 1);
   expect(WithALoss(), {}, "robust losses", -1, 1, -1);
   expect(WithLandmarks(), {.landmarks = true}, "landmarks", -1, -1, -1);
@@ -92,10 +92,9 @@ void ExpectAsSupported() {
   const Support& can = Filter::kSupport;
   EXPECT_EQ(Makes<Filter>(WithAConsideredBlock()), can.consider);
   EXPECT_EQ(Makes<Filter>(WithABlockFromAMeasurement()), can.from_measurement);
-  EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kConsider, RoleJacobianAt::kPrediction)),
-            can.consider);
-  EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kKnown, RoleJacobianAt::kPrediction)), can.known);
-  EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kEstimate, RoleJacobianAt::kMeasurement)),
+  EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kConsider, JacobianAt::kPrediction)), can.consider);
+  EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kKnown, JacobianAt::kPrediction)), can.known);
+  EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kEstimate, JacobianAt::kMeasurement)),
             can.at_measurement);
   EXPECT_EQ(Makes<Filter>(WithALoss()), can.robust_loss);
   EXPECT_EQ(Makes<Filter>(WithLandmarks()), can.landmarks);

@@ -9,6 +9,7 @@
 
 #include "alidade/base/random.h"
 #include "alidade/filter/ukf.h"
+#include "support/manifold_models.h"
 #include "support/systems.h"
 
 namespace alidade {
@@ -31,22 +32,6 @@ struct Wandering : Motion<G::kTangent, G> {
   }
 };
 
-/// z = x (+) n, n ~ N(0, kSensorSigma^2 I)
-template <class G>
-struct Itself : Sensor<G, G> {
-  static constexpr std::array kRoles{Quantity{"x"}};
-  static constexpr Quantity kMeasurement{"z"};
-  template <class T>
-  bool Predict(const T* x, T* z) const {
-    for (int i = 0; i < G::kAmbient; ++i) z[i] = x[i];
-    return true;
-  }
-  template <class T>
-  void SqrtNoise(const T*, T* l) const {
-    for (int i = 0; i < G::kTangent; ++i) l[(G::kTangent + 1) * i] = T(kSensorSigma);
-  }
-};
-
 /// `n` tangent elements in blocks of the geometry G, each with its own sensor.
 template <class G>
 System Wanderers(int n) {
@@ -63,7 +48,8 @@ System Wanderers(int n) {
     prior.covariance =
         kPriorSigma * kPriorSigma * Eigen::MatrixXd::Identity(G::kTangent, G::kTangent);
     system.priors.push_back(prior);
-    AddSensor(system, name, InProcessSensor(Itself<G>(), "itself"), {name + ".x"});
+    AddSensor(system, name, InProcessSensor(ManifoldSensor<G, kSensorSigma>(), "itself"),
+              {name + ".x"});
   }
   return system;
 }

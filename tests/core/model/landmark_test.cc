@@ -134,7 +134,7 @@ TEST(Landmark, IsNotConvertedAtInfinityOrBehindIt) {
 }
 
 TEST(Landmark, LinearityIndexIsThatOfCivera) {
-  // The anchor at the origin, the point 4 m ahead, the camera 3 m beside the anchor: d1 = 5 m,
+  // The anchor at the origin, the point 4 m ahead, the camera 3 m next to the anchor: d1 = 5 m,
   // cos alpha = 0.8, sigma_d = 0.02 / 0.25^2 = 0.32 m; L_d = 4 0.32 / 5 0.8 = 0.2048
   const double y[6] = {0, 0, 0, 0, 0, 0.25};
   const double beside[3] = {3, 0, 0};

@@ -338,7 +338,7 @@ TEST(Metrics, TellsOnceOfErrorsBeyondTenSigma) {
             "a.x: the error, 21 m, has been beyond 10 sigma for 20 timestamps; sigma is 2 m");
 }
 
-// A truth of sigma 3 m beside a filter's 2 m: the error has the variance 13 m^2.
+// A truth of sigma 3 m next to a filter's 2 m: the error has the variance 13 m^2.
 TEST(Metrics, TheUncertaintyOfTheTruthBelongsToTheError) {
   MetricsOf one(Scalars({"a.x"}), {{"x", 1, 3.0}});
   const double zero = 0.0;

@@ -177,6 +177,33 @@ TEST(Run, AStopAfterAFailureIsStillAFailure) {
   EXPECT_NE(result.reason.find("estimator 'exploding'"), std::string::npos) << result.reason;
 }
 
+/// Ends by a signal while it waits for frame 7, as a pipe does.
+struct SignalledSource : Source {
+  explicit SignalledSource(std::unique_ptr<Source> of) : frames(std::move(of)) {}
+  const std::vector<StreamInfo>& streams() const override { return frames->streams(); }
+  const std::vector<StreamInfo>& truths() const override { return frames->truths(); }
+  bool Next(Frame& frame) override {
+    if (++count == 7) throw Error(ExitCode::kStopped, "a signal");
+    return frames->Next(frame);
+  }
+  std::unique_ptr<Source> frames;
+  int count = 0;
+};
+
+TEST(Run, ASignalToItsSourceAfterAFailureIsStillAFailure) {
+  for (const bool fails : {false, true}) {
+    Experiment experiment = MakeExperiment();
+    if (fails) {
+      experiment.estimators.push_back(ExplodingEstimator(experiment.source->streams()));
+    }
+    experiment.source = std::make_unique<SignalledSource>(std::move(experiment.source));
+    const RunResult result = alidade::Run(experiment, {});
+    EXPECT_EQ(result.frames, 6);
+    EXPECT_EQ(result.status, fails ? RunStatus::kFailed : RunStatus::kStopped);
+    EXPECT_EQ(result.code, fails ? ExitCode::kDiverged : ExitCode::kStopped) << result.reason;
+  }
+}
+
 /// Is stopped in its smoothing.
 struct Interrupted : Hindsight {
   using Hindsight::Hindsight;

@@ -183,7 +183,7 @@ struct Chain : Motion<1, Vec<1>, Vec<1>, Vec<1>, Vec<1>> {
 };
 
 // Three steps of 0.02 s move x by j (0.02 s)^3: 8e-8 sigma where a jerk is known to 0.01 m/s^3
-// beside a position known to 1 m. It is small, but no rounding.
+// next to a position known to 1 m. It is small, but no rounding.
 TEST(UnobservableDirections, AThirdDerivativeIsSeen) {
   System system;
   testing::AddMotion(system, "p", InProcessMotion(Chain(), "chain"),

@@ -2,7 +2,7 @@
 // C++ plugin: sources that work and one that throws.
 #include <stdexcept>
 
-#include "alidade/host/build_plugin.h"
+#include "alidade/host/cpp_plugin.h"
 #include "alidade/model/camera.h"
 
 namespace {

@@ -95,13 +95,13 @@ double ValueOf(const std::map<std::string, Spread>& values, const std::string& k
 TEST(CompareLinear, OnlyMissingSmoothingIsLeftOfTheGap) {
   const auto [run, comparison] = CompareLinear(false);
   ASSERT_EQ(comparison.decomposition.size(), 3u);
-  EXPECT_EQ(comparison.explained, "ekf");
+  EXPECT_EQ(comparison.decomposed, "ekf");
   const DecompositionStep& linearisation = comparison.decomposition[0];
   EXPECT_EQ(linearisation.from + ' ' + linearisation.to, "ekf full_information");
   EXPECT_LT(ValueOf(linearisation.values, "rmsd:p.x"), 1e-9);
   EXPECT_LT(ValueOf(linearisation.values, "rmsd:p.v"), 1e-9);
   EXPECT_LT(ValueOf(linearisation.values, "rmsd.sigmas:p"), 1e-9);
-  EXPECT_NEAR(ValueOf(linearisation.values, "error_ratio:p.x"), 1.0, 1e-9);
+  EXPECT_NEAR(ValueOf(linearisation.values, "ratio.rmse:p.x"), 1.0, 1e-9);
 
   const DecompositionStep& smoothing = comparison.decomposition[1];
   EXPECT_EQ(smoothing.from + ' ' + smoothing.to, "ekf rts");
@@ -109,7 +109,7 @@ TEST(CompareLinear, OnlyMissingSmoothingIsLeftOfTheGap) {
     return run.estimators[e].metrics.at("rmse:p.x");
   };
   EXPECT_GT(rmse(0) / rmse(1), 1.2);
-  EXPECT_NEAR(ValueOf(smoothing.values, "error_ratio:p.x"), rmse(0) / rmse(1), 1e-12);
+  EXPECT_NEAR(ValueOf(smoothing.values, "ratio.rmse:p.x"), rmse(0) / rmse(1), 1e-12);
 
   const DecompositionStep& rejected = comparison.decomposition[2];
   EXPECT_EQ(rejected.from + ' ' + rejected.to, "accepted batch");
@@ -126,7 +126,7 @@ TEST(CompareLinear, OnlyMissingSmoothingIsLeftOfTheGap) {
 
 TEST(CompareLinear, AWindowIsNoSmootherOfAllData) {
   const DecompositionStep smoothing =
-      CompareLinear(false, {}, EstimatorKind::kWindow).comparison.decomposition[1];
+      CompareLinear(false, {}, EstimatorKind::kSlidingWindow).comparison.decomposition[1];
   EXPECT_EQ(smoothing.from + ' ' + smoothing.to, "full_information accepted");
 }
 
@@ -190,7 +190,7 @@ TEST(CompareLinear, WhatTheGateKeptOutIsLostData) {
   EXPECT_EQ(ValueOf(rejected.values, "rejected"), 1.0);
   EXPECT_EQ(ValueOf(rejected.values, "measurements"), 23.0);
   EXPECT_GT(ValueOf(rejected.values, "rmsd:p.x"), 0.5);
-  EXPECT_LT(ValueOf(rejected.values, "error_ratio:p.x"), 0.5);
+  EXPECT_LT(ValueOf(rejected.values, "ratio.rmse:p.x"), 0.5);
 }
 
 TEST(CompareLinear, ANamedReferenceServesAll) {
@@ -211,61 +211,61 @@ Config Depth(const std::vector<std::pair<std::string, std::string>>& settings = 
   return config;
 }
 
-TEST(ExplainExperiment, AddsWhatTheComparisonLacks) {
-  const ExplainedExperiment explained = ExplainExperiment(Depth(), Shipped(), {});
-  EXPECT_EQ(explained.filter, "ekf");
-  EXPECT_EQ(explained.added,
+TEST(BuildComparedExperiment, AddsWhatTheComparisonLacks) {
+  const ComparedExperiment compared = BuildComparedExperiment(Depth(), Shipped(), {});
+  EXPECT_EQ(compared.filter, "ekf");
+  EXPECT_EQ(compared.added,
             (std::vector<std::string>{"rts", "batch", "full_information", "batch_accepted"}));
-  const Node estimators = explained.config.root().At("estimators");
+  const Node estimators = compared.config.root().At("estimators");
   EXPECT_EQ(estimators.At("full_information").At("mode").Text(), "filtering");
   EXPECT_EQ(estimators.At("batch_accepted").At("use").At("accepted_by").Text(), "ekf");
   EXPECT_EQ(estimators.At("rts").At("gate").Text(), estimators.At("ekf").At("gate").Text());
   // What it gives is the config of a run.
-  EXPECT_EQ(BuildExperiment(explained.config, Shipped()).estimators.size(), 5u);
+  EXPECT_EQ(BuildExperiment(compared.config, Shipped()).estimators.size(), 5u);
 }
 
-TEST(ExplainExperiment, AddsNothingThatIsThereOrNotAskedFor) {
+TEST(BuildComparedExperiment, AddsNothingThatIsThereOrNotAskedFor) {
   const Config config = Depth({{"estimators.best", "{type: ceres_batch}"},
                                {"estimators.best_now", "{type: ceres_batch, mode: filtering}"}});
-  EXPECT_EQ(ExplainExperiment(config, Shipped(), {}).added,
+  EXPECT_EQ(BuildComparedExperiment(config, Shipped(), {}).added,
             (std::vector<std::string>{"rts", "batch_accepted"}));
-  EXPECT_TRUE(ExplainExperiment(config, Shipped(), {"", "", false}).added.empty());
+  EXPECT_TRUE(BuildComparedExperiment(config, Shipped(), {"", "", false}).added.empty());
 }
 
-TEST(ExplainExperiment, TakesOverWhatTheFilterSees) {
+TEST(BuildComparedExperiment, TakesOverWhatTheFilterSees) {
   const Config config = Depth({{"estimators.ekf.sensors", "[stereo]"},
                                {"estimators.ekf.overrides.sensors.stereo.sigma_px", "2"},
                                {"estimators.best", "{type: ceres_batch}"}});
-  const ExplainedExperiment explained = ExplainExperiment(config, Shipped(), {});
+  const ComparedExperiment compared = BuildComparedExperiment(config, Shipped(), {});
   // `best` has another sensor and another noise.
-  EXPECT_EQ(explained.added,
+  EXPECT_EQ(compared.added,
             (std::vector<std::string>{"rts", "batch", "full_information", "batch_accepted"}));
-  for (const NamedEstimator& named : explained.experiment.estimators) {
+  for (const NamedEstimator& named : compared.experiment.estimators) {
     EXPECT_EQ(named.system.sensors.size(), named.name == "best" ? 2u : 1u) << named.name;
     EXPECT_EQ(named.overrides.empty(), named.name == "best") << named.name;
   }
 }
 
-TEST(ExplainExperiment, LeavesOutWithItsReasonWhatDoesNotSupportTheSystem) {
+TEST(BuildComparedExperiment, LeavesOutWithItsReasonWhatDoesNotSupportTheSystem) {
   const Config config =
       Config::FromFile(ALIDADE_SOURCE_DIR "/examples/04_depth_fused_2017/config.yaml");
-  const ExplainedExperiment explained = ExplainExperiment(config, Shipped(), {});
-  EXPECT_TRUE(explained.added.empty());
-  ASSERT_EQ(explained.notes.size(), 2u);
+  const ComparedExperiment compared = BuildComparedExperiment(config, Shipped(), {});
+  EXPECT_TRUE(compared.added.empty());
+  ASSERT_EQ(compared.notes.size(), 2u);
   EXPECT_TRUE(
-      explained.notes[0].starts_with("left out the batch of all data; the full-information filter "
-                                     "over what the filter accepted; "))
-      << explained.notes[0];
-  EXPECT_EQ(explained.notes[1],
+      compared.notes[0].starts_with("left out the batch of all data; the full-information filter "
+                                    "over what the filter accepted; "))
+      << compared.notes[0];
+  EXPECT_EQ(compared.notes[1],
             "left out the smoother of all data: estimator type 'rts' does not support "
             "jacobian_at: measurement");
-  EXPECT_EQ(explained.experiment.estimators.size(), 1u);
+  EXPECT_EQ(compared.experiment.estimators.size(), 1u);
 }
 
-TEST(ExplainExperiment, RefusesNamesThatAreNotThereOrNoFilters) {
+TEST(BuildComparedExperiment, RefusesNamesThatAreNotThereOrNoFilters) {
   const auto refuses = [](const CompareOptions& options, const std::string& words) {
     try {
-      ExplainExperiment(Depth(), Shipped(), options);
+      BuildComparedExperiment(Depth(), Shipped(), options);
       ADD_FAILURE() << words;
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), ExitCode::kUsage);
@@ -276,13 +276,13 @@ TEST(ExplainExperiment, RefusesNamesThatAreNotThereOrNoFilters) {
   refuses({"", "efk", true}, "--filter: no estimator 'efk'; expected one of ekf; did you mean");
 }
 
-TEST(ExplainExperiment, RefusesToExplainTheGapOfABatchOrASmoother) {
+TEST(BuildComparedExperiment, RefusesToExplainTheGapOfABatchOrASmoother) {
   const Config config = Depth({{"estimators.rts", "{type: rts}"},
                                {"estimators.best", "{type: ceres_batch}"},
                                {"estimators.now", "{type: ceres_batch, mode: filtering}"}});
   for (const char* name : {"rts", "best", "now"}) {
     try {
-      ExplainExperiment(config, Shipped(), {"", name, true});
+      BuildComparedExperiment(config, Shipped(), {"", name, true});
       ADD_FAILURE() << name;
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), ExitCode::kUsage);
@@ -298,11 +298,11 @@ Comparison CompareScene(const std::string& more) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml");
   config.Set("source.max_frames", "10", "--set");
   if (!more.empty()) config.Set("estimators.now", more, "--set");
-  ExplainedExperiment explained = ExplainExperiment(config, Shipped(), {});
-  RunComparer comparer(explained.experiment);
+  ComparedExperiment compared = BuildComparedExperiment(config, Shipped(), {});
+  RunComparer comparer(compared.experiment);
   RunOptions observed;
   observed.observers.push_back(&comparer);
-  const RunResult run = Run(explained.experiment, observed);
+  const RunResult run = Run(compared.experiment, observed);
   EXPECT_EQ(run.status, RunStatus::kOk) << run.reason;
   return comparer.Finish(run, {});
 }
@@ -318,11 +318,11 @@ TEST(CompareLandmarks, AtTheLastFrameTheBatchOfAllDataIsThatOfTheDataSoFar) {
   ASSERT_EQ(with.estimators[1].name, "now");
   const std::map<std::string, Spread>& now = with.estimators[1].values;
   EXPECT_LT(ValueOf(now, "final_difference.sigmas:cam"), 1e-5);
-  EXPECT_LT(ValueOf(now, "rmsd.map"), 1e-6);
+  EXPECT_LT(ValueOf(now, "map.rmsd"), 1e-6);
   const double of_end = ValueOf(now, "final_error:cam.position");
   EXPECT_NEAR(ValueOf(step.values, "rmse.to:cam.position"), of_end, 1e-6 * of_end);
   EXPECT_NEAR(ValueOf(step.values, "rmse.to:map"), ValueOf(now, "map.rmse"), 1e-6);
-  EXPECT_GT(ValueOf(step.values, "error_ratio:map"), 0.0);
+  EXPECT_GT(ValueOf(step.values, "ratio.rmse:map"), 0.0);
   EXPECT_GT(ValueOf(step.values, "rmsd.sigmas:cam"), 0.01);
 }
 
@@ -334,13 +334,13 @@ TEST(CompareSeeds, WhatIsHeldAgainstAReferenceThatDivergedIsLeftOut) {
   config.Set("estimators.ukf", "{type: ukf}", "--set");
   CompareOptions options;
   options.reference = "ekf";
-  options.explain = false;
-  const ExplainedExperiment explained = ExplainExperiment(config, Shipped(), options);
+  options.decompose = false;
+  const ComparedExperiment compared = BuildComparedExperiment(config, Shipped(), options);
   const auto compare = [&](std::uint64_t first_seed, std::int64_t runs) {
     SweepOptions sweep;
     sweep.first_seed = first_seed;
     sweep.runs = runs;
-    return CompareSeeds(explained, Shipped(), sweep, options).comparison;
+    return CompareSeeds(compared, Shipped(), sweep, options).comparison;
   };
   const Comparison both = compare(4, 2), second = compare(5, 1);
   ASSERT_EQ(both.estimators[0].diverged, 1);

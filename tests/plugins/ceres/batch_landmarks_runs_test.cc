@@ -76,7 +76,8 @@ const std::string kSensors =
     "  known: {model: depth_feature, stream: known, sigma_px: 1, sigma_depth_m: 0.02, roles: "
     "{position: cam.position, orientation: cam.orientation, landmark: landmarks}}\n";
 const std::string kDrawn =
-    "max_frames: 40, rate_hz: 30, sigma_px: 1, known_points: {count: 4, sigma_relative: 0.005}, "
+    "max_frames: 40, rate_hz: 30, sigma_px: 1, known_points: {count: 4, sigma_depth_relative: "
+    "0.005}, "
     "points: {box: {min: [-0.8, -0.7, 1.6], max: [1.2, 0.7, 3.6]}, count: 40}, trajectory: "
     "{random: {linear_acceleration: 0.3, angular_acceleration: 0.05, velocity: [0.2, 0, 0]}}";
 

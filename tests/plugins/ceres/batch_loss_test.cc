@@ -304,7 +304,7 @@ std::vector<double> DepthErrors(bool robust) {
   return errors;
 }
 
-// Noise that depends on the state settles beside a loss.
+// Noise that depends on the state settles next to a loss.
 TEST(CeresBatchLoss, OfAConfigServesFilterAndBatch) {
   const std::vector<double> plain = DepthErrors(false), robust = DepthErrors(true);
   // Measured: ekf 26.5 and 6.0 mm, batch 25.7 and 3.7 mm.

@@ -11,21 +11,21 @@ namespace {
 
 using testing::FrameAt;
 
-constexpr double kGain = 2.0, kSigma = 0.3;
+constexpr double kScale = 2.0, kNoise = 0.3;
 
 /// A constant p.x, seen by a linear sensor.
-System Still(BlockStatus status) {
+System ConstantSystem(BlockStatus status) {
   System system;
   const MotionModel still = InProcessMotion(Constant<>(1), "constant");
   const BlockId id = system.layout.Declare("p.x", "p", still.blocks()[0], status);
   system.motions.push_back({"p", still, {id}});
   system.priors.push_back({id, {1.5}, Eigen::MatrixXd::Zero(1, 1), ""});
-  testing::AddSensor(system, "z", InProcessSensor(testing::Linear(kGain, kSigma), "linear"),
+  testing::AddSensor(system, "z", InProcessSensor(testing::Linear(kScale, kNoise), "linear"),
                      {"p.x"});
   return system;
 }
 System StartsFromItsSensor() {
-  System system = Still(BlockStatus::kEstimated);
+  System system = ConstantSystem(BlockStatus::kEstimated);
   system.priors[0].from = "z";
   return system;
 }
@@ -78,8 +78,8 @@ TEST(CeresBatchNoInputs, AFirstValueMayComeLate) {
       EXPECT_EQ(found[k].layout()[0].present, k >= 2) << k;
       EXPECT_EQ(found[k].covariance().size(), k >= 2 ? 1 : 0) << k;
     }
-    EXPECT_NEAR(*found.back().value(0), 12.1 / 4.0 / kGain, 1e-9);
-    EXPECT_NEAR(found.back().covariance().Variance(0), kSigma * kSigma / (kGain * kGain * 4.0),
+    EXPECT_NEAR(*found.back().value(0), 12.1 / 4.0 / kScale, 1e-9);
+    EXPECT_NEAR(found.back().covariance().Variance(0), kNoise * kNoise / (kScale * kScale * 4.0),
                 1e-9);
   }
 }
@@ -97,7 +97,7 @@ TEST(CeresBatchNoInputs, AFirstValueMayNeverCome) {
 TEST(CeresBatchNoInputs, WhatIsFixedStaysAndHasItsCost) {
   const std::vector<Frame> frames = {FrameAt(0.0, {{0, 3.3}}), FrameAt(0.1, {{0, 2.4}}),
                                      FrameAt(0.3, {{0, 4.2}})};
-  System system = Still(BlockStatus::kConstant);
+  System system = ConstantSystem(BlockStatus::kConstant);
   for (const std::string& options : kAll) {
     const Estimated found = Estimate(options, system, frames);
     for (const State& state : found.states) EXPECT_EQ(*state.value(0), 1.5) << options;
@@ -111,7 +111,7 @@ TEST(CeresBatchNoInputs, WhatIsFixedStaysAndHasItsCost) {
 
 // Offsets from a camera that stands still: each point is their mean.
 TEST(CeresBatchNoInputs, AFixedCameraHasAMap) {
-  System system = testing::MapSystem(testing::Offset(kSigma), {});
+  System system = testing::MapSystem(testing::Offset(kNoise), {});
   system.layout = {};
   system.motions[0].model = InProcessMotion(Constant<>(3), "constant");
   const Space place = system.motions[0].model.blocks()[0];
@@ -131,7 +131,7 @@ TEST(CeresBatchNoInputs, AFixedCameraHasAMap) {
     const std::vector<LandmarkEstimate> map = batch->landmarks();
     ASSERT_EQ(map.size(), 1u);
     EXPECT_LT((map[0].position - Eigen::Vector3d(1.15, 2.0, 3.0)).norm(), 1e-9);
-    const Eigen::Matrix3d expected = kSigma * kSigma / 4.0 * Eigen::Matrix3d::Identity();
+    const Eigen::Matrix3d expected = kNoise * kNoise / 4.0 * Eigen::Matrix3d::Identity();
     EXPECT_LT((map[0].covariance - expected).norm(), 1e-9);
   }
 }

@@ -60,7 +60,7 @@ TEST(CeresBatch, ASolveThatDoesNotConvergeIsAFailureAndAnEvent) {
   EXPECT_EQ(run.status, RunStatus::kFailed);
   EXPECT_EQ(run.code, ExitCode::kDiverged);
   EXPECT_NE(run.reason.find("estimator 'batch': cost"), std::string::npos) << run.reason;
-  EXPECT_TRUE(HasEvent(run.estimators[1], "batch", "not converged"));
+  EXPECT_TRUE(HasEvent(run.estimators[1], "solution", "not converged"));
   EXPECT_EQ(run.estimators[0].counts.at("accepted:scale"), 152);
 }
 

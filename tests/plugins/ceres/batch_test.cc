@@ -6,6 +6,7 @@
 #include "alidade/run/run.h"
 #include "batch_fixture.h"
 #include "plugins/depth_target/depth_target.h"
+#include "support/manifold_models.h"
 
 namespace alidade {
 namespace {
@@ -120,7 +121,7 @@ TEST(CeresBatch, EqualsTheSmootherWrittenOutOnALinearProblem) {
              1e-9);
   EXPECT_FALSE(batch->failed());
   ASSERT_EQ(found.events.size(), 1u);
-  EXPECT_EQ(found.events[0].kind, "batch");
+  EXPECT_EQ(found.events[0].kind, "solution");
   EXPECT_NE(found.events[0].text.find("in 1 solve: converged"), std::string::npos)
       << found.events[0].text;
 }
@@ -293,7 +294,7 @@ TEST(CeresBatch, WhatIsKnownStays) {
 
 // ---- manifolds ----------------------------------------------------------------------------------
 
-/// A value on a manifold that stays, and a sensor of it.
+/// A value on a manifold that stays.
 template <class G>
 struct Still : Motion<0, G> {
   static constexpr std::array kBlocks{Quantity{"x"}};
@@ -303,20 +304,6 @@ struct Still : Motion<0, G> {
     std::copy_n(x, G::kAmbient, next);
   }
   void SqrtQ(double, MatrixRef) const {}
-};
-template <class G>
-struct Direct : Sensor<G, G> {
-  static constexpr std::array kRoles{Quantity{"x"}};
-  static constexpr Quantity kMeasurement{"z"};
-  template <class T>
-  bool Predict(const T* x, T* z) const {
-    std::copy_n(x, G::kAmbient, z);
-    return true;
-  }
-  template <class T>
-  void SqrtNoise(const T*, T* l) const {
-    for (int i = 0; i < G::kTangent; ++i) l[i * G::kTangent + i] = T(0.4);
-  }
 };
 
 /// At the estimate x the derivative of |x (-) m|^2 / 0.25 + sum |z (-) x|^2 / 0.16 vanishes.
@@ -330,7 +317,7 @@ void ExpectStationary(const Geometry& geometry) {
   system.motions.push_back({"p", still, {id}});
   const int t = geometry.tangent;
   system.priors.push_back({id, mean, 0.25 * Eigen::MatrixXd::Identity(t, t), ""});
-  AddSensor(system, "z", InProcessSensor(Direct<G>(), "direct"), {"p.x"});
+  AddSensor(system, "z", InProcessSensor(testing::ManifoldSensor<G, 0.4>(), "direct"), {"p.x"});
   std::vector<Frame> frames;
   for (int k = 0; k < 3; ++k) {  // far from the mean and from one another
     const double d[3] = {0.9 + 0.4 * k, -0.5 * k, 0.3};

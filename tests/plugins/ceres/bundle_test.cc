@@ -147,7 +147,7 @@ TEST(CeresBundle, EndsAfterTheIterationWhereItIsTold) {
   EXPECT_LT(BundleRms(sensor, problem), 0.5 * before) << "what is reached is kept";
 }
 
-// All unknowns together are then so large that any step is small beside them.
+// All unknowns together are then so large that any step is small compared with them.
 TEST(CeresBundle, APointFarAwayDoesNotEndIt) {
   double cost[2] = {};
   for (const double far : {1e9, 1e15}) {
@@ -298,7 +298,8 @@ TEST(CeresBundle, SaysWhatIsNotDetermined) {
   for (const std::string& line : Undetermined(problem, sensor, result)) all += line + '\n';
   EXPECT_NE(all.find("2 parts share no observation"), std::string::npos) << all;
   EXPECT_NE(all.find("seen once: no depth"), std::string::npos) << all;
-  EXPECT_NE(all.find("directions beside the scale are told by no observation"), std::string::npos)
+  EXPECT_NE(all.find("directions besides the scale are determined by no observation"),
+            std::string::npos)
       << all;
 }
 
@@ -342,10 +343,12 @@ TEST(CeresBundle, CountsDirectionsThatNothingTells) {
     return Undetermined(problem, sensor, result).back();
   };
   EXPECT_EQ(last(9), "rank: 9 of 10 unknowns: all but the scale is determined");
-  EXPECT_EQ(last(8),
-            "rank: 8 of 10 unknowns; 1 direction beside the scale is told by no observation");
-  EXPECT_EQ(last(7),
-            "rank: 7 of 10 unknowns; 2 directions beside the scale are told by no observation");
+  EXPECT_EQ(
+      last(8),
+      "rank: 8 of 10 unknowns; 1 direction besides the scale is determined by no observation");
+  EXPECT_EQ(
+      last(7),
+      "rank: 7 of 10 unknowns; 2 directions besides the scale are determined by no observation");
   EXPECT_EQ(last(-1), "rank: not computed, the Jacobian is not finite");
 }
 

@@ -5,6 +5,7 @@
 
 #include "alidade/run/run.h"
 #include "batch_fixture.h"
+#include "support/manifold_models.h"
 
 namespace alidade {
 namespace {
@@ -217,44 +218,17 @@ TEST(FixedLag, FramesThatLeaveTakeNothingWithThem) {
   ExpectLeavingChangesNothing(system, DepthFrames(30));
 }
 
-/// A value on a manifold that wanders, and a sensor of it.
-template <class G>
-struct Wander : Motion<G::kTangent, G> {
-  static constexpr std::array kBlocks{Quantity{"x"}};
-  template <class T>
-  void Step(const T* x, const T* w, double, T* next) const {
-    G::Plus(x, w, next);
-  }
-  void SqrtQ(double dt_s, MatrixRef l) const {
-    for (int i = 0; i < G::kTangent; ++i) l(i, i) = 0.1 * std::sqrt(dt_s);
-  }
-};
-template <class G>
-struct Direct : Sensor<G, G> {
-  static constexpr std::array kRoles{Quantity{"x"}};
-  static constexpr Quantity kMeasurement{"z"};
-  template <class T>
-  bool Predict(const T* x, T* z) const {
-    std::copy_n(x, G::kAmbient, z);
-    return true;
-  }
-  template <class T>
-  void SqrtNoise(const T*, T* l) const {
-    for (int i = 0; i < G::kTangent; ++i) l[i * G::kTangent + i] = T(0.4);
-  }
-};
-
 template <class G>
 System OnManifold(const Geometry& geometry) {
   System system;
-  const MotionModel model = InProcessMotion(Wander<G>(), "wander");
+  const MotionModel model = InProcessMotion(testing::ManifoldWalk<G, 0.1>(), "wander");
   const BlockId id = system.layout.Declare("p.x", "p", model.blocks()[0]);
   system.motions.push_back({"p", model, {id}});
   const int t = geometry.tangent;
   std::vector<double> mean(G::kAmbient);
   geometry.Identity(mean.data());
   system.priors.push_back({id, mean, 0.25 * Eigen::MatrixXd::Identity(t, t), ""});
-  AddSensor(system, "z", InProcessSensor(Direct<G>(), "direct"), {"p.x"});
+  AddSensor(system, "z", InProcessSensor(testing::ManifoldSensor<G, 0.4>(), "direct"), {"p.x"});
   return system;
 }
 

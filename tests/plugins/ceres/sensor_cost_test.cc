@@ -9,27 +9,15 @@
 #include "plugins/ceres/bundle/geometry_manifold.h"
 #include "sensors/self_calibrating_feature.h"
 #include "sensors/stereo_disparity.h"
+#include "support/manifold_models.h"
 
 namespace alidade::ceres_batch {
 namespace {
 
 using Values = std::vector<std::vector<double>>;
 
-/// z = x (+) n
 template <class G>
-struct Seen : Sensor<G, G> {
-  static constexpr std::array kRoles{Quantity{"x"}};
-  static constexpr Quantity kMeasurement{"z"};
-  template <class T>
-  bool Predict(const T* x, T* z) const {
-    std::copy_n(x, G::kAmbient, z);
-    return true;
-  }
-  template <class T>
-  void SqrtNoise(const T*, T* l) const {
-    l[0] = T(1.0);
-  }
-};
+using Seen = testing::ManifoldSensor<G, 1.0>;
 
 /// z = x + b, where b may lack.
 struct Biased : Sensor<Vec<1>, Vec<1>, Vec<1>> {

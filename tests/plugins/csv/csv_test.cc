@@ -214,7 +214,7 @@ TEST_F(Csv, BlindNamesTheStreams) {
                   "inverse_scale; did you mean 'disparity'?");
   ExpectBadConfig(kDepthConfig + std::string("blind: disparity\n"),
                   "run.yaml:4:8 blind: without 'blind_after' no stream goes blind; expected "
-                  "'blind_after' beside it");
+                  "'blind_after' with it");
 }
 
 TEST_F(Csv, BlindAfterNeedsRowsInTheOrderOfTime) {

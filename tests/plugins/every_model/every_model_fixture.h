@@ -10,40 +10,19 @@
 #include "alidade/model/camera.h"
 #include "alidade/model/static_ekf.h"
 #include "plugins/host/host_fixture.h"
+#include "support/manifold_models.h"
 #include "support/systems.h"
 
 /// A shipped model from its one struct, as a plugin under the engine and the batch, and composed at
 /// compile time. Each composition takes seconds to compile: the rows stand in several sources.
 namespace alidade::testing {
 
-/// x' = x (+) w: moves the roles of a sensor.
+/// Moves the roles of a sensor.
 template <class G>
-struct Wander : Motion<G::kTangent, G> {
-  static constexpr std::array kBlocks{Quantity{"x"}};
-  template <class T>
-  void Step(const T* x, const T* w, double, T* next) const {
-    G::Plus(x, w, next);
-  }
-  void SqrtQ(double dt_s, MatrixRef l) const {
-    for (int i = 0; i < G::kTangent; ++i) l(i, i) = 0.01 * std::sqrt(dt_s);
-  }
-};
-
-/// z = x (+) n: sees the blocks of a motion model.
+using Wander = ManifoldWalk<G, 0.01>;
+/// Sees the blocks of a motion model.
 template <class G>
-struct Seen : Sensor<G, G> {
-  static constexpr std::array kRoles{Quantity{"x"}};
-  static constexpr Quantity kMeasurement{"z"};
-  template <class T>
-  bool Predict(const T* x, T* z) const {
-    std::copy_n(x, G::kAmbient, z);
-    return true;
-  }
-  template <class T>
-  void SqrtNoise(const T*, T* l) const {
-    for (int i = 0; i < G::kTangent; ++i) l[i * (G::kTangent + 1)] = T(0.05);
-  }
-};
+using Seen = ManifoldSensor<G, 0.05>;
 
 using Means = std::vector<std::vector<double>>;
 

@@ -101,10 +101,10 @@ TEST_F(SharedParametersTest, OtherKeysAreTheEntrysOwn) {
 TEST_F(SharedParametersTest, ASourceSharesThem) {
   const PluginHost host({Built("sources")});
   const Config config = Parse(kCamera + "source: {type: sees}");
-  EXPECT_NO_THROW(host.CreateSource("sees", config.root().At("source"), 1, "/"));
+  EXPECT_NO_THROW(host.CreateSource(config, 1));
   const Config none = Parse("source: {type: sees}");
   ExpectError(ExitCode::kBadConfig, {"camera.fx: missing; source 'sees' needs it"},
-              [&] { host.CreateSource("sees", none.root().At("source"), 1, "/"); });
+              [&] { host.CreateSource(none, 1); });
 }
 
 }  // namespace

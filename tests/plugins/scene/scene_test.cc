@@ -93,7 +93,8 @@ TEST(Scene, NoiseIsThatOfTheConfig) {
 
 TEST(Scene, SameSeedSameBytesAndOthersDiffer) {
   const std::string keys =
-      "max_frames: 10, simulate_odometry: true, odometry_noise: {linear: 0.1, angular: 0.1}, "
+      "max_frames: 10, simulate_odometry: true, odometry_noise: {linear_velocity: 0.1, "
+      "angular_velocity: 0.1}, "
       "trajectory: {random: {linear_acceleration: 1, angular_acceleration: 1}}, " +
       kPoints;
   const auto values = [&](std::uint64_t seed) {
@@ -179,7 +180,7 @@ TEST(Scene, PointsLieWhereTheConfigPutsThem) {
     const double p = share[i % 3];
     EXPECT_NEAR(on[i], 3000 * p, 4 * std::sqrt(3000 * p * (1 - p))) << i;
   }
-  const auto shells = points("shells: {center: [0, 0, 1], radii: [4.3, 10, 20]}, count: 300");
+  const auto shells = points("shells: {centre: [0, 0, 1], radii: [4.3, 10, 20]}, count: 300");
   Vector3d mean = Vector3d::Zero();
   for (std::size_t i = 0; i < shells.size(); ++i) {
     const double radius = std::vector<double>{4.3, 10, 20}[i % 3];

@@ -156,10 +156,11 @@ TEST_F(TracksTest, AFrameWithoutATime) {
                 "measures: pixel");
   Write("tracks.csv", kGood);
   fs::remove(folder_ / "timestamps.csv");
-  ExpectError(ExitCode::kBadConfig,
-              "run.yaml:1:16 source.path: no timestamps.csv beside the tracks; expected that file, "
-              "or 'rate_hz'",
-              [&] { Open("measures: pixel"); });
+  ExpectError(
+      ExitCode::kBadConfig,
+      "run.yaml:1:16 source.path: no timestamps.csv next to the tracks; expected that file, "
+      "or 'rate_hz'",
+      [&] { Open("measures: pixel"); });
 }
 
 TEST_F(TracksTest, FaultsOfOdometry) {

@@ -18,7 +18,7 @@ namespace alidade::testing {
 
 namespace fs = std::filesystem;
 
-/// A folder of its own for each test, with tracks.csv and what is beside it.
+/// A folder of its own for each test, with tracks.csv and what is next to it.
 class TracksTest : public ::testing::Test {
  protected:
   void Write(const std::string& name, const std::string& text) const {

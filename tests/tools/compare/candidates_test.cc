@@ -20,11 +20,11 @@ using internal::CompareRuns;
 
 EstimatorKind KindOf(const std::string& type) {
   if (type == "rts") return EstimatorKind::kSmoother;
-  if (type == "fixed_lag") return EstimatorKind::kWindow;
+  if (type == "fixed_lag") return EstimatorKind::kSlidingWindow;
   return type == "ceres_batch" ? EstimatorKind::kBatch : EstimatorKind::kFilter;
 }
 
-/// An estimator of a block p.x that is `error` beside the truth, nought, at three timestamps.
+/// An estimator of a block p.x that is off the truth by `error`, nought, at three timestamps.
 ComparedEntry Entry(const std::string& name, const std::string& type, bool smoothed, double error,
                     const std::vector<std::string>& sensors = {"stereo"}) {
   ComparedEntry entry;
@@ -157,7 +157,7 @@ TEST(CompareRuns, ExplainsTheGapOfAFilterAlone) {
                                                "' is not an online filter; expected one of ekf");
     }
   }
-  EXPECT_EQ(CompareRuns({run}, {"", "ekf", true}).explained, "ekf");
+  EXPECT_EQ(CompareRuns({run}, {"", "ekf", true}).decomposed, "ekf");
 }
 
 /// With a map of three landmarks at distance `error` of the true ones, along x.
@@ -189,8 +189,8 @@ TEST(CompareRuns, WithoutABatchSoFarLinearisationIsToldFromTheLastFrame) {
   const auto value = [&](const char* key) { return step.values.at(key).mean; };
   EXPECT_EQ(value("rmsd:p.x"), 1.5);
   EXPECT_EQ(value("rmsd.sigmas:p"), 3.0);
-  EXPECT_EQ(value("error_ratio:p.x"), 4.0);
-  EXPECT_EQ(value("error_ratio:map"), 4.0);
+  EXPECT_EQ(value("ratio.rmse:p.x"), 4.0);
+  EXPECT_EQ(value("ratio.rmse:map"), 4.0);
   EXPECT_EQ(value("rmsd:map"), 0.375);
   EXPECT_LT(value("rmsd:map.sim3"), 1e-12);
   const std::string text = CompareReport(comparison, TableStyle::kText);

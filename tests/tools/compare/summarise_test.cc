@@ -11,7 +11,7 @@ namespace {
 /// A run of two estimators, the second one the reference of the first.
 Comparison OneRun(double error, bool filter_diverged = false) {
   Comparison one;
-  one.explained = "ekf";
+  one.decomposed = "ekf";
   one.estimators.resize(2);
   ComparedEstimator& filter = one.estimators[0];
   filter.name = "ekf";

@@ -159,10 +159,11 @@ TEST(Associate, TheOffsetIsAddedToTheEstimate) {
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ExitCode::kBadData);
-    EXPECT_STREQ(error.what(),
-                 "curve.tum: no pose within 0.001 s of one of curve.tum: 0.000000 s to 2.000000 s "
-                 "beside 10.000000 s to 13.000000 s; expected the same clock; or --t-offset, which "
-                 "is added to the estimate's timestamps, or --t-max-diff");
+    EXPECT_STREQ(
+        error.what(),
+        "curve.tum: no pose within 0.001 s of one of curve.tum: 0.000000 s to 2.000000 s "
+        "compared with 10.000000 s to 13.000000 s; expected the same clock; or --t-offset, which "
+        "is added to the estimate's timestamps, or --t-max-diff");
   }
 }
 
@@ -172,7 +173,7 @@ TEST(Associate, NamesTheOffsetWhereItIsToBlame) {
     FAIL();
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what())
-                  .find("0.000000 s to 1.000000 s and --t-offset beside "
+                  .find("0.000000 s to 1.000000 s and --t-offset compared with "
                         "0.000000 s to 1.000000 s"),
               std::string::npos)
         << error.what();
@@ -192,14 +193,16 @@ TEST(Associate, RefusesAnOffsetThatNoTimestampHolds) {
     }
     return std::string();
   };
-  EXPECT_EQ(refusal(two, one, kOffset),
-            "curve.tum --t-offset: 9000000000.000000 s beside its timestamps is beyond 292 years; "
-            "expected the "
-            "time between the two clocks");
-  EXPECT_EQ(refusal(one, two, -kOffset),
-            "curve.tum --t-offset: -9000000000.000000 s beside its timestamps is beyond 292 years; "
-            "expected the "
-            "time between the two clocks");
+  EXPECT_EQ(
+      refusal(two, one, kOffset),
+      "curve.tum --t-offset: 9000000000.000000 s added to its timestamps is beyond 292 years; "
+      "expected the "
+      "time between the two clocks");
+  EXPECT_EQ(
+      refusal(one, two, -kOffset),
+      "curve.tum --t-offset: -9000000000.000000 s added to its timestamps is beyond 292 years; "
+      "expected the "
+      "time between the two clocks");
 }
 
 TEST(Associate, WithoutTimestampsByRow) {
@@ -228,10 +231,10 @@ TEST(Associate, WithoutTimestampsByRow) {
   five.name = "five.txt";
   EXPECT_EQ(refusal(timed, five),
             "five.txt: 5 poses for 4 of timed.txt, and no timestamps; expected a row for each row "
-            "of the reference, or timestamps in both (KITTI: NAME_times.txt beside NAME.txt)");
+            "of the reference, or timestamps in both (KITTI: NAME_times.txt next to NAME.txt)");
   EXPECT_EQ(refusal(five, timed),
             "five.txt: 5 poses for 4 of timed.txt, and no timestamps; expected a row for each row "
-            "of the estimate, or timestamps in both (KITTI: NAME_times.txt beside NAME.txt)");
+            "of the estimate, or timestamps in both (KITTI: NAME_times.txt next to NAME.txt)");
 }
 
 TEST(Associate, KittiWithTimesBesideBothGoesByThem) {

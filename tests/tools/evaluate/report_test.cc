@@ -36,9 +36,9 @@ TEST(EvaluationReport, EveryTableSaysWhatItsFiguresDependOn) {
             "| a_b | none | 1.000000 | 30 of 30 | 0.01 | 0.050000 | 0.000000 | 0.000000 | 0.000000 "
             "|\n"
             "| c | se3 | 1.000000 | 30 of 30 | 0.01 | 0.000000 | 0.000000 | 0.000000 | 0.000000 |\n"
-            "\nRmse against curve.tum; RPE of consecutive pairs, 1 f apart.\n");
+            "\nRMSE, compared with curve.tum; RPE of consecutive pairs, 1 f apart.\n");
   const std::string latex = EvaluationLatex(both);
-  EXPECT_TRUE(latex.starts_with("% Rmse against curve.tum; ")) << latex;
+  EXPECT_TRUE(latex.starts_with("% RMSE, compared with curve.tum; ")) << latex;
   EXPECT_NE(latex.find("\\begin{tabular}{llrrrrrrr}\n"), std::string::npos) << latex;
   EXPECT_NE(latex.find("a\\_b & none & 1.000000 & 30 of 30 & 0.01 & 0.050000 & "),
             std::string::npos)
@@ -190,7 +190,7 @@ TEST(SaveEvoResult, IsAZipAsEvoWritesIt) {
   EXPECT_NEAR(times[29], 102.9, 1e-9);
   EXPECT_NEAR(Numbers(entries.at("seconds_from_start.npy")).second[29], 2.9, 1e-9);
   EXPECT_NEAR(Numbers(entries.at("distances_from_start.npy")).second[29],
-              evaluation.reference.PathLength(0, 29), 1e-12);
+              evaluation.reference.Length(0, 29), 1e-12);
   const auto [square, matrix] = Numbers(entries.at("alignment_transformation_sim3.npy"));
   EXPECT_EQ(square, "(4, 4)");
   EXPECT_NEAR(matrix[3], -0.05, 1e-12);
@@ -231,8 +231,8 @@ TEST(SaveEvoResult, DistancesAreThoseOfThePosesWhateverTheirOrder) {
   ASSERT_EQ(estimate.size(), evaluation.pairs.size());
   for (std::size_t k = 0; k < evaluation.pairs.size(); ++k) {
     const int end = evaluation.pairs[k].second;
-    EXPECT_NEAR(reference[k], evaluation.reference.PathLength(0, end), 1e-12) << k;
-    EXPECT_NEAR(estimate[k], evaluation.estimate.PathLength(0, end), 1e-12) << k;
+    EXPECT_NEAR(reference[k], evaluation.reference.Length(0, end), 1e-12) << k;
+    EXPECT_NEAR(estimate[k], evaluation.estimate.Length(0, end), 1e-12) << k;
   }
   EXPECT_NE(entries.at("info.json").find("Umeyama alignment) (aligned poses: 5)"),
             std::string::npos)

@@ -100,7 +100,7 @@ TEST_F(TrajectoryFiles, KittiTakesItsTimestampsFromTheFileBeside) {
   fs::remove(folder_ / "poses_times.txt");
   Write("times.txt", "0\n1\n2\n");
   EXPECT_NE(Refusal(rows).find("times.txt:3: 3 times for 2 poses of "), std::string::npos);
-  EXPECT_NE(Refusal(rows).find("; expected one for each pose, or poses_times.txt beside it"),
+  EXPECT_NE(Refusal(rows).find("; expected one for each pose, or poses_times.txt next to it"),
             std::string::npos)
       << Refusal(rows);
   Write("poses_times.txt", "5\n5\n");

@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "alidade/model/landmark.h"
 #include "alidade/run/map_metrics.h"
 #include "support/landmark_models.h"
 #include "support/recording.h"
@@ -15,7 +16,7 @@
 namespace alidade::testing {
 namespace {
 
-/// Four points beside a camera that moves right, and an odometer that a static block is read by.
+/// Four points next to a camera that moves right, and an odometer that a static block is read by.
 class Street : public Source {
  public:
   /// With `outlier`, one measurement of landmark 3 is far off.
@@ -110,6 +111,22 @@ TEST(LandmarkRecords, EveryColumnOfTheMapIsItsOwn) {
   EXPECT_EQ(last[14], "8");  // one was gated
   const std::array<double, 3> place = *Street().TrueLandmark(3);
   for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(std::stod(last[15 + i]), place[i]);
+}
+
+// Seen under a ray alone, its place may lie anywhere: the inverse distance then has its own cells.
+TEST(LandmarkRecords, AnInverseDistanceIsWrittenBeforeItsSigma) {
+  LandmarkEstimate far_off;
+  far_off.id = 7;
+  far_off.generation = 2;
+  far_off.representation = LandmarkRepresentation::kInverseDepth;
+  far_off.inverse_distance = -0.25;
+  far_off.sigma = 0.5;
+  const TemporaryFolder folder;
+  internal::OutputFolder out(folder / "out", false);
+  internal::WriteLandmarks(out, "ekf", {far_off});
+  out.Commit();
+  EXPECT_EQ(Lines(folder / "out/ekf/landmarks.csv").at(1),
+            "7,2,inverse_depth,,,,,,,-0.25,0.5,,,0,0,,,");
 }
 
 TEST(LandmarkRecords, OtherFilesHaveTheBlocksOfTheSystemAlone) {

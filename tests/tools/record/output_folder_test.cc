@@ -234,7 +234,7 @@ TEST(OutputFolder, AFolderBeingWrittenIsRefused) {
   Record(OptionsFor(folder / "other"));  // another name is free
 }
 
-/// The hidden folders beside `out`, by name.
+/// The hidden folders next to `out`, by name.
 std::vector<std::string> HiddenIn(const TemporaryFolder& folder) {
   std::vector<std::string> names;
   for (const auto& entry : fs::directory_iterator(folder.path())) {
@@ -462,7 +462,7 @@ TEST(OutputFolder, EveryFailureOfTheDiskIsAnErrorThatLeavesNothing) {
                 std::string::npos)
           << text;
       if (replace && fs::exists(folder / "out") && Lines(folder / "out/truth.csv").size() == 6) {
-        // The last fsync, of the folder above: the new one is in its place, the old one beside it.
+        // The last fsync, of the folder above: the new one is in its place, the old one next to it.
         EXPECT_NE(text.find("cannot sync"), std::string::npos) << text;
         for (const auto& entry : fs::directory_iterator(folder.path())) fs::remove_all(entry);
         Record(OptionsFor(folder / "out"), 3);

@@ -24,7 +24,7 @@ TEST(Recorder, WritesEveryFile) {
           "comparison.csv", "config.resolved.yaml", "ekf/estimates.csv", "ekf/events.csv",
           "ekf/gains.csv", "ekf/innovations.csv", "expected.csv", "files.txt", "implied_states.csv",
           "log.txt", "measurements.csv", "report.html", "run.json", "timing.json", "truth.csv"}));
-  EXPECT_EQ(FilesIn(folder.path()).size(), 19u);  // nothing beside it
+  EXPECT_EQ(FilesIn(folder.path()).size(), 19u);  // nothing next to it
 }
 
 TEST(Recorder, EstimatesRoundTrip) {

@@ -9,7 +9,7 @@
 #include <set>
 
 #include "alidade/base/words.h"
-#include "alidade/host/build_plugin.h"
+#include "alidade/host/cpp_plugin.h"
 #include "alidade/host/plugin_file.h"
 
 namespace alidade {
@@ -127,7 +127,7 @@ std::string Count(std::ptrdiff_t count, const std::string& what) {
 }  // namespace
 
 const char* ToString(BundleEnd end) {
-  constexpr const char* kNames[] = {"converged", "out of iterations", "stopped", "failed"};
+  constexpr const char* kNames[] = {"converged", "out_of_iterations", "stopped", "failed"};
   return kNames[static_cast<int>(end)];
 }
 
@@ -294,8 +294,9 @@ std::vector<std::string> Undetermined(const BundleProblem& problem, const Sensor
   } else if (open > 0) {
     lines.push_back("rank: " + std::to_string(result.rank) + " of " +
                     std::to_string(result.unknowns) + " unknowns; " + std::to_string(open) +
-                    (open == 1 ? " direction" : " directions") + (mono ? " beside the scale" : "") +
-                    (open == 1 ? " is" : " are") + " told by no observation");
+                    (open == 1 ? " direction" : " directions") +
+                    (mono ? " besides the scale" : "") + (open == 1 ? " is" : " are") +
+                    " determined by no observation");
   } else {
     lines.push_back(
         "rank: " + std::to_string(result.rank) + " of " + std::to_string(result.unknowns) +

@@ -57,7 +57,7 @@ struct BundleOptions {
 };
 
 enum class BundleEnd { kConverged, kOutOfIterations, kStopped, kFailed };
-/// `converged`, `out of iterations`, `stopped`, `failed`.
+/// `converged`, `out_of_iterations`, `stopped`, `failed`.
 const char* ToString(BundleEnd end);
 
 /// What became of an adjustment.
@@ -112,14 +112,14 @@ double BundleRms(const SensorModel& sensor, const BundleProblem& problem);
 /// pose of the first camera that is used stays. If the sensor measures two numbers, which cannot
 /// determine the scale, cameras and points are scaled about the first camera after the solution, so
 /// that the extent (BundleResult) is that of the start. Done by the plugin of the Ceres solver,
-/// loaded when it is first asked for, from `folder`, or if that is "" from beside the library.
+/// loaded when it is first asked for, from `folder`, or if that is "" from next to the library.
 /// Errors: kPlugin where there is none, kNotTrusted; kBadData where no observation is used; kUsage
 /// as FixedElements, and for a scale of the loss out of its bounds.
 BundleResult AdjustBundle(const SensorModel& sensor, BundleProblem& problem,
                           const BundleOptions& options, const std::filesystem::path& folder = {});
 
-/// What the observations used cannot tell, in words, a line each: the gauge, parts that share no
-/// observation, points seen once, directions without any information.
+/// What the observations used do not determine, in words, a line each: the gauge, parts that share
+/// no observation, points seen once, directions without any information.
 std::vector<std::string> Undetermined(const BundleProblem& problem, const SensorModel& sensor,
                                       const BundleResult& result);
 

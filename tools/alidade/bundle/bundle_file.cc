@@ -66,7 +66,7 @@ BundleFile ReadBundle(const std::filesystem::path& file) {
   const std::size_t first = std::min(view.find('\n'), view.size());
   if (view.substr(0, first).find(',') != view.npos) {
     FailFormat(name, "columns with commas: tracks",
-               "their calibration and start beside them, --camera FILE and --start FILE");
+               "their calibration and start next to them, --camera FILE and --start FILE");
   }
   return internal::ReadBal(view, name);
 }

@@ -59,7 +59,7 @@ struct BundleTracks {
 };
 
 /// Reads tracks of one camera (dim 0, 1) or of a rectified pair (0 to 3). Frames have the
-/// timestamps of `timestamps.csv` beside the tracks, and a pose to 1 us; where it is not there, as
+/// timestamps of `timestamps.csv` next to the tracks, and a pose to 1 us; where it is not there, as
 /// from standard input (`-`), the k-th pose is that of frame k. Frames without a pose are left out.
 /// Points are placed by triangulation from the start, by the inverse measurement models of the
 /// sensor that `host` gives; those that it cannot place are left out. Errors: kInputMissing,

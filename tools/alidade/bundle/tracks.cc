@@ -4,8 +4,8 @@
 #include <map>
 #include <optional>
 
+#include "alidade/base/decompositions.h"
 #include "alidade/base/number_rows.h"
-#include "alidade/base/symmetric_eigen.h"
 #include "alidade/bundle/bundle_file.h"
 #include "alidade/model/geometry.h"
 
@@ -214,7 +214,7 @@ BundleFile ReadBundleTracks(const BundleTracks& from, const PluginHost& host) {
   if (problem.cameras.empty()) {
     throw Error(ExitCode::kBadData,
                 ErrorLine(Place{from.start.string()}, {}, "no pose at the time of any frame",
-                          "the times of timestamps.csv beside the tracks"));
+                          "the times of timestamps.csv next to the tracks"));
   }
   return file;
 }

@@ -95,7 +95,7 @@ std::string TypeOf(EstimatorKind kind, const PluginHost& host) {
 /// The config with the variant's entry.
 Config WithVariant(const Config& config, const Variant& variant, const std::string& type,
                    const std::string& name, const std::string& filter) {
-  Config with = internal::Copy(config);
+  Config with = config.Copy();
   const std::string entry = "estimators." + name;
   with.Set(entry + ".type", type, kOrigin);
   if (variant.full_information) with.Set(entry + ".mode", "filtering", kOrigin);
@@ -119,9 +119,9 @@ std::string ReasonOf(const Error& error) {
 }
 
 /// Adds the variant, or puts what it is below the reason why it cannot be.
-void AddVariant(const Variant& variant, const PluginHost& host, ExplainedExperiment& explained,
+void AddVariant(const Variant& variant, const PluginHost& host, ComparedExperiment& compared,
                 std::map<std::string, std::vector<std::string>>& left_out) {
-  const std::string name = FreeName(variant.name, explained.experiment.estimators);
+  const std::string name = FreeName(variant.name, compared.experiment.estimators);
   const std::string type = TypeOf(variant.kind, host);
   if (type.empty()) {
     left_out[std::string("no plugin offers an estimator of the kind ") + ToString(variant.kind)]
@@ -129,11 +129,11 @@ void AddVariant(const Variant& variant, const PluginHost& host, ExplainedExperim
     return;
   }
   try {
-    const Config with = WithVariant(explained.config, variant, type, name, explained.filter);
-    internal::AddEstimator(with, host, name, explained.experiment);
-    explained.config = with;
-    explained.added.push_back(name);
-    explained.notes.push_back("added '" + name + "': " + variant.what);
+    const Config with = WithVariant(compared.config, variant, type, name, compared.filter);
+    internal::AddEstimator(with, host, name, compared.experiment);
+    compared.config = with;
+    compared.added.push_back(name);
+    compared.notes.push_back("added '" + name + "': " + variant.what);
   } catch (const Error& error) {
     left_out[ReasonOf(error)].emplace_back(variant.what);
   }
@@ -166,24 +166,24 @@ int FindFilter(const Experiment& experiment, const std::string& name) {
 
 }  // namespace
 
-ExplainedExperiment ExplainExperiment(const Config& config, const PluginHost& host,
-                                      const CompareOptions& options) {
+ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHost& host,
+                                           const CompareOptions& options) {
   if (options.over_seeds) internal::CheckReadableAgain(config);
   // Errors are taken from truth: what a config compares with besides is done here.
-  Config own = internal::Copy(config);
+  Config own = config.Copy();
   if (own.root().is_map() && own.root().Find("reference")) {
     own.Set("reference", "truth", kOrigin);
-    own = internal::Copy(own);
+    own = own.Copy();
   }
-  ExplainedExperiment explained{own, BuildExperiment(own, host), "", {}, {}};
-  const int filter = FindFilter(explained.experiment, options.filter);
-  if (filter < 0 || !options.explain) CheckReference(explained.experiment, options.reference);
-  if (filter < 0) return explained;
-  explained.filter = explained.experiment.estimators[static_cast<std::size_t>(filter)].name;
-  if (!options.explain) return explained;
+  ComparedExperiment compared{own, BuildExperiment(own, host), "", {}, {}};
+  const int filter = FindFilter(compared.experiment, options.filter);
+  if (filter < 0 || !options.decompose) CheckReference(compared.experiment, options.reference);
+  if (filter < 0) return compared;
+  compared.filter = compared.experiment.estimators[static_cast<std::size_t>(filter)].name;
+  if (!options.decompose) return compared;
   std::map<std::string, std::vector<std::string>> left_out;  // by reason
   for (const Variant& variant : Variants()) {
-    const std::vector<NamedEstimator>& all = explained.experiment.estimators;
+    const std::vector<NamedEstimator>& all = compared.experiment.estimators;
     const NamedEstimator& of = all[static_cast<std::size_t>(filter)];
     const bool there = std::ranges::any_of(
         all, [&](const NamedEstimator& one) { return IsThere(variant, one, of, filter); });
@@ -193,13 +193,13 @@ ExplainedExperiment ExplainExperiment(const Config& config, const PluginHost& ho
           .emplace_back(variant.what);
       continue;
     }
-    AddVariant(variant, host, explained, left_out);
+    AddVariant(variant, host, compared, left_out);
   }
   for (const auto& [reason, what] : left_out) {
-    explained.notes.push_back("left out " + internal::Join(what, "; ") + ": " + reason);
+    compared.notes.push_back("left out " + internal::Join(what, "; ") + ": " + reason);
   }
-  CheckReference(explained.experiment, options.reference);
-  return explained;
+  CheckReference(compared.experiment, options.reference);
+  return compared;
 }
 
 }  // namespace alidade

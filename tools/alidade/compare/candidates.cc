@@ -30,7 +30,7 @@ std::string FolderName(const ComparedRun& run) {
       .string();
 }
 
-/// What estimators are called by beside those of other runs: the folder of each run, by its name
+/// What estimators are called by among those of other runs: the folder of each run, by its name
 /// alone where no other has that.
 std::vector<Candidate> CandidatesOf(const std::vector<ComparedRun>& runs) {
   std::vector<Candidate> candidates;
@@ -203,7 +203,7 @@ void AddRmsd(const Candidate& one, const Candidate& reference, ComparedEstimator
   const std::string& path = one.facts().position_block;
   if (path.empty() || !ScaleIsFree(one)) return;
   if (const auto aligned = AlignTrajectories(one.entry->series, reference.entry->series, path)) {
-    compared.values["rmsd.trajectory.sim3"] = Single(aligned->rmse);
+    compared.values["trajectory.sim3.rmsd"] = Single(aligned->rmse);
   }
 }
 
@@ -211,8 +211,10 @@ void AddFinal(const Candidate& one, const Candidate& reference, ComparedEstimato
   const Distance distance = internal::DistanceBetween(one.entry->series, reference.entry->series);
   AddAll(distance.final, "final_difference:", compared.values);
   AddAll(distance.final_sigmas, "final_difference.sigmas:", compared.values);
-  AddAll(internal::DistanceBetweenMaps(one.entry->result, reference.entry->result), "rmsd.",
-         compared.values);
+  for (const auto& [map, rms] :
+       internal::DistanceBetweenMaps(one.entry->result, reference.entry->result)) {
+    compared.values[map + ".rmsd"] = Single(rms);
+  }
 }
 
 /// Metrics of the run that need no truth.
@@ -331,7 +333,7 @@ void internal::RefuseFilter(const std::string& name, bool known,
 }
 
 const char* ToString(DecompositionKind kind) {
-  constexpr const char* kNames[] = {"linearisation", "smoothing", "rejected measurements"};
+  constexpr const char* kNames[] = {"linearisation", "smoothing", "rejected_measurements"};
   return kNames[static_cast<int>(kind)];
 }
 
@@ -363,9 +365,9 @@ Comparison internal::CompareRuns(const std::vector<ComparedRun>& runs,
     const Candidate* const final = references[i].final;
     if (comparison.reference.empty() && final != nullptr) comparison.reference = final->name;
   }
-  const Candidate* const filter = options.explain ? FilterOf(candidates, options) : nullptr;
+  const Candidate* const filter = options.decompose ? FilterOf(candidates, options) : nullptr;
   if (filter != nullptr) {
-    comparison.explained = filter->name;
+    comparison.decomposed = filter->name;
     comparison.decomposition = Decompose(*filter, candidates, truth);
     if (filter->entry->had_rejection_recovery) {
       comparison.notes.push_back(

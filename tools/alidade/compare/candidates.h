@@ -27,7 +27,7 @@ bool SameSystem(const EstimatorFacts& a, const EstimatorFacts& b);
 
 /// Whether its estimates rest on all data; later data of a window end with it.
 inline bool SmoothsAllData(const EstimatorFacts& facts) {
-  return facts.smoothed && facts.kind != EstimatorKind::kWindow;
+  return facts.smoothed && facts.kind != EstimatorKind::kSlidingWindow;
 }
 
 /// Refuses what an option names. Error: kUsage.

@@ -11,7 +11,7 @@
 #include "alidade/run/run.h"
 #include "alidade/sweep/sweep.h"
 
-/// Estimators over the same data beside each other, and where their difference comes from
+/// Estimators over the same data, compared, and where their difference comes from
 /// (docs/compare.md). What a filter makes of the past is never compared with what a smoother makes
 /// of all data: each is compared with the batch of the data that it had.
 namespace alidade {
@@ -20,8 +20,8 @@ struct CompareOptions {
   /// What errors are taken from: `truth`, or an estimator. "": truth where it is known, else the
   /// batch.
   std::string reference;
-  std::string filter;   ///< the one whose error is decomposed; "": the first
-  bool explain = true;  ///< else no error decomposition, and nothing is added to a config for it
+  std::string filter;     ///< the one whose error is decomposed; "": the first
+  bool decompose = true;  ///< else no error decomposition, and nothing is added to a config for it
   bool over_seeds = false;  ///< the source is read for each of several seeds
 };
 
@@ -32,9 +32,9 @@ struct CompareOptions {
 ///   final_difference:BLOCK         |d| at the last timestamp
 ///   rmsd.sigmas:OWNER              sqrt(mean d' P_ref^-1 d / dof), in sigmas of the reference
 ///   final_difference.sigmas:OWNER  the same at the last timestamp
-///   rmsd.trajectory.sim3           RMSD of the trajectory after the similarity that fits best, m
-///   rmsd.map                       rms of the places of landmarks at the end, m
-///   rmsd.map.sim3                  likewise after that similarity of the map, m
+///   trajectory.sim3.rmsd           RMSD of the trajectory after the similarity that fits best, m
+///   map.rmsd                       rms of the places of landmarks at the end, m
+///   map.sim3.rmsd                  likewise after that similarity of the map, m
 ///   ratio.KEY                      KEY over that of the reference; of rmse, final_error, map
 ///   time_us                        wall clock for each measurement
 struct ComparedEstimator {
@@ -52,13 +52,13 @@ struct ComparedEstimator {
 /// Where a part of the difference between a filter and the batch of all data comes from.
 enum class DecompositionKind {
   kLinearisation,  ///< the filter, compared with the full-information filter over what it accepted
-  kSmoothing,      ///< the filter against a smoother of the same models: what later data tell
+  kSmoothing,      ///< the filter against a smoother of the same models: what later data add
   kRejected,       ///< the batch of what the filter accepted against the batch of all data
 };
 /// `linearisation`, `smoothing`, `rejected measurements`.
 const char* ToString(DecompositionKind kind);
 
-/// One step of the way from the filter to the batch. Values: `error_ratio:BLOCK`, the RMSE from
+/// One step of the way from the filter to the batch. Values: `ratio.rmse:BLOCK`, the RMSE from
 /// truth of `from` over that of `to`; `rmsd:BLOCK` and `rmsd.sigmas:OWNER` between the two;
 /// `rmse.from:BLOCK`, `rmse.to:BLOCK`; `measurements` and `rejected` of kRejected. At the end they
 /// are of the last frame alone, and of BLOCK `map` and `map.sim3` too.
@@ -78,13 +78,13 @@ struct Comparison {
   std::string withheld;               ///< why there is no reference, or nothing to compare; or ""
   std::string measurements_sha256;    ///< of the data; "": of several seeds
   std::vector<ComparedEstimator> estimators;
-  std::string explained;  ///< the filter whose error it is
+  std::string decomposed;  ///< the filter whose error it is
   std::vector<DecompositionStep> decomposition;
   std::vector<std::string> notes;  ///< what a reader has to know, a line each
 };
 
 /// An experiment with the estimators that decompose the error of a filter.
-struct ExplainedExperiment {
+struct ComparedExperiment {
   Config config;  ///< with those that were added
   Experiment experiment;
   std::string filter;              ///< whose error it is; "": there is no filter
@@ -97,8 +97,8 @@ struct ExplainedExperiment {
 /// sensors, overrides and steps. What does not support the system is left out. Errors: those of
 /// BuildExperiment; kUsage where `options` names an estimator that is not there, or one that is no
 /// filter as that whose error is decomposed.
-ExplainedExperiment ExplainExperiment(const Config& config, const PluginHost& host,
-                                      const CompareOptions& options);
+ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHost& host,
+                                           const CompareOptions& options);
 
 /// Compares the estimators of a run while it runs.
 class RunComparer : public RunObserver {
@@ -132,7 +132,7 @@ struct ComparedSeeds {
 };
 /// Runs and compares a config once for each seed; the runs in which an estimator diverged count for
 /// none of its values. Errors: those of Sweep and of RunComparer.
-ComparedSeeds CompareSeeds(const ExplainedExperiment& explained, const PluginHost& host,
+ComparedSeeds CompareSeeds(const ComparedExperiment& compared, const PluginHost& host,
                            const SweepOptions& sweep, const CompareOptions& options);
 
 /// The values of comparisons of the same estimators, at least one, as mean and quantiles over them.

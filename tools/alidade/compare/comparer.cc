@@ -86,7 +86,7 @@ Comparison CompareFolders(const std::vector<std::filesystem::path>& folders,
   return comparison;
 }
 
-ComparedSeeds CompareSeeds(const ExplainedExperiment& explained, const PluginHost& host,
+ComparedSeeds CompareSeeds(const ComparedExperiment& compared, const PluginHost& host,
                            const SweepOptions& sweep, const CompareOptions& options) {
   std::mutex mutex;
   std::map<std::uint64_t, Comparison> by_seed;
@@ -99,13 +99,13 @@ ComparedSeeds CompareSeeds(const ExplainedExperiment& explained, const PluginHos
     const bool whole = result.code == ExitCode::kDiverged || result.status == RunStatus::kOk;
     if (!whole) return result;
     CompareOptions of_run = options;
-    of_run.filter = explained.filter;
+    of_run.filter = compared.filter;
     Comparison comparison = comparer.Finish(result, of_run);
     const std::lock_guard lock(mutex);
     by_seed.emplace(experiment.seed, std::move(comparison));
     return result;
   };
-  ComparedSeeds seeds{{}, Sweep(explained.config, host, with)};
+  ComparedSeeds seeds{{}, Sweep(compared.config, host, with)};
   std::vector<Comparison> comparisons;
   for (auto& [seed, comparison] : by_seed) comparisons.push_back(std::move(comparison));
   if (!comparisons.empty()) seeds.comparison = Summarise(comparisons);

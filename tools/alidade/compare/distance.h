@@ -24,7 +24,7 @@ struct Distance {
 /// Blocks are the same where name and geometry are.
 Distance DistanceBetween(const Series& series, const Series& reference);
 
-/// Of the paths that two series have of a vector block of three elements.
+/// Of the trajectories that two series have of a vector block of three elements.
 std::optional<Aligned> AlignTrajectories(const Series& series, const Series& reference,
                                          const std::string& block);
 

@@ -126,7 +126,7 @@ EstimatorFacts ReadFacts(const JsonNode& entry) {
   facts.type = TextOf(entry, "type");
   using enum EstimatorKind;
   facts.kind = static_cast<EstimatorKind>(entry.At("kind").Choice(
-      {ToString(kFilter), ToString(kSmoother), ToString(kBatch), ToString(kWindow)}));
+      {ToString(kFilter), ToString(kSmoother), ToString(kBatch), ToString(kSlidingWindow)}));
   facts.smoothed = entry.At("smoothed").Flag();
   facts.accepted_by = TextOf(entry, "accepted_by");
   facts.overrides = TextOf(entry, "overrides");

@@ -117,7 +117,7 @@ std::vector<RowKind> KindsOf(const Comparison& comparison, ReportRows rows,
                                                "map.sim3.rmse",
                                                "ratio.map.sim3.rmse"};
   static const std::set<std::string> differences = {
-      "rmsd", "rmsd.trajectory.sim3", "rmsd.sigmas", "time_us", "rmsd.map", "rmsd.map.sim3"};
+      "rmsd", "trajectory.sim3.rmsd", "rmsd.sigmas", "time_us", "map.rmsd", "map.sim3.rmsd"};
   const auto& main = comparison.reference == "truth" ? errors : differences;
   std::erase_if(kinds, [&](const RowKind& kind) { return !main.contains(kind.kind); });
   return kinds;
@@ -136,23 +136,24 @@ Section AlongSection(const Comparison& comparison, bool smoothed, ReportRows row
     any_diverged = any_diverged || one.diverged > 0;
   }
   if (of.empty()) return {};
-  Section section = TableOf(of, comparison.runs > 1,
-                            smoothed ? "Smoothed: estimates from later data too"
-                                     : "Online: every estimate from the data up to it",
-                            &ComparedEstimator::reference, &ComparedEstimator::reference_runs,
-                            KindsOf(comparison, rows,
-                                    {{"rmse", "rmse"},
-                                     {"ratio.rmse", "  ratio"},
-                                     {"trajectory.sim3.rmse", "trajectory, Sim3"},
-                                     {"trajectory.sim3.scale", "trajectory, scale"},
-                                     {"ratio.trajectory.sim3.rmse", "  ratio, trajectory, Sim3"},
-                                     {"rmsd", "RMSD"},
-                                     {"rmsd.trajectory.sim3", "RMSD, trajectory, Sim3"},
-                                     {"rmsd.sigmas", "RMSD in sigmas"},
-                                     {"nees.mean", "NEES"},
-                                     {"nees.within95", "in the 95 % region"},
-                                     {"nis.mean", "NIS"},
-                                     {"time_us", "wall clock [us/measurement]"}}));
+  Section section =
+      TableOf(of, comparison.runs > 1,
+              smoothed ? "Smoothed: estimates from later data too"
+                       : "Online: every estimate from the data up to it",
+              &ComparedEstimator::reference, &ComparedEstimator::reference_runs,
+              KindsOf(comparison, rows,
+                      {{"rmse", "rmse"},
+                       {"ratio.rmse", "  ratio"},
+                       {"trajectory.sim3.rmse", "Sim3-aligned trajectory"},
+                       {"trajectory.sim3.scale", "trajectory, scale"},
+                       {"ratio.trajectory.sim3.rmse", "  ratio, Sim3-aligned trajectory"},
+                       {"rmsd", "RMSD"},
+                       {"trajectory.sim3.rmsd", "RMSD, Sim3-aligned trajectory"},
+                       {"rmsd.sigmas", "RMSD in sigmas"},
+                       {"nees.mean", "NEES"},
+                       {"nees.within95", "in the 95 % region"},
+                       {"nis.mean", "NIS"},
+                       {"time_us", "wall clock [us/measurement]"}}));
   if (any_diverged) section.rows.push_back(diverged);
   if (comparison.runs > 1) section.rows.push_back(used);
   return section;
@@ -169,11 +170,11 @@ Section FinalSection(const Comparison& comparison, ReportRows rows) {
                           {"final_difference.sigmas", "difference in sigmas"},
                           {"map.rmse", "map"},
                           {"ratio.map.rmse", "  ratio, map"},
-                          {"map.sim3.rmse", "map, Sim3"},
+                          {"map.sim3.rmse", "Sim3-aligned map"},
                           {"map.sim3.scale", "map, scale"},
-                          {"ratio.map.sim3.rmse", "  ratio, map, Sim3"},
-                          {"rmsd.map", "RMSD, map"},
-                          {"rmsd.map.sim3", "RMSD, map, Sim3"}}));
+                          {"ratio.map.sim3.rmse", "  ratio, Sim3-aligned map"},
+                          {"map.rmsd", "RMSD, map"},
+                          {"map.sim3.rmsd", "RMSD, Sim3-aligned map"}}));
 }
 
 /// The values of one kind by their subject, under another kind.
@@ -208,7 +209,7 @@ std::string WordsOf(DecompositionKind kind) {
     case DecompositionKind::kLinearisation:
       return "what it costs that each measurement is linearised once, where the filter then was";
     case DecompositionKind::kSmoothing:
-      return "what later data tell of each estimate: no filter can have it, a smoother can";
+      return "what later data add to each estimate: a smoother can use it, a filter cannot";
     case DecompositionKind::kRejected:
       break;
   }
@@ -223,9 +224,9 @@ std::string LinesOf(const DecompositionStep& step) {
       (step.at_end ? "difference " : "RMSD ") + distances + " in sigmas of " + step.to;
   if (step.kind == DecompositionKind::kSmoothing) return line;
   constexpr double kNegligible = 0.1, kSmall = 0.5, kLarge = 1.0;
-  return line + (largest < kNegligible ? ": negligible beside what neither of them knows"
-                 : largest < kSmall    ? ": small beside what neither of them knows"
-                 : largest < kLarge    ? ": not small beside what neither of them knows"
+  return line + (largest < kNegligible ? ": negligible compared with what neither of them knows"
+                 : largest < kSmall    ? ": small compared with what neither of them knows"
+                 : largest < kLarge    ? ": not small compared with what neither of them knows"
                                     : ": more than the uncertainty that is left: here it matters");
 }
 
@@ -241,7 +242,9 @@ Section DecompositionSection(const Comparison& comparison, const DecompositionSt
   Section section;
   const std::string pair =
       step.from.empty() || step.to.empty() ? "" : ", " + step.from + " against " + step.to;
-  section.title = ToString(step.kind) + pair + (step.at_end ? ", at the last frame" : "");
+  section.title = ToString(step.kind);
+  std::ranges::replace(section.title, '_', ' ');
+  section.title += pair + (step.at_end ? ", at the last frame" : "");
   section.lines.push_back(WordsOf(step.kind));
   if (step.at_end) {
     section.lines.emplace_back("there the batch of all data is the full-information filter");
@@ -272,8 +275,8 @@ Section DecompositionSection(const Comparison& comparison, const DecompositionSt
   for (TableRow& row : section.rows) {
     row.label.erase(0, row.label.find_first_not_of(' '));
     const std::string block = row.label.substr(0, row.label.find(' '));
-    if (block == "map.sim3") row.label.replace(0, block.size(), "map, Sim3");
-    const auto ratio = step.values.find("error_ratio:" + block);
+    if (block == "map.sim3") row.label.replace(0, block.size(), "Sim3-aligned map");
+    const auto ratio = step.values.find("ratio.rmse:" + block);
     if (ratio == step.values.end()) continue;
     const std::vector<TableRow> text = SpreadRows(
         {{"", {{"ratio.rmse:" + block, ratio->second}}, {}}}, several, {{"ratio.rmse", ""}});
@@ -314,7 +317,7 @@ std::vector<Section> SectionsOf(const Comparison& comparison, ReportRows rows) {
   Section at_end = FinalSection(comparison, rows);
   if (!at_end.rows.empty()) sections.push_back(std::move(at_end));
   if (comparison.decomposition.empty()) return sections;
-  sections.push_back({"Error decomposition of " + comparison.explained, {}, {}, {}});
+  sections.push_back({"Error decomposition of " + comparison.decomposed, {}, {}, {}});
   for (const DecompositionStep& step : comparison.decomposition)
     sections.push_back(DecompositionSection(comparison, step));
   return sections;
@@ -355,7 +358,7 @@ internal::Json JsonOfDecomposition(const Comparison& comparison) {
     json["values"] = JsonOf(step.values, comparison.runs > 1);
     steps.push_back(std::move(json));
   }
-  return {{"filter", comparison.explained}, {"steps", std::move(steps)}};
+  return {{"filter", comparison.decomposed}, {"steps", std::move(steps)}};
 }
 
 }  // namespace

@@ -71,7 +71,7 @@ DecompositionStep SummariseStep(const std::vector<Comparison>& comparisons, std:
   for (const Comparison& one : comparisons) {
     const DecompositionStep& of_run = one.decomposition.at(s);
     const bool same = of_run.from == all.from && of_run.to == all.to;
-    if (same && !Diverged(one, one.explained)) gathered.Add(of_run.values);
+    if (same && !Diverged(one, one.decomposed)) gathered.Add(of_run.values);
   }
   all.values = std::move(gathered).Spreads();
   return all;

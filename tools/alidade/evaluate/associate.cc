@@ -49,7 +49,7 @@ Matches ByRow(const Trajectory& reference, const Trajectory& estimate) {
                    other.name + ", and no timestamps",
                std::string("a row for each row of the ") +
                    (of_reference ? "estimate" : "reference") +
-                   ", or timestamps in both (KITTI: NAME_times.txt beside NAME.txt)");
+                   ", or timestamps in both (KITTI: NAME_times.txt next to NAME.txt)");
 }
 
 std::string Span(const Trajectory& trajectory) {
@@ -70,7 +70,7 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Times
   if (!both) {
     FailMatching((reference.has_timestamps() ? estimate : reference).name,
                  "poses without timestamps",
-                 "times.txt beside them, as the other trajectory has timestamps");
+                 "times.txt next to them, as the other trajectory has timestamps");
   }
   const bool estimate_longer = estimate.size() > reference.size();
   const std::vector<Timestamp>& shorter = (estimate_longer ? reference : estimate).timestamps;
@@ -80,7 +80,7 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Times
     if (std::abs(Seconds(end) + Seconds(shift)) < cell::kTimeLimit) continue;
     throw Error(ExitCode::kBadData, ErrorLine({estimate.name}, "--t-offset",
                                               internal::SecondsText(offset) +
-                                                  " beside its timestamps is beyond 292 years",
+                                                  " added to its timestamps is beyond 292 years",
                                               "the time between the two clocks"));
   }
   Matches matches;
@@ -99,7 +99,7 @@ Matches Associate(const Trajectory& reference, const Trajectory& estimate, Times
   FailMatching(estimate.name,
                "no pose within " + internal::NumberText(Seconds(max_diff)) + " s of one of " +
                    reference.name + ": " + Span(estimate) + (offset == 0 ? "" : " and --t-offset") +
-                   " beside " + Span(reference),
+                   " compared with " + Span(reference),
                "the same clock; or --t-offset, which is added to the estimate's timestamps, or "
                "--t-max-diff");
 }

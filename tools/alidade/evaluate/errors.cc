@@ -141,7 +141,7 @@ std::vector<double> internal::Progress(const Trajectory& t, DeltaUnit unit) {
   for (int i = 1; i < t.size(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     double step = 1.0;
-    if (unit == DeltaUnit::kMetres) step = t.PathLength(i - 1, i);
+    if (unit == DeltaUnit::kMetres) step = t.Length(i - 1, i);
     if (unit == DeltaUnit::kSeconds)
       step = static_cast<double>(t.timestamps[at] - t.timestamps[at - 1]);
     if (unit == DeltaUnit::kDegrees || unit == DeltaUnit::kRadians) {
@@ -158,7 +158,7 @@ Pairs PairsOf(const Trajectory& estimate, const PairOptions& options) {
     throw Error(ExitCode::kBadData, ErrorLine({estimate.name}, "--delta", what, expected));
   };
   if (options.unit == DeltaUnit::kSeconds && !estimate.has_timestamps()) {
-    fail("seconds of poses without timestamps", "--delta-unit f or m, or times.txt beside them");
+    fail("seconds of poses without timestamps", "--delta-unit f or m, or times.txt next to them");
   }
   const bool degrees = options.unit == DeltaUnit::kDegrees;
   const bool angles = degrees || options.unit == DeltaUnit::kRadians;

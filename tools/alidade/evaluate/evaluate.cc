@@ -22,7 +22,7 @@ std::vector<int> UncertainAxes(const std::vector<Eigen::Matrix3d>& covariances) 
   return axes;
 }
 
-/// Of the errors of all poses, columns of `errors`, with the covariances beside them.
+/// Of the errors of all poses, columns of `errors`, with the covariances next to them.
 Nees NeesOf(const Eigen::Matrix3Xd& errors, const std::vector<Eigen::Matrix3d>& covariances) {
   const std::vector<int> axes = UncertainAxes(covariances);
   Nees nees;

@@ -132,7 +132,7 @@ struct EvaluateOptions {
   PairOptions pairs;
 };
 
-/// One estimate beside the reference, and all that is needed to read the figures right.
+/// One estimate compared with the reference, and all that is needed to read the figures right.
 struct Evaluation {
   std::string label;
   EvaluateOptions options;

@@ -165,7 +165,7 @@ std::string AlignmentNpy(const Similarity& alignment) {
   return Npy(matrix, 4);
 }
 
-/// Writes beside its place, and renames.
+/// Writes next to its place, and renames.
 void WriteWhole(const fs::path& file, const std::string& content) {
   const fs::path partial = fs::path(file) += ".partial-" + std::to_string(::getpid());
   try {

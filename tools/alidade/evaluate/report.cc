@@ -50,8 +50,8 @@ std::string PairsText(const Evaluation& evaluation) {
 }
 
 std::string TrajectoryText(const Trajectory& trajectory) {
-  return trajectory.name + ": " + ToString(trajectory.format) + ", path " +
-         RoundedText(trajectory.PathLength(0, trajectory.size() - 1)) + " m";
+  return trajectory.name + ": " + ToString(trajectory.format) + ", length " +
+         RoundedText(trajectory.Length(0, trajectory.size() - 1)) + " m";
 }
 
 std::string NeesText(const char* name, const Nees& nees, int poses) {
@@ -190,7 +190,7 @@ std::vector<internal::TextRow> SummaryRows(const std::vector<Evaluation>& evalua
 /// What all rows of a table share.
 std::string SharedText(const std::vector<Evaluation>& evaluations) {
   const Evaluation& first = evaluations.front();
-  std::string text = "Rmse against " + first.reference.name;
+  std::string text = "RMSE, compared with " + first.reference.name;
   if (std::ranges::any_of(evaluations, [](const auto& one) { return !one.pairs.empty(); })) {
     text += "; RPE of " + std::string(first.options.pairs.all ? "all" : "consecutive") +
             " pairs, " + NumberText(first.options.pairs.delta) + ' ' +
@@ -258,8 +258,8 @@ Json JsonOf(const Evaluation& one) {
   json["by_row"] = one.by_row;
   json["t_max_diff"] = Seconds(one.options.max_diff);
   json["t_offset"] = Seconds(one.options.offset);
-  json["reference_path_m"] = one.reference.PathLength(0, one.reference.size() - 1);
-  json["estimate_path_m"] = one.estimate.PathLength(0, one.estimate.size() - 1);
+  json["reference_length_m"] = one.reference.Length(0, one.reference.size() - 1);
+  json["estimate_length_m"] = one.estimate.Length(0, one.estimate.size() - 1);
   if (one.sim3_scale) json["sim3_scale"] = *one.sim3_scale;
   if (one.scale_drift) json["scale_drift"] = *one.scale_drift;
   json["ate"] = JsonOf(one.absolute);

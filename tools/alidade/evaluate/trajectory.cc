@@ -8,9 +8,9 @@
 #include <numeric>
 #include <optional>
 
+#include "alidade/base/decompositions.h"
 #include "alidade/base/number_rows.h"
 #include "alidade/base/number_text.h"
-#include "alidade/base/symmetric_eigen.h"
 
 namespace alidade {
 namespace {
@@ -274,7 +274,7 @@ std::filesystem::path OwnTimes(const std::filesystem::path& file) {
   return file.stem().string() + "_times.txt";
 }
 
-/// The file of timestamps beside a file of KITTI; empty where there is none.
+/// The file of timestamps next to a file of KITTI; empty where there is none.
 std::filesystem::path TimesBeside(const std::filesystem::path& file) {
   for (const std::filesystem::path& name : {OwnTimes(file), std::filesystem::path("times.txt")}) {
     const std::filesystem::path beside = file.parent_path() / name;
@@ -299,7 +299,7 @@ void ReadTimes(const std::filesystem::path& times, Trajectory& trajectory) {
   const bool shared = times.filename() != own;
   rows.FailLine(std::to_string(trajectory.timestamps.size()) + " times for " +
                     std::to_string(trajectory.size()) + " poses of " + trajectory.name,
-                "one for each pose" + (shared ? ", or " + own.string() + " beside it" : ""));
+                "one for each pose" + (shared ? ", or " + own.string() + " next to it" : ""));
 }
 
 }  // namespace
@@ -309,7 +309,7 @@ const char* ToString(TrajectoryFormat format) {
   return kNames[static_cast<std::size_t>(format)];
 }
 
-double Trajectory::PathLength(int first, int last) const {
+double Trajectory::Length(int first, int last) const {
   double length = 0.0;
   for (int i = first + 1; i <= last; ++i) {
     length += (positions.col(i) - positions.col(i - 1)).norm();

@@ -40,7 +40,7 @@ struct Trajectory {
   bool has_timestamps() const { return !timestamps.empty(); }
   bool has_covariances() const { return !position_covariances.empty(); }
   /// Length of the path along the poses [first, last], m.
-  double PathLength(int first, int last) const;
+  double Length(int first, int last) const;
   /// The poses of these indices.
   Trajectory Select(const std::vector<int>& indices) const;
   /// With the quaternions read in the other of the two orders, w first for w last.
@@ -49,7 +49,8 @@ struct Trajectory {
 
 /// Reads a file of poses, or standard input where it is `-`. kDetect takes the format that the
 /// first row has by its columns and commas. Blank lines and lines that begin with `#` are left out.
-/// KITTI's timestamps are those of NAME_times.txt or times.txt beside NAME.txt, where there is one.
+/// KITTI's timestamps are those of NAME_times.txt or times.txt next to NAME.txt, where there is
+/// one.
 ///
 /// Warns, with the line, of timestamps of TUM that are no seconds by their size and distance (they
 /// are read as what they look like, ns, us or ms), of poses out of order (they are sorted), of
@@ -68,8 +69,9 @@ struct TrajectoryFile {
   std::filesystem::path innovations;  ///< of the estimator that wrote it; or empty
 };
 
-/// What `path` means as a reference: the file itself; of a run folder truth.tum; of a sequence of
-/// EuRoC its state_groundtruth_estimate0. Errors: kInputMissing where a folder has none.
+/// What `path` means as a reference: the file itself; of a folder truth.tum or groundtruth.tum; of
+/// a sequence of EuRoC its state_groundtruth_estimate0. Errors: kInputMissing where a folder has
+/// none.
 TrajectoryFile ReferenceAt(const std::filesystem::path& path);
 
 /// The truth.tum that a run folder, or the folder that holds an estimator's, has. Errors:

@@ -7,9 +7,9 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "alidade/base/decompositions.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
-#include "alidade/base/symmetric_eigen.h"
 #include "alidade/evaluate/errors.h"
 
 namespace alidade {
@@ -160,9 +160,9 @@ class Warnings {
   }
 
   void CheckPath() {
-    const double whole = whole_reference_.PathLength(0, whole_reference_.size() - 1);
+    const double whole = whole_reference_.Length(0, whole_reference_.size() - 1);
     const double matched =
-        whole_reference_.PathLength(matches_.reference.front(), matches_.reference.back());
+        whole_reference_.Length(matches_.reference.front(), matches_.reference.back());
     if (!(matched < kShortPath * whole)) return;
     Warn("it covers " + RoundedText(matched, 3) + " m of the reference's trajectory of " +
              RoundedText(whole, 3) + " m",

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/base/decompositions.h"
 #include "alidade/base/number_text.h"
-#include "alidade/base/symmetric_eigen.h"
 #include "alidade/inspect/check_context.h"
 #include "alidade/inspect/check_values.h"
 

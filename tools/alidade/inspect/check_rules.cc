@@ -152,7 +152,7 @@ Finding CheckBounds(Context& context) {
         }
         return std::string();
       });
-  return Verdict(failure, "nothing written beside the buffers");
+  return Verdict(failure, "nothing written outside the buffers");
 }
 
 Finding CheckEnvironment(Context& context) {

@@ -151,7 +151,7 @@ std::string Sensors(const System& system) {
       } else if (role.block < 0) {
         row.insert(row.end(), {"(unbound)", "", ""});
       } else {
-        const bool prediction = role.jacobian_at == RoleJacobianAt::kPrediction;
+        const bool prediction = role.jacobian_at == JacobianAt::kPrediction;
         row.insert(row.end(), {system.layout[role.block].name, ModeText(role.mode),
                                prediction ? "prediction" : "measurement"});
       }
@@ -235,7 +235,7 @@ std::string Unobservable(const System& system) {
       text +=
           "    scale, of trajectory and map alike, is what the prior makes of it: depth, a stereo "
           "pair, "
-          "odometry\n    or known landmarks tell it\n";
+          "odometry\n    or known landmarks determine it\n";
     }
   }
   return text + NeedExcitation(system, unobservable);

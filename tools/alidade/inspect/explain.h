@@ -9,7 +9,7 @@ namespace alidade {
 
 /// What `experiment`, made from `config`, does, for a person to read before running it: for each
 /// estimator its blocks and how they start, what moves and measures them, which directions of the
-/// state no sensor tells, its options, and what it supports.
+/// state no sensor determines, its options, and what it supports.
 std::string Explain(const Config& config, const Experiment& experiment);
 
 }  // namespace alidade

@@ -12,7 +12,7 @@
 namespace alidade::internal {
 
 /// One element of a block in `NAME/estimates.csv`. Value and truth are ambient elements, sigma is a
-/// tangent one: beside a value only where both are the same, in vectors and angles.
+/// tangent one: next to a value only where both are the same, in vectors and angles.
 struct RecordedElement {
   std::string name;  ///< the column of its value too
   std::string unit;
@@ -43,7 +43,7 @@ struct RecordedSensor {
 /// Landmarks of `NAME/landmarks.csv` that have a place, and those whose true one is known too.
 struct RecordedMap {
   std::int64_t placed = 0, known = 0;
-  /// The two axes along which path and landmarks reach farthest: horizontal, vertical.
+  /// The two axes along which trajectory and landmarks reach farthest: horizontal, vertical.
   int across = 0, along = 2;
 };
 

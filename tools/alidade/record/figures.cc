@@ -198,7 +198,7 @@ FigureScript InnovationFigure(const RecordedRun& run, const RecordedEstimator& e
   return script;
 }
 
-/// What the measurements tell of a block by themselves, beside truth and estimates.
+/// What the measurements say of a block by themselves, with truth and estimates.
 void ImpliedPanel(FigureScript& script, const RecordedRun& run, const RecordedImplied& implied) {
   script.Panel(implied.block + " from single measurements", InBrackets(implied.unit));
   script.Quartiles("I", "implied_states.csv", GnuplotColumn(implied.block));
@@ -272,7 +272,7 @@ void StreamPanel(FigureScript& script, const RecordedRun& run, const RecordedStr
 
 FigureScript MeasurementFigure(const RecordedRun& run) {
   constexpr int kMaxElements = 3;
-  FigureScript script("measurements", "measurements, and what they tell", run.first, run.last);
+  FigureScript script("measurements", "measurements, and what they imply", run.first, run.last);
   std::vector<std::string> blocks;
   for (const RecordedImplied& implied : run.implied) {
     if (implied.rows == 0 || blocks.size() == kMaxPanels) continue;
@@ -300,7 +300,7 @@ const std::string& Identity(const RecordedElement& element) {
   return element.truth.empty() ? element.name : element.truth;
 }
 
-/// All estimators beside truth, for each element that any of them has.
+/// All estimators and truth, for each element that any of them has.
 FigureScript ComparisonFigure(const RecordedRun& run) {
   const std::size_t count = run.estimators.size();
   const std::string some =

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/record/images.h"
 
-#include "alidade/host/build_plugin.h"
+#include "alidade/host/cpp_plugin.h"
 #include "alidade/host/plugin_file.h"
 
 namespace alidade {

@@ -6,8 +6,8 @@
 
 namespace alidade::internal {
 
-/// Path and landmarks at the end beside truth, over the two axes along which they reach farthest:
-/// from above, as a rule. What lies far off is left out. Empty where there are none.
+/// Trajectory and landmarks at the end, and truth, over the two axes along which they reach
+/// farthest: from above, as a rule. What lies far off is left out. Empty where there are none.
 FigureScript MapFigure(const RecordedRun& run, const RecordedEstimator& estimator);
 
 /// The rms of the accepted innovations of each frame, by sensor. Empty where there are none.

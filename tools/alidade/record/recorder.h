@@ -12,7 +12,7 @@
 
 namespace alidade {
 
-/// Writes a run folder (docs/run_folder.md). Everything goes to a temporary folder beside it, is
+/// Writes a run folder (docs/run_folder.md). Everything goes to a temporary folder next to it, is
 /// synced, and takes its name at the end, also where the run failed: `run.json` then says why.
 /// Every write is checked. Errors: kCannotCreate, kIo with the path.
 class Recorder : public RunObserver {

@@ -10,7 +10,7 @@
 
 namespace alidade::internal {
 
-/// What run.json says of an estimator beside its result.
+/// What run.json says of an estimator besides its result.
 struct EstimatorFacts {
   std::string type;
   EstimatorKind kind = EstimatorKind::kFilter;
@@ -23,7 +23,7 @@ struct EstimatorFacts {
   std::int64_t rows = 0;  ///< of estimates.csv
 };
 
-/// What run.json says beside the result.
+/// What run.json says besides the result.
 struct RunFacts {
   std::uint64_t seed = 0;
   std::multimap<std::string, std::string> plugins;  ///< file name -> SHA-256, for each file

@@ -27,8 +27,7 @@ std::unique_ptr<Source> MakeSource(const Config& config, const PluginHost& host)
   if (const auto node = entry.Find("seed")) {
     seed = static_cast<std::uint64_t>(node->Integer(0, INT64_MAX));
   }
-  std::unique_ptr<Source> source =
-      host.CreateSource(entry.At("type", "a source").Text(), entry, seed, config.folder());
+  std::unique_ptr<Source> source = host.CreateSource(config, seed);
   entry.Declare("calibration");
   entry.RejectUnread();
   return source;

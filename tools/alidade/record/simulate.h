@@ -19,7 +19,7 @@ struct SimulateResult {
   std::vector<std::string> files;  ///< names in the folder, sorted
 };
 
-/// Images of what the camera sees, beside the data: their names in the folder, "" for none.
+/// Images of what the camera sees, next to the data: their names in the folder, "" for none.
 struct SimulateImages {
   std::string video;   ///< a file, NAME.avi
   std::string folder;  ///< of PNG, one for each frame

@@ -14,8 +14,6 @@
 
 namespace alidade {
 
-using internal::Copy;
-
 namespace {
 
 /// The runs of a sweep, handed out to threads one after the other.
@@ -61,7 +59,7 @@ class Queue {
 
   Config CopyFor(std::uint64_t seed) {
     const std::lock_guard lock(mutex_);
-    Config copy = Copy(config_);
+    Config copy = config_.Copy();
     copy.Set("source.seed", std::to_string(seed), "--first-seed");
     return copy;
   }

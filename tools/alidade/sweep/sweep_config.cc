@@ -8,10 +8,8 @@
 
 namespace alidade::internal {
 
-Config Copy(const Config& config) { return config.Merged(Config::FromText("{}", "sweep").root()); }
-
 void CheckReadableAgain(const Config& config) {
-  const Config copy = Copy(config);
+  const Config copy = config.Copy();
   const auto source = copy.root().Find("source");
   const auto path = source && source->is_map() ? source->Find("path") : std::nullopt;
   if (!path || path->kind() != Node::Kind::kScalar) return;
@@ -27,7 +25,7 @@ void CheckReadableAgain(const Config& config) {
 namespace {
 
 Config WithSeed(const Config& config, std::uint64_t seed) {
-  Config copy = Copy(config);
+  Config copy = config.Copy();
   copy.Set("source.seed", std::to_string(seed), "--first-seed");
   return copy;
 }
@@ -61,7 +59,7 @@ bool UsesSeed(const Config& config, const PluginHost& host, std::uint64_t seed) 
 }
 
 void FailUnseeded(const Config& config) {
-  const Config copy = Copy(config);
+  const Config copy = config.Copy();
   const Node type = copy.root().At("source").At("type");
   type.Fail(
       "source '" + type.Text() + "' gives the same data for every seed: all runs would be equal",

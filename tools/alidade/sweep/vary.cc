@@ -81,7 +81,7 @@ void CheckKey(const Config& config, const std::string& key) {
 
 /// A config of its own for each value.
 Config ConfigWith(const Config& config, const std::string& key, const std::string& value) {
-  Config copy = internal::Copy(config);
+  Config copy = config.Copy();
   copy.Set(key, value, kOrigin);
   return copy;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// examples/15_slam_forms: one filter with landmarks in different representations.
+// examples/15_slam_representations: one filter with landmarks in different representations.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -14,7 +14,7 @@ namespace {
 /// Seeds 1001 to 1004, by estimator.
 std::map<std::string, SweepSummary> Four() {
   const Config config = Config::FromFile(std::filesystem::path(ALIDADE_SOURCE_DIR) /
-                                         "examples/15_slam_forms/config.yaml");
+                                         "examples/15_slam_representations/config.yaml");
   const PluginHost host(PluginPaths(config));
   SweepOptions options;
   options.runs = 4;
@@ -28,7 +28,7 @@ std::map<std::string, SweepSummary> Four() {
   return by_name;
 }
 
-TEST(SlamForms, AgreeAndConversionIsHarmlessOnlyWhereItIsLinear) {
+TEST(SlamRepresentations, AgreeAndConversionIsHarmlessOnlyWhereItIsLinear) {
   const auto forms = Four();
   const auto mean = [&](const char* form, const char* key) {
     return forms.at(form).metrics.at(key).mean;

@@ -134,8 +134,8 @@ inline Vector ReadSigmas(const Node& node) {
 }
 
 /// Drawn from quaternion_pose itself, with its own discretisation.
-inline std::vector<CameraState> DrawPath(const Node& node, std::size_t count, double dt_s,
-                                         Random& random) {
+inline std::vector<CameraState> DrawTrajectory(const Node& node, std::size_t count, double dt_s,
+                                               Random& random) {
   const QuaternionPose model(
       ReadSigmas(node.At("linear_acceleration", "a trajectory that is drawn")),
       ReadSigmas(node.At("angular_acceleration", "a trajectory that is drawn")));
@@ -167,16 +167,16 @@ inline std::vector<CameraState> DrawPath(const Node& node, std::size_t count, do
 
 /// The map `trajectory` of the config, see kSceneKeys: `count` states, dt_s apart. Errors:
 /// kBadConfig.
-inline std::vector<CameraState> ReadPath(const Node& node, std::size_t count, double dt_s,
-                                         Random& random) {
+inline std::vector<CameraState> ReadTrajectory(const Node& node, std::size_t count, double dt_s,
+                                               Random& random) {
   const auto up_node = node.Find("up");
   const auto [kind, what] = OneOf(node, {"look_at", "keyframes", "random"});
-  if (up_node && kind != "look_at") up_node->Fail("without a use", "'up' beside 'look_at'");
+  if (up_node && kind != "look_at") up_node->Fail("without a use", "'up' next to 'look_at'");
   const Eigen::Vector3d up = up_node ? ReadVector(*up_node) : Eigen::Vector3d(0.0, -1.0, 0.0);
   if (!(up.norm() > 0.0)) up_node->Fail("no direction", "a vector that is not 0");
   if (kind == "look_at") return ReadLookAt(what, up, count, dt_s);
   if (kind == "keyframes") return ReadKeyframes(what, count, dt_s);
-  return DrawPath(what, count, dt_s, random);
+  return DrawTrajectory(what, count, dt_s, random);
 }
 
 }  // namespace alidade::scene

@@ -6,28 +6,27 @@
 namespace alidade {
 namespace {
 
-TEST_F(HostTest, CreatesASourceOfTheBuildTier) {
+TEST_F(HostTest, CreatesASourceOfACppPlugin) {
   const PluginHost host({Built("sources")});
-  const Config config = Parse("{type: counter, last: 2, unit: sheep}");
-  const auto source = host.CreateSource("counter", config.root(), 1, "/");
+  const Config config = Parse("source: {type: counter, last: 2, unit: sheep}");
+  const auto source = host.CreateSource(config, 1);
   EXPECT_EQ(source->streams().at(0).name, "count");
   Frame frame;
   EXPECT_TRUE(source->Next(frame));
   EXPECT_TRUE(source->Next(frame));
   EXPECT_FALSE(source->Next(frame));
-  static_cast<void>(config.root().At("type"));
-  EXPECT_NO_THROW(config.root().RejectUnread());
+  EXPECT_NO_THROW(config.root().At("source").RejectUnread());
 }
 
 TEST_F(HostTest, AFailingSourceNamesItselfAndItsPlugin) {
   const PluginHost host({Built("sources")});
   const Config config = Parse("source: {type: throwing_source}");
-  const Node entry = config.root().At("source");
+  const Config incomplete = Parse("source: {type: counter}");
   ExpectError(ExitCode::kPlugin,
               {"source 'throwing_source'", Built("sources").string(), "no such thing"},
-              [&] { host.CreateSource("throwing_source", entry, 1, "/"); });
+              [&] { host.CreateSource(config, 1); });
   ExpectError(ExitCode::kBadConfig, {"source.last: missing; source 'counter' needs it ([1, 100]"},
-              [&] { host.CreateSource("counter", entry, 1, "/"); });
+              [&] { host.CreateSource(incomplete, 1); });
   const auto counter = std::find_if(host.entries().begin(), host.entries().end(),
                                     [](const PluginEntry& e) { return e.name == "counter"; });
   const std::vector<ParamInfo> schema = host.Schema(*counter);

@@ -36,7 +36,7 @@ source:
   rate_hz: 10
   sigma_px: 1.0
   simulate_odometry: true
-  odometry_noise: {linear: 0.004, angular: 0.002}
+  odometry_noise: {linear_velocity: 0.004, angular_velocity: 0.002}
   points: {box: {min: [-1.2, -0.9, 2.2], max: [1.2, 0.9, 5.5]}, count: 40}
   trajectory:
     look_at:
@@ -74,7 +74,7 @@ std::vector<SweepSummary> Ten() {
 }
 
 // Estimated or considered, wrong extrinsics cost neither the path nor the honesty of the filter.
-TEST(SlamMounting, MayBeWrongWhereItIsInTheState) {
+TEST(SlamExtrinsics, MayBeWrongWhereItIsInTheState) {
   const auto summaries = Ten();
   const auto& without = summaries.at(0).metrics;
   EXPECT_GE(without.at("nees.mean:cam").mean, 4.0);

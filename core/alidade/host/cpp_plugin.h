@@ -58,8 +58,8 @@ struct EstimatorEntry {
   bool landmarks = false;  ///< whether it takes a system that has some
 };
 
-struct BuildTable {
-  std::uint32_t struct_size = sizeof(BuildTable);
+struct CppPluginTable {
+  std::uint32_t struct_size = sizeof(CppPluginTable);
   const SourceEntry* sources = nullptr;
   int source_count = 0;
   const EstimatorEntry* estimators = nullptr;
@@ -71,32 +71,32 @@ struct BuildTable {
                          const BundleOptions& options) = nullptr;
 };
 
-inline constexpr const char* kBuildEntrySymbol = "alidade_build_plugin";
+inline constexpr const char* kCppEntrySymbol = "alidade_cpp_plugin";
 
 }  // namespace alidade
 
-/// Exports a table of this plugin; `...` are the members of BuildTable after the size.
-#define ALIDADE_BUILD_PLUGIN_(...)                                                       \
-  ALIDADE_BUILD_TAG(ALIDADE_PLUGIN_CPP, ALIDADE_BUILD_ID)                                \
-  extern "C" __attribute__((visibility("default"))) const alidade::BuildTable*           \
-  alidade_build_plugin() {                                                               \
-    static const alidade::BuildTable table = {sizeof(alidade::BuildTable), __VA_ARGS__}; \
-    return &table;                                                                       \
+/// Exports a table of this plugin; `...` are the members of CppPluginTable after the size.
+#define ALIDADE_CPP_PLUGIN_(...)                                                                 \
+  ALIDADE_BUILD_TAG(ALIDADE_PLUGIN_CPP, ALIDADE_BUILD_ID)                                        \
+  extern "C" __attribute__((visibility("default"))) const alidade::CppPluginTable*               \
+  alidade_cpp_plugin() {                                                                         \
+    static const alidade::CppPluginTable table = {sizeof(alidade::CppPluginTable), __VA_ARGS__}; \
+    return &table;                                                                               \
   }
 
 /// Exports the sources of this plugin: ALIDADE_SOURCE_PLUGIN({"name", "doc", "keys", &Create}, ...)
 #define ALIDADE_SOURCE_PLUGIN(...)                                     \
   static const alidade::SourceEntry alidade_sources[] = {__VA_ARGS__}; \
-  ALIDADE_BUILD_PLUGIN_(alidade_sources, std::size(alidade_sources), nullptr, 0)
+  ALIDADE_CPP_PLUGIN_(alidade_sources, std::size(alidade_sources), nullptr, 0)
 
 /// Exports the estimators of this plugin:
 /// ALIDADE_ESTIMATOR_PLUGIN({"name", "doc", "citation", &Create}, ...)
 #define ALIDADE_ESTIMATOR_PLUGIN(...)                                        \
   static const alidade::EstimatorEntry alidade_estimators[] = {__VA_ARGS__}; \
-  ALIDADE_BUILD_PLUGIN_(nullptr, 0, alidade_estimators, std::size(alidade_estimators))
+  ALIDADE_CPP_PLUGIN_(nullptr, 0, alidade_estimators, std::size(alidade_estimators))
 
 /// Exports the image writer of this plugin: ALIDADE_IMAGE_PLUGIN(&Create)
-#define ALIDADE_IMAGE_PLUGIN(create) ALIDADE_BUILD_PLUGIN_(nullptr, 0, nullptr, 0, create)
+#define ALIDADE_IMAGE_PLUGIN(create) ALIDADE_CPP_PLUGIN_(nullptr, 0, nullptr, 0, create)
 
 /// Exports the bundle adjustment of this plugin: ALIDADE_BUNDLE_PLUGIN(&Adjust)
-#define ALIDADE_BUNDLE_PLUGIN(adjust) ALIDADE_BUILD_PLUGIN_(nullptr, 0, nullptr, 0, nullptr, adjust)
+#define ALIDADE_BUNDLE_PLUGIN(adjust) ALIDADE_CPP_PLUGIN_(nullptr, 0, nullptr, 0, nullptr, adjust)

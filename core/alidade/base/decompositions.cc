@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/base/decompositions.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+
+namespace alidade::internal {
+namespace {
+
+using Qr = Eigen::HouseholderQR<Eigen::MatrixXd>;
+
+Eigen::MatrixXd UpperTriangle(const Qr& qr) {
+  return qr.matrixQR().topRows(qr.cols()).triangularView<Eigen::Upper>();
+}
+
+}  // namespace
+
+SymmetricEigen EigenOf(const Eigen::MatrixXd& symmetric) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(symmetric);
+  return {solver.eigenvalues(), solver.eigenvectors()};
+}
+
+Eigen::VectorXd EigenvaluesOf(const Eigen::MatrixXd& symmetric) {
+  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(symmetric, Eigen::EigenvaluesOnly)
+      .eigenvalues();
+}
+
+LeastSquares SolveLeastSquares(const Eigen::MatrixXd& a, const Eigen::VectorXd& b) {
+  const Qr qr(a);
+  LeastSquares found{UpperTriangle(qr), qr.solve(b), b};
+  found.q_adjoint_b.applyOnTheLeft(qr.householderQ().adjoint());
+  return found;
+}
+
+Eigen::MatrixXd UpperTriangleOf(const Eigen::MatrixXd& a) { return UpperTriangle(Qr(a)); }
+
+Eigen::MatrixXd ComplementOf(const Eigen::MatrixXd& a) {
+  const Eigen::MatrixXd q = Qr(a).householderQ();
+  return q.rightCols(a.rows() - a.cols());
+}
+
+Eigen::VectorXd SolveByPivoting(const Eigen::MatrixXd& a, const Eigen::VectorXd& b) {
+  return Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(a).solve(b);
+}
+
+int RankOf(const Eigen::MatrixXd& a, double threshold) {
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(a);
+  qr.setThreshold(threshold);
+  return static_cast<int>(qr.rank());
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,392 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "alidade/base/error.h"
+#include "alidade/base/random.h"
+#include "alidade/config/config.h"
+#include "alidade/host/plugin_host.h"
+#include "alidade/host/source.h"
+#include "alidade/system/system.h"
+#include "sensor_schedule.h"
+
+namespace alidade {
+
+inline constexpr const char* kModelsKeys =
+    "start                 prior (default): the true state is drawn from the priors; mean: it is "
+    "their mean\n"
+    "initial               {BLOCK: value}: where the truth starts instead\n"
+    "overrides             config of the truth, merged over that of the filters\n"
+    "sensors               {SENSOR: {rate_hz, missing, outliers: {share, sigma_scale}}}\n"
+    "inputs                {STATE_ENTRY: {mean, amplitude, frequency_hz}}: its control input\n"
+    "landmarks             {count, box: {min, max}, max_per_frame}: points in the world, m";
+
+/// Draws truth and measurements from the motion and sensor models of the config.
+///
+///   start      x_0 = mean (+) chol(P_0) n of the priors
+///   step       x_{k+1} = f(x_k, u_k, w_k, dt),   w_k = Lq n,   dt = 1 / rate_hz
+///   sensor     z = h(x_k) (+) s L n,   R = L L',   s = 1, of an outlier sigma_scale
+///   input      u_i(t) = mean_i + amplitude_i sin(2 pi frequency_hz t)
+///
+/// with n ~ N(0, I), so that a filter of the same config is consistent. Discrete noise w is held
+/// until something has been measured, as the filters take it (docs/noise_models.md).
+///
+/// A measurement is given at each time step, or at the sensor's own rate_hz, where h is defined and
+/// the value valid; each is left out with the probability `missing`. Of several sensors on one
+/// stream the first draws. Points are drawn uniformly in `box`; a frame has those that the sensor
+/// sees, the smallest ids first where they are more than max_per_frame. Streams are those of the
+/// sensors and inputs, truths the blocks.
+///
+/// Each noise has a stream of the seed of its own: 0 start, 1 points, 100 + i motion models,
+/// 1000 + 2 i sensors, and one more for what is missing or an outlier.
+///
+/// Keys         kModelsKeys.
+/// Errors       kBadConfig; kBadData where the truth leaves the domain of a motion model.
+/// Source       [BarShalom2001] sec. 5.5: runs of the very model that the filter has.
+class Models : public Source {
+ public:
+  explicit Models(const SourceArguments& arguments) {
+    Params& p = arguments.params;
+    const double rate_hz = p.Number("rate_hz", "Hz", "time steps a second", {1e-6, 1e6}, 30.0);
+    const double duration_s =
+        p.Number("duration_s", "s", "time of the last step, at most", {0.0, 1e9}, 10.0);
+    const Node& entry = arguments.entry;
+    for (const char* key : {"start", "initial", "overrides", "sensors", "inputs", "landmarks"}) {
+      entry.Declare(key);
+    }
+    if (arguments.config == nullptr || arguments.host == nullptr) {
+      throw Error(ExitCode::kBadConfig, "source 'models' draws from the models of a config");
+    }
+    dt_s_ = 1.0 / rate_hz;
+    // A few units in the last place, for durations that are multiples of the step but for rounding.
+    count_ = 1 + static_cast<std::int64_t>(duration_s * rate_hz * (1.0 + 1e-15));
+    const auto overrides = entry.Find("overrides");
+    const Config truth =
+        overrides ? arguments.config->Merged(*overrides) : arguments.config->Copy();
+    system_ = BuildSystem(truth.root(), *arguments.host, {});
+    DrawStart(entry, arguments.seed);
+    AddMotions(entry, arguments.seed);
+    AddSensors(entry, arguments.seed, rate_hz);
+    DrawPoints(entry, arguments.seed);
+  }
+
+  const std::vector<StreamInfo>& streams() const override { return streams_; }
+  const std::vector<StreamInfo>& truths() const override { return truths_; }
+  std::int64_t size() const override { return count_; }
+
+  std::optional<std::array<double, 3>> TrueLandmark(std::int64_t id) const override {
+    if (id < 0 || id >= static_cast<std::int64_t>(points_.size())) return std::nullopt;
+    return points_[static_cast<std::size_t>(id)];
+  }
+
+  bool Next(Frame& frame) override {
+    if (index_ == count_) return false;
+    if (index_ > 0) Step();
+    frame.timestamp = TimestampFromSeconds(static_cast<double>(index_) * dt_s_);
+    frame.truth = x_;
+    frame.measurements.clear();
+    for (Sensor& sensor : sensors_) Measure(sensor, frame);
+    if (!frame.measurements.empty()) {
+      for (Motion& motion : motions_) motion.held = false;
+    }
+    for (Motion& motion : motions_) EmitInput(motion, frame);
+    ++index_;
+    return true;
+  }
+
+ private:
+  struct Motion {
+    const MotionBinding* binding;
+    Random noise;
+    int stream = -1;  ///< of its control input
+    std::vector<double> input, mean, amplitude;
+    double frequency_hz = 0.0;
+    std::vector<double> w;  ///< as it is drawn
+    bool held = false;      ///< w stays, as nothing has been measured since
+  };
+  struct Sensor {
+    const SensorBinding* binding;
+    SensorModel model;  ///< of landmarks that are xyz
+    int stream;
+    models::Schedule schedule;
+    Random noise;
+    int max_per_frame;  ///< of landmarks
+  };
+
+  static std::uint64_t StreamOf(std::size_t first, std::size_t i) {
+    return static_cast<std::uint64_t>(first + i);
+  }
+
+  /// n of N(0, P) as a vector of the tangent; P may be singular.
+  static Eigen::VectorXd DrawFrom(const Eigen::MatrixXd& p, Random& random) {
+    const Eigen::LDLT<Eigen::MatrixXd> root(p);
+    Eigen::VectorXd n(p.rows());
+    for (double& value : n) value = random.Normal();
+    n = root.vectorD().cwiseMax(0.0).cwiseSqrt().cwiseProduct(n);
+    const Eigen::VectorXd drawn = root.matrixL() * n;
+    return root.transpositionsP().transpose() * drawn;
+  }
+
+  void DrawStart(const Node& entry, std::uint64_t seed) {
+    const auto start = entry.Find("start");
+    const bool draws = !start || start->Choice({"prior", "mean"}) == 0;
+    const auto given = entry.Find("initial");
+    Random random(seed, 0);
+    x_.resize(system_.layout.blocks().size());
+    for (const Prior& prior : system_.priors) {
+      const Block& block = system_.layout[prior.block];
+      std::vector<double>& x = x_[static_cast<std::size_t>(prior.block)];
+      if (const auto value = given ? given->Find(block.name) : std::nullopt) {
+        x = value->Numbers(block.geometry().ambient);
+        block.geometry().Normalise(x.data());
+        continue;
+      }
+      if (!prior.from.empty()) {
+        entry.Fail(
+            "block '" + block.name + "' starts from a measurement: its true value is unknown",
+            "initial: {" + block.name + ": value}");
+      }
+      x = prior.mean;
+      if (!draws || prior.covariance.size() == 0) continue;
+      const Eigen::VectorXd d = DrawFrom(prior.covariance, random);
+      block.geometry().Plus(x.data(), d.data(), x.data());
+    }
+    if (given) given->RejectUnread();
+    for (const Block& block : system_.layout.blocks()) {
+      truths_.push_back({block.name, block.geometry().ambient});
+    }
+  }
+
+  void AddMotions(const Node& entry, std::uint64_t seed) {
+    const auto inputs = entry.Find("inputs");
+    for (std::size_t i = 0; i < system_.motions.size(); ++i) {
+      const MotionBinding& binding = system_.motions[i];
+      Motion motion{&binding, Random(seed, StreamOf(100, i)), -1, {}, {}, {}, 0.0, {}, false};
+      motion.w.resize(static_cast<std::size_t>(binding.model.noise_size()));
+      if (binding.model.has_input()) ReadInput(inputs, motion);
+      motions_.push_back(std::move(motion));
+    }
+    if (inputs) inputs->RejectUnread();
+  }
+
+  void ReadInput(const std::optional<Node>& inputs, Motion& motion) {
+    const Geometry& geometry = motion.binding->model.input().geometry;
+    const auto size = static_cast<std::size_t>(geometry.ambient);
+    motion.mean.resize(size);
+    motion.amplitude.resize(size);
+    geometry.Identity(motion.mean.data());
+    motion.stream = static_cast<int>(streams_.size());
+    streams_.push_back({motion.binding->input.stream, geometry.ambient});
+    const auto entry = inputs ? inputs->Find(motion.binding->name) : std::nullopt;
+    if (entry) {
+      if (const auto mean = entry->Find("mean")) motion.mean = mean->Numbers(geometry.ambient);
+      if (const auto amplitude = entry->Find("amplitude")) {
+        if (geometry.kind != GeometryKind::kVector) {
+          amplitude->Fail("the input is no vector", "`mean` alone");
+        }
+        motion.amplitude = amplitude->Numbers(geometry.ambient);
+        motion.frequency_hz = entry->At("frequency_hz", "an amplitude").Number(0.0, 1e6);
+      }
+      entry->RejectUnread();
+    }
+    motion.input = InputAt(motion, 0.0);
+  }
+
+  static std::vector<double> InputAt(const Motion& motion, double t_s) {
+    std::vector<double> u = motion.mean;
+    const double wave = std::sin(2.0 * std::numbers::pi * motion.frequency_hz * t_s);
+    for (std::size_t i = 0; i < u.size(); ++i) u[i] += motion.amplitude[i] * wave;
+    return u;
+  }
+
+  void AddSensors(const Node& entry, std::uint64_t seed, double rate_hz) {
+    const auto settings = entry.Find("sensors");
+    const auto landmarks = entry.Find("landmarks");
+    const auto most = landmarks ? landmarks->Find("max_per_frame") : std::nullopt;
+    const int max_per_frame = most ? static_cast<int>(most->Integer(1, LandmarkOptions::kUnlimited))
+                                   : LandmarkOptions::kUnlimited;
+    for (std::size_t i = 0; i < system_.sensors.size(); ++i) {
+      const SensorBinding& binding = system_.sensors[i];
+      const auto own = settings ? settings->Find(binding.name) : std::nullopt;
+      const models::Schedule schedule = models::ReadSchedule(own, rate_hz, seed, 1001 + 2 * i);
+      if (std::ranges::find(streams_, binding.stream, &StreamInfo::name) != streams_.end()) {
+        if (own)
+          own->Fail("another sensor before it draws stream '" + binding.stream + "'",
+                    "no such entry");
+        continue;
+      }
+      sensors_.push_back({&binding, ModelOf(entry, binding), static_cast<int>(streams_.size()),
+                          schedule, Random(seed, StreamOf(1000, 2 * i)), max_per_frame});
+      streams_.push_back({binding.stream, binding.model.measurement().geometry.ambient});
+    }
+    if (settings) settings->RejectUnread();
+  }
+
+  /// The model with landmarks that are points.
+  static SensorModel ModelOf(const Node& entry, const SensorBinding& binding) {
+    if (!binding.model.has_landmark()) return binding.model;
+    entry.At("landmarks", "sensor '" + binding.name + "'");
+    if (binding.xyz) return *binding.xyz;
+    const auto representation = RepresentationOf(binding.model.roles());
+    if (!representation || !IsXyz(*representation)) {
+      entry.Fail("model '" + binding.model.name() + "' of sensor '" + binding.name +
+                     "' has no representation xyz, which the points are drawn in",
+                 "a source with landmarks of its own");
+    }
+    return binding.model;
+  }
+
+  void DrawPoints(const Node& entry, std::uint64_t seed) {
+    const auto landmarks = entry.Find("landmarks");
+    if (!landmarks) return;
+    if (!system_.landmarks) landmarks->Fail("no sensor measures landmarks", "the key left out");
+    constexpr int kMost = 1'000'000;
+    const auto count =
+        static_cast<std::size_t>(landmarks->At("count", "landmarks").Integer(1, kMost));
+    const Node box = landmarks->At("box", "landmarks");
+    const std::vector<double> low = box.At("min").Numbers(3), high = box.At("max").Numbers(3);
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!(low[k] <= high[k])) box.Fail("min above max", "min <= max in each of x, y, z");
+    }
+    box.RejectUnread();
+    landmarks->RejectUnread();
+    Random random(seed, 1);
+    points_.resize(count);
+    for (auto& point : points_) {
+      for (std::size_t k = 0; k < 3; ++k) point[k] = low[k] + (high[k] - low[k]) * random.Uniform();
+    }
+    for (const KnownLandmark& known : system_.landmarks->known) {
+      if (known.id < 0 || known.id >= static_cast<std::int64_t>(count)) continue;
+      points_[static_cast<std::size_t>(known.id)] = known.position;
+    }
+  }
+
+  /// To the next time step.
+  void Step() {
+    const double t_s = static_cast<double>(index_) * dt_s_;
+    std::vector<std::vector<double>> next = x_;
+    for (Motion& motion : motions_) {
+      const MotionModel& model = motion.binding->model;
+      if (model.stationary()) continue;
+      std::vector<const double*> blocks;
+      std::vector<double*> moved;
+      for (const BlockId id : motion.binding->blocks) {
+        blocks.push_back(x_[static_cast<std::size_t>(id)].data());
+        moved.push_back(next[static_cast<std::size_t>(id)].data());
+      }
+      Status status = Status::kOk;
+      if (!motion.held || !model.discrete_noise()) status = DrawNoise(blocks, motion);
+      if (status == Status::kOk) {
+        const double* const input = motion.input.empty() ? nullptr : motion.input.data();
+        status = model.Step(blocks.data(), input, motion.w.data(), dt_s_, moved.data(), nullptr,
+                            nullptr);
+      }
+      if (status != Status::kOk) {
+        throw Error(ExitCode::kBadData, "source 'models': the truth leaves the domain of model '" +
+                                            model.name() + "' of '" + motion.binding->name +
+                                            "' before t = " + std::to_string(t_s) + " s");
+      }
+      for (const BlockId id : motion.binding->blocks) {
+        system_.layout[id].geometry().Normalise(next[static_cast<std::size_t>(id)].data());
+      }
+    }
+    // A constant block stays, whatever its model makes of it.
+    for (std::size_t id = 0; id < x_.size(); ++id) {
+      if (system_.layout[static_cast<BlockId>(id)].status != BlockStatus::kConstant)
+        x_[id] = next[id];
+    }
+  }
+
+  Status DrawNoise(const std::vector<const double*>& blocks, Motion& motion) const {
+    const auto n = static_cast<Eigen::Index>(motion.w.size());
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> l(n, n);
+    const Status status = motion.binding->model.SqrtQ(blocks.data(), dt_s_, l.data());
+    Eigen::VectorXd drawn(n);
+    for (double& value : drawn) value = motion.noise.Normal();
+    Eigen::VectorXd::Map(motion.w.data(), n) = l * drawn;
+    motion.held = true;
+    return status;
+  }
+
+  void Measure(Sensor& sensor, Frame& frame) {
+    if (!sensor.schedule.IsDue(index_)) return;
+    if (!sensor.model.has_landmark()) {
+      MeasureOne(sensor, -1, frame);
+      return;
+    }
+    int left = sensor.max_per_frame;
+    for (std::size_t id = 0; id < points_.size() && left > 0; ++id) {
+      left -= MeasureOne(sensor, static_cast<std::int64_t>(id), frame) ? 1 : 0;
+    }
+  }
+
+  /// Whether there is something to measure; what is missing counts.
+  bool MeasureOne(Sensor& sensor, std::int64_t landmark, Frame& frame) {
+    const Geometry& geometry = sensor.model.measurement().geometry;
+    std::vector<const double*> roles;
+    for (const RoleBinding& role : sensor.binding->roles) {
+      roles.push_back(role.block < 0 ? nullptr : x_[static_cast<std::size_t>(role.block)].data());
+    }
+    if (landmark >= 0) {
+      roles.resize(sensor.model.roles().size() - 1);
+      roles.push_back(points_[static_cast<std::size_t>(landmark)].data());
+    }
+    const auto m = static_cast<Eigen::Index>(geometry.tangent);
+    std::vector<double> z(static_cast<std::size_t>(geometry.ambient));
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> l(m, m);
+    // Drawn for each, seen or not, so that what one sees does not shift the noise of the others.
+    Eigen::VectorXd n(m);
+    for (double& value : n) value = sensor.noise.Normal();
+    const auto fate = sensor.schedule.Draw();
+    if (sensor.model.Predict(roles.data(), z.data()) != Status::kOk ||
+        sensor.model.Valid(z.data()) != Status::kOk ||
+        sensor.model.SqrtNoise(roles.data(), z.data(), l.data()) != Status::kOk) {
+      return false;
+    }
+    const Eigen::VectorXd d = fate.sigma_scale * (l * n);
+    geometry.Plus(z.data(), d.data(), z.data());
+    if (sensor.model.Valid(z.data()) != Status::kOk) return false;
+    if (fate.missing) return true;
+    Measurement& measurement = frame.measurements.emplace_back();
+    measurement.timestamp = frame.timestamp;
+    measurement.stream = sensor.stream;
+    measurement.landmark = landmark;
+    measurement.values = std::move(z);
+    return true;
+  }
+
+  void EmitInput(Motion& motion, Frame& frame) {
+    if (motion.stream < 0) return;
+    motion.input = InputAt(motion, static_cast<double>(index_) * dt_s_);
+    Measurement& measurement = frame.measurements.emplace_back();
+    measurement.timestamp = frame.timestamp;
+    measurement.stream = motion.stream;
+    measurement.values = motion.input;
+  }
+
+  System system_;
+  std::vector<StreamInfo> streams_, truths_;
+  std::vector<std::vector<double>> x_;  ///< the true value of each block
+  std::vector<Motion> motions_;
+  std::vector<Sensor> sensors_;
+  std::vector<std::array<double, 3>> points_;
+  double dt_s_;
+  std::int64_t count_, index_ = 0;
+};
+
+inline std::unique_ptr<Source> CreateModels(const SourceArguments& arguments) {
+  return std::make_unique<Models>(arguments);
+}
+
+}  // namespace alidade

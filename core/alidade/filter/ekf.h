@@ -16,8 +16,9 @@ namespace alidade {
 
 /// Extended Kalman filter: x' = f(x, u, 0), P' = F P F' + G Q G'; an update with stacked Jacobian H
 /// of all accepted measurements, S = H P H' + R = L L', W = P H' L^-T, dx = W L^-1 r, P -= W W'.
-/// Where a gain is not the optimal one (consider blocks) the Joseph form takes its place. With a
-/// robust loss on the sensor R / w(d) stands for R, d^2 = r' S^-1 r.
+/// The gain of a consider block is 0 (Schmidt): P += E E', E = (K - K*) L of the optimal gain K*.
+/// Where digits would cancel the Joseph form takes the place of both. With a robust loss on the
+/// sensor R / w(d) stands for R, d^2 = r' S^-1 r.
 ///
 /// Control inputs act as ControlInputs has it. A gap stepped in parts is noted as the event
 /// `substeps`, where it takes at least twice as many as any noted before.
@@ -200,7 +201,7 @@ class Ekf : public Estimator {
   Outcome ApplySmall(std::span<Row* const> rows, int m);
   Outcome ApplyLarge(std::span<Row* const> rows);
   bool MaskConsidered(std::span<Row* const> rows, Eigen::MatrixXd& gain) const;
-  bool Correct(const Eigen::MatrixXd& w, const Eigen::MatrixXd& gain, bool masked,
+  bool Correct(const Eigen::MatrixXd& w, const Eigen::MatrixXd& lost, const Eigen::MatrixXd& gain,
                const Eigen::MatrixXd& h, const Eigen::MatrixXd& r);
   Workspace::Matrix ProjectionOf(std::span<Row* const> rows);
   void InitialiseFromMeasurements();

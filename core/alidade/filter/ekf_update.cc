@@ -130,13 +130,14 @@ Outcome Ekf::ApplyLarge(std::span<Row* const> rows) {
   const auto l = s.triangularView<Eigen::Lower>();
   const auto l_transposed = s.transpose().triangularView<Eigen::Upper>();
   const Eigen::MatrixXd w = l.solve(pht.transpose()).transpose();
-  Eigen::MatrixXd gain = l_transposed.solve(w.transpose()).transpose();
-  const bool masked = MaskConsidered(rows, gain);
+  const Eigen::MatrixXd optimal = l_transposed.solve(w.transpose()).transpose();
+  Eigen::MatrixXd gain = optimal, lost;
+  if (MaskConsidered(rows, gain)) lost = (gain - optimal) * s.triangularView<Eigen::Lower>();
   Eigen::VectorXd dx = gain * all.innovation;
   if (correction_ != nullptr) std::copy_n(correction_, dx.size(), dx.data());
   state_.Retract(dx.data(), moved_);
   if (!AllFinite(moved_) || !w.allFinite() || !gain.allFinite()) return Outcome::kNotFinite;
-  if (!Correct(w, gain, masked, all.h, all.noise)) return Outcome::kNotPd;
+  if (!Correct(w, lost, gain, all.h, all.noise)) return Outcome::kNotPd;
   state_.MoveTo(moved_);
   RecordUpdate(rows, gain.data());
   return Outcome::kAccepted;
@@ -164,18 +165,22 @@ bool Ekf::MaskConsidered(std::span<Row* const> rows, Eigen::MatrixXd& gain) cons
   return masked;
 }
 
-/// P after the update: P -= W W' for the optimal gain, Joseph's form for any other and where the
-/// difference would cancel to nothing. False, and P as it was, where P would not stay positive.
-bool Ekf::Correct(const Eigen::MatrixXd& w, const Eigen::MatrixXd& gain, bool masked,
-                  const Eigen::MatrixXd& h, const Eigen::MatrixXd& r) {
+/// P after the update. With the optimal gain K* it is P - W W'; with another one, K, what K lacks
+/// stays: + (K - K*) S (K - K*)' = E E', E = (K - K*) L, `lost` (empty: the gain is optimal). Where
+/// the difference would cancel to nothing, Joseph's form. False, and P as it was, where P would not
+/// stay positive.
+bool Ekf::Correct(const Eigen::MatrixXd& w, const Eigen::MatrixXd& lost,
+                  const Eigen::MatrixXd& gain, const Eigen::MatrixXd& h, const Eigen::MatrixXd& r) {
   constexpr double kCancelled = 1e-10;
   Covariance& p = state_.covariance();
-  bool joseph = masked;
+  bool joseph = false;
   for (int i = 0; i < p.size() && !joseph; ++i) {
-    joseph = p.Variance(i) - w.row(i).squaredNorm() < kCancelled * p.Variance(i);
+    const double kept = lost.size() == 0 ? 0.0 : lost.row(i).squaredNorm();
+    joseph = p.Variance(i) - w.row(i).squaredNorm() + kept < kCancelled * p.Variance(i);
   }
   if (!joseph) {
     p.SubtractOuter(w);
+    if (lost.size() > 0) p.AddOuter(lost);
     return true;
   }
   Covariance updated = p;

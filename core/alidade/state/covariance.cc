@@ -194,12 +194,18 @@ void Covariance::SubtractOuter(const Eigen::MatrixXd& w) {
   p_.topLeftCorner(size_, size_).selfadjointView<Eigen::Lower>().rankUpdate(w, -1.0);
 }
 
+void Covariance::AddOuter(const Eigen::MatrixXd& w) {
+  p_.topLeftCorner(size_, size_).selfadjointView<Eigen::Lower>().rankUpdate(w);
+}
+
 void Covariance::Joseph(const Eigen::MatrixXd& k, const Eigen::MatrixXd& h,
                         const Eigen::MatrixXd& r) {
-  Eigen::MatrixXd m = -k * h;
-  m.diagonal().array() += 1.0;
-  const Eigen::MatrixXd krk = k * r * k.transpose();
-  SetBlock(0, 0, m * Dense() * m.transpose() + krk);
+  Eigen::MatrixXd a = Dense();
+  const Eigen::MatrixXd hp = h * a;
+  a.noalias() -= k * hp;  // (I - K H) P
+  const Eigen::MatrixXd ah = a * h.transpose(), kr = k * r;
+  a.noalias() += (kr - ah) * k.transpose();
+  SetBlock(0, 0, a);
 }
 
 void Covariance::Transform(int offset, const Eigen::MatrixXd& j) {

@@ -95,8 +95,10 @@ class Covariance {
   bool Downdate(int m, const double* w, const double* inverse_d);
   /// P <- P - W W', W n x m. O(n^2 m).
   void SubtractOuter(const Eigen::MatrixXd& w);
+  /// P <- P + W W', W n x m. O(n^2 m).
+  void AddOuter(const Eigen::MatrixXd& w);
   /// P <- (I - K H) P (I - K H)' + K R K' for any gain K (Joseph), K n x m, H m x n, R m x m.
-  /// O(n^3).
+  /// O(n^2 m).
   void Joseph(const Eigen::MatrixXd& k, const Eigen::MatrixXd& h, const Eigen::MatrixXd& r);
   /// Rows of one block <- J (k x k) times them: P_bb <- J P_bb J', P_bi <- J P_bi.
   void Transform(int offset, const Eigen::MatrixXd& j);

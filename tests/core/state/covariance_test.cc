@@ -89,6 +89,29 @@ TEST(Covariance, JosephAndSubtractOuterAgreeForTheOptimalGain) {
   EXPECT_LT((a.Dense() - b.Dense()).norm(), 1e-11 * a.Dense().norm());
 }
 
+// Of a gain that is zero for some rows and wrong for the others, as the definition has it; and by
+// what the optimal one would have taken: P - W W' + E E', E = (K - K*) L.
+TEST(Covariance, JosephAndAddOuterAgreeForAnyGain) {
+  Random random(14);
+  Covariance joseph = Make({3, 2, 3}, random);
+  Covariance outer = joseph;
+  const Eigen::MatrixXd p = joseph.Dense(), h = RandomMatrix(3, 8, random);
+  const Eigen::MatrixXd root = RandomMatrix(3, 3, random), r = root * root.transpose();
+  const Eigen::LLT<Eigen::MatrixXd> s(h * p * h.transpose() + r);
+  const Eigen::MatrixXd l = s.matrixL(), w = s.matrixL().solve(h * p).transpose();
+  const Eigen::MatrixXd optimal = s.solve(h * p).transpose();
+  Eigen::MatrixXd gain = optimal + 0.1 * RandomMatrix(8, 3, random);
+  gain.middleRows(3, 2).setZero();
+
+  const Eigen::MatrixXd kept = Eigen::MatrixXd::Identity(8, 8) - gain * h;
+  const Eigen::MatrixXd expected = kept * p * kept.transpose() + gain * r * gain.transpose();
+  joseph.Joseph(gain, h, r);
+  EXPECT_LT((joseph.Dense() - expected).norm(), 1e-13 * p.norm());
+  outer.SubtractOuter(w);
+  outer.AddOuter((gain - optimal) * l);
+  EXPECT_LT((outer.Dense() - expected).norm(), 1e-12 * p.norm());
+}
+
 TEST(Covariance, ReleasedRowsAreReusedAndLeaveNoTrace) {
   Random random(5);
   Covariance p = Make({2, 3, 2, 1}, random);

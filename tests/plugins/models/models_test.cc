@@ -193,7 +193,10 @@ TEST(Models, TheTruthCanHaveAModelOfItsOwn) {
 }
 
 TEST(Models, SensorsHaveRatesGapsAndOutliers) {
-  const std::string text = kState + "source: {type: models, rate_hz: 100, duration_s: 100, ";
+  const std::string text =  // a truth that only moves away, so that h is always defined
+      kState +
+      "source: {type: models, rate_hz: 100, duration_s: 100, start: mean,\n"
+      "  overrides: {state: {target: {noise: {acceleration: 0}}}}, ";
   std::size_t count = 0;
   for (const Frame& frame : FramesOf(Parse(text + "sensors: {stereo: {rate_hz: 30}}}"))) {
     count += frame.measurements.size();
@@ -227,7 +230,12 @@ TEST(Models, GivesControlInputs) {
       "    initial:\n"
       "      position: {mean: [0, 0, 0], sigma: 0}\n"
       "      orientation: {mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0}\n"
-      "source: {type: models, rate_hz: 10, duration_s: 1, inputs: {cam: INPUT}}\n";
+      "  b: {model: constant, initial: {value: {mean: 2, sigma: 0}}}\n"
+      "sensors:\n"
+      "  stereo: {model: stereo_disparity, stream: d, roles: {depth: b.value}, focal_px: 400,\n"
+      "           baseline_m: 0.5, sigma_px: 1}\n"
+      "source: {type: models, rate_hz: 10, duration_s: 1, sensors: {stereo: {missing: 1}},\n"
+      "         inputs: {cam: INPUT}}\n";
   const auto with = [&](std::string input) {
     std::string all = text;
     return testing::Read(all.replace(all.find("INPUT"), 5, input));

@@ -30,7 +30,7 @@ class Format : public CLI::Formatter {
  public:
   Format() {
     label("SUBCOMMAND", "COMMAND");
-    label("Positionals", "ProgramArguments");
+    label("Positionals", "Arguments");
     column_width(28);
   }
 };

@@ -26,7 +26,7 @@ namespace alidade {
 inline constexpr const char* kModelsKeys =
     "start                 prior (default): the true state is drawn from the priors; mean: it is "
     "their mean\n"
-    "initial               {BLOCK: value}: where the truth starts instead\n"
+    "initial               {ENTRY: {BLOCK: value}}: where the truth starts instead\n"
     "overrides             config of the truth, merged over that of the filters\n"
     "sensors               {SENSOR: {rate_hz, missing, outliers: {share, sigma_scale}}}\n"
     "inputs                {STATE_ENTRY: {mean, amplitude, frequency_hz}}: its control input\n"
@@ -45,8 +45,9 @@ inline constexpr const char* kModelsKeys =
 /// A measurement is given at each time step, or at the sensor's own rate_hz, where h is defined and
 /// the value valid; each is left out with the probability `missing`. Of several sensors on one
 /// stream the first draws. Points are drawn uniformly in `box`; a frame has those that the sensor
-/// sees, the smallest ids first where they are more than max_per_frame. Streams are those of the
-/// sensors and inputs, truths the blocks.
+/// sees, the smallest ids first where they are more than max_per_frame; those of `landmarks.known`
+/// are drawn about their places. The first time step is at `initial_time_s`, or 0. Streams are
+/// those of the sensors and inputs, truths the blocks.
 ///
 /// Each noise has a stream of the seed of its own: 0 start, 1 points, 100 + i motion models,
 /// 1000 + 2 i sensors, and one more for what is missing or an outlier.
@@ -71,10 +72,7 @@ class Models : public Source {
     dt_s_ = 1.0 / rate_hz;
     // A few units in the last place, for durations that are multiples of the step but for rounding.
     count_ = 1 + static_cast<std::int64_t>(duration_s * rate_hz * (1.0 + 1e-15));
-    const auto overrides = entry.Find("overrides");
-    const Config truth =
-        overrides ? arguments.config->Merged(*overrides) : arguments.config->Copy();
-    system_ = BuildSystem(truth.root(), *arguments.host, {});
+    BuildTruth(arguments);
     DrawStart(entry, arguments.seed);
     AddMotions(entry, arguments.seed);
     AddSensors(entry, arguments.seed, rate_hz);
@@ -93,7 +91,7 @@ class Models : public Source {
   bool Next(Frame& frame) override {
     if (index_ == count_) return false;
     if (index_ > 0) Step();
-    frame.timestamp = TimestampFromSeconds(static_cast<double>(index_) * dt_s_);
+    frame.timestamp = TimestampFromSeconds(Time());
     frame.truth = x_;
     frame.measurements.clear();
     for (Sensor& sensor : sensors_) Measure(sensor, frame);
@@ -109,7 +107,8 @@ class Models : public Source {
   struct Motion {
     const MotionBinding* binding;
     Random noise;
-    int stream = -1;  ///< of its control input
+    int stream = -1;             ///< of its control input
+    const Motion* of = nullptr;  ///< that draws the stream, where it is not this one
     std::vector<double> input, mean, amplitude;
     double frequency_hz = 0.0;
     std::vector<double> w;  ///< as it is drawn
@@ -123,6 +122,21 @@ class Models : public Source {
     Random noise;
     int max_per_frame;  ///< of landmarks
   };
+
+  /// The system of the config, with what `overrides` has of it.
+  void BuildTruth(const SourceArguments& arguments) {
+    const auto overrides = arguments.entry.Find("overrides");
+    const Config truth =
+        overrides ? arguments.config->Merged(*overrides) : arguments.config->Copy();
+    system_ = BuildSystem(truth.root(), *arguments.host, {});
+    start_s_ = system_.initial_time_s.value_or(0.0);
+    if (!overrides) return;
+    for (const auto& [key, node] : overrides->Entries()) {
+      if (!truth.root().HasUnread(key)) continue;
+      node.Fail("the truth has no key '" + key + "'",
+                "`state`, `sensors`, and what their models read");
+    }
+  }
 
   static std::uint64_t StreamOf(std::size_t first, std::size_t i) {
     return static_cast<std::uint64_t>(first + i);
@@ -147,22 +161,33 @@ class Models : public Source {
     for (const Prior& prior : system_.priors) {
       const Block& block = system_.layout[prior.block];
       std::vector<double>& x = x_[static_cast<std::size_t>(prior.block)];
-      if (const auto value = given ? given->Find(block.name) : std::nullopt) {
+      const std::string name = block.name.substr(block.owner.size() + 1);
+      const auto owner = given ? given->Find(block.owner) : std::nullopt;
+      if (const auto value = owner ? owner->Find(name) : std::nullopt) {
+        constexpr double kUnitLength = 1e-3;
         x = value->Numbers(block.geometry().ambient);
+        if (block.geometry().Defect(x.data()) > kUnitLength) {
+          value->Fail("not of unit length", "a unit vector or quaternion [w, x, y, z] to 1e-3");
+        }
         block.geometry().Normalise(x.data());
         continue;
       }
       if (!prior.from.empty()) {
         entry.Fail(
             "block '" + block.name + "' starts from a measurement: its true value is unknown",
-            "initial: {" + block.name + ": value}");
+            "source.initial: {" + block.owner + ": {" + name + ": value}}");
       }
       x = prior.mean;
       if (!draws || prior.covariance.size() == 0) continue;
       const Eigen::VectorXd d = DrawFrom(prior.covariance, random);
       block.geometry().Plus(x.data(), d.data(), x.data());
     }
-    if (given) given->RejectUnread();
+    if (given) {
+      for (const auto& [owner, blocks] : given->Entries()) {
+        if (blocks.is_map()) blocks.RejectUnread();
+      }
+      given->RejectUnread();
+    }
     for (const Block& block : system_.layout.blocks()) {
       truths_.push_back({block.name, block.geometry().ambient});
     }
@@ -170,24 +195,42 @@ class Models : public Source {
 
   void AddMotions(const Node& entry, std::uint64_t seed) {
     const auto inputs = entry.Find("inputs");
+    motions_.reserve(system_.motions.size());  // they point to each other
     for (std::size_t i = 0; i < system_.motions.size(); ++i) {
       const MotionBinding& binding = system_.motions[i];
-      Motion motion{&binding, Random(seed, StreamOf(100, i)), -1, {}, {}, {}, 0.0, {}, false};
+      Motion motion{&binding, Random(seed, StreamOf(100, i)), -1, nullptr, {}, {}, {}, 0.0, {},
+                    false};
       motion.w.resize(static_cast<std::size_t>(binding.model.noise_size()));
-      if (binding.model.has_input()) ReadInput(inputs, motion);
+      if (binding.model.has_input()) ReadInput(entry, inputs, motion);
       motions_.push_back(std::move(motion));
     }
     if (inputs) inputs->RejectUnread();
   }
 
-  void ReadInput(const std::optional<Node>& inputs, Motion& motion) {
+  void ReadInput(const Node& source, const std::optional<Node>& inputs, Motion& motion) {
+    if (motion.binding->input.timeout_s < dt_s_) {
+      source.Fail(
+          "the control input of '" + motion.binding->name + "' times out before the next time step",
+          "rate_hz above 1 / timeout_s");
+    }
+    const std::string& stream = motion.binding->input.stream;
+    for (const Motion& other : motions_) {
+      if (other.stream < 0 || other.binding->input.stream != stream) continue;
+      if (const auto twice = inputs ? inputs->Find(motion.binding->name) : std::nullopt) {
+        twice->Fail("stream '" + stream + "' is that of '" + other.binding->name + "' too",
+                    "the input of '" + other.binding->name + "' alone");
+      }
+      motion.stream = other.stream;
+      motion.of = &other;
+      return;
+    }
     const Geometry& geometry = motion.binding->model.input().geometry;
     const auto size = static_cast<std::size_t>(geometry.ambient);
     motion.mean.resize(size);
     motion.amplitude.resize(size);
     geometry.Identity(motion.mean.data());
     motion.stream = static_cast<int>(streams_.size());
-    streams_.push_back({motion.binding->input.stream, geometry.ambient});
+    streams_.push_back({stream, geometry.ambient});
     const auto entry = inputs ? inputs->Find(motion.binding->name) : std::nullopt;
     if (entry) {
       if (const auto mean = entry->Find("mean")) motion.mean = mean->Numbers(geometry.ambient);
@@ -200,7 +243,6 @@ class Models : public Source {
       }
       entry->RejectUnread();
     }
-    motion.input = InputAt(motion, 0.0);
   }
 
   static std::vector<double> InputAt(const Motion& motion, double t_s) {
@@ -216,14 +258,23 @@ class Models : public Source {
     const auto most = landmarks ? landmarks->Find("max_per_frame") : std::nullopt;
     const int max_per_frame = most ? static_cast<int>(most->Integer(1, LandmarkOptions::kUnlimited))
                                    : LandmarkOptions::kUnlimited;
+    const std::ptrdiff_t inputs = std::ssize(streams_);
     for (std::size_t i = 0; i < system_.sensors.size(); ++i) {
       const SensorBinding& binding = system_.sensors[i];
       const auto own = settings ? settings->Find(binding.name) : std::nullopt;
       const models::Schedule schedule = models::ReadSchedule(own, rate_hz, seed, 1001 + 2 * i);
-      if (std::ranges::find(streams_, binding.stream, &StreamInfo::name) != streams_.end()) {
-        if (own)
-          own->Fail("another sensor before it draws stream '" + binding.stream + "'",
-                    "no such entry");
+      const auto taken = std::ranges::find(streams_, binding.stream, &StreamInfo::name);
+      if (taken != streams_.end()) {
+        const bool input = taken - streams_.begin() < inputs;
+        if (input) {
+          entry.Fail("stream '" + binding.stream + "' of sensor '" + binding.name +
+                         "' is that of a control input",
+                     "a stream of its own");
+        }
+        if (own) {
+          own->Fail("a sensor before it has the stream '" + binding.stream + "', and draws it",
+                    "the entry of that sensor");
+        }
         continue;
       }
       sensors_.push_back({&binding, ModelOf(entry, binding), static_cast<int>(streams_.size()),
@@ -267,14 +318,23 @@ class Models : public Source {
       for (std::size_t k = 0; k < 3; ++k) point[k] = low[k] + (high[k] - low[k]) * random.Uniform();
     }
     for (const KnownLandmark& known : system_.landmarks->known) {
-      if (known.id < 0 || known.id >= static_cast<std::int64_t>(count)) continue;
-      points_[static_cast<std::size_t>(known.id)] = known.position;
+      if (known.id < 0 || known.id >= static_cast<std::int64_t>(count)) {
+        landmarks->At("count").Fail(
+            "no point has the id " + std::to_string(known.id) + " of `landmarks.known`",
+            "more than its greatest id");
+      }
+      auto& point = points_[static_cast<std::size_t>(known.id)];
+      for (std::size_t k = 0; k < 3; ++k) {
+        point[k] = known.position[k] + known.sigma * random.Normal();
+      }
     }
   }
 
+  double Time() const { return start_s_ + static_cast<double>(index_) * dt_s_; }
+
   /// To the next time step.
   void Step() {
-    const double t_s = static_cast<double>(index_) * dt_s_;
+    const double t_s = Time();
     std::vector<std::vector<double>> next = x_;
     for (Motion& motion : motions_) {
       const MotionModel& model = motion.binding->model;
@@ -368,7 +428,8 @@ class Models : public Source {
 
   void EmitInput(Motion& motion, Frame& frame) {
     if (motion.stream < 0) return;
-    motion.input = InputAt(motion, static_cast<double>(index_) * dt_s_);
+    motion.input = motion.of != nullptr ? motion.of->input : InputAt(motion, Time());
+    if (motion.of != nullptr) return;
     Measurement& measurement = frame.measurements.emplace_back();
     measurement.timestamp = frame.timestamp;
     measurement.stream = motion.stream;
@@ -381,7 +442,7 @@ class Models : public Source {
   std::vector<Motion> motions_;
   std::vector<Sensor> sensors_;
   std::vector<std::array<double, 3>> points_;
-  double dt_s_;
+  double dt_s_, start_s_ = 0.0;
   std::int64_t count_, index_ = 0;
 };
 

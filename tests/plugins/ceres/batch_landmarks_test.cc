@@ -182,7 +182,7 @@ TEST(CeresBatchLandmarks, AnotherStartLeadsToTheSameSolution) {
 
 // Points known exactly give the scale; what is seen without noise then gives the truth.
 TEST(CeresBatchLandmarks, WhatIsSeenWithoutNoiseGivesTheTruth) {
-  constexpr double kSigma = 1e-7;
+  constexpr double kPixelSigma = 1e-7;
   Problem problem(12, 12);
   LandmarkOptions options = testing::WithPrior(kRho, kRhoSigma);
   for (int i = 0; i < 3; ++i) {
@@ -195,7 +195,7 @@ TEST(CeresBatchLandmarks, WhatIsSeenWithoutNoiseGivesTheTruth) {
       m.values = {z[0], z[1]};
     }
   }
-  const Found found = Solve(MapSystem(InverseDepthPixels(kSigma), options), problem.frames);
+  const Found found = Solve(MapSystem(InverseDepthPixels(kPixelSigma), options), problem.frames);
   ASSERT_FALSE(found.failed) << found.events.back().text;
   const VectorXd error = problem.Solution(found) - problem.truth;
   EXPECT_LT(error.cwiseAbs().maxCoeff(), 1e-6);

@@ -175,9 +175,17 @@ TEST(Models, TheStartCanBeGiven) {
   const Config at_mean = Parse(kState + "source: {type: models, start: mean, duration_s: 0}");
   EXPECT_EQ(FramesOf(at_mean)[0].truth, (std::vector<std::vector<double>>{{10}, {0.1}}));
   const Config given =
-      Parse(kState + "source: {type: models, initial: {target.velocity: -1}, duration_s: 0}");
+      Parse(kState + "source: {type: models, initial: {target: {velocity: -1}}, duration_s: 0}");
   EXPECT_EQ(FramesOf(given)[0].truth[1], std::vector<double>{-1});
   EXPECT_NE(FramesOf(given)[0].truth[0], std::vector<double>{10});
+}
+
+// The priors are those of initial_time_s, at which the first measurements are made.
+TEST(Models, StartsAtTheTimeOfThePriors) {
+  const auto frames =
+      FramesOf(Parse(kState + "initial_time_s: 4\nsource: {type: models, rate_hz: 10}"));
+  EXPECT_EQ(frames[0].timestamp, TimestampFromSeconds(4.0));
+  EXPECT_EQ(frames[1].timestamp, TimestampFromSeconds(4.1));
 }
 
 TEST(Models, TheTruthCanHaveAModelOfItsOwn) {
@@ -273,7 +281,11 @@ TEST(Models, RefusesByKeyAndRemedy) {
   from.replace(from.find(prior), prior.size(), "{from_measurement: stereo}");
   const std::string message = Refusal(from + "seed: 1}");
   EXPECT_NE(message.find("block 'target.position' starts from a measurement"), std::string::npos);
-  EXPECT_NE(message.find("initial: {target.position: value}"), std::string::npos);
+  EXPECT_NE(message.find("source.initial: {target: {position: value}}"), std::string::npos);
+  for (const char* overrides : {"sensor: {stereo: {sigma_px: 2}}", "source: {rate_hz: 1}"}) {
+    const std::string why = Refusal(source + "overrides: {" + overrides + "}}");
+    EXPECT_NE(why.find("the truth has no key 's"), std::string::npos) << why;
+  }
 }
 
 }  // namespace

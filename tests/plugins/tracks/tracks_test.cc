@@ -210,7 +210,9 @@ TEST_F(TracksTest, StreamsALongFileInConstantMemory) {
   while (source->Next(frame)) count += frame.measurements.size();
   writer.join();
   EXPECT_EQ(count, 1000000u);
-  if (!kSanitized) EXPECT_LT(peak_kb() - before, 4096);
+  if (!kSanitized) {
+    EXPECT_LT(peak_kb() - before, 4096);
+  }
 }
 
 TEST_F(TracksTest, ReadsRealTracks) {

@@ -163,6 +163,7 @@ class Models : public Source {
       std::vector<double>& x = x_[static_cast<std::size_t>(prior.block)];
       const std::string name = block.name.substr(block.owner.size() + 1);
       const auto owner = given ? given->Find(block.owner) : std::nullopt;
+      if (owner && !owner->is_map()) owner->Fail("not a map", "{BLOCK: value}");
       if (const auto value = owner ? owner->Find(name) : std::nullopt) {
         constexpr double kUnitLength = 1e-3;
         x = value->Numbers(block.geometry().ambient);
@@ -183,8 +184,8 @@ class Models : public Source {
       block.geometry().Plus(x.data(), d.data(), x.data());
     }
     if (given) {
-      for (const auto& [owner, blocks] : given->Entries()) {
-        if (blocks.is_map()) blocks.RejectUnread();
+      for (const Block& block : system_.layout.blocks()) {
+        if (const auto owner = given->Find(block.owner)) owner->RejectUnread();
       }
       given->RejectUnread();
     }

@@ -54,7 +54,7 @@ inline constexpr const char* kModelsKeys =
 ///
 /// Keys         kModelsKeys.
 /// Errors       kBadConfig; kBadData where the truth leaves the domain of a motion model.
-/// Source       [BarShalom2001] sec. 5.5: runs of the very model that the filter has.
+/// Source       [BarShalom2001] sec. 5.4: runs of the very model that the filter has.
 class Models : public Source {
  public:
   explicit Models(const SourceArguments& arguments) {
@@ -138,10 +138,6 @@ class Models : public Source {
     }
   }
 
-  static std::uint64_t StreamOf(std::size_t first, std::size_t i) {
-    return static_cast<std::uint64_t>(first + i);
-  }
-
   /// n of N(0, P) as a vector of the tangent; P may be singular.
   static Eigen::VectorXd DrawFrom(const Eigen::MatrixXd& p, Random& random) {
     const Eigen::LDLT<Eigen::MatrixXd> root(p);
@@ -199,8 +195,7 @@ class Models : public Source {
     motions_.reserve(system_.motions.size());  // they point to each other
     for (std::size_t i = 0; i < system_.motions.size(); ++i) {
       const MotionBinding& binding = system_.motions[i];
-      Motion motion{&binding, Random(seed, StreamOf(100, i)), -1, nullptr, {}, {}, {}, 0.0, {},
-                    false};
+      Motion motion{&binding, Random(seed, 100 + i), -1, nullptr, {}, {}, {}, 0.0, {}, false};
       motion.w.resize(static_cast<std::size_t>(binding.model.noise_size()));
       if (binding.model.has_input()) ReadInput(entry, inputs, motion);
       motions_.push_back(std::move(motion));
@@ -279,7 +274,7 @@ class Models : public Source {
         continue;
       }
       sensors_.push_back({&binding, ModelOf(entry, binding), static_cast<int>(streams_.size()),
-                          schedule, Random(seed, StreamOf(1000, 2 * i)), max_per_frame});
+                          schedule, Random(seed, 1000 + 2 * i), max_per_frame});
       streams_.push_back({binding.stream, binding.model.measurement().geometry.ambient});
     }
     if (settings) settings->RejectUnread();
@@ -406,7 +401,7 @@ class Models : public Source {
     const auto m = static_cast<Eigen::Index>(geometry.tangent);
     std::vector<double> z(static_cast<std::size_t>(geometry.ambient));
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> l(m, m);
-    // Drawn for each, seen or not, so that what one sees does not shift the noise of the others.
+    // Before it is known whether h is defined: where the truth is does not shift the noise.
     Eigen::VectorXd n(m);
     for (double& value : n) value = sensor.noise.Normal();
     const auto fate = sensor.schedule.Draw();

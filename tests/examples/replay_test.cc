@@ -8,11 +8,13 @@
 // writes the files anew; say in the commit why they changed.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <ostream>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -137,6 +139,8 @@ struct Replayed {
   int every;
   ReplaySettings settings;
 };
+
+void PrintTo(const Replayed& one, std::ostream* out) { *out << one.name; }
 
 class Replay : public ::testing::TestWithParam<Replayed> {};
 

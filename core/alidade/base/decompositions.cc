@@ -27,8 +27,9 @@ Eigen::VectorXd EigenvaluesOf(const Eigen::MatrixXd& symmetric) {
 
 LeastSquares SolveLeastSquares(const Eigen::MatrixXd& a, const Eigen::VectorXd& b) {
   const Qr qr(a);
-  LeastSquares found{UpperTriangle(qr), qr.solve(b), b};
+  LeastSquares found{UpperTriangle(qr), {}, b};
   found.q_adjoint_b.applyOnTheLeft(qr.householderQ().adjoint());
+  found.x = found.r.triangularView<Eigen::Upper>().solve(found.q_adjoint_b.head(a.cols()));
   return found;
 }
 

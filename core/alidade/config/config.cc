@@ -307,19 +307,18 @@ std::vector<std::string> Config::inputs() const {
   return all;
 }
 
+Config Config::Copy() const {
+  Config config(*this);
+  config.tree_ = Clone(*tree_);
+  return config;
+}
+
 Config Config::Merged(const Node& overrides) const {
   if (!overrides.is_map()) overrides.Fail("not a map", "a map of keys to override");
   const auto over = Clone(*overrides.tree_);
   KeepPaths(*overrides.tree_, *over);
-  Config config(*this);
-  config.tree_ = Clone(*tree_);
+  Config config = Copy();
   Merge(config.tree_.get(), over.get());
-  return config;
-}
-
-Config Config::Copy() const {
-  Config config(*this);
-  config.tree_ = Clone(*tree_);
   return config;
 }
 

@@ -200,7 +200,7 @@ class Ekf : public Estimator {
   void CheckConditioning(const Row& row);
   Outcome ApplySmall(std::span<Row* const> rows, int m);
   Outcome ApplyLarge(std::span<Row* const> rows);
-  bool MaskConsidered(std::span<Row* const> rows, Eigen::MatrixXd& gain) const;
+  Eigen::MatrixXd MaskConsidered(std::span<Row* const> rows, Eigen::MatrixXd& gain) const;
   bool Correct(const Eigen::MatrixXd& w, const Eigen::MatrixXd& lost, const Eigen::MatrixXd& gain,
                const Eigen::MatrixXd& h, const Eigen::MatrixXd& r);
   Workspace::Matrix ProjectionOf(std::span<Row* const> rows);

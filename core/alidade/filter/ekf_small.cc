@@ -94,13 +94,7 @@ ALIDADE_INLINE bool Ekf::Small::Step(double dt_s) {
   double* const x = ekf_.state_.values().data();
   const double* const next = ekf_.next_.data();
   for (const Motion& motion : motions_) {
-    const int i = motion.offset;
-    if (motion.size == 2) {
-      x[i] = next[i];
-      x[i + 1] = next[i + 1];
-    } else {
-      for (int k = i; k < i + motion.size; ++k) x[k] = next[k];
-    }
+    for (int i = motion.offset; i < motion.offset + motion.size; ++i) x[i] = next[i];
   }
   return true;
 }

@@ -130,9 +130,9 @@ Outcome Ekf::ApplyLarge(std::span<Row* const> rows) {
   const auto l = s.triangularView<Eigen::Lower>();
   const auto l_transposed = s.transpose().triangularView<Eigen::Upper>();
   const Eigen::MatrixXd w = l.solve(pht.transpose()).transpose();
-  const Eigen::MatrixXd optimal = l_transposed.solve(w.transpose()).transpose();
-  Eigen::MatrixXd gain = optimal, lost;
-  if (MaskConsidered(rows, gain)) lost = (gain - optimal) * s.triangularView<Eigen::Lower>();
+  Eigen::MatrixXd gain = l_transposed.solve(w.transpose()).transpose();
+  Eigen::MatrixXd lost = MaskConsidered(rows, gain);
+  if (lost.size() > 0) lost *= l;
   Eigen::VectorXd dx = gain * all.innovation;
   if (correction_ != nullptr) std::copy_n(correction_, dx.size(), dx.data());
   state_.Retract(dx.data(), moved_);
@@ -143,26 +143,28 @@ Outcome Ekf::ApplyLarge(std::span<Row* const> rows) {
   return Outcome::kAccepted;
 }
 
-/// Zeroes the gain of consider blocks; true where that changed anything.
-bool Ekf::MaskConsidered(std::span<Row* const> rows, Eigen::MatrixXd& gain) const {
-  bool masked = false;
+/// Zeroes the gain of consider blocks; K - K* of what it was before, empty where nothing changed.
+Eigen::MatrixXd Ekf::MaskConsidered(std::span<Row* const> rows, Eigen::MatrixXd& gain) const {
+  Eigen::MatrixXd lost;
+  const auto mask = [&](Eigen::Index offset, Eigen::Index size, Eigen::Index at, Eigen::Index k) {
+    if (lost.size() == 0) lost = Eigen::MatrixXd::Zero(gain.rows(), gain.cols());
+    lost.block(offset, at, size, k) -= gain.block(offset, at, size, k);
+    gain.block(offset, at, size, k).setZero();
+  };
   for (const Block& block : state_.layout().blocks()) {
     if (!block.present || block.status != BlockStatus::kConsider) continue;
-    gain.middleRows(block.tangent_offset, block.geometry().tangent).setZero();
-    masked = true;
+    mask(block.tangent_offset, block.geometry().tangent, 0, gain.cols());
   }
   Eigen::Index at = 0;
   for (const Row* row : rows) {
     const SensorPlan& plan = PlanOf(*row);
     const Eigen::Index k = BindingOf(*row).model.measurement().geometry.tangent;
     for (std::size_t i = 0; i < plan.parts.size(); ++i) {
-      if (!plan.consider[i]) continue;
-      gain.block(plan.parts[i].offset, at, plan.parts[i].size, k).setZero();
-      masked = true;
+      if (plan.consider[i]) mask(plan.parts[i].offset, plan.parts[i].size, at, k);
     }
     at += k;
   }
-  return masked;
+  return lost;
 }
 
 /// P after the update. With the optimal gain K* it is P - W W'; with another one, K, what K lacks

@@ -54,8 +54,8 @@ enum class NoiseKind {
 ///   bool Valid(const double* z) const;
 ///   static constexpr int kInitialises;                                  the role y below
 ///   template <class T> bool Initialise(const T* other..., const T* z[, prior], T* y) const;
-///   static constexpr int kPrior;         numbers of the prior, which z does not determine; default
-///   0 void Jacobian(const double* role..., MatrixRef J_z_role...) const;  analytic, zeroed
+///   static constexpr int kPrior;         numbers of the prior, beyond z; default 0
+///   void Jacobian(const double* role..., MatrixRef J_z_role...) const;  analytic, zeroed
 ///
 /// Roles with the flag ALIDADE_ROLE_LANDMARK stand side by side and are filled by the landmark that
 /// a measurement names. Where kInitialises is the first of them, y holds them all, one after the

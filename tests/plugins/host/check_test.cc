@@ -59,7 +59,7 @@ TEST_P(OneFault, IsFoundByItsCheckAlone) {
   // The sanitizer ends such a process in its own way, and has a stack of its own.
   const std::string model = GetParam().model;
   const bool differs = model == "exits" || model == "eats_memory" || model == "unwritten";
-  if (testing::kSanitized && differs) GTEST_SKIP();
+  if (testing::kSanitized && differs) GTEST_SKIP() << "a sanitizer ends it in its own way";
   CheckOptions options;
   if (std::string(GetParam().model) == "hangs") options.timeout_s = 1.0;
   options.memory_mb = 64;

@@ -265,17 +265,23 @@ TEST(Models, GivesControlInputs) {
 
 TEST(Models, RefusesByKeyAndRemedy) {
   const std::string source = kState + "source: {type: models, ";
-  EXPECT_NE(Refusal(source + "sensors: {sterio: {missing: 0}}}").find("sterio"), std::string::npos);
+  EXPECT_NE(Refusal(source + "sensors: {sterio: {missing: 0}}}")
+                .find("source.sensors.sterio: unknown key"),
+            std::string::npos);
   EXPECT_NE(
       Refusal(source + "sensors: {stereo: {rate_hz: 31}}}").find("source.sensors.stereo.rate_hz"),
       std::string::npos);
-  EXPECT_NE(Refusal(source + "sensors: {stereo: {missing: 1.5}}}").find("missing"),
+  EXPECT_NE(Refusal(source + "sensors: {stereo: {missing: 1.5}}}")
+                .find("source.sensors.stereo.missing: '1.5' is out of range"),
             std::string::npos);
   EXPECT_NE(Refusal(source + "landmarks: {count: 3, box: {min: [0,0,0], max: [1,1,1]}}}")
                 .find("no sensor measures landmarks"),
             std::string::npos);
-  EXPECT_NE(Refusal(source + "initial: {depth: 3}}").find("depth"), std::string::npos);
-  EXPECT_NE(Refusal(source + "inputs: {target: {mean: 0}}}").find("target"), std::string::npos);
+  EXPECT_NE(Refusal(source + "initial: {depth: 3}}").find("source.initial.depth: unknown key"),
+            std::string::npos);
+  EXPECT_NE(
+      Refusal(source + "inputs: {target: {mean: 0}}}").find("source.inputs.target: unknown key"),
+      std::string::npos);
   std::string from = source;
   const std::string prior = "{mean: 10, sigma: 0.2}";
   from.replace(from.find(prior), prior.size(), "{from_measurement: stereo}");

@@ -10,6 +10,7 @@
 #include <memory>
 #include <sstream>
 
+#include "alidade/record/follower.h"
 #include "alidade/record/recorder.h"
 #include "alidade/run/metric_rows.h"
 #include "command.h"
@@ -23,6 +24,7 @@ constexpr const char* kRunFooter = R"(Examples:
   alidade run near/config.yaml                     into runs/near
   alidade run config.yaml -o runs/b --seed 2 --set estimators.ekf.gate=0.99
   alidade run config.yaml --set source.path=other.csv --force
+  tail -f log.csv | alidade run live.yaml --set source.path=/dev/stdin --follow | my_robot
 
 Ctrl-C finishes the frame, writes all that is done and ends with exit code 75; twice: at once. While
 figures are drawn it leaves out the rest of them.)";
@@ -33,6 +35,7 @@ struct RunArguments {
   std::string folder;
   std::optional<std::uint64_t> seed;
   bool force = false, quiet = false, no_figures = false, covariances = false, all = false;
+  bool follow = false;
 };
 
 /// Events of one estimator and one kind.
@@ -112,6 +115,8 @@ ExitCode RunConfig(const RunArguments& arguments) {
   Progress progress("frames", arguments.quiet);
   RunOptions options;
   options.observers = {&recorder};
+  Follower follower(Print);
+  if (arguments.follow) options.observers.push_back(&follower);
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
   const RunResult result = Run(experiment, options);
@@ -120,7 +125,7 @@ ExitCode RunConfig(const RunArguments& arguments) {
   if (result.status == RunStatus::kStopped) PrintNote(result.reason);
   FinishOnSignals();
   recorder.Finish(result);
-  if (!arguments.quiet) {
+  if (!arguments.quiet && !arguments.follow) {
     const std::string table = arguments.all
                                   ? ComparisonTable(result)
                                   : internal::MainTable(result, internal::SubjectsOf(experiment));
@@ -142,6 +147,8 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
   command.add_flag("--force", arguments->force, "replace the run folder if it is there");
   command.add_flag("--all", arguments->all, "print all rows of the table, not ten");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
+  command.add_flag("--follow", arguments->follow,
+                   "print each estimate as it is made, a line of JSON, in place of the table");
   command.add_flag("--no-figures", arguments->no_figures, "draw no figures");
   command.add_flag("--covariances", arguments->covariances,
                    "write P of every estimate, for `alidade compare`");

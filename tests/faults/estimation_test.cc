@@ -6,6 +6,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
+#include "alidade/filter/filter_state.h"
 #include "alidade/filter/iekf.h"
 #include "support/recording.h"
 
@@ -53,8 +54,9 @@ Eigen::Matrix2d Indefinite() { return (Eigen::Matrix2d() << 1.0, 1.1, 1.1, 1.0).
 TEST(LostPositiveDefiniteness, IsRepairedReportedAndTheFilterGoesOn) {
   const System system = TwoElements(Indefinite(), 0.1);
   for (const bool iterated : {false, true}) {
-    const auto filter = iterated ? std::make_unique<Iekf>(system, IekfOptions{}, StreamsOf(system))
-                                 : std::make_unique<Ekf>(system, EkfOptions{}, StreamsOf(system));
+    std::unique_ptr<Filter> filter =
+        std::make_unique<Ekf>(system, EkfOptions{}, StreamsOf(system));
+    if (iterated) filter = std::make_unique<Iekf>(system, IekfOptions{}, StreamsOf(system));
     const UpdateReport& report = filter->Process(FrameAt(0.0, {{0, -1.0}}));
     EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotPd);
     EXPECT_TRUE(HasEvent(report, "repaired"));
@@ -83,9 +85,7 @@ TEST(LostPositiveDefiniteness, EndsTheFilterOnceItsRepairsAreUsedUp) {
     EXPECT_EQ(HasEvent(report, "repaired"), k < options.max_covariance_repairs) << k;
     EXPECT_EQ(ekf.failed(), k == options.max_covariance_repairs) << k;
     // Spoilt again, from where it is.
-    const auto kept = ekf.Save();
-    kept->state.covariance().SetBlock(0, 0, Indefinite());
-    ekf.Restore(*kept);
+    ekf.internals().state.covariance().SetBlock(0, 0, Indefinite());
   }
 }
 
@@ -95,11 +95,11 @@ TEST(LostPositiveDefiniteness, WhatIsTakenBackIsNotCounted) {
   EkfOptions options;
   options.max_covariance_repairs = 1;
   Ekf ekf(system, options, StreamsOf(system));
-  const auto before = ekf.Save();
+  const Ekf before = ekf;
   for (int k = 0; k < 3; ++k) {
     EXPECT_TRUE(HasEvent(ekf.Process(FrameAt(0.0, {{0, -1.0}})), "repaired")) << k;
     EXPECT_FALSE(ekf.failed());
-    ekf.Restore(*before);
+    ekf = before;
   }
 }
 

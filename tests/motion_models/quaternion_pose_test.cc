@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "alidade/base/random.h"
+#include "alidade/filter/ekf.h"
 #include "alidade/filter/ukf.h"
 #include "alidade/host/in_process.h"
 #include "support/model_checks.h"

@@ -109,13 +109,6 @@ class Estimator {
   /// Takes the estimate of frame `index`, counted from the first call of Process, and its report.
   using Emit = std::function<void(std::size_t index, const State&, const UpdateReport&)>;
 
-  /// All that what comes after a frame depends on; each type of estimator adds its own.
-  struct Snapshot {
-    explicit Snapshot(State after) : state(std::move(after)) {}
-    virtual ~Snapshot() = default;
-    State state;
-  };
-
   virtual ~Estimator() = default;
   /// Sets the time of the initial state.
   virtual void Start(Timestamp timestamp) = 0;
@@ -132,11 +125,9 @@ class Estimator {
   /// Where Smooth takes long, it asks `stop` now and then; where that is true it ends by an Error
   /// of kStopped. A null function never stops.
   virtual void StopWhen(const std::function<bool()>& /*stop*/) {}
-  /// The estimator as it is after the last frame; null: it cannot go back to one.
-  virtual std::unique_ptr<Snapshot> Save() const { return nullptr; }
-  /// Goes back to where this estimator gave `snapshot`: every result from there on has the same
-  /// bits as if nothing had come between.
-  virtual void Restore(const Snapshot& /*snapshot*/) {}
+  /// A copy, whose every result from here on has the bits that this one's would have; null: it
+  /// cannot be copied.
+  virtual std::unique_ptr<Estimator> Clone() const { return nullptr; }
   virtual const State& state() const = 0;
   /// The landmarks in the state, by id.
   virtual std::vector<LandmarkEstimate> landmarks() const { return {}; }

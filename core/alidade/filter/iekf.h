@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <optional>
-#include <span>
 #include <vector>
 
-#include "alidade/filter/ekf.h"
+#include "alidade/filter/filter.h"
+#include "alidade/filter/support.h"
 
 namespace alidade {
 
@@ -22,7 +21,7 @@ struct IekfOptions : EkfOptions {
   static std::vector<ParamInfo> Schema();
 };
 
-/// Iterated extended Kalman filter [Bell1993]: an Ekf whose updates minimise
+/// Iterated extended Kalman filter [Bell1993]: as Ekf, with updates that minimise
 ///
 ///   c(dx) = dx' P^-1 dx + r' R^-1 r,   r = z (-) h(x (+) dx)
 ///
@@ -37,7 +36,7 @@ struct IekfOptions : EkfOptions {
 /// An update that does not converge keeps its last iterate and notes the event `not_converged`; so
 /// does one that comes to where h has no Jacobian. One with R not positive definite has no such c:
 /// it is that of the Ekf.
-class Iekf : public Ekf {
+class Iekf : public Filter {
  public:
   /// No consider blocks and roles, no role linearised at the measurement.
   static constexpr Support kSupport = {
@@ -46,31 +45,6 @@ class Iekf : public Ekf {
   /// ContractViolation where `system` asks for more than kSupport, `jacobian` is not kLatest, or an
   /// option is out of its range.
   Iekf(System system, const IekfOptions& options, const std::vector<StreamInfo>& streams);
-
- private:
-  struct Minimum {
-    Workspace::Vector dx;
-    int iterations = 0;
-    /// That is left, in posterior standard deviations; none where h has no Jacobian.
-    std::optional<double> step = std::nullopt;
-    bool converged = false;
-  };
-  /// dx = P v, and a step from there, step = P step_v.
-  struct Direction {
-    const Workspace::Vector &dx, &v, &step, &step_v;
-  };
-  Outcome Apply(std::span<Row* const> rows) override;
-  std::optional<Minimum> Minimise(std::span<Row* const> rows);
-  double PartThatLowersTheCost(std::span<Row* const> rows, const Direction& at,
-                               const Workspace::Matrix& r, Workspace::Vector& residual);
-  bool MoveTo(const double* dx);
-  bool Innovations(std::span<Row* const> rows, Workspace::Vector& innovations);
-  bool Relinearise(std::span<Row* const> rows, const double* dx);
-
-  int max_iterations_;
-  double tolerance_;
-  std::vector<double> iterate_;                   ///< values on the way; the state is the prior
-  std::vector<MeasurementReport> at_prediction_;  ///< reports of its rows
 };
 
 }  // namespace alidade

@@ -3,26 +3,38 @@
 
 #include <Eigen/Cholesky>
 
+#include "alidade/base/error.h"
 #include "alidade/filter/filter_options.h"
+#include "alidade/filter/linear.h"
+#include "alidade/filter/stack.h"
 
 namespace alidade {
+namespace internal {
+namespace {
 
-RtsSmoother::RtsSmoother(System system, const EkfOptions& options,
-                         const std::vector<StreamInfo>& streams)
-    : Ekf(std::move(system), internal::WithoutRecovery(options), streams, Steps::kOverridden) {
-  ALIDADE_EXPECTS(!FindUnsupported(system_, kSupport));
-}
+/// How the adjoint goes back over a frame: lambda <- A' lambda + b, Lambda <- A' Lambda A +
+/// information. Where the frame starts inside an interval, A has columns for w behind those of x.
+struct Adjoint {
+  Eigen::MatrixXd a;  ///< n x n, or n x (n + n_w)
+  Eigen::VectorXd b;
+  Eigen::MatrixXd information;
 
-void RtsSmoother::Adjoint::Append(const Eigen::MatrixXd& later_a, const Eigen::VectorXd& later_b,
-                                  const Eigen::MatrixXd& later_information) {
+  /// This one, and then what comes later in time.
+  void Append(const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
+              const Eigen::MatrixXd& information);
+  void GoBack(Eigen::Index held, Eigen::VectorXd& lambda, Eigen::MatrixXd& later) const;
+};
+
+void Adjoint::Append(const Eigen::MatrixXd& later_a, const Eigen::VectorXd& later_b,
+                     const Eigen::MatrixXd& later_information) {
   b += a.transpose() * later_b;
   information += a.transpose() * later_information * a;
   a = later_a * a;
 }
 
 /// `held`: of lambda and Lambda at the end of the frame, the rows of w behind those of x.
-void RtsSmoother::Adjoint::GoBack(Eigen::Index held, Eigen::VectorXd& lambda,
-                                  Eigen::MatrixXd& later_information) const {
+void Adjoint::GoBack(Eigen::Index held, Eigen::VectorXd& lambda,
+                     Eigen::MatrixXd& later_information) const {
   const Eigen::Index n = a.rows(), before = a.cols() - n;
   Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(n + held, n + before);
   whole.topRows(n) = a;
@@ -32,52 +44,99 @@ void RtsSmoother::Adjoint::GoBack(Eigen::Index held, Eigen::VectorXd& lambda,
   later_information = 0.5 * (later_information + later_information.transpose()).eval();
 }
 
-const UpdateReport& RtsSmoother::Process(const Frame& frame) {
-  const Workspace::Use use(work_);
-  const Eigen::Index n = state_.covariance().size(), all = n + (InInterval() ? NoiseSize() : 0);
-  current_ = {Eigen::MatrixXd::Identity(n, all), Eigen::VectorXd::Zero(all),
-              Eigen::MatrixXd::Zero(all, all)};
-  const UpdateReport& report = Ekf::Process(frame);
-  passed_frames_.push_back({current_, state_.values(), state_.covariance().Dense(),
-                            InInterval() ? Eigen::MatrixXd(HeldNoise()) : Eigen::MatrixXd(n, 0),
-                            report});
-  passed_frames_.back().report.events.clear();  // told already
-  return report;
+/// Linear, that takes its steps and updates down as an adjoint.
+class Taped : public Method {
+ public:
+  std::unique_ptr<Method> Clone() const override { return std::make_unique<Taped>(*this); }
+  Trouble Step(FilterState& f, double dt_s) override;
+  Outcome Predict(FilterState& f, Row& row) override { return linear_.Predict(f, row); }
+  Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
+
+  /// From here on is another frame.
+  void StartFrame(const FilterState& f);
+  const Adjoint& frame() const { return frame_; }
+
+ private:
+  Linear linear_;
+  Adjoint frame_;
+};
+
+void Taped::StartFrame(const FilterState& f) {
+  const Eigen::Index n = f.size();
+  const Eigen::Index all = n + (f.motions.in_interval() ? f.motions.noise_size() : 0);
+  frame_ = {Eigen::MatrixXd::Identity(n, all), Eigen::VectorXd::Zero(all),
+            Eigen::MatrixXd::Zero(all, all)};
 }
 
-bool RtsSmoother::StepOnce(double dt_s) {
-  if (!Ekf::StepOnce(dt_s)) return false;
-  const Workspace::Use use(work_);
-  current_.a = Transition() * current_.a;
-  const Eigen::Index held = current_.a.cols() - current_.a.rows();
-  if (held > 0) current_.a.rightCols(held) += HeldInput();
-  return true;
+Trouble Taped::Step(FilterState& f, double dt_s) {
+  if (Trouble trouble = linear_.Step(f, dt_s)) return trouble;
+  const Workspace::Use use(f.work);
+  frame_.a = f.motions.Transition(f.size(), f.work) * frame_.a;
+  const Eigen::Index held = frame_.a.cols() - frame_.a.rows();
+  if (held > 0) frame_.a.rightCols(held) += f.motions.HeldInput(f.size(), f.work);
+  return {};
 }
 
-Outcome RtsSmoother::Apply(std::span<Row* const> rows) {
-  const Workspace::Use use(work_);
-  const Stacked all = Stack(rows);
-  const Eigen::MatrixXd p = state_.covariance().Dense();
-  const std::vector<double> before = state_.values();
-  const Outcome outcome = Ekf::Apply(rows);
+Outcome Taped::Correct(FilterState& f, std::span<Row* const> rows) {
+  const Workspace::Use use(f.work);
+  const Stacked all = Stack(f, rows);
+  const Eigen::MatrixXd p = f.state.covariance().Dense();
+  const std::vector<double> before = f.state.values();
+  const Outcome outcome = linear_.Correct(f, rows);
   if (outcome != Outcome::kAccepted) return outcome;
   // The filter has factorised the same S.
   const Eigen::LLT<Eigen::MatrixXd> s(all.h * p * all.h.transpose() + all.noise);
   const Eigen::MatrixXd weighted = s.solve(all.h);  // S^-1 H
   Eigen::MatrixXd a = -p * all.h.transpose() * weighted;
   a.diagonal().array() += 1.0;
-  const Workspace::Matrix back = TransportTo(before);
-  current_.Append(back.transpose() * a, weighted.transpose() * all.innovation,
-                  all.h.transpose() * weighted);
+  const Workspace::Matrix back = TransportTo(f, before);
+  frame_.Append(back.transpose() * a, weighted.transpose() * all.innovation,
+                all.h.transpose() * weighted);
   return outcome;
 }
 
+}  // namespace
+}  // namespace internal
+
+/// One frame, and the filter's estimate after it.
+struct RtsSmoother::Passed {
+  internal::Adjoint adjoint;
+  std::vector<double> x;
+  Eigen::MatrixXd p;
+  Eigen::MatrixXd m;  ///< M inside an interval, else n x 0
+  UpdateReport report;
+};
+
+RtsSmoother::RtsSmoother(System system, const EkfOptions& options,
+                         const std::vector<StreamInfo>& streams)
+    : filter_(std::make_unique<Filter>(std::move(system), internal::WithoutRecovery(options),
+                                       streams, std::make_unique<internal::Taped>())) {
+  ALIDADE_EXPECTS(!FindUnsupported(filter_->system(), kSupport));
+}
+
+RtsSmoother::~RtsSmoother() = default;
+
+const UpdateReport& RtsSmoother::Process(const Frame& frame) {
+  auto& tape = dynamic_cast<internal::Taped&>(filter_->method());
+  const internal::FilterState& f = filter_->internals();
+  tape.StartFrame(f);
+  const UpdateReport& report = filter_->Process(frame);
+  Workspace work;
+  const Eigen::MatrixXd held = f.motions.in_interval()
+                                   ? Eigen::MatrixXd(f.motions.HeldNoise(f.size(), work))
+                                   : Eigen::MatrixXd(f.size(), 0);
+  passed_frames_.push_back(
+      {tape.frame(), f.state.values(), f.state.covariance().Dense(), held, report});
+  passed_frames_.back().report.events.clear();  // told already
+  return report;
+}
+
 void RtsSmoother::Smooth(const Emit& emit) {
-  const Eigen::Index n = state_.covariance().size();
+  const Eigen::Index n = state().covariance().size();
   Eigen::VectorXd lambda = Eigen::VectorXd::Zero(n);
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);  // Lambda
   std::vector<Event> events;
-  State smoothed = state_;
+  State smoothed = state();
   for (auto passed = passed_frames_.rbegin(); passed != passed_frames_.rend(); ++passed) {
     const Eigen::Index held = lambda.size() - n;  // noise inputs, of an interval that goes on
     Eigen::MatrixXd with(n, n + held);            // Cov(x, (x, w))
@@ -86,7 +145,7 @@ void RtsSmoother::Smooth(const Emit& emit) {
     const Eigen::MatrixXd p = passed->p - with * information * with.transpose();
     const bool positive = (p.diagonal().array() >= 0.0).all();
     if (!positive) {
-      events.push_back({timestamp_, "not_pd",
+      events.push_back({timestamp(), "not_pd",
                         "a smoothed variance is negative by rounding in frame " +
                             std::to_string(passed_frames_.rend() - passed - 1) +
                             "; its covariance is the filter's"});

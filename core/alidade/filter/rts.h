@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Core>
+#include <memory>
 #include <vector>
 
-#include "alidade/base/eigen_alignment.h"
-#include "alidade/filter/ekf.h"
+#include "alidade/filter/filter.h"
+#include "alidade/filter/support.h"
 
 namespace alidade {
 
@@ -26,7 +26,7 @@ namespace alidade {
 /// All Jacobians are those of the filter, and so are R and its weight under a robust loss.
 ///
 /// Source       [Rauch1965]; [Bierman1977] ch. X, modified Bryson-Frazier.
-class RtsSmoother : public Ekf {
+class RtsSmoother : public Estimator {
  public:
   /// No consider blocks and roles, none that start or are linearised at a measurement, no
   /// rejection recovery, no landmarks.
@@ -35,45 +35,24 @@ class RtsSmoother : public Ekf {
   /// `options.rejection_recovery` counts as kNone. ContractViolation where `system` asks for more
   /// than kSupport.
   RtsSmoother(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
+  ~RtsSmoother() override;
 
+  void Start(Timestamp timestamp) override { filter_->Start(timestamp); }
   const UpdateReport& Process(const Frame& frame) override;
   bool offline() const override { return true; }
-  /// None: it waits for all frames, and does not go back.
-  std::unique_ptr<Snapshot> Save() const override { return nullptr; }
   /// The reports are the filter's. Event `not_pd` where rounding would leave a smoothed variance
   /// negative: the covariance of that frame is then the filter's.
   void Smooth(const Emit& emit) override;
-
- protected:
-  /// @cond
-  bool StepOnce(double dt_s) override;
-  Outcome Apply(std::span<Row* const> rows) override;
+  const State& state() const override { return filter_->state(); }
+  Timestamp timestamp() const override { return filter_->timestamp(); }
+  bool diverged() const override { return filter_->diverged(); }
+  bool failed() const override { return filter_->failed(); }
 
  private:
-  /// How the adjoint goes back over a frame: lambda <- A' lambda + b, Lambda <- A' Lambda A +
-  /// information. Where the frame starts inside an interval, A has columns for w behind those of x.
-  struct Adjoint {
-    Eigen::MatrixXd a;  ///< n x n, or n x (n + n_w)
-    Eigen::VectorXd b;
-    Eigen::MatrixXd information;
+  struct Passed;
 
-    /// This one, and then what comes later in time.
-    void Append(const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
-                const Eigen::MatrixXd& information);
-    void GoBack(Eigen::Index held, Eigen::VectorXd& lambda, Eigen::MatrixXd& later) const;
-  };
-  /// One frame, and the filter's estimate after it.
-  struct Passed {
-    Adjoint adjoint;
-    std::vector<double> x;
-    Eigen::MatrixXd p;
-    Eigen::MatrixXd m;  ///< M inside an interval, else n x 0
-    UpdateReport report;
-  };
-
+  std::unique_ptr<Filter> filter_;
   std::vector<Passed> passed_frames_;
-  Adjoint current_;
-  /// @endcond
 };
 
 }  // namespace alidade

@@ -1,138 +1,169 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/filter/square_root_ekf.h"
 
-#include "alidade/filter/ekf_snapshot.h"
+#include "alidade/base/error.h"
 #include "alidade/filter/factorise.h"
 #include "alidade/filter/filter_options.h"
+#include "alidade/filter/linear.h"
+#include "alidade/filter/stack.h"
 
 namespace alidade {
-
-SquareRootEkf::SquareRootEkf(System system, const EkfOptions& options,
-                             const std::vector<StreamInfo>& streams)
-    : Ekf(std::move(system), internal::WithoutRecovery(options), streams, Steps::kOverridden) {
-  ALIDADE_EXPECTS(!FindUnsupported(system_, kSupport));
-  noise_roots_.resize(system_.sensors.size());
-  Eigen::LDLT<Eigen::MatrixXd> ldlt;
-  internal::SquareRootOf(state_.covariance().Dense(), ldlt, root_);
-  SetCovarianceOfRoot();
-}
-
-struct SquareRootEkf::Kept : Ekf::Kept {
-  explicit Kept(const SquareRootEkf& ekf)
-      : Ekf::Kept(ekf), root(ekf.root_), without_held(ekf.without_held_) {}
-
-  Eigen::MatrixXd root, without_held;
-};
-
-std::unique_ptr<Estimator::Snapshot> SquareRootEkf::Save() const {
-  return std::make_unique<Kept>(*this);
-}
-
-void SquareRootEkf::Restore(const Snapshot& snapshot) {
-  Ekf::Restore(snapshot);
-  const auto& kept = dynamic_cast<const Kept&>(snapshot);
-  root_ = kept.root;
-  without_held_ = kept.without_held;
-}
-
-/// P = L L'.
-void SquareRootEkf::SetCovarianceOfRoot() {
-  const Workspace::Use use(work_);
-  Workspace::Matrix p = work_.Take(root_.rows(), root_.rows());
-  p.noalias() = root_ * root_.transpose();
-  SetCovariance(p);
-}
+namespace internal {
+namespace {
 
 /// root, n x n, with root root' = a a' + b b', for a n x n.
-void SquareRootEkf::TakeRoot(const Workspace::Matrix& a, const Workspace::Matrix& b,
-                             Eigen::MatrixXd& root) {
-  const Workspace::Use use(work_);
+void TakeRoot(FilterState& f, const Workspace::Matrix& a, const Workspace::Matrix& b,
+              Eigen::MatrixXd& root) {
+  const Workspace::Use use(f.work);
   const Eigen::Index n = a.rows();
-  Workspace::Matrix tall = work_.Take(n + b.cols(), n);
+  Workspace::Matrix tall = f.work.Take(n + b.cols(), n);
   tall.topRows(n) = a.transpose();
   tall.bottomRows(b.cols()) = b.transpose();
-  internal::Triangularise(tall, work_.Take(n).data());
+  Triangularise(tall, f.work.Take(n).data());
   tall.topRows(n).triangularView<Eigen::StrictlyLower>().setZero();
   root = tall.topRows(n).transpose();
 }
 
-bool SquareRootEkf::StepOnce(double dt_s) {
-  const bool goes_on = InInterval();
-  if (!Ekf::StepOnce(dt_s)) return false;
-  const Workspace::Use use(work_);
-  const Workspace::Matrix transition = Transition();
-  Workspace::Matrix moved = work_.Take(root_.rows(), root_.cols()), noise = NoiseInput();
+/// Linear, with a root of P stepped and corrected beside it, of which P is made.
+class SquareRoot : public Method {
+ public:
+  std::unique_ptr<Method> Clone() const override { return std::make_unique<SquareRoot>(*this); }
+  void Begin(FilterState& f) override;
+  Trouble Step(FilterState& f, double dt_s) override;
+  Outcome Predict(FilterState& f, Row& row) override;
+  Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
+
+  const Eigen::MatrixXd& root() const { return root_; }
+
+ private:
+  void Project(FilterState& f, Row& row) const;
+  void SetCovariance(FilterState& f) const;
+
+  /// Of a sensor's R.
+  struct NoiseRoot {
+    Eigen::LDLT<Eigen::MatrixXd> ldlt;
+    Eigen::MatrixXd root;
+  };
+
+  Linear linear_;
+  Eigen::MatrixXd root_;
+  Eigen::MatrixXd without_held_;        ///< B, while an interval goes on
+  std::vector<NoiseRoot> noise_roots_;  ///< by sensor; memory
+};
+
+void SquareRoot::Begin(FilterState& f) {
+  noise_roots_.resize(f.binding->sensors.size());
+  Eigen::LDLT<Eigen::MatrixXd> ldlt;
+  SquareRootOf(f.state.covariance().Dense(), ldlt, root_);
+  SetCovariance(f);
+}
+
+/// P = L L'.
+void SquareRoot::SetCovariance(FilterState& f) const {
+  const Workspace::Use use(f.work);
+  Workspace::Matrix p = f.work.Take(root_.rows(), root_.rows());
+  p.noalias() = root_ * root_.transpose();
+  f.state.covariance().SetBlock(0, 0, p);
+}
+
+Trouble SquareRoot::Step(FilterState& f, double dt_s) {
+  const bool goes_on = f.motions.in_interval();
+  if (Trouble trouble = linear_.Step(f, dt_s)) return trouble;
+  const Workspace::Use use(f.work);
+  const Workspace::Matrix transition = f.motions.Transition(f.size(), f.work);
+  Workspace::Matrix moved = f.work.Take(root_.rows(), root_.cols()),
+                    noise = f.motions.NoiseInput(f.size(), f.work);
   moved.noalias() = transition * (goes_on ? without_held_ : root_);
-  if (holds_) {
-    noise -= HeldInput();
+  if (f.motions.holds()) {
+    noise -= f.motions.HeldInput(f.size(), f.work);
     if ((noise.array() != 0.0).any()) {
-      TakeRoot(moved, noise, without_held_);
+      TakeRoot(f, moved, noise, without_held_);
     } else {
       without_held_ = moved;
     }
-    noise += HeldNoise();
+    noise += f.motions.HeldNoise(f.size(), f.work);
   }
-  TakeRoot(moved, noise, root_);
-  SetCovarianceOfRoot();
-  return true;
+  TakeRoot(f, moved, noise, root_);
+  SetCovariance(f);
+  return {};
+}
+
+Outcome SquareRoot::Predict(FilterState& f, Row& row) {
+  const Outcome outcome = linear_.See(f, row);
+  if (outcome == Outcome::kAccepted) Project(f, row);
+  return outcome;
 }
 
 /// S = (H L) (H L)' + R, which rounding does not turn negative.
-void SquareRootEkf::Project(Row& row) {
-  const Workspace::Use use(work_);
+void SquareRoot::Project(FilterState& f, Row& row) const {
+  const Workspace::Use use(f.work);
   Row* const one[] = {&row};
-  const Stacked all = Stack(one);
+  const Stacked all = Stack(f, one);
   const Eigen::Index m = all.h.rows();
-  Workspace::Matrix hl = work_.Take(m, root_.cols()), s = work_.Take(m, m);
+  Workspace::Matrix hl = f.work.Take(m, root_.cols()), s = f.work.Take(m, m);
   hl.noalias() = all.h * root_;
   s = all.noise;
   s.noalias() += hl * hl.transpose();
-  EntryOf(row).s.assign(s.data(), s.data() + s.size());
+  row.report->s.assign(s.data(), s.data() + s.size());
   row.pht.clear();
 }
 
-Outcome SquareRootEkf::Apply(std::span<Row* const> rows) {
-  const Workspace::Use use(work_);
-  const Stacked all = Stack(rows);
+Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
+  const Workspace::Use use(f.work);
+  const Stacked all = Stack(f, rows);
   const Eigen::Index n = root_.rows(), m = all.h.rows();
-  Workspace::Matrix array = work_.Take(m + n, m + n), hl = work_.Take(m, n);  // array: transposed
+  Workspace::Matrix array = f.work.Take(m + n, m + n), hl = f.work.Take(m, n);  // array: transposed
   array.setZero();
   Eigen::Index at = 0;
   for (const Row* row : rows) {
-    const Eigen::Index k = EntryOf(*row).dof;
+    const Eigen::Index k = row->report->dof;
     auto& [ldlt, root] = noise_roots_[static_cast<std::size_t>(row->sensor)];
-    internal::SquareRootOf(all.noise.block(at, at, k, k), ldlt, root);
+    SquareRootOf(all.noise.block(at, at, k, k), ldlt, root);
     array.block(at, at, k, k) = root.transpose();
     at += k;
   }
   hl.noalias() = all.h * root_;
   array.bottomLeftCorner(n, m) = hl.transpose();
   array.bottomRightCorner(n, n) = root_.transpose();
-  internal::Triangularise(array, work_.Take(m + n).data());
+  Triangularise(array, f.work.Take(m + n).data());
   array.triangularView<Eigen::StrictlyLower>().setZero();
   if (!array.allFinite() || (array.diagonal().head(m).array() == 0.0).any()) {
-    Note("not_pd", "the update would leave S not positive definite; rolled back");
+    f.Note("not_pd", "the update would leave S not positive definite; rolled back");
     return Outcome::kNotPd;
   }
-  Workspace::Matrix gain = work_.Take(n, m);  // K = W Ls^-1
-  Workspace::Vector dx = work_.Take(n);
+  Workspace::Matrix gain = f.work.Take(n, m);  // K = W Ls^-1
+  Workspace::Vector dx = f.work.Take(n);
   gain = array.topRightCorner(m, n).transpose();
   array.topLeftCorner(m, m)
       .triangularView<Eigen::Upper>()
       .transpose()
       .solveInPlace<Eigen::OnTheRight>(gain);
   dx.noalias() = gain * all.innovation;
-  state_.Retract(dx.data(), moved_);
-  if (!AllFinite(moved_)) {
-    Note("not_finite", "the update is not finite; rolled back");
+  f.state.Retract(dx.data(), f.moved);
+  if (!AllFinite(f.moved)) {
+    f.Note("not_finite", "the update is not finite; rolled back");
     return Outcome::kNotFinite;
   }
-  const Workspace::Matrix transport = TransportTo(moved_);
-  state_.MoveTo(moved_);
+  const Workspace::Matrix transport = TransportTo(f, f.moved);
+  f.state.MoveTo(f.moved);
   root_.noalias() = transport * array.bottomRightCorner(n, n).transpose();
-  SetCovarianceOfRoot();
-  RecordUpdate(rows, gain.data());
+  SetCovariance(f);
+  f.RecordUpdate(rows, gain.data());
   return Outcome::kAccepted;
+}
+
+}  // namespace
+}  // namespace internal
+
+SquareRootEkf::SquareRootEkf(System system, const EkfOptions& options,
+                             const std::vector<StreamInfo>& streams)
+    : Filter(std::move(system), internal::WithoutRecovery(options), streams,
+             std::make_unique<internal::SquareRoot>()) {
+  ALIDADE_EXPECTS(!FindUnsupported(this->system(), kSupport));
+}
+
+const Eigen::MatrixXd& SquareRootEkf::root() const {
+  return dynamic_cast<const internal::SquareRoot&>(method()).root();
 }
 
 }  // namespace alidade

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <vector>
 
 #include "alidade/base/eigen_alignment.h"
-#include "alidade/filter/ekf.h"
+#include "alidade/filter/filter.h"
+#include "alidade/filter/support.h"
 
 namespace alidade {
 
@@ -26,7 +27,7 @@ namespace alidade {
 /// O((m + n)^3) for each update.
 ///
 /// Source       [Bierman1977] ch. V; [Kailath2000] sec. 12.3, the array form.
-class SquareRootEkf : public Ekf {
+class SquareRootEkf : public Filter {
  public:
   /// No consider blocks and roles, none that start or are linearised at a measurement, no
   /// rejection recovery, no landmarks.
@@ -37,32 +38,7 @@ class SquareRootEkf : public Ekf {
   SquareRootEkf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
 
   /// L, n x n. state().covariance() is L L' in double precision, and so has half its digits.
-  const Eigen::MatrixXd& root() const { return root_; }
-
-  std::unique_ptr<Snapshot> Save() const override;
-  void Restore(const Snapshot& snapshot) override;
-
- protected:
-  /// @cond
-  bool StepOnce(double dt_s) override;
-  void Project(Row& row) override;
-  Outcome Apply(std::span<Row* const> rows) override;
-
- private:
-  struct Kept;
-  void SetCovarianceOfRoot();
-  void TakeRoot(const Workspace::Matrix& a, const Workspace::Matrix& b, Eigen::MatrixXd& root);
-
-  /// Of a sensor's R.
-  struct NoiseRoot {
-    Eigen::LDLT<Eigen::MatrixXd> ldlt;
-    Eigen::MatrixXd root;
-  };
-
-  Eigen::MatrixXd root_;
-  Eigen::MatrixXd without_held_;        ///< B, while an interval goes on
-  std::vector<NoiseRoot> noise_roots_;  ///< by sensor; memory
-  /// @endcond
+  const Eigen::MatrixXd& root() const;
 };
 
 }  // namespace alidade

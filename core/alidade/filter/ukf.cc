@@ -1,16 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/filter/ukf.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
-#include "alidade/filter/ekf_snapshot.h"
+#include "alidade/filter/evaluate_models.h"
 #include "alidade/filter/factorise.h"
 #include "alidade/filter/filter_options.h"
+#include "alidade/filter/method.h"
+#include "alidade/filter/stack.h"
 
 namespace alidade {
+namespace internal {
 namespace {
 
 /// Mean of the points that `centre` and the columns of `points` are, and f_i = (y_i (-) mean) -
@@ -54,44 +59,66 @@ void MomentsOf(double w, const Eigen::Ref<const Eigen::MatrixXd>& f, double cent
   for (Eigen::Index i = 0; i < m.size(); ++i) moments.col(i) += centre * m[i] * m;
 }
 
-}  // namespace
+/// By sigma points, in place of Jacobians.
+class Unscented : public Method {
+ public:
+  explicit Unscented(const UkfOptions& options) : spread_(options) {}
 
-Ukf::Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>& streams)
-    : Ekf(std::move(system), internal::WithoutRecovery(options.filter), streams,
-          Steps::kOverridden),
-      spread_(options),
-      guarded_(system_.sensors.size() + 1, false) {
-  ALIDADE_EXPECTS(!FindUnsupported(system_, kSupport));
-  ALIDADE_EXPECTS(spread_.alpha >= UkfOptions::kLeastAlpha && spread_.alpha <= 1.0 &&
-                  spread_.beta >= 0.0 && spread_.kappa >= 0.0);
-}
+  std::unique_ptr<Method> Clone() const override { return std::make_unique<Unscented>(*this); }
+  void Begin(FilterState& f) override { guarded_.assign(f.binding->sensors.size() + 1, false); }
+  Trouble Step(FilterState& f, double dt_s) override;
+  Outcome Predict(FilterState& f, Row& row) override;
+  Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
 
-struct Ukf::Kept : Ekf::Kept {
-  explicit Kept(const Ukf& ukf)
-      : Ekf::Kept(ukf),
-        root(ukf.root_),
-        root_is_current(ukf.root_is_current_),
-        held(ukf.held_),
-        guarded(ukf.guarded_) {}
+ private:
+  /// Weights of the transform with 2N sigma points besides the centre.
+  struct Transform {
+    double c, w;
+    double centre;  ///< beta - alpha^2
+  };
+  /// What the sigma points make of one measurement.
+  struct Predicted {
+    int halvings = 0;            ///< of the spread
+    std::vector<double> centre;  ///< h(x0)
+    std::vector<double> f;       ///< m x 2n by columns
+    std::vector<double> m;
+  };
+  struct Moments {
+    Workspace::Matrix f;
+    Workspace::Vector m;
+  };
 
-  Eigen::MatrixXd root;
-  bool root_is_current;
-  Eigen::MatrixXd held;
-  std::vector<bool> guarded;
+  Transform TransformOf(Eigen::Index directions, int halvings) const;
+  bool MayHalve(int halvings) const;
+  const Eigen::MatrixXd& Root(FilterState& f);
+  const Eigen::MatrixXd& RootWithoutHeld(const FilterState& f);
+  void TakeHeld(const FilterState& f, const Workspace::Matrix& deviations, double c);
+  Status StepPoints(FilterState& f, int halvings, double dt_s);
+  Status StepPoint(FilterState& f, const double* from, const double* noise, double dt_s,
+                   double* to);
+  Outcome PredictPoints(FilterState& f, Row& row, int halvings);
+  void Project(FilterState& f, Row& row);
+  Predicted& PredictedOf(const FilterState& f, const Row& row);
+  Moments MomentsAt(FilterState& f, const Row& row);
+  Outcome StackPoints(FilterState& f, std::span<Row* const> rows, int halvings, Stacked& all,
+                      Workspace::Vector& mean);
+  void NoteGuard(FilterState& f, std::size_t index, int halvings, bool narrow_enough);
+
+  UkfOptions spread_;
+  Eigen::MatrixXd root_;  ///< of P
+  bool root_is_current_ = false;
+  Eigen::MatrixXd held_;              ///< M, while an interval goes on
+  std::vector<Predicted> predicted_;  ///< by report
+  std::vector<bool> guarded_;         ///< by sensor; the last: the motion
+  // Memory that is kept from step to step.
+  Eigen::MatrixXd rest_, root_of_rest_;
+  Eigen::LDLT<Eigen::MatrixXd> ldlt_;
+  std::vector<const double*> x_;
+  std::vector<double*> stepped_;
+  std::vector<double> reported_h_, reported_innovation_;
 };
 
-std::unique_ptr<Estimator::Snapshot> Ukf::Save() const { return std::make_unique<Kept>(*this); }
-
-void Ukf::Restore(const Snapshot& snapshot) {
-  Ekf::Restore(snapshot);
-  const auto& kept = dynamic_cast<const Kept&>(snapshot);
-  root_ = kept.root;
-  root_is_current_ = kept.root_is_current;
-  held_ = kept.held;
-  guarded_ = kept.guarded;
-}
-
-Ukf::Transform Ukf::TransformOf(Eigen::Index directions, int halvings) const {
+Unscented::Transform Unscented::TransformOf(Eigen::Index directions, int halvings) const {
   const double alpha = std::ldexp(spread_.alpha, -halvings);
   if (directions == 0) return {0.0, 0.0, spread_.beta - alpha * alpha};  // no point but the centre
   const double c2 = alpha * alpha * (static_cast<double>(directions) + spread_.kappa);
@@ -99,109 +126,111 @@ Ukf::Transform Ukf::TransformOf(Eigen::Index directions, int halvings) const {
 }
 
 /// Whether the spread may be halved once more, and still keeps its digits.
-bool Ukf::MayHalve(int halvings) const {
+bool Unscented::MayHalve(int halvings) const {
   return std::ldexp(spread_.alpha, -halvings - 1) >= UkfOptions::kLeastAlpha;
 }
 
 /// A with P = A A'; repairs P where it is not positive semi-definite.
-const Eigen::MatrixXd& Ukf::Root() {
+const Eigen::MatrixXd& Unscented::Root(FilterState& f) {
   constexpr double kRounding = 1e-12;
   if (root_is_current_) return root_;
   root_is_current_ = true;
-  Covariance& p = state_.covariance();
+  Covariance& p = f.state.covariance();
   const Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>> lower(
       p.data(), p.size(), p.size(), Eigen::OuterStride<>(p.stride()));
-  const double defect = internal::SquareRootOf(lower, ldlt_, root_);
+  const double defect = SquareRootOf(lower, ldlt_, root_);
   if (defect < -kRounding) {
-    interval_steps_ = 0;
+    f.motions.EndInterval();
     p.SetBlock(0, 0, root_ * root_.transpose());
-    Note("repaired", "the covariance has no square root: a pivot is " +
-                         internal::RoundedText(defect, 3) +
-                         " of its largest variance; negative pivots count as zero");
+    f.Note("repaired", "the covariance has no square root: a pivot is " + RoundedText(defect, 3) +
+                           " of its largest variance; negative pivots count as zero");
   }
   return root_;
 }
 
 /// B with P - M M' = B B', the covariance of x given the noise that is held. M M' is a part of P: a
 /// negative pivot is rounding.
-const Eigen::MatrixXd& Ukf::RootWithoutHeld() {
-  const Covariance& p = state_.covariance();
+const Eigen::MatrixXd& Unscented::RootWithoutHeld(const FilterState& f) {
+  const Covariance& p = f.state.covariance();
   rest_ = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>(
       p.data(), p.size(), p.size(), Eigen::OuterStride<>(p.stride()));  // its lower triangle
   rest_.noalias() -= held_ * held_.transpose();
-  internal::SquareRootOf(rest_, ldlt_, root_of_rest_);
+  SquareRootOf(rest_, ldlt_, root_of_rest_);
   return root_of_rest_;
 }
 
 /// M from the deviations of the points: along w_j alone they are those at +c and -c.
-void Ukf::TakeHeld(const Workspace::Matrix& f, double c) {
-  if (!holds_) return;
-  const Eigen::Index n = f.rows(), all = f.cols() / 2;
-  held_ = (f.middleCols(n, all - n) - f.rightCols(all - n)) / (2.0 * c);
+void Unscented::TakeHeld(const FilterState& f, const Workspace::Matrix& deviations, double c) {
+  if (!f.motions.holds()) return;
+  const Eigen::Index n = deviations.rows(), all = deviations.cols() / 2;
+  held_ = (deviations.middleCols(n, all - n) - deviations.rightCols(all - n)) / (2.0 * c);
   Eigen::Index column = 0;
-  for (std::size_t i = 0; i < motions_.size(); ++i) {
-    if (!motions_[i].active) continue;
-    const Eigen::Index inputs = system_.motions[i].model.noise_size();
-    if (!motions_[i].holds) held_.middleCols(column, inputs).setZero();
+  for (std::size_t i = 0; i < f.binding->motions.size(); ++i) {
+    if (!f.motions.steps()[i].active) continue;
+    const Eigen::Index inputs = f.binding->system.motions[i].model.noise_size();
+    if (!f.binding->motions[i].holds) held_.middleCols(column, inputs).setZero();
     column += inputs;
   }
 }
 
 /// Of sensor `index`, or of the motion, where that is beyond them; `narrow_enough`: the points at
 /// this spread are of use.
-void Ukf::NoteGuard(std::size_t index, int halvings, bool narrow_enough) {
+void Unscented::NoteGuard(FilterState& f, std::size_t index, int halvings, bool narrow_enough) {
   const bool guarded = halvings > 0 || !narrow_enough;
   if (guarded && !guarded_[index]) {
-    const std::string who =
-        index < system_.sensors.size() ? "sensor '" + system_.sensors[index].name + "'" : "motion";
-    Note("guarded", who + ": sigma points leave its domain or have no mean" +
-                        (narrow_enough ? "" : ", and their spread can be narrowed no further") +
-                        "; their spread is divided by " + std::to_string(1 << halvings));
+    const std::string who = index < f.binding->sensors.size()
+                                ? "sensor '" + f.binding->system.sensors[index].name + "'"
+                                : "motion";
+    f.Note("guarded", who + ": sigma points leave its domain or have no mean" +
+                          (narrow_enough ? "" : ", and their spread can be narrowed no further") +
+                          "; their spread is divided by " + std::to_string(1 << halvings));
   }
   guarded_[index] = guarded;
 }
 
 /// The model's x' at the values `from`, with `noise` (over all active models) in w, in `to`.
-Status Ukf::StepPoint(const double* from, const double* noise, double dt_s, double* to) {
-  const Workspace::Use use(work_);
-  const auto size = static_cast<Eigen::Index>(state_.values().size());
-  Workspace::Vector unused = work_.Take(size), w = work_.Take(NoiseSize());
+Status Unscented::StepPoint(FilterState& f, const double* from, const double* noise, double dt_s,
+                            double* to) {
+  const Workspace::Use use(f.work);
+  const auto size = static_cast<Eigen::Index>(f.state.values().size());
+  Workspace::Vector unused = f.work.Take(size), w = f.work.Take(f.motions.noise_size());
   std::copy_n(from, size, to);
-  for (std::size_t i = 0; i < motions_.size(); ++i) {
-    if (!motions_[i].active) continue;
-    const MotionBinding& motion = system_.motions[i];
+  for (std::size_t i = 0; i < f.motions.steps().size(); ++i) {
+    const Motions::Step& step = f.motions.steps()[i];
+    if (!step.active) continue;
+    const MotionBinding& motion = f.binding->system.motions[i];
     x_.clear();
     stepped_.clear();
     for (const BlockId id : motion.blocks) {
-      const Block& block = state_.layout()[id];
+      const Block& block = f.state.layout()[id];
       const bool constant = block.status == BlockStatus::kConstant;
       x_.push_back(from + block.value_offset);
       stepped_.push_back((constant ? unused.data() : to) + block.value_offset);
     }
     const Eigen::Index inputs = motion.model.noise_size();
-    const Eigen::Map<const RowMajor> l(motions_[i].l.data(), inputs, inputs);
+    const Eigen::Map<const RowMajor> l(step.l.data(), inputs, inputs);
     Workspace::Vector(w.data(), inputs).noalias() =
         l * Eigen::Map<const Eigen::VectorXd>(noise, inputs);
-    const Status status = motion.model.Step(x_.data(), motions_[i].u, w.data(), dt_s,
-                                            stepped_.data(), nullptr, nullptr);
+    const Status status =
+        motion.model.Step(x_.data(), step.u, w.data(), dt_s, stepped_.data(), nullptr, nullptr);
     if (status != Status::kOk) return status;
     noise += inputs;
   }
-  return AllFinite({to, state_.values().size()}) ? Status::kOk : Status::kOutOfDomain;
+  return AllFinite({to, f.state.values().size()}) ? Status::kOk : Status::kOutOfDomain;
 }
 
 /// Moves state and covariance, which stay as they are where a point is out of its domain.
-Status Ukf::StepPoints(int halvings, double dt_s) {
-  const Workspace::Use use(work_);
-  const bool goes_on = InInterval();
-  const Eigen::MatrixXd& root = goes_on ? RootWithoutHeld() : Root();
-  const auto size = static_cast<Eigen::Index>(state_.values().size());
-  const Eigen::Index n = root.cols(), noises = NoiseSize(), all = n + noises;
+Status Unscented::StepPoints(FilterState& f, int halvings, double dt_s) {
+  const Workspace::Use use(f.work);
+  const bool goes_on = f.motions.in_interval();
+  const Eigen::MatrixXd& root = goes_on ? RootWithoutHeld(f) : Root(f);
+  const auto size = static_cast<Eigen::Index>(f.state.values().size());
+  const Eigen::Index n = root.cols(), noises = f.motions.noise_size(), all = n + noises;
   const Transform transform = TransformOf(all, halvings);
-  Workspace::Vector centre = work_.Take(size), dx = work_.Take(n), noise = work_.Take(noises);
-  Workspace::Matrix points = work_.Take(size, 2 * all), f = work_.Take(n, 2 * all);
+  Workspace::Vector centre = f.work.Take(size), dx = f.work.Take(n), noise = f.work.Take(noises);
+  Workspace::Matrix points = f.work.Take(size, 2 * all), deviations = f.work.Take(n, 2 * all);
   noise.setZero();
-  Status status = StepPoint(state_.values().data(), noise.data(), dt_s, centre.data());
+  Status status = StepPoint(f, f.state.values().data(), noise.data(), dt_s, centre.data());
   for (Eigen::Index i = 0; i < 2 * all && status == Status::kOk; ++i) {
     const double c = i < all ? transform.c : -transform.c;
     const Eigen::Index direction = i % all;
@@ -213,153 +242,149 @@ Status Ukf::StepPoints(int halvings, double dt_s) {
       noise[direction - n] = c;
       if (goes_on) dx = c * held_.col(direction - n);
     }
-    state_.Retract(dx.data(), moved_);
-    status = StepPoint(moved_.data(), noise.data(), dt_s, points.col(i).data());
+    f.state.Retract(dx.data(), f.moved);
+    status = StepPoint(f, f.moved.data(), noise.data(), dt_s, points.col(i).data());
   }
   if (status != Status::kOk) return status;
-  Workspace::Vector mean = work_.Take(size), m = work_.Take(n);
-  Workspace::Matrix p = work_.Take(n, n);
+  Workspace::Vector mean = f.work.Take(size), m = f.work.Take(n);
+  Workspace::Matrix p = f.work.Take(n, n);
   mean = centre;
-  f.setZero();
+  deviations.setZero();
   m.setZero();
-  for (const Block& block : state_.layout().blocks()) {
+  for (const Block& block : f.state.layout().blocks()) {
     if (!block.has_covariance()) continue;
     const Geometry& geometry = block.geometry();
     if (!MeanOf(geometry, centre.data() + block.value_offset,
-                points.middleRows(block.value_offset, geometry.ambient), transform.w, work_,
+                points.middleRows(block.value_offset, geometry.ambient), transform.w, f.work,
                 mean.data() + block.value_offset,
-                f.middleRows(block.tangent_offset, geometry.tangent),
+                deviations.middleRows(block.tangent_offset, geometry.tangent),
                 m.segment(block.tangent_offset, geometry.tangent))) {
       return Status::kOutOfDomain;
     }
   }
-  MomentsOf(transform.w, f, transform.centre, m, p);
+  MomentsOf(transform.w, deviations, transform.centre, m, p);
   if (!mean.allFinite() || !p.allFinite()) return Status::kOutOfDomain;
-  std::copy_n(mean.data(), size, state_.values().data());
-  SetCovariance(p);
-  TakeHeld(f, transform.c);
+  std::copy_n(mean.data(), size, f.state.values().data());
+  f.state.covariance().SetBlock(0, 0, p);
+  TakeHeld(f, deviations, transform.c);
   root_is_current_ = false;
   return Status::kOk;
 }
 
-bool Ukf::StepOnce(double dt_s) {
-  if (std::ranges::none_of(motions_, &MotionPlan::active)) return true;
-  for (std::size_t i = 0; i < motions_.size(); ++i) {
-    if (!motions_[i].active) continue;
-    // The centre, and Lq.
-    if (!StepModel(system_.motions[i], motions_[i], dt_s, /*derivatives=*/false)) return false;
-  }
+Trouble Unscented::Step(FilterState& f, double dt_s) {
+  if (std::ranges::none_of(f.motions.steps(), &Motions::Step::active)) return {};
+  // The centre, and Lq.
+  if (Trouble trouble = f.motions.Evaluate(f.state, dt_s, /*derivatives=*/false)) return trouble;
   int halvings = 0;
-  Status status = StepPoints(halvings, dt_s);
+  Status status = StepPoints(f, halvings, dt_s);
   while (status == Status::kOutOfDomain && MayHalve(halvings)) {
-    status = StepPoints(++halvings, dt_s);
+    status = StepPoints(f, ++halvings, dt_s);
   }
   if (status == Status::kOk) {
-    NoteGuard(guarded_.size() - 1, halvings, true);
-    return true;
+    NoteGuard(f, guarded_.size() - 1, halvings, true);
+    return {};
   }
-  GiveUp("diverged", "the sigma points cannot step, also with their spread divided by " +
-                         std::to_string(1 << halvings));
-  return false;
+  return {"diverged", "the sigma points cannot step, also with their spread divided by " +
+                          std::to_string(1 << halvings)};
 }
 
 /// h at the sigma points of one measurement, where it is defined at the estimate: its mean, in the
 /// report, and its deviations.
-Outcome Ukf::Predict(Row& row, int halvings) {
-  const Workspace::Use use(work_);
-  const SensorBinding& binding = BindingOf(row);
-  const Geometry& geometry = binding.model.measurement().geometry;
-  const Eigen::MatrixXd& root = Root();
+Outcome Unscented::PredictPoints(FilterState& f, Row& row, int halvings) {
+  const Workspace::Use use(f.work);
+  const Geometry& geometry = row.model->measurement().geometry;
+  const Eigen::MatrixXd& root = Root(f);
   const Eigen::Index n = root.cols();
   const Transform transform = TransformOf(n, halvings);
-  Workspace::Vector dx = work_.Take(n);
-  Workspace::Matrix points = work_.Take(geometry.ambient, 2 * n);
+  Workspace::Vector dx = f.work.Take(n);
+  Workspace::Matrix points = f.work.Take(geometry.ambient, 2 * n);
   for (Eigen::Index i = 0; i < 2 * n; ++i) {
     dx = (i < n ? transform.c : -transform.c) * root.col(i % n);
-    state_.Retract(dx.data(), moved_);
+    f.state.Retract(dx.data(), f.moved);
     const Outcome outcome =
-        OutcomeOf(binding.model.Predict(RolesAt(row, moved_), points.col(i).data()));
+        OutcomeOf(row.model->Predict(RolesAt(f, row, f.moved), points.col(i).data()));
     if (outcome != Outcome::kAccepted) return outcome;
   }
-  Predicted& predicted = predicted_[row.report];
+  Predicted& predicted = PredictedOf(f, row);
   predicted.halvings = halvings;
   predicted.f.resize(static_cast<std::size_t>(geometry.tangent * 2 * n));
   predicted.m.resize(static_cast<std::size_t>(geometry.tangent));
-  MeasurementReport& entry = EntryOf(row);
+  MeasurementReport& entry = *row.report;
   entry.h.resize(static_cast<std::size_t>(geometry.ambient));
-  const Moments moments = MomentsAt(row);
-  if (!MeanOf(geometry, predicted.centre.data(), points, transform.w, work_, entry.h.data(),
+  const Moments moments = MomentsAt(f, row);
+  if (!MeanOf(geometry, predicted.centre.data(), points, transform.w, f.work, entry.h.data(),
               moments.f, moments.m)) {
     return Outcome::kOutOfDomain;
   }
-  entry.innovation.resize(static_cast<std::size_t>(geometry.tangent));
-  geometry.Minus(entry.z.data(), entry.h.data(), entry.innovation.data());
+  TakeInnovation(row);
   return Outcome::kAccepted;
 }
 
-Ukf::Moments Ukf::MomentsAt(const Row& row) {
-  Predicted& predicted = predicted_[row.report];
+Unscented::Moments Unscented::MomentsAt(FilterState& f, const Row& row) {
+  Predicted& predicted = PredictedOf(f, row);
   const auto m = std::ssize(predicted.m);
   return {{predicted.f.data(), m, std::ssize(predicted.f) / m}, {predicted.m.data(), m}};
 }
 
-Outcome Ukf::Linearise(Row& row) {
-  const SensorBinding& binding = BindingOf(row);
-  const SensorPlan& plan = PlanOf(row);
-  if (predicted_.size() <= row.report) predicted_.resize(row.report + 1);
-  std::vector<double>& centre = predicted_[row.report].centre;
-  centre.resize(static_cast<std::size_t>(binding.model.measurement().geometry.ambient));
-  Outcome outcome = OutcomeOf(binding.model.Predict(plan.roles.data(), centre.data()));
+Outcome Unscented::Predict(FilterState& f, Row& row) {
+  std::vector<double>& centre = PredictedOf(f, row).centre;
+  centre.resize(static_cast<std::size_t>(row.model->measurement().geometry.ambient));
+  Outcome outcome = OutcomeOf(row.model->Predict(RolesAt(f, row, f.state.values()), centre.data()));
   const bool defined = outcome == Outcome::kAccepted;  // at the estimate itself
   int halvings = 0;
-  if (defined) outcome = Predict(row, halvings);
+  if (defined) outcome = PredictPoints(f, row, halvings);
   while (defined && outcome == Outcome::kOutOfDomain && MayHalve(halvings)) {
-    outcome = Predict(row, ++halvings);
+    outcome = PredictPoints(f, row, ++halvings);
   }
   const bool too_wide = defined && outcome == Outcome::kOutOfDomain;
   if (outcome == Outcome::kAccepted || too_wide) {
-    NoteGuard(static_cast<std::size_t>(row.sensor), halvings, !too_wide);
+    NoteGuard(f, static_cast<std::size_t>(row.sensor), halvings, !too_wide);
   }
-  if (outcome == Outcome::kAccepted) outcome = NoiseOf(row, plan.roles.data());
-  if (outcome == Outcome::kAccepted) return outcome;
-  EntryOf(row).h.clear();
-  EntryOf(row).innovation.clear();
-  if (!too_wide) NoteRefusal(row, outcome);
+  if (outcome == Outcome::kAccepted) {
+    outcome = NoiseAt(row, RolesAt(f, row, f.state.values()));
+  }
+  if (outcome == Outcome::kAccepted) {
+    Project(f, row);
+    return outcome;
+  }
+  row.report->h.clear();
+  row.report->innovation.clear();
+  if (!too_wide) f.NoteRefusal(row, outcome);
   return outcome;
 }
 
 /// S = Cov(h) + R.
-void Ukf::Project(Row& row) {
-  const Workspace::Use use(work_);
-  const Moments moments = MomentsAt(row);
-  const Transform transform = TransformOf(Root().cols(), predicted_[row.report].halvings);
+void Unscented::Project(FilterState& f, Row& row) {
+  const Workspace::Use use(f.work);
+  const Moments moments = MomentsAt(f, row);
+  const Transform transform = TransformOf(Root(f).cols(), PredictedOf(f, row).halvings);
   const Eigen::Index m = moments.m.size();
-  Workspace::Matrix s = work_.Take(m, m);
+  Workspace::Matrix s = f.work.Take(m, m);
   MomentsOf(transform.w, moments.f, transform.centre, moments.m, s);
   s += Eigen::Map<const RowMajor>(row.r.data(), m, m);
-  EntryOf(row).s.assign(s.data(), s.data() + s.size());
+  row.report->s.assign(s.data(), s.data() + s.size());
   row.pht.clear();
 }
 
 /// All rows at one spread: f in place of H, R, innovation and m below one another.
-Outcome Ukf::StackPoints(std::span<Row* const> rows, int halvings, Stacked& all,
-                         Workspace::Vector& mean) {
+Outcome Unscented::StackPoints(FilterState& f, std::span<Row* const> rows, int halvings,
+                               Stacked& all, Workspace::Vector& mean) {
   all.noise.setZero();
   Eigen::Index at = 0;
   for (Row* row : rows) {
-    MeasurementReport& entry = EntryOf(*row);
-    const bool narrower = predicted_[row->report].halvings < halvings;
+    MeasurementReport& entry = *row->report;
+    const bool narrower = PredictedOf(f, *row).halvings < halvings;
     if (narrower) {  // what the gate saw is what is reported
       reported_h_ = entry.h;
       reported_innovation_ = entry.innovation;
-      const Outcome outcome = Predict(*row, halvings);
+      const Outcome outcome = PredictPoints(f, *row, halvings);
       if (outcome != Outcome::kAccepted) {
         entry.h.swap(reported_h_);
         entry.innovation.swap(reported_innovation_);
         return outcome;
       }
     }
-    const Moments moments = MomentsAt(*row);
+    const Moments moments = MomentsAt(f, *row);
     const Eigen::Index k = moments.m.size();
     all.h.middleRows(at, k) = moments.f;
     all.noise.block(at, at, k, k) = Eigen::Map<const RowMajor>(row->r.data(), k, k);
@@ -374,28 +399,30 @@ Outcome Ukf::StackPoints(std::span<Row* const> rows, int halvings, Stacked& all,
   return Outcome::kAccepted;
 }
 
-Outcome Ukf::Apply(std::span<Row* const> rows) {
-  const Workspace::Use use(work_);
-  const Eigen::MatrixXd& root = Root();
-  const Eigen::Index n = root.cols();
-  Eigen::Index m = 0;
+Outcome Unscented::Correct(FilterState& f, std::span<Row* const> rows) {
+  const Workspace::Use use(f.work);
+  const Eigen::MatrixXd& root = Root(f);
+  const Eigen::Index n = root.cols(), m = CountOf(rows);
   int halvings = 0;  // of the narrowest
   for (const Row* row : rows) {
-    m += EntryOf(*row).dof;
-    halvings = std::max(halvings, predicted_[row->report].halvings);
+    halvings = std::max(halvings, PredictedOf(f, *row).halvings);
   }
-  Stacked all{work_.Take(m, 2 * n), work_.Take(m, m), work_.Take(m)};
-  Workspace::Vector mean = work_.Take(m), centre = work_.Take(n), step = work_.Take(n);
-  Workspace::Matrix s = work_.Take(m, m), p = work_.Take(n, n), rest = work_.Take(n, 2 * n);
-  Workspace::Matrix gain = work_.Take(n, m), spread = work_.Take(n, m);
-  const Outcome stacked = StackPoints(rows, halvings, all, mean);
+  Stacked all{f.work.Take(m, 2 * n), f.work.Take(m, m), f.work.Take(m)};
+  Workspace::Vector mean = f.work.Take(m), centre = f.work.Take(n), step = f.work.Take(n);
+  Workspace::Matrix s = f.work.Take(m, m), p = f.work.Take(n, n), rest = f.work.Take(n, 2 * n);
+  Workspace::Matrix gain = f.work.Take(n, m), spread = f.work.Take(n, m);
+  const Outcome stacked = StackPoints(f, rows, halvings, all, mean);
   if (stacked != Outcome::kAccepted) return stacked;
   const Transform transform = TransformOf(n, halvings);
   MomentsOf(transform.w, all.h, transform.centre, mean, s);
   s += all.noise;
-  if (!internal::Factorise(s)) {
-    Note("not_pd", "the update would leave S not positive definite; rolled back");
+  if (!Factorise(s)) {
+    f.Note("not_pd", "the update would leave S not positive definite; rolled back");
     return Outcome::kNotPd;
+  }
+  if (n == 0) {  // nothing to correct, and Eigen solves for one row at least
+    f.RecordUpdate(rows, nullptr);
+    return Outcome::kAccepted;
   }
   rest.leftCols(n) = transform.c * root;
   rest.rightCols(n) = -transform.c * root;
@@ -410,16 +437,34 @@ Outcome Ukf::Apply(std::span<Row* const> rows) {
   MomentsOf(transform.w, rest, transform.centre, centre, p);
   spread.noalias() = gain * all.noise;
   p.noalias() += spread * gain.transpose();
-  state_.Retract(step.data(), moved_);
-  if (!AllFinite(moved_) || !p.allFinite()) {
-    Note("not_finite", "the update is not finite; rolled back");
+  f.state.Retract(step.data(), f.moved);
+  if (!AllFinite(f.moved) || !p.allFinite()) {
+    f.Note("not_finite", "the update is not finite; rolled back");
     return Outcome::kNotFinite;
   }
-  SetCovariance(p);
-  state_.MoveTo(moved_);
+  f.state.covariance().SetBlock(0, 0, p);
+  f.state.MoveTo(f.moved);
   root_is_current_ = false;
-  RecordUpdate(rows, gain.data());
+  f.RecordUpdate(rows, gain.data());
   return Outcome::kAccepted;
+}
+
+/// By the place of its report.
+Unscented::Predicted& Unscented::PredictedOf(const FilterState& f, const Row& row) {
+  const auto index = static_cast<std::size_t>(row.report - f.report.measurements().data());
+  if (predicted_.size() <= index) predicted_.resize(index + 1);
+  return predicted_[index];
+}
+
+}  // namespace
+}  // namespace internal
+
+Ukf::Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>& streams)
+    : Filter(std::move(system), internal::WithoutRecovery(options.filter), streams,
+             std::make_unique<internal::Unscented>(options)) {
+  ALIDADE_EXPECTS(!FindUnsupported(this->system(), kSupport));
+  ALIDADE_EXPECTS(options.alpha >= UkfOptions::kLeastAlpha && options.alpha <= 1.0 &&
+                  options.beta >= 0.0 && options.kappa >= 0.0);
 }
 
 }  // namespace alidade

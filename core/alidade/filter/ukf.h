@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <vector>
 
-#include "alidade/base/eigen_alignment.h"
-#include "alidade/filter/ekf.h"
+#include "alidade/filter/filter.h"
+#include "alidade/filter/support.h"
 
 namespace alidade {
 
@@ -50,7 +49,7 @@ struct UkfOptions {
 /// (event `repaired`).
 ///
 /// Source       [Julier2004]; [Wan2000] alpha, beta, kappa.
-class Ukf : public Ekf {
+class Ukf : public Filter {
  public:
   /// No consider blocks and roles, none that start or are linearised at a measurement, no
   /// rejection recovery, no landmarks.
@@ -58,62 +57,6 @@ class Ukf : public Ekf {
 
   /// ContractViolation where `system` asks for more than kSupport or an option is out of its range.
   Ukf(System system, const UkfOptions& options, const std::vector<StreamInfo>& streams);
-
-  std::unique_ptr<Snapshot> Save() const override;
-  void Restore(const Snapshot& snapshot) override;
-
- protected:
-  /// @cond
-  bool StepOnce(double dt_s) override;
-  Outcome Linearise(Row& row) override;
-  void Project(Row& row) override;
-  Outcome Apply(std::span<Row* const> rows) override;
-
- private:
-  struct Kept;
-  /// Weights of the transform with 2N sigma points besides the centre.
-  struct Transform {
-    double c, w;
-    double centre;  ///< beta - alpha^2
-  };
-  /// What the sigma points make of one measurement.
-  struct Predicted {
-    int halvings = 0;            ///< of the spread
-    std::vector<double> centre;  ///< h(x0)
-    std::vector<double> f;       ///< m x 2n by columns
-    std::vector<double> m;
-  };
-  struct Moments {
-    Workspace::Matrix f;
-    Workspace::Vector m;
-  };
-
-  Transform TransformOf(Eigen::Index directions, int halvings) const;
-  bool MayHalve(int halvings) const;
-  const Eigen::MatrixXd& Root();
-  const Eigen::MatrixXd& RootWithoutHeld();
-  void TakeHeld(const Workspace::Matrix& f, double c);
-  Status StepPoints(int halvings, double dt_s);
-  Status StepPoint(const double* from, const double* noise, double dt_s, double* to);
-  Outcome Predict(Row& row, int halvings);
-  Moments MomentsAt(const Row& row);
-  Outcome StackPoints(std::span<Row* const> rows, int halvings, Stacked& all,
-                      Workspace::Vector& mean);
-  void NoteGuard(std::size_t index, int halvings, bool narrow_enough);
-
-  UkfOptions spread_;
-  Eigen::MatrixXd root_;  ///< of P
-  bool root_is_current_ = false;
-  Eigen::MatrixXd held_;              ///< M, while an interval goes on
-  std::vector<Predicted> predicted_;  ///< by report
-  std::vector<bool> guarded_;         ///< by sensor; the last: the motion
-  // Memory that is kept from step to step.
-  Eigen::MatrixXd rest_, root_of_rest_;
-  Eigen::LDLT<Eigen::MatrixXd> ldlt_;
-  std::vector<const double*> x_;
-  std::vector<double*> stepped_;
-  std::vector<double> reported_h_, reported_innovation_;
-  /// @endcond
 };
 
 }  // namespace alidade

@@ -8,6 +8,14 @@
 
 namespace alidade {
 
+/// Memory that a copy does not take along.
+template <class T>
+struct Scratch : T {
+  Scratch() = default;
+  Scratch(const Scratch&) {}
+  Scratch& operator=(const Scratch&) { return *this; }
+};
+
 /// Memory for the matrices of a step or an update, kept from one to the next: where no more and no
 /// larger ones are taken than before, nothing is allocated.
 class Workspace {

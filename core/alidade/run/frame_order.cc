@@ -38,7 +38,7 @@ FrameOrder::FrameOrder(Experiment& experiment, Check check)
   for (const NamedEstimator& named : experiment.estimators) {
     Processed& before = released_.processed.emplace_back();
     if (named.estimator->offline()) continue;
-    before.after = named.estimator->Save();
+    before.after = named.estimator->Clone();
     ALIDADE_EXPECTS(before.after != nullptr);
   }
 }
@@ -202,10 +202,10 @@ void FrameOrder::Replay(std::size_t from, bool is_newest) {
     held_[i].processed.resize(experiment_.estimators.size());
   }
   for (std::size_t e = 0; e < experiment_.estimators.size(); ++e) {
-    Estimator& estimator = *experiment_.estimators[e].estimator;
-    if (estimator.offline()) continue;
+    std::unique_ptr<Estimator>& estimator = experiment_.estimators[e].estimator;
+    if (estimator->offline()) continue;
     const Processed* before = &(from == 0 ? released_ : held_[from - 1]).processed[e];
-    if (!is_newest && !before->failed) estimator.Restore(*before->after);
+    if (!is_newest && !before->failed) estimator = before->after->Clone();
     for (std::size_t i = from; i < held_.size(); ++i) {
       Processed& processed = held_[i].processed[e];
       if (before->failed) {
@@ -213,7 +213,7 @@ void FrameOrder::Replay(std::size_t from, bool is_newest) {
         processed.diverged = before->diverged;
       } else {
         const int by = experiment_.estimators[e].accepted_by;
-        processed = Process(estimator, by < 0 ? held_[i].frame : Accepted(held_[i], by));
+        processed = Process(*estimator, by < 0 ? held_[i].frame : Accepted(held_[i], by));
       }
       before = &processed;
     }
@@ -232,7 +232,7 @@ Frame FrameOrder::Accepted(const Held& held, int by) const {
 Processed FrameOrder::Process(Estimator& estimator, const Frame& frame) const {
   Processed processed;
   processed.report = estimator.Process(frame);
-  processed.after = estimator.Save();
+  processed.after = estimator.Clone();
   processed.failed = estimator.failed();
   processed.diverged = estimator.diverged();
   return processed;

@@ -15,7 +15,7 @@ namespace alidade::internal {
 
 /// What an estimator made of a frame that may have to be taken again.
 struct Processed {
-  std::unique_ptr<Estimator::Snapshot> after;
+  std::unique_ptr<Estimator> after;  ///< as it is then
   UpdateReport report;
   bool failed = false;
   bool diverged = false;

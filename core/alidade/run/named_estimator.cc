@@ -172,11 +172,13 @@ int ReadUse(const Node& use, const NamedEstimator& named, const Node& estimators
 
 /// Refuses an estimator that cannot do what the run asks for out-of-sequence frames.
 void CheckCanRollBack(const NamedEstimator& named, const Node& entry) {
-  if (named.estimator->offline() || named.estimator->Save() != nullptr) return;
+  if (named.estimator->offline() || named.estimator->Clone() != nullptr) return;
   entry.At("type").Fail(
       "'" + named.type + "' cannot roll back for an out-of-sequence frame",
       "another type under 'out_of_sequence.policy: rollback', or 'out_of_sequence.policy: buffer'");
 }
+
+}  // namespace
 
 NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const Config& config,
                               const PluginHost& host, const std::vector<StreamInfo>& streams,
@@ -221,8 +223,6 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   if (use) named.accepted_by = ReadUse(*use, named, config.root().At("estimators"), before);
   return named;
 }
-
-}  // namespace
 
 int FindStream(const Node& sensor, const SensorModel& model,
                const std::vector<StreamInfo>& streams) {

@@ -16,6 +16,12 @@ int FindStream(const Node& sensor, const SensorModel& model,
 /// Refuses a sensor or a control input whose stream the source does not have. Errors: kBadConfig.
 void CheckStreams(const Node& root, const System& system, const std::vector<StreamInfo>& streams);
 
+/// The entry `name` of the config's `estimators:`, given the streams of its source and the
+/// estimators before it. Errors: those of BuildExperiment.
+NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const Config& config,
+                              const PluginHost& host, const std::vector<StreamInfo>& streams,
+                              const std::vector<NamedEstimator>& before);
+
 /// Makes the entry `name` of the config's `estimators:` and puts it behind those that the
 /// experiment has; nothing is added where that fails. Errors: those of BuildExperiment.
 void AddEstimator(const Config& config, const PluginHost& host, const std::string& name,

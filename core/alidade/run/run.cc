@@ -67,7 +67,7 @@ bool Advance(Running& one, const Seen& seen, const Frame& visible,
   one.diverged = passed ? passed->diverged : estimator.diverged();
   if (!one.ended && !estimator.offline()) {
     one.Take(static_cast<std::size_t>(result.frames), seen,
-             passed ? passed->after->state : estimator.state(), report, options);
+             passed ? passed->after->state() : estimator.state(), report, options);
   }
   const bool policy = one.named.on_divergence == OnDivergence::kFail && one.diverged;
   if (!one.ended && !policy) return true;

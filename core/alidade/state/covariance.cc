@@ -92,7 +92,7 @@ Eigen::MatrixXd Covariance::Block(int a, int rows, int b, int columns) const {
   return p_.block(b, a, columns, rows).transpose();
 }
 
-void Covariance::SetBlock(int a, int b, const Eigen::MatrixXd& value) {
+void Covariance::SetBlock(int a, int b, const Eigen::Ref<const Eigen::MatrixXd>& value) {
   if (a == b) {
     p_.block(a, a, value.rows(), value.rows()).triangularView<Eigen::Lower>() = value;
   } else if (a > b) {
@@ -195,7 +195,12 @@ void Covariance::SubtractOuter(const Eigen::MatrixXd& w) {
 }
 
 void Covariance::AddOuter(const Eigen::MatrixXd& w) {
-  p_.topLeftCorner(size_, size_).selfadjointView<Eigen::Lower>().rankUpdate(w);
+  for (Eigen::Index c = 0; c < w.rows(); ++c) {
+    if (w.row(c).isZero(0.0)) continue;
+    for (Eigen::Index r = c; r < w.rows(); ++r) {
+      if (!w.row(r).isZero(0.0)) p_(r, c) += w.row(r).dot(w.row(c));
+    }
+  }
 }
 
 void Covariance::Joseph(const Eigen::MatrixXd& k, const Eigen::MatrixXd& h,

@@ -63,7 +63,7 @@ class Covariance {
   /// have none in common.
   Eigen::MatrixXd Block(int a, int rows, int b, int columns) const;
   /// Sets P(a, b) and P(b, a) = P(a, b)', as above; of a diagonal block the lower triangle counts.
-  void SetBlock(int a, int b, const Eigen::MatrixXd& value);
+  void SetBlock(int a, int b, const Eigen::Ref<const Eigen::MatrixXd>& value);
   /// P(i, i), 0 <= i < size().
   double Variance(int i) const { return p_(i, i); }
   /// Sets rows [offset, offset + k): `own` (k x k) on the diagonal, `cross` (n x k, n = size())
@@ -95,7 +95,7 @@ class Covariance {
   bool Downdate(int m, const double* w, const double* inverse_d);
   /// P <- P - W W', W n x m. O(n^2 m).
   void SubtractOuter(const Eigen::MatrixXd& w);
-  /// P <- P + W W', W n x m. O(n^2 m).
+  /// P <- P + W W', W n x m, of which k rows are not zero. O(n m + k^2 m).
   void AddOuter(const Eigen::MatrixXd& w);
   /// P <- (I - K H) P (I - K H)' + K R K' for any gain K (Joseph), K n x m, H m x n, R m x m.
   /// O(n^2 m).

@@ -2,6 +2,7 @@
 #include "alidade/state/state.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "alidade/base/error.h"
 
@@ -28,6 +29,13 @@ BlockId StateLayout::Find(std::string_view name) const {
   const auto found = std::find_if(blocks_.begin(), blocks_.end(),
                                   [name](const Block& b) { return b.name == name; });
   return found == blocks_.end() ? -1 : static_cast<BlockId>(found - blocks_.begin());
+}
+
+double State::sigma(BlockId id, int i) const {
+  const Block& block = layout_[id];
+  ALIDADE_EXPECTS(block.present && i >= 0 && i < block.geometry().tangent);
+  if (!block.has_covariance()) return 0.0;
+  return std::sqrt(covariance_.Variance(block.tangent_offset + i));
 }
 
 BlockId State::Declare(std::string name, std::string owner, Space space, BlockStatus status) {

@@ -349,7 +349,11 @@ System WithoutUntouched(System system) {
 
 State System::InitialState(bool reserved) const {
   State state(layout);
-  for (const Prior& prior : priors) {
+  std::vector<const Prior*> in_order;
+  for (const Prior& prior : priors) in_order.push_back(&prior);
+  std::ranges::stable_sort(in_order, {}, &Prior::block);
+  for (const Prior* const one : in_order) {
+    const Prior& prior = *one;
     if (!prior.from.empty() && reserved) state.Reserve(prior.block);
     if (!prior.from.empty()) continue;
     ALIDADE_EXPECTS(std::ssize(prior.mean) == layout[prior.block].geometry().ambient);

@@ -80,8 +80,8 @@ struct System {
   std::optional<double> initial_time_s;      ///< time of the priors; else the first frame's
   std::optional<LandmarkOptions> landmarks;  ///< there where a sensor measures landmarks
 
-  /// The state before the first measurement: all blocks with a given prior are present. `reserved`:
-  /// those that start from a measurement have their places, in the order of the priors.
+  /// The state before the first measurement, in the order of the layout: all blocks with a given
+  /// prior are present. `reserved`: those that start from a measurement have their places.
   State InitialState(bool reserved = false) const;
   /// -1 where there is none.
   int FindSensor(std::string_view name) const;

@@ -241,7 +241,7 @@ bool CondensedRun::Residual(const Factor& factor, const Point& point, const std:
     for (std::size_t i = 0; i < roles.size(); ++i) {
       if (into[i] != nullptr) a->middleCols(columns[i], strides[i]) += j_r_h * jacobians[i];
     }
-    whiten.solveInPlace(*a);
+    if (width > 0) whiten.solveInPlace(*a);  // Eigen solves for one column at least
     finite = finite && a->allFinite();
   }
   return finite || Fail("sensor '" + sensor.name + "' predicts what is not finite");

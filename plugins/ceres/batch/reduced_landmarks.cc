@@ -102,6 +102,9 @@ bool CondensedRun::Project(const double* e, const std::vector<Point>& points, Un
 void CondensedRun::Assemble(const double* e, const std::vector<Point>& points,
                             const Information& information, Reduced& reduced) const {
   const auto d = std::ssize(read_), size = d * std::ssize(points);
+  reduced.a = Eigen::MatrixXd::Identity(inputs_, inputs_);
+  reduced.g = Eigen::Map<const Eigen::VectorXd>(e, inputs_);
+  if (size == 0) return;
   const Eigen::MatrixXd& h = information.h;
   Eigen::MatrixXd s(size, inputs_), hs = Eigen::MatrixXd::Zero(size, inputs_);
   Eigen::VectorXd offset(size);
@@ -123,14 +126,13 @@ void CondensedRun::Assemble(const double* e, const std::vector<Point>& points,
     hs.block(row, 0, d, begin(k)).noalias() += before * s.block(first, 0, row - first, begin(k));
     hs.block(first, 0, row - first, here.cols()).noalias() += before.transpose() * here;
   }
-  reduced.a = Eigen::MatrixXd::Identity(inputs_, inputs_);
   for (std::size_t k = 0; k < points.size(); ++k) {
     const auto row = d * static_cast<Eigen::Index>(k), from = begin(k), to = begin(k + 1);
     reduced.a.block(from, 0, to - from, to).noalias() +=
         s.block(row, from, size - row, to - from).transpose() * hs.block(row, 0, size - row, to);
   }
   const Eigen::VectorXd g = information.g + h.selfadjointView<Eigen::Lower>() * offset;
-  reduced.g = Eigen::Map<const Eigen::VectorXd>(e, inputs_) + s.transpose() * g;
+  reduced.g += s.transpose() * g;
 }
 
 /// A landmark moves with e by M = J (J_y_x S_k - J_y_l C^-1 B' S), and by its own inputs besides:

@@ -229,10 +229,10 @@ template <class Filter, class Options>
 void ExpectTheSameAfterGoingBack(const Options& options) {
   Filter filter(Car(0.6), options, kStreams), straight(Car(0.6), options, kStreams);
   filter.Process(FrameOf({0.0, 1.2, 2.0}));
-  const auto saved = filter.Save();
+  const Filter saved = filter;
   filter.Process(FrameOf({0.3, 2.0, -7.0}));
   filter.Process(FrameOf({5.0, 2.0, kNone}));
-  filter.Restore(*saved);
+  filter = saved;
   straight.Process(FrameOf({0.0, 1.2, 2.0}));
   for (const Seen& next : {Seen{0.5, 2.1, kNone}, Seen{2.0, 2.2, kNone}, Seen{2.5, 2.2, kNone}}) {
     const UpdateReport& one = filter.Process(FrameOf(next));

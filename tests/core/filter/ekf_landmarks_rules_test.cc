@@ -234,10 +234,10 @@ TEST(Landmarks, GoBackToTheGenerationsOfTheirPast) {
   EXPECT_EQ(see(1), 0);
   EXPECT_EQ(see(2), 0);  // ends 1
   EXPECT_EQ(see(1), 1);
-  const auto saved = ekf.Save();
+  const Ekf saved = ekf;
   EXPECT_EQ(see(2), 1);
   EXPECT_EQ(see(1), 2);
-  ekf.Restore(*saved);
+  ekf = saved;
   EXPECT_EQ(see(2), 1);
   EXPECT_EQ(see(3), 0);
   EXPECT_EQ(see(1), 2);
@@ -252,10 +252,10 @@ TEST(Landmarks, WhoseFirstEndIsGoneBackOverAreTheFirstOfTheirId) {
     ekf.Process(FrameOf(0.0, {{id, {0, 0, 1}}}));
     return Find(ekf.landmarks(), id)->generation;
   };
-  const auto saved = ekf.Save();
+  const Ekf saved = ekf;
   EXPECT_EQ(see(5), 0);
   EXPECT_EQ(see(6), 0);  // ends 5
-  ekf.Restore(*saved);
+  ekf = saved;
   EXPECT_EQ(see(5), 0);
 }
 

@@ -343,15 +343,15 @@ TEST(Landmarks, AreGoneBackToWithTheFilter) {
     }
     frames.push_back(FrameOf(0.1 * k, observations));
   }
-  std::unique_ptr<Estimator::Snapshot> middle;
+  std::unique_ptr<Ekf> middle;
   for (int k = 0; k < kSteps; ++k) {
-    if (k == 11) middle = ekf.Save();
+    if (k == 11) middle = std::make_unique<Ekf>(ekf);
     ekf.Process(frames[static_cast<std::size_t>(k)]);
   }
   const std::vector<double> once = ekf.state().values();
   const MatrixXd p = ekf.state().covariance().Dense();
   const std::vector<LandmarkEstimate> landmarks = ekf.landmarks();
-  ekf.Restore(*middle);
+  ekf = *middle;
   for (int k = 11; k < kSteps; ++k) ekf.Process(frames[static_cast<std::size_t>(k)]);
   EXPECT_EQ(ekf.state().values(), once);
   EXPECT_EQ(ekf.state().covariance().Dense(), p);

@@ -20,7 +20,7 @@ struct Breaking : Motion<1, Vec<1>> {
 };
 
 /// One block of known value 1 +- 1, measured directly with the given noise.
-Ekf Filter(double sigma) {
+Ekf OneBlock(double sigma) {
   System system;
   AddMotion(system, "p", InProcessMotion(Breaking(), "breaking"), {{"x", 1.0, 1.0}});
   AddSensor(system, "z", InProcessSensor(Linear(1.0, sigma), "linear"), {"p.x"});
@@ -32,26 +32,26 @@ bool Has(const UpdateReport& report, const std::string& kind) {
 }
 
 TEST(EkfSnapshot, AWarningThatIsGivenOnceIsGivenAgainOnlyFromBeforeIt) {
-  Ekf ekf = Filter(1e-9);
-  const auto before = ekf.Save();
+  Ekf ekf = OneBlock(1e-9);
+  const Ekf before = ekf;
   EXPECT_TRUE(Has(ekf.Process(FrameAt(0.0, {{0, 1.0}})), "conditioning"));
-  const auto after = ekf.Save();
-  ekf.Restore(*before);
+  const Ekf after = ekf;
+  ekf = before;
   EXPECT_TRUE(Has(ekf.Process(FrameAt(0.0, {{0, 1.0}})), "conditioning"));
-  ekf.Restore(*before);
-  ekf.Restore(*after);
+  ekf = before;
+  ekf = after;
   EXPECT_FALSE(Has(ekf.Process(FrameAt(0.5, {{0, 1.0}})), "conditioning"));
 }
 
 TEST(EkfSnapshot, AFailureTellsTheLastMeasurementOfThePastThatCounts) {
-  Ekf ekf = Filter(1.0);
+  Ekf ekf = OneBlock(1.0);
   ekf.Process(FrameAt(0.0, {{0, 1.5}}));
-  const auto saved = ekf.Save();
-  const std::vector<double> values = saved->state.values();
+  const Ekf saved = ekf;
+  const std::vector<double> values = saved.state().values();
   ekf.Process(FrameAt(0.5, {{0, 2.5}}));
   ASSERT_TRUE(Has(ekf.Process(FrameAt(2.0, {{0, 1.0}})), "not_finite"));
   EXPECT_TRUE(ekf.failed());
-  ekf.Restore(*saved);
+  ekf = saved;
   EXPECT_FALSE(ekf.failed());
   EXPECT_FALSE(ekf.diverged());
   EXPECT_EQ(ekf.timestamp(), 0);

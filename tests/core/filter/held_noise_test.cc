@@ -246,13 +246,13 @@ TYPED_TEST(HeldNoiseSnapshot, GoesOnFromInsideAGap) {
     const auto filter = Make<TypeParam>(system, {}, StreamsOf(system));
     filter->Process(FrameAt(0.0, {{0, 80.0}, {1, 1.0}}));
     for (int i = 1; i <= parts; ++i) filter->Process(FrameAt(0.01 * i, {}));
-    const auto saved = filter->Save();
+    const TypeParam saved = *filter;
     const Frame next = FrameAt(0.1, {{0, 75.0}, {1, 1.1}});
     filter->Process(next);
     const State once = filter->state();
     filter->Process(FrameAt(0.3, {}));
     filter->Process(FrameAt(0.4, {{0, 70.0}}));
-    filter->Restore(*saved);
+    *filter = saved;
     filter->Process(next);
     EXPECT_EQ(filter->state().values(), once.values()) << parts;
     EXPECT_EQ(filter->state().covariance().Dense(), once.covariance().Dense()) << parts;

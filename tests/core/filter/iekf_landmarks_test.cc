@@ -86,7 +86,7 @@ TEST(IekfLandmarks, AnUpdateEndsWhereItsCostIsLeast) {
   options.max_iterations = 500;
   Iekf iekf = Make<Iekf>(system, options);
   const Frame frame = FrameOf(1.0, {{0, later}});
-  for (Ekf* const filter : {&prediction, &ekf, static_cast<Ekf*>(&iekf)}) {
+  for (Filter* const filter : std::initializer_list<Filter*>{&prediction, &ekf, &iekf}) {
     filter->Process(FrameOf(0.0, {{0, {0.3, 0.1}}}));
     filter->Process(filter == &prediction ? FrameOf(1.0, {}) : frame);
   }

@@ -171,7 +171,7 @@ TEST(RtsSmoother, EqualsTheRecursionOfRauchTungAndStriebelOnTheDepthFilter) {
 
 TEST(RtsSmoother, HasNothingToGoBackTo) {
   const System system = DepthFilter();
-  EXPECT_EQ(RtsSmoother(system, {}, StreamsOf(system)).Save(), nullptr);
+  EXPECT_EQ(RtsSmoother(system, {}, StreamsOf(system)).Clone(), nullptr);
 }
 
 TEST(RtsSmoother, IsNotMadeWithConsideredOrWaitingBlocks) {

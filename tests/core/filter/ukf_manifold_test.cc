@@ -200,7 +200,7 @@ TEST(Ukf, AStepThatIsNotFiniteEndsItInTheWordsOfTheEkf) {
     AddMotion(system, "p", InProcessMotion(Breaking(in_noise), "breaking"), {{"v", 1.0, 0.5}});
     Ekf ekf(system, {}, {});
     Ukf ukf(system, {}, {});
-    for (Ekf* filter : {&ekf, static_cast<Ekf*>(&ukf)}) {
+    for (Estimator* filter : std::initializer_list<Estimator*>{&ekf, &ukf}) {
       filter->Start(0);
       const UpdateReport& report = filter->Process(FrameAt(2.0, {}));
       EXPECT_TRUE(filter->failed());

@@ -282,7 +282,7 @@ TEST(Ukf, AFixedBlockEntersTheModelsAndStaysAsItIs) {
   for (int k = 0; k < 50; ++k) {
     const Frame frame = FrameAt(0.04 * k, {{0, random.Normal()}});
     ekf.Process(frame);
-    for (Ekf* filter : {static_cast<Ekf*>(&ukf), static_cast<Ekf*>(&root)}) {
+    for (Estimator* filter : std::initializer_list<Estimator*>{&ukf, &root}) {
       filter->Process(frame);
       EXPECT_EQ(ValueOf(filter->state(), "p.v"), -0.5);
       EXPECT_NEAR(ValueOf(filter->state(), "p.x"), ValueOf(ekf.state(), "p.x"), 1e-10);

@@ -223,14 +223,15 @@ TEST(Sort, WithoutAWindowTakesTheWholeRun) {
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 50);
 }
 
-/// Remembers how many frames it was given, and that it was asked to go back.
+/// Remembers, with its copies, which frames it was given.
 struct Watching : Ekf {
   using Ekf::Ekf;
   const UpdateReport& Process(const Frame& frame) override {
-    timestamps.push_back(frame.timestamp);
+    timestamps->push_back(frame.timestamp);
     return Ekf::Process(frame);
   }
-  std::vector<Timestamp> timestamps;
+  std::unique_ptr<Estimator> Clone() const override { return std::make_unique<Watching>(*this); }
+  std::shared_ptr<std::vector<Timestamp>> timestamps = std::make_shared<std::vector<Timestamp>>();
 };
 
 TEST(Rollback, TakesAFrameAtOnceAndTheLaterOnesAgain) {
@@ -240,12 +241,11 @@ TEST(Rollback, TakesAFrameAtOnceAndTheLaterOnesAgain) {
   NamedEstimator& named = experiment.estimators[0];
   auto watching =
       std::make_unique<Watching>(named.system, EkfOptions{}, experiment.source->streams());
-  const Watching& seen = *watching;
+  const auto seen = watching->timestamps;
   named.estimator = std::move(watching);
   alidade::Run(experiment, {});
   const Timestamp ms = 1'000'000;
-  EXPECT_EQ(seen.timestamps,
-            (std::vector<Timestamp>{0, 50 * ms, 100 * ms, 20 * ms, 50 * ms, 100 * ms}));
+  EXPECT_EQ(*seen, (std::vector<Timestamp>{0, 50 * ms, 100 * ms, 20 * ms, 50 * ms, 100 * ms}));
 }
 
 /// Throws once, at the frame of that timestamp.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/filter/ekf_small.h"
+#include "alidade/filter/fast_path.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 
 #define ALIDADE_INLINE [[gnu::always_inline]] inline
 
-namespace alidade {
+namespace alidade::internal {
 namespace {
 
 ALIDADE_INLINE void Fit(std::vector<double>& values, int size) {
@@ -48,35 +48,35 @@ ALIDADE_INLINE double Defect(const double* values, int size) {
 /// What one motion model makes of its blocks and of P. K rows and W noise inputs, or 0 where they
 /// are known at run time only.
 template <int N, int K, int W>
-ALIDADE_INLINE bool Ekf::Small::StepModel(const Motion& motion, double dt_s, double (&p)[N][N]) {
-  MotionPlan& plan = *motion.plan;
-  double* const f = plan.f.data();
-  double* const l = plan.l.data();
-  double* const g = plan.g.data();
+ALIDADE_INLINE bool FastPath::StepModel(const Motion& motion, double dt_s, double (&p)[N][N]) {
+  Motions::Step& step = *motion.step;
+  double* const f = step.f.data();
+  double* const l = step.l.data();
+  double* const g = step.g.data();
   const int k = K > 0 ? K : motion.size, w = W > 0 ? W : motion.noise;
-  double* const next = ekf_.next_.data() + motion.offset;
+  double* const next = f_.motions.next().data() + motion.offset;
   for (int i = 0; i < k; ++i) next[i] = kUnwritten;
   for (int i = 0; i < k * k; ++i) f[i] = kUnwritten;
   for (int i = 0; i < k * w; ++i) g[i] = kUnwritten;
   for (int i = 0; i < w * w; ++i) l[i] = kUnwritten;
-  if (motion.model->Step(plan.x.data(), plan.u, nullptr, dt_s, plan.next.data(), f, g) !=
+  if (motion.model->Step(motion.x.data(), step.u, nullptr, dt_s, motion.next.data(), f, g) !=
           Status::kOk ||
-      motion.model->SqrtQ(plan.x.data(), dt_s, l) != Status::kOk) {
+      motion.model->SqrtQ(motion.x.data(), dt_s, l) != Status::kOk) {
     return false;
   }
   double own[K > 0 ? K * K : 1];
-  double* const q = K > 0 ? own : plan.q.data();
-  internal::SpreadNoise(g, l, k, w, plan.gl.data(), q);
-  internal::Propagate<N, K>(p, motion.offset, k, f, q);
-  return Defect(ekf_.next_.data() + motion.offset, k) == 0.0;
+  double* const q = K > 0 ? own : step.q.data();
+  SpreadNoise(g, l, k, w, step.gl.data(), q);
+  Propagate<N, K>(p, motion.offset, k, f, q);
+  return Defect(f_.motions.next().data() + motion.offset, k) == 0.0;
 }
 
 /// All motion models, or nothing.
 template <int N>
-ALIDADE_INLINE bool Ekf::Small::Step(double dt_s) {
-  Covariance& covariance = ekf_.state_.covariance();
+ALIDADE_INLINE bool FastPath::Step(double dt_s) {
+  Covariance& covariance = f_.state.covariance();
   double p[N][N];
-  internal::Load(covariance.data(), covariance.stride(), p);
+  Load(covariance.data(), covariance.stride(), p);
   for (const Motion& motion : motions_) {
     bool done = false;
     if constexpr (N >= 2) {
@@ -90,9 +90,9 @@ ALIDADE_INLINE bool Ekf::Small::Step(double dt_s) {
   double defect = 0.0;
   for (int i = 0; i < N; ++i) defect += 0.0 * p[i][i];
   if (defect != 0.0) return false;
-  internal::Store(p, covariance.data(), covariance.stride());
-  double* const x = ekf_.state_.values().data();
-  const double* const next = ekf_.next_.data();
+  Store(p, covariance.data(), covariance.stride());
+  double* const x = f_.state.values().data();
+  const double* const next = f_.motions.next().data();
   for (const Motion& motion : motions_) {
     for (int i = motion.offset; i < motion.offset + motion.size; ++i) x[i] = next[i];
   }
@@ -102,12 +102,12 @@ ALIDADE_INLINE bool Ekf::Small::Step(double dt_s) {
 /// h, H, R, S and NIS of one measurement of M rows (0: known at run time only), with P H' at
 /// `pht`; false where anything is unusual.
 template <int N, int M>
-ALIDADE_INLINE bool Ekf::Small::Linearise(Sensor& sensor, const double* z, MeasurementReport& entry,
-                                          double* pht) {
+ALIDADE_INLINE bool FastPath::Linearise(Sensor& sensor, const double* z, MeasurementReport& entry,
+                                        double* pht) {
   constexpr double kTiny = 1e-13;
   constexpr int kMost = M > 0 ? M : kMostOfOne;
   const int m = M > 0 ? M : sensor.rows;
-  const Covariance& p = ekf_.state_.covariance();
+  const Covariance& p = f_.state.covariance();
   double h[kMost], l[kMost * kMost], r[kMost], noise[kMost], s[kMost * kMost];
   for (int i = 0; i < m; ++i) h[i] = kUnwritten;
   for (int i = 0; i < m * m; ++i) l[i] = kUnwritten;
@@ -127,12 +127,12 @@ ALIDADE_INLINE bool Ekf::Small::Linearise(Sensor& sensor, const double* z, Measu
     }
     noise[i] = s[i * m + i];
   }
-  internal::Project<N>(p.data(), p.stride(), sensor.h.data(), m, pht, s);
+  Project<N>(p.data(), p.stride(), sensor.h.data(), m, pht, s);
   bool tiny = false;
   for (int i = 0; i < m; ++i) tiny |= !(noise[i] > kTiny * s[i * m + i]);
-  if (tiny && !ekf_.warned_[static_cast<std::size_t>(entry.sensor)]) return false;
+  if (tiny && !parts_.gate.warned(static_cast<std::size_t>(entry.sensor))) return false;
   double work[kMost * (kMost + 1)];
-  entry.nis = internal::SquaredMahalanobis(s, r, m, work);
+  entry.nis = SquaredMahalanobis(s, r, m, work);
   if (Defect(s, m * m) + 0.0 * entry.nis != 0.0) return false;
   Copy(z, m, entry.z);
   Copy(h, m, entry.h);
@@ -143,8 +143,8 @@ ALIDADE_INLINE bool Ekf::Small::Linearise(Sensor& sensor, const double* z, Measu
 
 /// Puts a measurement that passed its gate below the `at` rows before it; their P H' is there.
 template <int N, int M>
-ALIDADE_INLINE void Ekf::Small::Stack(const Sensor& sensor, MeasurementReport& entry, Rows<N>& rows,
-                                      int at) {
+ALIDADE_INLINE void FastPath::Stack(const Sensor& sensor, MeasurementReport& entry, Rows<N>& rows,
+                                    int at) {
   const int m = M > 0 ? M : sensor.rows;
   const double* const own = entry.s.data();
   for (int i = 0; i < m; ++i) {
@@ -163,23 +163,23 @@ ALIDADE_INLINE void Ekf::Small::Stack(const Sensor& sensor, MeasurementReport& e
 
 /// The update with M rows (0: known at run time only), or nothing.
 template <int N, int M>
-ALIDADE_INLINE bool Ekf::Small::Correct(const Rows<N>& rows, int count) {
+ALIDADE_INLINE bool FastPath::Correct(const Rows<N>& rows, int count) {
   constexpr int kMost = M > 0 ? M : kRows;
   const int m = M > 0 ? M : count;
-  Covariance& p = ekf_.state_.covariance();
+  Covariance& p = f_.state.covariance();
   double w[kMost * N], inverse_d[kMost], dx[N], gain[kMost * N], moved[N], updated[N * N];
-  if (!internal::Solve<N, M>(m, rows.pht, rows.s, kRows, rows.innovation, w, inverse_d, dx, gain) ||
-      !internal::Downdate<N, M>(p.data(), p.stride(), m, w, inverse_d, updated)) {
+  if (!Solve<N, M>(m, rows.pht, rows.s, kRows, rows.innovation, w, inverse_d, dx, gain) ||
+      !Downdate<N, M>(p.data(), p.stride(), m, w, inverse_d, updated)) {
     return false;
   }
-  double* const x = ekf_.state_.values().data();
+  double* const x = f_.state.values().data();
   for (int i = 0; i < N; ++i) moved[i] = x[i] + dx[i];
   if (Defect(moved, N) != 0.0) return false;
   for (int c = 0; c < N; ++c) {
     for (int r = c; r < N; ++r) p.data()[c * p.stride() + r] = updated[c * N + r];
   }
   for (int i = 0; i < N; ++i) x[i] = moved[i];
-  ekf_.interval_steps_ = 0;
+  f_.motions.EndInterval();
   for (int i = 0; i < m; ++i) {
     for (int n = 0; n < N; ++n) rows.gain[i][n] = gain[i * N + n];
   }
@@ -189,8 +189,8 @@ ALIDADE_INLINE bool Ekf::Small::Correct(const Rows<N>& rows, int count) {
 /// Reports a measurement of M rows (0: known at run time only) and stacks it below the `at` rows
 /// before it, where it passes its gate.
 template <int N, int M>
-ALIDADE_INLINE Ekf::Small::Taken Ekf::Small::Take(Sensor& sensor, const Measurement& measurement,
-                                                  Rows<N>& rows, int at) {
+ALIDADE_INLINE FastPath::Taken FastPath::Take(Sensor& sensor, const Measurement& measurement,
+                                              Rows<N>& rows, int at) {
   const int m = M > 0 ? M : sensor.rows;
   const double* const z = measurement.values.data();
   if (std::ssize(measurement.values) != m || !measurement.covariance.empty() ||
@@ -199,7 +199,7 @@ ALIDADE_INLINE Ekf::Small::Taken Ekf::Small::Take(Sensor& sensor, const Measurem
   }
   const Status valid = sensor.model->Valid(z);
   if (valid != Status::kOk && valid != Status::kInvalid) return Taken::kUnusual;
-  MeasurementReport& entry = ekf_.report_.Add();
+  MeasurementReport& entry = f_.report.Add();
   if (valid == Status::kInvalid) {
     entry.Reset(sensor.index, measurement.landmark, m);
     entry.z.assign(z, z + m);
@@ -213,7 +213,7 @@ ALIDADE_INLINE Ekf::Small::Taken Ekf::Small::Take(Sensor& sensor, const Measurem
   entry.outcome = Outcome::kAccepted;
   if (!Linearise<N, M>(sensor, z, entry, rows.pht + at * N)) return Taken::kUnusual;
   if (!(entry.nis <= sensor.gate)) {
-    if (*sensor.rejections + 1 >= ekf_.options_.rejection_recovery_after) return Taken::kUnusual;
+    if (parts_.recovery.IsDueNext(static_cast<std::size_t>(sensor.index))) return Taken::kUnusual;
     entry.outcome = Outcome::kGated;
     entry.gain.clear();
     return Taken::kLeftOut;
@@ -224,11 +224,11 @@ ALIDADE_INLINE Ekf::Small::Taken Ekf::Small::Take(Sensor& sensor, const Measurem
 
 /// The measurements of a frame as one update, or nothing.
 template <int N>
-ALIDADE_INLINE bool Ekf::Small::Update(const Frame& frame) {
+ALIDADE_INLINE bool FastPath::Update(const Frame& frame) {
   Rows<N> rows;
   int m = 0, last_sensor = -1;
   const Measurement* last = nullptr;
-  ekf_.report_.ClearMeasurements();
+  f_.report.ClearMeasurements();
   for (Sensor& sensor : sensors_) {
     const Measurement* found = nullptr;
     for (const Measurement& one : frame.measurements) {
@@ -250,113 +250,127 @@ ALIDADE_INLINE bool Ekf::Small::Update(const Frame& frame) {
                       : m == 2 ? Correct<N, 2>(rows, m)
                                : Correct<N, 0>(rows, m);
     if (!done) return false;
-    ekf_.last_used_.sensor = last_sensor;
-    ekf_.last_used_.timestamp = last->timestamp;
-    Fit(ekf_.last_used_.z, static_cast<int>(std::ssize(last->values)));
-    Copy(last->values.data(), static_cast<int>(std::ssize(last->values)), ekf_.last_used_.z);
+    f_.last_used.sensor = last_sensor;
+    f_.last_used.timestamp = last->timestamp;
+    Fit(f_.last_used.z, static_cast<int>(std::ssize(last->values)));
+    Copy(last->values.data(), static_cast<int>(std::ssize(last->values)), f_.last_used.z);
   }
   CountRejections();
   return true;
 }
 
-void Ekf::Small::CountRejections() {
-  for (const MeasurementReport& entry : ekf_.report_.measurements()) {
+void FastPath::CountRejections() {
+  for (const MeasurementReport& entry : f_.report.measurements()) {
     const auto k = static_cast<std::size_t>(entry.sensor);
     if (entry.outcome == Outcome::kAccepted) {
-      ekf_.rejections_[k] = 0;
-      ekf_.inflated_[k] = false;
-      ekf_.out_of_domain_[k] = false;
+      parts_.recovery.CountAccepted(f_, k);
     } else if (entry.outcome == Outcome::kGated) {
-      ++ekf_.rejections_[k];
+      parts_.recovery.CountRejected(k);
     }
   }
 }
 
 template <int N>
-bool Ekf::Small::ProcessSized(const Frame& frame) {
+bool FastPath::ProcessSized(const Frame& frame) {
   Timestamp elapsed = 0;
-  if (ekf_.failed_ || ekf_.timestamp_ == kNoTimestamp || frame.timestamp < ekf_.timestamp_ ||
-      __builtin_sub_overflow(frame.timestamp, ekf_.timestamp_, &elapsed)) {
+  if (f_.ended || f_.timestamp == kNoTimestamp || frame.timestamp < f_.timestamp ||
+      __builtin_sub_overflow(frame.timestamp, f_.timestamp, &elapsed)) {
     return false;
   }
   if (elapsed > 0) {
-    if (ekf_.InInterval()) return false;
+    if (f_.motions.in_interval()) return false;
     const double dt_s = Seconds(elapsed);
-    if (!ekf_.inputs_.empty()) {
-      if (!ekf_.inputs_.AllAct(ekf_.timestamp_, frame.timestamp)) return false;
-      ekf_.UseInputs();
+    if (!parts_.time.inputs().empty()) {
+      if (!parts_.time.inputs().AllAct(f_.timestamp, frame.timestamp)) return false;
+      parts_.time.UseInputs(f_.timestamp, f_.motions, f_.report.events);
     }
-    if (!(dt_s <= ekf_.options_.max_dt_s) || !Step<N>(dt_s)) return false;
-    ekf_.timestamp_ = frame.timestamp;
-    ++ekf_.interval_steps_;
+    if (!(dt_s <= parts_.time.max_dt_s()) || !Step<N>(dt_s)) return false;
+    f_.timestamp = frame.timestamp;
+    f_.motions.CountStep();
   }
   return Update<N>(frame);
 }
 
-bool Ekf::Small::AddMotions() {
-  for (std::size_t i = 0; i < ekf_.motions_.size(); ++i) {
-    MotionPlan& plan = ekf_.motions_[i];
-    if (!plan.active) continue;
-    if (plan.segments.size() != 1 || !plan.rows.empty()) return false;
-    const MotionModel& model = ekf_.system_.motions[i].model;
-    motions_.push_back(
-        {&model, &plan, plan.segments[0].first, plan.segments[0].second, model.noise_size()});
+bool FastPath::AddMotions() {
+  const Binding& binding = *f_.binding;
+  motions_.reserve(binding.motions.size());
+  for (std::size_t i = 0; i < binding.motions.size(); ++i) {
+    Motions::Step& step = f_.motions.steps()[i];
+    const MotionPlace& place = binding.motions[i];
+    if (!step.active) continue;
+    if (place.segments.size() != 1 || !place.rows.empty()) return false;
+    const MotionModel& model = binding.system.motions[i].model;
+    const auto [offset, size] = place.segments[0];
+    Motion& motion =
+        motions_.emplace_back(Motion{&model, &step, {}, {}, offset, size, model.noise_size()});
+    for (const int value : place.values) {
+      motion.x.push_back(f_.state.values().data() + value);
+      motion.next.push_back(f_.motions.next().data() + value);
+    }
   }
   return true;
 }
 
-bool Ekf::Small::AddSensors() {
-  sensors_.reserve(ekf_.plans_.size());  // they hold pointers into themselves
-  for (std::size_t k = 0; k < ekf_.plans_.size(); ++k) {
-    const SensorPlan& plan = ekf_.plans_[k];
-    const SensorModel& model = ekf_.system_.sensors[k].model;
-    const Geometry& geometry = model.measurement().geometry;
-    if (geometry.kind != GeometryKind::kVector || geometry.tangent > kMostOfOne || !plan.whole ||
-        plan.linearised_elsewhere || ekf_.system_.sensors[k].loss.kind != LossKind::kNone ||
-        std::ranges::count(plan.consider, true) > 0) {
+bool FastPath::AddSensors() {
+  const Binding& binding = *f_.binding;
+  sensors_.reserve(binding.sensors.size());  // they hold pointers into themselves
+  for (std::size_t k = 0; k < binding.sensors.size(); ++k) {
+    const SensorPlace& place = binding.sensors[k];
+    const SensorBinding& bound = binding.system.sensors[k];
+    const Geometry& geometry = bound.model.measurement().geometry;
+    const bool elsewhere = std::ranges::any_of(bound.roles, [&](const RoleBinding& role) {
+      return role.block >= 0 &&
+             (role.jacobian_at == JacobianAt::kMeasurement ||
+              (!f_.first_estimates.empty() &&
+               !f_.first_estimates[static_cast<std::size_t>(role.block)].empty()));
+    });
+    if (geometry.kind != GeometryKind::kVector || geometry.tangent > kMostOfOne || !place.whole ||
+        elsewhere || bound.loss.kind != LossKind::kNone ||
+        std::ranges::count(place.consider, true) > 0) {
       return false;
     }
     Sensor& sensor = sensors_.emplace_back();
     sensor.index = static_cast<int>(k);
-    sensor.rejections = &ekf_.rejections_[k];
-    sensor.model = &model;
-    sensor.roles = plan.roles;
-    sensor.strides = plan.strides;
-    for (const JacobianPart& part : plan.parts) {
+    sensor.model = &bound.model;
+    for (const int value : place.values) {
+      sensor.roles.push_back(value < 0 ? nullptr : f_.state.values().data() + value);
+    }
+    sensor.strides = place.strides;
+    for (const JacobianPart& part : place.parts) {
       for (int i = 0; i < geometry.tangent * part.size; ++i) {
-        const int at = i / part.size * plan.width + part.column + i % part.size;
+        const int at = i / part.size * place.width + part.column + i % part.size;
         sensor.blank[static_cast<std::size_t>(at)] = kUnwritten;
       }
     }
-    for (const int column : plan.columns) {
+    for (const int column : place.columns) {
       sensor.jacobians.push_back(column < 0 ? nullptr : sensor.h.data() + column);
     }
-    sensor.stream = ekf_.stream_of_sensor_[k];
+    sensor.stream = binding.stream_of_sensor[k];
     sensor.rows = geometry.tangent;
-    sensor.gate = ekf_.gate_threshold_[k];
+    sensor.gate = parts_.gate.threshold(k);
   }
   return true;
 }
 
-std::unique_ptr<Ekf::Small> Ekf::Small::For(Ekf& ekf) {
-  const int n = ekf.state_.covariance().size();
+std::unique_ptr<FastPath> FastPath::For(const FastParts& parts) {
+  const FilterState& f = parts.f;
+  const int n = f.size();
   const auto plain = [](const Block& block) {
     return block.has_covariance() && block.geometry().kind == GeometryKind::kVector &&
            block.value_offset == block.tangent_offset;
   };
-  if (ekf.landmarks_ != nullptr || !ekf.state_.covariance().small() ||
-      ekf.options_.fuse != Fuse::kJoint || ekf.waiting_ || ekf.considering_ ||
-      !ekf.order_.empty() || std::ssize(ekf.state_.values()) != n ||
-      !std::ranges::all_of(ekf.state_.layout().blocks(), plain)) {
+  if (f.binding->system.landmarks || !f.state.covariance().small() ||
+      parts.options.fuse != Fuse::kJoint || f.waiting || f.considering ||
+      std::ssize(f.state.values()) != n || !std::ranges::all_of(f.state.layout().blocks(), plain)) {
     return nullptr;
   }
-  std::unique_ptr<Small> small(new Small(ekf));
-  if (!small->AddMotions() || !small->AddSensors()) return nullptr;
+  std::unique_ptr<FastPath> path(new FastPath(parts));
+  if (!path->AddMotions() || !path->AddSensors()) return nullptr;
   const auto choose = [&]<int... I>(std::integer_sequence<int, I...>) {
-    ((n == I + 1 ? (small->process_ = &Small::ProcessSized<I + 1>, 0) : 0), ...);
+    ((n == I + 1 ? (path->process_ = &FastPath::ProcessSized<I + 1>, 0) : 0), ...);
   };
   choose(std::make_integer_sequence<int, Covariance::kSmall>{});
-  return small;
+  return path;
 }
 
-}  // namespace alidade
+}  // namespace alidade::internal

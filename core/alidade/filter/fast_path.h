@@ -5,19 +5,32 @@
 #include <memory>
 #include <vector>
 
-#include "alidade/filter/ekf.h"
+#include "alidade/filter/ekf_options.h"
+#include "alidade/filter/gate.h"
+#include "alidade/filter/recovery.h"
+#include "alidade/filter/timeline.h"
 
-namespace alidade {
+namespace alidade::internal {
 
-/// The fast path: takes the steps and updates in which nothing but acceptance and gating happens,
-/// in functions compiled for the number of states. Before anything else it changes nothing and says
-/// false: the general path then does the work and finds the words.
-class Ekf::Small {
+/// The parts of a filter that its fast path works on.
+struct FastParts {
+  FilterState& f;
+  Timeline& time;
+  Gate& gate;
+  Recovery& recovery;
+  const EkfOptions& options;
+};
+
+/// The fast path of a filter whose method is Linear: takes the steps and updates in which nothing
+/// but acceptance and gating happens, in functions compiled for the number of states. Before
+/// anything else it changes nothing and says false: the frame loop then does the work and finds the
+/// words.
+class FastPath {
  public:
   /// Null where the filter is not one of few states, all of them vectors in the order of the
-  /// layout, with plain joint updates.
-  static std::unique_ptr<Small> For(Ekf& ekf);
-  /// As Ekf::Process, all of it or nothing but the step.
+  /// layout, with plain joint updates. It points into the parts.
+  static std::unique_ptr<FastPath> For(const FastParts& parts);
+  /// As a filter processes a frame, all of it or nothing but the step.
   bool Process(const Frame& frame) { return (this->*process_)(frame); }
 
  private:
@@ -26,7 +39,9 @@ class Ekf::Small {
 
   struct Motion {
     const MotionModel* model;
-    MotionPlan* plan;
+    Motions::Step* step;
+    std::vector<const double*> x;
+    std::vector<double*> next;
     int offset, size, noise;
   };
   struct Sensor {
@@ -37,7 +52,6 @@ class Ekf::Small {
     std::array<double, kMostOfOne * Covariance::kSmall> h{};      ///< H, its zeros included
     std::array<double, kMostOfOne * Covariance::kSmall> blank{};  ///< h before the model writes it
     int index, stream, rows;
-    int* rejections;
     double gate;
   };
   /// The rows that passed their gates, stacked.
@@ -51,7 +65,7 @@ class Ekf::Small {
 
   enum class Taken { kUnusual, kLeftOut, kStacked };
 
-  explicit Small(Ekf& ekf) : ekf_(ekf) {}
+  explicit FastPath(const FastParts& parts) : parts_(parts), f_(parts.f) {}
   bool AddMotions();
   bool AddSensors();
   template <int N>
@@ -73,10 +87,11 @@ class Ekf::Small {
 
   void CountRejections();
 
-  Ekf& ekf_;
-  bool (Small::*process_)(const Frame& frame) = nullptr;
+  FastParts parts_;
+  FilterState& f_;
+  bool (FastPath::*process_)(const Frame& frame) = nullptr;
   std::vector<Motion> motions_;
   std::vector<Sensor> sensors_;
 };
 
-}  // namespace alidade
+}  // namespace alidade::internal

@@ -39,12 +39,8 @@ struct CorrelatedPair : Sensor<Vec<2>, Vec<2>> {
 class Watched : public Ekf {
  public:
   using Ekf::Ekf;
-  const UpdateReport& Process(const Frame& frame) override {
-    row_count_ = 0;  // the fast path leaves it
-    return Ekf::Process(frame);
-  }
-  /// Of the last frame, which had measurements.
-  bool fast() const { return row_count_ == 0; }
+  /// Of the last frame.
+  bool fast() const { return took_fast_path(); }
 };
 
 /// The same system, which a block of no sensor's keeps from the fast path.

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/filter/binding.h"
+
+#include "alidade/base/error.h"
+
+namespace alidade::internal {
+namespace {
+
+/// Lays a row of H out as wide as P, where no two roles have the same block.
+void MakeWhole(SensorPlace& place, int size) {
+  for (std::size_t i = 0; i < place.parts.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      if (place.parts[i].offset == place.parts[j].offset) return;
+    }
+  }
+  place.whole = true;
+  place.width = size;
+  std::size_t part = 0;
+  for (int& column : place.columns) {
+    if (column < 0) continue;
+    column = place.parts[part].column = place.parts[part].offset;
+    ++part;
+  }
+}
+
+SensorPlace PlaceOf(const SensorBinding& sensor, const State& initial, bool small) {
+  SensorPlace place;
+  for (const RoleBinding& role : sensor.roles) {
+    const Block block = role.block < 0 ? Block{} : initial.layout()[role.block];
+    place.Add(block, role.mode != RoleMode::kKnown, role.mode == RoleMode::kConsider);
+  }
+  if (small && !sensor.model.has_landmark()) MakeWhole(place, initial.covariance().size());
+  place.strides.assign(sensor.roles.size(), place.width);
+  return place;
+}
+
+MotionPlace PlaceOf(const MotionBinding& motion, const StateLayout& layout) {
+  MotionPlace place;
+  place.holds = motion.model.discrete_noise() && motion.model.noise_size() > 0;
+  bool all = true;  // of its blocks are in P
+  int row = 0;
+  for (const BlockId id : motion.blocks) {
+    const Block& block = layout[id];
+    const int size = block.geometry().tangent, offset = block.tangent_offset;
+    place.values.push_back(block.value_offset);
+    for (int k = 0; k < size; ++k) {
+      if (offset >= 0) place.rows.push_back(row + k);
+      place.at.push_back(offset < 0 ? -1 : offset + k);
+    }
+    row += size;
+    all = all && offset >= 0;
+    if (offset < 0) continue;
+    if (!place.segments.empty() &&
+        place.segments.back().first + place.segments.back().second == offset) {
+      place.segments.back().second += size;
+    } else {
+      place.segments.emplace_back(offset, size);
+    }
+  }
+  if (all) place.rows.clear();
+  return place;
+}
+
+}  // namespace
+
+void SensorPlace::Add(const Block& block, bool jacobian, bool considered) {
+  values.push_back(block.value_offset);
+  columns.push_back(-1);
+  if (!jacobian || block.tangent_offset < 0) return;
+  const int size = block.geometry().tangent;
+  columns.back() = width;
+  parts.push_back({block.tangent_offset, size, width});
+  consider.push_back(considered);
+  width += size;
+}
+
+Binding::Binding(System of, const std::vector<StreamInfo>& streams)
+    : system(std::move(of)),
+      initial(system.InitialState(true)),
+      stream_of_sensor(system.sensors.size(), -1) {
+  // Landmarks come behind: then P has no size of its own.
+  const bool small = initial.covariance().small() && !system.landmarks;
+  for (const SensorBinding& sensor : system.sensors) {
+    sensors.push_back(PlaceOf(sensor, initial, small));
+  }
+  for (const MotionBinding& motion : system.motions) {
+    motions.push_back(PlaceOf(motion, initial.layout()));
+  }
+  for (std::size_t i = 0; i < system.sensors.size(); ++i) {
+    for (std::size_t s = 0; s < streams.size(); ++s) {
+      if (streams[s].name != system.sensors[i].stream) continue;
+      ALIDADE_EXPECTS(streams[s].size == system.sensors[i].model.measurement().geometry.ambient);
+      stream_of_sensor[i] = static_cast<int>(s);
+    }
+  }
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/filter/evaluate_models.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace alidade::internal {
+
+const double* const* RolesAt(FilterState& f, const Row& row, const std::vector<double>& x) {
+  const std::vector<RoleBinding>& bound = row.binding->roles;
+  f.roles.clear();
+  for (std::size_t i = 0; i < row.place->values.size(); ++i) {
+    const int at = row.place->values[i];
+    const bool known = i < bound.size() && bound[i].mode == RoleMode::kKnown;
+    f.roles.push_back(at < 0 ? nullptr : (known ? f.state.values() : x).data() + at);
+  }
+  return f.roles.data();
+}
+
+Outcome LineariseAt(FilterState& f, Row& row, const double* const* roles) {
+  const SensorPlace& place = *row.place;
+  const int m = row.report->dof;
+  row.h.assign(static_cast<std::size_t>(m * place.width), 0.0);
+  for (const JacobianPart& part : place.parts) {
+    for (int i = 0; i < m; ++i) {
+      std::fill_n(row.h.data() + i * place.width + part.column, part.size, std::nan(""));
+    }
+  }
+  f.jacobians.clear();
+  for (const int column : place.columns) {
+    f.jacobians.push_back(column < 0 ? nullptr : row.h.data() + column);
+  }
+  row.report->h.assign(static_cast<std::size_t>(row.model->measurement().geometry.ambient),
+                       std::nan(""));
+  return OutcomeOf(
+      row.model->Linearise(roles, row.report->h.data(), f.jacobians.data(), place.strides.data()));
+}
+
+Outcome NoiseAt(Row& row, const double* const* roles) {
+  const auto m = static_cast<std::size_t>(row.report->dof);
+  const Measurement& measurement = *row.measurement;
+  if (!measurement.covariance.empty()) {
+    row.r.assign(measurement.covariance.begin(), measurement.covariance.end());
+    return Outcome::kAccepted;
+  }
+  row.r.resize(m * m);
+  row.l.assign(m * m, std::nan(""));
+  const Outcome outcome =
+      OutcomeOf(row.model->SqrtNoise(roles, measurement.values.data(), row.l.data()));
+  for (std::size_t i = 0; i < m; ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      double sum = 0.0;
+      for (std::size_t k = 0; k < m; ++k) sum += row.l[i * m + k] * row.l[j * m + k];
+      row.r[i * m + j] = row.r[j * m + i] = sum;
+    }
+  }
+  return outcome;
+}
+
+void TakeInnovation(Row& row) {
+  MeasurementReport& entry = *row.report;
+  entry.innovation.resize(static_cast<std::size_t>(entry.dof));
+  row.model->measurement().geometry.Minus(entry.z.data(), entry.h.data(), entry.innovation.data());
+}
+
+void ChainJacobian(FilterState& f, Row& row, int column, int size, const double* j) {
+  const Workspace::Use use(f.work);
+  const int m = row.report->dof;
+  auto own = Eigen::Map<RowMajor>(row.h.data(), m, row.place->width).middleCols(column, size);
+  Workspace::Matrix chained = f.work.Take(m, size);
+  chained.noalias() = own * Eigen::Map<const RowMajor>(j, size, size);
+  own = chained;
+}
+
+Outcome Invert(FilterState& f, Row& row, const LandmarkOptions::Prior* prior, Inverse& inverse) {
+  const SensorBinding& binding = *row.binding;
+  const SensorModel& model = binding.model;
+  const auto first = static_cast<std::size_t>(model.initialised_role());
+  const auto count = static_cast<std::size_t>(model.initialised_count());
+  const std::span<const Space> targets = std::span(model.roles()).subspan(first, count);
+  int rows = 0, size = 0;
+  for (const Space& target : targets) {
+    rows += target.geometry.tangent;
+    size += target.geometry.ambient;
+  }
+  std::vector<const double*> roles(binding.roles.size(), nullptr);
+  std::vector<RowMajor> jacobians(roles.size());
+  std::vector<double*> jx(roles.size(), nullptr);
+  for (std::size_t i = 0; i < roles.size(); ++i) {
+    const RoleBinding& role = binding.roles[i];
+    if ((i >= first && i < first + count) || role.block < 0) continue;
+    roles[i] = f.state.value(role.block);
+    const Block& block = f.state.layout()[role.block];
+    if (role.mode == RoleMode::kKnown || !block.has_covariance()) continue;
+    jacobians[i] = RowMajor::Constant(rows, block.geometry().tangent, std::nan(""));
+    jx[i] = jacobians[i].data();
+  }
+  const int m = model.measurement().geometry.tangent;
+  RowMajor jz = RowMajor::Constant(rows, m, std::nan(""));
+  RowMajor jp = RowMajor::Constant(rows, model.prior_size(), std::nan(""));
+  inverse.y.resize(static_cast<std::size_t>(size));
+  const Status status = model.Initialise(roles.data(), row.measurement->values.data(),
+                                         prior == nullptr ? nullptr : &prior->inverse_distance,
+                                         inverse.y.data(), jx.data(), jz.data(), jp.data());
+  Outcome outcome = OutcomeOf(status);
+  if (status == Status::kOk) {
+    double* y = inverse.y.data();
+    for (std::size_t i = 0; i < count; ++i) {
+      targets[i].geometry.Normalise(y);
+      roles[first + i] = y;
+      y += targets[i].geometry.ambient;
+    }
+    outcome = NoiseAt(row, roles.data());
+  }
+  if (outcome == Outcome::kFailed) f.NotePluginFailure(binding);
+  if (outcome != Outcome::kAccepted) {
+    return outcome == Outcome::kFailed ? outcome : Outcome::kInvalid;
+  }
+  const Eigen::Map<const RowMajor> r(row.r.data(), m, m);
+  inverse.own = jz * r * jz.transpose();
+  if (prior != nullptr) inverse.own += prior->sigma * prior->sigma * jp * jp.transpose();
+  bool finite = AllFinite(inverse.y) && inverse.own.allFinite();
+  for (std::size_t i = 0; i < roles.size(); ++i) {
+    if (jx[i] == nullptr) continue;
+    finite = finite && jacobians[i].allFinite();
+    inverse.from.push_back(binding.roles[i].block);
+    inverse.jacobians.emplace_back(jacobians[i]);
+  }
+  return finite ? Outcome::kAccepted : Outcome::kNotFinite;
+}
+
+}  // namespace alidade::internal

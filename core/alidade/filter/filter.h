@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "alidade/filter/ekf_options.h"
+#include "alidade/filter/estimator.h"
+
+namespace alidade {
+
+namespace internal {
+class Method;
+struct FilterState;
+}  // namespace internal
+
+/// A value of one stream, as it comes.
+struct Reading {
+  int stream = 0;  ///< Filter::stream
+  std::vector<double> values;
+  std::int64_t landmark = -1;
+  std::vector<double> covariance = {};  ///< row-major, overrides the model's noise; empty: none
+};
+
+/// What a sensor would measure.
+struct Prediction {
+  std::vector<double> z;  ///< h, ambient
+  Eigen::MatrixXd s;      ///< S = H P H' + R, m x m
+};
+
+/// A recursive estimator over one system: Ekf, Iekf, Ukf, SquareRootEkf. A copy of one is a
+/// snapshot of it, and goes on by itself.
+///
+/// What a frame goes through:
+///
+///   step         to its timestamp, in parts where a control input changes or a gap is longer than
+///                max_dt_s; noise that a model holds is held over the whole gap
+///   initialise   blocks that wait for one of its measurements
+///   predict      h, r and S of each measurement, all of a group at the same state
+///   gate         each by itself: r' S^-1 r against chi-square; robust losses; consensus
+///   correct      one stacked update by those that pass: all of it happens or nothing
+///   recover      from a covariance that is not positive semi-definite, and from sensors that are
+///                rejected again and again
+///   landmarks    are counted, pruned, converted and initialised
+///
+/// Control inputs of the frame act from its timestamp on. An update is a transaction: what would
+/// leave the state not finite or not positive definite is rolled back and reported.
+///
+/// Live use: Push measurements by the names of their streams as they come, ask At for the estimate
+/// at any later time, and Expect for what a sensor will see then; neither changes the filter.
+///
+/// Threads: as a value of the standard library. Const members may be called from several threads at
+/// once, while none calls another one; a copy belongs to whoever has it. What copies share, the
+/// system and its models, does not change, and models may be called from several threads.
+class Filter : public Estimator {
+ public:
+  Filter(const Filter& other);
+  Filter& operator=(const Filter& other);
+  Filter(Filter&& other) noexcept;
+  Filter& operator=(Filter&& other) noexcept;
+  ~Filter() override;
+
+  // By frames.
+  void Start(Timestamp timestamp) override;
+  const UpdateReport& Process(const Frame& frame) override;
+  std::unique_ptr<Estimator> Clone() const override { return std::make_unique<Filter>(*this); }
+  const State& state() const override;
+  std::vector<LandmarkEstimate> landmarks() const override;
+  Timestamp timestamp() const override;
+  bool diverged() const override;
+  bool failed() const override;
+
+  const System& system() const;
+
+  // Live.
+  /// Index of a stream, for Reading::stream. Error kBadConfig where there is none.
+  int stream(std::string_view name) const;
+  /// Id of a block, `owner.block`. Error kBadConfig where there is none.
+  BlockId block(std::string_view name) const;
+  /// Process, of what came at one timestamp. The report is good until the next call.
+  const UpdateReport& Push(Timestamp timestamp, const std::vector<Reading>& readings);
+  /// The state at `timestamp`, not before timestamp(), as a frame without measurements would leave
+  /// it. Nothing is committed. Where it cannot be stepped to, it is that of the last step that can.
+  State At(Timestamp timestamp) const;
+  /// What the sensor of that name will measure at `timestamp`, of the landmark of that id where it
+  /// measures landmarks. Nothing where h is not defined there, or a block or the landmark has no
+  /// value yet. Error kBadConfig where there is no
+  /// such sensor.
+  std::optional<Prediction> Expect(std::string_view sensor, Timestamp timestamp,
+                                   std::int64_t landmark = -1) const;
+
+  /// @cond
+  /// `streams` are the source's, in the order of Measurement::stream.
+  Filter(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams,
+         std::unique_ptr<internal::Method> method);
+  internal::Method& method();
+  const internal::Method& method() const;
+  internal::FilterState& internals();
+  const internal::FilterState& internals() const;
+  bool took_fast_path() const;  ///< the last frame
+                                /// @endcond
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace alidade

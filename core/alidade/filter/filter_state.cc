@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/filter/filter_state.h"
+
+#include <numeric>
+
+#include "alidade/base/number_text.h"
+
+namespace alidade::internal {
+
+FilterState::FilterState(std::shared_ptr<const Binding> of, bool keeps_first_estimates)
+    : binding(std::move(of)),
+      state(binding->initial),
+      motions(*binding),
+      out_of_domain(binding->sensors.size(), 0),
+      keeps_first_estimates_(keeps_first_estimates) {
+  Activate();
+}
+
+void FilterState::Activate() {
+  const std::span<const Block> blocks(binding->system.layout.blocks());
+  ++activations;
+  waiting = considering = false;
+  gain_rows_.clear();
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    const Block& block = state.layout()[static_cast<BlockId>(i)];
+    waiting = waiting || !block.present;
+    considering = considering || (block.present && block.status == BlockStatus::kConsider);
+    for (int k = 0; block.has_covariance() && k < block.geometry().tangent; ++k) {
+      gain_rows_.push_back(block.tangent_offset + k);
+    }
+  }
+  motions.Activate(state.layout());
+  if (keeps_first_estimates_) KeepFirstEstimates();
+}
+
+/// The values of stationary blocks that have none noted yet.
+void FilterState::KeepFirstEstimates() {
+  first_estimates.resize(binding->system.layout.blocks().size());
+  for (const MotionBinding& motion : binding->system.motions) {
+    if (!motion.model.stationary()) continue;
+    for (const BlockId id : motion.blocks) {
+      const Block& block = state.layout()[id];
+      std::vector<double>& first = first_estimates[static_cast<std::size_t>(id)];
+      if (!block.has_covariance() || !first.empty()) continue;
+      first.assign(state.value(id), state.value(id) + block.geometry().ambient);
+    }
+  }
+}
+
+Event& FilterState::Note(const char* kind, std::string text) {
+  report.events.push_back({timestamp, kind, std::move(text)});
+  return report.events.back();
+}
+
+void FilterState::NoteDivergence(const char* kind, std::string text) {
+  diverged = true;
+  Note(kind, std::move(text)).divergence = true;
+}
+
+void FilterState::NotePluginFailure(const SensorBinding& sensor) {
+  Note("plugin_failed", "sensor '" + sensor.name + "': " + sensor.model.error_text());
+}
+
+void FilterState::NoteRefusal(const Row& row, Outcome outcome) {
+  const SensorBinding& sensor = *row.binding;
+  if (outcome == Outcome::kFailed) NotePluginFailure(sensor);
+  const auto index = static_cast<std::size_t>(row.sensor);
+  // A landmark behind the camera, say, is no divergence.
+  if (outcome != Outcome::kOutOfDomain || row.on_landmark() || out_of_domain[index] != 0) return;
+  out_of_domain[index] = 1;
+  std::vector<BlockId> blocks;
+  for (const RoleBinding& role : sensor.roles) blocks.push_back(role.block);
+  NoteDivergence("diverged", "sensor '" + sensor.name + "' is not defined at " + Describe(blocks));
+}
+
+/// `block = value, ...` for the given blocks that have one.
+std::string FilterState::Describe(std::span<const BlockId> blocks) const {
+  std::string text;
+  for (const BlockId id : blocks) {
+    if (id < 0 || !state.layout()[id].present) continue;
+    const Block& block = state.layout()[id];
+    text += (text.empty() ? "" : ", ") + block.name + " =";
+    for (int i = 0; i < block.geometry().ambient; ++i) {
+      text += ' ' + RoundedText(state.value(id)[i], 6);
+    }
+  }
+  return text;
+}
+
+void FilterState::End(const char* kind, const std::string& what) {
+  ended = true;
+  std::vector<BlockId> all(binding->system.layout.blocks().size());
+  std::iota(all.begin(), all.end(), 0);
+  std::string text = what + "; last good state at " + SecondsText(timestamp) + ": " + Describe(all);
+  if (last_used.sensor >= 0) {
+    text += "; last measurement used: sensor '" +
+            binding->system.sensors[static_cast<std::size_t>(last_used.sensor)].name + "' at " +
+            SecondsText(last_used.timestamp) + ", z =";
+    for (const double z : last_used.z) text += ' ' + RoundedText(z, 6);
+  }
+  NoteDivergence(kind, text);
+}
+
+void FilterState::RecordUpdate(std::span<Row* const> rows, const double* gain) {
+  motions.EndInterval();
+  const int n = size();
+  for (const Row* row : rows) {
+    const double* const end = gain + n * row->report->dof;
+    if (row->model->has_landmark()) {  // its gain is not recorded
+      gain = end;
+      continue;
+    }
+    for (; gain != end; gain += n) {
+      for (const int i : gain_rows_) row->report->gain.push_back(gain[i]);
+    }
+  }
+  const Row& last = *rows.back();
+  last_used.sensor = last.sensor;
+  last_used.timestamp = last.measurement->timestamp;
+  last_used.z.assign(last.measurement->values.begin(), last.measurement->values.end());
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "alidade/filter/binding.h"
+#include "alidade/filter/estimator.h"
+#include "alidade/filter/motions.h"
+#include "alidade/filter/rows.h"
+#include "alidade/filter/workspace.h"
+#include "alidade/state/state.h"
+
+namespace alidade::internal {
+
+/// What the parts of a filter share: x and P, what moved them last, and what there is to say of it.
+/// Has no pointer into itself: a copy is a snapshot.
+struct FilterState {
+  FilterState(std::shared_ptr<const Binding> of, bool keeps_first_estimates);
+
+  const SensorBinding& sensor(const Row& row) const { return *row.binding; }
+  int size() const { return state.covariance().size(); }  ///< n
+
+  /// Has to be called when a block of the system gets its first value.
+  void Activate();
+
+  /// An event of this time.
+  Event& Note(const char* kind, std::string text);
+  /// One by which the filter counts as diverged.
+  void NoteDivergence(const char* kind, std::string text);
+  /// Tells why h of a row could not be had; outside its domain, once until the sensor is accepted
+  /// again.
+  void NoteRefusal(const Row& row, Outcome outcome);
+  void NotePluginFailure(const SensorBinding& sensor);
+  /// Ends the filter: what happened, the state that is left, the measurement that led there.
+  void End(const char* kind, const std::string& what);
+  /// Takes an update down in the reports: the gain of all rows (n x m by columns, its rows as they
+  /// lie in P; null where no block has a covariance). Ends the interval of held noise.
+  void RecordUpdate(std::span<Row* const> rows, const double* gain);
+
+  std::shared_ptr<const Binding> binding;
+  State state;
+  Timestamp timestamp = kNoTimestamp;  ///< of the state
+  Motions motions;
+  /// By block of the system: the value that H is taken at, in place of the latest; empty: none.
+  std::vector<std::vector<double>> first_estimates;
+  UpdateReport report;              ///< of the frame
+  int activations = 0;              ///< calls of Activate
+  bool waiting = false;             ///< a block of the system has no value yet
+  bool considering = false;         ///< one is a consider state
+  std::vector<char> out_of_domain;  ///< by sensor: said since its last acceptance
+  bool diverged = false, ended = false;
+  /// The last accepted measurement.
+  struct {
+    int sensor = -1;
+    Timestamp timestamp = kNoTimestamp;
+    std::vector<double> z;
+  } last_used;
+  Scratch<Workspace> work;
+  Scratch<std::vector<double>> moved;         ///< values on the way to x
+  Scratch<std::vector<const double*>> roles;  ///< of the row that is evaluated
+  Scratch<std::vector<double*>> jacobians;    ///< of the same
+
+ private:
+  std::string Describe(std::span<const BlockId> blocks) const;
+  void KeepFirstEstimates();
+
+  bool keeps_first_estimates_;
+  /// Rows of P of the system's blocks that have a value; empty: all rows of P.
+  std::vector<int> gain_rows_;
+};
+
+}  // namespace alidade::internal

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/filter/first_values.h"
+
+#include <algorithm>
+
+#include "alidade/filter/evaluate_models.h"
+
+namespace alidade::internal {
+namespace {
+
+bool IsMissing(const FilterState& f, const RoleBinding& role) {
+  return role.block >= 0 && !f.state.layout()[role.block].present;
+}
+
+/// Whether a row measures the one block that its sensor misses, and which starts from that sensor.
+bool IsAwaited(const FilterState& f, const Row& row) {
+  const SensorBinding& sensor = *row.binding;
+  const int index = sensor.model.initialised_role();
+  if (row.report->outcome != Outcome::kAccepted || index < 0) return false;
+  const RoleBinding& target = sensor.roles[static_cast<std::size_t>(index)];
+  const auto missing = [&](const RoleBinding& role) { return IsMissing(f, role); };
+  const auto waits = [&](const Prior& prior) {
+    return prior.block == target.block && prior.from == sensor.name;
+  };
+  return missing(target) && std::ranges::count_if(sensor.roles, missing) == 1 &&
+         std::ranges::any_of(f.binding->system.priors, waits);
+}
+
+}  // namespace
+
+bool IsReady(const FilterState& f, const Row& row) {
+  return std::ranges::none_of(row.binding->roles,
+                              [&](const RoleBinding& role) { return IsMissing(f, role); });
+}
+
+void InitialiseWaiting(FilterState& f, std::span<Row> rows) {
+  for (bool progress = true; progress;) {
+    progress = false;
+    for (Row& row : rows) {
+      if (!IsAwaited(f, row)) continue;
+      row.report->outcome = InitialiseBlock(f, row);
+      progress = progress || row.report->outcome == Outcome::kInitialised;
+    }
+  }
+  for (const Row& row : rows) {
+    Outcome& outcome = row.report->outcome;
+    if (outcome == Outcome::kAccepted && !IsReady(f, row)) outcome = Outcome::kNotReady;
+  }
+}
+
+Outcome InitialiseBlock(FilterState& f, Row& row) {
+  const SensorBinding& sensor = *row.binding;
+  const BlockId id = sensor.roles[static_cast<std::size_t>(sensor.model.initialised_role())].block;
+  Inverse inverse;
+  const Outcome outcome = Invert(f, row, nullptr, inverse);
+  if (outcome != Outcome::kAccepted) return outcome;
+  f.state.Initialise(id, inverse.y.data(), inverse.from, inverse.jacobians, inverse.own);
+  if (!f.first_estimates.empty()) f.first_estimates[static_cast<std::size_t>(id)].clear();
+  f.Activate();
+  f.motions.EndInterval();
+  return Outcome::kInitialised;
+}
+
+}  // namespace alidade::internal

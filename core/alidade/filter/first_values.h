@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+
+#include "alidade/filter/filter_state.h"
+
+/// Blocks that take their value from a measurement, by the inverse measurement model.
+namespace alidade::internal {
+
+/// Whether all blocks that a row's sensor is bound to have a value.
+bool IsReady(const FilterState& f, const Row& row);
+
+/// Initialises the blocks that wait for one of these measurements, each consuming its measurement;
+/// what then still needs a block without a value is not ready.
+void InitialiseWaiting(FilterState& f, std::span<Row> rows);
+
+/// Gives the block of the sensor's initialised role the value that the measurement implies, with
+/// its covariance and correlations, in place of any that it has. kInitialised, or why not.
+Outcome InitialiseBlock(FilterState& f, Row& row);
+
+}  // namespace alidade::internal

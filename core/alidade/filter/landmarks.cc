@@ -1,0 +1,406 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/filter/landmarks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "alidade/base/error.h"
+#include "alidade/filter/first_values.h"
+#include "alidade/system/landmark_representation.h"
+
+namespace alidade::internal {
+namespace {
+
+/// A landmark that waits for its initialisation is no more counted after so many frames without it.
+constexpr int kWaitingFrames = 30;
+
+/// The role of a landmark that is a point, m.
+Space Xyz() {
+  return {"landmark", "m", "", {"x", "y", "z"}, Geometry::Vector(3), ALIDADE_ROLE_LANDMARK};
+}
+
+bool IsUsed(const Row& row) { return row.report->outcome == Outcome::kAccepted; }
+
+std::vector<const double*> ValuesOf(const State& state, const LandmarkRecord& landmark) {
+  std::vector<const double*> values;
+  for (const BlockId id : landmark.blocks) values.push_back(state.value(id));
+  return values;
+}
+
+bool HasInverseDistance(const LandmarkRecord& landmark) {
+  return landmark.in_state() && landmark.representation && !IsXyz(*landmark.representation);
+}
+
+/// The last element of all that has one.
+double InverseDistance(const State& state, const LandmarkRecord& landmark) {
+  const BlockId last = landmark.blocks.back();
+  return state.value(last)[state.layout()[last].geometry().ambient - 1];
+}
+
+double InverseDistanceSigma(const State& state, const LandmarkRecord& landmark) {
+  const Block& last = state.layout()[landmark.blocks.back()];
+  const int row = last.tangent_offset + last.geometry().tangent - 1;
+  return std::sqrt(state.covariance().Variance(row));
+}
+
+double LinearityIndexOf(const State& state, const LandmarkRecord& landmark, const double* camera) {
+  return LinearityOf(*landmark.representation, ValuesOf(state, landmark).data(),
+                     InverseDistanceSigma(state, landmark), camera);
+}
+
+/// J P J' of the blocks of a landmark.
+Eigen::Matrix3d CovarianceOf(const State& state, const LandmarkRecord& landmark,
+                             const Eigen::Matrix<double, 3, Eigen::Dynamic>& jacobian) {
+  std::vector<JacobianBlock> parts;
+  Eigen::Index column = 0;
+  for (const BlockId id : landmark.blocks) {
+    const Block& block = state.layout()[id];
+    const int size = block.geometry().tangent;
+    if (block.has_covariance()) {
+      parts.push_back({block.tangent_offset, jacobian.middleCols(column, size)});
+    }
+    column += size;
+  }
+  return Times(parts, 3, state.covariance().TimesTransposed(parts, 3));
+}
+
+}  // namespace
+
+int Generations::Of(std::int64_t id) const {
+  const auto found = of_.find(id);
+  return found == of_.end() ? 0 : found->second;
+}
+
+void Generations::End(std::int64_t id, int generation) {
+  constexpr std::size_t kMost = 100'000;
+  log_.emplace_back(id, of_[id] = generation);
+  if (log_.size() <= kMost) return;
+  const auto [oldest, its] = log_.front();
+  log_.pop_front();
+  const auto found = of_.find(oldest);
+  if (found != of_.end() && found->second == its) of_.erase(found);
+}
+
+Landmarks::Landmarks(const Binding& binding) : options_(*binding.system.landmarks) {
+  for (const SensorBinding& sensor : binding.system.sensors) {
+    Family& family = families_.emplace_back();
+    const std::vector<Space>& roles = sensor.model.roles();
+    family.representation = RepresentationOf(roles);
+    for (std::size_t i = 0; i < roles.size(); ++i) {
+      if (roles[i].name == "position") family.position = static_cast<int>(i);
+      ALIDADE_EXPECTS(roles[i].landmark() || family.first < 0);
+      if (!roles[i].landmark()) continue;
+      if (family.first < 0) family.first = static_cast<int>(i);
+      family.roles.push_back(roles[i]);
+    }
+    ALIDADE_EXPECTS(family.first < 0 || sensor.model.prior_size() == 0 ||
+                    (options_.prior && std::isfinite(options_.prior->inverse_distance) &&
+                     options_.prior->sigma >= 0.0));
+    ALIDADE_EXPECTS(family.first < 0 || sensor.model.prior_size() <= 1);
+    ALIDADE_EXPECTS(family.first < 0 || family.representation == XyzRepresentation() ||
+                    sensor.xyz ||
+                    (options_.known.empty() && !(options_.max_linearity_index > 0.0)));
+  }
+}
+
+BlockId Landmarks::Declare(FilterState& f, std::int64_t id, const Space& role, BlockStatus status) {
+  const std::string name = "landmarks." + std::to_string(id) + '.' + role.name;
+  return f.state.Declare(name + '#' + std::to_string(names_++), "landmarks", role, status);
+}
+
+void Landmarks::AddKnown(FilterState& f) {
+  for (const KnownLandmark& known : options_.known) {
+    LandmarkRecord& landmark = landmarks_[known.id];
+    landmark.representation = XyzRepresentation();
+    landmark.known = true;
+    landmark.blocks = {Declare(
+        f, known.id, Xyz(), known.sigma > 0.0 ? BlockStatus::kEstimated : BlockStatus::kConstant)};
+    f.state.Add(landmark.blocks[0], known.position.data(),
+                known.sigma * known.sigma * Eigen::Matrix3d::Identity());
+  }
+}
+
+const double* Landmarks::CameraOf(const State& state, const Row& row) const {
+  const int position = FamilyOf(row).position;
+  if (position < 0) return nullptr;
+  const BlockId id = row.binding->roles[static_cast<std::size_t>(position)].block;
+  return id < 0 ? nullptr : state.value(id);
+}
+
+void Landmarks::Attach(FilterState& f, std::span<Row> rows) {
+  bool any = false;
+  for (Row& row : rows) {
+    if (!Has(row)) continue;
+    any = true;
+    Outcome& outcome = row.report->outcome;
+    if (outcome != Outcome::kAccepted) continue;
+    const auto found = landmarks_.find(row.measurement->landmark);
+    if (row.measurement->landmark < 0) {
+      outcome = Outcome::kInvalid;
+    } else if (found != landmarks_.end() && found->second.in_state()) {
+      Attach(f, row, found->second);
+    } else {
+      outcome = Outcome::kNotReady;
+    }
+  }
+  if (any) ++frame_;
+}
+
+/// Puts the blocks of the landmark into the row's last roles.
+void Landmarks::Attach(const FilterState& f, Row& row, const LandmarkRecord& landmark) {
+  const Family& family = FamilyOf(row);
+  const auto first = static_cast<std::size_t>(family.first);
+  row.own = *row.place;
+  row.own.values.resize(first);
+  row.own.columns.resize(first);
+  for (const BlockId id : landmark.blocks) row.own.Add(f.state.layout()[id], true, false);
+  row.own.strides.assign(row.own.values.size(), row.own.width);
+  row.place = &row.own;
+  if (landmark.representation != family.representation) row.model = &*row.binding->xyz;
+}
+
+void Landmarks::KeepHouse(FilterState& f, std::span<Row> rows) {
+  Count(f, rows);
+  CheckDepths(f);
+  Prune(f);
+  Convert(f, rows);
+  InitialiseNew(f, rows);
+}
+
+/// Takes down which landmarks were seen, and what became of their measurements.
+void Landmarks::Count(FilterState& f, std::span<Row> rows) {
+  for (const Row& row : rows) {
+    if (!Has(row) || (!row.on_landmark() && row.report->outcome != Outcome::kNotReady)) continue;
+    if (!IsReady(f, row)) continue;
+    const auto [at, is_new] = landmarks_.try_emplace(row.measurement->landmark);
+    LandmarkRecord& landmark = at->second;
+    if (is_new) landmark.generation = generations_.Of(at->first);
+    if (landmark.first == kNoTimestamp) landmark.first = f.timestamp;
+    if (landmark.observations == 0 || landmark.seen != frame_) ++landmark.observations;
+    landmark.seen = frame_;
+    landmark.last = f.timestamp;
+    if (!row.on_landmark()) continue;
+    ++landmark.tried;
+    landmark.accepted += IsUsed(row);
+  }
+}
+
+/// Looks for inverse distances that an update left at zero or below.
+void Landmarks::CheckDepths(FilterState& f) {
+  for (auto at = landmarks_.begin(); at != landmarks_.end();) {
+    LandmarkRecord& landmark = at->second;
+    const bool negative =
+        HasInverseDistance(landmark) && !(InverseDistance(f.state, landmark) > 0.0);
+    f.report.landmarks.negative += negative && !landmark.negative;
+    landmark.negative = negative;
+    if (negative && options_.negative_depth == LandmarkOptions::NegativeDepth::kDelete) {
+      at = Delete(f, at);
+    } else {
+      ++at;
+    }
+  }
+}
+
+/// Drops what was not seen for long, or fails too often. Known landmarks stay.
+void Landmarks::Prune(FilterState& f) {
+  for (auto at = landmarks_.begin(); at != landmarks_.end();) {
+    const LandmarkRecord& landmark = at->second;
+    const std::int64_t unseen = frame_ - landmark.seen;
+    const int most = landmark.in_state() ? options_.max_missed_frames : kWaitingFrames;
+    const bool lost = most > 0 && unseen >= most;
+    const bool fails = landmark.tried >= options_.min_attempts &&
+                       landmark.accepted < options_.min_match_ratio * landmark.tried;
+    if ((lost || fails) && !landmark.known) {
+      at = Delete(f, at);
+    } else {
+      ++at;
+    }
+  }
+}
+
+Landmarks::ById::iterator Landmarks::Delete(FilterState& f, ById::iterator at) {
+  if (at->second.in_state()) {
+    DropBlocks(f, at->second);
+    ++f.report.landmarks.deleted;
+    generations_.End(at->first, at->second.generation + 1);
+  }
+  return landmarks_.erase(at);
+}
+
+/// A shared block goes with the last landmark on it.
+void Landmarks::DropBlocks(FilterState& f, LandmarkRecord& landmark) {
+  for (const BlockId id : landmark.blocks) {
+    const auto shared = users_.find(id);
+    if (shared != users_.end() && --shared->second > 0) continue;
+    if (shared != users_.end()) users_.erase(shared);
+    f.state.Drop(id);
+  }
+  landmark.blocks.clear();
+  f.motions.EndInterval();
+}
+
+/// Turns those landmarks of the frame into xyz that are linear enough.
+void Landmarks::Convert(FilterState& f, std::span<Row> rows) {
+  if (!(options_.max_linearity_index > 0.0)) return;
+  for (const Row& row : rows) {
+    if (!row.on_landmark() || row.model != &row.binding->model || !IsUsed(row)) continue;
+    const auto found = landmarks_.find(row.measurement->landmark);
+    if (found == landmarks_.end() || !found->second.in_state()) continue;
+    f.report.landmarks.converted += ConvertToXyz(f, found->first, found->second, row);
+  }
+}
+
+bool Landmarks::ConvertToXyz(FilterState& f, std::int64_t id, LandmarkRecord& landmark,
+                             const Row& row) {
+  const double* const camera = CameraOf(f.state, row);
+  if (!HasInverseDistance(landmark) || camera == nullptr) return false;
+  const double linearity = LinearityIndexOf(f.state, landmark, camera);
+  const auto point = PointOf(*landmark.representation, ValuesOf(f.state, landmark).data());
+  if (!point || !(linearity < options_.max_linearity_index)) return false;
+  std::vector<Eigen::MatrixXd> jacobians;
+  Eigen::Index column = 0;
+  for (const BlockId block : landmark.blocks) {
+    const int size = f.state.layout()[block].geometry().tangent;
+    jacobians.emplace_back(point->jacobian.middleCols(column, size));
+    column += size;
+  }
+  const BlockId to = Declare(f, id, Xyz(), BlockStatus::kEstimated);
+  f.state.Initialise(to, point->position.data(), landmark.blocks, jacobians,
+                     Eigen::Matrix3d::Zero());
+  DropBlocks(f, landmark);
+  landmark.blocks = {to};
+  landmark.representation = XyzRepresentation();
+  return true;
+}
+
+/// Initialises landmarks of this frame that wait, as long as too few are measured.
+void Landmarks::InitialiseNew(FilterState& f, std::span<Row> rows) {
+  const std::vector<const Row*> used = MeasuredOnce(rows);
+  auto measured = std::ssize(used);
+  for (Family& family : families_) family.shared.clear();
+  if (options_.prior) prior_ = *options_.prior;
+  bool asked_map = prior_.adapt_after == 0;
+  for (Row& row : rows) {
+    if (measured >= options_.max_per_frame) return;
+    if (!Has(row) || row.report->outcome != Outcome::kNotReady || !IsReady(f, row) ||
+        row.binding->model.initialised_role() != FamilyOf(row).first) {
+      continue;
+    }
+    const auto found = landmarks_.find(row.measurement->landmark);
+    if (found == landmarks_.end() || found->second.in_state() ||
+        found->second.observations < options_.min_observations) {
+      continue;
+    }
+    if (!asked_map) prior_.inverse_distance = PriorInverseDistance(f.state, used);
+    asked_map = true;
+    row.report->outcome = Initialise(f, found->first, row, found->second);
+    if (row.report->outcome != Outcome::kInitialised) continue;
+    ++f.report.landmarks.initialised;
+    ++measured;
+  }
+}
+
+/// A row that was used of each landmark in the state, by id.
+std::vector<const Row*> Landmarks::MeasuredOnce(std::span<Row> rows) const {
+  std::vector<const Row*> used;
+  for (const Row& row : rows) {
+    if (!row.on_landmark() || !IsUsed(row)) continue;
+    const auto found = landmarks_.find(row.measurement->landmark);
+    if (found != landmarks_.end() && found->second.in_state()) used.push_back(&row);
+  }
+  const auto id = [](const Row* row) { return row->measurement->landmark; };
+  std::ranges::stable_sort(used, {}, id);
+  const auto same = [&](const Row* a, const Row* b) { return id(a) == id(b); };
+  used.erase(std::unique(used.begin(), used.end(), same), used.end());
+  return used;
+}
+
+/// The median of the converged inverse distances among landmarks that were measured, where there
+/// are enough; else the prior's.
+double Landmarks::PriorInverseDistance(const State& state,
+                                       std::span<const Row* const> measured) const {
+  constexpr double kConverged = 0.1;  // of the index of linearity, where nothing is converted
+  const double limit =
+      options_.max_linearity_index > 0.0 ? options_.max_linearity_index : kConverged;
+  std::vector<double> converged;
+  for (const Row* const row : measured) {
+    const double* const camera = CameraOf(state, *row);
+    const LandmarkRecord& landmark = landmarks_.at(row->measurement->landmark);
+    if (camera == nullptr || !landmark.representation) continue;
+    if (HasInverseDistance(landmark) && !(LinearityIndexOf(state, landmark, camera) < limit))
+      continue;
+    const auto point = PointOf(*landmark.representation, ValuesOf(state, landmark).data());
+    const Eigen::Map<const Eigen::Vector3d> r(camera);
+    if (point) converged.push_back(1.0 / (point->position - r).norm());
+  }
+  if (converged.empty() || std::ssize(converged) < options_.prior->adapt_after) {
+    return options_.prior->inverse_distance;
+  }
+  const auto middle = converged.begin() + std::ssize(converged) / 2;
+  std::ranges::nth_element(converged, middle);
+  return *middle;
+}
+
+/// Gives the landmark its blocks, correlated with those that the observation took. Of a shared role
+/// the first landmark of the frame makes the block, and the others of the same sensor take it.
+Outcome Landmarks::Initialise(FilterState& f, std::int64_t id, Row& row, LandmarkRecord& landmark) {
+  Family& family = families_[static_cast<std::size_t>(row.sensor)];
+  Inverse inverse;
+  const Outcome outcome = Invert(f, row, options_.prior ? &prior_ : nullptr, inverse);
+  if (outcome != Outcome::kAccepted) return outcome;
+  std::vector<BlockId> fresh;
+  std::vector<double> values;
+  std::vector<int> kept;  // rows of y
+  const double* y = inverse.y.data();
+  int at = 0;
+  for (std::size_t i = 0; i < family.roles.size(); ++i) {
+    const Space& role = family.roles[i];
+    const auto shared = family.shared.find(i);
+    if (shared != family.shared.end()) {
+      landmark.blocks.push_back(shared->second);
+    } else {
+      fresh.push_back(Declare(f, id, role, BlockStatus::kEstimated));
+      landmark.blocks.push_back(fresh.back());
+      values.insert(values.end(), y, y + role.geometry.ambient);
+      for (int k = 0; k < role.geometry.tangent; ++k) kept.push_back(at + k);
+      if (role.shared()) family.shared[i] = fresh.back();
+    }
+    if (role.shared()) ++users_[landmark.blocks.back()];
+    y += role.geometry.ambient;
+    at += role.geometry.tangent;
+  }
+  std::vector<Eigen::MatrixXd> jacobians;
+  for (const Eigen::MatrixXd& j : inverse.jacobians) jacobians.emplace_back(j(kept, Eigen::all));
+  f.state.Initialise(fresh, values.data(), inverse.from, jacobians, inverse.own(kept, kept));
+  landmark.representation = family.representation;
+  f.motions.EndInterval();
+  return Outcome::kInitialised;
+}
+
+std::vector<LandmarkEstimate> Landmarks::Estimates(const State& state) const {
+  std::vector<LandmarkEstimate> estimates;
+  for (const auto& [id, landmark] : landmarks_) {
+    if (!landmark.in_state()) continue;
+    LandmarkEstimate& one = estimates.emplace_back();
+    one.id = id;
+    one.generation = landmark.generation;
+    one.representation = landmark.representation;
+    one.first = landmark.first;
+    one.last = landmark.last;
+    one.tried = landmark.tried;
+    one.accepted = landmark.accepted;
+    if (HasInverseDistance(landmark)) {
+      one.inverse_distance = InverseDistance(state, landmark);
+      one.sigma = InverseDistanceSigma(state, landmark);
+    }
+    if (!landmark.representation) continue;
+    const auto point = PointOf(*landmark.representation, ValuesOf(state, landmark).data());
+    if (!point) continue;
+    one.position = point->position;
+    one.covariance = CovarianceOf(state, landmark, point->jacobian);
+  }
+  return estimates;
+}
+
+}  // namespace alidade::internal

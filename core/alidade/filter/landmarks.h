@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <deque>
+#include <map>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "alidade/filter/evaluate_models.h"
+#include "alidade/filter/filter_state.h"
+#include "alidade/system/landmarks.h"
+
+namespace alidade::internal {
+
+/// How many landmarks of an id have ended, over the newest 100 000 ends.
+class Generations {
+ public:
+  int Of(std::int64_t id) const;
+  void End(std::int64_t id, int generation);
+
+ private:
+  std::deque<std::pair<std::int64_t, int>> log_;  ///< id, its ended generations then
+  std::map<std::int64_t, int> of_;
+};
+
+/// One landmark, in the state or waiting for it.
+struct LandmarkRecord {
+  std::optional<LandmarkRepresentation> representation;
+  std::vector<BlockId> blocks;  ///< by landmark role; empty: seen, but not in the state yet
+  int generation = 0, observations = 0, tried = 0, accepted = 0;
+  std::int64_t seen = 0;  ///< the last frame that measured it
+  Timestamp first = kNoTimestamp, last = kNoTimestamp;
+  bool negative = false;  ///< its inverse distance is
+  bool known = false;     ///< from the config: never pruned
+  bool in_state() const { return !blocks.empty(); }
+};
+
+/// The landmarks of a filter: finds them for the measurements of a frame, and initialises, converts
+/// and prunes them after its update. A copy is a snapshot.
+class Landmarks {
+ public:
+  /// Of a system that has landmarks.
+  explicit Landmarks(const Binding& binding);
+
+  /// Puts the known landmarks into the state, once.
+  void AddKnown(FilterState& f);
+  /// Gives the rows of landmarks in the state their places; the others are not ready.
+  void Attach(FilterState& f, std::span<Row> rows);
+  /// After the updates with those rows.
+  void KeepHouse(FilterState& f, std::span<Row> rows);
+
+  std::vector<LandmarkEstimate> Estimates(const State& state) const;
+  /// Frames with a measurement of a landmark.
+  std::int64_t frame() const { return frame_; }
+
+ private:
+  using ById = std::map<std::int64_t, LandmarkRecord>;
+  /// How a sensor sees landmarks.
+  struct Family {
+    int first = -1;     ///< of its landmark roles, which come last; -1: it sees none
+    int position = -1;  ///< its role `position`, the camera's in the world
+    std::optional<LandmarkRepresentation> representation;
+    std::vector<Space> roles;               ///< the landmark's
+    std::map<std::size_t, BlockId> shared;  ///< by landmark role: blocks of this frame
+  };
+
+  bool Has(const Row& row) const { return FamilyOf(row).first >= 0; }
+  void Attach(const FilterState& f, Row& row, const LandmarkRecord& landmark);
+  void Count(FilterState& f, std::span<Row> rows);
+  void CheckDepths(FilterState& f);
+  void Prune(FilterState& f);
+  void Convert(FilterState& f, std::span<Row> rows);
+  bool ConvertToXyz(FilterState& f, std::int64_t id, LandmarkRecord& landmark, const Row& row);
+  void InitialiseNew(FilterState& f, std::span<Row> rows);
+  std::vector<const Row*> MeasuredOnce(std::span<Row> rows) const;
+  double PriorInverseDistance(const State& state, std::span<const Row* const> measured) const;
+  Outcome Initialise(FilterState& f, std::int64_t id, Row& row, LandmarkRecord& landmark);
+  void DropBlocks(FilterState& f, LandmarkRecord& landmark);
+  ById::iterator Delete(FilterState& f, ById::iterator at);
+  BlockId Declare(FilterState& f, std::int64_t id, const Space& role, BlockStatus status);
+  const double* CameraOf(const State& state, const Row& row) const;
+  const Family& FamilyOf(const Row& row) const {
+    return families_[static_cast<std::size_t>(row.sensor)];
+  }
+
+  LandmarkOptions options_;
+  std::vector<Family> families_;  ///< by sensor
+  ById landmarks_;                ///< by the id of the measurements
+  std::map<BlockId, int> users_;  ///< of a shared block: landmarks on it
+  std::int64_t frame_ = 0;        ///< frames with a measurement of a landmark
+  std::int64_t names_ = 0;        ///< blocks named so far
+  Generations generations_;
+  LandmarkOptions::Prior prior_;  ///< of what is initialised in this frame
+};
+
+}  // namespace alidade::internal

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "alidade/filter/method.h"
+
+namespace alidade::internal {
+
+/// The extended Kalman filter's: everything by Jacobians, P dense.
+///
+///   step      x' = f(x, u, 0),   P <- F P F' + G Q G'
+///   predict   h, H at x,   S = H P H' + R
+///   correct   S = L L',   W = P H' L^-T,   dx = W L^-1 r,   P -= W W'
+///
+/// The gain of a consider block is 0 (Schmidt): P += E E', E = (K - K*) L of the optimal gain K*.
+/// Where digits would cancel, Joseph's form takes the place of both.
+class Linear : public Method {
+ public:
+  std::unique_ptr<Method> Clone() const override { return std::make_unique<Linear>(*this); }
+  Trouble Step(FilterState& f, double dt_s) override;
+  Outcome Predict(FilterState& f, Row& row) override;
+  Outcome Correct(FilterState& f, std::span<Row* const> rows) override {
+    return CorrectBy(f, rows, nullptr);
+  }
+
+  /// The first part of Predict: h, H, R and the innovation at x.
+  Outcome See(FilterState& f, Row& row);
+  /// The second: P H' and S of a row that has H and R.
+  static void Project(FilterState& f, Row& row);
+  /// As Correct, with x (+) dx in place of x (+) K r; null: K r.
+  Outcome CorrectBy(FilterState& f, std::span<Row* const> rows, const double* dx);
+
+ private:
+  Outcome SeeAtState(FilterState& f, Row& row);
+  bool FindLinearisation(const FilterState& f, const Row& row);
+  Outcome LineariseElsewhere(FilterState& f, Row& row);
+  Outcome CorrectSmall(FilterState& f, std::span<Row* const> rows, const double* dx);
+  Outcome CorrectLarge(FilterState& f, std::span<Row* const> rows, const double* dx);
+
+  // Memory that is kept from row to row.
+  std::vector<const double*> at_;  ///< what fills the roles where H is taken
+  std::vector<double> implied_;    ///< of the role that is linearised at what z implies
+  std::vector<double> predicted_;
+};
+
+}  // namespace alidade::internal

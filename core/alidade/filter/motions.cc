@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/filter/motions.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/filter/estimator.h"
+#include "alidade/state/small_kernels.h"
+
+namespace alidade::internal {
+
+Motions::Motions(const Binding& binding)
+    : binding_(&binding),
+      steps_(binding.system.motions.size()),
+      next_(binding.initial.values().size()) {
+  for (std::size_t i = 0; i < steps_.size(); ++i) {
+    const MotionModel& model = binding.system.motions[i].model;
+    const auto n = static_cast<std::size_t>(model.tangent_size());
+    const auto n_w = static_cast<std::size_t>(model.noise_size());
+    Step& step = steps_[i];
+    step.f.resize(n * n);
+    step.g.resize(n * n_w);
+    step.l.resize(n_w * n_w);
+    step.gl.resize(n * n_w);
+    step.q.resize(n * n);
+    if (binding.motions[i].holds) step.m.resize(n * n_w);
+  }
+}
+
+void Motions::Activate(const StateLayout& layout) {
+  holds_ = false;
+  for (std::size_t i = 0; i < steps_.size(); ++i) {
+    const MotionBinding& motion = binding_->system.motions[i];
+    steps_[i].active =
+        !motion.model.stationary() &&
+        std::ranges::all_of(motion.blocks, [&](BlockId id) { return layout[id].present; });
+    holds_ = holds_ || (steps_[i].active && binding_->motions[i].holds);
+  }
+}
+
+Trouble Motions::Evaluate(const State& state, double dt_s, bool derivatives) {
+  for (std::size_t i = 0; i < steps_.size(); ++i) {
+    if (!steps_[i].active) continue;
+    if (Trouble trouble = EvaluateOne(i, state, dt_s, derivatives)) return trouble;
+  }
+  return {};
+}
+
+Trouble Motions::EvaluateOne(std::size_t i, const State& state, double dt_s, bool derivatives) {
+  const MotionBinding& motion = binding_->system.motions[i];
+  const MotionPlace& place = binding_->motions[i];
+  Step& step = steps_[i];
+  const double unwritten = std::nan("");
+  const bool goes_on = place.holds && in_interval();
+  if (goes_on && interval_steps_ == 1) step.m = step.gl;
+  std::ranges::fill(step.f, unwritten);
+  std::ranges::fill(step.g, unwritten);
+  if (!goes_on) std::ranges::fill(step.l, unwritten);
+  x_.clear();
+  to_.clear();
+  for (std::size_t k = 0; k < motion.blocks.size(); ++k) {
+    x_.push_back(state.values().data() + place.values[k]);
+    to_.push_back(next_.data() + place.values[k]);
+    std::fill_n(to_.back(), state.layout()[motion.blocks[k]].geometry().ambient, unwritten);
+  }
+  Status status = motion.model.Step(x_.data(), step.u, nullptr, dt_s, to_.data(),
+                                    derivatives ? step.f.data() : nullptr,
+                                    derivatives ? step.g.data() : nullptr);
+  if (status == Status::kOk && !goes_on) {
+    status = motion.model.SqrtQ(x_.data(), dt_s, step.l.data());
+  }
+  if (status != Status::kOk) {
+    return {status == Status::kError ? "plugin_failed" : "diverged",
+            "motion model of '" + motion.name + "' cannot step: " +
+                (status == Status::kError ? motion.model.error_text() : "out of its domain")};
+  }
+  bool finite = AllFinite(step.l);
+  if (derivatives) {
+    SpreadNoise(step.g.data(), step.l.data(), motion.model.tangent_size(),
+                motion.model.noise_size(), step.gl.data(), step.q.data());
+    if (goes_on) {
+      CarryHeld(motion.model, place, step);
+    } else if (place.holds) {
+      step.m = step.gl;
+    }
+    finite = finite && AllFinite(step.f) && AllFinite(step.q);
+  }
+  for (std::size_t k = 0; k < motion.blocks.size(); ++k) {
+    const auto size = static_cast<std::size_t>(state.layout()[motion.blocks[k]].geometry().ambient);
+    finite = finite && AllFinite({to_[k], size});
+  }
+  if (finite) return {};
+  return {"not_finite",
+          "motion model of '" + motion.name + "' steps to a state that is not finite"};
+}
+
+/// With A = F M and N = G Lq: q <- N N' + A N' + N A' (its lower triangle), M <- A + N. Blocks
+/// without a covariance have no M.
+void Motions::CarryHeld(const MotionModel& model, const MotionPlace& place, Step& step) {
+  const Workspace::Use use(memory_);
+  const Eigen::Index n = model.tangent_size(), w = model.noise_size();
+  const Eigen::Map<const RowMajor> f(step.f.data(), n, n), input(step.gl.data(), n, w);
+  Eigen::Map<RowMajor> m(step.m.data(), n, w), q(step.q.data(), n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (place.at[static_cast<std::size_t>(i)] < 0) m.row(i).setZero();
+  }
+  Workspace::Matrix moved = memory_.Take(n, w), both = memory_.Take(n, n);
+  moved.noalias() = f * m;
+  both.noalias() = moved * input.transpose();
+  q.triangularView<Eigen::Lower>() += both;
+  q.triangularView<Eigen::Lower>() += both.transpose();
+  m = moved + input;
+}
+
+bool Motions::Apply(State& state) const {
+  Covariance& p = state.covariance();
+  if (IsBounded(p)) {
+    Propagate(p);
+  } else {
+    const Covariance before = p;
+    Propagate(p);
+    if (!p.Dense().allFinite()) {
+      p = before;
+      return false;
+    }
+  }
+  for (std::size_t i = 0; i < steps_.size(); ++i) {
+    if (!steps_[i].active) continue;
+    for (const BlockId id : binding_->system.motions[i].blocks) {
+      const Block& block = state.layout()[id];
+      if (block.status == BlockStatus::kConstant) continue;
+      const Geometry& geometry = block.geometry();
+      std::copy_n(next_.data() + block.value_offset, geometry.ambient, state.value(id));
+      if (geometry.kind != GeometryKind::kVector) geometry.Normalise(state.value(id));
+    }
+  }
+  return true;
+}
+
+/// Whether no F P F' + Q of this step can overflow, by |F P F'|_ij <= (n max|F|)^2 max|P|.
+bool Motions::IsBounded(const Covariance& covariance) const {
+  constexpr double kSafe = 1e300;
+  double f = 1.0, q = 0.0, p = 0.0;
+  for (const Step& step : steps_) {
+    if (!step.active) continue;
+    for (const double value : step.f) f = std::max(f, std::abs(value));
+    for (const double value : step.q) q = std::max(q, std::abs(value));
+  }
+  const int n = covariance.size();
+  for (int i = 0; i < n; ++i) p = std::max(p, covariance.Variance(i));
+  const double sum = f * n;
+  return sum * sum * p + q <= kSafe;
+}
+
+void Motions::Propagate(Covariance& p) const {
+  for (std::size_t i = 0; i < steps_.size(); ++i) {
+    const Step& step = steps_[i];
+    const MotionPlace& place = binding_->motions[i];
+    if (!step.active || place.segments.empty()) continue;
+    if (place.rows.empty() && place.segments.size() == 1) {
+      p.Propagate(place.segments[0].first, place.segments[0].second, step.f.data(), step.q.data());
+      continue;
+    }
+    const Eigen::Index n = binding_->system.motions[i].model.tangent_size();
+    const Eigen::Map<const RowMajor> f(step.f.data(), n, n), q(step.q.data(), n, n);
+    if (place.rows.empty()) {
+      p.Propagate(place.segments, f, q);
+    } else {
+      p.Propagate(place.segments, f(place.rows, place.rows), q(place.rows, place.rows));
+    }
+  }
+}
+
+int Motions::noise_size() const {
+  int size = 0;
+  for (std::size_t i = 0; i < steps_.size(); ++i) {
+    if (steps_[i].active) size += binding_->system.motions[i].model.noise_size();
+  }
+  return size;
+}
+
+Workspace::Matrix Motions::Transition(int n, Workspace& work) const {
+  Workspace::Matrix transition = work.Take(n, n);
+  transition.setIdentity();
+  for (std::size_t i = 0; i < steps_.size(); ++i) {
+    if (!steps_[i].active) continue;
+    const double* f = steps_[i].f.data();
+    for (const int row : binding_->motions[i].at) {
+      for (const int column : binding_->motions[i].at) {
+        if (row >= 0 && column >= 0) transition(row, column) = *f;
+        ++f;
+      }
+    }
+  }
+  return transition;
+}
+
+/// A matrix of the steps (rows of F x n_w each) in the rows of P, next to one another; with
+/// `held_only` the columns of continuous noise are zero.
+Workspace::Matrix Motions::Spread(std::vector<double> Step::*matrix, bool held_only, int n,
+                                  Workspace& work) const {
+  Workspace::Matrix input = work.Take(n, noise_size());
+  input.setZero();
+  Eigen::Index columns = 0;
+  for (std::size_t i = 0; i < steps_.size(); ++i) {
+    const Step& step = steps_[i];
+    const MotionPlace& place = binding_->motions[i];
+    if (!step.active) continue;
+    const MotionModel& model = binding_->system.motions[i].model;
+    const Eigen::Index width = model.noise_size();
+    for (std::size_t row = 0; row < place.at.size() && (place.holds || !held_only); ++row) {
+      if (place.at[row] < 0) continue;
+      const Eigen::Map<const RowMajor> from((step.*matrix).data(), model.tangent_size(), width);
+      input.row(place.at[row]).segment(columns, width) = from.row(static_cast<Eigen::Index>(row));
+    }
+    columns += width;
+  }
+  return input;
+}
+
+Workspace::Matrix Motions::NoiseInput(int n, Workspace& work) const {
+  return Spread(&Step::gl, false, n, work);
+}
+Workspace::Matrix Motions::HeldInput(int n, Workspace& work) const {
+  return Spread(&Step::gl, true, n, work);
+}
+Workspace::Matrix Motions::HeldNoise(int n, Workspace& work) const {
+  return Spread(&Step::m, true, n, work);
+}
+
+}  // namespace alidade::internal

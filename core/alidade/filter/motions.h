@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "alidade/filter/binding.h"
+#include "alidade/filter/workspace.h"
+
+namespace alidade::internal {
+
+/// Why a step cannot be done; empty where it can.
+struct Trouble {
+  const char* kind = nullptr;  ///< of the event
+  std::string text;
+  explicit operator bool() const { return kind != nullptr; }
+};
+
+/// What the motion models of a system make of the state over one step: x', F and G Lq.
+///
+/// Discrete noise w ~ N(0, I) is held over an interval, which ends with whatever changes the state
+/// but a step: frames without an accepted measurement are part of it. With Lq of its start and
+/// M = Cov(x, w), 0 there, each step of it makes
+///
+///   N = G Lq,  A = F M:   P' = F P F' + A N' + N A' + N N',   M' = A + N
+///
+/// n: size of P, n_w: noise inputs of the models that move. A copy is a snapshot.
+class Motions {
+ public:
+  /// Of one model: row-major, in the order of its blocks.
+  struct Step {
+    bool active = false;        ///< false: stationary, or a block has no value yet
+    const double* u = nullptr;  ///< control input; null: the model takes none
+    std::vector<double> f, g;   ///< F, G
+    std::vector<double> l, gl;  ///< L of Qw, G L
+    std::vector<double> q;      ///< what is added to F P F' (lower triangle)
+    std::vector<double> m;      ///< M, where its noise is discrete
+  };
+
+  explicit Motions(const Binding& binding);
+
+  /// Finds out which models move: those all of whose blocks have a value.
+  void Activate(const StateLayout& layout);
+  std::vector<Step>& steps() { return steps_; }
+  const std::vector<Step>& steps() const { return steps_; }
+  /// x' of the active models, by the places of their blocks.
+  std::vector<double>& next() { return next_; }
+
+  /// x', F, G and Lq of all active models; without `derivatives` x' and Lq alone.
+  Trouble Evaluate(const State& state, double dt_s, bool derivatives = true);
+  /// P <- F P F' + Q and x <- x'; false, and nothing changed, where P would not be finite.
+  bool Apply(State& state) const;
+
+  /// Whether noise that the last step held goes on being held.
+  bool in_interval() const { return holds_ && interval_steps_ > 0; }
+  void CountStep() { ++interval_steps_; }
+  void EndInterval() { interval_steps_ = 0; }
+  /// Whether the noise of an active model is discrete.
+  bool holds() const { return holds_; }
+
+  int noise_size() const;  ///< n_w
+  // Matrices of the last step, in `work`:
+  Workspace::Matrix Transition(int n, Workspace& work) const;  ///< F, n x n
+  Workspace::Matrix NoiseInput(int n, Workspace& work) const;  ///< G Lq, n x n_w
+  /// The same, the columns of continuous noise zero.
+  Workspace::Matrix HeldInput(int n, Workspace& work) const;
+  /// M, n x n_w, the columns of continuous noise zero.
+  Workspace::Matrix HeldNoise(int n, Workspace& work) const;
+
+ private:
+  Trouble EvaluateOne(std::size_t i, const State& state, double dt_s, bool derivatives);
+  void CarryHeld(const MotionModel& model, const MotionPlace& place, Step& step);
+  bool IsBounded(const Covariance& p) const;
+  void Propagate(Covariance& p) const;
+  Workspace::Matrix Spread(std::vector<double> Step::*matrix, bool held_only, int n,
+                           Workspace& work) const;
+
+  const Binding* binding_;
+  std::vector<Step> steps_;  ///< as in System::motions
+  std::vector<double> next_;
+  std::vector<const double*> x_;
+  std::vector<double*> to_;
+  bool holds_ = false;
+  Scratch<Workspace> memory_;
+  Timestamp interval_steps_ = 0;  ///< since the state was last changed by anything else
+};
+
+}  // namespace alidade::internal

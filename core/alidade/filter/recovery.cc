@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/filter/recovery.h"
+
+#include <algorithm>
+
+#include "alidade/base/number_text.h"
+#include "alidade/filter/factorise.h"
+#include "alidade/filter/first_values.h"
+
+namespace alidade::internal {
+namespace {
+
+/// A measurement that is itself not finite tells nothing of the filter.
+bool IsRejected(const MeasurementReport& entry) {
+  switch (entry.outcome) {
+    case Outcome::kGated:
+    case Outcome::kOutOfDomain:
+    case Outcome::kNotPd:
+      return true;
+    case Outcome::kNotFinite:
+      return AllFinite(entry.z);
+    default:
+      return false;
+  }
+}
+
+/// Puts the blocks that one motion model moves together with `id` back to their prior covariance,
+/// uncorrelated, with the values they have.
+void DropMotionOf(FilterState& f, BlockId id) {
+  for (const MotionBinding& motion : f.binding->system.motions) {
+    if (std::ranges::find(motion.blocks, id) == motion.blocks.end()) continue;
+    for (const Prior& prior : f.binding->system.priors) {
+      const Block& block = f.state.layout()[prior.block];
+      if (std::ranges::find(motion.blocks, prior.block) == motion.blocks.end() ||
+          prior.block == id || prior.covariance.size() == 0 || !block.has_covariance() ||
+          block.status != BlockStatus::kEstimated) {
+        continue;
+      }
+      const double* const value = f.state.value(prior.block);
+      const std::vector<double> kept(value, value + block.geometry().ambient);
+      f.state.Add(prior.block, kept.data(), prior.covariance);
+    }
+  }
+}
+
+/// Multiplies the standard deviations of the blocks that a sensor corrects by 10; false where there
+/// are none.
+bool Inflate(FilterState& f, const SensorBinding& sensor) {
+  constexpr double kInflation = 10.0;
+  bool any = false;
+  for (const RoleBinding& role : sensor.roles) {
+    if (role.block < 0 || role.mode != RoleMode::kEstimate) continue;
+    const Block& block = f.state.layout()[role.block];
+    if (!block.has_covariance() || block.status != BlockStatus::kEstimated) continue;
+    const int n = block.geometry().tangent;
+    f.state.covariance().Transform(block.tangent_offset,
+                                   kInflation * Eigen::MatrixXd::Identity(n, n));
+    any = true;
+  }
+  if (any) f.motions.EndInterval();
+  return any;
+}
+
+}  // namespace
+
+Recovery::Recovery(const System& system, const EkfOptions& options)
+    : options_{options.rejection_recovery, options.rejection_recovery_after,
+               options.max_covariance_repairs},
+      rejections_(system.sensors.size(), 0),
+      inflated_(system.sensors.size(), 0) {}
+
+void Recovery::RepairCovariance(FilterState& f, std::span<Row> rows) {
+  constexpr double kRounding = 1e-12;
+  const auto is_not_pd = [](const Row& row) { return row.report->outcome == Outcome::kNotPd; };
+  if (std::ranges::none_of(rows, is_not_pd)) return;
+  Covariance& p = f.state.covariance();
+  Eigen::LDLT<Eigen::MatrixXd> ldlt;
+  Eigen::MatrixXd root;
+  const double defect = SquareRootOf(p.Dense(), ldlt, root);
+  if (!(defect < -kRounding)) return;
+  const std::string text = "the covariance is not positive semi-definite: a pivot is " +
+                           RoundedText(defect, 3) + " of its largest variance";
+  if (repairs_ == options_.max_repairs) {
+    return f.End("not_pd", text + ", after " + std::to_string(repairs_) + " repairs");
+  }
+  ++repairs_;
+  f.motions.EndInterval();
+  p.SetBlock(0, 0, root * root.transpose());
+  f.Note("repaired", text + "; negative pivots count as zero (repair " + std::to_string(repairs_) +
+                         " of " + std::to_string(options_.max_repairs) + ")");
+}
+
+void Recovery::CountRejections(FilterState& f, std::span<Row> rows) {
+  for (Row& row : rows) {
+    if (row.binding->model.has_landmark()) continue;
+    const auto sensor = static_cast<std::size_t>(row.sensor);
+    const MeasurementReport& entry = *row.report;
+    if (entry.outcome == Outcome::kAccepted || entry.outcome == Outcome::kInitialised) {
+      CountAccepted(f, sensor);
+    }
+    if (!IsRejected(entry)) continue;
+    if (++rejections_[sensor] < options_.after) continue;
+    if (options_.action == RejectionRecovery::kNone) continue;
+    rejections_[sensor] = 0;
+    Recover(f, row);
+  }
+}
+
+/// Resets what the sensor determines from its measurement, with the blocks that move with it at
+/// their prior uncertainty; where that cannot be, inflates the blocks that it corrects, once
+/// until it is accepted again.
+void Recovery::Recover(FilterState& f, Row& row) {
+  const SensorBinding& sensor = *row.binding;
+  const std::string why = "sensor '" + sensor.name + "' rejected " +
+                          std::to_string(options_.after) + " times in a row: ";
+  const int role = sensor.model.initialised_role();
+  const RoleBinding* target = role < 0 ? nullptr : &sensor.roles[static_cast<std::size_t>(role)];
+  if (options_.action == RejectionRecovery::kReset && target != nullptr && target->block >= 0 &&
+      target->mode == RoleMode::kEstimate &&
+      f.state.layout()[target->block].status == BlockStatus::kEstimated &&
+      InitialiseBlock(f, row) == Outcome::kInitialised) {
+    DropMotionOf(f, target->block);
+    f.Note("rejection_recovery",
+           why + "reset " + f.state.layout()[target->block].name + " from its measurement");
+    return;
+  }
+  char& inflated = inflated_[static_cast<std::size_t>(row.sensor)];
+  if (inflated != 0) return;
+  inflated = 1;
+  f.Note("rejection_recovery", why + (Inflate(f, sensor) ? "inflated the covariance of its blocks"
+                                                         : "it corrects no block to inflate"));
+}
+
+}  // namespace alidade::internal

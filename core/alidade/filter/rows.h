@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "alidade/filter/binding.h"
+#include "alidade/filter/estimator.h"
+
+namespace alidade::internal {
+
+/// One measurement on its way into an update: m = dof, n = size of P.
+struct Row {
+  const Measurement* measurement = nullptr;
+  MeasurementReport* report = nullptr;
+  int sensor = -1;
+  const SensorBinding* binding = nullptr;
+  const SensorModel* model = nullptr;  ///< the sensor's, or that of its landmark's representation
+  const SensorPlace* place = nullptr;  ///< the sensor's, or `own`
+  SensorPlace own;                     ///< with the blocks of the landmark that it measures
+  std::vector<double> h;               ///< H, m rows of the place's width
+  std::vector<double> r, l;            ///< R and its factor, m x m, row-major
+  std::vector<double> pht;             ///< P H', n x m by columns, where the method has an H
+  double weight = 1.0;                 ///< w of the robust loss; R is divided by it
+
+  /// Whether it measures a landmark in the state.
+  bool on_landmark() const { return place == &own; }
+  JacobianRows jacobian() const {
+    return {h.data(), report->dof, place->width, place->parts, place->whole};
+  }
+};
+
+/// The rows of a frame, in memory that is kept from one to the next.
+class Rows {
+ public:
+  /// One row for each measurement and sensor bound to its stream, in the order of the sensors, with
+  /// its entry in the report: kAccepted as long as nothing speaks against it.
+  void Collect(const Frame& frame, const Binding& binding, UpdateReport& report);
+  std::span<Row> all() { return {rows_.data(), count_}; }
+
+ private:
+  std::vector<Row> rows_;  ///< the first count_ are in use
+  std::size_t count_ = 0;
+};
+
+}  // namespace alidade::internal

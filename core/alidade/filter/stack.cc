@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/filter/stack.h"
+
+namespace alidade::internal {
+
+Eigen::Index CountOf(std::span<Row* const> rows) {
+  Eigen::Index m = 0;
+  for (const Row* row : rows) m += row->report->dof;
+  return m;
+}
+
+Stacked Stack(FilterState& f, std::span<Row* const> rows) {
+  const Eigen::Index m = CountOf(rows);
+  Stacked all{f.work.Take(m, f.size()), f.work.Take(m, m), f.work.Take(m)};
+  all.h.setZero();
+  all.noise.setZero();
+  Eigen::Index at = 0;
+  for (const Row* row : rows) {
+    const JacobianRows own = row->jacobian();
+    const Eigen::Index k = own.rows;
+    const Eigen::Map<const RowMajor> compact(own.data, k, own.stride);
+    for (const JacobianPart& part : own.parts) {
+      all.h.block(at, part.offset, k, part.size) += compact.middleCols(part.column, part.size);
+    }
+    all.noise.block(at, at, k, k) = Eigen::Map<const RowMajor>(row->r.data(), k, k);
+    all.innovation.segment(at, k) =
+        Eigen::Map<const Eigen::VectorXd>(row->report->innovation.data(), k);
+    at += k;
+  }
+  return all;
+}
+
+Workspace::Matrix ProjectionOf(FilterState& f, std::span<Row* const> rows) {
+  const Eigen::Index n = f.size();
+  Workspace::Matrix pht = f.work.Take(n, CountOf(rows));
+  Eigen::Index at = 0;
+  for (const Row* row : rows) {
+    const Eigen::Index k = row->report->dof;
+    pht.middleCols(at, k) = Eigen::Map<const Eigen::MatrixXd>(row->pht.data(), n, k);
+    at += k;
+  }
+  return pht;
+}
+
+Eigen::MatrixXd MaskConsidered(const FilterState& f, std::span<Row* const> rows,
+                               Eigen::MatrixXd& gain) {
+  Eigen::MatrixXd lost;
+  const auto mask = [&](Eigen::Index offset, Eigen::Index size, Eigen::Index at, Eigen::Index k) {
+    if (lost.size() == 0) lost = Eigen::MatrixXd::Zero(gain.rows(), gain.cols());
+    lost.block(offset, at, size, k) -= gain.block(offset, at, size, k);
+    gain.block(offset, at, size, k).setZero();
+  };
+  if (f.considering) {
+    for (std::size_t i = 0; i < f.binding->system.layout.blocks().size(); ++i) {
+      const Block& block = f.state.layout()[static_cast<BlockId>(i)];
+      if (!block.present || block.status != BlockStatus::kConsider) continue;
+      mask(block.tangent_offset, block.geometry().tangent, 0, gain.cols());
+    }
+  }
+  Eigen::Index at = 0;
+  for (const Row* row : rows) {
+    const SensorPlace& place = *row->place;
+    const Eigen::Index k = row->report->dof;
+    for (std::size_t i = 0; i < place.parts.size(); ++i) {
+      if (place.consider[i]) mask(place.parts[i].offset, place.parts[i].size, at, k);
+    }
+    at += k;
+  }
+  return lost;
+}
+
+Workspace::Matrix TransportTo(FilterState& f, const std::vector<double>& values) {
+  Workspace::Matrix transport = f.work.Take(f.size(), f.size());
+  transport.setIdentity();
+  for (const Block& block : f.state.layout().blocks()) {
+    if (!block.has_covariance() || block.geometry().kind != GeometryKind::kUnitVector) continue;
+    const Eigen::Index k = block.geometry().tangent;
+    RowMajor j(k, k);
+    block.geometry().Transport(f.state.values().data() + block.value_offset,
+                               values.data() + block.value_offset, j.data());
+    transport.block(block.tangent_offset, block.tangent_offset, k, k) = j;
+  }
+  return transport;
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A filter in a program of one's own: measurements as they come, the estimate whenever it is wanted.
+// Reads lines `t_s stream value` from standard input.
+#include <alidade/run/make_filter.h>
+
+#include <cstdio>
+#include <iostream>
+#include <string>
+
+int main(int argc, char** argv) try {
+  if (argc != 2) throw std::runtime_error("usage: live CONFIG");
+  const alidade::PluginHost host;
+  const auto filter = alidade::MakeFilter(alidade::Config::FromFile(argv[1]), host, "ekf");
+  const alidade::BlockId depth = filter->block("target.depth");
+  double t_s = 0.0, value = 0.0;
+  for (std::string stream; std::cin >> t_s >> stream >> value;) {
+    const alidade::Timestamp now = alidade::TimestampFromSeconds(t_s);
+    const alidade::UpdateReport& report = filter->Push(now, {{filter->stream(stream), {value}}});
+    for (const alidade::Event& event : report.events) std::cerr << event.text << '\n';
+    const alidade::State soon = filter->At(now + 50'000'000);  // predicted: nothing is committed
+    std::printf("%.3f s: in 50 ms the depth is %.3f +- %.3f m\n", t_s, soon.value(depth)[0],
+                soon.sigma(depth));
+  }
+} catch (const std::exception& e) {
+  std::cerr << "error: " << e.what() << '\n';
+  return 1;
+}

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Live use of a filter: measurements pushed by name, predictions that commit nothing, copies.
+#include "alidade/filter/filter.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <thread>
+
+#include "alidade/base/random.h"
+#include "alidade/filter/iekf.h"
+#include "alidade/filter/square_root_ekf.h"
+#include "alidade/filter/ukf.h"
+#include "support/landmark_models.h"
+#include "support/systems.h"
+
+namespace alidade::testing {
+namespace {
+
+template <class Type>
+Type MakeLive() {
+  const System system = DepthFilter();
+  if constexpr (std::is_same_v<Type, Iekf>) {
+    return Iekf(system, IekfOptions{}, StreamsOf(system));
+  } else if constexpr (std::is_same_v<Type, Ukf>) {
+    return Ukf(system, UkfOptions{}, StreamsOf(system));
+  } else {
+    return Type(system, EkfOptions{}, StreamsOf(system));
+  }
+}
+
+/// Of a target that swings between 0.2 and 0.4 m; some frames are empty, some have one stream.
+std::vector<Frame> Swinging(int count, std::uint64_t seed) {
+  Random random(seed);
+  std::vector<Frame> frames;
+  double t_s = 0.0;
+  for (int k = 0; k < count; ++k) {
+    t_s += 0.01 + 0.05 * random.Uniform();
+    const double depth = 0.3 + 0.1 * std::sin(2.5 * t_s);
+    std::vector<std::pair<int, double>> values;
+    if (random.Uniform() < 0.6) values.emplace_back(0, 26.0 / depth + random.Normal());
+    if (random.Uniform() < 0.6) values.emplace_back(1, depth / 0.3 + 0.003 * random.Normal());
+    frames.push_back(FrameAt(t_s, values));
+  }
+  return frames;
+}
+
+void ExpectSame(const State& a, const State& b) {
+  EXPECT_EQ(a.values(), b.values());
+  EXPECT_EQ(a.covariance().Dense(), b.covariance().Dense());
+}
+
+template <class Type>
+class Live : public ::testing::Test {};
+using Recursive = ::testing::Types<Ekf, Iekf, SquareRootEkf, Ukf>;
+TYPED_TEST_SUITE(Live, Recursive);
+
+TYPED_TEST(Live, AtIsWhereAFrameWithoutMeasurementsLeads) {
+  TypeParam filter = MakeLive<TypeParam>(), run = MakeLive<TypeParam>();
+  for (const Frame& frame : Swinging(20, 1)) {
+    filter.Process(frame);
+    const State before = filter.state();
+    const Timestamp later = frame.timestamp + 7'000'000;
+    const State at = filter.At(later);
+    ExpectSame(filter.state(), before);
+    EXPECT_EQ(filter.timestamp(), frame.timestamp);
+    run = filter;
+    Frame empty;
+    empty.timestamp = later;
+    run.Process(empty);
+    ExpectSame(at, run.state());
+    EXPECT_NE(at.covariance().Dense(), before.covariance().Dense());
+  }
+  ExpectSame(filter.At(0), filter.state());  // the past is not to be had
+}
+
+// 250 of each type.
+TYPED_TEST(Live, WhateverIsAskedBetweenTheFramesTheRunIsTheStraightOne) {
+  for (std::uint64_t seed = 0; seed < 250; ++seed) {
+    const std::vector<Frame> frames = Swinging(12, seed);
+    TypeParam straight = MakeLive<TypeParam>();
+    std::unique_ptr<Estimator> asked = std::make_unique<TypeParam>(straight);
+    Random random(seed + 1'000);
+    for (const Frame& frame : frames) {
+      straight.Process(frame);
+      auto& filter = dynamic_cast<Filter&>(*asked);
+      while (random.Uniform() < 0.7) {
+        const auto later = static_cast<Timestamp>(1e8 * random.Uniform());
+        const double dice = random.Uniform();
+        if (dice < 0.3) {
+          filter.At(frame.timestamp + later);
+        } else if (dice < 0.6) {
+          filter.Expect("disparity", frame.timestamp + later);
+        } else {
+          const auto other = filter.Clone();  // goes its own way
+          other->Process(FrameAt(Seconds(frame.timestamp + later), {{0, 70.0}}));
+        }
+      }
+      std::vector<Reading> readings;
+      for (const Measurement& m : frame.measurements) readings.push_back({m.stream, m.values});
+      filter.Push(frame.timestamp, readings);
+      if (random.Uniform() < 0.5) asked = asked->Clone();
+    }
+    ExpectSame(straight.state(), asked->state());
+    if (this->HasFailure()) return;
+  }
+}
+
+TYPED_TEST(Live, ExpectsWhatTheReportThenSaysOfTheMeasurement) {
+  TypeParam filter = MakeLive<TypeParam>();
+  for (const Frame& frame : Swinging(10, 3)) filter.Process(frame);
+  const Timestamp later = filter.timestamp() + 20'000'000;
+  const auto disparity = filter.Expect("disparity", later);
+  const auto scale = filter.Expect("inverse_scale", later);
+  ASSERT_TRUE(disparity && scale);
+  const UpdateReport& report = filter.Push(
+      later, {{filter.stream("disparity"), {80.0}}, {filter.stream("inverse_scale"), {1.0}}});
+  ASSERT_EQ(report.measurements().size(), 2u);
+  EXPECT_EQ(disparity->z, report.measurements()[0].h);
+  EXPECT_NEAR(disparity->s(0, 0), report.measurements()[0].s[0], 1e-12 * disparity->s(0, 0));
+  EXPECT_EQ(scale->z, report.measurements()[1].h);
+  EXPECT_NEAR(scale->s(0, 0), report.measurements()[1].s[0], 1e-12 * scale->s(0, 0));
+}
+
+TEST(Live, NamesAreThoseOfTheConfigAndAWrongOneIsAnErrorThatListsThem) {
+  const Ekf ekf = MakeLive<Ekf>();
+  EXPECT_EQ(ekf.stream("inverse_scale"), 1);
+  EXPECT_EQ(ekf.state().layout()[ekf.block("target.depth")].name, "target.depth");
+  const auto text = [](const auto& call) -> std::string {
+    try {
+      call();
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(text([&] { ekf.stream("disparty"); }),
+            "no stream 'disparty'; the filter has disparity, inverse_scale");
+  EXPECT_EQ(text([&] { ekf.block("depth"); }),
+            "no block 'depth'; the filter has target.depth, target.depth_rate, "
+            "template.inverse_distance");
+  EXPECT_EQ(text([&] { ekf.Expect("stereo", 0); }),
+            "no sensor 'stereo'; the filter has disparity, inverse_scale");
+}
+
+TEST(Live, ExpectsNothingWhereHIsNotDefinedOrNothingIsThereToMeasure) {
+  System system = DepthFilter();
+  system.priors[0].mean = {-0.1};  // behind the camera
+  Ekf behind(system, {}, StreamsOf(system));
+  behind.Start(0);
+  EXPECT_FALSE(behind.Expect("disparity", 0));
+  System waiting = DepthFilter();
+  waiting.priors[0] = {waiting.priors[0].block, {}, {}, "disparity"};
+  Ekf empty(waiting, {}, StreamsOf(waiting));
+  empty.Start(0);
+  EXPECT_FALSE(empty.Expect("disparity", 0));
+  EXPECT_FALSE(empty.diverged());
+}
+
+TEST(Live, ExpectsALandmarkByItsId) {
+  Ekf ekf(MapSystem(Offset(0.1), {}, 0.3), {}, {{"tracks", 3}});
+  ekf.Process(FrameOf(0.0, {{7, {0, 0, 1}}}));
+  const auto seen = ekf.Expect("tracks", 0, 7);
+  ASSERT_TRUE(seen);
+  EXPECT_NEAR(seen->z[2], 1.0, 1e-12);
+  // The landmark came from a measurement by the same noise: S = 2 R, whatever the camera's P.
+  EXPECT_NEAR(seen->s(0, 0), 2.0 * 0.1 * 0.1, 1e-12);
+  EXPECT_FALSE(ekf.Expect("tracks", 0, 8));
+  EXPECT_FALSE(ekf.Expect("tracks", 0));
+}
+
+// Run it with the thread sanitizer.
+TEST(Live, ThreadsMayAskOneFilterAtOnceAndMoveTheirOwnCopies) {
+  Ekf ekf = MakeLive<Ekf>();
+  const std::vector<Frame> frames = Swinging(30, 5);
+  for (const Frame& frame : frames) ekf.Process(frame);
+  const Timestamp later = ekf.timestamp() + 30'000'000;
+  const State once = ekf.At(later);
+  std::vector<std::thread> threads;
+  std::vector<char> same(4, 0);
+  for (std::size_t i = 0; i < same.size(); ++i) {
+    threads.emplace_back([&, i] {
+      bool all = true;
+      Ekf own = ekf;
+      for (int k = 0; k < 50; ++k) {
+        all = all && ekf.At(later).values() == once.values();
+        own.Push(own.timestamp() + 1'000'000, {{0, {80.0}}});
+      }
+      same[i] = all && own.timestamp() == ekf.timestamp() + 50'000'000 ? 1 : 0;
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(same, std::vector<char>(4, 1));
+}
+
+}  // namespace
+}  // namespace alidade::testing

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "alidade/run/run_observer.h"
+#include "alidade/system/system.h"
+
+namespace alidade {
+
+/// Writes each estimate as it is made, a line of JSON for each frame and estimator: `t_s`,
+/// `estimator`, then `owner.block.element` and `sigma:owner.block.element` of the blocks that have a
+/// value, those of the system. An offline estimator has none until all frames are there.
+class Follower : public RunObserver {
+ public:
+  /// `write` takes a line with its end.
+  explicit Follower(std::function<void(std::string_view line)> write) : write_(std::move(write)) {}
+
+  void Begin(const Experiment& experiment) override;
+  void OnEstimate(int estimator, const Frame& frame, const State& state,
+                  const UpdateReport& report) override;
+
+ private:
+  struct Followed {
+    std::string name;
+    StateLayout layout;  ///< of its system
+  };
+  std::function<void(std::string_view line)> write_;
+  std::vector<Followed> estimators_;
+};
+
+}  // namespace alidade

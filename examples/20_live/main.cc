@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A filter in a program of one's own: measurements as they come, the estimate whenever it is wanted.
+// A filter in a program of one's own: measurements as they come, the estimate when it is wanted.
 // Reads lines `t_s stream value` from standard input.
 #include <alidade/run/make_filter.h>
 

@@ -50,7 +50,9 @@ state:
     noise: {kind: continuous, acceleration: 1.0}
     initial: {position: {mean: 0.3, sigma: 0.1}, velocity: {mean: 0, sigma: 0.5}}
 sensors:
-  stereo: {model: stereo_disparity, stream: left, roles: {depth: target.position}, focal_px: 400, baseline_m: 0.065, sigma_px: 1.0}
+  stereo:
+    {model: stereo_disparity, stream: left, roles: {depth: target.position}, focal_px: 400,
+     baseline_m: 0.065, sigma_px: 1.0}
 estimators:
   alone: {type: iekf, gate: 0.99}
   late: {type: rts}
@@ -69,7 +71,7 @@ estimators:
     return "";
   };
   EXPECT_NE(refusal("late").find("'rts' is no recursive filter"), std::string::npos);
-  EXPECT_NE(refusal("late").find("live.yaml:12"), std::string::npos) << refusal("late");
+  EXPECT_NE(refusal("late").find("live.yaml:14"), std::string::npos) << refusal("late");
   EXPECT_NE(refusal("deep").find("estimators.deep"), std::string::npos) << refusal("deep");
 }
 

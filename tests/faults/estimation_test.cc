@@ -6,7 +6,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
-#include "alidade/filter/filter_state.h"
+#include "alidade/filter/frame_loop.h"
 #include "alidade/filter/iekf.h"
 #include "support/recording.h"
 
@@ -54,8 +54,7 @@ Eigen::Matrix2d Indefinite() { return (Eigen::Matrix2d() << 1.0, 1.1, 1.1, 1.0).
 TEST(LostPositiveDefiniteness, IsRepairedReportedAndTheFilterGoesOn) {
   const System system = TwoElements(Indefinite(), 0.1);
   for (const bool iterated : {false, true}) {
-    std::unique_ptr<Filter> filter =
-        std::make_unique<Ekf>(system, EkfOptions{}, StreamsOf(system));
+    std::unique_ptr<Filter> filter = std::make_unique<Ekf>(system, EkfOptions{}, StreamsOf(system));
     if (iterated) filter = std::make_unique<Iekf>(system, IekfOptions{}, StreamsOf(system));
     const UpdateReport& report = filter->Process(FrameAt(0.0, {{0, -1.0}}));
     EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotPd);
@@ -85,7 +84,7 @@ TEST(LostPositiveDefiniteness, EndsTheFilterOnceItsRepairsAreUsedUp) {
     EXPECT_EQ(HasEvent(report, "repaired"), k < options.max_covariance_repairs) << k;
     EXPECT_EQ(ekf.failed(), k == options.max_covariance_repairs) << k;
     // Spoilt again, from where it is.
-    ekf.internals().state.covariance().SetBlock(0, 0, Indefinite());
+    ekf.loop().f.state.covariance().SetBlock(0, 0, Indefinite());
   }
 }
 

@@ -74,8 +74,9 @@ void SensorPlace::Add(const Block& block, bool jacobian, bool considered) {
   width += size;
 }
 
-Binding::Binding(System of, const std::vector<StreamInfo>& streams)
+Binding::Binding(System of, const std::vector<StreamInfo>& from)
     : system(std::move(of)),
+      streams(from),
       initial(system.InitialState(true)),
       stream_of_sensor(system.sensors.size(), -1) {
   // Landmarks come behind: then P has no size of its own.

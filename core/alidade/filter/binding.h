@@ -43,6 +43,7 @@ struct Binding {
   Binding(System system, const std::vector<StreamInfo>& streams);
 
   const System system;
+  const std::vector<StreamInfo> streams;
   const State initial;  ///< with a place for every block that has a prior
   std::vector<SensorPlace> sensors;
   std::vector<MotionPlace> motions;

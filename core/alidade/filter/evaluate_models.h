@@ -10,8 +10,8 @@
 /// the hypothesis of a consensus.
 namespace alidade::internal {
 
-/// What fills the roles of a row at x: known roles have the value that the state has. Until the next
-/// call.
+/// What fills the roles of a row at x: known roles have the value that the state has. Until the
+/// next call.
 const double* const* RolesAt(FilterState& f, const Row& row, const std::vector<double>& x);
 
 /// h at the roles, in the report, and H, in the row; of H what the model does not write is not a

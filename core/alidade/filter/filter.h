@@ -13,8 +13,8 @@
 namespace alidade {
 
 namespace internal {
+class FrameLoop;
 class Method;
-struct FilterState;
 }  // namespace internal
 
 /// A value of one stream, as it comes.
@@ -96,16 +96,12 @@ class Filter : public Estimator {
   /// `streams` are the source's, in the order of Measurement::stream.
   Filter(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams,
          std::unique_ptr<internal::Method> method);
-  internal::Method& method();
-  const internal::Method& method() const;
-  internal::FilterState& internals();
-  const internal::FilterState& internals() const;
-  bool took_fast_path() const;  ///< the last frame
-                                /// @endcond
+  internal::FrameLoop& loop();
+  const internal::FrameLoop& loop() const;
+  /// @endcond
 
  private:
-  struct Parts;
-  std::unique_ptr<Parts> parts_;
+  std::unique_ptr<internal::FrameLoop> loop_;
 };
 
 }  // namespace alidade

@@ -5,6 +5,7 @@
 
 #include "alidade/base/error.h"
 #include "alidade/filter/filter_options.h"
+#include "alidade/filter/frame_loop.h"
 #include "alidade/filter/linear.h"
 #include "alidade/filter/stack.h"
 
@@ -117,8 +118,8 @@ RtsSmoother::RtsSmoother(System system, const EkfOptions& options,
 RtsSmoother::~RtsSmoother() = default;
 
 const UpdateReport& RtsSmoother::Process(const Frame& frame) {
-  auto& tape = dynamic_cast<internal::Taped&>(filter_->method());
-  const internal::FilterState& f = filter_->internals();
+  auto& tape = dynamic_cast<internal::Taped&>(*filter_->loop().method);
+  const internal::FilterState& f = filter_->loop().f;
   tape.StartFrame(f);
   const UpdateReport& report = filter_->Process(frame);
   Workspace work;

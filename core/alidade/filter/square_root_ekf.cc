@@ -4,6 +4,7 @@
 #include "alidade/base/error.h"
 #include "alidade/filter/factorise.h"
 #include "alidade/filter/filter_options.h"
+#include "alidade/filter/frame_loop.h"
 #include "alidade/filter/linear.h"
 #include "alidade/filter/stack.h"
 
@@ -163,7 +164,7 @@ SquareRootEkf::SquareRootEkf(System system, const EkfOptions& options,
 }
 
 const Eigen::MatrixXd& SquareRootEkf::root() const {
-  return dynamic_cast<const internal::SquareRoot&>(method()).root();
+  return dynamic_cast<const internal::SquareRoot&>(*loop().method).root();
 }
 
 }  // namespace alidade

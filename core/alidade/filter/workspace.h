@@ -12,8 +12,8 @@ namespace alidade {
 template <class T>
 struct Scratch : T {
   Scratch() = default;
-  Scratch(const Scratch&) {}
-  Scratch& operator=(const Scratch&) { return *this; }
+  Scratch(const Scratch& /*other*/) : T() {}
+  Scratch& operator=(const Scratch& /*other*/) { return *this; }
 };
 
 /// Memory for the matrices of a step or an update, kept from one to the next: where no more and no

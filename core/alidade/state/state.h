@@ -66,7 +66,7 @@ class State {
   /// The ambient value of a present block; valid until a block is added or values() is replaced.
   const double* value(BlockId id) const { return values_.data() + layout_[id].value_offset; }
   double* value(BlockId id) { return values_.data() + layout_[id].value_offset; }
-  /// The standard deviation of element i of a present block, in its tangent; 0 where it is constant.
+  /// The standard deviation of element i of a present block, in its tangent; 0 if it is constant.
   double sigma(BlockId id, int i = 0) const;
   const std::vector<double>& values() const { return values_; }
   std::vector<double>& values() { return values_; }

@@ -10,6 +10,7 @@
 #include <map>
 #include <string>
 
+#include "alidade/filter/frame_loop.h"
 #include "support/systems.h"
 
 namespace alidade {
@@ -40,7 +41,7 @@ class Watched : public Ekf {
  public:
   using Ekf::Ekf;
   /// Of the last frame.
-  bool fast() const { return took_fast_path(); }
+  bool fast() const { return loop().took_fast_path; }
 };
 
 /// The same system, which a block of no sensor's keeps from the fast path.

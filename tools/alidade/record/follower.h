@@ -12,8 +12,8 @@
 namespace alidade {
 
 /// Writes each estimate as it is made, a line of JSON for each frame and estimator: `t_s`,
-/// `estimator`, then `owner.block.element` and `sigma:owner.block.element` of the blocks that have a
-/// value, those of the system. An offline estimator has none until all frames are there.
+/// `estimator`, then `owner.block.element` and `sigma:owner.block.element` of the blocks of the
+/// system that have a value. An offline estimator has none until all frames are there.
 class Follower : public RunObserver {
  public:
   /// `write` takes a line with its end.

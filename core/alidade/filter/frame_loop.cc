@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/filter/frame_loop.h"
+
+#include <algorithm>
+
+#include "alidade/filter/evaluate_models.h"
+#include "alidade/filter/first_values.h"
+#include "alidade/filter/linear.h"
+
+namespace alidade::internal {
+
+FrameLoop::FrameLoop(System system, const EkfOptions& options,
+                     const std::vector<StreamInfo>& streams, std::unique_ptr<Method> by)
+    : f(std::make_shared<const Binding>(std::move(system), streams),
+        options.jacobian == JacobianPolicy::kFirstEstimate),
+      method(std::move(by)),
+      options_(options),
+      time_(f.binding->system, streams, options.max_dt_s),
+      gate_(f.binding->system, options.gate),
+      consensus_(f.binding->system),
+      recovery_(f.binding->system, options) {
+  if (f.binding->system.landmarks) {
+    landmarks.emplace(*f.binding);
+    landmarks->AddKnown(f);
+  }
+  method->Begin(f);
+}
+
+/// Null where the frame loop is the only way.
+FastPath* FrameLoop::Fast() {
+  if (fast_.made_at != f.activations) {
+    const bool linear = dynamic_cast<const Linear*>(&*method) != nullptr;
+    fast_.path = linear ? FastPath::For(FastParts{f, time_, gate_, recovery_, options_}) : nullptr;
+    fast_.made_at = f.activations;
+  }
+  return fast_.path.get();
+}
+
+void FrameLoop::Process(const Frame& frame) {
+  f.report.Clear();
+  FastPath* const path = Fast();
+  took_fast_path = path != nullptr && path->Process(frame);
+  if (!took_fast_path) Run(frame);
+  if (!time_.inputs().empty()) time_.inputs().Take(frame, f.report);
+}
+
+/// What a frame goes through.
+void FrameLoop::Run(const Frame& frame) {
+  if (f.timestamp == kNoTimestamp) {
+    const std::optional<double>& initial = f.binding->system.initial_time_s;
+    f.timestamp = initial ? TimestampFromSeconds(*initial) : frame.timestamp;
+  }
+  f.report.stale = frame.timestamp < f.timestamp;
+  if (!f.report.stale && !f.ended) StepTo(frame.timestamp);
+  for (Event& event : f.report.events)
+    event.timestamp = frame.timestamp;  // also where it fell short
+  rows_.Collect(frame, *f.binding, f.report);
+  const std::span<Row> all = rows_.all();
+  for (const Row& row : all) {
+    if (row.report->outcome == Outcome::kFailed) f.NotePluginFailure(*row.binding);
+  }
+  if (f.report.stale || f.ended) {
+    for (const Row& row : all) {
+      row.report->outcome = f.report.stale ? Outcome::kStale : Outcome::kFailed;
+    }
+    return;
+  }
+  if (f.waiting) InitialiseWaiting(f, all);
+  if (landmarks) landmarks->Attach(f, all);
+  Fuse(all);
+  recovery_.RepairCovariance(f, all);
+  recovery_.CountRejections(f, all);
+  if (landmarks) landmarks->KeepHouse(f, all);
+}
+
+/// Moves the state to `timestamp`; where a step cannot be done it stays at the end of the one
+/// before, and the filter has ended.
+void FrameLoop::StepTo(Timestamp timestamp) {
+  while (f.timestamp < timestamp) {
+    time_.UseInputs(f.timestamp, f.motions, f.report.events);
+    Timeline::Piece piece;
+    Trouble trouble = time_.First(f.timestamp, timestamp, f.report.events, piece);
+    for (Timestamp i = 1; i <= piece.steps && !trouble; ++i) {
+      trouble = method->Step(f, piece.dt_s);
+      if (trouble) break;
+      f.motions.CountStep();
+      f.timestamp = piece.EndOf(i);
+    }
+    if (trouble) return f.End(trouble.kind, trouble.text);
+  }
+}
+
+/// The updates of a frame, group by group.
+void FrameLoop::Fuse(std::span<Row> all) {
+  std::vector<Row*>& group = groups_.group;
+  group.clear();
+  for (Row& row : all) {
+    if (row.report->outcome != Outcome::kAccepted) continue;
+    const bool apart =
+        options_.fuse == Fuse::kPerMeasurement ||
+        (options_.fuse == Fuse::kPerSensor && !group.empty() && group.back()->sensor != row.sensor);
+    if (apart) {
+      Update(group);
+      group.clear();
+    }
+    group.push_back(&row);
+  }
+  Update(group);
+}
+
+/// One update by those of a group that pass; with a consensus a second one by those it rescues.
+void FrameLoop::Update(std::span<Row* const> group) {
+  Pass(group, groups_.passed);
+  if (!landmarks || !Consensus::IsAsked(groups_.passed)) return Correct(groups_.passed);
+  groups_.agreed.clear();
+  groups_.rest.clear();
+  consensus_.Split(f, groups_.passed, static_cast<std::uint64_t>(landmarks->frame()),
+                   groups_.agreed, groups_.rest);
+  Correct(groups_.agreed);
+  Pass(groups_.rest, groups_.passed);
+  std::erase_if(groups_.passed, [&](const Row* row) {
+    if (consensus_.Rescues(*row)) return false;
+    row->report->outcome = Outcome::kGated;
+    return true;
+  });
+  f.report.landmarks.rescued += static_cast<int>(groups_.passed.size());
+  Correct(groups_.passed);
+}
+
+/// Predicts all rows of a group at the state, and finds those that pass the gate, each by itself.
+void FrameLoop::Pass(std::span<Row* const> group, std::vector<Row*>& passed) {
+  passed.clear();
+  for (Row* const row : group) {
+    Outcome& outcome = row->report->outcome;
+    outcome = method->Predict(f, *row);
+    if (outcome == Outcome::kAccepted) outcome = gate_.Pass(f, *row);
+    if (outcome == Outcome::kAccepted) passed.push_back(row);
+  }
+}
+
+void FrameLoop::Correct(std::span<Row* const> rows_of_update) {
+  if (rows_of_update.empty()) return;
+  for (Row* const row : rows_of_update) Gate::Weigh(*row);
+  const Outcome outcome = method->Correct(f, rows_of_update);
+  for (const Row* const row : rows_of_update) row->report->outcome = outcome;
+}
+
+void FrameLoop::GoTo(Timestamp timestamp) {
+  Frame frame;
+  frame.timestamp = timestamp;
+  Process(frame);
+}
+
+std::optional<Prediction> FrameLoop::Expect(int sensor, std::int64_t landmark) {
+  if (f.ended || f.report.stale) return std::nullopt;
+  const auto index = static_cast<std::size_t>(sensor);
+  const Geometry& geometry = f.binding->system.sensors[index].model.measurement().geometry;
+  Frame frame;
+  Measurement& one = frame.measurements.emplace_back();
+  one.stream = f.binding->stream_of_sensor[index];
+  one.landmark = landmark;
+  one.values.resize(static_cast<std::size_t>(geometry.ambient));
+  geometry.Identity(one.values.data());
+  rows_.Collect(frame, *f.binding, f.report);
+  const auto of_sensor = [&](const Row& row) { return row.sensor == sensor; };
+  const auto found = std::ranges::find_if(rows_.all(), of_sensor);
+  if (found == rows_.all().end()) return std::nullopt;
+  Row& row = *found;
+  row.report->outcome = Outcome::kAccepted;  // whatever Valid says of what is no measurement yet
+  if (landmarks) landmarks->Attach(f, {&row, 1});
+  if (row.report->outcome != Outcome::kAccepted || !IsReady(f, row) ||
+      row.model->Predict(RolesAt(f, row, f.state.values()), one.values.data()) != Status::kOk) {
+    return std::nullopt;
+  }
+  row.report->z = one.values;  // as if it measured what it expects
+  if (method->Predict(f, row) != Outcome::kAccepted) return std::nullopt;
+  const Eigen::Index m = row.report->dof;
+  return Prediction{row.report->h, Eigen::Map<const RowMajor>(row.report->s.data(), m, m)};
+}
+
+}  // namespace alidade::internal

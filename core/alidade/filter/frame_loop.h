@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "alidade/filter/consensus.h"
+#include "alidade/filter/ekf_options.h"
+#include "alidade/filter/fast_path.h"
+#include "alidade/filter/filter.h"
+#include "alidade/filter/filter_state.h"
+#include "alidade/filter/gate.h"
+#include "alidade/filter/landmarks.h"
+#include "alidade/filter/method.h"
+#include "alidade/filter/recovery.h"
+#include "alidade/filter/timeline.h"
+
+namespace alidade::internal {
+
+/// A method by value.
+class AnyMethod {
+ public:
+  explicit AnyMethod(std::unique_ptr<Method> method) : method_(std::move(method)) {}
+  AnyMethod(const AnyMethod& other) : method_(other.method_->Clone()) {}
+  AnyMethod& operator=(const AnyMethod&) = delete;
+  Method& operator*() const { return *method_; }
+  Method* operator->() const { return method_.get(); }
+
+ private:
+  std::unique_ptr<Method> method_;
+};
+
+/// What a filter is made of, and what a frame goes through there. No part points into another: a
+/// copy is a filter by itself.
+class FrameLoop {
+ public:
+  FrameLoop(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams,
+            std::unique_ptr<Method> method);
+
+  /// All that Filter::Process does. The report is in f.
+  void Process(const Frame& frame);
+  /// The same of a frame without measurements.
+  void GoTo(Timestamp timestamp);
+  /// What the sensor, an index into System::sensors, would measure now; as Filter::Expect.
+  std::optional<Prediction> Expect(int sensor, std::int64_t landmark);
+
+  FilterState f;
+  AnyMethod method;
+  std::optional<Landmarks> landmarks;  ///< where the system has any
+  bool took_fast_path = false;         ///< the last frame
+
+ private:
+  FastPath* Fast();
+  void Run(const Frame& frame);
+  void StepTo(Timestamp timestamp);
+  void Fuse(std::span<Row> rows);
+  void Update(std::span<Row* const> group);
+  void Pass(std::span<Row* const> group, std::vector<Row*>& passed);
+  void Correct(std::span<Row* const> rows);
+
+  /// The fast path, as long as the blocks are those that it was made for.
+  struct CurrentPath {
+    std::unique_ptr<FastPath> path;
+    int made_at = -1;  ///< FilterState::activations
+  };
+  /// One group of rows, and what becomes of it.
+  struct Groups {
+    std::vector<Row*> group, passed, agreed, rest;
+  };
+
+  EkfOptions options_;
+  Timeline time_;
+  Gate gate_;
+  Consensus consensus_;
+  Recovery recovery_;
+  Scratch<Rows> rows_;
+  Scratch<Groups> groups_;
+  Scratch<CurrentPath> fast_;
+};
+
+}  // namespace alidade::internal

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 
-# alidade_unity(TARGET COUNT)
+# alidade_unity(TARGET COUNT SANITIZED)
 #
 # With ALIDADE_UNITY, compiles up to COUNT sources of a folder as one: headers are read once, and
-# what several sources instantiate is compiled once. With sanitizers half as many, for a source then
-# takes twice the memory.
-function(alidade_unity target count)
+# what several sources instantiate is compiled once. With sanitizers up to SANITIZED, for a source
+# then takes twice the memory.
+function(alidade_unity target count sanitized)
   if(NOT ALIDADE_UNITY)
     return()
   endif()
   if(CMAKE_CXX_FLAGS MATCHES "-fsanitize")
-    math(EXPR count "${count} / 2")
+    set(count ${sanitized})
   endif()
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
   get_target_property(sources ${target} SOURCES)
@@ -45,7 +45,7 @@ function(alidade_add_library name)
     CXX_VISIBILITY_PRESET default VISIBILITY_INLINES_HIDDEN OFF
     LINK_DEPENDS ${exports})
   alidade_warnings(${target})
-  alidade_unity(${target} 8)
+  alidade_unity(${target} 12 4)
   target_compile_features(${target} PUBLIC cxx_std_20)
   target_link_options(${target} PRIVATE -Wl,-z,defs -Wl,--version-script=${exports})
   target_compile_definitions(${target} PRIVATE ALIDADE_VERSION="${PROJECT_VERSION}")

@@ -2,6 +2,7 @@
 //
 // A filter in a program of one's own: measurements as they come, the estimate when it is wanted.
 // Reads lines `t_s stream value` from standard input.
+#include <alidade/run/experiment.h>
 #include <alidade/run/make_filter.h>
 
 #include <cstdio>
@@ -10,8 +11,9 @@
 
 int main(int argc, char** argv) try {
   if (argc != 2) throw std::runtime_error("usage: live CONFIG");
-  const alidade::PluginHost host;
-  const auto filter = alidade::MakeFilter(alidade::Config::FromFile(argv[1]), host, "ekf");
+  const auto config = alidade::Config::FromFile(argv[1]);
+  const alidade::PluginHost host(alidade::PluginPaths(config));
+  const auto filter = alidade::MakeFilter(config, host, "ekf");
   const alidade::BlockId depth = filter->block("target.depth");
   double t_s = 0.0, value = 0.0;
   for (std::string stream; std::cin >> t_s >> stream >> value;) {

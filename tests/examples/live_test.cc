@@ -70,7 +70,7 @@ estimators:
     }
     return "";
   };
-  EXPECT_NE(refusal("late").find("'rts' is no recursive filter"), std::string::npos);
+  EXPECT_NE(refusal("late").find("'rts' is not a recursive filter"), std::string::npos);
   EXPECT_NE(refusal("late").find("live.yaml:14"), std::string::npos) << refusal("late");
   EXPECT_NE(refusal("deep").find("estimators.deep"), std::string::npos) << refusal("deep");
 }

@@ -73,12 +73,12 @@ void Consensus::SupportOf(FilterState& f, std::size_t hypothesis, std::span<Row*
   const Row& one = *matches[hypothesis];
   const MeasurementReport& own = *one.report;
   const Eigen::Index n = f.size(), m = own.dof;
-  Eigen::MatrixXd pht = Eigen::Map<const Eigen::MatrixXd>(one.pht.data(), n, m);
+  Eigen::MatrixXd pht = Eigen::Map<const Eigen::MatrixXd>(one.PHt.data(), n, m);
   MaskConsidered(f, matches.subspan(hypothesis, 1), pht);
   const Eigen::Map<const Eigen::MatrixXd> s(own.s.data(), m, m);
   const Eigen::Map<const Eigen::VectorXd> innovation(own.innovation.data(), m);
   const Eigen::VectorXd dx = pht * s.llt().solve(innovation);
-  f.state.Retract(dx.data(), f.moved);
+  f.state.Retract(dx.data(), f.buffers.moved);
   agrees.assign(matches.size(), 0);
   std::vector<double> h, r, work;
   for (std::size_t i = 0; i < matches.size(); ++i) {
@@ -86,10 +86,10 @@ void Consensus::SupportOf(FilterState& f, std::size_t hypothesis, std::span<Row*
     const MeasurementReport& entry = *row.report;
     h.resize(entry.z.size());
     r.resize(static_cast<std::size_t>(entry.dof));
-    if (row.model->Predict(RolesAt(f, row, f.moved), h.data()) != Status::kOk) continue;
+    if (row.model->Predict(RolesAt(f, row, f.buffers.moved), h.data()) != Status::kOk) continue;
     row.model->measurement().geometry.Minus(entry.z.data(), h.data(), r.data());
     work.resize(r.size() * (r.size() + 1));
-    const double d2 = SquaredMahalanobis(row.r.data(), r.data(), entry.dof, work.data());
+    const double d2 = SquaredMahalanobis(row.R.data(), r.data(), entry.dof, work.data());
     agrees[i] = d2 <= support_[static_cast<std::size_t>(row.sensor)] ? 1 : 0;
   }
 }

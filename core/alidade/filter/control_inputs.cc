@@ -69,16 +69,17 @@ std::string ControlInputs::WhyNone(const Held& held) {
          " s: steps with u = 0";
 }
 
-const double* ControlInputs::Use(std::size_t motion, Timestamp from, std::vector<Event>& events) {
+std::span<const double> ControlInputs::Use(std::size_t motion, Timestamp from,
+                                           std::vector<Event>& events) {
   const auto found = std::ranges::find(held_, motion, &Held::motion);
-  if (found == held_.end()) return nullptr;
+  if (found == held_.end()) return {};
   if (Acts(*found, from)) {
     found->stale_noted = false;
-    return found->value.data();
+    return found->value;
   }
   if (!found->stale_noted) events.push_back({from, "input_stale", WhyNone(*found)});
   found->stale_noted = true;
-  return found->neutral.data();
+  return found->neutral;
 }
 
 void ControlInputs::Take(const Frame& frame, UpdateReport& report) {

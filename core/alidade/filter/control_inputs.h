@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -33,9 +34,9 @@ class ControlInputs {
   Timestamp StepEnd(Timestamp from, Timestamp to) const;
   /// Whether all models have an input that acts from `from` to `to`.
   bool AllAct(Timestamp from, Timestamp to) const;
-  /// u (ambient) from `from` to StepEnd, for System::motions[motion]; null where it takes none.
+  /// u (ambient) from `from` to StepEnd, for System::motions[motion]; empty where it takes none.
   /// Where none acts, an event `input_stale`, once until one does. Good until the next Take.
-  const double* Use(std::size_t motion, Timestamp from, std::vector<Event>& events);
+  std::span<const double> Use(std::size_t motion, Timestamp from, std::vector<Event>& events);
   /// Takes the inputs of a frame, which then act from its timestamp on, and lists them in
   /// `report.inputs`. One that is older than the one held is passed over; one that is not finite or
   /// not of unit length is refused, with an event `input_refused`, once until one is taken. Their

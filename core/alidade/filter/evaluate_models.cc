@@ -8,50 +8,50 @@ namespace alidade::internal {
 
 const double* const* RolesAt(FilterState& f, const Row& row, const std::vector<double>& x) {
   const std::vector<RoleBinding>& bound = row.binding->roles;
-  f.roles.clear();
+  f.buffers.roles.clear();
   for (std::size_t i = 0; i < row.place->values.size(); ++i) {
     const int at = row.place->values[i];
     const bool known = i < bound.size() && bound[i].mode == RoleMode::kKnown;
-    f.roles.push_back(at < 0 ? nullptr : (known ? f.state.values() : x).data() + at);
+    f.buffers.roles.push_back(at < 0 ? nullptr : (known ? f.state.values() : x).data() + at);
   }
-  return f.roles.data();
+  return f.buffers.roles.data();
 }
 
 Outcome LineariseAt(FilterState& f, Row& row, const double* const* roles) {
   const SensorPlace& place = *row.place;
   const int m = row.report->dof;
-  row.h.assign(static_cast<std::size_t>(m * place.width), 0.0);
+  row.H.assign(static_cast<std::size_t>(m * place.width), 0.0);
   for (const JacobianPart& part : place.parts) {
     for (int i = 0; i < m; ++i) {
-      std::fill_n(row.h.data() + i * place.width + part.column, part.size, std::nan(""));
+      std::fill_n(row.H.data() + i * place.width + part.column, part.size, std::nan(""));
     }
   }
-  f.jacobians.clear();
+  f.buffers.jacobians.clear();
   for (const int column : place.columns) {
-    f.jacobians.push_back(column < 0 ? nullptr : row.h.data() + column);
+    f.buffers.jacobians.push_back(column < 0 ? nullptr : row.H.data() + column);
   }
   row.report->h.assign(static_cast<std::size_t>(row.model->measurement().geometry.ambient),
                        std::nan(""));
-  return OutcomeOf(
-      row.model->Linearise(roles, row.report->h.data(), f.jacobians.data(), place.strides.data()));
+  return OutcomeOf(row.model->Linearise(roles, row.report->h.data(), f.buffers.jacobians.data(),
+                                        place.strides.data()));
 }
 
 Outcome NoiseAt(Row& row, const double* const* roles) {
   const auto m = static_cast<std::size_t>(row.report->dof);
   const Measurement& measurement = *row.measurement;
   if (!measurement.covariance.empty()) {
-    row.r.assign(measurement.covariance.begin(), measurement.covariance.end());
+    row.R.assign(measurement.covariance.begin(), measurement.covariance.end());
     return Outcome::kAccepted;
   }
-  row.r.resize(m * m);
-  row.l.assign(m * m, std::nan(""));
+  row.R.resize(m * m);
+  row.L.assign(m * m, std::nan(""));
   const Outcome outcome =
-      OutcomeOf(row.model->SqrtNoise(roles, measurement.values.data(), row.l.data()));
+      OutcomeOf(row.model->SqrtNoise(roles, measurement.values.data(), row.L.data()));
   for (std::size_t i = 0; i < m; ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
       double sum = 0.0;
-      for (std::size_t k = 0; k < m; ++k) sum += row.l[i * m + k] * row.l[j * m + k];
-      row.r[i * m + j] = row.r[j * m + i] = sum;
+      for (std::size_t k = 0; k < m; ++k) sum += row.L[i * m + k] * row.L[j * m + k];
+      row.R[i * m + j] = row.R[j * m + i] = sum;
     }
   }
   return outcome;
@@ -66,7 +66,7 @@ void TakeInnovation(Row& row) {
 void ChainJacobian(FilterState& f, Row& row, int column, int size, const double* j) {
   const Workspace::Use use(f.work);
   const int m = row.report->dof;
-  auto own = Eigen::Map<RowMajor>(row.h.data(), m, row.place->width).middleCols(column, size);
+  auto own = Eigen::Map<RowMajor>(row.H.data(), m, row.place->width).middleCols(column, size);
   Workspace::Matrix chained = f.work.Take(m, size);
   chained.noalias() = own * Eigen::Map<const RowMajor>(j, size, size);
   own = chained;
@@ -112,11 +112,11 @@ Outcome Invert(FilterState& f, Row& row, const LandmarkOptions::Prior* prior, In
     }
     outcome = NoiseAt(row, roles.data());
   }
-  if (outcome == Outcome::kFailed) f.NotePluginFailure(binding);
+  if (outcome == Outcome::kFailed) NotePluginFailure(f, binding);
   if (outcome != Outcome::kAccepted) {
     return outcome == Outcome::kFailed ? outcome : Outcome::kInvalid;
   }
-  const Eigen::Map<const RowMajor> r(row.r.data(), m, m);
+  const Eigen::Map<const RowMajor> r(row.R.data(), m, m);
   inverse.own = jz * r * jz.transpose();
   if (prior != nullptr) inverse.own += prior->sigma * prior->sigma * jp * jp.transpose();
   bool finite = AllFinite(inverse.y) && inverse.own.allFinite();

@@ -59,7 +59,7 @@ ALIDADE_INLINE bool FastPath::StepModel(const Motion& motion, double dt_s, doubl
   for (int i = 0; i < k * k; ++i) f[i] = kUnwritten;
   for (int i = 0; i < k * w; ++i) g[i] = kUnwritten;
   for (int i = 0; i < w * w; ++i) l[i] = kUnwritten;
-  if (motion.model->Step(motion.x.data(), step.u, nullptr, dt_s, motion.next.data(), f, g) !=
+  if (motion.model->Step(motion.x.data(), step.u.data(), nullptr, dt_s, motion.next.data(), f, g) !=
           Status::kOk ||
       motion.model->SqrtQ(motion.x.data(), dt_s, l) != Status::kOk) {
     return false;
@@ -250,10 +250,10 @@ ALIDADE_INLINE bool FastPath::Update(const Frame& frame) {
                       : m == 2 ? Correct<N, 2>(rows, m)
                                : Correct<N, 0>(rows, m);
     if (!done) return false;
-    f_.last_used.sensor = last_sensor;
-    f_.last_used.timestamp = last->timestamp;
-    Fit(f_.last_used.z, static_cast<int>(std::ssize(last->values)));
-    Copy(last->values.data(), static_cast<int>(std::ssize(last->values)), f_.last_used.z);
+    f_.said.last_used.sensor = last_sensor;
+    f_.said.last_used.timestamp = last->timestamp;
+    Fit(f_.said.last_used.z, static_cast<int>(std::ssize(last->values)));
+    Copy(last->values.data(), static_cast<int>(std::ssize(last->values)), f_.said.last_used.z);
   }
   CountRejections();
   return true;
@@ -273,7 +273,7 @@ void FastPath::CountRejections() {
 template <int N>
 bool FastPath::ProcessSized(const Frame& frame) {
   Timestamp elapsed = 0;
-  if (f_.ended || f_.timestamp == kNoTimestamp || frame.timestamp < f_.timestamp ||
+  if (f_.said.ended || f_.timestamp == kNoTimestamp || frame.timestamp < f_.timestamp ||
       __builtin_sub_overflow(frame.timestamp, f_.timestamp, &elapsed)) {
     return false;
   }

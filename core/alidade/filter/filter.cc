@@ -34,10 +34,8 @@ const UpdateReport& Filter::Process(const Frame& frame) {
 const System& Filter::system() const { return loop_->f.binding->system; }
 const State& Filter::state() const { return loop_->f.state; }
 Timestamp Filter::timestamp() const { return loop_->f.timestamp; }
-bool Filter::diverged() const { return loop_->f.diverged; }
-bool Filter::failed() const { return loop_->f.ended; }
-FrameLoop& Filter::loop() { return *loop_; }
-const FrameLoop& Filter::loop() const { return *loop_; }
+bool Filter::diverged() const { return loop_->f.said.diverged; }
+bool Filter::failed() const { return loop_->f.said.ended; }
 
 std::vector<LandmarkEstimate> Filter::landmarks() const {
   if (!loop_->landmarks) return {};
@@ -50,6 +48,28 @@ namespace {
                              const std::vector<std::string>& known) {
   throw Error(ExitCode::kBadConfig, "no " + std::string(what) + " '" + std::string(name) +
                                         "'; the filter has " + internal::Join(known));
+}
+
+void CheckReading(const std::vector<StreamInfo>& streams, const System& system,
+                  const Reading& one) {
+  if (one.stream < 0 || one.stream >= std::ssize(streams)) {
+    throw Error(ExitCode::kBadData, "no stream " + std::to_string(one.stream) +
+                                        "; the filter has " + std::to_string(streams.size()));
+  }
+  const StreamInfo& stream = streams[static_cast<std::size_t>(one.stream)];
+  if (std::ssize(one.values) != stream.size) {
+    throw Error(ExitCode::kBadData, "stream '" + stream.name + "' has " +
+                                        std::to_string(stream.size) + " values at a time, not " +
+                                        std::to_string(one.values.size()));
+  }
+  if (one.covariance.empty()) return;
+  for (const SensorBinding& sensor : system.sensors) {
+    const int m = sensor.model.measurement().geometry.tangent;
+    if (sensor.stream != stream.name || std::ssize(one.covariance) == m * m) continue;
+    throw Error(ExitCode::kBadData, "the covariance of stream '" + stream.name + "' has " +
+                                        std::to_string(one.covariance.size()) + " numbers, not " +
+                                        std::to_string(m * m));
+  }
 }
 
 }  // namespace
@@ -65,10 +85,10 @@ int Filter::stream(std::string_view name) const {
 }
 
 BlockId Filter::block(std::string_view name) const {
-  const BlockId id = loop_->f.state.layout().Find(name);
+  const BlockId id = system().layout.Find(name);
   if (id >= 0) return id;
   std::vector<std::string> known;
-  for (const Block& block : loop_->f.state.layout().blocks()) known.push_back(block.name);
+  for (const Block& block : system().layout.blocks()) known.push_back(block.name);
   RefuseName("block", name, known);
 }
 
@@ -76,6 +96,7 @@ const UpdateReport& Filter::Push(Timestamp timestamp, const std::vector<Reading>
   Frame frame;
   frame.timestamp = timestamp;
   for (const Reading& one : readings) {
+    CheckReading(loop_->f.binding->streams, system(), one);
     frame.measurements.push_back({timestamp, one.stream, one.landmark, one.values, one.covariance});
   }
   return Process(frame);

@@ -3,7 +3,6 @@
 
 #include <memory>
 #include <optional>
-#include <span>
 #include <string_view>
 #include <vector>
 
@@ -78,9 +77,11 @@ class Filter : public Estimator {
   // Live.
   /// Index of a stream, for Reading::stream. Error kBadConfig where there is none.
   int stream(std::string_view name) const;
-  /// Id of a block, `owner.block`. Error kBadConfig where there is none.
+  /// Id of a block of the system, `owner.block`. Error kBadConfig where there is none.
   BlockId block(std::string_view name) const;
-  /// Process, of what came at one timestamp. The report is good until the next call.
+  /// Process, of what came at one timestamp. The report is good until the next call. Errors, and
+  /// nothing has changed: kBadData for a stream that is not there, or values or a covariance of
+  /// another size than its sensors measure.
   const UpdateReport& Push(Timestamp timestamp, const std::vector<Reading>& readings);
   /// The state at `timestamp`, not before timestamp(), as a frame without measurements would leave
   /// it. Nothing is committed. Where it cannot be stepped to, it is that of the last step that can.
@@ -92,12 +93,13 @@ class Filter : public Estimator {
   std::optional<Prediction> Expect(std::string_view sensor, Timestamp timestamp,
                                    std::int64_t landmark = -1) const;
 
+ protected:
   /// @cond
   /// `streams` are the source's, in the order of Measurement::stream.
   Filter(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams,
          std::unique_ptr<internal::Method> method);
-  internal::FrameLoop& loop();
-  const internal::FrameLoop& loop() const;
+  internal::FrameLoop& loop() { return *loop_; }
+  const internal::FrameLoop& loop() const { return *loop_; }
   /// @endcond
 
  private:

@@ -6,13 +6,35 @@
 #include "alidade/base/number_text.h"
 
 namespace alidade::internal {
+namespace {
+
+/// `block = value, ...` for the given blocks that have one.
+std::string Describe(const State& state, std::span<const BlockId> blocks) {
+  std::string text;
+  for (const BlockId id : blocks) {
+    if (id < 0 || !state.layout()[id].present) continue;
+    const Block& block = state.layout()[id];
+    text += (text.empty() ? "" : ", ") + block.name + " =";
+    for (int i = 0; i < block.geometry().ambient; ++i) {
+      text += ' ' + RoundedText(state.value(id)[i], 6);
+    }
+  }
+  return text;
+}
+
+void NoteDivergence(FilterState& f, const char* kind, std::string text) {
+  f.said.diverged = true;
+  Note(f, kind, std::move(text)).divergence = true;
+}
+
+}  // namespace
 
 FilterState::FilterState(std::shared_ptr<const Binding> of, bool keeps_first_estimates)
     : binding(std::move(of)),
       state(binding->initial),
       motions(*binding),
-      out_of_domain(binding->sensors.size(), 0),
       keeps_first_estimates_(keeps_first_estimates) {
+  said.out_of_domain.assign(binding->sensors.size(), 0);
   Activate();
 }
 
@@ -47,60 +69,6 @@ void FilterState::KeepFirstEstimates() {
   }
 }
 
-Event& FilterState::Note(const char* kind, std::string text) {
-  report.events.push_back({timestamp, kind, std::move(text)});
-  return report.events.back();
-}
-
-void FilterState::NoteDivergence(const char* kind, std::string text) {
-  diverged = true;
-  Note(kind, std::move(text)).divergence = true;
-}
-
-void FilterState::NotePluginFailure(const SensorBinding& sensor) {
-  Note("plugin_failed", "sensor '" + sensor.name + "': " + sensor.model.error_text());
-}
-
-void FilterState::NoteRefusal(const Row& row, Outcome outcome) {
-  const SensorBinding& sensor = *row.binding;
-  if (outcome == Outcome::kFailed) NotePluginFailure(sensor);
-  const auto index = static_cast<std::size_t>(row.sensor);
-  // A landmark behind the camera, say, is no divergence.
-  if (outcome != Outcome::kOutOfDomain || row.on_landmark() || out_of_domain[index] != 0) return;
-  out_of_domain[index] = 1;
-  std::vector<BlockId> blocks;
-  for (const RoleBinding& role : sensor.roles) blocks.push_back(role.block);
-  NoteDivergence("diverged", "sensor '" + sensor.name + "' is not defined at " + Describe(blocks));
-}
-
-/// `block = value, ...` for the given blocks that have one.
-std::string FilterState::Describe(std::span<const BlockId> blocks) const {
-  std::string text;
-  for (const BlockId id : blocks) {
-    if (id < 0 || !state.layout()[id].present) continue;
-    const Block& block = state.layout()[id];
-    text += (text.empty() ? "" : ", ") + block.name + " =";
-    for (int i = 0; i < block.geometry().ambient; ++i) {
-      text += ' ' + RoundedText(state.value(id)[i], 6);
-    }
-  }
-  return text;
-}
-
-void FilterState::End(const char* kind, const std::string& what) {
-  ended = true;
-  std::vector<BlockId> all(binding->system.layout.blocks().size());
-  std::iota(all.begin(), all.end(), 0);
-  std::string text = what + "; last good state at " + SecondsText(timestamp) + ": " + Describe(all);
-  if (last_used.sensor >= 0) {
-    text += "; last measurement used: sensor '" +
-            binding->system.sensors[static_cast<std::size_t>(last_used.sensor)].name + "' at " +
-            SecondsText(last_used.timestamp) + ", z =";
-    for (const double z : last_used.z) text += ' ' + RoundedText(z, 6);
-  }
-  NoteDivergence(kind, text);
-}
-
 void FilterState::RecordUpdate(std::span<Row* const> rows, const double* gain) {
   motions.EndInterval();
   const int n = size();
@@ -115,9 +83,46 @@ void FilterState::RecordUpdate(std::span<Row* const> rows, const double* gain) {
     }
   }
   const Row& last = *rows.back();
-  last_used.sensor = last.sensor;
-  last_used.timestamp = last.measurement->timestamp;
-  last_used.z.assign(last.measurement->values.begin(), last.measurement->values.end());
+  said.last_used.sensor = last.sensor;
+  said.last_used.timestamp = last.measurement->timestamp;
+  said.last_used.z.assign(last.measurement->values.begin(), last.measurement->values.end());
+}
+
+Event& Note(FilterState& f, const char* kind, std::string text) {
+  f.report.events.push_back({f.timestamp, kind, std::move(text)});
+  return f.report.events.back();
+}
+
+void NotePluginFailure(FilterState& f, const SensorBinding& sensor) {
+  Note(f, "plugin_failed", "sensor '" + sensor.name + "': " + sensor.model.error_text());
+}
+
+void NoteRefusal(FilterState& f, const Row& row, Outcome outcome) {
+  const SensorBinding& sensor = *row.binding;
+  if (outcome == Outcome::kFailed) NotePluginFailure(f, sensor);
+  char& said = f.said.out_of_domain[static_cast<std::size_t>(row.sensor)];
+  // A landmark behind the camera, say, is no divergence.
+  if (outcome != Outcome::kOutOfDomain || row.on_landmark() || said != 0) return;
+  said = 1;
+  std::vector<BlockId> blocks;
+  for (const RoleBinding& role : sensor.roles) blocks.push_back(role.block);
+  NoteDivergence(f, "diverged",
+                 "sensor '" + sensor.name + "' is not defined at " + Describe(f.state, blocks));
+}
+
+void End(FilterState& f, const char* kind, const std::string& what) {
+  f.said.ended = true;
+  std::vector<BlockId> all(f.binding->system.layout.blocks().size());
+  std::iota(all.begin(), all.end(), 0);
+  std::string text =
+      what + "; last good state at " + SecondsText(f.timestamp) + ": " + Describe(f.state, all);
+  if (f.said.last_used.sensor >= 0) {
+    text += "; last measurement used: sensor '" +
+            f.binding->system.sensors[static_cast<std::size_t>(f.said.last_used.sensor)].name +
+            "' at " + SecondsText(f.said.last_used.timestamp) + ", z =";
+    for (const double z : f.said.last_used.z) text += ' ' + RoundedText(z, 6);
+  }
+  NoteDivergence(f, kind, std::move(text));
 }
 
 }  // namespace alidade::internal

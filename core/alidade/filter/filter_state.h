@@ -15,27 +15,27 @@
 
 namespace alidade::internal {
 
+/// What a filter has said of itself, so that it says it once.
+struct Said {
+  std::vector<char> out_of_domain;  ///< by sensor: since its last acceptance
+  bool diverged = false, ended = false;
+  /// The last accepted measurement.
+  struct {
+    int sensor = -1;
+    Timestamp timestamp = kNoTimestamp;
+    std::vector<double> z;
+  } last_used;
+};
+
 /// What the parts of a filter share: x and P, what moved them last, and what there is to say of it.
-/// Has no pointer into itself: a copy is a snapshot.
+/// Only a Method changes P of blocks that have a value, but where the part that does it says so: it
+/// may carry a root. A copy is a snapshot.
 struct FilterState {
   FilterState(std::shared_ptr<const Binding> of, bool keeps_first_estimates);
 
-  const SensorBinding& sensor(const Row& row) const { return *row.binding; }
   int size() const { return state.covariance().size(); }  ///< n
-
   /// Has to be called when a block of the system gets its first value.
   void Activate();
-
-  /// An event of this time.
-  Event& Note(const char* kind, std::string text);
-  /// One by which the filter counts as diverged.
-  void NoteDivergence(const char* kind, std::string text);
-  /// Tells why h of a row could not be had; outside its domain, once until the sensor is accepted
-  /// again.
-  void NoteRefusal(const Row& row, Outcome outcome);
-  void NotePluginFailure(const SensorBinding& sensor);
-  /// Ends the filter: what happened, the state that is left, the measurement that led there.
-  void End(const char* kind, const std::string& what);
   /// Takes an update down in the reports: the gain of all rows (n x m by columns, its rows as they
   /// lie in P; null where no block has a covariance). Ends the interval of held noise.
   void RecordUpdate(std::span<Row* const> rows, const double* gain);
@@ -46,30 +46,34 @@ struct FilterState {
   Motions motions;
   /// By block of the system: the value that H is taken at, in place of the latest; empty: none.
   std::vector<std::vector<double>> first_estimates;
-  UpdateReport report;              ///< of the frame
-  int activations = 0;              ///< calls of Activate
-  bool waiting = false;             ///< a block of the system has no value yet
-  bool considering = false;         ///< one is a consider state
-  std::vector<char> out_of_domain;  ///< by sensor: said since its last acceptance
-  bool diverged = false, ended = false;
-  /// The last accepted measurement.
-  struct {
-    int sensor = -1;
-    Timestamp timestamp = kNoTimestamp;
-    std::vector<double> z;
-  } last_used;
+  UpdateReport report;  ///< of the frame
+  Said said;
+  int activations = 0;       ///< calls of Activate
+  bool waiting = false;      ///< a block of the system has no value yet
+  bool considering = false;  ///< one is a consider state
+  /// Matrices; what takes from it has a Workspace::Use around it.
   Scratch<Workspace> work;
-  Scratch<std::vector<double>> moved;         ///< values on the way to x
-  Scratch<std::vector<const double*>> roles;  ///< of the row that is evaluated
-  Scratch<std::vector<double*>> jacobians;    ///< of the same
+  struct Buffers {
+    std::vector<double> moved;         ///< values on the way to x
+    std::vector<const double*> roles;  ///< of the row that is evaluated
+    std::vector<double*> jacobians;    ///< of the same
+  };
+  Scratch<Buffers> buffers;
 
  private:
-  std::string Describe(std::span<const BlockId> blocks) const;
   void KeepFirstEstimates();
 
   bool keeps_first_estimates_;
-  /// Rows of P of the system's blocks that have a value; empty: all rows of P.
-  std::vector<int> gain_rows_;
+  std::vector<int> gain_rows_;  ///< of P: of the system's blocks that have a value
 };
+
+/// An event of the frame; the end of the frame gives it its timestamp.
+Event& Note(FilterState& f, const char* kind, std::string text);
+/// Tells why h of a row could not be had; outside its domain, by which the filter counts as
+/// diverged, once until the sensor is accepted again.
+void NoteRefusal(FilterState& f, const Row& row, Outcome outcome);
+void NotePluginFailure(FilterState& f, const SensorBinding& sensor);
+/// Ends the filter: what happened, the state that is left, the measurement that led there.
+void End(FilterState& f, const char* kind, const std::string& what);
 
 }  // namespace alidade::internal

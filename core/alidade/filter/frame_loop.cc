@@ -42,6 +42,7 @@ void FrameLoop::Process(const Frame& frame) {
   took_fast_path = path != nullptr && path->Process(frame);
   if (!took_fast_path) Run(frame);
   if (!time_.inputs().empty()) time_.inputs().Take(frame, f.report);
+  for (Event& event : f.report.events) event.timestamp = frame.timestamp;
 }
 
 /// What a frame goes through.
@@ -51,15 +52,13 @@ void FrameLoop::Run(const Frame& frame) {
     f.timestamp = initial ? TimestampFromSeconds(*initial) : frame.timestamp;
   }
   f.report.stale = frame.timestamp < f.timestamp;
-  if (!f.report.stale && !f.ended) StepTo(frame.timestamp);
-  for (Event& event : f.report.events)
-    event.timestamp = frame.timestamp;  // also where it fell short
+  if (!f.report.stale && !f.said.ended) StepTo(frame.timestamp);
   rows_.Collect(frame, *f.binding, f.report);
   const std::span<Row> all = rows_.all();
   for (const Row& row : all) {
-    if (row.report->outcome == Outcome::kFailed) f.NotePluginFailure(*row.binding);
+    if (row.report->outcome == Outcome::kFailed) NotePluginFailure(f, *row.binding);
   }
-  if (f.report.stale || f.ended) {
+  if (f.report.stale || f.said.ended) {
     for (const Row& row : all) {
       row.report->outcome = f.report.stale ? Outcome::kStale : Outcome::kFailed;
     }
@@ -69,8 +68,9 @@ void FrameLoop::Run(const Frame& frame) {
   if (landmarks) landmarks->Attach(f, all);
   Fuse(all);
   recovery_.RepairCovariance(f, all);
+  if (f.said.ended) return;
   recovery_.CountRejections(f, all);
-  if (landmarks) landmarks->KeepHouse(f, all);
+  if (landmarks) landmarks->Maintain(f, all);
 }
 
 /// Moves the state to `timestamp`; where a step cannot be done it stays at the end of the one
@@ -86,7 +86,7 @@ void FrameLoop::StepTo(Timestamp timestamp) {
       f.motions.CountStep();
       f.timestamp = piece.EndOf(i);
     }
-    if (trouble) return f.End(trouble.kind, trouble.text);
+    if (trouble) return End(f, trouble.kind, trouble.text);
   }
 }
 
@@ -111,12 +111,18 @@ void FrameLoop::Fuse(std::span<Row> all) {
 /// One update by those of a group that pass; with a consensus a second one by those it rescues.
 void FrameLoop::Update(std::span<Row* const> group) {
   Pass(group, groups_.passed);
-  if (!landmarks || !Consensus::IsAsked(groups_.passed)) return Correct(groups_.passed);
+  if (!landmarks || !Consensus::IsAsked(groups_.passed)) {
+    Correct(groups_.passed);
+    return;
+  }
   groups_.agreed.clear();
   groups_.rest.clear();
   consensus_.Split(f, groups_.passed, static_cast<std::uint64_t>(landmarks->frame()),
                    groups_.agreed, groups_.rest);
-  Correct(groups_.agreed);
+  if (!groups_.agreed.empty() && !Correct(groups_.agreed)) {  // what would the rest agree with?
+    for (Row* const row : groups_.rest) row->report->outcome = Outcome::kGated;
+    return;
+  }
   Pass(groups_.rest, groups_.passed);
   std::erase_if(groups_.passed, [&](const Row* row) {
     if (consensus_.Rescues(*row)) return false;
@@ -138,11 +144,13 @@ void FrameLoop::Pass(std::span<Row* const> group, std::vector<Row*>& passed) {
   }
 }
 
-void FrameLoop::Correct(std::span<Row* const> rows_of_update) {
-  if (rows_of_update.empty()) return;
-  for (Row* const row : rows_of_update) Gate::Weigh(*row);
-  const Outcome outcome = method->Correct(f, rows_of_update);
-  for (const Row* const row : rows_of_update) row->report->outcome = outcome;
+/// False where there is no update.
+bool FrameLoop::Correct(std::span<Row* const> rows) {
+  if (rows.empty()) return false;
+  for (Row* const row : rows) Gate::Weigh(*row);
+  const Outcome outcome = method->Correct(f, rows);
+  for (const Row* const row : rows) row->report->outcome = outcome;
+  return outcome == Outcome::kAccepted;
 }
 
 void FrameLoop::GoTo(Timestamp timestamp) {
@@ -152,7 +160,7 @@ void FrameLoop::GoTo(Timestamp timestamp) {
 }
 
 std::optional<Prediction> FrameLoop::Expect(int sensor, std::int64_t landmark) {
-  if (f.ended || f.report.stale) return std::nullopt;
+  if (f.said.ended || f.report.stale) return std::nullopt;
   const auto index = static_cast<std::size_t>(sensor);
   const Geometry& geometry = f.binding->system.sensors[index].model.measurement().geometry;
   Frame frame;

@@ -59,7 +59,7 @@ class FrameLoop {
   void Fuse(std::span<Row> rows);
   void Update(std::span<Row* const> group);
   void Pass(std::span<Row* const> group, std::vector<Row*>& passed);
-  void Correct(std::span<Row* const> rows);
+  bool Correct(std::span<Row* const> rows);
 
   /// The fast path, as long as the blocks are those that it was made for.
   struct CurrentPath {

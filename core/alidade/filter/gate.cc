@@ -22,10 +22,10 @@ Gate::Gate(const System& system, double probability) : warned_(system.sensors.si
 
 Outcome Gate::Pass(FilterState& f, Row& row) {
   MeasurementReport& entry = *row.report;
-  if (!AllFinite(entry.s) || !AllFinite(row.pht) || !AllFinite(entry.innovation)) {
+  if (!AllFinite(entry.s) || !AllFinite(row.PHt) || !AllFinite(entry.innovation)) {
     entry.s.clear();
-    f.Note("not_finite",
-           "sensor '" + row.binding->name + "': h, H, R or the innovation is not finite");
+    Note(f, "not_finite",
+         "sensor '" + row.binding->name + "': h, H, R or the innovation is not finite");
     return Outcome::kNotFinite;
   }
   CheckConditioning(f, row);
@@ -35,21 +35,21 @@ Outcome Gate::Pass(FilterState& f, Row& row) {
       SquaredMahalanobis(entry.s.data(), entry.innovation.data(), entry.dof, memory_.data());
   if (std::isnan(entry.nis)) {
     entry.nis = 0.0;
-    f.Note("not_pd", "sensor '" + row.binding->name + "': S is not positive definite");
+    Note(f, "not_pd", "sensor '" + row.binding->name + "': S is not positive definite");
     return Outcome::kNotPd;
   }
   if (!(entry.nis <= thresholds_[static_cast<std::size_t>(row.sensor)])) return Outcome::kGated;
   row.weight = Weight(row.binding->loss, std::sqrt(entry.nis));
-  const double widest = *std::ranges::max_element(row.r) / row.weight;
+  const double widest = *std::ranges::max_element(row.R) / row.weight;
   return std::isfinite(widest) ? Outcome::kAccepted : Outcome::kGated;
 }
 
 void Gate::Weigh(Row& row) {
   if (row.weight == 1.0) return;
-  for (std::size_t i = 0; i < row.r.size(); ++i) {
-    const double widened = row.r[i] / row.weight;
-    row.report->s[i] += widened - row.r[i];
-    row.r[i] = widened;
+  for (std::size_t i = 0; i < row.R.size(); ++i) {
+    const double widened = row.R[i] / row.weight;
+    row.report->s[i] += widened - row.R[i];
+    row.R[i] = widened;
   }
 }
 
@@ -62,15 +62,16 @@ void Gate::CheckConditioning(FilterState& f, const Row& row) {
   double noise = 0.0, total = 0.0;
   bool tiny = false;
   for (std::size_t i = 0; i < m && !tiny; ++i) {
-    noise = row.r[i * m + i];
+    noise = row.R[i * m + i];
     total = row.report->s[i * m + i];
     tiny = noise <= kTiny * total || noise <= 0.0;
   }
   if (!tiny) return;
   warned_[sensor] = true;
-  f.Note("conditioning", "sensor '" + row.binding->name + "': noise variance " +
-                             RoundedText(noise, 3) + " vanishes compared with H P H' = " +
-                             RoundedText(total - noise, 3) + "; S is badly conditioned");
+  Note(f, "conditioning",
+       "sensor '" + row.binding->name + "': noise variance " + RoundedText(noise, 3) +
+           " vanishes compared with H P H' = " + RoundedText(total - noise, 3) +
+           "; S is badly conditioned");
 }
 
 }  // namespace alidade::internal

@@ -72,12 +72,12 @@ Outcome Iterated::Correct(FilterState& f, std::span<Row* const> rows) {
     entry.s.swap(at_prediction_[i].s);
   }
   if (outcome == Outcome::kAccepted && minimum && !minimum->converged) {
-    f.Note("not_converged",
-           "an update stopped after " + std::to_string(minimum->iterations) + " iterations" +
-               (minimum->step
-                    ? ", a step of " + RoundedText(*minimum->step, 3) + " sigma before its optimum"
-                    : std::string(" where h has no Jacobian")) +
-               "; the last iterate is kept");
+    Note(f, "not_converged",
+         "an update stopped after " + std::to_string(minimum->iterations) + " iterations" +
+             (minimum->step
+                  ? ", a step of " + RoundedText(*minimum->step, 3) + " sigma before its optimum"
+                  : std::string(" where h has no Jacobian")) +
+             "; the last iterate is kept");
   }
   return outcome;
 }
@@ -188,7 +188,7 @@ bool Iterated::Relinearise(FilterState& f, std::span<Row* const> rows, const dou
         NoiseAt(*row, roles) != Outcome::kAccepted) {
       return false;
     }
-    for (double& r : row->r) r /= row->weight;
+    for (double& r : row->R) r /= row->weight;
     TakeInnovation(*row);
     const double* const* const at = RolesAt(f, *row, f.state.values());
     std::size_t part = 0;

@@ -160,7 +160,7 @@ void Landmarks::Attach(const FilterState& f, Row& row, const LandmarkRecord& lan
   if (landmark.representation != family.representation) row.model = &*row.binding->xyz;
 }
 
-void Landmarks::KeepHouse(FilterState& f, std::span<Row> rows) {
+void Landmarks::Maintain(FilterState& f, std::span<Row> rows) {
   Count(f, rows);
   CheckDepths(f);
   Prune(f);
@@ -237,7 +237,6 @@ void Landmarks::DropBlocks(FilterState& f, LandmarkRecord& landmark) {
     f.state.Drop(id);
   }
   landmark.blocks.clear();
-  f.motions.EndInterval();
 }
 
 /// Turns those landmarks of the frame into xyz that are linear enough.

@@ -49,7 +49,7 @@ class Landmarks {
   /// Gives the rows of landmarks in the state their places; the others are not ready.
   void Attach(FilterState& f, std::span<Row> rows);
   /// After the updates with those rows.
-  void KeepHouse(FilterState& f, std::span<Row> rows);
+  void Maintain(FilterState& f, std::span<Row> rows);
 
   std::vector<LandmarkEstimate> Estimates(const State& state) const;
   /// Frames with a measurement of a landmark.

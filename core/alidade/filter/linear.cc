@@ -47,18 +47,18 @@ Trouble Linear::Step(FilterState& f, double dt_s) {
 }
 
 Outcome Linear::Predict(FilterState& f, Row& row) {
-  const Outcome outcome = See(f, row);
+  const Outcome outcome = Linearise(f, row);
   if (outcome == Outcome::kAccepted) Project(f, row);
   return outcome;
 }
 
-Outcome Linear::See(FilterState& f, Row& row) {
-  const Outcome outcome = SeeAtState(f, row);
-  if (outcome != Outcome::kAccepted) f.NoteRefusal(row, outcome);
+Outcome Linear::Linearise(FilterState& f, Row& row) {
+  const Outcome outcome = LineariseAtState(f, row);
+  if (outcome != Outcome::kAccepted) NoteRefusal(f, row, outcome);
   return outcome;
 }
 
-Outcome Linear::SeeAtState(FilterState& f, Row& row) {
+Outcome Linear::LineariseAtState(FilterState& f, Row& row) {
   MeasurementReport& entry = *row.report;
   const Geometry& geometry = row.model->measurement().geometry;
   const double* const* const roles = RolesAt(f, row, f.state.values());
@@ -72,11 +72,11 @@ Outcome Linear::SeeAtState(FilterState& f, Row& row) {
   return outcome;
 }
 
-/// Puts where H is taken into at_: the roles in f.roles, but first estimates, and what the
+/// Puts where H is taken into at_: the roles in f.buffers.roles, but first estimates, and what the
 /// measurement implies for the role that asks for it. Whether that is elsewhere than h.
 bool Linear::FindLinearisation(const FilterState& f, const Row& row) {
   const std::vector<RoleBinding>& bound = row.binding->roles;
-  at_.assign(f.roles.begin(), f.roles.end());
+  at_.assign(f.buffers.roles.begin(), f.buffers.roles.end());
   implied_.clear();
   bool elsewhere = false;
   for (std::size_t i = 0; i < std::min(at_.size(), bound.size()); ++i) {
@@ -89,21 +89,21 @@ bool Linear::FindLinearisation(const FilterState& f, const Row& row) {
     } else if (!f.first_estimates.empty() && !f.first_estimates[index].empty()) {
       at_[i] = f.first_estimates[index].data();
     }
-    elsewhere = elsewhere || at_[i] != f.roles[i];
+    elsewhere = elsewhere || at_[i] != f.buffers.roles[i];
   }
   return elsewhere;
 }
 
-/// h at x, in f.roles, and H at at_.
+/// h at x, in f.buffers.roles, and H at at_.
 Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
   const SensorModel& model = *row.model;
   MeasurementReport& entry = *row.report;
   entry.h.assign(static_cast<std::size_t>(model.measurement().geometry.ambient), std::nan(""));
-  Outcome outcome = OutcomeOf(model.Predict(f.roles.data(), entry.h.data()));
+  Outcome outcome = OutcomeOf(model.Predict(f.buffers.roles.data(), entry.h.data()));
   if (outcome != Outcome::kAccepted) return outcome;
   if (!implied_.empty()) {
     const Status status =
-        model.Initialise(f.roles.data(), entry.z.data(), implied_.data(), nullptr, nullptr);
+        model.Initialise(f.buffers.roles.data(), entry.z.data(), implied_.data(), nullptr, nullptr);
     // What z cannot have come from tells nothing of where to linearise.
     outcome = status == Status::kOutOfDomain ? Outcome::kInvalid : OutcomeOf(status);
     if (outcome != Outcome::kAccepted) return outcome;
@@ -113,21 +113,21 @@ Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
   entry.h.assign(predicted_.begin(), predicted_.end());
   for (std::size_t i = 0; i < at_.size(); ++i) {
     const Geometry& geometry = model.roles()[i].geometry;
-    if (row.place->columns[i] < 0 || at_[i] == f.roles[i] ||
+    if (row.place->columns[i] < 0 || at_[i] == f.buffers.roles[i] ||
         geometry.kind != GeometryKind::kUnitVector) {
       continue;
     }
     RowMajor j(geometry.tangent, geometry.tangent);
-    geometry.Transport(f.roles[i], at_[i], j.data());
+    geometry.Transport(f.buffers.roles[i], at_[i], j.data());
     ChainJacobian(f, row, row.place->columns[i], geometry.tangent, j.data());
   }
   return outcome;
 }
 
 void Linear::Project(FilterState& f, Row& row) {
-  row.pht.resize(static_cast<std::size_t>(f.size() * row.report->dof));
-  row.report->s.assign(row.r.begin(), row.r.end());
-  f.state.covariance().Project(row.jacobian(), row.pht.data(), row.report->s.data());
+  row.PHt.resize(static_cast<std::size_t>(f.size() * row.report->dof));
+  row.report->s.assign(row.R.begin(), row.R.end());
+  f.state.covariance().Project(row.jacobian(), row.PHt.data(), row.report->s.data());
 }
 
 Outcome Linear::CorrectBy(FilterState& f, std::span<Row* const> rows, const double* dx) {
@@ -139,9 +139,9 @@ Outcome Linear::CorrectBy(FilterState& f, std::span<Row* const> rows, const doub
                      !f.considering && std::ranges::none_of(rows, considers);
   const Outcome outcome = small ? CorrectSmall(f, rows, dx) : CorrectLarge(f, rows, dx);
   if (outcome == Outcome::kNotPd) {
-    f.Note("not_pd", "the update would leave S or P not positive definite; rolled back");
+    Note(f, "not_pd", "the update would leave S or P not positive definite; rolled back");
   } else if (outcome == Outcome::kNotFinite) {
-    f.Note("not_finite", "the update is not finite; rolled back");
+    Note(f, "not_finite", "the update is not finite; rolled back");
   }
   return outcome;
 }
@@ -159,7 +159,7 @@ Outcome Linear::CorrectSmall(FilterState& f, std::span<Row* const> rows, const d
     const MeasurementReport& entry = *row->report;
     const JacobianRows h = row->jacobian();
     const auto k = static_cast<std::size_t>(entry.dof);
-    std::copy(row->pht.begin(), row->pht.end(), pht.begin() + at * n);
+    std::copy(row->PHt.begin(), row->PHt.end(), pht.begin() + at * n);
     std::copy(entry.innovation.begin(), entry.innovation.end(), innovation.begin() + at);
     for (std::size_t i = 0; i < k; ++i) {
       for (std::size_t j = 0; j < k; ++j) s[(at + i) * all + at + j] = entry.s[i * k + j];
@@ -184,10 +184,10 @@ Outcome Linear::CorrectSmall(FilterState& f, std::span<Row* const> rows, const d
   }
   if (correction != nullptr) std::copy_n(correction, n, dx.begin());
   if (!AllFinite({dx.data(), n})) return Outcome::kNotFinite;
-  f.state.Retract(dx.data(), f.moved);
-  if (!AllFinite(f.moved)) return Outcome::kNotFinite;
+  f.state.Retract(dx.data(), f.buffers.moved);
+  if (!AllFinite(f.buffers.moved)) return Outcome::kNotFinite;
   if (!p.Downdate(m, w.data(), inverse_d.data())) return CorrectLarge(f, rows, correction);
-  f.state.MoveTo(f.moved);  // last: P turns with the tangent planes
+  f.state.MoveTo(f.buffers.moved);  // last: P turns with the tangent planes
   f.RecordUpdate(rows, gain.data());
   return Outcome::kAccepted;
 }
@@ -219,10 +219,11 @@ Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const d
   if (lost.size() > 0) lost *= l;
   Eigen::VectorXd dx = gain * all.innovation;
   if (correction != nullptr) std::copy_n(correction, dx.size(), dx.data());
-  f.state.Retract(dx.data(), f.moved);
-  if (!AllFinite(f.moved) || !w.allFinite() || !gain.allFinite()) return Outcome::kNotFinite;
+  f.state.Retract(dx.data(), f.buffers.moved);
+  if (!AllFinite(f.buffers.moved) || !w.allFinite() || !gain.allFinite())
+    return Outcome::kNotFinite;
   if (!Update(f.state.covariance(), w, lost, gain, all)) return Outcome::kNotPd;
-  f.state.MoveTo(f.moved);
+  f.state.MoveTo(f.buffers.moved);
   f.RecordUpdate(rows, gain.data());
   return Outcome::kAccepted;
 }

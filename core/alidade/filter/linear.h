@@ -27,22 +27,22 @@ class Linear : public Method {
   }
 
   /// The first part of Predict: h, H, R and the innovation at x.
-  Outcome See(FilterState& f, Row& row);
+  Outcome Linearise(FilterState& f, Row& row);
   /// The second: P H' and S of a row that has H and R.
   static void Project(FilterState& f, Row& row);
   /// As Correct, with x (+) dx in place of x (+) K r; null: K r.
   Outcome CorrectBy(FilterState& f, std::span<Row* const> rows, const double* dx);
 
  private:
-  Outcome SeeAtState(FilterState& f, Row& row);
+  Outcome LineariseAtState(FilterState& f, Row& row);
   bool FindLinearisation(const FilterState& f, const Row& row);
   Outcome LineariseElsewhere(FilterState& f, Row& row);
   Outcome CorrectSmall(FilterState& f, std::span<Row* const> rows, const double* dx);
   Outcome CorrectLarge(FilterState& f, std::span<Row* const> rows, const double* dx);
 
   // Memory that is kept from row to row.
-  std::vector<const double*> at_;  ///< what fills the roles where H is taken
-  std::vector<double> implied_;    ///< of the role that is linearised at what z implies
+  Scratch<std::vector<const double*>> at_;  ///< what fills the roles where H is taken
+  std::vector<double> implied_;             ///< of the role that is linearised at what z implies
   std::vector<double> predicted_;
 };
 

@@ -63,7 +63,7 @@ Trouble Motions::EvaluateOne(std::size_t i, const State& state, double dt_s, boo
     to_.push_back(next_.data() + place.values[k]);
     std::fill_n(to_.back(), state.layout()[motion.blocks[k]].geometry().ambient, unwritten);
   }
-  Status status = motion.model.Step(x_.data(), step.u, nullptr, dt_s, to_.data(),
+  Status status = motion.model.Step(x_.data(), step.u.data(), nullptr, dt_s, to_.data(),
                                     derivatives ? step.f.data() : nullptr,
                                     derivatives ? step.g.data() : nullptr);
   if (status == Status::kOk && !goes_on) {

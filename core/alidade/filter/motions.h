@@ -30,7 +30,7 @@ class Motions {
   /// Of one model: row-major, in the order of its blocks.
   struct Step {
     bool active = false;        ///< false: stationary, or a block has no value yet
-    const double* u = nullptr;  ///< control input; null: the model takes none
+    std::vector<double> u;      ///< control input; empty: the model takes none
     std::vector<double> f, g;   ///< F, G
     std::vector<double> l, gl;  ///< L of Qw, G L
     std::vector<double> q;      ///< what is added to F P F' (lower triangle)
@@ -78,8 +78,8 @@ class Motions {
   const Binding* binding_;
   std::vector<Step> steps_;  ///< as in System::motions
   std::vector<double> next_;
-  std::vector<const double*> x_;
-  std::vector<double*> to_;
+  Scratch<std::vector<const double*>> x_;
+  Scratch<std::vector<double*>> to_;
   bool holds_ = false;
   Scratch<Workspace> memory_;
   Timestamp interval_steps_ = 0;  ///< since the state was last changed by anything else

@@ -81,13 +81,14 @@ void Recovery::RepairCovariance(FilterState& f, std::span<Row> rows) {
   const std::string text = "the covariance is not positive semi-definite: a pivot is " +
                            RoundedText(defect, 3) + " of its largest variance";
   if (repairs_ == options_.max_repairs) {
-    return f.End("not_pd", text + ", after " + std::to_string(repairs_) + " repairs");
+    return End(f, "not_pd", text + ", after " + std::to_string(repairs_) + " repairs");
   }
   ++repairs_;
   f.motions.EndInterval();
   p.SetBlock(0, 0, root * root.transpose());
-  f.Note("repaired", text + "; negative pivots count as zero (repair " + std::to_string(repairs_) +
-                         " of " + std::to_string(options_.max_repairs) + ")");
+  Note(f, "repaired",
+       text + "; negative pivots count as zero (repair " + std::to_string(repairs_) + " of " +
+           std::to_string(options_.max_repairs) + ")");
 }
 
 void Recovery::CountRejections(FilterState& f, std::span<Row> rows) {
@@ -120,15 +121,16 @@ void Recovery::Recover(FilterState& f, Row& row) {
       f.state.layout()[target->block].status == BlockStatus::kEstimated &&
       InitialiseBlock(f, row) == Outcome::kInitialised) {
     DropMotionOf(f, target->block);
-    f.Note("rejection_recovery",
-           why + "reset " + f.state.layout()[target->block].name + " from its measurement");
+    Note(f, "rejection_recovery",
+         why + "reset " + f.state.layout()[target->block].name + " from its measurement");
     return;
   }
   char& inflated = inflated_[static_cast<std::size_t>(row.sensor)];
   if (inflated != 0) return;
   inflated = 1;
-  f.Note("rejection_recovery", why + (Inflate(f, sensor) ? "inflated the covariance of its blocks"
-                                                         : "it corrects no block to inflate"));
+  Note(f, "rejection_recovery",
+       why + (Inflate(f, sensor) ? "inflated the covariance of its blocks"
+                                 : "it corrects no block to inflate"));
 }
 
 }  // namespace alidade::internal

@@ -20,7 +20,7 @@ class Recovery {
   /// its L D L' count as zero (event `repaired`). Ends the filter where it needed that too often.
   void RepairCovariance(FilterState& f, std::span<Row> rows);
   /// Counts rejections in a row for each sensor, and recovers one that was rejected too often
-  /// (event `rejection_recovery`). No landmark locks its sensor out.
+  /// (event `rejection_recovery`). Rejected landmarks do not count.
   void CountRejections(FilterState& f, std::span<Row> rows);
 
   // For the fast path, which takes no part in recovering.
@@ -28,7 +28,7 @@ class Recovery {
   bool IsDueNext(std::size_t sensor) const { return rejections_[sensor] + 1 >= options_.after; }
   void CountAccepted(FilterState& f, std::size_t sensor) {
     rejections_[sensor] = 0;
-    inflated_[sensor] = f.out_of_domain[sensor] = 0;
+    inflated_[sensor] = f.said.out_of_domain[sensor] = 0;
   }
   void CountRejected(std::size_t sensor) { ++rejections_[sensor]; }
 

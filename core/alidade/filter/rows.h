@@ -18,15 +18,15 @@ struct Row {
   const SensorModel* model = nullptr;  ///< the sensor's, or that of its landmark's representation
   const SensorPlace* place = nullptr;  ///< the sensor's, or `own`
   SensorPlace own;                     ///< with the blocks of the landmark that it measures
-  std::vector<double> h;               ///< H, m rows of the place's width
-  std::vector<double> r, l;            ///< R and its factor, m x m, row-major
-  std::vector<double> pht;             ///< P H', n x m by columns, where the method has an H
+  std::vector<double> H;               ///< H, m rows of the place's width
+  std::vector<double> R, L;            ///< R and its factor, m x m, row-major
+  std::vector<double> PHt;             ///< P H', n x m by columns, where the method has an H
   double weight = 1.0;                 ///< w of the robust loss; R is divided by it
 
   /// Whether it measures a landmark in the state.
   bool on_landmark() const { return place == &own; }
   JacobianRows jacobian() const {
-    return {h.data(), report->dof, place->width, place->parts, place->whole};
+    return {H.data(), report->dof, place->width, place->parts, place->whole};
   }
 };
 

@@ -110,26 +110,33 @@ struct RtsSmoother::Passed {
 
 RtsSmoother::RtsSmoother(System system, const EkfOptions& options,
                          const std::vector<StreamInfo>& streams)
-    : filter_(std::make_unique<Filter>(std::move(system), internal::WithoutRecovery(options),
-                                       streams, std::make_unique<internal::Taped>())) {
-  ALIDADE_EXPECTS(!FindUnsupported(filter_->system(), kSupport));
+    : loop_(std::make_unique<internal::FrameLoop>(std::move(system),
+                                                  internal::WithoutRecovery(options), streams,
+                                                  std::make_unique<internal::Taped>())) {
+  ALIDADE_EXPECTS(!FindUnsupported(loop_->f.binding->system, kSupport));
 }
 
 RtsSmoother::~RtsSmoother() = default;
 
+void RtsSmoother::Start(Timestamp timestamp) { loop_->f.timestamp = timestamp; }
+const State& RtsSmoother::state() const { return loop_->f.state; }
+Timestamp RtsSmoother::timestamp() const { return loop_->f.timestamp; }
+bool RtsSmoother::diverged() const { return loop_->f.said.diverged; }
+bool RtsSmoother::failed() const { return loop_->f.said.ended; }
+
 const UpdateReport& RtsSmoother::Process(const Frame& frame) {
-  auto& tape = dynamic_cast<internal::Taped&>(*filter_->loop().method);
-  const internal::FilterState& f = filter_->loop().f;
+  auto& tape = dynamic_cast<internal::Taped&>(*loop_->method);
+  const internal::FilterState& f = loop_->f;
   tape.StartFrame(f);
-  const UpdateReport& report = filter_->Process(frame);
+  loop_->Process(frame);
   Workspace work;
   const Eigen::MatrixXd held = f.motions.in_interval()
                                    ? Eigen::MatrixXd(f.motions.HeldNoise(f.size(), work))
                                    : Eigen::MatrixXd(f.size(), 0);
   passed_frames_.push_back(
-      {tape.frame(), f.state.values(), f.state.covariance().Dense(), held, report});
+      {tape.frame(), f.state.values(), f.state.covariance().Dense(), held, f.report});
   passed_frames_.back().report.events.clear();  // told already
-  return report;
+  return f.report;
 }
 
 void RtsSmoother::Smooth(const Emit& emit) {

@@ -4,10 +4,15 @@
 #include <memory>
 #include <vector>
 
-#include "alidade/filter/filter.h"
+#include "alidade/filter/ekf_options.h"
+#include "alidade/filter/estimator.h"
 #include "alidade/filter/support.h"
 
 namespace alidade {
+
+namespace internal {
+class FrameLoop;
+}
 
 /// Fixed-interval smoother: the estimate of every frame from the measurements of all. An extended
 /// Kalman filter goes forward; the way back is that of Rauch, Tung and Striebel in the adjoint form
@@ -37,21 +42,21 @@ class RtsSmoother : public Estimator {
   RtsSmoother(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
   ~RtsSmoother() override;
 
-  void Start(Timestamp timestamp) override { filter_->Start(timestamp); }
+  void Start(Timestamp timestamp) override;
   const UpdateReport& Process(const Frame& frame) override;
   bool offline() const override { return true; }
   /// The reports are the filter's. Event `not_pd` where rounding would leave a smoothed variance
   /// negative: the covariance of that frame is then the filter's.
   void Smooth(const Emit& emit) override;
-  const State& state() const override { return filter_->state(); }
-  Timestamp timestamp() const override { return filter_->timestamp(); }
-  bool diverged() const override { return filter_->diverged(); }
-  bool failed() const override { return filter_->failed(); }
+  const State& state() const override;
+  Timestamp timestamp() const override;
+  bool diverged() const override;
+  bool failed() const override;
 
  private:
   struct Passed;
 
-  std::unique_ptr<Filter> filter_;
+  std::unique_ptr<internal::FrameLoop> loop_;
   std::vector<Passed> passed_frames_;
 };
 

@@ -90,7 +90,7 @@ Trouble SquareRoot::Step(FilterState& f, double dt_s) {
 }
 
 Outcome SquareRoot::Predict(FilterState& f, Row& row) {
-  const Outcome outcome = linear_.See(f, row);
+  const Outcome outcome = linear_.Linearise(f, row);
   if (outcome == Outcome::kAccepted) Project(f, row);
   return outcome;
 }
@@ -106,7 +106,7 @@ void SquareRoot::Project(FilterState& f, Row& row) const {
   s = all.noise;
   s.noalias() += hl * hl.transpose();
   row.report->s.assign(s.data(), s.data() + s.size());
-  row.pht.clear();
+  row.PHt.clear();
 }
 
 Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
@@ -129,7 +129,7 @@ Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
   Triangularise(array, f.work.Take(m + n).data());
   array.triangularView<Eigen::StrictlyLower>().setZero();
   if (!array.allFinite() || (array.diagonal().head(m).array() == 0.0).any()) {
-    f.Note("not_pd", "the update would leave S not positive definite; rolled back");
+    Note(f, "not_pd", "the update would leave S not positive definite; rolled back");
     return Outcome::kNotPd;
   }
   Workspace::Matrix gain = f.work.Take(n, m);  // K = W Ls^-1
@@ -140,13 +140,13 @@ Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
       .transpose()
       .solveInPlace<Eigen::OnTheRight>(gain);
   dx.noalias() = gain * all.innovation;
-  f.state.Retract(dx.data(), f.moved);
-  if (!AllFinite(f.moved)) {
-    f.Note("not_finite", "the update is not finite; rolled back");
+  f.state.Retract(dx.data(), f.buffers.moved);
+  if (!AllFinite(f.buffers.moved)) {
+    Note(f, "not_finite", "the update is not finite; rolled back");
     return Outcome::kNotFinite;
   }
-  const Workspace::Matrix transport = TransportTo(f, f.moved);
-  f.state.MoveTo(f.moved);
+  const Workspace::Matrix transport = TransportTo(f, f.buffers.moved);
+  f.state.MoveTo(f.buffers.moved);
   root_.noalias() = transport * array.bottomRightCorner(n, n).transpose();
   SetCovariance(f);
   f.RecordUpdate(rows, gain.data());

@@ -22,7 +22,7 @@ Stacked Stack(FilterState& f, std::span<Row* const> rows) {
     for (const JacobianPart& part : own.parts) {
       all.h.block(at, part.offset, k, part.size) += compact.middleCols(part.column, part.size);
     }
-    all.noise.block(at, at, k, k) = Eigen::Map<const RowMajor>(row->r.data(), k, k);
+    all.noise.block(at, at, k, k) = Eigen::Map<const RowMajor>(row->R.data(), k, k);
     all.innovation.segment(at, k) =
         Eigen::Map<const Eigen::VectorXd>(row->report->innovation.data(), k);
     at += k;
@@ -36,7 +36,7 @@ Workspace::Matrix ProjectionOf(FilterState& f, std::span<Row* const> rows) {
   Eigen::Index at = 0;
   for (const Row* row : rows) {
     const Eigen::Index k = row->report->dof;
-    pht.middleCols(at, k) = Eigen::Map<const Eigen::MatrixXd>(row->pht.data(), n, k);
+    pht.middleCols(at, k) = Eigen::Map<const Eigen::MatrixXd>(row->PHt.data(), n, k);
     at += k;
   }
   return pht;

@@ -39,7 +39,9 @@ void Timeline::UseInputs(Timestamp from, Motions& motions, std::vector<Event>& e
   if (inputs_.empty()) return;
   for (std::size_t i = 0; i < motions.steps().size(); ++i) {
     Motions::Step& step = motions.steps()[i];
-    if (step.active) step.u = inputs_.Use(i, from, events);
+    if (!step.active) continue;
+    const std::span<const double> u = inputs_.Use(i, from, events);
+    step.u.assign(u.begin(), u.end());
   }
 }
 

@@ -113,9 +113,10 @@ class Unscented : public Method {
   // Memory that is kept from step to step.
   Eigen::MatrixXd rest_, root_of_rest_;
   Eigen::LDLT<Eigen::MatrixXd> ldlt_;
-  std::vector<const double*> x_;
-  std::vector<double*> stepped_;
+  Scratch<std::vector<const double*>> x_;
+  Scratch<std::vector<double*>> stepped_;
   std::vector<double> reported_h_, reported_innovation_;
+  std::string failed_, failure_;  ///< the state entry whose plugin failed, and why
 };
 
 Unscented::Transform Unscented::TransformOf(Eigen::Index directions, int halvings) const {
@@ -142,8 +143,9 @@ const Eigen::MatrixXd& Unscented::Root(FilterState& f) {
   if (defect < -kRounding) {
     f.motions.EndInterval();
     p.SetBlock(0, 0, root_ * root_.transpose());
-    f.Note("repaired", "the covariance has no square root: a pivot is " + RoundedText(defect, 3) +
-                           " of its largest variance; negative pivots count as zero");
+    Note(f, "repaired",
+         "the covariance has no square root: a pivot is " + RoundedText(defect, 3) +
+             " of its largest variance; negative pivots count as zero");
   }
   return root_;
 }
@@ -181,9 +183,10 @@ void Unscented::NoteGuard(FilterState& f, std::size_t index, int halvings, bool 
     const std::string who = index < f.binding->sensors.size()
                                 ? "sensor '" + f.binding->system.sensors[index].name + "'"
                                 : "motion";
-    f.Note("guarded", who + ": sigma points leave its domain or have no mean" +
-                          (narrow_enough ? "" : ", and their spread can be narrowed no further") +
-                          "; their spread is divided by " + std::to_string(1 << halvings));
+    Note(f, "guarded",
+         who + ": sigma points leave its domain or have no mean" +
+             (narrow_enough ? "" : ", and their spread can be narrowed no further") +
+             "; their spread is divided by " + std::to_string(1 << halvings));
   }
   guarded_[index] = guarded;
 }
@@ -211,8 +214,12 @@ Status Unscented::StepPoint(FilterState& f, const double* from, const double* no
     const Eigen::Map<const RowMajor> l(step.l.data(), inputs, inputs);
     Workspace::Vector(w.data(), inputs).noalias() =
         l * Eigen::Map<const Eigen::VectorXd>(noise, inputs);
-    const Status status =
-        motion.model.Step(x_.data(), step.u, w.data(), dt_s, stepped_.data(), nullptr, nullptr);
+    const Status status = motion.model.Step(x_.data(), step.u.data(), w.data(), dt_s,
+                                            stepped_.data(), nullptr, nullptr);
+    if (status == Status::kError) {
+      failed_ = motion.name;
+      failure_ = motion.model.error_text();
+    }
     if (status != Status::kOk) return status;
     noise += inputs;
   }
@@ -242,8 +249,8 @@ Status Unscented::StepPoints(FilterState& f, int halvings, double dt_s) {
       noise[direction - n] = c;
       if (goes_on) dx = c * held_.col(direction - n);
     }
-    f.state.Retract(dx.data(), f.moved);
-    status = StepPoint(f, f.moved.data(), noise.data(), dt_s, points.col(i).data());
+    f.state.Retract(dx.data(), f.buffers.moved);
+    status = StepPoint(f, f.buffers.moved.data(), noise.data(), dt_s, points.col(i).data());
   }
   if (status != Status::kOk) return status;
   Workspace::Vector mean = f.work.Take(size), m = f.work.Take(n);
@@ -284,6 +291,10 @@ Trouble Unscented::Step(FilterState& f, double dt_s) {
     NoteGuard(f, guarded_.size() - 1, halvings, true);
     return {};
   }
+  if (status == Status::kError) {
+    return {"plugin_failed",
+            "motion model of '" + failed_ + "' cannot step a sigma point: " + failure_};
+  }
   return {"diverged", "the sigma points cannot step, also with their spread divided by " +
                           std::to_string(1 << halvings)};
 }
@@ -300,9 +311,9 @@ Outcome Unscented::PredictPoints(FilterState& f, Row& row, int halvings) {
   Workspace::Matrix points = f.work.Take(geometry.ambient, 2 * n);
   for (Eigen::Index i = 0; i < 2 * n; ++i) {
     dx = (i < n ? transform.c : -transform.c) * root.col(i % n);
-    f.state.Retract(dx.data(), f.moved);
+    f.state.Retract(dx.data(), f.buffers.moved);
     const Outcome outcome =
-        OutcomeOf(row.model->Predict(RolesAt(f, row, f.moved), points.col(i).data()));
+        OutcomeOf(row.model->Predict(RolesAt(f, row, f.buffers.moved), points.col(i).data()));
     if (outcome != Outcome::kAccepted) return outcome;
   }
   Predicted& predicted = PredictedOf(f, row);
@@ -349,7 +360,7 @@ Outcome Unscented::Predict(FilterState& f, Row& row) {
   }
   row.report->h.clear();
   row.report->innovation.clear();
-  if (!too_wide) f.NoteRefusal(row, outcome);
+  if (!too_wide) NoteRefusal(f, row, outcome);
   return outcome;
 }
 
@@ -361,9 +372,9 @@ void Unscented::Project(FilterState& f, Row& row) {
   const Eigen::Index m = moments.m.size();
   Workspace::Matrix s = f.work.Take(m, m);
   MomentsOf(transform.w, moments.f, transform.centre, moments.m, s);
-  s += Eigen::Map<const RowMajor>(row.r.data(), m, m);
+  s += Eigen::Map<const RowMajor>(row.R.data(), m, m);
   row.report->s.assign(s.data(), s.data() + s.size());
-  row.pht.clear();
+  row.PHt.clear();
 }
 
 /// All rows at one spread: f in place of H, R, innovation and m below one another.
@@ -381,13 +392,14 @@ Outcome Unscented::StackPoints(FilterState& f, std::span<Row* const> rows, int h
       if (outcome != Outcome::kAccepted) {
         entry.h.swap(reported_h_);
         entry.innovation.swap(reported_innovation_);
+        NoteRefusal(f, *row, outcome);
         return outcome;
       }
     }
     const Moments moments = MomentsAt(f, *row);
     const Eigen::Index k = moments.m.size();
     all.h.middleRows(at, k) = moments.f;
-    all.noise.block(at, at, k, k) = Eigen::Map<const RowMajor>(row->r.data(), k, k);
+    all.noise.block(at, at, k, k) = Eigen::Map<const RowMajor>(row->R.data(), k, k);
     all.innovation.segment(at, k) = Eigen::Map<const Eigen::VectorXd>(entry.innovation.data(), k);
     mean.segment(at, k) = moments.m;
     if (narrower) {
@@ -417,7 +429,7 @@ Outcome Unscented::Correct(FilterState& f, std::span<Row* const> rows) {
   MomentsOf(transform.w, all.h, transform.centre, mean, s);
   s += all.noise;
   if (!Factorise(s)) {
-    f.Note("not_pd", "the update would leave S not positive definite; rolled back");
+    Note(f, "not_pd", "the update would leave S not positive definite; rolled back");
     return Outcome::kNotPd;
   }
   if (n == 0) {  // nothing to correct, and Eigen solves for one row at least
@@ -437,13 +449,13 @@ Outcome Unscented::Correct(FilterState& f, std::span<Row* const> rows) {
   MomentsOf(transform.w, rest, transform.centre, centre, p);
   spread.noalias() = gain * all.noise;
   p.noalias() += spread * gain.transpose();
-  f.state.Retract(step.data(), f.moved);
-  if (!AllFinite(f.moved) || !p.allFinite()) {
-    f.Note("not_finite", "the update is not finite; rolled back");
+  f.state.Retract(step.data(), f.buffers.moved);
+  if (!AllFinite(f.buffers.moved) || !p.allFinite()) {
+    Note(f, "not_finite", "the update is not finite; rolled back");
     return Outcome::kNotFinite;
   }
   f.state.covariance().SetBlock(0, 0, p);
-  f.state.MoveTo(f.moved);
+  f.state.MoveTo(f.buffers.moved);
   root_is_current_ = false;
   f.RecordUpdate(rows, gain.data());
   return Outcome::kAccepted;

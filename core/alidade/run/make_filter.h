@@ -11,9 +11,10 @@
 namespace alidade {
 
 /// The filter that the entry `name` of a config's `estimators:` describes, for live use: the config
-/// needs no `source:`, and one that it has is not read. The filter's streams are those that its
-/// sensors and control inputs name. Errors: those of BuildExperiment, and kBadConfig where the
-/// entry is not there or its type is no recursive filter of core.
+/// needs no `source:`; keys of a run, such as `source` or `on_divergence`, have no effect. The
+/// filter's streams are those that its sensors and control inputs name. Errors: those of
+/// BuildExperiment, and kBadConfig where the entry is not there or its type is not a recursive
+/// filter of core.
 std::unique_ptr<Filter> MakeFilter(const Config& config, const PluginHost& host,
                                    const std::string& name);
 

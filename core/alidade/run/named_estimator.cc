@@ -53,6 +53,23 @@ std::vector<std::string> ReadSensorList(const Node& entry, const Node& root) {
   return names;
 }
 
+/// What the sensors and control inputs of a system take, each stream once.
+std::vector<StreamInfo> StreamsOf(const System& system) {
+  std::vector<StreamInfo> streams;
+  const auto add = [&](const std::string& name, int size) {
+    if (std::ranges::find(streams, name, &StreamInfo::name) == streams.end()) {
+      streams.push_back({name, size});
+    }
+  };
+  for (const SensorBinding& sensor : system.sensors) {
+    add(sensor.stream, sensor.model.measurement().geometry.ambient);
+  }
+  for (const MotionBinding& motion : system.motions) {
+    if (motion.model.has_input()) add(motion.input.stream, motion.model.input().geometry.ambient);
+  }
+  return streams;
+}
+
 void CheckName(const std::string& name, const Node& entry) {
   ExpectName(name, entry, "an estimator");
   if (name == "figures") {
@@ -181,7 +198,7 @@ void CheckCanRollBack(const NamedEstimator& named, const Node& entry) {
 }  // namespace
 
 NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const Config& config,
-                              const PluginHost& host, const std::vector<StreamInfo>& streams,
+                              const PluginHost& host, const std::vector<StreamInfo>* streams,
                               const std::vector<NamedEstimator>& before) {
   CheckName(name, entry);
   NamedEstimator named;
@@ -216,10 +233,10 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
     type.Fail("estimator type '" + named.type + "' does not support landmarks",
               "`sensors` that measure none, or type: ekf");
   }
-  CheckStreams(own.root(), named.system, streams);
+  if (streams != nullptr) CheckStreams(own.root(), named.system, *streams);
   const bool lent = use && use->is_map();  // landmarks are initialised as in the other estimator
   if (lent && named.system.landmarks) named.system.landmarks->min_observations = 1;
-  named.estimator = make(named.system, streams);
+  named.estimator = make(named.system, streams != nullptr ? *streams : StreamsOf(named.system));
   if (use) named.accepted_by = ReadUse(*use, named, config.root().At("estimators"), before);
   return named;
 }
@@ -246,7 +263,7 @@ void CheckStreams(const Node& root, const System& system, const std::vector<Stre
 void AddCalibrated(const Config& config, const PluginHost& host, const std::string& name,
                    Experiment& experiment) {
   const Node entry = config.root().At("estimators").At(name);
-  NamedEstimator named = BuildEstimator(name, entry, config, host, experiment.source->streams(),
+  NamedEstimator named = BuildEstimator(name, entry, config, host, &experiment.source->streams(),
                                         experiment.estimators);
   if (experiment.out_of_sequence.policy == OutOfSequence::kRollback) CheckCanRollBack(named, entry);
   experiment.estimators.push_back(std::move(named));

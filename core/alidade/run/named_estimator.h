@@ -16,10 +16,10 @@ int FindStream(const Node& sensor, const SensorModel& model,
 /// Refuses a sensor or a control input whose stream the source does not have. Errors: kBadConfig.
 void CheckStreams(const Node& root, const System& system, const std::vector<StreamInfo>& streams);
 
-/// The entry `name` of the config's `estimators:`, given the streams of its source and the
-/// estimators before it. Errors: those of BuildExperiment.
+/// The entry `name` of the config's `estimators:`, given the streams of its source (null: those
+/// that it takes) and the estimators before it. Errors: those of BuildExperiment.
 NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const Config& config,
-                              const PluginHost& host, const std::vector<StreamInfo>& streams,
+                              const PluginHost& host, const std::vector<StreamInfo>* streams,
                               const std::vector<NamedEstimator>& before);
 
 /// Makes the entry `name` of the config's `estimators:` and puts it behind those that the

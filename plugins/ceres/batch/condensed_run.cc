@@ -136,14 +136,14 @@ bool CondensedRun::AddSteps(Timestamp from, Timestamp end, Epoch& epoch) {
     for (std::size_t i = 0; i < system_.motions.size(); ++i) {
       const MotionBinding& motion = system_.motions[i];
       if (motion.model.stationary() || !AllPresent(motion.blocks)) continue;
-      const double* const u = controls_.Use(i, from, events);
+      const std::span<const double> u = controls_.Use(i, from, events);
       Step& step = epoch.steps.emplace_back();
       step.motion = i;
       step.dt_s = Seconds(elapsed) / static_cast<double>(parts);
       step.begins = held_[i] < 0;
       step.column = step.begins ? inputs_ : held_[i];
       step.columns = inputs_;
-      if (u != nullptr) step.u.assign(u, u + motion.model.input().geometry.ambient);
+      step.u.assign(u.begin(), u.end());
       if (step.begins) inputs_ += motion.model.noise_size();
       if (Holds(i)) held_[i] = step.column;
     }

@@ -56,6 +56,7 @@ sensors:
 estimators:
   alone: {type: iekf, gate: 0.99}
   late: {type: rts}
+  other: {type: ekf, overrides: {sensors: {stereo: {stream: right}}}}
 )",
                                          "live.yaml");
   const PluginHost host;
@@ -70,6 +71,7 @@ estimators:
     }
     return "";
   };
+  EXPECT_EQ(MakeFilter(config, host, "other")->stream("right"), 0);
   EXPECT_NE(refusal("late").find("'rts' is not a recursive filter"), std::string::npos);
   EXPECT_NE(refusal("late").find("live.yaml:14"), std::string::npos) << refusal("late");
   EXPECT_NE(refusal("deep").find("estimators.deep"), std::string::npos) << refusal("deep");

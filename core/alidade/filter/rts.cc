@@ -11,7 +11,6 @@
 
 namespace alidade {
 namespace internal {
-namespace {
 
 /// How the adjoint goes back over a frame: lambda <- A' lambda + b, Lambda <- A' Lambda A +
 /// information. Where the frame starts inside an interval, A has columns for w behind those of x.
@@ -44,6 +43,8 @@ void Adjoint::GoBack(Eigen::Index held, Eigen::VectorXd& lambda,
   later_information = whole.transpose() * later_information * whole + information;
   later_information = 0.5 * (later_information + later_information.transpose()).eval();
 }
+
+namespace {
 
 /// Linear, that takes its steps and updates down as an adjoint.
 class Taped : public Method {

@@ -244,6 +244,34 @@ TEST(Landmarks, GoBackToTheGenerationsOfTheirPast) {
   EXPECT_EQ(see(2), 2);
 }
 
+/// Its noise is held from one update to the next.
+struct HeldWalk : Walk {
+  using Walk::Walk;
+  NoiseKind noise_kind() const { return NoiseKind::kDiscrete; }
+};
+
+// Nothing is measured at 0.1 s but a landmark that waits: the interval goes on to 0.2 s, whether
+// another one is pruned on the way or not.
+TEST(Landmarks, ThatArePrunedDoNotEndAnIntervalOfHeldNoise) {
+  const auto camera = [](int max_missed_frames) {
+    LandmarkOptions options;
+    options.min_observations = 2;
+    options.max_missed_frames = max_missed_frames;
+    System system = MapSystem(Offset(0.1), options, 0.3);
+    system.motions[0].model = InProcessMotion(HeldWalk(0.1), "held_walk");
+    Ekf ekf(system, {}, {{"tracks", 3}});
+    for (int i = 0; i < 2; ++i) ekf.Process(FrameOf(0.0, {{1, {0, 0, 1}}}));
+    EXPECT_EQ(ekf.landmarks().size(), 1u);
+    ekf.Process(FrameOf(0.1, {{2, {0, 0, 1}}}));
+    EXPECT_EQ(ekf.landmarks().size(), max_missed_frames == 0 ? 1u : 0u);
+    ekf.Process(FrameOf(0.2, {}));
+    return ekf.state().covariance().Variance(0);
+  };
+  EXPECT_DOUBLE_EQ(camera(1), camera(0));
+  // Held: 2 sigma sqrt(dt) w.
+  EXPECT_NEAR(camera(0), 0.3 * 0.3 + 4.0 * 0.1 * 0.1 * 0.1, 1e-12);
+}
+
 TEST(Landmarks, WhoseFirstEndIsGoneBackOverAreTheFirstOfTheirId) {
   LandmarkOptions options;
   options.max_missed_frames = 1;

@@ -144,6 +144,19 @@ TEST(Live, NamesAreThoseOfTheConfigAndAWrongOneIsAnErrorThatListsThem) {
             "no sensor 'stereo'; the filter has disparity, inverse_scale");
 }
 
+TEST(Live, AReadingThatNoSensorTakesIsAnErrorAndChangesNothing) {
+  Ekf ekf = MakeLive<Ekf>();
+  ekf.Start(0);
+  const State before = ekf.state();
+  EXPECT_THROW(ekf.Push(1'000'000, {{2, {80.0}}}), Error);
+  EXPECT_THROW(ekf.Push(1'000'000, {{-1, {80.0}}}), Error);
+  EXPECT_THROW(ekf.Push(1'000'000, {{0, {80.0}}, {1, {1.0, 2.0}}}), Error);
+  EXPECT_THROW(ekf.Push(1'000'000, {{0, {80.0}, -1, {1.0, 0.0}}}), Error);
+  ExpectSame(ekf.state(), before);
+  EXPECT_EQ(ekf.timestamp(), 0);
+  EXPECT_EQ(ekf.Push(1'000'000, {{0, {80.0}, -1, {4.0}}}).measurements().size(), 1u);
+}
+
 TEST(Live, ExpectsNothingWhereHIsNotDefinedOrNothingIsThereToMeasure) {
   System system = DepthFilter();
   system.priors[0].mean = {-0.1};  // behind the camera

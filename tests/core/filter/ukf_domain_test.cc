@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <stdexcept>
 
 #include "alidade/filter/ukf.h"
 #include "support/systems.h"
@@ -31,6 +32,29 @@ TEST(Ukf, PointsThatWouldLeaveTheDomainAreDrawnNearerAndThatIsSaid) {
   for (int k = 1; k < 20; ++k) ukf.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.1}}));
   EXPECT_FALSE(HasEvent(ukf.Process(FrameAt(0.0, {{0, 80.0}})), "guarded"));
   EXPECT_NEAR(ValueOf(ukf.state(), "target.depth"), 26.0 / 80.0, 0.005);
+}
+
+/// Stays at 1, and throws elsewhere.
+struct Stubborn : Motion<1, Vec<1>> {
+  static constexpr std::array kBlocks{Quantity{"x"}};
+  template <class T>
+  void Step(const T* x, const T*, double, T* next) const {
+    if (!(x[0] == T(1.0))) throw std::runtime_error("only from 1");
+    next[0] = x[0];
+  }
+  void SqrtQ(double, MatrixRef l) const { l(0, 0) = 0.1; }
+};
+
+TEST(Ukf, APluginThatFailsAtAPointIsSaidToFail) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Stubborn{}, "stubborn"), {{"x", 1.0, 0.5}});
+  Ukf ukf(system, {}, {});
+  ukf.Start(0);
+  const UpdateReport& report = ukf.Process(FrameAt(0.1, {}));
+  EXPECT_TRUE(ukf.failed());
+  ASSERT_TRUE(HasEvent(report, "plugin_failed"));
+  EXPECT_NE(report.events.back().text.find("only from 1"), std::string::npos)
+      << report.events.back().text;
 }
 
 /// z = x + 5 + n, linear, but defined for x > 0 alone.

@@ -86,7 +86,7 @@ void Consensus::SupportOf(FilterState& f, std::size_t hypothesis, std::span<Row*
     const MeasurementReport& entry = *row.report;
     h.resize(entry.z.size());
     r.resize(static_cast<std::size_t>(entry.dof));
-    if (row.model->Predict(RolesAt(f, row, f.buffers.moved), h.data()) != Status::kOk) continue;
+    if (PredictAt(f, row, f.buffers.moved, h.data()) != Outcome::kAccepted) continue;
     row.model->measurement().geometry.Minus(entry.z.data(), h.data(), r.data());
     work.resize(r.size() * (r.size() + 1));
     const double d2 = SquaredMahalanobis(row.R.data(), r.data(), entry.dof, work.data());

@@ -17,10 +17,14 @@ const double* const* RolesAt(FilterState& f, const Row& row, const std::vector<d
   return f.buffers.roles.data();
 }
 
+Outcome PredictAt(FilterState& f, const Row& row, const std::vector<double>& x, double* h) {
+  return OutcomeOf(row.model->Predict(RolesAt(f, row, x), h));
+}
+
 Outcome LineariseAt(FilterState& f, Row& row, const double* const* roles) {
   const SensorPlace& place = *row.place;
   const int m = row.report->dof;
-  row.H.assign(static_cast<std::size_t>(m * place.width), 0.0);
+  row.H.assign(static_cast<std::size_t>(m) * static_cast<std::size_t>(place.width), 0.0);
   for (const JacobianPart& part : place.parts) {
     for (int i = 0; i < m; ++i) {
       std::fill_n(row.H.data() + i * place.width + part.column, part.size, std::nan(""));

@@ -14,6 +14,9 @@ namespace alidade::internal {
 /// next call.
 const double* const* RolesAt(FilterState& f, const Row& row, const std::vector<double>& x);
 
+/// h at x, ambient, in `h`.
+Outcome PredictAt(FilterState& f, const Row& row, const std::vector<double>& x, double* h);
+
 /// h at the roles, in the report, and H, in the row; of H what the model does not write is not a
 /// number.
 Outcome LineariseAt(FilterState& f, Row& row, const double* const* roles);

@@ -104,7 +104,6 @@ ALIDADE_INLINE bool FastPath::Step(double dt_s) {
 template <int N, int M>
 ALIDADE_INLINE bool FastPath::Linearise(Sensor& sensor, const double* z, MeasurementReport& entry,
                                         double* pht) {
-  constexpr double kTiny = 1e-13;
   constexpr int kMost = M > 0 ? M : kMostOfOne;
   const int m = M > 0 ? M : sensor.rows;
   const Covariance& p = f_.state.covariance();
@@ -129,7 +128,7 @@ ALIDADE_INLINE bool FastPath::Linearise(Sensor& sensor, const double* z, Measure
   }
   Project<N>(p.data(), p.stride(), sensor.h.data(), m, pht, s);
   bool tiny = false;
-  for (int i = 0; i < m; ++i) tiny |= !(noise[i] > kTiny * s[i * m + i]);
+  for (int i = 0; i < m; ++i) tiny |= !(noise[i] > Gate::kVanishing * s[i * m + i]);
   if (tiny && !parts_.gate.warned(static_cast<std::size_t>(entry.sensor))) return false;
   double work[kMost * (kMost + 1)];
   entry.nis = SquaredMahalanobis(s, r, m, work);

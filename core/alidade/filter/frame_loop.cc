@@ -177,7 +177,7 @@ std::optional<Prediction> FrameLoop::Expect(int sensor, std::int64_t landmark) {
   row.report->outcome = Outcome::kAccepted;  // whatever Valid says of what is no measurement yet
   if (landmarks) landmarks->Attach(f, {&row, 1});
   if (row.report->outcome != Outcome::kAccepted || !IsReady(f, row) ||
-      row.model->Predict(RolesAt(f, row, f.state.values()), one.values.data()) != Status::kOk) {
+      PredictAt(f, row, f.state.values(), one.values.data()) != Outcome::kAccepted) {
     return std::nullopt;
   }
   row.report->z = one.values;  // as if it measured what it expects

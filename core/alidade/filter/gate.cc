@@ -55,7 +55,6 @@ void Gate::Weigh(Row& row) {
 
 /// Warns once for each sensor whose noise vanishes compared with H P H'.
 void Gate::CheckConditioning(FilterState& f, const Row& row) {
-  constexpr double kTiny = 1e-13;
   const auto sensor = static_cast<std::size_t>(row.sensor);
   if (warned_[sensor]) return;
   const auto m = static_cast<std::size_t>(row.report->dof);
@@ -64,7 +63,7 @@ void Gate::CheckConditioning(FilterState& f, const Row& row) {
   for (std::size_t i = 0; i < m && !tiny; ++i) {
     noise = row.R[i * m + i];
     total = row.report->s[i * m + i];
-    tiny = noise <= kTiny * total || noise <= 0.0;
+    tiny = noise <= kVanishing * total || noise <= 0.0;
   }
   if (!tiny) return;
   warned_[sensor] = true;

@@ -12,6 +12,9 @@ namespace alidade::internal {
 /// depends on the same distance.
 class Gate {
  public:
+  /// Of S, less noise than this vanishes compared with H P H'.
+  static constexpr double kVanishing = 1e-13;
+
   /// `probability` >= 1: all that is finite passes.
   Gate(const System& system, double probability);
 

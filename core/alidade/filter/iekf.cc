@@ -171,7 +171,7 @@ bool Iterated::Innovations(FilterState& f, std::span<Row* const> rows,
   for (Row* row : rows) {
     MeasurementReport& entry = *row->report;
     const SensorModel& model = *row->model;
-    if (model.Predict(RolesAt(f, *row, iterate_), entry.h.data()) != Status::kOk) return false;
+    if (PredictAt(f, *row, iterate_, entry.h.data()) != Outcome::kAccepted) return false;
     model.measurement().geometry.Minus(entry.z.data(), entry.h.data(), innovations.data() + at);
     at += entry.dof;
   }

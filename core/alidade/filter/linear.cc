@@ -8,6 +8,7 @@
 #include "alidade/filter/evaluate_models.h"
 #include "alidade/filter/factorise.h"
 #include "alidade/filter/stack.h"
+#include "alidade/state/small_kernels.h"
 
 namespace alidade::internal {
 namespace {
@@ -18,7 +19,6 @@ namespace {
 /// stay positive.
 bool Update(Covariance& p, const Eigen::MatrixXd& w, const Eigen::MatrixXd& lost,
             const Eigen::MatrixXd& gain, const Stacked& all) {
-  constexpr double kCancelled = 1e-10;
   bool joseph = false;
   for (int i = 0; i < p.size() && !joseph; ++i) {
     const double kept = lost.size() == 0 ? 0.0 : lost.row(i).squaredNorm();
@@ -99,7 +99,7 @@ Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
   const SensorModel& model = *row.model;
   MeasurementReport& entry = *row.report;
   entry.h.assign(static_cast<std::size_t>(model.measurement().geometry.ambient), std::nan(""));
-  Outcome outcome = OutcomeOf(model.Predict(f.buffers.roles.data(), entry.h.data()));
+  Outcome outcome = PredictAt(f, row, f.state.values(), entry.h.data());
   if (outcome != Outcome::kAccepted) return outcome;
   if (!implied_.empty()) {
     const Status status =
@@ -125,7 +125,7 @@ Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
 }
 
 void Linear::Project(FilterState& f, Row& row) {
-  row.PHt.resize(static_cast<std::size_t>(f.size() * row.report->dof));
+  row.PHt.resize(static_cast<std::size_t>(f.size()) * static_cast<std::size_t>(row.report->dof));
   row.report->s.assign(row.R.begin(), row.R.end());
   f.state.covariance().Project(row.jacobian(), row.PHt.data(), row.report->s.data());
 }

@@ -42,7 +42,7 @@ class SquareRoot : public Method {
 
   /// Of a sensor's R.
   struct NoiseRoot {
-    Eigen::LDLT<Eigen::MatrixXd> ldlt;
+    Scratch<Eigen::LDLT<Eigen::MatrixXd>> ldlt;
     Eigen::MatrixXd root;
   };
 

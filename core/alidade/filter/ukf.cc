@@ -112,7 +112,7 @@ class Unscented : public Method {
   std::vector<bool> guarded_;         ///< by sensor; the last: the motion
   // Memory that is kept from step to step.
   Eigen::MatrixXd rest_, root_of_rest_;
-  Eigen::LDLT<Eigen::MatrixXd> ldlt_;
+  Scratch<Eigen::LDLT<Eigen::MatrixXd>> ldlt_;
   Scratch<std::vector<const double*>> x_;
   Scratch<std::vector<double*>> stepped_;
   std::vector<double> reported_h_, reported_innovation_;
@@ -312,8 +312,7 @@ Outcome Unscented::PredictPoints(FilterState& f, Row& row, int halvings) {
   for (Eigen::Index i = 0; i < 2 * n; ++i) {
     dx = (i < n ? transform.c : -transform.c) * root.col(i % n);
     f.state.Retract(dx.data(), f.buffers.moved);
-    const Outcome outcome =
-        OutcomeOf(row.model->Predict(RolesAt(f, row, f.buffers.moved), points.col(i).data()));
+    const Outcome outcome = PredictAt(f, row, f.buffers.moved, points.col(i).data());
     if (outcome != Outcome::kAccepted) return outcome;
   }
   Predicted& predicted = PredictedOf(f, row);
@@ -340,7 +339,7 @@ Unscented::Moments Unscented::MomentsAt(FilterState& f, const Row& row) {
 Outcome Unscented::Predict(FilterState& f, Row& row) {
   std::vector<double>& centre = PredictedOf(f, row).centre;
   centre.resize(static_cast<std::size_t>(row.model->measurement().geometry.ambient));
-  Outcome outcome = OutcomeOf(row.model->Predict(RolesAt(f, row, f.state.values()), centre.data()));
+  Outcome outcome = PredictAt(f, row, f.state.values(), centre.data());
   const bool defined = outcome == Outcome::kAccepted;  // at the estimate itself
   int halvings = 0;
   if (defined) outcome = PredictPoints(f, row, halvings);

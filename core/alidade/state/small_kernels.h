@@ -12,6 +12,8 @@
 namespace alidade::internal {
 
 inline constexpr int kSmall = Covariance::kSmall;
+/// Of a variance, less than this left of it has lost nearly all its digits.
+inline constexpr double kCancelled = 1e-10;
 
 /// r' S^-1 r by S = L D L', m x m; not a number where S is not positive definite. Writes over the
 /// m (m + 1) numbers of `work`.
@@ -168,7 +170,6 @@ template <int N, int M>
 template <int N, int M>
 [[gnu::always_inline]] inline bool Downdate(const double* p, int ld, int rows, const double* w,
                                             const double* inverse_d, double* updated) {
-  constexpr double kCancelled = 1e-10;
   const int m = M > 0 ? M : rows;
   bool kept = true;
   ALIDADE_UNROLL for (int c = 0; c < N; ++c) {

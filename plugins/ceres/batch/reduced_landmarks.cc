@@ -154,16 +154,18 @@ bool CondensedRun::PutMap(const double* e, const Eigen::MatrixXd& u,
         !NormalOf(*found, found->l, points, Undefined::kSkipped, normal, &unused)) {
       return false;
     }
-    Eigen::MatrixXd m = Eigen::MatrixXd::Zero(normal.b.size(), inputs_);
-    for (std::size_t i = 0; i < normal.epochs.size(); ++i) {
-      m.noalias() += normal.ties[i].transpose() * Packed(points[normal.epochs[i]].s);
-    }
     const Eigen::LLT<Eigen::MatrixXd> c(normal.c);
-    m = -place.by_d * c.solve(m);
-    if (found->first) m += place.by_x * points[found->first->epoch].s;
-    const Eigen::MatrixXd y = u.transpose().triangularView<Eigen::Lower>().solve(m.transpose());
-    const Eigen::MatrixXd p =
-        y.transpose() * y + place.by_d * c.solve(Eigen::MatrixXd(place.by_d.transpose()));
+    Eigen::MatrixXd p = place.by_d * c.solve(Eigen::MatrixXd(place.by_d.transpose()));
+    if (inputs_ > 0) {  // Eigen solves for one column at least
+      Eigen::MatrixXd m = Eigen::MatrixXd::Zero(normal.b.size(), inputs_);
+      for (std::size_t i = 0; i < normal.epochs.size(); ++i) {
+        m.noalias() += normal.ties[i].transpose() * Packed(points[normal.epochs[i]].s);
+      }
+      m = -place.by_d * c.solve(m);
+      if (found->first) m += place.by_x * points[found->first->epoch].s;
+      const Eigen::MatrixXd y = u.transpose().triangularView<Eigen::Lower>().solve(m.transpose());
+      p = (y.transpose() * y + p).eval();
+    }
     Describe(*found, p, estimate);
   }
   return true;

@@ -33,8 +33,8 @@ class AnyMethod {
   std::unique_ptr<Method> method_;
 };
 
-/// What a filter is made of, and what a frame goes through there. No part points into another: a
-/// copy is a filter by itself.
+/// What a filter is made of, and what a frame goes through there. No part points into another but
+/// the fast path, which a copy makes anew: a copy is a filter by itself.
 class FrameLoop {
  public:
   FrameLoop(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams,

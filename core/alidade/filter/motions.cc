@@ -52,6 +52,7 @@ Trouble Motions::EvaluateOne(std::size_t i, const State& state, double dt_s, boo
   Step& step = steps_[i];
   const double unwritten = std::nan("");
   const bool goes_on = place.holds && in_interval();
+  // The first step may have been the fast path's, which keeps no M.
   if (goes_on && interval_steps_ == 1) step.m = step.gl;
   std::ranges::fill(step.f, unwritten);
   std::ranges::fill(step.g, unwritten);

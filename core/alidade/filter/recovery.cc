@@ -93,7 +93,7 @@ void Recovery::RepairCovariance(FilterState& f, std::span<Row> rows) {
 
 void Recovery::CountRejections(FilterState& f, std::span<Row> rows) {
   for (Row& row : rows) {
-    if (row.binding->model.has_landmark()) continue;
+    if (f.binding->system.landmarks && row.binding->model.has_landmark()) continue;
     const auto sensor = static_cast<std::size_t>(row.sensor);
     const MeasurementReport& entry = *row.report;
     if (entry.outcome == Outcome::kAccepted || entry.outcome == Outcome::kInitialised) {

@@ -6,6 +6,7 @@
 #include "alidade/run/named_estimator.h"
 
 namespace alidade {
+
 std::unique_ptr<Filter> MakeFilter(const Config& config, const PluginHost& host,
                                    const std::string& name) {
   const Node entry = config.root().At("estimators", "a filter").At(name, "MakeFilter");
@@ -15,8 +16,7 @@ std::unique_ptr<Filter> MakeFilter(const Config& config, const PluginHost& host,
     entry.At("type").Fail("'" + named.type + "' is not a recursive filter",
                           "ekf, iekf, square_root_ekf or ukf");
   }
-  named.estimator.release();  // NOLINT(bugprone-unused-return-value): filter is the same
-  return std::unique_ptr<Filter>(filter);
+  return std::make_unique<Filter>(std::move(*filter));
 }
 
 }  // namespace alidade

@@ -38,7 +38,7 @@ MotionPlace PlaceOf(const MotionBinding& motion, const StateLayout& layout) {
   MotionPlace place;
   place.holds = motion.model.discrete_noise() && motion.model.noise_size() > 0;
   bool all = true;  // of its blocks are in P
-  int row = 0;
+  int row = 0, column = 0;
   for (const BlockId id : motion.blocks) {
     const Block& block = layout[id];
     const int size = block.geometry().tangent, offset = block.tangent_offset;
@@ -50,12 +50,12 @@ MotionPlace PlaceOf(const MotionBinding& motion, const StateLayout& layout) {
     row += size;
     all = all && offset >= 0;
     if (offset < 0) continue;
-    if (!place.segments.empty() &&
-        place.segments.back().first + place.segments.back().second == offset) {
-      place.segments.back().second += size;
+    if (!place.parts.empty() && place.parts.back().offset + place.parts.back().size == offset) {
+      place.parts.back().size += size;
     } else {
-      place.segments.emplace_back(offset, size);
+      place.parts.push_back({offset, size, column});
     }
+    column += size;
   }
   if (all) place.rows.clear();
   return place;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <utility>
 #include <vector>
 
 #include "alidade/host/source.h"
@@ -27,11 +26,11 @@ struct SensorPlace {
 
 /// How a motion model moves the state, by places in x and P.
 struct MotionPlace {
-  std::vector<int> values;                    ///< by block: in x
-  std::vector<std::pair<int, int>> segments;  ///< of P: (offset, size)
-  std::vector<int> rows;                      ///< of F that are in P; empty: all
-  std::vector<int> at;                        ///< in P, of each row of F; -1: not in P
-  bool holds = false;                         ///< its noise is discrete
+  std::vector<int> values;          ///< by block: in x
+  std::vector<JacobianPart> parts;  ///< of F, without the rows that are not in P
+  std::vector<int> rows;            ///< of F that are in P; empty: all
+  std::vector<int> at;              ///< in P, of each row of F; -1: not in P
+  bool holds = false;               ///< its noise is discrete
 };
 
 /// A system on its layout: which stream each sensor reads, and where its blocks and those of the

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/filter/consensus.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -11,6 +10,7 @@
 #include "alidade/filter/evaluate_models.h"
 #include "alidade/filter/stack.h"
 #include "alidade/state/small_kernels.h"
+#include "alidade/state/tiles.h"
 
 namespace alidade::internal {
 
@@ -29,68 +29,73 @@ bool Consensus::IsAsked(std::span<Row* const> rows) {
 }
 
 void Consensus::Split(FilterState& f, std::span<Row* const> rows, std::uint64_t seed,
-                      std::vector<Row*>& agreed, std::vector<Row*>& rest) const {
-  std::vector<Row*> matches;
+                      std::vector<Row*>& agreed, std::vector<Row*>& rest) {
+  matches_.clear();
   for (Row* const row : rows) {
-    (row->binding->outlier_rejection ? matches : agreed).push_back(row);
+    (row->binding->outlier_rejection ? matches_ : agreed).push_back(row);
   }
-  const std::vector<char> support = Support(f, matches, seed);
-  for (std::size_t i = 0; i < matches.size(); ++i) {
-    (support[i] != 0 ? agreed : rest).push_back(matches[i]);
+  FindBest(f, seed);
+  for (std::size_t i = 0; i < matches_.size(); ++i) {
+    (best_[i] != 0 ? agreed : rest).push_back(matches_[i]);
   }
 }
 
-std::vector<char> Consensus::Support(FilterState& f, std::span<Row* const> matches,
-                                     std::uint64_t seed) const {
+/// The best support, in best_.
+void Consensus::FindBest(FilterState& f, std::uint64_t seed) {
   Random random(seed);
-  std::vector<std::size_t> order(matches.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::vector<char> agrees, best;
+  order_.resize(matches_.size());
+  std::iota(order_.begin(), order_.end(), 0);
+  best_.assign(matches_.size(), 0);
   std::ptrdiff_t most = 0;
-  const double failure = 1.0 - matches[0]->binding->outlier_rejection->confidence;
-  double tries = static_cast<double>(order.size());
+  const double failure = 1.0 - matches_[0]->binding->outlier_rejection->confidence;
+  double tries = static_cast<double>(order_.size());
   for (std::size_t k = 0; static_cast<double>(k) < tries; ++k) {
-    const auto left = static_cast<double>(order.size() - k);
-    std::swap(order[k], order[k + static_cast<std::size_t>(left * random.Uniform())]);
-    SupportOf(f, order[k], matches, agrees);
+    const auto left = static_cast<double>(order_.size() - k);
+    std::swap(order_[k], order_[k + static_cast<std::size_t>(left * random.Uniform())]);
+    FindSupport(f, order_[k]);
     ++f.report.landmarks.hypotheses;
-    const std::ptrdiff_t count = std::ranges::count(agrees, 1);
+    const std::ptrdiff_t count = std::ranges::count(agrees_, 1);
     if (count <= most) continue;
     most = count;
-    best = agrees;
-    const double share = static_cast<double>(count) / static_cast<double>(order.size());
+    best_ = agrees_;
+    const double share = static_cast<double>(count) / static_cast<double>(order_.size());
     const double needed = share < 1.0 ? std::log(failure) / std::log1p(-share) : 1.0;
     tries = std::min(tries, needed);
   }
-  best.resize(matches.size(), 0);
-  return best;
 }
 
 /// Which of the matches lie within their noise of what the state predicts that one of them corrects
 /// by itself, as an update would: consider states stay, and known roles are seen as they are.
-void Consensus::SupportOf(FilterState& f, std::size_t hypothesis, std::span<Row* const> matches,
-                          std::vector<char>& agrees) const {
-  const Row& one = *matches[hypothesis];
+void Consensus::FindSupport(FilterState& f, std::size_t hypothesis) {
+  const Workspace::Use use(f.work);
+  const Row& one = *matches_[hypothesis];
   const MeasurementReport& own = *one.report;
   const Eigen::Index n = f.size(), m = own.dof;
-  Eigen::MatrixXd pht = Eigen::Map<const Eigen::MatrixXd>(one.PHt.data(), n, m);
-  MaskConsidered(f, matches.subspan(hypothesis, 1), pht);
-  const Eigen::Map<const Eigen::MatrixXd> s(own.s.data(), m, m);
-  const Eigen::Map<const Eigen::VectorXd> innovation(own.innovation.data(), m);
-  const Eigen::VectorXd dx = pht * s.llt().solve(innovation);
+  Workspace::Matrix pht = f.work.Take(n, m), s = f.work.Take(m, m);
+  Workspace::Vector y = f.work.Take(m), dx = f.work.Take(n);
+  pht = Eigen::Map<const Eigen::MatrixXd>(one.PHt.data(), n, m);
+  s = Eigen::Map<const Eigen::MatrixXd>(own.s.data(), m, m);
+  y = Eigen::Map<const Eigen::VectorXd>(own.innovation.data(), m);
+  ForEachConsidered(f, std::span(matches_).subspan(hypothesis, 1),
+                    [&](int offset, int size, Eigen::Index at, Eigen::Index k) {
+                      pht.block(offset, at, size, k).setZero();
+                    });
+  Factorise(s);  // positive definite: it has passed the gate
+  s.triangularView<Eigen::Lower>().solveInPlace(y);
+  s.triangularView<Eigen::Lower>().transpose().solveInPlace(y);
+  dx.noalias() = pht * y;
   f.state.Retract(dx.data(), f.buffers.moved);
-  agrees.assign(matches.size(), 0);
-  std::vector<double> h, r, work;
-  for (std::size_t i = 0; i < matches.size(); ++i) {
-    const Row& row = *matches[i];
+  agrees_.assign(matches_.size(), 0);
+  for (std::size_t i = 0; i < matches_.size(); ++i) {
+    const Row& row = *matches_[i];
     const MeasurementReport& entry = *row.report;
-    h.resize(entry.z.size());
-    r.resize(static_cast<std::size_t>(entry.dof));
-    if (PredictAt(f, row, f.buffers.moved, h.data()) != Outcome::kAccepted) continue;
-    row.model->measurement().geometry.Minus(entry.z.data(), h.data(), r.data());
-    work.resize(r.size() * (r.size() + 1));
-    const double d2 = SquaredMahalanobis(row.R.data(), r.data(), entry.dof, work.data());
-    agrees[i] = d2 <= support_[static_cast<std::size_t>(row.sensor)] ? 1 : 0;
+    h_.resize(entry.z.size());
+    r_.resize(static_cast<std::size_t>(entry.dof));
+    if (PredictAt(f, row, f.buffers.moved, h_.data()) != Outcome::kAccepted) continue;
+    row.model->measurement().geometry.Minus(entry.z.data(), h_.data(), r_.data());
+    work_.resize(r_.size() * (r_.size() + 1));
+    const double d2 = SquaredMahalanobis(row.R.data(), r_.data(), entry.dof, work_.data());
+    agrees_[i] = d2 <= support_[static_cast<std::size_t>(row.sensor)] ? 1 : 0;
   }
 }
 

@@ -22,19 +22,23 @@ class Consensus {
   /// the fewer are tried: log(1 - confidence) / log(1 - share of support). The same `seed` tries
   /// them in the same order.
   void Split(FilterState& f, std::span<Row* const> rows, std::uint64_t seed,
-             std::vector<Row*>& agreed, std::vector<Row*>& rest) const;
+             std::vector<Row*>& agreed, std::vector<Row*>& rest);
   /// Whether a row outside the support is close enough to the state after the update by it.
   bool Rescues(const Row& row) const {
     return row.report->nis <= rescue_[static_cast<std::size_t>(row.sensor)];
   }
 
  private:
-  std::vector<char> Support(FilterState& f, std::span<Row* const> matches,
-                            std::uint64_t seed) const;
-  void SupportOf(FilterState& f, std::size_t hypothesis, std::span<Row* const> matches,
-                 std::vector<char>& agrees) const;
+  void FindBest(FilterState& f, std::uint64_t seed);
+  void FindSupport(FilterState& f, std::size_t hypothesis);
 
   std::vector<double> support_, rescue_;  ///< bounds on r' R^-1 r and NIS, by sensor
+
+  // Memory.
+  Scratch<std::vector<Row*>> matches_;  ///< rows of sensors that ask for it
+  std::vector<std::size_t> order_;      ///< in which they are tried
+  std::vector<char> agrees_, best_;     ///< by match: whether it supports the hypothesis; the best
+  std::vector<double> h_, r_, work_;    ///< of one match
 };
 
 }  // namespace alidade::internal

@@ -77,31 +77,40 @@ void ChainJacobian(FilterState& f, Row& row, int column, int size, const double*
 }
 
 Outcome Invert(FilterState& f, Row& row, const LandmarkOptions::Prior* prior, Inverse& inverse) {
+  const Workspace::Use use(f.work);
   const SensorBinding& binding = *row.binding;
   const SensorModel& model = binding.model;
   const auto first = static_cast<std::size_t>(model.initialised_role());
   const auto count = static_cast<std::size_t>(model.initialised_count());
   const std::span<const Space> targets = std::span(model.roles()).subspan(first, count);
-  int rows = 0, size = 0;
+  const auto matrix = [&](Eigen::Index rows, Eigen::Index columns) {
+    Eigen::Map<RowMajor> taken(f.work.Take(rows * columns).data(), rows, columns);
+    taken.setConstant(std::nan(""));
+    return taken;
+  };
+  int size = 0;
+  inverse.rows = inverse.columns = 0;
+  inverse.from.clear();
   for (const Space& target : targets) {
-    rows += target.geometry.tangent;
+    inverse.rows += target.geometry.tangent;
     size += target.geometry.ambient;
   }
-  std::vector<const double*> roles(binding.roles.size(), nullptr);
-  std::vector<RowMajor> jacobians(roles.size());
-  std::vector<double*> jx(roles.size(), nullptr);
+  std::vector<const double*>& roles = f.buffers.roles;
+  std::vector<double*>& jx = f.buffers.jacobians;
+  roles.assign(binding.roles.size(), nullptr);
+  jx.assign(binding.roles.size(), nullptr);
   for (std::size_t i = 0; i < roles.size(); ++i) {
     const RoleBinding& role = binding.roles[i];
     if ((i >= first && i < first + count) || role.block < 0) continue;
     roles[i] = f.state.value(role.block);
     const Block& block = f.state.layout()[role.block];
     if (role.mode == RoleMode::kKnown || !block.has_covariance()) continue;
-    jacobians[i] = RowMajor::Constant(rows, block.geometry().tangent, std::nan(""));
-    jx[i] = jacobians[i].data();
+    jx[i] = matrix(inverse.rows, block.geometry().tangent).data();
+    inverse.from.push_back(role.block);
+    inverse.columns += block.geometry().tangent;
   }
   const int m = model.measurement().geometry.tangent;
-  RowMajor jz = RowMajor::Constant(rows, m, std::nan(""));
-  RowMajor jp = RowMajor::Constant(rows, model.prior_size(), std::nan(""));
+  Eigen::Map<RowMajor> jz = matrix(inverse.rows, m), jp = matrix(inverse.rows, model.prior_size());
   inverse.y.resize(static_cast<std::size_t>(size));
   const Status status = model.Initialise(roles.data(), row.measurement->values.data(),
                                          prior == nullptr ? nullptr : &prior->inverse_distance,
@@ -120,16 +129,22 @@ Outcome Invert(FilterState& f, Row& row, const LandmarkOptions::Prior* prior, In
   if (outcome != Outcome::kAccepted) {
     return outcome == Outcome::kFailed ? outcome : Outcome::kInvalid;
   }
-  const Eigen::Map<const RowMajor> r(row.R.data(), m, m);
-  inverse.own = jz * r * jz.transpose();
-  if (prior != nullptr) inverse.own += prior->sigma * prior->sigma * jp * jp.transpose();
-  bool finite = AllFinite(inverse.y) && inverse.own.allFinite();
+  Eigen::Map<RowMajor> jz_r = matrix(inverse.rows, m);
+  inverse.own.resize(static_cast<std::size_t>(inverse.rows * inverse.rows));
+  Eigen::Map<RowMajor> own(inverse.own.data(), inverse.rows, inverse.rows);
+  jz_r.noalias() = jz * Eigen::Map<const RowMajor>(row.R.data(), m, m);
+  own.noalias() = jz_r * jz.transpose();
+  if (prior != nullptr) own.noalias() += prior->sigma * prior->sigma * jp * jp.transpose();
+  inverse.jacobian.resize(static_cast<std::size_t>(inverse.rows * inverse.columns));
+  Eigen::Map<RowMajor> jacobian(inverse.jacobian.data(), inverse.rows, inverse.columns);
+  Eigen::Index column = 0;
   for (std::size_t i = 0; i < roles.size(); ++i) {
     if (jx[i] == nullptr) continue;
-    finite = finite && jacobians[i].allFinite();
-    inverse.from.push_back(binding.roles[i].block);
-    inverse.jacobians.emplace_back(jacobians[i]);
+    const Eigen::Index width = model.roles()[i].geometry.tangent;
+    jacobian.middleCols(column, width) = Eigen::Map<const RowMajor>(jx[i], inverse.rows, width);
+    column += width;
   }
+  const bool finite = AllFinite(inverse.y) && own.allFinite() && jacobian.allFinite();
   return finite ? Outcome::kAccepted : Outcome::kNotFinite;
 }
 

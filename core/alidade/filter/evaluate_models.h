@@ -32,10 +32,11 @@ void ChainJacobian(FilterState& f, Row& row, int column, int size, const double*
 
 /// What a measurement tells of the roles that its sensor initialises: y = g(other roles, z, prior).
 struct Inverse {
-  std::vector<double> y;                   ///< values, one role after the other
-  std::vector<BlockId> from;               ///< the blocks that it took
-  std::vector<Eigen::MatrixXd> jacobians;  ///< dy/d from
-  Eigen::MatrixXd own;                     ///< J_z R J_z' + J_p sigma^2 J_p', p the prior
+  std::vector<double> y;               ///< values, one role after the other
+  std::vector<BlockId> from;           ///< the blocks that it took
+  std::vector<double> jacobian;        ///< dy/d from, their columns side by side, row-major
+  std::vector<double> own;             ///< J_z R J_z' + J_p sigma^2 J_p', p the prior; row-major
+  Eigen::Index rows = 0, columns = 0;  ///< of the Jacobian
 };
 /// The inverse of a row's measurement at the state. `prior` may be null where the model needs none.
 /// kAccepted, or why not.

@@ -8,14 +8,6 @@
 
 namespace alidade::internal {
 
-/// Puts L of a symmetric S = L L' in place of its lower triangle; false unless S is finite and
-/// positive definite. (Eigen's own LLT reports success on NaN.)
-inline bool Factorise(Eigen::Ref<Eigen::MatrixXd> s) {
-  if (!s.allFinite()) return false;
-  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(s);
-  return llt.info() == Eigen::Success && (s.diagonal().array() > 0.0).all();
-}
-
 /// A square root A of a symmetric, positive semi-definite P = A A', singular or not, from the
 /// pivoted L D L' of its lower triangle. Returns the most negative pivot, over the largest
 /// variance; 0: none. Negative pivots count as zero. `ldlt` is memory.

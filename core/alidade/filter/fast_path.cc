@@ -297,11 +297,11 @@ bool FastPath::AddMotions() {
     Motions::Step& step = f_.motions.steps()[i];
     const MotionPlace& place = binding.motions[i];
     if (!step.active) continue;
-    if (place.segments.size() != 1 || !place.rows.empty()) return false;
+    if (place.parts.size() != 1 || !place.rows.empty()) return false;
     const MotionModel& model = binding.system.motions[i].model;
-    const auto [offset, size] = place.segments[0];
-    Motion& motion =
-        motions_.emplace_back(Motion{&model, &step, {}, {}, offset, size, model.noise_size()});
+    const JacobianPart& part = place.parts[0];
+    Motion& motion = motions_.emplace_back(
+        Motion{&model, &step, {}, {}, part.offset, part.size, model.noise_size()});
     for (const int value : place.values) {
       motion.x.push_back(f_.state.values().data() + value);
       motion.next.push_back(f_.motions.next().data() + value);

@@ -73,12 +73,10 @@ void FilterState::RecordUpdate(std::span<Row* const> rows, const double* gain) {
   motions.EndInterval();
   const int n = size();
   for (const Row* row : rows) {
+    if (gain == nullptr) break;
     const double* const end = gain + n * row->report->dof;
-    if (row->model->has_landmark()) {  // its gain is not recorded
-      gain = end;
-      continue;
-    }
     for (; gain != end; gain += n) {
+      if (!row->gain_is_recorded()) continue;
       for (const int i : gain_rows_) row->report->gain.push_back(gain[i]);
     }
   }

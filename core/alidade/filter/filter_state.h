@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "alidade/base/workspace.h"
 #include "alidade/filter/binding.h"
 #include "alidade/filter/estimator.h"
 #include "alidade/filter/motions.h"
 #include "alidade/filter/rows.h"
-#include "alidade/filter/workspace.h"
 #include "alidade/state/state.h"
 
 namespace alidade::internal {
@@ -37,7 +37,7 @@ struct FilterState {
   /// Has to be called when a block of the system gets its first value.
   void Activate();
   /// Takes an update down in the reports: the gain of all rows (n x m by columns, its rows as they
-  /// lie in P; null where no block has a covariance). Ends the interval of held noise.
+  /// lie in P; null where none is recorded). Ends the interval of held noise.
   void RecordUpdate(std::span<Row* const> rows, const double* gain);
 
   std::shared_ptr<const Binding> binding;

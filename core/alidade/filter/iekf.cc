@@ -8,9 +8,9 @@
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
 #include "alidade/filter/evaluate_models.h"
-#include "alidade/filter/factorise.h"
 #include "alidade/filter/linear.h"
 #include "alidade/filter/stack.h"
+#include "alidade/state/tiles.h"
 
 namespace alidade {
 namespace internal {
@@ -101,7 +101,7 @@ std::optional<Iterated::Minimum> Iterated::Minimise(FilterState& f, std::span<Ro
     const Stacked at = Stack(f, rows);
     const Workspace::Matrix pht = ProjectionOf(f, rows);
     s = r = at.noise;
-    s.noalias() += at.h * pht;
+    AddProjected(rows, pht, s);
     if (!defined || !Factorise(s) || !Factorise(r)) {
       if (minimum.iterations == 0) return std::nullopt;
       MoveTo(f, linearised.data());

@@ -2,6 +2,7 @@
 #include "alidade/filter/landmarks.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -22,9 +23,11 @@ Space Xyz() {
 
 bool IsUsed(const Row& row) { return row.report->outcome == Outcome::kAccepted; }
 
-std::vector<const double*> ValuesOf(const State& state, const LandmarkRecord& landmark) {
-  std::vector<const double*> values;
-  for (const BlockId id : landmark.blocks) values.push_back(state.value(id));
+/// Of a landmark that has a representation.
+std::array<const double*, 3> ValuesOf(const State& state, const LandmarkRecord& landmark) {
+  std::array<const double*, 3> values{};
+  const auto value = [&](BlockId id) { return state.value(id); };
+  std::ranges::transform(landmark.blocks, values.begin(), value);
   return values;
 }
 
@@ -51,38 +54,39 @@ double LinearityIndexOf(const State& state, const LandmarkRecord& landmark, cons
 
 /// J P J' of the blocks of a landmark.
 Eigen::Matrix3d CovarianceOf(const State& state, const LandmarkRecord& landmark,
-                             const Eigen::Matrix<double, 3, Eigen::Dynamic>& jacobian) {
-  std::vector<JacobianBlock> parts;
-  Eigen::Index column = 0;
+                             const LandmarkPoint& point) {
+  std::vector<JacobianPart> parts;
+  int column = 0;
   for (const BlockId id : landmark.blocks) {
     const Block& block = state.layout()[id];
     const int size = block.geometry().tangent;
-    if (block.has_covariance()) {
-      parts.push_back({block.tangent_offset, jacobian.middleCols(column, size)});
-    }
+    if (block.has_covariance()) parts.push_back({block.tangent_offset, size, column});
     column += size;
   }
-  return Times(parts, 3, state.covariance().TimesTransposed(parts, 3));
+  Eigen::MatrixXd pjt(state.covariance().size(), 3);
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  state.covariance().Project({point.jacobian.data(), 3, column, parts}, pjt.data(),
+                             covariance.data());
+  return covariance;
 }
 
 }  // namespace
 
 int Generations::Of(std::int64_t id) const {
-  const auto found = of_.find(id);
-  return found == of_.end() ? 0 : found->second;
+  const auto found = std::ranges::lower_bound(ended_, id, {}, &Ended::id);
+  return found == ended_.end() || found->id != id ? 0 : found->generation;
 }
 
 void Generations::End(std::int64_t id, int generation) {
-  constexpr std::size_t kMost = 100'000;
-  log_.emplace_back(id, of_[id] = generation);
-  if (log_.size() <= kMost) return;
-  const auto [oldest, its] = log_.front();
-  log_.pop_front();
-  const auto found = of_.find(oldest);
-  if (found != of_.end() && found->second == its) of_.erase(found);
+  constexpr std::int64_t kMost = 100'000;
+  auto found = std::ranges::lower_bound(ended_, id, {}, &Ended::id);
+  if (found == ended_.end() || found->id != id) found = ended_.insert(found, Ended{});
+  *found = {id, ++ends_, generation};
+  if (std::ssize(ended_) <= kMost) return;
+  std::erase_if(ended_, [&](const Ended& one) { return one.order <= ends_ - kMost / 2; });
 }
 
-Landmarks::Landmarks(const Binding& binding) : options_(*binding.system.landmarks) {
+Landmarks::Landmarks(const Binding& binding) : options_(*binding.system.landmarks), xyz_(Xyz()) {
   for (const SensorBinding& sensor : binding.system.sensors) {
     Family& family = families_.emplace_back();
     const std::vector<Space>& roles = sensor.model.roles();
@@ -105,8 +109,13 @@ Landmarks::Landmarks(const Binding& binding) : options_(*binding.system.landmark
 }
 
 BlockId Landmarks::Declare(FilterState& f, std::int64_t id, const Space& role, BlockStatus status) {
-  const std::string name = "landmarks." + std::to_string(id) + '.' + role.name;
-  return f.state.Declare(name + '#' + std::to_string(names_++), "landmarks", role, status);
+  name_ = "landmarks.";
+  name_ += std::to_string(id);
+  name_ += '.';
+  name_ += role.name;
+  name_ += '#';
+  name_ += std::to_string(names_++);
+  return f.state.Declare(name_, "landmarks", role, status);
 }
 
 void Landmarks::AddKnown(FilterState& f) {
@@ -115,7 +124,7 @@ void Landmarks::AddKnown(FilterState& f) {
     landmark.representation = XyzRepresentation();
     landmark.known = true;
     landmark.blocks = {Declare(
-        f, known.id, Xyz(), known.sigma > 0.0 ? BlockStatus::kEstimated : BlockStatus::kConstant)};
+        f, known.id, xyz_, known.sigma > 0.0 ? BlockStatus::kEstimated : BlockStatus::kConstant)};
     f.state.Add(landmark.blocks[0], known.position.data(),
                 known.sigma * known.sigma * Eigen::Matrix3d::Identity());
   }
@@ -173,9 +182,7 @@ void Landmarks::Count(FilterState& f, std::span<Row> rows) {
   for (const Row& row : rows) {
     if (!Has(row) || (!row.on_landmark() && row.report->outcome != Outcome::kNotReady)) continue;
     if (!IsReady(f, row)) continue;
-    const auto [at, is_new] = landmarks_.try_emplace(row.measurement->landmark);
-    LandmarkRecord& landmark = at->second;
-    if (is_new) landmark.generation = generations_.Of(at->first);
+    LandmarkRecord& landmark = RecordOf(row.measurement->landmark);
     if (landmark.first == kNoTimestamp) landmark.first = f.timestamp;
     if (landmark.observations == 0 || landmark.seen != frame_) ++landmark.observations;
     landmark.seen = frame_;
@@ -184,6 +191,25 @@ void Landmarks::Count(FilterState& f, std::span<Row> rows) {
     ++landmark.tried;
     landmark.accepted += IsUsed(row);
   }
+}
+
+/// A new one has the memory of one that is gone.
+LandmarkRecord& Landmarks::RecordOf(std::int64_t id) {
+  const auto at = landmarks_.lower_bound(id);
+  if (at != landmarks_.end() && at->first == id) return at->second;
+  if (spare_.empty()) {
+    LandmarkRecord& landmark = landmarks_.try_emplace(at, id)->second;
+    landmark.generation = generations_.Of(id);
+    return landmark;
+  }
+  ById::node_type node = std::move(spare_.back());
+  spare_.pop_back();
+  LandmarkRecord fresh;
+  fresh.blocks.swap(node.mapped().blocks);
+  fresh.generation = generations_.Of(id);
+  node.key() = id;
+  node.mapped() = std::move(fresh);
+  return landmarks_.insert(at, std::move(node))->second;
 }
 
 /// Looks for inverse distances that an update left at zero or below.
@@ -225,15 +251,17 @@ Landmarks::ById::iterator Landmarks::Delete(FilterState& f, ById::iterator at) {
     ++f.report.landmarks.deleted;
     generations_.End(at->first, at->second.generation + 1);
   }
-  return landmarks_.erase(at);
+  const auto next = std::next(at);
+  spare_.push_back(landmarks_.extract(at));
+  return next;
 }
 
 /// A shared block goes with the last landmark on it.
 void Landmarks::DropBlocks(FilterState& f, LandmarkRecord& landmark) {
   for (const BlockId id : landmark.blocks) {
-    const auto shared = users_.find(id);
-    if (shared != users_.end() && --shared->second > 0) continue;
-    if (shared != users_.end()) users_.erase(shared);
+    const auto index = static_cast<std::size_t>(id);
+    const bool shared = index < users_.size() && users_[index] > 0;
+    if (shared && --users_[index] > 0) continue;
     f.state.Drop(id);
   }
   landmark.blocks.clear();
@@ -257,15 +285,8 @@ bool Landmarks::ConvertToXyz(FilterState& f, std::int64_t id, LandmarkRecord& la
   const double linearity = LinearityIndexOf(f.state, landmark, camera);
   const auto point = PointOf(*landmark.representation, ValuesOf(f.state, landmark).data());
   if (!point || !(linearity < options_.max_linearity_index)) return false;
-  std::vector<Eigen::MatrixXd> jacobians;
-  Eigen::Index column = 0;
-  for (const BlockId block : landmark.blocks) {
-    const int size = f.state.layout()[block].geometry().tangent;
-    jacobians.emplace_back(point->jacobian.middleCols(column, size));
-    column += size;
-  }
-  const BlockId to = Declare(f, id, Xyz(), BlockStatus::kEstimated);
-  f.state.Initialise(to, point->position.data(), landmark.blocks, jacobians,
+  const BlockId to = Declare(f, id, xyz_, BlockStatus::kEstimated);
+  f.state.Initialise({&to, 1}, point->position.data(), landmark.blocks, point->jacobian,
                      Eigen::Matrix3d::Zero());
   DropBlocks(f, landmark);
   landmark.blocks = {to};
@@ -275,9 +296,9 @@ bool Landmarks::ConvertToXyz(FilterState& f, std::int64_t id, LandmarkRecord& la
 
 /// Initialises landmarks of this frame that wait, as long as too few are measured.
 void Landmarks::InitialiseNew(FilterState& f, std::span<Row> rows) {
-  const std::vector<const Row*> used = MeasuredOnce(rows);
-  auto measured = std::ssize(used);
-  for (Family& family : families_) family.shared.clear();
+  FindMeasured(rows);
+  auto measured = std::ssize(measured_);
+  for (Family& family : families_) family.shared.assign(family.roles.size(), -1);
   if (options_.prior) prior_ = *options_.prior;
   bool asked_map = prior_.adapt_after == 0;
   for (Row& row : rows) {
@@ -291,7 +312,7 @@ void Landmarks::InitialiseNew(FilterState& f, std::span<Row> rows) {
         found->second.observations < options_.min_observations) {
       continue;
     }
-    if (!asked_map) prior_.inverse_distance = PriorInverseDistance(f.state, used);
+    if (!asked_map) prior_.inverse_distance = PriorInverseDistance(f.state);
     asked_map = true;
     row.report->outcome = Initialise(f, found->first, row, found->second);
     if (row.report->outcome != Outcome::kInitialised) continue;
@@ -300,30 +321,28 @@ void Landmarks::InitialiseNew(FilterState& f, std::span<Row> rows) {
   }
 }
 
-/// A row that was used of each landmark in the state, by id.
-std::vector<const Row*> Landmarks::MeasuredOnce(std::span<Row> rows) const {
-  std::vector<const Row*> used;
+/// A row that was used of each landmark in the state, by id; the first one of several.
+void Landmarks::FindMeasured(std::span<Row> rows) {
+  measured_.clear();
   for (const Row& row : rows) {
     if (!row.on_landmark() || !IsUsed(row)) continue;
     const auto found = landmarks_.find(row.measurement->landmark);
-    if (found != landmarks_.end() && found->second.in_state()) used.push_back(&row);
+    if (found != landmarks_.end() && found->second.in_state()) measured_.push_back(&row);
   }
   const auto id = [](const Row* row) { return row->measurement->landmark; };
-  std::ranges::stable_sort(used, {}, id);
+  std::ranges::sort(measured_, {}, [&](const Row* row) { return std::pair(id(row), row); });
   const auto same = [&](const Row* a, const Row* b) { return id(a) == id(b); };
-  used.erase(std::unique(used.begin(), used.end(), same), used.end());
-  return used;
+  measured_.erase(std::unique(measured_.begin(), measured_.end(), same), measured_.end());
 }
 
 /// The median of the converged inverse distances among landmarks that were measured, where there
 /// are enough; else the prior's.
-double Landmarks::PriorInverseDistance(const State& state,
-                                       std::span<const Row* const> measured) const {
+double Landmarks::PriorInverseDistance(const State& state) {
   constexpr double kConverged = 0.1;  // of the index of linearity, where nothing is converted
   const double limit =
       options_.max_linearity_index > 0.0 ? options_.max_linearity_index : kConverged;
-  std::vector<double> converged;
-  for (const Row* const row : measured) {
+  distances_.clear();
+  for (const Row* const row : measured_) {
     const double* const camera = CameraOf(state, *row);
     const LandmarkRecord& landmark = landmarks_.at(row->measurement->landmark);
     if (camera == nullptr || !landmark.representation) continue;
@@ -331,13 +350,13 @@ double Landmarks::PriorInverseDistance(const State& state,
       continue;
     const auto point = PointOf(*landmark.representation, ValuesOf(state, landmark).data());
     const Eigen::Map<const Eigen::Vector3d> r(camera);
-    if (point) converged.push_back(1.0 / (point->position - r).norm());
+    if (point) distances_.push_back(1.0 / (point->position - r).norm());
   }
-  if (converged.empty() || std::ssize(converged) < options_.prior->adapt_after) {
+  if (distances_.empty() || std::ssize(distances_) < options_.prior->adapt_after) {
     return options_.prior->inverse_distance;
   }
-  const auto middle = converged.begin() + std::ssize(converged) / 2;
-  std::ranges::nth_element(converged, middle);
+  const auto middle = distances_.begin() + std::ssize(distances_) / 2;
+  std::ranges::nth_element(distances_, middle);
   return *middle;
 }
 
@@ -345,33 +364,49 @@ double Landmarks::PriorInverseDistance(const State& state,
 /// the first landmark of the frame makes the block, and the others of the same sensor take it.
 Outcome Landmarks::Initialise(FilterState& f, std::int64_t id, Row& row, LandmarkRecord& landmark) {
   Family& family = families_[static_cast<std::size_t>(row.sensor)];
-  Inverse inverse;
-  const Outcome outcome = Invert(f, row, options_.prior ? &prior_ : nullptr, inverse);
+  const Outcome outcome = Invert(f, row, options_.prior ? &prior_ : nullptr, inverse_);
   if (outcome != Outcome::kAccepted) return outcome;
-  std::vector<BlockId> fresh;
-  std::vector<double> values;
-  std::vector<int> kept;  // rows of y
-  const double* y = inverse.y.data();
+  auto& [fresh, values, rows] = fresh_;
+  fresh.clear();
+  values.clear();
+  rows.clear();
+  const double* y = inverse_.y.data();
   int at = 0;
   for (std::size_t i = 0; i < family.roles.size(); ++i) {
     const Space& role = family.roles[i];
-    const auto shared = family.shared.find(i);
-    if (shared != family.shared.end()) {
-      landmark.blocks.push_back(shared->second);
+    if (family.shared[i] >= 0) {
+      landmark.blocks.push_back(family.shared[i]);
     } else {
       fresh.push_back(Declare(f, id, role, BlockStatus::kEstimated));
       landmark.blocks.push_back(fresh.back());
       values.insert(values.end(), y, y + role.geometry.ambient);
-      for (int k = 0; k < role.geometry.tangent; ++k) kept.push_back(at + k);
+      for (int k = 0; k < role.geometry.tangent; ++k) rows.push_back(at + k);
       if (role.shared()) family.shared[i] = fresh.back();
     }
-    if (role.shared()) ++users_[landmark.blocks.back()];
+    if (role.shared()) {
+      const auto block = static_cast<std::size_t>(landmark.blocks.back());
+      users_.resize(std::max(users_.size(), block + 1));
+      ++users_[block];
+    }
     y += role.geometry.ambient;
     at += role.geometry.tangent;
   }
-  std::vector<Eigen::MatrixXd> jacobians;
-  for (const Eigen::MatrixXd& j : inverse.jacobians) jacobians.emplace_back(j(kept, Eigen::all));
-  f.state.Initialise(fresh, values.data(), inverse.from, jacobians, inverse.own(kept, kept));
+  const Workspace::Use use(f.work);
+  const auto size = std::ssize(rows);
+  const Eigen::Map<const RowMajor> jacobian(inverse_.jacobian.data(), inverse_.rows,
+                                            inverse_.columns),
+      own(inverse_.own.data(), inverse_.rows, inverse_.rows);
+  Eigen::Map<RowMajor> its_jacobian(f.work.Take(size * inverse_.columns).data(), size,
+                                    inverse_.columns);
+  Workspace::Matrix its_own = f.work.Take(size, size);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    const int row_of_y = rows[static_cast<std::size_t>(i)];
+    its_jacobian.row(i) = jacobian.row(row_of_y);
+    for (Eigen::Index j = 0; j < size; ++j) {
+      its_own(i, j) = own(row_of_y, rows[static_cast<std::size_t>(j)]);
+    }
+  }
+  f.state.Initialise(fresh, values.data(), inverse_.from, its_jacobian, its_own);
   landmark.representation = family.representation;
   f.motions.EndInterval();
   return Outcome::kInitialised;
@@ -397,7 +432,7 @@ std::vector<LandmarkEstimate> Landmarks::Estimates(const State& state) const {
     const auto point = PointOf(*landmark.representation, ValuesOf(state, landmark).data());
     if (!point) continue;
     one.position = point->position;
-    one.covariance = CovarianceOf(state, landmark, point->jacobian);
+    one.covariance = CovarianceOf(state, landmark, *point);
   }
   return estimates;
 }

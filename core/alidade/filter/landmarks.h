@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <deque>
 #include <map>
 #include <optional>
 #include <span>
-#include <utility>
+#include <string>
 #include <vector>
 
 #include "alidade/filter/evaluate_models.h"
@@ -14,15 +13,20 @@
 
 namespace alidade::internal {
 
-/// How many landmarks of an id have ended, over the newest 100 000 ends.
+/// How many landmarks of an id have ended, over the newest 50 000 ends at least.
 class Generations {
  public:
   int Of(std::int64_t id) const;
   void End(std::int64_t id, int generation);
 
  private:
-  std::deque<std::pair<std::int64_t, int>> log_;  ///< id, its ended generations then
-  std::map<std::int64_t, int> of_;
+  struct Ended {
+    std::int64_t id;
+    std::int64_t order;  ///< of its last end
+    int generation;
+  };
+  std::vector<Ended> ended_;  ///< by id
+  std::int64_t ends_ = 0;
 };
 
 /// One landmark, in the state or waiting for it.
@@ -62,8 +66,8 @@ class Landmarks {
     int first = -1;     ///< of its landmark roles, which come last; -1: it sees none
     int position = -1;  ///< its role `position`, the camera's in the world
     std::optional<LandmarkRepresentation> representation;
-    std::vector<Space> roles;               ///< the landmark's
-    std::map<std::size_t, BlockId> shared;  ///< by landmark role: blocks of this frame
+    std::vector<Space> roles;     ///< the landmark's
+    std::vector<BlockId> shared;  ///< by landmark role: the block of this frame, or -1
   };
 
   bool Has(const Row& row) const { return FamilyOf(row).first >= 0; }
@@ -74,9 +78,10 @@ class Landmarks {
   void Convert(FilterState& f, std::span<Row> rows);
   bool ConvertToXyz(FilterState& f, std::int64_t id, LandmarkRecord& landmark, const Row& row);
   void InitialiseNew(FilterState& f, std::span<Row> rows);
-  std::vector<const Row*> MeasuredOnce(std::span<Row> rows) const;
-  double PriorInverseDistance(const State& state, std::span<const Row* const> measured) const;
+  void FindMeasured(std::span<Row> rows);
+  double PriorInverseDistance(const State& state);
   Outcome Initialise(FilterState& f, std::int64_t id, Row& row, LandmarkRecord& landmark);
+  LandmarkRecord& RecordOf(std::int64_t id);
   void DropBlocks(FilterState& f, LandmarkRecord& landmark);
   ById::iterator Delete(FilterState& f, ById::iterator at);
   BlockId Declare(FilterState& f, std::int64_t id, const Space& role, BlockStatus status);
@@ -88,11 +93,25 @@ class Landmarks {
   LandmarkOptions options_;
   std::vector<Family> families_;  ///< by sensor
   ById landmarks_;                ///< by the id of the measurements
-  std::map<BlockId, int> users_;  ///< of a shared block: landmarks on it
+  std::vector<int> users_;        ///< by block, where it is shared: landmarks on it
   std::int64_t frame_ = 0;        ///< frames with a measurement of a landmark
   std::int64_t names_ = 0;        ///< blocks named so far
   Generations generations_;
   LandmarkOptions::Prior prior_;  ///< of what is initialised in this frame
+
+  Space xyz_;  ///< the role of a landmark that is a point
+
+  // Memory.
+  Scratch<std::vector<ById::node_type>> spare_;  ///< records of landmarks that are gone
+  std::string name_;                             ///< of the block that is declared
+  Scratch<std::vector<const Row*>> measured_;  ///< a used row of each landmark in the state, by id
+  Scratch<Inverse> inverse_;
+  struct {
+    std::vector<BlockId> blocks;
+    std::vector<double> values;
+    std::vector<int> rows;         ///< of the inverse
+  } fresh_;                        ///< the blocks of a landmark that are not shared with others
+  std::vector<double> distances_;  ///< inverse, of those that have converged
 };
 
 }  // namespace alidade::internal

@@ -6,36 +6,24 @@
 #include <cmath>
 
 #include "alidade/filter/evaluate_models.h"
-#include "alidade/filter/factorise.h"
 #include "alidade/filter/stack.h"
 #include "alidade/state/small_kernels.h"
+#include "alidade/state/tiles.h"
 
 namespace alidade::internal {
 namespace {
 
-/// P after the update. With the optimal gain K* it is P - W W'; with another one, K, what K lacks
-/// stays: + (K - K*) S (K - K*)' = E E', E = (K - K*) L, `lost` (empty: the gain is optimal). Where
-/// the difference would cancel to nothing, Joseph's form. False, and P as it was, where P would not
-/// stay positive.
-bool Update(Covariance& p, const Eigen::MatrixXd& w, const Eigen::MatrixXd& lost,
-            const Eigen::MatrixXd& gain, const Stacked& all) {
-  bool joseph = false;
-  for (int i = 0; i < p.size() && !joseph; ++i) {
-    const double kept = lost.size() == 0 ? 0.0 : lost.row(i).squaredNorm();
-    joseph = p.Variance(i) - w.row(i).squaredNorm() + kept < kCancelled * p.Variance(i);
+/// Whether P - W W' + E E' would leave nearly no digits of a variance; E has the given rows.
+bool Cancels(const Covariance& p, const Workspace::Matrix& w, std::span<const int> rows,
+             const Workspace::Matrix& e, Workspace::Vector left) {
+  for (int i = 0; i < p.size(); ++i) left[i] = p.Variance(i);
+  for (Eigen::Index k = 0; k < w.cols(); ++k) left -= w.col(k).cwiseAbs2();
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    left[rows[i]] += e.row(static_cast<Eigen::Index>(i)).squaredNorm();
   }
-  if (!joseph) {
-    p.SubtractOuter(w);
-    if (lost.size() > 0) p.AddOuter(lost);
-    return true;
-  }
-  Covariance updated = p;
-  updated.Joseph(gain, all.h, all.noise);
-  for (int i = 0; i < updated.size(); ++i) {
-    if (!(updated.Variance(i) >= 0.0)) return false;
-  }
-  p = std::move(updated);
-  return true;
+  bool cancels = false;
+  for (int i = 0; i < p.size(); ++i) cancels = cancels || left[i] < kCancelled * p.Variance(i);
+  return cancels;
 }
 
 }  // namespace
@@ -192,39 +180,76 @@ Outcome Linear::CorrectSmall(FilterState& f, std::span<Row* const> rows, const d
   return Outcome::kAccepted;
 }
 
+/// E = (K - K*) L, whose rows are those of lost_: there K* = W L^-1 is the optimal gain, and K it
+/// with zeros for what is considered.
+Workspace::Matrix Linear::FindLost(FilterState& f, std::span<Row* const> rows,
+                                   const Workspace::Matrix& w, const Workspace::Matrix& l) {
+  lost_.clear();
+  ForEachConsidered(f, rows, [&](int offset, int size, Eigen::Index, Eigen::Index) {
+    for (int i = 0; i < size; ++i) lost_.push_back(offset + i);
+  });
+  std::ranges::sort(lost_);
+  lost_.erase(std::unique(lost_.begin(), lost_.end()), lost_.end());
+  const Eigen::Index count = std::ssize(lost_), m = w.cols();
+  Workspace::Matrix e = f.work.Take(count, m);
+  if (count == 0) return e;
+  e.setZero();
+  const Workspace::Use use(f.work);
+  Workspace::Matrix gain = f.work.Take(count, m);
+  for (Eigen::Index i = 0; i < count; ++i) gain.row(i) = w.row(lost_[static_cast<std::size_t>(i)]);
+  Divide(l, gain);
+  ForEachConsidered(f, rows, [&](int offset, int size, Eigen::Index at, Eigen::Index k) {
+    const Eigen::Index i = std::ranges::lower_bound(lost_, offset) - lost_.begin();
+    e.block(i, at, size, k) = -gain.block(i, at, size, k);
+  });
+  for (Eigen::Index k = 0; k < m; ++k) {
+    e.col(k) *= l(k, k);
+    e.col(k).noalias() += e.rightCols(m - k - 1) * l.col(k).tail(m - k - 1);
+  }
+  return e;
+}
+
 Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const double* correction) {
   const Workspace::Use use(f.work);
+  Covariance& p = f.state.covariance();
   const Stacked all = Stack(f, rows);
-  const Workspace::Matrix pht = ProjectionOf(f, rows);
-  Eigen::MatrixXd s = all.noise;
-  Eigen::Index at = 0;
-  for (const Row* row : rows) {
-    const Eigen::Index k = row->report->dof;
-    for (const JacobianPart& part : row->place->parts) {
-      s.middleRows(at, k) +=
-          all.h.block(at, part.offset, k, part.size) * pht.middleRows(part.offset, part.size);
-    }
-    at += k;
-  }
-  if (!Factorise(s)) return Outcome::kNotPd;
-  if (pht.rows() == 0) {  // nothing to correct, and Eigen solves for one column at least
+  Workspace::Matrix w = ProjectionOf(f, rows);
+  const Eigen::Index n = w.rows(), m = w.cols();
+  Workspace::Matrix l = f.work.Take(m, m), gain = f.work.Take(n, m);
+  Workspace::Vector y = f.work.Take(m), dx = f.work.Take(n);
+  l = all.noise;
+  AddProjected(rows, w, l);
+  if (!Factorise(l)) return Outcome::kNotPd;
+  if (n == 0) {  // nothing to correct
     f.RecordUpdate(rows, nullptr);
     return Outcome::kAccepted;
   }
-  const auto l = s.triangularView<Eigen::Lower>();
-  const auto l_transposed = s.transpose().triangularView<Eigen::Upper>();
-  const Eigen::MatrixXd w = l.solve(pht.transpose()).transpose();
-  Eigen::MatrixXd gain = l_transposed.solve(w.transpose()).transpose();
-  Eigen::MatrixXd lost = MaskConsidered(f, rows, gain);
-  if (lost.size() > 0) lost *= l;
-  Eigen::VectorXd dx = gain * all.innovation;
-  if (correction != nullptr) std::copy_n(correction, dx.size(), dx.data());
+  DivideByTransposed(l, w);
+  const Workspace::Matrix e = FindLost(f, rows, w, l);
+  y = all.innovation;
+  l.triangularView<Eigen::Lower>().solveInPlace(y);
+  dx.noalias() = w * y;
+  gain = w;
+  for (std::size_t i = 0; i < lost_.size(); ++i) {
+    const auto row = e.row(static_cast<Eigen::Index>(i));
+    dx[lost_[i]] += row.dot(y);
+    gain.row(lost_[i]) += row;
+  }
+  if (correction != nullptr) std::copy_n(correction, n, dx.data());
   f.state.Retract(dx.data(), f.buffers.moved);
-  if (!AllFinite(f.buffers.moved) || !w.allFinite() || !gain.allFinite())
-    return Outcome::kNotFinite;
-  if (!Update(f.state.covariance(), w, lost, gain, all)) return Outcome::kNotPd;
+  if (!AllFinite(f.buffers.moved) || !w.allFinite() || !e.allFinite()) return Outcome::kNotFinite;
+  const bool cancels = Cancels(p, w, lost_, e, f.work.Take(n));
+  const bool recorded =
+      std::ranges::any_of(rows, [](const Row* row) { return row->gain_is_recorded(); });
+  if (cancels || recorded) Divide(l, gain);
+  if (cancels) {
+    if (!p.Joseph(gain, all.h, all.noise)) return Outcome::kNotPd;
+  } else {
+    p.SubtractOuter(w);
+    p.AddOuter(lost_, e);
+  }
   f.state.MoveTo(f.buffers.moved);
-  f.RecordUpdate(rows, gain.data());
+  f.RecordUpdate(rows, recorded ? gain.data() : nullptr);
   return Outcome::kAccepted;
 }
 

@@ -39,11 +39,14 @@ class Linear : public Method {
   Outcome LineariseElsewhere(FilterState& f, Row& row);
   Outcome CorrectSmall(FilterState& f, std::span<Row* const> rows, const double* dx);
   Outcome CorrectLarge(FilterState& f, std::span<Row* const> rows, const double* dx);
+  Workspace::Matrix FindLost(FilterState& f, std::span<Row* const> rows, const Workspace::Matrix& w,
+                             const Workspace::Matrix& l);
 
   // Memory that is kept from row to row.
   Scratch<std::vector<const double*>> at_;  ///< what fills the roles where H is taken
   std::vector<double> implied_;             ///< of the role that is linearised at what z implies
   std::vector<double> predicted_;
+  Scratch<std::vector<int>> lost_;  ///< rows of P whose gain is not the optimal one
 };
 
 }  // namespace alidade::internal

@@ -113,7 +113,7 @@ void Motions::CarryHeld(const MotionModel& model, const MotionPlace& place, Step
   m = moved + input;
 }
 
-bool Motions::Apply(State& state) const {
+bool Motions::Apply(State& state) {
   Covariance& p = state.covariance();
   if (IsBounded(p)) {
     Propagate(p);
@@ -153,22 +153,28 @@ bool Motions::IsBounded(const Covariance& covariance) const {
   return sum * sum * p + q <= kSafe;
 }
 
-void Motions::Propagate(Covariance& p) const {
+void Motions::Propagate(Covariance& p) {
+  const Workspace::Use use(memory_);
   for (std::size_t i = 0; i < steps_.size(); ++i) {
     const Step& step = steps_[i];
     const MotionPlace& place = binding_->motions[i];
-    if (!step.active || place.segments.empty()) continue;
-    if (place.rows.empty() && place.segments.size() == 1) {
-      p.Propagate(place.segments[0].first, place.segments[0].second, step.f.data(), step.q.data());
+    if (!step.active || place.parts.empty()) continue;
+    if (place.rows.empty()) {
+      p.Propagate(place.parts, step.f.data(), step.q.data());
       continue;
     }
     const Eigen::Index n = binding_->system.motions[i].model.tangent_size();
-    const Eigen::Map<const RowMajor> f(step.f.data(), n, n), q(step.q.data(), n, n);
-    if (place.rows.empty()) {
-      p.Propagate(place.segments, f, q);
-    } else {
-      p.Propagate(place.segments, f(place.rows, place.rows), q(place.rows, place.rows));
+    const auto k = std::ssize(place.rows);
+    Workspace::Vector f = memory_.Take(k * k), q = memory_.Take(k * k);
+    Eigen::Index at = 0;
+    for (const int row : place.rows) {
+      for (const int column : place.rows) {
+        const auto from = static_cast<std::size_t>(row * n + column);
+        f[at] = step.f[from];
+        q[at++] = step.q[from];
+      }
     }
+    p.Propagate(place.parts, f.data(), q.data());
   }
 }
 

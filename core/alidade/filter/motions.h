@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "alidade/base/workspace.h"
 #include "alidade/filter/binding.h"
-#include "alidade/filter/workspace.h"
 
 namespace alidade::internal {
 
@@ -49,7 +49,7 @@ class Motions {
   /// x', F, G and Lq of all active models; without `derivatives` x' and Lq alone.
   Trouble Evaluate(const State& state, double dt_s, bool derivatives = true);
   /// P <- F P F' + Q and x <- x'; false, and nothing changed, where P would not be finite.
-  bool Apply(State& state) const;
+  bool Apply(State& state);
 
   /// Whether noise that the last step held goes on being held.
   bool in_interval() const { return holds_ && interval_steps_ > 0; }
@@ -71,7 +71,7 @@ class Motions {
   Trouble EvaluateOne(std::size_t i, const State& state, double dt_s, bool derivatives);
   void CarryHeld(const MotionModel& model, const MotionPlace& place, Step& step);
   bool IsBounded(const Covariance& p) const;
-  void Propagate(Covariance& p) const;
+  void Propagate(Covariance& p);
   Workspace::Matrix Spread(std::vector<double> Step::*matrix, bool held_only, int n,
                            Workspace& work) const;
 

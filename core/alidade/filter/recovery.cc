@@ -53,8 +53,8 @@ bool Inflate(FilterState& f, const SensorBinding& sensor) {
     const Block& block = f.state.layout()[role.block];
     if (!block.has_covariance() || block.status != BlockStatus::kEstimated) continue;
     const int n = block.geometry().tangent;
-    f.state.covariance().Transform(block.tangent_offset,
-                                   kInflation * Eigen::MatrixXd::Identity(n, n));
+    const RowMajor inflation = kInflation * RowMajor::Identity(n, n);
+    f.state.covariance().Transform(block.tangent_offset, n, inflation.data());
     any = true;
   }
   if (any) f.motions.EndInterval();

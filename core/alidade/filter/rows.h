@@ -25,6 +25,8 @@ struct Row {
 
   /// Whether it measures a landmark in the state.
   bool on_landmark() const { return place == &own; }
+  /// Of a landmark it is not: its blocks come and go.
+  bool gain_is_recorded() const { return !model->has_landmark(); }
   JacobianRows jacobian() const {
     return {H.data(), report->dof, place->width, place->parts, place->whole};
   }

@@ -7,6 +7,7 @@
 #include "alidade/filter/frame_loop.h"
 #include "alidade/filter/linear.h"
 #include "alidade/filter/stack.h"
+#include "alidade/state/tiles.h"
 
 namespace alidade {
 namespace internal {
@@ -63,7 +64,8 @@ void SquareRoot::Begin(FilterState& f) {
 void SquareRoot::SetCovariance(FilterState& f) const {
   const Workspace::Use use(f.work);
   Workspace::Matrix p = f.work.Take(root_.rows(), root_.rows());
-  p.noalias() = root_ * root_.transpose();
+  p.setZero();
+  AddOuterProduct(p, root_, 1.0);
   f.state.covariance().SetBlock(0, 0, p);
 }
 
@@ -74,7 +76,8 @@ Trouble SquareRoot::Step(FilterState& f, double dt_s) {
   const Workspace::Matrix transition = f.motions.Transition(f.size(), f.work);
   Workspace::Matrix moved = f.work.Take(root_.rows(), root_.cols()),
                     noise = f.motions.NoiseInput(f.size(), f.work);
-  moved.noalias() = transition * (goes_on ? without_held_ : root_);
+  moved.setZero();
+  AddProduct(moved, transition, goes_on ? without_held_ : root_);
   if (f.motions.holds()) {
     noise -= f.motions.HeldInput(f.size(), f.work);
     if ((noise.array() != 0.0).any()) {
@@ -102,9 +105,10 @@ void SquareRoot::Project(FilterState& f, Row& row) const {
   const Stacked all = Stack(f, one);
   const Eigen::Index m = all.h.rows();
   Workspace::Matrix hl = f.work.Take(m, root_.cols()), s = f.work.Take(m, m);
-  hl.noalias() = all.h * root_;
+  hl.setZero();
+  AddProduct(hl, all.h, root_);
   s = all.noise;
-  s.noalias() += hl * hl.transpose();
+  AddProduct(s, hl, hl.transpose());
   row.report->s.assign(s.data(), s.data() + s.size());
   row.PHt.clear();
 }
@@ -123,7 +127,8 @@ Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
     array.block(at, at, k, k) = root.transpose();
     at += k;
   }
-  hl.noalias() = all.h * root_;
+  hl.setZero();
+  AddProduct(hl, all.h, root_);
   array.bottomLeftCorner(n, m) = hl.transpose();
   array.bottomRightCorner(n, n) = root_.transpose();
   Triangularise(array, f.work.Take(m + n).data());
@@ -135,10 +140,7 @@ Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
   Workspace::Matrix gain = f.work.Take(n, m);  // K = W Ls^-1
   Workspace::Vector dx = f.work.Take(n);
   gain = array.topRightCorner(m, n).transpose();
-  array.topLeftCorner(m, m)
-      .triangularView<Eigen::Upper>()
-      .transpose()
-      .solveInPlace<Eigen::OnTheRight>(gain);
+  Divide(array.topLeftCorner(m, m).transpose(), gain);
   dx.noalias() = gain * all.innovation;
   f.state.Retract(dx.data(), f.buffers.moved);
   if (!AllFinite(f.buffers.moved)) {
@@ -147,7 +149,8 @@ Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
   }
   const Workspace::Matrix transport = TransportTo(f, f.buffers.moved);
   f.state.MoveTo(f.buffers.moved);
-  root_.noalias() = transport * array.bottomRightCorner(n, n).transpose();
+  root_.setZero();
+  AddProduct(root_, transport, array.bottomRightCorner(n, n).transpose());
   SetCovariance(f);
   f.RecordUpdate(rows, gain.data());
   return Outcome::kAccepted;

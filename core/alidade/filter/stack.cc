@@ -42,31 +42,17 @@ Workspace::Matrix ProjectionOf(FilterState& f, std::span<Row* const> rows) {
   return pht;
 }
 
-Eigen::MatrixXd MaskConsidered(const FilterState& f, std::span<Row* const> rows,
-                               Eigen::MatrixXd& gain) {
-  Eigen::MatrixXd lost;
-  const auto mask = [&](Eigen::Index offset, Eigen::Index size, Eigen::Index at, Eigen::Index k) {
-    if (lost.size() == 0) lost = Eigen::MatrixXd::Zero(gain.rows(), gain.cols());
-    lost.block(offset, at, size, k) -= gain.block(offset, at, size, k);
-    gain.block(offset, at, size, k).setZero();
-  };
-  if (f.considering) {
-    for (std::size_t i = 0; i < f.binding->system.layout.blocks().size(); ++i) {
-      const Block& block = f.state.layout()[static_cast<BlockId>(i)];
-      if (!block.present || block.status != BlockStatus::kConsider) continue;
-      mask(block.tangent_offset, block.geometry().tangent, 0, gain.cols());
-    }
-  }
+void AddProjected(std::span<Row* const> rows, const Workspace::Matrix& pht, Workspace::Matrix& s) {
   Eigen::Index at = 0;
   for (const Row* row : rows) {
-    const SensorPlace& place = *row->place;
-    const Eigen::Index k = row->report->dof;
-    for (std::size_t i = 0; i < place.parts.size(); ++i) {
-      if (place.consider[i]) mask(place.parts[i].offset, place.parts[i].size, at, k);
+    const JacobianRows h = row->jacobian();
+    const Eigen::Map<const RowMajor> compact(h.data, h.rows, h.stride);
+    for (const JacobianPart& part : h.parts) {
+      s.middleRows(at, h.rows).noalias() +=
+          compact.middleCols(part.column, part.size) * pht.middleRows(part.offset, part.size);
     }
-    at += k;
+    at += h.rows;
   }
-  return lost;
 }
 
 Workspace::Matrix TransportTo(FilterState& f, const std::vector<double>& values) {
@@ -74,11 +60,10 @@ Workspace::Matrix TransportTo(FilterState& f, const std::vector<double>& values)
   transport.setIdentity();
   for (const Block& block : f.state.layout().blocks()) {
     if (!block.has_covariance() || block.geometry().kind != GeometryKind::kUnitVector) continue;
-    const Eigen::Index k = block.geometry().tangent;
-    RowMajor j(k, k);
+    Eigen::Matrix<double, 2, 2, Eigen::RowMajor> j;
     block.geometry().Transport(f.state.values().data() + block.value_offset,
                                values.data() + block.value_offset, j.data());
-    transport.block(block.tangent_offset, block.tangent_offset, k, k) = j;
+    transport.block<2, 2>(block.tangent_offset, block.tangent_offset) = j;
   }
   return transport;
 }

@@ -22,10 +22,26 @@ Eigen::Index CountOf(std::span<Row* const> rows);
 Stacked Stack(FilterState& f, std::span<Row* const> rows);
 /// P H' of all rows, n x m, in f.work.
 Workspace::Matrix ProjectionOf(FilterState& f, std::span<Row* const> rows);
-/// Zeroes the gain (n x m) of consider blocks and roles; K - K* of what it was before, empty where
-/// nothing changed.
-Eigen::MatrixXd MaskConsidered(const FilterState& f, std::span<Row* const> rows,
-                               Eigen::MatrixXd& gain);
+/// s += H P H' of all rows, m x m, from P H'.
+void AddProjected(std::span<Row* const> rows, const Workspace::Matrix& pht, Workspace::Matrix& s);
+/// Calls zero(offset, size, at, k) for each part of the gain that consider blocks and roles keep at
+/// 0: rows [offset, offset + size) of P, columns [at, at + k) of the update.
+template <class Zero>
+void ForEachConsidered(const FilterState& f, std::span<Row* const> rows, const Zero& zero) {
+  for (std::size_t i = 0; f.considering && i < f.binding->system.layout.blocks().size(); ++i) {
+    const Block& block = f.state.layout()[static_cast<BlockId>(i)];
+    if (!block.present || block.status != BlockStatus::kConsider) continue;
+    zero(block.tangent_offset, block.geometry().tangent, 0, CountOf(rows));
+  }
+  Eigen::Index at = 0;
+  for (const Row* row : rows) {
+    const SensorPlace& place = *row->place;
+    for (std::size_t i = 0; i < place.parts.size(); ++i) {
+      if (place.consider[i]) zero(place.parts[i].offset, place.parts[i].size, at, row->report->dof);
+    }
+    at += row->report->dof;
+  }
+}
 /// J (n x n, in f.work) of State::MoveTo(values): dx there = J dx here.
 Workspace::Matrix TransportTo(FilterState& f, const std::vector<double>& values);
 

@@ -13,6 +13,7 @@
 #include "alidade/filter/filter_options.h"
 #include "alidade/filter/method.h"
 #include "alidade/filter/stack.h"
+#include "alidade/state/tiles.h"
 
 namespace alidade {
 namespace internal {
@@ -54,8 +55,10 @@ bool MeanOf(const Geometry& geometry, const double* centre,
 /// moments = w f f' + centre m m'
 void MomentsOf(double w, const Eigen::Ref<const Eigen::MatrixXd>& f, double centre,
                const Eigen::Ref<const Eigen::VectorXd>& m, Workspace::Matrix& moments) {
-  moments.noalias() = f * f.transpose();
+  moments.setZero();
+  AddOuterProduct(moments, f, 1.0);
   moments *= w;
+  moments.triangularView<Eigen::StrictlyUpper>() = moments.transpose();
   for (Eigen::Index i = 0; i < m.size(); ++i) moments.col(i) += centre * m[i] * m;
 }
 
@@ -156,7 +159,7 @@ const Eigen::MatrixXd& Unscented::RootWithoutHeld(const FilterState& f) {
   const Covariance& p = f.state.covariance();
   rest_ = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>(
       p.data(), p.size(), p.size(), Eigen::OuterStride<>(p.stride()));  // its lower triangle
-  rest_.noalias() -= held_ * held_.transpose();
+  AddOuterProduct(rest_, held_, -1.0);
   SquareRootOf(rest_, ldlt_, root_of_rest_);
   return root_of_rest_;
 }
@@ -431,23 +434,24 @@ Outcome Unscented::Correct(FilterState& f, std::span<Row* const> rows) {
     Note(f, "not_pd", "the update would leave S not positive definite; rolled back");
     return Outcome::kNotPd;
   }
-  if (n == 0) {  // nothing to correct, and Eigen solves for one row at least
+  if (n == 0) {  // nothing to correct
     f.RecordUpdate(rows, nullptr);
     return Outcome::kAccepted;
   }
   rest.leftCols(n) = transform.c * root;
   rest.rightCols(n) = -transform.c * root;
-  gain.noalias() = rest * all.h.transpose();
+  gain.setZero();
+  AddProduct(gain, rest, all.h.transpose());
   gain *= transform.w;
-  const auto l = s.triangularView<Eigen::Lower>();
-  l.transpose().solveInPlace<Eigen::OnTheRight>(gain);
-  l.solveInPlace<Eigen::OnTheRight>(gain);
-  rest.noalias() -= gain * all.h;
+  DivideByTransposed(s, gain);
+  Divide(s, gain);
+  AddProduct(rest, gain, all.h, -1.0);
   centre.noalias() = gain * mean;
   step.noalias() = gain * all.innovation;
   MomentsOf(transform.w, rest, transform.centre, centre, p);
-  spread.noalias() = gain * all.noise;
-  p.noalias() += spread * gain.transpose();
+  spread.setZero();
+  AddProduct(spread, gain, all.noise);
+  AddProduct(p, spread, gain.transpose());
   f.state.Retract(step.data(), f.buffers.moved);
   if (!AllFinite(f.buffers.moved) || !p.allFinite()) {
     Note(f, "not_finite", "the update is not finite; rolled back");

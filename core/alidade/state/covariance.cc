@@ -5,17 +5,9 @@
 
 #include "alidade/base/error.h"
 #include "alidade/state/small_kernels.h"
+#include "alidade/state/tiles.h"
 
 namespace alidade {
-
-Eigen::MatrixXd Times(const std::vector<JacobianBlock>& h, int rows,
-                      const Eigen::MatrixXd& columns) {
-  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(rows, columns.cols());
-  for (const JacobianBlock& part : h) {
-    result += part.block * columns.middleRows(part.offset, part.block.cols());
-  }
-  return result;
-}
 
 int Covariance::Add(int rows) {
   const int gap = FindGap(rows);
@@ -56,9 +48,13 @@ void Covariance::TakeFromGap(int offset, int rows) {
   if (end < first + size) gaps_.emplace_back(end, first + size - end);
 }
 
-void Covariance::Release(int offset, int rows) {
+void Covariance::Clear(int offset, int rows) {
   p_.block(offset, 0, rows, offset).setZero();
   p_.block(offset, offset, size_ - offset, rows).setZero();
+}
+
+void Covariance::Release(int offset, int rows) {
+  Clear(offset, rows);
   // Gaps that touch become one, and one at the end is given back.
   for (auto gap = gaps_.begin(); gap != gaps_.end();) {
     const bool before = gap->first + gap->second == offset, after = offset + rows == gap->first;
@@ -79,10 +75,11 @@ void Covariance::Release(int offset, int rows) {
 
 void Covariance::Move(int from, int to, int rows) {
   TakeFromGap(to, rows);
-  Eigen::MatrixXd cross(size_, rows);
+  const Workspace::Use use(memory_);
+  Workspace::Matrix cross = memory_.Take(size_, rows);
   cross.topRows(from) = p_.block(from, 0, rows, from).transpose();
   cross.bottomRows(size_ - from) = p_.block(from, from, size_ - from, rows);
-  SetRows(to, Block(from, rows, from, rows), cross);
+  SetRows(to, cross.middleRows(from, rows), cross);
   Release(from, rows);
 }
 
@@ -92,7 +89,7 @@ Eigen::MatrixXd Covariance::Block(int a, int rows, int b, int columns) const {
   return p_.block(b, a, columns, rows).transpose();
 }
 
-void Covariance::SetBlock(int a, int b, const Eigen::Ref<const Eigen::MatrixXd>& value) {
+void Covariance::SetBlock(int a, int b, const ConstMatrix& value) {
   if (a == b) {
     p_.block(a, a, value.rows(), value.rows()).triangularView<Eigen::Lower>() = value;
   } else if (a > b) {
@@ -102,7 +99,7 @@ void Covariance::SetBlock(int a, int b, const Eigen::Ref<const Eigen::MatrixXd>&
   }
 }
 
-void Covariance::SetRows(int offset, const Eigen::MatrixXd& own, const Eigen::MatrixXd& cross) {
+void Covariance::SetRows(int offset, const ConstMatrix& own, const ConstMatrix& cross) {
   const Eigen::Index k = own.rows();
   const Eigen::Index below = size_ - offset - k;
   p_.block(offset, 0, k, offset) = cross.topRows(offset).transpose();
@@ -110,51 +107,35 @@ void Covariance::SetRows(int offset, const Eigen::MatrixXd& own, const Eigen::Ma
   SetBlock(offset, offset, own);
 }
 
-Eigen::MatrixXd Covariance::TimesTransposed(const std::vector<JacobianBlock>& h, int rows) const {
-  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(size_, rows);
-  for (const JacobianBlock& part : h) {
-    const Eigen::Index o = part.offset, k = part.block.cols(), below = size_ - o - k;
-    const auto jt = part.block.transpose();
-    result.topRows(o).noalias() += p_.block(o, 0, k, o).transpose() * jt;
-    result.middleRows(o, k).noalias() +=
-        p_.block(o, o, k, k).selfadjointView<Eigen::Lower>() * Eigen::MatrixXd(jt);
-    result.bottomRows(below).noalias() += p_.block(o + k, o, below, k) * jt;
-  }
-  return result;
+void Covariance::SetRows(int offset, const ConstMatrix& own) {
+  Clear(offset, static_cast<int>(own.rows()));
+  SetBlock(offset, offset, own);
 }
 
-void Covariance::Propagate(const std::vector<std::pair<int, int>>& segments,
-                           const Eigen::MatrixXd& f, const Eigen::MatrixXd& q) {
-  std::vector<JacobianBlock> rows;
-  Eigen::Index at = 0;
-  for (const auto& [offset, size] : segments) {
-    rows.push_back({offset, f.middleCols(at, size)});
-    at += size;
+void Covariance::Propagate(std::span<const JacobianPart> parts, const double* f, const double* q) {
+  int k = 0;
+  for (const JacobianPart& part : parts) k += part.size;
+  if (small() && parts.size() == 1) {
+    const int ld = static_cast<int>(p_.rows());
+    return internal::SmallKernelsFor(size_).propagate(p_.data(), ld, parts[0].offset, k, f, q);
   }
-  const Eigen::MatrixXd cross = TimesTransposed(rows, static_cast<int>(f.rows()));
-  const Eigen::MatrixXd own = Times(rows, static_cast<int>(f.rows()), cross) + q;
-  at = 0;
-  for (const auto& [offset, size] : segments) {
-    SetRows(offset, own.block(at, at, size, size), cross.middleCols(at, size));
-    at += size;
+  const Workspace::Use use(memory_);
+  Workspace::Matrix cross = memory_.Take(size_, k), own = memory_.Take(k, k);
+  own.setZero();
+  Project({f, k, k, parts}, cross.data(), own.data());
+  own += Eigen::Map<const RowMajor>(q, k, k);
+  for (const JacobianPart& a : parts) {
+    SetRows(a.offset, own.block(a.column, a.column, a.size, a.size),
+            cross.middleCols(a.column, a.size));
   }
-  // Between segments SetRows wrote P_ai F_i'; there both sides move.
-  Eigen::Index row = 0;
-  for (const auto& [a, a_size] : segments) {
-    Eigen::Index column = 0;
-    for (const auto& [b, b_size] : segments) {
-      if (column < row) SetBlock(a, b, own.block(row, column, a_size, b_size));
-      column += b_size;
+  // Between parts SetRows wrote P_ai F_i'; there both sides move.
+  for (const JacobianPart& a : parts) {
+    for (const JacobianPart& b : parts) {
+      if (b.column < a.column) {
+        SetBlock(a.offset, b.offset, own.block(a.column, b.column, a.size, b.size));
+      }
     }
-    row += a_size;
   }
-}
-
-void Covariance::Propagate(int offset, int k, const double* f, const double* q) {
-  const int ld = static_cast<int>(p_.rows());
-  if (small()) return internal::SmallKernelsFor(size_).propagate(p_.data(), ld, offset, k, f, q);
-  const Eigen::Map<const RowMajor> fm(f, k, k), qm(q, k, k);
-  Propagate({{offset, k}}, fm, qm);
 }
 
 void Covariance::Project(const JacobianRows& h, double* pht, double* s) const {
@@ -190,31 +171,42 @@ bool Covariance::Downdate(int m, const double* w, const double* inverse_d) {
                                                    inverse_d);
 }
 
-void Covariance::SubtractOuter(const Eigen::MatrixXd& w) {
-  p_.topLeftCorner(size_, size_).selfadjointView<Eigen::Lower>().rankUpdate(w, -1.0);
+void Covariance::SubtractOuter(const ConstMatrix& w) {
+  internal::AddOuterProduct(p_.topLeftCorner(size_, size_), w, -1.0);
 }
 
-void Covariance::AddOuter(const Eigen::MatrixXd& w) {
-  for (Eigen::Index c = 0; c < w.rows(); ++c) {
-    if (w.row(c).isZero(0.0)) continue;
-    for (Eigen::Index r = c; r < w.rows(); ++r) {
-      if (!w.row(r).isZero(0.0)) p_(r, c) += w.row(r).dot(w.row(c));
+void Covariance::AddOuter(std::span<const int> rows, const ConstMatrix& e) {
+  for (Eigen::Index i = 0; i < e.rows(); ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      const int a = rows[static_cast<std::size_t>(i)], b = rows[static_cast<std::size_t>(j)];
+      p_(std::max(a, b), std::min(a, b)) += e.row(i).dot(e.row(j));
     }
   }
 }
 
-void Covariance::Joseph(const Eigen::MatrixXd& k, const Eigen::MatrixXd& h,
-                        const Eigen::MatrixXd& r) {
-  Eigen::MatrixXd a = Dense();
-  const Eigen::MatrixXd hp = h * a;
-  a.noalias() -= k * hp;  // (I - K H) P
-  const Eigen::MatrixXd ah = a * h.transpose(), kr = k * r;
-  a.noalias() += (kr - ah) * k.transpose();
+bool Covariance::Joseph(const ConstMatrix& k, const ConstMatrix& h, const ConstMatrix& r) {
+  const Workspace::Use use(memory_);
+  const Eigen::Index n = size_, m = h.rows();
+  Workspace::Matrix a = memory_.Take(n, n), hp = memory_.Take(m, n), change = memory_.Take(n, m);
+  a = p_.topLeftCorner(n, n).selfadjointView<Eigen::Lower>();
+  hp.setZero();
+  internal::AddProduct(hp, h, a);
+  internal::AddProduct(a, k, hp, -1.0);  // (I - K H) P
+  change.setZero();
+  internal::AddProduct(change, k, r);
+  internal::AddProduct(change, a, h.transpose(), -1.0);
+  internal::AddProduct(a, change, k.transpose());
+  if (!(a.diagonal().array() >= 0.0).all()) return false;
   SetBlock(0, 0, a);
+  return true;
 }
 
-void Covariance::Transform(int offset, const Eigen::MatrixXd& j) {
-  Propagate({{offset, static_cast<int>(j.cols())}}, j, Eigen::MatrixXd::Zero(j.rows(), j.rows()));
+void Covariance::Transform(int offset, int k, const double* j) {
+  const Workspace::Use use(memory_);
+  Workspace::Matrix zero = memory_.Take(k, k);
+  zero.setZero();
+  const JacobianPart part{offset, k, 0};
+  Propagate({&part, 1}, j, zero.data());
 }
 
 Eigen::MatrixXd Covariance::Dense() const {

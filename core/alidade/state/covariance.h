@@ -7,17 +7,12 @@
 #include <vector>
 
 #include "alidade/base/eigen_alignment.h"
+#include "alidade/base/workspace.h"
 
 namespace alidade {
 
 /// Matrices as they cross the plugin ABI.
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-/// Columns [offset, offset + block.cols()) of a Jacobian that is zero elsewhere.
-struct JacobianBlock {
-  int offset;
-  Eigen::MatrixXd block;
-};
 
 /// The columns of a Jacobian that belong to one block of the state: at `column` of its rows.
 struct JacobianPart {
@@ -35,16 +30,15 @@ struct JacobianRows {
   bool whole = false;  ///< rows are as wide as the covariance, zeros included
 };
 
-/// H times `columns` (n x k), for H given by the blocks that it touches; `rows` is that of H.
-Eigen::MatrixXd Times(const std::vector<JacobianBlock>& h, int rows,
-                      const Eigen::MatrixXd& columns);
-
 /// The covariance P of a state in its tangent, behind block queries only: who uses it names rows by
 /// (offset, size) and never sees the storage. Dense here: one symmetric matrix, the lower triangle
 /// authoritative, with spare capacity. Offsets and sizes lie in [0, size()], as Add gave them; they
 /// are not checked, but where said.
+/// Nothing allocates memory in the steady state but what returns a matrix.
 class Covariance {
  public:
+  using ConstMatrix = Eigen::Ref<const Eigen::MatrixXd>;
+
   /// Rows in use, gaps included; a gap has zero rows and columns.
   int size() const { return size_; }
 
@@ -63,25 +57,21 @@ class Covariance {
   /// have none in common.
   Eigen::MatrixXd Block(int a, int rows, int b, int columns) const;
   /// Sets P(a, b) and P(b, a) = P(a, b)', as above; of a diagonal block the lower triangle counts.
-  void SetBlock(int a, int b, const Eigen::Ref<const Eigen::MatrixXd>& value);
+  void SetBlock(int a, int b, const ConstMatrix& value);
   /// P(i, i), 0 <= i < size().
   double Variance(int i) const { return p_(i, i); }
   /// Sets rows [offset, offset + k): `own` (k x k) on the diagonal, `cross` (n x k, n = size())
   /// elsewhere; its rows [offset, offset + k) are not read.
-  void SetRows(int offset, const Eigen::MatrixXd& own, const Eigen::MatrixXd& cross);
+  void SetRows(int offset, const ConstMatrix& own, const ConstMatrix& cross);
+  /// The same, zero elsewhere.
+  void SetRows(int offset, const ConstMatrix& own);
 
-  /// P H' (n x m), for H given by the blocks that it touches.
-  Eigen::MatrixXd TimesTransposed(const std::vector<JacobianBlock>& h, int rows) const;
-  /// pht = P H' (n x m, by columns) and s += H P H' (m x m).
+  /// pht = P H' (n x m, by columns) and s += H P H' (m x m). O(n m k), k the columns of H's parts.
   void Project(const JacobianRows& h, double* pht, double* s) const;
 
-  /// x' = F x + w of the rows in `segments` (offset, size), gathered in that order, w ~ N(0, Q):
-  /// P_aa <- F P_aa F' + Q, P_ai <- F P_ai, F and Q k x k, k the sum of the sizes. O(n k).
-  void Propagate(const std::vector<std::pair<int, int>>& segments, const Eigen::MatrixXd& f,
-                 const Eigen::MatrixXd& q);
-  /// The same for the k rows [offset, offset + k), F and Q row-major. Allocates nothing where the
-  /// covariance is small.
-  void Propagate(int offset, int k, const double* f, const double* q);
+  /// x' = F x + w of the k rows in `parts`, w ~ N(0, Q): P_aa <- F P_aa F' + Q, P_ai <- F P_ai,
+  /// F and Q k x k, row-major, of Q the lower triangle. O(n k).
+  void Propagate(std::span<const JacobianPart> parts, const double* f, const double* q);
 
   /// Few states, at least one: the operations below exist.
   bool small() const { return size_ > 0 && size_ <= kSmall; }
@@ -94,14 +84,14 @@ class Covariance {
   /// nearly all its digits.
   bool Downdate(int m, const double* w, const double* inverse_d);
   /// P <- P - W W', W n x m. O(n^2 m).
-  void SubtractOuter(const Eigen::MatrixXd& w);
-  /// P <- P + W W', W n x m, of which k rows are not zero. O(n m + k^2 m).
-  void AddOuter(const Eigen::MatrixXd& w);
+  void SubtractOuter(const ConstMatrix& w);
+  /// P_ab <- P_ab + E E' of the given rows, which E has one after the other.
+  void AddOuter(std::span<const int> rows, const ConstMatrix& e);
   /// P <- (I - K H) P (I - K H)' + K R K' for any gain K (Joseph), K n x m, H m x n, R m x m.
-  /// O(n^2 m).
-  void Joseph(const Eigen::MatrixXd& k, const Eigen::MatrixXd& h, const Eigen::MatrixXd& r);
-  /// Rows of one block <- J (k x k) times them: P_bb <- J P_bb J', P_bi <- J P_bi.
-  void Transform(int offset, const Eigen::MatrixXd& j);
+  /// O(n^2 m). False, and P as it was, where a variance would not be >= 0.
+  bool Joseph(const ConstMatrix& k, const ConstMatrix& h, const ConstMatrix& r);
+  /// Rows of one block <- J (k x k, row-major) times them: P_bb <- J P_bb J', P_bi <- J P_bi.
+  void Transform(int offset, int k, const double* j);
   /// Where P lies, column-major with leading dimension stride(); the lower triangle counts.
   double* data() { return p_.data(); }
   const double* data() const { return p_.data(); }
@@ -111,10 +101,12 @@ class Covariance {
 
  private:
   void TakeFromGap(int offset, int rows);
+  void Clear(int offset, int rows);
 
   Eigen::MatrixXd p_;  ///< capacity x capacity
   int size_ = 0;
   std::vector<std::pair<int, int>> gaps_;  ///< (offset, rows)
+  Scratch<Workspace> memory_;
 };
 
 }  // namespace alidade

@@ -2,27 +2,28 @@
 #include "alidade/state/state.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "alidade/base/error.h"
 
 namespace alidade {
 
-BlockId StateLayout::Declare(std::string name, std::string owner, Space space, BlockStatus status) {
+BlockId StateLayout::Declare(std::string_view name, std::string_view owner, const Space& space,
+                             BlockStatus status) {
   ALIDADE_EXPECTS(Find(name) < 0);
-  Block block;
-  block.name = std::move(name);
-  block.owner = std::move(owner);
-  block.space = std::move(space);
-  block.status = status;
-  if (!dropped_.empty()) {
-    const BlockId id = dropped_.back();
-    dropped_.pop_back();
-    blocks_[static_cast<std::size_t>(id)] = std::move(block);
-    return id;
+  if (dropped_.empty()) {
+    dropped_.push_back(static_cast<BlockId>(blocks_.size()));
+    blocks_.emplace_back();
   }
-  blocks_.push_back(std::move(block));
-  return static_cast<BlockId>(blocks_.size()) - 1;
+  const BlockId id = dropped_.back();
+  dropped_.pop_back();
+  Block& block = blocks_[static_cast<std::size_t>(id)];
+  block.name = name;
+  block.owner = owner;
+  block.space = space;
+  block.status = status;
+  return id;
 }
 
 BlockId StateLayout::Find(std::string_view name) const {
@@ -38,8 +39,9 @@ double State::sigma(BlockId id, int i) const {
   return std::sqrt(covariance_.Variance(block.tangent_offset + i));
 }
 
-BlockId State::Declare(std::string name, std::string owner, Space space, BlockStatus status) {
-  return layout_.Declare(std::move(name), std::move(owner), std::move(space), status);
+BlockId State::Declare(std::string_view name, std::string_view owner, const Space& space,
+                       BlockStatus status) {
+  return layout_.Declare(name, owner, space, status);
 }
 
 void State::Reserve(BlockId id) {
@@ -66,68 +68,73 @@ void State::PlaceValue(BlockId id, const double* value) {
   std::copy_n(value, block.geometry().ambient, this->value(id));
 }
 
-void State::Add(BlockId id, const double* value, const Eigen::MatrixXd& covariance) {
+void State::Add(BlockId id, const double* value, const Covariance::ConstMatrix& covariance) {
   PlaceValue(id, value);
   const Block& block = layout_[id];
   if (block.status == BlockStatus::kConstant) return;
   ALIDADE_EXPECTS(covariance.rows() == block.geometry().tangent);
-  covariance_.SetRows(block.tangent_offset, covariance,
-                      Eigen::MatrixXd::Zero(covariance_.size(), covariance.rows()));
+  covariance_.SetRows(block.tangent_offset, covariance);
 }
 
-void State::Initialise(BlockId id, const double* value, const std::vector<BlockId>& from,
-                       const std::vector<Eigen::MatrixXd>& jacobians, const Eigen::MatrixXd& own) {
-  ALIDADE_EXPECTS(from.size() == jacobians.size());
-  PlaceValue(id, value);
-  const Block& block = layout_[id];
-  if (block.status == BlockStatus::kConstant) return;
-  const int rows = block.geometry().tangent;
-  std::vector<JacobianBlock> j;
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    const Block& source = layout_[from[i]];
-    const bool counts = source.has_covariance() && from[i] != id;
-    if (counts) j.push_back({source.tangent_offset, jacobians[i]});
+void State::Initialise(std::span<const BlockId> ids, const double* values,
+                       std::span<const BlockId> from, const Eigen::Ref<const RowMajor>& jacobian,
+                       const Covariance::ConstMatrix& own) {
+  for (const BlockId id : ids) {
+    PlaceValue(id, values);
+    values += layout_[id].geometry().ambient;
   }
-  const Eigen::MatrixXd cross = covariance_.TimesTransposed(j, rows);
-  covariance_.SetRows(block.tangent_offset, Times(j, rows, cross) + own, cross);
-}
-
-void State::Initialise(const std::vector<BlockId>& ids, const double* values,
-                       const std::vector<BlockId>& from,
-                       const std::vector<Eigen::MatrixXd>& jacobians, const Eigen::MatrixXd& own) {
-  ALIDADE_EXPECTS(from.size() == jacobians.size());
-  Eigen::Index row = 0;
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    const Geometry geometry = layout_[ids[i]].geometry();
-    const Eigen::Index k = geometry.tangent;
-    std::vector<Eigen::MatrixXd> rows;
-    for (const Eigen::MatrixXd& j : jacobians) rows.emplace_back(j.middleRows(row, k));
-    Initialise(ids[i], values, from, rows, own.block(row, row, k, k));
-    values += geometry.ambient;
-    const Block& block = layout_[ids[i]];
-    Eigen::Index column = 0;
-    for (std::size_t j = 0; j < i; ++j) {
-      const Block& other = layout_[ids[j]];
-      const int size = other.geometry().tangent;
-      if (block.has_covariance() && other.has_covariance()) {
-        const Eigen::MatrixXd through_x = covariance_.Block(
-            block.tangent_offset, block.geometry().tangent, other.tangent_offset, size);
-        covariance_.SetBlock(block.tangent_offset, other.tangent_offset,
-                             through_x + own.block(row, column, k, size));
-      }
-      column += size;
+  parts_.clear();
+  int column = 0;
+  for (const BlockId id : from) {
+    const Block& block = layout_[id];
+    const int size = block.geometry().tangent;
+    if (block.has_covariance()) parts_.push_back({block.tangent_offset, size, column});
+    column += size;
+  }
+  ALIDADE_EXPECTS(jacobian.cols() == column);
+  const Workspace::Use use(memory_);
+  const Eigen::Index rows = jacobian.rows();
+  Workspace::Matrix cross = memory_.Take(covariance_.size(), rows), p = memory_.Take(rows, rows);
+  p.setZero();
+  covariance_.Project(
+      {jacobian.data(), static_cast<int>(rows), static_cast<int>(jacobian.outerStride()), parts_},
+      cross.data(), p.data());
+  p += own;
+  Eigen::Index at = 0;
+  for (const BlockId id : ids) {
+    const Block& block = layout_[id];
+    const Eigen::Index size = block.geometry().tangent;
+    if (block.has_covariance()) {
+      covariance_.SetRows(block.tangent_offset, p.block(at, at, size, size),
+                          cross.middleCols(at, size));
     }
-    row += k;
+    at += size;
+  }
+  // So far the new blocks have no more in common than P has of them.
+  Eigen::Index row = 0;
+  for (const BlockId a : ids) {
+    const Eigen::Index size = layout_[a].geometry().tangent;
+    Eigen::Index other = 0;
+    for (const BlockId b : ids) {
+      if (b == a) break;
+      const Eigen::Index its = layout_[b].geometry().tangent;
+      if (layout_[a].has_covariance() && layout_[b].has_covariance()) {
+        covariance_.SetBlock(layout_[a].tangent_offset, layout_[b].tangent_offset,
+                             p.block(row, other, size, its));
+      }
+      other += its;
+    }
+    row += size;
   }
 }
 
 BlockId State::Clone(BlockId source, std::string name) {
   const Block original = layout_[source];
   ALIDADE_EXPECTS(original.present);
-  const BlockId id = Declare(std::move(name), original.owner, original.space, original.status);
+  const BlockId id = Declare(name, original.owner, original.space, original.status);
   const std::vector<double> copy(value(source), value(source) + original.geometry().ambient);
   const int n = original.geometry().tangent;
-  Initialise(id, copy.data(), {source}, {Eigen::MatrixXd::Identity(n, n)},
+  Initialise({&id, 1}, copy.data(), {&source, 1}, RowMajor::Identity(n, n),
              Eigen::MatrixXd::Zero(n, n));
   return id;
 }
@@ -166,23 +173,10 @@ void State::FillGaps() {
 
 void State::Drop(BlockId id) {
   if (layout_[id].value_offset >= 0) Release(id);
-  layout_.blocks_[static_cast<std::size_t>(id)] = {};
-  layout_.dropped_.push_back(id);
-}
-
-void State::Reparametrise(BlockId id, Space space, const double* value,
-                          const Eigen::MatrixXd& jacobian) {
-  const Block old = layout_[id];
-  ALIDADE_EXPECTS(old.present);
-  const BlockId fresh = Declare(old.name + "'", old.owner, std::move(space), old.status);
-  const Eigen::Index n = jacobian.rows();
-  Initialise(fresh, value, {id}, {jacobian}, Eigen::MatrixXd::Zero(n, n));
-  Marginalise(id);
   Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
-  block = layout_[fresh];
-  block.name = old.name;
-  layout_.blocks_[static_cast<std::size_t>(fresh)] = {};
-  layout_.dropped_.push_back(fresh);
+  block.present = false;
+  block.name.clear();  // what is assigned to it next has its memory
+  layout_.dropped_.push_back(id);
 }
 
 void State::Retract(const double* dx, std::vector<double>& moved) const {
@@ -198,10 +192,10 @@ void State::MoveTo(const std::vector<double>& values) {
   ALIDADE_EXPECTS(values.size() == values_.size());
   for (const Block& block : layout_.blocks()) {
     if (!block.has_covariance() || block.geometry().kind != GeometryKind::kUnitVector) continue;
-    RowMajor j(block.geometry().tangent, block.geometry().tangent);
+    std::array<double, 4> j;  // a unit vector's tangent has two elements
     block.geometry().Transport(values_.data() + block.value_offset,
                                values.data() + block.value_offset, j.data());
-    covariance_.Transform(block.tangent_offset, j);
+    covariance_.Transform(block.tangent_offset, 2, j.data());
   }
   std::copy(values.begin(), values.end(), values_.begin());
 }

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "alidade/base/eigen_alignment.h"
@@ -36,7 +38,7 @@ struct Block {
 class StateLayout {
  public:
   /// Adds a block without a value; ContractViolation where the name is taken.
-  BlockId Declare(std::string name, std::string owner, Space space,
+  BlockId Declare(std::string_view name, std::string_view owner, const Space& space,
                   BlockStatus status = BlockStatus::kEstimated);
   const std::vector<Block>& blocks() const { return blocks_; }
   const Block& operator[](BlockId id) const { return blocks_[static_cast<std::size_t>(id)]; }
@@ -72,31 +74,25 @@ class State {
   std::vector<double>& values() { return values_; }
 
   /// Declares a block and its place for a dynamic state (a landmark, a clone).
-  BlockId Declare(std::string name, std::string owner, Space space,
+  BlockId Declare(std::string_view name, std::string_view owner, const Space& space,
                   BlockStatus status = BlockStatus::kEstimated);
   /// Gives a declared block the place that its value will have, and rows of zeros.
   void Reserve(BlockId id);
   /// Gives a declared block a value and a covariance (tangent, row-major; ignored where constant),
   /// uncorrelated with the rest.
-  void Add(BlockId id, const double* value, const Eigen::MatrixXd& covariance);
-  /// Gives a declared block the value y = g(x, n), with dy = J_y_x dx + J_y_n dn: its covariance is
-  /// J_y_x P J_y_x' + own, its correlation J_y_x P. `from` names the blocks of x, `jacobians` dy/d
-  /// block; `own` = J_y_n R J_y_n'.
-  void Initialise(BlockId id, const double* value, const std::vector<BlockId>& from,
-                  const std::vector<Eigen::MatrixXd>& jacobians, const Eigen::MatrixXd& own);
-  /// The same of several blocks at once, correlated through n: the values, and the rows of
-  /// `jacobians` and `own`, one block after the other.
-  void Initialise(const std::vector<BlockId>& ids, const double* values,
-                  const std::vector<BlockId>& from, const std::vector<Eigen::MatrixXd>& jacobians,
-                  const Eigen::MatrixXd& own);
+  void Add(BlockId id, const double* value, const Covariance::ConstMatrix& covariance);
+  /// Gives declared blocks the values y = g(x, n), one after the other, with dy = J dx + J_n dn:
+  /// their covariance is J P_xx J' + own, their correlation with the rest J P_x. `from` names the
+  /// blocks of x, none of them among `ids`; J has the columns of their tangents side by side,
+  /// row-major; `own` = J_n Cov(n) J_n'.
+  void Initialise(std::span<const BlockId> ids, const double* values, std::span<const BlockId> from,
+                  const Eigen::Ref<const RowMajor>& jacobian, const Covariance::ConstMatrix& own);
   /// Declares `name` as a copy of `source`, fully correlated with it.
   BlockId Clone(BlockId source, std::string name);
   /// Drops the block; the rest keeps its value and covariance.
   void Marginalise(BlockId id);
   /// Marginalise, and gives the id back too: a block declared later may have it.
   void Drop(BlockId id);
-  /// Replaces the block by y = g(x_id) of another geometry, J = dy/dx in the tangents.
-  void Reparametrise(BlockId id, Space space, const double* value, const Eigen::MatrixXd& jacobian);
   /// moved = the values x_i (+) dx_i of all blocks with a covariance, the rest as it is; dx is
   /// indexed like the covariance. Changes nothing: see MoveTo.
   void Retract(const double* dx, std::vector<double>& moved) const;
@@ -113,6 +109,8 @@ class State {
   std::vector<double> values_;
   std::vector<std::pair<int, int>> value_gaps_;  ///< (offset, size)
   Covariance covariance_;
+  Scratch<Workspace> memory_;
+  Scratch<std::vector<JacobianPart>> parts_;
 };
 
 }  // namespace alidade

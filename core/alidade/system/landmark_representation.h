@@ -24,8 +24,8 @@ std::optional<LandmarkRepresentation> RepresentationOf(const std::vector<Space>&
 namespace internal {
 
 struct LandmarkPoint {
-  Eigen::Vector3d position;                           ///< in the world, m
-  Eigen::Matrix<double, 3, Eigen::Dynamic> jacobian;  ///< by the tangents of the blocks
+  Eigen::Vector3d position;                                                  ///< in the world, m
+  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, 6> jacobian;  ///< by their tangents
 };
 
 /// The landmark as xyz, from the values of its blocks in the order of its roles; none unless its

@@ -10,6 +10,7 @@
 #include "alidade/filter/square_root_ekf.h"
 #include "alidade/filter/ukf.h"
 #include "support/driven.h"
+#include "support/landmark_models.h"
 #include "support/sanitized.h"
 #include "support/systems.h"
 
@@ -130,6 +131,151 @@ TEST_P(Allocation, AStepOfTheUkfTakesNone) {
 
 INSTANTIATE_TEST_SUITE_P(Fuse, Allocation,
                          ::testing::Values(Fuse::kJoint, Fuse::kPerSensor, Fuse::kPerMeasurement));
+
+/// Adds `count` states that walk; with `considered` the first one is never corrected.
+void AddWalking(System& system, int count, bool considered) {
+  const MotionModel model = InProcessMotion(Constant<>(1, 0.1), "constant");
+  for (int i = 0; i < count; ++i) {
+    const std::string name = "other_" + std::to_string(i);
+    const BlockId id = system.layout.Declare(
+        name + ".value", name, model.blocks()[0],
+        considered && i == 0 ? BlockStatus::kConsider : BlockStatus::kEstimated);
+    Prior prior;
+    prior.block = id;
+    prior.mean = {0.0};
+    prior.covariance = Eigen::MatrixXd::Identity(1, 1);
+    system.priors.push_back(prior);
+    system.motions.push_back({name, model, {id}});
+  }
+}
+
+/// Landmark `id` from a camera that walks along x, in pixels.
+std::vector<double> Seen(std::int64_t id, double x) {
+  const double angle = static_cast<double>(id), depth = 4.0 + static_cast<double>(id % 5);
+  return {(3.0 * std::sin(angle) - x) / depth, 2.0 * std::cos(1.7 * angle) / depth};
+}
+
+/// Counts allocations in frames of `measured` landmarks out of half as many again. In each frame a
+/// tenth of them leaves, and as many come; one measurement is wild.
+void ExpectNoAllocationOf(Filter& filter, int measured) {
+  if (testing::kSanitized) GTEST_SKIP() << "the sanitizer allocates by itself";
+  const int known = measured * 3 / 2, change = measured / 10;
+  std::vector<Frame> frames;
+  for (int k = 0; k < 60; ++k) {
+    std::vector<testing::Observation> observations;
+    for (int i = 0; i < measured; ++i) {
+      const std::int64_t id = (k * change + i) % known;
+      observations.push_back({id, Seen(id, 0.01 * k)});
+    }
+    observations[static_cast<std::size_t>(measured / 2)].z[0] += 3.0;
+    frames.push_back(testing::FrameOf(0.1 * k, observations));
+  }
+  long before = 0;
+  int initialised = 0, deleted = 0, converted = 0, accepted = 0;
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    if (k == 40) before = allocations;
+    const UpdateReport& report = filter.Process(frames[k]);
+    if (k < 40) continue;
+    initialised += report.landmarks.initialised;
+    deleted += report.landmarks.deleted;
+    converted += report.landmarks.converted;
+    for (const MeasurementReport& entry : report.measurements()) {
+      accepted += entry.outcome == Outcome::kAccepted;
+    }
+  }
+  EXPECT_EQ(allocations - before, 0);
+  EXPECT_FALSE(filter.diverged());
+  EXPECT_GE(initialised, 20 * change);
+  EXPECT_GE(deleted, 20 * change);
+  EXPECT_GE(accepted, 15 * measured);
+  if (filter.system().landmarks->max_linearity_index > 0.0) {
+    EXPECT_GT(converted, 0);
+  }
+}
+
+LandmarkOptions Turnover() {
+  LandmarkOptions options = testing::WithPrior(0.2, 0.1);
+  options.max_missed_frames = 1;
+  return options;
+}
+
+TEST(AllocationOfLandmarks, AnUpdateOfManyTakesNone) {
+  System system = testing::MapSystem(testing::InverseDepthPixels(0.01), Turnover());
+  AddWalking(system, 10, /*considered=*/true);
+  Ekf filter = testing::EkfOf(system);
+  ExpectNoAllocationOf(filter, 100);
+  EXPECT_GE(filter.state().covariance().size(), 13 + 6 * 100);
+}
+
+TEST(AllocationOfLandmarks, TheIteratedEkfTakesNone) {
+  const System system = testing::MapSystem(testing::InverseDepthPixels(0.01), Turnover());
+  Iekf filter(system, {}, {{"tracks", 2}});
+  ExpectNoAllocationOf(filter, 20);
+}
+
+TEST(AllocationOfLandmarks, DirectionsAndSharedAnchorsTakeNone) {
+  const System system =
+      testing::MapSystem(testing::AnchoredPixels<ALIDADE_ROLE_SHARED>(0.01), Turnover());
+  Ekf filter = testing::EkfOf(system);
+  ExpectNoAllocationOf(filter, 20);
+}
+
+TEST(AllocationOfLandmarks, ConsensusAndConversionTakeNone) {
+  LandmarkOptions options = Turnover();
+  options.max_linearity_index = 1.0;
+  options.prior->adapt_after = 3;
+  System system = testing::MapSystem(testing::InverseDepthPixels(0.01), options);
+  system.sensors[0].outlier_rejection = OnePointRansac{};
+  Ekf filter = testing::EkfOf(system);
+  ExpectNoAllocationOf(filter, 20);
+}
+
+/// Thirty states in fifteen points that move, one measurement each.
+System ThirtyStates() {
+  System system;
+  for (int i = 0; i < 15; ++i) {
+    const std::string name = "p" + std::to_string(i);
+    testing::AddMotion(system, name,
+                       InProcessMotion(ConstantVelocity<1, false>(1.0), "constant_velocity"),
+                       {{"x", 0.1 * i, 1.0}, {"v", 0.0, 1.0}});
+    testing::AddSensor(system, "of_" + name, InProcessSensor(testing::Linear(1.0, 0.1), "linear"),
+                       {name + ".x"});
+  }
+  return system;
+}
+
+template <class Filter, class Options>
+void ExpectNoAllocationOfThirtyStates(const Options& options) {
+  if (testing::kSanitized) GTEST_SKIP() << "the sanitizer allocates by itself";
+  const System system = ThirtyStates();
+  Filter filter(system, options, testing::StreamsOf(system));
+  std::vector<Frame> frames;
+  for (int k = 0; k < 30; ++k) {
+    std::vector<std::pair<int, double>> values;
+    for (int i = 0; i < 15; ++i) values.emplace_back(i, 0.1 * i + 0.01 * k);
+    frames.push_back(testing::FrameAt(0.1 * k, values));
+  }
+  for (std::size_t k = 0; k < 10; ++k) filter.Process(frames[k]);
+  const long before = allocations;
+  for (std::size_t k = 10; k < frames.size(); ++k) filter.Process(frames[k]);
+  EXPECT_EQ(allocations - before, 0);
+  EXPECT_FALSE(filter.diverged());
+}
+
+TEST(AllocationOfThirtyStates, TheEkfTakesNone) {
+  ExpectNoAllocationOfThirtyStates<Ekf>(EkfOptions{});
+}
+TEST(AllocationOfThirtyStates, TheIteratedEkfTakesNone) {
+  ExpectNoAllocationOfThirtyStates<Iekf>(IekfOptions{});
+}
+TEST(AllocationOfThirtyStates, TheSquareRootEkfTakesNone) {
+  ExpectNoAllocationOfThirtyStates<SquareRootEkf>(EkfOptions{});
+}
+TEST(AllocationOfThirtyStates, TheUkfTakesNone) {
+  UkfOptions options;
+  options.alpha = 1.0;
+  ExpectNoAllocationOfThirtyStates<Ukf>(options);
+}
 
 }  // namespace
 }  // namespace alidade

@@ -45,26 +45,28 @@ TEST(Covariance, BlocksAreThoseOfTheSymmetricMatrix) {
   EXPECT_EQ(p.Block(2, 3, 2, 3), dense.block(2, 2, 3, 3));
 }
 
-TEST(Covariance, TimesTransposedEqualsTheDenseProduct) {
+TEST(Covariance, ProjectEqualsTheDenseProduct) {
   Random random(2);
   const Covariance p = Make({2, 3, 1, 2}, random);
-  const std::vector<JacobianBlock> h = {{5, RandomMatrix(2, 1, random)},
-                                        {2, RandomMatrix(2, 3, random)}};
+  const RowMajor h = RandomMatrix(2, 4, random);
+  const std::vector<JacobianPart> parts = {{5, 1, 0}, {2, 3, 1}};
   Eigen::MatrixXd dense_h = Eigen::MatrixXd::Zero(2, 8);
-  dense_h.middleCols(5, 1) = h[0].block;
-  dense_h.middleCols(2, 3) = h[1].block;
-  const Eigen::MatrixXd pht = p.TimesTransposed(h, 2);
+  dense_h.middleCols(5, 1) = h.leftCols(1);
+  dense_h.middleCols(2, 3) = h.rightCols(3);
+  Eigen::MatrixXd pht(8, 2), s = Eigen::MatrixXd::Zero(2, 2);
+  p.Project({h.data(), 2, 4, parts}, pht.data(), s.data());
   EXPECT_LT((pht - p.Dense() * dense_h.transpose()).norm(), kRounding * pht.norm());
-  EXPECT_LT((Times(h, 2, pht) - dense_h * pht).norm(), kRounding * pht.norm());
+  EXPECT_LT((s - dense_h * pht).norm(), kRounding * pht.norm());
 }
 
 TEST(Covariance, PropagateEqualsTheDenseFormForScatteredRows) {
   Random random(3);
   Covariance p = Make({2, 3, 1, 2}, random);
   const Eigen::MatrixXd before = p.Dense();
-  const Eigen::MatrixXd f = RandomMatrix(3, 3, random);
+  const RowMajor f = RandomMatrix(3, 3, random);
   const Eigen::MatrixXd root = RandomMatrix(3, 1, random);
-  p.Propagate({{6, 2}, {5, 1}}, f, root * root.transpose());
+  const RowMajor q = root * root.transpose();
+  p.Propagate(std::vector<JacobianPart>{{6, 2, 0}, {5, 1, 2}}, f.data(), q.data());
   // Gathered rows 6, 7, 5 in this order.
   const std::vector<int> rows = {6, 7, 5};
   Eigen::MatrixXd whole_f = Eigen::MatrixXd::Identity(8, 8);
@@ -80,7 +82,7 @@ TEST(Covariance, JosephAndSubtractOuterAgreeForTheOptimalGain) {
   Covariance a = Make({4}, random);
   Covariance b = a;
   const Eigen::MatrixXd h = RandomMatrix(2, 4, random), r = Eigen::MatrixXd::Identity(2, 2);
-  const Eigen::MatrixXd pht = a.TimesTransposed({{0, h}}, 2);
+  const Eigen::MatrixXd pht = a.Dense() * h.transpose();
   const Eigen::MatrixXd s = h * pht + r;
   const Eigen::MatrixXd gain = pht * s.inverse();
   const Eigen::LLT<Eigen::MatrixXd> llt(s);
@@ -108,7 +110,8 @@ TEST(Covariance, JosephAndAddOuterAgreeForAnyGain) {
   joseph.Joseph(gain, h, r);
   EXPECT_LT((joseph.Dense() - expected).norm(), 1e-13 * p.norm());
   outer.SubtractOuter(w);
-  outer.AddOuter((gain - optimal) * l);
+  const std::vector<int> rows = {0, 1, 2, 3, 4, 5, 6, 7};
+  outer.AddOuter(rows, (gain - optimal) * l);
   EXPECT_LT((outer.Dense() - expected).norm(), 1e-12 * p.norm());
 }
 

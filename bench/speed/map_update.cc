@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Time of a frame of the EKF that measures 20 of 1000 landmarks, with a bias that is estimated, and
+// with one that is considered, relative to P - W W' of that size alone.
+#include <CLI/CLI.hpp>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+#include "alidade/filter/ekf.h"
+#include "alidade/host/in_process.h"
+#include "alidade/model/model.h"
+#include "bench/speed/interleaved.h"
+
+namespace alidade::bench {
+namespace {
+
+constexpr int kLandmarks = 1000, kMeasured = 20;
+
+struct Walk : Motion<3, Vec<3>> {
+  static constexpr std::array kBlocks{Quantity{"position", "m", "", "x,y,z"}};
+  template <class T>
+  void Step(const T* r, const T* w, double, T* next) const {
+    for (int i = 0; i < 3; ++i) next[i] = r[i] + w[i];
+  }
+  void SqrtQ(double dt_s, MatrixRef l) const {
+    for (int i = 0; i < 3; ++i) l(i, i) = 0.1 * std::sqrt(dt_s);
+  }
+};
+
+/// z = p - r + b
+struct Offset : Sensor<Vec<3>, Vec<3>, Vec<3>, Vec<3>> {
+  static constexpr std::array kRoles{Quantity{"position", "m", "", "x,y,z"},
+                                     Quantity{"bias", "m", "", "x,y,z"},
+                                     Quantity{"landmark", "m", "", "x,y,z", ALIDADE_ROLE_LANDMARK}};
+  static constexpr Quantity kMeasurement{"offset", "m", "", "x,y,z"};
+  template <class T>
+  bool Predict(const T* r, const T* b, const T* p, T* z) const {
+    for (int i = 0; i < 3; ++i) z[i] = p[i] - r[i] + b[i];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, const T*, T* l) const {
+    for (int i = 0; i < 3; ++i) l[4 * i] = T(0.05);
+  }
+};
+
+double PlaceOf(int landmark, int axis) { return std::sin(1.0 + landmark * (axis + 1)); }
+
+System MapSystem(BlockStatus bias) {
+  System system;
+  const MotionModel walk = InProcessMotion(Walk(), "walk");
+  for (const char* owner : {"cam", "bias"}) {
+    const BlockStatus status = *owner == 'b' ? bias : BlockStatus::kEstimated;
+    const std::string name = std::string(owner) + ".position";
+    const BlockId id = system.layout.Declare(name, owner, walk.blocks()[0], status);
+    system.motions.push_back({owner, walk, {id}});
+    Prior prior;
+    prior.block = id;
+    prior.mean = {0.0, 0.0, 0.0};
+    prior.covariance = 0.01 * Eigen::Matrix3d::Identity();
+    system.priors.push_back(prior);
+  }
+  SensorBinding sensor{"tracks", "tracks", InProcessSensor(Offset(), "offset"), {}};
+  sensor.roles.resize(3);
+  sensor.roles[0].block = 0;
+  sensor.roles[1].block = 1;
+  system.sensors.push_back(sensor);
+  LandmarkOptions landmarks;
+  for (int i = 0; i < kLandmarks; ++i) {
+    landmarks.known.push_back({i, {PlaceOf(i, 0), PlaceOf(i, 1), PlaceOf(i, 2)}, 0.1});
+  }
+  system.landmarks = landmarks;
+  return system;
+}
+
+/// Processes one frame after the other.
+class Run {
+ public:
+  explicit Run(BlockStatus bias) : filter_(MapSystem(bias), {}, {{"tracks", 3}}) {}
+
+  void operator()() {
+    Frame frame;
+    frame.timestamp = TimestampFromSeconds(0.1 * count_);
+    for (int i = 0; i < kMeasured; ++i) {
+      const int id = (kMeasured * count_ + i) % kLandmarks;
+      frame.measurements.push_back(
+          {frame.timestamp, 0, id, {PlaceOf(id, 0), PlaceOf(id, 1), PlaceOf(id, 2)}, {}});
+    }
+    ++count_;
+    for (const MeasurementReport& entry : filter_.Process(frame).measurements()) {
+      used_ += entry.outcome == Outcome::kAccepted;
+    }
+  }
+  bool used_all() const { return used_ == kMeasured * count_; }
+
+ private:
+  Ekf filter_;
+  int count_ = 0, used_ = 0;
+};
+
+int Main(int argc, char** argv) {
+  CLI::App app("A frame of an EKF with 1000 landmarks, relative to P - W W' alone");
+  int rounds = 20;
+  app.add_option("--rounds", rounds, "frames of each contender")->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+
+  Run estimated(BlockStatus::kEstimated), considered(BlockStatus::kConsider);
+  const int n = 6 + 3 * kLandmarks, m = 3 * kMeasured;
+  Eigen::MatrixXd p = Eigen::MatrixXd::Identity(n, n);
+  const Eigen::MatrixXd w = 1e-3 * Eigen::MatrixXd::Random(n, m);
+  std::vector<Contender> contenders = {
+      {"P - W W' by Eigen",
+       [&] { p.selfadjointView<Eigen::Lower>().rankUpdate(w, -1.0); },
+       1.0,
+       {}},
+      {"EKF, the bias estimated", [&] { estimated(); }, 1.0, {}},
+      {"EKF, the bias considered", [&] { considered(); }, 1.0, {}}};
+  Interleave(contenders, rounds);
+  if (!estimated.used_all() || !considered.used_all()) {
+    std::fprintf(stderr, "error: not every measurement was accepted\n");
+    return 1;
+  }
+  PrintTable(contenders);
+  PrintRatio("considered/estimated", contenders[2], contenders[1]);
+  PrintRatio("estimated/floor", contenders[1], contenders[0]);
+  return 0;
+}
+
+}  // namespace
+}  // namespace alidade::bench
+
+int main(int argc, char** argv) { return alidade::bench::Main(argc, argv); }

@@ -72,12 +72,12 @@ alidade::Config ConfigOf(const std::string& file, int points, int frames, int se
 }
 
 /// The estimator alone over frames that were made before, so that its own time is taken.
-Outcome RunOne(alidade::NamedEstimator& named, const std::vector<alidade::Frame>& frames,
+Outcome RunOne(alidade::NamedEstimator& named, const std::vector<alidade::SourceFrame>& frames,
                std::size_t truth) {
   Outcome outcome;
   alidade::Estimator& estimator = *named.estimator;
   const double start = alidade::bench::CpuNs();
-  for (const alidade::Frame& frame : frames) estimator.Process(frame);
+  for (const alidade::SourceFrame& frame : frames) estimator.Process(frame);
   const auto take = [&](const alidade::State& state) {
     outcome.cpu_ns = alidade::bench::CpuNs() - start;
     outcome.log2_det = Log2Det(state);
@@ -100,8 +100,8 @@ Outcome RunOne(alidade::NamedEstimator& named, const std::vector<alidade::Frame>
 std::map<std::string, Outcome> RunAll(const alidade::Config& config,
                                       const alidade::PluginHost& host) {
   alidade::Experiment experiment = alidade::BuildExperiment(config, host);
-  std::vector<alidade::Frame> frames;
-  for (alidade::Frame frame; experiment.source->Next(frame);) frames.push_back(frame);
+  std::vector<alidade::SourceFrame> frames;
+  for (alidade::SourceFrame frame; experiment.source->Next(frame);) frames.push_back(frame);
   const auto& truths = experiment.source->truths();
   const auto at = std::ranges::find(truths, "cam.position", &alidade::StreamInfo::name);
   std::map<std::string, Outcome> outcomes;

@@ -45,7 +45,7 @@ class CsvSource : public Source {
   Place place() const override { return {reader_.name(), reader_.number(), 0}; }
   std::optional<Config> Calibration() const override { return calibration_.Get(); }
 
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (!NextRow()) {
       if (rows_ == 0) Fail(Place{reader_.name()}, {}, "no data rows", "a row below the header");
       return false;

@@ -90,7 +90,7 @@ class DepthTarget : public Source {
   const std::vector<StreamInfo>& truths() const override { return truths_; }
   std::int64_t size() const override { return count_; }
 
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (index_ == count_) return false;
     const double t_s = static_cast<double>(index_++) * step_s_;
     const double omega = 2.0 * std::numbers::pi * frequency_hz_;

@@ -88,7 +88,7 @@ class Models : public Source {
     return points_[static_cast<std::size_t>(id)];
   }
 
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (index_ == count_) return false;
     if (index_ > 0) Step();
     frame.timestamp = TimestampFromSeconds(Time());

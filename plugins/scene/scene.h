@@ -82,7 +82,7 @@ class Scene : public Source {
     return scene::ToArray(points_[static_cast<std::size_t>(id)]);
   }
 
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (index_ == count_) return false;
     const scene::CameraState& state = trajectory_[index_];
     frame.timestamp = TimestampFromSeconds(static_cast<double>(index_) * dt_s_);

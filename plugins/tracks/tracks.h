@@ -62,7 +62,7 @@ class Tracks : public Source {
     return CalibrationFile::Read(*calibration_);
   }
 
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (frames_ == options_.most || !NextFrame(frame.timestamp)) return false;
     while (frame_ < options_.start_frame) {
       EmitTracks(nullptr);

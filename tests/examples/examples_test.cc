@@ -179,7 +179,7 @@ double RmsApart(const std::string& name, int seed, const std::string& block) {
   Experiment experiment = BuildExperiment(config, Host());
   double squares = 0.0;
   int count = 0;
-  for (Frame frame; experiment.source->Next(frame); ++count) {
+  for (SourceFrame frame; experiment.source->Next(frame); ++count) {
     std::vector<double> values;
     for (const NamedEstimator& named : experiment.estimators) {
       named.estimator->Process(frame);

@@ -23,7 +23,7 @@ TEST(MakeFilter, IsTheFilterOfTheRun) {
   Experiment experiment = BuildExperiment(config, host);
   Estimator& run = *experiment.estimators[0].estimator;
   const std::vector<StreamInfo>& streams = experiment.source->streams();
-  Frame frame;
+  SourceFrame frame;
   int frames = 0;
   for (; frames < 60 && experiment.source->Next(frame); ++frames) {
     std::vector<Reading> readings;

@@ -50,7 +50,7 @@ class Recording : public RunObserver {
     for (const NamedEstimator& one : experiment.estimators) series_.push_back({one.name, 0, {}});
     system_blocks_ = experiment.estimators.front().system.layout.blocks().size();
   }
-  void OnEstimate(int estimator, const Frame& /*frame*/, const State& state,
+  void OnEstimate(int estimator, const SourceFrame& /*frame*/, const State& state,
                   const UpdateReport& report) override {
     Series& series = series_[static_cast<std::size_t>(estimator)];
     for (const MeasurementReport& one : report.measurements()) ++series.outcomes[one.outcome];

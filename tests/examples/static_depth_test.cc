@@ -25,7 +25,7 @@ TEST(StaticDepth, ItsNumbersAreThoseOfExample05) {
   const Config config = Example05();
   const PluginHost host;
   const std::unique_ptr<Source> source = std::move(BuildExperiment(config, host).source);
-  Frame frame;
+  SourceFrame frame;
   for (const static_depth::Row& row : kRows) {
     ASSERT_TRUE(source->Next(frame));
     double disparity = 0.0, inverse_scale = 0.0;

@@ -53,15 +53,14 @@ class SwingingTarget : public Source {
   explicit SwingingTarget(int frames) : frames_(frames) {}
   const std::vector<StreamInfo>& streams() const override { return streams_; }
   const std::vector<StreamInfo>& truths() const override { return truths_; }
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (next_ == frames_) return false;
     const double t_s = 0.033 * next_;
     const double depth = 0.3 + 0.1 * std::sin(2.5133 * t_s), wobble = std::sin(37.0 * next_);
-    frame = FrameAt(t_s, {{1, depth / 0.3 + 0.002 * wobble}});
+    frame = {FrameAt(t_s, {{1, depth / 0.3 + 0.002 * wobble}}), {{depth}}};
     if (next_ % 2 == 0) {
       frame.measurements.push_back({frame.timestamp, 0, -1, {26.0 / depth + wobble}, {}});
     }
-    frame.truth = {{depth}};
     if (next_ == 3) frame.truth = {{}};
     ++next_;
     return true;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 namespace alidade {
@@ -32,7 +33,8 @@ Timestamp StepParts(Timestamp elapsed, double max_dt_s) {
 const char* ToString(Outcome outcome) {
   constexpr const char* kNames[] = {"accepted",  "initialised", "gated",  "out_of_domain",
                                     "invalid",   "not_finite",  "not_pd", "stale",
-                                    "not_ready", "failed"};
+                                    "not_ready", "failed",      "ended"};
+  static_assert(std::size(kNames) == kOutcomes);
   return kNames[static_cast<int>(outcome)];
 }
 

@@ -26,7 +26,9 @@ enum class Outcome {
   kStale,        ///< older than the state
   kNotReady,     ///< a block it needs has no value yet
   kFailed,       ///< the plugin failed
+  kEnded,        ///< not looked at: the estimator has nothing left to go on with
 };
+inline constexpr int kOutcomes = static_cast<int>(Outcome::kEnded) + 1;
 const char* ToString(Outcome outcome);
 /// What a model's status means for the measurement; kOk is kAccepted.
 Outcome OutcomeOf(Status status);

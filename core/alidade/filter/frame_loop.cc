@@ -60,7 +60,7 @@ void FrameLoop::Run(const Frame& frame) {
   }
   if (f.report.stale || f.said.ended) {
     for (const Row& row : all) {
-      row.report->outcome = f.report.stale ? Outcome::kStale : Outcome::kFailed;
+      row.report->outcome = f.report.stale ? Outcome::kStale : Outcome::kEnded;
     }
     return;
   }

@@ -24,13 +24,19 @@ struct Measurement {
   std::vector<double> covariance;  ///< row-major, overrides the model's noise; empty: none
 };
 
-/// All that is known at one timestamp, in the order of the source.
+/// What was measured at one timestamp, in the order of the source: all that an estimator sees.
 struct Frame {
   Timestamp timestamp = 0;
   std::vector<Measurement> measurements;
-  /// One value list for each entry of Source::truths(), of its size; what is empty, or lacks at the
-  /// end, is unknown at this timestamp.
-  std::vector<std::vector<double>> truth;
+};
+
+/// The true values at one timestamp, one for each entry of Source::truths() and of its size; what
+/// is empty, or lacks at the end, is unknown.
+using Truth = std::vector<std::vector<double>>;
+
+/// What a source gives: a frame, and the truth that it is compared with.
+struct SourceFrame : Frame {
+  Truth truth = {};
 };
 
 /// A named stream or truth value of a source.
@@ -50,7 +56,7 @@ class Source {
   /// Fills `frame` with the next one; false at the end. Its streams are indices into streams(), its
   /// values as many as streams() and truths() say: what is not ends the run as internal.
   /// Errors: kBadData, kIo.
-  virtual bool Next(Frame& frame) = 0;
+  virtual bool Next(SourceFrame& frame) = 0;
   /// Where the landmark of that id is in the world, m, where the source knows the true map.
   virtual std::optional<std::array<double, 3>> TrueLandmark(std::int64_t /*id*/) const {
     return std::nullopt;

@@ -21,7 +21,7 @@ std::vector<bool> UsedOf(int sensor, const UpdateReport& report) {
 
 Frame AcceptedOf(const Frame& frame, const std::vector<StreamInfo>& streams, const System& system,
                  const UpdateReport& report) {
-  Frame accepted{frame.timestamp, {}, frame.truth};
+  Frame accepted{frame.timestamp, {}};
   std::vector<std::optional<std::vector<bool>>> used(streams.size());  // none: of no sensor
   for (int sensor = 0; sensor < std::ssize(system.sensors); ++sensor) {
     const std::string& stream = system.sensors[static_cast<std::size_t>(sensor)].stream;

@@ -57,7 +57,7 @@ FrameCheck::FrameCheck(const Experiment& experiment, Counts& normalised)
   }
 }
 
-void FrameCheck::operator()(Frame& frame) {
+void FrameCheck::operator()(SourceFrame& frame) {
   Check(frame);
   for (Measurement& m : frame.measurements) {
     Normalise(streams_[static_cast<std::size_t>(m.stream)], m.values);
@@ -67,7 +67,7 @@ void FrameCheck::operator()(Frame& frame) {
   }
 }
 
-void FrameCheck::Check(const Frame& frame) const {
+void FrameCheck::Check(const SourceFrame& frame) const {
   for (const Measurement& m : frame.measurements) {
     if (m.stream < 0 || m.stream >= std::ssize(streams_)) {
       Refuse(frame, "a measurement of stream " + std::to_string(m.stream) + " of " +
@@ -100,7 +100,7 @@ void FrameCheck::Normalise(Kind& kind, std::vector<double>& value) {
   if (is_rotation) ChooseSign({}, value);
 }
 
-void FrameCheck::FollowTruth(Frame& frame) {
+void FrameCheck::FollowTruth(SourceFrame& frame) {
   for (std::size_t t = 0; t < frame.truth.size(); ++t) {
     Kind& kind = truths_[t];
     if (frame.truth[t].empty() || kind.geometry.kind != GeometryKind::kUnitQuaternion) continue;

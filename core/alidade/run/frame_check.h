@@ -23,9 +23,9 @@ class FrameCheck {
   /// Errors: ContractViolation for a frame that is not as Source::streams() and truths() say, as
   /// whatever takes it afterwards indexes by stream and reads as many values as these tell;
   /// kBadData for a length that is off by more than 1e-3.
-  void operator()(Frame& frame);
+  void operator()(SourceFrame& frame);
   /// Of the two signs of a true quaternion, that nearer to the one before. Takes frames in order.
-  void FollowTruth(Frame& frame);
+  void FollowTruth(SourceFrame& frame);
 
  private:
   /// The values of one stream or truth.
@@ -35,7 +35,7 @@ class FrameCheck {
     std::vector<double> before = {};  ///< of a truth
   };
 
-  void Check(const Frame& frame) const;
+  void Check(const SourceFrame& frame) const;
   void Normalise(Kind& kind, std::vector<double>& value);
 
   const Source& source_;

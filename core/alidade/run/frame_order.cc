@@ -43,7 +43,14 @@ FrameOrder::FrameOrder(Experiment& experiment, Check check)
   }
 }
 
-bool FrameOrder::Next(Frame& frame) {
+FrameOrder::~FrameOrder() {
+  for (std::size_t e = 0; e < released_.processed.size(); ++e) {
+    std::unique_ptr<Estimator>& after = released_.processed[e].after;
+    if (after != nullptr) experiment_.estimators[e].estimator = std::move(after);
+  }
+}
+
+bool FrameOrder::Next(SourceFrame& frame) {
   if (experiment_.out_of_sequence.policy == OutOfSequence::kReject) {
     if (!experiment_.source->Next(frame)) return false;
     check_(frame);
@@ -143,9 +150,9 @@ std::size_t FrameOrder::Insert(Held&& received) {
 }
 
 /// Throws where both have a measurement of one stream, or another value of a truth.
-void FrameOrder::CheckMerge(const Held& held, const Frame& part) const {
+void FrameOrder::CheckMerge(const Held& held, const SourceFrame& part) const {
   const Source& source = *experiment_.source;
-  const Frame& whole = held.frame;
+  const SourceFrame& whole = held.frame;
   const auto fail = [&](const std::string& what, const std::string& expected) {
     throw Error(
         ExitCode::kBadData,
@@ -171,7 +178,7 @@ void FrameOrder::CheckMerge(const Held& held, const Frame& part) const {
 /// Puts the measurements of both into the order of the config, and the truths that one of the two
 /// lacks.
 void FrameOrder::Merge(Held& held, Held&& received) const {
-  Frame &whole = held.frame, &part = received.frame;
+  SourceFrame &whole = held.frame, &part = received.frame;
   const auto key = [this](const Measurement& one) {
     const std::vector<int>& ranks = experiment_.out_of_sequence.ranks;
     const auto stream = static_cast<std::size_t>(one.stream);
@@ -225,7 +232,7 @@ Frame FrameOrder::Accepted(const Held& held, int by) const {
   const auto index = static_cast<std::size_t>(by);
   const NamedEstimator& filter = experiment_.estimators[index];
   const bool follows = filter.accepted_by >= 0;
-  return AcceptedOf(follows ? Accepted(held, filter.accepted_by) : held.frame,
+  return AcceptedOf(follows ? Accepted(held, filter.accepted_by) : Frame(held.frame),
                     experiment_.source->streams(), filter.system, held.processed[index].report);
 }
 

@@ -26,15 +26,19 @@ struct Processed {
 /// out-of-sequence one again.
 class FrameOrder {
  public:
-  using Check = std::function<void(Frame&)>;
+  using Check = std::function<void(SourceFrame&)>;
 
   /// `check` takes each frame first; it throws for one that the estimators must not see.
   FrameOrder(Experiment& experiment, Check check);
+  /// Takes back what the estimators were given beyond the frame that Next gave last.
+  ~FrameOrder();
+  FrameOrder(const FrameOrder&) = delete;
+  FrameOrder& operator=(const FrameOrder&) = delete;
 
   /// The next frame that no other can come before; false at the end. An error of the source, of
   /// `check` or of an estimator is thrown once the frames held back are out. Errors: kBadData where
   /// a stream, or another value of a truth, comes twice at one timestamp.
-  bool Next(Frame& frame);
+  bool Next(SourceFrame& frame);
   /// What the estimator made of the frame that Next gave; null: it has not been given the frame.
   const Processed* processed(std::size_t estimator) const;
   const Arrivals& arrivals() const { return arrivals_; }
@@ -43,7 +47,7 @@ class FrameOrder {
 
  private:
   struct Held {
-    Frame frame;
+    SourceFrame frame;
     std::vector<Place> places;         ///< of the measurements
     std::vector<Processed> processed;  ///< by estimator; empty but under kRollback
   };
@@ -51,7 +55,7 @@ class FrameOrder {
   bool Accept(const Frame& frame);
   void Receive();
   std::size_t Insert(Held&& received);
-  void CheckMerge(const Held& held, const Frame& part) const;
+  void CheckMerge(const Held& held, const SourceFrame& part) const;
   void Merge(Held& held, Held&& received) const;
   void Replay(std::size_t from, bool is_newest);
   Frame Accepted(const Held& held, int by) const;

@@ -26,7 +26,6 @@ constexpr double kInconsistentSigmas = 10.0;
 constexpr int kInconsistentTimestamps = 20;
 constexpr double kFarSigmas = 100.0;
 constexpr double kFarAngleSigmas = 5.0;
-constexpr std::size_t kOutcomes = static_cast<std::size_t>(Outcome::kFailed) + 1;
 
 /// Whether the innovation of an angle, which is never beyond pi, looks like one of another unit:
 /// far beyond its sigma, and either spread over the circle, or of a measurement beyond a turn.
@@ -130,7 +129,8 @@ struct Metrics::Impl {
 
   void Track(const System& system, const std::vector<StreamInfo>& truths);
   template <class ValueOf>
-  void AddErrors(const Frame& frame, const std::vector<Sums*>& into, const ValueOf& value_of);
+  void AddErrors(Timestamp timestamp, const Truth& truth, const std::vector<Sums*>& into,
+                 const ValueOf& value_of);
   void AddConsistency(Timestamp timestamp, const std::vector<Sums*>& into, const State& state);
   void CheckElement(Timestamp timestamp, Tracked& block, int element, double sigma);
   void AddNees(Owner& owner, std::size_t index, const std::vector<Sums*>& into, const State& state);
@@ -169,31 +169,30 @@ void Metrics::Impl::Track(const System& system, const std::vector<StreamInfo>& t
 
 /// value_of(id): the estimate of a block; null: there is none.
 template <class ValueOf>
-void Metrics::Impl::AddErrors(const Frame& frame, const std::vector<Sums*>& into,
-                              const ValueOf& value_of) {
+void Metrics::Impl::AddErrors(Timestamp timestamp, const Truth& truth,
+                              const std::vector<Sums*>& into, const ValueOf& value_of) {
   for (std::size_t i = 0; i < tracked.size(); ++i) {
     Tracked& block = tracked[i];
     const double* const estimate = value_of(block.id);
-    block.known = estimate != nullptr && block.truth < frame.truth.size() &&
-                  !frame.truth[block.truth].empty();
+    block.known = estimate != nullptr && block.truth < truth.size() && !truth[block.truth].empty();
     if (!block.known) continue;
-    const double* truth = frame.truth[block.truth].data();
+    const double* const is = truth[block.truth].data();
     // In the tangent at the estimate, where P is.
-    block.geometry.Minus(truth, estimate, block.error.data());
+    block.geometry.Minus(is, estimate, block.error.data());
     const double square = block.error.allFinite() ? block.error.squaredNorm() : kInfinity;
     block.last_error = std::sqrt(square);
     if (block.id == path && std::isfinite(square)) {
       alignment.Add(Eigen::Map<const Eigen::Vector3d>(estimate),
-                    Eigen::Map<const Eigen::Vector3d>(truth));
+                    Eigen::Map<const Eigen::Vector3d>(is));
     }
     for (Sums* s : into) s->squares[i].Add(square);
     if (!block.scalar) continue;
-    double value = truth[0];
+    double value = is[0];
     if (block.geometry.kind == GeometryKind::kAngle && !block.series.truth.empty()) {
       const double before = block.series.truth.back();  // unwrapped: lag needs no jumps
-      value = before + Angle::Wrap(truth[0] - before);
+      value = before + Angle::Wrap(is[0] - before);
     }
-    block.series.Add(frame.timestamp, value, block.error[0]);
+    block.series.Add(timestamp, value, block.error[0]);
   }
 }
 
@@ -398,11 +397,11 @@ Metrics::Metrics(const NamedEstimator& named, const std::vector<StreamInfo>& tru
 Metrics::~Metrics() = default;
 Metrics::Metrics(Metrics&&) noexcept = default;
 
-void Metrics::Add(const Frame& frame, const std::vector<bool>& in_segment, const State& state,
+void Metrics::Add(const SourceFrame& frame, const std::vector<bool>& in_segment, const State& state,
                   const UpdateReport& report) {
   const std::vector<Impl::Sums*> into = impl_->SumsOf(in_segment);
   if (!report.stale) {
-    impl_->AddErrors(frame, into, [&](BlockId id) {
+    impl_->AddErrors(frame.timestamp, frame.truth, into, [&](BlockId id) {
       return state.layout()[id].present ? state.value(id) : nullptr;
     });
     impl_->AddConsistency(frame.timestamp, into, state);
@@ -414,12 +413,14 @@ void Metrics::AddReport(const std::vector<bool>& in_segment, const UpdateReport&
   impl_->AddReport(impl_->SumsOf(in_segment), report);
 }
 
-void Metrics::AddDifference(const Frame& frame, const std::vector<bool>& in_segment,
+void Metrics::AddDifference(Timestamp timestamp, const std::vector<std::vector<double>>& reference,
+                            const std::vector<bool>& in_segment,
                             const std::vector<std::vector<double>>& estimate) {
-  impl_->AddErrors(frame, impl_->SumsOf(in_segment), [&](BlockId id) -> const double* {
+  const auto value_of = [&](BlockId id) -> const double* {
     const std::vector<double>& value = estimate[static_cast<std::size_t>(id)];
     return value.empty() ? nullptr : value.data();
-  });
+  };
+  impl_->AddErrors(timestamp, reference, impl_->SumsOf(in_segment), value_of);
 }
 
 std::vector<std::string> Metrics::without_truth() const {

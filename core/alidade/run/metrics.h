@@ -56,14 +56,15 @@ class Metrics {
   Metrics(Metrics&&) noexcept;
 
   /// Takes the state after `frame`; `in_segment[i]` says whether the frame lies in segment i.
-  void Add(const Frame& frame, const std::vector<bool>& in_segment, const State& state,
+  void Add(const SourceFrame& frame, const std::vector<bool>& in_segment, const State& state,
            const UpdateReport& report);
   /// The part of Add that needs no truth: counts and NIS.
   void AddReport(const std::vector<bool>& in_segment, const UpdateReport& report);
-  /// The errors of an estimate, its values by block of the estimator's system and empty where there
-  /// is none, where `frame.truth` is an estimate itself: rmse, lag_ms and final_error alone. How
-  /// far the two may be apart P does not say, as they share their data.
-  void AddDifference(const Frame& frame, const std::vector<bool>& in_segment,
+  /// The errors of an estimate from that of another estimator, which stands for the truth: rmse,
+  /// lag_ms and final_error alone. How far the two may be apart P does not say, as they share their
+  /// data. Both are values by block of their estimator's system, empty where there is none.
+  void AddDifference(Timestamp timestamp, const std::vector<std::vector<double>>& reference,
+                     const std::vector<bool>& in_segment,
                      const std::vector<std::vector<double>>& estimate);
   /// `inconsistent`, once for each block element: truth is known and the error has been beyond 10
   /// sigma for 20 timestamps on end.

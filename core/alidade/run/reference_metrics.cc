@@ -29,11 +29,11 @@ void AddDifferences(const std::vector<Estimate>& estimates, const std::vector<Es
   for (const Estimate& one : estimates) {
     if (at[one.frame] == nullptr) continue;
     const Seen& frame = seen[one.frame];
-    Frame known{frame.frame.timestamp, {}, at[one.frame]->values};
-    for (std::vector<double>& value : known.truth) {
+    std::vector<std::vector<double>> known = at[one.frame]->values;
+    for (std::vector<double>& value : known) {
       if (!AllFinite(value)) value.clear();
     }
-    metrics.AddDifference(known, frame.in_segment, one.values);
+    metrics.AddDifference(frame.frame.timestamp, known, frame.in_segment, one.values);
   }
 }
 

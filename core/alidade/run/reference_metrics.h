@@ -22,7 +22,7 @@ std::vector<std::vector<double>> ValuesOf(const State& state, std::size_t blocks
 
 /// A frame of a run, and which segments it is in.
 struct Seen {
-  Frame frame;
+  SourceFrame frame;
   std::vector<bool> in_segment;
 };
 

@@ -62,9 +62,9 @@ bool Advance(Running& one, const Seen& seen, const Frame& visible,
   const UpdateReport& report = passed ? passed->report : estimator.Process(visible);
   if (!passed) one.result.wall_s += SecondsSince(started);
   one.last = &report;
-  one.Note(report.events);
   one.ended = passed ? passed->failed : estimator.failed();
   one.diverged = passed ? passed->diverged : estimator.diverged();
+  one.Note(report.events);
   if (!one.ended && !estimator.offline()) {
     one.Take(static_cast<std::size_t>(result.frames), seen,
              passed ? passed->after->state() : estimator.state(), report, options);
@@ -92,7 +92,7 @@ Frame AcceptedBy(int by, const std::vector<Running>& running, const Frame& frame
 /// The next frame, as the experiment's OutOfSequencePolicy has it; false at the end. What became of
 /// others on the way is noted.
 bool NextFrame(internal::FrameOrder& frames, std::vector<Running>& running, RunResult& result,
-               Frame& frame) {
+               SourceFrame& frame) {
   const auto note = [&] {
     result.arrivals = frames.arrivals();
     const std::vector<Event> events = frames.TakeEvents();
@@ -118,7 +118,7 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
   const bool keep = std::ranges::any_of(
       running, [](const Running& one) { return one.waits || one.named.estimator->offline(); });
   internal::FrameCheck check(experiment, result.normalised);
-  internal::FrameOrder frames(experiment, [&check](Frame& frame) { check(frame); });
+  internal::FrameOrder frames(experiment, [&check](SourceFrame& frame) { check(frame); });
   while (NextFrame(frames, running, result, seen.frame)) {
     check.FollowTruth(seen.frame);
     for (std::size_t i = 0; i < experiment.segments.size(); ++i) {
@@ -193,8 +193,9 @@ void SmoothAll(std::vector<Running>& running, const std::vector<Seen>& kept,
       if (!estimator.failed()) throw;  // it is the record, say, that failed
       events.push_back({estimator.timestamp(), "failed", e.what()});
     }
+    one.ended = estimator.failed();
     one.Note(events);
-    if (!estimator.failed()) continue;
+    if (!one.ended) continue;
     Fail(result, ExitCode::kDiverged,
          "estimator '" + one.named.name + "': " + Cause(events, "failed"));
   }

@@ -4,7 +4,7 @@
 namespace alidade {
 
 struct Experiment;   // in alidade/run/experiment.h
-struct Frame;        // in alidade/host/source.h
+struct SourceFrame;  // in alidade/host/source.h
 class UpdateReport;  // in alidade/filter/estimator.h
 class State;         // in alidade/state/state.h
 
@@ -14,11 +14,11 @@ class RunObserver {
   virtual ~RunObserver() = default;
   /// Once, before the first frame.
   virtual void Begin(const Experiment& /*experiment*/) {}
-  /// Each frame as the estimators are given it, before they take it.
-  virtual void OnFrame(const Frame& /*frame*/) {}
+  /// Each frame before the estimators take it; the truth they are not given.
+  virtual void OnFrame(const SourceFrame& /*frame*/) {}
   /// Each estimate as it is made, with the index of its estimator; those of an offline estimator
   /// after the last frame.
-  virtual void OnEstimate(int /*estimator*/, const Frame& /*frame*/, const State& /*state*/,
+  virtual void OnEstimate(int /*estimator*/, const SourceFrame& /*frame*/, const State& /*state*/,
                           const UpdateReport& /*report*/) {}
 };
 

@@ -35,7 +35,7 @@ void Running::Note(const std::vector<Event>& events) {
     if (stale) ++stale_inputs;
     if (stale && std::ranges::any_of(result.events, same)) continue;
     result.events.push_back(event);
-    const bool ends = named.on_divergence == OnDivergence::kFail || named.estimator->failed();
+    const bool ends = named.on_divergence == OnDivergence::kFail || ended;
     LogEvents(named.name, {&event, 1}, ends);
   }
 }

@@ -68,7 +68,8 @@ void CondensedRun::AddLandmarks(const UpdateReport& report, const Estimator& fil
     const Outcome told = report.measurements()[i].outcome;
     const auto current = current_.find(factor.measurement.landmark);
     const bool lost = told == Outcome::kNotReady || told == Outcome::kOutOfDomain ||
-                      told == Outcome::kInvalid || told == Outcome::kFailed;
+                      told == Outcome::kInvalid || told == Outcome::kFailed ||
+                      told == Outcome::kEnded;
     if (lost || current == current_.end()) {
       factor.outcome = lost ? told : Outcome::kNotReady;
       continue;

@@ -294,7 +294,7 @@ TEST(ControlInputs, OnAManifoldStartAtItsNeutralElementAndStayOnIt) {
   system.initial_time_s = -1.0;
   Ekf ekf(system, {}, {{"attitude", 4}});
   const auto frame = [](double t_s, const std::vector<double>& q) {
-    return Frame{TimestampFromSeconds(t_s), {{TimestampFromSeconds(t_s), 0, -1, q, {}}}, {}};
+    return Frame{TimestampFromSeconds(t_s), {{TimestampFromSeconds(t_s), 0, -1, q, {}}}};
   };
   ekf.Process(frame(0.0, {0.60006, 0.80008, 0.0, 0.0}));  // 1e-4 too long
   EXPECT_NEAR(ValueOf(ekf.state(), "body.x"), 1.0, 1e-15);

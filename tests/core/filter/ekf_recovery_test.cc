@@ -78,6 +78,8 @@ TEST(Ekf, AStepThatIsNotFiniteEndsWithTheLastGoodStateAndMeasurement) {
   EXPECT_NE(report.events[0].text.find("last good state at 0.000000 s: p.x = 4"),
             std::string::npos);
   EXPECT_NE(report.events[0].text.find("sensor 'direct' at 0.000000 s, z = 5"), std::string::npos);
+  EXPECT_STREQ(ToString(report.measurements()[0].outcome), "ended");
+  EXPECT_EQ(ekf.Process(FrameAt(2.0, {{0, 5.0}})).measurements()[0].outcome, Outcome::kEnded);
 }
 
 TEST(Ekf, AFailedStepMovesNothing) {

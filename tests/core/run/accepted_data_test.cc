@@ -17,7 +17,7 @@ class WithOutliers : public SwingingTarget {
   /// `late`: each third frame comes after the one behind it.
   WithOutliers(bool outliers, bool late) : SwingingTarget(0) {
     SwingingTarget target(kFrames);
-    Frame frame;
+    SourceFrame frame;
     for (int k = 0; target.Next(frame); ++k) {
       Measurement& scale = frame.measurements[0];
       if (k % 11 == 5 && outliers) scale.values[0] += 0.5;
@@ -28,14 +28,14 @@ class WithOutliers : public SwingingTarget {
       std::swap(frames_[k], frames_[k + 1]);
     }
   }
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (next_ == frames_.size()) return false;
     frame = frames_[next_++];
     return true;
   }
 
  private:
-  std::vector<Frame> frames_;
+  std::vector<SourceFrame> frames_;
   std::size_t next_ = 0;
 };
 
@@ -97,9 +97,9 @@ class GivenFrames : public Source {
       : streams_(std::move(streams)), frames_(std::move(frames)) {}
   const std::vector<StreamInfo>& streams() const override { return streams_; }
   const std::vector<StreamInfo>& truths() const override { return truths_; }
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (next_ == frames_.size()) return false;
-    frame = frames_[next_++];
+    frame = {frames_[next_++]};
     return true;
   }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "alidade/base/log.h"
 #include "support/recording.h"
 
 namespace alidade::testing {
@@ -17,12 +18,17 @@ INSTANTIATE_TEST_SUITE_P(Policies, FrameOrder,
                            return of.param == OutOfSequence::kBuffer ? "buffer" : "rollback";
                          });
 
+/// A frame as of FrameAt, without truth.
+SourceFrame GivenAt(double t_s, const std::vector<std::pair<int, double>>& values) {
+  return {FrameAt(t_s, values)};
+}
+
 /// What the test says, frame by frame; frame k is in line k + 2 of rows.csv.
 class Given : public SwingingTarget {
  public:
-  explicit Given(std::vector<Frame> frames, bool then_fails = false)
+  explicit Given(std::vector<SourceFrame> frames, bool then_fails = false)
       : SwingingTarget(0), frames_(std::move(frames)), then_fails_(then_fails) {}
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (next_ == std::ssize(frames_) && then_fails_) throw Error(ExitCode::kBadData, "torn");
     if (next_ == std::ssize(frames_)) return false;
     frame = frames_[static_cast<std::size_t>(next_++)];
@@ -33,12 +39,13 @@ class Given : public SwingingTarget {
 
  private:
   std::vector<StreamInfo> with_another_ = {{"disparity", 1}, {"inverse_scale", 1}, {"aside", 1}};
-  std::vector<Frame> frames_;
+  std::vector<SourceFrame> frames_;
   int next_ = 0;
   bool then_fails_;
 };
 
-Experiment MakeGiven(std::vector<Frame> frames, OutOfSequence order, bool then_fails = false) {
+Experiment MakeGiven(std::vector<SourceFrame> frames, OutOfSequence order,
+                     bool then_fails = false) {
   Experiment experiment = MakeExperiment();
   experiment.source = std::make_unique<Given>(std::move(frames), then_fails);
   experiment.out_of_sequence.policy = order;
@@ -48,10 +55,10 @@ Experiment MakeGiven(std::vector<Frame> frames, OutOfSequence order, bool then_f
 
 TEST_P(FrameOrder, AFrameBeyondTheWindowIsDroppedWithAnEvent) {
   // 0.1 s behind the newest is in the window, a nanosecond more is not.
-  Frame beyond = FrameAt(0.2, {{0, 80.0}, {1, 1.0}});
+  SourceFrame beyond = GivenAt(0.2, {{0, 80.0}, {1, 1.0}});
   beyond.timestamp -= 1;
   Experiment experiment = MakeGiven(
-      {FrameAt(0.1, {{1, 1.0}}), FrameAt(0.3, {{1, 1.0}}), beyond, FrameAt(0.2, {{1, 1.0}})},
+      {GivenAt(0.1, {{1, 1.0}}), GivenAt(0.3, {{1, 1.0}}), beyond, GivenAt(0.2, {{1, 1.0}})},
       GetParam());
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.status, RunStatus::kOk) << result.reason;
@@ -71,7 +78,7 @@ TEST_P(FrameOrder, AFrameBeyondTheWindowIsDroppedWithAnEvent) {
 }
 
 TEST_P(FrameOrder, AFrameBeforeTheFirstIsWhereTheRunStarts) {
-  const Frame first = FrameAt(0.0, {{1, 1.0}}), second = FrameAt(0.1, {{1, 1.1}});
+  const SourceFrame first = GivenAt(0.0, {{1, 1.0}}), second = GivenAt(0.1, {{1, 1.1}});
   Experiment in_order = MakeGiven({first, second}, OutOfSequence::kReject);
   Experiment late = MakeGiven({second, first}, GetParam());
   alidade::Run(in_order, {});
@@ -82,8 +89,8 @@ TEST_P(FrameOrder, AFrameBeforeTheFirstIsWhereTheRunStarts) {
 
 TEST_P(FrameOrder, AStreamTwiceAtOneTimestampIsAnErrorThatNamesBothPlaces) {
   Experiment experiment =
-      MakeGiven({FrameAt(0.0, {{1, 1.0}}), FrameAt(0.05, {{1, 1.0}}), FrameAt(0.1, {{1, 1.0}}),
-                 FrameAt(0.05, {{0, 80.0}}), FrameAt(0.05, {{1, 1.0}})},
+      MakeGiven({GivenAt(0.0, {{1, 1.0}}), GivenAt(0.05, {{1, 1.0}}), GivenAt(0.1, {{1, 1.0}}),
+                 GivenAt(0.05, {{0, 80.0}}), GivenAt(0.05, {{1, 1.0}})},
                 GetParam());
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.code, ExitCode::kBadData);
@@ -97,7 +104,7 @@ TEST_P(FrameOrder, AStreamTwiceAtOneTimestampIsAnErrorThatNamesBothPlaces) {
 TEST_P(FrameOrder, MergedMeasurementsHaveTheOrderOfTheSensors) {
   for (const bool swapped : {false, true}) {
     const TemporaryFolder folder;
-    const std::vector<Frame> frames = {FrameAt(0.0, {{0, 80.0}}), FrameAt(0.0, {{1, 1.0}})};
+    const std::vector<SourceFrame> frames = {GivenAt(0.0, {{0, 80.0}}), GivenAt(0.0, {{1, 1.0}})};
     Experiment experiment = MakeGiven({frames[swapped], frames[!swapped]}, GetParam());
     experiment.out_of_sequence.ranks = {1, 0};
     Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
@@ -114,8 +121,8 @@ TEST_P(FrameOrder, MergedMeasurementsHaveTheOrderOfTheSensors) {
 TEST_P(FrameOrder, MergedFramesOfSeveralMeasurementsToo) {
   for (const bool swapped : {false, true}) {
     const TemporaryFolder folder;
-    const std::vector<Frame> frames = {FrameAt(0.0, {{0, 80.0}, {1, 1.0}}),
-                                       FrameAt(0.0, {{2, 5.0}})};
+    const std::vector<SourceFrame> frames = {GivenAt(0.0, {{0, 80.0}, {1, 1.0}}),
+                                             GivenAt(0.0, {{2, 5.0}})};
     Experiment experiment = MakeGiven({frames[swapped], frames[!swapped]}, GetParam());
     experiment.out_of_sequence.ranks = {2, 1, 0};
     Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
@@ -131,7 +138,7 @@ TEST_P(FrameOrder, MergedFramesOfSeveralMeasurementsToo) {
 // The place of each goes with it.
 TEST_P(FrameOrder, AStreamTwiceInMergedFramesNamesTheFirstOfItsOwn) {
   Experiment experiment = MakeGiven(
-      {FrameAt(0.0, {{0, 80.0}, {1, 1.0}}), FrameAt(0.0, {{2, 5.0}}), FrameAt(0.0, {{2, 5.0}})},
+      {GivenAt(0.0, {{0, 80.0}, {1, 1.0}}), GivenAt(0.0, {{2, 5.0}}), GivenAt(0.0, {{2, 5.0}})},
       GetParam());
   experiment.out_of_sequence.ranks = {2, 1, 0};
   EXPECT_EQ(alidade::Run(experiment, {}).reason,
@@ -140,7 +147,7 @@ TEST_P(FrameOrder, AStreamTwiceInMergedFramesNamesTheFirstOfItsOwn) {
 }
 
 TEST_P(FrameOrder, LandmarksOfOneStreamAreNotTheSameTwice) {
-  Frame one = FrameAt(0.0, {{1, 1.0}}), another = one;
+  SourceFrame one = GivenAt(0.0, {{1, 1.0}}), another = one;
   one.measurements[0].landmark = 1;
   another.measurements[0].landmark = 2;
   Experiment experiment = MakeGiven({one, another}, GetParam());
@@ -150,7 +157,8 @@ TEST_P(FrameOrder, LandmarksOfOneStreamAreNotTheSameTwice) {
 }
 
 TEST_P(FrameOrder, TwoTruthsAtOneTimestampAreAnError) {
-  Frame one = FrameAt(0.0, {{1, 1.0}}), same = FrameAt(0.0, {{0, 80.0}}), other = FrameAt(0.0, {});
+  SourceFrame one = GivenAt(0.0, {{1, 1.0}}), same = GivenAt(0.0, {{0, 80.0}}),
+              other = GivenAt(0.0, {});
   one.truth = same.truth = {{0.3}};
   other.truth = {{0.31}};
   Experiment experiment = MakeGiven({one, same}, GetParam());
@@ -164,7 +172,7 @@ TEST_P(FrameOrder, TwoTruthsAtOneTimestampAreAnError) {
 }
 
 TEST_P(FrameOrder, ARowThatIsRefusedForItsTruthIsNotUsedAtAll) {
-  Frame one = FrameAt(0.0, {{1, 1.0}}), refused = FrameAt(0.0, {{0, 80.0}});
+  SourceFrame one = GivenAt(0.0, {{1, 1.0}}), refused = GivenAt(0.0, {{0, 80.0}});
   one.truth = {{0.3}};
   refused.truth = {{0.31}};
   Experiment experiment = MakeGiven({one, refused}, GetParam());
@@ -178,7 +186,7 @@ TEST_P(FrameOrder, ARowThatIsRefusedForItsTruthIsNotUsedAtAll) {
 
 TEST_P(FrameOrder, BadDataKeepsTheFramesHeldBack) {
   Experiment experiment =
-      MakeGiven({FrameAt(0.1, {{1, 1.0}}), FrameAt(0.05, {{1, 1.0}}), FrameAt(0.0, {{1, 1.0}})},
+      MakeGiven({GivenAt(0.1, {{1, 1.0}}), GivenAt(0.05, {{1, 1.0}}), GivenAt(0.0, {{1, 1.0}})},
                 GetParam(), true);
   const RunResult result = alidade::Run(experiment, {});
   EXPECT_EQ(result.code, ExitCode::kBadData);
@@ -189,16 +197,21 @@ TEST_P(FrameOrder, BadDataKeepsTheFramesHeldBack) {
 
 TEST_P(FrameOrder, DivergenceUnderFailEndsTheRunAtTheFrameOfTheInOrderRun) {
   // A negative depth is outside of the domain of both sensors, from the second frame on.
-  const std::vector<Frame> frames = {FrameAt(0.0, {}), FrameAt(0.05, {{0, 80.0}}),
-                                     FrameAt(0.1, {{0, 80.0}}), FrameAt(0.15, {{0, 80.0}})};
-  const auto run = [](std::vector<Frame> given, OutOfSequence order) {
+  const std::vector<SourceFrame> frames = {GivenAt(0.0, {}), GivenAt(0.05, {{0, 80.0}}),
+                                           GivenAt(0.1, {{0, 80.0}}), GivenAt(0.15, {{0, 80.0}})};
+  std::vector<Timestamp> ends;
+  const auto run = [&ends](std::vector<SourceFrame> given, OutOfSequence order) {
     Experiment experiment = MakeGiven(std::move(given), order);
     NamedEstimator& alone = experiment.estimators[1];
     alone.system.priors[0].mean = {-0.2};
     alone.on_divergence = OnDivergence::kFail;
     alone.estimator =
         std::make_unique<Ekf>(alone.system, EkfOptions{}, experiment.source->streams());
-    return alidade::Run(experiment, {});
+    const RunResult result = alidade::Run(experiment, {});
+    for (const NamedEstimator& one : experiment.estimators) {
+      ends.push_back(one.estimator->timestamp());
+    }
+    return result;
   };
   const RunResult in_order = run(frames, OutOfSequence::kReject);
   ASSERT_EQ(in_order.code, ExitCode::kDiverged);
@@ -210,11 +223,65 @@ TEST_P(FrameOrder, DivergenceUnderFailEndsTheRunAtTheFrameOfTheInOrderRun) {
     EXPECT_EQ(late.estimators[e].diverged, in_order.estimators[e].diverged);
     EXPECT_EQ(late.estimators[e].counts, in_order.estimators[e].counts);
   }
+  EXPECT_EQ(ends, std::vector<Timestamp>(4, frames[1].timestamp));
+}
+
+/// Fails at the frame of that timestamp.
+struct Mortal : Ekf {
+  using Ekf::Ekf;
+  const UpdateReport& Process(const Frame& frame) override {
+    failed_ = failed_ || frame.timestamp == at;
+    return Ekf::Process(frame);
+  }
+  std::unique_ptr<Estimator> Clone() const override { return std::make_unique<Mortal>(*this); }
+  bool failed() const override { return failed_; }
+  Timestamp at = kNoTimestamp;
+
+ private:
+  bool failed_ = false;
+};
+
+// Its depth is negative, and so it diverges at the first frame; it fails at the third.
+TEST_P(FrameOrder, AStopLeavesTheEstimatorsAndTheLogAtTheLastFrameTaken) {
+  std::vector<SourceFrame> frames;
+  for (int k = 0; k < 8; ++k) frames.push_back(GivenAt(0.05 * k, {{0, 80.0 - k}, {1, 1.0}}));
+  const auto run = [&frames](OutOfSequence order, std::vector<std::string>& log) {
+    Experiment experiment = MakeGiven(frames, order);
+    NamedEstimator& named = experiment.estimators[1];
+    named.system.priors[0].mean = {-0.2};
+    auto mortal =
+        std::make_unique<Mortal>(named.system, EkfOptions{}, experiment.source->streams());
+    mortal->at = frames[2].timestamp;
+    named.estimator = std::move(mortal);
+    const LogSubscription subscription(
+        LogLevel::kWarning, [&](LogLevel, std::string_view text) { log.emplace_back(text); });
+    int left = 2;
+    RunOptions options;
+    options.stop = [&left] { return --left == 0; };
+    const RunResult result = alidade::Run(experiment, options);
+    EXPECT_EQ(result.status, RunStatus::kStopped);
+    EXPECT_EQ(result.frames, 2);
+    return experiment;
+  };
+  std::vector<std::string> log, late_log;
+  const Experiment in_order = run(OutOfSequence::kReject, log);
+  const Experiment late = run(GetParam(), late_log);
+  ASSERT_EQ(log.size(), 1u);
+  EXPECT_NE(log[0].find("not defined at target.depth = -0.2"), std::string::npos) << log[0];
+  EXPECT_EQ(late_log, log);
+  for (std::size_t e = 0; e < 2; ++e) {
+    const Estimator &one = *late.estimators[e].estimator,
+                    &other = *in_order.estimators[e].estimator;
+    EXPECT_FALSE(one.failed());
+    EXPECT_EQ(one.timestamp(), frames[1].timestamp);
+    EXPECT_EQ(one.state().values(), other.state().values());
+    EXPECT_EQ(one.state().covariance().Dense(), other.state().covariance().Dense());
+  }
 }
 
 TEST(Sort, WithoutAWindowTakesTheWholeRun) {
-  std::vector<Frame> frames;
-  for (int k = 0; k < 50; ++k) frames.push_back(FrameAt(100.0 - k, {{1, 1.0}}));
+  std::vector<SourceFrame> frames;
+  for (int k = 0; k < 50; ++k) frames.push_back(GivenAt(100.0 - k, {{1, 1.0}}));
   Experiment experiment = MakeGiven(frames, OutOfSequence::kBuffer);
   experiment.out_of_sequence.window.reset();
   const RunResult result = alidade::Run(experiment, {});
@@ -235,8 +302,8 @@ struct Watching : Ekf {
 };
 
 TEST(Rollback, TakesAFrameAtOnceAndTheLaterOnesAgain) {
-  Experiment experiment = MakeGiven({FrameAt(0.0, {{1, 1.0}}), FrameAt(0.05, {{1, 1.0}}),
-                                     FrameAt(0.1, {{1, 1.0}}), FrameAt(0.02, {{1, 1.0}})},
+  Experiment experiment = MakeGiven({GivenAt(0.0, {{1, 1.0}}), GivenAt(0.05, {{1, 1.0}}),
+                                     GivenAt(0.1, {{1, 1.0}}), GivenAt(0.02, {{1, 1.0}})},
                                     OutOfSequence::kRollback);
   NamedEstimator& named = experiment.estimators[0];
   auto watching =
@@ -263,10 +330,10 @@ struct Throwing : Ekf {
 
 TEST(Rollback, AnEstimatorThatThrowsEndsTheRunAfterTheFramesBefore) {
   // All are within the window: none is released before the third is tried.
-  Experiment experiment = MakeGiven({FrameAt(0.0, {{1, 1.0}}), FrameAt(0.02, {{1, 1.0}}),
-                                     FrameAt(0.04, {{1, 1.0}}), FrameAt(0.06, {{1, 1.0}})},
+  Experiment experiment = MakeGiven({GivenAt(0.0, {{1, 1.0}}), GivenAt(0.02, {{1, 1.0}}),
+                                     GivenAt(0.04, {{1, 1.0}}), GivenAt(0.06, {{1, 1.0}})},
                                     OutOfSequence::kRollback);
-  NamedEstimator& named = experiment.estimators[0];
+  NamedEstimator& named = experiment.estimators[1];
   auto throwing =
       std::make_unique<Throwing>(named.system, EkfOptions{}, experiment.source->streams());
   throwing->at = TimestampFromSeconds(0.04);
@@ -276,6 +343,9 @@ TEST(Rollback, AnEstimatorThatThrowsEndsTheRunAfterTheFramesBefore) {
   EXPECT_EQ(result.reason, "internal: an invariant");
   EXPECT_EQ(result.frames, 2);
   EXPECT_EQ(result.estimators[0].counts.at("accepted:inverse_scale"), 2);
+  for (const NamedEstimator& one : experiment.estimators) {  // the first had the third frame
+    EXPECT_EQ(one.estimator->timestamp(), TimestampFromSeconds(0.02));
+  }
 }
 
 /// An estimator that cannot go back.
@@ -295,7 +365,7 @@ class Forward : public Estimator {
 };
 
 TEST(Rollback, IsNotForAnEstimatorThatCannotGoBack) {
-  Experiment experiment = MakeGiven({FrameAt(0.0, {})}, OutOfSequence::kRollback);
+  Experiment experiment = MakeGiven({GivenAt(0.0, {})}, OutOfSequence::kRollback);
   experiment.estimators[0].estimator = std::make_unique<Forward>(experiment.estimators[0].system);
   EXPECT_EQ(alidade::Run(experiment, {}).code, ExitCode::kInternal);
 }

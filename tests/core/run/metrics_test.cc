@@ -35,7 +35,7 @@ class FakeSource : public Source {
   explicit FakeSource(std::vector<StreamInfo> truths) : truths_(std::move(truths)) {}
   const std::vector<StreamInfo>& streams() const override { return streams_; }
   const std::vector<StreamInfo>& truths() const override { return truths_; }
-  bool Next(Frame&) override { return false; }
+  bool Next(SourceFrame&) override { return false; }
 
  private:
   std::vector<StreamInfo> streams_, truths_;
@@ -60,7 +60,7 @@ class MetricsOf {
   std::vector<bool>& in_segment() { return in_segment_; }
   /// The state as it is, at the next timestamp of 0.1 s.
   void Add(const std::vector<std::vector<double>>& truth, const UpdateReport& report = {}) {
-    Frame frame;
+    SourceFrame frame;
     frame.timestamp = timestamp_;
     frame.truth = truth;
     metrics_->Add(frame, in_segment_, state_, report);

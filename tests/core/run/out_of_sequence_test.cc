@@ -68,26 +68,26 @@ class Delayed : public Source {
  public:
   Delayed(std::unique_ptr<Source> source, double most_s, bool split) : source_(std::move(source)) {
     std::mt19937_64 random(7);
-    std::multimap<Timestamp, Frame> arrivals;  // in the order of insertion where equal
-    const auto add = [&](Frame frame) {
+    std::multimap<Timestamp, SourceFrame> arrivals;  // in the order of insertion where equal
+    const auto add = [&](SourceFrame frame) {
       const auto most = static_cast<std::uint64_t>(TimestampFromSeconds(most_s));
       const auto delay = static_cast<Timestamp>(arrivals.empty() ? most : random() % (most + 1));
       const Timestamp at = frame.timestamp + delay;
       arrivals.emplace(at, std::move(frame));
     };
-    for (Frame frame; source_->Next(frame);) {
+    for (SourceFrame frame; source_->Next(frame);) {
       if (!split) {
         add(frame);
         continue;
       }
-      for (const Measurement& m : frame.measurements) add({frame.timestamp, {m}, {}});
-      add({frame.timestamp, {}, frame.truth});
+      for (const Measurement& m : frame.measurements) add({{frame.timestamp, {m}}});
+      add({{frame.timestamp, {}}, frame.truth});
     }
     for (auto& [at, frame] : arrivals) frames_.push_back(std::move(frame));
   }
   const std::vector<StreamInfo>& streams() const override { return source_->streams(); }
   const std::vector<StreamInfo>& truths() const override { return source_->truths(); }
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (next_ == frames_.size()) return false;
     frame = frames_[next_++];
     return true;
@@ -95,7 +95,7 @@ class Delayed : public Source {
 
  private:
   std::unique_ptr<Source> source_;
-  std::vector<Frame> frames_;
+  std::vector<SourceFrame> frames_;
   std::size_t next_ = 0;
 };
 

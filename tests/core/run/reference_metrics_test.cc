@@ -43,7 +43,7 @@ class Blind : public SwingingTarget {
  public:
   using SwingingTarget::SwingingTarget;
   const std::vector<StreamInfo>& truths() const override { return none_; }
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     const bool more = SwingingTarget::Next(frame);
     frame.truth.clear();
     return more;
@@ -69,7 +69,7 @@ Experiment MakeCompared(bool fails = false) {
 std::vector<double> Depths(bool alone) {
   Experiment experiment = MakeExperiment();
   Estimator& ekf = *experiment.estimators[alone ? 1 : 0].estimator;
-  Frame frame;
+  SourceFrame frame;
   std::vector<double> depths;
   while (experiment.source->Next(frame)) {
     ekf.Process(frame);
@@ -137,7 +137,7 @@ TEST(Reference, ThatFailedIsNone) {
 class Counting : public Blind {
  public:
   Counting(int frames, std::size_t& grown) : Blind(frames), grown_(grown) {}
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (start_ == 0) start_ = InUse();
     const bool more = Blind::Next(frame);
     if (!more) grown_ = InUse() - start_;
@@ -184,7 +184,7 @@ TEST(Reference, KeepsNoCovariances) {
 class Torn : public Blind {
  public:
   using Blind::Blind;
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (left_-- == 0) throw Error(ExitCode::kBadData, "torn");
     return Blind::Next(frame);
   }

@@ -117,7 +117,7 @@ TEST(Run, TakesTheEstimatesOfAnOfflineEstimatorAtTheEnd) {
   NamedEstimator& alone = experiment.estimators[1];
   alone.estimator = std::make_unique<Hindsight>(alone.system);
   Experiment truths = MakeExperiment();
-  Frame frame;
+  SourceFrame frame;
   double squares = 0.0, known = 0.0;
   for (double k = 0.0; truths.source->Next(frame); ++k) {
     for (const double depth : frame.truth[0]) {
@@ -182,7 +182,7 @@ struct SignalledSource : Source {
   explicit SignalledSource(std::unique_ptr<Source> of) : frames(std::move(of)) {}
   const std::vector<StreamInfo>& streams() const override { return frames->streams(); }
   const std::vector<StreamInfo>& truths() const override { return frames->truths(); }
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (++count == 7) throw Error(ExitCode::kStopped, "a signal");
     return frames->Next(frame);
   }
@@ -234,10 +234,9 @@ class Walking : public testing::SwingingTarget {
   explicit Walking(std::uint64_t seed) : SwingingTarget(0), random_(seed) {
     x_ = 2.0 * random_.Normal();
   }
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (k_ == 200) return false;
-    frame = testing::FrameAt(k_++, {{0, x_ + random_.Normal()}});
-    frame.truth = {{x_}};
+    frame = {testing::FrameAt(k_++, {{0, x_ + random_.Normal()}}), {{x_}}};
     x_ += 0.1 * random_.Normal();
     return true;
   }
@@ -334,11 +333,11 @@ class Turning : public testing::SwingingTarget {
  public:
   Turning(double rate_rad_s, double unit, bool wrapped)
       : SwingingTarget(0), rate_rad_s_(rate_rad_s), unit_(unit), wrapped_(wrapped) {}
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (k_ == 300) return false;
     const double t_s = 0.1 * k_++;
     const double angle = 0.6 + rate_rad_s_ * t_s + 0.02 * random_.Normal();
-    frame = testing::FrameAt(t_s, {{0, unit_ * (wrapped_ ? Angle::Wrap(angle) : angle)}});
+    frame = {testing::FrameAt(t_s, {{0, unit_ * (wrapped_ ? Angle::Wrap(angle) : angle)}})};
     return true;
   }
 
@@ -438,7 +437,7 @@ TEST(Run, ASensorOfWhichNothingWasUsedIsAnEvent) {
 class Failing : public testing::SwingingTarget {
  public:
   explicit Failing(ExitCode code) : SwingingTarget(60), code_(code) {}
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (++count_ > 5) throw Error(code_, "rows.csv:7 d: 'x' is not a number");
     return SwingingTarget::Next(frame);
   }
@@ -452,9 +451,9 @@ class Failing : public testing::SwingingTarget {
 class EachSecond : public testing::SwingingTarget {
  public:
   explicit EachSecond(int frames) : SwingingTarget(0), left_(frames) {}
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (left_-- == 0) return false;
-    frame = testing::FrameAt(t_s_, {{0, t_s_}, {1, 1.0}});
+    frame = {testing::FrameAt(t_s_, {{0, t_s_}, {1, 1.0}})};
     t_s_ += 1.0;
     return true;
   }
@@ -498,7 +497,7 @@ TEST(Run, BadDataKeepsWhatWasDone) {
 class Breaking : public testing::SwingingTarget {
  public:
   Breaking() : SwingingTarget(60) {}
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (++count_ > 5) throw std::logic_error("an invariant");
     return SwingingTarget::Next(frame);
   }
@@ -519,37 +518,38 @@ TEST(Run, ADefectIsAResultToo) {
 /// Spoils its fourth frame.
 class Spoiling : public testing::SwingingTarget {
  public:
-  explicit Spoiling(void (*spoil)(Frame&)) : SwingingTarget(60), spoil_(spoil) {}
-  bool Next(Frame& frame) override {
+  explicit Spoiling(void (*spoil)(SourceFrame&)) : SwingingTarget(60), spoil_(spoil) {}
+  bool Next(SourceFrame& frame) override {
     const bool more = SwingingTarget::Next(frame);
     if (++count_ == 4) spoil_(frame);
     return more;
   }
 
  private:
-  void (*spoil_)(Frame&);
+  void (*spoil_)(SourceFrame&);
   int count_ = 0;
 };
 
 TEST(Run, AFrameThatBreaksTheContractOfItsSourceEndsTheRun) {
   struct Case {
-    void (*spoil)(Frame&);
+    void (*spoil)(SourceFrame&);
     std::string reason;
   };
   for (const Case& one : std::vector<Case>{
-           {[](Frame& f) { f.measurements[0].values.clear(); },
+           {[](SourceFrame& f) { f.measurements[0].values.clear(); },
             "0 values of 'inverse_scale', not 1"},
-           {[](Frame& f) {
+           {[](SourceFrame& f) {
               f.measurements[0].values = {1, 2};
             },
             "2 values of 'inverse_scale', not 1"},
-           {[](Frame& f) { f.measurements[0].stream = -1; }, "a measurement of stream -1 of 2"},
-           {[](Frame& f) { f.measurements[0].stream = 2; }, "a measurement of stream 2 of 2"},
-           {[](Frame& f) {
+           {[](SourceFrame& f) { f.measurements[0].stream = -1; },
+            "a measurement of stream -1 of 2"},
+           {[](SourceFrame& f) { f.measurements[0].stream = 2; }, "a measurement of stream 2 of 2"},
+           {[](SourceFrame& f) {
               f.truth[0] = {1, 2};
             },
             "2 values of 'depth', not 1"},
-           {[](Frame& f) { f.truth.resize(2); }, "2 truths of 1"}}) {
+           {[](SourceFrame& f) { f.truth.resize(2); }, "2 truths of 1"}}) {
     Experiment experiment = MakeExperiment();
     const SensorModel stereo = experiment.estimators[0].system.sensors[1].model;
     experiment.segments.push_back({"near", 1, true, stereo});

@@ -12,7 +12,7 @@ class Counter : public alidade::Source {
   explicit Counter(int last) : last_(last) {}
   const std::vector<alidade::StreamInfo>& streams() const override { return streams_; }
   const std::vector<alidade::StreamInfo>& truths() const override { return truths_; }
-  bool Next(alidade::Frame& frame) override {
+  bool Next(alidade::SourceFrame& frame) override {
     frame.timestamp = next_;
     return next_++ < last_;
   }

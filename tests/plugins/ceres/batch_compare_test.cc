@@ -21,12 +21,12 @@ class Swing : public Source {
   explicit Swing(bool with_outlier = false) : with_outlier_(with_outlier) {}
   const std::vector<StreamInfo>& streams() const override { return streams_; }
   const std::vector<StreamInfo>& truths() const override { return truths_; }
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (next_ == kFrames) return false;
     const double t_s = 0.05 * next_, wobble = 0.3 * std::sin(37.0 * next_);
     const double z = 2.0 * std::cos(t_s) + wobble + (with_outlier_ && next_ == 9 ? 50.0 : 0.0);
-    frame = next_ % 4 == 3 ? testing::FrameAt(t_s, {}) : testing::FrameAt(t_s, {{0, z}});
-    frame.truth = {{std::cos(t_s)}};
+    frame = {next_ % 4 == 3 ? testing::FrameAt(t_s, {}) : testing::FrameAt(t_s, {{0, z}}),
+             {{std::cos(t_s)}}};
     ++next_;
     return true;
   }
@@ -155,7 +155,7 @@ ByHand RunByHand() {
   Ekf ekf(system, options, source.streams());
   RtsSmoother rts(system, options, source.streams());
   ByHand run;
-  for (Frame frame; source.Next(frame);) {
+  for (SourceFrame frame; source.Next(frame);) {
     ekf.Process(frame);
     rts.Process(frame);
     run.filter.emplace_back(ekf.state().values().data());

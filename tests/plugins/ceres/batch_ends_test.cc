@@ -166,7 +166,7 @@ TEST(CeresBatchEnds, AFilterThatGaveUpStepsNoMore) {
   Failing::budget = 1000;
   const UpdateReport& report = ekf.Process(FrameAt(0.2, {{0, 0.2}}));
   EXPECT_TRUE(report.events.empty());
-  EXPECT_EQ(report.measurements()[0].outcome, Outcome::kFailed);
+  EXPECT_EQ(report.measurements()[0].outcome, Outcome::kEnded);
   EXPECT_EQ(ekf.timestamp(), 0);
   EXPECT_EQ(ekf.state().values(), good);
   EXPECT_EQ(ekf.state().covariance().Dense(), p);

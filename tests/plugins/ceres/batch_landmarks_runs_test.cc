@@ -90,7 +90,7 @@ TEST(CeresBatchLandmarks, NoiseOfLowRankMovesTheCameraExactlyAsItsModelSays) {
   const auto batch = testing::Shipped().CreateEstimator("ceres_batch", entry.root())(
       system, made.scene->streams());
   std::vector<Frame> frames;
-  for (Frame frame; made.scene->Next(frame);) frames.push_back(frame);
+  for (SourceFrame frame; made.scene->Next(frame);) frames.push_back(frame);
   const Found found = Solve(*batch, frames);
   ASSERT_FALSE(found.failed) << found.events.back().text;
   ASSERT_EQ(found.states.size(), 40u);

@@ -271,7 +271,7 @@ class WithOutliers : public Source {
   explicit WithOutliers(std::unique_ptr<Source> source) : source_(std::move(source)) {}
   const std::vector<StreamInfo>& streams() const override { return source_->streams(); }
   const std::vector<StreamInfo>& truths() const override { return source_->truths(); }
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (!source_->Next(frame)) return false;
     for (Measurement& m : frame.measurements) {
       if (++count_ % 8 == 0) m.values[0] += streams()[m.stream].name == "disparity" ? 20.0 : 0.2;

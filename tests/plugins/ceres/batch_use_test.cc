@@ -17,7 +17,7 @@ bool IsOutlier(int k) { return k % 13 == 6; }
 class WithOutliers : public SwingingTarget {
  public:
   explicit WithOutliers(bool outliers) : SwingingTarget(80), outliers_(outliers) {}
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (!SwingingTarget::Next(frame)) return false;
     const int k = next_++;
     if (!IsOutlier(k) || frame.measurements.size() < 2) return true;

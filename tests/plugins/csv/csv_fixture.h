@@ -41,13 +41,13 @@ class Csv : public ::testing::Test {
     config_->root().RejectUnread();
     return source;
   }
-  std::vector<Frame> Frames(const std::string& config = kDepthConfig) {
+  std::vector<SourceFrame> Frames(const std::string& config = kDepthConfig) {
     const auto source = Open(config);
-    std::vector<Frame> frames;
-    for (Frame frame; source->Next(frame);) frames.push_back(frame);
+    std::vector<SourceFrame> frames;
+    for (SourceFrame frame; source->Next(frame);) frames.push_back(frame);
     return frames;
   }
-  std::vector<Frame> Frames(const std::string& text, const std::string& config) {
+  std::vector<SourceFrame> Frames(const std::string& text, const std::string& config) {
     Write(text);
     return Frames(config);
   }
@@ -79,14 +79,14 @@ class Csv : public ::testing::Test {
   std::unique_ptr<Config> config_;
 };
 
-inline std::vector<Timestamp> Timestamps(const std::vector<Frame>& frames) {
+inline std::vector<Timestamp> Timestamps(const std::vector<SourceFrame>& frames) {
   std::vector<Timestamp> timestamps;
-  for (const Frame& frame : frames) timestamps.push_back(frame.timestamp);
+  for (const SourceFrame& frame : frames) timestamps.push_back(frame.timestamp);
   return timestamps;
 }
 
 /// For each frame the names of what it holds, as `0 1 | 1`: streams and known truth values.
-inline std::string Held(const Frame& frame) {
+inline std::string Held(const SourceFrame& frame) {
   std::string held;
   for (const Measurement& m : frame.measurements) held += std::to_string(m.stream) + ' ';
   held += "|";

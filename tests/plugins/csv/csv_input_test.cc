@@ -23,7 +23,7 @@ TEST_F(Csv, DashIsStandardInput) {
     config_ = std::make_unique<Config>(Config::FromText("path: q\nstreams: {z: z}\n", "run.yaml"));
     config_->Set("path", written, "--set");
     const auto source = OpenConfig();
-    Frame frame;
+    SourceFrame frame;
     EXPECT_TRUE(source->Next(frame));
     ExpectError(ExitCode::kBadData, "<stdin>:3:3 z: 'x' is not a number; expected a finite number",
                 [&] { source->Next(frame); });
@@ -40,7 +40,7 @@ TEST_F(Csv, ReadsAPipeAsItIsWritten) {
     EXPECT_EQ(write(descriptor, "t_s,z\n0,1\n1", 11), 11);
   });
   const auto source = Open("path: a.csv\nstreams: {z: z}\n");
-  Frame frame;
+  SourceFrame frame;
   EXPECT_TRUE(source->Next(frame));  // comes although the pipe is still open
   writer.join();
   EXPECT_EQ(write(descriptor, ",2\n", 3), 3);
@@ -61,7 +61,7 @@ TEST_F(Csv, ASignalEndsTheWaitForAPipe) {
   sigaction(SIGALRM, &action, &before);
   const itimerval every_50_ms{{0, 50000}, {0, 50000}}, never{};
   setitimer(ITIMER_REAL, &every_50_ms, nullptr);
-  Frame frame;
+  SourceFrame frame;
   ExpectError(ExitCode::kStopped, "FILE:1: stopped by a signal while waiting for data",
               [&] { source->Next(frame); });
   setitimer(ITIMER_REAL, &never, nullptr);
@@ -88,7 +88,7 @@ TEST_F(Csv, RefusesWhatCannotBeRead) {
 TEST_F(Csv, NoticesAFileThatChangesWhileItIsRead) {
   Write("t_s,z\n0,1\n");
   const auto source = Open("path: a.csv\nstreams: {z: z}\n");
-  Frame frame;
+  SourceFrame frame;
   EXPECT_TRUE(source->Next(frame));
   std::ofstream(File(), std::ios::app) << "1,2\n";
   ExpectError(ExitCode::kIo, "FILE:3: changed while it was read", [&] {
@@ -116,7 +116,7 @@ TEST_F(Csv, StreamsALongFileInConstantMemory) {
     for (int i = 0; i < 2000000; ++i) out << i << ",1.234567890\n";
   });
   const auto source = Open("path: a.csv\nstreams: {z: z}\n");
-  Frame frame;
+  SourceFrame frame;
   const long before = peak_kb();
   int count = 0;
   while (source->Next(frame)) ++count;

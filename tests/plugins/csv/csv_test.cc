@@ -37,7 +37,7 @@ TEST_F(Csv, GivesStreamsAndTruthsInTheOrderWritten) {
   EXPECT_EQ(source->streams()[1].size, 1);
   EXPECT_TRUE(source->truths().empty());
   EXPECT_EQ(source->size(), -1);
-  Frame frame;
+  SourceFrame frame;
   ASSERT_TRUE(source->Next(frame));
   EXPECT_EQ(frame.measurements[0].values, (std::vector<double>{2.0, 1.0}));
   EXPECT_FALSE(source->Next(frame));
@@ -94,7 +94,7 @@ TEST_F(Csv, PartOfAVectorIsMissingAsAWhole) {
 TEST_F(Csv, FramesHoldNothingOfTheFrameBefore) {
   Write("t_s,a,b\n0,1,2\n1,,3\n");
   const auto source = Open("path: a.csv\nstreams: {a: a, b: b}\n");
-  Frame frame;
+  SourceFrame frame;
   source->Next(frame);
   frame.measurements[0].covariance = {9.0};
   frame.measurements[0].landmark = 4;
@@ -176,7 +176,7 @@ TEST_F(Csv, BlindAfterDropsTheFirstStreamInTheRestOfTheSeries) {
     bool ended = false;
     const auto source = Open(kDepthConfig + ("blind_after: " + share + "\n"));
     EXPECT_EQ(source->size(), share == "1" ? -1 : 7);  // 1 drops nothing: no need to count
-    for (Frame frame; source->Next(frame);) {
+    for (SourceFrame frame; source->Next(frame);) {
       const std::string held = Held(frame);
       EXPECT_TRUE(held == "0 1 | 0" || held == "1 | 0") << held;
       ended |= held == "1 | 0";
@@ -198,7 +198,7 @@ TEST_F(Csv, BlindAfterIsExactWhereTheShareIs) {
   for (int i = 0; i < 100; ++i) text += std::to_string(i) + ",1\n";
   Write(text);
   int seen = 0;
-  for (const Frame& frame : Frames("path: a.csv\nblind_after: 0.07\nstreams: {z: z}\n")) {
+  for (const SourceFrame& frame : Frames("path: a.csv\nblind_after: 0.07\nstreams: {z: z}\n")) {
     seen += static_cast<int>(frame.measurements.size());
   }
   EXPECT_EQ(seen, 7);
@@ -238,7 +238,7 @@ TEST_F(Csv, BlindAfterNeedsAFileThatCanBeReadTwice) {
   ASSERT_EQ(write(both_ends, kHeader, std::strlen(kHeader)), std::strlen(kHeader));
   ASSERT_EQ(write(both_ends, "0,1,2,3\n", 8), 8);
   const auto source = Open(kDepthConfig + std::string("blind_after: 1\n"));
-  Frame frame;
+  SourceFrame frame;
   ASSERT_TRUE(source->Next(frame));
   EXPECT_EQ(Held(frame), "0 1 | 0");
   close(both_ends);

@@ -55,10 +55,10 @@ class Host {
   std::string failed_;
 };
 
-std::vector<Frame> AllFrames(const Values& values, std::uint64_t seed = 1) {
+std::vector<SourceFrame> AllFrames(const Values& values, std::uint64_t seed = 1) {
   DepthTarget source = Host(values).Make(seed);
-  std::vector<Frame> frames;
-  for (Frame frame; source.Next(frame);) frames.push_back(frame);
+  std::vector<SourceFrame> frames;
+  for (SourceFrame frame; source.Next(frame);) frames.push_back(frame);
   return frames;
 }
 
@@ -71,7 +71,7 @@ std::optional<double> Value(const Frame& frame, Stream stream) {
 
 std::vector<double> Series(const Values& values, Stream stream, std::uint64_t seed = 1) {
   std::vector<double> series;
-  for (const Frame& frame : AllFrames(values, seed)) {
+  for (const SourceFrame& frame : AllFrames(values, seed)) {
     if (const auto value = Value(frame, stream)) series.push_back(*value);
   }
   return series;
@@ -82,9 +82,9 @@ struct Noise {
   std::vector<double> disparity, scale;
 };
 
-Noise NoiseOf(const std::vector<Frame>& frames, double sigma_d, double sigma_e) {
+Noise NoiseOf(const std::vector<SourceFrame>& frames, double sigma_d, double sigma_e) {
   Noise noise;
-  for (const Frame& frame : frames) {
+  for (const SourceFrame& frame : frames) {
     const double depth_m = frame.truth[0][0];
     const double scale = 0.3 / depth_m;  // of the target, with Z0 = 0.3 m and w = 300 px
     noise.disparity.push_back((*Value(frame, kDisparityAll) - kBfPxM / depth_m) / sigma_d);
@@ -108,7 +108,7 @@ double MeanProduct(const std::vector<double>& a, const std::vector<double>& b) {
 
 TEST(DepthTarget, DefaultsAreTheScenarioOf2017) {
   // t = 0, 33 ms, ... <= 5 s: 151 * 33 ms = 4.983 s.
-  const std::vector<Frame> frames = AllFrames({});
+  const std::vector<SourceFrame> frames = AllFrames({});
   ASSERT_EQ(frames.size(), 152u);
   EXPECT_EQ(Host().Make().size(), 152);
   for (std::size_t k = 0; k < frames.size(); ++k) {
@@ -142,11 +142,11 @@ TEST(DepthTarget, LastSampleSurvivesRounding) {
 
 TEST(DepthTarget, WithoutNoiseGivesTheFormulas) {
   // Quarter periods of 0.5 Hz: Z = 0.3, 0.4, 0.3, 0.2 m. d = 26 px m / Z; 1/scale = Z / 0.3 m.
-  const std::vector<Frame> frames = AllFrames({{"frequency_hz", 0.5},
-                                               {"rate_hz", 2.0},
-                                               {"duration_s", 1.5},
-                                               {"sigma_disparity_px", 0.0},
-                                               {"sigma_edge_px", 0.0}});
+  const std::vector<SourceFrame> frames = AllFrames({{"frequency_hz", 0.5},
+                                                     {"rate_hz", 2.0},
+                                                     {"duration_s", 1.5},
+                                                     {"sigma_disparity_px", 0.0},
+                                                     {"sigma_edge_px", 0.0}});
   const double disparity_px[] = {26.0 / 0.3, 65.0, 26.0 / 0.3, 130.0};
   const double inverse_scale[] = {1.0, 4.0 / 3.0, 1.0, 2.0 / 3.0};
   ASSERT_EQ(frames.size(), 4u);
@@ -162,14 +162,14 @@ TEST(DepthTarget, WithoutNoiseGivesTheFormulas) {
 
 TEST(DepthTarget, TemplateDepthScalesTheImage) {
   // Z = 0.3 m and a template from 0.6 m: the target looks twice as large; its truth is 1 / 0.6 m.
-  const std::vector<Frame> frames =
+  const std::vector<SourceFrame> frames =
       AllFrames({{"template_depth_m", 0.6}, {"duration_s", 0.0}, {"sigma_edge_px", 0.0}});
   EXPECT_NEAR(*Value(frames[0], kInverseScale), 0.5, 1e-15);
   EXPECT_NEAR(frames[0].truth[2][0], 1.0 / 0.6, 1e-15);
 }
 
 TEST(DepthTarget, SplitStreamsRepeatTheWholeOnes) {
-  for (const Frame& frame : AllFrames({})) {
+  for (const SourceFrame& frame : AllFrames({})) {
     const auto disparity = Value(frame, kDisparity);
     const auto seeing = Value(frame, kInverseScaleSeeing), blind = Value(frame, kInverseScaleBlind);
     EXPECT_EQ(disparity.value_or(*Value(frame, kDisparityAll)), *Value(frame, kDisparityAll));
@@ -181,7 +181,7 @@ TEST(DepthTarget, SplitStreamsRepeatTheWholeOnes) {
 
 TEST(DepthTarget, NearOnMeasuredComparesTheNoisyDisparity) {
   int unlike_truth = 0;
-  for (const Frame& frame : AllFrames({{"blind_test", 0}, {"rate_hz", 1000.0}})) {
+  for (const SourceFrame& frame : AllFrames({{"blind_test", 0}, {"rate_hz", 1000.0}})) {
     const bool sees = Value(frame, kDisparity).has_value();
     EXPECT_EQ(sees, *Value(frame, kDisparityAll) <= kBfPxM / 0.3);
     unlike_truth += sees != (frame.truth[0][0] >= 0.3) ? 1 : 0;
@@ -190,7 +190,7 @@ TEST(DepthTarget, NearOnMeasuredComparesTheNoisyDisparity) {
 }
 
 TEST(DepthTarget, NearOnTrueComparesTheExactDisparity) {
-  for (const Frame& frame : AllFrames({{"blind_test", 1}, {"rate_hz", 1000.0}})) {
+  for (const SourceFrame& frame : AllFrames({{"blind_test", 1}, {"rate_hz", 1000.0}})) {
     EXPECT_EQ(Value(frame, kDisparity).has_value(), kBfPxM / frame.truth[0][0] <= kBfPxM / 0.3);
   }
 }
@@ -217,13 +217,13 @@ TEST(DepthTarget, NearZeroIsNeverBlind) {
 TEST(DepthTarget, NoiseIsAsItsFormulasSay) {
   // Undone, both noises are N(0, 1) at every depth: mean 0, variance 1 in either half of the
   // depths, and no correlation; 5 sigma of N samples.
-  const std::vector<Frame> frames = AllFrames({{"rate_hz", 10000.0},
-                                               {"duration_s", 5.0},
-                                               {"sigma_disparity_px", 0.5},
-                                               {"sigma_edge_px", 0.7}});
-  std::vector<Frame> near, far;
-  for (const Frame& frame : frames) (frame.truth[0][0] < 0.3 ? near : far).push_back(frame);
-  for (const std::vector<Frame>* part : {&near, &far}) {
+  const std::vector<SourceFrame> frames = AllFrames({{"rate_hz", 10000.0},
+                                                     {"duration_s", 5.0},
+                                                     {"sigma_disparity_px", 0.5},
+                                                     {"sigma_edge_px", 0.7}});
+  std::vector<SourceFrame> near, far;
+  for (const SourceFrame& frame : frames) (frame.truth[0][0] < 0.3 ? near : far).push_back(frame);
+  for (const std::vector<SourceFrame>* part : {&near, &far}) {
     const Noise noise = NoiseOf(*part, 0.5, 0.7);
     const double n = static_cast<double>(part->size());
     ASSERT_GT(n, 20000.0);

@@ -11,7 +11,7 @@ TEST_F(HostTest, CreatesASourceOfACppPlugin) {
   const Config config = Parse("source: {type: counter, last: 2, unit: sheep}");
   const auto source = host.CreateSource(config, 1);
   EXPECT_EQ(source->streams().at(0).name, "count");
-  Frame frame;
+  SourceFrame frame;
   EXPECT_TRUE(source->Next(frame));
   EXPECT_TRUE(source->Next(frame));
   EXPECT_FALSE(source->Next(frame));

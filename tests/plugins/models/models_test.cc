@@ -39,10 +39,10 @@ const PluginHost& Shipped() {
   return host;
 }
 
-std::vector<Frame> FramesOf(const Config& config, std::uint64_t seed = 1) {
+std::vector<SourceFrame> FramesOf(const Config& config, std::uint64_t seed = 1) {
   const auto source = Shipped().CreateSource(config, seed);
-  std::vector<Frame> frames;
-  for (Frame frame; source->Next(frame);) frames.push_back(frame);
+  std::vector<SourceFrame> frames;
+  for (SourceFrame frame; source->Next(frame);) frames.push_back(frame);
   return frames;
 }
 
@@ -103,7 +103,7 @@ TEST(Models, DrawsLandmarks) {
       "5]}}}\n"
       "estimators: {ekf: {type: ekf}}\n";
   const Config config = testing::Read(text);
-  for (const Frame& frame : FramesOf(config)) {
+  for (const SourceFrame& frame : FramesOf(config)) {
     ASSERT_EQ(frame.measurements.size(), 8u);
     for (const Measurement& one : frame.measurements) {
       EXPECT_GE(one.landmark, 0);
@@ -206,17 +206,17 @@ TEST(Models, SensorsHaveRatesGapsAndOutliers) {
       "source: {type: models, rate_hz: 100, duration_s: 100, start: mean,\n"
       "  overrides: {state: {target: {noise: {acceleration: 0}}}}, ";
   std::size_t count = 0;
-  for (const Frame& frame : FramesOf(Parse(text + "sensors: {stereo: {rate_hz: 30}}}"))) {
+  for (const SourceFrame& frame : FramesOf(Parse(text + "sensors: {stereo: {rate_hz: 30}}}"))) {
     count += frame.measurements.size();
   }
   EXPECT_EQ(count, 3001u);
   count = 0;
-  for (const Frame& frame : FramesOf(Parse(text + "sensors: {stereo: {missing: 0.25}}}"))) {
+  for (const SourceFrame& frame : FramesOf(Parse(text + "sensors: {stereo: {missing: 0.25}}}"))) {
     count += frame.measurements.size();
   }
   EXPECT_NEAR(static_cast<double>(count), 7500, 200);  // sd 43
   int far = 0, farther = 0;
-  for (const Frame& frame :
+  for (const SourceFrame& frame :
        FramesOf(Parse(text + "sensors: {stereo: {outliers: {share: 0.1, sigma_scale: 100}}}}"))) {
     const double error = frame.measurements[0].values[0] - 200 / frame.truth[0][0];
     far += std::abs(error) > 4 * 0.02 ? 1 : 0;

@@ -15,7 +15,7 @@ namespace {
 /// When each landmark was initialised, by estimator.
 class Entries : public RunObserver {
  public:
-  void OnEstimate(int estimator, const Frame& frame, const State&,
+  void OnEstimate(int estimator, const SourceFrame& frame, const State&,
                   const UpdateReport& report) override {
     for (const MeasurementReport& entry : report.measurements()) {
       if (entry.outcome == Outcome::kInitialised)

@@ -40,11 +40,11 @@ inline MadeScene MakeScene(const std::string& keys, std::uint64_t seed = 1,
   return made;
 }
 
-inline std::vector<Frame> SceneFrames(const std::string& keys, std::uint64_t seed = 1,
-                                      const std::string& camera = kCamera) {
+inline std::vector<SourceFrame> SceneFrames(const std::string& keys, std::uint64_t seed = 1,
+                                            const std::string& camera = kCamera) {
   const MadeScene made = MakeScene(keys, seed, camera);
-  std::vector<Frame> frames;
-  for (Frame frame; made.scene->Next(frame);) frames.push_back(frame);
+  std::vector<SourceFrame> frames;
+  for (SourceFrame frame; made.scene->Next(frame);) frames.push_back(frame);
   return frames;
 }
 

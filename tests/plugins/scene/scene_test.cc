@@ -99,7 +99,7 @@ TEST(Scene, SameSeedSameBytesAndOthersDiffer) {
       kPoints;
   const auto values = [&](std::uint64_t seed) {
     std::vector<double> all;
-    for (const Frame& frame : SceneFrames(keys, seed)) {
+    for (const SourceFrame& frame : SceneFrames(keys, seed)) {
       for (const Measurement& m : frame.measurements) {
         all.insert(all.end(), m.values.begin(), m.values.end());
       }
@@ -144,7 +144,7 @@ TEST(Scene, OfTooManyPointsKeepsThoseItSaw) {
       "4], "
       "[0.5, 0, 4]]}, trajectory: {keyframes: [{position: [0, 0, 0], euler_deg: [0, 0, 0]}, "
       "{position: [1, 0, 0], euler_deg: [0, 0, 0]}]}");
-  for (const Frame& frame : frames) EXPECT_EQ(Ids(frame), (std::set<std::int64_t>{1, 2}));
+  for (const SourceFrame& frame : frames) EXPECT_EQ(Ids(frame), (std::set<std::int64_t>{1, 2}));
   // The next to go makes room.
   const auto all = SceneFrames(
       "max_frames: 30, sigma_px: 0, max_features_per_frame: 2, points: {list: [[3, 0, 4], [-2, 0, "

@@ -124,7 +124,7 @@ TEST(ScenePath, LooksAtItsTargetWithTheHorizonLevel) {
   const std::vector<double> q = frames.front().truth[1];
   // From (-0.5, 0, 0) to (0, 0, 4).
   EXPECT_LT((Rotated(q, Vector3d::UnitZ()) - Vector3d(0.5, 0, 4).normalized()).norm(), 1e-14);
-  for (const Frame& frame : frames) {
+  for (const SourceFrame& frame : frames) {
     const Vector3d right = Rotated(frame.truth[1], Vector3d::UnitX());
     const Vector3d down = Rotated(frame.truth[1], Vector3d::UnitY());
     EXPECT_NEAR(right.y(), 0.0, 1e-14);

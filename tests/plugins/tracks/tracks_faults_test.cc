@@ -133,7 +133,7 @@ TEST_F(TracksTest, Fault43NothingAtAll) {
 TEST_F(TracksTest, Fault48ChangedWhileRead) {
   Write("tracks.csv", kGood);
   const auto source = Open();
-  Frame frame;
+  SourceFrame frame;
   std::ofstream(File(), std::ios::app) << kFrameTwo;
   ExpectError(ExitCode::kIo, "DIR/tracks.csv:4: changed while it was read", [&] {
     while (source->Next(frame)) {

@@ -39,14 +39,14 @@ class TracksTest : public ::testing::Test {
     entry.RejectUnread();
     return source;
   }
-  std::vector<Frame> Frames(const std::string& keys = "rate_hz: 10",
-                            const std::string& path = "tracks.csv") {
+  std::vector<SourceFrame> Frames(const std::string& keys = "rate_hz: 10",
+                                  const std::string& path = "tracks.csv") {
     const auto source = Open(keys, path);
-    std::vector<Frame> frames;
-    for (Frame frame; source->Next(frame);) frames.push_back(frame);
+    std::vector<SourceFrame> frames;
+    for (SourceFrame frame; source->Next(frame);) frames.push_back(frame);
     return frames;
   }
-  std::vector<Frame> FramesOf(const std::string& text) {
+  std::vector<SourceFrame> FramesOf(const std::string& text) {
     Write("tracks.csv", text);
     return Frames();
   }

@@ -63,7 +63,7 @@ TEST_F(TracksTest, MayBeginLaterAndWithoutTheFeaturesOfBefore) {
         "3,3,0,6\n3,3,1,6\n");
   const auto ids = [&](const std::string& keys) {
     std::vector<std::pair<Timestamp, std::vector<std::int64_t>>> all;
-    for (const Frame& frame : Frames("rate_hz: 10" + keys)) {
+    for (const SourceFrame& frame : Frames("rate_hz: 10" + keys)) {
       all.emplace_back(frame.timestamp / 100'000'000, std::vector<std::int64_t>());
       for (const Measurement& m : frame.measurements) all.back().second.push_back(m.landmark);
     }
@@ -119,7 +119,7 @@ TEST_F(TracksTest, OdometryIsHeldOrTheMeanOfAStep) {
         "0,1,2,3,4,5,6,0\n1,3,4,5,6,7,8,0\n3,9,9,9,9,9,9,0\n");
   const auto odometry = [&](const std::string& keys) {
     std::vector<Values> all;
-    for (const Frame& frame : Frames(keys)) {
+    for (const SourceFrame& frame : Frames(keys)) {
       const bool has = !frame.measurements.empty() && frame.measurements.back().stream == 1;
       all.push_back(has ? frame.measurements.back().values : Values{});
     }
@@ -156,7 +156,7 @@ TEST_F(TracksTest, TruthIsThePoseNearestInTime) {
   Write("truth.tum",
         "-0.02 1 0 0 0 0 0 1\n0.01 2 0 0 0 0 0 1\n0.08 3 0 0 0 0 0 1\n0.1 4 0 0 0 0 0 1\n"
         "0.11 5 0 0 0 0 0 1\n0.17 6 0 0 0 0 0 1\n");
-  const std::vector<Frame> frames = Frames("rate_hz: 10, truth_tolerance_s: 0.03");
+  const std::vector<SourceFrame> frames = Frames("rate_hz: 10, truth_tolerance_s: 0.03");
   ASSERT_EQ(frames.size(), 3u);
   EXPECT_EQ(frames[0].truth[0].at(0), 2.0);
   EXPECT_EQ(frames[1].truth[0].at(0), 4.0);
@@ -171,7 +171,7 @@ TEST_F(TracksTest, ReadsAPipeAsItIsWritten) {
     EXPECT_EQ(write(descriptor, "0,3,0,1\n0,3,1,2\n1,3,0,5\n", 24), 24);
   });
   const auto source = Open();
-  Frame frame;
+  SourceFrame frame;
   EXPECT_TRUE(source->Next(frame));  // comes although the pipe is still open
   EXPECT_EQ(frame.measurements.at(0).values, (Values{1, 2}));
   writer.join();
@@ -204,7 +204,7 @@ TEST_F(TracksTest, StreamsALongFileInConstantMemory) {
     }
   });
   const auto source = Open();
-  Frame frame;
+  SourceFrame frame;
   const long before = peak_kb();
   std::size_t count = 0;
   while (source->Next(frame)) count += frame.measurements.size();
@@ -223,7 +223,7 @@ TEST_F(TracksTest, ReadsRealTracks) {
   const auto frames = Frames("measures: stereo, odometry: mean", drive);
   ASSERT_EQ(frames.size(), 108u);
   std::size_t observations = 0;
-  for (const Frame& frame : frames) {
+  for (const SourceFrame& frame : frames) {
     EXPECT_EQ(frame.truth.at(0).size(), 3u);
     for (const Measurement& m : frame.measurements) observations += m.stream == 0;
   }

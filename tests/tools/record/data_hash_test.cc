@@ -13,54 +13,54 @@ namespace {
 
 using internal::DataHash;
 
-DataHash HashOf(const std::vector<Frame>& frames, std::vector<StreamInfo> streams = {{"a"}, {"b"}},
+DataHash HashOf(const std::vector<SourceFrame>& frames,
+                std::vector<StreamInfo> streams = {{"a"}, {"b"}},
                 std::vector<StreamInfo> truths = {{"x", 1}}) {
   DataHash hash(std::move(streams), std::move(truths));
-  for (const Frame& frame : frames) hash.Add(frame);
+  for (const SourceFrame& frame : frames) hash.Add(frame);
   return hash;
 }
 
-Frame MakeFrame() {
-  Frame frame = testing::FrameAt(0.1, {{0, 1.0}, {1, 2.0}});
-  frame.truth = {{0.5}};
-  return frame;
+SourceFrame MakeFrame(const std::vector<std::pair<int, double>>& values = {{0, 1.0}, {1, 2.0}}) {
+  return {testing::FrameAt(0.1, values), {{0.5}}};
 }
 
 TEST(DataHash, DependsOnAllThatAnEstimatorSees) {
   const std::string hash = HashOf({MakeFrame()}).measurements();
   const auto changed = [](const auto& change) {
-    Frame frame = MakeFrame();
+    SourceFrame frame = MakeFrame();
     change(frame);
     return HashOf({frame}).measurements();
   };
-  EXPECT_NE(hash, changed([](Frame& f) { f.timestamp += 1; }));
-  EXPECT_NE(hash, changed([](Frame& f) { f.measurements[0].timestamp += 1; }));
-  EXPECT_NE(hash, changed([](Frame& f) { f.measurements[0].stream = 1; }));
-  EXPECT_NE(hash, changed([](Frame& f) { f.measurements[0].landmark = 3; }));
-  EXPECT_NE(hash,
-            changed([](Frame& f) { f.measurements[0].values[0] = std::nextafter(1.0, 2.0); }));
-  EXPECT_NE(hash, changed([](Frame& f) { f.measurements[0].covariance = {1.0}; }));
-  EXPECT_NE(hash, changed([](Frame& f) { f.measurements.pop_back(); }));
+  EXPECT_NE(hash, changed([](SourceFrame& f) { f.timestamp += 1; }));
+  EXPECT_NE(hash, changed([](SourceFrame& f) { f.measurements[0].timestamp += 1; }));
+  EXPECT_NE(hash, changed([](SourceFrame& f) { f.measurements[0].stream = 1; }));
+  EXPECT_NE(hash, changed([](SourceFrame& f) { f.measurements[0].landmark = 3; }));
+  EXPECT_NE(hash, changed([](SourceFrame& f) {
+              f.measurements[0].values[0] = std::nextafter(1.0, 2.0);
+            }));
+  EXPECT_NE(hash, changed([](SourceFrame& f) { f.measurements[0].covariance = {1.0}; }));
+  EXPECT_NE(hash, changed([](SourceFrame& f) { f.measurements.pop_back(); }));
   EXPECT_NE(hash, HashOf({MakeFrame(), MakeFrame()}).measurements());
   EXPECT_NE(hash, HashOf({MakeFrame()}, {{"a"}, {"c"}}).measurements());
-  EXPECT_EQ(hash, changed([](Frame& f) { f.truth = {{0.7}}; }));
+  EXPECT_EQ(hash, changed([](SourceFrame& f) { f.truth = {{0.7}}; }));
 }
 
 TEST(DataHash, IsOfContentNotOfItsOrderOrSign) {
-  Frame turned = MakeFrame();
+  SourceFrame turned = MakeFrame();
   std::swap(turned.measurements[0], turned.measurements[1]);
   EXPECT_EQ(HashOf({MakeFrame()}).measurements(), HashOf({turned}).measurements());
   // The streams of another source, by the same names in another order.
-  Frame other = MakeFrame();
+  SourceFrame other = MakeFrame();
   other.measurements[0].stream = 1;
   other.measurements[1].stream = 0;
   EXPECT_EQ(HashOf({MakeFrame()}).measurements(), HashOf({other}, {{"b"}, {"a"}}).measurements());
   // Of two of one stream the order is theirs.
-  const Frame twice = testing::FrameAt(0.1, {{0, 1.0}, {0, 2.0}});
-  const Frame back = testing::FrameAt(0.1, {{0, 2.0}, {0, 1.0}});
+  const SourceFrame twice = MakeFrame({{0, 1.0}, {0, 2.0}});
+  const SourceFrame back = MakeFrame({{0, 2.0}, {0, 1.0}});
   EXPECT_NE(HashOf({twice}).measurements(), HashOf({back}).measurements());
   const auto of_value = [](double value) {
-    return HashOf({testing::FrameAt(0.1, {{0, value}})}).measurements();
+    return HashOf({MakeFrame({{0, value}})}).measurements();
   };
   EXPECT_EQ(of_value(0.0), of_value(-0.0));
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -68,7 +68,7 @@ TEST(DataHash, IsOfContentNotOfItsOrderOrSign) {
 }
 
 TEST(DataHash, OfTruthsIsApart) {
-  Frame other = MakeFrame();
+  SourceFrame other = MakeFrame();
   other.truth = {{0.25}};
   EXPECT_NE(HashOf({MakeFrame()}).truth(), HashOf({other}).truth());
   other.truth = {{}};

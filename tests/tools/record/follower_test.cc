@@ -22,7 +22,8 @@ TEST(Follower, WritesEachEstimateAsSoonAsItIsMade) {
   /// Looks at the lines after each estimate of the observers before it.
   struct After : RunObserver {
     explicit After(const std::vector<std::string>& all) : lines(all) {}
-    void OnEstimate(int, const Frame& frame, const State& state, const UpdateReport&) override {
+    void OnEstimate(int, const SourceFrame& frame, const State& state,
+                    const UpdateReport&) override {
       ++estimates;
       ASSERT_EQ(lines.size(), estimates);
       ASSERT_TRUE(lines.back().ends_with("}\n"));
@@ -54,7 +55,7 @@ TEST(Follower, LeavesOutWhatHasNoValueYetAndSigmasOfConstants) {
   follower.Begin(experiment);
   const double one = 1.0;
   state.Add(aside, &one, {});
-  follower.OnEstimate(0, FrameAt(0.5, {}), state, {});
+  follower.OnEstimate(0, {FrameAt(0.5, {})}, state, {});
   ASSERT_EQ(lines.size(), 1u);
   EXPECT_EQ(lines[0], "{\"t_s\":0.5,\"estimator\":\"ekf\",\"aside.x\":1.0}\n");
 }

@@ -23,7 +23,7 @@ class Street : public Source {
   explicit Street(bool outlier = false) : outlier_(outlier) {}
   const std::vector<StreamInfo>& streams() const override { return streams_; }
   const std::vector<StreamInfo>& truths() const override { return truths_; }
-  bool Next(Frame& frame) override {
+  bool Next(SourceFrame& frame) override {
     if (next_ == 20) return false;
     const double x = 0.1 * next_;
     std::vector<Observation> observations;
@@ -33,8 +33,7 @@ class Street : public Source {
       const double error_m = outlier_ && id == 3 && next_ == 15 ? 5.0 : 0.0;
       observations.push_back({id, {p[0] - x + error_m, p[1], p[2]}});
     }
-    frame = FrameOf(0.1 * next_, observations);
-    frame.truth = {{x, 0.0, 0.0}};
+    frame = {FrameOf(0.1 * next_, observations), {{x, 0.0, 0.0}}};
     ++next_;
     return true;
   }

@@ -51,7 +51,7 @@ TEST(Recorder, KeepsMeasurementsAndTruthAsTheyCame) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "out"));
   SwingingTarget source(60);
-  Frame frame;
+  SourceFrame frame;
   std::vector<std::string> measurements = {"t_s,stream,landmark,v0"}, truth = {"t_s,depth"};
   while (source.Next(frame)) {
     std::string t;
@@ -71,7 +71,7 @@ TEST(Recorder, ImpliedValuesInvertTheSensor) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "out"), 3);
   SwingingTarget source(1);
-  Frame frame;
+  SourceFrame frame;
   ASSERT_TRUE(source.Next(frame));
   const std::vector<std::string> lines = Lines(folder / "out/implied_states.csv");
   ASSERT_EQ(lines.size(), 3u);  // of disparity alone: a scale tells no distance by itself
@@ -99,7 +99,7 @@ class NoEstimator : public Estimator {
 struct HandMade {
   Experiment experiment;
   State state;
-  Frame frame;
+  SourceFrame frame;
   UpdateReport report;
 
   HandMade() {

@@ -108,8 +108,8 @@ class RunComparer : public RunObserver {
   RunComparer(const RunComparer&) = delete;
   RunComparer& operator=(const RunComparer&) = delete;
 
-  void OnFrame(const Frame& frame) override;
-  void OnEstimate(int estimator, const Frame& frame, const State& state,
+  void OnFrame(const SourceFrame& frame) override;
+  void OnEstimate(int estimator, const SourceFrame& frame, const State& state,
                   const UpdateReport& report) override;
   /// Once, after the run. Errors: kUsage where `options` names an estimator that is not there.
   Comparison Finish(const RunResult& result, const CompareOptions& options);

@@ -29,9 +29,9 @@ RunComparer::RunComparer(const Experiment& experiment)
 
 RunComparer::~RunComparer() = default;
 
-void RunComparer::OnFrame(const Frame& frame) { impl_->data.Add(frame); }
+void RunComparer::OnFrame(const SourceFrame& frame) { impl_->data.Add(frame); }
 
-void RunComparer::OnEstimate(int estimator, const Frame& frame, const State& state,
+void RunComparer::OnEstimate(int estimator, const SourceFrame& frame, const State& state,
                              const UpdateReport& report) {
   if (report.stale) return;
   impl_->run.estimators[static_cast<std::size_t>(estimator)].series.Append(frame.timestamp, state);

@@ -195,7 +195,7 @@ std::int64_t CountOf(const EstimatorResult& result, const std::vector<std::strin
 
 std::int64_t ComparedEntry::measurements() const {
   std::vector<std::string> all;
-  for (int i = 0; i <= static_cast<int>(Outcome::kFailed); ++i) {
+  for (int i = 0; i < kOutcomes; ++i) {
     all.emplace_back(ToString(static_cast<Outcome>(i)));
   }
   return CountOf(result, all);

@@ -32,7 +32,7 @@ void Append(std::string& bytes, const std::vector<double>& values) {
 DataHash::DataHash(std::vector<StreamInfo> streams, std::vector<StreamInfo> truths)
     : streams_(std::move(streams)), truths_(std::move(truths)) {}
 
-void DataHash::Add(const Frame& frame) {
+void DataHash::Add(const SourceFrame& frame) {
   const auto name_of = [&](const Measurement* m) -> const std::string& {
     return streams_[static_cast<std::size_t>(m->stream)].name;
   };

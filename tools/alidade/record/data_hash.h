@@ -9,8 +9,8 @@
 
 namespace alidade::internal {
 
-/// SHA-256 of what the estimators of a run were given: of the values, whatever text or simulator
-/// they came from.
+/// SHA-256 of what the source of a run gave: of the values, whatever text or simulator they came
+/// from.
 ///
 ///   measurements   of each frame its timestamp, and of each of its measurements stream, landmark,
 ///                  values and own covariance; those of one frame by the name of their stream
@@ -21,7 +21,7 @@ class DataHash {
  public:
   DataHash(std::vector<StreamInfo> streams, std::vector<StreamInfo> truths);
 
-  void Add(const Frame& frame);
+  void Add(const SourceFrame& frame);
   /// 64 hexadecimal digits of all frames so far.
   std::string measurements() const { return measurements_.Digest(); }
   /// Likewise; "" where no frame had a truth.

@@ -126,7 +126,7 @@ std::vector<std::string> EstimatorFiles::GainsHeader(const System& system) {
   return header;
 }
 
-void EstimatorFiles::Add(const Frame& frame, const State& state, const UpdateReport& report) {
+void EstimatorFiles::Add(const SourceFrame& frame, const State& state, const UpdateReport& report) {
   if (!report.stale) {
     AddEstimate(frame, state);
     if (pose_) AddPose(frame.timestamp, state);
@@ -145,7 +145,7 @@ void EstimatorFiles::Add(const Frame& frame, const State& state, const UpdateRep
   }
 }
 
-void EstimatorFiles::AddEstimate(const Frame& frame, const State& state) {
+void EstimatorFiles::AddEstimate(const SourceFrame& frame, const State& state) {
   estimates_.Time(frame.timestamp);
   for (const BlockColumns& columns : blocks_) {
     const Block& block = state.layout()[columns.id];

@@ -25,7 +25,7 @@ class EstimatorFiles {
 
   /// A frame older than the state has no row in estimates.csv: the state is not of its timestamp.
   /// Error: kIo.
-  void Add(const Frame& frame, const State& state, const UpdateReport& report);
+  void Add(const SourceFrame& frame, const State& state, const UpdateReport& report);
   void Close();
   const RecordedEstimator& recorded() const { return recorded_; }
 
@@ -34,7 +34,7 @@ class EstimatorFiles {
     BlockId id;
     std::size_t ambient, tangent;
     std::size_t element;  ///< the first of it in recorded_.elements
-    int truth;            ///< index into Frame::truth, or -1
+    int truth;            ///< index into SourceFrame::truth, or -1
   };
 
   static RecordedEstimator Describe(const NamedEstimator& named);
@@ -46,7 +46,7 @@ class EstimatorFiles {
   /// The position that landmarks are seen from, among the elements.
   void FindPath(const System& system);
   void OpenTrajectory(const OutputFolder& folder, const System& system);
-  void AddEstimate(const Frame& frame, const State& state);
+  void AddEstimate(const SourceFrame& frame, const State& state);
   void AddPose(Timestamp timestamp, const State& state);
   void AddInnovation(Timestamp timestamp, const MeasurementReport& report);
   void AddGain(Timestamp timestamp, const State& state, const MeasurementReport& report);

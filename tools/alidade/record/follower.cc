@@ -15,7 +15,7 @@ void Follower::Begin(const Experiment& experiment) {
   }
 }
 
-void Follower::OnEstimate(int estimator, const Frame& frame, const State& state,
+void Follower::OnEstimate(int estimator, const SourceFrame& frame, const State& state,
                           const UpdateReport& /*report*/) {
   const Followed& followed = estimators_[static_cast<std::size_t>(estimator)];
   internal::Json line;

@@ -20,7 +20,7 @@ class Follower : public RunObserver {
   explicit Follower(std::function<void(std::string_view line)> write) : write_(std::move(write)) {}
 
   void Begin(const Experiment& experiment) override;
-  void OnEstimate(int estimator, const Frame& frame, const State& state,
+  void OnEstimate(int estimator, const SourceFrame& frame, const State& state,
                   const UpdateReport& report) override;
 
  private:

@@ -106,7 +106,7 @@ void PoseFile::Add(Timestamp timestamp, const double* position, const double* or
   file_->Write(row + '\n');
 }
 
-void PoseFile::AddTruth(const Frame& frame) {
+void PoseFile::AddTruth(const SourceFrame& frame) {
   if (frame.truth.size() <= std::max(place_.position, place_.orientation)) return;
   const std::vector<double>& r = frame.truth[place_.position];
   const std::vector<double>& q = frame.truth[place_.orientation];

@@ -39,7 +39,7 @@ class PoseFile {
            const Eigen::MatrixXd& position_covariance,
            const Eigen::MatrixXd& orientation_covariance);
   /// The pose among the truths of a frame; no row where it is not known.
-  void AddTruth(const Frame& frame);
+  void AddTruth(const SourceFrame& frame);
   void Close();
 
  private:

@@ -186,13 +186,13 @@ void Recorder::Begin(const Experiment& experiment) {
   impl_->started = Clock::now();
 }
 
-void Recorder::OnFrame(const Frame& frame) {
+void Recorder::OnFrame(const SourceFrame& frame) {
   ALIDADE_EXPECTS(impl_->source.has_value());
   impl_->source->Add(frame);
   impl_->data->Add(frame);
 }
 
-void Recorder::OnEstimate(int estimator, const Frame& frame, const State& state,
+void Recorder::OnEstimate(int estimator, const SourceFrame& frame, const State& state,
                           const UpdateReport& report) {
   ALIDADE_EXPECTS(estimator >= 0 && estimator < static_cast<int>(impl_->estimators.size()));
   impl_->estimators[static_cast<std::size_t>(estimator)]->Add(frame, state, report);

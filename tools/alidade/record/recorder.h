@@ -34,8 +34,8 @@ class Recorder : public RunObserver {
 
   /// Writes the headers, once the experiment is known.
   void Begin(const Experiment& experiment) override;
-  void OnFrame(const Frame& frame) override;
-  void OnEstimate(int estimator, const Frame& frame, const State& state,
+  void OnFrame(const SourceFrame& frame) override;
+  void OnEstimate(int estimator, const SourceFrame& frame, const State& state,
                   const UpdateReport& report) override;
   /// Puts a file of that text into the folder too. Errors: kCannotCreate, kIo.
   void AddFile(const std::string& name, std::string_view text);

@@ -60,7 +60,7 @@ class DataFiles {
     names_.insert("truth.tum");
   }
 
-  void Add(std::int64_t number, const Frame& frame) {
+  void Add(std::int64_t number, const SourceFrame& frame) {
     times_->Integer(number).Time(frame.timestamp).EndRow();
     for (const Measurement& measurement : frame.measurements) AddRow(number, measurement);
     if (!truth_) return;
@@ -221,7 +221,7 @@ SimulateResult Simulate(const Config& config, const PluginHost& host,
   DataFiles files(output, *source);
   ImageFiles drawn(images, config, output);
   SimulateResult result;
-  for (Frame frame; !result.stopped && source->Next(frame);) {
+  for (SourceFrame frame; !result.stopped && source->Next(frame);) {
     files.Add(result.frames, frame);
     drawn.Add(result.frames++, frame);
     result.stopped = stop && stop();

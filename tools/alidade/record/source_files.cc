@@ -44,7 +44,7 @@ bool IsScalar(const SensorBinding& binding) {
 }
 
 /// Values of the roles at the frame's truth; empty where one is not known there.
-std::vector<const double*> AtTruth(const Frame& frame, const std::vector<int>& truths) {
+std::vector<const double*> AtTruth(const SourceFrame& frame, const std::vector<int>& truths) {
   std::vector<const double*> roles;
   for (const int truth : truths) {
     const auto t = static_cast<std::size_t>(truth);
@@ -158,7 +158,7 @@ void SourceFiles::FindInverses(const Experiment& experiment) {
   }
 }
 
-void SourceFiles::Add(const Frame& frame) {
+void SourceFiles::Add(const SourceFrame& frame) {
   if (first_ == kNoTimestamp) first_ = frame.timestamp;
   last_ = frame.timestamp;
   for (const Measurement& m : frame.measurements) {
@@ -183,7 +183,7 @@ void SourceFiles::Add(const Frame& frame) {
   truth_->EndRow();
 }
 
-void SourceFiles::AddExpected(const Frame& frame, const Measurement& m) {
+void SourceFiles::AddExpected(const SourceFrame& frame, const Measurement& m) {
   const auto found = expectations_.find(m.stream);
   if (found == expectations_.end()) return;
   const auto& [model, truths] = found->second;
@@ -196,7 +196,7 @@ void SourceFiles::AddExpected(const Frame& frame, const Measurement& m) {
   ++expected_rows_[stream];
 }
 
-void SourceFiles::AddImplied(const Frame& frame, const Measurement& m) {
+void SourceFiles::AddImplied(const SourceFrame& frame, const Measurement& m) {
   for (Inverse& inverse : inverses_) {
     if (inverse.stream != m.stream || inverse.model.Valid(m.values.data()) != Status::kOk) continue;
     double value = 0.0;

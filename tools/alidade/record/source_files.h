@@ -20,7 +20,7 @@ class SourceFiles {
   SourceFiles(const OutputFolder& folder, const Experiment& experiment);
 
   /// Error: kIo.
-  void Add(const Frame& frame);
+  void Add(const SourceFrame& frame);
   void Close();
   /// The columns of truth.csv, by truth and element.
   const std::vector<std::vector<std::string>>& truth_columns() const { return truth_columns_; }
@@ -41,8 +41,8 @@ class SourceFiles {
   };
 
   void FindInverses(const Experiment& experiment);
-  void AddExpected(const Frame& frame, const Measurement& measurement);
-  void AddImplied(const Frame& frame, const Measurement& measurement);
+  void AddExpected(const SourceFrame& frame, const Measurement& measurement);
+  void AddImplied(const SourceFrame& frame, const Measurement& measurement);
 
   std::vector<StreamInfo> streams_, truths_;
   std::vector<std::vector<std::string>> truth_columns_;

@@ -30,7 +30,7 @@ Config WithSeed(const Config& config, std::uint64_t seed) {
   return copy;
 }
 
-bool AreEqual(const Frame& a, const Frame& b) {
+bool AreEqual(const SourceFrame& a, const SourceFrame& b) {
   const auto same = [](const Measurement& m, const Measurement& n) {
     return m.timestamp == n.timestamp && m.stream == n.stream && m.landmark == n.landmark &&
            m.values == n.values && m.covariance == n.covariance;
@@ -45,7 +45,7 @@ bool UsesSeed(const Config& config, const PluginHost& host, std::uint64_t seed) 
   CheckReadableAgain(config);
   const Config first = WithSeed(config, seed), second = WithSeed(config, seed + 1);
   const Experiment one = BuildExperiment(first, host), another = BuildExperiment(second, host);
-  Frame a, b;
+  SourceFrame a, b;
   try {
     for (;;) {
       const bool more = one.source->Next(a);

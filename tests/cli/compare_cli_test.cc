@@ -302,8 +302,11 @@ TEST_F(CompareCli, TellsOfRejectionRecovery) {
 }
 
 TEST_F(CompareCli, OverSeedsValuesHaveASpread) {
-  const Arguments sweep = {"compare", "config.yaml", "--runs", "3", "--jobs", "1", "-o", "one"};
-  const Outcome compared = Call(sweep);
+  const auto compare = [](const char* jobs, const char* folder) {
+    return Arguments{"compare", "config.yaml", "--runs", "3",   "--set", "source.duration_s=2",
+                     "--jobs",  jobs,          "-o",     folder};
+  };
+  const Outcome compared = Call(compare("1", "one"));
   EXPECT_EQ(compared.code, 0) << compared.err;
   EXPECT_TRUE(Contains(compared.out, "3 runs, mean [5 %, 95 %]")) << compared.out;
   const auto rmse = [](const Node& of, const char* where, const char* what) {
@@ -314,23 +317,24 @@ TEST_F(CompareCli, OverSeedsValuesHaveASpread) {
     EXPECT_EQ(rmse(json.root(), "values", what), rmse(summary.root(), "metrics", what));
   }
   EXPECT_LT(rmse(json.root(), "values", "p05"), rmse(json.root(), "values", "p95"));
-  ASSERT_EQ(
-      Call({"compare", "config.yaml", "--runs", "3", "--jobs", "2", "-o", "two", "--quiet"}).code,
-      0);
+  ASSERT_EQ(Call(compare("2", "two")).code, 0);
   EXPECT_EQ(WithoutClock(Read("one/compare.json")), WithoutClock(Read("two/compare.json")));
 }
 
 TEST_F(CompareCli, StopsAtASignalWithTheSeedsThatAreComplete) {
   // One run comes to its end in this time, on this machine and in this build.
   const auto start = std::chrono::steady_clock::now();
-  ASSERT_EQ(Call({"compare", "config.yaml", "--runs", "1", "-o", "first"}).code, 0);
+  const auto compare = [](const char* runs, const char* folder) {
+    return Arguments{"compare", "config.yaml", "--runs", runs,  "--set", "source.duration_s=2",
+                     "--jobs",  "1",           "-o",     folder};
+  };
+  ASSERT_EQ(Call(compare("1", "first")).code, 0);
   const auto one_run = std::chrono::steady_clock::now() - start;
-  const pid_t compare =
-      Start({"compare", "config.yaml", "--runs", "1000000", "--jobs", "1", "-o", "out"});
-  ASSERT_TRUE(Eventually([&] { return Exists(".out.partial-" + std::to_string(compare)); }));
+  const pid_t process = Start(compare("1000000", "out"));
+  ASSERT_TRUE(Eventually([&] { return Exists(".out.partial-" + std::to_string(process)); }));
   std::this_thread::sleep_for(4 * one_run);
-  ::kill(compare, SIGTERM);
-  const Outcome stopped = Wait(compare);
+  ::kill(process, SIGTERM);
+  const Outcome stopped = Wait(process);
   EXPECT_EQ(stopped.code, 75);
   EXPECT_TRUE(Contains(stopped.err, " of 1000000 runs")) << stopped.err;
   const Config json = Json("out/compare.json");

@@ -74,6 +74,14 @@ void SensorPlace::Add(const Block& block, bool jacobian, bool considered) {
   width += size;
 }
 
+void SensorPlace::PutLandmark(std::size_t first, const StateLayout& layout,
+                              const std::vector<BlockId>& blocks) {
+  values.resize(first);
+  columns.resize(first);
+  for (const BlockId id : blocks) Add(layout[id], true, false);
+  strides.assign(values.size(), width);
+}
+
 Binding::Binding(System of, const std::vector<StreamInfo>& from)
     : system(std::move(of)),
       streams(from),

@@ -22,6 +22,9 @@ struct SensorPlace {
 
   /// Adds a role: a block's place, with a Jacobian or without.
   void Add(const Block& block, bool jacobian, bool considered);
+  /// Gives its last roles, from `first` on, the places of the blocks of a landmark.
+  void PutLandmark(std::size_t first, const StateLayout& layout,
+                   const std::vector<BlockId>& blocks);
 };
 
 /// How a motion model moves the state, by places in x and P.

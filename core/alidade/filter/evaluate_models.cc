@@ -6,14 +6,113 @@
 
 namespace alidade::internal {
 
-const double* const* RolesAt(FilterState& f, const Row& row, const std::vector<double>& x) {
-  const std::vector<RoleBinding>& bound = row.binding->roles;
-  f.buffers.roles.clear();
-  for (std::size_t i = 0; i < row.place->values.size(); ++i) {
-    const int at = row.place->values[i];
-    const bool known = i < bound.size() && bound[i].mode == RoleMode::kKnown;
-    f.buffers.roles.push_back(at < 0 ? nullptr : (known ? f.state.values() : x).data() + at);
+void RolesAt(const SensorBinding& sensor, const SensorPlace& place, const std::vector<double>& x,
+             const std::vector<double>& known, std::vector<const double*>& roles) {
+  roles.clear();
+  for (std::size_t i = 0; i < place.values.size(); ++i) {
+    const int at = place.values[i];
+    const bool knows = i < sensor.roles.size() && sensor.roles[i].mode == RoleMode::kKnown;
+    roles.push_back(at < 0 ? nullptr : (knows ? known : x).data() + at);
   }
+}
+
+Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place, const double* const* roles,
+                   std::vector<double*>& columns, std::vector<double>& h,
+                   std::vector<double>* jacobian) {
+  const Geometry& geometry = model.measurement().geometry;
+  h.assign(static_cast<std::size_t>(geometry.ambient), std::nan(""));
+  if (jacobian == nullptr) return OutcomeOf(model.Predict(roles, h.data()));
+  const int m = geometry.tangent;
+  jacobian->assign(static_cast<std::size_t>(m) * static_cast<std::size_t>(place.width), 0.0);
+  for (const JacobianPart& part : place.parts) {
+    for (int i = 0; i < m; ++i) {
+      std::fill_n(jacobian->data() + i * place.width + part.column, part.size, std::nan(""));
+    }
+  }
+  columns.clear();
+  for (const int column : place.columns) {
+    columns.push_back(column < 0 ? nullptr : jacobian->data() + column);
+  }
+  return OutcomeOf(model.Linearise(roles, h.data(), columns.data(), place.strides.data()));
+}
+
+Outcome NoiseAt(const SensorModel& model, const Measurement& measurement,
+                const double* const* roles, std::vector<double>& l, std::vector<double>& r) {
+  if (!measurement.covariance.empty()) {
+    r.assign(measurement.covariance.begin(), measurement.covariance.end());
+    return Outcome::kAccepted;
+  }
+  const auto m = static_cast<std::size_t>(model.measurement().geometry.tangent);
+  r.resize(m * m);
+  l.assign(m * m, std::nan(""));
+  const Outcome outcome = OutcomeOf(model.SqrtNoise(roles, measurement.values.data(), l.data()));
+  for (std::size_t i = 0; i < m; ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      double sum = 0.0;
+      for (std::size_t k = 0; k < m; ++k) sum += l[i * m + k] * l[j * m + k];
+      r[i * m + j] = r[j * m + i] = sum;
+    }
+  }
+  return outcome;
+}
+
+Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place, const double* z,
+                 const double* prior, std::vector<const double*>& roles, Inverse& inverse) {
+  const SensorModel& model = sensor.model;
+  const auto first = static_cast<std::size_t>(model.initialised_role());
+  const auto count = static_cast<std::size_t>(model.initialised_count());
+  const std::span<const Space> targets = std::span(model.roles()).subspan(first, count);
+  int rows = 0, size = 0, columns = 0;
+  for (const Space& target : targets) {
+    rows += target.geometry.tangent;
+    size += target.geometry.ambient;
+  }
+  const double unwritten = std::nan("");
+  std::fill_n(roles.begin() + model.initialised_role(), count, nullptr);
+  const auto counts = [&](std::size_t i) { return roles[i] != nullptr && place.columns[i] >= 0; };
+  inverse.from.clear();
+  for (std::size_t i = 0; i < roles.size(); ++i) {
+    if (!counts(i)) continue;
+    inverse.from.push_back(sensor.roles[i].block);
+    columns += model.roles()[i].geometry.tangent;
+  }
+  inverse.by_role.assign(static_cast<std::size_t>(rows * columns), unwritten);
+  inverse.of_role.assign(roles.size(), nullptr);
+  double* next = inverse.by_role.data();
+  for (std::size_t i = 0; i < roles.size(); ++i) {
+    if (!counts(i)) continue;
+    inverse.of_role[i] = next;
+    next += rows * model.roles()[i].geometry.tangent;
+  }
+  inverse.y.assign(static_cast<std::size_t>(size), unwritten);
+  inverse.by_z.setConstant(rows, model.measurement().geometry.tangent, unwritten);
+  inverse.by_prior.setConstant(rows, model.prior_size(), unwritten);
+  const Status status =
+      model.Initialise(roles.data(), z, prior, inverse.y.data(), inverse.of_role.data(),
+                       inverse.by_z.data(), inverse.by_prior.data());
+  if (status != Status::kOk) return OutcomeOf(status);
+  inverse.by_x.resize(rows, columns);
+  Eigen::Index column = 0;
+  for (std::size_t i = 0; i < roles.size(); ++i) {
+    if (inverse.of_role[i] == nullptr) continue;
+    const int width = model.roles()[i].geometry.tangent;
+    inverse.by_x.middleCols(column, width) =
+        Eigen::Map<const RowMajor>(inverse.of_role[i], rows, width);
+    column += width;
+  }
+  double* y = inverse.y.data();
+  for (std::size_t i = 0; i < count; ++i) {
+    targets[i].geometry.Normalise(y);
+    roles[first + i] = y;
+    y += targets[i].geometry.ambient;
+  }
+  const bool finite = AllFinite(inverse.y) && inverse.by_x.allFinite() &&
+                      inverse.by_z.allFinite() && inverse.by_prior.allFinite();
+  return finite ? Outcome::kAccepted : Outcome::kNotFinite;
+}
+
+const double* const* RolesAt(FilterState& f, const Row& row, const std::vector<double>& x) {
+  RolesAt(*row.binding, *row.place, x, f.state.values(), f.buffers.roles);
   return f.buffers.roles.data();
 }
 
@@ -22,43 +121,7 @@ Outcome PredictAt(FilterState& f, const Row& row, const std::vector<double>& x, 
 }
 
 Outcome LineariseAt(FilterState& f, Row& row, const double* const* roles) {
-  const SensorPlace& place = *row.place;
-  const int m = row.report->dof;
-  row.H.assign(static_cast<std::size_t>(m) * static_cast<std::size_t>(place.width), 0.0);
-  for (const JacobianPart& part : place.parts) {
-    for (int i = 0; i < m; ++i) {
-      std::fill_n(row.H.data() + i * place.width + part.column, part.size, std::nan(""));
-    }
-  }
-  f.buffers.jacobians.clear();
-  for (const int column : place.columns) {
-    f.buffers.jacobians.push_back(column < 0 ? nullptr : row.H.data() + column);
-  }
-  row.report->h.assign(static_cast<std::size_t>(row.model->measurement().geometry.ambient),
-                       std::nan(""));
-  return OutcomeOf(row.model->Linearise(roles, row.report->h.data(), f.buffers.jacobians.data(),
-                                        place.strides.data()));
-}
-
-Outcome NoiseAt(Row& row, const double* const* roles) {
-  const auto m = static_cast<std::size_t>(row.report->dof);
-  const Measurement& measurement = *row.measurement;
-  if (!measurement.covariance.empty()) {
-    row.R.assign(measurement.covariance.begin(), measurement.covariance.end());
-    return Outcome::kAccepted;
-  }
-  row.R.resize(m * m);
-  row.L.assign(m * m, std::nan(""));
-  const Outcome outcome =
-      OutcomeOf(row.model->SqrtNoise(roles, measurement.values.data(), row.L.data()));
-  for (std::size_t i = 0; i < m; ++i) {
-    for (std::size_t j = 0; j <= i; ++j) {
-      double sum = 0.0;
-      for (std::size_t k = 0; k < m; ++k) sum += row.L[i * m + k] * row.L[j * m + k];
-      row.R[i * m + j] = row.R[j * m + i] = sum;
-    }
-  }
-  return outcome;
+  return EvaluateAt(*row.model, *row.place, roles, f.buffers.jacobians, row.report->h, &row.H);
 }
 
 void TakeInnovation(Row& row) {
@@ -77,75 +140,24 @@ void ChainJacobian(FilterState& f, Row& row, int column, int size, const double*
 }
 
 Outcome Invert(FilterState& f, Row& row, const LandmarkOptions::Prior* prior, Inverse& inverse) {
-  const Workspace::Use use(f.work);
-  const SensorBinding& binding = *row.binding;
-  const SensorModel& model = binding.model;
-  const auto first = static_cast<std::size_t>(model.initialised_role());
-  const auto count = static_cast<std::size_t>(model.initialised_count());
-  const std::span<const Space> targets = std::span(model.roles()).subspan(first, count);
-  const auto matrix = [&](Eigen::Index rows, Eigen::Index columns) {
-    Eigen::Map<RowMajor> taken(f.work.Take(rows * columns).data(), rows, columns);
-    taken.setConstant(std::nan(""));
-    return taken;
-  };
-  int size = 0;
-  inverse.rows = inverse.columns = 0;
-  inverse.from.clear();
-  for (const Space& target : targets) {
-    inverse.rows += target.geometry.tangent;
-    size += target.geometry.ambient;
-  }
-  std::vector<const double*>& roles = f.buffers.roles;
-  std::vector<double*>& jx = f.buffers.jacobians;
-  roles.assign(binding.roles.size(), nullptr);
-  jx.assign(binding.roles.size(), nullptr);
-  for (std::size_t i = 0; i < roles.size(); ++i) {
-    const RoleBinding& role = binding.roles[i];
-    if ((i >= first && i < first + count) || role.block < 0) continue;
-    roles[i] = f.state.value(role.block);
-    const Block& block = f.state.layout()[role.block];
-    if (role.mode == RoleMode::kKnown || !block.has_covariance()) continue;
-    jx[i] = matrix(inverse.rows, block.geometry().tangent).data();
-    inverse.from.push_back(role.block);
-    inverse.columns += block.geometry().tangent;
-  }
-  const int m = model.measurement().geometry.tangent;
-  Eigen::Map<RowMajor> jz = matrix(inverse.rows, m), jp = matrix(inverse.rows, model.prior_size());
-  inverse.y.resize(static_cast<std::size_t>(size));
-  const Status status = model.Initialise(roles.data(), row.measurement->values.data(),
-                                         prior == nullptr ? nullptr : &prior->inverse_distance,
-                                         inverse.y.data(), jx.data(), jz.data(), jp.data());
-  Outcome outcome = OutcomeOf(status);
-  if (status == Status::kOk) {
-    double* y = inverse.y.data();
-    for (std::size_t i = 0; i < count; ++i) {
-      targets[i].geometry.Normalise(y);
-      roles[first + i] = y;
-      y += targets[i].geometry.ambient;
-    }
-    outcome = NoiseAt(row, roles.data());
-  }
-  if (outcome == Outcome::kFailed) NotePluginFailure(f, binding);
+  RolesAt(f, row, f.state.values());
+  Outcome outcome =
+      InvertAt(*row.binding, *row.place, row.measurement->values.data(),
+               prior == nullptr ? nullptr : &prior->inverse_distance, f.buffers.roles, inverse);
+  if (outcome == Outcome::kAccepted) outcome = NoiseAt(row, f.buffers.roles.data());
+  if (outcome == Outcome::kFailed) NotePluginFailure(f, *row.binding);
   if (outcome != Outcome::kAccepted) {
-    return outcome == Outcome::kFailed ? outcome : Outcome::kInvalid;
+    return outcome == Outcome::kOutOfDomain ? Outcome::kInvalid : outcome;
   }
-  Eigen::Map<RowMajor> jz_r = matrix(inverse.rows, m);
-  inverse.own.resize(static_cast<std::size_t>(inverse.rows * inverse.rows));
-  Eigen::Map<RowMajor> own(inverse.own.data(), inverse.rows, inverse.rows);
-  jz_r.noalias() = jz * Eigen::Map<const RowMajor>(row.R.data(), m, m);
-  own.noalias() = jz_r * jz.transpose();
-  if (prior != nullptr) own.noalias() += prior->sigma * prior->sigma * jp * jp.transpose();
-  inverse.jacobian.resize(static_cast<std::size_t>(inverse.rows * inverse.columns));
-  Eigen::Map<RowMajor> jacobian(inverse.jacobian.data(), inverse.rows, inverse.columns);
-  Eigen::Index column = 0;
-  for (std::size_t i = 0; i < roles.size(); ++i) {
-    if (jx[i] == nullptr) continue;
-    const Eigen::Index width = model.roles()[i].geometry.tangent;
-    jacobian.middleCols(column, width) = Eigen::Map<const RowMajor>(jx[i], inverse.rows, width);
-    column += width;
+  const int m = row.report->dof;
+  const Eigen::Map<const RowMajor> r(row.R.data(), m, m);
+  const RowMajor& jp = inverse.by_prior;
+  inverse.by_z_r.noalias() = inverse.by_z * r;
+  inverse.own.noalias() = inverse.by_z_r * inverse.by_z.transpose();
+  if (prior != nullptr) {
+    inverse.own.noalias() += prior->sigma * prior->sigma * jp * jp.transpose();
   }
-  const bool finite = AllFinite(inverse.y) && own.allFinite() && jacobian.allFinite();
-  return finite ? Outcome::kAccepted : Outcome::kNotFinite;
+  return inverse.own.allFinite() ? Outcome::kAccepted : Outcome::kNotFinite;
 }
 
 }  // namespace alidade::internal

@@ -54,9 +54,7 @@ Outcome InitialiseBlock(FilterState& f, Row& row) {
   Inverse inverse;
   const Outcome outcome = Invert(f, row, nullptr, inverse);
   if (outcome != Outcome::kAccepted) return outcome;
-  const Eigen::Map<const RowMajor> jacobian(inverse.jacobian.data(), inverse.rows, inverse.columns),
-      own(inverse.own.data(), inverse.rows, inverse.rows);
-  f.state.Initialise({&id, 1}, inverse.y.data(), inverse.from, jacobian, own);
+  f.state.Initialise({&id, 1}, inverse.y.data(), inverse.from, inverse.by_x, inverse.own);
   if (!f.first_estimates.empty()) f.first_estimates[static_cast<std::size_t>(id)].clear();
   f.Activate();
   f.motions.EndInterval();

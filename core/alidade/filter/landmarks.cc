@@ -159,12 +159,8 @@ void Landmarks::Attach(FilterState& f, std::span<Row> rows) {
 /// Puts the blocks of the landmark into the row's last roles.
 void Landmarks::Attach(const FilterState& f, Row& row, const LandmarkRecord& landmark) {
   const Family& family = FamilyOf(row);
-  const auto first = static_cast<std::size_t>(family.first);
   row.own = *row.place;
-  row.own.values.resize(first);
-  row.own.columns.resize(first);
-  for (const BlockId id : landmark.blocks) row.own.Add(f.state.layout()[id], true, false);
-  row.own.strides.assign(row.own.values.size(), row.own.width);
+  row.own.PutLandmark(static_cast<std::size_t>(family.first), f.state.layout(), landmark.blocks);
   row.place = &row.own;
   if (landmark.representation != family.representation) row.model = &*row.binding->xyz;
 }
@@ -286,8 +282,8 @@ bool Landmarks::ConvertToXyz(FilterState& f, std::int64_t id, LandmarkRecord& la
   const auto point = PointOf(*landmark.representation, ValuesOf(f.state, landmark).data());
   if (!point || !(linearity < options_.max_linearity_index)) return false;
   const BlockId to = Declare(f, id, xyz_, BlockStatus::kEstimated);
-  f.state.Initialise({&to, 1}, point->position.data(), landmark.blocks, point->jacobian,
-                     Eigen::Matrix3d::Zero());
+  const Eigen::Matrix3d none = Eigen::Matrix3d::Zero();
+  f.state.Initialise({&to, 1}, point->position.data(), landmark.blocks, point->jacobian, none);
   DropBlocks(f, landmark);
   landmark.blocks = {to};
   landmark.representation = XyzRepresentation();
@@ -364,13 +360,14 @@ double Landmarks::PriorInverseDistance(const State& state) {
 /// the first landmark of the frame makes the block, and the others of the same sensor take it.
 Outcome Landmarks::Initialise(FilterState& f, std::int64_t id, Row& row, LandmarkRecord& landmark) {
   Family& family = families_[static_cast<std::size_t>(row.sensor)];
-  const Outcome outcome = Invert(f, row, options_.prior ? &prior_ : nullptr, inverse_);
+  Inverse& inverse = family.inverse;
+  const Outcome outcome = Invert(f, row, options_.prior ? &prior_ : nullptr, inverse);
   if (outcome != Outcome::kAccepted) return outcome;
   auto& [fresh, values, rows] = fresh_;
   fresh.clear();
   values.clear();
   rows.clear();
-  const double* y = inverse_.y.data();
+  const double* y = inverse.y.data();
   int at = 0;
   for (std::size_t i = 0; i < family.roles.size(); ++i) {
     const Space& role = family.roles[i];
@@ -393,20 +390,17 @@ Outcome Landmarks::Initialise(FilterState& f, std::int64_t id, Row& row, Landmar
   }
   const Workspace::Use use(f.work);
   const auto size = std::ssize(rows);
-  const Eigen::Map<const RowMajor> jacobian(inverse_.jacobian.data(), inverse_.rows,
-                                            inverse_.columns),
-      own(inverse_.own.data(), inverse_.rows, inverse_.rows);
-  Eigen::Map<RowMajor> its_jacobian(f.work.Take(size * inverse_.columns).data(), size,
-                                    inverse_.columns);
-  Workspace::Matrix its_own = f.work.Take(size, size);
+  Eigen::Map<RowMajor> by_x(f.work.Take(size * inverse.by_x.cols()).data(), size,
+                            inverse.by_x.cols());
+  Workspace::Matrix own = f.work.Take(size, size);
   for (Eigen::Index i = 0; i < size; ++i) {
     const int row_of_y = rows[static_cast<std::size_t>(i)];
-    its_jacobian.row(i) = jacobian.row(row_of_y);
+    by_x.row(i) = inverse.by_x.row(row_of_y);
     for (Eigen::Index j = 0; j < size; ++j) {
-      its_own(i, j) = own(row_of_y, rows[static_cast<std::size_t>(j)]);
+      own(i, j) = inverse.own(row_of_y, rows[static_cast<std::size_t>(j)]);
     }
   }
-  f.state.Initialise(fresh, values.data(), inverse_.from, its_jacobian, its_own);
+  f.state.Initialise(fresh, values.data(), inverse.from, by_x, own);
   landmark.representation = family.representation;
   f.motions.EndInterval();
   return Outcome::kInitialised;

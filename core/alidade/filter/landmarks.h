@@ -67,6 +67,7 @@ class Landmarks {
     int position = -1;  ///< its role `position`, the camera's in the world
     std::optional<LandmarkRepresentation> representation;
     std::vector<Space> roles;     ///< the landmark's
+    Scratch<Inverse> inverse;     ///< of the last measurement that it initialised by
     std::vector<BlockId> shared;  ///< by landmark role: the block of this frame, or -1
   };
 
@@ -105,7 +106,6 @@ class Landmarks {
   Scratch<std::vector<ById::node_type>> spare_;  ///< records of landmarks that are gone
   std::string name_;                             ///< of the block that is declared
   Scratch<std::vector<const Row*>> measured_;  ///< a used row of each landmark in the state, by id
-  Scratch<Inverse> inverse_;
   struct {
     std::vector<BlockId> blocks;
     std::vector<double> values;

@@ -180,10 +180,10 @@ Outcome Linear::CorrectSmall(FilterState& f, std::span<Row* const> rows, const d
   return Outcome::kAccepted;
 }
 
-/// E = (K - K*) L, whose rows are those of lost_: there K* = W L^-1 is the optimal gain, and K it
+/// The rows of P that are considered, in lost_. There the optimal gain is K* = W L^-1, and K is it
 /// with zeros for what is considered.
-Workspace::Matrix Linear::FindLost(FilterState& f, std::span<Row* const> rows,
-                                   const Workspace::Matrix& w, const Workspace::Matrix& l) {
+Linear::Lost Linear::FindLost(FilterState& f, std::span<Row* const> rows,
+                              const Workspace::Matrix& w, const Workspace::Matrix& l) {
   lost_.clear();
   ForEachConsidered(f, rows, [&](int offset, int size, Eigen::Index, Eigen::Index) {
     for (int i = 0; i < size; ++i) lost_.push_back(offset + i);
@@ -191,22 +191,22 @@ Workspace::Matrix Linear::FindLost(FilterState& f, std::span<Row* const> rows,
   std::ranges::sort(lost_);
   lost_.erase(std::unique(lost_.begin(), lost_.end()), lost_.end());
   const Eigen::Index count = std::ssize(lost_), m = w.cols();
-  Workspace::Matrix e = f.work.Take(count, m);
-  if (count == 0) return e;
+  Lost lost{f.work.Take(count, m), f.work.Take(count, m)};
+  auto& [gain, e] = lost;
+  if (count == 0) return lost;
   e.setZero();
-  const Workspace::Use use(f.work);
-  Workspace::Matrix gain = f.work.Take(count, m);
   for (Eigen::Index i = 0; i < count; ++i) gain.row(i) = w.row(lost_[static_cast<std::size_t>(i)]);
   Divide(l, gain);
   ForEachConsidered(f, rows, [&](int offset, int size, Eigen::Index at, Eigen::Index k) {
     const Eigen::Index i = std::ranges::lower_bound(lost_, offset) - lost_.begin();
-    e.block(i, at, size, k) = -gain.block(i, at, size, k);
+    e.block(i, at, size, k) -= gain.block(i, at, size, k);
+    gain.block(i, at, size, k).setZero();
   });
   for (Eigen::Index k = 0; k < m; ++k) {
     e.col(k) *= l(k, k);
     e.col(k).noalias() += e.rightCols(m - k - 1) * l.col(k).tail(m - k - 1);
   }
-  return e;
+  return lost;
 }
 
 Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const double* correction) {
@@ -225,15 +225,12 @@ Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const d
     return Outcome::kAccepted;
   }
   DivideByTransposed(l, w);
-  const Workspace::Matrix e = FindLost(f, rows, w, l);
+  const auto [lost_gain, e] = FindLost(f, rows, w, l);
   y = all.innovation;
   l.triangularView<Eigen::Lower>().solveInPlace(y);
   dx.noalias() = w * y;
-  gain = w;
   for (std::size_t i = 0; i < lost_.size(); ++i) {
-    const auto row = e.row(static_cast<Eigen::Index>(i));
-    dx[lost_[i]] += row.dot(y);
-    gain.row(lost_[i]) += row;
+    dx[lost_[i]] = lost_gain.row(static_cast<Eigen::Index>(i)).dot(all.innovation);
   }
   if (correction != nullptr) std::copy_n(correction, n, dx.data());
   f.state.Retract(dx.data(), f.buffers.moved);
@@ -241,7 +238,13 @@ Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const d
   const bool cancels = Cancels(p, w, lost_, e, f.work.Take(n));
   const bool recorded =
       std::ranges::any_of(rows, [](const Row* row) { return row->gain_is_recorded(); });
-  if (cancels || recorded) Divide(l, gain);
+  if (cancels || recorded) {
+    gain = w;
+    Divide(l, gain);
+    for (std::size_t i = 0; i < lost_.size(); ++i) {
+      gain.row(lost_[i]) = lost_gain.row(static_cast<Eigen::Index>(i));
+    }
+  }
   if (cancels) {
     if (!p.Joseph(gain, all.h, all.noise)) return Outcome::kNotPd;
   } else {

@@ -39,8 +39,12 @@ class Linear : public Method {
   Outcome LineariseElsewhere(FilterState& f, Row& row);
   Outcome CorrectSmall(FilterState& f, std::span<Row* const> rows, const double* dx);
   Outcome CorrectLarge(FilterState& f, std::span<Row* const> rows, const double* dx);
-  Workspace::Matrix FindLost(FilterState& f, std::span<Row* const> rows, const Workspace::Matrix& w,
-                             const Workspace::Matrix& l);
+  /// Of the rows in lost_: K, and E = (K - K*) L.
+  struct Lost {
+    Workspace::Matrix gain, e;
+  };
+  Lost FindLost(FilterState& f, std::span<Row* const> rows, const Workspace::Matrix& w,
+                const Workspace::Matrix& l);
 
   // Memory that is kept from row to row.
   Scratch<std::vector<const double*>> at_;  ///< what fills the roles where H is taken

@@ -2,12 +2,83 @@
 #include "alidade/filter/motions.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
-#include "alidade/filter/estimator.h"
 #include "alidade/state/small_kernels.h"
 
 namespace alidade::internal {
+namespace {
+
+constexpr double kNotWritten = std::numeric_limits<double>::quiet_NaN();
+
+bool AreFinite(const double* values, Eigen::Index size) {
+  return AllFinite({values, static_cast<std::size_t>(size)});
+}
+
+/// The values of the model's blocks in x.
+std::array<const double*, kMaxRoles> BlocksAt(const MotionPlace& place, const double* x) {
+  std::array<const double*, kMaxRoles> blocks;
+  std::ranges::transform(place.values, blocks.begin(), [&](int at) { return x + at; });
+  return blocks;
+}
+
+}  // namespace
+
+Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
+               const double* u, const double* w, double dt_s, double* next, double* f, double* g) {
+  const MotionModel& model = motion.model;
+  const Eigen::Index n = model.tangent_size();
+  const Eigen::Index of_f = f == nullptr ? 0 : n * n,
+                     of_g = g == nullptr ? 0 : n * model.noise_size();
+  std::array<double*, kMaxRoles> to;
+  for (std::size_t k = 0; k < place.values.size(); ++k) {
+    to[k] = next + place.values[k];
+    std::fill_n(to[k], model.blocks()[k].geometry.ambient, kNotWritten);
+  }
+  std::fill_n(f, of_f, kNotWritten);
+  std::fill_n(g, of_g, kNotWritten);
+  const Status status = model.Step(BlocksAt(place, x).data(), u, w, dt_s, to.data(), f, g);
+  if (status != Status::kOk) return OutcomeOf(status);
+  bool finite = AreFinite(f, of_f) && AreFinite(g, of_g);
+  for (std::size_t k = 0; k < place.values.size(); ++k) {
+    finite = finite && AreFinite(to[k], model.blocks()[k].geometry.ambient);
+  }
+  return finite ? Outcome::kAccepted : Outcome::kNotFinite;
+}
+
+Outcome SqrtQAt(const MotionBinding& motion, const MotionPlace& place, const double* x, double dt_s,
+                double* l) {
+  const Eigen::Index size = Eigen::Index{motion.model.noise_size()} * motion.model.noise_size();
+  std::fill_n(l, size, kNotWritten);
+  const Status status = motion.model.SqrtQ(BlocksAt(place, x).data(), dt_s, l);
+  if (status != Status::kOk) return OutcomeOf(status);
+  return AreFinite(l, size) ? Outcome::kAccepted : Outcome::kNotFinite;
+}
+
+Trouble TroubleOf(const MotionBinding& motion, Outcome outcome) {
+  if (outcome == Outcome::kAccepted) return {};
+  const std::string who = "motion model of '" + motion.name + "' ";
+  if (outcome == Outcome::kNotFinite) {
+    return {"not_finite", who + "steps to a state that is not finite"};
+  }
+  const bool failed = outcome == Outcome::kFailed;
+  return {failed ? "plugin_failed" : "diverged",
+          who + "cannot step: " + (failed ? motion.model.error_text() : "out of its domain")};
+}
+
+void TakeStep(const MotionBinding& motion, const StateLayout& layout, const double* next,
+              double* x) {
+  for (const BlockId id : motion.blocks) {
+    const Block& block = layout[id];
+    if (block.status == BlockStatus::kConstant) continue;
+    const Geometry& geometry = block.geometry();
+    double* const value = x + block.value_offset;
+    std::copy_n(next + block.value_offset, geometry.ambient, value);
+    if (geometry.kind != GeometryKind::kVector) geometry.Normalise(value);
+  }
+}
 
 Motions::Motions(const Binding& binding)
     : binding_(&binding),
@@ -50,49 +121,25 @@ Trouble Motions::EvaluateOne(std::size_t i, const State& state, double dt_s, boo
   const MotionBinding& motion = binding_->system.motions[i];
   const MotionPlace& place = binding_->motions[i];
   Step& step = steps_[i];
-  const double unwritten = std::nan("");
   const bool goes_on = place.holds && in_interval();
   // The first step may have been the fast path's, which keeps no M.
   if (goes_on && interval_steps_ == 1) step.m = step.gl;
-  std::ranges::fill(step.f, unwritten);
-  std::ranges::fill(step.g, unwritten);
-  if (!goes_on) std::ranges::fill(step.l, unwritten);
-  x_.clear();
-  to_.clear();
-  for (std::size_t k = 0; k < motion.blocks.size(); ++k) {
-    x_.push_back(state.values().data() + place.values[k]);
-    to_.push_back(next_.data() + place.values[k]);
-    std::fill_n(to_.back(), state.layout()[motion.blocks[k]].geometry().ambient, unwritten);
+  const double* const x = state.values().data();
+  Outcome outcome =
+      StepAt(motion, place, x, step.u.data(), nullptr, dt_s, next_.data(),
+             derivatives ? step.f.data() : nullptr, derivatives ? step.g.data() : nullptr);
+  if (outcome == Outcome::kAccepted && !goes_on) {
+    outcome = SqrtQAt(motion, place, x, dt_s, step.l.data());
   }
-  Status status = motion.model.Step(x_.data(), step.u.data(), nullptr, dt_s, to_.data(),
-                                    derivatives ? step.f.data() : nullptr,
-                                    derivatives ? step.g.data() : nullptr);
-  if (status == Status::kOk && !goes_on) {
-    status = motion.model.SqrtQ(x_.data(), dt_s, step.l.data());
+  if (outcome != Outcome::kAccepted || !derivatives) return TroubleOf(motion, outcome);
+  SpreadNoise(step.g.data(), step.l.data(), motion.model.tangent_size(), motion.model.noise_size(),
+              step.gl.data(), step.q.data());
+  if (goes_on) {
+    CarryHeld(motion.model, place, step);
+  } else if (place.holds) {
+    step.m = step.gl;
   }
-  if (status != Status::kOk) {
-    return {status == Status::kError ? "plugin_failed" : "diverged",
-            "motion model of '" + motion.name + "' cannot step: " +
-                (status == Status::kError ? motion.model.error_text() : "out of its domain")};
-  }
-  bool finite = AllFinite(step.l);
-  if (derivatives) {
-    SpreadNoise(step.g.data(), step.l.data(), motion.model.tangent_size(),
-                motion.model.noise_size(), step.gl.data(), step.q.data());
-    if (goes_on) {
-      CarryHeld(motion.model, place, step);
-    } else if (place.holds) {
-      step.m = step.gl;
-    }
-    finite = finite && AllFinite(step.f) && AllFinite(step.q);
-  }
-  for (std::size_t k = 0; k < motion.blocks.size(); ++k) {
-    const auto size = static_cast<std::size_t>(state.layout()[motion.blocks[k]].geometry().ambient);
-    finite = finite && AllFinite({to_[k], size});
-  }
-  if (finite) return {};
-  return {"not_finite",
-          "motion model of '" + motion.name + "' steps to a state that is not finite"};
+  return TroubleOf(motion, AllFinite(step.q) ? Outcome::kAccepted : Outcome::kNotFinite);
 }
 
 /// With A = F M and N = G Lq: q <- N N' + A N' + N A' (its lower triangle), M <- A + N. Blocks
@@ -127,13 +174,7 @@ bool Motions::Apply(State& state) {
   }
   for (std::size_t i = 0; i < steps_.size(); ++i) {
     if (!steps_[i].active) continue;
-    for (const BlockId id : binding_->system.motions[i].blocks) {
-      const Block& block = state.layout()[id];
-      if (block.status == BlockStatus::kConstant) continue;
-      const Geometry& geometry = block.geometry();
-      std::copy_n(next_.data() + block.value_offset, geometry.ambient, state.value(id));
-      if (geometry.kind != GeometryKind::kVector) geometry.Normalise(state.value(id));
-    }
+    TakeStep(binding_->system.motions[i], state.layout(), next_.data(), state.values().data());
   }
   return true;
 }

@@ -6,6 +6,7 @@
 
 #include "alidade/base/workspace.h"
 #include "alidade/filter/binding.h"
+#include "alidade/filter/estimator.h"
 
 namespace alidade::internal {
 
@@ -15,6 +16,19 @@ struct Trouble {
   std::string text;
   explicit operator bool() const { return kind != nullptr; }
 };
+
+/// x' = f(x, u, w, dt) of one motion model at the values x of the whole state, at the places of its
+/// blocks in `next`, and unless null its F (n x n) and G (n x n_w), row-major. w may be null: zero.
+Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
+               const double* u, const double* w, double dt_s, double* next, double* f, double* g);
+/// L of its Qw = L L' there, n_w x n_w, row-major.
+Outcome SqrtQAt(const MotionBinding& motion, const MotionPlace& place, const double* x, double dt_s,
+                double* l);
+/// What one of these that is not kAccepted means.
+Trouble TroubleOf(const MotionBinding& motion, Outcome outcome);
+/// x <- x' of its blocks that are not constant, brought back to their manifolds.
+void TakeStep(const MotionBinding& motion, const StateLayout& layout, const double* next,
+              double* x);
 
 /// What the motion models of a system make of the state over one step: x', F and G Lq.
 ///
@@ -78,8 +92,6 @@ class Motions {
   const Binding* binding_;
   std::vector<Step> steps_;  ///< as in System::motions
   std::vector<double> next_;
-  Scratch<std::vector<const double*>> x_;
-  Scratch<std::vector<double*>> to_;
   bool holds_ = false;
   Scratch<Workspace> memory_;
   Timestamp interval_steps_ = 0;  ///< since the state was last changed by anything else

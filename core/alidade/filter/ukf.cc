@@ -116,8 +116,6 @@ class Unscented : public Method {
   // Memory that is kept from step to step.
   Eigen::MatrixXd rest_, root_of_rest_;
   Scratch<Eigen::LDLT<Eigen::MatrixXd>> ldlt_;
-  Scratch<std::vector<const double*>> x_;
-  Scratch<std::vector<double*>> stepped_;
   std::vector<double> reported_h_, reported_innovation_;
   std::string failed_, failure_;  ///< the state entry whose plugin failed, and why
 };
@@ -199,34 +197,28 @@ Status Unscented::StepPoint(FilterState& f, const double* from, const double* no
                             double* to) {
   const Workspace::Use use(f.work);
   const auto size = static_cast<Eigen::Index>(f.state.values().size());
-  Workspace::Vector unused = f.work.Take(size), w = f.work.Take(f.motions.noise_size());
+  Workspace::Vector next = f.work.Take(size), w = f.work.Take(f.motions.noise_size());
   std::copy_n(from, size, to);
   for (std::size_t i = 0; i < f.motions.steps().size(); ++i) {
     const Motions::Step& step = f.motions.steps()[i];
     if (!step.active) continue;
     const MotionBinding& motion = f.binding->system.motions[i];
-    x_.clear();
-    stepped_.clear();
-    for (const BlockId id : motion.blocks) {
-      const Block& block = f.state.layout()[id];
-      const bool constant = block.status == BlockStatus::kConstant;
-      x_.push_back(from + block.value_offset);
-      stepped_.push_back((constant ? unused.data() : to) + block.value_offset);
-    }
     const Eigen::Index inputs = motion.model.noise_size();
     const Eigen::Map<const RowMajor> l(step.l.data(), inputs, inputs);
     Workspace::Vector(w.data(), inputs).noalias() =
         l * Eigen::Map<const Eigen::VectorXd>(noise, inputs);
-    const Status status = motion.model.Step(x_.data(), step.u.data(), w.data(), dt_s,
-                                            stepped_.data(), nullptr, nullptr);
-    if (status == Status::kError) {
+    const Outcome outcome = StepAt(motion, f.binding->motions[i], from, step.u.data(), w.data(),
+                                   dt_s, next.data(), nullptr, nullptr);
+    if (outcome == Outcome::kFailed) {
       failed_ = motion.name;
       failure_ = motion.model.error_text();
+      return Status::kError;
     }
-    if (status != Status::kOk) return status;
+    if (outcome != Outcome::kAccepted) return Status::kOutOfDomain;
+    TakeStep(motion, f.state.layout(), next.data(), to);
     noise += inputs;
   }
-  return AllFinite({to, f.state.values().size()}) ? Status::kOk : Status::kOutOfDomain;
+  return Status::kOk;
 }
 
 /// Moves state and covariance, which stay as they are where a point is out of its domain.

@@ -14,7 +14,6 @@ namespace {
 using internal::ReadPrefix;
 using internal::Text;
 
-constexpr int kMaxRoles = 64;
 constexpr int kMaxSize = 1 << 20;
 
 /// Whether the sizes are those of a geometry that this version knows.

@@ -19,6 +19,9 @@ inline Status ToStatus(std::int32_t code) {
 }
 }  // namespace detail
 
+/// The most roles of a sensor, and blocks of a motion model.
+inline constexpr int kMaxRoles = 64;
+
 /// Owns one instance that a plugin created, and its description as C++ values.
 class ModelInstance {
  public:

@@ -16,8 +16,12 @@ BlockId StateLayout::Declare(std::string_view name, std::string_view owner, cons
     dropped_.push_back(static_cast<BlockId>(blocks_.size()));
     blocks_.emplace_back();
   }
-  const BlockId id = dropped_.back();
-  dropped_.pop_back();
+  // One of the same kind has memory for all that is assigned.
+  const auto same = [&](BlockId id) { return (*this)[id].space.name == space.name; };
+  auto place = std::ranges::find_if(dropped_, same);
+  if (place == dropped_.end()) --place;
+  const BlockId id = *place;
+  dropped_.erase(place);
   Block& block = blocks_[static_cast<std::size_t>(id)];
   block.name = name;
   block.owner = owner;

@@ -17,20 +17,27 @@ void ForEachTile(Eigen::Index size, const Take& take) {
   for (Eigen::Index at = 0; at < size; at += kTile) take(at, std::min(kTile, size - at));
 }
 
-/// C <- C + sign A B, A l x k, B k x m.
+/// C <- C + sign A B, A l x k, B k x m, sign 1 or -1. (Of a factor within the product Eigen makes a
+/// copy where A has one row.)
 template <class A, class B>
 void AddProduct(Eigen::Ref<Eigen::MatrixXd> c, const A& a, const B& b, double sign = 1.0) {
   ForEachTile(b.cols(), [&](Eigen::Index j, Eigen::Index columns) {
     ForEachTile(a.cols(), [&](Eigen::Index k, Eigen::Index depth) {
       ForEachTile(a.rows(), [&](Eigen::Index i, Eigen::Index rows) {
-        c.block(i, j, rows, columns).noalias() +=
-            sign * a.block(i, k, rows, depth) * b.block(k, j, depth, columns);
+        auto tile = c.block(i, j, rows, columns);
+        const auto left = a.block(i, k, rows, depth);
+        const auto right = b.block(k, j, depth, columns);
+        if (sign > 0.0) {
+          tile.noalias() += left * right;
+        } else {
+          tile.noalias() -= left * right;
+        }
       });
     });
   });
 }
 
-/// The lower triangle of C <- C + sign A A', A n x m.
+/// The lower triangle of C <- C + sign A A', A n x m, sign 1 or -1.
 template <class A>
 void AddOuterProduct(Eigen::Ref<Eigen::MatrixXd> c, const A& a, double sign) {
   ForEachTile(a.rows(), [&](Eigen::Index j, Eigen::Index columns) {

@@ -28,7 +28,7 @@ class CeresBatch : public Estimator {
       : mode_(options.mode),
         run_(system, streams, options.solve.max_dt_s),
         solve_(options.solve),
-        state_(system.InitialState()),
+        state_(system.InitialState(/*reserved=*/true)),
         initialiser_(system, options.solve.max_dt_s, streams) {}
 
   void Start(Timestamp timestamp) override {

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "alidade/base/number_text.h"
+#include "alidade/filter/rows.h"
 
 namespace alidade::ceres_batch {
 namespace {
@@ -23,22 +24,18 @@ Eigen::MatrixXd SquareRoot(const Eigen::MatrixXd& p) {
 }  // namespace
 
 CondensedRun::CondensedRun(System system, const std::vector<StreamInfo>& streams, double max_dt_s)
-    : system_(std::move(system)),
-      max_dt_s_(max_dt_s),
-      initial_(system_.InitialState()),
-      controls_(system_, streams) {
-  for (const SensorBinding& sensor : system_.sensors) {
-    const auto found = std::ranges::find(streams, sensor.stream, &StreamInfo::name);
-    stream_of_sensor_.push_back(found == streams.end() ? -1
-                                                       : static_cast<int>(found - streams.begin()));
+    : binding_(std::move(system), streams),
+      initial_(binding_.initial),
+      time_(binding_.system, streams, max_dt_s) {
+  for (const Block& block : initial_.layout().blocks()) {
+    present_.push_back(block.present);
+    if (block.has_covariance()) inputs_ += block.geometry().tangent;
   }
-  l0_ = SquareRoot(initial_.covariance().Dense());
+  l0_ = SquareRoot(initial_.covariance().Dense()).leftCols(inputs_);  // the others are zero
   d0_ = Eigen::VectorXd::Zero(l0_.rows());
-  inputs_ = static_cast<int>(l0_.cols());
-  for (const Block& block : initial_.layout().blocks()) present_.push_back(block.present);
   for (std::size_t i = 0; i < present_.size(); ++i) {
-    if (present_[i]) continue;
     const BlockId id = static_cast<BlockId>(i);
+    if (present_[i] || initial_.layout()[id].value_offset < 0) continue;
     const Geometry geometry = initial_.layout()[id].geometry();
     std::vector<double> value(static_cast<std::size_t>(geometry.ambient));
     geometry.Identity(value.data());
@@ -47,14 +44,30 @@ CondensedRun::CondensedRun(System system, const std::vector<StreamInfo>& streams
   has_unit_vector_ = std::ranges::any_of(initial_.layout().blocks(), [](const Block& block) {
     return block.has_covariance() && block.geometry().kind == GeometryKind::kUnitVector;
   });
-  held_.assign(system_.motions.size(), -1);
-  held_l_.resize(system_.motions.size());
+  held_.assign(binding_.motions.size(), -1);
+  held_l_.resize(binding_.motions.size());
+  for (std::size_t i = 0; i < binding_.sensors.size(); ++i) {
+    const SensorBinding& sensor = binding_.system.sensors[i];
+    places_.push_back(PlaceBehind(i, sensor.model));
+    xyz_places_.push_back(PlaceBehind(i, sensor.xyz.value_or(sensor.model)));
+  }
   if (has_landmarks()) AddKnown();
 }
 
-bool CondensedRun::Holds(std::size_t motion) const {
-  const MotionModel& model = system_.motions[motion].model;
-  return model.discrete_noise() && !model.stationary() && model.noise_size() > 0;
+/// The place of a sensor in x and S; that of a landmark which it observes lies behind them.
+internal::SensorPlace CondensedRun::PlaceBehind(std::size_t sensor,
+                                                const SensorModel& model) const {
+  internal::SensorPlace place = binding_.sensors[sensor];
+  if (!ObservesLandmarks(binding_.system.sensors[sensor])) return place;
+  State behind = initial_;
+  std::vector<BlockId> landmark;
+  for (const Space& role : model.roles()) {
+    if (!role.landmark()) continue;
+    landmark.push_back(behind.Declare("landmarks.#" + role.name, "landmarks", role));
+    behind.Reserve(landmark.back());
+  }
+  place.PutLandmark(model.roles().size() - landmark.size(), behind.layout(), landmark);
+  return place;
 }
 
 bool CondensedRun::Fail(std::string why) const {
@@ -77,8 +90,8 @@ std::vector<double> CondensedRun::ValuesOf(const State& state) const {
   std::vector<double> values = initial_.values();
   for (std::size_t i = 0; i < present_.size(); ++i) {
     const BlockId id = static_cast<BlockId>(i);
-    if (!state.layout()[id].present) continue;
-    const Block& block = initial_.layout()[id];
+    const Block& block = state.layout()[id];  // its place is that in initial_
+    if (!block.present) continue;
     std::copy_n(state.value(id), block.geometry().ambient, values.data() + block.value_offset);
   }
   return values;
@@ -86,26 +99,21 @@ std::vector<double> CondensedRun::ValuesOf(const State& state) const {
 
 bool CondensedRun::Add(const Frame& frame, const UpdateReport& report, const Estimator& filter) {
   if (timestamp_ == kNoTimestamp) {
-    timestamp_ =
-        system_.initial_time_s ? TimestampFromSeconds(*system_.initial_time_s) : frame.timestamp;
+    const std::optional<double>& initial = binding_.system.initial_time_s;
+    timestamp_ = initial ? TimestampFromSeconds(*initial) : frame.timestamp;
   }
   Epoch epoch;
   epoch.steps.swap(passed_on_);
-  epoch.stale = frame.timestamp < timestamp_;
+  epoch.report.stale = frame.timestamp < timestamp_;
   const int inputs = inputs_;
   if (!epochs_.empty()) epoch.column = inputs;
-  for (Timestamp from = timestamp_; from < frame.timestamp;) {
-    const Timestamp end = controls_.StepEnd(from, frame.timestamp);
-    if (!AddSteps(from, end, epoch)) {
-      inputs_ = inputs;
-      return false;
-    }
-    from = end;
+  if (!AddSteps(timestamp_, frame.timestamp, epoch)) {
+    inputs_ = inputs;
+    return false;
   }
-  if (!epoch.stale) timestamp_ = frame.timestamp;
-  UpdateReport taken;
-  controls_.Take(frame, taken);
-  epoch.inputs = std::move(taken.inputs);
+  if (!epoch.report.stale) timestamp_ = frame.timestamp;
+  time_.inputs().Take(frame, epoch.report);
+  epoch.report.events.clear();  // the filter tells them
   AddFactors(frame, report, epoch);
   if (has_landmarks()) AddLandmarks(report, filter, epoch);
   EndInterval(epoch);
@@ -122,54 +130,52 @@ void CondensedRun::EndInterval(Epoch& epoch) {
   epoch.ends = std::ranges::all_of(held_, [](int column) { return column < 0; });
 }
 
-/// The steps of all models from `from` to `end`, over which the control inputs are constant.
-bool CondensedRun::AddSteps(Timestamp from, Timestamp end, Epoch& epoch) {
-  Timestamp elapsed = 0;
-  const bool overflow = __builtin_sub_overflow(end, from, &elapsed);
-  const Timestamp parts = overflow ? 0 : StepParts(elapsed, max_dt_s_);
-  if (overflow || parts > kMostInputs) {
-    return Fail("a gap before " + internal::SecondsText(end) + " needs more than " +
-                std::to_string(kMostInputs) + " steps of max_dt_s");
-  }
-  std::vector<Event> events;  // which the filter tells
-  for (Timestamp part = 0; part < parts; ++part) {
-    for (std::size_t i = 0; i < system_.motions.size(); ++i) {
-      const MotionBinding& motion = system_.motions[i];
-      if (motion.model.stationary() || !AllPresent(motion.blocks)) continue;
-      const std::span<const double> u = controls_.Use(i, from, events);
-      Step& step = epoch.steps.emplace_back();
-      step.motion = i;
-      step.dt_s = Seconds(elapsed) / static_cast<double>(parts);
-      step.begins = held_[i] < 0;
-      step.column = step.begins ? inputs_ : held_[i];
-      step.columns = inputs_;
-      step.u.assign(u.begin(), u.end());
-      if (step.begins) inputs_ += motion.model.noise_size();
-      if (Holds(i)) held_[i] = step.column;
+/// The steps of all models from `from` to `to`, where that is later.
+bool CondensedRun::AddSteps(Timestamp from, Timestamp to, Epoch& epoch) {
+  std::vector<Event> events;  // the filter tells them
+  internal::Timeline::Piece piece;
+  for (; from < to; from = piece.end) {
+    if (time_.First(from, to, events, piece) || piece.steps > kMostInputs) {
+      return Fail("a gap before " + internal::SecondsText(piece.end) + " needs more than " +
+                  std::to_string(kMostInputs) + " steps of max_dt_s");
     }
-    if (inputs_ > kMostInputs) return FailTooMany();
+    for (Timestamp part = 0; part < piece.steps; ++part) {
+      for (std::size_t i = 0; i < binding_.motions.size(); ++i) {
+        const MotionBinding& motion = binding_.system.motions[i];
+        if (motion.model.stationary() || !AllPresent(motion.blocks)) continue;
+        const std::span<const double> u = time_.inputs().Use(i, from, events);
+        Step& step = epoch.steps.emplace_back();
+        step.motion = i;
+        step.dt_s = piece.dt_s;
+        step.begins = held_[i] < 0;
+        step.column = step.begins ? inputs_ : held_[i];
+        step.columns = inputs_;
+        step.u.assign(u.begin(), u.end());
+        if (step.begins) inputs_ += motion.model.noise_size();
+        if (binding_.motions[i].holds) held_[i] = step.column;
+      }
+      if (inputs_ > kMostInputs) return FailTooMany();
+    }
   }
   return true;
 }
 
-/// One factor for each measurement and sensor bound to its stream, in the order of the sensors.
+/// One factor for each measurement and sensor bound to its stream, in the order of the filter.
 void CondensedRun::AddFactors(const Frame& frame, const UpdateReport& report, Epoch& epoch) {
-  for (std::size_t i = 0; i < system_.sensors.size(); ++i) {
-    const SensorModel& model = system_.sensors[i].model;
-    for (const Measurement& m : frame.measurements) {
-      if (m.stream != stream_of_sensor_[i]) continue;
-      ALIDADE_EXPECTS(std::ssize(m.values) == model.measurement().geometry.ambient);
-      Factor factor{static_cast<int>(i), m, Outcome::kStale, -1, -1, {}};
-      if (!epoch.stale) {
-        factor.outcome =
-            AllFinite(m.values) ? OutcomeOf(model.Valid(m.values.data())) : Outcome::kNotFinite;
-      }
-      const std::size_t index = epoch.factors.size();  // the filter has the same order
-      const bool first = index < report.measurements().size() &&
-                         report.measurements()[index].outcome == Outcome::kInitialised;
-      if (first) factor.outcome = Outcome::kInitialised;
-      epoch.factors.push_back(std::move(factor));
-    }
+  internal::Rows rows;
+  rows.Collect(frame, binding_, epoch.report);
+  ALIDADE_EXPECTS(rows.all().size() == report.measurements().size());
+  for (std::size_t i = 0; i < rows.all().size(); ++i) {
+    const internal::Row& row = rows.all()[i];
+    const bool first = report.measurements()[i].outcome == Outcome::kInitialised;
+    Factor& factor = epoch.factors.emplace_back();
+    factor.sensor = row.sensor;
+    factor.model = row.model;
+    factor.place = &places_[static_cast<std::size_t>(row.sensor)];
+    factor.measurement = *row.measurement;
+    factor.outcome = first                ? Outcome::kInitialised
+                     : epoch.report.stale ? Outcome::kStale
+                                          : row.report->outcome;
   }
   AddFirstValues(epoch);
   for (Factor& factor : epoch.factors) {
@@ -219,9 +225,8 @@ void CondensedRun::AddFirstValues(Epoch& epoch) {
 }
 
 bool CondensedRun::Begin(const double* e, bool sensitivity, Point& point) const {
-  const Eigen::Index n = initial_.covariance().size(), n0 = l0_.rows();
-  Eigen::VectorXd d = Eigen::VectorXd::Zero(n);
-  d.head(n0) = d0_ + l0_ * Eigen::Map<const Eigen::VectorXd>(e, n0);
+  const Eigen::Index n = l0_.rows(), n0 = l0_.cols();
+  const Eigen::VectorXd d = d0_ + l0_ * Eigen::Map<const Eigen::VectorXd>(e, n0);
   initial_.Retract(d.data(), point.x);
   point.offset = Eigen::VectorXd::Zero(n);
   point.s.resize(0, 0);
@@ -231,7 +236,7 @@ bool CondensedRun::Begin(const double* e, bool sensitivity, Point& point) const 
   for (std::size_t id = 0; id < initial_.layout().blocks().size(); ++id) {
     const Block& block = initial_.layout().blocks()[id];
     const int at = block.tangent_offset, t = block.geometry().tangent;
-    if (!block.has_covariance() || at >= n0) continue;
+    if (!block.has_covariance()) continue;
     RowMajor j(t, t);
     block.geometry().PlusJacobian(initial_.value(static_cast<BlockId>(id)), d.data() + at,
                                   j.data());
@@ -268,7 +273,7 @@ bool CondensedRun::Evaluate(const double* e, double* r, double* j) const {
     if (!Advance(k, e, point)) return false;
     for (const Factor& factor : epochs_[k].factors) {
       if (factor.row < 0) continue;
-      if (!Residual(factor, point, {}, residual, j != nullptr ? &a : nullptr)) return false;
+      if (!Residual(factor, point.x, residual, j != nullptr ? &a : nullptr)) return false;
       Eigen::Map<Eigen::VectorXd>(r + factor.row, residual.size()) = residual;
       if (j == nullptr) continue;
       Eigen::Map<RowMajor>(j + std::ptrdiff_t{factor.row} * inputs_, a.rows(), inputs_).noalias() =
@@ -296,7 +301,7 @@ bool CondensedRun::FreezeEpoch(Epoch& epoch, const double* e, Point& point) {
     Factor& factor = epoch.factors[first.factor];
     Point values = point;  // R may depend on the first value itself
     values.s.resize(0, 0);
-    if (!Initialise(first, factor, e, values) || !FreezeFactor(factor, values) ||
+    if (!Initialise(first, factor, e, values) || !FreezeFactor(factor, values.x) ||
         !Initialise(first, factor, e, point)) {
       return false;
     }
@@ -316,7 +321,7 @@ bool CondensedRun::Freeze(const double* e) {
   for (Epoch& epoch : epochs_) {
     if (!FreezeEpoch(epoch, e, point)) return false;
     for (Factor& factor : epoch.factors) {
-      if (factor.row >= 0 && !FreezeFactor(factor, point)) return false;
+      if (factor.row >= 0 && !FreezeFactor(factor, point.x)) return false;
     }
     if (has_landmarks()) points.push_back(point);
   }
@@ -325,52 +330,35 @@ bool CondensedRun::Freeze(const double* e) {
 
 void CondensedRun::Put(std::size_t k, const Point& point, const Eigen::MatrixXd& y,
                        State& state) const {
-  const std::vector<Block>& places = initial_.layout().blocks();
   for (const FirstValue& first : epochs_[k].first_values) {
-    const Block& place = places[static_cast<std::size_t>(first.block)];
-    const int t = place.geometry().tangent;
-    state.Add(first.block, point.x.data() + place.value_offset, Eigen::MatrixXd::Zero(t, t));
+    const Block& block = initial_.layout()[first.block];
+    const int t = block.geometry().tangent;
+    state.Add(first.block, point.x.data() + block.value_offset, Eigen::MatrixXd::Zero(t, t));
   }
-  const Eigen::MatrixXd p = y.transpose() * y;
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const Block& place = places[i];
-    const Block& block = state.layout().blocks()[i];
-    if (!block.present) continue;
-    std::copy_n(point.x.data() + place.value_offset, place.geometry().ambient,
-                state.value(static_cast<BlockId>(i)));
-    for (std::size_t j = 0; j <= i && block.has_covariance(); ++j) {
-      const Block& other = state.layout().blocks()[j];
-      if (!other.has_covariance()) continue;
-      state.covariance().SetBlock(block.tangent_offset, other.tangent_offset,
-                                  p.block(place.tangent_offset, places[j].tangent_offset,
-                                          place.geometry().tangent, places[j].geometry().tangent));
-    }
-  }
+  state.values() = point.x;
+  state.covariance().SetBlock(0, 0, y.transpose() * y);
 }
 
 void CondensedRun::Report(std::size_t k, const Point& point, UpdateReport& report) const {
-  report.Clear();
-  report.stale = epochs_[k].stale;
-  report.inputs = epochs_[k].inputs;
-  report.landmarks = epochs_[k].counts;
-  for (const Factor& factor : epochs_[k].factors) {
-    const SensorBinding& sensor = SensorOf(factor);
-    const Geometry& geometry = sensor.model.measurement().geometry;
-    MeasurementReport& entry = report.Add();
-    entry.Reset(factor.sensor, factor.measurement.landmark, geometry.tangent);
+  report = epochs_[k].report;
+  for (std::size_t i = 0; i < epochs_[k].factors.size(); ++i) {
+    const Factor& factor = epochs_[k].factors[i];
+    const Geometry& geometry = factor.model->measurement().geometry;
+    MeasurementReport& entry = report.measurements()[i];
     entry.outcome = factor.outcome;
-    entry.z = factor.measurement.values;
     entry.nis = std::nan("");  // what is left after smoothing is no innovation
     const bool of_landmark = factor.landmark >= 0 && factor.outcome == Outcome::kAccepted;
     if (factor.row < 0 && !of_landmark) continue;
-    std::vector<double> y;
-    if (of_landmark) y = landmarks_[static_cast<std::size_t>(factor.landmark)].y;
-    entry.h.resize(entry.z.size());
-    entry.innovation.resize(static_cast<std::size_t>(geometry.tangent));
-    if (ModelOf(factor).Predict(RolesOf(factor, point, y).data(), entry.h.data()) != Status::kOk) {
+    std::vector<double> x = point.x;
+    if (of_landmark) {
+      x = WithLandmark(x, landmarks_[static_cast<std::size_t>(factor.landmark)].y);
+    }
+    if (See(factor, x, entry.h, nullptr) != Outcome::kAccepted) {
+      entry.h.clear();
       continue;
     }
     if (geometry.kind == GeometryKind::kAngle) geometry.Normalise(entry.h.data());
+    entry.innovation.resize(static_cast<std::size_t>(geometry.tangent));
     geometry.Minus(entry.z.data(), entry.h.data(), entry.innovation.data());
   }
 }

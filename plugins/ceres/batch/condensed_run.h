@@ -7,8 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "alidade/filter/control_inputs.h"
+#include "alidade/filter/binding.h"
 #include "alidade/filter/estimator.h"
+#include "alidade/filter/timeline.h"
 #include "map_landmark.h"
 
 namespace alidade::ceres_batch {
@@ -49,6 +50,8 @@ class CondensedRun {
 
   /// Gaps longer than `max_dt_s` are stepped in equal parts.
   CondensedRun(System system, const std::vector<StreamInfo>& streams, double max_dt_s);
+  CondensedRun(const CondensedRun&) = delete;
+  CondensedRun& operator=(const CondensedRun&) = delete;
 
   /// Sets the time of the prior; else the first frame, or initial_time_s, does.
   void Start(Timestamp timestamp) { timestamp_ = timestamp; }
@@ -81,7 +84,7 @@ class CondensedRun {
   double change() const { return change_; }
   /// r (M) and, unless null, its row-major Jacobian (M x N). False where a model is not defined.
   bool Evaluate(const double* e, double* r, double* j) const;
-  bool has_landmarks() const { return system_.landmarks.has_value(); }
+  bool has_landmarks() const { return binding_.system.landmarks.has_value(); }
   /// The problem in e alone, the landmarks where they cost least given e (variable projection
   /// [Golub2003]):  phi(e) = min_l |e|^2 / 2 + |l|^2 / 2 + sum_i rho_i(|r_i(e, l)|).
   struct Reduced {
@@ -107,8 +110,8 @@ class CondensedRun {
   /// defined, which ends it.
   bool ForEachFrame(const Eigen::VectorXd& e, std::size_t count,
                     const std::function<void(std::size_t, const Point&)>& take) const;
-  /// `state`, that of frame k - 1, becomes the one of frame k: the values of `point`, with the
-  /// covariance y' y for y = U^-T S'.
+  /// `state`, that of frame k - 1 from System::InitialState(reserved) on, becomes the one of frame
+  /// k: the values of `point`, with the covariance y' y for y = U^-T S'.
   void Put(std::size_t k, const Point& point, const Eigen::MatrixXd& y, State& state) const;
   /// What became of the measurements of frame k, seen from `point`.
   void Report(std::size_t k, const Point& point, UpdateReport& report) const;
@@ -128,9 +131,11 @@ class CondensedRun {
     RowMajor l;             ///< frozen
   };
   struct Factor {
-    int sensor;
+    int sensor = -1;
+    const SensorModel* model = nullptr;            ///< the sensor's, or that of known landmarks
+    const internal::SensorPlace* place = nullptr;  ///< y of a landmark behind x, its rows behind S
     Measurement measurement;
-    Outcome outcome;
+    Outcome outcome = Outcome::kAccepted;
     int row = -1;       ///< of r; -1: not in use, or of a landmark
     int landmark = -1;  ///< index into landmarks_ of the one that it sees
     Eigen::MatrixXd l;  ///< frozen
@@ -145,11 +150,9 @@ class CondensedRun {
     std::vector<Step> steps;  ///< that lead to it
     std::vector<Factor> factors;
     std::vector<FirstValue> first_values;  ///< after the steps
-    bool stale = false;
-    bool ends = false;        ///< no noise goes on being held after it
-    std::vector<int> inputs;  ///< UpdateReport::inputs
-    LandmarkCounts counts;    ///< of the filter
-    int column = 0;           ///< the first of its inputs; of the first epoch 0: the prior's too
+    UpdateReport report;                   ///< as far as it does not depend on the solution
+    bool ends = false;                     ///< no noise goes on being held after it
+    int column = 0;  ///< the first of its inputs; of the first epoch 0: the prior's too
   };
   /// What a measurement tells of the roles that its sensor initialises, t in the tangent.
   struct Inverse {
@@ -177,13 +180,14 @@ class CondensedRun {
   bool Begin(const double* e, bool sensitivity, Point& point) const;
   /// From frame k - 1 (or the prior) to frame k.
   bool Advance(std::size_t k, const double* e, Point& point) const;
-  bool AddSteps(Timestamp from, Timestamp end, Epoch& epoch);
+  bool AddSteps(Timestamp from, Timestamp to, Epoch& epoch);
   void AddFactors(const Frame& frame, const UpdateReport& report, Epoch& epoch);
   void AddLandmarks(const UpdateReport& report, const Estimator& filter, Epoch& epoch);
   void AddKnown();
   void Begin(const Factor& factor, std::size_t index, const Estimator& filter);
   void AddFirstValues(Epoch& epoch);
   void AddPart(int size, const RobustLoss& loss);
+  internal::SensorPlace PlaceBehind(std::size_t sensor, const SensorModel& model) const;
   /// Whether its landmark roles are filled by what a measurement names, not by blocks.
   bool ObservesLandmarks(const SensorBinding& sensor) const {
     return has_landmarks() && sensor.model.has_landmark();
@@ -197,18 +201,18 @@ class CondensedRun {
               const Point& point, const std::string& name, Inverse& inverse) const;
   bool FreezeEpoch(Epoch& epoch, const double* e, Point& point);
   bool FreezeStep(Step& step, const Point& point);
-  bool Holds(std::size_t motion) const;
   void EndInterval(Epoch& epoch);
   void PassOnFirst();
-  bool FreezeFactor(Factor& factor, const Point& point, const std::vector<double>& y = {});
-  bool Residual(const Factor& factor, const Point& point, const std::vector<double>& y,
-                Eigen::VectorXd& r, Eigen::MatrixXd* a) const;
+  // Of a factor of a landmark x has the landmark's values behind.
+  bool FreezeFactor(Factor& factor, const std::vector<double>& x);
+  bool Residual(const Factor& factor, const std::vector<double>& x, Eigen::VectorXd& r,
+                Eigen::MatrixXd* a) const;
+  Outcome See(const Factor& factor, const std::vector<double>& x, std::vector<double>& h,
+              std::vector<double>* jacobian) const;
+  std::vector<const double*> RolesOf(const Factor& factor, const std::vector<double>& x) const;
   void NoteChange(const Eigen::MatrixXd& before, const Eigen::MatrixXd& after);
-  const SensorModel& ModelOf(const Factor& factor) const;
-  std::vector<const double*> RolesOf(const Factor& factor, const Point& point,
-                                     const std::vector<double>& y = {}) const;
   const SensorBinding& SensorOf(const Factor& factor) const {
-    return system_.sensors[static_cast<std::size_t>(factor.sensor)];
+    return binding_.system.sensors[static_cast<std::size_t>(factor.sensor)];
   }
   bool PointsOf(const double* e, bool sensitivity, std::vector<Point>& points) const;
   bool Place(const MapLandmark& landmark, const Eigen::VectorXd& l,
@@ -236,22 +240,21 @@ class CondensedRun {
                  Eigen::VectorXd& step);
   bool FailTooMany() const;
 
-  System system_;
-  std::vector<int> stream_of_sensor_;
-  double max_dt_s_;
-  State initial_;                 ///< all blocks have a place in it
+  internal::Binding binding_;
+  std::vector<internal::SensorPlace> places_, xyz_places_;  ///< by sensor, as in Factor
+  State initial_;                 ///< all blocks that have a place have a value
   std::vector<bool> present_;     ///< at the last frame, by block
   std::vector<int> held_;         ///< by motion: column of the inputs that go on being held, or -1
   std::vector<RowMajor> held_l_;  ///< by motion: L of the last step that begins
-  Eigen::MatrixXd l0_;
-  Eigen::VectorXd d0_;  ///< x_0 = m (+) (d_0 + L_0 e_0); 0 but after MarginaliseFirst
+  Eigen::MatrixXd l0_;            ///< n x the rows of blocks with a prior, later n x n
+  Eigen::VectorXd d0_;            ///< x_0 = m (+) (d_0 + L_0 e_0); 0 but after MarginaliseFirst
   std::vector<Epoch> epochs_;
   std::vector<MapLandmark> landmarks_;
   std::map<std::int64_t, int> current_;  ///< by id: the last of landmarks_
   std::vector<int> read_;                ///< tangent rows of a state that sensors read
   std::vector<Part> parts_;
   Timestamp timestamp_ = kNoTimestamp;
-  ControlInputs controls_;
+  internal::Timeline time_;
   int inputs_ = 0, residuals_ = 0;
   bool has_unit_vector_ = false;
   double change_ = 0.0;

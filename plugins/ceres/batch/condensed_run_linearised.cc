@@ -58,8 +58,8 @@ bool CondensedRun::StepAbout(std::vector<std::vector<double>>& trajectory, const
     if (has_unit_vector_ || has_landmarks()) points.push_back(point);
     for (Factor& factor : epochs_[k].factors) {
       // What is not defined here tells nothing yet; it may be at the solution.
-      if (factor.row < 0 || !FreezeFactor(factor, point)) continue;
-      if (has_landmarks() || !Residual(factor, point, {}, residual, &a)) continue;
+      if (factor.row < 0 || !FreezeFactor(factor, point.x)) continue;
+      if (has_landmarks() || !Residual(factor, point.x, residual, &a)) continue;
       const double root = std::sqrt(Weight(SensorOf(factor).loss, residual.norm()));
       r.segment(inputs_ + factor.row, residual.size()) = root * (residual + a * point.offset);
       j.middleRows(inputs_ + factor.row, residual.size()) = root * a * point.s;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "alidade/base/number_text.h"
+#include "alidade/filter/evaluate_models.h"
 #include "alidade/model/geometry.h"
 #include "condensed_run.h"
 #include "plugins/ceres/difference.h"
@@ -11,18 +12,6 @@
 /// The models of a CondensedRun: their values, derivatives and noise at a point of it.
 namespace alidade::ceres_batch {
 namespace {
-
-/// The rows of the covariance that belong to the blocks, in their order; -1: a constant block's.
-std::vector<int> RowsOf(const StateLayout& layout, const std::vector<BlockId>& blocks) {
-  std::vector<int> rows;
-  for (const BlockId id : blocks) {
-    const Block& block = layout[id];
-    for (int i = 0; i < block.geometry().tangent; ++i) {
-      rows.push_back(block.has_covariance() ? block.tangent_offset + i : -1);
-    }
-  }
-  return rows;
-}
 
 /// d = z (-) h and, unless null, j = dd/dh (row-major), in the tangent at h.
 void Difference(const Geometry& geometry, const double* z, const double* h, double* d, double* j) {
@@ -37,9 +26,14 @@ void Difference(const Geometry& geometry, const double* z, const double* h, doub
   }
 }
 
-/// What a status says that is not kOk.
-std::string Why(Status status, const std::string& error) {
-  return status == Status::kError ? error : "out of its domain";
+/// Why a sensor model gives nothing.
+std::string Why(Outcome outcome, const SensorModel& model) {
+  return outcome == Outcome::kFailed ? model.error_text() : "out of its domain";
+}
+
+/// `sensor 'NAME' at TIME`
+std::string TextOf(const SensorBinding& sensor, const Measurement& measurement) {
+  return "sensor '" + sensor.name + "' at " + internal::SecondsText(measurement.timestamp);
 }
 
 }  // namespace
@@ -47,100 +41,64 @@ std::string Why(Status status, const std::string& error) {
 /// x = f(x, u, L e, dt); S = F S + [0  G L  0], which adds to what held inputs did before, and
 /// offset = F offset, in the rows of the model.
 bool CondensedRun::Move(const Step& step, const double* e, Point& point) const {
-  const MotionBinding& motion = system_.motions[step.motion];
-  const StateLayout& layout = initial_.layout();
+  const MotionBinding& motion = binding_.system.motions[step.motion];
+  const internal::MotionPlace& place = binding_.motions[step.motion];
   const int n = motion.model.tangent_size(), n_w = motion.model.noise_size();
   const Eigen::VectorXd w = step.l * Eigen::Map<const Eigen::VectorXd>(e + step.column, n_w);
   const bool sensitivity = point.s.size() > 0;
-  RowMajor f = RowMajor::Constant(n, n, std::nan("")), g = RowMajor::Constant(n, n_w, std::nan(""));
-  std::vector<double> next = point.x;
-  std::vector<const double*> from;
-  std::vector<double*> to;
-  for (const BlockId id : motion.blocks) {
-    from.push_back(point.x.data() + layout[id].value_offset);
-    to.push_back(next.data() + layout[id].value_offset);
-  }
-  const Status status =
-      motion.model.Step(from.data(), step.u.data(), w.data(), step.dt_s, to.data(),
-                        sensitivity ? f.data() : nullptr, sensitivity ? g.data() : nullptr);
-  if (status != Status::kOk) {
-    return Fail("motion model of '" + motion.name +
-                "' cannot step: " + Why(status, motion.model.error_text()));
-  }
-  for (const BlockId id : motion.blocks) {
-    const Block& block = layout[id];
-    if (block.status != BlockStatus::kConstant) continue;
-    std::copy_n(point.x.data() + block.value_offset, block.geometry().ambient,
-                next.data() + block.value_offset);
-  }
-  const bool finite = AllFinite(next) && (!sensitivity || (f.allFinite() && g.allFinite()));
-  if (!finite) return Fail("motion model of '" + motion.name + "' steps to what is not finite");
-  point.x = std::move(next);
+  RowMajor f(n, n), g(n, n_w);
+  std::vector<double> next(point.x.size());
+  const Outcome outcome = internal::StepAt(motion, place, point.x.data(), step.u.data(), w.data(),
+                                           step.dt_s, next.data(), sensitivity ? f.data() : nullptr,
+                                           sensitivity ? g.data() : nullptr);
+  if (outcome != Outcome::kAccepted) return Fail(internal::TroubleOf(motion, outcome).text);
+  internal::TakeStep(motion, initial_.layout(), next.data(), point.x.data());
   if (!sensitivity) return true;
 
-  // F and G L in the rows of the whole state.
-  const std::vector<int> rows = RowsOf(layout, motion.blocks);
-  const RowMajor gl = g * step.l;
-  Eigen::MatrixXd a = Eigen::MatrixXd::Identity(point.s.rows(), point.s.rows());
+  std::vector<int> own, rows;  // of F and of S: those of blocks that are not constant
   for (int i = 0; i < n; ++i) {
-    const int row = rows[static_cast<std::size_t>(i)];
+    const int row = place.at[static_cast<std::size_t>(i)];
     if (row < 0) continue;
-    for (int k = 0; k < n; ++k) {
-      const int column = rows[static_cast<std::size_t>(k)];
-      if (column >= 0) a(row, column) = f(i, k);
-    }
+    own.push_back(i);
+    rows.push_back(row);
   }
-  point.s.leftCols(step.columns) = a * point.s.leftCols(step.columns);
-  for (int i = 0; i < n; ++i) {
-    const int row = rows[static_cast<std::size_t>(i)];
-    if (row >= 0) point.s.row(row).segment(step.column, n_w) += gl.row(i);
-  }
-  point.offset = a * point.offset;
+  const Eigen::MatrixXd f_own = f(own, own), gl = g(own, Eigen::all) * step.l;
+  const auto before = Eigen::seqN(0, step.columns), inputs = Eigen::seqN(step.column, n_w);
+  point.s(rows, before) = (f_own * point.s(rows, before)).eval();
+  point.s(rows, inputs) += gl;
+  point.offset(rows) = (f_own * point.offset(rows)).eval();
   return true;
 }
 
-/// y = g(x, z (+) d, prior) and its Jacobians; roles without a covariance have none.
+/// y = g(x, z (+) d, prior) and its Jacobians.
 bool CondensedRun::Invert(const Factor& factor, const Eigen::VectorXd& d, const double* prior,
                           const Point& point, const std::string& name, Inverse& inverse) const {
   const SensorBinding& sensor = SensorOf(factor);
-  const SensorModel& model = sensor.model;
-  const Geometry& measured = model.measurement().geometry;
-  const auto first = static_cast<std::size_t>(model.initialised_role());
-  const auto end = first + static_cast<std::size_t>(model.initialised_count());
-  int t = 0, ambient = 0;
-  for (std::size_t i = first; i < end; ++i) {
-    t += model.roles()[i].geometry.tangent;
-    ambient += model.roles()[i].geometry.ambient;
-  }
-  std::vector<const double*> roles = RolesOf(factor, point);
-  std::vector<RowMajor> jacobians(roles.size());
-  std::vector<double*> jx(roles.size(), nullptr);
-  for (std::size_t i = 0; i < roles.size(); ++i) {
-    if (i >= first && i < end) roles[i] = nullptr;
-    if (roles[i] == nullptr || !initial_.layout()[sensor.roles[i].block].has_covariance()) continue;
-    jacobians[i] = RowMajor::Zero(t, model.roles()[i].geometry.tangent);
-    jx[i] = jacobians[i].data();
-  }
+  const Geometry& measured = sensor.model.measurement().geometry;
+  const internal::SensorPlace& place = binding_.sensors[static_cast<std::size_t>(factor.sensor)];
   std::vector<double> z = factor.measurement.values;
-  measured.Plus(z.data(), d.data(), z.data());
-  inverse.y.resize(static_cast<std::size_t>(ambient));
-  RowMajor jz = RowMajor::Zero(t, measured.tangent), jp = RowMajor::Zero(t, model.prior_size());
-  const Status status = model.Initialise(roles.data(), z.data(), prior, inverse.y.data(), jx.data(),
-                                         jz.data(), model.prior_size() > 0 ? jp.data() : nullptr);
-  if (status != Status::kOk || !AllFinite(inverse.y) || !jz.allFinite() || !jp.allFinite()) {
-    return Fail("sensor '" + sensor.name + "' gives " + name +
-                " no first value: " + Why(status, model.error_text()));
-  }
-  inverse.by_x = Eigen::MatrixXd::Zero(t, initial_.covariance().size());
-  for (std::size_t i = 0; i < roles.size(); ++i) {
-    if (jx[i] == nullptr) continue;
-    const int from = initial_.layout()[sensor.roles[i].block].tangent_offset;
-    inverse.by_x.middleCols(from, jacobians[i].cols()) += jacobians[i];
-  }
   RowMajor j_plus(measured.tangent, measured.tangent);
-  measured.PlusJacobian(factor.measurement.values.data(), d.data(), j_plus.data());
-  inverse.by_d = jz * j_plus;
-  inverse.by_prior = jp;
+  measured.PlusJacobian(z.data(), d.data(), j_plus.data());
+  measured.Plus(z.data(), d.data(), z.data());
+  std::vector<const double*> roles;
+  internal::RolesAt(sensor, place, point.x, point.x, roles);
+  internal::Inverse at;
+  const Outcome outcome = internal::InvertAt(sensor, place, z.data(), prior, roles, at);
+  if (outcome != Outcome::kAccepted) {
+    return Fail("sensor '" + sensor.name + "' gives " + name +
+                " no first value: " + Why(outcome, sensor.model));
+  }
+  inverse.y = std::move(at.y);
+  inverse.by_d = at.by_z * j_plus;
+  inverse.by_prior = at.by_prior;
+  inverse.by_x = Eigen::MatrixXd::Zero(inverse.by_d.rows(), initial_.covariance().size());
+  Eigen::Index column = 0;
+  for (const BlockId id : at.from) {
+    const Block& block = initial_.layout()[id];
+    const int width = block.geometry().tangent;
+    inverse.by_x.middleCols(block.tangent_offset, width) += at.by_x.middleCols(column, width);
+    column += width;
+  }
   return true;
 }
 
@@ -164,82 +122,51 @@ bool CondensedRun::Initialise(const FirstValue& first, const Factor& factor, con
   return true;
 }
 
-/// Known landmarks are points, whatever the form of the others.
-const SensorModel& CondensedRun::ModelOf(const Factor& factor) const {
-  const SensorBinding& sensor = SensorOf(factor);
-  const bool known =
-      factor.landmark >= 0 && !landmarks_[static_cast<std::size_t>(factor.landmark)].first;
-  return known && sensor.xyz ? *sensor.xyz : sensor.model;
-}
-
-/// Those of a landmark have the values `y`, one after the other; null where that is empty.
-std::vector<const double*> CondensedRun::RolesOf(const Factor& factor, const Point& point,
-                                                 const std::vector<double>& y) const {
-  const SensorBinding& sensor = SensorOf(factor);
+std::vector<const double*> CondensedRun::RolesOf(const Factor& factor,
+                                                 const std::vector<double>& x) const {
   std::vector<const double*> roles;
-  const double* next = y.empty() ? nullptr : y.data();
-  for (const Space& role : ModelOf(factor).roles()) {
-    if (role.landmark() && has_landmarks()) {
-      roles.push_back(next);
-      if (next != nullptr) next += role.geometry.ambient;
-      continue;
-    }
-    const BlockId block = sensor.roles[roles.size()].block;
-    roles.push_back(block < 0 ? nullptr : point.x.data() + initial_.layout()[block].value_offset);
-  }
+  internal::RolesAt(SensorOf(factor), *factor.place, x, x, roles);
   return roles;
 }
 
-/// r = L^-1 (z (-) h), m, and unless null a = dr/d(x, y), m x (n + t_y); y is the landmark's.
-bool CondensedRun::Residual(const Factor& factor, const Point& point, const std::vector<double>& y,
-                            Eigen::VectorXd& r, Eigen::MatrixXd* a) const {
+/// h and, unless null, H in the columns of its place.
+Outcome CondensedRun::See(const Factor& factor, const std::vector<double>& x,
+                          std::vector<double>& h, std::vector<double>* jacobian) const {
+  std::vector<double*> memory;
+  return internal::EvaluateAt(*factor.model, *factor.place, RolesOf(factor, x).data(), memory, h,
+                              jacobian);
+}
+
+/// r = L^-1 (z (-) h), m, and unless null a = dr/dx, m x n, that of its landmark behind.
+bool CondensedRun::Residual(const Factor& factor, const std::vector<double>& x, Eigen::VectorXd& r,
+                            Eigen::MatrixXd* a) const {
   const SensorBinding& sensor = SensorOf(factor);
-  const SensorModel& model = ModelOf(factor);
-  const Geometry& geometry = model.measurement().geometry;
+  const Geometry& geometry = factor.model->measurement().geometry;
   if (factor.l.size() == 0) {
-    return Fail("sensor '" + sensor.name + "' at " +
-                internal::SecondsText(factor.measurement.timestamp) + ": not defined at the start");
+    return Fail(TextOf(sensor, factor.measurement) + ": not defined at the start");
   }
-  const std::vector<const double*> roles = RolesOf(factor, point, y);
-  std::vector<RowMajor> jacobians(roles.size());
-  std::vector<double*> into(roles.size(), nullptr);
-  std::vector<int> strides(roles.size(), 0), columns(roles.size(), -1);
-  int width = initial_.covariance().size();
-  for (std::size_t i = 0; i < roles.size() && a != nullptr; ++i) {
-    const Space& role = model.roles()[i];
-    if (role.landmark() && has_landmarks()) {
-      columns[i] = width;
-      width += role.geometry.tangent;
-    } else if (const BlockId id = sensor.roles[i].block;
-               id >= 0 && initial_.layout()[id].has_covariance()) {
-      columns[i] = initial_.layout()[id].tangent_offset;
-    }
-    if (columns[i] < 0) continue;
-    strides[i] = role.geometry.tangent;
-    jacobians[i] = RowMajor::Constant(geometry.tangent, strides[i], std::nan(""));
-    into[i] = jacobians[i].data();
+  std::vector<double> h, jacobian;
+  const Outcome outcome = See(factor, x, h, a == nullptr ? nullptr : &jacobian);
+  if (outcome != Outcome::kAccepted) {
+    return Fail(TextOf(sensor, factor.measurement) + ": " + Why(outcome, *factor.model));
   }
-  std::vector<double> h(static_cast<std::size_t>(geometry.ambient), std::nan(""));
-  const Status status = a == nullptr
-                            ? model.Predict(roles.data(), h.data())
-                            : model.Linearise(roles.data(), h.data(), into.data(), strides.data());
-  if (status != Status::kOk) {
-    return Fail("sensor '" + sensor.name + "' at " +
-                internal::SecondsText(factor.measurement.timestamp) + ": " +
-                Why(status, model.error_text()));
-  }
-  const double* z = factor.measurement.values.data();
-  r.resize(geometry.tangent);
-  RowMajor j_r_h;
-  if (a != nullptr) j_r_h.resize(geometry.tangent, geometry.tangent);
-  Difference(geometry, z, h.data(), r.data(), a == nullptr ? nullptr : j_r_h.data());
+  const int m = geometry.tangent;
+  r.resize(m);
+  RowMajor j_r_h(m, m);
+  Difference(geometry, factor.measurement.values.data(), h.data(), r.data(),
+             a == nullptr ? nullptr : j_r_h.data());
   const auto whiten = factor.l.triangularView<Eigen::Lower>();
   whiten.solveInPlace(r);
   bool finite = r.allFinite();
   if (a != nullptr) {
-    a->setZero(geometry.tangent, width);
-    for (std::size_t i = 0; i < roles.size(); ++i) {
-      if (into[i] != nullptr) a->middleCols(columns[i], strides[i]) += j_r_h * jacobians[i];
+    const internal::SensorPlace& place = *factor.place;
+    const Eigen::Map<const RowMajor> j_h(jacobian.data(), m, place.width);
+    const int width = ObservesLandmarks(sensor)
+                          ? place.parts.back().offset + place.parts.back().size
+                          : initial_.covariance().size();
+    a->setZero(m, width);
+    for (const JacobianPart& part : place.parts) {
+      a->middleCols(part.offset, part.size) += j_r_h * j_h.middleCols(part.column, part.size);
     }
     if (width > 0) whiten.solveInPlace(*a);  // Eigen solves for one column at least
     finite = finite && a->allFinite();
@@ -252,47 +179,27 @@ bool CondensedRun::FreezeStep(Step& step, const Point& point) {
     step.l = held_l_[step.motion];
     return true;
   }
-  const MotionBinding& motion = system_.motions[step.motion];
-  const int n_w = motion.model.noise_size();
-  std::vector<const double*> blocks;
-  for (const BlockId id : motion.blocks) {
-    blocks.push_back(point.x.data() + initial_.layout()[id].value_offset);
-  }
-  RowMajor l = RowMajor::Zero(n_w, n_w);
-  const Status status = motion.model.SqrtQ(blocks.data(), step.dt_s, l.data());
-  if (status != Status::kOk || !l.allFinite()) {
-    return Fail("the noise of motion model '" + motion.name +
-                "': " + Why(status, motion.model.error_text()));
-  }
+  const MotionBinding& motion = binding_.system.motions[step.motion];
+  const internal::MotionPlace& place = binding_.motions[step.motion];
+  RowMajor l(motion.model.noise_size(), motion.model.noise_size());
+  const Outcome outcome = internal::SqrtQAt(motion, place, point.x.data(), step.dt_s, l.data());
+  if (outcome != Outcome::kAccepted) return Fail(internal::TroubleOf(motion, outcome).text);
   NoteChange(step.l, l);
   step.l = std::move(l);
-  if (Holds(step.motion)) held_l_[step.motion] = step.l;
+  if (place.holds) held_l_[step.motion] = step.l;
   return true;
 }
 
-bool CondensedRun::FreezeFactor(Factor& factor, const Point& point, const std::vector<double>& y) {
-  const SensorBinding& sensor = SensorOf(factor);
-  const SensorModel& model = ModelOf(factor);
-  const int m = model.measurement().geometry.tangent;
-  Eigen::MatrixXd r;
-  if (factor.measurement.covariance.empty()) {
-    RowMajor root = RowMajor::Constant(m, m, std::nan(""));
-    const Status status = model.SqrtNoise(RolesOf(factor, point, y).data(),
-                                          factor.measurement.values.data(), root.data());
-    if (status != Status::kOk) {
-      return Fail("the noise of sensor '" + sensor.name + "' at " +
-                  internal::SecondsText(factor.measurement.timestamp) + ": " +
-                  Why(status, model.error_text()));
-    }
-    r = root * root.transpose();
-  } else {
-    r = Eigen::Map<const RowMajor>(factor.measurement.covariance.data(), m, m);
-  }
-  const Eigen::LLT<Eigen::MatrixXd> llt(r);  // which takes what is not a number for a success
-  if (!r.allFinite() || llt.info() != Eigen::Success) {
-    return Fail("the noise of sensor '" + sensor.name + "' at " +
-                internal::SecondsText(factor.measurement.timestamp) +
-                " is not positive definite: a batch needs sigma > 0");
+bool CondensedRun::FreezeFactor(Factor& factor, const std::vector<double>& x) {
+  std::vector<double> root, r;
+  const Outcome outcome =
+      internal::NoiseAt(*factor.model, factor.measurement, RolesOf(factor, x).data(), root, r);
+  const std::string noise = "the noise of " + TextOf(SensorOf(factor), factor.measurement);
+  if (outcome != Outcome::kAccepted) return Fail(noise + ": " + Why(outcome, *factor.model));
+  const int m = factor.model->measurement().geometry.tangent;
+  const Eigen::LLT<Eigen::MatrixXd> llt(Eigen::Map<const RowMajor>(r.data(), m, m));
+  if (!AllFinite(r) || llt.info() != Eigen::Success) {  // which takes NaN for a success
+    return Fail(noise + " is not positive definite: a batch needs sigma > 0");
   }
   const Eigen::MatrixXd l = llt.matrixL();
   NoteChange(factor.l, l);

@@ -29,7 +29,7 @@ bool CondensedRun::MarginaliseFirst(Eigen::VectorXd& e) {
   int gone = 0;  // residuals
   for (const Factor& factor : epochs_.front().factors) {
     if (factor.row < 0) continue;
-    if (!Residual(factor, point, {}, residual, &a)) return false;
+    if (!Residual(factor, point.x, residual, &a)) return false;
     const double root = std::sqrt(Weight(SensorOf(factor).loss, residual.norm()));
     const Eigen::Index rows = residual.size(), before = j.rows();
     gone += static_cast<int>(rows);

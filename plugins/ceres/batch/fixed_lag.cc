@@ -47,7 +47,7 @@ class FixedLag : public Estimator {
         window_(LagOf(options.lag_s)),
         run_(system, streams, options.solve.max_dt_s),
         solve_(options.solve),
-        state_(system.InitialState()),
+        state_(system.InitialState(/*reserved=*/true)),
         initialiser_(system, options.solve.max_dt_s, streams) {}
 
   void Start(Timestamp timestamp) override {

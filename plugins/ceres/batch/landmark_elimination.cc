@@ -34,17 +34,15 @@ double PriorOf(std::int64_t id, const SensorBinding& sensor, const LandmarkOptio
 /// What no filter has to say: landmarks known beforehand, and which rows of a state sensors read.
 void CondensedRun::AddKnown() {
   std::vector<bool> reads(static_cast<std::size_t>(initial_.covariance().size()), false);
-  for (const SensorBinding& sensor : system_.sensors) {
-    for (const RoleBinding& role : sensor.roles) {
-      if (role.block < 0 || !initial_.layout()[role.block].has_covariance()) continue;
-      const Block& block = initial_.layout()[role.block];
-      std::fill_n(reads.begin() + block.tangent_offset, block.geometry().tangent, true);
+  for (const internal::SensorPlace& place : binding_.sensors) {
+    for (const JacobianPart& part : place.parts) {
+      std::fill_n(reads.begin() + part.offset, part.size, true);
     }
   }
   for (std::size_t i = 0; i < reads.size(); ++i) {
     if (reads[i]) read_.push_back(static_cast<int>(i));
   }
-  for (const KnownLandmark& known : system_.landmarks->known) {
+  for (const KnownLandmark& known : binding_.system.landmarks->known) {
     current_[known.id] = static_cast<int>(landmarks_.size());
     MapLandmark& landmark = landmarks_.emplace_back();
     landmark.id = known.id;
@@ -57,8 +55,8 @@ void CondensedRun::AddKnown() {
 /// The observations of a frame. A landmark begins with the one that the filter began it with; what
 /// the filter had no landmark for, or could not predict, is left out.
 void CondensedRun::AddLandmarks(const UpdateReport& report, const Estimator& filter, Epoch& epoch) {
-  epoch.counts.initialised = report.landmarks.initialised;
-  epoch.counts.deleted = report.landmarks.deleted;
+  epoch.report.landmarks.initialised = report.landmarks.initialised;
+  epoch.report.landmarks.deleted = report.landmarks.deleted;
   std::vector<std::size_t> begin;
   for (std::size_t i = 0; i < epoch.factors.size(); ++i) {
     Factor& factor = epoch.factors[i];
@@ -75,8 +73,12 @@ void CondensedRun::AddLandmarks(const UpdateReport& report, const Estimator& fil
       continue;
     }
     factor.landmark = current->second;
-    landmarks_[static_cast<std::size_t>(current->second)].observations.push_back(
-        {epochs_.size(), i});
+    MapLandmark& landmark = landmarks_[static_cast<std::size_t>(current->second)];
+    landmark.observations.push_back({epochs_.size(), i});
+    const SensorBinding& sensor = SensorOf(factor);
+    if (landmark.first || !sensor.xyz) continue;  // known landmarks are points
+    factor.model = &*sensor.xyz;
+    factor.place = &xyz_places_[static_cast<std::size_t>(factor.sensor)];
   }
   for (const std::size_t i : begin) {
     Begin(epoch.factors[i], i, filter);
@@ -95,8 +97,8 @@ void CondensedRun::Begin(const Factor& factor, std::size_t index, const Estimato
     landmark.generation = landmarks_[static_cast<std::size_t>(before->second)].generation + 1;
   }
   if (sensor.model.prior_size() > 0) {
-    landmark.prior = PriorOf(id, sensor, *system_.landmarks->prior, filter);
-    landmark.sigma = system_.landmarks->prior->sigma;
+    landmark.prior = PriorOf(id, sensor, *binding_.system.landmarks->prior, filter);
+    landmark.sigma = binding_.system.landmarks->prior->sigma;
   }
   landmark.from = Eigen::VectorXd::Zero(sensor.model.measurement().geometry.tangent +
                                         sensor.model.prior_size());
@@ -143,17 +145,17 @@ bool CondensedRun::FreezeLandmarks(const std::vector<Point>& points) {
     if (!Place(landmark, landmark.l, points, place)) return false;
     if (landmark.first) {
       const auto [epoch, index] = *landmark.first;
-      if (!FreezeFactor(epochs_[epoch].factors[index], points[epoch], place.y) ||
+      if (!FreezeFactor(epochs_[epoch].factors[index], WithLandmark(points[epoch].x, place.y)) ||
           !Place(landmark, landmark.l, points, place)) {
         return false;
       }
     }
     for (const auto& [epoch, index] : landmark.observations) {
       Factor& factor = epochs_[epoch].factors[index];
-      std::vector<double> h(factor.measurement.values.size());
-      const std::vector<const double*> roles = RolesOf(factor, points[epoch], place.y);
-      const bool defined = ModelOf(factor).Predict(roles.data(), h.data()) == Status::kOk;
-      if (defined && !FreezeFactor(factor, points[epoch], place.y)) return false;
+      std::vector<double> h;
+      const std::vector<double> x = WithLandmark(points[epoch].x, place.y);
+      const bool defined = See(factor, x, h, nullptr) == Outcome::kAccepted;
+      if (defined && !FreezeFactor(factor, x)) return false;
     }
   }
   return true;
@@ -173,7 +175,7 @@ bool CondensedRun::AddObservation(const Factor& factor, std::size_t epoch,
   const auto d = std::ssize(read_);
   Eigen::VectorXd r;
   Eigen::MatrixXd a;
-  if (!Residual(factor, point, place.y, r, &a)) return false;
+  if (!Residual(factor, WithLandmark(point.x, place.y), r, &a)) return false;
   const RobustLoss& loss = SensorOf(factor).loss;
   normal.cost += Rho(loss, r.norm());
   const double root = std::sqrt(Weight(loss, r.norm()));

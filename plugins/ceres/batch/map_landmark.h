@@ -32,4 +32,10 @@ struct MapLandmark {
   std::vector<double> y;                  ///< its value there, ambient, one role after the other
 };
 
+/// The values x of a state and, behind, y of a landmark.
+inline std::vector<double> WithLandmark(std::vector<double> x, const std::vector<double>& y) {
+  x.insert(x.end(), y.begin(), y.end());
+  return x;
+}
+
 }  // namespace alidade::ceres_batch

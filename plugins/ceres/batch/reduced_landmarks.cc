@@ -37,7 +37,7 @@ bool CondensedRun::AddPlain(const std::vector<Point>& points, Undefined undefine
   for (std::size_t k = 0; k < points.size(); ++k) {
     for (const Factor& factor : epochs_[k].factors) {
       if (factor.row < 0) continue;
-      if (!Residual(factor, points[k], {}, r, information != nullptr ? &a : nullptr)) {
+      if (!Residual(factor, points[k].x, r, information != nullptr ? &a : nullptr)) {
         if (undefined == Undefined::kFails) return false;
         continue;
       }
@@ -180,7 +180,7 @@ void CondensedRun::Describe(const MapLandmark& landmark, const Eigen::MatrixXd& 
                                                       : std::optional(landmark.observations[0]));
   if (!any) return;
   const Factor& factor = epochs_[any->epoch].factors[any->factor];
-  const std::vector<Space>& roles = ModelOf(factor).roles();
+  const std::vector<Space>& roles = factor.model->roles();
   estimate.representation = RepresentationOf(roles);
   estimate.tried = estimate.accepted = static_cast<int>(landmark.observations.size());
   if (!estimate.representation) return;

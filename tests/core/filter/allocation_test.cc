@@ -150,7 +150,7 @@ void AddWalking(System& system, int count, bool considered) {
 }
 
 /// Landmark `id` from a camera that walks along x, in pixels.
-std::vector<double> Seen(std::int64_t id, double x) {
+std::vector<double> PixelOf(std::int64_t id, double x) {
   const double angle = static_cast<double>(id), depth = 4.0 + static_cast<double>(id % 5);
   return {(3.0 * std::sin(angle) - x) / depth, 2.0 * std::cos(1.7 * angle) / depth};
 }
@@ -165,7 +165,7 @@ void ExpectNoAllocationOf(Filter& filter, int measured) {
     std::vector<testing::Observation> observations;
     for (int i = 0; i < measured; ++i) {
       const std::int64_t id = (k * change + i) % known;
-      observations.push_back({id, Seen(id, 0.01 * k)});
+      observations.push_back({id, PixelOf(id, 0.01 * k)});
     }
     observations[static_cast<std::size_t>(measured / 2)].z[0] += 3.0;
     frames.push_back(testing::FrameOf(0.1 * k, observations));
@@ -199,34 +199,40 @@ LandmarkOptions Turnover() {
   return options;
 }
 
+EkfOptions Gated() {
+  EkfOptions options;
+  options.gate = 0.999;
+  return options;
+}
+
 TEST(AllocationOfLandmarks, AnUpdateOfManyTakesNone) {
   System system = testing::MapSystem(testing::InverseDepthPixels(0.01), Turnover());
   AddWalking(system, 10, /*considered=*/true);
-  Ekf filter = testing::EkfOf(system);
+  Ekf filter = testing::EkfOf(system, Gated());
   ExpectNoAllocationOf(filter, 100);
   EXPECT_GE(filter.state().covariance().size(), 13 + 6 * 100);
 }
 
 TEST(AllocationOfLandmarks, TheIteratedEkfTakesNone) {
   const System system = testing::MapSystem(testing::InverseDepthPixels(0.01), Turnover());
-  Iekf filter(system, {}, {{"tracks", 2}});
+  Iekf filter(system, {Gated()}, {{"tracks", 2}});
   ExpectNoAllocationOf(filter, 20);
 }
 
 TEST(AllocationOfLandmarks, DirectionsAndSharedAnchorsTakeNone) {
   const System system =
       testing::MapSystem(testing::AnchoredPixels<ALIDADE_ROLE_SHARED>(0.01), Turnover());
-  Ekf filter = testing::EkfOf(system);
+  Ekf filter = testing::EkfOf(system, Gated());
   ExpectNoAllocationOf(filter, 20);
 }
 
 TEST(AllocationOfLandmarks, ConsensusAndConversionTakeNone) {
   LandmarkOptions options = Turnover();
-  options.max_linearity_index = 1.0;
+  options.max_linearity_index = 10.0;
   options.prior->adapt_after = 3;
   System system = testing::MapSystem(testing::InverseDepthPixels(0.01), options);
   system.sensors[0].outlier_rejection = OnePointRansac{};
-  Ekf filter = testing::EkfOf(system);
+  Ekf filter = testing::EkfOf(system, Gated());
   ExpectNoAllocationOf(filter, 20);
 }
 

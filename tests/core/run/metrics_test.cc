@@ -148,7 +148,7 @@ TEST(Metrics, TakesTheErrorWhereTheCovarianceIs) {
   const double estimate[3] = {0.48, 0.6, 0.64}, error[2] = {0.3, 0.0};
   double truth[3];
   Geometry::UnitVector().Plus(estimate, error, truth);
-  one.state().Add(0, estimate, Eigen::Vector2d(0.09, 1e-6).asDiagonal());
+  one.state().Add(0, estimate, Eigen::Vector2d(0.09, 1e-6).asDiagonal().toDenseMatrix());
   one.Add({{truth[0], truth[1], truth[2]}});
   EXPECT_NEAR(one.Finish().at("nees.mean:a"), 0.5, 1e-9);
 }

@@ -296,7 +296,7 @@ TEST(BuildComparedExperiment, RefusesToExplainTheGapOfABatchOrASmoother) {
 
 Comparison CompareScene(const std::string& more) {
   Config config = Config::FromFile(ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml");
-  config.Set("source.max_frames", "10", "--set");
+  config.Set("source.max_frames", "6", "--set");
   if (!more.empty()) config.Set("estimators.now", more, "--set");
   ComparedExperiment compared = BuildComparedExperiment(config, Shipped(), {});
   RunComparer comparer(compared.experiment);

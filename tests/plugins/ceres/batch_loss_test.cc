@@ -243,7 +243,7 @@ TEST(CeresBatchLoss, IsOnTheWholeWhitenedResidual) {
   for (std::size_t k = 0; k < z.size(); ++k) {
     Measurement m{TimestampFromSeconds(double(k)), 0, -1, {z[k](0), z[k](1)}, {}};
     m.covariance = {r(0, 0), r(0, 1), r(1, 0), r(1, 1)};
-    frames.push_back({m.timestamp, {m}, {}});
+    frames.push_back({m.timestamp, {m}});
   }
   const Eigen::Matrix2d inverse = r.llt().solve(Eigen::Matrix2d::Identity());
   Eigen::Vector2d x = Eigen::Vector2d::Zero();

@@ -323,7 +323,7 @@ void ExpectStationary(const Geometry& geometry) {
     const double d[3] = {0.9 + 0.4 * k, -0.5 * k, 0.3};
     Measurement m{TimestampFromSeconds(k), 0, -1, std::vector<double>(G::kAmbient), {}};
     geometry.Plus(mean.data(), d, m.values.data());
-    frames.push_back({m.timestamp, {m}, {}});
+    frames.push_back({m.timestamp, {m}});
   }
   const Smoothed found = SmoothOver(*MakeBatch(system), frames);
   ASSERT_EQ(found.x.size(), 3u);

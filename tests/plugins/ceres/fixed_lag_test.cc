@@ -198,7 +198,7 @@ std::vector<Frame> DepthFrames(int count) {
 /// linearised was so at the optimum, so that the estimate is that of the batch, which keeps all.
 void ExpectLeavingChangesNothing(const System& system, std::vector<Frame> frames) {
   const double lag_s = Seconds(frames.back().timestamp - frames.front().timestamp);
-  frames.push_back({frames.back().timestamp + TimestampFromSeconds(lag_s + 0.1), {}, {}});
+  frames.push_back({frames.back().timestamp + TimestampFromSeconds(lag_s + 0.1), {}});
   const auto lag = MakeFixedLag(system, "lag_s: " + std::to_string(lag_s + 0.01) + "\n");
   const auto batch = MakeBatch(system, "mode: filtering\n");
   for (const Frame& frame : frames) {
@@ -241,7 +241,7 @@ std::vector<Frame> FramesOnManifold(const Geometry& geometry, int count) {
     const double d[3] = {0.9 + 0.4 * std::sin(2.0 * k), -0.5 * std::cos(3.0 * k), 0.3};
     Measurement m{TimestampFromSeconds(0.1 * k), 0, -1, mean, {}};
     geometry.Plus(mean.data(), d, m.values.data());
-    frames.push_back({m.timestamp, {m}, {}});
+    frames.push_back({m.timestamp, {m}});
   }
   return frames;
 }

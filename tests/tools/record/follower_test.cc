@@ -54,7 +54,7 @@ TEST(Follower, LeavesOutWhatHasNoValueYetAndSigmasOfConstants) {
   Follower follower([&](std::string_view line) { lines.emplace_back(line); });
   follower.Begin(experiment);
   const double one = 1.0;
-  state.Add(aside, &one, {});
+  state.Add(aside, &one, Eigen::MatrixXd());
   follower.OnEstimate(0, {FrameAt(0.5, {})}, state, {});
   ASSERT_EQ(lines.size(), 1u);
   EXPECT_EQ(lines[0], "{\"t_s\":0.5,\"estimator\":\"ekf\",\"aside.x\":1.0}\n");

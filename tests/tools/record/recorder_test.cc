@@ -120,9 +120,10 @@ struct HandMade {
     state = State(layout);
     const double fixed = 0.25, attitude[4] = {1.0, 0.0, 0.0, 0.0};
     state.Add(1, &fixed, Eigen::MatrixXd());
-    state.Add(2, attitude, Eigen::Vector3d(1.0, 4.0, 9.0).asDiagonal());
+    state.Add(2, attitude, Eigen::Vector3d(1.0, 4.0, 9.0).asDiagonal().toDenseMatrix());
     experiment.estimators.push_back(std::move(named));
-    frame = testing::FrameAt(5e-9, {{0, 90.0}});  // 0.289 m, nearer than stereo sees
+    static_cast<Frame&>(frame) =
+        testing::FrameAt(5e-9, {{0, 90.0}});  // 0.289 m, nearer than stereo sees
     MeasurementReport accepted;
     accepted.sensor = 0;
     accepted.dof = 1;

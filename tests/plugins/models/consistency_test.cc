@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Every model that is shipped or built for the tests under `source: {type: models}`, in the
+// problems of tests/plugins/models/consistent. Each is linear, or so accurate that it is as good as
+// linear, as it says: NEES and NIS of `ekf`, whose models are the truth's, are chi-square. Each
+// other estimator has another h, f or noise than the truth, and is seen.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <ostream>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "alidade/base/mahalanobis.h"
+#include "alidade/base/statistics.h"
+#include "alidade/host/plugin_host.h"
+#include "alidade/run/run.h"
+#include "support/sanitized.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kRuns = testing::kSanitized ? 10 : 200, kFirstSeed = 1;
+constexpr const char* kProblems = ALIDADE_SOURCE_DIR "/tests/plugins/models/consistent";
+constexpr const char* kShippedPlugins = ALIDADE_BINARY_DIR "/lib/alidade/plugins";
+
+/// The shipped plugins, and those of the tests that are not spoiled on purpose.
+const PluginHost& AllModels() {
+  const auto places = [] {
+    std::vector<fs::path> paths{kShippedPlugins};
+    for (const char* name :
+         {"driven", "planar", "range_rate", "echo_time", "matrix_baseline", "good"}) {
+      paths.push_back(fs::path(ALIDADE_TEST_PLUGINS) / (std::string(name) + ".so"));
+    }
+    return paths;
+  };
+  static const PluginHost host(places());
+  return host;
+}
+
+/// A sum of e' P^-1 e over independent e ~ N(0, P) of `dof` elements in all.
+struct ChiSquare {
+  double sum = 0.0, dof = 0.0;
+
+  void Add(double square, int elements) {
+    sum += square;
+    dof += elements;
+  }
+  /// Where sum / dof lies with that probability.
+  Interval Bounds(double probability) const {
+    const double tail = 0.5 * (1.0 - probability);
+    return {ChiSquareQuantile(tail, dof) / dof, ChiSquareQuantile(1.0 - tail, dof) / dof};
+  }
+  bool IsWithin(double probability) const {
+    const Interval bounds = Bounds(probability);
+    return bounds.low <= sum / dof && sum / dof <= bounds.high;
+  }
+};
+void PrintTo(const ChiSquare& x, std::ostream* out) {
+  const Interval bounds = x.Bounds(0.99);
+  *out << x.sum / x.dof << ", 99 % in [" << bounds.low << ", " << bounds.high << "]";
+}
+
+/// NEES and NIS of each estimator over many runs. Each sum is over what is independent: the errors
+/// of the last frame of each run, of all blocks jointly and of a landmark; all innovations of a
+/// sensor, which are white over frames and, as each is an update of its own, within one.
+class Tally : public RunObserver {
+ public:
+  using Sums = std::map<std::string, ChiSquare>;
+
+  const std::map<std::string, Sums>& sums() const { return sums_; }
+
+  void Begin(const Experiment& experiment) override {
+    experiment_ = &experiment;
+    frames_ = 0;
+  }
+  void OnFrame(const SourceFrame& /*frame*/) override { ++frames_; }
+  void OnEstimate(int index, const SourceFrame& frame, const State& state,
+                  const UpdateReport& report) override {
+    const NamedEstimator& named = experiment_->estimators[static_cast<std::size_t>(index)];
+    Sums& sums = sums_[named.name];
+    for (const MeasurementReport& m : report.measurements()) {
+      if (m.outcome == Outcome::kInitialised) continue;
+      const auto sensor = static_cast<std::size_t>(m.sensor);
+      EXPECT_EQ(m.outcome, Outcome::kAccepted) << named.name;
+      sums["NIS of " + named.system.sensors[sensor].name].Add(m.nis, m.dof);
+    }
+    if (frames_ < experiment_->source->size()) return;
+    AddState(frame, state, sums["NEES"]);
+    const std::vector<LandmarkEstimate> landmarks = named.estimator->landmarks();
+    if (landmarks.empty() || landmarks[0].covariance.isZero()) return;  // known exactly
+    AddLandmark(landmarks.front(), sums["NEES of the first landmark"]);
+    AddLandmark(landmarks.back(), sums["NEES of the last landmark"]);
+  }
+
+ private:
+  void AddState(const SourceFrame& frame, const State& state, ChiSquare& nees) const {
+    const std::vector<StreamInfo>& truths = experiment_->source->truths();
+    std::vector<int> rows;
+    std::vector<double> errors;
+    for (std::size_t t = 0; t < truths.size(); ++t) {
+      const BlockId id = state.layout().Find(truths[t].name);
+      const Block& block = state.layout()[id];
+      if (!block.has_covariance()) continue;
+      std::vector<double> e(static_cast<std::size_t>(block.geometry().tangent));
+      block.geometry().Minus(frame.truth[t].data(), state.value(id), e.data());
+      for (std::size_t i = 0; i < e.size(); ++i) {
+        rows.push_back(block.tangent_offset + static_cast<int>(i));
+        errors.push_back(e[i]);
+      }
+    }
+    Add(state.covariance().Dense()(rows, rows),
+        Eigen::VectorXd::Map(errors.data(), std::ssize(errors)), nees);
+  }
+  void AddLandmark(const LandmarkEstimate& landmark, ChiSquare& nees) const {
+    const auto place = experiment_->source->TrueLandmark(landmark.id);
+    ASSERT_TRUE(place);
+    Add(landmark.covariance, Eigen::Vector3d::Map(place->data()) - landmark.position, nees);
+  }
+  static void Add(const Eigen::MatrixXd& p, const Eigen::VectorXd& error, ChiSquare& nees) {
+    const double square = internal::SquaredMahalanobis(p, error);
+    ASSERT_GE(square, 0.0);  // P is regular
+    nees.Add(square, static_cast<int>(error.size()));
+  }
+
+  const Experiment* experiment_ = nullptr;
+  std::int64_t frames_ = 0;
+  std::map<std::string, Sums> sums_;
+};
+
+std::vector<std::string> Problems() {
+  std::vector<std::string> names;
+  for (const auto& file : fs::directory_iterator(kProblems))
+    names.push_back(file.path().stem().string());
+  std::ranges::sort(names);
+  return names;
+}
+Config ReadProblem(const std::string& name) {
+  return Config::FromFile(fs::path(kProblems) / (name + ".yaml"));
+}
+
+class ModelsProblem : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(ModelsProblem, OnlyTheFilterOfTheModelsIsConsistent) {
+  Config config = ReadProblem(GetParam());
+  Tally tally;
+  RunOptions options;
+  options.observers = {&tally};
+  for (int run = 0; run < kRuns; ++run) {
+    config.Set("source.seed", std::to_string(kFirstSeed + run), "the test");
+    Experiment experiment = BuildExperiment(config, AllModels());
+    const RunResult result = alidade::Run(experiment, options);
+    ASSERT_EQ(result.status, RunStatus::kOk) << result.reason;
+  }
+  ASSERT_TRUE(tally.sums().contains("ekf"));
+  EXPECT_GE(tally.sums().size(), 2u) << "an estimator with another model than the truth";
+  for (const auto& [name, sums] : tally.sums()) {
+    if (name == "ekf") {
+      for (const auto& [what, sum] : sums) {
+        EXPECT_TRUE(sum.IsWithin(0.99)) << what << ": " << ::testing::PrintToString(sum);
+      }
+    } else if (!testing::kSanitized) {  // in few runs it is not
+      // Chance alone does that once in 1e9 runs of this test.
+      const auto far = [](const auto& one) { return !one.second.IsWithin(1.0 - 1e-9); };
+      EXPECT_TRUE(std::ranges::any_of(sums, far)) << name << " is not seen";
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Models, ModelsProblem, ::testing::ValuesIn(Problems()),
+                         [](const auto& problem) { return problem.param; });
+
+/// The value at `dotted.key` below the map, where there is one.
+std::optional<std::string> TextAt(const Node& map, const std::string& key) {
+  const std::size_t dot = key.find('.');
+  const auto child = map.Find(key.substr(0, dot));
+  if (!child || dot == std::string::npos)
+    return child ? std::optional(child->Text()) : std::nullopt;
+  return child->is_map() ? TextAt(*child, key.substr(dot + 1)) : std::nullopt;
+}
+
+bool IsModel(const PluginEntry& entry) {
+  return entry.kind == PluginEntry::Kind::kSensor || entry.kind == PluginEntry::Kind::kMotion;
+}
+
+/// `scale_2d`, `scale_2d with noise_model: constant`: a model alone, or with one of its choices.
+std::string With(const PluginEntry& model, const ParamInfo& param, const std::string& choice) {
+  return model.name + " with " + param.key + ": " + choice;
+}
+
+/// The choices of a model, but for the lens of a camera, which is not its own.
+std::vector<ParamInfo> ChoicesOf(const PluginEntry& model) {
+  std::vector<ParamInfo> choices = AllModels().Schema(model);
+  std::erase_if(choices, [](const ParamInfo& param) {
+    return param.choices.empty() || param.key.starts_with("camera.");
+  });
+  return choices;
+}
+
+/// The models of a problem, and what it chooses of them.
+std::set<std::string> UsedBy(const Config& config) {
+  std::set<std::string> used;
+  for (const char* kind : {"state", "sensors"}) {
+    for (const auto& [name, node] : config.root().At(kind).Entries()) {
+      const std::string model = node.At("model").Text();
+      used.insert(model);
+      for (const PluginEntry& entry : AllModels().entries()) {
+        if (!IsModel(entry) || entry.name != model) continue;
+        for (const ParamInfo& param : ChoicesOf(entry)) {
+          const auto own = TextAt(node, param.key);
+          const auto shared = own ? own : TextAt(config.root(), param.key);
+          used.insert(With(entry, param, shared.value_or(param.fallback)));
+        }
+      }
+    }
+  }
+  return used;
+}
+
+TEST(ModelsProblems, AreThereForEveryModelAndChoice) {
+  std::set<std::string> used, needed;
+  for (const std::string& name : Problems()) used.merge(UsedBy(ReadProblem(name)));
+  for (const PluginEntry& entry : AllModels().entries()) {
+    const fs::path folder = entry.plugin.parent_path();
+    const bool ours =
+        fs::equivalent(folder, kShippedPlugins) || fs::equivalent(folder, ALIDADE_TEST_PLUGINS);
+    if (!IsModel(entry) || !ours) continue;
+    needed.insert(entry.name);
+    for (const ParamInfo& param : ChoicesOf(entry)) {
+      for (const std::string& choice : param.choices) needed.insert(With(entry, param, choice));
+    }
+  }
+  EXPECT_TRUE(needed.contains("constant_velocity with noise.kind: discrete"));
+  for (const std::string& model : needed) {
+    EXPECT_TRUE(used.contains(model))
+        << "no problem for " << model << ": add tests/plugins/models/consistent/NAME.yaml, a "
+        << "config with `source: {type: models}`, an estimator `ekf` and one that is wrong";
+  }
+}
+
+}  // namespace
+}  // namespace alidade

@@ -108,7 +108,7 @@ void SquareRoot::Project(FilterState& f, Row& row) const {
   hl.setZero();
   AddProduct(hl, all.h, root_);
   s = all.noise;
-  AddProduct(s, hl, hl.transpose());
+  AddProductWithTransposed(s, hl, hl);
   row.report->s.assign(s.data(), s.data() + s.size());
   row.PHt.clear();
 }
@@ -137,10 +137,11 @@ Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
     Note(f, "not_pd", "the update would leave S not positive definite; rolled back");
     return Outcome::kNotPd;
   }
-  Workspace::Matrix gain = f.work.Take(n, m);  // K = W Ls^-1
+  Workspace::Matrix gain = f.work.Take(n, m), l = f.work.Take(m, m);  // K = W Ls^-1
   Workspace::Vector dx = f.work.Take(n);
   gain = array.topRightCorner(m, n).transpose();
-  Divide(array.topLeftCorner(m, m).transpose(), gain);
+  l = array.topLeftCorner(m, m).transpose();
+  Divide(l, gain);
   dx.noalias() = gain * all.innovation;
   f.state.Retract(dx.data(), f.buffers.moved);
   if (!AllFinite(f.buffers.moved)) {
@@ -150,7 +151,7 @@ Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
   const Workspace::Matrix transport = TransportTo(f, f.buffers.moved);
   f.state.MoveTo(f.buffers.moved);
   root_.setZero();
-  AddProduct(root_, transport, array.bottomRightCorner(n, n).transpose());
+  AddProductWithTransposed(root_, transport, array.bottomRightCorner(n, n));
   SetCovariance(f);
   f.RecordUpdate(rows, gain.data());
   return Outcome::kAccepted;

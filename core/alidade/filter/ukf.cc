@@ -433,7 +433,7 @@ Outcome Unscented::Correct(FilterState& f, std::span<Row* const> rows) {
   rest.leftCols(n) = transform.c * root;
   rest.rightCols(n) = -transform.c * root;
   gain.setZero();
-  AddProduct(gain, rest, all.h.transpose());
+  AddProductWithTransposed(gain, rest, all.h);
   gain *= transform.w;
   DivideByTransposed(s, gain);
   Divide(s, gain);
@@ -443,7 +443,7 @@ Outcome Unscented::Correct(FilterState& f, std::span<Row* const> rows) {
   MomentsOf(transform.w, rest, transform.centre, centre, p);
   spread.setZero();
   AddProduct(spread, gain, all.noise);
-  AddProduct(p, spread, gain.transpose());
+  AddProductWithTransposed(p, spread, gain);
   f.state.Retract(step.data(), f.buffers.moved);
   if (!AllFinite(f.buffers.moved) || !p.allFinite()) {
     Note(f, "not_finite", "the update is not finite; rolled back");

@@ -194,8 +194,8 @@ bool Covariance::Joseph(const ConstMatrix& k, const ConstMatrix& h, const ConstM
   internal::AddProduct(a, k, hp, -1.0);  // (I - K H) P
   change.setZero();
   internal::AddProduct(change, k, r);
-  internal::AddProduct(change, a, h.transpose(), -1.0);
-  internal::AddProduct(a, change, k.transpose());
+  internal::AddProductWithTransposed(change, a, h, -1.0);
+  internal::AddProductWithTransposed(a, change, k);
   if (!(a.diagonal().array() >= 0.0).all()) return false;
   SetBlock(0, 0, a);
   return true;

@@ -13,8 +13,13 @@ BlockId StateLayout::Declare(std::string_view name, std::string_view owner, cons
                              BlockStatus status) {
   ALIDADE_EXPECTS(Find(name) < 0);
   if (dropped_.empty()) {
-    dropped_.push_back(static_cast<BlockId>(blocks_.size()));
-    blocks_.emplace_back();
+    Block fresh;  // before blocks_ moves: the arguments may lie in it
+    fresh.name = name;
+    fresh.owner = owner;
+    fresh.space = space;
+    fresh.status = status;
+    blocks_.push_back(std::move(fresh));
+    return static_cast<BlockId>(blocks_.size()) - 1;
   }
   // One of the same kind has memory for all that is assigned.
   const auto same = [&](BlockId id) { return (*this)[id].space.name == space.name; };

@@ -225,6 +225,17 @@ TEST(State, MoveToTransportsTheCovarianceOfADirection) {
   EXPECT_LT((state.covariance().Dense() - j * p * j.transpose()).norm(), 1e-14);
 }
 
+TEST(StateLayout, ABlockIsDeclaredLikeAnotherOfTheSameLayout) {
+  StateLayout layout;
+  layout.Declare("s.a", "s", Named(Geometry::UnitQuaternion()));
+  for (int i = 0; i < 20; ++i) {  // blocks move in memory
+    const Block& first = layout[0];
+    const BlockId id = layout.Declare("s." + std::to_string(i), first.owner, first.space);
+    EXPECT_EQ(layout[id].owner, "s");
+    EXPECT_EQ(layout[id].geometry(), Geometry::UnitQuaternion());
+  }
+}
+
 TEST(StateLayout, TwoBlocksOfOneNameAreAMisuse) {
   StateLayout layout;
   layout.Declare("s.a", "s", Named(Geometry::Vector(1)));

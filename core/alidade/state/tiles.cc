@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/state/tiles.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+
+namespace alidade::internal {
+namespace {
+
+/// Calls take(first, size) for the tiles of [0, size).
+template <class Take>
+void ForEachTile(Eigen::Index size, const Take& take) {
+  for (Eigen::Index at = 0; at < size; at += kTile) take(at, std::min(kTile, size - at));
+}
+
+/// C <- C + sign A B. (Of a factor within the product Eigen makes a copy where A has one row.)
+template <class B>
+void AddTiles(MatrixRef& c, const ConstMatrixRef& a, const B& b, double sign) {
+  ForEachTile(b.cols(), [&](Eigen::Index j, Eigen::Index columns) {
+    ForEachTile(a.cols(), [&](Eigen::Index k, Eigen::Index depth) {
+      ForEachTile(a.rows(), [&](Eigen::Index i, Eigen::Index rows) {
+        auto tile = c.block(i, j, rows, columns);
+        const auto left = a.block(i, k, rows, depth);
+        const auto right = b.block(k, j, depth, columns);
+        if (sign > 0.0) {
+          tile.noalias() += left * right;
+        } else {
+          tile.noalias() -= left * right;
+        }
+      });
+    });
+  });
+}
+
+}  // namespace
+
+void AddProduct(MatrixRef c, const ConstMatrixRef& a, const ConstMatrixRef& b, double sign) {
+  AddTiles(c, a, b, sign);
+}
+
+void AddProductWithTransposed(MatrixRef c, const ConstMatrixRef& a, const ConstMatrixRef& b,
+                              double sign) {
+  AddTiles(c, a, b.transpose(), sign);
+}
+
+void AddOuterProduct(MatrixRef c, const ConstMatrixRef& a, double sign) {
+  ForEachTile(a.rows(), [&](Eigen::Index j, Eigen::Index columns) {
+    ForEachTile(a.cols(), [&](Eigen::Index k, Eigen::Index depth) {
+      c.block(j, j, columns, columns)
+          .selfadjointView<Eigen::Lower>()
+          .rankUpdate(a.block(j, k, columns, depth), sign);
+    });
+    const Eigen::Index below = a.rows() - j - columns;
+    AddProductWithTransposed(c.block(j + columns, j, below, columns), a.bottomRows(below),
+                             a.middleRows(j, columns), sign);
+  });
+}
+
+void DivideByTransposed(const ConstMatrixRef& l, MatrixRef b) {
+  ForEachTile(l.rows(), [&](Eigen::Index j, Eigen::Index columns) {
+    AddProductWithTransposed(b.middleCols(j, columns), b.leftCols(j), l.block(j, 0, columns, j),
+                             -1.0);
+    ForEachTile(b.rows(), [&](Eigen::Index i, Eigen::Index rows) {
+      auto tile = b.block(i, j, rows, columns);
+      l.block(j, j, columns, columns)
+          .triangularView<Eigen::Lower>()
+          .transpose()
+          .solveInPlace<Eigen::OnTheRight>(tile);
+    });
+  });
+}
+
+void Divide(const ConstMatrixRef& l, MatrixRef b) {
+  ForEachTile(l.rows(), [&](Eigen::Index from_end, Eigen::Index columns) {
+    const Eigen::Index j = l.rows() - from_end - columns;
+    AddProduct(b.middleCols(j, columns), b.rightCols(from_end),
+               l.block(j + columns, j, from_end, columns), -1.0);
+    ForEachTile(b.rows(), [&](Eigen::Index i, Eigen::Index rows) {
+      auto tile = b.block(i, j, rows, columns);
+      l.block(j, j, columns, columns)
+          .triangularView<Eigen::Lower>()
+          .solveInPlace<Eigen::OnTheRight>(tile);
+    });
+  });
+}
+
+bool Factorise(MatrixRef s) {
+  if (!s.allFinite()) return false;
+  bool positive = true;
+  ForEachTile(s.rows(), [&](Eigen::Index j, Eigen::Index columns) {
+    if (!positive) return;
+    MatrixRef diagonal = s.block(j, j, columns, columns);
+    AddOuterProduct(diagonal, s.block(j, 0, columns, j), -1.0);
+    const Eigen::LLT<MatrixRef> llt(diagonal);
+    positive = llt.info() == Eigen::Success && (diagonal.diagonal().array() > 0.0).all();
+    const Eigen::Index below = s.rows() - j - columns;
+    MatrixRef panel = s.block(j + columns, j, below, columns);
+    AddProductWithTransposed(panel, s.block(j + columns, 0, below, j), s.block(j, 0, columns, j),
+                             -1.0);
+    DivideByTransposed(diagonal, panel);
+  });
+  return positive;
+}
+
+}  // namespace alidade::internal

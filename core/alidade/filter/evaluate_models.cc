@@ -76,7 +76,8 @@ Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place, const do
     inverse.from.push_back(sensor.roles[i].block);
     columns += model.roles()[i].geometry.tangent;
   }
-  inverse.by_role.assign(static_cast<std::size_t>(rows * columns), unwritten);
+  inverse.by_role.assign(static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns),
+                         unwritten);
   inverse.of_role.assign(roles.size(), nullptr);
   double* next = inverse.by_role.data();
   for (std::size_t i = 0; i < roles.size(); ++i) {

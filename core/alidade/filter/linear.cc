@@ -192,7 +192,7 @@ Linear::Lost Linear::FindLost(FilterState& f, std::span<Row* const> rows,
   lost_.erase(std::unique(lost_.begin(), lost_.end()), lost_.end());
   const Eigen::Index count = std::ssize(lost_), m = w.cols();
   Lost lost{f.work.Take(count, m), f.work.Take(count, m)};
-  auto& [gain, e] = lost;
+  Workspace::Matrix &gain = lost.gain, &e = lost.e;
   if (count == 0) return lost;
   e.setZero();
   for (Eigen::Index i = 0; i < count; ++i) gain.row(i) = w.row(lost_[static_cast<std::size_t>(i)]);

@@ -137,7 +137,7 @@ void State::Initialise(std::span<const BlockId> ids, const double* values,
   }
 }
 
-BlockId State::Clone(BlockId source, std::string name) {
+BlockId State::Clone(BlockId source, std::string_view name) {
   const Block original = layout_[source];
   ALIDADE_EXPECTS(original.present);
   const BlockId id = Declare(name, original.owner, original.space, original.status);

@@ -88,7 +88,7 @@ class State {
   void Initialise(std::span<const BlockId> ids, const double* values, std::span<const BlockId> from,
                   const Eigen::Ref<const RowMajor>& jacobian, const Covariance::ConstMatrix& own);
   /// Declares `name` as a copy of `source`, fully correlated with it.
-  BlockId Clone(BlockId source, std::string name);
+  BlockId Clone(BlockId source, std::string_view name);
   /// Drops the block; the rest keeps its value and covariance.
   void Marginalise(BlockId id);
   /// Marginalise, and gives the id back too: a block declared later may have it.

@@ -90,10 +90,10 @@ Binding::Binding(System of, const std::vector<StreamInfo>& from)
   // Landmarks come behind: then P has no size of its own.
   const bool small = initial.covariance().small() && !system.landmarks;
   for (const SensorBinding& sensor : system.sensors) {
-    sensors.push_back(PlaceOf(sensor, initial, small));
+    sensor_places.push_back(PlaceOf(sensor, initial, small));
   }
   for (const MotionBinding& motion : system.motions) {
-    motions.push_back(PlaceOf(motion, initial.layout()));
+    motion_places.push_back(PlaceOf(motion, initial.layout()));
   }
   for (std::size_t i = 0; i < system.sensors.size(); ++i) {
     for (std::size_t s = 0; s < streams.size(); ++s) {

@@ -47,8 +47,8 @@ struct Binding {
   const System system;
   const std::vector<StreamInfo> streams;
   const State initial;  ///< with a place for every block that has a prior
-  std::vector<SensorPlace> sensors;
-  std::vector<MotionPlace> motions;
+  std::vector<SensorPlace> sensor_places;
+  std::vector<MotionPlace> motion_places;
   std::vector<int> stream_of_sensor;  ///< -1: the source has none of that name
 };
 

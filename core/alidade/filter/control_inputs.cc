@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "alidade/base/all_finite.h"
 #include "alidade/base/number_text.h"
 
 namespace alidade {
@@ -20,7 +21,7 @@ Timestamp TimeoutOf(double timeout_s) {
 /// Why an input cannot be used; empty: it can.
 std::string Defect(const Geometry& geometry, const std::vector<double>& value) {
   constexpr double kTolerance = 1e-3;
-  if (!AllFinite(value)) return "not finite";
+  if (!internal::AllFinite(value)) return "not finite";
   if (geometry.Defect(value.data()) > kTolerance) return "not of unit length";
   return {};
 }

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/filter/estimator.h"
+#include "alidade/filter/update_report.h"
 #include "alidade/system/system.h"
 
 namespace alidade {

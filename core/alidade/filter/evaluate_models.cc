@@ -2,9 +2,83 @@
 #include "alidade/filter/evaluate_models.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
+
+#include "alidade/base/all_finite.h"
 
 namespace alidade::internal {
+namespace {
+
+constexpr double kNotWritten = std::numeric_limits<double>::quiet_NaN();
+
+bool AreFinite(const double* values, Eigen::Index size) {
+  return AllFinite({values, static_cast<std::size_t>(size)});
+}
+
+/// The values of the model's blocks in x.
+std::array<const double*, kMaxRoles> BlocksAt(const MotionPlace& place, const double* x) {
+  std::array<const double*, kMaxRoles> blocks;
+  std::ranges::transform(place.values, blocks.begin(), [&](int at) { return x + at; });
+  return blocks;
+}
+
+}  // namespace
+
+Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
+               const double* u, const double* w, double dt_s, double* next, double* f, double* g) {
+  const MotionModel& model = motion.model;
+  const Eigen::Index n = model.tangent_size();
+  const Eigen::Index of_f = f == nullptr ? 0 : n * n,
+                     of_g = g == nullptr ? 0 : n * model.noise_size();
+  std::array<double*, kMaxRoles> to;
+  for (std::size_t k = 0; k < place.values.size(); ++k) {
+    to[k] = next + place.values[k];
+    std::fill_n(to[k], model.blocks()[k].geometry.ambient, kNotWritten);
+  }
+  std::fill_n(f, of_f, kNotWritten);
+  std::fill_n(g, of_g, kNotWritten);
+  const Status status = model.Step(BlocksAt(place, x).data(), u, w, dt_s, to.data(), f, g);
+  if (status != Status::kOk) return OutcomeOf(status);
+  bool finite = AreFinite(f, of_f) && AreFinite(g, of_g);
+  for (std::size_t k = 0; k < place.values.size(); ++k) {
+    finite = finite && AreFinite(to[k], model.blocks()[k].geometry.ambient);
+  }
+  return finite ? Outcome::kAccepted : Outcome::kNotFinite;
+}
+
+Outcome SqrtQAt(const MotionBinding& motion, const MotionPlace& place, const double* x, double dt_s,
+                double* l) {
+  const Eigen::Index size = Eigen::Index{motion.model.noise_size()} * motion.model.noise_size();
+  std::fill_n(l, size, kNotWritten);
+  const Status status = motion.model.SqrtQ(BlocksAt(place, x).data(), dt_s, l);
+  if (status != Status::kOk) return OutcomeOf(status);
+  return AreFinite(l, size) ? Outcome::kAccepted : Outcome::kNotFinite;
+}
+
+Trouble TroubleOf(const MotionBinding& motion, Outcome outcome) {
+  if (outcome == Outcome::kAccepted) return {};
+  const std::string who = "motion model of '" + motion.name + "' ";
+  if (outcome == Outcome::kNotFinite) {
+    return {"not_finite", who + "steps to a state that is not finite"};
+  }
+  const bool failed = outcome == Outcome::kFailed;
+  return {failed ? "plugin_failed" : "diverged",
+          who + "cannot step: " + (failed ? motion.model.error_text() : "out of its domain")};
+}
+
+void TakeStep(const MotionBinding& motion, const StateLayout& layout, const double* next,
+              double* x) {
+  for (const BlockId id : motion.blocks) {
+    const Block& block = layout[id];
+    if (block.status == BlockStatus::kConstant) continue;
+    const Geometry& geometry = block.geometry();
+    double* const value = x + block.value_offset;
+    std::copy_n(next + block.value_offset, geometry.ambient, value);
+    if (geometry.kind != GeometryKind::kVector) geometry.Normalise(value);
+  }
+}
 
 void RolesAt(const SensorBinding& sensor, const SensorPlace& place, const std::vector<double>& x,
              const std::vector<double>& known, std::vector<const double*>& roles) {
@@ -20,13 +94,13 @@ Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place, const dou
                    std::vector<double*>& columns, std::vector<double>& h,
                    std::vector<double>* jacobian) {
   const Geometry& geometry = model.measurement().geometry;
-  h.assign(static_cast<std::size_t>(geometry.ambient), std::nan(""));
+  h.assign(static_cast<std::size_t>(geometry.ambient), kNotWritten);
   if (jacobian == nullptr) return OutcomeOf(model.Predict(roles, h.data()));
   const int m = geometry.tangent;
   jacobian->assign(static_cast<std::size_t>(m) * static_cast<std::size_t>(place.width), 0.0);
   for (const JacobianPart& part : place.parts) {
     for (int i = 0; i < m; ++i) {
-      std::fill_n(jacobian->data() + i * place.width + part.column, part.size, std::nan(""));
+      std::fill_n(jacobian->data() + i * place.width + part.column, part.size, kNotWritten);
     }
   }
   columns.clear();
@@ -44,7 +118,7 @@ Outcome NoiseAt(const SensorModel& model, const Measurement& measurement,
   }
   const auto m = static_cast<std::size_t>(model.measurement().geometry.tangent);
   r.resize(m * m);
-  l.assign(m * m, std::nan(""));
+  l.assign(m * m, kNotWritten);
   const Outcome outcome = OutcomeOf(model.SqrtNoise(roles, measurement.values.data(), l.data()));
   for (std::size_t i = 0; i < m; ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
@@ -67,7 +141,6 @@ Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place, const do
     rows += target.geometry.tangent;
     size += target.geometry.ambient;
   }
-  const double unwritten = std::nan("");
   std::fill_n(roles.begin() + model.initialised_role(), count, nullptr);
   const auto counts = [&](std::size_t i) { return roles[i] != nullptr && place.columns[i] >= 0; };
   inverse.from.clear();
@@ -77,7 +150,7 @@ Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place, const do
     columns += model.roles()[i].geometry.tangent;
   }
   inverse.by_role.assign(static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns),
-                         unwritten);
+                         kNotWritten);
   inverse.of_role.assign(roles.size(), nullptr);
   double* next = inverse.by_role.data();
   for (std::size_t i = 0; i < roles.size(); ++i) {
@@ -85,9 +158,9 @@ Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place, const do
     inverse.of_role[i] = next;
     next += rows * model.roles()[i].geometry.tangent;
   }
-  inverse.y.assign(static_cast<std::size_t>(size), unwritten);
-  inverse.by_z.setConstant(rows, model.measurement().geometry.tangent, unwritten);
-  inverse.by_prior.setConstant(rows, model.prior_size(), unwritten);
+  inverse.y.assign(static_cast<std::size_t>(size), kNotWritten);
+  inverse.by_z.setConstant(rows, model.measurement().geometry.tangent, kNotWritten);
+  inverse.by_prior.setConstant(rows, model.prior_size(), kNotWritten);
   const Status status =
       model.Initialise(roles.data(), z, prior, inverse.y.data(), inverse.of_role.data(),
                        inverse.by_z.data(), inverse.by_prior.data());
@@ -110,55 +183,6 @@ Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place, const do
   const bool finite = AllFinite(inverse.y) && inverse.by_x.allFinite() &&
                       inverse.by_z.allFinite() && inverse.by_prior.allFinite();
   return finite ? Outcome::kAccepted : Outcome::kNotFinite;
-}
-
-const double* const* RolesAt(FilterState& f, const Row& row, const std::vector<double>& x) {
-  RolesAt(*row.binding, *row.place, x, f.state.values(), f.buffers.roles);
-  return f.buffers.roles.data();
-}
-
-Outcome PredictAt(FilterState& f, const Row& row, const std::vector<double>& x, double* h) {
-  return OutcomeOf(row.model->Predict(RolesAt(f, row, x), h));
-}
-
-Outcome LineariseAt(FilterState& f, Row& row, const double* const* roles) {
-  return EvaluateAt(*row.model, *row.place, roles, f.buffers.jacobians, row.report->h, &row.H);
-}
-
-void TakeInnovation(Row& row) {
-  MeasurementReport& entry = *row.report;
-  entry.innovation.resize(static_cast<std::size_t>(entry.dof));
-  row.model->measurement().geometry.Minus(entry.z.data(), entry.h.data(), entry.innovation.data());
-}
-
-void ChainJacobian(FilterState& f, Row& row, int column, int size, const double* j) {
-  const Workspace::Use use(f.work);
-  const int m = row.report->dof;
-  auto own = Eigen::Map<RowMajor>(row.H.data(), m, row.place->width).middleCols(column, size);
-  Workspace::Matrix chained = f.work.Take(m, size);
-  chained.noalias() = own * Eigen::Map<const RowMajor>(j, size, size);
-  own = chained;
-}
-
-Outcome Invert(FilterState& f, Row& row, const LandmarkOptions::Prior* prior, Inverse& inverse) {
-  RolesAt(f, row, f.state.values());
-  Outcome outcome =
-      InvertAt(*row.binding, *row.place, row.measurement->values.data(),
-               prior == nullptr ? nullptr : &prior->inverse_distance, f.buffers.roles, inverse);
-  if (outcome == Outcome::kAccepted) outcome = NoiseAt(row, f.buffers.roles.data());
-  if (outcome == Outcome::kFailed) NotePluginFailure(f, *row.binding);
-  if (outcome != Outcome::kAccepted) {
-    return outcome == Outcome::kOutOfDomain ? Outcome::kInvalid : outcome;
-  }
-  const int m = row.report->dof;
-  const Eigen::Map<const RowMajor> r(row.R.data(), m, m);
-  const RowMajor& jp = inverse.by_prior;
-  inverse.by_z_r.noalias() = inverse.by_z * r;
-  inverse.own.noalias() = inverse.by_z_r * inverse.by_z.transpose();
-  if (prior != nullptr) {
-    inverse.own.noalias() += prior->sigma * prior->sigma * jp * jp.transpose();
-  }
-  return inverse.own.allFinite() ? Outcome::kAccepted : Outcome::kNotFinite;
 }
 
 }  // namespace alidade::internal

@@ -2,21 +2,46 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <string>
 #include <vector>
 
-#include "alidade/filter/filter_state.h"
+#include "alidade/filter/binding.h"
+#include "alidade/filter/update_report.h"
 
-/// Sensor models at any values x of the whole state: the state itself, an iterate, a sigma point,
-/// the hypothesis of a consensus, a point of a batch. m: tangent size of the measurement.
+/// The models at any values x of the whole state: the state itself, an iterate, a sigma point, the
+/// hypothesis of a consensus, a point of a batch. What a model does not write is not a number.
 namespace alidade::internal {
+
+// Motion models, n_w: noise inputs.
+
+/// Why a step cannot be done; empty where it can.
+struct Trouble {
+  const char* kind = nullptr;  ///< of the event
+  std::string text;
+  explicit operator bool() const { return kind != nullptr; }
+};
+
+/// x' = f(x, u, w, dt) of one motion model at the values x of the whole state, at the places of its
+/// blocks in `next`, and unless null its F (n x n) and G (n x n_w), row-major. w may be null: zero.
+Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
+               const double* u, const double* w, double dt_s, double* next, double* f, double* g);
+/// L of its Qw = L L' there, n_w x n_w, row-major.
+Outcome SqrtQAt(const MotionBinding& motion, const MotionPlace& place, const double* x, double dt_s,
+                double* l);
+/// What one of these that is not kAccepted means.
+Trouble TroubleOf(const MotionBinding& motion, Outcome outcome);
+/// x <- x' of its blocks that are not constant, brought back to their manifolds.
+void TakeStep(const MotionBinding& motion, const StateLayout& layout, const double* next,
+              double* x);
+
+// Sensor models, m: tangent size of the measurement.
 
 /// The values that fill the roles of a sensor at x; of roles that it knows those of `known`. Null:
 /// the role has no place.
 void RolesAt(const SensorBinding& sensor, const SensorPlace& place, const std::vector<double>& x,
              const std::vector<double>& known, std::vector<const double*>& roles);
 
-/// h at the roles, ambient, and unless null H, m rows of the place's width. What the model does not
-/// write is not a number. `columns` is memory.
+/// h at the roles, ambient, and unless null H, m rows of the place's width. `columns` is memory.
 Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place, const double* const* roles,
                    std::vector<double*>& columns, std::vector<double>& h,
                    std::vector<double>* jacobian);
@@ -42,31 +67,5 @@ struct Inverse {
 /// be null where the model needs none.
 Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place, const double* z,
                  const double* prior, std::vector<const double*>& roles, Inverse& inverse);
-
-// Of a row of a filter:
-
-/// What fills its roles at x: known roles have the value that the state has. Until the next call.
-const double* const* RolesAt(FilterState& f, const Row& row, const std::vector<double>& x);
-
-/// h at x, ambient, in `h`.
-Outcome PredictAt(FilterState& f, const Row& row, const std::vector<double>& x, double* h);
-
-/// h at the roles, in the report, and H, in the row.
-Outcome LineariseAt(FilterState& f, Row& row, const double* const* roles);
-
-/// R at the roles, or as the measurement itself says, in the row.
-inline Outcome NoiseAt(Row& row, const double* const* roles) {
-  return NoiseAt(*row.model, *row.measurement, roles, row.L, row.R);
-}
-
-/// z (-) h of the h in the report, in the report.
-void TakeInnovation(Row& row);
-
-/// H <- H J in the columns of one role, J size x size, row-major.
-void ChainJacobian(FilterState& f, Row& row, int column, int size, const double* j);
-
-/// The inverse of its measurement at the state. `prior` may be null where the model needs none.
-/// kAccepted, or why not.
-Outcome Invert(FilterState& f, Row& row, const LandmarkOptions::Prior* prior, Inverse& inverse);
 
 }  // namespace alidade::internal

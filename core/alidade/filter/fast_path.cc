@@ -254,19 +254,8 @@ ALIDADE_INLINE bool FastPath::Update(const Frame& frame) {
     Fit(f_.said.last_used.z, static_cast<int>(std::ssize(last->values)));
     Copy(last->values.data(), static_cast<int>(std::ssize(last->values)), f_.said.last_used.z);
   }
-  CountRejections();
+  for (const MeasurementReport& entry : f_.report.measurements()) parts_.recovery.Count(f_, entry);
   return true;
-}
-
-void FastPath::CountRejections() {
-  for (const MeasurementReport& entry : f_.report.measurements()) {
-    const auto k = static_cast<std::size_t>(entry.sensor);
-    if (entry.outcome == Outcome::kAccepted) {
-      parts_.recovery.CountAccepted(f_, k);
-    } else if (entry.outcome == Outcome::kGated) {
-      parts_.recovery.CountRejected(k);
-    }
-  }
 }
 
 template <int N>
@@ -292,10 +281,10 @@ bool FastPath::ProcessSized(const Frame& frame) {
 
 bool FastPath::AddMotions() {
   const Binding& binding = *f_.binding;
-  motions_.reserve(binding.motions.size());
-  for (std::size_t i = 0; i < binding.motions.size(); ++i) {
+  motions_.reserve(binding.motion_places.size());
+  for (std::size_t i = 0; i < binding.motion_places.size(); ++i) {
     Motions::Step& step = f_.motions.steps()[i];
-    const MotionPlace& place = binding.motions[i];
+    const MotionPlace& place = binding.motion_places[i];
     if (!step.active) continue;
     if (place.parts.size() != 1 || !place.rows.empty()) return false;
     const MotionModel& model = binding.system.motions[i].model;
@@ -312,16 +301,14 @@ bool FastPath::AddMotions() {
 
 bool FastPath::AddSensors() {
   const Binding& binding = *f_.binding;
-  sensors_.reserve(binding.sensors.size());  // they hold pointers into themselves
-  for (std::size_t k = 0; k < binding.sensors.size(); ++k) {
-    const SensorPlace& place = binding.sensors[k];
+  sensors_.reserve(binding.sensor_places.size());  // they hold pointers into themselves
+  for (std::size_t k = 0; k < binding.sensor_places.size(); ++k) {
+    const SensorPlace& place = binding.sensor_places[k];
     const SensorBinding& bound = binding.system.sensors[k];
     const Geometry& geometry = bound.model.measurement().geometry;
     const bool elsewhere = std::ranges::any_of(bound.roles, [&](const RoleBinding& role) {
-      return role.block >= 0 &&
-             (role.jacobian_at == JacobianAt::kMeasurement ||
-              (!f_.first_estimates.empty() &&
-               !f_.first_estimates[static_cast<std::size_t>(role.block)].empty()));
+      return role.block >= 0 && (role.jacobian_at == JacobianAt::kMeasurement ||
+                                 !f_.first_estimates[static_cast<std::size_t>(role.block)].empty());
     });
     if (geometry.kind != GeometryKind::kVector || geometry.tangent > kMostOfOne || !place.whole ||
         elsewhere || bound.loss.kind != LossKind::kNone ||

@@ -22,9 +22,9 @@ struct FastParts {
 };
 
 /// The fast path of a filter whose method is Linear: takes the steps and updates in which nothing
-/// but acceptance and gating happens, in functions compiled for the number of states. Before
-/// anything else it changes nothing and says false: the frame loop then does the work and finds the
-/// words.
+/// but acceptance and gating happens, in functions compiled for the number of states. Of a frame
+/// with anything else it does the step at most, and says false: the frame loop then does the rest
+/// and finds the words. The first frame of all is the loop's.
 class FastPath {
  public:
   /// Null where the filter is not one of few states, all of them vectors in the order of the
@@ -84,8 +84,6 @@ class FastPath {
   void Stack(const Sensor& sensor, MeasurementReport& entry, Rows<N>& rows, int at);
   template <int N, int M>
   bool Correct(const Rows<N>& rows, int count);
-
-  void CountRejections();
 
   FastParts parts_;
   FilterState& f_;

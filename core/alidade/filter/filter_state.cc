@@ -33,8 +33,9 @@ FilterState::FilterState(std::shared_ptr<const Binding> of, bool keeps_first_est
     : binding(std::move(of)),
       state(binding->initial),
       motions(*binding),
+      first_estimates(binding->system.layout.blocks().size()),
       keeps_first_estimates_(keeps_first_estimates) {
-  said.out_of_domain.assign(binding->sensors.size(), 0);
+  said.out_of_domain.assign(binding->sensor_places.size(), 0);
   Activate();
 }
 
@@ -57,7 +58,6 @@ void FilterState::Activate() {
 
 /// The values of stationary blocks that have none noted yet.
 void FilterState::KeepFirstEstimates() {
-  first_estimates.resize(binding->system.layout.blocks().size());
   for (const MotionBinding& motion : binding->system.motions) {
     if (!motion.model.stationary()) continue;
     for (const BlockId id : motion.blocks) {

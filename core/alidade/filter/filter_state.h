@@ -8,9 +8,9 @@
 
 #include "alidade/base/workspace.h"
 #include "alidade/filter/binding.h"
-#include "alidade/filter/estimator.h"
 #include "alidade/filter/motions.h"
 #include "alidade/filter/rows.h"
+#include "alidade/filter/update_report.h"
 #include "alidade/state/state.h"
 
 namespace alidade::internal {
@@ -44,7 +44,7 @@ struct FilterState {
   State state;
   Timestamp timestamp = kNoTimestamp;  ///< of the state
   Motions motions;
-  /// By block of the system: the value that H is taken at, in place of the latest; empty: none.
+  /// By block of the system: the value that H is taken at; empty: the latest.
   std::vector<std::vector<double>> first_estimates;
   UpdateReport report;  ///< of the frame
   Said said;

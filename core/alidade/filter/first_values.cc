@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "alidade/filter/evaluate_models.h"
+#include "alidade/filter/evaluate_row.h"
 
 namespace alidade::internal {
 namespace {
@@ -55,7 +55,7 @@ Outcome InitialiseBlock(FilterState& f, Row& row) {
   const Outcome outcome = Invert(f, row, nullptr, inverse);
   if (outcome != Outcome::kAccepted) return outcome;
   f.state.Initialise({&id, 1}, inverse.y.data(), inverse.from, inverse.by_x, inverse.own);
-  if (!f.first_estimates.empty()) f.first_estimates[static_cast<std::size_t>(id)].clear();
+  f.first_estimates[static_cast<std::size_t>(id)].clear();
   f.Activate();
   f.motions.EndInterval();
   return Outcome::kInitialised;

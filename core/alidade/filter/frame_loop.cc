@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "alidade/filter/evaluate_models.h"
+#include "alidade/filter/evaluate_row.h"
 #include "alidade/filter/first_values.h"
 #include "alidade/filter/linear.h"
 
@@ -69,7 +69,7 @@ void FrameLoop::Run(const Frame& frame) {
   Fuse(all);
   recovery_.RepairCovariance(f, all);
   if (f.said.ended) return;
-  recovery_.CountRejections(f, all);
+  recovery_.RecoverRejected(f, all);
   if (landmarks) landmarks->Maintain(f, all);
 }
 
@@ -149,6 +149,11 @@ bool FrameLoop::Correct(std::span<Row* const> rows) {
   if (rows.empty()) return false;
   for (Row* const row : rows) Gate::Weigh(*row);
   const Outcome outcome = method->Correct(f, rows);
+  if (outcome == Outcome::kNotPd) {
+    Note(f, "not_pd", "the update would leave S or P not positive definite; rolled back");
+  } else if (outcome == Outcome::kNotFinite) {
+    Note(f, "not_finite", "the update is not finite; rolled back");
+  }
   for (const Row* const row : rows) row->report->outcome = outcome;
   return outcome == Outcome::kAccepted;
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "alidade/base/all_finite.h"
 #include "alidade/base/number_text.h"
 #include "alidade/base/statistics.h"
 #include "alidade/state/small_kernels.h"

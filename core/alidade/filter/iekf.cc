@@ -5,9 +5,10 @@
 #include <cmath>
 #include <optional>
 
+#include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
-#include "alidade/filter/evaluate_models.h"
+#include "alidade/filter/evaluate_row.h"
 #include "alidade/filter/linear.h"
 #include "alidade/filter/stack.h"
 #include "alidade/state/tiles.h"

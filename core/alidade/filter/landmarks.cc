@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "alidade/base/error.h"
+#include "alidade/filter/evaluate_row.h"
 #include "alidade/filter/first_values.h"
 #include "alidade/system/landmark_representation.h"
 
@@ -210,34 +211,31 @@ LandmarkRecord& Landmarks::RecordOf(std::int64_t id) {
 
 /// Looks for inverse distances that an update left at zero or below.
 void Landmarks::CheckDepths(FilterState& f) {
-  for (auto at = landmarks_.begin(); at != landmarks_.end();) {
-    LandmarkRecord& landmark = at->second;
+  DeleteIf(f, [&](LandmarkRecord& landmark) {
     const bool negative =
         HasInverseDistance(landmark) && !(InverseDistance(f.state, landmark) > 0.0);
     f.report.landmarks.negative += negative && !landmark.negative;
     landmark.negative = negative;
-    if (negative && options_.negative_depth == LandmarkOptions::NegativeDepth::kDelete) {
-      at = Delete(f, at);
-    } else {
-      ++at;
-    }
-  }
+    return negative && options_.negative_depth == LandmarkOptions::NegativeDepth::kDelete;
+  });
 }
 
 /// Drops what was not seen for long, or fails too often. Known landmarks stay.
 void Landmarks::Prune(FilterState& f) {
-  for (auto at = landmarks_.begin(); at != landmarks_.end();) {
-    const LandmarkRecord& landmark = at->second;
+  DeleteIf(f, [&](const LandmarkRecord& landmark) {
     const std::int64_t unseen = frame_ - landmark.seen;
     const int most = landmark.in_state() ? options_.max_missed_frames : kWaitingFrames;
     const bool lost = most > 0 && unseen >= most;
     const bool fails = landmark.tried >= options_.min_attempts &&
                        landmark.accepted < options_.min_match_ratio * landmark.tried;
-    if ((lost || fails) && !landmark.known) {
-      at = Delete(f, at);
-    } else {
-      ++at;
-    }
+    return (lost || fails) && !landmark.known;
+  });
+}
+
+template <class Condition>
+void Landmarks::DeleteIf(FilterState& f, const Condition& condition) {
+  for (auto at = landmarks_.begin(); at != landmarks_.end();) {
+    at = condition(at->second) ? Delete(f, at) : std::next(at);
   }
 }
 

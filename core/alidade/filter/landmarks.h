@@ -84,6 +84,8 @@ class Landmarks {
   Outcome Initialise(FilterState& f, std::int64_t id, Row& row, LandmarkRecord& landmark);
   LandmarkRecord& RecordOf(std::int64_t id);
   void DropBlocks(FilterState& f, LandmarkRecord& landmark);
+  template <class Condition>
+  void DeleteIf(FilterState& f, const Condition& condition);
   ById::iterator Delete(FilterState& f, ById::iterator at);
   BlockId Declare(FilterState& f, std::int64_t id, const Space& role, BlockStatus status);
   const double* CameraOf(const State& state, const Row& row) const;

@@ -5,7 +5,8 @@
 #include <array>
 #include <cmath>
 
-#include "alidade/filter/evaluate_models.h"
+#include "alidade/base/all_finite.h"
+#include "alidade/filter/evaluate_row.h"
 #include "alidade/filter/stack.h"
 #include "alidade/state/small_kernels.h"
 #include "alidade/state/tiles.h"
@@ -74,7 +75,7 @@ bool Linear::FindLinearisation(const FilterState& f, const Row& row) {
     if (bound[i].jacobian_at == JacobianAt::kMeasurement) {
       implied_.resize(static_cast<std::size_t>(row.model->roles()[i].geometry.ambient));
       at_[i] = implied_.data();
-    } else if (!f.first_estimates.empty() && !f.first_estimates[index].empty()) {
+    } else if (!f.first_estimates[index].empty()) {
       at_[i] = f.first_estimates[index].data();
     }
     elsewhere = elsewhere || at_[i] != f.buffers.roles[i];
@@ -86,7 +87,7 @@ bool Linear::FindLinearisation(const FilterState& f, const Row& row) {
 Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
   const SensorModel& model = *row.model;
   MeasurementReport& entry = *row.report;
-  entry.h.assign(static_cast<std::size_t>(model.measurement().geometry.ambient), std::nan(""));
+  entry.h.resize(static_cast<std::size_t>(model.measurement().geometry.ambient));
   Outcome outcome = PredictAt(f, row, f.state.values(), entry.h.data());
   if (outcome != Outcome::kAccepted) return outcome;
   if (!implied_.empty()) {
@@ -125,13 +126,7 @@ Outcome Linear::CorrectBy(FilterState& f, std::span<Row* const> rows, const doub
   };
   const bool small = f.state.covariance().small() && CountOf(rows) <= Covariance::kSmall &&
                      !f.considering && std::ranges::none_of(rows, considers);
-  const Outcome outcome = small ? CorrectSmall(f, rows, dx) : CorrectLarge(f, rows, dx);
-  if (outcome == Outcome::kNotPd) {
-    Note(f, "not_pd", "the update would leave S or P not positive definite; rolled back");
-  } else if (outcome == Outcome::kNotFinite) {
-    Note(f, "not_finite", "the update is not finite; rolled back");
-  }
-  return outcome;
+  return small ? CorrectSmall(f, rows, dx) : CorrectLarge(f, rows, dx);
 }
 
 /// Few states and few rows: nothing is allocated.

@@ -20,11 +20,11 @@ class Method {
   virtual void Begin(FilterState& /*f*/) {}
   /// Moves x and P by dt_s: all of it or nothing, and why.
   virtual Trouble Step(FilterState& f, double dt_s) = 0;
-  /// h, the innovation, R and S of a row by itself; kAccepted, or why they cannot be had, which it
-  /// notes.
+  /// h, the innovation, R and S of a row by itself, and what Correct needs besides; kAccepted, or
+  /// why they cannot be had, which it notes.
   virtual Outcome Predict(FilterState& f, Row& row) = 0;
   /// One update with all rows, as Predict left them, R and S weighed since: all of it happens, or
-  /// nothing. kAccepted, or why not, which it notes.
+  /// nothing. kAccepted, or why not, which it notes but for kNotPd and kNotFinite.
   virtual Outcome Correct(FilterState& f, std::span<Row* const> rows) = 0;
 };
 

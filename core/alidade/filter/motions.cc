@@ -2,83 +2,12 @@
 #include "alidade/filter/motions.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
 
+#include "alidade/base/all_finite.h"
 #include "alidade/state/small_kernels.h"
 
 namespace alidade::internal {
-namespace {
-
-constexpr double kNotWritten = std::numeric_limits<double>::quiet_NaN();
-
-bool AreFinite(const double* values, Eigen::Index size) {
-  return AllFinite({values, static_cast<std::size_t>(size)});
-}
-
-/// The values of the model's blocks in x.
-std::array<const double*, kMaxRoles> BlocksAt(const MotionPlace& place, const double* x) {
-  std::array<const double*, kMaxRoles> blocks;
-  std::ranges::transform(place.values, blocks.begin(), [&](int at) { return x + at; });
-  return blocks;
-}
-
-}  // namespace
-
-Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
-               const double* u, const double* w, double dt_s, double* next, double* f, double* g) {
-  const MotionModel& model = motion.model;
-  const Eigen::Index n = model.tangent_size();
-  const Eigen::Index of_f = f == nullptr ? 0 : n * n,
-                     of_g = g == nullptr ? 0 : n * model.noise_size();
-  std::array<double*, kMaxRoles> to;
-  for (std::size_t k = 0; k < place.values.size(); ++k) {
-    to[k] = next + place.values[k];
-    std::fill_n(to[k], model.blocks()[k].geometry.ambient, kNotWritten);
-  }
-  std::fill_n(f, of_f, kNotWritten);
-  std::fill_n(g, of_g, kNotWritten);
-  const Status status = model.Step(BlocksAt(place, x).data(), u, w, dt_s, to.data(), f, g);
-  if (status != Status::kOk) return OutcomeOf(status);
-  bool finite = AreFinite(f, of_f) && AreFinite(g, of_g);
-  for (std::size_t k = 0; k < place.values.size(); ++k) {
-    finite = finite && AreFinite(to[k], model.blocks()[k].geometry.ambient);
-  }
-  return finite ? Outcome::kAccepted : Outcome::kNotFinite;
-}
-
-Outcome SqrtQAt(const MotionBinding& motion, const MotionPlace& place, const double* x, double dt_s,
-                double* l) {
-  const Eigen::Index size = Eigen::Index{motion.model.noise_size()} * motion.model.noise_size();
-  std::fill_n(l, size, kNotWritten);
-  const Status status = motion.model.SqrtQ(BlocksAt(place, x).data(), dt_s, l);
-  if (status != Status::kOk) return OutcomeOf(status);
-  return AreFinite(l, size) ? Outcome::kAccepted : Outcome::kNotFinite;
-}
-
-Trouble TroubleOf(const MotionBinding& motion, Outcome outcome) {
-  if (outcome == Outcome::kAccepted) return {};
-  const std::string who = "motion model of '" + motion.name + "' ";
-  if (outcome == Outcome::kNotFinite) {
-    return {"not_finite", who + "steps to a state that is not finite"};
-  }
-  const bool failed = outcome == Outcome::kFailed;
-  return {failed ? "plugin_failed" : "diverged",
-          who + "cannot step: " + (failed ? motion.model.error_text() : "out of its domain")};
-}
-
-void TakeStep(const MotionBinding& motion, const StateLayout& layout, const double* next,
-              double* x) {
-  for (const BlockId id : motion.blocks) {
-    const Block& block = layout[id];
-    if (block.status == BlockStatus::kConstant) continue;
-    const Geometry& geometry = block.geometry();
-    double* const value = x + block.value_offset;
-    std::copy_n(next + block.value_offset, geometry.ambient, value);
-    if (geometry.kind != GeometryKind::kVector) geometry.Normalise(value);
-  }
-}
 
 Motions::Motions(const Binding& binding)
     : binding_(&binding),
@@ -94,7 +23,7 @@ Motions::Motions(const Binding& binding)
     step.l.resize(n_w * n_w);
     step.gl.resize(n * n_w);
     step.q.resize(n * n);
-    if (binding.motions[i].holds) step.m.resize(n * n_w);
+    if (binding.motion_places[i].holds) step.m.resize(n * n_w);
   }
 }
 
@@ -105,7 +34,7 @@ void Motions::Activate(const StateLayout& layout) {
     steps_[i].active =
         !motion.model.stationary() &&
         std::ranges::all_of(motion.blocks, [&](BlockId id) { return layout[id].present; });
-    holds_ = holds_ || (steps_[i].active && binding_->motions[i].holds);
+    holds_ = holds_ || (steps_[i].active && binding_->motion_places[i].holds);
   }
 }
 
@@ -119,7 +48,7 @@ Trouble Motions::Evaluate(const State& state, double dt_s, bool derivatives) {
 
 Trouble Motions::EvaluateOne(std::size_t i, const State& state, double dt_s, bool derivatives) {
   const MotionBinding& motion = binding_->system.motions[i];
-  const MotionPlace& place = binding_->motions[i];
+  const MotionPlace& place = binding_->motion_places[i];
   Step& step = steps_[i];
   const bool goes_on = place.holds && in_interval();
   // The first step may have been the fast path's, which keeps no M.
@@ -198,7 +127,7 @@ void Motions::Propagate(Covariance& p) {
   const Workspace::Use use(memory_);
   for (std::size_t i = 0; i < steps_.size(); ++i) {
     const Step& step = steps_[i];
-    const MotionPlace& place = binding_->motions[i];
+    const MotionPlace& place = binding_->motion_places[i];
     if (!step.active || place.parts.empty()) continue;
     if (place.rows.empty()) {
       p.Propagate(place.parts, step.f.data(), step.q.data());
@@ -233,8 +162,8 @@ Workspace::Matrix Motions::Transition(int n, Workspace& work) const {
   for (std::size_t i = 0; i < steps_.size(); ++i) {
     if (!steps_[i].active) continue;
     const double* f = steps_[i].f.data();
-    for (const int row : binding_->motions[i].at) {
-      for (const int column : binding_->motions[i].at) {
+    for (const int row : binding_->motion_places[i].at) {
+      for (const int column : binding_->motion_places[i].at) {
         if (row >= 0 && column >= 0) transition(row, column) = *f;
         ++f;
       }
@@ -252,7 +181,7 @@ Workspace::Matrix Motions::Spread(std::vector<double> Step::*matrix, bool held_o
   Eigen::Index columns = 0;
   for (std::size_t i = 0; i < steps_.size(); ++i) {
     const Step& step = steps_[i];
-    const MotionPlace& place = binding_->motions[i];
+    const MotionPlace& place = binding_->motion_places[i];
     if (!step.active) continue;
     const MotionModel& model = binding_->system.motions[i].model;
     const Eigen::Index width = model.noise_size();

@@ -3,9 +3,10 @@
 
 #include <algorithm>
 
+#include "alidade/base/all_finite.h"
 #include "alidade/base/number_text.h"
-#include "alidade/filter/factorise.h"
 #include "alidade/filter/first_values.h"
+#include "alidade/filter/square_root.h"
 
 namespace alidade::internal {
 namespace {
@@ -91,20 +92,20 @@ void Recovery::RepairCovariance(FilterState& f, std::span<Row> rows) {
            std::to_string(options_.max_repairs) + ")");
 }
 
-void Recovery::CountRejections(FilterState& f, std::span<Row> rows) {
+void Recovery::RecoverRejected(FilterState& f, std::span<Row> rows) {
   for (Row& row : rows) {
     if (f.binding->system.landmarks && row.binding->model.has_landmark()) continue;
-    const auto sensor = static_cast<std::size_t>(row.sensor);
-    const MeasurementReport& entry = *row.report;
-    if (entry.outcome == Outcome::kAccepted || entry.outcome == Outcome::kInitialised) {
-      CountAccepted(f, sensor);
-    }
-    if (!IsRejected(entry)) continue;
-    if (++rejections_[sensor] < options_.after) continue;
-    if (options_.action == RejectionRecovery::kNone) continue;
-    rejections_[sensor] = 0;
-    Recover(f, row);
+    if (Count(f, *row.report)) Recover(f, row);
   }
+}
+
+/// Counts one that was not accepted.
+bool Recovery::IsTooOften(const MeasurementReport& entry) {
+  if (options_.action == RejectionRecovery::kNone || !IsRejected(entry)) return false;
+  int& count = rejections_[static_cast<std::size_t>(entry.sensor)];
+  if (++count < options_.after) return false;
+  count = 0;
+  return true;
 }
 
 /// Resets what the sensor determines from its measurement, with the blocks that move with it at

@@ -21,22 +21,29 @@ class Recovery {
   void RepairCovariance(FilterState& f, std::span<Row> rows);
   /// Counts rejections in a row for each sensor, and recovers one that was rejected too often
   /// (event `rejection_recovery`). Rejected landmarks do not count.
-  void CountRejections(FilterState& f, std::span<Row> rows);
+  void RecoverRejected(FilterState& f, std::span<Row> rows);
 
-  // For the fast path, which takes no part in recovering.
   /// Whether one more rejection of the sensor is one too many.
-  bool IsDueNext(std::size_t sensor) const { return rejections_[sensor] + 1 >= options_.after; }
-  void CountAccepted(FilterState& f, std::size_t sensor) {
+  bool IsDueNext(std::size_t sensor) const {
+    return options_.action != RejectionRecovery::kNone && rejections_[sensor] + 1 >= options_.after;
+  }
+  /// Counts what became of one measurement. Whether its sensor has to recover.
+  bool Count(FilterState& f, const MeasurementReport& entry) {
+    if (entry.outcome != Outcome::kAccepted && entry.outcome != Outcome::kInitialised) {
+      return IsTooOften(entry);
+    }
+    const auto sensor = static_cast<std::size_t>(entry.sensor);
     rejections_[sensor] = 0;
     inflated_[sensor] = f.said.out_of_domain[sensor] = 0;
+    return false;
   }
-  void CountRejected(std::size_t sensor) { ++rejections_[sensor]; }
 
  private:
   struct Options {
     RejectionRecovery action;
     int after, max_repairs;
   };
+  bool IsTooOften(const MeasurementReport& entry);
   void Recover(FilterState& f, Row& row);
 
   Options options_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/filter/rows.h"
 
+#include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 
 namespace alidade::internal {
@@ -8,7 +9,7 @@ namespace alidade::internal {
 void Rows::Collect(const Frame& frame, const Binding& binding, UpdateReport& report) {
   count_ = 0;
   report.ClearMeasurements();
-  for (std::size_t sensor = 0; sensor < binding.sensors.size(); ++sensor) {
+  for (std::size_t sensor = 0; sensor < binding.sensor_places.size(); ++sensor) {
     const SensorBinding& bound = binding.system.sensors[sensor];
     const Geometry& geometry = bound.model.measurement().geometry;
     for (const Measurement& m : frame.measurements) {
@@ -22,7 +23,7 @@ void Rows::Collect(const Frame& frame, const Binding& binding, UpdateReport& rep
       row.sensor = static_cast<int>(sensor);
       row.binding = &bound;
       row.model = &bound.model;
-      row.place = &binding.sensors[sensor];
+      row.place = &binding.sensor_places[sensor];
       MeasurementReport& entry = report.Add();
       entry.Reset(row.sensor, m.landmark, geometry.tangent);
       entry.z.assign(m.values.begin(), m.values.end());

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "alidade/filter/binding.h"
-#include "alidade/filter/estimator.h"
+#include "alidade/filter/update_report.h"
 
 namespace alidade::internal {
 

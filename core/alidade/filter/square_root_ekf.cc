@@ -1,17 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/filter/square_root_ekf.h"
 
+#include <Eigen/Householder>
+
+#include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
-#include "alidade/filter/factorise.h"
 #include "alidade/filter/filter_options.h"
 #include "alidade/filter/frame_loop.h"
 #include "alidade/filter/linear.h"
+#include "alidade/filter/square_root.h"
 #include "alidade/filter/stack.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade {
 namespace internal {
 namespace {
+
+/// Puts R of A = Q R, the upper triangle of the first n rows, in place of A, m x n, m >= n; below
+/// it lies what is of no use. `work`: n numbers.
+void Triangularise(Eigen::Ref<Eigen::MatrixXd> a, double* work) {
+  for (Eigen::Index k = 0; k < a.cols(); ++k) {
+    const Eigen::Index rows = a.rows() - k, columns = a.cols() - k - 1;
+    double tau = 0.0, beta = 0.0;
+    a.col(k).tail(rows).makeHouseholderInPlace(tau, beta);
+    a(k, k) = beta;
+    a.bottomRightCorner(rows, columns)
+        .applyHouseholderOnTheLeft(a.col(k).tail(rows - 1), tau, work);
+  }
+}
 
 /// root, n x n, with root root' = a a' + b b', for a n x n.
 void TakeRoot(FilterState& f, const Workspace::Matrix& a, const Workspace::Matrix& b,
@@ -54,7 +70,7 @@ class SquareRoot : public Method {
 };
 
 void SquareRoot::Begin(FilterState& f) {
-  noise_roots_.resize(f.binding->sensors.size());
+  noise_roots_.resize(f.binding->sensor_places.size());
   Eigen::LDLT<Eigen::MatrixXd> ldlt;
   SquareRootOf(f.state.covariance().Dense(), ldlt, root_);
   SetCovariance(f);
@@ -110,7 +126,6 @@ void SquareRoot::Project(FilterState& f, Row& row) const {
   s = all.noise;
   AddProductWithTransposed(s, hl, hl);
   row.report->s.assign(s.data(), s.data() + s.size());
-  row.PHt.clear();
 }
 
 Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
@@ -133,10 +148,7 @@ Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
   array.bottomRightCorner(n, n) = root_.transpose();
   Triangularise(array, f.work.Take(m + n).data());
   array.triangularView<Eigen::StrictlyLower>().setZero();
-  if (!array.allFinite() || (array.diagonal().head(m).array() == 0.0).any()) {
-    Note(f, "not_pd", "the update would leave S not positive definite; rolled back");
-    return Outcome::kNotPd;
-  }
+  if (!array.allFinite() || (array.diagonal().head(m).array() == 0.0).any()) return Outcome::kNotPd;
   Workspace::Matrix gain = f.work.Take(n, m), l = f.work.Take(m, m);  // K = W Ls^-1
   Workspace::Vector dx = f.work.Take(n);
   gain = array.topRightCorner(m, n).transpose();
@@ -144,10 +156,7 @@ Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
   Divide(l, gain);
   dx.noalias() = gain * all.innovation;
   f.state.Retract(dx.data(), f.buffers.moved);
-  if (!AllFinite(f.buffers.moved)) {
-    Note(f, "not_finite", "the update is not finite; rolled back");
-    return Outcome::kNotFinite;
-  }
+  if (!AllFinite(f.buffers.moved)) return Outcome::kNotFinite;
   const Workspace::Matrix transport = TransportTo(f, f.buffers.moved);
   f.state.MoveTo(f.buffers.moved);
   root_.setZero();

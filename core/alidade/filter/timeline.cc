@@ -1,10 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/filter/timeline.h"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 #include "alidade/base/number_text.h"
 
 namespace alidade::internal {
 namespace {
+
+/// Number of equal parts in which a gap of `elapsed` > 0 is stepped: at most max_dt_s each, to
+/// whole ns, and at least 1 ns.
+Timestamp StepParts(Timestamp elapsed, double max_dt_s) {
+  constexpr double kBeyond = 9.2e18;  // what a Timestamp cannot hold
+  const double ns = std::round(1e9 * max_dt_s);
+  const Timestamp longest = ns < kBeyond ? std::max<Timestamp>(1, static_cast<Timestamp>(ns))
+                                         : std::numeric_limits<Timestamp>::max();
+  return (elapsed - 1) / longest + 1;
+}
 
 /// Six significant digits.
 std::string Rounded(double value) { return RoundedText(value, 6); }

@@ -6,12 +6,13 @@
 #include <cmath>
 #include <limits>
 
+#include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
-#include "alidade/filter/evaluate_models.h"
-#include "alidade/filter/factorise.h"
+#include "alidade/filter/evaluate_row.h"
 #include "alidade/filter/filter_options.h"
 #include "alidade/filter/method.h"
+#include "alidade/filter/square_root.h"
 #include "alidade/filter/stack.h"
 #include "alidade/state/tiles.h"
 
@@ -68,7 +69,9 @@ class Unscented : public Method {
   explicit Unscented(const UkfOptions& options) : spread_(options) {}
 
   std::unique_ptr<Method> Clone() const override { return std::make_unique<Unscented>(*this); }
-  void Begin(FilterState& f) override { guarded_.assign(f.binding->sensors.size() + 1, false); }
+  void Begin(FilterState& f) override {
+    guarded_.assign(f.binding->sensor_places.size() + 1, false);
+  }
   Trouble Step(FilterState& f, double dt_s) override;
   Outcome Predict(FilterState& f, Row& row) override;
   Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
@@ -168,10 +171,10 @@ void Unscented::TakeHeld(const FilterState& f, const Workspace::Matrix& deviatio
   const Eigen::Index n = deviations.rows(), all = deviations.cols() / 2;
   held_ = (deviations.middleCols(n, all - n) - deviations.rightCols(all - n)) / (2.0 * c);
   Eigen::Index column = 0;
-  for (std::size_t i = 0; i < f.binding->motions.size(); ++i) {
+  for (std::size_t i = 0; i < f.binding->motion_places.size(); ++i) {
     if (!f.motions.steps()[i].active) continue;
     const Eigen::Index inputs = f.binding->system.motions[i].model.noise_size();
-    if (!f.binding->motions[i].holds) held_.middleCols(column, inputs).setZero();
+    if (!f.binding->motion_places[i].holds) held_.middleCols(column, inputs).setZero();
     column += inputs;
   }
 }
@@ -181,7 +184,7 @@ void Unscented::TakeHeld(const FilterState& f, const Workspace::Matrix& deviatio
 void Unscented::NoteGuard(FilterState& f, std::size_t index, int halvings, bool narrow_enough) {
   const bool guarded = halvings > 0 || !narrow_enough;
   if (guarded && !guarded_[index]) {
-    const std::string who = index < f.binding->sensors.size()
+    const std::string who = index < f.binding->sensor_places.size()
                                 ? "sensor '" + f.binding->system.sensors[index].name + "'"
                                 : "motion";
     Note(f, "guarded",
@@ -207,8 +210,8 @@ Status Unscented::StepPoint(FilterState& f, const double* from, const double* no
     const Eigen::Map<const RowMajor> l(step.l.data(), inputs, inputs);
     Workspace::Vector(w.data(), inputs).noalias() =
         l * Eigen::Map<const Eigen::VectorXd>(noise, inputs);
-    const Outcome outcome = StepAt(motion, f.binding->motions[i], from, step.u.data(), w.data(),
-                                   dt_s, next.data(), nullptr, nullptr);
+    const Outcome outcome = StepAt(motion, f.binding->motion_places[i], from, step.u.data(),
+                                   w.data(), dt_s, next.data(), nullptr, nullptr);
     if (outcome == Outcome::kFailed) {
       failed_ = motion.name;
       failure_ = motion.model.error_text();
@@ -368,7 +371,6 @@ void Unscented::Project(FilterState& f, Row& row) {
   MomentsOf(transform.w, moments.f, transform.centre, moments.m, s);
   s += Eigen::Map<const RowMajor>(row.R.data(), m, m);
   row.report->s.assign(s.data(), s.data() + s.size());
-  row.PHt.clear();
 }
 
 /// All rows at one spread: f in place of H, R, innovation and m below one another.
@@ -422,10 +424,7 @@ Outcome Unscented::Correct(FilterState& f, std::span<Row* const> rows) {
   const Transform transform = TransformOf(n, halvings);
   MomentsOf(transform.w, all.h, transform.centre, mean, s);
   s += all.noise;
-  if (!Factorise(s)) {
-    Note(f, "not_pd", "the update would leave S not positive definite; rolled back");
-    return Outcome::kNotPd;
-  }
+  if (!Factorise(s)) return Outcome::kNotPd;
   if (n == 0) {  // nothing to correct
     f.RecordUpdate(rows, nullptr);
     return Outcome::kAccepted;
@@ -445,10 +444,7 @@ Outcome Unscented::Correct(FilterState& f, std::span<Row* const> rows) {
   AddProduct(spread, gain, all.noise);
   AddProductWithTransposed(p, spread, gain);
   f.state.Retract(step.data(), f.buffers.moved);
-  if (!AllFinite(f.buffers.moved) || !p.allFinite()) {
-    Note(f, "not_finite", "the update is not finite; rolled back");
-    return Outcome::kNotFinite;
-  }
+  if (!AllFinite(f.buffers.moved) || !p.allFinite()) return Outcome::kNotFinite;
   f.state.covariance().SetBlock(0, 0, p);
   f.state.MoveTo(f.buffers.moved);
   root_is_current_ = false;

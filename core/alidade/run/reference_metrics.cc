@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/run/reference_metrics.h"
 
+#include "alidade/base/all_finite.h"
+
 namespace alidade::internal {
 std::vector<std::vector<double>> ValuesOf(const State& state, std::size_t blocks) {
   std::vector<std::vector<double>> values(blocks);

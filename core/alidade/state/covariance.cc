@@ -112,6 +112,22 @@ void Covariance::SetRows(int offset, const ConstMatrix& own) {
   SetBlock(offset, offset, own);
 }
 
+void Covariance::SetParts(std::span<const JacobianPart> parts, const ConstMatrix& own,
+                          const ConstMatrix& cross) {
+  for (const JacobianPart& a : parts) {
+    SetRows(a.offset, own.block(a.column, a.column, a.size, a.size),
+            cross.middleCols(a.column, a.size));
+  }
+  // Between parts that wrote `cross`.
+  for (const JacobianPart& a : parts) {
+    for (const JacobianPart& b : parts) {
+      if (b.column < a.column) {
+        SetBlock(a.offset, b.offset, own.block(a.column, b.column, a.size, b.size));
+      }
+    }
+  }
+}
+
 void Covariance::Propagate(std::span<const JacobianPart> parts, const double* f, const double* q) {
   int k = 0;
   for (const JacobianPart& part : parts) k += part.size;
@@ -124,18 +140,7 @@ void Covariance::Propagate(std::span<const JacobianPart> parts, const double* f,
   own.setZero();
   Project({f, k, k, parts}, cross.data(), own.data());
   own += Eigen::Map<const RowMajor>(q, k, k);
-  for (const JacobianPart& a : parts) {
-    SetRows(a.offset, own.block(a.column, a.column, a.size, a.size),
-            cross.middleCols(a.column, a.size));
-  }
-  // Between parts SetRows wrote P_ai F_i'; there both sides move.
-  for (const JacobianPart& a : parts) {
-    for (const JacobianPart& b : parts) {
-      if (b.column < a.column) {
-        SetBlock(a.offset, b.offset, own.block(a.column, b.column, a.size, b.size));
-      }
-    }
-  }
+  SetParts(parts, own, cross);
 }
 
 void Covariance::Project(const JacobianRows& h, double* pht, double* s) const {

@@ -30,10 +30,10 @@ struct JacobianRows {
   bool whole = false;  ///< rows are as wide as the covariance, zeros included
 };
 
-/// The covariance P of a state in its tangent, behind block queries only: who uses it names rows by
-/// (offset, size) and never sees the storage. Dense here: one symmetric matrix, the lower triangle
-/// authoritative, with spare capacity. Offsets and sizes lie in [0, size()], as Add gave them; they
-/// are not checked, but where said.
+/// The covariance P of a state in its tangent, behind block queries: who uses it names rows by
+/// (offset, size). Dense: one symmetric matrix, the lower triangle authoritative, with spare
+/// capacity; the fast path and square roots take it from where it lies. Offsets and sizes lie in
+/// [0, size()], as Add gave them; they are not checked, but where said.
 /// Nothing allocates memory in the steady state but what returns a matrix.
 class Covariance {
  public:
@@ -65,6 +65,10 @@ class Covariance {
   void SetRows(int offset, const ConstMatrix& own, const ConstMatrix& cross);
   /// The same, zero elsewhere.
   void SetRows(int offset, const ConstMatrix& own);
+  /// Sets the rows of all `parts`, of k columns together: `own` (k x k) among them, `cross` (n x k)
+  /// elsewhere.
+  void SetParts(std::span<const JacobianPart> parts, const ConstMatrix& own,
+                const ConstMatrix& cross);
 
   /// pht = P H' (n x m, by columns) and s += H P H' (m x m). O(n m k), k the columns of H's parts.
   void Project(const JacobianRows& h, double* pht, double* s) const;
@@ -96,7 +100,7 @@ class Covariance {
   double* data() { return p_.data(); }
   const double* data() const { return p_.data(); }
   int stride() const { return static_cast<int>(p_.rows()); }
-  /// The whole matrix, mirrored; for records and tests.
+  /// The whole matrix, mirrored.
   Eigen::MatrixXd Dense() const;
 
  private:

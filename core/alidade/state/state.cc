@@ -92,15 +92,7 @@ void State::Initialise(std::span<const BlockId> ids, const double* values,
     PlaceValue(id, values);
     values += layout_[id].geometry().ambient;
   }
-  parts_.clear();
-  int column = 0;
-  for (const BlockId id : from) {
-    const Block& block = layout_[id];
-    const int size = block.geometry().tangent;
-    if (block.has_covariance()) parts_.push_back({block.tangent_offset, size, column});
-    column += size;
-  }
-  ALIDADE_EXPECTS(jacobian.cols() == column);
+  ALIDADE_EXPECTS(jacobian.cols() == FindParts(from));
   const Workspace::Use use(memory_);
   const Eigen::Index rows = jacobian.rows();
   Workspace::Matrix cross = memory_.Take(covariance_.size(), rows), p = memory_.Take(rows, rows);
@@ -109,32 +101,21 @@ void State::Initialise(std::span<const BlockId> ids, const double* values,
       {jacobian.data(), static_cast<int>(rows), static_cast<int>(jacobian.outerStride()), parts_},
       cross.data(), p.data());
   p += own;
-  Eigen::Index at = 0;
-  for (const BlockId id : ids) {
+  FindParts(ids);
+  covariance_.SetParts(parts_, p, cross);
+}
+
+/// Puts the rows of the blocks in P into parts_, and returns the size of their tangents.
+int State::FindParts(std::span<const BlockId> blocks) {
+  parts_.clear();
+  int column = 0;
+  for (const BlockId id : blocks) {
     const Block& block = layout_[id];
-    const Eigen::Index size = block.geometry().tangent;
-    if (block.has_covariance()) {
-      covariance_.SetRows(block.tangent_offset, p.block(at, at, size, size),
-                          cross.middleCols(at, size));
-    }
-    at += size;
+    const int size = block.geometry().tangent;
+    if (block.has_covariance()) parts_.push_back({block.tangent_offset, size, column});
+    column += size;
   }
-  // So far the new blocks have no more in common than P has of them.
-  Eigen::Index row = 0;
-  for (const BlockId a : ids) {
-    const Eigen::Index size = layout_[a].geometry().tangent;
-    Eigen::Index other = 0;
-    for (const BlockId b : ids) {
-      if (b == a) break;
-      const Eigen::Index its = layout_[b].geometry().tangent;
-      if (layout_[a].has_covariance() && layout_[b].has_covariance()) {
-        covariance_.SetBlock(layout_[a].tangent_offset, layout_[b].tangent_offset,
-                             p.block(row, other, size, its));
-      }
-      other += its;
-    }
-    row += size;
-  }
+  return column;
 }
 
 BlockId State::Clone(BlockId source, std::string_view name) {
@@ -146,11 +127,6 @@ BlockId State::Clone(BlockId source, std::string_view name) {
   Initialise({&id, 1}, copy.data(), {&source, 1}, RowMajor::Identity(n, n),
              Eigen::MatrixXd::Zero(n, n));
   return id;
-}
-
-void State::Marginalise(BlockId id) {
-  ALIDADE_EXPECTS(layout_[id].present);
-  Release(id);
 }
 
 /// Gives the place of a block back.

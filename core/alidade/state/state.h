@@ -89,9 +89,8 @@ class State {
                   const Eigen::Ref<const RowMajor>& jacobian, const Covariance::ConstMatrix& own);
   /// Declares `name` as a copy of `source`, fully correlated with it.
   BlockId Clone(BlockId source, std::string_view name);
-  /// Drops the block; the rest keeps its value and covariance.
-  void Marginalise(BlockId id);
-  /// Marginalise, and gives the id back too: a block declared later may have it.
+  /// Drops the block, with its id: a block declared later may have it. The rest keeps its value and
+  /// covariance.
   void Drop(BlockId id);
   /// moved = the values x_i (+) dx_i of all blocks with a covariance, the rest as it is; dx is
   /// indexed like the covariance. Changes nothing: see MoveTo.
@@ -102,6 +101,7 @@ class State {
 
  private:
   void PlaceValue(BlockId id, const double* value);
+  int FindParts(std::span<const BlockId> blocks);
   void Release(BlockId id);
   void FillGaps();
 

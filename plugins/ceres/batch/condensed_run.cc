@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "alidade/base/all_finite.h"
 #include "alidade/base/number_text.h"
 #include "alidade/filter/rows.h"
 
@@ -44,9 +45,9 @@ CondensedRun::CondensedRun(System system, const std::vector<StreamInfo>& streams
   has_unit_vector_ = std::ranges::any_of(initial_.layout().blocks(), [](const Block& block) {
     return block.has_covariance() && block.geometry().kind == GeometryKind::kUnitVector;
   });
-  held_.assign(binding_.motions.size(), -1);
-  held_l_.resize(binding_.motions.size());
-  for (std::size_t i = 0; i < binding_.sensors.size(); ++i) {
+  held_.assign(binding_.motion_places.size(), -1);
+  held_l_.resize(binding_.motion_places.size());
+  for (std::size_t i = 0; i < binding_.sensor_places.size(); ++i) {
     const SensorBinding& sensor = binding_.system.sensors[i];
     places_.push_back(PlaceBehind(i, sensor.model));
     xyz_places_.push_back(PlaceBehind(i, sensor.xyz.value_or(sensor.model)));
@@ -57,7 +58,7 @@ CondensedRun::CondensedRun(System system, const std::vector<StreamInfo>& streams
 /// The place of a sensor in x and S; that of a landmark which it observes lies behind them.
 internal::SensorPlace CondensedRun::PlaceBehind(std::size_t sensor,
                                                 const SensorModel& model) const {
-  internal::SensorPlace place = binding_.sensors[sensor];
+  internal::SensorPlace place = binding_.sensor_places[sensor];
   if (!ObservesLandmarks(binding_.system.sensors[sensor])) return place;
   State behind = initial_;
   std::vector<BlockId> landmark;
@@ -140,7 +141,7 @@ bool CondensedRun::AddSteps(Timestamp from, Timestamp to, Epoch& epoch) {
                   std::to_string(kMostInputs) + " steps of max_dt_s");
     }
     for (Timestamp part = 0; part < piece.steps; ++part) {
-      for (std::size_t i = 0; i < binding_.motions.size(); ++i) {
+      for (std::size_t i = 0; i < binding_.motion_places.size(); ++i) {
         const MotionBinding& motion = binding_.system.motions[i];
         if (motion.model.stationary() || !AllPresent(motion.blocks)) continue;
         const std::span<const double> u = time_.inputs().Use(i, from, events);
@@ -152,7 +153,7 @@ bool CondensedRun::AddSteps(Timestamp from, Timestamp to, Epoch& epoch) {
         step.columns = inputs_;
         step.u.assign(u.begin(), u.end());
         if (step.begins) inputs_ += motion.model.noise_size();
-        if (binding_.motions[i].holds) held_[i] = step.column;
+        if (binding_.motion_places[i].holds) held_[i] = step.column;
       }
       if (inputs_ > kMostInputs) return FailTooMany();
     }
@@ -230,7 +231,7 @@ bool CondensedRun::Begin(const double* e, bool sensitivity, Point& point) const 
   initial_.Retract(d.data(), point.x);
   point.offset = Eigen::VectorXd::Zero(n);
   point.s.resize(0, 0);
-  if (!AllFinite(point.x)) return Fail("the initial state is not finite");
+  if (!internal::AllFinite(point.x)) return Fail("the initial state is not finite");
   if (!sensitivity) return true;
   point.s = Eigen::MatrixXd::Zero(n, inputs_);
   for (std::size_t id = 0; id < initial_.layout().blocks().size(); ++id) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alidade/base/all_finite.h"
 #include "alidade/base/number_text.h"
 #include "alidade/filter/evaluate_models.h"
 #include "alidade/model/geometry.h"
@@ -42,7 +43,7 @@ std::string TextOf(const SensorBinding& sensor, const Measurement& measurement) 
 /// offset = F offset, in the rows of the model.
 bool CondensedRun::Move(const Step& step, const double* e, Point& point) const {
   const MotionBinding& motion = binding_.system.motions[step.motion];
-  const internal::MotionPlace& place = binding_.motions[step.motion];
+  const internal::MotionPlace& place = binding_.motion_places[step.motion];
   const int n = motion.model.tangent_size(), n_w = motion.model.noise_size();
   const Eigen::VectorXd w = step.l * Eigen::Map<const Eigen::VectorXd>(e + step.column, n_w);
   const bool sensitivity = point.s.size() > 0;
@@ -75,7 +76,8 @@ bool CondensedRun::Invert(const Factor& factor, const Eigen::VectorXd& d, const 
                           const Point& point, const std::string& name, Inverse& inverse) const {
   const SensorBinding& sensor = SensorOf(factor);
   const Geometry& measured = sensor.model.measurement().geometry;
-  const internal::SensorPlace& place = binding_.sensors[static_cast<std::size_t>(factor.sensor)];
+  const internal::SensorPlace& place =
+      binding_.sensor_places[static_cast<std::size_t>(factor.sensor)];
   std::vector<double> z = factor.measurement.values;
   RowMajor j_plus(measured.tangent, measured.tangent);
   measured.PlusJacobian(z.data(), d.data(), j_plus.data());
@@ -180,7 +182,7 @@ bool CondensedRun::FreezeStep(Step& step, const Point& point) {
     return true;
   }
   const MotionBinding& motion = binding_.system.motions[step.motion];
-  const internal::MotionPlace& place = binding_.motions[step.motion];
+  const internal::MotionPlace& place = binding_.motion_places[step.motion];
   RowMajor l(motion.model.noise_size(), motion.model.noise_size());
   const Outcome outcome = internal::SqrtQAt(motion, place, point.x.data(), step.dt_s, l.data());
   if (outcome != Outcome::kAccepted) return Fail(internal::TroubleOf(motion, outcome).text);
@@ -198,7 +200,7 @@ bool CondensedRun::FreezeFactor(Factor& factor, const std::vector<double>& x) {
   if (outcome != Outcome::kAccepted) return Fail(noise + ": " + Why(outcome, *factor.model));
   const int m = factor.model->measurement().geometry.tangent;
   const Eigen::LLT<Eigen::MatrixXd> llt(Eigen::Map<const RowMajor>(r.data(), m, m));
-  if (!AllFinite(r) || llt.info() != Eigen::Success) {  // which takes NaN for a success
+  if (!internal::AllFinite(r) || llt.info() != Eigen::Success) {  // which takes NaN for a success
     return Fail(noise + " is not positive definite: a batch needs sigma > 0");
   }
   const Eigen::MatrixXd l = llt.matrixL();

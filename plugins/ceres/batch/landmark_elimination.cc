@@ -34,7 +34,7 @@ double PriorOf(std::int64_t id, const SensorBinding& sensor, const LandmarkOptio
 /// What no filter has to say: landmarks known beforehand, and which rows of a state sensors read.
 void CondensedRun::AddKnown() {
   std::vector<bool> reads(static_cast<std::size_t>(initial_.covariance().size()), false);
-  for (const internal::SensorPlace& place : binding_.sensors) {
+  for (const internal::SensorPlace& place : binding_.sensor_places) {
     for (const JacobianPart& part : place.parts) {
       std::fill_n(reads.begin() + part.offset, part.size, true);
     }

@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "support/landmark_models.h"
+#include "support/systems.h"
 
 namespace alidade::testing {
 namespace {
@@ -136,6 +137,30 @@ TEST(OnePointRansac, RescuesByItsOwnThreshold) {
   }
   EXPECT_GT(rescued[0], 0);
   EXPECT_EQ(rescued[1], 0);
+}
+
+// A value that is nearly too large, with a sensor that nobody rejects, takes the update by those
+// that agree with it: there is no corrected state then that the others could fit.
+TEST(OnePointRansac, RescuesNothingAfterAnUpdateThatIsRolledBack) {
+  for (const bool overflows : {false, true}) {
+    System system = KnownMap();
+    system.sensors[0].outlier_rejection = OnePointRansac{};
+    AddMotion(system, "far", InProcessMotion(Constant<>(1), "constant"), {{"x", 1.5e308, 1.0}});
+    AddSensor(system, "z", InProcessSensor(Linear(0.1, 0.3), "linear"), {"far.x"});
+    Ekf ekf(system, {}, StreamsOf(system));
+    const std::vector<double> before = ekf.state().values();
+    Frame frame = Matches({0.05, -0.03, 0.08}, 1000, 0.0);
+    frame.measurements.push_back({0, 1, -1, {overflows ? 5e307 : 1.5e307}, {}});
+    const UpdateReport& report = ekf.Process(frame);
+    EXPECT_EQ(report.landmarks.rescued > 0, !overflows);
+    EXPECT_EQ(ekf.state().values() == before, overflows);
+    std::ptrdiff_t count[kOutcomes] = {};
+    for (const MeasurementReport& one : report.measurements())
+      ++count[static_cast<int>(one.outcome)];
+    EXPECT_EQ(count[static_cast<int>(Outcome::kNotFinite)] > 1, overflows);
+    EXPECT_EQ(count[static_cast<int>(Outcome::kGated)] > 1, overflows);
+    EXPECT_EQ(count[static_cast<int>(Outcome::kAccepted)] == 0, overflows);
+  }
 }
 
 // By a support that no match meets all are tried and none agrees; all fit the state as it was.

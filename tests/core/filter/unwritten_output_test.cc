@@ -4,6 +4,7 @@
 // of a small filter as in the general one, at the first measurement as at any other.
 #include <gtest/gtest.h>
 
+#include "alidade/filter/ukf.h"
 #include "support/systems.h"
 
 namespace alidade {
@@ -11,8 +12,8 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// The output of which the elements off the diagonal (of L: above it) are left out.
-enum class Left { kNothing, kSensorL, kSensorH, kMotionL, kF, kG };
+/// The output of which the elements off the diagonal (of L: above it; of h: the last) are left out.
+enum class Left { kNothing, kPrediction, kSensorL, kSensorH, kMotionL, kF, kG };
 
 void WriteDiagonal(double value, bool zeros_too, double* j, int stride) {
   for (int row = 0; row < 2; ++row) {
@@ -45,7 +46,7 @@ struct HandWritten {
     sensor.struct_size = sizeof(sensor);
     sensor.eval = [](const void* self, const double* const* roles, double* z,
                      double* const* jacobians, const std::int32_t* strides) {
-      for (int i = 0; i < 2; ++i) z[i] = roles[0][i];
+      for (int i = 0; i < (Leaves(self, Left::kPrediction) ? 1 : 2); ++i) z[i] = roles[0][i];
       if (jacobians != nullptr && jacobians[0] != nullptr) {
         WriteDiagonal(1.0, !Leaves(self, Left::kSensorH), jacobians[0], strides[0]);
       }
@@ -111,7 +112,7 @@ System Direct(HandWritten& hand, bool aside) {
 class Unwritten : public ::testing::TestWithParam<bool> {};
 
 TEST_P(Unwritten, OutputOfASensorIsNotFiniteAtEveryMeasurement) {
-  for (const Left left : {Left::kNothing, Left::kSensorL, Left::kSensorH}) {
+  for (const Left left : {Left::kNothing, Left::kPrediction, Left::kSensorL, Left::kSensorH}) {
     HandWritten hand(left);
     const System system = Direct(hand, GetParam());
     Ekf ekf(system, {}, StreamsOf(system));
@@ -136,6 +137,23 @@ TEST_P(Unwritten, OutputOfAMotionModelEndsTheFilterAtItsFirstStep) {
     const UpdateReport& report = ekf.Process(FrameAt(0.1, {}));
     EXPECT_EQ(HasEvent(report, "not_finite"), left != Left::kNothing) << static_cast<int>(left);
     EXPECT_EQ(ekf.failed(), left != Left::kNothing) << static_cast<int>(left);
+  }
+}
+
+// The memory that h comes into was that of the measurement before.
+TEST(UnwrittenAtPoints, IsNotFiniteAtEveryMeasurement) {
+  for (const Left left : {Left::kNothing, Left::kPrediction}) {
+    HandWritten hand(left);
+    const System system = Direct(hand, false);
+    Ukf ukf(system, {}, StreamsOf(system));
+    ukf.Start(0);
+    for (int k = 0; k < 4; ++k) {
+      Frame frame = FrameAt(0.1 * k, {});
+      frame.measurements.push_back({frame.timestamp, 0, -1, {1.5, 2.5}, {}});
+      EXPECT_EQ(ukf.Process(frame).measurements()[0].outcome,
+                left == Left::kNothing ? Outcome::kAccepted : Outcome::kNotFinite)
+          << k;
+    }
   }
 }
 

@@ -67,7 +67,8 @@ TEST(State, ABlockThatHasAValueTakesAnotherInItsPlace) {
   const Eigen::RowVector2d ja(1.0, -2.0);
   const Eigen::MatrixXd own = Eigen::MatrixXd::Constant(1, 1, 0.25);
   const double value = 7.0;
-  moved.Marginalise(b);
+  moved.Drop(b);
+  ASSERT_EQ(moved.Declare("s.b", "s", Named(Geometry::Vector(1))), b);
   for (State* one : {&state, &moved})
     one->Initialise(std::array{b}, &value, std::array{a}, ja, own);
   for (const char* x : {"s.a", "s.b", "s.c"}) {
@@ -94,17 +95,17 @@ TEST(State, AReservedPlaceIsTakenByItsBlockAlone) {
   EXPECT_FALSE(state.layout()[first].present);
   EXPECT_EQ(state.covariance().Dense(),
             Eigen::Vector3d(0.0, 4.0, 4.0).asDiagonal().toDenseMatrix());
-  state.Marginalise(third);
+  state.Drop(third);
   state.Add(first, &value, Eigen::MatrixXd::Constant(1, 1, 9.0));
   EXPECT_EQ(state.layout()[first].tangent_offset, 0);
   EXPECT_EQ(state.layout()[first].value_offset, 0);
   EXPECT_EQ(state.covariance().Dense(), Eigen::Vector2d(9.0, 4.0).asDiagonal().toDenseMatrix());
 }
 
-TEST(State, MarginaliseKeepsTheRestAndFillsTheGap) {
+TEST(State, DropKeepsTheRestAndFillsTheGap) {
   State state = Abc();
   const Eigen::MatrixXd bc = Cross(state, "s.b", "s.c");
-  state.Marginalise(state.layout().Find("s.a"));
+  state.Drop(state.layout().Find("s.a"));
   // c, the last block of the same size, moved into the place of a.
   EXPECT_EQ(state.covariance().size(), 3);
   EXPECT_EQ(Cross(state, "s.b", "s.c"), bc);
@@ -112,7 +113,7 @@ TEST(State, MarginaliseKeepsTheRestAndFillsTheGap) {
   EXPECT_EQ(state.value(state.layout().Find("s.c"))[1], 2.0);
 }
 
-TEST(State, MarginaliseMovesAtMostOneBlock) {
+TEST(State, DropMovesAtMostOneBlock) {
   State state;
   std::vector<BlockId> ids;
   for (int i = 0; i < 20; ++i) {
@@ -120,7 +121,7 @@ TEST(State, MarginaliseMovesAtMostOneBlock) {
     ids.push_back(state.Declare("s.b" + std::to_string(i), "s", Named(Geometry::Vector(1))));
     state.Add(ids.back(), &value, Eigen::MatrixXd::Constant(1, 1, 1.0 + i));
   }
-  state.Marginalise(ids[4]);
+  state.Drop(ids[4]);
   int moved = 0;
   for (int i = 0; i < 20; ++i) {
     if (i == 4) continue;
@@ -142,7 +143,7 @@ TEST(State, ASmallerBlockAtTheEndMovesIntoAGap) {
   state.Add(a, value, Eigen::MatrixXd::Constant(1, 1, 4.0));
   state.Add(b, value, Eigen::MatrixXd::Constant(1, 1, 9.0));
   state.covariance().SetBlock(3, 4, Eigen::MatrixXd::Constant(1, 1, 5.0));
-  state.Marginalise(large);
+  state.Drop(large);
   EXPECT_EQ(state.covariance().size(), 2);
   EXPECT_EQ(Cross(state, "s.a", "s.a")(0), 4.0);
   EXPECT_EQ(Cross(state, "s.b", "s.b")(0), 9.0);

@@ -6,6 +6,7 @@
 #include "alidade/run/run.h"
 #include "batch_fixture.h"
 #include "support/comma_locale.h"
+#include "support/landmark_models.h"
 
 /// How a batch starts and ends: what it says where it is not at the optimum.
 namespace alidade {
@@ -149,6 +150,26 @@ TEST(CeresBatchEnds, ThatItsFilterEndedIsSaid) {
   EXPECT_FALSE(batch->failed());
   EXPECT_EQ(std::ranges::count(outcomes, Outcome::kAccepted), 4);
   EXPECT_EQ(std::ranges::count(outcomes, Outcome::kNotReady), 3);
+}
+
+// What it could have predicted of landmarks, too, is left out.
+TEST(CeresBatchEnds, LandmarksSeenAfterItsFilterEndedAreLeftOut) {
+  System system = testing::MapSystem(testing::Offset(0.1), {}, 0.3);
+  testing::AddMotion(system, "p", InProcessMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
+  for (const bool ends : {false, true}) {
+    const auto batch = MakeBatch(system);
+    Failing::budget = ends ? 0 : 1000;
+    for (int k = 0; k < 3; ++k) {
+      batch->Process(testing::FrameOf(0.1 * k, {{7, {1.0, 0.0, 2.0}}}));
+      if (k == 1) Failing::budget = 1000;
+    }
+    std::vector<Outcome> outcomes;
+    batch->Smooth([&](std::size_t, const State&, const UpdateReport& report) {
+      outcomes.push_back(report.measurements()[0].outcome);
+    });
+    const Outcome later = ends ? Outcome::kEnded : Outcome::kAccepted;
+    EXPECT_EQ(outcomes, (std::vector{Outcome::kInitialised, later, later}));
+  }
 }
 
 // It ends at its last good state, and says so once.

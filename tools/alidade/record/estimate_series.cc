@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/filter/estimator.h"
+#include "alidade/filter/update_report.h"
 
 namespace alidade::internal {
 namespace {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Cholesky>
-#include <Eigen/Householder>
 #include <algorithm>
 #include <cmath>
 
@@ -23,19 +22,6 @@ inline double SquareRootOf(const Eigen::Ref<const Eigen::MatrixXd>& p,
   const double least = d.minCoeff(), largest = p.diagonal().maxCoeff();
   if (!(least < 0.0)) return 0.0;
   return largest > 0.0 ? least / largest : -1.0;
-}
-
-/// Puts R of A = Q R, the upper triangle of the first n rows, in place of A, m x n, m >= n; below
-/// it lies what is of no use. `work`: n numbers.
-inline void Triangularise(Eigen::Ref<Eigen::MatrixXd> a, double* work) {
-  for (Eigen::Index k = 0; k < a.cols(); ++k) {
-    const Eigen::Index rows = a.rows() - k, columns = a.cols() - k - 1;
-    double tau = 0.0, beta = 0.0;
-    a.col(k).tail(rows).makeHouseholderInPlace(tau, beta);
-    a(k, k) = beta;
-    a.bottomRightCorner(rows, columns)
-        .applyHouseholderOnTheLeft(a.col(k).tail(rows - 1), tau, work);
-  }
 }
 
 }  // namespace alidade::internal

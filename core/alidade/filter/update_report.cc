@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/filter/estimator.h"
+#include "alidade/filter/update_report.h"
 
-#include <algorithm>
-#include <cmath>
 #include <iterator>
-#include <limits>
 
 namespace alidade {
 
@@ -20,14 +17,6 @@ Outcome OutcomeOf(Status status) {
       break;
   }
   return Outcome::kFailed;
-}
-
-Timestamp StepParts(Timestamp elapsed, double max_dt_s) {
-  constexpr double kBeyond = 9.2e18;  // what a Timestamp cannot hold
-  const double ns = std::round(1e9 * max_dt_s);
-  const Timestamp longest = ns < kBeyond ? std::max<Timestamp>(1, static_cast<Timestamp>(ns))
-                                         : std::numeric_limits<Timestamp>::max();
-  return (elapsed - 1) / longest + 1;
 }
 
 const char* ToString(Outcome outcome) {

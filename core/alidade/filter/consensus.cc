@@ -47,7 +47,10 @@ void Consensus::FindBest(FilterState& f, std::uint64_t seed) {
   std::iota(order_.begin(), order_.end(), 0);
   best_.assign(matches_.size(), 0);
   std::ptrdiff_t most = 0;
-  const double failure = 1.0 - matches_[0]->binding->outlier_rejection->confidence;
+  double failure = 1.0;  // the least that a sensor allows
+  for (const Row* const row : matches_) {
+    failure = std::min(failure, 1.0 - row->binding->outlier_rejection->confidence);
+  }
   double tries = static_cast<double>(order_.size());
   for (std::size_t k = 0; static_cast<double>(k) < tries; ++k) {
     const auto left = static_cast<double>(order_.size() - k);

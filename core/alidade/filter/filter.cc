@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "alidade/base/error.h"
+#include "alidade/base/number_text.h"
 #include "alidade/base/words.h"
 #include "alidade/filter/frame_loop.h"
 
@@ -50,6 +51,9 @@ namespace {
                                         "'; the filter has " + internal::Join(known));
 }
 
+/// On the length of a unit value, as for those of a config.
+constexpr double kTolerance = 1e-3;
+
 void CheckReading(const std::vector<StreamInfo>& streams, const System& system,
                   const Reading& one) {
   if (one.stream < 0 || one.stream >= std::ssize(streams)) {
@@ -62,10 +66,17 @@ void CheckReading(const std::vector<StreamInfo>& streams, const System& system,
                                         std::to_string(stream.size) + " values at a time, not " +
                                         std::to_string(one.values.size()));
   }
-  if (one.covariance.empty()) return;
   for (const SensorBinding& sensor : system.sensors) {
-    const int m = sensor.model.measurement().geometry.tangent;
-    if (sensor.stream != stream.name || std::ssize(one.covariance) == m * m) continue;
+    if (sensor.stream != stream.name) continue;
+    const Geometry& geometry = sensor.model.measurement().geometry;
+    const double defect = geometry.Defect(one.values.data());
+    if (defect > kTolerance) {
+      throw Error(ExitCode::kBadData, "the values of stream '" + stream.name +
+                                          "' are not of unit length: it is off by " +
+                                          internal::RoundedText(defect, 4));
+    }
+    const int m = geometry.tangent;
+    if (one.covariance.empty() || std::ssize(one.covariance) == m * m) continue;
     throw Error(ExitCode::kBadData, "the covariance of stream '" + stream.name + "' has " +
                                         std::to_string(one.covariance.size()) + " numbers, not " +
                                         std::to_string(m * m));

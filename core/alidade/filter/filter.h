@@ -31,7 +31,8 @@ struct Prediction {
 };
 
 /// A recursive estimator over one system: Ekf, Iekf, Ukf, SquareRootEkf. A copy of one is a
-/// snapshot of it, and goes on by itself.
+/// snapshot of it, and goes on by itself. What was moved from may be assigned to or destroyed, no
+/// more.
 ///
 /// What a frame goes through:
 ///
@@ -80,16 +81,17 @@ class Filter : public Estimator {
   /// Id of a block of the system, `owner.block`. Error kBadConfig where there is none.
   BlockId block(std::string_view name) const;
   /// Process, of what came at one timestamp. The report is good until the next call. Errors, and
-  /// nothing has changed: kBadData for a stream that is not there, or values or a covariance of
-  /// another size than its sensors measure.
+  /// nothing has changed: kBadData for a stream that is not there, values or a covariance of
+  /// another size than its sensors measure, or a quaternion or direction whose length is off by
+  /// more than 1e-3.
   const UpdateReport& Push(Timestamp timestamp, const std::vector<Reading>& readings);
   /// The state at `timestamp`, not before timestamp(), as a frame without measurements would leave
   /// it. Nothing is committed. Where it cannot be stepped to, it is that of the last step that can.
   State At(Timestamp timestamp) const;
   /// What the sensor of that name will measure at `timestamp`, of the landmark of that id where it
-  /// measures landmarks. Nothing where h is not defined there, or a block or the landmark has no
-  /// value yet. Error kBadConfig where there is no
-  /// such sensor.
+  /// measures landmarks. Nothing where h is not defined or not finite there, S is not positive
+  /// definite, or a block or the landmark has no value yet. Error kBadConfig where there is no such
+  /// sensor.
   std::optional<Prediction> Expect(std::string_view sensor, Timestamp timestamp,
                                    std::int64_t landmark = -1) const;
 

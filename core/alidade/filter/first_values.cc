@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "alidade/filter/evaluate_row.h"
-
 namespace alidade::internal {
 namespace {
 
@@ -34,12 +32,16 @@ bool IsReady(const FilterState& f, const Row& row) {
 }
 
 void InitialiseWaiting(FilterState& f, std::span<Row> rows) {
+  Inverse inverse;
   for (bool progress = true; progress;) {
     progress = false;
     for (Row& row : rows) {
       if (!IsAwaited(f, row)) continue;
-      row.report->outcome = InitialiseBlock(f, row);
-      progress = progress || row.report->outcome == Outcome::kInitialised;
+      row.report->outcome = Invert(f, row, nullptr, inverse);
+      if (row.report->outcome != Outcome::kAccepted) continue;
+      Initialise(f, row, inverse);
+      row.report->outcome = Outcome::kInitialised;
+      progress = true;
     }
   }
   for (const Row& row : rows) {
@@ -48,17 +50,13 @@ void InitialiseWaiting(FilterState& f, std::span<Row> rows) {
   }
 }
 
-Outcome InitialiseBlock(FilterState& f, Row& row) {
+void Initialise(FilterState& f, const Row& row, const Inverse& inverse) {
   const SensorBinding& sensor = *row.binding;
   const BlockId id = sensor.roles[static_cast<std::size_t>(sensor.model.initialised_role())].block;
-  Inverse inverse;
-  const Outcome outcome = Invert(f, row, nullptr, inverse);
-  if (outcome != Outcome::kAccepted) return outcome;
   f.state.Initialise({&id, 1}, inverse.y.data(), inverse.from, inverse.by_x, inverse.own);
   f.first_estimates[static_cast<std::size_t>(id)].clear();
   f.Activate();
   f.motions.EndInterval();
-  return Outcome::kInitialised;
 }
 
 }  // namespace alidade::internal

@@ -3,7 +3,7 @@
 
 #include <span>
 
-#include "alidade/filter/filter_state.h"
+#include "alidade/filter/evaluate_row.h"
 
 /// Blocks that take their value from a measurement, by the inverse measurement model.
 namespace alidade::internal {
@@ -15,8 +15,8 @@ bool IsReady(const FilterState& f, const Row& row);
 /// what then still needs a block without a value is not ready.
 void InitialiseWaiting(FilterState& f, std::span<Row> rows);
 
-/// Gives the block of the sensor's initialised role the value that the measurement implies, with
-/// its covariance and correlations, in place of any that it has. kInitialised, or why not.
-Outcome InitialiseBlock(FilterState& f, Row& row);
+/// Gives the block of the sensor's initialised role what the measurement implies, the row's inverse
+/// at the state: the value, its covariance and correlations, in place of any that it has.
+void Initialise(FilterState& f, const Row& row, const Inverse& inverse);
 
 }  // namespace alidade::internal

@@ -53,16 +53,17 @@ void FrameLoop::Run(const Frame& frame) {
   }
   f.report.stale = frame.timestamp < f.timestamp;
   if (!f.report.stale && !f.said.ended) StepTo(frame.timestamp);
-  rows_.Collect(frame, *f.binding, f.report);
+  std::optional<Outcome> refused;
+  if (f.report.stale) {
+    refused = Outcome::kStale;
+  } else if (f.said.ended) {
+    refused = Outcome::kEnded;
+  }
+  rows_.Collect(frame, *f.binding, f.report, refused);
+  if (refused) return;
   const std::span<Row> all = rows_.all();
   for (const Row& row : all) {
     if (row.report->outcome == Outcome::kFailed) NotePluginFailure(f, *row.binding);
-  }
-  if (f.report.stale || f.said.ended) {
-    for (const Row& row : all) {
-      row.report->outcome = f.report.stale ? Outcome::kStale : Outcome::kEnded;
-    }
-    return;
   }
   if (f.waiting) InitialiseWaiting(f, all);
   if (landmarks) landmarks->Attach(f, all);
@@ -120,7 +121,9 @@ void FrameLoop::Update(std::span<Row* const> group) {
   consensus_.Split(f, groups_.passed, static_cast<std::uint64_t>(landmarks->frame()),
                    groups_.agreed, groups_.rest);
   if (!groups_.agreed.empty() && !Correct(groups_.agreed)) {  // what would the rest agree with?
-    for (Row* const row : groups_.rest) row->report->outcome = Outcome::kGated;
+    for (Row* const row : groups_.rest) {
+      row->report->outcome = groups_.agreed.front()->report->outcome;
+    }
     return;
   }
   Pass(groups_.rest, groups_.passed);
@@ -129,8 +132,9 @@ void FrameLoop::Update(std::span<Row* const> group) {
     row->report->outcome = Outcome::kGated;
     return true;
   });
-  f.report.landmarks.rescued += static_cast<int>(groups_.passed.size());
-  Correct(groups_.passed);
+  if (Correct(groups_.passed)) {
+    f.report.landmarks.rescued += static_cast<int>(groups_.passed.size());
+  }
 }
 
 /// Predicts all rows of a group at the state, and finds those that pass the gate, each by itself.
@@ -166,27 +170,22 @@ void FrameLoop::GoTo(Timestamp timestamp) {
 
 std::optional<Prediction> FrameLoop::Expect(int sensor, std::int64_t landmark) {
   if (f.said.ended || f.report.stale) return std::nullopt;
-  const auto index = static_cast<std::size_t>(sensor);
-  const Geometry& geometry = f.binding->system.sensors[index].model.measurement().geometry;
-  Frame frame;
-  Measurement& one = frame.measurements.emplace_back();
-  one.stream = f.binding->stream_of_sensor[index];
+  Measurement one;
   one.landmark = landmark;
+  const Geometry& geometry =
+      f.binding->system.sensors[static_cast<std::size_t>(sensor)].model.measurement().geometry;
   one.values.resize(static_cast<std::size_t>(geometry.ambient));
   geometry.Identity(one.values.data());
-  rows_.Collect(frame, *f.binding, f.report);
-  const auto of_sensor = [&](const Row& row) { return row.sensor == sensor; };
-  const auto found = std::ranges::find_if(rows_.all(), of_sensor);
-  if (found == rows_.all().end()) return std::nullopt;
-  Row& row = *found;
-  row.report->outcome = Outcome::kAccepted;  // whatever Valid says of what is no measurement yet
+  Row& row = rows_.CollectOne(one, sensor, *f.binding, f.report);
   if (landmarks) landmarks->Attach(f, {&row, 1});
   if (row.report->outcome != Outcome::kAccepted || !IsReady(f, row) ||
       PredictAt(f, row, f.state.values(), one.values.data()) != Outcome::kAccepted) {
     return std::nullopt;
   }
   row.report->z = one.values;  // as if it measured what it expects
-  if (method->Predict(f, row) != Outcome::kAccepted) return std::nullopt;
+  if (method->Predict(f, row) != Outcome::kAccepted || gate_.Pass(f, row) != Outcome::kAccepted) {
+    return std::nullopt;
+  }
   const Eigen::Index m = row.report->dof;
   return Prediction{row.report->h, Eigen::Map<const RowMajor>(row.report->s.data(), m, m)};
 }

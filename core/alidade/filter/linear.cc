@@ -106,7 +106,7 @@ Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
         geometry.kind != GeometryKind::kUnitVector) {
       continue;
     }
-    RowMajor j(geometry.tangent, geometry.tangent);
+    std::array<double, 4> j;  // a unit vector's tangent has two elements
     geometry.Transport(f.buffers.roles[i], at_[i], j.data());
     ChainJacobian(f, row, row.place->columns[i], geometry.tangent, j.data());
   }

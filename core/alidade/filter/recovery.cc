@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "alidade/base/all_finite.h"
+#include "alidade/base/decompositions.h"
 #include "alidade/base/number_text.h"
 #include "alidade/filter/first_values.h"
 #include "alidade/filter/square_root.h"
@@ -11,7 +11,7 @@
 namespace alidade::internal {
 namespace {
 
-/// A measurement that is itself not finite tells nothing of the filter.
+/// A measurement that is itself not finite, of which no h was asked, tells nothing of the filter.
 bool IsRejected(const MeasurementReport& entry) {
   switch (entry.outcome) {
     case Outcome::kGated:
@@ -19,14 +19,20 @@ bool IsRejected(const MeasurementReport& entry) {
     case Outcome::kNotPd:
       return true;
     case Outcome::kNotFinite:
-      return AllFinite(entry.z);
+      return !entry.h.empty();
     default:
       return false;
   }
 }
 
-/// Puts the blocks that one motion model moves together with `id` back to their prior covariance,
-/// uncorrelated, with the values they have.
+/// The least covariance that is in no direction below either of two.
+Eigen::MatrixXd UpperBound(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  const SymmetricEigen above = EigenOf(b - a);
+  return a + above.vectors * above.values.cwiseMax(0.0).asDiagonal() * above.vectors.transpose();
+}
+
+/// Of the blocks that one motion model moves together with `id`: the values they have are no better
+/// known than at the start, nor than they are. Uncorrelated.
 void DropMotionOf(FilterState& f, BlockId id) {
   for (const MotionBinding& motion : f.binding->system.motions) {
     if (std::ranges::find(motion.blocks, id) == motion.blocks.end()) continue;
@@ -39,7 +45,9 @@ void DropMotionOf(FilterState& f, BlockId id) {
       }
       const double* const value = f.state.value(prior.block);
       const std::vector<double> kept(value, value + block.geometry().ambient);
-      f.state.Add(prior.block, kept.data(), prior.covariance);
+      const int at = block.tangent_offset, n = block.geometry().tangent;
+      f.state.Add(prior.block, kept.data(),
+                  UpperBound(prior.covariance, f.state.covariance().Block(at, n, at, n)));
     }
   }
 }
@@ -109,19 +117,21 @@ bool Recovery::IsTooOften(const MeasurementReport& entry) {
 }
 
 /// Resets what the sensor determines from its measurement, with the blocks that move with it at
-/// their prior uncertainty; where that cannot be, inflates the blocks that it corrects, once
-/// until it is accepted again.
+/// their prior uncertainty, or theirs where that is larger; where that cannot be, inflates the
+/// blocks that it corrects, once until it is accepted again.
 void Recovery::Recover(FilterState& f, Row& row) {
   const SensorBinding& sensor = *row.binding;
   const std::string why = "sensor '" + sensor.name + "' rejected " +
                           std::to_string(options_.after) + " times in a row: ";
   const int role = sensor.model.initialised_role();
+  Inverse inverse;
   const RoleBinding* target = role < 0 ? nullptr : &sensor.roles[static_cast<std::size_t>(role)];
   if (options_.action == RejectionRecovery::kReset && target != nullptr && target->block >= 0 &&
       target->mode == RoleMode::kEstimate &&
       f.state.layout()[target->block].status == BlockStatus::kEstimated &&
-      InitialiseBlock(f, row) == Outcome::kInitialised) {
+      Invert(f, row, nullptr, inverse) == Outcome::kAccepted) {
     DropMotionOf(f, target->block);
+    Initialise(f, row, inverse);
     Note(f, "rejection_recovery",
          why + "reset " + f.state.layout()[target->block].name + " from its measurement");
     return;

@@ -3,34 +3,69 @@
 
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
+#include "alidade/filter/square_root.h"
 
 namespace alidade::internal {
 
-void Rows::Collect(const Frame& frame, const Binding& binding, UpdateReport& report) {
+void Rows::Collect(const Frame& frame, const Binding& binding, UpdateReport& report,
+                   std::optional<Outcome> refused) {
   count_ = 0;
   report.ClearMeasurements();
   for (std::size_t sensor = 0; sensor < binding.sensor_places.size(); ++sensor) {
-    const SensorBinding& bound = binding.system.sensors[sensor];
-    const Geometry& geometry = bound.model.measurement().geometry;
     for (const Measurement& m : frame.measurements) {
       if (m.stream != binding.stream_of_sensor[sensor]) continue;
-      ALIDADE_EXPECTS(std::ssize(m.values) == geometry.ambient);
-      ALIDADE_EXPECTS(m.covariance.empty() ||
-                      std::ssize(m.covariance) == geometry.tangent * geometry.tangent);
-      if (count_ == rows_.size()) rows_.emplace_back();
-      Row& row = rows_[count_++];
-      row.measurement = &m;
-      row.sensor = static_cast<int>(sensor);
-      row.binding = &bound;
-      row.model = &bound.model;
-      row.place = &binding.sensor_places[sensor];
-      MeasurementReport& entry = report.Add();
-      entry.Reset(row.sensor, m.landmark, geometry.tangent);
-      entry.z.assign(m.values.begin(), m.values.end());
-      entry.outcome =
-          AllFinite(entry.z) ? OutcomeOf(bound.model.Valid(entry.z.data())) : Outcome::kNotFinite;
+      const Row& row = Add(m, static_cast<int>(sensor), binding, report);
+      report.measurements().back().outcome = refused ? *refused : OutcomeOf(row);
     }
   }
+  Link(report);
+}
+
+Row& Rows::CollectOne(const Measurement& measurement, int sensor, const Binding& binding,
+                      UpdateReport& report) {
+  count_ = 0;
+  report.ClearMeasurements();
+  Row& row = Add(measurement, sensor, binding, report);
+  Link(report);
+  return row;
+}
+
+Row& Rows::Add(const Measurement& measurement, int sensor, const Binding& binding,
+               UpdateReport& report) {
+  const auto index = static_cast<std::size_t>(sensor);
+  const SensorBinding& bound = binding.system.sensors[index];
+  const Geometry& geometry = bound.model.measurement().geometry;
+  ALIDADE_EXPECTS(std::ssize(measurement.values) == geometry.ambient);
+  ALIDADE_EXPECTS(measurement.covariance.empty() ||
+                  std::ssize(measurement.covariance) == geometry.tangent * geometry.tangent);
+  if (count_ == rows_.size()) rows_.emplace_back();
+  Row& row = rows_[count_++];
+  row.measurement = &measurement;
+  row.sensor = sensor;
+  row.binding = &bound;
+  row.model = &bound.model;
+  row.place = &binding.sensor_places[index];
+  MeasurementReport& entry = report.Add();
+  entry.Reset(sensor, measurement.landmark, geometry.tangent);
+  entry.z.assign(measurement.values.begin(), measurement.values.end());
+  return row;
+}
+
+/// What speaks against the measurement of a row, by itself.
+Outcome Rows::OutcomeOf(const Row& row) {
+  constexpr double kRounding = 1e-12;
+  const Measurement& m = *row.measurement;
+  if (!AllFinite(m.values) || !AllFinite(m.covariance)) return Outcome::kNotFinite;
+  if (!m.covariance.empty()) {
+    const int size = row.model->measurement().geometry.tangent;
+    const Eigen::Map<const Eigen::MatrixXd> r(m.covariance.data(), size, size);
+    if (SquareRootOf(r, ldlt_, root_) < -kRounding) return Outcome::kInvalid;
+  }
+  return alidade::OutcomeOf(row.model->Valid(m.values.data()));
+}
+
+/// References into the report end with each entry that is added.
+void Rows::Link(UpdateReport& report) {
   for (std::size_t i = 0; i < count_; ++i) rows_[i].report = &report.measurements()[i];
 }
 

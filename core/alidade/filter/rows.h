@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Cholesky>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "alidade/base/workspace.h"
 #include "alidade/filter/binding.h"
 #include "alidade/filter/update_report.h"
 
@@ -36,13 +39,26 @@ struct Row {
 class Rows {
  public:
   /// One row for each measurement and sensor bound to its stream, in the order of the sensors, with
-  /// its entry in the report: kAccepted as long as nothing speaks against it.
-  void Collect(const Frame& frame, const Binding& binding, UpdateReport& report);
+  /// its entry in the report: kAccepted as long as nothing speaks against it. With `refused` all
+  /// have that outcome, and no model is asked.
+  void Collect(const Frame& frame, const Binding& binding, UpdateReport& report,
+               std::optional<Outcome> refused = {});
+  /// The same of one measurement and one sensor, whatever their streams. kAccepted.
+  Row& CollectOne(const Measurement& measurement, int sensor, const Binding& binding,
+                  UpdateReport& report);
   std::span<Row> all() { return {rows_.data(), count_}; }
 
  private:
+  Row& Add(const Measurement& measurement, int sensor, const Binding& binding,
+           UpdateReport& report);
+  Outcome OutcomeOf(const Row& row);
+  void Link(UpdateReport& report);
+
   std::vector<Row> rows_;  ///< the first count_ are in use
   std::size_t count_ = 0;
+  // Memory.
+  Scratch<Eigen::LDLT<Eigen::MatrixXd>> ldlt_;
+  Scratch<Eigen::MatrixXd> root_;
 };
 
 }  // namespace alidade::internal

@@ -177,7 +177,9 @@ SquareRootEkf::SquareRootEkf(System system, const EkfOptions& options,
 }
 
 const Eigen::MatrixXd& SquareRootEkf::root() const {
-  return dynamic_cast<const internal::SquareRoot&>(*loop().method).root();
+  const auto* const method = dynamic_cast<const internal::SquareRoot*>(&*loop().method);
+  ALIDADE_EXPECTS(method != nullptr);
+  return method->root();
 }
 
 }  // namespace alidade

@@ -37,7 +37,8 @@ class SquareRootEkf : public Filter {
   /// than kSupport.
   SquareRootEkf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams);
 
-  /// L, n x n. state().covariance() is L L' in double precision, and so has half its digits.
+  /// L, n x n; ContractViolation where another kind of filter was assigned. state().covariance() is
+  /// L L' in double precision, and so has half its digits.
   const Eigen::MatrixXd& root() const;
 };
 

@@ -18,8 +18,8 @@ enum class Outcome {
   kInitialised,  ///< consumed to initialise a block
   kGated,
   kOutOfDomain,  ///< h is not defined at the prediction
-  kInvalid,      ///< of no use: beyond the sensor's limits
-  kNotFinite,    ///< the update would have been not finite, and was rolled back
+  kInvalid,      ///< of no use: beyond the sensor's limits, or its covariance is none
+  kNotFinite,    ///< it is itself, its h, H, R or S, or the update, which was rolled back
   kNotPd,        ///< the update would have lost positive definiteness, and was rolled back
   kStale,        ///< older than the state
   kNotReady,     ///< a block it needs has no value yet

@@ -73,7 +73,13 @@ void FrameCheck::Check(const SourceFrame& frame) const {
       Refuse(frame, "a measurement of stream " + std::to_string(m.stream) + " of " +
                         std::to_string(streams_.size()));
     }
-    CheckSize(frame, streams_[static_cast<std::size_t>(m.stream)].info, m.values);
+    const Kind& kind = streams_[static_cast<std::size_t>(m.stream)];
+    CheckSize(frame, kind.info, m.values);
+    const int tangent = kind.geometry.tangent;
+    if (!m.covariance.empty() && std::ssize(m.covariance) != tangent * tangent) {
+      Refuse(frame, "a covariance of " + std::to_string(m.covariance.size()) + " numbers of '" +
+                        kind.info.name + "', not " + std::to_string(tangent * tangent) + ',');
+    }
   }
   if (frame.truth.size() > truths_.size()) {
     Refuse(frame,

@@ -44,12 +44,14 @@ class CeresBatch : public Estimator {
 
   const UpdateReport& Process(const Frame& frame) override {
     report_.Clear();
+    if (refused_) return report_;
     const Ekf& ekf = initialiser_.filter();
     const UpdateReport& filter = initialiser_.Process(frame);
     const bool were_few = run_.inputs() <= kManyInputs;
     if (!run_.Add(frame, filter, ekf)) {
-      failed_ = true;
-      report_.events.push_back({frame.timestamp, "no_solution", run_.problem()});
+      refused_ = true;
+      NoteFailure(frame.timestamp, run_.problem());
+      initialiser_.AddReport(frame.timestamp, filter, report_.events);
       return report_;
     }
     if (!ekf.failed()) filtered_.push_back(run_.ValuesOf(ekf.state()));
@@ -68,6 +70,7 @@ class CeresBatch : public Estimator {
   }
 
   void Smooth(const Emit& emit) override {
+    if (refused_) FailAll(run_.problem());
     if (run_.size() == 0) return;
     const bool solved = solve_.SolveAll(run_, filtered_, e_);
     failed_ = solve_.failed();
@@ -136,6 +139,7 @@ class CeresBatch : public Estimator {
   std::vector<LandmarkEstimate> map_;
   UpdateReport report_;
   bool failed_ = false;
+  bool refused_ = false;  ///< a frame; there is nothing to go on with
 };
 
 constexpr Support kSupport = {.known = false, .from_measurement = true, .landmarks = true};

@@ -56,7 +56,8 @@ class CondensedRun {
   /// Sets the time of the prior; else the first frame, or initial_time_s, does.
   void Start(Timestamp timestamp) { timestamp_ = timestamp; }
   /// One frame more; the filter's report says which measurement gave a block or landmark its first
-  /// value. False, and problem(), where there would be too many inputs.
+  /// value. False, and problem(), where there would be too many inputs or steps: there is nothing
+  /// to go on with then.
   bool Add(const Frame& frame, const UpdateReport& report, const Estimator& filter);
   /// The values of a filter's state as Linearised takes them.
   std::vector<double> ValuesOf(const State& state) const;

@@ -65,7 +65,9 @@ class FixedLag : public Estimator {
     if (failed_) return report_;
     const UpdateReport& filter = initialiser_.Process(frame);
     if (!MoveWindow(frame.timestamp) || !run_.Add(frame, filter, initialiser_.filter())) {
-      return Fail(frame.timestamp, run_.problem());
+      Fail(frame.timestamp, run_.problem());
+      initialiser_.AddReport(frame.timestamp, filter, report_.events);
+      return report_;
     }
     timestamps_.push_back(run_.timestamp());
     if (!initialiser_.filter().failed()) {
@@ -78,6 +80,7 @@ class FixedLag : public Estimator {
 
   /// Of the frames that left the window, then of those still in it.
   void Smooth(const Emit& emit) override {
+    if (failed_) throw Error(ExitCode::kDiverged, why_);
     if (!Keep(run_.size())) {
       failed_ = true;
       throw Error(ExitCode::kDiverged, run_.problem());
@@ -92,10 +95,10 @@ class FixedLag : public Estimator {
     UpdateReport report;
   };
 
-  const UpdateReport& Fail(Timestamp timestamp, const std::string& why) {
+  void Fail(Timestamp timestamp, const std::string& why) {
     failed_ = true;
+    why_ = why;
     report_.events.push_back({timestamp, "no_solution", why});
-    return report_;
   }
 
   bool Leaves(Timestamp timestamp, Timestamp newest) const {
@@ -162,6 +165,7 @@ class FixedLag : public Estimator {
   Eigen::VectorXd e_;
   UpdateReport report_;
   bool failed_ = false;
+  std::string why_;
 };
 
 }  // namespace

@@ -319,11 +319,15 @@ TEST(Landmarks, BehindTheCameraAreOutOfDomainAndNoDivergence) {
   Ekf ekf = EkfOf([] {
     LandmarkOptions options = WithPrior();
     options.known = {{1, {0.0, 0.0, -1.0}, 0.1}};
-    return MapSystem(InverseDepthPixels(0.01), options);
+    return MapSystem(InverseDepthPixels(0.01), options, 0.1);
   }());
+  const Eigen::MatrixXd p = ekf.state().covariance().Dense();
   for (int k = 0; k < 30; ++k) {
-    EXPECT_EQ(OutcomeFor(ekf.Process(FrameOf(0.1 * k, {{1, {0, 0}}})), 1), Outcome::kOutOfDomain);
+    const UpdateReport& report = ekf.Process(FrameOf(0.0, {{1, {0, 0}}}));
+    EXPECT_EQ(OutcomeFor(report, 1), Outcome::kOutOfDomain);
+    EXPECT_TRUE(report.events.empty());
   }
+  EXPECT_EQ(ekf.state().covariance().Dense(), p);
   EXPECT_FALSE(ekf.diverged());
 }
 

@@ -3,6 +3,9 @@
 
 #include <cmath>
 
+#include "alidade/filter/rts.h"
+#include "alidade/filter/square_root_ekf.h"
+#include "alidade/filter/ukf.h"
 #include "support/systems.h"
 
 namespace alidade {
@@ -128,6 +131,60 @@ TEST(Ekf, NumbersThatAreNoneDoNotLockASensorOut) {
   EXPECT_EQ(ekf.state().covariance().Dense(), p);
 }
 
+// Nor do covariances that are none: what is wrong with them is not the filter's.
+TEST(Ekf, CovariancesThatAreNoneDoNotLockASensorOut) {
+  const System system = DepthFilter();
+  for (const double variance : {std::nan(""), -1e6}) {
+    Ekf ekf(system, {}, StreamsOf(system));
+    const State before = ekf.state();
+    Frame frame = FrameAt(0.0, {{1, 1.0}});
+    frame.measurements[0].covariance = {variance};
+    for (int k = 0; k < 100; ++k) {
+      const UpdateReport& report = ekf.Process(frame);
+      EXPECT_EQ(report.measurements()[0].outcome,
+                std::isnan(variance) ? Outcome::kNotFinite : Outcome::kInvalid);
+      EXPECT_TRUE(report.events.empty());
+    }
+    EXPECT_EQ(ekf.state().values(), before.values());
+    EXPECT_EQ(ekf.state().covariance().Dense(), before.covariance().Dense());
+    frame.measurements[0].covariance = {0.0};  // an exact measurement
+    EXPECT_EQ(ekf.Process(frame).measurements()[0].outcome, Outcome::kAccepted);
+  }
+}
+
+/// Two numbers, of which only the sum has noise.
+struct OfSum : Sensor<Vec<2>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    z[0] = z[1] = x[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = l[2] = T(0.1);
+  }
+};
+
+// What S rejects counts as much as what the gate rejects: the sensor's blocks become less certain.
+TEST(Ekf, ASensorWhoseSIsNeverPositiveDefiniteIsRecovered) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.0, 1.0}});
+  AddSensor(system, "z", InProcessSensor(OfSum(), "of_sum"), {"p.x"});
+  Ekf ekf(system, {}, StreamsOf(system));
+  Frame frame = FrameAt(0.0, {});
+  frame.measurements.push_back({0, 0, -1, {0.5, 0.5}, {}});
+  int recovered = 0;
+  for (int k = 0; k < 20; ++k) {
+    const UpdateReport& report = ekf.Process(frame);
+    EXPECT_EQ(report.measurements()[0].outcome, Outcome::kNotPd);
+    recovered += HasEvent(report, "rejection_recovery");
+  }
+  EXPECT_EQ(recovered, 1);
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "p.x", "p.x"), 100.0, 1e-9);
+}
+
 // FAULTS 77
 TEST(Ekf, ASensorThatStaysOutOfItsDomainInflatesOnceAndNotWhatItHolds) {
   System system = DepthFilter();
@@ -169,6 +226,97 @@ TEST(Ekf, ASensorThatIsRejectedRepeatedlyResetsItsBlockFromTheMeasurement) {
   EXPECT_EQ(ekf.Process(FrameAt(0.0, {{0, 65.0}})).measurements()[0].outcome, Outcome::kAccepted);
 }
 
+// After a second the rate is known to 1 more than its prior; the reset measures it no better.
+TEST(Ekf, AResetMakesNothingMoreCertainThanItWas) {
+  EkfOptions options;
+  options.gate = 0.999;
+  const System system = DepthFilter();
+  Ekf ekf(system, options, StreamsOf(system));
+  ekf.Start(0);
+  bool reset = false;
+  for (int k = 0; k < 20; ++k) {
+    reset = HasEvent(ekf.Process(FrameAt(1.0, {{0, 1e5}})), "rejection_recovery");
+  }
+  ASSERT_TRUE(reset);
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "target.depth_rate", "target.depth_rate"), 1.25, 1e-12);
+  EXPECT_EQ(CovarianceOf(ekf.state(), "target.depth", "target.depth_rate"), 0.0);
+}
+
+// Filters that carry more than P, and so cannot follow what others make of it.
+template <class Type>
+class WithoutRecovery : public ::testing::Test {};
+using CarryMore = ::testing::Types<SquareRootEkf, Ukf, RtsSmoother>;
+TYPED_TEST_SUITE(WithoutRecovery, CarryMore);
+
+TYPED_TEST(WithoutRecovery, LeavesTheCovarianceAsItIs) {
+  const System system = DepthFilter();
+  using Options = std::conditional_t<std::is_same_v<TypeParam, Ukf>, UkfOptions, EkfOptions>;
+  Options options;
+  if constexpr (std::is_same_v<TypeParam, Ukf>) {
+    options.filter.gate = 0.999;
+  } else {
+    options.gate = 0.999;
+  }
+  TypeParam filter(system, options, StreamsOf(system));
+  filter.Start(0);
+  const Eigen::MatrixXd p = filter.state().covariance().Dense();
+  for (int k = 0; k < 50; ++k) {
+    const UpdateReport& report = filter.Process(FrameAt(0.0, {{0, 2000.0}}));
+    EXPECT_EQ(report.measurements()[0].outcome, Outcome::kGated);
+    EXPECT_TRUE(report.events.empty());
+  }
+  EXPECT_LT((filter.state().covariance().Dense() - p).norm(), 1e-12);
+}
+
+/// x' = x + w of both blocks, and of neither by the other.
+struct Pair : Motion<2, Vec<1>, Vec<1>> {
+  static constexpr std::array kBlocks{Quantity{"a"}, Quantity{"b"}};
+  template <class T>
+  void Step(const T* a, const T* b, const T* w, double, T* next_a, T* next_b) const {
+    next_a[0] = a[0] + w[0];
+    next_b[0] = b[0] + w[1];
+  }
+  void SqrtQ(double, MatrixRef l) const { l(0, 0) = l(1, 1) = 1e-3; }
+};
+
+/// z = a + b, which tells b.
+struct Sum : Sensor<Vec<1>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"a"}, Quantity{"b"}};
+  static constexpr Quantity kMeasurement{"z"};
+  static constexpr int kInitialises = 1;
+  template <class T>
+  bool Predict(const T* a, const T* b, T* z) const {
+    z[0] = a[0] + b[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(0.1);
+  }
+  template <class T>
+  bool Initialise(const T* a, const T* z, T* b) const {
+    b[0] = z[0] - a[0];
+    return true;
+  }
+};
+
+// b = z - a: a, which moves with it, is put back to its prior first, and b is correlated with that.
+TEST(Ekf, ABlockThatIsResetIsCorrelatedWithWhatItWasResetFrom) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Pair(), "pair"), {{"a", 1.0, 0.5}, {"b", 2.0, 1e-3}});
+  AddSensor(system, "sum", InProcessSensor(Sum(), "sum"), {"p.a", "p.b"});
+  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 0.01), "linear"), {"p.a"});
+  EkfOptions options;
+  options.gate = 0.999;
+  Ekf ekf(system, options, StreamsOf(system));
+  ekf.Process(FrameAt(0.0, {{1, 1.0}}));
+  for (int k = 0; k < 20; ++k) ekf.Process(FrameAt(0.0, {{0, 50.0}}));
+  EXPECT_NEAR(ValueOf(ekf.state(), "p.b"), 49.0, 1e-3);
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "p.a", "p.a"), 0.25, 1e-12);
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "p.a", "p.b"), -0.25, 1e-12);
+  EXPECT_NEAR(CovarianceOf(ekf.state(), "p.b", "p.b"), 0.25 + 0.01, 1e-12);
+}
+
 TEST(Ekf, BlocksStartFromMeasurementsWithTheirCorrelation) {
   System system = DepthFilter();
   system.priors[0] = {0, {}, {}, "disparity"};
@@ -188,6 +336,19 @@ TEST(Ekf, BlocksStartFromMeasurementsWithTheirCorrelation) {
               -4.0 * variance_z, 1e-15);
   EXPECT_NEAR(CovarianceOf(ekf.state(), "template.inverse_distance", "template.inverse_distance"),
               16.0 * variance_z + 4.0 * variance_s, 1e-14);
+}
+
+TEST(Ekf, ABlockStartsFromTheSensorThatTheConfigNames) {
+  System system = DepthFilter();
+  system.priors[0] = {0, {}, {}, "disparity"};
+  SensorBinding other = system.sensors[0];
+  other.name = other.stream = "other";
+  system.sensors.push_back(other);
+  Ekf ekf(system, {}, StreamsOf(system));
+  EXPECT_EQ(ekf.Process(FrameAt(0.0, {{2, 65.0}})).measurements()[0].outcome, Outcome::kNotReady);
+  EXPECT_EQ(ekf.Process(FrameAt(0.1, {{0, 52.0}})).measurements()[0].outcome,
+            Outcome::kInitialised);
+  EXPECT_NEAR(ValueOf(ekf.state(), "target.depth"), 0.5, 1e-15);
 }
 
 TEST(Ekf, AHeldRoleIsExactWhereABlockStartsFromIt) {

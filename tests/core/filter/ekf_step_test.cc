@@ -198,5 +198,23 @@ TEST(EkfStep, AnInnovationOfAnAngleTakesTheShortWay) {
   }
 }
 
+// Said of one step in parts, and then of each that takes at least twice as many.
+TEST(Ekf, AGapInPartsIsNotedWhereItTakesTwiceAsManyAsBefore) {
+  EkfOptions options;
+  options.max_dt_s = 0.1;
+  Ekf ekf(MovingPoint(), options, {});
+  ekf.Start(0);
+  double t_s = 0.0;
+  const auto noted = [&](double gap_s) {
+    t_s += gap_s;
+    return HasEvent(ekf.Process(FrameAt(t_s, {})), "substeps");
+  };
+  EXPECT_FALSE(noted(0.1));
+  EXPECT_TRUE(noted(0.2));
+  EXPECT_FALSE(noted(0.3));
+  EXPECT_TRUE(noted(0.4));
+  EXPECT_FALSE(noted(0.4));
+}
+
 }  // namespace
 }  // namespace alidade

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "alidade/base/random.h"
+#include "support/manifold_models.h"
 #include "support/systems.h"
 
 namespace alidade {
@@ -137,6 +138,128 @@ TEST(Ekf, PerSensorHoldsWhereTheLastMeasurementOfASensorIsNotUsed) {
   Ekf joint(system, {}, StreamsOf(system));
   joint.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.0}}));
   EXPECT_NE(joint.state().values(), whole.state().values());
+}
+
+/// z = x + gain c
+struct Biased : Sensor<Vec<1>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}, Quantity{"c"}};
+  static constexpr Quantity kMeasurement{"z"};
+  double gain, sigma;
+  Biased(double g, double s) : gain(g), sigma(s) {}
+  template <class T>
+  bool Predict(const T* x, const T* c, T* z) const {
+    z[0] = x[0] + gain * c[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = T(sigma);
+  }
+};
+
+// Two updates of three rows each, by Joseph's form: the gain of c is zero for all rows where c is a
+// consider state, for those of the one sensor where that one considers it.
+TEST(Ekf, AnUpdateOfSeveralRowsIsSchmidtsWhereABlockIsConsidered) {
+  for (const bool by_role : {false, true}) {
+    System system;
+    AddMotion(system, "x", InProcessMotion(Constant<>(1), "constant"), {{"x", 1.0, 1.5}});
+    AddMotion(system, "c", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.5, 0.8}});
+    StateLayout layout;
+    for (const Block& block : system.layout.blocks()) {
+      layout.Declare(
+          block.name, block.owner, block.space,
+          block.owner == "c" && !by_role ? BlockStatus::kConsider : BlockStatus::kEstimated);
+    }
+    system.layout = layout;
+    const Eigen::Vector3d gains(1.0, -0.5, 2.0), sigmas(0.3, 0.2, 0.5);
+    for (int i = 0; i < 3; ++i) {
+      AddSensor(system, "z" + std::to_string(i),
+                InProcessSensor(Biased(gains[i], sigmas[i]), "biased"), {"x.x", "c.x"});
+    }
+    if (by_role) system.sensors[1].roles[1].mode = RoleMode::kConsider;
+    Ekf ekf(system, {}, StreamsOf(system));
+    Eigen::Vector2d x(1.0, 0.5);
+    Eigen::Matrix2d p = Eigen::Vector2d(1.5 * 1.5, 0.8 * 0.8).asDiagonal();
+    const Eigen::Matrix3d r = sigmas.cwiseAbs2().asDiagonal();
+    Eigen::Matrix<double, 3, 2> h;
+    h << Eigen::Vector3d::Ones(), gains;
+    for (const double shift : {0.0, 0.4}) {
+      const Eigen::Vector3d z(2.0 + shift, 1.1 - shift, 2.5);
+      ekf.Process(FrameAt(0.0, {{0, z[0]}, {1, z[1]}, {2, z[2]}}));
+      Eigen::Matrix<double, 2, 3> k = p * h.transpose() * (h * p * h.transpose() + r).inverse();
+      if (by_role) {
+        k(1, 1) = 0.0;
+      } else {
+        k.row(1).setZero();
+      }
+      x += k * (z - h * x);
+      const Eigen::Matrix2d a = Eigen::Matrix2d::Identity() - k * h;
+      p = (a * p * a.transpose() + k * r * k.transpose()).eval();
+      EXPECT_NEAR(ValueOf(ekf.state(), "x.x"), x[0], 1e-12) << by_role;
+      EXPECT_NEAR(ValueOf(ekf.state(), "c.x"), x[1], 1e-12) << by_role;
+      EXPECT_LT((ekf.state().covariance().Dense() - p).norm(), 1e-12) << by_role;
+    }
+  }
+}
+
+/// z = x, which implies x where it is positive.
+struct Implies : Sensor<Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  static constexpr int kInitialises = 0;
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    z[0] = x[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(0.1);
+  }
+  template <class T>
+  bool Initialise(const T* z, T* x) const {
+    if (!(z[0] > T(0.0))) return false;
+    x[0] = z[0];
+    return true;
+  }
+};
+
+// What cannot have come from anywhere tells of the measurement, not of the filter.
+TEST(Ekf, AMeasurementThatImpliesNoValueToLineariseAtIsInvalid) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 1.0, 1.0}});
+  AddSensor(system, "z", InProcessSensor(Implies(), "implies"), {"p.x"});
+  system.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
+  Ekf ekf(system, {}, StreamsOf(system));
+  for (int k = 0; k < 25; ++k) {
+    const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, -1.0}}));
+    EXPECT_EQ(report.measurements()[0].outcome, Outcome::kInvalid);
+    EXPECT_TRUE(report.events.empty());
+  }
+  EXPECT_FALSE(ekf.diverged());
+  EXPECT_EQ(ekf.Process(FrameAt(0.0, {{0, 1.5}})).measurements()[0].outcome, Outcome::kAccepted);
+}
+
+// A quaternion has three degrees of freedom: chi2(0.95, 3) = 7.81, chi2(0.95, 4) = 9.49.
+TEST(Ekf, TheGateCountsDegreesOfFreedomNotNumbers) {
+  System system;
+  AddMotion(system, "q", InProcessMotion(ManifoldWalk<UnitQuaternion, 0.01>(), "walk"),
+            {{"x", 0.0, 0.1}});
+  system.priors[0].mean = {1.0, 0.0, 0.0, 0.0};
+  system.priors[0].covariance = 0.01 * Eigen::Matrix3d::Identity();
+  AddSensor(system, "z", InProcessSensor(ManifoldSensor<UnitQuaternion, 0.05>(), "seen"), {"q.x"});
+  EkfOptions options;
+  options.gate = 0.95;
+  const auto outcome_at = [&](double nis) {
+    Ekf ekf(system, options, StreamsOf(system));
+    const double angle = std::sqrt(nis * (0.01 + 0.0025));
+    Frame frame = FrameAt(0.0, {});
+    frame.measurements.push_back(
+        {0, 0, -1, {std::cos(0.5 * angle), std::sin(0.5 * angle), 0.0, 0.0}, {}});
+    return ekf.Process(frame).measurements()[0].outcome;
+  };
+  EXPECT_EQ(outcome_at(7.6), Outcome::kAccepted);
+  EXPECT_EQ(outcome_at(8.6), Outcome::kGated);
 }
 
 TEST(Ekf, ConsideredBlocksKeepTheirValueAndTheirCorrelationsFollowSchmidt) {

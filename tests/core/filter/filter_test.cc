@@ -13,6 +13,7 @@
 #include "alidade/filter/square_root_ekf.h"
 #include "alidade/filter/ukf.h"
 #include "support/landmark_models.h"
+#include "support/manifold_models.h"
 #include "support/systems.h"
 
 namespace alidade::testing {
@@ -169,6 +170,113 @@ TEST(Live, ExpectsNothingWhereHIsNotDefinedOrNothingIsThereToMeasure) {
   empty.Start(0);
   EXPECT_FALSE(empty.Expect("disparity", 0));
   EXPECT_FALSE(empty.diverged());
+}
+
+/// z = sqrt(5 - x), not a number beyond 5.
+struct NoNumber : Sensor<Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    using std::sqrt;
+    z[0] = sqrt(T(5.0) - x[0]);
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(0.1);
+  }
+};
+
+TEST(Live, ExpectsNothingThatIsNotFinite) {
+  for (const double x : {1.0, 7.0}) {
+    System system;
+    AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", x, 0.1}});
+    AddSensor(system, "z", InProcessSensor(NoNumber(), "no_number"), {"p.x"});
+    Ekf ekf(system, {}, StreamsOf(system));
+    ekf.Start(0);
+    EXPECT_EQ(ekf.Expect("z", 0).has_value(), x < 5.0);
+  }
+}
+
+TEST(Live, ExpectsASensorWhoseStreamTheSourceLacks) {
+  System system = DepthFilter();
+  const std::vector<StreamInfo> one = {StreamsOf(system)[1]};
+  Ekf ekf(system, {}, one), none(system, {}, {});
+  for (Ekf* filter : {&ekf, &none}) {
+    filter->Start(0);
+    const auto expected = filter->Expect("disparity", 0);
+    ASSERT_TRUE(expected);
+    EXPECT_NEAR(expected->z[0], 26.0 / 0.35, 1e-12);
+  }
+}
+
+TEST(Live, ExpectsNothingOfThePast) {
+  Ekf ekf = MakeLive<Ekf>();
+  ekf.Process(FrameAt(1.0, {{0, 74.0}}));
+  EXPECT_TRUE(ekf.Expect("disparity", ekf.timestamp()));
+  EXPECT_FALSE(ekf.Expect("disparity", ekf.timestamp() - 1));
+}
+
+TEST(Live, AnEndedFilterExpectsNothing) {
+  System system = DepthFilter();
+  EkfOptions options;
+  options.max_dt_s = 1e-9;  // the next frame would need too many steps
+  Ekf ekf(system, options, StreamsOf(system));
+  ekf.Start(0);
+  EXPECT_TRUE(ekf.Expect("disparity", 0));
+  ekf.Process(FrameAt(10.0, {{0, 74.0}}));
+  ASSERT_TRUE(ekf.failed());
+  EXPECT_FALSE(ekf.Expect("disparity", ekf.timestamp()));
+}
+
+// H is taken at what z implies for the depth: S is that of the z which is expected.
+TEST(Live, ExpectsByWhatTheExpectedMeasurementImplies) {
+  System system = DepthFilter();
+  system.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
+  Ekf ekf(system, {}, StreamsOf(system));
+  ekf.Start(0);
+  const auto expected = ekf.Expect("disparity", 0);
+  ASSERT_TRUE(expected);
+  const UpdateReport& report = ekf.Push(0, {{0, expected->z}});
+  EXPECT_NEAR(expected->s(0, 0), report.measurements()[0].s[0], 1e-9 * expected->s(0, 0));
+}
+
+// Bit by bit, with covariances and landmarks.
+TEST(Live, PushIsProcess) {
+  Ekf pushed(MapSystem(Offset(0.1), {}, 0.3), {}, {{"tracks", 3}});
+  Ekf processed = pushed;
+  const std::vector<double> r = {0.02, 0.0, 0.0, 0.0, 0.03, 0.01, 0.0, 0.01, 0.04};
+  for (int k = 0; k < 4; ++k) {
+    Frame frame = FrameOf(0.1 * k, {{7, {0.1 * k, 0.0, 1.0}}, {8, {0.0, 0.2 * k, 2.0}}});
+    frame.measurements[1].covariance = r;
+    std::vector<Reading> readings;
+    for (const Measurement& m : frame.measurements) {
+      readings.push_back({m.stream, m.values, m.landmark, m.covariance});
+    }
+    pushed.Push(frame.timestamp, readings);
+    processed.Process(frame);
+    ExpectSame(pushed.state(), processed.state());
+  }
+  EXPECT_EQ(pushed.landmarks().size(), 2u);
+  EXPECT_GT(pushed.landmarks()[1].covariance(0, 0), pushed.landmarks()[0].covariance(0, 0));
+}
+
+TEST(Live, AQuaternionThatIsNoneIsAnErrorAndChangesNothing) {
+  System system;
+  AddMotion(system, "q", InProcessMotion(ManifoldWalk<UnitQuaternion, 0.01>(), "walk"),
+            {{"x", 0.0, 0.1}});
+  system.priors[0].mean = {1.0, 0.0, 0.0, 0.0};
+  system.priors[0].covariance = 0.01 * Eigen::Matrix3d::Identity();
+  AddSensor(system, "z", InProcessSensor(ManifoldSensor<UnitQuaternion, 0.05>(), "seen"), {"q.x"});
+  Ekf ekf(system, {}, StreamsOf(system));
+  ekf.Start(0);
+  const State before = ekf.state();
+  EXPECT_THROW(ekf.Push(0, {{0, {0.0, 0.0, 0.0, 0.0}}}), Error);
+  EXPECT_THROW(ekf.Push(0, {{0, {1.01, 0.0, 0.0, 0.0}}}), Error);
+  ExpectSame(ekf.state(), before);
+  EXPECT_EQ(ekf.Push(0, {{0, {1.0005, 0.0, 0.0, 0.0}}}).measurements()[0].outcome,
+            Outcome::kAccepted);
 }
 
 TEST(Live, ExpectsALandmarkByItsId) {

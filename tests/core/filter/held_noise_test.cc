@@ -269,6 +269,29 @@ TYPED_TEST(HeldNoiseSnapshot, IsHeldOverTheWholeGap) {
 }
 
 // x_k = Phi_k x_0 + sum Gamma w with one w from each measured frame to the next, by least squares.
+// What gives a block its first value ends the interval, as an update that tells nothing does.
+TEST(HeldNoiseOfAFirstValue, IsHeldAnewAfterIt) {
+  System waits = DepthFilter();
+  waits.priors[2] = {2, {}, {}, "inverse_scale"};
+  const System system = DepthFilter();
+  Ekf starts(waits, {}, StreamsOf(waits)), corrected(system, {}, StreamsOf(system));
+  Ekf goes_on = corrected;
+  for (Ekf* one : {&starts, &corrected, &goes_on}) one->Start(0);
+  Frame vague = FrameAt(0.2, {{0, 74.0}});
+  vague.measurements[0].covariance = {1e30};
+  for (int k = 1; k <= 3; ++k) {
+    const Frame empty = FrameAt(0.1 * k, {});
+    starts.Process(k == 2 ? FrameAt(0.2, {{1, 1.0}}) : empty);
+    corrected.Process(k == 2 ? vague : empty);
+    goes_on.Process(empty);
+  }
+  const auto covariance = [](const Ekf& ekf) {
+    return CovarianceOf(ekf.state(), "target.depth", "target.depth_rate");
+  };
+  EXPECT_NEAR(covariance(starts), covariance(corrected), 1e-12);
+  EXPECT_GT(std::abs(covariance(starts) - covariance(goes_on)), 1e-3);
+}
+
 TEST(HeldNoiseSmoother, EqualsTheBatchAtFramesInsideAGap) {
   constexpr int kFrames = 40;
   constexpr double kDt = 0.05, kSigma = 0.7;

@@ -152,6 +152,41 @@ TEST(CeresBatchEnds, ThatItsFilterEndedIsSaid) {
   EXPECT_EQ(std::ranges::count(outcomes, Outcome::kNotReady), 3);
 }
 
+// What the filter could not predict is left out: landmark 1 lies behind the camera.
+TEST(CeresBatchEnds, LandmarksOutOfTheDomainAreLeftOut) {
+  LandmarkOptions options = testing::WithPrior();
+  options.known = {{1, {0.0, 0.0, -1.0}, 0.1}, {2, {0.0, 0.0, 2.0}, 0.1}};
+  const System system = testing::MapSystem(testing::InverseDepthPixels(0.01), options, 0.1);
+  const auto batch = MakeBatch(system);
+  for (int k = 0; k < 3; ++k) {
+    batch->Process(testing::FrameOf(0.1 * k, {{1, {0.0, 0.0}}, {2, {0.01, 0.0}}}));
+  }
+  std::vector<Outcome> outcomes;
+  batch->Smooth([&](std::size_t, const State&, const UpdateReport& report) {
+    for (const MeasurementReport& one : report.measurements()) outcomes.push_back(one.outcome);
+  });
+  EXPECT_FALSE(batch->failed());
+  ASSERT_EQ(outcomes.size(), 6u);
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(outcomes[i], i % 2 == 0 ? Outcome::kOutOfDomain : Outcome::kAccepted);
+  }
+}
+
+// There is nothing to go on with after a gap that is too long; the frames after it change nothing.
+TEST(CeresBatchEnds, ARefusedFrameIsTheLast) {
+  for (const bool so_far : {false, true}) {
+    const auto batch = MakeBatch(
+        LinearSystem(), std::string("max_dt_s: 0.001\n") + (so_far ? "mode: filtering\n" : ""));
+    batch->Process(FrameAt(0.0, {{0, 1.0}}));
+    EXPECT_EQ(batch->Process(FrameAt(1000.0, {{0, 1.0}})).events.empty(), false);
+    EXPECT_TRUE(batch->failed());
+    EXPECT_TRUE(batch->Process(FrameAt(0.001, {{0, 1.0}})).events.empty());
+    EXPECT_TRUE(batch->failed());
+    if (!batch->offline()) continue;
+    EXPECT_THROW(batch->Smooth([](std::size_t, const State&, const UpdateReport&) {}), Error);
+  }
+}
+
 // What it could have predicted of landmarks, too, is left out.
 TEST(CeresBatchEnds, LandmarksSeenAfterItsFilterEndedAreLeftOut) {
   System system = testing::MapSystem(testing::Offset(0.1), {}, 0.3);

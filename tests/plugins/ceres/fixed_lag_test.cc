@@ -369,5 +369,14 @@ TEST(FixedLag, IsRefusedWhatItCannotDo) {
   expect_refused(window, "estimators.one.output", "lag", "lagged");
 }
 
+TEST(FixedLag, ARefusedFrameIsTheLast) {
+  const auto lag = MakeFixedLag(LinearSystem(), "lag_s: 1\noutput: lagged\nmax_dt_s: 0.001\n");
+  lag->Process(FrameAt(0.0, {{0, 1.0}}));
+  EXPECT_FALSE(lag->Process(FrameAt(1000.0, {{0, 1.0}})).events.empty());
+  EXPECT_TRUE(lag->failed());
+  EXPECT_TRUE(lag->Process(FrameAt(0.001, {{0, 1.0}})).events.empty());
+  EXPECT_THROW(lag->Smooth([](std::size_t, const State&, const UpdateReport&) {}), Error);
+}
+
 }  // namespace
 }  // namespace alidade

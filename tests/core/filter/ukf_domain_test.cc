@@ -32,6 +32,8 @@ TEST(Ukf, PointsThatWouldLeaveTheDomainAreDrawnNearerAndThatIsSaid) {
   for (int k = 1; k < 20; ++k) ukf.Process(FrameAt(0.0, {{0, 80.0}, {1, 1.1}}));
   EXPECT_FALSE(HasEvent(ukf.Process(FrameAt(0.0, {{0, 80.0}})), "guarded"));
   EXPECT_NEAR(ValueOf(ukf.state(), "target.depth"), 26.0 / 80.0, 0.005);
+  // Three seconds later it may be metres away: said anew.
+  EXPECT_TRUE(HasEvent(ukf.Process(FrameAt(3.0, {{0, 80.0}})), "guarded"));
 }
 
 /// Stays at 1, and throws elsewhere.

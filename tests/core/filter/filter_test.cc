@@ -258,7 +258,7 @@ TEST(Live, PushIsProcess) {
     processed.Process(frame);
     ExpectSame(pushed.state(), processed.state());
   }
-  EXPECT_EQ(pushed.landmarks().size(), 2u);
+  ASSERT_EQ(pushed.landmarks().size(), 2u);
   EXPECT_GT(pushed.landmarks()[1].covariance(0, 0), pushed.landmarks()[0].covariance(0, 0));
 }
 

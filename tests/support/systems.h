@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "motion_models/constant_velocity.h"
 #include "sensors/scale_2d.h"
 #include "sensors/stereo_disparity.h"
+#include "support/manifold_models.h"
 
 /// Small systems composed in C++, for tests.
 namespace alidade::testing {
@@ -103,6 +105,44 @@ inline System DepthFilter() {
             {"target.depth"});
   AddSensor(system, "inverse_scale", InProcessSensor(Scale2d::FromPixels(300.0, 1.0), "scale_2d"),
             {"target.depth", "template.inverse_distance"});
+  return system;
+}
+
+/// The same system, the block `name` (empty: every block) estimated, consider or constant.
+inline System WithStatus(System system, const std::string& name, BlockStatus status) {
+  StateLayout layout;
+  for (const Block& block : system.layout.blocks()) {
+    const bool meant = name.empty() || block.name == name;
+    layout.Declare(block.name, block.owner, block.space, meant ? status : block.status);
+  }
+  system.layout = layout;
+  return system;
+}
+
+/// z = sqrt(5 - x), not a number once x passes 5, and no more its Jacobian.
+struct Broken : Sensor<Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    using std::sqrt;
+    z[0] = sqrt(T(5.0) - x[0]);
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = T(1.0);
+  }
+};
+
+/// An orientation that walks at random, known to 0.1 rad at first and measured to 0.05 rad.
+inline System WalkingOrientation() {
+  System system;
+  AddMotion(system, "q", InProcessMotion(ManifoldWalk<UnitQuaternion, 0.01>(), "walk"),
+            {{"x", 0.0, 0.1}});
+  system.priors[0].mean = {1.0, 0.0, 0.0, 0.0};
+  system.priors[0].covariance = 0.01 * Eigen::Matrix3d::Identity();
+  AddSensor(system, "z", InProcessSensor(ManifoldSensor<UnitQuaternion, 0.05>(), "seen"), {"q.x"});
   return system;
 }
 

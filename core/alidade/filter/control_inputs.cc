@@ -20,9 +20,8 @@ Timestamp TimeoutOf(double timeout_s) {
 
 /// Why an input cannot be used; empty: it can.
 std::string Defect(const Geometry& geometry, const std::vector<double>& value) {
-  constexpr double kTolerance = 1e-3;
   if (!internal::AllFinite(value)) return "not finite";
-  if (geometry.Defect(value.data()) > kTolerance) return "not of unit length";
+  if (geometry.Defect(value.data()) > kUnitTolerance) return "not of unit length";
   return {};
 }
 

@@ -51,9 +51,6 @@ namespace {
                                         "'; the filter has " + internal::Join(known));
 }
 
-/// On the length of a unit value, as for those of a config.
-constexpr double kTolerance = 1e-3;
-
 void CheckReading(const std::vector<StreamInfo>& streams, const System& system,
                   const Reading& one) {
   if (one.stream < 0 || one.stream >= std::ssize(streams)) {
@@ -70,7 +67,7 @@ void CheckReading(const std::vector<StreamInfo>& streams, const System& system,
     if (sensor.stream != stream.name) continue;
     const Geometry& geometry = sensor.model.measurement().geometry;
     const double defect = geometry.Defect(one.values.data());
-    if (defect > kTolerance) {
+    if (defect > kUnitTolerance) {
       throw Error(ExitCode::kBadData, "the values of stream '" + stream.name +
                                           "' are not of unit length: it is off by " +
                                           internal::RoundedText(defect, 4));

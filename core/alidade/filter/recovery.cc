@@ -25,7 +25,7 @@ bool IsRejected(const MeasurementReport& entry) {
   }
 }
 
-/// The least covariance that is in no direction below either of two.
+/// A + (B - A)+, the positive part: a covariance that is in no direction below A or B.
 Eigen::MatrixXd UpperBound(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   const SymmetricEigen above = EigenOf(b - a);
   return a + above.vectors * above.values.cwiseMax(0.0).asDiagonal() * above.vectors.transpose();
@@ -107,8 +107,8 @@ void Recovery::RecoverRejected(FilterState& f, std::span<Row> rows) {
   }
 }
 
-/// Counts one that was not accepted.
-bool Recovery::IsTooOften(const MeasurementReport& entry) {
+/// Of a measurement that was not accepted. Whether its sensor has to recover.
+bool Recovery::CountRejection(const MeasurementReport& entry) {
   if (options_.action == RejectionRecovery::kNone || !IsRejected(entry)) return false;
   int& count = rejections_[static_cast<std::size_t>(entry.sensor)];
   if (++count < options_.after) return false;

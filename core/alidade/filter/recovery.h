@@ -30,7 +30,7 @@ class Recovery {
   /// Counts what became of one measurement. Whether its sensor has to recover.
   bool Count(FilterState& f, const MeasurementReport& entry) {
     if (entry.outcome != Outcome::kAccepted && entry.outcome != Outcome::kInitialised) {
-      return IsTooOften(entry);
+      return CountRejection(entry);
     }
     const auto sensor = static_cast<std::size_t>(entry.sensor);
     rejections_[sensor] = 0;
@@ -43,7 +43,7 @@ class Recovery {
     RejectionRecovery action;
     int after, max_repairs;
   };
-  bool IsTooOften(const MeasurementReport& entry);
+  bool CountRejection(const MeasurementReport& entry);
   void Recover(FilterState& f, Row& row);
 
   Options options_;

@@ -10,7 +10,6 @@
 namespace alidade::internal {
 namespace {
 
-constexpr double kTolerance = 1e-3;  ///< on the length of a unit value, as for those of a config
 constexpr double kCounted = 1e-9;
 
 [[noreturn]] void Refuse(const Frame& frame, const std::string& what) {
@@ -94,7 +93,7 @@ void FrameCheck::Normalise(Kind& kind, std::vector<double>& value) {
   const bool is_rotation = kind.geometry.kind == GeometryKind::kUnitQuaternion;
   if (!is_rotation && kind.geometry.kind != GeometryKind::kUnitVector) return;
   const double defect = kind.geometry.Defect(value.data());
-  if (!(defect <= kTolerance)) {
+  if (!(defect <= kUnitTolerance)) {
     throw Error(ExitCode::kBadData,
                 ErrorLine(source_.place(), kind.info.name,
                           std::string(is_rotation ? "a quaternion" : "a direction") +

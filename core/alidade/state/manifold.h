@@ -18,6 +18,9 @@ enum class GeometryKind : std::uint32_t {
 /// `vector`, `angle`, `unit_quaternion`, `unit_vector`.
 const char* ToString(GeometryKind kind);
 
+/// How far the length of a unit vector or quaternion that comes from outside may be off 1.
+inline constexpr double kUnitTolerance = 1e-3;
+
 /// A geometry of geometry.h with its size, chosen at run time.
 struct Geometry {
   GeometryKind kind = GeometryKind::kVector;

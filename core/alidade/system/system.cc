@@ -15,8 +15,6 @@ namespace {
 
 using internal::NamesOf;
 
-constexpr double kQuaternionTolerance = 1e-3;
-
 /// The value of a block: a number, a list, or {w, x, y, z} for a unit quaternion.
 std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
   std::vector<double> mean;
@@ -26,7 +24,7 @@ std::vector<double> ReadMean(const Node& node, const Geometry& geometry) {
   } else {
     mean = node.Numbers(geometry.ambient);
   }
-  if (geometry.Defect(mean.data()) > kQuaternionTolerance) {
+  if (geometry.Defect(mean.data()) > kUnitTolerance) {
     node.Fail("not of unit length", "a unit vector or quaternion to 1e-3");
   }
   geometry.Normalise(mean.data());

@@ -87,6 +87,27 @@ TEST(OnePointRansac, TriesFewerTheMoreAgree) {
   EXPECT_LT(more, kPoints);
 }
 
+// Half of the matches belong to a sensor that asks for more: as many are tried as if all did.
+TEST(OnePointRansac, TriesAsManyAsTheMostCautiousSensorAsksFor) {
+  const auto hypotheses = [](double first, double second) {
+    System system = KnownMap();
+    system.sensors.push_back(system.sensors[0]);
+    system.sensors[1].name = system.sensors[1].stream = "more";
+    system.sensors[0].outlier_rejection = OnePointRansac{.confidence = first};
+    system.sensors[1].outlier_rejection = OnePointRansac{.confidence = second};
+    Ekf ekf(system, {}, {{"tracks", 2}, {"more", 2}});
+    Frame frame = Matches({0.05, -0.03, 0.0}, 2, 0.05);
+    for (std::size_t i = 0; i < frame.measurements.size(); ++i) {
+      frame.measurements[i].stream = i < frame.measurements.size() / 2 ? 0 : 1;
+    }
+    return ekf.Process(frame).landmarks.hypotheses;
+  };
+  const int few = hypotheses(0.5, 0.5), many = hypotheses(0.9999, 0.9999);
+  EXPECT_LT(few, many);
+  EXPECT_EQ(hypotheses(0.5, 0.9999), many);
+  EXPECT_EQ(hypotheses(0.9999, 0.5), many);
+}
+
 TEST(OnePointRansac, RescuesWhatFitsTheUpdatedState) {
   // One match does not tell how far the camera went ahead: others then miss it by more than noise.
   const Frame frame = Matches({0.05, -0.03, 0.08}, 1000, 0.0);
@@ -196,11 +217,7 @@ TEST(OnePointRansac, AHypothesisDoesNotMoveWhatIsConsidered) {
     if (by_role) {
       system.sensors[0].roles[0].mode = RoleMode::kConsider;
     } else {
-      StateLayout layout;
-      for (const Block& block : system.layout.blocks()) {
-        layout.Declare(block.name, block.owner, block.space, BlockStatus::kConsider);
-      }
-      system.layout = layout;
+      system = WithStatus(system, "", BlockStatus::kConsider);
     }
     Ekf ekf = EkfOf(system);
     const UpdateReport& report = ekf.Process(frame);

@@ -13,33 +13,6 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
-/// The system with the block `name` estimated, consider or constant.
-System WithStatus(System system, const std::string& name, BlockStatus status) {
-  StateLayout layout;
-  for (const Block& block : system.layout.blocks()) {
-    layout.Declare(block.name, block.owner, block.space,
-                   block.name == name ? status : block.status);
-  }
-  system.layout = layout;
-  return system;
-}
-
-/// Returns what is not a number once x passes 5, from h and from its Jacobian.
-struct Broken : Sensor<Vec<1>, Vec<1>> {
-  static constexpr std::array kRoles{Quantity{"x"}};
-  static constexpr Quantity kMeasurement{"z"};
-  template <class T>
-  bool Predict(const T* x, T* z) const {
-    using std::sqrt;
-    z[0] = sqrt(T(5.0) - x[0]);
-    return true;
-  }
-  template <class T>
-  void SqrtNoise(const T*, T* l) const {
-    l[0] = T(1.0);
-  }
-};
-
 // FAULTS 76
 TEST(Ekf, AnUpdateThatIsNotFiniteIsRolledBackAndReported) {
   System system;
@@ -83,6 +56,31 @@ TEST(Ekf, AStepThatIsNotFiniteEndsWithTheLastGoodStateAndMeasurement) {
   EXPECT_NE(report.events[0].text.find("sensor 'direct' at 0.000000 s, z = 5"), std::string::npos);
   EXPECT_STREQ(ToString(report.measurements()[0].outcome), "ended");
   EXPECT_EQ(ekf.Process(FrameAt(2.0, {{0, 5.0}})).measurements()[0].outcome, Outcome::kEnded);
+}
+
+/// Counts how often it is asked whether a measurement is of use.
+struct Asked : Linear {
+  static inline int times = 0;
+  using Linear::Linear;
+  bool Valid(const double*) const {
+    ++times;
+    return true;
+  }
+};
+
+TEST(Ekf, StaleFramesAndThoseAfterItsEndAskNoModel) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
+  AddSensor(system, "asked", InProcessSensor(Asked(1.0, 1.0), "asked"), {"p.x"});
+  Ekf ekf(system, {}, StreamsOf(system));
+  Asked::times = 0;
+  ekf.Process(FrameAt(0.0, {{0, 5.0}}));
+  EXPECT_EQ(Asked::times, 1);
+  EXPECT_EQ(ekf.Process(FrameAt(-1.0, {{0, 5.0}})).measurements()[0].outcome, Outcome::kStale);
+  ekf.Process(FrameAt(1.0, {{0, 5.0}}));
+  ASSERT_TRUE(ekf.failed());
+  EXPECT_EQ(ekf.Process(FrameAt(2.0, {{0, 5.0}})).measurements()[0].outcome, Outcome::kEnded);
+  EXPECT_EQ(Asked::times, 1);
 }
 
 TEST(Ekf, AFailedStepMovesNothing) {

@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "alidade/base/random.h"
-#include "support/manifold_models.h"
 #include "support/systems.h"
 
 namespace alidade {
@@ -164,13 +163,7 @@ TEST(Ekf, AnUpdateOfSeveralRowsIsSchmidtsWhereABlockIsConsidered) {
     System system;
     AddMotion(system, "x", InProcessMotion(Constant<>(1), "constant"), {{"x", 1.0, 1.5}});
     AddMotion(system, "c", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.5, 0.8}});
-    StateLayout layout;
-    for (const Block& block : system.layout.blocks()) {
-      layout.Declare(
-          block.name, block.owner, block.space,
-          block.owner == "c" && !by_role ? BlockStatus::kConsider : BlockStatus::kEstimated);
-    }
-    system.layout = layout;
+    if (!by_role) system = WithStatus(system, "c.x", BlockStatus::kConsider);
     const Eigen::Vector3d gains(1.0, -0.5, 2.0), sigmas(0.3, 0.2, 0.5);
     for (int i = 0; i < 3; ++i) {
       AddSensor(system, "z" + std::to_string(i),
@@ -242,12 +235,7 @@ TEST(Ekf, AMeasurementThatImpliesNoValueToLineariseAtIsInvalid) {
 
 // A quaternion has three degrees of freedom: chi2(0.95, 3) = 7.81, chi2(0.95, 4) = 9.49.
 TEST(Ekf, TheGateCountsDegreesOfFreedomNotNumbers) {
-  System system;
-  AddMotion(system, "q", InProcessMotion(ManifoldWalk<UnitQuaternion, 0.01>(), "walk"),
-            {{"x", 0.0, 0.1}});
-  system.priors[0].mean = {1.0, 0.0, 0.0, 0.0};
-  system.priors[0].covariance = 0.01 * Eigen::Matrix3d::Identity();
-  AddSensor(system, "z", InProcessSensor(ManifoldSensor<UnitQuaternion, 0.05>(), "seen"), {"q.x"});
+  const System system = WalkingOrientation();
   EkfOptions options;
   options.gate = 0.95;
   const auto outcome_at = [&](double nis) {

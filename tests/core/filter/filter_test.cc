@@ -13,7 +13,6 @@
 #include "alidade/filter/square_root_ekf.h"
 #include "alidade/filter/ukf.h"
 #include "support/landmark_models.h"
-#include "support/manifold_models.h"
 #include "support/systems.h"
 
 namespace alidade::testing {
@@ -172,27 +171,11 @@ TEST(Live, ExpectsNothingWhereHIsNotDefinedOrNothingIsThereToMeasure) {
   EXPECT_FALSE(empty.diverged());
 }
 
-/// z = sqrt(5 - x), not a number beyond 5.
-struct NoNumber : Sensor<Vec<1>, Vec<1>> {
-  static constexpr std::array kRoles{Quantity{"x"}};
-  static constexpr Quantity kMeasurement{"z"};
-  template <class T>
-  bool Predict(const T* x, T* z) const {
-    using std::sqrt;
-    z[0] = sqrt(T(5.0) - x[0]);
-    return true;
-  }
-  template <class T>
-  void SqrtNoise(const T*, T* l) const {
-    l[0] = T(0.1);
-  }
-};
-
 TEST(Live, ExpectsNothingThatIsNotFinite) {
   for (const double x : {1.0, 7.0}) {
     System system;
     AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", x, 0.1}});
-    AddSensor(system, "z", InProcessSensor(NoNumber(), "no_number"), {"p.x"});
+    AddSensor(system, "z", InProcessSensor(Broken(), "broken"), {"p.x"});
     Ekf ekf(system, {}, StreamsOf(system));
     ekf.Start(0);
     EXPECT_EQ(ekf.Expect("z", 0).has_value(), x < 5.0);
@@ -263,12 +246,7 @@ TEST(Live, PushIsProcess) {
 }
 
 TEST(Live, AQuaternionThatIsNoneIsAnErrorAndChangesNothing) {
-  System system;
-  AddMotion(system, "q", InProcessMotion(ManifoldWalk<UnitQuaternion, 0.01>(), "walk"),
-            {{"x", 0.0, 0.1}});
-  system.priors[0].mean = {1.0, 0.0, 0.0, 0.0};
-  system.priors[0].covariance = 0.01 * Eigen::Matrix3d::Identity();
-  AddSensor(system, "z", InProcessSensor(ManifoldSensor<UnitQuaternion, 0.05>(), "seen"), {"q.x"});
+  const System system = WalkingOrientation();
   Ekf ekf(system, {}, StreamsOf(system));
   ekf.Start(0);
   const State before = ekf.state();

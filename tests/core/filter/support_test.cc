@@ -15,15 +15,7 @@ namespace {
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures of this project
 
 System WithAConsideredBlock() {
-  System system = DepthFilter();
-  StateLayout layout;
-  for (const Block& block : system.layout.blocks()) {
-    const bool considered = block.name == "template.inverse_distance";
-    layout.Declare(block.name, block.owner, block.space,
-                   considered ? BlockStatus::kConsider : block.status);
-  }
-  system.layout = layout;
-  return system;
+  return WithStatus(DepthFilter(), "template.inverse_distance", BlockStatus::kConsider);
 }
 
 System WithABlockFromAMeasurement() {

@@ -213,19 +213,9 @@ TEST(Ukf, AStepThatIsNotFiniteEndsItInTheWordsOfTheEkf) {
   }
 }
 
-/// The same system with every block known.
-System AllFixed(System system) {
-  StateLayout layout;
-  for (const Block& block : system.layout.blocks()) {
-    layout.Declare(block.name, block.owner, block.space, BlockStatus::kConstant);
-  }
-  system.layout = layout;
-  return system;
-}
-
 template <class G>
 void ExpectReportsOfTheEkf() {
-  const System system = AllFixed(Wanderers<G>(6));
+  const System system = WithStatus(Wanderers<G>(6), "", BlockStatus::kConstant);
   Ekf ekf(system, {}, StreamsOf(system));
   Ukf ukf(system, {}, StreamsOf(system));  // kappa = 0
   Random random(42);

@@ -542,6 +542,10 @@ TEST(Run, AFrameThatBreaksTheContractOfItsSourceEndsTheRun) {
               f.measurements[0].values = {1, 2};
             },
             "2 values of 'inverse_scale', not 1"},
+           {[](SourceFrame& f) {
+              f.measurements[0].covariance = {1, 0, 0, 1};
+            },
+            "a covariance of 4 numbers of 'inverse_scale', not 1"},
            {[](SourceFrame& f) { f.measurements[0].stream = -1; },
             "a measurement of stream -1 of 2"},
            {[](SourceFrame& f) { f.measurements[0].stream = 2; }, "a measurement of stream 2 of 2"},

@@ -10,7 +10,7 @@
 #include "alidade/model/static_ekf.h"
 #include "bench/speed/depth_step.h"
 #include "bench/speed/interleaved.h"
-#include "tests/support/systems.h"
+#include "support/systems.h"
 
 namespace alidade::bench {
 namespace {

@@ -18,7 +18,7 @@ namespace {
 std::atomic<long> allocations{0};
 }  // namespace
 
-#ifndef __SANITIZE_ADDRESS__  // which has its own
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // which have their own
 // Every allocation of this program is counted, those of operator new and of Eigen too.
 extern "C" void* __libc_malloc(std::size_t size);  // NOLINT: of glibc
 extern "C" void* malloc(std::size_t size) noexcept {

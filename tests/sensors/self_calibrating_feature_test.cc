@@ -5,6 +5,7 @@
 
 #include "alidade/host/in_process.h"
 #include "alidade/model/camera.h"
+#include "support/landmarks.h"
 #include "support/model_checks.h"
 
 namespace alidade {
@@ -20,12 +21,6 @@ SensorModel Made() {
 /// A camera that is turned and moved, and a point 5 m before it.
 const Blocks kRadial{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}, {500, -0.3, 0.2}, {-2.6, 1.1, 3.5}};
 const std::vector<double> kRadtan{500, 320, 240, -0.3, 0.2, 0.05, 0.01, -0.02};
-
-std::vector<double> Predicted(const SensorModel& sensor, const Blocks& roles) {
-  std::vector<double> z(2, kPoison);
-  EXPECT_EQ(sensor.Predict(Pointers(roles).data(), z.data()), Status::kOk);
-  return z;
-}
 
 // h = (0.3, -0.4, 1) m: q = 0.25, s = 1 - 0.3 0.25 + 0.2 0.0625 = 0.9375, f s = 468.75 px
 TEST(SelfCalibratingFeature, PredictsWorkedNumbers) {

@@ -12,7 +12,7 @@ namespace {
 using namespace testing;  // NOLINT(google-build-using-namespace)
 
 template <class Representation>
-SensorModel Made() {
+SensorModel MadeStereo() {
   return InProcessSensor(StereoFeature<Representation>(Pinhole(), 0.1, 0.5), "stereo_feature");
 }
 
@@ -23,11 +23,11 @@ TEST(StereoFeature, PredictsWorkedNumbers) {
     using Representation = decltype(representation);
     const Blocks roles = Blocks{{1, 0, 0}, {1, 0, 0, 0}} +
                          LandmarkAt<Representation>({0.3, -0.2, 0.1}, {0.0, 0.4, 2.0});
-    const std::vector<double> z = Predicted(Made<Representation>(), roles);
+    const std::vector<double> z = Predicted(MadeStereo<Representation>(), roles);
     const double expected[4] = {57.5, 345.0, 31.25, 345.0};
     for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(z[i], expected[i], 1e-12);
     std::vector<double> l(16, kPoison);
-    ASSERT_EQ(Made<Representation>().SqrtNoise(Pointers(roles).data(), z.data(), l.data()),
+    ASSERT_EQ(MadeStereo<Representation>().SqrtNoise(Pointers(roles).data(), z.data(), l.data()),
               Status::kOk);
     for (std::size_t i = 0; i < 16; ++i) EXPECT_EQ(l[i], i % 5 == 0 ? 0.5 : 0.0);
   });
@@ -48,23 +48,23 @@ TEST(StereoFeature, TheRightCameraIsBesideTheLeftOne) {
   ForEachRepresentation([&](auto representation) {
     using Representation = decltype(representation);
     const Blocks roles = pose + LandmarkAt<Representation>({-0.5, 0.2, -0.8}, point);
-    const std::vector<double> z = Predicted(Made<Representation>(), roles);
+    const std::vector<double> z = Predicted(MadeStereo<Representation>(), roles);
     EXPECT_NEAR(z[2], pixel[0], 1e-11);
     EXPECT_NEAR(z[3], pixel[1], 1e-11);
-    ExpectTrueJacobians(Made<Representation>(), roles);
+    ExpectTrueJacobians(MadeStereo<Representation>(), roles);
   });
 }
 
 TEST(StereoFeature, SeesNoDisparityAtInfinity) {
   const Blocks roles = Blocks{{3, 4, 5}, {1, 0, 0, 0}} + Blocks{{0, 0, 0, 0.1, 0.2, 0.0}};
-  const std::vector<double> z = Predicted(Made<InverseDepth>(), roles);
+  const std::vector<double> z = Predicted(MadeStereo<InverseDepth>(), roles);
   EXPECT_EQ(z[0], z[2]);
-  ExpectTrueJacobians(Made<InverseDepth>(), roles);
+  ExpectTrueJacobians(MadeStereo<InverseDepth>(), roles);
 }
 
 TEST(StereoFeature, InitialisesWithoutAPrior) {
   ForEachRepresentation([](auto representation) {
-    const SensorModel sensor = Made<decltype(representation)>();
+    const SensorModel sensor = MadeStereo<decltype(representation)>();
     EXPECT_EQ(sensor.prior_size(), 0);
     ExpectTrueInverse(sensor,
                       Blocks{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}, {411, 87.5, 390, 87.5}});
@@ -82,7 +82,7 @@ TEST(StereoFeature, InitialisesWithoutAPrior) {
 }
 
 TEST(StereoFeature, IsValidWhereBothCamerasSeeIt) {
-  const SensorModel sensor = Made<Xyz>();
+  const SensorModel sensor = MadeStereo<Xyz>();
   const auto valid = [&](const std::vector<double>& z) { return sensor.Valid(z.data()); };
   EXPECT_EQ(valid({100, 50, 90, 50}), Status::kOk);
   EXPECT_EQ(valid({5, 50, -5, 50}), Status::kInvalid);

@@ -207,6 +207,7 @@ void StopOnSignals() {
   action.sa_flags = 0;  // a wait for data ends
   ::sigaction(SIGINT, &action, nullptr);
   ::sigaction(SIGTERM, &action, nullptr);
+  ::sigaction(SIGHUP, &action, nullptr);  // the terminal is gone
 }
 
 bool StopRequested() { return stop_requested; }

@@ -98,6 +98,18 @@ std::string Summary(const RunResult& result, const std::string& table, const Rec
   return text;
 }
 
+/// f(), with the place of what was recorded in the message where it throws.
+template <class F>
+auto WithWhatIsKept(const Recorder& recorder, const F& f) {
+  try {
+    return f();
+  } catch (const Error& e) {
+    const std::filesystem::path kept = recorder.failed();
+    if (kept.empty()) throw;
+    throw Error(e.code(), std::string(e.what()) + "; what was recorded is in " + kept.string());
+  }
+}
+
 ExitCode RunConfig(const RunArguments& arguments) {
   Config config = arguments.input.Load();
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
@@ -119,12 +131,12 @@ ExitCode RunConfig(const RunArguments& arguments) {
   if (arguments.follow) options.observers.push_back(&follower);
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
-  const RunResult result = Run(experiment, options);
+  const RunResult result = WithWhatIsKept(recorder, [&] { return Run(experiment, options); });
   progress.Clear();
   if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
   if (result.status == RunStatus::kStopped) PrintNote(result.reason);
   FinishOnSignals();
-  recorder.Finish(result);
+  WithWhatIsKept(recorder, [&] { recorder.Finish(result); });
   if (!arguments.quiet && !arguments.follow) {
     const std::string table = arguments.all
                                   ? ComparisonTable(result)

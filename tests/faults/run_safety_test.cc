@@ -22,6 +22,7 @@ class RunSafety : public ProgramTest {
     names.insert(names.end(), {"config.yaml", "table.yaml", "stdout", "stderr"});
     for (const auto& entry : fs::directory_iterator(folder_)) {
       const std::string name = entry.path().filename();
+      if (name.starts_with("out.failed-")) continue;  // see Kept
       EXPECT_NE(std::find(names.begin(), names.end(), name), names.end()) << name;
     }
   }
@@ -32,6 +33,23 @@ class RunSafety : public ProgramTest {
     const Config record = Json("out/run.json");
     EXPECT_EQ(record.root().At("status").Text(), "failed");
     EXPECT_TRUE(Contains(record.root().At("reason").Text(), reason)) << Read("out/run.json");
+  }
+  /// What was kept of runs to `out` that could not be finished; removes it. Its rows are complete.
+  int Kept() const {
+    int kept = 0;
+    std::vector<fs::path> folders;
+    for (const auto& entry : fs::directory_iterator(folder_)) {
+      if (entry.path().filename().string().starts_with("out.failed-")) folders.push_back(entry);
+    }
+    for (const fs::path& folder : folders) {
+      ++kept;
+      for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+        if (entry.path().extension() != ".csv" || entry.file_size() == 0) continue;
+        EXPECT_EQ(ReadText(entry.path()).back(), '\n') << entry.path();
+      }
+      fs::remove_all(folder);
+    }
+    return kept;
   }
   /// Whether there is enough for the program to start. With less, the C++ runtime has none left to
   /// throw with, and ends.
@@ -47,7 +65,7 @@ TEST_F(RunSafety, EveryLimitOnTheSizeOfFilesIsAnErrorWithThePath) {
     if (entry.is_regular_file()) largest = std::max(largest, entry.file_size());
   }
   fs::remove_all(folder_ / "whole");
-  int refused = 0;
+  int refused = 0, kept = 0;
   for (std::uintmax_t blocks = 0; blocks <= largest / 512 + 1; blocks += 1 + blocks / 3) {
     // The shell counts in 512 bytes..
     before_ = "ulimit -f " + std::to_string(blocks) + "; exec 2>/dev/null >/dev/null";
@@ -58,12 +76,16 @@ TEST_F(RunSafety, EveryLimitOnTheSizeOfFilesIsAnErrorWithThePath) {
     ExpectOnly({"out"});
     EXPECT_EQ(Exists("out"), fits) << blocks;
     refused += run.code == 74 ? 1 : 0;
+    kept += Kept();
   }
   EXPECT_GT(refused, 5);
+  EXPECT_GT(kept, 5);
   before_ = "ulimit -f 4";
   const Outcome run = Call({"run", "config.yaml", "-o", "out", "--no-figures", "--force"});
   EXPECT_TRUE(run.err.starts_with("error: out/")) << run.err;
-  EXPECT_TRUE(Contains(run.err, ": cannot write: File too large")) << run.err;
+  EXPECT_TRUE(Contains(run.err, ": cannot write: File too large; what was recorded is in "))
+      << run.err;
+  EXPECT_EQ(Kept(), 1);
 }
 
 // 89
@@ -183,10 +205,11 @@ TEST_F(RunSafety, AFolderThatAnotherProcessWritesIsRefusedAtOnce) {
   ::kill(first, SIGKILL);
   Wait(first);
   ::close(pipe);
-  // What the dead process left is cleared away.
+  // What the dead process left gets a name that can be seen.
   EXPECT_EQ(Call({"run", "config.yaml", "-o", "out", "--no-figures"}).code, 0);
   fs::remove(folder_ / "table.csv");
   ExpectOnly({"out"});
+  EXPECT_TRUE(Exists("out.failed-" + process + "/measurements.csv"));
 }
 
 // 96
@@ -209,6 +232,7 @@ TEST_F(RunSafety, MemoryThatRunsOutIsAnErrorAndARecord) {
     EXPECT_EQ(run.code, 70) << kib << " KiB: " << run.err;
     EXPECT_TRUE(Contains(run.err, "error: out of memory")) << kib << " KiB: " << run.err;
     ExpectRecordOfFailure("out of memory");
+    Kept();
     ++failed;
     recorded += Exists("out") ? 1 : 0;
   }

@@ -6,6 +6,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <system_error>
 
@@ -13,6 +14,7 @@ namespace alidade::internal {
 namespace {
 
 constexpr std::size_t kBufferSize = 1 << 16;
+constexpr std::chrono::seconds kLongestWait{1};
 
 /// write(2) that answers EFBIG where the file size is limited, without the signal that would end
 /// the process.
@@ -66,27 +68,42 @@ OutputFile::OutputFile(const std::filesystem::path& file, std::string shown)
 }
 
 OutputFile::~OutputFile() {
+  try {
+    if (fd_ >= 0) Flush();
+  } catch (const std::exception&) {
+    // What fits in is there.
+  }
   if (fd_ >= 0) ::close(fd_);
 }
 
 void OutputFile::Write(std::string_view text) {
   buffer_ += text;
-  if (buffer_.size() >= kBufferSize) Flush();
+  ends_.push_back(buffer_.size());
+  const bool due = std::chrono::steady_clock::now() - flushed_ >= kLongestWait;
+  if (due || buffer_.size() >= kBufferSize) Flush();
 }
 
 void OutputFile::Flush() {
+  if (fd_ < 0) FailIo(shown_, "write", error_);  // what follows a gap is worth nothing
   std::size_t done = 0;
   while (done < buffer_.size()) {
     const ssize_t written = WriteQuietly(fd_, buffer_.data() + done, buffer_.size() - done);
     if (written < 0 && errno == EINTR) continue;
     if (written < 0) {
-      const int error = errno;
-      buffer_.erase(0, done);  // or else a later Close() would write it a second time
-      FailIo(shown_, "write", error);
+      error_ = errno;
+      const auto whole = std::ranges::upper_bound(ends_, done);
+      const std::uint64_t kept = size_ + (whole == ends_.begin() ? 0 : *(whole - 1));
+      static_cast<void>(::ftruncate(fd_, static_cast<off_t>(kept)));
+      ::close(fd_);
+      fd_ = -1;
+      FailIo(shown_, "write", error_);
     }
     done += static_cast<std::size_t>(written);
   }
+  size_ += done;
   buffer_.clear();
+  ends_.clear();
+  flushed_ = std::chrono::steady_clock::now();
 }
 
 void OutputFile::Close() {

@@ -21,6 +21,8 @@ namespace fs = std::filesystem;
 constexpr const char* kList = "files.txt";
 /// The file that marks a hidden folder as this program's; its first line names the process.
 constexpr const char* kMarker = ".alidade";
+/// The file in it that says that it is worth keeping.
+constexpr const char* kKeep = ".keep";
 
 std::string MarkerLine(std::string_view process) {
   return "alidade process " + std::string(process);
@@ -122,6 +124,20 @@ void MakeMarked(const fs::path& folder, const std::string& shown) {
   }
 }
 
+/// `NAME.failed-PROCESS`
+std::string FailedName(const fs::path& target, const std::string& process) {
+  return target.filename().string() + ".failed-" + process;
+}
+
+/// Gives a hidden folder that is worth keeping a name that can be seen. Where that one is taken it
+/// stays hidden, and nobody's.
+void MakeFailed(const fs::path& folder, const fs::path& to) {
+  std::error_code ignored;
+  fs::remove(folder / kMarker, ignored);
+  fs::remove(folder / kKeep, ignored);
+  if (!Exists(to)) fs::rename(folder, to, ignored);
+}
+
 /// The lines of the list in a run folder, sorted as they were written; none where there is no list.
 std::vector<std::string> ReadList(const fs::path& folder, std::error_code& error) {
   std::ifstream stream(folder / kList);
@@ -140,7 +156,8 @@ std::vector<std::string> Unlisted(const fs::path& folder, std::error_code& error
        entry.increment(error)) {
     const std::string name = entry->path().lexically_relative(folder).string();
     // A process that died right after Commit's rename leaves its marker.
-    if (name == kMarker || std::binary_search(listed.begin(), listed.end(), name)) continue;
+    if (name == kMarker || name == kKeep || std::binary_search(listed.begin(), listed.end(), name))
+      continue;
     found.push_back(name);
     entry.disable_recursion_pending();
   }
@@ -185,13 +202,30 @@ OutputFolder::~OutputFolder() { Discard(); }
 
 void OutputFolder::Discard() {
   std::error_code ignored;
-  if (!partial_.empty()) {
+  if (keep_ && !partial_.empty()) {
+    try {
+      MakeFailed(partial_, failed());
+    } catch (const std::bad_alloc&) {
+      // It stays as it is; the next run to this place gives it its name.
+    }
+    made_.clear();
+  } else if (!partial_.empty()) {
     fs::remove_all(partial_, ignored);
-    partial_.clear();
   }
+  partial_.clear();
   for (; !made_.empty(); made_.pop_back()) ::rmdir(made_.back().c_str());
   if (lock_ >= 0) ::close(lock_);
   lock_ = -1;
+}
+
+void OutputFolder::Keep() {
+  OutputFile(partial_ / kKeep, shown_.string()).Close();
+  keep_ = true;
+}
+
+fs::path OutputFolder::failed() const {
+  if (!keep_ || partial_.empty()) return {};
+  return target_.parent_path() / FailedName(target_, std::to_string(::getpid()));
 }
 
 fs::path OutputFolder::Sibling(const char* kind) const {
@@ -241,7 +275,15 @@ void OutputFolder::CleanUp(const Leftovers& leftovers) const {
     FailIo(shown_.string(), "restore", errno);
   }
   std::error_code ignored;
-  for (const fs::path& folder : leftovers.folders) fs::remove_all(folder, ignored);
+  for (const fs::path& folder : leftovers.folders) {
+    const std::string name = folder.filename().string();
+    if (Exists(folder / kKeep)) {
+      const std::string process = name.substr(name.rfind('-') + 1);
+      MakeFailed(folder, target_.parent_path() / FailedName(target_, process));
+    } else {
+      fs::remove_all(folder, ignored);
+    }
+  }
 }
 
 void OutputFolder::CheckTarget(const fs::path& lost) const {
@@ -283,11 +325,16 @@ void OutputFolder::Write(const std::string& name, std::string_view text) const {
   file->Close();
 }
 
+void OutputFolder::Remove(const std::string& name) const {
+  std::error_code ignored;
+  fs::remove_all(partial_ / name, ignored);
+}
+
 void OutputFolder::WriteList() const {
   std::vector<std::string> names = {kList};
   for (const auto& entry : fs::recursive_directory_iterator(partial_)) {
     const std::string name = entry.path().lexically_relative(partial_).string();
-    if (name != kMarker) names.push_back(name);
+    if (name != kMarker && name != kKeep) names.push_back(name);
   }
   std::sort(names.begin(), names.end());
   std::string text;
@@ -319,6 +366,7 @@ void OutputFolder::Commit() {
   partial_.clear();
   made_.clear();
   fs::remove(target_ / kMarker, ignored);
+  fs::remove(target_ / kKeep, ignored);
   Sync(target_.parent_path(), shown_.string());
   if (!old.empty()) fs::remove_all(old, ignored);
 }

@@ -12,18 +12,20 @@
 namespace alidade::internal {
 
 /// A folder that is there in full or not at all: it grows as `.NAME.partial-PID` next to its place,
-/// and takes its name in Commit(). It is locked meanwhile, so that nobody else writes to that name,
+/// and takes its name in Commit(). What is worth keeping of one that is never committed is
+/// `NAME.failed-PID` in the end. It is locked meanwhile, so that nobody else writes to that name,
 /// and so that what a killed process left can be told from what a living one is writing. A marker
 /// file tells the hidden folders of this class from those of others, which it never touches.
 class OutputFolder {
  public:
   /// Creates the partial folder, and the folders above it where they are missing. A link to a
-  /// folder stands for that folder. Then removes the marked folders of dead processes, and puts
-  /// back what one of them was replacing; an error leaves them as they are. Errors: kCannotCreate
-  /// where `target` exists without `force`, holds anything that its own `files.txt` does not list,
-  /// or is being written by another process; kIo.
+  /// folder stands for that folder. Then removes the marked folders of dead processes, or renames
+  /// those that are worth keeping, and puts back what one of them was replacing; an error leaves
+  /// them as they are. Errors: kCannotCreate where `target` exists without `force`, holds anything
+  /// that its own `files.txt` does not list, or is being written by another process; kIo.
   OutputFolder(const std::filesystem::path& target, bool force);
-  /// Removes what was not committed, with the folders above it that were made for it.
+  /// Removes what was not committed, with the folders above it that were made for it; or calls it
+  /// failed().
   ~OutputFolder();
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;
@@ -31,6 +33,13 @@ class OutputFolder {
   /// Opens a new file; `name` may lie in a sub-folder, which is made. Errors: kCannotCreate, kIo.
   std::unique_ptr<OutputFile> Create(const std::string& name) const;
   void Write(const std::string& name, std::string_view text) const;
+  /// Removes a file or sub-folder, where it is there.
+  void Remove(const std::string& name) const;
+  /// From now on what is in it is worth keeping, if it is not committed. Errors: kCannotCreate,
+  /// kIo.
+  void Keep();
+  /// Where it then will be; "" where nothing is.
+  std::filesystem::path failed() const;
   /// Where the files are for now.
   const std::filesystem::path& partial() const { return partial_; }
   /// The path of `name` as messages give it: in the folder's place.
@@ -62,7 +71,7 @@ class OutputFolder {
   std::filesystem::path target_;  ///< absolute, behind links
   std::filesystem::path partial_;
   std::vector<std::filesystem::path> made_;  ///< parents, the outermost first
-  bool force_;
+  bool force_, keep_ = false;
   int lock_ = -1;  ///< of the partial folder
 };
 

@@ -10,8 +10,11 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstdarg>
 #include <fstream>
+#include <iterator>
+#include <thread>
 
 #include "alidade/sweep/sweep.h"
 #include "support/recording.h"
@@ -275,6 +278,25 @@ TEST(OutputFolder, RemovesWhatADeadProcessLeft) {
   EXPECT_EQ(HiddenIn(folder), std::vector<std::string>{});
 }
 
+TEST(OutputFolder, KeepsTheRowsThatADeadProcessLeft) {
+  const TemporaryFolder folder;
+  const int code = InChild([&] {
+    Experiment experiment = MakeExperiment(5);
+    Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+    static_cast<void>(RunInto(recorder, experiment));
+    ::_exit(0);
+  });
+  ASSERT_EQ(code, 0);
+  const std::string hidden = HiddenIn(folder).at(0);
+  const std::string process = hidden.substr(hidden.rfind('-') + 1);
+  Record(OptionsFor(folder / "out"));
+  EXPECT_EQ(HiddenIn(folder), std::vector<std::string>{});
+  EXPECT_TRUE(fs::exists(folder / ("out.failed-" + process) / "config.resolved.yaml"));
+  EXPECT_FALSE(fs::exists(folder / ("out.failed-" + process) / ".alidade"));
+  Record(OptionsFor(folder / "out", true));
+  EXPECT_TRUE(fs::exists(folder / ("out.failed-" + process))) << "--force replaces DIR alone";
+}
+
 TEST(OutputFolder, TouchesNoFolderThatItDidNotMake) {
   const std::vector<std::string> mine = {".out.old-1", ".out.old-2024", ".out.partial-1",
                                          ".out.partial-999999999", ".out.partial-notes"};
@@ -375,7 +397,7 @@ TEST(OutputFolder, LeavesNothingWithoutFinish) {
   EXPECT_TRUE(folder.empty());
 }
 
-TEST(OutputFile, WritesNothingTwiceAfterAFailure) {
+TEST(OutputFile, TakesNoMoreAfterAFailure) {
   const TemporaryFolder folder;
   std::string text;
   for (int i = 0; text.size() < 70'000; ++i) text += std::to_string(i) + '\n';
@@ -387,9 +409,41 @@ TEST(OutputFile, WritesNothingTwiceAfterAFailure) {
   fail_at = 0;
   write_limit = 0;
   EXPECT_EQ(code, 74);
-  EXPECT_EQ(Read(folder / "file"), text.substr(0, 3000));
-  file.Close();
-  EXPECT_TRUE(Read(folder / "file") == text);
+  EXPECT_EQ(Read(folder / "file"), "") << "the text was not whole";
+  EXPECT_EQ(CodeOf([&] {
+              file.Write("next\n");
+              file.Close();
+            }),
+            74);
+  EXPECT_EQ(Read(folder / "file"), "");
+}
+
+TEST(OutputFile, EndsWithTheLastRowThatFitsIn) {
+  const TemporaryFolder folder;
+  internal::OutputFile file(folder / "file", "file");
+  std::string rows;
+  for (int i = 100; i < 400; ++i) {
+    rows += std::to_string(i) + '\n';
+    file.Write(std::to_string(i) + '\n');
+  }
+  write_limit = 111;
+  fail_at = 8;
+  fail_error = ENOSPC;
+  const int code = CodeOf([&] { file.Close(); });
+  fail_at = 0;
+  write_limit = 0;
+  EXPECT_EQ(code, 74);
+  EXPECT_EQ(Read(folder / "file"), rows.substr(0, 7 * 111 / 4 * 4));
+}
+
+TEST(OutputFile, RowsDoNotWaitForLongerThanASecond) {
+  const TemporaryFolder folder;
+  internal::OutputFile file(folder / "file", "file");
+  file.Write("1\n");
+  EXPECT_EQ(Read(folder / "file"), "");
+  std::this_thread::sleep_for(std::chrono::milliseconds(1100));
+  file.Write("2\n");
+  EXPECT_EQ(Read(folder / "file"), "1\n2\n");
 }
 
 // FAULTS 87: a disk or quota that is full is no matter of rights.
@@ -439,11 +493,12 @@ TEST(OutputFolder, EveryFileIsSyncedAfterItsLastWriteAndBeforeItsFolderTakesItsN
 }
 
 // FAULTS 87: every write, fsync and rename in turn, on a new folder and on one to be replaced.
-TEST(OutputFolder, EveryFailureOfTheDiskIsAnErrorThatLeavesNothing) {
+TEST(OutputFolder, EveryFailureOfTheDiskIsAnErrorThatKeepsTheRows) {
   for (const bool replace : {false, true}) {
     const TemporaryFolder folder;
+    const fs::path failed_folder = folder / ("out.failed-" + std::to_string(::getpid()));
     if (replace) Record(OptionsFor(folder / "out"), 3);
-    int calls = 0;
+    int calls = 0, kept = 0, without_report = 0;
     for (int n = 1; n < 200; ++n) {
       fail_at = n;
       fail_error = n % 2 == 0 ? ENOSPC : EIO;
@@ -461,6 +516,23 @@ TEST(OutputFolder, EveryFailureOfTheDiskIsAnErrorThatLeavesNothing) {
       EXPECT_NE(text.find(n % 2 == 0 ? "No space left on device" : "Input/output error"),
                 std::string::npos)
           << text;
+      if (fs::exists(failed_folder)) {
+        ++kept;
+        for (const std::string& name : FilesIn(failed_folder)) {
+          if (!name.ends_with(".csv")) continue;
+          const std::string rows = Read(failed_folder / name);
+          EXPECT_TRUE(rows.empty() || rows.back() == '\n') << "call " << n << ": " << name;
+        }
+        fs::remove_all(failed_folder);
+      } else if (fs::exists(folder / "out") && !fs::exists(folder / "out/report.html")) {
+        ++without_report;
+        EXPECT_NE(text.find("report.html"), std::string::npos) << text;
+        EXPECT_EQ(Lines(folder / "out/truth.csv").size(), 6u);
+        EXPECT_EQ(Lines(folder / "out/files.txt"), EntriesOf(folder / "out"));
+        fs::remove_all(folder / "out");
+        if (replace) Record(OptionsFor(folder / "out"), 3);
+        continue;
+      }
       if (replace && fs::exists(folder / "out") && Lines(folder / "out/truth.csv").size() == 6) {
         // The last fsync, of the folder above: the new one is in its place, the old one next to it.
         EXPECT_NE(text.find("cannot sync"), std::string::npos) << text;
@@ -475,6 +547,8 @@ TEST(OutputFolder, EveryFailureOfTheDiskIsAnErrorThatLeavesNothing) {
       }
     }
     EXPECT_GT(calls, 30);
+    EXPECT_GT(kept, 20);
+    EXPECT_GT(without_report, 0);
   }
 }
 
@@ -524,7 +598,10 @@ TEST(OutputFolder, ALimitOnTheFileSizeIsAnErrorNotTheEnd) {
     Record(OptionsFor(folder / "out"));
   });
   EXPECT_EQ(code, 74);
-  EXPECT_TRUE(folder.empty());
+  ASSERT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
+  const fs::path kept = fs::directory_iterator(folder.path())->path();
+  EXPECT_TRUE(kept.filename().string().starts_with("out.failed-")) << kept;
+  EXPECT_EQ(Read(kept / "truth.csv").back(), '\n');
 }
 
 // FAULTS 93

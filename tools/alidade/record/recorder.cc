@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <ctime>
+#include <exception>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -188,6 +189,7 @@ void Recorder::Begin(const Experiment& experiment) {
 
 void Recorder::OnFrame(const SourceFrame& frame) {
   ALIDADE_EXPECTS(impl_->source.has_value());
+  if (impl_->folder.failed().empty()) impl_->folder.Keep();
   impl_->source->Add(frame);
   impl_->data->Add(frame);
 }
@@ -226,11 +228,21 @@ void Recorder::Finish(const RunResult& result) {
   folder.Write("run.json", internal::RunJson(result, impl_->facts));
   folder.Write("comparison.csv", internal::ComparisonCsv(result));
   folder.Write("timing.json", timing);
-  impl_->WriteReport(result, recorded);
+  std::exception_ptr without_report;
+  try {
+    impl_->WriteReport(result, recorded);
+  } catch (const Error&) {
+    without_report = std::current_exception();
+    folder.Remove("report.html");
+    folder.Remove("figures");
+  }
   impl_->log.Close();
   impl_->folder.Commit();
+  if (without_report) std::rethrow_exception(without_report);
   if (IsLogged(LogLevel::kInfo)) Log(LogLevel::kInfo, "wrote " + impl_->options.folder.string());
 }
+
+std::filesystem::path Recorder::failed() const { return impl_->folder.failed(); }
 
 const std::vector<std::string>& Recorder::highlights() const { return impl_->highlights; }
 const std::string& Recorder::note() const { return impl_->note; }

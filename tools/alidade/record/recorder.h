@@ -13,8 +13,10 @@
 namespace alidade {
 
 /// Writes a run folder (docs/run_folder.md). Everything goes to a temporary folder next to it, is
-/// synced, and takes its name at the end, also where the run failed: `run.json` then says why.
-/// Every write is checked. Errors: kCannotCreate, kIo with the path.
+/// synced, and takes its name at the end, also where the run failed: `run.json` then says why. Once
+/// there are frames, nothing of it is lost: where it cannot be finished (a full disk, a crash) the
+/// temporary folder becomes `FOLDER.failed-PID`, rows as complete as they were a second before.
+/// Every write is checked. Errors: kCannotCreate, kIo with the path, and what was kept.
 class Recorder : public RunObserver {
  public:
   struct Options {
@@ -39,8 +41,11 @@ class Recorder : public RunObserver {
                   const UpdateReport& report) override;
   /// Puts a file of that text into the folder too. Errors: kCannotCreate, kIo.
   void AddFile(const std::string& name, std::string_view text);
-  /// Writes run.json, comparison.csv, timing.json, figures and report.html, syncs and renames.
+  /// Writes run.json, comparison.csv, timing.json, figures and report.html, syncs and renames. A
+  /// figure or report that cannot be written is an error once the rest has its name.
   void Finish(const RunResult& result);
+  /// Where it will be kept, not finished; "" where there is nothing to keep, or it is finished.
+  std::filesystem::path failed() const;
 
   /// Paths that Finish made, relative to the folder, those a person wants first: report.html, ...
   const std::vector<std::string>& highlights() const;

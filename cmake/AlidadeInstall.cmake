@@ -28,8 +28,8 @@ set(plugin_folder ${CMAKE_INSTALL_LIBDIR}/alidade/plugins)
 file(RELATIVE_PATH bin_to_lib /${CMAKE_INSTALL_BINDIR} /${CMAKE_INSTALL_LIBDIR})
 set_target_properties(alidade PROPERTIES INSTALL_RPATH "$ORIGIN/${bin_to_lib}")
 install(TARGETS alidade)
-install(TARGETS alidade_model alidade_core alidade_tools EXPORT alidadeTargets
-        FILE_SET HEADERS)
+install(TARGETS alidade_model alidade_tools EXPORT alidadeTargets FILE_SET HEADERS)
+install(TARGETS alidade_core EXPORT alidadeTargets FILE_SET HEADERS FILE_SET generated)
 
 foreach(folder IN ITEMS motion_models sensors plugins)
   alidade_plugins_of(${PROJECT_SOURCE_DIR}/${folder} plugins)

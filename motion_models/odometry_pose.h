@@ -41,11 +41,10 @@ struct OdometryPose : Motion<6, Vec<3>, UnitQuaternion, Vec<3>, UnitQuaternion, 
       Quantity{"position", "m", "of the camera in the world", "x,y,z"},
       Quantity{"orientation", "", "world_from_cam", "w,x,y,z"},
       Quantity{"extrinsics_position", "m", "added to vehicle_from_cam.position", "x,y,z",
-               ALIDADE_ROLE_PARAMETER},
+               ALIDADE_ROLE_OWNED},
       Quantity{"extrinsics_orientation", "", "times vehicle_from_cam.orientation", "w,x,y,z",
-               ALIDADE_ROLE_PARAMETER},
-      Quantity{"speed_scale_error", "", "true speed / measured speed - 1", "",
-               ALIDADE_ROLE_PARAMETER}};
+               ALIDADE_ROLE_OWNED},
+      Quantity{"speed_scale_error", "", "true speed / measured speed - 1", "", ALIDADE_ROLE_OWNED}};
   using Input = Vec<6>;
   static constexpr Quantity kInput{"velocities", "",
                                    "of the vehicle, in its frame: linear, m/s, and angular, rad/s",

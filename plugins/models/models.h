@@ -342,9 +342,9 @@ class Models : public Source {
         moved.push_back(next[static_cast<std::size_t>(id)].data());
       }
       Status status = Status::kOk;
-      if (!motion.held || !model.discrete_noise()) status = DrawNoise(blocks, motion);
+      const double* const input = motion.input.empty() ? nullptr : motion.input.data();
+      if (!motion.held || !model.discrete_noise()) status = DrawNoise(blocks, input, motion);
       if (status == Status::kOk) {
-        const double* const input = motion.input.empty() ? nullptr : motion.input.data();
         status = model.Step(blocks.data(), input, motion.w.data(), dt_s_, moved.data(), nullptr,
                             nullptr);
       }
@@ -364,10 +364,11 @@ class Models : public Source {
     }
   }
 
-  Status DrawNoise(const std::vector<const double*>& blocks, Motion& motion) const {
+  Status DrawNoise(const std::vector<const double*>& blocks, const double* input,
+                   Motion& motion) const {
     const auto n = static_cast<Eigen::Index>(motion.w.size());
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> l(n, n);
-    const Status status = motion.binding->model.SqrtQ(blocks.data(), dt_s_, l.data());
+    const Status status = motion.binding->model.SqrtQ(blocks.data(), input, dt_s_, l.data());
     Eigen::VectorXd drawn(n);
     for (double& value : drawn) value = motion.noise.Normal();
     Eigen::VectorXd::Map(motion.w.data(), n) = l * drawn;

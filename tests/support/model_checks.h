@@ -93,10 +93,11 @@ inline void ExpectTrueJacobians(const MotionModel& motion, const Blocks& x, cons
 }
 
 /// L L' of the process noise, n_w x n_w.
-inline std::vector<double> Covariance(const MotionModel& motion, const Blocks& x, double dt_s) {
+inline std::vector<double> Covariance(const MotionModel& motion, const Blocks& x, double dt_s,
+                                      const double* u = nullptr) {
   const int n = motion.noise_size();
   std::vector<double> l(n * n, kPoison), q(n * n);
-  EXPECT_EQ(motion.SqrtQ(Pointers(x).data(), dt_s, l.data()), Status::kOk);
+  EXPECT_EQ(motion.SqrtQ(Pointers(x).data(), u, dt_s, l.data()), Status::kOk);
   for (int r = 0; r < n; ++r) {
     for (int c = 0; c < n; ++c) {
       for (int k = 0; k < n; ++k) q[r * n + c] += l[r * n + k] * l[c * n + k];
@@ -116,7 +117,7 @@ inline NoisyStep StepWithNoise(const MotionModel& motion, const Blocks& x, const
   const int n = motion.tangent_size(), n_w = motion.noise_size();
   const Stepped step = Step(motion, x, u, nullptr, dt_s);
   Rows l = Rows::Zero(n_w, n_w);
-  EXPECT_EQ(motion.SqrtQ(Pointers(noise_of).data(), noise_dt_s, l.data()), Status::kOk);
+  EXPECT_EQ(motion.SqrtQ(Pointers(noise_of).data(), u, noise_dt_s, l.data()), Status::kOk);
   return {step.next, Eigen::Map<const Rows>(step.f.data(), n, n),
           Eigen::Map<const Rows>(step.g.data(), n, n_w) * l};
 }

@@ -48,11 +48,11 @@ Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const doub
   return finite ? Outcome::kAccepted : Outcome::kNotFinite;
 }
 
-Outcome SqrtQAt(const MotionBinding& motion, const MotionPlace& place, const double* x, double dt_s,
-                double* l) {
+Outcome SqrtQAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
+                const double* u, double dt_s, double* l) {
   const Eigen::Index size = Eigen::Index{motion.model.noise_size()} * motion.model.noise_size();
   std::fill_n(l, size, kNotWritten);
-  const Status status = motion.model.SqrtQ(BlocksAt(place, x).data(), dt_s, l);
+  const Status status = motion.model.SqrtQ(BlocksAt(place, x).data(), u, dt_s, l);
   if (status != Status::kOk) return OutcomeOf(status);
   return AreFinite(l, size) ? Outcome::kAccepted : Outcome::kNotFinite;
 }

@@ -26,8 +26,8 @@ struct Trouble {
 Outcome StepAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
                const double* u, const double* w, double dt_s, double* next, double* f, double* g);
 /// L of its Qw = L L' there, n_w x n_w, row-major.
-Outcome SqrtQAt(const MotionBinding& motion, const MotionPlace& place, const double* x, double dt_s,
-                double* l);
+Outcome SqrtQAt(const MotionBinding& motion, const MotionPlace& place, const double* x,
+                const double* u, double dt_s, double* l);
 /// What one of these that is not kAccepted means.
 Trouble TroubleOf(const MotionBinding& motion, Outcome outcome);
 /// x <- x' of its blocks that are not constant, brought back to their manifolds.

@@ -61,7 +61,7 @@ ALIDADE_INLINE bool FastPath::StepModel(const Motion& motion, double dt_s, doubl
   for (int i = 0; i < w * w; ++i) l[i] = kUnwritten;
   if (motion.model->Step(motion.x.data(), step.u.data(), nullptr, dt_s, motion.next.data(), f, g) !=
           Status::kOk ||
-      motion.model->SqrtQ(motion.x.data(), dt_s, l) != Status::kOk) {
+      motion.model->SqrtQ(motion.x.data(), step.u.data(), dt_s, l) != Status::kOk) {
     return false;
   }
   double own[K > 0 ? K * K : 1];

@@ -58,7 +58,7 @@ Trouble Motions::EvaluateOne(std::size_t i, const State& state, double dt_s, boo
       StepAt(motion, place, x, step.u.data(), nullptr, dt_s, next_.data(),
              derivatives ? step.f.data() : nullptr, derivatives ? step.g.data() : nullptr);
   if (outcome == Outcome::kAccepted && !goes_on) {
-    outcome = SqrtQAt(motion, place, x, dt_s, step.l.data());
+    outcome = SqrtQAt(motion, place, x, step.u.data(), dt_s, step.l.data());
   }
   if (outcome != Outcome::kAccepted || !derivatives) return TroubleOf(motion, outcome);
   SpreadNoise(step.g.data(), step.l.data(), motion.model.tangent_size(), motion.model.noise_size(),

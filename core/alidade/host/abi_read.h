@@ -7,10 +7,28 @@
 #include <cstring>
 #include <string>
 
+#include "alidade/model/plugin_abi.h"
+
+/// Reads structs of plugin_abi.h by its rules.
 namespace alidade::internal {
 
 /// A text that may be null.
 inline std::string Text(const char* text) { return text == nullptr ? "" : text; }
+
+/// What breaks the rules of texts, as in `is not UTF-8`, or "".
+std::string TextDefect(const char* text);
+
+/// Printable ASCII without blanks, of 1 to ALIDADE_MAX_NAME bytes.
+bool GoodName(const char* name);
+
+/// Whether reserved members are as they have to be.
+template <class T, std::size_t N>
+bool AllZero(const T (&reserved)[N]) {
+  return std::all_of(reserved, reserved + N, [](const T& one) { return one == T{}; });
+}
+
+/// The bits of `flags` that have to be understood and are not among `known`, as in `0x20000`; "".
+std::string UnknownBits(std::uint32_t flags, std::uint32_t known);
 
 /// A copy of a struct of plugin_abi.h, as far as its own size says; zero beyond. `limit`: bytes
 /// that it may claim at most.

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <iterator>
 #include <memory>
 
+#include "alidade/host/headers_hash.h"
 #include "alidade/host/plugin_host.h"
 #include "alidade/host/source.h"
 #include "alidade/model/build_tag.h"
@@ -18,8 +20,8 @@ struct BundleProblem;   // in alidade/bundle/bundle.h
 struct BundleOptions;   // likewise
 struct BundleResult;    // likewise
 
-/// All that must be equal between the host and a C++ plugin: version, compiler, and the
-/// flags that change layout.
+/// All that must be equal between the host and a C++ plugin: version and headers, compiler, and
+/// what else changes the layout of classes.
 #define ALIDADE_STRINGISE_(x) #x
 #define ALIDADE_STRINGISE(x) ALIDADE_STRINGISE_(x)
 #if defined(_GLIBCXX_DEBUG)
@@ -28,10 +30,13 @@ struct BundleResult;    // likewise
 #define ALIDADE_BUILD_STL "stl"
 #endif
 #define ALIDADE_BUILD_VERSION "0.1.0"  // of the project: plugin_host.cc checks it
-#define ALIDADE_BUILD_ID                                                          \
-  ALIDADE_BUILD_VERSION                                                           \
+#define ALIDADE_BUILD_ID \
+  ALIDADE_BUILD_VERSION  \
   " " __VERSION__ " cxx" ALIDADE_STRINGISE(__cplusplus) " abi" ALIDADE_STRINGISE( \
-      __GXX_ABI_VERSION) " align" ALIDADE_STRINGISE(__BIGGEST_ALIGNMENT__) " " ALIDADE_BUILD_STL
+      __GXX_ABI_VERSION) " align" ALIDADE_STRINGISE(__BIGGEST_ALIGNMENT__) " " ALIDADE_BUILD_STL \
+  ALIDADE_STRINGISE(_GLIBCXX_USE_CXX11_ABI) " eigen" ALIDADE_STRINGISE(EIGEN_WORLD_VERSION) \
+  "." ALIDADE_STRINGISE(EIGEN_MAJOR_VERSION) "." ALIDADE_STRINGISE(EIGEN_MINOR_VERSION) \
+  "/" ALIDADE_STRINGISE(EIGEN_MAX_ALIGN_BYTES) " headers" ALIDADE_HEADERS_HASH
 
 struct SourceEntry {
   const char* name;

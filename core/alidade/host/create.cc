@@ -55,7 +55,7 @@ std::string Line(const std::string& what, const Space& space) {
   if (!space.doc.empty()) line += "; " + space.doc;
   if (space.optional()) line += " (optional)";
   if (space.landmark()) line += " (of a landmark)";
-  if ((space.flags & ALIDADE_ROLE_PARAMETER) != 0)
+  if ((space.flags & ALIDADE_ROLE_OWNED) != 0)
     line += " (model parameter state: constant, unless it has an initial value)";
   return line;
 }

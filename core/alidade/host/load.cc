@@ -8,6 +8,8 @@
 
 #include "alidade/base/child_process.h"
 #include "alidade/host/cpp_plugin.h"
+#include "alidade/host/elf_file.h"
+#include "alidade/host/loadable.h"
 #include "alidade/host/plugin_file.h"
 #include "alidade/host/process_settings.h"
 
@@ -53,7 +55,9 @@ std::string TrialLoad(const std::filesystem::path& file, std::uint32_t kind) {
       return "threw an exception while loading";
     }
   });
-  return end.answered ? end.text : end.text + " while loading";
+  if (!end.answered) return end.text + " while loading";
+  if (end.text.empty() && !end.printed.empty()) return "prints '" + end.printed + "' while loading";
+  return end.text;
 }
 
 /// Opens the library for the rest of the process.
@@ -69,6 +73,7 @@ OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem
   const AlidadeBuildTag build_tag = ReadBuildTag(canonical);
   CheckBuild(build_tag, canonical);
   CheckTrusted(file);
+  CheckLoadable(ElfFile(canonical));
   const std::string failure = TrialLoad(canonical, build_tag.kind);
   if (!failure.empty()) Refuse(file, failure);
 

@@ -14,7 +14,15 @@ namespace {
 using internal::ReadPrefix;
 using internal::Text;
 
-constexpr int kMaxSize = 1 << 20;
+constexpr int kMaxSize = ALIDADE_MAX_SIZE;
+constexpr std::uint32_t kKnownRoleFlags = ALIDADE_ROLE_OPTIONAL | ALIDADE_ROLE_OWNED |
+                                          ALIDADE_ROLE_LANDMARK | ALIDADE_ROLE_SHARED |
+                                          ALIDADE_ROLE_TIME_OFFSET | ALIDADE_ROLE_CLONE;
+constexpr std::uint32_t kKnownCapabilities = ALIDADE_CAN_INITIALISE | ALIDADE_HAS_VALIDITY |
+                                             ALIDADE_RESIDUAL_ONLY | ALIDADE_NEEDS_PAYLOAD |
+                                             ALIDADE_DISCRETE_NOISE;
+constexpr const char* kUnsupported = ", which this version does not support";
+constexpr const char* kReserved = "uses reserved members";
 
 /// Whether the sizes are those of a geometry that this version knows.
 bool KnownGeometry(const AlidadeSpace& space) {
@@ -60,6 +68,16 @@ std::vector<std::string> DefaultElements(const AlidadeSpace& space) {
 /// What is wrong with `space`, or "".
 std::string Defect(const AlidadeSpace& space) {
   if (Text(space.name).empty()) return "has no name";
+  if (!internal::GoodName(space.name)) return "has a name that is none";
+  const std::pair<const char*, const char*> texts[] = {
+      {"unit", space.unit}, {"elements", space.elements}, {"doc", space.doc}};
+  for (const auto& [what, text] : texts) {
+    const std::string defect = internal::TextDefect(text);
+    if (!defect.empty()) return std::string("has a text '") + what + "' that " + defect;
+  }
+  const std::string unknown = internal::UnknownBits(space.flags, kKnownRoleFlags);
+  if (!unknown.empty()) return "has flags that this version does not know: " + unknown;
+  if (space.reserved0 != 0 || !internal::AllZero(space.reserved)) return kReserved;
   if (!KnownGeometry(space)) {
     return "has geometry " + std::to_string(space.geometry) + " with sizes " +
            std::to_string(space.ambient) + " and " + std::to_string(space.tangent) +
@@ -71,6 +89,15 @@ std::string Defect(const AlidadeSpace& space) {
   }
   if ((space.flags & ALIDADE_ROLE_SHARED) != 0 && (space.flags & ALIDADE_ROLE_LANDMARK) == 0) {
     return "is shared, but not a landmark's";
+  }
+  if ((space.flags & ALIDADE_ROLE_TIME_OFFSET) != 0) {
+    return std::string("is a time offset") + kUnsupported;
+  }
+  if ((space.flags & ALIDADE_ROLE_CLONE) != 0) {
+    return std::string("is of an earlier timestamp") + kUnsupported;
+  }
+  if (space.owned != nullptr) {
+    return std::string("has a prior and dynamics of its own") + kUnsupported;
   }
   return {};
 }
@@ -95,6 +122,7 @@ ModelInstance::ModelInstance(const AlidadeInstance& instance, std::string name, 
     Refuse("was created without an object or without a way to destroy it");
   }
   std::unique_ptr<void, void (*)(void*)> until_checked(instance_.self, instance_.destroy);
+  if (!internal::AllZero(instance_.reserved)) Refuse(kReserved);
   ReadCalls();
   ReadDescription();
   static_cast<void>(until_checked.release());
@@ -110,9 +138,11 @@ void ModelInstance::ReadCalls() {
   if (instance_.kind == ALIDADE_KIND_SENSOR && instance_.sensor != nullptr) {
     sensor_ = ReadPrefix(instance_.sensor);
     instance_.sensor = &sensor_;
+    if (!internal::AllZero(sensor_.reserved)) Refuse(kReserved);
   } else if (instance_.kind == ALIDADE_KIND_MOTION && instance_.motion != nullptr) {
     motion_ = ReadPrefix(instance_.motion);
     instance_.motion = &motion_;
+    if (!internal::AllZero(motion_.reserved)) Refuse(kReserved);
     if (motion_.step == nullptr || motion_.sqrt_q == nullptr) {
       Refuse("lacks a function that every motion model must have: step, sqrt_q");
     }
@@ -127,8 +157,25 @@ void ModelInstance::ReadDescription() {
   instance_.description = &description_;
   capabilities_ = description_.capabilities;
   const bool is_sensor = instance_.kind == ALIDADE_KIND_SENSOR;
-  if ((capabilities_ & ALIDADE_RESIDUAL_ONLY) != 0) {
-    Refuse("gives a residual alone, which this version does not support");
+  const std::string unknown = internal::UnknownBits(capabilities_, kKnownCapabilities);
+  if (!unknown.empty()) Refuse("has capabilities that this version does not know: " + unknown);
+  if (description_.reserved0 != 0 || !internal::AllZero(description_.reserved)) Refuse(kReserved);
+  if ((capabilities_ & ALIDADE_RESIDUAL_ONLY) != 0 || description_.residual != nullptr) {
+    Refuse(std::string("gives a residual alone") + kUnsupported);
+  }
+  if ((capabilities_ & ALIDADE_NEEDS_PAYLOAD) != 0) {
+    Refuse(std::string("needs what comes beside a measurement") + kUnsupported);
+  }
+  if (is_sensor && description_.known != nullptr) {
+    Refuse(std::string("needs known numbers with each measurement") + kUnsupported);
+  }
+  if (!is_sensor && description_.input_count > 1) {
+    Refuse("has " + std::to_string(description_.input_count) + " control inputs" + kUnsupported);
+  }
+  if (!is_sensor && description_.input_count == 1 &&
+      (description_.inputs == nullptr ||
+       !internal::GoodStride<AlidadeSpace>(description_.input_stride))) {
+    Refuse("does not describe its control input");
   }
   if (is_sensor && (sensor_.eval == nullptr || sensor_.sqrt_noise == nullptr)) {
     Refuse("lacks a function that every sensor must have: eval, sqrt_noise");
@@ -148,9 +195,9 @@ void ModelInstance::ReadDescription() {
   for (int i = 0; i < count; ++i) {
     const auto role = internal::ReadEntry(description_.roles, description_.role_stride, i);
     spaces_.push_back(read(role, "role '" + Text(role.name) + "'"));
-    if (is_sensor && (role.flags & ALIDADE_ROLE_PARAMETER) != 0) {
-      Refuse(": role '" + spaces_.back().name +
-             "' is a model parameter state of the sensor, which this version does not support");
+    if (is_sensor && (role.flags & ALIDADE_ROLE_OWNED) != 0) {
+      Refuse(": role '" + spaces_.back().name + "' is a model parameter state of the sensor" +
+             kUnsupported);
     }
     tangents_.push_back(role.tangent);
     const auto same = [&](const Space& other) { return other.name == spaces_.back().name; };
@@ -158,10 +205,11 @@ void ModelInstance::ReadDescription() {
       Refuse("has two roles named '" + spaces_.back().name + "'");
     }
   }
-  const AlidadeSpace* space = is_sensor ? description_.output : description_.input;
-  if (is_sensor && space == nullptr) Refuse("does not describe its measurement");
-  if (space != nullptr) {
-    space_ = read(ReadPrefix(space), is_sensor ? "the measurement" : "the control input");
+  if (is_sensor && description_.output == nullptr) Refuse("does not describe its measurement");
+  if (is_sensor) {
+    space_ = read(ReadPrefix(description_.output), "the measurement");
+  } else if (has_input()) {
+    space_ = read(ReadPrefix(description_.inputs), "the control input");
   }
   const int y = description_.initialise_role;
   if (is_sensor && (capabilities_ & ALIDADE_CAN_INITIALISE) != 0 &&
@@ -203,7 +251,8 @@ bool SensorModel::has_landmark() const {
 Status SensorModel::Initialise(const double* const* roles, const double* z, const double* prior,
                                double* y, double* const* jx, double* jz, double* jp) const {
   ALIDADE_EXPECTS(initialised_role_ >= 0);
-  return detail::ToStatus(sensor_->initialise(self_, roles, z, prior, y, jx,
+  const AlidadeObservation seen = detail::Seen(z);
+  return detail::ToStatus(sensor_->initialise(self_, &seen, roles, prior, y, jx,
                                               instance_->tangents().data(), jz,
                                               measurement().geometry.tangent, jp, prior_size_));
 }

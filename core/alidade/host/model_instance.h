@@ -17,10 +17,18 @@ namespace detail {
 inline Status ToStatus(std::int32_t code) {
   return code < ALIDADE_OK || code > ALIDADE_ERROR ? Status::kError : static_cast<Status>(code);
 }
+/// A measurement as its sensor is shown it; null: a prediction alone is asked for.
+constexpr AlidadeObservation Seen(const double* z) {
+  AlidadeObservation seen{};
+  seen.struct_size = sizeof(seen);
+  seen.z = z;
+  return seen;
+}
+inline constexpr AlidadeObservation kUnseen = Seen(nullptr);
 }  // namespace detail
 
 /// The most roles of a sensor, and blocks of a motion model.
-inline constexpr int kMaxRoles = 64;
+inline constexpr int kMaxRoles = ALIDADE_MAX_ROLES;
 
 /// Owns one instance that a plugin created, and its description as C++ values.
 class ModelInstance {
@@ -39,6 +47,7 @@ class ModelInstance {
   const std::vector<std::int32_t>& tangents() const { return tangents_; }  ///< of the spaces
   /// The measurement of a sensor, the control input of a motion model (empty name: none).
   const Space& space() const { return space_; }
+  bool has_input() const { return description_.input_count > 0; }
   unsigned capabilities() const { return capabilities_; }
   std::string error_text() const;
 
@@ -78,20 +87,23 @@ class SensorModel {
 
   /// z = h(roles), ambient values; kOutOfDomain where h is not defined.
   Status Predict(const double* const* roles, double* z) const {
-    return detail::ToStatus(sensor_->eval(self_, roles, z, nullptr, nullptr));
+    return detail::ToStatus(sensor_->eval(self_, &detail::kUnseen, roles, z, nullptr, nullptr));
   }
   /// z and jacobians[i] = dz/d role_i, row stride strides[i]; a null jacobian is skipped.
   Status Linearise(const double* const* roles, double* z, double* const* jacobians,
                    const int* strides) const {
-    return detail::ToStatus(sensor_->eval(self_, roles, z, jacobians, strides));
+    return detail::ToStatus(sensor_->eval(self_, &detail::kUnseen, roles, z, jacobians, strides));
   }
   /// l, row-major m x m, with R = l l'.
   Status SqrtNoise(const double* const* roles, const double* z, double* l) const {
+    const AlidadeObservation seen = detail::Seen(z);
     return detail::ToStatus(
-        sensor_->sqrt_noise(self_, roles, z, l, measurement().geometry.tangent));
+        sensor_->sqrt_noise(self_, &seen, roles, l, measurement().geometry.tangent));
   }
   Status Valid(const double* z) const {
-    return sensor_->valid == nullptr ? Status::kOk : detail::ToStatus(sensor_->valid(self_, z));
+    if (sensor_->valid == nullptr) return Status::kOk;
+    const AlidadeObservation seen = detail::Seen(z);
+    return detail::ToStatus(sensor_->valid(self_, &seen));
   }
   /// y = g(other roles, z), dense row-major Jacobians jx[i] = dy/d role_i and jz = dy/dz. kInvalid
   /// where a prior is needed.
@@ -128,7 +140,7 @@ class MotionModel {
   /// Whether w is held over the whole of an interval between updates, or drawn for each step.
   bool discrete_noise() const { return (instance_->capabilities() & ALIDADE_DISCRETE_NOISE) != 0; }
   int tangent_size() const { return tangent_size_; }
-  bool has_input() const { return instance_->c().description->input != nullptr; }
+  bool has_input() const { return instance_->has_input(); }
   /// The control input, where it has one.
   const Space& input() const { return instance_->space(); }
 
@@ -136,13 +148,13 @@ class MotionModel {
   /// be null.
   Status Step(const double* const* blocks, const double* input, const double* w, double dt_s,
               double* const* next, double* f, double* g) const {
-    return detail::ToStatus(motion_->step(self_, blocks, input,
+    return detail::ToStatus(motion_->step(self_, blocks, &input,
                                           w != nullptr ? w : zero_noise_.data(), dt_s, next, f,
-                                          tangent_size_, g, noise_size_));
+                                          tangent_size_, g, noise_size_, nullptr, 0));
   }
   /// l, row-major n_w x n_w, with Qw = l l'.
-  Status SqrtQ(const double* const* blocks, double dt_s, double* l) const {
-    return detail::ToStatus(motion_->sqrt_q(self_, blocks, dt_s, l, noise_size_));
+  Status SqrtQ(const double* const* blocks, const double* input, double dt_s, double* l) const {
+    return detail::ToStatus(motion_->sqrt_q(self_, blocks, &input, dt_s, l, noise_size_));
   }
   std::string error_text() const { return instance_->error_text(); }
 

@@ -33,7 +33,7 @@ std::string RangeText(const AlidadeParam& param) {
 }
 
 std::string TypeText(const AlidadeParam& param) {
-  const char* const names[] = {"", "number", "integer", "flag", "choice"};
+  const char* const names[] = {"", "number", "integer", "flag", "choice", "text", "file"};
   const std::string name = names[param.kind];
   if (param.count < 0) return name + "[]";
   return param.count == 1 ? name : name + '[' + std::to_string(param.count) + ']';
@@ -62,7 +62,10 @@ std::string ValuesText(const AlidadeParam& param, const std::vector<double>& val
   return param.count == 1 ? text : '[' + text + ']';
 }
 
+bool IsText(const AlidadeParam& param) { return param.kind == ALIDADE_PARAM_TEXT; }
+
 std::string FallbackText(const AlidadeParam& param) {
+  if (IsText(param)) return Text(param.fallback_text);
   return HasFallback(param) ? ValuesText(param, Fallback(param)) : "";
 }
 
@@ -86,28 +89,83 @@ ParamInfo Describe(const AlidadeParam& param) {
   return info;
 }
 
-/// Whether the defaults are there that it says it has; that of a choice is one of its names.
+/// Whether the defaults are there that it says it has; that of a choice is one of its names, that
+/// of a number lies in its range.
 bool GoodFallback(const AlidadeParam& param) {
   if (!HasFallback(param) || param.count < 0) return true;
+  if (IsText(param)) return TextDefect(param.fallback_text).empty();
   if (param.fallback == nullptr) return false;
-  const bool choice = param.kind == ALIDADE_PARAM_CHOICE;
-  return !choice || (param.fallback[0] >= 0.0 && param.fallback[0] < param.choice_count);
+  return std::all_of(param.fallback, param.fallback + param.count, [&](double value) {
+    if (param.kind == ALIDADE_PARAM_CHOICE) return value >= 0.0 && value < param.choice_count;
+    if (param.kind == ALIDADE_PARAM_INTEGER && value != std::trunc(value)) return false;
+    const bool none = value == kInfinity && (param.flags & ALIDADE_PARAM_OR_NONE) != 0;
+    return none || (value >= param.low && value <= param.high);
+  });
 }
 
-/// The parameter, where it follows the rules of plugin_abi.h; else an exception.
-AlidadeParam Checked(const AlidadeParam* from, const double* values, std::int32_t capacity) {
+/// What breaks the rules of plugin_abi.h in a parameter, or "".
+std::string ParamDefect(const AlidadeParam& param) {
+  constexpr std::uint32_t kKnown = ALIDADE_PARAM_HAS_DEFAULT | ALIDADE_PARAM_LOW_OPEN |
+                                   ALIDADE_PARAM_HIGH_OPEN | ALIDADE_PARAM_OR_NONE;
+  const bool choice = param.kind == ALIDADE_PARAM_CHOICE;
+  if (!GoodName(param.key)) return "its key is no name";
+  if (param.kind == ALIDADE_PARAM_FILE) return "it is a file";
+  if (param.kind < ALIDADE_PARAM_NUMBER || param.kind > ALIDADE_PARAM_TEXT) {
+    return "its kind is " + std::to_string(param.kind);
+  }
+  const std::string unknown = UnknownBits(param.flags, kKnown);
+  if (!unknown.empty()) return "it has the flags " + unknown;
+  if (param.reserved0 != 0 || !AllZero(param.reserved)) return "it uses reserved members";
+  for (const char* text : {param.unit, param.doc}) {
+    const std::string defect = TextDefect(text);
+    if (!defect.empty()) return "its unit or doc " + defect;
+  }
+  if (choice != (param.choices != nullptr && param.choice_count > 0) ||
+      param.choice_count > ALIDADE_MAX_CHOICES) {
+    return "it has " + std::to_string(param.choice_count) + " choices";
+  }
+  for (int i = 0; i < param.choice_count; ++i) {
+    const std::string defect = TextDefect(param.choices[i]);
+    if (!defect.empty()) return "a choice " + defect;
+  }
+  if (param.count == 0 || param.count < -1 || ((choice || IsText(param)) && param.count != 1)) {
+    return "its count is " + std::to_string(param.count);
+  }
+  if (!(param.low <= param.high)) return "its range is empty";
+  return GoodFallback(param) ? "" : "its default is none";
+}
+
+/// The parameter, where it follows the rules of plugin_abi.h and there is room for it; else an
+/// exception.
+AlidadeParam Checked(const AlidadeParam* from, bool text, bool room) {
   if (from == nullptr) throw Error(ExitCode::kPlugin, "asks for no parameter at all");
   const AlidadeParam param = ReadPrefix(from);
-  const std::string key = Text(param.key);
-  const bool known = param.kind >= ALIDADE_PARAM_NUMBER && param.kind <= ALIDADE_PARAM_CHOICE;
-  const bool choice = param.kind == ALIDADE_PARAM_CHOICE;
-  if (key.empty() || !known || param.count == 0 || param.count < -1 || param.count > capacity ||
-      values == nullptr || choice != (param.choices != nullptr && param.choice_count > 0) ||
-      (choice && param.count != 1) || !GoodFallback(param)) {
+  std::string defect = ParamDefect(param);
+  if (defect.empty() && (text != IsText(param) || !room))
+    defect = "it is asked for as another kind";
+  if (!defect.empty()) {
     throw Error(ExitCode::kPlugin,
-                "asks for parameter '" + key + "' in a way that this version does not understand");
+                "asks for parameter '" + (GoodName(param.key) ? std::string(param.key) : "") +
+                    "' in a way that this version does not understand: " + defect);
   }
   return param;
+}
+
+/// The same of one that is read into `values`.
+AlidadeParam Checked(const AlidadeParam* from, const double* values, std::int32_t capacity) {
+  const bool room = values != nullptr && from != nullptr && from->count <= capacity;
+  return Checked(from, false, room);
+}
+
+/// The same of one that is read into `text`.
+AlidadeParam Checked(const AlidadeParam* from, const char* text, std::int32_t capacity) {
+  return Checked(from, true, text != nullptr && capacity > ALIDADE_MAX_TEXT);
+}
+
+/// Copies `from`, of at most ALIDADE_MAX_TEXT bytes; its length.
+std::int32_t Put(const std::string& from, char* to) {
+  std::memcpy(to, from.c_str(), from.size() + 1);
+  return static_cast<std::int32_t>(from.size());
 }
 
 /// `(px, > 0: rectified focal length)`
@@ -164,16 +222,27 @@ std::vector<double> All(const AlidadeParam& param, const Node& node) {
   return values;
 }
 
+/// What a dotted key names below `map`, or nothing: then `map` is the last map on the way, and
+/// `key` what is missing there.
+std::optional<Node> FindBelow(Node& map, std::string& key) {
+  for (std::size_t dot; (dot = key.find('.')) != std::string::npos; key.erase(0, dot + 1)) {
+    const std::optional<Node> child = map.Find(key.substr(0, dot));
+    if (!child) return std::nullopt;
+    map = *child;
+  }
+  return map.Find(key);
+}
+
 }  // namespace
 
 ParamReader::ParamReader(const Node& entry, std::string owner, std::string representation)
-    : entry_(entry), owner_(std::move(owner)), representation_(std::move(representation)) {
-  host_.struct_size = sizeof(AlidadeHost);
-  host_.abi_major = ALIDADE_ABI_MAJOR;
-  host_.abi_minor = ALIDADE_ABI_MINOR;
-  host_.context = this;
-  host_.read = &ParamReader::Read;
-  host_.fail = &ParamReader::Fail;
+    : entry_(entry),
+      owner_(std::move(owner)),
+      representation_(std::move(representation)),
+      host_(this) {
+  host_.c().read = &ParamReader::Read;
+  host_.c().read_text = &ParamReader::ReadText;
+  host_.c().fail = &ParamReader::Fail;
 }
 
 void ParamReader::Check() const {
@@ -188,11 +257,13 @@ void ParamReader::Check() const {
   throw Error(code_, Join(lines, "\n"));
 }
 
-std::int32_t ParamReader::Read(void* self, const AlidadeParam* param, double* values,
+std::int32_t ParamReader::Read(void* context, const AlidadeParam* param, double* values,
                                std::int32_t capacity) noexcept try {
-  auto* reader = static_cast<ParamReader*>(self);
+  auto* reader = LentHost::ReaderOf<ParamReader>(context);
+  if (reader == nullptr) return -1;
   try {
-    const std::vector<double> read = reader->Values(reader->Expect(param, values, capacity));
+    const std::vector<double> read =
+        reader->Values(reader->Expect([&] { return Checked(param, values, capacity); }));
     std::copy_n(read.begin(), std::min(std::ssize(read), std::ptrdiff_t{capacity}), values);
     return static_cast<std::int32_t>(read.size());
   } catch (const Error& e) {
@@ -200,12 +271,29 @@ std::int32_t ParamReader::Read(void* self, const AlidadeParam* param, double* va
   }
   return -1;
 } catch (...) {
-  static_cast<ParamReader*>(self)->thrown_ = std::current_exception();
+  LentHost::ReaderOf<ParamReader>(context)->thrown_ = std::current_exception();
   return -1;
 }
 
-void ParamReader::Fail(void* self, const char* key, const char* text) noexcept try {
-  auto* reader = static_cast<ParamReader*>(self);
+std::int32_t ParamReader::ReadText(void* context, const AlidadeParam* param, char* text,
+                                   std::int32_t capacity) noexcept try {
+  auto* reader = LentHost::ReaderOf<ParamReader>(context);
+  if (reader == nullptr) return -1;
+  try {
+    const AlidadeParam expected = reader->Expect([&] { return Checked(param, text, capacity); });
+    return Put(reader->TextOf(expected), text);
+  } catch (const Error& e) {
+    reader->errors_.emplace_back(e.what());
+  }
+  return -1;
+} catch (...) {
+  LentHost::ReaderOf<ParamReader>(context)->thrown_ = std::current_exception();
+  return -1;
+}
+
+void ParamReader::Fail(void* context, const char* key, const char* text) noexcept try {
+  auto* reader = LentHost::ReaderOf<ParamReader>(context);
+  if (reader == nullptr) return;
   if (Text(text) == std::bad_alloc().what()) throw std::bad_alloc();  // on the other side
   if (Text(key).empty()) {
     reader->failure_ = Text(text).empty() ? "it does not say why" : Text(text);
@@ -223,14 +311,13 @@ void ParamReader::Fail(void* self, const char* key, const char* text) noexcept t
   }
   reader->errors_.push_back(ErrorLine(place, PathBelow(base.path(), key), Text(text)));
 } catch (...) {
-  static_cast<ParamReader*>(self)->thrown_ = std::current_exception();
+  LentHost::ReaderOf<ParamReader>(context)->thrown_ = std::current_exception();
 }
 
 /// The parameter; one that breaks the rules is an error of the plugin, at the entry.
-AlidadeParam ParamReader::Expect(const AlidadeParam* param, const double* values,
-                                 std::int32_t capacity) {
+AlidadeParam ParamReader::Expect(const std::function<AlidadeParam()>& checked) {
   try {
-    return Checked(param, values, capacity);
+    return checked();
   } catch (const Error& e) {
     code_ = e.code();
     throw Error(code_, ErrorLine(entry_.place(), entry_.path(), owner_ + ' ' + e.what()));
@@ -259,16 +346,24 @@ std::vector<double> ParamReader::Values(const AlidadeParam& param) const {
     return {static_cast<double>(representation - choices.begin())};
   }
   Node map = BaseOf(rest);
-  for (std::size_t dot; (dot = rest.find('.')) != std::string::npos; rest.erase(0, dot + 1)) {
-    const std::optional<Node> child = map.Find(rest.substr(0, dot));
-    if (!child) return Absent(param, map, rest);
-    map = *child;
-  }
-  const std::optional<Node> node = map.Find(rest);
+  const std::optional<Node> node = FindBelow(map, rest);
   if (!node) return Absent(param, map, rest);
   const std::vector<double> values = All(param, *node);
   ExpectCalibrated(param, *node, values);
   return values;
+}
+
+/// A text, which no calibration has.
+std::string ParamReader::TextOf(const AlidadeParam& param) const {
+  std::string rest = param.key;
+  Node map = BaseOf(rest);
+  const std::optional<Node> node = FindBelow(map, rest);
+  if (!node && HasFallback(param)) return Text(param.fallback_text);
+  if (!node) FailMissing(param, map, rest);
+  const std::string text = node->Text();
+  const std::string defect = TextDefect(text.c_str());
+  if (!defect.empty()) node->Fail("a text that " + defect);
+  return text;
 }
 
 std::optional<Node> ParamReader::InCalibration(const std::string& key) const {
@@ -304,6 +399,11 @@ std::vector<double> ParamReader::Absent(const AlidadeParam& param, const Node& m
   const std::optional<Node> data = InCalibration(param.key);
   if (data && (dotted || !HasFallback(param))) return All(param, *data);
   if (HasFallback(param)) return Fallback(param);
+  FailMissing(param, map, key_in_map);
+}
+
+void ParamReader::FailMissing(const AlidadeParam& param, const Node& map,
+                              const std::string& key_in_map) const {
   const std::string first = key_in_map.substr(0, key_in_map.find('.'));
   try {
     static_cast<void>(map.At(first));
@@ -319,31 +419,26 @@ std::vector<double> ParamReader::Absent(const AlidadeParam& param, const Node& m
     }
     throw Error(ExitCode::kBadConfig, text);
   }
-  return {};
+  throw ContractViolation("a key that is there is missing: " + key_in_map);
 }
 
-ParamRecorder::ParamRecorder() : trials_(1) {
-  host_.struct_size = sizeof(AlidadeHost);
-  host_.abi_major = ALIDADE_ABI_MAJOR;
-  host_.abi_minor = ALIDADE_ABI_MINOR;
-  host_.context = this;
-  host_.read = &ParamRecorder::Read;
-  host_.fail = [](void*, const char*, const char*) {};
+ParamRecorder::ParamRecorder() : host_(this), trials_(1) {
+  host_.c().read = &ParamRecorder::Read;
+  host_.c().read_text = &ParamRecorder::ReadText;
+  host_.c().fail = [](void*, const char*, const char*) {};
 }
 
-std::int32_t ParamRecorder::Read(void* self, const AlidadeParam* from, double* values,
+std::int32_t ParamRecorder::Read(void* context, const AlidadeParam* from, double* values,
                                  std::int32_t capacity) noexcept {
-  auto* recorder = static_cast<ParamRecorder*>(self);
+  auto* recorder = LentHost::ReaderOf<ParamRecorder>(context);
+  if (recorder == nullptr) return -1;
   Trial& trial = recorder->trials_.back();
   try {
     const AlidadeParam param = Checked(from, values, capacity);
     const bool choice = param.kind == ALIDADE_PARAM_CHOICE;
     if (choice) values[0] = HasFallback(param) ? Fallback(param)[0] : 0.0;
     if (choice && trial.choice == param.key) values[0] = trial.value;
-    const auto same = [&](const Asked& other) { return other.info.key == param.key; };
-    if (std::none_of(trial.asked.begin(), trial.asked.end(), same)) {
-      trial.asked.push_back({Describe(param), choice ? static_cast<int>(values[0]) : 0});
-    }
+    recorder->Note(param, choice ? static_cast<int>(values[0]) : 0);
     return std::max(param.count, 0);
   } catch (const std::bad_alloc&) {
     recorder->out_of_memory_ = true;
@@ -351,6 +446,28 @@ std::int32_t ParamRecorder::Read(void* self, const AlidadeParam* from, double* v
     // The plugin asks wrongly; it is told so when the model is made.
   }
   return -1;
+}
+
+std::int32_t ParamRecorder::ReadText(void* context, const AlidadeParam* from, char* text,
+                                     std::int32_t capacity) noexcept {
+  auto* recorder = LentHost::ReaderOf<ParamRecorder>(context);
+  if (recorder == nullptr) return -1;
+  try {
+    const AlidadeParam param = Checked(from, text, capacity);
+    recorder->Note(param, 0);
+    return Put(Text(param.fallback_text), text);
+  } catch (const std::bad_alloc&) {
+    recorder->out_of_memory_ = true;
+  } catch (const std::exception&) {
+    // As above.
+  }
+  return -1;
+}
+
+void ParamRecorder::Note(const AlidadeParam& param, int value) {
+  std::vector<Asked>& asked = trials_.back().asked;
+  const auto same = [&](const Asked& other) { return other.info.key == param.key; };
+  if (std::none_of(asked.begin(), asked.end(), same)) asked.push_back({Describe(param), value});
 }
 
 std::string ParamRecorder::When(const std::string& key) const {

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <exception>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "alidade/config/config.h"
+#include "alidade/host/lent_host.h"
 #include "alidade/host/plugin_host.h"
 #include "alidade/model/plugin_abi.h"
 
@@ -28,7 +30,7 @@ class ParamReader {
   ParamReader(const ParamReader&) = delete;
   ParamReader& operator=(const ParamReader&) = delete;
 
-  const AlidadeHost& host() const { return host_; }
+  const AlidadeHost& host() const { return host_.c(); }
   /// Why the model says that it cannot be made, where that belongs to no key; else "".
   const std::string& failure() const { return failure_; }
   /// Throws all errors as one, kBadConfig, in the order of their places (that of the reads depends
@@ -37,22 +39,27 @@ class ParamReader {
   void Check() const;
 
  private:
-  static std::int32_t Read(void* self, const AlidadeParam* param, double* values,
+  static std::int32_t Read(void* context, const AlidadeParam* param, double* values,
                            std::int32_t capacity) noexcept;
-  static void Fail(void* self, const char* key, const char* text) noexcept;
-  AlidadeParam Expect(const AlidadeParam* param, const double* values, std::int32_t capacity);
+  static std::int32_t ReadText(void* context, const AlidadeParam* param, char* text,
+                               std::int32_t capacity) noexcept;
+  static void Fail(void* context, const char* key, const char* text) noexcept;
+  AlidadeParam Expect(const std::function<AlidadeParam()>& checked);
   Node BaseOf(const std::string& key) const;
   std::vector<double> Values(const AlidadeParam& param) const;
+  std::string TextOf(const AlidadeParam& param) const;
   std::optional<Node> InCalibration(const std::string& key) const;
   void ExpectCalibrated(const AlidadeParam& param, const Node& node,
                         const std::vector<double>& values) const;
   std::vector<double> Absent(const AlidadeParam& param, const Node& map,
                              const std::string& key_in_map) const;
+  [[noreturn]] void FailMissing(const AlidadeParam& param, const Node& map,
+                                const std::string& key_in_map) const;
 
   Node entry_;
   std::string owner_, representation_;
   ExitCode code_ = ExitCode::kBadConfig;  ///< of the errors
-  AlidadeHost host_{};
+  LentHost host_;
   std::vector<std::string> errors_;
   std::string failure_;
   std::exception_ptr thrown_;  ///< by a call from the plugin, which must not see it
@@ -65,7 +72,7 @@ class ParamRecorder {
   ParamRecorder(const ParamRecorder&) = delete;
   ParamRecorder& operator=(const ParamRecorder&) = delete;
 
-  const AlidadeHost& host() const { return host_; }
+  const AlidadeHost& host() const { return host_.c(); }
   /// Runs `create` once, then again for each other value of each choice, one at a time.
   template <class Create>
   void Run(const Create& create) {
@@ -94,11 +101,14 @@ class ParamRecorder {
     int value = 0;
     std::vector<Asked> asked;
   };
-  static std::int32_t Read(void* self, const AlidadeParam* param, double* values,
+  static std::int32_t Read(void* context, const AlidadeParam* param, double* values,
                            std::int32_t capacity) noexcept;
+  static std::int32_t ReadText(void* context, const AlidadeParam* param, char* text,
+                               std::int32_t capacity) noexcept;
+  void Note(const AlidadeParam& param, int value);
   std::string When(const std::string& key) const;
 
-  AlidadeHost host_{};
+  LentHost host_;
   std::vector<Trial> trials_;
   bool out_of_memory_ = false;
 };

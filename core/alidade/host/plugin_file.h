@@ -53,6 +53,9 @@ struct PluginOnDemand {
 PluginOnDemand OpenOnDemand(const std::string& name, const std::filesystem::path& folder,
                             const std::string& missing);
 
+/// Whether the entry is of a kind that this version knows; another is left out.
+bool IsKnown(const AlidadeEntry& entry);
+
 /// What breaks the rules of plugin_abi.h or cpp_plugin.h in a table, or "".
 std::string Defect(const AlidadeTable* table);
 std::string Defect(const CppPluginTable* table);

@@ -161,6 +161,14 @@ void PluginHost::AddEntries(const Loaded& plugin) {
   const AlidadeTable table = internal::ReadPrefix(plugin.table);
   for (std::uint32_t i = 0; i < table.entry_count; ++i) {
     const AlidadeEntry entry = internal::ReadEntry(table.entries, table.entry_stride, i);
+    if (!internal::IsKnown(entry)) {
+      refusals_.push_back({plugin.file,
+                           std::string("its entry '") + entry.name + "' is of kind " +
+                               std::to_string(entry.kind) +
+                               ", which this version does not know; the others are used",
+                           ExitCode::kPlugin});
+      continue;
+    }
     entries_.push_back({ToKind(entry.kind), entry.name, Text(entry.doc), Text(entry.citation),
                         Text(entry.family), plugin.file, entry.thread_flags, false,
                         plugin.unoptimised});

@@ -10,19 +10,6 @@
 namespace alidade::internal {
 namespace {
 
-constexpr std::size_t kMaxName = 128;
-constexpr std::uint32_t kMaxEntries = 1024;
-
-bool GoodName(const char* name) {
-  if (name == nullptr) return false;
-  const std::size_t length = strnlen(name, kMaxName + 1);
-  if (length == 0 || length > kMaxName) return false;
-  for (std::size_t i = 0; i < length; ++i) {
-    if (name[i] <= ' ' || name[i] > '~') return false;
-  }
-  return true;
-}
-
 std::string Number(std::uint64_t i) { return std::to_string(i); }
 
 std::string EntryDefect(const AlidadeEntry& entry, std::uint32_t stride) {
@@ -30,12 +17,18 @@ std::string EntryDefect(const AlidadeEntry& entry, std::uint32_t stride) {
     return "states a size of " + Number(entry.struct_size) + " bytes";
   }
   if (!GoodName(entry.name)) return "has no name";
-  if (entry.kind == ALIDADE_KIND_LANDMARK_REPRESENTATION) {
-    return "is a landmark representation, which this version does not support";
+  const std::pair<const char*, const char*> texts[] = {{"family", entry.family},
+                                                       {"doc", entry.doc},
+                                                       {"citation", entry.citation},
+                                                       {"version", entry.version}};
+  for (const auto& [what, text] : texts) {
+    const std::string defect = TextDefect(text);
+    if (!defect.empty()) return std::string("has a ") + what + " that " + defect;
   }
-  if (entry.kind != ALIDADE_KIND_SENSOR && entry.kind != ALIDADE_KIND_MOTION) {
-    return "is of unknown kind " + Number(entry.kind);
-  }
+  if (!IsKnown(entry)) return {};
+  const std::string unknown = UnknownBits(entry.flags, 0);
+  if (!unknown.empty()) return "has flags that this version does not know: " + unknown;
+  if (!AllZero(entry.reserved)) return "uses reserved members";
   if (entry.create == nullptr) return "cannot be created";
   return {};
 }
@@ -56,6 +49,10 @@ std::string BuildDefect(const Entry* entries, int count, const char* kind) {
 
 }  // namespace
 
+bool IsKnown(const AlidadeEntry& entry) {
+  return entry.kind == ALIDADE_KIND_SENSOR || entry.kind == ALIDADE_KIND_MOTION;
+}
+
 std::string Defect(const AlidadeTable* from) {
   if (from == nullptr) return "its table is null";
   const AlidadeTable table = ReadPrefix(from);
@@ -66,10 +63,14 @@ std::string Defect(const AlidadeTable* from) {
   if (table.abi_major != ALIDADE_ABI_MAJOR) {
     return "its table has ABI major " + Number(table.abi_major);
   }
+  const std::string unknown = UnknownBits(table.flags, 0);
+  if (!unknown.empty()) return "its table has flags that this version does not know: " + unknown;
+  if (!AllZero(table.reserved)) return "its table uses reserved members";
   if (!GoodStride<AlidadeEntry>(table.entry_stride)) {
     return "its table states an entry stride of " + Number(table.entry_stride) + " bytes";
   }
-  if (table.entry_count == 0 || table.entry_count > kMaxEntries || table.entries == nullptr) {
+  if (table.entry_count == 0 || table.entry_count > std::uint32_t{ALIDADE_MAX_ENTRIES} ||
+      table.entries == nullptr) {
     return "its table has " + Number(table.entry_count) + " entries";
   }
   std::set<std::pair<std::uint32_t, std::string>> names;

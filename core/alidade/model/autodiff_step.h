@@ -86,6 +86,45 @@ Status StepJets(const Model& model, const double* const* x, const double* u, con
   return Status::kOk;
 }
 
+/// B by dual numbers.
+template <class Model>
+Status InputJets(const Model& model, const double* const* x, const double* u, const double* w,
+                 double dt_s, MatrixRef b) {
+  using All = Blocks<Model>;
+  using U = typename Model::Input;
+  static_assert(All::kStatic && Model::kNoise != kDynamic,
+                "a model of dynamic size has no control input");
+  constexpr typename All::Indices indices{};
+  using Jet = ceres::Jet<double, U::kTangent>;
+  Jet lifted[All::kAmbient], value[All::kAmbient], lifted_w[Model::kNoise + 1];
+  Jet lifted_u[U::kAmbient];
+  const Jet* block[All::kCount];
+  Jet* result[All::kCount];
+  int offset = 0;
+  const auto lift = [&](auto index) {
+    constexpr int i = decltype(index)::value;
+    block[i] = lifted + offset;
+    result[i] = value + offset;
+    for (int k = 0; k < SpaceAt<i, Model>::kAmbient; ++k) lifted[offset++] = Jet(x[i][k]);
+  };
+  ForEach(lift, indices);
+  for (int i = 0; i < Model::kNoise; ++i) lifted_w[i] = Jet(w[i]);
+  LiftOne<U>(u, 0, lifted_u);
+  const Jet *const_w = lifted_w, *const_u = lifted_u;
+  if (!CallStep(model, block, const_u, const_w, dt_s, result, indices)) {
+    return Status::kOutOfDomain;
+  }
+  int row = 0;
+  const auto read = [&](auto index) {
+    constexpr int i = decltype(index)::value;
+    using B = SpaceAt<i, Model>;
+    ReadTangent<B>(result[i], 0, U::kTangent, b.Row(row));
+    row += B::kTangent;
+  };
+  ForEach(read, indices);
+  return Status::kOk;
+}
+
 /// Calls f(w) with zeros of the size of the model's noise.
 template <class Model, class F>
 Status WithZeroNoise(const Model& model, const F& f) {
@@ -140,6 +179,25 @@ Status Step(const Model& model, const double* const* x, const double* u, const d
     return detail::StepWithNoise(model, x, u, noise, dt_s, next, f, n_w > 0 ? g : MatrixRef{});
   };
   return w != nullptr ? step(w) : detail::WithZeroNoise(model, step);
+}
+
+/// The same with B = d x' / d u (n x n_u), of a model with a control input.
+template <class Model>
+Status Step(const Model& model, const double* const* x, const double* u, const double* w,
+            double dt_s, double* const* next, MatrixRef f, MatrixRef g, MatrixRef b) {
+  constexpr int n_u = Model::Input::kTangent;
+  const int n = detail::TangentSizeOf(model);
+  std::vector<double> by_input(static_cast<std::size_t>(n) * n_u);
+  const MatrixRef fresh{by_input.data(), n_u};
+  const auto differentiate = [&](const double* noise) {
+    return detail::InputJets(model, x, u, noise, dt_s, fresh);
+  };
+  const Status status =
+      w != nullptr ? differentiate(w) : detail::WithZeroNoise(model, differentiate);
+  if (status != Status::kOk) return status;
+  const Status stepped = Step(model, x, u, w, dt_s, next, f, g);
+  if (stepped == Status::kOk) detail::Copy(fresh, n, n_u, b);
+  return stepped;
 }
 
 }  // namespace alidade

@@ -14,6 +14,100 @@ constexpr void CopyText(const char* text, char (&to)[N]) {
   for (std::size_t i = 0; i + 1 < N && text[i] != '\0'; ++i) to[i] = text[i];
 }
 
+/// ALIDADE_ISA_* of all that the compiler may use by itself in this translation unit.
+constexpr std::uint32_t InstructionSets() {
+  std::uint32_t isa = 0;
+#if defined(__SSE3__)
+  isa |= ALIDADE_ISA_SSE3;
+#endif
+#if defined(__SSSE3__)
+  isa |= ALIDADE_ISA_SSSE3;
+#endif
+#if defined(__SSE4_1__)
+  isa |= ALIDADE_ISA_SSE4_1;
+#endif
+#if defined(__SSE4_2__)
+  isa |= ALIDADE_ISA_SSE4_2;
+#endif
+#if defined(__POPCNT__)
+  isa |= ALIDADE_ISA_POPCNT;
+#endif
+#if defined(__AVX__)
+  isa |= ALIDADE_ISA_AVX;
+#endif
+#if defined(__F16C__)
+  isa |= ALIDADE_ISA_F16C;
+#endif
+#if defined(__FMA__)
+  isa |= ALIDADE_ISA_FMA;
+#endif
+#if defined(__AVX2__)
+  isa |= ALIDADE_ISA_AVX2;
+#endif
+#if defined(__BMI__)
+  isa |= ALIDADE_ISA_BMI;
+#endif
+#if defined(__BMI2__)
+  isa |= ALIDADE_ISA_BMI2;
+#endif
+#if defined(__LZCNT__)
+  isa |= ALIDADE_ISA_LZCNT;
+#endif
+#if defined(__MOVBE__)
+  isa |= ALIDADE_ISA_MOVBE;
+#endif
+#if defined(__AVX512F__)
+  isa |= ALIDADE_ISA_AVX512F;
+#endif
+#if defined(__AVX512BW__)
+  isa |= ALIDADE_ISA_AVX512BW;
+#endif
+#if defined(__AVX512CD__)
+  isa |= ALIDADE_ISA_AVX512CD;
+#endif
+#if defined(__AVX512DQ__)
+  isa |= ALIDADE_ISA_AVX512DQ;
+#endif
+#if defined(__AVX512VL__)
+  isa |= ALIDADE_ISA_AVX512VL;
+#endif
+#if defined(__AVX512IFMA__)
+  isa |= ALIDADE_ISA_AVX512IFMA;
+#endif
+#if defined(__AVX512VBMI__)
+  isa |= ALIDADE_ISA_AVX512VBMI;
+#endif
+#if defined(__AVX512VBMI2__)
+  isa |= ALIDADE_ISA_AVX512VBMI2;
+#endif
+#if defined(__AVX512VNNI__)
+  isa |= ALIDADE_ISA_AVX512VNNI;
+#endif
+#if defined(__AVX512BITALG__)
+  isa |= ALIDADE_ISA_AVX512BITALG;
+#endif
+#if defined(__AVX512VPOPCNTDQ__)
+  isa |= ALIDADE_ISA_AVX512VPOPCNTDQ;
+#endif
+#if defined(__AVX512BF16__)
+  isa |= ALIDADE_ISA_AVX512BF16;
+#endif
+#if defined(__AVX512FP16__)
+  isa |= ALIDADE_ISA_AVX512FP16;
+#endif
+#if defined(__AVXVNNI__)
+  isa |= ALIDADE_ISA_AVXVNNI;
+#endif
+#if defined(__GFNI__)
+  isa |= ALIDADE_ISA_GFNI;
+#endif
+#if defined(__XOP__) || defined(__FMA4__) || defined(__TBM__) || defined(__AVX512ER__) || \
+    defined(__AVX512PF__) || defined(__AVX10_1__) || defined(__APX_F__)
+  isa |= ALIDADE_ISA_OTHER;
+#endif
+  return isa;
+}
+
 constexpr AlidadeBuildTag MakeBuildTag(std::uint32_t kind, const char* build) {
   AlidadeBuildTag f{};
   CopyText("ALIDADE", f.magic);
@@ -30,18 +124,7 @@ constexpr AlidadeBuildTag MakeBuildTag(std::uint32_t kind, const char* build) {
 #if !defined(__OPTIMIZE__)
   f.flags |= ALIDADE_BUILT_UNOPTIMISED;
 #endif
-#if defined(__AVX__)
-  f.isa |= ALIDADE_ISA_AVX;
-#endif
-#if defined(__AVX2__)
-  f.isa |= ALIDADE_ISA_AVX2;
-#endif
-#if defined(__FMA__)
-  f.isa |= ALIDADE_ISA_FMA;
-#endif
-#if defined(__AVX512F__)
-  f.isa |= ALIDADE_ISA_AVX512F;
-#endif
+  f.isa = InstructionSets();
   f.cplusplus = static_cast<std::uint32_t>(__cplusplus);
   CopyText(__VERSION__, f.compiler);
   CopyText(build, f.build);

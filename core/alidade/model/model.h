@@ -27,9 +27,11 @@ struct Quantity {
 struct MatrixRef {
   double* data = nullptr;
   int stride = 0;
-  double& operator()(int row, int column) const { return data[row * stride + column]; }
+  double& operator()(int row, int column) const {
+    return data[std::ptrdiff_t{row} * stride + column];
+  }
   /// The view from `row` on.
-  MatrixRef Row(int row) const { return {data + row * stride, stride}; }
+  MatrixRef Row(int row) const { return {data + std::ptrdiff_t{row} * stride, stride}; }
   explicit operator bool() const { return data != nullptr; }
 };
 
@@ -86,7 +88,7 @@ struct Sensor {
 ///
 /// Lq of discrete noise is taken at the start of its interval and does not depend on dt_s.
 ///
-/// A block with the flag ALIDADE_ROLE_PARAMETER, a bias or an extrinsic, is constant at the neutral
+/// A block with the flag ALIDADE_ROLE_OWNED, a bias or an extrinsic, is constant at the neutral
 /// element of its geometry, unless the config gives it an initial value.
 ///
 /// Blocks of size kDynamic need StepJacobian, `int Size(int block) const` and

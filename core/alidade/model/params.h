@@ -7,6 +7,7 @@
 #include <initializer_list>
 #include <limits>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "alidade/model/plugin_abi.h"
@@ -83,6 +84,19 @@ class Params {
     param.choice_count = static_cast<std::int32_t>(choices.size());
     host_->read(host_->context, &param, &value, 1);
     return static_cast<int>(value);
+  }
+  /// A text of at most 4096 bytes, as it stands in the config.
+  std::string Text(const char* key, const char* doc,
+                   const std::optional<std::string>& fallback = std::nullopt) {
+    AlidadeParam param = Describe(ALIDADE_PARAM_TEXT, key, "", doc, {}, 1, nullptr);
+    if (fallback) {
+      param.flags |= ALIDADE_PARAM_HAS_DEFAULT;
+      param.fallback_text = fallback->c_str();
+    }
+    std::vector<char> text(ALIDADE_MAX_TEXT + 1);
+    const std::int32_t size = host_->read_text(host_->context, &param, text.data(),
+                                               static_cast<std::int32_t>(text.size()));
+    return size < 0 ? fallback.value_or("") : std::string(text.data());
   }
   /// `N` numbers with one unit and range.
   template <int N>

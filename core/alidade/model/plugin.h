@@ -52,7 +52,9 @@ void PublishMotion(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* insta
   if (U::kAmbient > 0) {
     constexpr Quantity input = Model::kInput;
     holder->space = Describe(input, U::kGeometry, U::kAmbient, U::kTangent);
-    holder->description.input = &holder->space;
+    holder->description.inputs = &holder->space;
+    holder->description.input_count = 1;
+    holder->description.input_stride = sizeof(AlidadeSpace);
   }
   holder->description.noise_count = NoiseSizeOf(holder->model);
   if constexpr (HasStepJacobian<Model, typename Blocks<Model>::Indices>::value) {
@@ -100,6 +102,7 @@ constexpr AlidadeEntry Entry(std::uint32_t kind, const char* name, const char* d
   entry.name = name;
   entry.doc = doc;
   entry.citation = citation;
+  entry.version = "";
   entry.thread_flags = ALIDADE_THREAD_INSTANCES | ALIDADE_THREAD_CALLS;
   entry.create = [](const AlidadeHost* host, AlidadeInstance* instance) -> std::int32_t {
     return GuardedCreate(host, [&](Params& params) { kMake(params, instance); });

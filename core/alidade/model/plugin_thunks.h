@@ -93,41 +93,43 @@ struct __attribute__((visibility("hidden"))) SensorCalls {
   static constexpr bool kInitialises = Model::kInitialises >= 0;
 
   ALIDADE_FLATTEN ALIDADE_SCALAR_LOOPS static std::int32_t Eval(
-      const void* self, const double* const* roles, double* z, double* const* jacobians,
-      const std::int32_t* strides) noexcept {
+      const void* self, const AlidadeObservation*, const double* const* roles, double* z,
+      double* const* jacobians, const std::int32_t* strides) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
       return static_cast<std::int32_t>(Evaluate(model, roles, z, jacobians, strides));
     });
   }
-  ALIDADE_FLATTEN static std::int32_t SqrtNoise(const void* self, const double* const* roles,
-                                                const double* z, double* l,
+  ALIDADE_FLATTEN static std::int32_t SqrtNoise(const void* self, const AlidadeObservation* seen,
+                                                const double* const* roles, double* l,
                                                 std::int32_t stride) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
       constexpr int m = Model::Measurement::kTangent;
       double dense[m * m] = {};
-      CallSqrtNoise(model, roles, z, dense, typename Blocks<Model>::Indices{});
+      CallSqrtNoise(model, roles, seen->z, dense, typename Blocks<Model>::Indices{});
       for (int i = 0; i < m; ++i) std::copy_n(dense + i * m, m, l + i * stride);
       return std::int32_t{ALIDADE_OK};
     });
   }
-  ALIDADE_FLATTEN static std::int32_t Valid(const void* self, const double* z) noexcept {
+  ALIDADE_FLATTEN static std::int32_t Valid(const void* self,
+                                            const AlidadeObservation* seen) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
       if constexpr (HasValid<Model>::value) {
-        return std::int32_t{model.Valid(z) ? ALIDADE_OK : ALIDADE_INVALID};
+        return std::int32_t{model.Valid(seen->z) ? ALIDADE_OK : ALIDADE_INVALID};
       } else {
         static_cast<void>(model);
         return std::int32_t{ALIDADE_OK};
       }
     });
   }
-  static std::int32_t Initialise(const void* self, const double* const* roles, const double* z,
-                                 const double* prior, double* y, double* const* jx,
-                                 const std::int32_t* jx_strides, double* jz, std::int32_t jz_stride,
-                                 double* jp, std::int32_t jp_stride) noexcept {
+  static std::int32_t Initialise(const void* self, const AlidadeObservation* seen,
+                                 const double* const* roles, const double* prior, double* y,
+                                 double* const* jx, const std::int32_t* jx_strides, double* jz,
+                                 std::int32_t jz_stride, double* jp,
+                                 std::int32_t jp_stride) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
       if constexpr (kInitialises) {
-        return static_cast<std::int32_t>(InitialiseRole(model, roles, z, prior, y, jx, jx_strides,
-                                                        {jz, jz_stride}, {jp, jp_stride}));
+        return static_cast<std::int32_t>(InitialiseRole(
+            model, roles, seen->z, prior, y, jx, jx_strides, {jz, jz_stride}, {jp, jp_stride}));
       } else {
         return std::int32_t{ALIDADE_ERROR};
       }
@@ -146,16 +148,26 @@ struct __attribute__((visibility("hidden"))) SensorCalls {
 template <class Model>
 struct __attribute__((visibility("hidden"))) MotionCalls {
   ALIDADE_FLATTEN static std::int32_t Step(const void* self, const double* const* blocks,
-                                           const double* input, const double* w, double dt_s,
-                                           double* const* next, double* f, std::int32_t f_stride,
-                                           double* g, std::int32_t g_stride) noexcept {
+                                           const double* const* inputs, const double* w,
+                                           double dt_s, double* const* next, double* f,
+                                           std::int32_t f_stride, double* g, std::int32_t g_stride,
+                                           double* b, std::int32_t b_stride) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
+      const MatrixRef by_state{f, f_stride}, by_noise{g, g_stride};
+      const double* u = nullptr;
+      if constexpr (Model::Input::kAmbient > 0) {
+        u = inputs[0];
+        if (b != nullptr) {
+          return StepWithInput(model, blocks, u, w, dt_s, next, by_state, by_noise, {b, b_stride});
+        }
+      }
       return static_cast<std::int32_t>(
-          alidade::Step(model, blocks, input, w, dt_s, next, {f, f_stride}, {g, g_stride}));
+          alidade::Step(model, blocks, u, w, dt_s, next, by_state, by_noise));
     });
   }
   ALIDADE_FLATTEN static std::int32_t SqrtQ(const void* self, const double* const* blocks,
-                                            double dt_s, double* l, std::int32_t stride) noexcept {
+                                            const double* const*, double dt_s, double* l,
+                                            std::int32_t stride) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
       constexpr typename Blocks<Model>::Indices indices{};
       if constexpr (Model::kNoise != kDynamic) {
@@ -172,6 +184,15 @@ struct __attribute__((visibility("hidden"))) MotionCalls {
     });
   }
   static constexpr AlidadeMotion kCalls{sizeof(AlidadeMotion), 0, Step, SqrtQ, {}};
+
+ private:
+  [[gnu::noinline]] static std::int32_t StepWithInput(const Model& model,
+                                                      const double* const* blocks, const double* u,
+                                                      const double* w, double dt_s,
+                                                      double* const* next, MatrixRef f, MatrixRef g,
+                                                      MatrixRef b) {
+    return static_cast<std::int32_t>(alidade::Step(model, blocks, u, w, dt_s, next, f, g, b));
+  }
 };
 
 }  // namespace detail

@@ -147,7 +147,7 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
   const Node initial = entry.At("initial", "the state entry '" + name + "'");
   const std::vector<Space>& spaces = binding.model.blocks();
   for (std::size_t i = 0; i < names.size(); ++i) {
-    const bool known = (spaces[i].flags & ALIDADE_ROLE_PARAMETER) != 0 && !initial.Find(names[i]) &&
+    const bool known = (spaces[i].flags & ALIDADE_ROLE_OWNED) != 0 && !initial.Find(names[i]) &&
                        !Contains(considered, names[i]);
     const BlockStatus status = known || Contains(constant, names[i]) ? BlockStatus::kConstant
                                : Contains(considered, names[i])      ? BlockStatus::kConsider

@@ -184,7 +184,8 @@ bool CondensedRun::FreezeStep(Step& step, const Point& point) {
   const MotionBinding& motion = binding_.system.motions[step.motion];
   const internal::MotionPlace& place = binding_.motion_places[step.motion];
   RowMajor l(motion.model.noise_size(), motion.model.noise_size());
-  const Outcome outcome = internal::SqrtQAt(motion, place, point.x.data(), step.dt_s, l.data());
+  const Outcome outcome =
+      internal::SqrtQAt(motion, place, point.x.data(), step.u.data(), step.dt_s, l.data());
   if (outcome != Outcome::kAccepted) return Fail(internal::TroubleOf(motion, outcome).text);
   NoteChange(step.l, l);
   step.l = std::move(l);

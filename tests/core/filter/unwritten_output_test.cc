@@ -44,30 +44,30 @@ struct HandWritten {
     seen.roles = moves.roles = seen.output = &space;
     moves.noise_count = 2;
     sensor.struct_size = sizeof(sensor);
-    sensor.eval = [](const void* self, const double* const* roles, double* z,
-                     double* const* jacobians, const std::int32_t* strides) {
+    sensor.eval = [](const void* self, const AlidadeObservation*, const double* const* roles,
+                     double* z, double* const* jacobians, const std::int32_t* strides) {
       for (int i = 0; i < (Leaves(self, Left::kPrediction) ? 1 : 2); ++i) z[i] = roles[0][i];
       if (jacobians != nullptr && jacobians[0] != nullptr) {
         WriteDiagonal(1.0, !Leaves(self, Left::kSensorH), jacobians[0], strides[0]);
       }
       return std::int32_t{ALIDADE_OK};
     };
-    sensor.sqrt_noise = [](const void* self, const double* const*, const double*, double* l,
-                           std::int32_t stride) {
+    sensor.sqrt_noise = [](const void* self, const AlidadeObservation*, const double* const*,
+                           double* l, std::int32_t stride) {
       WriteLower(0.5, !Leaves(self, Left::kSensorL), l, stride);
       return std::int32_t{ALIDADE_OK};
     };
     motion.struct_size = sizeof(motion);
-    motion.step = [](const void* self, const double* const* blocks, const double*, const double* w,
-                     double, double* const* next, double* f, std::int32_t f_stride, double* g,
-                     std::int32_t g_stride) {
+    motion.step = [](const void* self, const double* const* blocks, const double* const*,
+                     const double* w, double, double* const* next, double* f, std::int32_t f_stride,
+                     double* g, std::int32_t g_stride, double*, std::int32_t) {
       for (int i = 0; i < 2; ++i) next[0][i] = blocks[0][i] + w[i];
       if (f != nullptr) WriteDiagonal(1.0, !Leaves(self, Left::kF), f, f_stride);
       if (g != nullptr) WriteDiagonal(1.0, !Leaves(self, Left::kG), g, g_stride);
       return std::int32_t{ALIDADE_OK};
     };
-    motion.sqrt_q = [](const void* self, const double* const*, double, double* l,
-                       std::int32_t stride) {
+    motion.sqrt_q = [](const void* self, const double* const*, const double* const*, double,
+                       double* l, std::int32_t stride) {
       WriteLower(0.1, !Leaves(self, Left::kMotionL), l, stride);
       return std::int32_t{ALIDADE_OK};
     };

@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <string>
 
 #include "alidade/base/error.h"
 
@@ -26,9 +27,9 @@ struct HandWritten {
     description.roles = &role;
     description.output = &output;
     sensor.struct_size = sizeof(sensor);
-    sensor.eval = [](const void*, const double* const*, double*, double* const*,
-                     const std::int32_t*) { return std::int32_t{77}; };
-    sensor.sqrt_noise = [](const void*, const double* const*, const double*, double*,
+    sensor.eval = [](const void*, const AlidadeObservation*, const double* const*, double*,
+                     double* const*, const std::int32_t*) { return std::int32_t{77}; };
+    sensor.sqrt_noise = [](const void*, const AlidadeObservation*, const double* const*, double*,
                            std::int32_t) { return std::int32_t{-1}; };
     instance.struct_size = sizeof(instance);
     instance.kind = ALIDADE_KIND_SENSOR;
@@ -79,11 +80,19 @@ TEST(ModelInstance, ReadsNoFurtherThanAStructSays) {
   hand.role.struct_size = offsetof(AlidadeSpace, unit);
   hand.role.unit = reinterpret_cast<const char*>(8);
   hand.sensor.struct_size = offsetof(AlidadeSensor, valid);
-  hand.sensor.valid = reinterpret_cast<std::int32_t (*)(const void*, const double*)>(8);
+  hand.sensor.valid = reinterpret_cast<decltype(hand.sensor.valid)>(8);
   const SensorModel sensor(std::make_shared<const ModelInstance>(hand.instance, "m", "p.so"));
   EXPECT_EQ(sensor.roles()[0].unit, "");
   const double z = 0.0;
   EXPECT_EQ(sensor.Valid(&z), Status::kOk);
+}
+
+TEST(ModelInstance, IgnoresHintsThatItDoesNotKnow) {
+  HandWritten hand;
+  hand.role.flags = 1u << 9;
+  hand.description.capabilities = 1u << 12;
+  const ModelInstance instance(hand.instance, "m", "p.so");
+  EXPECT_EQ(instance.spaces().size(), 1u);
 }
 
 TEST(MotionModel, PassesZerosWhereNoNoiseIsGiven) {
@@ -91,13 +100,13 @@ TEST(MotionModel, PassesZerosWhereNoNoiseIsGiven) {
   HandWritten hand;
   AlidadeMotion motion{};
   motion.struct_size = sizeof(motion);
-  motion.step = [](const void*, const double* const*, const double*, const double* w, double,
-                   double* const*, double*, std::int32_t, double*, std::int32_t) {
+  motion.step = [](const void*, const double* const*, const double* const*, const double* w, double,
+                   double* const*, double*, std::int32_t, double*, std::int32_t, double*,
+                   std::int32_t) {
     return std::int32_t{w != nullptr && w[0] == 0.0 && w[1] == 0.0 ? ALIDADE_OK : ALIDADE_ERROR};
   };
-  motion.sqrt_q = [](const void*, const double* const*, double, double*, std::int32_t) {
-    return std::int32_t{ALIDADE_OK};
-  };
+  motion.sqrt_q = [](const void*, const double* const*, const double* const*, double, double*,
+                     std::int32_t) { return std::int32_t{ALIDADE_OK}; };
   hand.instance.kind = ALIDADE_KIND_MOTION;
   hand.instance.motion = &motion;
   hand.description.output = nullptr;
@@ -128,8 +137,38 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
       {"the measurement has geometry 0", [](HandWritten& h) { h.output.geometry = 0; }},
       {"names its elements 'a,b', but has 1", [](HandWritten& h) { h.role.elements = "a,b"; }},
       {"is a model parameter state of the sensor",
-       [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_PARAMETER; }},
+       [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_OWNED; }},
       {"is shared, but not", [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_SHARED; }},
+      {"role 'x' has flags that this version does not know: 0x400000",
+       [](HandWritten& h) { h.role.flags = 1u << 22; }},
+      {"role 'x' uses reserved members", [](HandWritten& h) { h.role.reserved[2] = &h; }},
+      {"role 'x' uses reserved members", [](HandWritten& h) { h.role.reserved0 = 1; }},
+      {"role 'x' is a time offset, which this version",
+       [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_TIME_OFFSET; }},
+      {"role 'x' is of an earlier timestamp, which this version",
+       [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_CLONE; }},
+      {"role 'x' has a prior and dynamics of its own",
+       [](HandWritten& h) {
+         static constexpr AlidadeOwned kOwned{};
+         h.role.owned = &kOwned;
+       }},
+      {"role 'a b' has a name that is none", [](HandWritten& h) { h.role.name = "a b"; }},
+      {"has a text 'doc' that is not UTF-8", [](HandWritten& h) { h.role.doc = "\xc0\xaf"; }},
+      {"has a text 'unit' that has a control character",
+       [](HandWritten& h) { h.output.unit = "m\n"; }},
+      {"has a text 'elements' that is longer than 4096 bytes",
+       [](HandWritten& h) {
+         static const std::string long_text(4097, 'x');
+         h.role.elements = long_text.c_str();
+       }},
+      {"has capabilities that this version does not know: 0x80000000",
+       [](HandWritten& h) { h.description.capabilities = 1u << 31; }},
+      {"uses reserved members", [](HandWritten& h) { h.description.reserved[5] = &h; }},
+      {"uses reserved members", [](HandWritten& h) { h.instance.reserved[7] = &h; }},
+      {"uses reserved members", [](HandWritten& h) { h.sensor.reserved[5] = [] {}; }},
+      {"needs what comes beside a measurement",
+       [](HandWritten& h) { h.description.capabilities = ALIDADE_NEEDS_PAYLOAD; }},
+      {"needs known numbers", [](HandWritten& h) { h.description.known = &h.output; }},
       {"gives a residual alone",
        [](HandWritten& h) { h.description.capabilities = ALIDADE_RESIDUAL_ONLY; }},
       {"can initialise, but not what or how",
@@ -139,8 +178,9 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
       {"eval, sqrt_noise",
        [](HandWritten& h) {
          h.sensor.sqrt_noise = nullptr;
-         h.sensor.residual = [](const void*, const double* const*, const double*, double*,
-                                double* const*, const std::int32_t*) { return std::int32_t{0}; };
+         h.sensor.residual = [](const void*, const AlidadeObservation*, const double* const*,
+                                double*, double* const*,
+                                const std::int32_t*) { return std::int32_t{0}; };
        }},
       {"step, sqrt_q",
        [](HandWritten& h) {
@@ -149,8 +189,7 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
          h.instance.motion = &kNoStep;
        }},
       {"lacks the functions of its kind", [](HandWritten& h) { h.instance.sensor = nullptr; }},
-      {"is of kind 3",
-       [](HandWritten& h) { h.instance.kind = ALIDADE_KIND_LANDMARK_REPRESENTATION; }},
+      {"is of kind 3", [](HandWritten& h) { h.instance.kind = 3; }},
   };
   for (const Spoiled& test : cases) {
     HandWritten hand;

@@ -95,12 +95,43 @@ TEST(AutodiffMotion, NullNoiseIsZeroInThePluginItself) {
   const AlidadeInstance& c = turn.instance().c();
   const Blocks x{{1, 0, 0, 0}};
   const double rate[3] = {0, 0, 1};
+  const double* const inputs[] = {rate};
   Blocks next = Filled(turn.blocks(), kPoison);
   std::vector<double> f(9, kPoison), g(9, kPoison);
-  EXPECT_EQ(c.motion->step(c.self, Pointers(x).data(), rate, nullptr, 0.1, Pointers(next).data(),
-                           f.data(), 3, g.data(), 3),
+  EXPECT_EQ(c.motion->step(c.self, Pointers(x).data(), inputs, nullptr, 0.1, Pointers(next).data(),
+                           f.data(), 3, g.data(), 3, nullptr, 0),
             ALIDADE_OK);
   EXPECT_NEAR(next[0][3], std::sin(0.05), 1e-16);
+}
+
+TEST(AutodiffMotion, TheJacobianByTheControlInputIsThatOfDifferences) {
+  const MotionModel turn = MakeMotion<Turn>();
+  const AlidadeInstance& c = turn.instance().c();
+  const Blocks x{{0.8, 0.0, 0.6, 0.0}};
+  const double rate[3] = {0.3, -0.2, 1.0}, h = 1e-6;
+  const auto step = [&](const double* u, double* b) {
+    const double* const inputs[] = {u};
+    Blocks next = Filled(turn.blocks(), kPoison);
+    EXPECT_EQ(c.motion->step(c.self, Pointers(x).data(), inputs, nullptr, 0.1,
+                             Pointers(next).data(), nullptr, 0, nullptr, 0, b, 4),
+              ALIDADE_OK);
+    return next[0];
+  };
+  std::vector<double> b(12, kPoison);
+  const std::vector<double> at = step(rate, b.data());
+  for (int j = 0; j < 3; ++j) {
+    double up[3], down[3], d_up[3], d_down[3];
+    std::copy_n(rate, 3, up);
+    std::copy_n(rate, 3, down);
+    up[j] += h;
+    down[j] -= h;
+    UnitQuaternion::Minus(step(up, nullptr).data(), at.data(), d_up);
+    UnitQuaternion::Minus(step(down, nullptr).data(), at.data(), d_down);
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_NEAR(b[static_cast<std::size_t>(4 * i + j)], (d_up[i] - d_down[i]) / (2.0 * h), 1e-9);
+    }
+  }
+  EXPECT_EQ(b[3], kPoison) << "the stride is kept";
 }
 
 /// x' = x + w, with an analytic Jacobian that throws once it has written.
@@ -128,7 +159,7 @@ TEST(AutodiffMotion, AnAnalyticJacobianThatThrowsWritesNothing) {
   double f = kPoison, g = kPoison, l = kPoison;
   EXPECT_EQ(faulty.Step(Pointers(x).data(), nullptr, nullptr, 0.1, Pointers(next).data(), &f, &g),
             Status::kError);
-  EXPECT_EQ(faulty.SqrtQ(Pointers(x).data(), 0.1, &l), Status::kError);
+  EXPECT_EQ(faulty.SqrtQ(Pointers(x).data(), nullptr, 0.1, &l), Status::kError);
   EXPECT_EQ(next, Filled(faulty.blocks(), kPoison));
   EXPECT_EQ(f, kPoison);
   EXPECT_EQ(g, kPoison);

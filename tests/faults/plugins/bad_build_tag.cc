@@ -6,6 +6,10 @@
 #define OTHER_ABI 1
 #define OTHER_PROCESSOR 2
 #define OTHER_BUILD 3
+#define NEEDS_MINOR 4
+#define LATER_FLAG 5
+#define LATER_HINT 6
+#define RESERVED 7
 
 namespace {
 
@@ -13,7 +17,11 @@ constexpr AlidadeBuildTag Spoiled() {
   AlidadeBuildTag f = alidade::detail::MakeBuildTag(
       BAD_BUILD_TAG == OTHER_BUILD ? ALIDADE_PLUGIN_CPP : ALIDADE_PLUGIN_C_ABI, "0.0.9 other");
   if (BAD_BUILD_TAG == OTHER_ABI) f.abi_major = 99;
-  if (BAD_BUILD_TAG == OTHER_PROCESSOR) f.isa = 1u << 30;
+  if (BAD_BUILD_TAG == OTHER_PROCESSOR) f.isa = ALIDADE_ISA_OTHER;
+  if (BAD_BUILD_TAG == NEEDS_MINOR) f.needs_minor = f.abi_minor = 3;
+  if (BAD_BUILD_TAG == LATER_FLAG) f.flags |= 1u << 27;
+  if (BAD_BUILD_TAG == LATER_HINT) f.flags |= 1u << 7;
+  if (BAD_BUILD_TAG == RESERVED) f.reserved[6] = 1;
   return f;
 }
 

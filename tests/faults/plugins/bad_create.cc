@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Models that fail while they are created.
+#include <optional>
 #include <stdexcept>
+#include <string>
 
 #include "alidade/model/plugin.h"
 #include "probe.h"
@@ -19,6 +21,26 @@ struct Misfit : Probe {
   }
 };
 
+/// With a text.
+struct Titled : Probe {
+  explicit Titled(alidade::Params& p) : Probe(p) {
+    const std::string title = p.Text("title", "what it is called", "nameless");
+    const std::string needed = p.Text("needed", "what it cannot do without");
+    p.Fail("", (title + '|' + needed).c_str());  // for the test to see
+  }
+};
+/// Keeps what it is lent, against the rules, and tries it in its next creation.
+struct KeepsHost : Probe {
+  explicit KeepsHost(alidade::Params& p) : Probe(p) {
+    static std::optional<alidade::Params> kept;
+    const bool first = !kept.has_value();
+    if (first) kept = p;
+    const double late = kept->Number("late", "", "", {}, 42.0);
+    if (!first) kept->Fail("late", "nobody hears this");
+    p.Fail("", first ? "first" : late == 42.0 ? "not answered" : "answered");
+  }
+};
+
 namespace {
 
 void MakeWrongKind(alidade::Params& p, AlidadeInstance* instance) {
@@ -27,7 +49,7 @@ void MakeWrongKind(alidade::Params& p, AlidadeInstance* instance) {
 }
 
 constexpr const char* kNames[] = {"fixed", "free"};
-constexpr double kBeyond = 7.0;
+constexpr double kBeyond = 7.0, kHalfValue = 0.5;
 
 constexpr AlidadeParam Declared(std::uint32_t kind, std::int32_t count, const double* fallback,
                                 std::uint32_t flags) {
@@ -44,6 +66,32 @@ constexpr AlidadeParam Declared(std::uint32_t kind, std::int32_t count, const do
   }
   return param;
 }
+constexpr AlidadeParam Spoiled(void (*spoil)(AlidadeParam&)) {
+  AlidadeParam param = Declared(ALIDADE_PARAM_NUMBER, 1, nullptr, 0);
+  spoil(param);
+  return param;
+}
+constexpr AlidadeParam kLaterFlag = Spoiled([](AlidadeParam& p) { p.flags = 1u << 25; });
+constexpr AlidadeParam kReservedMember = Spoiled([](AlidadeParam& p) { p.reserved0 = 1; });
+constexpr AlidadeParam kNoKey = Spoiled([](AlidadeParam& p) { p.key = "no key"; });
+constexpr AlidadeParam kEmptyRange = Spoiled([](AlidadeParam& p) { p.low = 1.0; });
+constexpr AlidadeParam kManyChoices = Spoiled([](AlidadeParam& p) {
+  p.kind = ALIDADE_PARAM_CHOICE;
+  p.choices = kNames;
+  p.choice_count = 0x7fffffff;
+});
+constexpr AlidadeParam kHalf = Spoiled([](AlidadeParam& p) {
+  p.kind = ALIDADE_PARAM_INTEGER;
+  p.flags = ALIDADE_PARAM_HAS_DEFAULT;
+  p.high = 1.0;
+  p.fallback = &kHalfValue;
+});
+constexpr AlidadeParam kOutside = Spoiled([](AlidadeParam& p) {
+  p.flags = ALIDADE_PARAM_HAS_DEFAULT;
+  p.fallback = &kBeyond;
+});
+constexpr AlidadeParam kTextAsNumber =
+    Spoiled([](AlidadeParam& p) { p.kind = ALIDADE_PARAM_TEXT; });
 constexpr AlidadeParam kNoDefault =
     Declared(ALIDADE_PARAM_CHOICE, 1, nullptr, ALIDADE_PARAM_HAS_DEFAULT);
 constexpr AlidadeParam kNoNumber =
@@ -75,4 +123,9 @@ ALIDADE_PLUGIN(ALIDADE_SENSOR(Throws, "throws", "", ""),
                ALIDADE_SENSOR_BY(MakeWrongKind, "wrong_kind", "", ""),
                Reading<kNoDefault>("no_default"), Reading<kNoNumber>("no_number"),
                Reading<kTwoChoices>("two_choices"), Reading<kAnyChoices>("any_choices"),
-               Reading<kDefaultBeyond>("default_beyond"))
+               Reading<kDefaultBeyond>("default_beyond"), Reading<kLaterFlag>("later_flag"),
+               Reading<kReservedMember>("reserved_member"), Reading<kNoKey>("no_key"),
+               Reading<kEmptyRange>("empty_range"), Reading<kManyChoices>("many_choices"),
+               Reading<kHalf>("half"), Reading<kOutside>("outside"),
+               Reading<kTextAsNumber>("text_as_number"), ALIDADE_SENSOR(Titled, "titled", "", ""),
+               ALIDADE_SENSOR(KeepsHost, "keeps_host", "", ""))

@@ -241,8 +241,8 @@ struct LosesItself : Right {
 
 // ---- written against the plugin ABI ------------------------------------------------------------
 
-using Eval = std::int32_t (*)(const void*, const double* const*, double*, double* const*,
-                              const std::int32_t*);
+using Seen = AlidadeObservation;
+using Eval = decltype(AlidadeSensor::eval);
 
 /// Right, with a function of another for Predict.
 template <Eval kEval>
@@ -258,28 +258,34 @@ std::int32_t RightEval(const double* const* x, double* z, double* const* j,
   return static_cast<std::int32_t>(alidade::Evaluate(Right(), x, z, j, strides));
 }
 
-std::int32_t PastTheEnd(const void*, const double* const* x, double* z, double* const* j,
-                        const std::int32_t* strides) {
+std::int32_t PastTheEnd(const void*, const Seen*, const double* const* x, double* z,
+                        double* const* j, const std::int32_t* strides) {
   z[2] = 0.0;
   return RightEval(x, z, j, strides);
 }
+std::int32_t WritesItsInput(const void*, const Seen*, const double* const* x, double* z,
+                            double* const* j, const std::int32_t* strides) {
+  const std::int32_t code = RightEval(x, z, j, strides);
+  const_cast<double*>(x[1])[0] += 1.0;
+  return code;
+}
 /// Takes the rows of a Jacobian to lie one behind the other.
-std::int32_t IgnoresStrides(const void*, const double* const* x, double* z, double* const* j,
-                            const std::int32_t*) {
+std::int32_t IgnoresStrides(const void*, const Seen*, const double* const* x, double* z,
+                            double* const* j, const std::int32_t*) {
   const std::int32_t dense[] = {1, 1};
   return RightEval(x, z, j, dense);
 }
-std::int32_t WritesAndFails(const void*, const double* const* x, double* z, double* const* j,
-                            const std::int32_t* strides) {
+std::int32_t WritesAndFails(const void*, const Seen*, const double* const* x, double* z,
+                            double* const* j, const std::int32_t* strides) {
   if (!(x[1][0] > 0.0)) z[0] = 2.0 * x[0][0];
   return RightEval(x, z, j, strides);
 }
-std::int32_t StrangeStatus(const void*, const double* const*, double*, double* const*,
+std::int32_t StrangeStatus(const void*, const Seen*, const double* const*, double*, double* const*,
                            const std::int32_t*) {
   return 77;
 }
 /// No noise, z or Jacobian comes of it anywhere.
-std::int32_t NowhereDefined(const void*, const double* const*, double*, double* const*,
+std::int32_t NowhereDefined(const void*, const Seen*, const double* const*, double*, double* const*,
                             const std::int32_t*) {
   return ALIDADE_OUT_OF_DOMAIN;
 }
@@ -314,13 +320,13 @@ struct Landmark : alidade::Sensor<Vec<1>, Vec<1>, Vec<1>, Vec<1>> {
   }
 };
 
-std::int32_t PastTheLandmark(const void* self, const double* const* x, const double* z,
+std::int32_t PastTheLandmark(const void* self, const Seen* seen, const double* const* x,
                              const double* prior, double* y, double* const* jx,
                              const std::int32_t* jx_strides, double* jz, std::int32_t jz_stride,
                              double* jp, std::int32_t jp_stride) {
   y[2] = 0.0;
-  return alidade::detail::SensorCalls<Landmark<0>>::Initialise(self, x, z, prior, y, jx, jx_strides,
-                                                               jz, jz_stride, jp, jp_stride);
+  return alidade::detail::SensorCalls<Landmark<0>>::Initialise(
+      self, seen, x, prior, y, jx, jx_strides, jz, jz_stride, jp, jp_stride);
 }
 void MakePastTheLandmark(Params& p, AlidadeInstance* instance) {
   static AlidadeSensor calls;
@@ -429,9 +435,10 @@ ALIDADE_PLUGIN(SENSOR(Right, "right"), SENSOR(MayHaveBias, "may_have_bias"),
                SENSOR(Misbehaves<8>, "changes_folder"), SENSOR(Misbehaves<9>, "leaks_files"),
                SENSOR(Misbehaves<10>, "prints"), SENSOR(Misbehaves<11>, "leaves_daemons"),
                SENSOR(LosesItself, "loses_itself"), RAW(PastTheEnd, "past_the_end"),
-               RAW(IgnoresStrides, "ignores_strides"), RAW(WritesAndFails, "writes_and_fails"),
-               RAW(StrangeStatus, "strange_status"), RAW(NowhereDefined, "nowhere_defined"),
-               SENSOR(Landmark<0>, "landmark"), SENSOR(Landmark<1>, "wrong_landmark"),
+               RAW(WritesItsInput, "writes_its_input"), RAW(IgnoresStrides, "ignores_strides"),
+               RAW(WritesAndFails, "writes_and_fails"), RAW(StrangeStatus, "strange_status"),
+               RAW(NowhereDefined, "nowhere_defined"), SENSOR(Landmark<0>, "landmark"),
+               SENSOR(Landmark<1>, "wrong_landmark"),
                ALIDADE_SENSOR_BY(MakePastTheLandmark, "past_the_landmark", "", ""),
                SENSOR(TwoCovers, "two_covers"), MOTION(Turning<1>, "ignores_dt"),
                MOTION(Turning<2>, "euler"), MOTION(Turning<3>, "drifts"),

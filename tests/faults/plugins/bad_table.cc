@@ -12,8 +12,12 @@
 #define NAME_TWICE 7
 #define NO_ENTRY_SYMBOL 8
 #define EMPTY 9
-#define LANDMARK_REPRESENTATION 10
+#define UNKNOWN_FLAGS 10
 #define UNKNOWN_KIND 11
+#define RESERVED 12
+#define CONTROL_CHARACTER 13
+#define WILD_TEXT 14
+#define LATER_HINT 15
 
 ALIDADE_BUILD_TAG(ALIDADE_PLUGIN_C_ABI, "")
 
@@ -28,7 +32,11 @@ extern "C" __attribute__((visibility("default"))) const AlidadeTable* alidade_pl
   if (BAD_TABLE == NULL_NAME) entries[1].name = nullptr;
   if (BAD_TABLE == NO_CREATE) entries[1].create = nullptr;
   if (BAD_TABLE == NAME_TWICE) entries[1].name = "probe";
-  if (BAD_TABLE == LANDMARK_REPRESENTATION) entries[1].kind = ALIDADE_KIND_LANDMARK_REPRESENTATION;
+  if (BAD_TABLE == UNKNOWN_FLAGS) entries[1].flags = 1u << 20;
+  if (BAD_TABLE == LATER_HINT) table.flags = entries[1].flags = 1u << 3;
+  if (BAD_TABLE == RESERVED) table.reserved[3] = &table;
+  if (BAD_TABLE == CONTROL_CHARACTER) entries[1].doc = "red \033[31m";
+  if (BAD_TABLE == WILD_TEXT) entries[1].citation = reinterpret_cast<const char*>(8);
   if (BAD_TABLE == UNKNOWN_KIND) entries[1].kind = 9;
   if (BAD_TABLE == EMPTY) table.entry_count = 0;
   return BAD_TABLE == NULL_TABLE ? nullptr : &table;

@@ -84,6 +84,7 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{60, "nan_noise", "noise", {"SqrtNoise at", "entry (0, 0) is nan"}},
         Fault{60, "infinite_q", "noise", {"SqrtQ at", "dt = ", "entry (0, 0) is -inf"}},
         Fault{61, "past_the_end", "bounds", {"Predict at", "writes past its buffer of z"}},
+        Fault{61, "writes_its_input", "bounds", {"Predict at", "writes to its input y"}},
         Fault{61, "ignores_strides", "bounds", {"writes past its buffer of Jacobian 0"}},
         Fault{62, "wrong_jacobian", "jacobian", {"Predict: d z.second / d x is", "by differences"}},
         Fault{63,

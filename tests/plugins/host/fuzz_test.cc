@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 #include <random>
+#include <vector>
 
 #include "host_fixture.h"
 #include "support/sanitized.h"
@@ -26,6 +27,15 @@ class FuzzTest : public HostTest {
     Elf64_Ehdr header;
     std::memcpy(&header, good_.data(), sizeof(header));
     sections_ = header.e_shoff;
+    std::vector<Elf64_Shdr> table(header.e_shnum);
+    std::memcpy(table.data(), good_.data() + sections_, table.size() * sizeof(Elf64_Shdr));
+    for (const Elf64_Shdr& one : table) {
+      // What the dynamic loader walks; not the code.
+      if (one.sh_type != SHT_NOBITS && one.sh_size >= 8 && (one.sh_flags & SHF_ALLOC) != 0 &&
+          (one.sh_flags & SHF_EXECINSTR) == 0 && one.sh_type != SHT_PROGBITS) {
+        walked_.push_back(one);
+      }
+    }
   }
   std::size_t Below(std::size_t n) { return static_cast<std::size_t>(engine_() % n); }
 
@@ -36,7 +46,18 @@ class FuzzTest : public HostTest {
     for (std::size_t flips = 1 + Below(6); flips > 0 && !bytes.empty(); --flips) {
       std::size_t at = Below(bytes.size());
       if (kind < 5) at = Below(0x400);
-      if (kind >= 5 && kind < 8) at = sections_ + Below(good_.size() - sections_);
+      if (kind >= 5 && kind < 7) at = sections_ + Below(good_.size() - sections_);
+      if (kind == 7 || kind == 8) {
+        const Elf64_Shdr& one = walked_[Below(walked_.size())];
+        at = one.sh_offset + 8 * Below(one.sh_size / 8);
+        if (Below(2) == 0 && at + 8 <= bytes.size()) {
+          const std::uint64_t values[] = {0,        1,     0xff,       0xffff,       1u << 20,
+                                          1u << 31, ~0ull, 1ull << 47, ~0ull - 4095, engine_()};
+          std::memcpy(bytes.data() + at, &values[Below(std::size(values))], 8);
+          continue;
+        }
+        at += Below(8);
+      }
       if (at < bytes.size()) bytes[at] = static_cast<char>(engine_());
     }
     return bytes;
@@ -50,6 +71,7 @@ class FuzzTest : public HostTest {
 
   std::string good_;
   std::size_t sections_ = 0;
+  std::vector<Elf64_Shdr> walked_;
   std::mt19937_64 engine_{20260101};
 };
 

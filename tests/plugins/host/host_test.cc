@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <elf.h>
+#include <sys/stat.h>
+
 #include <algorithm>
 #include <cfenv>
 #include <fstream>
@@ -101,7 +104,7 @@ TEST_F(HostTest, AMissingModelNamesWhatWasRefusedAndWhy) {
   EXPECT_EQ(host.refusals()[0].code, ExitCode::kPlugin);
   const Config config = Parse("model: probe");
   ExpectError(ExitCode::kPlugin,
-              {"refused " + (folder_ / "path/other_abi.so").string(), "built for plugin ABI 99.1"},
+              {"refused " + (folder_ / "path/other_abi.so").string(), "built for plugin ABI 99.0"},
               [&] { host.CreateSensor("probe", config.root()); });
 }
 
@@ -131,6 +134,61 @@ TEST_F(HostTest, ATruncatedFileIsRefused) {
   }
 }
 
+TEST_F(HostTest, APipeIsNotWaitedFor) {
+  const fs::path pipe = folder_ / "pipe.so";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  ExpectRefused(pipe, {"cannot be read as a file"});
+}
+
+/// A copy of a good plugin, its first segment of a type changed.
+template <class Change>
+void DamageSegment(const fs::path& file, Elf64_Word type, const Change& change) {
+  std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
+  Elf64_Ehdr header;
+  stream.read(reinterpret_cast<char*>(&header), sizeof(header));
+  for (Elf64_Half i = 0; i < header.e_phnum; ++i) {
+    const auto at = static_cast<std::streamoff>(header.e_phoff + i * sizeof(Elf64_Phdr));
+    Elf64_Phdr segment;
+    stream.seekg(at);
+    stream.read(reinterpret_cast<char*>(&segment), sizeof(segment));
+    if (segment.p_type != type) continue;
+    change(segment);
+    stream.seekp(at);
+    stream.write(reinterpret_cast<const char*>(&segment), sizeof(segment));
+    return;
+  }
+  ADD_FAILURE() << "no segment of type " << type;
+}
+
+TEST_F(HostTest, SegmentsThatTheLoaderWouldTrustAreRefused) {
+  struct Damage {
+    const char* words;
+    Elf64_Word type;
+    void (*change)(Elf64_Phdr&);
+  };
+  const Damage cases[] = {
+      // The range of addresses wraps: the loader maps over what lies behind.
+      {"overlap, or do not fit", PT_LOAD, [](Elf64_Phdr& s) { s.p_memsz = ~Elf64_Xword{0}; }},
+      {"overlap, or do not fit", PT_LOAD, [](Elf64_Phdr& s) { s.p_vaddr = Elf64_Addr{1} << 47; }},
+      {"overlap, or do not fit", PT_LOAD, [](Elf64_Phdr& s) { s.p_memsz = 1 << 24; }},
+      {"larger in the file than in memory", PT_LOAD, [](Elf64_Phdr& s) { s.p_memsz = 1; }},
+      {"not aligned", PT_LOAD, [](Elf64_Phdr& s) { s.p_align = 3000; }},
+      {"not aligned", PT_LOAD, [](Elf64_Phdr& s) { s.p_vaddr += 8; }},
+      {"lies outside", PT_DYNAMIC, [](Elf64_Phdr& s) { s.p_vaddr += 1 << 20; }},
+      {"no table for the dynamic loader", PT_DYNAMIC, [](Elf64_Phdr& s) { s.p_type = PT_NULL; }},
+      {"two tables", PT_GNU_EH_FRAME, [](Elf64_Phdr& s) { s.p_type = PT_DYNAMIC; }},
+      {"no end", PT_DYNAMIC, [](Elf64_Phdr& s) { s.p_filesz = s.p_memsz = 32; }},
+      {"stack that can be executed", PT_GNU_STACK, [](Elf64_Phdr& s) { s.p_flags |= PF_X; }},
+      {"what it protects", PT_GNU_RELRO, [](Elf64_Phdr& s) { s.p_memsz += 1 << 20; }},
+  };
+  int number = 0;
+  for (const Damage& damage : cases) {
+    const fs::path file = Copy("good", "segment" + std::to_string(number++) + ".so");
+    DamageSegment(file, damage.type, damage.change);
+    ExpectRefused(file, {"malformed", damage.words});
+  }
+}
+
 TEST_F(HostTest, AnExecutableIsNoPlugin) {
   const fs::path file = folder_ / "object.so";
   fs::copy_file(Built("good"), file);
@@ -150,7 +208,7 @@ TEST_F(HostTest, AFileWithoutBuildTagIsRefused) {
 // FAULTS 53
 TEST_F(HostTest, AnotherAbiIsRefused) {
   ExpectRefused(Built("other_abi"),
-                {"built for plugin ABI 99.1", "this program has 0.1", "rebuild the plugin"});
+                {"built for plugin ABI 99.0", "this program has 1.0", "rebuild the plugin"});
 }
 
 // FAULTS 54
@@ -162,8 +220,17 @@ TEST_F(HostTest, InstructionsThatTheProcessorLacksAreRefused) {
   ExpectRefused(Built("other_processor"), {"needs an instruction set that this processor lacks"});
 }
 
+TEST_F(HostTest, ABuildTagThatAsksForMoreThanThisHostIsRefused) {
+  ExpectRefused(Built("needs_minor"), {"needs plugin ABI 1.3", "this program has 1.0"});
+  ExpectRefused(Built("later_flag"), {"flags that this version does not know: 0x8000000"});
+  ExpectRefused(Built("reserved_tag"), {"its build tag uses reserved members"});
+  const PluginHost host({Built("later_hint")});
+  EXPECT_EQ(std::ranges::count(host.entries(), "probe", &PluginEntry::name), 1);
+}
+
 TEST_F(HostTest, AnotherBuildIsRefusedWithBothBuildsNamed) {
-  ExpectRefused(Built("other_build"), {"of another build", "'0.0.9 other'", "expected '0.1.0 "});
+  ExpectRefused(Built("other_build"),
+                {"of another build", "'0.0.9 other'", "expected '0.1.0 ", " headers"});
 }
 
 // FAULTS 55
@@ -181,13 +248,32 @@ TEST_F(HostTest, ABadTableIsRefused) {
       {"NO_CREATE", "entry 1 of its table cannot be created"},
       {"NAME_TWICE", "names 'probe' twice"},
       {"NO_ENTRY_SYMBOL", "does not export alidade_plugin"},
-      {"LANDMARK_REPRESENTATION",
-       "entry 1 of its table is a landmark representation, which this version"},
-      {"UNKNOWN_KIND", "entry 1 of its table is of unknown kind 9"},
+      {"UNKNOWN_FLAGS", "entry 1 of its table has flags that this version does not know: 0x100000"},
+      {"RESERVED", "its table uses reserved members"},
+      {"CONTROL_CHARACTER", "entry 1 of its table has a doc that has a control character"},
+      {"WILD_TEXT", "crashed (signal 11"},
       {"EMPTY", "table has 0 entries"}};
   for (const auto& [fault, words] : faults) {
     ExpectRefused(Built(std::string("table_") + fault), {words});
   }
+}
+
+TEST_F(HostTest, AnEntryOfUnknownKindIsLeftOutAndListed) {
+  const PluginHost host({Built("table_UNKNOWN_KIND")});
+  const auto named = [](const char* name) {
+    return [name](const PluginEntry& entry) { return entry.name == name; };
+  };
+  EXPECT_EQ(std::ranges::count_if(host.entries(), named("probe")), 1);
+  EXPECT_EQ(std::ranges::count_if(host.entries(), named("other_probe")), 0);
+  const auto told = [](const Refusal& refusal) {
+    return refusal.reason.find("its entry 'other_probe' is of kind 9") == 0;
+  };
+  EXPECT_EQ(std::ranges::count_if(host.refusals(), told), 1);
+}
+
+TEST_F(HostTest, AFlagThatNeedNotBeUnderstoodIsIgnored) {
+  const PluginHost host({Built("table_LATER_HINT")});
+  EXPECT_EQ(std::ranges::count(host.entries(), "other_probe", &PluginEntry::name), 1);
 }
 
 TEST_F(HostTest, ACrashWhileLoadingIsARefusal) {
@@ -201,6 +287,13 @@ TEST_F(HostTest, ACrashWhileLoadingIsARefusal) {
 TEST_F(HostTest, APluginThatChangesTheProgramWhileLoadingIsRefused) {
   ExpectRefused(Built("start_ROUND"), {"changed the rounding mode while loading"});
   ExpectRefused(Built("start_LOCALE"), {"changed the locale from 'C' to 'C.UTF-8' while loading"});
+  ExpectRefused(Built("start_PRINT"), {"prints 'Hello from the constructor' while loading"});
+  ExpectRefused(Built("start_IGNORE"), {"changed what happens at signal 15", "while loading"});
+  ExpectRefused(Built("start_BLOCK"), {"changed what happens at signal 1 ", "while loading"});
+  ExpectRefused(Built("start_ALARM"), {"set a timer while loading"});
+  ExpectRefused(Built("start_PATH"), {"changed the environment while loading"});
+  ExpectRefused(Built("start_CLOSE"), {"closed standard output while loading"});
+  ExpectRefused(Built("start_MASK"), {"changed the file mode mask while loading"});
   EXPECT_EQ(std::fegetround(), FE_TONEAREST);
 }
 
@@ -249,10 +342,47 @@ TEST_F(HostTest, ParametersThatDoNotFitTogetherAreABadConfig) {
               [&] { host.CreateSensor("misfit", unlucky.root()); });
 }
 
+TEST_F(HostTest, AModelReadsTexts) {
+  const PluginHost host({Built("bad_create")});
+  const Config given = Parse("{model: titled, title: \"a 'b' \u03bb\", needed: x y}");
+  ExpectError(ExitCode::kBadConfig, {"a 'b' \u03bb|x y"},
+              [&] { host.CreateSensor("titled", given.root()); });
+  const Config by_default = Parse("{model: titled, needed: 1}");
+  ExpectError(ExitCode::kBadConfig, {"nameless|1"},
+              [&] { host.CreateSensor("titled", by_default.root()); });
+  const Config missing = Parse("{model: titled}");
+  ExpectError(ExitCode::kBadConfig, {"needed: missing", "what it cannot do without"},
+              [&] { host.CreateSensor("titled", missing.root()); });
+  const Config control = Parse("{model: titled, needed: \"a\\tb\"}");
+  ExpectError(ExitCode::kBadConfig, {"needed", "has a control character"},
+              [&] { host.CreateSensor("titled", control.root()); });
+  const auto titled = std::ranges::find(host.entries(), "titled", &PluginEntry::name);
+  ASSERT_NE(titled, host.entries().end());
+  const std::vector<ParamInfo> schema = host.Schema(*titled);
+  const auto title = std::ranges::find(schema, "title", &ParamInfo::key);
+  ASSERT_NE(title, schema.end());
+  EXPECT_EQ(title->type, "text");
+  EXPECT_EQ(title->fallback, "nameless");
+}
+
+TEST_F(HostTest, AHostThatIsKeptAnswersNoMore) {
+  const PluginHost host({Built("bad_create")});
+  const Config config = Parse("{model: keeps_host}");
+  ExpectError(ExitCode::kBadConfig, {"first"},
+              [&] { host.CreateSensor("keeps_host", config.root()); });
+  const Config again = Parse("{model: keeps_host, late: 7}");
+  ExpectError(ExitCode::kBadConfig, {"not answered"},
+              [&] { host.CreateSensor("keeps_host", again.root()); });
+}
+
 TEST_F(HostTest, AParameterDeclaredAgainstTheRulesIsRefused) {
   const PluginHost host({Built("bad_create")});
+  const Config no_key = Parse("{model: no_key}");
+  ExpectError(ExitCode::kPlugin, {"model 'no_key' asks for parameter ''", "its key is no name"},
+              [&] { host.CreateSensor("no_key", no_key.root()); });
   for (const char* name :
-       {"no_default", "no_number", "two_choices", "any_choices", "default_beyond"}) {
+       {"no_default", "no_number", "two_choices", "any_choices", "default_beyond", "later_flag",
+        "reserved_member", "empty_range", "many_choices", "half", "outside", "text_as_number"}) {
     const Config config = Parse(std::string("{model: ") + name + '}');
     // A parameter in the config is read by the same declaration.
     const Config given = Parse(std::string("{model: ") + name + ", noise: [fixed, free]}");

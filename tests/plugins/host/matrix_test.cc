@@ -40,7 +40,7 @@ void EvaluateMotion(const MotionModel& motion, const std::vector<double>& x,
   double q[4], rate[3], f[36], g[18], l[9];
   double* next[] = {q, rate};
   ASSERT_EQ(motion.Step(blocks, nullptr, &x[8], 0.1, next, f, g), Status::kOk);
-  ASSERT_EQ(motion.SqrtQ(blocks, 0.1, l), Status::kOk);
+  ASSERT_EQ(motion.SqrtQ(blocks, nullptr, 0.1, l), Status::kOk);
   out.insert(out.end(), q, q + 4);
   out.insert(out.end(), rate, rate + 3);
   out.insert(out.end(), f, f + 36);

@@ -101,6 +101,8 @@ std::optional<NoisyStep> StepWithNoise(const Context& context, Values inputs, co
   inputs.back()[0] = dt_s;
   Values of_noise = noise_of;
   of_noise.push_back({noise_dt_s});
+  const bool has_input = inputs.size() > blocks.size() + 2;
+  if (has_input) of_noise.push_back(inputs[blocks.size() + 1]);
   const Answer step = context.CallWith(context.main(), inputs, kAllMatrices);
   const Answer noise = context.CallWith(*context.model().Find("SqrtQ"), of_noise, kAllMatrices);
   if (!step.ok() || !noise.ok()) return std::nullopt;

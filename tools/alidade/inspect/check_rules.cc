@@ -141,6 +141,11 @@ Finding CheckBounds(Context& context) {
   const std::string failure =
       FirstFailure(context, [&](const Function& f, const CheckedState& state) {
         const Answer answer = context.Call(f, state);
+        if (answer.written_input >= 0) {
+          const int slot = f.slots[static_cast<std::size_t>(answer.written_input)];
+          return context.Where(f, state) + ": writes to its input " +
+                 context.model().slots[static_cast<std::size_t>(slot)].name;
+        }
         for (const auto* buffers : {&answer.outputs, &answer.matrices}) {
           for (std::size_t i = 0; i < buffers->size(); ++i) {
             if ((*buffers)[i].GuardsWhole()) continue;
@@ -152,7 +157,7 @@ Finding CheckBounds(Context& context) {
         }
         return std::string();
       });
-  return Verdict(failure, "nothing written outside the buffers");
+  return Verdict(failure, "nothing written but the outputs");
 }
 
 Finding CheckEnvironment(Context& context) {
@@ -171,7 +176,7 @@ Finding CheckEnvironment(Context& context) {
       return changed(f.name);
     });
   }
-  return Verdict(failure, "rounding, traps, locale and folder stay");
+  return Verdict(failure, "rounding, traps, locale, folder, signals and streams stay");
 }
 
 Finding CheckDeterministic(Context& context) {

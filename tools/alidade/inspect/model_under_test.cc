@@ -53,7 +53,8 @@ void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const 
   predict.call = [=](const double* const* in, double* const* out, double* const* jacobians,
                      const std::int32_t* strides) {
     const bool any = std::any_of(jacobians, jacobians + count, [](auto* j) { return j; });
-    return sensor.eval(self, in, out[0], any ? jacobians : nullptr, any ? strides : nullptr);
+    const AlidadeObservation seen = detail::Seen(nullptr);
+    return sensor.eval(self, &seen, in, out[0], any ? jacobians : nullptr, any ? strides : nullptr);
   };
   model.functions.push_back(std::move(predict));
   model.functions.push_back(
@@ -64,17 +65,21 @@ void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const 
        0,
        true,
        [=](const double* const* in, double* const*, double* const* l, const std::int32_t* strides) {
-         return sensor.sqrt_noise(self, in, in[count], l[0], strides[0]);
+         const AlidadeObservation seen = detail::Seen(in[count]);
+         return sensor.sqrt_noise(self, &seen, in, l[0], strides[0]);
        }});
   if (sensor.valid != nullptr) {
-    model.functions.push_back({"Valid",
-                               {count},
-                               {},
-                               {},
-                               0,
-                               false,
-                               [=](const double* const* in, double* const*, double* const*,
-                                   const std::int32_t*) { return sensor.valid(self, in[0]); }});
+    model.functions.push_back(
+        {"Valid",
+         {count},
+         {},
+         {},
+         0,
+         false,
+         [=](const double* const* in, double* const*, double* const*, const std::int32_t*) {
+           const AlidadeObservation seen = detail::Seen(in[0]);
+           return sensor.valid(self, &seen);
+         }});
   }
 }
 
@@ -142,8 +147,9 @@ void AddInitialise(const AlidadeInstance& c, const std::vector<Space>& roles, co
     }
     const bool has_prior = prior > 0, apart = outputs.size() > 1;
     std::vector<double> row = apart ? Gather(outputs, out) : std::vector<double>();
+    const AlidadeObservation seen = detail::Seen(in[k]);
     const std::int32_t code = sensor.initialise(
-        self, all.data(), in[k], has_prior ? in[k + 1] : nullptr, apart ? row.data() : out[0],
+        self, &seen, all.data(), has_prior ? in[k + 1] : nullptr, apart ? row.data() : out[0],
         jx.data(), jx_strides.data(), j[k], strides[k], has_prior ? j[k + 1] : nullptr,
         has_prior ? strides[k + 1] : 0);
     if (apart) Scatter(row, outputs, out);
@@ -168,13 +174,14 @@ void AddMotion(const AlidadeInstance& c, const std::vector<Space>& blocks, bool 
                              false,
                              [=](const double* const* in, double* const* out, double* const* j,
                                  const std::int32_t* strides) {
-                               return motion.step(self, in, has_input ? in[count + 1] : nullptr,
+                               return motion.step(self, in, has_input ? in + count + 1 : nullptr,
                                                   in[count], in[dt][0], out, j[0], strides[0], j[1],
-                                                  strides[1]);
+                                                  strides[1], nullptr, 0);
                              }});
   if (n_w == 0) return;
   std::vector<int> slots = FirstSlots(count);
   slots.push_back(dt);
+  if (has_input) slots.push_back(count + 1);
   model.functions.push_back(
       {"SqrtQ",
        std::move(slots),
@@ -183,7 +190,8 @@ void AddMotion(const AlidadeInstance& c, const std::vector<Space>& blocks, bool 
        0,
        true,
        [=](const double* const* in, double* const*, double* const* l, const std::int32_t* strides) {
-         return motion.sqrt_q(self, in, in[count][0], l[0], strides[0]);
+         return motion.sqrt_q(self, in, has_input ? in + count + 1 : nullptr, in[count][0], l[0],
+                              strides[0]);
        }});
 }
 
@@ -202,7 +210,9 @@ std::string ValueText(const std::vector<double>& value) {
 Buffer::Buffer(int rows, int columns)
     : rows_(rows),
       columns_(columns),
-      cells_(static_cast<std::size_t>(2 * kGuard + rows * (columns + kGap)), kGuardWord) {
+      cells_(2 * std::size_t{kGuard} +
+                 static_cast<std::size_t>(rows) * (static_cast<std::size_t>(columns) + kGap),
+             kGuardWord) {
   for (int r = 0; r < rows; ++r) {
     for (int c = 0; c < columns; ++c) cells_[Index(r, c)] = kPoison;
   }
@@ -239,7 +249,7 @@ ModelUnderTest::ModelUnderTest(std::shared_ptr<const ModelInstance> from)
     }
     return;
   }
-  const bool has_input = c.description->input != nullptr;
+  const bool has_input = instance->has_input();
   slots.push_back(Named("w", Geometry::Vector(c.description->noise_count)));
   if (has_input) slots.push_back(instance->space());
   slots.push_back(Named("dt", Geometry::Vector(1)));
@@ -264,7 +274,8 @@ Answer CallFunction(const Function& function, const Values& inputs, int matrices
   std::vector<const double*> in;
   std::vector<double*> out, wanted;
   std::vector<std::int32_t> strides;
-  for (const auto& input : inputs) in.push_back(input.empty() ? nullptr : input.data());
+  const Values given = inputs;  // lent: the model may write to it
+  for (const auto& input : given) in.push_back(input.empty() ? nullptr : input.data());
   for (const Space& space : function.outputs)
     answer.outputs.emplace_back(1, space.geometry.ambient);
   for (const Shape& shape : function.matrices) {
@@ -282,6 +293,9 @@ Answer CallFunction(const Function& function, const Values& inputs, int matrices
   }
   PoisonStack();
   answer.code = function.call(in.data(), out.data(), wanted.data(), strides.data());
+  for (std::size_t i = 0; i < given.size() && answer.written_input < 0; ++i) {
+    if (!std::ranges::equal(given[i], inputs[i], Same)) answer.written_input = static_cast<int>(i);
+  }
   return answer;
 }
 

@@ -69,6 +69,7 @@ struct Function {
 struct Answer {
   std::int32_t code = 0;
   std::vector<Buffer> outputs, matrices;
+  int written_input = -1;  ///< the first of its inputs that is no longer what it was
   bool ok() const { return code == ALIDADE_OK; }
   friend bool operator==(const Answer&, const Answer&) = default;
 };

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/host/lent_host.h"
+
+#include <deque>
+#include <mutex>
+
+namespace alidade::internal {
+namespace {
+
+/// Blocks that nobody uses, for so long that a late call is likely to find them so.
+template <class Block>
+struct Idle {
+  std::mutex mutex;
+  std::deque<Block*> blocks;
+};
+
+template <class Block>
+Idle<Block>& IdleBlocks() {
+  static auto& idle = *new Idle<Block>;  // plugins may call while the program ends
+  return idle;
+}
+
+}  // namespace
+
+LentHost::Block* LentHost::Take() {
+  constexpr std::size_t kKept = 64;
+  Idle<Block>& idle = IdleBlocks<Block>();
+  const std::lock_guard lock(idle.mutex);
+  if (idle.blocks.size() <= kKept) return new Block;
+  Block* const oldest = idle.blocks.front();
+  idle.blocks.pop_front();
+  return oldest;
+}
+
+LentHost::LentHost(void* reader) : block_(Take()) {
+  block_->reader = reader;
+  block_->host = {};
+  block_->host.struct_size = sizeof(AlidadeHost);
+  block_->host.abi_major = ALIDADE_ABI_MAJOR;
+  block_->host.abi_minor = ALIDADE_ABI_MINOR;
+  block_->host.context = block_;
+}
+
+LentHost::~LentHost() {
+  block_->reader = nullptr;
+  Idle<Block>& idle = IdleBlocks<Block>();
+  const std::lock_guard lock(idle.mutex);
+  idle.blocks.push_back(block_);
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "alidade/model/plugin_abi.h"
+
+namespace alidade::internal {
+
+/// The AlidadeHost that is lent to a plugin while it creates a model. It lies in memory that is
+/// never given back: a plugin that keeps the pointer, against the rules, finds nobody there.
+class LentHost {
+ public:
+  /// `reader` is who answers; the caller sets the functions of c(), which ask ReaderOf first.
+  explicit LentHost(void* reader);
+  /// Reads give -1 from now on.
+  ~LentHost();
+  LentHost(const LentHost&) = delete;
+  LentHost& operator=(const LentHost&) = delete;
+
+  AlidadeHost& c() { return block_->host; }
+  const AlidadeHost& c() const { return block_->host; }
+  /// Who answers calls with this context; null: nobody does any more.
+  template <class Reader>
+  static Reader* ReaderOf(void* context) {
+    return static_cast<Reader*>(static_cast<Block*>(context)->reader);
+  }
+
+ private:
+  struct Block {
+    AlidadeHost host{};
+    void* reader = nullptr;
+  };
+  static Block* Take();
+
+  Block* block_;
+};
+
+}  // namespace alidade::internal

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <sys/stat.h>
+
+#include <filesystem>
 #include <regex>
 
 #include "alidade/config/config.h"
@@ -10,6 +13,7 @@ namespace {
 using testing::Arguments;
 using testing::Contains;
 using testing::Outcome;
+namespace fs = std::filesystem;
 
 /// Comparisons need the batch, which a build without the Ceres solver does not have.
 class CompareFolderCli : public testing::ProgramTest {};
@@ -376,7 +380,28 @@ TEST_F(CompareCli, RefusesWhatItCannotCompare) {
   fails({"compare", "a"}, 65, "estimates.csv: 151 rows, run.json has 152; expected a run folder");
   Write("a/ekf/estimates.csv", whole.substr(0, whole.size() - 1));
   fails({"compare", "a"}, 65, "estimates.csv:153: the last line is cut short");
+  for (const auto& [stamp, words] : {std::pair("", "t_s '' is not a number"),
+                                     {"nan", "t_s 'nan' is not finite"},
+                                     {"1e300", "t_s '1e300' is out of range"},
+                                     {"123456789012345678901234567890", "is out of range"},
+                                     {"0x1", "not a number"}}) {
+    Write("a/ekf/estimates.csv",
+          whole.substr(0, last) + stamp + whole.substr(whole.find(',', last)));
+    fails({"compare", "a"}, 65, words);
+  }
   Write("a/ekf/estimates.csv", whole);
+  for (const char* name : {"run.json", "timing.json", "ekf/estimates.csv", "ekf/covariance.bin"}) {
+    const bool there = Exists(std::string("a/") + name);
+    const std::string kept = there ? Read(std::string("a/") + name) : "";
+    fs::remove(folder_ / "a" / name);
+    fs::create_directory(folder_ / "a" / name);
+    fails({"compare", "a"}, 65, std::string(name) + ": is not a regular file");
+    fs::remove(folder_ / "a" / name);
+    ASSERT_EQ(::mkfifo((folder_ / "a" / name).c_str(), 0600), 0);
+    fails({"compare", "a"}, 65, std::string(name) + ": is not a regular file");
+    fs::remove(folder_ / "a" / name);
+    if (there) Write(std::string("a/") + name, kept);
+  }
   const std::string json = Read("a/run.json");
   const auto with = [&](const char* text, const char* other) {
     Write("a/run.json", std::regex_replace(json, std::regex(text), other));

@@ -156,6 +156,30 @@ void ModelInstance::ReadDescription() {
   description_ = ReadPrefix(instance_.description);
   instance_.description = &description_;
   capabilities_ = description_.capabilities;
+  CheckSupported();
+  ReadRoles();
+  const bool is_sensor = instance_.kind == ALIDADE_KIND_SENSOR;
+  if (is_sensor) {
+    if (description_.output == nullptr) Refuse("does not describe its measurement");
+    space_ = ReadSpace(ReadPrefix(description_.output), "the measurement");
+  } else if (has_input()) {
+    space_ = ReadSpace(ReadPrefix(description_.inputs), "the control input");
+  }
+  const int y = description_.initialise_role;
+  if (is_sensor && (capabilities_ & ALIDADE_CAN_INITIALISE) != 0 &&
+      (y < 0 || y >= std::ssize(spaces_) || sensor_.initialise == nullptr)) {
+    Refuse("says that it can initialise, but not what or how");
+  }
+  if (is_sensor && (description_.prior_count < 0 || description_.prior_count > kMaxSize)) {
+    Refuse("states a prior of size " + std::to_string(description_.prior_count));
+  }
+  if (!is_sensor && (description_.noise_count < 0 || description_.noise_count > kMaxSize)) {
+    Refuse("states a noise of size " + std::to_string(description_.noise_count));
+  }
+}
+
+/// Refuses what has to be understood and is not, and what is understood but not done.
+void ModelInstance::CheckSupported() const {
   const bool is_sensor = instance_.kind == ALIDADE_KIND_SENSOR;
   const std::string unknown = internal::UnknownBits(capabilities_, kKnownCapabilities);
   if (!unknown.empty()) Refuse("has capabilities that this version does not know: " + unknown);
@@ -166,20 +190,23 @@ void ModelInstance::ReadDescription() {
   if ((capabilities_ & ALIDADE_NEEDS_PAYLOAD) != 0) {
     Refuse(std::string("needs what comes beside a measurement") + kUnsupported);
   }
-  if (is_sensor && description_.known != nullptr) {
-    Refuse(std::string("needs known numbers with each measurement") + kUnsupported);
-  }
-  if (!is_sensor && description_.input_count > 1) {
+  if (is_sensor) {
+    if (description_.known != nullptr) {
+      Refuse(std::string("needs known numbers with each measurement") + kUnsupported);
+    }
+    if (sensor_.eval == nullptr || sensor_.sqrt_noise == nullptr) {
+      Refuse("lacks a function that every sensor must have: eval, sqrt_noise");
+    }
+  } else if (description_.input_count > 1) {
     Refuse("has " + std::to_string(description_.input_count) + " control inputs" + kUnsupported);
-  }
-  if (!is_sensor && description_.input_count == 1 &&
-      (description_.inputs == nullptr ||
-       !internal::GoodStride<AlidadeSpace>(description_.input_stride))) {
+  } else if (description_.input_count == 1 &&
+             (description_.inputs == nullptr ||
+              !internal::GoodStride<AlidadeSpace>(description_.input_stride))) {
     Refuse("does not describe its control input");
   }
-  if (is_sensor && (sensor_.eval == nullptr || sensor_.sqrt_noise == nullptr)) {
-    Refuse("lacks a function that every sensor must have: eval, sqrt_noise");
-  }
+}
+
+void ModelInstance::ReadRoles() {
   const int count = static_cast<int>(std::min<std::uint32_t>(description_.role_count, 1 << 16));
   if (count < 1 || count > kMaxRoles || description_.roles == nullptr) {
     Refuse("has " + std::to_string(count) + " roles; 1 to 64 are allowed");
@@ -187,15 +214,10 @@ void ModelInstance::ReadDescription() {
   if (!internal::GoodStride<AlidadeSpace>(description_.role_stride)) {
     Refuse("states a role stride of " + std::to_string(description_.role_stride) + " bytes");
   }
-  const auto read = [&](const AlidadeSpace& space, const std::string& what) {
-    const std::string defect = Defect(space);
-    if (!defect.empty()) Refuse(": " + what + ' ' + defect);
-    return ToSpace(space);
-  };
   for (int i = 0; i < count; ++i) {
     const auto role = internal::ReadEntry(description_.roles, description_.role_stride, i);
-    spaces_.push_back(read(role, "role '" + Text(role.name) + "'"));
-    if (is_sensor && (role.flags & ALIDADE_ROLE_OWNED) != 0) {
+    spaces_.push_back(ReadSpace(role, "role '" + Text(role.name) + "'"));
+    if (instance_.kind == ALIDADE_KIND_SENSOR && (role.flags & ALIDADE_ROLE_OWNED) != 0) {
       Refuse(": role '" + spaces_.back().name + "' is a model parameter state of the sensor" +
              kUnsupported);
     }
@@ -205,23 +227,12 @@ void ModelInstance::ReadDescription() {
       Refuse("has two roles named '" + spaces_.back().name + "'");
     }
   }
-  if (is_sensor && description_.output == nullptr) Refuse("does not describe its measurement");
-  if (is_sensor) {
-    space_ = read(ReadPrefix(description_.output), "the measurement");
-  } else if (has_input()) {
-    space_ = read(ReadPrefix(description_.inputs), "the control input");
-  }
-  const int y = description_.initialise_role;
-  if (is_sensor && (capabilities_ & ALIDADE_CAN_INITIALISE) != 0 &&
-      (y < 0 || y >= count || sensor_.initialise == nullptr)) {
-    Refuse("says that it can initialise, but not what or how");
-  }
-  if (is_sensor && (description_.prior_count < 0 || description_.prior_count > kMaxSize)) {
-    Refuse("states a prior of size " + std::to_string(description_.prior_count));
-  }
-  if (!is_sensor && (description_.noise_count < 0 || description_.noise_count > kMaxSize)) {
-    Refuse("states a noise of size " + std::to_string(description_.noise_count));
-  }
+}
+
+Space ModelInstance::ReadSpace(const AlidadeSpace& space, const std::string& what) const {
+  const std::string defect = Defect(space);
+  if (!defect.empty()) Refuse(": " + what + ' ' + defect);
+  return ToSpace(space);
 }
 
 std::string ModelInstance::error_text() const {

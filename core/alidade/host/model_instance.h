@@ -54,6 +54,9 @@ class ModelInstance {
  private:
   void ReadCalls();
   void ReadDescription();
+  void CheckSupported() const;
+  void ReadRoles();
+  Space ReadSpace(const AlidadeSpace& space, const std::string& what) const;
   [[noreturn]] void Refuse(const std::string& why) const;
 
   AlidadeInstance instance_;  ///< its pointers lead to the copies below

@@ -105,7 +105,7 @@ bool GoodFallback(const AlidadeParam& param) {
 
 /// What breaks the rules of plugin_abi.h in a parameter, or "".
 std::string ParamDefect(const AlidadeParam& param) {
-  constexpr std::uint32_t kKnown = ALIDADE_PARAM_HAS_DEFAULT | ALIDADE_PARAM_LOW_OPEN |
+  constexpr std::uint32_t kFlags = ALIDADE_PARAM_HAS_DEFAULT | ALIDADE_PARAM_LOW_OPEN |
                                    ALIDADE_PARAM_HIGH_OPEN | ALIDADE_PARAM_OR_NONE;
   const bool choice = param.kind == ALIDADE_PARAM_CHOICE;
   if (!GoodName(param.key)) return "its key is no name";
@@ -113,7 +113,7 @@ std::string ParamDefect(const AlidadeParam& param) {
   if (param.kind < ALIDADE_PARAM_NUMBER || param.kind > ALIDADE_PARAM_TEXT) {
     return "its kind is " + std::to_string(param.kind);
   }
-  const std::string unknown = UnknownBits(param.flags, kKnown);
+  const std::string unknown = UnknownBits(param.flags, kFlags);
   if (!unknown.empty()) return "it has the flags " + unknown;
   if (param.reserved0 != 0 || !AllZero(param.reserved)) return "it uses reserved members";
   for (const char* text : {param.unit, param.doc}) {

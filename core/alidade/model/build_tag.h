@@ -14,8 +14,9 @@ constexpr void CopyText(const char* text, char (&to)[N]) {
   for (std::size_t i = 0; i + 1 < N && text[i] != '\0'; ++i) to[i] = text[i];
 }
 
-/// ALIDADE_ISA_* of all that the compiler may use by itself in this translation unit.
-constexpr std::uint32_t InstructionSets() {
+/// ALIDADE_ISA_* of all that the compiler may use by itself in this translation unit, as far as
+/// registers of 256 bits.
+constexpr std::uint32_t InstructionSetsTo256() {
   std::uint32_t isa = 0;
 #if defined(__SSE3__)
   isa |= ALIDADE_ISA_SSE3;
@@ -56,6 +57,12 @@ constexpr std::uint32_t InstructionSets() {
 #if defined(__MOVBE__)
   isa |= ALIDADE_ISA_MOVBE;
 #endif
+  return isa;
+}
+
+/// The rest of them.
+constexpr std::uint32_t InstructionSetsBeyond256() {
+  std::uint32_t isa = 0;
 #if defined(__AVX512F__)
   isa |= ALIDADE_ISA_AVX512F;
 #endif
@@ -124,7 +131,7 @@ constexpr AlidadeBuildTag MakeBuildTag(std::uint32_t kind, const char* build) {
 #if !defined(__OPTIMIZE__)
   f.flags |= ALIDADE_BUILT_UNOPTIMISED;
 #endif
-  f.isa = InstructionSets();
+  f.isa = InstructionSetsTo256() | InstructionSetsBeyond256();
   f.cplusplus = static_cast<std::uint32_t>(__cplusplus);
   CopyText(__VERSION__, f.compiler);
   CopyText(build, f.build);

@@ -153,16 +153,16 @@ struct __attribute__((visibility("hidden"))) MotionCalls {
                                            std::int32_t f_stride, double* g, std::int32_t g_stride,
                                            double* b, std::int32_t b_stride) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
-      const MatrixRef by_state{f, f_stride}, by_noise{g, g_stride};
       const double* u = nullptr;
       if constexpr (Model::Input::kAmbient > 0) {
         u = inputs[0];
         if (b != nullptr) {
-          return StepWithInput(model, blocks, u, w, dt_s, next, by_state, by_noise, {b, b_stride});
+          return StepWithInput(model, blocks, u, w, dt_s, next, {f, f_stride}, {g, g_stride},
+                               {b, b_stride});
         }
       }
       return static_cast<std::int32_t>(
-          alidade::Step(model, blocks, u, w, dt_s, next, by_state, by_noise));
+          alidade::Step(model, blocks, u, w, dt_s, next, {f, f_stride}, {g, g_stride}));
     });
   }
   ALIDADE_FLATTEN static std::int32_t SqrtQ(const void* self, const double* const* blocks,

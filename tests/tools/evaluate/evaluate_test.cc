@@ -282,6 +282,18 @@ TEST(ReadInnovations, TellsNisAndAutocorrelation) {
   EXPECT_DOUBLE_EQ(all[1].white_within, 1.96 / 3.0);
   std::ofstream(folder / "innovations.csv") << "t_s,sensor\n";
   EXPECT_THROW(ReadInnovations(folder / "innovations.csv"), Error);
+  // More than there are columns, and more than an int holds.
+  const std::string header = "t_s,stream,sensor,landmark,outcome,dof,nis,z0,h0,s0,r0\n";
+  for (const char* dof : {"2", "2147483648", "4294967297", "9223372036854775807"}) {
+    std::ofstream(folder / "innovations.csv")
+        << header << "0.1,pixels,pixels,,accepted," << dof << ",1,0,0,1,1\n";
+    try {
+      static_cast<void>(ReadInnovations(folder / "innovations.csv"));
+      ADD_FAILURE() << dof;
+    } catch (const Error& e) {
+      EXPECT_NE(std::string(e.what()).find("too few columns"), std::string::npos) << e.what();
+    }
+  }
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -28,14 +30,26 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
                                                  "the folder of a run that came to its end"));
 }
 
+/// Refuses a folder, a device, a pipe that would be waited for.
+void RequireFile(const fs::path& file) {
+  std::error_code error;
+  if (!fs::exists(file, error)) FailOpen(file);
+  if (!fs::is_regular_file(file, error)) FailFile(file, 0, "is not a regular file");
+}
+
 std::ifstream Open(const fs::path& file) {
+  RequireFile(file);
   std::ifstream stream(file, std::ios::binary);
   if (!stream) FailOpen(file);
   return stream;
 }
 
 Json ReadJson(const fs::path& file) {
-  const std::string text = ReadFile(file, [&](ExitCode, int) { FailOpen(file); });
+  constexpr std::uintmax_t kMost = 1 << 28;  // bytes
+  RequireFile(file);
+  if (fs::file_size(file) > kMost) FailFile(file, 0, "is larger than 256 MiB");
+  const std::string text = ReadFile(
+      file, [&](ExitCode, int) { FailOpen(file); }, kMost);
   return ParseJson(text, file.string());
 }
 
@@ -57,6 +71,16 @@ std::vector<double> NumbersOf(std::string_view row, const fs::path& file, int li
     at = end + 1;
   }
   return numbers;
+}
+
+Timestamp TimestampOf(std::string_view row, const fs::path& file, int line) {
+  const std::string_view text = row.substr(0, row.find(','));
+  double value = 0.0;
+  if (const char* const defect = cell::ParseNumber(text, value))
+    FailFile(file, line, std::string("t_s '") + cell::Harmless(text) + "' " + defect);
+  if (!(std::abs(value) < cell::kTimeLimit))
+    FailFile(file, line, "t_s '" + cell::Harmless(text) + "' is out of range");
+  return cell::ParseTimestamp(text, value, 9);
 }
 
 /// A row of estimates.csv behind its timestamp: for each block its values, then its sigmas.
@@ -86,7 +110,7 @@ std::int64_t ReadEstimates(const fs::path& file, std::int64_t rows, Series& seri
     const std::vector<double> row = NumbersOf(line, file, number);
     if (row.size() != columns) FailFile(file, number, "not as wide as run.json has it");
     if (stream.eof()) FailFile(file, number, "the last line is cut short");
-    series.timestamps.push_back(cell::ExactTimestamp(line.substr(0, line.find(',')), 9));
+    series.timestamps.push_back(TimestampOf(line, file, number));
     AppendRow(series, row);
     not_finite += line.find_first_of("nN") != line.npos ? 1 : 0;  // nan, inf
   }
@@ -102,6 +126,7 @@ std::int64_t ReadEstimates(const fs::path& file, std::int64_t rows, Series& seri
 void ReadCovariances(const fs::path& file, Series& series) {
   if (series.tangent() > Series::kMostJoint || !fs::exists(file)) return;
   series.joint = true;
+  RequireFile(file);
   std::vector<double> cells(series.cells() * series.timestamps.size());
   const auto bytes = static_cast<std::streamsize>(8 * cells.size());
   if (fs::file_size(file) != static_cast<std::uintmax_t>(bytes)) {
@@ -165,6 +190,7 @@ EstimatorResult ReadResult(const std::string& name, const JsonNode& entry) {
 std::vector<LandmarkEstimate> ReadMap(const fs::path& file) {
   constexpr std::size_t kPlace = 3;  // the columns x, y, z, behind id, generation and form
   constexpr const char* kAxes[] = {"x", "y", "z"};
+  RequireFile(file);
   std::vector<LandmarkEstimate> map;
   NumberRows rows(file, Place{file.string()}, {});
   rows.Next();  // the header

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <map>
 
 #include "alidade/base/number_rows.h"
@@ -46,6 +47,8 @@ void AddRow(const NumberRows& rows, const Columns& at, std::map<std::int64_t, do
   const std::int64_t dof = rows.Index(at.dof, "dof");
   const double nis = rows.Number(at.nis, "nis");
   if (dof < 1) rows.FailCell(at.dof, "dof", "is not a number of elements", "1 or more");
+  const std::size_t room = rows.size() - std::min(rows.size(), std::max(at.s0, at.r0));
+  if (static_cast<std::uint64_t>(dof) > room) rows.FailLine("too few columns", "as many as dof");
   ++sums.measurements;
   sums.nis += nis / static_cast<double>(dof);
   const auto [limit, is_new] = limits.try_emplace(dof, 0.0);
@@ -53,8 +56,6 @@ void AddRow(const NumberRows& rows, const Columns& at, std::map<std::int64_t, do
   sums.inside += nis <= limit->second ? 1 : 0;
   std::vector<double> r;
   for (std::size_t k = 0; k < static_cast<std::size_t>(dof); ++k) {
-    if (std::max(at.s0, at.r0) + k >= rows.size())
-      rows.FailLine("too few columns", "as many as dof");
     r.push_back(rows.Number(at.r0 + k, "r") / rows.Number(at.s0 + k, "s"));
   }
   AddProducts(std::string(rows.text(at.landmark)), r, sums);

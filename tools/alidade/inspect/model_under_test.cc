@@ -274,7 +274,7 @@ Answer CallFunction(const Function& function, const Values& inputs, int matrices
   std::vector<const double*> in;
   std::vector<double*> out, wanted;
   std::vector<std::int32_t> strides;
-  const Values given = inputs;  // lent: the model may write to it
+  const Values given(inputs.begin(), inputs.end());  // lent: the model may write to it
   for (const auto& input : given) in.push_back(input.empty() ? nullptr : input.data());
   for (const Space& space : function.outputs)
     answer.outputs.emplace_back(1, space.geometry.ambient);

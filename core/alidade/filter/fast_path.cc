@@ -114,7 +114,7 @@ ALIDADE_INLINE bool FastPath::Linearise(Sensor& sensor, const double* z, Measure
   const double* const* const roles = sensor.roles.data();
   if (sensor.model->Linearise(roles, h, sensor.jacobians.data(), sensor.strides.data()) !=
           Status::kOk ||
-      sensor.model->SqrtNoise(roles, z, l) != Status::kOk) {
+      sensor.model->SqrtNoise(roles, sensor.seen, l) != Status::kOk) {
     return false;
   }
   for (int i = 0; i < m; ++i) {
@@ -196,7 +196,8 @@ ALIDADE_INLINE FastPath::Taken FastPath::Take(Sensor& sensor, const Measurement&
       Defect(z, m) != 0.0 || at + m > kRows) {
     return Taken::kUnusual;
   }
-  const Status valid = sensor.model->Valid(z);
+  sensor.seen.z = z;
+  const Status valid = sensor.model->Valid(sensor.seen);
   if (valid != Status::kOk && valid != Status::kInvalid) return Taken::kUnusual;
   MeasurementReport& entry = f_.report.Add();
   if (valid == Status::kInvalid) {

@@ -51,6 +51,7 @@ class FastPath {
     std::vector<int> strides;
     std::array<double, kMostOfOne * Covariance::kSmall> h{};      ///< H, its zeros included
     std::array<double, kMostOfOne * Covariance::kSmall> blank{};  ///< h before the model writes it
+    AlidadeObservation seen = detail::Seen(nullptr);              ///< the measurement that is taken
     int index, stream, rows;
     double gate;
   };

@@ -99,14 +99,16 @@ class SensorModel {
   }
   /// l, row-major m x m, with R = l l'.
   Status SqrtNoise(const double* const* roles, const double* z, double* l) const {
-    const AlidadeObservation seen = detail::Seen(z);
+    return SqrtNoise(roles, detail::Seen(z), l);
+  }
+  /// The same of a measurement as it is shown to the plugin, which takes as long to make as a call.
+  Status SqrtNoise(const double* const* roles, const AlidadeObservation& seen, double* l) const {
     return detail::ToStatus(
         sensor_->sqrt_noise(self_, &seen, roles, l, measurement().geometry.tangent));
   }
-  Status Valid(const double* z) const {
-    if (sensor_->valid == nullptr) return Status::kOk;
-    const AlidadeObservation seen = detail::Seen(z);
-    return detail::ToStatus(sensor_->valid(self_, &seen));
+  Status Valid(const double* z) const { return Valid(detail::Seen(z)); }
+  Status Valid(const AlidadeObservation& seen) const {
+    return sensor_->valid == nullptr ? Status::kOk : detail::ToStatus(sensor_->valid(self_, &seen));
   }
   /// y = g(other roles, z), dense row-major Jacobians jx[i] = dy/d role_i and jz = dy/dz. kInvalid
   /// where a prior is needed.

@@ -59,9 +59,9 @@ ALIDADE_INLINE bool FastPath::StepModel(const Motion& motion, double dt_s, doubl
   for (int i = 0; i < k * k; ++i) f[i] = kUnwritten;
   for (int i = 0; i < k * w; ++i) g[i] = kUnwritten;
   for (int i = 0; i < w * w; ++i) l[i] = kUnwritten;
-  if (motion.model->Step(motion.x.data(), step.u.data(), nullptr, dt_s, motion.next.data(), f, g) !=
+  if (motion.model.Step(motion.x.data(), step.u.data(), nullptr, dt_s, motion.next.data(), f, g) !=
           Status::kOk ||
-      motion.model->SqrtQ(motion.x.data(), step.u.data(), dt_s, l) != Status::kOk) {
+      motion.model.SqrtQ(motion.x.data(), step.u.data(), dt_s, l) != Status::kOk) {
     return false;
   }
   double own[K > 0 ? K * K : 1];
@@ -112,9 +112,9 @@ ALIDADE_INLINE bool FastPath::Linearise(Sensor& sensor, const double* z, Measure
   for (int i = 0; i < m * m; ++i) l[i] = kUnwritten;
   for (int i = 0; i < m * N; ++i) sensor.h.data()[i] = sensor.blank.data()[i];
   const double* const* const roles = sensor.roles.data();
-  if (sensor.model->Linearise(roles, h, sensor.jacobians.data(), sensor.strides.data()) !=
+  if (sensor.model.Linearise(roles, h, sensor.jacobians.data(), sensor.strides.data()) !=
           Status::kOk ||
-      sensor.model->SqrtNoise(roles, sensor.seen, l) != Status::kOk) {
+      sensor.model.SqrtNoise(roles, sensor.seen, l) != Status::kOk) {
     return false;
   }
   for (int i = 0; i < m; ++i) {
@@ -174,9 +174,7 @@ ALIDADE_INLINE bool FastPath::Correct(const Rows<N>& rows, int count) {
   double* const x = f_.state.values().data();
   for (int i = 0; i < N; ++i) moved[i] = x[i] + dx[i];
   if (Defect(moved, N) != 0.0) return false;
-  for (int c = 0; c < N; ++c) {
-    for (int r = c; r < N; ++r) p.data()[c * p.stride() + r] = updated[c * N + r];
-  }
+  StoreLower<N>(updated, p.data(), p.stride());
   for (int i = 0; i < N; ++i) x[i] = moved[i];
   f_.motions.EndInterval();
   for (int i = 0; i < m; ++i) {
@@ -197,7 +195,7 @@ ALIDADE_INLINE FastPath::Taken FastPath::Take(Sensor& sensor, const Measurement&
     return Taken::kUnusual;
   }
   sensor.seen.z = z;
-  const Status valid = sensor.model->Valid(sensor.seen);
+  const Status valid = sensor.model.Valid(sensor.seen);
   if (valid != Status::kOk && valid != Status::kInvalid) return Taken::kUnusual;
   MeasurementReport& entry = f_.report.Add();
   if (valid == Status::kInvalid) {
@@ -206,7 +204,7 @@ ALIDADE_INLINE FastPath::Taken FastPath::Take(Sensor& sensor, const Measurement&
     entry.outcome = Outcome::kInvalid;
     return Taken::kLeftOut;
   }
-  if (std::ssize(entry.gain) != m * N || std::ssize(entry.z) != m) Fit(entry, m, N);
+  if (std::ssize(entry.gain) != m * N) Fit(entry, m, N);
   entry.sensor = sensor.index;
   entry.landmark = measurement.landmark;
   entry.dof = m;
@@ -260,24 +258,26 @@ ALIDADE_INLINE bool FastPath::Update(const Frame& frame) {
 }
 
 template <int N>
-bool FastPath::ProcessSized(const Frame& frame) {
+bool FastPath::ProcessSized(FastPath& path, const Frame& frame) {
+  FilterState& f = path.f_;
+  Timeline& time = path.parts_.time;
   Timestamp elapsed = 0;
-  if (f_.said.ended || f_.timestamp == kNoTimestamp || frame.timestamp < f_.timestamp ||
-      __builtin_sub_overflow(frame.timestamp, f_.timestamp, &elapsed)) {
+  if (f.said.ended || f.timestamp == kNoTimestamp || frame.timestamp < f.timestamp ||
+      __builtin_sub_overflow(frame.timestamp, f.timestamp, &elapsed)) {
     return false;
   }
   if (elapsed > 0) {
-    if (f_.motions.in_interval()) return false;
+    if (f.motions.in_interval()) return false;
     const double dt_s = Seconds(elapsed);
-    if (!parts_.time.inputs().empty()) {
-      if (!parts_.time.inputs().AllAct(f_.timestamp, frame.timestamp)) return false;
-      parts_.time.UseInputs(f_.timestamp, f_.motions, f_.report.events);
+    if (!time.inputs().empty()) {
+      if (!time.inputs().AllAct(f.timestamp, frame.timestamp)) return false;
+      time.UseInputs(f.timestamp, f.motions, f.report.events);
     }
-    if (!(dt_s <= parts_.time.max_dt_s()) || !Step<N>(dt_s)) return false;
-    f_.timestamp = frame.timestamp;
-    f_.motions.CountStep();
+    if (!(dt_s <= time.max_dt_s()) || !path.Step<N>(dt_s)) return false;
+    f.timestamp = frame.timestamp;
+    f.motions.CountStep();
   }
-  return Update<N>(frame);
+  return path.Update<N>(frame);
 }
 
 bool FastPath::AddMotions() {
@@ -291,7 +291,7 @@ bool FastPath::AddMotions() {
     const MotionModel& model = binding.system.motions[i].model;
     const JacobianPart& part = place.parts[0];
     Motion& motion = motions_.emplace_back(
-        Motion{&model, &step, {}, {}, part.offset, part.size, model.noise_size()});
+        Motion{model, &step, {}, {}, part.offset, part.size, model.noise_size()});
     for (const int value : place.values) {
       motion.x.push_back(f_.state.values().data() + value);
       motion.next.push_back(f_.motions.next().data() + value);
@@ -316,9 +316,8 @@ bool FastPath::AddSensors() {
         std::ranges::count(place.consider, true) > 0) {
       return false;
     }
-    Sensor& sensor = sensors_.emplace_back();
+    Sensor& sensor = sensors_.emplace_back(bound.model);
     sensor.index = static_cast<int>(k);
-    sensor.model = &bound.model;
     for (const int value : place.values) {
       sensor.roles.push_back(value < 0 ? nullptr : f_.state.values().data() + value);
     }

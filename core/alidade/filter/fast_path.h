@@ -31,21 +31,23 @@ class FastPath {
   /// layout, with plain joint updates. It points into the parts.
   static std::unique_ptr<FastPath> For(const FastParts& parts);
   /// As a filter processes a frame, all of it or nothing but the step.
-  bool Process(const Frame& frame) { return (this->*process_)(frame); }
+  bool Process(const Frame& frame) { return process_(*this, frame); }
 
  private:
   static constexpr int kRows = 8;       ///< most rows of an update
   static constexpr int kMostOfOne = 3;  ///< most rows of a measurement
 
   struct Motion {
-    const MotionModel* model;
+    MotionModel model;
     Motions::Step* step;
     std::vector<const double*> x;
     std::vector<double*> next;
     int offset, size, noise;
   };
   struct Sensor {
-    const SensorModel* model;
+    explicit Sensor(const SensorModel& of) : model(of) {}
+
+    SensorModel model;
     std::vector<const double*> roles;
     std::vector<double*> jacobians;  ///< into h
     std::vector<int> strides;
@@ -70,7 +72,7 @@ class FastPath {
   bool AddMotions();
   bool AddSensors();
   template <int N>
-  bool ProcessSized(const Frame& frame);
+  static bool ProcessSized(FastPath& path, const Frame& frame);
   template <int N>
   bool Step(double dt_s);
   template <int N, int K, int W>
@@ -88,7 +90,7 @@ class FastPath {
 
   FastParts parts_;
   FilterState& f_;
-  bool (FastPath::*process_)(const Frame& frame) = nullptr;
+  bool (*process_)(FastPath& path, const Frame& frame) = nullptr;
   std::vector<Motion> motions_;
   std::vector<Sensor> sensors_;
 };

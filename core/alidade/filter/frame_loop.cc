@@ -26,20 +26,17 @@ FrameLoop::FrameLoop(System system, const EkfOptions& options,
   method->Begin(f);
 }
 
-/// Null where the frame loop is the only way.
-FastPath* FrameLoop::Fast() {
-  if (fast_.made_at != f.activations) {
-    const bool linear = dynamic_cast<const Linear*>(&*method) != nullptr;
-    fast_.path = linear ? FastPath::For(FastParts{f, time_, gate_, recovery_, options_}) : nullptr;
-    fast_.made_at = f.activations;
-  }
-  return fast_.path.get();
+/// Null afterwards where the frame loop is the only way.
+void FrameLoop::MakeFastPath() {
+  const bool linear = dynamic_cast<const Linear*>(&*method) != nullptr;
+  fast_.path = linear ? FastPath::For(FastParts{f, time_, gate_, recovery_, options_}) : nullptr;
+  fast_.made_at = f.activations;
 }
 
 void FrameLoop::Process(const Frame& frame) {
   f.report.Clear();
-  FastPath* const path = Fast();
-  took_fast_path = path != nullptr && path->Process(frame);
+  if (fast_.made_at != f.activations) MakeFastPath();
+  took_fast_path = fast_.path != nullptr && fast_.path->Process(frame);
   if (!took_fast_path) Run(frame);
   if (!time_.inputs().empty()) time_.inputs().Take(frame, f.report);
   for (Event& event : f.report.events) event.timestamp = frame.timestamp;

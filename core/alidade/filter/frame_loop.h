@@ -53,7 +53,7 @@ class FrameLoop {
   bool took_fast_path = false;         ///< the last frame
 
  private:
-  FastPath* Fast();
+  void MakeFastPath();
   void Run(const Frame& frame);
   void StepTo(Timestamp timestamp);
   void Fuse(std::span<Row> rows);

@@ -71,8 +71,8 @@ class UpdateReport {
   std::span<MeasurementReport> measurements() { return {pool_.data(), count_}; }
   /// One more; references to the others end.
   MeasurementReport& Add() {
-    if (count_ == pool_.size()) pool_.emplace_back();
-    return pool_[count_++];
+    const auto next = pool_.begin() + static_cast<std::ptrdiff_t>(count_++);
+    return next == pool_.end() ? pool_.emplace_back() : *next;
   }
   void Clear() {
     stale = false;

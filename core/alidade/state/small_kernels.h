@@ -185,6 +185,15 @@ template <int N, int M>
   return kept;
 }
 
+/// The lower triangle of what Downdate gave, to P. Unrolled, so that it never lies in memory between
+/// the two: pairs read there would wait for the single numbers that were written.
+template <int N>
+[[gnu::always_inline]] inline void StoreLower(const double* updated, double* p, int ld) {
+  ALIDADE_UNROLL for (int c = 0; c < N; ++c) {
+    ALIDADE_UNROLL for (int r = c; r < N; ++r) p[c * ld + r] = updated[c * N + r];
+  }
+}
+
 #undef ALIDADE_UNROLL
 
 /// The same for n states, 1 to kSmall, known at run time.

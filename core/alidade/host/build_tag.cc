@@ -24,9 +24,14 @@ std::string Version(unsigned major, unsigned minor) {
 
 AlidadeBuildTag ReadBuildTag(const fs::path& path) {
   const internal::ElfFile file(path);
-  const Elf64_Shdr section = file.FindSection(ALIDADE_BUILD_TAG_SECTION);
-  const std::uint64_t size = std::min<std::uint64_t>(section.sh_size, sizeof(AlidadeBuildTag));
-  const std::vector<char> bytes = file.Read<char>(section.sh_offset, size, "build tag");
+  const auto section = file.FindSection(ALIDADE_BUILD_TAG_SECTION);
+  if (!section) {
+    Refuse(path,
+           "has no alidade build tag: not an alidade plugin, or built without ALIDADE_PLUGIN, or "
+           "stripped of its section headers");
+  }
+  const std::uint64_t size = std::min<std::uint64_t>(section->sh_size, sizeof(AlidadeBuildTag));
+  const std::vector<char> bytes = file.Read<char>(section->sh_offset, size, "build tag");
   AlidadeBuildTag print{};
   std::memcpy(&print, bytes.data(), bytes.size());
   constexpr std::uint32_t kFixed = offsetof(AlidadeBuildTag, kind);

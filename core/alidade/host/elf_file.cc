@@ -23,10 +23,6 @@ constexpr Elf64_Half kMachine = EM_AARCH64;
 #error "alidade does not know the ELF machine of this target"
 #endif
 
-constexpr const char* kNoTag =
-    "has no alidade build tag: not an alidade plugin, or built without "
-    "ALIDADE_PLUGIN, or stripped of its section headers";
-
 }  // namespace
 
 ElfFile::ElfFile(const std::filesystem::path& path) : path_(path) {
@@ -88,8 +84,8 @@ void ElfFile::ReadBytes(std::uint64_t offset, void* to, std::size_t size, const 
   }
 }
 
-Elf64_Shdr ElfFile::FindSection(const std::string& name) const {
-  if (header_.e_shoff == 0 || header_.e_shnum == 0) RefuseAs(kNoTag);
+std::optional<Elf64_Shdr> ElfFile::FindSection(const std::string& name) const {
+  if (header_.e_shoff == 0 || header_.e_shnum == 0) return std::nullopt;
   if (header_.e_shentsize != sizeof(Elf64_Shdr) || header_.e_shstrndx >= header_.e_shnum) {
     RefuseAs("malformed: its table of sections");
   }
@@ -105,7 +101,7 @@ Elf64_Shdr ElfFile::FindSection(const std::string& name) const {
       return section;
     }
   }
-  RefuseAs(kNoTag);
+  return std::nullopt;
 }
 
 }  // namespace alidade::internal

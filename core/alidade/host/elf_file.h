@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,7 +21,6 @@ class ElfFile {
   ElfFile(const ElfFile&) = delete;
   ElfFile& operator=(const ElfFile&) = delete;
 
-  const std::filesystem::path& path() const { return path_; }
   const std::vector<Elf64_Phdr>& segments() const { return segments_; }
 
   /// `count` values of T from `offset` on. `what` is how messages name them.
@@ -31,8 +31,8 @@ class ElfFile {
     ReadBytes(offset, values.data(), values.size() * sizeof(T), what);
     return values;
   }
-  /// The first section of that name that has bytes in the file; refused where there is none.
-  Elf64_Shdr FindSection(const std::string& name) const;
+  /// The first section of that name that has bytes in the file.
+  std::optional<Elf64_Shdr> FindSection(const std::string& name) const;
   [[noreturn]] void RefuseAs(const std::string& why) const;
 
  private:

@@ -5,26 +5,21 @@
 #include <mutex>
 
 namespace alidade::internal {
-namespace {
 
 /// Blocks that nobody uses, for so long that a late call is likely to find them so.
-template <class Block>
-struct Idle {
+struct LentHost::Idle {
   std::mutex mutex;
   std::deque<Block*> blocks;
 };
 
-template <class Block>
-Idle<Block>& IdleBlocks() {
-  static auto& idle = *new Idle<Block>;  // plugins may call while the program ends
+LentHost::Idle& LentHost::IdleBlocks() {
+  static Idle& idle = *new Idle;  // plugins may call while the program ends
   return idle;
 }
 
-}  // namespace
-
 LentHost::Block* LentHost::Take() {
   constexpr std::size_t kKept = 64;
-  Idle<Block>& idle = IdleBlocks<Block>();
+  Idle& idle = IdleBlocks();
   const std::lock_guard lock(idle.mutex);
   if (idle.blocks.size() <= kKept) return new Block;
   Block* const oldest = idle.blocks.front();
@@ -43,7 +38,7 @@ LentHost::LentHost(void* reader) : block_(Take()) {
 
 LentHost::~LentHost() {
   block_->reader = nullptr;
-  Idle<Block>& idle = IdleBlocks<Block>();
+  Idle& idle = IdleBlocks();
   const std::lock_guard lock(idle.mutex);
   idle.blocks.push_back(block_);
 }

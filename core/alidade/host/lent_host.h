@@ -29,6 +29,8 @@ class LentHost {
     AlidadeHost host{};
     void* reader = nullptr;
   };
+  struct Idle;
+  static Idle& IdleBlocks();
   static Block* Take();
 
   Block* block_;

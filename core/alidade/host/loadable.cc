@@ -94,12 +94,11 @@ class Examination {
           segment.p_memsz >= kTop - segment.p_vaddr) {
         Fail("its segments overlap, or do not fit into memory");
       }
-      if (segment.p_align > 1 &&
-          (!IsPowerOfTwo(segment.p_align) || segment.p_align >= kTop ||
-           (segment.p_vaddr - segment.p_offset) % std::max(segment.p_align, kPage) != 0)) {
+      const std::uint64_t align = std::max<std::uint64_t>(segment.p_align, kPage);
+      if (!IsPowerOfTwo(align) || align >= kTop ||
+          (segment.p_vaddr - segment.p_offset) % align != 0) {
         Fail("a segment is not aligned");
       }
-      if ((segment.p_vaddr - segment.p_offset) % kPage != 0) Fail("a segment is not aligned");
       end = segment.p_vaddr + segment.p_memsz;
       loads_.push_back(&segment);
     }
@@ -250,8 +249,8 @@ class Examination {
 
   void CheckSymbols() {
     if (Need(DT_SYMENT, "size of symbols") != sizeof(Elf64_Sym)) Fail("size of symbols");
-    symbols_ = ReadAt<Elf64_Sym>(Need(DT_SYMTAB, "symbols"), symbol_count_, "symbols");
-    for (const Elf64_Sym& symbol : symbols_) {
+    const auto symbols = ReadAt<Elf64_Sym>(Need(DT_SYMTAB, "symbols"), symbol_count_, "symbols");
+    for (const Elf64_Sym& symbol : symbols) {
       CheckText(symbol.st_name);
       const auto type = ELF64_ST_TYPE(symbol.st_info);
       if (symbol.st_shndx == SHN_UNDEF || symbol.st_shndx == SHN_ABS || type == STT_TLS) continue;
@@ -384,7 +383,6 @@ class Examination {
   std::vector<std::uint64_t> names_;  ///< into texts_
   std::vector<char> texts_;
   std::uint64_t symbol_count_ = 0;
-  std::vector<Elf64_Sym> symbols_;
   std::map<Address, Address> relative_;  ///< what is written where, less the place of the library
 };
 

@@ -95,7 +95,7 @@ class Examination {
         Fail("its segments overlap, or do not fit into memory");
       }
       const std::uint64_t align = std::max<std::uint64_t>(segment.p_align, kPage);
-      if (!IsPowerOfTwo(align) || align >= kTop ||
+      if ((segment.p_align > 1 && !IsPowerOfTwo(segment.p_align)) || align >= kTop ||
           (segment.p_vaddr - segment.p_offset) % align != 0) {
         Fail("a segment is not aligned");
       }

@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 #include <signal.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -14,6 +15,7 @@
 #include <system_error>
 
 #include "alidade/base/error.h"
+#include "alidade/host/last_call.h"
 
 namespace alidade::cli {
 namespace {
@@ -28,29 +30,48 @@ extern "C" void HandleStop(int signal_number) {
 }
 
 constexpr char kCrashed[] =
-    "error: crashed, most likely inside a model, a source or an estimator of a plugin; `alidade "
-    "check "
-    "PLUGIN` finds what is wrong with a model\n";
-constexpr char kExited[] =
-    "error: a model, a source or an estimator of a plugin ended the process; `alidade check "
-    "PLUGIN` finds what "
-    "is wrong with a model\n";
+    "error: crashed, most likely inside a model, a source or an estimator of a plugin";
+constexpr char kExited[] = "error: a model, a source or an estimator of a plugin ended the process";
+constexpr char kRemedy[] = "; `alidade check PLUGIN` finds what is wrong with a model\n";
+
+/// The process whose end is looked at; 0: none yet. A child of it ends as it likes.
+std::atomic<pid_t> watched{0};
 
 /// Only calls that a signal handler may make.
-void Say(const char* text, std::size_t size) {
-  if (::write(STDERR_FILENO, text, size) < 0) return;
+void Say(const char* text) {
+  if (::write(STDERR_FILENO, text, std::strlen(text)) < 0) return;
+}
+
+/// What happened, and which model this thread called last.
+void SayWithCall(const char* what) {
+  char call[1024];
+  DescribeCall(detail::last_call, call, sizeof call);
+  Say(what);
+  if (*call != '\0') Say("; the last call of a model: ");
+  Say(call);
+  Say(kRemedy);
 }
 
 extern "C" void HandleCrash(int signal_number) {
-  Say(kCrashed, sizeof kCrashed - 1);
+  SayWithCall(kCrashed);
   ::signal(signal_number, SIG_DFL);
   ::raise(signal_number);
 }
 
+[[noreturn]] void ExitNow(int code) {
+  for (;;) ::syscall(SYS_exit_group, code);
+}
+
+/// The process is about to end with that code, which nobody asked for while it is watched.
+int CodeOfEnd(int code) {
+  if (finishing || watched.load() != ::getpid()) return code;
+  finishing = true;
+  SayWithCall(kExited);
+  return static_cast<int>(ExitCode::kPlugin);
+}
+
 extern "C" void HandleExit() {
-  if (finishing) return;
-  Say(kExited, sizeof kExited - 1);
-  ::_exit(static_cast<int>(ExitCode::kInternal));
+  if (const int code = CodeOfEnd(0); code != 0) ExitNow(code);
 }
 
 /// Writes all of it; false with errno where that fails.
@@ -197,6 +218,7 @@ void ReportCrashes() {
     const bool free = ::sigaction(crash, nullptr, &before) == 0 && before.sa_handler == SIG_DFL;
     if (free) ::sigaction(crash, &action, nullptr);  // else a sanitizer, say, has its own
   }
+  watched = ::getpid();
   std::atexit(HandleExit);
 }
 
@@ -215,3 +237,12 @@ bool StopRequested() { return stop_requested; }
 void FinishOnSignals() { finishing = true; }
 
 }  // namespace alidade::cli
+
+// In place of the C library's, for plugins too: of what ends the process at once, without the
+// handlers of atexit.
+extern "C" {
+[[noreturn, gnu::visibility("default")]] void _exit(int code) {
+  alidade::cli::ExitNow(alidade::cli::CodeOfEnd(code));
+}
+[[noreturn, gnu::visibility("default")]] void _Exit(int code) { _exit(code); }
+}

@@ -15,6 +15,7 @@
 #include "alidade/run/metric_rows.h"
 #include "command.h"
 #include "console.h"
+#include "watchdog.h"
 
 namespace alidade::cli {
 namespace {
@@ -36,6 +37,7 @@ struct RunArguments {
   std::optional<std::uint64_t> seed;
   bool force = false, quiet = false, no_figures = false, covariances = false, all = false;
   bool follow = false;
+  std::string frame_timeout = "60";  ///< s, or `none`
 };
 
 /// Events of one estimator and one kind.
@@ -129,7 +131,14 @@ ExitCode RunConfig(const RunArguments& arguments) {
   options.observers = {&recorder};
   Follower follower(Print);
   if (arguments.follow) options.observers.push_back(&follower);
-  options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
+  std::optional<double> limit_s;
+  if (arguments.frame_timeout != "none") limit_s = std::stod(arguments.frame_timeout);
+  Watchdog watchdog(limit_s, recorder);
+  options.observers.push_back(&watchdog);
+  options.progress = [&](std::int64_t done, std::int64_t total) {
+    watchdog.FrameDone();
+    progress.Show(done, total);
+  };
   options.stop = StopRequested;
   const RunResult result = WithWhatIsKept(recorder, [&] { return Run(experiment, options); });
   progress.Clear();
@@ -161,6 +170,14 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.add_flag("--follow", arguments->follow,
                    "print each estimate as it is made, a line of JSON, in place of the table");
+  command
+      .add_option("--frame-timeout", arguments->frame_timeout,
+                  "seconds that the estimators may take for one frame before the run ends, or "
+                  "none; a model that hangs is named")
+      ->check([](const std::string& text) {
+        return text == "none" ? std::string() : IsNumber(0.001, 1e9)(text);
+      })
+      ->capture_default_str();
   command.add_flag("--no-figures", arguments->no_figures, "draw no figures");
   command.add_flag("--covariances", arguments->covariances,
                    "write P of every estimate, for `alidade compare`");

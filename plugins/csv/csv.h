@@ -58,6 +58,7 @@ class CsvSource : public Source {
       if (used == frame.measurements.size()) frame.measurements.emplace_back();
       Measurement& measurement = frame.measurements[used];
       if (!ReadField(layout_.streams[i], measurement.values)) continue;
+      if (!ReadKnown(layout_.streams[i], measurement.known)) continue;
       if (layout_.streams[i].goes_blind && rows_ >= first_blind_row_) continue;
       measurement.timestamp = frame.timestamp;
       measurement.stream = static_cast<int>(i);
@@ -175,6 +176,16 @@ class CsvSource : public Source {
     }
     if (values.size() < field.columns.size()) values.clear();
     return !values.empty();
+  }
+
+  /// What comes with a measurement of the field; false where one of its cells says "missing".
+  bool ReadKnown(const CsvField& field, std::vector<double>& known) const {
+    known.clear();
+    for (const CsvColumn& column : field.known) {
+      if (Missing(cell::Trim(cells_[column.index]))) return false;
+      known.push_back(ReadNumber(column));
+    }
+    return true;
   }
 
   double ReadNumber(const CsvColumn& column) const {

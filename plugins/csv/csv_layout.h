@@ -24,6 +24,7 @@ struct CsvColumn {
 struct CsvField {
   StreamInfo info;
   std::vector<CsvColumn> columns;
+  std::vector<CsvColumn> known;  ///< taken as they are, with each measurement
   double gain = 1.0;
   bool reciprocal = false;
   bool goes_blind = false;  ///< dropped from `blind_after` on
@@ -45,8 +46,9 @@ inline constexpr const char* kCsvKeys =
     "path           file or pipe, from the folder of the config; '-' is standard input\n"
     "time           {column: t_s, unit: s}; unit s, ms, us or ns; default column t_s in s\n"
     "rate_hz        rows a second, where there is no column of time; the first is at 0\n"
-    "streams        stream: x, [x, y], or {columns: x, reciprocal: false, gain: 1}; x a column\n"
-    "truth          the same for truth values; may be left out\n"
+    "streams        stream: x, [x, y], or {columns: x, reciprocal: false, gain: 1, known: [a, b]}; "
+    "x a column, a and b those of numbers that its sensor takes as known\n"
+    "truth          the same for truth values, without known; may be left out\n"
     "separator      character between cells; default ','\n"
     "missing        cells that say there is no value; default [\"\"], the empty cell\n"
     "blind_after    share of the rows, in [0, 1], from which on streams are dropped; default 1\n"
@@ -54,7 +56,7 @@ inline constexpr const char* kCsvKeys =
 
 namespace csv_detail {
 
-inline CsvField ReadField(const std::string& name, const Node& node) {
+inline CsvField ReadField(const std::string& name, const Node& node, bool takes_known) {
   CsvField field;
   field.info.name = name;
   Node columns = node;
@@ -65,17 +67,22 @@ inline CsvField ReadField(const std::string& name, const Node& node) {
       field.gain = gain->Number();
       if (field.gain == 0.0) gain->Fail("0 leaves nothing of the column", "a number but 0");
     }
+    if (const auto known = takes_known ? node.Find("known") : std::nullopt) {
+      for (const Node& column : known->ItemsOrOne()) field.known.push_back({column.Text(), column});
+    }
     node.RejectUnread();
   }
   for (const Node& column : columns.ItemsOrOne()) field.columns.push_back({column.Text(), column});
   if (field.columns.empty()) columns.Fail("no columns", "the name of a column, or a list of names");
   field.info.size = static_cast<int>(field.columns.size());
+  field.info.known = static_cast<int>(field.known.size());
   return field;
 }
 
-inline std::vector<CsvField> ReadFields(const Node& map) {
+inline std::vector<CsvField> ReadFields(const Node& map, bool take_known) {
   std::vector<CsvField> fields;
-  for (const auto& [name, node] : map.Entries()) fields.push_back(ReadField(name, node));
+  for (const auto& [name, node] : map.Entries())
+    fields.push_back(ReadField(name, node, take_known));
   return fields;
 }
 
@@ -159,9 +166,9 @@ inline CsvLayout ReadCsvLayout(const Node& entry) {
     entry.Declare(key);
   }
   const Node streams = entry.At("streams", "csv");
-  layout.streams = csv_detail::ReadFields(streams);
+  layout.streams = csv_detail::ReadFields(streams, true);
   if (layout.streams.empty()) streams.Fail("no streams", "a map, as in 'disparity: disparity_px'");
-  if (const auto truth = entry.Find("truth")) layout.truths = csv_detail::ReadFields(*truth);
+  if (const auto truth = entry.Find("truth")) layout.truths = csv_detail::ReadFields(*truth, false);
   csv_detail::ReadTime(entry, layout);
   if (const auto separator = entry.Find("separator")) {
     layout.separator = csv_detail::ReadSeparator(*separator);
@@ -182,6 +189,7 @@ inline void ResolveColumns(const std::vector<std::string>& names, const std::str
   for (std::vector<CsvField>* fields : {&layout.streams, &layout.truths}) {
     for (CsvField& field : *fields) {
       for (CsvColumn& column : field.columns) csv_detail::Resolve(names, file, column);
+      for (CsvColumn& column : field.known) csv_detail::Resolve(names, file, column);
     }
   }
 }

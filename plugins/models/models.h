@@ -28,7 +28,8 @@ inline constexpr const char* kModelsKeys =
     "their mean\n"
     "initial               {ENTRY: {BLOCK: value}}: where the truth starts instead\n"
     "overrides             config of the truth, merged over that of the filters\n"
-    "sensors               {SENSOR: {rate_hz, missing, outliers: {share, sigma_scale}}}\n"
+    "sensors               {SENSOR: {rate_hz, missing, outliers: {share, sigma_scale}, known}}; "
+    "known: of a sensor that takes known numbers, a list of them for each measurement at one time\n"
     "inputs                {STATE_ENTRY: {mean, amplitude, frequency_hz}}: its control input\n"
     "landmarks             {count, box: {min, max}, max_per_frame}: points in the world, m";
 
@@ -258,7 +259,13 @@ class Models : public Source {
     for (std::size_t i = 0; i < system_.sensors.size(); ++i) {
       const SensorBinding& binding = system_.sensors[i];
       const auto own = settings ? settings->Find(binding.name) : std::nullopt;
-      const models::Schedule schedule = models::ReadSchedule(own, rate_hz, seed, 1001 + 2 * i);
+      const int known = binding.model.known_size();
+      if (known > 0 && !own) {
+        entry.At("sensors", "sensor '" + binding.name + "'")
+            .At(binding.name, "the known numbers of model '" + binding.model.name() + "'");
+      }
+      const models::Schedule schedule =
+          models::ReadSchedule(own, rate_hz, known, seed, 1001 + 2 * i);
       const auto taken = std::ranges::find(streams_, binding.stream, &StreamInfo::name);
       if (taken != streams_.end()) {
         const bool input = taken - streams_.begin() < inputs;
@@ -275,7 +282,8 @@ class Models : public Source {
       }
       sensors_.push_back({&binding, ModelOf(entry, binding), static_cast<int>(streams_.size()),
                           schedule, Random(seed, 1000 + 2 * i), max_per_frame});
-      streams_.push_back({binding.stream, binding.model.measurement().geometry.ambient});
+      streams_.push_back(
+          {binding.stream, binding.model.measurement().geometry.ambient, 0.0, known});
     }
     if (settings) settings->RejectUnread();
   }
@@ -378,18 +386,21 @@ class Models : public Source {
 
   void Measure(Sensor& sensor, Frame& frame) {
     if (!sensor.schedule.IsDue(index_)) return;
-    if (!sensor.model.has_landmark()) {
-      MeasureOne(sensor, -1, frame);
-      return;
-    }
-    int left = sensor.max_per_frame;
-    for (std::size_t id = 0; id < points_.size() && left > 0; ++id) {
-      left -= MeasureOne(sensor, static_cast<std::int64_t>(id), frame) ? 1 : 0;
+    for (const std::vector<double>& known : sensor.schedule.known) {
+      if (!sensor.model.has_landmark()) {
+        MeasureOne(sensor, -1, known, frame);
+        continue;
+      }
+      int left = sensor.max_per_frame;
+      for (std::size_t id = 0; id < points_.size() && left > 0; ++id) {
+        left -= MeasureOne(sensor, static_cast<std::int64_t>(id), known, frame) ? 1 : 0;
+      }
     }
   }
 
   /// Whether there is something to measure; what is missing counts.
-  bool MeasureOne(Sensor& sensor, std::int64_t landmark, Frame& frame) {
+  bool MeasureOne(Sensor& sensor, std::int64_t landmark, const std::vector<double>& known,
+                  Frame& frame) {
     const Geometry& geometry = sensor.model.measurement().geometry;
     std::vector<const double*> roles;
     for (const RoleBinding& role : sensor.binding->roles) {
@@ -406,20 +417,21 @@ class Models : public Source {
     Eigen::VectorXd n(m);
     for (double& value : n) value = sensor.noise.Normal();
     const auto fate = sensor.schedule.Draw();
-    if (sensor.model.Predict(roles.data(), z.data()) != Status::kOk ||
-        sensor.model.Valid(z.data()) != Status::kOk ||
-        sensor.model.SqrtNoise(roles.data(), z.data(), l.data()) != Status::kOk) {
+    if (sensor.model.Predict(roles.data(), z.data(), known.data()) != Status::kOk ||
+        sensor.model.Valid(z.data(), known.data()) != Status::kOk ||
+        sensor.model.SqrtNoise(roles.data(), z.data(), l.data(), known.data()) != Status::kOk) {
       return false;
     }
     const Eigen::VectorXd d = fate.sigma_scale * (l * n);
     geometry.Plus(z.data(), d.data(), z.data());
-    if (sensor.model.Valid(z.data()) != Status::kOk) return false;
+    if (sensor.model.Valid(z.data(), known.data()) != Status::kOk) return false;
     if (fate.missing) return true;
     Measurement& measurement = frame.measurements.emplace_back();
     measurement.timestamp = frame.timestamp;
     measurement.stream = sensor.stream;
     measurement.landmark = landmark;
     measurement.values = std::move(z);
+    measurement.known = known;
     return true;
   }
 

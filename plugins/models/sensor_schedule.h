@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "alidade/base/random.h"
 #include "alidade/config/config.h"
@@ -30,16 +32,27 @@ struct Schedule {
   }
 
   double per_step = 1.0;  ///< measurements to a time step, at most 1
+  /// Of each measurement at one time step, the known numbers that come with it: none of most.
+  std::vector<std::vector<double>> known;
   double missing = 0.0, outliers = 0.0, sigma_scale = 1.0;
   Random random;
 };
 
-/// Reads the entry of a sensor: `rate_hz`, `missing`, `outliers: {share, sigma_scale}`; none: one
-/// measurement at each of the `rate_hz` steps a second. Errors: kBadConfig.
-inline Schedule ReadSchedule(const std::optional<Node>& entry, double rate_hz, std::uint64_t seed,
-                             std::uint64_t stream) {
-  Schedule schedule{1.0, 0.0, 0.0, 1.0, Random(seed, stream)};
+/// Reads the entry of a sensor: `rate_hz`, `missing`, `outliers: {share, sigma_scale}`, and of one
+/// that takes `known_size` known numbers `known`, a list of such lists; none: one measurement at
+/// each of the `rate_hz` steps a second. Errors: kBadConfig.
+inline Schedule ReadSchedule(const std::optional<Node>& entry, double rate_hz, int known_size,
+                             std::uint64_t seed, std::uint64_t stream) {
+  Schedule schedule{1.0, {}, 0.0, 0.0, 1.0, Random(seed, stream)};
+  if (known_size == 0) schedule.known.emplace_back();
   if (!entry) return schedule;
+  if (known_size > 0) {
+    const Node known = entry->At("known", "a sensor that takes known numbers");
+    for (const Node& row : known.Items()) schedule.known.push_back(row.Numbers(known_size));
+    if (schedule.known.empty())
+      known.Fail("empty",
+                 "a list of " + std::to_string(known_size) + " numbers for each measurement");
+  }
   if (const auto own = entry->Find("rate_hz")) {
     schedule.per_step = own->Number(0.0, rate_hz, true) / rate_hz;
   }

@@ -18,7 +18,7 @@ class CrashCli : public ProgramTest {
     Write("rows.csv", "t_s,u,v\n0,1,1\n1,1,1\n");
   }
   /// Runs a model of tests/faults/plugins/bad_models.cc.
-  Outcome RunModel(const std::string& model) const {
+  void WriteConfig(const std::string& model) const {
     Write("bad.yaml", R"(alidade: 1
 plugins: [)" + kPlugin + R"(]
 state:
@@ -30,7 +30,12 @@ sensors:
 source: {type: csv, path: rows.csv, streams: {z: [u, v]}}
 estimators: {ekf: {type: ekf}}
 )");
-    return Call({"run", "bad.yaml", "-o", "out", "--no-figures"});
+  }
+  Outcome RunModel(const std::string& model, const std::vector<std::string>& options = {}) const {
+    WriteConfig(model);
+    std::vector<std::string> line{"run", "bad.yaml", "-o", "out", "--no-figures"};
+    line.insert(line.end(), options.begin(), options.end());
+    return Call(line);
   }
   const std::string kPlugin = ALIDADE_BINARY_DIR "/tests/plugins/bad_models.so";
 };
@@ -39,13 +44,84 @@ TEST_F(CrashCli, ACrashSaysWhereToLookAndTakesItsCourse) {
   const Outcome outcome = RunModel("crashes");
   EXPECT_EQ(outcome.signal, SIGSEGV);
   EXPECT_TRUE(outcome.err.starts_with("error: crashed, most likely inside a model")) << outcome.err;
+  EXPECT_TRUE(Contains(outcome.err, "the last call of a model: Predict of model 'crashes'"))
+      << outcome.err;
   EXPECT_TRUE(Contains(outcome.err, "`alidade check PLUGIN`")) << outcome.err;
 }
 
 TEST_F(CrashCli, AnExitOfAModelIsNoSuccess) {
-  const Outcome outcome = RunModel("exits");
-  EXPECT_EQ(outcome.code, 70) << outcome.out;
-  EXPECT_TRUE(Contains(outcome.err, "ended the process")) << outcome.err;
+  for (const char* model : {"exits", "exits_at_once"}) {
+    const Outcome outcome = RunModel(model);
+    EXPECT_EQ(outcome.code, 69) << outcome.out;
+    EXPECT_TRUE(Contains(outcome.err, "ended the process")) << outcome.err;
+    EXPECT_TRUE(Contains(outcome.err, "the last call of a model: Predict of model '" +
+                                          std::string(model) + "' of plugin " + kPlugin))
+        << outcome.err;
+  }
+}
+
+// FAULTS 67
+TEST_F(CrashCli, AModelThatHangsIsNamedAndWhatWasRecordedIsKept) {
+  const Outcome outcome = RunModel("hangs", {"--frame-timeout", "0.5"});
+  EXPECT_EQ(outcome.code, 69) << outcome.out;
+  EXPECT_TRUE(Contains(outcome.err, "error: the estimators work on the frame at t = 0.000000 s"))
+      << outcome.err;
+  EXPECT_TRUE(Contains(outcome.err,
+                       "for more than 0.5 s; the last call of a model: Predict of model "
+                       "'hangs' of plugin " +
+                           kPlugin + "; what was recorded is in "))
+      << outcome.err;
+  const std::size_t at = outcome.err.find("out.failed-");
+  ASSERT_NE(at, std::string::npos) << outcome.err;
+  const std::string kept = outcome.err.substr(at, outcome.err.find('\n', at) - at);
+  EXPECT_TRUE(Exists(kept + "/measurements.csv"));
+  EXPECT_FALSE(Exists("out"));
+  EXPECT_EQ(RunModel("right", {"--frame-timeout", "none"}).code, 0);
+}
+
+// FAULTS 58
+TEST_F(CrashCli, ASensorThatFailsIsLeftOutOnceOrAltogetherOrEndsTheRun) {
+  const auto policy = [&](const std::string& name) {
+    return RunModel("throws_in_noise",
+                    {"--set", "estimators.ekf.on_plugin_failure=" + name, "--force"});
+  };
+  EXPECT_EQ(policy("skip").code, 0);
+  const auto failures = [&] {
+    const std::string rows = Read("out/ekf/innovations.csv");
+    int count = 0;
+    for (std::size_t at = 0; (at = rows.find(",failed,", at)) != std::string::npos; ++at) ++count;
+    return count;
+  };
+  EXPECT_EQ(failures(), 2);
+  EXPECT_FALSE(Contains(Read("out/ekf/events.csv"), "sensor_disabled"));
+  EXPECT_EQ(policy("disable").code, 0);
+  EXPECT_EQ(failures(), 1);
+  EXPECT_TRUE(Contains(Read("out/ekf/events.csv"), "sensor 'bad' has failed; its stream 'z'"));
+  const Outcome ended = policy("abort");
+  EXPECT_EQ(ended.code, 69);
+  EXPECT_TRUE(Contains(ended.err,
+                       "error: estimator 'ekf' at t = 0.000000 s: sensor 'bad', model "
+                       "'throws_in_noise' of plugin " +
+                           kPlugin + ", failed: "))
+      << ended.err;
+}
+
+TEST_F(CrashCli, AStopDoesNotWaitForAModelThatHangs) {
+  WriteConfig("hangs");
+  const pid_t run =
+      Start({"run", "bad.yaml", "-o", "out", "--no-figures", "--frame-timeout", "none"});
+  const auto recording = [&] {
+    return Exists(".out.partial-" + std::to_string(run) + "/measurements.csv");
+  };
+  ASSERT_TRUE(Eventually(recording));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  ::kill(run, SIGTERM);
+  const Outcome outcome = Wait(run);
+  EXPECT_EQ(outcome.code, 75) << outcome.err;
+  EXPECT_TRUE(Contains(outcome.err, "asked to stop, but the estimators do not finish"))
+      << outcome.err;
+  EXPECT_TRUE(Contains(outcome.err, "Predict of model 'hangs'")) << outcome.err;
+  EXPECT_TRUE(Exists("out.failed-" + std::to_string(run))) << outcome.err;
 }
 
 TEST_F(CrashCli, ARunOfAGoodModelSaysNothing) {

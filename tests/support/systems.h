@@ -149,7 +149,8 @@ inline System WalkingOrientation() {
 inline std::vector<StreamInfo> StreamsOf(const System& system) {
   std::vector<StreamInfo> streams;
   for (const SensorBinding& sensor : system.sensors) {
-    streams.push_back({sensor.stream, sensor.model.measurement().geometry.ambient});
+    streams.push_back({sensor.stream, sensor.model.measurement().geometry.ambient, 0.0,
+                       sensor.model.known_size()});
   }
   return streams;
 }

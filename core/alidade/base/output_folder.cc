@@ -228,6 +228,13 @@ fs::path OutputFolder::failed() const {
   return target_.parent_path() / FailedName(target_, std::to_string(::getpid()));
 }
 
+bool OutputFolder::Abandon() const {
+  const fs::path name = failed();
+  if (name.empty()) return false;
+  MakeFailed(partial_, name);
+  return fs::exists(name);
+}
+
 fs::path OutputFolder::Sibling(const char* kind) const {
   return target_.parent_path() /
          ('.' + target_.filename().string() + '.' + kind + '-' + std::to_string(::getpid()));

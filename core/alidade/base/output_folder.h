@@ -40,6 +40,9 @@ class OutputFolder {
   void Keep();
   /// Where it then will be; "" where nothing is.
   std::filesystem::path failed() const;
+  /// Gives it the name failed() at once, as it is; false where that cannot be done. Of another
+  /// thread than the one that writes, which must not go on.
+  bool Abandon() const;
   /// Where the files are for now.
   const std::filesystem::path& partial() const { return partial_; }
   /// The path of `name` as messages give it: in the folder's place.

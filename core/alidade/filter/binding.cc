@@ -99,6 +99,7 @@ Binding::Binding(System of, const std::vector<StreamInfo>& from)
     for (std::size_t s = 0; s < streams.size(); ++s) {
       if (streams[s].name != system.sensors[i].stream) continue;
       ALIDADE_EXPECTS(streams[s].size == system.sensors[i].model.measurement().geometry.ambient);
+      ALIDADE_EXPECTS(streams[s].known == system.sensors[i].model.known_size());
       stream_of_sensor[i] = static_cast<int>(s);
     }
   }

@@ -71,7 +71,8 @@ Node ConsiderOf(const Node& state, const Block& block) {
 Node NodeOf(const Unsupported& asked, const Node& root, const System& system) {
   if (asked.block >= 0) {
     const Block& block = system.layout[asked.block];
-    const Node state = root.At("state").At(block.owner);
+    const auto entry = root.At("state").Find(block.owner);
+    const Node state = entry ? *entry : root.At("sensors").At(block.owner);  // which owns it
     if (block.status == BlockStatus::kConsider) return ConsiderOf(state, block);
     return state.At("initial").At(NameIn(block)).At("from_measurement");
   }

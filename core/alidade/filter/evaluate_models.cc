@@ -90,12 +90,14 @@ void RolesAt(const SensorBinding& sensor, const SensorPlace& place, const std::v
   }
 }
 
-Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place, const double* const* roles,
+Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place,
+                   const Measurement& measurement, const double* const* roles,
                    std::vector<double*>& columns, std::vector<double>& h,
                    std::vector<double>* jacobian) {
+  const double* const known = measurement.known.data();
   const Geometry& geometry = model.measurement().geometry;
   h.assign(static_cast<std::size_t>(geometry.ambient), kNotWritten);
-  if (jacobian == nullptr) return OutcomeOf(model.Predict(roles, h.data()));
+  if (jacobian == nullptr) return OutcomeOf(model.Predict(roles, h.data(), known));
   const int m = geometry.tangent;
   jacobian->assign(static_cast<std::size_t>(m) * static_cast<std::size_t>(place.width), 0.0);
   for (const JacobianPart& part : place.parts) {
@@ -107,7 +109,7 @@ Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place, const dou
   for (const int column : place.columns) {
     columns.push_back(column < 0 ? nullptr : jacobian->data() + column);
   }
-  return OutcomeOf(model.Linearise(roles, h.data(), columns.data(), place.strides.data()));
+  return OutcomeOf(model.Linearise(roles, h.data(), columns.data(), place.strides.data(), known));
 }
 
 Outcome NoiseAt(const SensorModel& model, const Measurement& measurement,
@@ -119,7 +121,8 @@ Outcome NoiseAt(const SensorModel& model, const Measurement& measurement,
   const auto m = static_cast<std::size_t>(model.measurement().geometry.tangent);
   r.resize(m * m);
   l.assign(m * m, kNotWritten);
-  const Outcome outcome = OutcomeOf(model.SqrtNoise(roles, measurement.values.data(), l.data()));
+  const Outcome outcome = OutcomeOf(
+      model.SqrtNoise(roles, measurement.values.data(), l.data(), measurement.known.data()));
   for (std::size_t i = 0; i < m; ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
       double sum = 0.0;
@@ -130,8 +133,9 @@ Outcome NoiseAt(const SensorModel& model, const Measurement& measurement,
   return outcome;
 }
 
-Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place, const double* z,
-                 const double* prior, std::vector<const double*>& roles, Inverse& inverse) {
+Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
+                 const Measurement& measurement, const double* prior,
+                 std::vector<const double*>& roles, Inverse& inverse) {
   const SensorModel& model = sensor.model;
   const auto first = static_cast<std::size_t>(model.initialised_role());
   const auto count = static_cast<std::size_t>(model.initialised_count());
@@ -161,9 +165,9 @@ Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place, const do
   inverse.y.assign(static_cast<std::size_t>(size), kNotWritten);
   inverse.by_z.setConstant(rows, model.measurement().geometry.tangent, kNotWritten);
   inverse.by_prior.setConstant(rows, model.prior_size(), kNotWritten);
-  const Status status =
-      model.Initialise(roles.data(), z, prior, inverse.y.data(), inverse.of_role.data(),
-                       inverse.by_z.data(), inverse.by_prior.data());
+  const Status status = model.Initialise(
+      roles.data(), measurement.values.data(), prior, inverse.y.data(), inverse.of_role.data(),
+      inverse.by_z.data(), inverse.by_prior.data(), measurement.known.data());
   if (status != Status::kOk) return OutcomeOf(status);
   inverse.by_x.resize(rows, columns);
   Eigen::Index column = 0;

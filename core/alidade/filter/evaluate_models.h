@@ -41,8 +41,10 @@ void TakeStep(const MotionBinding& motion, const StateLayout& layout, const doub
 void RolesAt(const SensorBinding& sensor, const SensorPlace& place, const std::vector<double>& x,
              const std::vector<double>& known, std::vector<const double*>& roles);
 
-/// h at the roles, ambient, and unless null H, m rows of the place's width. `columns` is memory.
-Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place, const double* const* roles,
+/// h of a measurement at the roles, ambient, and unless null H, m rows of the place's width.
+/// `columns` is memory.
+Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place,
+                   const Measurement& measurement, const double* const* roles,
                    std::vector<double*>& columns, std::vector<double>& h,
                    std::vector<double>* jacobian);
 
@@ -65,7 +67,8 @@ struct Inverse {
 };
 /// y and its Jacobians. Of `roles` those that the sensor initialises are y afterwards. `prior` may
 /// be null where the model needs none.
-Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place, const double* z,
-                 const double* prior, std::vector<const double*>& roles, Inverse& inverse);
+Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
+                 const Measurement& measurement, const double* prior,
+                 std::vector<const double*>& roles, Inverse& inverse);
 
 }  // namespace alidade::internal

@@ -17,11 +17,12 @@ Outcome NoiseAt(Row& row, const double* const* roles) {
 
 Outcome PredictAt(FilterState& f, const Row& row, const std::vector<double>& x, double* h) {
   std::fill_n(h, row.model->measurement().geometry.ambient, std::nan(""));
-  return OutcomeOf(row.model->Predict(RolesAt(f, row, x), h));
+  return OutcomeOf(row.model->Predict(RolesAt(f, row, x), h, row.measurement->known.data()));
 }
 
 Outcome LineariseAt(FilterState& f, Row& row, const double* const* roles) {
-  return EvaluateAt(*row.model, *row.place, roles, f.buffers.jacobians, row.report->h, &row.H);
+  return EvaluateAt(*row.model, *row.place, *row.measurement, roles, f.buffers.jacobians,
+                    row.report->h, &row.H);
 }
 
 void TakeInnovation(Row& row) {
@@ -42,7 +43,7 @@ void ChainJacobian(FilterState& f, Row& row, int column, int size, const double*
 Outcome Invert(FilterState& f, Row& row, const LandmarkOptions::Prior* prior, Inverse& inverse) {
   RolesAt(f, row, f.state.values());
   Outcome outcome =
-      InvertAt(*row.binding, *row.place, row.measurement->values.data(),
+      InvertAt(*row.binding, *row.place, *row.measurement,
                prior == nullptr ? nullptr : &prior->inverse_distance, f.buffers.roles, inverse);
   if (outcome == Outcome::kAccepted) outcome = NoiseAt(row, f.buffers.roles.data());
   if (outcome == Outcome::kFailed) NotePluginFailure(f, *row.binding);

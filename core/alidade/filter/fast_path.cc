@@ -312,7 +312,7 @@ bool FastPath::AddSensors() {
                                  !f_.first_estimates[static_cast<std::size_t>(role.block)].empty());
     });
     if (geometry.kind != GeometryKind::kVector || geometry.tangent > kMostOfOne || !place.whole ||
-        elsewhere || bound.loss.kind != LossKind::kNone ||
+        elsewhere || bound.model.known_size() > 0 || bound.loss.kind != LossKind::kNone ||
         std::ranges::count(place.consider, true) > 0) {
       return false;
     }

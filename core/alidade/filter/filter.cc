@@ -51,6 +51,13 @@ namespace {
                                         "'; the filter has " + internal::Join(known));
 }
 
+void CheckKnown(const std::string& what, int size, const std::vector<double>& known) {
+  if (std::ssize(known) == size) return;
+  throw Error(ExitCode::kBadData, what + " takes " + std::to_string(size) +
+                                      " known numbers with a measurement, not " +
+                                      std::to_string(known.size()));
+}
+
 void CheckReading(const std::vector<StreamInfo>& streams, const System& system,
                   const Reading& one) {
   if (one.stream < 0 || one.stream >= std::ssize(streams)) {
@@ -63,6 +70,7 @@ void CheckReading(const std::vector<StreamInfo>& streams, const System& system,
                                         std::to_string(stream.size) + " values at a time, not " +
                                         std::to_string(one.values.size()));
   }
+  CheckKnown("stream '" + stream.name + '\'', stream.known, one.known);
   for (const SensorBinding& sensor : system.sensors) {
     if (sensor.stream != stream.name) continue;
     const Geometry& geometry = sensor.model.measurement().geometry;
@@ -105,7 +113,8 @@ const UpdateReport& Filter::Push(Timestamp timestamp, const std::vector<Reading>
   frame.timestamp = timestamp;
   for (const Reading& one : readings) {
     CheckReading(loop_->f.binding->streams, system(), one);
-    frame.measurements.push_back({timestamp, one.stream, one.landmark, one.values, one.covariance});
+    frame.measurements.push_back(
+        {timestamp, one.stream, one.landmark, one.values, one.covariance, one.known});
   }
   return Process(frame);
 }
@@ -117,16 +126,19 @@ State Filter::At(Timestamp timestamp) const {
 }
 
 std::optional<Prediction> Filter::Expect(std::string_view sensor, Timestamp timestamp,
-                                         std::int64_t landmark) const {
+                                         std::int64_t landmark,
+                                         const std::vector<double>& known) const {
   const int index = system().FindSensor(sensor);
   if (index < 0) {
     std::vector<std::string> known;
     for (const SensorBinding& one : system().sensors) known.push_back(one.name);
     RefuseName("sensor", sensor, known);
   }
+  CheckKnown("sensor '" + std::string(sensor) + '\'',
+             system().sensors[static_cast<std::size_t>(index)].model.known_size(), known);
   FrameLoop later(*loop_);
   later.GoTo(timestamp);
-  return later.Expect(index, landmark);
+  return later.Expect(index, landmark, known);
 }
 
 }  // namespace alidade

@@ -22,6 +22,7 @@ struct Reading {
   std::vector<double> values;
   std::int64_t landmark = -1;
   std::vector<double> covariance = {};  ///< row-major, overrides the model's noise; empty: none
+  std::vector<double> known = {};       ///< as many as its sensors take; mostly none
 };
 
 /// What a sensor would measure.
@@ -81,19 +82,21 @@ class Filter : public Estimator {
   /// Id of a block of the system, `owner.block`. Error kBadConfig where there is none.
   BlockId block(std::string_view name) const;
   /// Process, of what came at one timestamp. The report is good until the next call. Errors, and
-  /// nothing has changed: kBadData for a stream that is not there, values or a covariance of
-  /// another size than its sensors measure, or a quaternion or direction whose length is off by
-  /// more than 1e-3.
+  /// nothing has changed: kBadData for a stream that is not there, values, a covariance or known
+  /// numbers of another size than its sensors take, or a quaternion or direction whose length is
+  /// off by more than 1e-3.
   const UpdateReport& Push(Timestamp timestamp, const std::vector<Reading>& readings);
   /// The state at `timestamp`, not before timestamp(), as a frame without measurements would leave
   /// it. Nothing is committed. Where it cannot be stepped to, it is that of the last step that can.
   State At(Timestamp timestamp) const;
   /// What the sensor of that name will measure at `timestamp`, of the landmark of that id where it
-  /// measures landmarks. Nothing where h is not defined or not finite there, S is not positive
-  /// definite, or a block or the landmark has no value yet. Error kBadConfig where there is no such
-  /// sensor.
+  /// measures landmarks, with `known` where it takes known numbers. Nothing where h is not defined
+  /// or not finite there, S is not positive definite, or a block or the landmark has no value yet.
+  /// Errors: kBadConfig where there is no such sensor, kBadData where it takes another number of
+  /// known numbers.
   std::optional<Prediction> Expect(std::string_view sensor, Timestamp timestamp,
-                                   std::int64_t landmark = -1) const;
+                                   std::int64_t landmark = -1,
+                                   const std::vector<double>& known = {}) const;
 
  protected:
   /// @cond

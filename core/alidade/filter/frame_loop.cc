@@ -165,10 +165,12 @@ void FrameLoop::GoTo(Timestamp timestamp) {
   Process(frame);
 }
 
-std::optional<Prediction> FrameLoop::Expect(int sensor, std::int64_t landmark) {
+std::optional<Prediction> FrameLoop::Expect(int sensor, std::int64_t landmark,
+                                            const std::vector<double>& known) {
   if (f.said.ended || f.report.stale) return std::nullopt;
   Measurement one;
   one.landmark = landmark;
+  one.known = known;
   const Geometry& geometry =
       f.binding->system.sensors[static_cast<std::size_t>(sensor)].model.measurement().geometry;
   one.values.resize(static_cast<std::size_t>(geometry.ambient));

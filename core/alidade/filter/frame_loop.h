@@ -45,7 +45,8 @@ class FrameLoop {
   /// The same of a frame without measurements.
   void GoTo(Timestamp timestamp);
   /// What the sensor, an index into System::sensors, would measure now; as Filter::Expect.
-  std::optional<Prediction> Expect(int sensor, std::int64_t landmark);
+  std::optional<Prediction> Expect(int sensor, std::int64_t landmark,
+                                   const std::vector<double>& known);
 
   FilterState f;
   AnyMethod method;

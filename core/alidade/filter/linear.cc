@@ -56,7 +56,7 @@ Outcome Linear::LineariseAtState(FilterState& f, Row& row) {
   if (outcome == Outcome::kOutOfDomain || outcome == Outcome::kFailed) entry.h.clear();
   if (outcome == Outcome::kAccepted) outcome = NoiseAt(row, roles);
   if (outcome != Outcome::kAccepted) return outcome;
-  if (geometry.kind == GeometryKind::kAngle) geometry.Normalise(entry.h.data());
+  geometry.WrapAngles(entry.h.data());
   TakeInnovation(row);
   return outcome;
 }
@@ -91,8 +91,8 @@ Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
   Outcome outcome = PredictAt(f, row, f.state.values(), entry.h.data());
   if (outcome != Outcome::kAccepted) return outcome;
   if (!implied_.empty()) {
-    const Status status =
-        model.Initialise(f.buffers.roles.data(), entry.z.data(), implied_.data(), nullptr, nullptr);
+    const Status status = model.Initialise(f.buffers.roles.data(), entry.z.data(), implied_.data(),
+                                           nullptr, nullptr, row.measurement->known.data());
     // What z cannot have come from tells nothing of where to linearise.
     outcome = status == Status::kOutOfDomain ? Outcome::kInvalid : OutcomeOf(status);
     if (outcome != Outcome::kAccepted) return outcome;

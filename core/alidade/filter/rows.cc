@@ -36,6 +36,7 @@ Row& Rows::Add(const Measurement& measurement, int sensor, const Binding& bindin
   const SensorBinding& bound = binding.system.sensors[index];
   const Geometry& geometry = bound.model.measurement().geometry;
   ALIDADE_EXPECTS(std::ssize(measurement.values) == geometry.ambient);
+  ALIDADE_EXPECTS(std::ssize(measurement.known) == bound.model.known_size());
   ALIDADE_EXPECTS(measurement.covariance.empty() ||
                   std::ssize(measurement.covariance) == geometry.tangent * geometry.tangent);
   if (count_ == rows_.size()) rows_.emplace_back();
@@ -55,13 +56,15 @@ Row& Rows::Add(const Measurement& measurement, int sensor, const Binding& bindin
 Outcome Rows::OutcomeOf(const Row& row) {
   constexpr double kRounding = 1e-12;
   const Measurement& m = *row.measurement;
-  if (!AllFinite(m.values) || !AllFinite(m.covariance)) return Outcome::kNotFinite;
+  if (!AllFinite(m.values) || !AllFinite(m.covariance) || !AllFinite(m.known)) {
+    return Outcome::kNotFinite;
+  }
   if (!m.covariance.empty()) {
     const int size = row.model->measurement().geometry.tangent;
     const Eigen::Map<const Eigen::MatrixXd> r(m.covariance.data(), size, size);
     if (SquareRootOf(r, ldlt_, root_) < -kRounding) return Outcome::kInvalid;
   }
-  return alidade::OutcomeOf(row.model->Valid(m.values.data()));
+  return alidade::OutcomeOf(row.model->Valid(m.values.data(), m.known.data()));
 }
 
 /// References into the report end with each entry that is added.

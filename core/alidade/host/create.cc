@@ -4,6 +4,7 @@
 #include <iterator>
 #include <sstream>
 
+#include "alidade/base/words.h"
 #include "alidade/host/abi_read.h"
 #include "alidade/host/cpp_plugin.h"
 #include "alidade/host/param_reader.h"
@@ -51,12 +52,12 @@ std::string Named(PluginEntry::Kind kind, const std::string& name) {
 
 std::string Line(const std::string& what, const Space& space) {
   std::string line = what + ' ' + space.name + ": " + ToString(space.geometry);
+  if (!space.parts.empty()) line += " of " + internal::Join(space.parts);
   if (!space.unit.empty()) line += ", " + space.unit;
   if (!space.doc.empty()) line += "; " + space.doc;
   if (space.optional()) line += " (optional)";
   if (space.landmark()) line += " (of a landmark)";
-  if ((space.flags & ALIDADE_ROLE_OWNED) != 0)
-    line += " (model parameter state: constant, unless it has an initial value)";
+  if ((space.flags & ALIDADE_ROLE_OWNED) != 0) line += " (model parameter state)";
   return line;
 }
 
@@ -246,6 +247,9 @@ std::vector<std::string> PluginHost::Describe(const PluginEntry& entry) const {
   for (const Space& space : model.spaces()) lines.push_back(Line(sensor ? "role" : "block", space));
   if (!model.space().name.empty()) {
     lines.push_back(Line(sensor ? "measurement" : "input", model.space()));
+  }
+  if (!model.known().name.empty()) {
+    lines.push_back(Line("known with each measurement", model.known()));
   }
   std::ranges::copy(Capabilities(model), std::back_inserter(lines));
   return lines;

@@ -2,11 +2,14 @@
 #include "alidade/host/model_instance.h"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <utility>
 
+#include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/host/abi_read.h"
+#include "alidade/host/instances.h"
 
 namespace alidade {
 namespace {
@@ -17,12 +20,25 @@ using internal::Text;
 constexpr int kMaxSize = ALIDADE_MAX_SIZE;
 constexpr std::uint32_t kKnownRoleFlags = ALIDADE_ROLE_OPTIONAL | ALIDADE_ROLE_OWNED |
                                           ALIDADE_ROLE_LANDMARK | ALIDADE_ROLE_SHARED |
-                                          ALIDADE_ROLE_TIME_OFFSET | ALIDADE_ROLE_CLONE;
+                                          ALIDADE_ROLE_CLONE;
 constexpr std::uint32_t kKnownCapabilities = ALIDADE_CAN_INITIALISE | ALIDADE_HAS_VALIDITY |
                                              ALIDADE_RESIDUAL_ONLY | ALIDADE_NEEDS_PAYLOAD |
                                              ALIDADE_DISCRETE_NOISE;
 constexpr const char* kUnsupported = ", which this version does not support";
 constexpr const char* kReserved = "uses reserved members";
+
+AlidadeSpace PartOf(const AlidadeSpace& space, std::size_t i) {
+  return internal::ReadEntry(space.parts, space.part_stride, i);
+}
+
+Geometry GeometryOf(const AlidadeSpace& space) {
+  if (space.geometry != ALIDADE_PRODUCT) {
+    return {static_cast<GeometryKind>(space.geometry), space.ambient, space.tangent};
+  }
+  std::vector<Geometry> parts;
+  for (std::size_t i = 0; i < space.part_count; ++i) parts.push_back(GeometryOf(PartOf(space, i)));
+  return Geometry::Product(std::move(parts));
+}
 
 /// Whether the sizes are those of a geometry that this version knows.
 bool KnownGeometry(const AlidadeSpace& space) {
@@ -38,6 +54,8 @@ bool KnownGeometry(const AlidadeSpace& space) {
       return is(Geometry::UnitQuaternion());
     case ALIDADE_UNIT_VECTOR:
       return is(Geometry::UnitVector());
+    case ALIDADE_PRODUCT:
+      return space.ambient <= kMaxSize && is(GeometryOf(space));
     default:
       return false;
   }
@@ -66,6 +84,34 @@ std::vector<std::string> DefaultElements(const AlidadeSpace& space) {
 }
 
 /// What is wrong with `space`, or "".
+std::string Defect(const AlidadeSpace& space);
+
+/// The same of the parts of one.
+std::string DefectOfParts(const AlidadeSpace& space) {
+  const bool is_product = space.geometry == ALIDADE_PRODUCT;
+  if (!is_product && (space.parts != nullptr || space.part_count != 0)) {
+    return "has parts, but is no product";
+  }
+  if (!is_product) return {};
+  if (space.parts == nullptr || space.part_count < 1 || space.part_count > ALIDADE_MAX_ROLES ||
+      !internal::GoodStride<AlidadeSpace>(space.part_stride)) {
+    return "does not describe the parts of its product";
+  }
+  if (!Text(space.elements).empty()) return "names its elements, which are those of its parts";
+  for (std::size_t i = 0; i < space.part_count; ++i) {
+    const AlidadeSpace part = PartOf(space, i);
+    const std::string which = "has a part '" + Text(part.name) + "' that ";
+    if (part.geometry == ALIDADE_PRODUCT) return which + "is a product";
+    if (part.flags != 0) return which + "has flags";
+    const std::string defect = Defect(part);
+    if (!defect.empty()) return which + defect;
+    for (std::size_t j = 0; j < i; ++j) {
+      if (Text(PartOf(space, j).name) == Text(part.name)) return "has two parts of one name";
+    }
+  }
+  return {};
+}
+
 std::string Defect(const AlidadeSpace& space) {
   if (Text(space.name).empty()) return "has no name";
   if (!internal::GoodName(space.name)) return "has a name that is none";
@@ -78,6 +124,7 @@ std::string Defect(const AlidadeSpace& space) {
   const std::string unknown = internal::UnknownBits(space.flags, kKnownRoleFlags);
   if (!unknown.empty()) return "has flags that this version does not know: " + unknown;
   if (space.reserved0 != 0 || !internal::AllZero(space.reserved)) return kReserved;
+  if (std::string defect = DefectOfParts(space); !defect.empty()) return defect;
   if (!KnownGeometry(space)) {
     return "has geometry " + std::to_string(space.geometry) + " with sizes " +
            std::to_string(space.ambient) + " and " + std::to_string(space.tangent) +
@@ -90,14 +137,11 @@ std::string Defect(const AlidadeSpace& space) {
   if ((space.flags & ALIDADE_ROLE_SHARED) != 0 && (space.flags & ALIDADE_ROLE_LANDMARK) == 0) {
     return "is shared, but not a landmark's";
   }
-  if ((space.flags & ALIDADE_ROLE_TIME_OFFSET) != 0) {
-    return std::string("is a time offset") + kUnsupported;
-  }
   if ((space.flags & ALIDADE_ROLE_CLONE) != 0) {
     return std::string("is of an earlier timestamp") + kUnsupported;
   }
-  if (space.owned != nullptr) {
-    return std::string("has a prior and dynamics of its own") + kUnsupported;
+  if (space.owned != nullptr && (space.flags & ALIDADE_ROLE_OWNED) == 0) {
+    return "has a prior and dynamics, but is no state of its model";
   }
   return {};
 }
@@ -108,9 +152,17 @@ Space ToSpace(const AlidadeSpace& from) {
   space.unit = Text(from.unit);
   space.doc = Text(from.doc);
   const std::string elements = Text(from.elements);
-  space.elements = elements.empty() ? DefaultElements(from) : SplitAtCommas(elements);
-  space.geometry = {static_cast<GeometryKind>(from.geometry), from.ambient, from.tangent};
+  space.geometry = GeometryOf(from);
   space.flags = from.flags;
+  if (from.geometry != ALIDADE_PRODUCT) {
+    space.elements = elements.empty() ? DefaultElements(from) : SplitAtCommas(elements);
+    return space;
+  }
+  for (std::size_t i = 0; i < from.part_count; ++i) {
+    const Space part = ToSpace(PartOf(from, i));
+    space.parts.push_back(part.name);
+    for (const std::string& name : ColumnNames(part.name, part)) space.elements.push_back(name);
+  }
   return space;
 }
 
@@ -126,9 +178,13 @@ ModelInstance::ModelInstance(const AlidadeInstance& instance, std::string name, 
   ReadCalls();
   ReadDescription();
   static_cast<void>(until_checked.release());
+  internal::AddInstance(*this);
 }
 
-ModelInstance::~ModelInstance() { instance_.destroy(instance_.self); }
+ModelInstance::~ModelInstance() {
+  internal::DropInstance(*this);
+  instance_.destroy(instance_.self);
+}
 
 void ModelInstance::Refuse(const std::string& why) const {
   throw Error(ExitCode::kPlugin, ErrorLine({plugin_}, {}, "model '" + name_ + "' " + why));
@@ -162,8 +218,15 @@ void ModelInstance::ReadDescription() {
   if (is_sensor) {
     if (description_.output == nullptr) Refuse("does not describe its measurement");
     space_ = ReadSpace(ReadPrefix(description_.output), "the measurement");
+    if (description_.known != nullptr) {
+      known_ = ReadSpace(ReadPrefix(description_.known), "what comes with a measurement");
+      if (known_.geometry.kind != GeometryKind::kVector) {
+        Refuse(": what comes with a measurement is no vector");
+      }
+    }
   } else if (has_input()) {
     space_ = ReadSpace(ReadPrefix(description_.inputs), "the control input");
+    if (space_.geometry.kind == GeometryKind::kProduct) Refuse(": the control input is a product");
   }
   const int y = description_.initialise_role;
   if (is_sensor && (capabilities_ & ALIDADE_CAN_INITIALISE) != 0 &&
@@ -191,9 +254,6 @@ void ModelInstance::CheckSupported() const {
     Refuse(std::string("needs what comes beside a measurement") + kUnsupported);
   }
   if (is_sensor) {
-    if (description_.known != nullptr) {
-      Refuse(std::string("needs known numbers with each measurement") + kUnsupported);
-    }
     if (sensor_.eval == nullptr || sensor_.sqrt_noise == nullptr) {
       Refuse("lacks a function that every sensor must have: eval, sqrt_noise");
     }
@@ -217,9 +277,11 @@ void ModelInstance::ReadRoles() {
   for (int i = 0; i < count; ++i) {
     const auto role = internal::ReadEntry(description_.roles, description_.role_stride, i);
     spaces_.push_back(ReadSpace(role, "role '" + Text(role.name) + "'"));
-    if (instance_.kind == ALIDADE_KIND_SENSOR && (role.flags & ALIDADE_ROLE_OWNED) != 0) {
-      Refuse(": role '" + spaces_.back().name + "' is a model parameter state of the sensor" +
-             kUnsupported);
+    if (role.owned != nullptr) {
+      ReadOwned(ReadPrefix(role.owned), spaces_.back(), static_cast<std::size_t>(i));
+    }
+    if (role.geometry == ALIDADE_PRODUCT) {
+      Refuse(": role '" + spaces_.back().name + "' is a product: each part is a role of its own");
     }
     tangents_.push_back(role.tangent);
     const auto same = [&](const Space& other) { return other.name == spaces_.back().name; };
@@ -227,6 +289,44 @@ void ModelInstance::ReadRoles() {
       Refuse("has two roles named '" + spaces_.back().name + "'");
     }
   }
+}
+
+void ModelInstance::ReadOwned(const AlidadeOwned& owned, const Space& role, std::size_t index) {
+  const std::string what = ": the prior or dynamics of role '" + role.name + "' ";
+  if (instance_.kind != ALIDADE_KIND_SENSOR) Refuse(what + "are a motion model's own affair");
+  if (role.landmark()) Refuse(what + "are those of a landmark");
+  if (!internal::AllZero(owned.reserved)) Refuse(kReserved);
+  if (owned.dynamics > ALIDADE_GAUSS_MARKOV) {
+    Refuse(what + "are of kind " + std::to_string(owned.dynamics));
+  }
+  const bool returns = owned.dynamics == ALIDADE_GAUSS_MARKOV;
+  const auto n = static_cast<std::size_t>(role.geometry.tangent);
+  const auto read = [](const double* from, std::size_t size) {
+    return from == nullptr ? std::vector<double>() : std::vector<double>(from, from + size);
+  };
+  OwnedRole known{read(owned.mean, static_cast<std::size_t>(role.geometry.ambient)),
+                  read(owned.sqrt_prior, n * n), static_cast<OwnedDynamics>(owned.dynamics),
+                  read(owned.sqrt_density, n * n), returns ? owned.time_constant_s : 0.0};
+  if (known.mean.empty()) known.mean = this->owned(index).mean;
+  const bool finite = internal::AllFinite(known.mean) && internal::AllFinite(known.sqrt_prior) &&
+                      internal::AllFinite(known.sqrt_density) &&
+                      std::isfinite(known.time_constant_s);
+  if (!finite) Refuse(what + "are not finite");
+  if (role.geometry.Defect(known.mean.data()) > kUnitTolerance) {
+    Refuse(what + "have a mean that is not of unit length");
+  }
+  if (returns && !(known.time_constant_s > 0.0))
+    Refuse(what + "have a time constant of 0 s or less");
+  owned_[index] = std::move(known);
+}
+
+OwnedRole ModelInstance::owned(std::size_t role) const {
+  if (const auto found = owned_.find(role); found != owned_.end()) return found->second;
+  OwnedRole neutral;
+  const Geometry& geometry = spaces_[role].geometry;
+  neutral.mean.resize(static_cast<std::size_t>(geometry.ambient));
+  geometry.Identity(neutral.mean.data());
+  return neutral;
 }
 
 Space ModelInstance::ReadSpace(const AlidadeSpace& space, const std::string& what) const {
@@ -242,6 +342,7 @@ std::string ModelInstance::error_text() const {
 SensorModel::SensorModel(std::shared_ptr<const ModelInstance> instance)
     : instance_(std::move(instance)), sensor_(instance_->c().sensor), self_(instance_->c().self) {
   ALIDADE_EXPECTS(instance_->c().kind == ALIDADE_KIND_SENSOR);
+  if (!known().name.empty()) known_size_ = known().geometry.ambient;
   if ((instance_->capabilities() & ALIDADE_CAN_INITIALISE) != 0) {
     const AlidadeDescription& description = *instance_->c().description;
     initialised_role_ = description.initialise_role;
@@ -259,10 +360,20 @@ bool SensorModel::has_landmark() const {
   return std::any_of(roles().begin(), roles().end(), [](const Space& r) { return r.landmark(); });
 }
 
+Status SensorModel::LineariseKnowing(const double* const* roles, double* z,
+                                     double* const* jacobians, const int* strides,
+                                     const double* known) const {
+  ALIDADE_EXPECTS(known != nullptr);
+  const AlidadeObservation seen = detail::Seen(nullptr, known);
+  return detail::ToStatus(sensor_->eval(self_, &seen, roles, z, jacobians, strides));
+}
+
 Status SensorModel::Initialise(const double* const* roles, const double* z, const double* prior,
-                               double* y, double* const* jx, double* jz, double* jp) const {
+                               double* y, double* const* jx, double* jz, double* jp,
+                               const double* known) const {
   ALIDADE_EXPECTS(initialised_role_ >= 0);
-  const AlidadeObservation seen = detail::Seen(z);
+  const AlidadeObservation seen = detail::Seen(z, known);
+  detail::last_call = &sensor_->initialise;
   return detail::ToStatus(sensor_->initialise(self_, &seen, roles, prior, y, jx,
                                               instance_->tangents().data(), jz,
                                               measurement().geometry.tangent, jp, prior_size_));

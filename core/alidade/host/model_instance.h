@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "alidade/host/last_call.h"
 #include "alidade/model/plugin_abi.h"
 #include "alidade/model/status.h"
 #include "alidade/state/manifold.h"
@@ -17,15 +19,33 @@ namespace detail {
 inline Status ToStatus(std::int32_t code) {
   return code < ALIDADE_OK || code > ALIDADE_ERROR ? Status::kError : static_cast<Status>(code);
 }
-/// A measurement as its sensor is shown it; null: a prediction alone is asked for.
-constexpr AlidadeObservation Seen(const double* z) {
+/// A measurement as its sensor is shown it, with the known numbers of a sensor that takes any; null:
+/// a prediction alone is asked for.
+constexpr AlidadeObservation Seen(const double* z, const double* known = nullptr) {
   AlidadeObservation seen{};
   seen.struct_size = sizeof(seen);
   seen.z = z;
+  seen.known = known;
   return seen;
 }
 inline constexpr AlidadeObservation kUnseen = Seen(nullptr);
 }  // namespace detail
+
+/// How a state that its sensor owns moves.
+enum class OwnedDynamics : std::uint32_t {
+  kConstant = ALIDADE_STAYS,
+  kRandomWalk = ALIDADE_RANDOM_WALK,
+  kGaussMarkov = ALIDADE_GAUSS_MARKOV,
+};
+
+/// Prior and dynamics of a role that is a state of its sensor, n: its tangent size.
+struct OwnedRole {
+  std::vector<double> mean;        ///< ambient
+  std::vector<double> sqrt_prior;  ///< L of P = L L', n x n row-major; empty: known exactly
+  OwnedDynamics dynamics = OwnedDynamics::kConstant;
+  std::vector<double> sqrt_density;  ///< L of the driving noise, per sqrt(s); empty: none
+  double time_constant_s = 0.0;      ///< of a Gauss-Markov process
+};
 
 /// The most roles of a sensor, and blocks of a motion model.
 inline constexpr int kMaxRoles = ALIDADE_MAX_ROLES;
@@ -45,8 +65,12 @@ class ModelInstance {
   const std::string& plugin() const { return plugin_; }
   const std::vector<Space>& spaces() const { return spaces_; }             ///< roles, or blocks
   const std::vector<std::int32_t>& tangents() const { return tangents_; }  ///< of the spaces
+  /// Of a role with ALIDADE_ROLE_OWNED: the model's own, or constant at the neutral element.
+  OwnedRole owned(std::size_t role) const;
   /// The measurement of a sensor, the control input of a motion model (empty name: none).
   const Space& space() const { return space_; }
+  /// What comes with each measurement and is no state (empty name: nothing).
+  const Space& known() const { return known_; }
   bool has_input() const { return description_.input_count > 0; }
   unsigned capabilities() const { return capabilities_; }
   std::string error_text() const;
@@ -56,6 +80,7 @@ class ModelInstance {
   void ReadDescription();
   void CheckSupported() const;
   void ReadRoles();
+  void ReadOwned(const AlidadeOwned& owned, const Space& role, std::size_t index);
   Space ReadSpace(const AlidadeSpace& space, const std::string& what) const;
   [[noreturn]] void Refuse(const std::string& why) const;
 
@@ -66,11 +91,13 @@ class ModelInstance {
   std::string name_, plugin_;
   std::vector<Space> spaces_;
   std::vector<std::int32_t> tangents_;
-  Space space_;
+  std::map<std::size_t, OwnedRole> owned_;  ///< by role, where the model says
+  Space space_, known_;
   unsigned capabilities_ = 0;
 };
 
-/// A sensor z = h(roles) + n behind the plugin ABI. Cheap to copy; calls as in plugin_abi.h.
+/// A sensor z = h(roles) + n behind the plugin ABI. Cheap to copy; calls as in plugin_abi.h. `known`
+/// is what came with the measurement, of a sensor that takes known numbers; null of others.
 class SensorModel {
  public:
   explicit SensorModel(std::shared_ptr<const ModelInstance> instance);
@@ -87,45 +114,60 @@ class SensorModel {
   int prior_size() const { return prior_size_; }
   /// Whether its roles are filled by the landmark that a measurement names.
   bool has_landmark() const;
+  /// The known numbers of a measurement, and how many.
+  const Space& known() const { return instance_->known(); }
+  int known_size() const { return known_size_; }
 
   /// z = h(roles), ambient values; kOutOfDomain where h is not defined.
-  Status Predict(const double* const* roles, double* z) const {
-    return detail::ToStatus(sensor_->eval(self_, &detail::kUnseen, roles, z, nullptr, nullptr));
+  Status Predict(const double* const* roles, double* z, const double* known = nullptr) const {
+    return Linearise(roles, z, nullptr, nullptr, known);
   }
   /// z and jacobians[i] = dz/d role_i, row stride strides[i]; a null jacobian is skipped.
   Status Linearise(const double* const* roles, double* z, double* const* jacobians,
-                   const int* strides) const {
+                   const int* strides, const double* known = nullptr) const {
+    detail::last_call = &sensor_->eval;
+    if (known_size_ > 0) return LineariseKnowing(roles, z, jacobians, strides, known);
     return detail::ToStatus(sensor_->eval(self_, &detail::kUnseen, roles, z, jacobians, strides));
   }
   /// l, row-major m x m, with R = l l'.
-  Status SqrtNoise(const double* const* roles, const double* z, double* l) const {
-    return SqrtNoise(roles, detail::Seen(z), l);
+  Status SqrtNoise(const double* const* roles, const double* z, double* l,
+                   const double* known = nullptr) const {
+    return SqrtNoise(roles, detail::Seen(z, known), l);
   }
   /// The same of a measurement as it is shown to the plugin, which takes as long to make as a call.
   Status SqrtNoise(const double* const* roles, const AlidadeObservation& seen, double* l) const {
+    detail::last_call = &sensor_->sqrt_noise;
     return detail::ToStatus(
         sensor_->sqrt_noise(self_, &seen, roles, l, measurement().geometry.tangent));
   }
-  Status Valid(const double* z) const { return Valid(detail::Seen(z)); }
+  Status Valid(const double* z, const double* known = nullptr) const {
+    return Valid(detail::Seen(z, known));
+  }
   Status Valid(const AlidadeObservation& seen) const {
-    return sensor_->valid == nullptr ? Status::kOk : detail::ToStatus(sensor_->valid(self_, &seen));
+    if (sensor_->valid == nullptr) return Status::kOk;
+    detail::last_call = &sensor_->valid;
+    return detail::ToStatus(sensor_->valid(self_, &seen));
   }
   /// y = g(other roles, z), dense row-major Jacobians jx[i] = dy/d role_i and jz = dy/dz. kInvalid
   /// where a prior is needed.
   Status Initialise(const double* const* roles, const double* z, double* y, double* const* jx,
-                    double* jz) const {
-    return Initialise(roles, z, nullptr, y, jx, jz, nullptr);
+                    double* jz, const double* known = nullptr) const {
+    return Initialise(roles, z, nullptr, y, jx, jz, nullptr, known);
   }
   /// y = g(other roles, z, prior), the initialised roles one after the other; Jacobians dense and
   /// row-major, jp = dy/d prior; each may be null.
   Status Initialise(const double* const* roles, const double* z, const double* prior, double* y,
-                    double* const* jx, double* jz, double* jp) const;
+                    double* const* jx, double* jz, double* jp, const double* known = nullptr) const;
   std::string error_text() const { return instance_->error_text(); }
 
  private:
+  Status LineariseKnowing(const double* const* roles, double* z, double* const* jacobians,
+                          const int* strides, const double* known) const;
+
   std::shared_ptr<const ModelInstance> instance_;
   const AlidadeSensor* sensor_;
   const void* self_;
+  int known_size_ = 0;
   int initialised_role_ = -1;
   int initialised_count_ = 0;
   int prior_size_ = 0;
@@ -153,12 +195,14 @@ class MotionModel {
   /// be null.
   Status Step(const double* const* blocks, const double* input, const double* w, double dt_s,
               double* const* next, double* f, double* g) const {
+    detail::last_call = &motion_->step;
     return detail::ToStatus(motion_->step(self_, blocks, &input,
                                           w != nullptr ? w : zero_noise_.data(), dt_s, next, f,
                                           tangent_size_, g, noise_size_, nullptr, 0));
   }
   /// l, row-major n_w x n_w, with Qw = l l'.
   Status SqrtQ(const double* const* blocks, const double* input, double dt_s, double* l) const {
+    detail::last_call = &motion_->sqrt_q;
     return detail::ToStatus(motion_->sqrt_q(self_, blocks, &input, dt_s, l, noise_size_));
   }
   std::string error_text() const { return instance_->error_text(); }

@@ -22,6 +22,8 @@ struct Measurement {
   std::int64_t landmark = -1;
   std::vector<double> values;
   std::vector<double> covariance;  ///< row-major, overrides the model's noise; empty: none
+  /// What its sensor takes as known with it: where the satellite was. Mostly empty.
+  std::vector<double> known = {};
 };
 
 /// What was measured at one timestamp, in the order of the source: all that an estimator sees.
@@ -44,6 +46,7 @@ struct StreamInfo {
   std::string name;
   int size = 1;
   double sigma = 0.0;  ///< of a truth: standard deviation of each element, in its tangent
+  int known = 0;       ///< known numbers that come with each measurement
 };
 
 /// Where measurements come from: a simulator, a file, a pipe. A C++ plugin.

@@ -116,14 +116,17 @@ void CopyFixed(MatrixRef from, MatrixRef to) {
 }
 
 template <class Model, class T, std::size_t... I>
-bool CallPredict(const Model& model, const T* const* x, T* z, std::index_sequence<I...>) {
-  return model.Predict(x[I]..., z);
+bool CallPredict(const Model& model, const T* const* x, const double* known, T* z,
+                 std::index_sequence<I...> indices) {
+  const auto predict = [&](auto... arguments) { return model.Predict(arguments...); };
+  return WithRoles<Model>(predict, x, known, indices, z);
 }
 
 /// By way of a buffer, so that a Jacobian that throws leaves `jacobians` untouched.
 template <class Model, std::size_t... I>
-void AnalyticJacobians(const Model& model, const double* const* x, double* const* jacobians,
-                       const int* strides, std::index_sequence<I...> indices) {
+void AnalyticJacobians(const Model& model, const double* const* x, const double* known,
+                       double* const* jacobians, const int* strides,
+                       std::index_sequence<I...> indices) {
   constexpr int m = Model::Measurement::kTangent;
   double buffer[m * Blocks<Model>::kTangent] = {};
   MatrixRef j[sizeof...(I)];
@@ -135,7 +138,8 @@ void AnalyticJacobians(const Model& model, const double* const* x, double* const
     used += m * n;
   };
   ForEach(bind, indices);
-  model.Jacobian(x[I]..., j[I]...);
+  const auto differentiate = [&](auto... arguments) { model.Jacobian(arguments...); };
+  WithRoles<Model>(differentiate, x, known, indices, j[I]...);
   const auto copy = [&](auto index) {
     constexpr int i = decltype(index)::value;
     constexpr int n = SpaceAt<i, Model>::kTangent;
@@ -148,10 +152,11 @@ void AnalyticJacobians(const Model& model, const double* const* x, double* const
 }  // namespace detail
 
 /// z = h(roles); where `jacobians` is not null, jacobians[i] = d z / d role_i. A null entry, or a
-/// role that is not bound, is skipped.
+/// role that is not bound, is skipped. `known`: the numbers that come with the measurement, of a
+/// model with such.
 template <class Model>
 Status Evaluate(const Model& model, const double* const* roles, double* z, double* const* jacobians,
-                const int* strides) {
+                const int* strides, const double* known = nullptr) {
   static_assert(detail::CheckSensorMembers<Model>());
   using Z = typename Model::Measurement;
   using Blocks = detail::Blocks<Model>;
@@ -159,10 +164,10 @@ Status Evaluate(const Model& model, const double* const* roles, double* z, doubl
   constexpr bool kAnalytic = detail::HasJacobian<Model, typename Blocks::Indices>::value;
   if (kAnalytic || jacobians == nullptr) {
     double value[Z::kAmbient];
-    if (!detail::CallPredict(model, roles, value, indices)) return Status::kOutOfDomain;
+    if (!detail::CallPredict(model, roles, known, value, indices)) return Status::kOutOfDomain;
     if constexpr (kAnalytic) {
       if (jacobians != nullptr)
-        detail::AnalyticJacobians(model, roles, jacobians, strides, indices);
+        detail::AnalyticJacobians(model, roles, known, jacobians, strides, indices);
     }
     std::copy_n(value, Z::kAmbient, z);
     return Status::kOk;
@@ -172,7 +177,7 @@ Status Evaluate(const Model& model, const double* const* roles, double* z, doubl
     Jet lifted[Blocks::kAmbient], value[Z::kAmbient];
     const Jet* x[Blocks::kCount];
     detail::Lift<Model>(roles, lifted, x);
-    if (!detail::CallPredict(model, x, value, indices)) return Status::kOutOfDomain;
+    if (!detail::CallPredict(model, x, known, value, indices)) return Status::kOutOfDomain;
     for (int i = 0; i < Z::kAmbient; ++i) z[i] = value[i].a;
     int first = 0;
     const auto read = [&](auto index) {

@@ -36,14 +36,15 @@ constexpr std::size_t OtherRole(std::size_t k) {
 }
 
 template <class Model, class T, std::size_t... I>
-bool CallInitialise(const Model& model, const T* const* x, const T* z, const T* prior, T* y,
-                    std::index_sequence<I...>) {
-  static_cast<void>(x);
+bool CallInitialise(const Model& model, const T* const* x, const double* known, const T* z,
+                    const T* prior, T* y, std::index_sequence<I...>) {
+  constexpr std::index_sequence<OtherRole<Model>(I)...> others{};
+  const auto initialise = [&](auto... arguments) { return model.Initialise(arguments...); };
   if constexpr (Model::kPrior > 0) {
-    return model.Initialise(x[OtherRole<Model>(I)]..., z, prior, y);
+    return WithRoles<Model>(initialise, x, known, others, z, prior, y);
   } else {
     static_cast<void>(prior);
-    return model.Initialise(x[OtherRole<Model>(I)]..., z, y);
+    return WithRoles<Model>(initialise, x, known, others, z, y);
   }
 }
 
@@ -67,11 +68,11 @@ void ReadInitialised(const Jet* y, int first, int count, MatrixRef j) {
 /// y, the role Model::kInitialises (of a landmark: its roles one after the other), from the other
 /// roles, z and prior (inverse measurement model), with Jacobians jx[i] = d y / d role_i, jz = d y
 /// / d z, jp = d y / d prior; each may be null. kInvalid where the model needs a prior and has
-/// none.
+/// none. `known` as Evaluate has it.
 template <class Model>
 Status InitialiseRole(const Model& model, const double* const* roles, const double* z,
                       const double* prior, double* y, double* const* jx, const int* jx_strides,
-                      MatrixRef jz, MatrixRef jp) {
+                      MatrixRef jz, MatrixRef jp, const double* known = nullptr) {
   using Z = typename Model::Measurement;
   using Y = detail::Initialised<Model>;
   using Blocks = detail::Blocks<Model>;
@@ -88,7 +89,8 @@ Status InitialiseRole(const Model& model, const double* const* roles, const doub
   for (int i = 0; i < Model::kPrior; ++i) {
     lifted_prior[i] = Jet(prior[i], kRoles + Z::kTangent + i);
   }
-  if (!detail::CallInitialise(model, x, lifted_z, lifted_prior, value, others)) {
+  const Jet *const_z = lifted_z, *const_prior = lifted_prior;
+  if (!detail::CallInitialise(model, x, known, const_z, const_prior, value, others)) {
     return Status::kOutOfDomain;
   }
   for (int i = 0; i < Y::kAmbient; ++i) y[i] = value[i].a;

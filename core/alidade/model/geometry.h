@@ -226,10 +226,38 @@ struct UnitVector {
   }
 };
 
+/// Parts one after the other, each as it is by itself: the geometry of a composite measurement, a
+/// pose or a range with a bearing, whose noise is correlated.
+template <class... Parts>
+struct Product {
+  static_assert(sizeof...(Parts) > 0 && ((Parts::kTangent > 0) && ... && true) &&
+                    ((Parts::kGeometry != ALIDADE_PRODUCT) && ... && true),
+                "a part is of fixed size and no product");
+  static constexpr std::uint32_t kGeometry = ALIDADE_PRODUCT;
+  static constexpr int kAmbient = (Parts::kAmbient + ...), kTangent = (Parts::kTangent + ...);
+  static constexpr std::size_t kParts = sizeof...(Parts);
+
+  /// f(Part{}, ambient offset, tangent offset) for every part.
+  template <class F>
+  static void ForEachPart(const F& f) {
+    int ambient = 0, tangent = 0;
+    ((f(Parts{}, ambient, tangent), ambient += Parts::kAmbient, tangent += Parts::kTangent), ...);
+  }
+  template <class X, class D, class Y>
+  static void Plus(const X* x, const D* d, Y* y, int = 0) {
+    ForEachPart([&](auto part, int a, int t) { decltype(part)::Plus(x + a, d + t, y + a); });
+  }
+  template <class Y, class X, class D>
+  static void Minus(const Y* y, const X* x, D* d, int = 0) {
+    ForEachPart([&](auto part, int a, int t) { decltype(part)::Minus(y + a, x + a, d + t); });
+  }
+};
+
 /// Brings x, off the manifold of G by rounding, back to it: else rounding would add up over many
 /// steps. An angle is wrapped.
 template <class G>
 void Normalise(double* x) {
+  static_assert(G::kGeometry != ALIDADE_PRODUCT, "part by part");
   if constexpr (G::kGeometry == ALIDADE_ANGLE) x[0] = G::Wrap(x[0]);
   if constexpr (G::kAmbient > G::kTangent) {  // of unit length
     double sum = 0.0;

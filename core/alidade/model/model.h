@@ -2,10 +2,13 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <tuple>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "alidade/model/geometry.h"
 #include "alidade/model/params.h"
@@ -35,6 +38,33 @@ struct MatrixRef {
   explicit operator bool() const { return data != nullptr; }
 };
 
+/// Prior and dynamics of a role with the flag ALIDADE_ROLE_OWNED, which a config may override: per
+/// element of its tangent, `mean` per ambient element.
+struct Owned {
+  std::uint32_t dynamics = ALIDADE_STAYS;
+  std::vector<double> mean, sigma;
+  std::vector<double> density;   ///< of the white noise that drives it, unit / sqrt(s)
+  double time_constant_s = 0.0;  ///< of a Gauss-Markov process
+
+  /// Stays as it is.
+  static Owned Constant(std::vector<double> mean, std::vector<double> sigma) {
+    return {ALIDADE_STAYS, std::move(mean), std::move(sigma), {}, 0.0};
+  }
+  /// `walk`: standard deviation of its change in one second.
+  static Owned RandomWalk(std::vector<double> mean, std::vector<double> sigma,
+                          std::vector<double> walk) {
+    return {ALIDADE_RANDOM_WALK, std::move(mean), std::move(sigma), std::move(walk), 0.0};
+  }
+  /// Returns to its mean with `time_constant_s`; `sigma` is that of the stationary process too.
+  static Owned GaussMarkov(std::vector<double> mean, std::vector<double> sigma,
+                           double time_constant_s) {
+    std::vector<double> density = sigma;
+    for (double& one : density) one *= std::sqrt(2.0 / time_constant_s);
+    return {ALIDADE_GAUSS_MARKOV, std::move(mean), std::move(sigma), std::move(density),
+            time_constant_s};
+  }
+};
+
 /// Process noise over a time that is stepped in parts. An interval lies between two updates; both
 /// kinds are white from one interval to the next.
 enum class NoiseKind {
@@ -46,6 +76,7 @@ enum class NoiseKind {
 ///
 ///   static constexpr std::array kRoles{Quantity{...}, ...};      one for each role geometry
 ///   static constexpr Quantity kMeasurement{...};
+///   static constexpr std::array kParts{Quantity{...}, ...};      only of a Product, for each part
 ///   explicit Model(Params&);
 ///   template <class T> bool Predict(const T* role..., T* z) const;      false: out of domain
 ///   template <class T> void SqrtNoise(const T* role..., [const T* z,] T* L) const;
@@ -53,19 +84,32 @@ enum class NoiseKind {
 ///
 /// and may have
 ///
+///   using Known = Vec<3>; static constexpr Quantity kKnown{...};        numbers that come with each
+///                                       measurement and are no state: where a satellite is. Every
+///                                       function takes them, `const double* known`, behind the
+///                                       roles: Predict(role..., known, z), Valid(known, z)
 ///   bool Valid(const double* z) const;
 ///   static constexpr int kInitialises;                                  the role y below
 ///   template <class T> bool Initialise(const T* other..., const T* z[, prior], T* y) const;
 ///   static constexpr int kPrior;         numbers of the prior, beyond z; default 0
 ///   void Jacobian(const double* role..., MatrixRef J_z_role...) const;  analytic, zeroed
 ///
-/// Roles with the flag ALIDADE_ROLE_LANDMARK stand side by side and are filled by the landmark that
+/// A role with the flag ALIDADE_ROLE_OWNED is a state that comes with the sensor, a bias or a lever
+/// arm, unless the config binds it: constant at the neutral element of its geometry, or as
+///
+///   Owned OwnedRole(int role) const;
+///
+/// says. Roles with the flag ALIDADE_ROLE_LANDMARK stand side by side and are filled by the landmark that
 /// a measurement names. Where kInitialises is the first of them, y holds them all, one after the
 /// other. An optional member of another signature is a compile error (model_members.h).
 template <class MeasurementGeometry, class... RoleGeometries>
 struct Sensor {
+  static_assert(((RoleGeometries::kGeometry != ALIDADE_PRODUCT) && ... && true),
+                "a role is no Product: give each part a role of its own");
   using Measurement = MeasurementGeometry;
   using Spaces = std::tuple<RoleGeometries...>;
+  using Known = Vec<0>;
+  static constexpr Quantity kKnown{""};
   static constexpr int kPrior = 0;
   static constexpr int kInitialises = -1;
 };
@@ -147,22 +191,49 @@ using Pointer = const T*;
 template <std::size_t>
 using Matrix = MatrixRef;
 
-template <class Model, class Indices, class = void>
-struct HasJacobian : std::false_type {};
-template <class Model, std::size_t... I>
-struct HasJacobian<Model, std::index_sequence<I...>,
-                   std::void_t<decltype(std::declval<const Model&>().Jacobian(
-                       std::declval<Pointer<double, I>>()..., std::declval<Matrix<I>>()...))>>
-    : std::true_type {};
+template <class Model>
+inline constexpr bool kHasKnown = Model::Known::kAmbient > 0;
 
-template <class Model, class Indices, class = void>
-struct HasNoiseOfMeasurement : std::false_type {};
+/// Calls f(role pointers..., [known,] rest...) of a sensor.
+template <class Model, class F, class T, std::size_t... I, class... Rest>
+decltype(auto) WithRoles(const F& f, const T* const* x, const double* known,
+                         std::index_sequence<I...>, Rest... rest) {
+  static_cast<void>(x);
+  if constexpr (kHasKnown<Model>) {
+    return f(x[I]..., known, rest...);
+  } else {
+    static_cast<void>(known);
+    return f(x[I]..., rest...);
+  }
+}
+
+/// Whether Call can be called as (model, pointer for each of Indices..., [known,] rest...).
+template <class Call, class Model, class Indices, class... Rest>
+struct TakesRoles;
+template <class Call, class Model, std::size_t... I, class... Rest>
+struct TakesRoles<Call, Model, std::index_sequence<I...>, Rest...> {
+  static constexpr bool value =
+      kHasKnown<Model>
+          ? std::is_invocable_v<Call, const Model&, Pointer<double, I>..., const double*, Rest...>
+          : std::is_invocable_v<Call, const Model&, Pointer<double, I>..., Rest...>;
+};
+
+struct JacobianCall {
+  template <class Model, class... A>
+  auto operator()(const Model& model, A... a) const -> decltype(model.Jacobian(a...));
+};
+template <class Model, class Indices>
+struct HasJacobian;
 template <class Model, std::size_t... I>
-struct HasNoiseOfMeasurement<Model, std::index_sequence<I...>,
-                             std::void_t<decltype(std::declval<const Model&>().SqrtNoise(
-                                 std::declval<Pointer<double, I>>()...,
-                                 std::declval<const double*>(), std::declval<double*>()))>>
-    : std::true_type {};
+struct HasJacobian<Model, std::index_sequence<I...>>
+    : TakesRoles<JacobianCall, Model, std::index_sequence<I...>, Matrix<I>...> {};
+
+struct SqrtNoiseCall {
+  template <class Model, class... A>
+  auto operator()(const Model& model, A... a) const -> decltype(model.SqrtNoise(a...));
+};
+template <class Model, class Indices>
+struct HasNoiseOfMeasurement : TakesRoles<SqrtNoiseCall, Model, Indices, const double*, double*> {};
 
 template <class Model, class = void>
 struct HasSimpleSqrtQ : std::false_type {};
@@ -196,13 +267,14 @@ bool CallStep(const Model& model, const T* const* x, const T* u, const T* w, dou
 
 /// L with R = L L' of a sensor, row-major and zeroed before.
 template <class Model, std::size_t... I>
-void CallSqrtNoise(const Model& model, const double* const* x, const double* z, double* l,
-                   std::index_sequence<I...>) {
+void CallSqrtNoise(const Model& model, const double* const* x, const double* known, const double* z,
+                   double* l, std::index_sequence<I...> indices) {
+  const auto noise = [&](auto... arguments) { model.SqrtNoise(arguments...); };
   if constexpr (HasNoiseOfMeasurement<Model, std::index_sequence<I...>>::value) {
-    model.SqrtNoise(x[I]..., z, l);
+    WithRoles<Model>(noise, x, known, indices, z, l);
   } else {
     static_cast<void>(z);
-    model.SqrtNoise(x[I]..., l);
+    WithRoles<Model>(noise, x, known, indices, l);
   }
 }
 

@@ -33,21 +33,29 @@ ALIDADE_DECLARES(Valid)
 ALIDADE_DECLARES(Initialise)
 ALIDADE_DECLARES(StepJacobian)
 ALIDADE_DECLARES(Stationary)
+ALIDADE_DECLARES(OwnedRole)
 #undef ALIDADE_DECLARES
 
-template <class Model, class = void>
-struct HasValid : std::false_type {};
+struct ValidCall {
+  template <class Model, class... A>
+  auto operator()(const Model& model, A... a) const
+      -> std::enable_if_t<std::is_convertible_v<decltype(model.Valid(a...)), bool>>;
+};
 template <class Model>
-struct HasValid<
-    Model, std::enable_if_t<std::is_convertible_v<
-               decltype(std::declval<const Model&>().Valid(std::declval<const double*>())), bool>>>
-    : std::true_type {};
+struct HasValid : TakesRoles<ValidCall, Model, std::index_sequence<>, const double*> {};
 
 template <class Model, class = void>
 struct HasStationary : std::false_type {};
 template <class Model>
 struct HasStationary<Model, std::enable_if_t<std::is_convertible_v<
                                 decltype(std::declval<const Model&>().Stationary()), bool>>>
+    : std::true_type {};
+
+template <class Model, class = void>
+struct HasOwnedRole : std::false_type {};
+template <class Model>
+struct HasOwnedRole<Model, std::enable_if_t<std::is_convertible_v<
+                               decltype(std::declval<const Model&>().OwnedRole(0)), Owned>>>
     : std::true_type {};
 
 /// How many roles Initialise does not compute.
@@ -58,26 +66,18 @@ constexpr std::size_t OtherCount() {
   return count;
 }
 
-template <class Model, class Others, class = void>
-struct CanInitialise : std::false_type {};
-template <class Model, std::size_t... I>
-struct CanInitialise<
-    Model, std::index_sequence<I...>,
-    std::enable_if_t<(Model::kPrior > 0) &&
-                     std::is_convertible_v<
-                         decltype(std::declval<const Model&>().Initialise(
-                             std::declval<Pointer<double, I>>()..., std::declval<const double*>(),
-                             std::declval<const double*>(), std::declval<double*>())),
-                         bool>>> : std::true_type {};
-template <class Model, std::size_t... I>
-struct CanInitialise<
-    Model, std::index_sequence<I...>,
-    std::enable_if_t<
-        Model::kPrior == 0 &&
-        std::is_convertible_v<decltype(std::declval<const Model&>().Initialise(
-                                  std::declval<Pointer<double, I>>()...,
-                                  std::declval<const double*>(), std::declval<double*>())),
-                              bool>>> : std::true_type {};
+struct InitialiseCall {
+  template <class Model, class... A>
+  auto operator()(const Model& model, A... a) const
+      -> std::enable_if_t<std::is_convertible_v<decltype(model.Initialise(a...)), bool>>;
+};
+template <class Model, class Others>
+struct CanInitialise {
+  static constexpr bool value =
+      Model::kPrior > 0
+          ? TakesRoles<InitialiseCall, Model, Others, const double*, const double*, double*>::value
+          : TakesRoles<InitialiseCall, Model, Others, const double*, double*>::value;
+};
 
 /// Always true: the errors are its own.
 template <class Model>
@@ -86,17 +86,20 @@ constexpr bool CheckSensorMembers() {
   using Others = std::make_index_sequence<OtherCount<Model>()>;
   static_assert(!DeclaresJacobian<Model>::value || HasJacobian<Model, Indices>::value,
                 "Jacobian exists but cannot be called as Jacobian(const double* role..., "
-                "MatrixRef J_z_role...) const: see docs/add_a_sensor.md");
+                "[const double* known,] MatrixRef J_z_role...) const: see docs/add_a_sensor.md");
   static_assert(!DeclaresValid<Model>::value || HasValid<Model>::value,
-                "Valid exists but cannot be called as bool Valid(const double* z) const: see "
+                "Valid exists but cannot be called as bool Valid([const double* known,] const "
+                "double* z) const: see docs/add_a_sensor.md");
+  static_assert(!DeclaresOwnedRole<Model>::value || HasOwnedRole<Model>::value,
+                "OwnedRole exists but cannot be called as Owned OwnedRole(int role) const: see "
                 "docs/add_a_sensor.md");
   static_assert(!DeclaresInitialise<Model>::value || Model::kInitialises >= 0,
                 "Initialise exists but kInitialises, the index of the role that it computes, does "
                 "not: see docs/add_a_sensor.md");
   static_assert(Model::kInitialises < 0 || CanInitialise<Model, Others>::value,
                 "kInitialises exists but Initialise cannot be called as bool Initialise(const T* "
-                "other_role..., const T* z, [const T* prior,] T* y) const: see "
-                "docs/add_a_sensor.md");
+                "other_role..., [const double* known,] const T* z, [const T* prior,] T* y) const: "
+                "see docs/add_a_sensor.md");
   return true;
 }
 

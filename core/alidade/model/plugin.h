@@ -26,12 +26,11 @@ void Publish(std::unique_ptr<Holder<Model>> holder, std::uint32_t kind, AlidadeI
 
 template <class Model>
 void PublishSensor(std::unique_ptr<Holder<Model>> holder, AlidadeInstance* instance) {
-  using Z = typename Model::Measurement;
   constexpr auto roles = Model::kRoles;  // copies, lest they too be shared
-  constexpr Quantity measurement = Model::kMeasurement;
   holder->DescribeRoles(roles);
-  holder->space = Describe(measurement, Z::kGeometry, Z::kAmbient, Z::kTangent);
-  holder->description.output = &holder->space;
+  holder->DescribeMeasurement();
+  holder->DescribeKnown();
+  holder->DescribeOwned();
   holder->description.initialise_role = Model::kInitialises;
   holder->description.prior_count = Model::kPrior;
   holder->description.capabilities =

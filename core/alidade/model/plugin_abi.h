@@ -33,7 +33,8 @@
  * code has written none. Codes 4 to 15 are reserved; a host takes a code that it does not know as
  * ALIDADE_ERROR. Inputs are not written. No call throws. Calls are made with rounding to nearest,
  * without traps, subnormal numbers kept, and leave that as it is. All calls on an instance end
- * before `destroy`. */
+ * before `destroy`. `dt_s` is 0 or more, but may be negative in `step` without noise: a host looks
+ * back by it. */
 
 #include <stddef.h>
 #include <stdint.h>
@@ -142,6 +143,8 @@ typedef struct AlidadeBuildTag {
  * ALIDADE_UNIT_QUATERNION  ambient 4, tangent 3      w x y z, Hamilton; x (+) d = x Exp(d),
  *                                                    Exp(d) = (cos |d|/2, sin(|d|/2) d / |d|)
  * ALIDADE_UNIT_VECTOR      ambient 3, tangent 2      x (+) d = cos |d| x + sin |d| / |d| B(x) d
+ * ALIDADE_PRODUCT          sums of the parts         the parts one after the other, each as it is
+ *                                                    by itself; of a measurement alone
  *
  * B(x) of a unit vector, with s = -1 where x2 < 0, else 1 (also at x2 = -0), a = -1 / (s + x2):
  *
@@ -155,19 +158,18 @@ enum {
   ALIDADE_VECTOR = 1,
   ALIDADE_ANGLE = 2,
   ALIDADE_UNIT_QUATERNION = 3,
-  ALIDADE_UNIT_VECTOR = 4
+  ALIDADE_UNIT_VECTOR = 4,
+  ALIDADE_PRODUCT = 5
 };
 
 /* Bits of AlidadeSpace.flags. */
 enum {
-  ALIDADE_ROLE_OPTIONAL = 1 << 16,    /* may stay unbound: its pointer is then null */
-  ALIDADE_ROLE_OWNED = 1 << 17,       /* the block arrives with its model: a bias, an extrinsic */
-  ALIDADE_ROLE_LANDMARK = 1 << 18,    /* filled anew for each measurement, by its landmark id */
-  ALIDADE_ROLE_SHARED = 1 << 19,      /* with LANDMARK: one block for all that are first seen at one
+  ALIDADE_ROLE_OPTIONAL = 1 << 16, /* may stay unbound: its pointer is then null */
+  ALIDADE_ROLE_OWNED = 1 << 17,    /* the block arrives with its model: a bias, an extrinsic */
+  ALIDADE_ROLE_LANDMARK = 1 << 18, /* filled anew for each measurement, by its landmark id */
+  ALIDADE_ROLE_SHARED = 1 << 19,   /* with LANDMARK: one block for all that are first seen at one
                                       timestamp */
-  ALIDADE_ROLE_TIME_OFFSET = 1 << 20, /* vector(1), s: the host evaluates the other roles at the
-                                         timestamp + this, and adds the chain rule */
-  ALIDADE_ROLE_CLONE = 1 << 21        /* the value at the earlier timestamp of the observation */
+  ALIDADE_ROLE_CLONE = 1 << 20     /* the value at the earlier timestamp of the observation */
 };
 
 enum { ALIDADE_STAYS = 0, ALIDADE_RANDOM_WALK = 1, ALIDADE_GAUSS_MARKOV = 2 };
@@ -191,8 +193,10 @@ typedef struct AlidadeSpace {
   const char* unit;     /* of every element; "" where it has none */
   const char* elements; /* names of the ambient elements, comma separated; "" for a single one */
   const char* doc;
-  const AlidadeOwned* owned; /* null: at the neutral element, constant, known exactly */
-  void* reserved[3];
+  const AlidadeOwned* owned;        /* null: at the neutral element, constant, known exactly */
+  const struct AlidadeSpace* parts; /* of a product, 1 to ALIDADE_MAX_ROLES; none is a product */
+  uint32_t part_count, part_stride;
+  void* reserved[1];
 } AlidadeSpace;
 
 /* ---- parameters ------------------------------------------------------------------------------ */

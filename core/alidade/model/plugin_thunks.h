@@ -3,6 +3,9 @@
 
 #include <cstdio>
 #include <exception>
+#include <memory>
+#include <utility>
+#include <vector>
 
 #include "alidade/model/autodiff_inverse.h"
 #include "alidade/model/autodiff_step.h"
@@ -25,6 +28,31 @@ inline AlidadeSpace Describe(const Quantity& q, std::uint32_t geometry, int ambi
   space.doc = q.doc;
   return space;
 }
+
+/// An Owned as the ABI has it.
+struct OwnedByAbi {
+  explicit OwnedByAbi(Owned of) : from(std::move(of)) {
+    c.struct_size = sizeof(c);
+    c.dynamics = from.dynamics;
+    c.mean = from.mean.data();
+    c.sqrt_prior = Diagonal(from.sigma, sqrt_prior);
+    c.sqrt_density = Diagonal(from.density, sqrt_density);
+    c.time_constant_s = from.time_constant_s;
+  }
+  OwnedByAbi(const OwnedByAbi&) = delete;
+  OwnedByAbi& operator=(const OwnedByAbi&) = delete;
+
+  static const double* Diagonal(const std::vector<double>& of, std::vector<double>& matrix) {
+    const std::size_t n = of.size();
+    matrix.assign(n * n, 0.0);
+    for (std::size_t i = 0; i < n; ++i) matrix[i * n + i] = of[i];
+    return n > 0 ? matrix.data() : nullptr;
+  }
+
+  Owned from;
+  std::vector<double> sqrt_prior, sqrt_density;
+  AlidadeOwned c{};
+};
 
 /// A model with its description, as the instance's `self`.
 template <class Model>
@@ -53,10 +81,54 @@ struct Holder {
     description.roles = roles;
   }
 
+  /// The measurement.
+  void DescribeMeasurement() {
+    using Z = typename Model::Measurement;
+    constexpr Quantity measurement = Model::kMeasurement;
+    space = Describe(measurement, Z::kGeometry, Z::kAmbient, Z::kTangent);
+    if constexpr (Z::kGeometry == ALIDADE_PRODUCT) {
+      constexpr auto quantities = Model::kParts;
+      static_assert(quantities.size() == Z::kParts, "one Quantity in kParts for each part");
+      parts.reserve(Z::kParts);
+      Z::ForEachPart([&](auto part, int, int) {
+        using G = decltype(part);
+        parts.push_back(Describe(quantities[parts.size()], G::kGeometry, G::kAmbient, G::kTangent));
+      });
+      space.parts = parts.data();
+      space.part_count = Z::kParts;
+      space.part_stride = sizeof(AlidadeSpace);
+    }
+    description.output = &space;
+  }
+
+  /// Prior and dynamics of the roles that are states of the sensor itself.
+  void DescribeOwned() {
+    if constexpr (HasOwnedRole<Model>::value) {
+      for (int i = 0; i < Blocks<Model>::kCount; ++i) {
+        if ((roles[i].flags & ALIDADE_ROLE_OWNED) == 0) continue;
+        owned[i] = std::make_unique<OwnedByAbi>(model.OwnedRole(i));
+        roles[i].owned = &owned[i]->c;
+      }
+    }
+  }
+  /// The numbers that come with each measurement.
+  void DescribeKnown() {
+    using Known = typename Model::Known;
+    static_assert(Known::kGeometry == ALIDADE_VECTOR, "known numbers are a vector");
+    if constexpr (kHasKnown<Model>) {
+      constexpr Quantity quantity = Model::kKnown;
+      known = Describe(quantity, Known::kGeometry, Known::kAmbient, Known::kTangent);
+      description.known = &known;
+    }
+  }
+
   Model model;
   AlidadeDescription description{};
   AlidadeSpace roles[Blocks<Model>::kCount];
-  AlidadeSpace space;  ///< the measurement, or the control input
+  AlidadeSpace space;               ///< the measurement, or the control input
+  AlidadeSpace known;               ///< of a sensor
+  std::vector<AlidadeSpace> parts;  ///< of the measurement
+  std::unique_ptr<OwnedByAbi> owned[Blocks<Model>::kCount];
 };
 
 /// What the last ALIDADE_ERROR of this thread was about. Hidden: one for each plugin.
@@ -86,6 +158,12 @@ std::int32_t Guarded(const void* self, const F& f) noexcept {
 #endif
 }
 
+/// Not looked up for models that have none.
+template <class Model>
+const double* KnownOf(const AlidadeObservation* seen) {
+  return kHasKnown<Model> ? seen->known : nullptr;
+}
+
 /// Hidden, as is MotionCalls: were its table exported, two plugins with a struct of one name would
 /// share the table of the first (STB_GNU_UNIQUE), whatever dlopen is told.
 template <class Model>
@@ -93,10 +171,11 @@ struct __attribute__((visibility("hidden"))) SensorCalls {
   static constexpr bool kInitialises = Model::kInitialises >= 0;
 
   ALIDADE_FLATTEN ALIDADE_SCALAR_LOOPS static std::int32_t Eval(
-      const void* self, const AlidadeObservation*, const double* const* roles, double* z,
+      const void* self, const AlidadeObservation* seen, const double* const* roles, double* z,
       double* const* jacobians, const std::int32_t* strides) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
-      return static_cast<std::int32_t>(Evaluate(model, roles, z, jacobians, strides));
+      return static_cast<std::int32_t>(
+          Evaluate(model, roles, z, jacobians, strides, KnownOf<Model>(seen)));
     });
   }
   ALIDADE_FLATTEN static std::int32_t SqrtNoise(const void* self, const AlidadeObservation* seen,
@@ -105,7 +184,8 @@ struct __attribute__((visibility("hidden"))) SensorCalls {
     return Guarded<Model>(self, [&](const Model& model) {
       constexpr int m = Model::Measurement::kTangent;
       double dense[m * m] = {};
-      CallSqrtNoise(model, roles, seen->z, dense, typename Blocks<Model>::Indices{});
+      CallSqrtNoise(model, roles, KnownOf<Model>(seen), seen->z, dense,
+                    typename Blocks<Model>::Indices{});
       for (int i = 0; i < m; ++i) std::copy_n(dense + i * m, m, l + i * stride);
       return std::int32_t{ALIDADE_OK};
     });
@@ -114,7 +194,11 @@ struct __attribute__((visibility("hidden"))) SensorCalls {
                                             const AlidadeObservation* seen) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
       if constexpr (HasValid<Model>::value) {
-        return std::int32_t{model.Valid(seen->z) ? ALIDADE_OK : ALIDADE_INVALID};
+        const auto valid = [&](auto... arguments) -> bool { return model.Valid(arguments...); };
+        const double* const* const no_roles = nullptr;
+        const bool is_valid = WithRoles<Model>(valid, no_roles, KnownOf<Model>(seen),
+                                               std::index_sequence<>{}, seen->z);
+        return std::int32_t{is_valid ? ALIDADE_OK : ALIDADE_INVALID};
       } else {
         static_cast<void>(model);
         return std::int32_t{ALIDADE_OK};
@@ -128,8 +212,9 @@ struct __attribute__((visibility("hidden"))) SensorCalls {
                                  std::int32_t jp_stride) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
       if constexpr (kInitialises) {
-        return static_cast<std::int32_t>(InitialiseRole(
-            model, roles, seen->z, prior, y, jx, jx_strides, {jz, jz_stride}, {jp, jp_stride}));
+        return static_cast<std::int32_t>(InitialiseRole(model, roles, seen->z, prior, y, jx,
+                                                        jx_strides, {jz, jz_stride},
+                                                        {jp, jp_stride}, KnownOf<Model>(seen)));
       } else {
         return std::int32_t{ALIDADE_ERROR};
       }

@@ -87,7 +87,8 @@ class StaticEkf {
     return PredictAll(dt_s, inputs, std::index_sequence_for<Motions...>{});
   }
 
-  /// Uses z (ambient), a measurement of `sensor` whose roles are filled by the blocks `Roles`.
+  /// Uses z (ambient, then the known numbers of a model with such), a measurement of `sensor` whose
+  /// roles are filled by the blocks `Roles`.
   template <int... Roles, class Model>
   ALIDADE_FLATTEN StaticOutcome Update(const Model& sensor, const double* z,
                                        double gate = std::numeric_limits<double>::infinity());

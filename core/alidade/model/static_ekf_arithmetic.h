@@ -80,10 +80,11 @@ StaticOutcome StaticEkf<Motions...>::Update(const Model& sensor, const double* z
     used += m * strides[i];
   };
   detail::ForEach(place, indices);
-  if (Evaluate(sensor, roles, h, jacobians, strides) != Status::kOk) {
+  const double* const known = z + Model::Measurement::kAmbient;
+  if (Evaluate(sensor, roles, h, jacobians, strides, known) != Status::kOk) {
     return StaticOutcome::kOutOfDomain;
   }
-  detail::CallSqrtNoise(sensor, roles, z, l, indices);
+  detail::CallSqrtNoise(sensor, roles, known, z, l, indices);
   Eigen::Matrix<double, m, 1> r;
   Z::Minus(z, h, r.data());
   Eigen::Matrix<double, kTangent, m> pht;

@@ -20,6 +20,10 @@ namespace alidade {
 /// truth, never ends one.
 enum class OnDivergence { kReport, kFail };
 
+/// What a call of a sensor that fails does: that measurement is left out; so are all of its stream
+/// from then on, once every sensor of the estimator on it has failed; the run ends.
+enum class OnPluginFailure { kSkip, kDisable, kAbort };
+
 /// One estimator of a run, on its own system (the config with the estimator's overrides merged in).
 struct NamedEstimator {
   std::string name;
@@ -28,6 +32,7 @@ struct NamedEstimator {
   System system;
   std::unique_ptr<Estimator> estimator;
   OnDivergence on_divergence = OnDivergence::kReport;
+  OnPluginFailure on_plugin_failure = OnPluginFailure::kSkip;
   std::string overrides;  ///< of its entry, as YAML; "": none
   /// Index of an estimator before it, not an offline one: it sees the measurements alone that this
   /// one accepted or took as first values. -1: it sees all.

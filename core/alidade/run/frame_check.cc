@@ -74,6 +74,10 @@ void FrameCheck::Check(const SourceFrame& frame) const {
     }
     const Kind& kind = streams_[static_cast<std::size_t>(m.stream)];
     CheckSize(frame, kind.info, m.values);
+    if (std::ssize(m.known) != kind.info.known) {
+      Refuse(frame, std::to_string(m.known.size()) + " known numbers with '" + kind.info.name +
+                        "', not " + std::to_string(kind.info.known) + ',');
+    }
     const int tangent = kind.geometry.tangent;
     if (!m.covariance.empty() && std::ssize(m.covariance) != tangent * tangent) {
       Refuse(frame, "a covariance of " + std::to_string(m.covariance.size()) + " numbers of '" +
@@ -90,19 +94,22 @@ void FrameCheck::Check(const SourceFrame& frame) const {
 }
 
 void FrameCheck::Normalise(Kind& kind, std::vector<double>& value) {
-  const bool is_rotation = kind.geometry.kind == GeometryKind::kUnitQuaternion;
-  if (!is_rotation && kind.geometry.kind != GeometryKind::kUnitVector) return;
-  const double defect = kind.geometry.Defect(value.data());
-  if (!(defect <= kUnitTolerance)) {
-    throw Error(ExitCode::kBadData,
-                ErrorLine(source_.place(), kind.info.name,
-                          std::string(is_rotation ? "a quaternion" : "a direction") +
-                              " whose length is off by " + RoundedText(defect, 4),
-                          "unit length to 1e-3"));
-  }
-  if (defect > kCounted) ++normalised_[kind.info.name];
-  kind.geometry.Normalise(value.data());
-  if (is_rotation) ChooseSign({}, value);
+  kind.geometry.ForEachPart([&](const Geometry& part, int a, int) {
+    const bool is_rotation = part.kind == GeometryKind::kUnitQuaternion;
+    if (!is_rotation && part.kind != GeometryKind::kUnitVector) return;
+    double* const x = value.data() + a;
+    const double defect = part.Defect(x);
+    if (!(defect <= kUnitTolerance)) {
+      throw Error(ExitCode::kBadData,
+                  ErrorLine(source_.place(), kind.info.name,
+                            std::string(is_rotation ? "a quaternion" : "a direction") +
+                                " whose length is off by " + RoundedText(defect, 4),
+                            "unit length to 1e-3"));
+    }
+    if (defect > kCounted) ++normalised_[kind.info.name];
+    part.Normalise(x);
+    if (is_rotation) ChooseSign({}, {x, 4});
+  });
 }
 
 void FrameCheck::FollowTruth(SourceFrame& frame) {

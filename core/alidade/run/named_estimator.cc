@@ -56,16 +56,18 @@ std::vector<std::string> ReadSensorList(const Node& entry, const Node& root) {
 /// What the sensors and control inputs of a system take, each stream once.
 std::vector<StreamInfo> StreamsOf(const System& system) {
   std::vector<StreamInfo> streams;
-  const auto add = [&](const std::string& name, int size) {
+  const auto add = [&](const std::string& name, int size, int known) {
     if (std::ranges::find(streams, name, &StreamInfo::name) == streams.end()) {
-      streams.push_back({name, size});
+      streams.push_back({name, size, 0.0, known});
     }
   };
   for (const SensorBinding& sensor : system.sensors) {
-    add(sensor.stream, sensor.model.measurement().geometry.ambient);
+    add(sensor.stream, sensor.model.measurement().geometry.ambient, sensor.model.known_size());
   }
   for (const MotionBinding& motion : system.motions) {
-    if (motion.model.has_input()) add(motion.input.stream, motion.model.input().geometry.ambient);
+    if (motion.model.has_input()) {
+      add(motion.input.stream, motion.model.input().geometry.ambient, 0);
+    }
   }
   return streams;
 }
@@ -214,6 +216,17 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   if (const auto policy = entry.Find("on_divergence")) {
     named.on_divergence = static_cast<OnDivergence>(policy->Choice({"report", "fail"}));
   }
+  if (const auto policy = entry.Find("on_plugin_failure")) {
+    named.on_plugin_failure =
+        static_cast<OnPluginFailure>(policy->Choice({"skip", "disable", "abort"}));
+    const auto order = config.root().Find("out_of_sequence");
+    const auto rollback = order ? order->Find("policy") : std::nullopt;
+    if (named.on_plugin_failure == OnPluginFailure::kDisable && rollback &&
+        rollback->Text() == "rollback") {
+      policy->Fail("a rollback gives frames of before again, with the sensor",
+                   "skip or abort, or another out_of_sequence.policy");
+    }
+  }
   const auto overrides = entry.Find("overrides");
   const Config own = overrides ? config.Merged(*overrides) : config;
   if (overrides) {
@@ -243,8 +256,18 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
 
 int FindStream(const Node& sensor, const SensorModel& model,
                const std::vector<StreamInfo>& streams) {
-  return FindStreamOf(sensor, model.measurement().geometry.ambient,
-                      "model '" + model.name() + "' measures", streams);
+  const int index = FindStreamOf(sensor, model.measurement().geometry.ambient,
+                                 "model '" + model.name() + "' measures", streams);
+  const int known = streams[static_cast<std::size_t>(index)].known;
+  if (known != model.known_size()) {
+    sensor.At("stream").Fail(
+        "stream '" + streams[static_cast<std::size_t>(index)].name + "' has " +
+            std::to_string(known) + " known numbers with each measurement",
+        std::to_string(model.known_size()) + ", as model '" + model.name() + "' takes" +
+            (model.known_size() > 0 ? ": " + Join(ColumnNames(model.known().name, model.known()))
+                                    : std::string()));
+  }
+  return index;
 }
 
 void CheckStreams(const Node& root, const System& system, const std::vector<StreamInfo>& streams) {

@@ -25,7 +25,8 @@ std::string At(const Frame& frame) { return " at t = " + internal::SecondsText(f
 /// Whether the frame has a measurement of the segment's stream that its sensor finds valid.
 bool InSegment(const Segment& segment, const Frame& frame) {
   const auto seen = [&](const Measurement& m) {
-    return m.stream == segment.stream && segment.sensor.Valid(m.values.data()) == Status::kOk;
+    return m.stream == segment.stream &&
+           segment.sensor.Valid(m.values.data(), m.known.data()) == Status::kOk;
   };
   return std::any_of(frame.measurements.begin(), frame.measurements.end(), seen) == segment.with;
 }
@@ -53,13 +54,16 @@ std::string Cause(const std::vector<Event>& events, const char* otherwise) {
 
 /// One frame through one estimator, which sees `visible` of it, unless it has passed already; false
 /// where the whole run has to end.
-bool Advance(Running& one, const Seen& seen, const Frame& visible,
+bool Advance(Running& one, const Seen& seen, const Frame& visible, const Source& source,
              const internal::Processed* passed, const RunOptions& options, RunResult& result) {
   one.last = nullptr;
   if (one.ended) return true;
   Estimator& estimator = *one.named.estimator;
+  Frame rest;
+  const bool all = one.failed_sensors.empty();
+  if (!all) rest = one.WithoutFailed(visible, source.streams());
   const auto started = Clock::now();
-  const UpdateReport& report = passed ? passed->report : estimator.Process(visible);
+  const UpdateReport& report = passed ? passed->report : estimator.Process(all ? visible : rest);
   if (!passed) one.result.wall_s += SecondsSince(started);
   one.last = &report;
   one.ended = passed ? passed->failed : estimator.failed();
@@ -68,6 +72,11 @@ bool Advance(Running& one, const Seen& seen, const Frame& visible,
   if (!one.ended && !estimator.offline()) {
     one.Take(static_cast<std::size_t>(result.frames), seen,
              passed ? passed->after->state() : estimator.state(), report, options);
+  }
+  if (const std::string why = one.TakeFailures(report); !why.empty()) {
+    Fail(result, ExitCode::kPlugin,
+         "estimator '" + one.named.name + "'" + At(seen.frame) + ": " + why);
+    return false;
   }
   const bool policy = one.named.on_divergence == OnDivergence::kFail && one.diverged;
   if (!one.ended && !policy) return true;
@@ -131,8 +140,8 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
       const int by = running[e].named.accepted_by;
       Frame accepted;
       if (by >= 0) accepted = AcceptedBy(by, running, seen.frame, *experiment.source);
-      go_on = Advance(running[e], seen, by < 0 ? seen.frame : accepted, frames.processed(e),
-                      options, result) &&
+      go_on = Advance(running[e], seen, by < 0 ? seen.frame : accepted, *experiment.source,
+                      frames.processed(e), options, result) &&
               go_on;
     }
     ++result.frames;

@@ -2,6 +2,7 @@
 #include "alidade/run/running_estimator.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "alidade/base/number_text.h"
 #include "alidade/base/words.h"
@@ -9,6 +10,43 @@
 #include "alidade/system/observability.h"
 
 namespace alidade::internal {
+
+Frame Running::WithoutFailed(const Frame& frame, const std::vector<StreamInfo>& streams) const {
+  const auto goes_on = [&](const Measurement& m) {
+    const std::string& stream = streams[static_cast<std::size_t>(m.stream)].name;
+    bool read = false, works = false;
+    for (std::size_t s = 0; s < named.system.sensors.size(); ++s) {
+      if (named.system.sensors[s].stream != stream) continue;
+      read = true;
+      works = works || failed_sensors[s] == 0;
+    }
+    return works || !read;  // a control input, say
+  };
+  Frame visible{frame.timestamp, {}};
+  std::ranges::copy_if(frame.measurements, std::back_inserter(visible.measurements), goes_on);
+  return visible;
+}
+
+std::string Running::TakeFailures(const UpdateReport& report) {
+  if (named.on_plugin_failure == OnPluginFailure::kSkip) return {};
+  for (const MeasurementReport& m : report.measurements()) {
+    if (m.outcome != Outcome::kFailed) continue;
+    const SensorBinding& sensor = named.system.sensors[static_cast<std::size_t>(m.sensor)];
+    if (named.on_plugin_failure == OnPluginFailure::kAbort) {
+      return "sensor '" + sensor.name + "', model '" + sensor.model.name() + "' of plugin " +
+             sensor.model.instance().plugin() + ", failed: " + sensor.model.error_text();
+    }
+    failed_sensors.resize(named.system.sensors.size(), 0);
+    char& failed = failed_sensors[static_cast<std::size_t>(m.sensor)];
+    if (failed == 0) {
+      Note({{named.estimator->timestamp(), "sensor_disabled",
+             "sensor '" + sensor.name + "' has failed; its stream '" + sensor.stream +
+                 "' is no longer used"}});
+    }
+    failed = 1;
+  }
+  return {};
+}
 
 void Running::Take(std::size_t k, const Seen& seen, const State& state, const UpdateReport& report,
                    const RunOptions& options) {

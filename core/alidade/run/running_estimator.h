@@ -22,8 +22,15 @@ struct Running {
   bool took = false;                   ///< an estimate, so that its counts tell of the measurements
   const UpdateReport* last = nullptr;  ///< report of the last frame; null: it had ended before
   bool waits = false;                  ///< metrics need the estimates of the reference
-  std::vector<Estimate> estimates = {};  ///< where it waits
-  std::int64_t stale_inputs = 0;         ///< events `input_stale`, those that are kept too
+  std::vector<Estimate> estimates = {};   ///< where it waits
+  std::int64_t stale_inputs = 0;          ///< events `input_stale`, those that are kept too
+  std::vector<char> failed_sensors = {};  ///< under OnPluginFailure::kDisable; empty: none
+
+  /// The frame without the streams that its failed sensors alone read.
+  Frame WithoutFailed(const Frame& frame, const std::vector<StreamInfo>& streams) const;
+  /// Looks for calls that failed in a report of a frame. Why the run has to end; "" where it goes
+  /// on.
+  std::string TakeFailures(const UpdateReport& report);
 
   /// Puts the estimate of frame k into metrics and record, and shows it to who observes the run.
   void Take(std::size_t k, const Seen& seen, const State& state, const UpdateReport& report,

@@ -22,6 +22,8 @@ std::vector<std::string> TangentNames(const std::string& name, const Space& spac
       return {name + ".rx", name + ".ry", name + ".rz"};
     case GeometryKind::kUnitVector:
       return {name + ".d0", name + ".d1"};
+    case GeometryKind::kProduct:
+      return NumberedNames(name, static_cast<std::size_t>(space.geometry.tangent));
     case GeometryKind::kVector:
     case GeometryKind::kAngle:
       break;

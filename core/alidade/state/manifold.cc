@@ -2,7 +2,9 @@
 #include "alidade/state/manifold.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 #include "alidade/model/geometry.h"
 
@@ -71,6 +73,22 @@ void Identity(int size, double* j) {
   }
 }
 
+/// j, of a whole of `size`: the identity, but for the parts whose own Jacobian by(part, a, own) is
+/// none.
+template <class By>
+void ByParts(const Geometry& whole, double* j, const By& by) {
+  const int size = whole.tangent;
+  Identity(size, j);
+  whole.ForEachPart([&](const Geometry& part, int a, int t) {
+    if (part.ambient == part.tangent) return;  // a vector or an angle
+    std::array<double, 9> own;
+    by(part, a, t, own.data());
+    for (int row = 0; row < part.tangent; ++row) {
+      std::copy_n(own.data() + row * part.tangent, part.tangent, j + (t + row) * size + t);
+    }
+  });
+}
+
 }  // namespace
 
 const char* ToString(GeometryKind kind) {
@@ -82,16 +100,33 @@ const char* ToString(GeometryKind kind) {
     case GeometryKind::kUnitQuaternion:
       return "unit_quaternion";
     case GeometryKind::kUnitVector:
+      return "unit_vector";
+    case GeometryKind::kProduct:
       break;
   }
-  return "unit_vector";
+  return "product";
 }
 
 std::string ToString(const Geometry& geometry) {
-  const std::string name = ToString(geometry.kind);
-  return geometry.kind == GeometryKind::kVector
-             ? name + '(' + std::to_string(geometry.ambient) + ')'
-             : name;
+  std::string name = ToString(geometry.kind);
+  if (geometry.kind == GeometryKind::kVector) {
+    name += '(' + std::to_string(geometry.ambient) + ')';
+  } else if (geometry.kind == GeometryKind::kProduct) {
+    for (const Geometry& part : geometry.parts) {
+      name += (&part == &geometry.parts.front() ? "(" : ", ") + ToString(part);
+    }
+    name += ')';
+  }
+  return name;
+}
+
+Geometry Geometry::Product(std::vector<Geometry> parts) {
+  Geometry whole{GeometryKind::kProduct, 0, 0, std::move(parts)};
+  for (const Geometry& part : whole.parts) {
+    whole.ambient += part.ambient;
+    whole.tangent += part.tangent;
+  }
+  return whole;
 }
 
 void Geometry::Plus(const double* x, const double* d, double* y) const {
@@ -104,6 +139,9 @@ void Geometry::Plus(const double* x, const double* d, double* y) const {
       return UnitPlus<alidade::UnitQuaternion>(x, d, y);
     case GeometryKind::kUnitVector:
       return UnitPlus<alidade::UnitVector>(x, d, y);
+    case GeometryKind::kProduct:
+      return ForEachPart(
+          [&](const Geometry& part, int a, int t) { part.Plus(x + a, d + t, y + a); });
   }
 }
 
@@ -117,26 +155,45 @@ void Geometry::Minus(const double* y, const double* x, double* d) const {
       return alidade::UnitQuaternion::Minus(y, x, d);
     case GeometryKind::kUnitVector:
       return alidade::UnitVector::Minus(y, x, d);
+    case GeometryKind::kProduct:
+      return ForEachPart(
+          [&](const Geometry& part, int a, int t) { part.Minus(y + a, x + a, d + t); });
   }
 }
 
 void Geometry::Transport(const double* from, const double* to, double* j) const {
   if (kind == GeometryKind::kUnitVector) return alidade::UnitVector::Transport(from, to, j);
-  alidade::Identity(tangent, j);
+  ByParts(*this, j, [&](const Geometry& part, int a, int, double* own) {
+    part.kind == GeometryKind::kUnitVector ? part.Transport(from + a, to + a, own)
+                                           : alidade::Identity(part.tangent, own);
+  });
 }
 
 void Geometry::PlusJacobian(const double* x, const double* d, double* j) const {
   if (kind == GeometryKind::kUnitQuaternion) return RightJacobian(d, j);
   if (kind == GeometryKind::kUnitVector) return UnitVectorPlusJacobian(x, d, j);
-  alidade::Identity(tangent, j);
+  ByParts(*this, j, [&](const Geometry& part, int a, int t, double* own) {
+    part.PlusJacobian(x + a, d + t, own);
+  });
 }
 
 double Geometry::Defect(const double* x) const {
+  if (kind == GeometryKind::kProduct) {
+    double worst = 0.0;
+    ForEachPart([&](const Geometry& part, int a, int) {
+      const double defect = part.Defect(x + a);
+      if (!(defect <= worst)) worst = defect;
+    });
+    return worst;
+  }
   const bool unit = kind == GeometryKind::kUnitQuaternion || kind == GeometryKind::kUnitVector;
   return unit ? std::abs(Norm(x, ambient) - 1.0) : 0.0;
 }
 
 void Geometry::Normalise(double* x) const {
+  if (kind == GeometryKind::kProduct) {
+    return ForEachPart([&](const Geometry& part, int a, int) { part.Normalise(x + a); });
+  }
   if (kind == GeometryKind::kAngle) x[0] = alidade::Angle::Wrap(x[0]);
   if (Defect(x) == 0.0) return;
   const double norm = Norm(x, ambient);
@@ -147,7 +204,16 @@ void Geometry::Normalise(double* x) const {
   }
 }
 
+void Geometry::WrapAngles(double* x) const {
+  ForEachPart([&](const Geometry& part, int a, int) {
+    if (part.kind == GeometryKind::kAngle) x[a] = alidade::Angle::Wrap(x[a]);
+  });
+}
+
 void Geometry::Identity(double* x) const {
+  if (kind == GeometryKind::kProduct) {
+    return ForEachPart([&](const Geometry& part, int a, int) { part.Identity(x + a); });
+  }
   std::fill_n(x, ambient, 0.0);
   if (kind == GeometryKind::kUnitQuaternion) x[0] = 1.0;
   if (kind == GeometryKind::kUnitVector) x[2] = 1.0;

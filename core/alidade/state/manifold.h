@@ -14,8 +14,9 @@ enum class GeometryKind : std::uint32_t {
   kAngle = ALIDADE_ANGLE,
   kUnitQuaternion = ALIDADE_UNIT_QUATERNION,
   kUnitVector = ALIDADE_UNIT_VECTOR,
+  kProduct = ALIDADE_PRODUCT,
 };
-/// `vector`, `angle`, `unit_quaternion`, `unit_vector`.
+/// `vector`, `angle`, `unit_quaternion`, `unit_vector`, `product`.
 const char* ToString(GeometryKind kind);
 
 /// How far the length of a unit vector or quaternion that comes from outside may be off 1.
@@ -26,12 +27,27 @@ struct Geometry {
   GeometryKind kind = GeometryKind::kVector;
   int ambient = 1;
   int tangent = 1;
+  std::vector<Geometry> parts = {};  ///< of a product
 
   /// The geometries of geometry.h by name.
   static Geometry Vector(int size) { return {GeometryKind::kVector, size, size}; }
   static Geometry UnitQuaternion() { return {GeometryKind::kUnitQuaternion, 4, 3}; }
   static Geometry UnitVector() { return {GeometryKind::kUnitVector, 3, 2}; }
   static Geometry Angle() { return {GeometryKind::kAngle, 1, 1}; }
+  static Geometry Product(std::vector<Geometry> parts);
+
+  /// f(part, ambient offset, tangent offset) for each part of a product; of another geometry for
+  /// itself.
+  template <class F>
+  void ForEachPart(const F& f) const {
+    if (kind != GeometryKind::kProduct) return f(*this, 0, 0);
+    int a = 0, t = 0;
+    for (const Geometry& part : parts) {
+      f(part, a, t);
+      a += part.ambient;
+      t += part.tangent;
+    }
+  }
 
   /// y = x (+) d; x and y may be the same. The result lies on the manifold to rounding.
   void Plus(const double* x, const double* d, double* y) const;
@@ -43,17 +59,20 @@ struct Geometry {
   /// j (tangent x tangent, row-major) = d(x (+) d)/dd, in the tangent space at x (+) d: the
   /// identity for vectors and angles, and where d = 0.
   void PlusJacobian(const double* x, const double* d, double* j) const;
-  /// Distance of x from the manifold: 0 for vectors, | |x| - 1 | for unit vectors and quaternions.
+  /// Distance of x from the manifold: 0 for vectors, | |x| - 1 | for unit vectors and quaternions,
+  /// that of the farthest part for products.
   double Defect(const double* x) const;
   /// The nearest point of the manifold; an angle is wrapped.
   void Normalise(double* x) const;
+  /// Wraps what is an angle, and leaves the rest.
+  void WrapAngles(double* x) const;
   /// The neutral element: zeros, (1, 0, 0, 0), (0, 0, 1).
   void Identity(double* x) const;
 
   friend bool operator==(const Geometry&, const Geometry&) = default;
 };
 
-/// `vector(3)`, `angle`, `unit_quaternion`, `unit_vector`.
+/// `vector(3)`, `angle`, `unit_quaternion`, `unit_vector`, `product(vector(3), unit_quaternion)`.
 std::string ToString(const Geometry& geometry);
 
 /// A named quantity with its geometry: a role, a measurement, a control input, a state block.
@@ -63,7 +82,8 @@ struct Space {
   std::string doc;
   std::vector<std::string> elements;  ///< names of the ambient elements; {""} for a single one
   Geometry geometry;
-  unsigned flags = 0;  ///< ALIDADE_ROLE_*
+  unsigned flags = 0;                   ///< ALIDADE_ROLE_*
+  std::vector<std::string> parts = {};  ///< names of those of a product
 
   bool optional() const { return (flags & ALIDADE_ROLE_OPTIONAL) != 0; }
   bool landmark() const { return (flags & ALIDADE_ROLE_LANDMARK) != 0; }

@@ -170,39 +170,50 @@ class RowSpace {
   Eigen::Index rank_ = 0;
 };
 
-/// Adds the rows H phi of every sensor that is defined at the values, in units of the prior sigma.
-void Observe(const System& system, const Trajectory& t, const Eigen::MatrixXd& phi,
-             RowSpace& rows) {
+/// Adds the rows H phi of a sensor, where it is defined at the values, in units of the prior sigma.
+void ObserveBy(const SensorBinding& sensor, const double* known, const System& system,
+               const Trajectory& t, const Eigen::MatrixXd& phi, RowSpace& rows) {
   const Eigen::Map<const Eigen::RowVectorXd> scale(t.scale.data(), phi.cols());
+  const int m = sensor.model.measurement().geometry.tangent;
+  std::vector<const double*> roles;
+  std::vector<RowMajor> j;
+  for (const RoleBinding& role : sensor.roles) {
+    roles.push_back(role.block < 0 ? nullptr
+                                   : t.values[static_cast<std::size_t>(role.block)].data());
+    j.push_back(
+        RowMajor::Zero(m, role.block < 0 ? 1 : system.layout[role.block].geometry().tangent));
+  }
+  std::vector<double*> data;
+  std::vector<int> strides;
+  for (RowMajor& block : j) {
+    data.push_back(block.data());
+    strides.push_back(static_cast<int>(block.cols()));
+  }
+  std::vector<double> z(static_cast<std::size_t>(sensor.model.measurement().geometry.ambient));
+  if (sensor.model.Linearise(roles.data(), z.data(), data.data(), strides.data(), known) !=
+      Status::kOk) {
+    return;
+  }
+  Eigen::MatrixXd seen = Eigen::MatrixXd::Zero(m, phi.cols());
+  for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
+    const RoleBinding& role = sensor.roles[i];
+    if (role.block < 0 || role.mode == RoleMode::kKnown) continue;
+    const int column = t.columns[static_cast<std::size_t>(role.block)];
+    if (column >= 0) seen += j[i] * phi.middleRows(column, j[i].cols());
+  }
+  for (Eigen::Index i = 0; i < m; ++i) rows.Add(seen.row(i).cwiseProduct(scale));
+}
+
+/// The same of every sensor; known numbers are any, as several measurements bring them.
+void Observe(const System& system, const Trajectory& t, const Eigen::MatrixXd& phi, Random& random,
+             RowSpace& rows) {
+  constexpr int kMeasurements = 4;
   for (const SensorBinding& sensor : system.sensors) {
-    const int m = sensor.model.measurement().geometry.tangent;
-    std::vector<const double*> roles;
-    std::vector<RowMajor> j;
-    for (const RoleBinding& role : sensor.roles) {
-      roles.push_back(role.block < 0 ? nullptr
-                                     : t.values[static_cast<std::size_t>(role.block)].data());
-      j.push_back(
-          RowMajor::Zero(m, role.block < 0 ? 1 : system.layout[role.block].geometry().tangent));
+    std::vector<double> known(static_cast<std::size_t>(sensor.model.known_size()));
+    for (int i = 0; i < (known.empty() ? 1 : kMeasurements); ++i) {
+      for (double& number : known) number = random.Normal();
+      ObserveBy(sensor, known.data(), system, t, phi, rows);
     }
-    std::vector<double*> data;
-    std::vector<int> strides;
-    for (RowMajor& block : j) {
-      data.push_back(block.data());
-      strides.push_back(static_cast<int>(block.cols()));
-    }
-    std::vector<double> z(static_cast<std::size_t>(sensor.model.measurement().geometry.ambient));
-    if (sensor.model.Linearise(roles.data(), z.data(), data.data(), strides.data()) !=
-        Status::kOk) {
-      continue;
-    }
-    Eigen::MatrixXd seen = Eigen::MatrixXd::Zero(m, phi.cols());
-    for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
-      const RoleBinding& role = sensor.roles[i];
-      if (role.block < 0 || role.mode == RoleMode::kKnown) continue;
-      const int column = t.columns[static_cast<std::size_t>(role.block)];
-      if (column >= 0) seen += j[i] * phi.middleRows(column, j[i].cols());
-    }
-    for (Eigen::Index i = 0; i < m; ++i) rows.Add(seen.row(i).cwiseProduct(scale));
   }
 }
 
@@ -318,13 +329,13 @@ std::vector<std::vector<std::string>> internal::UnobservableDirections(const Sys
   Eigen::MatrixXd phi = Eigen::MatrixXd::Identity(n, n);
   RowSpace rows(n);
   if (with) AddKnown(*with, t, rows);
-  Random random(1);
+  Random random(1), known(2);
   Random* const changing = excitation == Excitation::kChanging ? &random : nullptr;
   // Once a step adds nothing to the rank, later ones do not either: what holds from this state and
   // for these inputs, which are not special, holds from the next ones. Twice, as trajectories turn.
   for (int idle = 0; idle < kIdleSteps && rows.rank() < n;) {
     const Eigen::Index before = rows.rank();
-    Observe(system, t, phi, rows);
+    Observe(system, t, phi, known, rows);
     idle = rows.rank() == before ? idle + 1 : 0;
     if (!Advance(system, kStep, changing, t, phi)) break;
   }

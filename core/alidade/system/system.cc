@@ -2,13 +2,16 @@
 #include "alidade/system/system.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <limits>
 
 #include "alidade/base/words.h"
 #include "alidade/config/tree.h"
 #include "alidade/state/quaternion_sign.h"
+#include "alidade/system/owned_state.h"
 #include "alidade/system/read_landmarks.h"
+#include "alidade/system/time_offset.h"
 
 namespace alidade {
 namespace {
@@ -169,6 +172,144 @@ void ReadStateEntry(const std::string& name, const Node& entry, const PluginHost
   system.motions.push_back(std::move(binding));
 }
 
+/// One standard deviation, or one for each of `size` elements, as the square root of a covariance.
+std::vector<double> ReadSqrtDiagonal(const Node& node, int size) {
+  const auto n = static_cast<std::size_t>(size);
+  std::vector<double> sigma = node.Numbers();
+  if (sigma.size() == 1) sigma.assign(n, sigma[0]);
+  if (sigma.size() != n) {
+    node.Fail(std::to_string(sigma.size()) + " numbers", std::to_string(size) + ", or one");
+  }
+  std::vector<double> root(n * n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (sigma[i] < 0.0) node.Fail("negative", ">= 0");
+    root[i * n + i] = sigma[i];
+  }
+  return root;
+}
+
+/// `constant`, {random_walk: sigma after one second} or {gauss_markov: {sigma, time_constant_s}},
+/// sigma that of the stationary process.
+void ReadDynamics(const Node& node, int size, OwnedRole& owned) {
+  owned.dynamics = OwnedDynamics::kConstant;
+  owned.sqrt_density.clear();
+  if (!node.is_map()) {
+    static_cast<void>(node.Choice({"constant"}));
+    return;
+  }
+  const auto walk = node.Find("random_walk"), markov = node.Find("gauss_markov");
+  if (walk.has_value() == markov.has_value()) {
+    node.RejectUnread();
+    node.Fail("not one kind of dynamics",
+              "constant, {random_walk: SIGMA}, or {gauss_markov: {sigma: SIGMA, "
+              "time_constant_s: S}}");
+  }
+  node.RejectUnread();
+  if (walk) {
+    owned.dynamics = OwnedDynamics::kRandomWalk;
+    owned.sqrt_density = ReadSqrtDiagonal(*walk, size);
+    return;
+  }
+  constexpr double kMostSeconds = 1e9;
+  owned.dynamics = OwnedDynamics::kGaussMarkov;
+  owned.time_constant_s =
+      markov->At("time_constant_s", "gauss_markov").Number(0.0, kMostSeconds, true);
+  owned.sqrt_density = ReadSqrtDiagonal(markov->At("sigma", "gauss_markov"), size);
+  for (double& one : owned.sqrt_density) one *= std::sqrt(2.0 / owned.time_constant_s);
+  markov->RejectUnread();
+}
+
+/// What a sensor entry says of the states that the sensor owns: `initial` and `dynamics` by role,
+/// `consider` and `constant` as lists, `time_offset_s`. Where it says nothing the model does.
+class OwnedReader {
+  static constexpr const char* kTimeOffset = "time_offset";
+
+ public:
+  OwnedReader(std::string name, const Node& entry, const SensorModel& model)
+      : name_(std::move(name)), entry_(entry), offset_(entry.Find("time_offset_s")) {
+    std::vector<std::string> owned;
+    for (const Space& role : model.roles()) {
+      if ((role.flags & ALIDADE_ROLE_OWNED) != 0) owned.push_back(role.name);
+    }
+    if (offset_) owned.emplace_back(kTimeOffset);
+    if (owned.empty()) return;
+    considered_ = ReadNames(entry, "consider", owned);
+    constant_ = ReadNames(entry, "constant", owned);
+    for (const char* key : {"initial", "dynamics"}) entry.Declare(key);
+    initial_ = entry.Find("initial");
+    dynamics_ = entry.Find("dynamics");
+  }
+
+  /// Declares the block of a role, `SENSOR.ROLE`, with its prior and its motion.
+  BlockId Add(const Space& role, OwnedRole owned, System& system) {
+    if (system.layout.Find(name_ + '.' + role.name) >= 0) {
+      entry_.Fail("it brings the state '" + name_ + '.' + role.name +
+                      "', which a state entry of its name has",
+                  "another name for the sensor, or the role bound under `roles`");
+    }
+    const bool is_offset = role.name == kTimeOffset;
+    const auto own = is_offset  ? (offset_->is_map() ? offset_ : std::nullopt)
+                     : initial_ ? initial_->Find(role.name)
+                                : std::nullopt;
+    const bool considered = Contains(considered_, role.name);
+    const bool constant = Contains(constant_, role.name) || (!own && owned.sqrt_prior.empty());
+    if (considered && constant) {
+      entry_.At("consider")
+          .Fail("'" + role.name + "' is constant: it has no uncertainty",
+                "`initial` with a sigma, and `constant` without it");
+    }
+    const BlockId id = system.layout.Declare(name_ + '.' + role.name, name_, role,
+                                             constant     ? BlockStatus::kConstant
+                                             : considered ? BlockStatus::kConsider
+                                                          : BlockStatus::kEstimated);
+    if (own) {
+      if (const auto from = own->Find("from_measurement")) {
+        from->Fail("a state that a sensor owns starts from no measurement", "mean and sigma");
+      }
+      ReadPrior(*own, system.layout[id], id, system);
+      owned.mean = system.priors.back().mean;
+    } else {
+      const int n = role.geometry.tangent;
+      Prior prior{id, owned.mean, {}, {}};
+      if (!constant) {
+        const Eigen::Map<const RowMajor> root(owned.sqrt_prior.data(), n, n);
+        prior.covariance = root * root.transpose();
+      }
+      system.priors.push_back(std::move(prior));
+    }
+    if (const auto dynamics = dynamics_ ? dynamics_->Find(role.name) : std::nullopt) {
+      ReadDynamics(*dynamics, role.geometry.tangent, owned);
+    }
+    if (constant) owned.dynamics = OwnedDynamics::kConstant;
+    system.motions.push_back(
+        {name_, internal::OwnedMotion(role.geometry, owned, "owned_state"), {id}});
+    return id;
+  }
+
+  /// The time offset of a sensor whose roles are bound; nothing where none is given.
+  void AddTimeOffset(System& system, SensorBinding& sensor) {
+    if (!offset_) return;
+    OwnedRole at_first;
+    at_first.mean = {offset_->is_map() ? 0.0 : offset_->Number()};
+    const Space space{
+        kTimeOffset, "s", "added to the timestamps of the sensor", {""}, Geometry::Vector(1)};
+    const std::string why =
+        internal::OffsetInTime(system, Add(space, std::move(at_first), system), sensor);
+    if (!why.empty()) offset_->Fail(why, "the key left out");
+  }
+
+  void RejectUnread() const {
+    if (initial_) initial_->RejectUnread();
+    if (dynamics_) dynamics_->RejectUnread();
+  }
+
+ private:
+  std::string name_;
+  Node entry_;
+  std::optional<Node> offset_, initial_, dynamics_;
+  std::vector<std::string> considered_, constant_;
+};
+
 BlockId FindBlock(const Node& node, const System& system) {
   const std::string name = node.Text();
   const BlockId id = system.layout.Find(name);
@@ -224,7 +365,7 @@ RobustLoss ReadLoss(const Node& node) {
 }
 
 SensorBinding ReadSensor(const std::string& name, const Node& entry, const PluginHost& host,
-                         const System& system) {
+                         System& system) {
   const std::string model_name = entry.At("model", "a sensor entry").Text();
   SensorBinding binding{name,
                         entry.At("stream", "sensor '" + name + "'").Text(),
@@ -233,12 +374,18 @@ SensorBinding ReadSensor(const std::string& name, const Node& entry, const Plugi
                         {}};
   if (const auto loss = entry.Find("loss")) binding.loss = ReadLoss(*loss);
   const Node roles = entry.At("roles", "sensor '" + name + "'");
-  for (const Space& role : binding.model.roles()) {
+  OwnedReader owned(name, entry, binding.model);
+  for (std::size_t i = 0; i < binding.model.roles().size(); ++i) {
+    const Space& role = binding.model.roles()[i];
     if (role.landmark()) {
       binding.roles.push_back({});
       continue;
     }
     const auto node = roles.Find(role.name);
+    if (!node && (role.flags & ALIDADE_ROLE_OWNED) != 0) {
+      binding.roles.push_back({owned.Add(role, binding.model.instance().owned(i), system)});
+      continue;
+    }
     if (!node && role.optional()) {
       binding.roles.push_back({});
       continue;
@@ -253,7 +400,9 @@ SensorBinding ReadSensor(const std::string& name, const Node& entry, const Plugi
     }
   }
   if (binding.model.has_landmark()) internal::ReadLandmarkKeys(entry, host, binding);
+  owned.AddTimeOffset(system, binding);
   roles.RejectUnread();
+  owned.RejectUnread();
   entry.RejectUnread();
   return binding;
 }

@@ -358,7 +358,7 @@ void CondensedRun::Report(std::size_t k, const Point& point, UpdateReport& repor
       entry.h.clear();
       continue;
     }
-    if (geometry.kind == GeometryKind::kAngle) geometry.Normalise(entry.h.data());
+    geometry.WrapAngles(entry.h.data());
     entry.innovation.resize(static_cast<std::size_t>(geometry.tangent));
     geometry.Minus(entry.z.data(), entry.h.data(), entry.innovation.data());
   }

@@ -16,15 +16,23 @@ namespace {
 
 /// d = z (-) h and, unless null, j = dd/dh (row-major), in the tangent at h.
 void Difference(const Geometry& geometry, const double* z, const double* h, double* d, double* j) {
-  if (geometry.kind == GeometryKind::kUnitQuaternion) {
-    ceres_batch::Difference<UnitQuaternion>(z, h, d, j);
-  } else if (geometry.kind == GeometryKind::kUnitVector) {
-    ceres_batch::Difference<UnitVector>(z, h, d, j);
-  } else {
-    const int t = geometry.tangent;
-    geometry.Minus(z, h, d);
-    if (j != nullptr) Eigen::Map<RowMajor>(j, t, t) = -RowMajor::Identity(t, t);
-  }
+  const int size = geometry.tangent;
+  geometry.Minus(z, h, d);
+  if (j == nullptr) return;
+  Eigen::Map<RowMajor> whole(j, size, size);
+  whole = -RowMajor::Identity(size, size);
+  geometry.ForEachPart([&](const Geometry& part, int a, int t) {
+    double unused[3], own[9];
+    if (part.kind == GeometryKind::kUnitQuaternion) {
+      ceres_batch::Difference<UnitQuaternion>(z + a, h + a, unused, own);
+    } else if (part.kind == GeometryKind::kUnitVector) {
+      ceres_batch::Difference<UnitVector>(z + a, h + a, unused, own);
+    } else {
+      return;
+    }
+    whole.block(t, t, part.tangent, part.tangent) =
+        Eigen::Map<const RowMajor>(own, part.tangent, part.tangent);
+  });
 }
 
 /// Why a sensor model gives nothing.
@@ -78,14 +86,15 @@ bool CondensedRun::Invert(const Factor& factor, const Eigen::VectorXd& d, const 
   const Geometry& measured = sensor.model.measurement().geometry;
   const internal::SensorPlace& place =
       binding_.sensor_places[static_cast<std::size_t>(factor.sensor)];
-  std::vector<double> z = factor.measurement.values;
+  Measurement measurement = factor.measurement;
+  double* const z = measurement.values.data();
   RowMajor j_plus(measured.tangent, measured.tangent);
-  measured.PlusJacobian(z.data(), d.data(), j_plus.data());
-  measured.Plus(z.data(), d.data(), z.data());
+  measured.PlusJacobian(z, d.data(), j_plus.data());
+  measured.Plus(z, d.data(), z);
   std::vector<const double*> roles;
   internal::RolesAt(sensor, place, point.x, point.x, roles);
   internal::Inverse at;
-  const Outcome outcome = internal::InvertAt(sensor, place, z.data(), prior, roles, at);
+  const Outcome outcome = internal::InvertAt(sensor, place, measurement, prior, roles, at);
   if (outcome != Outcome::kAccepted) {
     return Fail("sensor '" + sensor.name + "' gives " + name +
                 " no first value: " + Why(outcome, sensor.model));
@@ -135,8 +144,8 @@ std::vector<const double*> CondensedRun::RolesOf(const Factor& factor,
 Outcome CondensedRun::See(const Factor& factor, const std::vector<double>& x,
                           std::vector<double>& h, std::vector<double>* jacobian) const {
   std::vector<double*> memory;
-  return internal::EvaluateAt(*factor.model, *factor.place, RolesOf(factor, x).data(), memory, h,
-                              jacobian);
+  return internal::EvaluateAt(*factor.model, *factor.place, factor.measurement,
+                              RolesOf(factor, x).data(), memory, h, jacobian);
 }
 
 /// r = L^-1 (z (-) h), m, and unless null a = dr/dx, m x n, that of its landmark behind.

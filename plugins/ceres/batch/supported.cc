@@ -10,7 +10,8 @@ namespace {
 std::string KeyOf(const Unsupported& asked, const System& system) {
   if (asked.block >= 0) {
     const Block& block = system.layout[asked.block];
-    return "state." + block.owner + ".consider names '" + block.name + "'";
+    const std::string entry = system.FindSensor(block.owner) >= 0 ? "sensors." : "state.";
+    return entry + block.owner + ".consider names '" + block.name + "'";
   }
   if (asked.sensor < 0) return "landmarks";
   const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(asked.sensor)];

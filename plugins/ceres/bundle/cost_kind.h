@@ -23,13 +23,19 @@ struct JacobianElement {
 
 namespace detail {
 
+/// The geometry of a measurement, which is no product.
+struct Measured {
+  GeometryKind kind;
+  int ambient, tangent;
+};
+
 /// What is asked of a sensor: a model of alidade/model/model.h, which the compiler sees through.
 template <class Sensor>
 struct SensorTraits {
   using Z = typename Sensor::Measurement;
   using Roles = alidade::detail::Blocks<Sensor>;
   static constexpr int kMaxRoles = Roles::kCount;
-  static constexpr Geometry Measured(const Sensor&) {
+  static constexpr detail::Measured Measured(const Sensor&) {
     return {GeometryKind{Z::kGeometry}, Z::kAmbient, Z::kTangent};
   }
   static std::vector<Geometry> Geometries(const Sensor&) {
@@ -53,7 +59,10 @@ struct SensorTraits {
 template <>
 struct SensorTraits<SensorModel> {
   static constexpr int kMaxRoles = 64;  // as many as a model may have
-  static Geometry Measured(const SensorModel& sensor) { return sensor.measurement().geometry; }
+  static detail::Measured Measured(const SensorModel& sensor) {
+    const Geometry& z = sensor.measurement().geometry;
+    return {z.kind, z.ambient, z.tangent};
+  }
   static std::vector<Geometry> Geometries(const SensorModel& sensor) {
     std::vector<Geometry> all;
     for (const Space& role : sensor.roles()) all.push_back(role.geometry);
@@ -114,7 +123,7 @@ struct CostKind {
 
   int role_count() const { return kStatic ? Traits::kMaxRoles : role_count_; }
   /// The geometry of z.
-  Geometry measured() const { return kStatic ? Traits::Measured(sensor) : measured_; }
+  detail::Measured measured() const { return kStatic ? Traits::Measured(sensor) : measured_; }
 
   const Sensor& sensor;
   double scale = 1.0;
@@ -129,7 +138,7 @@ struct CostKind {
   /// Of a model that the compiler sees through they are constants.
   static constexpr bool kStatic = !std::is_same_v<Sensor, SensorModel>;
   int role_count_ = 0;
-  Geometry measured_ = Traits::Measured(sensor);
+  detail::Measured measured_ = Traits::Measured(sensor);
 };
 
 }  // namespace alidade::ceres_batch

@@ -51,6 +51,42 @@ void ExpectSame(const State& a, const State& b) {
   EXPECT_EQ(a.covariance().Dense(), b.covariance().Dense());
 }
 
+/// The distance to a beacon whose place comes with the measurement.
+struct Beacon : Sensor<Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  using Known = Vec<1>;
+  static constexpr Quantity kKnown{"beacon"};
+  template <class T>
+  bool Predict(const T* x, const double* beacon, T* z) const {
+    z[0] = x[0] - beacon[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const double* beacon, T* l) const {
+    l[0] = T(0.1 * beacon[0]);
+  }
+  bool Valid(const double* beacon, const double*) const { return beacon[0] > 0.0; }
+};
+
+// x = 1 +- 2; z = x - 3 +- 0.3, so that S = 4.09 and x' = 1 + 4 / 4.09 (z + 2).
+TEST(LiveKnown, ComesWithAReadingAndIsNeededForAPrediction) {
+  System system = MovingPoint();
+  AddSensor(system, "z", InProcessSensor(Beacon(), "beacon"), {"p.x"});
+  Ekf filter(system, {}, StreamsOf(system));
+  EXPECT_THROW(filter.Push(0, {{0, {-1.5}}}), Error);
+  EXPECT_THROW(static_cast<void>(filter.Expect("z", 0)), Error);
+  const auto expected = filter.Expect("z", 0, -1, {3.0});
+  ASSERT_TRUE(expected);
+  EXPECT_DOUBLE_EQ(expected->z[0], -2.0);
+  EXPECT_DOUBLE_EQ(expected->s(0, 0), 4.09);
+  const UpdateReport& report =
+      filter.Push(0, {{0, {-1.5}, -1, {}, {3.0}}, {0, {7.0}, -1, {}, {-3.0}}});
+  EXPECT_EQ(report.measurements()[0].outcome, Outcome::kAccepted);
+  EXPECT_EQ(report.measurements()[1].outcome, Outcome::kInvalid);
+  EXPECT_NEAR(ValueOf(filter.state(), "p.x"), 1.0 + 4.0 / 4.09 * 0.5, 1e-15);
+}
+
 template <class Type>
 class Live : public ::testing::Test {};
 using Recursive = ::testing::Types<Ekf, Iekf, SquareRootEkf, Ukf>;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cstddef>
+#include <limits>
 #include <memory>
 #include <string>
 
@@ -38,7 +39,27 @@ struct HandWritten {
     instance.description = &description;
     instance.sensor = &sensor;
   }
-  AlidadeSpace role{}, output{};
+  /// Makes a space a product of two scalars, `a` and `b`.
+  void Divide(AlidadeSpace& space) {
+    parts[0] = parts[1] = output;
+    parts[0].name = "a";
+    parts[1].name = "b";
+    space.geometry = ALIDADE_PRODUCT;
+    space.ambient = space.tangent = 2;
+    space.parts = parts;
+    space.part_count = 2;
+    space.part_stride = sizeof(AlidadeSpace);
+  }
+  /// Makes the role a state of the sensor.
+  AlidadeOwned& Own() {
+    owned.struct_size = sizeof(owned);
+    role.flags = ALIDADE_ROLE_OWNED;
+    role.owned = &owned;
+    return owned;
+  }
+
+  AlidadeSpace role{}, output{}, parts[2] = {};
+  AlidadeOwned owned{};
   AlidadeDescription description{};
   AlidadeSensor sensor{};
   AlidadeInstance instance{};
@@ -85,6 +106,46 @@ TEST(ModelInstance, ReadsNoFurtherThanAStructSays) {
   EXPECT_EQ(sensor.roles()[0].unit, "");
   const double z = 0.0;
   EXPECT_EQ(sensor.Valid(&z), Status::kOk);
+}
+
+TEST(ModelInstance, ReadsTheMeasurementsPartsWhatComesWithItAndWhatItsSensorOwns) {
+  HandWritten hand;
+  hand.Divide(hand.output);
+  hand.parts[1].geometry = ALIDADE_UNIT_VECTOR;
+  hand.parts[1].ambient = 3;
+  hand.parts[1].tangent = 2;
+  hand.output.ambient = 4;
+  hand.output.tangent = 3;
+  hand.description.known = &hand.parts[0];
+  const double mean = 2.0, root = 3.0, density = 0.5;
+  AlidadeOwned& owned = hand.Own();
+  owned.dynamics = ALIDADE_GAUSS_MARKOV;
+  owned.mean = &mean;
+  owned.sqrt_prior = &root;
+  owned.sqrt_density = &density;
+  owned.time_constant_s = 10.0;
+  const auto instance = std::make_shared<const ModelInstance>(hand.instance, "m", "p.so");
+  const SensorModel sensor(instance);
+  EXPECT_EQ(sensor.measurement().geometry,
+            Geometry::Product({Geometry::Vector(1), Geometry::UnitVector()}));
+  EXPECT_EQ(sensor.measurement().elements, (std::vector<std::string>{"a", "b.x", "b.y", "b.z"}));
+  EXPECT_EQ(sensor.known_size(), 1);
+  const OwnedRole own = instance->owned(0);
+  EXPECT_EQ(own.mean, std::vector<double>{2.0});
+  EXPECT_EQ(own.sqrt_prior, std::vector<double>{3.0});
+  EXPECT_EQ(own.sqrt_density, std::vector<double>{0.5});
+  EXPECT_EQ(own.dynamics, OwnedDynamics::kGaussMarkov);
+  EXPECT_EQ(own.time_constant_s, 10.0);
+}
+
+TEST(ModelInstance, WhatASensorOwnsIsConstantAtTheNeutralElementUnlessItSaysElse) {
+  HandWritten hand;
+  hand.role.flags = ALIDADE_ROLE_OWNED;
+  const ModelInstance instance(hand.instance, "m", "p.so");
+  const OwnedRole own = instance.owned(0);
+  EXPECT_EQ(own.mean, std::vector<double>{0.0});
+  EXPECT_TRUE(own.sqrt_prior.empty());
+  EXPECT_EQ(own.dynamics, OwnedDynamics::kConstant);
 }
 
 TEST(ModelInstance, IgnoresHintsThatItDoesNotKnow) {
@@ -136,21 +197,93 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
       {"has geometry 3 with sizes 1 and 1", [](HandWritten& h) { h.role.geometry = 3; }},
       {"the measurement has geometry 0", [](HandWritten& h) { h.output.geometry = 0; }},
       {"names its elements 'a,b', but has 1", [](HandWritten& h) { h.role.elements = "a,b"; }},
-      {"is a model parameter state of the sensor",
-       [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_OWNED; }},
+      {"role 'x' is a product: each part",
+       [](HandWritten& h) {
+         h.role.geometry = ALIDADE_PRODUCT;
+         h.Divide(h.role);
+       }},
+      {"the measurement does not describe the parts of its product",
+       [](HandWritten& h) { h.output.geometry = ALIDADE_PRODUCT; }},
+      {"the measurement has parts, but is no product",
+       [](HandWritten& h) {
+         h.Divide(h.output);
+         h.output.geometry = ALIDADE_VECTOR;
+       }},
+      {"does not describe the parts",
+       [](HandWritten& h) {
+         h.Divide(h.output);
+         h.output.part_stride = 4;
+       }},
+      {"has geometry 5 with sizes 2 and 3",
+       [](HandWritten& h) {
+         h.Divide(h.output);
+         h.output.tangent = 3;
+       }},
+      {"has a part 'b' that is a product",
+       [](HandWritten& h) {
+         h.Divide(h.output);
+         h.parts[1].geometry = ALIDADE_PRODUCT;
+       }},
+      {"has a part 'b' that has flags",
+       [](HandWritten& h) {
+         h.Divide(h.output);
+         h.parts[1].flags = ALIDADE_ROLE_OPTIONAL;
+       }},
+      {"has a part 'b' that has geometry 3 with sizes 1 and 1",
+       [](HandWritten& h) {
+         h.Divide(h.output);
+         h.parts[1].geometry = ALIDADE_UNIT_QUATERNION;
+       }},
+      {"has two parts of one name",
+       [](HandWritten& h) {
+         h.Divide(h.output);
+         h.parts[1].name = "a";
+       }},
+      {"names its elements, which are those of its parts",
+       [](HandWritten& h) {
+         h.Divide(h.output);
+         h.output.elements = "a,b";
+       }},
+      {"role 'x' are those of a landmark",
+       [](HandWritten& h) {
+         h.Own();
+         h.role.flags |= ALIDADE_ROLE_LANDMARK;
+       }},
+      {"role 'x' are of kind 3", [](HandWritten& h) { h.Own().dynamics = 3; }},
+      {"role 'x' are not finite",
+       [](HandWritten& h) {
+         static constexpr double kInfinite = std::numeric_limits<double>::infinity();
+         h.Own().sqrt_prior = &kInfinite;
+       }},
+      {"role 'x' have a time constant of 0 s",
+       [](HandWritten& h) { h.Own().dynamics = ALIDADE_GAUSS_MARKOV; }},
+      {"uses reserved members", [](HandWritten& h) { h.Own().reserved[3] = &h; }},
+      {"role 'x' are a motion model's own affair",
+       [](HandWritten& h) {
+         static constexpr AlidadeMotion kMotion{
+             sizeof(AlidadeMotion),
+             0,
+             [](const void*, const double* const*, const double* const*, const double*, double,
+                double* const*, double*, std::int32_t, double*, std::int32_t, double*,
+                std::int32_t) { return std::int32_t{0}; },
+             [](const void*, const double* const*, const double* const*, double, double*,
+                std::int32_t) { return std::int32_t{0}; },
+             {}};
+         h.Own();
+         h.instance.kind = ALIDADE_KIND_MOTION;
+         h.instance.motion = &kMotion;
+       }},
       {"is shared, but not", [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_SHARED; }},
-      {"role 'x' has flags that this version does not know: 0x400000",
-       [](HandWritten& h) { h.role.flags = 1u << 22; }},
-      {"role 'x' uses reserved members", [](HandWritten& h) { h.role.reserved[2] = &h; }},
+      {"role 'x' has flags that this version does not know: 0x200000",
+       [](HandWritten& h) { h.role.flags = 1u << 21; }},
+      {"role 'x' uses reserved members", [](HandWritten& h) { h.role.reserved[0] = &h; }},
       {"role 'x' uses reserved members", [](HandWritten& h) { h.role.reserved0 = 1; }},
-      {"role 'x' is a time offset, which this version",
-       [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_TIME_OFFSET; }},
       {"role 'x' is of an earlier timestamp, which this version",
        [](HandWritten& h) { h.role.flags = ALIDADE_ROLE_CLONE; }},
-      {"role 'x' has a prior and dynamics of its own",
+      {"role 'x' has a prior and dynamics, but is no state",
        [](HandWritten& h) {
-         static constexpr AlidadeOwned kOwned{};
-         h.role.owned = &kOwned;
+         h.Own();
+         h.role.flags = 0;
        }},
       {"role 'a b' has a name that is none", [](HandWritten& h) { h.role.name = "a b"; }},
       {"has a text 'doc' that is not UTF-8", [](HandWritten& h) { h.role.doc = "\xc0\xaf"; }},
@@ -168,7 +301,18 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
       {"uses reserved members", [](HandWritten& h) { h.sensor.reserved[5] = [] {}; }},
       {"needs what comes beside a measurement",
        [](HandWritten& h) { h.description.capabilities = ALIDADE_NEEDS_PAYLOAD; }},
-      {"needs known numbers", [](HandWritten& h) { h.description.known = &h.output; }},
+      {"what comes with a measurement is no vector",
+       [](HandWritten& h) {
+         static constexpr AlidadeSpace kAngle = [] {
+           AlidadeSpace space{};
+           space.struct_size = sizeof(space);
+           space.geometry = ALIDADE_ANGLE;
+           space.ambient = space.tangent = 1;
+           space.name = "k";
+           return space;
+         }();
+         h.description.known = &kAngle;
+       }},
       {"gives a residual alone",
        [](HandWritten& h) { h.description.capabilities = ALIDADE_RESIDUAL_ONLY; }},
       {"can initialise, but not what or how",

@@ -16,7 +16,7 @@ constexpr int kPoints = 200;
 // Rounding of a dozen operations on numbers up to 10.
 constexpr double kTolerance = 2e-14;
 
-using Values = std::array<double, 5>;
+using Values = std::array<double, 7>;
 
 struct Case {
   const char* name;
@@ -126,7 +126,7 @@ TEST_P(GeometryLaws, TransportIsOrthogonalAndTheIdentityAtOnePoint) {
   const int n = geometry_.tangent;
   for (int i = 0; i < kPoints; ++i) {
     const Values from = Point(), to = Point();
-    std::array<double, 25> j{}, back{}, same{};
+    std::array<double, 49> j{}, back{}, same{};
     geometry_.Transport(from.data(), to.data(), j.data());
     geometry_.Transport(to.data(), from.data(), back.data());
     geometry_.Transport(from.data(), from.data(), same.data());
@@ -142,12 +142,44 @@ TEST_P(GeometryLaws, TransportIsOrthogonalAndTheIdentityAtOnePoint) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(AllKinds, GeometryLaws,
-                         testing::Values(Case{"vector", Geometry::Vector(5), 1e9},
-                                         Case{"angle", Geometry::Angle(), kPi},
-                                         Case{"unit_quaternion", Geometry::UnitQuaternion(), kPi},
-                                         Case{"unit_vector", Geometry::UnitVector(), kPi}),
-                         [](const auto& test) { return std::string(test.param.name); });
+INSTANTIATE_TEST_SUITE_P(
+    AllKinds, GeometryLaws,
+    testing::Values(Case{"vector", Geometry::Vector(5), 1e9}, Case{"angle", Geometry::Angle(), kPi},
+                    Case{"unit_quaternion", Geometry::UnitQuaternion(), kPi},
+                    Case{"unit_vector", Geometry::UnitVector(), kPi},
+                    Case{"product",
+                         Geometry::Product({Geometry::Vector(2), Geometry::Angle(),
+                                            Geometry::UnitVector()}),
+                         kPi}),
+    [](const auto& test) { return std::string(test.param.name); });
+
+TEST(Product, IsItsPartsOneAfterTheOther) {
+  const Geometry pose = Geometry::Product({Geometry::Vector(3), Geometry::UnitQuaternion()});
+  EXPECT_EQ(pose.ambient, 7);
+  EXPECT_EQ(pose.tangent, 6);
+  EXPECT_EQ(ToString(pose), "product(vector(3), unit_quaternion)");
+  EXPECT_NE(pose, Geometry::Product({Geometry::UnitQuaternion(), Geometry::Vector(3)}));
+  const std::vector<double> x{1, 2, 3, 0.6, 0, 0.8, 0}, d{0.1, 0.2, 0.3, 0.5, -0.4, 0.3};
+  std::vector<double> y(7), back(6), j(36), part(9);
+  pose.Plus(x.data(), d.data(), y.data());
+  std::vector<double> q(4);
+  Geometry::UnitQuaternion().Plus(&x[3], &d[3], q.data());
+  EXPECT_EQ(y, (std::vector<double>{1.1, 2.2, 3.3, q[0], q[1], q[2], q[3]}));
+  pose.Minus(y.data(), x.data(), back.data());
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(back[i], d[i], 1e-15);
+  pose.PlusJacobian(x.data(), d.data(), j.data());
+  Geometry::UnitQuaternion().PlusJacobian(&x[3], &d[3], part.data());
+  for (std::size_t r = 0; r < 6; ++r) {
+    for (std::size_t c = 0; c < 6; ++c) {
+      const bool rotation = r >= 3 && c >= 3;
+      EXPECT_EQ(j[6 * r + c], rotation ? part[3 * (r - 3) + c - 3] : r == c) << r << ' ' << c;
+    }
+  }
+  std::vector<double> off{1, 2, 3, 1.2, 0, 1.6, 0};
+  EXPECT_NEAR(pose.Defect(off.data()), 1.0, 1e-15);
+  pose.Normalise(off.data());
+  EXPECT_EQ(off, x);
+}
 
 // FAULTS 84
 TEST(Angle, WrapsAtPlusAndMinusPi) {

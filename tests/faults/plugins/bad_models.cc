@@ -217,6 +217,7 @@ struct Misbehaves : Right {
     if (kWhat == 9) static_cast<void>(::dup(0));
     if (kWhat == 10) std::puts("hello");
     if (kWhat == 11) LeaveDaemon();
+    if (kWhat == 12) ::_exit(0);
     return Right::Predict(x, y, z);
   }
   /// Leaves a process that has left this one's group and session, with a name of its own.
@@ -429,16 +430,16 @@ ALIDADE_PLUGIN(SENSOR(Right, "right"), SENSOR(MayHaveBias, "may_have_bias"),
                SENSOR(ThrowsInt, "throws_int"), SENSOR(ThrowsInNoise, "throws_in_noise"),
                SENSOR(ThrowsInDestroy, "throws_in_destroy"),
                SENSOR(ThrowsInCreate, "throws_in_create"), SENSOR(Misbehaves<1>, "exits"),
-               SENSOR(Misbehaves<2>, "crashes"), SENSOR(Misbehaves<3>, "hangs"),
-               SENSOR(Misbehaves<4>, "eats_memory"), SENSOR(Misbehaves<5>, "rounds_upward"),
-               SENSOR(Misbehaves<6>, "sets_locale"), SENSOR(Misbehaves<7>, "leaks"),
-               SENSOR(Misbehaves<8>, "changes_folder"), SENSOR(Misbehaves<9>, "leaks_files"),
-               SENSOR(Misbehaves<10>, "prints"), SENSOR(Misbehaves<11>, "leaves_daemons"),
-               SENSOR(LosesItself, "loses_itself"), RAW(PastTheEnd, "past_the_end"),
-               RAW(WritesItsInput, "writes_its_input"), RAW(IgnoresStrides, "ignores_strides"),
-               RAW(WritesAndFails, "writes_and_fails"), RAW(StrangeStatus, "strange_status"),
-               RAW(NowhereDefined, "nowhere_defined"), SENSOR(Landmark<0>, "landmark"),
-               SENSOR(Landmark<1>, "wrong_landmark"),
+               SENSOR(Misbehaves<2>, "crashes"), SENSOR(Misbehaves<12>, "exits_at_once"),
+               SENSOR(Misbehaves<3>, "hangs"), SENSOR(Misbehaves<4>, "eats_memory"),
+               SENSOR(Misbehaves<5>, "rounds_upward"), SENSOR(Misbehaves<6>, "sets_locale"),
+               SENSOR(Misbehaves<7>, "leaks"), SENSOR(Misbehaves<8>, "changes_folder"),
+               SENSOR(Misbehaves<9>, "leaks_files"), SENSOR(Misbehaves<10>, "prints"),
+               SENSOR(Misbehaves<11>, "leaves_daemons"), SENSOR(LosesItself, "loses_itself"),
+               RAW(PastTheEnd, "past_the_end"), RAW(WritesItsInput, "writes_its_input"),
+               RAW(IgnoresStrides, "ignores_strides"), RAW(WritesAndFails, "writes_and_fails"),
+               RAW(StrangeStatus, "strange_status"), RAW(NowhereDefined, "nowhere_defined"),
+               SENSOR(Landmark<0>, "landmark"), SENSOR(Landmark<1>, "wrong_landmark"),
                ALIDADE_SENSOR_BY(MakePastTheLandmark, "past_the_landmark", "", ""),
                SENSOR(TwoCovers, "two_covers"), MOTION(Turning<1>, "ignores_dt"),
                MOTION(Turning<2>, "euler"), MOTION(Turning<3>, "drifts"),

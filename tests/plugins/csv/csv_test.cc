@@ -52,6 +52,23 @@ TEST_F(Csv, GainAndReciprocalScaleTheColumn) {
   EXPECT_DOUBLE_EQ(frames[0].measurements[1].values[0], 0.75);
 }
 
+// A satellite's place comes with its range; where a part of it is missing there is no measurement.
+TEST_F(Csv, ReadsKnownNumbersWithAMeasurement) {
+  const std::string config =
+      "path: a.csv\nstreams: {range: {columns: r, gain: 1e3, known: [x, y]}, other: r}\n";
+  Write("t_s,r,x,y\n0,21.5,1,2\n1,22,3,\n");
+  const auto source = Open(config);
+  EXPECT_EQ(source->streams()[0].known, 2);
+  EXPECT_EQ(source->streams()[1].known, 0);
+  const auto frames = Frames("t_s,r,x,y\n0,21.5,1,2\n1,22,3,\n", config);
+  ASSERT_EQ(Held(frames[0]), "0 1 |");
+  EXPECT_EQ(frames[0].measurements[0].values, std::vector<double>{21500.0});
+  EXPECT_EQ(frames[0].measurements[0].known, (std::vector<double>{1.0, 2.0})) << "without the gain";
+  EXPECT_TRUE(frames[0].measurements[1].known.empty());
+  ASSERT_EQ(Held(frames[1]), "1 |");
+  EXPECT_TRUE(frames[1].measurements[0].known.empty());
+}
+
 TEST_F(Csv, AcceptsCommentsCarriageReturnsAndByteOrderMark) {
   const auto frames = Frames(
       "\xEF\xBB\xBF# made by hand\r\n\r\nt_s , \"z\"\r\n# rows\r\n0, +1.5\r\n\r\n"

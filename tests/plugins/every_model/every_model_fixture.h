@@ -89,14 +89,19 @@ inline std::vector<Frame> FramesOf(const System& system, int count) {
       const Geometry& geometry = sensor.model.measurement().geometry;
       const int m = geometry.tangent;
       std::vector<double> z(static_cast<std::size_t>(geometry.ambient)), l(m * m), d(m);
-      EXPECT_EQ(sensor.model.Predict(roles.data(), z.data()), Status::kOk);
-      EXPECT_EQ(sensor.model.SqrtNoise(roles.data(), z.data(), l.data()), Status::kOk);
+      std::vector<double> known;
+      for (int i = 0; i < sensor.model.known_size(); ++i) {
+        known.push_back(8.0 * std::sin(0.9 * k + 2.0 * i));
+      }
+      EXPECT_EQ(sensor.model.Predict(roles.data(), z.data(), known.data()), Status::kOk);
+      EXPECT_EQ(sensor.model.SqrtNoise(roles.data(), z.data(), l.data(), known.data()),
+                Status::kOk);
       for (int r = 0; r < m; ++r) {
         for (int c = 0; c <= r; ++c)
           d[r] += l[r * m + c] * std::sin(1.7 * k + 2.0 * static_cast<double>(s) + c);
       }
       geometry.Plus(z.data(), d.data(), z.data());
-      frame.measurements.push_back({frame.timestamp, static_cast<int>(s), -1, z, {}});
+      frame.measurements.push_back({frame.timestamp, static_cast<int>(s), -1, z, {}, known});
     }
     const std::vector<StreamInfo> streams = AllStreams(system);
     for (std::size_t s = system.sensors.size(); s < streams.size(); ++s) {
@@ -212,8 +217,10 @@ Row SensorRow(const std::string& name, const std::string& parameters, const Mode
   };
   const auto expect = [=](const System& around) {
     ExpectSame(around, FilterOf(spaces), [&](auto& filter, const Frame& frame) {
-      ASSERT_EQ(UpdateAll(filter, model, frame.measurements.back().values.data(),
-                          typename detail::Blocks<Model>::Indices{}),
+      std::vector<double> z = frame.measurements.back().values;
+      const std::vector<double>& known = frame.measurements.back().known;
+      z.insert(z.end(), known.begin(), known.end());
+      ASSERT_EQ(UpdateAll(filter, model, z.data(), typename detail::Blocks<Model>::Indices{}),
                 StaticOutcome::kAccepted);
     });
   };

@@ -153,6 +153,7 @@ BundleRoles RolesOf(const SensorModel& sensor) {
   const Geometry& z = sensor.measurement().geometry;
   if (z.kind != GeometryKind::kVector || z.ambient > 4)
     FailRoles(sensor, "it measures " + ToString(z));
+  if (sensor.known_size() > 0) FailRoles(sensor, "it takes known numbers with each measurement");
   return found;
 }
 

@@ -52,11 +52,11 @@ class JacobianTest {
 
   /// The entries of the column of tangent element `k` of input `i`, which is `column` of all.
   std::vector<Entry> Column(std::size_t i, int k, Eigen::Index column) const {
-    const Geometry& geometry = Input(i).geometry;
     double h = 0.1;
-    if (geometry.kind == GeometryKind::kVector) {
-      h *= std::max(std::abs(inputs_[i][static_cast<std::size_t>(k)]), 0.01);
-    }
+    Input(i).geometry.ForEachPart([&](const Geometry& part, int a, int t) {
+      if (part.kind != GeometryKind::kVector || k < t || k >= t + part.tangent) return;
+      h *= std::max(std::abs(inputs_[i][static_cast<std::size_t>(a + k - t)]), 0.01);
+    });
     const Curve curve = [&](double t) { return Moved(i, k, t); };
     constexpr int kMostLengths = 6;
     std::vector<Entry> entries;

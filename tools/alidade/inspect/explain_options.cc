@@ -92,6 +92,11 @@ std::vector<TextRow> OptionRows(const Node& entry, const NamedEstimator& named) 
   rows.push_back({"on_divergence", named.on_divergence == OnDivergence::kFail
                                        ? "fail: the run ends with exit code 79"
                                        : "report: the run goes on"});
+  if (named.on_plugin_failure != OnPluginFailure::kSkip) {
+    rows.push_back({"on_plugin_failure", named.on_plugin_failure == OnPluginFailure::kAbort
+                                             ? "abort: the run ends with exit code 69"
+                                             : "disable: a sensor that fails is no longer used"});
+  }
   if (const std::string losses = LossText(system); !losses.empty()) {
     rows.push_back({"loss", losses});
   }

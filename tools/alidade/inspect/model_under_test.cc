@@ -48,36 +48,41 @@ void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const 
   const AlidadeSensor sensor = *c.sensor;
   const void* const self = c.self;
   const int count = static_cast<int>(roles.size()), m = z.geometry.tangent;
-  Function predict{"Predict", FirstSlots(count), {z}, {}, count, false, {}};
+  const auto knowing = [&](std::vector<int> slots) {  // the known numbers are the last input
+    if (model.known_slot >= 0) slots.push_back(model.known_slot);
+    return slots;
+  };
+  const bool knows = model.known_slot >= 0;
+  Function predict{"Predict", knowing(FirstSlots(count)), {z}, {}, count, false, {}};
   for (const Space& role : roles) predict.matrices.push_back({m, role.geometry.tangent});
   predict.call = [=](const double* const* in, double* const* out, double* const* jacobians,
                      const std::int32_t* strides) {
     const bool any = std::any_of(jacobians, jacobians + count, [](auto* j) { return j; });
-    const AlidadeObservation seen = detail::Seen(nullptr);
+    const AlidadeObservation seen = detail::Seen(nullptr, knows ? in[count] : nullptr);
     return sensor.eval(self, &seen, in, out[0], any ? jacobians : nullptr, any ? strides : nullptr);
   };
   model.functions.push_back(std::move(predict));
   model.functions.push_back(
       {"SqrtNoise",
-       FirstSlots(count + 1),
+       knowing(FirstSlots(count + 1)),
        {},
        {{m, m}},
        0,
        true,
        [=](const double* const* in, double* const*, double* const* l, const std::int32_t* strides) {
-         const AlidadeObservation seen = detail::Seen(in[count]);
+         const AlidadeObservation seen = detail::Seen(in[count], knows ? in[count + 1] : nullptr);
          return sensor.sqrt_noise(self, &seen, in, l[0], strides[0]);
        }});
   if (sensor.valid != nullptr) {
     model.functions.push_back(
         {"Valid",
-         {count},
+         knowing({count}),
          {},
          {},
          0,
          false,
          [=](const double* const* in, double* const*, double* const*, const std::int32_t*) {
-           const AlidadeObservation seen = detail::Seen(in[0]);
+           const AlidadeObservation seen = detail::Seen(in[0], knows ? in[1] : nullptr);
            return sensor.valid(self, &seen);
          }});
   }
@@ -133,6 +138,8 @@ void AddInitialise(const AlidadeInstance& c, const std::vector<Space>& roles, co
     f.matrices.push_back({n, prior});
   }
   f.differentiated = static_cast<int>(f.slots.size());
+  const bool knows = model.known_slot >= 0;
+  if (knows) f.slots.push_back(model.known_slot);
   f.call = [=, outputs = f.outputs](const double* const* in, double* const* out, double* const* j,
                                     const std::int32_t* strides) {
     std::vector<const double*> all(count, nullptr);
@@ -147,7 +154,8 @@ void AddInitialise(const AlidadeInstance& c, const std::vector<Space>& roles, co
     }
     const bool has_prior = prior > 0, apart = outputs.size() > 1;
     std::vector<double> row = apart ? Gather(outputs, out) : std::vector<double>();
-    const AlidadeObservation seen = detail::Seen(in[k]);
+    const AlidadeObservation seen =
+        detail::Seen(in[k], knows ? in[k + (has_prior ? 2 : 1)] : nullptr);
     const std::int32_t code = sensor.initialise(
         self, &seen, all.data(), has_prior ? in[k + 1] : nullptr, apart ? row.data() : out[0],
         jx.data(), jx_strides.data(), j[k], strides[k], has_prior ? j[k + 1] : nullptr,
@@ -243,6 +251,10 @@ ModelUnderTest::ModelUnderTest(std::shared_ptr<const ModelInstance> from)
     slots.push_back(instance->space());
     const int prior = c.description->prior_count;
     if (prior > 0) slots.push_back(Named("prior", Geometry::Vector(prior)));
+    if (!instance->known().name.empty()) {
+      known_slot = static_cast<int>(slots.size());
+      slots.push_back(instance->known());
+    }
     AddSensor(c, instance->spaces(), instance->space(), *this);
     if ((instance->capabilities() & ALIDADE_CAN_INITIALISE) != 0) {
       AddInitialise(c, instance->spaces(), instance->space(), *this);

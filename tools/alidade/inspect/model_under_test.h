@@ -89,9 +89,11 @@ struct ModelUnderTest {
   std::vector<int> Initialised() const;
 
   std::shared_ptr<const ModelInstance> instance;
-  /// Sensor: its roles, the measurement, the `prior` of Initialise where it needs one. Motion: its
-  /// blocks, the noise `w`, the control input where it has one, `dt`.
+  /// Sensor: its roles, the measurement, the `prior` of Initialise where it needs one, the known
+  /// numbers where it takes any. Motion: its blocks, the noise `w`, the control input where it has
+  /// one, `dt`.
   std::vector<Space> slots;
+  int known_slot = -1;  ///< -1: it takes none
   std::vector<Function> functions;
 };
 

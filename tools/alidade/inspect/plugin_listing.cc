@@ -42,6 +42,9 @@ std::vector<ParamInfo> WithCommonKeys(std::vector<ParamInfo> keys) {
   add("sensors", "list", "all", "names of those it uses, in the order of their updates");
   add("use", "choice or map", "all", "or {accepted_by: NAME}: what that filter accepted");
   add("on_divergence", "choice", "report", "fail ends the run", {"report", "fail"});
+  add("on_plugin_failure", "choice", "skip",
+      "a call of a sensor that fails: leave that measurement out, or the sensor, or end the run",
+      {"skip", "disable", "abort"});
   add("overrides", "map", "none",
       "its own state, sensors, landmarks and initial_time_s, merged in");
   return keys;

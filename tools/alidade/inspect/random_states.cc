@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 
 #include "alidade/base/random.h"
@@ -12,15 +13,17 @@ constexpr double kPi = 3.14159265358979323846;
 /// x = identity (+) d. Vectors have elements of 0.03 to 30, all positive where `positive`.
 std::vector<double> RandomValue(const Geometry& geometry, bool positive, Random& random) {
   std::vector<double> x(static_cast<std::size_t>(geometry.ambient));
-  std::vector<double> d(static_cast<std::size_t>(geometry.tangent));
-  for (double& element : d) {
-    if (geometry.kind == GeometryKind::kVector) {
-      const double sign = positive || random.Uniform() < 0.5 ? 1.0 : -1.0;
-      element = sign * std::pow(10.0, 3.0 * random.Uniform() - 1.5);
-    } else {
-      element = 1.2 * random.Normal();
+  std::vector<double> d;
+  geometry.ForEachPart([&](const Geometry& part, int, int) {
+    for (int i = 0; i < part.tangent; ++i) {
+      if (part.kind == GeometryKind::kVector) {
+        const double sign = positive || random.Uniform() < 0.5 ? 1.0 : -1.0;
+        d.push_back(sign * std::pow(10.0, 3.0 * random.Uniform() - 1.5));
+      } else {
+        d.push_back(1.2 * random.Normal());
+      }
     }
-  }
+  });
   if (x.empty()) return x;
   geometry.Identity(x.data());
   geometry.Plus(x.data(), d.data(), x.data());
@@ -36,9 +39,20 @@ std::vector<std::vector<double>> Edges(const Geometry& geometry) {
     case GeometryKind::kUnitVector:
       return {{0, 0, 1}, {0, 0, -1}, {1, 0, 0}, {0, -1, 0}};
     case GeometryKind::kVector:
+    case GeometryKind::kProduct:
       break;
   }
   std::vector<std::vector<double>> edges;
+  if (geometry.kind == GeometryKind::kProduct) {  // of one part, the others at the neutral element
+    geometry.ForEachPart([&](const Geometry& part, int a, int) {
+      for (const std::vector<double>& edge : Edges(part)) {
+        edges.emplace_back(static_cast<std::size_t>(geometry.ambient));
+        geometry.Identity(edges.back().data());
+        std::ranges::copy(edge, edges.back().begin() + a);
+      }
+    });
+    return edges;
+  }
   for (const double value : {0.0, 1e-6, -1e-6, 1e6, -1e6}) {
     edges.emplace_back(static_cast<std::size_t>(geometry.ambient), value);
   }
@@ -68,7 +82,8 @@ std::vector<Values> RandomStates(const ModelUnderTest& model, int count, std::ui
       } else if (!model.is_sensor() && k + 1 == model.slots.size()) {
         values.push_back({RandomStep(random)});
       } else {
-        const bool is_prior = model.is_sensor() && k > blocks;
+        const bool is_prior =
+            model.is_sensor() && k > blocks && static_cast<int>(k) != model.known_slot;
         values.push_back(RandomValue(space.geometry, is_prior || i % 2 == 0, random));
         if (space.optional() && i % 4 >= 2) values.back().clear();
       }

@@ -48,6 +48,7 @@ void DataHash::Add(const SourceFrame& frame) {
     Append(bytes_, static_cast<std::uint64_t>(m->landmark));
     Append(bytes_, m->values);
     Append(bytes_, m->covariance);
+    if (!m->known.empty()) Append(bytes_, m->known);
   }
   measurements_.Add(bytes_);
 

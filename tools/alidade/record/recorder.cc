@@ -243,6 +243,7 @@ void Recorder::Finish(const RunResult& result) {
 }
 
 std::filesystem::path Recorder::failed() const { return impl_->folder.failed(); }
+bool Recorder::Abandon() const { return impl_->folder.Abandon(); }
 
 const std::vector<std::string>& Recorder::highlights() const { return impl_->highlights; }
 const std::string& Recorder::note() const { return impl_->note; }

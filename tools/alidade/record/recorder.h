@@ -46,6 +46,9 @@ class Recorder : public RunObserver {
   void Finish(const RunResult& result);
   /// Where it will be kept, not finished; "" where there is nothing to keep, or it is finished.
   std::filesystem::path failed() const;
+  /// Gives what was recorded that name at once; false where that cannot be done. Of another thread
+  /// than that of the run, which must not go on.
+  bool Abandon() const;
 
   /// Paths that Finish made, relative to the folder, those a person wants first: report.html, ...
   const std::vector<std::string>& highlights() const;

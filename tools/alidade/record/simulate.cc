@@ -103,6 +103,7 @@ class DataFiles {
       if (!landmark) {
         header = {"frame", "t_s"};
         for (const std::string& name : ColumnsOf(stream)) header.push_back(name);
+        for (int i = 0; i < stream.known; ++i) header.push_back("known" + std::to_string(i));
       }
       OpenCsv(file, stream.name + ".csv", header);
     }
@@ -110,6 +111,7 @@ class DataFiles {
       file->Integer(number).Time(measurement.timestamp);
       file->Numbers(measurement.values.data(), measurement.values.size(),
                     measurement.values.size());
+      file->Numbers(measurement.known.data(), measurement.known.size(), measurement.known.size());
       return file->EndRow();
     }
     seen_.insert(measurement.landmark);

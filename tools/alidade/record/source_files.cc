@@ -105,9 +105,11 @@ SourceFiles::SourceFiles(const OutputFolder& folder, const Experiment& experimen
       expected_rows_(streams_.size(), 0) {
   for (const StreamInfo& stream : streams_) {
     width_ = std::max(width_, static_cast<std::size_t>(stream.size));
+    known_width_ = std::max(known_width_, static_cast<std::size_t>(stream.known));
   }
   std::vector<std::string> header = {"t_s", "stream", "landmark"};
   for (std::size_t i = 0; i < width_; ++i) header.push_back('v' + std::to_string(i));
+  for (std::size_t i = 0; i < known_width_; ++i) header.push_back("known" + std::to_string(i));
   measurements_.emplace(folder, "measurements.csv", header);
   if (!truths_.empty()) {
     header = {"t_s"};
@@ -144,6 +146,7 @@ void SourceFiles::FindInverses(const Experiment& experiment) {
       const int s = static_cast<int>(stream - streams_.begin());
       const std::vector<int> truths = TruthsOf(system, binding, truths_);
       if (!truths.empty()) expectations_.try_emplace(s, Expectation{binding.model, truths});
+      if (binding.model.known_size() > 0) continue;  // one curve for all would need them
       const bool by_itself = IsInvertible(system, binding);
       if (!by_itself && (truths.empty() || !IsScalar(binding))) continue;
       const int role = by_itself ? binding.model.initialised_role() : 0;
@@ -165,7 +168,8 @@ void SourceFiles::Add(const SourceFrame& frame) {
     const auto stream = static_cast<std::size_t>(m.stream);
     ++stream_rows_[stream];
     measurements_->Time(m.timestamp).Text(streams_[stream].name).Landmark(m.landmark);
-    measurements_->Numbers(m.values.data(), m.values.size(), width_).EndRow();
+    measurements_->Numbers(m.values.data(), m.values.size(), width_);
+    measurements_->Numbers(m.known.data(), m.known.size(), known_width_).EndRow();
     AddExpected(frame, m);
     AddImplied(frame, m);
   }
@@ -189,7 +193,9 @@ void SourceFiles::AddExpected(const SourceFrame& frame, const Measurement& m) {
   const auto& [model, truths] = found->second;
   const std::vector<const double*> roles = AtTruth(frame, truths);
   std::vector<double> z(m.values.size());
-  if (roles.empty() || model.Predict(roles.data(), z.data()) != Status::kOk) return;
+  if (roles.empty() || model.Predict(roles.data(), z.data(), m.known.data()) != Status::kOk) {
+    return;
+  }
   const auto stream = static_cast<std::size_t>(m.stream);
   expected_->Time(m.timestamp).Text(streams_[stream].name);
   expected_->Numbers(z.data(), z.size(), width_).EndRow();

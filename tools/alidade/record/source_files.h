@@ -50,7 +50,7 @@ class SourceFiles {
   std::vector<std::int64_t> expected_rows_;  ///< in expected.csv, by stream
   std::map<int, Expectation> expectations_;  ///< by stream
   std::vector<Inverse> inverses_;
-  std::size_t width_ = 1, blocks_ = 0;
+  std::size_t width_ = 1, known_width_ = 0, blocks_ = 0;
   Timestamp first_ = kNoTimestamp, last_ = kNoTimestamp;
   std::optional<CsvFile> measurements_, truth_, expected_, implied_;
   std::optional<PoseFile> poses_;

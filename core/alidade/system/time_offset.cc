@@ -1,0 +1,426 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/system/time_offset.h"
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <utility>
+
+#include "alidade/base/words.h"
+
+namespace alidade::internal {
+namespace {
+
+/// A motion model that moves roles: its blocks are `count` roles from `first` on.
+struct Mover {
+  MotionModel model;
+  int first, count;
+};
+
+/// The sensor at another time, behind the calls of the plugin ABI.
+class OffsetSensor {
+ public:
+  OffsetSensor(SensorModel sensor, std::vector<Mover> movers, std::vector<int> place_of_role,
+               std::vector<Space> roles, int offset_role)
+      : sensor_(std::move(sensor)),
+        movers_(std::move(movers)),
+        place_(std::move(place_of_role)),
+        roles_(std::move(roles)),
+        offset_(offset_role) {
+    Describe();
+  }
+  OffsetSensor(const OffsetSensor&) = delete;
+  OffsetSensor& operator=(const OffsetSensor&) = delete;
+
+  /// Takes over `self`.
+  static SensorModel Publish(std::unique_ptr<OffsetSensor> self) {
+    AlidadeInstance instance{};
+    instance.struct_size = sizeof(instance);
+    instance.kind = ALIDADE_KIND_SENSOR;
+    instance.destroy = [](void* of) { delete static_cast<OffsetSensor*>(of); };
+    instance.error_text = [](const void* of) { return Of(of).ErrorText(); };
+    instance.description = &self->description_;
+    instance.sensor = &self->calls_;
+    const std::string name = self->sensor_.name(), plugin = self->sensor_.instance().plugin();
+    instance.self = self.release();
+    return SensorModel(std::make_shared<const ModelInstance>(instance, name, plugin));
+  }
+
+ private:
+  /// What a call needs besides its arguments, kept from one to the next in a thread.
+  struct Memory {
+    std::vector<double> next, f, g, rate;  ///< x(t + delta), F, G, df/ddelta of all movers
+    std::vector<double> shifted, jacobian;
+    std::vector<const double*> roles;
+    std::vector<double*> jacobians;
+    std::vector<int> strides;
+  };
+  static Memory& MemoryOfThread() {
+    static thread_local Memory memory;
+    return memory;
+  }
+  static const OffsetSensor& Of(const void* self) {
+    return *static_cast<const OffsetSensor*>(self);
+  }
+
+  void Describe() {
+    const AlidadeDescription& inner = *sensor_.instance().c().description;
+    spaces_.resize(roles_.size());
+    for (std::size_t i = 0; i < roles_.size(); ++i) {
+      const Space& role = roles_[i];
+      texts_.push_back(Join(role.elements, ","));
+      AlidadeSpace& space = spaces_[i];
+      space.struct_size = sizeof(space);
+      space.geometry = static_cast<std::uint32_t>(role.geometry.kind);
+      space.ambient = role.geometry.ambient;
+      space.tangent = role.geometry.tangent;
+      space.flags = role.flags & (ALIDADE_ROLE_LANDMARK | ALIDADE_ROLE_SHARED);
+      space.name = role.name.c_str();
+      space.unit = role.unit.c_str();
+      space.doc = role.doc.c_str();
+    }
+    for (std::size_t i = 0; i < roles_.size(); ++i) spaces_[i].elements = texts_[i].c_str();
+    description_.struct_size = sizeof(description_);
+    description_.role_count = static_cast<std::uint32_t>(spaces_.size());
+    description_.role_stride = sizeof(AlidadeSpace);
+    description_.roles = spaces_.data();
+    description_.output = inner.output;
+    description_.known = inner.known;
+    description_.capabilities = inner.capabilities;
+    description_.prior_count = inner.prior_count;
+    calls_.struct_size = sizeof(calls_);
+    calls_.eval = Eval;
+    calls_.sqrt_noise = SqrtNoise;
+    if (sensor_.instance().c().sensor->valid != nullptr) calls_.valid = Valid;
+    const int role = sensor_.initialised_role();
+    if (role >= 0 && !IsMoved(place_[static_cast<std::size_t>(role)])) {
+      description_.initialise_role = place_[static_cast<std::size_t>(role)];
+      calls_.initialise = Initialise;
+    } else {
+      description_.capabilities &= ~std::uint32_t{ALIDADE_CAN_INITIALISE};
+    }
+  }
+
+  bool IsMoved(int place) const { return place >= 0 && place < offset_ && MoverOf(place) >= 0; }
+  /// Of the role at a place; -1: it is what it is.
+  int MoverOf(int place) const {
+    for (std::size_t m = 0; m < movers_.size(); ++m) {
+      if (place >= movers_[m].first && place < movers_[m].first + movers_[m].count)
+        return static_cast<int>(m);
+    }
+    return -1;
+  }
+
+  /// x' of one mover after dt_s, its blocks one after the other; its F unless null.
+  static Status Move(const Mover& mover, const double* const* x, double dt_s, double* next,
+                     Memory& memory, double* f) {
+    std::array<double*, kMaxRoles> to;
+    double* at = next;
+    for (std::size_t b = 0; b < mover.model.blocks().size(); ++b) {
+      to[b] = at;
+      at += mover.model.blocks()[b].geometry.ambient;
+    }
+    const Status status = mover.model.Step(x, nullptr, nullptr, dt_s, to.data(), f,
+                                           f == nullptr ? nullptr : memory.g.data());
+    for (std::size_t b = 0; status == Status::kOk && b < mover.model.blocks().size(); ++b) {
+      mover.model.blocks()[b].geometry.Normalise(to[b]);
+    }
+    return status;
+  }
+
+  /// df/ddelta of one mover at x' = next, in its tangent.
+  static Status Differentiate(const Mover& mover, const double* const* x, double dt_s,
+                              const double* next, Memory& memory, double* rate) {
+    constexpr double kStep = 1e-3;
+    const std::array<std::pair<double, double>, 4> points{
+        {{-2.0, 1.0 / 12.0}, {-1.0, -2.0 / 3.0}, {1.0, 2.0 / 3.0}, {2.0, -1.0 / 12.0}}};
+    std::fill_n(rate, mover.model.tangent_size(), 0.0);
+    std::vector<double>& there = memory.shifted;
+    for (const auto& [steps, weight] : points) {
+      const Status status = Move(mover, x, dt_s + steps * kStep, there.data(), memory, nullptr);
+      if (status != Status::kOk) return status;
+      int a = 0, t = 0;
+      for (const Space& block : mover.model.blocks()) {
+        std::array<double, 64> d;
+        double* const apart = block.geometry.tangent <= 64 ? d.data() : memory.jacobian.data();
+        block.geometry.Minus(there.data() + a, next + a, apart);
+        for (int i = 0; i < block.geometry.tangent; ++i) {
+          rate[t + i] += weight / kStep * apart[i];
+        }
+        a += block.geometry.ambient;
+        t += block.geometry.tangent;
+      }
+    }
+    return Status::kOk;
+  }
+
+  /// The roles of the sensor at t + delta, in memory.roles; with `derivatives` F and df/ddelta.
+  Status Shift(const double* const* roles, bool derivatives, Memory& memory) const {
+    int ambient = 0, tangent = 0, square = 0, noise = 1;
+    for (const Mover& mover : movers_) {
+      for (const Space& block : mover.model.blocks()) ambient += block.geometry.ambient;
+      const int n = mover.model.tangent_size();
+      tangent += n;
+      square += n * n;
+      noise = std::max(noise, n * mover.model.noise_size());
+    }
+    const auto size = [](int n) { return static_cast<std::size_t>(n); };
+    memory.next.resize(size(ambient));
+    memory.shifted.resize(size(ambient));
+    memory.rate.resize(size(tangent));
+    memory.f.resize(size(square));
+    memory.g.resize(size(noise));
+    memory.jacobian.resize(std::max(memory.jacobian.size(), size(tangent)));
+    const double dt_s = roles[offset_][0];
+    memory.roles.assign(place_.size(), nullptr);
+    for (std::size_t i = 0; i < place_.size(); ++i) {
+      if (place_[i] >= 0) memory.roles[i] = roles[place_[i]];
+    }
+    double *next = memory.next.data(), *f = memory.f.data(), *rate = memory.rate.data();
+    for (const Mover& mover : movers_) {
+      const double* const* const x = roles + mover.first;
+      Status status = Move(mover, x, dt_s, next, memory, derivatives ? f : nullptr);
+      if (status == Status::kOk && derivatives) {
+        status = Differentiate(mover, x, dt_s, next, memory, rate);
+      }
+      if (status != Status::kOk) return status;
+      for (std::size_t i = 0; i < place_.size(); ++i) {
+        const int block = place_[i] - mover.first;
+        if (block < 0 || block >= mover.count) continue;
+        memory.roles[i] = next;
+        for (int b = 0; b < block; ++b) {
+          memory.roles[i] += mover.model.blocks()[static_cast<std::size_t>(b)].geometry.ambient;
+        }
+      }
+      for (const Space& block : mover.model.blocks()) next += block.geometry.ambient;
+      const int n = mover.model.tangent_size();
+      f += n * n;
+      rate += n;
+    }
+    return Status::kOk;
+  }
+
+  /// Gives the sensor where to write its Jacobians, of m rows: for roles that stay the caller's
+  /// place, for others one in memory.
+  void PlaceJacobians(int m, double* const* jacobians, const int* strides, Memory& memory) const {
+    std::size_t size = 0;
+    for (const Space& role : sensor_.roles())
+      size += static_cast<std::size_t>(m * role.geometry.tangent);
+    memory.jacobian.assign(std::max(memory.jacobian.size(), size), 0.0);
+    memory.jacobians.assign(place_.size(), nullptr);
+    memory.strides.assign(place_.size(), 0);
+    double* next = memory.jacobian.data();
+    for (std::size_t i = 0; i < place_.size(); ++i) {
+      const int n = sensor_.roles()[i].geometry.tangent;
+      if (place_[i] < 0) continue;
+      if (IsMoved(place_[i])) {
+        memory.jacobians[i] = next;
+        memory.strides[i] = n;
+      } else {
+        memory.jacobians[i] = jacobians[place_[i]];
+        memory.strides[i] = strides[place_[i]];
+      }
+      next += m * n;
+    }
+  }
+
+  /// J_c = sum_i J_i F_ic of the blocks c of all movers, and J_delta = sum_i J_i df_i/ddelta, from
+  /// the Jacobians J_i, of m rows, of the roles i that move.
+  void Chain(int m, double* const* jacobians, const int* strides, const Memory& memory) const {
+    const auto at = [&](int role, int r, int c) -> double& {
+      return jacobians[role][static_cast<std::ptrdiff_t>(r) * strides[role] + c];
+    };
+    for (int r = 0; r < m && jacobians[offset_] != nullptr; ++r) at(offset_, r, 0) = 0.0;
+    const double *f = memory.f.data(), *rate = memory.rate.data();
+    for (const Mover& mover : movers_) {
+      const std::vector<Space>& blocks = mover.model.blocks();
+      const int n = mover.model.tangent_size();
+      int column = 0;
+      for (int c = 0; c < mover.count; ++c) {
+        const int width = blocks[static_cast<std::size_t>(c)].geometry.tangent;
+        for (int r = 0; r < m && jacobians[mover.first + c] != nullptr; ++r) {
+          std::fill_n(&at(mover.first + c, r, 0), width, 0.0);
+        }
+        column += width;
+      }
+      for (std::size_t i = 0; i < place_.size(); ++i) {
+        const int block = place_[i] - mover.first;
+        if (block < 0 || block >= mover.count) continue;
+        int row = 0;
+        for (int b = 0; b < block; ++b) row += blocks[static_cast<std::size_t>(b)].geometry.tangent;
+        const int size = blocks[static_cast<std::size_t>(block)].geometry.tangent;
+        for (int r = 0; r < m; ++r) {
+          const double* const j = memory.jacobians[i] + r * memory.strides[i];
+          for (int k = 0; k < size; ++k) {
+            if (jacobians[offset_] != nullptr) at(offset_, r, 0) += j[k] * rate[row + k];
+            const double* from = f + (row + k) * n;
+            for (int c = 0; c < mover.count; ++c) {
+              const int width = blocks[static_cast<std::size_t>(c)].geometry.tangent;
+              for (int l = 0; l < width && jacobians[mover.first + c] != nullptr; ++l) {
+                at(mover.first + c, r, l) += j[k] * from[l];
+              }
+              from += width;
+            }
+          }
+        }
+      }
+      f += n * n;
+      rate += n;
+    }
+  }
+
+  static std::int32_t Eval(const void* self, const AlidadeObservation* seen,
+                           const double* const* roles, double* z, double* const* jacobians,
+                           const std::int32_t* strides) {
+    const OffsetSensor& of = Of(self);
+    Memory& memory = MemoryOfThread();
+    const Status status = of.Shift(roles, jacobians != nullptr, memory);
+    if (status != Status::kOk) return static_cast<std::int32_t>(status);
+    if (jacobians == nullptr) {
+      return static_cast<std::int32_t>(of.sensor_.Predict(memory.roles.data(), z, seen->known));
+    }
+    const int m = of.sensor_.measurement().geometry.tangent;
+    of.PlaceJacobians(m, jacobians, strides, memory);
+    const Status seen_there = of.sensor_.Linearise(memory.roles.data(), z, memory.jacobians.data(),
+                                                   memory.strides.data(), seen->known);
+    if (seen_there == Status::kOk) of.Chain(m, jacobians, strides, memory);
+    return static_cast<std::int32_t>(seen_there);
+  }
+  static std::int32_t SqrtNoise(const void* self, const AlidadeObservation* seen,
+                                const double* const* roles, double* l, std::int32_t stride) {
+    const OffsetSensor& of = Of(self);
+    Memory& memory = MemoryOfThread();
+    const Status status = of.Shift(roles, false, memory);
+    if (status != Status::kOk) return static_cast<std::int32_t>(status);
+    const AlidadeInstance& c = of.sensor_.instance().c();
+    return c.sensor->sqrt_noise(c.self, seen, memory.roles.data(), l, stride);
+  }
+  static std::int32_t Valid(const void* self, const AlidadeObservation* seen) {
+    const AlidadeInstance& c = Of(self).sensor_.instance().c();
+    return c.sensor->valid(c.self, seen);
+  }
+  static std::int32_t Initialise(const void* self, const AlidadeObservation* seen,
+                                 const double* const* roles, const double* prior, double* y,
+                                 double* const* jx, const std::int32_t* jx_strides, double* jz,
+                                 std::int32_t jz_stride, double* jp, std::int32_t jp_stride) {
+    const OffsetSensor& of = Of(self);
+    Memory& memory = MemoryOfThread();
+    const bool derivatives = jx != nullptr;
+    const Status status = of.Shift(roles, derivatives, memory);
+    if (status != Status::kOk) return static_cast<std::int32_t>(status);
+    int rows = 0;
+    for (int i = 0; i < of.sensor_.initialised_count(); ++i) {
+      const auto role = static_cast<std::size_t>(of.sensor_.initialised_role() + i);
+      rows += of.sensor_.roles()[role].geometry.tangent;
+    }
+    if (derivatives) of.PlaceJacobians(rows, jx, jx_strides, memory);
+    const AlidadeInstance& c = of.sensor_.instance().c();
+    const std::int32_t code =
+        c.sensor->initialise(c.self, seen, memory.roles.data(), prior, y,
+                             derivatives ? memory.jacobians.data() : nullptr, memory.strides.data(),
+                             jz, jz_stride, jp, jp_stride);
+    if (code == ALIDADE_OK && derivatives) of.Chain(rows, jx, jx_strides, memory);
+    return code;
+  }
+  const char* ErrorText() const {
+    const AlidadeInstance& c = sensor_.instance().c();
+    return c.error_text == nullptr ? "" : c.error_text(c.self);
+  }
+
+  SensorModel sensor_;
+  std::vector<Mover> movers_;
+  std::vector<int> place_;  ///< by role of the sensor: which role of this; -1: unbound
+  std::vector<Space> roles_;
+  int offset_;
+  std::vector<AlidadeSpace> spaces_;
+  std::vector<std::string> texts_;
+  AlidadeDescription description_{};
+  AlidadeSensor calls_{};
+};
+
+/// How the roles of a sensor and the blocks of its motion models become the roles of an
+/// OffsetSensor.
+struct Arrangement {
+  std::vector<Mover> movers;
+  std::vector<Space> roles;
+  std::vector<RoleBinding> bindings;
+  std::vector<int> place_of_role;
+  int offset = -1;
+
+  /// The role of the block, or a new one of `space`, named after the role of the sensor that it
+  /// fills or else after the block.
+  int Add(Space space, RoleBinding binding, const std::string& name) {
+    space.name = name;
+    roles.push_back(std::move(space));
+    bindings.push_back(binding);
+    return static_cast<int>(roles.size()) - 1;
+  }
+};
+
+}  // namespace
+
+std::string OffsetInTime(const System& system, BlockId offset, SensorBinding& sensor) {
+  const std::vector<Space>& inner = sensor.model.roles();
+  const auto arrange = [&](const SensorModel& model) {
+    Arrangement all;
+    all.place_of_role.assign(model.roles().size(), -1);
+    const auto role_of = [&](BlockId block) {
+      const auto found = std::ranges::find(sensor.roles, block, &RoleBinding::block);
+      return found == sensor.roles.end() ? -1 : static_cast<int>(found - sensor.roles.begin());
+    };
+    for (const MotionBinding& motion : system.motions) {
+      const bool moves =
+          !motion.model.stationary() &&
+          std::ranges::any_of(motion.blocks, [&](BlockId id) { return role_of(id) >= 0; });
+      if (!moves) continue;
+      all.movers.push_back({motion.model, static_cast<int>(all.roles.size()),
+                            static_cast<int>(motion.blocks.size())});
+      for (const BlockId id : motion.blocks) {
+        const int role = role_of(id);
+        RoleBinding binding{id};
+        if (role >= 0) binding = sensor.roles[static_cast<std::size_t>(role)];
+        const int place = all.Add(
+            system.layout[id].space, binding,
+            role >= 0 ? inner[static_cast<std::size_t>(role)].name : system.layout[id].name);
+        if (role >= 0) all.place_of_role[static_cast<std::size_t>(role)] = place;
+      }
+    }
+    for (std::size_t i = 0; i < std::min(sensor.roles.size(), model.roles().size()); ++i) {
+      if (model.roles()[i].landmark() || sensor.roles[i].block < 0 || all.place_of_role[i] >= 0) {
+        continue;
+      }
+      all.place_of_role[i] = all.Add(model.roles()[i], sensor.roles[i], model.roles()[i].name);
+    }
+    all.offset = all.Add(system.layout[offset].space, RoleBinding{offset}, "time_offset");
+    for (std::size_t i = 0; i < model.roles().size(); ++i) {
+      if (!model.roles()[i].landmark()) continue;
+      all.place_of_role[i] = all.Add(model.roles()[i], {}, model.roles()[i].name);
+    }
+    return all;
+  };
+  const auto publish = [](const SensorModel& model, Arrangement all) {
+    return OffsetSensor::Publish(std::make_unique<OffsetSensor>(model, std::move(all.movers),
+                                                                std::move(all.place_of_role),
+                                                                std::move(all.roles), all.offset));
+  };
+  Arrangement all = arrange(sensor.model);
+  for (const Mover& mover : all.movers) {
+    if (mover.model.has_input()) {
+      return "motion model '" + mover.model.name() + "' of its roles takes a control input";
+    }
+  }
+  const auto at_measurement = [](const RoleBinding& role) {
+    return role.jacobian_at == JacobianAt::kMeasurement;
+  };
+  if (std::ranges::any_of(sensor.roles, at_measurement)) {
+    return "a role has jacobian_at: measurement";
+  }
+  if (all.movers.empty()) return "no motion model moves its roles: it sees the same at any time";
+  std::vector<RoleBinding> bindings = all.bindings;
+  if (sensor.xyz) sensor.xyz = publish(*sensor.xyz, arrange(*sensor.xyz));
+  sensor.model = publish(sensor.model, std::move(all));
+  sensor.roles = std::move(bindings);
+  return {};
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pose.h"
+
+#include "alidade/model/plugin.h"
+
+ALIDADE_PLUGIN(ALIDADE_SENSOR(alidade::Pose, "pose",
+                              "position and orientation, with one covariance of both",
+                              "[Sola2017] ch. 4"))

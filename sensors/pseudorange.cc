@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pseudorange.h"
+
+#include "alidade/model/plugin.h"
+
+ALIDADE_PLUGIN(ALIDADE_SENSOR(alidade::Pseudorange, "pseudorange",
+                              "distance to a transmitter at a known place, and clock bias",
+                              "[Groves2013] sec. 9.4"))

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "every_model_fixture.h"
+#include "sensors/pose.h"
+#include "sensors/pseudorange.h"
+#include "sensors/range_bearing.h"
+
+namespace alidade::testing {
+namespace {
+
+INSTANTIATE_TEST_SUITE_P(
+    Composite, EveryModel,
+    ::testing::Values(
+        SensorRow("pose", "{sigma_position_m: 0.1, sigma_orientation_rad: [0.05, 0.1, 0.2]}",
+                  Pose({0.1, 0.1, 0.1}, {0.05, 0.1, 0.2}), {kPosition, {0.6, 0.0, 0.8, 0.0}}),
+        SensorRow("range_bearing",
+                  "{sigma_range_m: 0.1, sigma_bearing_rad: 0.05, landmarks: {representation: xyz}}",
+                  RangeBearing<Xyz>(0.1, 0.05), {kPosition, kOrientation, {0.2, 0.4, 2.0}}),
+        SensorRow("pseudorange", "{sigma_m: 0.5}", Pseudorange(0.5), {{1.0, 2.0, 3.0}, {0.2}})),
+    RowName);
+
+}  // namespace
+}  // namespace alidade::testing

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <system_error>
 
 #include "alidade/base/number_text.h"
 #include "alidade/host/last_call.h"
@@ -14,7 +15,10 @@ namespace alidade::cli {
 
 Watchdog::Watchdog(std::optional<double> limit_s, Recorder& recorder)
     : limit_s_(limit_s), recorder_(recorder), last_call_(&detail::last_call) {
-  thread_ = std::thread([this] { Watch(); });
+  try {
+    thread_ = std::thread([this] { Watch(); });
+  } catch (const std::system_error&) {  // no memory for it, say: the run may do with less
+  }
 }
 
 Watchdog::~Watchdog() {
@@ -23,7 +27,13 @@ Watchdog::~Watchdog() {
     ends_ = true;
   }
   changed_.notify_one();
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
+}
+
+void Watchdog::Begin(const Experiment& /*experiment*/) {
+  const std::lock_guard lock(mutex_);
+  working_ = false;
+  frames_ = 0;
 }
 
 void Watchdog::OnFrame(const SourceFrame& frame) {
@@ -51,8 +61,10 @@ void Watchdog::Watch() {
     const auto waited = [&](Clock::time_point since) {
       return std::chrono::duration<double>(now - std::max(since, since_)).count();
     };
-    const std::string frame = "the frame at t = " + internal::SecondsText(timestamp_) + ", after " +
-                              std::to_string(frames_) + " others";
+    const std::string frame = frames_ < 0
+                                  ? "their start"
+                                  : "the frame at t = " + internal::SecondsText(timestamp_) +
+                                        ", after " + std::to_string(frames_) + " others";
     if (asked <= now && waited(asked) > kPatience) {
       End("asked to stop, but the estimators do not finish " + frame, ExitCode::kStopped);
     }

@@ -62,13 +62,13 @@ TEST_F(CrashCli, AnExitOfAModelIsNoSuccess) {
 
 // FAULTS 67
 TEST_F(CrashCli, AModelThatHangsIsNamedAndWhatWasRecordedIsKept) {
-  const Outcome outcome = RunModel("hangs", {"--frame-timeout", "0.5"});
+  const Outcome outcome = RunModel("hangs_in_noise", {"--frame-timeout", "0.5"});
   EXPECT_EQ(outcome.code, 69) << outcome.out;
   EXPECT_TRUE(Contains(outcome.err, "error: the estimators work on the frame at t = 0.000000 s"))
       << outcome.err;
   EXPECT_TRUE(Contains(outcome.err,
-                       "for more than 0.5 s; the last call of a model: Predict of model "
-                       "'hangs' of plugin " +
+                       "for more than 0.5 s; the last call of a model: SqrtNoise of model "
+                       "'hangs_in_noise' of plugin " +
                            kPlugin + "; what was recorded is in "))
       << outcome.err;
   const std::size_t at = outcome.err.find("out.failed-");
@@ -77,6 +77,11 @@ TEST_F(CrashCli, AModelThatHangsIsNamedAndWhatWasRecordedIsKept) {
   EXPECT_TRUE(Exists(kept + "/measurements.csv"));
   EXPECT_FALSE(Exists("out"));
   EXPECT_EQ(RunModel("right", {"--frame-timeout", "none"}).code, 0);
+  // Before the first frame, when it is asked what can be observed.
+  const Outcome at_start = RunModel("hangs", {"--frame-timeout", "0.5", "--force"});
+  EXPECT_EQ(at_start.code, 69) << at_start.out;
+  EXPECT_TRUE(Contains(at_start.err, "the estimators work on their start")) << at_start.err;
+  EXPECT_TRUE(Contains(at_start.err, "Predict of model 'hangs'")) << at_start.err;
 }
 
 // FAULTS 58
@@ -107,7 +112,7 @@ TEST_F(CrashCli, ASensorThatFailsIsLeftOutOnceOrAltogetherOrEndsTheRun) {
 }
 
 TEST_F(CrashCli, AStopDoesNotWaitForAModelThatHangs) {
-  WriteConfig("hangs");
+  WriteConfig("hangs_in_noise");
   const pid_t run =
       Start({"run", "bad.yaml", "-o", "out", "--no-figures", "--frame-timeout", "none"});
   const auto recording = [&] {
@@ -120,7 +125,7 @@ TEST_F(CrashCli, AStopDoesNotWaitForAModelThatHangs) {
   EXPECT_EQ(outcome.code, 75) << outcome.err;
   EXPECT_TRUE(Contains(outcome.err, "asked to stop, but the estimators do not finish"))
       << outcome.err;
-  EXPECT_TRUE(Contains(outcome.err, "Predict of model 'hangs'")) << outcome.err;
+  EXPECT_TRUE(Contains(outcome.err, "SqrtNoise of model 'hangs_in_noise'")) << outcome.err;
   EXPECT_TRUE(Exists("out.failed-" + std::to_string(run))) << outcome.err;
 }
 

@@ -29,13 +29,13 @@ refused() {
 }
 
 compiles 0 || { cat "$errors" >&2; exit 1; }
-jacobian='Jacobian exists but cannot be called as Jacobian(const double* role..., MatrixRef J_z_role...) const'
+jacobian='Jacobian exists but cannot be called as Jacobian(const double* role..., [const double* known,] MatrixRef J_z_role...) const'
 for number in 1 2 3 4; do refused "$number" Seen "$jacobian"; done
 for number in 5 6; do
-  refused "$number" Seen 'Valid exists but cannot be called as bool Valid(const double* z) const'
+  refused "$number" Seen 'Valid exists but cannot be called as bool Valid([const double* known,] const double* z) const'
 done
 refused 7 Seen 'Initialise exists but kInitialises, the index of the role that it computes, does not'
-refused 8 Seen 'Initialise cannot be called as bool Initialise(const T* other_role..., const T* z, [const T* prior,] T* y) const'
+refused 8 Seen 'Initialise cannot be called as bool Initialise(const T* other_role..., [const double* known,] const T* z, [const T* prior,] T* y) const'
 for number in 10 11; do
   refused "$number" Moved 'StepJacobian exists but cannot be called as StepJacobian(const double* block..., const double* w, double dt_s, MatrixRef F, MatrixRef G) const'
 done

@@ -42,10 +42,10 @@ const char* NameOf(const ModelInstance& model, const void* slot) {
 }
 
 /// Puts one text after another, as far as there is room.
-class Line {
+class CutText {
  public:
-  Line(char* text, std::size_t size) : at_(text), end_(text + size - 1) { *at_ = '\0'; }
-  Line& operator<<(const char* more) {
+  CutText(char* text, std::size_t size) : at_(text), end_(text + size - 1) { *at_ = '\0'; }
+  CutText& operator<<(const char* more) {
     while (*more != '\0' && at_ != end_) *at_++ = *more++;
     *at_ = '\0';
     return *this;
@@ -68,7 +68,7 @@ void internal::DropInstance(const ModelInstance& model) {
 }
 
 void DescribeCall(const void* slot, char* text, std::size_t size) {
-  Line line(text, size);
+  CutText line(text, size);
   const std::unique_lock lock(TheInstances().mutex, std::try_to_lock);
   if (slot == nullptr || !lock) return;
   for (const ModelInstance* const model : TheInstances().all) {

@@ -63,6 +63,7 @@ System WanderersOf(GeometryKind kind, int n) {
     case GeometryKind::kUnitQuaternion:
       return Wanderers<UnitQuaternion>(n);
     case GeometryKind::kUnitVector:
+    case GeometryKind::kProduct:  // of measurements alone
       break;
   }
   return Wanderers<UnitVector>(n);

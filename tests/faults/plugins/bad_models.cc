@@ -187,6 +187,13 @@ struct ThrowsInNoise : Right {
     throw std::runtime_error("the dog ate it");
   }
 };
+struct HangsInNoise : Right {
+  using Right::Right;
+  template <class T>
+  void SqrtNoise(const T*, const T*, T*) const {
+    while (g_zero == 0.0) ::pause();
+  }
+};
 struct ThrowsInDestroy : Right {
   using Right::Right;
   ~ThrowsInDestroy() noexcept(false) {
@@ -428,7 +435,7 @@ ALIDADE_PLUGIN(SENSOR(Right, "right"), SENSOR(MayHaveBias, "may_have_bias"),
                SENSOR(NanNoise, "nan_noise"), SENSOR(SingularNoise, "singular_noise"),
                SENSOR(NoNoise, "no_noise"), SENSOR(WrongInverse, "wrong_inverse"),
                SENSOR(ThrowsInt, "throws_int"), SENSOR(ThrowsInNoise, "throws_in_noise"),
-               SENSOR(ThrowsInDestroy, "throws_in_destroy"),
+               SENSOR(HangsInNoise, "hangs_in_noise"), SENSOR(ThrowsInDestroy, "throws_in_destroy"),
                SENSOR(ThrowsInCreate, "throws_in_create"), SENSOR(Misbehaves<1>, "exits"),
                SENSOR(Misbehaves<2>, "crashes"), SENSOR(Misbehaves<12>, "exits_at_once"),
                SENSOR(Misbehaves<3>, "hangs"), SENSOR(Misbehaves<4>, "eats_memory"),

@@ -65,10 +65,11 @@ Experiment MakeWithBatch(bool outliers, bool accepted) {
   EkfOptions options;
   options.gate = 0.9999;
   auto ekf = std::make_unique<Ekf>(system, options, testing::StreamsOf(system));
-  experiment.estimators.push_back(
-      {"ekf", "ekf", EstimatorKind::kFilter, system, std::move(ekf), OnDivergence::kReport, ""});
+  experiment.estimators.push_back({"ekf", "ekf", EstimatorKind::kFilter, system, std::move(ekf),
+                                   OnDivergence::kReport, OnPluginFailure::kSkip, ""});
   experiment.estimators.push_back({"batch", "ceres_batch", EstimatorKind::kBatch, system,
-                                   std::make_unique<Told>(system), OnDivergence::kReport, ""});
+                                   std::make_unique<Told>(system), OnDivergence::kReport,
+                                   OnPluginFailure::kSkip, ""});
   if (accepted) experiment.estimators[1].accepted_by = 0;
   return experiment;
 }

@@ -10,8 +10,8 @@ namespace {
 INSTANTIATE_TEST_SUITE_P(
     Composite, EveryModel,
     ::testing::Values(
-        SensorRow("pose", "{sigma_position_m: 0.1, sigma_orientation_rad: [0.05, 0.1, 0.2]}",
-                  Pose({0.1, 0.1, 0.1}, {0.05, 0.1, 0.2}), {kPosition, {0.6, 0.0, 0.8, 0.0}}),
+        SensorRow("pose", "{sigma_position_m: 0.1, sigma_orientation_rad: [0.01, 0.02, 0.02]}",
+                  Pose({0.1, 0.1, 0.1}, {0.01, 0.02, 0.02}), {kPosition, {0.6, 0.0, 0.8, 0.0}}),
         SensorRow("range_bearing",
                   "{sigma_range_m: 0.1, sigma_bearing_rad: 0.05, landmarks: {representation: xyz}}",
                   RangeBearing<Xyz>(0.1, 0.05), {kPosition, kOrientation, {0.2, 0.4, 2.0}}),

@@ -61,7 +61,7 @@ TEST_P(OneFault, IsFoundByItsCheckAlone) {
   const bool differs = model == "exits" || model == "eats_memory" || model == "unwritten";
   if (testing::kSanitized && differs) GTEST_SKIP() << "a sanitizer ends it in its own way";
   CheckOptions options;
-  if (std::string(GetParam().model) == "hangs") options.timeout_s = 1.0;
+  if (model.starts_with("hangs")) options.timeout_s = 1.0;
   options.memory_mb = 64;
   const auto findings = Checked(GetParam().model, options);
   const auto failures = Failures(findings);
@@ -96,6 +96,12 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{65, "hidden_state", "pure", {"Predict at", "depends on what was called before"}},
         Fault{66, "crashes", "calls", {"Predict crashed (signal 11", "; at x = "}},
         Fault{66, "exits", "calls", {"Predict ended the process with exit code 0; at x = "}},
+        Fault{
+            66, "exits_at_once", "calls", {"Predict ended the process with exit code 0; at x = "}},
+        Fault{67,
+              "hangs_in_noise",
+              "calls",
+              {"the check took longer than 1 s (--timeout); it was in SqrtNoise at x = "}},
         Fault{67,
               "hangs",
               "calls",

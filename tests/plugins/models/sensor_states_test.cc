@@ -13,6 +13,7 @@
 #include "alidade/host/plugin_host.h"
 #include "alidade/run/run.h"
 #include "support/config_text.h"
+#include "support/sanitized.h"
 
 namespace alidade {
 namespace {
@@ -135,6 +136,10 @@ TEST(SensorStates, CanBeConsidered) {
 std::map<std::string, double> MeansOf(const std::string& text, const std::string& metric,
                                       int runs) {
   std::map<std::string, double> means;
+  if (testing::kSanitized) {  // once is enough to see that it is sound
+    RunOf(text);
+    return means;
+  }
   for (int seed = 1; seed <= runs; ++seed) {
     for (const EstimatorResult& one : RunOf(text, seed).estimators) {
       means[one.name] += one.metrics.at(metric) / runs;
@@ -165,7 +170,7 @@ TEST(SensorStates, AGaussMarkovStateKeepsItsVariance) {
       testing::Read(Filled("", "",
                            ", initial: {clock_bias: {mean: 3, sigma: 2}}, dynamics: {clock_bias: "
                            "{gauss_markov: {sigma: 2, time_constant_s: 1.5}}}"));
-  constexpr int kDraws = 600;
+  constexpr int kDraws = testing::kSanitized ? 5 : 600;
   double sum = 0.0, squares = 0.0, lagged = 0.0;
   for (std::uint64_t seed = 1; seed <= kDraws; ++seed) {
     const auto source = TheHost().CreateSource(config, seed);
@@ -177,6 +182,7 @@ TEST(SensorStates, AGaussMarkovStateKeepsItsVariance) {
     squares += last * last / kDraws;
     lagged += last * before / kDraws;
   }
+  if (testing::kSanitized) return;
   EXPECT_NEAR(sum, 0.0, 0.35);                               // sd 0.08
   EXPECT_NEAR(squares, 4.0, 0.9);                            // sd 0.23
   EXPECT_NEAR(lagged / squares, std::exp(-0.5 / 1.5), 0.1);  // 2 Hz
@@ -216,7 +222,7 @@ const std::string kLate =
     "alidade: 1\n"
     "state:\n"
     "  target: {model: constant_velocity, noise: {kind: continuous, acceleration: 0.4},\n"
-    "    initial: {position: {mean: 10, sigma: 0.2}, velocity: {mean: 1, sigma: 0.5}}}\n"
+    "    initial: {position: {mean: 40, sigma: 0.2}, velocity: {mean: -3, sigma: 0.2}}}\n"
     "sensors:\n"
     "  left: {model: stereo_disparity, stream: left, roles: {depth: target.position},\n"
     "    focal_px: 400, baseline_m: 0.5, sigma_px: 0.05}\n"
@@ -253,12 +259,14 @@ TEST(SensorStates, ATimeOffsetOf20MsIsFound) {
   }
 }
 
-// A constant one is the same as an estimated one that is known exactly.
+// A constant one is the same as an estimated one that is known exactly; to the spread of sigma points,
+// which goes by the number of states.
 TEST(SensorStates, ATimeOffsetMayBeAParameter) {
   const RunResult constant = RunOf(Late("0.02")), known = RunOf(Late("{mean: 0.02, sigma: 0}"));
   for (std::size_t i = 0; i < constant.estimators.size(); ++i) {
     const double rmse = known.estimators[i].metrics.at("rmse:target.position");
-    EXPECT_NEAR(constant.estimators[i].metrics.at("rmse:target.position"), rmse, 1e-10 * rmse)
+    const double relative = constant.estimators[i].name == "ukf" ? 1e-6 : 1e-10;
+    EXPECT_NEAR(constant.estimators[i].metrics.at("rmse:target.position"), rmse, relative * rmse)
         << constant.estimators[i].name;
   }
   const RunResult ignored = RunOf(Late("0.0",
@@ -294,7 +302,7 @@ TEST(SensorStates, RefusesByKeyAndRemedy) {
   still.replace(
       still.find("model: constant_velocity, noise: {kind: continuous, acceleration: 0.4},"), 71,
       "model: constant, blocks: {value: position},");
-  still.replace(still.find(", velocity: {mean: 1, sigma: 0.5}"), 33, "");
+  still.replace(still.find(", velocity: {mean: -3, sigma: 0.2}"), 34, "");
   expect(still, "sensors.right.time_offset_s: no motion model moves its roles");
   std::string unknown = Filled("", "", "");
   const std::size_t at = unknown.find("known:");

@@ -241,8 +241,8 @@ void FinishOnSignals() { finishing = true; }
 // In place of the C library's, for plugins too: of what ends the process at once, without the
 // handlers of atexit.
 extern "C" {
-[[noreturn, gnu::visibility("default")]] void _exit(int code) {
+[[gnu::visibility("default")]] void _exit(int code) {
   alidade::cli::ExitNow(alidade::cli::CodeOfEnd(code));
 }
-[[noreturn, gnu::visibility("default")]] void _Exit(int code) { _exit(code); }
+[[gnu::visibility("default")]] void _Exit(int code) { _exit(code); }
 }

@@ -17,8 +17,8 @@ namespace alidade::cli {
 /// Watches a run from a thread of its own. Where its estimators work on one frame for longer than a
 /// limit, or for more than 5 s after they were asked to stop, they hang in a model: it says which
 /// one was called last, keeps what was recorded, and ends the process, with kPlugin or kStopped. So
-/// does it before the first frame. A source that waits for data is not watched, nor is the smoothing
-/// after the last frame. Where there can be no thread there is no watch.
+/// does it before the first frame. A source that waits for data is not watched, nor is the
+/// smoothing after the last frame. Where there can be no thread there is no watch.
 class Watchdog : public RunObserver {
  public:
   /// Of a run on this thread. No limit: only requests to stop count.

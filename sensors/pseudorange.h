@@ -5,8 +5,8 @@
 
 namespace alidade {
 
-/// Pseudorange from a receiver to a transmitter whose place comes with the measurement: a satellite,
-/// or a radio beacon.
+/// Pseudorange from a receiver to a transmitter whose place comes with the measurement: a
+/// satellite, or a radio beacon.
 ///
 ///   model      z = |p - s| + b + n,   n ~ N(0, sigma^2)
 ///   Jacobian   dz/dp = (p - s)' / |p - s|,  dz/db = 1  1x3, 1x1

@@ -260,10 +260,6 @@ class Models : public Source {
       const SensorBinding& binding = system_.sensors[i];
       const auto own = settings ? settings->Find(binding.name) : std::nullopt;
       const int known = binding.model.known_size();
-      if (known > 0 && !own) {
-        entry.At("sensors", "sensor '" + binding.name + "'")
-            .At(binding.name, "the known numbers of model '" + binding.model.name() + "'");
-      }
       const models::Schedule schedule =
           models::ReadSchedule(own, rate_hz, known, seed, 1001 + 2 * i);
       const auto taken = std::ranges::find(streams_, binding.stream, &StreamInfo::name);
@@ -279,6 +275,10 @@ class Models : public Source {
                     "the entry of that sensor");
         }
         continue;
+      }
+      if (known > 0 && !own) {
+        entry.Fail("sensor '" + binding.name + "' takes known numbers with each measurement",
+                   "sensors." + binding.name + ".known, a list of them for each measurement");
       }
       sensors_.push_back({&binding, ModelOf(entry, binding), static_cast<int>(streams_.size()),
                           schedule, Random(seed, 1000 + 2 * i), max_per_frame});

@@ -15,9 +15,9 @@ extern constinit thread_local const void* last_call;
 }  // namespace detail
 
 /// `Predict of model 'scale_2d' of plugin /x/scale_2d.so`, of the slot that a thread called last,
-/// into `text` of `size` bytes, which it ends with a zero; "" where no model has been called, or its
-/// instance is gone. Of a thread that hangs or has crashed, too: it allocates nothing, waits for
-/// nobody, and may be called by a signal handler.
+/// into `text` of `size` bytes, which it ends with a zero; "" where no model has been called, or
+/// its instance is gone. Of a thread that hangs or has crashed, too: it allocates nothing, waits
+/// for nobody, and may be called by a signal handler.
 void DescribeCall(const void* slot, char* text, std::size_t size);
 
 }  // namespace alidade

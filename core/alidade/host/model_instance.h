@@ -19,8 +19,8 @@ namespace detail {
 inline Status ToStatus(std::int32_t code) {
   return code < ALIDADE_OK || code > ALIDADE_ERROR ? Status::kError : static_cast<Status>(code);
 }
-/// A measurement as its sensor is shown it, with the known numbers of a sensor that takes any; null:
-/// a prediction alone is asked for.
+/// A measurement as its sensor is shown it, with the known numbers of a sensor that takes any;
+/// null: a prediction alone is asked for.
 constexpr AlidadeObservation Seen(const double* z, const double* known = nullptr) {
   AlidadeObservation seen{};
   seen.struct_size = sizeof(seen);
@@ -96,8 +96,8 @@ class ModelInstance {
   unsigned capabilities_ = 0;
 };
 
-/// A sensor z = h(roles) + n behind the plugin ABI. Cheap to copy; calls as in plugin_abi.h. `known`
-/// is what came with the measurement, of a sensor that takes known numbers; null of others.
+/// A sensor z = h(roles) + n behind the plugin ABI. Cheap to copy; calls as in plugin_abi.h.
+/// `known` is what came with the measurement, of a sensor that takes known numbers; null of others.
 class SensorModel {
  public:
   explicit SensorModel(std::shared_ptr<const ModelInstance> instance);

@@ -84,7 +84,7 @@ enum class NoiseKind {
 ///
 /// and may have
 ///
-///   using Known = Vec<3>; static constexpr Quantity kKnown{...};        numbers that come with each
+///   using Known = Vec<3>; static constexpr Quantity kKnown{...};    numbers that come with each
 ///                                       measurement and are no state: where a satellite is. Every
 ///                                       function takes them, `const double* known`, behind the
 ///                                       roles: Predict(role..., known, z), Valid(known, z)
@@ -99,9 +99,10 @@ enum class NoiseKind {
 ///
 ///   Owned OwnedRole(int role) const;
 ///
-/// says. Roles with the flag ALIDADE_ROLE_LANDMARK stand side by side and are filled by the landmark that
-/// a measurement names. Where kInitialises is the first of them, y holds them all, one after the
-/// other. An optional member of another signature is a compile error (model_members.h).
+/// says. Roles with the flag ALIDADE_ROLE_LANDMARK stand side by side and are filled by the
+/// landmark that a measurement names. Where kInitialises is the first of them, y holds them all,
+/// one after the other. An optional member of another signature is a compile error
+/// (model_members.h).
 template <class MeasurementGeometry, class... RoleGeometries>
 struct Sensor {
   static_assert(((RoleGeometries::kGeometry != ALIDADE_PRODUCT) && ... && true),

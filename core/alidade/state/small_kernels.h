@@ -185,8 +185,8 @@ template <int N, int M>
   return kept;
 }
 
-/// The lower triangle of what Downdate gave, to P. Unrolled, so that it never lies in memory between
-/// the two: pairs read there would wait for the single numbers that were written.
+/// The lower triangle of what Downdate gave, to P. Unrolled, so that it never lies in memory
+/// between the two: pairs read there would wait for the single numbers that were written.
 template <int N>
 [[gnu::always_inline]] inline void StoreLower(const double* updated, double* p, int ld) {
   ALIDADE_UNROLL for (int c = 0; c < N; ++c) {

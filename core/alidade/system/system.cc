@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <utility>
 
 #include "alidade/base/words.h"
 #include "alidade/config/tree.h"
@@ -193,16 +194,16 @@ std::vector<double> ReadSqrtDiagonal(const Node& node, int size) {
 void ReadDynamics(const Node& node, int size, OwnedRole& owned) {
   owned.dynamics = OwnedDynamics::kConstant;
   owned.sqrt_density.clear();
+  constexpr const char* kKinds =
+      "constant, {random_walk: SIGMA}, or {gauss_markov: {sigma: SIGMA, time_constant_s: S}}";
   if (!node.is_map()) {
-    static_cast<void>(node.Choice({"constant"}));
+    if (node.Text() != "constant") node.Fail("no kind of dynamics", kKinds);
     return;
   }
   const auto walk = node.Find("random_walk"), markov = node.Find("gauss_markov");
   if (walk.has_value() == markov.has_value()) {
     node.RejectUnread();
-    node.Fail("not one kind of dynamics",
-              "constant, {random_walk: SIGMA}, or {gauss_markov: {sigma: SIGMA, "
-              "time_constant_s: S}}");
+    node.Fail("not one kind of dynamics", kKinds);
   }
   node.RejectUnread();
   if (walk) {
@@ -242,10 +243,11 @@ class OwnedReader {
 
   /// Declares the block of a role, `SENSOR.ROLE`, with its prior and its motion.
   BlockId Add(const Space& role, OwnedRole owned, System& system) {
-    if (system.layout.Find(name_ + '.' + role.name) >= 0) {
-      entry_.Fail("it brings the state '" + name_ + '.' + role.name +
-                      "', which a state entry of its name has",
-                  "another name for the sensor, or the role bound under `roles`");
+    const auto taken = [&](const Block& block) { return block.owner == name_; };
+    if (!std::exchange(added_, true) && std::ranges::any_of(system.layout.blocks(), taken)) {
+      entry_.Fail(
+          "it brings the state '" + name_ + '.' + role.name + "', and a state entry has its name",
+          "another name for the sensor, or the role bound under `roles`");
     }
     const bool is_offset = role.name == kTimeOffset;
     const auto own = is_offset  ? (offset_->is_map() ? offset_ : std::nullopt)
@@ -277,8 +279,12 @@ class OwnedReader {
       }
       system.priors.push_back(std::move(prior));
     }
-    if (const auto dynamics = dynamics_ ? dynamics_->Find(role.name) : std::nullopt) {
-      ReadDynamics(*dynamics, role.geometry.tangent, owned);
+    if (is_offset) CheckOffset(system.priors.back());
+    const auto dynamics = dynamics_ ? dynamics_->Find(role.name) : std::nullopt;
+    if (dynamics) ReadDynamics(*dynamics, role.geometry.tangent, owned);
+    if (constant && dynamics && owned.dynamics != OwnedDynamics::kConstant) {
+      dynamics->Fail("'" + role.name + "' is constant",
+                     "a sigma where it starts, or the key left out");
     }
     if (constant) owned.dynamics = OwnedDynamics::kConstant;
     system.motions.push_back(
@@ -286,9 +292,9 @@ class OwnedReader {
     return id;
   }
 
-  /// The time offset of a sensor whose roles are bound; nothing where none is given.
+  /// The time offset of a sensor whose roles are bound; nothing where none is given, or 0.
   void AddTimeOffset(System& system, SensorBinding& sensor) {
-    if (!offset_) return;
+    if (!offset_ || (!offset_->is_map() && offset_->Number() == 0.0)) return;
     OwnedRole at_first;
     at_first.mean = {offset_->is_map() ? 0.0 : offset_->Number()};
     const Space space{
@@ -304,8 +310,17 @@ class OwnedReader {
   }
 
  private:
+  /// Of a clock that is off by more than a filter can look ahead.
+  void CheckOffset(const Prior& prior) const {
+    constexpr double kMostSeconds = 60.0;
+    const double sigma = prior.covariance.size() == 0 ? 0.0 : std::sqrt(prior.covariance(0, 0));
+    if (std::abs(prior.mean[0]) <= kMostSeconds && sigma <= kMostSeconds) return;
+    offset_->Fail("more than a motion model can look ahead", "at most 60 s, sigma too");
+  }
+
   std::string name_;
   Node entry_;
+  bool added_ = false;  ///< one of its states
   std::optional<Node> offset_, initial_, dynamics_;
   std::vector<std::string> considered_, constant_;
 };

@@ -235,13 +235,11 @@ class OffsetSensor {
     for (const Mover& mover : movers_) {
       const std::vector<Space>& blocks = mover.model.blocks();
       const int n = mover.model.tangent_size();
-      int column = 0;
       for (int c = 0; c < mover.count; ++c) {
         const int width = blocks[static_cast<std::size_t>(c)].geometry.tangent;
         for (int r = 0; r < m && jacobians[mover.first + c] != nullptr; ++r) {
           std::fill_n(&at(mover.first + c, r, 0), width, 0.0);
         }
-        column += width;
       }
       for (std::size_t i = 0; i < place_.size(); ++i) {
         const int block = place_[i] - mover.first;
@@ -309,9 +307,9 @@ class OffsetSensor {
     const Status status = of.Shift(roles, derivatives, memory);
     if (status != Status::kOk) return static_cast<std::int32_t>(status);
     int rows = 0;
-    for (int i = 0; i < of.sensor_.initialised_count(); ++i) {
-      const auto role = static_cast<std::size_t>(of.sensor_.initialised_role() + i);
-      rows += of.sensor_.roles()[role].geometry.tangent;
+    const auto first = of.sensor_.roles().begin() + of.sensor_.initialised_role();
+    for (auto role = first; role != first + of.sensor_.initialised_count(); ++role) {
+      rows += role->geometry.tangent;
     }
     if (derivatives) of.PlaceJacobians(rows, jx, jx_strides, memory);
     const AlidadeInstance& c = of.sensor_.instance().c();
@@ -357,53 +355,56 @@ struct Arrangement {
   }
 };
 
+/// Of one model of the sensor: its own, or that of landmarks that are xyz.
+Arrangement Arrange(const System& system, BlockId offset, const SensorBinding& sensor,
+                    const SensorModel& model) {
+  Arrangement all;
+  all.place_of_role.assign(model.roles().size(), -1);
+  const auto role_of = [&](BlockId block) {
+    const auto found = std::ranges::find(sensor.roles, block, &RoleBinding::block);
+    return found == sensor.roles.end() ? -1 : static_cast<int>(found - sensor.roles.begin());
+  };
+  for (const MotionBinding& motion : system.motions) {
+    const bool moves =
+        !motion.model.stationary() &&
+        std::ranges::any_of(motion.blocks, [&](BlockId id) { return role_of(id) >= 0; });
+    if (!moves) continue;
+    all.movers.push_back(
+        {motion.model, static_cast<int>(all.roles.size()), static_cast<int>(motion.blocks.size())});
+    for (const BlockId id : motion.blocks) {
+      const int role = role_of(id);
+      if (role < 0) {
+        all.Add(system.layout[id].space, RoleBinding{id}, system.layout[id].name);
+        continue;
+      }
+      const auto index = static_cast<std::size_t>(role);
+      all.place_of_role[index] =
+          all.Add(model.roles()[index], sensor.roles[index], model.roles()[index].name);
+    }
+  }
+  for (std::size_t i = 0; i < std::min(sensor.roles.size(), model.roles().size()); ++i) {
+    const Space& role = model.roles()[i];
+    if (role.landmark() || sensor.roles[i].block < 0 || all.place_of_role[i] >= 0) continue;
+    all.place_of_role[i] = all.Add(role, sensor.roles[i], role.name);
+  }
+  all.offset = all.Add(system.layout[offset].space, RoleBinding{offset}, "time_offset");
+  for (std::size_t i = 0; i < model.roles().size(); ++i) {
+    const Space& role = model.roles()[i];
+    if (role.landmark()) all.place_of_role[i] = all.Add(role, {}, role.name);
+  }
+  return all;
+}
+
+SensorModel Publish(const SensorModel& model, Arrangement all) {
+  return OffsetSensor::Publish(std::make_unique<OffsetSensor>(model, std::move(all.movers),
+                                                              std::move(all.place_of_role),
+                                                              std::move(all.roles), all.offset));
+}
+
 }  // namespace
 
 std::string OffsetInTime(const System& system, BlockId offset, SensorBinding& sensor) {
-  const std::vector<Space>& inner = sensor.model.roles();
-  const auto arrange = [&](const SensorModel& model) {
-    Arrangement all;
-    all.place_of_role.assign(model.roles().size(), -1);
-    const auto role_of = [&](BlockId block) {
-      const auto found = std::ranges::find(sensor.roles, block, &RoleBinding::block);
-      return found == sensor.roles.end() ? -1 : static_cast<int>(found - sensor.roles.begin());
-    };
-    for (const MotionBinding& motion : system.motions) {
-      const bool moves =
-          !motion.model.stationary() &&
-          std::ranges::any_of(motion.blocks, [&](BlockId id) { return role_of(id) >= 0; });
-      if (!moves) continue;
-      all.movers.push_back({motion.model, static_cast<int>(all.roles.size()),
-                            static_cast<int>(motion.blocks.size())});
-      for (const BlockId id : motion.blocks) {
-        const int role = role_of(id);
-        RoleBinding binding{id};
-        if (role >= 0) binding = sensor.roles[static_cast<std::size_t>(role)];
-        const int place = all.Add(
-            system.layout[id].space, binding,
-            role >= 0 ? inner[static_cast<std::size_t>(role)].name : system.layout[id].name);
-        if (role >= 0) all.place_of_role[static_cast<std::size_t>(role)] = place;
-      }
-    }
-    for (std::size_t i = 0; i < std::min(sensor.roles.size(), model.roles().size()); ++i) {
-      if (model.roles()[i].landmark() || sensor.roles[i].block < 0 || all.place_of_role[i] >= 0) {
-        continue;
-      }
-      all.place_of_role[i] = all.Add(model.roles()[i], sensor.roles[i], model.roles()[i].name);
-    }
-    all.offset = all.Add(system.layout[offset].space, RoleBinding{offset}, "time_offset");
-    for (std::size_t i = 0; i < model.roles().size(); ++i) {
-      if (!model.roles()[i].landmark()) continue;
-      all.place_of_role[i] = all.Add(model.roles()[i], {}, model.roles()[i].name);
-    }
-    return all;
-  };
-  const auto publish = [](const SensorModel& model, Arrangement all) {
-    return OffsetSensor::Publish(std::make_unique<OffsetSensor>(model, std::move(all.movers),
-                                                                std::move(all.place_of_role),
-                                                                std::move(all.roles), all.offset));
-  };
-  Arrangement all = arrange(sensor.model);
+  Arrangement all = Arrange(system, offset, sensor, sensor.model);
   for (const Mover& mover : all.movers) {
     if (mover.model.has_input()) {
       return "motion model '" + mover.model.name() + "' of its roles takes a control input";
@@ -416,9 +417,11 @@ std::string OffsetInTime(const System& system, BlockId offset, SensorBinding& se
     return "a role has jacobian_at: measurement";
   }
   if (all.movers.empty()) return "no motion model moves its roles: it sees the same at any time";
-  std::vector<RoleBinding> bindings = all.bindings;
-  if (sensor.xyz) sensor.xyz = publish(*sensor.xyz, arrange(*sensor.xyz));
-  sensor.model = publish(sensor.model, std::move(all));
+  if (sensor.xyz) {
+    sensor.xyz = Publish(*sensor.xyz, Arrange(system, offset, sensor, *sensor.xyz));
+  }
+  std::vector<RoleBinding> bindings = std::move(all.bindings);
+  sensor.model = Publish(sensor.model, std::move(all));
   sensor.roles = std::move(bindings);
   return {};
 }

@@ -51,7 +51,7 @@ std::string Refusal(const std::string& text) {
   return Message([&] { Shipped().CreateSource(Parse(text), 1); });
 }
 
-/// Expects that the mean over `runs` seeds of a metric of the first estimator is 1. No run may fail.
+/// Expects that the mean over `runs` seeds of a metric of the first estimator is 1; no run fails.
 void ExpectOne(const std::string& metric, const Config& config, int runs, double tolerance) {
   if (testing::kSanitized) runs = 2;
   double sum = 0.0;

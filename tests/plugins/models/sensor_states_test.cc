@@ -259,8 +259,8 @@ TEST(SensorStates, ATimeOffsetOf20MsIsFound) {
   }
 }
 
-// A constant one is the same as an estimated one that is known exactly; to the spread of sigma points,
-// which goes by the number of states.
+// A constant one is the same as an estimated one that is known exactly; to the spread of sigma
+// points, which goes by the number of states.
 TEST(SensorStates, ATimeOffsetMayBeAParameter) {
   const RunResult constant = RunOf(Late("0.02")), known = RunOf(Late("{mean: 0.02, sigma: 0}"));
   for (std::size_t i = 0; i < constant.estimators.size(); ++i) {
@@ -297,7 +297,13 @@ TEST(SensorStates, RefusesByKeyAndRemedy) {
   expect(Filled("  gnss: {model: constant, blocks: {value: clock_bias}, initial: {clock_bias: "
                 "{mean: 0, sigma: 1}}}\n",
                 "", ""),
-         "it brings the state 'gnss.clock_bias'");
+         "it brings the state 'gnss.clock_bias', and a state entry has its name");
+  expect(keys("dynamics: {clock_bias: brownian}"), "expected constant, {random_walk: SIGMA}");
+  expect(keys("constant: [clock_bias], initial: {clock_bias: {mean: 1}}, dynamics: {clock_bias: "
+              "{random_walk: 1}}"),
+         "'clock_bias' is constant");
+  expect(Late("100"), "at most 60 s");
+  expect(Late("{mean: 0, sigma: 1e9}"), "at most 60 s");
   std::string still = Late("0.02");
   still.replace(
       still.find("model: constant_velocity, noise: {kind: continuous, acceleration: 0.4},"), 71,

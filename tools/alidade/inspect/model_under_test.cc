@@ -26,7 +26,7 @@ bool Same(double a, double b) {
   for (volatile double& cell : cells) cell = kPoison;
 }
 
-Space Named(const char* name, Geometry geometry) {
+Space Named(const char* name, const Geometry& geometry) {
   Space space;
   space.name = name;
   space.geometry = geometry;

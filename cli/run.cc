@@ -131,16 +131,14 @@ ExitCode RunConfig(const RunArguments& arguments) {
   options.observers = {&recorder};
   Follower follower(Print);
   if (arguments.follow) options.observers.push_back(&follower);
+  options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
+  options.stop = StopRequested;
   std::optional<double> limit_s;
   if (arguments.frame_timeout != "none") limit_s = std::stod(arguments.frame_timeout);
-  Watchdog watchdog(limit_s, recorder);
-  options.observers.push_back(&watchdog);
-  options.progress = [&](std::int64_t done, std::int64_t total) {
-    watchdog.FrameDone();
-    progress.Show(done, total);
-  };
-  options.stop = StopRequested;
+  std::optional<Watchdog> watchdog(std::in_place, limit_s, recorder);
+  options.busy = [&](bool busy) { watchdog->Work(busy); };
   const RunResult result = WithWhatIsKept(recorder, [&] { return Run(experiment, options); });
+  watchdog.reset();
   progress.Clear();
   if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
   if (result.status == RunStatus::kStopped) PrintNote(result.reason);

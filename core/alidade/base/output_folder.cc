@@ -232,7 +232,7 @@ bool OutputFolder::Abandon() const {
   const fs::path name = failed();
   if (name.empty()) return false;
   MakeFailed(partial_, name);
-  return fs::exists(name);
+  return Exists(name);
 }
 
 fs::path OutputFolder::Sibling(const char* kind) const {

@@ -130,9 +130,9 @@ std::optional<Prediction> Filter::Expect(std::string_view sensor, Timestamp time
                                          const std::vector<double>& known) const {
   const int index = system().FindSensor(sensor);
   if (index < 0) {
-    std::vector<std::string> known;
-    for (const SensorBinding& one : system().sensors) known.push_back(one.name);
-    RefuseName("sensor", sensor, known);
+    std::vector<std::string> names;
+    for (const SensorBinding& one : system().sensors) names.push_back(one.name);
+    RefuseName("sensor", sensor, names);
   }
   CheckKnown("sensor '" + std::string(sensor) + '\'',
              system().sensors[static_cast<std::size_t>(index)].model.known_size(), known);

@@ -69,8 +69,9 @@ void internal::DropInstance(const ModelInstance& model) {
 
 void DescribeCall(const void* slot, char* text, std::size_t size) {
   CutText line(text, size);
+  if (slot == nullptr) return;  // else there has been an instance
   const std::unique_lock lock(TheInstances().mutex, std::try_to_lock);
-  if (slot == nullptr || !lock) return;
+  if (!lock) return;
   for (const ModelInstance* const model : TheInstances().all) {
     const char* const name = NameOf(*model, slot);
     if (name == nullptr) continue;

@@ -315,6 +315,7 @@ void ModelInstance::ReadOwned(const AlidadeOwned& owned, const Space& role, std:
   if (role.geometry.Defect(known.mean.data()) > kUnitTolerance) {
     Refuse(what + "have a mean that is not of unit length");
   }
+  role.geometry.Normalise(known.mean.data());
   if (returns && !(known.time_constant_s > 0.0))
     Refuse(what + "have a time constant of 0 s or less");
   owned_[index] = std::move(known);

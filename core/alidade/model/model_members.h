@@ -44,6 +44,14 @@ struct ValidCall {
 template <class Model>
 struct HasValid : TakesRoles<ValidCall, Model, std::index_sequence<>, const double*> {};
 
+/// Of a model with Valid.
+template <class Model>
+bool CallValid(const Model& model, const double* known, const double* z) {
+  const auto valid = [&](auto... arguments) -> bool { return model.Valid(arguments...); };
+  const double* const* const no_roles = nullptr;
+  return WithRoles<Model>(valid, no_roles, known, std::index_sequence<>{}, z);
+}
+
 template <class Model, class = void>
 struct HasStationary : std::false_type {};
 template <class Model>

@@ -34,7 +34,7 @@ struct OwnedByAbi {
   explicit OwnedByAbi(Owned of) : from(std::move(of)) {
     c.struct_size = sizeof(c);
     c.dynamics = from.dynamics;
-    c.mean = from.mean.data();
+    c.mean = from.mean.empty() ? nullptr : from.mean.data();
     c.sqrt_prior = Diagonal(from.sigma, sqrt_prior);
     c.sqrt_density = Diagonal(from.density, sqrt_density);
     c.time_constant_s = from.time_constant_s;
@@ -106,7 +106,16 @@ struct Holder {
     if constexpr (HasOwnedRole<Model>::value) {
       for (int i = 0; i < Blocks<Model>::kCount; ++i) {
         if ((roles[i].flags & ALIDADE_ROLE_OWNED) == 0) continue;
-        owned[i] = std::make_unique<OwnedByAbi>(model.OwnedRole(i));
+        Owned own = model.OwnedRole(i);
+        const auto fits = [](const std::vector<double>& of, int size) {
+          return of.empty() || of.size() == static_cast<std::size_t>(size);
+        };
+        if (!fits(own.mean, roles[i].ambient) || !fits(own.sigma, roles[i].tangent) ||
+            !fits(own.density, roles[i].tangent)) {
+          own = Owned{ALIDADE_STAYS, {std::nan("")}, {}, {}, 0.0};  // which the host refuses
+          own.mean.resize(static_cast<std::size_t>(roles[i].ambient));
+        }
+        owned[i] = std::make_unique<OwnedByAbi>(std::move(own));
         roles[i].owned = &owned[i]->c;
       }
     }
@@ -194,11 +203,8 @@ struct __attribute__((visibility("hidden"))) SensorCalls {
                                             const AlidadeObservation* seen) noexcept {
     return Guarded<Model>(self, [&](const Model& model) {
       if constexpr (HasValid<Model>::value) {
-        const auto valid = [&](auto... arguments) -> bool { return model.Valid(arguments...); };
-        const double* const* const no_roles = nullptr;
-        const bool is_valid = WithRoles<Model>(valid, no_roles, KnownOf<Model>(seen),
-                                               std::index_sequence<>{}, seen->z);
-        return std::int32_t{is_valid ? ALIDADE_OK : ALIDADE_INVALID};
+        const bool valid = CallValid(model, KnownOf<Model>(seen), seen->z);
+        return std::int32_t{valid ? ALIDADE_OK : ALIDADE_INVALID};
       } else {
         static_cast<void>(model);
         return std::int32_t{ALIDADE_OK};

@@ -67,7 +67,8 @@ StaticOutcome StaticEkf<Motions...>::Update(const Model& sensor, const double* z
   constexpr int m = Z::kTangent, bound[] = {Roles...};
   static_assert(sizeof...(Roles) == RoleBlocks::kCount, "one block for each role");
   if constexpr (detail::HasValid<Model>::value) {
-    if (!sensor.Valid(z)) return StaticOutcome::kInvalid;
+    if (!detail::CallValid(sensor, z + Model::Measurement::kAmbient, z))
+      return StaticOutcome::kInvalid;
   }
   const double* const roles[] = {value<Roles>()...};
   double h[Z::kAmbient], l[m * m] = {}, j[m * RoleBlocks::kTangent];

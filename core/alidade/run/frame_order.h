@@ -28,8 +28,9 @@ class FrameOrder {
  public:
   using Check = std::function<void(SourceFrame&)>;
 
-  /// `check` takes each frame first; it throws for one that the estimators must not see.
-  FrameOrder(Experiment& experiment, Check check);
+  /// `check` takes each frame first; it throws for one that the estimators must not see. `busy` as
+  /// RunOptions has it.
+  FrameOrder(Experiment& experiment, Check check, std::function<void(bool)> busy);
   /// Takes back what the estimators were given beyond the frame that Next gave last.
   ~FrameOrder();
   FrameOrder(const FrameOrder&) = delete;
@@ -65,6 +66,7 @@ class FrameOrder {
 
   Experiment& experiment_;
   Check check_;
+  std::function<void(bool)> busy_;
   std::deque<Held> held_;  ///< by timestamp
   Held released_;          ///< the one that Next gave last, or what was before the first
   Timestamp newest_ = kNoTimestamp;

@@ -8,6 +8,7 @@
 #include "alidade/base/number_text.h"
 #include "alidade/base/words.h"
 #include "alidade/run/accepted_data.h"
+#include "alidade/run/busy_while.h"
 #include "alidade/run/frame_check.h"
 #include "alidade/run/frame_order.h"
 #include "alidade/run/map_metrics.h"
@@ -63,7 +64,11 @@ bool Advance(Running& one, const Seen& seen, const Frame& visible, const Source&
   const bool all = one.failed_sensors.empty();
   if (!all) rest = one.WithoutFailed(visible, source.streams());
   const auto started = Clock::now();
-  const UpdateReport& report = passed ? passed->report : estimator.Process(all ? visible : rest);
+  const auto process = [&]() -> const UpdateReport& {
+    const internal::BusyWhile works(options.busy);
+    return estimator.Process(all ? visible : rest);
+  };
+  const UpdateReport& report = passed ? passed->report : process();
   if (!passed) one.result.wall_s += SecondsSince(started);
   one.last = &report;
   one.ended = passed ? passed->failed : estimator.failed();
@@ -74,8 +79,10 @@ bool Advance(Running& one, const Seen& seen, const Frame& visible, const Source&
              passed ? passed->after->state() : estimator.state(), report, options);
   }
   if (const std::string why = one.TakeFailures(report); !why.empty()) {
-    Fail(result, ExitCode::kPlugin,
-         "estimator '" + one.named.name + "'" + At(seen.frame) + ": " + why);
+    if (result.status == RunStatus::kOk) {
+      Fail(result, ExitCode::kPlugin,
+           "estimator '" + one.named.name + "'" + At(seen.frame) + ": " + why);
+    }
     return false;
   }
   const bool policy = one.named.on_divergence == OnDivergence::kFail && one.diverged;
@@ -127,7 +134,8 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
   const bool keep = std::ranges::any_of(
       running, [](const Running& one) { return one.waits || one.named.estimator->offline(); });
   internal::FrameCheck check(experiment, result.normalised);
-  internal::FrameOrder frames(experiment, [&check](SourceFrame& frame) { check(frame); });
+  internal::FrameOrder frames(
+      experiment, [&check](SourceFrame& frame) { check(frame); }, options.busy);
   while (NextFrame(frames, running, result, seen.frame)) {
     check.FollowTruth(seen.frame);
     for (std::size_t i = 0; i < experiment.segments.size(); ++i) {
@@ -327,7 +335,10 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
     }
   };
   guarded([&] {
-    running = BeginAll(experiment);
+    {
+      const internal::BusyWhile works(options.busy);
+      running = BeginAll(experiment);
+    }
     for (RunObserver* const observer : options.observers) observer->Begin(experiment);
     internal::LogExperiment(experiment);
     for (const Running& one : running) internal::LogEvents(one.named.name, one.result.events);

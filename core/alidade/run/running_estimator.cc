@@ -41,7 +41,7 @@ std::string Running::TakeFailures(const UpdateReport& report) {
     if (failed == 0) {
       Note({{named.estimator->timestamp(), "sensor_disabled",
              "sensor '" + sensor.name + "' has failed; its stream '" + sensor.stream +
-                 "' is no longer used"}});
+                 "' is no longer used, unless another sensor reads it"}});
     }
     failed = 1;
   }

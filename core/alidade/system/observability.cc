@@ -204,14 +204,19 @@ void ObserveBy(const SensorBinding& sensor, const double* known, const System& s
   for (Eigen::Index i = 0; i < m; ++i) rows.Add(seen.row(i).cwiseProduct(scale));
 }
 
-/// The same of every sensor; known numbers are any, as several measurements bring them.
+/// The same of every sensor; known numbers are any of the size of the state, as several
+/// measurements bring them.
 void Observe(const System& system, const Trajectory& t, const Eigen::MatrixXd& phi, Random& random,
              RowSpace& rows) {
   constexpr int kMeasurements = 4;
+  double reach = 1.0;
+  for (const std::vector<double>& value : t.values) {
+    for (const double element : value) reach = std::max(reach, 2.0 * std::abs(element));
+  }
   for (const SensorBinding& sensor : system.sensors) {
     std::vector<double> known(static_cast<std::size_t>(sensor.model.known_size()));
     for (int i = 0; i < (known.empty() ? 1 : kMeasurements); ++i) {
-      for (double& number : known) number = random.Normal();
+      for (double& number : known) number = reach * random.Normal();
       ObserveBy(sensor, known.data(), system, t, phi, rows);
     }
   }

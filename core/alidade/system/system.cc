@@ -226,11 +226,13 @@ class OwnedReader {
   static constexpr const char* kTimeOffset = "time_offset";
 
  public:
-  OwnedReader(std::string name, const Node& entry, const SensorModel& model)
+  OwnedReader(std::string name, const Node& entry, const Node& roles, const SensorModel& model)
       : name_(std::move(name)), entry_(entry), offset_(entry.Find("time_offset_s")) {
     std::vector<std::string> owned;
     for (const Space& role : model.roles()) {
-      if ((role.flags & ALIDADE_ROLE_OWNED) != 0) owned.push_back(role.name);
+      if ((role.flags & ALIDADE_ROLE_OWNED) != 0 && !roles.Find(role.name)) {
+        owned.push_back(role.name);
+      }
     }
     if (offset_) owned.emplace_back(kTimeOffset);
     if (owned.empty()) return;
@@ -389,7 +391,7 @@ SensorBinding ReadSensor(const std::string& name, const Node& entry, const Plugi
                         {}};
   if (const auto loss = entry.Find("loss")) binding.loss = ReadLoss(*loss);
   const Node roles = entry.At("roles", "sensor '" + name + "'");
-  OwnedReader owned(name, entry, binding.model);
+  OwnedReader owned(name, entry, roles, binding.model);
   for (std::size_t i = 0; i < binding.model.roles().size(); ++i) {
     const Space& role = binding.model.roles()[i];
     if (role.landmark()) {

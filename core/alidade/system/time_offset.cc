@@ -11,10 +11,12 @@
 namespace alidade::internal {
 namespace {
 
-/// A motion model that moves roles: its blocks are `count` roles from `first` on.
+/// A motion model that moves roles: its blocks are `count` roles from `first` on, of which constant
+/// ones stay.
 struct Mover {
   MotionModel model;
   int first, count;
+  std::vector<bool> stays;
 };
 
 /// The sensor at another time, behind the calls of the plugin ABI.
@@ -122,8 +124,17 @@ class OffsetSensor {
     }
     const Status status = mover.model.Step(x, nullptr, nullptr, dt_s, to.data(), f,
                                            f == nullptr ? nullptr : memory.g.data());
+    const int n = mover.model.tangent_size();
+    int row = 0;
     for (std::size_t b = 0; status == Status::kOk && b < mover.model.blocks().size(); ++b) {
-      mover.model.blocks()[b].geometry.Normalise(to[b]);
+      const Geometry& geometry = mover.model.blocks()[b].geometry;
+      geometry.Normalise(to[b]);
+      if (mover.stays[b]) std::copy_n(x[b], geometry.ambient, to[b]);
+      for (int r = row; r < row + geometry.tangent && mover.stays[b] && f != nullptr; ++r) {
+        std::fill_n(f + r * n, n, 0.0);
+        f[r * n + r] = 1.0;
+      }
+      row += geometry.tangent;
     }
     return status;
   }
@@ -291,6 +302,7 @@ class OffsetSensor {
     const Status status = of.Shift(roles, false, memory);
     if (status != Status::kOk) return static_cast<std::int32_t>(status);
     const AlidadeInstance& c = of.sensor_.instance().c();
+    detail::last_call = &c.sensor->sqrt_noise;
     return c.sensor->sqrt_noise(c.self, seen, memory.roles.data(), l, stride);
   }
   static std::int32_t Valid(const void* self, const AlidadeObservation* seen) {
@@ -313,6 +325,7 @@ class OffsetSensor {
     }
     if (derivatives) of.PlaceJacobians(rows, jx, jx_strides, memory);
     const AlidadeInstance& c = of.sensor_.instance().c();
+    detail::last_call = &c.sensor->initialise;
     const std::int32_t code =
         c.sensor->initialise(c.self, seen, memory.roles.data(), prior, y,
                              derivatives ? memory.jacobians.data() : nullptr, memory.strides.data(),
@@ -345,8 +358,7 @@ struct Arrangement {
   std::vector<int> place_of_role;
   int offset = -1;
 
-  /// The role of the block, or a new one of `space`, named after the role of the sensor that it
-  /// fills or else after the block.
+  /// Appends a role; its index.
   int Add(Space space, RoleBinding binding, const std::string& name) {
     space.name = name;
     roles.push_back(std::move(space));
@@ -369,12 +381,19 @@ Arrangement Arrange(const System& system, BlockId offset, const SensorBinding& s
         !motion.model.stationary() &&
         std::ranges::any_of(motion.blocks, [&](BlockId id) { return role_of(id) >= 0; });
     if (!moves) continue;
-    all.movers.push_back(
-        {motion.model, static_cast<int>(all.roles.size()), static_cast<int>(motion.blocks.size())});
+    all.movers.push_back({motion.model,
+                          static_cast<int>(all.roles.size()),
+                          static_cast<int>(motion.blocks.size()),
+                          {}});
+    // What brings the motion model decides how its other blocks take part.
+    const auto moved =
+        std::ranges::find_if(motion.blocks, [&](BlockId id) { return role_of(id) >= 0; });
+    const RoleMode mode = sensor.roles[static_cast<std::size_t>(role_of(*moved))].mode;
     for (const BlockId id : motion.blocks) {
+      all.movers.back().stays.push_back(system.layout[id].status == BlockStatus::kConstant);
       const int role = role_of(id);
       if (role < 0) {
-        all.Add(system.layout[id].space, RoleBinding{id}, system.layout[id].name);
+        all.Add(system.layout[id].space, RoleBinding{id, mode}, system.layout[id].name);
         continue;
       }
       const auto index = static_cast<std::size_t>(role);

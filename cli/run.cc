@@ -37,7 +37,7 @@ struct RunArguments {
   std::optional<std::uint64_t> seed;
   bool force = false, quiet = false, no_figures = false, covariances = false, all = false;
   bool follow = false;
-  std::string frame_timeout = "60";  ///< s, or `none`
+  std::optional<double> frame_timeout_s = 60.0;
 };
 
 /// Events of one estimator and one kind.
@@ -133,9 +133,7 @@ ExitCode RunConfig(const RunArguments& arguments) {
   if (arguments.follow) options.observers.push_back(&follower);
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
-  std::optional<double> limit_s;
-  if (arguments.frame_timeout != "none") limit_s = std::stod(arguments.frame_timeout);
-  std::optional<Watchdog> watchdog(std::in_place, limit_s, recorder);
+  std::optional<Watchdog> watchdog(std::in_place, arguments.frame_timeout_s, recorder);
   options.busy = [&](bool busy) { watchdog->Work(busy); };
   const RunResult result = WithWhatIsKept(recorder, [&] { return Run(experiment, options); });
   watchdog.reset();
@@ -168,14 +166,19 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.add_flag("--follow", arguments->follow,
                    "print each estimate as it is made, a line of JSON, in place of the table");
+  const auto read_timeout = [arguments](const std::string& text) {
+    arguments->frame_timeout_s.reset();
+    if (text != "none") arguments->frame_timeout_s = std::stod(text);
+  };
   command
-      .add_option("--frame-timeout", arguments->frame_timeout,
-                  "seconds that the estimators may take for one frame before the run ends, or "
-                  "none; a model that hangs is named")
+      .add_option_function<std::string>(
+          "--frame-timeout", read_timeout,
+          "seconds that the estimators may take for one frame before the run ends, or none; a "
+          "model that hangs is named")
       ->check([](const std::string& text) {
         return text == "none" ? std::string() : IsNumber(0.001, 1e9)(text);
       })
-      ->capture_default_str();
+      ->default_str("60");
   command.add_flag("--no-figures", arguments->no_figures, "draw no figures");
   command.add_flag("--covariances", arguments->covariances,
                    "write P of every estimate, for `alidade compare`");

@@ -13,7 +13,7 @@
 namespace alidade::cli {
 
 Watchdog::Watchdog(std::optional<double> limit_s, const Recorder& recorder)
-    : limit_s_(limit_s), recorder_(recorder), last_call_(&detail::last_call) {
+    : limit_s_(limit_s), recorder_(recorder), last_call_(detail::last_call) {
   try {
     thread_ = std::thread([this] { Watch(); });
   } catch (const std::system_error&) {  // no memory for it, say: the run may do with less
@@ -66,7 +66,7 @@ void Watchdog::Watch() {
 
 void Watchdog::End(const std::string& why, ExitCode code) const {
   char call[1024];
-  DescribeCall(*last_call_, call, sizeof call);
+  DescribeCall(last_call_, call, sizeof call);
   std::string text = why;
   if (*call != '\0') text += std::string("; the last call of a model: ") + call;
   try {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -36,7 +37,7 @@ class Watchdog {
 
   const std::optional<double> limit_s_;
   const Recorder& recorder_;
-  const void* const* const last_call_;  ///< of the thread of the run
+  const std::atomic<const void*>& last_call_;  ///< of the thread of the run
   std::mutex mutex_;
   std::condition_variable changed_;
   bool ends_ = false, working_ = false;

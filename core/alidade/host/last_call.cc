@@ -11,7 +11,7 @@
 
 namespace alidade {
 
-constinit thread_local const void* detail::last_call = nullptr;
+constinit thread_local std::atomic<const void*> detail::last_call = nullptr;
 
 namespace {
 

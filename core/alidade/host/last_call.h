@@ -1,17 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 
 namespace alidade {
 
 namespace detail {
-/// The slot of the call table, in a ModelInstance, of the model that this thread called last. A
-/// call costs one store.
+/// The slot of the call table, in a ModelInstance, of the model that this thread called last.
+/// Another thread may read it.
 #if defined(__ELF__)
 [[gnu::tls_model("initial-exec")]]
 #endif
-extern constinit thread_local const void* last_call;
+extern constinit thread_local std::atomic<const void*>
+    last_call;
+
+/// One store, before each call.
+inline void NoteCall(const void* slot) { last_call.store(slot, std::memory_order_relaxed); }
 }  // namespace detail
 
 /// `Predict of model 'scale_2d' of plugin /x/scale_2d.so`, of the slot that a thread called last,

@@ -374,7 +374,7 @@ Status SensorModel::Initialise(const double* const* roles, const double* z, cons
                                const double* known) const {
   ALIDADE_EXPECTS(initialised_role_ >= 0);
   const AlidadeObservation seen = detail::Seen(z, known);
-  detail::last_call = &sensor_->initialise;
+  detail::NoteCall(&sensor_->initialise);
   return detail::ToStatus(sensor_->initialise(self_, &seen, roles, prior, y, jx,
                                               instance_->tangents().data(), jz,
                                               measurement().geometry.tangent, jp, prior_size_));

@@ -125,7 +125,7 @@ class SensorModel {
   /// z and jacobians[i] = dz/d role_i, row stride strides[i]; a null jacobian is skipped.
   Status Linearise(const double* const* roles, double* z, double* const* jacobians,
                    const int* strides, const double* known = nullptr) const {
-    detail::last_call = &sensor_->eval;
+    detail::NoteCall(&sensor_->eval);
     if (known_size_ > 0) return LineariseKnowing(roles, z, jacobians, strides, known);
     return detail::ToStatus(sensor_->eval(self_, &detail::kUnseen, roles, z, jacobians, strides));
   }
@@ -136,7 +136,7 @@ class SensorModel {
   }
   /// The same of a measurement as it is shown to the plugin, which takes as long to make as a call.
   Status SqrtNoise(const double* const* roles, const AlidadeObservation& seen, double* l) const {
-    detail::last_call = &sensor_->sqrt_noise;
+    detail::NoteCall(&sensor_->sqrt_noise);
     return detail::ToStatus(
         sensor_->sqrt_noise(self_, &seen, roles, l, measurement().geometry.tangent));
   }
@@ -145,7 +145,7 @@ class SensorModel {
   }
   Status Valid(const AlidadeObservation& seen) const {
     if (sensor_->valid == nullptr) return Status::kOk;
-    detail::last_call = &sensor_->valid;
+    detail::NoteCall(&sensor_->valid);
     return detail::ToStatus(sensor_->valid(self_, &seen));
   }
   /// y = g(other roles, z), dense row-major Jacobians jx[i] = dy/d role_i and jz = dy/dz. kInvalid
@@ -195,14 +195,14 @@ class MotionModel {
   /// be null.
   Status Step(const double* const* blocks, const double* input, const double* w, double dt_s,
               double* const* next, double* f, double* g) const {
-    detail::last_call = &motion_->step;
+    detail::NoteCall(&motion_->step);
     return detail::ToStatus(motion_->step(self_, blocks, &input,
                                           w != nullptr ? w : zero_noise_.data(), dt_s, next, f,
                                           tangent_size_, g, noise_size_, nullptr, 0));
   }
   /// l, row-major n_w x n_w, with Qw = l l'.
   Status SqrtQ(const double* const* blocks, const double* input, double dt_s, double* l) const {
-    detail::last_call = &motion_->sqrt_q;
+    detail::NoteCall(&motion_->sqrt_q);
     return detail::ToStatus(motion_->sqrt_q(self_, blocks, &input, dt_s, l, noise_size_));
   }
   std::string error_text() const { return instance_->error_text(); }

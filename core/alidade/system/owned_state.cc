@@ -84,22 +84,35 @@ struct OwnedOn : Motion<G::kTangent, G> {
   void SqrtQ(double dt_s, MatrixRef q) const { dynamics.SqrtQ(dt_s, G::kTangent, q); }
 };
 
+const char* NameOf(OwnedDynamics dynamics) {
+  switch (dynamics) {
+    case OwnedDynamics::kRandomWalk:
+      return "random_walk";
+    case OwnedDynamics::kGaussMarkov:
+      return "gauss_markov";
+    case OwnedDynamics::kConstant:
+      break;
+  }
+  return "constant";
+}
+
 }  // namespace
 
-MotionModel OwnedMotion(const Geometry& geometry, const OwnedRole& owned, const std::string& name) {
+MotionModel OwnedMotion(const Geometry& geometry, const OwnedRole& owned) {
+  const char* const name = NameOf(owned.dynamics);
   switch (geometry.kind) {
     case GeometryKind::kAngle:
-      return InProcessMotion(OwnedOn<Angle>(owned), name.c_str());
+      return InProcessMotion(OwnedOn<Angle>(owned), name);
     case GeometryKind::kUnitQuaternion:
-      return InProcessMotion(OwnedOn<UnitQuaternion>(owned), name.c_str());
+      return InProcessMotion(OwnedOn<UnitQuaternion>(owned), name);
     case GeometryKind::kUnitVector:
-      return InProcessMotion(OwnedOn<UnitVector>(owned), name.c_str());
+      return InProcessMotion(OwnedOn<UnitVector>(owned), name);
     case GeometryKind::kVector:
     case GeometryKind::kProduct:  // of measurements alone
       break;
   }
   ALIDADE_EXPECTS(geometry.kind == GeometryKind::kVector);
-  return InProcessMotion(OwnedVector(owned, geometry.ambient), name.c_str());
+  return InProcessMotion(OwnedVector(owned, geometry.ambient), name);
 }
 
 }  // namespace alidade::internal

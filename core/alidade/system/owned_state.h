@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <string>
-
 #include "alidade/host/model_instance.h"
 
 namespace alidade::internal {
@@ -14,8 +12,9 @@ namespace alidade::internal {
 ///   Gauss-Markov  x' = mu (+) a (x (-) mu) (+) w,          w ~ N(0, L L' tau (1 - a^2) / 2),
 ///                                                          a = exp(-dt / tau)
 ///
-/// L is the density of the driving white noise, tau the time constant. Noise is continuous; exact
-/// for vectors and angles.  [BarShalom2001] ch. 4.
-MotionModel OwnedMotion(const Geometry& geometry, const OwnedRole& owned, const std::string& name);
+/// The model is named `constant`, `random_walk` or `gauss_markov`. L is the density of the driving
+/// white noise, tau the time constant. Noise is continuous; exact for vectors and angles.
+/// [BarShalom2001] ch. 4.
+MotionModel OwnedMotion(const Geometry& geometry, const OwnedRole& owned);
 
 }  // namespace alidade::internal

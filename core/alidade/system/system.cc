@@ -289,8 +289,7 @@ class OwnedReader {
                      "a sigma where it starts, or the key left out");
     }
     if (constant) owned.dynamics = OwnedDynamics::kConstant;
-    system.motions.push_back(
-        {name_, internal::OwnedMotion(role.geometry, owned, "owned_state"), {id}});
+    system.motions.push_back({name_, internal::OwnedMotion(role.geometry, owned), {id}});
     return id;
   }
 

@@ -29,6 +29,15 @@ class OffsetSensor {
         place_(std::move(place_of_role)),
         roles_(std::move(roles)),
         offset_(offset_role) {
+    for (const Mover& mover : movers_) {
+      for (const Space& block : mover.model.blocks()) {
+        ambient_ += static_cast<std::size_t>(block.geometry.ambient);
+      }
+      const auto n = static_cast<std::size_t>(mover.model.tangent_size());
+      tangent_ += n;
+      square_ += n * n;
+      noise_ = std::max(noise_, n * static_cast<std::size_t>(mover.model.noise_size()));
+    }
     Describe();
   }
   OffsetSensor(const OffsetSensor&) = delete;
@@ -56,6 +65,7 @@ class OffsetSensor {
     std::vector<const double*> roles;
     std::vector<double*> jacobians;
     std::vector<int> strides;
+    std::string error;  ///< of a mover that failed, in words
   };
   static Memory& MemoryOfThread() {
     static thread_local Memory memory;
@@ -103,14 +113,10 @@ class OffsetSensor {
     }
   }
 
-  bool IsMoved(int place) const { return place >= 0 && place < offset_ && MoverOf(place) >= 0; }
-  /// Of the role at a place; -1: it is what it is.
-  int MoverOf(int place) const {
-    for (std::size_t m = 0; m < movers_.size(); ++m) {
-      if (place >= movers_[m].first && place < movers_[m].first + movers_[m].count)
-        return static_cast<int>(m);
-    }
-    return -1;
+  bool IsMoved(int place) const {
+    return std::ranges::any_of(movers_, [&](const Mover& mover) {
+      return place >= mover.first && place < mover.first + mover.count;
+    });
   }
 
   /// x' of one mover after dt_s, its blocks one after the other; its F unless null.
@@ -167,21 +173,13 @@ class OffsetSensor {
 
   /// The roles of the sensor at t + delta, in memory.roles; with `derivatives` F and df/ddelta.
   Status Shift(const double* const* roles, bool derivatives, Memory& memory) const {
-    int ambient = 0, tangent = 0, square = 0, noise = 1;
-    for (const Mover& mover : movers_) {
-      for (const Space& block : mover.model.blocks()) ambient += block.geometry.ambient;
-      const int n = mover.model.tangent_size();
-      tangent += n;
-      square += n * n;
-      noise = std::max(noise, n * mover.model.noise_size());
-    }
-    const auto size = [](int n) { return static_cast<std::size_t>(n); };
-    memory.next.resize(size(ambient));
-    memory.shifted.resize(size(ambient));
-    memory.rate.resize(size(tangent));
-    memory.f.resize(size(square));
-    memory.g.resize(size(noise));
-    memory.jacobian.resize(std::max(memory.jacobian.size(), size(tangent)));
+    memory.next.resize(ambient_);
+    memory.shifted.resize(ambient_);
+    memory.rate.resize(tangent_);
+    memory.f.resize(square_);
+    memory.g.resize(noise_);
+    memory.jacobian.resize(std::max(memory.jacobian.size(), tangent_));
+    memory.error.clear();
     const double dt_s = roles[offset_][0];
     memory.roles.assign(place_.size(), nullptr);
     for (std::size_t i = 0; i < place_.size(); ++i) {
@@ -193,6 +191,10 @@ class OffsetSensor {
       Status status = Move(mover, x, dt_s, next, memory, derivatives ? f : nullptr);
       if (status == Status::kOk && derivatives) {
         status = Differentiate(mover, x, dt_s, next, memory, rate);
+      }
+      if (status == Status::kError) {
+        memory.error =
+            "motion model '" + mover.model.name() + "' of its roles: " + mover.model.error_text();
       }
       if (status != Status::kOk) return status;
       for (std::size_t i = 0; i < place_.size(); ++i) {
@@ -302,7 +304,7 @@ class OffsetSensor {
     const Status status = of.Shift(roles, false, memory);
     if (status != Status::kOk) return static_cast<std::int32_t>(status);
     const AlidadeInstance& c = of.sensor_.instance().c();
-    detail::last_call = &c.sensor->sqrt_noise;
+    detail::NoteCall(&c.sensor->sqrt_noise);
     return c.sensor->sqrt_noise(c.self, seen, memory.roles.data(), l, stride);
   }
   static std::int32_t Valid(const void* self, const AlidadeObservation* seen) {
@@ -325,7 +327,7 @@ class OffsetSensor {
     }
     if (derivatives) of.PlaceJacobians(rows, jx, jx_strides, memory);
     const AlidadeInstance& c = of.sensor_.instance().c();
-    detail::last_call = &c.sensor->initialise;
+    detail::NoteCall(&c.sensor->initialise);
     const std::int32_t code =
         c.sensor->initialise(c.self, seen, memory.roles.data(), prior, y,
                              derivatives ? memory.jacobians.data() : nullptr, memory.strides.data(),
@@ -334,6 +336,7 @@ class OffsetSensor {
     return code;
   }
   const char* ErrorText() const {
+    if (const std::string& text = MemoryOfThread().error; !text.empty()) return text.c_str();
     const AlidadeInstance& c = sensor_.instance().c();
     return c.error_text == nullptr ? "" : c.error_text(c.self);
   }
@@ -343,6 +346,7 @@ class OffsetSensor {
   std::vector<int> place_;  ///< by role of the sensor: which role of this; -1: unbound
   std::vector<Space> roles_;
   int offset_;
+  std::size_t ambient_ = 0, tangent_ = 0, square_ = 0, noise_ = 1;  ///< of Memory
   std::vector<AlidadeSpace> spaces_;
   std::vector<std::string> texts_;
   AlidadeDescription description_{};

@@ -54,12 +54,10 @@ TEST(UnobservableDirections, ManyBlocksThatNothingJoinsAreToldApart) {
   System system;
   for (int i = 0; i < kPairs; ++i) {
     const std::string name = "p" + std::to_string(i);
-    testing::AddMotion(system, name,
-                       InProcessMotion(ConstantVelocity<1, false>(1.0), "constant_velocity"),
+    testing::AddMotion(system, name, testing::ConstantVelocityMotion(1.0),
                        {{"x", 1.0, 1e-3}, {"v", 0.0, 1e3}});
     if (i % 50 == 7) continue;
-    testing::AddSensor(system, name, InProcessSensor(testing::Linear(1.0, 1.0), "linear"),
-                       {name + ".x"});
+    testing::AddSensor(system, name, testing::LinearSensor(1.0, 1.0), {name + ".x"});
   }
   EXPECT_EQ(UnobservableDirections(system),
             (std::vector<Names>{{"p7.x"}, {"p7.v"}, {"p57.x"}, {"p57.v"}, {"p107.x"}, {"p107.v"}}));
@@ -68,7 +66,7 @@ TEST(UnobservableDirections, ManyBlocksThatNothingJoinsAreToldApart) {
 TEST(UnobservableDirections, AreNotLookedForInALargeState) {
   const auto state_of = [](int size) {
     System system;
-    const MotionModel model = InProcessMotion(Constant<>(size), "constant");
+    const MotionModel model = testing::ConstantMotion(size);
     const BlockId id = system.layout.Declare("c.value", "c", model.blocks()[0]);
     system.motions.push_back({"c", model, {id}});
     Prior prior;
@@ -188,7 +186,7 @@ TEST(UnobservableDirections, AThirdDerivativeIsSeen) {
   System system;
   testing::AddMotion(system, "p", InProcessMotion(Chain(), "chain"),
                      {{"x", 0.0, 1.0}, {"v", 0.0, 1.0}, {"a", 0.0, 1.0}, {"j", 0.0, 0.01}});
-  testing::AddSensor(system, "fix", InProcessSensor(testing::Linear(1.0, 1.0), "linear"), {"p.x"});
+  testing::AddSensor(system, "fix", testing::LinearSensor(1.0, 1.0), {"p.x"});
   EXPECT_EQ(UnobservableDirections(system), std::vector<Names>{});
 }
 

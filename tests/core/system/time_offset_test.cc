@@ -8,6 +8,7 @@
 
 #include <cmath>
 #include <random>
+#include <stdexcept>
 
 #include "motion_models/quaternion_pose.h"
 #include "sensors/inverse_depth_feature.h"
@@ -22,13 +23,13 @@ using testing::AddSensor;
 using testing::Blocks;
 using testing::ExpectSame;
 using testing::kPoison;
-using testing::Linear;
 using testing::Linearised;
+using testing::LinearSensor;
 using testing::NumericallyLinearised;
 using testing::Pointers;
 
 BlockId AddOffset(System& system, double mean, double sigma) {
-  AddMotion(system, "clock", InProcessMotion(Constant<>(1), "constant"), {{"offset", mean, sigma}});
+  AddMotion(system, "clock", testing::ConstantMotion(1), {{"offset", mean, sigma}});
   return system.layout.Find("clock.offset");
 }
 
@@ -41,7 +42,7 @@ std::vector<std::string> NamesOf(const SensorModel& sensor) {
 // z = 2 (x + v delta)
 TEST(TimeOffset, SeesAPointWhereItIsThen) {
   System system = testing::MovingPoint();
-  AddSensor(system, "z", InProcessSensor(Linear(2.0, 0.1), "linear"), {"p.x"});
+  AddSensor(system, "z", LinearSensor(2.0, 0.1), {"p.x"});
   const BlockId offset = AddOffset(system, 0.0, 0.1);
   SensorBinding& sensor = system.sensors[0];
   ASSERT_EQ(internal::OffsetInTime(system, offset, sensor), "");
@@ -121,15 +122,42 @@ TEST(TimeOffset, HasTheJacobiansOfACameraThatMoves) {
   }
 }
 
+/// A point that moves as long as its speed is not that of light.
+struct Refusing : ConstantVelocity<1, false> {
+  using ConstantVelocity<1, false>::ConstantVelocity;
+  template <class T>
+  void Step(const T* x, const T* v, const T* w, double dt_s, T* next_x, T* next_v) const {
+    if (v[0] > 3e8) throw std::runtime_error("faster than light");
+    ConstantVelocity<1, false>::Step(x, v, w, dt_s, next_x, next_v);
+  }
+};
+
+// What fails is the motion model, and its words are those that are heard; the next call has none.
+TEST(TimeOffset, TellsWhatFailsOfAMotionModel) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Refusing(1.0), "refusing"),
+            {{"x", 0.0, 1.0}, {"v", 0.0, 1.0}});
+  AddSensor(system, "z", LinearSensor(1.0, 0.1), {"p.x"});
+  const BlockId offset = AddOffset(system, 0.0, 0.1);
+  SensorBinding& sensor = system.sensors[0];
+  ASSERT_EQ(internal::OffsetInTime(system, offset, sensor), "");
+  double z = 0.0;
+  const Blocks fast{{0.0}, {4e8}, {0.1}}, slow{{0.0}, {1.0}, {0.1}};
+  EXPECT_EQ(sensor.model.Predict(Pointers(fast).data(), &z), Status::kError);
+  EXPECT_EQ(sensor.model.error_text(), "motion model 'refusing' of its roles: faster than light");
+  EXPECT_EQ(sensor.model.Predict(Pointers(slow).data(), &z), Status::kOk);
+  EXPECT_EQ(sensor.model.error_text(), "");
+}
+
 TEST(TimeOffset, RefusesWhatItCannotDo) {
   System still;
-  AddMotion(still, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.0, 1.0}});
-  AddSensor(still, "z", InProcessSensor(Linear(1.0, 0.1), "linear"), {"p.x"});
+  AddMotion(still, "p", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
+  AddSensor(still, "z", LinearSensor(1.0, 0.1), {"p.x"});
   const BlockId offset = AddOffset(still, 0.0, 0.1);
   EXPECT_NE(internal::OffsetInTime(still, offset, still.sensors[0]).find("sees the same"),
             std::string::npos);
   System moving = testing::MovingPoint();
-  AddSensor(moving, "z", InProcessSensor(Linear(1.0, 0.1), "linear"), {"p.x"});
+  AddSensor(moving, "z", LinearSensor(1.0, 0.1), {"p.x"});
   moving.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
   EXPECT_NE(internal::OffsetInTime(moving, AddOffset(moving, 0.0, 0.1), moving.sensors[0])
                 .find("jacobian_at"),
@@ -140,8 +168,8 @@ TEST(TimeOffset, RefusesWhatItCannotDo) {
 // t - 0.02. The truth is a sine, no motion model.
 TEST(TimeOffset, IsFoundInDataThatAreLate) {
   System system = testing::MovingPoint(2.0);
-  AddSensor(system, "good", InProcessSensor(Linear(1.0, 0.01), "linear"), {"p.x"});
-  AddSensor(system, "late", InProcessSensor(Linear(1.0, 0.01), "linear"), {"p.x"});
+  AddSensor(system, "good", LinearSensor(1.0, 0.01), {"p.x"});
+  AddSensor(system, "late", LinearSensor(1.0, 0.01), {"p.x"});
   const BlockId offset = AddOffset(system, 0.0, 0.05);
   ASSERT_EQ(internal::OffsetInTime(system, offset, system.sensors[1]), "");
   Ekf filter(system, {}, testing::StreamsOf(system));

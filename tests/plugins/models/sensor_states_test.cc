@@ -265,7 +265,7 @@ TEST(SensorStates, ATimeOffsetMayBeAParameter) {
   const RunResult constant = RunOf(Late("0.02")), known = RunOf(Late("{mean: 0.02, sigma: 0}"));
   for (std::size_t i = 0; i < constant.estimators.size(); ++i) {
     const double rmse = known.estimators[i].metrics.at("rmse:target.position");
-    const double relative = constant.estimators[i].name == "ukf" ? 1e-6 : 1e-10;
+    const double relative = constant.estimators[i].name == "ukf" ? 1e-8 : 1e-10;
     EXPECT_NEAR(constant.estimators[i].metrics.at("rmse:target.position"), rmse, relative * rmse)
         << constant.estimators[i].name;
   }
@@ -273,6 +273,18 @@ TEST(SensorStates, ATimeOffsetMayBeAParameter) {
                                        ", overrides: {sensors: {right: {time_offset_s: "
                                        "0.05}}}"));
   EXPECT_GT(ignored.estimators[0].metrics.at("nees.mean:target"), 1.5) << "50 ms matter";
+}
+
+// As `explain` shows them.
+TEST(SensorStates, AreMovedByAModelThatIsNamedAfterItsDynamics) {
+  const auto name = [](const std::string& dynamics) {
+    const Experiment experiment = BuildExperiment(
+        testing::Read(Filled("", "", ", dynamics: {clock_bias: " + dynamics + '}')), TheHost());
+    return experiment.estimators[0].system.motions.back().model.name();
+  };
+  EXPECT_EQ(name("constant"), "constant");
+  EXPECT_EQ(name("{random_walk: 1}"), "random_walk");
+  EXPECT_EQ(name("{gauss_markov: {sigma: 1, time_constant_s: 9}}"), "gauss_markov");
 }
 
 std::string WhyNot(const std::string& text) {

@@ -2,6 +2,7 @@
 #include "alidade/filter/binding.h"
 
 #include "alidade/base/error.h"
+#include "alidade/state/small_kernels.h"
 
 namespace alidade::internal {
 namespace {
@@ -88,7 +89,7 @@ Binding::Binding(System of, const std::vector<StreamInfo>& from)
       initial(system.InitialState(true)),
       stream_of_sensor(system.sensors.size(), -1) {
   // Landmarks come behind: then P has no size of its own.
-  const bool small = initial.covariance().small() && !system.landmarks;
+  const bool small = IsSmall(initial.covariance()) && !system.landmarks;
   for (const SensorBinding& sensor : system.sensors) {
     sensor_places.push_back(PlaceOf(sensor, initial, small));
   }

@@ -7,7 +7,6 @@
 
 #include "alidade/base/random.h"
 #include "alidade/base/statistics.h"
-#include "alidade/filter/evaluate_row.h"
 #include "alidade/filter/stack.h"
 #include "alidade/state/small_kernels.h"
 #include "alidade/state/tiles.h"
@@ -87,14 +86,14 @@ void Consensus::FindSupport(FilterState& f, std::size_t hypothesis) {
   s.triangularView<Eigen::Lower>().solveInPlace(y);
   s.triangularView<Eigen::Lower>().transpose().solveInPlace(y);
   dx.noalias() = pht * y;
-  f.state.Retract(dx.data(), f.buffers.moved);
+  f.state.Retract(dx.data(), f.moved);
   agrees_.assign(matches_.size(), 0);
   for (std::size_t i = 0; i < matches_.size(); ++i) {
-    const Row& row = *matches_[i];
+    Row& row = *matches_[i];
     const MeasurementReport& entry = *row.report;
     h_.resize(entry.z.size());
     r_.resize(static_cast<std::size_t>(entry.dof));
-    if (PredictAt(f, row, f.buffers.moved, h_.data()) != Outcome::kAccepted) continue;
+    if (PredictAt(row, f.moved, f.state.values(), h_.data()) != Outcome::kAccepted) continue;
     row.model->measurement().geometry.Minus(entry.z.data(), h_.data(), r_.data());
     work_.resize(r_.size() * (r_.size() + 1));
     const double d2 = SquaredMahalanobis(row.R.data(), r_.data(), entry.dof, work_.data());

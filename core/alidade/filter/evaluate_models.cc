@@ -133,6 +133,42 @@ Outcome NoiseAt(const SensorModel& model, const Measurement& measurement,
   return outcome;
 }
 
+const double* const* RolesAt(Row& row, const std::vector<double>& x,
+                             const std::vector<double>& known) {
+  RolesAt(*row.binding, *row.place, x, known, row.roles);
+  return row.roles.data();
+}
+
+Outcome PredictAt(Row& row, const std::vector<double>& x, const std::vector<double>& known,
+                  double* h) {
+  std::fill_n(h, row.model->measurement().geometry.ambient, kNotWritten);
+  return OutcomeOf(row.model->Predict(RolesAt(row, x, known), h, row.measurement->known.data()));
+}
+
+Outcome LineariseAt(Row& row, const double* const* roles) {
+  return EvaluateAt(*row.model, *row.place, *row.measurement, roles, row.columns, row.report->h,
+                    &row.H);
+}
+
+Outcome NoiseAt(Row& row, const double* const* roles) {
+  return NoiseAt(*row.model, *row.measurement, roles, row.L, row.R);
+}
+
+void TakeInnovation(Row& row) {
+  MeasurementReport& entry = *row.report;
+  entry.innovation.resize(static_cast<std::size_t>(entry.dof));
+  row.model->measurement().geometry.Minus(entry.z.data(), entry.h.data(), entry.innovation.data());
+}
+
+void ChainJacobian(Row& row, int column, int size, const double* j, Workspace& work) {
+  const Workspace::Use use(work);
+  const int m = row.report->dof;
+  auto own = Eigen::Map<RowMajor>(row.H.data(), m, row.place->width).middleCols(column, size);
+  Workspace::Matrix chained = work.Take(m, size);
+  chained.noalias() = own * Eigen::Map<const RowMajor>(j, size, size);
+  own = chained;
+}
+
 Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
                  const Measurement& measurement, const double* prior,
                  std::vector<const double*>& roles, Inverse& inverse) {

@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/filter/binding.h"
-#include "alidade/filter/update_report.h"
+#include "alidade/filter/rows.h"
 
 /// The models at any values x of the whole state: the state itself, an iterate, a sigma point, the
 /// hypothesis of a consensus, a point of a batch. What a model does not write is not a number.
@@ -51,6 +50,25 @@ Outcome EvaluateAt(const SensorModel& model, const SensorPlace& place,
 /// R at the roles, or as the measurement itself says, m x m. `l` is memory.
 Outcome NoiseAt(const SensorModel& model, const Measurement& measurement,
                 const double* const* roles, std::vector<double>& l, std::vector<double>& r);
+
+// The same of a row.
+
+/// What fills its roles at x: known roles have the value of `known`. Until the next call.
+const double* const* RolesAt(Row& row, const std::vector<double>& x,
+                             const std::vector<double>& known);
+/// h at x, ambient, in `h`.
+Outcome PredictAt(Row& row, const std::vector<double>& x, const std::vector<double>& known,
+                  double* h);
+/// h at the roles, in the report, and H, in the row.
+Outcome LineariseAt(Row& row, const double* const* roles);
+/// R at the roles, or as the measurement itself says, in the row.
+Outcome NoiseAt(Row& row, const double* const* roles);
+/// z (-) h of the h in the report, in the report.
+void TakeInnovation(Row& row);
+/// H <- H J in the columns of one role, J size x size, row-major.
+void ChainJacobian(Row& row, int column, int size, const double* j, Workspace& work);
+
+// Inverse measurement models.
 
 /// What a measurement tells of the roles that its sensor initialises: y = g(other roles, z, prior),
 /// t: its tangent. One that is used again for the same sensor keeps its memory.

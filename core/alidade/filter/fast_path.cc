@@ -6,8 +6,6 @@
 #include <limits>
 #include <utility>
 
-#include "alidade/state/small_kernels.h"
-
 #define ALIDADE_INLINE [[gnu::always_inline]] inline
 
 namespace alidade::internal {
@@ -74,9 +72,10 @@ ALIDADE_INLINE bool FastPath::StepModel(const Motion& motion, double dt_s, doubl
 /// All motion models, or nothing.
 template <int N>
 ALIDADE_INLINE bool FastPath::Step(double dt_s) {
-  Covariance& covariance = f_.state.covariance();
+  Covariance::Lower lower = f_.state.covariance().lower();
+  const int stride = static_cast<int>(lower.outerStride());
   double p[N][N];
-  Load(covariance.data(), covariance.stride(), p);
+  Load(lower.data(), stride, p);
   for (const Motion& motion : motions_) {
     bool done = false;
     if constexpr (N >= 2) {
@@ -90,7 +89,7 @@ ALIDADE_INLINE bool FastPath::Step(double dt_s) {
   double defect = 0.0;
   for (int i = 0; i < N; ++i) defect += 0.0 * p[i][i];
   if (defect != 0.0) return false;
-  Store(p, covariance.data(), covariance.stride());
+  Store(p, lower.data(), stride);
   double* const x = f_.state.values().data();
   const double* const next = f_.motions.next().data();
   for (const Motion& motion : motions_) {
@@ -106,7 +105,8 @@ ALIDADE_INLINE bool FastPath::Linearise(Sensor& sensor, const double* z, Measure
                                         double* pht) {
   constexpr int kMost = M > 0 ? M : kMostOfOne;
   const int m = M > 0 ? M : sensor.rows;
-  const Covariance& p = f_.state.covariance();
+  const Covariance::Lower p = f_.state.covariance().lower();
+  const int stride = static_cast<int>(p.outerStride());
   double h[kMost], l[kMost * kMost], r[kMost], noise[kMost], s[kMost * kMost];
   for (int i = 0; i < m; ++i) h[i] = kUnwritten;
   for (int i = 0; i < m * m; ++i) l[i] = kUnwritten;
@@ -126,7 +126,7 @@ ALIDADE_INLINE bool FastPath::Linearise(Sensor& sensor, const double* z, Measure
     }
     noise[i] = s[i * m + i];
   }
-  Project<N>(p.data(), p.stride(), sensor.h.data(), m, pht, s);
+  Project<N>(p.data(), stride, sensor.h.data(), m, pht, s);
   bool tiny = false;
   for (int i = 0; i < m; ++i) tiny |= !(noise[i] > Gate::kVanishing * s[i * m + i]);
   if (tiny && !parts_.gate.warned(static_cast<std::size_t>(entry.sensor))) return false;
@@ -165,16 +165,17 @@ template <int N, int M>
 ALIDADE_INLINE bool FastPath::Correct(const Rows<N>& rows, int count) {
   constexpr int kMost = M > 0 ? M : kRows;
   const int m = M > 0 ? M : count;
-  Covariance& p = f_.state.covariance();
+  Covariance::Lower p = f_.state.covariance().lower();
+  const int stride = static_cast<int>(p.outerStride());
   double w[kMost * N], inverse_d[kMost], dx[N], gain[kMost * N], moved[N], updated[N * N];
   if (!Solve<N, M>(m, rows.pht, rows.s, kRows, rows.innovation, w, inverse_d, dx, gain) ||
-      !Downdate<N, M>(p.data(), p.stride(), m, w, inverse_d, updated)) {
+      !Downdate<N, M>(p.data(), stride, m, w, inverse_d, updated)) {
     return false;
   }
   double* const x = f_.state.values().data();
   for (int i = 0; i < N; ++i) moved[i] = x[i] + dx[i];
   if (Defect(moved, N) != 0.0) return false;
-  StoreLower<N>(updated, p.data(), p.stride());
+  StoreLower<N>(updated, p.data(), stride);
   for (int i = 0; i < N; ++i) x[i] = moved[i];
   f_.motions.EndInterval();
   for (int i = 0; i < m; ++i) {
@@ -345,7 +346,7 @@ std::unique_ptr<FastPath> FastPath::For(const FastParts& parts) {
     return block.has_covariance() && block.geometry().kind == GeometryKind::kVector &&
            block.value_offset == block.tangent_offset;
   };
-  if (f.binding->system.landmarks || !f.state.covariance().small() ||
+  if (f.binding->system.landmarks || !IsSmall(f.state.covariance()) ||
       parts.options.fuse != Fuse::kJoint || f.waiting || f.considering ||
       std::ssize(f.state.values()) != n || !std::ranges::all_of(f.state.layout().blocks(), plain)) {
     return nullptr;
@@ -355,7 +356,7 @@ std::unique_ptr<FastPath> FastPath::For(const FastParts& parts) {
   const auto choose = [&]<int... I>(std::integer_sequence<int, I...>) {
     ((n == I + 1 ? (path->process_ = &FastPath::ProcessSized<I + 1>, 0) : 0), ...);
   };
-  choose(std::make_integer_sequence<int, Covariance::kSmall>{});
+  choose(std::make_integer_sequence<int, kSmall>{});
   return path;
 }
 

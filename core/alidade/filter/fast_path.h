@@ -9,6 +9,7 @@
 #include "alidade/filter/gate.h"
 #include "alidade/filter/recovery.h"
 #include "alidade/filter/timeline.h"
+#include "alidade/state/small_kernels.h"
 
 namespace alidade::internal {
 
@@ -51,9 +52,9 @@ class FastPath {
     std::vector<const double*> roles;
     std::vector<double*> jacobians;  ///< into h
     std::vector<int> strides;
-    std::array<double, kMostOfOne * Covariance::kSmall> h{};      ///< H, its zeros included
-    std::array<double, kMostOfOne * Covariance::kSmall> blank{};  ///< h before the model writes it
-    AlidadeObservation seen = detail::Seen(nullptr);              ///< the measurement that is taken
+    std::array<double, kMostOfOne * kSmall> h{};      ///< H, its zeros included
+    std::array<double, kMostOfOne * kSmall> blank{};  ///< h before the model writes it
+    AlidadeObservation seen = detail::Seen(nullptr);  ///< the measurement that is taken
     int index, stream, rows;
     double gate;
   };

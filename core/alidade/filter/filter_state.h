@@ -53,12 +53,7 @@ struct FilterState {
   bool considering = false;  ///< one is a consider state
   /// Matrices; what takes from it has a Workspace::Use around it.
   Scratch<Workspace> work;
-  struct Buffers {
-    std::vector<double> moved;         ///< values on the way to x
-    std::vector<const double*> roles;  ///< of the row that is evaluated
-    std::vector<double*> jacobians;    ///< of the same
-  };
-  Scratch<Buffers> buffers;
+  Scratch<std::vector<double>> moved;  ///< values on the way to x
 
  private:
   void KeepFirstEstimates();

@@ -31,6 +31,27 @@ bool IsReady(const FilterState& f, const Row& row) {
                               [&](const RoleBinding& role) { return IsMissing(f, role); });
 }
 
+Outcome Invert(FilterState& f, Row& row, const LandmarkOptions::Prior* prior, Inverse& inverse) {
+  RolesAt(row, f.state.values(), f.state.values());
+  Outcome outcome =
+      InvertAt(*row.binding, *row.place, *row.measurement,
+               prior == nullptr ? nullptr : &prior->inverse_distance, row.roles, inverse);
+  if (outcome == Outcome::kAccepted) outcome = NoiseAt(row, row.roles.data());
+  if (outcome == Outcome::kFailed) NotePluginFailure(f, *row.binding);
+  if (outcome != Outcome::kAccepted) {
+    return outcome == Outcome::kOutOfDomain ? Outcome::kInvalid : outcome;
+  }
+  const int m = row.report->dof;
+  const Eigen::Map<const RowMajor> r(row.R.data(), m, m);
+  const RowMajor& jp = inverse.by_prior;
+  inverse.by_z_r.noalias() = inverse.by_z * r;
+  inverse.own.noalias() = inverse.by_z_r * inverse.by_z.transpose();
+  if (prior != nullptr) {
+    inverse.own.noalias() += prior->sigma * prior->sigma * jp * jp.transpose();
+  }
+  return inverse.own.allFinite() ? Outcome::kAccepted : Outcome::kNotFinite;
+}
+
 void InitialiseWaiting(FilterState& f, std::span<Row> rows) {
   Inverse inverse;
   for (bool progress = true; progress;) {

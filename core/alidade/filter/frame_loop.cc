@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "alidade/filter/evaluate_row.h"
 #include "alidade/filter/first_values.h"
 #include "alidade/filter/linear.h"
 
@@ -178,7 +177,7 @@ std::optional<Prediction> FrameLoop::Expect(int sensor, std::int64_t landmark,
   Row& row = rows_.CollectOne(one, sensor, *f.binding, f.report);
   if (landmarks) landmarks->Attach(f, {&row, 1});
   if (row.report->outcome != Outcome::kAccepted || !IsReady(f, row) ||
-      PredictAt(f, row, f.state.values(), one.values.data()) != Outcome::kAccepted) {
+      PredictAt(row, f.state.values(), f.state.values(), one.values.data()) != Outcome::kAccepted) {
     return std::nullopt;
   }
   row.report->z = one.values;  // as if it measured what it expects

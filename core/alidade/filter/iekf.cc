@@ -8,7 +8,6 @@
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
-#include "alidade/filter/evaluate_row.h"
 #include "alidade/filter/linear.h"
 #include "alidade/filter/stack.h"
 #include "alidade/state/tiles.h"
@@ -172,7 +171,8 @@ bool Iterated::Innovations(FilterState& f, std::span<Row* const> rows,
   for (Row* row : rows) {
     MeasurementReport& entry = *row->report;
     const SensorModel& model = *row->model;
-    if (PredictAt(f, *row, iterate_, entry.h.data()) != Outcome::kAccepted) return false;
+    if (PredictAt(*row, iterate_, f.state.values(), entry.h.data()) != Outcome::kAccepted)
+      return false;
     model.measurement().geometry.Minus(entry.z.data(), entry.h.data(), innovations.data() + at);
     at += entry.dof;
   }
@@ -184,14 +184,14 @@ bool Iterated::Relinearise(FilterState& f, std::span<Row* const> rows, const dou
   for (Row* row : rows) {
     const SensorModel& model = *row->model;
     const SensorPlace& place = *row->place;
-    const double* const* const roles = RolesAt(f, *row, iterate_);
-    if (LineariseAt(f, *row, roles) != Outcome::kAccepted ||
+    const double* const* const roles = RolesAt(*row, iterate_, f.state.values());
+    if (LineariseAt(*row, roles) != Outcome::kAccepted ||
         NoiseAt(*row, roles) != Outcome::kAccepted) {
       return false;
     }
     for (double& r : row->R) r /= row->weight;
     TakeInnovation(*row);
-    const double* const* const at = RolesAt(f, *row, f.state.values());
+    const double* const* const at = RolesAt(*row, f.state.values(), f.state.values());
     std::size_t part = 0;
     for (std::size_t i = 0; i < place.values.size(); ++i) {
       if (place.columns[i] < 0) continue;
@@ -201,7 +201,7 @@ bool Iterated::Relinearise(FilterState& f, std::span<Row* const> rows, const dou
       const Workspace::Use use(f.work);
       Workspace::Vector j = f.work.Take(geometry.tangent * geometry.tangent);
       geometry.PlusJacobian(at[i], dx + offset, j.data());
-      ChainJacobian(f, *row, place.columns[i], geometry.tangent, j.data());
+      ChainJacobian(*row, place.columns[i], geometry.tangent, j.data(), f.work);
     }
     Linear::Project(f, *row);
   }

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "alidade/base/error.h"
-#include "alidade/filter/evaluate_row.h"
 #include "alidade/filter/first_values.h"
 #include "alidade/system/landmark_representation.h"
 

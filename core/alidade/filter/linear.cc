@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "alidade/base/all_finite.h"
-#include "alidade/filter/evaluate_row.h"
 #include "alidade/filter/stack.h"
 #include "alidade/state/small_kernels.h"
 #include "alidade/state/tiles.h"
@@ -50,9 +49,9 @@ Outcome Linear::Linearise(FilterState& f, Row& row) {
 Outcome Linear::LineariseAtState(FilterState& f, Row& row) {
   MeasurementReport& entry = *row.report;
   const Geometry& geometry = row.model->measurement().geometry;
-  const double* const* const roles = RolesAt(f, row, f.state.values());
+  const double* const* const roles = RolesAt(row, f.state.values(), f.state.values());
   Outcome outcome =
-      FindLinearisation(f, row) ? LineariseElsewhere(f, row) : LineariseAt(f, row, roles);
+      FindLinearisation(f, row) ? LineariseElsewhere(f, row) : LineariseAt(row, roles);
   if (outcome == Outcome::kOutOfDomain || outcome == Outcome::kFailed) entry.h.clear();
   if (outcome == Outcome::kAccepted) outcome = NoiseAt(row, roles);
   if (outcome != Outcome::kAccepted) return outcome;
@@ -61,11 +60,11 @@ Outcome Linear::LineariseAtState(FilterState& f, Row& row) {
   return outcome;
 }
 
-/// Puts where H is taken into at_: the roles in f.buffers.roles, but first estimates, and what the
+/// Puts where H is taken into at_: the roles in row.roles, but first estimates, and what the
 /// measurement implies for the role that asks for it. Whether that is elsewhere than h.
 bool Linear::FindLinearisation(const FilterState& f, const Row& row) {
   const std::vector<RoleBinding>& bound = row.binding->roles;
-  at_.assign(f.buffers.roles.begin(), f.buffers.roles.end());
+  at_.assign(row.roles.begin(), row.roles.end());
   implied_.clear();
   bool elsewhere = false;
   for (std::size_t i = 0; i < std::min(at_.size(), bound.size()); ++i) {
@@ -78,37 +77,37 @@ bool Linear::FindLinearisation(const FilterState& f, const Row& row) {
     } else if (!f.first_estimates[index].empty()) {
       at_[i] = f.first_estimates[index].data();
     }
-    elsewhere = elsewhere || at_[i] != f.buffers.roles[i];
+    elsewhere = elsewhere || at_[i] != row.roles[i];
   }
   return elsewhere;
 }
 
-/// h at x, in f.buffers.roles, and H at at_.
+/// h at x, in row.roles, and H at at_.
 Outcome Linear::LineariseElsewhere(FilterState& f, Row& row) {
   const SensorModel& model = *row.model;
   MeasurementReport& entry = *row.report;
   entry.h.resize(static_cast<std::size_t>(model.measurement().geometry.ambient));
-  Outcome outcome = PredictAt(f, row, f.state.values(), entry.h.data());
+  Outcome outcome = PredictAt(row, f.state.values(), f.state.values(), entry.h.data());
   if (outcome != Outcome::kAccepted) return outcome;
   if (!implied_.empty()) {
-    const Status status = model.Initialise(f.buffers.roles.data(), entry.z.data(), implied_.data(),
+    const Status status = model.Initialise(row.roles.data(), entry.z.data(), implied_.data(),
                                            nullptr, nullptr, row.measurement->known.data());
     // What z cannot have come from tells nothing of where to linearise.
     outcome = status == Status::kOutOfDomain ? Outcome::kInvalid : OutcomeOf(status);
     if (outcome != Outcome::kAccepted) return outcome;
   }
   predicted_.assign(entry.h.begin(), entry.h.end());
-  outcome = LineariseAt(f, row, at_.data());
+  outcome = LineariseAt(row, at_.data());
   entry.h.assign(predicted_.begin(), predicted_.end());
   for (std::size_t i = 0; i < at_.size(); ++i) {
     const Geometry& geometry = model.roles()[i].geometry;
-    if (row.place->columns[i] < 0 || at_[i] == f.buffers.roles[i] ||
+    if (row.place->columns[i] < 0 || at_[i] == row.roles[i] ||
         geometry.kind != GeometryKind::kUnitVector) {
       continue;
     }
     std::array<double, 4> j;  // a unit vector's tangent has two elements
-    geometry.Transport(f.buffers.roles[i], at_[i], j.data());
-    ChainJacobian(f, row, row.place->columns[i], geometry.tangent, j.data());
+    geometry.Transport(row.roles[i], at_[i], j.data());
+    ChainJacobian(row, row.place->columns[i], geometry.tangent, j.data(), f.work);
   }
   return outcome;
 }
@@ -124,14 +123,14 @@ Outcome Linear::CorrectBy(FilterState& f, std::span<Row* const> rows, const doub
     const std::vector<bool>& consider = row->place->consider;
     return std::ranges::find(consider, true) != consider.end();
   };
-  const bool small = f.state.covariance().small() && CountOf(rows) <= Covariance::kSmall &&
-                     !f.considering && std::ranges::none_of(rows, considers);
+  const bool small = IsSmall(f.state.covariance()) && CountOf(rows) <= kSmall && !f.considering &&
+                     std::ranges::none_of(rows, considers);
   return small ? CorrectSmall(f, rows, dx) : CorrectLarge(f, rows, dx);
 }
 
 /// Few states and few rows: nothing is allocated.
 Outcome Linear::CorrectSmall(FilterState& f, std::span<Row* const> rows, const double* correction) {
-  constexpr std::size_t kMost = Covariance::kSmall;
+  constexpr std::size_t kMost = kSmall;
   std::array<double, kMost * kMost> pht, s, w, gain;
   std::array<double, kMost> innovation, inverse_d, dx;
   const auto n = static_cast<std::size_t>(f.size());
@@ -160,17 +159,21 @@ Outcome Linear::CorrectSmall(FilterState& f, std::span<Row* const> rows, const d
     }
     at += k;
   }
-  Covariance& p = f.state.covariance();
-  if (!p.Solve(m, pht.data(), s.data(), innovation.data(), w.data(), inverse_d.data(), dx.data(),
-               gain.data())) {
+  const SmallKernels& kernels = SmallKernelsFor(f.size());
+  if (!kernels.solve(m, pht.data(), s.data(), m, innovation.data(), w.data(), inverse_d.data(),
+                     dx.data(), gain.data())) {
     return Outcome::kNotPd;
   }
   if (correction != nullptr) std::copy_n(correction, n, dx.begin());
   if (!AllFinite({dx.data(), n})) return Outcome::kNotFinite;
-  f.state.Retract(dx.data(), f.buffers.moved);
-  if (!AllFinite(f.buffers.moved)) return Outcome::kNotFinite;
-  if (!p.Downdate(m, w.data(), inverse_d.data())) return CorrectLarge(f, rows, correction);
-  f.state.MoveTo(f.buffers.moved);  // last: P turns with the tangent planes
+  f.state.Retract(dx.data(), f.moved);
+  if (!AllFinite(f.moved)) return Outcome::kNotFinite;
+  Covariance::Lower p = f.state.covariance().lower();
+  if (!kernels.downdate(p.data(), static_cast<int>(p.outerStride()), m, w.data(),
+                        inverse_d.data())) {
+    return CorrectLarge(f, rows, correction);
+  }
+  f.state.MoveTo(f.moved);  // last: P turns with the tangent planes
   f.RecordUpdate(rows, gain.data());
   return Outcome::kAccepted;
 }
@@ -228,8 +231,8 @@ Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const d
     dx[lost_[i]] = lost_gain.row(static_cast<Eigen::Index>(i)).dot(all.innovation);
   }
   if (correction != nullptr) std::copy_n(correction, n, dx.data());
-  f.state.Retract(dx.data(), f.buffers.moved);
-  if (!AllFinite(f.buffers.moved) || !w.allFinite() || !e.allFinite()) return Outcome::kNotFinite;
+  f.state.Retract(dx.data(), f.moved);
+  if (!AllFinite(f.moved) || !w.allFinite() || !e.allFinite()) return Outcome::kNotFinite;
   const bool cancels = Cancels(p, w, lost_, e, f.work.Take(n));
   const bool recorded =
       std::ranges::any_of(rows, [](const Row* row) { return row->gain_is_recorded(); });
@@ -241,12 +244,12 @@ Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const d
     }
   }
   if (cancels) {
-    if (!p.Joseph(gain, all.h, all.noise)) return Outcome::kNotPd;
+    if (!Joseph(p.lower(), gain, all.h, all.noise, f.work)) return Outcome::kNotPd;
   } else {
-    p.SubtractOuter(w);
-    p.AddOuter(lost_, e);
+    AddOuterProduct(p.lower(), w, -1.0);
+    AddOuterProduct(p.lower(), lost_, e);
   }
-  f.state.MoveTo(f.buffers.moved);
+  f.state.MoveTo(f.moved);
   f.RecordUpdate(rows, recorded ? gain.data() : nullptr);
   return Outcome::kAccepted;
 }

@@ -63,7 +63,8 @@ bool Inflate(FilterState& f, const SensorBinding& sensor) {
     if (!block.has_covariance() || block.status != BlockStatus::kEstimated) continue;
     const int n = block.geometry().tangent;
     const RowMajor inflation = kInflation * RowMajor::Identity(n, n);
-    f.state.covariance().Transform(block.tangent_offset, n, inflation.data());
+    const JacobianPart part{block.tangent_offset, n, 0};
+    f.state.covariance().Propagate({&part, 1}, inflation.data(), nullptr);
     any = true;
   }
   if (any) f.motions.EndInterval();

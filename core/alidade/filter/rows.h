@@ -24,6 +24,8 @@ struct Row {
   std::vector<double> H;               ///< H, m rows of the place's width
   std::vector<double> R, L;            ///< R and its factor, m x m, row-major
   std::vector<double> PHt;             ///< P H', n x m by columns, where the method has an H
+  std::vector<const double*> roles;    ///< what fills its roles, as RolesAt last had it
+  std::vector<double*> columns;        ///< memory
   double weight = 1.0;                 ///< w of the robust loss; R is divided by it
 
   /// Whether it measures a landmark in the state.

@@ -155,10 +155,10 @@ Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
   l = array.topLeftCorner(m, m).transpose();
   Divide(l, gain);
   dx.noalias() = gain * all.innovation;
-  f.state.Retract(dx.data(), f.buffers.moved);
-  if (!AllFinite(f.buffers.moved)) return Outcome::kNotFinite;
-  const Workspace::Matrix transport = TransportTo(f, f.buffers.moved);
-  f.state.MoveTo(f.buffers.moved);
+  f.state.Retract(dx.data(), f.moved);
+  if (!AllFinite(f.moved)) return Outcome::kNotFinite;
+  const Workspace::Matrix transport = TransportTo(f, f.moved);
+  f.state.MoveTo(f.moved);
   root_.setZero();
   AddProductWithTransposed(root_, transport, array.bottomRightCorner(n, n));
   SetCovariance(f);

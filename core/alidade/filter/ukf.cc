@@ -9,7 +9,6 @@
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
-#include "alidade/filter/evaluate_row.h"
 #include "alidade/filter/filter_options.h"
 #include "alidade/filter/method.h"
 #include "alidade/filter/square_root.h"
@@ -141,9 +140,7 @@ const Eigen::MatrixXd& Unscented::Root(FilterState& f) {
   if (root_is_current_) return root_;
   root_is_current_ = true;
   Covariance& p = f.state.covariance();
-  const Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>> lower(
-      p.data(), p.size(), p.size(), Eigen::OuterStride<>(p.stride()));
-  const double defect = SquareRootOf(lower, ldlt_, root_);
+  const double defect = SquareRootOf(p.lower(), ldlt_, root_);
   if (defect < -kRounding) {
     f.motions.EndInterval();
     p.SetBlock(0, 0, root_ * root_.transpose());
@@ -157,9 +154,7 @@ const Eigen::MatrixXd& Unscented::Root(FilterState& f) {
 /// B with P - M M' = B B', the covariance of x given the noise that is held. M M' is a part of P: a
 /// negative pivot is rounding.
 const Eigen::MatrixXd& Unscented::RootWithoutHeld(const FilterState& f) {
-  const Covariance& p = f.state.covariance();
-  rest_ = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>(
-      p.data(), p.size(), p.size(), Eigen::OuterStride<>(p.stride()));  // its lower triangle
+  rest_ = f.state.covariance().lower();  // of which the lower triangle counts
   AddOuterProduct(rest_, held_, -1.0);
   SquareRootOf(rest_, ldlt_, root_of_rest_);
   return root_of_rest_;
@@ -247,8 +242,8 @@ Status Unscented::StepPoints(FilterState& f, int halvings, double dt_s) {
       noise[direction - n] = c;
       if (goes_on) dx = c * held_.col(direction - n);
     }
-    f.state.Retract(dx.data(), f.buffers.moved);
-    status = StepPoint(f, f.buffers.moved.data(), noise.data(), dt_s, points.col(i).data());
+    f.state.Retract(dx.data(), f.moved);
+    status = StepPoint(f, f.moved.data(), noise.data(), dt_s, points.col(i).data());
   }
   if (status != Status::kOk) return status;
   Workspace::Vector mean = f.work.Take(size), m = f.work.Take(n);
@@ -309,8 +304,8 @@ Outcome Unscented::PredictPoints(FilterState& f, Row& row, int halvings) {
   Workspace::Matrix points = f.work.Take(geometry.ambient, 2 * n);
   for (Eigen::Index i = 0; i < 2 * n; ++i) {
     dx = (i < n ? transform.c : -transform.c) * root.col(i % n);
-    f.state.Retract(dx.data(), f.buffers.moved);
-    const Outcome outcome = PredictAt(f, row, f.buffers.moved, points.col(i).data());
+    f.state.Retract(dx.data(), f.moved);
+    const Outcome outcome = PredictAt(row, f.moved, f.state.values(), points.col(i).data());
     if (outcome != Outcome::kAccepted) return outcome;
   }
   Predicted& predicted = PredictedOf(f, row);
@@ -337,7 +332,7 @@ Unscented::Moments Unscented::MomentsAt(FilterState& f, const Row& row) {
 Outcome Unscented::Predict(FilterState& f, Row& row) {
   std::vector<double>& centre = PredictedOf(f, row).centre;
   centre.resize(static_cast<std::size_t>(row.model->measurement().geometry.ambient));
-  Outcome outcome = PredictAt(f, row, f.state.values(), centre.data());
+  Outcome outcome = PredictAt(row, f.state.values(), f.state.values(), centre.data());
   const bool defined = outcome == Outcome::kAccepted;  // at the estimate itself
   int halvings = 0;
   if (defined) outcome = PredictPoints(f, row, halvings);
@@ -349,7 +344,7 @@ Outcome Unscented::Predict(FilterState& f, Row& row) {
     NoteGuard(f, static_cast<std::size_t>(row.sensor), halvings, !too_wide);
   }
   if (outcome == Outcome::kAccepted) {
-    outcome = NoiseAt(row, RolesAt(f, row, f.state.values()));
+    outcome = NoiseAt(row, RolesAt(row, f.state.values(), f.state.values()));
   }
   if (outcome == Outcome::kAccepted) {
     Project(f, row);
@@ -443,10 +438,10 @@ Outcome Unscented::Correct(FilterState& f, std::span<Row* const> rows) {
   spread.setZero();
   AddProduct(spread, gain, all.noise);
   AddProductWithTransposed(p, spread, gain);
-  f.state.Retract(step.data(), f.buffers.moved);
-  if (!AllFinite(f.buffers.moved) || !p.allFinite()) return Outcome::kNotFinite;
+  f.state.Retract(step.data(), f.moved);
+  if (!AllFinite(f.moved) || !p.allFinite()) return Outcome::kNotFinite;
   f.state.covariance().SetBlock(0, 0, p);
-  f.state.MoveTo(f.buffers.moved);
+  f.state.MoveTo(f.moved);
   root_is_current_ = false;
   f.RecordUpdate(rows, gain.data());
   return Outcome::kAccepted;

@@ -5,7 +5,6 @@
 
 #include "alidade/base/error.h"
 #include "alidade/state/small_kernels.h"
-#include "alidade/state/tiles.h"
 
 namespace alidade {
 
@@ -131,11 +130,16 @@ void Covariance::SetParts(std::span<const JacobianPart> parts, const ConstMatrix
 void Covariance::Propagate(std::span<const JacobianPart> parts, const double* f, const double* q) {
   int k = 0;
   for (const JacobianPart& part : parts) k += part.size;
-  if (small() && parts.size() == 1) {
+  const Workspace::Use use(memory_);
+  if (q == nullptr) {
+    Workspace::Matrix zero = memory_.Take(k, k);
+    zero.setZero();
+    q = zero.data();
+  }
+  if (internal::IsSmall(*this) && parts.size() == 1) {
     const int ld = static_cast<int>(p_.rows());
     return internal::SmallKernelsFor(size_).propagate(p_.data(), ld, parts[0].offset, k, f, q);
   }
-  const Workspace::Use use(memory_);
   Workspace::Matrix cross = memory_.Take(size_, k), own = memory_.Take(k, k);
   own.setZero();
   Project({f, k, k, parts}, cross.data(), own.data());
@@ -144,7 +148,7 @@ void Covariance::Propagate(std::span<const JacobianPart> parts, const double* f,
 }
 
 void Covariance::Project(const JacobianRows& h, double* pht, double* s) const {
-  if (small() && h.whole) {
+  if (internal::IsSmall(*this) && h.whole) {
     const int ld = static_cast<int>(p_.rows());
     return internal::SmallKernelsFor(size_).project(p_.data(), ld, h.data, h.rows, pht, s);
   }
@@ -164,54 +168,6 @@ void Covariance::Project(const JacobianRows& h, double* pht, double* s) const {
     const Strided j(h.data + part.column, h.rows, part.size, Eigen::OuterStride<>(h.stride));
     sum.noalias() += j * product.middleRows(part.offset, part.size);
   }
-}
-
-bool Covariance::Solve(int m, const double* pht, const double* s, const double* r, double* w,
-                       double* inverse_d, double* dx, double* gain) const {
-  return internal::SmallKernelsFor(size_).solve(m, pht, s, m, r, w, inverse_d, dx, gain);
-}
-
-bool Covariance::Downdate(int m, const double* w, const double* inverse_d) {
-  return internal::SmallKernelsFor(size_).downdate(p_.data(), static_cast<int>(p_.rows()), m, w,
-                                                   inverse_d);
-}
-
-void Covariance::SubtractOuter(const ConstMatrix& w) {
-  internal::AddOuterProduct(p_.topLeftCorner(size_, size_), w, -1.0);
-}
-
-void Covariance::AddOuter(std::span<const int> rows, const ConstMatrix& e) {
-  for (Eigen::Index i = 0; i < e.rows(); ++i) {
-    for (Eigen::Index j = 0; j <= i; ++j) {
-      const int a = rows[static_cast<std::size_t>(i)], b = rows[static_cast<std::size_t>(j)];
-      p_(std::max(a, b), std::min(a, b)) += e.row(i).dot(e.row(j));
-    }
-  }
-}
-
-bool Covariance::Joseph(const ConstMatrix& k, const ConstMatrix& h, const ConstMatrix& r) {
-  const Workspace::Use use(memory_);
-  const Eigen::Index n = size_, m = h.rows();
-  Workspace::Matrix a = memory_.Take(n, n), hp = memory_.Take(m, n), change = memory_.Take(n, m);
-  a = p_.topLeftCorner(n, n).selfadjointView<Eigen::Lower>();
-  hp.setZero();
-  internal::AddProduct(hp, h, a);
-  internal::AddProduct(a, k, hp, -1.0);  // (I - K H) P
-  change.setZero();
-  internal::AddProduct(change, k, r);
-  internal::AddProductWithTransposed(change, a, h, -1.0);
-  internal::AddProductWithTransposed(a, change, k);
-  if (!(a.diagonal().array() >= 0.0).all()) return false;
-  SetBlock(0, 0, a);
-  return true;
-}
-
-void Covariance::Transform(int offset, int k, const double* j) {
-  const Workspace::Use use(memory_);
-  Workspace::Matrix zero = memory_.Take(k, k);
-  zero.setZero();
-  const JacobianPart part{offset, k, 0};
-  Propagate({&part, 1}, j, zero.data());
 }
 
 Eigen::MatrixXd Covariance::Dense() const {

@@ -32,12 +32,14 @@ struct JacobianRows {
 
 /// The covariance P of a state in its tangent, behind block queries: who uses it names rows by
 /// (offset, size). Dense: one symmetric matrix, the lower triangle authoritative, with spare
-/// capacity; the fast path and square roots take it from where it lies. Offsets and sizes lie in
+/// capacity; what corrects all of it takes it from where it lies. Offsets and sizes lie in
 /// [0, size()], as Add gave them; they are not checked, but where said.
 /// Nothing allocates memory in the steady state but what returns a matrix.
 class Covariance {
  public:
   using ConstMatrix = Eigen::Ref<const Eigen::MatrixXd>;
+  using Lower = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+  using ConstLower = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
 
   /// Rows in use, gaps included; a gap has zero rows and columns.
   int size() const { return size_; }
@@ -74,32 +76,12 @@ class Covariance {
   void Project(const JacobianRows& h, double* pht, double* s) const;
 
   /// x' = F x + w of the k rows in `parts`, w ~ N(0, Q): P_aa <- F P_aa F' + Q, P_ai <- F P_ai,
-  /// F and Q k x k, row-major, of Q the lower triangle. O(n k).
+  /// F and Q k x k, row-major, of Q the lower triangle; null: zero. O(n k).
   void Propagate(std::span<const JacobianPart> parts, const double* f, const double* q);
 
-  /// Few states, at least one: the operations below exist.
-  bool small() const { return size_ > 0 && size_ <= kSmall; }
-  static constexpr int kSmall = 16;
-  /// Of m <= kSmall rows with P H' (by columns), S and innovation r: W = P H' L^-T and 1/D for
-  /// S = L D L', dx = K r and K = P H' S^-1 (by columns). False where S is not positive definite.
-  bool Solve(int m, const double* pht, const double* s, const double* r, double* w,
-             double* inverse_d, double* dx, double* gain) const;
-  /// P <- P - W D^-1 W', with what Solve gave. False, and P as it was, where a variance would lose
-  /// nearly all its digits.
-  bool Downdate(int m, const double* w, const double* inverse_d);
-  /// P <- P - W W', W n x m. O(n^2 m).
-  void SubtractOuter(const ConstMatrix& w);
-  /// P_ab <- P_ab + E E' of the given rows, which E has one after the other.
-  void AddOuter(std::span<const int> rows, const ConstMatrix& e);
-  /// P <- (I - K H) P (I - K H)' + K R K' for any gain K (Joseph), K n x m, H m x n, R m x m.
-  /// O(n^2 m). False, and P as it was, where a variance would not be >= 0.
-  bool Joseph(const ConstMatrix& k, const ConstMatrix& h, const ConstMatrix& r);
-  /// Rows of one block <- J (k x k, row-major) times them: P_bb <- J P_bb J', P_bi <- J P_bi.
-  void Transform(int offset, int k, const double* j);
-  /// Where P lies, column-major with leading dimension stride(); the lower triangle counts.
-  double* data() { return p_.data(); }
-  const double* data() const { return p_.data(); }
-  int stride() const { return static_cast<int>(p_.rows()); }
+  /// P where it lies; the lower triangle counts.
+  Lower lower() { return {p_.data(), size_, size_, Eigen::OuterStride<>(p_.rows())}; }
+  ConstLower lower() const { return {p_.data(), size_, size_, Eigen::OuterStride<>(p_.rows())}; }
   /// The whole matrix, mirrored.
   Eigen::MatrixXd Dense() const;
 

@@ -11,7 +11,9 @@
 /// dimension `lds`), F and Q are row-major.
 namespace alidade::internal {
 
-inline constexpr int kSmall = Covariance::kSmall;
+inline constexpr int kSmall = 16;
+/// Few states, at least one.
+inline bool IsSmall(const Covariance& p) { return p.size() > 0 && p.size() <= kSmall; }
 /// Of a variance, less than this left of it has lost nearly all its digits.
 inline constexpr double kCancelled = 1e-10;
 

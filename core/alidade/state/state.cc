@@ -180,7 +180,8 @@ void State::MoveTo(const std::vector<double>& values) {
     std::array<double, 4> j;  // a unit vector's tangent has two elements
     block.geometry().Transport(values_.data() + block.value_offset,
                                values.data() + block.value_offset, j.data());
-    covariance_.Transform(block.tangent_offset, 2, j.data());
+    const JacobianPart part{block.tangent_offset, 2, 0};
+    covariance_.Propagate({&part, 1}, j.data(), nullptr);
   }
   std::copy(values.begin(), values.end(), values_.begin());
 }

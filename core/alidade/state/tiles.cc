@@ -56,6 +56,15 @@ void AddOuterProduct(MatrixRef c, const ConstMatrixRef& a, double sign) {
   });
 }
 
+void AddOuterProduct(MatrixRef c, std::span<const int> rows, const ConstMatrixRef& a) {
+  for (Eigen::Index i = 0; i < a.rows(); ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      const int row = rows[static_cast<std::size_t>(i)], column = rows[static_cast<std::size_t>(j)];
+      c(std::max(row, column), std::min(row, column)) += a.row(i).dot(a.row(j));
+    }
+  }
+}
+
 void DivideByTransposed(const ConstMatrixRef& l, MatrixRef b) {
   ForEachTile(l.rows(), [&](Eigen::Index j, Eigen::Index columns) {
     AddProductWithTransposed(b.middleCols(j, columns), b.leftCols(j), l.block(j, 0, columns, j),
@@ -82,6 +91,24 @@ void Divide(const ConstMatrixRef& l, MatrixRef b) {
           .solveInPlace<Eigen::OnTheRight>(tile);
     });
   });
+}
+
+bool Joseph(MatrixRef p, const ConstMatrixRef& k, const ConstMatrixRef& h, const ConstMatrixRef& r,
+            Workspace& work) {
+  const Workspace::Use use(work);
+  const Eigen::Index n = p.rows(), m = h.rows();
+  Workspace::Matrix a = work.Take(n, n), hp = work.Take(m, n), change = work.Take(n, m);
+  a = p.selfadjointView<Eigen::Lower>();
+  hp.setZero();
+  AddProduct(hp, h, a);
+  AddProduct(a, k, hp, -1.0);  // (I - K H) P
+  change.setZero();
+  AddProduct(change, k, r);
+  AddProductWithTransposed(change, a, h, -1.0);
+  AddProductWithTransposed(a, change, k);
+  if (!(a.diagonal().array() >= 0.0).all()) return false;
+  p.triangularView<Eigen::Lower>() = a;
+  return true;
 }
 
 bool Factorise(MatrixRef s) {

@@ -2,6 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
+
+#include "alidade/base/workspace.h"
 
 /// Products and factors of matrices in tiles that are small enough for Eigen to work on the stack:
 /// nothing is allocated at any size.
@@ -19,10 +22,17 @@ void AddProductWithTransposed(MatrixRef c, const ConstMatrixRef& a, const ConstM
                               double sign = 1.0);
 /// The lower triangle of C <- C + sign A A', sign 1 or -1.
 void AddOuterProduct(MatrixRef c, const ConstMatrixRef& a, double sign);
+/// The lower triangle of C_ab <- C_ab + A A' of the given rows, which A has one after the other.
+void AddOuterProduct(MatrixRef c, std::span<const int> rows, const ConstMatrixRef& a);
 /// B <- B L^-T, L the lower triangle of `l`.
 void DivideByTransposed(const ConstMatrixRef& l, MatrixRef b);
 /// B <- B L^-1, L the lower triangle of `l`.
 void Divide(const ConstMatrixRef& l, MatrixRef b);
+/// The lower triangle of P <- (I - K H) P (I - K H)' + K R K' for any gain K (Joseph), K n x m,
+/// H m x n, R m x m, from that of P. O(n^2 m). False, and P as it was, where a variance would be
+/// negative.
+bool Joseph(MatrixRef p, const ConstMatrixRef& k, const ConstMatrixRef& h, const ConstMatrixRef& r,
+            Workspace& work);
 /// Puts L of a symmetric S = L L' in place of its lower triangle; false unless S is finite and
 /// positive definite. (Eigen's own LLT reports success on NaN.)
 bool Factorise(MatrixRef s);

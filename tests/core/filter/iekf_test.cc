@@ -9,6 +9,7 @@
 #include <functional>
 
 #include "alidade/base/random.h"
+#include "alidade/state/small_kernels.h"
 #include "support/systems.h"
 
 namespace alidade {
@@ -18,8 +19,8 @@ using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures 
 
 TEST(Iekf, EqualsTheEkfOnALinearProblem) {
   System system = MovingPoint();
-  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 0.3), "linear"), {"p.x"});
-  AddSensor(system, "doubled", InProcessSensor(Linear(2.0, 0.7), "linear"), {"p.x"});
+  AddSensor(system, "direct", LinearSensor(1.0, 0.3), {"p.x"});
+  AddSensor(system, "doubled", LinearSensor(2.0, 0.7), {"p.x"});
   Ekf ekf(system, {}, StreamsOf(system));
   Iekf iekf(system, {}, StreamsOf(system));
   Random random(21);
@@ -131,7 +132,7 @@ struct Creased : Sensor<Vec<1>, Vec<1>> {
 
 System FarArcTangent() {
   System system;
-  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 3.0, 100.0}});
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 3.0, 100.0}});
   AddSensor(system, "s", InProcessSensor(ArcTangent(), "arc_tangent"), {"p.x"});
   return system;
 }
@@ -192,7 +193,7 @@ TEST(Iekf, LinearisesAnUpdateNoMoreOftenThanItMay) {
   for (const int most : {2, 3}) {
     int linearisations = 0;
     System system;
-    AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 3.0, 100.0}});
+    AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 3.0, 100.0}});
     AddSensor(system, "s", InProcessSensor(CountedArcTangent{{}, &linearisations}, "counted"),
               {"p.x"});
     IekfOptions options;
@@ -205,8 +206,8 @@ TEST(Iekf, LinearisesAnUpdateNoMoreOftenThanItMay) {
 // The first step leads from 2.5 to 1.34, where h is defined but its derivative is not.
 TEST(Iekf, AnIterateThatCannotBeLinearisedIsTheLast) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 2.5, 1.0}});
-  AddSensor(system, "plain", InProcessSensor(Linear(1.0, 1.0), "linear"), {"p.x"});
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 2.5, 1.0}});
+  AddSensor(system, "plain", LinearSensor(1.0, 1.0), {"p.x"});
   AddSensor(system, "creased", InProcessSensor(Creased{}, "creased"), {"p.x"});
   Iekf iekf(system, {}, StreamsOf(system));
   const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 2.5}, {1, 0.0}}));
@@ -225,7 +226,7 @@ TEST(Iekf, AnIterateThatCannotBeLinearisedIsTheLast) {
 
 TEST(Iekf, WithoutNoiseTheUpdateIsThatOfTheEkf) {
   System system = MovingPoint();
-  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 1e-200), "linear"), {"p.x"});
+  AddSensor(system, "direct", LinearSensor(1.0, 1e-200), {"p.x"});
   Iekf iekf(system, {}, StreamsOf(system));
   Ekf ekf(system, {}, StreamsOf(system));
   const UpdateReport& report = iekf.Process(FrameAt(0.0, {{0, 3.0}}));
@@ -327,8 +328,7 @@ TEST(Ekf, ACovarianceMovesWithItsUnitVectorTheSameInSmallAndLargeFilters) {
   const System few = TurnedVector();
   System many = TurnedVector();
   for (int i = 0; i < 20; ++i) {
-    AddMotion(many, "m" + std::to_string(i), InProcessMotion(Constant<>(1), "constant"),
-              {{"x", 0.0, 1.0}});
+    AddMotion(many, "m" + std::to_string(i), testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
   }
   Ekf small(few, {}, StreamsOf(few)), large(many, {}, StreamsOf(many));
   Frame frame;
@@ -336,8 +336,8 @@ TEST(Ekf, ACovarianceMovesWithItsUnitVectorTheSameInSmallAndLargeFilters) {
   frame.measurements.push_back({0, 0, -1, {-0.3, 0.9, 0.2}, {}});
   small.Process(frame);
   large.Process(frame);
-  ASSERT_TRUE(small.state().covariance().small());
-  ASSERT_FALSE(large.state().covariance().small());
+  ASSERT_TRUE(internal::IsSmall(small.state().covariance()));
+  ASSERT_FALSE(internal::IsSmall(large.state().covariance()));
   EXPECT_LT(
       (small.state().covariance().Dense() - large.state().covariance().Dense().topLeftCorner(5, 5))
           .norm(),
@@ -380,8 +380,8 @@ struct Difference : Sensor<Vec<1>, Vec<1>, Vec<1>> {
 /// After z = 2 = x^k c with R = .01 and c held; x = c = 1 before, as correlated as Difference says.
 State AfterAHeldRole(int power) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 1.0, std::sqrt(1.9)}});
-  AddMotion(system, "q", InProcessMotion(Constant<>(1), "constant"), {{"c", 1.0, std::sqrt(1.9)}});
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 1.0, std::sqrt(1.9)}});
+  AddMotion(system, "q", testing::ConstantMotion(1), {{"c", 1.0, std::sqrt(1.9)}});
   AddSensor(system, "difference", InProcessSensor(Difference(), "difference"), {"p.x", "q.c"});
   AddSensor(system, "power", InProcessSensor(PowerTimes(power), "power"), {"p.x", "q.c"});
   system.sensors[1].roles[1].mode = RoleMode::kKnown;

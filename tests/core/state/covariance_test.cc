@@ -7,9 +7,13 @@
 #include <Eigen/LU>
 
 #include "alidade/base/random.h"
+#include "alidade/state/tiles.h"
 
 namespace alidade {
 namespace {
+
+using internal::AddOuterProduct;
+using internal::Joseph;
 
 Eigen::MatrixXd RandomMatrix(int rows, int columns, Random& random) {
   Eigen::MatrixXd m(rows, columns);
@@ -77,7 +81,7 @@ TEST(Covariance, PropagateEqualsTheDenseFormForScatteredRows) {
   EXPECT_LT((p.Dense() - expected).norm(), kRounding * expected.norm());
 }
 
-TEST(Covariance, JosephAndSubtractOuterAgreeForTheOptimalGain) {
+TEST(Covariance, JosephAndTheOuterProductAgreeForTheOptimalGain) {
   Random random(4);
   Covariance a = Make({4}, random);
   Covariance b = a;
@@ -86,14 +90,15 @@ TEST(Covariance, JosephAndSubtractOuterAgreeForTheOptimalGain) {
   const Eigen::MatrixXd s = h * pht + r;
   const Eigen::MatrixXd gain = pht * s.inverse();
   const Eigen::LLT<Eigen::MatrixXd> llt(s);
-  a.SubtractOuter(llt.matrixL().solve(pht.transpose()).transpose());
-  b.Joseph(gain, h, r);
+  Workspace work;
+  AddOuterProduct(a.lower(), llt.matrixL().solve(pht.transpose()).transpose(), -1.0);
+  Joseph(b.lower(), gain, h, r, work);
   EXPECT_LT((a.Dense() - b.Dense()).norm(), 1e-11 * a.Dense().norm());
 }
 
 // Of a gain that is zero for some rows and wrong for the others, as the definition has it; and by
 // what the optimal one would have taken: P - W W' + E E', E = (K - K*) L.
-TEST(Covariance, JosephAndAddOuterAgreeForAnyGain) {
+TEST(Covariance, JosephAndTheOuterProductsAgreeForAnyGain) {
   Random random(14);
   Covariance joseph = Make({3, 2, 3}, random);
   Covariance outer = joseph;
@@ -107,11 +112,12 @@ TEST(Covariance, JosephAndAddOuterAgreeForAnyGain) {
 
   const Eigen::MatrixXd kept = Eigen::MatrixXd::Identity(8, 8) - gain * h;
   const Eigen::MatrixXd expected = kept * p * kept.transpose() + gain * r * gain.transpose();
-  joseph.Joseph(gain, h, r);
+  Workspace work;
+  Joseph(joseph.lower(), gain, h, r, work);
   EXPECT_LT((joseph.Dense() - expected).norm(), 1e-13 * p.norm());
-  outer.SubtractOuter(w);
+  AddOuterProduct(outer.lower(), w, -1.0);
   const std::vector<int> rows = {0, 1, 2, 3, 4, 5, 6, 7};
-  outer.AddOuter(rows, (gain - optimal) * l);
+  AddOuterProduct(outer.lower(), rows, (gain - optimal) * l);
   EXPECT_LT((outer.Dense() - expected).norm(), 1e-12 * p.norm());
 }
 

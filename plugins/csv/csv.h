@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <exception>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -18,11 +19,13 @@ namespace alidade {
 
 /// Measurements and truth from the columns of a table: a file, a pipe, or standard input.
 ///
-/// Each row is a frame. The first line that is neither blank nor a comment (`#`) names the columns;
-/// columns that the config does not name may hold anything. A cell that says "missing" leaves its
-/// stream, or truth value, out of the frame; nothing stands in for it. Time is read exactly where
-/// it is written without an exponent, so that ns since 1970 keep every digit. Comments above the
-/// names of the columns may tell the calibration, see CsvCalibration.
+/// Each row is a frame, or with `repeats` all rows of one time that come one after the other; a
+/// frame is then complete where the next one begins. The first line that is neither blank nor a
+/// comment (`#`) names the columns; columns that the config does not name may hold anything. A cell
+/// that says "missing" leaves its stream, or truth value, out of the frame; nothing stands in for
+/// it. Time is read exactly where it is written without an exponent, so that ns since 1970 keep
+/// every digit. Comments above the names of the columns may tell the calibration, see
+/// CsvCalibration.
 ///
 /// Keys         kCsvKeys in csv_layout.h.
 /// Errors       kBadData with file, line and column of the first cell that is wrong; kInputMissing;
@@ -42,18 +45,49 @@ class CsvSource : public Source {
   const std::vector<StreamInfo>& streams() const override { return streams_; }
   const std::vector<StreamInfo>& truths() const override { return truths_; }
   std::int64_t size() const override { return size_; }
-  Place place() const override { return {reader_.name(), reader_.number(), 0}; }
+  Place place() const override { return {reader_.name(), last_line_, 0}; }
   std::optional<Config> Calibration() const override { return calibration_.Get(); }
 
   bool Next(SourceFrame& frame) override {
-    if (!NextRow()) {
+    if (fault_) std::rethrow_exception(fault_);
+    if (!has_row_ && !ReadRow()) {
       if (rows_ == 0) Fail(Place{reader_.name()}, {}, "no data rows", "a row below the header");
       return false;
     }
+    frame.timestamp = timestamp_;
+    frame.truth.resize(layout_.truths.size());
+    for (std::vector<double>& truth : frame.truth) truth.clear();
+    std::size_t used = 0;
+    do {
+      TakeRow(frame, used);
+    } while (layout_.time_repeats && ReadAhead() && timestamp_ == frame.timestamp);
+    frame.measurements.resize(used);
+    return true;
+  }
+
+ private:
+  /// The next row, whole, with its time in timestamp_; false at the end.
+  bool ReadRow() {
+    has_row_ = NextRow();
+    if (!has_row_) return false;
     Split();
     CheckColumns();
-    frame.timestamp = ReadTimestamp();
-    std::size_t used = 0;
+    timestamp_ = ReadTimestamp();
+    return true;
+  }
+
+  /// The same while a frame is whole but for more rows: what is wrong with this one comes after it.
+  bool ReadAhead() {
+    try {
+      return ReadRow();
+    } catch (const Error&) {
+      fault_ = std::current_exception();
+      return false;
+    }
+  }
+
+  /// Puts the row into the frame, whose first `used` measurements are there.
+  void TakeRow(SourceFrame& frame, std::size_t& used) {
     for (std::size_t i = 0; i < layout_.streams.size(); ++i) {
       if (used == frame.measurements.size()) frame.measurements.emplace_back();
       Measurement& measurement = frame.measurements[used];
@@ -66,18 +100,15 @@ class CsvSource : public Source {
       measurement.covariance.clear();
       ++used;
     }
-    frame.measurements.resize(used);
-    frame.truth.resize(layout_.truths.size());
     for (std::size_t i = 0; i < frame.truth.size(); ++i) {
-      ReadField(layout_.truths[i], frame.truth[i]);
+      if (frame.truth[i].empty()) ReadField(layout_.truths[i], frame.truth[i]);
     }
-    last_timestamp_ = frame.timestamp;
+    last_timestamp_ = timestamp_;
     last_line_ = reader_.number();
     ++rows_;
-    return true;
+    has_row_ = false;
   }
 
- private:
   static LineReader Open(const SourceArguments& arguments) {
     const Node path = arguments.entry.At("path", "csv");
     return {Path(path, arguments.folder), path.place(), path.path()};
@@ -117,7 +148,7 @@ class CsvSource : public Source {
   void ReadHeader() {
     if (!NextRow())
       Fail(Place{reader_.name()}, {}, "no header line", "a line that names the columns");
-    header_line_ = reader_.number();
+    header_line_ = last_line_ = reader_.number();
     Split();
     std::vector<std::string> names;
     for (const std::string_view cell : cells_) names.emplace_back(cell::Trim(cell));
@@ -136,11 +167,12 @@ class CsvSource : public Source {
           "'" + reader_.name() + "' is a pipe, which cannot be read twice",
           "a regular file, whose rows can be counted first");
     }
-    size_ = 0;
-    while (NextRow()) ++size_;
+    std::int64_t rows = 0;
+    while (NextRow()) ++rows;
     reader_.Rewind();
     NextRow();  // the header
-    const double share = layout_.blind_after * static_cast<double>(size_);
+    if (!layout_.time_repeats) size_ = rows;
+    const double share = layout_.blind_after * static_cast<double>(rows);
     first_blind_row_ = static_cast<std::int64_t>(std::ceil(share * (1.0 - 1e-12)));
   }
 
@@ -203,14 +235,16 @@ class CsvSource : public Source {
     if (!(std::abs(t_s) < 9.2e9)) FailCell(column, "is beyond 292 years", "-9.2e9 s to 9.2e9 s");
     const Timestamp timestamp =
         cell::ParseTimestamp(cell::Trim(cells_[column.index]), value, layout_.time_digits);
-    if (!any_order_ && rows_ > 0 && timestamp <= last_timestamp_) {
+    const bool same = timestamp == last_timestamp_;
+    if (!any_order_ && rows_ > 0 && timestamp <= last_timestamp_ &&
+        !(same && layout_.time_repeats)) {
       const bool late = timestamp < last_timestamp_;
       FailCell(
           column,
           (late ? "is before line " : "is the same time as line ") + std::to_string(last_line_),
           late ? "times that increase, or 'out_of_sequence.policy: buffer' or 'rollback'"
-               : "times that increase, or 'out_of_sequence.policy: buffer', which joins rows of "
-                 "different "
+               : "times that increase, 'time.repeats: true', by which rows of one time are one "
+                 "frame, or 'out_of_sequence.policy: buffer', which joins rows of different "
                  "streams");
     }
     return timestamp;
@@ -242,7 +276,10 @@ class CsvSource : public Source {
 
   std::string_view line_;
   std::vector<std::string_view> cells_;
-  std::int64_t rows_ = 0;  ///< given out so far
+  bool has_row_ = false;      ///< that no frame has yet
+  std::exception_ptr fault_;  ///< of the row behind the last frame
+  Timestamp timestamp_ = 0;   ///< of the row
+  std::int64_t rows_ = 0;     ///< given out so far
   Timestamp last_timestamp_ = 0;
   int last_line_ = 0;
 };

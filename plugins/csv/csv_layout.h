@@ -34,6 +34,7 @@ struct CsvField {
 struct CsvLayout {
   std::optional<CsvColumn> time;  ///< none: rows come at rate_hz
   std::size_t time_digits = 9;    ///< decimal digits from the unit of time to ns
+  bool time_repeats = false;      ///< rows of one time, one after the other, are one frame
   double rate_hz = 0.0;
   std::vector<CsvField> streams, truths;
   char separator = ',';
@@ -44,7 +45,8 @@ struct CsvLayout {
 
 inline constexpr const char* kCsvKeys =
     "path           file or pipe, from the folder of the config; '-' is standard input\n"
-    "time           {column: t_s, unit: s}; unit s, ms, us or ns; default column t_s in s\n"
+    "time           {column: t_s, unit: s, repeats: false}; unit s, ms, us or ns; default column "
+    "t_s in s; repeats: rows of one time, one after the other, are one frame\n"
     "rate_hz        rows a second, where there is no column of time; the first is at 0\n"
     "streams        stream: x, [x, y], or {columns: x, reciprocal: false, gain: 1, known: [a, b]}; "
     "x a column, a and b those of numbers that its sensor takes as known\n"
@@ -101,6 +103,7 @@ inline void ReadTime(const Node& entry, CsvLayout& layout) {
     const int thousands = unit->Choice({"s", "ms", "us", "ns"});
     layout.time_digits = static_cast<std::size_t>(9 - 3 * thousands);
   }
+  if (const auto repeats = time->Find("repeats")) layout.time_repeats = repeats->Flag();
   time->RejectUnread();
 }
 

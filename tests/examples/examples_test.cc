@@ -10,7 +10,9 @@
 #include <map>
 
 #include "alidade/base/number_text.h"
+#include "alidade/record/simulate.h"
 #include "alidade/run/run.h"
+#include "support/temporary_folder.h"
 
 namespace alidade {
 namespace {
@@ -370,6 +372,28 @@ TEST(Examples, APoorStartDoesNotMakeTheUnscentedFilterDiverge) {
     EXPECT_FALSE(result->diverged || result->inconsistent) << seed;
     for (const auto& [key, value] : result->metrics) {
       EXPECT_TRUE(std::isfinite(value)) << seed << ' ' << key;
+    }
+  }
+}
+
+// What `simulate` writes, a row for each satellite, `csv` reads back as frames of six.
+TEST(Examples, SatellitesFromATableGiveTheSameEstimates) {
+  const testing::TemporaryFolder folder;
+  const std::string example = "23_satellites";
+  Simulate(Config::FromFile(kExamples / example / "config.yaml"), Host(), folder / "data", false);
+  const std::string table = (folder / "data/ranges.csv").string();
+  const RunResult straight = RunExample(example, {});
+  const RunResult read = RunExample(
+      example, {{"source", "{type: csv, path: " + table +
+                               ", time: {repeats: true}, streams: {ranges: {columns: ranges, "
+                               "known: [known0, known1, known2]}}}"}});
+  EXPECT_EQ(read.frames, straight.frames);
+  ASSERT_EQ(read.estimators.size(), straight.estimators.size());
+  for (std::size_t i = 0; i < read.estimators.size(); ++i) {
+    EXPECT_EQ(read.estimators[i].counts, straight.estimators[i].counts);
+    EXPECT_GT(read.estimators[i].counts.at("accepted:gnss"), 300);
+    for (const auto& [key, value] : read.estimators[i].metrics) {
+      EXPECT_EQ(value, straight.estimators[i].metrics.at(key)) << key;  // those without a truth
     }
   }
 }

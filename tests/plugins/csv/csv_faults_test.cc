@@ -97,10 +97,10 @@ TEST_F(Csv, TimeMustIncrease) {
   ExpectBadData(std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n# c\n0.1,1,2,3\n",
                 "FILE:5:1 t_s: '0.1' is before line 3; expected times that increase, or "
                 "'out_of_sequence.policy: buffer' or 'rollback'");
-  ExpectBadData(
-      std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n0.2000000001,1,2,3\n",
-      "FILE:4:1 t_s: '0.2000000001' is the same time as line 3; expected times that "
-      "increase, or 'out_of_sequence.policy: buffer', which joins rows of different streams");
+  ExpectBadData(std::string(kHeader) + "0,1,2,3\n0.2,1,2,3\n0.2000000001,1,2,3\n",
+                "FILE:4:1 t_s: '0.2000000001' is the same time as line 3; expected times that "
+                "increase, 'time.repeats: true', by which rows of one time are one frame, or "
+                "'out_of_sequence.policy: buffer', which joins rows of different streams");
 }
 
 TEST_F(Csv, TimeBeyondTheTimestamps) {

@@ -69,6 +69,47 @@ TEST_F(Csv, ReadsKnownNumbersWithAMeasurement) {
   EXPECT_TRUE(frames[1].measurements[0].known.empty());
 }
 
+// Satellites in rows of their own, two at the first time and one at the second; truth is that of
+// the first row that has it.
+TEST_F(Csv, RowsOfOneTimeAreOneFrameWhereTimesRepeat) {
+  const std::string config =
+      "path: a.csv\ntime: {column: t_s, repeats: true}\n"
+      "streams: {range: {columns: r, known: [x]}, speed: v}\ntruth: {depth: d}\n";
+  Write("t_s,r,x,v,d\n0,21,1,,\n0,22,2,7,58\n0,,,,59\n1,23,3,,\n");
+  const auto source = Open(config);
+  SourceFrame frame;
+  ASSERT_TRUE(source->Next(frame));
+  EXPECT_EQ(source->place().line, 4) << "the last row of the frame, not the one behind it";
+  ASSERT_EQ(Held(frame), "0 0 1 | 0");
+  EXPECT_EQ(frame.measurements[0].values, std::vector<double>{21.0});
+  EXPECT_EQ(frame.measurements[0].known, std::vector<double>{1.0});
+  EXPECT_EQ(frame.measurements[1].values, std::vector<double>{22.0});
+  EXPECT_EQ(frame.measurements[1].known, std::vector<double>{2.0});
+  EXPECT_EQ(frame.measurements[2].values, std::vector<double>{7.0});
+  EXPECT_EQ(frame.truth[0], std::vector<double>{58.0});
+  ASSERT_TRUE(source->Next(frame));
+  EXPECT_EQ(frame.timestamp, 1'000'000'000);
+  ASSERT_EQ(Held(frame), "0 |");
+  EXPECT_EQ(frame.measurements[0].known, std::vector<double>{3.0});
+  EXPECT_FALSE(source->Next(frame));
+}
+
+// What is wrong with a row does not cost the frame before it.
+TEST_F(Csv, AFrameBeforeABadRowIsGivenOutWhereTimesRepeat) {
+  Write("t_s,r\n0,21\n0,22\n1,x\n");
+  const auto source =
+      Open("path: a.csv\ntime: {column: t_s, repeats: true}\nstreams: {range: r}\n");
+  SourceFrame frame;
+  ASSERT_TRUE(source->Next(frame));
+  EXPECT_EQ(Held(frame), "0 0 |");
+  ExpectError(ExitCode::kBadData, "FILE:4:3 r: 'x' is not a number; expected a finite number",
+              [&] { source->Next(frame); });
+  ExpectBadData("t_s,r\n1,21\n0,22\n",
+                "FILE:3:1 t_s: '0' is before line 2; expected times that increase, or "
+                "'out_of_sequence.policy: buffer' or 'rollback'",
+                "path: a.csv\ntime: {column: t_s, repeats: true}\nstreams: {range: r}\n");
+}
+
 TEST_F(Csv, AcceptsCommentsCarriageReturnsAndByteOrderMark) {
   const auto frames = Frames(
       "\xEF\xBB\xBF# made by hand\r\n\r\nt_s , \"z\"\r\n# rows\r\n0, +1.5\r\n\r\n"

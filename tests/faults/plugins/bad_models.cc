@@ -380,6 +380,32 @@ struct TwoCovers : alidade::Sensor<Vec<1>, UnitQuaternion> {
   }
 };
 
+/// z = (x, q); of a measured -q, which is q, it implies another x.
+struct TwoCoversOfAPart
+    : alidade::Sensor<alidade::Product<Vec<1>, UnitQuaternion>, Vec<1>, UnitQuaternion> {
+  static constexpr std::array kRoles{Quantity{"x", "m"}, Quantity{"orientation"}};
+  static constexpr Quantity kMeasurement{"pose"};
+  static constexpr std::array kParts{Quantity{"x", "m"}, Quantity{"orientation"}};
+  static constexpr int kInitialises = 0;
+  explicit TwoCoversOfAPart(Params&) {}
+  template <class T>
+  bool Predict(const T* x, const T* q, T* z) const {
+    const double sign = q[0] < T(0.0) ? -1.0 : 1.0;
+    z[0] = x[0];
+    for (int i = 0; i < 4; ++i) z[1 + i] = sign * q[i];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    for (int i = 0; i < 4; ++i) l[5 * i] = T(0.01);
+  }
+  template <class T>
+  bool Initialise(const T*, const T* z, T* x) const {
+    x[0] = z[0] + (z[1] < T(0.0) ? 1.0 : 0.0);
+    return true;
+  }
+};
+
 /// A turning body with a control input; kWhat names a fault.
 template <int kWhat>
 struct Turning : alidade::Motion<4, Vec<1>, UnitQuaternion> {
@@ -448,9 +474,10 @@ ALIDADE_PLUGIN(SENSOR(Right, "right"), SENSOR(MayHaveBias, "may_have_bias"),
                RAW(StrangeStatus, "strange_status"), RAW(NowhereDefined, "nowhere_defined"),
                SENSOR(Landmark<0>, "landmark"), SENSOR(Landmark<1>, "wrong_landmark"),
                ALIDADE_SENSOR_BY(MakePastTheLandmark, "past_the_landmark", "", ""),
-               SENSOR(TwoCovers, "two_covers"), MOTION(Turning<1>, "ignores_dt"),
-               MOTION(Turning<2>, "euler"), MOTION(Turning<3>, "drifts"),
-               MOTION(Turning<4>, "infinite_q"), MOTION(Noisy<Noise::kHeld>, "held"),
+               SENSOR(TwoCovers, "two_covers"), SENSOR(TwoCoversOfAPart, "two_covers_of_a_part"),
+               MOTION(Turning<1>, "ignores_dt"), MOTION(Turning<2>, "euler"),
+               MOTION(Turning<3>, "drifts"), MOTION(Turning<4>, "infinite_q"),
+               MOTION(Noisy<Noise::kHeld>, "held"),
                MOTION(Noisy<Noise::kHeldUndeclared>, "held_undeclared"),
                MOTION(Noisy<Noise::kAddsUpUndeclared>, "adds_up_undeclared"),
                MOTION(Noisy<Noise::kOfEachStep>, "noise_of_each_step"))

@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "alidade/base/decompositions.h"
 #include "alidade/base/number_text.h"
@@ -163,6 +164,30 @@ std::string RemedyOfParts(bool discrete, bool other_fits) {
                     "{ return NoiseKind::kDiscrete; }`, or let Q grow with dt";
 }
 
+/// That f is the same for q and -q, the quaternion at `offset` of its input i.
+void CompareCovers(Context& context, const Function& f, std::size_t i, int offset,
+                   Farthest& farthest) {
+  const std::string& name = context.model().slots[static_cast<std::size_t>(f.slots[i])].name;
+  for (const CheckedState& state : context.states()) {
+    Values turned = Context::Inputs(f, state);
+    // Of a half turn, -0 apart from 0 decides which way round its logarithm goes.
+    if (turned[i].empty() || turned[i][static_cast<std::size_t>(offset)] == 0.0) continue;
+    for (double& element : std::span(turned[i]).subspan(offset, 4)) element = -element;
+    const Answer a = context.Call(f, state), b = context.CallWith(f, turned, kAllMatrices);
+    const auto words = [&] {
+      return context.Where(f, state) + ": q and -q of " + name + " are not the same";
+    };
+    farthest.Add(a.code == b.code ? 0.0 : 2.0, 1.0, words);
+    if (!a.ok() || !b.ok()) continue;
+    const Values x = OutputValues(a), y = OutputValues(b);
+    farthest.Add(Difference(f.outputs, x, y).abs().maxCoeff(), kRounding * (1.0 + Largest(x)),
+                 words);
+    const MatrixXd j = SideBySide(a);
+    farthest.Add((j - SideBySide(b)).cwiseAbs().maxCoeff(),
+                 kRounding * (1.0 + j.cwiseAbs().maxCoeff()), words);
+  }
+}
+
 }  // namespace
 
 Finding CheckNoise(Context& context) {
@@ -192,28 +217,13 @@ Finding CheckDoubleCover(Context& context) {
   Farthest farthest;
   bool any = false;
   for (const Function& f : context.model().functions) {
-    for (std::size_t i = 0; i < f.slots.size(); ++i) {
+    for (std::size_t i = 0; i < f.slots.size() && !f.outputs.empty(); ++i) {
       const Space& space = context.model().slots[static_cast<std::size_t>(f.slots[i])];
-      if (space.geometry.kind != GeometryKind::kUnitQuaternion || f.outputs.empty()) continue;
-      any = true;
-      for (const CheckedState& state : context.states()) {
-        Values turned = Context::Inputs(f, state);
-        // Of a half turn, -0 apart from 0 decides which way round its logarithm goes.
-        if (turned[i].empty() || turned[i][0] == 0.0) continue;
-        for (double& element : turned[i]) element = -element;
-        const Answer a = context.Call(f, state), b = context.CallWith(f, turned, kAllMatrices);
-        const auto words = [&] {
-          return context.Where(f, state) + ": q and -q of " + space.name + " are not the same";
-        };
-        farthest.Add(a.code == b.code ? 0.0 : 2.0, 1.0, words);
-        if (!a.ok() || !b.ok()) continue;
-        const Values x = OutputValues(a), y = OutputValues(b);
-        farthest.Add(Difference(f.outputs, x, y).abs().maxCoeff(), kRounding * (1.0 + Largest(x)),
-                     words);
-        const MatrixXd j = SideBySide(a);
-        farthest.Add((j - SideBySide(b)).cwiseAbs().maxCoeff(),
-                     kRounding * (1.0 + j.cwiseAbs().maxCoeff()), words);
-      }
+      space.geometry.ForEachPart([&](const Geometry& part, int offset, int) {
+        if (part.kind != GeometryKind::kUnitQuaternion) return;
+        any = true;
+        CompareCovers(context, f, i, offset, farthest);
+      });
     }
   }
   if (!any) return Skip("it takes no quaternion");

@@ -2,7 +2,9 @@
 #include <dlfcn.h>
 
 #define BOOST_DLL_USE_STD_FS
+#include <algorithm>
 #include <boost/dll/shared_library.hpp>
+#include <exception>
 #include <system_error>
 #include <vector>
 
@@ -60,6 +62,15 @@ std::string TrialLoad(const std::filesystem::path& file, std::uint32_t kind) {
   return end.text;
 }
 
+/// All that can be found without loading it. Errors: kPlugin, kNotTrusted.
+AlidadeBuildTag Examine(const std::filesystem::path& file, const std::filesystem::path& canonical) {
+  const AlidadeBuildTag build_tag = ReadBuildTag(canonical);
+  CheckBuild(build_tag, canonical);
+  CheckTrusted(file);
+  CheckLoadable(ElfFile(canonical));
+  return build_tag;
+}
+
 /// Opens the library for the rest of the process.
 const boost::dll::shared_library& OpenForGood(const std::filesystem::path& file) {
   using boost::dll::load_mode::rtld_local;
@@ -69,12 +80,35 @@ const boost::dll::shared_library& OpenForGood(const std::filesystem::path& file)
 
 }  // namespace
 
-OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical) {
-  const AlidadeBuildTag build_tag = ReadBuildTag(canonical);
-  CheckBuild(build_tag, canonical);
-  CheckTrusted(file);
-  CheckLoadable(ElfFile(canonical));
-  const std::string failure = TrialLoad(canonical, build_tag.kind);
+std::set<std::filesystem::path> TryTogether(const std::set<std::filesystem::path>& files) {
+  constexpr double kMostSeconds = 5.0;
+  struct Examined {
+    std::filesystem::path file, canonical;
+    std::uint32_t kind;
+  };
+  std::vector<Examined> all;
+  for (const std::filesystem::path& file : files) {
+    try {
+      const std::filesystem::path canonical = std::filesystem::canonical(file);
+      all.push_back({file, canonical, Examine(file, canonical).kind});
+    } catch (const std::exception&) {  // OpenPlugin says why
+    }
+  }
+  const SharedJournal journal;
+  const ChildEnd end = RunInChild({kMostSeconds, 0}, *journal, [&]() -> std::string {
+    const auto fails = [](const Examined& one) { return !Try(one.canonical, one.kind).empty(); };
+    return std::ranges::any_of(all, fails) ? "one fails" : "";
+  });
+  std::set<std::filesystem::path> good;
+  if (!end.answered || !end.text.empty() || !end.printed.empty()) return good;
+  for (const Examined& one : all) good.insert(one.file);
+  return good;
+}
+
+OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical,
+                        bool tried) {
+  const AlidadeBuildTag build_tag = Examine(file, canonical);
+  const std::string failure = tried ? std::string() : TrialLoad(canonical, build_tag.kind);
   if (!failure.empty()) Refuse(file, failure);
 
   const bool unoptimised = (build_tag.flags & ALIDADE_BUILT_UNOPTIMISED) != 0;
@@ -114,7 +148,7 @@ PluginOnDemand OpenOnDemand(const std::string& name, const std::filesystem::path
   }
   if (files.size() > 1)
     Refuse(searched, "holds " + std::to_string(files.size()) + " plugins; expected one");
-  const OpenedPlugin opened = OpenPlugin(files.front(), files.front());
+  const OpenedPlugin opened = OpenPlugin(files.front(), files.front(), false);
   if (opened.cpp_table == nullptr) Refuse(files.front(), "holds models alone");
   return {files.front(), opened.cpp_table};
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <set>
 #include <string>
 
 #include "alidade/host/plugin_host.h"
@@ -37,9 +38,15 @@ std::filesystem::path FolderOfProgram();
 /// C++ plugin of another build. Errors: kPlugin.
 void CheckBuild(const AlidadeBuildTag& build_tag, const std::filesystem::path& file);
 
-/// Checks build tag, build and trust, tries the plugin in a child process, opens it and walks its
-/// table. `canonical` is `file` behind its links. Errors: kPlugin, kNotTrusted.
-OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical);
+/// Tries the plugins in one child process, one after the other. Those that are without fault there;
+/// none where any has one, so that each has to be tried by itself.
+std::set<std::filesystem::path> TryTogether(const std::set<std::filesystem::path>& files);
+
+/// Checks build tag, build and trust, tries the plugin in a child process, unless it has been
+/// `tried`, opens it and walks its table. `canonical` is `file` behind its links. Errors: kPlugin,
+/// kNotTrusted.
+OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical,
+                        bool tried);
 
 /// A C++ plugin that is loaded only when it is needed.
 struct PluginOnDemand {

@@ -83,7 +83,7 @@ void PluginHost::LoadPlace(const fs::path& place, const std::string& origin, boo
   if (fs::is_directory(place, error)) {
     LoadFolder(place, required);
   } else if (there) {
-    LoadFile(place, required);
+    LoadFile(place, required, false);
   }
   std::string found = "not there";
   if (there) {
@@ -105,12 +105,13 @@ void PluginHost::LoadFolder(const fs::path& folder, bool required) {
     if (required) Refuse(folder, error.message());
     refusals_.push_back({folder, error.message(), ExitCode::kPlugin});
   }
-  for (const fs::path& file : files) LoadFile(file, required);
+  const std::set<fs::path> tried = internal::TryTogether(files);
+  for (const fs::path& file : files) LoadFile(file, required, tried.contains(file));
 }
 
-void PluginHost::LoadFile(const fs::path& file, bool required) {
+void PluginHost::LoadFile(const fs::path& file, bool required, bool tried) {
   try {
-    Load(file);
+    Load(file, tried);
   } catch (const Error& e) {
     if (required) throw;
     const std::string prefix = file.string() + ": ";
@@ -123,7 +124,7 @@ void PluginHost::LoadFile(const fs::path& file, bool required) {
   }
 }
 
-void PluginHost::Load(const fs::path& file) {
+void PluginHost::Load(const fs::path& file, bool tried) {
   if (!file.is_absolute()) CheckTrusted(file);
   std::error_code error;
   const fs::path canonical = fs::canonical(file, error);
@@ -132,7 +133,7 @@ void PluginHost::Load(const fs::path& file) {
     return other->file == canonical || fs::equivalent(other->file, canonical, error);
   };
   if (std::any_of(loaded_.begin(), loaded_.end(), same)) return;
-  loaded_.push_back(std::make_unique<Loaded>(Loaded{internal::OpenPlugin(file, canonical)}));
+  loaded_.push_back(std::make_unique<Loaded>(Loaded{internal::OpenPlugin(file, canonical, tried)}));
   const std::size_t before = entries_.size();
   AddEntries(*loaded_.back());
   if (!IsLogged(LogLevel::kDebug)) return;

@@ -109,8 +109,8 @@ class PluginHost {
   struct Loaded;
   void LoadPlace(const std::filesystem::path& place, const std::string& origin, bool required);
   void LoadFolder(const std::filesystem::path& folder, bool required);
-  void LoadFile(const std::filesystem::path& file, bool required);
-  void Load(const std::filesystem::path& file);
+  void LoadFile(const std::filesystem::path& file, bool required, bool tried);
+  void Load(const std::filesystem::path& file, bool tried);
   void AddEntries(const Loaded& plugin);
 
   const PluginEntry& Find(PluginEntry::Kind kind, const std::string& name, const Node& entry) const;

@@ -10,6 +10,9 @@
 #include "alidade/model/static_ekf.h"
 #include "bench/speed/depth_step.h"
 #include "bench/speed/interleaved.h"
+#include "motion_models/constant.h"
+#include "sensors/scale_2d.h"
+#include "sensors/stereo_disparity.h"
 #include "support/systems.h"
 
 namespace alidade::bench {

@@ -9,6 +9,7 @@
 #include "alidade/filter/frame_loop.h"
 #include "alidade/filter/iekf.h"
 #include "support/recording.h"
+#include "support/systems.h"
 
 namespace alidade {
 namespace {
@@ -35,7 +36,7 @@ struct Difference : Sensor<Vec<1>, Vec<2>> {
 /// Two elements x with the covariance P, and their difference measured.
 System TwoElements(const Eigen::Matrix2d& p, double sigma) {
   System system;
-  MotionBinding binding{"p", InProcessMotion(Constant<>(2), "constant"), {}};
+  MotionBinding binding{"p", testing::ConstantMotion(2), {}};
   binding.blocks.push_back(system.layout.Declare("p.x", "p", binding.model.blocks()[0]));
   Prior prior;
   prior.block = 0;
@@ -152,9 +153,9 @@ TEST(SingularInnovation, IsReportedAndChangesNothing) {
 // FAULTS 79: the same measurement twice without noise; one by one each S is as it should be.
 TEST(SingularInnovation, OfTwoStackedMeasurementsRollsBoth) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 1.0, 2.0}});
-  AddSensor(system, "one", InProcessSensor(Linear(1.0, 0.0), "linear"), {"p.x"});
-  AddSensor(system, "two", InProcessSensor(Linear(1.0, 0.0), "linear"), {"p.x"});
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 1.0, 2.0}});
+  AddSensor(system, "one", LinearSensor(1.0, 0.0), {"p.x"});
+  AddSensor(system, "two", LinearSensor(1.0, 0.0), {"p.x"});
   Ekf ekf(system, {}, StreamsOf(system));
   const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 3.0}, {1, 4.0}}));
   for (const MeasurementReport& entry : report.measurements()) {

@@ -1,18 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
 
 #include "alidade/filter/ekf.h"
 #include "alidade/host/in_process.h"
-#include "motion_models/constant.h"
 #include "motion_models/constant_velocity.h"
-#include "sensors/scale_2d.h"
-#include "sensors/stereo_disparity.h"
-#include "support/manifold_models.h"
 
 /// Small systems composed in C++, for tests.
 namespace alidade::testing {
@@ -40,37 +35,23 @@ struct Linear : Sensor<Vec<1>, Vec<1>> {
   }
 };
 
+// The models that most tests are made of, compiled once.
+SensorModel LinearSensor(double gain, double sigma);
+MotionModel ConstantMotion(int size, double random_walk = 0.0);
+/// One axis, discrete noise.
+MotionModel ConstantVelocityMotion(double acceleration);
+
 struct GivenPrior {
   std::string block;
   double mean, sigma;
 };
 
 /// Adds a state entry whose scalar blocks start at the given priors.
-inline void AddMotion(System& system, const std::string& name, const MotionModel& model,
-                      const std::vector<GivenPrior>& priors) {
-  MotionBinding binding{name, model, {}};
-  for (std::size_t i = 0; i < priors.size(); ++i) {
-    const BlockId id = system.layout.Declare(name + "." + priors[i].block, name, model.blocks()[i]);
-    binding.blocks.push_back(id);
-    Prior prior;
-    prior.block = id;
-    prior.mean = {priors[i].mean};
-    prior.covariance = Eigen::MatrixXd::Constant(1, 1, priors[i].sigma * priors[i].sigma);
-    system.priors.push_back(prior);
-  }
-  system.motions.push_back(binding);
-}
-
-inline void AddSensor(System& system, const std::string& name, const SensorModel& model,
-                      const std::vector<std::string>& blocks) {
-  SensorBinding binding{name, name, model, {}};
-  for (const std::string& block : blocks) {
-    RoleBinding role;
-    role.block = system.layout.Find(block);
-    binding.roles.push_back(role);
-  }
-  system.sensors.push_back(binding);
-}
+void AddMotion(System& system, const std::string& name, const MotionModel& model,
+               const std::vector<GivenPrior>& priors);
+/// Adds a sensor of the stream of its name.
+void AddSensor(System& system, const std::string& name, const SensorModel& model,
+               const std::vector<std::string>& blocks);
 
 /// Constant velocity but for an acceleration that each step has by itself, constant during it.
 struct Jolted : ConstantVelocity<1, false> {
@@ -78,46 +59,17 @@ struct Jolted : ConstantVelocity<1, false> {
   NoiseKind noise_kind() const { return NoiseKind::kContinuous; }
 };
 
-inline System PointOf(const MotionModel& model) {
-  System system;
-  AddMotion(system, "p", model, {{"x", 1.0, 2.0}, {"v", -0.5, 3.0}});
-  return system;
-}
 /// A point that moves with constant velocity, jolted at each step: blocks `p.x`, `p.v`.
-inline System MovingPoint(double acceleration = 1.0) {
-  return PointOf(InProcessMotion(Jolted(acceleration), "jolted"));
-}
+System MovingPoint(double acceleration = 1.0);
 /// The same, with an acceleration that is held from one update to the next.
-inline System HeldPoint(double acceleration = 1.0) {
-  return PointOf(InProcessMotion(ConstantVelocity<1, false>(acceleration), "constant_velocity"));
-}
+System HeldPoint(double acceleration = 1.0);
 
 /// The depth filter: blocks `target.depth`, `target.depth_rate`, `template.inverse_distance`;
 /// sensors `disparity` (BF = 26 px m, 1 px) and `inverse_scale` (300 px, 1 px).
-inline System DepthFilter() {
-  System system;
-  AddMotion(system, "target", InProcessMotion(ConstantVelocity<1, false>(1.0), "constant_velocity"),
-            {{"depth", 0.35, 0.1}, {"depth_rate", 0.0, 0.5}});
-  AddMotion(system, "template", InProcessMotion(Constant<>(1), "constant"),
-            {{"inverse_distance", 3.3, 0.5}});
-  AddSensor(system, "disparity",
-            InProcessSensor(StereoDisparity(400.0, 0.065, 1.0), "stereo_disparity"),
-            {"target.depth"});
-  AddSensor(system, "inverse_scale", InProcessSensor(Scale2d::FromPixels(300.0, 1.0), "scale_2d"),
-            {"target.depth", "template.inverse_distance"});
-  return system;
-}
+System DepthFilter();
 
 /// The same system, the block `name` (empty: every block) estimated, consider or constant.
-inline System WithStatus(System system, const std::string& name, BlockStatus status) {
-  StateLayout layout;
-  for (const Block& block : system.layout.blocks()) {
-    const bool meant = name.empty() || block.name == name;
-    layout.Declare(block.name, block.owner, block.space, meant ? status : block.status);
-  }
-  system.layout = layout;
-  return system;
-}
+System WithStatus(System system, const std::string& name, BlockStatus status);
 
 /// z = sqrt(5 - x), not a number once x passes 5, and no more its Jacobian.
 struct Broken : Sensor<Vec<1>, Vec<1>> {
@@ -136,46 +88,14 @@ struct Broken : Sensor<Vec<1>, Vec<1>> {
 };
 
 /// An orientation that walks at random, known to 0.1 rad at first and measured to 0.05 rad.
-inline System WalkingOrientation() {
-  System system;
-  AddMotion(system, "q", InProcessMotion(ManifoldWalk<UnitQuaternion, 0.01>(), "walk"),
-            {{"x", 0.0, 0.1}});
-  system.priors[0].mean = {1.0, 0.0, 0.0, 0.0};
-  system.priors[0].covariance = 0.01 * Eigen::Matrix3d::Identity();
-  AddSensor(system, "z", InProcessSensor(ManifoldSensor<UnitQuaternion, 0.05>(), "seen"), {"q.x"});
-  return system;
-}
+System WalkingOrientation();
 
-inline std::vector<StreamInfo> StreamsOf(const System& system) {
-  std::vector<StreamInfo> streams;
-  for (const SensorBinding& sensor : system.sensors) {
-    streams.push_back({sensor.stream, sensor.model.measurement().geometry.ambient, 0.0,
-                       sensor.model.known_size()});
-  }
-  return streams;
-}
-
+std::vector<StreamInfo> StreamsOf(const System& system);
 /// A frame with one scalar for each (stream, value).
-inline Frame FrameAt(double t_s, const std::vector<std::pair<int, double>>& values) {
-  Frame frame;
-  frame.timestamp = TimestampFromSeconds(t_s);
-  for (const auto& [stream, value] : values) {
-    frame.measurements.push_back({frame.timestamp, stream, -1, {value}, {}});
-  }
-  return frame;
-}
+Frame FrameAt(double t_s, const std::vector<std::pair<int, double>>& values);
 
-inline bool HasEvent(const UpdateReport& report, const std::string& kind) {
-  return std::ranges::count(report.events, kind, &Event::kind) > 0;
-}
-
-inline double ValueOf(const State& state, const std::string& block) {
-  return *state.value(state.layout().Find(block));
-}
-inline double CovarianceOf(const State& state, const std::string& a, const std::string& b) {
-  const StateLayout& layout = state.layout();
-  return state.covariance().Block(layout[layout.Find(a)].tangent_offset, 1,
-                                  layout[layout.Find(b)].tangent_offset, 1)(0);
-}
+bool HasEvent(const UpdateReport& report, const std::string& kind);
+double ValueOf(const State& state, const std::string& block);
+double CovarianceOf(const State& state, const std::string& a, const std::string& b);
 
 }  // namespace alidade::testing

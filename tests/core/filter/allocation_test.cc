@@ -33,8 +33,7 @@ namespace {
 /// The depth filter, with a motion model besides that is of no sensor.
 System WalkingDepthFilter() {
   System system = testing::DepthFilter();
-  testing::AddMotion(system, "walk", InProcessMotion(Constant<>(1, 0.1), "constant"),
-                     {{"value", 0.0, 1.0}});
+  testing::AddMotion(system, "walk", testing::ConstantMotion(1, 0.1), {{"value", 0.0, 1.0}});
   return system;
 }
 
@@ -134,7 +133,7 @@ INSTANTIATE_TEST_SUITE_P(Fuse, Allocation,
 
 /// Adds `count` states that walk; with `considered` the first one is never corrected.
 void AddWalking(System& system, int count, bool considered) {
-  const MotionModel model = InProcessMotion(Constant<>(1, 0.1), "constant");
+  const MotionModel model = testing::ConstantMotion(1, 0.1);
   for (int i = 0; i < count; ++i) {
     const std::string name = "other_" + std::to_string(i);
     const BlockId id = system.layout.Declare(
@@ -241,11 +240,9 @@ System ThirtyStates() {
   System system;
   for (int i = 0; i < 15; ++i) {
     const std::string name = "p" + std::to_string(i);
-    testing::AddMotion(system, name,
-                       InProcessMotion(ConstantVelocity<1, false>(1.0), "constant_velocity"),
+    testing::AddMotion(system, name, testing::ConstantVelocityMotion(1.0),
                        {{"x", 0.1 * i, 1.0}, {"v", 0.0, 1.0}});
-    testing::AddSensor(system, "of_" + name, InProcessSensor(testing::Linear(1.0, 0.1), "linear"),
-                       {name + ".x"});
+    testing::AddSensor(system, "of_" + name, testing::LinearSensor(1.0, 0.1), {name + ".x"});
   }
   return system;
 }

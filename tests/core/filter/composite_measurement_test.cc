@@ -13,6 +13,7 @@
 #include "alidade/filter/rts.h"
 #include "alidade/filter/square_root_ekf.h"
 #include "alidade/filter/ukf.h"
+#include "support/manifold_models.h"
 #include "support/systems.h"
 
 namespace alidade {

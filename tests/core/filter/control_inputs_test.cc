@@ -12,6 +12,7 @@
 #include "alidade/filter/square_root_ekf.h"
 #include "alidade/filter/ukf.h"
 #include "alidade/model/static_ekf.h"
+#include "motion_models/constant.h"
 #include "support/driven.h"
 #include "support/systems.h"
 
@@ -31,7 +32,7 @@ System Car(double timeout_s = kInfinity) {
   System system;
   AddMotion(system, "car", InProcessMotion(Driven(kNoise), "driven"), {{"position", 1.0, 0.5}});
   system.motions[0].input = {"odometry", timeout_s};
-  AddSensor(system, "fix", InProcessSensor(Linear(1.0, kSigma), "linear"), {"car.position"});
+  AddSensor(system, "fix", LinearSensor(1.0, kSigma), {"car.position"});
   return system;
 }
 
@@ -312,8 +313,7 @@ TEST(ControlInputs, EachModelHasItsOwnAndTheyEndOneByOne) {
   system.motions[1].input = {"odometry", 2.0};
   AddMotion(system, "third", InProcessMotion(Driven(0.1), "driven"), {{"position", 0.0, 1.0}});
   system.motions[2].input = {"wheel", 1.0};
-  AddMotion(system, "still", InProcessMotion(Constant<>(1, 0.1), "constant"),
-            {{"value", 3.0, 1.0}});
+  AddMotion(system, "still", testing::ConstantMotion(1, 0.1), {{"value", 3.0, 1.0}});
   Ekf ekf(system, {}, {{"fix", 1}, {"odometry", 1}, {"wheel", 1}});
   EXPECT_EQ(ekf.Process(FrameAt(0.0, {{1, 2.0}, {2, 10.0}})).inputs, (std::vector{0, 1, 2}));
   const UpdateReport& report = ekf.Process(FrameAt(4.0, {}));
@@ -347,7 +347,7 @@ TEST(ControlInputs, WhatCannotBeObservedIsJudgedInMotion) {
   System system;
   AddMotion(system, "p", InProcessMotion(Heading(), "heading"),
             {{"x", 0.0, 1.0}, {"heading", 0.5, 1.0}});
-  AddSensor(system, "fix", InProcessSensor(Linear(1.0, 0.3), "linear"), {"p.x"});
+  AddSensor(system, "fix", LinearSensor(1.0, 0.3), {"p.x"});
   EXPECT_TRUE(UnobservableDirections(system).empty());
 }
 

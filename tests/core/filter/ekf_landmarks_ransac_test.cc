@@ -164,8 +164,8 @@ TEST(OnePointRansac, RescuesByItsOwnThreshold) {
 TEST(OnePointRansac, LeavesSensorsAloneThatDoNotAskForIt) {
   System system = KnownMap();
   system.sensors[0].outlier_rejection = OnePointRansac{};
-  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.0, 0.1}});
-  AddSensor(system, "z", InProcessSensor(Linear(1.0, 0.1), "linear"), {"p.x"});
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 0.0, 0.1}});
+  AddSensor(system, "z", LinearSensor(1.0, 0.1), {"p.x"});
   Ekf ekf(system, {}, StreamsOf(system));
   Frame frame = Matches({0.05, -0.03, 0.0}, 1000, 0.0);
   frame.measurements.push_back({0, 1, -1, {2.0}, {}});
@@ -180,8 +180,8 @@ TEST(OnePointRansac, RescuesNothingAfterAnUpdateThatIsRolledBack) {
   for (const bool overflows : {false, true}) {
     System system = KnownMap();
     system.sensors[0].outlier_rejection = OnePointRansac{};
-    AddMotion(system, "far", InProcessMotion(Constant<>(1), "constant"), {{"x", 1.5e308, 1.0}});
-    AddSensor(system, "z", InProcessSensor(Linear(0.1, 0.3), "linear"), {"far.x"});
+    AddMotion(system, "far", testing::ConstantMotion(1), {{"x", 1.5e308, 1.0}});
+    AddSensor(system, "z", LinearSensor(0.1, 0.3), {"far.x"});
     Ekf ekf(system, {}, StreamsOf(system));
     const std::vector<double> before = ekf.state().values();
     Frame frame = Matches({0.05, -0.03, 0.08}, 1000, 0.0);

@@ -16,7 +16,7 @@ using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures 
 // FAULTS 76
 TEST(Ekf, AnUpdateThatIsNotFiniteIsRolledBackAndReported) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 7.0, 1.0}});
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 7.0, 1.0}});
   AddSensor(system, "broken", InProcessSensor(Broken(), "broken"), {"p.x"});
   Ekf ekf(system, {}, StreamsOf(system));
   const UpdateReport& report = ekf.Process(FrameAt(0.0, {{0, 1.0}}));
@@ -43,7 +43,7 @@ struct Exploding : Motion<1, Vec<1>> {
 TEST(Ekf, AStepThatIsNotFiniteEndsWithTheLastGoodStateAndMeasurement) {
   System system;
   AddMotion(system, "p", InProcessMotion(Exploding(), "exploding"), {{"x", 3.0, 1.0}});
-  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 1.0), "linear"), {"p.x"});
+  AddSensor(system, "direct", LinearSensor(1.0, 1.0), {"p.x"});
   Ekf ekf(system, {}, StreamsOf(system));
   ekf.Process(FrameAt(0.0, {{0, 5.0}}));
   const UpdateReport& report = ekf.Process(FrameAt(1.0, {{0, 5.0}}));
@@ -168,7 +168,7 @@ struct OfSum : Sensor<Vec<2>, Vec<1>> {
 // What S rejects counts as much as what the gate rejects: the sensor's blocks become less certain.
 TEST(Ekf, ASensorWhoseSIsNeverPositiveDefiniteIsRecovered) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.0, 1.0}});
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
   AddSensor(system, "z", InProcessSensor(OfSum(), "of_sum"), {"p.x"});
   Ekf ekf(system, {}, StreamsOf(system));
   Frame frame = FrameAt(0.0, {});
@@ -303,7 +303,7 @@ TEST(Ekf, ABlockThatIsResetIsCorrelatedWithWhatItWasResetFrom) {
   System system;
   AddMotion(system, "p", InProcessMotion(Pair(), "pair"), {{"a", 1.0, 0.5}, {"b", 2.0, 1e-3}});
   AddSensor(system, "sum", InProcessSensor(Sum(), "sum"), {"p.a", "p.b"});
-  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 0.01), "linear"), {"p.a"});
+  AddSensor(system, "direct", LinearSensor(1.0, 0.01), {"p.a"});
   EkfOptions options;
   options.gate = 0.999;
   Ekf ekf(system, options, StreamsOf(system));
@@ -422,7 +422,7 @@ struct WithOptional : Sensor<Vec<1>, Vec<1>, Vec<1>> {
 
 TEST(Ekf, ASensorThatIsRejectedRepeatedlyWhoseRoleIsUnboundInflatesWhatItCorrects) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.0, 1.0}});
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
   AddSensor(system, "s", InProcessSensor(WithOptional(), "with_optional"), {"p.x"});
   system.sensors[0].roles.push_back({});
   EkfOptions options;

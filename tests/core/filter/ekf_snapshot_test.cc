@@ -23,7 +23,7 @@ struct Breaking : Motion<1, Vec<1>> {
 Ekf OneBlock(double sigma) {
   System system;
   AddMotion(system, "p", InProcessMotion(Breaking(), "breaking"), {{"x", 1.0, 1.0}});
-  AddSensor(system, "z", InProcessSensor(Linear(1.0, sigma), "linear"), {"p.x"});
+  AddSensor(system, "z", LinearSensor(1.0, sigma), {"p.x"});
   return {system, EkfOptions{}, {{"z", 1}}};
 }
 

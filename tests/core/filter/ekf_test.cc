@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "alidade/base/random.h"
+#include "alidade/state/small_kernels.h"
 #include "support/systems.h"
 
 namespace alidade {
@@ -36,8 +37,8 @@ struct Textbook {
 
 System TwoSensors() {
   System system = MovingPoint();
-  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 0.3), "linear"), {"p.x"});
-  AddSensor(system, "doubled", InProcessSensor(Linear(2.0, 0.7), "linear"), {"p.x"});
+  AddSensor(system, "direct", LinearSensor(1.0, 0.3), {"p.x"});
+  AddSensor(system, "doubled", LinearSensor(2.0, 0.7), {"p.x"});
   return system;
 }
 
@@ -107,8 +108,8 @@ TEST(Ekf, AnOutlierIsGatedAndLeavesStateAndCovarianceBitForBit) {
 
 TEST(Ekf, TheGatePassesTheShareThatItsProbabilityStates) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.0, 1e-9}});
-  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 1.0), "linear"), {"p.x"});
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 0.0, 1e-9}});
+  AddSensor(system, "direct", LinearSensor(1.0, 1.0), {"p.x"});
   EkfOptions options;
   options.gate = 0.9;
   options.rejection_recovery = RejectionRecovery::kNone;
@@ -161,8 +162,8 @@ struct Biased : Sensor<Vec<1>, Vec<1>, Vec<1>> {
 TEST(Ekf, AnUpdateOfSeveralRowsIsSchmidtsWhereABlockIsConsidered) {
   for (const bool by_role : {false, true}) {
     System system;
-    AddMotion(system, "x", InProcessMotion(Constant<>(1), "constant"), {{"x", 1.0, 1.5}});
-    AddMotion(system, "c", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.5, 0.8}});
+    AddMotion(system, "x", testing::ConstantMotion(1), {{"x", 1.0, 1.5}});
+    AddMotion(system, "c", testing::ConstantMotion(1), {{"x", 0.5, 0.8}});
     if (!by_role) system = WithStatus(system, "c.x", BlockStatus::kConsider);
     const Eigen::Vector3d gains(1.0, -0.5, 2.0), sigmas(0.3, 0.2, 0.5);
     for (int i = 0; i < 3; ++i) {
@@ -220,7 +221,7 @@ struct Implies : Sensor<Vec<1>, Vec<1>> {
 // What cannot have come from anywhere tells of the measurement, not of the filter.
 TEST(Ekf, AMeasurementThatImpliesNoValueToLineariseAtIsInvalid) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 1.0, 1.0}});
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 1.0, 1.0}});
   AddSensor(system, "z", InProcessSensor(Implies(), "implies"), {"p.x"});
   system.sensors[0].roles[0].jacobian_at = JacobianAt::kMeasurement;
   Ekf ekf(system, {}, StreamsOf(system));
@@ -318,7 +319,7 @@ TEST(Ekf, ASensorOutsideItsDomainIsReportedAsDivergenceOnce) {
 // FAULTS 73
 TEST(Ekf, NoiseThatVanishesIsWarnedOfOnce) {
   System system = MovingPoint();
-  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 1e-200), "linear"), {"p.x"});
+  AddSensor(system, "direct", LinearSensor(1.0, 1e-200), {"p.x"});
   Ekf ekf(system, {}, StreamsOf(system));
   const UpdateReport first = ekf.Process(FrameAt(0.0, {{0, 1.0}}));
   ASSERT_EQ(first.events.size(), 1u);
@@ -353,7 +354,7 @@ TEST(Ekf, AGapIsSteppedInEqualParts) {
 
 TEST(Ekf, FixedBlocksAreNeitherMovedNorCorrected) {
   System system;
-  const MotionModel model = InProcessMotion(ConstantVelocity<1, false>(1.0), "constant_velocity");
+  const MotionModel model = testing::ConstantVelocityMotion(1.0);
   AddMotion(system, "p", model, {{"x", 1.0, 2.0}});
   const BlockId v = system.layout.Declare("p.v", "p", model.blocks()[1], BlockStatus::kConstant);
   system.motions[0].blocks.push_back(v);
@@ -385,8 +386,8 @@ struct Product : Sensor<Vec<1>, Vec<1>, Vec<1>> {
 // z = x^2 at x = 2: H = (4, 0), S = 17. The two roles are as many as the states.
 TEST(Ekf, TwoRolesOfOneBlockAddUpInItsColumn) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 2.0, 1.0}});
-  AddMotion(system, "q", InProcessMotion(Constant<>(1), "constant"), {{"x", 5.0, 1.0}});
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 2.0, 1.0}});
+  AddMotion(system, "q", testing::ConstantMotion(1), {{"x", 5.0, 1.0}});
   AddSensor(system, "square", InProcessSensor(Product(), "product"), {"p.x", "p.x"});
   for (const Fuse fuse : {Fuse::kJoint, Fuse::kPerMeasurement}) {
     EkfOptions options;
@@ -422,8 +423,8 @@ struct OffsetOf : Sensor<Vec<1>, Vec<1>, Vec<1>> {
 // order than the roles.
 TEST(Ekf, ASensorOfLandmarksMayReadBlocksInAnyOrder) {
   System system;
-  AddMotion(system, "map", InProcessMotion(Constant<>(1), "constant"), {{"p", 0.0, 2.0}});
-  AddMotion(system, "cam", InProcessMotion(Constant<>(1), "constant"), {{"r", 0.0, 1.0}});
+  AddMotion(system, "map", testing::ConstantMotion(1), {{"p", 0.0, 2.0}});
+  AddMotion(system, "cam", testing::ConstantMotion(1), {{"r", 0.0, 1.0}});
   AddSensor(system, "offset", InProcessSensor(OffsetOf(), "offset"), {"cam.r", "map.p"});
   for (const Fuse fuse : {Fuse::kJoint, Fuse::kPerMeasurement}) {
     EkfOptions options;
@@ -443,12 +444,12 @@ TEST(Ekf, AVarianceThatNearlyVanishesKeepsItsDigitsInLargeFilters) {
     System system;
     constexpr double kP = 0.7, kR = 7e-15;
     for (int i = 0; i < n; ++i) {
-      AddMotion(system, "b" + std::to_string(i), InProcessMotion(Constant<>(1), "constant"),
+      AddMotion(system, "b" + std::to_string(i), testing::ConstantMotion(1),
                 {{"x", 1.0, std::sqrt(kP)}});
     }
     AddSensor(system, "direct", InProcessSensor(Linear(1.0, std::sqrt(kR)), "linear"), {"b0.x"});
     Ekf ekf(system, {}, StreamsOf(system));
-    ASSERT_EQ(ekf.state().covariance().small(), n == 3);
+    ASSERT_EQ(internal::IsSmall(ekf.state().covariance()), n == 3);
     EXPECT_EQ(ekf.Process(FrameAt(0.0, {{0, 1.1}})).measurements()[0].outcome, Outcome::kAccepted);
     EXPECT_NEAR(CovarianceOf(ekf.state(), "b0.x", "b0.x") / kR, 1.0, 1e-6) << n;
     EXPECT_NEAR(CovarianceOf(ekf.state(), "b1.x", "b1.x"), kP, 1e-15) << n;

@@ -206,9 +206,8 @@ TEST(SmallEkf, AnAcceptedMeasurementEndsARecovery) {
 
 TEST(SmallEkf, StacksMeasurementsOfSeveralRows) {
   System system;
-  const BlockId x =
-      system.layout.Declare("a.x", "a", InProcessMotion(Constant<>(2), "constant").blocks()[0]);
-  system.motions.push_back({"a", InProcessMotion(Constant<>(2, 0.4), "constant"), {x}});
+  const BlockId x = system.layout.Declare("a.x", "a", testing::ConstantMotion(2).blocks()[0]);
+  system.motions.push_back({"a", testing::ConstantMotion(2, 0.4), {x}});
   Prior prior;
   prior.block = x;
   prior.mean = {1.5, 0.7};
@@ -316,7 +315,7 @@ struct Mixed : Sensor<Vec<1>, Vec<1>, Vec<3>> {
 
 /// Adds a block of three that walk, `t.x`, with correlated priors.
 void AddTriple(System& system) {
-  const MotionModel walk = InProcessMotion(Constant<>(3, 0.2), "constant");
+  const MotionModel walk = testing::ConstantMotion(3, 0.2);
   const BlockId id = system.layout.Declare("t.x", "t", walk.blocks()[0]);
   system.motions.push_back({"t", walk, {id}});
   const Eigen::Matrix3d p{{0.09, 0.02, 0.01}, {0.02, 0.04, -0.01}, {0.01, -0.01, 0.16}};
@@ -332,16 +331,16 @@ System OfSize(int n) {
   std::vector<std::string> scalars;
   for (int i = 0; i < rest / 2; ++i) {
     const std::string name = "p" + std::to_string(i);
-    AddMotion(system, name, InProcessMotion(ConstantVelocity<1, false>(0.7), "constant_velocity"),
+    AddMotion(system, name, testing::ConstantVelocityMotion(0.7),
               {{"x", 1.0, 0.3}, {"v", 0.0, 0.2}});
     scalars.push_back(name + ".x");
   }
   if (rest % 2 == 1) {
-    AddMotion(system, "s", InProcessMotion(Constant<>(1, 0.3), "constant"), {{"x", 1.0, 0.3}});
+    AddMotion(system, "s", testing::ConstantMotion(1, 0.3), {{"x", 1.0, 0.3}});
     scalars.emplace_back("s.x");
   }
   if (triple) AddTriple(system);
-  AddSensor(system, "first", InProcessSensor(Linear(2.0, 0.5), "linear"), {scalars[0]});
+  AddSensor(system, "first", LinearSensor(2.0, 0.5), {scalars[0]});
   if (triple) AddSensor(system, "mixed", InProcessSensor(Mixed(), "mixed"), {scalars[0], "t.x"});
   for (std::size_t i = 1; i < scalars.size() && i < 3; ++i) {
     AddSensor(system, "both" + std::to_string(i), InProcessSensor(Both(), "both"),

@@ -210,7 +210,7 @@ TEST(Live, ExpectsNothingWhereHIsNotDefinedOrNothingIsThereToMeasure) {
 TEST(Live, ExpectsNothingThatIsNotFinite) {
   for (const double x : {1.0, 7.0}) {
     System system;
-    AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", x, 0.1}});
+    AddMotion(system, "p", testing::ConstantMotion(1), {{"x", x, 0.1}});
     AddSensor(system, "z", InProcessSensor(Broken(), "broken"), {"p.x"});
     Ekf ekf(system, {}, StreamsOf(system));
     ekf.Start(0);

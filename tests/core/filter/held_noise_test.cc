@@ -160,7 +160,7 @@ TYPED_TEST(HeldNoise, RejectedMeasurementsAreNone) {
 // A second model whose noise adds up, next to the one that holds it.
 TYPED_TEST(HeldNoise, StandsBesideNoiseThatAddsUp) {
   System system = DepthFilter();
-  system.motions[1].model = InProcessMotion(Constant<>(1, 0.3), "constant");
+  system.motions[1].model = testing::ConstantMotion(1, 0.3);
   const auto whole = this->Run(system, DepthFrames());
   EXPECT_LT(MostApart(whole, this->Run(system, DepthFrames(), {0.002})), this->kTolerance);
   const std::vector<Frame> more = WithEmptyFrames(DepthFrames(), 4);
@@ -213,8 +213,7 @@ TYPED_TEST(HeldNoise, ControlInputsThatChangeInsideAGapDoNotSplitIt) {
 TYPED_TEST(HeldNoise, OfAKnownBlockThereIsNone) {
   const auto system = [](BlockStatus position) {
     System made;
-    MotionBinding binding{
-        "p", InProcessMotion(ConstantVelocity<1, false>(2.0), "constant_velocity"), {}};
+    MotionBinding binding{"p", testing::ConstantVelocityMotion(2.0), {}};
     binding.blocks = {
         made.layout.Declare("p.x", "p", binding.model.blocks()[0], position),
         made.layout.Declare("p.v", "p", binding.model.blocks()[1], BlockStatus::kEstimated)};
@@ -223,7 +222,7 @@ TYPED_TEST(HeldNoise, OfAKnownBlockThereIsNone) {
     v.covariance = Eigen::MatrixXd::Constant(1, 1, 0.25);
     made.priors = {x, v};
     made.motions.push_back(binding);
-    AddSensor(made, "rate", InProcessSensor(Linear(1.0, 0.2), "linear"), {"p.v"});
+    AddSensor(made, "rate", LinearSensor(1.0, 0.2), {"p.v"});
     return made;
   };
   std::vector<Frame> frames;
@@ -296,7 +295,7 @@ TEST(HeldNoiseSmoother, EqualsTheBatchAtFramesInsideAGap) {
   constexpr int kFrames = 40;
   constexpr double kDt = 0.05, kSigma = 0.7;
   System system = HeldPoint(kSigma);
-  AddSensor(system, "z", InProcessSensor(Linear(2.0, 0.3), "linear"), {"p.x"});
+  AddSensor(system, "z", LinearSensor(2.0, 0.3), {"p.x"});
   RtsSmoother rts(system, {}, StreamsOf(system)),
       parts(system, {.max_dt_s = 0.02}, StreamsOf(system));
   Eigen::MatrixXd normal = Eigen::MatrixXd::Identity(2 + kFrames, 2 + kFrames);

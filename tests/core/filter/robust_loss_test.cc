@@ -42,8 +42,8 @@ TEST(RobustLoss, HasTheTextbookValues) {
 /// x ~ N(0, 4), measured with R = 1 under the loss.
 System Measured(const RobustLoss& loss) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.0, 2.0}});
-  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 1.0), "linear"), {"p.x"});
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 0.0, 2.0}});
+  AddSensor(system, "direct", LinearSensor(1.0, 1.0), {"p.x"});
   system.sensors[0].loss = loss;
   return system;
 }
@@ -83,7 +83,7 @@ TYPED_TEST(RobustFilter, TakesAnOutlierWithROverW) {
 TYPED_TEST(RobustFilter, LeavesOutWhatItsWeightOfZeroIsFor) {
   for (const RobustLoss& loss : {kCauchy, kHuber}) {
     System system = Measured({});
-    AddSensor(system, "far", InProcessSensor(Linear(1.0, 1.0), "linear"), {"p.x"});
+    AddSensor(system, "far", LinearSensor(1.0, 1.0), {"p.x"});
     system.sensors[1].loss = loss;
     for (const double far : {1e155, 1e200}) {
       TypeParam filter(system, {}, StreamsOf(system));
@@ -142,7 +142,7 @@ struct Normal {
 // of the second after the first; a gate sees S before the loss.
 TYPED_TEST(RobustFilter, WeighsAMeasurementOfTwoElementsAsAWhole) {
   System system;
-  const MotionModel still = InProcessMotion(Constant<>(2), "constant");
+  const MotionModel still = testing::ConstantMotion(2);
   const BlockId id = system.layout.Declare("p.x", "p", still.blocks()[0]);
   system.motions.push_back({"p", still, {id}});
   const Eigen::Matrix2d p0 = (Eigen::Matrix2d() << 4.0, 1.0, 1.0, 2.0).finished();

@@ -44,8 +44,8 @@ struct DenseBatch {
 TEST(RtsSmoother, EqualsTheBatchLeastSquaresSolutionWithSingularProcessNoise) {
   constexpr int kFrames = 80;
   System system = MovingPoint(0.7);
-  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 0.3), "linear"), {"p.x"});
-  AddSensor(system, "doubled", InProcessSensor(Linear(2.0, 0.7), "linear"), {"p.x"});
+  AddSensor(system, "direct", LinearSensor(1.0, 0.3), {"p.x"});
+  AddSensor(system, "doubled", LinearSensor(2.0, 0.7), {"p.x"});
   EkfOptions per_sensor;
   per_sensor.fuse = Fuse::kPerSensor;
   RtsSmoother joint(system, {}, StreamsOf(system)), apart(system, per_sensor, StreamsOf(system));
@@ -87,7 +87,7 @@ TEST(RtsSmoother, EqualsTheBatchLeastSquaresSolutionWithSingularProcessNoise) {
 
 TEST(RtsSmoother, GapsInPartsAndTheGateAreThoseOfTheFilter) {
   System system = MovingPoint();
-  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 0.3), "linear"), {"p.x"});
+  AddSensor(system, "direct", LinearSensor(1.0, 0.3), {"p.x"});
   EkfOptions options;
   options.gate = 0.999;
   options.max_dt_s = 0.1;

@@ -50,7 +50,7 @@ struct DirectTextbook {
 
 TEST(SquareRootEkf, EqualsTheClosedFormKalmanFilterOnALinearProblem) {
   System system = MovingPoint(0.7);
-  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 0.3), "linear"), {"p.x"});
+  AddSensor(system, "direct", LinearSensor(1.0, 0.3), {"p.x"});
   SquareRootEkf filter(system, {}, StreamsOf(system));
   filter.Start(0);
   DirectTextbook textbook;
@@ -105,8 +105,8 @@ TEST(SquareRootEkf, EqualsTheEkfOnTheDepthFilterInEveryOrderOfUpdates) {
 TEST(SquareRootEkf, StaysPositiveDefiniteWhereTheDifferenceOfCovariancesDoesNot) {
   constexpr double kPrior = 1e3, kSigma = 1e-7;
   System system;
-  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.0, kPrior}});
-  AddMotion(system, "q", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.0, kPrior}});
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 0.0, kPrior}});
+  AddMotion(system, "q", testing::ConstantMotion(1), {{"x", 0.0, kPrior}});
   AddSensor(system, "sum", InProcessSensor(Sum(1.0, 1.0, kSigma), "sum"), {"p.x", "q.x"});
   AddSensor(system, "nearly", InProcessSensor(Sum(1.0, 1.001, kSigma), "sum"), {"p.x", "q.x"});
   SquareRootEkf filter(system, {}, StreamsOf(system));
@@ -141,7 +141,7 @@ TEST(SquareRootEkf, StaysPositiveDefiniteWhereTheDifferenceOfCovariancesDoesNot)
 TEST(SquareRootEkf, ASingularPriorStaysSingular) {
   System system = MovingPoint(0.0);
   system.priors[1].covariance.setZero();
-  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 0.3), "linear"), {"p.x"});
+  AddSensor(system, "direct", LinearSensor(1.0, 0.3), {"p.x"});
   SquareRootEkf filter(system, {}, StreamsOf(system));
   filter.Start(0);
   for (int k = 1; k <= 20; ++k) filter.Process(FrameAt(0.1 * k, {{0, 1.0}}));

@@ -77,7 +77,7 @@ struct Near : Sensor<Vec<1>, Vec<1>> {
 
 System NearZero(double x) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", x, 0.1}});
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", x, 0.1}});
   AddSensor(system, "near", InProcessSensor(Near{}, "near"), {"p.x"});
   return system;
 }

@@ -19,8 +19,8 @@ using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures 
 TEST(Ukf, EqualsTheKalmanFilterOnALinearProblemWithSingularCovariances) {
   System system = MovingPoint(0.7);
   system.priors[1].covariance.setZero();
-  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 0.3), "linear"), {"p.x"});
-  AddSensor(system, "doubled", InProcessSensor(Linear(2.0, 0.7), "linear"), {"p.x"});
+  AddSensor(system, "direct", LinearSensor(1.0, 0.3), {"p.x"});
+  AddSensor(system, "doubled", LinearSensor(2.0, 0.7), {"p.x"});
   for (const double alpha : {1.0, 0.5, 1e-3}) {
     for (const Fuse fuse : {Fuse::kJoint, Fuse::kPerMeasurement}) {
       UkfOptions options;
@@ -73,7 +73,7 @@ struct Square : Sensor<Vec<1>, Vec<1>> {
 // c^2 = 3 and beta = 0.
 TEST(Ukf, GetsTheMomentsOfASquareExactly) {
   System system;
-  AddMotion(system, "p", InProcessMotion(Constant<>(1), "constant"), {{"x", 1.5, 0.8}});
+  AddMotion(system, "p", testing::ConstantMotion(1), {{"x", 1.5, 0.8}});
   AddSensor(system, "square", InProcessSensor(Square{}, "square"), {"p.x"});
   UkfOptions options;
   options.alpha = 1.0;
@@ -213,7 +213,7 @@ struct First : Sensor<Vec<1>, Vec<2>> {
 // FAULTS 82
 TEST(Ukf, ACovarianceWithoutASquareRootIsRepairedAndThatIsSaid) {
   System system;
-  MotionBinding binding{"p", InProcessMotion(Constant<>(2), "constant"), {}};
+  MotionBinding binding{"p", testing::ConstantMotion(2), {}};
   binding.blocks.push_back(system.layout.Declare("p.x", "p", binding.model.blocks()[0]));
   Prior prior;
   prior.block = 0;
@@ -252,7 +252,7 @@ TEST(Ukf, GatesAndHoldsAsTheEkfDoes) {
 // x' = x + v dt, but x is known.
 TEST(Ukf, AFixedBlockIsNotMovedByItsModel) {
   System system;
-  const MotionModel model = InProcessMotion(ConstantVelocity<1, false>(0.7), "constant_velocity");
+  const MotionModel model = testing::ConstantVelocityMotion(0.7);
   const BlockId x = system.layout.Declare("p.x", "p", model.blocks()[0], BlockStatus::kConstant);
   const BlockId v = system.layout.Declare("p.v", "p", model.blocks()[1]);
   system.motions.push_back({"p", model, {x, v}});
@@ -268,13 +268,13 @@ TEST(Ukf, AFixedBlockIsNotMovedByItsModel) {
 // A linear problem, so all three filters agree; v is known, and neither moved nor corrected.
 TEST(Ukf, AFixedBlockEntersTheModelsAndStaysAsItIs) {
   System system;
-  const MotionModel model = InProcessMotion(ConstantVelocity<1, false>(0.7), "constant_velocity");
+  const MotionModel model = testing::ConstantVelocityMotion(0.7);
   const BlockId v = system.layout.Declare("p.v", "p", model.blocks()[1], BlockStatus::kConstant);
   const BlockId x = system.layout.Declare("p.x", "p", model.blocks()[0]);
   system.motions.push_back({"p", model, {x, v}});
   system.priors.push_back({v, {-0.5}, {}, ""});
   system.priors.push_back({x, {1.0}, Eigen::MatrixXd::Constant(1, 1, 4.0), ""});
-  AddSensor(system, "direct", InProcessSensor(Linear(1.0, 0.3), "linear"), {"p.x"});
+  AddSensor(system, "direct", LinearSensor(1.0, 0.3), {"p.x"});
   Ekf ekf(system, {}, StreamsOf(system));
   Ukf ukf(system, {}, StreamsOf(system));
   SquareRootEkf root(system, {}, StreamsOf(system));

@@ -8,6 +8,9 @@
 #include <limits>
 
 #include "alidade/base/statistics.h"
+#include "motion_models/constant.h"
+#include "sensors/scale_2d.h"
+#include "sensors/stereo_disparity.h"
 #include "support/systems.h"
 
 namespace alidade {

@@ -131,7 +131,7 @@ TEST(AcceptedBy, PassesOnTheControlInputs) {
   System system;
   AddMotion(system, "car", InProcessMotion(Driven(0.2), "driven"), {{"position", 1.0, 0.5}});
   system.motions[0].input.stream = "odometry";
-  AddSensor(system, "fix", InProcessSensor(Linear(1.0, 0.3), "linear"), {"car.position"});
+  AddSensor(system, "fix", LinearSensor(1.0, 0.3), {"car.position"});
   const std::vector<Frame> frames = {FrameAt(0.0, {{0, 1.5}, {1, 2.0}}),
                                      FrameAt(1.0, {{0, 50.0}, {1, -1.0}}), FrameAt(2.0, {{1, 0.5}}),
                                      FrameAt(3.0, {{0, 2.6}})};

@@ -11,6 +11,7 @@
 
 #include "alidade/base/random.h"
 #include "alidade/base/statistics.h"
+#include "sensors/stereo_disparity.h"
 #include "support/systems.h"
 
 namespace alidade {

@@ -7,6 +7,7 @@
 
 #include "support/recording.h"
 #include "support/sanitized.h"
+#include "support/systems.h"
 
 namespace alidade::testing {
 namespace {
@@ -165,7 +166,7 @@ TEST(Reference, KeepsNoCovariances) {
     named.name = name;
     named.system = DepthFilter();
     named.system.sensors.pop_back();
-    const MotionModel model = InProcessMotion(Constant<>(299), "constant");
+    const MotionModel model = testing::ConstantMotion(299);
     const BlockId id = named.system.layout.Declare("wide.x", "wide", model.blocks()[0]);
     named.system.motions.push_back({"wide", model, {id}});
     named.system.priors.push_back(

@@ -31,8 +31,7 @@ NamedEstimator ExplodingEstimator(const std::vector<StreamInfo>& streams) {
   named.name = "exploding";
   testing::AddMotion(named.system, "p", InProcessMotion(Exploding(), "exploding"),
                      {{"x", 1.0, 1.0}});
-  testing::AddSensor(named.system, "disparity",
-                     InProcessSensor(testing::Linear(1.0, 1.0), "linear"), {"p.x"});
+  testing::AddSensor(named.system, "disparity", testing::LinearSensor(1.0, 1.0), {"p.x"});
   named.estimator = std::make_unique<Ekf>(named.system, EkfOptions{}, streams);
   return named;
 }
@@ -253,10 +252,9 @@ EstimatorResult WalkWith(double factor, std::uint64_t seed = 1) {
   experiment.source = std::make_unique<Walking>(seed);
   NamedEstimator& named = experiment.estimators.emplace_back();
   named.name = "ekf";
-  testing::AddMotion(named.system, "p", InProcessMotion(Constant<>(1, 0.1 * factor), "constant"),
+  testing::AddMotion(named.system, "p", testing::ConstantMotion(1, 0.1 * factor),
                      {{"depth", 0.0, 2.0 * factor}});
-  testing::AddSensor(named.system, "disparity",
-                     InProcessSensor(testing::Linear(1.0, factor), "linear"), {"p.depth"});
+  testing::AddSensor(named.system, "disparity", testing::LinearSensor(1.0, factor), {"p.depth"});
   named.estimator = std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
   return alidade::Run(experiment, {}).estimators[0];
 }
@@ -419,7 +417,7 @@ TEST(Run, ASensorOfWhichNothingWasUsedIsAnEvent) {
 
   experiment = MakeExperiment();
   NamedEstimator& ekf = experiment.estimators[0];
-  const SensorModel linear = InProcessSensor(testing::Linear(1.0, 1.0), "linear");
+  const SensorModel linear = testing::LinearSensor(1.0, 1.0);
   testing::AddSensor(ekf.system, "elsewhere", linear, {"target.depth"});
   for (Prior& prior : ekf.system.priors) prior.covariance *= 1e-12;  // sure of what is wrong
   EkfOptions options;
@@ -472,8 +470,7 @@ TEST(Run, AnInputThatIsMissingAgainAndAgainIsOneEventAndACount) {
   testing::AddMotion(named.system, "car", InProcessMotion(testing::Driven(0.2), "driven"),
                      {{"position", 0.0, 1.0}});
   named.system.motions[0].input = {"inverse_scale", 0.5};
-  testing::AddSensor(named.system, "disparity",
-                     InProcessSensor(testing::Linear(1.0, 1.0), "linear"), {"car.position"});
+  testing::AddSensor(named.system, "disparity", testing::LinearSensor(1.0, 1.0), {"car.position"});
   named.estimator = std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
   const RunResult run = alidade::Run(experiment, {});
   const EstimatorResult& ekf = run.estimators[0];

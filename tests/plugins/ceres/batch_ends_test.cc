@@ -40,8 +40,8 @@ TEST(CeresBatchEnds, StartsAtTheGivenTime) {
 // 4000 inputs fit: 1 of p.v and 1 of p.x, 3998 of steps. The first value of c.x is one more.
 TEST(CeresBatchEnds, InputsOfFirstValuesCountToo) {
   System system = LinearSystem();
-  testing::AddMotion(system, "c", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.0, 1.0}});
-  AddSensor(system, "y", InProcessSensor(testing::Linear(1.0, 0.3), "linear"), {"c.x"});
+  testing::AddMotion(system, "c", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
+  AddSensor(system, "y", testing::LinearSensor(1.0, 0.3), {"c.x"});
   system.priors.back().from = "y";
   const auto process = [&](const std::vector<std::pair<int, double>>& values, bool fails) {
     const auto batch = MakeBatch(system, "max_dt_s: 0.001\n");
@@ -106,7 +106,7 @@ TEST(CeresBatchEnds, AModelThatFailsAtTheEndIsSaid) {
   constexpr int kMany = 1'000'000;
   System system;
   testing::AddMotion(system, "p", InProcessMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
-  AddSensor(system, "z", InProcessSensor(testing::Linear(2.0, 0.3), "linear"), {"p.x"});
+  AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
   for (const bool so_far : {false, true}) {
     Failing::budget = kMany;
     const auto batch = MakeBatch(system, so_far ? "mode: filtering\n" : "");
@@ -125,9 +125,9 @@ TEST(CeresBatchEnds, AModelThatFailsAtTheEndIsSaid) {
 TEST(CeresBatchEnds, ThatItsFilterEndedIsSaid) {
   System system;
   testing::AddMotion(system, "p", InProcessMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
-  testing::AddMotion(system, "c", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.0, 1.0}});
-  AddSensor(system, "z", InProcessSensor(testing::Linear(2.0, 0.3), "linear"), {"p.x"});
-  AddSensor(system, "y", InProcessSensor(testing::Linear(1.0, 0.3), "linear"), {"c.x"});
+  testing::AddMotion(system, "c", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
+  AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
+  AddSensor(system, "y", testing::LinearSensor(1.0, 0.3), {"c.x"});
   system.priors.back().from = "y";
   const auto batch = MakeBatch(system);
   Failing::budget = 0;
@@ -211,7 +211,7 @@ TEST(CeresBatchEnds, LandmarksSeenAfterItsFilterEndedAreLeftOut) {
 TEST(CeresBatchEnds, AFilterThatGaveUpStepsNoMore) {
   System system;
   testing::AddMotion(system, "p", InProcessMotion(Failing(), "failing"), {{"x", 0.0, 2.0}});
-  AddSensor(system, "z", InProcessSensor(testing::Linear(2.0, 0.3), "linear"), {"p.x"});
+  AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
   Ekf ekf(system, {}, testing::StreamsOf(system));
   ekf.Process(FrameAt(0.0, {{0, 0.2}}));
   const std::vector<double> good = ekf.state().values();
@@ -230,7 +230,7 @@ TEST(CeresBatchEnds, AFilterThatGaveUpStepsNoMore) {
 
 TEST(CeresBatchEnds, TooFewIterationsNameTheKeyThatAllowsMore) {
   System system = testing::MovingPoint(0.7);
-  AddSensor(system, "z", InProcessSensor(testing::Linear(2.0, 0.3), "linear"), {"p.x"});
+  AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
   system.sensors[0].loss = {LossKind::kHuber, 0.1};
   const auto batch = MakeBatch(system, "max_iterations: 2\n");
   for (int k = 0; k < 20; ++k) batch->Process(FrameAt(0.05 * k, {{0, 4.0 + k % 3}}));

@@ -25,7 +25,7 @@ inline std::unique_ptr<Estimator> MakeBatch(const System& system, const std::str
 /// A point with a linear sensor of 0.3 m; its second block is measured by none.
 inline System LinearSystem() {
   System system = MovingPoint(0.7);
-  AddSensor(system, "z", InProcessSensor(Linear(2.0, 0.3), "linear"), {"p.x"});
+  AddSensor(system, "z", LinearSensor(2.0, 0.3), {"p.x"});
   return system;
 }
 

@@ -52,7 +52,7 @@ void ExpectNear(const std::vector<Estimate>& found, const std::vector<Estimate>&
 
 System HeldSystem() {
   System system = testing::HeldPoint(0.7);
-  testing::AddSensor(system, "z", InProcessSensor(testing::Linear(2.0, 0.3), "linear"), {"p.x"});
+  testing::AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
   return system;
 }
 

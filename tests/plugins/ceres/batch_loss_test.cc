@@ -41,7 +41,7 @@ constexpr double kGain = 2.0, kSigma = 0.3, kAcceleration = 0.7, kStep = 0.05;
 /// A moving point with a linear sensor: p.x ~ N(1, 2^2), p.v ~ N(-0.5, 3^2).
 System PointWith(const RobustLoss& loss) {
   System system = testing::MovingPoint(kAcceleration);
-  AddSensor(system, "z", InProcessSensor(testing::Linear(kGain, kSigma), "linear"), {"p.x"});
+  AddSensor(system, "z", testing::LinearSensor(kGain, kSigma), {"p.x"});
   system.sensors[0].loss = loss;
   return system;
 }
@@ -135,8 +135,8 @@ TEST(CeresBatchLoss, OfTheDataSoFarEndsWhereTheSmootherDoes) {
 // at 1e-14 of the cost, comes early, and much is left to the weights.
 TEST(CeresBatchLoss, WeightsThatDoNotSettleAreSaid) {
   System system = PointWith({LossKind::kHuber, 0.3});
-  testing::AddMotion(system, "c", InProcessMotion(Constant<>(1), "constant"), {{"x", 0.0, 1.0}});
-  AddSensor(system, "y", InProcessSensor(testing::Linear(1.0, 0.3), "linear"), {"c.x"});
+  testing::AddMotion(system, "c", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
+  AddSensor(system, "y", testing::LinearSensor(1.0, 0.3), {"c.x"});
   std::vector<Frame> frames = FramesWithOutliers(60);
   frames[0].measurements.push_back({frames[0].timestamp, 1, -1, {1e5}, {}});
   frames[1].measurements.push_back({frames[1].timestamp, 1, -1, {-1e5}, {}});

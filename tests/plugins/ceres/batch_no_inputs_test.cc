@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "batch_fixture.h"
+#include "motion_models/constant.h"
 #include "support/landmark_models.h"
 
 namespace alidade {
@@ -20,8 +21,7 @@ System ConstantSystem(BlockStatus status) {
   const BlockId id = system.layout.Declare("p.x", "p", still.blocks()[0], status);
   system.motions.push_back({"p", still, {id}});
   system.priors.push_back({id, {1.5}, Eigen::MatrixXd::Zero(1, 1), ""});
-  testing::AddSensor(system, "z", InProcessSensor(testing::Linear(kScale, kNoise), "linear"),
-                     {"p.x"});
+  testing::AddSensor(system, "z", testing::LinearSensor(kScale, kNoise), {"p.x"});
   return system;
 }
 System StartsFromItsSensor() {

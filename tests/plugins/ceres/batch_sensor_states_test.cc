@@ -66,7 +66,7 @@ TEST(BatchSensorStates, OfPosesIsTheSmoother) {
       "source: {type: models, duration_s: 3, rate_hz: 10}\n"
       "estimators: {rts: {type: rts}, batch: {type: ceres_batch}}\n");
   ExpectSmootherIsBatch(run, "body.position", 1e-6);
-  ExpectSmootherIsBatch(run, "body.orientation", 5e-3);
+  ExpectSmootherIsBatch(run, "body.orientation", 2e-3);
 }
 
 }  // namespace

@@ -67,7 +67,7 @@ std::vector<Estimate> SmoothOver(Estimator& estimator, const std::vector<Frame>&
 /// A point (process noise of rank 1), of which one sensor sees the place and one the rate.
 System LinearSystem() {
   System system = testing::LinearSystem();
-  AddSensor(system, "rate", InProcessSensor(testing::Linear(1.5, 0.8), "linear"), {"p.v"});
+  AddSensor(system, "rate", testing::LinearSensor(1.5, 0.8), {"p.v"});
   return system;
 }
 

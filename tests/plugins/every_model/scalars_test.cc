@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "every_model_fixture.h"
+#include "motion_models/constant.h"
+#include "sensors/scale_2d.h"
+#include "sensors/stereo_disparity.h"
 
 namespace alidade::testing {
 namespace {

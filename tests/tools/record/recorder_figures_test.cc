@@ -45,10 +45,8 @@ TEST(Recorder, TheComparisonDrawsEveryEstimatorWhateverItsBlocksAreCalled) {
   Experiment experiment = MakeExperiment();
   NamedEstimator other;
   other.name = "other";
-  testing::AddMotion(other.system, "thing", InProcessMotion(Constant<>(1), "constant"),
-                     {{"depth", 0.3, 0.1}});
-  testing::AddMotion(other.system, "own", InProcessMotion(Constant<>(1), "constant"),
-                     {{"bias", 0.1, 0.1}});
+  testing::AddMotion(other.system, "thing", testing::ConstantMotion(1), {{"depth", 0.3, 0.1}});
+  testing::AddMotion(other.system, "own", testing::ConstantMotion(1), {{"bias", 0.1, 0.1}});
   other.estimator = std::make_unique<Ekf>(other.system, EkfOptions{}, experiment.source->streams());
   experiment.estimators.push_back(std::move(other));
   Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());

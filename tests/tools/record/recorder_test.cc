@@ -7,6 +7,7 @@
 
 #include "alidade/base/number_text.h"
 #include "alidade/base/sha256.h"
+#include "sensors/stereo_disparity.h"
 #include "support/recording.h"
 
 namespace alidade {

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "support/systems.h"
+
+#include <algorithm>
+
+#include "motion_models/constant.h"
+#include "sensors/scale_2d.h"
+#include "sensors/stereo_disparity.h"
+#include "support/manifold_models.h"
+
+namespace alidade::testing {
+
+SensorModel LinearSensor(double gain, double sigma) {
+  return InProcessSensor(Linear(gain, sigma), "linear");
+}
+MotionModel ConstantMotion(int size, double random_walk) {
+  return InProcessMotion(Constant<>(size, random_walk), "constant");
+}
+MotionModel ConstantVelocityMotion(double acceleration) {
+  return InProcessMotion(ConstantVelocity<1, false>(acceleration), "constant_velocity");
+}
+
+void AddMotion(System& system, const std::string& name, const MotionModel& model,
+               const std::vector<GivenPrior>& priors) {
+  MotionBinding binding{name, model, {}};
+  for (std::size_t i = 0; i < priors.size(); ++i) {
+    const BlockId id = system.layout.Declare(name + "." + priors[i].block, name, model.blocks()[i]);
+    binding.blocks.push_back(id);
+    Prior prior;
+    prior.block = id;
+    prior.mean = {priors[i].mean};
+    prior.covariance = Eigen::MatrixXd::Constant(1, 1, priors[i].sigma * priors[i].sigma);
+    system.priors.push_back(prior);
+  }
+  system.motions.push_back(binding);
+}
+
+void AddSensor(System& system, const std::string& name, const SensorModel& model,
+               const std::vector<std::string>& blocks) {
+  SensorBinding binding{name, name, model, {}};
+  for (const std::string& block : blocks) {
+    RoleBinding role;
+    role.block = system.layout.Find(block);
+    binding.roles.push_back(role);
+  }
+  system.sensors.push_back(binding);
+}
+
+static System PointOf(const MotionModel& model) {
+  System system;
+  AddMotion(system, "p", model, {{"x", 1.0, 2.0}, {"v", -0.5, 3.0}});
+  return system;
+}
+System MovingPoint(double acceleration) {
+  return PointOf(InProcessMotion(Jolted(acceleration), "jolted"));
+}
+System HeldPoint(double acceleration) { return PointOf(ConstantVelocityMotion(acceleration)); }
+
+System DepthFilter() {
+  System system;
+  AddMotion(system, "target", ConstantVelocityMotion(1.0),
+            {{"depth", 0.35, 0.1}, {"depth_rate", 0.0, 0.5}});
+  AddMotion(system, "template", ConstantMotion(1), {{"inverse_distance", 3.3, 0.5}});
+  AddSensor(system, "disparity",
+            InProcessSensor(StereoDisparity(400.0, 0.065, 1.0), "stereo_disparity"),
+            {"target.depth"});
+  AddSensor(system, "inverse_scale", InProcessSensor(Scale2d::FromPixels(300.0, 1.0), "scale_2d"),
+            {"target.depth", "template.inverse_distance"});
+  return system;
+}
+
+System WithStatus(System system, const std::string& name, BlockStatus status) {
+  StateLayout layout;
+  for (const Block& block : system.layout.blocks()) {
+    const bool meant = name.empty() || block.name == name;
+    layout.Declare(block.name, block.owner, block.space, meant ? status : block.status);
+  }
+  system.layout = layout;
+  return system;
+}
+
+System WalkingOrientation() {
+  System system;
+  AddMotion(system, "q", InProcessMotion(ManifoldWalk<UnitQuaternion, 0.01>(), "walk"),
+            {{"x", 0.0, 0.1}});
+  system.priors[0].mean = {1.0, 0.0, 0.0, 0.0};
+  system.priors[0].covariance = 0.01 * Eigen::Matrix3d::Identity();
+  AddSensor(system, "z", InProcessSensor(ManifoldSensor<UnitQuaternion, 0.05>(), "seen"), {"q.x"});
+  return system;
+}
+
+std::vector<StreamInfo> StreamsOf(const System& system) {
+  std::vector<StreamInfo> streams;
+  for (const SensorBinding& sensor : system.sensors) {
+    streams.push_back({sensor.stream, sensor.model.measurement().geometry.ambient, 0.0,
+                       sensor.model.known_size()});
+  }
+  return streams;
+}
+
+Frame FrameAt(double t_s, const std::vector<std::pair<int, double>>& values) {
+  Frame frame;
+  frame.timestamp = TimestampFromSeconds(t_s);
+  for (const auto& [stream, value] : values) {
+    frame.measurements.push_back({frame.timestamp, stream, -1, {value}, {}});
+  }
+  return frame;
+}
+
+bool HasEvent(const UpdateReport& report, const std::string& kind) {
+  return std::ranges::count(report.events, kind, &Event::kind) > 0;
+}
+
+double ValueOf(const State& state, const std::string& block) {
+  return *state.value(state.layout().Find(block));
+}
+double CovarianceOf(const State& state, const std::string& a, const std::string& b) {
+  const StateLayout& layout = state.layout();
+  return state.covariance().Block(layout[layout.Find(a)].tangent_offset, 1,
+                                  layout[layout.Find(b)].tangent_offset, 1)(0);
+}
+
+}  // namespace alidade::testing

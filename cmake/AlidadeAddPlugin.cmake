@@ -1,5 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
+# Leaves no symbol of a library undefined. Of clang's sanitizers the program has the runtime alone.
+function(alidade_no_undefined target)
+  if(NOT (CMAKE_CXX_COMPILER_ID STREQUAL "Clang" AND CMAKE_CXX_FLAGS MATCHES "-fsanitize"))
+    target_link_options(${target} PRIVATE -Wl,-z,defs)
+  endif()
+endfunction()
+
 # alidade_add_plugin(NAME SOURCES file... [CPP] [FOLDER folder] [LIBRARIES target...])
 #
 # Builds a plugin that alidade loads at run time: hidden visibility, no undefined symbols, no
@@ -20,7 +27,7 @@ function(alidade_add_plugin name)
     CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON
     LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib/alidade/${arg_FOLDER}
     ALIDADE_FOLDER ${arg_FOLDER})
-  target_link_options(${name} PRIVATE -Wl,-z,defs)
+  alidade_no_undefined(${name})
   if(NOT CMAKE_CXX_FLAGS MATCHES "(^| )-O")
     target_compile_options(${name} PRIVATE $<$<CONFIG:>:-O2>)
   endif()

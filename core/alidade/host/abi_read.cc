@@ -51,6 +51,22 @@ std::string TextDefect(const char* text) {
   return {};
 }
 
+std::string ShownText(const char* text) {
+  std::string shown;
+  const std::size_t size = text == nullptr ? 0 : strnlen(text, ALIDADE_MAX_TEXT);
+  const auto* const bytes = reinterpret_cast<const unsigned char*>(text);
+  for (std::size_t i = 0; i < size;) {
+    const std::size_t length = CharacterLength(bytes + i, size - i);
+    if (length > 0 && !IsControl(bytes + i)) {
+      shown.append(text + i, length);
+    } else {
+      shown += '?';
+    }
+    i += std::max<std::size_t>(length, 1);
+  }
+  return shown;
+}
+
 bool GoodName(const char* name) {
   if (name == nullptr) return false;
   const std::size_t length = strnlen(name, ALIDADE_MAX_NAME + 1);

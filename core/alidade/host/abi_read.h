@@ -18,6 +18,10 @@ inline std::string Text(const char* text) { return text == nullptr ? "" : text; 
 /// What breaks the rules of texts, as in `is not UTF-8`, or "".
 std::string TextDefect(const char* text);
 
+/// A text of a plugin as it goes into a message, whatever is in it: UTF-8 without control
+/// characters, in place of which is `?`, of at most ALIDADE_MAX_TEXT bytes.
+std::string ShownText(const char* text);
+
 /// Printable ASCII without blanks, of 1 to ALIDADE_MAX_NAME bytes.
 bool GoodName(const char* name);
 

@@ -7,6 +7,7 @@
 #include "alidade/base/words.h"
 #include "alidade/host/abi_read.h"
 #include "alidade/host/cpp_plugin.h"
+#include "alidade/host/foreign_call.h"
 #include "alidade/host/param_reader.h"
 #include "alidade/host/plugin_file.h"
 #include "alidade/host/plugin_host.h"
@@ -21,20 +22,34 @@ std::uint32_t ToKind(PluginEntry::Kind kind) {
   return kind == PluginEntry::Kind::kSensor ? ALIDADE_KIND_SENSOR : ALIDADE_KIND_MOTION;
 }
 
-/// An instance that `create` has filled, destroyed unless it is released.
+/// An instance that `create` fills, destroyed unless it is released.
 class NewInstance {
  public:
-  NewInstance() { c_.struct_size = sizeof(AlidadeInstance); }
+  explicit NewInstance(const PluginEntry& entry) : name_(entry.name), plugin_(entry.plugin) {
+    c_.struct_size = sizeof(AlidadeInstance);
+  }
   ~NewInstance() {
-    if (c_.self != nullptr && c_.destroy != nullptr) c_.destroy(c_.self);
+    if (c_.self != nullptr && c_.destroy != nullptr) internal::Destroy(c_, name_, plugin_);
   }
   NewInstance(const NewInstance&) = delete;
   NewInstance& operator=(const NewInstance&) = delete;
 
-  AlidadeInstance* c() { return &c_; }
+  /// The code of `create`, that of an error where it threw.
+  std::int32_t Create(const AlidadeEntry& entry, const AlidadeHost& host) {
+    std::int32_t code = ALIDADE_ERROR;
+    thrown_ = internal::ThrownBy([&] {
+      const internal::NamedCall call("Create", "model", name_, plugin_);
+      code = entry.create(&host, &c_);
+    });
+    return code;
+  }
+  /// What `create` threw, or "".
+  const std::string& thrown() const { return thrown_; }
+  std::uint32_t kind() const { return c_.kind; }
   AlidadeInstance Release() { return std::exchange(c_, AlidadeInstance{}); }
 
  private:
+  std::string name_, plugin_, thrown_;
   AlidadeInstance c_{};
 };
 
@@ -92,8 +107,10 @@ auto CreateBuilt(const PluginEntry& entry, const Node& node, std::recursive_mute
   ParamReader reader(node, Named(entry.kind, entry.name));
   Params params(&reader.host());
   decltype(create(params)) made;
+  const std::string plugin = entry.plugin.string();
   try {
     const std::lock_guard lock(mutex);
+    const internal::NamedCall call("Create", internal::KindName(entry.kind), entry.name, plugin);
     made = create(params);
   } catch (const Error&) {
     reader.Check();
@@ -156,18 +173,19 @@ std::shared_ptr<const ModelInstance> PluginHost::Create(const PluginEntry& entry
                                                         const std::string& representation) const {
   const AlidadeEntry c = EntryOf(entry);
   ParamReader reader(node, Named(entry.kind, entry.name), representation);
-  NewInstance instance;
+  NewInstance instance(entry);
   std::int32_t code;
   {
     const std::lock_guard lock(create_mutex_);
-    code = c.create(&reader.host(), instance.c());
+    code = instance.Create(c, reader.host());
   }
   reader.Check();
+  if (!instance.thrown().empty()) FailCreation(entry, node, "it threw: " + instance.thrown());
   if (code != ALIDADE_OK) {
     FailCreation(entry, node, reader.failure().empty() ? "it does not say why" : reader.failure());
   }
   if (!reader.failure().empty()) node.Fail(reader.failure());
-  if (instance.c()->kind != c.kind) FailCreation(entry, node, "it is not what its table says");
+  if (instance.kind() != c.kind) FailCreation(entry, node, "it is not what its table says");
   return std::make_shared<const ModelInstance>(instance.Release(), entry.name,
                                                entry.plugin.string());
 }
@@ -213,8 +231,8 @@ std::vector<ParamInfo> PluginHost::Schema(const PluginEntry& entry) const {
   if (entry.kind != PluginEntry::Kind::kSource) {
     const AlidadeEntry c = EntryOf(entry);
     recorder.Run([&] {
-      NewInstance instance;
-      static_cast<void>(c.create(&recorder.host(), instance.c()));
+      NewInstance instance(entry);
+      static_cast<void>(instance.Create(c, recorder.host()));
     });
     return recorder.Result();
   }
@@ -238,9 +256,9 @@ std::vector<std::string> PluginHost::Describe(const PluginEntry& entry) const {
     return {};
   }
   ParamRecorder recorder;
-  NewInstance instance;
+  NewInstance instance(entry);
   const std::lock_guard lock(create_mutex_);
-  if (EntryOf(entry).create(&recorder.host(), instance.c()) != ALIDADE_OK) return {};
+  if (instance.Create(EntryOf(entry), recorder.host()) != ALIDADE_OK) return {};
   const ModelInstance model(instance.Release(), entry.name, entry.plugin.string());
   const bool sensor = entry.kind == PluginEntry::Kind::kSensor;
   std::vector<std::string> lines;

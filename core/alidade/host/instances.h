@@ -11,4 +11,7 @@ namespace alidade::internal {
 void AddInstance(const ModelInstance& model);
 void DropInstance(const ModelInstance& model);
 
+/// The author's name of the function in that slot of an instance; null: it is none of its.
+const char* NameOfCall(const ModelInstance& model, const void* slot);
+
 }  // namespace alidade::internal

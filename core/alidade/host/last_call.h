@@ -7,8 +7,9 @@
 namespace alidade {
 
 namespace detail {
-/// The slot of the call table, in a ModelInstance, of the model that this thread called last.
-/// Another thread may read it.
+/// The slot of the call table, in a ModelInstance, of the model that this thread called last, or
+/// another call of a plugin that lasts. Another thread may
+/// read it.
 #if defined(__ELF__)
 [[gnu::tls_model("initial-exec")]]
 #endif
@@ -19,7 +20,7 @@ extern constinit thread_local std::atomic<const void*>
 inline void NoteCall(const void* slot) { last_call.store(slot, std::memory_order_relaxed); }
 }  // namespace detail
 
-/// `Predict of model 'scale_2d' of plugin /x/scale_2d.so`, of the slot that a thread called last,
+/// `Predict of model 'scale_2d' of plugin /x/scale_2d.so`, of what a thread called last,
 /// into `text` of `size` bytes, which it ends with a zero; "" where no model has been called, or
 /// its instance is gone. Of a thread that hangs or has crashed, too: it allocates nothing, waits
 /// for nobody, and may be called by a signal handler.

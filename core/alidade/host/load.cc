@@ -11,7 +11,9 @@
 #include "alidade/base/child_process.h"
 #include "alidade/host/cpp_plugin.h"
 #include "alidade/host/elf_file.h"
+#include "alidade/host/foreign_call.h"
 #include "alidade/host/loadable.h"
+#include "alidade/host/needed_libraries.h"
 #include "alidade/host/plugin_file.h"
 #include "alidade/host/process_settings.h"
 
@@ -50,12 +52,10 @@ std::string Try(const std::filesystem::path& file, std::uint32_t kind) {
 /// that failed.
 std::string TrialLoad(const std::filesystem::path& file, std::uint32_t kind) {
   const SharedJournal journal;
-  const ChildEnd end = RunInChild({kTimeLimit_s, 0}, *journal, [&]() -> std::string {
-    try {
-      return Try(file, kind);
-    } catch (...) {
-      return "threw an exception while loading";
-    }
+  const ChildEnd end = RunInChild({kTimeLimit_s, 0}, *journal, [&] {
+    std::string failure;
+    const std::string thrown = ThrownBy([&] { failure = Try(file, kind); });
+    return thrown.empty() ? failure : "threw while loading: " + thrown;
   });
   if (!end.answered) return end.text + " while loading";
   if (end.text.empty() && !end.printed.empty()) return "prints '" + end.printed + "' while loading";
@@ -68,6 +68,7 @@ AlidadeBuildTag Examine(const std::filesystem::path& file, const std::filesystem
   CheckBuild(build_tag, canonical);
   CheckTrusted(file);
   CheckLoadable(ElfFile(canonical));
+  CheckTrustedNeeds(canonical);
   return build_tag;
 }
 
@@ -114,7 +115,7 @@ OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem
   const bool unoptimised = (build_tag.flags & ALIDADE_BUILT_UNOPTIMISED) != 0;
   OpenedPlugin plugin{canonical, nullptr, nullptr, unoptimised};
   std::string defect;
-  try {
+  const std::string thrown = ThrownBy([&] {
     const boost::dll::shared_library& library = OpenForGood(canonical);
     if (build_tag.kind == ALIDADE_PLUGIN_CPP) {
       plugin.cpp_table = library.get<const CppPluginTable*()>(kCppEntrySymbol)();
@@ -123,9 +124,8 @@ OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem
       plugin.table = library.get<const AlidadeTable*()>(ALIDADE_ENTRY_SYMBOL)();
       defect = Defect(plugin.table);
     }
-  } catch (const std::exception& e) {
-    Refuse(file, std::string("cannot be loaded: ") + e.what());
-  }
+  });
+  if (!thrown.empty()) Refuse(file, "cannot be loaded: " + thrown);
   if (!defect.empty()) Refuse(file, defect);
   return plugin;
 }
@@ -148,7 +148,7 @@ PluginOnDemand OpenOnDemand(const std::string& name, const std::filesystem::path
   }
   if (files.size() > 1)
     Refuse(searched, "holds " + std::to_string(files.size()) + " plugins; expected one");
-  const OpenedPlugin opened = OpenPlugin(files.front(), files.front(), false);
+  const OpenedPlugin opened = OpenPlugin(files.front(), files.front());
   if (opened.cpp_table == nullptr) Refuse(files.front(), "holds models alone");
   return {files.front(), opened.cpp_table};
 }

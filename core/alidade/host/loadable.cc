@@ -25,16 +25,21 @@ constexpr Address kPage = 4096;             ///< the smallest; larger ones only 
 bool IsPowerOfTwo(std::uint64_t n) { return n != 0 && (n & (n - 1)) == 0; }
 
 #if defined(__x86_64__)
-constexpr std::uint32_t kRelative = R_X86_64_RELATIVE, kDescriptor = R_X86_64_TLSDESC;
+constexpr std::uint32_t kRelative = R_X86_64_RELATIVE, kDescriptor = R_X86_64_TLSDESC,
+                        kAbsolute = R_X86_64_64;
 const std::set<std::uint32_t> kRelocations = {
     R_X86_64_64,       R_X86_64_GLOB_DAT, R_X86_64_JUMP_SLOT, R_X86_64_RELATIVE, R_X86_64_DTPMOD64,
     R_X86_64_DTPOFF64, R_X86_64_TPOFF64,  R_X86_64_TLSDESC,   R_X86_64_IRELATIVE};
+const std::set<std::uint32_t> kToSymbols = {R_X86_64_64, R_X86_64_GLOB_DAT, R_X86_64_JUMP_SLOT};
 #else
-constexpr std::uint32_t kRelative = R_AARCH64_RELATIVE, kDescriptor = R_AARCH64_TLSDESC;
+constexpr std::uint32_t kRelative = R_AARCH64_RELATIVE, kDescriptor = R_AARCH64_TLSDESC,
+                        kAbsolute = R_AARCH64_ABS64;
 const std::set<std::uint32_t> kRelocations = {
     R_AARCH64_ABS64,     R_AARCH64_GLOB_DAT,   R_AARCH64_JUMP_SLOT,
     R_AARCH64_RELATIVE,  R_AARCH64_TLS_DTPMOD, R_AARCH64_TLS_DTPREL,
     R_AARCH64_TLS_TPREL, R_AARCH64_TLSDESC,    R_AARCH64_IRELATIVE};
+const std::set<std::uint32_t> kToSymbols = {R_AARCH64_ABS64, R_AARCH64_GLOB_DAT,
+                                            R_AARCH64_JUMP_SLOT};
 #endif
 
 /// One library under examination.
@@ -98,6 +103,9 @@ class Examination {
       if ((segment.p_align > 1 && !IsPowerOfTwo(segment.p_align)) || align >= kTop ||
           (segment.p_vaddr - segment.p_offset) % align != 0) {
         Fail("a segment is not aligned");
+      }
+      if (segment.p_memsz > segment.p_filesz && (segment.p_flags & PF_W) == 0) {
+        Fail("a segment of code or constants is not all in the file");
       }
       end = segment.p_vaddr + segment.p_memsz;
       loads_.push_back(&segment);
@@ -249,8 +257,8 @@ class Examination {
 
   void CheckSymbols() {
     if (Need(DT_SYMENT, "size of symbols") != sizeof(Elf64_Sym)) Fail("size of symbols");
-    const auto symbols = ReadAt<Elf64_Sym>(Need(DT_SYMTAB, "symbols"), symbol_count_, "symbols");
-    for (const Elf64_Sym& symbol : symbols) {
+    symbols_ = ReadAt<Elf64_Sym>(Need(DT_SYMTAB, "symbols"), symbol_count_, "symbols");
+    for (const Elf64_Sym& symbol : symbols_) {
       CheckText(symbol.st_name);
       const auto type = ELF64_ST_TYPE(symbol.st_info);
       if (symbol.st_shndx == SHN_UNDEF || symbol.st_shndx == SHN_ABS || type == STT_TLS) continue;
@@ -319,35 +327,48 @@ class Examination {
       if (!kRelocations.contains(type) || (i < relative && type != kRelative)) {
         Fail("a relocation of kind " + std::to_string(type));
       }
-      if (ELF64_R_SYM(relocations[i].r_info) >= symbol_count_)
-        Fail("a relocation without a symbol");
+      CheckTarget(type, ELF64_R_SYM(relocations[i].r_info));
       const std::uint64_t written = type == kDescriptor ? 16 : 8;
       if (Holder(relocations[i].r_offset, written, PF_W) == nullptr) {
         Fail("a relocation outside its data");
       }
       if (type == kRelative) {
         relative_.emplace(relocations[i].r_offset, static_cast<Address>(relocations[i].r_addend));
+      } else if (type == kAbsolute) {
+        symbolic_.insert(relocations[i].r_offset);
       }
     }
   }
 
+  /// The symbol of a relocation. One that is in no library, but is not looked for in others either,
+  /// is where this one begins.
+  void CheckTarget(std::uint32_t type, std::uint64_t at) const {
+    if (at >= symbols_.size()) Fail("a relocation without a symbol");
+    const Elf64_Sym& symbol = symbols_[static_cast<std::size_t>(at)];
+    const bool nowhere = symbol.st_shndx == SHN_UNDEF &&
+                         (symbol.st_name == 0 || ELF64_ST_BIND(symbol.st_info) == STB_LOCAL ||
+                          ELF64_ST_VISIBILITY(symbol.st_other) != STV_DEFAULT);
+    if (nowhere && kToSymbols.contains(type)) Fail("a relocation without a symbol");
+  }
+
   /// DT_RELR: an address, then bits of the 63 words behind it.
-  void CheckPackedRelocations() const {
+  void CheckPackedRelocations() {
     const auto at = Tag(DT_RELR);
     if (!at) return;
     Address next = 0;
+    const auto add = [&](Address where) {
+      if (Holder(where, 8, PF_W) == nullptr) Fail("a relocation outside its data");
+      packed_.insert(where);
+    };
     for (const std::uint64_t entry :
          ReadAt<std::uint64_t>(*at, Need(DT_RELRSZ, "size of relocations") / 8, "relocations")) {
       if ((entry & 1u) == 0) {
-        if (Holder(entry, 8, PF_W) == nullptr) Fail("a relocation outside its data");
+        add(entry);
         next = entry + 8;
         continue;
       }
       for (int bit = 1; bit < 64; ++bit) {
-        if ((entry >> bit & 1u) != 0 &&
-            Holder(next + 8 * static_cast<Address>(bit - 1), 8, PF_W) == nullptr) {
-          Fail("a relocation outside its data");
-        }
+        if ((entry >> bit & 1u) != 0) add(next + 8 * static_cast<Address>(bit - 1));
       }
       next += Address{8} * 63;
     }
@@ -355,9 +376,12 @@ class Examination {
 
   /// What is called when the library is loaded, and when the program ends.
   void CheckFunctions() const {
-    for (const std::int64_t tag : {DT_INIT, DT_FINI}) {
+    for (const auto& [tag, name] : {std::pair(DT_INIT, ".init"), {DT_FINI, ".fini"}}) {
       const auto at = Tag(tag);
-      if (at && Holder(*at, 1, PF_X) == nullptr) Fail("a function lies outside its code");
+      if (!at) continue;
+      if (Holder(*at, 1, PF_X) == nullptr) Fail("a function lies outside its code");
+      const auto section = file_.FindSection(name);  // where a linker puts it, unless told else
+      if (section && section->sh_addr != *at) Fail("a function does not begin its section");
     }
     const std::pair<std::int64_t, std::int64_t> arrays[] = {{DT_INIT_ARRAY, DT_INIT_ARRAYSZ},
                                                             {DT_FINI_ARRAY, DT_FINI_ARRAYSZ}};
@@ -366,14 +390,26 @@ class Examination {
       if (!at) continue;
       const std::uint64_t size = Need(size_tag, "size of functions");
       if (Holder(*at, size) == nullptr) Fail("its list of functions lies outside its segments");
-      for (auto one = relative_.lower_bound(*at); one != relative_.end() && one->first < *at + size;
-           ++one) {
-        if (Holder(one->second, 1, PF_X) == nullptr) Fail("a function lies outside its code");
-      }
+      for (std::uint64_t i = 0; i < size; i += 8) CheckListed(*at + i);
     }
     if (const auto got = Tag(DT_PLTGOT); got && Holder(*got, 0) == nullptr) {
       Fail("its table of calls lies outside its segments");
     }
+  }
+
+  /// A member of a list of functions: a relocation writes where it is, or that of a symbol.
+  void CheckListed(Address at) const {
+    if (symbolic_.contains(at)) return;
+    const auto relative = relative_.find(at);
+    Address function = 0;
+    if (relative != relative_.end()) {
+      function = relative->second;
+    } else if (packed_.contains(at)) {
+      function = ReadAt<Address>(at, 1, "list of functions").front();
+    } else {
+      Fail("its list of functions holds what is none");
+    }
+    if (Holder(function, 1, PF_X) == nullptr) Fail("a function lies outside its code");
   }
 
   const ElfFile& file_;
@@ -383,7 +419,10 @@ class Examination {
   std::vector<std::uint64_t> names_;  ///< into texts_
   std::vector<char> texts_;
   std::uint64_t symbol_count_ = 0;
+  std::vector<Elf64_Sym> symbols_;
   std::map<Address, Address> relative_;  ///< what is written where, less the place of the library
+  std::set<Address> packed_;             ///< where the same is written, from what stands there
+  std::set<Address> symbolic_;           ///< where the place of a symbol is written
 };
 
 }  // namespace

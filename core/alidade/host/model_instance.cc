@@ -3,18 +3,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <memory>
 #include <utility>
 
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/host/abi_read.h"
+#include "alidade/host/foreign_call.h"
 #include "alidade/host/instances.h"
 
 namespace alidade {
 namespace {
 
 using internal::ReadPrefix;
+using internal::ShownText;
 using internal::Text;
 
 constexpr int kMaxSize = ALIDADE_MAX_SIZE;
@@ -100,7 +103,7 @@ std::string DefectOfParts(const AlidadeSpace& space) {
   if (!Text(space.elements).empty()) return "names its elements, which are those of its parts";
   for (std::size_t i = 0; i < space.part_count; ++i) {
     const AlidadeSpace part = PartOf(space, i);
-    const std::string which = "has a part '" + Text(part.name) + "' that ";
+    const std::string which = "has a part '" + ShownText(part.name) + "' that ";
     if (part.geometry == ALIDADE_PRODUCT) return which + "is a product";
     if (part.flags != 0) return which + "has flags";
     const std::string defect = Defect(part);
@@ -166,24 +169,49 @@ Space ToSpace(const AlidadeSpace& from) {
   return space;
 }
 
+/// What the last failed call of this thread threw.
+thread_local struct {
+  const void* slot = nullptr;  ///< null: nothing
+  char text[1280];
+} thrown;
+
 }  // namespace
+
+Status detail::Failed() noexcept {
+  thrown.slot = nullptr;
+  return Status::kError;
+}
+
+Status detail::Thrown(const void* slot) noexcept {
+  const std::string what = internal::ThrownBy([] { throw; });
+  char call[1024];
+  DescribeCall(slot, call, sizeof call);
+  std::snprintf(thrown.text, sizeof thrown.text, "%s threw: %s", *call != '\0' ? call : "it",
+                what.c_str());
+  thrown.slot = slot;
+  return Status::kError;
+}
 
 ModelInstance::ModelInstance(const AlidadeInstance& instance, std::string name, std::string plugin)
     : instance_(ReadPrefix(&instance)), name_(std::move(name)), plugin_(std::move(plugin)) {
   if (instance_.self == nullptr || instance_.destroy == nullptr) {
     Refuse("was created without an object or without a way to destroy it");
   }
-  std::unique_ptr<void, void (*)(void*)> until_checked(instance_.self, instance_.destroy);
-  if (!internal::AllZero(instance_.reserved)) Refuse(kReserved);
-  ReadCalls();
-  ReadDescription();
-  static_cast<void>(until_checked.release());
-  internal::AddInstance(*this);
+  try {
+    const internal::NamedCall reading("Description", "model", name_, plugin_);
+    if (!internal::AllZero(instance_.reserved)) Refuse(kReserved);
+    ReadCalls();
+    ReadDescription();
+    internal::AddInstance(*this);
+  } catch (...) {
+    internal::Destroy(instance_, name_, plugin_);
+    throw;
+  }
 }
 
 ModelInstance::~ModelInstance() {
   internal::DropInstance(*this);
-  instance_.destroy(instance_.self);
+  internal::Destroy(instance_, name_, plugin_);
 }
 
 void ModelInstance::Refuse(const std::string& why) const {
@@ -276,7 +304,7 @@ void ModelInstance::ReadRoles() {
   }
   for (int i = 0; i < count; ++i) {
     const auto role = internal::ReadEntry(description_.roles, description_.role_stride, i);
-    spaces_.push_back(ReadSpace(role, "role '" + Text(role.name) + "'"));
+    spaces_.push_back(ReadSpace(role, "role '" + ShownText(role.name) + "'"));
     if (role.owned != nullptr) {
       ReadOwned(ReadPrefix(role.owned), spaces_.back(), static_cast<std::size_t>(i));
     }
@@ -337,7 +365,16 @@ Space ModelInstance::ReadSpace(const AlidadeSpace& space, const std::string& wha
 }
 
 std::string ModelInstance::error_text() const {
-  return instance_.error_text == nullptr ? "" : Text(instance_.error_text(instance_.self));
+  if (internal::NameOfCall(*this, thrown.slot) != nullptr) return thrown.text;
+  if (instance_.error_text == nullptr) return "";
+  std::string text;
+  const std::string failure = internal::ThrownBy([&] {
+    const internal::NamedCall call("error_text", "model", name_, plugin_);
+    text = ShownText(instance_.error_text(instance_.self));
+  });
+  return failure.empty()
+             ? text
+             : "error_text of model '" + name_ + "' of plugin " + plugin_ + " threw: " + failure;
 }
 
 SensorModel::SensorModel(std::shared_ptr<const ModelInstance> instance)
@@ -366,7 +403,8 @@ Status SensorModel::LineariseKnowing(const double* const* roles, double* z,
                                      const double* known) const {
   ALIDADE_EXPECTS(known != nullptr);
   const AlidadeObservation seen = detail::Seen(nullptr, known);
-  return detail::ToStatus(sensor_->eval(self_, &seen, roles, z, jacobians, strides));
+  return detail::CallModel(
+      &sensor_->eval, [&] { return sensor_->eval(self_, &seen, roles, z, jacobians, strides); });
 }
 
 Status SensorModel::Initialise(const double* const* roles, const double* z, const double* prior,
@@ -374,10 +412,10 @@ Status SensorModel::Initialise(const double* const* roles, const double* z, cons
                                const double* known) const {
   ALIDADE_EXPECTS(initialised_role_ >= 0);
   const AlidadeObservation seen = detail::Seen(z, known);
-  detail::NoteCall(&sensor_->initialise);
-  return detail::ToStatus(sensor_->initialise(self_, &seen, roles, prior, y, jx,
-                                              instance_->tangents().data(), jz,
-                                              measurement().geometry.tangent, jp, prior_size_));
+  return detail::CallModel(&sensor_->initialise, [&] {
+    return sensor_->initialise(self_, &seen, roles, prior, y, jx, instance_->tangents().data(), jz,
+                               measurement().geometry.tangent, jp, prior_size_);
+  });
 }
 
 MotionModel::MotionModel(std::shared_ptr<const ModelInstance> instance)

@@ -15,9 +15,23 @@
 namespace alidade {
 
 namespace detail {
-/// What a plugin returned; a code that the ABI does not have is a failure of the plugin.
-inline Status ToStatus(std::int32_t code) {
-  return code < ALIDADE_OK || code > ALIDADE_ERROR ? Status::kError : static_cast<Status>(code);
+/// The plugin has returned ALIDADE_ERROR, or a code that the ABI does not have: kError.
+[[gnu::cold]] Status Failed() noexcept;
+/// It has thrown, in a call of that slot: kError. What it threw, which is in flight, becomes the
+/// error text of its instance in this thread.
+[[gnu::cold]] Status Thrown(const void* slot) noexcept;
+
+/// The status of `call`, of a model's function in `slot` of its call table.
+template <class Call>
+Status CallModel(const void* slot, const Call& call) {
+  NoteCall(slot);
+  try {
+    const std::int32_t code = call();
+    const bool known = code >= ALIDADE_OK && code < ALIDADE_ERROR;
+    return known ? static_cast<Status>(code) : Failed();
+  } catch (...) {
+    return Thrown(slot);
+  }
 }
 /// A measurement as its sensor is shown it, with the known numbers of a sensor that takes any;
 /// null: a prediction alone is asked for.
@@ -73,6 +87,7 @@ class ModelInstance {
   const Space& known() const { return known_; }
   bool has_input() const { return description_.input_count > 0; }
   unsigned capabilities() const { return capabilities_; }
+  /// Of its last call in this thread that gave kError.
   std::string error_text() const;
 
  private:
@@ -125,9 +140,10 @@ class SensorModel {
   /// z and jacobians[i] = dz/d role_i, row stride strides[i]; a null jacobian is skipped.
   Status Linearise(const double* const* roles, double* z, double* const* jacobians,
                    const int* strides, const double* known = nullptr) const {
-    detail::NoteCall(&sensor_->eval);
     if (known_size_ > 0) return LineariseKnowing(roles, z, jacobians, strides, known);
-    return detail::ToStatus(sensor_->eval(self_, &detail::kUnseen, roles, z, jacobians, strides));
+    return detail::CallModel(&sensor_->eval, [&] {
+      return sensor_->eval(self_, &detail::kUnseen, roles, z, jacobians, strides);
+    });
   }
   /// l, row-major m x m, with R = l l'.
   Status SqrtNoise(const double* const* roles, const double* z, double* l,
@@ -136,17 +152,16 @@ class SensorModel {
   }
   /// The same of a measurement as it is shown to the plugin, which takes as long to make as a call.
   Status SqrtNoise(const double* const* roles, const AlidadeObservation& seen, double* l) const {
-    detail::NoteCall(&sensor_->sqrt_noise);
-    return detail::ToStatus(
-        sensor_->sqrt_noise(self_, &seen, roles, l, measurement().geometry.tangent));
+    return detail::CallModel(&sensor_->sqrt_noise, [&] {
+      return sensor_->sqrt_noise(self_, &seen, roles, l, measurement().geometry.tangent);
+    });
   }
   Status Valid(const double* z, const double* known = nullptr) const {
     return Valid(detail::Seen(z, known));
   }
   Status Valid(const AlidadeObservation& seen) const {
     if (sensor_->valid == nullptr) return Status::kOk;
-    detail::NoteCall(&sensor_->valid);
-    return detail::ToStatus(sensor_->valid(self_, &seen));
+    return detail::CallModel(&sensor_->valid, [&] { return sensor_->valid(self_, &seen); });
   }
   /// y = g(other roles, z), dense row-major Jacobians jx[i] = dy/d role_i and jz = dy/dz. kInvalid
   /// where a prior is needed.
@@ -195,15 +210,16 @@ class MotionModel {
   /// be null.
   Status Step(const double* const* blocks, const double* input, const double* w, double dt_s,
               double* const* next, double* f, double* g) const {
-    detail::NoteCall(&motion_->step);
-    return detail::ToStatus(motion_->step(self_, blocks, &input,
-                                          w != nullptr ? w : zero_noise_.data(), dt_s, next, f,
-                                          tangent_size_, g, noise_size_, nullptr, 0));
+    return detail::CallModel(&motion_->step, [&] {
+      return motion_->step(self_, blocks, &input, w != nullptr ? w : zero_noise_.data(), dt_s, next,
+                           f, tangent_size_, g, noise_size_, nullptr, 0);
+    });
   }
   /// l, row-major n_w x n_w, with Qw = l l'.
   Status SqrtQ(const double* const* blocks, const double* input, double dt_s, double* l) const {
-    detail::NoteCall(&motion_->sqrt_q);
-    return detail::ToStatus(motion_->sqrt_q(self_, blocks, &input, dt_s, l, noise_size_));
+    return detail::CallModel(&motion_->sqrt_q, [&] {
+      return motion_->sqrt_q(self_, blocks, &input, dt_s, l, noise_size_);
+    });
   }
   std::string error_text() const { return instance_->error_text(); }
 

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <limits>
 #include <new>
+#include <string_view>
 #include <tuple>
 #include <utility>
 
@@ -18,6 +19,7 @@ namespace alidade::internal {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kExact = 9007199254740992.0;  // up to here a double has all integers
 
 std::string RangeText(const AlidadeParam& param) {
   const bool low_open = (param.flags & ALIDADE_PARAM_LOW_OPEN) != 0;
@@ -97,10 +99,18 @@ bool GoodFallback(const AlidadeParam& param) {
   if (param.fallback == nullptr) return false;
   return std::all_of(param.fallback, param.fallback + param.count, [&](double value) {
     if (param.kind == ALIDADE_PARAM_CHOICE) return value >= 0.0 && value < param.choice_count;
-    if (param.kind == ALIDADE_PARAM_INTEGER && value != std::trunc(value)) return false;
+    const bool whole = value == std::trunc(value) && std::abs(value) <= kExact;
+    if (param.kind == ALIDADE_PARAM_INTEGER && !whole) return false;
     const bool none = value == kInfinity && (param.flags & ALIDADE_PARAM_OR_NONE) != 0;
     return none || (value >= param.low && value <= param.high);
   });
+}
+
+/// A name, or several with a dot between them.
+bool GoodKey(const char* key) {
+  if (!GoodName(key)) return false;
+  const std::string_view text = key;
+  return text.front() != '.' && text.back() != '.' && text.find("..") == text.npos;
 }
 
 /// What breaks the rules of plugin_abi.h in a parameter, or "".
@@ -108,7 +118,7 @@ std::string ParamDefect(const AlidadeParam& param) {
   constexpr std::uint32_t kFlags = ALIDADE_PARAM_HAS_DEFAULT | ALIDADE_PARAM_LOW_OPEN |
                                    ALIDADE_PARAM_HIGH_OPEN | ALIDADE_PARAM_OR_NONE;
   const bool choice = param.kind == ALIDADE_PARAM_CHOICE;
-  if (!GoodName(param.key)) return "its key is no name";
+  if (!GoodKey(param.key)) return "its key is no name";
   if (param.kind == ALIDADE_PARAM_FILE) return "it is a file";
   if (param.kind < ALIDADE_PARAM_NUMBER || param.kind > ALIDADE_PARAM_TEXT) {
     return "its kind is " + std::to_string(param.kind);
@@ -120,7 +130,8 @@ std::string ParamDefect(const AlidadeParam& param) {
     const std::string defect = TextDefect(text);
     if (!defect.empty()) return "its unit or doc " + defect;
   }
-  if (choice != (param.choices != nullptr && param.choice_count > 0) ||
+  const bool has_choices = param.choices != nullptr && param.choice_count > 0;
+  if (choice != has_choices || (!choice && param.choice_count != 0) ||
       param.choice_count > ALIDADE_MAX_CHOICES) {
     return "it has " + std::to_string(param.choice_count) + " choices";
   }
@@ -192,7 +203,6 @@ double NumberOrNone(const AlidadeParam& param, const Node& node, bool low_open, 
 double One(const AlidadeParam& param, const Node& node) {
   const bool low_open = (param.flags & ALIDADE_PARAM_LOW_OPEN) != 0;
   const bool high_open = (param.flags & ALIDADE_PARAM_HIGH_OPEN) != 0;
-  constexpr double kExact = 9007199254740992.0;
   switch (param.kind) {
     case ALIDADE_PARAM_INTEGER:
       return static_cast<double>(
@@ -296,7 +306,7 @@ void ParamReader::Fail(void* context, const char* key, const char* text) noexcep
   if (reader == nullptr) return;
   if (Text(text) == std::bad_alloc().what()) throw std::bad_alloc();  // on the other side
   if (Text(key).empty()) {
-    reader->failure_ = Text(text).empty() ? "it does not say why" : Text(text);
+    reader->failure_ = Text(text).empty() ? "it does not say why" : ShownText(text);
     return;
   }
   const Node base = reader->BaseOf(Text(key));
@@ -309,7 +319,8 @@ void ParamReader::Fail(void* context, const char* key, const char* text) noexcep
     if (at) place = at->place();
     rest.erase(0, dot == std::string::npos ? dot : dot + 1);
   }
-  reader->errors_.push_back(ErrorLine(place, PathBelow(base.path(), key), Text(text)));
+  reader->errors_.push_back(
+      ErrorLine(place, PathBelow(base.path(), ShownText(key)), ShownText(text)));
 } catch (...) {
   LentHost::ReaderOf<ParamReader>(context)->thrown_ = std::current_exception();
 }

@@ -46,7 +46,7 @@ std::set<std::filesystem::path> TryTogether(const std::set<std::filesystem::path
 /// `tried`, opens it and walks its table. `canonical` is `file` behind its links. Errors: kPlugin,
 /// kNotTrusted.
 OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical,
-                        bool tried);
+                        bool tried = false);
 
 /// A C++ plugin that is loaded only when it is needed.
 struct PluginOnDemand {

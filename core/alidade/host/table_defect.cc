@@ -26,7 +26,7 @@ std::string EntryDefect(const AlidadeEntry& entry, std::uint32_t stride) {
     if (!defect.empty()) return std::string("has a ") + what + " that " + defect;
   }
   if (!IsKnown(entry)) return {};
-  const std::string unknown = UnknownBits(entry.flags, 0);
+  const std::string unknown = UnknownBits(entry.flags | entry.thread_flags, 0);
   if (!unknown.empty()) return "has flags that this version does not know: " + unknown;
   if (!AllZero(entry.reserved)) return "uses reserved members";
   if (entry.create == nullptr) return "cannot be created";

@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 #include "alidade/base/follow_links.h"
+#include "alidade/host/needed_libraries.h"
 #include "alidade/host/plugin_host.h"
 
 namespace alidade {
@@ -17,7 +19,14 @@ namespace {
 
 class TrustCheck {
  public:
-  explicit TrustCheck(const fs::path& file) : file_(file) {
+  /// Of `file`. A library that a plugin needs is `subject`'s, as `because` says, and may not be
+  /// there: then nobody else may put it there.
+  explicit TrustCheck(const fs::path& file) : TrustCheck(file, file, "", false) {}
+  TrustCheck(const fs::path& file, fs::path subject, std::string because, bool may_lack)
+      : file_(file),
+        subject_(std::move(subject)),
+        because_(std::move(because)),
+        may_lack_(may_lack) {
     owners_ = {0, geteuid()};
     struct stat program;
     if (stat("/proc/self/exe", &program) == 0) owners_.push_back(program.st_uid);
@@ -25,11 +34,16 @@ class TrustCheck {
 
   /// Walks from / to the file, checking each folder, link and at last the file itself.
   void Run() {
-    const auto visit = [this](const fs::path& folder, const fs::path& entry, bool last) {
-      CheckFolder(folder, last);
-      CheckOwner(entry, Status(entry));
+    bool lacks = false;
+    const auto visit = [&](const fs::path& folder, const fs::path& entry, bool last) {
+      if (lacks) return;
+      std::error_code error;
+      lacks = may_lack_ && !fs::exists(fs::symlink_status(entry, error));
+      CheckFolder(folder, last || lacks);
+      if (!lacks) CheckOwner(entry, Status(entry));
     };
     const fs::path end = internal::FollowLinks(file_, visit);
+    if (lacks) return;
     if (end.empty()) {
       Fail(file_, "behind a symbolic link that cannot be read, or more than 40 of them");
     }
@@ -38,9 +52,9 @@ class TrustCheck {
 
  private:
   [[noreturn]] void Fail(const fs::path& where, const std::string& why) const {
-    const std::string what = where == file_ ? "it is " : "'" + where.string() + "' is ";
+    const std::string what = where == subject_ ? "it is " : "'" + where.string() + "' is ";
     throw Error(ExitCode::kNotTrusted,
-                ErrorLine({file_.string()}, {}, "not trusted: " + what + why));
+                ErrorLine({subject_.string()}, {}, "not trusted: " + because_ + what + why));
   }
   struct stat Status(const fs::path& path) const {
     struct stat status;
@@ -73,11 +87,29 @@ class TrustCheck {
     CheckMode(folder, status, !holds_the_file);
   }
 
-  fs::path file_;
+  fs::path file_, subject_;
+  std::string because_;
+  bool may_lack_;
   std::vector<uid_t> owners_;
 };
 
 }  // namespace
+
+void internal::CheckTrustedNeed(const fs::path& plugin, const std::string& name,
+                                const fs::path& place) {
+  const std::string because = "it needs the library '" + name + "', and ";
+  if (!place.is_absolute()) {
+    // CMake ends the RUNPATH of a build tree with a colon: the current folder, mostly for nothing.
+    std::error_code error;
+    if (!fs::exists(place, error)) return;
+    throw Error(ExitCode::kNotTrusted,
+                ErrorLine({plugin.string()}, {},
+                          "not trusted: " + because + "takes it from the current folder, '" +
+                              place.string() + "'",
+                          "an absolute path or $ORIGIN in its RUNPATH"));
+  }
+  TrustCheck(place, plugin, because, true).Run();
+}
 
 void CheckTrusted(const fs::path& file) {
   if (!file.is_absolute()) {

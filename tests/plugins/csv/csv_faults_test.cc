@@ -18,6 +18,14 @@ TEST_F(Csv, WrongNumberOfColumns) {
                 "FILE:2:9: 5 columns; expected 4 columns, as in line 1");
 }
 
+TEST_F(Csv, BytesThatAreNoText) {
+  const std::string expected =
+      "FILE:1:1: bytes that are no text; expected a table; a compressed one by a pipe: zcat FILE | "
+      "alidade run CONFIG --set source.path=-";
+  ExpectBadData("\x1F\x8B\x08\x01,t_s\n", expected);
+  ExpectBadData(std::string("t\0_\0s\0\n", 7), expected);
+}
+
 // FAULTS 34
 TEST_F(Csv, TruncatedLastLine) {
   ExpectBadData(

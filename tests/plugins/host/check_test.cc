@@ -76,8 +76,10 @@ INSTANTIATE_TEST_SUITE_P(
     Models, OneFault,
     ::testing::Values(
         Fault{58, "throws_in_create", "create", {"failed while being created: the dog ate it"}},
+        Fault{66, "crashes_in_create", "create", {"create crashed (signal 11"}},
+        Fault{66, "wild_description", "create", {"create crashed (signal 11"}},
         Fault{58, "throws_in_noise", "calls", {"SqrtNoise at x = ", "failed: the dog ate it"}},
-        Fault{58, "throws_in_destroy", "create", {"destroy crashed", "threw never let go"}},
+        Fault{58, "throws_in_destroy", "create", {"Destroy of model", "threw: never let go"}},
         Fault{59, "throws_int", "calls", {"Predict at", "an exception of unknown type"}},
         Fault{60, "unwritten", "outputs", {"Predict at", "z.second is not written"}},
         Fault{60, "nan_output", "outputs", {"Predict at x = 0, y = ", "z.second is nan"}},

@@ -170,8 +170,9 @@ TEST_F(HostTest, SegmentsThatTheLoaderWouldTrustAreRefused) {
       // The range of addresses wraps: the loader maps over what lies behind.
       {"overlap, or do not fit", PT_LOAD, [](Elf64_Phdr& s) { s.p_memsz = ~Elf64_Xword{0}; }},
       {"overlap, or do not fit", PT_LOAD, [](Elf64_Phdr& s) { s.p_vaddr = Elf64_Addr{1} << 47; }},
-      {"overlap, or do not fit", PT_LOAD, [](Elf64_Phdr& s) { s.p_memsz = 1 << 24; }},
+      {"is not all in the file", PT_LOAD, [](Elf64_Phdr& s) { s.p_memsz = 1 << 24; }},
       {"larger in the file than in memory", PT_LOAD, [](Elf64_Phdr& s) { s.p_memsz = 1; }},
+      {"is not all in the file", PT_LOAD, [](Elf64_Phdr& s) { s.p_filesz -= 8; }},
       {"not aligned", PT_LOAD, [](Elf64_Phdr& s) { s.p_align = 3000; }},
       {"not aligned", PT_LOAD, [](Elf64_Phdr& s) { s.p_vaddr += 8; }},
       {"lies outside", PT_DYNAMIC, [](Elf64_Phdr& s) { s.p_vaddr += 1 << 20; }},
@@ -185,6 +186,43 @@ TEST_F(HostTest, SegmentsThatTheLoaderWouldTrustAreRefused) {
   for (const Damage& damage : cases) {
     const fs::path file = Copy("good", "segment" + std::to_string(number++) + ".so");
     DamageSegment(file, damage.type, damage.change);
+    ExpectRefused(file, {"malformed", damage.words});
+  }
+}
+
+/// Moves what the first entry of that tag in the table for the dynamic loader leads to.
+void MoveEntry(const fs::path& file, Elf64_Sxword tag, Elf64_Xword by) {
+  Elf64_Phdr dynamic{};
+  DamageSegment(file, PT_DYNAMIC, [&](const Elf64_Phdr& segment) { dynamic = segment; });
+  std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
+  for (Elf64_Xword i = 0; i < dynamic.p_filesz; i += sizeof(Elf64_Dyn)) {
+    const auto at = static_cast<std::streamoff>(dynamic.p_offset + i);
+    Elf64_Dyn entry;
+    stream.seekg(at);
+    stream.read(reinterpret_cast<char*>(&entry), sizeof(entry));
+    if (entry.d_tag != tag) continue;
+    entry.d_un.d_val += by;
+    stream.seekp(at);
+    stream.write(reinterpret_cast<const char*>(&entry), sizeof(entry));
+    return;
+  }
+  ADD_FAILURE() << "no entry " << tag;
+}
+
+TEST_F(HostTest, FunctionsThatTheLoaderWouldCallAreWhereTheyShouldBe) {
+  struct Damage {
+    const char* words;
+    Elf64_Sxword tag;
+    Elf64_Xword by;
+  };
+  // Those of the end run when the host ends, far from what a trial finds.
+  const Damage cases[] = {{"list of functions holds what is none", DT_FINI_ARRAY, 4},
+                          {"list of functions holds what is none", DT_INIT_ARRAY, 4},
+                          {"a function does not begin its section", DT_FINI, 1},
+                          {"a function does not begin its section", DT_INIT, 1}};
+  for (const Damage& damage : cases) {
+    const fs::path file = Copy("good", "entry" + std::to_string(damage.tag) + ".so");
+    MoveEntry(file, damage.tag, damage.by);
     ExpectRefused(file, {"malformed", damage.words});
   }
 }
@@ -249,6 +287,7 @@ TEST_F(HostTest, ABadTableIsRefused) {
       {"NAME_TWICE", "names 'probe' twice"},
       {"NO_ENTRY_SYMBOL", "does not export alidade_plugin"},
       {"UNKNOWN_FLAGS", "entry 1 of its table has flags that this version does not know: 0x100000"},
+      {"UNKNOWN_THREAD_FLAGS", "entry 1 of its table has flags that this version does not know"},
       {"RESERVED", "its table uses reserved members"},
       {"CONTROL_CHARACTER", "entry 1 of its table has a doc that has a control character"},
       {"WILD_TEXT", "crashed (signal 11"},
@@ -342,6 +381,13 @@ TEST_F(HostTest, ParametersThatDoNotFitTogetherAreABadConfig) {
               [&] { host.CreateSensor("misfit", unlucky.root()); });
 }
 
+TEST_F(HostTest, WhatAModelSaysIsOneLineOfUtf8) {
+  const PluginHost host({Built("bad_create")});
+  const Config config = Parse("model: forges");
+  ExpectError(ExitCode::kBadConfig, {"forged?error: key: one?error: two ?[31m? \u03bb"},
+              [&] { host.CreateSensor("forges", config.root()); });
+}
+
 TEST_F(HostTest, AModelReadsTexts) {
   const PluginHost host({Built("bad_create")});
   const Config given = Parse("{model: titled, title: \"a 'b' \u03bb\", needed: x y}");
@@ -377,12 +423,15 @@ TEST_F(HostTest, AHostThatIsKeptAnswersNoMore) {
 
 TEST_F(HostTest, AParameterDeclaredAgainstTheRulesIsRefused) {
   const PluginHost host({Built("bad_create")});
-  const Config no_key = Parse("{model: no_key}");
-  ExpectError(ExitCode::kPlugin, {"model 'no_key' asks for parameter ''", "its key is no name"},
-              [&] { host.CreateSensor("no_key", no_key.root()); });
-  for (const char* name :
-       {"no_default", "no_number", "two_choices", "any_choices", "default_beyond", "later_flag",
-        "reserved_member", "empty_range", "many_choices", "half", "outside", "text_as_number"}) {
+  for (const char* name : {"no_key", "gap_in_key"}) {
+    const Config config = Parse("{}");
+    ExpectError(ExitCode::kPlugin,
+                {std::string("model '") + name + "' asks for parameter '", "its key is no name"},
+                [&] { host.CreateSensor(name, config.root()); });
+  }
+  for (const char* name : {"no_default", "no_number", "two_choices", "any_choices",
+                           "default_beyond", "later_flag", "reserved_member", "empty_range",
+                           "many_choices", "half", "huge", "outside", "text_as_number"}) {
     const Config config = Parse(std::string("{model: ") + name + '}');
     // A parameter in the config is read by the same declaration.
     const Config given = Parse(std::string("{model: ") + name + ", noise: [fixed, free]}");

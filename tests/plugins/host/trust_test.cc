@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include "host_fixture.h"
+#include "support/recording.h"
 
 namespace alidade {
 namespace {
@@ -12,7 +13,8 @@ namespace fs = std::filesystem;
 
 constexpr uid_t kStranger = 54321;
 
-/// Fault 70: what someone else could have written is not opened.
+/// What someone else could have written is not opened.
+// FAULTS 70
 class TrustTest : public HostTest {
  protected:
   static void Allow(const fs::path& path, fs::perms who) {
@@ -85,6 +87,66 @@ TEST_F(TrustTest, AForeignOwner) {
   fs::create_symlink(file, folder_ / "link.so");
   ASSERT_EQ(lchown((folder_ / "link.so").c_str(), kStranger, 0), 0);
   ExpectNotTrusted(folder_ / "link.so", "owned by user 54321");
+}
+
+/// A plugin whose RUNPATH is `:$ORIGIN/open/needed:$ORIGIN/needed`, and needs libneeded.so, which
+/// has `$ORIGIN/deep` and needs libdeep.so.
+class NeedsTest : public TrustTest {
+ protected:
+  NeedsTest() {
+    Copy("libneeded", "needed/libneeded.so");
+    Copy("libdeep", "needed/deep/libdeep.so");
+  }
+  /// In a process of its own, for what is loaded stays.
+  int Load() const {
+    return testing::InChild([&] {
+      const PluginHost host({file_});
+      const double x = 3.0;
+      const double* const roles[] = {&x};
+      double z = 0.0;
+      const Config config = Parse("model: probe");
+      const SensorModel sensor = host.CreateSensor("probe", config.root());
+      if (sensor.Predict(roles, &z) != Status::kOk || z != 6.0) throw ContractViolation("z");
+    });
+  }
+  const fs::path file_ = Copy("needs_library", "plugin.so");
+};
+
+TEST_F(NeedsTest, ALibraryThatNobodyElseCanWriteIsLoaded) { EXPECT_EQ(Load(), 0); }
+
+TEST_F(NeedsTest, ALibraryThatOthersCanWrite) {
+  Allow(folder_ / "needed/libneeded.so", fs::perms::others_write);
+  ExpectNotTrusted(file_, "it needs the library 'libneeded.so', and '" +
+                              (folder_ / "needed/libneeded.so").string() +
+                              "' is writable for everyone");
+}
+
+TEST_F(NeedsTest, AFolderOfALibraryThatOthersCanWrite) {
+  Allow(folder_ / "needed", fs::perms::group_write);
+  ExpectNotTrusted(file_, "it needs the library 'libneeded.so', and '" +
+                              (folder_ / "needed").string() + "' is writable for its group");
+}
+
+TEST_F(NeedsTest, WhatALibraryNeedsInTurn) {
+  Allow(folder_ / "needed/deep", fs::perms::others_write);
+  ExpectNotTrusted(file_, "it needs the library 'libdeep.so', and '" +
+                              (folder_ / "needed/deep").string() + "' is writable for everyone");
+}
+
+TEST_F(NeedsTest, APlaceThatIsSearchedEarlierAndWhereOthersCanPutOne) {
+  fs::create_directory(folder_ / "open");
+  EXPECT_EQ(Load(), 0) << "nobody else can";
+  Allow(folder_ / "open", fs::perms::others_write | fs::perms::sticky_bit);
+  ExpectNotTrusted(file_, "it needs the library 'libneeded.so', and '" +
+                              (folder_ / "open").string() + "' is writable for everyone");
+}
+
+TEST_F(NeedsTest, ALibraryInTheCurrentFolder) {
+  const fs::path before = fs::current_path();
+  fs::current_path(folder_ / "needed");
+  ExpectNotTrusted(file_,
+                   "it needs the library 'libneeded.so', and takes it from the current folder");
+  fs::current_path(before);
 }
 
 TEST_F(TrustTest, InADefaultPlaceItIsToldWhenItsModelIsMissed) {

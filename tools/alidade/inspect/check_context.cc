@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "alidade/base/log.h"
+
 namespace alidade::internal {
 namespace {
 
@@ -53,8 +55,14 @@ std::unique_ptr<ModelUnderTest> Context::Create() const {
 
 void Context::Destroy(std::unique_ptr<ModelUnderTest> model) const {
   journal_.Enter("destroy");
-  model.reset();
+  std::string thrown;  // of which the host warns alone
+  {
+    const auto take = [&](LogLevel, std::string_view text) { thrown = text; };
+    const LogSubscription warnings(LogLevel::kWarning, take);
+    model.reset();
+  }
   journal_.Enter("");
+  if (!thrown.empty()) throw Error(ExitCode::kPlugin, thrown);
 }
 
 void Context::Close() { Destroy(std::move(model_)); }

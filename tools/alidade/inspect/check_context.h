@@ -35,7 +35,7 @@ class Context {
   void RejectUnread() const { parameters_.RejectUnread(); }
   /// Another instance with the same parameters.
   std::unique_ptr<ModelUnderTest> Create() const;
-  /// Destroys `model`, which is written down as a call.
+  /// Destroys `model`, which is written down as a call. Error: kPlugin where that throws.
   void Destroy(std::unique_ptr<ModelUnderTest> model) const;
   /// The inputs of `f` at a state.
   static Values Inputs(const Function& f, const CheckedState& state);

@@ -160,7 +160,12 @@ ExitCode RunEval(const EvalArguments& arguments) {
     }
   }
   MakeUnique(evaluations);
-  Print(Text(evaluations, arguments.form));
+  std::exception_ptr unprinted;
+  try {
+    Print(Text(evaluations, arguments.form));
+  } catch (const Error&) {
+    unprinted = std::current_exception();  // the files below are written all the same
+  }
   // First those that there may be none of.
   if (!arguments.save_relative.empty()) {
     SaveEvoResult(evaluations.front(), SavedErrors::kRelative, arguments.save_relative,
@@ -170,6 +175,7 @@ ExitCode RunEval(const EvalArguments& arguments) {
     SaveEvoResult(evaluations.front(), SavedErrors::kAbsolute, arguments.save_absolute,
                   arguments.force);
   }
+  if (unprinted) std::rethrow_exception(unprinted);
   return code;
 }
 

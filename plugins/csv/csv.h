@@ -149,6 +149,12 @@ class CsvSource : public Source {
     if (!NextRow())
       Fail(Place{reader_.name()}, {}, "no header line", "a line that names the columns");
     header_line_ = last_line_ = reader_.number();
+    constexpr std::string_view kGzip = "\x1F\x8B";
+    if (line_.starts_with(kGzip) || line_.find('\0') != line_.npos) {
+      Fail(Place{reader_.name(), header_line_, 1}, {}, "bytes that are no text",
+           "a table; a compressed one by a pipe: zcat FILE | alidade run CONFIG --set "
+           "source.path=-");
+    }
     Split();
     std::vector<std::string> names;
     for (const std::string_view cell : cells_) names.emplace_back(cell::Trim(cell));

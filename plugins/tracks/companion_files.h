@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
-#include <cmath>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -149,13 +150,19 @@ class TumRows {
   /// The pose nearest to `timestamp`, of two as near the earlier, where it is within `tolerance`.
   /// Timestamps are asked for in order.
   std::optional<Pose> At(Timestamp timestamp, Timestamp tolerance) {
-    const auto off = [timestamp](Timestamp other) { return std::abs(other - timestamp); };
+    // Two timestamps may be further apart than one can be.
+    const auto off = [timestamp](Timestamp other) {
+      const auto [least, most] = std::minmax(timestamp, other);
+      return static_cast<std::uint64_t>(most) - static_cast<std::uint64_t>(least);
+    };
     while (has_next_ && (!nearest_ || off(timestamp_) < off(nearest_timestamp_))) {
       nearest_ = pose_;
       nearest_timestamp_ = timestamp_;
       Advance();
     }
-    return nearest_ && off(nearest_timestamp_) <= tolerance ? nearest_ : std::nullopt;
+    return nearest_ && off(nearest_timestamp_) <= static_cast<std::uint64_t>(tolerance)
+               ? nearest_
+               : std::nullopt;
   }
 
  private:

@@ -50,5 +50,48 @@ TEST_P(ConfigFault, GetsItsCodePlaceAndWords) {
 INSTANTIATE_TEST_SUITE_P(Files, ConfigFault, ::testing::ValuesIn(ConfigsWithAFault()),
                          [](const auto& file) { return "_" + file.param; });
 
+class ConfigText : public ProgramTest {
+ protected:
+  Outcome RunText(const std::string& text) const {
+    Write("text.yaml", text);
+    return Call({"run", "text.yaml", "-o", "out", "--no-figures", "--force"});
+  }
+};
+
+// FAULTS 15
+TEST_F(ConfigText, LargerThanOneMebibyteIsRefused) {
+  constexpr std::size_t kLimit = 1 << 20;
+  const std::string padded = kDepthConfig + '#' + std::string(kLimit, 'x');
+  EXPECT_EQ(RunText(padded.substr(0, kLimit)).code, 0);
+  const Outcome large = RunText(padded.substr(0, kLimit + 1));
+  EXPECT_EQ(large.code, 78);
+  EXPECT_EQ(large.err, "error: text.yaml: larger than 1 MiB; expected a config of at most 1 MiB\n");
+}
+
+// FAULTS 18
+TEST_F(ConfigText, ByteOrderMarkAndCarriageReturnsMakeNoDifference) {
+  ASSERT_EQ(RunText(kDepthConfig).code, 0);
+  const std::string estimates = Read("out/ekf/estimates.csv");
+  std::string text = "\xEF\xBB\xBF";
+  for (const char c : kDepthConfig) text += c == '\n' ? "\r\n" : std::string(1, c);
+  const Outcome outcome = RunText(text);
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(Read("out/ekf/estimates.csv"), estimates);
+}
+
+// FAULTS 22
+TEST_F(ConfigText, AFolderAndAMissingFileAreInputMissing) {
+  const auto expect = [&](const std::string& config, const std::string& reason) {
+    const Outcome outcome = Call({"run", config, "-o", "out"});
+    EXPECT_EQ(outcome.code, 66);
+    EXPECT_EQ(outcome.err, "error: " + config + ": cannot be read: " + reason + '\n');
+  };
+  fs::create_directory(folder_ / "folder.yaml");
+  fs::create_symlink("nothing", folder_ / "link.yaml");
+  expect("folder.yaml", "it is a directory");
+  expect("missing.yaml", "No such file or directory");
+  expect("link.yaml", "No such file or directory");
+}
+
 }  // namespace
 }  // namespace alidade::testing

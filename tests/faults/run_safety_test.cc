@@ -56,6 +56,44 @@ class RunSafety : public ProgramTest {
   std::string Estimates(const std::string& run) const { return Read(run + "/ekf/estimates.csv"); }
 };
 
+// 66
+TEST_F(RunSafety, ACrashKeepsTheRowsThatAreFinished) {
+  if (kSanitized) GTEST_SKIP() << "a sanitizer ends such a process in its own way";
+  Write("crash.yaml", "alidade: 1\nplugins: [" ALIDADE_BINARY_DIR R"(/tests/faults/ratio.so]
+state:
+  s: {model: constant, size: 1, noise: {random_walk: 1}, initial: {value: {mean: 1, sigma: 1}}}
+sensors: {far: {model: crashes_far_away, stream: z, roles: {x: s.value}}}
+source: {type: csv, path: rows.csv, streams: {z: z}}
+estimators: {ekf: {type: ekf, gate: none}}
+)");
+  ASSERT_EQ(::mkfifo((folder_ / "rows.csv").c_str(), 0600), 0);
+  const int pipe = ::open((folder_ / "rows.csv").c_str(), O_RDWR | O_CLOEXEC);
+  const auto feed = [&](const std::string& rows) {
+    ASSERT_EQ(::write(pipe, rows.data(), rows.size()), std::ssize(rows));
+  };
+  feed("t_s,z\n0,1\n");
+  const pid_t run = Start({"run", "crash.yaml", "--no-figures", "-o", "out"});
+  const std::string process = std::to_string(run);
+  // Rows are written once a second. One for each look, so that none is the last of its second.
+  int row = 0;
+  const std::string rows = ".out.partial-" + process + "/ekf/estimates.csv";
+  ASSERT_TRUE(Eventually([&] {
+    feed(std::to_string(++row) + ",1\n");
+    return Contains(Read(rows), "\n3.000000000,");
+  }));
+  feed(std::to_string(row + 1) + ",1000\n" + std::to_string(row + 2) + ",1000\n");
+  const Outcome outcome = Wait(run);
+  ::close(pipe);
+  EXPECT_EQ(outcome.signal, SIGSEGV) << outcome.err;
+  EXPECT_TRUE(Contains(outcome.err, "Predict of model 'crashes_far_away'")) << outcome.err;
+  EXPECT_FALSE(Exists("out"));
+  // The next run to the same place gives them a name that can be seen.
+  EXPECT_EQ(Call({"run", "config.yaml", "-o", "out", "--no-figures"}).code, 0);
+  const std::string kept = Read("out.failed-" + process + "/ekf/estimates.csv");
+  EXPECT_TRUE(Contains(kept, "\n3.000000000,")) << kept;
+  EXPECT_EQ(kept.back(), '\n');
+}
+
 // 88
 TEST_F(RunSafety, EveryLimitOnTheSizeOfFilesIsAnErrorWithThePath) {
   ASSERT_EQ(Call({"run", "config.yaml", "-o", "whole", "--no-figures"}).code, 0);

@@ -10,7 +10,8 @@
 
 namespace alidade::internal {
 
-std::string ReadFile(const std::filesystem::path& file, const ReadFailure& fail, std::size_t most) {
+std::string ReadFile(const std::filesystem::path& file, const ReadFailure& fail, std::size_t most,
+                     const ReadLook& look) {
   struct Opened {
     int descriptor;
     ~Opened() {
@@ -25,17 +26,19 @@ std::string ReadFile(const std::filesystem::path& file, const ReadFailure& fail,
   } else if (S_ISDIR(status.st_mode)) {
     error = EISDIR;
   }
-  if (error == 0) return ReadDescriptor(opened.descriptor, fail, most);
+  if (error == 0) return ReadDescriptor(opened.descriptor, fail, most, look);
   fail(ExitCode::kInputMissing, error);
   return {};
 }
 
-std::string ReadDescriptor(int descriptor, const ReadFailure& fail, std::size_t most) {
+std::string ReadDescriptor(int descriptor, const ReadFailure& fail, std::size_t most,
+                           const ReadLook& look) {
   std::string bytes;
   for (char chunk[1 << 14]; bytes.size() < most;) {
     const ssize_t count = ::read(descriptor, chunk, std::min(sizeof chunk, most - bytes.size()));
     if (count < 0) fail(ExitCode::kIo, errno);
     if (count <= 0) break;
+    if (bytes.empty() && look) look({chunk, static_cast<std::size_t>(count)});
     bytes.append(chunk, static_cast<std::size_t>(count));
   }
   return bytes;

@@ -55,6 +55,11 @@ class TextCheck {
       Fail(std::string("control character 0x") + kHex[c >> 4] + kHex[c & 15]);
     }
     if (in_indent_ && c == '\t') Fail("tab in the indentation", "spaces");
+    if (column_ == 1) {
+      // yaml-cpp leaves such a line out.
+      if (c == '%' && begun_) Fail("'%' begins a line", "quotes around a text that begins so");
+      begun_ = begun_ || (c != '%' && c != '#' && c != ' ' && c != '\n');
+    }
     if (c != ' ') in_indent_ = false;
     if (c == '[' || c == '{') ++unclosed_;
     if (c == ']' || c == '}') unclosed_ = std::max(0, unclosed_ - 1);
@@ -75,6 +80,7 @@ class TextCheck {
   int column_ = 1;
   int unclosed_ = 0;
   bool in_indent_ = true;
+  bool begun_ = false;  ///< the document has, after which there are no directives
 };
 
 /// Checks size, encoding and indentation; gives the text without BOM and carriage returns.

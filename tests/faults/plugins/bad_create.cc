@@ -29,6 +29,12 @@ struct Titled : Probe {
     p.Fail("", (title + '|' + needed).c_str());  // for the test to see
   }
 };
+/// Would write an error of its own into the messages.
+struct Forges : Probe {
+  explicit Forges(alidade::Params& p) : Probe(p) {
+    p.Fail("forged\nerror: key", "one\nerror: two \033[31m\xff \u03bb");
+  }
+};
 /// Keeps what it is lent, against the rules, and tries it in its next creation.
 struct KeepsHost : Probe {
   explicit KeepsHost(alidade::Params& p) : Probe(p) {
@@ -49,7 +55,7 @@ void MakeWrongKind(alidade::Params& p, AlidadeInstance* instance) {
 }
 
 constexpr const char* kNames[] = {"fixed", "free"};
-constexpr double kBeyond = 7.0, kHalfValue = 0.5;
+constexpr double kBeyond = 7.0, kHalfValue = 0.5, kHugeValue = 1e300;
 
 constexpr AlidadeParam Declared(std::uint32_t kind, std::int32_t count, const double* fallback,
                                 std::uint32_t flags) {
@@ -74,6 +80,14 @@ constexpr AlidadeParam Spoiled(void (*spoil)(AlidadeParam&)) {
 constexpr AlidadeParam kLaterFlag = Spoiled([](AlidadeParam& p) { p.flags = 1u << 25; });
 constexpr AlidadeParam kReservedMember = Spoiled([](AlidadeParam& p) { p.reserved0 = 1; });
 constexpr AlidadeParam kNoKey = Spoiled([](AlidadeParam& p) { p.key = "no key"; });
+constexpr AlidadeParam kGap = Spoiled([](AlidadeParam& p) { p.key = "no..gap"; });
+constexpr AlidadeParam kHuge = Spoiled([](AlidadeParam& p) {
+  p.kind = ALIDADE_PARAM_INTEGER;
+  p.flags = ALIDADE_PARAM_HAS_DEFAULT;
+  p.low = -1e301;
+  p.high = 1e301;
+  p.fallback = &kHugeValue;
+});
 constexpr AlidadeParam kEmptyRange = Spoiled([](AlidadeParam& p) { p.low = 1.0; });
 constexpr AlidadeParam kManyChoices = Spoiled([](AlidadeParam& p) {
   p.kind = ALIDADE_PARAM_CHOICE;
@@ -125,7 +139,9 @@ ALIDADE_PLUGIN(ALIDADE_SENSOR(Throws, "throws", "", ""),
                Reading<kTwoChoices>("two_choices"), Reading<kAnyChoices>("any_choices"),
                Reading<kDefaultBeyond>("default_beyond"), Reading<kLaterFlag>("later_flag"),
                Reading<kReservedMember>("reserved_member"), Reading<kNoKey>("no_key"),
-               Reading<kEmptyRange>("empty_range"), Reading<kManyChoices>("many_choices"),
-               Reading<kHalf>("half"), Reading<kOutside>("outside"),
-               Reading<kTextAsNumber>("text_as_number"), ALIDADE_SENSOR(Titled, "titled", "", ""),
+               Reading<kGap>("gap_in_key"), Reading<kHuge>("huge"),
+               ALIDADE_SENSOR(Forges, "forges", "", ""), Reading<kEmptyRange>("empty_range"),
+               Reading<kManyChoices>("many_choices"), Reading<kHalf>("half"),
+               Reading<kOutside>("outside"), Reading<kTextAsNumber>("text_as_number"),
+               ALIDADE_SENSOR(Titled, "titled", "", ""),
                ALIDADE_SENSOR(KeepsHost, "keeps_host", "", ""))

@@ -243,6 +243,11 @@ struct Misbehaves : Right {
     for (std::vector<double*> all;;) all.push_back(new double[1 << 16]());
   }
 };
+struct CrashesInCreate : Right {
+  explicit CrashesInCreate(Params&) {
+    if (g_zero == 0.0) std::raise(SIGSEGV);
+  }
+};
 struct LosesItself : Right {
   explicit LosesItself(Params&) { static_cast<void>(!new std::string(500, 'x')); }
 };
@@ -335,6 +340,10 @@ std::int32_t PastTheLandmark(const void* self, const Seen* seen, const double* c
   y[2] = 0.0;
   return alidade::detail::SensorCalls<Landmark<0>>::Initialise(
       self, seen, x, prior, y, jx, jx_strides, jz, jz_stride, jp, jp_stride);
+}
+void MakeWildDescription(Params& p, AlidadeInstance* instance) {
+  alidade::EmplaceSensor<Right>(p, instance);
+  instance->description = reinterpret_cast<const AlidadeDescription*>(16);
 }
 void MakePastTheLandmark(Params& p, AlidadeInstance* instance) {
   static AlidadeSensor calls;
@@ -469,6 +478,8 @@ ALIDADE_PLUGIN(SENSOR(Right, "right"), SENSOR(MayHaveBias, "may_have_bias"),
                SENSOR(Misbehaves<7>, "leaks"), SENSOR(Misbehaves<8>, "changes_folder"),
                SENSOR(Misbehaves<9>, "leaks_files"), SENSOR(Misbehaves<10>, "prints"),
                SENSOR(Misbehaves<11>, "leaves_daemons"), SENSOR(LosesItself, "loses_itself"),
+               SENSOR(CrashesInCreate, "crashes_in_create"),
+               ALIDADE_SENSOR_BY(MakeWildDescription, "wild_description", "", ""),
                RAW(PastTheEnd, "past_the_end"), RAW(WritesItsInput, "writes_its_input"),
                RAW(IgnoresStrides, "ignores_strides"), RAW(WritesAndFails, "writes_and_fails"),
                RAW(StrangeStatus, "strange_status"), RAW(NowhereDefined, "nowhere_defined"),

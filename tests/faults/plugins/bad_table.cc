@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A table spoiled in the way that BAD_TABLE names.
+#include <stdexcept>
+
 #include "alidade/model/plugin.h"
 #include "probe.h"
 
@@ -18,6 +20,8 @@
 #define CONTROL_CHARACTER 13
 #define WILD_TEXT 14
 #define LATER_HINT 15
+#define THROWS 16
+#define UNKNOWN_THREAD_FLAGS 17
 
 ALIDADE_BUILD_TAG(ALIDADE_PLUGIN_C_ABI, "")
 
@@ -33,12 +37,14 @@ extern "C" __attribute__((visibility("default"))) const AlidadeTable* alidade_pl
   if (BAD_TABLE == NO_CREATE) entries[1].create = nullptr;
   if (BAD_TABLE == NAME_TWICE) entries[1].name = "probe";
   if (BAD_TABLE == UNKNOWN_FLAGS) entries[1].flags = 1u << 20;
+  if (BAD_TABLE == UNKNOWN_THREAD_FLAGS) entries[1].thread_flags |= 1u << 20;
   if (BAD_TABLE == LATER_HINT) table.flags = entries[1].flags = 1u << 3;
   if (BAD_TABLE == RESERVED) table.reserved[3] = &table;
   if (BAD_TABLE == CONTROL_CHARACTER) entries[1].doc = "red \033[31m";
   if (BAD_TABLE == WILD_TEXT) entries[1].citation = reinterpret_cast<const char*>(8);
   if (BAD_TABLE == UNKNOWN_KIND) entries[1].kind = 9;
   if (BAD_TABLE == EMPTY) table.entry_count = 0;
+  if (BAD_TABLE == THROWS) throw std::runtime_error("the dog ate it");
   return BAD_TABLE == NULL_TABLE ? nullptr : &table;
 }
 #endif

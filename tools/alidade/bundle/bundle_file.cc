@@ -13,6 +13,30 @@
 namespace alidade {
 namespace {
 
+[[noreturn]] void FailFormat(const std::string& name, const std::string& what,
+                             const std::string& expected) {
+  throw Error(ExitCode::kBadData, ErrorLine(Place{name, 1, 1}, {}, what, expected));
+}
+
+bool IsLibmv(std::string_view bytes) {
+  return bytes.size() > 1 && (bytes[0] == 'v' || bytes[0] == 'V') &&
+         (bytes[1] == 'P' || bytes[1] == 'N');
+}
+
+/// Refuses what is no text.
+void RefuseBytes(const std::string& name, std::string_view beginning) {
+  constexpr std::string_view kCompressed[] = {"\x1F\x8B", "BZh",
+                                              "\xFD"
+                                              "7zXZ",
+                                              "\x28\xB5\x2F\xFD"};
+  if (std::ranges::any_of(kCompressed, [&](auto magic) { return beginning.starts_with(magic); })) {
+    FailFormat(name, "compressed",
+               "the text: zcat, bzcat, xzcat or zstdcat FILE | alidade bundle -");
+  }
+  if (beginning.find('\0') != beginning.npos)
+    FailFormat(name, "bytes that are no text", "a problem of BAL, Bundler or libmv");
+}
+
 /// All of a file, of a pipe, or of standard input where it is `-`. Errors: kInputMissing, kIo for a
 /// read that fails, kStopped where a signal ends the wait for more.
 std::string ReadAll(const std::filesystem::path& file) {
@@ -26,13 +50,11 @@ std::string ReadAll(const std::filesystem::path& file) {
     const char* const expected = code == ExitCode::kInputMissing ? "a readable file" : "";
     throw Error(code, ErrorLine(place, {}, std::strerror(error), expected));
   };
-  return standard_input ? internal::ReadDescriptor(STDIN_FILENO, fail)
-                        : internal::ReadFile(file, fail);
-}
-
-[[noreturn]] void FailFormat(const std::string& name, const std::string& what,
-                             const std::string& expected) {
-  throw Error(ExitCode::kBadData, ErrorLine(Place{name, 1, 1}, {}, what, expected));
+  const auto look = [&](std::string_view beginning) {
+    if (!IsLibmv(beginning)) RefuseBytes(place.file, beginning);
+  };
+  return standard_input ? internal::ReadDescriptor(STDIN_FILENO, fail, std::string::npos, look)
+                        : internal::ReadFile(file, fail, std::string::npos, look);
 }
 
 }  // namespace
@@ -48,16 +70,7 @@ BundleFile ReadBundle(const std::filesystem::path& file) {
   const std::string_view view = text;
   if (view.find_first_not_of(" \t\r\n") == view.npos)
     FailFormat(name, "nothing in it", "a problem");
-  constexpr std::string_view kCompressed[] = {"\x1F\x8B", "BZh",
-                                              "\xFD"
-                                              "7zXZ",
-                                              "\x28\xB5\x2F\xFD"};
-  if (std::ranges::any_of(kCompressed, [&](auto magic) { return view.starts_with(magic); })) {
-    FailFormat(name, "compressed",
-               "the text: zcat, bzcat, xzcat or zstdcat FILE | alidade bundle -");
-  }
-  if (view.size() > 1 && (view[0] == 'v' || view[0] == 'V') && (view[1] == 'P' || view[1] == 'N'))
-    return internal::ReadLibmv(view, name);
+  if (IsLibmv(view)) return internal::ReadLibmv(view, name);
   if (view.starts_with(internal::kBundlerHeader)) return internal::ReadBundler(view, name);
   if (view.starts_with("# Bundle")) {
     FailFormat(name, '\'' + std::string(view.substr(0, view.find_first_of("\r\n"))) + '\'',

@@ -114,6 +114,7 @@ BundleFile ReadLibmv(std::string_view text, const std::string& name) {
   problem.sensor = "{model: self_calibrating_feature, lens: radtan, sigma_px: 1}";
   problem.intrinsics.assign(1, std::vector<double>(kLens));
   bytes.Numbers("intrinsics", kLens, problem.intrinsics[0].data());
+  if (!(problem.intrinsics[0][0] > 0.0)) bytes.Fail(2, "the focal length is not positive");
   std::map<std::int64_t, int> cameras, points;
   const int camera_count = bytes.Count("the number of cameras");
   for (int i = 0; i < camera_count; ++i) ReadCamera(bytes, file, cameras);

@@ -87,13 +87,20 @@ Pairs AllPairs(const std::vector<double>& progress, double delta, double toleran
   return pairs;
 }
 
-/// Every two poses that are turned against each other by delta.
+/// Every two poses that are turned against each other by delta. Error: kBadData if they are too
+/// many.
 Pairs AllAnglePairs(const Trajectory& t, double delta, double tolerance) {
+  constexpr std::size_t kMost = 10'000'000;  // there are n (n - 1) / 2 at rest
   Pairs pairs;
   for (int i = 0; i < t.size(); ++i) {
     for (int j = i + 1; j < t.size(); ++j) {
       const double angle = AngleOf(Orientation(t, i).conjugate() * Orientation(t, j));
       if (std::abs(angle - delta) <= tolerance) pairs.emplace_back(i, j);
+    }
+    if (pairs.size() > kMost) {
+      throw Error(ExitCode::kBadData, ErrorLine({t.name}, "--delta",
+                                                "more than 10000000 pairs of poses are apart by it",
+                                                "a larger --delta, or a smaller --delta-tol"));
     }
   }
   return pairs;

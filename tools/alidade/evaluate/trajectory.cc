@@ -108,6 +108,8 @@ class TrajectoryReader {
         break;
       case Format::kEuroc:
         trajectory_.timestamps.push_back(rows_.Index(0, "t"));
+        if (!(Seconds(trajectory_.timestamps.back()) < cell::kTimeLimit))
+          rows_.FailCell(0, "t", "is beyond 292 years", "ns, as EuRoC has them");
         AddPose({"x", "y", "z", "qw", "qx", "qy", "qz"});
         break;
       default:

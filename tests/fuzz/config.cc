@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A config, `key=value` as of --set, and overrides: what is read is read again from its ToYaml.
+#include "alidade/config/config.h"
+
+#include "fuzz.h"
+
+namespace alidade::fuzz {
+namespace {
+
+void ExpectSame(const Node& a, const Node& b) {
+  Require(a.kind() == b.kind(), "another kind");
+  Require(a.path() == b.path(), "another path");
+  if (a.kind() == Node::Kind::kScalar) {
+    Require(a.Text() == b.Text(), "another text");
+    double x = 0.0, y = 0.0;
+    const bool number = Accepts([&] { x = a.Number(); });
+    Require(number == Accepts([&] { y = b.Number(); }) && x == y, "another number");
+    Require(Accepts([&] { static_cast<void>(a.Flag()); }) ==
+                Accepts([&] { static_cast<void>(b.Flag()); }),
+            "another flag");
+  }
+  if (a.kind() == Node::Kind::kMap) {
+    const auto first = a.Entries(), second = b.Entries();
+    Require(first.size() == second.size(), "other keys");
+    for (std::size_t i = 0; i < first.size(); ++i) {
+      Require(first[i].first == second[i].first, "another key");
+      ExpectSame(first[i].second, second[i].second);
+    }
+  }
+  if (a.kind() != Node::Kind::kList) return;
+  const auto first = a.Items(), second = b.Items();
+  Require(first.size() == second.size(), "other items");
+  for (std::size_t i = 0; i < first.size(); ++i) ExpectSame(first[i], second[i]);
+  static_cast<void>(Accepts([&] { static_cast<void>(a.Numbers()); }));
+  static_cast<void>(
+      Accepts([&] { static_cast<void>(a.Covariance(static_cast<int>(first.size()))); }));
+}
+
+void ExpectReadAgain(const Config& config) {
+  constexpr std::size_t kMost = 1 << 20;  // of a file; aliases are expanded
+  const std::string yaml = config.ToYaml();
+  if (yaml.size() > kMost) return;
+  const Config again = Config::FromText(yaml, "again");
+  ExpectSame(config.root(), again.root());
+  Require(again.ToYaml() == yaml, "another ToYaml");
+}
+
+void Read(const std::vector<std::string>& parts) {
+  Config config = Config::FromText(parts[0], "config");
+  Require(Accepts([&] { ExpectReadAgain(config); }), "ToYaml is refused");
+  const std::string& set = parts[1];
+  const std::size_t equals = std::min(set.find('='), set.size());
+  Config changed = config.Copy();
+  if (Accepts([&] {
+        changed.Set(set.substr(0, equals), set.substr(std::min(equals + 1, set.size())), "--set");
+      })) {
+    Require(Accepts([&] { ExpectReadAgain(changed); }), "ToYaml after Set is refused");
+  }
+  static_cast<void>(Accepts([&] {
+    const Config overrides = Config::FromText(parts[2], "overrides");
+    const Config merged = config.Merged(overrides.root());
+    Require(Accepts([&] { static_cast<void>(Config::FromText(merged.ToYaml(), "merged")); }),
+            "ToYaml of merged is refused");
+  }));
+  static_cast<void>(Accepts([&] { config.root().RejectUnread(); }));
+}
+
+}  // namespace
+}  // namespace alidade::fuzz
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace alidade::fuzz;
+  static_cast<void>(Accepts([&] { Read(Parts(TextOf(data, size), 3)); }));
+  return 0;
+}

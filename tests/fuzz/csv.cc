@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The config of source csv, and its table.
+#include "plugins/csv/csv.h"
+
+#include "fuzz.h"
+#include "read_source.h"
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace alidade::fuzz;
+  const auto parts = Parts(TextOf(data, size), 2);
+  const MemoryFile table(parts[1]);
+  static_cast<void>(Accepts([&] { ReadSource<alidade::CsvSource>(parts[0], table.path()); }));
+  return 0;
+}

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The innovations.csv of a run folder.
+#include "alidade/evaluate/evaluate.h"
+#include "fuzz.h"
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace alidade::fuzz;
+  const MemoryFile file(TextOf(data, size));
+  static_cast<void>(Accepts([&] {
+    for (const auto& sensor : alidade::ReadInnovations(file.path())) {
+      Require(sensor.measurements > 0, "a sensor without measurements");
+      Require(sensor.nis_within95 >= 0.0 && sensor.nis_within95 <= 1.0, "not a share");
+    }
+  }));
+  return 0;
+}

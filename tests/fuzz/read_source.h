@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "alidade/host/param_reader.h"
+#include "alidade/host/source.h"
+#include "alidade/model/params.h"
+#include "fuzz.h"
+
+namespace alidade::fuzz {
+
+/// Makes a source of its config map and the data at `path`, and takes all frames of it.
+template <class Made>
+void ReadSource(const std::string& yaml, const std::filesystem::path& path) {
+  Config config = Config::FromText(yaml, "source");
+  config.Set("path", path.string(), "fuzz");
+  internal::ParamReader reader(config.root(), "source");
+  Params params(&reader.host());
+  for (const bool any_order : {false, true}) {
+    Made source(SourceArguments{config.root(), params, 1, "/", any_order});
+    reader.Check();
+    static_cast<void>(Accepts([&] { static_cast<void>(source.Calibration()); }));
+    static_cast<void>(Accepts([&] {
+      SourceFrame frame;
+      while (source.Next(frame)) {
+        for (const Measurement& one : frame.measurements) {
+          const auto& streams = source.streams();
+          Require(one.stream >= 0 && one.stream < std::ssize(streams), "no such stream");
+          const StreamInfo& stream = streams[static_cast<std::size_t>(one.stream)];
+          Require(std::ssize(one.values) == stream.size, "another size than the stream says");
+          Require(std::ssize(one.known) == stream.known,
+                  "other known numbers than the stream says");
+        }
+        Require(frame.truth.size() <= source.truths().size(), "a truth of nothing");
+      }
+    }));
+  }
+}
+
+}  // namespace alidade::fuzz

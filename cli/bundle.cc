@@ -136,6 +136,7 @@ ExitCode CodeOf(BundleEnd end) {
 ExitCode RunBundle(const BundleArguments& arguments) {
   KeepInputs(arguments.folder, {arguments.problem, arguments.tracks.camera.string(),
                                 arguments.tracks.start.string()});
+  ReportCrashes();
   const PluginHost host(Absolute(arguments.plugin_paths));
   StopOnSignals();
   std::optional<BundleFolder> folder;

@@ -157,7 +157,6 @@ ExitCode CompareConfig(const CompareArguments& arguments) {
   const fs::path folder =
       OutputFolder(arguments.folder, config, input, arguments.force, arguments.quiet, "compare-");
   const PluginHost host = input.Host(config);
-  ReportCrashes();
   StopOnSignals();
   ComparedExperiment compared = BuildComparedExperiment(config, host, arguments.options);
   return arguments.over_seeds ? CompareOverSeeds(arguments, compared, host, folder)

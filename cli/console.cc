@@ -11,10 +11,13 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <exception>
 #include <mutex>
+#include <new>
 #include <system_error>
 
 #include "alidade/base/error.h"
+#include "alidade/base/signal_stack.h"
 #include "alidade/host/last_call.h"
 
 namespace alidade::cli {
@@ -72,6 +75,23 @@ int CodeOfEnd(int code) {
 
 extern "C" void HandleExit() {
   if (const int code = CodeOfEnd(0); code != 0) ExitNow(code);
+}
+
+std::terminate_handler end_by_default = nullptr;
+
+/// An exception left what must not throw, as some functions of CLI11 and std::filesystem: where
+/// memory ran out, that is an error like any other.
+[[noreturn]] void HandleTerminate() {
+  try {
+    if (std::current_exception() != nullptr) throw;
+  } catch (const std::bad_alloc&) {
+    Say("error: out of memory\n");
+    ExitNow(static_cast<int>(ExitCode::kInternal));
+  } catch (...) {
+    end_by_default();
+  }
+  Say("error: a library gave up, as it does when it is out of memory\n");
+  ExitNow(static_cast<int>(ExitCode::kInternal));
 }
 
 /// Writes all of it; false with errno where that fails.
@@ -143,6 +163,7 @@ void WriteMessage(LogLevel level, std::string_view text, bool coloured) {
 }  // namespace
 
 void PrepareConsole() {
+  end_by_default = std::set_terminate(HandleTerminate);
   ::signal(SIGPIPE, SIG_IGN);
   ::signal(SIGXFSZ, SIG_IGN);
   for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
@@ -206,14 +227,14 @@ void Progress::Clear() {
 }
 
 void ReportCrashes() {
-  static char stack[1 << 16];  // of the handler, as a recursion may have used up the other
-  const stack_t aside{stack, 0, sizeof stack};
+  if (watched != 0) return;
+  static const auto& stack = *new internal::SignalStack;  // until the end of the process
+  static_cast<void>(stack);
   struct sigaction action {
   }, before{};
   action.sa_handler = HandleCrash;
   action.sa_flags = SA_ONSTACK;
   sigemptyset(&action.sa_mask);
-  if (::sigaltstack(&aside, nullptr) != 0) return;
   for (const int crash : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT}) {
     const bool free = ::sigaction(crash, nullptr, &before) == 0 && before.sa_handler == SIG_DFL;
     if (free) ::sigaction(crash, &action, nullptr);  // else a sanitizer, say, has its own

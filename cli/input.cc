@@ -133,6 +133,7 @@ std::vector<fs::path> Absolute(const std::vector<std::string>& paths) {
 }
 
 PluginHost Input::Host(const Config& loaded) const {
+  ReportCrashes();
   std::vector<fs::path> places;
   for (const fs::path& path : PluginPaths(loaded)) places.push_back(FullPath(path));
   for (const fs::path& path : Absolute(plugin_paths)) places.push_back(path);
@@ -175,6 +176,7 @@ fs::path NamedFolder(const std::string& given, const Config& config, const Input
   }
   if (const auto output = config.root().Find("output")) {
     const std::string name = output->Text();
+    if (name.empty()) output->Fail("empty path", "a name inside runs/");
     FullPath(name);  // or the current folder is gone
     const fs::path folder =
         ResolveInside(kRuns, name, input.allow_outside, output->place(), output->path());

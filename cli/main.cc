@@ -18,6 +18,7 @@ constexpr const char* kProgramFooter = R"(Examples:
   alidade check stereo_disparity --config examples/05_depth_principled/config.yaml
   alidade explain examples/05_depth_principled/config.yaml
   alidade run examples/05_depth_principled/config.yaml -o runs/first
+  alidade replay runs/first                        does it give the same bytes again?
   alidade sweep examples/05_depth_principled/config.yaml --runs 200
   alidade eval runs/slam                           trajectories against truth: ATE, RPE, NEES
   alidade compare examples/08_depth_all_estimators/config.yaml
@@ -46,16 +47,17 @@ std::string ShellQuoted(const std::string& text) {
   return quoted + '\'';
 }
 
-std::string CommandLine(int argc, char** argv) {
+using Words = std::vector<std::string>;
+
+std::string CommandLine(const Words& arguments) {
   std::string line = "alidade";
-  for (int i = 1; i < argc; ++i) line += ' ' + ShellQuoted(argv[i]);
+  for (const std::string& argument : arguments) line += ' ' + ShellQuoted(argument);
   return line;
 }
 
 /// The arguments, the last one first, as CLI11 takes them. An underscore in the name of an option
 /// means a hyphen: `--t_max_diff` of evo is `--t-max-diff`. What follows `--` is left as it is.
-std::vector<std::string> ReversedArguments(int argc, char** argv) {
-  std::vector<std::string> arguments(argv + 1, argv + std::max(argc, 1));
+Words Reversed(Words arguments) {
   for (std::string& argument : arguments) {
     if (argument == "--") break;
     if (!argument.starts_with("--")) continue;
@@ -84,6 +86,8 @@ LogLevel LogLevelFor(const CLI::App& command, const std::string& given) {
   throw Error(ExitCode::kUsage, "ALIDADE_LOG: " + IsLogLevel(variable));
 }
 
+ExitCode Execute(const Words& arguments);
+
 void Describe(CLI::App& program, Action& action, const std::string& command_line,
               std::string& log_level) {
   program.formatter(std::make_shared<Format>());
@@ -93,6 +97,7 @@ void Describe(CLI::App& program, Action& action, const std::string& command_line
   AddRun(program, action, command_line);
   AddCompare(program, action, command_line);
   AddSweep(program, action);
+  AddReplay(program, action, Execute);
   AddSimulate(program, action);
   AddBundle(program, action);
   AddExplain(program, action);
@@ -173,13 +178,13 @@ ExitCode Fail(const CLI::App& program, const CLI::ParseError& error) {
   return UsageError(command, Complaint(command, error));
 }
 
-ExitCode Main(int argc, char** argv) {
+ExitCode Execute(const Words& arguments) {
   CLI::App program("Recursive state estimation from plugins: write h(x) once.", "alidade");
   Action action;
   std::string log_level;
-  Describe(program, action, CommandLine(argc, argv), log_level);
+  Describe(program, action, CommandLine(arguments), log_level);
   try {
-    program.parse(ReversedArguments(argc, argv));
+    program.parse(Reversed(arguments));
   } catch (const CLI::ParseError& error) {
     return Fail(program, error);
   }
@@ -194,7 +199,7 @@ ExitCode Main(int argc, char** argv) {
 
 ExitCode Guarded(int argc, char** argv) {
   try {
-    return Main(argc, argv);
+    return Execute(Words(argv + 1, argv + std::max(argc, 1)));
   } catch (...) {
     const Failure failure = CaughtFailure();
     PrintErrors(failure.reason);

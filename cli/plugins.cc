@@ -36,6 +36,7 @@ std::shared_ptr<PluginsArguments> AddListing(CLI::App& command, Action& action, 
   command.footer(kPluginsFooter);
   command.callback([&action, arguments, listing, on_refusal] {
     action = [arguments, listing, on_refusal] {
+      ReportCrashes();
       const PluginHost host(Absolute(arguments->paths), on_refusal);
       Print(listing(host, *arguments));
       return ExitCode::kOk;

@@ -12,9 +12,12 @@
 
 #include "alidade/record/follower.h"
 #include "alidade/record/recorder.h"
+#include "alidade/record/run_inputs.h"
 #include "alidade/run/metric_rows.h"
+#include "alidade/sweep/sweep_config.h"
 #include "command.h"
 #include "console.h"
+#include "resume.h"
 #include "watchdog.h"
 
 namespace alidade::cli {
@@ -25,10 +28,12 @@ constexpr const char* kRunFooter = R"(Examples:
   alidade run near/config.yaml                     into runs/near
   alidade run config.yaml -o runs/b --seed 2 --set estimators.ekf.gate=0.99
   alidade run config.yaml --set source.path=other.csv --force
+  alidade run config.yaml -o runs/b --resume       after a crash, a full disk, a signal
   tail -f log.csv | alidade run live.yaml --set source.path=/dev/stdin --follow | my_robot
 
 Ctrl-C finishes the frame, writes all that is done and ends with exit code 75; twice: at once. While
-figures are drawn it leaves out the rest of them.)";
+figures are drawn it leaves out the rest of them. --resume computes all frames again, and compares
+their rows with what is there.)";
 
 struct RunArguments {
   std::string command;  ///< the whole line
@@ -36,7 +41,7 @@ struct RunArguments {
   std::string folder;
   std::optional<std::uint64_t> seed;
   bool force = false, quiet = false, no_figures = false, covariances = false, all = false;
-  bool follow = false;
+  bool follow = false, resume = false;
   std::optional<double> frame_timeout_s = 60.0;
 };
 
@@ -100,16 +105,23 @@ std::string Summary(const RunResult& result, const std::string& table, const Rec
   return text;
 }
 
-/// f(), with the place of what was recorded in the message where it throws.
-template <class F>
-auto WithWhatIsKept(const Recorder& recorder, const F& f) {
-  try {
-    return f();
-  } catch (const Error& e) {
-    const std::filesystem::path kept = recorder.failed();
-    if (kept.empty()) throw;
-    throw Error(e.code(), std::string(e.what()) + "; what was recorded is in " + kept.string());
-  }
+/// Of the options those that a byte of the run folder depends on.
+std::vector<std::string> ArgumentsOf(const RunArguments& arguments) {
+  std::vector<std::string> list = {"run"};
+  if (arguments.no_figures) list.emplace_back("--no-figures");
+  if (arguments.covariances) list.emplace_back("--covariances");
+  return list;
+}
+
+Recorder::Options RecordOf(const RunArguments& arguments, const Config& config,
+                           const std::filesystem::path& folder,
+                           const std::vector<std::filesystem::path>& plugins) {
+  Recorder::Options record{folder, arguments.force, !arguments.no_figures, arguments.command,
+                           StopRequested};
+  record.covariances = arguments.covariances;
+  record.inputs = InputsText(arguments.input, config, ArgumentsOf(arguments), plugins);
+  record.resume = arguments.resume;
+  return record;
 }
 
 ExitCode RunConfig(const RunArguments& arguments) {
@@ -117,14 +129,19 @@ ExitCode RunConfig(const RunArguments& arguments) {
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
   const std::filesystem::path folder =
       OutputFolder(arguments.folder, config, arguments.input, arguments.force, arguments.quiet);
+  if (arguments.resume)
+    internal::CheckReadableAgain(config, "a run that is resumed reads it from its start");
   const PluginHost host = arguments.input.Host(config);
-  ReportCrashes();
   StopOnSignals();  // before a source that waits for its pipe is made
   Experiment experiment = BuildExperiment(config, host);
-  Recorder::Options record{folder, arguments.force, !arguments.no_figures, arguments.command,
-                           StopRequested};
-  record.covariances = arguments.covariances;
+  const Recorder::Options record =
+      RecordOf(arguments, config, folder, internal::PluginsInUse(experiment, config, host));
+  if (record.resume && IsFinished(folder, config, record.inputs, record.force, arguments.quiet))
+    return ExitCode::kOk;
   Recorder recorder(record, config, host);
+  if (record.resume && !arguments.quiet) {
+    TellResumed(folder, recorder.resumed(), "its frames are computed again, and compared");
+  }
 
   Progress progress("frames", arguments.quiet);
   RunOptions options;
@@ -142,6 +159,7 @@ ExitCode RunConfig(const RunArguments& arguments) {
   if (result.status == RunStatus::kStopped) PrintNote(result.reason);
   FinishOnSignals();
   WithWhatIsKept(recorder, [&] { recorder.Finish(result); });
+  if (!arguments.quiet) TellKept(recorder.resumed(), folder);
   if (!arguments.quiet && !arguments.follow) {
     const std::string table = arguments.all
                                   ? ComparisonTable(result)
@@ -162,6 +180,7 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
             "run folder; default: the config's `output:`, or its name, in runs/");
   AddSeed(command, arguments->seed);
   command.add_flag("--force", arguments->force, "replace the run folder if it is there");
+  AddResume(command, arguments->resume);
   command.add_flag("--all", arguments->all, "print all rows of the table, not ten");
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.add_flag("--follow", arguments->follow,

@@ -3,11 +3,16 @@
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <charconv>
 #include <memory>
 
+#include "alidade/record/run_inputs.h"
+#include "alidade/sweep/finished_runs.h"
+#include "alidade/sweep/sweep_config.h"
 #include "command.h"
 #include "console.h"
+#include "resume.h"
 
 namespace alidade::cli {
 namespace {
@@ -17,17 +22,18 @@ constexpr const char* kSweepFooter = R"(Examples:
   alidade sweep config.yaml --runs 200 --first-seed 1001 -o runs/test
   alidade sweep config.yaml --runs 10000 --shard 3/16 -o runs/share-03
   alidade sweep config.yaml --runs 200 --vary sensors.stereo.sigma_px=0.5,1,2
+  alidade sweep config.yaml --runs 200 -o runs/test --resume
 
 The folder gets sweep.json, runs.csv and table.md; with --vary, sweep.csv and a figure too. The
 number of jobs does not change a byte of them. Exit code 1: some runs failed; 75: stopped by a
-signal, with what was complete written.)";
+signal, with what was complete written. --resume makes the runs that are not finished.)";
 
 struct SweepArguments {
   Input input;
   std::string folder;
   std::string vary;
   SweepOptions options;
-  bool force = false, quiet = false;
+  bool force = false, quiet = false, resume = false;
 };
 
 void ReadShard(const std::string& text, SweepOptions& options) {
@@ -74,8 +80,24 @@ struct Task {
   const PluginHost& host;
   const SweepOptions& options;
   const std::filesystem::path& path;
+  const std::string& inputs;  ///< the text of inputs.json
   Progress& progress;
 };
+
+SweepFolder::Options FolderOf(const Task& task) {
+  return {task.path, task.arguments.force, task.inputs, task.arguments.resume};
+}
+
+/// The options of a sweep into `folder`; says what it takes from there.
+SweepOptions OptionsInto(SweepFolder& folder, const Task& task) {
+  SweepOptions options = task.options;
+  options.finished = folder.finished();
+  if (task.arguments.resume && !task.arguments.quiet) {
+    TellResumed(task.path, folder.resumed(),
+                std::to_string(options.finished->size()) + " runs are finished");
+  }
+  return options;
+}
 
 void TellWritten(const Task& task, const std::string& table,
                  const std::vector<std::string>& names) {
@@ -86,12 +108,15 @@ void TellWritten(const Task& task, const std::string& table,
 }
 
 ExitCode SweepSeeds(const Task& task) {
-  SweepFolder folder(task.path, task.arguments.force);
-  const SweepResult result = Sweep(task.config, task.host, task.options);
+  SweepFolder folder(FolderOf(task), task.config);
+  const SweepOptions options = OptionsInto(folder, task);
+  const SweepResult result =
+      WithWhatIsKept(folder, [&] { return Sweep(task.config, task.host, options); });
   task.progress.Clear();
   const bool failed = ReportFailures(result, "");
   if (result.stopped) TellStopped(result.done.size(), result.runs);
-  folder.Write(result, task.config);
+  WithWhatIsKept(folder, [&] { folder.Write(result, task.config); });
+  if (!task.arguments.quiet) TellKept(folder.resumed(), task.path);
   TellWritten(task, SweepTable(result), {"table.md", "sweep.json", "runs.csv"});
   if (result.stopped) return ExitCode::kStopped;
   return failed ? ExitCode::kFound : ExitCode::kOk;
@@ -99,8 +124,10 @@ ExitCode SweepSeeds(const Task& task) {
 
 ExitCode SweepValues(const Task& task) {
   const Variation variation = Variation::FromText(task.arguments.vary);
-  SweepFolder folder(task.path, task.arguments.force);
-  const VariedSweep sweep = SweepOver(task.config, task.host, task.options, variation);
+  SweepFolder folder(FolderOf(task), task.config);
+  const SweepOptions options = OptionsInto(folder, task);
+  const VariedSweep sweep =
+      WithWhatIsKept(folder, [&] { return SweepOver(task.config, task.host, options, variation); });
   task.progress.Clear();
   bool failed = false;
   std::size_t done = 0;
@@ -111,7 +138,9 @@ ExitCode SweepValues(const Task& task) {
   }
   const auto values = static_cast<std::int64_t>(variation.values.size());
   if (sweep.stopped()) TellStopped(done, values * sweep.results.front().runs);
-  const std::string note = folder.Write(sweep, task.config, StopRequested);
+  const std::string note =
+      WithWhatIsKept(folder, [&] { return folder.Write(sweep, task.config, StopRequested); });
+  if (!task.arguments.quiet) TellKept(folder.resumed(), task.path);
   std::vector<std::string> names = {"table.md", "sweep.csv", "sweep.json", "runs.csv"};
   if (note.empty()) names.insert(names.begin(), "figures/vary.svg");
   TellWritten(task, SweepTable(sweep), names);
@@ -120,19 +149,63 @@ ExitCode SweepValues(const Task& task) {
   return failed ? ExitCode::kFound : ExitCode::kOk;
 }
 
+/// Those that the runs use. A config that cannot be run has none; the sweep says what is wrong.
+std::vector<std::filesystem::path> PluginsOf(const SweepArguments& arguments, const Config& config,
+                                             const PluginHost& host) {
+  std::vector<std::filesystem::path> plugins;
+  const auto add = [&](const Config& one) {
+    try {
+      internal::CheckReadableAgain(one);
+      for (const auto& file : internal::PluginsInUse(BuildExperiment(one, host), one, host)) {
+        if (std::ranges::find(plugins, file) == plugins.end()) plugins.push_back(file);
+      }
+    } catch (const Error&) {
+    }
+  };
+  if (arguments.vary.empty()) {
+    add(config.Copy());
+    return plugins;
+  }
+  const Variation variation = Variation::FromText(arguments.vary);
+  for (const std::string& value : variation.values) {
+    try {
+      Config with = config.Copy();
+      with.Set(variation.key, value, "--vary");
+      add(with);
+    } catch (const Error&) {
+    }
+  }
+  return plugins;
+}
+
+/// The options that a byte of the folder depends on.
+std::vector<std::string> ArgumentsOf(const SweepArguments& arguments) {
+  const SweepOptions& options = arguments.options;
+  std::vector<std::string> list = {"sweep", "--runs", std::to_string(options.runs), "--first-seed",
+                                   std::to_string(options.first_seed)};
+  if (options.shards > 1) {
+    list.insert(list.end(),
+                {"--shard", std::to_string(options.shard) + '/' + std::to_string(options.shards)});
+  }
+  if (!arguments.vary.empty()) list.insert(list.end(), {"--vary", arguments.vary});
+  return list;
+}
+
 ExitCode RunSweep(const SweepArguments& arguments) {
   const Config config = arguments.input.Load();
   const std::filesystem::path path = OutputFolder(arguments.folder, config, arguments.input,
                                                   arguments.force, arguments.quiet, "sweep-");
   const PluginHost host = arguments.input.Host(config);
-
-  ReportCrashes();
   StopOnSignals();
+  const std::string inputs = InputsText(arguments.input, config, ArgumentsOf(arguments),
+                                        PluginsOf(arguments, config, host));
+  if (arguments.resume && IsFinished(path, config, inputs, arguments.force, arguments.quiet))
+    return ExitCode::kOk;
   Progress progress("runs", arguments.quiet);
   SweepOptions options = arguments.options;
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
-  const Task task{arguments, config, host, options, path, progress};
+  const Task task{arguments, config, host, options, path, inputs, progress};
   return arguments.vary.empty() ? SweepSeeds(task) : SweepValues(task);
 }
 
@@ -167,6 +240,7 @@ void AddSweep(CLI::App& program, Action& action) {
   AddOutput(command, arguments->folder,
             "folder; default: the config's `output:`, or sweep-NAME, in runs/");
   command.add_flag("--force", arguments->force, "replace the folder if it is there");
+  AddResume(command, arguments->resume);
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.footer(kSweepFooter);
   command.callback([&action, arguments] {

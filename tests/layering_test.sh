@@ -14,8 +14,9 @@
 #   order     a room of core or tools includes itself and those before it, in the order of `rooms`
 #   model     motion_models and sensors include alidade/model/, Eigen, the standard library and
 #             their own stem
-#   plugin    nothing includes from plugins/, but a plugin from its own folder and tests/plugins,
-#             which test the class behind the export; bench includes the costs of plugins/ceres
+#   plugin    nothing includes from plugins/, but a plugin from its own folder, tests/plugins and
+#             tests/fuzz, which test the class behind the export; bench includes the costs of
+#             plugins/ceres
 #   upward    what lies below does not include cli, bench, tests or examples
 #   library   yaml-cpp, Boost, spdlog, OpenSSL and nlohmann-json in sources of core and tools,
 #             libarchive in those of tools, alone; of nlohmann-json the forward declarations also in
@@ -123,7 +124,7 @@ sources() {
       if (path ~ /^opencv/ && own_plugin !~ /image/ && folder != "bench" &&
           FILENAME !~ /^tests\/images\//)
         report("library", "only image plugins, their tests and bench include " path)
-      if (FILENAME !~ /^tests\/plugins\// && of_plugin(path))
+      if (FILENAME !~ /^tests\/(plugins|fuzz)\// && of_plugin(path))
         report("plugin", "plugins are loaded, not included: " path)
       # core/CMakeLists.txt writes headers_hash.h.
       if (folder ~ /^(core|tools)$/ && foreign_to_library(path, bracket) &&

@@ -37,6 +37,32 @@ estimators: {ekf: {type: ekf}}
     line.insert(line.end(), options.begin(), options.end());
     return Call(line);
   }
+  static std::string Plugin(const std::string& name) {
+    return ALIDADE_BINARY_DIR "/tests/plugins/" + name + ".so";
+  }
+  /// A config whose only sensor is a model of that plugin, of tests/faults/plugins, for one role.
+  void WriteProbe(const std::string& plugin, const std::string& model) const {
+    Write("probe.yaml", R"(alidade: 1
+plugins: [)" + Plugin(plugin) +
+                            R"(]
+state: {s: {model: constant, size: 1, initial: {value: {mean: 1, sigma: 1}}}}
+sensors: {bad: {model: )" + model +
+                            R"(, stream: z, roles: {x: s.value}}}
+source: {type: csv, path: rows.csv, streams: {z: u}}
+estimators: {ekf: {type: ekf}}
+)");
+  }
+  /// The words of a crash in that call of a model.
+  void ExpectCrash(const Arguments& line, const std::string& call,
+                   const std::string& plugin = Plugin("bad_models")) const {
+    const Outcome outcome = Call(line);
+    EXPECT_EQ(outcome.signal, SIGSEGV) << line[0] << outcome.code;
+    EXPECT_TRUE(outcome.err.starts_with("error: crashed, most likely inside a model"))
+        << line[0] << outcome.err;
+    EXPECT_TRUE(
+        Contains(outcome.err, "the last call of a model: " + call + "' of plugin " + plugin))
+        << line[0] << outcome.err;
+  }
   const std::string kPlugin = ALIDADE_BINARY_DIR "/tests/plugins/bad_models.so";
 };
 
@@ -47,6 +73,62 @@ TEST_F(CrashCli, ACrashSaysWhereToLookAndTakesItsCourse) {
   EXPECT_TRUE(Contains(outcome.err, "the last call of a model: Predict of model 'crashes'"))
       << outcome.err;
   EXPECT_TRUE(Contains(outcome.err, "`alidade check PLUGIN`")) << outcome.err;
+}
+
+TEST_F(CrashCli, ACrashIsNamedInEveryCommand) {
+  const std::string create = "Create of model 'crashes_in_create";
+  WriteConfig("crashes_in_create");
+  ExpectCrash({"run", "bad.yaml", "-o", "out", "--no-figures"}, create);
+  ExpectCrash({"explain", "bad.yaml"}, create);
+  ExpectCrash({"compare", "bad.yaml", "-o", "out"}, create);
+  ExpectCrash({"plugins", "info", "crashes_in_create", "--plugin-path", kPlugin}, create);
+  WriteConfig("wild_description");
+  ExpectCrash({"explain", "bad.yaml"}, "Description of model 'wild_description");
+  WriteConfig("crashes");
+  const std::string models = "source={type: models, rate_hz: 10, duration_s: 1}";
+  ExpectCrash({"simulate", "bad.yaml", "-o", "data", "--set", models}, "Predict of model 'crashes");
+  ExpectCrash({"sweep", "bad.yaml", "--runs", "2", "--jobs", "1", "-o", "out", "--set", models},
+              "Predict of model 'crashes");
+}
+
+// Handlers of signals need a stack of their own there.
+TEST_F(CrashCli, AStackThatAThreadOfASweepUsesUpIsACrashWithWords) {
+  WriteProbe("overflow", "overflows");
+  ExpectCrash({"sweep", "probe.yaml", "--runs", "8", "--jobs", "2", "-o", "out", "--set",
+               "source={type: models, rate_hz: 10, duration_s: 1}"},
+              "Predict of model 'overflows", Plugin("overflow"));
+}
+
+// FAULTS 58
+TEST_F(CrashCli, AnExceptionOfAPluginInCIsNamedAndNoEndOfTheProgram) {
+  const std::string plugin = Plugin("raw_throws");
+  WriteProbe("raw_throws", "throws_in_eval");
+  const auto run = [&](const std::string& key, const std::string& value) {
+    return Call(
+        {"run", "probe.yaml", "-o", "out", "--no-figures", "--force", "--set", key + '=' + value});
+  };
+  const std::string words =
+      "Predict of model 'throws_in_eval' of plugin " + plugin + " threw: the dog ate it";
+  EXPECT_EQ(run("estimators.ekf.on_plugin_failure", "skip").code, 0);
+  EXPECT_TRUE(Contains(Read("out/ekf/events.csv"), words)) << Read("out/ekf/events.csv");
+  const Outcome ended = run("estimators.ekf.on_plugin_failure", "abort");
+  EXPECT_EQ(ended.code, 69) << ended.err;
+  EXPECT_TRUE(Contains(ended.err, words)) << ended.err;
+  const Outcome created = run("sensors.bad.model", "throws_in_create");
+  EXPECT_EQ(created.code, 69) << created.err;
+  EXPECT_TRUE(Contains(created.err, "model 'throws_in_create' of plugin " + plugin +
+                                        " failed while being created: it threw: the dog ate it"))
+      << created.err;
+  const Outcome destroyed = run("sensors.bad.model", "throws_in_destroy_too");
+  EXPECT_EQ(destroyed.code, 0) << destroyed.err;
+  EXPECT_TRUE(Contains(destroyed.err, "warning: Destroy of model 'throws_in_destroy_too'"))
+      << destroyed.err;
+  const Outcome step =
+      run("state.s",
+          "{model: throws_in_step, blocks: {x: value}, initial: {value: {mean: 1, sigma: 1}}}");
+  EXPECT_EQ(step.code, 79) << step.err;
+  EXPECT_TRUE(Contains(step.err, "Step of model 'throws_in_step' of plugin " + plugin + " threw: "))
+      << step.err;
 }
 
 TEST_F(CrashCli, AnExitOfAModelIsNoSuccess) {

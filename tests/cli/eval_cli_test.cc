@@ -228,6 +228,14 @@ TEST_F(EvalCli, SeveralEstimatesAreOneTableAndSaveNoSingleResult) {
   EXPECT_TRUE(Exists("r.zip"));
 }
 
+TEST_F(EvalCli, ResultsAreSavedWhereNobodyTakesTheTable) {
+  const Outcome unread =
+      Call({"eval", "truth.tum", "mono.tum", "--save_results", "a.zip"}, "/dev/full");
+  EXPECT_EQ(unread.code, 74);
+  EXPECT_TRUE(Contains(unread.err, "error: <stdout>: cannot write: ")) << unread.err;
+  EXPECT_TRUE(Exists("a.zip"));
+}
+
 TEST_F(EvalCli, WithoutPairsTheOtherFiguresStand) {
   const Outcome outcome = Call({"eval", "truth.tum", "mono.tum", "-as", "-d", "30", "-u", "m"});
   EXPECT_EQ(outcome.code, 0);

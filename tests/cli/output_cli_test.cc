@@ -52,6 +52,7 @@ TEST_F(OutputCli, OutputIsNotTheFolderOfAllRuns) {
   for (const std::string folder : {"runs", "./runs/", "runs/a/.."}) {
     expect({"-o", folder, "--force"}, 73, folder + ':' + holds + "runs/NAME");
   }
+  expect({"--set", "output=\"\""}, 78, "--set output: empty path; expected a name inside runs/");
   expect({"--set", "output=."}, 78, "--set output: '.'" + holds + "a name inside runs/");
   Write("config.yaml", "output: a/..\n" + testing::kDepthConfig);
   expect({}, 78, "config.yaml:1:9 output: 'a/..'" + holds + "a name inside runs/");

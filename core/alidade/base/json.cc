@@ -24,6 +24,10 @@ std::string JsonText(const Json& json) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 
+std::string JsonString(std::string_view text) {
+  return Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 Json ParseJson(std::string_view text, const std::string& file) {
   try {
     return Json::parse(text);

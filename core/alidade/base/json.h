@@ -15,6 +15,10 @@ using Json = nlohmann::ordered_json;
 /// null, and bytes that are not UTF-8 become U+FFFD.
 std::string JsonText(const Json& json);
 
+/// `text` as a string of JSON. A list or map of Json allocates in its destructor, and so ends the
+/// program where memory runs out; a text put together from these does not.
+std::string JsonString(std::string_view text);
+
 /// The value that `text`, the contents of `file`, is. Errors: kBadData with line and column.
 Json ParseJson(std::string_view text, const std::string& file);
 

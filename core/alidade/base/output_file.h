@@ -27,12 +27,12 @@ class OutputFile {
 
   /// Error: kIo.
   void Write(std::string_view text);
+  /// Gives what is buffered to the operating system now. Error: kIo.
+  void Flush();
   /// Writes what is buffered and closes. Error: kIo.
   void Close();
 
  private:
-  void Flush();
-
   std::string shown_;
   std::string buffer_;
   std::vector<std::size_t> ends_;  ///< of the texts in the buffer

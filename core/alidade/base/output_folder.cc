@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
+#include <climits>
 #include <fstream>
 #include <new>
 
@@ -33,8 +34,15 @@ class FolderLock {
  public:
   explicit FolderLock(const fs::path& folder)
       : fd_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
-    // A file system without locks goes without: the checks then race, the renames do not.
-    if (fd_ >= 0) static_cast<void>(::flock(fd_, LOCK_EX));
+    // This program holds it for milliseconds, but any other may for as long as it likes: it must
+    // not hold up a run. Without the lock, which some file systems do not have either, the checks
+    // race, the renames do not.
+    constexpr int kTries = 100;
+    constexpr useconds_t kPause_us = 10'000;
+    for (int i = 0; fd_ >= 0 && i < kTries && ::flock(fd_, LOCK_EX | LOCK_NB) != 0; ++i) {
+      if (errno != EWOULDBLOCK && errno != EINTR) break;
+      ::usleep(kPause_us);
+    }
   }
   ~FolderLock() {
     if (fd_ >= 0) ::close(fd_);
@@ -49,6 +57,10 @@ class FolderLock {
 bool Exists(const fs::path& path) {
   std::error_code error;
   return fs::exists(fs::symlink_status(path, error));
+}
+
+bool IsNumber(std::string_view text) {
+  return !text.empty() && text.find_first_not_of("0123456789") == text.npos;
 }
 
 bool IsAlive(std::string_view process) {
@@ -67,6 +79,21 @@ bool IsMarked(const fs::path& folder, std::string_view process) {
   std::ifstream stream(folder / kMarker);
   std::string line;
   return std::getline(stream, line) && line == MarkerLine(process);
+}
+
+/// True where `process` died before it could mark the folder that it had just made: it is empty, or
+/// holds an empty marker alone.
+bool IsBarelyMade(const fs::path& folder, std::string_view process) {
+  std::error_code error;
+  const bool is_folder = fs::is_directory(fs::symlink_status(folder, error));
+  const bool own = process == std::to_string(::getpid());  // of one with the same number
+  if (!is_folder || !IsNumber(process) || (IsAlive(process) && !own)) return false;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    const bool marker = entry.path().filename() == kMarker && entry.is_regular_file(error) &&
+                        fs::file_size(entry.path(), error) == 0;
+    if (!marker) return false;
+  }
+  return !error;
 }
 
 /// True where a living process holds the folder, which `process` has made. On a file system
@@ -96,6 +123,8 @@ fs::path WithoutTrailingSlash(const fs::path& path) {
     Refuse(path, "the current folder is gone",
            "change to one that exists, or name the output by its full path");
   }
+  constexpr std::size_t kRoom = 64;  // for `.partial-PID`, and the names of files
+  if (normal.native().size() + kRoom >= PATH_MAX) FailCreate("the run folder", ENAMETOOLONG);
   return normal.has_filename() ? normal : normal.parent_path();
 }
 
@@ -124,17 +153,27 @@ void MakeMarked(const fs::path& folder, const std::string& shown) {
   }
 }
 
-/// `NAME.failed-PROCESS`
-std::string FailedName(const fs::path& target, const std::string& process) {
-  return target.filename().string() + ".failed-" + process;
+constexpr const char* kFailed = ".failed-";
+
+/// `NAME.failed-PROCESS`; where that is taken, as in a container, whose processes have the same
+/// numbers each time, `NAME.failed-PROCESS-2` and so on.
+fs::path FailedName(const fs::path& target, const std::string& process) {
+  const fs::path name = target.string() + kFailed + process;
+  fs::path free = name;
+  for (int n = 2; Exists(free); ++n) free = name.string() + '-' + std::to_string(n);
+  return free;
 }
 
-/// Gives a hidden folder that is worth keeping a name that can be seen. Where that one is taken it
-/// stays hidden, and nobody's.
+/// Whether `text` is what stands behind `NAME.failed-`.
+bool IsFailedSuffix(std::string_view text) {
+  const std::size_t dash = std::min(text.find('-'), text.size());
+  return IsNumber(text.substr(0, dash)) && (dash == text.size() || IsNumber(text.substr(dash + 1)));
+}
+
+/// Gives a hidden folder that is worth keeping a name that can be seen.
 void MakeFailed(const fs::path& folder, const fs::path& to) {
+  RemoveMarks(folder);
   std::error_code ignored;
-  fs::remove(folder / kMarker, ignored);
-  fs::remove(folder / kKeep, ignored);
   if (!Exists(to)) fs::rename(folder, to, ignored);
 }
 
@@ -223,9 +262,15 @@ void OutputFolder::Keep() {
   keep_ = true;
 }
 
+void OutputFolder::Forget() {
+  keep_ = false;
+  std::error_code ignored;
+  fs::remove(partial_ / kKeep, ignored);
+}
+
 fs::path OutputFolder::failed() const {
   if (!keep_ || partial_.empty()) return {};
-  return target_.parent_path() / FailedName(target_, std::to_string(::getpid()));
+  return FailedName(target_, std::to_string(::getpid()));
 }
 
 bool OutputFolder::Abandon() const {
@@ -265,7 +310,7 @@ OutputFolder::Leftovers OutputFolder::FindLeftovers() const {
     const bool replaced = name.starts_with(old);
     if (!replaced && !name.starts_with(partial)) continue;
     const std::string process = name.substr((replaced ? old : partial).size());
-    if (!IsMarked(entry.path(), process)) continue;
+    if (!IsMarked(entry.path(), process) && !IsBarelyMade(entry.path(), process)) continue;
     if (IsHeld(entry.path(), process)) {
       Refuse(shown_, "process " + process + " is writing it now",
              "wait for it or choose another folder");
@@ -286,7 +331,7 @@ void OutputFolder::CleanUp(const Leftovers& leftovers) const {
     const std::string name = folder.filename().string();
     if (Exists(folder / kKeep)) {
       const std::string process = name.substr(name.rfind('-') + 1);
-      MakeFailed(folder, target_.parent_path() / FailedName(target_, process));
+      MakeFailed(folder, FailedName(target_, process));
     } else {
       fs::remove_all(folder, ignored);
     }
@@ -337,10 +382,20 @@ void OutputFolder::Remove(const std::string& name) const {
   fs::remove_all(partial_ / name, ignored);
 }
 
+std::vector<std::string> OutputFolder::Names() const {
+  std::vector<std::string> names;
+  std::error_code error;
+  fs::recursive_directory_iterator entry(partial_, error);
+  for (const fs::recursive_directory_iterator end; !error && entry != end; entry.increment(error)) {
+    names.push_back(entry->path().lexically_relative(partial_).string());
+  }
+  if (error) FailIo(shown_.string(), "read", error.value());
+  return names;
+}
+
 void OutputFolder::WriteList() const {
   std::vector<std::string> names = {kList};
-  for (const auto& entry : fs::recursive_directory_iterator(partial_)) {
-    const std::string name = entry.path().lexically_relative(partial_).string();
+  for (const std::string& name : Names()) {
     if (name != kMarker && name != kKeep) names.push_back(name);
   }
   std::sort(names.begin(), names.end());
@@ -350,9 +405,7 @@ void OutputFolder::WriteList() const {
 }
 
 void OutputFolder::SyncAll() const {
-  for (const auto& entry : fs::recursive_directory_iterator(partial_)) {
-    Sync(entry.path(), Shown(entry.path().lexically_relative(partial_).string()));
-  }
+  for (const std::string& name : Names()) Sync(partial_ / name, Shown(name));
   Sync(partial_, shown_.string());
 }
 
@@ -372,8 +425,7 @@ void OutputFolder::Commit() {
   }
   partial_.clear();
   made_.clear();
-  fs::remove(target_ / kMarker, ignored);
-  fs::remove(target_ / kKeep, ignored);
+  RemoveMarks(target_);
   Sync(target_.parent_path(), shown_.string());
   if (!old.empty()) fs::remove_all(old, ignored);
 }
@@ -388,6 +440,27 @@ fs::path OutputFolder::MoveAway() const {
     FailIo(shown_.string(), "replace", error);
   }
   return old;
+}
+
+std::vector<fs::path> FailedFolders(const fs::path& target) {
+  const fs::path place = BehindLinks(WithoutTrailingSlash(target));
+  const std::string start = place.filename().string() + kFailed;
+  std::vector<fs::path> folders;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(place.parent_path(), error)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(start) || !IsFailedSuffix(std::string_view(name).substr(start.size())))
+      continue;
+    if (fs::is_directory(entry.symlink_status(error))) folders.push_back(entry.path());
+  }
+  std::ranges::sort(folders);
+  return folders;
+}
+
+void RemoveMarks(const fs::path& folder) {
+  std::error_code ignored;
+  fs::remove(folder / kMarker, ignored);
+  fs::remove(folder / kKeep, ignored);
 }
 
 }  // namespace alidade::internal

@@ -38,6 +38,9 @@ class OutputFolder {
   /// From now on what is in it is worth keeping, if it is not committed. Errors: kCannotCreate,
   /// kIo.
   void Keep();
+  /// It is not any more.
+  void Forget();
+  bool kept() const { return keep_; }
   /// Where it then will be; "" where nothing is.
   std::filesystem::path failed() const;
   /// Gives it the name failed() at once, as it is; false where that cannot be done. Of another
@@ -67,6 +70,8 @@ class OutputFolder {
   std::filesystem::path MoveAway() const;
   void MakeParents();
   std::filesystem::path Sibling(const char* kind) const;
+  /// Of all files and folders in it, at any depth.
+  std::vector<std::string> Names() const;
   void WriteList() const;
   void SyncAll() const;
 
@@ -77,5 +82,11 @@ class OutputFolder {
   bool force_, keep_ = false;
   int lock_ = -1;  ///< of the partial folder
 };
+
+/// The folders `NAME.failed-PID` that runs to `target` left next to it, by name.
+std::vector<std::filesystem::path> FailedFolders(const std::filesystem::path& target);
+
+/// Removes the marks of a process that died right after `folder` had taken its name.
+void RemoveMarks(const std::filesystem::path& folder);
 
 }  // namespace alidade::internal

@@ -41,6 +41,22 @@ TEST_F(FileReader, TellsWhyAFileCannotBeOpened) {
   EXPECT_EQ(failure_, std::pair(ExitCode::kInputMissing, EISDIR));
 }
 
+TEST_F(FileReader, ShowsTheBeginningOfWhatMayHaveNoEnd) {
+  constexpr std::size_t kMost = 1 << 24;
+  std::size_t shown = 0;
+  const auto refuse = [&](std::string_view beginning) {
+    shown += beginning.size();
+    if (beginning[0] == '\0') throw Error(ExitCode::kBadData, "zeros");
+  };
+  EXPECT_THROW(ReadFile("/dev/zero", fail_, kMost, refuse), Error);
+  EXPECT_GT(shown, 0u);
+  EXPECT_LT(shown, std::size_t{1} << 20);
+  std::ofstream(folder_ / "a") << "text";
+  shown = 0;
+  EXPECT_EQ(ReadFile(folder_ / "a", fail_, kMost, refuse), "text");
+  EXPECT_EQ(shown, 4u);
+}
+
 TEST_F(FileReader, ReadsAPipeToItsEndAndTellsOfAReadThatFails) {
   int ends[2];
   ASSERT_EQ(pipe(ends), 0);

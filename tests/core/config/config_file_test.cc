@@ -165,6 +165,9 @@ TEST(ConfigFile, RefusesOddEncodings) {
                       "b: 1"),
             "78 f:2:1: byte order mark inside the text");
   EXPECT_EQ(TextError("a: 1\rb: 1"), "78 f:1:5: carriage return without a line feed");
+  EXPECT_EQ(TextError("a: 1\n%anything"),
+            "78 f:2:1: '%' begins a line; expected quotes around a text that begins so");
+  EXPECT_EQ(TextError("# first\n%YAML 1.2\n---\na: 1"), "no error");
   EXPECT_EQ(TextError("a: \x07"), "78 f:1:4: control character 0x07");
   EXPECT_EQ(TextError("a: \"\\0\""), "78 f:1:4 a: NUL character in a text");
   EXPECT_EQ(TextError("a: \"\\_\""), "78 f:1:4 a: escape that is not a character");

@@ -285,6 +285,8 @@ TEST(ModelInstance, RefusesByNameWhatBreaksTheRules) {
          h.Own();
          h.role.flags = 0;
        }},
+      {"role 'a?error: b' has a name that is none",
+       [](HandWritten& h) { h.role.name = "a\nerror: b"; }},
       {"role 'a b' has a name that is none", [](HandWritten& h) { h.role.name = "a b"; }},
       {"has a text 'doc' that is not UTF-8", [](HandWritten& h) { h.role.doc = "\xc0\xaf"; }},
       {"has a text 'unit' that has a control character",

@@ -177,6 +177,7 @@ TEST_F(BundleFiles, RefusesBadBal) {
                             "7zXZ",
                             "\x28\xB5\x2F\xFD"})
     ExpectBad(magic, {":1:1: compressed; expected the text: zcat, bzcat, xzcat or zstdcat FILE"});
+  ExpectBad(std::string("1 1 1\0", 6), {":1:1: bytes that are no text; expected a problem of BAL"});
   ExpectBad("frame,feature,dim,value\n", {":1:1: columns with commas", "--camera FILE"});
 }
 
@@ -197,6 +198,9 @@ TEST_F(BundleFiles, RefusesBadBundler) {
 TEST_F(BundleFiles, RefusesBadLibmv) {
   const std::string good = Libmv(true);
   std::string bad = good;
+  bad.replace(2, 4, 4, '\0');
+  ExpectBad(bad, {"byte 2: the focal length is not positive"});
+  bad = good;
   bad[1] = 'N';
   ExpectBad(bad, {"byte 1: markers in normalised coordinates"});
   ExpectBad(good.substr(0, good.size() - 2), {"byte 128: the file ends before a marker"});

@@ -144,6 +144,21 @@ TEST(PairsOf, RefusesADeltaThatNoTwoPosesAreApart) {
   EXPECT_THROW(PairsOf(bare, {0.0, DeltaUnit::kFrames}), ContractViolation);
 }
 
+TEST(PairsOf, RefusesMorePairsThanAnyoneReads) {
+  PairOptions options{0.1, DeltaUnit::kDegrees, true, 1.0};
+  EXPECT_EQ(PairsOf(Line(100, 0.0), options).size(), 100u * 99 / 2);
+  constexpr int kPoses = 4480;  // at rest, 4480 * 4479 / 2 > 1e7
+  try {
+    PairsOf(Line(kPoses, 0.0), options);
+    ADD_FAILURE() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::kBadData);
+    EXPECT_STREQ(error.what(),
+                 "curve.tum --delta: more than 10000000 pairs of poses are apart by it; expected a "
+                 "larger --delta, or a smaller --delta-tol");
+  }
+}
+
 TEST(Evaluate, WithoutPairsThereAreNoRelativeErrorsButAWarning) {
   EvaluateOptions options;
   options.pairs = {1000.0, DeltaUnit::kMetres};

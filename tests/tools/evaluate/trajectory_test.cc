@@ -197,6 +197,9 @@ TEST_F(TrajectoryFiles, TimestampsThatNoTimestampHoldsAreRefusedWithTheirPlace) 
   }
   EXPECT_EQ(Refusal("9199999998" + pose + "9199999999" + pose + "9200000001" + pose),
             beyond("9200000001"));
+  EXPECT_EQ(Refusal("9223372036854775807,1,2,3,1,0,0,0\n"),
+            "poses.txt:1:1 t: '9223372036854775807' is beyond 292 years; expected ns, as EuRoC has "
+            "them");
   EXPECT_EQ(Refusal("1e20" + pose),
             "poses.txt:1 t: '1e20' is beyond 292 years; expected seconds, as TUM has them");
   EXPECT_EQ(Read("9199999998.123456789" + pose).timestamps[0], 9199999998123456789);

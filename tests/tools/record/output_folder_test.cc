@@ -16,6 +16,8 @@
 #include <iterator>
 #include <thread>
 
+#include "alidade/record/leftovers.h"
+#include "alidade/record/run_inputs.h"
 #include "alidade/sweep/sweep.h"
 #include "support/recording.h"
 
@@ -237,6 +239,30 @@ TEST(OutputFolder, AFolderBeingWrittenIsRefused) {
   Record(OptionsFor(folder / "other"));  // another name is free
 }
 
+TEST(OutputFolder, ALockThatAnotherProgramKeepsDoesNotHoldUpARun) {
+  const TemporaryFolder folder;
+  Host();
+  const int held = ::open(folder.path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  ASSERT_EQ(::flock(held, LOCK_EX), 0);
+  const int code = InChild([&] {
+    ::alarm(60);
+    Record(OptionsFor(folder / "out"));
+  });
+  ::close(held);
+  EXPECT_EQ(code, 0);
+  EXPECT_TRUE(fs::exists(folder / "out/run.json"));
+}
+
+TEST(OutputFolder, ANameThatIsTooLongIsRefusedAtOnce) {
+  const TemporaryFolder folder;
+  fs::path deep = folder.path();
+  for (int i = 0; i < 2500; ++i) deep /= "d";
+  std::string text;
+  EXPECT_EQ(CodeOf([&] { Record(OptionsFor(deep)); }, &text), 73);
+  EXPECT_EQ(text, "the run folder: cannot create: File name too long");
+  EXPECT_FALSE(fs::exists(folder / "d"));
+}
+
 /// The hidden folders next to `out`, by name.
 std::vector<std::string> HiddenIn(const TemporaryFolder& folder) {
   std::vector<std::string> names;
@@ -276,6 +302,35 @@ TEST(OutputFolder, RemovesWhatADeadProcessLeft) {
   EXPECT_EQ(HiddenIn(folder).size(), 1u);
   Record(OptionsFor(folder / "out"));
   EXPECT_EQ(HiddenIn(folder), std::vector<std::string>{});
+}
+
+TEST(OutputFolder, RemovesWhatAProcessLeftThatDiedBeforeItsMark) {
+  const TemporaryFolder folder;
+  const std::string dead = "999999999", living = std::to_string(::getppid());
+  for (const std::string& name : {".out.partial-" + dead, ".out.old-" + dead}) {
+    fs::create_directory(folder / name);
+  }
+  std::ofstream(folder / (".out.old-" + dead) / ".alidade");
+  fs::create_directory(folder / (".out.partial-" + living));
+  fs::create_directory(folder / ".out.partial-notes");
+  Record(OptionsFor(folder / "out"));
+  EXPECT_EQ(HiddenIn(folder),
+            (std::vector<std::string>{".out.partial-" + living, ".out.partial-notes"}));
+}
+
+// As in a container, where each process has the number of the one before.
+TEST(OutputFolder, KeepsTheRowsOfProcessesOfOneNumberApart) {
+  const TemporaryFolder folder;
+  const std::string name = "out.failed-" + std::to_string(::getpid());
+  for (int i = 0; i < 3; ++i) {
+    Experiment experiment = MakeExperiment(5);
+    Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+    static_cast<void>(RunInto(recorder, experiment));
+  }
+  fs::create_directory(folder / (name + "-mine"));
+  EXPECT_EQ(HiddenIn(folder), std::vector<std::string>{});
+  EXPECT_EQ(internal::FailedFolders(folder / "out"),
+            (std::vector<fs::path>{folder / name, folder / (name + "-2"), folder / (name + "-3")}));
 }
 
 TEST(OutputFolder, KeepsTheRowsThatADeadProcessLeft) {
@@ -550,6 +605,44 @@ TEST(OutputFolder, EveryFailureOfTheDiskIsAnErrorThatKeepsTheRows) {
     EXPECT_GT(kept, 20);
     EXPECT_GT(without_report, 0);
   }
+}
+
+// FAULTS 87, 91: whatever the disk failed at, once and in the run that resumes too.
+TEST(OutputFolder, ARunThatResumesAfterAnyFailureOfTheDiskHasTheSameBytes) {
+  const auto options = [](const TemporaryFolder& folder, bool resume) {
+    Recorder::Options all = OptionsFor(folder / "out");
+    all.inputs = internal::InputsJson({{"run"}, {}}, MakeConfig(), {});
+    all.resume = resume;
+    return all;
+  };
+  const TemporaryFolder whole;
+  Record(options(whole, false), 5);
+  int kept = 0, calls = 0;
+  for (int n = 1; n < 200; ++n) {
+    const TemporaryFolder folder;
+    for (const bool resume : {false, true}) {
+      if (internal::StatusOf(folder / "out") == internal::FolderStatus::kFinished) continue;
+      fail_at = n;
+      fail_error = ENOSPC;
+      static_cast<void>(CodeOf([&] { Record(options(folder, resume), 5); }));
+      calls += fail_at <= 0 ? 1 : 0;
+      fail_at = 0;
+      kept += internal::FailedFolders(folder / "out").empty() ? 0 : 1;
+    }
+    if (internal::StatusOf(folder / "out") != internal::FolderStatus::kFinished) {
+      std::string text;
+      EXPECT_EQ(CodeOf([&] { Record(options(folder, true), 5); }, &text), 0) << n << ": " << text;
+      EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1) << n;
+    }
+    ASSERT_EQ(FilesIn(folder / "out"), FilesIn(whole / "out")) << n;
+    for (const std::string& name : FilesIn(whole / "out")) {
+      if (name == "timing.json") continue;
+      EXPECT_EQ(Read(folder / "out" / name), Read(whole / "out" / name)) << n << ": " << name;
+    }
+    if (calls == 0) break;
+    calls = 0;
+  }
+  EXPECT_GT(kept, 20);
 }
 
 // FAULTS 87: the folder of a sweep.

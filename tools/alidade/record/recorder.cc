@@ -17,8 +17,10 @@
 #include "alidade/record/estimator_files.h"
 #include "alidade/record/figures.h"
 #include "alidade/record/landmarks_file.h"
+#include "alidade/record/leftovers.h"
 #include "alidade/record/log_file.h"
 #include "alidade/record/report_html.h"
+#include "alidade/record/run_inputs.h"
 #include "alidade/record/run_json.h"
 #include "alidade/record/source_files.h"
 #include "alidade/run/metric_rows.h"
@@ -31,21 +33,23 @@ using Clock = std::chrono::steady_clock;
 struct Recorder::Impl {
   Impl(const Options& given, const Config& config, const PluginHost& plugin_host);
 
-  void AddPlugin(const std::filesystem::path& file);
   void AddPlugins(const Experiment& experiment);
   internal::RecordedRun CloseFiles();
   void WriteEvents(const EstimatorResult& result) const;
   std::string TimingJson(const RunResult& result) const;
   void WriteReport(const RunResult& result, const internal::RecordedRun& recorded);
+  /// Whether all that is in the leftovers is here too.
+  void CompareWithLeftovers(const RunResult& result);
 
   Options options;
   internal::OutputFolder folder;
+  std::optional<internal::Leftovers> leftovers;
   internal::LogFile log{folder};
+  const Config config;
   const PluginHost& host;
-  std::string title, config_text, source_type;
+  std::string title, config_text;
   internal::RunFacts facts;
-  std::vector<std::string> subjects;       ///< of the rows, as SubjectsOf
-  std::set<std::filesystem::path> hashed;  ///< plugins that are in the facts
+  std::vector<std::string> subjects;  ///< of the rows, as SubjectsOf
   std::optional<internal::SourceFiles> source;
   std::optional<internal::DataHash> data;
   std::vector<std::unique_ptr<internal::EstimatorFiles>> estimators;
@@ -63,6 +67,11 @@ std::string TextOf(const Node& map, std::string_view key, const std::string& fal
   return node && node->kind() == Node::Kind::kScalar ? node->Text() : fallback;
 }
 
+/// Whether a run that resumes others takes the place of what is there: not that of a finished run.
+bool MayReplace(const Recorder::Options& options) {
+  return options.resume && internal::StatusOf(options.folder) != internal::FolderStatus::kFinished;
+}
+
 /// An svg file as an element of a page: without its XML prolog.
 std::string AsElement(const std::string& svg) {
   const std::size_t at = svg.find("<svg");
@@ -71,37 +80,35 @@ std::string AsElement(const std::string& svg) {
 
 }  // namespace
 
-Recorder::Impl::Impl(const Options& given, const Config& config, const PluginHost& plugin_host)
+Recorder::Impl::Impl(const Options& given, const Config& read, const PluginHost& plugin_host)
     : options(given),
-      folder(given.folder, given.force),
+      folder(given.folder, given.force || MayReplace(given)),
+      config(read),
       host(plugin_host),
       title(TextOf(config.root(), "title", std::filesystem::path(config.name()).stem().string())),
       config_text(config.ToYaml()) {
-  if (const auto entry = config.root().is_map() ? config.root().Find("source") : std::nullopt) {
-    source_type = TextOf(*entry, "type", "");
-  }
-  folder.Write("config.resolved.yaml", config_text);
-}
-
-void Recorder::Impl::AddPlugin(const std::filesystem::path& file) {
-  if (!file.is_absolute()) return;  // a model made in this process
-  if (!hashed.insert(file).second) return;
-  facts.plugins.emplace(file.filename().string(), internal::Sha256OfFile(file));
+  if (given.resume) leftovers.emplace(given.folder).CheckInputs(config_text, given.inputs);
+  folder.Write(internal::kResolvedConfig, config_text);
+  if (!given.inputs.empty()) folder.Write(internal::kInputsFile, given.inputs);
 }
 
 void Recorder::Impl::AddPlugins(const Experiment& experiment) {
-  for (const NamedEstimator& named : experiment.estimators) {
-    for (const auto& sensor : named.system.sensors) AddPlugin(sensor.model.instance().plugin());
-    for (const auto& motion : named.system.motions) AddPlugin(motion.model.instance().plugin());
+  for (const std::filesystem::path& file : internal::PluginsInUse(experiment, config, host)) {
+    facts.plugins.emplace(file.filename().string(), internal::Sha256OfFile(file));
   }
-  for (const PluginEntry& entry : host.entries()) {
-    const auto is_used = [&](const NamedEstimator& named) { return named.type == entry.name; };
-    const bool used = entry.kind == PluginEntry::Kind::kSource
-                          ? entry.name == source_type
-                          : entry.kind == PluginEntry::Kind::kEstimator &&
-                                std::ranges::any_of(experiment.estimators, is_used);
-    if (used) AddPlugin(entry.plugin);
+}
+
+void Recorder::Impl::CompareWithLeftovers(const RunResult& result) {
+  std::set<std::string> offline;
+  for (const auto& [name, estimator] : facts.estimators) {
+    if (estimator.smoothed) offline.insert(name);
   }
+  const auto longer = leftovers->LongerThan(folder.partial(), offline);
+  if (!longer) return;
+  const std::string what = longer->string() + ": has more rows than this run";
+  if (result.status == RunStatus::kOk) throw Error(ExitCode::kFound, what);
+  throw Error(result.code, what + ", which came to " + std::to_string(result.frames) +
+                               " frames; it is kept, and this run is not");
 }
 
 internal::RecordedRun Recorder::Impl::CloseFiles() {
@@ -189,7 +196,7 @@ void Recorder::Begin(const Experiment& experiment) {
 
 void Recorder::OnFrame(const SourceFrame& frame) {
   ALIDADE_EXPECTS(impl_->source.has_value());
-  if (impl_->folder.failed().empty()) impl_->folder.Keep();
+  if (!impl_->folder.kept()) impl_->folder.Keep();
   impl_->source->Add(frame);
   impl_->data->Add(frame);
 }
@@ -236,14 +243,28 @@ void Recorder::Finish(const RunResult& result) {
     folder.Remove("report.html");
     folder.Remove("figures");
   }
+  if (impl_->leftovers) {
+    try {
+      impl_->CompareWithLeftovers(result);
+    } catch (const Error&) {
+      impl_->folder.Forget();
+      throw;
+    }
+  }
   impl_->log.Close();
   impl_->folder.Commit();
+  if (impl_->leftovers) impl_->leftovers->Remove();
   if (without_report) std::rethrow_exception(without_report);
   if (IsLogged(LogLevel::kInfo)) Log(LogLevel::kInfo, "wrote " + impl_->options.folder.string());
 }
 
 std::filesystem::path Recorder::failed() const { return impl_->folder.failed(); }
 bool Recorder::Abandon() const { return impl_->folder.Abandon(); }
+
+const std::vector<std::filesystem::path>& Recorder::resumed() const {
+  static const std::vector<std::filesystem::path> none;
+  return impl_->leftovers ? impl_->leftovers->folders() : none;
+}
 
 const std::vector<std::string>& Recorder::highlights() const { return impl_->highlights; }
 const std::string& Recorder::note() const { return impl_->note; }

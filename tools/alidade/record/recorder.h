@@ -27,8 +27,12 @@ class Recorder : public RunObserver {
     std::function<bool()> stop = {};  ///< true: leave out the figures that are not drawn yet
     double drawing_s = 60.0;          ///< the most that all figures may take
     bool covariances = false;         ///< write `NAME/covariance.bin` too
+    std::string inputs = {};          ///< the text of inputs.json; "": there is none
+    /// Continues what unfinished runs left here: see `alidade run --resume` in docs/cli.md.
+    bool resume = false;
   };
-  /// Creates the temporary folder. Errors: kCannotCreate where `folder` exists without `force`.
+  /// Creates the temporary folder. Errors: kCannotCreate where `folder` exists without `force`, or
+  /// is to be resumed and was made from other inputs.
   Recorder(const Options& options, const Config& config, const PluginHost& host);
   ~Recorder() override;
   Recorder(const Recorder&) = delete;
@@ -42,13 +46,17 @@ class Recorder : public RunObserver {
   /// Puts a file of that text into the folder too. Errors: kCannotCreate, kIo.
   void AddFile(const std::string& name, std::string_view text);
   /// Writes run.json, comparison.csv, timing.json, figures and report.html, syncs and renames. A
-  /// figure or report that cannot be written is an error once the rest has its name.
+  /// figure or report that cannot be written is an error once the rest has its name. A run that
+  /// resumes others has to have their rows: it fails with kFound where these differ, and with its
+  /// own code where it ended before their last; they are then kept in its stead.
   void Finish(const RunResult& result);
   /// Where it will be kept, not finished; "" where there is nothing to keep, or it is finished.
   std::filesystem::path failed() const;
   /// Gives what was recorded that name at once; false where that cannot be done. Of another thread
   /// than that of the run, which must not go on.
   bool Abandon() const;
+  /// The folders of the unfinished runs that this one resumes.
+  const std::vector<std::filesystem::path>& resumed() const;
 
   /// Paths that Finish made, relative to the folder, those a person wants first: report.html, ...
   const std::vector<std::string>& highlights() const;

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "alidade/base/csv_file.h"
 #include "alidade/base/json.h"
 #include "alidade/base/output_folder.h"
+#include "alidade/record/leftovers.h"
+#include "alidade/record/run_inputs.h"
 #include "alidade/run/metric_rows.h"
+#include "alidade/sweep/finished_runs.h"
 #include "alidade/sweep/sweep.h"
 #include "alidade/sweep/table.h"
 #include "alidade/sweep/vary_files.h"
@@ -20,10 +24,32 @@ using internal::OutputFolder;
 
 struct SweepFolder::Impl {
   Impl(const std::filesystem::path& path, bool force) : folder(path, force) {}
+  /// Unless it is there already.
+  void WriteConfig(const Config& config) const;
+  void Commit(bool stopped);
+
   OutputFolder folder;
+  std::optional<internal::Leftovers> leftovers;
+  std::optional<internal::FinishedRuns> finished;
 };
 
+void SweepFolder::Impl::WriteConfig(const Config& config) const {
+  if (!finished) folder.Write(internal::kResolvedConfig, config.ToYaml());
+}
+
+void SweepFolder::Impl::Commit(bool stopped) {
+  if (finished) finished->Close();
+  if (finished && !stopped) folder.Remove(internal::kFinishedRuns);
+  folder.Commit();
+  if (leftovers) leftovers->Remove();
+}
+
 namespace {
+
+/// Whether a sweep that resumes others takes the place of what is there: not of a finished one.
+bool MayReplaceFolder(const SweepFolder::Options& options) {
+  return options.resume && internal::StatusOf(options.folder) != internal::FolderStatus::kFinished;
+}
 
 /// A sweep, and the value of the varied key that it is of, "" where none is varied.
 struct Part {
@@ -162,7 +188,31 @@ void WriteFailures(const OutputFolder& folder, const Parts& parts, const std::st
 SweepFolder::SweepFolder(const std::filesystem::path& folder, bool force)
     : impl_(std::make_unique<Impl>(folder, force)) {}
 
+SweepFolder::SweepFolder(const Options& options, const Config& config)
+    : SweepFolder(options.folder, options.force || MayReplaceFolder(options)) {
+  std::vector<std::filesystem::path> before;
+  if (options.resume) {
+    impl_->leftovers.emplace(options.folder).CheckInputs(config.ToYaml(), options.inputs);
+    before = impl_->leftovers->folders();
+  }
+  if (options.inputs.empty()) return;
+  impl_->folder.Write(internal::kResolvedConfig, config.ToYaml());
+  impl_->folder.Write(internal::kInputsFile, options.inputs);
+  impl_->finished.emplace(impl_->folder, before);
+}
+
 SweepFolder::~SweepFolder() = default;
+
+internal::FinishedRuns* SweepFolder::finished() {
+  return impl_->finished ? &*impl_->finished : nullptr;
+}
+
+const std::vector<std::filesystem::path>& SweepFolder::resumed() const {
+  static const std::vector<std::filesystem::path> none;
+  return impl_->leftovers ? impl_->leftovers->folders() : none;
+}
+
+std::filesystem::path SweepFolder::failed() const { return impl_->folder.failed(); }
 
 void SweepFolder::AddFile(const std::string& name, const std::string& text) {
   impl_->folder.Write(name, text);
@@ -170,27 +220,27 @@ void SweepFolder::AddFile(const std::string& name, const std::string& text) {
 
 void SweepFolder::Write(const SweepResult& result, const Config& config) {
   const OutputFolder& folder = impl_->folder;
-  folder.Write("config.resolved.yaml", config.ToYaml());
+  impl_->WriteConfig(config);
   folder.Write("sweep.json", SweepJson(result));
   const Parts parts = {{&result, ""}};
   WriteRuns(folder, parts, "");
   WriteFailures(folder, parts, "");
   folder.Write("table.md", internal::SweepMarkdown(result));
-  impl_->folder.Commit();
+  impl_->Commit(result.stopped);
 }
 
 std::string SweepFolder::Write(const VariedSweep& sweep, const Config& config,
                                const std::function<bool()>& stop) {
   const OutputFolder& folder = impl_->folder;
   const Parts parts = PartsOf(sweep);
-  folder.Write("config.resolved.yaml", config.ToYaml());
+  impl_->WriteConfig(config);
   folder.Write("sweep.json", SweepJson(sweep));
   internal::WriteSweepCsv(folder, sweep);
   WriteRuns(folder, parts, sweep.variation.key);
   WriteFailures(folder, parts, sweep.variation.key);
   folder.Write("table.md", internal::VariedMarkdown(sweep));
   const std::string note = internal::DrawVariation(folder, sweep, stop);
-  impl_->folder.Commit();
+  impl_->Commit(sweep.stopped());
   return note;
 }
 

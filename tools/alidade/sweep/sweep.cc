@@ -10,6 +10,8 @@
 #include <thread>
 
 #include "alidade/base/log.h"
+#include "alidade/base/signal_stack.h"
+#include "alidade/sweep/finished_runs.h"
 #include "alidade/sweep/sweep_config.h"
 
 namespace alidade {
@@ -34,6 +36,25 @@ class Queue {
     }
   }
 
+  /// Makes the first run that was finished before once more. Error: kFound where it is another.
+  void CheckFinished() {
+    for (std::int64_t index = 0; index < runs_; ++index) {
+      const auto seed = first_seed_ + static_cast<std::uint64_t>(index);
+      const internal::FinishedRuns::Known* const known = FinishedBefore(seed);
+      if (known == nullptr) continue;
+      const SweepRun again = RunSeed(seed);
+      if (again.status == RunStatus::kStopped) return;
+      const std::string was = internal::RunLine(options_.value, known->run);
+      if (again.status == RunStatus::kOk && internal::RunLine(options_.value, again) == was) return;
+      throw Error(
+          ExitCode::kFound,
+          ErrorLine(known->place, {},
+                    "the run of seed " + std::to_string(seed) + " gives other results now") +
+              "; config, data, plugins and build are as they were: another machine, a file "
+              "next to the data, or a model that is not deterministic (`alidade check`)");
+    }
+  }
+
   /// The finished ones, by seed.
   std::vector<SweepRun> Take() {
     if (thrown_) std::rethrow_exception(thrown_);
@@ -49,12 +70,22 @@ class Queue {
   bool TakeOne() {
     const std::int64_t index = next_++;
     if (index >= runs_) return false;
-    SweepRun run = RunSeed(first_seed_ + static_cast<std::uint64_t>(index));
+    const std::uint64_t seed = first_seed_ + static_cast<std::uint64_t>(index);
+    const internal::FinishedRuns::Known* const known = FinishedBefore(seed);
+    SweepRun run = known != nullptr ? known->run : RunSeed(seed);
     if (run.status == RunStatus::kStopped) return false;
     const std::lock_guard lock(mutex_);
+    if (known == nullptr && options_.finished != nullptr) {
+      options_.finished->Add(options_.value, run);
+    }
     done_.push_back(std::move(run));
     if (options_.progress) options_.progress(static_cast<std::int64_t>(done_.size()), runs_);
     return true;
+  }
+
+  /// Null: it was not.
+  const internal::FinishedRuns::Known* FinishedBefore(std::uint64_t seed) const {
+    return options_.finished == nullptr ? nullptr : options_.finished->Find(options_.value, seed);
   }
 
   Config CopyFor(std::uint64_t seed) {
@@ -147,6 +178,7 @@ SweepResult internal::SweepSeeds(const Config& config, const PluginHost& host,
   result.first_seed = options.first_seed + static_cast<std::uint64_t>(first);
 
   Queue queue(config, host, options, result.first_seed, result.runs);
+  queue.CheckFinished();
   const auto hardware = static_cast<std::int64_t>(std::thread::hardware_concurrency());
   const std::int64_t jobs = options.jobs > 0 ? options.jobs : std::max<std::int64_t>(1, hardware);
   const std::int64_t wanted = MayRunInParallel(host) ? jobs : 1;
@@ -154,7 +186,10 @@ SweepResult internal::SweepSeeds(const Config& config, const PluginHost& host,
     std::vector<std::jthread> threads;
     for (std::int64_t i = 1; i < std::min(wanted, result.runs); ++i) {
       try {
-        threads.emplace_back([&queue] { queue.Work(); });
+        threads.emplace_back([&queue] {
+          const internal::SignalStack stack;
+          queue.Work();
+        });
       } catch (const std::system_error&) {
         break;  // no more threads are to be had; these do
       }

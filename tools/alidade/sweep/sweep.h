@@ -14,6 +14,10 @@
 
 namespace alidade {
 
+namespace internal {
+class FinishedRuns;  // in alidade/sweep/finished_runs.h
+}
+
 struct SweepOptions {
   std::int64_t runs = 1;  ///< of all shards together; their seeds count up from first_seed
   std::uint64_t first_seed = 1;
@@ -25,6 +29,10 @@ struct SweepOptions {
   std::function<RunResult(Experiment&, const RunOptions&)> run;
   std::function<void(std::int64_t, std::int64_t)> progress;  ///< runs done, runs in all
   std::function<bool()> stop;                                ///< true: drop unfinished runs
+  /// SweepFolder::finished(): runs that are in it are not made again, but for the first; the others
+  /// are added. Null: all are made.
+  internal::FinishedRuns* finished = nullptr;
+  std::string value = {};  ///< of the varied key, in `finished`
 };
 
 /// One run of a sweep.
@@ -52,7 +60,8 @@ struct SweepResult {
 /// Runs `config` once for each seed (key `source.seed`), in memory, each run built afresh from its
 /// own copy of the config. Results do not depend on the number of threads. A run in which an
 /// estimator diverges goes on also under `on_divergence: fail`. What ends one run, ends that one
-/// only. Errors: those of BuildExperiment, before the first run.
+/// only. Errors: those of BuildExperiment, before the first run; kFound where the first run that
+/// was finished before does not give the same again; kIo where a finished run cannot be written.
 SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptions& options);
 
 /// A key of the config, and the values that it takes one after the other.
@@ -101,12 +110,28 @@ std::string SweepTable(const VariedSweep& sweep);
 /// or not at all.
 class SweepFolder {
  public:
-  /// Takes the name. Errors: kCannotCreate where it exists without `force`; kIo.
+  struct Options {
+    std::filesystem::path folder;
+    bool force = false;
+    std::string inputs = {};  ///< the text of inputs.json; "": there is none
+    /// Continues what unfinished sweeps left here: see `alidade sweep --resume` in docs/cli.md.
+    bool resume = false;
+  };
+  /// Takes the name. Errors: kCannotCreate where it exists without `force`, or is to be resumed and
+  /// was made from another config or other inputs; kIo.
+  SweepFolder(const Options& options, const Config& config);
+  /// Likewise, without inputs: finished runs are not kept before all are.
   SweepFolder(const std::filesystem::path& folder, bool force);
   ~SweepFolder();
   SweepFolder(const SweepFolder&) = delete;
   SweepFolder& operator=(const SweepFolder&) = delete;
 
+  /// For SweepOptions; null: there is no inputs.json.
+  internal::FinishedRuns* finished();
+  /// The folders of unfinished sweeps that this one resumes.
+  const std::vector<std::filesystem::path>& resumed() const;
+  /// Where the finished runs are kept if it is not written; "": nowhere.
+  std::filesystem::path failed() const;
   /// Puts a file of that text into the folder too. Errors: kCannotCreate, kIo.
   void AddFile(const std::string& name, const std::string& text);
   /// Errors: kCannotCreate, kIo.

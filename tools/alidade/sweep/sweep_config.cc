@@ -8,7 +8,7 @@
 
 namespace alidade::internal {
 
-void CheckReadableAgain(const Config& config) {
+void CheckReadableAgain(const Config& config, const char* reader) {
   const Config copy = config.Copy();
   const auto source = copy.root().Find("source");
   const auto path = source && source->is_map() ? source->Find("path") : std::nullopt;
@@ -18,8 +18,7 @@ void CheckReadableAgain(const Config& config) {
   const bool file =
       !std::filesystem::exists(status) || is_regular_file(status) || is_directory(status);
   if (path->Text() != "-" && file) return;
-  path->Fail("'" + path->Text() + "' can be read once, but a sweep reads it for every run",
-             "a regular file");
+  path->Fail("'" + path->Text() + "' can be read once, but " + reader, "a regular file");
 }
 
 namespace {

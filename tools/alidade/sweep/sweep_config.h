@@ -8,9 +8,10 @@
 /// The configs of a sweep's runs.
 namespace alidade::internal {
 
-/// Refuses a source that the second run would find empty: standard input, or a pipe. Error:
-/// kBadConfig.
-void CheckReadableAgain(const Config& config);
+/// Refuses a source that is empty for whoever reads it a second time, as `reader` says: standard
+/// input, or a pipe. Error: kBadConfig.
+void CheckReadableAgain(const Config& config,
+                        const char* reader = "a sweep reads it for every run");
 
 /// Whether the source of `config` gives other data for `seed` than for the next one: reads both up
 /// to their first difference. A source whose data have an error counts as one that does.

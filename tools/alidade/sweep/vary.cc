@@ -133,6 +133,7 @@ VariedSweep SweepOver(const Config& config, const PluginHost& host, const SweepO
   VariedSweep sweep{variation, {}};
   SweepOptions each = options;
   for (const std::string& value : variation.values) {
+    each.value = value;
     const auto before = static_cast<std::int64_t>(sweep.results.size());
     if (options.progress) {
       each.progress = [&options, before, &variation](std::int64_t done, std::int64_t total) {

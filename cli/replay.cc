@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/record/replay.h"
+
+#include <stdlib.h>
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <cerrno>
+#include <memory>
+#include <system_error>
+
+#include "alidade/base/output_file.h"
+#include "command.h"
+#include "console.h"
+
+namespace alidade::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kReplayFooter = R"(Examples:
+  alidade replay runs/first
+  alidade replay runs/first -o runs/again          keeps what is made again
+
+DIR is a folder of `alidade run` or `alidade sweep`. What it was made from is in its inputs.json and
+config.resolved.yaml. All of its files are compared but timing.json, which has the wall clock. Exit
+code 1: something differs.)";
+
+struct ReplayArguments {
+  std::string folder, output;
+  bool json = false, quiet = false;
+};
+
+/// A folder that is gone with its owner.
+class ScratchFolder {
+ public:
+  ScratchFolder() {
+    std::string name = (fs::temp_directory_path() / "alidade-replay-XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) internal::FailCreate(name, errno);
+    path_ = name;
+  }
+  ~ScratchFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+/// Does the recorded command again, into `output`, and gives its exit code.
+ExitCode MakeAgain(const internal::RecordedInputs& recorded, const fs::path& folder,
+                   const fs::path& scratch, const fs::path& output,
+                   const std::function<ExitCode(const std::vector<std::string>&)>& execute) {
+  // A config gives its name to the title.
+  const fs::path config = scratch / fs::path(recorded.config).filename();
+  std::error_code error;
+  fs::copy_file(folder / internal::kResolvedConfig, config, error);
+  if (error) {
+    throw Error(ExitCode::kInputMissing,
+                ErrorLine(Place{(folder / internal::kResolvedConfig).string()}, {},
+                          "cannot be copied: " + error.message()));
+  }
+  std::vector<std::string> words = recorded.command.arguments;
+  words.insert(words.end(), {config.string(), "-o", output.string(), "--quiet"});
+  for (const fs::path& path : recorded.command.plugin_paths) {
+    if (fs::exists(path, error)) words.insert(words.end(), {"--plugin-path", path.string()});
+  }
+  if (words.front() == "run") words.insert(words.end(), {"--frame-timeout", "none"});
+  return execute(words);
+}
+
+ExitCode Replay(const ReplayArguments& arguments,
+                const std::function<ExitCode(const std::vector<std::string>&)>& execute) {
+  const fs::path folder = Resolved(arguments.folder);
+  const internal::RecordedInputs recorded = internal::ReadReplayable(arguments.folder);
+  const ScratchFolder scratch;
+  const fs::path again =
+      arguments.output.empty() ? scratch.path() / "again" : fs::path(arguments.output);
+  const ExitCode code = MakeAgain(recorded, folder, scratch.path(), again, execute);
+  std::error_code ignored;
+  const bool made = fs::exists(again / internal::kInputsFile, ignored);
+  if (code == ExitCode::kStopped || !made) return code;
+  const internal::ReplayResult result = internal::CompareReplay(folder, again);
+  if (arguments.json) {
+    Print(internal::ReplayJson(result));
+  } else if (!arguments.quiet || !result.equal()) {
+    Print(internal::ReplayText(result, arguments.folder));
+  }
+  return result.equal() ? ExitCode::kOk : ExitCode::kFound;
+}
+
+}  // namespace
+
+void AddReplay(CLI::App& program, Action& action,
+               const std::function<ExitCode(const std::vector<std::string>&)>& execute) {
+  CLI::App& command = *program.add_subcommand(
+      "replay", "Make a run folder again, and compare every byte or name what differs");
+  const auto arguments = std::make_shared<ReplayArguments>();
+  command.add_option("DIR", arguments->folder, "the folder of a run or sweep")
+      ->option_text(" ")
+      ->required()
+      ->check(IsNamed);
+  AddOutput(command, arguments->output,
+            "keep what is made again in that folder; default: a temporary one");
+  command.add_flag("--json", arguments->json, "print the result as JSON");
+  command.add_flag("--quiet", arguments->quiet, "print differences and errors only");
+  command.footer(kReplayFooter);
+  command.callback([&action, arguments, execute] {
+    action = [arguments, execute] { return Replay(*arguments, execute); };
+  });
+}
+
+}  // namespace alidade::cli

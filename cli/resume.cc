@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "resume.h"
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <cstdlib>
+#include <sstream>
+#include <system_error>
+
+#include "alidade/base/words.h"
+#include "alidade/record/leftovers.h"
+#include "alidade/record/run_inputs.h"
+#include "console.h"
+
+namespace alidade::cli {
+
+void AddResume(CLI::App& command, bool& resume) {
+  command
+      .add_flag("--resume", resume,
+                "go on with what a stopped, failed or killed run left at -o, to the same bytes as "
+                "one that was not interrupted")
+      ->needs(command.get_option("--output"));
+}
+
+std::string InputsText(const Input& input, const Config& config,
+                       const std::vector<std::string>& arguments,
+                       const std::vector<std::filesystem::path>& plugins) {
+  std::vector<std::string> given = input.plugin_paths;
+  if (const char* const variable = std::getenv("ALIDADE_PLUGIN_PATH")) {
+    std::istringstream places(variable);
+    for (std::string place; std::getline(places, place, ':');) {
+      if (!place.empty()) given.push_back(place);
+    }
+  }
+  internal::CommandInputs command{arguments, {}};
+  for (const std::filesystem::path& path : Absolute(given)) {
+    if (std::ranges::find(command.plugin_paths, path) == command.plugin_paths.end())
+      command.plugin_paths.push_back(path);
+  }
+  return internal::InputsJson(command, config, plugins);
+}
+
+bool IsFinished(const std::filesystem::path& folder, const Config& config,
+                const std::string& inputs, bool force, bool quiet) {
+  if (!internal::IsFinishedRun(folder, config.ToYaml(), inputs, force)) return false;
+  if (!quiet) PrintNote(folder.string() + " is finished: nothing to resume");
+  return true;
+}
+
+void TellResumed(const std::filesystem::path& folder,
+                 const std::vector<std::filesystem::path>& resumed, const std::string& how) {
+  if (resumed.empty()) {
+    PrintNote(folder.string() + ": nothing to resume, starting anew");
+    return;
+  }
+  std::vector<std::string> names;
+  for (const std::filesystem::path& one : resumed) names.push_back(one.string());
+  PrintNote("resuming " + internal::Join(names) + ": " + how);
+}
+
+void TellKept(const std::vector<std::filesystem::path>& resumed,
+              const std::filesystem::path& folder) {
+  std::error_code ignored;
+  for (const std::filesystem::path& one : resumed) {
+    const bool kept =
+        std::filesystem::exists(one, ignored) && !std::filesystem::equivalent(one, folder, ignored);
+    if (kept) PrintNote(one.string() + " stays: it holds what " + folder.string() + " has not");
+  }
+}
+
+}  // namespace alidade::cli

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "support/program.h"
+
+/// What a run folder holds, to be compared with another.
+namespace alidade::testing {
+
+/// The bytes of every file but timing.json, by name.
+inline std::map<std::string, std::string> RunFiles(const fs::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    const std::string name = entry.path().lexically_relative(folder).string();
+    if (entry.is_regular_file() && name != "timing.json") files[name] = ReadText(entry.path());
+  }
+  return files;
+}
+
+/// The same files with the same bytes; says which are not.
+inline void ExpectSameFiles(const fs::path& folder, const fs::path& expected) {
+  const auto files = RunFiles(folder), others = RunFiles(expected);
+  EXPECT_GT(others.size(), 4u);
+  for (const auto& [name, bytes] : others) {
+    const auto found = files.find(name);
+    EXPECT_TRUE(found != files.end() && found->second == bytes) << name;
+  }
+  for (const auto& [name, bytes] : files) EXPECT_TRUE(others.contains(name)) << name;
+}
+
+}  // namespace alidade::testing

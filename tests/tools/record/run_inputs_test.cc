@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/record/run_inputs.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "alidade/record/build_ids.h"
+#include "support/temporary_folder.h"
+
+namespace alidade::internal {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string Written(const fs::path& file, const std::string& text) {
+  std::ofstream(file, std::ios::binary) << text;
+  return file.string();
+}
+
+std::string InputsOf(const std::string& data, const std::vector<fs::path>& plugins = {},
+                     const std::vector<std::string>& arguments = {"run"}) {
+  const std::string path = data.empty() ? "" : ", path: '" + data + '\'';
+  const Config config = Config::FromText("source: {type: csv" + path + "}\n", "a.yaml");
+  return InputsJson({arguments, {"/somewhere"}}, config, plugins);
+}
+
+std::vector<std::string> Differences(const std::string& before, const std::string& now) {
+  return InputDifferences(before, "out/inputs.json", now);
+}
+
+TEST(RunInputs, AreReadAsTheyWereWritten) {
+  const RecordedInputs inputs =
+      ReadInputs(InputsOf("", {}, {"run", "--covariances"}), "out/inputs.json");
+  EXPECT_EQ(inputs.command.arguments, (std::vector<std::string>{"run", "--covariances"}));
+  EXPECT_EQ(inputs.command.plugin_paths, std::vector<fs::path>{"/somewhere"});
+  EXPECT_EQ(inputs.config, "a.yaml");
+  EXPECT_EQ(inputs.read_once, "");
+  EXPECT_EQ(ReadInputs(InputsOf("-"), "").read_once, "-");
+  EXPECT_EQ(ReadInputs(InputsOf("/dev/null"), "").read_once, "/dev/null");
+}
+
+TEST(RunInputs, NameWhatDiffers) {
+  const testing::TemporaryFolder folder;
+  const std::string data = Written(folder / "a.csv", "1\n");
+  const std::string plugin = Written(folder / "own.so", "one");
+  const std::string before = InputsOf(data, {plugin});
+  EXPECT_EQ(Differences(before, InputsOf(data, {plugin})), std::vector<std::string>{});
+  Written(folder / "own.so", "two");
+  // SHA-256 of `two` and `one`.
+  EXPECT_EQ(Differences(before, InputsOf(data, {plugin})),
+            (std::vector<std::string>{"plugin own.so: now 3fc4ccfe7458..., was 7692c3ad3540..."}));
+  EXPECT_EQ(Differences(before, InputsOf(data)),
+            (std::vector<std::string>{"plugin own.so: missing now"}));
+  Written(folder / "own.so", "one");
+  Written(folder / "a.csv", "2\n");
+  const auto other = Differences(before, InputsOf(data, {plugin}));
+  ASSERT_EQ(other.size(), 1u);
+  EXPECT_TRUE(other[0].starts_with("data " + data + ": now ")) << other[0];
+  Written(folder / "a.csv", "1\n");
+  EXPECT_EQ(Differences(before, InputsOf(data, {plugin}, {"run", "--no-figures"})),
+            (std::vector<std::string>{"command: now 'run --no-figures', was 'run'"}));
+}
+
+TEST(RunInputs, AFolderOfDataStandsForItsFiles) {
+  const testing::TemporaryFolder folder;
+  const fs::path data = folder / "data";
+  fs::create_directories(data / "deeper");
+  Written(data / "a.csv", "1\n");
+  const std::string before = InputsOf(data.string());
+  Written(data / "deeper/b.csv", "1\n");
+  EXPECT_EQ(Differences(before, InputsOf(data.string())), std::vector<std::string>{});
+  Written(data / "truth.tum", "1\n");
+  EXPECT_EQ(Differences(before, InputsOf(data.string())),
+            (std::vector<std::string>{"data " + (data / "truth.tum").string() + ": new"}));
+}
+
+TEST(RunInputs, WhatIsNoRecordIsRefused) {
+  for (const char* text : {"[]", "{}", "{\"arguments\": 1}"}) {
+    try {
+      ReadInputs(text, "out/inputs.json");
+      ADD_FAILURE() << text;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::kBadData);
+      EXPECT_TRUE(std::string(error.what()).starts_with("out/inputs.json: is not ")) << text;
+    }
+  }
+}
+
+TEST(BuildIds, NameTheProgramAndTheLibrariesThatCompute) {
+  const auto ids = BuildIds();
+  for (const char* name : {"program", "processor"}) {
+    ASSERT_TRUE(ids.contains(name));
+    EXPECT_NE(ids.at(name), "") << name;
+  }
+  const std::string& program = ids.at("program");
+  EXPECT_GE(program.size(), 32u);
+  EXPECT_EQ(program.find_first_not_of("0123456789abcdef"), std::string::npos) << program;
+  const auto has = [&](const char* start) {
+    return std::ranges::any_of(ids, [&](const auto& one) { return one.first.starts_with(start); });
+  };
+  EXPECT_TRUE(has("libalidade-core.so"));
+  EXPECT_TRUE(has("libalidade-tools.so"));
+}
+
+}  // namespace
+}  // namespace alidade::internal

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/sweep/finished_runs.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+
+#include "support/temporary_folder.h"
+
+namespace alidade::internal {
+namespace {
+
+SweepRun MakeRun(std::uint64_t seed) {
+  SweepRun run;
+  run.seed = seed;
+  run.code = ExitCode::kDiverged;
+  run.reason = "estimator 'a' \"diverged\"\n";
+  run.withheld = true;
+  EstimatorResult& one = run.estimators.emplace_back();
+  one.name = "a";
+  one.diverged = one.failed = true;
+  one.units = {{"depth", "m"}};
+  one.counts = {{"accepted:stereo", 75}};
+  one.metrics = {{"third", 1.0 / 3.0},
+                 {"least", 5e-324},
+                 {"zero", -0.0},
+                 {"nan", std::numeric_limits<double>::quiet_NaN()},
+                 {"inf", -std::numeric_limits<double>::infinity()}};
+  return run;
+}
+
+TEST(FinishedRuns, AreReadAsTheyWereWritten) {
+  const testing::TemporaryFolder temporary;
+  {
+    OutputFolder first(temporary / "out", false);
+    FinishedRuns runs(first, {});
+    runs.Add("x=1", MakeRun(std::numeric_limits<std::uint64_t>::max()));
+    SweepRun failed = MakeRun(2);
+    failed.status = RunStatus::kFailed;
+    runs.Add("x=1", failed);
+    EXPECT_FALSE(first.failed().empty()) << "it is worth keeping";
+  }
+  const std::vector<std::filesystem::path> before = FailedFolders(temporary / "out");
+  ASSERT_EQ(before.size(), 1u);
+  OutputFolder second(temporary / "out", false);
+  const FinishedRuns runs(second, before);
+  EXPECT_EQ(runs.size(), 1u);
+  EXPECT_EQ(runs.Find("x=1", 2), nullptr) << "one that failed is tried again";
+  EXPECT_EQ(runs.Find("", std::numeric_limits<std::uint64_t>::max()), nullptr);
+  const FinishedRuns::Known* const known =
+      runs.Find("x=1", std::numeric_limits<std::uint64_t>::max());
+  ASSERT_NE(known, nullptr);
+  const SweepRun expected = MakeRun(std::numeric_limits<std::uint64_t>::max());
+  EXPECT_EQ(known->run.code, expected.code);
+  EXPECT_EQ(known->run.reason, expected.reason);
+  EXPECT_EQ(known->run.withheld, expected.withheld);
+  ASSERT_EQ(known->run.estimators.size(), 1u);
+  const EstimatorResult &one = known->run.estimators[0], &was = expected.estimators[0];
+  EXPECT_EQ(one.name, was.name);
+  EXPECT_TRUE(one.diverged && one.failed && !one.inconsistent);
+  EXPECT_EQ(one.units, was.units);
+  EXPECT_EQ(one.counts, was.counts);
+  ASSERT_EQ(one.metrics.size(), was.metrics.size());
+  for (const auto& [key, value] : was.metrics) {
+    if (std::isnan(value)) {
+      EXPECT_TRUE(std::isnan(one.metrics.at(key)));
+    } else {
+      EXPECT_EQ(one.metrics.at(key), value) << key;
+      EXPECT_EQ(std::signbit(one.metrics.at(key)), std::signbit(value)) << key;
+    }
+  }
+  EXPECT_EQ(RunLine("x=1", known->run), RunLine("x=1", expected));
+}
+
+TEST(FinishedRuns, ALineThatWasCutIsNoneAndAnyOtherIsRefused) {
+  const testing::TemporaryFolder temporary;
+  std::filesystem::create_directory(temporary / "left");
+  const std::string line = RunLine("", MakeRun(1));
+  std::ofstream(temporary / "left/finished_runs.jsonl") << line << line.substr(0, 40);
+  OutputFolder folder(temporary / "out", false);
+  EXPECT_EQ(FinishedRuns(folder, {temporary / "left"}).size(), 1u);
+  std::ofstream(temporary / "left/finished_runs.jsonl") << line << "{\"seed\": \"one\"}\n";
+  OutputFolder other(temporary / "other", false);
+  try {
+    const FinishedRuns runs(other, {temporary / "left"});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::kBadData);
+    EXPECT_TRUE(std::string(error.what())
+                    .starts_with((temporary / "left/finished_runs.jsonl").string() + ":2: "))
+        << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace alidade::internal

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <istream>
+#include <optional>
+#include <string>
+
+/// Files that ought to be the same, line by line.
+namespace alidade::internal {
+
+/// The first place where two files differ.
+struct RowDifference {
+  std::int64_t line = 0, column = 0;  ///< from 1
+  std::string before, now;            ///< the cell there, or the start of it; "": no text
+
+  /// `now '0.51', was '0.5'`, or `other bytes`
+  std::string Text() const;
+};
+
+struct RowComparison {
+  std::optional<RowDifference> difference;  ///< in the rows that both have
+  std::int64_t rows = 0;                    ///< that both have and are equal
+  bool before_goes_on = false;              ///< it has more rows, the same ones up to there
+  bool now_goes_on = false;
+};
+
+/// A last row of `before` without a line end: one like any other, or one that was cut.
+enum class LastRow { kCounts, kWhereWhole };
+
+RowComparison CompareRows(std::istream& before, std::istream& now, LastRow last_row);
+/// A file that cannot be read has no rows.
+RowComparison CompareRows(const std::filesystem::path& before, const std::filesystem::path& now,
+                          LastRow last_row);
+
+}  // namespace alidade::internal

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/record/replay.h"
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <system_error>
+
+#include "alidade/base/error.h"
+#include "alidade/base/json.h"
+#include "alidade/base/read_file.h"
+#include "alidade/base/words.h"
+#include "alidade/record/compare_rows.h"
+#include "alidade/record/leftovers.h"
+
+namespace alidade::internal {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string ReadInputsText(const fs::path& file) {
+  return ReadFile(file, [&](ExitCode code, int error) {
+    throw Error(code, ErrorLine(Place{file.string()}, {},
+                                "cannot be read: " + std::generic_category().message(error),
+                                "the folder of an `alidade run` or `alidade sweep`"));
+  });
+}
+
+/// What `files.txt` of a folder lists, as far as these are files.
+std::set<std::string> ListedFiles(const fs::path& folder) {
+  std::ifstream list(folder / "files.txt");
+  std::set<std::string> names;
+  std::error_code ignored;
+  for (std::string name; std::getline(list, name);) {
+    if (!fs::is_directory(folder / name, ignored)) names.insert(name);
+  }
+  return names;
+}
+
+}  // namespace
+
+RecordedInputs ReadReplayable(const fs::path& folder) {
+  const fs::path file = folder / kInputsFile;
+  const RecordedInputs inputs = ReadInputs(ReadInputsText(file), file.string());
+  const std::vector<std::string>& arguments = inputs.command.arguments;
+  if (arguments.empty() || (arguments[0] != "run" && arguments[0] != "sweep")) {
+    throw Error(ExitCode::kBadData, ErrorLine(Place{file.string()}, "arguments",
+                                              "no command that makes a folder", "run or sweep"));
+  }
+  if (!inputs.read_once.empty()) {
+    throw Error(ExitCode::kInputMissing,
+                ErrorLine(Place{folder.string()}, {},
+                          "its data came from '" + inputs.read_once + "', which could be read once",
+                          "a run on files"));
+  }
+  if (RecordedStatus(folder) == "stopped") {
+    throw Error(ExitCode::kBadData,
+                ErrorLine(Place{folder.string()}, {}, "was stopped before its end",
+                          "a run that came to it; --resume of the same command goes on"));
+  }
+  return inputs;
+}
+
+ReplayResult CompareReplay(const fs::path& before, const fs::path& now) {
+  constexpr const char* kTiming = "timing.json";
+  ReplayResult result;
+  result.inputs =
+      InputDifferences(ReadInputsText(before / kInputsFile), (before / kInputsFile).string(),
+                       ReadInputsText(now / kInputsFile));
+  std::set<std::string> made = ListedFiles(now);
+  std::error_code ignored;
+  for (const std::string& name : ListedFiles(before)) {
+    const bool is_made = made.erase(name) > 0;
+    if (name == kTiming) {
+      result.left_out.push_back(name);
+      continue;
+    }
+    ++result.files;
+    if (name == kInputsFile && !result.inputs.empty()) continue;
+    if (!fs::exists(before / name, ignored)) {
+      result.differences.push_back({name, 0, 0, "has been removed"});
+      continue;
+    }
+    if (!is_made) {
+      result.differences.push_back({name, 0, 0, "is not made now"});
+      continue;
+    }
+    const RowComparison rows = CompareRows(before / name, now / name, LastRow::kCounts);
+    if (rows.difference) {
+      result.differences.push_back(
+          {name, rows.difference->line, rows.difference->column, rows.difference->Text()});
+    } else if (rows.before_goes_on || rows.now_goes_on) {
+      result.differences.push_back(
+          {name, rows.rows + 1, 1, rows.now_goes_on ? "now there is more" : "ends here now"});
+    }
+  }
+  for (const std::string& name : made) {
+    if (name == kTiming) continue;
+    ++result.files;
+    result.differences.push_back({name, 0, 0, "is new"});
+  }
+  return result;
+}
+
+std::string ReplayJson(const ReplayResult& result) {
+  Json json = {{"equal", result.equal()}, {"files", result.files}};
+  json["not_compared"] = result.left_out;
+  json["inputs"] = result.inputs;
+  Json& differences = json["differences"] = Json::array();
+  for (const FileDifference& one : result.differences) {
+    Json& entry = differences.emplace_back(Json{{"file", one.file}});
+    if (one.line > 0) entry["line"] = one.line;
+    if (one.line > 0) entry["column"] = one.column;
+    entry["what"] = one.what;
+  }
+  return JsonText(json);
+}
+
+std::string ReplayText(const ReplayResult& result, const std::string& folder) {
+  std::string text;
+  for (const std::string& one : result.inputs) text += "input differs: " + one + '\n';
+  for (const FileDifference& one : result.differences) {
+    const Place place{(fs::path(folder) / one.file).string(), static_cast<int>(one.line),
+                      static_cast<int>(one.column)};
+    text += "differs: " + ToString(place) + ": " + one.what + '\n';
+  }
+  const std::string left_out = Join(result.left_out);
+  text += folder + ": " +
+          (result.equal() ? "all " + std::to_string(result.files) + " files are equal"
+                          : std::to_string(result.differences.size()) + " of " +
+                                std::to_string(result.files) + " files differ") +
+          (left_out.empty() ? "" : "; not compared: " + left_out) + '\n';
+  return text;
+}
+
+}  // namespace alidade::internal

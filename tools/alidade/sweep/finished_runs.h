@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "alidade/base/output_folder.h"
+#include "alidade/sweep/sweep.h"
+
+namespace alidade::internal {
+
+constexpr const char* kFinishedRuns = "finished_runs.jsonl";
+
+/// The text of a run that came to its end, one line of JSON with all that the files of a sweep rest
+/// on: `value` is that of the varied key, "" where none is varied.
+std::string RunLine(const std::string& value, const SweepRun& run);
+
+/// The finished runs of a sweep that is not finished itself, in `finished_runs.jsonl` of its
+/// folder: a sweep that resumes it takes them from there.
+class FinishedRuns {
+ public:
+  /// Creates the file in `folder`, with what is in those of `before`. Errors: kBadData with the
+  /// line, kCannotCreate, kIo.
+  FinishedRuns(OutputFolder& folder, const std::vector<std::filesystem::path>& before);
+
+  struct Known {
+    SweepRun run;
+    Place place;  ///< where it was read
+  };
+  /// Null: it was not finished before.
+  const Known* Find(const std::string& value, std::uint64_t seed) const;
+  /// How many were.
+  std::size_t size() const { return known_.size(); }
+  /// Adds a run that came to its end; the folder is worth keeping from now on. Not from two threads
+  /// at once. Error: kIo.
+  void Add(const std::string& value, const SweepRun& run);
+  /// Error: kIo.
+  void Close() { file_->Close(); }
+
+ private:
+  void Read(const std::filesystem::path& file);
+
+  OutputFolder& folder_;
+  std::map<std::pair<std::string, std::uint64_t>, Known> known_;
+  std::unique_ptr<OutputFile> file_;
+};
+
+}  // namespace alidade::internal

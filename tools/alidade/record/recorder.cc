@@ -12,7 +12,6 @@
 #include "alidade/base/log.h"
 #include "alidade/base/output_folder.h"
 #include "alidade/base/read_file.h"
-#include "alidade/base/sha256.h"
 #include "alidade/record/data_hash.h"
 #include "alidade/record/estimator_files.h"
 #include "alidade/record/figures.h"
@@ -94,7 +93,7 @@ Recorder::Impl::Impl(const Options& given, const Config& read, const PluginHost&
 
 void Recorder::Impl::AddPlugins(const Experiment& experiment) {
   for (const std::filesystem::path& file : internal::PluginsInUse(experiment, config, host)) {
-    facts.plugins.emplace(file.filename().string(), internal::Sha256OfFile(file));
+    facts.plugins.emplace(file.filename().string(), internal::PluginHash(file));
   }
 }
 

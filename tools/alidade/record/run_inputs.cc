@@ -134,6 +134,14 @@ std::vector<fs::path> PluginsInUse(const Experiment& experiment, const Config& c
   return files;
 }
 
+std::string PluginHash(const fs::path& file) {
+  std::string hash = Sha256OfFile(file);
+  if (hash.empty()) {
+    throw Error(ExitCode::kIo, ErrorLine(Place{file.string()}, {}, "cannot be read for its hash"));
+  }
+  return hash;
+}
+
 std::string InputsJson(const CommandInputs& command, const Config& config,
                        const std::vector<fs::path>& plugins) {
   std::vector<std::string> paths, build, used;
@@ -141,7 +149,7 @@ std::string InputsJson(const CommandInputs& command, const Config& config,
   for (const auto& [name, id] : BuildIds())
     build.push_back(JsonString(name) + ": " + JsonString(id));
   std::multimap<std::string, std::string> hashes;  // by name, wherever they lie
-  for (const fs::path& file : plugins) hashes.emplace(file.filename().string(), Sha256OfFile(file));
+  for (const fs::path& file : plugins) hashes.emplace(file.filename().string(), PluginHash(file));
   for (const auto& [file, hash] : hashes) {
     used.push_back("{\"file\": " + JsonString(file) + ", \"sha256\": " + JsonString(hash) + '}');
   }

@@ -28,6 +28,9 @@ struct CommandInputs {
 std::vector<std::filesystem::path> PluginsInUse(const Experiment& experiment, const Config& config,
                                                 const PluginHost& host);
 
+/// SHA-256 of a plugin in use. Error: kIo.
+std::string PluginHash(const std::filesystem::path& file);
+
 /// The text of `inputs.json`. Reads plugins and data for their hashes; a folder of data stands for
 /// the files in it, a pipe has no hash.
 std::string InputsJson(const CommandInputs& command, const Config& config,

@@ -57,9 +57,9 @@ ALIDADE_INLINE bool FastPath::StepModel(const Motion& motion, double dt_s, doubl
   for (int i = 0; i < k * k; ++i) f[i] = kUnwritten;
   for (int i = 0; i < k * w; ++i) g[i] = kUnwritten;
   for (int i = 0; i < w * w; ++i) l[i] = kUnwritten;
-  if (motion.model.Step(motion.x.data(), step.u.data(), nullptr, dt_s, motion.next.data(), f, g) !=
-          Status::kOk ||
-      motion.model.SqrtQ(motion.x.data(), step.u.data(), dt_s, l) != Status::kOk) {
+  if (motion.model.Step<false>(motion.x.data(), step.u.data(), nullptr, dt_s, motion.next.data(), f,
+                               g) != Status::kOk ||
+      motion.model.SqrtQ<false>(motion.x.data(), step.u.data(), dt_s, l) != Status::kOk) {
     return false;
   }
   double own[K > 0 ? K * K : 1];
@@ -112,9 +112,9 @@ ALIDADE_INLINE bool FastPath::Linearise(Sensor& sensor, const double* z, Measure
   for (int i = 0; i < m * m; ++i) l[i] = kUnwritten;
   for (int i = 0; i < m * N; ++i) sensor.h.data()[i] = sensor.blank.data()[i];
   const double* const* const roles = sensor.roles.data();
-  if (sensor.model.Linearise(roles, h, sensor.jacobians.data(), sensor.strides.data()) !=
+  if (sensor.model.Linearise<false>(roles, h, sensor.jacobians.data(), sensor.strides.data()) !=
           Status::kOk ||
-      sensor.model.SqrtNoise(roles, sensor.seen, l) != Status::kOk) {
+      sensor.model.SqrtNoise<false>(roles, sensor.seen, l) != Status::kOk) {
     return false;
   }
   for (int i = 0; i < m; ++i) {
@@ -196,7 +196,7 @@ ALIDADE_INLINE FastPath::Taken FastPath::Take(Sensor& sensor, const Measurement&
     return Taken::kUnusual;
   }
   sensor.seen.z = z;
-  const Status valid = sensor.model.Valid(sensor.seen);
+  const Status valid = sensor.model.Valid<false>(sensor.seen);
   if (valid != Status::kOk && valid != Status::kInvalid) return Taken::kUnusual;
   MeasurementReport& entry = f_.report.Add();
   if (valid == Status::kInvalid) {
@@ -279,6 +279,14 @@ bool FastPath::ProcessSized(FastPath& path, const Frame& frame) {
     f.motions.CountStep();
   }
   return path.Update<N>(frame);
+}
+
+bool FastPath::Process(const Frame& frame) {
+  try {
+    return process_(*this, frame);
+  } catch (...) {  // by a model: the loop asks it again, and names it
+    return false;
+  }
 }
 
 bool FastPath::AddMotions() {

@@ -32,7 +32,7 @@ class FastPath {
   /// layout, with plain joint updates. It points into the parts.
   static std::unique_ptr<FastPath> For(const FastParts& parts);
   /// As a filter processes a frame, all of it or nothing but the step.
-  bool Process(const Frame& frame) { return process_(*this, frame); }
+  bool Process(const Frame& frame);
 
  private:
   static constexpr int kRows = 8;       ///< most rows of an update

@@ -403,7 +403,7 @@ Status SensorModel::LineariseKnowing(const double* const* roles, double* z,
                                      const double* known) const {
   ALIDADE_EXPECTS(known != nullptr);
   const AlidadeObservation seen = detail::Seen(nullptr, known);
-  return detail::CallModel(
+  return detail::CallModel<true>(
       &sensor_->eval, [&] { return sensor_->eval(self_, &seen, roles, z, jacobians, strides); });
 }
 
@@ -412,7 +412,7 @@ Status SensorModel::Initialise(const double* const* roles, const double* z, cons
                                const double* known) const {
   ALIDADE_EXPECTS(initialised_role_ >= 0);
   const AlidadeObservation seen = detail::Seen(z, known);
-  return detail::CallModel(&sensor_->initialise, [&] {
+  return detail::CallModel<true>(&sensor_->initialise, [&] {
     return sensor_->initialise(self_, &seen, roles, prior, y, jx, instance_->tangents().data(), jz,
                                measurement().geometry.tangent, jp, prior_size_);
   });

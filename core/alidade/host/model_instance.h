@@ -21,14 +21,19 @@ namespace detail {
 /// error text of its instance in this thread.
 [[gnu::cold]] Status Thrown(const void* slot) noexcept;
 
-/// The status of `call`, of a model's function in `slot` of its call table.
-template <class Call>
-Status CallModel(const void* slot, const Call& call) {
+inline Status ToStatus(std::int32_t code) {
+  const bool known = code >= ALIDADE_OK && code < ALIDADE_ERROR;
+  return known ? static_cast<Status>(code) : Failed();
+}
+
+/// The status of `call`, of a model's function in `slot` of its call table. Unless `kGuarded` what
+/// it throws goes on to the caller: a step of a small filter is a quarter shorter.
+template <bool kGuarded, class Call>
+[[gnu::always_inline]] inline Status CallModel(const void* slot, const Call& call) {
   NoteCall(slot);
+  if constexpr (!kGuarded) return ToStatus(call());
   try {
-    const std::int32_t code = call();
-    const bool known = code >= ALIDADE_OK && code < ALIDADE_ERROR;
-    return known ? static_cast<Status>(code) : Failed();
+    return ToStatus(call());
   } catch (...) {
     return Thrown(slot);
   }
@@ -138,10 +143,11 @@ class SensorModel {
     return Linearise(roles, z, nullptr, nullptr, known);
   }
   /// z and jacobians[i] = dz/d role_i, row stride strides[i]; a null jacobian is skipped.
+  template <bool kGuarded = true>
   Status Linearise(const double* const* roles, double* z, double* const* jacobians,
                    const int* strides, const double* known = nullptr) const {
     if (known_size_ > 0) return LineariseKnowing(roles, z, jacobians, strides, known);
-    return detail::CallModel(&sensor_->eval, [&] {
+    return detail::CallModel<kGuarded>(&sensor_->eval, [&] {
       return sensor_->eval(self_, &detail::kUnseen, roles, z, jacobians, strides);
     });
   }
@@ -151,17 +157,20 @@ class SensorModel {
     return SqrtNoise(roles, detail::Seen(z, known), l);
   }
   /// The same of a measurement as it is shown to the plugin, which takes as long to make as a call.
+  template <bool kGuarded = true>
   Status SqrtNoise(const double* const* roles, const AlidadeObservation& seen, double* l) const {
-    return detail::CallModel(&sensor_->sqrt_noise, [&] {
+    return detail::CallModel<kGuarded>(&sensor_->sqrt_noise, [&] {
       return sensor_->sqrt_noise(self_, &seen, roles, l, measurement().geometry.tangent);
     });
   }
   Status Valid(const double* z, const double* known = nullptr) const {
     return Valid(detail::Seen(z, known));
   }
+  template <bool kGuarded = true>
   Status Valid(const AlidadeObservation& seen) const {
     if (sensor_->valid == nullptr) return Status::kOk;
-    return detail::CallModel(&sensor_->valid, [&] { return sensor_->valid(self_, &seen); });
+    return detail::CallModel<kGuarded>(&sensor_->valid,
+                                       [&] { return sensor_->valid(self_, &seen); });
   }
   /// y = g(other roles, z), dense row-major Jacobians jx[i] = dy/d role_i and jz = dy/dz. kInvalid
   /// where a prior is needed.
@@ -208,16 +217,18 @@ class MotionModel {
 
   /// x', where `w` may be null (zero), F (n x n) and G (n x n_w) dense row-major; F and G may both
   /// be null.
+  template <bool kGuarded = true>
   Status Step(const double* const* blocks, const double* input, const double* w, double dt_s,
               double* const* next, double* f, double* g) const {
-    return detail::CallModel(&motion_->step, [&] {
+    return detail::CallModel<kGuarded>(&motion_->step, [&] {
       return motion_->step(self_, blocks, &input, w != nullptr ? w : zero_noise_.data(), dt_s, next,
                            f, tangent_size_, g, noise_size_, nullptr, 0);
     });
   }
   /// l, row-major n_w x n_w, with Qw = l l'.
+  template <bool kGuarded = true>
   Status SqrtQ(const double* const* blocks, const double* input, double dt_s, double* l) const {
-    return detail::CallModel(&motion_->sqrt_q, [&] {
+    return detail::CallModel<kGuarded>(&motion_->sqrt_q, [&] {
       return motion_->sqrt_q(self_, blocks, &input, dt_s, l, noise_size_);
     });
   }

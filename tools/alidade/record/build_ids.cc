@@ -45,6 +45,7 @@ std::string BuildIdOf(const dl_phdr_info& object) {
   for (int i = 0; i < object.dlpi_phnum; ++i) {
     const ElfW(Phdr)& segment = object.dlpi_phdr[i];
     if (segment.p_type != PT_NOTE) continue;
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): the loader tells addresses as integers
     const auto* const start = reinterpret_cast<const char*>(object.dlpi_addr + segment.p_vaddr);
     if (const std::string id = BuildIdIn({start, segment.p_memsz}); !id.empty()) return id;
   }

@@ -113,7 +113,8 @@ void RemoveAllOf(const fs::path& leftover, const fs::path& finished) {
   std::error_code ignored;
   RemoveMarks(leftover);
   std::vector<fs::path> files = FilesOf(leftover);
-  std::ranges::stable_partition(files, [](const fs::path& name) { return name != kInputsFile; });
+  std::stable_partition(files.begin(), files.end(),
+                        [](const fs::path& name) { return name != kInputsFile; });
   for (const fs::path& name : files) {
     const bool known = Holds(kOnlyOfUnfinished, name.string()) ||
                        fs::is_regular_file(fs::symlink_status(finished / name, ignored));

@@ -88,6 +88,17 @@ TEST_F(ResumeCli, LeavesWhatItDidNotWrite) {
             (std::map<std::string, std::string>{{"notes.txt", "mine"}}));
 }
 
+// A process that was killed while it removed what it had resumed leaves empty folders.
+TEST_F(ResumeCli, EmptyFoldersAreNothingToResume) {
+  fs::create_directories(folder_ / "out.failed-1/ekf");
+  const Outcome fresh = Run({"--resume"});
+  EXPECT_EQ(fresh.code, 0) << fresh.err;
+  EXPECT_FALSE(Exists("out.failed-1"));
+  fs::create_directories(folder_ / "out.failed-1/ekf");
+  EXPECT_EQ(Run({"--resume"}).code, 0) << "finished";
+  EXPECT_FALSE(Exists("out.failed-1"));
+}
+
 TEST_F(ResumeCli, WithNothingToResumeSaysSo) {
   const Outcome fresh = Run({"--resume"});
   EXPECT_EQ(fresh.code, 0) << fresh.err;

@@ -170,6 +170,11 @@ bool IsFinishedRun(const fs::path& target, const std::string& config, const std:
 }
 
 Leftovers::Leftovers(const fs::path& target) : target_(target), folders_(FailedFolders(target)) {
+  std::erase_if(folders_, [](const fs::path& folder) {
+    if (!FilesOf(folder).empty()) return false;
+    RemoveEmpty(folder);  // the end of a removal that was killed
+    return true;
+  });
   if (StatusOf(target) == FolderStatus::kUnfinished) folders_.push_back(target);
 }
 

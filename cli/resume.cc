@@ -4,11 +4,10 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
-#include <cstdlib>
-#include <sstream>
 #include <system_error>
 
 #include "alidade/base/words.h"
+#include "alidade/host/plugin_file.h"
 #include "alidade/record/leftovers.h"
 #include "alidade/record/run_inputs.h"
 #include "console.h"
@@ -27,12 +26,7 @@ std::string InputsText(const Input& input, const Config& config,
                        const std::vector<std::string>& arguments,
                        const std::vector<std::filesystem::path>& plugins) {
   std::vector<std::string> given = input.plugin_paths;
-  if (const char* const variable = std::getenv("ALIDADE_PLUGIN_PATH")) {
-    std::istringstream places(variable);
-    for (std::string place; std::getline(places, place, ':');) {
-      if (!place.empty()) given.push_back(place);
-    }
-  }
+  for (const auto& folder : internal::PluginFoldersOfEnvironment()) given.push_back(folder);
   internal::CommandInputs command{arguments, {}};
   for (const std::filesystem::path& path : Absolute(given)) {
     if (std::ranges::find(command.plugin_paths, path) == command.plugin_paths.end())

@@ -95,6 +95,7 @@ std::set<std::filesystem::path> TryTogether(const std::set<std::filesystem::path
     } catch (const std::exception&) {  // OpenPlugin says why
     }
   }
+  if (all.empty()) return {};
   const SharedJournal journal;
   const ChildEnd end = RunInChild({kMostSeconds, 0}, *journal, [&]() -> std::string {
     const auto fails = [](const Examined& one) { return !Try(one.canonical, one.kind).empty(); };
@@ -108,7 +109,7 @@ std::set<std::filesystem::path> TryTogether(const std::set<std::filesystem::path
 
 OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical,
                         bool tried) {
-  const AlidadeBuildTag build_tag = Examine(file, canonical);
+  const AlidadeBuildTag build_tag = tried ? ReadBuildTag(canonical) : Examine(file, canonical);
   const std::string failure = tried ? std::string() : TrialLoad(canonical, build_tag.kind);
   if (!failure.empty()) Refuse(file, failure);
 

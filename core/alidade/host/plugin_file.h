@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "alidade/host/plugin_host.h"
 #include "alidade/model/plugin_abi.h"
@@ -14,6 +15,9 @@ namespace alidade {
 struct CppPluginTable;
 
 namespace internal {
+
+/// The folders of ALIDADE_PLUGIN_PATH, in its order.
+std::vector<std::filesystem::path> PluginFoldersOfEnvironment();
 
 /// A plugin that is open for the rest of the process.
 struct OpenedPlugin {
@@ -38,13 +42,14 @@ std::filesystem::path FolderOfProgram();
 /// C++ plugin of another build. Errors: kPlugin.
 void CheckBuild(const AlidadeBuildTag& build_tag, const std::filesystem::path& file);
 
-/// Tries the plugins in one child process, one after the other. Those that are without fault there;
-/// none where any has one, so that each has to be tried by itself.
+/// Examines the plugins as OpenPlugin does, and tries those that pass in one child process, one
+/// after the other. They are the result; none where any has a fault there, so that each has to be
+/// tried by itself.
 std::set<std::filesystem::path> TryTogether(const std::set<std::filesystem::path>& files);
 
-/// Checks build tag, build and trust, tries the plugin in a child process, unless it has been
-/// `tried`, opens it and walks its table. `canonical` is `file` behind its links. Errors: kPlugin,
-/// kNotTrusted.
+/// Checks build tag, build and trust, tries the plugin in a child process, opens it and walks its
+/// table; of one that TryTogether has `tried` the last two alone. `canonical` is `file` behind its
+/// links. Errors: kPlugin, kNotTrusted.
 OpenedPlugin OpenPlugin(const std::filesystem::path& file, const std::filesystem::path& canonical,
                         bool tried = false);
 

@@ -25,17 +25,6 @@ using internal::Text;
 static_assert(std::string_view(ALIDADE_BUILD_VERSION) == ALIDADE_VERSION,
               "cpp_plugin.h states another version than the project");
 
-std::vector<fs::path> FoldersOf(const char* variable) {
-  std::vector<fs::path> folders;
-  std::string rest = Text(secure_getenv(variable));
-  while (!rest.empty()) {
-    const std::size_t colon = std::min(rest.find(':'), rest.size());
-    if (colon > 0) folders.emplace_back(rest.substr(0, colon));
-    rest.erase(0, colon + 1);
-  }
-  return folders;
-}
-
 std::optional<fs::path> UserFolder() {
   const fs::path data = Text(secure_getenv("XDG_DATA_HOME"));
   if (data.is_absolute()) return data / "alidade/plugins";
@@ -50,6 +39,17 @@ PluginEntry::Kind ToKind(std::uint32_t kind) {
 
 }  // namespace
 
+std::vector<fs::path> internal::PluginFoldersOfEnvironment() {
+  std::vector<fs::path> folders;
+  std::string rest = Text(secure_getenv("ALIDADE_PLUGIN_PATH"));
+  while (!rest.empty()) {
+    const std::size_t colon = std::min(rest.find(':'), rest.size());
+    if (colon > 0) folders.emplace_back(rest.substr(0, colon));
+    rest.erase(0, colon + 1);
+  }
+  return folders;
+}
+
 fs::path internal::FolderOfProgram() {
   Dl_info info{};
   const auto* here = reinterpret_cast<const void*>(&HostBuildId);
@@ -62,7 +62,7 @@ fs::path internal::FolderOfProgram() {
 PluginHost::PluginHost(const std::vector<fs::path>& files_and_folders, OnRefusal on_refusal) {
   const bool required = on_refusal == OnRefusal::kThrow;
   for (const fs::path& place : files_and_folders) LoadPlace(place, "given", required);
-  for (const fs::path& folder : FoldersOf("ALIDADE_PLUGIN_PATH")) {
+  for (const fs::path& folder : internal::PluginFoldersOfEnvironment()) {
     LoadPlace(folder, "ALIDADE_PLUGIN_PATH", false);
   }
   if (const auto folder = UserFolder()) LoadPlace(*folder, "user data folder", false);

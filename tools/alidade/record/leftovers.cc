@@ -88,10 +88,7 @@ std::optional<fs::path> LongerIn(const fs::path& leftover, const fs::path& folde
     if (!rows.difference) continue;
     const Place place{(leftover / name).string(), static_cast<int>(rows.difference->line),
                       static_cast<int>(rows.difference->column)};
-    throw Error(ExitCode::kFound,
-                ErrorLine(place, {}, rows.difference->Text()) +
-                    "; config, data, plugins and build are as they were: another machine, a file "
-                    "next to the data, or a model that is not deterministic (`alidade check`)");
+    FailOtherResults(place, rows.difference->Text());
   }
   return longer;
 }
@@ -124,6 +121,13 @@ void RemoveAllOf(const fs::path& leftover, const fs::path& finished) {
 }
 
 }  // namespace
+
+void FailOtherResults(const Place& place, const std::string& what) {
+  throw Error(ExitCode::kFound,
+              ErrorLine(place, {}, what) +
+                  "; config, data, plugins and build are as they were: another machine, a file "
+                  "next to the data, or a model that is not deterministic (`alidade check`)");
+}
 
 std::string RecordedStatus(const fs::path& folder) {
   const std::string run = StatusIn(folder / "run.json");

@@ -7,11 +7,20 @@
 #include <string>
 #include <vector>
 
+#include "alidade/base/error.h"
+
 namespace alidade::internal {
+
+/// What was recorded at `place` comes out otherwise from the same inputs. Error: kFound.
+[[noreturn]] void FailOtherResults(const Place& place, const std::string& what);
 
 /// Whether a folder is that of a run or sweep, and whether that came to its end.
 enum class FolderStatus { kOther, kUnfinished, kFinished };
 FolderStatus StatusOf(const std::filesystem::path& folder);
+/// Whether what resumes others may take the place of what is there.
+inline bool IsNotFinished(const std::filesystem::path& folder) {
+  return StatusOf(folder) != FolderStatus::kFinished;
+}
 /// `status` in its run.json or sweep.json; "": there is none.
 std::string RecordedStatus(const std::filesystem::path& folder);
 

@@ -66,11 +66,6 @@ std::string TextOf(const Node& map, std::string_view key, const std::string& fal
   return node && node->kind() == Node::Kind::kScalar ? node->Text() : fallback;
 }
 
-/// Whether a run that resumes others takes the place of what is there: not that of a finished run.
-bool MayReplace(const Recorder::Options& options) {
-  return options.resume && internal::StatusOf(options.folder) != internal::FolderStatus::kFinished;
-}
-
 /// An svg file as an element of a page: without its XML prolog.
 std::string AsElement(const std::string& svg) {
   const std::size_t at = svg.find("<svg");
@@ -81,7 +76,7 @@ std::string AsElement(const std::string& svg) {
 
 Recorder::Impl::Impl(const Options& given, const Config& read, const PluginHost& plugin_host)
     : options(given),
-      folder(given.folder, given.force || MayReplace(given)),
+      folder(given.folder, given.force || (given.resume && internal::IsNotFinished(given.folder))),
       config(read),
       host(plugin_host),
       title(TextOf(config.root(), "title", std::filesystem::path(config.name()).stem().string())),

@@ -46,11 +46,6 @@ void SweepFolder::Impl::Commit(bool stopped) {
 
 namespace {
 
-/// Whether a sweep that resumes others takes the place of what is there: not of a finished one.
-bool MayReplaceFolder(const SweepFolder::Options& options) {
-  return options.resume && internal::StatusOf(options.folder) != internal::FolderStatus::kFinished;
-}
-
 /// A sweep, and the value of the varied key that it is of, "" where none is varied.
 struct Part {
   const SweepResult* result;
@@ -189,7 +184,8 @@ SweepFolder::SweepFolder(const std::filesystem::path& folder, bool force)
     : impl_(std::make_unique<Impl>(folder, force)) {}
 
 SweepFolder::SweepFolder(const Options& options, const Config& config)
-    : SweepFolder(options.folder, options.force || MayReplaceFolder(options)) {
+    : SweepFolder(options.folder,
+                  options.force || (options.resume && internal::IsNotFinished(options.folder))) {
   std::vector<std::filesystem::path> before;
   if (options.resume) {
     impl_->leftovers.emplace(options.folder).CheckInputs(config.ToYaml(), options.inputs);

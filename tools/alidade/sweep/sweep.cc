@@ -11,6 +11,7 @@
 
 #include "alidade/base/log.h"
 #include "alidade/base/signal_stack.h"
+#include "alidade/record/leftovers.h"
 #include "alidade/sweep/finished_runs.h"
 #include "alidade/sweep/sweep_config.h"
 
@@ -46,12 +47,8 @@ class Queue {
       if (again.status == RunStatus::kStopped) return;
       const std::string was = internal::RunLine(options_.value, known->run);
       if (again.status == RunStatus::kOk && internal::RunLine(options_.value, again) == was) return;
-      throw Error(
-          ExitCode::kFound,
-          ErrorLine(known->place, {},
-                    "the run of seed " + std::to_string(seed) + " gives other results now") +
-              "; config, data, plugins and build are as they were: another machine, a file "
-              "next to the data, or a model that is not deterministic (`alidade check`)");
+      internal::FailOtherResults(
+          known->place, "the run of seed " + std::to_string(seed) + " gives other results now");
     }
   }
 

@@ -10,6 +10,7 @@
 #include "alidade/record/recorder.h"
 #include "command.h"
 #include "console.h"
+#include "watchdog.h"
 
 namespace alidade::cli {
 namespace {
@@ -157,6 +158,7 @@ ExitCode CompareConfig(const CompareArguments& arguments) {
   const fs::path folder =
       OutputFolder(arguments.folder, config, input, arguments.force, arguments.quiet, "compare-");
   const PluginHost host = input.Host(config);
+  const Watchdog watchdog;
   StopOnSignals();
   ComparedExperiment compared = BuildComparedExperiment(config, host, arguments.options);
   return arguments.over_seeds ? CompareOverSeeds(arguments, compared, host, folder)

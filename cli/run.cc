@@ -42,7 +42,7 @@ struct RunArguments {
   std::optional<std::uint64_t> seed;
   bool force = false, quiet = false, no_figures = false, covariances = false, all = false;
   bool follow = false, resume = false;
-  std::optional<double> frame_timeout_s = 60.0;
+  std::optional<double> frame_timeout_s = Watchdog::kUsualLimit_s;
 };
 
 /// Events of one estimator and one kind.
@@ -132,39 +132,40 @@ ExitCode RunConfig(const RunArguments& arguments) {
   if (arguments.resume)
     internal::CheckReadableAgain(config, "a run that is resumed reads it from its start");
   const PluginHost host = arguments.input.Host(config);
+  std::optional<Recorder> recorder;  // outlives the watchdog, which outlives the models
+  Watchdog watchdog(arguments.frame_timeout_s);
   StopOnSignals();  // before a source that waits for its pipe is made
   Experiment experiment = BuildExperiment(config, host);
   const Recorder::Options record =
       RecordOf(arguments, config, folder, internal::PluginsInUse(experiment, config, host));
   if (record.resume && IsFinished(folder, config, record.inputs, record.force, arguments.quiet))
     return ExitCode::kOk;
-  Recorder recorder(record, config, host);
+  recorder.emplace(record, config, host);
+  watchdog.Keep(*recorder);
   if (record.resume && !arguments.quiet) {
-    TellResumed(folder, recorder.resumed(), "its frames are computed again, and compared");
+    TellResumed(folder, recorder->resumed(), "its frames are computed again, and compared");
   }
 
   Progress progress("frames", arguments.quiet);
   RunOptions options;
-  options.observers = {&recorder};
+  options.observers = {&*recorder};
   Follower follower(Print);
   if (arguments.follow) options.observers.push_back(&follower);
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
-  std::optional<Watchdog> watchdog(std::in_place, arguments.frame_timeout_s, recorder);
-  options.busy = [&](bool busy) { watchdog->Work(busy); };
-  const RunResult result = WithWhatIsKept(recorder, [&] { return Run(experiment, options); });
-  watchdog.reset();
+  options.busy = [&](bool busy) { watchdog.Work(busy); };
+  const RunResult result = WithWhatIsKept(*recorder, [&] { return Run(experiment, options); });
   progress.Clear();
   if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
   if (result.status == RunStatus::kStopped) PrintNote(result.reason);
   FinishOnSignals();
-  WithWhatIsKept(recorder, [&] { recorder.Finish(result); });
-  if (!arguments.quiet) TellKept(recorder.resumed(), folder);
+  WithWhatIsKept(*recorder, [&] { recorder->Finish(result); });
+  if (!arguments.quiet) TellKept(recorder->resumed(), folder);
   if (!arguments.quiet && !arguments.follow) {
     const std::string table = arguments.all
                                   ? ComparisonTable(result)
                                   : internal::MainTable(result, internal::SubjectsOf(experiment));
-    Print(Summary(result, table, recorder));
+    Print(Summary(result, table, *recorder));
   }
   return result.code;
 }
@@ -192,8 +193,8 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
   command
       .add_option_function<std::string>(
           "--frame-timeout", read_timeout,
-          "seconds that the estimators may take for one frame before the run ends, or none; a "
-          "model that hangs is named")
+          "seconds that the estimators may take for one frame, or a plugin to create or destroy a "
+          "model, before the run ends, or none; a model that hangs is named")
       ->check([](const std::string& text) {
         return text == "none" ? std::string() : IsNumber(0.001, 1e9)(text);
       })

@@ -7,6 +7,7 @@
 
 #include "command.h"
 #include "console.h"
+#include "watchdog.h"
 
 namespace alidade::cli {
 namespace {
@@ -46,6 +47,7 @@ ExitCode RunSimulate(const SimulateArguments& arguments) {
   const std::filesystem::path path = OutputFolder(arguments.folder, config, arguments.input,
                                                   arguments.force, arguments.quiet, "data-");
   const PluginHost host = arguments.input.Host(config);
+  const Watchdog watchdog;
   StopOnSignals();
   const SimulateResult result =
       Simulate(config, host, path, arguments.force, StopRequested, arguments.images);

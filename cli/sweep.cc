@@ -13,6 +13,7 @@
 #include "command.h"
 #include "console.h"
 #include "resume.h"
+#include "watchdog.h"
 
 namespace alidade::cli {
 namespace {
@@ -196,6 +197,7 @@ ExitCode RunSweep(const SweepArguments& arguments) {
   const std::filesystem::path path = OutputFolder(arguments.folder, config, arguments.input,
                                                   arguments.force, arguments.quiet, "sweep-");
   const PluginHost host = arguments.input.Host(config);
+  const Watchdog watchdog;
   StopOnSignals();
   const std::string inputs = InputsText(arguments.input, config, ArgumentsOf(arguments),
                                         PluginsOf(arguments, config, host));

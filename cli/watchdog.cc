@@ -7,13 +7,12 @@
 #include <system_error>
 
 #include "alidade/base/number_text.h"
-#include "alidade/host/last_call.h"
 #include "console.h"
 
 namespace alidade::cli {
 
-Watchdog::Watchdog(std::optional<double> limit_s, const Recorder& recorder)
-    : limit_s_(limit_s), recorder_(recorder), last_call_(detail::last_call) {
+Watchdog::Watchdog(std::optional<double> limit_s)
+    : limit_s_(limit_s), last_call_(detail::last_call) {
   try {
     thread_ = std::thread([this] { Watch(); });
   } catch (const std::system_error&) {  // no memory for it, say: the run may do with less
@@ -27,6 +26,11 @@ Watchdog::~Watchdog() {
   }
   changed_.notify_one();
   if (thread_.joinable()) thread_.join();
+}
+
+void Watchdog::Keep(const Recorder& recorder) {
+  const std::lock_guard lock(mutex_);
+  recorder_ = &recorder;
 }
 
 void Watchdog::Work(bool busy) {
@@ -48,30 +52,35 @@ void Watchdog::Watch() {
     const double passed =
         std::min(std::chrono::duration<double>(now - before).count(), kMostOfALook);
     before = now;
-    if (!working_) continue;
+    const LastingCall lasting = working_ ? LastingCall() : OldestLastingCall();
+    if (lasting.number != lasting_.number) worked_s_ = after_stop_s_ = 0.0;
+    lasting_ = lasting;
+    if (!working_ && lasting.number == 0) continue;
     worked_s_ += passed;
     if (StopRequested()) after_stop_s_ += passed;
-    const std::string frame =
-        works_ <= 1 ? "its start" : "one frame, after " + std::to_string(works_ - 2) + " others";
-    if (after_stop_s_ > kPatience) {
-      End("asked to stop, but an estimator does not finish " + frame, ExitCode::kStopped);
-    }
+    const void* const call = working_ ? last_call_.load() : lasting.slot;
+    if (after_stop_s_ > kPatience) End("asked to stop, but " + Doing(), call, ExitCode::kStopped);
     if (limit_s_ && worked_s_ > *limit_s_) {
-      End("an estimator works on " + frame + ", for more than " +
-              internal::RoundedText(*limit_s_, 6) + " s",
+      End(Doing() + ", for more than " + internal::RoundedText(*limit_s_, 6) + " s", call,
           ExitCode::kPlugin);
     }
   }
 }
 
-void Watchdog::End(const std::string& why, ExitCode code) const {
-  char call[1024];
-  DescribeCall(last_call_, call, sizeof call);
+std::string Watchdog::Doing() const {
+  if (!working_) return "a plugin does not return";
+  return "an estimator works on " +
+         (works_ <= 1 ? "its start" : "one frame, after " + std::to_string(works_ - 2) + " others");
+}
+
+void Watchdog::End(const std::string& why, const void* call, ExitCode code) const {
+  char words[1024];
+  DescribeCall(call, words, sizeof words);
   std::string text = why;
-  if (*call != '\0') text += std::string("; the last call of a model: ") + call;
+  if (*words != '\0') text += std::string("; the last call of a model: ") + words;
   try {
-    const std::filesystem::path kept = recorder_.failed();
-    if (recorder_.Abandon()) text += "; what was recorded is in " + kept.string();
+    const std::filesystem::path kept = recorder_ == nullptr ? "" : recorder_->failed();
+    if (!kept.empty() && recorder_->Abandon()) text += "; what was recorded is in " + kept.string();
   } catch (const std::exception&) {  // it stays where it is; the next run to that place finds it
   }
   PrintErrors(text + '\n');

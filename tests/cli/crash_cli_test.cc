@@ -166,6 +166,30 @@ TEST_F(CrashCli, AModelThatHangsIsNamedAndWhatWasRecordedIsKept) {
   EXPECT_TRUE(Contains(at_start.err, "Predict of model 'hangs'")) << at_start.err;
 }
 
+TEST_F(CrashCli, APluginThatDoesNotReturnFromCreateOrDestroyIsNamed) {
+  for (const std::string call : {"Create", "Destroy"}) {
+    const std::string model = call == "Create" ? "hangs_in_create" : "hangs_in_destroy";
+    const std::string words =
+        "; the last call of a model: " + call + " of model '" + model + "' of plugin " + kPlugin;
+    const Outcome late = RunModel(model, {"--frame-timeout", "0.5", "--force"});
+    EXPECT_EQ(late.code, 69) << late.out;
+    EXPECT_EQ(late.err, "error: a plugin does not return, for more than 0.5 s" + words + '\n');
+    EXPECT_EQ(Exists("out/run.json"), call == "Destroy");  // all was written by then
+    const pid_t run = Start({"run", "bad.yaml", "-o", "other", "--no-figures"});
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    ::kill(run, SIGTERM);
+    const Outcome stopped = Wait(run);
+    EXPECT_EQ(stopped.code, 75) << stopped.err;
+    EXPECT_TRUE(Contains(stopped.err, "asked to stop, but a plugin does not return" + words))
+        << stopped.err;
+    const pid_t sweep = Start({"sweep", "bad.yaml", "-o", "sweep", "--runs", "2", "--jobs", "1",
+                               "--set", "source={type: models, rate_hz: 10, duration_s: 1}"});
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    ::kill(sweep, SIGTERM);
+    EXPECT_TRUE(Contains(Wait(sweep).err, "asked to stop, but a plugin does not return" + words));
+  }
+}
+
 // FAULTS 58
 TEST_F(CrashCli, ASensorThatFailsIsLeftOutOnceOrAltogetherOrEndsTheRun) {
   const auto policy = [&](const std::string& name) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <exception>
 #include <string>
 
@@ -35,6 +36,7 @@ class NamedCall {
 
   /// A signal handler may ask.
   const char *const call, *const kind, *const name, *const plugin;
+  std::uint64_t number = 0;   ///< each has its own
   NamedCall* next = nullptr;  ///< of all threads
 
  private:

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 #include <mutex>
+#include <string_view>
 #include <vector>
 
 #include "alidade/base/log.h"
@@ -21,6 +22,7 @@ struct Instances {
   std::mutex mutex;
   std::vector<const ModelInstance*> all;
   internal::NamedCall* calls = nullptr;  ///< that last
+  std::uint64_t call_count = 0;
 };
 
 Instances& TheInstances() {
@@ -77,6 +79,7 @@ internal::NamedCall::NamedCall(const char* of_call, const char* of_kind, const s
       plugin(of_plugin.c_str()),
       outer_(detail::last_call) {
   const std::lock_guard lock(TheInstances().mutex);
+  number = ++TheInstances().call_count;
   next = TheInstances().calls;
   TheInstances().calls = this;
   detail::NoteCall(this);
@@ -117,6 +120,15 @@ void DescribeCall(const void* slot, char* text, std::size_t size) {
          << model->plugin().c_str();
     return;
   }
+}
+
+LastingCall OldestLastingCall() {
+  const std::lock_guard lock(TheInstances().mutex);
+  LastingCall oldest;
+  for (const internal::NamedCall* call = TheInstances().calls; call != nullptr; call = call->next) {
+    if (std::string_view(call->kind) != "source") oldest = {call, call->number};
+  }
+  return oldest;
 }
 
 }  // namespace alidade

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstddef>
+#include <cstdint>
 
 namespace alidade {
 
@@ -25,5 +26,13 @@ inline void NoteCall(const void* slot) { last_call.store(slot, std::memory_order
 /// its instance is gone. Of a thread that hangs or has crashed, too: it allocates nothing, waits
 /// for nobody, and may be called by a signal handler.
 void DescribeCall(const void* slot, char* text, std::size_t size);
+
+/// A call that creates or destroys something, say, in any thread.
+struct LastingCall {
+  const void* slot = nullptr;
+  std::uint64_t number = 0;  ///< each has its own; 0: there is none
+};
+/// The oldest now, but for those of sources, which may wait for their data.
+LastingCall OldestLastingCall();
 
 }  // namespace alidade

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <dlfcn.h>
+#include <link.h>
 
 #define BOOST_DLL_USE_STD_FS
 #include <algorithm>
@@ -34,18 +35,36 @@ std::string WalkTable(void* library, const char* symbol) {
   return Defect(reinterpret_cast<const Table* (*)()>(function)());
 }
 
-/// In the child.
-std::string Try(const std::filesystem::path& file, std::uint32_t kind) {
+/// Calls what is run as the process ends: a crash is better found in the child. dlclose would not,
+/// as many a C++ library is never unloaded.
+void RunDestructors(void* library) {
+  link_map* loaded = nullptr;
+  if (::dlinfo(library, RTLD_DI_LINKMAP, static_cast<void*>(&loaded)) != 0) return;
+  using Function = void (*)();
+  const auto at = [&](ElfW(Addr) address) { return reinterpret_cast<Function*>(address); };
+  Function* functions = nullptr;
+  Function last = nullptr;
+  std::size_t count = 0;
+  for (const ElfW(Dyn)* entry = loaded->l_ld; entry->d_tag != DT_NULL; ++entry) {
+    const ElfW(Addr) address = loaded->l_addr + entry->d_un.d_ptr;
+    if (entry->d_tag == DT_FINI_ARRAY) functions = at(address);
+    if (entry->d_tag == DT_FINI_ARRAYSZ) count = entry->d_un.d_val / sizeof(Function);
+    if (entry->d_tag == DT_FINI) last = reinterpret_cast<Function>(address);
+  }
+  while (functions != nullptr && count > 0) functions[--count]();
+  if (last != nullptr) last();
+}
+
+/// In the child, which calls the destructors of what is then `opened`.
+std::string Try(const std::filesystem::path& file, std::uint32_t kind, std::vector<void*>& opened) {
   const Surroundings before;
   void* const library = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (library == nullptr) return "cannot be loaded: " + DlError();
   const std::string change = Surroundings().ChangeSince(before);
   if (!change.empty()) return change + " while loading";
-  if (kind == ALIDADE_PLUGIN_CPP) return WalkTable<CppPluginTable>(library, kCppEntrySymbol);
-  const std::string defect = WalkTable<AlidadeTable>(library, ALIDADE_ENTRY_SYMBOL);
-  // The destructors of its statics run when the host ends; a crash is better found here.
-  dlclose(library);
-  return defect;
+  opened.push_back(library);
+  return kind == ALIDADE_PLUGIN_CPP ? WalkTable<CppPluginTable>(library, kCppEntrySymbol)
+                                    : WalkTable<AlidadeTable>(library, ALIDADE_ENTRY_SYMBOL);
 }
 
 /// Opens the plugin in a child process, looks its entry up and walks its table. Returns "" or why
@@ -54,7 +73,11 @@ std::string TrialLoad(const std::filesystem::path& file, std::uint32_t kind) {
   const SharedJournal journal;
   const ChildEnd end = RunInChild({kTimeLimit_s, 0}, *journal, [&] {
     std::string failure;
-    const std::string thrown = ThrownBy([&] { failure = Try(file, kind); });
+    const std::string thrown = ThrownBy([&] {
+      std::vector<void*> opened;
+      failure = Try(file, kind, opened);
+      std::ranges::for_each(opened, RunDestructors);
+    });
     return thrown.empty() ? failure : "threw while loading: " + thrown;
   });
   if (!end.answered) return end.text + " while loading";
@@ -98,8 +121,12 @@ std::set<std::filesystem::path> TryTogether(const std::set<std::filesystem::path
   if (all.empty()) return {};
   const SharedJournal journal;
   const ChildEnd end = RunInChild({kMostSeconds, 0}, *journal, [&]() -> std::string {
-    const auto fails = [](const Examined& one) { return !Try(one.canonical, one.kind).empty(); };
-    return std::ranges::any_of(all, fails) ? "one fails" : "";
+    std::vector<void*> opened;  // they may share statics: none is destroyed before all are tried
+    for (const Examined& one : all) {
+      if (!Try(one.canonical, one.kind, opened).empty()) return "one fails";
+    }
+    std::for_each(opened.rbegin(), opened.rend(), RunDestructors);
+    return "";
   });
   std::set<std::filesystem::path> good;
   if (!end.answered || !end.text.empty() || !end.printed.empty()) return good;

@@ -13,6 +13,7 @@
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "alidade/model/plugin.h"
@@ -248,6 +249,19 @@ struct CrashesInCreate : Right {
     if (g_zero == 0.0) std::raise(SIGSEGV);
   }
 };
+struct HangsInCreate : Right {
+  explicit HangsInCreate(Params&) {
+    while (g_zero == 0.0) ::pause();
+  }
+};
+struct HangsInDestroy : Right {
+  explicit HangsInDestroy(Params&) {}
+  HangsInDestroy(HangsInDestroy&& other) noexcept : owner(std::exchange(other.owner, false)) {}
+  ~HangsInDestroy() {
+    while (owner) ::pause();
+  }
+  bool owner = true;
+};
 struct LosesItself : Right {
   explicit LosesItself(Params&) { static_cast<void>(!new std::string(500, 'x')); }
 };
@@ -479,6 +493,7 @@ ALIDADE_PLUGIN(SENSOR(Right, "right"), SENSOR(MayHaveBias, "may_have_bias"),
                SENSOR(Misbehaves<9>, "leaks_files"), SENSOR(Misbehaves<10>, "prints"),
                SENSOR(Misbehaves<11>, "leaves_daemons"), SENSOR(LosesItself, "loses_itself"),
                SENSOR(CrashesInCreate, "crashes_in_create"),
+               SENSOR(HangsInCreate, "hangs_in_create"), SENSOR(HangsInDestroy, "hangs_in_destroy"),
                ALIDADE_SENSOR_BY(MakeWildDescription, "wild_description", "", ""),
                RAW(PastTheEnd, "past_the_end"), RAW(WritesItsInput, "writes_its_input"),
                RAW(IgnoresStrides, "ignores_strides"), RAW(WritesAndFails, "writes_and_fails"),

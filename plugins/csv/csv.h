@@ -3,7 +3,6 @@
 
 #include <cmath>
 #include <cstdint>
-#include <exception>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -49,7 +48,6 @@ class CsvSource : public Source {
   std::optional<Config> Calibration() const override { return calibration_.Get(); }
 
   bool Next(SourceFrame& frame) override {
-    if (fault_) std::rethrow_exception(fault_);
     if (!has_row_ && !ReadRow()) {
       if (rows_ == 0) Fail(Place{reader_.name()}, {}, "no data rows", "a row below the header");
       return false;
@@ -60,7 +58,7 @@ class CsvSource : public Source {
     std::size_t used = 0;
     do {
       TakeRow(frame, used);
-    } while (layout_.time_repeats && ReadAhead() && timestamp_ == frame.timestamp);
+    } while (layout_.time_repeats && ReadRow() && timestamp_ == frame.timestamp);
     frame.measurements.resize(used);
     return true;
   }
@@ -74,16 +72,6 @@ class CsvSource : public Source {
     CheckColumns();
     timestamp_ = ReadTimestamp();
     return true;
-  }
-
-  /// The same while a frame is whole but for more rows: what is wrong with this one comes after it.
-  bool ReadAhead() {
-    try {
-      return ReadRow();
-    } catch (const Error&) {
-      fault_ = std::current_exception();
-      return false;
-    }
   }
 
   /// Puts the row into the frame, whose first `used` measurements are there.
@@ -283,7 +271,6 @@ class CsvSource : public Source {
   std::string_view line_;
   std::vector<std::string_view> cells_;
   bool has_row_ = false;      ///< that no frame has yet
-  std::exception_ptr fault_;  ///< of the row behind the last frame
   Timestamp timestamp_ = 0;   ///< of the row
   std::int64_t rows_ = 0;     ///< given out so far
   Timestamp last_timestamp_ = 0;

@@ -114,6 +114,8 @@ TEST_F(CrashCli, AnExceptionOfAPluginInCIsNamedAndNoEndOfTheProgram) {
   const Outcome ended = run("estimators.ekf.on_plugin_failure", "abort");
   EXPECT_EQ(ended.code, 69) << ended.err;
   EXPECT_TRUE(Contains(ended.err, words)) << ended.err;
+  ASSERT_EQ(run("sensors.bad.time_offset_s", "0.01").code, 0);
+  EXPECT_TRUE(Contains(Read("out/ekf/events.csv"), words)) << Read("out/ekf/events.csv");
   const Outcome created = run("sensors.bad.model", "throws_in_create");
   EXPECT_EQ(created.code, 69) << created.err;
   EXPECT_TRUE(Contains(created.err, "model 'throws_in_create' of plugin " + plugin +

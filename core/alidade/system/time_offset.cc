@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <memory>
 #include <utility>
 
@@ -10,6 +11,9 @@
 
 namespace alidade::internal {
 namespace {
+
+/// What a model does not write is not a number.
+constexpr double kUnwritten = std::numeric_limits<double>::quiet_NaN();
 
 /// A motion model that moves roles: its blocks are `count` roles from `first` on, of which constant
 /// ones stay.
@@ -65,7 +69,7 @@ class OffsetSensor {
     std::vector<const double*> roles;
     std::vector<double*> jacobians;
     std::vector<int> strides;
-    std::string error;  ///< of a mover that failed, in words
+    std::string error;  ///< of a mover or the sensor, where it failed
   };
   static Memory& MemoryOfThread() {
     static thread_local Memory memory;
@@ -126,11 +130,12 @@ class OffsetSensor {
     double* at = next;
     for (std::size_t b = 0; b < mover.model.blocks().size(); ++b) {
       to[b] = at;
-      at += mover.model.blocks()[b].geometry.ambient;
+      at = std::fill_n(at, mover.model.blocks()[b].geometry.ambient, kUnwritten);
     }
+    const int n = mover.model.tangent_size();
+    if (f != nullptr) std::fill_n(f, n * n, kUnwritten);
     const Status status = mover.model.Step(x, nullptr, nullptr, dt_s, to.data(), f,
                                            f == nullptr ? nullptr : memory.g.data());
-    const int n = mover.model.tangent_size();
     int row = 0;
     for (std::size_t b = 0; status == Status::kOk && b < mover.model.blocks().size(); ++b) {
       const Geometry& geometry = mover.model.blocks()[b].geometry;
@@ -219,7 +224,7 @@ class OffsetSensor {
     std::size_t size = 0;
     for (const Space& role : sensor_.roles())
       size += static_cast<std::size_t>(m * role.geometry.tangent);
-    memory.jacobian.assign(std::max(memory.jacobian.size(), size), 0.0);
+    memory.jacobian.assign(std::max(memory.jacobian.size(), size), kUnwritten);
     memory.jacobians.assign(place_.size(), nullptr);
     memory.strides.assign(place_.size(), 0);
     double* next = memory.jacobian.data();
@@ -287,15 +292,16 @@ class OffsetSensor {
     Memory& memory = MemoryOfThread();
     const Status status = of.Shift(roles, jacobians != nullptr, memory);
     if (status != Status::kOk) return static_cast<std::int32_t>(status);
-    if (jacobians == nullptr) {
-      return static_cast<std::int32_t>(of.sensor_.Predict(memory.roles.data(), z, seen->known));
-    }
     const int m = of.sensor_.measurement().geometry.tangent;
-    of.PlaceJacobians(m, jacobians, strides, memory);
-    const Status seen_there = of.sensor_.Linearise(memory.roles.data(), z, memory.jacobians.data(),
-                                                   memory.strides.data(), seen->known);
-    if (seen_there == Status::kOk) of.Chain(m, jacobians, strides, memory);
-    return static_cast<std::int32_t>(seen_there);
+    if (jacobians != nullptr) of.PlaceJacobians(m, jacobians, strides, memory);
+    const Status there =
+        jacobians == nullptr
+            ? of.sensor_.Predict(memory.roles.data(), z, seen->known)
+            : of.sensor_.Linearise(memory.roles.data(), z, memory.jacobians.data(),
+                                   memory.strides.data(), seen->known);
+    if (there == Status::kError) memory.error = of.sensor_.error_text();
+    if (there == Status::kOk && jacobians != nullptr) of.Chain(m, jacobians, strides, memory);
+    return static_cast<std::int32_t>(there);
   }
   static std::int32_t SqrtNoise(const void* self, const AlidadeObservation* seen,
                                 const double* const* roles, double* l, std::int32_t stride) {
@@ -308,6 +314,7 @@ class OffsetSensor {
     return c.sensor->sqrt_noise(c.self, seen, memory.roles.data(), l, stride);
   }
   static std::int32_t Valid(const void* self, const AlidadeObservation* seen) {
+    MemoryOfThread().error.clear();
     const AlidadeInstance& c = Of(self).sensor_.instance().c();
     return c.sensor->valid(c.self, seen);
   }

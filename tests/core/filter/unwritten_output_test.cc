@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "alidade/filter/ukf.h"
+#include "alidade/system/time_offset.h"
 #include "support/systems.h"
 
 namespace alidade {
@@ -61,7 +62,7 @@ struct HandWritten {
     motion.step = [](const void* self, const double* const* blocks, const double* const*,
                      const double* w, double, double* const* next, double* f, std::int32_t f_stride,
                      double* g, std::int32_t g_stride, double*, std::int32_t) {
-      for (int i = 0; i < 2; ++i) next[0][i] = blocks[0][i] + w[i];
+      for (int i = 0; i < 2; ++i) next[0][i] = blocks[0][i] + (w == nullptr ? 0.0 : w[i]);
       if (f != nullptr) WriteDiagonal(1.0, !Leaves(self, Left::kF), f, f_stride);
       if (g != nullptr) WriteDiagonal(1.0, !Leaves(self, Left::kG), g, g_stride);
       return std::int32_t{ALIDADE_OK};
@@ -153,6 +154,25 @@ TEST(UnwrittenAtPoints, IsNotFiniteAtEveryMeasurement) {
       EXPECT_EQ(ukf.Process(frame).measurements()[0].outcome,
                 left == Left::kNothing ? Outcome::kAccepted : Outcome::kNotFinite)
           << k;
+    }
+  }
+}
+
+TEST(UnwrittenUnderATimeOffset, IsNotFiniteAtEveryMeasurement) {
+  for (const Left left : {Left::kNothing, Left::kPrediction, Left::kSensorH, Left::kF}) {
+    HandWritten hand(left);
+    System system = Direct(hand, false);
+    AddMotion(system, "clock", ConstantMotion(1), {{"offset", 0.0, 0.1}});
+    const BlockId offset = system.layout.Find("clock.offset");
+    ASSERT_EQ(internal::OffsetInTime(system, offset, system.sensors[0]), "");
+    Ekf ekf(system, {}, StreamsOf(system));
+    ekf.Start(0);
+    for (int k = 0; k < 3; ++k) {
+      Frame frame = FrameAt(0.0, {});
+      frame.measurements.push_back({frame.timestamp, 0, -1, {1.5, 2.5}, {}});
+      EXPECT_EQ(ekf.Process(frame).measurements()[0].outcome,
+                left == Left::kNothing ? Outcome::kAccepted : Outcome::kNotFinite)
+          << static_cast<int>(left) << ' ' << k;
     }
   }
 }

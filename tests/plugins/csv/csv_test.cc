@@ -94,8 +94,8 @@ TEST_F(Csv, RowsOfOneTimeAreOneFrameWhereTimesRepeat) {
   EXPECT_FALSE(source->Next(frame));
 }
 
-// What is wrong with a row does not cost the frame before it.
-TEST_F(Csv, AFrameBeforeABadRowIsGivenOutWhereTimesRepeat) {
+// A bad value does not cost the frame before it; a row whose time cannot be read may be part of it.
+TEST_F(Csv, AFrameBeforeABadRowIsGivenOutWhereItIsWhole) {
   Write("t_s,r\n0,21\n0,22\n1,x\n");
   const auto source =
       Open("path: a.csv\ntime: {column: t_s, repeats: true}\nstreams: {range: r}\n");
@@ -108,6 +108,10 @@ TEST_F(Csv, AFrameBeforeABadRowIsGivenOutWhereTimesRepeat) {
                 "FILE:3:1 t_s: '0' is before line 2; expected times that increase, or "
                 "'out_of_sequence.policy: buffer' or 'rollback'",
                 "path: a.csv\ntime: {column: t_s, repeats: true}\nstreams: {range: r}\n");
+  Write("t_s,r\n0,21\nO,22\n");
+  const auto cut = Open("path: a.csv\ntime: {column: t_s, repeats: true}\nstreams: {range: r}\n");
+  ExpectError(ExitCode::kBadData, "FILE:3:1 t_s: 'O' is not a number; expected a finite number",
+              [&] { cut->Next(frame); });
 }
 
 TEST_F(Csv, AcceptsCommentsCarriageReturnsAndByteOrderMark) {

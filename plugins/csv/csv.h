@@ -270,9 +270,9 @@ class CsvSource : public Source {
 
   std::string_view line_;
   std::vector<std::string_view> cells_;
-  bool has_row_ = false;      ///< that no frame has yet
-  Timestamp timestamp_ = 0;   ///< of the row
-  std::int64_t rows_ = 0;     ///< given out so far
+  bool has_row_ = false;     ///< that no frame has yet
+  Timestamp timestamp_ = 0;  ///< of the row
+  std::int64_t rows_ = 0;    ///< given out so far
   Timestamp last_timestamp_ = 0;
   int last_line_ = 0;
 };

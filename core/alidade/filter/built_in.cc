@@ -79,7 +79,6 @@ Node NodeOf(const Unsupported& asked, const Node& root, const System& system) {
   if (asked.sensor < 0) return root.At("landmarks");
   const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(asked.sensor)];
   const Node entry = root.At("sensors").At(sensor.name);
-  if (asked.role < 0) return entry.At("loss");
   const auto role = static_cast<std::size_t>(asked.role);
   const Node node = entry.At("roles").At(sensor.model.roles()[role].name);
   // A mode that cannot be done comes before jacobian_at.

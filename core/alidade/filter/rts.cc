@@ -19,18 +19,8 @@ struct Adjoint {
   Eigen::VectorXd b;
   Eigen::MatrixXd information;
 
-  /// This one, and then what comes later in time.
-  void Append(const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
-              const Eigen::MatrixXd& information);
   void GoBack(Eigen::Index held, Eigen::VectorXd& lambda, Eigen::MatrixXd& later) const;
 };
-
-void Adjoint::Append(const Eigen::MatrixXd& later_a, const Eigen::VectorXd& later_b,
-                     const Eigen::MatrixXd& later_information) {
-  b += a.transpose() * later_b;
-  information += a.transpose() * later_information * a;
-  a = later_a * a;
-}
 
 /// `held`: of lambda and Lambda at the end of the frame, the rows of w behind those of x.
 void Adjoint::GoBack(Eigen::Index held, Eigen::VectorXd& lambda,
@@ -92,8 +82,9 @@ Outcome Taped::Correct(FilterState& f, std::span<Row* const> rows) {
   Eigen::MatrixXd a = -p * all.h.transpose() * weighted;
   a.diagonal().array() += 1.0;
   const Workspace::Matrix back = TransportTo(f, before);
-  frame_.Append(back.transpose() * a, weighted.transpose() * all.innovation,
-                all.h.transpose() * weighted);
+  frame_.b += frame_.a.transpose() * (weighted.transpose() * all.innovation);
+  frame_.information += frame_.a.transpose() * (all.h.transpose() * weighted) * frame_.a;
+  frame_.a = back.transpose() * a * frame_.a;
   return outcome;
 }
 

@@ -46,9 +46,6 @@ std::optional<Unsupported> FindUnsupported(const System& system, const Support& 
       found->role = static_cast<int>(r);
       return found;
     }
-    if (sensor.loss.kind != LossKind::kNone && !support.robust_loss) {
-      return Unsupported{"robust losses", "the sensor without one", -1, static_cast<int>(s)};
-    }
   }
   return std::nullopt;
 }

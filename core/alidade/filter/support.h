@@ -15,12 +15,11 @@ struct Support {
   bool at_measurement = false;    ///< jacobian_at: measurement
   bool from_measurement = false;  ///< blocks that start from their first measurement
   bool recovery = false;          ///< after consecutive rejections
-  bool robust_loss = true;        ///< of a sensor
   bool landmarks = false;         ///< that come and go
 };
 
 /// Something that a system asks for and an estimator cannot do: of a block, of a role of a sensor,
-/// where both `block` and `role` are -1 the loss of a sensor, and without a sensor the landmarks.
+/// or without either the landmarks.
 struct Unsupported {
   std::string what;    ///< `consider blocks`
   std::string remedy;  ///< what to write in its place: `the block estimated or constant`

@@ -118,17 +118,6 @@ int State::FindParts(std::span<const BlockId> blocks) {
   return column;
 }
 
-BlockId State::Clone(BlockId source, std::string_view name) {
-  const Block original = layout_[source];
-  ALIDADE_EXPECTS(original.present);
-  const BlockId id = Declare(name, original.owner, original.space, original.status);
-  const std::vector<double> copy(value(source), value(source) + original.geometry().ambient);
-  const int n = original.geometry().tangent;
-  Initialise({&id, 1}, copy.data(), {&source, 1}, RowMajor::Identity(n, n),
-             Eigen::MatrixXd::Zero(n, n));
-  return id;
-}
-
 /// Gives the place of a block back.
 void State::Release(BlockId id) {
   Block& block = layout_.blocks_[static_cast<std::size_t>(id)];

@@ -87,8 +87,6 @@ class State {
   /// row-major; `own` = J_n Cov(n) J_n'.
   void Initialise(std::span<const BlockId> ids, const double* values, std::span<const BlockId> from,
                   const Eigen::Ref<const RowMajor>& jacobian, const Covariance::ConstMatrix& own);
-  /// Declares `name` as a copy of `source`, fully correlated with it.
-  BlockId Clone(BlockId source, std::string_view name);
   /// Drops the block, with its id: a block declared later may have it. The rest keeps its value and
   /// covariance.
   void Drop(BlockId id);

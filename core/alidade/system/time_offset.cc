@@ -294,11 +294,10 @@ class OffsetSensor {
     if (status != Status::kOk) return static_cast<std::int32_t>(status);
     const int m = of.sensor_.measurement().geometry.tangent;
     if (jacobians != nullptr) of.PlaceJacobians(m, jacobians, strides, memory);
-    const Status there =
-        jacobians == nullptr
-            ? of.sensor_.Predict(memory.roles.data(), z, seen->known)
-            : of.sensor_.Linearise(memory.roles.data(), z, memory.jacobians.data(),
-                                   memory.strides.data(), seen->known);
+    const Status there = jacobians == nullptr
+                             ? of.sensor_.Predict(memory.roles.data(), z, seen->known)
+                             : of.sensor_.Linearise(memory.roles.data(), z, memory.jacobians.data(),
+                                                    memory.strides.data(), seen->known);
     if (there == Status::kError) memory.error = of.sensor_.error_text();
     if (there == Status::kOk && jacobians != nullptr) of.Chain(m, jacobians, strides, memory);
     return static_cast<std::int32_t>(there);

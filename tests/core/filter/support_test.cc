@@ -44,7 +44,7 @@ System WithLandmarks() {
 }
 
 TEST(Support, NamesTheFirstThingThatIsLacking) {
-  const Support nothing = {.known = false, .robust_loss = false};
+  const Support nothing = {.known = false};
   EXPECT_FALSE(FindUnsupported(DepthFilter(), nothing));
   const auto expect = [&](const System& system, const Support& enough, const char* what, int block,
                           int sensor, int role) {
@@ -64,7 +64,6 @@ TEST(Support, NamesTheFirstThingThatIsLacking) {
   expect(WithARole(RoleMode::kKnown, JacobianAt::kPrediction), {}, "known roles", -1, 1, 1);
   expect(WithARole(RoleMode::kEstimate, JacobianAt::kMeasurement), {.at_measurement = true},
          "jacobian_at: measurement", -1, 1, 1);
-  expect(WithALoss(), {}, "robust losses", -1, 1, -1);
   expect(WithLandmarks(), {.landmarks = true}, "landmarks", -1, -1, -1);
 }
 
@@ -88,7 +87,7 @@ void ExpectAsSupported() {
   EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kKnown, JacobianAt::kPrediction)), can.known);
   EXPECT_EQ(Makes<Filter>(WithARole(RoleMode::kEstimate, JacobianAt::kMeasurement)),
             can.at_measurement);
-  EXPECT_EQ(Makes<Filter>(WithALoss()), can.robust_loss);
+  EXPECT_TRUE(Makes<Filter>(WithALoss()));
   EXPECT_EQ(Makes<Filter>(WithLandmarks()), can.landmarks);
 }
 

@@ -182,14 +182,6 @@ TEST(State, BlocksInitialisedTogetherAreCorrelatedThroughTheirNoise) {
   EXPECT_EQ(state.value(e)[1], 9.0);
 }
 
-TEST(State, CloneIsFullyCorrelatedWithItsSource) {
-  State state = Abc();
-  state.Clone(state.layout().Find("s.c"), "s.c_then");
-  EXPECT_EQ(Cross(state, "s.c_then", "s.c"), Cross(state, "s.c", "s.c"));
-  EXPECT_EQ(Cross(state, "s.c_then", "s.c_then"), Cross(state, "s.c", "s.c"));
-  EXPECT_EQ(Cross(state, "s.c_then", "s.b"), Cross(state, "s.c", "s.b"));
-}
-
 TEST(State, FixedBlocksHaveAValueAndNoCovariance) {
   State state;
   const BlockId id = state.Declare("s.f", "s", Named(Geometry::Vector(2)), BlockStatus::kConstant);

@@ -264,8 +264,7 @@ std::string SupportText(const std::string& type) {
          "    control inputs; jacobian_at prediction" +
          either(can.at_measurement, " or measurement", "") +
          either(can.from_measurement, "; blocks that start from a measurement", "") +
-         either(can.robust_loss, ";\n    robust losses", "") +
-         either(can.landmarks, "; landmarks", "") + '.' +
+         ";\n    robust losses" + either(can.landmarks, "; landmarks", "") + '.' +
          (lacks.empty() ? "" : "\n    Not: " + lacks + '.') + '\n';
 }
 

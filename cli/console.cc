@@ -228,8 +228,7 @@ void Progress::Clear() {
 
 void ReportCrashes() {
   if (watched != 0) return;
-  static const auto& stack = *new internal::SignalStack;  // until the end of the process
-  static_cast<void>(stack);
+  static const internal::SignalStack stack;  // outlives HandleExit
   struct sigaction action {
   }, before{};
   action.sa_handler = HandleCrash;

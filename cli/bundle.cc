@@ -9,6 +9,7 @@
 #include "alidade/bundle/bundle_folder.h"
 #include "command.h"
 #include "console.h"
+#include "watchdog.h"
 
 namespace alidade::cli {
 namespace {
@@ -138,6 +139,7 @@ ExitCode RunBundle(const BundleArguments& arguments) {
                                 arguments.tracks.start.string()});
   ReportCrashes();
   const PluginHost host(Absolute(arguments.plugin_paths));
+  const Watchdog watchdog(std::nullopt);
   StopOnSignals();
   std::optional<BundleFolder> folder;
   if (!arguments.folder.empty()) folder.emplace(arguments.folder, arguments.force);

@@ -158,7 +158,7 @@ ExitCode CompareConfig(const CompareArguments& arguments) {
   const fs::path folder =
       OutputFolder(arguments.folder, config, input, arguments.force, arguments.quiet, "compare-");
   const PluginHost host = input.Host(config);
-  const Watchdog watchdog;
+  const Watchdog watchdog(std::nullopt);
   StopOnSignals();
   ComparedExperiment compared = BuildComparedExperiment(config, host, arguments.options);
   return arguments.over_seeds ? CompareOverSeeds(arguments, compared, host, folder)

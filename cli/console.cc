@@ -90,7 +90,9 @@ std::terminate_handler end_by_default = nullptr;
   } catch (...) {
     end_by_default();
   }
-  Say("error: a library gave up, as it does when it is out of memory\n");
+  SayWithCall(
+      "error: ended without an exception, as a library does when it is out of memory, or a plugin "
+      "that leaves a thread behind");
   ExitNow(static_cast<int>(ExitCode::kInternal));
 }
 

@@ -69,6 +69,11 @@ ExitCode MakeAgain(const internal::RecordedInputs& recorded, const fs::path& fol
   for (const fs::path& path : recorded.command.plugin_paths) {
     if (fs::exists(path, error)) words.insert(words.end(), {"--plugin-path", path.string()});
   }
+  std::string folders;
+  for (const fs::path& path : recorded.command.plugin_folders) {
+    folders += (folders.empty() ? "" : ":") + path.string();
+  }
+  ::setenv("ALIDADE_PLUGIN_PATH", folders.c_str(), 1);
   if (words.front() == "run") words.insert(words.end(), {"--frame-timeout", "none"});
   return execute(words);
 }
@@ -83,7 +88,7 @@ ExitCode Replay(const ReplayArguments& arguments,
   const ExitCode code = MakeAgain(recorded, folder, scratch.path(), again, execute);
   std::error_code ignored;
   const bool made = fs::exists(again / internal::kInputsFile, ignored);
-  if (code == ExitCode::kStopped || !made) return code;
+  if (code == ExitCode::kStopped || code == ExitCode::kUsage || !made) return code;
   const internal::ReplayResult result = internal::CompareReplay(folder, again);
   if (arguments.json) {
     Print(internal::ReplayJson(result));

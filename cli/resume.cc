@@ -25,10 +25,8 @@ void AddResume(CLI::App& command, bool& resume) {
 std::string InputsText(const Input& input, const Config& config,
                        const std::vector<std::string>& arguments,
                        const std::vector<std::filesystem::path>& plugins) {
-  std::vector<std::string> given = input.plugin_paths;
-  for (const auto& folder : internal::PluginFoldersOfEnvironment()) given.push_back(folder);
-  internal::CommandInputs command{arguments, {}};
-  for (const std::filesystem::path& path : Absolute(given)) {
+  internal::CommandInputs command{arguments, {}, internal::PluginFoldersOfEnvironment()};
+  for (const std::filesystem::path& path : Absolute(input.plugin_paths)) {
     if (std::ranges::find(command.plugin_paths, path) == command.plugin_paths.end())
       command.plugin_paths.push_back(path);
   }

@@ -197,12 +197,12 @@ ExitCode RunSweep(const SweepArguments& arguments) {
   const std::filesystem::path path = OutputFolder(arguments.folder, config, arguments.input,
                                                   arguments.force, arguments.quiet, "sweep-");
   const PluginHost host = arguments.input.Host(config);
-  const Watchdog watchdog;
+  const Watchdog watchdog(std::nullopt);
   StopOnSignals();
   const std::string inputs = InputsText(arguments.input, config, ArgumentsOf(arguments),
                                         PluginsOf(arguments, config, host));
   if (arguments.resume && IsFinished(path, config, inputs, arguments.force, arguments.quiet))
-    return ExitCode::kOk;
+    return std::filesystem::exists(path / "failures.csv") ? ExitCode::kFound : ExitCode::kOk;
   Progress progress("runs", arguments.quiet);
   SweepOptions options = arguments.options;
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };

@@ -172,9 +172,10 @@ bool IsFailedSuffix(std::string_view text) {
 
 /// Gives a hidden folder that is worth keeping a name that can be seen.
 void MakeFailed(const fs::path& folder, const fs::path& to) {
-  RemoveMarks(folder);
-  std::error_code ignored;
-  if (!Exists(to)) fs::rename(folder, to, ignored);
+  std::error_code error;
+  if (Exists(to)) return;
+  fs::rename(folder, to, error);
+  if (!error) RemoveMarks(to);
 }
 
 /// The lines of the list in a run folder, sorted as they were written; none where there is no list.

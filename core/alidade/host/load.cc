@@ -76,12 +76,16 @@ std::string TrialLoad(const std::filesystem::path& file, std::uint32_t kind) {
     const std::string thrown = ThrownBy([&] {
       std::vector<void*> opened;
       failure = Try(file, kind, opened);
+      if (!failure.empty()) return;
+      journal->Enter("destructors");
       std::ranges::for_each(opened, RunDestructors);
     });
-    return thrown.empty() ? failure : "threw while loading: " + thrown;
+    return thrown.empty() ? failure : "threw: " + thrown;
   });
-  if (!end.answered) return end.text + " while loading";
-  if (end.text.empty() && !end.printed.empty()) return "prints '" + end.printed + "' while loading";
+  const std::string when =
+      journal->call().empty() ? " while loading" : " in the destructors of its statics";
+  if (!end.answered || end.text.starts_with("threw: ")) return end.text + when;
+  if (end.text.empty() && !end.printed.empty()) return "prints '" + end.printed + "'" + when;
   return end.text;
 }
 

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <memory>
+#include <new>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
@@ -169,26 +171,35 @@ Space ToSpace(const AlidadeSpace& from) {
   return space;
 }
 
-/// What the last failed call of this thread threw.
-thread_local struct {
-  const void* slot = nullptr;  ///< null: nothing
-  char text[1280];
-} thrown;
+/// A call that failed: what it threw, where it did.
+struct FailedCall {
+  const void* slot;
+  std::optional<std::string> thrown;
+};
+
+/// The last of this thread, each of another slot; the last one is the latest.
+thread_local std::vector<FailedCall> failed_calls;
+
+/// Without memory for it, it is one that says nothing.
+void NoteFailure(const void* slot, std::optional<std::string> thrown) noexcept {
+  constexpr std::size_t kMost = 64;
+  try {
+    std::erase_if(failed_calls, [&](const FailedCall& call) { return call.slot == slot; });
+    if (failed_calls.size() == kMost) failed_calls.erase(failed_calls.begin());
+    failed_calls.push_back({slot, std::move(thrown)});
+  } catch (const std::bad_alloc&) {
+  }
+}
 
 }  // namespace
 
-Status detail::Failed() noexcept {
-  thrown.slot = nullptr;
+Status detail::Failed(const void* slot) noexcept {
+  NoteFailure(slot, std::nullopt);
   return Status::kError;
 }
 
 Status detail::Thrown(const void* slot) noexcept {
-  const std::string what = internal::ThrownBy([] { throw; });
-  char call[1024];
-  DescribeCall(slot, call, sizeof call);
-  std::snprintf(thrown.text, sizeof thrown.text, "%s threw: %s", *call != '\0' ? call : "it",
-                what.c_str());
-  thrown.slot = slot;
+  NoteFailure(slot, internal::ThrownBy([] { throw; }));
   return Status::kError;
 }
 
@@ -365,7 +376,14 @@ Space ModelInstance::ReadSpace(const AlidadeSpace& space, const std::string& wha
 }
 
 std::string ModelInstance::error_text() const {
-  if (internal::NameOfCall(*this, thrown.slot) != nullptr) return thrown.text;
+  const auto of_this = [&](const FailedCall& call) {
+    return internal::NameOfCall(*this, call.slot) != nullptr;
+  };
+  const auto last = std::find_if(failed_calls.rbegin(), failed_calls.rend(), of_this);
+  if (last != failed_calls.rend() && last->thrown) {
+    return std::string(internal::NameOfCall(*this, last->slot)) + " of model '" + name_ +
+           "' of plugin " + plugin_ + " threw: " + *last->thrown;
+  }
   if (instance_.error_text == nullptr) return "";
   std::string text;
   const std::string failure = internal::ThrownBy([&] {

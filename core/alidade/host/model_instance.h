@@ -15,15 +15,15 @@
 namespace alidade {
 
 namespace detail {
-/// The plugin has returned ALIDADE_ERROR, or a code that the ABI does not have: kError.
-[[gnu::cold]] Status Failed() noexcept;
+/// A call of that slot has returned ALIDADE_ERROR, or a code that the ABI does not have: kError.
+[[gnu::cold]] Status Failed(const void* slot) noexcept;
 /// It has thrown, in a call of that slot: kError. What it threw, which is in flight, becomes the
 /// error text of its instance in this thread.
 [[gnu::cold]] Status Thrown(const void* slot) noexcept;
 
-inline Status ToStatus(std::int32_t code) {
+inline Status ToStatus(std::int32_t code, const void* slot) {
   const bool known = code >= ALIDADE_OK && code < ALIDADE_ERROR;
-  return known ? static_cast<Status>(code) : Failed();
+  return known ? static_cast<Status>(code) : Failed(slot);
 }
 
 /// The status of `call`, of a model's function in `slot` of its call table. Unless `kGuarded` what
@@ -31,9 +31,9 @@ inline Status ToStatus(std::int32_t code) {
 template <bool kGuarded, class Call>
 [[gnu::always_inline]] inline Status CallModel(const void* slot, const Call& call) {
   NoteCall(slot);
-  if constexpr (!kGuarded) return ToStatus(call());
+  if constexpr (!kGuarded) return ToStatus(call(), slot);
   try {
-    return ToStatus(call());
+    return ToStatus(call(), slot);
   } catch (...) {
     return Thrown(slot);
   }

@@ -144,8 +144,9 @@ std::string PluginHash(const fs::path& file) {
 
 std::string InputsJson(const CommandInputs& command, const Config& config,
                        const std::vector<fs::path>& plugins) {
-  std::vector<std::string> paths, build, used;
+  std::vector<std::string> paths, folders, build, used;
   for (const fs::path& path : command.plugin_paths) paths.push_back(JsonString(path.string()));
+  for (const fs::path& path : command.plugin_folders) folders.push_back(JsonString(path.string()));
   for (const auto& [name, id] : BuildIds())
     build.push_back(JsonString(name) + ": " + JsonString(id));
   std::multimap<std::string, std::string> hashes;  // by name, wherever they lie
@@ -157,6 +158,7 @@ std::string InputsJson(const CommandInputs& command, const Config& config,
          ",\n  \"config\": {\"file\": " + JsonString(fs::path(config.name()).filename().string()) +
          ", \"sha256\": " + JsonString(Sha256(config.ToYaml())) +
          "},\n  \"plugin_paths\": " + Bracketed('[', paths, ']') +
+         ",\n  \"plugin_folders\": " + Bracketed('[', folders, ']') +
          ",\n  \"build\": " + Bracketed('{', build, '}') +
          ",\n  \"plugins\": " + Bracketed('[', used, ']') +
          ",\n  \"data\": " + Bracketed('[', DataOf(config), ']') + "\n}\n";
@@ -168,6 +170,8 @@ RecordedInputs ReadInputs(const std::string& text, const std::string& file) {
     inputs.command.arguments = json.at("arguments").get<std::vector<std::string>>();
     for (const Json& path : json.at("plugin_paths"))
       inputs.command.plugin_paths.emplace_back(path.get<std::string>());
+    for (const Json& path : json.at("plugin_folders"))
+      inputs.command.plugin_folders.emplace_back(path.get<std::string>());
     inputs.config = json.at("config").at("file").get<std::string>();
     for (const Json& one : json.at("data")) {
       if (one.value("read_once", false)) inputs.read_once = one.at("file").get<std::string>();

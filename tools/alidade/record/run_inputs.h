@@ -19,8 +19,9 @@ struct CommandInputs {
   /// The command and those of its options that a byte depends on, but for the config and what is in
   /// its resolved text: {"run", "--covariances"}.
   std::vector<std::string> arguments;
-  /// Where plugins were searched besides the usual places and those of the config.
-  std::vector<std::filesystem::path> plugin_paths;
+  std::vector<std::filesystem::path> plugin_paths;  ///< of --plugin-path
+  /// Of the environment. What is refused there is no error, and so they are no difference either.
+  std::vector<std::filesystem::path> plugin_folders;
 };
 
 /// The files of the plugins that a run uses: of its models in the order of the config, of its

@@ -188,7 +188,10 @@ TEST_F(CrashCli, APluginThatDoesNotReturnFromCreateOrDestroyIsNamed) {
                                "--set", "source={type: models, rate_hz: 10, duration_s: 1}"});
     std::this_thread::sleep_for(std::chrono::milliseconds(1500));
     ::kill(sweep, SIGTERM);
-    EXPECT_TRUE(Contains(Wait(sweep).err, "asked to stop, but a plugin does not return" + words));
+    const Outcome swept = Wait(sweep);
+    EXPECT_EQ(swept.code, 75) << swept.err;
+    EXPECT_TRUE(Contains(swept.err, "asked to stop, but a plugin does not return" + words))
+        << swept.err;
   }
 }
 

@@ -115,6 +115,8 @@ auto CreateBuilt(const PluginEntry& entry, const Node& node, std::recursive_mute
   } catch (const Error&) {
     reader.Check();
     throw;
+  } catch (const std::bad_alloc&) {
+    throw;
   } catch (const std::exception& e) {
     reader.Check();
     FailCreation(entry, node, e.what());
@@ -220,15 +222,7 @@ EstimatorMaker PluginHost::CreateEstimator(const std::string& name, const Node& 
 std::vector<ParamInfo> PluginHost::Schema(const PluginEntry& entry) const {
   ParamRecorder recorder;
   const std::lock_guard lock(create_mutex_);
-  if (entry.kind == PluginEntry::Kind::kEstimator) {
-    const Config stand_in = Config::FromText("type: " + entry.name, "stand-in");
-    recorder.Run([&] {
-      Params params(&recorder.host());
-      static_cast<void>(EstimatorOf(entry).create(EstimatorArguments{stand_in.root(), params}));
-    });
-    return recorder.Result();
-  }
-  if (entry.kind != PluginEntry::Kind::kSource) {
+  if (entry.kind != PluginEntry::Kind::kSource && entry.kind != PluginEntry::Kind::kEstimator) {
     const AlidadeEntry c = EntryOf(entry);
     recorder.Run([&] {
       NewInstance instance(entry);
@@ -236,17 +230,23 @@ std::vector<ParamInfo> PluginHost::Schema(const PluginEntry& entry) const {
     });
     return recorder.Result();
   }
-  const SourceEntry& source = SourceOf(entry);
+  const bool is_source = entry.kind == PluginEntry::Kind::kSource;
   const Config stand_in = Config::FromText("type: " + entry.name, "stand-in");
+  const std::string plugin = entry.plugin.string();
   recorder.Run([&] {
+    const internal::NamedCall call("Create", internal::KindName(entry.kind), entry.name, plugin);
     Params params(&recorder.host());
     try {
-      static_cast<void>(source.create(SourceArguments{stand_in.root(), params, 1, {}}));
+      if (is_source) {
+        static_cast<void>(SourceOf(entry).create(SourceArguments{stand_in.root(), params, 1, {}}));
+      } else {
+        static_cast<void>(EstimatorOf(entry).create(EstimatorArguments{stand_in.root(), params}));
+      }
     } catch (...) {
       // It wants a file, say, that stand-ins do not give; what it read before counts.
     }
   });
-  std::vector<ParamInfo> result = ListedKeys(source.keys);
+  std::vector<ParamInfo> result = ListedKeys(is_source ? SourceOf(entry).keys : nullptr);
   for (const ParamInfo& info : recorder.Result()) result.push_back(info);
   return result;
 }

@@ -78,7 +78,8 @@ Needs ReadNeeds(const fs::path& library) {
   const std::string origin = library.parent_path().string();
   Needs needs;
   for (const Elf64_Dyn& entry : entries) {
-    if (entry.d_tag == DT_NEEDED) needs.libraries.push_back(text(entry));
+    if (entry.d_tag == DT_NEEDED || entry.d_tag == DT_AUXILIARY || entry.d_tag == DT_FILTER)
+      needs.libraries.push_back(Split(text(entry), origin).front());
     if (entry.d_tag == DT_RPATH) needs.rpath = Split(text(entry), origin);
     if (entry.d_tag != DT_RUNPATH) continue;
     needs.runpath = Split(text(entry), origin);
@@ -98,11 +99,13 @@ class NeedsCheck {
  public:
   explicit NeedsCheck(const fs::path& plugin) : plugin_(plugin) {}
 
-  /// `inherited`: the RPATH of those that need `library`.
+  /// `inherited`: the RPATH of those that need `library`, which is there. $ORIGIN is the folder
+  /// where it was found, not the one that a link leads to.
   void Run(const fs::path& library, Folders inherited) {
-    if (!seen_.insert(library).second) return;
+    if (!seen_.insert(fs::canonical(library)).second) return;
     const Needs needs = ReadNeeds(library);
-    inherited.insert(inherited.begin(), needs.rpath.begin(), needs.rpath.end());
+    if (!needs.has_runpath)
+      inherited.insert(inherited.begin(), needs.rpath.begin(), needs.rpath.end());
     for (const std::string& name : needs.libraries) {
       if (name.find('/') != name.npos) {
         Follow(name, name, inherited);
@@ -122,9 +125,8 @@ class NeedsCheck {
   bool Follow(const std::string& name, const fs::path& place, const Folders& inherited) {
     CheckTrustedNeed(plugin_, name, place);
     std::error_code error;
-    const fs::path canonical = fs::canonical(place, error);
-    if (error) return false;
-    Run(canonical, inherited);
+    if (!fs::exists(place, error)) return false;
+    Run(place, inherited);
     return true;
   }
 

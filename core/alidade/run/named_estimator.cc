@@ -2,12 +2,15 @@
 #include "alidade/run/named_estimator.h"
 
 #include <algorithm>
+#include <exception>
+#include <new>
 
 #include "alidade/base/text_table.h"
 #include "alidade/base/words.h"
 #include "alidade/config/tree.h"
 #include "alidade/filter/built_in.h"
 #include "alidade/host/calibration.h"
+#include "alidade/host/foreign_call.h"
 #include "alidade/host/plugin_host.h"
 
 namespace alidade::internal {
@@ -189,6 +192,32 @@ int ReadUse(const Node& use, const NamedEstimator& named, const Node& estimators
   return first;
 }
 
+/// Makes the estimator of the entry `node`, of a plugin unless null. Error: kPlugin.
+std::unique_ptr<Estimator> Make(const EstimatorMaker& make, const NamedEstimator& named,
+                                const std::vector<StreamInfo>* streams, const PluginEntry* plugin,
+                                const Node& node) {
+  const auto made = [&] {
+    return make(named.system, streams != nullptr ? *streams : StreamsOf(named.system));
+  };
+  if (plugin == nullptr) return made();
+  const std::string file = plugin->plugin.string();
+  const NamedCall call("Create", "estimator", plugin->name, file);
+  std::string why = "an exception of unknown type";
+  try {
+    return made();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& e) {
+    why = e.what();
+  } catch (...) {
+  }
+  throw Error(ExitCode::kPlugin, ErrorLine(node.place(), node.path(),
+                                           "estimator '" + plugin->name + "' of plugin " + file +
+                                               " failed while being created: " + why));
+}
+
 /// Refuses an estimator that cannot do what the run asks for out-of-sequence frames.
 void CheckCanRollBack(const NamedEstimator& named, const Node& entry) {
   if (named.estimator->offline() || named.estimator->Clone() != nullptr) return;
@@ -249,7 +278,7 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   if (streams != nullptr) CheckStreams(own.root(), named.system, *streams);
   const bool lent = use && use->is_map();  // landmarks are initialised as in the other estimator
   if (lent && named.system.landmarks) named.system.landmarks->min_observations = 1;
-  named.estimator = make(named.system, streams != nullptr ? *streams : StreamsOf(named.system));
+  named.estimator = Make(make, named, streams, of_plugin, entry);
   if (use) named.accepted_by = ReadUse(*use, named, config.root().At("estimators"), before);
   return named;
 }

@@ -116,6 +116,15 @@ TEST_F(CrashCli, AnExceptionOfAPluginInCIsNamedAndNoEndOfTheProgram) {
   EXPECT_TRUE(Contains(ended.err, words)) << ended.err;
   ASSERT_EQ(run("sensors.bad.time_offset_s", "0.01").code, 0);
   EXPECT_TRUE(Contains(Read("out/ekf/events.csv"), words)) << Read("out/ekf/events.csv");
+  // Two in one frame, which are asked for their words once both have thrown.
+  const std::string two = "{model: throws_in_valid, stream: z, roles: {x: s.value}}";
+  ASSERT_EQ(run("sensors", "{bad: " + two + ", worse: " + two + '}').code, 0);
+  for (const std::string sensor : {"bad", "worse"}) {
+    EXPECT_TRUE(Contains(Read("out/ekf/events.csv"),
+                         "sensor '" + sensor + "': Valid of model 'throws_in_valid' of plugin " +
+                             plugin + " threw: an exception of unknown type"))
+        << Read("out/ekf/events.csv");
+  }
   const Outcome created = run("sensors.bad.model", "throws_in_create");
   EXPECT_EQ(created.code, 69) << created.err;
   EXPECT_TRUE(Contains(created.err, "model 'throws_in_create' of plugin " + plugin +

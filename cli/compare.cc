@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "alidade/record/recorder.h"
+#include "alidade/resume/run_inputs.h"
 #include "command.h"
 #include "console.h"
 #include "watchdog.h"
@@ -85,7 +86,8 @@ ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compa
   Recorder::Options record{folder, arguments.force, arguments.figures, arguments.command,
                            StopRequested};
   record.covariances = true;
-  Recorder recorder(record, compared.config, host);
+  record.plugins = internal::HashesOf(internal::PluginsNamed({compared.config}, host));
+  Recorder recorder(record, compared.config);
   RunComparer comparer(compared.experiment);
   Progress progress("frames", arguments.quiet);
   RunOptions options;

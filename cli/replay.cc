@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/record/replay.h"
+#include "alidade/resume/replay.h"
 
 #include <stdlib.h>
 
@@ -55,9 +55,11 @@ class ScratchFolder {
 ExitCode MakeAgain(const internal::RecordedInputs& recorded, const fs::path& folder,
                    const fs::path& scratch, const fs::path& output,
                    const std::function<ExitCode(const std::vector<std::string>&)>& execute) {
-  // A config gives its name to the title.
-  const fs::path config = scratch / fs::path(recorded.config).filename();
+  // A config gives its name to the title; in a folder of its own it is in nobody's way.
+  const fs::path config = scratch / "config" / fs::path(recorded.config).filename();
   std::error_code error;
+  fs::create_directory(config.parent_path(), error);
+  if (error) internal::FailCreate(config.parent_path().string(), error.value());
   fs::copy_file(folder / internal::kResolvedConfig, config, error);
   if (error) {
     throw Error(ExitCode::kInputMissing,
@@ -84,8 +86,9 @@ ExitCode Replay(const ReplayArguments& arguments,
   const internal::RecordedInputs recorded = internal::ReadReplayable(arguments.folder);
   const ScratchFolder scratch;
   const fs::path again =
-      arguments.output.empty() ? scratch.path() / "again" : fs::path(arguments.output);
+      arguments.output.empty() ? scratch.path() / "made/again" : fs::path(arguments.output);
   const ExitCode code = MakeAgain(recorded, folder, scratch.path(), again, execute);
+  if (StopRequested()) return ExitCode::kStopped;  // some figures may not be drawn
   std::error_code ignored;
   const bool made = fs::exists(again / internal::kInputsFile, ignored);
   if (code == ExitCode::kStopped || code == ExitCode::kUsage || !made) return code;

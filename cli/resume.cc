@@ -8,8 +8,7 @@
 
 #include "alidade/base/words.h"
 #include "alidade/host/plugin_file.h"
-#include "alidade/record/leftovers.h"
-#include "alidade/record/run_inputs.h"
+#include "alidade/resume/leftovers.h"
 #include "console.h"
 
 namespace alidade::cli {
@@ -23,14 +22,14 @@ void AddResume(CLI::App& command, bool& resume) {
 }
 
 std::string InputsText(const Input& input, const Config& config,
-                       const std::vector<std::string>& arguments,
-                       const std::vector<std::filesystem::path>& plugins) {
+                       const std::vector<std::string>& arguments, const std::vector<Config>& runs,
+                       const internal::PluginHashes& plugins) {
   internal::CommandInputs command{arguments, {}, internal::PluginFoldersOfEnvironment()};
   for (const std::filesystem::path& path : Absolute(input.plugin_paths)) {
     if (std::ranges::find(command.plugin_paths, path) == command.plugin_paths.end())
       command.plugin_paths.push_back(path);
   }
-  return internal::InputsJson(command, config, plugins);
+  return internal::InputsJson(command, config, runs, plugins);
 }
 
 bool IsFinished(const std::filesystem::path& folder, const Config& config,

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "alidade/base/error.h"
+#include "alidade/resume/run_inputs.h"
 #include "command.h"
 
 /// What commands that make a run folder share: its inputs, and how they go on with an unfinished
@@ -15,10 +16,11 @@ namespace alidade::cli {
 /// The option --resume, which needs -o.
 void AddResume(CLI::App& command, bool& resume);
 
-/// The text of inputs.json for a command with these arguments, as internal::CommandInputs has them.
+/// The text of inputs.json for a command with these arguments, as internal::CommandInputs has them;
+/// `runs` are the configs of its runs, `plugins` those that they use.
 std::string InputsText(const Input& input, const Config& config,
-                       const std::vector<std::string>& arguments,
-                       const std::vector<std::filesystem::path>& plugins);
+                       const std::vector<std::string>& arguments, const std::vector<Config>& runs,
+                       const internal::PluginHashes& plugins);
 
 /// Of --resume: whether `folder` is finished already, which is said unless `quiet`. Error:
 /// kCannotCreate where it is a finished run of other inputs, unless `force`.

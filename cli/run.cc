@@ -12,7 +12,7 @@
 
 #include "alidade/record/follower.h"
 #include "alidade/record/recorder.h"
-#include "alidade/record/run_inputs.h"
+#include "alidade/resume/run_inputs.h"
 #include "alidade/run/metric_rows.h"
 #include "alidade/sweep/sweep_config.h"
 #include "command.h"
@@ -114,12 +114,13 @@ std::vector<std::string> ArgumentsOf(const RunArguments& arguments) {
 }
 
 Recorder::Options RecordOf(const RunArguments& arguments, const Config& config,
-                           const std::filesystem::path& folder,
-                           const std::vector<std::filesystem::path>& plugins) {
+                           const std::filesystem::path& folder, const PluginHost& host) {
   Recorder::Options record{folder, arguments.force, !arguments.no_figures, arguments.command,
                            StopRequested};
   record.covariances = arguments.covariances;
-  record.inputs = InputsText(arguments.input, config, ArgumentsOf(arguments), plugins);
+  record.plugins = internal::HashesOf(internal::PluginsNamed({config}, host));
+  record.inputs =
+      InputsText(arguments.input, config, ArgumentsOf(arguments), {config}, record.plugins);
   record.resume = arguments.resume;
   return record;
 }
@@ -136,11 +137,10 @@ ExitCode RunConfig(const RunArguments& arguments) {
   Watchdog watchdog(arguments.frame_timeout_s);
   StopOnSignals();  // before a source that waits for its pipe is made
   Experiment experiment = BuildExperiment(config, host);
-  const Recorder::Options record =
-      RecordOf(arguments, config, folder, internal::PluginsInUse(experiment, config, host));
+  const Recorder::Options record = RecordOf(arguments, config, folder, host);
   if (record.resume && IsFinished(folder, config, record.inputs, record.force, arguments.quiet))
     return ExitCode::kOk;
-  recorder.emplace(record, config, host);
+  recorder.emplace(record, config);
   watchdog.Keep(*recorder);
   if (record.resume && !arguments.quiet) {
     TellResumed(folder, recorder->resumed(), "its frames are computed again, and compared");

@@ -3,11 +3,11 @@
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
-#include <algorithm>
 #include <charconv>
 #include <memory>
+#include <utility>
 
-#include "alidade/record/run_inputs.h"
+#include "alidade/resume/run_inputs.h"
 #include "alidade/sweep/finished_runs.h"
 #include "alidade/sweep/sweep_config.h"
 #include "command.h"
@@ -150,33 +150,21 @@ ExitCode SweepValues(const Task& task) {
   return failed ? ExitCode::kFound : ExitCode::kOk;
 }
 
-/// Those that the runs use. A config that cannot be run has none; the sweep says what is wrong.
-std::vector<std::filesystem::path> PluginsOf(const SweepArguments& arguments, const Config& config,
-                                             const PluginHost& host) {
-  std::vector<std::filesystem::path> plugins;
-  const auto add = [&](const Config& one) {
-    try {
-      internal::CheckReadableAgain(one);
-      for (const auto& file : internal::PluginsInUse(BuildExperiment(one, host), one, host)) {
-        if (std::ranges::find(plugins, file) == plugins.end()) plugins.push_back(file);
-      }
-    } catch (const Error&) {
-    }
-  };
-  if (arguments.vary.empty()) {
-    add(config.Copy());
-    return plugins;
-  }
+/// The config of the runs, or one for each value that is varied, but for those that cannot be set:
+/// the sweep says what is wrong with them.
+std::vector<Config> ConfigsOf(const SweepArguments& arguments, const Config& config) {
+  if (arguments.vary.empty()) return {config};
   const Variation variation = Variation::FromText(arguments.vary);
+  std::vector<Config> configs;
   for (const std::string& value : variation.values) {
     try {
       Config with = config.Copy();
       with.Set(variation.key, value, "--vary");
-      add(with);
+      configs.push_back(std::move(with));
     } catch (const Error&) {
     }
   }
-  return plugins;
+  return configs;
 }
 
 /// The options that a byte of the folder depends on.
@@ -199,8 +187,9 @@ ExitCode RunSweep(const SweepArguments& arguments) {
   const PluginHost host = arguments.input.Host(config);
   const Watchdog watchdog(std::nullopt);
   StopOnSignals();
-  const std::string inputs = InputsText(arguments.input, config, ArgumentsOf(arguments),
-                                        PluginsOf(arguments, config, host));
+  const std::vector<Config> configs = ConfigsOf(arguments, config);
+  const std::string inputs = InputsText(arguments.input, config, ArgumentsOf(arguments), configs,
+                                        internal::HashesOf(internal::PluginsNamed(configs, host)));
   if (arguments.resume && IsFinished(path, config, inputs, arguments.force, arguments.quiet))
     return std::filesystem::exists(path / "failures.csv") ? ExitCode::kFound : ExitCode::kOk;
   Progress progress("runs", arguments.quiet);

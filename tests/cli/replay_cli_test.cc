@@ -64,6 +64,30 @@ TEST_F(ReplayCli, MakesASweepAgain) {
   ExpectEqual();
 }
 
+// Whatever its config is called.
+TEST_F(ReplayCli, MakesARunOfAConfigOfAnyNameAgain) {
+  for (const char* name : {"again", "config", "made"}) {
+    Write(name, Read("config.yaml"));
+    Make({"run", name, "--no-figures", "--force"});
+    ExpectEqual();
+  }
+}
+
+// What is refused in a folder of the environment is no error, then or now.
+TEST_F(ReplayCli, MakesARunWithThePluginsOfTheEnvironmentAgain) {
+  fs::create_directory(folder_ / "own");
+  fs::permissions(folder_ / "own", fs::perms::owner_all);
+  fs::copy_file(ALIDADE_BINARY_DIR "/tests/faults/ratio.so", folder_ / "own/ratio.so");
+  Write("own/broken.so", "no plugin");
+  ::setenv("ALIDADE_PLUGIN_PATH", (folder_ / "own").c_str(), 1);
+  Make({"run", "config.yaml", "--no-figures", "--set",
+        "sensors.ratio={model: ratio, stream: inverse_scale, roles: {numerator: target.depth, "
+        "denominator: template.inverse_distance}}"});
+  ::unsetenv("ALIDADE_PLUGIN_PATH");
+  EXPECT_TRUE(Contains(Read("out/inputs.json"), "\"file\": \"ratio.so\""));
+  ExpectEqual();
+}
+
 // A run that fails on its data does so again.
 TEST_F(ReplayCli, MakesAFailureAgain) {
   WriteTable("none");
@@ -151,6 +175,12 @@ TEST_F(ReplayCli, RefusesWhatCannotBeMadeAgain) {
   const Outcome stopped = Call({"replay", "out"});
   EXPECT_EQ(stopped.code, 65);
   EXPECT_TRUE(Contains(stopped.err, "error: out: was stopped before its end")) << stopped.err;
+  fs::copy(folder_ / "out", folder_ / "out.failed-123", fs::copy_options::recursive);
+  fs::remove(folder_ / "out.failed-123/run.json");
+  const Outcome failed = Call({"replay", "out.failed-123"});
+  EXPECT_EQ(failed.code, 65);
+  EXPECT_TRUE(Contains(failed.err, "error: out.failed-123: was not written to its end: "))
+      << failed.err;
   Write("out/inputs.json", "[1, 2]");
   EXPECT_EQ(Call({"replay", "out"}).code, 65);
 }

@@ -121,6 +121,21 @@ TEST_F(ResumeCli, WithNothingToResumeSaysSo) {
   EXPECT_EQ(Call({"run", "config.yaml", "--resume"}).code, 2);  // without -o
 }
 
+TEST_F(ResumeCli, ReplacesNothingButWhatIsUnfinished) {
+  ASSERT_EQ(Call({"simulate", "config.yaml", "-o", "out", "--quiet"}).code, 0);
+  const auto data = RunFiles(folder_ / "out");
+  ASSERT_FALSE(data.empty());
+  const Outcome run = Run({"--resume"});
+  EXPECT_EQ(run.code, 73);
+  EXPECT_EQ(run.err, "error: out: is no unfinished run; add --force to replace it\n");
+  const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "1", "-o", "out", "--resume"});
+  EXPECT_EQ(sweep.code, 73);
+  EXPECT_EQ(sweep.err, run.err);
+  EXPECT_EQ(RunFiles(folder_ / "out"), data);
+  EXPECT_EQ(Leftovers(), std::vector<std::string>{});
+  EXPECT_EQ(Run({"--resume", "--force"}).code, 0) << Read("stderr");
+}
+
 TEST_F(ResumeCli, RefusesAnotherConfig) {
   const std::string leftover = Interrupt();
   ExpectRefused(Run({"--resume", "--seed", "2"}), leftover, "config.resolved.yaml:");
@@ -128,6 +143,12 @@ TEST_F(ResumeCli, RefusesAnotherConfig) {
                 "config.resolved.yaml:");
   ExpectRefused(Run({"--resume", "--covariances"}), leftover,
                 "command: now 'run --no-figures --covariances', was 'run --no-figures'; ");
+}
+
+TEST_F(ResumeCli, KnowsTheSameConfigByAnotherName) {
+  WriteTable(80);
+  Interrupt({}, "./table.yaml");
+  EXPECT_EQ(Run({"--resume"}, "table.yaml").code, 0) << Read("stderr");
 }
 
 TEST_F(ResumeCli, RefusesOtherData) {
@@ -204,6 +225,23 @@ TEST_F(ResumeCli, GoesOnAfterASignal) {
   ExpectSameFiles(folder_ / "out", folder_ / "whole");
 }
 
+// The estimates of a smoother rest on later data, which a run that was stopped has not.
+TEST_F(ResumeCli, GoesOnAfterASignalWithASmoother) {
+  Arguments command = {"run", "config.yaml", "--no-figures", "-o", "out"};
+  command.insert(command.end(), long_.begin(), long_.end());
+  command.insert(command.end(), {"--set", "estimators={ekf: {type: ekf}, rts: {type: rts}}"});
+  Arguments whole = command;
+  whole[4] = "whole";
+  ASSERT_EQ(Call(whole).code, 0) << Read("stderr");
+  ASSERT_EQ(Stop(command, ".keep").code, 75);
+  ASSERT_TRUE(Exists("out/rts/estimates.csv"));
+  command.emplace_back("--resume");
+  const Outcome resumed = Call(command);
+  EXPECT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_TRUE(Contains(resumed.err, "resuming out: ")) << resumed.err;
+  ExpectSameFiles(folder_ / "out", folder_ / "whole");
+}
+
 // What a run had come to is not lost to one that resumes it and comes less far.
 TEST_F(ResumeCli, AStopBeforeWhatIsThereKeepsThat) {
   before_ = "ulimit -f 1400";
@@ -263,6 +301,33 @@ TEST_F(ResumeSweepCli, GoesOnToTheSameBytes) {
   EXPECT_FALSE(Contains(resumed.err, ": 0 runs are finished")) << resumed.err;
   ExpectSameFiles(folder_ / "out", folder_ / "whole");
   EXPECT_EQ(Sweep("out", {"--resume"}).err, "out is finished: nothing to resume\n");
+}
+
+// A signal before the first new run leaves the summary of those that were finished.
+TEST_F(ResumeSweepCli, AStopKeepsWhatWasFinished) {
+  StopSweep({"--jobs", "1"});
+  const double before = Json("out/sweep.json").root().At("runs_used").Number();
+  ASSERT_GT(before, 0);
+  const Outcome stopped = Stop({"sweep", "config.yaml", "--runs", "40", "--set",
+                                "source.duration_s=20", "-o", "out", "--jobs", "1", "--resume"},
+                               "inputs.json");
+  EXPECT_EQ(stopped.code, 75) << stopped.err;
+  EXPECT_GE(Json("out/sweep.json").root().At("runs_used").Number(), before);
+  EXPECT_EQ(Sweep("out", {"--resume"}).code, 0) << Read("stderr");
+}
+
+TEST_F(ResumeSweepCli, AFinishedOneWithFailuresHasItsExitCodeAgain) {
+  Write("table.csv", "t_s,d\n0,80\n0.1,none\n");
+  const Arguments sweep = {"sweep", "table.yaml", "--runs", "2", "-o", "out"};
+  ASSERT_EQ(Call(sweep).code, 1);
+  const auto files = RunFiles(folder_ / "out");
+  ASSERT_TRUE(files.contains("failures.csv"));
+  Arguments resume = sweep;
+  resume.emplace_back("--resume");
+  const Outcome again = Call(resume);
+  EXPECT_EQ(again.code, 1);
+  EXPECT_EQ(again.err, "out is finished: nothing to resume\n");
+  EXPECT_EQ(RunFiles(folder_ / "out"), files);
 }
 
 TEST_F(ResumeSweepCli, TakesFinishedRunsFromTheDisk) {

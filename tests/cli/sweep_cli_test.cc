@@ -348,6 +348,19 @@ TEST_F(SweepCli, AVariedReferenceIsNamedForEachValue) {
   EXPECT_TRUE(Contains(one.out, "\nerrors are differences from estimator 'ekf'")) << one.out;
 }
 
+// The inputs are those of all values, and of what the source alone is made with.
+TEST_F(SweepCli, RecordsTheInputsOfEveryValue) {
+  for (const char* name : {"a.csv", "b.csv"}) Write(name, "t_s,d\n0,80\n0.1,79\n");
+  const Outcome data = Call(
+      {"sweep", "table.yaml", "--runs", "1", "-o", "out", "--vary", "source.path=a.csv,b.csv"});
+  ASSERT_EQ(data.code, 0) << data.err;
+  const std::string inputs = Read("out/inputs.json");
+  EXPECT_TRUE(Contains(inputs, "/a.csv\", \"bytes\"")) << inputs;
+  EXPECT_TRUE(Contains(inputs, "/b.csv\", \"bytes\"")) << inputs;
+  EXPECT_FALSE(Contains(inputs, "/table.csv\"")) << inputs;
+  EXPECT_TRUE(Contains(inputs, "\"alidade_csv.so\"")) << inputs;
+}
+
 TEST_F(SweepCli, RefusesWhatCannotBeVaried) {
   const std::vector<std::pair<std::string, std::string>> wrong = {
       {"source.noise", "error: --vary: 'source.noise' varies no key; expected KEY=v1,v2,..."},

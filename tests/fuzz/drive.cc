@@ -3,13 +3,16 @@
 // Stands in for libFuzzer: PROGRAM SEED... or PROGRAM FOLDER MUTATIONS
 //
 // Runs each seed once, and then so many mutations of the seeds in the folder, the same in every
-// run. An input that ends the program is kept as crash-PROCESS in the working folder.
+// run. An input that ends the program is kept as crash-PROCESS in the working folder. Exit code
+// 2: a seed or the folder cannot be read.
 #include <fcntl.h>
 #include <signal.h>
 
 #include <algorithm>
 #include <array>
 #include <random>
+#include <sstream>
+#include <system_error>
 
 #include "fuzz.h"
 
@@ -35,9 +38,29 @@ void Run(const std::string& input) {
   LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(input.data()), input.size());
 }
 
+[[noreturn]] void FailRead(const fs::path& path) {
+  std::fprintf(stderr, "%s: cannot be read\n", path.c_str());
+  std::exit(2);
+}
+
 std::string Read(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
+  std::ostringstream text;
+  if (stream && stream.peek() != std::ifstream::traits_type::eof()) text << stream.rdbuf();
+  if (!stream.is_open() || stream.bad() || text.bad()) FailRead(file);
+  return text.str();
+}
+
+/// The files in a folder, by name.
+std::vector<fs::path> FilesIn(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  fs::directory_iterator entry(folder, error);
+  for (const fs::directory_iterator end; !error && entry != end; entry.increment(error))
+    files.push_back(entry->path());
+  if (error || files.empty()) FailRead(folder);
+  std::sort(files.begin(), files.end());
+  return files;
 }
 
 /// Changes a few places of a text.
@@ -102,13 +125,11 @@ class Mutator {
 
 int main(int count, char** arguments) {
   for (const int signal : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL}) ::signal(signal, Keep);
-  if (count == 3 && fs::is_directory(arguments[1])) {
-    std::vector<fs::path> files(fs::directory_iterator(arguments[1]), {});
-    std::sort(files.begin(), files.end());
+  std::error_code ignored;
+  if (count == 3 && fs::is_directory(arguments[1], ignored)) {
     std::vector<std::string> seeds;
-    for (const fs::path& file : files) seeds.push_back(Read(file));
+    for (const fs::path& file : FilesIn(arguments[1])) seeds.push_back(Read(file));
     for (const std::string& seed : seeds) Run(seed);
-    if (seeds.empty()) return 1;
     Mutator mutator(std::move(seeds));
     for (int left = std::atoi(arguments[2]); left > 0; --left) Run(mutator.Next());
     return 0;

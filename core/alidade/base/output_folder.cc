@@ -88,9 +88,10 @@ bool IsBarelyMade(const fs::path& folder, std::string_view process) {
   const bool is_folder = fs::is_directory(fs::symlink_status(folder, error));
   const bool own = process == std::to_string(::getpid());  // of one with the same number
   if (!is_folder || !IsNumber(process) || (IsAlive(process) && !own)) return false;
-  for (const auto& entry : fs::directory_iterator(folder, error)) {
-    const bool marker = entry.path().filename() == kMarker && entry.is_regular_file(error) &&
-                        fs::file_size(entry.path(), error) == 0;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const bool marker = entry->path().filename() == kMarker && entry->is_regular_file(error) &&
+                        fs::file_size(entry->path(), error) == 0;
     if (!marker) return false;
   }
   return !error;
@@ -124,7 +125,7 @@ fs::path WithoutTrailingSlash(const fs::path& path) {
            "change to one that exists, or name the output by its full path");
   }
   constexpr std::size_t kRoom = 64;  // for `.partial-PID`, and the names of files
-  if (normal.native().size() + kRoom >= PATH_MAX) FailCreate("the run folder", ENAMETOOLONG);
+  if (normal.native().size() + kRoom >= PATH_MAX) FailCreate(path.string(), ENAMETOOLONG);
   return normal.has_filename() ? normal : normal.parent_path();
 }
 
@@ -306,19 +307,20 @@ OutputFolder::Leftovers OutputFolder::FindLeftovers() const {
   const std::string old = '.' + target_.filename().string() + ".old-";
   Leftovers found;
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator(target_.parent_path(), error)) {
-    const std::string name = entry.path().filename().string();
+  for (fs::directory_iterator entry(target_.parent_path(), error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
     const bool replaced = name.starts_with(old);
     if (!replaced && !name.starts_with(partial)) continue;
     const std::string process = name.substr((replaced ? old : partial).size());
-    if (!IsMarked(entry.path(), process) && !IsBarelyMade(entry.path(), process)) continue;
-    if (IsHeld(entry.path(), process)) {
+    if (!IsMarked(entry->path(), process) && !IsBarelyMade(entry->path(), process)) continue;
+    if (IsHeld(entry->path(), process)) {
       Refuse(shown_, "process " + process + " is writing it now",
              "wait for it or choose another folder");
     }
-    const fs::path whole = entry.path() / target_.filename();
+    const fs::path whole = entry->path() / target_.filename();
     if (replaced && found.lost.empty() && !Exists(target_) && Exists(whole)) found.lost = whole;
-    found.folders.push_back(entry.path());
+    found.folders.push_back(entry->path());
   }
   return found;
 }
@@ -394,10 +396,10 @@ std::vector<std::string> OutputFolder::Names() const {
   return names;
 }
 
-void OutputFolder::WriteList() const {
+void OutputFolder::WriteList(const std::string& scratch) const {
   std::vector<std::string> names = {kList};
   for (const std::string& name : Names()) {
-    if (name != kMarker && name != kKeep) names.push_back(name);
+    if (name != kMarker && name != kKeep && name != scratch) names.push_back(name);
   }
   std::sort(names.begin(), names.end());
   std::string text;
@@ -410,12 +412,13 @@ void OutputFolder::SyncAll() const {
   Sync(partial_, shown_.string());
 }
 
-void OutputFolder::Commit() {
-  WriteList();
+void OutputFolder::Commit(const std::string& scratch) {
+  WriteList(scratch);
   SyncAll();
   const FolderLock lock(target_.parent_path());
   CheckTarget({});
   const fs::path old = Exists(target_) ? MoveAway() : fs::path();
+  if (!scratch.empty()) Remove(scratch);
   std::error_code ignored;
   if (::rename(partial_.c_str(), target_.c_str()) != 0) {
     const int error = errno;
@@ -448,11 +451,13 @@ std::vector<fs::path> FailedFolders(const fs::path& target) {
   const std::string start = place.filename().string() + kFailed;
   std::vector<fs::path> folders;
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator(place.parent_path(), error)) {
-    const std::string name = entry.path().filename().string();
+  for (fs::directory_iterator entry(place.parent_path(), error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
     if (!name.starts_with(start) || !IsFailedSuffix(std::string_view(name).substr(start.size())))
       continue;
-    if (fs::is_directory(entry.symlink_status(error))) folders.push_back(entry.path());
+    std::error_code ignored;
+    if (fs::is_directory(entry->symlink_status(ignored))) folders.push_back(entry->path());
   }
   std::ranges::sort(folders);
   return folders;

@@ -51,8 +51,9 @@ class OutputFolder {
   /// The path of `name` as messages give it: in the folder's place.
   std::string Shown(const std::string& name) const { return (shown_ / name).string(); }
   /// Lists all that was written in `files.txt`, syncs it and moves it to its place; an old folder
-  /// goes. Errors: kCannotCreate, kIo.
-  void Commit();
+  /// goes. The file `scratch`, of use to what is not committed alone, is not listed and goes last;
+  /// "": there is none. Errors: kCannotCreate, kIo.
+  void Commit(const std::string& scratch = {});
 
  private:
   /// Marked folders of dead processes.
@@ -72,7 +73,7 @@ class OutputFolder {
   std::filesystem::path Sibling(const char* kind) const;
   /// Of all files and folders in it, at any depth.
   std::vector<std::string> Names() const;
-  void WriteList() const;
+  void WriteList(const std::string& scratch) const;
   void SyncAll() const;
 
   std::filesystem::path shown_;   ///< as given

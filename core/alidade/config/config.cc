@@ -114,13 +114,17 @@ ConfigTree* SourcePath(const ConfigTree& root) {
   return source == nullptr ? nullptr : Child(*source, "path");
 }
 
-/// Makes the relative paths of a config absolute: `source.path`, and the items of `plugins`.
+/// Makes the relative paths of a config absolute, `source.path` and the items of `plugins`, without
+/// the `.` of a config that is named so. A `..` stays, as it may stand behind a link.
 void AnchorPaths(const ConfigTree& root, const fs::path& folder) {
   const auto anchor = [&](ConfigTree* node) {
     if (node->kind != Node::Kind::kScalar || node->text.empty() || node->text == "-") return;
     std::error_code error;
-    const fs::path absolute = fs::absolute(folder / node->text, error);
-    if (!error) node->text = absolute.string();
+    fs::path anchored;
+    for (const fs::path& part : fs::absolute(folder / node->text, error)) {
+      if (part != ".") anchored /= part;
+    }
+    if (!error) node->text = anchored.string();
   };
   if (ConfigTree* const path = SourcePath(root)) anchor(path);
   const ConfigTree* plugins = Child(root, "plugins");

@@ -174,7 +174,7 @@ class Examination {
       if (ended) break;
       if (entry.d_tag == DT_NEEDED || entry.d_tag == DT_SONAME || entry.d_tag == DT_RPATH ||
           entry.d_tag == DT_RUNPATH || entry.d_tag == DT_AUXILIARY || entry.d_tag == DT_FILTER) {
-        names_.push_back(entry.d_un.d_val);
+        names_.push_back(entry);
       } else if (!tags_.emplace(entry.d_tag, entry.d_un.d_val).second) {
         Fail("its table for the dynamic loader has an entry twice");
       }
@@ -202,7 +202,13 @@ class Examination {
     texts_ =
         ReadAt<char>(Need(DT_STRTAB, "texts"), Need(DT_STRSZ, "size of texts"), "table of texts");
     if (texts_.empty() || texts_.back() != '\0') Fail("its table of texts has no end");
-    for (const std::uint64_t name : names_) CheckText(name);
+    for (const Elf64_Dyn& name : names_) {
+      CheckText(name.d_un.d_val);
+      const bool library =
+          name.d_tag == DT_NEEDED || name.d_tag == DT_AUXILIARY || name.d_tag == DT_FILTER;
+      // It would be the program itself.
+      if (library && texts_[name.d_un.d_val] == '\0') Fail("it needs a library without a name");
+    }
   }
   void CheckText(std::uint64_t at) const {
     if (at >= texts_.size()) Fail("a name lies outside its table of texts");
@@ -413,7 +419,7 @@ class Examination {
   std::vector<const Elf64_Phdr*> loads_;
   const Elf64_Phdr* dynamic_ = nullptr;
   std::map<std::int64_t, std::uint64_t> tags_;
-  std::vector<std::uint64_t> names_;  ///< into texts_
+  std::vector<Elf64_Dyn> names_;  ///< of places in texts_
   std::vector<char> texts_;
   std::uint64_t symbol_count_ = 0;
   std::vector<Elf64_Sym> symbols_;

@@ -107,7 +107,7 @@ TEST_P(FrameOrder, MergedMeasurementsHaveTheOrderOfTheSensors) {
     const std::vector<SourceFrame> frames = {GivenAt(0.0, {{0, 80.0}}), GivenAt(0.0, {{1, 1.0}})};
     Experiment experiment = MakeGiven({frames[swapped], frames[!swapped]}, GetParam());
     experiment.out_of_sequence.ranks = {1, 0};
-    Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+    Recorder recorder(OptionsFor(folder / "out"), MakeConfig());
     recorder.Finish(RunInto(recorder, experiment));
     EXPECT_EQ(Lines(folder / "out/measurements.csv"),
               (std::vector<std::string>{"t_s,stream,landmark,v0", "0.000000000,inverse_scale,,1",
@@ -125,7 +125,7 @@ TEST_P(FrameOrder, MergedFramesOfSeveralMeasurementsToo) {
                                              GivenAt(0.0, {{2, 5.0}})};
     Experiment experiment = MakeGiven({frames[swapped], frames[!swapped]}, GetParam());
     experiment.out_of_sequence.ranks = {2, 1, 0};
-    Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+    Recorder recorder(OptionsFor(folder / "out"), MakeConfig());
     recorder.Finish(RunInto(recorder, experiment));
     EXPECT_EQ(
         Lines(folder / "out/measurements.csv"),

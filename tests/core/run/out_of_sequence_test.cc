@@ -107,7 +107,7 @@ RunResult RecordDelayed(const std::string& text, const fs::path& folder, OutOfSe
   experiment.source = std::make_unique<Delayed>(std::move(experiment.source), most_s, split);
   experiment.out_of_sequence.policy = order;
   experiment.out_of_sequence.window = TimestampFromSeconds(kWindow_s);
-  Recorder recorder(OptionsFor(folder), config, Host());
+  Recorder recorder(OptionsFor(folder), config);
   RunResult result = RunInto(recorder, experiment);
   recorder.Finish(result);
   return result;

@@ -213,7 +213,7 @@ TEST(Reference, WithoutEstimatesIsNone) {
 TEST(Reference, IsNamedBelowTheTableInRunJsonAndInTheReport) {
   const TemporaryFolder folder;
   Experiment experiment = MakeCompared();
-  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig());
   const RunResult run = RunInto(recorder, experiment);
   recorder.Finish(run);
   const std::string words =

@@ -62,7 +62,7 @@ class DrivenTest : public HostTest {
   }
   RunResult RunInto(const Config& config, const fs::path& folder) {
     Experiment experiment = BuildExperiment(config, host_);
-    Recorder recorder({folder, false, false, "alidade run"}, config, host_);
+    Recorder recorder({folder, false, false, "alidade run"}, config);
     RunResult result = testing::RunInto(recorder, experiment);
     recorder.Finish(result);
     return result;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cfenv>
 #include <fstream>
+#include <functional>
 
 #include "host_fixture.h"
 
@@ -190,8 +191,9 @@ TEST_F(HostTest, SegmentsThatTheLoaderWouldTrustAreRefused) {
   }
 }
 
-/// Moves what the first entry of that tag in the table for the dynamic loader leads to.
-void MoveEntry(const fs::path& file, Elf64_Sxword tag, Elf64_Xword by) {
+/// Changes the value of the first entry of that tag in the table for the dynamic loader.
+void DamageEntry(const fs::path& file, Elf64_Sxword tag,
+                 const std::function<void(Elf64_Xword&)>& change) {
   Elf64_Phdr dynamic{};
   DamageSegment(file, PT_DYNAMIC, [&](const Elf64_Phdr& segment) { dynamic = segment; });
   std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
@@ -201,7 +203,7 @@ void MoveEntry(const fs::path& file, Elf64_Sxword tag, Elf64_Xword by) {
     stream.seekg(at);
     stream.read(reinterpret_cast<char*>(&entry), sizeof(entry));
     if (entry.d_tag != tag) continue;
-    entry.d_un.d_val += by;
+    change(entry.d_un.d_val);
     stream.seekp(at);
     stream.write(reinterpret_cast<const char*>(&entry), sizeof(entry));
     return;
@@ -215,16 +217,30 @@ TEST_F(HostTest, FunctionsThatTheLoaderWouldCallAreWhereTheyShouldBe) {
     Elf64_Sxword tag;
     Elf64_Xword by;
   };
-  // Those of the end run when the host ends, far from what a trial finds.
   const Damage cases[] = {{"list of functions holds what is none", DT_FINI_ARRAY, 4},
                           {"list of functions holds what is none", DT_INIT_ARRAY, 4},
-                          {"a function does not begin its section", DT_FINI, 1},
-                          {"a function does not begin its section", DT_INIT, 1}};
+                          {"a function lies outside its code", DT_FINI, 1 << 20},
+                          {"a function lies outside its code", DT_INIT, 1 << 20}};
   for (const Damage& damage : cases) {
     const fs::path file = Copy("good", "entry" + std::to_string(damage.tag) + ".so");
-    MoveEntry(file, damage.tag, damage.by);
+    DamageEntry(file, damage.tag, [&](Elf64_Xword& at) { at += damage.by; });
     ExpectRefused(file, {"malformed", damage.words});
   }
+}
+
+// They run when the host ends; in a C++ plugin, which is never unloaded, too.
+TEST_F(HostTest, DestructorsThatCrashAreFoundAsItIsLoaded) {
+  for (const char* name : {"good", "sources"}) {
+    const fs::path file = Copy(name, std::string(name) + "_end.so");
+    DamageEntry(file, DT_FINI, [](Elf64_Xword& at) { ++at; });  // amid its first instruction
+    ExpectRefused(file, {"crashed", "in the destructors of its statics"});
+  }
+}
+
+TEST_F(HostTest, ALibraryWithoutANameIsNotTheProgram) {
+  const fs::path file = Copy("good", "nameless.so");
+  DamageEntry(file, DT_NEEDED, [](Elf64_Xword& name) { name = 0; });
+  ExpectRefused(file, {"malformed", "a library without a name"});
 }
 
 TEST_F(HostTest, AnExecutableIsNoPlugin) {

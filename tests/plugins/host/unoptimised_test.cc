@@ -50,7 +50,7 @@ TEST_F(UnoptimisedTest, ARunAndItsComparisonSaySoOfTheWallClock) {
   const fs::path folder = folder_ / "run";
   Experiment experiment = BuildExperiment(config, host_);
   EXPECT_TRUE(experiment.unoptimised.contains(kPlugin));
-  Recorder recorder({folder, false, false, "alidade run"}, config, host_);
+  Recorder recorder({folder, false, false, "alidade run"}, config);
   const RunResult result = testing::RunInto(recorder, experiment);
   recorder.Finish(result);
   const std::string note = UnoptimisedText(result.unoptimised);

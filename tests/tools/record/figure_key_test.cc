@@ -41,7 +41,7 @@ TEST_P(FigureKey, HasAllEstimatorsInOneColumn) {
         std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
     experiment.estimators.push_back(std::move(named));
   }
-  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
   recorder.Finish(RunInto(recorder, experiment));
   if (recorder.note().ends_with("not installed")) GTEST_SKIP() << recorder.note();
   auto texts = TextsOf(Read(folder / "out/figures/comparison.svg"));
@@ -79,7 +79,7 @@ TEST(FigureKeyOfTheLastPanel, HasAllEstimatorsAndTruthInOneColumn) {
         std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
     experiment.estimators.push_back(std::move(named));
   }
-  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
   recorder.Finish(RunInto(recorder, experiment));
   if (recorder.note().ends_with("not installed")) GTEST_SKIP() << recorder.note();
   auto texts = TextsOf(Read(folder / "out/figures/comparison.svg"));

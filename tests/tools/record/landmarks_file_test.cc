@@ -67,7 +67,7 @@ Experiment OnTheStreet(bool outlier = false) {
 TEST(LandmarkRecords, TheMapAtTheEndIsWritten) {
   const TemporaryFolder folder;
   Experiment experiment = OnTheStreet();
-  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig());
   const RunResult result = RunInto(recorder, experiment);
   recorder.Finish(result);
   ASSERT_EQ(result.status, RunStatus::kOk) << result.reason;
@@ -92,7 +92,7 @@ TEST(LandmarkRecords, TheMapAtTheEndIsWritten) {
 TEST(LandmarkRecords, EveryColumnOfTheMapIsItsOwn) {
   const TemporaryFolder folder;
   Experiment experiment = OnTheStreet(true);
-  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig());
   recorder.Finish(RunInto(recorder, experiment));
   const std::vector<std::string> last = Cells(Lines(folder / "out/ekf/landmarks.csv").at(4));
   const LandmarkEstimate estimate = experiment.estimators[0].estimator->landmarks()[3];
@@ -131,7 +131,7 @@ TEST(LandmarkRecords, AnInverseDistanceIsWrittenBeforeItsSigma) {
 TEST(LandmarkRecords, OtherFilesHaveTheBlocksOfTheSystemAlone) {
   const TemporaryFolder folder;
   Experiment experiment = OnTheStreet();
-  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig());
   recorder.Finish(RunInto(recorder, experiment));
   EXPECT_EQ(Lines(folder / "out/ekf/estimates.csv")[0],
             "t_s,cam.position.x,cam.position.y,cam.position.z,sigma:cam.position.x,"
@@ -164,7 +164,7 @@ TEST(LandmarkRecords, ResultsHaveCountsAndTheMapsErrors) {
 TEST(LandmarkRecords, TheReprojectionErrorOfEachFrameIsWritten) {
   const TemporaryFolder folder;
   Experiment experiment = OnTheStreet();
-  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig());
   recorder.Finish(RunInto(recorder, experiment));
   // By hand from what innovations.csv has of the last frame, of four landmarks.
   const std::vector<std::string> innovations = Lines(folder / "out/ekf/innovations.csv");
@@ -186,7 +186,7 @@ TEST(LandmarkRecords, TheReprojectionErrorOfEachFrameIsWritten) {
 TEST(LandmarkRecords, TheMapIsDrawnBesideTruth) {
   const TemporaryFolder folder;
   Experiment experiment = OnTheStreet();
-  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
   recorder.Finish(RunInto(recorder, experiment));
   EXPECT_TRUE(recorder.note() == "" || recorder.note().ends_with("not installed"))
       << recorder.note();

@@ -10,7 +10,7 @@ using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures 
 
 TEST(Recorder, DrawsWhereGnuplotIs) {
   const TemporaryFolder folder;
-  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
   Experiment experiment = MakeExperiment();
   recorder.Finish(RunInto(recorder, experiment));
   const std::string report = Read(folder / "out/report.html");
@@ -49,7 +49,7 @@ TEST(Recorder, TheComparisonDrawsEveryEstimatorWhateverItsBlocksAreCalled) {
   testing::AddMotion(other.system, "own", testing::ConstantMotion(1), {{"bias", 0.1, 0.1}});
   other.estimator = std::make_unique<Ekf>(other.system, EkfOptions{}, experiment.source->streams());
   experiment.estimators.push_back(std::move(other));
-  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
   recorder.Finish(RunInto(recorder, experiment));
   const std::string script = Read(folder / "out/figures/comparison.gp");
   EXPECT_NE(script.find("'other/estimates.csv' using (column('t_s')-t0):(column('thing.depth'))"),
@@ -80,7 +80,7 @@ TEST(Recorder, TheLineOfAnAngleIsBrokenWhereItLeaps) {
     named.estimator =
         std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
   }
-  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
   recorder.Finish(RunInto(recorder, experiment));
   EXPECT_TRUE(recorder.note() == "" || recorder.note().ends_with("not installed"))
       << recorder.note();
@@ -106,7 +106,7 @@ TEST(Recorder, TheComparisonSaysWhatItLeavesOut) {
   }
   const int code = InChild([&] {
     ::setenv("PATH", "/nowhere", 1);  // the script tells
-    Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+    Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
     recorder.Finish(RunInto(recorder, experiment));
   });
   EXPECT_EQ(code, 0);
@@ -119,7 +119,7 @@ TEST(Recorder, DoesWithoutGnuplot) {
   const TemporaryFolder folder;
   const int code = InChild([&] {
     ::setenv("PATH", "/nowhere", 1);
-    Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+    Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
     Experiment experiment = MakeExperiment();
     recorder.Finish(RunInto(recorder, experiment));
     if (recorder.note() != "0 of 10 figures drawn: gnuplot is not installed") ::_exit(1);
@@ -148,7 +148,7 @@ void UseSlowGnuplot(const TemporaryFolder& folder) {
 int RecordSlowly(const TemporaryFolder& folder, Recorder::Options options, const char* note) {
   return InChild([&] {
     UseSlowGnuplot(folder);
-    Recorder recorder(options, MakeConfig(), Host());
+    Recorder recorder(options, MakeConfig());
     Experiment experiment = MakeExperiment();
     recorder.Finish(RunInto(recorder, experiment));
     if (recorder.note() != note) ::_exit(1);
@@ -177,7 +177,7 @@ TEST(Recorder, AFigureThatGnuplotDidNotWriteIsNotThere) {
     fs::create_directory(folder / "bin");
     fs::create_symlink("/bin/true", folder / "bin/gnuplot");
     ::setenv("PATH", (folder / "bin").c_str(), 1);
-    Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig(), Host());
+    Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
     Experiment experiment = MakeExperiment();
     recorder.Finish(RunInto(recorder, experiment));
     const std::string note = recorder.note();

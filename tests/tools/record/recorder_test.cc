@@ -7,6 +7,7 @@
 
 #include "alidade/base/number_text.h"
 #include "alidade/base/sha256.h"
+#include "alidade/resume/run_inputs.h"
 #include "sensors/stereo_disparity.h"
 #include "support/recording.h"
 
@@ -31,7 +32,7 @@ TEST(Recorder, WritesEveryFile) {
 TEST(Recorder, EstimatesRoundTrip) {
   const TemporaryFolder folder;
   Experiment experiment = MakeExperiment();
-  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig());
   recorder.Finish(RunInto(recorder, experiment));
   const std::vector<std::string> lines = Lines(folder / "out/ekf/estimates.csv");
   ASSERT_EQ(lines.size(), 61u);
@@ -148,7 +149,7 @@ struct HandMade {
 TEST(Recorder, WritesAbsentFixedAndRejected) {
   const TemporaryFolder folder;
   HandMade hand;
-  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig());
   recorder.Begin(hand.experiment);
   recorder.OnFrame(hand.frame);
   recorder.OnEstimate(0, hand.frame, hand.state, hand.report);
@@ -179,7 +180,7 @@ TEST(Recorder, AFrameOlderThanTheStateHasNoEstimate) {
   NamedEstimator& ekf = experiment.estimators[0];
   ekf.system.initial_time_s = 0.066;
   ekf.estimator = std::make_unique<Ekf>(ekf.system, EkfOptions{}, experiment.source->streams());
-  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig());
   recorder.Finish(RunInto(recorder, experiment));
   std::vector<std::string> timestamps;
   for (const std::string& line : Lines(folder / "out/ekf/estimates.csv")) {
@@ -203,32 +204,24 @@ TEST(Recorder, QuotesTextsInEvents) {
       << events;
 }
 
-/// A sensor that says it came from `plugin`.
-SensorModel SensorFrom(const fs::path& plugin) {
-  AlidadeInstance instance{};
-  instance.struct_size = sizeof(instance);
-  detail::PublishSensor(std::make_unique<detail::Holder<Linear>>(Linear(1.0, 1.0)), &instance);
-  return SensorModel(std::make_shared<const ModelInstance>(instance, "linear", plugin.string()));
-}
-
 TEST(Recorder, TellsPluginsOfOneNameApart) {
   const TemporaryFolder folder;
   std::string expected = "\"plugins\": [";
-  Experiment experiment = MakeExperiment();
-  for (const char* where : {"b", "a"}) {  // in the order of the config, whatever the folders are
+  std::vector<fs::path> plugins;
+  for (const char* where : {"b", "a"}) {  // in their order, whatever the folders are
     fs::create_directory(folder / where);
     const fs::path plugin = folder / where / "models.so";
     std::ofstream(plugin) << "bytes of " << where;
-    for (NamedEstimator& named : experiment.estimators) {
-      testing::AddSensor(named.system, where, SensorFrom(plugin), {"target.depth"});
-    }
+    plugins.push_back(plugin);
     expected.append(expected.back() == '[' ? "" : ",")
         .append("\n    {\n      \"file\": \"models.so\",\n      \"sha256\": \"")
         .append(internal::Sha256OfFile(plugin))
         .append("\"\n    }");
   }
-  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
-  recorder.Begin(experiment);
+  Recorder::Options options = OptionsFor(folder / "out");
+  options.plugins = internal::HashesOf(plugins);
+  Recorder recorder(options, MakeConfig());
+  recorder.Begin(MakeExperiment());
   recorder.Finish({});
   const std::string json = Read(folder / "out/run.json");
   EXPECT_NE(json.find(expected + "\n  ]"), std::string::npos) << json;
@@ -249,7 +242,7 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
   one.events = {{0, "rejection_recovery", ""}, {1, "rejection_recovery", ""}, {2, "diverged", ""}};
   one.unobservable = {{"a.x", "b.y"}};
   result.estimators = {one};
-  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig());
   const Experiment experiment = MakeExperiment();
   recorder.Begin(experiment);
   recorder.Finish(result);
@@ -331,7 +324,7 @@ TEST(Recorder, RunJsonHasTheAgreedKeys) {
 
 TEST(Recorder, SaysWhatFailedBeforeTheExperimentWasKnown) {
   const TemporaryFolder folder;
-  Recorder recorder(OptionsFor(folder / "out"), MakeConfig(), Host());
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig());
   RunResult result;
   result.status = RunStatus::kStopped;
   recorder.Finish(result);

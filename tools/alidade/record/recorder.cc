@@ -16,12 +16,12 @@
 #include "alidade/record/estimator_files.h"
 #include "alidade/record/figures.h"
 #include "alidade/record/landmarks_file.h"
-#include "alidade/record/leftovers.h"
 #include "alidade/record/log_file.h"
 #include "alidade/record/report_html.h"
-#include "alidade/record/run_inputs.h"
 #include "alidade/record/run_json.h"
 #include "alidade/record/source_files.h"
+#include "alidade/resume/leftovers.h"
+#include "alidade/resume/run_inputs.h"
 #include "alidade/run/metric_rows.h"
 
 namespace alidade {
@@ -30,9 +30,8 @@ using internal::CsvFile;
 using Clock = std::chrono::steady_clock;
 
 struct Recorder::Impl {
-  Impl(const Options& given, const Config& config, const PluginHost& plugin_host);
+  Impl(const Options& given, const Config& config);
 
-  void AddPlugins(const Experiment& experiment);
   internal::RecordedRun CloseFiles();
   void WriteEvents(const EstimatorResult& result) const;
   std::string TimingJson(const RunResult& result) const;
@@ -45,7 +44,6 @@ struct Recorder::Impl {
   std::optional<internal::Leftovers> leftovers;
   internal::LogFile log{folder};
   const Config config;
-  const PluginHost& host;
   std::string title, config_text;
   internal::RunFacts facts;
   std::vector<std::string> subjects;  ///< of the rows, as SubjectsOf
@@ -74,22 +72,17 @@ std::string AsElement(const std::string& svg) {
 
 }  // namespace
 
-Recorder::Impl::Impl(const Options& given, const Config& read, const PluginHost& plugin_host)
+Recorder::Impl::Impl(const Options& given, const Config& read)
     : options(given),
-      folder(given.folder, given.force || (given.resume && internal::IsNotFinished(given.folder))),
+      folder(given.folder, given.force || given.resume),
       config(read),
-      host(plugin_host),
       title(TextOf(config.root(), "title", std::filesystem::path(config.name()).stem().string())),
       config_text(config.ToYaml()) {
+  if (given.resume && !given.force) internal::CheckReplaceable(given.folder);
   if (given.resume) leftovers.emplace(given.folder).CheckInputs(config_text, given.inputs);
+  facts.plugins = given.plugins;
   folder.Write(internal::kResolvedConfig, config_text);
   if (!given.inputs.empty()) folder.Write(internal::kInputsFile, given.inputs);
-}
-
-void Recorder::Impl::AddPlugins(const Experiment& experiment) {
-  for (const std::filesystem::path& file : internal::PluginsInUse(experiment, config, host)) {
-    facts.plugins.emplace(file.filename().string(), internal::PluginHash(file));
-  }
 }
 
 void Recorder::Impl::CompareWithLeftovers(const RunResult& result) {
@@ -168,15 +161,14 @@ void Recorder::Impl::WriteReport(const RunResult& result, const internal::Record
   if (!note.empty()) Log(LogLevel::kWarning, note);
 }
 
-Recorder::Recorder(const Options& options, const Config& config, const PluginHost& host)
-    : impl_(std::make_unique<Impl>(options, config, host)) {}
+Recorder::Recorder(const Options& options, const Config& config)
+    : impl_(std::make_unique<Impl>(options, config)) {}
 
 Recorder::~Recorder() = default;
 
 void Recorder::Begin(const Experiment& experiment) {
   impl_->facts.seed = experiment.seed;
   impl_->subjects = internal::SubjectsOf(experiment);
-  impl_->AddPlugins(experiment);
   impl_->source.emplace(impl_->folder, experiment);
   impl_->data.emplace(experiment.source->streams(), experiment.source->truths());
   for (const NamedEstimator& named : experiment.estimators) {

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -28,12 +29,14 @@ class Recorder : public RunObserver {
     double drawing_s = 60.0;          ///< the most that all figures may take
     bool covariances = false;         ///< write `NAME/covariance.bin` too
     std::string inputs = {};          ///< the text of inputs.json; "": there is none
+    /// What run.json says of plugins: file name -> SHA-256, for each file.
+    std::multimap<std::string, std::string> plugins = {};
     /// Continues what unfinished runs left here: see `alidade run --resume` in docs/cli.md.
     bool resume = false;
   };
-  /// Creates the temporary folder. Errors: kCannotCreate where `folder` exists without `force`, or
-  /// is to be resumed and was made from other inputs.
-  Recorder(const Options& options, const Config& config, const PluginHost& host);
+  /// Creates the temporary folder. Errors: kCannotCreate where `folder` exists without `force` and
+  /// is no unfinished run to be resumed, or one that was made from other inputs.
+  Recorder(const Options& options, const Config& config);
   ~Recorder() override;
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;

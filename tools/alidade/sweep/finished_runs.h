@@ -10,11 +10,10 @@
 #include <vector>
 
 #include "alidade/base/output_folder.h"
+#include "alidade/resume/leftovers.h"
 #include "alidade/sweep/sweep.h"
 
 namespace alidade::internal {
-
-constexpr const char* kFinishedRuns = "finished_runs.jsonl";
 
 /// The text of a run that came to its end, one line of JSON with all that the files of a sweep rest
 /// on: `value` is that of the varied key, "" where none is varied.

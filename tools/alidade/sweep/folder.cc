@@ -6,8 +6,8 @@
 #include "alidade/base/csv_file.h"
 #include "alidade/base/json.h"
 #include "alidade/base/output_folder.h"
-#include "alidade/record/leftovers.h"
-#include "alidade/record/run_inputs.h"
+#include "alidade/resume/leftovers.h"
+#include "alidade/resume/run_inputs.h"
 #include "alidade/run/metric_rows.h"
 #include "alidade/sweep/finished_runs.h"
 #include "alidade/sweep/sweep.h"
@@ -23,6 +23,7 @@ using internal::Json;
 using internal::OutputFolder;
 
 struct SweepFolder::Impl {
+  Impl(const Options& options, const Config& config);
   Impl(const std::filesystem::path& path, bool force) : folder(path, force) {}
   /// Unless it is there already.
   void WriteConfig(const Config& config) const;
@@ -33,14 +34,27 @@ struct SweepFolder::Impl {
   std::optional<internal::FinishedRuns> finished;
 };
 
+SweepFolder::Impl::Impl(const Options& options, const Config& config)
+    : folder(options.folder, options.force || options.resume) {
+  std::vector<std::filesystem::path> before;
+  if (options.resume) {
+    if (!options.force) internal::CheckReplaceable(options.folder);
+    leftovers.emplace(options.folder).CheckInputs(config.ToYaml(), options.inputs);
+    before = leftovers->folders();
+  }
+  if (options.inputs.empty()) return;
+  folder.Write(internal::kResolvedConfig, config.ToYaml());
+  folder.Write(internal::kInputsFile, options.inputs);
+  finished.emplace(folder, before);
+}
+
 void SweepFolder::Impl::WriteConfig(const Config& config) const {
   if (!finished) folder.Write(internal::kResolvedConfig, config.ToYaml());
 }
 
 void SweepFolder::Impl::Commit(bool stopped) {
   if (finished) finished->Close();
-  if (finished && !stopped) folder.Remove(internal::kFinishedRuns);
-  folder.Commit();
+  folder.Commit(finished && !stopped ? internal::kFinishedRuns : "");
   if (leftovers) leftovers->Remove();
 }
 
@@ -184,18 +198,7 @@ SweepFolder::SweepFolder(const std::filesystem::path& folder, bool force)
     : impl_(std::make_unique<Impl>(folder, force)) {}
 
 SweepFolder::SweepFolder(const Options& options, const Config& config)
-    : SweepFolder(options.folder,
-                  options.force || (options.resume && internal::IsNotFinished(options.folder))) {
-  std::vector<std::filesystem::path> before;
-  if (options.resume) {
-    impl_->leftovers.emplace(options.folder).CheckInputs(config.ToYaml(), options.inputs);
-    before = impl_->leftovers->folders();
-  }
-  if (options.inputs.empty()) return;
-  impl_->folder.Write(internal::kResolvedConfig, config.ToYaml());
-  impl_->folder.Write(internal::kInputsFile, options.inputs);
-  impl_->finished.emplace(impl_->folder, before);
-}
+    : impl_(std::make_unique<Impl>(options, config)) {}
 
 SweepFolder::~SweepFolder() = default;
 

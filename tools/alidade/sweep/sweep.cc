@@ -11,7 +11,7 @@
 
 #include "alidade/base/log.h"
 #include "alidade/base/signal_stack.h"
-#include "alidade/record/leftovers.h"
+#include "alidade/resume/leftovers.h"
 #include "alidade/sweep/finished_runs.h"
 #include "alidade/sweep/sweep_config.h"
 
@@ -29,7 +29,7 @@ class Queue {
   /// Takes runs until there are none left. What ends it before that, Take() throws.
   void Work() noexcept {
     try {
-      while (!Stopped() && TakeOne()) continue;
+      while (TakeOne()) continue;
     } catch (...) {
       const std::lock_guard lock(mutex_);
       thrown_ = std::current_exception();
@@ -63,14 +63,15 @@ class Queue {
  private:
   bool Stopped() const { return options_.stop && options_.stop(); }
 
-  /// False where none is left, or it was stopped.
+  /// False where none is left. Once it is stopped, only those that were finished before are taken.
   bool TakeOne() {
     const std::int64_t index = next_++;
     if (index >= runs_) return false;
     const std::uint64_t seed = first_seed_ + static_cast<std::uint64_t>(index);
     const internal::FinishedRuns::Known* const known = FinishedBefore(seed);
+    if (known == nullptr && Stopped()) return true;
     SweepRun run = known != nullptr ? known->run : RunSeed(seed);
-    if (run.status == RunStatus::kStopped) return false;
+    if (run.status == RunStatus::kStopped) return true;
     const std::lock_guard lock(mutex_);
     if (known == nullptr && options_.finished != nullptr) {
       options_.finished->Add(options_.value, run);

@@ -117,8 +117,8 @@ class SweepFolder {
     /// Continues what unfinished sweeps left here: see `alidade sweep --resume` in docs/cli.md.
     bool resume = false;
   };
-  /// Takes the name. Errors: kCannotCreate where it exists without `force`, or is to be resumed and
-  /// was made from another config or other inputs; kIo.
+  /// Takes the name. Errors: kCannotCreate where it exists without `force` and is no unfinished
+  /// sweep to be resumed, or one that was made from another config or other inputs; kIo.
   SweepFolder(const Options& options, const Config& config);
   /// Likewise, without inputs: finished runs are not kept before all are.
   SweepFolder(const std::filesystem::path& folder, bool force);

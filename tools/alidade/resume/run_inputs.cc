@@ -1,21 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/record/run_inputs.h"
+#include "alidade/resume/run_inputs.h"
 
 #include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <system_error>
 
 #include "alidade/base/json.h"
+#include "alidade/base/output_file.h"
 #include "alidade/base/sha256.h"
 #include "alidade/base/words.h"
-#include "alidade/record/build_ids.h"
+#include "alidade/resume/build_ids.h"
 
 namespace alidade::internal {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// SHA-256 of a file. Error: kIo.
+std::string HashOf(const fs::path& file) {
+  std::string hash = Sha256OfFile(file);
+  if (hash.empty()) {
+    throw Error(ExitCode::kIo, ErrorLine(Place{file.string()}, {}, "cannot be read for its hash"));
+  }
+  return hash;
+}
 
 /// `{"file": FILE, "bytes": N, "sha256": HASH}`
 std::string HashedFile(const fs::path& file) {
@@ -23,7 +34,7 @@ std::string HashedFile(const fs::path& file) {
   const std::uintmax_t bytes = fs::file_size(file, error);
   return "{\"file\": " + JsonString(file.string()) +
          ", \"bytes\": " + std::to_string(error ? 0 : bytes) +
-         ", \"sha256\": " + JsonString(Sha256OfFile(file)) + '}';
+         ", \"sha256\": " + JsonString(HashOf(file)) + '}';
 }
 
 /// The texts between two brackets, a line each.
@@ -42,32 +53,66 @@ std::vector<std::string> JsonStrings(const std::vector<std::string>& texts) {
   return strings;
 }
 
-/// The value of `source.KEY` as text; "" where there is none.
-std::string SourceText(const Config& config, const char* key) {
+/// `source.path`; "" where there is none.
+std::string SourcePath(const Config& config) {
   const Config copy = config.Copy();  // nothing of the original counts as read
   const auto source = copy.root().is_map() ? copy.root().Find("source") : std::nullopt;
-  const auto value = source && source->is_map() ? source->Find(key) : std::nullopt;
-  return value && value->kind() == Node::Kind::kScalar ? value->Text() : "";
+  const auto path = source && source->is_map() ? source->Find("path") : std::nullopt;
+  return path && path->kind() == Node::Kind::kScalar ? path->Text() : "";
 }
 
-std::vector<std::string> DataOf(const Config& config) {
-  const std::string path = SourceText(config, "path");
-  if (path.empty()) return {};
+/// What a source reads from `path`, as JSON.
+std::vector<std::string> DataAt(const std::string& path) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (fs::is_regular_file(status)) return {HashedFile(path)};
   std::vector<std::string> data;
   if (fs::is_directory(status)) {
     std::vector<fs::path> files;
-    for (const auto& entry : fs::directory_iterator(path, error)) {
-      if (entry.is_regular_file(error)) files.push_back(entry.path());
+    fs::directory_iterator entry(path, error);
+    for (const fs::directory_iterator end; !error && entry != end; entry.increment(error)) {
+      std::error_code ignored;
+      if (entry->is_regular_file(ignored)) files.push_back(entry->path());
     }
+    if (error) FailIo(path, "read", error.value());
     std::ranges::sort(files);
     for (const fs::path& file : files) data.push_back(HashedFile(file));
   } else if (path == "-" || fs::exists(status)) {
     data.push_back("{\"file\": " + JsonString(path) + ", \"read_once\": true}");
   }
   return data;
+}
+
+/// Likewise, of all these configs; each path once, in their order.
+std::vector<std::string> DataOf(const std::vector<Config>& configs) {
+  std::vector<std::string> data;
+  std::set<std::string> known = {""};
+  for (const Config& config : configs) {
+    const std::string path = SourcePath(config);
+    if (!known.insert(path).second) continue;
+    const std::vector<std::string> more = DataAt(path);
+    data.insert(data.end(), more.begin(), more.end());
+  }
+  return data;
+}
+
+/// The names of plugins in a config.
+struct Names {
+  std::set<std::string> models, types;
+};
+
+/// Adds the values of the keys `model` and `type` at and below `node`, at any depth.
+void AddNames(const Node& node, Names& names) {
+  if (node.kind() == Node::Kind::kList) {
+    for (const Node& item : node.Items()) AddNames(item, names);
+  }
+  if (!node.is_map()) return;
+  for (const auto& [key, value] : node.Entries()) {
+    const bool scalar = value.kind() == Node::Kind::kScalar;
+    if (scalar && key == "model") names.models.insert(value.Text());
+    if (scalar && key == "type") names.types.insert(value.Text());
+    AddNames(value, names);
+  }
 }
 
 /// Calls `read` on the value that `text` is.
@@ -111,47 +156,36 @@ std::string Shortened(const std::string& text) {
 
 }  // namespace
 
-std::vector<fs::path> PluginsInUse(const Experiment& experiment, const Config& config,
-                                   const PluginHost& host) {
-  std::vector<fs::path> files;
-  const auto add = [&](const fs::path& file) {
-    if (!file.is_absolute()) return;  // a model made in this process
-    if (std::ranges::find(files, file) == files.end()) files.push_back(file);
-  };
-  for (const NamedEstimator& named : experiment.estimators) {
-    for (const auto& sensor : named.system.sensors) add(sensor.model.instance().plugin());
-    for (const auto& motion : named.system.motions) add(motion.model.instance().plugin());
+std::vector<fs::path> PluginsNamed(const std::vector<Config>& configs, const PluginHost& host) {
+  Names names;
+  for (const Config& config : configs) {
+    const Config copy = config.Copy();  // nothing of the original counts as read
+    AddNames(copy.root(), names);
   }
-  const std::string source = SourceText(config, "type");
+  std::vector<fs::path> files;
   for (const PluginEntry& entry : host.entries()) {
-    const auto is_used = [&](const NamedEstimator& named) { return named.type == entry.name; };
-    const bool used = entry.kind == PluginEntry::Kind::kSource
-                          ? entry.name == source
-                          : entry.kind == PluginEntry::Kind::kEstimator &&
-                                std::ranges::any_of(experiment.estimators, is_used);
-    if (used) add(entry.plugin);
+    const bool model =
+        entry.kind == PluginEntry::Kind::kSensor || entry.kind == PluginEntry::Kind::kMotion;
+    if (!(model ? names.models : names.types).contains(entry.name)) continue;
+    if (std::ranges::find(files, entry.plugin) == files.end()) files.push_back(entry.plugin);
   }
   return files;
 }
 
-std::string PluginHash(const fs::path& file) {
-  std::string hash = Sha256OfFile(file);
-  if (hash.empty()) {
-    throw Error(ExitCode::kIo, ErrorLine(Place{file.string()}, {}, "cannot be read for its hash"));
-  }
-  return hash;
+PluginHashes HashesOf(const std::vector<fs::path>& files) {
+  PluginHashes hashes;
+  for (const fs::path& file : files) hashes.emplace(file.filename().string(), HashOf(file));
+  return hashes;
 }
 
 std::string InputsJson(const CommandInputs& command, const Config& config,
-                       const std::vector<fs::path>& plugins) {
+                       const std::vector<Config>& runs, const PluginHashes& plugins) {
   std::vector<std::string> paths, folders, build, used;
   for (const fs::path& path : command.plugin_paths) paths.push_back(JsonString(path.string()));
   for (const fs::path& path : command.plugin_folders) folders.push_back(JsonString(path.string()));
   for (const auto& [name, id] : BuildIds())
     build.push_back(JsonString(name) + ": " + JsonString(id));
-  std::multimap<std::string, std::string> hashes;  // by name, wherever they lie
-  for (const fs::path& file : plugins) hashes.emplace(file.filename().string(), PluginHash(file));
-  for (const auto& [file, hash] : hashes) {
+  for (const auto& [file, hash] : plugins) {
     used.push_back("{\"file\": " + JsonString(file) + ", \"sha256\": " + JsonString(hash) + '}');
   }
   return "{\n  \"arguments\": " + Bracketed('[', JsonStrings(command.arguments), ']') +
@@ -161,7 +195,7 @@ std::string InputsJson(const CommandInputs& command, const Config& config,
          ",\n  \"plugin_folders\": " + Bracketed('[', folders, ']') +
          ",\n  \"build\": " + Bracketed('{', build, '}') +
          ",\n  \"plugins\": " + Bracketed('[', used, ']') +
-         ",\n  \"data\": " + Bracketed('[', DataOf(config), ']') + "\n}\n";
+         ",\n  \"data\": " + Bracketed('[', DataOf(runs), ']') + "\n}\n";
 }
 
 RecordedInputs ReadInputs(const std::string& text, const std::string& file) {

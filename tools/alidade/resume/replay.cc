@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/record/replay.h"
+#include "alidade/resume/replay.h"
 
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -10,8 +10,8 @@
 #include "alidade/base/json.h"
 #include "alidade/base/read_file.h"
 #include "alidade/base/words.h"
-#include "alidade/record/compare_rows.h"
-#include "alidade/record/leftovers.h"
+#include "alidade/resume/compare_rows.h"
+#include "alidade/resume/leftovers.h"
 
 namespace alidade::internal {
 namespace {
@@ -53,9 +53,12 @@ RecordedInputs ReadReplayable(const fs::path& folder) {
                           "its data came from '" + inputs.read_once + "', which could be read once",
                           "a run on files"));
   }
-  if (RecordedStatus(folder) == "stopped") {
+  const std::string status = RecordedStatus(folder);
+  if (status.empty() || status == "stopped") {
     throw Error(ExitCode::kBadData,
-                ErrorLine(Place{folder.string()}, {}, "was stopped before its end",
+                ErrorLine(Place{folder.string()}, {},
+                          status.empty() ? "was not written to its end: no run.json or sweep.json"
+                                         : "was stopped before its end",
                           "a run that came to it; --resume of the same command goes on"));
   }
   return inputs;

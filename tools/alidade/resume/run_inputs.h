@@ -2,10 +2,12 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
-#include "alidade/run/experiment.h"
+#include "alidade/config/config.h"
+#include "alidade/host/plugin_host.h"
 
 /// What a run folder was made from: `inputs.json`. Next to `config.resolved.yaml` it has all that
 /// it takes to make the same bytes again.
@@ -24,18 +26,21 @@ struct CommandInputs {
   std::vector<std::filesystem::path> plugin_folders;
 };
 
-/// The files of the plugins that a run uses: of its models in the order of the config, of its
-/// source and estimators.
-std::vector<std::filesystem::path> PluginsInUse(const Experiment& experiment, const Config& config,
+/// The files of the plugins that runs of these configs use, each once: of those that `host` offers,
+/// every model, source and estimator that a `model` or `type` of a config names, in `overrides` too.
+std::vector<std::filesystem::path> PluginsNamed(const std::vector<Config>& configs,
                                                 const PluginHost& host);
 
-/// SHA-256 of a plugin in use. Error: kIo.
-std::string PluginHash(const std::filesystem::path& file);
+/// File name -> SHA-256, for each file, wherever it lies.
+using PluginHashes = std::multimap<std::string, std::string>;
+/// Error: kIo.
+PluginHashes HashesOf(const std::vector<std::filesystem::path>& files);
 
-/// The text of `inputs.json`. Reads plugins and data for their hashes; a folder of data stands for
-/// the files in it, a pipe has no hash.
+/// The text of `inputs.json`. `config` is that of `config.resolved.yaml`, `runs` the configs of the
+/// runs. Reads what the sources of these name for its hashes; a folder stands for the files in it, a
+/// pipe has no hash. Error: kIo.
 std::string InputsJson(const CommandInputs& command, const Config& config,
-                       const std::vector<std::filesystem::path>& plugins);
+                       const std::vector<Config>& runs, const PluginHashes& plugins);
 
 /// What is recorded in such a text.
 struct RecordedInputs {

@@ -11,16 +11,15 @@
 
 namespace alidade::internal {
 
+/// In the folder of a sweep that is not finished: the runs that are, a line of JSON each.
+constexpr const char* kFinishedRuns = "finished_runs.jsonl";
+
 /// What was recorded at `place` comes out otherwise from the same inputs. Error: kFound.
 [[noreturn]] void FailOtherResults(const Place& place, const std::string& what);
 
 /// Whether a folder is that of a run or sweep, and whether that came to its end.
 enum class FolderStatus { kOther, kUnfinished, kFinished };
 FolderStatus StatusOf(const std::filesystem::path& folder);
-/// Whether what resumes others may take the place of what is there.
-inline bool IsNotFinished(const std::filesystem::path& folder) {
-  return StatusOf(folder) != FolderStatus::kFinished;
-}
 /// `status` in its run.json or sweep.json; "": there is none.
 std::string RecordedStatus(const std::filesystem::path& folder);
 
@@ -34,6 +33,10 @@ std::string DifferenceFrom(const std::filesystem::path& folder, const std::strin
 /// `force`.
 bool IsFinishedRun(const std::filesystem::path& target, const std::string& config,
                    const std::string& inputs, bool force);
+
+/// Refuses a target that --resume may not replace without --force: all but an unfinished run or
+/// sweep. To be asked once nobody else can write to it. Error: kCannotCreate.
+void CheckReplaceable(const std::filesystem::path& target);
 
 /// The folders that unfinished runs to one place left: `NAME.failed-PID` next to it, and the folder
 /// itself. A run that is to do the same to the end compares its rows with theirs.

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/record/compare_rows.h"
+#include "alidade/resume/compare_rows.h"
 
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <sstream>
+
+#include "alidade/base/error.h"
+#include "support/temporary_folder.h"
 
 namespace alidade::internal {
 namespace {
@@ -49,13 +53,33 @@ TEST(CompareRows, SaysWhichGoesOn) {
 }
 
 TEST(CompareRows, ARowWithoutItsLineEndCountsOrWasCut) {
-  EXPECT_TRUE(Compare("1\n2", "1\n2\n").difference);
+  const auto end = Compare("1\n2", "1\n2\n").difference;
+  ASSERT_TRUE(end);
+  EXPECT_EQ(end->Text(), "line end");
+  EXPECT_EQ(Compare("1,\n", "1,").difference->Text(), "line end");
+  EXPECT_EQ(Compare("12\n", "1").difference->Text(), "now '1', was '12'");
   EXPECT_TRUE(Compare("1\n2", "1\n23\n").difference);
   const RowComparison cut = Compare("1\n2", "1\n23\n", LastRow::kWhereWhole);
   EXPECT_FALSE(cut.difference);
   EXPECT_FALSE(cut.before_goes_on);
   EXPECT_TRUE(cut.now_goes_on);
   EXPECT_FALSE(Compare("1\n2", "1\n", LastRow::kWhereWhole).before_goes_on);
+}
+
+TEST(CompareRows, AFileThatIsNotThereHasNoRowsAndOneThatCannotBeReadIsAnError) {
+  const testing::TemporaryFolder folder;
+  const std::filesystem::path file = folder / "a.csv";
+  std::ofstream(file) << "1\n";
+  const RowComparison missing = CompareRows(file, folder / "b.csv", LastRow::kCounts);
+  EXPECT_TRUE(missing.before_goes_on);
+  EXPECT_FALSE(missing.difference);
+  try {
+    CompareRows(folder.path(), file, LastRow::kCounts);
+    ADD_FAILURE() << "a folder has no rows";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::kIo);
+    EXPECT_TRUE(std::string(error.what()).starts_with(folder.path().string())) << error.what();
+  }
 }
 
 }  // namespace

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/record/compare_rows.h"
+#include "alidade/resume/compare_rows.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <fstream>
+
+#include "alidade/base/output_file.h"
 
 namespace alidade::internal {
 namespace {
@@ -29,12 +32,23 @@ std::string CellAt(const std::string& row, std::size_t at) {
 
 RowDifference DifferenceOf(const std::string& before, const std::string& now, std::int64_t line) {
   const auto at = static_cast<std::size_t>(std::ranges::mismatch(before, now).in1 - before.begin());
-  return {line, static_cast<std::int64_t>(at) + 1, CellAt(before, at), CellAt(now, at)};
+  const bool only_line_end = before + '\n' == now || now + '\n' == before;
+  return {line, static_cast<std::int64_t>(at) + 1, CellAt(before, at), CellAt(now, at),
+          only_line_end};
+}
+
+/// A stream that fails where the file is not there. Error: kIo.
+std::ifstream Opened(const std::filesystem::path& file) {
+  errno = 0;
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream && errno != ENOENT && errno != ENOTDIR) FailIo(file.string(), "read", errno);
+  return stream;
 }
 
 }  // namespace
 
 std::string RowDifference::Text() const {
+  if (only_line_end) return "line end";
   if (before.empty() && now.empty()) return "other bytes";
   return "now '" + now + "', was '" + before + '\'';
 }
@@ -54,8 +68,11 @@ RowComparison CompareRows(std::istream& before, std::istream& now, LastRow last_
 
 RowComparison CompareRows(const std::filesystem::path& before, const std::filesystem::path& now,
                           LastRow last_row) {
-  std::ifstream was(before, std::ios::binary), is(now, std::ios::binary);
-  return CompareRows(was, is, last_row);
+  std::ifstream was = Opened(before), is = Opened(now);
+  const RowComparison comparison = CompareRows(was, is, last_row);
+  if (was.bad()) FailIo(before.string(), "read", EIO);
+  if (is.bad()) FailIo(now.string(), "read", EIO);
+  return comparison;
 }
 
 }  // namespace alidade::internal

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/record/leftovers.h"
+#include "alidade/resume/leftovers.h"
 
 #include <algorithm>
 #include <array>
@@ -13,8 +13,8 @@
 #include "alidade/base/output_folder.h"
 #include "alidade/base/read_file.h"
 #include "alidade/base/words.h"
-#include "alidade/record/compare_rows.h"
-#include "alidade/record/run_inputs.h"
+#include "alidade/resume/compare_rows.h"
+#include "alidade/resume/run_inputs.h"
 
 namespace alidade::internal {
 namespace {
@@ -43,8 +43,7 @@ constexpr std::array<std::string_view, 7> kRowsOfEstimator = {
     "estimates.csv",  "innovations.csv",           "gains.csv",     "reprojection.csv",
     "trajectory.tum", "trajectory_covariance.tum", "covariance.bin"};
 /// Files that a finished folder has not.
-constexpr std::array<std::string_view, 2> kOnlyOfUnfinished = {"finished_runs.jsonl",
-                                                               ".gnuplot.log"};
+constexpr std::array<std::string_view, 2> kOnlyOfUnfinished = {kFinishedRuns, ".gnuplot.log"};
 
 bool Holds(const auto& names, const std::string& name) {
   return std::ranges::find(names, name) != names.end();
@@ -97,8 +96,10 @@ std::optional<fs::path> LongerIn(const fs::path& leftover, const fs::path& folde
 void RemoveEmpty(const fs::path& folder) {
   std::vector<fs::path> folders = {folder};
   std::error_code ignored;
-  for (const auto& entry : fs::recursive_directory_iterator(folder, ignored)) {
-    if (fs::is_directory(entry.symlink_status(ignored))) folders.push_back(entry.path());
+  std::error_code error;
+  for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (fs::is_directory(entry->symlink_status(ignored))) folders.push_back(entry->path());
   }
   std::ranges::sort(folders, std::ranges::greater());  // what is in a folder comes before it
   for (const fs::path& one : folders) fs::remove(one, ignored);
@@ -171,6 +172,15 @@ bool IsFinishedRun(const fs::path& target, const std::string& config, const std:
   }
   if (!force) RefuseInputs(target, difference, "add --force to replace it");
   return false;
+}
+
+void CheckReplaceable(const fs::path& target) {
+  std::error_code ignored;
+  const bool is_there = fs::exists(fs::symlink_status(target, ignored));
+  if (!is_there || StatusOf(target) == FolderStatus::kUnfinished) return;
+  throw Error(ExitCode::kCannotCreate,
+              ErrorLine(Place{target.string()}, {}, "is no unfinished run") +
+                  "; add --force to replace it");
 }
 
 Leftovers::Leftovers(const fs::path& target) : target_(target), folders_(FailedFolders(target)) {

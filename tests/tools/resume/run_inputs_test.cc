@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/record/run_inputs.h"
+#include "alidade/resume/run_inputs.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <fstream>
 
-#include "alidade/record/build_ids.h"
+#include "alidade/resume/build_ids.h"
+#include "support/recording.h"
 #include "support/temporary_folder.h"
 
 namespace alidade::internal {
@@ -23,7 +24,7 @@ std::string InputsOf(const std::string& data, const std::vector<fs::path>& plugi
                      const std::vector<std::string>& arguments = {"run"}) {
   const std::string path = data.empty() ? "" : ", path: '" + data + '\'';
   const Config config = Config::FromText("source: {type: csv" + path + "}\n", "a.yaml");
-  return InputsJson({arguments, {"/somewhere"}}, config, plugins);
+  return InputsJson({arguments, {"/somewhere"}, {}}, config, {config}, HashesOf(plugins));
 }
 
 std::vector<std::string> Differences(const std::string& before, const std::string& now) {
@@ -74,6 +75,49 @@ TEST(RunInputs, AFolderOfDataStandsForItsFiles) {
   Written(data / "truth.tum", "1\n");
   EXPECT_EQ(Differences(before, InputsOf(data.string())),
             (std::vector<std::string>{"data " + (data / "truth.tum").string() + ": new"}));
+}
+
+TEST(RunInputs, HaveTheDataOfAllRunsOnce) {
+  const testing::TemporaryFolder folder;
+  std::vector<Config> runs;
+  for (const char* name : {"b.csv", "a.csv", "b.csv"}) {
+    const std::string data = Written(folder / name, "1\n");
+    runs.push_back(Config::FromText("source: {type: csv, path: '" + data + "'}\n", "a.yaml"));
+  }
+  const std::string text = InputsJson({{"sweep"}, {}, {}}, runs[0], runs, {});
+  const std::size_t first = text.find("/b.csv\""), second = text.find("/a.csv\"");
+  EXPECT_LT(first, second);
+  EXPECT_NE(second, text.npos);
+  EXPECT_EQ(text.find("/b.csv\"", first + 1), text.npos) << text;
+}
+
+// A file that cannot be read has no hash to compare with.
+TEST(RunInputs, AFileThatCannotBeReadIsAnError) {
+  const testing::TemporaryFolder folder;
+  std::string text;
+  EXPECT_EQ(testing::CodeOf([&] { HashesOf({folder / "none.so"}); }, &text), 74);
+  EXPECT_EQ(text, (folder / "none.so").string() + ": cannot be read for its hash");
+}
+
+TEST(PluginsNamed, AreThoseOfModelsAndTypesAtAnyDepth) {
+  const auto names = [](const std::string& yaml) {
+    std::vector<std::string> files;
+    const Config config = Config::FromText(yaml, "a.yaml");
+    for (const fs::path& file : PluginsNamed({config, config}, testing::Host()))
+      files.push_back(file.filename().string());
+    std::ranges::sort(files);
+    return files;
+  };
+  EXPECT_EQ(names("alidade: 1\n"), std::vector<std::string>{});
+  const std::vector<std::string> expected = {"alidade_constant.so", "alidade_csv.so",
+                                             "alidade_scale_2d.so"};
+  EXPECT_EQ(names("state: {a: {model: constant}}\n"
+                  "source: {type: csv, overrides: {sensors: {s: {model: scale_2d}}}}\n"
+                  "estimators: {e: {type: ekf}}\n"),
+            expected);
+  EXPECT_EQ(names("estimators: {e: {overrides: {state: {a: {model: constant}}}}}\n"),
+            std::vector<std::string>{"alidade_constant.so"});
+  EXPECT_EQ(names("a: {model: csv, type: constant}\n"), std::vector<std::string>{});
 }
 
 TEST(RunInputs, WhatIsNoRecordIsRefused) {

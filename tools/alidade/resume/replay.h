@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "alidade/record/run_inputs.h"
+#include "alidade/resume/run_inputs.h"
 
 /// Whether a run folder and one that was made again from what it records are the same.
 namespace alidade::internal {

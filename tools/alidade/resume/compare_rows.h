@@ -14,8 +14,9 @@ namespace alidade::internal {
 struct RowDifference {
   std::int64_t line = 0, column = 0;  ///< from 1
   std::string before, now;            ///< the cell there, or the start of it; "": no text
+  bool only_line_end = false;         ///< the last line end of one of them is all there is
 
-  /// `now '0.51', was '0.5'`, or `other bytes`
+  /// `now '0.51', was '0.5'`, `other bytes`, or `line end`
   std::string Text() const;
 };
 
@@ -30,7 +31,7 @@ struct RowComparison {
 enum class LastRow { kCounts, kWhereWhole };
 
 RowComparison CompareRows(std::istream& before, std::istream& now, LastRow last_row);
-/// A file that cannot be read has no rows.
+/// A file that is not there has no rows. Error: kIo where one cannot be read.
 RowComparison CompareRows(const std::filesystem::path& before, const std::filesystem::path& now,
                           LastRow last_row);
 

@@ -21,19 +21,21 @@ namespace detail {
 /// error text of its instance in this thread.
 [[gnu::cold]] Status Thrown(const void* slot) noexcept;
 
-inline Status ToStatus(std::int32_t code, const void* slot) {
+inline Status ToStatus(std::int32_t code) {
   const bool known = code >= ALIDADE_OK && code < ALIDADE_ERROR;
-  return known ? static_cast<Status>(code) : Failed(slot);
+  return known ? static_cast<Status>(code) : Status::kError;
 }
 
 /// The status of `call`, of a model's function in `slot` of its call table. Unless `kGuarded` what
-/// it throws goes on to the caller, which costs less (bench_small_filter).
+/// it throws goes on to the caller, and of a failure there is no text, which costs less
+/// (bench_small_filter): for who then calls it again.
 template <bool kGuarded, class Call>
 [[gnu::always_inline]] inline Status CallModel(const void* slot, const Call& call) {
   NoteCall(slot);
-  if constexpr (!kGuarded) return ToStatus(call(), slot);
+  if constexpr (!kGuarded) return ToStatus(call());
   try {
-    return ToStatus(call(), slot);
+    const Status status = ToStatus(call());
+    return status == Status::kError ? Failed(slot) : status;
   } catch (...) {
     return Thrown(slot);
   }

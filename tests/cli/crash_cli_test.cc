@@ -114,7 +114,12 @@ TEST_F(CrashCli, AnExceptionOfAPluginInCIsNamedAndNoEndOfTheProgram) {
   const Outcome ended = run("estimators.ekf.on_plugin_failure", "abort");
   EXPECT_EQ(ended.code, 69) << ended.err;
   EXPECT_TRUE(Contains(ended.err, words)) << ended.err;
-  ASSERT_EQ(run("sensors.bad.time_offset_s", "0.01").code, 0);
+  const Outcome shifted = Call(
+      {"run", "probe.yaml", "-o", "out", "--no-figures", "--force", "--set",
+       "state.s={model: constant_velocity, noise: {kind: continuous, acceleration: 1}, "
+       "initial: {position: {mean: 1, sigma: 1}, velocity: {mean: 0, sigma: 1}}}",
+       "--set", "sensors.bad.roles={x: s.position}", "--set", "sensors.bad.time_offset_s=0.01"});
+  ASSERT_EQ(shifted.code, 0) << shifted.err;
   EXPECT_TRUE(Contains(Read("out/ekf/events.csv"), words)) << Read("out/ekf/events.csv");
   // Two in one frame, which are asked for their words once both have thrown.
   const std::string two = "{model: throws_in_valid, stream: z, roles: {x: s.value}}";

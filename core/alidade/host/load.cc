@@ -80,12 +80,13 @@ std::string TrialLoad(const std::filesystem::path& file, std::uint32_t kind) {
       journal->Enter("destructors");
       std::ranges::for_each(opened, RunDestructors);
     });
-    return thrown.empty() ? failure : "threw: " + thrown;
+    return thrown.empty() ? failure : "threw while loading: " + thrown;
   });
-  const std::string when =
-      journal->call().empty() ? " while loading" : " in the destructors of its statics";
-  if (!end.answered || end.text.starts_with("threw: ")) return end.text + when;
-  if (end.text.empty() && !end.printed.empty()) return "prints '" + end.printed + "'" + when;
+  const bool ends = !journal->call().empty();
+  if (!end.answered) {
+    return end.text + (ends ? " in the destructors of its statics" : " while loading");
+  }
+  if (end.text.empty() && !end.printed.empty()) return "prints '" + end.printed + "' while loading";
   return end.text;
 }
 

@@ -100,6 +100,8 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{66, "exits", "calls", {"Predict ended the process with exit code 0; at x = "}},
         Fault{
             66, "exits_at_once", "calls", {"Predict ended the process with exit code 0; at x = "}},
+        Fault{67, "hangs_in_create", "create", {"than 1 s (--timeout); it was in create"}},
+        Fault{67, "hangs_in_destroy", "create", {"than 1 s (--timeout); it was in destroy"}},
         Fault{67,
               "hangs_in_noise",
               "calls",

@@ -59,18 +59,21 @@ void Watchdog::Watch() {
     worked_s_ += passed;
     if (StopRequested()) after_stop_s_ += passed;
     const void* const call = working_ ? last_call_.load() : lasting.slot;
-    if (after_stop_s_ > kPatience) End("asked to stop, but " + Doing(), call, ExitCode::kStopped);
+    if (after_stop_s_ > kPatience) {
+      End("asked to stop, but " +
+              (working_ ? "an estimator does not finish " + Frame() : "a plugin does not return"),
+          call, ExitCode::kStopped);
+    }
     if (limit_s_ && worked_s_ > *limit_s_) {
-      End(Doing() + ", for more than " + internal::RoundedText(*limit_s_, 6) + " s", call,
-          ExitCode::kPlugin);
+      End((working_ ? "an estimator works on " + Frame() : "a plugin does not return") +
+              ", for more than " + internal::RoundedText(*limit_s_, 6) + " s",
+          call, ExitCode::kPlugin);
     }
   }
 }
 
-std::string Watchdog::Doing() const {
-  if (!working_) return "a plugin does not return";
-  return "an estimator works on " +
-         (works_ <= 1 ? "its start" : "one frame, after " + std::to_string(works_ - 2) + " others");
+std::string Watchdog::Frame() const {
+  return works_ <= 1 ? "its start" : "one frame, after " + std::to_string(works_ - 2) + " others";
 }
 
 void Watchdog::End(const std::string& why, const void* call, ExitCode code) const {

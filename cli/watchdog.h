@@ -40,7 +40,7 @@ class Watchdog {
 
  private:
   void Watch();
-  std::string Doing() const;
+  std::string Frame() const;
   [[noreturn]] void End(const std::string& why, const void* call, ExitCode code) const;
 
   const std::optional<double> limit_s_;

@@ -190,7 +190,6 @@ TEST_F(CrashCli, APluginThatDoesNotReturnFromCreateOrDestroyIsNamed) {
     const Outcome late = RunModel(model, {"--frame-timeout", "0.5", "--force"});
     EXPECT_EQ(late.code, 69) << late.out;
     EXPECT_EQ(late.err, "error: a plugin does not return, for more than 0.5 s" + words + '\n');
-    EXPECT_EQ(Exists("out/run.json"), call == "Destroy");  // all was written by then
     const pid_t run = Start({"run", "bad.yaml", "-o", "other", "--no-figures"});
     std::this_thread::sleep_for(std::chrono::milliseconds(1500));
     ::kill(run, SIGTERM);

@@ -225,7 +225,7 @@ void Journal::Thrown(const char* what) { std::snprintf(thrown_, sizeof thrown_, 
 SharedJournal::SharedJournal() {
   void* const memory =
       mmap(nullptr, sizeof(Journal), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-  if (memory == MAP_FAILED) throw Error(ExitCode::kInternal, "no memory to share with a child");
+  if (memory == MAP_FAILED) throw Error(ExitCode::kInternal, "out of memory to share with a child");
   journal_ = new (memory) Journal();
 }
 

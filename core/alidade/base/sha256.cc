@@ -4,6 +4,7 @@
 #include <openssl/evp.h>
 
 #include <array>
+#include <cerrno>
 #include <fstream>
 #include <new>
 
@@ -45,7 +46,9 @@ std::string Sha256(std::string_view bytes) {
 }
 
 std::string Sha256OfFile(const std::filesystem::path& file) {
+  errno = 0;
   std::ifstream in(file, std::ios::binary);
+  if (!in && errno == ENOMEM) throw std::bad_alloc();
   if (!in) return {};
   Sha256Stream stream;
   std::array<char, 1 << 16> buffer;

@@ -339,6 +339,11 @@ class Examination {
         Fail("a relocation outside its data");
       }
       if (type == kRelative) {
+        // What lies beyond its end may be there in a trial and not in the host.
+        const Elf64_Phdr& last = *loads_.back();
+        if (static_cast<Address>(relocations[i].r_addend) > last.p_vaddr + last.p_memsz) {
+          Fail("a relocation leads out of it");
+        }
         relative_.emplace(relocations[i].r_offset, static_cast<Address>(relocations[i].r_addend));
       } else if (type == kAbsolute) {
         symbolic_.insert(relocations[i].r_offset);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cfenv>
+#include <cstddef>
 #include <fstream>
 #include <functional>
 
@@ -235,6 +236,19 @@ TEST_F(HostTest, DestructorsThatCrashAreFoundAsItIsLoaded) {
     DamageEntry(file, DT_FINI, [](Elf64_Xword& at) { ++at; });  // amid its first instruction
     ExpectRefused(file, {"crashed", "in the destructors of its statics"});
   }
+}
+
+// What is there depends on what else is loaded.
+TEST_F(HostTest, AddressesBehindItsEndAreRefused) {
+  const fs::path file = Copy("good", "behind.so");
+  Elf64_Xword table = 0;  // at the same place in the file, in the first segment
+  DamageEntry(file, DT_RELA, [&](Elf64_Xword& at) { table = at; });
+  const Elf64_Sxword behind = 1 << 20;
+  std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
+  stream.seekp(static_cast<std::streamoff>(table + offsetof(Elf64_Rela, r_addend)));
+  stream.write(reinterpret_cast<const char*>(&behind), sizeof(behind));
+  stream.close();
+  ExpectRefused(file, {"malformed", "a relocation leads out of it"});
 }
 
 TEST_F(HostTest, ALibraryWithoutANameIsNotTheProgram) {

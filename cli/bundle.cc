@@ -139,7 +139,7 @@ ExitCode RunBundle(const BundleArguments& arguments) {
                                 arguments.tracks.start.string()});
   ReportCrashes();
   const PluginHost host(Absolute(arguments.plugin_paths));
-  const Watchdog watchdog(std::nullopt);
+  const Watchdog watchdog;
   StopOnSignals();
   std::optional<BundleFolder> folder;
   if (!arguments.folder.empty()) folder.emplace(arguments.folder, arguments.force);

@@ -33,6 +33,7 @@ struct CompareArguments {
   std::vector<std::string> of;  ///< a config, or folders
   std::string folder;
   std::optional<std::uint64_t> seed;
+  std::optional<double> frame_timeout_s = kUsualFrameTimeout_s;
   SweepOptions sweep;
   bool over_seeds = false;
   CompareOptions options;
@@ -82,7 +83,7 @@ void AddFiles(auto& folder, const Comparison& comparison) {
 }
 
 ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compared,
-                    const PluginHost& host, const fs::path& folder) {
+                    const PluginHost& host, const fs::path& folder, Watchdog& watchdog) {
   Recorder::Options record{folder, arguments.force, arguments.figures, arguments.command,
                            StopRequested};
   record.covariances = true;
@@ -94,7 +95,7 @@ ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compa
   options.observers = {&recorder, &comparer};
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
-  const RunResult result = Run(compared.experiment, options);
+  const RunResult result = watchdog.Run(compared.experiment, options);
   progress.Clear();
   FinishOnSignals();
   CompareOptions of_run = arguments.options;
@@ -124,12 +125,15 @@ ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compa
 }
 
 ExitCode CompareOverSeeds(const CompareArguments& arguments, const ComparedExperiment& compared,
-                          const PluginHost& host, const fs::path& folder) {
+                          const PluginHost& host, const fs::path& folder, Watchdog& watchdog) {
   Progress progress("runs", arguments.quiet);
   SweepOptions options = arguments.sweep;
   if (arguments.seed) options.first_seed = *arguments.seed;
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
+  options.run = [&](Experiment& experiment, const RunOptions& given) {
+    return watchdog.Run(experiment, given);
+  };
   SweepFolder out(folder, arguments.force);
   ComparedSeeds seeds = CompareSeeds(compared, host, options, arguments.options);
   progress.Clear();
@@ -160,11 +164,11 @@ ExitCode CompareConfig(const CompareArguments& arguments) {
   const fs::path folder =
       OutputFolder(arguments.folder, config, input, arguments.force, arguments.quiet, "compare-");
   const PluginHost host = input.Host(config);
-  const Watchdog watchdog(std::nullopt);
+  Watchdog watchdog(arguments.frame_timeout_s);
   StopOnSignals();
   ComparedExperiment compared = BuildComparedExperiment(config, host, arguments.options);
-  return arguments.over_seeds ? CompareOverSeeds(arguments, compared, host, folder)
-                              : CompareRun(arguments, compared, host, folder);
+  return arguments.over_seeds ? CompareOverSeeds(arguments, compared, host, folder, watchdog)
+                              : CompareRun(arguments, compared, host, folder, watchdog);
 }
 
 ExitCode CompareFinished(const CompareArguments& arguments) {
@@ -239,6 +243,7 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
             "folder; default of a config: its `output:`, or compare-NAME, in runs/; of folders: "
             "none is written");
   command.add_flag("--force", arguments.force, "replace the folder if it is there");
+  AddFrameTimeout(command, arguments.frame_timeout_s);
   command.add_flag("--all", arguments.all, "print all rows of the tables");
   command.add_flag("--json", arguments.json, "print all values as JSON");
   command.add_flag("--markdown", arguments.markdown, "print the tables as Markdown")

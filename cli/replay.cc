@@ -35,7 +35,13 @@ struct ReplayArguments {
 class ScratchFolder {
  public:
   ScratchFolder() {
-    std::string name = (fs::temp_directory_path() / "alidade-replay-XXXXXX").string();
+    std::error_code error;
+    const fs::path temporary = fs::temp_directory_path(error);
+    if (error) {
+      throw Error(ExitCode::kCannotCreate,
+                  "TMPDIR: no folder for temporary files; expected one that is there");
+    }
+    std::string name = (temporary / "alidade-replay-XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr) internal::FailCreate(name, errno);
     path_ = name;
   }
@@ -76,7 +82,7 @@ ExitCode MakeAgain(const internal::RecordedInputs& recorded, const fs::path& fol
     folders += (folders.empty() ? "" : ":") + path.string();
   }
   ::setenv("ALIDADE_PLUGIN_PATH", folders.c_str(), 1);
-  if (words.front() == "run") words.insert(words.end(), {"--frame-timeout", "none"});
+  words.insert(words.end(), {"--frame-timeout", "none"});
   return execute(words);
 }
 

@@ -42,7 +42,7 @@ struct RunArguments {
   std::optional<std::uint64_t> seed;
   bool force = false, quiet = false, no_figures = false, covariances = false, all = false;
   bool follow = false, resume = false;
-  std::optional<double> frame_timeout_s = Watchdog::kUsualLimit_s;
+  std::optional<double> frame_timeout_s = kUsualFrameTimeout_s;
 };
 
 /// Events of one estimator and one kind.
@@ -153,8 +153,8 @@ ExitCode RunConfig(const RunArguments& arguments) {
   if (arguments.follow) options.observers.push_back(&follower);
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
-  options.busy = [&](bool busy) { watchdog.Work(busy); };
-  const RunResult result = WithWhatIsKept(*recorder, [&] { return Run(experiment, options); });
+  const RunResult result =
+      WithWhatIsKept(*recorder, [&] { return watchdog.Run(experiment, options); });
   progress.Clear();
   if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
   if (result.status == RunStatus::kStopped) PrintNote(result.reason);
@@ -186,19 +186,7 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.add_flag("--follow", arguments->follow,
                    "print each estimate as it is made, a line of JSON, in place of the table");
-  const auto read_timeout = [arguments](const std::string& text) {
-    arguments->frame_timeout_s.reset();
-    if (text != "none") arguments->frame_timeout_s = std::stod(text);
-  };
-  command
-      .add_option_function<std::string>(
-          "--frame-timeout", read_timeout,
-          "seconds that the estimators may take for one frame, or a plugin to create or destroy a "
-          "model, before the run ends, or none; a model that hangs is named")
-      ->check([](const std::string& text) {
-        return text == "none" ? std::string() : IsNumber(0.001, 1e9)(text);
-      })
-      ->default_str("60");
+  AddFrameTimeout(command, arguments->frame_timeout_s);
   command.add_flag("--no-figures", arguments->no_figures, "draw no figures");
   command.add_flag("--covariances", arguments->covariances,
                    "write P of every estimate, for `alidade compare`");

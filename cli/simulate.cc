@@ -47,7 +47,7 @@ ExitCode RunSimulate(const SimulateArguments& arguments) {
   const std::filesystem::path path = OutputFolder(arguments.folder, config, arguments.input,
                                                   arguments.force, arguments.quiet, "data-");
   const PluginHost host = arguments.input.Host(config);
-  const Watchdog watchdog(std::nullopt);
+  const Watchdog watchdog;
   StopOnSignals();
   const SimulateResult result =
       Simulate(config, host, path, arguments.force, StopRequested, arguments.images);

@@ -35,6 +35,7 @@ struct SweepArguments {
   std::string vary;
   SweepOptions options;
   bool force = false, quiet = false, resume = false;
+  std::optional<double> frame_timeout_s = kUsualFrameTimeout_s;
 };
 
 void ReadShard(const std::string& text, SweepOptions& options) {
@@ -185,7 +186,7 @@ ExitCode RunSweep(const SweepArguments& arguments) {
   const std::filesystem::path path = OutputFolder(arguments.folder, config, arguments.input,
                                                   arguments.force, arguments.quiet, "sweep-");
   const PluginHost host = arguments.input.Host(config);
-  const Watchdog watchdog(std::nullopt);
+  Watchdog watchdog(arguments.frame_timeout_s);
   StopOnSignals();
   const std::vector<Config> configs = ConfigsOf(arguments, config);
   const std::string inputs = InputsText(arguments.input, config, ArgumentsOf(arguments), configs,
@@ -196,6 +197,9 @@ ExitCode RunSweep(const SweepArguments& arguments) {
   SweepOptions options = arguments.options;
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
+  options.run = [&](Experiment& experiment, const RunOptions& given) {
+    return watchdog.Run(experiment, given);
+  };
   const Task task{arguments, config, host, options, path, inputs, progress};
   return arguments.vary.empty() ? SweepSeeds(task) : SweepValues(task);
 }
@@ -232,6 +236,7 @@ void AddSweep(CLI::App& program, Action& action) {
             "folder; default: the config's `output:`, or sweep-NAME, in runs/");
   command.add_flag("--force", arguments->force, "replace the folder if it is there");
   AddResume(command, arguments->resume);
+  AddFrameTimeout(command, arguments->frame_timeout_s);
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.footer(kSweepFooter);
   command.callback([&action, arguments] {

@@ -3,7 +3,11 @@
 
 #include <unistd.h>
 
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
 #include <algorithm>
+#include <chrono>
+#include <memory>
 #include <system_error>
 
 #include "alidade/base/number_text.h"
@@ -11,8 +15,27 @@
 
 namespace alidade::cli {
 
-Watchdog::Watchdog(std::optional<double> limit_s)
-    : limit_s_(limit_s), last_call_(detail::last_call) {
+void AddFrameTimeout(CLI::App& command, std::optional<double>& limit_s) {
+  const auto read = [&limit_s](const std::string& text) {
+    limit_s.reset();
+    if (text != "none") limit_s = std::stod(text);
+  };
+  command
+      .add_option_function<std::string>(
+          "--frame-timeout", read,
+          "seconds that the estimators may take for one frame, or a plugin to create or destroy a "
+          "model, before the run ends, or none; a model that hangs is named")
+      ->check([](const std::string& text) {
+        return text == "none" ? std::string() : IsNumber(0.001, 1e9)(text);
+      })
+      ->default_str("60");
+}
+
+std::string Watchdog::Frames::Text() const {
+  return count <= 1 ? "its start" : "one frame, after " + std::to_string(count - 2) + " others";
+}
+
+Watchdog::Watchdog(std::optional<double> limit_s) : limit_s_(limit_s) {
   try {
     thread_ = std::thread([this] { Watch(); });
   } catch (const std::system_error&) {  // no memory for it, say: the run may do with less
@@ -33,47 +56,60 @@ void Watchdog::Keep(const Recorder& recorder) {
   recorder_ = &recorder;
 }
 
-void Watchdog::Work(bool busy) {
-  const std::lock_guard lock(mutex_);
-  working_ = busy;
-  works_ += busy ? 1 : 0;
-  worked_s_ = after_stop_s_ = 0.0;
+RunResult Watchdog::Run(Experiment& experiment, RunOptions options) {
+  std::unique_lock lock(mutex_);
+  const auto frames = runs_.insert(runs_.end(), Frames{detail::last_call});
+  lock.unlock();
+  const auto remove = [&](const Frames*) {
+    const std::lock_guard again(mutex_);
+    runs_.erase(frames);
+  };
+  const std::unique_ptr<const Frames, decltype(remove)> removed(&*frames, remove);
+  options.busy = [&](bool busy) {
+    const std::lock_guard again(mutex_);
+    frames->busy = busy;
+    frames->count += busy ? 1 : 0;
+    frames->spell = {};
+  };
+  return alidade::Run(experiment, options);
 }
 
 void Watchdog::Watch() {
   using Clock = std::chrono::steady_clock;
   constexpr auto kLook = std::chrono::milliseconds(200);
-  constexpr double kPatience = 5.0, kMostOfALook = 0.4;
+  constexpr double kMostOfALook = 0.4;
   Clock::time_point before = Clock::now();
   std::unique_lock lock(mutex_);
   while (!changed_.wait_for(lock, kLook, [&] { return ends_; })) {
     const Clock::time_point now = Clock::now();
     // More has passed where the whole process was stopped.
-    const double passed =
+    const double passed_s =
         std::min(std::chrono::duration<double>(now - before).count(), kMostOfALook);
     before = now;
-    const LastingCall lasting = working_ ? LastingCall() : OldestLastingCall();
-    if (lasting.number != lasting_.number) worked_s_ = after_stop_s_ = 0.0;
-    lasting_ = lasting;
-    if (!working_ && lasting.number == 0) continue;
-    worked_s_ += passed;
-    if (StopRequested()) after_stop_s_ += passed;
-    const void* const call = working_ ? last_call_.load() : lasting.slot;
-    if (after_stop_s_ > kPatience) {
-      End("asked to stop, but " +
-              (working_ ? "an estimator does not finish " + Frame() : "a plugin does not return"),
-          call, ExitCode::kStopped);
-    }
-    if (limit_s_ && worked_s_ > *limit_s_) {
-      End((working_ ? "an estimator works on " + Frame() : "a plugin does not return") +
-              ", for more than " + internal::RoundedText(*limit_s_, 6) + " s",
-          call, ExitCode::kPlugin);
+    const LastingCall call = OldestLastingCall();
+    if (call.number != call_) of_call_ = {};
+    call_ = call.number;
+    constexpr const char* kNoReturn = "a plugin does not return";
+    if (call_ != 0) Check(of_call_, passed_s, call.slot, kNoReturn, kNoReturn);
+    for (Frames& frames : runs_) {
+      if (!frames.busy) continue;
+      Check(frames.spell, passed_s, frames.last_call, "an estimator works on " + frames.Text(),
+            "an estimator does not finish " + frames.Text());
     }
   }
 }
 
-std::string Watchdog::Frame() const {
-  return works_ <= 1 ? "its start" : "one frame, after " + std::to_string(works_ - 2) + " others";
+void Watchdog::Check(Spell& spell, double passed_s, const void* call, const std::string& works,
+                     const std::string& is_stuck) const {
+  constexpr double kPatience = 5.0;
+  spell.worked_s += passed_s;
+  if (StopRequested()) spell.after_stop_s += passed_s;
+  if (spell.after_stop_s > kPatience)
+    End("asked to stop, but " + is_stuck, call, ExitCode::kStopped);
+  if (limit_s_ && spell.worked_s > *limit_s_) {
+    End(works + ", for more than " + internal::RoundedText(*limit_s_, 6) + " s", call,
+        ExitCode::kPlugin);
+  }
 }
 
 void Watchdog::End(const std::string& why, const void* call, ExitCode code) const {

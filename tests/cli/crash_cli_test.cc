@@ -253,6 +253,21 @@ TEST_F(CrashCli, AStopDoesNotWaitForAModelThatHangs) {
   EXPECT_TRUE(Exists("out.failed-" + std::to_string(run))) << outcome.err;
 }
 
+TEST_F(CrashCli, AModelThatHangsEndsSweepsAndComparisonsToo) {
+  WriteConfig("hangs_in_noise");
+  const Arguments lines[] = {{"compare", "bad.yaml", "-o", "out"},
+                             {"sweep", "bad.yaml", "-o", "out", "--runs", "1", "--vary",
+                              "estimators.ekf.gate=0.9,0.99"}};
+  for (Arguments line : lines) {
+    line.insert(line.end(), {"--frame-timeout", "0.5"});
+    const Outcome late = Call(line);
+    EXPECT_EQ(late.code, 69) << line[0] << late.err;
+    EXPECT_TRUE(Contains(late.err, "error: an estimator works on one frame, after 0 others, for"))
+        << line[0] << late.err;
+    EXPECT_TRUE(Contains(late.err, "SqrtNoise of model 'hangs_in_noise'")) << line[0] << late.err;
+  }
+}
+
 TEST_F(CrashCli, ARunOfAGoodModelSaysNothing) {
   const Outcome outcome = RunModel("right");
   EXPECT_EQ(outcome.code, 0) << outcome.err;

@@ -95,7 +95,7 @@ ComparedSeeds CompareSeeds(const ComparedExperiment& compared, const PluginHost&
     RunComparer comparer(experiment);
     RunOptions observed = given;
     observed.observers.push_back(&comparer);
-    RunResult result = Run(experiment, observed);
+    RunResult result = sweep.run ? sweep.run(experiment, observed) : Run(experiment, observed);
     const bool whole = result.code == ExitCode::kDiverged || result.status == RunStatus::kOk;
     if (!whole) return result;
     CompareOptions of_run = options;

@@ -255,9 +255,9 @@ TEST_F(CrashCli, AStopDoesNotWaitForAModelThatHangs) {
 
 TEST_F(CrashCli, AModelThatHangsEndsSweepsAndComparisonsToo) {
   WriteConfig("hangs_in_noise");
-  const Arguments lines[] = {{"compare", "bad.yaml", "-o", "out"},
-                             {"sweep", "bad.yaml", "-o", "out", "--runs", "1", "--vary",
-                              "estimators.ekf.gate=0.9,0.99"}};
+  const Arguments lines[] = {
+      {"compare", "bad.yaml", "-o", "out"},
+      {"sweep", "bad.yaml", "-o", "out", "--runs", "1", "--vary", "estimators.ekf.gate=0.9,0.99"}};
   for (Arguments line : lines) {
     line.insert(line.end(), {"--frame-timeout", "0.5"});
     const Outcome late = Call(line);

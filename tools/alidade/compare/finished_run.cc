@@ -235,6 +235,11 @@ ComparedRun ReadRun(const fs::path& folder) {
   ComparedRun run;
   run.folder = folder;
   const fs::path run_file = folder / "run.json", timing_file = folder / "timing.json";
+  if (fs::exists(folder / "sweep.json")) {
+    throw Error(ExitCode::kBadData,
+                ErrorLine(Place{folder.string()}, {}, "is the folder of a sweep",
+                          "folders of `alidade run`"));
+  }
   const Json run_json = ReadJson(run_file), timing_json = ReadJson(timing_file);
   const JsonNode root(run_json, run_file.string()), timing(timing_json, timing_file.string());
   run.status = static_cast<RunStatus>(root.At("status").Choice({"ok", "stopped", "failed"}));

@@ -1,10 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/host/lent_host.h"
 
+#include <atomic>
 #include <deque>
 #include <mutex>
 
 namespace alidade::internal {
+namespace {
+
+std::atomic<std::int64_t> late_calls = 0;
+
+}  // namespace
+
+void LentHost::NoteLateCall() { ++late_calls; }
+std::int64_t LentHost::LateCalls() { return late_calls; }
 
 /// Blocks that nobody uses, for so long that a late call is likely to find them so.
 struct LentHost::Idle {

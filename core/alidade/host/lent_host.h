@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+
 #include "alidade/model/plugin_abi.h"
 
 namespace alidade::internal {
@@ -21,8 +23,12 @@ class LentHost {
   /// Who answers calls with this context; null: nobody does any more.
   template <class Reader>
   static Reader* ReaderOf(void* context) {
-    return static_cast<Reader*>(static_cast<Block*>(context)->reader);
+    auto* const reader = static_cast<Reader*>(static_cast<Block*>(context)->reader);
+    if (reader == nullptr) NoteLateCall();
+    return reader;
   }
+  /// How many found nobody, in this process.
+  static std::int64_t LateCalls();
 
  private:
   struct Block {
@@ -30,6 +36,7 @@ class LentHost {
     void* reader = nullptr;
   };
   struct Idle;
+  static void NoteLateCall();
   static Idle& IdleBlocks();
   static Block* Take();
 

@@ -262,6 +262,16 @@ struct HangsInDestroy : Right {
   }
   bool owner = true;
 };
+/// Keeps what it is lent, against the rules.
+struct AsksLate : Right {
+  explicit AsksLate(Params& p) : params(p) {}
+  template <class T>
+  bool Predict(const T* x, const T* y, T* z) const {
+    params.Number("late", "", "", {}, 0.0);
+    return Right::Predict(x, y, z);
+  }
+  mutable Params params;
+};
 struct LosesItself : Right {
   explicit LosesItself(Params&) { static_cast<void>(!new std::string(500, 'x')); }
 };
@@ -494,6 +504,7 @@ ALIDADE_PLUGIN(SENSOR(Right, "right"), SENSOR(MayHaveBias, "may_have_bias"),
                SENSOR(Misbehaves<11>, "leaves_daemons"), SENSOR(LosesItself, "loses_itself"),
                SENSOR(CrashesInCreate, "crashes_in_create"),
                SENSOR(HangsInCreate, "hangs_in_create"), SENSOR(HangsInDestroy, "hangs_in_destroy"),
+               SENSOR(AsksLate, "asks_late"),
                ALIDADE_SENSOR_BY(MakeWildDescription, "wild_description", "", ""),
                RAW(PastTheEnd, "past_the_end"), RAW(WritesItsInput, "writes_its_input"),
                RAW(IgnoresStrides, "ignores_strides"), RAW(WritesAndFails, "writes_and_fails"),

@@ -116,6 +116,7 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{69, "rounds_upward", "environment", {"Predict changed the rounding mode"}},
         Fault{69, "sets_locale", "environment", {"Predict changed the locale from 'C'"}},
         Fault{69, "changes_folder", "environment", {"Predict changed the current folder to /"}},
+        Fault{0, "asks_late", "environment", {"Predict asks the host, which is lent to create"}},
         Fault{0, "prints", "environment", {"the model prints", "output of a run: 'hello'"}},
         Fault{0, "eats_memory", "calls", {"Predict at", "std::bad_alloc; it may take 64 MB"}},
         Fault{0, "singular_noise", "noise", {"R is singular: smallest eigenvalue"}},

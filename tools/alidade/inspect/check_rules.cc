@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "alidade/base/number_text.h"
+#include "alidade/host/lent_host.h"
 #include "alidade/host/process_settings.h"
 #include "alidade/inspect/check_context.h"
 
@@ -162,8 +163,11 @@ Finding CheckBounds(Context& context) {
 
 Finding CheckEnvironment(Context& context) {
   const Surroundings before;
+  const std::int64_t late_calls = LentHost::LateCalls();
   const auto changed = [&](const std::string& call) {
-    const std::string change = Surroundings().ChangeSince(before);
+    std::string change = Surroundings().ChangeSince(before);
+    if (LentHost::LateCalls() != late_calls)
+      change = "asks the host, which is lent to create alone";
     return change.empty() ? change : call + ' ' + change;
   };
   std::unique_ptr<ModelUnderTest> other = context.Create();

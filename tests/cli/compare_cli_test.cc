@@ -362,6 +362,7 @@ TEST_F(CompareCli, RefusesWhatItCannotCompare) {
   fails({"compare", "a", "--filter", "rts"}, 2, "no estimator 'rts'; expected one of ekf");
   fails({"compare", "nowhere"}, 66, "nowhere");
   fails({"compare", "."}, 66, "run.json: cannot be read");
+  fs::create_directory(folder_ / "swept");
   Write("swept/sweep.json", "{}");
   fails({"compare", "swept"}, 65, "swept: is the folder of a sweep; expected folders of");
   fails({"compare", "config.yaml", "-o", "a"}, 73, "exists already");

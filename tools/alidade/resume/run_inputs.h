@@ -27,7 +27,7 @@ struct CommandInputs {
 };
 
 /// The files of the plugins that runs of these configs use, each once: of those that `host` offers,
-/// every model, source and estimator that a `model` or `type` of a config names, in `overrides` too.
+/// every model, source and estimator that a `model` or `type` of a config names, overrides too.
 std::vector<std::filesystem::path> PluginsNamed(const std::vector<Config>& configs,
                                                 const PluginHost& host);
 
@@ -37,8 +37,8 @@ using PluginHashes = std::multimap<std::string, std::string>;
 PluginHashes HashesOf(const std::vector<std::filesystem::path>& files);
 
 /// The text of `inputs.json`. `config` is that of `config.resolved.yaml`, `runs` the configs of the
-/// runs. Reads what the sources of these name for its hashes; a folder stands for the files in it, a
-/// pipe has no hash. Error: kIo.
+/// runs. Reads what the sources of these name for its hashes; a folder stands for the files in it,
+/// a pipe has no hash. Error: kIo.
 std::string InputsJson(const CommandInputs& command, const Config& config,
                        const std::vector<Config>& runs, const PluginHashes& plugins);
 

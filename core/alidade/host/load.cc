@@ -4,6 +4,7 @@
 
 #define BOOST_DLL_USE_STD_FS
 #include <algorithm>
+#include <bit>
 #include <boost/dll/shared_library.hpp>
 #include <exception>
 #include <system_error>
@@ -41,7 +42,7 @@ void RunDestructors(void* library) {
   link_map* loaded = nullptr;
   if (::dlinfo(library, RTLD_DI_LINKMAP, static_cast<void*>(&loaded)) != 0) return;
   using Function = void (*)();
-  const auto at = [&](ElfW(Addr) address) { return reinterpret_cast<Function*>(address); };
+  const auto at = [&](ElfW(Addr) address) { return std::bit_cast<Function*>(address); };
   Function* functions = nullptr;
   Function last = nullptr;
   std::size_t count = 0;
@@ -49,7 +50,7 @@ void RunDestructors(void* library) {
     const ElfW(Addr) address = loaded->l_addr + entry->d_un.d_ptr;
     if (entry->d_tag == DT_FINI_ARRAY) functions = at(address);
     if (entry->d_tag == DT_FINI_ARRAYSZ) count = entry->d_un.d_val / sizeof(Function);
-    if (entry->d_tag == DT_FINI) last = reinterpret_cast<Function>(address);
+    if (entry->d_tag == DT_FINI) last = std::bit_cast<Function>(address);
   }
   while (functions != nullptr && count > 0) functions[--count]();
   if (last != nullptr) last();

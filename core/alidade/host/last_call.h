@@ -9,8 +9,7 @@ namespace alidade {
 
 namespace detail {
 /// The slot of the call table, in a ModelInstance, of the model that this thread called last, or a
-/// NamedCall that lasts.
-/// Another thread may read it.
+/// NamedCall that lasts. Another thread may read it.
 #if defined(__ELF__)
 [[gnu::tls_model("initial-exec")]]
 #endif

@@ -95,7 +95,7 @@ ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compa
   options.observers = {&recorder, &comparer};
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
-  const RunResult result = watchdog.Run(compared.experiment, options);
+  const RunResult result = watchdog.Run(compared.experiment, options, &recorder);
   progress.Clear();
   FinishOnSignals();
   CompareOptions of_run = arguments.options;

@@ -133,39 +133,37 @@ ExitCode RunConfig(const RunArguments& arguments) {
   if (arguments.resume)
     internal::CheckReadableAgain(config, "a run that is resumed reads it from its start");
   const PluginHost host = arguments.input.Host(config);
-  std::optional<Recorder> recorder;  // outlives the watchdog, which outlives the models
   Watchdog watchdog(arguments.frame_timeout_s);
   StopOnSignals();  // before a source that waits for its pipe is made
   Experiment experiment = BuildExperiment(config, host);
   const Recorder::Options record = RecordOf(arguments, config, folder, host);
   if (record.resume && IsFinished(folder, config, record.inputs, record.force, arguments.quiet))
     return ExitCode::kOk;
-  recorder.emplace(record, config);
-  watchdog.Keep(*recorder);
+  Recorder recorder(record, config);
   if (record.resume && !arguments.quiet) {
-    TellResumed(folder, recorder->resumed(), "its frames are computed again, and compared");
+    TellResumed(folder, recorder.resumed(), "its frames are computed again, and compared");
   }
 
   Progress progress("frames", arguments.quiet);
   RunOptions options;
-  options.observers = {&*recorder};
+  options.observers = {&recorder};
   Follower follower(Print);
   if (arguments.follow) options.observers.push_back(&follower);
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
   const RunResult result =
-      WithWhatIsKept(*recorder, [&] { return watchdog.Run(experiment, options); });
+      WithWhatIsKept(recorder, [&] { return watchdog.Run(experiment, options, &recorder); });
   progress.Clear();
   if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
   if (result.status == RunStatus::kStopped) PrintNote(result.reason);
   FinishOnSignals();
-  WithWhatIsKept(*recorder, [&] { recorder->Finish(result); });
-  if (!arguments.quiet) TellKept(recorder->resumed(), folder);
+  WithWhatIsKept(recorder, [&] { recorder.Finish(result); });
+  if (!arguments.quiet) TellKept(recorder.resumed(), folder);
   if (!arguments.quiet && !arguments.follow) {
     const std::string table = arguments.all
                                   ? ComparisonTable(result)
                                   : internal::MainTable(result, internal::SubjectsOf(experiment));
-    Print(Summary(result, table, *recorder));
+    Print(Summary(result, table, recorder));
   }
   return result.code;
 }

@@ -51,14 +51,9 @@ Watchdog::~Watchdog() {
   if (thread_.joinable()) thread_.join();
 }
 
-void Watchdog::Keep(const Recorder& recorder) {
-  const std::lock_guard lock(mutex_);
-  recorder_ = &recorder;
-}
-
-RunResult Watchdog::Run(Experiment& experiment, RunOptions options) {
+RunResult Watchdog::Run(Experiment& experiment, RunOptions options, const Recorder* recorder) {
   std::unique_lock lock(mutex_);
-  const auto frames = runs_.insert(runs_.end(), Frames{detail::last_call});
+  const auto frames = runs_.insert(runs_.end(), Frames{detail::last_call, recorder});
   lock.unlock();
   const auto remove = [&](const Frames*) {
     const std::lock_guard again(mutex_);
@@ -117,10 +112,15 @@ void Watchdog::End(const std::string& why, const void* call, ExitCode code) cons
   DescribeCall(call, words, sizeof words);
   std::string text = why;
   if (*words != '\0') text += std::string("; the last call of a model: ") + words;
-  try {
-    const std::filesystem::path kept = recorder_ == nullptr ? "" : recorder_->failed();
-    if (!kept.empty() && recorder_->Abandon()) text += "; what was recorded is in " + kept.string();
-  } catch (const std::exception&) {  // it stays where it is; the next run to that place finds it
+  for (const Frames& frames : runs_) {
+    if (frames.recorder == nullptr) continue;
+    try {
+      const std::filesystem::path kept = frames.recorder->failed();
+      if (!kept.empty() && frames.recorder->Abandon()) {
+        text += "; what was recorded is in " + kept.string();
+      }
+    } catch (const std::exception&) {  // it stays where it is; the next run to that place finds it
+    }
   }
   PrintErrors(text + '\n');
   FinishOnSignals();

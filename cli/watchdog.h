@@ -35,10 +35,8 @@ class Watchdog {
   Watchdog(const Watchdog&) = delete;
   Watchdog& operator=(const Watchdog&) = delete;
 
-  /// What this records is kept. It outlives the watchdog.
-  void Keep(const Recorder& recorder);
-  /// alidade::Run, watched; of several threads at once.
-  RunResult Run(Experiment& experiment, RunOptions options);
+  /// alidade::Run, watched; of several threads at once. What `recorder` records is kept.
+  RunResult Run(Experiment& experiment, RunOptions options, const Recorder* recorder = nullptr);
 
  private:
   /// What may last for too long, and how long it has.
@@ -48,6 +46,7 @@ class Watchdog {
   /// The frames of a run.
   struct Frames {
     const std::atomic<const void*>& last_call;  ///< of its thread
+    const Recorder* recorder;                   ///< null: none
     bool busy = false;
     std::int64_t count = 0;  ///< how often one began
     Spell spell = {};        ///< of the one at hand
@@ -63,7 +62,6 @@ class Watchdog {
   const std::optional<double> limit_s_;
   std::mutex mutex_;
   std::condition_variable changed_;
-  const Recorder* recorder_ = nullptr;
   bool ends_ = false;
   std::list<Frames> runs_;
   std::uint64_t call_ = 0;  ///< LastingCall::number

@@ -265,6 +265,9 @@ TEST_F(CrashCli, AModelThatHangsEndsSweepsAndComparisonsToo) {
     EXPECT_TRUE(Contains(late.err, "error: an estimator works on one frame, after 0 others, for"))
         << line[0] << late.err;
     EXPECT_TRUE(Contains(late.err, "SqrtNoise of model 'hangs_in_noise'")) << line[0] << late.err;
+    // A comparison records one run; a sweep keeps those that are finished.
+    const bool kept = Contains(late.err, "; what was recorded is in ");
+    EXPECT_EQ(kept, std::string(line[0]) == "compare") << late.err;
   }
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <string>
+#include <functional>
 #include <string_view>
 #include <vector>
 
@@ -23,30 +23,18 @@ struct Description {
 struct EstimatorType {
   const char* name;
   const char* doc;  ///< one line
-  /// Reads the entry's keys. Errors: kBadConfig.
-  EstimatorMaker (*read)(const Node& entry);
-  std::vector<ParamInfo> (*schema)();  ///< what `read` asks for
-  /// The options that an entry sets, in words.
-  Description (*describe)(const Node& entry);
   Support support;
-  EstimatorKind kind = EstimatorKind::kFilter;
+  EstimatorKind kind;
+  /// Reads the entry's keys. Errors: kBadConfig.
+  std::function<EstimatorMaker(const Node& entry)> read;
+  std::function<std::vector<ParamInfo>()> schema;  ///< what `read` asks for
+  /// The options that an entry sets, in words.
+  std::function<Description(const Node& entry)> describe;
 };
 
 /// All of them; the first is `ekf`.
 const std::vector<EstimatorType>& EstimatorTypes();
 /// Null where there is none of that name.
 const EstimatorType* FindEstimatorType(std::string_view name);
-
-/// Refuses by name the keys of an estimator's entry that are left unread but other types have:
-/// `gate`, `fuse`, `jacobian`, `rejection_recovery`. To be called once the entry's own keys have
-/// been read. Errors: kBadConfig.
-void RefuseUnsupportedKeys(const std::string& type, const Node& entry);
-/// The same for what `system`, built from the config `root`, asks for beyond `support`.
-/// Errors: kBadConfig.
-void RefuseUnsupported(const std::string& type, const Support& support, const Node& root,
-                       const System& system);
-/// Refuses `fuse: per_measurement` of an estimator, the map `entry`, where a sensor looks for
-/// matches that agree. Error: kBadConfig.
-void RefuseLoneMatches(const Node& entry, const System& system);
 
 }  // namespace alidade::internal

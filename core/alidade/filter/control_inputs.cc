@@ -31,7 +31,7 @@ ControlInputs::ControlInputs(const System& system, const std::vector<StreamInfo>
   for (std::size_t i = 0; i < system.motions.size(); ++i) {
     const MotionBinding& motion = system.motions[i];
     if (!motion.model.has_input()) continue;
-    Held held;
+    Held& held = held_.emplace_back();
     held.motion = i;
     held.name = motion.name;
     held.binding = motion.input;
@@ -45,7 +45,6 @@ ControlInputs::ControlInputs(const System& system, const std::vector<StreamInfo>
       ALIDADE_EXPECTS(stream->size == held.geometry.ambient);
       held.stream = static_cast<int>(stream - streams.begin());
     }
-    held_.push_back(std::move(held));
   }
 }
 
@@ -88,21 +87,18 @@ void ControlInputs::Take(const Frame& frame, UpdateReport& report) {
       if (m.stream != held.stream || frame.timestamp < held.timestamp) continue;
       ALIDADE_EXPECTS(m.values.size() == held.value.size());
       const std::string defect = Defect(held.geometry, m.values);
-      if (!defect.empty()) {
-        if (!held.refusal_noted) {
-          report.events.push_back({frame.timestamp, "input_refused",
-                                   "a control input of '" + held.name + "' from stream '" +
-                                       held.binding.stream + "' is " + defect +
-                                       ": the one before it goes on acting"});
-        }
-        held.refusal_noted = true;
-        continue;
+      if (!defect.empty() && !held.refusal_noted) {
+        report.events.push_back({frame.timestamp, "input_refused",
+                                 "a control input of '" + held.name + "' from stream '" +
+                                     held.binding.stream + "' is " + defect +
+                                     ": the one before it goes on acting"});
       }
+      held.refusal_noted = !defect.empty();
+      if (held.refusal_noted) continue;
       std::ranges::copy(m.values, held.value.begin());
       held.geometry.Normalise(held.value.data());
       held.timestamp = frame.timestamp;
       if (__builtin_add_overflow(frame.timestamp, held.timeout, &held.until)) held.until = kForever;
-      held.refusal_noted = false;
       report.inputs.push_back(static_cast<int>(held.motion));
     }
   }

@@ -2,10 +2,6 @@
 #pragma once
 
 #include <limits>
-#include <vector>
-
-#include "alidade/config/config.h"
-#include "alidade/host/plugin_host.h"
 
 namespace alidade {
 
@@ -40,15 +36,14 @@ struct EkfOptions {
   int max_covariance_repairs = 10;    ///< of one that is not positive definite; then it ends
   /// Longer gaps are stepped in equal parts of at most this, to whole ns, and at least 1 ns.
   double max_dt_s = std::numeric_limits<double>::infinity();
-
-  /// Reads `gate`, `fuse` (`joint`, `per_sensor`, `per_measurement`), `jacobian` (`latest`,
-  /// `first_estimate`), `rejection_recovery` (`after`; `action`: `reset`, `inflate`, `none`),
-  /// `max_covariance_repairs` and `max_dt_s` from an estimator's entry of the config; an absent key
-  /// keeps its default.
-  /// Errors: kBadConfig.
-  static EkfOptions FromNode(const Node& entry);
-  /// What FromNode reads.
-  static std::vector<ParamInfo> Schema();
 };
 
+namespace internal {
+
+inline EkfOptions WithoutRecovery(EkfOptions options) {
+  options.rejection_recovery = RejectionRecovery::kNone;
+  return options;
+}
+
+}  // namespace internal
 }  // namespace alidade

@@ -146,12 +146,12 @@ Outcome PredictAt(Row& row, const std::vector<double>& x, const std::vector<doub
 }
 
 Outcome LineariseAt(Row& row, const double* const* roles) {
-  return EvaluateAt(*row.model, *row.place, *row.measurement, roles, row.columns, row.report->h,
-                    &row.H);
+  return EvaluateAt(*row.model, *row.place, *row.measurement, roles, row.memory.columns,
+                    row.report->h, &row.H);
 }
 
 Outcome NoiseAt(Row& row, const double* const* roles) {
-  return NoiseAt(*row.model, *row.measurement, roles, row.L, row.R);
+  return NoiseAt(*row.model, *row.measurement, roles, row.memory.l, row.R);
 }
 
 void TakeInnovation(Row& row) {
@@ -176,27 +176,21 @@ Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
   const auto first = static_cast<std::size_t>(model.initialised_role());
   const auto count = static_cast<std::size_t>(model.initialised_count());
   const std::span<const Space> targets = std::span(model.roles()).subspan(first, count);
-  int rows = 0, size = 0, columns = 0;
+  int rows = 0, size = 0, columns = 0, most = 0;
   for (const Space& target : targets) {
     rows += target.geometry.tangent;
     size += target.geometry.ambient;
   }
+  for (const Space& role : model.roles()) most += role.geometry.tangent;
   std::fill_n(roles.begin() + model.initialised_role(), count, nullptr);
-  const auto counts = [&](std::size_t i) { return roles[i] != nullptr && place.columns[i] >= 0; };
   inverse.from.clear();
-  for (std::size_t i = 0; i < roles.size(); ++i) {
-    if (!counts(i)) continue;
-    inverse.from.push_back(sensor.roles[i].block);
-    columns += model.roles()[i].geometry.tangent;
-  }
-  inverse.by_role.assign(static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns),
-                         kNotWritten);
+  inverse.by_role.assign(static_cast<std::size_t>(rows * most), kNotWritten);
   inverse.of_role.assign(roles.size(), nullptr);
-  double* next = inverse.by_role.data();
   for (std::size_t i = 0; i < roles.size(); ++i) {
-    if (!counts(i)) continue;
-    inverse.of_role[i] = next;
-    next += rows * model.roles()[i].geometry.tangent;
+    if (roles[i] == nullptr || place.columns[i] < 0) continue;
+    inverse.from.push_back(sensor.roles[i].block);
+    inverse.of_role[i] = inverse.by_role.data() + rows * columns;
+    columns += model.roles()[i].geometry.tangent;
   }
   inverse.y.assign(static_cast<std::size_t>(size), kNotWritten);
   inverse.by_z.setConstant(rows, model.measurement().geometry.tangent, kNotWritten);

@@ -355,7 +355,7 @@ std::unique_ptr<FastPath> FastPath::For(const FastParts& parts) {
            block.value_offset == block.tangent_offset;
   };
   if (f.binding->system.landmarks || !IsSmall(f.state.covariance()) ||
-      parts.options.fuse != Fuse::kJoint || f.waiting || f.considering ||
+      parts.options.fuse != Fuse::kJoint || f.blocks.waiting || f.blocks.considering ||
       std::ssize(f.state.values()) != n || !std::ranges::all_of(f.state.layout().blocks(), plain)) {
     return nullptr;
   }

@@ -16,14 +16,6 @@ using internal::FrameLoop;
 Filter::Filter(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams,
                std::unique_ptr<internal::Method> method)
     : loop_(std::make_unique<FrameLoop>(std::move(system), options, streams, std::move(method))) {}
-Filter::Filter(const Filter& other) : loop_(std::make_unique<FrameLoop>(*other.loop_)) {}
-Filter& Filter::operator=(const Filter& other) {
-  if (this != &other) loop_ = std::make_unique<FrameLoop>(*other.loop_);
-  return *this;
-}
-Filter::Filter(Filter&& other) noexcept = default;
-Filter& Filter::operator=(Filter&& other) noexcept = default;
-Filter::~Filter() = default;
 
 void Filter::Start(Timestamp timestamp) { loop_->f.timestamp = timestamp; }
 

@@ -6,8 +6,10 @@
 #include <string_view>
 #include <vector>
 
+#include "alidade/base/indirect.h"
 #include "alidade/filter/ekf_options.h"
 #include "alidade/filter/estimator.h"
+#include "alidade/system/system.h"
 
 namespace alidade {
 
@@ -58,12 +60,6 @@ struct Prediction {
 /// system and its models, does not change, and models may be called from several threads.
 class Filter : public Estimator {
  public:
-  Filter(const Filter& other);
-  Filter& operator=(const Filter& other);
-  Filter(Filter&& other) noexcept;
-  Filter& operator=(Filter&& other) noexcept;
-  ~Filter() override;
-
   // By frames.
   void Start(Timestamp timestamp) override;
   const UpdateReport& Process(const Frame& frame) override;
@@ -108,7 +104,7 @@ class Filter : public Estimator {
   /// @endcond
 
  private:
-  std::unique_ptr<internal::FrameLoop> loop_;
+  Indirect<internal::FrameLoop> loop_;
 };
 
 }  // namespace alidade

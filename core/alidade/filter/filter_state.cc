@@ -40,16 +40,16 @@ FilterState::FilterState(std::shared_ptr<const Binding> of, bool keeps_first_est
 }
 
 void FilterState::Activate() {
-  const std::span<const Block> blocks(binding->system.layout.blocks());
-  ++activations;
-  waiting = considering = false;
-  gain_rows_.clear();
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
+  const std::size_t count = binding->system.layout.blocks().size();
+  ++blocks.activations;
+  blocks.waiting = blocks.considering = false;
+  blocks.gain_rows.clear();
+  for (std::size_t i = 0; i < count; ++i) {
     const Block& block = state.layout()[static_cast<BlockId>(i)];
-    waiting = waiting || !block.present;
-    considering = considering || (block.present && block.status == BlockStatus::kConsider);
+    blocks.waiting |= !block.present;
+    blocks.considering |= block.present && block.status == BlockStatus::kConsider;
     for (int k = 0; block.has_covariance() && k < block.geometry().tangent; ++k) {
-      gain_rows_.push_back(block.tangent_offset + k);
+      blocks.gain_rows.push_back(block.tangent_offset + k);
     }
   }
   motions.Activate(state.layout());
@@ -76,8 +76,8 @@ void FilterState::RecordUpdate(std::span<Row* const> rows, const double* gain) {
     if (gain == nullptr) break;
     const double* const end = gain + n * row->report->dof;
     for (; gain != end; gain += n) {
-      if (!row->gain_is_recorded()) continue;
-      for (const int i : gain_rows_) row->report->gain.push_back(gain[i]);
+      if (!GainIsRecorded(*row)) continue;
+      for (const int i : blocks.gain_rows) row->report->gain.push_back(gain[i]);
     }
   }
   const Row& last = *rows.back();

@@ -48,9 +48,13 @@ struct FilterState {
   std::vector<std::vector<double>> first_estimates;
   UpdateReport report;  ///< of the frame
   Said said;
-  int activations = 0;       ///< calls of Activate
-  bool waiting = false;      ///< a block of the system has no value yet
-  bool considering = false;  ///< one is a consider state
+  /// What Activate last found among the blocks of the system.
+  struct {
+    int activations = 0;         ///< calls of Activate
+    bool waiting = false;        ///< one has no value yet
+    bool considering = false;    ///< one is a consider state
+    std::vector<int> gain_rows;  ///< of P: of those that have a value
+  } blocks;
   /// Matrices; what takes from it has a Workspace::Use around it.
   Scratch<Workspace> work;
   Scratch<std::vector<double>> moved;  ///< values on the way to x
@@ -59,7 +63,6 @@ struct FilterState {
   void KeepFirstEstimates();
 
   bool keeps_first_estimates_;
-  std::vector<int> gain_rows_;  ///< of P: of the system's blocks that have a value
 };
 
 /// An event of the frame; the end of the frame gives it its timestamp.

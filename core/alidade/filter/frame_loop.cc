@@ -29,12 +29,12 @@ FrameLoop::FrameLoop(System system, const EkfOptions& options,
 void FrameLoop::MakeFastPath() {
   const bool linear = dynamic_cast<const Linear*>(&*method) != nullptr;
   fast_.path = linear ? FastPath::For(FastParts{f, time_, gate_, recovery_, options_}) : nullptr;
-  fast_.made_at = f.activations;
+  fast_.made_at = f.blocks.activations;
 }
 
 void FrameLoop::Process(const Frame& frame) {
   f.report.Clear();
-  if (fast_.made_at != f.activations) MakeFastPath();
+  if (fast_.made_at != f.blocks.activations) MakeFastPath();
   took_fast_path = fast_.path != nullptr && fast_.path->Process(frame);
   if (!took_fast_path) Run(frame);
   if (!time_.inputs().empty()) time_.inputs().Take(frame, f.report);
@@ -61,7 +61,7 @@ void FrameLoop::Run(const Frame& frame) {
   for (const Row& row : all) {
     if (row.report->outcome == Outcome::kFailed) NotePluginFailure(f, *row.binding);
   }
-  if (f.waiting) InitialiseWaiting(f, all);
+  if (f.blocks.waiting) InitialiseWaiting(f, all);
   if (landmarks) landmarks->Attach(f, all);
   Fuse(all);
   recovery_.RepairCovariance(f, all);

@@ -4,9 +4,9 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <utility>
 #include <vector>
 
+#include "alidade/base/indirect.h"
 #include "alidade/filter/consensus.h"
 #include "alidade/filter/ekf_options.h"
 #include "alidade/filter/fast_path.h"
@@ -19,19 +19,6 @@
 #include "alidade/filter/timeline.h"
 
 namespace alidade::internal {
-
-/// A method by value.
-class AnyMethod {
- public:
-  explicit AnyMethod(std::unique_ptr<Method> method) : method_(std::move(method)) {}
-  AnyMethod(const AnyMethod& other) : method_(other.method_->Clone()) {}
-  AnyMethod& operator=(const AnyMethod&) = delete;
-  Method& operator*() const { return *method_; }
-  Method* operator->() const { return method_.get(); }
-
- private:
-  std::unique_ptr<Method> method_;
-};
 
 /// What a filter is made of, and what a frame goes through there. No part points into another but
 /// the fast path, which a copy makes anew: a copy is a filter by itself.
@@ -49,7 +36,7 @@ class FrameLoop {
                                    const std::vector<double>& known);
 
   FilterState f;
-  AnyMethod method;
+  Indirect<Method> method;
   std::optional<Landmarks> landmarks;  ///< where the system has any
   bool took_fast_path = false;         ///< the last frame
 
@@ -65,7 +52,7 @@ class FrameLoop {
   /// The fast path, as long as the blocks are those that it was made for.
   struct CurrentPath {
     std::unique_ptr<FastPath> path;
-    int made_at = -1;  ///< FilterState::activations
+    int made_at = -1;  ///< FilterState::blocks
   };
   /// One group of rows, and what becomes of it.
   struct Groups {

@@ -13,12 +13,6 @@ struct IekfOptions : EkfOptions {
   /// An update has converged where its next step is at most this, in posterior standard deviations;
   /// > 0.
   double tolerance = 1e-4;
-
-  /// Reads what EkfOptions reads but `jacobian`, and `max_iterations`, `tolerance`.
-  /// Errors: kBadConfig.
-  static IekfOptions FromNode(const Node& entry);
-  /// What FromNode reads.
-  static std::vector<ParamInfo> Schema();
 };
 
 /// Iterated extended Kalman filter [Bell1993]: as Ekf, with updates that minimise

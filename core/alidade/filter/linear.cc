@@ -123,8 +123,8 @@ Outcome Linear::CorrectBy(FilterState& f, std::span<Row* const> rows, const doub
     const std::vector<bool>& consider = row->place->consider;
     return std::ranges::find(consider, true) != consider.end();
   };
-  const bool small = IsSmall(f.state.covariance()) && CountOf(rows) <= kSmall && !f.considering &&
-                     std::ranges::none_of(rows, considers);
+  const bool small = IsSmall(f.state.covariance()) && CountOf(rows) <= kSmall &&
+                     !f.blocks.considering && std::ranges::none_of(rows, considers);
   return small ? CorrectSmall(f, rows, dx) : CorrectLarge(f, rows, dx);
 }
 
@@ -235,7 +235,7 @@ Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const d
   if (!AllFinite(f.moved) || !w.allFinite() || !e.allFinite()) return Outcome::kNotFinite;
   const bool cancels = Cancels(p, w, lost_, e, f.work.Take(n));
   const bool recorded =
-      std::ranges::any_of(rows, [](const Row* row) { return row->gain_is_recorded(); });
+      std::ranges::any_of(rows, [](const Row* row) { return GainIsRecorded(*row); });
   if (cancels || recorded) {
     gain = w;
     Divide(l, gain);

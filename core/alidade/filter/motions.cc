@@ -198,11 +198,8 @@ Workspace::Matrix Motions::Spread(std::vector<double> Step::*matrix, bool held_o
 Workspace::Matrix Motions::NoiseInput(int n, Workspace& work) const {
   return Spread(&Step::gl, false, n, work);
 }
-Workspace::Matrix Motions::HeldInput(int n, Workspace& work) const {
-  return Spread(&Step::gl, true, n, work);
-}
-Workspace::Matrix Motions::HeldNoise(int n, Workspace& work) const {
-  return Spread(&Step::m, true, n, work);
+Workspace::Matrix Motions::Held(std::vector<double> Step::*matrix, int n, Workspace& work) const {
+  return Spread(matrix, true, n, work);
 }
 
 }  // namespace alidade::internal

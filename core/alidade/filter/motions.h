@@ -28,7 +28,6 @@ class Motions {
   /// Finds out which models move: those all of whose blocks have a value.
   void Activate(const StateLayout& layout);
   std::vector<Step>& steps() { return steps_; }
-  const std::vector<Step>& steps() const { return steps_; }
   /// x' of the active models, by the places of their blocks.
   std::vector<double>& next() { return next_; }
 
@@ -48,10 +47,8 @@ class Motions {
   // Matrices of the last step, in `work`:
   Workspace::Matrix Transition(int n, Workspace& work) const;  ///< F, n x n
   Workspace::Matrix NoiseInput(int n, Workspace& work) const;  ///< G Lq, n x n_w
-  /// The same, the columns of continuous noise zero.
-  Workspace::Matrix HeldInput(int n, Workspace& work) const;
-  /// M, n x n_w, the columns of continuous noise zero.
-  Workspace::Matrix HeldNoise(int n, Workspace& work) const;
+  /// Of the steps' `gl` the same, of their `m` M (n x n_w); the columns of continuous noise zero.
+  Workspace::Matrix Held(std::vector<double> Step::*matrix, int n, Workspace& work) const;
 
  private:
   Trouble EvaluateOne(std::size_t i, const State& state, double dt_s, bool derivatives);

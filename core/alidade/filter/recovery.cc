@@ -13,16 +13,9 @@ namespace {
 
 /// A measurement that is itself not finite, of which no h was asked, tells nothing of the filter.
 bool IsRejected(const MeasurementReport& entry) {
-  switch (entry.outcome) {
-    case Outcome::kGated:
-    case Outcome::kOutOfDomain:
-    case Outcome::kNotPd:
-      return true;
-    case Outcome::kNotFinite:
-      return !entry.h.empty();
-    default:
-      return false;
-  }
+  const Outcome outcome = entry.outcome;
+  return outcome == Outcome::kGated || outcome == Outcome::kOutOfDomain ||
+         outcome == Outcome::kNotPd || (outcome == Outcome::kNotFinite && !entry.h.empty());
 }
 
 /// A + (B - A)+, the positive part: a covariance that is in no direction below A or B.
@@ -74,8 +67,7 @@ bool Inflate(FilterState& f, const SensorBinding& sensor) {
 }  // namespace
 
 Recovery::Recovery(const System& system, const EkfOptions& options)
-    : options_{options.rejection_recovery, options.rejection_recovery_after,
-               options.max_covariance_repairs},
+    : options_(options),
       rejections_(system.sensors.size(), 0),
       inflated_(system.sensors.size(), 0) {}
 
@@ -90,7 +82,7 @@ void Recovery::RepairCovariance(FilterState& f, std::span<Row> rows) {
   if (!(defect < -kRounding)) return;
   const std::string text = "the covariance is not positive semi-definite: a pivot is " +
                            RoundedText(defect, 3) + " of its largest variance";
-  if (repairs_ == options_.max_repairs) {
+  if (repairs_ == options_.max_covariance_repairs) {
     return End(f, "not_pd", text + ", after " + std::to_string(repairs_) + " repairs");
   }
   ++repairs_;
@@ -98,7 +90,7 @@ void Recovery::RepairCovariance(FilterState& f, std::span<Row> rows) {
   p.SetBlock(0, 0, root * root.transpose());
   Note(f, "repaired",
        text + "; negative pivots count as zero (repair " + std::to_string(repairs_) + " of " +
-           std::to_string(options_.max_repairs) + ")");
+           std::to_string(options_.max_covariance_repairs) + ")");
 }
 
 void Recovery::RecoverRejected(FilterState& f, std::span<Row> rows) {
@@ -110,9 +102,9 @@ void Recovery::RecoverRejected(FilterState& f, std::span<Row> rows) {
 
 /// Of a measurement that was not accepted. Whether its sensor has to recover.
 bool Recovery::CountRejection(const MeasurementReport& entry) {
-  if (options_.action == RejectionRecovery::kNone || !IsRejected(entry)) return false;
+  if (options_.rejection_recovery == RejectionRecovery::kNone || !IsRejected(entry)) return false;
   int& count = rejections_[static_cast<std::size_t>(entry.sensor)];
-  if (++count < options_.after) return false;
+  if (++count < options_.rejection_recovery_after) return false;
   count = 0;
   return true;
 }
@@ -123,12 +115,12 @@ bool Recovery::CountRejection(const MeasurementReport& entry) {
 void Recovery::Recover(FilterState& f, Row& row) {
   const SensorBinding& sensor = *row.binding;
   const std::string why = "sensor '" + sensor.name + "' rejected " +
-                          std::to_string(options_.after) + " times in a row: ";
+                          std::to_string(options_.rejection_recovery_after) + " times in a row: ";
   const int role = sensor.model.initialised_role();
   Inverse inverse;
   const RoleBinding* target = role < 0 ? nullptr : &sensor.roles[static_cast<std::size_t>(role)];
-  if (options_.action == RejectionRecovery::kReset && target != nullptr && target->block >= 0 &&
-      target->mode == RoleMode::kEstimate &&
+  if (options_.rejection_recovery == RejectionRecovery::kReset && target != nullptr &&
+      target->block >= 0 && target->mode == RoleMode::kEstimate &&
       f.state.layout()[target->block].status == BlockStatus::kEstimated &&
       Invert(f, row, nullptr, inverse) == Outcome::kAccepted) {
     DropMotionOf(f, target->block);

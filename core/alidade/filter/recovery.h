@@ -25,7 +25,8 @@ class Recovery {
 
   /// Whether one more rejection of the sensor is one too many.
   bool IsDueNext(std::size_t sensor) const {
-    return options_.action != RejectionRecovery::kNone && rejections_[sensor] + 1 >= options_.after;
+    return options_.rejection_recovery != RejectionRecovery::kNone &&
+           rejections_[sensor] + 1 >= options_.rejection_recovery_after;
   }
   /// Counts what became of one measurement. Whether its sensor has to recover.
   bool Count(FilterState& f, const MeasurementReport& entry) {
@@ -39,14 +40,10 @@ class Recovery {
   }
 
  private:
-  struct Options {
-    RejectionRecovery action;
-    int after, max_repairs;
-  };
   bool CountRejection(const MeasurementReport& entry);
   void Recover(FilterState& f, Row& row);
 
-  Options options_;
+  EkfOptions options_;
   std::vector<int> rejections_;  ///< consecutive, by sensor
   std::vector<char> inflated_;   ///< since the last acceptance, by sensor
   int repairs_ = 0;              ///< of P, so far

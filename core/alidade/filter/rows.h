@@ -22,20 +22,24 @@ struct Row {
   const SensorPlace* place = nullptr;  ///< the sensor's, or `own`
   SensorPlace own;                     ///< with the blocks of the landmark that it measures
   std::vector<double> H;               ///< H, m rows of the place's width
-  std::vector<double> R, L;            ///< R and its factor, m x m, row-major
+  std::vector<double> R;               ///< R, m x m, row-major
   std::vector<double> PHt;             ///< P H', n x m by columns, where the method has an H
   std::vector<const double*> roles;    ///< what fills its roles, as RolesAt last had it
-  std::vector<double*> columns;        ///< memory
   double weight = 1.0;                 ///< w of the robust loss; R is divided by it
+  struct {
+    std::vector<double*> columns;
+    std::vector<double> l;  ///< factor of R
+  } memory;
 
   /// Whether it measures a landmark in the state.
   bool on_landmark() const { return place == &own; }
-  /// Of a landmark it is not: its blocks come and go.
-  bool gain_is_recorded() const { return !model->has_landmark(); }
   JacobianRows jacobian() const {
     return {H.data(), report->dof, place->width, place->parts, place->whole};
   }
 };
+
+/// Of a landmark it is not: its blocks come and go.
+inline bool GainIsRecorded(const Row& row) { return !row.model->has_landmark(); }
 
 /// The rows of a frame, in memory that is kept from one to the next.
 class Rows {

@@ -4,7 +4,6 @@
 #include <Eigen/Cholesky>
 
 #include "alidade/base/error.h"
-#include "alidade/filter/filter_options.h"
 #include "alidade/filter/frame_loop.h"
 #include "alidade/filter/linear.h"
 #include "alidade/filter/stack.h"
@@ -19,20 +18,17 @@ struct Adjoint {
   Eigen::VectorXd b;
   Eigen::MatrixXd information;
 
-  void GoBack(Eigen::Index held, Eigen::VectorXd& lambda, Eigen::MatrixXd& later) const;
+  /// `held`: of lambda and Lambda at the end of the frame, the rows of w behind those of x.
+  void GoBack(Eigen::Index held, Eigen::VectorXd& lambda, Eigen::MatrixXd& later) const {
+    const Eigen::Index n = a.rows(), before = a.cols() - n;
+    Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(n + held, n + before);
+    whole.topRows(n) = a;
+    if (before > 0) whole.bottomRightCorner(held, before).setIdentity();
+    lambda = whole.transpose() * lambda + b;
+    later = whole.transpose() * later * whole + information;
+    later = 0.5 * (later + later.transpose()).eval();
+  }
 };
-
-/// `held`: of lambda and Lambda at the end of the frame, the rows of w behind those of x.
-void Adjoint::GoBack(Eigen::Index held, Eigen::VectorXd& lambda,
-                     Eigen::MatrixXd& later_information) const {
-  const Eigen::Index n = a.rows(), before = a.cols() - n;
-  Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(n + held, n + before);
-  whole.topRows(n) = a;
-  if (before > 0) whole.bottomRightCorner(held, before).setIdentity();
-  lambda = whole.transpose() * lambda + b;
-  later_information = whole.transpose() * later_information * whole + information;
-  later_information = 0.5 * (later_information + later_information.transpose()).eval();
-}
 
 namespace {
 
@@ -65,7 +61,7 @@ Trouble Taped::Step(FilterState& f, double dt_s) {
   const Workspace::Use use(f.work);
   frame_.a = f.motions.Transition(f.size(), f.work) * frame_.a;
   const Eigen::Index held = frame_.a.cols() - frame_.a.rows();
-  if (held > 0) frame_.a.rightCols(held) += f.motions.HeldInput(f.size(), f.work);
+  if (held > 0) frame_.a.rightCols(held) += f.motions.Held(&Motions::Step::gl, f.size(), f.work);
   return {};
 }
 
@@ -122,9 +118,8 @@ const UpdateReport& RtsSmoother::Process(const Frame& frame) {
   tape.StartFrame(f);
   loop_->Process(frame);
   Workspace work;
-  const Eigen::MatrixXd held = f.motions.in_interval()
-                                   ? Eigen::MatrixXd(f.motions.HeldNoise(f.size(), work))
-                                   : Eigen::MatrixXd(f.size(), 0);
+  Eigen::MatrixXd held(f.size(), 0);
+  if (f.motions.in_interval()) held = f.motions.Held(&internal::Motions::Step::m, f.size(), work);
   passed_frames_.push_back(
       {tape.frame(), f.state.values(), f.state.covariance().Dense(), held, f.report});
   passed_frames_.back().report.events.clear();  // told already

@@ -5,7 +5,6 @@
 
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
-#include "alidade/filter/filter_options.h"
 #include "alidade/filter/frame_loop.h"
 #include "alidade/filter/linear.h"
 #include "alidade/filter/square_root.h"
@@ -95,13 +94,13 @@ Trouble SquareRoot::Step(FilterState& f, double dt_s) {
   moved.setZero();
   AddProduct(moved, transition, goes_on ? without_held_ : root_);
   if (f.motions.holds()) {
-    noise -= f.motions.HeldInput(f.size(), f.work);
+    noise -= f.motions.Held(&Motions::Step::gl, f.size(), f.work);
     if ((noise.array() != 0.0).any()) {
       TakeRoot(f, moved, noise, without_held_);
     } else {
       without_held_ = moved;
     }
-    noise += f.motions.HeldNoise(f.size(), f.work);
+    noise += f.motions.Held(&Motions::Step::m, f.size(), f.work);
   }
   TakeRoot(f, moved, noise, root_);
   SetCovariance(f);

@@ -28,7 +28,8 @@ void AddProjected(std::span<Row* const> rows, const Workspace::Matrix& pht, Work
 /// 0: rows [offset, offset + size) of P, columns [at, at + k) of the update.
 template <class Zero>
 void ForEachConsidered(const FilterState& f, std::span<Row* const> rows, const Zero& zero) {
-  for (std::size_t i = 0; f.considering && i < f.binding->system.layout.blocks().size(); ++i) {
+  for (std::size_t i = 0; f.blocks.considering && i < f.binding->system.layout.blocks().size();
+       ++i) {
     const Block& block = f.state.layout()[static_cast<BlockId>(i)];
     if (!block.present || block.status != BlockStatus::kConsider) continue;
     zero(block.tangent_offset, block.geometry().tangent, 0, CountOf(rows));

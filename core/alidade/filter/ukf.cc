@@ -9,7 +9,6 @@
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
-#include "alidade/filter/filter_options.h"
 #include "alidade/filter/method.h"
 #include "alidade/filter/square_root.h"
 #include "alidade/filter/stack.h"
@@ -52,14 +51,20 @@ bool MeanOf(const Geometry& geometry, const double* centre,
   return false;
 }
 
+/// Weights of the transform with 2N sigma points besides the centre.
+struct Transform {
+  double c, w;
+  double centre;  ///< beta - alpha^2
+};
+
 /// moments = w f f' + centre m m'
-void MomentsOf(double w, const Eigen::Ref<const Eigen::MatrixXd>& f, double centre,
+void MomentsOf(const Transform& transform, const Eigen::Ref<const Eigen::MatrixXd>& f,
                const Eigen::Ref<const Eigen::VectorXd>& m, Workspace::Matrix& moments) {
   moments.setZero();
   AddOuterProduct(moments, f, 1.0);
-  moments *= w;
+  moments *= transform.w;
   moments.triangularView<Eigen::StrictlyUpper>() = moments.transpose();
-  for (Eigen::Index i = 0; i < m.size(); ++i) moments.col(i) += centre * m[i] * m;
+  for (Eigen::Index i = 0; i < m.size(); ++i) moments.col(i) += transform.centre * m[i] * m;
 }
 
 /// By sigma points, in place of Jacobians.
@@ -76,35 +81,31 @@ class Unscented : public Method {
   Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
 
  private:
-  /// Weights of the transform with 2N sigma points besides the centre.
-  struct Transform {
-    double c, w;
-    double centre;  ///< beta - alpha^2
-  };
   /// What the sigma points make of one measurement.
   struct Predicted {
-    int halvings = 0;            ///< of the spread
-    std::vector<double> centre;  ///< h(x0)
-    std::vector<double> f;       ///< m x 2n by columns
-    std::vector<double> m;
-  };
-  struct Moments {
-    Workspace::Matrix f;
-    Workspace::Vector m;
+    int halvings = 0;                       ///< of the spread
+    std::vector<double> centre;             ///< h(x0)
+    std::vector<double> h, innovation;      ///< the mean, and z (-) h
+    std::vector<double> deviations, shift;  ///< f_i, tangent x 2n by columns, and m
+
+    Workspace::Matrix f() {
+      return {deviations.data(), std::ssize(shift), std::ssize(deviations) / std::ssize(shift)};
+    }
+    Workspace::Vector m() { return {shift.data(), std::ssize(shift)}; }
   };
 
   Transform TransformOf(Eigen::Index directions, int halvings) const;
-  bool MayHalve(int halvings) const;
+  template <class Attempt>
+  Outcome Narrow(int& halvings, const Attempt& attempt) const;
   const Eigen::MatrixXd& Root(FilterState& f);
   const Eigen::MatrixXd& RootWithoutHeld(const FilterState& f);
-  void TakeHeld(const FilterState& f, const Workspace::Matrix& deviations, double c);
-  Status StepPoints(FilterState& f, int halvings, double dt_s);
-  Status StepPoint(FilterState& f, const double* from, const double* noise, double dt_s,
-                   double* to);
+  void TakeHeld(FilterState& f, const Workspace::Matrix& deviations, double c);
+  Outcome StepPoints(FilterState& f, int halvings, double dt_s);
+  Outcome StepPoint(FilterState& f, const double* from, const double* noise, double dt_s,
+                    double* to);
   Outcome PredictPoints(FilterState& f, Row& row, int halvings);
-  void Project(FilterState& f, Row& row);
+  void Project(FilterState& f, Row& row, Predicted& predicted);
   Predicted& PredictedOf(const FilterState& f, const Row& row);
-  Moments MomentsAt(FilterState& f, const Row& row);
   Outcome StackPoints(FilterState& f, std::span<Row* const> rows, int halvings, Stacked& all,
                       Workspace::Vector& mean);
   void NoteGuard(FilterState& f, std::size_t index, int halvings, bool narrow_enough);
@@ -118,20 +119,25 @@ class Unscented : public Method {
   // Memory that is kept from step to step.
   Eigen::MatrixXd rest_, root_of_rest_;
   Scratch<Eigen::LDLT<Eigen::MatrixXd>> ldlt_;
-  std::vector<double> reported_h_, reported_innovation_;
-  std::string failed_, failure_;  ///< the state entry whose plugin failed, and why
+  const MotionBinding* failed_ = nullptr;  ///< whose plugin failed last
 };
 
-Unscented::Transform Unscented::TransformOf(Eigen::Index directions, int halvings) const {
+Transform Unscented::TransformOf(Eigen::Index directions, int halvings) const {
   const double alpha = std::ldexp(spread_.alpha, -halvings);
   if (directions == 0) return {0.0, 0.0, spread_.beta - alpha * alpha};  // no point but the centre
   const double c2 = alpha * alpha * (static_cast<double>(directions) + spread_.kappa);
   return {std::sqrt(c2), 0.5 / c2, spread_.beta - alpha * alpha};
 }
 
-/// Whether the spread may be halved once more, and still keeps its digits.
-bool Unscented::MayHalve(int halvings) const {
-  return std::ldexp(spread_.alpha, -halvings - 1) >= UkfOptions::kLeastAlpha;
+/// What `attempt` makes of the widest spread at which no point is out of its domain, or else of the
+/// last that keeps its digits, after so many halvings.
+template <class Attempt>
+Outcome Unscented::Narrow(int& halvings, const Attempt& attempt) const {
+  for (halvings = 0;; ++halvings) {
+    const Outcome outcome = attempt(halvings);
+    const bool last = !(std::ldexp(spread_.alpha, -halvings - 1) >= UkfOptions::kLeastAlpha);
+    if (outcome != Outcome::kOutOfDomain || last) return outcome;
+  }
 }
 
 /// A with P = A A'; repairs P where it is not positive semi-definite.
@@ -161,7 +167,7 @@ const Eigen::MatrixXd& Unscented::RootWithoutHeld(const FilterState& f) {
 }
 
 /// M from the deviations of the points: along w_j alone they are those at +c and -c.
-void Unscented::TakeHeld(const FilterState& f, const Workspace::Matrix& deviations, double c) {
+void Unscented::TakeHeld(FilterState& f, const Workspace::Matrix& deviations, double c) {
   if (!f.motions.holds()) return;
   const Eigen::Index n = deviations.rows(), all = deviations.cols() / 2;
   held_ = (deviations.middleCols(n, all - n) - deviations.rightCols(all - n)) / (2.0 * c);
@@ -191,8 +197,8 @@ void Unscented::NoteGuard(FilterState& f, std::size_t index, int halvings, bool 
 }
 
 /// The model's x' at the values `from`, with `noise` (over all active models) in w, in `to`.
-Status Unscented::StepPoint(FilterState& f, const double* from, const double* noise, double dt_s,
-                            double* to) {
+Outcome Unscented::StepPoint(FilterState& f, const double* from, const double* noise, double dt_s,
+                             double* to) {
   const Workspace::Use use(f.work);
   const auto size = static_cast<Eigen::Index>(f.state.values().size());
   Workspace::Vector next = f.work.Take(size), w = f.work.Take(f.motions.noise_size());
@@ -208,19 +214,18 @@ Status Unscented::StepPoint(FilterState& f, const double* from, const double* no
     const Outcome outcome = StepAt(motion, f.binding->motion_places[i], from, step.u.data(),
                                    w.data(), dt_s, next.data(), nullptr, nullptr);
     if (outcome == Outcome::kFailed) {
-      failed_ = motion.name;
-      failure_ = motion.model.error_text();
-      return Status::kError;
+      failed_ = &motion;
+      return outcome;
     }
-    if (outcome != Outcome::kAccepted) return Status::kOutOfDomain;
+    if (outcome != Outcome::kAccepted) return Outcome::kOutOfDomain;
     TakeStep(motion, f.state.layout(), next.data(), to);
     noise += inputs;
   }
-  return Status::kOk;
+  return Outcome::kAccepted;
 }
 
 /// Moves state and covariance, which stay as they are where a point is out of its domain.
-Status Unscented::StepPoints(FilterState& f, int halvings, double dt_s) {
+Outcome Unscented::StepPoints(FilterState& f, int halvings, double dt_s) {
   const Workspace::Use use(f.work);
   const bool goes_on = f.motions.in_interval();
   const Eigen::MatrixXd& root = goes_on ? RootWithoutHeld(f) : Root(f);
@@ -230,8 +235,8 @@ Status Unscented::StepPoints(FilterState& f, int halvings, double dt_s) {
   Workspace::Vector centre = f.work.Take(size), dx = f.work.Take(n), noise = f.work.Take(noises);
   Workspace::Matrix points = f.work.Take(size, 2 * all), deviations = f.work.Take(n, 2 * all);
   noise.setZero();
-  Status status = StepPoint(f, f.state.values().data(), noise.data(), dt_s, centre.data());
-  for (Eigen::Index i = 0; i < 2 * all && status == Status::kOk; ++i) {
+  Outcome outcome = StepPoint(f, f.state.values().data(), noise.data(), dt_s, centre.data());
+  for (Eigen::Index i = 0; i < 2 * all && outcome == Outcome::kAccepted; ++i) {
     const double c = i < all ? transform.c : -transform.c;
     const Eigen::Index direction = i % all;
     dx.setZero();
@@ -243,9 +248,9 @@ Status Unscented::StepPoints(FilterState& f, int halvings, double dt_s) {
       if (goes_on) dx = c * held_.col(direction - n);
     }
     f.state.Retract(dx.data(), f.moved);
-    status = StepPoint(f, f.moved.data(), noise.data(), dt_s, points.col(i).data());
+    outcome = StepPoint(f, f.moved.data(), noise.data(), dt_s, points.col(i).data());
   }
-  if (status != Status::kOk) return status;
+  if (outcome != Outcome::kAccepted) return outcome;
   Workspace::Vector mean = f.work.Take(size), m = f.work.Take(n);
   Workspace::Matrix p = f.work.Take(n, n);
   mean = centre;
@@ -259,16 +264,16 @@ Status Unscented::StepPoints(FilterState& f, int halvings, double dt_s) {
                 mean.data() + block.value_offset,
                 deviations.middleRows(block.tangent_offset, geometry.tangent),
                 m.segment(block.tangent_offset, geometry.tangent))) {
-      return Status::kOutOfDomain;
+      return Outcome::kOutOfDomain;
     }
   }
-  MomentsOf(transform.w, deviations, transform.centre, m, p);
-  if (!mean.allFinite() || !p.allFinite()) return Status::kOutOfDomain;
+  MomentsOf(transform, deviations, m, p);
+  if (!mean.allFinite() || !p.allFinite()) return Outcome::kOutOfDomain;
   std::copy_n(mean.data(), size, f.state.values().data());
   f.state.covariance().SetBlock(0, 0, p);
   TakeHeld(f, deviations, transform.c);
   root_is_current_ = false;
-  return Status::kOk;
+  return Outcome::kAccepted;
 }
 
 Trouble Unscented::Step(FilterState& f, double dt_s) {
@@ -276,24 +281,20 @@ Trouble Unscented::Step(FilterState& f, double dt_s) {
   // The centre, and Lq.
   if (Trouble trouble = f.motions.Evaluate(f.state, dt_s, /*derivatives=*/false)) return trouble;
   int halvings = 0;
-  Status status = StepPoints(f, halvings, dt_s);
-  while (status == Status::kOutOfDomain && MayHalve(halvings)) {
-    status = StepPoints(f, ++halvings, dt_s);
-  }
-  if (status == Status::kOk) {
+  const Outcome outcome = Narrow(halvings, [&](int k) { return StepPoints(f, k, dt_s); });
+  if (outcome == Outcome::kAccepted) {
     NoteGuard(f, guarded_.size() - 1, halvings, true);
     return {};
   }
-  if (status == Status::kError) {
-    return {"plugin_failed",
-            "motion model of '" + failed_ + "' cannot step a sigma point: " + failure_};
+  if (outcome == Outcome::kFailed) {
+    return {"plugin_failed", "motion model of '" + failed_->name +
+                                 "' cannot step a sigma point: " + failed_->model.error_text()};
   }
   return {"diverged", "the sigma points cannot step, also with their spread divided by " +
                           std::to_string(1 << halvings)};
 }
 
-/// h at the sigma points of one measurement, where it is defined at the estimate: its mean, in the
-/// report, and its deviations.
+/// h at the sigma points of one measurement, where it is defined at the estimate.
 Outcome Unscented::PredictPoints(FilterState& f, Row& row, int halvings) {
   const Workspace::Use use(f.work);
   const Geometry& geometry = row.model->measurement().geometry;
@@ -310,44 +311,36 @@ Outcome Unscented::PredictPoints(FilterState& f, Row& row, int halvings) {
   }
   Predicted& predicted = PredictedOf(f, row);
   predicted.halvings = halvings;
-  predicted.f.resize(static_cast<std::size_t>(geometry.tangent * 2 * n));
-  predicted.m.resize(static_cast<std::size_t>(geometry.tangent));
-  MeasurementReport& entry = *row.report;
-  entry.h.resize(static_cast<std::size_t>(geometry.ambient));
-  const Moments moments = MomentsAt(f, row);
-  if (!MeanOf(geometry, predicted.centre.data(), points, transform.w, f.work, entry.h.data(),
-              moments.f, moments.m)) {
+  predicted.h.resize(static_cast<std::size_t>(geometry.ambient));
+  predicted.innovation.resize(static_cast<std::size_t>(geometry.tangent));
+  predicted.deviations.resize(static_cast<std::size_t>(geometry.tangent * 2 * n));
+  predicted.shift.resize(static_cast<std::size_t>(geometry.tangent));
+  if (!MeanOf(geometry, predicted.centre.data(), points, transform.w, f.work, predicted.h.data(),
+              predicted.f(), predicted.m())) {
     return Outcome::kOutOfDomain;
   }
-  TakeInnovation(row);
+  geometry.Minus(row.report->z.data(), predicted.h.data(), predicted.innovation.data());
   return Outcome::kAccepted;
 }
 
-Unscented::Moments Unscented::MomentsAt(FilterState& f, const Row& row) {
-  Predicted& predicted = PredictedOf(f, row);
-  const auto m = std::ssize(predicted.m);
-  return {{predicted.f.data(), m, std::ssize(predicted.f) / m}, {predicted.m.data(), m}};
-}
-
 Outcome Unscented::Predict(FilterState& f, Row& row) {
-  std::vector<double>& centre = PredictedOf(f, row).centre;
-  centre.resize(static_cast<std::size_t>(row.model->measurement().geometry.ambient));
-  Outcome outcome = PredictAt(row, f.state.values(), f.state.values(), centre.data());
-  const bool defined = outcome == Outcome::kAccepted;  // at the estimate itself
-  int halvings = 0;
-  if (defined) outcome = PredictPoints(f, row, halvings);
-  while (defined && outcome == Outcome::kOutOfDomain && MayHalve(halvings)) {
-    outcome = PredictPoints(f, row, ++halvings);
-  }
-  const bool too_wide = defined && outcome == Outcome::kOutOfDomain;
-  if (outcome == Outcome::kAccepted || too_wide) {
-    NoteGuard(f, static_cast<std::size_t>(row.sensor), halvings, !too_wide);
+  Predicted& predicted = PredictedOf(f, row);
+  predicted.centre.resize(static_cast<std::size_t>(row.model->measurement().geometry.ambient));
+  Outcome outcome = PredictAt(row, f.state.values(), f.state.values(), predicted.centre.data());
+  bool too_wide = false;
+  if (outcome == Outcome::kAccepted) {  // at the estimate itself
+    int halvings = 0;
+    outcome = Narrow(halvings, [&](int k) { return PredictPoints(f, row, k); });
+    too_wide = outcome == Outcome::kOutOfDomain;
+    if (outcome == Outcome::kAccepted || too_wide) {
+      NoteGuard(f, static_cast<std::size_t>(row.sensor), halvings, !too_wide);
+    }
   }
   if (outcome == Outcome::kAccepted) {
     outcome = NoiseAt(row, RolesAt(row, f.state.values(), f.state.values()));
   }
   if (outcome == Outcome::kAccepted) {
-    Project(f, row);
+    Project(f, row, predicted);
     return outcome;
   }
   row.report->h.clear();
@@ -356,47 +349,39 @@ Outcome Unscented::Predict(FilterState& f, Row& row) {
   return outcome;
 }
 
-/// S = Cov(h) + R.
-void Unscented::Project(FilterState& f, Row& row) {
+/// Reports the mean, the innovation and S = Cov(h) + R.
+void Unscented::Project(FilterState& f, Row& row, Predicted& predicted) {
   const Workspace::Use use(f.work);
-  const Moments moments = MomentsAt(f, row);
-  const Transform transform = TransformOf(Root(f).cols(), PredictedOf(f, row).halvings);
-  const Eigen::Index m = moments.m.size();
+  row.report->h = predicted.h;
+  row.report->innovation = predicted.innovation;
+  const Eigen::Index m = row.report->dof;
   Workspace::Matrix s = f.work.Take(m, m);
-  MomentsOf(transform.w, moments.f, transform.centre, moments.m, s);
+  MomentsOf(TransformOf(Root(f).cols(), predicted.halvings), predicted.f(), predicted.m(), s);
   s += Eigen::Map<const RowMajor>(row.R.data(), m, m);
   row.report->s.assign(s.data(), s.data() + s.size());
 }
 
-/// All rows at one spread: f in place of H, R, innovation and m below one another.
+/// All rows at one spread, also those that the gate saw at a wider one: f in place of H, R,
+/// innovation and m below one another.
 Outcome Unscented::StackPoints(FilterState& f, std::span<Row* const> rows, int halvings,
                                Stacked& all, Workspace::Vector& mean) {
   all.noise.setZero();
   Eigen::Index at = 0;
   for (Row* row : rows) {
-    MeasurementReport& entry = *row->report;
-    const bool narrower = PredictedOf(f, *row).halvings < halvings;
-    if (narrower) {  // what the gate saw is what is reported
-      reported_h_ = entry.h;
-      reported_innovation_ = entry.innovation;
+    Predicted& predicted = PredictedOf(f, *row);
+    if (predicted.halvings < halvings) {
       const Outcome outcome = PredictPoints(f, *row, halvings);
       if (outcome != Outcome::kAccepted) {
-        entry.h.swap(reported_h_);
-        entry.innovation.swap(reported_innovation_);
         NoteRefusal(f, *row, outcome);
         return outcome;
       }
     }
-    const Moments moments = MomentsAt(f, *row);
-    const Eigen::Index k = moments.m.size();
-    all.h.middleRows(at, k) = moments.f;
+    const Eigen::Index k = row->report->dof;
+    all.h.middleRows(at, k) = predicted.f();
     all.noise.block(at, at, k, k) = Eigen::Map<const RowMajor>(row->R.data(), k, k);
-    all.innovation.segment(at, k) = Eigen::Map<const Eigen::VectorXd>(entry.innovation.data(), k);
-    mean.segment(at, k) = moments.m;
-    if (narrower) {
-      entry.h.swap(reported_h_);
-      entry.innovation.swap(reported_innovation_);
-    }
+    all.innovation.segment(at, k) =
+        Eigen::Map<const Eigen::VectorXd>(predicted.innovation.data(), k);
+    mean.segment(at, k) = predicted.m();
     at += k;
   }
   return Outcome::kAccepted;
@@ -417,7 +402,7 @@ Outcome Unscented::Correct(FilterState& f, std::span<Row* const> rows) {
   const Outcome stacked = StackPoints(f, rows, halvings, all, mean);
   if (stacked != Outcome::kAccepted) return stacked;
   const Transform transform = TransformOf(n, halvings);
-  MomentsOf(transform.w, all.h, transform.centre, mean, s);
+  MomentsOf(transform, all.h, mean, s);
   s += all.noise;
   if (!Factorise(s)) return Outcome::kNotPd;
   if (n == 0) {  // nothing to correct
@@ -434,7 +419,7 @@ Outcome Unscented::Correct(FilterState& f, std::span<Row* const> rows) {
   AddProduct(rest, gain, all.h, -1.0);
   centre.noalias() = gain * mean;
   step.noalias() = gain * all.innovation;
-  MomentsOf(transform.w, rest, transform.centre, centre, p);
+  MomentsOf(transform, rest, centre, p);
   spread.setZero();
   AddProduct(spread, gain, all.noise);
   AddProductWithTransposed(p, spread, gain);

@@ -16,12 +16,6 @@ struct UkfOptions {
   double alpha = 0.01;  ///< spread of the sigma points, in [1e-4, 1]
   double beta = 2.0;    ///< weight of what the centre adds, >= 0; 2: best for a Gaussian
   double kappa = 0.0;   ///< spread beyond the number of directions, >= 0
-
-  /// Reads `alpha` in [1e-4, 1], `beta` >= 0, `kappa` >= 0, `gate`, `fuse` and `max_dt_s` from an
-  /// estimator's entry of the config. Errors: kBadConfig.
-  static UkfOptions FromNode(const Node& entry);
-  /// What FromNode reads.
-  static std::vector<ParamInfo> Schema();
 };
 
 /// Unscented Kalman filter: moments of y = g(x), x ~ N(x0, A A'), from 2N + 1 sigma points, A from

@@ -60,7 +60,9 @@ struct EstimatorEntry {
   /// both: an Error with a place, as of Node::Fail.
   EstimatorMaker (*create)(const EstimatorArguments& arguments);
   EstimatorKind kind = EstimatorKind::kFilter;
-  bool landmarks = false;  ///< whether it takes a system that has some
+  /// What it can do; what a system asks for beyond is refused by name before `create`'s maker is
+  /// asked. Null: it takes no landmarks, and refuses by itself what else it cannot do.
+  const Support* support = nullptr;
 };
 
 struct CppPluginTable {

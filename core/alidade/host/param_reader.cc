@@ -328,7 +328,13 @@ void ParamReader::Fail(void* context, const char* key, const char* text) noexcep
 /// The parameter; one that breaks the rules is an error of the plugin, at the entry.
 AlidadeParam ParamReader::Expect(const std::function<AlidadeParam()>& checked) {
   try {
-    return checked();
+    const AlidadeParam param = checked();
+    keys_.insert(param.key);
+    if (keys_.size() > ALIDADE_MAX_PARAMS) {
+      throw Error(ExitCode::kPlugin, "asks for more than " + std::to_string(ALIDADE_MAX_PARAMS) +
+                                         " parameters, which is the most");
+    }
+    return param;
   } catch (const Error& e) {
     code_ = e.code();
     throw Error(code_, ErrorLine(entry_.place(), entry_.path(), owner_ + ' ' + e.what()));
@@ -478,6 +484,7 @@ std::int32_t ParamRecorder::ReadText(void* context, const AlidadeParam* from, ch
 void ParamRecorder::Note(const AlidadeParam& param, int value) {
   std::vector<Asked>& asked = trials_.back().asked;
   const auto same = [&](const Asked& other) { return other.info.key == param.key; };
+  if (asked.size() >= ALIDADE_MAX_PARAMS) return;  // it is told so when the model is made
   if (std::none_of(asked.begin(), asked.end(), same)) asked.push_back({Describe(param), value});
 }
 

@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <unordered_set>
 #include <vector>
 
 #include "alidade/config/config.h"
@@ -60,6 +61,7 @@ class ParamReader {
   std::string owner_, representation_;
   ExitCode code_ = ExitCode::kBadConfig;  ///< of the errors
   LentHost host_;
+  std::unordered_set<std::string> keys_;  ///< that were asked for
   std::vector<std::string> errors_;
   std::string failure_;
   std::exception_ptr thrown_;  ///< by a call from the plugin, which must not see it

@@ -149,12 +149,12 @@ void PluginHost::AddEntries(const Loaded& plugin) {
     for (int i = 0; i < plugin.cpp_table->source_count; ++i) {
       const SourceEntry& source = plugin.cpp_table->sources[i];
       entries_.push_back({PluginEntry::Kind::kSource, source.name, Text(source.doc), "", "",
-                          plugin.file, 0, false, plugin.unoptimised});
+                          plugin.file, 0, nullptr, plugin.unoptimised});
     }
     for (int i = 0; i < plugin.cpp_table->estimator_count; ++i) {
       const EstimatorEntry& one = plugin.cpp_table->estimators[i];
       entries_.push_back({PluginEntry::Kind::kEstimator, one.name, Text(one.doc),
-                          Text(one.citation), "", plugin.file, 0, one.landmarks, plugin.unoptimised,
+                          Text(one.citation), "", plugin.file, 0, one.support, plugin.unoptimised,
                           one.kind});
     }
     return;
@@ -171,7 +171,7 @@ void PluginHost::AddEntries(const Loaded& plugin) {
       continue;
     }
     entries_.push_back({ToKind(entry.kind), entry.name, Text(entry.doc), Text(entry.citation),
-                        Text(entry.family), plugin.file, entry.thread_flags, false,
+                        Text(entry.family), plugin.file, entry.thread_flags, nullptr,
                         plugin.unoptimised});
   }
 }

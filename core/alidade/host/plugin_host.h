@@ -16,6 +16,7 @@
 namespace alidade {
 
 class Estimator;        // in alidade/filter/estimator.h
+struct Support;         // in alidade/filter/support.h
 struct System;          // in alidade/system/system.h
 struct SourceEntry;     // in alidade/host/cpp_plugin.h
 struct EstimatorEntry;  // likewise
@@ -49,10 +50,10 @@ const char* ToString(EstimatorKind kind);
 struct PluginEntry {
   enum class Kind { kSensor, kMotion, kSource, kEstimator } kind;
   std::string name, doc, citation, family;
-  std::filesystem::path plugin;  ///< the file it came from
-  unsigned thread_flags = 0;     ///< ALIDADE_THREAD_*; of a source or estimator 0
-  bool landmarks = false;        ///< of an estimator: EstimatorEntry::landmarks
-  bool unoptimised = false;      ///< the plugin was built without optimisation
+  std::filesystem::path plugin;      ///< the file it came from
+  unsigned thread_flags = 0;         ///< ALIDADE_THREAD_*; of a source or estimator 0
+  const Support* support = nullptr;  ///< of an estimator: EstimatorEntry::support
+  bool unoptimised = false;          ///< the plugin was built without optimisation
   EstimatorKind estimator = EstimatorKind::kFilter;  ///< of an estimator
 };
 

@@ -16,6 +16,9 @@
 namespace alidade::internal {
 namespace {
 
+/// What a plugin's estimator that does not say is given: it refuses by itself what it cannot do.
+constexpr Support kUnsaid = {.consider = true, .at_measurement = true, .from_measurement = true};
+
 /// Index of the stream that an entry of a sensor or an input names, of the size `wanted_by` it.
 int FindStreamOf(const Node& entry, int size, const std::string& wanted_by,
                  const std::vector<StreamInfo>& streams) {
@@ -104,6 +107,72 @@ const PluginEntry& FindOffered(const std::string& type, const PluginHost& host, 
                         "no estimator '" + type + "' is built in, and no plugin offers it",
                         expected, Nearest(type, names)) +
                   (of_plugins.empty() ? kHint : "") + "\n" + PluginPlaces(host));
+}
+
+std::string NameIn(const Block& block) { return block.name.substr(block.owner.size() + 1); }
+
+/// The item `block` of the list under `consider` of its state entry.
+Node ConsiderOf(const Node& state, const Block& block) {
+  const Node list = state.At("consider");
+  for (const Node& item : list.Items()) {
+    if (item.Text() == NameIn(block)) return item;
+  }
+  return list;
+}
+
+/// Where the config asks for what is not supported.
+Node NodeOf(const Unsupported& asked, const Node& root, const System& system) {
+  if (asked.block >= 0) {
+    const Block& block = system.layout[asked.block];
+    const auto entry = root.At("state").Find(block.owner);
+    const Node state = entry ? *entry : root.At("sensors").At(block.owner);  // which owns it
+    if (block.status == BlockStatus::kConsider) return ConsiderOf(state, block);
+    return state.At("initial").At(NameIn(block)).At("from_measurement");
+  }
+  if (asked.sensor < 0) return root.At("landmarks");
+  const SensorBinding& sensor = system.sensors[static_cast<std::size_t>(asked.sensor)];
+  const Node roles = root.At("sensors").At(sensor.name).At("roles");
+  const auto role = roles.Find(sensor.model.roles()[static_cast<std::size_t>(asked.role)].name);
+  if (!role) return roles;  // one that a time offset adds
+  // A mode that cannot be done comes before jacobian_at.
+  return role->At(asked.what.starts_with("jacobian_at") ? "jacobian_at" : "mode");
+}
+
+/// Refuses by name what `system`, built from the config `root`, asks for beyond `support`.
+void RefuseUnsupported(const std::string& type, const Support& support, const Node& root,
+                       const System& system) {
+  const auto asked = FindUnsupported(system, support);
+  if (!asked) return;
+  NodeOf(*asked, root, system)
+      .Fail("estimator type '" + type + "' does not support " + asked->what,
+            asked->remedy + " (also by the estimator's `overrides`), or type: ekf");
+}
+
+/// The same for the keys of an estimator's entry that other types have, where they are left unread
+/// once its own have been read.
+void RefuseUnsupportedKeys(const std::string& type, const Node& entry) {
+  constexpr std::pair<const char*, const char*> kKeys[] = {
+      {"gate", "gate"},
+      {"fuse", "choice of updates"},
+      {"jacobian", "choice of Jacobian"},
+      {"rejection_recovery", "rejection recovery"}};
+  for (const auto& [key, what] : kKeys) {
+    if (!entry.HasUnread(key)) continue;
+    entry.At(key).Fail("estimator type '" + type + "' has no " + what,
+                       "the key left out, or type: ekf");
+  }
+}
+
+/// Refuses `fuse: per_measurement` where a sensor looks for matches that agree.
+void RefuseLoneMatches(const Node& entry, const System& system) {
+  const auto fuse = entry.Find("fuse");
+  if (!fuse || fuse->Text() != "per_measurement") return;
+  for (const SensorBinding& sensor : system.sensors) {
+    if (!sensor.outlier_rejection) continue;
+    fuse->Fail("one match has no others to agree with, as sensor '" + sensor.name +
+                   "' asks by its `outlier_rejection`",
+               "joint or per_sensor");
+  }
 }
 
 /// Refuses overrides of what all estimators share, and of an entry that `root` does not have and
@@ -240,6 +309,9 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   const PluginEntry* const of_plugin =
       of_core == nullptr ? &FindOffered(named.type, host, type) : nullptr;
   named.kind = of_core != nullptr ? of_core->kind : of_plugin->estimator;
+  const Support& support = of_core != nullptr              ? of_core->support
+                           : of_plugin->support != nullptr ? *of_plugin->support
+                                                           : kUnsaid;
   const EstimatorMaker make =
       of_core != nullptr ? of_core->read(entry) : host.CreateEstimator(named.type, entry);
   if (const auto policy = entry.Find("on_divergence")) {
@@ -268,13 +340,8 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   RefuseUnsupportedKeys(named.type, entry);
   entry.RejectUnread();
   named.system = BuildSystem(own.root(), host, only);
-  if (of_core != nullptr) {
-    RefuseUnsupported(named.type, of_core->support, own.root(), named.system);
-    RefuseLoneMatches(entry, named.system);
-  } else if (named.system.landmarks && !of_plugin->landmarks) {
-    type.Fail("estimator type '" + named.type + "' does not support landmarks",
-              "`sensors` that measure none, or type: ekf");
-  }
+  RefuseUnsupported(named.type, support, own.root(), named.system);
+  if (of_core != nullptr) RefuseLoneMatches(entry, named.system);
   if (streams != nullptr) CheckStreams(own.root(), named.system, *streams);
   const bool lent = use && use->is_map();  // landmarks are initialised as in the other estimator
   if (lent && named.system.landmarks) named.system.landmarks->min_observations = 1;

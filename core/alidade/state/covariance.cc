@@ -9,11 +9,7 @@
 namespace alidade {
 
 int Covariance::Add(int rows) {
-  const int gap = FindGap(rows);
-  if (gap >= 0) {
-    TakeFromGap(gap, rows);
-    return gap;
-  }
+  if (const int gap = TakeGap(rows); gap >= 0) return gap;
   const int offset = size_;
   if (size_ + rows > p_.rows()) {
     const Eigen::Index capacity = std::max<Eigen::Index>(2 * p_.rows(), size_ + rows);
@@ -25,26 +21,18 @@ int Covariance::Add(int rows) {
   return offset;
 }
 
-int Covariance::FindGap(int rows) const {
+/// Takes `rows` rows from the smallest gap that has them, and returns their offset; -1: none has.
+int Covariance::TakeGap(int rows) {
   auto best = gaps_.end();
   for (auto gap = gaps_.begin(); gap != gaps_.end(); ++gap) {
     if (gap->second < rows) continue;
     if (best == gaps_.end() || gap->second < best->second) best = gap;
   }
-  return best == gaps_.end() ? -1 : best->first;
-}
-
-/// Takes [offset, offset + rows) out of the gap that it lies in.
-void Covariance::TakeFromGap(int offset, int rows) {
-  const auto gap = std::find_if(gaps_.begin(), gaps_.end(), [&](const auto& g) {
-    return g.first <= offset && offset + rows <= g.first + g.second;
-  });
-  ALIDADE_EXPECTS(gap != gaps_.end());
-  const auto [first, size] = *gap;
-  gaps_.erase(gap);
-  if (first < offset) gaps_.emplace_back(first, offset - first);
-  const int end = offset + rows;
-  if (end < first + size) gaps_.emplace_back(end, first + size - end);
+  if (best == gaps_.end()) return -1;
+  const auto [offset, size] = *best;
+  gaps_.erase(best);
+  if (rows < size) gaps_.emplace_back(offset + rows, size - rows);
+  return offset;
 }
 
 void Covariance::Clear(int offset, int rows) {
@@ -72,14 +60,16 @@ void Covariance::Release(int offset, int rows) {
   }
 }
 
-void Covariance::Move(int from, int to, int rows) {
-  TakeFromGap(to, rows);
+int Covariance::MoveToGap(int from, int rows) {
+  const int to = TakeGap(rows);
+  if (to < 0) return to;
   const Workspace::Use use(memory_);
   Workspace::Matrix cross = memory_.Take(size_, rows);
   cross.topRows(from) = p_.block(from, 0, rows, from).transpose();
   cross.bottomRows(size_ - from) = p_.block(from, from, size_ - from, rows);
   SetRows(to, cross.middleRows(from, rows), cross);
   Release(from, rows);
+  return to;
 }
 
 Eigen::MatrixXd Covariance::Block(int a, int rows, int b, int columns) const {
@@ -98,6 +88,8 @@ void Covariance::SetBlock(int a, int b, const ConstMatrix& value) {
   }
 }
 
+/// Sets rows [offset, offset + k): `own` (k x k) on the diagonal, `cross` (n x k) elsewhere; its
+/// rows [offset, offset + k) are not read.
 void Covariance::SetRows(int offset, const ConstMatrix& own, const ConstMatrix& cross) {
   const Eigen::Index k = own.rows();
   const Eigen::Index below = size_ - offset - k;

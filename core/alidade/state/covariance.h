@@ -49,11 +49,9 @@ class Covariance {
   int Add(int rows);
   /// Gives [offset, offset + rows) back. O(n).
   void Release(int offset, int rows);
-  /// Where the smallest gap of at least `rows` rows begins; -1: there is none.
-  int FindGap(int rows) const;
-  /// Moves rows to a released place (ContractViolation: not released) and releases where they were.
-  /// O(n).
-  void Move(int from, int to, int rows);
+  /// Moves rows into the smallest gap that holds them, releases where they were, and returns their
+  /// new offset; -1, and nothing has changed, where there is none. O(n).
+  int MoveToGap(int from, int rows);
 
   /// P(a, b) as a copy, rows x columns. [a, a + rows) and [b, b + columns) are the same rows, or
   /// have none in common.
@@ -62,13 +60,10 @@ class Covariance {
   void SetBlock(int a, int b, const ConstMatrix& value);
   /// P(i, i), 0 <= i < size().
   double Variance(int i) const { return p_(i, i); }
-  /// Sets rows [offset, offset + k): `own` (k x k) on the diagonal, `cross` (n x k, n = size())
-  /// elsewhere; its rows [offset, offset + k) are not read.
-  void SetRows(int offset, const ConstMatrix& own, const ConstMatrix& cross);
-  /// The same, zero elsewhere.
+  /// Sets rows [offset, offset + k): `own` (k x k) on the diagonal, zero elsewhere.
   void SetRows(int offset, const ConstMatrix& own);
-  /// Sets the rows of all `parts`, of k columns together: `own` (k x k) among them, `cross` (n x k)
-  /// elsewhere.
+  /// Sets the rows of all `parts`, of k columns together: `own` (k x k) among them, `cross` (n x k,
+  /// n = size()) elsewhere.
   void SetParts(std::span<const JacobianPart> parts, const ConstMatrix& own,
                 const ConstMatrix& cross);
 
@@ -86,7 +81,8 @@ class Covariance {
   Eigen::MatrixXd Dense() const;
 
  private:
-  void TakeFromGap(int offset, int rows);
+  int TakeGap(int rows);
+  void SetRows(int offset, const ConstMatrix& own, const ConstMatrix& cross);
   void Clear(int offset, int rows);
 
   Eigen::MatrixXd p_;  ///< capacity x capacity

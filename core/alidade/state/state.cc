@@ -74,7 +74,7 @@ void State::PlaceValue(BlockId id, const double* value) {
   Reserve(id);
   Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
   block.present = true;
-  std::copy_n(value, block.geometry().ambient, this->value(id));
+  std::copy_n(value, block.geometry().ambient, values_.data() + block.value_offset);
 }
 
 void State::Add(BlockId id, const double* value, const Covariance::ConstMatrix& covariance) {
@@ -138,9 +138,8 @@ void State::FillGaps() {
         [](const Block& a, const Block& b) { return a.tangent_offset < b.tangent_offset; });
     if (last == layout_.blocks_.end() || last->tangent_offset < 0) return;
     const int rows = last->geometry().tangent;
-    const int gap = covariance_.FindGap(rows);
+    const int gap = covariance_.MoveToGap(last->tangent_offset, rows);
     if (gap < 0) return;
-    covariance_.Move(last->tangent_offset, gap, rows);
     last->tangent_offset = gap;
   }
 }

@@ -58,8 +58,7 @@ class StateLayout {
 /// no larger, or that a later one takes. A block that has a value takes another one in place.
 class State {
  public:
-  State() = default;
-  explicit State(StateLayout layout) : layout_(std::move(layout)) {}
+  explicit State(StateLayout layout = {}) : layout_(std::move(layout)) {}
 
   const StateLayout& layout() const { return layout_; }
   const Covariance& covariance() const { return covariance_; }
@@ -67,7 +66,6 @@ class State {
 
   /// The ambient value of a present block; valid until a block is added or values() is replaced.
   const double* value(BlockId id) const { return values_.data() + layout_[id].value_offset; }
-  double* value(BlockId id) { return values_.data() + layout_[id].value_offset; }
   /// The standard deviation of element i of a present block, in its tangent; 0 if it is constant.
   double sigma(BlockId id, int i = 0) const;
   const std::vector<double>& values() const { return values_; }

@@ -5,6 +5,7 @@
 #include <array>
 #include <limits>
 #include <memory>
+#include <numeric>
 #include <utility>
 
 #include "alidade/base/words.h"
@@ -245,38 +246,32 @@ class OffsetSensor {
   /// J_c = sum_i J_i F_ic of the blocks c of all movers, and J_delta = sum_i J_i df_i/ddelta, from
   /// the Jacobians J_i, of m rows, of the roles i that move.
   void Chain(int m, double* const* jacobians, const int* strides, const Memory& memory) const {
-    const auto at = [&](int role, int r, int c) -> double& {
-      return jacobians[role][static_cast<std::ptrdiff_t>(r) * strides[role] + c];
+    const auto to = [&](int role, int columns) {
+      return Eigen::Map<RowMajor, 0, Eigen::OuterStride<>>(jacobians[role], m, columns,
+                                                           Eigen::OuterStride<>(strides[role]));
     };
-    for (int r = 0; r < m && jacobians[offset_] != nullptr; ++r) at(offset_, r, 0) = 0.0;
+    if (jacobians[offset_] != nullptr) to(offset_, 1).setZero();
     const double *f = memory.f.data(), *rate = memory.rate.data();
     for (const Mover& mover : movers_) {
-      const std::vector<Space>& blocks = mover.model.blocks();
+      const std::int32_t* const tangents = mover.model.instance().tangents().data();
       const int n = mover.model.tangent_size();
       for (int c = 0; c < mover.count; ++c) {
-        const int width = blocks[static_cast<std::size_t>(c)].geometry.tangent;
-        for (int r = 0; r < m && jacobians[mover.first + c] != nullptr; ++r) {
-          std::fill_n(&at(mover.first + c, r, 0), width, 0.0);
-        }
+        if (jacobians[mover.first + c] != nullptr) to(mover.first + c, tangents[c]).setZero();
       }
       for (std::size_t i = 0; i < place_.size(); ++i) {
         const int block = place_[i] - mover.first;
         if (block < 0 || block >= mover.count) continue;
-        int row = 0;
-        for (int b = 0; b < block; ++b) row += blocks[static_cast<std::size_t>(b)].geometry.tangent;
-        const int size = blocks[static_cast<std::size_t>(block)].geometry.tangent;
-        for (int r = 0; r < m; ++r) {
-          const double* const j = memory.jacobians[i] + r * memory.strides[i];
-          for (int k = 0; k < size; ++k) {
-            if (jacobians[offset_] != nullptr) at(offset_, r, 0) += j[k] * rate[row + k];
-            const double* from = f + (row + k) * n;
-            for (int c = 0; c < mover.count; ++c) {
-              const int width = blocks[static_cast<std::size_t>(c)].geometry.tangent;
-              for (int l = 0; l < width && jacobians[mover.first + c] != nullptr; ++l) {
-                at(mover.first + c, r, l) += j[k] * from[l];
-              }
-              from += width;
+        const int row = std::accumulate(tangents, tangents + block, 0);
+        const Eigen::Map<const RowMajor> own(memory.jacobians[i], m, tangents[block]);
+        for (int k = 0; k < tangents[block]; ++k) {
+          if (jacobians[offset_] != nullptr) to(offset_, 1) += own.col(k) * rate[row + k];
+          const double* from = f + (row + k) * n;
+          for (int c = 0; c < mover.count; ++c) {
+            const Eigen::Map<const Eigen::RowVectorXd> of_c(from, tangents[c]);
+            if (jacobians[mover.first + c] != nullptr) {
+              to(mover.first + c, tangents[c]).noalias() += own.col(k) * of_c;
             }
+            from += tangents[c];
           }
         }
       }

@@ -1,28 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "condensed_run.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <limits>
 
 #include "alidade/base/all_finite.h"
 #include "alidade/base/number_text.h"
 #include "alidade/filter/rows.h"
+#include "alidade/filter/square_root.h"
 
 namespace alidade::ceres_batch {
 namespace {
 
 constexpr int kMostInputs = 4000;  // the dense Jacobian of as many rows takes 128 MB
 
-/// L with P = L L', for P positive semidefinite.
-Eigen::MatrixXd SquareRoot(const Eigen::MatrixXd& p) {
-  if (p.size() == 0) return p;
-  const Eigen::LDLT<Eigen::MatrixXd> ldlt(p);
-  const Eigen::VectorXd d = ldlt.vectorD().cwiseMax(0.0).cwiseSqrt();
-  return ldlt.transpositionsP().transpose() * (Eigen::MatrixXd(ldlt.matrixL()) * d.asDiagonal());
-}
-
 }  // namespace
+
+bool RunShape::robust() const {
+  return std::ranges::any_of(parts, [](const Part& p) { return p.loss.kind != LossKind::kNone; });
+}
 
 CondensedRun::CondensedRun(System system, const std::vector<StreamInfo>& streams, double max_dt_s)
     : binding_(std::move(system), streams),
@@ -32,7 +28,9 @@ CondensedRun::CondensedRun(System system, const std::vector<StreamInfo>& streams
     present_.push_back(block.present);
     if (block.has_covariance()) inputs_ += block.geometry().tangent;
   }
-  l0_ = SquareRoot(initial_.covariance().Dense()).leftCols(inputs_);  // the others are zero
+  Eigen::LDLT<Eigen::MatrixXd> ldlt;
+  internal::SquareRootOf(initial_.covariance().Dense(), ldlt, l0_);
+  l0_ = l0_.leftCols(inputs_).eval();  // the others are zero
   d0_ = Eigen::VectorXd::Zero(l0_.rows());
   for (std::size_t i = 0; i < present_.size(); ++i) {
     const BlockId id = static_cast<BlockId>(i);
@@ -82,11 +80,7 @@ bool CondensedRun::FailTooMany() const {
               "longer time between frames, has fewer");
 }
 
-bool CondensedRun::AllPresent(const std::vector<BlockId>& blocks) const {
-  return std::ranges::all_of(
-      blocks, [&](BlockId id) { return id < 0 || present_[static_cast<std::size_t>(id)]; });
-}
-
+/// As Linearised takes them.
 std::vector<double> CondensedRun::ValuesOf(const State& state) const {
   std::vector<double> values = initial_.values();
   for (std::size_t i = 0; i < present_.size(); ++i) {
@@ -98,7 +92,8 @@ std::vector<double> CondensedRun::ValuesOf(const State& state) const {
   return values;
 }
 
-bool CondensedRun::Add(const Frame& frame, const UpdateReport& report, const Estimator& filter) {
+bool CondensedRun::Add(const Frame& frame, const UpdateReport& report, const Estimator& filter,
+                       Trajectory& about) {
   if (timestamp_ == kNoTimestamp) {
     const std::optional<double>& initial = binding_.system.initial_time_s;
     timestamp_ = initial ? TimestampFromSeconds(*initial) : frame.timestamp;
@@ -106,12 +101,8 @@ bool CondensedRun::Add(const Frame& frame, const UpdateReport& report, const Est
   Epoch epoch;
   epoch.steps.swap(passed_on_);
   epoch.report.stale = frame.timestamp < timestamp_;
-  const int inputs = inputs_;
-  if (!epochs_.empty()) epoch.column = inputs;
-  if (!AddSteps(timestamp_, frame.timestamp, epoch)) {
-    inputs_ = inputs;
-    return false;
-  }
+  if (!epochs_.empty()) epoch.column = inputs_;
+  if (!AddSteps(timestamp_, frame.timestamp, epoch)) return false;
   if (!epoch.report.stale) timestamp_ = frame.timestamp;
   time_.inputs().Take(frame, epoch.report);
   epoch.report.events.clear();  // the filter tells them
@@ -119,7 +110,9 @@ bool CondensedRun::Add(const Frame& frame, const UpdateReport& report, const Est
   if (has_landmarks()) AddLandmarks(report, filter, epoch);
   EndInterval(epoch);
   epochs_.push_back(std::move(epoch));
-  return inputs_ <= kMostInputs || FailTooMany();
+  if (inputs_ > kMostInputs) return FailTooMany();
+  if (!filter.failed()) about.push_back(ValuesOf(filter.state()));
+  return true;
 }
 
 /// Noise is held no longer where the frame has a measurement in use, as in a filter.
@@ -133,6 +126,7 @@ void CondensedRun::EndInterval(Epoch& epoch) {
 
 /// The steps of all models from `from` to `to`, where that is later.
 bool CondensedRun::AddSteps(Timestamp from, Timestamp to, Epoch& epoch) {
+  const auto present = [this](BlockId id) { return Present(id); };
   std::vector<Event> events;  // the filter tells them
   internal::Timeline::Piece piece;
   for (; from < to; from = piece.end) {
@@ -143,7 +137,7 @@ bool CondensedRun::AddSteps(Timestamp from, Timestamp to, Epoch& epoch) {
     for (Timestamp part = 0; part < piece.steps; ++part) {
       for (std::size_t i = 0; i < binding_.motion_places.size(); ++i) {
         const MotionBinding& motion = binding_.system.motions[i];
-        if (motion.model.stationary() || !AllPresent(motion.blocks)) continue;
+        if (motion.model.stationary() || !std::ranges::all_of(motion.blocks, present)) continue;
         const std::span<const double> u = time_.inputs().Use(i, from, events);
         Step& step = epoch.steps.emplace_back();
         step.motion = i;
@@ -171,39 +165,41 @@ void CondensedRun::AddFactors(const Frame& frame, const UpdateReport& report, Ep
     const bool first = report.measurements()[i].outcome == Outcome::kInitialised;
     Factor& factor = epoch.factors.emplace_back();
     factor.sensor = row.sensor;
-    factor.model = row.model;
-    factor.place = &places_[static_cast<std::size_t>(row.sensor)];
     factor.measurement = *row.measurement;
     factor.outcome = first                ? Outcome::kInitialised
                      : epoch.report.stale ? Outcome::kStale
                                           : row.report->outcome;
   }
   AddFirstValues(epoch);
+  const auto present = [this](const RoleBinding& role) { return Present(role.block); };
   for (Factor& factor : epoch.factors) {
     const SensorBinding& sensor = SensorOf(factor);
     if (factor.outcome != Outcome::kAccepted || ObservesLandmarks(sensor)) continue;
-    if (!std::ranges::all_of(sensor.roles,
-                             [&](const RoleBinding& role) { return AllPresent({role.block}); })) {
+    if (std::ranges::all_of(sensor.roles, present)) {
+      AddPart(factor);
+    } else {
       factor.outcome = Outcome::kNotReady;
-      continue;
     }
-    factor.row = residuals_;
-    AddPart(sensor.model.measurement().geometry.tangent, sensor.loss);
   }
 }
 
-void CondensedRun::AddPart(int size, const RobustLoss& loss) {
-  const bool plain = loss.kind == LossKind::kNone;
+/// Puts the residuals of a factor behind those that there are.
+void CondensedRun::AddPart(Factor& factor) {
+  const SensorBinding& sensor = SensorOf(factor);
+  const int size = sensor.model.measurement().geometry.tangent;
+  const bool plain = sensor.loss.kind == LossKind::kNone;
+  factor.row = residuals_;
+  residuals_ += size;
   if (plain && !parts_.empty() && parts_.back().loss.kind == LossKind::kNone) {
     parts_.back().size += size;
   } else {
-    parts_.push_back({residuals_, size, loss});
+    parts_.push_back({factor.row, size, sensor.loss});
   }
-  residuals_ += size;
 }
 
 /// First values in an order in which each finds the blocks that it needs.
 void CondensedRun::AddFirstValues(Epoch& epoch) {
+  const auto missing = [this](const RoleBinding& role) { return !Present(role.block); };
   for (bool progress = true; progress;) {
     progress = false;
     for (std::size_t i = 0; i < epoch.factors.size(); ++i) {
@@ -212,12 +208,8 @@ void CondensedRun::AddFirstValues(Epoch& epoch) {
         continue;
       }
       const auto target = static_cast<std::size_t>(sensor.model.initialised_role());
-      std::vector<BlockId> others;
-      for (std::size_t k = 0; k < sensor.roles.size(); ++k) {
-        if (k != target) others.push_back(sensor.roles[k].block);
-      }
       const BlockId block = sensor.roles[target].block;
-      if (present_[static_cast<std::size_t>(block)] || !AllPresent(others)) continue;
+      if (Present(block) || std::ranges::count_if(sensor.roles, missing) > 1) continue;
       present_[static_cast<std::size_t>(block)] = progress = true;
       epoch.first_values.push_back({i, block, inputs_});
       inputs_ += sensor.model.measurement().geometry.tangent;
@@ -254,10 +246,10 @@ bool CondensedRun::Advance(std::size_t k, const double* e, Point& point) const {
          });
 }
 
-bool CondensedRun::ForEachFrame(const Eigen::VectorXd& e, std::size_t count,
-                                const std::function<void(std::size_t, const Point&)>& take) const {
+bool CondensedRun::ForEachFrame(const Eigen::VectorXd& e, std::size_t count, const TakePoint& take,
+                                bool sensitivity) const {
   Point point;
-  if (count > 0 && !Begin(e.data(), true, point)) return false;
+  if (count > 0 && !Begin(e.data(), sensitivity, point)) return false;
   for (std::size_t k = 0; k < count; ++k) {
     if (!Advance(k, e.data(), point)) return false;
     take(k, point);
@@ -265,13 +257,13 @@ bool CondensedRun::ForEachFrame(const Eigen::VectorXd& e, std::size_t count,
   return true;
 }
 
-bool CondensedRun::Evaluate(const double* e, double* r, double* j) const {
+bool CondensedRun::Evaluate(const Eigen::VectorXd& e, double* r, double* j) const {
   Point point;
-  if (!Begin(e, j != nullptr, point)) return false;
+  if (!Begin(e.data(), j != nullptr, point)) return false;
   Eigen::VectorXd residual;
   Eigen::MatrixXd a;
   for (std::size_t k = 0; k < epochs_.size(); ++k) {
-    if (!Advance(k, e, point)) return false;
+    if (!Advance(k, e.data(), point)) return false;
     for (const Factor& factor : epochs_[k].factors) {
       if (factor.row < 0) continue;
       if (!Residual(factor, point.x, residual, j != nullptr ? &a : nullptr)) return false;
@@ -310,41 +302,41 @@ bool CondensedRun::FreezeEpoch(Epoch& epoch, const double* e, Point& point) {
   return true;
 }
 
-bool CondensedRun::robust() const {
-  return std::ranges::any_of(parts_, [](const Part& p) { return p.loss.kind != LossKind::kNone; });
-}
-
-bool CondensedRun::Freeze(const double* e) {
+std::optional<double> CondensedRun::Freeze(const Eigen::VectorXd& e) {
   change_ = 0.0;
   Point point;
   std::vector<Point> points;
-  if (!Begin(e, false, point)) return false;
+  if (!Begin(e.data(), false, point)) return {};
   for (Epoch& epoch : epochs_) {
-    if (!FreezeEpoch(epoch, e, point)) return false;
+    if (!FreezeEpoch(epoch, e.data(), point)) return {};
     for (Factor& factor : epoch.factors) {
-      if (factor.row >= 0 && !FreezeFactor(factor, point.x)) return false;
+      if (factor.row >= 0 && !FreezeFactor(factor, point.x)) return {};
     }
     if (has_landmarks()) points.push_back(point);
   }
-  return FreezeLandmarks(points);
+  if (!FreezeLandmarks(points)) return {};
+  return change_;
 }
 
-void CondensedRun::Put(std::size_t k, const Point& point, const Eigen::MatrixXd& y,
-                       State& state) const {
+void CondensedRun::Put(std::size_t k, const Point& point, const Eigen::MatrixXd& u, State& state,
+                       UpdateReport& report) const {
   for (const FirstValue& first : epochs_[k].first_values) {
     const Block& block = initial_.layout()[first.block];
     const int t = block.geometry().tangent;
     state.Add(first.block, point.x.data() + block.value_offset, Eigen::MatrixXd::Zero(t, t));
   }
   state.values() = point.x;
+  const Eigen::MatrixXd y = u.transpose().triangularView<Eigen::Lower>().solve(point.s.transpose());
   state.covariance().SetBlock(0, 0, y.transpose() * y);
+  Report(k, point, report);
 }
 
+/// What became of the measurements of frame k, seen from `point`.
 void CondensedRun::Report(std::size_t k, const Point& point, UpdateReport& report) const {
   report = epochs_[k].report;
   for (std::size_t i = 0; i < epochs_[k].factors.size(); ++i) {
     const Factor& factor = epochs_[k].factors[i];
-    const Geometry& geometry = factor.model->measurement().geometry;
+    const Geometry& geometry = ModelOf(factor).measurement().geometry;
     MeasurementReport& entry = report.measurements()[i];
     entry.outcome = factor.outcome;
     entry.nis = std::nan("");  // what is left after smoothing is no innovation

@@ -1,18 +1,51 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <functional>
 #include <map>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "alidade/filter/binding.h"
 #include "alidade/filter/estimator.h"
 #include "alidade/filter/timeline.h"
+#include "epoch.h"
 #include "map_landmark.h"
 
 namespace alidade::ceres_batch {
+
+/// The values of all blocks, frame by frame.
+using Trajectory = std::vector<std::vector<double>>;
+
+/// Residuals of a measurement, of which a loss takes the norm; or, without one, of all on end.
+struct Part {
+  int row, size;
+  RobustLoss loss;
+};
+
+/// What a CondensedRun consists of so far.
+struct RunShape {
+  int inputs, residuals;  ///< N, M
+  std::size_t frames;
+  bool has_landmarks;
+  /// A block is one: its basis turns over at z = 0, and with it what an input of its motion means,
+  /// so that x(e) jumps.
+  bool has_unit_vector;
+  std::span<const Part> parts;  ///< of the residuals
+
+  bool robust() const;  ///< any of them has a loss
+};
+
+/// The problem in e alone, the landmarks where they cost least given e (variable projection
+/// [Golub2003]):  phi(e) = min_l |e|^2 / 2 + |l|^2 / 2 + sum_i rho_i(|r_i(e, l)|).
+struct Reduced {
+  double cost = 0.0;                ///< phi
+  Eigen::VectorXd g;                ///< its gradient, N
+  Eigen::LLT<Eigen::MatrixXd> llt;  ///< of its Gauss-Newton matrix, N x N: a Schur complement
+};
 
 /// A whole run as a function of its random inputs e, all of them N(0, 1):
 ///
@@ -40,121 +73,59 @@ namespace alidade::ceres_batch {
 /// Source       [Bock1984] (condensing), [Bell1994] (smoothing as least squares).
 class CondensedRun {
  public:
-  /// x_k, and S_k where it was asked for (columns of later inputs are zero). About a given
-  /// trajectory x is that one's, and the linearised state is x (+) (offset + S e).
-  struct Point {
-    std::vector<double> x;
-    Eigen::MatrixXd s;
-    Eigen::VectorXd offset;
-  };
-
   /// Gaps longer than `max_dt_s` are stepped in equal parts.
   CondensedRun(System system, const std::vector<StreamInfo>& streams, double max_dt_s);
-  CondensedRun(const CondensedRun&) = delete;
-  CondensedRun& operator=(const CondensedRun&) = delete;
 
   /// Sets the time of the prior; else the first frame, or initial_time_s, does.
   void Start(Timestamp timestamp) { timestamp_ = timestamp; }
-  /// One frame more; the filter's report says which measurement gave a block or landmark its first
-  /// value. False, and problem(), where there would be too many inputs or steps: there is nothing
-  /// to go on with then.
-  bool Add(const Frame& frame, const UpdateReport& report, const Estimator& filter);
-  /// The values of a filter's state as Linearised takes them.
-  std::vector<double> ValuesOf(const State& state) const;
-  int inputs() const { return inputs_; }        ///< N
-  int residuals() const { return residuals_; }  ///< M
-  /// Residuals of a measurement, of which a loss takes the norm; or, without one, of all on end.
-  struct Part {
-    int row, size;
-    RobustLoss loss;
-  };
-  const std::vector<Part>& parts() const { return parts_; }
-  bool robust() const;  ///< any of them has a loss
-  std::size_t size() const { return epochs_.size(); }
+  Timestamp timestamp() const { return timestamp_; }
+  /// One frame more, which `filter` has processed: its report says which measurement gave a block
+  /// or landmark its first value. Unless it has failed, its values go behind `about`. False, and
+  /// problem(), where there would be too many inputs or steps: there is nothing to go on with then.
+  bool Add(const Frame& frame, const UpdateReport& report, const Estimator& filter,
+           Trajectory& about);
   /// Makes the first frame, linearised at e, part of the prior, which is then that of the state at
   /// that frame; e becomes the same trajectory in the inputs that are left. L_0 is a square root:
   /// P_0 may stay singular. Q, R and the weights of losses are those at e. Not with landmarks. A
   /// frame after which noise goes on being held has no measurement: its steps become those of the
   /// next one. False where a model is not defined: nothing has changed.
   bool MarginaliseFirst(Eigen::VectorXd& e);
-  Timestamp timestamp() const { return timestamp_; }
+  /// Its parts are good until one of these is called.
+  RunShape shape() const {
+    return {inputs_, residuals_, epochs_.size(), has_landmarks(), has_unit_vector_, parts_};
+  }
 
-  /// Takes Q and R at the states of e. False where that cannot be.
-  bool Freeze(const double* e);
-  /// Largest relative change of a factor of Q or R in the last Freeze.
-  double change() const { return change_; }
+  /// Takes Q and R at the states of e: the largest relative change of a factor of them. Nothing
+  /// where that cannot be.
+  std::optional<double> Freeze(const Eigen::VectorXd& e);
   /// r (M) and, unless null, its row-major Jacobian (M x N). False where a model is not defined.
-  bool Evaluate(const double* e, double* r, double* j) const;
-  bool has_landmarks() const { return binding_.system.landmarks.has_value(); }
-  /// The problem in e alone, the landmarks where they cost least given e (variable projection
-  /// [Golub2003]):  phi(e) = min_l |e|^2 / 2 + |l|^2 / 2 + sum_i rho_i(|r_i(e, l)|).
-  struct Reduced {
-    double cost = 0.0;  ///< phi
-    Eigen::VectorXd g;  ///< its gradient, N
-    Eigen::MatrixXd a;  ///< its Gauss-Newton matrix, N x N: a Schur complement; lower triangle
-  };
+  bool Evaluate(const Eigen::VectorXd& e, double* r, double* j) const;
   /// phi and, where asked for, its derivatives, which also makes the landmarks there those that the
-  /// next call starts from. False where a model is not defined.
-  bool Reduce(const double* e, bool derivatives, Reduced& reduced);
-  /// Puts place and covariance at e into `map`, the landmarks that a filter has at the end, for
-  /// Cov(e) = (U'U)^-1. False where a model is not defined.
-  bool PutMap(const double* e, const Eigen::MatrixXd& u, std::vector<LandmarkEstimate>& map);
+  /// next call starts from. False where a model is not defined, or its matrix singular.
+  bool Reduce(const Eigen::VectorXd& e, bool derivatives, Reduced& reduced);
   /// The inputs that solve the problem linearised about `trajectory`, the values of a filter frame
   /// by frame (it may end early). Freezes there. False where that cannot be. With a unit vector it
   /// is linearised about its own solution again until that settles.
-  bool Linearised(std::vector<std::vector<double>> trajectory, Eigen::VectorXd& e);
-  /// Whether a block is a unit vector: its basis turns over at z = 0, and with it what an input of
-  /// its motion means, so that x(e) jumps.
-  bool has_unit_vector() const { return has_unit_vector_; }
+  bool Linearised(Trajectory trajectory, Eigen::VectorXd& e);
 
-  /// Gives the points of e, of the first `count` frames, in turn. False where a model is not
-  /// defined, which ends it.
-  bool ForEachFrame(const Eigen::VectorXd& e, std::size_t count,
-                    const std::function<void(std::size_t, const Point&)>& take) const;
-  /// `state`, that of frame k - 1 from System::InitialState(reserved) on, becomes the one of frame
-  /// k: the values of `point`, with the covariance y' y for y = U^-T S'.
-  void Put(std::size_t k, const Point& point, const Eigen::MatrixXd& y, State& state) const;
-  /// What became of the measurements of frame k, seen from `point`.
-  void Report(std::size_t k, const Point& point, UpdateReport& report) const;
+  /// Gives the points of e, of the first `count` frames, in turn, with S or without. False where a
+  /// model is not defined, which ends it.
+  bool ForEachFrame(const Eigen::VectorXd& e, std::size_t count, const TakePoint& take,
+                    bool sensitivity = true) const;
+  /// The estimate of frame k from its point, for Cov(e) = (U'U)^-1: `state`, that of frame k - 1
+  /// from System::InitialState(reserved) on, becomes the one of frame k, with the covariance y' y
+  /// for y = U^-T S'; `report` says what became of the measurements.
+  void Put(std::size_t k, const Point& point, const Eigen::MatrixXd& u, State& state,
+           UpdateReport& report) const;
+  /// The same of `map`, the landmarks that a filter has at the end: place and covariance at e.
+  /// False where a model is not defined.
+  bool PutMap(const Eigen::VectorXd& e, const Eigen::MatrixXd& u,
+              std::vector<LandmarkEstimate>& map);
 
   /// Why the last call failed.
   const std::string& problem() const { return problem_; }
-  bool Fail(std::string why) const;  ///< false, with this problem()
 
  private:
-  struct Step {
-    std::size_t motion;
-    double dt_s;
-    int column;
-    int columns;            ///< inputs before it: of which the state depends on some
-    bool begins;            ///< it has inputs of its own, else those that the step before held
-    std::vector<double> u;  ///< control input; empty: the model takes none
-    RowMajor l;             ///< frozen
-  };
-  struct Factor {
-    int sensor = -1;
-    const SensorModel* model = nullptr;            ///< the sensor's, or that of known landmarks
-    const internal::SensorPlace* place = nullptr;  ///< y of a landmark behind x, its rows behind S
-    Measurement measurement;
-    Outcome outcome = Outcome::kAccepted;
-    int row = -1;       ///< of r; -1: not in use, or of a landmark
-    int landmark = -1;  ///< index into landmarks_ of the one that it sees
-    Eigen::MatrixXd l;  ///< frozen
-  };
-  /// A factor whose measurement gives a block its first value.
-  struct FirstValue {
-    std::size_t factor;
-    BlockId block;
-    int column;
-  };
-  struct Epoch {
-    std::vector<Step> steps;  ///< that lead to it
-    std::vector<Factor> factors;
-    std::vector<FirstValue> first_values;  ///< after the steps
-    UpdateReport report;                   ///< as far as it does not depend on the solution
-    bool ends = false;                     ///< no noise goes on being held after it
-    int column = 0;  ///< the first of its inputs; of the first epoch 0: the prior's too
-  };
   /// What a measurement tells of the roles that its sensor initialises, t in the tangent.
   struct Inverse {
     std::vector<double> y;
@@ -181,20 +152,22 @@ class CondensedRun {
   bool Begin(const double* e, bool sensitivity, Point& point) const;
   /// From frame k - 1 (or the prior) to frame k.
   bool Advance(std::size_t k, const double* e, Point& point) const;
+  std::vector<double> ValuesOf(const State& state) const;
   bool AddSteps(Timestamp from, Timestamp to, Epoch& epoch);
   void AddFactors(const Frame& frame, const UpdateReport& report, Epoch& epoch);
   void AddLandmarks(const UpdateReport& report, const Estimator& filter, Epoch& epoch);
   void AddKnown();
   void Begin(const Factor& factor, std::size_t index, const Estimator& filter);
   void AddFirstValues(Epoch& epoch);
-  void AddPart(int size, const RobustLoss& loss);
+  void AddPart(Factor& factor);
+  bool has_landmarks() const { return binding_.system.landmarks.has_value(); }
   internal::SensorPlace PlaceBehind(std::size_t sensor, const SensorModel& model) const;
   /// Whether its landmark roles are filled by what a measurement names, not by blocks.
   bool ObservesLandmarks(const SensorBinding& sensor) const {
     return has_landmarks() && sensor.model.has_landmark();
   }
-  void Shift(int columns, int rows);
-  bool AllPresent(const std::vector<BlockId>& blocks) const;
+  void Shift(int columns);
+  bool Present(BlockId id) const { return id < 0 || present_[static_cast<std::size_t>(id)]; }
   bool Move(const Step& step, const double* e, Point& point) const;
   bool Initialise(const FirstValue& first, const Factor& factor, const double* e,
                   Point& point) const;
@@ -215,7 +188,14 @@ class CondensedRun {
   const SensorBinding& SensorOf(const Factor& factor) const {
     return binding_.system.sensors[static_cast<std::size_t>(factor.sensor)];
   }
-  bool PointsOf(const double* e, bool sensitivity, std::vector<Point>& points) const;
+  const SensorModel& ModelOf(const Factor& factor) const {
+    return factor.xyz ? *SensorOf(factor).xyz : SensorOf(factor).model;
+  }
+  /// y of a landmark lies behind x, its rows behind S.
+  const internal::SensorPlace& PlaceOf(const Factor& factor) const {
+    return (factor.xyz ? xyz_places_ : places_)[static_cast<std::size_t>(factor.sensor)];
+  }
+  bool PointsOf(const Eigen::VectorXd& e, bool sensitivity, std::vector<Point>& points) const;
   bool Place(const MapLandmark& landmark, const Eigen::VectorXd& l,
              const std::vector<Point>& points, Inverse& place) const;
   bool FreezeLandmarks(const std::vector<Point>& points);
@@ -227,22 +207,23 @@ class CondensedRun {
                       Information* information) const;
   bool OptimiseLandmark(MapLandmark& landmark, const std::vector<Point>& points,
                         Undefined undefined) const;
-  bool Project(const double* e, const std::vector<Point>& points, Undefined undefined,
+  bool Project(const Eigen::VectorXd& e, const std::vector<Point>& points, Undefined undefined,
                bool derivatives, Reduced& reduced);
   bool AddPlain(const std::vector<Point>& points, Undefined undefined, Information* information,
                 double& cost) const;
-  void Assemble(const double* e, const std::vector<Point>& points, const Information& information,
-                Reduced& reduced) const;
+  Eigen::MatrixXd Assemble(const Eigen::VectorXd& e, const std::vector<Point>& points,
+                           const Information& information, Eigen::VectorXd& g) const;
   Eigen::MatrixXd Packed(const Eigen::MatrixXd& rows) const;
   void Describe(const MapLandmark& landmark, const Eigen::MatrixXd& p,
                 LandmarkEstimate& estimate) const;
   void PutAbout(const std::vector<double>& about, Point& point) const;
-  bool StepAbout(std::vector<std::vector<double>>& trajectory, const Eigen::VectorXd& e,
-                 Eigen::VectorXd& step);
+  bool StepAbout(Trajectory& trajectory, const Eigen::VectorXd& e, Eigen::VectorXd& step);
+  void Report(std::size_t k, const Point& point, UpdateReport& report) const;
+  bool Fail(std::string why) const;  ///< false, with this problem()
   bool FailTooMany() const;
 
   internal::Binding binding_;
-  std::vector<internal::SensorPlace> places_, xyz_places_;  ///< by sensor, as in Factor
+  std::vector<internal::SensorPlace> places_, xyz_places_;  ///< by sensor
   State initial_;                 ///< all blocks that have a place have a value
   std::vector<bool> present_;     ///< at the last frame, by block
   std::vector<int> held_;         ///< by motion: column of the inputs that go on being held, or -1

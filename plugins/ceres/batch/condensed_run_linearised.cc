@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -9,7 +8,7 @@
 /// The solution of a CondensedRun linearised about a given one.
 namespace alidade::ceres_batch {
 
-bool CondensedRun::Linearised(std::vector<std::vector<double>> trajectory, Eigen::VectorXd& e) {
+bool CondensedRun::Linearised(Trajectory trajectory, Eigen::VectorXd& e) {
   constexpr int kMostPasses = 20;
   constexpr double kSettled = 1e-9;  // of inputs whose sigma is 1
   Eigen::VectorXd step;
@@ -41,7 +40,7 @@ void CondensedRun::PutAbout(const std::vector<double>& about, Point& point) cons
   }
 }
 
-bool CondensedRun::StepAbout(std::vector<std::vector<double>>& trajectory, const Eigen::VectorXd& e,
+bool CondensedRun::StepAbout(Trajectory& trajectory, const Eigen::VectorXd& e,
                              Eigen::VectorXd& step) {
   const int residuals = has_landmarks() ? 0 : residuals_;
   Eigen::MatrixXd j = Eigen::MatrixXd::Identity(inputs_ + residuals, inputs_);
@@ -67,11 +66,10 @@ bool CondensedRun::StepAbout(std::vector<std::vector<double>>& trajectory, const
   }
   if (has_landmarks()) {
     Reduced reduced;
-    if (!FreezeLandmarks(points) ||
-        !Project(e.data(), points, Undefined::kSkipped, true, reduced)) {
+    if (!FreezeLandmarks(points) || !Project(e, points, Undefined::kSkipped, true, reduced)) {
       return false;
     }
-    step = -reduced.a.selfadjointView<Eigen::Lower>().llt().solve(reduced.g);
+    step = -reduced.llt.solve(reduced.g);
   } else {
     step = -internal::SolveLeastSquares(j, r).x;
   }

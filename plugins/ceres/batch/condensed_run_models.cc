@@ -136,7 +136,7 @@ bool CondensedRun::Initialise(const FirstValue& first, const Factor& factor, con
 std::vector<const double*> CondensedRun::RolesOf(const Factor& factor,
                                                  const std::vector<double>& x) const {
   std::vector<const double*> roles;
-  internal::RolesAt(SensorOf(factor), *factor.place, x, x, roles);
+  internal::RolesAt(SensorOf(factor), PlaceOf(factor), x, x, roles);
   return roles;
 }
 
@@ -144,7 +144,7 @@ std::vector<const double*> CondensedRun::RolesOf(const Factor& factor,
 Outcome CondensedRun::See(const Factor& factor, const std::vector<double>& x,
                           std::vector<double>& h, std::vector<double>* jacobian) const {
   std::vector<double*> memory;
-  return internal::EvaluateAt(*factor.model, *factor.place, factor.measurement,
+  return internal::EvaluateAt(ModelOf(factor), PlaceOf(factor), factor.measurement,
                               RolesOf(factor, x).data(), memory, h, jacobian);
 }
 
@@ -152,14 +152,15 @@ Outcome CondensedRun::See(const Factor& factor, const std::vector<double>& x,
 bool CondensedRun::Residual(const Factor& factor, const std::vector<double>& x, Eigen::VectorXd& r,
                             Eigen::MatrixXd* a) const {
   const SensorBinding& sensor = SensorOf(factor);
-  const Geometry& geometry = factor.model->measurement().geometry;
+  const SensorModel& model = ModelOf(factor);
+  const Geometry& geometry = model.measurement().geometry;
   if (factor.l.size() == 0) {
     return Fail(TextOf(sensor, factor.measurement) + ": not defined at the start");
   }
   std::vector<double> h, jacobian;
   const Outcome outcome = See(factor, x, h, a == nullptr ? nullptr : &jacobian);
   if (outcome != Outcome::kAccepted) {
-    return Fail(TextOf(sensor, factor.measurement) + ": " + Why(outcome, *factor.model));
+    return Fail(TextOf(sensor, factor.measurement) + ": " + Why(outcome, model));
   }
   const int m = geometry.tangent;
   r.resize(m);
@@ -170,7 +171,7 @@ bool CondensedRun::Residual(const Factor& factor, const std::vector<double>& x, 
   whiten.solveInPlace(r);
   bool finite = r.allFinite();
   if (a != nullptr) {
-    const internal::SensorPlace& place = *factor.place;
+    const internal::SensorPlace& place = PlaceOf(factor);
     const Eigen::Map<const RowMajor> j_h(jacobian.data(), m, place.width);
     const int width = ObservesLandmarks(sensor)
                           ? place.parts.back().offset + place.parts.back().size
@@ -203,12 +204,13 @@ bool CondensedRun::FreezeStep(Step& step, const Point& point) {
 }
 
 bool CondensedRun::FreezeFactor(Factor& factor, const std::vector<double>& x) {
+  const SensorModel& model = ModelOf(factor);
   std::vector<double> root, r;
   const Outcome outcome =
-      internal::NoiseAt(*factor.model, factor.measurement, RolesOf(factor, x).data(), root, r);
+      internal::NoiseAt(model, factor.measurement, RolesOf(factor, x).data(), root, r);
   const std::string noise = "the noise of " + TextOf(SensorOf(factor), factor.measurement);
-  if (outcome != Outcome::kAccepted) return Fail(noise + ": " + Why(outcome, *factor.model));
-  const int m = factor.model->measurement().geometry.tangent;
+  if (outcome != Outcome::kAccepted) return Fail(noise + ": " + Why(outcome, model));
+  const int m = model.measurement().geometry.tangent;
   const Eigen::LLT<Eigen::MatrixXd> llt(Eigen::Map<const RowMajor>(r.data(), m, m));
   if (!internal::AllFinite(r) || llt.info() != Eigen::Success) {  // which takes NaN for a success
     return Fail(noise + " is not positive definite: a batch needs sigma > 0");

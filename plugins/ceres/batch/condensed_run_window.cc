@@ -26,13 +26,11 @@ bool CondensedRun::MarginaliseFirst(Eigen::VectorXd& e) {
   const Eigen::MatrixXd s = point.s.leftCols(c);
   Eigen::MatrixXd j = Eigen::MatrixXd::Identity(c, c), a;
   Eigen::VectorXd r = e.head(c), residual;
-  int gone = 0;  // residuals
   for (const Factor& factor : epochs_.front().factors) {
     if (factor.row < 0) continue;
     if (!Residual(factor, point.x, residual, &a)) return false;
     const double root = std::sqrt(Weight(SensorOf(factor).loss, residual.norm()));
     const Eigen::Index rows = residual.size(), before = j.rows();
-    gone += static_cast<int>(rows);
     j.conservativeResize(before + rows, Eigen::NoChange);
     r.conservativeResize(before + rows);
     j.bottomRows(rows) = root * a * s;
@@ -55,7 +53,7 @@ bool CondensedRun::MarginaliseFirst(Eigen::VectorXd& e) {
   moved << of_y.q_adjoint_b.head(n), e.tail(e.size() - c);
   e = std::move(moved);
   epochs_.erase(epochs_.begin());
-  Shift(static_cast<int>(n - c), gone);
+  Shift(static_cast<int>(n - c));
   return true;
 }
 
@@ -71,7 +69,7 @@ void CondensedRun::PassOnFirst() {
 }
 
 /// The places of inputs and residuals, once those of the first frame are gone.
-void CondensedRun::Shift(int columns, int rows) {
+void CondensedRun::Shift(int columns) {
   inputs_ += columns;
   for (int& column : held_) column += column < 0 ? 0 : columns;
   residuals_ = 0;
@@ -84,9 +82,7 @@ void CondensedRun::Shift(int columns, int rows) {
     }
     for (FirstValue& first : epoch.first_values) first.column += columns;
     for (Factor& factor : epoch.factors) {
-      if (factor.row < 0) continue;
-      factor.row -= rows;
-      AddPart(SensorOf(factor).model.measurement().geometry.tangent, SensorOf(factor).loss);
+      if (factor.row >= 0) AddPart(factor);
     }
   }
 }

@@ -9,19 +9,9 @@
 #include "condensed_run.h"
 #include "initialising_filter.h"
 #include "map_solve.h"
-#include "supported.h"
 
 namespace alidade::ceres_batch {
 namespace {
-
-/// No known roles, consider blocks, roles linearised at the measurement, landmarks.
-constexpr Support kFixedLagSupport = {.known = false, .from_measurement = true};
-
-struct FixedLagOptions {
-  enum class Output { kCurrent, kLagged } output = Output::kCurrent;
-  double lag_s = 0.0;
-  SolveOptions solve;
-};
 
 /// lag_s in whole ns; beyond what a Timestamp holds, no frame leaves the window.
 Timestamp LagOf(double lag_s) {
@@ -41,50 +31,41 @@ Timestamp LagOf(double lag_s) {
 /// Source       [Sibley2010].
 class FixedLag : public Estimator {
  public:
-  FixedLag(const System& system, const FixedLagOptions& options,
+  FixedLag(const System& system, double lag_s, bool lagged, const SolveOptions& options,
            const std::vector<StreamInfo>& streams)
-      : output_(options.output),
-        window_(LagOf(options.lag_s)),
-        run_(system, streams, options.solve.max_dt_s),
-        solve_(options.solve),
+      : lag_(LagOf(lag_s)),
+        lagged_(lagged),
+        run_(system, streams, options.max_dt_s),
+        solve_(options),
         state_(system.InitialState(/*reserved=*/true)),
-        initialiser_(system, options.solve.max_dt_s, streams) {}
+        initialiser_(system, options.max_dt_s, streams) {}
 
   void Start(Timestamp timestamp) override {
     run_.Start(timestamp);
     initialiser_.filter().Start(timestamp);
   }
-  bool offline() const override { return output_ == FixedLagOptions::Output::kLagged; }
+  bool offline() const override { return lagged_; }
   const State& state() const override { return state_; }
   Timestamp timestamp() const override { return run_.timestamp(); }
-  bool diverged() const override { return failed_; }
-  bool failed() const override { return failed_; }
+  bool diverged() const override { return failed(); }
+  bool failed() const override { return refused_ || solve_.failed(); }
 
   const UpdateReport& Process(const Frame& frame) override {
     report_.Clear();
-    if (failed_) return report_;
+    if (failed()) return report_;
     const UpdateReport& filter = initialiser_.Process(frame);
-    if (!MoveWindow(frame.timestamp) || !run_.Add(frame, filter, initialiser_.filter())) {
-      Fail(frame.timestamp, run_.problem());
-      initialiser_.AddReport(frame.timestamp, filter, report_.events);
-      return report_;
-    }
-    timestamps_.push_back(run_.timestamp());
-    if (!initialiser_.filter().failed()) {
-      about_.push_back(run_.ValuesOf(initialiser_.filter().state()));
-    }
-    SolveWindow(frame.timestamp);
+    refused_ =
+        !MoveWindow(frame.timestamp) || !run_.Add(frame, filter, initialiser_.filter(), about_);
+    if (!refused_) SolveWindow(frame.timestamp);
+    if (failed()) report_.events.push_back({frame.timestamp, "no_solution", WhyFailed()});
     initialiser_.AddReport(frame.timestamp, filter, report_.events);
     return report_;
   }
 
   /// Of the frames that left the window, then of those still in it.
   void Smooth(const Emit& emit) override {
-    if (failed_) throw Error(ExitCode::kDiverged, why_);
-    if (!Keep(run_.size())) {
-      failed_ = true;
-      throw Error(ExitCode::kDiverged, run_.problem());
-    }
+    if (!failed()) refused_ = !Keep(run_.shape().frames);
+    if (failed()) throw Error(ExitCode::kDiverged, WhyFailed());
     for (std::size_t k = 0; k < kept_.size(); ++k) emit(k, kept_[k].state, kept_[k].report);
   }
 
@@ -95,15 +76,11 @@ class FixedLag : public Estimator {
     UpdateReport report;
   };
 
-  void Fail(Timestamp timestamp, const std::string& why) {
-    failed_ = true;
-    why_ = why;
-    report_.events.push_back({timestamp, "no_solution", why});
-  }
+  const std::string& WhyFailed() const { return refused_ ? run_.problem() : solve_.summary(); }
 
   bool Leaves(Timestamp timestamp, Timestamp newest) const {
     Timestamp age = 0;
-    return __builtin_sub_overflow(newest, timestamp, &age) || age > window_;
+    return __builtin_sub_overflow(newest, timestamp, &age) || age > lag_;
   }
 
   /// Lets go of the frames that are too old once there is one at `newest`.
@@ -122,66 +99,54 @@ class FixedLag : public Estimator {
 
   /// Keeps the estimates of the first `count` frames of the window.
   bool Keep(std::size_t count) {
-    return run_.ForEachFrame(e_, count, [&](std::size_t k, const CondensedRun::Point& point) {
+    return run_.ForEachFrame(e_, count, [&](std::size_t k, const Point& point) {
       Kept kept;
-      run_.Report(k, point, kept.report);
-      run_.Put(k, point, solve_.Whitened(point), state_);
+      run_.Put(k, point, solve_.u(), state_, kept.report);
       kept.state = state_;
       kept_.push_back(std::move(kept));
     });
   }
 
   void SolveWindow(Timestamp timestamp) {
-    if (!solve_.SolveAnew(run_, about_, e_)) {
-      Fail(timestamp, solve_.summary());
-      return;
-    }
+    timestamps_.push_back(run_.timestamp());
+    if (!solve_.SolveAnew(run_, about_, e_)) return;
     about_.clear();
-    const bool good =
-        run_.ForEachFrame(e_, run_.size(), [&](std::size_t k, const CondensedRun::Point& point) {
-          about_.push_back(point.x);
-          if (offline() || k + 1 < run_.size()) return;
-          run_.Report(k, point, report_);
-          run_.Put(k, point, solve_.Whitened(point), state_);
-        });
+    const std::size_t frames = run_.shape().frames;
+    const auto take = [&](std::size_t k, const Point& point) {
+      about_.push_back(point.x);
+      if (!offline() && k + 1 == frames) run_.Put(k, point, solve_.u(), state_, report_);
+    };
+    solve_.FailUnless(run_.ForEachFrame(e_, frames, take), run_);
     solve_.Note(timestamp, report_.events);
-    if (!good) {
-      Fail(timestamp, solve_.summary() + "; then " + run_.problem());
-    } else if (solve_.failed()) {
-      Fail(timestamp, solve_.summary());
-    }
   }
 
-  FixedLagOptions::Output output_;
-  Timestamp window_;
+  Timestamp lag_;
+  bool lagged_;       ///< the output, else current
   CondensedRun run_;  ///< that of the window
   MapSolve solve_;
   State state_;  ///< current: of the last frame; lagged: of the last that left
   InitialisingFilter
       initialiser_;  ///< gives the newest frame a start, and blocks their first values
   std::vector<Timestamp> timestamps_;
-  std::vector<std::vector<double>> about_;  ///< the last solution
+  Trajectory about_;  ///< the last solution
   std::vector<Kept> kept_;
   Eigen::VectorXd e_;
   UpdateReport report_;
-  bool failed_ = false;
-  std::string why_;
+  bool refused_ = false;  ///< a frame, or to let go of one; there is nothing to go on with
 };
 
 }  // namespace
 
 EstimatorMaker CreateFixedLag(const EstimatorArguments& arguments) {
   Params& p = arguments.params;
-  FixedLagOptions options;
-  options.lag_s = p.Positive("lag_s", "s", "age of the oldest frame that is smoothed");
-  options.output = static_cast<FixedLagOptions::Output>(p.Choice(
+  const double lag_s = p.Positive("lag_s", "s", "age of the oldest frame that is smoothed");
+  const int output = p.Choice(
       "output", {"current", "lagged"},
-      "current: of each frame when it comes; lagged: when it leaves the window, at the end", 0));
-  options.solve = ReadSolveOptions(p);
-  return [options, entry = arguments.entry](const System& system,
-                                            const std::vector<StreamInfo>& streams) {
-    CheckSupported(system, entry, "fixed_lag", kFixedLagSupport);
-    return std::make_unique<FixedLag>(system, options, streams);
+      "current: of each frame when it comes; lagged: when it leaves the window, at the end", 0);
+  return [lag_s, lagged = output == 1, options = ReadSolveOptions(p)](
+             const System& system, const std::vector<StreamInfo>& streams) {
+    ALIDADE_EXPECTS(!FindUnsupported(system, kFixedLagSupport));
+    return std::make_unique<FixedLag>(system, lag_s, lagged, options, streams);
   };
 }
 

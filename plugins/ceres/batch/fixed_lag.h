@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "alidade/filter/support.h"
 #include "alidade/host/cpp_plugin.h"
 
 namespace alidade::ceres_batch {
+
+/// No known roles, consider blocks, roles linearised at the measurement, landmarks.
+inline constexpr Support kFixedLagSupport = {.known = false, .from_measurement = true};
 
 /// The estimator type `fixed_lag`, from its entry in a config.
 EstimatorMaker CreateFixedLag(const EstimatorArguments& arguments);

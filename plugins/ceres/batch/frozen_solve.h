@@ -5,15 +5,16 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <optional>
 
 #include "condensed_run.h"
 
 /// The least squares problem of a CondensedRun whose Q and R stand where they were frozen.
 namespace alidade::ceres_batch {
 
-/// phi(e) = |e|^2 / 2 + sum_i rho_i(|r_i(e)|), the landmarks where they cost least. False where a
+/// phi(e) = |e|^2 / 2 + sum_i rho_i(|r_i(e)|), the landmarks where they cost least. None where a
 /// model is not defined.
-bool CostAt(CondensedRun& run, const Eigen::VectorXd& e, double& cost);
+std::optional<double> CostAt(CondensedRun& run, const Eigen::VectorXd& e);
 /// Minimises phi from e, until `stop` is true. Where there are no inputs it converges at once.
 ceres::Solver::Summary SolveFrozen(CondensedRun& run, Eigen::VectorXd& e, int max_iterations,
                                    const std::function<bool()>& stop);
@@ -23,7 +24,7 @@ struct GaussNewton {
   Eigen::MatrixXd u;     ///< U, N x N, upper, with Cov(e) = (U'U)^-1
   Eigen::VectorXd step;  ///< -(U'U)^-1 grad phi
 };
-/// False, with `at` as it was or half done, where a model is not defined or U'U is singular.
+/// False, with `at` as it was, where a model is not defined or U'U is singular.
 bool GaussNewtonAt(CondensedRun& run, const Eigen::VectorXd& e, GaussNewton& at);
 
 }  // namespace alidade::ceres_batch

@@ -75,10 +75,7 @@ void CondensedRun::AddLandmarks(const UpdateReport& report, const Estimator& fil
     factor.landmark = current->second;
     MapLandmark& landmark = landmarks_[static_cast<std::size_t>(current->second)];
     landmark.observations.push_back({epochs_.size(), i});
-    const SensorBinding& sensor = SensorOf(factor);
-    if (landmark.first || !sensor.xyz) continue;  // known landmarks are points
-    factor.model = &*sensor.xyz;
-    factor.place = &xyz_places_[static_cast<std::size_t>(factor.sensor)];
+    factor.xyz = !landmark.first && SensorOf(factor).xyz;  // known landmarks are points
   }
   for (const std::size_t i : begin) {
     Begin(epoch.factors[i], i, filter);

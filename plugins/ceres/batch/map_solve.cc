@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
@@ -17,8 +18,7 @@ std::string Setting(const char* key, int value) {
 
 /// Freezes at e; false where a model is not defined there.
 bool CanStart(CondensedRun& run, const Eigen::VectorXd& e) {
-  double unused = 0.0;
-  return run.Freeze(e.data()) && CostAt(run, e, unused);
+  return run.Freeze(e) && CostAt(run, e);
 }
 
 }  // namespace
@@ -44,40 +44,44 @@ void MapSolve::Note(Timestamp timestamp, std::vector<Event>& events) const {
   if (!note_.empty()) events.push_back({timestamp, "not_converged", note_});
 }
 
-bool MapSolve::SolveAll(CondensedRun& run, const Values& about, Eigen::VectorXd& e) {
-  if (!run.Linearised(about, e) || !CanStart(run, e)) {
-    e.setZero(run.inputs());
-    if (!CanStart(run, e)) return NowhereToStart(run);
+bool MapSolve::SolveAll(CondensedRun& run, const Trajectory& about, Eigen::VectorXd& e) {
+  bool defined = run.Linearised(about, e) && CanStart(run, e);
+  if (!defined) {
+    e.setZero(run.shape().inputs);
+    defined = CanStart(run, e);
   }
-  return SolveFrom(run, e);
+  return SolveFrom(run, defined, e);
 }
 
-bool MapSolve::SolveAnew(CondensedRun& run, const Values& about, Eigen::VectorXd& e) {
+bool MapSolve::SolveAnew(CondensedRun& run, const Trajectory& about, Eigen::VectorXd& e) {
+  const RunShape shape = run.shape();
   const Eigen::Index before = e.size();
-  e.conservativeResize(run.inputs());
+  e.conservativeResize(shape.inputs);
   e.tail(e.size() - before).setZero();
-  const bool old = !run.has_unit_vector() && CanStart(run, e);
-  if (!old && !(run.Linearised(about, e) && CanStart(run, e))) {
-    return NowhereToStart(run);
-  }
-  return SolveFrom(run, e);
+  const bool old = !shape.has_unit_vector && CanStart(run, e);
+  return SolveFrom(run, old || (run.Linearised(about, e) && CanStart(run, e)), e);
 }
 
-bool MapSolve::NowhereToStart(const CondensedRun& run) {
-  failed_ = true;
+/// From e, at which Q and R are frozen, where the models are defined there.
+bool MapSolve::SolveFrom(CondensedRun& run, bool defined, Eigen::VectorXd& e) {
   note_.clear();
-  summary_ = "nowhere to start: " + run.problem();
-  return false;
-}
-
-/// From e, at which Q and R are frozen.
-bool MapSolve::SolveFrom(CondensedRun& run, Eigen::VectorXd& e) {
+  if (!defined) {
+    failed_ = true;
+    summary_ = "nowhere to start: " + run.problem();
+    return false;
+  }
   const std::string solved = Minimise(run, e);
   HeedStop();
-  const bool defined = TakeLastStep(run, e);
+  defined = TakeLastStep(run, e);
   summary_ = "cost " + internal::RoundedText(at_.cost, 9) + ", " + solved + summary_;
-  if (!defined) summary_ += "; then " + run.problem();
-  return defined;
+  return FailUnless(defined, run);
+}
+
+bool MapSolve::FailUnless(bool defined, const CondensedRun& run) {
+  if (defined) return true;
+  failed_ = true;
+  summary_ += "; then " + run.problem();
+  return false;
 }
 
 /// Until Q and R settle. How it went; in summary_, why it failed.
@@ -85,7 +89,6 @@ std::string MapSolve::Minimise(CondensedRun& run, Eigen::VectorXd& e) {
   constexpr double kSettled = 1e-9;
   int iterations = 0, outer = 0;
   bool settled = false;
-  note_.clear();
   summary_ = "the noise that depends on the state did not settle; a larger " +
              Setting("max_outer_iterations", options_.max_outer_iterations) + " may do";
   do {
@@ -98,13 +101,14 @@ std::string MapSolve::Minimise(CondensedRun& run, Eigen::VectorXd& e) {
     at_.cost = summary.final_cost;
     failed_ = summary.termination_type != ceres::CONVERGENCE || !std::isfinite(summary.final_cost);
     if (failed_) summary_ = WhyNot(summary);
-    if (!failed_ && run.robust()) iterations += IterateWeights(run, e);
+    if (!failed_ && run.shape().robust()) iterations += IterateWeights(run, e);
     if (failed_) break;
-    if (!run.Freeze(e.data())) {
+    const std::optional<double> change = run.Freeze(e);
+    if (!change) {
       summary_ = run.problem();
       break;
     }
-    settled = run.change() <= kSettled;
+    settled = *change <= kSettled;
   } while (!settled && outer < options_.max_outer_iterations);
   failed_ = failed_ || !settled;
   if (!failed_) summary_.clear();
@@ -139,8 +143,7 @@ bool MapSolve::TakeLastStep(CondensedRun& run, Eigen::VectorXd& e) {
   }
   summary_ = "converged";
   e += at_.step;
-  double unused = 0.0;
-  return !run.has_landmarks() || CostAt(run, e, unused);
+  return !run.shape().has_landmarks || CostAt(run, e);
 }
 
 /// Iteratively reweighted least squares (IRLS) converges linearly where the squared error does so
@@ -148,7 +151,7 @@ bool MapSolve::TakeLastStep(CondensedRun& run, Eigen::VectorXd& e) {
 /// taken, and ends it. How many steps it took.
 int MapSolve::IterateWeights(CondensedRun& run, Eigen::VectorXd& e) {
   // Of inputs whose sigma is 1; with landmarks a step takes longer.
-  const double settled = run.has_landmarks() ? 1e-6 : 1e-10;
+  const double settled = run.shape().has_landmarks ? 1e-6 : 1e-10;
   constexpr double kRounding = 1e-9;  // of the cost
   constexpr double kTells = 1e-8;     // sigma
   GaussNewton next;

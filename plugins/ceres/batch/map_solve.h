@@ -28,26 +28,21 @@ SolveOptions ReadSolveOptions(Params& params);
 /// without, Cov(e) = (U'U)^-1 and P_k = (U^-T S_k')'(U^-T S_k').
 class MapSolve {
  public:
-  /// The values of all states, frame by frame.
-  using Values = std::vector<std::vector<double>>;
-
   explicit MapSolve(const SolveOptions& options) : options_(options) {}
 
   /// Where `stop` is true, a solve ends by an Error of kStopped.
   void StopWhen(std::function<bool()> stop) { stop_ = std::move(stop); }
   /// Solves from the problem linearised about `about`, or where that leaves the domain of a model,
   /// from e = 0. False, and summary(), where there are no estimates.
-  bool SolveAll(CondensedRun& run, const Values& about, Eigen::VectorXd& e);
+  bool SolveAll(CondensedRun& run, const Trajectory& about, Eigen::VectorXd& e);
   /// Solves from e, the solution before the last frame came, and new inputs at their mean. Where
   /// that leaves the domain of a model, and with unit vectors, from the problem linearised about
   /// `about`. False, and summary(), where there are no estimates.
-  bool SolveAnew(CondensedRun& run, const Values& about, Eigen::VectorXd& e);
-  /// y = U^-T S' of a point, as CondensedRun::Put takes it.
-  Eigen::MatrixXd Whitened(const CondensedRun::Point& point) const {
-    return at_.u.transpose().triangularView<Eigen::Lower>().solve(point.s.transpose());
-  }
+  bool SolveAnew(CondensedRun& run, const Trajectory& about, Eigen::VectorXd& e);
+  /// Returns `defined`, whether the estimates of the solution are. Where not, it has failed.
+  bool FailUnless(bool defined, const CondensedRun& run);
 
-  bool failed() const { return failed_; }  ///< not converged, or not settled
+  bool failed() const { return failed_; }  ///< not converged, not settled, or not defined
   const std::string& summary() const { return summary_; }
   const Eigen::MatrixXd& u() const { return at_.u; }
   /// The event `not_converged` where the weights of robust losses did not settle.
@@ -55,8 +50,7 @@ class MapSolve {
   void HeedStop() const;
 
  private:
-  bool SolveFrom(CondensedRun& run, Eigen::VectorXd& e);
-  bool NowhereToStart(const CondensedRun& run);
+  bool SolveFrom(CondensedRun& run, bool defined, Eigen::VectorXd& e);
   std::string Minimise(CondensedRun& run, Eigen::VectorXd& e);
   int IterateWeights(CondensedRun& run, Eigen::VectorXd& e);
   bool TakeLastStep(CondensedRun& run, Eigen::VectorXd& e);

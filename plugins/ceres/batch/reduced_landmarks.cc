@@ -11,20 +11,20 @@
 namespace alidade::ceres_batch {
 
 /// The points of e, by frame.
-bool CondensedRun::PointsOf(const double* e, bool sensitivity, std::vector<Point>& points) const {
-  Point point;
-  if (!Begin(e, sensitivity, point)) return false;
-  for (std::size_t k = 0; k < epochs_.size(); ++k) {
-    if (!Advance(k, e, point)) return false;
-    points.push_back(point);
-  }
-  return true;
+bool CondensedRun::PointsOf(const Eigen::VectorXd& e, bool sensitivity,
+                            std::vector<Point>& points) const {
+  const auto keep = [&](std::size_t, const Point& point) { points.push_back(point); };
+  return ForEachFrame(e, epochs_.size(), keep, sensitivity);
 }
 
-bool CondensedRun::Reduce(const double* e, bool derivatives, Reduced& reduced) {
+bool CondensedRun::Reduce(const Eigen::VectorXd& e, bool derivatives, Reduced& reduced) {
   std::vector<Point> points;
-  return PointsOf(e, derivatives, points) &&
-         Project(e, points, Undefined::kFails, derivatives, reduced);
+  if (!PointsOf(e, derivatives, points) ||
+      !Project(e, points, Undefined::kFails, derivatives, reduced)) {
+    return false;
+  }
+  return !derivatives || reduced.llt.info() == Eigen::Success ||
+         Fail("the normal matrix is not positive definite");
 }
 
 /// The measurements of no landmark.
@@ -55,8 +55,8 @@ bool CondensedRun::AddPlain(const std::vector<Point>& points, Undefined undefine
 }
 
 /// phi and its derivatives at the points, from the landmarks settled there.
-bool CondensedRun::Project(const double* e, const std::vector<Point>& points, Undefined undefined,
-                           bool derivatives, Reduced& reduced) {
+bool CondensedRun::Project(const Eigen::VectorXd& e, const std::vector<Point>& points,
+                           Undefined undefined, bool derivatives, Reduced& reduced) {
   const auto d = std::ssize(read_), size = d * std::ssize(points);
   Information information;
   if (derivatives) {
@@ -66,7 +66,7 @@ bool CondensedRun::Project(const double* e, const std::vector<Point>& points, Un
     std::iota(information.first.begin(), information.first.end(), std::size_t{0});
   }
   Information* const into = derivatives ? &information : nullptr;
-  reduced.cost = 0.5 * Eigen::Map<const Eigen::VectorXd>(e, inputs_).squaredNorm();
+  reduced.cost = 0.5 * e.squaredNorm();
   if (!AddPlain(points, undefined, into, reduced.cost)) return false;
   Normal normal;
   for (MapLandmark& landmark : landmarks_) {
@@ -92,19 +92,22 @@ bool CondensedRun::Project(const double* e, const std::vector<Point>& points, Un
   }
   if (!derivatives) return true;
   for (MapLandmark& landmark : landmarks_) landmark.from = landmark.l;
-  Assemble(e, points, information, reduced);
-  return (reduced.g.allFinite() && reduced.a.allFinite()) ||
-         Fail("the normal equations of the batch are not finite");
+  const Eigen::MatrixXd a = Assemble(e, points, information, reduced.g);
+  if (!reduced.g.allFinite() || !a.allFinite()) {
+    return Fail("the normal equations of the batch are not finite");
+  }
+  reduced.llt.compute(a);
+  return true;
 }
 
 /// A = I + S' H S, g = e + S' (g_x + H offset), for S of all points, which is lower triangular by
-/// frames: no state depends on a later input.
-void CondensedRun::Assemble(const double* e, const std::vector<Point>& points,
-                            const Information& information, Reduced& reduced) const {
+/// frames: no state depends on a later input. The lower triangle of A.
+Eigen::MatrixXd CondensedRun::Assemble(const Eigen::VectorXd& e, const std::vector<Point>& points,
+                                       const Information& information, Eigen::VectorXd& g) const {
   const auto d = std::ssize(read_), size = d * std::ssize(points);
-  reduced.a = Eigen::MatrixXd::Identity(inputs_, inputs_);
-  reduced.g = Eigen::Map<const Eigen::VectorXd>(e, inputs_);
-  if (size == 0) return;
+  Eigen::MatrixXd a = Eigen::MatrixXd::Identity(inputs_, inputs_);
+  g = e;
+  if (size == 0) return a;
   const Eigen::MatrixXd& h = information.h;
   Eigen::MatrixXd s(size, inputs_), hs = Eigen::MatrixXd::Zero(size, inputs_);
   Eigen::VectorXd offset(size);
@@ -128,16 +131,17 @@ void CondensedRun::Assemble(const double* e, const std::vector<Point>& points,
   }
   for (std::size_t k = 0; k < points.size(); ++k) {
     const auto row = d * static_cast<Eigen::Index>(k), from = begin(k), to = begin(k + 1);
-    reduced.a.block(from, 0, to - from, to).noalias() +=
+    a.block(from, 0, to - from, to).noalias() +=
         s.block(row, from, size - row, to - from).transpose() * hs.block(row, 0, size - row, to);
   }
-  const Eigen::VectorXd g = information.g + h.selfadjointView<Eigen::Lower>() * offset;
-  reduced.g += s.transpose() * g;
+  const Eigen::VectorXd g_x = information.g + h.selfadjointView<Eigen::Lower>() * offset;
+  g += s.transpose() * g_x;
+  return a;
 }
 
 /// A landmark moves with e by M = J (J_y_x S_k - J_y_l C^-1 B' S), and by its own inputs besides:
 /// P = M Cov(e) M' + J J_y_l C^-1 J_y_l' J', with J = dp/dy.
-bool CondensedRun::PutMap(const double* e, const Eigen::MatrixXd& u,
+bool CondensedRun::PutMap(const Eigen::VectorXd& e, const Eigen::MatrixXd& u,
                           std::vector<LandmarkEstimate>& map) {
   std::vector<Point> points;
   if (!PointsOf(e, true, points)) return false;
@@ -180,7 +184,7 @@ void CondensedRun::Describe(const MapLandmark& landmark, const Eigen::MatrixXd& 
                                                       : std::optional(landmark.observations[0]));
   if (!any) return;
   const Factor& factor = epochs_[any->epoch].factors[any->factor];
-  const std::vector<Space>& roles = factor.model->roles();
+  const std::vector<Space>& roles = ModelOf(factor).roles();
   estimate.representation = RepresentationOf(roles);
   estimate.tried = estimate.accepted = static_cast<int>(landmark.observations.size());
   if (!estimate.representation) return;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "alidade/filter/built_in.h"
 #include "alidade/filter/ukf.h"
 #include "support/systems.h"
 
@@ -128,7 +129,7 @@ TEST(Ukf, ASpreadThatLosesAllDigitsIsRefused) {
   EXPECT_THROW(Ukf(system, options, StreamsOf(system)), ContractViolation);
   const Config config = Config::FromText("alpha: 1e-9", "ukf.yaml");
   try {
-    UkfOptions::FromNode(config.root());
+    internal::FindEstimatorType("ukf")->read(config.root());
     FAIL() << "alpha 1e-9 is read";
   } catch (const Error& error) {
     EXPECT_STREQ(error.what(),

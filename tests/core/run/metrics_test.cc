@@ -279,7 +279,7 @@ TEST(Metrics, NeesLeavesOutSingularCovariances) {
 
 TEST(Metrics, AnEstimateThatIsNotFiniteSpoilsItsRmse) {
   MetricsOf one = OneScalar();
-  *one.state().value(0) = std::nan("");
+  one.state().values()[0] = std::nan("");
   one.Add({{1.0}});
   EXPECT_TRUE(std::isinf(one.Finish().at("rmse:a.x")));
 }
@@ -287,7 +287,7 @@ TEST(Metrics, AnEstimateThatIsNotFiniteSpoilsItsRmse) {
 TEST(Metrics, LagIsInMilliseconds) {
   MetricsOf one = OneScalar();
   for (int i = 0; i < 152; ++i) {  // 2.5 samples of 100 ms late
-    *one.state().value(0) = std::sin(0.083 * (i - 2.5));
+    one.state().values()[0] = std::sin(0.083 * (i - 2.5));
     one.Add({{std::sin(0.083 * i)}});
   }
   EXPECT_NEAR(one.Finish().at("lag_ms:a.x"), 250.0, 1.0);
@@ -300,7 +300,7 @@ TEST(Metrics, LagOfALongRunIsThatOfItsBeginning) {
   MetricsOf one = OneScalar();
   const auto x = [](double i) { return std::sin(0.083 * i + 20.0 * std::sin(0.001 * i)); };
   for (int i = 0; i < 100'000; ++i) {
-    *one.state().value(0) = x(i - 1.5);
+    one.state().values()[0] = x(i - 1.5);
     one.Add({{x(i)}});
   }
   one.Skip(50'000'000);  // neither the gap nor what follows counts
@@ -316,7 +316,7 @@ TEST(Metrics, LagOfAnAngleSeesNoJumps) {
   one.state().Add(0, &zero, Eigen::MatrixXd::Identity(1, 1));
   const auto heading = [](double i) { return 4.0 * std::sin(0.083 * i); };
   for (int i = 0; i < 152; ++i) {
-    *one.state().value(0) = Angle::Wrap(heading(i - 1.5));
+    one.state().values()[0] = Angle::Wrap(heading(i - 1.5));
     one.Add({{Angle::Wrap(heading(i))}});
   }
   EXPECT_NEAR(one.Finish().at("lag_ms:a.heading"), 150.0, 1.0);

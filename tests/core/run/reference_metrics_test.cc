@@ -23,7 +23,7 @@ struct Known : Estimator {
   bool offline() const override { return true; }
   void Smooth(const Emit& emit) override {
     for (std::size_t k = 0; k < frames_; ++k) {
-      *state_.value(0) = k == 0 ? std::nan("") : 0.3;
+      state_.values()[0] = k == 0 ? std::nan("") : 0.3;
       emit(k, state_, report_);
     }
   }

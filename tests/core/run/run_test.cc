@@ -92,7 +92,7 @@ struct Hindsight : Estimator {
   bool offline() const override { return true; }
   void Smooth(const Emit& emit) override {
     for (std::size_t k = 0; k < frames_; ++k) {
-      *state_.value(0) = 1.0 + 1e-3 * static_cast<double>(k);
+      state_.values()[0] = 1.0 + 1e-3 * static_cast<double>(k);
       if (k + 1 == frames_) report_.events.push_back({kNoTimestamp, "hindsight", "all is known"});
       emit(k, state_, report_);
     }

@@ -146,7 +146,7 @@ TEST(Covariance, MoveCarriesCorrelationsAlong) {
   Covariance p = Make({2, 2, 1, 2}, random);
   const Eigen::MatrixXd before = p.Dense();
   p.Release(0, 2);
-  p.Move(5, 0, 2);
+  EXPECT_EQ(p.MoveToGap(5, 2), 0);
   EXPECT_EQ(p.size(), 5);
   EXPECT_EQ(p.Block(0, 2, 0, 2), before.block(5, 5, 2, 2));
   EXPECT_EQ(p.Block(0, 2, 2, 2), before.block(5, 2, 2, 2));

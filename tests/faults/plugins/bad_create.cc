@@ -35,6 +35,16 @@ struct Forges : Probe {
     p.Fail("forged\nerror: key", "one\nerror: two \033[31m\xff \u03bb");
   }
 };
+/// One more parameter than there may be, or for each of so many the same.
+struct AsksMuch : Probe {
+  explicit AsksMuch(alidade::Params& p) : Probe(p) {
+    const bool distinct = p.Flag("distinct", "");
+    for (int i = 0; i < ALIDADE_MAX_PARAMS; ++i) {
+      const std::string key = "k" + std::to_string(distinct ? i : 0);
+      p.Number(key.c_str(), "", "", {}, 0.0);
+    }
+  }
+};
 /// Keeps what it is lent, against the rules, and tries it in its next creation.
 struct KeepsHost : Probe {
   explicit KeepsHost(alidade::Params& p) : Probe(p) {
@@ -131,17 +141,15 @@ AlidadeEntry Reading(const char* name) {
 
 }  // namespace
 
-ALIDADE_PLUGIN(ALIDADE_SENSOR(Throws, "throws", "", ""),
-               ALIDADE_SENSOR(ThrowsInt, "throws_int", "", ""),
-               ALIDADE_SENSOR(Misfit, "misfit", "", ""),
-               ALIDADE_SENSOR_BY(MakeWrongKind, "wrong_kind", "", ""),
-               Reading<kNoDefault>("no_default"), Reading<kNoNumber>("no_number"),
-               Reading<kTwoChoices>("two_choices"), Reading<kAnyChoices>("any_choices"),
-               Reading<kDefaultBeyond>("default_beyond"), Reading<kLaterFlag>("later_flag"),
-               Reading<kReservedMember>("reserved_member"), Reading<kNoKey>("no_key"),
-               Reading<kGap>("gap_in_key"), Reading<kHuge>("huge"),
-               ALIDADE_SENSOR(Forges, "forges", "", ""), Reading<kEmptyRange>("empty_range"),
-               Reading<kManyChoices>("many_choices"), Reading<kHalf>("half"),
-               Reading<kOutside>("outside"), Reading<kTextAsNumber>("text_as_number"),
-               ALIDADE_SENSOR(Titled, "titled", "", ""),
-               ALIDADE_SENSOR(KeepsHost, "keeps_host", "", ""))
+ALIDADE_PLUGIN(
+    ALIDADE_SENSOR(Throws, "throws", "", ""), ALIDADE_SENSOR(ThrowsInt, "throws_int", "", ""),
+    ALIDADE_SENSOR(Misfit, "misfit", "", ""),
+    ALIDADE_SENSOR_BY(MakeWrongKind, "wrong_kind", "", ""), Reading<kNoDefault>("no_default"),
+    Reading<kNoNumber>("no_number"), Reading<kTwoChoices>("two_choices"),
+    Reading<kAnyChoices>("any_choices"), Reading<kDefaultBeyond>("default_beyond"),
+    Reading<kLaterFlag>("later_flag"), Reading<kReservedMember>("reserved_member"),
+    Reading<kNoKey>("no_key"), Reading<kGap>("gap_in_key"), Reading<kHuge>("huge"),
+    ALIDADE_SENSOR(Forges, "forges", "", ""), ALIDADE_SENSOR(AsksMuch, "asks_much", "", ""),
+    Reading<kEmptyRange>("empty_range"), Reading<kManyChoices>("many_choices"),
+    Reading<kHalf>("half"), Reading<kOutside>("outside"), Reading<kTextAsNumber>("text_as_number"),
+    ALIDADE_SENSOR(Titled, "titled", "", ""), ALIDADE_SENSOR(KeepsHost, "keeps_host", "", ""))

@@ -83,18 +83,18 @@ using CeresBatchConfig = HostTest;
 
 TEST_F(CeresBatchConfig, WhatItCannotDoIsRefusedByName) {
   const auto expect = [&](const std::string& key, const std::string& value,
-                          const std::string& words) {
+                          const std::string& place, const std::string& what) {
     ExpectError(ExitCode::kBadConfig,
-                {"estimators.batch: estimator type 'ceres_batch' does not support", words}, [&] {
+                {key + place + ": estimator type 'ceres_batch' does not support " + what + ';'},
+                [&] {
                   RunDepth(1, {{"estimators.batch.type", "ceres_batch"}, {key, value}});
                 });
   };
   expect("sensors.scale.roles.inverse_distance", "{block: template.inverse_distance, mode: known}",
-         "known roles: sensors.scale.roles.inverse_distance.mode");
+         ".mode", "known roles");
   expect("sensors.stereo.roles.depth", "{block: target.depth, jacobian_at: measurement}",
-         "jacobian_at: measurement: sensors.stereo.roles.depth.jacobian_at");
-  expect("state.template.consider", "[inverse_distance]",
-         "consider blocks: state.template.consider names 'template.inverse_distance'");
+         ".jacobian_at", "jacobian_at: measurement");
+  expect("state.template.consider", "[inverse_distance]", "[0]", "consider blocks");
 }
 
 TEST_F(CeresBatchConfig, KeysOfTheFiltersAreRefusedByName) {

@@ -359,8 +359,8 @@ TEST(FixedLag, IsRefusedWhatItCannotDo) {
   const std::string window = ", lag_s: 0.3";
   expect_refused(window, "sensors.scale.roles.inverse_distance",
                  "{block: template.inverse_distance, mode: known}",
-                 "estimator type 'fixed_lag' does not support known roles: "
-                 "sensors.scale.roles.inverse_distance.mode");
+                 "sensors.scale.roles.inverse_distance.mode: "
+                 "estimator type 'fixed_lag' does not support known roles");
   expect_refused(window, "state.template.consider", "[inverse_distance]",
                  "estimator type 'fixed_lag' does not support consider blocks");
   expect_refused(window, "estimators.one.gate", "0.99", "estimator type 'fixed_lag' has no gate");

@@ -411,6 +411,15 @@ TEST_F(HostTest, ParametersThatDoNotFitTogetherAreABadConfig) {
               [&] { host.CreateSensor("misfit", unlucky.root()); });
 }
 
+TEST_F(HostTest, MoreParametersThanThereMayBeAreRefused) {
+  const PluginHost host({Built("bad_create")});
+  const Config one = Parse("{model: asks_much, distinct: false}");
+  EXPECT_NO_THROW(host.CreateSensor("asks_much", one.root()));
+  const Config much = Parse("{model: asks_much, distinct: true}");
+  ExpectError(ExitCode::kPlugin, {"model 'asks_much' asks for more than 4096 parameters"},
+              [&] { host.CreateSensor("asks_much", much.root()); });
+}
+
 TEST_F(HostTest, WhatAModelSaysIsOneLineOfUtf8) {
   const PluginHost host({Built("bad_create")});
   const Config config = Parse("model: forges");

@@ -130,8 +130,8 @@ std::string PluginListJson(const PluginHost& host) {
   Json json = Json::array();
   for (const PluginEntry* entry : Sorted(host)) json.push_back(JsonOf(*entry));
   for (const EstimatorType& type : EstimatorTypes()) {
-    json.push_back(JsonOf({PluginEntry::Kind::kEstimator, type.name, type.doc, "", "", "", 0, false,
-                           false, type.kind}));
+    json.push_back(JsonOf({PluginEntry::Kind::kEstimator, type.name, type.doc, "", "", "", 0,
+                           &type.support, false, type.kind}));
   }
   return internal::JsonText(json);
 }

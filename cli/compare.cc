@@ -11,6 +11,7 @@
 #include "alidade/resume/run_inputs.h"
 #include "command.h"
 #include "console.h"
+#include "resume.h"
 #include "watchdog.h"
 
 namespace alidade::cli {
@@ -35,7 +36,6 @@ struct CompareArguments {
   std::optional<std::uint64_t> seed;
   std::optional<double> frame_timeout_s = kUsualFrameTimeout_s;
   SweepOptions sweep;
-  bool over_seeds = false;
   CompareOptions options;
   bool all = false;
   bool no_decomposition = false, json = false, markdown = false, latex = false;
@@ -95,7 +95,8 @@ ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compa
   options.observers = {&recorder, &comparer};
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
-  const RunResult result = watchdog.Run(compared.experiment, options, &recorder);
+  const RunResult result = WithWhatIsKept(
+      recorder, [&] { return watchdog.Run(compared.experiment, options, &recorder); });
   progress.Clear();
   FinishOnSignals();
   CompareOptions of_run = arguments.options;
@@ -104,7 +105,7 @@ ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compa
   try {
     comparison = comparer.Finish(result, of_run);
   } catch (const Error&) {  // the run is kept, with its own reason where it has one
-    recorder.Finish(result);
+    WithWhatIsKept(recorder, [&] { recorder.Finish(result); });
     if (result.status == RunStatus::kOk) throw;
     if (result.status == RunStatus::kFailed) PrintErrors(result.reason);
     if (result.status == RunStatus::kStopped) PrintNote(result.reason);
@@ -112,8 +113,10 @@ ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compa
   }
   comparison.notes.insert(comparison.notes.begin(), compared.notes.begin(), compared.notes.end());
   if (result.status != RunStatus::kOk) comparison.notes.push_back(result.reason);
-  AddFiles(recorder, comparison);
-  recorder.Finish(result);
+  WithWhatIsKept(recorder, [&] {
+    AddFiles(recorder, comparison);
+    recorder.Finish(result);
+  });
   Report(comparison, arguments, folder);
   if (result.status == RunStatus::kStopped) {
     PrintNote(result.reason);
@@ -167,8 +170,9 @@ ExitCode CompareConfig(const CompareArguments& arguments) {
   Watchdog watchdog(arguments.frame_timeout_s);
   StopOnSignals();
   ComparedExperiment compared = BuildComparedExperiment(config, host, arguments.options);
-  return arguments.over_seeds ? CompareOverSeeds(arguments, compared, host, folder, watchdog)
-                              : CompareRun(arguments, compared, host, folder, watchdog);
+  return arguments.options.over_seeds
+             ? CompareOverSeeds(arguments, compared, host, folder, watchdog)
+             : CompareRun(arguments, compared, host, folder, watchdog);
 }
 
 ExitCode CompareFinished(const CompareArguments& arguments) {
@@ -196,10 +200,10 @@ bool AreFolders(const std::vector<std::string>& of) {
       "CONFIG | DIR...", "'" + *file + "' is not a folder; expected one config, or run folders");
 }
 
-void CheckOptions(const CompareArguments& arguments, const CLI::App& command) {
-  if (!AreFolders(arguments.of)) return;
+/// Of finished runs.
+void CheckOptions(const CLI::App& command) {
   for (const char* option : {"--runs", "--first-seed", "--jobs", "--seed", "--set", "--plugin-path",
-                             "--allow-outside", "--figures"}) {
+                             "--allow-outside", "--figures", "--frame-timeout"}) {
     if (command.count(option) == 0) continue;
     throw CLI::ValidationError(option, "a finished run is not run again; expected a config");
   }
@@ -266,11 +270,10 @@ void AddCompare(CLI::App& program, Action& action, const std::string& command_li
   AddOptions(command, *arguments);
   command.footer(kCompareFooter);
   command.callback([&action, &command, arguments] {
-    CheckOptions(*arguments, command);
-    arguments->over_seeds = command.count("--runs") > 0;
-    arguments->options.decompose = !arguments->no_decomposition;
-    arguments->options.over_seeds = arguments->over_seeds;
     const bool folders = AreFolders(arguments->of);
+    if (folders) CheckOptions(command);
+    arguments->options.decompose = !arguments->no_decomposition;
+    arguments->options.over_seeds = command.count("--runs") > 0;
     action = [arguments, folders] {
       return folders ? CompareFinished(*arguments) : CompareConfig(*arguments);
     };

@@ -30,8 +30,8 @@ class Estimator {
   /// Process is then of no use to anyone but the estimator, and Smooth gives the estimates.
   virtual bool offline() const { return false; }
   /// Once, after the last frame: the estimates of all frames, in their order. The events of the
-  /// smoothing itself come with the last report. Errors: where there is nothing to emit, failed()
-  /// turns true and the text of the error says why; whatever `emit` throws.
+  /// smoothing itself come with the last report. Errors: where there is nothing to emit, or not
+  /// all, failed() turns true and the text of the error says why; whatever `emit` throws.
   virtual void Smooth(const Emit& /*emit*/) {}
   /// Where Smooth takes long, it asks `stop` now and then; where that is true it ends by an Error
   /// of kStopped. A null function never stops.

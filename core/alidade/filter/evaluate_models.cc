@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 
 #include "alidade/base/all_finite.h"
@@ -184,7 +183,8 @@ Outcome InvertAt(const SensorBinding& sensor, const SensorPlace& place,
   for (const Space& role : model.roles()) most += role.geometry.tangent;
   std::fill_n(roles.begin() + model.initialised_role(), count, nullptr);
   inverse.from.clear();
-  inverse.by_role.assign(static_cast<std::size_t>(rows * most), kNotWritten);
+  inverse.by_role.assign(static_cast<std::size_t>(rows) * static_cast<std::size_t>(most),
+                         kNotWritten);
   inverse.of_role.assign(roles.size(), nullptr);
   for (std::size_t i = 0; i < roles.size(); ++i) {
     if (roles[i] == nullptr || place.columns[i] < 0) continue;

@@ -2,7 +2,6 @@
 #include "alidade/filter/fast_path.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -192,7 +191,7 @@ ALIDADE_INLINE FastPath::Taken FastPath::Take(Sensor& sensor, const Measurement&
   const int m = M > 0 ? M : sensor.rows;
   const double* const z = measurement.values.data();
   if (std::ssize(measurement.values) != m || !measurement.covariance.empty() ||
-      Defect(z, m) != 0.0 || at + m > kRows) {
+      !measurement.known.empty() || Defect(z, m) != 0.0 || at + m > kRows) {
     return Taken::kUnusual;
   }
   sensor.seen.z = z;
@@ -354,11 +353,12 @@ std::unique_ptr<FastPath> FastPath::For(const FastParts& parts) {
     return block.has_covariance() && block.geometry().kind == GeometryKind::kVector &&
            block.value_offset == block.tangent_offset;
   };
-  if (f.binding->system.landmarks || !IsSmall(f.state.covariance()) ||
-      parts.options.fuse != Fuse::kJoint || f.blocks.waiting || f.blocks.considering ||
-      std::ssize(f.state.values()) != n || !std::ranges::all_of(f.state.layout().blocks(), plain)) {
+  if (f.binding->system.landmarks || !IsSmall(f.state.covariance()) || f.blocks.waiting ||
+      f.blocks.considering || std::ssize(f.state.values()) != n ||
+      !std::ranges::all_of(f.state.layout().blocks(), plain)) {
     return nullptr;
   }
+  parts.f.said.last_used.z.reserve(kMostOfOne);
   std::unique_ptr<FastPath> path(new FastPath(parts));
   if (!path->AddMotions() || !path->AddSensors()) return nullptr;
   const auto choose = [&]<int... I>(std::integer_sequence<int, I...>) {

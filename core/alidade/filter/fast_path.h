@@ -5,7 +5,6 @@
 #include <memory>
 #include <vector>
 
-#include "alidade/filter/ekf_options.h"
 #include "alidade/filter/gate.h"
 #include "alidade/filter/recovery.h"
 #include "alidade/filter/timeline.h"
@@ -19,17 +18,18 @@ struct FastParts {
   Timeline& time;
   Gate& gate;
   Recovery& recovery;
-  const EkfOptions& options;
 };
 
-/// The fast path of a filter whose method is Linear: takes the steps and updates in which nothing
+/// The fast path of a filter whose method is Linear, with joint updates: takes the steps and updates in which nothing
 /// but acceptance and gating happens, in functions compiled for the number of states. Of a frame
 /// with anything else it does the step at most, and says false: the frame loop then does the rest
-/// and finds the words. The first frame of all is the loop's.
+/// and finds the words. The first frame of all is the loop's, where Filter::Start gave no time.
 class FastPath {
  public:
-  /// Null where the filter is not one of few states, all of them vectors in the order of the
-  /// layout, with plain joint updates. It points into the parts.
+  /// Null where the filter is not one of few states, all of them estimated vectors in the order of
+  /// the layout, and sensors of a vector of at most 3 elements each, all of whose
+  /// roles are corrected and linearised at the estimate, without loss or known numbers. It points
+  /// into the parts.
   static std::unique_ptr<FastPath> For(const FastParts& parts);
   /// As a filter processes a frame, all of it or nothing but the step.
   bool Process(const Frame& frame);
@@ -64,7 +64,7 @@ class FastPath {
     double pht[kRows * N];  ///< P H', by columns
     double s[kRows * kRows];
     double innovation[kRows];
-    double* gain[kRows];  ///< where to report each row's column of K
+    double* gain[kRows];  ///< where to report each row's column of K; a report that moves keeps it
   };
 
   enum class Taken { kUnusual, kLeftOut, kStacked };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/filter/filter.h"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -83,21 +84,16 @@ void CheckReading(const std::vector<StreamInfo>& streams, const System& system,
 }  // namespace
 
 int Filter::stream(std::string_view name) const {
-  std::vector<std::string> known;
   const std::vector<StreamInfo>& streams = loop_->f.binding->streams;
-  for (std::size_t i = 0; i < streams.size(); ++i) {
-    if (streams[i].name == name) return static_cast<int>(i);
-    known.push_back(streams[i].name);
-  }
-  RefuseName("stream", name, known);
+  const auto found = std::ranges::find(streams, name, &StreamInfo::name);
+  if (found == streams.end()) RefuseName("stream", name, internal::NamesOf(streams));
+  return static_cast<int>(found - streams.begin());
 }
 
 BlockId Filter::block(std::string_view name) const {
   const BlockId id = system().layout.Find(name);
-  if (id >= 0) return id;
-  std::vector<std::string> known;
-  for (const Block& block : system().layout.blocks()) known.push_back(block.name);
-  RefuseName("block", name, known);
+  if (id < 0) RefuseName("block", name, internal::NamesOf(system().layout.blocks()));
+  return id;
 }
 
 const UpdateReport& Filter::Push(Timestamp timestamp, const std::vector<Reading>& readings) {
@@ -114,18 +110,14 @@ const UpdateReport& Filter::Push(Timestamp timestamp, const std::vector<Reading>
 State Filter::At(Timestamp timestamp) const {
   FrameLoop later(*loop_);
   later.GoTo(timestamp);
-  return later.f.state;
+  return std::move(later.f.state);
 }
 
 std::optional<Prediction> Filter::Expect(std::string_view sensor, Timestamp timestamp,
                                          std::int64_t landmark,
                                          const std::vector<double>& known) const {
   const int index = system().FindSensor(sensor);
-  if (index < 0) {
-    std::vector<std::string> names;
-    for (const SensorBinding& one : system().sensors) names.push_back(one.name);
-    RefuseName("sensor", sensor, names);
-  }
+  if (index < 0) RefuseName("sensor", sensor, internal::NamesOf(system().sensors));
   CheckKnown("sensor '" + std::string(sensor) + '\'',
              system().sensors[static_cast<std::size_t>(index)].model.known_size(), known);
   FrameLoop later(*loop_);

@@ -40,7 +40,7 @@ struct Prediction {
 /// What a frame goes through:
 ///
 ///   step         to its timestamp, in parts where a control input changes or a gap is longer than
-///                max_dt_s; noise that a model holds is held over the whole gap
+///                max_dt_s; noise that a model holds is held up to the next update
 ///   initialise   blocks that wait for one of its measurements
 ///   predict      h, r and S of each measurement, all of a group at the same state
 ///   gate         each by itself: r' S^-1 r against chi-square; robust losses; consensus

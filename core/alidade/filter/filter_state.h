@@ -34,7 +34,8 @@ struct FilterState {
   FilterState(std::shared_ptr<const Binding> of, bool keeps_first_estimates);
 
   int size() const { return state.covariance().size(); }  ///< n
-  /// Has to be called when a block of the system gets its first value.
+  /// Has to be called when a block of the system gets a value, its first or another one in place of
+  /// a rejected one.
   void Activate();
   /// Takes an update down in the reports: the gain of all rows (n x m by columns, its rows as they
   /// lie in P; null where none is recorded). Ends the interval of held noise.

@@ -27,8 +27,9 @@ FrameLoop::FrameLoop(System system, const EkfOptions& options,
 
 /// Null afterwards where the frame loop is the only way.
 void FrameLoop::MakeFastPath() {
-  const bool linear = dynamic_cast<const Linear*>(&*method) != nullptr;
-  fast_.path = linear ? FastPath::For(FastParts{f, time_, gate_, recovery_, options_}) : nullptr;
+  const bool apt =
+      options_.fuse == Fuse::kJoint && dynamic_cast<const Linear*>(&*method) != nullptr;
+  fast_.path = apt ? FastPath::For(FastParts{f, time_, gate_, recovery_}) : nullptr;
   fast_.made_at = f.blocks.activations;
 }
 
@@ -154,7 +155,9 @@ bool FrameLoop::Correct(std::span<Row* const> rows) {
   } else if (outcome == Outcome::kNotFinite) {
     Note(f, "not_finite", "the update is not finite; rolled back");
   }
-  for (const Row* const row : rows) row->report->outcome = outcome;
+  for (const Row* const row : rows) {
+    if (row->report->outcome == Outcome::kAccepted) row->report->outcome = outcome;
+  }
   return outcome == Outcome::kAccepted;
 }
 
@@ -181,9 +184,9 @@ std::optional<Prediction> FrameLoop::Expect(int sensor, std::int64_t landmark,
     return std::nullopt;
   }
   row.report->z = one.values;  // as if it measured what it expects
-  if (method->Predict(f, row) != Outcome::kAccepted || gate_.Pass(f, row) != Outcome::kAccepted) {
-    return std::nullopt;
-  }
+  if (method->Predict(f, row) != Outcome::kAccepted) return std::nullopt;
+  const Outcome outcome = gate_.Pass(f, row);  // gated: h at the estimate lies far from its mean
+  if (outcome != Outcome::kAccepted && outcome != Outcome::kGated) return std::nullopt;
   const Eigen::Index m = row.report->dof;
   return Prediction{row.report->h, Eigen::Map<const RowMajor>(row.report->s.data(), m, m)};
 }

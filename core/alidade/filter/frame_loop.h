@@ -26,6 +26,8 @@ class FrameLoop {
  public:
   FrameLoop(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams,
             std::unique_ptr<Method> method);
+  FrameLoop(const FrameLoop&) = default;
+  FrameLoop& operator=(const FrameLoop&) = delete;  // it would keep a fast path into another x
 
   /// All that Filter::Process does. The report is in f.
   void Process(const Frame& frame);

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #include "alidade/base/all_finite.h"
 #include "alidade/filter/stack.h"
@@ -49,11 +48,11 @@ Outcome Linear::Linearise(FilterState& f, Row& row) {
 Outcome Linear::LineariseAtState(FilterState& f, Row& row) {
   MeasurementReport& entry = *row.report;
   const Geometry& geometry = row.model->measurement().geometry;
-  const double* const* const roles = RolesAt(row, f.state.values(), f.state.values());
+  RolesAt(row, f.state.values(), f.state.values());
   Outcome outcome =
-      FindLinearisation(f, row) ? LineariseElsewhere(f, row) : LineariseAt(row, roles);
+      FindLinearisation(f, row) ? LineariseElsewhere(f, row) : LineariseAt(row, row.roles.data());
   if (outcome == Outcome::kOutOfDomain || outcome == Outcome::kFailed) entry.h.clear();
-  if (outcome == Outcome::kAccepted) outcome = NoiseAt(row, roles);
+  if (outcome == Outcome::kAccepted) outcome = NoiseAt(row, row.roles.data());
   if (outcome != Outcome::kAccepted) return outcome;
   geometry.WrapAngles(entry.h.data());
   TakeInnovation(row);

@@ -343,8 +343,6 @@ Outcome Unscented::Predict(FilterState& f, Row& row) {
     Project(f, row, predicted);
     return outcome;
   }
-  row.report->h.clear();
-  row.report->innovation.clear();
   if (!too_wide) NoteRefusal(f, row, outcome);
   return outcome;
 }
@@ -371,9 +369,10 @@ Outcome Unscented::StackPoints(FilterState& f, std::span<Row* const> rows, int h
     Predicted& predicted = PredictedOf(f, *row);
     if (predicted.halvings < halvings) {
       const Outcome outcome = PredictPoints(f, *row, halvings);
-      if (outcome != Outcome::kAccepted) {
-        NoteRefusal(f, *row, outcome);
-        return outcome;
+      if (outcome != Outcome::kAccepted) {  // h is defined at the estimate: it does not diverge
+        if (outcome == Outcome::kFailed) NotePluginFailure(f, *row->binding);
+        row->report->outcome = outcome;
+        return Outcome::kNotFinite;
       }
     }
     const Eigen::Index k = row->report->dof;

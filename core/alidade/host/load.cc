@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cxxabi.h>
 #include <dlfcn.h>
 #include <link.h>
 
 #define BOOST_DLL_USE_STD_FS
-#include <algorithm>
 #include <bit>
 #include <boost/dll/shared_library.hpp>
+#include <csetjmp>
+#include <cstdlib>
 #include <exception>
+#include <span>
 #include <system_error>
 #include <vector>
 
@@ -36,24 +39,40 @@ std::string WalkTable(void* library, const char* symbol) {
   return Defect(reinterpret_cast<const Table* (*)()>(function)());
 }
 
-/// Calls what is run as the process ends: a crash is better found in the child. dlclose would not,
-/// as many a C++ library is never unloaded.
-void RunDestructors(void* library) {
-  link_map* loaded = nullptr;
-  if (::dlinfo(library, RTLD_DI_LINKMAP, static_cast<void*>(&loaded)) != 0) return;
+/// In the child: where it goes on after the exit functions of plugins, once it calls them.
+std::jmp_buf after_exit_functions;
+bool calls_exit_functions = false;
+
+/// To be called in the child before plugins are loaded: exit functions from here on are theirs.
+void BeginExitFunctions() {
+  std::atexit([] {
+    if (calls_exit_functions) std::longjmp(after_exit_functions, 1);
+  });
+}
+
+/// Calls what the libraries, opened since BeginExitFunctions, have run as the process ends: a crash
+/// is better found in the child. dlclose would not, as many a C++ library is never unloaded.
+void RunDestructors(std::span<void* const> opened) {
   using Function = void (*)();
-  const auto at = [&](ElfW(Addr) address) { return std::bit_cast<Function*>(address); };
-  Function* functions = nullptr;
-  Function last = nullptr;
-  std::size_t count = 0;
-  for (const ElfW(Dyn)* entry = loaded->l_ld; entry->d_tag != DT_NULL; ++entry) {
-    const ElfW(Addr) address = loaded->l_addr + entry->d_un.d_ptr;
-    if (entry->d_tag == DT_FINI_ARRAY) functions = at(address);
-    if (entry->d_tag == DT_FINI_ARRAYSZ) count = entry->d_un.d_val / sizeof(Function);
-    if (entry->d_tag == DT_FINI) last = std::bit_cast<Function>(address);
+  for (auto library = opened.rbegin(); library != opened.rend(); ++library) {
+    link_map* loaded = nullptr;
+    if (::dlinfo(*library, RTLD_DI_LINKMAP, static_cast<void*>(&loaded)) != 0) continue;
+    const auto at = [&](ElfW(Addr) address) { return std::bit_cast<Function*>(address); };
+    Function* functions = nullptr;
+    Function last = nullptr;
+    std::size_t count = 0;
+    for (const ElfW(Dyn)* entry = loaded->l_ld; entry->d_tag != DT_NULL; ++entry) {
+      const ElfW(Addr) address = loaded->l_addr + entry->d_un.d_ptr;
+      if (entry->d_tag == DT_FINI_ARRAY) functions = at(address);
+      if (entry->d_tag == DT_FINI_ARRAYSZ) count = entry->d_un.d_val / sizeof(Function);
+      if (entry->d_tag == DT_FINI) last = std::bit_cast<Function>(address);
+    }
+    while (functions != nullptr && count > 0) functions[--count]();
+    if (last != nullptr) last();
   }
-  while (functions != nullptr && count > 0) functions[--count]();
-  if (last != nullptr) last();
+  // What is left, down to that of BeginExitFunctions, which comes back here.
+  calls_exit_functions = true;
+  if (setjmp(after_exit_functions) == 0) abi::__cxa_finalize(nullptr);
 }
 
 /// In the child, which calls the destructors of what is then `opened`.
@@ -75,11 +94,12 @@ std::string TrialLoad(const std::filesystem::path& file, std::uint32_t kind) {
   const ChildEnd end = RunInChild({kTimeLimit_s, 0}, *journal, [&] {
     std::string failure;
     const std::string thrown = ThrownBy([&] {
+      BeginExitFunctions();
       std::vector<void*> opened;
       failure = Try(file, kind, opened);
       if (!failure.empty()) return;
       journal->Enter("destructors");
-      std::ranges::for_each(opened, RunDestructors);
+      RunDestructors(opened);
     });
     return thrown.empty() ? failure : "threw while loading: " + thrown;
   });
@@ -127,11 +147,12 @@ std::set<std::filesystem::path> TryTogether(const std::set<std::filesystem::path
   if (all.empty()) return {};
   const SharedJournal journal;
   const ChildEnd end = RunInChild({kMostSeconds, 0}, *journal, [&]() -> std::string {
+    BeginExitFunctions();
     std::vector<void*> opened;  // they may share statics: none is destroyed before all are tried
     for (const Examined& one : all) {
       if (!Try(one.canonical, one.kind, opened).empty()) return "one fails";
     }
-    std::for_each(opened.rbegin(), opened.rend(), RunDestructors);
+    RunDestructors(opened);
     return "";
   });
   std::set<std::filesystem::path> good;

@@ -226,7 +226,7 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
   experiment.out_of_sequence.ranks = RanksOf(streams, whole);
   experiment.segments = ReadSegments(root, whole, streams);
   for (const auto& [name, entry] : root.At("estimators", "a run").Entries()) {
-    internal::AddCalibrated(calibrated, host, name, experiment);
+    internal::AddEstimator(calibrated, host, name, experiment);
   }
   if (experiment.estimators.empty()) {
     root.At("estimators").Fail("empty", "at least one estimator");

@@ -5,7 +5,6 @@
 #include <exception>
 #include <new>
 
-#include "alidade/base/text_table.h"
 #include "alidade/base/words.h"
 #include "alidade/config/tree.h"
 #include "alidade/filter/built_in.h"
@@ -379,18 +378,13 @@ void CheckStreams(const Node& root, const System& system, const std::vector<Stre
   }
 }
 
-void AddCalibrated(const Config& config, const PluginHost& host, const std::string& name,
-                   Experiment& experiment) {
+void AddEstimator(const Config& config, const PluginHost& host, const std::string& name,
+                  Experiment& experiment) {
   const Node entry = config.root().At("estimators").At(name);
   NamedEstimator named = BuildEstimator(name, entry, config, host, &experiment.source->streams(),
                                         experiment.estimators);
   if (experiment.out_of_sequence.policy == OutOfSequence::kRollback) CheckCanRollBack(named, entry);
   experiment.estimators.push_back(std::move(named));
-}
-
-void AddEstimator(const Config& config, const PluginHost& host, const std::string& name,
-                  Experiment& experiment) {
-  AddCalibrated(WithCalibration(config, *experiment.source), host, name, experiment);
 }
 
 }  // namespace alidade::internal

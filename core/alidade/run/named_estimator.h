@@ -22,13 +22,10 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
                               const PluginHost& host, const std::vector<StreamInfo>* streams,
                               const std::vector<NamedEstimator>& before);
 
-/// Makes the entry `name` of the config's `estimators:` and puts it behind those that the
-/// experiment has; nothing is added where that fails. Errors: those of BuildExperiment.
+/// Makes the entry `name` of the `estimators:` of a config that has the calibration of the data,
+/// and puts it behind those that the experiment has; nothing is added where that fails. Errors:
+/// those of BuildExperiment.
 void AddEstimator(const Config& config, const PluginHost& host, const std::string& name,
                   Experiment& experiment);
-
-/// As AddEstimator, of a config that has the calibration of the data.
-void AddCalibrated(const Config& config, const PluginHost& host, const std::string& name,
-                   Experiment& experiment);
 
 }  // namespace alidade::internal

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "alidade/base/error.h"
 #include "alidade/state/small_kernels.h"
 
 namespace alidade {

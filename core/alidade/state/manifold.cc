@@ -197,10 +197,10 @@ void Geometry::Normalise(double* x) const {
   if (kind == GeometryKind::kAngle) x[0] = alidade::Angle::Wrap(x[0]);
   if (Defect(x) == 0.0) return;
   const double norm = Norm(x, ambient);
-  if (norm > 0.0) {
-    Scale(1.0 / norm, x, ambient);
-  } else {
+  if (norm == 0.0) {
     Identity(x);
+  } else {  // not a number stays none
+    Scale(1.0 / norm, x, ambient);
   }
 }
 

@@ -40,7 +40,7 @@ class CeresBatch : public Estimator {
 
   const UpdateReport& Process(const Frame& frame) override {
     report_.Clear();
-    if (refused_) return report_;
+    if (failed()) return report_;
     const UpdateReport& filter = initialiser_.Process(frame);
     const bool were_few = run_.shape().inputs <= kManyInputs;
     refused_ = !run_.Add(frame, filter, initialiser_.filter(), filtered_);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <cmath>
 
 #include "alidade/base/all_finite.h"
 #include "alidade/base/number_text.h"

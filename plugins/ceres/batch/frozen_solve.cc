@@ -160,8 +160,8 @@ ceres::Solver::Summary SolveFrozen(CondensedRun& run, Eigen::VectorXd& e, int ma
   options.callbacks.push_back(&callback);
   options.logging_type = ceres::SILENT;
   ceres::Solve(options, &problem, &summary);
-  // Where it fails, e is the point evaluated last, at which A may be singular.
-  if (reduced && !summary.IsSolutionUsable()) e = start;
+  // Where it fails, e is the point evaluated last.
+  if (!summary.IsSolutionUsable()) e = start;
   return summary;
 }
 

@@ -14,7 +14,8 @@ namespace alidade::ceres_batch {
 class InitialisingFilter {
  public:
   InitialisingFilter(const System& system, double max_dt_s, const std::vector<StreamInfo>& streams)
-      : filter_(system, OptionsOf(max_dt_s), streams) {}
+      : filter_(system, {.rejection_recovery = RejectionRecovery::kNone, .max_dt_s = max_dt_s},
+                streams) {}
 
   Ekf& filter() { return filter_; }
   /// Its report of a frame.
@@ -35,12 +36,6 @@ class InitialisingFilter {
   }
 
  private:
-  static EkfOptions OptionsOf(double max_dt_s) {
-    EkfOptions options;
-    options.rejection_recovery = RejectionRecovery::kNone;
-    options.max_dt_s = max_dt_s;
-    return options;
-  }
   static bool TellsOfTheData(const Event& event) {
     return event.kind == "input_stale" || event.kind == "input_refused" || event.kind == "substeps";
   }

@@ -12,7 +12,8 @@ namespace {
 /// The value of the camera's role `position`; null where the sensor has none.
 const double* CameraOf(const SensorBinding& sensor, const State& state) {
   for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
-    if (sensor.model.roles()[i].name == "position") return state.value(sensor.roles[i].block);
+    const BlockId block = sensor.roles[i].block;
+    if (sensor.model.roles()[i].name == "position" && block >= 0) return state.value(block);
   }
   return nullptr;
 }
@@ -191,24 +192,29 @@ bool CondensedRun::AddObservation(const Factor& factor, std::size_t epoch,
     }
   }
   const auto here = d * static_cast<Eigen::Index>(epoch);
-  information->h.block(here, here, d, d).noalias() += a_x * a_x.transpose();
-  information->g.segment(here, d).noalias() += a_x * r;
+  const bool of_states = information->h.size() > 0;
+  if (of_states) {
+    information->h.block(here, here, d, d).noalias() += a_x * a_x.transpose();
+    information->g.segment(here, d).noalias() += a_x * r;
+  }
   if (normal.epochs.empty() || normal.epochs.back() != epoch) {
     normal.epochs.push_back(epoch);
     normal.ties.emplace_back(Eigen::MatrixXd::Zero(d, normal.b.size()));
   }
   normal.ties.back().noalias() += a_x * a_l;
   if (a_first.size() == 0) return true;
-  const auto first = d * static_cast<Eigen::Index>(landmark.first->epoch);
-  information->h.block(first, first, d, d).noalias() += a_first * a_first.transpose();
-  information->h.block(here, first, d, d).noalias() += a_x * a_first.transpose();
-  information->g.segment(first, d).noalias() += a_first * r;
+  if (of_states) {
+    const auto first = d * static_cast<Eigen::Index>(landmark.first->epoch);
+    information->h.block(first, first, d, d).noalias() += a_first * a_first.transpose();
+    information->h.block(here, first, d, d).noalias() += a_x * a_first.transpose();
+    information->g.segment(first, d).noalias() += a_first * r;
+  }
   normal.ties.front().noalias() += a_first * a_l;
   return true;
 }
 
 /// The normal equations of a landmark at the inputs l; into `information`, unless null, what its
-/// observations tell of the states, l apart.
+/// observations tell of the states, l apart; with one that is empty only the ties to them.
 bool CondensedRun::NormalOf(const MapLandmark& landmark, const Eigen::VectorXd& l,
                             const std::vector<Point>& points, Undefined undefined, Normal& normal,
                             Information* information) const {

@@ -145,8 +145,7 @@ bool CondensedRun::PutMap(const Eigen::VectorXd& e, const Eigen::MatrixXd& u,
                           std::vector<LandmarkEstimate>& map) {
   std::vector<Point> points;
   if (!PointsOf(e, true, points)) return false;
-  const auto size = std::ssize(read_) * std::ssize(points);
-  Information unused{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size), {}};
+  Information unused;
   for (LandmarkEstimate& estimate : map) {
     const auto found = std::ranges::find_if(landmarks_, [&](const MapLandmark& landmark) {
       return landmark.id == estimate.id && landmark.generation == estimate.generation;

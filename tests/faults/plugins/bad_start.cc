@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A static constructor that ends the process, or changes it, in the way that BAD_START names.
+#include <cxxabi.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -24,6 +25,7 @@
 #define PATH 10
 #define CLOSE 11
 #define MASK 12
+#define AT_EXIT 13
 
 namespace {
 
@@ -45,6 +47,9 @@ struct Start {
     if (BAD_START == PATH) setenv("PATH", "/tmp", 1);
     if (BAD_START == CLOSE) close(STDOUT_FILENO);
     if (BAD_START == MASK) umask(0777);
+    if (BAD_START == AT_EXIT) {  // of no library: no destructor of this one calls it
+      abi::__cxa_atexit([](void*) { std::raise(SIGSEGV); }, nullptr, nullptr);
+    }
   }
 };
 const Start kStart;

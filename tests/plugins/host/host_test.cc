@@ -236,6 +236,7 @@ TEST_F(HostTest, DestructorsThatCrashAreFoundAsItIsLoaded) {
     DamageEntry(file, DT_FINI, [](Elf64_Xword& at) { ++at; });  // amid its first instruction
     ExpectRefused(file, {"crashed", "in the destructors of its statics"});
   }
+  ExpectRefused(Built("start_AT_EXIT"), {"crashed", "in the destructors of its statics"});
 }
 
 // What is there depends on what else is loaded.

@@ -7,6 +7,7 @@
 #include "alidade/compare/candidates.h"
 #include "alidade/compare/compare.h"
 #include "alidade/filter/built_in.h"
+#include "alidade/host/calibration.h"
 #include "alidade/run/named_estimator.h"
 #include "alidade/sweep/sweep_config.h"
 
@@ -130,7 +131,8 @@ void AddVariant(const Variant& variant, const PluginHost& host, ComparedExperime
   }
   try {
     const Config with = WithVariant(compared.config, variant, type, name, compared.filter);
-    internal::AddEstimator(with, host, name, compared.experiment);
+    internal::AddEstimator(internal::WithCalibration(with, *compared.experiment.source), host, name,
+                           compared.experiment);
     compared.config = with;
     compared.added.push_back(name);
     compared.notes.push_back("added '" + name + "': " + variant.what);

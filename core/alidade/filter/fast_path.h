@@ -20,16 +20,17 @@ struct FastParts {
   Recovery& recovery;
 };
 
-/// The fast path of a filter whose method is Linear, with joint updates: takes the steps and updates in which nothing
-/// but acceptance and gating happens, in functions compiled for the number of states. Of a frame
-/// with anything else it does the step at most, and says false: the frame loop then does the rest
-/// and finds the words. The first frame of all is the loop's, where Filter::Start gave no time.
+/// The fast path of a filter whose method is Linear, with joint updates: takes the steps and
+/// updates in which nothing but acceptance and gating happens, in functions compiled for the number
+/// of states. Of a frame with anything else it does the step at most, and says false: the frame
+/// loop then does the rest and finds the words. The first frame of all is the loop's, where
+/// Filter::Start gave no time.
 class FastPath {
  public:
   /// Null where the filter is not one of few states, all of them estimated vectors in the order of
-  /// the layout, and sensors of a vector of at most 3 elements each, all of whose
-  /// roles are corrected and linearised at the estimate, without loss or known numbers. It points
-  /// into the parts.
+  /// the layout, and sensors of a vector of at most 3 elements each, all of whose roles are
+  /// corrected and linearised at the estimate, without loss or known numbers. It points into the
+  /// parts.
   static std::unique_ptr<FastPath> For(const FastParts& parts);
   /// As a filter processes a frame, all of it or nothing but the step.
   bool Process(const Frame& frame);

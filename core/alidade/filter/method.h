@@ -24,8 +24,8 @@ class Method {
   /// why they cannot be had, which it notes.
   virtual Outcome Predict(FilterState& f, Row& row) = 0;
   /// One update with all rows, as Predict left them, R and S weighed since: all of it happens, or
-  /// nothing. kAccepted, or why not, which it notes but for kNotPd and kNotFinite. A row that is the
-  /// reason may have an outcome of its own, in its report.
+  /// nothing. kAccepted, or why not, which it notes but for kNotPd and kNotFinite. A row that is
+  /// the reason may have an outcome of its own, in its report.
   virtual Outcome Correct(FilterState& f, std::span<Row* const> rows) = 0;
 };
 

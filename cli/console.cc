@@ -2,16 +2,22 @@
 #include "console.h"
 
 #include <fcntl.h>
+#include <linux/audit.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <cstddef>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <iterator>
 #include <mutex>
 #include <new>
 #include <system_error>
@@ -35,6 +41,8 @@ extern "C" void HandleStop(int signal_number) {
 constexpr char kCrashed[] =
     "error: crashed, most likely inside a model, a source or an estimator of a plugin";
 constexpr char kExited[] = "error: a model, a source or an estimator of a plugin ended the process";
+constexpr char kStopped[] =
+    "error: a model, a source or an estimator of a plugin wanted to stop the process (SIGSTOP)";
 constexpr char kRemedy[] = "; `alidade check PLUGIN` finds what is wrong with a model\n";
 
 /// The process whose end is looked at; 0: none yet. A child of it ends as it likes.
@@ -55,14 +63,48 @@ void SayWithCall(const char* what) {
   Say(kRemedy);
 }
 
+[[noreturn]] void ExitNow(int code) {
+  for (;;) ::syscall(SYS_exit_group, code);
+}
+
 extern "C" void HandleCrash(int signal_number) {
   SayWithCall(kCrashed);
   ::signal(signal_number, SIG_DFL);
   ::raise(signal_number);
 }
 
-[[noreturn]] void ExitNow(int code) {
-  for (;;) ::syscall(SYS_exit_group, code);
+extern "C" void HandleSelfStop(int) {
+  SayWithCall(kStopped);
+  ExitNow(static_cast<int>(ExitCode::kPlugin));
+}
+
+#ifdef __x86_64__
+constexpr unsigned kArchitecture = AUDIT_ARCH_X86_64;
+#else
+constexpr unsigned kArchitecture = AUDIT_ARCH_AARCH64;
+#endif
+
+/// No watchdog runs in a process that has stopped: its own call with SIGSTOP becomes SIGSYS. What
+/// others send, and ^Z, stop it as ever. Nothing happens where the kernel does not have this.
+void TrapSelfStop() {
+  constexpr auto kWord = BPF_LD | BPF_W | BPF_ABS;
+  constexpr auto kIf = BPF_JMP | BPF_JEQ | BPF_K;
+  sock_filter code[] = {
+      BPF_STMT(kWord, offsetof(seccomp_data, arch)),
+      BPF_JUMP(kIf, kArchitecture, 0, 8),
+      BPF_STMT(kWord, offsetof(seccomp_data, nr)),
+      BPF_JUMP(kIf, SYS_tgkill, 3, 0),
+      BPF_JUMP(kIf, SYS_kill, 0, 5),
+      BPF_STMT(kWord, offsetof(seccomp_data, args[1])),  // of kill
+      BPF_STMT(BPF_JMP | BPF_JA, 1),
+      BPF_STMT(kWord, offsetof(seccomp_data, args[2])),  // of tgkill
+      BPF_JUMP(kIf, SIGSTOP, 0, 1),
+      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_TRAP),
+      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW),
+  };
+  const sock_fprog filter{static_cast<unsigned short>(std::size(code)), code};
+  if (::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0) return;
+  ::syscall(SYS_seccomp, SECCOMP_SET_MODE_FILTER, SECCOMP_FILTER_FLAG_SPEC_ALLOW, &filter);
 }
 
 /// The process is about to end with that code, which nobody asked for while it is watched.
@@ -240,6 +282,9 @@ void ReportCrashes() {
     const bool free = ::sigaction(crash, nullptr, &before) == 0 && before.sa_handler == SIG_DFL;
     if (free) ::sigaction(crash, &action, nullptr);  // else a sanitizer, say, has its own
   }
+  action.sa_handler = HandleSelfStop;
+  ::sigaction(SIGSYS, &action, nullptr);
+  TrapSelfStop();
   watched = ::getpid();
   std::atexit(HandleExit);
 }

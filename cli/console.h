@@ -47,8 +47,8 @@ class Progress {
 };
 
 /// From now on a crash, or an exit of the process before FinishOnSignals(), says that it was inside
-/// a model or estimator; a crash then takes its course, an exit ends with kPlugin. To be called
-/// before plugins are loaded.
+/// a model or estimator; a crash then takes its course, an exit ends with kPlugin, as does a stop
+/// (SIGSTOP) that the process would send itself. To be called before plugins are loaded.
 void ReportCrashes();
 
 /// From now on SIGINT and SIGTERM ask the command to stop; a second one ends the program at once.

@@ -158,6 +158,17 @@ TEST_F(CrashCli, AnExitOfAModelIsNoSuccess) {
   }
 }
 
+// A process that has stopped has no watchdog.
+TEST_F(CrashCli, AModelThatStopsTheProcessEndsIt) {
+  const Outcome outcome = RunModel("stops_itself");
+  EXPECT_EQ(outcome.code, 69) << outcome.out;
+  EXPECT_TRUE(Contains(outcome.err,
+                       "wanted to stop the process (SIGSTOP); the last call of a "
+                       "model: Predict of model 'stops_itself' of plugin " +
+                           kPlugin))
+      << outcome.err;
+}
+
 // FAULTS 67
 TEST_F(CrashCli, AModelThatHangsIsNamedAndWhatWasRecordedIsKept) {
   const Outcome outcome = RunModel("hangs_in_noise", {"--frame-timeout", "0.5"});

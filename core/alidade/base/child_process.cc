@@ -58,7 +58,8 @@ void Limit(int resource, rlim_t value) {
 }
 
 void UseDefaultHandlers() {
-  for (const int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGALRM, SIGTERM, SIGINT}) {
+  for (const int signal :
+       {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGSYS, SIGALRM, SIGTERM, SIGINT}) {
     std::signal(signal, SIG_DFL);
   }
 }

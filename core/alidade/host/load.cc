@@ -51,9 +51,10 @@ void BeginExitFunctions() {
 }
 
 /// Calls what the libraries, opened since BeginExitFunctions, have run as the process ends: a crash
-/// is better found in the child. dlclose would not, as many a C++ library is never unloaded.
+/// is better found in the child. dlclose would not, as many a C++ library is never unloaded. They
+/// get numbers that are no addresses: what works with what the registers happen to hold fails here.
 void RunDestructors(std::span<void* const> opened) {
-  using Function = void (*)();
+  using Function = void (*)(long, long, long, long, long, long, ...);
   for (auto library = opened.rbegin(); library != opened.rend(); ++library) {
     link_map* loaded = nullptr;
     if (::dlinfo(*library, RTLD_DI_LINKMAP, static_cast<void*>(&loaded)) != 0) continue;
@@ -67,8 +68,8 @@ void RunDestructors(std::span<void* const> opened) {
       if (entry->d_tag == DT_FINI_ARRAYSZ) count = entry->d_un.d_val / sizeof(Function);
       if (entry->d_tag == DT_FINI) last = std::bit_cast<Function>(address);
     }
-    while (functions != nullptr && count > 0) functions[--count]();
-    if (last != nullptr) last();
+    while (functions != nullptr && count > 0) functions[--count](1, 1, 1, 1, 1, 1);
+    if (last != nullptr) last(1, 1, 1, 1, 1, 1);
   }
   // What is left, down to that of BeginExitFunctions, which comes back here.
   calls_exit_functions = true;

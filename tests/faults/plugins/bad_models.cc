@@ -226,6 +226,7 @@ struct Misbehaves : Right {
     if (kWhat == 10) std::puts("hello");
     if (kWhat == 11) LeaveDaemon();
     if (kWhat == 12) ::_exit(0);
+    if (kWhat == 13) std::raise(SIGSTOP);
     return Right::Predict(x, y, z);
   }
   /// Leaves a process that has left this one's group and session, with a name of its own.
@@ -497,12 +498,12 @@ ALIDADE_PLUGIN(SENSOR(Right, "right"), SENSOR(MayHaveBias, "may_have_bias"),
                SENSOR(HangsInNoise, "hangs_in_noise"), SENSOR(ThrowsInDestroy, "throws_in_destroy"),
                SENSOR(ThrowsInCreate, "throws_in_create"), SENSOR(Misbehaves<1>, "exits"),
                SENSOR(Misbehaves<2>, "crashes"), SENSOR(Misbehaves<12>, "exits_at_once"),
-               SENSOR(Misbehaves<3>, "hangs"), SENSOR(Misbehaves<4>, "eats_memory"),
-               SENSOR(Misbehaves<5>, "rounds_upward"), SENSOR(Misbehaves<6>, "sets_locale"),
-               SENSOR(Misbehaves<7>, "leaks"), SENSOR(Misbehaves<8>, "changes_folder"),
-               SENSOR(Misbehaves<9>, "leaks_files"), SENSOR(Misbehaves<10>, "prints"),
-               SENSOR(Misbehaves<11>, "leaves_daemons"), SENSOR(LosesItself, "loses_itself"),
-               SENSOR(CrashesInCreate, "crashes_in_create"),
+               SENSOR(Misbehaves<13>, "stops_itself"), SENSOR(Misbehaves<3>, "hangs"),
+               SENSOR(Misbehaves<4>, "eats_memory"), SENSOR(Misbehaves<5>, "rounds_upward"),
+               SENSOR(Misbehaves<6>, "sets_locale"), SENSOR(Misbehaves<7>, "leaks"),
+               SENSOR(Misbehaves<8>, "changes_folder"), SENSOR(Misbehaves<9>, "leaks_files"),
+               SENSOR(Misbehaves<10>, "prints"), SENSOR(Misbehaves<11>, "leaves_daemons"),
+               SENSOR(LosesItself, "loses_itself"), SENSOR(CrashesInCreate, "crashes_in_create"),
                SENSOR(HangsInCreate, "hangs_in_create"), SENSOR(HangsInDestroy, "hangs_in_destroy"),
                SENSOR(AsksLate, "asks_late"),
                ALIDADE_SENSOR_BY(MakeWildDescription, "wild_description", "", ""),

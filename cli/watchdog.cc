@@ -31,10 +31,6 @@ void AddFrameTimeout(CLI::App& command, std::optional<double>& limit_s) {
       ->default_str("60");
 }
 
-std::string Watchdog::Frames::Text() const {
-  return count <= 1 ? "its start" : "one frame, after " + std::to_string(count - 2) + " others";
-}
-
 Watchdog::Watchdog(std::optional<double> limit_s) : limit_s_(limit_s) {
   try {
     thread_ = std::thread([this] { Watch(); });
@@ -63,8 +59,15 @@ RunResult Watchdog::Run(Experiment& experiment, RunOptions options, const Record
   options.busy = [&](bool busy) {
     const std::lock_guard again(mutex_);
     frames->busy = busy;
-    frames->count += busy ? 1 : 0;
+    frames->started = frames->started || !busy;
     frames->spell = {};
+  };
+  options.progress = [&, progress = options.progress](std::int64_t done, std::int64_t all) {
+    {
+      const std::lock_guard again(mutex_);
+      frames->done = done;
+    }
+    if (progress) progress(done, all);
   };
   return alidade::Run(experiment, options);
 }
@@ -88,8 +91,11 @@ void Watchdog::Watch() {
     if (call_ != 0) Check(of_call_, passed_s, call.slot, kNoReturn, kNoReturn);
     for (Frames& frames : runs_) {
       if (!frames.busy) continue;
-      Check(frames.spell, passed_s, frames.last_call, "an estimator works on " + frames.Text(),
-            "an estimator does not finish " + frames.Text());
+      const std::string of = frames.started
+                                 ? "one frame, after " + std::to_string(frames.done) + " others"
+                                 : "its start";
+      Check(frames.spell, passed_s, frames.last_call, "an estimator works on " + of,
+            "an estimator does not finish " + of);
     }
   }
 }

@@ -48,10 +48,9 @@ class Watchdog {
     const std::atomic<const void*>& last_call;  ///< of its thread
     const Recorder* recorder;                   ///< null: none
     bool busy = false;
-    std::int64_t count = 0;  ///< how often one began
-    Spell spell = {};        ///< of the one at hand
-
-    std::string Text() const;
+    bool started = false;   ///< the work before the first frame is done
+    std::int64_t done = 0;  ///< frames
+    Spell spell = {};       ///< of what it is busy with
   };
 
   void Watch();

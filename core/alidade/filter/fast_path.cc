@@ -204,7 +204,7 @@ ALIDADE_INLINE FastPath::Taken FastPath::Take(Sensor& sensor, const Measurement&
     entry.outcome = Outcome::kInvalid;
     return Taken::kLeftOut;
   }
-  if (std::ssize(entry.gain) != m * N) Fit(entry, m, N);
+  if (entry.dof != m || std::ssize(entry.gain) != m * N) Fit(entry, m, N);
   entry.sensor = sensor.index;
   entry.landmark = measurement.landmark;
   entry.dof = m;

@@ -91,13 +91,13 @@ Event& Note(FilterState& f, const char* kind, std::string text) {
   return f.report.events.back();
 }
 
-void NotePluginFailure(FilterState& f, const SensorBinding& sensor) {
-  Note(f, "plugin_failed", "sensor '" + sensor.name + "': " + sensor.model.error_text());
+void NotePluginFailure(FilterState& f, const Row& row) {
+  Note(f, "plugin_failed", "sensor '" + row.binding->name + "': " + row.model->error_text());
 }
 
 void NoteRefusal(FilterState& f, const Row& row, Outcome outcome) {
   const SensorBinding& sensor = *row.binding;
-  if (outcome == Outcome::kFailed) NotePluginFailure(f, sensor);
+  if (outcome == Outcome::kFailed) NotePluginFailure(f, row);
   char& said = f.said.out_of_domain[static_cast<std::size_t>(row.sensor)];
   // A landmark behind the camera, say, is no divergence.
   if (outcome != Outcome::kOutOfDomain || row.on_landmark() || said != 0) return;

@@ -71,7 +71,7 @@ Event& Note(FilterState& f, const char* kind, std::string text);
 /// Tells why h of a row could not be had; outside its domain, by which the filter counts as
 /// diverged, once until the sensor is accepted again.
 void NoteRefusal(FilterState& f, const Row& row, Outcome outcome);
-void NotePluginFailure(FilterState& f, const SensorBinding& sensor);
+void NotePluginFailure(FilterState& f, const Row& row);
 /// Ends the filter: what happened, the state that is left, the measurement that led there.
 void End(FilterState& f, const char* kind, const std::string& what);
 

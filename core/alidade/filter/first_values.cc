@@ -37,7 +37,7 @@ Outcome Invert(FilterState& f, Row& row, const LandmarkOptions::Prior* prior, In
       InvertAt(*row.binding, *row.place, *row.measurement,
                prior == nullptr ? nullptr : &prior->inverse_distance, row.roles, inverse);
   if (outcome == Outcome::kAccepted) outcome = NoiseAt(row, row.roles.data());
-  if (outcome == Outcome::kFailed) NotePluginFailure(f, *row.binding);
+  if (outcome == Outcome::kFailed) NotePluginFailure(f, row);
   if (outcome != Outcome::kAccepted) {
     return outcome == Outcome::kOutOfDomain ? Outcome::kInvalid : outcome;
   }

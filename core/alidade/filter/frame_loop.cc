@@ -60,7 +60,7 @@ void FrameLoop::Run(const Frame& frame) {
   if (refused) return;
   const std::span<Row> all = rows_.all();
   for (const Row& row : all) {
-    if (row.report->outcome == Outcome::kFailed) NotePluginFailure(f, *row.binding);
+    if (row.report->outcome == Outcome::kFailed) NotePluginFailure(f, row);
   }
   if (f.blocks.waiting) InitialiseWaiting(f, all);
   if (landmarks) landmarks->Attach(f, all);

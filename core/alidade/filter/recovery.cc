@@ -51,7 +51,9 @@ bool Inflate(FilterState& f, const SensorBinding& sensor) {
   constexpr double kInflation = 10.0;
   bool any = false;
   for (const RoleBinding& role : sensor.roles) {
-    if (role.block < 0 || role.mode != RoleMode::kEstimate) continue;
+    const auto same = [&](const RoleBinding& other) { return other.block == role.block; };
+    const bool again = &role != &*std::ranges::find_if(sensor.roles, same);
+    if (role.block < 0 || role.mode != RoleMode::kEstimate || again) continue;
     const Block& block = f.state.layout()[role.block];
     if (!block.has_covariance() || block.status != BlockStatus::kEstimated) continue;
     const int n = block.geometry().tangent;

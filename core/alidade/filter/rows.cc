@@ -54,7 +54,7 @@ Row& Rows::Add(const Measurement& measurement, int sensor, const Binding& bindin
 
 /// What speaks against the measurement of a row, by itself.
 Outcome Rows::OutcomeOf(const Row& row) {
-  constexpr double kRounding = 1e-12;
+  constexpr double kRounding = 1e-12, kSymmetric = 1e-9;
   const Measurement& m = *row.measurement;
   if (!AllFinite(m.values) || !AllFinite(m.covariance) || !AllFinite(m.known)) {
     return Outcome::kNotFinite;
@@ -62,7 +62,9 @@ Outcome Rows::OutcomeOf(const Row& row) {
   if (!m.covariance.empty()) {
     const int size = row.model->measurement().geometry.tangent;
     const Eigen::Map<const Eigen::MatrixXd> r(m.covariance.data(), size, size);
-    if (SquareRootOf(r, ldlt_, root_) < -kRounding) return Outcome::kInvalid;
+    if (!r.isApprox(r.transpose(), kSymmetric) || SquareRootOf(r, ldlt_, root_) < -kRounding) {
+      return Outcome::kInvalid;
+    }
   }
   return alidade::OutcomeOf(row.model->Valid(m.values.data(), m.known.data()));
 }

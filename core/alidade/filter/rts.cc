@@ -71,7 +71,7 @@ Outcome Taped::Correct(FilterState& f, std::span<Row* const> rows) {
   const Eigen::MatrixXd p = f.state.covariance().Dense();
   const std::vector<double> before = f.state.values();
   const Outcome outcome = linear_.Correct(f, rows);
-  if (outcome != Outcome::kAccepted) return outcome;
+  if (outcome != Outcome::kAccepted || f.size() == 0) return outcome;
   // The filter has factorised the same S.
   const Eigen::LLT<Eigen::MatrixXd> s(all.h * p * all.h.transpose() + all.noise);
   const Eigen::MatrixXd weighted = s.solve(all.h);  // S^-1 H

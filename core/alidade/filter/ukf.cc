@@ -370,7 +370,7 @@ Outcome Unscented::StackPoints(FilterState& f, std::span<Row* const> rows, int h
     if (predicted.halvings < halvings) {
       const Outcome outcome = PredictPoints(f, *row, halvings);
       if (outcome != Outcome::kAccepted) {  // h is defined at the estimate: it does not diverge
-        if (outcome == Outcome::kFailed) NotePluginFailure(f, *row->binding);
+        if (outcome == Outcome::kFailed) NotePluginFailure(f, *row);
         row->report->outcome = outcome;
         return Outcome::kNotFinite;
       }

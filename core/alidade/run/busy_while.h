@@ -5,7 +5,7 @@
 
 namespace alidade::internal {
 
-/// Tells RunOptions::busy that an estimator works, for as long as this lives.
+/// Tells RunOptions::busy that an estimator or an observer works, for as long as this lives.
 class BusyWhile {
  public:
   explicit BusyWhile(const std::function<void(bool)>& busy) : busy_(busy) {

@@ -141,7 +141,10 @@ void RunFrames(Experiment& experiment, std::vector<Running>& running, const RunO
     for (std::size_t i = 0; i < experiment.segments.size(); ++i) {
       seen.in_segment[i] = InSegment(experiment.segments[i], seen.frame);
     }
-    for (RunObserver* const observer : options.observers) observer->OnFrame(seen.frame);
+    for (RunObserver* const observer : options.observers) {
+      const internal::BusyWhile works(options.busy);  // it may call models
+      observer->OnFrame(seen.frame);
+    }
     if (keep) kept.push_back(seen);
     bool go_on = true;
     for (std::size_t e = 0; e < running.size(); ++e) {
@@ -192,17 +195,18 @@ void SmoothAll(std::vector<Running>& running, const std::vector<Seen>& kept,
     Estimator& estimator = *one.named.estimator;
     if (one.ended || !estimator.offline()) continue;
     std::vector<Event> events;
-    const auto started = Clock::now();
+    auto works_since = Clock::now();  // rather than the record and the metrics
     try {
       estimator.StopWhen(options.stop);
       estimator.Smooth([&](std::size_t k, const State& state, const UpdateReport& report) {
-        const auto taken = Clock::now();
+        one.result.wall_s += SecondsSince(works_since);
         one.Take(k, kept[k], state, report, options);
         events = report.events;
-        one.result.wall_s -= SecondsSince(taken);  // of the record and the metrics
+        works_since = Clock::now();
       });
-      one.result.wall_s += SecondsSince(started);
+      one.result.wall_s += SecondsSince(works_since);
     } catch (const Error& e) {
+      one.result.wall_s += SecondsSince(works_since);
       if (e.code() == ExitCode::kStopped) {
         NoteStop(one, e.what(), result);
         continue;
@@ -212,7 +216,7 @@ void SmoothAll(std::vector<Running>& running, const std::vector<Seen>& kept,
     }
     one.ended = estimator.failed();
     one.Note(events);
-    if (!one.ended) continue;
+    if (!one.ended || result.status == RunStatus::kFailed) continue;
     Fail(result, ExitCode::kDiverged,
          "estimator '" + one.named.name + "': " + Cause(events, "failed"));
   }
@@ -290,7 +294,6 @@ void Conclude(Running& one, const std::vector<Running>& running, const Experimen
   one.result.diverged = one.diverged || (estimator.offline() && estimator.diverged());
   one.result.inconsistent = !one.metrics.events().empty();
   one.result.failed = one.ended || one.diverged || estimator.failed() || estimator.diverged();
-  result.estimators.push_back(std::move(one.result));
 }
 
 }  // namespace
@@ -348,7 +351,10 @@ RunResult Run(Experiment& experiment, const RunOptions& options) {
   if (reference >= 0 && !running.empty()) {
     guarded([&] { Compare(running, reference, kept, result); });
   }
-  for (Running& one : running) Conclude(one, running, experiment, result);
+  for (Running& one : running) {
+    guarded([&] { Conclude(one, running, experiment, result); });
+    result.estimators.push_back(std::move(one.result));
+  }
   internal::LogDurations(result);
   return result;
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "alidade/base/decompositions.h"
 #include "alidade/base/random.h"
@@ -11,6 +12,8 @@
 
 namespace alidade {
 namespace {
+
+constexpr double kNotWritten = std::numeric_limits<double>::quiet_NaN();
 
 /// Where the landmarks are before the camera, as shares of their usual distance.
 constexpr double kPlaces[][3] = {{-0.2, 0.1, 1.0},   {0.23, -0.07, 1.3}, {0.1, 0.15, 0.8},
@@ -121,10 +124,12 @@ bool Advance(const System& system, double dt_s, Random* random, Trajectory& t,
       next.push_back(t.values[static_cast<std::size_t>(id)]);
     }
     for (auto& value : next) y.push_back(value.data());
-    RowMajor f(n, n), g(n, std::max(1, motion.model.noise_size()));
+    RowMajor f = RowMajor::Constant(n, n, kNotWritten);
+    RowMajor g(n, std::max(1, motion.model.noise_size()));
     const std::vector<double> u = GenericInput(motion.model, random);
     if (motion.model.Step(x.data(), u.data(), nullptr, dt_s, y.data(), f.data(), g.data()) !=
-        Status::kOk) {
+            Status::kOk ||
+        !f.allFinite()) {
       return false;
     }
     std::vector<Eigen::Index> to, from;
@@ -180,8 +185,8 @@ void ObserveBy(const SensorBinding& sensor, const double* known, const System& s
   for (const RoleBinding& role : sensor.roles) {
     roles.push_back(role.block < 0 ? nullptr
                                    : t.values[static_cast<std::size_t>(role.block)].data());
-    j.push_back(
-        RowMajor::Zero(m, role.block < 0 ? 1 : system.layout[role.block].geometry().tangent));
+    j.push_back(RowMajor::Constant(
+        m, role.block < 0 ? 1 : system.layout[role.block].geometry().tangent, kNotWritten));
   }
   std::vector<double*> data;
   std::vector<int> strides;
@@ -199,7 +204,9 @@ void ObserveBy(const SensorBinding& sensor, const double* known, const System& s
     const RoleBinding& role = sensor.roles[i];
     if (role.block < 0 || role.mode == RoleMode::kKnown) continue;
     const int column = t.columns[static_cast<std::size_t>(role.block)];
-    if (column >= 0) seen += j[i] * phi.middleRows(column, j[i].cols());
+    if (column < 0) continue;
+    if (!j[i].allFinite()) return;
+    seen += j[i] * phi.middleRows(column, j[i].cols());
   }
   for (Eigen::Index i = 0; i < m; ++i) rows.Add(seen.row(i).cwiseProduct(scale));
 }

@@ -326,8 +326,11 @@ void CondensedRun::Put(std::size_t k, const Point& point, const Eigen::MatrixXd&
     state.Add(first.block, point.x.data() + block.value_offset, Eigen::MatrixXd::Zero(t, t));
   }
   state.values() = point.x;
-  const Eigen::MatrixXd y = u.transpose().triangularView<Eigen::Lower>().solve(point.s.transpose());
-  state.covariance().SetBlock(0, 0, y.transpose() * y);
+  if (point.s.rows() > 0) {  // else all blocks are constant
+    const Eigen::MatrixXd y =
+        u.transpose().triangularView<Eigen::Lower>().solve(point.s.transpose());
+    state.covariance().SetBlock(0, 0, y.transpose() * y);
+  }
   Report(k, point, report);
 }
 

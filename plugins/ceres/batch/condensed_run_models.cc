@@ -211,8 +211,9 @@ bool CondensedRun::FreezeFactor(Factor& factor, const std::vector<double>& x) {
   if (outcome != Outcome::kAccepted) return Fail(noise + ": " + Why(outcome, model));
   const int m = model.measurement().geometry.tangent;
   const Eigen::LLT<Eigen::MatrixXd> llt(Eigen::Map<const RowMajor>(r.data(), m, m));
-  if (!internal::AllFinite(r) || llt.info() != Eigen::Success) {  // which takes NaN for a success
-    return Fail(noise + " is not positive definite: a batch needs sigma > 0");
+  if (!internal::AllFinite(r)) return Fail(noise + " is not finite");
+  if (llt.info() != Eigen::Success) {
+    return Fail(noise + " is not positive definite: a batch needs sigma > 0, and its square");
   }
   const Eigen::MatrixXd l = llt.matrixL();
   NoteChange(factor.l, l);

@@ -40,7 +40,7 @@ bool CondensedRun::MarginaliseFirst(Eigen::VectorXd& e) {
   const Eigen::MatrixXd& u = newest.r;
   const Eigen::VectorXd step = -newest.x;
   Eigen::MatrixXd y = Eigen::MatrixXd::Zero(std::max(c, n), n);
-  y.topRows(c) = u.transpose().triangularView<Eigen::Lower>().solve(s.transpose());
+  if (n > 0) y.topRows(c) = u.transpose().triangularView<Eigen::Lower>().solve(s.transpose());
   Eigen::VectorXd e0 = Eigen::VectorXd::Zero(y.rows());
   e0.head(c) = -u * step;
   const internal::LeastSquares of_y = internal::SolveLeastSquares(y, e0);

@@ -100,7 +100,7 @@ std::string MapSolve::Minimise(CondensedRun& run, Eigen::VectorXd& e) {
     ++outer;
     at_.cost = summary.final_cost;
     failed_ = summary.termination_type != ceres::CONVERGENCE || !std::isfinite(summary.final_cost);
-    if (failed_) summary_ = WhyNot(summary);
+    if (failed_) summary_ = WhyNot(summary, run);
     if (!failed_ && run.shape().robust()) iterations += IterateWeights(run, e);
     if (failed_) break;
     const std::optional<double> change = run.Freeze(e);
@@ -116,7 +116,7 @@ std::string MapSolve::Minimise(CondensedRun& run, Eigen::VectorXd& e) {
          (outer == 1 ? " solve: " : " solves: ");
 }
 
-std::string MapSolve::WhyNot(const ceres::Solver::Summary& summary) const {
+std::string MapSolve::WhyNot(const ceres::Solver::Summary& summary, const CondensedRun& run) const {
   if (!std::isfinite(summary.final_cost)) {
     return "not converged, the cost is not finite: a measurement lies too far out; `use: "
            "{accepted_by: FILTER}` leaves out what a filter gates";
@@ -124,7 +124,8 @@ std::string MapSolve::WhyNot(const ceres::Solver::Summary& summary) const {
   const bool by_count = summary.termination_type == ceres::NO_CONVERGENCE;
   return "not converged, " + summary.message +
          (by_count ? " A larger " + Setting("max_iterations", options_.max_iterations) + " may do."
-                   : "");
+                   : "") +
+         (run.problem().empty() ? "" : " A step was refused: " + run.problem());
 }
 
 /// U at e, and the Gauss-Newton step that it gives: Ceres stops before the last one. A solver that

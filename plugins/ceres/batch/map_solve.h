@@ -15,7 +15,7 @@
 namespace alidade::ceres_batch {
 
 struct SolveOptions {
-  int max_iterations = 50;
+  int max_iterations = 500;
   int max_outer_iterations = 20;
   double max_dt_s = std::numeric_limits<double>::infinity();  ///< of a step of the motion
 };
@@ -54,7 +54,7 @@ class MapSolve {
   std::string Minimise(CondensedRun& run, Eigen::VectorXd& e);
   int IterateWeights(CondensedRun& run, Eigen::VectorXd& e);
   bool TakeLastStep(CondensedRun& run, Eigen::VectorXd& e);
-  std::string WhyNot(const ceres::Solver::Summary& summary) const;
+  std::string WhyNot(const ceres::Solver::Summary& summary, const CondensedRun& run) const;
   bool Stopped() const { return stop_ && stop_(); }
 
   SolveOptions options_;

@@ -315,6 +315,40 @@ TEST(Ekf, ABlockThatIsResetIsCorrelatedWithWhatItWasResetFrom) {
   EXPECT_NEAR(CovarianceOf(ekf.state(), "p.b", "p.b"), 0.25 + 0.01, 1e-12);
 }
 
+/// z = (a, b)
+struct Both : Sensor<Vec<2>, Vec<1>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"a"}, Quantity{"b"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* a, const T* b, T* z) const {
+    z[0] = a[0];
+    z[1] = b[0];
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, const T*, T* l) const {
+    l[0] = l[3] = T(1.0);
+  }
+};
+
+// Each half of it is a covariance.
+TEST(Ekf, AnAsymmetricCovarianceOfAMeasurementIsInvalid) {
+  System system;
+  AddMotion(system, "p", InProcessMotion(Pair(), "pair"), {{"a", 1.0, 0.5}, {"b", 2.0, 0.5}});
+  AddSensor(system, "both", InProcessSensor(Both(), "both"), {"p.a", "p.b"});
+  Ekf ekf(system, {}, StreamsOf(system));
+  Frame frame = FrameAt(0.0, {{0, 1.0}});
+  frame.measurements[0].values = {1.0, 2.0};
+  for (const double other : {5.0, 0.1}) {
+    frame.measurements[0].covariance = {1.0, 0.1, other, 1.0};
+    EXPECT_EQ(ekf.Process(frame).measurements()[0].outcome,
+              other == 0.1 ? Outcome::kAccepted : Outcome::kInvalid);
+    frame.measurements[0].covariance = {1.0, other, 0.1, 1.0};
+    EXPECT_EQ(ekf.Process(frame).measurements()[0].outcome,
+              other == 0.1 ? Outcome::kAccepted : Outcome::kInvalid);
+  }
+}
+
 TEST(Ekf, BlocksStartFromMeasurementsWithTheirCorrelation) {
   System system = DepthFilter();
   system.priors[0] = {0, {}, {}, "disparity"};

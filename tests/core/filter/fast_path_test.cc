@@ -278,6 +278,35 @@ TEST(SmallEkf, TakesAnySquareRootOfTheNoiseAndMotionWithoutNoise) {
   }
 }
 
+/// K times the same number.
+template <int K>
+struct Repeated : Sensor<Vec<K>, Vec<1>> {
+  static constexpr std::array kRoles{Quantity{"x"}};
+  static constexpr Quantity kMeasurement{"z"};
+  template <class T>
+  bool Predict(const T* x, T* z) const {
+    std::fill_n(z, K, x[0]);
+    return true;
+  }
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    for (int i = 0; i < K; ++i) l[(K + 1) * i] = T(0.2);
+  }
+};
+
+// A gain of 3 rows for the 2 states that had a value then has as many numbers as one of 2 for 3.
+TEST(SmallEkf, AReportHasTheSizesOfItsOwnMeasurement) {
+  System system = DepthFilter();
+  system.priors[2] = {2, {}, {}, "inverse_scale"};
+  AddSensor(system, "three", InProcessSensor(Repeated<3>(), "three"), {"target.depth"});
+  AddSensor(system, "two", InProcessSensor(Repeated<2>(), "two"), {"target.depth"});
+  std::vector<Frame> frames = {FrameAt(0.0, {{0, 74.0}, {2, 0.35}}), FrameAt(0.1, {{1, 1.0}}),
+                               FrameAt(0.2, {{0, 74.0}, {3, 0.35}})};
+  frames[0].measurements[1].values = {0.35, 0.34, 0.36};
+  frames[2].measurements[1].values = {0.35, 0.34};
+  EXPECT_EQ(Compare(system, {}, frames)["fast"], 1);
+}
+
 // ---- every number of states ---------------------------------------------------------------------
 
 /// Two numbers of two blocks, with correlated noise.

@@ -174,6 +174,19 @@ TEST(RtsSmoother, HasNothingToGoBackTo) {
   EXPECT_EQ(RtsSmoother(system, {}, StreamsOf(system)).Clone(), nullptr);
 }
 
+TEST(RtsSmoother, AllBlocksMayBeConstant) {
+  const System system = WithStatus(DepthFilter(), "", BlockStatus::kConstant);
+  RtsSmoother smoother(system, {}, StreamsOf(system));
+  for (int k = 0; k < 3; ++k) smoother.Process(FrameAt(0.1 * k, {{0, 80.0}}));
+  int frames = 0;
+  smoother.Smooth([&](std::size_t, const State& state, const UpdateReport& report) {
+    EXPECT_NEAR(ValueOf(state, "target.depth"), system.priors[0].mean[0], 0.2);
+    EXPECT_EQ(report.measurements()[0].outcome, Outcome::kAccepted);
+    ++frames;
+  });
+  EXPECT_EQ(frames, 3);
+}
+
 TEST(RtsSmoother, IsNotMadeWithConsideredOrWaitingBlocks) {
   System considered = DepthFilter();
   const BlockId id = considered.layout.Find("template.inverse_distance");

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 #include "alidade/base/random.h"
 #include "support/driven.h"
@@ -502,6 +503,46 @@ class Breaking : public testing::SwingingTarget {
  private:
   int count_ = 0;
 };
+
+/// Has landmarks at the end, but cannot say where they are.
+struct Mapless : Hindsight {
+  using Hindsight::Hindsight;
+  std::vector<LandmarkEstimate> landmarks() const override {
+    throw std::out_of_range("a landmark that is none");
+  }
+};
+
+TEST(Run, AFailureAtTheEndKeepsTheResults) {
+  Experiment experiment = MakeExperiment();
+  NamedEstimator& first = experiment.estimators[0];
+  first.system.landmarks.emplace();
+  first.estimator = std::make_unique<Mapless>(first.system);
+  const RunResult result = alidade::Run(experiment, {});
+  EXPECT_EQ(result.status, RunStatus::kFailed);
+  EXPECT_EQ(result.code, ExitCode::kInternal);
+  EXPECT_NE(result.reason.find("a landmark that is none"), std::string::npos) << result.reason;
+  ASSERT_EQ(result.estimators.size(), 2u);
+  EXPECT_EQ(result.estimators[1].counts.at("accepted:inverse_scale"), 60);
+}
+
+/// Fails in its smoothing.
+struct FailsLate : Hindsight {
+  using Hindsight::Hindsight;
+  void Smooth(const Emit&) override {
+    failed_ = true;
+    throw Error(ExitCode::kDiverged, "no optimum");
+  }
+};
+
+TEST(Run, TheFirstFailureIsTheReason) {
+  Experiment experiment = MakeExperiment();
+  NamedEstimator& alone = experiment.estimators[1];
+  alone.estimator = std::make_unique<FailsLate>(alone.system);
+  EXPECT_EQ(alidade::Run(experiment, {}).reason, "estimator 'alone': no optimum");
+  alone.estimator = std::make_unique<FailsLate>(alone.system);
+  experiment.estimators.push_back(ExplodingEstimator(experiment.source->streams()));
+  EXPECT_NE(alidade::Run(experiment, {}).reason.find("estimator 'exploding'"), std::string::npos);
+}
 
 TEST(Run, ADefectIsAResultToo) {
   Experiment experiment = MakeExperiment();

@@ -85,6 +85,19 @@ TEST(CeresBatchNoInputs, AFirstValueMayComeLate) {
   }
 }
 
+// Their model has noise, of which nothing is seen.
+TEST(CeresBatchNoInputs, AllBlocksMayBeConstantThoughTheyMove) {
+  const System system = testing::WithStatus(testing::DepthFilter(), "", BlockStatus::kConstant);
+  const std::vector<Frame> frames = {FrameAt(0.0, {{0, 80.0}}), FrameAt(0.1, {{0, 80.0}}),
+                                     FrameAt(0.4, {{0, 80.0}}), FrameAt(0.5, {{0, 80.0}})};
+  for (const std::string& options : kAll) {
+    SCOPED_TRACE(options);
+    const std::vector<State> found = Estimate(options, system, frames).states;
+    EXPECT_EQ(found.back().covariance().size(), 0);
+    EXPECT_NEAR(*found.back().value(0), system.priors[0].mean[0], 0.5);
+  }
+}
+
 TEST(CeresBatchNoInputs, AFirstValueMayNeverCome) {
   const std::vector<Frame> frames = {FrameAt(0.0, {}), FrameAt(0.1, {}), FrameAt(0.4, {})};
   for (const std::string& options : kAll) {

@@ -61,7 +61,7 @@ TEST_P(OneFault, IsFoundByItsCheckAlone) {
   const bool differs = model == "exits" || model == "eats_memory" || model == "unwritten";
   if (testing::kSanitized && differs) GTEST_SKIP() << "a sanitizer ends it in its own way";
   CheckOptions options;
-  if (model.starts_with("hangs")) options.timeout_s = 1.0;
+  if (model.starts_with("hangs") || model == "stops_itself") options.timeout_s = 1.0;
   options.memory_mb = 64;
   const auto findings = Checked(GetParam().model, options);
   const auto failures = Failures(findings);
@@ -100,6 +100,7 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{66, "exits", "calls", {"Predict ended the process with exit code 0; at x = "}},
         Fault{
             66, "exits_at_once", "calls", {"Predict ended the process with exit code 0; at x = "}},
+        Fault{67, "stops_itself", "calls", {"than 1 s (--timeout); it was in Predict at x = "}},
         Fault{67, "hangs_in_create", "create", {"than 1 s (--timeout); it was in create"}},
         Fault{67, "hangs_in_destroy", "create", {"than 1 s (--timeout); it was in destroy"}},
         Fault{67,

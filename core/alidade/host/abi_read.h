@@ -34,13 +34,13 @@ bool AllZero(const T (&reserved)[N]) {
 /// The bits of `flags` that have to be understood and are not among `known`, as in `0x20000`; "".
 std::string UnknownBits(std::uint32_t flags, std::uint32_t known);
 
-/// A copy of a struct of plugin_abi.h, as far as its own size says; zero beyond. `limit`: bytes
-/// that it may claim at most.
+/// A copy of a struct of plugin_abi.h, as far as its own size says, but no part of a pointer; zero
+/// beyond. `limit`: bytes that it may claim at most.
 template <class T>
 T ReadPrefix(const T* from, std::size_t limit = sizeof(T)) {
   T copy{};
   const std::size_t size = std::min({std::size_t{from->struct_size}, limit, sizeof(T)});
-  std::memcpy(&copy, from, size);
+  std::memcpy(&copy, from, size - size % alignof(T));
   return copy;
 }
 

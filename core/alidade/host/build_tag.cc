@@ -33,7 +33,7 @@ AlidadeBuildTag ReadBuildTag(const fs::path& path) {
   const std::uint64_t size = std::min<std::uint64_t>(section->sh_size, sizeof(AlidadeBuildTag));
   const std::vector<char> bytes = file.Read<char>(section->sh_offset, size, "build tag");
   AlidadeBuildTag print{};
-  std::memcpy(&print, bytes.data(), bytes.size());
+  if (!bytes.empty()) std::memcpy(&print, bytes.data(), bytes.size());
   constexpr std::uint32_t kFixed = offsetof(AlidadeBuildTag, kind);
   if (size < kFixed || std::memcmp(print.magic, "ALIDADE", sizeof(print.magic)) != 0) {
     Refuse(path, "malformed build tag");

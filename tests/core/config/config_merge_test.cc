@@ -71,6 +71,10 @@ TEST(ConfigSet, KeyPathMustFitTheTree) {
   }
 }
 
+TEST(ConfigSet, KeyPathIsUtf8) {
+  EXPECT_EQ(SetError("a.\xff", "1"), "--set: the key is not UTF-8; expected a key in UTF-8");
+}
+
 TEST(ConfigSet, DepthIsLimited) {
   std::string key = "a";
   for (int i = 1; i < 63; ++i) key += ".a";

@@ -72,13 +72,19 @@ std::filesystem::path Resolved(const std::string& path);
 /// be empty. Error: kCannotCreate.
 void KeepInputs(const std::string& output, const std::vector<std::string>& inputs);
 
-/// Where output goes: `given`, or the config's `output:` inside runs/, or runs/PREFIX and the name
-/// of the config: of its folder where it is called config.yaml, else of the file. If nothing is
-/// given, and the folder exists without `force`, it is the first of NAME-2, NAME-3, ... that does
-/// not, which is said unless `quiet`. Errors: kCannotCreate where `given` is runs/ itself, or it
-/// would replace the config or what that reads; kNotTrusted, kBadConfig.
-std::filesystem::path OutputFolder(const std::string& given, const Config& config,
-                                   const Input& input, bool force, bool quiet,
-                                   const std::string& prefix = "");
+/// Where output goes, and where it would if nothing were there.
+struct Output {
+  std::filesystem::path folder, named;
+};
+/// Named is `given`, or the config's `output:` inside runs/, or runs/PREFIX and the name of the
+/// config: of its folder where it is called config.yaml, else of the file. If nothing is given, and
+/// that exists without `force`, the folder is the first of NAME-2, NAME-3, ... that does not.
+/// Errors: kCannotCreate where `given` is runs/ itself, or it would replace the config or what that
+/// reads; kNotTrusted, kBadConfig.
+Output OutputFolder(const std::string& given, const Config& config, const Input& input, bool force,
+                    const std::string& prefix = "");
+/// Says so where the folder is not the one that is named. To be called once the config is known to
+/// be right.
+void TellOutput(const Output& output);
 
 }  // namespace alidade::cli

@@ -89,6 +89,7 @@ ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compa
   record.covariances = true;
   record.plugins = internal::HashesOf(internal::PluginsNamed({compared.config}, host));
   Recorder recorder(record, compared.config);
+  TellIfCrashed(recorder.partial());
   RunComparer comparer(compared.experiment);
   Progress progress("frames", arguments.quiet);
   RunOptions options;
@@ -164,15 +165,15 @@ ExitCode CompareConfig(const CompareArguments& arguments) {
   input.config = arguments.of.front();
   Config config = input.Load();
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
-  const fs::path folder =
-      OutputFolder(arguments.folder, config, input, arguments.force, arguments.quiet, "compare-");
+  const Output output = OutputFolder(arguments.folder, config, input, arguments.force, "compare-");
   const PluginHost host = input.Host(config);
   Watchdog watchdog(arguments.frame_timeout_s);
   StopOnSignals();
   ComparedExperiment compared = BuildComparedExperiment(config, host, arguments.options);
+  if (!arguments.quiet) TellOutput(output);
   return arguments.options.over_seeds
-             ? CompareOverSeeds(arguments, compared, host, folder, watchdog)
-             : CompareRun(arguments, compared, host, folder, watchdog);
+             ? CompareOverSeeds(arguments, compared, host, output.folder, watchdog)
+             : CompareRun(arguments, compared, host, output.folder, watchdog);
 }
 
 ExitCode CompareFinished(const CompareArguments& arguments) {

@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <climits>
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
@@ -24,6 +25,7 @@
 
 #include "alidade/base/error.h"
 #include "alidade/base/signal_stack.h"
+#include "alidade/base/utf8.h"
 #include "alidade/host/last_call.h"
 
 namespace alidade::cli {
@@ -48,18 +50,25 @@ constexpr char kRemedy[] = "; `alidade check PLUGIN` finds what is wrong with a 
 /// The process whose end is looked at; 0: none yet. A child of it ends as it likes.
 std::atomic<pid_t> watched{0};
 
+/// Where what was recorded is; "": nowhere.
+char recorded_in[PATH_MAX] = "";
+
 /// Only calls that a signal handler may make.
 void Say(const char* text) {
   if (::write(STDERR_FILENO, text, std::strlen(text)) < 0) return;
 }
 
-/// What happened, and which model this thread called last.
+/// What happened, which model this thread called last, and where what was recorded is.
 void SayWithCall(const char* what) {
   char call[1024];
   DescribeCall(detail::last_call, call, sizeof call);
   Say(what);
   if (*call != '\0') Say("; the last call of a model: ");
   Say(call);
+  if (*recorded_in != '\0' && ::access(recorded_in, F_OK) == 0) {
+    Say("; what was recorded is in ");
+    Say(recorded_in);
+  }
   Say(kRemedy);
 }
 
@@ -149,18 +158,8 @@ bool WriteAll(int fd, std::string_view text) {
   return true;
 }
 
-/// `text` without what a terminal would obey: control characters but for line ends, those from
-/// U+0080 on too.
-std::string Harmless(std::string_view text) {
-  std::string shown(text);
-  for (std::size_t i = 0; i < shown.size(); ++i) {
-    const auto c = static_cast<unsigned char>(shown[i]);
-    const bool is_c1 = c >= 0x80 && c < 0xA0 && i > 0 && shown[i - 1] == '\xC2';
-    if (is_c1) shown[i - 1] = '?';
-    if (is_c1 || (c < ' ' && c != '\n' && c != '\t') || c == 0x7F) shown[i] = '?';
-  }
-  return shown;
-}
+/// `text` as a terminal may have it: it obeys none of it but the line ends.
+std::string Harmless(std::string_view text) { return internal::ShownUtf8(text, "\n\t"); }
 
 /// What cannot be said on standard error cannot be said.
 void WriteError(std::string_view text) { static_cast<void>(WriteAll(STDERR_FILENO, text)); }
@@ -287,6 +286,10 @@ void ReportCrashes() {
   TrapSelfStop();
   watched = ::getpid();
   std::atexit(HandleExit);
+}
+
+void TellIfCrashed(const std::string& folder) {
+  recorded_in[folder.copy(recorded_in, sizeof recorded_in - 1)] = '\0';
 }
 
 void StopOnSignals() {

@@ -19,7 +19,8 @@ void PrepareConsole();
 void Print(std::string_view text);
 
 /// `error: LINE` on standard error for each line; a line that is indented continues the one above.
-/// Control characters, as a file may hold them, are shown as `?`; in notes too.
+/// Control characters and bytes that are not UTF-8, as a file may hold them, are shown as `?`; in
+/// notes too.
 void PrintErrors(std::string_view text);
 void PrintNote(std::string_view text);
 
@@ -50,6 +51,9 @@ class Progress {
 /// a model or estimator; a crash then takes its course, an exit ends with kPlugin, as does a stop
 /// (SIGSTOP) that the process would send itself. To be called before plugins are loaded.
 void ReportCrashes();
+
+/// From now on these words end with the place of what was recorded, while `folder` is there.
+void TellIfCrashed(const std::string& folder);
 
 /// From now on SIGINT and SIGTERM ask the command to stop; a second one ends the program at once.
 void StopOnSignals();

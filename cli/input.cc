@@ -199,16 +199,19 @@ fs::path FreeFolder(const fs::path& folder) {
 
 }  // namespace
 
-fs::path OutputFolder(const std::string& given, const Config& config, const Input& input,
-                      bool force, bool quiet, const std::string& prefix) {
+Output OutputFolder(const std::string& given, const Config& config, const Input& input, bool force,
+                    const std::string& prefix) {
   const fs::path named = NamedFolder(given, config, input, prefix);
   const fs::path folder = given.empty() && !force ? FreeFolder(named) : named;
   KeepInputs(folder.string(), config.inputs());
-  if (folder != named && !quiet) {
-    PrintNote(named.string() + " exists: the output is " + folder.string() + " (--force replaces " +
-              named.string() + ')');
-  }
-  return folder;
+  return {folder, named};
+}
+
+void TellOutput(const Output& output) {
+  if (output.folder == output.named) return;
+  const std::string named = output.named.string();
+  PrintNote(named + " exists: the output is " + output.folder.string() + " (--force replaces " +
+            named + ')');
 }
 
 }  // namespace alidade::cli

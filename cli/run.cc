@@ -127,8 +127,8 @@ Recorder::Options RecordOf(const RunArguments& arguments, const Config& config,
 ExitCode RunConfig(const RunArguments& arguments) {
   Config config = arguments.input.Load();
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
-  const std::filesystem::path folder =
-      OutputFolder(arguments.folder, config, arguments.input, arguments.force, arguments.quiet);
+  const Output output = OutputFolder(arguments.folder, config, arguments.input, arguments.force);
+  const std::filesystem::path& folder = output.folder;
   if (arguments.resume)
     internal::CheckReadableAgain(config, "a run that is resumed reads it from its start");
   const PluginHost host = arguments.input.Host(config);
@@ -139,6 +139,8 @@ ExitCode RunConfig(const RunArguments& arguments) {
   if (record.resume && IsFinished(folder, config, record.inputs, record.force, arguments.quiet))
     return ExitCode::kOk;
   Recorder recorder(record, config);
+  TellIfCrashed(recorder.partial());
+  if (!arguments.quiet) TellOutput(output);
   if (record.resume && !arguments.quiet) {
     TellResumed(folder, recorder.resumed(), "its frames are computed again, and compared");
   }

@@ -44,14 +44,16 @@ std::string IsInside(const std::string& name) {
 ExitCode RunSimulate(const SimulateArguments& arguments) {
   Config config = arguments.input.Load();
   if (arguments.seed) config.Set("source.seed", std::to_string(*arguments.seed), "--seed");
-  const std::filesystem::path path = OutputFolder(arguments.folder, config, arguments.input,
-                                                  arguments.force, arguments.quiet, "data-");
+  const Output output =
+      OutputFolder(arguments.folder, config, arguments.input, arguments.force, "data-");
+  const std::filesystem::path& path = output.folder;
   const PluginHost host = arguments.input.Host(config);
   const Watchdog watchdog;
   StopOnSignals();
   const SimulateResult result =
       Simulate(config, host, path, arguments.force, StopRequested, arguments.images);
   if (!arguments.quiet) {
+    TellOutput(output);
     std::string text = std::to_string(result.frames) + " frames\nwrote " + path.string() + '\n';
     for (const std::string& file : result.files) text += "  " + (path / file).string() + '\n';
     Print(text);

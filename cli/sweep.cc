@@ -5,6 +5,7 @@
 #include <CLI/Formatter.hpp>
 #include <charconv>
 #include <memory>
+#include <mutex>
 #include <utility>
 
 #include "alidade/resume/run_inputs.h"
@@ -92,6 +93,7 @@ SweepFolder::Options FolderOf(const Task& task) {
 
 /// The options of a sweep into `folder`; says what it takes from there.
 SweepOptions OptionsInto(SweepFolder& folder, const Task& task) {
+  TellIfCrashed(folder.partial());
   SweepOptions options = task.options;
   options.finished = folder.finished();
   if (task.arguments.resume && !task.arguments.quiet) {
@@ -183,8 +185,9 @@ std::vector<std::string> ArgumentsOf(const SweepArguments& arguments) {
 
 ExitCode RunSweep(const SweepArguments& arguments) {
   const Config config = arguments.input.Load();
-  const std::filesystem::path path = OutputFolder(arguments.folder, config, arguments.input,
-                                                  arguments.force, arguments.quiet, "sweep-");
+  const Output output =
+      OutputFolder(arguments.folder, config, arguments.input, arguments.force, "sweep-");
+  const std::filesystem::path& path = output.folder;
   const PluginHost host = arguments.input.Host(config);
   Watchdog watchdog(arguments.frame_timeout_s);
   StopOnSignals();
@@ -197,7 +200,9 @@ ExitCode RunSweep(const SweepArguments& arguments) {
   SweepOptions options = arguments.options;
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
+  std::once_flag told;  // with the first run that could be built
   options.run = [&](Experiment& experiment, const RunOptions& given) {
+    if (!arguments.quiet) std::call_once(told, TellOutput, output);
     return watchdog.Run(experiment, given);
   };
   const Task task{arguments, config, host, options, path, inputs, progress};

@@ -214,19 +214,26 @@ class CsvSource : public Source {
     return true;
   }
 
-  double ReadNumber(const CsvColumn& column) const {
+  double ReadNumber(const CsvColumn& column, bool may_miss = true) const {
     double value = 0.0;
-    const char* const wrong = cell::ParseNumber(cell::Trim(cells_[column.index]), value);
-    if (wrong != nullptr) FailCell(column, wrong);
-    return value;
+    const std::string_view text = cell::Trim(cells_[column.index]);
+    const char* const wrong = cell::ParseNumber(text, value);
+    if (wrong == nullptr) return value;
+    std::string expected = "a finite number";
+    if (may_miss && !std::isfinite(value))
+      expected += ", or 'source.missing: " + cell::Harmless(text) + '\'';
+    FailCell(column, wrong, expected);
   }
 
   Timestamp ReadTimestamp() const {
     if (!layout_.time) return TimestampFromSeconds(static_cast<double>(rows_) / layout_.rate_hz);
     const CsvColumn& column = *layout_.time;
-    const double value = ReadNumber(column);
+    const double value = ReadNumber(column, false);
     const double t_s = value * std::pow(10.0, static_cast<double>(layout_.time_digits) - 9.0);
-    if (!(std::abs(t_s) < 9.2e9)) FailCell(column, "is beyond 292 years", "-9.2e9 s to 9.2e9 s");
+    if (!(std::abs(t_s) < cell::kTimeLimit)) {
+      FailCell(column, "is beyond 292 years",
+               "-9.2e9 s to 9.2e9 s, or the unit of the column, as in 'source.time: {unit: ns}'");
+    }
     const Timestamp timestamp =
         cell::ParseTimestamp(cell::Trim(cells_[column.index]), value, layout_.time_digits);
     const bool same = timestamp == last_timestamp_;

@@ -116,6 +116,16 @@ inline char ReadSeparator(const Node& node) {
   return text[0];
 }
 
+/// The text of a cell that says there is no value.
+inline std::string ReadMissing(const Node& word) {
+  const std::string text = word.Text();
+  if (text == ".nan" || text == ".NaN" || text == ".NAN") {
+    word.Fail("'" + text + "' is not the text of a cell", "the text as the table has it",
+              text.substr(1));
+  }
+  return text;
+}
+
 inline void ReadBlind(const Node& entry, CsvLayout& layout) {
   const std::optional<Node> after = entry.Find("blind_after");
   const std::optional<Node> blind = entry.Find("blind");
@@ -139,6 +149,17 @@ inline void ReadBlind(const Node& entry, CsvLayout& layout) {
   }
 }
 
+/// `, or 'source.separator: ";"'` where the one column that there seems to be is several; else "".
+inline std::string OtherSeparator(const std::vector<std::string>& names) {
+  if (names.size() != 1) return {};
+  for (const char separator : {';', '\t', '|', ',', ' '}) {
+    if (names[0].find(separator) == std::string::npos) continue;
+    const std::string text = separator == '\t' ? "\\t" : std::string(1, separator);
+    return ", or 'source.separator: \"" + text + "\"'";
+  }
+  return {};
+}
+
 /// Finds a column in the header `names` of `file`.
 inline void Resolve(const std::vector<std::string>& names, const std::string& file,
                     CsvColumn& column) {
@@ -150,8 +171,9 @@ inline void Resolve(const std::vector<std::string>& names, const std::string& fi
       expected += (i > 0 ? ", " : "") + cell::Harmless(names[i]);
     }
     if (names.size() > kListed) expected += ", ...";
-    column.node.Fail("no column '" + column.name + "' in " + file, expected,
-                     cell::Harmless(Nearest(column.name, names)));
+    const std::string remedy = OtherSeparator(names);
+    column.node.Fail("no column '" + column.name + "' in " + file, expected + remedy,
+                     remedy.empty() ? cell::Harmless(Nearest(column.name, names)) : "");
   }
   if (std::find(found + 1, names.end(), column.name) != names.end()) {
     column.node.Fail(file + " has two columns '" + column.name + "'", "one");
@@ -178,7 +200,8 @@ inline CsvLayout ReadCsvLayout(const Node& entry) {
   }
   if (const auto missing = entry.Find("missing")) {
     layout.missing.clear();
-    for (const Node& word : missing->ItemsOrOne()) layout.missing.push_back(word.Text());
+    for (const Node& word : missing->ItemsOrOne())
+      layout.missing.push_back(csv_detail::ReadMissing(word));
   }
   csv_detail::ReadBlind(entry, layout);
   return layout;

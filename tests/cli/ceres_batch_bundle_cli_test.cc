@@ -43,7 +43,8 @@ TEST_F(BundleCli, SaysWhatIsWrong) {
   Write("p.txt", "1 1 1\n0 3 1 1\n");
   const Outcome bad = Call({"bundle", "p.txt"});
   EXPECT_EQ(bad.code, 65);
-  EXPECT_TRUE(bad.err.starts_with("error: p.txt:2:3: '3' is none; expected the point")) << bad.err;
+  EXPECT_TRUE(bad.err.starts_with("error: p.txt:2:3: '3' is out of range; expected the point"))
+      << bad.err;
   EXPECT_EQ(Call({"bundle", "p.txt", "--loss", "hubert"}).code, 2);
   EXPECT_EQ(Call({"bundle", "p.txt", "--loss", "none=5"}).code, 2);
   EXPECT_EQ(Call({"bundle", "p.txt", "--camera", "c.yaml"}).code, 2);

@@ -106,6 +106,10 @@ TEST_F(CheckProgram, SaysWhichPluginsAreMissingOrRefused) {
   EXPECT_EQ(source.err,
             "error: 'csv' is a source; expected a sensor or motion model, which is what is "
             "checked\n");
+  const Outcome built_in = Call({"check", "ekf"});
+  EXPECT_EQ(built_in.code, 69);
+  EXPECT_TRUE(built_in.err.starts_with("error: 'ekf' is a built-in estimator; expected a sensor "))
+      << built_in.err;
   EXPECT_EQ(Call({"check"}).code, 2);
   const Outcome states = Call(With(kStereo, {"--states", "0"}));
   EXPECT_EQ(states.code, 2);

@@ -37,6 +37,8 @@ estimators: {ekf: {type: ekf}}
     line.insert(line.end(), options.begin(), options.end());
     return Call(line);
   }
+  /// The hidden folder of a run to `out`, without its process.
+  std::string Partial() const { return (fs::canonical(folder_) / ".out.partial-").string(); }
   static std::string Plugin(const std::string& name) {
     return ALIDADE_BINARY_DIR "/tests/plugins/" + name + ".so";
   }
@@ -72,6 +74,7 @@ TEST_F(CrashCli, ACrashSaysWhereToLookAndTakesItsCourse) {
   EXPECT_TRUE(outcome.err.starts_with("error: crashed, most likely inside a model")) << outcome.err;
   EXPECT_TRUE(Contains(outcome.err, "the last call of a model: Predict of model 'crashes'"))
       << outcome.err;
+  EXPECT_TRUE(Contains(outcome.err, "; what was recorded is in " + Partial())) << outcome.err;
   EXPECT_TRUE(Contains(outcome.err, "`alidade check PLUGIN`")) << outcome.err;
 }
 
@@ -153,7 +156,8 @@ TEST_F(CrashCli, AnExitOfAModelIsNoSuccess) {
     EXPECT_EQ(outcome.code, 69) << outcome.out;
     EXPECT_TRUE(Contains(outcome.err, "ended the process")) << outcome.err;
     EXPECT_TRUE(Contains(outcome.err, "the last call of a model: Predict of model '" +
-                                          std::string(model) + "' of plugin " + kPlugin))
+                                          std::string(model) + "' of plugin " + kPlugin +
+                                          "; what was recorded is in " + Partial()))
         << outcome.err;
   }
 }

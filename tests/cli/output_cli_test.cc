@@ -108,10 +108,12 @@ TEST_F(OutputCli, ErrorsObeyNoControlCharacters) {
         "1m,\xc3\xbc\n0,80,1,2\n");
   const Outcome run = Call({"run", "table.yaml", "--no-figures"});
   EXPECT_EQ(run.code, 78);
-  EXPECT_TRUE(Contains(run.err, "expected one of t_s, ?[31md, ??1m, \xc3\xbc")) << run.err;
+  EXPECT_TRUE(Contains(run.err, "expected one of t_s, ?[31md, ?1m, \xc3\xbc")) << run.err;
   const Outcome missing = Call({"run", "\x1b[31m.yaml"});
   EXPECT_EQ(missing.code, 66);
   EXPECT_TRUE(missing.err.starts_with("error: ?[31m.yaml: ")) << missing.err;
+  const Outcome raw = Call({"run", "\x9b\xff.yaml"});
+  EXPECT_TRUE(raw.err.starts_with("error: ??.yaml: ")) << raw.err;
 }
 
 /// The number in `column` (from 0) of the row that starts with `start`.
@@ -162,6 +164,21 @@ TEST_F(OutputCli, ASecondRunGoesToANumberedFolder) {
     EXPECT_TRUE(Exists("runs/" + name + "/run.json"));
   }
   EXPECT_EQ(Call({"run", "config.yaml", "--no-figures", "-o", "runs/own"}).code, 73);
+}
+
+TEST_F(OutputCli, ARefusedConfigNamesNoFolder) {
+  fs::create_directories(folder_ / "runs/there");
+  for (const std::string command : {"run", "simulate", "sweep", "compare"}) {
+    Arguments line = {command, "config.yaml", "--set", "output=there"};
+    if (command == "sweep") line.insert(line.end(), {"--runs", "2"});
+    const Outcome good = Call(line);
+    EXPECT_TRUE(Contains(good.err, "runs/there exists: the output is runs/there-"))
+        << command << good.err;
+    line.insert(line.end(), {"--set", "source.sede=1"});
+    const Outcome refused = Call(line);
+    EXPECT_EQ(refused.code, 78) << command << refused.err;
+    EXPECT_FALSE(Contains(refused.err, "exists")) << command << refused.err;
+  }
 }
 
 // The first turn takes five of the eight rows, the second three: it ends before the second sensor's

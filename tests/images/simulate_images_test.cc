@@ -160,7 +160,11 @@ TEST_F(SimulateImages, RefusesWhatItCannotWrite) {
   EXPECT_TRUE(Contains(other.err, "expected a name like video.avi")) << other.err;
   const Outcome outside = Simulate(kScene, {"--images", "../images"});
   EXPECT_EQ(outside.code, 77) << outside.err;
-  EXPECT_TRUE(Contains(outside.err, "--images")) << outside.err;
+  EXPECT_TRUE(Contains(outside.err,
+                       "--images: '../images' leaves its folder; expected a path "
+                       "inside 'data/'"))
+      << outside.err;
+  EXPECT_EQ(Simulate(kScene, {"--video", "/tmp/v.avi"}).code, 77);
   const Outcome blind = Call({"simulate", "config.yaml", "-o", "data", "--video", "v.avi"});
   EXPECT_EQ(blind.code, 78);
   EXPECT_TRUE(Contains(blind.err, "camera: missing key, needed by images of a simulation"))

@@ -28,7 +28,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-Journal* g_journal = nullptr;  // of this child, for OnTerminate
+Journal* g_journal = nullptr;  // of this child
 
 /// Says which exception ends the child, then lets it end.
 [[noreturn]] void OnTerminate() {
@@ -222,6 +222,10 @@ void Journal::Enter(const char* call, const std::string& state) {
 }
 
 void Journal::Thrown(const char* what) { std::snprintf(thrown_, sizeof thrown_, "%s", what); }
+
+void EnterInChild(const char* call) {
+  if (g_journal != nullptr) g_journal->Enter(call);
+}
 
 SharedJournal::SharedJournal() {
   void* const memory =

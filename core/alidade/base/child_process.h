@@ -23,6 +23,9 @@ class Journal {
   char call_[128], state_[512], thrown_[256];
 };
 
+/// Enters `call` in the journal of the child that this process is, if it is one.
+void EnterInChild(const char* call);
+
 struct ChildLimits {
   double timeout_s = 10.0;
   int memory_mb = 0;  ///< beyond what the program has already; 0: no limit

@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "alidade/base/timestamp.h"
+#include "alidade/base/utf8.h"
 
 /// What the text of a single cell of a table means, whatever the locale.
 namespace alidade::cell {
@@ -62,13 +63,10 @@ inline Timestamp ParseTimestamp(std::string_view text, double value, std::size_t
   return TimestampFromSeconds(value * std::pow(10.0, static_cast<double>(digits) - 9.0));
 }
 
-/// The start of a cell for a message, without control characters.
+/// The start of a cell for a message: UTF-8 without control characters.
 inline std::string Harmless(std::string_view cell) {
   constexpr std::size_t kShown = 40;
-  std::string shown(cell.substr(0, kShown));
-  for (char& c : shown) {
-    if (static_cast<unsigned char>(c) < ' ' || c == 0x7F) c = '?';
-  }
+  const std::string shown = internal::ShownUtf8(cell.substr(0, kShown), "");
   return cell.size() > kShown ? shown + "..." : shown;
 }
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <string>
 #include <string_view>
 
 namespace alidade::internal {
@@ -35,6 +37,26 @@ inline bool IsUtf8(std::string_view text) {
     text.remove_prefix(size);
   }
   return true;
+}
+
+/// Whether the character of UTF-8 that `text` starts with is a control character, those from U+0080
+/// on too.
+inline bool IsControl(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  return byte(0) < ' ' || byte(0) == 0x7F || (byte(0) == 0xC2 && byte(1) < 0xA0);
+}
+
+/// `text` as it may be shown, whatever is in it: `?` in place of each byte that is not of UTF-8 and
+/// of each control character that is not among `kept`.
+inline std::string ShownUtf8(std::string_view text, std::string_view kept) {
+  std::string shown;
+  while (!text.empty()) {
+    const std::size_t size = Utf8Length(text);
+    const bool plain = size > 0 && (!IsControl(text) || kept.find(text[0]) != kept.npos);
+    shown += plain ? text.substr(0, size) : "?";
+    text.remove_prefix(std::max<std::size_t>(size, 1));
+  }
+  return shown;
 }
 
 }  // namespace alidade::internal

@@ -10,4 +10,9 @@ std::string Join(const std::vector<std::string>& parts, const char* separator) {
   return text;
 }
 
+std::string WithArticle(const std::string& noun) {
+  const bool vowel = noun.find_first_of("aeiou") == 0;
+  return (vowel ? "an " : "a ") + noun;
+}
+
 }  // namespace alidade::internal

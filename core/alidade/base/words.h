@@ -9,6 +9,9 @@ namespace alidade::internal {
 /// `a, b, c`
 std::string Join(const std::vector<std::string>& parts, const char* separator = ", ");
 
+/// `a source`, `an estimator`
+std::string WithArticle(const std::string& noun);
+
 /// The `name` of each.
 template <class Range>
 std::vector<std::string> NamesOf(const Range& named) {

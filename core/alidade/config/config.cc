@@ -8,7 +8,6 @@
 #include <unordered_map>
 
 #include "alidade/base/read_file.h"
-#include "alidade/base/utf8.h"
 #include "alidade/config/tree.h"
 
 namespace alidade {
@@ -280,8 +279,11 @@ Node Config::root() const { return Node(tree_.get()); }
 
 void Config::Set(std::string_view dotted_key, std::string_view value, std::string_view origin) {
   const Place place{std::string(origin)};
-  if (!internal::IsUtf8(dotted_key)) FailAt(place, {}, "the key is not UTF-8", "a key in UTF-8");
   const std::vector<Step> steps = ParseDotted(dotted_key, place);
+  for (const Step& step : steps) {
+    const std::string defect = internal::KeyDefect(step.name);
+    if (!defect.empty()) FailAt(place, {}, defect);
+  }
   if (steps[0].name == "include") {
     FailAt(place, dotted_key, "files are included before it is set", "a key of the file");
   }

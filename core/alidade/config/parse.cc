@@ -92,8 +92,6 @@ std::string CleanText(std::string_view text, const Origin& origin) {
   return TextCheck(origin).Run(text);
 }
 
-constexpr std::size_t kMaxKeyLength = 256;
-
 struct Extent {
   int depth = 0;
   int nodes = 0;
@@ -258,10 +256,7 @@ class TreeBuilder : public YAML::EventHandler {
     if (key.empty()) Fail(mark, "empty key", "text");
     if (key == "<<" && tag == "?")
       Fail(mark, "merge key '<<' is not supported", "the keys themselves");
-    if (key.size() > kMaxKeyLength) Fail(mark, "key longer than 256 bytes: " + Quoted(key));
-    if (std::any_of(key.begin(), key.end(),
-                    [](char c) { return (c >= 0 && c < ' ') || c == 0x7F; }))
-      Fail(mark, "control character in the key " + Quoted(key));
+    if (const std::string defect = KeyDefect(key); !defect.empty()) Fail(mark, defect);
     const auto [first, is_new] = frame.key_lines.emplace(key, mark.line + 1);
     if (!is_new) {
       std::string what = "duplicate key";
@@ -340,6 +335,17 @@ class TreeBuilder : public YAML::EventHandler {
 };
 
 }  // namespace
+
+std::string KeyDefect(const std::string& key) {
+  constexpr std::size_t kMaxKeyLength = 256;
+  if (!IsUtf8(key)) return "the key is not UTF-8";
+  if (key.size() > kMaxKeyLength) return "key longer than 256 bytes: " + Quoted(key);
+  const auto control = [](char c) { return (c >= 0 && c < ' ') || c == 0x7F; };
+  if (std::any_of(key.begin(), key.end(), control)) {
+    return "control character in the key " + Quoted(key);
+  }
+  return {};
+}
 
 std::unique_ptr<ConfigTree> ParseYaml(std::string_view text, const Origin& origin, Budget* budget) {
   const std::string clean = CleanText(text, origin);

@@ -53,6 +53,9 @@ struct Origin {
 /// Reads one YAML document strictly; null where the text holds none.
 std::unique_ptr<ConfigTree> ParseYaml(std::string_view text, const Origin& origin, Budget* budget);
 
+/// What forbids `key` as one, or "".
+std::string KeyDefect(const std::string& key);
+
 const std::string& PathOf(const ConfigTree& tree);
 /// The key path of `key` in the map at `path`.
 std::string PathBelow(const std::string& path, std::string_view key);

@@ -14,11 +14,13 @@ namespace alidade {
 /// Where digits would cancel the Joseph form takes the place of both. With a robust loss on the
 /// sensor R / w(d) stands for R, d^2 = r' S^-1 r.
 ///
-/// Control inputs act as ControlInputs has it. A gap stepped in parts is noted as the event
-/// `substeps`, where it takes at least twice as many as any noted before. Discrete noise
-/// w ~ N(0, I) is held over an interval, which ends with whatever changes the state but a step:
-/// frames without an accepted measurement are part of it. With Lq of its start and M = Cov(x, w), 0
-/// there, each step of it makes
+/// A control input acts from the timestamp of its frame on, until the next one comes or it is as
+/// old as InputBinding::timeout_s; where none acts, u is 0 (event `input_stale`). A gap stepped in
+/// parts is noted as the event `substeps`, where it takes at least twice as many as any noted
+/// before.
+/// Discrete noise w ~ N(0, I) is held over an interval, which ends with whatever changes the state
+/// but a step: frames without an accepted measurement are part of it. With Lq of its start and
+/// M = Cov(x, w), 0 there, each step of it makes
 ///
 ///   N = G Lq,  A = F M:   P' = F P F' + A N' + N A' + N N',   M' = A + N
 ///

@@ -269,8 +269,8 @@ bool FastPath::ProcessSized(FastPath& path, const Frame& frame) {
   if (elapsed > 0) {
     if (f.motions.in_interval()) return false;
     const double dt_s = Seconds(elapsed);
-    if (!time.inputs().empty()) {
-      if (!time.inputs().AllAct(f.timestamp, frame.timestamp)) return false;
+    if (time.has_inputs()) {
+      if (!time.InputsAct(f.timestamp, frame.timestamp)) return false;
       time.UseInputs(f.timestamp, f.motions, f.report.events);
     }
     if (!(dt_s <= time.max_dt_s()) || !path.Step<N>(dt_s)) return false;

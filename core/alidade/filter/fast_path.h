@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
-#include "alidade/filter/gate.h"
 #include "alidade/filter/recovery.h"
+#include "alidade/filter/rows.h"
 #include "alidade/filter/timeline.h"
 #include "alidade/state/small_kernels.h"
 

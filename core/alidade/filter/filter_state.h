@@ -8,9 +8,9 @@
 
 #include "alidade/base/workspace.h"
 #include "alidade/filter/binding.h"
+#include "alidade/filter/estimator.h"
 #include "alidade/filter/motions.h"
 #include "alidade/filter/rows.h"
-#include "alidade/filter/update_report.h"
 #include "alidade/state/state.h"
 
 namespace alidade::internal {

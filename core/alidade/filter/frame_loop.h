@@ -8,14 +8,13 @@
 
 #include "alidade/base/indirect.h"
 #include "alidade/filter/consensus.h"
-#include "alidade/filter/ekf_options.h"
 #include "alidade/filter/fast_path.h"
 #include "alidade/filter/filter.h"
 #include "alidade/filter/filter_state.h"
-#include "alidade/filter/gate.h"
 #include "alidade/filter/landmarks.h"
 #include "alidade/filter/method.h"
 #include "alidade/filter/recovery.h"
+#include "alidade/filter/rows.h"
 #include "alidade/filter/timeline.h"
 
 namespace alidade::internal {

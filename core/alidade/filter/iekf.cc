@@ -9,7 +9,7 @@
 #include "alidade/base/error.h"
 #include "alidade/base/number_text.h"
 #include "alidade/filter/linear.h"
-#include "alidade/filter/stack.h"
+#include "alidade/filter/method.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade {

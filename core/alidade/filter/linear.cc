@@ -5,7 +5,7 @@
 #include <array>
 
 #include "alidade/base/all_finite.h"
-#include "alidade/filter/stack.h"
+#include "alidade/filter/ekf.h"
 #include "alidade/state/small_kernels.h"
 #include "alidade/state/tiles.h"
 
@@ -254,3 +254,10 @@ Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const d
 }
 
 }  // namespace alidade::internal
+
+namespace alidade {
+
+Ekf::Ekf(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams)
+    : Filter(std::move(system), options, streams, std::make_unique<internal::Linear>()) {}
+
+}  // namespace alidade

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "alidade/filter/ekf_options.h"
+#include "alidade/filter/filter.h"
 #include "alidade/filter/filter_state.h"
 
 namespace alidade::internal {

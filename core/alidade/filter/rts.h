@@ -4,15 +4,11 @@
 #include <memory>
 #include <vector>
 
-#include "alidade/filter/ekf_options.h"
 #include "alidade/filter/estimator.h"
+#include "alidade/filter/filter.h"
 #include "alidade/filter/support.h"
 
 namespace alidade {
-
-namespace internal {
-class FrameLoop;
-}
 
 /// Fixed-interval smoother: the estimate of every frame from the measurements of all. An extended
 /// Kalman filter goes forward; the way back is that of Rauch, Tung and Striebel in the adjoint form

@@ -7,8 +7,8 @@
 #include "alidade/base/error.h"
 #include "alidade/filter/frame_loop.h"
 #include "alidade/filter/linear.h"
+#include "alidade/filter/method.h"
 #include "alidade/filter/square_root.h"
-#include "alidade/filter/stack.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade {

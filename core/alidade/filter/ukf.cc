@@ -11,7 +11,6 @@
 #include "alidade/base/number_text.h"
 #include "alidade/filter/method.h"
 #include "alidade/filter/square_root.h"
-#include "alidade/filter/stack.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade {

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "alidade/base/child_process.h"
 #include "alidade/base/log.h"
 #include "alidade/host/foreign_call.h"
 #include "alidade/host/instances.h"
@@ -96,6 +97,7 @@ internal::NamedCall::~NamedCall() {
 void internal::Destroy(const AlidadeInstance& instance, const std::string& name,
                        const std::string& plugin) noexcept {
   const NamedCall call("Destroy", "model", name, plugin);
+  EnterInChild("destroy");
   const std::string thrown = ThrownBy([&] { instance.destroy(instance.self); });
   if (thrown.empty()) return;
   Log(LogLevel::kWarning,

@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "alidade/base/log.h"
+#include "alidade/base/words.h"
 #include "alidade/host/abi_read.h"
 #include "alidade/host/cpp_plugin.h"
 #include "alidade/host/plugin_file.h"
@@ -21,6 +22,7 @@ namespace {
 using internal::KindName;
 using internal::Refuse;
 using internal::Text;
+using internal::WithArticle;
 
 static_assert(std::string_view(ALIDADE_BUILD_VERSION) == ALIDADE_VERSION,
               "cpp_plugin.h states another version than the project");
@@ -202,7 +204,7 @@ void PluginHost::FailMissing(PluginEntry::Kind kind, const std::string& name,
   for (const PluginEntry& other : entries_) {
     if (other.kind == kind) names.push_back(other.name);
     if (other.name == name)
-      what += std::string("; there is a ") + KindName(other.kind) + " of that name";
+      what += "; there is " + WithArticle(KindName(other.kind)) + " of that name";
   }
   ExitCode code = ExitCode::kPlugin;
   for (const Refusal& refusal : refusals_) {

@@ -12,7 +12,7 @@
 #include "alidade/base/number_text.h"
 #include "alidade/base/words.h"
 #include "alidade/run/accepted_data.h"
-#include "alidade/run/busy_while.h"
+#include "alidade/run/running_estimator.h"
 
 namespace alidade::internal {
 namespace {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <numbers>
 
@@ -14,7 +15,6 @@
 #include "alidade/base/words.h"
 #include "alidade/model/geometry.h"
 #include "alidade/run/frame_innovation.h"
-#include "alidade/run/lag_series.h"
 #include "alidade/state/element_names.h"
 #include "alidade/system/truth_match.h"
 
@@ -61,6 +61,38 @@ struct Metrics::Impl {
     std::vector<Tally> nis;               ///< by sensor
   };
 
+  /// Estimate and truth of a scalar block over evenly spaced timestamps, for its lag. Only the
+  /// first ones are kept, so that memory and time of a long run do not grow with it.
+  struct LagSeries {
+    static constexpr std::size_t kMost = 100'000;
+
+    std::vector<double> estimate, truth;
+    Timestamp first = 0, last = 0;
+    Timestamp shortest = INT64_MAX, longest = 0;
+
+    void Add(Timestamp timestamp, double true_value, double error) {
+      if (truth.size() == kMost) return;
+      if (truth.empty()) {
+        first = timestamp;
+      } else {
+        shortest = std::min(shortest, timestamp - last);
+        longest = std::max(longest, timestamp - last);
+      }
+      last = timestamp;
+      truth.push_back(true_value);
+      estimate.push_back(true_value - error);
+    }
+    double step_ms() const {
+      return 1e-6 * static_cast<double>(last - first) / static_cast<double>(truth.size() - 1);
+    }
+    /// Within 5 % of the mean step: what a camera's clock does.
+    bool even() const {
+      if (truth.size() < 2 || shortest <= 0) return false;
+      return 1e-6 * static_cast<double>(longest) < 1.05 * step_ms() &&
+             1e-6 * static_cast<double>(shortest) > 0.95 * step_ms();
+    }
+  };
+
   /// A block whose truth is known.
   struct Tracked {
     BlockId id;
@@ -70,8 +102,8 @@ struct Metrics::Impl {
     std::vector<std::string> elements;  ///< of the tangent
     std::vector<int> outside;  ///< timestamps on end beyond 10 sigma, by element; -1: reported
     bool scalar;
-    double truth_variance;       ///< of each element
-    internal::LagSeries series;  ///< where scalar
+    double truth_variance;  ///< of each element
+    LagSeries series;       ///< where scalar
     double last_error = -1.0;
 
     bool known = false;  ///< at this timestamp, and so is what follows

@@ -8,7 +8,6 @@
 #include "alidade/base/number_text.h"
 #include "alidade/base/words.h"
 #include "alidade/run/accepted_data.h"
-#include "alidade/run/busy_while.h"
 #include "alidade/run/frame_check.h"
 #include "alidade/run/frame_order.h"
 #include "alidade/run/map_metrics.h"

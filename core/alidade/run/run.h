@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "alidade/run/experiment.h"
-#include "alidade/run/run_observer.h"
 
 namespace alidade {
 
@@ -55,6 +54,20 @@ struct RunResult {
   std::string withheld;             ///< why there is no comparison with that estimator, or ""
   std::vector<EstimatorResult> estimators;
   std::set<std::string> unoptimised;  ///< as of the experiment
+};
+
+/// Follows a run on its own thread. What it throws ends the run, and is its reason.
+class RunObserver {
+ public:
+  virtual ~RunObserver() = default;
+  /// Once, before the first frame.
+  virtual void Begin(const Experiment& /*experiment*/) {}
+  /// Each frame before the estimators take it; the truth they are not given.
+  virtual void OnFrame(const SourceFrame& /*frame*/) {}
+  /// Each estimate as it is made, with the index of its estimator; those of an offline estimator
+  /// after the last frame.
+  virtual void OnEstimate(int /*estimator*/, const SourceFrame& /*frame*/, const State& /*state*/,
+                          const UpdateReport& /*report*/) {}
 };
 
 struct RunOptions {

@@ -2,9 +2,11 @@
 #include "condensed_run.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "alidade/base/all_finite.h"
+#include "alidade/base/decompositions.h"
 #include "alidade/base/number_text.h"
 #include "alidade/filter/rows.h"
 #include "alidade/filter/square_root.h"
@@ -94,17 +96,14 @@ std::vector<double> CondensedRun::ValuesOf(const State& state) const {
 
 bool CondensedRun::Add(const Frame& frame, const UpdateReport& report, const Estimator& filter,
                        Trajectory& about) {
-  if (timestamp_ == kNoTimestamp) {
-    const std::optional<double>& initial = binding_.system.initial_time_s;
-    timestamp_ = initial ? TimestampFromSeconds(*initial) : frame.timestamp;
-  }
+  if (timestamp_ == kNoTimestamp) timestamp_ = time_.StartFor(frame);
   Epoch epoch;
   epoch.steps.swap(passed_on_);
   epoch.report.stale = frame.timestamp < timestamp_;
   if (!epochs_.empty()) epoch.column = inputs_;
   if (!AddSteps(timestamp_, frame.timestamp, epoch)) return false;
   if (!epoch.report.stale) timestamp_ = frame.timestamp;
-  time_.inputs().Take(frame, epoch.report);
+  time_.TakeInputs(frame, epoch.report);
   epoch.report.events.clear();  // the filter tells them
   AddFactors(frame, report, epoch);
   if (has_landmarks()) AddLandmarks(report, filter, epoch);
@@ -138,7 +137,7 @@ bool CondensedRun::AddSteps(Timestamp from, Timestamp to, Epoch& epoch) {
       for (std::size_t i = 0; i < binding_.motion_places.size(); ++i) {
         const MotionBinding& motion = binding_.system.motions[i];
         if (motion.model.stationary() || !std::ranges::all_of(motion.blocks, present)) continue;
-        const std::span<const double> u = time_.inputs().Use(i, from, events);
+        const std::span<const double> u = time_.Input(i, from, events);
         Step& step = epoch.steps.emplace_back();
         step.motion = i;
         step.dt_s = piece.dt_s;
@@ -317,6 +316,171 @@ std::optional<double> CondensedRun::Freeze(const Eigen::VectorXd& e) {
   if (!FreezeLandmarks(points)) return {};
   return change_;
 }
+
+// Linearised about a given trajectory.
+
+bool CondensedRun::Linearised(Trajectory trajectory, Eigen::VectorXd& e) {
+  constexpr int kMostPasses = 20;
+  constexpr double kSettled = 1e-9;  // of inputs whose sigma is 1
+  Eigen::VectorXd step;
+  e.setZero(inputs_);
+  for (int pass = 0; pass < kMostPasses; ++pass) {
+    if (!StepAbout(trajectory, e, step)) return pass > 0;
+    e += step;
+    if (!has_unit_vector_ || step.norm() <= kSettled) break;
+  }
+  return true;
+}
+
+/// To the values of `about`, where a filter has them: x' becomes x, and offset and S are carried
+/// from the tangent at x' to the one at x, where x' (-) x adds to the offset.
+void CondensedRun::PutAbout(const std::vector<double>& about, Point& point) const {
+  for (const Block& block : initial_.layout().blocks()) {
+    if (!block.has_covariance()) continue;
+    const Geometry& geometry = block.geometry();
+    const int at = block.tangent_offset, t = geometry.tangent;
+    double* const x = point.x.data() + block.value_offset;
+    const double* const to = about.data() + block.value_offset;
+    Eigen::VectorXd defect(t);
+    RowMajor j(t, t);
+    geometry.Minus(x, to, defect.data());
+    geometry.Transport(x, to, j.data());
+    point.s.middleRows(at, t) = j * point.s.middleRows(at, t);
+    point.offset.segment(at, t) = j * point.offset.segment(at, t) + defect;
+    std::copy_n(to, geometry.ambient, x);
+  }
+}
+
+bool CondensedRun::StepAbout(Trajectory& trajectory, const Eigen::VectorXd& e,
+                             Eigen::VectorXd& step) {
+  const int residuals = has_landmarks() ? 0 : residuals_;
+  Eigen::MatrixXd j = Eigen::MatrixXd::Identity(inputs_ + residuals, inputs_);
+  j.bottomRows(residuals).setZero();
+  Eigen::VectorXd r = Eigen::VectorXd::Zero(inputs_ + residuals), residual;
+  r.head(inputs_) = e;
+  Eigen::MatrixXd a;
+  Point point;
+  std::vector<Point> points;
+  if (!Begin(e.data(), true, point)) return false;
+  for (std::size_t k = 0; k < epochs_.size(); ++k) {
+    if (!FreezeEpoch(epochs_[k], e.data(), point)) return false;
+    if (k < trajectory.size()) PutAbout(trajectory[k], point);
+    if (has_unit_vector_ || has_landmarks()) points.push_back(point);
+    for (Factor& factor : epochs_[k].factors) {
+      // What is not defined here tells nothing yet; it may be at the solution.
+      if (factor.row < 0 || !FreezeFactor(factor, point.x)) continue;
+      if (has_landmarks() || !Residual(factor, point.x, residual, &a)) continue;
+      const double root = std::sqrt(Weight(SensorOf(factor).loss, residual.norm()));
+      r.segment(inputs_ + factor.row, residual.size()) = root * (residual + a * point.offset);
+      j.middleRows(inputs_ + factor.row, residual.size()) = root * a * point.s;
+    }
+  }
+  if (has_landmarks()) {
+    Reduced reduced;
+    if (!FreezeLandmarks(points) || !Project(e, points, Undefined::kSkipped, true, reduced)) {
+      return false;
+    }
+    step = -reduced.llt.solve(reduced.g);
+  } else {
+    step = -internal::SolveLeastSquares(j, r).x;
+  }
+  if (!step.allFinite()) return Fail("the problem linearised about the filter has no solution");
+  if (!has_unit_vector_) return true;
+  trajectory.resize(points.size());
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const Eigen::VectorXd d = points[k].offset + points[k].s * step;
+    trajectory[k] = points[k].x;
+    for (const Block& block : initial_.layout().blocks()) {
+      if (!block.has_covariance()) continue;
+      double* const x = trajectory[k].data() + block.value_offset;
+      block.geometry().Plus(x, d.data() + block.tangent_offset, x);
+    }
+  }
+  return true;
+}
+
+// The first frame becomes part of the prior.
+
+/// Of the inputs up to the first frame, c of them, with its residuals r(e^) and A = dr/de, weighed:
+///
+///   [I; A] = Q U,   e ~ N(e^ + s, (U'U)^-1),   s = -(U'U)^-1 (e^ + A' r)
+///   x      = x^ (+) (S s + S U^-1 n),   n ~ N(0, I)
+///   L'     = triangle of U^-T S' = Q_L L',   e_0 = -Q_L' U s   is where x = x^
+bool CondensedRun::MarginaliseFirst(Eigen::VectorXd& e) {
+  ALIDADE_EXPECTS(!has_landmarks() && !epochs_.empty() && e.size() == inputs_);
+  if (!epochs_.front().ends) {
+    PassOnFirst();
+    return true;
+  }
+  const Eigen::Index c = epochs_.size() > 1 ? epochs_[1].column : inputs_;
+  const Eigen::Index n = initial_.covariance().size();
+  Point point;
+  if (!Begin(e.data(), true, point) || !Advance(0, e.data(), point)) return false;
+  const Eigen::MatrixXd s = point.s.leftCols(c);
+  Eigen::MatrixXd j = Eigen::MatrixXd::Identity(c, c), a;
+  Eigen::VectorXd r = e.head(c), residual;
+  for (const Factor& factor : epochs_.front().factors) {
+    if (factor.row < 0) continue;
+    if (!Residual(factor, point.x, residual, &a)) return false;
+    const double root = std::sqrt(Weight(SensorOf(factor).loss, residual.norm()));
+    const Eigen::Index rows = residual.size(), before = j.rows();
+    j.conservativeResize(before + rows, Eigen::NoChange);
+    r.conservativeResize(before + rows);
+    j.bottomRows(rows) = root * a * s;
+    r.tail(rows) = root * residual;
+  }
+  const internal::LeastSquares newest = internal::SolveLeastSquares(j, r);
+  const Eigen::MatrixXd& u = newest.r;
+  const Eigen::VectorXd step = -newest.x;
+  Eigen::MatrixXd y = Eigen::MatrixXd::Zero(std::max(c, n), n);
+  if (n > 0) y.topRows(c) = u.transpose().triangularView<Eigen::Lower>().solve(s.transpose());
+  Eigen::VectorXd e0 = Eigen::VectorXd::Zero(y.rows());
+  e0.head(c) = -u * step;
+  const internal::LeastSquares of_y = internal::SolveLeastSquares(y, e0);
+  if (!step.allFinite() || !y.allFinite()) return Fail("the prior of the window is not finite");
+
+  initial_.values() = point.x;
+  d0_ = s * step;
+  l0_ = of_y.r.transpose();
+  Eigen::VectorXd moved(n + e.size() - c);
+  moved << of_y.q_adjoint_b.head(n), e.tail(e.size() - c);
+  e = std::move(moved);
+  epochs_.erase(epochs_.begin());
+  Shift(static_cast<int>(n - c));
+  return true;
+}
+
+/// Drops the first frame, which tells nothing; the steps to it lead to the next one.
+void CondensedRun::PassOnFirst() {
+  passed_on_.swap(epochs_.front().steps);
+  epochs_.erase(epochs_.begin());
+  if (epochs_.empty()) return;
+  Epoch& next = epochs_.front();
+  next.column = 0;
+  next.steps.insert(next.steps.begin(), passed_on_.begin(), passed_on_.end());
+  passed_on_.clear();
+}
+
+/// The places of inputs and residuals, once those of the first frame are gone.
+void CondensedRun::Shift(int columns) {
+  inputs_ += columns;
+  for (int& column : held_) column += column < 0 ? 0 : columns;
+  residuals_ = 0;
+  parts_.clear();
+  for (Epoch& epoch : epochs_) {
+    epoch.column = &epoch == &epochs_.front() ? 0 : epoch.column + columns;
+    for (Step& step : epoch.steps) {
+      step.column += columns;
+      step.columns += columns;
+    }
+    for (FirstValue& first : epoch.first_values) first.column += columns;
+    for (Factor& factor : epoch.factors) {
+      if (factor.row >= 0) AddPart(factor);
+    }
+  }
+}
+
+// Estimates and reports.
 
 void CondensedRun::Put(std::size_t k, const Point& point, const Eigen::MatrixXd& u, State& state,
                        UpdateReport& report) const {

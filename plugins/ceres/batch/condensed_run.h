@@ -3,6 +3,9 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <span>
@@ -12,10 +15,89 @@
 #include "alidade/filter/binding.h"
 #include "alidade/filter/estimator.h"
 #include "alidade/filter/timeline.h"
-#include "epoch.h"
-#include "map_landmark.h"
+#include "alidade/host/source.h"
+#include "alidade/state/state.h"
 
 namespace alidade::ceres_batch {
+
+/// One step of one motion model, whose inputs are those from `column` on.
+struct Step {
+  std::size_t motion;
+  double dt_s;
+  int column;
+  int columns;            ///< inputs before it: of which the state depends on some
+  bool begins;            ///< it has inputs of its own, else those that the step before held
+  std::vector<double> u;  ///< control input; empty: the model takes none
+  RowMajor l;             ///< frozen
+};
+
+/// A measurement, as one sensor takes it.
+struct Factor {
+  int sensor = -1;
+  bool xyz = false;  ///< a known landmark: the sensor's model of one that is xyz
+  Measurement measurement;
+  Outcome outcome = Outcome::kAccepted;
+  int row = -1;       ///< of r; -1: not in use, or of a landmark
+  int landmark = -1;  ///< index of the one that it sees
+  Eigen::MatrixXd l;  ///< frozen
+};
+
+/// A factor whose measurement gives a block its first value.
+struct FirstValue {
+  std::size_t factor;
+  BlockId block;
+  int column;
+};
+
+/// A frame of a CondensedRun: how it is reached, and what was measured.
+struct Epoch {
+  std::vector<Step> steps;  ///< that lead to it
+  std::vector<Factor> factors;
+  std::vector<FirstValue> first_values;  ///< after the steps
+  UpdateReport report;                   ///< as far as it does not depend on the solution
+  bool ends = false;                     ///< no noise goes on being held after it
+  int column = 0;  ///< the first of its inputs; of the first epoch 0: the prior's too
+};
+
+/// What a frame is at some inputs e: x_k, and S_k where it was asked for (columns of later inputs
+/// are zero). About a given trajectory x is that one's, and the linearised state is
+/// x (+) (offset + S e).
+struct Point {
+  std::vector<double> x;
+  Eigen::MatrixXd s;
+  Eigen::VectorXd offset;
+};
+using TakePoint = std::function<void(std::size_t frame, const Point&)>;
+
+/// A landmark as a function of the camera at its first observation k and of inputs l ~ N(0, I):
+///
+///   y = g(x_k, z_k (+) L_k l_z, rho0 + sigma l_rho)     by the sensor's own Initialise
+///   y = m + sigma l                                     where it is known beforehand
+///
+/// So it has the information of the filter's initialisation: the observation k is consumed by it,
+/// an anchor is the camera itself, and the prior of the inverse distance counts once.
+struct MapLandmark {
+  /// A factor of a frame.
+  struct Observation {
+    std::size_t epoch = 0, factor = 0;
+  };
+  std::int64_t id = -1;
+  int generation = 0;                     ///< landmarks of this id before it
+  std::optional<Observation> first;       ///< none: known
+  std::vector<Observation> observations;  ///< in their order, without the first
+  double prior = 0.0;                     ///< rho0, 1/m
+  double sigma = 0.0;                     ///< of rho0; known: of m; 0: exact
+  std::vector<double> mean;               ///< m, where known
+  Eigen::VectorXd from;                   ///< l that a search starts from
+  Eigen::VectorXd l;                      ///< found last
+  std::vector<double> y;                  ///< its value there, ambient, one role after the other
+};
+
+/// The values x of a state and, behind, y of a landmark.
+inline std::vector<double> WithLandmark(std::vector<double> x, const std::vector<double>& y) {
+  x.insert(x.end(), y.begin(), y.end());
+  return x;
+}
 
 /// The values of all blocks, frame by frame.
 using Trajectory = std::vector<std::vector<double>>;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <ceres/solver.h>
+
 #include <Eigen/Core>
 #include <functional>
 #include <limits>
@@ -10,7 +12,6 @@
 
 #include "alidade/host/cpp_plugin.h"
 #include "condensed_run.h"
-#include "frozen_solve.h"
 
 namespace alidade::ceres_batch {
 
@@ -20,6 +21,14 @@ struct SolveOptions {
   double max_dt_s = std::numeric_limits<double>::infinity();  ///< of a step of the motion
 };
 SolveOptions ReadSolveOptions(Params& params);
+
+/// phi(e) = |e|^2 / 2 + sum_i rho_i(|r_i(e)|) of a CondensedRun whose Q and R stand where they were
+/// frozen, about e, with the weights of robust losses as they are there.
+struct GaussNewton {
+  double cost = 0.0;     ///< phi(e)
+  Eigen::MatrixXd u;     ///< U, N x N, upper, with Cov(e) = (U'U)^-1
+  Eigen::VectorXd step;  ///< -(U'U)^-1 grad phi
+};
 
 /// The maximum a posteriori of a CondensedRun: Q and R that depend on the state are frozen, the
 /// problem is solved, and so on until they settle.

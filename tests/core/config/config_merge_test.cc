@@ -71,8 +71,11 @@ TEST(ConfigSet, KeyPathMustFitTheTree) {
   }
 }
 
-TEST(ConfigSet, KeyPathIsUtf8) {
-  EXPECT_EQ(SetError("a.\xff", "1"), "--set: the key is not UTF-8; expected a key in UTF-8");
+// They would not be read again.
+TEST(ConfigSet, RefusesKeysThatAFileMayNotHave) {
+  EXPECT_EQ(SetError("a.\xff", "1"), "--set: the key is not UTF-8");
+  EXPECT_EQ(SetError("a.x\ny", "1").find("--set: control character in the key"), 0u);
+  EXPECT_EQ(SetError("a." + std::string(257, 'x'), "1").find("--set: key longer than"), 0u);
 }
 
 TEST(ConfigSet, DepthIsLimited) {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/filter/control_inputs.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -57,8 +57,12 @@ TEST_F(Csv, ShowsHostileCellsHarmlessly) {
 TEST_F(Csv, NotFinite) {
   for (const std::string cell : {"nan", "inf", "-inf", "NaN", "Infinity"}) {
     ExpectBadData(std::string(kHeader) + "0,1," + cell + ",3\n",
-                  "FILE:2:5 scale: '" + cell + "' is not finite; expected a finite number");
+                  "FILE:2:5 scale: '" + cell +
+                      "' is not finite; expected a finite number, or 'source.missing: " + cell +
+                      '\'');
   }
+  ExpectBadData(std::string(kHeader) + "nan,1,2,3\n",
+                "FILE:2:1 t_s: 'nan' is not finite; expected a finite number");
 }
 
 // FAULTS 30
@@ -113,7 +117,8 @@ TEST_F(Csv, TimeMustIncrease) {
 
 TEST_F(Csv, TimeBeyondTheTimestamps) {
   ExpectBadData(std::string(kHeader) + "9.3e9,1,2,3\n",
-                "FILE:2:1 t_s: '9.3e9' is beyond 292 years; expected -9.2e9 s to 9.2e9 s");
+                "FILE:2:1 t_s: '9.3e9' is beyond 292 years; expected -9.2e9 s to 9.2e9 s, or the "
+                "unit of the column, as in 'source.time: {unit: ns}'");
   ExpectBadData(std::string(kHeader) + ",1,2,3\n",
                 "FILE:2:1 t_s: '' is not a number; expected a finite number");
 }
@@ -135,6 +140,25 @@ TEST_F(Csv, UnknownColumn) {
   ExpectBadConfig("path: a.csv\nstreams: {d: scale}\ntime: {column: timestamp}\n",
                   "run.yaml:3:16 time.column: no column 'timestamp' in FILE; expected one of t_s, "
                   "disparity_px, scale, reference_depth_m");
+}
+
+TEST_F(Csv, AnotherSeparatorIsNamed) {
+  const auto expect = [&](const std::string& separator, const std::string& words) {
+    Write("t_s" + separator + "z\n0" + separator + "1\n");
+    ExpectBadConfig("path: a.csv\nstreams: {z: z}\n",
+                    "run.yaml:1:1: no column 't_s' in FILE; expected one of t_s" + words);
+  };
+  expect(";", ";z, or 'source.separator: \";\"'");
+  expect("\t", "?z, or 'source.separator: \"\\t\"'");
+  expect(" | ", " | z, or 'source.separator: \"|\"'");
+  expect(" ", " z, or 'source.separator: \" \"'");
+}
+
+TEST_F(Csv, MissingIsTheTextOfACell) {
+  Write("t_s,z\n0,1\n");
+  ExpectBadConfig("path: a.csv\nmissing: .nan\nstreams: {z: z}\n",
+                  "run.yaml:2:10 missing: '.nan' is not the text of a cell; expected the text as "
+                  "the table has it; did you mean 'nan'?");
 }
 
 TEST_F(Csv, ShowsHostileColumnNamesHarmlessly) {

@@ -195,6 +195,17 @@ TEST_F(CheckTest, ModelsWithoutFaultPass) {
   }
 }
 
+TEST_F(CheckTest, NamesADestroyThatHangsAfterParametersAreRefused) {
+  CheckOptions options;
+  options.timeout_s = 1.0;
+  const Config config = Config::FromText("{unread: 1}", "test");
+  const auto findings =
+      CheckModel(host_, FindModels(host_, Built("bad_models").string(), "hangs_in_destroy").at(0),
+                 config.root(), options);
+  EXPECT_EQ(Joined(Failures(findings)),
+            "create: the check took longer than 1 s (--timeout); it was in destroy\n");
+}
+
 TEST_F(CheckTest, ADiscretisationPassesWhereItsOrderIsGiven) {
   CheckOptions options;
   options.step_order = 2;

@@ -161,12 +161,13 @@ TEST_F(BundleFiles, ReadsLibmvOfEitherByteOrder) {
 
 TEST_F(BundleFiles, RefusesBadBal) {
   ExpectBad("", {":1:1: nothing in it"});
-  ExpectBad("1 1 1\n0 1 2 3\n", {":2:3: '1' is none; expected the point", "from 0 to 0"});
-  ExpectBad("1 1 1\n-1 0 2 3\n", {":2:1: '-1' is none", "from 0 to 0"});
+  ExpectBad("1 1 1\n0 1 2 3\n", {":2:3: '1' is out of range; expected the point", "from 0 to 0"});
+  ExpectBad("1 1 1\n-1 0 2 3\n", {":2:1: '-1' is out of range", "from 0 to 0"});
   ExpectBad("1 1 1\n0 0 nan 3\n", {":2:5: 'nan' is not finite", "u of an observation"});
   ExpectBad("1 1 1\n0 0 2,5 3\n", {":2:5:"});
   ExpectBad("1 1 1\n0 0 1e999 3\n", {":2:5: '1e999' is too large or too small"});
-  ExpectBad("1 x 1\n", {":1:3: 'x' is none; expected the number of points"});
+  ExpectBad("1 x 1\n", {":1:3: 'x' is not a whole number; expected the number of points"});
+  ExpectBad("99999999999999999999 1 1\n", {":1:1: '99999999999999999999' is out of range"});
   ExpectBad(kBal.substr(0, kBal.size() - 4), {"the file ends here; expected a point"});
   std::string text = kBal;
   ExpectBad(text.replace(text.find("100"), 3, "-10"),
@@ -191,7 +192,8 @@ TEST_F(BundleFiles, RefusesBadBundler) {
   text = kBundler;
   ExpectBad(text.replace(text.find("100"), 3, "-10"), {":3:1: this focal length is not positive"});
   text = kBundler;
-  ExpectBad(text.replace(text.find("1 0 42"), 6, "1 2 42"), {"'2' is none; expected a camera"});
+  ExpectBad(text.replace(text.find("1 0 42"), 6, "1 2 42"),
+            {"'2' is out of range; expected a camera"});
   ExpectBad(kBundler.substr(0, 60), {"the file ends here"});
 }
 

@@ -7,6 +7,7 @@
 
 #include "alidade/base/number_text.h"
 #include "alidade/base/sha256.h"
+#include "alidade/record/report_html.h"
 #include "alidade/resume/run_inputs.h"
 #include "sensors/stereo_disparity.h"
 #include "support/recording.h"
@@ -27,6 +28,10 @@ TEST(Recorder, WritesEveryFile) {
           "ekf/gains.csv", "ekf/innovations.csv", "expected.csv", "files.txt", "implied_states.csv",
           "log.txt", "measurements.csv", "report.html", "run.json", "timing.json", "truth.csv"}));
   EXPECT_EQ(FilesIn(folder.path()).size(), 19u);  // nothing next to it
+}
+
+TEST(HtmlEscaped, IsUtf8WhateverIsInTheText) {
+  EXPECT_EQ(internal::HtmlEscaped("<\xC3\xA9 & \xFF\x1B\n\t>"), "&lt;\xC3\xA9 &amp; ??\n\t&gt;");
 }
 
 TEST(Recorder, EstimatesRoundTrip) {

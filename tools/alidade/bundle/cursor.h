@@ -32,9 +32,10 @@ class BundleCursor {
     const std::string_view word = Word(what);
     std::int64_t value = -1;
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc() || end != word.data() + word.size() || value < 0 || value >= limit) {
-      FailWord(word, "is none",
-               std::string(what) + ", a whole number from 0 to " + std::to_string(limit - 1));
+    const bool whole = error != std::errc::invalid_argument && end == word.data() + word.size();
+    if (!whole || error != std::errc() || value < 0 || value >= limit) {
+      FailWord(word, whole ? "is out of range" : "is not a whole number",
+               std::string(what) + ", from 0 to " + std::to_string(limit - 1));
     }
     return static_cast<int>(value);
   }

@@ -7,6 +7,8 @@
 
 #include "alidade/base/number_text.h"
 #include "alidade/base/text_table.h"
+#include "alidade/base/words.h"
+#include "alidade/filter/built_in.h"
 #include "alidade/host/plugin_file.h"
 #include "alidade/inspect/check_context.h"
 #include "alidade/inspect/plugin_listing.h"
@@ -132,9 +134,12 @@ std::vector<PluginEntry> FindModels(const PluginHost& host, const std::string& p
   };
   if (found.empty()) {
     const auto other = std::ranges::find(host.entries(), plugin, &PluginEntry::name);
-    if (other != host.entries().end()) {
+    const bool built_in = internal::FindEstimatorType(plugin) != nullptr;
+    if (built_in || other != host.entries().end()) {
+      const std::string is =
+          built_in ? "built-in estimator" : std::string(internal::KindName(other->kind));
       throw Error(ExitCode::kPlugin,
-                  ErrorLine({}, {}, "'" + plugin + "' is a " + internal::KindName(other->kind),
+                  ErrorLine({}, {}, "'" + plugin + "' is " + internal::WithArticle(is),
                             "a sensor or motion model, which is what is checked"));
     }
     for (const PluginEntry& entry : host.entries()) {

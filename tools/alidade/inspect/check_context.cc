@@ -54,7 +54,6 @@ std::unique_ptr<ModelUnderTest> Context::Create() const {
 }
 
 void Context::Destroy(std::unique_ptr<ModelUnderTest> model) const {
-  journal_.Enter("destroy");
   std::string thrown;  // of which the host warns alone
   {
     const auto take = [&](LogLevel, std::string_view text) { thrown = text; };

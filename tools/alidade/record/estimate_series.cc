@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "alidade/filter/update_report.h"
+#include "alidade/filter/estimator.h"
 
 namespace alidade::internal {
 namespace {

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "alidade/run/run_observer.h"
+#include "alidade/run/run.h"
 #include "alidade/system/system.h"
 
 namespace alidade {

@@ -246,6 +246,7 @@ void Recorder::Finish(const RunResult& result) {
 
 std::filesystem::path Recorder::failed() const { return impl_->folder.failed(); }
 bool Recorder::Abandon() const { return impl_->folder.Abandon(); }
+const std::filesystem::path& Recorder::partial() const { return impl_->folder.partial(); }
 
 const std::vector<std::filesystem::path>& Recorder::resumed() const {
   static const std::vector<std::filesystem::path> none;

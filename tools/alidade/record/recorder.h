@@ -58,6 +58,8 @@ class Recorder : public RunObserver {
   /// Gives what was recorded that name at once; false where that cannot be done. Of another thread
   /// than that of the run, which must not go on.
   bool Abandon() const;
+  /// The temporary folder.
+  const std::filesystem::path& partial() const;
   /// The folders of the unfinished runs that this one resumes.
   const std::vector<std::filesystem::path>& resumed() const;
 

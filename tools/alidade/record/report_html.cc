@@ -3,6 +3,7 @@
 
 #include "alidade/base/number_text.h"
 #include "alidade/base/text_table.h"
+#include "alidade/base/utf8.h"
 #include "alidade/base/words.h"
 #include "alidade/record/embedded.h"
 #include "alidade/run/metric_rows.h"
@@ -127,7 +128,7 @@ std::string Estimator(const EstimatorResult& result, std::size_t index, const Re
 
 std::string HtmlEscaped(std::string_view text) {
   std::string escaped;
-  for (const char c : text) {
+  for (const char c : ShownUtf8(text, "\n\t")) {
     switch (c) {
       case '&':
         escaped += "&amp;";

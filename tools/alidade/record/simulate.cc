@@ -172,9 +172,15 @@ class ImageFiles {
   }
 
  private:
+  /// The folder is new: there is no link in it.
   static std::filesystem::path Inside(const OutputFolder& folder, const std::string& name,
                                       const char* option) {
-    return ResolveInside(folder.partial(), name, false, {}, option);
+    const std::filesystem::path path = std::filesystem::path(name).lexically_normal();
+    if (path.is_absolute() || *path.begin() == "..") {
+      throw Error(ExitCode::kNotTrusted, ErrorLine({}, option, "'" + name + "' leaves its folder",
+                                                   "a path inside '" + folder.Shown("") + "'"));
+    }
+    return folder.partial() / name;
   }
   static void MakeFolder(const std::filesystem::path& path, const std::string& shown) {
     std::error_code error;

@@ -132,6 +132,8 @@ class SweepFolder {
   const std::vector<std::filesystem::path>& resumed() const;
   /// Where the finished runs are kept if it is not written; "": nowhere.
   std::filesystem::path failed() const;
+  /// The temporary folder.
+  const std::filesystem::path& partial() const;
   /// Puts a file of that text into the folder too. Errors: kCannotCreate, kIo.
   void AddFile(const std::string& name, const std::string& text);
   /// Errors: kCannotCreate, kIo.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/filter/stack.h"
+#include "alidade/filter/method.h"
 
 namespace alidade::internal {
 

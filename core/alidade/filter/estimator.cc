@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/filter/update_report.h"
+#include "alidade/filter/estimator.h"
 
 #include <iterator>
 

@@ -178,7 +178,7 @@ class TumRows {
       rows_.FailCell(0, "t", "is not after that of line " + std::to_string(line_before),
                      "times that increase");
     }
-    const std::array<double, 7> values = rows_.PoseNumbers(NumberRows::kTumPose);
+    const std::array<double, 7> values = PoseNumbers(rows_, kTumPose);
     pose_ = {{values[0], values[1], values[2]}, {values[6], values[3], values[4], values[5]}};
   }
 

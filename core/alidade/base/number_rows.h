@@ -84,20 +84,6 @@ class NumberRows {
     return cell::ParseTimestamp(text(i), t_s, 9);
   }
 
-  /// x y z and a quaternion of unit length to 1e-3, of columns 1 to 7, named by `names`.
-  std::array<double, 7> PoseNumbers(const std::array<const char*, 7>& names) const {
-    std::array<double, 7> values{};
-    double length2 = 0.0;
-    for (std::size_t i = 0; i < 7; ++i) {
-      values[i] = Number(i + 1, names[i]);
-      if (i >= 3) length2 += values[i] * values[i];
-    }
-    if (std::abs(std::sqrt(length2) - 1.0) <= 1e-3) return values;
-    FailLine("quaternion of length " + std::to_string(std::sqrt(length2)), "length 1 to 1e-3");
-  }
-  /// Columns 1 to 7 of a trajectory in the form of TUM, whose first is t, s.
-  static constexpr std::array<const char*, 7> kTumPose = {"x", "y", "z", "qx", "qy", "qz", "qw"};
-
   /// Of column i, called `name`.
   [[noreturn]] void FailCell(std::size_t i, const char* name, const std::string& what,
                              std::string_view expected) const {
@@ -141,5 +127,21 @@ class NumberRows {
   std::string_view line_;
   std::vector<std::string_view> cells_;
 };
+
+/// Columns 1 to 7 of a trajectory in the form of TUM, whose first is t, s.
+inline constexpr std::array<const char*, 7> kTumPose = {"x", "y", "z", "qx", "qy", "qz", "qw"};
+
+/// x y z and a quaternion of unit length to 1e-3, of columns 1 to 7, named by `names`.
+inline std::array<double, 7> PoseNumbers(const NumberRows& rows,
+                                         const std::array<const char*, 7>& names) {
+  std::array<double, 7> values{};
+  double length2 = 0.0;
+  for (std::size_t i = 0; i < 7; ++i) {
+    values[i] = rows.Number(i + 1, names[i]);
+    if (i >= 3) length2 += values[i] * values[i];
+  }
+  if (std::abs(std::sqrt(length2) - 1.0) <= 1e-3) return values;
+  rows.FailLine("quaternion of length " + std::to_string(std::sqrt(length2)), "length 1 to 1e-3");
+}
 
 }  // namespace alidade

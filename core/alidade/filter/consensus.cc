@@ -7,7 +7,7 @@
 
 #include "alidade/base/random.h"
 #include "alidade/base/statistics.h"
-#include "alidade/filter/method.h"
+#include "alidade/filter/stacked.h"
 #include "alidade/state/small_kernels.h"
 #include "alidade/state/tiles.h"
 

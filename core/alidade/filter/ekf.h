@@ -9,7 +9,8 @@
 namespace alidade {
 
 /// Extended Kalman filter: x' = f(x, u, 0), P' = F P F' + G Q G'; an update with stacked Jacobian H
-/// of all accepted measurements, S = H P H' + R = L L', W = P H' L^-T, dx = W L^-1 r, P -= W W'.
+/// of all accepted measurements, S = H P H' + R = L L', W = P H' L^-T, dx = W L^-1 r, P -= W W'
+/// (of few states by S = L D L', which is the same).
 /// The gain of a consider block is 0 (Schmidt): P += E E', E = (K - K*) L of the optimal gain K*.
 /// Where digits would cancel the Joseph form takes the place of both. With a robust loss on the
 /// sensor R / w(d) stands for R, d^2 = r' S^-1 r.

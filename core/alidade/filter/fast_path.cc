@@ -211,7 +211,7 @@ ALIDADE_INLINE FastPath::Taken FastPath::Take(Sensor& sensor, const Measurement&
   entry.outcome = Outcome::kAccepted;
   if (!Linearise<N, M>(sensor, z, entry, rows.pht + at * N)) return Taken::kUnusual;
   if (!(entry.nis <= sensor.gate)) {
-    if (parts_.recovery.IsDueNext(static_cast<std::size_t>(sensor.index))) return Taken::kUnusual;
+    if (parts_.gate.IsDueNext(static_cast<std::size_t>(sensor.index))) return Taken::kUnusual;
     entry.outcome = Outcome::kGated;
     entry.gain.clear();
     return Taken::kLeftOut;
@@ -253,7 +253,7 @@ ALIDADE_INLINE bool FastPath::Update(const Frame& frame) {
     Fit(f_.said.last_used.z, static_cast<int>(std::ssize(last->values)));
     Copy(last->values.data(), static_cast<int>(std::ssize(last->values)), f_.said.last_used.z);
   }
-  for (const MeasurementReport& entry : f_.report.measurements()) parts_.recovery.Count(f_, entry);
+  for (const MeasurementReport& entry : f_.report.measurements()) parts_.gate.Count(f_, entry);
   return true;
 }
 
@@ -267,7 +267,7 @@ bool FastPath::ProcessSized(FastPath& path, const Frame& frame) {
     return false;
   }
   if (elapsed > 0) {
-    if (f.motions.in_interval()) return false;
+    if (f.motions.in_interval()) return false;  // it keeps no M = Cov(x, w)
     const double dt_s = Seconds(elapsed);
     if (time.has_inputs()) {
       if (!time.InputsAct(f.timestamp, frame.timestamp)) return false;

@@ -5,8 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "alidade/filter/recovery.h"
-#include "alidade/filter/rows.h"
+#include "alidade/filter/gate.h"
 #include "alidade/filter/timeline.h"
 #include "alidade/state/small_kernels.h"
 
@@ -17,13 +16,13 @@ struct FastParts {
   FilterState& f;
   Timeline& time;
   Gate& gate;
-  Recovery& recovery;
 };
 
 /// The fast path of a filter whose method is Linear, with joint updates: takes the steps and
 /// updates in which nothing but acceptance and gating happens, in functions compiled for the number
-/// of states. Of a frame with anything else it does the step at most, and says false: the frame
-/// loop then does the rest and finds the words. The first frame of all is the loop's, where
+/// of states. A measurement that its model calls invalid is reported as such. Of a frame with
+/// anything else it does the step at most, and says false: the frame loop then does the rest and
+/// finds the words. The first frame of all is the loop's, where
 /// Filter::Start gave no time.
 class FastPath {
  public:

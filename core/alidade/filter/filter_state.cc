@@ -36,6 +36,7 @@ FilterState::FilterState(std::shared_ptr<const Binding> of, bool keeps_first_est
       first_estimates(binding->system.layout.blocks().size()),
       keeps_first_estimates_(keeps_first_estimates) {
   said.out_of_domain.assign(binding->sensor_places.size(), 0);
+  said.inflated = said.out_of_domain;
   Activate();
 }
 
@@ -67,23 +68,6 @@ void FilterState::KeepFirstEstimates() {
       first.assign(state.value(id), state.value(id) + block.geometry().ambient);
     }
   }
-}
-
-void FilterState::RecordUpdate(std::span<Row* const> rows, const double* gain) {
-  motions.EndInterval();
-  const int n = size();
-  for (const Row* row : rows) {
-    if (gain == nullptr) break;
-    const double* const end = gain + n * row->report->dof;
-    for (; gain != end; gain += n) {
-      if (!GainIsRecorded(*row)) continue;
-      for (const int i : blocks.gain_rows) row->report->gain.push_back(gain[i]);
-    }
-  }
-  const Row& last = *rows.back();
-  said.last_used.sensor = last.sensor;
-  said.last_used.timestamp = last.measurement->timestamp;
-  said.last_used.z.assign(last.measurement->values.begin(), last.measurement->values.end());
 }
 
 Event& Note(FilterState& f, const char* kind, std::string text) {

@@ -17,7 +17,7 @@ namespace alidade::internal {
 
 /// What a filter has said of itself, so that it says it once.
 struct Said {
-  std::vector<char> out_of_domain;  ///< by sensor: since its last acceptance
+  std::vector<char> out_of_domain, inflated;  ///< by sensor: since its last acceptance
   bool diverged = false, ended = false;
   /// The last accepted measurement.
   struct {
@@ -28,8 +28,8 @@ struct Said {
 };
 
 /// What the parts of a filter share: x and P, what moved them last, and what there is to say of it.
-/// Only a Method changes P of blocks that have a value, but where the part that does it says so: it
-/// may carry a root. A copy is a snapshot.
+/// Only a Method, or the FastPath in place of Linear, changes P of blocks that have a value, but
+/// where the part that does it says so: a method may carry a root. A copy is a snapshot.
 struct FilterState {
   FilterState(std::shared_ptr<const Binding> of, bool keeps_first_estimates);
 
@@ -37,9 +37,6 @@ struct FilterState {
   /// Has to be called when a block of the system gets a value, its first or another one in place of
   /// a rejected one.
   void Activate();
-  /// Takes an update down in the reports: the gain of all rows (n x m by columns, its rows as they
-  /// lie in P; null where none is recorded). Ends the interval of held noise.
-  void RecordUpdate(std::span<Row* const> rows, const double* gain);
 
   std::shared_ptr<const Binding> binding;
   State state;

@@ -11,6 +11,7 @@
 #include "alidade/filter/fast_path.h"
 #include "alidade/filter/filter.h"
 #include "alidade/filter/filter_state.h"
+#include "alidade/filter/gate.h"
 #include "alidade/filter/landmarks.h"
 #include "alidade/filter/method.h"
 #include "alidade/filter/recovery.h"
@@ -19,8 +20,20 @@
 
 namespace alidade::internal {
 
-/// What a filter is made of, and what a frame goes through there. No part points into another but
-/// the fast path, which a copy makes anew: a copy is a filter by itself.
+/// What a filter is made of, and what a frame goes through there:
+///
+///   plain frames of few states      FastPath::Process, all of it; any other:
+///   step         StepTo             Timeline::First, Method::Step
+///                                   Rows::Collect: one row for each measurement and sensor
+///   initialise   InitialiseWaiting, Landmarks::Attach
+///   predict      Pass               Method::Predict of each row
+///   gate         Pass               Gate::Pass of each row; Consensus::Split
+///   correct      Correct            Gate::Weigh, Method::Correct
+///   recover      Recovery::RepairCovariance, RecoverRejected
+///   landmarks    Landmarks::Maintain
+///
+/// Parts point to the binding, which copies share, and not into one another; only the fast path
+/// does, and a copy makes its own. So a copy is a filter by itself.
 class FrameLoop {
  public:
   FrameLoop(System system, const EkfOptions& options, const std::vector<StreamInfo>& streams,
@@ -53,7 +66,7 @@ class FrameLoop {
   /// The fast path, as long as the blocks are those that it was made for.
   struct CurrentPath {
     std::unique_ptr<FastPath> path;
-    int made_at = -1;  ///< FilterState::blocks
+    int made_at = -1;  ///< FilterState::blocks.activations
   };
   /// One group of rows, and what becomes of it.
   struct Groups {

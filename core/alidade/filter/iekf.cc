@@ -10,6 +10,7 @@
 #include "alidade/base/number_text.h"
 #include "alidade/filter/linear.h"
 #include "alidade/filter/method.h"
+#include "alidade/filter/stacked.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade {

@@ -6,6 +6,7 @@
 
 #include "alidade/base/all_finite.h"
 #include "alidade/filter/ekf.h"
+#include "alidade/filter/stacked.h"
 #include "alidade/state/small_kernels.h"
 #include "alidade/state/tiles.h"
 
@@ -173,7 +174,7 @@ Outcome Linear::CorrectSmall(FilterState& f, std::span<Row* const> rows, const d
     return CorrectLarge(f, rows, correction);
   }
   f.state.MoveTo(f.moved);  // last: P turns with the tangent planes
-  f.RecordUpdate(rows, gain.data());
+  RecordGain(f, rows, gain.data());
   return Outcome::kAccepted;
 }
 
@@ -217,10 +218,7 @@ Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const d
   l = all.noise;
   AddProjected(rows, w, l);
   if (!Factorise(l)) return Outcome::kNotPd;
-  if (n == 0) {  // nothing to correct
-    f.RecordUpdate(rows, nullptr);
-    return Outcome::kAccepted;
-  }
+  if (n == 0) return Outcome::kAccepted;  // nothing to correct
   DivideByTransposed(l, w);
   const auto [lost_gain, e] = FindLost(f, rows, w, l);
   y = all.innovation;
@@ -249,7 +247,7 @@ Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const d
     AddOuterProduct(p.lower(), lost_, e);
   }
   f.state.MoveTo(f.moved);
-  f.RecordUpdate(rows, recorded ? gain.data() : nullptr);
+  if (recorded) RecordGain(f, rows, gain.data());
   return Outcome::kAccepted;
 }
 

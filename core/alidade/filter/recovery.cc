@@ -11,13 +11,6 @@
 namespace alidade::internal {
 namespace {
 
-/// A measurement that is itself not finite, of which no h was asked, tells nothing of the filter.
-bool IsRejected(const MeasurementReport& entry) {
-  const Outcome outcome = entry.outcome;
-  return outcome == Outcome::kGated || outcome == Outcome::kOutOfDomain ||
-         outcome == Outcome::kNotPd || (outcome == Outcome::kNotFinite && !entry.h.empty());
-}
-
 /// A + (B - A)+, the positive part: a covariance that is in no direction below A or B.
 Eigen::MatrixXd UpperBound(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   const SymmetricEigen above = EigenOf(b - a);
@@ -68,11 +61,6 @@ bool Inflate(FilterState& f, const SensorBinding& sensor) {
 
 }  // namespace
 
-Recovery::Recovery(const System& system, const EkfOptions& options)
-    : options_(options),
-      rejections_(system.sensors.size(), 0),
-      inflated_(system.sensors.size(), 0) {}
-
 void Recovery::RepairCovariance(FilterState& f, std::span<Row> rows) {
   constexpr double kRounding = 1e-12;
   const auto is_not_pd = [](const Row& row) { return row.report->outcome == Outcome::kNotPd; };
@@ -95,20 +83,11 @@ void Recovery::RepairCovariance(FilterState& f, std::span<Row> rows) {
            std::to_string(options_.max_covariance_repairs) + ")");
 }
 
-void Recovery::RecoverRejected(FilterState& f, std::span<Row> rows) {
+void Recovery::RecoverRejected(FilterState& f, Gate& gate, std::span<Row> rows) {
   for (Row& row : rows) {
     if (f.binding->system.landmarks && row.binding->model.has_landmark()) continue;
-    if (Count(f, *row.report)) Recover(f, row);
+    if (gate.Count(f, *row.report)) Recover(f, row);
   }
-}
-
-/// Of a measurement that was not accepted. Whether its sensor has to recover.
-bool Recovery::CountRejection(const MeasurementReport& entry) {
-  if (options_.rejection_recovery == RejectionRecovery::kNone || !IsRejected(entry)) return false;
-  int& count = rejections_[static_cast<std::size_t>(entry.sensor)];
-  if (++count < options_.rejection_recovery_after) return false;
-  count = 0;
-  return true;
 }
 
 /// Resets what the sensor determines from its measurement, with the blocks that move with it at
@@ -131,7 +110,7 @@ void Recovery::Recover(FilterState& f, Row& row) {
          why + "reset " + f.state.layout()[target->block].name + " from its measurement");
     return;
   }
-  char& inflated = inflated_[static_cast<std::size_t>(row.sensor)];
+  char& inflated = f.said.inflated[static_cast<std::size_t>(row.sensor)];
   if (inflated != 0) return;
   inflated = 1;
   Note(f, "rejection_recovery",

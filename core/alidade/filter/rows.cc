@@ -2,16 +2,11 @@
 #include "alidade/filter/rows.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
-#include "alidade/base/number_text.h"
-#include "alidade/base/statistics.h"
 #include "alidade/filter/filter_state.h"
 #include "alidade/filter/square_root.h"
-#include "alidade/state/small_kernels.h"
 
 namespace alidade::internal {
 
@@ -23,7 +18,7 @@ void Rows::Collect(const Frame& frame, const Binding& binding, UpdateReport& rep
     for (const Measurement& m : frame.measurements) {
       if (m.stream != binding.stream_of_sensor[sensor]) continue;
       const Row& row = Add(m, static_cast<int>(sensor), binding, report);
-      report.measurements().back().outcome = refused ? *refused : OutcomeOf(row);
+      report.measurements().back().outcome = refused ? *refused : Check(row);
     }
   }
   Link(report);
@@ -61,7 +56,7 @@ Row& Rows::Add(const Measurement& measurement, int sensor, const Binding& bindin
 }
 
 /// What speaks against the measurement of a row, by itself.
-Outcome Rows::OutcomeOf(const Row& row) {
+Outcome Rows::Check(const Row& row) {
   constexpr double kRounding = 1e-12, kSymmetric = 1e-9;
   const Measurement& m = *row.measurement;
   if (!AllFinite(m.values) || !AllFinite(m.covariance) || !AllFinite(m.known)) {
@@ -74,7 +69,7 @@ Outcome Rows::OutcomeOf(const Row& row) {
       return Outcome::kInvalid;
     }
   }
-  return alidade::OutcomeOf(row.model->Valid(m.values.data(), m.known.data()));
+  return OutcomeOf(row.model->Valid(m.values.data(), m.known.data()));
 }
 
 /// References into the report end with each entry that is added.
@@ -82,66 +77,21 @@ void Rows::Link(UpdateReport& report) {
   for (std::size_t i = 0; i < count_; ++i) rows_[i].report = &report.measurements()[i];
 }
 
-Gate::Gate(const System& system, double probability) : warned_(system.sensors.size(), false) {
-  for (const SensorBinding& sensor : system.sensors) {
-    thresholds_.push_back(
-        probability < 1.0
-            ? ChiSquareQuantile(probability, sensor.model.measurement().geometry.tangent)
-            : std::numeric_limits<double>::infinity());
-  }
+Eigen::Index CountOf(std::span<Row* const> rows) {
+  Eigen::Index m = 0;
+  for (const Row* row : rows) m += row->report->dof;
+  return m;
 }
 
-Outcome Gate::Pass(FilterState& f, Row& row) {
-  MeasurementReport& entry = *row.report;
-  if (!AllFinite(entry.s) || !AllFinite(row.PHt) || !AllFinite(entry.innovation)) {
-    entry.s.clear();
-    Note(f, "not_finite",
-         "sensor '" + row.binding->name + "': h, H, R or the innovation is not finite");
-    return Outcome::kNotFinite;
+void RecordGain(const FilterState& f, std::span<Row* const> rows, const double* gain) {
+  const int n = f.size();
+  for (const Row* row : rows) {
+    const double* const end = gain + n * row->report->dof;
+    for (; gain != end; gain += n) {
+      if (!GainIsRecorded(*row)) continue;
+      for (const int i : f.blocks.gain_rows) row->report->gain.push_back(gain[i]);
+    }
   }
-  CheckConditioning(f, row);
-  const auto m = static_cast<std::size_t>(entry.dof);
-  memory_.resize(m * (m + 1));
-  entry.nis =
-      SquaredMahalanobis(entry.s.data(), entry.innovation.data(), entry.dof, memory_.data());
-  if (std::isnan(entry.nis)) {
-    entry.nis = 0.0;
-    Note(f, "not_pd", "sensor '" + row.binding->name + "': S is not positive definite");
-    return Outcome::kNotPd;
-  }
-  if (!(entry.nis <= thresholds_[static_cast<std::size_t>(row.sensor)])) return Outcome::kGated;
-  row.weight = Weight(row.binding->loss, std::sqrt(entry.nis));
-  const double widest = *std::ranges::max_element(row.R) / row.weight;
-  return std::isfinite(widest) ? Outcome::kAccepted : Outcome::kGated;
-}
-
-void Gate::Weigh(Row& row) {
-  if (row.weight == 1.0) return;
-  for (std::size_t i = 0; i < row.R.size(); ++i) {
-    const double widened = row.R[i] / row.weight;
-    row.report->s[i] += widened - row.R[i];
-    row.R[i] = widened;
-  }
-}
-
-/// Warns once for each sensor whose noise vanishes compared with H P H'.
-void Gate::CheckConditioning(FilterState& f, const Row& row) {
-  const auto sensor = static_cast<std::size_t>(row.sensor);
-  if (warned_[sensor]) return;
-  const auto m = static_cast<std::size_t>(row.report->dof);
-  double noise = 0.0, total = 0.0;
-  bool tiny = false;
-  for (std::size_t i = 0; i < m && !tiny; ++i) {
-    noise = row.R[i * m + i];
-    total = row.report->s[i * m + i];
-    tiny = noise <= kVanishing * total || noise <= 0.0;
-  }
-  if (!tiny) return;
-  warned_[sensor] = true;
-  Note(f, "conditioning",
-       "sensor '" + row.binding->name + "': noise variance " + RoundedText(noise, 3) +
-           " vanishes compared with H P H' = " + RoundedText(total - noise, 3) +
-           "; S is badly conditioned");
 }
 
 }  // namespace alidade::internal

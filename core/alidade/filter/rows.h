@@ -40,9 +40,6 @@ struct Row {
   }
 };
 
-/// Of a landmark it is not: its blocks come and go.
-inline bool GainIsRecorded(const Row& row) { return !row.model->has_landmark(); }
-
 /// The rows of a frame, in memory that is kept from one to the next.
 class Rows {
  public:
@@ -59,7 +56,7 @@ class Rows {
  private:
   Row& Add(const Measurement& measurement, int sensor, const Binding& binding,
            UpdateReport& report);
-  Outcome OutcomeOf(const Row& row);
+  Outcome Check(const Row& row);
   void Link(UpdateReport& report);
 
   std::vector<Row> rows_;  ///< the first count_ are in use
@@ -69,33 +66,13 @@ class Rows {
   Scratch<Eigen::MatrixXd> root_;
 };
 
-/// Which measurements may correct the state, each by itself: those with r' S^-1 r at most the
-/// quantile of chi-square that has the gate's probability. Also the weight of a robust loss, which
-/// depends on the same distance.
-class Gate {
- public:
-  /// Of S, less noise than this vanishes compared with H P H'.
-  static constexpr double kVanishing = 1e-13;
+/// m, of all rows of an update.
+Eigen::Index CountOf(std::span<Row* const> rows);
 
-  /// `probability` >= 1: all that is finite passes.
-  Gate(const System& system, double probability);
-
-  /// NIS and w of a row with r, R and S, and whether it passes: kAccepted, or why not. What lies so
-  /// far out that its R / w is not finite does not.
-  Outcome Pass(FilterState& f, Row& row);
-  /// R <- R / w in R and in S.
-  static void Weigh(Row& row);
-
-  double threshold(std::size_t sensor) const { return thresholds_[sensor]; }
-  /// Whether it was said that the noise of a sensor vanishes compared with H P H'.
-  bool warned(std::size_t sensor) const { return warned_[sensor]; }
-
- private:
-  void CheckConditioning(FilterState& f, const Row& row);
-
-  std::vector<double> thresholds_;  ///< on r' S^-1 r, by sensor
-  std::vector<bool> warned_;        ///< by sensor
-  Scratch<std::vector<double>> memory_;
-};
+/// Whether the gain is reported: of a landmark it is not, whose blocks come and go.
+inline bool GainIsRecorded(const Row& row) { return !row.model->has_landmark(); }
+/// Puts the gain of all rows of an update into their reports: n x m by columns, its rows as they
+/// lie in P.
+void RecordGain(const FilterState& f, std::span<Row* const> rows, const double* gain);
 
 }  // namespace alidade::internal

@@ -6,7 +6,7 @@
 #include "alidade/base/error.h"
 #include "alidade/filter/frame_loop.h"
 #include "alidade/filter/linear.h"
-#include "alidade/filter/method.h"
+#include "alidade/filter/stacked.h"
 
 namespace alidade {
 namespace internal {

@@ -9,6 +9,7 @@
 #include "alidade/filter/linear.h"
 #include "alidade/filter/method.h"
 #include "alidade/filter/square_root.h"
+#include "alidade/filter/stacked.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade {
@@ -161,7 +162,7 @@ Outcome SquareRoot::Correct(FilterState& f, std::span<Row* const> rows) {
   root_.setZero();
   AddProductWithTransposed(root_, transport, array.bottomRightCorner(n, n));
   SetCovariance(f);
-  f.RecordUpdate(rows, gain.data());
+  RecordGain(f, rows, gain.data());
   return Outcome::kAccepted;
 }
 

@@ -11,6 +11,7 @@
 #include "alidade/base/number_text.h"
 #include "alidade/filter/method.h"
 #include "alidade/filter/square_root.h"
+#include "alidade/filter/stacked.h"
 #include "alidade/state/tiles.h"
 
 namespace alidade {
@@ -403,10 +404,7 @@ Outcome Unscented::Correct(FilterState& f, std::span<Row* const> rows) {
   MomentsOf(transform, all.h, mean, s);
   s += all.noise;
   if (!Factorise(s)) return Outcome::kNotPd;
-  if (n == 0) {  // nothing to correct
-    f.RecordUpdate(rows, nullptr);
-    return Outcome::kAccepted;
-  }
+  if (n == 0) return Outcome::kAccepted;  // nothing to correct
   rest.leftCols(n) = transform.c * root;
   rest.rightCols(n) = -transform.c * root;
   gain.setZero();
@@ -426,7 +424,7 @@ Outcome Unscented::Correct(FilterState& f, std::span<Row* const> rows) {
   f.state.covariance().SetBlock(0, 0, p);
   f.state.MoveTo(f.moved);
   root_is_current_ = false;
-  f.RecordUpdate(rows, gain.data());
+  RecordGain(f, rows, gain.data());
   return Outcome::kAccepted;
 }
 

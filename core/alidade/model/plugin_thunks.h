@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "alidade/model/autodiff_inverse.h"
-#include "alidade/model/autodiff_step.h"
 #include "alidade/model/plugin_abi.h"
 
 /// Calls of plugin_abi.h that lead to a model: noexcept, an exception becomes ALIDADE_ERROR.

@@ -7,7 +7,7 @@
 #include <tuple>
 #include <utility>
 
-#include "alidade/model/autodiff_step.h"
+#include "alidade/model/autodiff.h"
 
 /// The models of a filter combined at compile time: no plugins, no config, no allocation, no
 /// exceptions; C++17 and Eigen. For embedded systems, and as a yardstick of the engine.

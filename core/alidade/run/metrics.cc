@@ -294,7 +294,7 @@ void Metrics::Impl::AddNees(Owner& owner, std::size_t index, const std::vector<S
     row += rows;
   }
   const double nees = internal::SquaredMahalanobis(p, error);
-  if (nees < 0.0) return;
+  if (std::isnan(nees)) return;
   const auto [bound, is_new] = quantiles.try_emplace(dof, 0.0);
   if (is_new) bound->second = ChiSquareQuantile(0.95, dof);
   for (Sums* s : into) s->nees[index].Add(nees / dof, nees <= bound->second);

@@ -71,7 +71,7 @@ Start ReadStart(const std::filesystem::path& path) {
   while (rows.Next()) {
     rows.ExpectColumns(8, "t x y z qx qy qz qw");
     start.timestamps.push_back(rows.Time(0, "t"));
-    const auto [x, y, z, qx, qy, qz, qw] = rows.PoseNumbers(NumberRows::kTumPose);
+    const auto [x, y, z, qx, qy, qz, qw] = PoseNumbers(rows, kTumPose);
     BundleCamera& camera = start.cameras.emplace_back(BundleCamera{{x, y, z}, {qw, qx, qy, qz}});
     Normalise<UnitQuaternion>(camera.orientation.data());
   }

@@ -118,8 +118,9 @@ Distance DistanceBetween(const Series& series, const Series& reference) {
         at += d[one].size();
       }
       const double square = SquaredMahalanobis(p, error);
-      joint.last = square < 0.0 ? -1.0 : std::sqrt(square / static_cast<double>(error.size()));
-      if (square < 0.0) continue;
+      joint.last =
+          std::isnan(square) ? -1.0 : std::sqrt(square / static_cast<double>(error.size()));
+      if (std::isnan(square)) continue;
       joint.sum += square / static_cast<double>(error.size());
       ++joint.count;
     }

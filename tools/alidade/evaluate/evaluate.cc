@@ -2,6 +2,7 @@
 #include "alidade/evaluate/evaluate.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "alidade/base/mahalanobis.h"
 #include "alidade/base/statistics.h"
@@ -33,7 +34,7 @@ Nees NeesOf(const Eigen::Matrix3Xd& errors, const std::vector<Eigen::Matrix3d>& 
   for (std::size_t i = 0; i < covariances.size(); ++i) {
     const Eigen::Vector3d error = errors.col(static_cast<Eigen::Index>(i));
     const double squared = internal::SquaredMahalanobis(covariances[i](axes, axes), error(axes));
-    if (squared < 0.0) continue;
+    if (std::isnan(squared)) continue;
     ++nees.poses;
     sum += squared / nees.dof;
     inside += squared <= limit ? 1.0 : 0.0;

@@ -134,7 +134,7 @@ class TrajectoryReader {
   void AddTum() {
     seconds_.push_back(rows_.Number(0, "t"));
     timestamp_texts_.emplace_back(rows_.text(0));
-    AddPose(NumberRows::kTumPose);
+    AddPose(kTumPose);
     if (columns_ != 20) return;
     double upper[12];
     for (std::size_t i = 0; i < 12; ++i) upper[i] = rows_.Number(8 + i, kCovarianceNames[i]);
@@ -159,7 +159,7 @@ class TrajectoryReader {
 
   /// Of columns 1 to 7.
   void AddPose(const std::array<const char*, 7>& names) {
-    const std::array<double, 7> v = rows_.PoseNumbers(names);
+    const std::array<double, 7> v = PoseNumbers(rows_, names);
     AddPosition({v[0], v[1], v[2]});
     const bool w_first = trajectory_.format == Format::kEuroc;
     const Eigen::Quaterniond q = w_first ? Eigen::Quaterniond(v[3], v[4], v[5], v[6])

@@ -1,13 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "alidade/filter/method.h"
+#include "alidade/filter/stacked.h"
 
 namespace alidade::internal {
-
-Eigen::Index CountOf(std::span<Row* const> rows) {
-  Eigen::Index m = 0;
-  for (const Row* row : rows) m += row->report->dof;
-  return m;
-}
 
 Stacked Stack(FilterState& f, std::span<Row* const> rows) {
   const Eigen::Index m = CountOf(rows);

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
 #include <span>
 
 namespace alidade::internal {
+
+/// What a model has not written.
+inline constexpr double kNotWritten = std::numeric_limits<double>::quiet_NaN();
 
 /// Whether none of the values is infinite or not a number.
 inline bool AllFinite(std::span<const double> values) {

@@ -24,11 +24,23 @@ void MakeWhole(SensorPlace& place, int size) {
   }
 }
 
+/// Adds a role: a block's place, with a Jacobian or without.
+void AddRole(SensorPlace& place, const Block& block, bool jacobian, bool considered) {
+  place.values.push_back(block.value_offset);
+  place.columns.push_back(-1);
+  if (!jacobian || block.tangent_offset < 0) return;
+  const int size = block.geometry().tangent;
+  place.columns.back() = place.width;
+  place.parts.push_back({block.tangent_offset, size, place.width});
+  place.consider.push_back(considered);
+  place.width += size;
+}
+
 SensorPlace PlaceOf(const SensorBinding& sensor, const State& initial, bool small) {
   SensorPlace place;
   for (const RoleBinding& role : sensor.roles) {
     const Block block = role.block < 0 ? Block{} : initial.layout()[role.block];
-    place.Add(block, role.mode != RoleMode::kKnown, role.mode == RoleMode::kConsider);
+    AddRole(place, block, role.mode != RoleMode::kKnown, role.mode == RoleMode::kConsider);
   }
   if (small && !sensor.model.has_landmark()) MakeWhole(place, initial.covariance().size());
   place.strides.assign(sensor.roles.size(), place.width);
@@ -38,18 +50,12 @@ SensorPlace PlaceOf(const SensorBinding& sensor, const State& initial, bool smal
 MotionPlace PlaceOf(const MotionBinding& motion, const StateLayout& layout) {
   MotionPlace place;
   place.holds = motion.model.discrete_noise() && motion.model.noise_size() > 0;
-  bool all = true;  // of its blocks are in P
-  int row = 0, column = 0;
+  int column = 0;
   for (const BlockId id : motion.blocks) {
     const Block& block = layout[id];
     const int size = block.geometry().tangent, offset = block.tangent_offset;
     place.values.push_back(block.value_offset);
-    for (int k = 0; k < size; ++k) {
-      if (offset >= 0) place.rows.push_back(row + k);
-      place.at.push_back(offset < 0 ? -1 : offset + k);
-    }
-    row += size;
-    all = all && offset >= 0;
+    for (int k = 0; k < size; ++k) place.at.push_back(offset < 0 ? -1 : offset + k);
     if (offset < 0) continue;
     if (!place.parts.empty() && place.parts.back().offset + place.parts.back().size == offset) {
       place.parts.back().size += size;
@@ -58,28 +64,16 @@ MotionPlace PlaceOf(const MotionBinding& motion, const StateLayout& layout) {
     }
     column += size;
   }
-  if (all) place.rows.clear();
   return place;
 }
 
 }  // namespace
 
-void SensorPlace::Add(const Block& block, bool jacobian, bool considered) {
-  values.push_back(block.value_offset);
-  columns.push_back(-1);
-  if (!jacobian || block.tangent_offset < 0) return;
-  const int size = block.geometry().tangent;
-  columns.back() = width;
-  parts.push_back({block.tangent_offset, size, width});
-  consider.push_back(considered);
-  width += size;
-}
-
 void SensorPlace::PutLandmark(std::size_t first, const StateLayout& layout,
                               const std::vector<BlockId>& blocks) {
   values.resize(first);
   columns.resize(first);
-  for (const BlockId id : blocks) Add(layout[id], true, false);
+  for (const BlockId id : blocks) AddRole(*this, layout[id], true, false);
   strides.assign(values.size(), width);
 }
 

@@ -20,8 +20,6 @@ struct SensorPlace {
   int width = 0;                    ///< of a row of H
   bool whole = false;               ///< a row of H is as wide as P, with its columns
 
-  /// Adds a role: a block's place, with a Jacobian or without.
-  void Add(const Block& block, bool jacobian, bool considered);
   /// Gives its last roles, from `first` on, the places of the blocks of a landmark.
   void PutLandmark(std::size_t first, const StateLayout& layout,
                    const std::vector<BlockId>& blocks);
@@ -31,7 +29,6 @@ struct SensorPlace {
 struct MotionPlace {
   std::vector<int> values;          ///< by block: in x
   std::vector<JacobianPart> parts;  ///< of F, without the rows that are not in P
-  std::vector<int> rows;            ///< of F that are in P; empty: all
   std::vector<int> at;              ///< in P, of each row of F; -1: not in P
   bool holds = false;               ///< its noise is discrete
 };

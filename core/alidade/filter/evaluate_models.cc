@@ -3,14 +3,11 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 
 #include "alidade/base/all_finite.h"
 
 namespace alidade::internal {
 namespace {
-
-constexpr double kNotWritten = std::numeric_limits<double>::quiet_NaN();
 
 bool AreFinite(const double* values, Eigen::Index size) {
   return AllFinite({values, static_cast<std::size_t>(size)});

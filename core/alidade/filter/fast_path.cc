@@ -2,8 +2,9 @@
 #include "alidade/filter/fast_path.h"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
+
+#include "alidade/base/all_finite.h"
 
 #define ALIDADE_INLINE [[gnu::always_inline]] inline
 
@@ -30,9 +31,6 @@ ALIDADE_INLINE void Copy(const double* from, int size, std::vector<double>& to) 
   for (int i = 0; i < size; ++i) at[i] = from[i];
 }
 
-/// What a model has not written yet.
-constexpr double kUnwritten = std::numeric_limits<double>::quiet_NaN();
-
 /// 0 where all are finite, else not a number.
 ALIDADE_INLINE double Defect(const double* values, int size) {
   double sum = 0.0;
@@ -52,10 +50,10 @@ ALIDADE_INLINE bool FastPath::StepModel(const Motion& motion, double dt_s, doubl
   double* const g = step.g.data();
   const int k = K > 0 ? K : motion.size, w = W > 0 ? W : motion.noise;
   double* const next = f_.motions.next().data() + motion.offset;
-  for (int i = 0; i < k; ++i) next[i] = kUnwritten;
-  for (int i = 0; i < k * k; ++i) f[i] = kUnwritten;
-  for (int i = 0; i < k * w; ++i) g[i] = kUnwritten;
-  for (int i = 0; i < w * w; ++i) l[i] = kUnwritten;
+  for (int i = 0; i < k; ++i) next[i] = kNotWritten;
+  for (int i = 0; i < k * k; ++i) f[i] = kNotWritten;
+  for (int i = 0; i < k * w; ++i) g[i] = kNotWritten;
+  for (int i = 0; i < w * w; ++i) l[i] = kNotWritten;
   if (motion.model.Step<false>(motion.x.data(), step.u.data(), nullptr, dt_s, motion.next.data(), f,
                                g) != Status::kOk ||
       motion.model.SqrtQ<false>(motion.x.data(), step.u.data(), dt_s, l) != Status::kOk) {
@@ -107,9 +105,9 @@ ALIDADE_INLINE bool FastPath::Linearise(Sensor& sensor, const double* z, Measure
   const Covariance::Lower p = f_.state.covariance().lower();
   const int stride = static_cast<int>(p.outerStride());
   double h[kMost], l[kMost * kMost], r[kMost], noise[kMost], s[kMost * kMost];
-  for (int i = 0; i < m; ++i) h[i] = kUnwritten;
-  for (int i = 0; i < m * m; ++i) l[i] = kUnwritten;
-  for (int i = 0; i < m * N; ++i) sensor.h.data()[i] = sensor.blank.data()[i];
+  for (int i = 0; i < m; ++i) h[i] = kNotWritten;
+  for (int i = 0; i < m * m; ++i) l[i] = kNotWritten;
+  for (int i = 0; i < m * N; ++i) sensor.H.data()[i] = sensor.blank.data()[i];
   const double* const* const roles = sensor.roles.data();
   if (sensor.model.Linearise<false>(roles, h, sensor.jacobians.data(), sensor.strides.data()) !=
           Status::kOk ||
@@ -125,10 +123,10 @@ ALIDADE_INLINE bool FastPath::Linearise(Sensor& sensor, const double* z, Measure
     }
     noise[i] = s[i * m + i];
   }
-  Project<N>(p.data(), stride, sensor.h.data(), m, pht, s);
+  Project<N>(p.data(), stride, sensor.H.data(), m, pht, s);
   bool tiny = false;
   for (int i = 0; i < m; ++i) tiny |= !(noise[i] > Gate::kVanishing * s[i * m + i]);
-  if (tiny && !parts_.gate.warned(static_cast<std::size_t>(entry.sensor))) return false;
+  if (tiny && !gate_.warned(static_cast<std::size_t>(entry.sensor))) return false;
   double work[kMost * (kMost + 1)];
   entry.nis = SquaredMahalanobis(s, r, m, work);
   if (Defect(s, m * m) + 0.0 * entry.nis != 0.0) return false;
@@ -146,7 +144,7 @@ ALIDADE_INLINE void FastPath::Stack(const Sensor& sensor, MeasurementReport& ent
   const int m = M > 0 ? M : sensor.rows;
   const double* const own = entry.s.data();
   for (int i = 0; i < m; ++i) {
-    const double* const h = sensor.h.data() + i * N;
+    const double* const h = sensor.H.data() + i * N;
     double* const s = rows.s + (at + i) * kRows;
     for (int j = 0; j < at; ++j) {
       double sum = h[0] * rows.pht[j * N];
@@ -210,8 +208,8 @@ ALIDADE_INLINE FastPath::Taken FastPath::Take(Sensor& sensor, const Measurement&
   entry.dof = m;
   entry.outcome = Outcome::kAccepted;
   if (!Linearise<N, M>(sensor, z, entry, rows.pht + at * N)) return Taken::kUnusual;
-  if (!(entry.nis <= sensor.gate)) {
-    if (parts_.gate.IsDueNext(static_cast<std::size_t>(sensor.index))) return Taken::kUnusual;
+  if (!(entry.nis <= sensor.threshold)) {
+    if (gate_.IsDueNext(static_cast<std::size_t>(sensor.index))) return Taken::kUnusual;
     entry.outcome = Outcome::kGated;
     entry.gain.clear();
     return Taken::kLeftOut;
@@ -253,36 +251,34 @@ ALIDADE_INLINE bool FastPath::Update(const Frame& frame) {
     Fit(f_.said.last_used.z, static_cast<int>(std::ssize(last->values)));
     Copy(last->values.data(), static_cast<int>(std::ssize(last->values)), f_.said.last_used.z);
   }
-  for (const MeasurementReport& entry : f_.report.measurements()) parts_.gate.Count(f_, entry);
+  for (const MeasurementReport& entry : f_.report.measurements()) gate_.Count(f_, entry);
   return true;
 }
 
 template <int N>
-bool FastPath::ProcessSized(FastPath& path, const Frame& frame) {
-  FilterState& f = path.f_;
-  Timeline& time = path.parts_.time;
+bool FastPath::ProcessSized(const Frame& frame) {
   Timestamp elapsed = 0;
-  if (f.said.ended || f.timestamp == kNoTimestamp || frame.timestamp < f.timestamp ||
-      __builtin_sub_overflow(frame.timestamp, f.timestamp, &elapsed)) {
+  if (f_.said.ended || f_.timestamp == kNoTimestamp || frame.timestamp < f_.timestamp ||
+      __builtin_sub_overflow(frame.timestamp, f_.timestamp, &elapsed)) {
     return false;
   }
   if (elapsed > 0) {
-    if (f.motions.in_interval()) return false;  // it keeps no M = Cov(x, w)
+    if (f_.motions.in_interval()) return false;  // it keeps no M = Cov(x, w)
     const double dt_s = Seconds(elapsed);
-    if (time.has_inputs()) {
-      if (!time.InputsAct(f.timestamp, frame.timestamp)) return false;
-      time.UseInputs(f.timestamp, f.motions, f.report.events);
+    if (time_.has_inputs()) {
+      if (!time_.InputsAct(f_.timestamp, frame.timestamp)) return false;
+      time_.UseInputs(f_.timestamp, f_.motions, f_.report.events);
     }
-    if (!(dt_s <= time.max_dt_s()) || !path.Step<N>(dt_s)) return false;
-    f.timestamp = frame.timestamp;
-    f.motions.CountStep();
+    if (!(dt_s <= time_.max_dt_s()) || !Step<N>(dt_s)) return false;
+    f_.timestamp = frame.timestamp;
+    f_.motions.CountStep();
   }
-  return path.Update<N>(frame);
+  return Update<N>(frame);
 }
 
 bool FastPath::Process(const Frame& frame) {
   try {
-    return process_(*this, frame);
+    return (this->*process_)(frame);
   } catch (...) {  // by a model: the loop asks it again, and names it
     return false;
   }
@@ -295,7 +291,7 @@ bool FastPath::AddMotions() {
     Motions::Step& step = f_.motions.steps()[i];
     const MotionPlace& place = binding.motion_places[i];
     if (!step.active) continue;
-    if (place.parts.size() != 1 || !place.rows.empty()) return false;
+    if (place.parts.size() != 1 || std::ranges::count(place.at, -1) > 0) return false;
     const MotionModel& model = binding.system.motions[i].model;
     const JacobianPart& part = place.parts[0];
     Motion& motion = motions_.emplace_back(
@@ -333,21 +329,20 @@ bool FastPath::AddSensors() {
     for (const JacobianPart& part : place.parts) {
       for (int i = 0; i < geometry.tangent * part.size; ++i) {
         const int at = i / part.size * place.width + part.column + i % part.size;
-        sensor.blank[static_cast<std::size_t>(at)] = kUnwritten;
+        sensor.blank[static_cast<std::size_t>(at)] = kNotWritten;
       }
     }
     for (const int column : place.columns) {
-      sensor.jacobians.push_back(column < 0 ? nullptr : sensor.h.data() + column);
+      sensor.jacobians.push_back(column < 0 ? nullptr : sensor.H.data() + column);
     }
     sensor.stream = binding.stream_of_sensor[k];
     sensor.rows = geometry.tangent;
-    sensor.gate = parts_.gate.threshold(k);
+    sensor.threshold = gate_.threshold(k);
   }
   return true;
 }
 
-std::unique_ptr<FastPath> FastPath::For(const FastParts& parts) {
-  const FilterState& f = parts.f;
+std::unique_ptr<FastPath> FastPath::For(FilterState& f, Timeline& time, Gate& gate) {
   const int n = f.size();
   const auto plain = [](const Block& block) {
     return block.has_covariance() && block.geometry().kind == GeometryKind::kVector &&
@@ -358,8 +353,8 @@ std::unique_ptr<FastPath> FastPath::For(const FastParts& parts) {
       !std::ranges::all_of(f.state.layout().blocks(), plain)) {
     return nullptr;
   }
-  parts.f.said.last_used.z.reserve(kMostOfOne);
-  std::unique_ptr<FastPath> path(new FastPath(parts));
+  f.said.last_used.z.reserve(kMostOfOne);
+  std::unique_ptr<FastPath> path(new FastPath(f, time, gate));
   if (!path->AddMotions() || !path->AddSensors()) return nullptr;
   const auto choose = [&]<int... I>(std::integer_sequence<int, I...>) {
     ((n == I + 1 ? (path->process_ = &FastPath::ProcessSized<I + 1>, 0) : 0), ...);

@@ -11,13 +11,6 @@
 
 namespace alidade::internal {
 
-/// The parts of a filter that its fast path works on.
-struct FastParts {
-  FilterState& f;
-  Timeline& time;
-  Gate& gate;
-};
-
 /// The fast path of a filter whose method is Linear, with joint updates: takes the steps and
 /// updates in which nothing but acceptance and gating happens, in functions compiled for the number
 /// of states. A measurement that its model calls invalid is reported as such. Of a frame with
@@ -28,9 +21,9 @@ class FastPath {
  public:
   /// Null where the filter is not one of few states, all of them estimated vectors in the order of
   /// the layout, and sensors of a vector of at most 3 elements each, all of whose roles are
-  /// corrected and linearised at the estimate, without loss or known numbers. It points into the
-  /// parts.
-  static std::unique_ptr<FastPath> For(const FastParts& parts);
+  /// corrected and linearised at the estimate, without loss or known numbers. It points into
+  /// all three.
+  static std::unique_ptr<FastPath> For(FilterState& f, Timeline& time, Gate& gate);
   /// As a filter processes a frame, all of it or nothing but the step.
   bool Process(const Frame& frame);
 
@@ -50,13 +43,13 @@ class FastPath {
 
     SensorModel model;
     std::vector<const double*> roles;
-    std::vector<double*> jacobians;  ///< into h
+    std::vector<double*> jacobians;  ///< into H
     std::vector<int> strides;
-    std::array<double, kMostOfOne * kSmall> h{};      ///< H, its zeros included
-    std::array<double, kMostOfOne * kSmall> blank{};  ///< h before the model writes it
+    std::array<double, kMostOfOne * kSmall> H{};      ///< its zeros included
+    std::array<double, kMostOfOne * kSmall> blank{};  ///< H before the model writes it
     AlidadeObservation seen = detail::Seen(nullptr);  ///< the measurement that is taken
     int index, stream, rows;
-    double gate;
+    double threshold;  ///< of its gate
   };
   /// The rows that passed their gates, stacked.
   template <int N>
@@ -64,16 +57,17 @@ class FastPath {
     double pht[kRows * N];  ///< P H', by columns
     double s[kRows * kRows];
     double innovation[kRows];
-    double* gain[kRows];  ///< where to report each row's column of K; a report that moves keeps it
+    double*
+        gain[kRows];  ///< each row's column of K in its report, which may move: the memory stays
   };
 
   enum class Taken { kUnusual, kLeftOut, kStacked };
 
-  explicit FastPath(const FastParts& parts) : parts_(parts), f_(parts.f) {}
+  FastPath(FilterState& f, Timeline& time, Gate& gate) : f_(f), time_(time), gate_(gate) {}
   bool AddMotions();
   bool AddSensors();
   template <int N>
-  static bool ProcessSized(FastPath& path, const Frame& frame);
+  bool ProcessSized(const Frame& frame);
   template <int N>
   bool Step(double dt_s);
   template <int N, int K, int W>
@@ -89,9 +83,10 @@ class FastPath {
   template <int N, int M>
   bool Correct(const Rows<N>& rows, int count);
 
-  FastParts parts_;
   FilterState& f_;
-  bool (*process_)(FastPath& path, const Frame& frame) = nullptr;
+  Timeline& time_;
+  Gate& gate_;
+  bool (FastPath::*process_)(const Frame& frame) = nullptr;  ///< for the number of states
   std::vector<Motion> motions_;
   std::vector<Sensor> sensors_;
 };

@@ -109,7 +109,7 @@ const UpdateReport& Filter::Push(Timestamp timestamp, const std::vector<Reading>
 
 State Filter::At(Timestamp timestamp) const {
   FrameLoop later(*loop_);
-  later.GoTo(timestamp);
+  later.Process({timestamp, {}});
   return std::move(later.f.state);
 }
 
@@ -121,7 +121,7 @@ std::optional<Prediction> Filter::Expect(std::string_view sensor, Timestamp time
   CheckKnown("sensor '" + std::string(sensor) + '\'',
              system().sensors[static_cast<std::size_t>(index)].model.known_size(), known);
   FrameLoop later(*loop_);
-  later.GoTo(timestamp);
+  later.Process({timestamp, {}});
   return later.Expect(index, landmark, known);
 }
 

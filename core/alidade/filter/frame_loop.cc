@@ -29,7 +29,7 @@ FrameLoop::FrameLoop(System system, const EkfOptions& options,
 void FrameLoop::MakeFastPath() {
   const bool apt =
       options_.fuse == Fuse::kJoint && dynamic_cast<const Linear*>(&*method) != nullptr;
-  fast_.path = apt ? FastPath::For(FastParts{f, time_, gate_}) : nullptr;
+  fast_.path = apt ? FastPath::For(f, time_, gate_) : nullptr;
   fast_.made_at = f.blocks.activations;
 }
 
@@ -48,11 +48,8 @@ void FrameLoop::Run(const Frame& frame) {
   f.report.stale = frame.timestamp < f.timestamp;
   if (!f.report.stale && !f.said.ended) StepTo(frame.timestamp);
   std::optional<Outcome> refused;
-  if (f.report.stale) {
-    refused = Outcome::kStale;
-  } else if (f.said.ended) {
-    refused = Outcome::kEnded;
-  }
+  if (f.said.ended) refused = Outcome::kEnded;
+  if (f.report.stale) refused = Outcome::kStale;
   rows_.Collect(frame, *f.binding, f.report, refused);
   if (refused) return;
   const std::span<Row> all = rows_.all();
@@ -162,12 +159,6 @@ bool FrameLoop::Correct(std::span<Row* const> rows) {
   f.said.last_used.timestamp = last.measurement->timestamp;
   f.said.last_used.z.assign(last.measurement->values.begin(), last.measurement->values.end());
   return true;
-}
-
-void FrameLoop::GoTo(Timestamp timestamp) {
-  Frame frame;
-  frame.timestamp = timestamp;
-  Process(frame);
 }
 
 std::optional<Prediction> FrameLoop::Expect(int sensor, std::int64_t landmark,

@@ -43,8 +43,6 @@ class FrameLoop {
 
   /// All that Filter::Process does. The report is in f.
   void Process(const Frame& frame);
-  /// The same of a frame without measurements.
-  void GoTo(Timestamp timestamp);
   /// What the sensor, an index into System::sensors, would measure now; as Filter::Expect.
   std::optional<Prediction> Expect(int sensor, std::int64_t landmark,
                                    const std::vector<double>& known);

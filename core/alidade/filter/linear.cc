@@ -41,21 +41,17 @@ Outcome Linear::Predict(FilterState& f, Row& row) {
 }
 
 Outcome Linear::Linearise(FilterState& f, Row& row) {
-  const Outcome outcome = LineariseAtState(f, row);
-  if (outcome != Outcome::kAccepted) NoteRefusal(f, row, outcome);
-  return outcome;
-}
-
-Outcome Linear::LineariseAtState(FilterState& f, Row& row) {
   MeasurementReport& entry = *row.report;
-  const Geometry& geometry = row.model->measurement().geometry;
   RolesAt(row, f.state.values(), f.state.values());
   Outcome outcome =
       FindLinearisation(f, row) ? LineariseElsewhere(f, row) : LineariseAt(row, row.roles.data());
   if (outcome == Outcome::kOutOfDomain || outcome == Outcome::kFailed) entry.h.clear();
   if (outcome == Outcome::kAccepted) outcome = NoiseAt(row, row.roles.data());
-  if (outcome != Outcome::kAccepted) return outcome;
-  geometry.WrapAngles(entry.h.data());
+  if (outcome != Outcome::kAccepted) {
+    NoteRefusal(f, row, outcome);
+    return outcome;
+  }
+  row.model->measurement().geometry.WrapAngles(entry.h.data());
   TakeInnovation(row);
   return outcome;
 }
@@ -128,7 +124,7 @@ Outcome Linear::CorrectBy(FilterState& f, std::span<Row* const> rows, const doub
   return small ? CorrectSmall(f, rows, dx) : CorrectLarge(f, rows, dx);
 }
 
-/// Few states and few rows: nothing is allocated.
+/// Few states and few rows, in arrays: CorrectLarge takes longer there.
 Outcome Linear::CorrectSmall(FilterState& f, std::span<Row* const> rows, const double* correction) {
   constexpr std::size_t kMost = kSmall;
   std::array<double, kMost * kMost> pht, s, w, gain;

@@ -9,14 +9,7 @@
 
 namespace alidade::internal {
 
-/// The extended Kalman filter's: everything by Jacobians, P dense.
-///
-///   step      x' = f(x, u, 0),   P <- F P F' + G Q G'
-///   predict   h, H at x,   S = H P H' + R
-///   correct   S = L L',   W = P H' L^-T,   dx = W L^-1 r,   P -= W W'
-///
-/// The gain of a consider block is 0 (Schmidt): P += E E', E = (K - K*) L of the optimal gain K*.
-/// Where digits would cancel, Joseph's form takes the place of both.
+/// The method of Ekf, which has the equations: everything by Jacobians, P dense.
 class Linear : public Method {
  public:
   std::unique_ptr<Method> Clone() const override { return std::make_unique<Linear>(*this); }
@@ -34,7 +27,6 @@ class Linear : public Method {
   Outcome CorrectBy(FilterState& f, std::span<Row* const> rows, const double* dx);
 
  private:
-  Outcome LineariseAtState(FilterState& f, Row& row);
   bool FindLinearisation(const FilterState& f, const Row& row);
   Outcome LineariseElsewhere(FilterState& f, Row& row);
   Outcome CorrectSmall(FilterState& f, std::span<Row* const> rows, const double* dx);

@@ -129,20 +129,19 @@ void Motions::Propagate(Covariance& p) {
     const Step& step = steps_[i];
     const MotionPlace& place = binding_->motion_places[i];
     if (!step.active || place.parts.empty()) continue;
-    if (place.rows.empty()) {
+    const auto fixed = std::ranges::count(place.at, -1);  // rows that are not in P
+    if (fixed == 0) {
       p.Propagate(place.parts, step.f.data(), step.q.data());
       continue;
     }
-    const Eigen::Index n = binding_->system.motions[i].model.tangent_size();
-    const auto k = std::ssize(place.rows);
+    const std::size_t n = place.at.size();
+    const auto k = static_cast<Eigen::Index>(n) - fixed;
     Workspace::Vector f = memory_.Take(k * k), q = memory_.Take(k * k);
     Eigen::Index at = 0;
-    for (const int row : place.rows) {
-      for (const int column : place.rows) {
-        const auto from = static_cast<std::size_t>(row * n + column);
-        f[at] = step.f[from];
-        q[at++] = step.q[from];
-      }
+    for (std::size_t i = 0; i < n * n; ++i) {
+      if (place.at[i / n] < 0 || place.at[i % n] < 0) continue;
+      f[at] = step.f[i];
+      q[at++] = step.q[i];
     }
     p.Propagate(place.parts, f.data(), q.data());
   }
@@ -172,10 +171,8 @@ Workspace::Matrix Motions::Transition(int n, Workspace& work) const {
   return transition;
 }
 
-/// A matrix of the steps (rows of F x n_w each) in the rows of P, next to one another; with
-/// `held_only` the columns of continuous noise are zero.
-Workspace::Matrix Motions::Spread(std::vector<double> Step::*matrix, bool held_only, int n,
-                                  Workspace& work) const {
+Workspace::Matrix Motions::Held(std::vector<double> Step::*matrix, int n, Workspace& work,
+                                bool all) const {
   Workspace::Matrix input = work.Take(n, noise_size());
   input.setZero();
   Eigen::Index columns = 0;
@@ -185,7 +182,7 @@ Workspace::Matrix Motions::Spread(std::vector<double> Step::*matrix, bool held_o
     if (!step.active) continue;
     const MotionModel& model = binding_->system.motions[i].model;
     const Eigen::Index width = model.noise_size();
-    for (std::size_t row = 0; row < place.at.size() && (place.holds || !held_only); ++row) {
+    for (std::size_t row = 0; row < place.at.size() && (place.holds || all); ++row) {
       if (place.at[row] < 0) continue;
       const Eigen::Map<const RowMajor> from((step.*matrix).data(), model.tangent_size(), width);
       input.row(place.at[row]).segment(columns, width) = from.row(static_cast<Eigen::Index>(row));
@@ -193,13 +190,6 @@ Workspace::Matrix Motions::Spread(std::vector<double> Step::*matrix, bool held_o
     columns += width;
   }
   return input;
-}
-
-Workspace::Matrix Motions::NoiseInput(int n, Workspace& work) const {
-  return Spread(&Step::gl, false, n, work);
-}
-Workspace::Matrix Motions::Held(std::vector<double> Step::*matrix, int n, Workspace& work) const {
-  return Spread(matrix, true, n, work);
 }
 
 }  // namespace alidade::internal

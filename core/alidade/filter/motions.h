@@ -46,17 +46,16 @@ class Motions {
   int noise_size() const;  ///< n_w
   // Matrices of the last step, in `work`:
   Workspace::Matrix Transition(int n, Workspace& work) const;  ///< F, n x n
-  Workspace::Matrix NoiseInput(int n, Workspace& work) const;  ///< G Lq, n x n_w
-  /// Of the steps' `gl` the same, of their `m` M (n x n_w); the columns of continuous noise zero.
-  Workspace::Matrix Held(std::vector<double> Step::*matrix, int n, Workspace& work) const;
+  /// Of the steps' `gl` G Lq, of their `m` M, n x n_w, one model beside the other; unless `all`,
+  /// the columns of continuous noise are zero.
+  Workspace::Matrix Held(std::vector<double> Step::*matrix, int n, Workspace& work,
+                         bool all = false) const;
 
  private:
   Trouble EvaluateOne(std::size_t i, const State& state, double dt_s, bool derivatives);
   void CarryHeld(const MotionModel& model, const MotionPlace& place, Step& step);
   bool IsBounded(const Covariance& p) const;
   void Propagate(Covariance& p);
-  Workspace::Matrix Spread(std::vector<double> Step::*matrix, bool held_only, int n,
-                           Workspace& work) const;
 
   const Binding* binding_;
   std::vector<Step> steps_;  ///< as in System::motions

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/filter/rows.h"
 
-#include <algorithm>
-
 #include "alidade/base/all_finite.h"
 #include "alidade/base/error.h"
 #include "alidade/filter/filter_state.h"
@@ -18,19 +16,18 @@ void Rows::Collect(const Frame& frame, const Binding& binding, UpdateReport& rep
     for (const Measurement& m : frame.measurements) {
       if (m.stream != binding.stream_of_sensor[sensor]) continue;
       const Row& row = Add(m, static_cast<int>(sensor), binding, report);
-      report.measurements().back().outcome = refused ? *refused : Check(row);
+      row.report->outcome = refused ? *refused : Check(row);
     }
   }
-  Link(report);
+  // An entry moves where one is added.
+  for (std::size_t i = 0; i < count_; ++i) rows_[i].report = &report.measurements()[i];
 }
 
 Row& Rows::CollectOne(const Measurement& measurement, int sensor, const Binding& binding,
                       UpdateReport& report) {
   count_ = 0;
   report.ClearMeasurements();
-  Row& row = Add(measurement, sensor, binding, report);
-  Link(report);
-  return row;
+  return Add(measurement, sensor, binding, report);
 }
 
 Row& Rows::Add(const Measurement& measurement, int sensor, const Binding& binding,
@@ -52,6 +49,7 @@ Row& Rows::Add(const Measurement& measurement, int sensor, const Binding& bindin
   MeasurementReport& entry = report.Add();
   entry.Reset(sensor, measurement.landmark, geometry.tangent);
   entry.z.assign(measurement.values.begin(), measurement.values.end());
+  row.report = &entry;
   return row;
 }
 
@@ -70,11 +68,6 @@ Outcome Rows::Check(const Row& row) {
     }
   }
   return OutcomeOf(row.model->Valid(m.values.data(), m.known.data()));
-}
-
-/// References into the report end with each entry that is added.
-void Rows::Link(UpdateReport& report) {
-  for (std::size_t i = 0; i < count_; ++i) rows_[i].report = &report.measurements()[i];
 }
 
 Eigen::Index CountOf(std::span<Row* const> rows) {

@@ -57,7 +57,6 @@ class Rows {
   Row& Add(const Measurement& measurement, int sensor, const Binding& binding,
            UpdateReport& report);
   Outcome Check(const Row& row);
-  void Link(UpdateReport& report);
 
   std::vector<Row> rows_;  ///< the first count_ are in use
   std::size_t count_ = 0;

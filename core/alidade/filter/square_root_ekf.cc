@@ -91,7 +91,7 @@ Trouble SquareRoot::Step(FilterState& f, double dt_s) {
   const Workspace::Use use(f.work);
   const Workspace::Matrix transition = f.motions.Transition(f.size(), f.work);
   Workspace::Matrix moved = f.work.Take(root_.rows(), root_.cols()),
-                    noise = f.motions.NoiseInput(f.size(), f.work);
+                    noise = f.motions.Held(&Motions::Step::gl, f.size(), f.work, true);
   moved.setZero();
   AddProduct(moved, transition, goes_on ? without_held_ : root_);
   if (f.motions.holds()) {

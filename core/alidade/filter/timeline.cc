@@ -37,9 +37,6 @@ Timestamp StepParts(Timestamp elapsed, double max_dt_s) {
   return (elapsed - 1) / longest + 1;
 }
 
-/// Six significant digits.
-std::string Rounded(double value) { return RoundedText(value, 6); }
-
 }  // namespace
 
 Timeline::Timeline(const System& system, const std::vector<StreamInfo>& streams, double max_dt_s)
@@ -65,33 +62,28 @@ Timeline::Timeline(const System& system, const std::vector<StreamInfo>& streams,
   }
 }
 
-/// The end of a step that starts at `from` and is to end at `to`, or before where u changes.
-Timestamp Timeline::PieceEnd(Timestamp from, Timestamp to) const {
-  for (const Held& held : held_) {
-    if (Acts(held, from)) to = std::min(to, held.until);
-  }
-  return to;
-}
-
 Trouble Timeline::First(Timestamp from, Timestamp to, std::vector<Event>& events, Piece& piece) {
   constexpr Timestamp kMostSteps = 1'000'000;
   piece.start = from;
-  piece.end = PieceEnd(from, to);
+  piece.end = to;
+  for (const Held& held : held_) {  // u changes where one stops acting
+    if (Acts(held, from)) piece.end = std::min(piece.end, held.until);
+  }
   Timestamp elapsed = 0;
   const bool overflow = __builtin_sub_overflow(piece.end, from, &elapsed);
   piece.steps = overflow ? 0 : StepParts(elapsed, max_dt_s_);
   if (overflow || piece.steps > kMostSteps) {
-    return {"too_many_substeps", "a gap of " + Rounded(Seconds(piece.end) - Seconds(from)) +
+    return {"too_many_substeps", "a gap of " + RoundedText(Seconds(piece.end) - Seconds(from)) +
                                      " s would need more than " +
-                                     Rounded(static_cast<double>(kMostSteps)) + " steps of " +
-                                     Rounded(max_dt_s_) + " s"};
+                                     RoundedText(static_cast<double>(kMostSteps)) + " steps of " +
+                                     RoundedText(max_dt_s_) + " s"};
   }
   piece.dt_s = Seconds(elapsed) / static_cast<double>(piece.steps);
   if (piece.steps >= 2 * most_steps_) {
     events.push_back({from, "substeps",
-                      "a gap of " + Rounded(Seconds(elapsed)) +
-                          " s, longer than max_dt_s = " + Rounded(max_dt_s_) + ", is stepped in " +
-                          std::to_string(piece.steps) + " equal parts"});
+                      "a gap of " + RoundedText(Seconds(elapsed)) +
+                          " s, longer than max_dt_s = " + RoundedText(max_dt_s_) +
+                          ", is stepped in " + std::to_string(piece.steps) + " equal parts"});
     most_steps_ = piece.steps;
   }
   return {};

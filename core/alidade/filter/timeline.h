@@ -81,7 +81,6 @@ class Timeline {
   };
   static bool Acts(const Held& held, Timestamp at) { return at < held.until; }
   static std::string WhyNone(const Held& held);
-  Timestamp PieceEnd(Timestamp from, Timestamp to) const;
 
   std::vector<Held> held_;  ///< of the models that take an input
   std::optional<Timestamp> start_;

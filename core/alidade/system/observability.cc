@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "alidade/base/all_finite.h"
 #include "alidade/base/decompositions.h"
 #include "alidade/base/random.h"
 #include "alidade/model/geometry.h"
@@ -12,8 +12,6 @@
 
 namespace alidade {
 namespace {
-
-constexpr double kNotWritten = std::numeric_limits<double>::quiet_NaN();
 
 /// Where the landmarks are before the camera, as shares of their usual distance.
 constexpr double kPlaces[][3] = {{-0.2, 0.1, 1.0},   {0.23, -0.07, 1.3}, {0.1, 0.15, 0.8},
@@ -124,7 +122,7 @@ bool Advance(const System& system, double dt_s, Random* random, Trajectory& t,
       next.push_back(t.values[static_cast<std::size_t>(id)]);
     }
     for (auto& value : next) y.push_back(value.data());
-    RowMajor f = RowMajor::Constant(n, n, kNotWritten);
+    RowMajor f = RowMajor::Constant(n, n, internal::kNotWritten);
     RowMajor g(n, std::max(1, motion.model.noise_size()));
     const std::vector<double> u = GenericInput(motion.model, random);
     if (motion.model.Step(x.data(), u.data(), nullptr, dt_s, y.data(), f.data(), g.data()) !=
@@ -185,8 +183,9 @@ void ObserveBy(const SensorBinding& sensor, const double* known, const System& s
   for (const RoleBinding& role : sensor.roles) {
     roles.push_back(role.block < 0 ? nullptr
                                    : t.values[static_cast<std::size_t>(role.block)].data());
-    j.push_back(RowMajor::Constant(
-        m, role.block < 0 ? 1 : system.layout[role.block].geometry().tangent, kNotWritten));
+    j.push_back(
+        RowMajor::Constant(m, role.block < 0 ? 1 : system.layout[role.block].geometry().tangent,
+                           internal::kNotWritten));
   }
   std::vector<double*> data;
   std::vector<int> strides;

@@ -3,18 +3,15 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <memory>
 #include <numeric>
 #include <utility>
 
+#include "alidade/base/all_finite.h"
 #include "alidade/base/words.h"
 
 namespace alidade::internal {
 namespace {
-
-/// What a model does not write is not a number.
-constexpr double kUnwritten = std::numeric_limits<double>::quiet_NaN();
 
 /// A motion model that moves roles: its blocks are `count` roles from `first` on, of which constant
 /// ones stay.
@@ -131,10 +128,10 @@ class OffsetSensor {
     double* at = next;
     for (std::size_t b = 0; b < mover.model.blocks().size(); ++b) {
       to[b] = at;
-      at = std::fill_n(at, mover.model.blocks()[b].geometry.ambient, kUnwritten);
+      at = std::fill_n(at, mover.model.blocks()[b].geometry.ambient, kNotWritten);
     }
     const int n = mover.model.tangent_size();
-    if (f != nullptr) std::fill_n(f, n * n, kUnwritten);
+    if (f != nullptr) std::fill_n(f, n * n, kNotWritten);
     const Status status = mover.model.Step(x, nullptr, nullptr, dt_s, to.data(), f,
                                            f == nullptr ? nullptr : memory.g.data());
     int row = 0;
@@ -225,7 +222,7 @@ class OffsetSensor {
     std::size_t size = 0;
     for (const Space& role : sensor_.roles())
       size += static_cast<std::size_t>(m * role.geometry.tangent);
-    memory.jacobian.assign(std::max(memory.jacobian.size(), size), kUnwritten);
+    memory.jacobian.assign(std::max(memory.jacobian.size(), size), kNotWritten);
     memory.jacobians.assign(place_.size(), nullptr);
     memory.strides.assign(place_.size(), 0);
     double* next = memory.jacobian.data();

@@ -122,7 +122,7 @@ sources() {
           own_plugin != "ceres" && folder != "bench")
         report("library", "only plugins/ceres and bench include " path)
       if (path ~ /^opencv/ && own_plugin !~ /image/ && folder != "bench" &&
-          FILENAME !~ /^tests\/images\//)
+          FILENAME !~ /^(tests|plugins\/[a-z_]+)\/images\//)
         report("library", "only image plugins, their tests and bench include " path)
       if (FILENAME !~ /^tests\/(plugins|fuzz)\// && of_plugin(path))
         report("plugin", "plugins are loaded, not included: " path)
@@ -166,7 +166,7 @@ sources() {
       check_include(path, bracket)
       next
     }
-    folder ~ /^(core|tools)$/ && " " $0 " " ~ /[^a-z_](ceres_batch|fixed_lag|ceres_bundle|image_writer|depth_target|alidade_[a-z_0-9]+\.so)[^a-z_]/ {
+    folder ~ /^(core|tools)$/ && " " $0 " " ~ /[^a-z_](ceres_batch|fixed_lag|ceres_bundle|image_writer|image_tracks|depth_target|alidade_[a-z_0-9]+\.so)[^a-z_]/ {
       report("named", $0)
     }
     folder ~ /^(core|tools|sensors|motion_models|plugins)$/ {
@@ -351,7 +351,7 @@ for call in 'std::cout << 1;' 'std::cerr << 1;' 'printf("x");' 'std::printf("//"
     plant print "$file" "$licence\n$call"
   done
 done
-for name in ceres_batch fixed_lag ceres_bundle image_writer depth_target alidade_ceres_bundle.so; do
+for name in ceres_batch fixed_lag ceres_bundle image_writer image_tracks depth_target alidade_ceres_bundle.so; do
   for file in core/alidade/run/new.cc tools/alidade/compare/new.h; do
     plant named "$file" "$licence\nif (entry.name == \"$name\") return;"
   done
@@ -378,6 +378,7 @@ allow sensors/new.cc "$licence\n#include \"new.h\"\n#include <cmath>\n#include <
 allow plugins/csv/new.cc "$licence\n#include \"own.h\"\n#include <fcntl.h>\n#include \"sensors/scale_2d.h\""
 allow plugins/ceres/batch/new.cc "$licence\n#include <ceres/ceres.h>"
 allow plugins/image_sequence/new.cc "$licence\n#include <opencv2/core.hpp>"
+allow plugins/tracks/images/new.cc "$licence\n#include <opencv2/core.hpp>"
 allow tests/images/new.cc "$licence\n#include <opencv2/core.hpp>"
 allow bench/speed/new.cc "$licence\n#include <ceres/problem.h>\n#include \"plugins/ceres/bundle/sensor_cost.h\""
 allow bench/speed/new.cc "$licence\n#include <CLI/CLI.hpp>\n#include <opencv2/core.hpp>"

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+#include <utility>
+#include <vector>
+
+#include "alidade/model/params.h"
+
+namespace alidade {
+
+/// How features are found and followed.
+struct TrackerOptions {
+  int features;                ///< as many are followed, where the image has them
+  std::array<int, 2> cells;    ///< columns and rows of the grid that spreads them
+  double distance_px;          ///< between two, at least
+  double quality;              ///< least response of a corner, of the strongest in the image
+  int window_px;               ///< side of the patch that is followed
+  int levels;                  ///< of the pyramid, above the image itself
+  double forward_backward_px;  ///< between a feature and where it is followed back to, at most
+
+  explicit TrackerOptions(Params& p)
+      : features(p.Integer("features", "features that are followed, where the image has them", 1,
+                           100'000, 100)),
+        cells{p.Integer("grid_columns", "of the grid over which features are spread", 1, 1000, 8),
+              p.Integer("grid_rows", "of that grid", 1, 1000, 6)},
+        distance_px(
+            p.Number("distance_px", "px", "between two features, at least", {1.0, 1e4}, 12.0)),
+        quality(p.Number("quality", "1",
+                         "least response of a corner, as a share of the strongest of its image",
+                         {0.0, 1.0, true, true}, 0.01)),
+        window_px(p.Integer("window_px", "side of the patch that is followed", 5, 101, 21)),
+        levels(p.Integer("pyramid_levels", "halved images above the image itself", 0, 10, 3)),
+        forward_backward_px(p.Positive(
+            "forward_backward_px", "px",
+            "a feature is lost where it is followed back to farther from where it was", 0.5)) {}
+};
+
+/// Follows corners from image to image [Lucas1981], and finds new ones
+/// [Shi1994] where a cell of the grid has fewer than its share. A feature is lost where its
+/// patch leaves the image, where it is not followed back to where it was [Kalal2010], and where it
+/// comes as close to an older one as half of the least distance. It keeps its id as long as it
+/// lives, and no other has it.
+class FeatureTracker {
+ public:
+  struct Feature {
+    std::int64_t id;
+    cv::Point2f at;  ///< px; the centre of the upper left pixel is (0, 0)
+  };
+
+  explicit FeatureTracker(const TrackerOptions& options) : options_(options) {}
+
+  /// The features in the next image, by id. All images are of one size, 8 bit grey.
+  const std::vector<Feature>& Track(const cv::Mat& image) {
+    const cv::Size window(options_.window_px, options_.window_px);
+    cv::buildOpticalFlowPyramid(image, pyramid_, window, options_.levels);
+    if (!features_.empty()) Follow(image.size(), window);
+    if (std::ssize(features_) < options_.features) Refill(image);
+    std::swap(pyramid_, before_);
+    return features_;
+  }
+
+ private:
+  void Follow(cv::Size size, cv::Size window) {
+    from_.clear();
+    for (const Feature& feature : features_) from_.push_back(feature.at);
+    cv::calcOpticalFlowPyrLK(before_, pyramid_, from_, to_, found_, error_, window, options_.levels,
+                             kStop);
+    // Back from where it is to where it was: what is near needs no pyramid.
+    back_ = from_;
+    cv::calcOpticalFlowPyrLK(pyramid_, before_, to_, back_, found_back_, error_, window, 0, kStop,
+                             cv::OPTFLOW_USE_INITIAL_FLOW);
+    const auto margin = static_cast<float>(options_.window_px / 2);
+    const cv::Rect2f inside(margin, margin, static_cast<float>(size.width - 1) - 2.0F * margin,
+                            static_cast<float>(size.height - 1) - 2.0F * margin);
+    taken_.create(size, CV_8UC1);
+    taken_.setTo(0);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < features_.size(); ++i) {
+      const cv::Point2f at = to_[i];
+      if (found_[i] == 0 || found_back_[i] == 0 || !inside.contains(at) ||
+          cv::norm(back_[i] - from_[i]) > options_.forward_backward_px ||
+          taken_.at<unsigned char>(cv::Point(at)) != 0) {
+        continue;
+      }
+      cv::circle(taken_, cv::Point(at), static_cast<int>(options_.distance_px / 2.0), 1,
+                 cv::FILLED);
+      features_[kept++] = {features_[i].id, at};
+    }
+    features_.resize(kept);
+  }
+
+  /// The strongest corners of each cell that has fewer features than its share.
+  void Refill(const cv::Mat& image) {
+    constexpr int kBlock = 5;  // px, over which a corner is told
+    cv::cornerMinEigenVal(image, response_, kBlock);
+    cv::dilate(response_, largest_, cv::Mat());
+    double strongest = 0.0;
+    cv::minMaxLoc(response_, nullptr, &strongest);
+    const auto least = static_cast<float>(options_.quality * strongest);
+    const int margin = options_.window_px / 2 + 1;
+    corners_.clear();
+    for (int y = margin; y < image.rows - margin; ++y) {
+      const float* const own = response_.ptr<float>(y);
+      const float* const around = largest_.ptr<float>(y);
+      for (int x = margin; x < image.cols - margin; ++x) {
+        if (own[x] > least && own[x] == around[x]) corners_.emplace_back(own[x], cv::Point(x, y));
+      }
+    }
+    std::ranges::stable_sort(corners_, std::greater(), &std::pair<float, cv::Point>::first);
+    taken_.create(image.size(), CV_8UC1);
+    taken_.setTo(0);
+    const int cells = options_.cells[0] * options_.cells[1];
+    std::vector<int> count(static_cast<std::size_t>(cells), 0);
+    const auto cell_of = [&](cv::Point at) {
+      const int column = at.x * options_.cells[0] / image.cols;
+      const int row = at.y * options_.cells[1] / image.rows;
+      return static_cast<std::size_t>(row * options_.cells[0] + column);
+    };
+    const auto take = [&](cv::Point at) {
+      cv::circle(taken_, at, static_cast<int>(options_.distance_px), 1, cv::FILLED);
+      ++count[cell_of(at)];
+    };
+    for (const Feature& feature : features_) take(cv::Point(feature.at));
+    const std::size_t old = features_.size();
+    const int share = (options_.features + cells - 1) / cells;
+    for (const auto& [response, at] : corners_) {
+      if (std::ssize(features_) == options_.features) break;
+      if (taken_.at<unsigned char>(at) != 0 || count[cell_of(at)] >= share) continue;
+      take(at);
+      features_.push_back({next_id_++, cv::Point2f(at)});
+    }
+    from_.clear();
+    for (std::size_t i = old; i < features_.size(); ++i) from_.push_back(features_[i].at);
+    if (from_.empty()) return;
+    cv::cornerSubPix(image, from_, cv::Size(kBlock, kBlock), cv::Size(-1, -1), kStop);
+    for (std::size_t i = old; i < features_.size(); ++i) features_[i].at = from_[i - old];
+  }
+
+  inline static const cv::TermCriteria kStop{cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30,
+                                             0.01};
+
+  TrackerOptions options_;
+  std::vector<Feature> features_;
+  std::int64_t next_id_ = 0;
+  std::vector<cv::Mat> before_, pyramid_;  ///< of the image before; of this one
+
+  // Memory.
+  std::vector<cv::Point2f> from_, to_, back_;
+  std::vector<unsigned char> found_, found_back_;
+  std::vector<float> error_;
+  std::vector<std::pair<float, cv::Point>> corners_;
+  cv::Mat taken_, response_, largest_;
+};
+
+}  // namespace alidade

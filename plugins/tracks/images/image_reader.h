@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <fnmatch.h>
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "alidade/base/error.h"
+#include "alidade/base/read_file.h"
+#include "alidade/config/config.h"
+
+namespace alidade {
+
+/// The images of a folder, in the order of their names (2.png before 10.png), or of a video, one at
+/// a time, 8 bit grey.
+///
+/// Errors       kInputMissing: no such path, no image in the folder. kBadData, with the file: an
+///              image that cannot be decoded, is cut short, or has another size than the first.
+class ImageReader {
+ public:
+  /// `names`: which files of a folder are images, as a shell matches names; empty: those that end
+  /// like one.
+  ImageReader(std::filesystem::path path, const std::string& names, const Node& key)
+      : path_(std::move(path)) {
+    std::error_code error;
+    if (!std::filesystem::exists(path_, error)) {
+      throw Error(ExitCode::kInputMissing,
+                  ErrorLine(key.place(), key.path(), "no such file or folder: " + path_.string()));
+    }
+    if (std::filesystem::is_directory(path_, error)) {
+      List(names, key);
+      return;
+    }
+    if (!video_.open(path_.string())) {
+      throw Error(ExitCode::kBadData,
+                  ErrorLine({path_.string()}, {}, "not a video that OpenCV reads",
+                            "a video, or a folder of images"));
+    }
+  }
+
+  /// The next image; false at the end.
+  bool Next(cv::Mat& image) {
+    if (is_video() ? !ReadVideo(image) : !ReadFile(image)) return false;
+    ++number_;
+    if (size_.empty()) size_ = image.size();
+    if (image.size() != size_) {
+      Fail(SizeText(image.size()) + ", but the first image is " + SizeText(size_),
+           "images of one size");
+    }
+    return true;
+  }
+
+  bool is_video() const { return files_.empty(); }
+  /// Of the image that was read last, from 0.
+  std::int64_t number() const { return number_; }
+  /// The file of the image that was read last, or its number in the video.
+  Place place() const {
+    if (is_video()) return {path_.string() + ", image " + std::to_string(number_)};
+    return {number_ < 0 ? path_.string() : files_[static_cast<std::size_t>(number_)].string()};
+  }
+  /// How many there are; of a video as it says.
+  std::int64_t size() const {
+    return is_video() ? static_cast<std::int64_t>(video_.get(cv::CAP_PROP_FRAME_COUNT))
+                      : std::ssize(files_);
+  }
+  /// Images a second, as a video says; 0: it does not.
+  double rate_hz() const { return is_video() ? video_.get(cv::CAP_PROP_FPS) : 0.0; }
+
+ private:
+  static std::string SizeText(cv::Size size) {
+    return std::to_string(size.width) + "x" + std::to_string(size.height) + " px";
+  }
+
+  /// By the name alone: an empty or broken image is an error, and not passed over.
+  static bool EndsLikeAnImage(const std::filesystem::path& file) {
+    constexpr const char* kEnds[] = {".png", ".jpg", ".jpeg", ".pgm",  ".ppm",
+                                     ".pnm", ".bmp", ".tif",  ".tiff", ".webp"};
+    const std::string end = file.extension().string();
+    return std::ranges::any_of(kEnds,
+                               [&](const char* one) { return strcasecmp(end.c_str(), one) == 0; });
+  }
+
+  void List(const std::string& names, const Node& key) {
+    for (const auto& entry : std::filesystem::directory_iterator(path_)) {
+      const std::string name = entry.path().filename().string();
+      const bool is_image = names.empty() ? EndsLikeAnImage(entry.path())
+                                          : fnmatch(names.c_str(), name.c_str(), 0) == 0;
+      if (entry.is_regular_file() && is_image) files_.push_back(entry.path());
+    }
+    std::ranges::sort(files_, [](const auto& a, const auto& b) {
+      return strverscmp(a.filename().c_str(), b.filename().c_str()) < 0;
+    });
+    if (!files_.empty()) return;
+    throw Error(ExitCode::kInputMissing,
+                ErrorLine(key.place(), key.path(),
+                          "no image in " + path_.string() +
+                              (names.empty() ? "" : " matches '" + names + "'"),
+                          "PNG, JPEG, PGM or another that OpenCV reads"));
+  }
+
+  bool ReadVideo(cv::Mat& image) {
+    if (!video_.read(colour_)) return false;
+    if (colour_.channels() == 1) {
+      image = colour_;
+    } else {
+      cv::cvtColor(colour_, image, cv::COLOR_BGR2GRAY);
+    }
+    return true;
+  }
+
+  bool ReadFile(cv::Mat& image) {
+    const auto next = static_cast<std::size_t>(number_ + 1);
+    if (next == files_.size()) return false;
+    const std::string bytes = internal::ReadFile(files_[next], [&](ExitCode code, int error) {
+      throw Error(code, ErrorLine({files_[next].string()}, {}, std::strerror(error)));
+    });
+    if (!bytes.empty()) {
+      const cv::Mat all(1, static_cast<int>(bytes.size()), CV_8UC1,
+                        const_cast<char*>(bytes.data()));
+      cv::imdecode(all, cv::IMREAD_GRAYSCALE, &image);
+    }
+    if (bytes.empty() || image.empty() || IsCutShort(bytes)) {
+      ++number_;
+      Fail(bytes.empty()   ? "an empty file"
+           : image.empty() ? "not an image that OpenCV reads"
+                           : "the image is cut short",
+           "a whole image; `images` says which files are");
+    }
+    return true;
+  }
+
+  /// Decoders fill up what a JPEG or PNG lacks, and say nothing.
+  static bool IsCutShort(std::string_view bytes) {
+    if (bytes.starts_with("\xff\xd8"))
+      return bytes.find("\xff\xd9", bytes.size() / 2) == bytes.npos;
+    if (bytes.starts_with("\x89PNG")) return bytes.find("IEND", bytes.size() / 2) == bytes.npos;
+    return false;
+  }
+
+  [[noreturn]] void Fail(const std::string& what, std::string_view expected) const {
+    throw Error(ExitCode::kBadData, ErrorLine(place(), {}, what, expected));
+  }
+
+  std::filesystem::path path_;
+  std::vector<std::filesystem::path> files_;  ///< of a folder
+  cv::VideoCapture video_;
+  cv::Mat colour_;
+  cv::Size size_;
+  std::int64_t number_ = -1;
+};
+
+}  // namespace alidade

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "alidade/host/source.h"
+#include "feature_tracker.h"
+#include "image_reader.h"
+#include "plugins/tracks/calibration_file.h"
+#include "plugins/tracks/companion_files.h"
+
+namespace alidade {
+
+/// Features that are found in the images of one camera and followed through them.
+///
+/// Beside the images, in their folder or that of the video, may be `timestamps.csv` (`frame,t_s`,
+/// frames counted from 0), or else rate_hz gives image k the time k / rate; `groundtruth.tum` or
+/// `truth.tum` (world_from_cam); and `calibration.yaml`, see CalibrationFile.
+///
+///   stream   size  values  when
+///   tracks   2     u, v    a feature is followed; the landmark is its id
+///
+/// Keys         kImageTracksKeys (tracks.cc), those of TrackerOptions.
+/// Errors       those of ImageReader, TimestampRows and TumRows; kBadConfig.
+class ImageTracks : public Source {
+ public:
+  explicit ImageTracks(const SourceArguments& arguments)
+      : tracker_(TrackerOptions(arguments.params)) {
+    Params& p = arguments.params;
+    rate_hz_ = p.Number("rate_hz", "Hz",
+                        "images a second, where there is no timestamps.csv; 0: there is, or the "
+                        "video says",
+                        {0.0, 1e6}, 0.0);
+    start_ = p.Integer("start_frame", "images before it are left out", 0, 1 << 30, 0);
+    most_ = p.Integer("max_frames", "images at most; 0: all", 0, 1 << 30, 0);
+    tolerance_ = TimestampFromSeconds(
+        p.Number("truth_tolerance_s", "s",
+                 "the true pose of an image is at most so far off in time", {0.0, 1e3}, 1e-3));
+    for (const char* key : {"path", "images", "state_entry"}) arguments.entry.Declare(key);
+    const auto text = [&](const char* key, const char* fallback) {
+      const auto node = arguments.entry.Find(key);
+      return node ? node->Text() : fallback;
+    };
+    Open(arguments.entry.At("path", "images"), text("images", ""), arguments.folder);
+    const std::string state = text("state_entry", "cam");
+    if (truth_) truths_ = {{state + ".position", 3}, {state + ".orientation", 4}};
+  }
+
+  const std::vector<StreamInfo>& streams() const override { return streams_; }
+  const std::vector<StreamInfo>& truths() const override { return truths_; }
+  Place place() const override { return images_->place(); }
+  std::int64_t size() const override {
+    const std::int64_t left = std::max<std::int64_t>(0, images_->size() - start_);
+    return most_ > 0 ? std::min<std::int64_t>(most_, left) : left;
+  }
+  std::optional<Config> Calibration() const override {
+    if (!calibration_) return std::nullopt;
+    return CalibrationFile::Read(*calibration_);
+  }
+
+  bool Next(SourceFrame& frame) override {
+    if (frames_ == most_ && most_ > 0) return false;
+    do {
+      if (!images_->Next(image_)) return false;
+    } while (images_->number() < start_);
+    frame.timestamp = TimeOf(images_->number());
+    frame.measurements.clear();
+    for (const FeatureTracker::Feature& feature : tracker_.Track(image_)) {
+      frame.measurements.push_back(
+          {frame.timestamp, 0, feature.id, {feature.at.x, feature.at.y}, {}});
+    }
+    frame.truth.assign(truths_.size(), {});
+    if (truth_) {
+      if (const auto pose = truth_->At(frame.timestamp, tolerance_)) {
+        frame.truth = {{pose->position.begin(), pose->position.end()},
+                       {pose->orientation.begin(), pose->orientation.end()}};
+      }
+    }
+    ++frames_;
+    return true;
+  }
+
+ private:
+  void Open(const Node& key, const std::string& names, const std::filesystem::path& folder) {
+    if (key.Text().empty()) key.Fail("no path", "a folder of images, or a video");
+    const std::filesystem::path path = folder / key.Text();
+    images_.emplace(path, names, key);
+    const std::filesystem::path home = images_->is_video() ? path.parent_path() : path;
+    const auto beside = [&](const char* name) -> std::optional<std::filesystem::path> {
+      std::error_code ignored;
+      const bool there = std::filesystem::exists(home / name, ignored);
+      return there ? std::optional(home / name) : std::nullopt;
+    };
+    if (rate_hz_ == 0.0) {
+      if (const auto times = beside("timestamps.csv")) {
+        times_.emplace(*times, key.place(), key.path());
+      } else {
+        rate_hz_ = images_->rate_hz();
+      }
+    }
+    if (!times_ && !(rate_hz_ > 0.0)) {
+      key.Fail("no timestamps.csv next to the images", "that file, or 'rate_hz'");
+    }
+    calibration_ = beside("calibration.yaml");
+    auto truth = beside("groundtruth.tum");
+    if (!truth) truth = beside("truth.tum");
+    if (truth) truth_.emplace(*truth, key.place(), key.path());
+  }
+
+  Timestamp TimeOf(std::int64_t image) {
+    if (!times_) return TimestampFromSeconds(static_cast<double>(image) / rate_hz_);
+    std::int64_t frame = -1;
+    Timestamp timestamp = 0;
+    while (frame < image) {
+      if (!times_->Next(frame, timestamp)) break;
+    }
+    if (frame != image) {
+      throw Error(
+          ExitCode::kBadData,
+          ErrorLine(place(), {}, "image " + std::to_string(image) + " is not in " + times_->name(),
+                    "a time for every image"));
+    }
+    return timestamp;
+  }
+
+  FeatureTracker tracker_;
+  double rate_hz_ = 0.0;
+  std::int64_t start_ = 0, most_ = 0, frames_ = 0;
+  Timestamp tolerance_ = 0;
+  std::vector<StreamInfo> streams_ = {{"tracks", 2}}, truths_;
+  std::optional<ImageReader> images_;
+  std::optional<TimestampRows> times_;
+  std::optional<TumRows> truth_;
+  std::optional<std::filesystem::path> calibration_;
+  cv::Mat image_;
+};
+
+}  // namespace alidade

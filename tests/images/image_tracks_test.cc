@@ -199,6 +199,19 @@ TEST_F(ImageTracks, RefuseWhatIsNoImage) {
       << small.err;
 }
 
+// Its decoder gives a whole image of what is left, grey below.
+TEST_F(ImageTracks, RefuseAJpegThatIsCutShort) {
+  MakeImages();
+  const std::string jpeg = (folder_ / "scene/images/000003.jpg").string();
+  cv::imwrite(jpeg, Image(3));
+  std::filesystem::remove(ImageFile(3));
+  ASSERT_EQ(Track().code, 0);
+  std::filesystem::resize_file(jpeg, std::filesystem::file_size(jpeg) * 3 / 4);
+  const Outcome cut = Track();
+  EXPECT_EQ(cut.code, 65) << cut.err;
+  EXPECT_TRUE(Contains(cut.err, "000003.jpg: the image is cut short")) << cut.err;
+}
+
 TEST_F(ImageTracks, EndInABlackImageAndBeginAnewAfterIt) {
   MakeImages();
   cv::imwrite(ImageFile(9), cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));

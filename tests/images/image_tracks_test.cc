@@ -244,5 +244,28 @@ TEST_F(ImageTracks, StandStillInAFrozenImage) {
   EXPECT_EQ(again, static_cast<int>(before.size()));
 }
 
+// Example 25, from pixels to the way of the camera: as good as from perfect tracks, within a half.
+TEST_F(ImageTracks, LeadTheFilterAsPerfectTracksDo) {
+  const std::string example = std::string(ALIDADE_SOURCE_DIR) + "/examples/25_slam_images/";
+  const Outcome drawn =
+      Call({"simulate", example + "scene.yaml", "-o", "room", "--images", "images"});
+  ASSERT_EQ(drawn.code, 0) << drawn.err;
+  const auto rmse_of = [&](const std::string& source) {
+    const Outcome run =
+        Call({"run", example + "config.yaml", "--set", source, "-o", "run", "--force"});
+    EXPECT_EQ(run.code, 0) << run.err;
+    const Outcome eval = Call({"eval", "room/truth.tum", "run", "--align-mode", "sim3", "--json"});
+    EXPECT_EQ(eval.code, 0) << eval.err;
+    const std::size_t at = eval.out.find("\"rmse\":");
+    return at == std::string::npos ? NAN : std::stod(eval.out.substr(at + 7));
+  };
+  const double perfect =
+      rmse_of("source={type: tracks, path: " + (folder_ / "room").string() + "}");
+  const double seen = rmse_of("source.path=" + (folder_ / "room/images").string());
+  EXPECT_GT(perfect, 0.0005);
+  EXPECT_LT(perfect, 0.004);  // m
+  EXPECT_LT(seen, 1.5 * perfect);
+}
+
 }  // namespace
 }  // namespace alidade

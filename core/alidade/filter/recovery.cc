@@ -18,14 +18,14 @@ Eigen::MatrixXd UpperBound(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
 }
 
 /// Of the blocks that one motion model moves together with `id`: the values they have are no better
-/// known than at the start, nor than they are. Uncorrelated.
+/// known than at the start, nor than they are. Uncorrelated. `id` itself is initialised after it.
 void DropMotionOf(FilterState& f, BlockId id) {
   for (const MotionBinding& motion : f.binding->system.motions) {
     if (std::ranges::find(motion.blocks, id) == motion.blocks.end()) continue;
     for (const Prior& prior : f.binding->system.priors) {
       const Block& block = f.state.layout()[prior.block];
       if (std::ranges::find(motion.blocks, prior.block) == motion.blocks.end() ||
-          prior.block == id || prior.covariance.size() == 0 || !block.has_covariance() ||
+          prior.covariance.size() == 0 || !block.has_covariance() ||
           block.status != BlockStatus::kEstimated) {
         continue;
       }

@@ -19,9 +19,11 @@ struct TrackerOptions {
   std::array<int, 2> cells;    ///< columns and rows of the grid that spreads them
   double distance_px;          ///< between two, at least
   double quality;              ///< least response of a corner, of the strongest in the image
+  int corner_px;               ///< side of the patch over which a corner is told
   int window_px;               ///< side of the patch that is followed
   int levels;                  ///< of the pyramid, above the image itself
   double forward_backward_px;  ///< between a feature and where it is followed back to, at most
+  double least_similarity;  ///< of the patch now and where the feature was found: their correlation
 
   explicit TrackerOptions(Params& p)
       : features(p.Integer("features", "features that are followed, where the image has them", 1,
@@ -33,23 +35,32 @@ struct TrackerOptions {
         quality(p.Number("quality", "1",
                          "least response of a corner, as a share of the strongest of its image",
                          {0.0, 1.0, true, true}, 0.01)),
+        corner_px(p.Integer("corner_px",
+                            "side of the patch over which a corner is told: small marks, such as "
+                            "discs, are found at their middle where it is larger than they are",
+                            3, 101, 5)),
         window_px(p.Integer("window_px", "side of the patch that is followed", 5, 101, 21)),
         levels(p.Integer("pyramid_levels", "halved images above the image itself", 0, 10, 3)),
         forward_backward_px(p.Positive(
             "forward_backward_px", "px",
-            "a feature is lost where it is followed back to farther from where it was", 0.5)) {}
+            "a feature is lost where it is followed back to farther from where it was", 0.5)),
+        least_similarity(p.Number(
+            "least_similarity", "1",
+            "a feature is lost where its patch correlates less with that where it was found",
+            {-1.0, 1.0}, 0.7)) {}
 };
 
 /// Follows corners from image to image [Lucas1981], and finds new ones
 /// [Shi1994] where a cell of the grid has fewer than its share. A feature is lost where its
-/// patch leaves the image, where it is not followed back to where it was [Kalal2010], and where it
-/// comes as close to an older one as half of the least distance. It keeps its id as long as it
-/// lives, and no other has it.
+/// patch leaves the image, where it is not followed back to where it was [Kalal2010], where it no
+/// longer looks as it did when it was found, and where it comes as close to an older one as half of
+/// the least distance. It keeps its id as long as it lives, and no other has it.
 class FeatureTracker {
  public:
   struct Feature {
     std::int64_t id;
     cv::Point2f at;  ///< px; the centre of the upper left pixel is (0, 0)
+    cv::Mat found;   ///< its patch where it was found
   };
 
   explicit FeatureTracker(const TrackerOptions& options) : options_(options) {}
@@ -58,14 +69,15 @@ class FeatureTracker {
   const std::vector<Feature>& Track(const cv::Mat& image) {
     const cv::Size window(options_.window_px, options_.window_px);
     cv::buildOpticalFlowPyramid(image, pyramid_, window, options_.levels);
-    if (!features_.empty()) Follow(image.size(), window);
+    if (!features_.empty()) Follow(image, window);
     if (std::ssize(features_) < options_.features) Refill(image);
     std::swap(pyramid_, before_);
     return features_;
   }
 
  private:
-  void Follow(cv::Size size, cv::Size window) {
+  void Follow(const cv::Mat& image, cv::Size window) {
+    const cv::Size size = image.size();
     from_.clear();
     for (const Feature& feature : features_) from_.push_back(feature.at);
     cv::calcOpticalFlowPyrLK(before_, pyramid_, from_, to_, found_, error_, window, options_.levels,
@@ -84,20 +96,22 @@ class FeatureTracker {
       const cv::Point2f at = to_[i];
       if (found_[i] == 0 || found_back_[i] == 0 || !inside.contains(at) ||
           cv::norm(back_[i] - from_[i]) > options_.forward_backward_px ||
-          taken_.at<unsigned char>(cv::Point(at)) != 0) {
+          taken_.at<unsigned char>(cv::Point(at)) != 0 ||
+          Similarity(image, at, features_[i].found) < options_.least_similarity) {
         continue;
       }
       cv::circle(taken_, cv::Point(at), static_cast<int>(options_.distance_px / 2.0), 1,
                  cv::FILLED);
-      features_[kept++] = {features_[i].id, at};
+      Feature& feature = features_[kept++];
+      std::swap(feature, features_[i]);
+      feature.at = at;
     }
     features_.resize(kept);
   }
 
   /// The strongest corners of each cell that has fewer features than its share.
   void Refill(const cv::Mat& image) {
-    constexpr int kBlock = 5;  // px, over which a corner is told
-    cv::cornerMinEigenVal(image, response_, kBlock);
+    cv::cornerMinEigenVal(image, response_, options_.corner_px);
     cv::dilate(response_, largest_, cv::Mat());
     double strongest = 0.0;
     cv::minMaxLoc(response_, nullptr, &strongest);
@@ -132,13 +146,25 @@ class FeatureTracker {
       if (std::ssize(features_) == options_.features) break;
       if (taken_.at<unsigned char>(at) != 0 || count[cell_of(at)] >= share) continue;
       take(at);
-      features_.push_back({next_id_++, cv::Point2f(at)});
+      features_.push_back({next_id_++, cv::Point2f(at), {}});
     }
     from_.clear();
     for (std::size_t i = old; i < features_.size(); ++i) from_.push_back(features_[i].at);
     if (from_.empty()) return;
-    cv::cornerSubPix(image, from_, cv::Size(kBlock, kBlock), cv::Size(-1, -1), kStop);
-    for (std::size_t i = old; i < features_.size(); ++i) features_[i].at = from_[i - old];
+    const int reach = options_.corner_px;
+    cv::cornerSubPix(image, from_, cv::Size(reach, reach), cv::Size(-1, -1), kStop);
+    const cv::Size window(options_.window_px, options_.window_px);
+    for (std::size_t i = old; i < features_.size(); ++i) {
+      features_[i].at = from_[i - old];
+      cv::getRectSubPix(image, window, features_[i].at, features_[i].found);
+    }
+  }
+
+  /// Correlation of the patch at `at` with one that was found before, in [-1, 1].
+  double Similarity(const cv::Mat& image, cv::Point2f at, const cv::Mat& found) {
+    cv::getRectSubPix(image, found.size(), at, patch_);
+    cv::matchTemplate(patch_, found, correlation_, cv::TM_CCOEFF_NORMED);
+    return static_cast<double>(correlation_.at<float>(0, 0));
   }
 
   inline static const cv::TermCriteria kStop{cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30,
@@ -154,7 +180,7 @@ class FeatureTracker {
   std::vector<unsigned char> found_, found_back_;
   std::vector<float> error_;
   std::vector<std::pair<float, cv::Point>> corners_;
-  cv::Mat taken_, response_, largest_;
+  cv::Mat taken_, response_, largest_, patch_, correlation_;
 };
 
 }  // namespace alidade

@@ -153,6 +153,14 @@ INSTANTIATE_TEST_SUITE_P(
                          kPi}),
     [](const auto& test) { return std::string(test.param.name); });
 
+TEST(Product, WrapsItsAnglesAndNothingElse) {
+  const Geometry polar = Geometry::Product({Geometry::Vector(1), Geometry::Angle()});
+  std::vector<double> z{7.0, 7.0};
+  polar.WrapAngles(z.data());
+  EXPECT_EQ(z[0], 7.0);
+  EXPECT_DOUBLE_EQ(z[1], 7.0 - 2.0 * M_PI);
+}
+
 TEST(Product, IsItsPartsOneAfterTheOther) {
   const Geometry pose = Geometry::Product({Geometry::Vector(3), Geometry::UnitQuaternion()});
   EXPECT_EQ(pose.ambient, 7);

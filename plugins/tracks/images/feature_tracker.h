@@ -86,7 +86,8 @@ class FeatureTracker {
     back_ = from_;
     cv::calcOpticalFlowPyrLK(pyramid_, before_, to_, back_, found_back_, error_, window, 0, kStop,
                              cv::OPTFLOW_USE_INITIAL_FLOW);
-    const auto margin = static_cast<float>(options_.window_px / 2);
+    const int half = options_.window_px / 2;
+    const auto margin = static_cast<float>(half);
     const cv::Rect2f inside(margin, margin, static_cast<float>(size.width - 1) - 2.0F * margin,
                             static_cast<float>(size.height - 1) - 2.0F * margin);
     taken_.create(size, CV_8UC1);
@@ -131,9 +132,9 @@ class FeatureTracker {
     const int cells = options_.cells[0] * options_.cells[1];
     std::vector<int> count(static_cast<std::size_t>(cells), 0);
     const auto cell_of = [&](cv::Point at) {
-      const int column = at.x * options_.cells[0] / image.cols;
-      const int row = at.y * options_.cells[1] / image.rows;
-      return static_cast<std::size_t>(row * options_.cells[0] + column);
+      const auto column = static_cast<std::size_t>(at.x * options_.cells[0] / image.cols);
+      const auto row = static_cast<std::size_t>(at.y * options_.cells[1] / image.rows);
+      return row * static_cast<std::size_t>(options_.cells[0]) + column;
     };
     const auto take = [&](cv::Point at) {
       cv::circle(taken_, at, static_cast<int>(options_.distance_px), 1, cv::FILLED);

@@ -90,7 +90,8 @@ class ImageReader {
   }
 
   void List(const std::string& names, const Node& key) {
-    for (const auto& entry : std::filesystem::directory_iterator(path_)) {
+    std::error_code error;
+    for (const auto& entry : std::filesystem::directory_iterator(path_, error)) {
       const std::string name = entry.path().filename().string();
       const bool is_image = names.empty() ? EndsLikeAnImage(entry.path())
                                           : fnmatch(names.c_str(), name.c_str(), 0) == 0;
@@ -99,6 +100,10 @@ class ImageReader {
     std::ranges::sort(files_, [](const auto& a, const auto& b) {
       return strverscmp(a.filename().c_str(), b.filename().c_str()) < 0;
     });
+    if (error) {
+      throw Error(ExitCode::kInputMissing,
+                  ErrorLine(key.place(), key.path(), path_.string() + ": " + error.message()));
+    }
     if (!files_.empty()) return;
     throw Error(ExitCode::kInputMissing,
                 ErrorLine(key.place(), key.path(),

@@ -29,5 +29,26 @@ TEST(FigureScript, TakesTheWholeRangeOfTimestamps) {
   EXPECT_NE(script.find("gap = 7.28e+08,"), std::string::npos) << script;
 }
 
+TEST(FigurePages, LeaveOutNoPanelAndAreOfOneSize) {
+  const auto panel = [](FigureScript& script, std::size_t i) {
+    script.Panel("panel " + std::to_string(i), "");
+  };
+  const auto pages = [&](std::size_t panels) {
+    return FigurePages({"ekf.state", "ekf: state", 0, 1}, panels, panel);
+  };
+  EXPECT_TRUE(pages(0).empty());
+  ASSERT_EQ(pages(12).size(), 1u);
+  EXPECT_EQ(pages(12)[0].title(), "ekf: state");
+  const std::vector<FigureScript> three = pages(25);  // 8 + 8 + 9
+  ASSERT_EQ(three.size(), 3u);
+  EXPECT_EQ(three[0].name(), "ekf.state");
+  EXPECT_EQ(three[1].name(), "ekf.state.2");
+  EXPECT_EQ(three[2].title(), "ekf: state (3 of 3)");
+  for (int i = 0; i < 25; ++i) {
+    const std::string label = "set label 1 'panel " + std::to_string(i) + "'";
+    EXPECT_NE(three[i < 8 ? 0 : i < 16 ? 1 : 2].Text().find(label), std::string::npos) << i;
+  }
+}
+
 }  // namespace
 }  // namespace alidade::internal

@@ -622,10 +622,10 @@ TEST(OutputFolder, EveryFailureOfTheDiskIsAnErrorThatKeepsTheRows) {
         for (const auto& entry : fs::directory_iterator(folder.path())) fs::remove_all(entry);
         Record(OptionsFor(folder / "out"), 3);
       } else if (replace) {
-        EXPECT_EQ(FilesIn(folder.path()).size(), 19u) << "call " << n;
+        EXPECT_EQ(FilesIn(folder.path()).size(), 21u) << "call " << n;
         EXPECT_EQ(Lines(folder / "out/truth.csv").size(), 4u);
       } else if (!folder.empty()) {
-        EXPECT_EQ(FilesIn(folder.path()).size(), 19u) << "call " << n;
+        EXPECT_EQ(FilesIn(folder.path()).size(), 21u) << "call " << n;
         fs::remove_all(folder / "out");
       }
     }

@@ -19,12 +19,12 @@ TEST(Recorder, DrawsWhereGnuplotIs) {
   for (const std::string& file : recorder.highlights()) {
     EXPECT_TRUE(fs::exists(folder / "out" / file)) << file;
   }
-  if (recorder.note() == "0 of 10 figures drawn: gnuplot is not installed")
+  if (recorder.note() == "0 of 12 figures drawn: gnuplot is not installed")
     GTEST_SKIP() << recorder.note();
   EXPECT_EQ(recorder.note(), "");
   EXPECT_EQ(recorder.highlights()[1], "figures/measurements.png");
-  for (const char* name : {"measurements", "comparison", "ekf.state", "ekf.covariance", "ekf.gain",
-                           "ekf.innovation", "alone.state"}) {
+  for (const char* name : {"measurements", "comparison", "ekf.errors", "ekf.state",
+                           "ekf.covariance", "ekf.gain", "ekf.innovation", "alone.state"}) {
     const fs::path figure = folder / "out/figures" / name;
     EXPECT_GT(fs::file_size(figure.string() + ".svg"), 5000u) << name;
     EXPECT_TRUE(fs::exists(figure.string() + ".gp")) << name;
@@ -122,7 +122,7 @@ TEST(Recorder, DoesWithoutGnuplot) {
     Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
     Experiment experiment = MakeExperiment();
     recorder.Finish(RunInto(recorder, experiment));
-    if (recorder.note() != "0 of 10 figures drawn: gnuplot is not installed") ::_exit(1);
+    if (recorder.note() != "0 of 12 figures drawn: gnuplot is not installed") ::_exit(1);
   });
   EXPECT_EQ(code, 0);
   EXPECT_TRUE(fs::exists(folder / "out/report.html"));
@@ -162,13 +162,13 @@ TEST(Recorder, AStopLeavesOutTheRestOfTheFigures) {
   options.stop = [&] {  // once it sleeps
     return fs::exists(half.string() + std::to_string(::getpid()) + "/figures/comparison.svg");
   };
-  EXPECT_EQ(RecordSlowly(folder, options, "1 of 10 figures drawn: the drawing was stopped"), 0);
+  EXPECT_EQ(RecordSlowly(folder, options, "1 of 12 figures drawn: the drawing was stopped"), 0);
   EXPECT_EQ(SvgsOf(folder / "out"), Names{"measurements.svg"});
   EXPECT_TRUE(fs::exists(folder / "out/run.json"));
   const std::string report = Read(folder / "out/report.html");
   EXPECT_NE(report.find("<svg>one</svg>"), std::string::npos);
   EXPECT_EQ(report.find("<svg>half"), std::string::npos);
-  EXPECT_NE(report.find("1 of 10 figures drawn: the drawing was stopped"), std::string::npos);
+  EXPECT_NE(report.find("1 of 12 figures drawn: the drawing was stopped"), std::string::npos);
 }
 
 TEST(Recorder, AFigureThatGnuplotDidNotWriteIsNotThere) {
@@ -181,7 +181,7 @@ TEST(Recorder, AFigureThatGnuplotDidNotWriteIsNotThere) {
     Experiment experiment = MakeExperiment();
     recorder.Finish(RunInto(recorder, experiment));
     const std::string note = recorder.note();
-    if (note != "0 of 10 figures drawn: measurements is not: gnuplot wrote nothing") ::_exit(1);
+    if (note != "0 of 12 figures drawn: measurements is not: gnuplot wrote nothing") ::_exit(1);
   });
   EXPECT_EQ(code, 0);
   EXPECT_EQ(Read(folder / "out/report.html").find("<figure>"), std::string::npos);
@@ -191,7 +191,7 @@ TEST(Recorder, DrawsNothingOnceItIsStopped) {
   const TemporaryFolder folder;
   Recorder::Options options = OptionsFor(folder / "out", false, true);
   options.stop = [] { return true; };
-  EXPECT_EQ(RecordSlowly(folder, options, "0 of 10 figures drawn: the drawing was stopped"), 0);
+  EXPECT_EQ(RecordSlowly(folder, options, "0 of 12 figures drawn: the drawing was stopped"), 0);
   EXPECT_EQ(SvgsOf(folder / "out"), Names{});
 }
 
@@ -199,7 +199,7 @@ TEST(Recorder, GivesGnuplotSoMuchTimeAndNoMore) {
   const TemporaryFolder folder;
   Recorder::Options options = OptionsFor(folder / "out", false, true);
   options.drawing_s = 1.0;
-  EXPECT_EQ(RecordSlowly(folder, options, "1 of 10 figures drawn: gnuplot took too long"), 0);
+  EXPECT_EQ(RecordSlowly(folder, options, "1 of 12 figures drawn: gnuplot took too long"), 0);
   EXPECT_EQ(SvgsOf(folder / "out"), Names{"measurements.svg"});
 }
 

@@ -20,14 +20,28 @@ using namespace testing;  // NOLINT(google-build-using-namespace): the fixtures 
 TEST(Recorder, WritesEveryFile) {
   const TemporaryFolder folder;
   Record(OptionsFor(folder / "above" / "out"));
-  EXPECT_EQ(
-      FilesIn(folder / "above" / "out"),
-      (std::vector<std::string>{
-          "alone/estimates.csv", "alone/events.csv", "alone/gains.csv", "alone/innovations.csv",
-          "comparison.csv", "config.resolved.yaml", "ekf/estimates.csv", "ekf/events.csv",
-          "ekf/gains.csv", "ekf/innovations.csv", "expected.csv", "files.txt", "implied_states.csv",
-          "log.txt", "measurements.csv", "report.html", "run.json", "timing.json", "truth.csv"}));
-  EXPECT_EQ(FilesIn(folder.path()).size(), 19u);  // nothing next to it
+  EXPECT_EQ(FilesIn(folder / "above" / "out"), (std::vector<std::string>{"alone/errors.csv",
+                                                                         "alone/estimates.csv",
+                                                                         "alone/events.csv",
+                                                                         "alone/gains.csv",
+                                                                         "alone/innovations.csv",
+                                                                         "comparison.csv",
+                                                                         "config.resolved.yaml",
+                                                                         "ekf/errors.csv",
+                                                                         "ekf/estimates.csv",
+                                                                         "ekf/events.csv",
+                                                                         "ekf/gains.csv",
+                                                                         "ekf/innovations.csv",
+                                                                         "expected.csv",
+                                                                         "files.txt",
+                                                                         "implied_states.csv",
+                                                                         "log.txt",
+                                                                         "measurements.csv",
+                                                                         "report.html",
+                                                                         "run.json",
+                                                                         "timing.json",
+                                                                         "truth.csv"}));
+  EXPECT_EQ(FilesIn(folder.path()).size(), 21u);  // nothing next to it
 }
 
 TEST(HtmlEscaped, IsUtf8WhateverIsInTheText) {

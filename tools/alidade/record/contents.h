@@ -23,6 +23,16 @@ struct RecordedElement {
   bool is_random = false;  ///< its variance was above zero at some timestamp
 };
 
+/// One element of the error of a block in `NAME/errors.csv`, a tangent one; sigma in column
+/// `sigma:NAME`.
+struct RecordedError {
+  std::string name;
+  std::string unit;
+  bool is_angle = false;   ///< or of a rotation or direction: rad
+  bool is_known = false;   ///< finite at some timestamp
+  bool is_random = false;  ///< its variance was above zero at some timestamp
+};
+
 struct RecordedGain {
   std::string name;      ///< the column in `NAME/gains.csv`: `target.depth<-disparity`
   std::size_t cell = 0;  ///< of a row, behind time and sensor
@@ -50,6 +60,7 @@ struct RecordedMap {
 struct RecordedEstimator {
   std::string name;
   std::vector<RecordedElement> elements;
+  std::vector<RecordedError> errors = {};
   std::vector<RecordedSensor> sensors;
   int width = 0;  ///< of the widest measurement: columns z0 .. z<width - 1>, then h, s and r
   int path = -1;  ///< the first of the three elements that landmarks are seen from; -1: none

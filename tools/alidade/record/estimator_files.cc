@@ -38,7 +38,8 @@ EstimatorFiles::EstimatorFiles(const OutputFolder& folder, const NamedEstimator&
           folder, named.name + "/estimates.csv",
           EstimatesHeader(named.system, MatchTruths(named.system.layout, truths), truth_columns)),
       innovations_(folder, named.name + "/innovations.csv", InnovationsHeader()),
-      gains_(folder, named.name + "/gains.csv", GainsHeader(named.system)) {
+      gains_(folder, named.name + "/gains.csv", GainsHeader(named.system)),
+      errors_(folder, named.name, named.system, MatchTruths(named.system.layout, truths)) {
   FindPath(named.system);
   OpenTrajectory(folder, named.system);
   if (covariances) covariances_ = folder.Create(named.name + "/covariance.bin");
@@ -129,6 +130,7 @@ std::vector<std::string> EstimatorFiles::GainsHeader(const System& system) {
 void EstimatorFiles::Add(const SourceFrame& frame, const State& state, const UpdateReport& report) {
   if (!report.stale) {
     AddEstimate(frame, state);
+    errors_.Add(frame, state);
     if (pose_) AddPose(frame.timestamp, state);
   }
   for (const MeasurementReport& one : report.measurements()) {
@@ -258,6 +260,8 @@ void EstimatorFiles::Close() {
   estimates_.Close();
   innovations_.Close();
   gains_.Close();
+  errors_.Close();
+  recorded_.errors = errors_.elements();
   if (trajectory_) trajectory_->Close();
   if (trajectory_covariance_) trajectory_covariance_->Close();
   if (covariances_) covariances_->Close();

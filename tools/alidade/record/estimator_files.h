@@ -6,13 +6,14 @@
 
 #include "alidade/base/csv_file.h"
 #include "alidade/record/contents.h"
+#include "alidade/record/errors_file.h"
 #include "alidade/record/pose_file.h"
 #include "alidade/run/run.h"
 
 namespace alidade::internal {
 
 /// The files of one estimator that grow frame by frame: `estimates.csv`, `innovations.csv`,
-/// `gains.csv`, of sensors of landmarks `reprojection.csv`, and of blocks X.position and
+/// `gains.csv`, of blocks with truth `errors.csv`, of sensors of landmarks `reprojection.csv`, and of blocks X.position and
 /// X.orientation `trajectory.tum`, with a covariance `trajectory_covariance.tum`. They hold the
 /// blocks and sensors that the system has from the start.
 class EstimatorFiles {
@@ -55,6 +56,7 @@ class EstimatorFiles {
   std::vector<BlockColumns> blocks_;
   std::size_t gain_columns_ = 0;
   CsvFile estimates_, innovations_, gains_;
+  ErrorsFile errors_;
   std::optional<CsvFile> reprojection_;
   std::optional<PosePlace> pose_;  ///< among the blocks
   std::optional<PoseFile> trajectory_, trajectory_covariance_;

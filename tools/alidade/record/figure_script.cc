@@ -134,4 +134,20 @@ std::string FigureScript::Text() const {
   return text + "\nunset multiplot\nset output\n";
 }
 
+std::vector<FigureScript> FigurePages(
+    const FigureTitle& figure, std::size_t panels,
+    const std::function<void(FigureScript& script, std::size_t panel)>& add) {
+  const std::size_t pages = (panels + kMaxPanels - 1) / kMaxPanels;
+  std::vector<FigureScript> scripts;
+  std::size_t next = 0;
+  for (std::size_t page = 1; page <= pages; ++page) {
+    const std::string count = " (" + std::to_string(page) + " of " + std::to_string(pages) + ')';
+    FigureScript& script =
+        scripts.emplace_back(figure.name + (page > 1 ? '.' + std::to_string(page) : ""),
+                             figure.title + (pages > 1 ? count : ""), figure.first, figure.last);
+    while (next < panels * page / pages) add(script, next++);
+  }
+  return scripts;
+}
+
 }  // namespace alidade::internal

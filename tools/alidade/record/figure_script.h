@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -9,6 +11,9 @@
 #include "alidade/host/source.h"
 
 namespace alidade::internal {
+
+/// In one figure.
+inline constexpr std::size_t kMaxPanels = 12;
 
 /// A csv file to draw from. Rows of `kinds` kinds take turns in it, as those of several sensors.
 struct FigureFile {
@@ -63,6 +68,18 @@ class FigureScript {
   int keys_ = 0, most_keys_ = 0;  ///< entries in the key of the panel at hand, and of the fullest
   std::size_t longest_key_ = 0;
 };
+
+/// Name, title and time of a figure that may need several files.
+struct FigureTitle {
+  std::string name, title;
+  Timestamp first, last;
+};
+
+/// Figures NAME, NAME.2, NAME.3, ... of `panels` panels together, at most 12 in each, about as many
+/// in one as in the other. `add(script, i)` adds panel i.
+std::vector<FigureScript> FigurePages(
+    const FigureTitle& figure, std::size_t panels,
+    const std::function<void(FigureScript& script, std::size_t panel)>& add);
 
 /// `text` as a gnuplot string.
 std::string GnuplotQuoted(std::string_view text);

@@ -2,7 +2,9 @@
 #include "alidade/record/figures.h"
 
 #include <algorithm>
+#include <iterator>
 
+#include "alidade/record/error_figure.h"
 #include "alidade/record/figure_script.h"
 #include "alidade/record/gnuplot.h"
 #include "alidade/record/map_figures.h"
@@ -10,7 +12,6 @@
 namespace alidade::internal {
 namespace {
 
-constexpr std::size_t kMaxPanels = 12;
 constexpr std::size_t kMaxCurves = 8;
 
 std::string Sigma(const RecordedElement& element) { return GnuplotColumn("sigma:" + element.name); }
@@ -73,12 +74,12 @@ void StateRange(FigureScript& script, const RecordedEstimator& estimator,
   script.Set("set yrange [low - margin(low, high) : high + margin(low, high)]");
 }
 
-FigureScript StateFigure(const RecordedRun& run, const RecordedEstimator& estimator) {
-  FigureScript script(estimator.name + ".state", estimator.name + ": state, 3 sigma and truth",
-                      run.first, run.last);
-  std::size_t panels = 0;
-  for (const RecordedElement& element : estimator.elements) {
-    if (!element.has_value || panels++ >= kMaxPanels) continue;
+std::vector<FigureScript> StateFigures(const RecordedRun& run, const RecordedEstimator& estimator) {
+  std::vector<RecordedElement> elements;
+  std::ranges::copy_if(estimator.elements, std::back_inserter(elements),
+                       &RecordedElement::has_value);
+  const auto panel = [&](FigureScript& script, std::size_t index) {
+    const RecordedElement& element = elements[index];
     script.Panel(element.name, InBrackets(element.unit));
     StateRange(script, estimator, element);
     const std::string value = GnuplotColumn(element.name), sigma = Sigma(element);
@@ -90,8 +91,10 @@ FigureScript StateFigure(const RecordedRun& run, const RecordedEstimator& estima
     }
     ElementCurve(script, Estimates(estimator), element.name, element.unit, 1, "estimate");
     TruthCurve(script, run, element);
-  }
-  return script;
+  };
+  return FigurePages({estimator.name + ".state", estimator.name + ": state, 3 sigma and truth",
+                      run.first, run.last},
+                     elements.size(), panel);
 }
 
 std::string Squared(const std::string& unit) {
@@ -301,12 +304,11 @@ const std::string& Identity(const RecordedElement& element) {
 }
 
 /// All estimators and truth, for each element that any of them has.
-FigureScript ComparisonFigure(const RecordedRun& run) {
+std::vector<FigureScript> ComparisonFigures(const RecordedRun& run) {
   const std::size_t count = run.estimators.size();
   const std::string some =
       ": the first " + std::to_string(kMaxCurves) + " of " + std::to_string(count);
-  FigureScript script("comparison", "estimators side by side" + (count > kMaxCurves ? some : ""),
-                      run.first, run.last);
+  if (count < 2) return {};
   std::vector<const RecordedElement*> elements;
   for (const RecordedEstimator& estimator : run.estimators) {
     for (const RecordedElement& element : estimator.elements) {
@@ -316,9 +318,8 @@ FigureScript ComparisonFigure(const RecordedRun& run) {
       }
     }
   }
-  if (run.estimators.size() < 2) return script;
-  if (elements.size() > kMaxPanels) elements.resize(kMaxPanels);
-  for (const RecordedElement* first : elements) {
+  const auto panel = [&](FigureScript& script, std::size_t index) {
+    const RecordedElement* const first = elements[index];
     script.Panel(first->name, InBrackets(first->unit));
     for (std::size_t i = 0; i < std::min(run.estimators.size(), kMaxCurves); ++i) {
       const RecordedEstimator& estimator = run.estimators[i];
@@ -330,8 +331,10 @@ FigureScript ComparisonFigure(const RecordedRun& run) {
       }
     }
     TruthCurve(script, run, *first);
-  }
-  return script;
+  };
+  return FigurePages({"comparison", "estimators side by side" + (count > kMaxCurves ? some : ""),
+                      run.first, run.last},
+                     elements.size(), panel);
 }
 
 /// A figure and the estimator it is of, "" where it is of all.
@@ -341,12 +344,16 @@ struct Plan {
 };
 
 std::vector<Plan> PlanFigures(const RecordedRun& run) {
-  std::vector<Plan> plans = {{MeasurementFigure(run), ""}, {ComparisonFigure(run), ""}};
-  for (const RecordedEstimator& estimator : run.estimators) {
-    for (const auto figure : {MapFigure, ReprojectionFigure, StateFigure, CovarianceFigure,
-                              GainFigure, InnovationFigure}) {
-      plans.push_back({figure(run, estimator), estimator.name});
-    }
+  std::vector<Plan> plans = {{MeasurementFigure(run), ""}};
+  const auto add = [&](std::vector<FigureScript> scripts, const std::string& estimator) {
+    for (FigureScript& script : scripts) plans.push_back({std::move(script), estimator});
+  };
+  add(ComparisonFigures(run), "");
+  for (const RecordedEstimator& one : run.estimators) {
+    add({MapFigure(run, one), ReprojectionFigure(run, one)}, one.name);
+    add(ErrorFigures(run, one), one.name);
+    add(StateFigures(run, one), one.name);
+    add({CovarianceFigure(run, one), GainFigure(run, one), InnovationFigure(run, one)}, one.name);
   }
   std::erase_if(plans, [](const Plan& plan) { return plan.script.empty(); });
   return plans;

@@ -39,9 +39,9 @@ std::string StatusIn(const fs::path& file) {
 /// estimator.
 constexpr std::array<std::string_view, 5> kRowsOfRun = {
     "measurements.csv", "truth.csv", "truth.tum", "expected.csv", "implied_states.csv"};
-constexpr std::array<std::string_view, 7> kRowsOfEstimator = {
-    "estimates.csv",  "innovations.csv",           "gains.csv",     "reprojection.csv",
-    "trajectory.tum", "trajectory_covariance.tum", "covariance.bin"};
+constexpr std::array<std::string_view, 8> kRowsOfEstimator = {
+    "estimates.csv",    "errors.csv",     "innovations.csv",           "gains.csv",
+    "reprojection.csv", "trajectory.tum", "trajectory_covariance.tum", "covariance.bin"};
 /// Files that a finished folder has not.
 constexpr std::array<std::string_view, 2> kOnlyOfUnfinished = {kFinishedRuns, ".gnuplot.log"};
 

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The error of each element with truth: in errors.csv and in the figures of it.
+#include "alidade/record/errors_file.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "alidade/record/error_figure.h"
+#include "support/recording.h"
+#include "support/systems.h"
+
+namespace alidade::testing {
+namespace {
+
+/// A camera of position, orientation and heading, of which the first two are estimated and the
+/// third is known; and a bias without truth.
+class ErrorsOfACamera : public ::testing::Test {
+ protected:
+  ErrorsOfACamera() {
+    const auto declare = [&](const char* name, const char* unit, Geometry geometry,
+                             BlockStatus status) {
+      const Space space{name, unit, "", {}, std::move(geometry)};
+      return system_.layout.Declare(std::string("cam.") + name, "cam", space, status);
+    };
+    position_ = declare("position", "m", Geometry::Vector(2), BlockStatus::kEstimated);
+    orientation_ = declare("orientation", "", Geometry::UnitQuaternion(), BlockStatus::kEstimated);
+    heading_ = declare("heading", "rad", Geometry::Angle(), BlockStatus::kConstant);
+    declare("bias", "m", Geometry::Vector(1), BlockStatus::kEstimated);
+    state_ = State(system_.layout);
+  }
+
+  void AddBlocks() {
+    const double position[] = {1.25, 2.0}, heading = 3.1;
+    // A turn by 0.2 rad about x.
+    const double orientation[] = {std::cos(0.1), std::sin(0.1), 0.0, 0.0};
+    state_.Add(position_, position, Eigen::Vector2d(0.25, 4.0).asDiagonal().toDenseMatrix());
+    state_.Add(orientation_, orientation, 1e-4 * Eigen::Matrix3d::Identity());
+    state_.Add(heading_, &heading, Eigen::MatrixXd(0, 0));
+  }
+
+  /// Truth of position, orientation, heading.
+  void Add(internal::ErrorsFile& file, bool has_position = true) {
+    const std::vector<double> position = {1.0, 2.5};
+    file.Add({FrameAt(0.5, {}),
+              {has_position ? position : std::vector<double>(), {1.0, 0.0, 0.0, 0.0}, {-3.1}}},
+             state_);
+  }
+
+  System system_;
+  BlockId position_, orientation_, heading_;
+  State state_;
+};
+
+TEST_F(ErrorsOfACamera, IsEstimateMinusTruthInTheTangent) {
+  const TemporaryFolder folder;
+  internal::OutputFolder out(folder / "out", false);
+  internal::ErrorsFile file(out, "ekf", system_, {0, 1, 2, -1});
+  Add(file);  // no block has a value
+  EXPECT_FALSE(file.elements()[0].is_known);
+  AddBlocks();
+  Add(file);
+  Add(file, false);
+  file.Close();
+  out.Commit();
+  const std::vector<std::string> lines = Lines(folder / "out/ekf/errors.csv");
+  ASSERT_EQ(lines.size(), 4u);
+  EXPECT_EQ(lines[0],
+            "t_s,cam.position.0,cam.position.1,sigma:cam.position.0,sigma:cam.position.1,"
+            "cam.orientation.rx,cam.orientation.ry,cam.orientation.rz,sigma:cam.orientation.rx,"
+            "sigma:cam.orientation.ry,sigma:cam.orientation.rz,cam.heading,sigma:cam.heading");
+  EXPECT_EQ(lines[1], "0.500000000,,,,,,,,,,,,");
+  const std::vector<std::string> cells = Cells(lines[2]);
+  ASSERT_EQ(cells.size(), 13u);
+  EXPECT_EQ(cells[1] + ' ' + cells[2], "0.25 -0.5");  // m
+  EXPECT_EQ(cells[3] + ' ' + cells[4], "0.5 2");
+  EXPECT_NEAR(std::stod(cells[5]), 0.2, 1e-12);  // rad, in the body
+  EXPECT_EQ(cells[6] + cells[7], "00");
+  EXPECT_EQ(cells[9], "0.01");
+  EXPECT_NEAR(std::stod(cells[11]), 6.2 - 2.0 * std::acos(-1.0), 1e-12);  // wrapped
+  EXPECT_EQ(cells[12], "");
+  EXPECT_EQ(Cells(lines[3])[1] + ' ' + Cells(lines[3])[3], " 0.5");
+}
+
+TEST_F(ErrorsOfACamera, IsDrawnInItsBandAndOrientationsInDegrees) {
+  const TemporaryFolder folder;
+  internal::OutputFolder out(folder / "out", false);
+  internal::ErrorsFile file(out, "ekf", system_, {0, 1, 2, -1});
+  AddBlocks();
+  Add(file);
+  internal::RecordedEstimator estimator;
+  estimator.name = "ekf";
+  estimator.errors = file.elements();
+  const auto figures = internal::ErrorFigures({}, estimator);
+  ASSERT_EQ(figures.size(), 1u);
+  EXPECT_EQ(figures[0].name(), "ekf.errors");
+  const std::string script = figures[0].Text();
+  for (const char* part :
+       {"set label 1 'cam.position.1'", "set ylabel '[m]'",
+        "(-3 * column('sigma:cam.position.1')):(3 * column('sigma:cam.position.1')) with filled",
+        "(column('cam.position.1')) with lines", "set label 1 'cam.orientation.rz'",
+        "set ylabel '[deg]'", "(column('cam.orientation.rz') * 180 / pi) with lines",
+        "(3 * column('sigma:cam.orientation.rz') * 180 / pi) with filled",
+        "(column('cam.heading') * 180 / pi) with lines"}) {
+    EXPECT_NE(script.find(part), std::string::npos) << part << '\n' << script;
+  }
+  EXPECT_EQ(script.find("sigma:cam.heading"), std::string::npos);  // it has none
+}
+
+TEST_F(ErrorsOfACamera, WithoutTruthIsNoFile) {
+  const TemporaryFolder folder;
+  internal::OutputFolder out(folder / "out", false);
+  internal::ErrorsFile file(out, "ekf", system_, {-1, -1, -1, -1});
+  AddBlocks();
+  Add(file);
+  file.Close();
+  out.Write("other.csv", "");
+  out.Commit();
+  EXPECT_FALSE(fs::exists(folder / "out/ekf"));
+  EXPECT_TRUE(internal::ErrorFigures({}, {}).empty());
+}
+
+}  // namespace
+}  // namespace alidade::testing

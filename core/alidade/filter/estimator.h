@@ -83,6 +83,7 @@ class UpdateReport {
     stale = false;
     inputs.clear();
     landmarks = {};
+    removed_landmarks.clear();
     ClearMeasurements();
     events.clear();
   }
@@ -92,6 +93,8 @@ class UpdateReport {
   std::vector<int> inputs;  ///< motion models whose control input was taken, as in System::motions
   std::vector<Event> events;
   LandmarkCounts landmarks;
+  /// Those that the frame removed from the state, as they were then. Those of a batch are not here.
+  std::vector<LandmarkEstimate> removed_landmarks;
 
  private:
   std::vector<MeasurementReport> pool_;  ///< the first count_ are in use

@@ -52,22 +52,45 @@ double LinearityIndexOf(const State& state, const LandmarkRecord& landmark, cons
                      InverseDistanceSigma(state, landmark), camera);
 }
 
-/// J P J' of the blocks of a landmark.
+/// J P J' of the blocks of a landmark; `pjt` is memory of n x 3, n the size of P.
 Eigen::Matrix3d CovarianceOf(const State& state, const LandmarkRecord& landmark,
-                             const LandmarkPoint& point) {
-  std::vector<JacobianPart> parts;
+                             const LandmarkPoint& point, double* pjt) {
+  std::array<JacobianPart, 3> parts{};  // a landmark with a place has as many blocks at most
+  std::size_t used = 0;
   int column = 0;
   for (const BlockId id : landmark.blocks) {
     const Block& block = state.layout()[id];
     const int size = block.geometry().tangent;
-    if (block.has_covariance()) parts.push_back({block.tangent_offset, size, column});
+    if (block.has_covariance()) parts[used++] = {block.tangent_offset, size, column};
     column += size;
   }
-  Eigen::MatrixXd pjt(state.covariance().size(), 3);
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  state.covariance().Project({point.jacobian.data(), 3, column, parts}, pjt.data(),
-                             covariance.data());
+  const std::span present(parts.data(), used);
+  state.covariance().Project({point.jacobian.data(), 3, column, present}, pjt, covariance.data());
   return covariance;
+}
+
+/// Of a landmark in the state; `pjt` as above.
+LandmarkEstimate EstimateOf(const State& state, std::int64_t id, const LandmarkRecord& landmark,
+                            double* pjt) {
+  LandmarkEstimate one;
+  one.id = id;
+  one.generation = landmark.generation;
+  one.representation = landmark.representation;
+  one.first = landmark.first;
+  one.last = landmark.last;
+  one.tried = landmark.tried;
+  one.accepted = landmark.accepted;
+  if (HasInverseDistance(landmark)) {
+    one.inverse_distance = InverseDistance(state, landmark);
+    one.sigma = InverseDistanceSigma(state, landmark);
+  }
+  if (!landmark.representation) return one;
+  const auto point = PointOf(*landmark.representation, ValuesOf(state, landmark).data());
+  if (!point) return one;
+  one.position = point->position;
+  one.covariance = CovarianceOf(state, landmark, *point, pjt);
+  return one;
 }
 
 }  // namespace
@@ -240,6 +263,7 @@ void Landmarks::DeleteIf(FilterState& f, const Condition& condition) {
 
 Landmarks::ById::iterator Landmarks::Delete(FilterState& f, ById::iterator at) {
   if (at->second.in_state()) {
+    NoteRemoval(f, at->first, at->second);
     DropBlocks(f, at->second);
     ++f.report.landmarks.deleted;
     generations_.End(at->first, at->second.generation + 1);
@@ -247,6 +271,14 @@ Landmarks::ById::iterator Landmarks::Delete(FilterState& f, ById::iterator at) {
   const auto next = std::next(at);
   spare_.push_back(landmarks_.extract(at));
   return next;
+}
+
+/// Puts what is known of it, as long as it is in the state, into the report.
+void Landmarks::NoteRemoval(FilterState& f, std::int64_t id, const LandmarkRecord& landmark) {
+  const Workspace::Use use(f.work);
+  double* const pjt = f.work.Take(f.state.covariance().size(), 3).data();
+  f.report.removed_landmarks.push_back(EstimateOf(f.state, id, landmark, pjt));
+  f.report.removed_landmarks.back().removed = f.timestamp;
 }
 
 /// A shared block goes with the last landmark on it.
@@ -405,25 +437,9 @@ Outcome Landmarks::Initialise(FilterState& f, std::int64_t id, Row& row, Landmar
 
 std::vector<LandmarkEstimate> Landmarks::Estimates(const State& state) const {
   std::vector<LandmarkEstimate> estimates;
+  std::vector<double> pjt(3 * static_cast<std::size_t>(state.covariance().size()));
   for (const auto& [id, landmark] : landmarks_) {
-    if (!landmark.in_state()) continue;
-    LandmarkEstimate& one = estimates.emplace_back();
-    one.id = id;
-    one.generation = landmark.generation;
-    one.representation = landmark.representation;
-    one.first = landmark.first;
-    one.last = landmark.last;
-    one.tried = landmark.tried;
-    one.accepted = landmark.accepted;
-    if (HasInverseDistance(landmark)) {
-      one.inverse_distance = InverseDistance(state, landmark);
-      one.sigma = InverseDistanceSigma(state, landmark);
-    }
-    if (!landmark.representation) continue;
-    const auto point = PointOf(*landmark.representation, ValuesOf(state, landmark).data());
-    if (!point) continue;
-    one.position = point->position;
-    one.covariance = CovarianceOf(state, landmark, *point);
+    if (landmark.in_state()) estimates.push_back(EstimateOf(state, id, landmark, pjt.data()));
   }
   return estimates;
 }

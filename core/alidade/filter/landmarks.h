@@ -83,6 +83,7 @@ class Landmarks {
   double PriorInverseDistance(const State& state);
   Outcome Initialise(FilterState& f, std::int64_t id, Row& row, LandmarkRecord& landmark);
   LandmarkRecord& RecordOf(std::int64_t id);
+  void NoteRemoval(FilterState& f, std::int64_t id, const LandmarkRecord& landmark);
   void DropBlocks(FilterState& f, LandmarkRecord& landmark);
   template <class Condition>
   void DeleteIf(FilterState& f, const Condition& condition);

@@ -36,9 +36,11 @@ std::map<std::string, double> internal::MapMetrics(const std::vector<LandmarkEst
 void internal::NoteMap(const NamedEstimator& named, const Source& source, EstimatorResult& result) {
   if (!named.system.landmarks) return;
   result.landmarks = named.estimator->landmarks();
-  for (LandmarkEstimate& landmark : *result.landmarks) {
-    const auto position = source.TrueLandmark(landmark.id);
-    if (position) landmark.true_position = Eigen::Map<const Eigen::Vector3d>(position->data());
+  for (std::vector<LandmarkEstimate>* map : {&*result.landmarks, &result.removed_landmarks}) {
+    for (LandmarkEstimate& landmark : *map) {
+      const auto position = source.TrueLandmark(landmark.id);
+      if (position) landmark.true_position = Eigen::Map<const Eigen::Vector3d>(position->data());
+    }
   }
   result.metrics.merge(MapMetrics(*result.landmarks));
 }

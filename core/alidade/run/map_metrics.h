@@ -18,8 +18,8 @@ namespace alidade::internal {
 ///   map.sim3.scale   s; both of three landmarks or more that are not all at one place
 std::map<std::string, double> MapMetrics(const std::vector<LandmarkEstimate>& landmarks);
 
-/// The landmarks at the end, with the true places that `source` knows, and their metrics, in
-/// `result`; nothing where `named` has none.
+/// The landmarks at the end and their metrics, in `result`; of these and of those removed before
+/// the true places that `source` knows. Nothing where `named` has none.
 void NoteMap(const NamedEstimator& named, const Source& source, EstimatorResult& result);
 
 }  // namespace alidade::internal

@@ -38,6 +38,8 @@ struct EstimatorResult {
   std::vector<std::vector<std::string>> unobservable;
   /// The map at the end, for `landmarks.csv`; none where the estimator has no landmarks at all.
   std::optional<std::vector<LandmarkEstimate>> landmarks;
+  /// Landmarks that were removed during the run, in the order of that, as they were then.
+  std::vector<LandmarkEstimate> removed_landmarks;
   /// Time of the wall clock that its frames and smoothing took; not under kRollback.
   double wall_s = 0.0;
 };

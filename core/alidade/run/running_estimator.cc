@@ -59,6 +59,8 @@ void Running::Take(std::size_t k, const Seen& seen, const State& state, const Up
       estimates.push_back({k, ValuesOf(state, named.system.layout.blocks().size())});
     }
   }
+  result.removed_landmarks.insert(result.removed_landmarks.end(), report.removed_landmarks.begin(),
+                                  report.removed_landmarks.end());
   for (RunObserver* const observer : options.observers) {
     observer->OnEstimate(index, seen.frame, state, report);
   }

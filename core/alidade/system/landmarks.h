@@ -73,7 +73,7 @@ struct OnePointRansac {
   static OnePointRansac FromNode(const Node& node);
 };
 
-/// A landmark in the state, for the record.
+/// A landmark in the state, or as it was when it was removed; for the record.
 struct LandmarkEstimate {
   std::int64_t id = 0;
   int generation = 0;  ///< landmarks of this id before it
@@ -84,7 +84,8 @@ struct LandmarkEstimate {
   double inverse_distance = std::nan("");  ///< 1/m; not of xyz
   double sigma = std::nan("");             ///< of the inverse distance, 1/m
   Timestamp first = kNoTimestamp, last = kNoTimestamp;
-  int tried = 0, accepted = 0;  ///< measurements
+  Timestamp removed = kNoTimestamp;  ///< when it was; none: it is in the state
+  int tried = 0, accepted = 0;       ///< measurements
 };
 
 /// What became of landmarks in one frame, or in all.

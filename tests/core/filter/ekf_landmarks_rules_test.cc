@@ -58,6 +58,39 @@ TEST(Landmarks, AnIdThatComesBackIsTheNextGeneration) {
   EXPECT_EQ(Find(ekf.landmarks(), 2)->generation, 0);
 }
 
+// What is reported of a landmark that is removed is what a filter that keeps it has of it then.
+TEST(Landmarks, ThatAreRemovedAreReportedAsTheyWere) {
+  LandmarkOptions options = WithPrior();
+  Ekf keeps = EkfOf(MapSystem(InverseDepthPixels(0.01), options, 0.1));
+  options.max_missed_frames = 2;
+  Ekf prunes = EkfOf(MapSystem(InverseDepthPixels(0.01), options, 0.1));
+  const auto both = [&](const Frame& frame) {
+    keeps.Process(frame);
+    return prunes.Process(frame).removed_landmarks;
+  };
+  EXPECT_TRUE(both(FrameOf(0.0, {{1, {0.1, 0.2}}, {2, {-0.1, 0.3}}})).empty());
+  EXPECT_TRUE(both(FrameOf(0.1, {{1, {0.12, 0.2}}, {2, {-0.1, 0.29}}})).empty());
+  EXPECT_TRUE(both(FrameOf(0.2, {{2, {-0.11, 0.3}}})).empty());
+  const std::vector<LandmarkEstimate> removed = both(FrameOf(0.3, {{2, {-0.12, 0.3}}}));
+  ASSERT_EQ(removed.size(), 1u);
+  const LandmarkEstimate& one = removed[0];
+  EXPECT_EQ(one.id, 1);
+  EXPECT_EQ(one.removed, TimestampFromSeconds(0.3));
+  EXPECT_EQ(one.first, TimestampFromSeconds(0.0));
+  EXPECT_EQ(one.last, TimestampFromSeconds(0.1));
+  EXPECT_EQ(one.tried, 1);
+  const std::vector<LandmarkEstimate> map = keeps.landmarks();
+  const LandmarkEstimate* const kept = Find(map, 1);
+  ASSERT_NE(kept, nullptr);
+  EXPECT_EQ(kept->removed, kNoTimestamp);
+  EXPECT_EQ(one.position, kept->position);
+  EXPECT_EQ(one.covariance, kept->covariance);
+  EXPECT_GT(one.covariance(2, 2), 0.0);
+  EXPECT_EQ(one.inverse_distance, kept->inverse_distance);
+  EXPECT_EQ(one.sigma, kept->sigma);
+  EXPECT_TRUE(both(FrameOf(0.4, {{2, {-0.12, 0.3}}})).empty());  // once
+}
+
 TEST(Landmarks, ThatFailTooOftenAreForgotten) {
   LandmarkOptions options;
   options.min_match_ratio = 0.5;

@@ -8,7 +8,9 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "alidade/compare/finished_run.h"
 #include "alidade/model/landmark.h"
+#include "alidade/record/landmarks_ply.h"
 #include "alidade/run/map_metrics.h"
 #include "support/landmark_models.h"
 #include "support/recording.h"
@@ -75,9 +77,10 @@ TEST(LandmarkRecords, TheMapAtTheEndIsWritten) {
   ASSERT_EQ(lines.size(), 5u);
   EXPECT_EQ(lines[0],
             "id,generation,representation,x,y,z,sigma_x,sigma_y,sigma_z,inverse_distance,"
-            "sigma_inverse_distance,first_s,last_s,tried,accepted,true_x,true_y,true_z");
+            "sigma_inverse_distance,first_s,last_s,tried,accepted,true_x,true_y,true_z,"
+            "cov_xy,cov_xz,cov_yz,status,removed_s");
   const std::vector<std::string> last = Cells(lines[4]);
-  ASSERT_EQ(last.size(), 18u);
+  ASSERT_EQ(last.size(), 23u);
   EXPECT_EQ(last[0], "3");
   EXPECT_EQ(last[2], "xyz");
   EXPECT_NEAR(std::stod(last[3]), 2.5, 3.0 * std::stod(last[6]));
@@ -96,7 +99,7 @@ TEST(LandmarkRecords, EveryColumnOfTheMapIsItsOwn) {
   recorder.Finish(RunInto(recorder, experiment));
   const std::vector<std::string> last = Cells(Lines(folder / "out/ekf/landmarks.csv").at(4));
   const LandmarkEstimate estimate = experiment.estimators[0].estimator->landmarks()[3];
-  ASSERT_EQ(last.size(), 18u);
+  ASSERT_EQ(last.size(), 23u);
   EXPECT_EQ(last[0] + ' ' + last[1], "3 0");
   for (std::size_t i = 0; i < 3; ++i) {
     const auto e = static_cast<Eigen::Index>(i);
@@ -110,6 +113,83 @@ TEST(LandmarkRecords, EveryColumnOfTheMapIsItsOwn) {
   EXPECT_EQ(last[14], "8");  // one was gated
   const std::array<double, 3> place = *Street().TrueLandmark(3);
   for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(std::stod(last[15 + i]), place[i]);
+  EXPECT_DOUBLE_EQ(std::stod(last[18]), estimate.covariance(0, 1));
+  EXPECT_DOUBLE_EQ(std::stod(last[19]), estimate.covariance(0, 2));
+  EXPECT_DOUBLE_EQ(std::stod(last[20]), estimate.covariance(1, 2));
+  EXPECT_EQ(last[21] + last[22], "kept");
+}
+
+/// Landmark 0 is measured once and removed, and comes back later.
+class Passing : public Street {
+ public:
+  bool Next(SourceFrame& frame) override {
+    if (!Street::Next(frame)) return false;
+    const bool seen = frame.timestamp == 0 || frame.timestamp > TimestampFromSeconds(1.05);
+    if (!seen) {
+      std::erase_if(frame.measurements, [](const Measurement& m) { return m.landmark == 0; });
+    }
+    return true;
+  }
+};
+
+Experiment OfOneThatPasses() {
+  Experiment experiment = OnTheStreet();
+  NamedEstimator& named = experiment.estimators[0];
+  experiment.source = std::make_unique<Passing>();
+  named.system.landmarks->max_missed_frames = 3;
+  named.estimator = std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+  return experiment;
+}
+
+TEST(LandmarkRecords, TheMapHasThoseThatWereRemoved) {
+  const TemporaryFolder folder;
+  Experiment experiment = OfOneThatPasses();
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig());
+  const RunResult result = RunInto(recorder, experiment);
+  recorder.Finish(result);
+  const std::vector<std::string> lines = Lines(folder / "out/ekf/landmarks.csv");
+  ASSERT_EQ(lines.size(), 6u);  // 0 twice, by generation, and 1 to 3
+  const std::vector<std::string> before = Cells(lines[1]), after = Cells(lines[2]);
+  EXPECT_EQ(before[0] + before[1] + before[21] + ' ' + before[22], "00removed 0.300000000");
+  EXPECT_EQ(before[12], "0.000000000");
+  EXPECT_NEAR(std::stod(before[3]), 1.0, 3.0 * std::stod(before[6]));
+  EXPECT_EQ(before[15], "1");  // its true place
+  EXPECT_EQ(after[0] + after[1] + after[21] + ' ' + after[22], "01kept ");
+  EXPECT_EQ(after[11], "1.100000000");
+  // The metrics of the map, and who reads the folder, have those of the end alone.
+  const EstimatorResult& one = result.estimators.at(0);
+  ASSERT_EQ(one.landmarks->size(), 4u);
+  ASSERT_EQ(one.removed_landmarks.size(), 1u);
+  EXPECT_EQ(one.metrics.at("map.rmse"), internal::MapMetrics(*one.landmarks).at("map.rmse"));
+  const internal::ComparedRun read = internal::ReadRun(folder / "out");
+  ASSERT_EQ(read.estimators.at(0).result.landmarks->size(), 4u);
+  EXPECT_EQ(read.estimators[0].result.landmarks->front().generation, 1);
+}
+
+TEST(LandmarkRecords, PointsOfTheMapAreWrittenAsPly) {
+  std::vector<LandmarkEstimate> map(3);  // the first has no place
+  for (std::size_t i = 1; i < 3; ++i) {
+    map[i].id = 7;
+    map[i].position = Eigen::Vector3d(1.5, -2.0, static_cast<double>(i));
+    map[i].covariance = Eigen::Vector3d(0.25, 1.0, 4.0).asDiagonal();
+  }
+  map[1].removed = TimestampFromSeconds(0.5);
+  EXPECT_EQ(internal::LandmarksPly(map),
+            "ply\n"
+            "format ascii 1.0\n"
+            "comment landmarks in the world, m\n"
+            "element vertex 2\n"
+            "property double x\n"
+            "property double y\n"
+            "property double z\n"
+            "property double sigma_x\n"
+            "property double sigma_y\n"
+            "property double sigma_z\n"
+            "property uchar removed\n"
+            "property double id\n"
+            "end_header\n"
+            "1.5 -2 1 0.5 1 2 1 7\n"
+            "1.5 -2 2 0.5 1 2 0 7\n");
 }
 
 // Seen under a ray alone, its place may lie anywhere: the inverse distance then has its own cells.
@@ -125,7 +205,7 @@ TEST(LandmarkRecords, AnInverseDistanceIsWrittenBeforeItsSigma) {
   internal::WriteLandmarks(out, "ekf", {far_off});
   out.Commit();
   EXPECT_EQ(Lines(folder / "out/ekf/landmarks.csv").at(1),
-            "7,2,inverse_depth,,,,,,,-0.25,0.5,,,0,0,,,");
+            "7,2,inverse_depth,,,,,,,-0.25,0.5,,,0,0,,,,,,,kept,");
 }
 
 TEST(LandmarkRecords, OtherFilesHaveTheBlocksOfTheSystemAlone) {
@@ -191,28 +271,35 @@ TEST(LandmarkRecords, TheMapIsDrawnBesideTruth) {
   EXPECT_TRUE(recorder.note() == "" || recorder.note().ends_with("not installed"))
       << recorder.note();
   const std::string map = Read(folder / "out/figures/ekf.map.gp");
-  EXPECT_NE(map.find("(column('true_x')):(column('true_y'))"), std::string::npos) << map;
-  EXPECT_NE(map.find("(column('cam.position.x')):(column('cam.position.y')) with lines"),
+  EXPECT_NE(map.find("? column('true_x') : NaN):(column('true_y')) with points ls 18"),
             std::string::npos)
       << map;
+  for (const char* part : {"(column('cam.position.x')):(column('cam.position.y')) with lines",
+                           "(column('cam.position.x')):(column('cam.position.z')) with lines",
+                           "(column('cam.position.y')):(column('cam.position.z')) with lines",
+                           "? column('x') : NaN):(column('z')):(3 * column('sigma_x')):(3 * "
+                           "column('sigma_z')) with xy",
+                           "set size ratio -1", "set multiplot layout 2,2"}) {
+    EXPECT_NE(map.find(part), std::string::npos) << part << '\n' << map;
+  }
+  EXPECT_EQ(map.find("removed, +-3"), std::string::npos) << map;  // there is none
   EXPECT_NE(Read(folder / "out/figures/ekf.reprojection.gp").find("column('rms')"),
             std::string::npos);
 }
 
-TEST(LandmarkRecords, AMapIsDrawnOverTheAxesOfPathAndLandmarks) {
-  std::vector<LandmarkEstimate> map;
-  for (int i = 0; i < 20; ++i) {
-    map.emplace_back().position = Eigen::Vector3d(0.2 * i, 0.1 * i, 3.0);  // a wall 4 m x 2 m
-  }
-  map.back().position.y() = 1000.0;  // one far off
-  const internal::RecordedMap wall = internal::DescribeMap(map, {});
-  EXPECT_EQ(wall.across, 0);
-  EXPECT_EQ(wall.along, 1);
-  const Eigen::AlignedBox3d path(Eigen::Vector3d::Zero(), Eigen::Vector3d(0.0, 0.0, 2.0));
-  const internal::RecordedMap from_above = internal::DescribeMap(map, path);
-  EXPECT_EQ(from_above.across, 0);
-  EXPECT_EQ(from_above.along, 2);
-  EXPECT_EQ(from_above.placed, 20);
+TEST(LandmarkRecords, RemovedLandmarksAreDrawnPaler) {
+  const TemporaryFolder folder;
+  Experiment experiment = OfOneThatPasses();
+  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
+  recorder.Finish(RunInto(recorder, experiment));
+  EXPECT_TRUE(recorder.note() == "" || recorder.note().ends_with("not installed"))
+      << recorder.note();
+  const std::string map = Read(folder / "out/figures/ekf.map.gp");
+  EXPECT_NE(
+      map.find(
+          "(strcol('status') eq 'removed' ? column('x') : NaN):(column('y')) with points ls 21"),
+      std::string::npos)
+      << map;
 }
 
 TEST(MapMetrics, ASimilarityIsNoErrorAfterAlignment) {

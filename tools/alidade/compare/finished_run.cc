@@ -187,8 +187,10 @@ EstimatorResult ReadResult(const std::string& name, const JsonNode& entry) {
   return result;
 }
 
+/// The landmarks of the state at the end, without those removed before.
 std::vector<LandmarkEstimate> ReadMap(const fs::path& file) {
   constexpr std::size_t kPlace = 3;  // the columns x, y, z, behind id, generation and form
+  constexpr std::size_t kStatus = 21;
   constexpr const char* kAxes[] = {"x", "y", "z"};
   RequireFile(file);
   std::vector<LandmarkEstimate> map;
@@ -196,6 +198,7 @@ std::vector<LandmarkEstimate> ReadMap(const fs::path& file) {
   rows.Next();  // the header
   while (rows.Next()) {
     if (rows.size() < kPlace + 3) FailFile(file, rows.line(), "too few columns");
+    if (rows.size() > kStatus && rows.text(kStatus) == "removed") continue;
     LandmarkEstimate& one = map.emplace_back();
     one.id = rows.Index(0, "id");
     one.generation = static_cast<int>(rows.Index(1, "generation"));

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Geometry>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -50,11 +49,10 @@ struct RecordedSensor {
   bool has_reprojection = false;  ///< rows in `NAME/reprojection.csv`
 };
 
-/// Landmarks of `NAME/landmarks.csv` that have a place, and those whose true one is known too.
+/// Landmarks of `NAME/landmarks.csv` that have a place: all, those of them whose true one is known
+/// too, and those that were removed.
 struct RecordedMap {
-  std::int64_t placed = 0, known = 0;
-  /// The two axes along which trajectory and landmarks reach farthest: horizontal, vertical.
-  int across = 0, along = 2;
+  std::int64_t placed = 0, known = 0, removed = 0;
 };
 
 struct RecordedEstimator {
@@ -64,7 +62,6 @@ struct RecordedEstimator {
   std::vector<RecordedSensor> sensors;
   int width = 0;  ///< of the widest measurement: columns z0 .. z<width - 1>, then h, s and r
   int path = -1;  ///< the first of the three elements that landmarks are seen from; -1: none
-  Eigen::AlignedBox3d trajectory_box = {};
   std::int64_t estimate_rows = 0, innovation_rows = 0, gain_rows = 0;
   std::int64_t reprojection_rows = 0;
   RecordedMap map;

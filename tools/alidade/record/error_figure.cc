@@ -31,7 +31,7 @@ std::vector<FigureScript> ErrorFigures(const RecordedRun& run, const RecordedEst
     const std::string error = GnuplotColumn(element.name) + scale;
     const std::string sigma = GnuplotColumn("sigma:" + element.name) + scale;
     script.Panel(element.name, InBrackets(element.is_angle ? "deg" : element.unit));
-    script.Set("set xzeroaxis ls 12");
+    script.Set("set arrow 1 from graph 0, first 0 to graph 1, first 0 nohead front ls 12");
     ErrorRange(script, file.name, error, element.is_random ? sigma : "");
     if (element.is_random) {
       script.Curve(

@@ -158,9 +158,6 @@ void EstimatorFiles::AddEstimate(const SourceFrame& frame, const State& state) {
     estimates_.Numbers(state.value(columns.id), columns.ambient, columns.ambient);
     const auto truth = static_cast<std::size_t>(columns.truth);
     const bool known = truth < frame.truth.size() && !frame.truth[truth].empty();
-    if (static_cast<int>(columns.element) == recorded_.path) {
-      recorded_.trajectory_box.extend(Eigen::Map<const Eigen::Vector3d>(state.value(columns.id)));
-    }
     for (std::size_t i = 0; i < columns.ambient; ++i) {
       RecordedElement& element = recorded_.elements[columns.element + i];
       element.has_value = true;

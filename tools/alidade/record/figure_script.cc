@@ -113,7 +113,8 @@ std::string FigureScript::TimeAxis(std::string& label) const {
 std::string FigureScript::Text() const {
   // A panel is as high as its key, which would go on beyond the right edge.
   const int height = std::max(panel_height_, 76 + 18 * most_keys_);
-  const std::string size = "960," + std::to_string(64 + height * panels_);
+  const int rows = (panels_ + columns_ - 1) / columns_;
+  const std::string size = "960," + std::to_string(64 + height * rows);
   std::string text =
       "# Draws figures/" + name_ + ".svg. In the run folder: gnuplot figures/" + name_ + ".gp\n";
   text += kFigureStyle;
@@ -124,8 +125,8 @@ std::string FigureScript::Text() const {
   text += "if (!png) set terminal svg size " + size +
           " font 'sans-serif,12' noenhanced background '#ffffff'\n";
   text += "set output png ? 'figures/" + name_ + ".png' : 'figures/" + name_ + ".svg'\n";
-  text += "set multiplot layout " + std::to_string(panels_) + ",1 title " + GnuplotQuoted(title_) +
-          " noenhanced\n";
+  text += "set multiplot layout " + std::to_string(rows) + ',' + std::to_string(columns_) +
+          " title " + GnuplotQuoted(title_) + " noenhanced\n";
   std::string label = x_label_;
   if (label.empty()) text += TimeAxis(label);
   text += body_;

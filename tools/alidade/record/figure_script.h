@@ -39,6 +39,8 @@ class FigureScript {
   void Panel(std::string_view title, std::string_view y_label);
   /// All panels are this high, px; by default as high as their key asks for.
   void PanelHeight(int height) { panel_height_ = height; }
+  /// So many panels stand side by side; by default one.
+  void Columns(int columns) { columns_ = columns; }
   /// A line of the panel's settings.
   void Set(std::string_view line);
   /// Adds a curve: what stands behind `using`, and its entry in the key ("": none). Of a long file
@@ -64,7 +66,7 @@ class FigureScript {
   std::string x_label_;  ///< "": time
   Timestamp first_, last_;
   double span_s_;
-  int panels_ = 0, panel_height_ = 170;
+  int panels_ = 0, panel_height_ = 170, columns_ = 1;
   int keys_ = 0, most_keys_ = 0;  ///< entries in the key of the panel at hand, and of the fullest
   std::size_t longest_key_ = 0;
 };

@@ -16,6 +16,7 @@
 #include "alidade/record/estimator_files.h"
 #include "alidade/record/figures.h"
 #include "alidade/record/landmarks_file.h"
+#include "alidade/record/landmarks_ply.h"
 #include "alidade/record/log_file.h"
 #include "alidade/record/report_html.h"
 #include "alidade/record/run_json.h"
@@ -209,10 +210,11 @@ void Recorder::Finish(const RunResult& result) {
     const EstimatorResult& one = result.estimators[e];
     impl_->WriteEvents(one);
     if (!one.landmarks) continue;
-    internal::WriteLandmarks(folder, one.name, *one.landmarks);
+    const std::vector<LandmarkEstimate> map = internal::WholeMap(one);
+    internal::WriteLandmarks(folder, one.name, map);
+    folder.Write(one.name + "/landmarks.ply", internal::LandmarksPly(map));
     if (e >= recorded.estimators.size()) continue;
-    internal::RecordedEstimator& estimator = recorded.estimators[e];
-    estimator.map = internal::DescribeMap(*one.landmarks, estimator.trajectory_box);
+    recorded.estimators[e].map = internal::DescribeMap(map);
   }
   if (impl_->data) {
     impl_->facts.measurements_sha256 = impl_->data->measurements();

@@ -27,11 +27,19 @@ set style line 15 pt 7 ps 0.35 lc rgb '#5aa469'
 set style line 16 pt 2 ps 0.5 lc rgb '#c03030'
 set style line 17 pt 8 ps 0.6 lc rgb '#c03030'
 set style line 18 pt 6 ps 0.8 lc rgb '#111111'
+set style line 19 pt 0 lw 0.8 lc rgb '#a5c6db'
+set style line 20 pt 0 lw 0.8 lc rgb '#dcd5e6'
+set style line 21 pt 7 ps 0.5 lc rgb '#b294d0'
+set style line 22 pt 6 ps 0.8 lw 0.7 lc rgb '#aaaaaa'
 max(a, b) = a > b ? a : b
 min(a, b) = a < b ? a : b
 # What a range is widened by at each end; never zero.
 margin(low, high) = high > low ? max(0.08 * (high - low), 1e-6 * max(abs(low), abs(high))) : \
                     low == 0 ? 1 : 0.1 * abs(low)
+# 1, 2 or 5 times a power of ten, about x.
+tic_step(x) = (power = 10**floor(log10(x)), \
+               x < 1.5 * power ? power : x < 3.5 * power ? 2 * power : \
+               x < 7.5 * power ? 5 * power : 10 * power)
 # A line through those rows of a file that are `mine`, broken where none comes for a time: along()
 # is its x, level() its y.
 along(mine, t) = (row = mine, jump = mine && t - px > gap, px = mine ? t : px)

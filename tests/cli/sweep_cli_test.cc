@@ -224,6 +224,18 @@ TEST_F(SweepCli, ValuesMayBeMapsAndTheirFigureIsDrawn) {
   EXPECT_TRUE(Contains(figure, "after: 5, action: none")) << "the axis has the values";
 }
 
+TEST_F(SweepCli, TheErrorOfTheMapIsInTablesAndFigure) {
+  const Outcome varied =
+      Call({"sweep", ALIDADE_SOURCE_DIR "/examples/10_slam_scene/config.yaml", "--runs", "1", "-o",
+            "out", "--vary", "sensors.pixels.sigma_px=1,2"});
+  ASSERT_EQ(varied.code, 0) << varied.err;
+  EXPECT_TRUE(Contains(varied.out, "map.rmse [mm]")) << varied.out;
+  EXPECT_TRUE(Contains(Read("out/sweep.csv"), "ekf.mean:map.rmse"));
+  const std::string figure = Read("out/figures/vary.gp");
+  EXPECT_TRUE(Contains(figure, "set label 1 'map.rmse: mean, 5 % to 95 %'")) << figure;
+  EXPECT_TRUE(Contains(figure, "column('ekf.mean:map.rmse')")) << figure;
+}
+
 TEST_F(SweepCli, ValuesAreReadWithoutTheBlanksAroundThem) {
   const Outcome varied = Call({"sweep", "config.yaml", "--runs", "1", "-o", "out", "--vary",
                                "estimators.ekf= {type: ekf} ,{type: ekf, gate: 0.99}"});

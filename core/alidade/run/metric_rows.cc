@@ -20,9 +20,9 @@ namespace alidade {
 namespace internal {
 namespace {
 
-constexpr std::array<std::string_view, 10> kOrder = {
-    "rmse",     "lag_ms",        "coverage95",     "nees.mean",    "nees.within95",
-    "nis.mean", "map.sim3.rmse", "map.sim3.scale", "reprojection", "settling_frames"};
+constexpr std::array<std::string_view, 11> kOrder = {
+    "rmse",     "lag_ms",        "coverage95",     "nees.mean",    "nees.within95",  "nis.mean",
+    "map.rmse", "map.sim3.rmse", "map.sim3.scale", "reprojection", "settling_frames"};
 
 std::string_view KindOf(std::string_view key) { return key.substr(0, key.find(':')); }
 
@@ -208,8 +208,9 @@ constexpr std::size_t kMainRows = 10;
 
 /// The keys of MainRows but for the two of health.
 std::set<std::string> MainKeys(const RunResult& result, const std::vector<std::string>& subjects) {
-  constexpr std::array<std::string_view, 7> kDealt = {
-      "rmse", "nees.mean", "nis.mean", "accepted", "coverage95", "map.sim3.rmse", "reprojection"};
+  constexpr std::array<std::string_view, 8> kDealt = {"rmse",          "nees.mean",   "nis.mean",
+                                                      "accepted",      "coverage95",  "map.rmse",
+                                                      "map.sim3.rmse", "reprojection"};
   // Turn, kind, key.
   std::vector<std::tuple<std::size_t, std::size_t, std::string>> dealt;
   for (std::size_t kind = 0; kind < kDealt.size(); ++kind) {

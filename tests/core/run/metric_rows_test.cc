@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 #include <sstream>
 
@@ -145,6 +146,25 @@ TEST(MainRows, AreDealtOutInTheOrderOfTheConfig) {
   EXPECT_NE(internal::MainTable(result, subjects).find("\n14 more rows: --all\n"),
             std::string::npos)
       << internal::MainTable(result, subjects);
+}
+
+// The map has no subject: it comes with the first turn, in the unit of the path.
+TEST(MainRows, HaveTheErrorOfTheMapBeforeThatAfterAlignment) {
+  std::map<std::string, double> metrics = {{"map.rmse", 0.012}, {"map.sim3.rmse", 0.007}};
+  for (const char* block : {"cam.position", "cam.velocity", "cam.heading"}) {
+    for (const char* kind : {"rmse:", "coverage95:", "nees.mean:"}) {
+      metrics[kind + std::string(block)] = 0.5;
+    }
+  }
+  RunResult result;
+  result.estimators = {Named("ekf", metrics)};
+  result.estimators[0].units = {{"cam.position", "m"}};
+  std::vector<internal::TableRow> rows = internal::MainRows(result, {"cam.position"});
+  ASSERT_EQ(rows.size(), 10u);
+  const auto map = std::ranges::find(rows, "map.rmse [mm]", &internal::TableRow::label);
+  ASSERT_NE(map, rows.end());
+  EXPECT_EQ(map->cells, std::vector<std::string>{"12.00"});
+  EXPECT_EQ(std::next(map)->label, "map.sim3.rmse [mm]");
 }
 
 TEST(MainRows, AreAllOfThemWhereTheyAreNoMoreThanTen) {

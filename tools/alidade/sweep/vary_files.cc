@@ -117,11 +117,14 @@ std::string SetAxis(FigureScript& script, const VariedSweep& sweep) {
   return "($0)";
 }
 
+/// Whether a metric is an error with a unit: of a block, or of a map.
+bool IsError(const std::string& key) { return key.starts_with("rmse:") || key == "map.rmse"; }
+
 /// The panel of one metric; none where it is the same everywhere, as of what is held at truth.
 void MetricPanel(FigureScript& script, const std::vector<Column>& columns, const std::string& key,
                  const std::string& x, std::int64_t rows) {
   std::vector<double> drawn;
-  std::string unit = key.starts_with("lag_ms") ? "ms" : "";
+  std::string unit = key.starts_with("lag_ms") ? "ms" : key == "map.rmse" ? "m" : "";
   for (const Column& column : columns) {
     for (const SweepSummary& summary : column) {
       const auto found = summary.metrics.find(key);
@@ -132,11 +135,10 @@ void MetricPanel(FigureScript& script, const std::vector<Column>& columns, const
     }
   }
   if (std::ranges::adjacent_find(drawn, std::not_equal_to()) == drawn.end()) return;
-  script.Panel(
-      key.substr(0, key.find(':')) + ' ' + key.substr(key.find(':') + 1) + ": mean, 5 % to 95 %",
-      InBrackets(unit));
-  script.Set(key.starts_with("rmse") && WantsLogAxis(drawn) ? "set logscale y"
-                                                            : "unset logscale y");
+  std::string title = key;
+  std::ranges::replace(title, ':', ' ');
+  script.Panel(title + ": mean, 5 % to 95 %", InBrackets(unit));
+  script.Set(IsError(key) && WantsLogAxis(drawn) ? "set logscale y" : "unset logscale y");
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const std::string& name = columns[i].front().name;
     std::string how = x;
@@ -159,8 +161,8 @@ FigureScript VariationFigure(const VariedSweep& sweep) {
   }
   const std::string x = SetAxis(script, sweep);
   for (const std::string& key : OrderedMetrics(all)) {
-    const bool shown = std::ranges::any_of(std::array{"rmse:", "lag_ms:", "nees.within95:"},
-                                           [&](const char* kind) { return key.starts_with(kind); });
+    const bool shown =
+        IsError(key) || key.starts_with("lag_ms:") || key.starts_with("nees.within95:");
     if (shown && key.find('@') == key.npos) MetricPanel(script, columns, key, x, rows);
   }
   script.Panel("runs that diverged or were inconsistent", "");

@@ -16,7 +16,8 @@ void ErrorRange(FigureScript& script, const std::string& file, const std::string
     script.Quartiles("S", file, sigma);
     script.Set("limit = max(limit, 3 * S_up_quartile)");
   }
-  script.Set("set yrange [-limit - margin(-limit, limit) : limit + margin(-limit, limit)]");
+  script.Set("limit = limit + margin(-limit, limit)");
+  script.Set("set yrange [-limit : limit]\nset ytics tic_step(limit / 2)");
 }
 
 }  // namespace

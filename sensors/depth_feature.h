@@ -10,7 +10,7 @@ namespace alidade {
 ///
 ///   model      (u, v) = K(h) + n_px,  d = hz / rho + n_d,     h = R_CW (rho (a - r) + m)
 ///   Jacobian   automatic differentiation               3 x (6 + landmark)
-///   noise      R = diag(sigma^2, sigma^2, (s0 + s2 d^2)^2)      3x3, px^2 and m^2, d predicted
+///   noise      R = diag(sigma_u^2, sigma_v^2, (s0 + s2 d^2)^2)  3x3, px^2 and m^2, d predicted
 ///   inverse    the point on the pixel's ray that is d ahead
 ///
 ///   symbol     shape  unit    frame  meaning
@@ -19,7 +19,7 @@ namespace alidade {
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_cam) of the camera
 ///   a, m, rho  -      -       world  the landmark, p = a + m / rho, by its representation
 ///   K          -      -       cam    projection with distortion, see alidade/model/camera.h
-///   sigma      1      px      -      standard deviation of u and of v; > 0
+///   sigma      2      px      -      standard deviations of u and v; > 0
 ///   s0, s2     1      m, 1/m  -      standard deviation of d: a constant part, > 0, and one that
 ///                                    grows with d^2, >= 0 (that of a disparity behind it)
 ///
@@ -32,16 +32,21 @@ struct DepthFeature : LandmarkSensor<DepthFeature<Representation>, Vec<3>, Repre
       "pixel_and_depth", "", "where the landmark is seen, px, and its depth, m", "u,v,depth"};
 
   Camera camera;
-  double sigma_px, sigma_depth_m, sigma_depth_quadratic_1_m;
+  std::array<double, 2> sigma_px;
+  double sigma_depth_m, sigma_depth_quadratic_1_m;
 
-  DepthFeature(const Camera& lens, double sigma, double depth_m, double depth_per_m = 0.0)
+  DepthFeature(const Camera& lens, const std::array<double, 2>& sigma, double depth_m,
+               double depth_per_m = 0.0)
       : camera(lens),
         sigma_px(sigma),
         sigma_depth_m(depth_m),
         sigma_depth_quadratic_1_m(depth_per_m) {}
+  DepthFeature(const Camera& lens, double sigma, double depth_m, double depth_per_m = 0.0)
+      : DepthFeature(lens, std::array{sigma, sigma}, depth_m, depth_per_m) {}
   explicit DepthFeature(Params& p)
       : DepthFeature(Camera(p),
-                     p.Positive("sigma_px", "px", "noise of a pixel coordinate, 1 sigma"),
+                     p.PerAxis<2>("sigma_px", "px",
+                                  "noise of a pixel, 1 sigma; one number, or [u, v]", kPositive),
                      p.Positive("sigma_depth_m", "m", "noise of the depth, 1 sigma"),
                      p.NonNegative("sigma_depth_quadratic_1_m", "1/m",
                                    "what is added to it, times the depth squared", 0.0)) {}
@@ -55,7 +60,8 @@ struct DepthFeature : LandmarkSensor<DepthFeature<Representation>, Vec<3>, Repre
   template <class T>
   void SqrtNoiseInCamera(const T* h, const T& rho, T* L) const {
     const T depth = h[2] / rho;
-    L[0] = L[4] = T(sigma_px);
+    L[0] = T(sigma_px[0]);
+    L[4] = T(sigma_px[1]);
     L[8] = sigma_depth_m + sigma_depth_quadratic_1_m * depth * depth;
   }
   bool Valid(const double* z) const { return camera.Contains(z) && z[2] > 0.0; }

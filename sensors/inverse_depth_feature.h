@@ -8,9 +8,9 @@ namespace alidade {
 
 /// Pixel at which one camera sees a landmark.
 ///
-///   model      (u, v) = K(h) + n,   n ~ N(0, sigma^2 I),   h = R_CW (rho (a - r) + m)
+///   model      (u, v) = K(h) + n,   n ~ N(0, R),   h = R_CW (rho (a - r) + m)
 ///   Jacobian   automatic differentiation               2 x (6 + landmark), px/m, px/rad, px m
-///   noise      R = sigma^2 I                           2x2, px^2
+///   noise      R = diag(sigma_u^2, sigma_v^2)          2x2, px^2
 ///   inverse    the point along the pixel's ray, at the inverse distance rho0 of the prior
 ///
 ///   symbol     shape  unit    frame  meaning
@@ -18,7 +18,7 @@ namespace alidade {
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_cam) of the camera
 ///   a, m, rho  -      -       world  the landmark, p = a + m / rho, by its representation
 ///   K          -      -       cam    projection with distortion, see alidade/model/camera.h
-///   sigma      1      px      -      standard deviation of u and of v; > 0
+///   sigma      2      px      -      standard deviations of u and v; > 0
 ///   rho0       1      1/m     -      prior, from the camera to the landmark (xyz: > 0)
 ///
 /// Defined for  h before the camera and within its lens; else out_of_domain, outputs untouched.
@@ -32,12 +32,17 @@ struct InverseDepthFeature
   static constexpr int kPrior = 1;
 
   Camera camera;
-  double sigma_px;
+  std::array<double, 2> sigma_px;
 
-  InverseDepthFeature(const Camera& lens, double sigma) : camera(lens), sigma_px(sigma) {}
+  InverseDepthFeature(const Camera& lens, const std::array<double, 2>& sigma)
+      : camera(lens), sigma_px(sigma) {}
+  InverseDepthFeature(const Camera& lens, double sigma)
+      : InverseDepthFeature(lens, std::array{sigma, sigma}) {}
   explicit InverseDepthFeature(Params& p)
-      : InverseDepthFeature(Camera(p),
-                            p.Positive("sigma_px", "px", "noise of a pixel coordinate, 1 sigma")) {}
+      : InverseDepthFeature(
+            Camera(p),
+            p.PerAxis<2>("sigma_px", "px", "noise of a pixel, 1 sigma; one number, or [u, v]",
+                         kPositive)) {}
 
   template <class T>
   bool PredictInCamera(const T* h, const T&, T* pixel) const {
@@ -45,7 +50,8 @@ struct InverseDepthFeature
   }
   template <class T>
   void SqrtNoiseInCamera(const T*, const T&, T* L) const {
-    L[0] = L[3] = T(sigma_px);
+    L[0] = T(sigma_px[0]);
+    L[3] = T(sigma_px[1]);
   }
   bool Valid(const double* pixel) const { return camera.Contains(pixel); }
   template <class T>

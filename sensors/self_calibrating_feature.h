@@ -90,16 +90,16 @@ struct RadtanLens {
 
 /// Pixel at which a camera sees a point, where the intrinsics of the camera are estimated too.
 ///
-///   model      (u, v) = K(k; hx/hz, hy/hz) + n,   n ~ N(0, sigma^2 I),   h = R_CW (p - r)
+///   model      (u, v) = K(k; hx/hz, hy/hz) + n,   n ~ N(0, R),   h = R_CW (p - r)
 ///   Jacobian   A = dz/dh:  dz/dr = -A R_CW,  dz/dq = A [h]x,  dz/dp = A R_CW,  dz/dk    2 x n
-///   noise      R = sigma^2 I                           2x2, px^2
+///   noise      R = diag(sigma_u^2, sigma_v^2)          2x2, px^2
 ///
 ///   symbol     shape  unit    frame  meaning
 ///   u, v       2      px      -      the pixel, from where the lens has its origin
 ///   r, q       3, 4   m, -    world  position and orientation (world_from_cam) of the camera
 ///   k          3, 8   px, -   -      intrinsics of the lens, above
 ///   p          3      m       world  the point
-///   sigma      1      px      -      standard deviation of u and of v; > 0
+///   sigma      2      px      -      standard deviations of u and v; > 0
 ///
 /// Defined for  hz > 0, or where the domain is projective hz != 0; else out_of_domain, outputs
 ///              untouched. BAL and Bundler define their camera by p = -P / P_z on both sides.
@@ -112,14 +112,17 @@ struct SelfCalibratingFeature : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<Lens:
       Quantity{"point", "m", "in the world", "x,y,z"}};
   static constexpr Quantity kMeasurement{"pixel", "px", "where the point is seen", "u,v"};
 
-  double sigma_px;
+  std::array<double, 2> sigma_px;
   bool projective;  ///< points behind the camera are seen too
 
-  explicit SelfCalibratingFeature(double sigma, bool both_sides = false)
+  explicit SelfCalibratingFeature(const std::array<double, 2>& sigma, bool both_sides = false)
       : sigma_px(sigma), projective(both_sides) {}
+  explicit SelfCalibratingFeature(double sigma, bool both_sides = false)
+      : SelfCalibratingFeature(std::array{sigma, sigma}, both_sides) {}
   explicit SelfCalibratingFeature(Params& p)
       : SelfCalibratingFeature{
-            p.Positive("sigma_px", "px", "noise of a pixel coordinate, 1 sigma"),
+            p.PerAxis<2>("sigma_px", "px", "noise of a pixel, 1 sigma; one number, or [u, v]",
+                         kPositive),
             p.Choice("domain", {"in_front", "projective"},
                      "points it is defined for: in front of the camera, or behind it too",
                      0) == 1} {}
@@ -155,7 +158,8 @@ struct SelfCalibratingFeature : Sensor<Vec<2>, Vec<3>, UnitQuaternion, Vec<Lens:
   }
   template <class T>
   void SqrtNoise(const T*, const T*, const T*, const T*, T* l) const {
-    l[0] = l[3] = T(sigma_px);
+    l[0] = T(sigma_px[0]);
+    l[3] = T(sigma_px[1]);
   }
 
  private:

@@ -9,9 +9,9 @@ namespace alidade {
 /// Pixels at which a rectified stereo pair sees a landmark.
 ///
 ///   model      u = cx + fx hx/hz,  v = cy + fy hy/hz            h = R_CW (rho (a - r) + m)
-///              u_right = u - fx B rho/hz,  v_right = v;  + n,  n ~ N(0, sigma^2 I)
+///              u_right = u - fx B rho/hz,  v_right = v;  + n,  n ~ N(0, R)
 ///   Jacobian   automatic differentiation               4 x (6 + landmark), px/m, px/rad, px m
-///   noise      R = sigma^2 I                           4x4, px^2
+///   noise      R = diag(sigma_u^2, sigma_v^2, sigma_u^2, sigma_v^2)   4x4, px^2
 ///   inverse    depth fx B / d of the ray through (u, (v + v_right)/2),  d = u - u_right
 ///
 ///   symbol     shape  unit    frame  meaning
@@ -20,7 +20,7 @@ namespace alidade {
 ///   a, m, rho  -      -       world  the landmark, p = a + m / rho, by its representation
 ///   fx..cy     1      px      -      of both cameras, which have no distortion
 ///   B          1      m       -      baseline: the right camera is at +x of the left one; > 0
-///   sigma      1      px      -      standard deviation of each coordinate; > 0
+///   sigma      2      px      -      standard deviations of u and v, in both images; > 0
 ///
 /// Defined for  hz > 0; else out_of_domain, outputs untouched.
 /// Valid for    pixels on the images, and d > 0; else the measurement is invalid.
@@ -31,13 +31,17 @@ struct StereoFeature : LandmarkSensor<StereoFeature<Representation>, Vec<4>, Rep
                                          "u,v,u_right,v_right"};
 
   Camera camera;
-  double baseline_m, sigma_px;
+  double baseline_m;
+  std::array<double, 2> sigma_px;
 
-  StereoFeature(const Camera& left, double baseline, double sigma)
+  StereoFeature(const Camera& left, double baseline, const std::array<double, 2>& sigma)
       : camera(left), baseline_m(baseline), sigma_px(sigma) {}
+  StereoFeature(const Camera& left, double baseline, double sigma)
+      : StereoFeature(left, baseline, std::array{sigma, sigma}) {}
   explicit StereoFeature(Params& p)
       : StereoFeature(Camera(p), p.Positive("camera.baseline_m", "m", "stereo baseline"),
-                      p.Positive("sigma_px", "px", "noise of a pixel coordinate, 1 sigma")) {
+                      p.PerAxis<2>("sigma_px", "px",
+                                   "noise of a pixel, 1 sigma; one number, or [u, v]", kPositive)) {
     if (camera.model != CameraModel::kPinhole) {
       p.Fail("camera.model", "not 'pinhole', but a rectified pair has no distortion");
     }
@@ -52,7 +56,8 @@ struct StereoFeature : LandmarkSensor<StereoFeature<Representation>, Vec<4>, Rep
   }
   template <class T>
   void SqrtNoiseInCamera(const T*, const T&, T* L) const {
-    for (int i = 0; i < 4; ++i) L[5 * i] = T(sigma_px);
+    L[0] = L[10] = T(sigma_px[0]);
+    L[5] = L[15] = T(sigma_px[1]);
   }
   bool Valid(const double* pixels) const {
     return camera.Contains(pixels) && camera.Contains(pixels + 2) && pixels[0] > pixels[2];

@@ -34,6 +34,19 @@ TEST(DepthFeature, PredictsWorkedNumbers) {
   });
 }
 
+TEST(DepthFeature, MayHaveAnotherNoiseInUThanInV) {
+  ForEachRepresentation([](auto representation) {
+    using Representation = decltype(representation);
+    const SensorModel sensor = InProcessSensor(
+        DepthFeature<Representation>(Pinhole(), std::array{0.5, 2.0}, 0.01), "depth_feature");
+    const Blocks roles = Blocks{{1, 0, 0}, {1, 0, 0, 0}} +
+                         LandmarkAt<Representation>({0.3, -0.2, 0.1}, {0.0, 0.4, 2.0});
+    std::vector<double> z(3), l(9, kPoison);
+    ASSERT_EQ(sensor.SqrtNoise(Pointers(roles).data(), z.data(), l.data()), Status::kOk);
+    EXPECT_EQ(l, (std::vector<double>{0.5, 0, 0, 0, 2.0, 0, 0, 0, 0.01}));
+  });
+}
+
 TEST(DepthFeature, HasTrueJacobians) {
   Vec3 ahead{0.2, -0.3, 5.0}, point;
   UnitQuaternion::Rotate(kPose[1].data(), ahead.data(), point.data());

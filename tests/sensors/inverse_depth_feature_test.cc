@@ -134,5 +134,17 @@ TEST(InverseDepthFeature, DescribesItsLandmark) {
   EXPECT_EQ(angles.roles()[2].elements.back(), "rho");
 }
 
+TEST(InverseDepthFeature, MayHaveAnotherNoiseInUThanInV) {
+  ForEachRepresentation([](auto representation) {
+    using Representation = decltype(representation);
+    const SensorModel sensor = InProcessSensor(
+        InverseDepthFeature<Representation>(Pinhole(), std::array{1.5, 0.25}), "feature");
+    const Blocks roles = kPose + SeenAt<Representation>(Pinhole(), {100, 200});
+    double z[2], l[4] = {kPoison, kPoison, kPoison, kPoison};
+    ASSERT_EQ(sensor.SqrtNoise(Pointers(roles).data(), z, l), Status::kOk);
+    EXPECT_EQ(std::vector<double>(l, l + 4), (std::vector<double>{1.5, 0, 0, 0.25}));
+  });
+}
+
 }  // namespace
 }  // namespace alidade

@@ -33,6 +33,14 @@ TEST(SelfCalibratingFeature, PredictsWorkedNumbers) {
   EXPECT_EQ(l, (std::vector<double>{0.5, 0, 0, 0.5}));
 }
 
+TEST(SelfCalibratingFeature, MayHaveAnotherNoiseInUThanInV) {
+  const SensorModel sensor = InProcessSensor(
+      SelfCalibratingFeature<RadialLens>(std::array{0.5, 2.0}), "self_calibrating_feature");
+  std::vector<double> z(2), l(4, kPoison);
+  ASSERT_EQ(sensor.SqrtNoise(Pointers(kRadial).data(), z.data(), l.data()), Status::kOk);
+  EXPECT_EQ(l, (std::vector<double>{0.5, 0, 0, 2.0}));
+}
+
 /// The equation of BAL, whose camera looks along -z with y up: P = R X + t, p = -P / P.z.
 TEST(SelfCalibratingFeature, IsTheCameraOfBalTurnedAboutItsXAxis) {
   const double turn[4] = {0, 1, 0, 0};

@@ -33,6 +33,19 @@ TEST(StereoFeature, PredictsWorkedNumbers) {
   });
 }
 
+TEST(StereoFeature, MayHaveAnotherNoiseInUThanInV) {
+  ForEachRepresentation([](auto representation) {
+    using Representation = decltype(representation);
+    const SensorModel sensor = InProcessSensor(
+        StereoFeature<Representation>(Pinhole(), 0.1, std::array{0.5, 2.0}), "stereo_feature");
+    const Blocks roles = kPose + LandmarkAt<Representation>({0.3, -0.2, 0.1}, {0.0, 0.4, 2.0});
+    std::vector<double> z(4), l(16, kPoison);
+    ASSERT_EQ(sensor.SqrtNoise(Pointers(roles).data(), z.data(), l.data()), Status::kOk);
+    const double diagonal[4] = {0.5, 2.0, 0.5, 2.0};  // u, v, u_right, v_right
+    for (std::size_t i = 0; i < 16; ++i) EXPECT_EQ(l[i], i % 5 == 0 ? diagonal[i / 5] : 0.0);
+  });
+}
+
 /// What the right camera sees is what one camera sees from there.
 TEST(StereoFeature, TheRightCameraIsBesideTheLeftOne) {
   const Blocks pose{{0.4, -1.1, 0.3}, {0.8, 0.2, -0.4, 0.4}};

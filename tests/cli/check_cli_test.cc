@@ -49,6 +49,21 @@ TEST_F(CheckProgram, EndsWithOneWhereACheckFails) {
       << outcome.out;
 }
 
+TEST_F(CheckProgram, TakesANoiseThatIsGivenAsACovariance) {
+  const Outcome sensor =
+      Call({"check", "pose", "--set",
+            "covariance=[[4, 1, 0, 0, 0, 0], [1, 4, 0, 0, 0, 0], [0, 0, 1, 0, 0, 0], [0, 0, 0, 1, "
+            "0, 0], [0, 0, 0, 0, 1, 0], [0, 0, 0, 0, 0, 1]]"});
+  EXPECT_EQ(sensor.code, 0) << sensor.out << sensor.err;
+  const Outcome motion = Call({"check", "constant_velocity", "--set", "noise.kind=discrete",
+                               "--set", "noise.covariance=[[4]]"});
+  EXPECT_EQ(motion.code, 0) << motion.out << motion.err;
+  const Outcome both = Call(With(kStereo, {"--set", "covariance=[[4]]"}));
+  EXPECT_EQ(both.code, 78) << both.out;
+  EXPECT_TRUE(Contains(both.err, "sigma_px: the entry gives the noise as `covariance` too"))
+      << both.err;
+}
+
 TEST_F(CheckProgram, NamesParametersThatAreMissingOrUnknown) {
   const Outcome missing = Call({"check", "stereo_disparity", "--set", "focal_px=400"});
   EXPECT_EQ(missing.code, 78);

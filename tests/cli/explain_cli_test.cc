@@ -45,6 +45,23 @@ TEST_F(ExplainCli, TellsWhichTruthIsOfWhichBlock) {
   EXPECT_FALSE(Contains(Call({"explain", "table.yaml"}).out, "truth  ")) << some.out;
 }
 
+TEST_F(ExplainCli, TellsWhichNoiseTheConfigGivesAsACovariance) {
+  EXPECT_FALSE(Contains(Call({"explain", "config.yaml"}).out, "noise of "));
+  std::string text = Read("config.yaml");
+  const auto replace = [&text](const std::string& from, const std::string& to) {
+    ASSERT_NE(text.find(from), std::string::npos);
+    text.replace(text.find(from), from.size(), to);
+  };
+  replace("acceleration: 1.0", "covariance: [[0.25]]");
+  replace("baseline_m: 0.065, sigma_px: 1.0", "baseline_m: 0.065, covariance: [[2.25]]");
+  Write("given.yaml", text);
+  const Outcome given = Call({"explain", "given.yaml"});
+  for (const char* line : {"    noise of target: the covariance of the config, sigma 0.5\n",
+                           "    noise of stereo: the covariance of the config, sigma 1.5\n"}) {
+    EXPECT_TRUE(Contains(given.out, line)) << given.out << given.err;
+  }
+}
+
 TEST_F(ExplainCli, TellsTheOptionsOfEachTypeOfEstimator) {
   const Outcome ekf =
       Call({"explain", "config.yaml", "--set", "estimators.ekf.jacobian=first_estimate", "--set",

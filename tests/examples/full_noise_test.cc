@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A whole R, as docs/noise_models.md has it: in a model of one's own, and with each measurement.
+// A whole R, as docs/noise_models.md has it: by config, in a model of one's own, and with each
+// measurement.
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -46,14 +50,26 @@ struct CorrelatedPixel : LandmarkSensor<CorrelatedPixel<Representation>, Vec<2>,
   }
 };
 
-TEST(FullNoise, OfAModelIsThatOfEachMeasurement) {
-  const Config config =
-      Config::FromFile(ALIDADE_SOURCE_DIR "/examples/12_slam_parameters/config.yaml");
+/// Example 12 with R by `covariance` in place of `sigma_px`.
+Config WithCovariance(const std::string& covariance) {
+  const std::string path = ALIDADE_SOURCE_DIR "/examples/12_slam_parameters/config.yaml";
+  std::ifstream file(path);
+  std::string text(std::istreambuf_iterator<char>(file), {});
+  const std::size_t at = text.find("    sigma_px: 1.0", text.find("  pixels:"));
+  EXPECT_NE(at, std::string::npos);
+  text.replace(at, text.find('\n', at) - at, "    covariance: " + covariance);
+  return Config::FromText(text, path);
+}
+
+TEST(FullNoise, OfAConfigAndOfAModelIsThatOfEachMeasurement) {
+  const Config config = WithCovariance("[[1, 0.6], [0.6, 4]]");
   const PluginHost host;
   const std::unique_ptr<Source> source = std::move(BuildExperiment(config, host).source);
   System system = BuildSystem(config.root(), host, {"pixels"});
   const std::vector<StreamInfo> streams = source->streams();
-  Ekf by_measurement(system, {}, streams);
+  Ekf by_config(system, {}, streams);
+  const Config other = WithCovariance("[[9, 0], [0, 9]]");
+  Ekf by_measurement(BuildSystem(other.root(), host, {"pixels"}), {}, streams);
   const Camera camera(640, 480, 525.0, 525.0, 320.0, 240.0);
   system.sensors.at(0).model =
       InProcessSensor(CorrelatedPixel<InverseDepth>(camera, 1.0, 2.0, 0.3), "correlated_pixel");
@@ -62,16 +78,19 @@ TEST(FullNoise, OfAModelIsThatOfEachMeasurement) {
   int used = 0, frames = 0;
   for (SourceFrame frame; source->Next(frame) && frames < 40; ++frames) {
     by_model.Process(frame);
+    by_config.Process(frame);
     for (Measurement& m : frame.measurements) {
       if (m.values.size() == 2) m.covariance = {1.0, 0.6, 0.6, 4.0};  // 0.3 * 1 px * 2 px
     }
     for (const MeasurementReport& m : by_measurement.Process(frame).measurements()) {
       used += m.outcome == Outcome::kAccepted ? 1 : 0;
     }
-    const State &a = by_model.state(), &b = by_measurement.state();
-    ASSERT_EQ(a.values().size(), b.values().size());
-    for (std::size_t i = 0; i < a.values().size(); ++i) {
-      ASSERT_NEAR(a.values()[i], b.values()[i], 1e-9) << "frame " << frames << ", element " << i;
+    const std::vector<double>& values = by_measurement.state().values();
+    for (const Ekf* one : {&by_model, &by_config}) {
+      ASSERT_EQ(one->state().values().size(), values.size());
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        ASSERT_NEAR(one->state().values()[i], values[i], 1e-9) << frames << ", element " << i;
+      }
     }
   }
   EXPECT_GT(used, 500);

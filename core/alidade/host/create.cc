@@ -8,6 +8,7 @@
 #include "alidade/host/abi_read.h"
 #include "alidade/host/cpp_plugin.h"
 #include "alidade/host/foreign_call.h"
+#include "alidade/host/given_noise.h"
 #include "alidade/host/param_reader.h"
 #include "alidade/host/plugin_file.h"
 #include "alidade/host/plugin_host.h"
@@ -174,7 +175,8 @@ const EstimatorEntry& PluginHost::EstimatorOf(const PluginEntry& entry) const {
 std::shared_ptr<const ModelInstance> PluginHost::Create(const PluginEntry& entry, const Node& node,
                                                         const std::string& representation) const {
   const AlidadeEntry c = EntryOf(entry);
-  ParamReader reader(node, Named(entry.kind, entry.name), representation);
+  const std::optional<Node> covariance = internal::GivenCovariance(node, c.kind);
+  ParamReader reader(node, Named(entry.kind, entry.name), representation, covariance.has_value());
   NewInstance instance(entry);
   std::int32_t code;
   {
@@ -188,8 +190,10 @@ std::shared_ptr<const ModelInstance> PluginHost::Create(const PluginEntry& entry
   }
   if (!reader.failure().empty()) node.Fail(reader.failure());
   if (instance.kind() != c.kind) FailCreation(entry, node, "it is not what its table says");
-  return std::make_shared<const ModelInstance>(instance.Release(), entry.name,
-                                               entry.plugin.string());
+  auto model =
+      std::make_shared<ModelInstance>(instance.Release(), entry.name, entry.plugin.string());
+  if (covariance) model->GiveNoise(internal::RootForModel(*covariance, *model));
+  return model;
 }
 
 SensorModel PluginHost::CreateSensor(const std::string& name, const Node& entry,

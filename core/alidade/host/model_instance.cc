@@ -369,6 +369,13 @@ OwnedRole ModelInstance::owned(std::size_t role) const {
   return neutral;
 }
 
+void ModelInstance::GiveNoise(std::vector<double> root) {
+  const bool sensor = instance_.kind == ALIDADE_KIND_SENSOR;
+  const int n = sensor ? space_.geometry.tangent : description_.noise_count;
+  ALIDADE_EXPECTS(std::ssize(root) == std::ptrdiff_t{n} * n);
+  given_noise_ = std::move(root);
+}
+
 Space ModelInstance::ReadSpace(const AlidadeSpace& space, const std::string& what) const {
   const std::string defect = Defect(space);
   if (!defect.empty()) Refuse(": " + what + ' ' + defect);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -50,6 +51,11 @@ constexpr AlidadeObservation Seen(const double* z, const double* known = nullptr
   return seen;
 }
 inline constexpr AlidadeObservation kUnseen = Seen(nullptr);
+
+inline Status CopyNoise(const std::vector<double>& root, double* l) {
+  std::copy(root.begin(), root.end(), l);
+  return Status::kOk;
+}
 }  // namespace detail
 
 /// How a state that its sensor owns moves.
@@ -94,6 +100,11 @@ class ModelInstance {
   const Space& known() const { return known_; }
   bool has_input() const { return description_.input_count > 0; }
   unsigned capabilities() const { return capabilities_; }
+  /// Takes L, n x n row-major, in place of the model's noise, while no sensor or motion model has
+  /// it: of a sensor R = L L', of a motion model Qw = L L'.
+  void GiveNoise(std::vector<double> root);
+  /// What GiveNoise took; empty: the noise is the model's.
+  const std::vector<double>& given_noise() const { return given_noise_; }
   /// Of its last call in this thread that gave kError.
   std::string error_text() const;
 
@@ -115,6 +126,7 @@ class ModelInstance {
   std::vector<std::int32_t> tangents_;
   std::map<std::size_t, OwnedRole> owned_;  ///< by role, where the model says
   Space space_, known_;
+  std::vector<double> given_noise_;
   unsigned capabilities_ = 0;
 };
 
@@ -153,7 +165,7 @@ class SensorModel {
       return sensor_->eval(self_, &detail::kUnseen, roles, z, jacobians, strides);
     });
   }
-  /// l, row-major m x m, with R = l l'.
+  /// l, row-major m x m, with R = l l': what was given in place of the model's noise, if anything.
   Status SqrtNoise(const double* const* roles, const double* z, double* l,
                    const double* known = nullptr) const {
     return SqrtNoise(roles, detail::Seen(z, known), l);
@@ -161,6 +173,7 @@ class SensorModel {
   /// The same of a measurement as it is shown to the plugin, which takes as long to make as a call.
   template <bool kGuarded = true>
   Status SqrtNoise(const double* const* roles, const AlidadeObservation& seen, double* l) const {
+    if (!instance_->given_noise().empty()) return detail::CopyNoise(instance_->given_noise(), l);
     return detail::CallModel<kGuarded>(&sensor_->sqrt_noise, [&] {
       return sensor_->sqrt_noise(self_, &seen, roles, l, measurement().geometry.tangent);
     });
@@ -227,9 +240,10 @@ class MotionModel {
                            f, tangent_size_, g, noise_size_, nullptr, 0);
     });
   }
-  /// l, row-major n_w x n_w, with Qw = l l'.
+  /// l, row-major n_w x n_w, with Qw = l l': what was given in place of the model's, if anything.
   template <bool kGuarded = true>
   Status SqrtQ(const double* const* blocks, const double* input, double dt_s, double* l) const {
+    if (!instance_->given_noise().empty()) return detail::CopyNoise(instance_->given_noise(), l);
     return detail::CallModel<kGuarded>(&motion_->sqrt_q, [&] {
       return motion_->sqrt_q(self_, blocks, &input, dt_s, l, noise_size_);
     });

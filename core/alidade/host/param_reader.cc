@@ -58,6 +58,24 @@ bool HasFallback(const AlidadeParam& param) {
   return (param.flags & ALIDADE_PARAM_HAS_DEFAULT) != 0;
 }
 
+/// Whether it is a standard deviation of the noise, by its name.
+bool IsNoise(const AlidadeParam& param) {
+  const std::string_view key = param.key;
+  return param.kind == ALIDADE_PARAM_NUMBER &&
+         (key.starts_with("sigma_") || key.starts_with("noise."));
+}
+
+/// Its default, or else values within its range.
+std::vector<double> StandIn(const AlidadeParam& param) {
+  if (HasFallback(param) && param.count > 0) return Fallback(param);
+  const bool bounded_below = param.low > -kInfinity, bounded_above = param.high < kInfinity;
+  double value = 0.0;
+  if (bounded_below) value = param.low + 1.0;
+  if (bounded_above) value = param.high - 1.0;
+  if (bounded_below && bounded_above) value = 0.5 * (param.low + param.high);
+  return std::vector<double>(static_cast<std::size_t>(std::max(param.count, 1)), value);
+}
+
 std::string ValuesText(const AlidadeParam& param, const std::vector<double>& values) {
   std::string text;
   for (const double value : values) text += (text.empty() ? "" : ", ") + ValueText(param, value);
@@ -245,10 +263,12 @@ std::optional<Node> FindBelow(Node& map, std::string& key) {
 
 }  // namespace
 
-ParamReader::ParamReader(const Node& entry, std::string owner, std::string representation)
+ParamReader::ParamReader(const Node& entry, std::string owner, std::string representation,
+                         bool noise_given)
     : entry_(entry),
       owner_(std::move(owner)),
       representation_(std::move(representation)),
+      noise_given_(noise_given),
       host_(this) {
   host_.c().read = &ParamReader::Read;
   host_.c().read_text = &ParamReader::ReadText;
@@ -364,6 +384,10 @@ std::vector<double> ParamReader::Values(const AlidadeParam& param) const {
   }
   Node map = BaseOf(rest);
   const std::optional<Node> node = FindBelow(map, rest);
+  if (noise_given_ && IsNoise(param)) {
+    if (node) node->Fail("the entry gives the noise as `covariance` too", "one of the two");
+    return StandIn(param);
+  }
   if (!node) return Absent(param, map, rest);
   const std::vector<double> values = All(param, *node);
   ExpectCalibrated(param, *node, values);

@@ -26,8 +26,10 @@ class ParamReader {
  public:
   /// `owner` names the model in messages, as in `model 'scale_2d'`.
   /// `representation` is the value of `landmarks.representation` where it is one of the choices;
-  /// "": what is written.
-  ParamReader(const Node& entry, std::string owner, std::string representation = {});
+  /// "": what is written. `noise_given`: the entry has a covariance in place of the model's noise,
+  /// whose parameters, `sigma_*` and `noise.*`, are stand-ins; one that is written is refused.
+  ParamReader(const Node& entry, std::string owner, std::string representation = {},
+              bool noise_given = false);
   ParamReader(const ParamReader&) = delete;
   ParamReader& operator=(const ParamReader&) = delete;
 
@@ -59,6 +61,7 @@ class ParamReader {
 
   Node entry_;
   std::string owner_, representation_;
+  bool noise_given_;
   ExitCode code_ = ExitCode::kBadConfig;  ///< of the errors
   LentHost host_;
   std::unordered_set<std::string> keys_;  ///< that were asked for

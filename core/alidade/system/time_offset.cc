@@ -55,8 +55,11 @@ class OffsetSensor {
     instance.description = &self->description_;
     instance.sensor = &self->calls_;
     const std::string name = self->sensor_.name(), plugin = self->sensor_.instance().plugin();
+    const std::vector<double> noise = self->sensor_.instance().given_noise();
     instance.self = self.release();
-    return SensorModel(std::make_shared<const ModelInstance>(instance, name, plugin));
+    const auto model = std::make_shared<ModelInstance>(instance, name, plugin);
+    if (!noise.empty()) model->GiveNoise(noise);
+    return SensorModel(model);
   }
 
  private:

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "alidade/filter/frame_loop.h"
+#include "support/given_noise.h"
 #include "support/systems.h"
 
 namespace alidade {
@@ -229,6 +230,40 @@ TEST(SmallEkf, StacksMeasurementsOfSeveralRows) {
   }
   const auto seen = Compare(system, options, frames);
   EXPECT_GT(seen.count("gated"), 0u);
+}
+
+/// The same pair, by a model that believes in another noise.
+struct LoudPair : CorrelatedPair {
+  template <class T>
+  void SqrtNoise(const T*, T* l) const {
+    l[0] = l[3] = T(7.0);
+  }
+};
+
+TEST(SmallEkf, TakesAGivenNoiseInPlaceOfTheModels) {
+  const auto make = [](const SensorModel& sensor, const MotionModel& motion) {
+    System system = HeldPoint(0.7);
+    system.motions[0].model = motion;
+    const BlockId x = system.layout.Declare("a.x", "a", ConstantMotion(2).blocks()[0]);
+    system.motions.push_back({"a", ConstantMotion(2, 0.4), {x}});
+    system.priors.push_back({x, {1.5, 0.7}, Eigen::Matrix2d{{0.5, 0.1}, {0.1, 0.3}}, {}});
+    AddSensor(system, "pair", sensor, {"a.x"});
+    AddSensor(system, "z", LinearSensor(2.0, 0.3), {"p.x"});
+    return system;
+  };
+  const System own = make(InProcessSensor(CorrelatedPair(), "pair"), ConstantVelocityMotion(0.7));
+  const System given = make(SensorOfNoise(LoudPair(), {0.3, 0.0, 0.1, 0.2}),
+                            MotionOfNoise(ConstantVelocity<1, false>(5.0), {0.7}));
+  Watched a(own, {}, StreamsOf(own)), b(given, {}, StreamsOf(given));
+  for (int k = 0; k < 20; ++k) {
+    Frame frame = FrameAt(0.1 * k, {{1, 2.0 * std::cos(0.1 * k)}});
+    frame.measurements.push_back({frame.timestamp, 0, -1, {1.0 + 0.2 * std::sin(k), 3.0}, {}});
+    a.Process(frame);
+    b.Process(frame);
+    EXPECT_EQ(b.fast(), k > 0);
+    EXPECT_EQ(a.state().values(), b.state().values());
+    EXPECT_EQ(a.state().covariance().Dense(), b.state().covariance().Dense());
+  }
 }
 
 /// x' = x + w, with a square root of Qw that is not triangular.

@@ -156,7 +156,9 @@ SensorModel MakeSensor(const BundleTracks& from, int dims, const PluginHost& hos
   Config config = Config::FromFile(from.camera);
   const char* const model = dims == 4 ? "stereo_feature" : "inverse_depth_feature";
   config.Set("model", model, "bundle");
-  if (!config.root().HasUnread("sigma_px")) config.Set("sigma_px", "1", "bundle");
+  const bool has_noise =
+      config.root().HasUnread("sigma_px") || config.root().HasUnread("covariance");
+  if (!has_noise) config.Set("sigma_px", "1", "bundle");
   const SensorModel sensor = host.CreateSensor(model, config.root(), "xyz");
   config.root().Declare("model");
   config.root().RejectUnread();

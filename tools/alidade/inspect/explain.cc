@@ -49,19 +49,23 @@ std::string ListText(const std::vector<double>& values, bool same = false) {
   return '[' + Join(parts) + ']';
 }
 
+std::string SigmasText(const Eigen::MatrixXd& covariance) {
+  std::vector<double> sigmas;
+  for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
+    // Six digits hide the rounding of sigma -> variance -> sigma.
+    char sigma[32];
+    std::snprintf(sigma, sizeof(sigma), "%.6g", std::sqrt(covariance(i, i)));
+    sigmas.push_back(std::strtod(sigma, nullptr));
+  }
+  return ListText(sigmas, true);
+}
+
 std::string PriorText(const Prior& prior, const Block& block) {
   const bool measured = !prior.from.empty();
   std::string text = measured ? "first measurement of " + prior.from : ListText(prior.mean);
   if (block.status == BlockStatus::kConstant) return text + ", exact";
   if (measured) return text;
-  std::vector<double> sigmas;
-  for (Eigen::Index i = 0; i < prior.covariance.rows(); ++i) {
-    // Six digits hide the rounding of sigma -> variance -> sigma.
-    char sigma[32];
-    std::snprintf(sigma, sizeof(sigma), "%.6g", std::sqrt(prior.covariance(i, i)));
-    sigmas.push_back(std::strtod(sigma, nullptr));
-  }
-  return text + " +- " + ListText(sigmas, true);
+  return text + " +- " + SigmasText(prior.covariance);
 }
 
 /// A line for each block; what constant ones are; for each truth that is of no block, why.
@@ -105,11 +109,21 @@ std::string InputText(const MotionBinding& motion) {
                                          : "");
 }
 
+/// A line for a state or sensor entry whose noise the config gives as a covariance; else "".
+std::string GivenNoise(const std::string& name, const ModelInstance& model, int size) {
+  const std::vector<double>& root = model.given_noise();
+  if (root.empty()) return "";
+  const RowMajor l = Eigen::Map<const RowMajor>(root.data(), size, size);
+  return "    noise of " + name + ": the covariance of the config, sigma " +
+         SigmasText(l * l.transpose()) + '\n';
+}
+
 std::string Motions(const System& system) {
   const bool driven = std::ranges::any_of(
       system.motions, [](const MotionBinding& motion) { return motion.model.has_input(); });
   std::vector<TextRow> rows = {{"entry", "model", "moves", "noise inputs"}};
   if (driven) rows[0].emplace_back("control input");
+  std::string given;
   for (const MotionBinding& motion : system.motions) {
     std::vector<std::string> blocks;
     for (const BlockId id : motion.blocks) {
@@ -121,8 +135,9 @@ std::string Motions(const System& system) {
     rows.push_back({motion.name, motion.model.name(), blocks.empty() ? "none" : Join(blocks),
                     noise == 0 ? "none" : std::to_string(noise) + kind});
     if (driven) rows.back().push_back(InputText(motion));
+    given += GivenNoise(motion.name, motion.model.instance(), noise);
   }
-  return TextTable(rows, kIndent);
+  return TextTable(rows, kIndent) + given;
 }
 
 const char* ModeText(RoleMode mode) {
@@ -140,8 +155,11 @@ const char* ModeText(RoleMode mode) {
 std::string Sensors(const System& system) {
   std::vector<TextRow> rows = {
       {"sensor", "stream", "model", "role", "block", "mode", "jacobian_at"}};
+  std::string given;
   for (const SensorBinding& sensor : system.sensors) {
     TextRow front = {sensor.name, sensor.stream, sensor.model.name()};
+    given += GivenNoise(sensor.name, sensor.model.instance(),
+                        sensor.model.measurement().geometry.tangent);
     for (std::size_t i = 0; i < sensor.roles.size(); ++i) {
       const RoleBinding& role = sensor.roles[i];
       TextRow row = std::exchange(front, TextRow(3));
@@ -158,7 +176,7 @@ std::string Sensors(const System& system) {
       rows.push_back(std::move(row));
     }
   }
-  return TextTable(rows, kIndent);
+  return TextTable(rows, kIndent) + given;
 }
 
 /// What a sensor does with the block that fills a role.

@@ -43,6 +43,12 @@ std::vector<int> FirstSlots(int count) {
   return slots;
 }
 
+/// The noise that the config gives, n x n, in rows `stride` apart; false: none.
+bool CopyGiven(const std::vector<double>& root, int n, double* l, std::int32_t stride) {
+  for (int i = 0; i < n && !root.empty(); ++i) std::copy_n(root.data() + i * n, n, l + i * stride);
+  return !root.empty();
+}
+
 void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const Space& z,
                ModelUnderTest& model) {
   const AlidadeSensor sensor = *c.sensor;
@@ -69,7 +75,9 @@ void AddSensor(const AlidadeInstance& c, const std::vector<Space>& roles, const 
        {{m, m}},
        0,
        true,
-       [=](const double* const* in, double* const*, double* const* l, const std::int32_t* strides) {
+       [=, &given = model.instance->given_noise()](const double* const* in, double* const*,
+                                                   double* const* l, const std::int32_t* strides) {
+         if (CopyGiven(given, m, l[0], strides[0])) return std::int32_t{ALIDADE_OK};
          const AlidadeObservation seen = detail::Seen(in[count], knows ? in[count + 1] : nullptr);
          return sensor.sqrt_noise(self, &seen, in, l[0], strides[0]);
        }});
@@ -197,7 +205,9 @@ void AddMotion(const AlidadeInstance& c, const std::vector<Space>& blocks, bool 
        {{n_w, n_w}},
        0,
        true,
-       [=](const double* const* in, double* const*, double* const* l, const std::int32_t* strides) {
+       [=, &given = model.instance->given_noise()](const double* const* in, double* const*,
+                                                   double* const* l, const std::int32_t* strides) {
+         if (CopyGiven(given, n_w, l[0], strides[0])) return std::int32_t{ALIDADE_OK};
          return motion.sqrt_q(self, in, has_input ? in + count + 1 : nullptr, in[count][0], l[0],
                               strides[0]);
        }});

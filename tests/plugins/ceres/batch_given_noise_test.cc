@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The batch and the fixed lag with a noise that is given in place of the models'.
+#include <cmath>
+
+#include "batch_fixture.h"
+#include "support/given_noise.h"
+
+namespace alidade {
+namespace {
+
+using testing::FrameAt;
+
+/// An acceleration of 0.7 m/s^2, held, and a sensor of 0.3 m: by the models themselves, or in place
+/// of others of theirs.
+System HeldNoise(bool given) {
+  System system = testing::HeldPoint(given ? 5.0 : 0.7);
+  if (given) {
+    system.motions[0].model = testing::MotionOfNoise(ConstantVelocity<1, false>(5.0), {0.7});
+  }
+  testing::AddSensor(system, "z",
+                     given ? testing::SensorOfNoise(testing::Linear(2.0, 4.0), {0.3})
+                           : testing::LinearSensor(2.0, 0.3),
+                     {"p.x"});
+  return system;
+}
+
+TEST(CeresBatchGivenNoise, IsTakenInPlaceOfTheModels) {
+  for (const char* options : {"", "mode: filtering\n"}) {
+    const auto own = testing::MakeBatch(HeldNoise(false), options);
+    const auto given = testing::MakeBatch(HeldNoise(true), options);
+    std::vector<State> expected, found;
+    for (int k = 0; k < 12; ++k) {
+      const Frame frame =
+          FrameAt(0.1 * k, {{0, 2.0 * std::cos(0.1 * k) + 0.3 * std::sin(37.0 * k)}});
+      own->Process(frame);
+      given->Process(frame);
+      if (own->offline()) continue;
+      expected.push_back(own->state());
+      found.push_back(given->state());
+    }
+    if (own->offline()) {
+      own->Smooth([&](std::size_t, const State& s, const UpdateReport&) { expected.push_back(s); });
+      given->Smooth([&](std::size_t, const State& s, const UpdateReport&) { found.push_back(s); });
+    }
+    ASSERT_EQ(found.size(), 12u);
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      EXPECT_EQ(found[k].values(), expected[k].values()) << options << k;
+      EXPECT_EQ(found[k].covariance().Dense(), expected[k].covariance().Dense()) << options << k;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace alidade

@@ -20,7 +20,8 @@ constexpr const char* kSimulateFooter = R"(Examples:
 
 No estimator is made. Measurements of landmarks go to STREAM.csv as frame,feature,dim,value, others
 as frame,t_s and their values; next to them timestamps.csv, truth, map.csv and calibration.yaml.
-Images have an equal disc at the pixel of each landmark's measurement.)";
+Images show the textured surfaces of a source that has them, of a pair in DIR/left and DIR/right;
+else an equal disc at the pixel of each landmark's measurement.)";
 
 struct SimulateArguments {
   Input input;

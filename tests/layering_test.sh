@@ -85,6 +85,7 @@ sources() {
       base = path
       while (sub(/^(\.\.?\/)+/, "", base)) {}
       if (own_plugin != "" && index(base, "plugins/" own_plugin "/") == 1) return 0
+      if (own_plugin != "" && index(base, "plugins/common/") == 1) return 0
       if (folder == "bench" && base ~ /^plugins\/ceres\/[a-z_\/]+\.h$/) return 0
       if (base ~ /^plugins\//) return !(folder == "tests" && exists("tests/" base))
       if (own_plugin != "" && exists("plugins/" own_plugin "/" path)) return path ~ /^\.\.\//

@@ -10,6 +10,7 @@
 
 #include "alidade/base/random.h"
 #include "alidade/host/source.h"
+#include "plugins/common/surfaces.h"
 
 namespace alidade {
 
@@ -42,6 +43,10 @@ namespace alidade {
 ///
 /// n1 and n2 come from streams 0 and 1 of the seed, one of each per sample whatever is emitted.
 ///
+/// Drawn, the target is a textured square of w Z0 / F metres that faces the pair, on the axis of the
+/// left camera, before a textured wall. Images are image.width times image.height, their principal
+/// points in the middle; their noise comes from stream 2.
+///
 /// What the notebook does differently, or says twice: it thresholds the NOISY disparity, so that
 /// the disparities that pass are biased: -0.85 px where F B / Z is within 1 px of the limit, -0.33
 /// px within 3 px (sigma_d 1 px, example 01). `blind_test: true_depth` thresholds F B / Z instead.
@@ -55,7 +60,8 @@ class DepthTarget : public Source {
  public:
   explicit DepthTarget(const SourceArguments& arguments)
       : DepthTarget(arguments.params, arguments.seed) {}
-  DepthTarget(Params& p, std::uint64_t seed) : disparity_noise_(seed, 0), scale_noise_(seed, 1) {
+  DepthTarget(Params& p, std::uint64_t seed)
+      : disparity_noise_(seed, 0), scale_noise_(seed, 1), image_noise_(seed, 2) {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     depth_mean_m_ = p.Positive("depth_mean_m", "m", "mean depth of the target", 0.3);
     amplitude_m_ = p.NonNegative("amplitude_m", "m", "amplitude; below depth_mean_m", 0.1);
@@ -63,8 +69,9 @@ class DepthTarget : public Source {
     step_s_ = 1.0 / p.Number("rate_hz", "Hz", "samples a second", {1e-6, 1e6}, 1.0 / 0.033);
     const double duration_s =
         p.Number("duration_s", "s", "time of the last sample, at most", {0.0, 1e9}, 5.0);
-    bf_px_m_ = p.Positive("focal_px", "px", "rectified focal length", 400.0) *
-               p.Positive("baseline_m", "m", "stereo baseline", 0.065);
+    focal_px_ = p.Positive("focal_px", "px", "rectified focal length", 400.0);
+    baseline_m_ = p.Positive("baseline_m", "m", "stereo baseline", 0.065);
+    bf_px_m_ = focal_px_ * baseline_m_;
     sigma_disparity_px_ =
         p.NonNegative("sigma_disparity_px", "px", "disparity noise, 1 sigma", 1.0);
     const double min_range_m =
@@ -77,6 +84,12 @@ class DepthTarget : public Source {
         p.NonNegative("sigma_edge_px", "px", "noise of an edge of the target, 1 sigma", 1.0);
     template_depth_m_ =
         p.Positive("template_depth_m", "m", "depth at which the template was taken", 0.3);
+    width_px_ = p.Integer("image.width", "of the images, px", 16, 1 << 14, 640);
+    height_px_ = p.Integer("image.height", "of the images, px", 16, 1 << 14, 480);
+    image_noise_grey_ =
+        p.NonNegative("image.noise_grey", "1", "noise of a pixel's grey, of 255", 2.0);
+    wall_m_ = p.Positive("image.wall_m", "m", "depth of the wall behind the target", 1.5);
+    target_m_ = template_px * template_depth_m_ / focal_px_;
     if (!(amplitude_m_ < depth_mean_m_)) {
       p.Fail("amplitude_m", "must be less than depth_mean_m: the target would reach the camera");
     }
@@ -90,11 +103,27 @@ class DepthTarget : public Source {
   const std::vector<StreamInfo>& truths() const override { return truths_; }
   std::int64_t size() const override { return count_; }
 
+  int views() const override { return 2; }
+  GreyImage Draw(int view) override {
+    const Camera camera(width_px_, height_px_, focal_px_, focal_px_, 0.5 * (width_px_ - 1),
+                        0.5 * (height_px_ - 1));
+    const auto square = [](double side_m, double depth, double grain_m, std::uint64_t texture) {
+      const Eigen::Vector3d x(side_m, 0.0, 0.0), y(0.0, side_m, 0.0), middle(0.0, 0.0, depth);
+      return Rectangle{middle - 0.5 * (x + y), x, y, grain_m, texture};
+    };
+    constexpr double kWidest = 20.0;  // of its depth: fills the image
+    const std::vector<Rectangle> surfaces = {square(target_m_, depth_m_, 0.25 * target_m_, 0),
+                                             square(kWidest * wall_m_, wall_m_, 0.5 * wall_m_, 1)};
+    const double eye[3] = {view * baseline_m_, 0.0, 0.0}, level[4] = {1.0, 0.0, 0.0, 0.0};
+    return Render(surfaces, camera, eye, level, image_noise_grey_, image_noise_);
+  }
+
   bool Next(SourceFrame& frame) override {
     if (index_ == count_) return false;
     const double t_s = static_cast<double>(index_++) * step_s_;
     const double omega = 2.0 * std::numbers::pi * frequency_hz_;
     const double depth_m = depth_mean_m_ + amplitude_m_ * std::sin(omega * t_s);
+    depth_m_ = depth_m;
     const double rate_m_s = amplitude_m_ * omega * std::cos(omega * t_s);
     frame.timestamp = TimestampFromSeconds(t_s);
     frame.truth = {{depth_m}, {rate_m_s}, {1.0 / template_depth_m_}};
@@ -130,11 +159,14 @@ class DepthTarget : public Source {
                                          {"inverse_scale_seeing", 1},
                                          {"inverse_scale_blind", 1}};
   const std::vector<StreamInfo> truths_{{"depth", 1}, {"depth_rate", 1}, {"inverse_distance", 1}};
-  double depth_mean_m_, amplitude_m_, frequency_hz_, step_s_, bf_px_m_, sigma_disparity_px_;
+  double depth_mean_m_, amplitude_m_, frequency_hz_, step_s_, sigma_disparity_px_;
+  double focal_px_, baseline_m_, bf_px_m_, wall_m_, target_m_, image_noise_grey_;
+  int width_px_, height_px_;
+  double depth_m_ = 0.0;  ///< of the last frame
   double disparity_limit_px_, relative_sigma_, template_depth_m_;
   bool blind_by_true_depth_;
   std::int64_t count_, index_ = 0;
-  Random disparity_noise_, scale_noise_;
+  Random disparity_noise_, scale_noise_, image_noise_;
 };
 
 inline std::unique_ptr<Source> CreateDepthTarget(const SourceArguments& arguments) {

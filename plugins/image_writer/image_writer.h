@@ -38,41 +38,72 @@ inline cv::Mat Draw(std::int64_t number, const std::vector<std::array<double, 2>
   return image;
 }
 
-/// One PNG for each frame, `000000.png` and so on.
-class ImageSequenceWriter : public ImageWriter {
+/// A writer of images of either kind.
+class MatWriter : public ImageWriter {
  public:
-  explicit ImageSequenceWriter(ImageArguments arguments) : to_(std::move(arguments)) {}
+  explicit MatWriter(ImageArguments arguments) : to_(std::move(arguments)) {}
 
-  void Add(std::int64_t number, Timestamp /*timestamp*/,
+  void Add(std::int64_t number, Timestamp timestamp,
            const std::vector<std::array<double, 2>>& pixels) override {
-    std::vector<unsigned char> bytes;
-    cv::imencode(".png", Draw(number, pixels, to_.width, to_.height), bytes);
-    char name[32];
-    std::snprintf(name, sizeof name, "%06lld.png", static_cast<long long>(number));
-    std::ofstream file(to_.path / name, std::ios::binary);
-    file.write(reinterpret_cast<const char*>(bytes.data()),
-               static_cast<std::streamsize>(bytes.size()));
-    file.close();
-    if (file) return;
-    throw Error(ExitCode::kIo, ErrorLine({to_.shown + '/' + name}, {}, "cannot be written"));
+    Write(number, timestamp, Draw(number, pixels, to_.width, to_.height));
   }
-  void Close() override {}
+  void Add(std::int64_t number, Timestamp timestamp, const GreyImage& image) override {
+    cv::Mat grey(image.height, image.width, CV_8UC1);
+    std::ranges::copy(image.pixels, grey.begin<unsigned char>());
+    Write(number, timestamp, grey);
+  }
+
+ protected:
+  virtual void Write(std::int64_t number, Timestamp timestamp, const cv::Mat& image) = 0;
+  const ImageArguments& to() const { return to_; }
 
  private:
   ImageArguments to_;
 };
 
+/// One PNG for each frame, `000000.png` and so on.
+class ImageSequenceWriter : public MatWriter {
+ public:
+  using MatWriter::MatWriter;
+  void Close() override {}
+
+ private:
+  void Write(std::int64_t number, Timestamp /*timestamp*/, const cv::Mat& image) override {
+    std::vector<unsigned char> bytes;
+    cv::imencode(".png", image, bytes);
+    char name[32];
+    std::snprintf(name, sizeof name, "%06lld.png", static_cast<long long>(number));
+    std::ofstream file(to().path / name, std::ios::binary);
+    file.write(reinterpret_cast<const char*>(bytes.data()),
+               static_cast<std::streamsize>(bytes.size()));
+    file.close();
+    if (file) return;
+    throw Error(ExitCode::kIo, ErrorLine({to().shown + '/' + name}, {}, "cannot be written"));
+  }
+};
+
 /// A video, MJPG in AVI, of as many frames a second as the first two are apart, to whole numbers
 /// from 1; of a single frame 30.
-class VideoWriter : public ImageWriter {
+class VideoWriter : public MatWriter {
  public:
   static constexpr double kRateOfOne = 30.0;  ///< where two frames do not tell
 
-  explicit VideoWriter(ImageArguments arguments) : to_(std::move(arguments)) {}
+  using MatWriter::MatWriter;
 
-  void Add(std::int64_t number, Timestamp timestamp,
-           const std::vector<std::array<double, 2>>& pixels) override {
-    cv::Mat image = Draw(number, pixels, to_.width, to_.height);
+  /// The writer of OpenCV does not tell of a full disk; the index, which is written last, does.
+  void Close() override {
+    if (count_ == 0) return;
+    if (!video_.isOpened()) Open(kRateOfOne);
+    video_.release();
+    const cv::VideoCapture written(to().path.string(), cv::CAP_OPENCV_MJPEG);
+    if (written.isOpened() && written.get(cv::CAP_PROP_FRAME_COUNT) == count_) return;
+    throw Error(ExitCode::kIo, ErrorLine({to().shown}, {}, "cannot be written in full"));
+  }
+
+ private:
+  void Write(std::int64_t /*number*/, Timestamp timestamp, const cv::Mat& given) override {
+    cv::Mat image = given;
+    if (image.channels() == 1) cv::cvtColor(given, image, cv::COLOR_GRAY2BGR);
     if (count_++ == 0) {
       first_ = image;
       first_timestamp_ = timestamp;
@@ -84,29 +115,16 @@ class VideoWriter : public ImageWriter {
     }
     video_.write(image);
   }
-
-  /// The writer of OpenCV does not tell of a full disk; the index, which is written last, does.
-  void Close() override {
-    if (count_ == 0) return;
-    if (!video_.isOpened()) Open(kRateOfOne);
-    video_.release();
-    const cv::VideoCapture written(to_.path.string(), cv::CAP_OPENCV_MJPEG);
-    if (written.isOpened() && written.get(cv::CAP_PROP_FRAME_COUNT) == count_) return;
-    throw Error(ExitCode::kIo, ErrorLine({to_.shown}, {}, "cannot be written in full"));
-  }
-
- private:
   void Open(double rate_hz) {
     const int fourcc = cv::VideoWriter::fourcc('M', 'J', 'P', 'G');
-    video_.open(to_.path.string(), cv::CAP_OPENCV_MJPEG, fourcc, std::max(rate_hz, 1.0),
-                {to_.width, to_.height});
+    video_.open(to().path.string(), cv::CAP_OPENCV_MJPEG, fourcc, std::max(rate_hz, 1.0),
+                first_.size());
     if (!video_.isOpened()) {
-      throw Error(ExitCode::kCannotCreate, ErrorLine({to_.shown}, {}, "cannot be created"));
+      throw Error(ExitCode::kCannotCreate, ErrorLine({to().shown}, {}, "cannot be created"));
     }
     video_.write(first_);
   }
 
-  ImageArguments to_;
   cv::VideoWriter video_;
   cv::Mat first_;
   Timestamp first_timestamp_ = 0;

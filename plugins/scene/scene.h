@@ -11,6 +11,7 @@
 #include "alidade/host/source.h"
 #include "alidade/model/camera.h"
 #include "points.h"
+#include "surfaces.h"
 #include "trajectory.h"
 
 namespace alidade {
@@ -25,6 +26,8 @@ inline constexpr const char* kSceneKeys =
     "trajectory.keyframes  [{position, t_s, euler_deg | matrix | axis_angle_deg | quaternion}, "
     "...]\n"
     "trajectory.random     noise and start of quaternion_pose, which it is drawn from\n"
+    "surfaces              [{box: {min, max}}, {rectangle: {corner, right, down}}, ...], m, each "
+    "with grain_m: textured, for images of what the camera sees\n"
     "state_entry           the state entry whose blocks the truth is named after; default cam";
 
 /// Points in space, seen by a camera that moves among them.
@@ -44,13 +47,14 @@ inline constexpr const char* kSceneKeys =
 ///   odometry   6        vx vy vz wx wy wz every frame but the last, for the way to the next
 ///
 /// The camera looks along z, x to the right, y down. A point is seen where it lies ahead and both
-/// its exact pixel and the noisy one lie on the image; nothing hides it. Of more points than
+/// its exact pixel and the noisy one lie on the image; nothing hides it, not the surfaces either,
+/// which are seen in images alone. Of more points than
 /// max_features_per_frame those seen in the frame before go first, then those with the smaller id.
 /// Truth is `cam.position`, `cam.orientation` (world_from_cam), `cam.velocity` (world) and
 /// `cam.angular_velocity` (cam), the velocities as in quaternion_pose; and the place of each point.
 ///
-/// Points, path, pixels and odometry are drawn from streams 0 to 3 of the seed; of the pixels four
-/// numbers for each point and frame, seen or not.
+/// Points, path, pixels, odometry and the noise of images are drawn from streams 0 to 4 of the seed;
+/// of the pixels four numbers for each point and frame, seen or not.
 ///
 /// Keys         kSceneKeys; the camera by the keys of alidade/model/camera.h.
 /// Errors       kBadConfig.
@@ -60,13 +64,14 @@ class Scene : public Source {
   explicit Scene(const SourceArguments& arguments)
       : Scene(arguments.entry, arguments.params, arguments.seed) {}
   Scene(const Node& entry, Params& p, std::uint64_t seed)
-      : camera_(p), pixel_noise_(seed, 2), odometry_noise_(seed, 3) {
+      : camera_(p), pixel_noise_(seed, 2), odometry_noise_(seed, 3), image_noise_(seed, 4) {
     ReadNumbers(p);
-    for (const char* key : {"points", "trajectory", "state_entry"}) entry.Declare(key);
+    for (const char* key : {"points", "trajectory", "surfaces", "state_entry"}) entry.Declare(key);
     Random of_points(seed, 0), of_trajectory(seed, 1);
     points_ = scene::ReadPoints(entry.At("points", "scene"), of_points);
     trajectory_ =
         scene::ReadTrajectory(entry.At("trajectory", "scene"), count_, dt_s_, of_trajectory);
+    if (const auto surfaces = entry.Find("surfaces")) surfaces_ = scene::ReadSurfaces(*surfaces);
     seen_before_.assign(points_.size(), false);
     seen_ever_.assign(points_.size(), false);
     const auto state = entry.Find("state_entry");
@@ -80,6 +85,17 @@ class Scene : public Source {
   std::optional<std::array<double, 3>> TrueLandmark(std::int64_t id) const override {
     if (id < 0 || id >= static_cast<std::int64_t>(points_.size())) return std::nullopt;
     return scene::ToArray(points_[static_cast<std::size_t>(id)]);
+  }
+
+  int views() const override { return surfaces_.empty() ? 0 : measures_ == kStereo ? 2 : 1; }
+  GreyImage Draw(int view) override {
+    const scene::CameraState& state = trajectory_[index_ - 1];
+    const double from_left[3] = {view * baseline_m_, 0.0, 0.0};
+    Eigen::Vector3d eye;
+    UnitQuaternion::Rotate(state.orientation.data(), from_left, eye.data());
+    for (std::size_t i = 0; i < 3; ++i) eye[static_cast<int>(i)] += state.position[i];
+    return Render(surfaces_, camera_, eye.data(), state.orientation.data(), image_noise_grey_,
+                  image_noise_);
   }
 
   bool Next(SourceFrame& frame) override {
@@ -114,6 +130,8 @@ class Scene : public Source {
     sigma_px_ = p.NonNegative("sigma_px", "px", "noise of a pixel coordinate, 1 sigma", 1.0);
     most_ = static_cast<std::size_t>(
         p.Integer("max_features_per_frame", "points seen at most", 1, 1 << 30, 1 << 30));
+    image_noise_grey_ = p.NonNegative(
+        "image_noise_grey", "1", "noise of a pixel's grey, of 255, in images of surfaces", 2.0);
     measures_ = static_cast<Measures>(p.Choice("measures", {"pixel", "stereo", "depth"},
                                                "what stream tracks holds of a point", kPixel));
     if (measures_ == kStereo) {
@@ -235,14 +253,16 @@ class Scene : public Source {
   Camera camera_;
   std::vector<StreamInfo> streams_, truths_;
   std::vector<Eigen::Vector3d> points_;
+  std::vector<Rectangle> surfaces_;
   std::vector<scene::CameraState> trajectory_;
   std::vector<bool> seen_before_, seen_ever_;
   std::size_t count_ = 0, index_ = 0, most_ = 0;
   double dt_s_ = 0.0, sigma_px_ = 0.0, baseline_m_ = 0.0, sigma_depth_m_ = 0.0;
+  double image_noise_grey_ = 0.0;
   Measures measures_ = kPixel;
   int known_left_ = 0, odometry_stream_ = -1;
   double known_sigma_ = 0.0, linear_sigma_ = 0.0, angular_sigma_ = 0.0;
-  Random pixel_noise_, odometry_noise_;
+  Random pixel_noise_, odometry_noise_, image_noise_;
 };
 
 inline std::unique_ptr<Source> CreateScene(const SourceArguments& arguments) {

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tracks.h"
 
-#include "alidade/host/cpp_plugin.h"
-#include "alidade/host/plugin_file.h"
+#include "plugins/common/source_on_demand.h"
 
 namespace alidade {
 namespace {
@@ -12,16 +11,8 @@ constexpr const char* kImageTracksKeys =
     "images         which files of the folder: 'left_*.png'; default: all that end like an image\n"
     "state_entry    the state entry whose blocks the truth is named after; default cam";
 
-/// By the plugin that has OpenCV, which takes long to load.
 std::unique_ptr<Source> CreateImageTracks(const SourceArguments& arguments) {
-  const internal::PluginOnDemand plugin = internal::OpenOnDemand(
-      "image_tracks", {},
-      ErrorLine(arguments.entry.place(), arguments.entry.path(),
-                "this build of alidade reads no images",
-                "one that found OpenCV: apt-get install libopencv-dev, then configure and build "
-                "again"));
-  if (plugin.table->source_count != 1) internal::Refuse(plugin.file, "is no source of tracks");
-  return plugin.table->sources[0].create(arguments);
+  return CreateOnDemand("image_tracks", arguments);
 }
 
 }  // namespace

@@ -11,8 +11,8 @@
 
 #include "alidade/host/source.h"
 #include "calibration_file.h"
-#include "companion_files.h"
 #include "feature_rows.h"
+#include "plugins/common/companion_files.h"
 #include "tracks_options.h"
 
 namespace alidade {

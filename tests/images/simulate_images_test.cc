@@ -165,7 +165,9 @@ TEST_F(SimulateImages, RefusesWhatItCannotWrite) {
                        "inside 'data/'"))
       << outside.err;
   EXPECT_EQ(Simulate(kScene, {"--video", "/tmp/v.avi"}).code, 77);
-  const Outcome blind = Call({"simulate", "config.yaml", "-o", "data", "--video", "v.avi"});
+  Write("table.yaml", testing::kTableConfig);
+  Write("table.csv", "t_s,d\n0,80\n");
+  const Outcome blind = Call({"simulate", "table.yaml", "-o", "data", "--video", "v.avi"});
   EXPECT_EQ(blind.code, 78);
   EXPECT_TRUE(Contains(blind.err, "camera: missing key, needed by images of a simulation"))
       << blind.err;
@@ -173,6 +175,63 @@ TEST_F(SimulateImages, RefusesWhatItCannotWrite) {
 }
 
 // Blocks are of 512 bytes: all other files fit into 16 of them, and an image is larger than 2.
+TEST_F(SimulateImages, SurfacesAreSeenWhereTheyAre) {
+  // A plate 1 m wide and 0.5 m high, 2 m ahead, whose edges a pinhole sees at known places.
+  const Outcome outcome = Simulate(R"(alidade: 1
+camera: {model: pinhole, width: 160, height: 120, fx: 100, fy: 100, cx: 80, cy: 60,
+         baseline_m: 0.4}
+source:
+  type: scene
+  max_frames: 2
+  measures: stereo
+  image_noise_grey: 0
+  points: {list: [[0, 0, 2]]}
+  surfaces: [{rectangle: {corner: [-0.5, -0.25, 2], right: [1, 0, 0], down: [0, 0.5, 0]}}]
+  trajectory: {look_at: [{position: [0, 0, 0], target: [0, 0, 1]},
+                         {position: [0, 0, 1], target: [0, 0, 2]}]}
+)",
+                                   {"--images", "images"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto edges = [&](const char* name) {
+    const cv::Mat image = cv::imread((folder_ / name).string(), cv::IMREAD_GRAYSCALE);
+    return cv::boundingRect(image);
+  };
+  EXPECT_EQ(edges("data/images/left/000000.png"), cv::Rect(55, 48, 51, 25));
+  EXPECT_EQ(edges("data/images/right/000000.png"), cv::Rect(35, 48, 51, 25));
+  EXPECT_EQ(edges("data/images/left/000001.png"), cv::Rect(30, 35, 101, 51));
+  EXPECT_EQ(edges("data/images/right/000001.png"), cv::Rect(0, 35, 91, 51));
+}
+
+TEST_F(SimulateImages, TheNearerSurfaceHidesTheOther) {
+  const auto draw = [&](const char* surfaces, const char* folder) {
+    Write("scene.yaml", std::string(R"(alidade: 1
+camera: {model: pinhole, width: 80, height: 60, fx: 60, fy: 60, cx: 40, cy: 30}
+source:
+  type: scene
+  max_frames: 1
+  image_noise_grey: 0
+  points: {list: [[0, 0, 2]]}
+  trajectory: {look_at: [{position: [0, 0, 0], target: [0, 0, 1]}]}
+  surfaces: )") + surfaces + '\n');
+    const Outcome outcome = Call({"simulate", "scene.yaml", "-o", folder, "--images", "images"});
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return cv::imread((folder_ / folder / "images/000000.png").string(), cv::IMREAD_GRAYSCALE);
+  };
+  // The textures go by the places in the list: a third rectangle, out of sight, keeps them apart.
+  const char* const kAway = "{rectangle: {corner: [0, 0, -5], right: [1, 0, 0], down: [0, 1, 0]}}";
+  const std::string wall =
+      "{rectangle: {corner: [-5, -5, 4], right: [10, 0, 0], down: [0, 10, 0]}}";
+  const std::string plate =
+      "{rectangle: {corner: [-0.3, -0.3, 1], right: [0.6, 0, 0], down: [0, 0.6, 0]}}";
+  const std::string both = "[" + plate + ", " + wall + "]";
+  const std::string alone = "[" + plate + ", " + kAway + "]";
+  const cv::Mat scene = draw(both.c_str(), "both"), one = draw(alone.c_str(), "one");
+  const cv::Rect inside(24, 14, 33, 33);
+  EXPECT_EQ(cv::norm(scene(inside), one(inside), cv::NORM_INF), 0.0);
+  EXPECT_EQ(cv::boundingRect(one), cv::Rect(22, 12, 37, 37));
+  EXPECT_GT(cv::countNonZero(scene), 80 * 60 * 9 / 10);
+}
+
 TEST_F(SimulateImages, AFullDiskIsAnError) {
   before_ = "ulimit -f 16";
   const Outcome video = Simulate(kScene, {"--video", "v.avi"});

@@ -49,6 +49,12 @@ struct StreamInfo {
   int known = 0;       ///< known numbers that come with each measurement
 };
 
+/// An image, 8 bit grey, row by row from the top.
+struct GreyImage {
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> pixels;
+};
+
 /// Where measurements come from: a simulator, a file, a pipe. A C++ plugin.
 class Source {
  public:
@@ -64,6 +70,10 @@ class Source {
   virtual std::optional<std::array<double, 3>> TrueLandmark(std::int64_t /*id*/) const {
     return std::nullopt;
   }
+  /// How many cameras of a simulated world can draw what they see: 0, 1, or 2 of a stereo pair.
+  virtual int views() const { return 0; }
+  /// What camera `view` sees at the last frame: 0, the left one of a pair, or 1.
+  virtual GreyImage Draw(int /*view*/) { return {}; }
   /// The calibration of the camera that took the data: a config of the one map `calibration`, with
   /// parameters under the keys by which models ask for them,
   /// `calibration: {camera: {fx: 721.5, baseline_m: 0.54}}`. None: the data bring none. Errors:

@@ -10,9 +10,9 @@
 
 #include "alidade/host/source.h"
 #include "feature_tracker.h"
-#include "image_reader.h"
+#include "plugins/common/companion_files.h"
+#include "plugins/common/images/image_reader.h"
 #include "plugins/tracks/calibration_file.h"
-#include "plugins/tracks/companion_files.h"
 
 namespace alidade {
 

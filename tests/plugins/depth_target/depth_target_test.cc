@@ -267,13 +267,15 @@ TEST(DepthTarget, EveryParameterHasAUnitAndADefault) {
   host.Make();
   EXPECT_EQ(host.failed(), "");
   const std::map<std::string, std::string> expected{
-      {"depth_mean_m", "m"},    {"amplitude_m", "m"},
-      {"frequency_hz", "Hz"},   {"rate_hz", "Hz"},
-      {"duration_s", "s"},      {"focal_px", "px"},
-      {"baseline_m", "m"},      {"min_range_m", "m"},
-      {"blind_test", ""},       {"sigma_disparity_px", "px"},
-      {"sigma_edge_px", "px"},  {"template_px", "px"},
-      {"template_depth_m", "m"}};
+      {"depth_mean_m", "m"},     {"amplitude_m", "m"},
+      {"frequency_hz", "Hz"},    {"rate_hz", "Hz"},
+      {"duration_s", "s"},       {"focal_px", "px"},
+      {"baseline_m", "m"},       {"min_range_m", "m"},
+      {"blind_test", ""},        {"sigma_disparity_px", "px"},
+      {"sigma_edge_px", "px"},   {"template_px", "px"},
+      {"template_depth_m", "m"}, {"image.width", ""},
+      {"image.height", ""},      {"image.noise_grey", "1"},
+      {"image.wall_m", "m"}};
   EXPECT_EQ(host.units(), expected);
 }
 

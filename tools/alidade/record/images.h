@@ -20,6 +20,8 @@ class ImageWriter {
   /// timestamps of the first two frames give the rate of a video. Errors: kCannotCreate, kIo.
   virtual void Add(std::int64_t number, Timestamp timestamp,
                    const std::vector<std::array<double, 2>>& pixels) = 0;
+  /// Adds an image as it is; all are of one size.
+  virtual void Add(std::int64_t number, Timestamp timestamp, const GreyImage& image) = 0;
   /// Completes what was written. Error: kIo.
   virtual void Close() = 0;
 };
@@ -29,7 +31,7 @@ struct ImageArguments {
   enum class Form { kVideo, kImages } form;
   std::filesystem::path path;  ///< of the video, or of the folder of images; its folder is there
   std::string shown;           ///< the path in messages
-  int width, height;           ///< px
+  int width, height;           ///< px, of images that are drawn from points
 };
 
 /// Makes the image writer of the C++ plugin in `folder`; of the one that was built with

@@ -141,34 +141,61 @@ class DataFiles {
   std::set<std::string> names_;
 };
 
-/// The images of one simulation.
+/// The images of one simulation: what the source draws, else discs at the landmarks.
 class ImageFiles {
  public:
-  ImageFiles(const SimulateImages& names, const Config& config, const OutputFolder& folder) {
-    if (!names.video.empty()) {
-      const std::filesystem::path path = Inside(folder, names.video, "--video");
-      MakeFolder(path.parent_path(), folder.Shown(names.video));
-      Open({ImageArguments::Form::kVideo, path, folder.Shown(names.video), 0, 0}, config);
+  ImageFiles(const SimulateImages& names, const Config& config, const OutputFolder& folder,
+             Source& source)
+      : source_(source) {
+    if (names.video.empty() && names.folder.empty()) return;
+    int width = 0, height = 0;
+    if (source.views() == 0) {
+      constexpr int kMost = 16384;
+      const Node camera = config.root().At("camera", "images of a simulation");
+      width = static_cast<int>(camera.At("width").Integer(1, kMost));
+      height = static_cast<int>(camera.At("height").Integer(1, kMost));
     }
-    if (!names.folder.empty()) {
-      const std::filesystem::path path = Inside(folder, names.folder, "--images");
-      MakeFolder(path, folder.Shown(names.folder));
-      Open({ImageArguments::Form::kImages, path, folder.Shown(names.folder), 0, 0}, config);
+    writers_.resize(static_cast<std::size_t>(std::max(1, source.views())));
+    for (std::size_t view = 0; view < writers_.size(); ++view) {
+      const std::string side = writers_.size() == 1 ? "" : view == 0 ? "left" : "right";
+      const auto add = [&](ImageArguments::Form form, const std::filesystem::path& path,
+                           const std::string& name) {
+        writers_[view].push_back(OpenImageWriter({form, path, folder.Shown(name), width, height}));
+        names_.push_back(name);
+      };
+      if (!names.video.empty()) {
+        std::filesystem::path path = Inside(folder, names.video, "--video");
+        if (!side.empty()) path.replace_filename(path.stem().string() + "_" + side + ".avi");
+        MakeFolder(path.parent_path(), folder.Shown(names.video));
+        const std::filesystem::path shown = std::filesystem::path(names.video).parent_path();
+        add(ImageArguments::Form::kVideo, path, (shown / path.filename()).string());
+      }
+      if (!names.folder.empty()) {
+        const std::filesystem::path path = Inside(folder, names.folder, "--images") / side;
+        MakeFolder(path, folder.Shown(names.folder));
+        add(ImageArguments::Form::kImages, path, names.folder + (side.empty() ? "" : '/' + side));
+      }
     }
   }
 
   void Add(std::int64_t number, const Frame& frame) {
-    if (writers_.empty()) return;
-    pixels_.clear();
-    for (const Measurement& measurement : frame.measurements) {
-      if (measurement.landmark < 0 || measurement.values.size() < 2) continue;
-      pixels_.push_back({measurement.values[0], measurement.values[1]});
+    for (std::size_t view = 0; view < writers_.size(); ++view) {
+      if (source_.views() == 0) {
+        FindPixels(frame);
+        for (const auto& writer : writers_[view]) writer->Add(number, frame.timestamp, pixels_);
+      } else {
+        const GreyImage image = source_.Draw(static_cast<int>(view));
+        for (const auto& writer : writers_[view]) writer->Add(number, frame.timestamp, image);
+      }
     }
-    for (const auto& writer : writers_) writer->Add(number, frame.timestamp, pixels_);
   }
 
+  /// Of what is written, in the folder.
+  const std::vector<std::string>& names() const { return names_; }
   void Close() {
-    for (const auto& writer : writers_) writer->Close();
+    for (const auto& view : writers_) {
+      for (const auto& writer : view) writer->Close();
+    }
   }
 
  private:
@@ -187,15 +214,17 @@ class ImageFiles {
     std::filesystem::create_directories(path, error);
     if (error) internal::FailCreate(shown, error.value());
   }
-  void Open(ImageArguments arguments, const Config& config) {
-    constexpr int kMost = 16384;
-    const Node camera = config.root().At("camera", "images of a simulation");
-    arguments.width = static_cast<int>(camera.At("width").Integer(1, kMost));
-    arguments.height = static_cast<int>(camera.At("height").Integer(1, kMost));
-    writers_.push_back(OpenImageWriter(arguments));
+  void FindPixels(const Frame& frame) {
+    pixels_.clear();
+    for (const Measurement& measurement : frame.measurements) {
+      if (measurement.landmark < 0 || measurement.values.size() < 2) continue;
+      pixels_.push_back({measurement.values[0], measurement.values[1]});
+    }
   }
 
-  std::vector<std::unique_ptr<ImageWriter>> writers_;
+  Source& source_;
+  std::vector<std::vector<std::unique_ptr<ImageWriter>>> writers_;  ///< of each view
+  std::vector<std::string> names_;
   std::vector<std::array<double, 2>> pixels_;
 };
 
@@ -227,7 +256,7 @@ SimulateResult Simulate(const Config& config, const PluginHost& host,
   const std::string camera = CameraYaml(config);
   OutputFolder output(folder, force);
   DataFiles files(output, *source);
-  ImageFiles drawn(images, config, output);
+  ImageFiles drawn(images, config, output, *source);
   SimulateResult result;
   for (SourceFrame frame; !result.stopped && source->Next(frame);) {
     files.Add(result.frames, frame);
@@ -237,9 +266,7 @@ SimulateResult Simulate(const Config& config, const PluginHost& host,
   files.Close();
   drawn.Close();
   result.files.assign(files.names().begin(), files.names().end());
-  for (const std::string& name : {images.folder, images.video}) {
-    if (!name.empty()) result.files.push_back(name);
-  }
+  std::ranges::copy(drawn.names(), std::back_inserter(result.files));
   if (!camera.empty()) {
     output.Write("calibration.yaml", camera);
     result.files.insert(result.files.begin(), "calibration.yaml");

@@ -37,9 +37,10 @@ struct SimulateImages {
 ///   map.csv           feature,x,y,z, m: of each landmark that was seen, where the source knows
 ///   calibration.yaml  the config's `camera`, for a config to include
 ///   simulate.json     {"status": "ok", or "stopped" before the end, "frames": N}
-///   images.video      an image of each frame, MJPG: equal discs at the first two values (u, v),
-///                     px, of all measurements of landmarks; as large as the config's `camera`
-///   images.folder   the same as NUMBER.png
+///   images.video      an image of each frame, MJPG: what the source draws; else equal discs at the
+///                     first two values (u, v), px, of all measurements of landmarks, as large as
+///                     the config's `camera`. Of a pair NAME_left.avi and NAME_right.avi
+///   images.folder     the same as NUMBER.png; of a pair in its folders left and right
 ///
 /// Only files that have something to hold are there. The folder appears when all is written; one
 /// that is there is replaced where `force`. `stop` true: ends after the frame. Errors: kBadConfig,

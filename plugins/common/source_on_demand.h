@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "alidade/host/cpp_plugin.h"
+#include "alidade/host/plugin_file.h"
+
+namespace alidade {
+
+/// The source of the plugin `name` in a folder of its own, which has OpenCV and takes long to load:
+/// it is loaded when its source is made. Errors: kPlugin, kNotTrusted, those of the source.
+inline std::unique_ptr<Source> CreateOnDemand(const std::string& name,
+                                              const SourceArguments& arguments) {
+  const internal::PluginOnDemand plugin = internal::OpenOnDemand(
+      name, {},
+      ErrorLine(arguments.entry.place(), arguments.entry.path(),
+                "this build of alidade reads no images",
+                "one that found OpenCV: apt-get install libopencv-dev, then configure and build "
+                "again"));
+  if (plugin.table->source_count != 1) internal::Refuse(plugin.file, "has not the one source");
+  return plugin.table->sources[0].create(arguments);
+}
+
+}  // namespace alidade

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "alidade/host/source.h"
+#include "alidade/model/camera.h"
+#include "disparity.h"
+#include "plugins/common/companion_files.h"
+#include "plugins/common/images/image_reader.h"
+#include "rectification.h"
+#include "target_tables.h"
+#include "target_tracker.h"
+
+namespace alidade {
+
+/// One target in the images of a stereo pair, or of one camera.
+///
+///   stream          size  values       when
+///   disparity       1     d, px        its texture is found in both images: see FindDisparity()
+///   inverse_scale   1     s            the target is followed: see TargetTracker
+///
+/// Each comes with its variance, unless `estimate_noise` is false:
+///
+///   of d            var(d) + sigma^2
+///   of s            var(s) + (2 sigma s / w)^2,   w = sqrt(width height) of the target in the image
+///
+/// with sigma the config's sigma_systematic_px: what calibration, interpolation and the target itself
+/// are off by, which no residual tells. var() is that of the alignment. The errors of s since the
+/// template was taken have that of the template in common, which no filter here models.
+///
+/// A target that is lost, hidden or black gives no measurement, and is looked for in each image.
+///
+/// Errors       those of ImageReader, TimestampRows, BoxRows, TruthRows, Rectification; kBadConfig.
+class ImageTarget : public Source {
+ public:
+  explicit ImageTarget(const SourceArguments& arguments)
+      : options_(arguments.params), disparity_options_(arguments.params) {
+    Params& p = arguments.params;
+    const Node& entry = arguments.entry;
+    rate_hz_ = p.Number("rate_hz", "Hz", "images a second; 0: by `timestamps`, or as a video says",
+                        {0.0, 1e6}, 0.0);
+    most_ = p.Integer("max_frames", "images at most; 0: all", 0, 1 << 30, 0);
+    tolerance_ = TimestampFromSeconds(p.Number(
+        "truth_tolerance_s", "s", "a true value is at most so far off in time", {0.0, 1e3}, 1e-3));
+    sigma_px_ = p.NonNegative("sigma_systematic_px", "px",
+                              "what no residual tells: of the disparity, and of an edge of the "
+                              "target, 1 sigma",
+                              0.1);
+    estimate_noise_ = p.Flag(
+        "estimate_noise", "each measurement brings its variance; false: that of the sensors", true);
+    const std::array<double, 4> box = p.Vector<4>(
+        "target", "px", "[x, y, width, height] of the target in the first image; or by `boxes`",
+        kNonNegative, std::array<double, 4>{});
+    for (const char* key : {"left", "right", "stereo", "boxes", "timestamps", "truth"}) {
+      entry.Declare(key);
+    }
+    folder_ = arguments.folder;
+    Open(entry);
+    if (box[2] >= 8.0 && box[3] >= 8.0) {
+      first_ = BoxRows::Of(box[0], box[1], box[2], box[3]);
+    } else if (box[2] > 0.0 || !boxes_) {
+      entry.Fail(
+          box[2] > 0.0 ? "'target' is less than 8 px wide or high" : "neither 'target' nor 'boxes'",
+          "target: [x, y, width, height], px, in the first image");
+    }
+    std::optional<cv::Matx33d> intrinsics;
+    if (options_.warp == Warp::kHomography && !entry.Find("stereo")) {
+      const Camera camera(p);
+      if (camera.model != CameraModel::kPinhole) {
+        p.Fail("camera.model", "not 'pinhole', but the images are taken as free of distortion");
+      }
+      intrinsics = cv::Matx33d(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1);
+    }
+    if (const auto stereo = entry.Find("stereo")) {
+      if (!right_) stereo->Fail("there is no 'right'", "the images of both cameras");
+      stereo_file_ = folder_ / stereo->Text();
+      ReadPair();
+      has_read_ = true;
+      rectification_.emplace(stereo_file_, *stereo, image_[0].size());
+      intrinsics = rectification_->intrinsics();
+    }
+    tracker_.emplace(options_, intrinsics);
+    if (right_) streams_.push_back({"disparity", 1});
+    streams_.push_back({"inverse_scale", 1});
+    if (truth_) {
+      for (const std::string& name : truth_->names()) truths_.push_back({name, 1});
+    }
+  }
+
+  const std::vector<StreamInfo>& streams() const override { return streams_; }
+  const std::vector<StreamInfo>& truths() const override { return truths_; }
+  Place place() const override { return left_->place(); }
+  std::int64_t size() const override {
+    return most_ > 0 ? std::min<std::int64_t>(most_, left_->size()) : left_->size();
+  }
+  std::optional<Config> Calibration() const override {
+    if (!rectification_) return std::nullopt;
+    return rectification_->Calibration(stereo_file_.string());
+  }
+
+  bool Next(SourceFrame& frame) override {
+    if (frames_ == most_ && most_ > 0) return false;
+    if (!std::exchange(has_read_, false) && !ReadPair()) return false;
+    frame.timestamp = TimeOf(left_->number());
+    frame.measurements.clear();
+    frame.truth.clear();
+    if (truth_) frame.truth = truth_->At(frame.timestamp, tolerance_);
+    if (rectification_) {
+      for (int view = 0; view < 2; ++view) {
+        image_[view] = rectification_->Rectify(image_[view], view);
+      }
+    }
+    Measure(frame);
+    ++frames_;
+    return true;
+  }
+
+ private:
+  std::optional<std::filesystem::path> Find(const Node& entry, const char* key) const {
+    const auto node = entry.Find(key);
+    if (!node) return std::nullopt;
+    if (node->Text().empty()) node->Fail("no path");
+    return folder_ / node->Text();
+  }
+
+  void Open(const Node& entry) {
+    const auto open = [&](const char* key, std::optional<ImageReader>& reader) {
+      const auto path = Find(entry, key);
+      if (!path) return;
+      const std::string name = path->filename().string();
+      const bool pattern = name.find_first_of("*?[") != name.npos;
+      reader.emplace(pattern ? path->parent_path() : *path, pattern ? name : "", *entry.Find(key));
+    };
+    entry.At("left", "source stereo_target");
+    open("left", left_);
+    open("right", right_);
+    if (right_ && !right_->is_video() && !left_->is_video() && right_->size() != left_->size()) {
+      entry.At("right").Fail(std::to_string(right_->size()) + " images, but 'left' has " +
+                                 std::to_string(left_->size()),
+                             "a right image for each left one");
+    }
+    const auto table = [&](const char* key, auto& rows) {
+      if (const auto path = Find(entry, key)) {
+        const Node node = entry.At(key);
+        rows.emplace(*path, node.place(), node.path());
+      }
+    };
+    table("boxes", boxes_);
+    table("timestamps", times_);
+    table("truth", truth_);
+    if (rate_hz_ == 0.0 && !times_) rate_hz_ = left_->rate_hz();
+    if (!times_ && !(rate_hz_ > 0.0)) entry.Fail("no 'timestamps'", "that table, or 'rate_hz'");
+  }
+
+  bool ReadPair() {
+    if (!left_->Next(image_[0])) return false;
+    if (!right_) return true;
+    if (!right_->Next(image_[1])) {
+      throw Error(ExitCode::kBadData,
+                  ErrorLine(right_->place(), {}, "the last right image", "as many as left ones"));
+    }
+    if (image_[0].size() != image_[1].size()) {
+      throw Error(
+          ExitCode::kBadData,
+          ErrorLine(right_->place(), {}, "not as large as the left image", "images of one size"));
+    }
+    return true;
+  }
+
+  Timestamp TimeOf(std::int64_t image) {
+    if (!times_) return TimestampFromSeconds(static_cast<double>(image) / rate_hz_);
+    std::int64_t frame = -1;
+    Timestamp timestamp = 0;
+    while (frame < image && times_->Next(frame, timestamp)) continue;
+    if (frame == image) return timestamp;
+    throw Error(
+        ExitCode::kBadData,
+        ErrorLine(place(), {}, "image " + std::to_string(image) + " is not in " + times_->name(),
+                  "a time for every image"));
+  }
+
+  void Measure(SourceFrame& frame) {
+    auto corners = boxes_ ? boxes_->At(left_->number()) : std::nullopt;
+    if (first_) corners = std::exchange(first_, std::nullopt);
+    if (!started_ && !corners) return;  // the table says nothing of it yet
+    if (!started_ && !OnImage(*corners)) {
+      throw Error(ExitCode::kBadData, ErrorLine(place(), {}, "the target is not on this image",
+                                                "'target' or a row of 'boxes' inside of it"));
+    }
+    started_ = true;
+    if (corners && rectification_) {
+      for (cv::Point2f& corner : *corners) corner = rectification_->Rectify(corner);
+    }
+    const auto seen = tracker_->Track(image_[0], corners);
+    if (!seen) return;
+    if (right_) {
+      if (const auto found =
+              FindDisparity(image_[0], image_[1], seen->box, seen->middle, disparity_options_)) {
+        Emit(0, found->value, found->variance + sigma_px_ * sigma_px_, frame);
+      }
+    }
+    const double width_px = std::sqrt(seen->box.area());
+    const double systematic = 2.0 * sigma_px_ * seen->inverse_scale / width_px;
+    Emit(right_ ? 1 : 0, seen->inverse_scale, seen->variance + systematic * systematic, frame);
+  }
+
+  bool OnImage(const BoxRows::Corners& corners) const {
+    const cv::Rect2f all({-0.5F, -0.5F}, cv::Size2f(image_[0].size()));
+    return std::ranges::all_of(corners, [&](cv::Point2f at) { return all.contains(at); });
+  }
+
+  void Emit(int stream, double value, double variance, Frame& frame) const {
+    Measurement measurement;
+    measurement.timestamp = frame.timestamp;
+    measurement.stream = stream;
+    measurement.values = {value};
+    if (estimate_noise_) measurement.covariance = {variance};
+    frame.measurements.push_back(std::move(measurement));
+  }
+
+  TargetOptions options_;
+  DisparityOptions disparity_options_;
+  double rate_hz_ = 0.0, sigma_px_ = 0.0;
+  bool estimate_noise_ = true, has_read_ = false, started_ = false;
+  std::int64_t most_ = 0, frames_ = 0;
+  Timestamp tolerance_ = 0;
+  std::filesystem::path folder_, stereo_file_;
+  std::vector<StreamInfo> streams_, truths_;
+  std::optional<ImageReader> left_, right_;
+  std::optional<BoxRows> boxes_;
+  std::optional<TimestampRows> times_;
+  std::optional<TruthRows> truth_;
+  std::optional<BoxRows::Corners> first_;  ///< the config's `target`
+  std::optional<Rectification> rectification_;
+  std::optional<TargetTracker> tracker_;
+  cv::Mat image_[2];
+};
+
+}  // namespace alidade

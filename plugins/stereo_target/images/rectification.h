@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstring>
+#include <filesystem>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
+#include <vector>
+
+#include "alidade/base/error.h"
+#include "alidade/base/read_file.h"
+#include "alidade/config/config.h"
+
+namespace alidade {
+
+/// Turns the images of a calibrated pair into those of two pinholes side by side, whose rows agree
+/// (cv::stereoRectify).
+///
+///   entry of the file   shape       unit  meaning
+///   M1, M2              3x3         px    camera matrix, left and right
+///   D1, D2              4, 5 or 8   -     k1 k2 p1 p2 [k3 [k4 k5 k6]]
+///   R, T                3x3, 3x1    -, m  right_from_left
+///
+/// Errors       kInputMissing; kBadData with the file: an entry that lacks, or is of another shape.
+class Rectification {
+ public:
+  Rectification(const std::filesystem::path& file, const Node& key, cv::Size size) {
+    const std::string text = internal::ReadFile(file, [&](ExitCode code, int error) {
+      throw Error(code,
+                  ErrorLine(key.place(), key.path(), file.string() + ": " + std::strerror(error)));
+    });
+    cv::Mat m1, d1, m2, d2, r, t;
+    try {
+      const cv::FileStorage storage(text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
+      const auto read = [&](const char* name) {
+        cv::Mat matrix;
+        storage[name] >> matrix;
+        if (matrix.empty()) Fail(file, std::string("no matrix '") + name + "'");
+        matrix.convertTo(matrix, CV_64F);
+        if (!cv::checkRange(matrix)) Fail(file, std::string("'") + name + "' is not finite");
+        return matrix;
+      };
+      m1 = read("M1");
+      d1 = read("D1");
+      m2 = read("M2");
+      d2 = read("D2");
+      r = read("R");
+      t = read("T");
+      cv::Mat r1, r2, p1, p2, q;
+      cv::stereoRectify(m1, d1, m2, d2, size, r, t, r1, r2, p1, p2, q, cv::CALIB_ZERO_DISPARITY,
+                        0.0);
+      constexpr int kKind = CV_32FC1;
+      cv::initUndistortRectifyMap(m1, d1, r1, p1, size, kKind, map_[0][0], map_[0][1]);
+      cv::initUndistortRectifyMap(m2, d2, r2, p2, size, kKind, map_[1][0], map_[1][1]);
+      camera_ = {m1, d1, r1, p1};
+      intrinsics_ = p1.colRange(0, 3);
+      baseline_m_ = -p2.at<double>(0, 3) / p2.at<double>(0, 0);
+    } catch (const cv::Exception& error) {
+      Fail(file, "not a calibration that OpenCV reads: " + error.err);
+    }
+    if (!(baseline_m_ > 0.0)) {
+      Fail(file, "its pair does not stand side by side, the right camera to the right");
+    }
+    size_ = size;
+  }
+
+  /// `view` 0: left, 1: right.
+  cv::Mat Rectify(const cv::Mat& image, int view) const {
+    cv::Mat rectified;
+    cv::remap(image, rectified, map_[view][0], map_[view][1], cv::INTER_LINEAR);
+    return rectified;
+  }
+  /// A pixel of the left image, as it was taken, in the rectified one.
+  cv::Point2f Rectify(cv::Point2f pixel) const {
+    std::vector<cv::Point2f> to;
+    cv::undistortPoints(std::vector<cv::Point2f>{pixel}, to, camera_.matrix, camera_.distortion,
+                        camera_.rotation, camera_.projection);
+    return to[0];
+  }
+  /// Camera matrix of both rectified cameras.
+  const cv::Matx33d& intrinsics() const { return intrinsics_; }
+  /// As of Source::Calibration.
+  Config Calibration(const std::string& origin) const {
+    Config config = Config::FromText("calibration: {}", origin);
+    const auto set = [&](const std::string& key, double value) {
+      config.Set("calibration." + key, cv::format("%.17g", value), origin);
+    };
+    set("focal_px", intrinsics_(0, 0));
+    set("baseline_m", baseline_m_);
+    set("camera.fx", intrinsics_(0, 0));
+    set("camera.fy", intrinsics_(1, 1));
+    set("camera.cx", intrinsics_(0, 2));
+    set("camera.cy", intrinsics_(1, 2));
+    set("camera.baseline_m", baseline_m_);
+    config.Set("calibration.camera.width", std::to_string(size_.width), origin);
+    config.Set("calibration.camera.height", std::to_string(size_.height), origin);
+    config.Set("calibration.camera.model", "pinhole", origin);
+    return config;
+  }
+
+ private:
+  [[noreturn]] static void Fail(const std::filesystem::path& file, const std::string& what) {
+    throw Error(ExitCode::kBadData, ErrorLine({file.string()}, {}, what,
+                                              "M1, D1, M2, D2, R and T of cv::stereoCalibrate, T "
+                                              "in m"));
+  }
+
+  struct Left {
+    cv::Mat matrix, distortion, rotation, projection;
+  };
+  cv::Mat map_[2][2];
+  Left camera_;
+  cv::Matx33d intrinsics_;
+  double baseline_m_ = 0.0;
+  cv::Size size_;
+};
+
+}  // namespace alidade

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "alidade/base/number_rows.h"
+
+/// The tables next to the images of a target, read along with them.
+namespace alidade {
+
+/// Where the target is: `frame,x,y,width,height` or `frame,x0,y0,...,x3,y3`, clockwise from the upper
+/// left, px; frames count from 0 and increase. A row of `nan` says that it is not seen. A header may
+/// stand first.
+class BoxRows {
+ public:
+  using Corners = std::array<cv::Point2f, 4>;
+
+  BoxRows(const std::filesystem::path& path, const Place& place, const std::string& key)
+      : rows_(path, place, key) {
+    Advance();
+  }
+
+  /// Of `frame`; none where it has no row. Frames are asked for in order.
+  std::optional<Corners> At(std::int64_t frame) {
+    while (has_next_ && next_frame_ < frame) Advance();
+    return has_next_ && next_frame_ == frame ? next_ : std::nullopt;
+  }
+  static Corners Of(double x, double y, double width, double height) {
+    const auto left = static_cast<float>(x), top = static_cast<float>(y);
+    const auto right = static_cast<float>(x + width - 1.0);
+    const auto bottom = static_cast<float>(y + height - 1.0);
+    return {cv::Point2f(left, top), {right, top}, {right, bottom}, {left, bottom}};
+  }
+
+ private:
+  static constexpr const char* kForms = "frame,x,y,width,height or frame and four corners";
+
+  void Advance() {
+    const int line_before = rows_.line();
+    const bool first = !has_next_;
+    has_next_ = rows_.Next() && (line_before > 0 || rows_.text(0) != "frame" || rows_.Next());
+    if (!has_next_) return;
+    if (rows_.size() != 5) rows_.ExpectColumns(9, kForms);
+    const std::int64_t frame = rows_.Index(0, "frame");
+    if (!first && frame <= next_frame_) {
+      rows_.FailCell(0, "frame", "is not after that of line " + std::to_string(line_before),
+                     "frames in order, each once");
+    }
+    next_frame_ = frame;
+    next_.reset();
+    if (rows_.text(1) == "nan") return;
+    std::vector<double> numbers;
+    for (std::size_t i = 1; i < rows_.size(); ++i) {
+      numbers.push_back(rows_.Number(i, kNames[rows_.size() == 5 ? i - 1 : i + 3]));
+    }
+    if (numbers.size() == 4) {
+      for (const std::size_t side : {2, 3}) {
+        if (!(numbers[side] >= 4.0)) {
+          rows_.FailCell(side + 1, kNames[side], "is less than 4 px", "a box of the target");
+        }
+      }
+      next_ = Of(numbers[0], numbers[1], numbers[2], numbers[3]);
+      return;
+    }
+    Corners corners;
+    for (std::size_t i = 0; i < 4; ++i) {
+      corners[i] = {static_cast<float>(numbers[2 * i]), static_cast<float>(numbers[2 * i + 1])};
+    }
+    next_ = corners;
+  }
+
+  static constexpr const char* kNames[] = {"x",  "y",  "width", "height", "x0", "y0",
+                                           "x1", "y1", "x2",    "y2",     "x3", "y3"};
+
+  NumberRows rows_;
+  bool has_next_ = false;
+  std::int64_t next_frame_ = -1;
+  std::optional<Corners> next_;
+};
+
+/// True values under a header `t_s,NAME,...`, each a number; times increase. An empty cell is unknown.
+class TruthRows {
+ public:
+  TruthRows(const std::filesystem::path& path, const Place& place, const std::string& key)
+      : rows_(path, place, key) {
+    if (!rows_.Next() || rows_.text(0) != "t_s" || rows_.size() < 2) {
+      rows_.FailLine("no header", "t_s,NAME,... with the names of the true values");
+    }
+    for (std::size_t i = 1; i < rows_.size(); ++i) names_.emplace_back(rows_.text(i));
+    Advance();
+  }
+
+  const std::vector<std::string>& names() const { return names_; }
+  /// The values at the row nearest to `timestamp`, where it is within `tolerance`; of two as near the
+  /// earlier. An empty one is unknown. Timestamps are asked for in order.
+  std::vector<std::vector<double>> At(Timestamp timestamp, Timestamp tolerance) {
+    const auto off = [timestamp](Timestamp other) { return std::abs(Seconds(timestamp - other)); };
+    while (has_next_ && (!has_nearest_ || off(timestamp_) < off(nearest_timestamp_))) {
+      nearest_ = values_;
+      nearest_timestamp_ = timestamp_;
+      has_nearest_ = true;
+      Advance();
+    }
+    if (has_nearest_ && off(nearest_timestamp_) <= Seconds(tolerance)) return nearest_;
+    return std::vector<std::vector<double>>(names_.size());
+  }
+
+ private:
+  void Advance() {
+    const int line_before = rows_.line();
+    const Timestamp before = timestamp_;
+    const bool first = !has_next_;
+    has_next_ = rows_.Next();
+    if (!has_next_) return;
+    rows_.ExpectColumns(names_.size() + 1, "as in the header");
+    timestamp_ = rows_.Time(0, "t_s");
+    if (!first && timestamp_ <= before) {
+      rows_.FailCell(0, "t_s", "is not after that of line " + std::to_string(line_before),
+                     "times that increase");
+    }
+    values_.clear();
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      values_.emplace_back();
+      if (!rows_.text(i + 1).empty()) values_.back() = {rows_.Number(i + 1, names_[i].c_str())};
+    }
+  }
+
+  NumberRows rows_;
+  std::vector<std::string> names_;
+  bool has_next_ = false, has_nearest_ = false;
+  Timestamp timestamp_ = 0, nearest_timestamp_ = 0;
+  std::vector<std::vector<double>> values_, nearest_;
+};
+
+}  // namespace alidade

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/common/source_on_demand.h"
+
+namespace alidade {
+namespace {
+
+constexpr const char* kStereoTargetKeys =
+    "left          images of the left camera, or the only one: a folder, files as in "
+    "'pairs/left*.jpg', or a video\n"
+    "right         those of the right camera; default: there is none, and no disparity\n"
+    "stereo        an OpenCV calibration file of the pair with M1, D1, M2, D2, R and T, m; "
+    "default: "
+    "the images are rectified\n"
+    "boxes         a table of where the target is: frame,x,y,width,height, or frame and four "
+    "corners x0,y0,...,x3,y3, px\n"
+    "timestamps    a table frame,t_s; default: rate_hz, or as a video says\n"
+    "truth         a table t_s,NAME,...: the true values";
+
+std::unique_ptr<Source> Create(const SourceArguments& arguments) {
+  return CreateOnDemand("image_target", arguments);
+}
+
+}  // namespace
+}  // namespace alidade
+
+ALIDADE_SOURCE_PLUGIN({"stereo_target",
+                       "disparity and apparent size of a target in images of a stereo pair",
+                       alidade::kStereoTargetKeys, &alidade::Create})

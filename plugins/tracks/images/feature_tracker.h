@@ -2,7 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdint>
+#include <functional>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
@@ -54,7 +57,8 @@ struct TrackerOptions {
 /// [Shi1994] where a cell of the grid has fewer than its share. A feature is lost where its
 /// patch leaves the image, where it is not followed back to where it was [Kalal2010], where it no
 /// longer looks as it did when it was found, and where it comes as close to an older one as half of
-/// the least distance. It keeps its id as long as it lives, and no other has it.
+/// the least distance. Where more than three quarters are lost at once, all are. It keeps its id as
+/// long as it lives, and no other has it.
 class FeatureTracker {
  public:
   struct Feature {
@@ -68,7 +72,8 @@ class FeatureTracker {
   /// The features in the next image, by id. All images are of one size, 8 bit grey.
   const std::vector<Feature>& Track(const cv::Mat& image) {
     const cv::Size window(options_.window_px, options_.window_px);
-    cv::buildOpticalFlowPyramid(image, pyramid_, window, options_.levels);
+    // Derivatives that wait in memory are slower than those that are computed where they are used.
+    cv::buildOpticalFlowPyramid(image, pyramid_, window, options_.levels, false);
     if (!features_.empty()) Follow(image, window);
     if (std::ssize(features_) < options_.features) Refill(image);
     std::swap(pyramid_, before_);
@@ -107,6 +112,8 @@ class FeatureTracker {
       std::swap(feature, features_[i]);
       feature.at = at;
     }
+    // Of an image that has nothing to do with the one before, some are found at what looks alike.
+    if (4 * kept < features_.size()) kept = 0;
     features_.resize(kept);
   }
 
@@ -161,11 +168,33 @@ class FeatureTracker {
     }
   }
 
-  /// Correlation of the patch at `at` with one that was found before, in [-1, 1].
+  /// Correlation of the patch at `at` with one that was found before, in [-1, 1]; 0 where one
+  /// of them is of one grey.
   double Similarity(const cv::Mat& image, cv::Point2f at, const cv::Mat& found) {
     cv::getRectSubPix(image, found.size(), at, patch_);
-    cv::matchTemplate(patch_, found, correlation_, cv::TM_CCOEFF_NORMED);
-    return static_cast<double>(correlation_.at<float>(0, 0));
+    std::int64_t a = 0, b = 0, aa = 0, bb = 0, ab = 0;
+    for (int y = 0; y < found.rows; ++y) {
+      const unsigned char* const now = patch_.ptr(y);
+      const unsigned char* const then = found.ptr(y);
+      int row_a = 0, row_b = 0, row_aa = 0, row_bb = 0, row_ab = 0;  // at most 101 * 255^2
+      for (int x = 0; x < found.cols; ++x) {
+        const int p = now[x], q = then[x];
+        row_a += p;
+        row_b += q;
+        row_aa += p * p;
+        row_bb += q * q;
+        row_ab += p * q;
+      }
+      a += row_a;
+      b += row_b;
+      aa += row_aa;
+      bb += row_bb;
+      ab += row_ab;
+    }
+    const auto n = static_cast<std::int64_t>(found.total());
+    const auto variances =
+        static_cast<double>(n * aa - a * a) * static_cast<double>(n * bb - b * b);
+    return variances > 0.0 ? static_cast<double>(n * ab - a * b) / std::sqrt(variances) : 0.0;
   }
 
   inline static const cv::TermCriteria kStop{cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30,
@@ -181,7 +210,7 @@ class FeatureTracker {
   std::vector<unsigned char> found_, found_back_;
   std::vector<float> error_;
   std::vector<std::pair<float, cv::Point>> corners_;
-  cv::Mat taken_, response_, largest_, patch_, correlation_;
+  cv::Mat taken_, response_, largest_, patch_;
 };
 
 }  // namespace alidade

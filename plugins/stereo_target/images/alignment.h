@@ -123,6 +123,32 @@ class PatchAlignment {
     return {warp, Similarity(), variance * solver_.solve(all).topLeftCorner(count_, count_)};
   }
 
+  /// At `warp` as it is.
+  void Look(const cv::Matx33d& warp) {
+    Sample(warp);
+    cv::Sobel(seen_, right_, CV_32F, 1, 0, 3, 0.125);
+    cv::Sobel(seen_, down_, CV_32F, 0, 1, 3, 0.125);
+  }
+
+  /// Correlation of the patch and what is seen at it, in [-1, 1].
+  double Similarity() const {
+    double n = 0.0, a = 0.0, b = 0.0, aa = 0.0, bb = 0.0, ab = 0.0;
+    for (int y = 1; y < patch_.rows - 1; ++y) {
+      for (int x = 1; x < patch_.cols - 1; ++x) {
+        if (!Usable(y, x)) continue;
+        const double p = double(patch_.at<float>(y, x)), s = double(seen_.at<float>(y, x));
+        n += 1.0;
+        a += p;
+        b += s;
+        aa += p * p;
+        bb += s * s;
+        ab += p * s;
+      }
+    }
+    const double variances = (aa - a * a / n) * (bb - b * b / n);
+    return variances > 0.0 ? (ab - a * b / n) / std::sqrt(variances) : 0.0;
+  }
+
  private:
   static constexpr float kOutside = -1e6F;  ///< grey beyond the image
 
@@ -164,9 +190,7 @@ class PatchAlignment {
 
   /// Solves for d, a and b at `warp`.
   bool Linearise(const cv::Matx33d& warp) {
-    Sample(warp);
-    cv::Sobel(seen_, right_, CV_32F, 1, 0, 3, 0.125);
-    cv::Sobel(seen_, down_, CV_32F, 0, 1, 3, 0.125);
+    Look(warp);
     const cv::Point2d middle = Middle(patch_);
     const double half = HalfSide(patch_);
     const bool weighted = solution_.size() > 0;
@@ -220,24 +244,6 @@ class PatchAlignment {
     const auto middle = errors_.begin() + std::ssize(errors_) / 2;
     std::ranges::nth_element(errors_, middle);
     spread_ = std::max(1.4826 * *middle, 0.5);
-  }
-
-  double Similarity() const {
-    double n = 0.0, a = 0.0, b = 0.0, aa = 0.0, bb = 0.0, ab = 0.0;
-    for (int y = 1; y < patch_.rows - 1; ++y) {
-      for (int x = 1; x < patch_.cols - 1; ++x) {
-        if (!Usable(y, x)) continue;
-        const double p = double(patch_.at<float>(y, x)), s = double(seen_.at<float>(y, x));
-        n += 1.0;
-        a += p;
-        b += s;
-        aa += p * p;
-        bb += s * s;
-        ab += p * s;
-      }
-    }
-    const double variances = (aa - a * a / n) * (bb - b * b / n);
-    return variances > 0.0 ? (ab - a * b / n) / std::sqrt(variances) : 0.0;
   }
 
   const cv::Mat& patch_;

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "alidade/model/params.h"
+#include "found_patch.h"
 
 namespace alidade {
 
@@ -59,12 +60,15 @@ struct TrackerOptions {
 /// longer looks as it did when it was found, and where it comes as close to an older one as half of
 /// the least distance. Where more than three quarters are lost at once, all are. It keeps its id as
 /// long as it lives, and no other has it.
+///
+/// The search for corners takes longer than following does: where features are missing, a third of
+/// the rows of cells is searched in each image, and every row where most were lost at once.
 class FeatureTracker {
  public:
   struct Feature {
     std::int64_t id;
-    cv::Point2f at;  ///< px; the centre of the upper left pixel is (0, 0)
-    cv::Mat found;   ///< its patch where it was found
+    cv::Point2f at;    ///< px; the centre of the upper left pixel is (0, 0)
+    FoundPatch found;  ///< what is about it
   };
 
   explicit FeatureTracker(const TrackerOptions& options) : options_(options) {}
@@ -74,8 +78,11 @@ class FeatureTracker {
     const cv::Size window(options_.window_px, options_.window_px);
     // Derivatives that wait in memory are slower than those that are computed where they are used.
     cv::buildOpticalFlowPyramid(image, pyramid_, window, options_.levels, false);
-    if (!features_.empty()) Follow(image, window);
-    if (std::ssize(features_) < options_.features) Refill(image);
+    const std::size_t before = features_.size();
+    if (before > 0) Follow(image, window);
+    if (std::ssize(features_) < options_.features) {
+      Refill(image, /*everywhere=*/2 * features_.size() <= before);
+    }
     std::swap(pyramid_, before_);
     return features_;
   }
@@ -99,39 +106,39 @@ class FeatureTracker {
     taken_.setTo(0);
     std::size_t kept = 0;
     for (std::size_t i = 0; i < features_.size(); ++i) {
-      const cv::Point2f at = to_[i];
-      if (found_[i] == 0 || found_back_[i] == 0 || !inside.contains(at) ||
-          cv::norm(back_[i] - from_[i]) > options_.forward_backward_px ||
-          taken_.at<unsigned char>(cv::Point(at)) != 0 ||
-          Similarity(image, at, features_[i].found) < options_.least_similarity) {
+      if (found_[i] == 0 || found_back_[i] == 0 || !inside.contains(to_[i]) ||
+          cv::norm(back_[i] - from_[i]) > options_.forward_backward_px) {
+        continue;
+      }
+      Feature& feature = features_[i];
+      cv::Point2f at = to_[i];
+      if (!feature.found.Align(image, at)) continue;
+      if (!inside.contains(at) || taken_.at<unsigned char>(cv::Point(at)) != 0 ||
+          feature.found.Similarity(image, at) < options_.least_similarity) {
         continue;
       }
       cv::circle(taken_, cv::Point(at), static_cast<int>(options_.distance_px / 2.0), 1,
                  cv::FILLED);
-      Feature& feature = features_[kept++];
-      std::swap(feature, features_[i]);
       feature.at = at;
+      std::swap(features_[kept++], feature);
     }
     // Of an image that has nothing to do with the one before, some are found at what looks alike.
     if (4 * kept < features_.size()) kept = 0;
     features_.resize(kept);
   }
 
-  /// The strongest corners of each cell that has fewer features than its share.
-  void Refill(const cv::Mat& image) {
-    cv::cornerMinEigenVal(image, response_, options_.corner_px);
-    cv::dilate(response_, largest_, cv::Mat());
-    double strongest = 0.0;
-    cv::minMaxLoc(response_, nullptr, &strongest);
-    const auto least = static_cast<float>(options_.quality * strongest);
-    const int margin = options_.window_px / 2 + 1;
+  /// The strongest corners of each cell that has fewer features than its share, of the rows of
+  /// cells whose turn it is.
+  void Refill(const cv::Mat& image, bool everywhere) {
+    const int rows = options_.cells[1];
+    strongest_.resize(static_cast<std::size_t>(rows), 0.0);
     corners_.clear();
-    for (int y = margin; y < image.rows - margin; ++y) {
-      const float* const own = response_.ptr<float>(y);
-      const float* const around = largest_.ptr<float>(y);
-      for (int x = margin; x < image.cols - margin; ++x) {
-        if (own[x] > least && own[x] == around[x]) corners_.emplace_back(own[x], cv::Point(x, y));
-      }
+    if (everywhere) {
+      FindCorners(image, 0, rows);
+    } else {
+      const int last = std::min(rows, turn_ + (rows + 2) / 3);
+      FindCorners(image, turn_, last);
+      turn_ = last % rows;
     }
     std::ranges::stable_sort(corners_, std::greater(), &std::pair<float, cv::Point>::first);
     taken_.create(image.size(), CV_8UC1);
@@ -159,42 +166,70 @@ class FeatureTracker {
     from_.clear();
     for (std::size_t i = old; i < features_.size(); ++i) from_.push_back(features_[i].at);
     if (from_.empty()) return;
-    const int reach = options_.corner_px;
-    cv::cornerSubPix(image, from_, cv::Size(reach, reach), cv::Size(-1, -1), kStop);
-    const cv::Size window(options_.window_px, options_.window_px);
+    for (cv::Point2f& at : from_) at = FindPoint(image, at);
     for (std::size_t i = old; i < features_.size(); ++i) {
       features_[i].at = from_[i - old];
-      cv::getRectSubPix(image, window, features_[i].at, features_[i].found);
+      features_[i].found = FoundPatch(image, features_[i].at, options_.window_px | 1);
     }
   }
 
-  /// Correlation of the patch at `at` with one that was found before, in [-1, 1]; 0 where one
-  /// of them is of one grey.
-  double Similarity(const cv::Mat& image, cv::Point2f at, const cv::Mat& found) {
-    cv::getRectSubPix(image, found.size(), at, patch_);
-    std::int64_t a = 0, b = 0, aa = 0, bb = 0, ab = 0;
-    for (int y = 0; y < found.rows; ++y) {
-      const unsigned char* const now = patch_.ptr(y);
-      const unsigned char* const then = found.ptr(y);
-      int row_a = 0, row_b = 0, row_aa = 0, row_bb = 0, row_ab = 0;  // at most 101 * 255^2
-      for (int x = 0; x < found.cols; ++x) {
-        const int p = now[x], q = then[x];
-        row_a += p;
-        row_b += q;
-        row_aa += p * p;
-        row_bb += q * q;
-        row_ab += p * q;
+  /// The point of a patch that stays with it when it grows, turns or is sheared, and not only when it
+  /// is shifted [Forstner1987]: p = (sum g g')^-1 sum g g' x, g the gradient at x. A patch about any
+  /// other point would be followed to a point that drifts from it.
+  cv::Point2f FindPoint(const cv::Mat& image, cv::Point2f at) {
+    constexpr int kMost = 5;
+    constexpr float kFarthest = 6.0F, kSettled = 0.02F;  // px
+    const cv::Point2f start = at;
+    const int side = options_.window_px;
+    for (int i = 0; i < kMost; ++i) {
+      cv::getRectSubPix(image, cv::Size(side + 2, side + 2), at, patch_, CV_32F);
+      cv::Matx22d normal = cv::Matx22d::zeros();
+      cv::Vec2d right(0.0, 0.0);
+      for (int y = 1; y <= side; ++y) {
+        for (int x = 1; x <= side; ++x) {
+          const double gx = patch_.at<float>(y, x + 1) - patch_.at<float>(y, x - 1);
+          const double gy = patch_.at<float>(y + 1, x) - patch_.at<float>(y - 1, x);
+          const double along = gx * (x - 1 - side / 2) + gy * (y - 1 - side / 2);
+          normal += cv::Matx22d(gx * gx, gx * gy, gx * gy, gy * gy);
+          right += along * cv::Vec2d(gx, gy);
+        }
       }
-      a += row_a;
-      b += row_b;
-      aa += row_aa;
-      bb += row_bb;
-      ab += row_ab;
+      if (!(cv::determinant(normal) > 0.0)) return start;
+      const cv::Vec2d shift = normal.inv() * right;
+      at += cv::Point2f(static_cast<float>(shift[0]), static_cast<float>(shift[1]));
+      if (!(cv::norm(at - start) < kFarthest)) return start;
+      if (cv::norm(shift) < kSettled) break;
     }
-    const auto n = static_cast<std::int64_t>(found.total());
-    const auto variances =
-        static_cast<double>(n * aa - a * a) * static_cast<double>(n * bb - b * b);
-    return variances > 0.0 ? static_cast<double>(n * ab - a * b) / std::sqrt(variances) : 0.0;
+    return at;
+  }
+
+  /// The local maxima of the response in the rows of cells [first, last).
+  void FindCorners(const cv::Mat& image, int first, int last) {
+    const int rows = options_.cells[1];
+    const auto top_of = [&](int row) { return (row * image.rows + rows - 1) / rows; };
+    const int reach = options_.corner_px / 2 + 2;  // of the response, its derivatives and maxima
+    const int top = std::max(0, top_of(first) - reach);
+    const int bottom = std::min(image.rows, top_of(last) + reach);
+    cv::cornerMinEigenVal(image.rowRange(top, bottom), response_, options_.corner_px);
+    cv::dilate(response_, largest_, cv::Mat());
+    const int margin = options_.window_px / 2 + 1;
+    for (int row = first; row < last; ++row) {
+      double& strongest = strongest_[static_cast<std::size_t>(row)];
+      strongest = 0.0;
+      if (top_of(row) == top_of(row + 1)) continue;
+      cv::minMaxLoc(response_.rowRange(top_of(row) - top, top_of(row + 1) - top), nullptr,
+                    &strongest);
+    }
+    // Of the whole image: in the other rows as they were when they were searched.
+    const auto least = static_cast<float>(options_.quality * *std::ranges::max_element(strongest_));
+    const int y_end = std::min(top_of(last), image.rows - margin);
+    for (int y = std::max(top_of(first), margin); y < y_end; ++y) {
+      const float* const own = response_.ptr<float>(y - top);
+      const float* const around = largest_.ptr<float>(y - top);
+      for (int x = margin; x < image.cols - margin; ++x) {
+        if (own[x] > least && own[x] == around[x]) corners_.emplace_back(own[x], cv::Point(x, y));
+      }
+    }
   }
 
   inline static const cv::TermCriteria kStop{cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30,
@@ -204,6 +239,8 @@ class FeatureTracker {
   std::vector<Feature> features_;
   std::int64_t next_id_ = 0;
   std::vector<cv::Mat> before_, pyramid_;  ///< of the image before; of this one
+  std::vector<double> strongest_;          ///< response in each row of cells, when it was searched
+  int turn_ = 0;                           ///< the row of cells that is searched next
 
   // Memory.
   std::vector<cv::Point2f> from_, to_, back_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cfloat>
 #include <cmath>
 #include <limits>
@@ -33,10 +34,12 @@ namespace alidade {
 ///   w        template_px         px    cam    300    width of the template
 ///   Z0       template_depth_m    m     cam    0.3    depth at which the template was taken
 ///   sigma_e  sigma_edge_px      px    cam    1      noise of one edge of the target, 1 sigma
+///            missing             1     -      0      probability that there is no disparity
+///            outliers.share      1     -      0      probability that d is U(0, its largest)
 ///
 ///   stream                  size  unit  when
-///   disparity               1     px    while stereo sees
-///   disparity_all           1     px    always: for a sensor that judges validity itself
+///   disparity               1     px    while stereo sees, but for those that are missing
+///   disparity_all           1     px    while none is missing: for a sensor that judges validity
 ///   inverse_scale           1     -     always
 ///   inverse_scale_seeing    1     -     the same value, while stereo sees
 ///   inverse_scale_blind     1     -     the same value, while stereo is blind
@@ -45,7 +48,7 @@ namespace alidade {
 ///
 /// Drawn, the target is a textured square of w Z0 / F metres that faces the pair, on the axis of the
 /// left camera, before a textured wall. Images are image.width times image.height, their principal
-/// points in the middle; their noise comes from stream 2.
+/// points in the middle. Their noise comes from stream 2, what is missing or wrong from stream 3.
 ///
 /// What the notebook does differently, or says twice: it thresholds the NOISY disparity, so that
 /// the disparities that pass are biased: -0.85 px where F B / Z is within 1 px of the limit, -0.33
@@ -61,7 +64,7 @@ class DepthTarget : public Source {
   explicit DepthTarget(const SourceArguments& arguments)
       : DepthTarget(arguments.params, arguments.seed) {}
   DepthTarget(Params& p, std::uint64_t seed)
-      : disparity_noise_(seed, 0), scale_noise_(seed, 1), image_noise_(seed, 2) {
+      : disparity_noise_(seed, 0), scale_noise_(seed, 1), image_noise_(seed, 2), texture_(seed, 3) {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     depth_mean_m_ = p.Positive("depth_mean_m", "m", "mean depth of the target", 0.3);
     amplitude_m_ = p.NonNegative("amplitude_m", "m", "amplitude; below depth_mean_m", 0.1);
@@ -74,6 +77,12 @@ class DepthTarget : public Source {
     bf_px_m_ = focal_px_ * baseline_m_;
     sigma_disparity_px_ =
         p.NonNegative("sigma_disparity_px", "px", "disparity noise, 1 sigma", 1.0);
+    missing_ = p.Number("missing", "1", "probability that there is no disparity: poor texture",
+                        {0.0, 1.0}, 0.0);
+    outlier_share_ =
+        p.Number("outliers.share", "1",
+                 "probability that a disparity is anything from 0 to the largest: poor texture",
+                 {0.0, 1.0}, 0.0);
     const double min_range_m =
         p.NonNegative("min_range_m", "m", "stereo is blind to what is nearer; 0: to nothing", 0.3);
     blind_by_true_depth_ =
@@ -131,12 +140,18 @@ class DepthTarget : public Source {
     const double exact_px = bf_px_m_ / depth_m;
     const double disparity_px = exact_px + sigma_disparity_px_ * disparity_noise_.Normal();
     const bool sees = !((blind_by_true_depth_ ? exact_px : disparity_px) > disparity_limit_px_);
+    // Of texture that is poor: no match, or a wrong one anywhere in the search.
+    const double nearest_px = bf_px_m_ / (depth_mean_m_ - amplitude_m_);
+    const bool missing = texture_.Uniform() < missing_;
+    const bool wrong = texture_.Uniform() < outlier_share_;
+    const double anywhere_px = std::min(nearest_px, disparity_limit_px_) * texture_.Uniform();
+    const double matched_px = wrong ? anywhere_px : disparity_px;
     const double exact_scale = template_depth_m_ / depth_m;
     const double scale = exact_scale + relative_sigma_ / exact_scale * scale_noise_.Normal();
 
     frame.measurements.clear();
-    if (sees) Emit(kDisparity, disparity_px, frame);
-    Emit(kDisparityAll, disparity_px, frame);
+    if (sees && !missing) Emit(kDisparity, matched_px, frame);
+    if (!missing) Emit(kDisparityAll, matched_px, frame);
     Emit(kInverseScale, 1.0 / scale, frame);
     Emit(sees ? kInverseScaleSeeing : kInverseScaleBlind, 1.0 / scale, frame);
     return true;
@@ -166,7 +181,8 @@ class DepthTarget : public Source {
   double disparity_limit_px_, relative_sigma_, template_depth_m_;
   bool blind_by_true_depth_;
   std::int64_t count_, index_ = 0;
-  Random disparity_noise_, scale_noise_, image_noise_;
+  double missing_, outlier_share_;
+  Random disparity_noise_, scale_noise_, image_noise_, texture_;
 };
 
 inline std::unique_ptr<Source> CreateDepthTarget(const SourceArguments& arguments) {

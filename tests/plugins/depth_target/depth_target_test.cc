@@ -262,6 +262,43 @@ TEST(DepthTarget, RefusesADepthThatReachesTheCamera) {
   EXPECT_EQ(host.failed(), "");
 }
 
+TEST(DepthTarget, PoorTextureLosesDisparitiesOrMakesThemAnything) {
+  const Values still{{"amplitude_m", 0.0}, {"depth_mean_m", 0.5}, {"duration_s", 165.0}};
+  const auto with = [&](const char* key, double value) {
+    Values values = still;
+    values[key] = value;
+    return AllFrames(values);
+  };
+  // Stream 1, disparity_all: 52 px, noise 1 px; the largest there can be is 52 px.
+  const auto disparities = [](const std::vector<SourceFrame>& frames) {
+    std::vector<double> found;
+    for (const SourceFrame& frame : frames) {
+      for (const Measurement& one : frame.measurements) {
+        if (one.stream == 1) found.push_back(one.values[0]);
+      }
+    }
+    return found;
+  };
+  const std::vector<double> all = disparities(AllFrames(still));
+  ASSERT_EQ(all.size(), 5001u);
+  const double share = static_cast<double>(disparities(with("missing", 0.3)).size()) / 5001.0;
+  EXPECT_NEAR(share, 0.7, 4.0 * std::sqrt(0.21 / 5001.0));
+  const std::vector<double> wrong = disparities(with("outliers.share", 0.2));
+  ASSERT_EQ(wrong.size(), all.size());
+  int changed = 0;
+  double sum = 0.0, largest = 0.0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (wrong[i] == all[i]) continue;
+    ++changed;
+    sum += wrong[i];
+    largest = std::max(largest, wrong[i]);
+  }
+  EXPECT_NEAR(changed / 5001.0, 0.2, 4.0 * std::sqrt(0.16 / 5001.0));
+  EXPECT_NEAR(sum / changed, 26.0, 4.0 * 52.0 / std::sqrt(12.0 * changed));
+  EXPECT_LT(largest, 52.0);
+  EXPECT_GT(largest, 51.0);
+}
+
 TEST(DepthTarget, EveryParameterHasAUnitAndADefault) {
   Host host;
   host.Make();
@@ -275,7 +312,8 @@ TEST(DepthTarget, EveryParameterHasAUnitAndADefault) {
       {"sigma_edge_px", "px"},   {"template_px", "px"},
       {"template_depth_m", "m"}, {"image.width", ""},
       {"image.height", ""},      {"image.noise_grey", "1"},
-      {"image.wall_m", "m"}};
+      {"image.wall_m", "m"},     {"missing", "1"},
+      {"outliers.share", "1"}};
   EXPECT_EQ(host.units(), expected);
 }
 

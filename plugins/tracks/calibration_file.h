@@ -1,15 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <string>
+#include <string_view>
+#include <vector>
 
+#include "alidade/base/read_file.h"
 #include "alidade/config/config.h"
 
 namespace alidade {
 
-/// The `calibration.yaml` next to tracks, under the keys by which models ask. It has one of two
-/// forms:
+/// The `calibration.yaml` next to tracks or images, under the keys by which models ask. It has one of
+/// these forms:
 ///
 ///   written as                                        key
 ///   camera: {width, height, fx, fy, cx, cy, ...}      camera.*, as `alidade simulate` writes it
@@ -19,7 +26,17 @@ namespace alidade {
 ///   baseline_m                                        camera.baseline_m, of a rectified pair
 ///   vehicle_from_cam: {position_m, quaternion}        vehicle_from_cam.position, .orientation
 ///
-/// `sigma_px`, for `alidade bundle`, is left out.
+///   camera_matrix, distortion_coefficients: {data}, image_width, image_height, [distortion_model:
+///   plumb_bob, rational_polynomial or equidistant]           of OpenCV and ROS
+///
+///   cam0: {camera_model: pinhole, intrinsics, distortion_model: radtan or equidistant,
+///   distortion_coeffs, resolution}                           of Kalibr
+///
+///   camera_model: pinhole, intrinsics, distortion_model: radial-tangential or equidistant,
+///   distortion_coefficients, resolution                      of a sensor of EuRoC
+///
+/// Of the last three what is not of the camera itself is left out, and so is `sigma_px`, for
+/// `alidade bundle`.
 ///
 /// Errors       kBadData with file, line and column; kInputMissing.
 class CalibrationFile {
@@ -36,9 +53,22 @@ class CalibrationFile {
 
  private:
   explicit CalibrationFile(const std::filesystem::path& file)
-      : from_(Config::FromFile(file)), to_(Config::FromText("calibration: {}", file.string())) {
+      : from_(Config::FromText(PlainYaml(file), file.string())),
+        to_(Config::FromText("calibration: {}", file.string())) {
     const Node root = from_.root();
     root.Declare("sigma_px");
+    if (root.Find("camera_matrix")) {
+      ReadOpenCv(root);
+    } else if (const auto first = root.Find("cam0")) {
+      ReadKalibr(*first, "distortion_coeffs");
+    } else if (root.Find("intrinsics")) {
+      ReadKalibr(root, "distortion_coefficients");
+    } else {
+      ReadOwn(root);
+    }
+  }
+
+  void ReadOwn(const Node& root) {
     if (const auto camera = root.Find("camera")) {
       for (const auto& [key, value] : camera->Entries()) Copy(value, "camera." + key);
       if (!camera->Find("model")) Set("camera.model", "pinhole", camera->place());
@@ -46,6 +76,86 @@ class CalibrationFile {
       ReadIntrinsics(root);
     }
     root.RejectUnread();
+  }
+
+  /// OpenCV writes a directive and tags that are not of YAML; blanks in their place.
+  static std::string PlainYaml(const std::filesystem::path& file) {
+    std::string text = internal::ReadFile(file, [&](ExitCode code, int error) {
+      throw Error(code, ErrorLine({file.string()}, {}, std::strerror(error)));
+    });
+    for (const std::string_view odd : {"%YAML:1.0", "!!opencv-matrix"}) {
+      for (std::size_t at = 0; (at = text.find(odd, at)) != text.npos;) {
+        text.replace(at, odd.size(), odd.size(), ' ');
+      }
+    }
+    return text;
+  }
+
+  void ReadOpenCv(const Node& root) {
+    const Node matrix = root.At("camera_matrix").At("data");
+    const std::vector<double> k = matrix.Numbers(9);
+    if (k[1] != 0.0 || k[3] != 0.0 || k[6] != 0.0 || k[7] != 0.0 || k[8] != 1.0) {
+      matrix.Fail("not a camera matrix without skew", "[fx, 0, cx, 0, fy, cy, 0, 0, 1]");
+    }
+    SetIntrinsics({k[0], k[4], k[2], k[5]}, matrix.place());
+    Copy(root.At("image_width"), "camera.width");
+    Copy(root.At("image_height"), "camera.height");
+    const auto model = root.Find("distortion_model");
+    SetDistortion(root.At("distortion_coefficients").At("data"),
+                  model && model->Text() == "equidistant");
+  }
+
+  void ReadKalibr(const Node& camera, const char* distortion) {
+    const Node model = camera.At("camera_model");
+    if (model.Text() != "pinhole") model.Fail("'" + model.Text() + "'", "pinhole");
+    const Node intrinsics = camera.At("intrinsics"), size = camera.At("resolution");
+    const std::vector<double> k = intrinsics.Numbers(4);
+    SetIntrinsics({k[0], k[1], k[2], k[3]}, intrinsics.place());
+    const std::vector<Node> sides = size.Items();
+    if (sides.size() != 2) size.Fail("not two numbers", "[width, height], px");
+    Copy(sides[0], "camera.width");
+    Copy(sides[1], "camera.height");
+    const Node kind = camera.At("distortion_model");
+    if (kind.Text() == "none") return Set("camera.model", "pinhole", kind.place());
+    const bool equidistant = kind.Text() == "equidistant";
+    if (!equidistant && kind.Text() != "radtan" && kind.Text() != "radial-tangential") {
+      kind.Fail("'" + kind.Text() + "'", "radtan, radial-tangential, equidistant or none");
+    }
+    SetDistortion(camera.At(distortion), equidistant);
+  }
+
+  void SetIntrinsics(const std::array<double, 4>& fx_fy_cx_cy, const Place& place) {
+    constexpr const char* kKeys[] = {"camera.fx", "camera.fy", "camera.cx", "camera.cy"};
+    for (std::size_t i = 0; i < 4; ++i) SetNumber(kKeys[i], fx_fy_cx_cy[i], place);
+  }
+
+  /// k1 k2 p1 p2 [k3], or k1 to k4 of an equidistant camera; more of them must be 0.
+  void SetDistortion(const Node& node, bool equidistant) {
+    constexpr const char* kRadtan[] = {"camera.k1", "camera.k2", "camera.p1", "camera.p2",
+                                       "camera.k3"};
+    constexpr const char* kEquidistant[] = {"camera.k1", "camera.k2", "camera.k3", "camera.k4"};
+    std::vector<double> values = node.Numbers();
+    const std::size_t most = equidistant ? 4 : 5;
+    for (std::size_t i = most; i < values.size(); ++i) {
+      if (values[i] != 0.0) {
+        node.Fail("a coefficient beyond the first " + std::to_string(most) + " that is not 0",
+                  equidistant ? "k1, k2, k3, k4" : "k1, k2, p1, p2, k3");
+      }
+    }
+    values.resize(most, 0.0);
+    if (std::ranges::all_of(values, [](double value) { return value == 0.0; }) && !equidistant) {
+      return Set("camera.model", "pinhole", node.place());
+    }
+    Set("camera.model", equidistant ? "equidistant" : "radtan", node.place());
+    for (std::size_t i = 0; i < most; ++i) {
+      SetNumber(equidistant ? kEquidistant[i] : kRadtan[i], values[i], node.place());
+    }
+  }
+
+  void SetNumber(const std::string& key, double value, const Place& place) {
+    char text[40];
+    std::snprintf(text, sizeof text, "%.17g", value);
+    Set(key, text, place);
   }
 
   void ReadIntrinsics(const Node& root) {

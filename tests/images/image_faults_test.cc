@@ -220,7 +220,7 @@ TEST_F(ImageFaults, AnImageWithoutATimeEndsTheRun) {
   const Outcome outcome = Simulate({"--set", "source.rate_hz=0"});
   EXPECT_EQ(outcome.code, 65) << outcome.err;
   EXPECT_TRUE(Contains(outcome.err, "000010.png")) << outcome.err;
-  EXPECT_TRUE(Contains(outcome.err, "image 9 is not in ")) << outcome.err;
+  EXPECT_TRUE(Contains(outcome.err, "has no time for image 9")) << outcome.err;
 }
 
 // Half of the image farther, and back: nothing is followed that far, and nothing is mistaken.

@@ -244,6 +244,19 @@ TEST_F(ImageTracks, StandStillInAFrozenImage) {
   EXPECT_EQ(again, static_cast<int>(before.size()));
 }
 
+TEST_F(ImageTracks, AnImageThatIsGoneIsMissedByItsTime) {
+  MakeImages();
+  std::ostringstream times;
+  for (int k = 0; k < 20; ++k) times << k << ',' << 0.05 * k << '\n';
+  Write("scene/images/timestamps.csv", times.str());
+  const testing::Arguments by_table{"--set", "source.rate_hz=0"};
+  EXPECT_EQ(Track(by_table).code, 0);
+  std::filesystem::remove(ImageFile(7));
+  const Outcome gone = Track(by_table);
+  EXPECT_EQ(gone.code, 65);
+  EXPECT_TRUE(Contains(gone.err, "has a time for image 19, but there are 19 images")) << gone.err;
+}
+
 // Example 25, from pixels to the way of the camera: as good as from tracks with noise of 0.1 px and
 // no drift, within a half.
 TEST_F(ImageTracks, LeadTheFilterAsPerfectTracksDo) {
@@ -266,6 +279,88 @@ TEST_F(ImageTracks, LeadTheFilterAsPerfectTracksDo) {
   EXPECT_GT(perfect, 0.0005);
   EXPECT_LT(perfect, 0.004);  // m
   EXPECT_LT(seen, 1.5 * perfect);
+}
+
+TEST_F(ImageTracks, PointsOfKnownDepthGiveTheMapItsScale) {
+  constexpr const char* kCamera =
+      "camera: {model: pinhole, width: 320, height: 240, fx: 260, fy: 260, cx: 160, cy: 120}\n";
+  Write("scene.yaml", std::string("alidade: 1\n") + kCamera + R"(source:
+  type: scene
+  max_frames: 60
+  sigma_px: 0
+  points: {room: {min: [-2, -1.3, -1], max: [2, 1.3, 3.5]}, count: 200}
+  surfaces: [{box: {min: [-2, -1.3, -1], max: [2, 1.3, 3.5]}, grain_m: 0.6}]
+  trajectory: {look_at: [{position: [0, 0, 0], target: [0, 0, 3]},
+                         {position: [0.2, -0.1, 0.1], target: [0, 0, 3]},
+                         {position: [0.5, 0.1, 0.2], target: [0, 0, 3]}]}
+)");
+  MakeImages();
+  // The camera is at the origin first: the depth of a point is its z.
+  std::map<int, double> depth_m;
+  std::istringstream map(Read("scene/map.csv"));
+  std::string row;
+  std::getline(map, row);
+  while (std::getline(map, row)) {
+    int id = 0;
+    double x = 0.0, y = 0.0, z = 0.0;
+    ASSERT_EQ(std::sscanf(row.c_str(), "%d,%lf,%lf,%lf", &id, &x, &y, &z), 4);
+    depth_m[id] = z;
+  }
+  std::ostringstream known;
+  int count = 0;
+  known << "u,v,depth_m\n";
+  for (const Seen& one : Rows("scene/tracks.csv").at(0)) {
+    if (one.u < 30 || one.v < 30 || one.u > 290 || one.v > 210 || count == 6) continue;
+    known << one.u << ',' << one.v << ',' << depth_m.at(one.feature) << '\n';
+    ++count;
+  }
+  ASSERT_EQ(count, 6);
+  Write("known.csv", known.str());
+  Write("config.yaml", std::string("alidade: 1\n") + kCamera + R"(state:
+  cam:
+    model: quaternion_pose
+    noise: {kind: continuous, linear_acceleration: 0.3, angular_acceleration: 0.1}
+    initial:
+      position: {mean: [0, 0, 0], sigma: 0}
+      orientation: {mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0}
+      velocity: {mean: [0, 0, 0], sigma: 0.3}
+      angular_velocity: {mean: [0, 0, 0], sigma: 0.3}
+landmarks: {representation: inverse_depth, prior: {inverse_distance: 0.4, sigma: 0.12}}
+sensors:
+  pixels: {model: inverse_depth_feature, stream: tracks, sigma_px: 0.15,
+           roles: {position: cam.position, orientation: cam.orientation, landmark: landmarks}}
+  known: {model: depth_feature, stream: known, sigma_px: 0.15, sigma_depth_m: 0.01,
+          roles: {position: cam.position, orientation: cam.orientation, landmark: landmarks}}
+source: {type: image_tracks, path: scene/images, rate_hz: 30, features: 60, known: known.csv}
+estimators: {ekf: {type: ekf, gate: 0.999}}
+)");
+  const auto scale = [&](const testing::Arguments& more) {
+    testing::Arguments arguments{"run", "config.yaml", "-o", "run", "--force", "--no-figures"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome run = Call(arguments);
+    EXPECT_EQ(run.code, 0) << run.err;
+    const Outcome eval = Call({"eval", "scene/truth.tum", "run", "--align-mode", "sim3", "--json"});
+    EXPECT_EQ(eval.code, 0) << eval.err;
+    const std::size_t at = eval.out.find("\"scale\":");
+    return at == std::string::npos ? NAN : std::stod(eval.out.substr(at + 8));
+  };
+  EXPECT_NEAR(scale({}), 1.0, 0.03);
+  // Depths that are half as large make the map half as large.
+  std::ostringstream half;
+  for (std::istringstream rows(known.str()); std::getline(rows, row);) {
+    double u = 0.0, v = 0.0, depth = 0.0;
+    if (std::sscanf(row.c_str(), "%lf,%lf,%lf", &u, &v, &depth) == 3) {
+      half << u << ',' << v << ',' << 0.5 * depth << '\n';
+    }
+  }
+  Write("known.csv", half.str());
+  EXPECT_NEAR(scale({"--set", "landmarks.prior.inverse_distance=0.8", "--set",
+                     "landmarks.prior.sigma=0.24"}),
+              2.0, 0.06);
+  Write("known.csv", "u,v,depth_m\n3,30,2\n");
+  const Outcome rim = Call({"run", "config.yaml", "-o", "run", "--force"});
+  EXPECT_EQ(rim.code, 65);
+  EXPECT_TRUE(Contains(rim.err, "known.csv:2: the point is not on the image")) << rim.err;
 }
 
 }  // namespace

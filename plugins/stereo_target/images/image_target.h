@@ -13,6 +13,7 @@
 #include "disparity.h"
 #include "plugins/common/companion_files.h"
 #include "plugins/common/images/image_reader.h"
+#include "plugins/common/images/image_times.h"
 #include "rectification.h"
 #include "target_tables.h"
 #include "target_tracker.h"
@@ -107,7 +108,7 @@ class ImageTarget : public Source {
   bool Next(SourceFrame& frame) override {
     if (frames_ == most_ && most_ > 0) return false;
     if (!std::exchange(has_read_, false) && !ReadPair()) return false;
-    frame.timestamp = TimeOf(left_->number());
+    frame.timestamp = times_->At(left_->number());
     frame.measurements.clear();
     frame.truth.clear();
     if (truth_) frame.truth = truth_->At(frame.timestamp, tolerance_);
@@ -152,14 +153,21 @@ class ImageTarget : public Source {
       }
     };
     table("boxes", boxes_);
-    table("timestamps", times_);
     table("truth", truth_);
-    if (rate_hz_ == 0.0 && !times_) rate_hz_ = left_->rate_hz();
-    if (!times_ && !(rate_hz_ > 0.0)) entry.Fail("no 'timestamps'", "that table, or 'rate_hz'");
+    if (const auto path = Find(entry, "timestamps")) {
+      times_.emplace(*path, entry.At("timestamps"));
+    } else {
+      if (rate_hz_ == 0.0) rate_hz_ = left_->rate_hz();
+      if (!(rate_hz_ > 0.0)) entry.Fail("no 'timestamps'", "that table, or 'rate_hz'");
+      times_.emplace(rate_hz_);
+    }
   }
 
   bool ReadPair() {
-    if (!left_->Next(image_[0])) return false;
+    if (!left_->Next(image_[0])) {
+      times_->End(left_->number() + 1);
+      return false;
+    }
     if (!right_) return true;
     if (!right_->Next(image_[1])) {
       throw Error(ExitCode::kBadData,
@@ -171,18 +179,6 @@ class ImageTarget : public Source {
           ErrorLine(right_->place(), {}, "not as large as the left image", "images of one size"));
     }
     return true;
-  }
-
-  Timestamp TimeOf(std::int64_t image) {
-    if (!times_) return TimestampFromSeconds(static_cast<double>(image) / rate_hz_);
-    std::int64_t frame = -1;
-    Timestamp timestamp = 0;
-    while (frame < image && times_->Next(frame, timestamp)) continue;
-    if (frame == image) return timestamp;
-    throw Error(
-        ExitCode::kBadData,
-        ErrorLine(place(), {}, "image " + std::to_string(image) + " is not in " + times_->name(),
-                  "a time for every image"));
   }
 
   void Measure(SourceFrame& frame) {
@@ -234,7 +230,7 @@ class ImageTarget : public Source {
   std::vector<StreamInfo> streams_, truths_;
   std::optional<ImageReader> left_, right_;
   std::optional<BoxRows> boxes_;
-  std::optional<TimestampRows> times_;
+  std::optional<ImageTimes> times_;
   std::optional<TruthRows> truth_;
   std::optional<BoxRows::Corners> first_;  ///< the config's `target`
   std::optional<Rectification> rectification_;

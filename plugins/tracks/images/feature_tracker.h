@@ -73,6 +73,11 @@ class FeatureTracker {
 
   explicit FeatureTracker(const TrackerOptions& options) : options_(options) {}
 
+  /// Points of the next image that are followed beside the corners that are found: the first ids.
+  void Add(const std::vector<cv::Point2f>& points) { given_ = points; }
+  /// How far from the rim of an image a point is that can be followed, px.
+  int margin() const { return options_.window_px / 2 + 1; }
+
   /// The features in the next image, by id. All images are of one size, 8 bit grey.
   const std::vector<Feature>& Track(const cv::Mat& image) {
     const cv::Size window(options_.window_px, options_.window_px);
@@ -80,7 +85,7 @@ class FeatureTracker {
     cv::buildOpticalFlowPyramid(image, pyramid_, window, options_.levels, false);
     const std::size_t before = features_.size();
     if (before > 0) Follow(image, window);
-    if (std::ssize(features_) < options_.features) {
+    if (std::ssize(features_) < options_.features || !given_.empty()) {
       Refill(image, /*everywhere=*/2 * features_.size() <= before);
     }
     std::swap(pyramid_, before_);
@@ -155,6 +160,10 @@ class FeatureTracker {
       ++count[cell_of(at)];
     };
     for (const Feature& feature : features_) take(cv::Point(feature.at));
+    for (const cv::Point2f at : std::exchange(given_, {})) {
+      take(cv::Point(at));
+      features_.push_back({next_id_++, at, FoundPatch(image, at, options_.window_px | 1)});
+    }
     const std::size_t old = features_.size();
     const int share = (options_.features + cells - 1) / cells;
     for (const auto& [response, at] : corners_) {
@@ -237,6 +246,7 @@ class FeatureTracker {
 
   TrackerOptions options_;
   std::vector<Feature> features_;
+  std::vector<cv::Point2f> given_;  ///< to be followed from the next image on
   std::int64_t next_id_ = 0;
   std::vector<cv::Mat> before_, pyramid_;  ///< of the image before; of this one
   std::vector<double> strongest_;          ///< response in each row of cells, when it was searched

@@ -8,10 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "alidade/base/number_rows.h"
 #include "alidade/host/source.h"
 #include "feature_tracker.h"
 #include "plugins/common/companion_files.h"
 #include "plugins/common/images/image_reader.h"
+#include "plugins/common/images/image_times.h"
 #include "plugins/tracks/calibration_file.h"
 
 namespace alidade {
@@ -24,6 +26,8 @@ namespace alidade {
 ///
 ///   stream   size  values  when
 ///   tracks   2     u, v    a feature is followed; the landmark is its id
+///   known    3     u, v, depth   there is a table `known`: of its points in the first image, in place
+///                                of their first observation
 ///
 /// Keys         kImageTracksKeys (tracks.cc), those of TrackerOptions.
 /// Errors       those of ImageReader, TimestampRows and TumRows; kBadConfig.
@@ -41,12 +45,17 @@ class ImageTracks : public Source {
     tolerance_ = TimestampFromSeconds(
         p.Number("truth_tolerance_s", "s",
                  "the true pose of an image is at most so far off in time", {0.0, 1e3}, 1e-3));
-    for (const char* key : {"path", "images", "state_entry"}) arguments.entry.Declare(key);
+    for (const char* key : {"path", "images", "known", "state_entry"}) {
+      arguments.entry.Declare(key);
+    }
     const auto text = [&](const char* key, const char* fallback) {
       const auto node = arguments.entry.Find(key);
       return node ? node->Text() : fallback;
     };
     Open(arguments.entry.At("path", "images"), text("images", ""), arguments.folder);
+    if (const auto known = arguments.entry.Find("known")) {
+      ReadKnown(arguments.folder / known->Text(), *known);
+    }
     const std::string state = text("state_entry", "cam");
     if (truth_) truths_ = {{state + ".position", 3}, {state + ".orientation", 4}};
   }
@@ -66,13 +75,22 @@ class ImageTracks : public Source {
   bool Next(SourceFrame& frame) override {
     if (frames_ == most_ && most_ > 0) return false;
     do {
-      if (!images_->Next(image_)) return false;
+      if (!images_->Next(image_)) {
+        times_->End(images_->number() + 1);
+        return false;
+      }
     } while (images_->number() < start_);
-    frame.timestamp = TimeOf(images_->number());
+    frame.timestamp = times_->At(images_->number());
     frame.measurements.clear();
+    if (frames_ == 0 && !known_.empty()) GiveKnown();
     for (const FeatureTracker::Feature& feature : tracker_.Track(image_)) {
-      frame.measurements.push_back(
-          {frame.timestamp, 0, feature.id, {feature.at.x, feature.at.y}, {}});
+      const bool known = frames_ == 0 && feature.id < std::ssize(known_);
+      Measurement& one = frame.measurements.emplace_back();
+      one.timestamp = frame.timestamp;
+      one.stream = known ? 1 : 0;
+      one.landmark = feature.id;
+      one.values = {feature.at.x, feature.at.y};
+      if (known) one.values.push_back(known_[static_cast<std::size_t>(feature.id)].depth_m);
     }
     frame.truth.assign(truths_.size(), {});
     if (truth_) {
@@ -86,6 +104,46 @@ class ImageTracks : public Source {
   }
 
  private:
+  struct Known {
+    cv::Point2f at;
+    double depth_m;
+    int line;
+  };
+
+  /// `u,v,depth_m` of each point; a header may stand first.
+  void ReadKnown(const std::filesystem::path& file, const Node& key) {
+    NumberRows rows(file, key.place(), key.path());
+    known_file_ = rows.name();
+    while (rows.Next()) {
+      if (rows.line() == 1 && rows.text(0) == "u") continue;
+      rows.ExpectColumns(3, "u,v,depth_m");
+      const auto u = static_cast<float>(rows.Number(0, "u"));
+      const auto v = static_cast<float>(rows.Number(1, "v"));
+      const double depth_m = rows.Number(2, "depth_m");
+      if (!(depth_m > 0.0)) rows.FailCell(2, "depth_m", "is not positive", "m, > 0");
+      known_.push_back({{u, v}, depth_m, rows.line()});
+    }
+    if (known_.empty()) rows.FailLine("no rows", "u,v,depth_m of a point in the first image");
+    streams_.push_back({"known", 3});
+  }
+
+  void GiveKnown() {
+    const auto margin = static_cast<float>(tracker_.margin());
+    const cv::Rect2f inside(margin, margin, static_cast<float>(image_.cols) - 2.0F * margin,
+                            static_cast<float>(image_.rows) - 2.0F * margin);
+    std::vector<cv::Point2f> points;
+    for (const Known& one : known_) {
+      if (!inside.contains(one.at)) {
+        throw Error(ExitCode::kBadData, ErrorLine({known_file_, one.line}, {},
+                                                  "the point is not on the image, or less "
+                                                  "than half of window_px from its rim",
+                                                  "points inside of the first image"));
+      }
+      points.push_back(one.at);
+    }
+    tracker_.Add(points);
+  }
+
   void Open(const Node& key, const std::string& names, const std::filesystem::path& folder) {
     if (key.Text().empty()) key.Fail("no path", "a folder of images, or a video");
     const std::filesystem::path path = folder / key.Text();
@@ -98,7 +156,7 @@ class ImageTracks : public Source {
     };
     if (rate_hz_ == 0.0) {
       if (const auto times = beside("timestamps.csv")) {
-        times_.emplace(*times, key.place(), key.path());
+        times_.emplace(*times, key);
       } else {
         rate_hz_ = images_->rate_hz();
       }
@@ -106,26 +164,11 @@ class ImageTracks : public Source {
     if (!times_ && !(rate_hz_ > 0.0)) {
       key.Fail("no timestamps.csv next to the images", "that file, or 'rate_hz'");
     }
+    if (!times_) times_.emplace(rate_hz_);
     calibration_ = beside("calibration.yaml");
     auto truth = beside("groundtruth.tum");
     if (!truth) truth = beside("truth.tum");
     if (truth) truth_.emplace(*truth, key.place(), key.path());
-  }
-
-  Timestamp TimeOf(std::int64_t image) {
-    if (!times_) return TimestampFromSeconds(static_cast<double>(image) / rate_hz_);
-    std::int64_t frame = -1;
-    Timestamp timestamp = 0;
-    while (frame < image) {
-      if (!times_->Next(frame, timestamp)) break;
-    }
-    if (frame != image) {
-      throw Error(
-          ExitCode::kBadData,
-          ErrorLine(place(), {}, "image " + std::to_string(image) + " is not in " + times_->name(),
-                    "a time for every image"));
-    }
-    return timestamp;
   }
 
   FeatureTracker tracker_;
@@ -133,8 +176,10 @@ class ImageTracks : public Source {
   std::int64_t start_ = 0, most_ = 0, frames_ = 0;
   Timestamp tolerance_ = 0;
   std::vector<StreamInfo> streams_ = {{"tracks", 2}}, truths_;
+  std::vector<Known> known_;
+  std::string known_file_;
   std::optional<ImageReader> images_;
-  std::optional<TimestampRows> times_;
+  std::optional<ImageTimes> times_;
   std::optional<TumRows> truth_;
   std::optional<std::filesystem::path> calibration_;
   cv::Mat image_;

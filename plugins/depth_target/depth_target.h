@@ -46,9 +46,10 @@ namespace alidade {
 ///
 /// n1 and n2 come from streams 0 and 1 of the seed, one of each per sample whatever is emitted.
 ///
-/// Drawn, the target is a textured square of w Z0 / F metres that faces the pair, on the axis of the
-/// left camera, before a textured wall. Images are image.width times image.height, their principal
-/// points in the middle. Their noise comes from stream 2, what is missing or wrong from stream 3.
+/// Drawn, the target is a textured square of w Z0 / F metres that faces the pair, on the axis of
+/// the left camera, before a textured wall. Images are image.width times image.height, their
+/// principal points in the middle. Their noise comes from stream 2, what is missing or wrong from
+/// stream 3.
 ///
 /// What the notebook does differently, or says twice: it thresholds the NOISY disparity, so that
 /// the disparities that pass are biased: -0.85 px where F B / Z is within 1 px of the limit, -0.33
@@ -97,7 +98,11 @@ class DepthTarget : public Source {
     height_px_ = p.Integer("image.height", "of the images, px", 16, 1 << 14, 480);
     image_noise_grey_ =
         p.NonNegative("image.noise_grey", "1", "noise of a pixel's grey, of 255", 2.0);
-    wall_m_ = p.Positive("image.wall_m", "m", "depth of the wall behind the target", 1.5);
+    wall_m_ =
+        p.Positive("image.wall_m", "m", "depth of the wall behind the target", 5.0 * depth_mean_m_);
+    if (!(wall_m_ > depth_mean_m_ + amplitude_m_)) {
+      p.Fail("image.wall_m", "must be more than depth_mean_m + amplitude_m: it hides the target");
+    }
     target_m_ = template_px * template_depth_m_ / focal_px_;
     if (!(amplitude_m_ < depth_mean_m_)) {
       p.Fail("amplitude_m", "must be less than depth_mean_m: the target would reach the camera");

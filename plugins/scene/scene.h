@@ -48,10 +48,10 @@ inline constexpr const char* kSceneKeys =
 ///
 /// The camera looks along z, x to the right, y down. A point is seen where it lies ahead and both
 /// its exact pixel and the noisy one lie on the image; nothing hides it, not the surfaces either,
-/// which are seen in images alone. Of more points than
-/// max_features_per_frame those seen in the frame before go first, then those with the smaller id.
-/// Truth is `cam.position`, `cam.orientation` (world_from_cam), `cam.velocity` (world) and
-/// `cam.angular_velocity` (cam), the velocities as in quaternion_pose; and the place of each point.
+/// which are seen in images alone. Of more points than max_features_per_frame those seen in the
+/// frame before go first, then those with the smaller id. Truth is `cam.position`,
+/// `cam.orientation` (world_from_cam), `cam.velocity` (world) and `cam.angular_velocity` (cam), the
+/// velocities as in quaternion_pose; and the place of each point.
 ///
 /// Points, path, pixels, odometry and the noise of images are drawn from streams 0 to 4 of the seed;
 /// of the pixels four numbers for each point and frame, seen or not.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <string>
+#include <cmath>
 #include <vector>
 
 #include "plugins/common/surfaces.h"
@@ -39,7 +39,10 @@ inline std::vector<Rectangle> ReadSurfaces(const Node& list) {
     } else {
       const auto read = [&](const char* key) { return ReadVector(what.At(key, "a rectangle")); };
       const Rectangle one{read("corner"), read("right"), read("down"), grain_m, surfaces.size()};
-      if (!(one.right.cross(one.down).norm() > 0.0)) what.Fail("its edges span no area");
+      const double area = one.right.norm() * one.down.norm();
+      if (!(area > 0.0) || std::abs(one.right.dot(one.down)) > 1e-6 * area) {
+        what.Fail("'right' and 'down' are not at right angles", "the edges of a rectangle, m");
+      }
       what.RejectUnread();
       surfaces.push_back(one);
     }

@@ -174,7 +174,6 @@ TEST_F(SimulateImages, RefusesWhatItCannotWrite) {
   EXPECT_FALSE(Exists("data"));
 }
 
-// Blocks are of 512 bytes: all other files fit into 16 of them, and an image is larger than 2.
 TEST_F(SimulateImages, SurfacesAreSeenWhereTheyAre) {
   // A plate 1 m wide and 0.5 m high, 2 m ahead, whose edges a pinhole sees at known places.
   const Outcome outcome = Simulate(R"(alidade: 1
@@ -217,14 +216,14 @@ source:
     EXPECT_EQ(outcome.code, 0) << outcome.err;
     return cv::imread((folder_ / folder / "images/000000.png").string(), cv::IMREAD_GRAYSCALE);
   };
-  // The textures go by the places in the list: a third rectangle, out of sight, keeps them apart.
+  // The textures go by the places in the list: one out of sight stands for the wall.
   const char* const kAway = "{rectangle: {corner: [0, 0, -5], right: [1, 0, 0], down: [0, 1, 0]}}";
   const std::string wall =
       "{rectangle: {corner: [-5, -5, 4], right: [10, 0, 0], down: [0, 10, 0]}}";
   const std::string plate =
       "{rectangle: {corner: [-0.3, -0.3, 1], right: [0.6, 0, 0], down: [0, 0.6, 0]}}";
-  const std::string both = "[" + plate + ", " + wall + "]";
-  const std::string alone = "[" + plate + ", " + kAway + "]";
+  const std::string both = "[" + wall + ", " + plate + "]";
+  const std::string alone = std::string("[") + kAway + ", " + plate + "]";
   const cv::Mat scene = draw(both.c_str(), "both"), one = draw(alone.c_str(), "one");
   const cv::Rect inside(24, 14, 33, 33);
   EXPECT_EQ(cv::norm(scene(inside), one(inside), cv::NORM_INF), 0.0);
@@ -232,6 +231,7 @@ source:
   EXPECT_GT(cv::countNonZero(scene), 80 * 60 * 9 / 10);
 }
 
+// Blocks are of 512 bytes: all other files fit into 16 of them, and an image is larger than 2.
 TEST_F(SimulateImages, AFullDiskIsAnError) {
   before_ = "ulimit -f 16";
   const Outcome video = Simulate(kScene, {"--video", "v.avi"});

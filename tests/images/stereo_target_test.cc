@@ -192,15 +192,24 @@ TEST_F(StereoTarget, WithoutTextureThereIsNoDisparity) {
 
 TEST_F(StereoTarget, AMatchThatRepeatsIsNone) {
   MakePair();
-  // Upright stripes 12 px wide: as like at each twelfth disparity.
+  // Upright stripes 12 px wide, as like at each twelfth disparity, whose rows differ.
   for (int k = 0; k < 21; ++k) {
     Change(k, [&](cv::Mat& image) {
-      for (int x = 0; x < image.cols; ++x) image.col(x).setTo(128 + 100 * std::sin(x * M_PI / 6));
+      for (int y = 0; y < image.rows; ++y) {
+        for (int x = 0; x < image.cols; ++x) {
+          const double wave = std::sin(x * M_PI / 6) + std::sin(0.31 * y) + std::sin(0.173 * y);
+          image.at<unsigned char>(y, x) = cv::saturate_cast<unsigned char>(128 + 40 * wave);
+        }
+      }
     });
   }
   const Outcome outcome = Measure();
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_TRUE(Found("disparity").empty());
+  EXPECT_EQ(Found("inverse_scale").size(), 21u);
+  // It is the repetition alone.
+  ASSERT_EQ(Measure({"--set", "source.disparity.least_distinct=0"}).code, 0);
+  EXPECT_FALSE(Found("disparity").empty());
 }
 
 TEST_F(StereoTarget, OneCameraMeasuresTheSizeAlone) {
@@ -254,6 +263,50 @@ source: {type: stereo_target, left: plate, rate_hz: 20, target: [110, 70, 101, 1
   }
 }
 
+TEST_F(StereoTarget, WhatCoversTheTargetIsNotIt) {
+  MakePair();
+  // A plate slides over it from the left and stays, to image 12; then all is as it was.
+  cv::Mat plate(180, 240, CV_8U);
+  cv::RNG random(5);
+  random.fill(plate, cv::RNG::UNIFORM, 0, 255);
+  cv::GaussianBlur(plate, plate, {}, 2.0);
+  for (int k = 4; k < 18; ++k) {
+    const int edge = std::min(240, 60 * (k - 3));
+    Change(k, [&](cv::Mat& image) {
+      plate.colRange(240 - edge, 240).copyTo(image.colRange(0, edge));
+    });
+  }
+  const Outcome outcome = Measure();
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Values depth = Depth(), scale = Found("inverse_scale");
+  for (int k = 8; k < 18; ++k) EXPECT_FALSE(scale.contains(k)) << k;
+  for (int k = 18; k < 21; ++k) {
+    ASSERT_TRUE(scale.contains(k)) << k;
+    EXPECT_NEAR(scale.at(k), depth.at(k) / depth.at(0), 3e-3 * scale.at(k)) << k;
+  }
+}
+
+TEST_F(StereoTarget, ABoxSaysWhereItIsAndThatItIsNot) {
+  MakePair();
+  Write("config.yaml", R"(alidade: 1
+source: {type: stereo_target, left: pair/images/left, rate_hz: 20, boxes: boxes.csv}
+)");
+  // Four corners that are a pixel off, a row that says it is not seen.
+  Write("boxes.csv", "0,75,45,165,44,164,135,74,134\n5,nan,nan,nan,nan\n");
+  ASSERT_EQ(Measure().code, 0);
+  const Values depth = Depth(), scale = Found("inverse_scale");
+  EXPECT_EQ(scale.size(), 20u);
+  EXPECT_FALSE(scale.contains(5));
+  for (const auto& [frame, value] : scale) {
+    EXPECT_NEAR(value, depth.at(frame) / depth.at(0), 5e-3 * value) << frame;
+  }
+  // Black in the first image that has a box: the next one counts.
+  Change(0, [](cv::Mat& image) { image.setTo(0); });
+  Write("boxes.csv", "0,75,45,90,90\n1,75,45,90,90\n");
+  ASSERT_EQ(Measure().code, 0);
+  EXPECT_EQ(Found("inverse_scale").size(), 20u);
+}
+
 TEST_F(StereoTarget, BadInputIsNamed) {
   MakePair();
   const auto expect = [&](const testing::Arguments& more, int code, const std::string& text) {
@@ -263,12 +316,27 @@ TEST_F(StereoTarget, BadInputIsNamed) {
   };
   expect({"--set", "source.left=nowhere"}, 66, "no such file or folder");
   expect({"--set", "source.target=[75, 45, 4, 90]"}, 78, "less than 8 px");
-  expect({"--set", "source.target=[0, 0, 0, 0]"}, 78, "neither 'target' nor 'boxes'");
+  expect({"--set", "source.target=[0, 0, 0, 0]"}, 78, "less than 8 px");
   expect({"--set", "source.target=[200, 45, 90, 90]"}, 65, "the target is not on this image");
   expect({"--set", "source.stereo=pair.yaml"}, 65, "not a calibration");
   expect({"--set", "source.warp=homography"}, 78, "camera.fx");
   Write("boxes.csv", "frame,x,y,width,height\n0,75,45,2,90\n");
   expect({"--set", "source.boxes=boxes.csv"}, 65, "boxes.csv:2:");
+  Write("boxes.csv", "0,165,45,75,45,75,134,165,134\n");
+  expect({"--set", "source.boxes=boxes.csv"}, 65, "not in order");
+  Write("boxes.csv", "frame,x,y,width,height\n");
+  expect({"--set", "source.boxes=boxes.csv"}, 65, "no rows");
+  const auto calibration = [](const std::string& r) {
+    const std::string m = "!!opencv-matrix\n  rows: 3\n  cols: 3\n  dt: d\n  data: ";
+    const std::string k = m + "[120, 0, 120, 0, 120, 90, 0, 0, 1]\n";
+    const std::string d = "!!opencv-matrix\n  rows: 1\n  cols: 4\n  dt: d\n  data: [0, 0, 0, 0]\n";
+    return "%YAML:1.0\n---\nM1: " + k + "D1: " + d + "M2: " + k + "D2: " + d + "R: " + m + r +
+           "\nT: !!opencv-matrix\n  rows: 3\n  cols: 1\n  dt: d\n  data: [-0.065, 0, 0]\n";
+  };
+  Write("stereo.yml", calibration("[0, 0, 0, 0, 0, 0, 0, 0, 0]"));
+  expect({"--set", "source.stereo=stereo.yml"}, 65, "'R' is not a rotation");
+  Write("stereo.yml", calibration("[1, 0, 0, 0, 1, 0, 0, 0, 1]"));
+  expect({"--set", "source.stereo=stereo.yml"}, 0, "");
   Write("truth.csv", "depth\n1\n");
   expect({"--set", "source.truth=truth.csv"}, 65, "t_s,NAME");
   std::filesystem::remove(Image("right", 20));

@@ -95,7 +95,8 @@ class ImageReader {
       const std::string name = entry.path().filename().string();
       const bool is_image = names.empty() ? EndsLikeAnImage(entry.path())
                                           : fnmatch(names.c_str(), name.c_str(), 0) == 0;
-      if (entry.is_regular_file() && is_image) files_.push_back(entry.path());
+      std::error_code ignored;
+      if (entry.is_regular_file(ignored) && is_image) files_.push_back(entry.path());
     }
     std::ranges::sort(files_, [](const auto& a, const auto& b) {
       return strverscmp(a.filename().c_str(), b.filename().c_str()) < 0;
@@ -131,9 +132,15 @@ class ImageReader {
     if (!bytes.empty()) {
       const cv::Mat all(1, static_cast<int>(bytes.size()), CV_8UC1,
                         const_cast<char*>(bytes.data()));
-      cv::imdecode(all, cv::IMREAD_GRAYSCALE, &image);
+      try {
+        image.release();  // imdecode leaves what it has where no decoder knows the file
+        cv::imdecode(all, cv::IMREAD_GRAYSCALE, &image);
+      } catch (const cv::Exception&) {  // a header that asks for more than OpenCV reads
+        image.release();
+      }
     }
-    if (bytes.empty() || image.empty() || IsCutShort(bytes)) {
+    if (bytes.empty()) image.release();
+    if (image.empty() || IsCutShort(bytes)) {
       ++number_;
       Fail(bytes.empty()   ? "an empty file"
            : image.empty() ? "not an image that OpenCV reads"

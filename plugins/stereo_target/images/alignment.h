@@ -49,6 +49,30 @@ inline cv::Matx33d Changed(const cv::Matx33d& warp, const cv::Mat& patch,
   return changed * (1.0 / changed(2, 2));
 }
 
+/// The nearest warp of that kind, at the middle of the patch.
+inline cv::Matx33d Reduced(const cv::Matx33d& warp, const cv::Mat& patch, Warp kind) {
+  if (kind == Warp::kHomography) return warp;
+  const cv::Point2d middle = Middle(patch), at = Apply(warp, middle);
+  const cv::Point2d right =
+      Apply(warp, middle + cv::Point2d(0.5, 0.0)) - Apply(warp, middle - cv::Point2d(0.5, 0.0));
+  const cv::Point2d down =
+      Apply(warp, middle + cv::Point2d(0.0, 0.5)) - Apply(warp, middle - cv::Point2d(0.0, 0.5));
+  cv::Matx22d a(right.x, down.x, right.y, down.y);
+  if (kind == Warp::kSimilarity) {
+    const double size = 0.5 * (a(0, 0) + a(1, 1)), turn = 0.5 * (a(1, 0) - a(0, 1));
+    a = cv::Matx22d(size, -turn, turn, size);
+  }
+  return {a(0, 0), a(0, 1), at.x - a(0, 0) * middle.x - a(0, 1) * middle.y,
+          a(1, 0), a(1, 1), at.y - a(1, 0) * middle.x - a(1, 1) * middle.y,
+          0.0,     0.0,     1.0};
+}
+
+/// d (area in the image) / d (area of the patch) at a point of the patch.
+inline double AreaAt(const cv::Matx33d& warp, cv::Point2d at) {
+  const double w = warp(2, 0) * at.x + warp(2, 1) * at.y + warp(2, 2);
+  return std::abs(cv::determinant(warp) / (w * w * w));
+}
+
 /// A patch that was found in an image.
 struct Alignment {
   cv::Matx33d warp;            ///< from pixels of the patch to pixels of the image
@@ -123,32 +147,6 @@ class PatchAlignment {
     return {warp, Similarity(), variance * solver_.solve(all).topLeftCorner(count_, count_)};
   }
 
-  /// At `warp` as it is.
-  void Look(const cv::Matx33d& warp) {
-    Sample(warp);
-    cv::Sobel(seen_, right_, CV_32F, 1, 0, 3, 0.125);
-    cv::Sobel(seen_, down_, CV_32F, 0, 1, 3, 0.125);
-  }
-
-  /// Correlation of the patch and what is seen at it, in [-1, 1].
-  double Similarity() const {
-    double n = 0.0, a = 0.0, b = 0.0, aa = 0.0, bb = 0.0, ab = 0.0;
-    for (int y = 1; y < patch_.rows - 1; ++y) {
-      for (int x = 1; x < patch_.cols - 1; ++x) {
-        if (!Usable(y, x)) continue;
-        const double p = double(patch_.at<float>(y, x)), s = double(seen_.at<float>(y, x));
-        n += 1.0;
-        a += p;
-        b += s;
-        aa += p * p;
-        bb += s * s;
-        ab += p * s;
-      }
-    }
-    const double variances = (aa - a * a / n) * (bb - b * b / n);
-    return variances > 0.0 ? (ab - a * b / n) / std::sqrt(variances) : 0.0;
-  }
-
  private:
   static constexpr float kOutside = -1e6F;  ///< grey beyond the image
 
@@ -190,7 +188,9 @@ class PatchAlignment {
 
   /// Solves for d, a and b at `warp`.
   bool Linearise(const cv::Matx33d& warp) {
-    Look(warp);
+    Sample(warp);
+    cv::Sobel(seen_, right_, CV_32F, 1, 0, 3, 0.125);
+    cv::Sobel(seen_, down_, CV_32F, 0, 1, 3, 0.125);
     const cv::Point2d middle = Middle(patch_);
     const double half = HalfSide(patch_);
     const bool weighted = solution_.size() > 0;
@@ -246,6 +246,25 @@ class PatchAlignment {
     spread_ = std::max(1.4826 * *middle, 0.5);
   }
 
+  /// Correlation of the patch and what is seen at it, in [-1, 1].
+  double Similarity() const {
+    double n = 0.0, a = 0.0, b = 0.0, aa = 0.0, bb = 0.0, ab = 0.0;
+    for (int y = 1; y < patch_.rows - 1; ++y) {
+      for (int x = 1; x < patch_.cols - 1; ++x) {
+        if (!Usable(y, x)) continue;
+        const double p = double(patch_.at<float>(y, x)), s = double(seen_.at<float>(y, x));
+        n += 1.0;
+        a += p;
+        b += s;
+        aa += p * p;
+        bb += s * s;
+        ab += p * s;
+      }
+    }
+    const double variances = (aa - a * a / n) * (bb - b * b / n);
+    return variances > 0.0 ? (ab - a * b / n) / std::sqrt(variances) : 0.0;
+  }
+
   const cv::Mat& patch_;
   const cv::Mat& image_;
   int count_;
@@ -257,27 +276,33 @@ class PatchAlignment {
 };
 
 /// Finds `patch`, grey as float, near where `warp` puts it in `image`, 8 bit grey, to a fraction of a
-/// pixel: first in images a quarter as large, where it may be farther off. Brightness and contrast
-/// may change. None where PatchAlignment::Run() fails.
-inline std::optional<Alignment> Align(const cv::Mat& patch, const cv::Mat& image, cv::Matx33d warp,
-                                      Warp kind) {
+/// pixel. Brightness and contrast may change. Where that does not settle, or on what is hardly alike,
+/// it is tried again from where the same images a quarter as large settle, which may be farther off.
+/// None where PatchAlignment::Run() fails in both.
+inline std::optional<Alignment> Align(const cv::Mat& patch, const cv::Mat& image,
+                                      const cv::Matx33d& warp, Warp kind) {
   constexpr int kShrink = 4, kLeastSide = 16;
+  constexpr double kAlike = 0.95;
   cv::Mat grey;
   image.convertTo(grey, CV_32F);
-  if (std::min(patch.cols, patch.rows) >= kShrink * kLeastSide) {
-    constexpr double k = kShrink, kOffset = 0.5 * (kShrink - 1);
-    const cv::Matx33d from_small(k, 0.0, kOffset, 0.0, k, kOffset, 0.0, 0.0, 1.0);
-    cv::Mat small_patch, small_image;
-    cv::resize(patch, small_patch, {}, 1.0 / k, 1.0 / k, cv::INTER_AREA);
-    cv::resize(grey, small_image, {}, 1.0 / k, 1.0 / k, cv::INTER_AREA);
-    cv::Matx33d small = from_small.inv() * warp * from_small;
-    if (PatchAlignment(small_patch, small_image, kind).Run(small)) {
-      warp = from_small * small * from_small.inv();
-    }
-  }
-  PatchAlignment alignment(patch, grey, kind);
-  if (!alignment.Run(warp)) return std::nullopt;
-  return alignment.Result(warp);
+  const auto settle = [&](cv::Matx33d from) -> std::optional<Alignment> {
+    PatchAlignment alignment(patch, grey, kind);
+    if (!alignment.Run(from)) return std::nullopt;
+    return alignment.Result(from);
+  };
+  const cv::Matx33d start = Reduced(warp, patch, kind);
+  const std::optional<Alignment> near = settle(start);
+  if (near && near->similarity >= kAlike) return near;
+  if (std::min(patch.cols, patch.rows) < kShrink * kLeastSide) return near;
+  constexpr double k = kShrink, kOffset = 0.5 * (kShrink - 1);
+  const cv::Matx33d from_small(k, 0.0, kOffset, 0.0, k, kOffset, 0.0, 0.0, 1.0);
+  cv::Mat small_patch, small_image;
+  cv::resize(patch, small_patch, {}, 1.0 / k, 1.0 / k, cv::INTER_AREA);
+  cv::resize(grey, small_image, {}, 1.0 / k, 1.0 / k, cv::INTER_AREA);
+  cv::Matx33d small = from_small.inv() * start * from_small;
+  if (!PatchAlignment(small_patch, small_image, kind).Run(small)) return near;
+  const std::optional<Alignment> far = settle(from_small * small * from_small.inv());
+  return far && (!near || far->similarity > near->similarity) ? far : near;
 }
 
 }  // namespace alidade

@@ -51,7 +51,8 @@ inline std::optional<Disparity> FindDisparity(const cv::Mat& left, const cv::Mat
                                               const DisparityOptions& options) {
   const cv::Rect whole({0, 0}, left.size()), place = box;
   if ((place & whole) != place || place.width < 8 || place.height < 8) return std::nullopt;
-  const int reach = options.most_px > 0.0 ? cvCeil(options.most_px) : place.x;
+  const int reach =
+      options.most_px > 0.0 ? cvCeil(std::min(options.most_px, double(left.cols))) : place.x;
   const int from = std::max(0, place.x - reach);
   const cv::Mat strip = right(cv::Rect(from, place.y, place.x + place.width - from, place.height));
   cv::Mat patch, scores;

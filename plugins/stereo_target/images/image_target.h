@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <optional>
@@ -63,19 +65,22 @@ class ImageTarget : public Source {
     }
     folder_ = arguments.folder;
     Open(entry);
-    if (box[2] >= 8.0 && box[3] >= 8.0) {
-      first_ = BoxRows::Of(box[0], box[1], box[2], box[3]);
-    } else if (box[2] > 0.0 || !boxes_) {
-      entry.Fail(
-          box[2] > 0.0 ? "'target' is less than 8 px wide or high" : "neither 'target' nor 'boxes'",
-          "target: [x, y, width, height], px, in the first image");
+    const bool given = entry.Find("target").has_value();
+    if (given && !(box[2] >= 8.0 && box[3] >= 8.0)) {
+      entry.At("target").Fail("less than 8 px wide or high", "[x, y, width, height], px");
     }
+    if (!given && !boxes_) {
+      entry.Fail("neither 'target' nor 'boxes'",
+                 "target: [x, y, width, height], px, in the first image");
+    }
+    if (given) first_ = BoxRows::Of(box[0], box[1], box[2], box[3]);
     std::optional<cv::Matx33d> intrinsics;
     if (options_.warp == Warp::kHomography && !entry.Find("stereo")) {
       const Camera camera(p);
       if (camera.model != CameraModel::kPinhole) {
         p.Fail("camera.model", "not 'pinhole', but the images are taken as free of distortion");
       }
+      size_ = cv::Size(camera.width, camera.height);
       intrinsics = cv::Matx33d(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1);
     }
     if (const auto stereo = entry.Find("stereo")) {
@@ -117,6 +122,10 @@ class ImageTarget : public Source {
         image_[view] = rectification_->Rectify(image_[view], view);
       }
     }
+    if (!size_.empty() && size_ != image_[0].size()) {
+      throw Error(ExitCode::kBadData, ErrorLine(place(), {}, "not as large as the config's camera",
+                                                "camera.width and camera.height of the images"));
+    }
     Measure(frame);
     ++frames_;
     return true;
@@ -154,8 +163,9 @@ class ImageTarget : public Source {
     };
     table("boxes", boxes_);
     table("truth", truth_);
-    if (const auto path = Find(entry, "timestamps")) {
-      times_.emplace(*path, entry.At("timestamps"));
+    const auto table_of_times = Find(entry, "timestamps");
+    if (table_of_times && rate_hz_ == 0.0) {
+      times_.emplace(*table_of_times, entry.At("timestamps"));
     } else {
       if (rate_hz_ == 0.0) rate_hz_ = left_->rate_hz();
       if (!(rate_hz_ > 0.0)) entry.Fail("no 'timestamps'", "that table, or 'rate_hz'");
@@ -166,6 +176,11 @@ class ImageTarget : public Source {
   bool ReadPair() {
     if (!left_->Next(image_[0])) {
       times_->End(left_->number() + 1);
+      if (!started_) {
+        throw Error(ExitCode::kBadData,
+                    ErrorLine(place(), {}, "the target was in none of the images",
+                              "a row of 'boxes' where it can be seen"));
+      }
       return false;
     }
     if (!right_) return true;
@@ -182,19 +197,25 @@ class ImageTarget : public Source {
   }
 
   void Measure(SourceFrame& frame) {
-    auto corners = boxes_ ? boxes_->At(left_->number()) : std::nullopt;
-    if (first_) corners = std::exchange(first_, std::nullopt);
-    if (!started_ && !corners) return;  // the table says nothing of it yet
-    if (!started_ && !OnImage(*corners)) {
-      throw Error(ExitCode::kBadData, ErrorLine(place(), {}, "the target is not on this image",
-                                                "'target' or a row of 'boxes' inside of it"));
+    std::optional<BoxRows::Corners> corners = std::exchange(first_, std::nullopt);
+    if (const auto row = boxes_ ? boxes_->At(left_->number()) : std::nullopt) {
+      if (!row->corners) return;  // it is said not to be seen
+      if (!corners) corners = row->corners;
     }
-    started_ = true;
     if (corners && rectification_) {
       for (cv::Point2f& corner : *corners) corner = rectification_->Rectify(corner);
     }
+    if (corners && !started_ && !OnImage(*corners)) {
+      throw Error(ExitCode::kBadData, ErrorLine(place(), {}, "the target is not on this image",
+                                                "'target' or a row of 'boxes' inside of it"));
+    }
     const auto seen = tracker_->Track(image_[0], corners);
+    if (!seen && !started_ && !boxes_) {
+      throw Error(ExitCode::kBadData,
+                  ErrorLine(place(), {}, "the target has no texture", "one that differs in it"));
+    }
     if (!seen) return;
+    started_ = true;
     if (right_) {
       if (const auto found =
               FindDisparity(image_[0], image_[1], seen->box, seen->middle, disparity_options_)) {
@@ -235,6 +256,7 @@ class ImageTarget : public Source {
   std::optional<BoxRows::Corners> first_;  ///< the config's `target`
   std::optional<Rectification> rectification_;
   std::optional<TargetTracker> tracker_;
+  cv::Size size_;  ///< of the config's camera, where it is needed
   cv::Mat image_[2];
 };
 

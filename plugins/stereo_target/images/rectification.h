@@ -20,7 +20,7 @@ namespace alidade {
 ///
 ///   entry of the file   shape       unit  meaning
 ///   M1, M2              3x3         px    camera matrix, left and right
-///   D1, D2              4, 5 or 8   -     k1 k2 p1 p2 [k3 [k4 k5 k6]]
+///   D1, D2              4 to 14     -     k1 k2 p1 p2 [k3 [k4 k5 k6 ...]], as OpenCV counts them
 ///   R, T                3x3, 3x1    -, m  right_from_left
 ///
 /// Errors       kInputMissing; kBadData with the file: an entry that lacks, or is of another shape.
@@ -48,6 +48,16 @@ class Rectification {
       d2 = read("D2");
       r = read("R");
       t = read("T");
+      const auto expect = [&](const cv::Mat& matrix, cv::Size shape, const char* name) {
+        if (matrix.size() != shape) Fail(file, std::string("'") + name + "' has another shape");
+      };
+      expect(m1, {3, 3}, "M1");
+      expect(m2, {3, 3}, "M2");
+      expect(r, {3, 3}, "R");
+      if (t.total() != 3) Fail(file, "'T' has another shape");
+      if (!(cv::norm(r * r.t(), cv::Mat::eye(3, 3, CV_64F), cv::NORM_INF) < 1e-3)) {
+        Fail(file, "'R' is not a rotation");
+      }
       cv::Mat r1, r2, p1, p2, q;
       cv::stereoRectify(m1, d1, m2, d2, size, r, t, r1, r2, p1, p2, q, cv::CALIB_ZERO_DISPARITY,
                         0.0);

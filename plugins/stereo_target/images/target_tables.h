@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <array>
+#include <cmath>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,12 +24,17 @@ class BoxRows {
   BoxRows(const std::filesystem::path& path, const Place& place, const std::string& key)
       : rows_(path, place, key) {
     Advance();
+    if (!has_next_) rows_.FailLine("no rows", kForms);
   }
 
+  /// What a table says of one frame.
+  struct Row {
+    std::optional<Corners> corners;  ///< none: the target is not seen
+  };
   /// Of `frame`; none where it has no row. Frames are asked for in order.
-  std::optional<Corners> At(std::int64_t frame) {
+  std::optional<Row> At(std::int64_t frame) {
     while (has_next_ && next_frame_ < frame) Advance();
-    return has_next_ && next_frame_ == frame ? next_ : std::nullopt;
+    return has_next_ && next_frame_ == frame ? std::optional(Row{next_}) : std::nullopt;
   }
   static Corners Of(double x, double y, double width, double height) {
     const auto left = static_cast<float>(x), top = static_cast<float>(y);
@@ -56,7 +62,9 @@ class BoxRows {
     if (rows_.text(1) == "nan") return;
     std::vector<double> numbers;
     for (std::size_t i = 1; i < rows_.size(); ++i) {
-      numbers.push_back(rows_.Number(i, kNames[rows_.size() == 5 ? i - 1 : i + 3]));
+      const char* const name = kNames[rows_.size() == 5 ? i - 1 : i + 3];
+      numbers.push_back(rows_.Number(i, name));
+      if (std::abs(numbers.back()) > 1e5) rows_.FailCell(i, name, "is on no image", "px");
     }
     if (numbers.size() == 4) {
       for (const std::size_t side : {2, 3}) {
@@ -70,6 +78,11 @@ class BoxRows {
     Corners corners;
     for (std::size_t i = 0; i < 4; ++i) {
       corners[i] = {static_cast<float>(numbers[2 * i]), static_cast<float>(numbers[2 * i + 1])};
+    }
+    const std::vector<cv::Point2f> outline(corners.begin(), corners.end());
+    if (!cv::isContourConvex(outline) || !(cv::contourArea(outline, true) >= 16.0)) {
+      rows_.FailLine("four corners that are not in order, or span no area",
+                     "clockwise from the upper left: x0,y0,...,x3,y3");
     }
     next_ = corners;
   }
@@ -99,7 +112,10 @@ class TruthRows {
   /// The values at the row nearest to `timestamp`, where it is within `tolerance`; of two as near the
   /// earlier. An empty one is unknown. Timestamps are asked for in order.
   std::vector<std::vector<double>> At(Timestamp timestamp, Timestamp tolerance) {
-    const auto off = [timestamp](Timestamp other) { return std::abs(Seconds(timestamp - other)); };
+    // As floating-point numbers, whose difference does not overflow.
+    const auto off = [timestamp](Timestamp other) {
+      return 1e-9 * std::abs(static_cast<double>(timestamp) - static_cast<double>(other));
+    };
     while (has_next_ && (!has_nearest_ || off(timestamp_) < off(nearest_timestamp_))) {
       nearest_ = values_;
       nearest_timestamp_ = timestamp_;

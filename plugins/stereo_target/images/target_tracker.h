@@ -45,13 +45,12 @@ struct TargetOptions {
 
 /// Follows one target through the images of a camera, and measures its size.
 ///
-/// Corners of the target are followed from the last image [Lucas1981], a similarity is put through
-/// them, and from there the target is aligned with a template, see Align(): errors do not add up from
-/// image to image. The first template is used as long as it fits well, then of it and others that were
-/// taken on the way the one that tells most of the size; each brings the error of its own. Where none
-/// fits, as in a blurred image, there is no
-/// measurement, but the target is followed on for some images; then it is lost, and looked for in the
-/// whole image.
+/// A grid of its points is followed from the last image [Lucas1981], [Kalal2010], a similarity is put through
+/// them, and from there the target is aligned with a template, see Align(): errors do not add up
+/// from image to image. The first template is used as long as it fits well, then of it and others
+/// that were taken on the way the one that tells most of the size; each brings the error of its
+/// own. Where none fits, as in a blurred image, there is no measurement, but the target is followed
+/// on for some images; then it is lost, and looked for in the whole image.
 class TargetTracker {
  public:
   using Corners = std::array<cv::Point2f, 4>;  ///< clockwise from the upper left
@@ -62,7 +61,6 @@ class TargetTracker {
     cv::Rect2d box;        ///< px, upright, about all of it
     double inverse_scale;  ///< size in the first image / size now; of a plane: depth now / then
     double variance;       ///< of inverse_scale
-    double similarity;     ///< in [-1, 1]
   };
 
   /// `intrinsics`: the camera matrix, for a homography.
@@ -70,25 +68,29 @@ class TargetTracker {
       : options_(options), intrinsics_(intrinsics) {}
 
   /// The target in the next image; none where it is not measured. `corners`: where it is said to be;
-  /// the first image needs them.
+  /// without them there is none until a first image had them, and texture in them.
   std::optional<Seen> Track(const cv::Mat& image, const std::optional<Corners>& corners) {
     std::optional<Seen> seen;
     if (corners) {
       const Corners inner = Inset(*corners);
-      if (templates_.empty()) TakeTemplate(image, inner, 1.0, 0.0);
+      const bool first = templates_.empty();
+      if (first) TakeTemplate(image, inner, 1.0, 0.0);
       seen = Measure(image, inner, options_.least_similarity, kGuessedArea);
       lost_ = false;
       if (!seen) outline_ = inner;
-    } else {
+      if (first && !seen) templates_.clear();  // without texture it is like nothing
+    } else if (!templates_.empty()) {
       if (!lost_) seen = FollowAndMeasure(image);
       if (lost_) seen = SearchAndMeasure(image);
     }
+    unseen_ = seen ? 0 : unseen_ + 1;
     image.copyTo(before_);
     return seen;
   }
 
  private:
   static constexpr std::size_t kTemplates = 6;  ///< at most
+  static constexpr int kPatience = 10;  ///< images for which it is followed without being measured
   static constexpr double kGuessedArea = 2.0;  ///< times that of a box, or less: as boxes are known
 
   /// What the target looked like.
@@ -151,7 +153,7 @@ class TargetTracker {
     constexpr double kArea = 1.2;
     const std::optional<Corners> followed = Follow(image);
     const auto seen = Measure(image, followed.value_or(outline_), options_.least_similarity, kArea);
-    lost_ = !followed && !seen;
+    lost_ = !seen && (!followed || unseen_ >= kPatience);
     if (followed && !seen) outline_ = *followed;
     return seen;
   }
@@ -201,7 +203,7 @@ class TargetTracker {
     const double all = one.scale * scale;
     const cv::Rect2d box =
         cv::boundingRect(std::vector<cv::Point2f>(outline.begin(), outline.end()));
-    return {Apply(found.warp, Middle(one.patch)), box, all, all * all * relative, found.similarity};
+    return {Apply(found.warp, Middle(one.patch)), box, all, all * all * relative};
   }
 
   /// Size of the target where the template was taken / size under `warp`. Of a plane under a
@@ -210,9 +212,7 @@ class TargetTracker {
   double InverseScale(const Template& one, const cv::Matx33d& warp) const {
     const cv::Point2d middle = Middle(one.patch);
     if (options_.warp != Warp::kHomography) {
-      const auto area = [](const cv::Matx33d& w) { return w(0, 0) * w(1, 1) - w(0, 1) * w(1, 0); };
-      const cv::Matx33d moved = warp * one.taken.inv();
-      return std::sqrt(1.0 / std::abs(area(moved * (1.0 / moved(2, 2)))));
+      return std::sqrt(AreaAt(one.taken, middle) / AreaAt(warp, middle));
     }
     const cv::Matx33d in_rays = intrinsics_->inv() * warp * one.taken.inv() * *intrinsics_;
     cv::Mat values;
@@ -300,14 +300,13 @@ class TargetTracker {
            factor *= std::sqrt(std::sqrt(kMost))) {
         const double size = last * factor;  // px of the image for one of the template
         const double shrink = std::min(1.0, kSide / (size * std::max(patch.cols, patch.rows)));
+        const double least_px = std::min(patch.cols, patch.rows) * size * shrink;
+        if (!(least_px >= 6.0) || std::min(image.cols, image.rows) * shrink < 6.0) continue;
         cv::Mat small, looked, scores;
         cv::resize(image, small, {}, shrink, shrink, cv::INTER_AREA);
         small.convertTo(small, CV_32F);
         cv::resize(patch, looked, {}, size * shrink, size * shrink, cv::INTER_AREA);
-        if (std::min(looked.cols, looked.rows) < 6 || looked.cols > small.cols ||
-            looked.rows > small.rows) {
-          continue;
-        }
+        if (looked.cols > small.cols || looked.rows > small.rows) continue;
         cv::matchTemplate(small, looked, scores, cv::TM_CCOEFF_NORMED);
         double score = 0.0;
         cv::Point at;
@@ -326,6 +325,7 @@ class TargetTracker {
   std::vector<Template> templates_;
   std::size_t last_ = 0;  ///< the template that fitted the last image
   int misfits_ = 0;       ///< images in which none fitted well
+  int unseen_ = 0;        ///< images since it was measured
   bool lost_ = false;
   Corners outline_{};  ///< of the target
   cv::Mat before_;     ///< the last image

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <opencv2/core.hpp>
@@ -54,12 +53,12 @@ struct TrackerOptions {
             {-1.0, 1.0}, 0.7)) {}
 };
 
-/// Follows corners from image to image [Lucas1981], and finds new ones
-/// [Shi1994] where a cell of the grid has fewer than its share. A feature is lost where its
-/// patch leaves the image, where it is not followed back to where it was [Kalal2010], where it no
-/// longer looks as it did when it was found, and where it comes as close to an older one as half of
-/// the least distance. Where more than three quarters are lost at once, all are. It keeps its id as
-/// long as it lives, and no other has it.
+/// Follows corners from image to image [Lucas1981], and finds new ones [Shi1994] where a cell of
+/// the grid has fewer than its share. A feature is lost where its patch leaves the image, where it
+/// is not followed back to where it was [Kalal2010], where it no longer looks as it did when it was
+/// found, and where it comes as close to an older one as half of the least distance. Where more
+/// than three quarters are lost at once, all are. It keeps its id as long as it lives, and no other
+/// has it.
 ///
 /// The search for corners takes longer than following does: where features are missing, a third of
 /// the rows of cells is searched in each image, and every row where most were lost at once.
@@ -189,7 +188,7 @@ class FeatureTracker {
     constexpr int kMost = 5;
     constexpr float kFarthest = 6.0F, kSettled = 0.02F;  // px
     const cv::Point2f start = at;
-    const int side = options_.window_px;
+    const int side = options_.window_px | 1;
     for (int i = 0; i < kMost; ++i) {
       cv::getRectSubPix(image, cv::Size(side + 2, side + 2), at, patch_, CV_32F);
       cv::Matx22d normal = cv::Matx22d::zeros();
@@ -206,7 +205,10 @@ class FeatureTracker {
       if (!(cv::determinant(normal) > 0.0)) return start;
       const cv::Vec2d shift = normal.inv() * right;
       at += cv::Point2f(static_cast<float>(shift[0]), static_cast<float>(shift[1]));
-      if (!(cv::norm(at - start) < kFarthest)) return start;
+      const cv::Rect2f inside(static_cast<float>(margin()), static_cast<float>(margin()),
+                              static_cast<float>(image.cols - 2 * margin()),
+                              static_cast<float>(image.rows - 2 * margin()));
+      if (!(cv::norm(at - start) < kFarthest) || !inside.contains(at)) return start;
       if (cv::norm(shift) < kSettled) break;
     }
     return at;

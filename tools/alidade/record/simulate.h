@@ -16,7 +16,7 @@ namespace alidade {
 struct SimulateResult {
   std::int64_t frames = 0;
   bool stopped = false;            ///< before the end
-  std::vector<std::string> files;  ///< names in the folder, sorted
+  std::vector<std::string> files;  ///< names in the folder
 };
 
 /// Images of what the camera sees, next to the data: their names in the folder, "" for none.

@@ -45,12 +45,12 @@ struct TargetOptions {
 
 /// Follows one target through the images of a camera, and measures its size.
 ///
-/// A grid of its points is followed from the last image [Lucas1981], [Kalal2010], a similarity is put through
-/// them, and from there the target is aligned with a template, see Align(): errors do not add up
-/// from image to image. The first template is used as long as it fits well, then of it and others
-/// that were taken on the way the one that tells most of the size; each brings the error of its
-/// own. Where none fits, as in a blurred image, there is no measurement, but the target is followed
-/// on for some images; then it is lost, and looked for in the whole image.
+/// A grid of its points is followed from the last image [Lucas1981], [Kalal2010], a similarity is
+/// put through them, and from there the target is aligned with a template, see Align(): errors do
+/// not add up from image to image. The first template is used as long as it fits well, then of it
+/// and others that were taken on the way the one that tells most of the size; each brings the error
+/// of its own. Where none fits, as in a blurred image, there is no measurement, but the target is
+/// followed on for some images; then it is lost, and looked for in the whole image.
 class TargetTracker {
  public:
   using Corners = std::array<cv::Point2f, 4>;  ///< clockwise from the upper left

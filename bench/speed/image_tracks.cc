@@ -5,9 +5,10 @@
 //
 //   bench_image_tracks examples/25_slam_images
 //
-// The images are those of the example, drawn here and kept as files. Source `image_tracks` reads them
-// and gives its features to the EKF of the example. What it does inside is measured by the same calls
-// of OpenCV, made apart from it; its checks and its search for new features are the rest.
+// The images are those of the example, drawn here and kept as files. Source `image_tracks` reads
+// them and gives its features to the EKF of the example. What it does inside is measured by the
+// same calls of OpenCV, made apart from it; its checks and its search for new features are the
+// rest.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>

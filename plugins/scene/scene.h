@@ -53,8 +53,8 @@ inline constexpr const char* kSceneKeys =
 /// `cam.orientation` (world_from_cam), `cam.velocity` (world) and `cam.angular_velocity` (cam), the
 /// velocities as in quaternion_pose; and the place of each point.
 ///
-/// Points, path, pixels, odometry and the noise of images are drawn from streams 0 to 4 of the seed;
-/// of the pixels four numbers for each point and frame, seen or not.
+/// Points, path, pixels, odometry and the noise of images are drawn from streams 0 to 4 of the
+/// seed; of the pixels four numbers for each point and frame, seen or not.
 ///
 /// Keys         kSceneKeys; the camera by the keys of alidade/model/camera.h.
 /// Errors       kBadConfig.

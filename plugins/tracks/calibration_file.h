@@ -15,8 +15,8 @@
 
 namespace alidade {
 
-/// The `calibration.yaml` next to tracks or images, under the keys by which models ask. It has one of
-/// these forms:
+/// The `calibration.yaml` next to tracks or images, under the keys by which models ask. It has one
+/// of these forms:
 ///
 ///   written as                                        key
 ///   camera: {width, height, fx, fy, cx, cy, ...}      camera.*, as `alidade simulate` writes it

@@ -21,8 +21,8 @@ using testing::Contains;
 using testing::Outcome;
 
 /// A camera with faults in front of a wall, from which features are followed. Image k shows the
-/// wall from (u, v) = shown_[k] on: a point that image j has at p is at p + shown_[j] - shown_[k] in
-/// image k. So each measurement is known to be true or false.
+/// wall from (u, v) = shown_[k] on: a point that image j has at p is at p + shown_[j] - shown_[k]
+/// in image k. So each measurement is known to be true or false.
 class ImageFaults : public testing::ProgramTest {
  protected:
   static constexpr int kImages = 20, kFeatures = 40;

@@ -422,7 +422,8 @@ TEST_F(StereoTarget, ABoardOfAChessIsAsFarAsItsCornersSay) {
     cv::FileStorage stereo((folder_ / "stereo.yml").string(), cv::FileStorage::WRITE);
     stereo << "M1" << m1 << "D1" << d1 << "M2" << m2 << "D2" << d2 << "R" << r << "T" << t;
   }
-  // In the rectified left camera, where the source measures: the middle of the board, by its corners.
+  // In the rectified left camera, where the source measures: the middle of the board, by its
+  // corners.
   cv::Mat r1, r2, p1, p2, q;
   cv::stereoRectify(m1, d1, m2, d2, size, r, t, r1, r2, p1, p2, q, cv::CALIB_ZERO_DISPARITY, 0.0);
   std::vector<double> depth_m;

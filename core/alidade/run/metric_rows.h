@@ -25,7 +25,8 @@ std::vector<std::string> SubjectsOf(const Experiment& experiment);
 /// At most ten rows of ComparisonRows, those that matter most, in its order; all of them if they
 /// are no more. `diverged` and `inconsistent` are two. The others are dealt out in turns: the first
 /// subject's rmse, nees.mean, nis.mean, accepted, coverage95, map.rmse, map.sim3.rmse and
-/// reprojection, then the second subject's, and so on. Segments are left out; unknown subjects come last, by name.
+/// reprojection, then the second subject's, and so on. Segments are left out; unknown subjects come
+/// last, by name.
 std::vector<TableRow> MainRows(const RunResult& result, const std::vector<std::string>& subjects);
 /// ComparisonTable() of these rows, with the number of those left out.
 std::string MainTable(const RunResult& result, const std::vector<std::string>& subjects);

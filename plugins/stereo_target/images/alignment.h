@@ -33,8 +33,8 @@ inline cv::Point2d Middle(const cv::Mat& patch) {
 inline double HalfSide(const cv::Mat& patch) { return 0.5 * std::max(patch.cols, patch.rows); }
 
 /// warp U (I + sum_i d_i E_i) U^-1: small changes d of the patch in coordinates that are 0 in its
-/// middle and 1 at its edge (U takes them to pixels). E_0 to E_7: size, turn, shift right, shift down,
-/// stretch, shear, and the two projective ones.
+/// middle and 1 at its edge (U takes them to pixels). E_0 to E_7: size, turn, shift right, shift
+/// down, stretch, shear, and the two projective ones.
 inline cv::Matx33d Changed(const cv::Matx33d& warp, const cv::Mat& patch,
                            const Eigen::Ref<const Eigen::VectorXd>& d) {
   std::array<double, 8> all{};
@@ -97,9 +97,9 @@ struct Alignment {
 ///
 ///   patch(x) = a (seen(x; warp) + J d) + b + e,   J = d seen / d d
 ///
-/// is solved for the change d of the warp and the light (a, b) by weighted least squares, until d is
-/// small. (With a and b on the patch's side a warp to any flat place would do, with a = 0.) Pixels
-/// with a large e, by Huber's loss, count less: of what is in front of the target.
+/// is solved for the change d of the warp and the light (a, b) by weighted least squares, until d
+/// is small. (With a and b on the patch's side a warp to any flat place would do, with a = 0.)
+/// Pixels with a large e, by Huber's loss, count less: of what is in front of the target.
 class PatchAlignment {
  public:
   PatchAlignment(const cv::Mat& patch, const cv::Mat& image, Warp kind)
@@ -164,8 +164,8 @@ class PatchAlignment {
     return std::abs(error) <= kHuber * spread_ ? 1.0 : kHuber * spread_ / std::abs(error);
   }
 
-  /// What is seen at each pixel of the patch. cv::warpPerspective rounds places to 1/32 px, in which
-  /// the alignment would not settle.
+  /// What is seen at each pixel of the patch. cv::warpPerspective rounds places to 1/32 px, in
+  /// which the alignment would not settle.
   void Sample(const cv::Matx33d& warp) {
     seen_.create(patch_.size(), CV_32F);
     const int most_column = image_.cols - 2, most_row = image_.rows - 2;
@@ -275,10 +275,10 @@ class PatchAlignment {
   std::vector<double> errors_;
 };
 
-/// Finds `patch`, grey as float, near where `warp` puts it in `image`, 8 bit grey, to a fraction of a
-/// pixel. Brightness and contrast may change. Where that does not settle, or on what is hardly alike,
-/// it is tried again from where the same images a quarter as large settle, which may be farther off.
-/// None where PatchAlignment::Run() fails in both.
+/// Finds `patch`, grey as float, near where `warp` puts it in `image`, 8 bit grey, to a fraction of
+/// a pixel. Brightness and contrast may change. Where that does not settle, or on what is hardly
+/// alike, it is tried again from where the same images a quarter as large settle, which may be
+/// farther off. None where PatchAlignment::Run() fails in both.
 inline std::optional<Alignment> Align(const cv::Mat& patch, const cv::Mat& image,
                                       const cv::Matx33d& warp, Warp kind) {
   constexpr int kShrink = 4, kLeastSide = 16;

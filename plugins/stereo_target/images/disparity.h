@@ -43,9 +43,9 @@ struct Disparity {
   double value, variance;
 };
 
-/// The target in `box` of the left image, found in the same rows of the right one: by correlation at
-/// each disparity, then by alignment, whose slant takes up that of the target. `middle` is the point
-/// whose disparity it is. None: no texture, no match, two matches, or part of it is not seen.
+/// The target in `box` of the left image, found in the same rows of the right one: by correlation
+/// at each disparity, then by alignment, whose slant takes up that of the target. `middle` is the
+/// point whose disparity it is. None: no texture, no match, two matches, or part of it is not seen.
 inline std::optional<Disparity> FindDisparity(const cv::Mat& left, const cv::Mat& right,
                                               const cv::Rect2d& box, cv::Point2d middle,
                                               const DisparityOptions& options) {

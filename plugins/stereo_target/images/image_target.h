@@ -31,11 +31,11 @@ namespace alidade {
 /// Each comes with its variance, unless `estimate_noise` is false:
 ///
 ///   of d            var(d) + sigma^2
-///   of s            var(s) + (2 sigma s / w)^2,   w = sqrt(width height) of the target in the image
+///   of s            var(s) + (2 sigma s / w)^2,   w = sqrt(width height) of the target in it
 ///
-/// with sigma the config's sigma_systematic_px: what calibration, interpolation and the target itself
-/// are off by, which no residual tells. var() is that of the alignment. The errors of s since the
-/// template was taken have that of the template in common, which no filter here models.
+/// with sigma the config's sigma_systematic_px: what calibration, interpolation and the target
+/// itself are off by, which no residual tells. var() is that of the alignment. The errors of s
+/// since the template was taken have that of the template in common, which no filter here models.
 ///
 /// A target that is lost, hidden or black gives no measurement, and is looked for in each image.
 ///

@@ -14,9 +14,9 @@
 /// The tables next to the images of a target, read along with them.
 namespace alidade {
 
-/// Where the target is: `frame,x,y,width,height` or `frame,x0,y0,...,x3,y3`, clockwise from the upper
-/// left, px; frames count from 0 and increase. A row of `nan` says that it is not seen. A header may
-/// stand first.
+/// Where the target is: `frame,x,y,width,height` or `frame,x0,y0,...,x3,y3`, clockwise from the
+/// upper left, px; frames count from 0 and increase. A row of `nan` says that it is not seen. A
+/// header may stand first.
 class BoxRows {
  public:
   using Corners = std::array<cv::Point2f, 4>;
@@ -96,7 +96,8 @@ class BoxRows {
   std::optional<Corners> next_;
 };
 
-/// True values under a header `t_s,NAME,...`, each a number; times increase. An empty cell is unknown.
+/// True values under a header `t_s,NAME,...`, each a number; times increase. An empty cell is
+/// unknown.
 class TruthRows {
  public:
   TruthRows(const std::filesystem::path& path, const Place& place, const std::string& key)
@@ -109,8 +110,8 @@ class TruthRows {
   }
 
   const std::vector<std::string>& names() const { return names_; }
-  /// The values at the row nearest to `timestamp`, where it is within `tolerance`; of two as near the
-  /// earlier. An empty one is unknown. Timestamps are asked for in order.
+  /// The values at the row nearest to `timestamp`, where it is within `tolerance`; of two as near
+  /// the earlier. An empty one is unknown. Timestamps are asked for in order.
   std::vector<std::vector<double>> At(Timestamp timestamp, Timestamp tolerance) {
     // As floating-point numbers, whose difference does not overflow.
     const auto off = [timestamp](Timestamp other) {

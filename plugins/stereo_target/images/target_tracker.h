@@ -67,8 +67,8 @@ class TargetTracker {
   TargetTracker(const TargetOptions& options, const std::optional<cv::Matx33d>& intrinsics)
       : options_(options), intrinsics_(intrinsics) {}
 
-  /// The target in the next image; none where it is not measured. `corners`: where it is said to be;
-  /// without them there is none until a first image had them, and texture in them.
+  /// The target in the next image; none where it is not measured. `corners`: where it is said to
+  /// be; without them there is none until a first image had them, and texture in them.
   std::optional<Seen> Track(const cv::Mat& image, const std::optional<Corners>& corners) {
     std::optional<Seen> seen;
     if (corners) {
@@ -147,8 +147,8 @@ class TargetTracker {
     outline_ = outline;
   }
 
-  /// From where the target is followed to; where it cannot be followed, from where it was, and it is
-  /// lost if it is not there.
+  /// From where the target is followed to; where it cannot be followed, from where it was, and it
+  /// is lost if it is not there.
   std::optional<Seen> FollowAndMeasure(const cv::Mat& image) {
     constexpr double kArea = 1.2;
     const std::optional<Corners> followed = Follow(image);
@@ -207,8 +207,9 @@ class TargetTracker {
   }
 
   /// Size of the target where the template was taken / size under `warp`. Of a plane under a
-  /// homography the depth of its middle x under `warp` / then: H = s (R + t n' / d) takes x, of third
-  /// element 1, to s Z / Z0 times its image, and s is the middle singular value of H [Ma2004].
+  /// homography the depth of its middle x under `warp` / then: H = s (R + t n' / d) takes x, of
+  /// third element 1, to s Z / Z0 times its image, and s is the middle singular value of H
+  /// [Ma2004].
   double InverseScale(const Template& one, const cv::Matx33d& warp) const {
     const cv::Point2d middle = Middle(one.patch);
     if (options_.warp != Warp::kHomography) {
@@ -246,8 +247,8 @@ class TargetTracker {
            cv::Rect2f({0.0F, 0.0F}, cv::Size2f(size)).contains(middle);
   }
 
-  /// By a grid of its points from the image before, the better half of them by where they are followed
-  /// back to [Kalal2010], and the similarity that most agree on; none where too few do.
+  /// By a grid of its points from the image before, the better half of them by where they are
+  /// followed back to [Kalal2010], and the similarity that most agree on; none where too few do.
   std::optional<Corners> Follow(const cv::Mat& image) const {
     constexpr int kGrid = 12, kFewest = 8, kWindow = 15, kLevels = 4;
     constexpr double kBack = 2.0, kAgree = 1.5;  // px

@@ -181,9 +181,9 @@ class FeatureTracker {
     }
   }
 
-  /// The point of a patch that stays with it when it grows, turns or is sheared, and not only when it
-  /// is shifted [Forstner1987]: p = (sum g g')^-1 sum g g' x, g the gradient at x. A patch about any
-  /// other point would be followed to a point that drifts from it.
+  /// The point of a patch that stays with it when it grows, turns or is sheared, and not only when
+  /// it is shifted [Forstner1987]: p = (sum g g')^-1 sum g g' x, g the gradient at x. A patch about
+  /// any other point would be followed to a point that drifts from it.
   cv::Point2f FindPoint(const cv::Mat& image, cv::Point2f at) {
     constexpr int kMost = 5;
     constexpr float kFarthest = 6.0F, kSettled = 0.02F;  // px

@@ -12,14 +12,14 @@
 namespace alidade {
 
 /// The patch about a feature where it was found, to which it is aligned in each image, so that the
-/// errors of following it from image to image do not add up. All that does not depend on the image is
-/// prepared once: the inverse compositional algorithm [Baker2004],
+/// errors of following it from image to image do not add up. All that does not depend on the image
+/// is prepared once: the inverse compositional algorithm [Baker2004],
 ///
 ///   e(x) = a seen(A x + t) + b - patch(x),   d = (J' J)^-1 J' e,   (A, t) <- (A, t) (I + D)^-1
 ///
 /// with x counted from the middle of the patch, in units of half its side, J the derivative of the
-/// patch by the six numbers of D, without the part that a change of light explains, and a and b those
-/// that give `seen` the mean and the variance of the patch.
+/// patch by the six numbers of D, without the part that a change of light explains, and a and b
+/// those that give `seen` the mean and the variance of the patch.
 class FoundPatch {
  public:
   FoundPatch() = default;
@@ -85,8 +85,8 @@ class FoundPatch {
     return false;
   }
 
-  /// Correlation with what is seen at `at` under the shape of the last alignment, in [-1, 1]; -1 off
-  /// the image.
+  /// Correlation with what is seen at `at` under the shape of the last alignment, in [-1, 1]; -1
+  /// off the image.
   float Similarity(const cv::Mat& image, cv::Point2f at) {
     if (!Look(image, shape_, {at.x, at.y}) || !(length_ > 0.0F)) return -1.0F;
     return seen_.dot(patch_) / (length_ * length_);

@@ -23,10 +23,10 @@ namespace alidade {
 /// frames counted from 0), or else rate_hz gives image k the time k / rate; `groundtruth.tum` or
 /// `truth.tum` (world_from_cam); and `calibration.yaml`, see CalibrationFile.
 ///
-///   stream   size  values  when
-///   tracks   2     u, v    a feature is followed; the landmark is its id
-///   known    3     u, v, depth   there is a table `known`: of its points in the first image, in place
-///                                of their first observation
+///   stream   size  values       when
+///   tracks   2     u, v         a feature is followed; the landmark is its id
+///   known    3     u, v, depth  of the points of a table `known` in the first image, in place of
+///                               their first observation
 ///
 /// Keys         kImageTracksKeys (tracks.cc), those of TrackerOptions.
 /// Errors       those of ImageReader, TimestampRows and TumRows; kBadConfig.

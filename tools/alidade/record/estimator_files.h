@@ -13,9 +13,10 @@
 namespace alidade::internal {
 
 /// The files of one estimator that grow frame by frame: `estimates.csv`, `innovations.csv`,
-/// `gains.csv`, of blocks with truth `errors.csv`, of sensors of landmarks `reprojection.csv`, and of blocks X.position and
-/// X.orientation `trajectory.tum`, with a covariance `trajectory_covariance.tum`. They hold the
-/// blocks and sensors that the system has from the start.
+/// `gains.csv`, of blocks with truth `errors.csv`, of sensors of landmarks `reprojection.csv`, and
+/// of blocks X.position and X.orientation `trajectory.tum`, with a covariance
+/// `trajectory_covariance.tum`. They hold the blocks and sensors that the system has from the
+/// start.
 class EstimatorFiles {
  public:
   /// `truth_columns` names the columns of truth.csv, by truth and element; `covariances` asks for

@@ -28,8 +28,9 @@ GnuplotResult DrawFigure(const OutputFolder& folder, const std::string& name,
                          const std::vector<std::string>& arguments, const DrawingLimits& limits);
 
 /// Draws what the csv files hold: the measurements and what they tell, the estimators side by side,
-/// and for each estimator its errors, state, variances, gains and innovations. The scripts are all written,
-/// and first. What gnuplot cannot do, or not within the limits, is noted, no error. Errors: kIo.
+/// and for each estimator its errors, state, variances, gains and innovations. The scripts are all
+/// written, and first. What gnuplot cannot do, or not within the limits, is noted, no error.
+/// Errors: kIo.
 Figures DrawFigures(const OutputFolder& folder, const RecordedRun& run,
                     const DrawingLimits& limits);
 

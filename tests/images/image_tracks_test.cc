@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <map>
 #include <opencv2/core.hpp>
@@ -361,6 +363,39 @@ estimators: {ekf: {type: ekf, gate: 0.999}}
   const Outcome rim = Call({"run", "config.yaml", "-o", "run", "--force"});
   EXPECT_EQ(rim.code, 65);
   EXPECT_TRUE(Contains(rim.err, "known.csv:2: the point is not on the image")) << rim.err;
+}
+
+// Example 29: the target on the desk of MonoSLAM is 0.21 m wide and 0.1485 m high.
+TEST_F(ImageTracks, AKnownTargetGivesARecordedDeskItsScale) {
+  const char* const data = std::getenv("ALIDADE_DATA");
+  const std::filesystem::path frames =
+      std::filesystem::path(data == nullptr ? "" : data) / "mono-davison-desk/frames";
+  if (data == nullptr || !std::filesystem::exists(frames)) {
+    GTEST_SKIP() << "ALIDADE_DATA has no mono-davison-desk";
+  }
+  const std::string example =
+      std::string(ALIDADE_SOURCE_DIR) + "/examples/29_slam_recorded_images/config.yaml";
+  const Outcome run = Call(
+      {"run", example, "--set", "source.path=" + frames.string(), "-o", "run", "--no-figures"});
+  ASSERT_EQ(run.code, 0) << run.err;
+  std::map<int, std::array<double, 3>> place;
+  std::istringstream rows(Read("run/ekf/landmarks.csv"));
+  std::string row;
+  while (std::getline(rows, row)) {
+    int id = 0, generation = 0;
+    double x = 0.0, y = 0.0, z = 0.0;
+    if (std::sscanf(row.c_str(), "%d,%d,inverse_depth,%lf,%lf,%lf", &id, &generation, &x, &y, &z) ==
+        5) {
+      place[id] = {x, y, z};
+    }
+  }
+  const auto length = [&](int from, int to) {
+    const auto& a = place.at(from);
+    const auto& b = place.at(to);
+    return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+  };
+  EXPECT_NEAR(0.5 * (length(0, 1) + length(2, 3)), 0.21, 0.02 * 0.21);
+  EXPECT_NEAR(0.5 * (length(0, 2) + length(1, 3)), 0.1485, 0.02 * 0.1485);
 }
 
 }  // namespace

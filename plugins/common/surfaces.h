@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -64,79 +65,105 @@ inline double Brightness(const Rectangle& rectangle, double x, double y, double 
   return std::clamp(0.5 + kContrast * sum / std::sqrt(squares), 0.0, 1.0);
 }
 
-/// What a camera at `position`, `orientation` (world_from_cam, w x y z) sees of the nearest
-/// surface, with grey noise N(0, noise_grey^2); black where there is none. One ray for a pixel, at
-/// edges the mean of 4 x 4.
-inline GreyImage Render(const std::vector<Rectangle>& surfaces, const Camera& camera,
-                        const double* position, const double* orientation, double noise_grey,
-                        Random& noise) {
-  struct Plane {
-    Eigen::Vector3d normal, right, down;  ///< unit normal; edges by their squared length
-    double distance, width, height;       ///< of the camera, m, signed; m
-  };
-  std::vector<Plane> planes;
-  const Eigen::Vector3d eye(position[0], position[1], position[2]);
-  for (const Rectangle& one : surfaces) {
-    const Eigen::Vector3d normal = one.right.cross(one.down).normalized();
-    planes.push_back({normal, one.right / one.right.squaredNorm(),
-                      one.down / one.down.squaredNorm(), normal.dot(one.corner - eye),
-                      one.right.norm(), one.down.norm()});
+/// What one ray meets.
+struct Met {
+  int surface = -1;  ///< -1: none
+  double brightness = 0.0;
+};
+
+/// A camera at `position`, `orientation` (world_from_cam, w x y z), before surfaces.
+class SurfaceView {
+ public:
+  SurfaceView(const std::vector<Rectangle>& surfaces, const Camera& camera, const double* position,
+              const double* orientation)
+      : surfaces_(surfaces),
+        camera_(camera),
+        eye_(position[0], position[1], position[2]),
+        orientation_{orientation[0], orientation[1], orientation[2], orientation[3]} {
+    for (const Rectangle& one : surfaces) {
+      const Eigen::Vector3d normal = one.right.cross(one.down).normalized();
+      planes_.push_back({normal, one.right / one.right.squaredNorm(),
+                         one.down / one.down.squaredNorm(), normal.dot(one.corner - eye_),
+                         one.right.norm(), one.down.norm()});
+    }
   }
-  struct Sample {
-    int surface = -1;
-    double brightness = 0.0;
-  };
-  const auto see = [&](double u, double v) {
+
+  /// The nearest surface on the ray through pixel (u, v).
+  Met Look(double u, double v) const {
     const double z[2] = {u, v};
     double h[3];
-    Sample sample;
-    if (!camera.Unproject(z, h)) return sample;
+    Met met;
+    if (!camera_.Unproject(z, h)) return met;
     Eigen::Vector3d ray;
-    UnitQuaternion::Rotate(orientation, h, ray.data());
+    UnitQuaternion::Rotate(orientation_.data(), h, ray.data());
     double nearest = std::numeric_limits<double>::infinity(), right = 0.0, down = 0.0;
-    for (std::size_t i = 0; i < planes.size(); ++i) {
-      const Plane& plane = planes[i];
+    for (std::size_t i = 0; i < planes_.size(); ++i) {
+      const Plane& plane = planes_[i];
       const double along = plane.distance / plane.normal.dot(ray);
       if (!(along > 0.0) || !(along < nearest)) continue;
-      const Eigen::Vector3d at = eye + along * ray - surfaces[i].corner;
+      const Eigen::Vector3d at = eye_ + along * ray - surfaces_[i].corner;
       const double a = plane.right.dot(at), b = plane.down.dot(at);
       if (a < 0.0 || a > 1.0 || b < 0.0 || b > 1.0) continue;
       nearest = along;
       right = a * plane.width;
       down = b * plane.height;
-      sample.surface = static_cast<int>(i);
+      met.surface = static_cast<int>(i);
     }
-    if (sample.surface < 0) return sample;
-    const auto index = static_cast<std::size_t>(sample.surface);
+    if (met.surface < 0) return met;
+    const auto index = static_cast<std::size_t>(met.surface);
     const double length = ray.norm();
-    const double cosine = std::max(std::abs(planes[index].normal.dot(ray)) / length, 0.05);
-    sample.brightness =
-        Brightness(surfaces[index], right, down, nearest * length / (camera.fx * cosine));
-    return sample;
-  };
-  std::vector<Sample> samples;
-  for (int v = 0; v < camera.height; ++v) {
-    for (int u = 0; u < camera.width; ++u) samples.push_back(see(u, v));
+    const double cosine = std::max(std::abs(planes_[index].normal.dot(ray)) / length, 0.05);
+    met.brightness =
+        Brightness(surfaces_[index], right, down, nearest * length / (camera_.fx * cosine));
+    return met;
   }
-  // A texture is smooth over a pixel, an edge is not.
-  const auto surface = [&](int u, int v) {
-    const int column = std::clamp(u, 0, camera.width - 1),
-              row = std::clamp(v, 0, camera.height - 1);
-    return samples[static_cast<std::size_t>(row * camera.width + column)].surface;
+
+  /// Of the whole pixel, which an edge passes: the mean of 4 x 4 rays.
+  double Mean(int u, int v) const {
+    constexpr double kOffsets[] = {-0.375, -0.125, 0.125, 0.375};
+    double sum = 0.0;
+    for (const double du : kOffsets) {
+      for (const double dv : kOffsets) sum += Look(u + du, v + dv).brightness;
+    }
+    return sum / 16.0;
+  }
+
+ private:
+  struct Plane {
+    Eigen::Vector3d normal, right, down;  ///< unit normal; edges by their squared length
+    double distance, width, height;       ///< of the camera, m, signed; m
+  };
+  const std::vector<Rectangle>& surfaces_;
+  const Camera& camera_;
+  Eigen::Vector3d eye_;
+  std::array<double, 4> orientation_;
+  std::vector<Plane> planes_;
+};
+
+/// What a camera at `position`, `orientation` (world_from_cam, w x y z) sees of the nearest
+/// surface, with grey noise N(0, noise_grey^2); black where there is none. One ray for a pixel, at
+/// edges the mean of 4 x 4: a texture is smooth over a pixel, an edge is not.
+inline GreyImage Render(const std::vector<Rectangle>& surfaces, const Camera& camera,
+                        const double* position, const double* orientation, double noise_grey,
+                        Random& noise) {
+  const SurfaceView view(surfaces, camera, position, orientation);
+  std::vector<Met> all;
+  for (int v = 0; v < camera.height; ++v) {
+    for (int u = 0; u < camera.width; ++u) all.push_back(view.Look(u, v));
+  }
+  const auto at = [&](int u, int v) {
+    const auto column = static_cast<std::size_t>(std::clamp(u, 0, camera.width - 1));
+    const auto row = static_cast<std::size_t>(std::clamp(v, 0, camera.height - 1));
+    return all[row * static_cast<std::size_t>(camera.width) + column];
   };
   GreyImage image{camera.width, camera.height, {}};
   for (int v = 0; v < camera.height; ++v) {
     for (int u = 0; u < camera.width; ++u) {
-      const Sample& own = samples[static_cast<std::size_t>(v * camera.width + u)];
-      double brightness = own.brightness;
-      if (surface(u - 1, v) != own.surface || surface(u + 1, v) != own.surface ||
-          surface(u, v - 1) != own.surface || surface(u, v + 1) != own.surface) {
-        brightness = 0.0;
-        for (int k = 0; k < 16; ++k) {
-          brightness += see(u + 0.25 * (k % 4) - 0.375, v + 0.25 * (k / 4) - 0.375).brightness / 16;
-        }
-      }
-      double grey = 255.0 * brightness;
+      const Met own = at(u, v);
+      const bool edge = at(u - 1, v).surface != own.surface ||
+                        at(u + 1, v).surface != own.surface ||
+                        at(u, v - 1).surface != own.surface || at(u, v + 1).surface != own.surface;
+      double grey = 255.0 * (edge ? view.Mean(u, v) : own.brightness);
       if (noise_grey > 0.0) grey += noise_grey * noise.Normal();
       image.pixels.push_back(static_cast<std::uint8_t>(std::clamp(grey + 0.5, 0.0, 255.0)));
     }

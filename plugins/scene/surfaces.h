@@ -37,7 +37,9 @@ inline std::vector<Rectangle> ReadSurfaces(const Node& list) {
     if (kind == "box") {
       AddFaces(Box(what), grain_m, surfaces);
     } else {
-      const auto read = [&](const char* key) { return ReadVector(what.At(key, "a rectangle")); };
+      const auto read = [&at = what](const char* key) {
+        return ReadVector(at.At(key, "a rectangle"));
+      };
       const Rectangle one{read("corner"), read("right"), read("down"), grain_m, surfaces.size()};
       const double area = one.right.norm() * one.down.norm();
       if (!(area > 0.0) || std::abs(one.right.dot(one.down)) > 1e-6 * area) {

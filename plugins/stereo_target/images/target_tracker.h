@@ -256,7 +256,8 @@ class TargetTracker {
     const cv::Matx33d to_image = cv::getPerspectiveTransform(unit.data(), outline_.data());
     std::vector<cv::Point2f> from, to, back;
     for (int i = 0; i < kGrid * kGrid; ++i) {
-      const cv::Point2d at((i % kGrid + 0.5) / kGrid, (i / kGrid + 0.5) / kGrid);
+      const int row = i / kGrid;
+      const cv::Point2d at((i % kGrid + 0.5) / kGrid, (row + 0.5) / kGrid);
       from.emplace_back(Apply(to_image, at));
     }
     std::vector<unsigned char> found, found_back, inlier;

@@ -188,7 +188,7 @@ class FeatureTracker {
     constexpr int kMost = 5;
     constexpr float kFarthest = 6.0F, kSettled = 0.02F;  // px
     const cv::Point2f start = at;
-    const int side = options_.window_px | 1;
+    const int side = options_.window_px | 1, middle = 1 + side / 2;
     for (int i = 0; i < kMost; ++i) {
       cv::getRectSubPix(image, cv::Size(side + 2, side + 2), at, patch_, CV_32F);
       cv::Matx22d normal = cv::Matx22d::zeros();
@@ -197,7 +197,7 @@ class FeatureTracker {
         for (int x = 1; x <= side; ++x) {
           const double gx = patch_.at<float>(y, x + 1) - patch_.at<float>(y, x - 1);
           const double gy = patch_.at<float>(y + 1, x) - patch_.at<float>(y - 1, x);
-          const double along = gx * (x - 1 - side / 2) + gy * (y - 1 - side / 2);
+          const double along = gx * (x - middle) + gy * (y - middle);
           normal += cv::Matx22d(gx * gx, gx * gy, gx * gy, gy * gy);
           right += along * cv::Vec2d(gx, gy);
         }

@@ -160,7 +160,9 @@ class CalibrationFile {
 
   void ReadIntrinsics(const Node& root) {
     const auto intrinsics = root.Find("intrinsics_px");
-    if (!intrinsics) root.Fail("no calibration of a camera", "'camera' or 'intrinsics_px'");
+    if (!intrinsics)
+      root.Fail("no calibration of a camera",
+                "'camera', 'intrinsics_px', or a file of OpenCV, ROS, Kalibr or EuRoC");
     for (const char* key : {"fx", "fy", "cx", "cy"}) {
       Copy(intrinsics->At(key), std::string("camera.") + key);
     }

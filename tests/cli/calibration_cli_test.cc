@@ -215,12 +215,12 @@ TEST_F(CalibrationCli, ACalibrationThatIsNotUnderstoodIsRefused) {
   EXPECT_EQ(lens.code, 65);
   EXPECT_TRUE(Contains(lens.err, "drive/calibration.yaml:8:1 distortion: unknown key")) << lens.err;
   EXPECT_TRUE(Contains(lens.err, "; 'source.calibration: ignore' does without it\n")) << lens.err;
-  WriteTracks("cam0: {intrinsics: [500, 510, 320, 240]}\n");
+  WriteTracks("front: {intrinsics: [500, 510, 320, 240]}\n");
   const Outcome other = Run("slam.yaml");
   EXPECT_EQ(other.code, 65);
   EXPECT_TRUE(Contains(other.err,
-                       "no calibration of a camera; expected 'camera' or "
-                       "'intrinsics_px'"))
+                       "no calibration of a camera; expected 'camera', 'intrinsics_px', or a file "
+                       "of OpenCV, ROS, Kalibr or EuRoC"))
       << other.err;
 }
 

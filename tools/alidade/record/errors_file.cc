@@ -13,7 +13,8 @@ std::vector<bool> AreAngles(const Geometry& geometry) {
   std::vector<bool> angles(static_cast<std::size_t>(geometry.tangent), false);
   geometry.ForEachPart([&](const Geometry& part, int, int first) {
     for (int i = 0; i < part.tangent; ++i) {
-      angles[static_cast<std::size_t>(first + i)] = part.kind != GeometryKind::kVector;
+      angles[static_cast<std::size_t>(first) + static_cast<std::size_t>(i)] =
+          part.kind != GeometryKind::kVector;
     }
   });
   return angles;

@@ -240,8 +240,8 @@ TEST_F(ImageTracks, StandStillInAFrozenImage) {
   for (const Seen& one : found.at(9)) {
     if (!before.contains(one.feature)) continue;
     ++again;
-    EXPECT_NEAR(one.u, before[one.feature].u, 5e-3);
-    EXPECT_NEAR(one.v, before[one.feature].v, 5e-3);
+    EXPECT_NEAR(one.u, before[one.feature].u, 1e-3);
+    EXPECT_NEAR(one.v, before[one.feature].v, 1e-3);
   }
   EXPECT_EQ(again, static_cast<int>(before.size()));
 }

@@ -275,18 +275,16 @@ class PatchAlignment {
   std::vector<double> errors_;
 };
 
-/// Finds `patch`, grey as float, near where `warp` puts it in `image`, 8 bit grey, to a fraction of
-/// a pixel. Brightness and contrast may change. Where that does not settle, or on what is hardly
+/// Finds `patch` near where `warp` puts it in `image`, both grey as float, to a fraction of a
+/// pixel. Brightness and contrast may change. Where that does not settle, or on what is hardly
 /// alike, it is tried again from where the same images a quarter as large settle, which may be
 /// farther off. None where PatchAlignment::Run() fails in both.
 inline std::optional<Alignment> Align(const cv::Mat& patch, const cv::Mat& image,
                                       const cv::Matx33d& warp, Warp kind) {
   constexpr int kShrink = 4, kLeastSide = 16;
   constexpr double kAlike = 0.95;
-  cv::Mat grey;
-  image.convertTo(grey, CV_32F);
   const auto settle = [&](cv::Matx33d from) -> std::optional<Alignment> {
-    PatchAlignment alignment(patch, grey, kind);
+    PatchAlignment alignment(patch, image, kind);
     if (!alignment.Run(from)) return std::nullopt;
     return alignment.Result(from);
   };
@@ -298,7 +296,7 @@ inline std::optional<Alignment> Align(const cv::Mat& patch, const cv::Mat& image
   const cv::Matx33d from_small(k, 0.0, kOffset, 0.0, k, kOffset, 0.0, 0.0, 1.0);
   cv::Mat small_patch, small_image;
   cv::resize(patch, small_patch, {}, 1.0 / k, 1.0 / k, cv::INTER_AREA);
-  cv::resize(grey, small_image, {}, 1.0 / k, 1.0 / k, cv::INTER_AREA);
+  cv::resize(image, small_image, {}, 1.0 / k, 1.0 / k, cv::INTER_AREA);
   cv::Matx33d small = from_small.inv() * start * from_small;
   if (!PatchAlignment(small_patch, small_image, kind).Run(small)) return near;
   const std::optional<Alignment> far = settle(from_small * small * from_small.inv());

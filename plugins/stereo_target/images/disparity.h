@@ -73,7 +73,9 @@ inline std::optional<Disparity> FindDisparity(const cv::Mat& left, const cv::Mat
     if ((x < low || x > high) && score(x) > best - options.least_distinct) return std::nullopt;
   }
   const cv::Matx33d guess(1.0, 0.0, from + at.x, 0.0, 1.0, place.y, 0.0, 0.0, 1.0);
-  const auto found = Align(patch, right, guess, Warp::kAffine);
+  cv::Mat grey;
+  right.convertTo(grey, CV_32F);
+  const auto found = Align(patch, grey, guess, Warp::kAffine);
   if (!found || found->similarity < options.least_similarity) return std::nullopt;
   const cv::Point2d in_patch = middle - cv::Point2d(place.tl());
   const auto column = [&](const cv::Matx33d& warp) { return Apply(warp, in_patch).x; };

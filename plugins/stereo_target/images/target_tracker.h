@@ -71,17 +71,18 @@ class TargetTracker {
   /// be; without them there is none until a first image had them, and texture in them.
   std::optional<Seen> Track(const cv::Mat& image, const std::optional<Corners>& corners) {
     std::optional<Seen> seen;
+    image.convertTo(grey_, CV_32F);
     if (corners) {
       const Corners inner = Inset(*corners);
       const bool first = templates_.empty();
-      if (first) TakeTemplate(image, inner, 1.0, 0.0);
-      seen = Measure(image, inner, options_.least_similarity, kGuessedArea);
+      if (first) TakeTemplate(inner, 1.0, 0.0);
+      seen = Measure(inner, options_.least_similarity, kGuessedArea);
       lost_ = false;
       if (!seen) outline_ = inner;
       if (first && !seen) templates_.clear();  // without texture it is like nothing
     } else if (!templates_.empty()) {
       if (!lost_) seen = FollowAndMeasure(image);
-      if (lost_) seen = SearchAndMeasure(image);
+      if (lost_) seen = SearchAndMeasure();
     }
     unseen_ = seen ? 0 : unseen_ + 1;
     image.copyTo(before_);
@@ -104,15 +105,16 @@ class TargetTracker {
   /// Leaves out the rim, which mixes with what is behind the target, and would pull the size.
   static Corners Inset(const Corners& corners) {
     constexpr float kShare = 0.04F;
-    const Corners unit{cv::Point2f(0.0F, 0.0F), {1.0F, 0.0F}, {1.0F, 1.0F}, {0.0F, 1.0F}};
-    const cv::Matx33d warp = cv::getPerspectiveTransform(unit.data(), corners.data());
-    Corners inner;
-    std::ranges::transform(unit, inner.begin(), [&](cv::Point2f at) {
-      return cv::Point2f(Apply(warp, (1.0F - 2.0F * kShare) * at + cv::Point2f(kShare, kShare)));
-    });
-    return inner;
+    constexpr float kRest = 1.0F - kShare;
+    return Moved(FromUnit(corners),
+                 {cv::Point2f(kShare, kShare), {kRest, kShare}, {kRest, kRest}, {kShare, kRest}});
   }
 
+  /// From the unit square, its upper left corner first.
+  static cv::Matx33d FromUnit(const Corners& corners) {
+    const Corners unit{cv::Point2f(0.0F, 0.0F), {1.0F, 0.0F}, {1.0F, 1.0F}, {0.0F, 1.0F}};
+    return cv::getPerspectiveTransform(unit.data(), corners.data());
+  }
   static Corners CornersOf(const cv::Mat& patch) {
     const auto right = static_cast<float>(patch.cols - 1);
     const auto bottom = static_cast<float>(patch.rows - 1);
@@ -128,7 +130,7 @@ class TargetTracker {
     return cv::contourArea(std::vector<cv::Point2f>(corners.begin(), corners.end()));
   }
 
-  void TakeTemplate(const cv::Mat& image, const Corners& outline, double scale, double variance) {
+  void TakeTemplate(const Corners& outline, double scale, double variance) {
     const float width = 0.5F * static_cast<float>(cv::norm(outline[1] - outline[0]) +
                                                   cv::norm(outline[2] - outline[3]));
     const float height = 0.5F * static_cast<float>(cv::norm(outline[3] - outline[0]) +
@@ -136,9 +138,7 @@ class TargetTracker {
     const cv::Size size(std::max(8, cvRound(width)), std::max(8, cvRound(height)));
     Template taken{cv::Mat(size, CV_32F), {}, scale, variance};
     taken.taken = cv::getPerspectiveTransform(CornersOf(taken.patch).data(), outline.data());
-    cv::Mat grey;
-    image.convertTo(grey, CV_32F);
-    cv::warpPerspective(grey, taken.patch, taken.taken, size,
+    cv::warpPerspective(grey_, taken.patch, taken.taken, size,
                         cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
     if (templates_.size() == kTemplates) templates_.erase(templates_.begin() + 1);
     templates_.push_back(taken);
@@ -152,35 +152,34 @@ class TargetTracker {
   std::optional<Seen> FollowAndMeasure(const cv::Mat& image) {
     constexpr double kArea = 1.2;
     const std::optional<Corners> followed = Follow(image);
-    const auto seen = Measure(image, followed.value_or(outline_), options_.least_similarity, kArea);
+    const auto seen = Measure(followed.value_or(outline_), options_.least_similarity, kArea);
     lost_ = !seen && (!followed || unseen_ >= kPatience);
     if (followed && !seen) outline_ = *followed;
     return seen;
   }
 
   /// Anywhere in the image. It has to be more like the target than what is where it should be.
-  std::optional<Seen> SearchAndMeasure(const cv::Mat& image) {
-    const std::optional<Corners> guess = Search(image);
+  std::optional<Seen> SearchAndMeasure() {
+    const std::optional<Corners> guess = Search();
     if (!guess) return std::nullopt;
-    const auto seen = Measure(image, *guess, 0.5 * (1.0 + options_.least_similarity), kGuessedArea);
+    const auto seen = Measure(*guess, 0.5 * (1.0 + options_.least_similarity), kGuessedArea);
     lost_ = !seen;
     return seen;
   }
 
   /// From there, with the template that tells most of the size; with the first one alone if it fits
   /// well. Its area is at most `growth` times that of the guess, or as many times less.
-  std::optional<Seen> Measure(const cv::Mat& image, const Corners& guess, double least,
-                              double growth) {
+  std::optional<Seen> Measure(const Corners& guess, double least, double growth) {
     std::optional<Seen> best;
     double most_similar = -1.0;
     for (std::size_t i = 0; i < templates_.size(); ++i) {
       const Template& one = templates_[i];
       const Corners from = CornersOf(one.patch);
       const auto found = Align(
-          one.patch, image, cv::getPerspectiveTransform(from.data(), guess.data()), options_.warp);
+          one.patch, grey_, cv::getPerspectiveTransform(from.data(), guess.data()), options_.warp);
       if (!found || found->similarity < least) continue;
       const Corners outline = Moved(found->warp, from);
-      if (!IsSane(outline, guess, growth, image.size())) continue;
+      if (!IsSane(outline, guess, growth, grey_.size())) continue;
       most_similar = std::max(most_similar, found->similarity);
       const Seen seen = See(one, *found, outline);
       const auto relative = [](const Seen& of) {
@@ -192,7 +191,7 @@ class TargetTracker {
       outline_ = outline;
       if (i == 0 && found->similarity >= options_.refresh_similarity) break;
     }
-    if (best) Refresh(image, *best, most_similar);
+    if (best) Refresh(*best, most_similar);
     return best;
   }
 
@@ -225,15 +224,15 @@ class TargetTracker {
 
   /// Takes another template where none has fitted well for some images, or the target is far larger
   /// or smaller than in the one that is used.
-  void Refresh(const cv::Mat& image, const Seen& seen, double most_similar) {
+  void Refresh(const Seen& seen, double most_similar) {
     constexpr int kMisfits = 3;
     const double scale = seen.inverse_scale / templates_[last_].scale;
     const bool other_size = scale > options_.refresh_scale || scale < 1.0 / options_.refresh_scale;
     misfits_ = most_similar < options_.refresh_similarity ? misfits_ + 1 : 0;
     if (!other_size && misfits_ < kMisfits) return;
-    const cv::Rect2d whole(0.0, 0.0, image.cols, image.rows);
+    const cv::Rect2d whole(0.0, 0.0, grey_.cols, grey_.rows);
     if ((seen.box & whole).area() < seen.box.area()) return;  // part of it is not seen
-    TakeTemplate(image, outline_, seen.inverse_scale,
+    TakeTemplate(outline_, seen.inverse_scale,
                  seen.variance / (seen.inverse_scale * seen.inverse_scale));
   }
 
@@ -252,8 +251,7 @@ class TargetTracker {
   std::optional<Corners> Follow(const cv::Mat& image) const {
     constexpr int kGrid = 12, kFewest = 8, kWindow = 15, kLevels = 4;
     constexpr double kBack = 2.0, kAgree = 1.5;  // px
-    const Corners unit{cv::Point2f(0.0F, 0.0F), {1.0F, 0.0F}, {1.0F, 1.0F}, {0.0F, 1.0F}};
-    const cv::Matx33d to_image = cv::getPerspectiveTransform(unit.data(), outline_.data());
+    const cv::Matx33d to_image = FromUnit(outline_);
     std::vector<cv::Point2f> from, to, back;
     for (int i = 0; i < kGrid * kGrid; ++i) {
       const int row = i / kGrid;
@@ -291,7 +289,7 @@ class TargetTracker {
   }
 
   /// Where in the whole image something is most like a template, about as large as the target was.
-  std::optional<Corners> Search(const cv::Mat& image) const {
+  std::optional<Corners> Search() const {
     constexpr double kSide = 40.0, kMost = 1.5;  // px of the template as it is compared; times
     std::optional<Corners> best;
     double most = options_.least_similarity;
@@ -303,10 +301,9 @@ class TargetTracker {
         const double size = last * factor;  // px of the image for one of the template
         const double shrink = std::min(1.0, kSide / (size * std::max(patch.cols, patch.rows)));
         const double least_px = std::min(patch.cols, patch.rows) * size * shrink;
-        if (!(least_px >= 6.0) || std::min(image.cols, image.rows) * shrink < 6.0) continue;
+        if (!(least_px >= 6.0) || std::min(grey_.cols, grey_.rows) * shrink < 6.0) continue;
         cv::Mat small, looked, scores;
-        cv::resize(image, small, {}, shrink, shrink, cv::INTER_AREA);
-        small.convertTo(small, CV_32F);
+        cv::resize(grey_, small, {}, shrink, shrink, cv::INTER_AREA);
         cv::resize(patch, looked, {}, size * shrink, size * shrink, cv::INTER_AREA);
         if (looked.cols > small.cols || looked.rows > small.rows) continue;
         cv::matchTemplate(small, looked, scores, cv::TM_CCOEFF_NORMED);
@@ -330,6 +327,7 @@ class TargetTracker {
   int unseen_ = 0;        ///< images since it was measured
   bool lost_ = false;
   Corners outline_{};  ///< of the target
+  cv::Mat grey_;       ///< the image at hand, as float
   cv::Mat before_;     ///< the last image
 };
 

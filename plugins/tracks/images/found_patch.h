@@ -63,7 +63,7 @@ class FoundPatch {
   /// False where it does not settle or leaves the image; then all is as before.
   bool Align(const cv::Mat& image, cv::Point2f& at) {
     constexpr int kMost = 15;
-    constexpr float kSettled = 0.01F;  // px
+    constexpr float kSettled = 1e-3F, kNearly = 1e-2F;  // px; after as many steps as there may be
     Eigen::Matrix2f shape = shape_;
     Eigen::Vector2f place(at.x, at.y);
     for (int k = 0; k < kMost; ++k) {
@@ -76,7 +76,7 @@ class FoundPatch {
       shape = shape * back.topLeftCorner<2, 2>();
       const float largest = d.cwiseAbs().maxCoeff();
       if (!(largest < 0.5F)) return false;
-      if (largest * 0.5F * static_cast<float>(side_ - 1) < kSettled) {
+      if (largest * 0.5F * static_cast<float>(side_ - 1) < (k + 1 < kMost ? kSettled : kNearly)) {
         shape_ = shape;
         at = {place[0], place[1]};
         return true;

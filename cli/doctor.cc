@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "alidade/inspect/plugin_listing.h"
+#include "alidade/state/vector_kernels.h"
 #include "command.h"
 #include "console.h"
 
@@ -77,7 +78,7 @@ void CheckVersions(Diagnosis& diagnosis) {
   diagnosis.Ok("alidade " ALIDADE_VERSION);
   diagnosis.Ok("built with " + Compiler() + ", Eigen " + EigenVersion() + ", yaml-cpp " +
                ALIDADE_YAML_CPP_VERSION + ", Boost " + ALIDADE_BOOST_VERSION);
-  diagnosis.Ok("processor: " + Processor());
+  diagnosis.Ok("processor: " + Processor() + "; kernels: " + internal::BestVectorKernels().name);
 }
 
 std::string RemedyFor(const Refusal& refusal) {

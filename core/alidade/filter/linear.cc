@@ -13,17 +13,22 @@
 namespace alidade::internal {
 namespace {
 
-/// Whether P - W W' + E E' would leave nearly no digits of a variance; E has the given rows.
-bool Cancels(const Covariance& p, const Workspace::Matrix& w, std::span<const int> rows,
-             const Workspace::Matrix& e, Workspace::Vector left) {
+/// The variances of P - W W' + E E'; E has the given rows.
+void VariancesAfter(const Covariance& p, const Workspace::Matrix& w, std::span<const int> rows,
+                    const Workspace::Matrix& e, Workspace::Vector& left) {
   for (int i = 0; i < p.size(); ++i) left[i] = p.Variance(i);
   for (Eigen::Index k = 0; k < w.cols(); ++k) left -= w.col(k).cwiseAbs2();
   for (std::size_t i = 0; i < rows.size(); ++i) {
     left[rows[i]] += e.row(static_cast<Eigen::Index>(i)).squaredNorm();
   }
-  bool cancels = false;
-  for (int i = 0; i < p.size(); ++i) cancels = cancels || left[i] < kCancelled * p.Variance(i);
-  return cancels;
+}
+
+/// Whether one of them has nearly no digits left of that of P.
+bool Cancels(const Covariance& p, const Workspace::Vector& left) {
+  for (int i = 0; i < p.size(); ++i) {
+    if (left[i] < kCancelled * p.Variance(i)) return true;
+  }
+  return false;
 }
 
 }  // namespace
@@ -206,27 +211,27 @@ Linear::Lost Linear::FindLost(FilterState& f, std::span<Row* const> rows,
 Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const double* correction) {
   const Workspace::Use use(f.work);
   Covariance& p = f.state.covariance();
-  const Stacked all = Stack(f, rows);
-  Workspace::Matrix w = ProjectionOf(f, rows);
+  const Workspace::Vector innovation = InnovationOf(f, rows);
+  Workspace::Matrix w = ProjectionOf(f, rows), l = NoiseOf(f, rows);
   const Eigen::Index n = w.rows(), m = w.cols();
-  Workspace::Matrix l = f.work.Take(m, m), gain = f.work.Take(n, m);
-  Workspace::Vector y = f.work.Take(m), dx = f.work.Take(n);
-  l = all.noise;
+  Workspace::Matrix gain = f.work.Take(n, m);
+  Workspace::Vector y = f.work.Take(m), dx = f.work.Take(n), left = f.work.Take(n);
   AddProjected(rows, w, l);
   if (!Factorise(l)) return Outcome::kNotPd;
   if (n == 0) return Outcome::kAccepted;  // nothing to correct
   DivideByTransposed(l, w);
   const auto [lost_gain, e] = FindLost(f, rows, w, l);
-  y = all.innovation;
+  y = innovation;
   l.triangularView<Eigen::Lower>().solveInPlace(y);
   dx.noalias() = w * y;
   for (std::size_t i = 0; i < lost_.size(); ++i) {
-    dx[lost_[i]] = lost_gain.row(static_cast<Eigen::Index>(i)).dot(all.innovation);
+    dx[lost_[i]] = lost_gain.row(static_cast<Eigen::Index>(i)).dot(innovation);
   }
   if (correction != nullptr) std::copy_n(correction, n, dx.data());
   f.state.Retract(dx.data(), f.moved);
-  if (!AllFinite(f.moved) || !w.allFinite() || !e.allFinite()) return Outcome::kNotFinite;
-  const bool cancels = Cancels(p, w, lost_, e, f.work.Take(n));
+  VariancesAfter(p, w, lost_, e, left);
+  if (!AllFinite(f.moved) || !left.allFinite()) return Outcome::kNotFinite;
+  const bool cancels = Cancels(p, left);
   const bool recorded =
       std::ranges::any_of(rows, [](const Row* row) { return GainIsRecorded(*row); });
   if (cancels || recorded) {
@@ -237,7 +242,8 @@ Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const d
     }
   }
   if (cancels) {
-    if (!Joseph(p.lower(), gain, all.h, all.noise, f.work)) return Outcome::kNotPd;
+    const bool left_psd = Joseph(p.lower(), gain, JacobianOf(f, rows), NoiseOf(f, rows), f.work);
+    if (!left_psd) return Outcome::kNotPd;
   } else {
     AddOuterProduct(p.lower(), w, -1.0);
     AddOuterProduct(p.lower(), lost_, e);

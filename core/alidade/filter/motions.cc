@@ -138,10 +138,10 @@ void Motions::Propagate(Covariance& p) {
     const auto k = static_cast<Eigen::Index>(n) - fixed;
     Workspace::Vector f = memory_.Take(k * k), q = memory_.Take(k * k);
     Eigen::Index at = 0;
-    for (std::size_t i = 0; i < n * n; ++i) {
-      if (place.at[i / n] < 0 || place.at[i % n] < 0) continue;
-      f[at] = step.f[i];
-      q[at++] = step.q[i];
+    for (std::size_t element = 0; element < n * n; ++element) {
+      if (place.at[element / n] < 0 || place.at[element % n] < 0) continue;
+      f[at] = step.f[element];
+      q[at++] = step.q[element];
     }
     p.Propagate(place.parts, f.data(), q.data());
   }

@@ -1,52 +1,83 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/filter/stacked.h"
 
+#include <algorithm>
+
 namespace alidade::internal {
 
-Stacked Stack(FilterState& f, std::span<Row* const> rows) {
-  const Eigen::Index m = CountOf(rows);
-  Stacked all{f.work.Take(m, f.size()), f.work.Take(m, m), f.work.Take(m)};
-  all.h.setZero();
-  all.noise.setZero();
+namespace {
+
+/// Calls take(row, at) for each row, `at` of the update's m where it begins.
+template <class Take>
+void ForEachPlace(std::span<Row* const> rows, const Take& take) {
   Eigen::Index at = 0;
   for (const Row* row : rows) {
-    const JacobianRows own = row->jacobian();
-    const Eigen::Index k = own.rows;
-    const Eigen::Map<const RowMajor> compact(own.data, k, own.stride);
-    for (const JacobianPart& part : own.parts) {
-      all.h.block(at, part.offset, k, part.size) += compact.middleCols(part.column, part.size);
-    }
-    all.noise.block(at, at, k, k) = Eigen::Map<const RowMajor>(row->R.data(), k, k);
-    all.innovation.segment(at, k) =
-        Eigen::Map<const Eigen::VectorXd>(row->report->innovation.data(), k);
-    at += k;
+    take(*row, at);
+    at += row->report->dof;
   }
-  return all;
+}
+
+}  // namespace
+
+Stacked Stack(FilterState& f, std::span<Row* const> rows) {
+  return {JacobianOf(f, rows), NoiseOf(f, rows), InnovationOf(f, rows)};
+}
+
+Workspace::Matrix JacobianOf(FilterState& f, std::span<Row* const> rows) {
+  Workspace::Matrix h = f.work.Take(CountOf(rows), f.size());
+  h.setZero();
+  ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
+    const JacobianRows own = row.jacobian();
+    const Eigen::Map<const RowMajor> compact(own.data, own.rows, own.stride);
+    for (const JacobianPart& part : own.parts) {
+      h.block(at, part.offset, own.rows, part.size) += compact.middleCols(part.column, part.size);
+    }
+  });
+  return h;
+}
+
+Workspace::Matrix NoiseOf(FilterState& f, std::span<Row* const> rows) {
+  Workspace::Matrix noise = f.work.Take(CountOf(rows), CountOf(rows));
+  noise.setZero();
+  ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
+    const Eigen::Index k = row.report->dof;
+    noise.block(at, at, k, k) = Eigen::Map<const RowMajor>(row.R.data(), k, k);
+  });
+  return noise;
+}
+
+Workspace::Vector InnovationOf(FilterState& f, std::span<Row* const> rows) {
+  Workspace::Vector innovation = f.work.Take(CountOf(rows));
+  ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
+    std::ranges::copy(row.report->innovation, innovation.data() + at);
+  });
+  return innovation;
 }
 
 Workspace::Matrix ProjectionOf(FilterState& f, std::span<Row* const> rows) {
-  const Eigen::Index n = f.size();
-  Workspace::Matrix pht = f.work.Take(n, CountOf(rows));
-  Eigen::Index at = 0;
-  for (const Row* row : rows) {
-    const Eigen::Index k = row->report->dof;
-    pht.middleCols(at, k) = Eigen::Map<const Eigen::MatrixXd>(row->PHt.data(), n, k);
-    at += k;
-  }
+  Workspace::Matrix pht = f.work.Take(f.size(), CountOf(rows));
+  ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
+    std::ranges::copy(row.PHt, pht.col(at).data());
+  });
   return pht;
 }
 
 void AddProjected(std::span<Row* const> rows, const Workspace::Matrix& pht, Workspace::Matrix& s) {
-  Eigen::Index at = 0;
-  for (const Row* row : rows) {
-    const JacobianRows h = row->jacobian();
-    const Eigen::Map<const RowMajor> compact(h.data, h.rows, h.stride);
-    for (const JacobianPart& part : h.parts) {
-      s.middleRows(at, h.rows).noalias() +=
-          compact.middleCols(part.column, part.size) * pht.middleRows(part.offset, part.size);
+  ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
+    const JacobianRows h = row.jacobian();
+    for (Eigen::Index column = 0; column < at + h.rows; ++column) {
+      const double* const projected = pht.col(column).data();
+      for (int i = 0; i < h.rows; ++i) {
+        const double* const j = h.data + static_cast<std::ptrdiff_t>(i) * h.stride;
+        double sum = 0.0;
+        for (const JacobianPart& part : h.parts) {
+          for (int c = 0; c < part.size; ++c)
+            sum += j[part.column + c] * projected[part.offset + c];
+        }
+        s(at + i, column) += sum;
+      }
     }
-    at += h.rows;
-  }
+  });
 }
 
 Workspace::Matrix TransportTo(FilterState& f, const std::vector<double>& values) {

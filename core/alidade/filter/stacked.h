@@ -17,9 +17,12 @@ struct Stacked {
 
 /// The rows as they are, in f.work.
 Stacked Stack(FilterState& f, std::span<Row* const> rows);
-/// P H' of all rows, n x m, in f.work.
+/// H, R, the innovation and P H' (n x m) of all rows, in f.work.
+Workspace::Matrix JacobianOf(FilterState& f, std::span<Row* const> rows);
+Workspace::Matrix NoiseOf(FilterState& f, std::span<Row* const> rows);
+Workspace::Vector InnovationOf(FilterState& f, std::span<Row* const> rows);
 Workspace::Matrix ProjectionOf(FilterState& f, std::span<Row* const> rows);
-/// s += H P H' of all rows, m x m, from P H'.
+/// The lower triangle of s += H P H' of all rows, m x m, from P H'.
 void AddProjected(std::span<Row* const> rows, const Workspace::Matrix& pht, Workspace::Matrix& s);
 /// Calls zero(offset, size, at, k) for each part of the gain that consider blocks and roles keep at
 /// 0: rows [offset, offset + size) of P, columns [at, at + k) of the update.

@@ -2,8 +2,10 @@
 #include "alidade/state/covariance.h"
 
 #include <algorithm>
+#include <array>
 
 #include "alidade/state/small_kernels.h"
+#include "alidade/state/vector_kernels.h"
 
 namespace alidade {
 
@@ -143,21 +145,42 @@ void Covariance::Project(const JacobianRows& h, double* pht, double* s) const {
     const int ld = static_cast<int>(p_.rows());
     return internal::SmallKernelsFor(size_).project(p_.data(), ld, h.data, h.rows, pht, s);
   }
-  using Strided = Eigen::Map<const RowMajor, 0, Eigen::OuterStride<>>;
-  Eigen::Map<Eigen::MatrixXd> product(pht, size_, h.rows);
-  Eigen::Map<Eigen::MatrixXd> sum(s, h.rows, h.rows);
-  product.setZero();
+  constexpr int kRows = 64, kColumns = 8;  // of P' that is copied at a time
+  std::array<double, kRows * kColumns> copy;
+  const internal::VectorKernels& kernels = internal::BestVectorKernels();
+  const long ld = p_.rows(), n = size_;
+  std::fill_n(pht, n * h.rows, 0.0);
   for (const JacobianPart& part : h.parts) {
-    const int o = part.offset, k = part.size, below = size_ - o - k;
-    const Strided j(h.data + part.column, h.rows, k, Eigen::OuterStride<>(h.stride));
-    product.topRows(o).noalias() += p_.block(o, 0, k, o).transpose() * j.transpose();
-    product.middleRows(o, k).noalias() +=
-        p_.block(o, o, k, k).selfadjointView<Eigen::Lower>() * j.transpose();
-    product.bottomRows(below).noalias() += p_.block(o + k, o, below, k) * j.transpose();
+    const int o = part.offset, end = part.offset + part.size;
+    for (int first = 0; first < part.size; first += kColumns) {
+      const int count = std::min(kColumns, part.size - first);
+      const double* const j = h.data + part.column + first;
+      // What P has in rows [o + first, ...) left of and on its diagonal block.
+      for (int at = 0; at < end; at += kRows) {
+        const int rows = std::min(kRows, end - at);
+        for (int i = 0; i < rows; ++i) {
+          const int column = at + i;
+          const double* const below = p_.data() + column * ld + o + first;
+          for (int c = 0; c < count; ++c) {
+            copy[static_cast<std::size_t>(c * kRows + i)] =
+                column <= o + first + c ? below[c] : p_(column, o + first + c);
+          }
+        }
+        kernels.combine(rows, count, h.rows, copy.data(), kRows, j, h.stride, pht + at, n);
+      }
+    }
+    kernels.combine(n - end, part.size, h.rows, p_.data() + end + o * ld, ld, h.data + part.column,
+                    h.stride, pht + end, n);
   }
-  for (const JacobianPart& part : h.parts) {
-    const Strided j(h.data + part.column, h.rows, part.size, Eigen::OuterStride<>(h.stride));
-    sum.noalias() += j * product.middleRows(part.offset, part.size);
+  for (int i = 0; i < h.rows; ++i) {
+    for (int k = 0; k < h.rows; ++k) {
+      double sum = 0.0;
+      for (const JacobianPart& part : h.parts) {
+        const double* const j = h.data + static_cast<std::ptrdiff_t>(i) * h.stride + part.column;
+        for (int c = 0; c < part.size; ++c) sum += j[c] * pht[k * n + part.offset + c];
+      }
+      s[i * h.rows + k] += sum;
+    }
   }
 }
 

@@ -4,6 +4,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 
+#include "alidade/state/vector_kernels.h"
+
 namespace alidade::internal {
 namespace {
 
@@ -13,47 +15,29 @@ void ForEachTile(Eigen::Index size, const Take& take) {
   for (Eigen::Index at = 0; at < size; at += kTile) take(at, std::min(kTile, size - at));
 }
 
-/// C <- C + sign A B. (Of a factor within the product Eigen makes a copy where A has one row.)
-template <class B>
-void AddTiles(MatrixRef& c, const ConstMatrixRef& a, const B& b, double sign) {
-  ForEachTile(b.cols(), [&](Eigen::Index j, Eigen::Index columns) {
-    ForEachTile(a.cols(), [&](Eigen::Index k, Eigen::Index depth) {
-      ForEachTile(a.rows(), [&](Eigen::Index i, Eigen::Index rows) {
-        auto tile = c.block(i, j, rows, columns);
-        const auto left = a.block(i, k, rows, depth);
-        const auto right = b.block(k, j, depth, columns);
-        if (sign > 0.0) {
-          tile.noalias() += left * right;
-        } else {
-          tile.noalias() -= left * right;
-        }
-      });
-    });
-  });
+Strided ByColumns(const ConstMatrixRef& a) { return {a.data(), 1, a.outerStride()}; }
+Strided Transposed(const ConstMatrixRef& a) { return {a.data(), a.outerStride(), 1}; }
+
+/// C <- C + sign A B of the given depth.
+void Add(MatrixRef& c, Eigen::Index depth, const Strided& a, const Strided& b, double sign,
+         bool lower = false) {
+  BestVectorKernels().add_product(c.rows(), c.cols(), depth, a, b, c.data(), c.outerStride(), sign,
+                                  lower);
 }
 
 }  // namespace
 
 void AddProduct(MatrixRef c, const ConstMatrixRef& a, const ConstMatrixRef& b, double sign) {
-  AddTiles(c, a, b, sign);
+  Add(c, a.cols(), ByColumns(a), ByColumns(b), sign);
 }
 
 void AddProductWithTransposed(MatrixRef c, const ConstMatrixRef& a, const ConstMatrixRef& b,
                               double sign) {
-  AddTiles(c, a, b.transpose(), sign);
+  Add(c, a.cols(), ByColumns(a), Transposed(b), sign);
 }
 
 void AddOuterProduct(MatrixRef c, const ConstMatrixRef& a, double sign) {
-  ForEachTile(a.rows(), [&](Eigen::Index j, Eigen::Index columns) {
-    ForEachTile(a.cols(), [&](Eigen::Index k, Eigen::Index depth) {
-      c.block(j, j, columns, columns)
-          .selfadjointView<Eigen::Lower>()
-          .rankUpdate(a.block(j, k, columns, depth), sign);
-    });
-    const Eigen::Index below = a.rows() - j - columns;
-    AddProductWithTransposed(c.block(j + columns, j, below, columns), a.bottomRows(below),
-                             a.middleRows(j, columns), sign);
-  });
+  Add(c, a.cols(), ByColumns(a), Transposed(a), sign, true);
 }
 
 void AddOuterProduct(MatrixRef c, std::span<const int> rows, const ConstMatrixRef& a) {
@@ -66,17 +50,8 @@ void AddOuterProduct(MatrixRef c, std::span<const int> rows, const ConstMatrixRe
 }
 
 void DivideByTransposed(const ConstMatrixRef& l, MatrixRef b) {
-  ForEachTile(l.rows(), [&](Eigen::Index j, Eigen::Index columns) {
-    AddProductWithTransposed(b.middleCols(j, columns), b.leftCols(j), l.block(j, 0, columns, j),
-                             -1.0);
-    ForEachTile(b.rows(), [&](Eigen::Index i, Eigen::Index rows) {
-      auto tile = b.block(i, j, rows, columns);
-      l.block(j, j, columns, columns)
-          .triangularView<Eigen::Lower>()
-          .transpose()
-          .solveInPlace<Eigen::OnTheRight>(tile);
-    });
-  });
+  BestVectorKernels().divide_by_transposed(b.rows(), l.rows(), l.data(), l.outerStride(), b.data(),
+                                           b.outerStride());
 }
 
 void Divide(const ConstMatrixRef& l, MatrixRef b) {

@@ -6,14 +6,14 @@
 
 #include "alidade/base/workspace.h"
 
-/// Products and factors of matrices in tiles that are small enough for Eigen to work on the stack:
-/// nothing is allocated at any size.
+/// Products and factors of matrices by the vector kernels of the processor; what is left to Eigen is
+/// in tiles that it works on the stack: nothing is allocated in the steady state.
 namespace alidade::internal {
 
 using MatrixRef = Eigen::Ref<Eigen::MatrixXd>;
 using ConstMatrixRef = Eigen::Ref<const Eigen::MatrixXd>;
 
-constexpr Eigen::Index kTile = 96;  // a panel of it takes 74 kB; Eigen's limit is 128 kB
+constexpr Eigen::Index kTile = 32;  // what the kernels leave to Eigen is small then
 
 /// C <- C + sign A B, sign 1 or -1.
 void AddProduct(MatrixRef c, const ConstMatrixRef& a, const ConstMatrixRef& b, double sign = 1.0);

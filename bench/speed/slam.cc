@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Time of a whole frame of the EKF at the size of SLAM: a camera of 13 numbers, N landmarks in
+// inverse depth, of which some are observed, beside
+//
+//   peak      the operations of the update alone, at the rate at which this processor multiplies
+//             and adds, measured in turns with the rest
+//   textbook  the update with dense H in Eigen, as this build compiles it: K = P H' S^-1,
+//             P = (I - K H) P
+//
+//   bench_slam [--kernels NAME]
+#include <CLI/CLI.hpp>
+#include <Eigen/Cholesky>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "alidade/base/random.h"
+#include "alidade/run/make_filter.h"
+#include "alidade/state/vector_kernels.h"
+#include "bench/speed/interleaved.h"
+#include "support/temporary_folder.h"
+
+namespace alidade::bench {
+namespace {
+
+constexpr const char* kConfig = R"(
+alidade: 1
+camera: {model: pinhole, width: 640, height: 480, fx: 525, fy: 525, cx: 320, cy: 240}
+state:
+  cam:
+    model: quaternion_pose
+    noise: {kind: continuous, linear_acceleration: 0.1, angular_acceleration: 0.05}
+    initial:
+      position: {mean: [0, 0, 0], sigma: 0}
+      orientation: {mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0}
+      velocity: {mean: [0, 0, 0], sigma: 0.3}
+      angular_velocity: {mean: [0, 0, 0], sigma: 0.3}
+landmarks:
+  representation: inverse_depth
+  prior: {inverse_distance: 0.35, sigma: 0.1}
+sensors:
+  pixels:
+    model: inverse_depth_feature
+    stream: tracks
+    roles: {position: cam.position, orientation: cam.orientation, landmark: landmarks}
+    sigma_px: 1.0
+estimators: {ekf: {type: ekf}}
+)";
+
+/// The filter, and frames of a camera that sways before a box of points.
+class Slam {
+ public:
+  Slam(const PluginHost& host, const Config& config, int landmarks, int observed)
+      : filter_(MakeFilter(config, host, "ekf")), observed_(observed) {
+    Random random(1);
+    for (int i = 0; i < landmarks; ++i) {
+      points_.push_back({2.0 * random.Uniform() - 1.0, 1.6 * random.Uniform() - 0.8,
+                         2.0 + 2.0 * random.Uniform()});
+    }
+    stream_ = filter_->stream("tracks");
+    Take(landmarks);
+    for (int i = 0; i < 3; ++i) Take(observed_);
+  }
+
+  void operator()() { Take(observed_); }
+  long size() const { return filter_->state().covariance().size(); }
+  bool used_all() const { return used_ == taken_; }
+  const Filter& filter() const { return *filter_; }
+
+ private:
+  void Take(int count) {
+    const double t = count_++ / 30.0;
+    const double x = 0.2 * std::sin(t), y = 0.1 * std::sin(1.3 * t);
+    std::vector<Reading> readings;
+    for (int k = 0; k < count; ++k) {
+      const auto i = static_cast<std::size_t>(next_++ % std::ssize(points_));
+      const auto& p = points_[i];
+      readings.push_back({stream_,
+                          {320.0 + 525.0 * (p[0] - x) / p[2], 240.0 + 525.0 * (p[1] - y) / p[2]},
+                          static_cast<std::int64_t>(i)});
+    }
+    const UpdateReport& report = filter_->Push(TimestampFromSeconds(t), readings);
+    for (const MeasurementReport& entry : report.measurements()) {
+      taken_ += 1;
+      used_ += entry.outcome == Outcome::kAccepted || entry.outcome == Outcome::kInitialised;
+    }
+  }
+
+  std::unique_ptr<Filter> filter_;
+  std::vector<std::array<double, 3>> points_;
+  int observed_, stream_ = 0, count_ = 0;
+  long next_ = 0, taken_ = 0, used_ = 0;
+};
+
+/// Operations, multiplications and additions, of an update of n states by m rows whose H has 12
+/// numbers each: P H', S, its factor, W = P H' L^-T, the lower triangle of P - W W'.
+double UpdateOperations(double n, double m) {
+  return 2.0 * 12.0 * n * m + 12.0 * m * m + m * m * m / 3.0 + n * m * m + n * n * m;
+}
+
+/// Multiplications with additions in registers.
+template <int kLanes>
+struct Multiply {
+  using Vector [[gnu::vector_size(kLanes * sizeof(double))]] = double;
+  [[gnu::always_inline]] static double Run(long rounds) {
+    Vector sums[12];
+    for (int k = 0; k < 12; ++k) sums[k] = static_cast<double>(k) - Vector{};
+    Vector factor = 0.999999 - Vector{};
+    for (long i = 0; i < rounds; ++i) {
+#pragma GCC unroll 12
+      for (int k = 0; k < 12; ++k) sums[k] = sums[k] * factor + factor;
+    }
+    double numbers[12 * kLanes];
+    std::memcpy(numbers, sums, sizeof numbers);
+    return std::accumulate(std::begin(numbers), std::end(numbers), 0.0);
+  }
+};
+
+constexpr long kRounds = 20000;
+double MultiplyBaseline() { return Multiply<2>::Run(kRounds); }
+#if defined(__x86_64__)
+[[gnu::target("avx2,fma")]] double MultiplyAvx2() { return Multiply<4>::Run(kRounds); }
+[[gnu::target("avx512f,avx2,fma")]] double MultiplyAvx512() { return Multiply<8>::Run(kRounds); }
+#endif
+
+struct Peak {
+  double (*work)() = MultiplyBaseline;
+  double operations = 2.0 * 2 * 12 * kRounds;
+};
+
+Peak PeakOf(const std::string& kernels) {
+#if defined(__x86_64__)
+  if (kernels == "AVX2") return {MultiplyAvx2, 2.0 * 4 * 12 * kRounds};
+  if (kernels == "AVX-512") return {MultiplyAvx512, 2.0 * 8 * 12 * kRounds};
+#endif
+  return {};
+}
+
+/// The update as books write it.
+struct Textbook {
+  Eigen::MatrixXd p, h, r;
+  Textbook(long n, long m)
+      : p(Eigen::MatrixXd::Identity(n, n)),
+        h(1e-3 * Eigen::MatrixXd::Random(m, n)),
+        r(Eigen::MatrixXd::Identity(m, m)) {}
+  void operator()() {
+    const Eigen::MatrixXd s = h * p * h.transpose() + r;
+    const Eigen::MatrixXd k = s.llt().solve(h * p).transpose();
+    p = (Eigen::MatrixXd::Identity(p.rows(), p.rows()) - k * h) * p;
+  }
+};
+
+int Main(int argc, char** argv) {
+  CLI::App app("A frame of an EKF at the size of SLAM, relative to the peak of the processor");
+  int rounds = 15;
+  bool textbook = true;
+  std::vector<std::string> sizes = {"30/20", "100/20", "300/20", "1000/20", "100/100", "300/300"};
+  app.add_option("--rounds", rounds, "frames of each contender")->capture_default_str();
+  app.add_option("--size", sizes, "landmarks/observed")->capture_default_str();
+  app.add_flag("--textbook,!--no-textbook", textbook, "the dense update too");
+  CLI11_PARSE(app, argc, argv);
+
+  const testing::TemporaryFolder temporary;
+  const std::string file = (temporary.path() / "config.yaml").string();
+  std::ofstream(file) << kConfig;
+  const Config config = Config::FromFile(file);
+  const PluginHost host;
+  const std::string kernels = internal::BestVectorKernels().name;
+  const Peak peak = PeakOf(kernels);
+  std::printf("kernels: %s\n", kernels.c_str());
+  for (const std::string& size : sizes) {
+    const int landmarks = std::atoi(size.c_str());
+    const int observed = std::atoi(size.c_str() + size.find('/') + 1);
+    Slam slam(host, config, landmarks, observed);
+    const long n = slam.size(), m = 2L * observed;
+    volatile double sink = 0.0;
+    std::vector<Contender> contenders = {{"peak", [&] { sink = sink + peak.work(); }, 1.0, {}},
+                                         {"frame", [&] { slam(); }, 1.0, {}}};
+    const bool dense = textbook && n < 3000;
+    std::unique_ptr<Textbook> book;
+    if (dense) {
+      book = std::make_unique<Textbook>(n, m);
+      contenders.push_back({"textbook", [&] { (*book)(); }, 1.0, {}});
+    }
+    Interleave(contenders, rounds);
+    if (!slam.used_all()) throw std::runtime_error("not every measurement was used");
+    const double least = UpdateOperations(static_cast<double>(n), static_cast<double>(m)) /
+                         peak.operations * contenders[0].Quantile(0.01);
+    std::printf("%s: %ld states, %ld rows, %.3f ms a frame\n", size.c_str(), n, m,
+                1e-6 * contenders[1].Quantile(0.5));
+    std::printf("ratio update/peak_%s %.3f\n", size.c_str(), contenders[1].Quantile(0.01) / least);
+    if (dense) PrintRatio("textbook/update_" + size, contenders[2], contenders[1]);
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace alidade::bench
+
+int main(int argc, char** argv) try {
+  return alidade::bench::Main(argc, argv);
+} catch (const std::exception& e) {
+  std::cerr << "error: " << e.what() << '\n';
+  return 1;
+}

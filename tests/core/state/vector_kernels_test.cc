@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/state/vector_kernels.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+
+#include "alidade/base/random.h"
+
+namespace alidade::internal {
+namespace {
+
+using Eigen::MatrixXd;
+
+MatrixXd Drawn(Eigen::Index rows, Eigen::Index columns, Random& random) {
+  MatrixXd m(rows, columns);
+  for (double& element : m.reshaped()) element = random.Normal();
+  return m;
+}
+
+/// The largest difference of two matrices, relative to the largest number of the second.
+double Difference(const MatrixXd& a, const MatrixXd& b) {
+  if (b.size() == 0) return 0.0;
+  return (a - b).cwiseAbs().maxCoeff() / (1.0 + b.cwiseAbs().maxCoeff());
+}
+
+/// Sizes below, at and above those that the loops take at once.
+constexpr Eigen::Index kRowCounts[] = {0, 1, 2, 3, 7, 8, 23, 24, 25, 49, 193, 300};
+
+TEST(VectorKernels, ProductsAreThoseOfEigen) {
+  ASSERT_EQ(std::string_view(AllVectorKernels().front().name), "baseline");
+  Random random(1);
+  for (const VectorKernels& kernels : AllVectorKernels()) {
+    for (const Eigen::Index rows : kRowCounts) {
+      for (const Eigen::Index depth : {0, 1, 5, 40, 300}) {
+        const Eigen::Index columns = rows / 2 + 3;
+        const MatrixXd a = Drawn(rows, depth, random), b = Drawn(depth, columns, random);
+        const MatrixXd bt = b.transpose(), before = Drawn(rows + 5, columns, random);
+        const MatrixXd expected = before.topRows(rows) - a * b;
+        MatrixXd c = before, ct = before;
+        kernels.add_product(rows, columns, depth, {a.data(), 1, rows}, {b.data(), 1, depth},
+                            c.data(), c.outerStride(), -1.0, false);
+        kernels.add_product(rows, columns, depth, {a.data(), 1, rows}, {bt.data(), columns, 1},
+                            ct.data(), ct.outerStride(), -1.0, false);
+        EXPECT_LE(Difference(c.topRows(rows), expected), 1e-12) << kernels.name << rows;
+        EXPECT_LE(Difference(ct.topRows(rows), expected), 1e-12) << kernels.name << rows;
+        EXPECT_EQ(c.bottomRows(5), before.bottomRows(5)) << kernels.name << rows;
+      }
+    }
+  }
+}
+
+TEST(VectorKernels, LowerTriangleLeavesWhatIsAboveIt) {
+  Random random(2);
+  for (const VectorKernels& kernels : AllVectorKernels()) {
+    for (const Eigen::Index n : {1, 5, 24, 31, 200, 800}) {
+      const MatrixXd a = Drawn(n, 7, random), before = Drawn(n, n, random);
+      const MatrixXd whole = before + a * a.transpose();
+      MatrixXd c = before, expected = before;
+      expected.triangularView<Eigen::Lower>() = whole;
+      kernels.add_product(n, n, 7, {a.data(), 1, n}, {a.data(), n, 1}, c.data(), n, 1.0, true);
+      EXPECT_LE(Difference(c, expected), 1e-12) << kernels.name << n;
+      const MatrixXd above = c.triangularView<Eigen::StrictlyUpper>();
+      EXPECT_EQ(above, MatrixXd(before.triangularView<Eigen::StrictlyUpper>())) << kernels.name;
+    }
+  }
+}
+
+TEST(VectorKernels, DividesAsEigen) {
+  Random random(3);
+  for (const VectorKernels& kernels : AllVectorKernels()) {
+    for (const Eigen::Index rows : kRowCounts) {
+      for (const Eigen::Index m : {0, 1, 4, 9, 64, 300}) {
+        MatrixXd l = 0.1 * Drawn(m, m, random);  // what is above the diagonal is not read
+        l.diagonal().array() += 2.0;
+        const MatrixXd before = Drawn(rows + 3, m, random);
+        MatrixXd b = before;
+        kernels.divide_by_transposed(rows, m, l.data(), l.outerStride(), b.data(), b.outerStride());
+        const MatrixXd product =
+            b.topRows(rows) * MatrixXd(l.triangularView<Eigen::Lower>()).transpose();
+        EXPECT_LE(Difference(product, before.topRows(rows)), 1e-12) << kernels.name << rows << m;
+        EXPECT_EQ(b.bottomRows(3), before.bottomRows(3)) << kernels.name << rows;
+      }
+    }
+  }
+}
+
+TEST(VectorKernels, CombinesFewColumns) {
+  Random random(4);
+  for (const VectorKernels& kernels : AllVectorKernels()) {
+    for (const Eigen::Index rows : kRowCounts) {
+      for (const Eigen::Index m : {1, 2, 3, 4, 5, 7}) {
+        const MatrixXd x = Drawn(rows, 6, random), jt = Drawn(8, m, random);
+        const MatrixXd before = Drawn(rows, m, random);
+        MatrixXd y = before;
+        kernels.combine(rows, 6, m, x.data(), rows, jt.data(), 8, y.data(), rows);
+        EXPECT_LE(Difference(y, before + x * jt.topRows(6)), 1e-12) << kernels.name << rows << m;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace alidade::internal

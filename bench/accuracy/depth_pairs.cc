@@ -1,75 +1,136 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Chooses the noise of the real depth filter on every second series and reports it on the others,
-// and then on those too:
+// The real depth filter, tuned on every second series and reported on the others, compared with
+// stereo alone, the last value and the line d = c s:
 //
 //   accuracy_depth_pairs examples/07_depth_pairs/config.yaml FOLDER_OF_SERIES
 //
-// The same grid serves the stereo-only baseline, which chooses for itself. What is minimised is the
-// geometric mean, over the tuning series, of the depth RMSE while stereo is masked (second half).
+// docs/experiments.md, "Real series of depth", states what is tuned, on which series and by which
+// criterion, and what the columns are. Exit code 1 if a parameter lies at the edge of its grid.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "alidade/run/run.h"
 #include "alidade/sweep/sweep.h"
+#include "bench/accuracy/bootstrap.h"
+#include "bench/accuracy/pair_series.h"
+#include "bench/accuracy/read_pair_series.h"
 
 namespace {
 
+using alidade::bench::Mean;
+using alidade::bench::PairSeries;
 using Settings = std::vector<std::pair<std::string, std::string>>;
 using Names = std::vector<std::string>;
+using RmseByEstimator = std::map<std::string, double>;
 
-constexpr const char* kAcceleration = "state.target.noise.acceleration";
-constexpr const char* kDisparity = "sensors.stereo.sigma_px";
-constexpr const char* kWalk = "state.template.noise.random_walk";
-constexpr const char* kScale = "sensors.scale.sigma_px";
-constexpr const char* kBaseline =
-    "estimators.stereo_only.overrides.state.target.noise.acceleration";
-constexpr const char* kBaselineSigma = "estimators.stereo_only.overrides.sensors.stereo.sigma_px";
+/// A parameter and the values that are tried, ascending.
+struct Axis {
+  std::string key;
+  Names values;
+};
 
-/// RMSE of depth by estimator: masked, in the blind half; unmasked, over the whole series.
-std::map<std::string, double> Rmse(const std::string& config_file, const Settings& settings,
-                                   const std::string& series, bool masked,
-                                   const alidade::PluginHost& host) {
-  alidade::Config config = alidade::Config::FromFile(config_file);
-  for (const auto& [key, value] : settings) config.Set(key, value, "--set");
-  config.Set("source.path", series, "--set");
-  config.Set("source.blind_after", masked ? "0.5" : "1.0", "--set");
-  alidade::Experiment experiment = alidade::BuildExperiment(config, host);
-  std::map<std::string, double> rmse;
-  for (const auto& result : alidade::Run(experiment, {}).estimators) {
-    rmse[result.name] = result.metrics.at(masked ? "rmse:target.depth@blind" : "rmse:target.depth");
+const std::vector<Axis> kFusedGrid = {{"state.target.noise.acceleration",
+                                       {"0.5", "0.7", "1", "1.4", "2", "3", "4", "6", "8", "12",
+                                        "16", "24", "32", "64", "128", "256", "512", "1024"}},
+                                      {"state.template.noise.random_walk",
+                                       {"0", "0.00025", "0.00035", "0.0005", "0.0007", "0.001",
+                                        "0.0014", "0.002", "0.0028", "0.004"}}};
+const std::vector<Axis> kStereoGrid = {
+    {"estimators.stereo_only.overrides.state.target.noise.acceleration",
+     {"0.05", "0.1", "0.2", "0.3", "0.4", "0.6", "0.8", "1", "1.4", "2", "3", "4", "6", "8", "12",
+      "16", "32"}},
+    {"estimators.stereo_only.overrides.sensors.stereo.sigma_px",
+     {"0.025", "0.05", "0.1", "0.2", "0.4", "0.8", "1.6", "3.2"}}};
+constexpr double kShownLagsS[] = {0.1, 0.4, 0.8, 1.2};  // of the drift of the scale
+
+/// The program's arguments and what all runs share.
+struct Bench {
+  std::string config_file;
+  const alidade::PluginHost& host;
+
+  alidade::Experiment Make(const std::string& series, const Settings& settings, bool masked) const {
+    alidade::Config config = alidade::Config::FromFile(config_file);
+    for (const auto& [key, value] : settings) config.Set(key, value, "--set");
+    config.Set("source.path", series, "--set");
+    config.Set("source.blind_after", masked ? "0.5" : "1.0", "--set");
+    return alidade::BuildExperiment(config, host);
   }
-  return rmse;
+
+  /// RMSE of depth by estimator: masked, in the blind half; unmasked, over the whole series.
+  RmseByEstimator Rmse(const std::string& series, const Settings& settings, bool masked) const {
+    alidade::Experiment experiment = Make(series, settings, masked);
+    RmseByEstimator rmse;
+    for (const auto& result : alidade::Run(experiment, {}).estimators) {
+      rmse[result.name] =
+          result.metrics.at(masked ? "rmse:target.depth@blind" : "rmse:target.depth");
+    }
+    return rmse;
+  }
+
+  /// What the source of the masked run gives, with the calibration in the header of the series.
+  PairSeries Read(const std::string& file) const {
+    const alidade::Experiment experiment = Make(file, {}, true);
+    return alidade::bench::ReadPairSeries(*experiment.source, std::filesystem::path(file).stem());
+  }
+};
+
+/// Calls `visit` with every combination of the values of the axes.
+void ForEach(const std::vector<Axis>& grid, Settings& settings,
+             const std::function<void(const Settings&)>& visit) {
+  if (settings.size() == grid.size()) return visit(settings);
+  const Axis& axis = grid[settings.size()];
+  for (const std::string& value : axis.values) {
+    settings.emplace_back(axis.key, value);
+    ForEach(grid, settings, visit);
+    settings.pop_back();
+  }
 }
 
 struct Choice {
   Settings settings;
   double geometric_mean = INFINITY;
+  bool at_edge = false;
 };
 
-Choice Choose(const std::string& config, const std::string& estimator,
-              const std::vector<Settings>& grid, const Names& series,
-              const alidade::PluginHost& host) {
+Choice Choose(const Bench& bench, const std::string& estimator, const std::vector<Axis>& grid,
+              const Names& series) {
   Choice best;
-  for (const Settings& settings : grid) {
+  Settings start;
+  ForEach(grid, start, [&](const Settings& settings) {
     double sum = 0.0;
     for (const std::string& file : series) {
-      sum += std::log(Rmse(config, settings, file, true, host).at(estimator));
+      sum += std::log(bench.Rmse(file, settings, true).at(estimator));
     }
     const double mean = std::exp(sum / static_cast<double>(series.size()));
     if (mean < best.geometric_mean) best = {settings, mean};
-  }
+  });
   std::printf("%s, geometric mean %.3f m on %zu series:\n", estimator.c_str(), best.geometric_mean,
               series.size());
-  for (const auto& [key, value] : best.settings) {
-    std::printf("  %s = %s\n", key.c_str(), value.c_str());
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    const Names& values = grid[i].values;
+    const std::string& value = best.settings[i].second;
+    const bool at_edge = value == values.front() || value == values.back();
+    best.at_edge |= at_edge;
+    std::printf("  %s = %s, of %s to %s%s\n", grid[i].key.c_str(), value.c_str(),
+                values.front().c_str(), values.back().c_str(), at_edge ? ": AT THE EDGE" : "");
   }
   return best;
+}
+
+/// Chosen on some series: for the fused filter, and for stereo alone.
+Choice ChooseAll(const Bench& bench, const Names& series) {
+  Choice choice = Choose(bench, "fused", kFusedGrid, series);
+  const Choice stereo = Choose(bench, "stereo_only", kStereoGrid, series);
+  choice.settings.insert(choice.settings.end(), stereo.settings.begin(), stereo.settings.end());
+  choice.at_edge |= stereo.at_edge;
+  return choice;
 }
 
 double Median(std::vector<double> values) {
@@ -77,67 +138,114 @@ double Median(std::vector<double> values) {
   return alidade::Quantile(values, 0.5);
 }
 
-double Mean(const std::vector<double>& values) {
-  double sum = 0.0;
-  for (const double v : values) sum += v;
-  return sum / static_cast<double>(values.size());
+/// A table of RMSE [m] with a last row of medians.
+class Table {
+ public:
+  explicit Table(Names columns) : columns_(std::move(columns)), values_(columns_.size()) {
+    std::printf("\n| series |");
+    for (const std::string& column : columns_) std::printf(" %s |", column.c_str());
+    std::printf("\n|---|");
+    for (std::size_t i = 0; i < columns_.size(); ++i) std::printf("---|");
+    std::printf("\n");
+  }
+  void Add(const std::string& name, const std::vector<double>& row) {
+    for (std::size_t i = 0; i < row.size(); ++i) values_[i].push_back(row[i]);
+    Print(name, row);
+  }
+  void Medians() const {
+    std::vector<double> row;
+    for (const auto& column : values_) row.push_back(Median(column));
+    Print("median", row);
+  }
+
+ private:
+  static void Print(const std::string& name, const std::vector<double>& row) {
+    std::printf("| %s |", name.c_str());
+    for (const double value : row) std::printf(" %.3f |", value);
+    std::printf("\n");
+  }
+  Names columns_;
+  std::vector<std::vector<double>> values_;
+};
+
+/// Prints RMSE and floors by series. Returns log(RMSE of fused / RMSE of the line), masked.
+std::vector<double> Report(const char* title, const Bench& bench, const Settings& settings,
+                           const Names& files) {
+  std::printf("\n%s:\n", title);
+  Table table({"masked: fused", "line", "stereo_only", "hold_last", "known at masking",
+               "best constant", "whole: fused", "stereo_only"});
+  std::vector<double> differences;
+  for (const std::string& file : files) {
+    const RmseByEstimator masked = bench.Rmse(file, settings, true);
+    const RmseByEstimator whole = bench.Rmse(file, settings, false);
+    const PairSeries series = bench.Read(file);
+    const double fused = masked.at("fused"), line = LineRmse(series);
+    table.Add(series.name,
+              {fused, line, masked.at("stereo_only"), masked.at("hold_last"), AnchoredRmse(series),
+               BestConstantRmse(series), whole.at("fused"), whole.at("stereo_only")});
+    differences.push_back(std::log(fused / line));
+  }
+  table.Medians();
+  return differences;
 }
 
-void Report(const char* title, const std::string& config, const Settings& settings,
-            const Names& series, const alidade::PluginHost& host) {
-  const Names estimators = {"fused", "stereo_only", "hold_last"};
-  std::printf("\n%s:\n", title);
-  std::printf(
-      "\n| series | masked: fused | stereo_only | hold_last | whole: fused | stereo_only |\n"
-      "|---|---|---|---|---|---|\n");
-  std::map<std::string, std::vector<double>> masked, whole;
-  for (const std::string& file : series) {
-    const auto m = Rmse(config, settings, file, true, host);
-    const auto w = Rmse(config, settings, file, false, host);
-    for (const std::string& name : estimators) {
-      masked[name].push_back(m.at(name));
-      whole[name].push_back(w.at(name));
+void PrintDifference(const char* title, const std::vector<double>& differences) {
+  const alidade::Interval interval = alidade::bench::BootstrapOfMean(differences);
+  std::printf("%s: mean of log(fused / line) over %zu series %+.3f, 95 %% [%+.3f, %+.3f]\n", title,
+              differences.size(), Mean(differences), interval.low, interval.high);
+}
+
+/// The white noise of both sensors and the drift of the scale.
+void ReportNoise(const Bench& bench, const Names& files) {
+  double disparity = 0.0, log_scale = 0.0;
+  std::printf("\nrms growth of log(s Z), %%, over\n");
+  Names columns;
+  for (const double lag_s : kShownLagsS)
+    columns.push_back(std::to_string(lag_s).substr(0, 3) + " s");
+  Table table(columns);
+  for (const std::string& file : files) {
+    const PairSeries series = bench.Read(file);
+    disparity += WhiteVariance(series, [](const auto& row) { return row.disparity_px; });
+    log_scale += WhiteVariance(series, [](const auto& row) { return std::log(row.scale); });
+    const double interval_s = (series.rows.back().t_s - series.rows.front().t_s) /
+                              static_cast<double>(series.rows.size() - 1);
+    std::vector<double> growth;
+    for (const double lag_s : kShownLagsS) {
+      const auto lag = static_cast<std::size_t>(std::lround(lag_s / interval_s));
+      growth.push_back(100.0 * std::sqrt(DriftVariance(series, lag)));
     }
-    std::printf("| %s | %.3f | %.3f | %.3f | %.3f | %.3f |\n",
-                std::filesystem::path(file).stem().c_str(), m.at("fused"), m.at("stereo_only"),
-                m.at("hold_last"), w.at("fused"), w.at("stereo_only"));
+    table.Add(series.name, growth);
   }
-  std::printf("| median masked, mean whole | %.3f | %.3f | %.3f | %.3f | %.3f |\n",
-              Median(masked["fused"]), Median(masked["stereo_only"]), Median(masked["hold_last"]),
-              Mean(whole["fused"]), Mean(whole["stereo_only"]));
+  table.Medians();
+  const auto n = static_cast<double>(files.size());
+  std::printf("white noise: disparity %.3f px, log(scale) %.5f\n", std::sqrt(disparity / n),
+              std::sqrt(log_scale / n));
 }
 
 int Main(const std::string& config, const std::string& folder) {
-  Names tuning, reporting;
-  Names files;
+  Names files, tuning, reported;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     if (entry.path().extension() == ".csv") files.push_back(entry.path());
   }
-  std::sort(files.begin(), files.end());
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    (i % 2 == 0 ? tuning : reporting).push_back(files[i]);
-  }
-  std::vector<Settings> fused_grid, baseline_grid;
-  for (const char* acceleration : {"0.3", "1", "3", "10"}) {
-    for (const char* disparity : {"0.05", "0.1", "0.2", "0.4"}) {
-      baseline_grid.push_back({{kBaseline, acceleration}, {kBaselineSigma, disparity}});
-      for (const char* walk : {"0", "0.0003", "0.001", "0.002"}) {
-        for (const char* scale : {"0.15", "0.3", "0.75", "1.5"}) {
-          fused_grid.push_back({{kAcceleration, acceleration},
-                                {kDisparity, disparity},
-                                {kWalk, walk},
-                                {kScale, scale}});
-        }
-      }
-    }
-  }
+  std::ranges::sort(files);
+  for (std::size_t i = 0; i < files.size(); ++i)
+    (i % 2 == 0 ? tuning : reported).push_back(files[i]);
   const alidade::PluginHost host;
-  Settings settings = Choose(config, "fused", fused_grid, tuning, host).settings;
-  const Choice baseline = Choose(config, "stereo_only", baseline_grid, tuning, host);
-  settings.insert(settings.end(), baseline.settings.begin(), baseline.settings.end());
-  Report("reported", config, settings, reporting, host);
-  Report("tuned on", config, settings, tuning, host);
-  return 0;
+  const Bench bench{config, host};
+
+  ReportNoise(bench, tuning);
+  std::printf("\n");
+  const Choice choice = ChooseAll(bench, tuning);
+  std::vector<double> differences = Report("reported", bench, choice.settings, reported);
+  PrintDifference("reported", differences);
+  Report("tuned on", bench, choice.settings, tuning);
+
+  std::printf("\nthe halves exchanged:\n");
+  const Choice exchanged = ChooseAll(bench, reported);
+  const std::vector<double> others = Report("the first half", bench, exchanged.settings, tuning);
+  differences.insert(differences.end(), others.begin(), others.end());
+  PrintDifference("each series with what was chosen on the other half", differences);
+  return choice.at_edge ? 1 : 0;
 }
 
 }  // namespace

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "alidade/base/random.h"
+#include "alidade/base/statistics.h"
+
+namespace alidade::bench {
+
+inline double Mean(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double v : values) sum += v;
+  return sum / static_cast<double>(values.size());
+}
+
+/// Bootstrap interval, 95 %, of the mean of n independent values: the 2.5 and 97.5 % quantiles of
+/// the means of `draws` samples of n values each, drawn with replacement [Efron1993, ch. 13].
+/// Of differences of two methods on the same series it is the paired bootstrap over the series.
+/// Where n is small it is too narrow, by about sqrt((n - 1) / n).
+inline Interval BootstrapOfMean(const std::vector<double>& values, int draws = 20000,
+                                std::uint64_t seed = 1) {
+  Random random(seed);
+  std::vector<double> means(draws);
+  const double n = static_cast<double>(values.size());
+  for (double& mean : means) {
+    mean = 0.0;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      mean += values[static_cast<std::size_t>(random.Uniform() * n)] / n;
+    }
+  }
+  std::ranges::sort(means);
+  return {Quantile(means, 0.025), Quantile(means, 0.975)};
+}
+
+}  // namespace alidade::bench

@@ -55,6 +55,13 @@ struct GreyImage {
   std::vector<std::uint8_t> pixels;
 };
 
+/// An image that measurements were taken from, of the left camera of a pair.
+struct SeenImage {
+  GreyImage grey;
+  /// Corners (u, v), px, of the target that was measured in it; none: there is none, or it is lost.
+  std::vector<std::array<double, 2>> outline = {};
+};
+
 /// Where measurements come from: a simulator, a file, a pipe. A C++ plugin.
 class Source {
  public:
@@ -74,6 +81,10 @@ class Source {
   virtual int views() const { return 0; }
   /// What camera `view` sees at the last frame: 0, the left one of a pair, or 1.
   virtual GreyImage Draw(int /*view*/) { return {}; }
+  /// Whether it measures in images, which Seen() gives.
+  virtual bool sees() const { return false; }
+  /// The image that the last frame was measured in.
+  virtual SeenImage Seen() const { return {}; }
   /// The calibration of the camera that took the data: a config of the one map `calibration`, with
   /// parameters under the keys by which models ask for them,
   /// `calibration: {camera: {fx: 721.5, baseline_m: 0.54}}`. None: the data bring none. Errors:

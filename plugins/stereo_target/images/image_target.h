@@ -14,6 +14,7 @@
 #include "alidade/model/camera.h"
 #include "disparity.h"
 #include "plugins/common/companion_files.h"
+#include "plugins/common/images/grey_image.h"
 #include "plugins/common/images/image_reader.h"
 #include "plugins/common/images/image_times.h"
 #include "rectification.h"
@@ -104,6 +105,14 @@ class ImageTarget : public Source {
   Place place() const override { return left_->place(); }
   std::int64_t size() const override {
     return most_ > 0 ? std::min<std::int64_t>(most_, left_->size()) : left_->size();
+  }
+  bool sees() const override { return true; }
+  SeenImage Seen() const override {
+    SeenImage seen{ToGreyImage(image_[0])};
+    if (const auto corners = tracker_->outline()) {
+      for (const cv::Point2f& corner : *corners) seen.outline.push_back({corner.x, corner.y});
+    }
+    return seen;
   }
   std::optional<Config> Calibration() const override {
     if (!rectification_) return std::nullopt;

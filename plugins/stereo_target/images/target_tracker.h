@@ -89,6 +89,12 @@ class TargetTracker {
     return seen;
   }
 
+  /// Where it is in the last image, also where it was followed but not measured; none: it is lost.
+  std::optional<Corners> outline() const {
+    if (lost_ || templates_.empty()) return std::nullopt;
+    return outline_;
+  }
+
  private:
   static constexpr std::size_t kTemplates = 6;  ///< at most
   static constexpr int kPatience = 10;  ///< images for which it is followed without being measured

@@ -11,6 +11,7 @@
 #include "alidade/host/source.h"
 #include "feature_tracker.h"
 #include "plugins/common/companion_files.h"
+#include "plugins/common/images/grey_image.h"
 #include "plugins/common/images/image_reader.h"
 #include "plugins/common/images/image_times.h"
 #include "plugins/tracks/calibration_file.h"
@@ -66,6 +67,8 @@ class ImageTracks : public Source {
     const std::int64_t left = std::max<std::int64_t>(0, images_->size() - start_);
     return most_ > 0 ? std::min<std::int64_t>(most_, left) : left;
   }
+  bool sees() const override { return true; }
+  SeenImage Seen() const override { return {ToGreyImage(image_)}; }
   std::optional<Config> Calibration() const override {
     if (!calibration_) return std::nullopt;
     return CalibrationFile::Read(*calibration_);

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <opencv2/core.hpp>
+
+#include "alidade/host/source.h"
+
+namespace alidade {
+
+/// A copy of an image, 8 bit grey.
+inline GreyImage ToGreyImage(const cv::Mat& image) {
+  GreyImage grey{image.cols, image.rows, {}};
+  grey.pixels.reserve(image.total());
+  for (int y = 0; y < image.rows; ++y) {
+    const auto* row = image.ptr<unsigned char>(y);
+    grey.pixels.insert(grey.pixels.end(), row, row + image.cols);
+  }
+  return grey;
+}
+
+}  // namespace alidade

@@ -2,6 +2,9 @@
 #include "alidade/filter/stacked.h"
 
 #include <algorithm>
+#include <array>
+
+#include "alidade/state/vector_kernels.h"
 
 namespace alidade::internal {
 
@@ -63,21 +66,30 @@ Workspace::Matrix ProjectionOf(FilterState& f, std::span<Row* const> rows) {
 }
 
 void AddProjected(std::span<Row* const> rows, const Workspace::Matrix& pht, Workspace::Matrix& s) {
+  constexpr int kColumns = 64, kWidth = 8;  // of P H' that is turned at a time
+  std::array<double, kColumns * kWidth> turned;
+  const VectorKernels& kernels = BestVectorKernels();
   ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
     const JacobianRows h = row.jacobian();
-    for (Eigen::Index column = 0; column < at + h.rows; ++column) {
-      const double* const projected = pht.col(column).data();
-      for (int i = 0; i < h.rows; ++i) {
-        const double* const j = h.data + static_cast<std::ptrdiff_t>(i) * h.stride;
-        double sum = 0.0;
-        for (const JacobianPart& part : h.parts) {
-          for (int c = 0; c < part.size; ++c)
-            sum += j[part.column + c] * projected[part.offset + c];
+    const Eigen::Index end = at + h.rows;
+    for (const JacobianPart& part : h.parts) {
+      for (int first = 0; first < part.size; first += kWidth) {
+        const int width = std::min(kWidth, part.size - first);
+        for (Eigen::Index q = 0; q < end; q += kColumns) {
+          const Eigen::Index columns = std::min<Eigen::Index>(kColumns, end - q);
+          for (Eigen::Index i = 0; i < columns; ++i) {
+            const double* const from = pht.col(q + i).data() + part.offset + first;
+            for (int c = 0; c < width; ++c) {
+              turned[static_cast<std::size_t>(c * kColumns + i)] = from[c];
+            }
+          }
+          kernels.combine(columns, width, h.rows, turned.data(), kColumns,
+                          h.data + part.column + first, h.stride, &s(q, at), s.outerStride());
         }
-        s(at + i, column) += sum;
       }
     }
   });
+  s.triangularView<Eigen::StrictlyLower>() = s.transpose();
 }
 
 Workspace::Matrix TransportTo(FilterState& f, const std::vector<double>& values) {

@@ -22,7 +22,7 @@ Workspace::Matrix JacobianOf(FilterState& f, std::span<Row* const> rows);
 Workspace::Matrix NoiseOf(FilterState& f, std::span<Row* const> rows);
 Workspace::Vector InnovationOf(FilterState& f, std::span<Row* const> rows);
 Workspace::Matrix ProjectionOf(FilterState& f, std::span<Row* const> rows);
-/// The lower triangle of s += H P H' of all rows, m x m, from P H'.
+/// s += H P H' of all rows, m x m, s symmetric before and after, from P H'.
 void AddProjected(std::span<Row* const> rows, const Workspace::Matrix& pht, Workspace::Matrix& s);
 /// Calls zero(offset, size, at, k) for each part of the gain that consider blocks and roles keep at
 /// 0: rows [offset, offset + size) of P, columns [at, at + k) of the update.

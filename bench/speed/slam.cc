@@ -167,13 +167,20 @@ int Main(int argc, char** argv) {
   std::vector<std::string> sizes = {"30/20", "100/20", "300/20", "1000/20", "100/100", "300/300"};
   app.add_option("--rounds", rounds, "frames of each contender")->capture_default_str();
   app.add_option("--size", sizes, "landmarks/observed")->capture_default_str();
+  std::vector<std::string> settings;
+  app.add_option("--set", settings, "KEY=VALUE of the config");
   app.add_flag("--textbook,!--no-textbook", textbook, "the dense update too");
   CLI11_PARSE(app, argc, argv);
 
   const testing::TemporaryFolder temporary;
   const std::string file = (temporary.path() / "config.yaml").string();
   std::ofstream(file) << kConfig;
-  const Config config = Config::FromFile(file);
+  Config config = Config::FromFile(file);
+  for (const std::string& setting : settings) {
+    const std::size_t equals = setting.find('=');
+    if (equals == setting.npos) throw std::runtime_error("--set takes KEY=VALUE");
+    config.Set(setting.substr(0, equals), setting.substr(equals + 1), "--set");
+  }
   const PluginHost host;
   const std::string kernels = internal::BestVectorKernels().name;
   const Peak peak = PeakOf(kernels);

@@ -162,7 +162,7 @@ void Covariance::Project(const JacobianRows& h, double* pht, double* s) const {
           const int column = at + i;
           const double* const below = p_.data() + column * ld + o + first;
           for (int c = 0; c < count; ++c) {
-            copy[static_cast<std::size_t>(c * kRows + i)] =
+            copy[static_cast<std::size_t>(c) * kRows + static_cast<std::size_t>(i)] =
                 column <= o + first + c ? below[c] : p_(column, o + first + c);
           }
         }

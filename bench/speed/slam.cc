@@ -5,6 +5,7 @@
 //
 //   peak      the operations of the update alone, at the rate at which this processor multiplies
 //             and adds, measured in turns with the rest
+//   mrpt      mrpt::bayes::CKalmanFilterCapable, where it is installed, to 300 landmarks
 //   textbook  the update with dense H in Eigen, as this build compiles it: K = P H' S^-1,
 //             P = (I - K H) P
 //
@@ -28,6 +29,7 @@
 #include "alidade/run/make_filter.h"
 #include "alidade/state/vector_kernels.h"
 #include "bench/speed/interleaved.h"
+#include "bench/speed/slam_peer.h"
 #include "support/temporary_folder.h"
 
 namespace alidade::bench {
@@ -163,13 +165,13 @@ struct Textbook {
 int Main(int argc, char** argv) {
   CLI::App app("A frame of an EKF at the size of SLAM, relative to the peak of the processor");
   int rounds = 15;
-  bool textbook = true;
+  bool peers = true;
   std::vector<std::string> sizes = {"30/20", "100/20", "300/20", "1000/20", "100/100", "300/300"};
   app.add_option("--rounds", rounds, "frames of each contender")->capture_default_str();
   app.add_option("--size", sizes, "landmarks/observed")->capture_default_str();
   std::vector<std::string> settings;
   app.add_option("--set", settings, "KEY=VALUE of the config");
-  app.add_flag("--textbook,!--no-textbook", textbook, "the dense update too");
+  app.add_flag("--peers,!--no-peers", peers, "the dense update and other libraries too");
   CLI11_PARSE(app, argc, argv);
 
   const testing::TemporaryFolder temporary;
@@ -193,12 +195,19 @@ int Main(int argc, char** argv) {
     volatile double sink = 0.0;
     std::vector<Contender> contenders = {{"peak", [&] { sink = sink + peak.work(); }, 1.0, {}},
                                          {"frame", [&] { slam(); }, 1.0, {}}};
-    const bool dense = textbook && n < 3000;
+    const bool dense = peers && n < 3000;
     std::unique_ptr<Textbook> book;
     if (dense) {
       book = std::make_unique<Textbook>(n, m);
       contenders.push_back({"textbook", [&] { (*book)(); }, 1.0, {}});
     }
+#ifdef ALIDADE_BENCH_MRPT
+    std::unique_ptr<SlamPeer> mrpt;
+    if (peers && n < 3000) {
+      mrpt = MakeMrptSlam(landmarks, observed);
+      contenders.push_back({"mrpt", [&] { mrpt->Frame(); }, 1.0, {}});
+    }
+#endif
     Interleave(contenders, rounds);
     if (!slam.used_all()) throw std::runtime_error("not every measurement was used");
     const double least = UpdateOperations(static_cast<double>(n), static_cast<double>(m)) /
@@ -206,7 +215,9 @@ int Main(int argc, char** argv) {
     std::printf("%s: %ld states, %ld rows, %.3f ms a frame\n", size.c_str(), n, m,
                 1e-6 * contenders[1].Quantile(0.5));
     std::printf("ratio update/peak_%s %.3f\n", size.c_str(), contenders[1].Quantile(0.01) / least);
-    if (dense) PrintRatio("textbook/update_" + size, contenders[2], contenders[1]);
+    for (std::size_t i = 2; i < contenders.size(); ++i) {
+      PrintRatio(contenders[i].name + "/update_" + size, contenders[i], contenders[1]);
+    }
   }
   return 0;
 }

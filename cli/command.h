@@ -24,6 +24,7 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line);
 void AddExplain(CLI::App& program, Action& action);
 void AddCompare(CLI::App& program, Action& action, const std::string& command_line);
 void AddSweep(CLI::App& program, Action& action);
+void AddMerge(CLI::App& program, Action& action);
 /// `execute` runs a command: its words, without the name of the program.
 void AddReplay(CLI::App& program, Action& action,
                const std::function<ExitCode(const std::vector<std::string>&)>& execute);

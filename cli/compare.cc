@@ -234,7 +234,9 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
       ->option_text("S")
       ->check(IsInteger(0, std::int64_t{1} << 62))
       ->needs("--runs");
-  command.add_option("--jobs", arguments.sweep.jobs, "threads; default: all processors")
+  command
+      .add_option("--jobs", arguments.sweep.jobs,
+                  "threads; default: all processors that may be used")
       ->option_text("J")
       ->check(IsInteger(1, 1024))
       ->needs("--runs");

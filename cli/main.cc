@@ -97,6 +97,7 @@ void Describe(CLI::App& program, Action& action, const std::string& command_line
   AddRun(program, action, command_line);
   AddCompare(program, action, command_line);
   AddSweep(program, action);
+  AddMerge(program, action);
   AddReplay(program, action, Execute);
   AddSimulate(program, action);
   AddBundle(program, action);

@@ -14,6 +14,7 @@
 #include "command.h"
 #include "console.h"
 #include "resume.h"
+#include "sweep_report.h"
 #include "watchdog.h"
 
 namespace alidade::cli {
@@ -22,13 +23,14 @@ namespace {
 constexpr const char* kSweepFooter = R"(Examples:
   alidade sweep config.yaml --runs 200             seeds 1 to 200, all processors
   alidade sweep config.yaml --runs 200 --first-seed 1001 -o runs/test
-  alidade sweep config.yaml --runs 10000 --shard 3/16 -o runs/share-03
+  alidade sweep config.yaml --runs 10000 --shard 3/16 -o runs/shard-03
   alidade sweep config.yaml --runs 200 --vary sensors.stereo.sigma_px=0.5,1,2
   alidade sweep config.yaml --runs 200 -o runs/test --resume
 
 The folder gets sweep.json, runs.csv and table.md; with --vary, sweep.csv and a figure too. The
 number of jobs does not change a byte of them. Exit code 1: some runs failed; 75: stopped by a
-signal, with what was complete written. --resume makes the runs that are not finished.)";
+signal, with what was complete written. --resume makes the runs that are not finished; `alidade
+merge` puts shards together.)";
 
 struct SweepArguments {
   Input input;
@@ -46,34 +48,20 @@ void ReadShard(const std::string& text, SweepOptions& options) {
     return error == std::errc() && rest == end;
   };
   const std::size_t slash = text.find('/');
-  const bool two = slash != std::string::npos && read(text.substr(0, slash), options.shard) &&
-                   read(text.substr(slash + 1), options.shards);
-  if (two && options.shard >= 1 && options.shard <= options.shards) return;
+  Shard& shard = options.shard.emplace();
+  const bool two = slash != std::string::npos && read(text.substr(0, slash), shard.index) &&
+                   read(text.substr(slash + 1), shard.of);
+  if (two && shard.index >= 1 && shard.index <= shard.of) return;
   throw CLI::ValidationError("--shard",
-                             "'" + text + "' is not a share; expected i/n with 1 <= i <= n");
+                             "'" + text + "' is not a shard; expected i/n with 1 <= i <= n");
 }
 
-/// Every share has a run, so that each gives a result.
-void CheckShares(const SweepOptions& options) {
-  if (options.shards <= options.runs) return;
-  throw CLI::ValidationError("--shard", std::to_string(options.shards) + " shares of " +
+/// Every shard has a run, so that each gives a result.
+void CheckShards(const SweepOptions& options) {
+  if (!options.shard || options.shard->of <= options.runs) return;
+  throw CLI::ValidationError("--shard", std::to_string(options.shard->of) + " shards of " +
                                             std::to_string(options.runs) +
-                                            " runs; expected a run for each share");
-}
-
-/// Tells of the runs that failed, the first few in full, each after `where`; true where there are
-/// any.
-bool ReportFailures(const SweepResult& result, const std::string& where) {
-  constexpr int kShown = 5;
-  int failed = 0;
-  for (const SweepRun& run : result.done) {
-    if (run.status != RunStatus::kFailed) continue;
-    if (++failed <= kShown)
-      PrintErrors(where + "seed " + std::to_string(run.seed) + ": " + run.reason);
-  }
-  if (failed > kShown)
-    PrintErrors(where + std::to_string(failed) + " runs failed: see failures.csv");
-  return failed > 0;
+                                            " runs; expected a run for each shard");
 }
 
 /// What both kinds of sweep start from.
@@ -88,7 +76,8 @@ struct Task {
 };
 
 SweepFolder::Options FolderOf(const Task& task) {
-  return {task.path, task.arguments.force, task.inputs, task.arguments.resume};
+  return {task.path, task.arguments.force, task.inputs, task.arguments.resume,
+          task.options.shard.has_value()};
 }
 
 /// The options of a sweep into `folder`; says what it takes from there.
@@ -103,27 +92,13 @@ SweepOptions OptionsInto(SweepFolder& folder, const Task& task) {
   return options;
 }
 
-void TellWritten(const Task& task, const std::string& table,
-                 const std::vector<std::string>& names) {
-  if (task.arguments.quiet) return;
-  std::string text = table + "\nwrote " + task.path.string() + '\n';
-  for (const std::string& name : names) text += "  " + (task.path / name).string() + '\n';
-  Print(text);
-}
-
 ExitCode SweepSeeds(const Task& task) {
   SweepFolder folder(FolderOf(task), task.config);
   const SweepOptions options = OptionsInto(folder, task);
   const SweepResult result =
       WithWhatIsKept(folder, [&] { return Sweep(task.config, task.host, options); });
   task.progress.Clear();
-  const bool failed = ReportFailures(result, "");
-  if (result.stopped) TellStopped(result.done.size(), result.runs);
-  WithWhatIsKept(folder, [&] { folder.Write(result, task.config); });
-  if (!task.arguments.quiet) TellKept(folder.resumed(), task.path);
-  TellWritten(task, SweepTable(result), {"table.md", "sweep.json", "runs.csv"});
-  if (result.stopped) return ExitCode::kStopped;
-  return failed ? ExitCode::kFound : ExitCode::kOk;
+  return FinishSweep(folder, task.path, result, task.config, task.arguments.quiet);
 }
 
 ExitCode SweepValues(const Task& task) {
@@ -133,24 +108,7 @@ ExitCode SweepValues(const Task& task) {
   const VariedSweep sweep =
       WithWhatIsKept(folder, [&] { return SweepOver(task.config, task.host, options, variation); });
   task.progress.Clear();
-  bool failed = false;
-  std::size_t done = 0;
-  for (std::size_t v = 0; v < sweep.results.size(); ++v) {
-    const std::string where = variation.key + '=' + variation.values[v] + ", ";
-    failed = ReportFailures(sweep.results[v], where) || failed;
-    done += sweep.results[v].done.size();
-  }
-  const auto values = static_cast<std::int64_t>(variation.values.size());
-  if (sweep.stopped()) TellStopped(done, values * sweep.results.front().runs);
-  const std::string note =
-      WithWhatIsKept(folder, [&] { return folder.Write(sweep, task.config, StopRequested); });
-  if (!task.arguments.quiet) TellKept(folder.resumed(), task.path);
-  std::vector<std::string> names = {"table.md", "sweep.csv", "sweep.json", "runs.csv"};
-  if (note.empty()) names.insert(names.begin(), "figures/vary.svg");
-  TellWritten(task, SweepTable(sweep), names);
-  if (!note.empty()) Log(LogLevel::kWarning, "no figure drawn: " + note);
-  if (sweep.stopped()) return ExitCode::kStopped;
-  return failed ? ExitCode::kFound : ExitCode::kOk;
+  return FinishSweep(folder, task.path, sweep, task.config, task.arguments.quiet);
 }
 
 /// The config of the runs, or one for each value that is varied, but for those that cannot be set:
@@ -175,9 +133,9 @@ std::vector<std::string> ArgumentsOf(const SweepArguments& arguments) {
   const SweepOptions& options = arguments.options;
   std::vector<std::string> list = {"sweep", "--runs", std::to_string(options.runs), "--first-seed",
                                    std::to_string(options.first_seed)};
-  if (options.shards > 1) {
+  if (const std::optional<Shard>& shard = options.shard) {
     list.insert(list.end(),
-                {"--shard", std::to_string(options.shard) + '/' + std::to_string(options.shards)});
+                {"--shard", std::to_string(shard->index) + '/' + std::to_string(shard->of)});
   }
   if (!arguments.vary.empty()) list.insert(list.end(), {"--vary", arguments.vary});
   return list;
@@ -223,14 +181,17 @@ void AddSweep(CLI::App& program, Action& action) {
       .add_option("--first-seed", arguments->options.first_seed, "seeds count up from S; default 1")
       ->option_text("S")
       ->check(IsInteger(0, std::int64_t{1} << 62));
-  command.add_option("--jobs", arguments->options.jobs, "threads; default: all processors")
+  command
+      .add_option("--jobs", arguments->options.jobs,
+                  "threads; default: all processors that may be used")
       ->option_text("J")
       ->check(IsInteger(1, 1024));
   const auto read_shard = [arguments](const std::string& text) {
     ReadShard(text, arguments->options);
   };
   command
-      .add_option_function<std::string>("--shard", read_shard, "do share i of n of the seeds only")
+      .add_option_function<std::string>("--shard", read_shard,
+                                        "run shard i of n equal ones of the seeds only")
       ->option_text("i/n");
   command
       .add_option("--vary", arguments->vary,
@@ -245,7 +206,7 @@ void AddSweep(CLI::App& program, Action& action) {
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.footer(kSweepFooter);
   command.callback([&action, arguments] {
-    CheckShares(arguments->options);
+    CheckShards(arguments->options);
     action = [arguments] { return RunSweep(*arguments); };
   });
 }

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "alidade/config/config.h"
-#include "support/program.h"
+#include "support/run_files.h"
 
 namespace alidade {
 namespace {
@@ -18,13 +18,34 @@ std::string Rows(const std::string& csv) { return csv.substr(csv.find('\n') + 1)
 
 // FAULTS 97
 TEST_F(SweepCli, GivesTheSameBytesForAnyNumberOfJobs) {
-  const Outcome one = Call({"sweep", "config.yaml", "--runs", "12", "--jobs", "1", "-o", "one"});
-  EXPECT_EQ(one.code, 0) << one.err;
-  EXPECT_EQ(Call({"sweep", "config.yaml", "--runs", "12", "--jobs", "2", "-o", "two"}).code, 0);
-  for (const std::string name : {"sweep.json", "runs.csv", "table.md", "config.resolved.yaml"}) {
-    EXPECT_NE(Read("one/" + name), "") << name;
-    EXPECT_EQ(Read("one/" + name), Read("two/" + name)) << name;
+  for (const std::string jobs : {"1", "2", "3"}) {
+    const Outcome sweep =
+        Call({"sweep", "config.yaml", "--runs", "12", "--jobs", jobs, "-o", "jobs" + jobs});
+    EXPECT_EQ(sweep.code, 0) << sweep.err;
+    testing::ExpectSameFiles(folder_ / ("jobs" + jobs), folder_ / "jobs1");
   }
+}
+
+// But for the wall clock, which is one entry of compare.json and one row of its tables.
+TEST_F(SweepCli, AComparisonOverSeedsHasTheSameBytesForAnyNumberOfJobs) {
+  const auto files = [&](const std::string& jobs) {
+    const Outcome comparison = Call({"compare", "config.yaml", "--runs", "4", "--no-decomposition",
+                                     "--jobs", jobs, "-o", "jobs" + jobs});
+    EXPECT_EQ(comparison.code, 0) << comparison.err;
+    auto all = testing::RunFiles(folder_ / ("jobs" + jobs));
+    std::string& json = all["compare.json"];
+    const std::size_t clock = json.find("\"time_us\"");
+    json.erase(clock, json.find('}', clock) - clock);
+    for (const char* table : {"compare.md", "compare.tex"}) {
+      std::string& text = all[table];
+      const std::size_t row = text.find("wall clock");
+      text.erase(row, text.find('\n', row) - row);
+    }
+    return all;
+  };
+  const auto one = files("1");
+  EXPECT_EQ(files("2"), one);
+  EXPECT_EQ(files("3"), one);
 }
 
 TEST_F(SweepCli, SummarisesRunsThatRunWouldGive) {
@@ -67,13 +88,13 @@ TEST_F(SweepCli, RefusesWhatIsNoShare) {
     EXPECT_EQ(sweep.code, 2) << shard;
   }
   const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "1", "--shard", "3/2"});
-  EXPECT_TRUE(Contains(sweep.err, "--shard: '3/2' is not a share")) << sweep.err;
+  EXPECT_TRUE(Contains(sweep.err, "--shard: '3/2' is not a shard")) << sweep.err;
 }
 
 TEST_F(SweepCli, EveryShareHasARun) {
   const Outcome sweep = Call({"sweep", "config.yaml", "--runs", "2", "--shard", "1/3"});
   EXPECT_EQ(sweep.code, 2);
-  EXPECT_TRUE(Contains(sweep.err, "error: --shard: 3 shares of 2 runs; expected a run for each"))
+  EXPECT_TRUE(Contains(sweep.err, "error: --shard: 3 shards of 2 runs; expected a run for each"))
       << sweep.err;
   EXPECT_EQ(Call({"sweep", "config.yaml", "--runs", "2", "--shard", "2/2"}).code, 0);
 }

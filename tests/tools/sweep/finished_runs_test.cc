@@ -7,6 +7,7 @@
 #include <fstream>
 #include <limits>
 
+#include "alidade/sweep/run_line.h"
 #include "support/temporary_folder.h"
 
 namespace alidade::internal {
@@ -36,10 +37,7 @@ TEST(FinishedRuns, AreReadAsTheyWereWritten) {
   {
     OutputFolder first(temporary / "out", false);
     FinishedRuns runs(first, {});
-    runs.Add("x=1", MakeRun(std::numeric_limits<std::uint64_t>::max()));
-    SweepRun failed = MakeRun(2);
-    failed.status = RunStatus::kFailed;
-    runs.Add("x=1", failed);
+    runs.Add(RunLine("x=1", MakeRun(std::numeric_limits<std::uint64_t>::max())));
     EXPECT_FALSE(first.failed().empty()) << "it is worth keeping";
   }
   const std::vector<std::filesystem::path> before = FailedFolders(temporary / "out");
@@ -47,7 +45,7 @@ TEST(FinishedRuns, AreReadAsTheyWereWritten) {
   OutputFolder second(temporary / "out", false);
   const FinishedRuns runs(second, before);
   EXPECT_EQ(runs.size(), 1u);
-  EXPECT_EQ(runs.Find("x=1", 2), nullptr) << "one that failed is tried again";
+  EXPECT_EQ(runs.Find("x=1", 2), nullptr);
   EXPECT_EQ(runs.Find("", std::numeric_limits<std::uint64_t>::max()), nullptr);
   const FinishedRuns::Known* const known =
       runs.Find("x=1", std::numeric_limits<std::uint64_t>::max());
@@ -72,6 +70,17 @@ TEST(FinishedRuns, AreReadAsTheyWereWritten) {
     }
   }
   EXPECT_EQ(RunLine("x=1", known->run), RunLine("x=1", expected));
+}
+
+TEST(RunLine, OfARunThatFailedSaysSo) {
+  SweepRun failed = MakeRun(2);
+  failed.status = RunStatus::kFailed;
+  const std::string line = RunLine("", failed);
+  const std::optional<LineOfRun> read = ReadRunLine(line);
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->run.status, RunStatus::kFailed);
+  EXPECT_EQ(RunLine(read->value, read->run), line);
+  EXPECT_FALSE(ReadRunLine(line.substr(0, 40)));
 }
 
 TEST(FinishedRuns, ALineThatWasCutIsNoneAndAnyOtherIsRefused) {

@@ -146,16 +146,19 @@ FolderStatus StatusOf(const fs::path& folder) {
 
 std::string DifferenceFrom(const fs::path& folder, const std::string& config,
                            const std::string& inputs) {
-  const std::string recorded = TextIn(folder / kInputsFile);
-  if (recorded.empty()) return std::string("it has no ") + kInputsFile;
+  const MadeFrom before = {TextIn(folder / kResolvedConfig), TextIn(folder / kInputsFile)};
+  if (before.inputs.empty()) return std::string("it has no ") + kInputsFile;
+  return DifferenceOf(before, (folder / kInputsFile).string(), {config, inputs});
+}
+
+std::string DifferenceOf(const MadeFrom& before, const std::string& file, const MadeFrom& now) {
   std::vector<std::string> differences;
-  std::istringstream before(TextIn(folder / kResolvedConfig)), now(config);
-  if (const auto one = CompareRows(before, now, LastRow::kCounts).difference) {
+  std::istringstream config_before(before.config), config_now(now.config);
+  if (const auto one = CompareRows(config_before, config_now, LastRow::kCounts).difference) {
     differences.push_back(std::string(kResolvedConfig) + ':' + std::to_string(one->line) + ": " +
                           one->Text());
   }
-  for (const std::string& one :
-       InputDifferences(recorded, (folder / kInputsFile).string(), inputs)) {
+  for (const std::string& one : InputDifferences(before.inputs, file, now.inputs)) {
     if (differences.empty() || !one.starts_with("config: ")) differences.push_back(one);
   }
   return Join(differences, "; ");

@@ -28,6 +28,13 @@ std::string RecordedStatus(const std::filesystem::path& folder);
 std::string DifferenceFrom(const std::filesystem::path& folder, const std::string& config,
                            const std::string& inputs);
 
+/// The two texts that a folder was made from: of its config.resolved.yaml and its inputs.json.
+struct MadeFrom {
+  std::string config, inputs;
+};
+/// What `now` differs in from `before`, whose inputs.json is `file`; "": in nothing.
+std::string DifferenceOf(const MadeFrom& before, const std::string& file, const MadeFrom& now);
+
 /// Whether `target` is a finished run of this config and these inputs; removes what is left of a
 /// process that died right after it was. Error: kCannotCreate where it is one of others, unless
 /// `force`.

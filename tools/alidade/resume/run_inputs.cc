@@ -214,6 +214,12 @@ RecordedInputs ReadInputs(const std::string& text, const std::string& file) {
   });
 }
 
+std::string WithoutOption(std::string text, const std::string& option, const std::string& value) {
+  const std::string words = ",\n    " + JsonString(option) + ",\n    " + JsonString(value);
+  const std::size_t place = text.find(words);
+  return place == text.npos ? text : text.erase(place, words.size());
+}
+
 std::vector<std::string> InputDifferences(const std::string& before, const std::string& file,
                                           const std::string& now) {
   Facts was = Reading(before, file, FactsIn);

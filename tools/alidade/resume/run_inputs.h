@@ -51,6 +51,10 @@ struct RecordedInputs {
 /// Error: kBadData where `text`, the contents of `file`, is none.
 RecordedInputs ReadInputs(const std::string& text, const std::string& file);
 
+/// The text of inputs.json without an option of the command and its value, as if the command had
+/// not had them.
+std::string WithoutOption(std::string text, const std::string& option, const std::string& value);
+
 /// What differs between two texts of `inputs.json`, one of them in `file`, a line each: `plugin
 /// ratio.so: now 1f0c..., was 9a3b...`. Error: kBadData.
 std::vector<std::string> InputDifferences(const std::string& before, const std::string& file,

@@ -1,90 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/sweep/finished_runs.h"
 
-#include <cmath>
 #include <fstream>
-#include <limits>
-#include <nlohmann/json.hpp>
 
-#include "alidade/base/json.h"
-#include "alidade/base/number_text.h"
+#include "alidade/sweep/run_line.h"
 
 namespace alidade::internal {
-namespace {
-
-/// JSON has no number that is not finite: such a one is a text. A minus of zero takes a point.
-std::string TextOfNumber(double value) {
-  if (!std::isfinite(value)) return '"' + NumberText(value) + '"';
-  return value == 0.0 && std::signbit(value) ? "-0.0" : NumberText(value);
-}
-
-const char* TextOfFlag(bool flag) { return flag ? "true" : "false"; }
-
-/// `"KEY":{...}`, the values as `text` gives them.
-template <class Map, class F>
-std::string MapText(const char* key, const Map& map, const F& text) {
-  std::string all = JsonString(key) + ":{";
-  const char* comma = "";
-  for (const auto& [name, value] : map) {
-    all.append(comma).append(JsonString(name)).append(":").append(text(value));
-    comma = ",";
-  }
-  return all + '}';
-}
-
-double NumberOf(const Json& json) {
-  if (json.is_number()) return json.get<double>();
-  const double infinity = std::numeric_limits<double>::infinity();
-  const std::string& text = json.get_ref<const std::string&>();
-  if (text == "inf") return infinity;
-  return text == "-inf" ? -infinity : std::numeric_limits<double>::quiet_NaN();
-}
-
-std::string TextOfResult(const EstimatorResult& one) {
-  const auto count = [](std::int64_t value) { return std::to_string(value); };
-  const auto unit = [](const std::string& value) { return JsonString(value); };
-  return "{\"name\":" + JsonString(one.name) + ",\"diverged\":" + TextOfFlag(one.diverged) +
-         ",\"inconsistent\":" + TextOfFlag(one.inconsistent) +
-         ",\"failed\":" + TextOfFlag(one.failed) + ',' + MapText("units", one.units, unit) + ',' +
-         MapText("counts", one.counts, count) + ',' +
-         MapText("metrics", one.metrics, TextOfNumber) + '}';
-}
-
-EstimatorResult EstimatorOf(const Json& json) {
-  EstimatorResult one;
-  one.name = json.at("name").get<std::string>();
-  one.diverged = json.at("diverged").get<bool>();
-  one.inconsistent = json.at("inconsistent").get<bool>();
-  one.failed = json.at("failed").get<bool>();
-  one.units = json.at("units").get<std::map<std::string, std::string>>();
-  one.counts = json.at("counts").get<std::map<std::string, std::int64_t>>();
-  for (const auto& [key, value] : json.at("metrics").items()) one.metrics[key] = NumberOf(value);
-  return one;
-}
-
-SweepRun RunOf(const Json& json) {
-  SweepRun run;
-  run.seed = json.at("seed").get<std::uint64_t>();
-  run.code = static_cast<ExitCode>(json.at("code").get<int>());
-  run.reason = json.at("reason").get<std::string>();
-  run.withheld = json.at("withheld").get<bool>();
-  for (const Json& one : json.at("estimators")) run.estimators.push_back(EstimatorOf(one));
-  return run;
-}
-
-}  // namespace
-
-std::string RunLine(const std::string& value, const SweepRun& run) {
-  std::string line = "{\"value\":" + JsonString(value) + ",\"seed\":" + std::to_string(run.seed) +
-                     ",\"code\":" + std::to_string(static_cast<int>(run.code)) +
-                     ",\"reason\":" + JsonString(run.reason) +
-                     ",\"withheld\":" + TextOfFlag(run.withheld) + ",\"estimators\":[";
-  for (const EstimatorResult& one : run.estimators) {
-    line += TextOfResult(one);
-    if (&one != &run.estimators.back()) line += ',';
-  }
-  return line + "]}\n";
-}
 
 FinishedRuns::FinishedRuns(OutputFolder& folder, const std::vector<std::filesystem::path>& before)
     : folder_(folder) {
@@ -100,14 +21,13 @@ void FinishedRuns::Read(const std::filesystem::path& file) {
   for (std::string line; std::getline(stream, line);) {
     if (stream.eof()) return;  // cut short
     ++place.line;
-    try {
-      const Json json = Json::parse(line);
-      const SweepRun run = RunOf(json);
-      known_.try_emplace({json.at("value").get<std::string>(), run.seed}, Known{run, place});
-    } catch (const Json::exception&) {
+    std::optional<LineOfRun> read = ReadRunLine(line);
+    if (!read) {
       throw Error(ExitCode::kBadData, ErrorLine(place, {}, "is not what a sweep writes",
                                                 "a run as JSON; leave out --resume"));
     }
+    const std::uint64_t seed = read->run.seed;
+    known_.try_emplace({read->value, seed}, Known{std::move(read->run), place});
   }
 }
 
@@ -116,10 +36,9 @@ const FinishedRuns::Known* FinishedRuns::Find(const std::string& value, std::uin
   return found == known_.end() ? nullptr : &found->second;
 }
 
-void FinishedRuns::Add(const std::string& value, const SweepRun& run) {
-  if (run.status != RunStatus::kOk) return;
+void FinishedRuns::Add(const std::string& line) {
   if (!folder_.kept()) folder_.Keep();
-  file_->Write(RunLine(value, run));
+  file_->Write(line);
   file_->Flush();  // the next may take hours
 }
 

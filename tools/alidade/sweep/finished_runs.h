@@ -15,10 +15,6 @@
 
 namespace alidade::internal {
 
-/// The text of a run that came to its end, one line of JSON with all that the files of a sweep rest
-/// on: `value` is that of the varied key, "" where none is varied.
-std::string RunLine(const std::string& value, const SweepRun& run);
-
 /// The finished runs of a sweep that is not finished itself, in `finished_runs.jsonl` of its
 /// folder: a sweep that resumes it takes them from there.
 class FinishedRuns {
@@ -35,9 +31,9 @@ class FinishedRuns {
   const Known* Find(const std::string& value, std::uint64_t seed) const;
   /// How many were.
   std::size_t size() const { return known_.size(); }
-  /// Adds a run that came to its end; the folder is worth keeping from now on. Not from two threads
-  /// at once. Error: kIo.
-  void Add(const std::string& value, const SweepRun& run);
+  /// Adds the RunLine() of a run that came to its end; the folder is worth keeping from now on. Not
+  /// from two threads at once. Error: kIo.
+  void Add(const std::string& line);
   /// Error: kIo.
   void Close() { file_->Close(); }
 

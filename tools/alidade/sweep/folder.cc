@@ -10,6 +10,8 @@
 #include "alidade/resume/run_inputs.h"
 #include "alidade/run/metric_rows.h"
 #include "alidade/sweep/finished_runs.h"
+#include "alidade/sweep/run_line.h"
+#include "alidade/sweep/shards.h"
 #include "alidade/sweep/sweep.h"
 #include "alidade/sweep/table.h"
 #include "alidade/sweep/vary_files.h"
@@ -30,12 +32,13 @@ struct SweepFolder::Impl {
   void Commit(bool stopped);
 
   OutputFolder folder;
+  bool shard = false;
   std::optional<internal::Leftovers> leftovers;
   std::optional<internal::FinishedRuns> finished;
 };
 
 SweepFolder::Impl::Impl(const Options& options, const Config& config)
-    : folder(options.folder, options.force || options.resume) {
+    : folder(options.folder, options.force || options.resume), shard(options.shard) {
   std::vector<std::filesystem::path> before;
   if (options.resume) {
     if (!options.force) internal::CheckReplaceable(options.folder);
@@ -75,9 +78,9 @@ Parts PartsOf(const VariedSweep& sweep) {
   return parts;
 }
 
-Json EstimatorsOf(const SweepResult& result) {
+Json EstimatorsOf(const std::vector<SweepSummary>& summaries) {
   Json json = Json::object();
-  for (const SweepSummary& summary : Summarise(result)) {
+  for (const SweepSummary& summary : summaries) {
     Json& one = json[summary.name];
     one = {{"diverged", summary.diverged}, {"inconsistent", summary.inconsistent}};
     Json& metrics = one["metrics"] = Json::object();
@@ -97,14 +100,14 @@ const char* StatusOf(bool stopped) {
   return ToString(stopped ? RunStatus::kStopped : RunStatus::kOk);
 }
 
-std::string SweepJson(const SweepResult& result) {
+std::string SweepJson(const SweepResult& result, const std::vector<SweepSummary>& summaries) {
   return internal::JsonText({{"status", StatusOf(result.stopped)},
                              {"runs", result.runs},
                              {"runs_used", CountWhole(result)},
                              {"first_seed", result.first_seed},
                              {"reference", result.reference},
                              {"withheld", CountWithheld(result)},
-                             {"estimators", EstimatorsOf(result)}});
+                             {"estimators", EstimatorsOf(summaries)}});
 }
 
 std::string SweepJson(const VariedSweep& sweep) {
@@ -114,7 +117,7 @@ std::string SweepJson(const VariedSweep& sweep) {
                       {"runs_used", CountWhole(*part.result)},
                       {"reference", part.result->reference},
                       {"withheld", CountWithheld(*part.result)},
-                      {"estimators", EstimatorsOf(*part.result)}});
+                      {"estimators", EstimatorsOf(Summarise(*part.result))}});
   }
   return internal::JsonText({{"status", StatusOf(sweep.stopped())},
                              {"runs", sweep.results.front().runs},
@@ -192,6 +195,15 @@ void WriteFailures(const OutputFolder& folder, const Parts& parts, const std::st
   csv.Close();
 }
 
+/// All runs of a shard, by value and seed, for MergeShards().
+void WriteShardRuns(const OutputFolder& folder, const Parts& parts) {
+  const auto file = folder.Create(internal::kShardRuns);
+  for (const Part& part : parts) {
+    for (const SweepRun& run : part.result->done) file->Write(internal::RunLine(part.value, run));
+  }
+  file->Close();
+}
+
 }  // namespace
 
 SweepFolder::SweepFolder(const std::filesystem::path& folder, bool force)
@@ -221,11 +233,13 @@ void SweepFolder::AddFile(const std::string& name, const std::string& text) {
 void SweepFolder::Write(const SweepResult& result, const Config& config) {
   const OutputFolder& folder = impl_->folder;
   impl_->WriteConfig(config);
-  folder.Write("sweep.json", SweepJson(result));
+  const std::vector<SweepSummary> summaries = Summarise(result);
+  folder.Write("sweep.json", SweepJson(result, summaries));
   const Parts parts = {{&result, ""}};
   WriteRuns(folder, parts, "");
   WriteFailures(folder, parts, "");
-  folder.Write("table.md", internal::SweepMarkdown(result));
+  if (impl_->shard && !result.stopped) WriteShardRuns(folder, parts);
+  folder.Write("table.md", internal::SweepMarkdown(result, summaries));
   impl_->Commit(result.stopped);
 }
 
@@ -238,6 +252,7 @@ std::string SweepFolder::Write(const VariedSweep& sweep, const Config& config,
   internal::WriteSweepCsv(folder, sweep);
   WriteRuns(folder, parts, sweep.variation.key);
   WriteFailures(folder, parts, sweep.variation.key);
+  if (impl_->shard && !sweep.stopped()) WriteShardRuns(folder, parts);
   folder.Write("table.md", internal::VariedMarkdown(sweep));
   const std::string note = internal::DrawVariation(folder, sweep, stop);
   impl_->Commit(sweep.stopped());

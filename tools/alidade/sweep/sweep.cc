@@ -13,6 +13,8 @@
 #include "alidade/base/signal_stack.h"
 #include "alidade/resume/leftovers.h"
 #include "alidade/sweep/finished_runs.h"
+#include "alidade/sweep/processors.h"
+#include "alidade/sweep/run_line.h"
 #include "alidade/sweep/sweep_config.h"
 
 namespace alidade {
@@ -72,10 +74,10 @@ class Queue {
     if (known == nullptr && Stopped()) return true;
     SweepRun run = known != nullptr ? known->run : RunSeed(seed);
     if (run.status == RunStatus::kStopped) return true;
+    const bool adds = known == nullptr && options_.finished != nullptr;
+    const std::string line = adds ? internal::RunLine(options_.value, run) : "";
     const std::lock_guard lock(mutex_);
-    if (known == nullptr && options_.finished != nullptr) {
-      options_.finished->Add(options_.value, run);
-    }
+    if (adds && run.status == RunStatus::kOk) options_.finished->Add(line);
     done_.push_back(std::move(run));
     if (options_.progress) options_.progress(static_cast<std::int64_t>(done_.size()), runs_);
     return true;
@@ -87,7 +89,7 @@ class Queue {
   }
 
   Config CopyFor(std::uint64_t seed) {
-    const std::lock_guard lock(mutex_);
+    const std::lock_guard lock(config_mutex_);
     Config copy = config_.Copy();
     copy.Set("source.seed", std::to_string(seed), "--first-seed");
     return copy;
@@ -122,7 +124,8 @@ class Queue {
     return run;
   }
 
-  const Config& config_;
+  const Config& config_;  ///< a copy of it marks its keys as read
+  std::mutex config_mutex_;
   const PluginHost& host_;
   const SweepOptions& options_;
   const std::uint64_t first_seed_;
@@ -155,7 +158,6 @@ SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptio
 SweepResult internal::SweepSeeds(const Config& config, const PluginHost& host,
                                  const SweepOptions& options) {
   ALIDADE_EXPECTS(options.runs > 0 && options.jobs >= 0);
-  ALIDADE_EXPECTS(options.shard >= 1 && options.shard <= options.shards);
   SweepResult result;
   CheckReadableAgain(config);
   // What is wrong with the config is said once, before the first run.
@@ -168,17 +170,14 @@ SweepResult internal::SweepSeeds(const Config& config, const PluginHost& host,
       result.reference = result.estimators[static_cast<std::size_t>(experiment.reference)];
     }
   }
-  const auto share = [&](int i) {
-    return options.runs / options.shards * i + options.runs % options.shards * i / options.shards;
-  };
-  const std::int64_t first = share(options.shard - 1);
-  result.runs = share(options.shard) - first;
-  result.first_seed = options.first_seed + static_cast<std::uint64_t>(first);
+  const SeedRange seeds =
+      SeedsOf(options.shard.value_or(Shard{}), options.first_seed, options.runs);
+  result.runs = seeds.count;
+  result.first_seed = seeds.first;
 
   Queue queue(config, host, options, result.first_seed, result.runs);
   queue.CheckFinished();
-  const auto hardware = static_cast<std::int64_t>(std::thread::hardware_concurrency());
-  const std::int64_t jobs = options.jobs > 0 ? options.jobs : std::max<std::int64_t>(1, hardware);
+  const std::int64_t jobs = options.jobs > 0 ? options.jobs : UsableProcessors();
   const std::int64_t wanted = MayRunInParallel(host) ? jobs : 1;
   {
     std::vector<std::jthread> threads;

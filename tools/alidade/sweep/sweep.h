@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,13 +19,18 @@ namespace internal {
 class FinishedRuns;  // in alidade/sweep/finished_runs.h
 }
 
+/// One of so many equal shares of the seeds, in order; counted from 1.
+struct Shard {
+  int index = 1, of = 1;
+};
+
 struct SweepOptions {
   std::int64_t runs = 1;  ///< of all shards together; their seeds count up from first_seed
   std::uint64_t first_seed = 1;
-  /// Threads; 0: as many as the processor has. One where a model on offer does not allow several
-  /// instances at once (no ALIDADE_THREAD_INSTANCES).
+  /// Threads; 0: one for each processor that the process may use. One where a model on offer does
+  /// not allow several instances at once (no ALIDADE_THREAD_INSTANCES).
   int jobs = 0;
-  int shard = 1, shards = 1;  ///< which of the equal shares of the seeds, in order
+  std::optional<Shard> shard = {};  ///< the share that is run; none: all
   /// What makes a run, from several threads at once; empty: alidade::Run.
   std::function<RunResult(Experiment&, const RunOptions&)> run;
   std::function<void(std::int64_t, std::int64_t)> progress;  ///< runs done, runs in all
@@ -106,8 +112,8 @@ std::string SweepTable(const SweepResult& result);
 std::string SweepTable(const VariedSweep& sweep);
 
 /// The folder of a sweep (docs/cli.md): sweep.json, runs.csv, table.md, config.resolved.yaml, and
-/// failures.csv where a run failed; of a varied one sweep.csv and a figure too. It is there in full
-/// or not at all.
+/// failures.csv where a run failed; of a varied one sweep.csv and a figure too; of a shard
+/// shard_runs.jsonl, which MergeShards() reads. It is there in full or not at all.
 class SweepFolder {
  public:
   struct Options {
@@ -116,6 +122,7 @@ class SweepFolder {
     std::string inputs = {};  ///< the text of inputs.json; "": there is none
     /// Continues what unfinished sweeps left here: see `alidade sweep --resume` in docs/cli.md.
     bool resume = false;
+    bool shard = false;  ///< the sweep is a shard
   };
   /// Takes the name. Errors: kCannotCreate where it exists without `force` and is no unfinished
   /// sweep to be resumed, or one that was made from another config or other inputs; kIo.

@@ -57,6 +57,13 @@ bool UsesSeed(const Config& config, const PluginHost& host, std::uint64_t seed) 
   }
 }
 
+SeedRange SeedsOf(const Shard& shard, std::uint64_t first_seed, std::int64_t runs) {
+  ALIDADE_EXPECTS(shard.index >= 1 && shard.index <= shard.of);
+  const auto end = [&](int i) { return runs / shard.of * i + runs % shard.of * i / shard.of; };
+  const std::int64_t before = end(shard.index - 1);
+  return {first_seed + static_cast<std::uint64_t>(before), end(shard.index) - before};
+}
+
 void FailUnseeded(const Config& config) {
   const Config copy = config.Copy();
   const Node type = copy.root().At("source").At("type");

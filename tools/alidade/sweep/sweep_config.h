@@ -20,6 +20,16 @@ bool UsesSeed(const Config& config, const PluginHost& host, std::uint64_t seed);
 /// Says that it does not. Error: kBadConfig.
 [[noreturn]] void FailUnseeded(const Config& config);
 
+/// Seeds that count up from the first.
+struct SeedRange {
+  std::uint64_t first = 1;
+  std::int64_t count = 1;
+};
+
+/// Those of a share of `runs` seeds from `first_seed` on: of share i from floor(runs (i - 1) / of)
+/// to floor(runs i / of), so that no two shares differ by more than one.
+SeedRange SeedsOf(const Shard& shard, std::uint64_t first_seed, std::int64_t runs);
+
 /// As Sweep(), for data that depend on the seed or not.
 SweepResult SweepSeeds(const Config& config, const PluginHost& host, const SweepOptions& options);
 

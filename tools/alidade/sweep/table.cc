@@ -113,12 +113,11 @@ std::string ReferenceLines(const VariedSweep& sweep) {
   return all_same ? ReferenceLines(sweep.results.front()) : lines;
 }
 
-std::string SweepMarkdown(const SweepResult& result) {
+std::string SweepMarkdown(const SweepResult& result, const std::vector<SweepSummary>& summaries) {
   std::string text = std::to_string(CountWhole(result)) + " of " + std::to_string(result.runs) +
                      " runs, seeds from " + std::to_string(result.first_seed) +
                      ". Mean [5 %, 50 %, 95 % quantile] over the runs that did not diverge, "
                      "inconsistent ones among them.\n\n";
-  const std::vector<SweepSummary> summaries = Summarise(result);
   text += MarkdownTable("", NamesOf(summaries), TableRows(summaries));
   return text + NeesLines(summaries) + ReferenceLines(result);
 }

@@ -29,7 +29,7 @@ std::string NeesLines(const std::vector<SweepSummary>& summaries);
 std::string ReferenceLines(const SweepResult& result);
 std::string ReferenceLines(const VariedSweep& sweep);
 
-/// The text of `table.md`: a column for each estimator.
-std::string SweepMarkdown(const SweepResult& result);
+/// The text of `table.md`: a column for each estimator, of which `summaries` are.
+std::string SweepMarkdown(const SweepResult& result, const std::vector<SweepSummary>& summaries);
 
 }  // namespace alidade::internal

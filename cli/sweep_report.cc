@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sweep_report.h"
+
+#include "console.h"
+#include "resume.h"
+
+namespace alidade::cli {
+namespace {
+
+/// Tells of the runs that failed, the first few in full, each after `where`; true where there are
+/// any.
+bool ReportFailures(const SweepResult& result, const std::string& where) {
+  constexpr int kShown = 5;
+  int failed = 0;
+  for (const SweepRun& run : result.done) {
+    if (run.status != RunStatus::kFailed) continue;
+    if (++failed <= kShown)
+      PrintErrors(where + "seed " + std::to_string(run.seed) + ": " + run.reason);
+  }
+  if (failed > kShown)
+    PrintErrors(where + std::to_string(failed) + " runs failed: see failures.csv");
+  return failed > 0;
+}
+
+/// The tables of a sweep, and the names of its main files.
+template <class Result>
+void TellWritten(const std::filesystem::path& path, const Result& result,
+                 const std::vector<std::string>& names) {
+  std::string text = SweepTable(result) + "\nwrote " + path.string() + '\n';
+  for (const std::string& name : names) text += "  " + (path / name).string() + '\n';
+  Print(text);
+}
+
+ExitCode CodeOf(bool stopped, bool failed) {
+  if (stopped) return ExitCode::kStopped;
+  return failed ? ExitCode::kFound : ExitCode::kOk;
+}
+
+}  // namespace
+
+ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
+                     const SweepResult& result, const Config& config, bool quiet) {
+  const bool failed = ReportFailures(result, "");
+  if (result.stopped) TellStopped(result.done.size(), result.runs);
+  WithWhatIsKept(folder, [&] { folder.Write(result, config); });
+  if (!quiet) {
+    TellKept(folder.resumed(), path);
+    TellWritten(path, result, {"table.md", "sweep.json", "runs.csv"});
+  }
+  return CodeOf(result.stopped, failed);
+}
+
+ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
+                     const VariedSweep& sweep, const Config& config, bool quiet) {
+  const Variation& variation = sweep.variation;
+  bool failed = false;
+  std::size_t done = 0;
+  for (std::size_t v = 0; v < sweep.results.size(); ++v) {
+    const std::string where = variation.key + '=' + variation.values[v] + ", ";
+    failed = ReportFailures(sweep.results[v], where) || failed;
+    done += sweep.results[v].done.size();
+  }
+  const auto values = static_cast<std::int64_t>(variation.values.size());
+  if (sweep.stopped()) TellStopped(done, values * sweep.results.front().runs);
+  const std::string note =
+      WithWhatIsKept(folder, [&] { return folder.Write(sweep, config, StopRequested); });
+  if (!quiet) {
+    TellKept(folder.resumed(), path);
+    std::vector<std::string> names = {"table.md", "sweep.csv", "sweep.json", "runs.csv"};
+    if (note.empty()) names.insert(names.begin(), "figures/vary.svg");
+    TellWritten(path, sweep, names);
+  }
+  if (!note.empty()) Log(LogLevel::kWarning, "no figure drawn: " + note);
+  return CodeOf(sweep.stopped(), failed);
+}
+
+}  // namespace alidade::cli

@@ -1,0 +1,114 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+#
+# tests/cluster/slurm_test.sh PROGRAM
+#
+# scripts/cluster/slurm_array.sh on a Slurm of this machine alone, which lives in a temporary folder
+# and ends with the test: the merged shards are the bytes of one process, a task that is cancelled
+# leaves a shard that the same submission finishes. Exit code 77: there is no Slurm.
+set -euo pipefail
+ALIDADE=$(realpath "$1")
+export ALIDADE
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+PATH=$PATH:/usr/sbin:/sbin
+for program in sbatch slurmctld slurmd munged; do
+  command -v "$program" >/dev/null || exit 77
+done
+
+work=$(mktemp -d)
+daemons=()
+finish() {
+  for ((i = ${#daemons[@]} - 1; i >= 0; --i)); do
+    kill "${daemons[i]}" 2>/dev/null || true
+    wait "${daemons[i]}" 2>/dev/null || true
+  done
+  rm -rf "$work"
+}
+trap finish EXIT
+fail() {
+  echo "error: $*" >&2
+  tail -n 20 "$work"/*.log "$work"/*.shards/*.log >&2 || true
+  exit 1
+}
+# Waits until a command holds, at most five minutes.
+eventually() {
+  for ((i = 0; i < 3000; ++i)); do
+    "$@" >/dev/null 2>&1 && return
+    sleep 0.1
+  done
+  fail "not in time: $*"
+}
+
+# ---- Slurm
+
+user=$(id -un) host=$(hostname -s) port=$((20000 + $$ % 20000))
+chmod 755 "$work"
+mkdir "$work/state" "$work/spool"
+head -c 1024 /dev/urandom >"$work/munge.key"
+chmod 600 "$work/munge.key"
+cat >"$work/slurm.conf" <<CONF
+ClusterName=alone
+SlurmctldHost=$host(127.0.0.1)
+SlurmctldPort=$port
+SlurmdPort=$((port + 1))
+SlurmUser=$user
+SlurmdUser=$user
+AuthType=auth/munge
+AuthInfo=socket=$work/munge.socket
+CredType=cred/munge
+StateSaveLocation=$work/state
+SlurmdSpoolDir=$work/spool
+SlurmctldPidFile=$work/slurmctld.pid
+SlurmdPidFile=$work/slurmd.pid
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+MpiDefault=none
+SelectType=select/cons_tres
+SelectTypeParameters=CR_CPU
+SchedulerParameters=batch_sched_delay=0,sched_interval=1
+ReturnToService=2
+NodeName=$host NodeAddr=127.0.0.1 CPUs=2
+PartitionName=all Nodes=ALL Default=YES State=UP
+CONF
+export SLURM_CONF=$work/slurm.conf
+munged --foreground --force --key-file="$work/munge.key" --socket="$work/munge.socket" \
+  --pid-file="$work/munge.pid" --log-file="$work/munged.log" --seed-file="$work/munge.seed" \
+  >"$work/munge_out.log" 2>&1 &
+daemons+=($!)
+eventually test -S "$work/munge.socket"
+slurmctld -D -f "$SLURM_CONF" >"$work/slurmctld.log" 2>&1 &
+daemons+=($!)
+slurmd -D -f "$SLURM_CONF" -N "$host" >"$work/slurmd.log" 2>&1 &
+daemons+=($!)
+is_up() { [[ $(sinfo --noheader --format=%T) == idle ]]; }
+eventually is_up
+
+# ---- the script
+
+has_ended() { [[ -z $(squeue --noheader) ]]; }
+config=examples/05_depth_principled/config.yaml
+whole() { "$ALIDADE" sweep "$config" -o "$work/$1_whole" --quiet "${@:2}"; }
+
+whole first --runs 20
+scripts/cluster/slurm_array.sh --cpus-per-task=1 -- 3 "$work/first" "$config" --runs 20
+eventually test -e "$work/first"
+eventually has_ended
+diff -r "$work/first_whole" "$work/first" || fail "the merged shards are others"
+
+# Cancelled while the second shard is running: what is finished is kept, nothing is merged.
+runs=(--runs 800 --set source.duration_s=60)
+scripts/cluster/slurm_array.sh -- 2 "$work/second" "$config" "${runs[@]}"
+has_begun() { compgen -G "$work/second.shards/.2.partial-*/.keep"; }
+eventually has_begun
+scancel --name=sweep
+eventually has_ended
+[[ ! -e $work/second ]] || fail "it was merged without a shard"
+grep -q '"status": "stopped"' "$work/second.shards/2/sweep.json" || fail "a shard was lost"
+grep -q 'second.shards/[12].* was stopped before its end' "$work/second.shards/merge.log" ||
+  fail "the merge does not name the shard"
+scripts/cluster/slurm_array.sh -- 2 "$work/second" "$config" "${runs[@]}"
+eventually test -e "$work/second"
+eventually has_ended
+whole second "${runs[@]}"
+diff -r "$work/second_whole" "$work/second" || fail "the shards that were resumed are others"
+echo "ok"

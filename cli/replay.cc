@@ -23,7 +23,7 @@ constexpr const char* kReplayFooter = R"(Examples:
   alidade replay runs/first -o runs/again          keeps what is made again
 
 DIR is a folder of `alidade run` or `alidade sweep`. What it was made from is in its inputs.json and
-config.resolved.yaml. All of its files are compared but timing.json, which has the wall clock. Exit
+config.resolved.yaml. All files are compared but those with the wall clock, as timing.json. Exit
 code 1: something differs.)";
 
 struct ReplayArguments {

@@ -243,14 +243,14 @@ TEST_F(OutputCli, SaysHowManyFiguresAreMissingAndWhy) {
   const Outcome run = Call({"run", "config.yaml"});
   EXPECT_EQ(run.code, 0) << run.err;
   const std::string note =
-      "0 of 6 figures drawn: measurements is not: gnuplot failed with exit code 1";
+      "0 of 7 figures drawn: measurements is not: gnuplot failed with exit code 1";
   EXPECT_EQ(run.err, "warning: " + note + '\n');
   EXPECT_TRUE(Read("runs/config/log.txt").ends_with("warning: " + note + '\n'));
   EXPECT_FALSE(Contains(run.out, "figures drawn"));
   EXPECT_TRUE(Contains(Read("runs/config/report.html"), note));
   Write("bin/gnuplot", "#!/bin/sh\necho 'line 3: no such thing' >&2; exit 2\n");
   EXPECT_EQ(Call({"run", "config.yaml", "--force"}).err,
-            "warning: 0 of 6 figures drawn: measurements is not: gnuplot failed with exit code 2: "
+            "warning: 0 of 7 figures drawn: measurements is not: gnuplot failed with exit code 2: "
             "line 3: no "
             "such thing\n");
   EXPECT_EQ(Call({"run", "config.yaml", "--force", "--quiet"}).err, "");

@@ -37,8 +37,10 @@ TEST_F(ReplayCli, MakesARunAgain) {
   const Outcome replay = Call({"replay", "out"});
   EXPECT_EQ(replay.code, 0) << replay.out << replay.err;
   const auto files = RunFiles(folder_ / "out").size();
-  EXPECT_EQ(replay.out,
-            "out: all " + std::to_string(files) + " files are equal; not compared: timing.json\n");
+  const std::string drawn =
+      fs::exists(folder_ / "out/figures/timing.svg") ? "figures/timing.svg, " : "";
+  EXPECT_EQ(replay.out, "out: all " + std::to_string(files) + " files are equal; not compared: " +
+                            drawn + "timing.csv, timing.json\n");
   ExpectEqual({"-o", "again"});
   ExpectSameFiles(folder_ / "again", folder_ / "out");
 }

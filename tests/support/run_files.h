@@ -4,17 +4,19 @@
 #include <map>
 #include <string>
 
+#include "alidade/resume/replay.h"
 #include "support/program.h"
 
 /// What a run folder holds, to be compared with another.
 namespace alidade::testing {
 
-/// The bytes of every file but timing.json, by name.
+/// The bytes of every file without the wall clock in it, by name.
 inline std::map<std::string, std::string> RunFiles(const fs::path& folder) {
   std::map<std::string, std::string> files;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
     const std::string name = entry.path().lexically_relative(folder).string();
-    if (entry.is_regular_file() && name != "timing.json") files[name] = ReadText(entry.path());
+    if (!entry.is_regular_file() || internal::HasWallClock(name)) continue;
+    files[name] = ReadText(entry.path());
   }
   return files;
 }

@@ -68,7 +68,11 @@ bool Advance(Running& one, const Seen& seen, const Frame& visible, const Source&
     return estimator.Process(all ? visible : rest);
   };
   const UpdateReport& report = passed ? passed->report : process();
-  if (!passed) one.result.wall_s += SecondsSince(started);
+  if (!passed) {
+    const double wall_s = SecondsSince(started);
+    one.result.wall_s += wall_s;
+    for (RunObserver* const observer : options.observers) observer->OnTime(one.index, wall_s);
+  }
   one.last = &report;
   one.ended = passed ? passed->failed : estimator.failed();
   one.diverged = passed ? passed->diverged : estimator.diverged();

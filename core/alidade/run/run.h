@@ -66,6 +66,9 @@ class RunObserver {
   virtual void Begin(const Experiment& /*experiment*/) {}
   /// Each frame before the estimators take it; the truth they are not given.
   virtual void OnFrame(const SourceFrame& /*frame*/) {}
+  /// The wall clock that an estimator needed for a frame; before its estimate, if there is one, and
+  /// not under kRollback.
+  virtual void OnTime(int /*estimator*/, double /*wall_s*/) {}
   /// Each estimate as it is made, with the index of its estimator; those of an offline estimator
   /// after the last frame.
   virtual void OnEstimate(int /*estimator*/, const SourceFrame& /*frame*/, const State& /*state*/,

@@ -297,9 +297,21 @@ TEST(LandmarkRecords, RemovedLandmarksAreDrawnPaler) {
   const std::string map = Read(folder / "out/figures/ekf.map.gp");
   EXPECT_NE(
       map.find(
-          "(strcol('status') eq 'removed' ? column('x') : NaN):(column('y')) with points ls 21"),
+          "(strcol('status') eq 'removed' ? column('x') : NaN):(column('y')) with points ls 20"),
       std::string::npos)
       << map;
+  // Bars of the many that a drive leaves behind would cover all else.
+  EXPECT_EQ(map.find("removed, +-3"), std::string::npos) << map;
+}
+
+TEST(LandmarkRecords, TheMeasurementsOfOneTimestampAreNotJoinedByALine) {
+  const TemporaryFolder folder;
+  Experiment experiment = OnTheStreet();
+  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
+  recorder.Finish(RunInto(recorder, experiment));
+  const std::string script = Read(folder / "out/figures/measurements.gp");
+  EXPECT_NE(script.find("with points ls 13 title 'measured'"), std::string::npos) << script;
+  EXPECT_EQ(script.find("predicted: "), std::string::npos) << script;  // hidden below
 }
 
 TEST(MapMetrics, ASimilarityIsNoErrorAfterAlignment) {

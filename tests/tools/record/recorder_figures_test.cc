@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include "alidade/record/figures.h"
 #include "support/recording.h"
 
 namespace alidade {
@@ -19,12 +20,13 @@ TEST(Recorder, DrawsWhereGnuplotIs) {
   for (const std::string& file : recorder.highlights()) {
     EXPECT_TRUE(fs::exists(folder / "out" / file)) << file;
   }
-  if (recorder.note() == "0 of 12 figures drawn: gnuplot is not installed")
+  if (recorder.note() == "0 of 14 figures drawn: gnuplot is not installed")
     GTEST_SKIP() << recorder.note();
   EXPECT_EQ(recorder.note(), "");
   EXPECT_EQ(recorder.highlights()[1], "figures/measurements.png");
-  for (const char* name : {"measurements", "comparison", "ekf.errors", "ekf.state",
-                           "ekf.covariance", "ekf.gain", "ekf.innovation", "alone.state"}) {
+  for (const char* name :
+       {"measurements", "comparison", "comparison.errors", "timing", "ekf.errors", "ekf.state",
+        "ekf.covariance", "ekf.gain", "ekf.innovation", "alone.state"}) {
     const fs::path figure = folder / "out/figures" / name;
     EXPECT_GT(fs::file_size(figure.string() + ".svg"), 5000u) << name;
     EXPECT_TRUE(fs::exists(figure.string() + ".gp")) << name;
@@ -94,6 +96,137 @@ TEST(Recorder, TheLineOfAnAngleIsBrokenWhereItLeaps) {
   }
 }
 
+/// The scripts of the figures of a run; gnuplot need not be there.
+class ScriptsOf {
+ public:
+  explicit ScriptsOf(Experiment& experiment) {
+    Recorder recorder(OptionsFor(folder_ / "out", false, true), MakeConfig());
+    recorder.Finish(RunInto(recorder, experiment));
+  }
+  bool Has(const std::string& name) const {
+    return fs::exists(folder_ / "out/figures" / (name + ".gp"));
+  }
+  std::string operator[](const std::string& name) const {
+    return Read(folder_ / "out/figures" / (name + ".gp"));
+  }
+
+ private:
+  TemporaryFolder folder_;
+};
+
+TEST(Recorder, ErrorsOfAllEstimatorsAreDrawnInOnePanel) {
+  Experiment experiment = MakeExperiment();
+  const ScriptsOf scripts(experiment);
+  const std::string script = scripts["comparison.errors"];
+  for (const char* curve : {"'ekf/errors.csv' using (column('t_s')-t0):(column('target.depth')) "
+                            "with lines ls 1 title 'ekf'",
+                            "'alone/errors.csv' using (column('t_s')-t0):(column('target.depth')) "
+                            "with lines ls 2 title 'alone'"}) {
+    EXPECT_NE(script.find(curve), std::string::npos) << curve << '\n' << script;
+  }
+  EXPECT_EQ(script.find("'template.inverse_distance'"), std::string::npos) << script;  // no truth
+  experiment = MakeExperiment();
+  experiment.estimators.pop_back();
+  EXPECT_FALSE(ScriptsOf(experiment).Has("comparison.errors"));
+}
+
+TEST(DrawFigures, DrawsTheVarianceOfARotationAndNoTwoCurvesAlike) {
+  internal::RecordedRun run;
+  run.estimators.push_back({"ekf"});
+  for (const char* axis : {"rx", "ry", "rz"}) {
+    run.estimators[0].sigmas.push_back({std::string("cam.orientation.") + axis, "rad", true});
+  }
+  for (int i = 0; i < 6; ++i) {
+    run.estimators[0].sigmas.push_back({"other." + std::to_string(i), "m", true});
+  }
+  run.estimators[0].sigmas.push_back({"exact", "m", false});
+  const TemporaryFolder folder;
+  const internal::OutputFolder output(folder / "out", false);
+  internal::DrawFigures(output, run, {[] { return true; }});
+  const std::string script = Read(output.partial() / "figures/ekf.covariance.gp");
+  EXPECT_NE(script.find("with lines ls 1 title 'cam.orientation.rx [rad^2]'"), std::string::npos);
+  EXPECT_NE(script.find("with lines ls 1 dt 2 title 'other.5 [m^2]'"), std::string::npos) << script;
+  EXPECT_EQ(script.find("exact"), std::string::npos) << script;
+}
+
+TEST(Recorder, AConstantBlockHasNoPanel) {
+  Experiment experiment = MakeExperiment();
+  for (NamedEstimator& named : experiment.estimators) {
+    named.system = WithStatus(named.system, "template.inverse_distance", BlockStatus::kConstant);
+    named.estimator =
+        std::make_unique<Ekf>(named.system, EkfOptions{}, experiment.source->streams());
+  }
+  const ScriptsOf scripts(experiment);
+  for (const char* name : {"comparison", "ekf.state"}) {
+    EXPECT_NE(scripts[name].find("set label 1 'target.depth'"), std::string::npos) << name;
+    EXPECT_EQ(scripts[name].find("template.inverse_distance"), std::string::npos) << name;
+  }
+}
+
+TEST(Recorder, AGainHasItsUnit) {
+  Experiment experiment = MakeExperiment();
+  const std::string script = ScriptsOf(experiment)["ekf.gain"];
+  // Of a disparity in px, and of a scale, which has no unit.
+  EXPECT_NE(script.find("title 'target.depth_rate [(m/s)/px]'"), std::string::npos) << script;
+  EXPECT_NE(script.find("title 'target.depth_rate [m/s]'"), std::string::npos) << script;
+}
+
+/// A target with streams that never come.
+class SilentStreams : public SwingingTarget {
+ public:
+  SilentStreams() : SwingingTarget(60), streams_(SwingingTarget::streams()) {
+    for (const char* name : {"left", "right", "top"}) streams_.push_back({name, 1});
+  }
+  const std::vector<StreamInfo>& streams() const override { return streams_; }
+
+ private:
+  std::vector<StreamInfo> streams_;
+};
+
+TEST(Recorder, StreamsThatNeverComeDoNotLetALineBridgeMore) {
+  const auto gap_of = [](const std::string& script) {
+    const std::size_t at = script.find("gap = ");
+    return script.substr(at, script.find(',', at) - at);
+  };
+  Experiment experiment = MakeExperiment(), silent = MakeExperiment();
+  silent.source = std::make_unique<SilentStreams>();
+  const std::string gap = gap_of(ScriptsOf(experiment)["measurements"]);
+  EXPECT_TRUE(gap.starts_with("gap = 0.")) << gap;
+  EXPECT_EQ(gap_of(ScriptsOf(silent)["measurements"]), gap);
+}
+
+TEST(Recorder, TheTimeOfEachFrameIsDrawnAndNotInThePage) {
+  const TemporaryFolder folder;
+  Experiment experiment = MakeExperiment();
+  Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
+  recorder.Finish(RunInto(recorder, experiment));
+  const std::vector<std::string> rows = Lines(folder / "out/timing.csv");
+  ASSERT_EQ(rows.size(), 61u);
+  EXPECT_EQ(rows[0], "t_s,ekf,alone");
+  for (const std::string& cell : Cells(rows[60])) EXPECT_GT(std::stod(cell), 0.0);
+  const std::string script = Read(folder / "out/figures/timing.gp");
+  EXPECT_NE(script.find("period = 0.033\n"), std::string::npos) << script;
+  EXPECT_NE(script.find("100 * C2_sum / (C2_records * period)"), std::string::npos) << script;
+  if (!recorder.note().empty()) GTEST_SKIP() << recorder.note();
+  EXPECT_NE(Read(folder / "out/report.html").find("<img src=\"figures/timing.svg\""),
+            std::string::npos);
+}
+
+TEST(Recorder, WhatSmoothsHasNoTimeOfAFrame) {
+  struct Offline : Ekf {
+    using Ekf::Ekf;
+    bool offline() const override { return true; }
+    void Smooth(const Emit&) override {}
+  };
+  const TemporaryFolder folder;
+  Experiment experiment = MakeExperiment();
+  experiment.estimators[0].estimator = std::make_unique<Offline>(
+      experiment.estimators[0].system, EkfOptions{}, experiment.source->streams());
+  Recorder recorder(OptionsFor(folder / "out"), MakeConfig());
+  recorder.Finish(RunInto(recorder, experiment));
+  EXPECT_EQ(Lines(folder / "out/timing.csv").at(0), "t_s,alone");
+}
+
 TEST(Recorder, TheComparisonSaysWhatItLeavesOut) {
   const TemporaryFolder folder;
   Experiment experiment = MakeExperiment();
@@ -122,7 +255,7 @@ TEST(Recorder, DoesWithoutGnuplot) {
     Recorder recorder(OptionsFor(folder / "out", false, true), MakeConfig());
     Experiment experiment = MakeExperiment();
     recorder.Finish(RunInto(recorder, experiment));
-    if (recorder.note() != "0 of 12 figures drawn: gnuplot is not installed") ::_exit(1);
+    if (recorder.note() != "0 of 14 figures drawn: gnuplot is not installed") ::_exit(1);
   });
   EXPECT_EQ(code, 0);
   EXPECT_TRUE(fs::exists(folder / "out/report.html"));
@@ -162,13 +295,13 @@ TEST(Recorder, AStopLeavesOutTheRestOfTheFigures) {
   options.stop = [&] {  // once it sleeps
     return fs::exists(half.string() + std::to_string(::getpid()) + "/figures/comparison.svg");
   };
-  EXPECT_EQ(RecordSlowly(folder, options, "1 of 12 figures drawn: the drawing was stopped"), 0);
+  EXPECT_EQ(RecordSlowly(folder, options, "1 of 14 figures drawn: the drawing was stopped"), 0);
   EXPECT_EQ(SvgsOf(folder / "out"), Names{"measurements.svg"});
   EXPECT_TRUE(fs::exists(folder / "out/run.json"));
   const std::string report = Read(folder / "out/report.html");
   EXPECT_NE(report.find("<svg>one</svg>"), std::string::npos);
   EXPECT_EQ(report.find("<svg>half"), std::string::npos);
-  EXPECT_NE(report.find("1 of 12 figures drawn: the drawing was stopped"), std::string::npos);
+  EXPECT_NE(report.find("1 of 14 figures drawn: the drawing was stopped"), std::string::npos);
 }
 
 TEST(Recorder, AFigureThatGnuplotDidNotWriteIsNotThere) {
@@ -181,7 +314,7 @@ TEST(Recorder, AFigureThatGnuplotDidNotWriteIsNotThere) {
     Experiment experiment = MakeExperiment();
     recorder.Finish(RunInto(recorder, experiment));
     const std::string note = recorder.note();
-    if (note != "0 of 12 figures drawn: measurements is not: gnuplot wrote nothing") ::_exit(1);
+    if (note != "0 of 14 figures drawn: measurements is not: gnuplot wrote nothing") ::_exit(1);
   });
   EXPECT_EQ(code, 0);
   EXPECT_EQ(Read(folder / "out/report.html").find("<figure>"), std::string::npos);
@@ -191,7 +324,7 @@ TEST(Recorder, DrawsNothingOnceItIsStopped) {
   const TemporaryFolder folder;
   Recorder::Options options = OptionsFor(folder / "out", false, true);
   options.stop = [] { return true; };
-  EXPECT_EQ(RecordSlowly(folder, options, "0 of 12 figures drawn: the drawing was stopped"), 0);
+  EXPECT_EQ(RecordSlowly(folder, options, "0 of 14 figures drawn: the drawing was stopped"), 0);
   EXPECT_EQ(SvgsOf(folder / "out"), Names{});
 }
 
@@ -199,7 +332,7 @@ TEST(Recorder, GivesGnuplotSoMuchTimeAndNoMore) {
   const TemporaryFolder folder;
   Recorder::Options options = OptionsFor(folder / "out", false, true);
   options.drawing_s = 1.0;
-  EXPECT_EQ(RecordSlowly(folder, options, "1 of 12 figures drawn: gnuplot took too long"), 0);
+  EXPECT_EQ(RecordSlowly(folder, options, "1 of 14 figures drawn: gnuplot took too long"), 0);
   EXPECT_EQ(SvgsOf(folder / "out"), Names{"measurements.svg"});
 }
 

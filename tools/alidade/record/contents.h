@@ -18,7 +18,16 @@ struct RecordedElement {
   bool has_sigma = false;  ///< in column `sigma:NAME`
   std::string truth;       ///< column in truth.csv, or ""
   bool has_value = false;  ///< at some timestamp
+  bool varies = false;     ///< likewise, and its block was not constant
   bool has_truth = false;
+  bool is_random = false;  ///< its variance was above zero at some timestamp
+};
+
+/// One tangent element of a block, whose standard deviation is in column `sigma:NAME` of
+/// `NAME/estimates.csv`.
+struct RecordedSigma {
+  std::string name;
+  std::string unit;
   bool is_random = false;  ///< its variance was above zero at some timestamp
 };
 
@@ -27,13 +36,15 @@ struct RecordedElement {
 struct RecordedError {
   std::string name;
   std::string unit;
-  bool is_angle = false;   ///< or of a rotation or direction: rad
-  bool is_known = false;   ///< finite at some timestamp
-  bool is_random = false;  ///< its variance was above zero at some timestamp
+  int truth = 0, part = 0;  ///< of the source's truths, and the tangent element of it
+  bool is_angle = false;    ///< or of a rotation or direction: rad
+  bool is_known = false;    ///< finite at some timestamp
+  bool is_random = false;   ///< its variance was above zero at some timestamp
 };
 
 struct RecordedGain {
   std::string name;      ///< the column in `NAME/gains.csv`: `target.depth<-disparity`
+  std::string unit;      ///< "" where it has none, or that of the measurement is not known
   std::size_t cell = 0;  ///< of a row, behind time and sensor
   bool used = false;
 };
@@ -43,7 +54,8 @@ struct RecordedSensor {
   std::string stream;
   std::string unit;
   int tangent = 1;
-  bool has_landmark = false;  ///< many measurements at a time, each of another landmark
+  bool has_landmark = false;
+  bool has_several = false;  ///< measurements at one timestamp: of landmarks, of satellites
   std::vector<RecordedGain> gains;
   bool has_innovations = false;
   bool has_reprojection = false;  ///< rows in `NAME/reprojection.csv`
@@ -58,6 +70,7 @@ struct RecordedMap {
 struct RecordedEstimator {
   std::string name;
   std::vector<RecordedElement> elements;
+  std::vector<RecordedSigma> sigmas = {};
   std::vector<RecordedError> errors = {};
   std::vector<RecordedSensor> sensors;
   int width = 0;  ///< of the widest measurement: columns z0 .. z<width - 1>, then h, s and r
@@ -85,12 +98,20 @@ struct RecordedImplied {
   std::int64_t rows = 0;
 };
 
+/// An estimator with a column in `timing.csv`.
+struct RecordedTimes {
+  std::string estimator;  ///< the column
+  bool is_known = false;  ///< of some frame
+};
+
 struct RecordedRun {
   std::vector<RecordedEstimator> estimators;
   std::vector<RecordedStream> streams;
   std::vector<RecordedImplied> implied;
+  std::vector<RecordedTimes> times;
   Timestamp first = 0, last = 0;
   std::int64_t truth_rows = 0, measurement_rows = 0, implied_rows = 0, expected_rows = 0;
+  std::int64_t timing_rows = 0;
 };
 
 }  // namespace alidade::internal

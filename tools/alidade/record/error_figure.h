@@ -12,4 +12,7 @@ namespace alidade::internal {
 /// rotations in degrees. Empty where no truth is known.
 std::vector<FigureScript> ErrorFigures(const RecordedRun& run, const RecordedEstimator& estimator);
 
+/// The errors of the first estimators in one panel for each element; empty where no truth is known.
+std::vector<FigureScript> ErrorComparisonFigures(const RecordedRun& run, const std::string& title);
+
 }  // namespace alidade::internal

@@ -6,9 +6,7 @@
 #include "alidade/state/element_names.h"
 
 namespace alidade::internal {
-namespace {
 
-/// Whether each tangent element is an angle or of a rotation or direction.
 std::vector<bool> AreAngles(const Geometry& geometry) {
   std::vector<bool> angles(static_cast<std::size_t>(geometry.tangent), false);
   geometry.ForEachPart([&](const Geometry& part, int, int first) {
@@ -19,8 +17,6 @@ std::vector<bool> AreAngles(const Geometry& geometry) {
   });
   return angles;
 }
-
-}  // namespace
 
 ErrorsFile::ErrorsFile(const OutputFolder& folder, const std::string& estimator,
                        const System& system, const std::vector<int>& truth_of) {
@@ -33,7 +29,7 @@ ErrorsFile::ErrorsFile(const OutputFolder& folder, const std::string& estimator,
     const std::vector<bool> angles = AreAngles(block.geometry());
     blocks_.push_back({id, static_cast<std::size_t>(truth), elements_.size()});
     for (std::size_t i = 0; i < names.size(); ++i) {
-      elements_.push_back({names[i], UnitOf(system, id), angles[i]});
+      elements_.push_back({names[i], UnitOf(system, id), truth, static_cast<int>(i), angles[i]});
       header.push_back(names[i]);
     }
     for (const std::string& name : names) header.push_back("sigma:" + name);

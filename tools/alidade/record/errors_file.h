@@ -11,6 +11,9 @@
 
 namespace alidade::internal {
 
+/// Whether each tangent element is an angle or of a rotation or direction: in rad.
+std::vector<bool> AreAngles(const Geometry& geometry);
+
 /// `NAME/errors.csv`, of an estimator with a block whose truth the source names:
 ///
 ///   e      = x (-) x_true    of each tangent element, at the estimate: P's; unit of the element

@@ -12,6 +12,21 @@
 #include "alidade/system/truth_match.h"
 
 namespace alidade::internal {
+namespace {
+
+std::string InParentheses(const std::string& unit) {
+  return unit.find_first_of("/ ^") == unit.npos ? unit : '(' + unit + ')';
+}
+
+/// Of an element of that unit for one of a measurement; "" where it has none. A sensor of several
+/// elements without a unit may have one for each.
+std::string UnitOfGain(const std::string& unit, const RecordedSensor& sensor) {
+  if (unit == sensor.unit) return "";
+  if (sensor.unit.empty()) return sensor.tangent == 1 ? unit : "";
+  return (unit.empty() ? "1" : InParentheses(unit)) + '/' + InParentheses(sensor.unit);
+}
+
+}  // namespace
 
 RecordedEstimator EstimatorFiles::Describe(const NamedEstimator& named) {
   RecordedEstimator recorded;
@@ -23,7 +38,7 @@ RecordedEstimator EstimatorFiles::Describe(const NamedEstimator& named) {
     sensor.stream = binding.stream;
     sensor.unit = space.unit;
     sensor.tangent = space.geometry.tangent;
-    sensor.has_landmark = binding.model.has_landmark();
+    sensor.has_landmark = sensor.has_several = binding.model.has_landmark();
     recorded.width = std::max(recorded.width, space.geometry.ambient);
   }
   return recorded;
@@ -40,6 +55,7 @@ EstimatorFiles::EstimatorFiles(const OutputFolder& folder, const NamedEstimator&
       innovations_(folder, named.name + "/innovations.csv", InnovationsHeader()),
       gains_(folder, named.name + "/gains.csv", GainsHeader(named.system)),
       errors_(folder, named.name, named.system, MatchTruths(named.system.layout, truths)) {
+  measured_.assign(named.system.sensors.size(), kNoTimestamp);
   FindPath(named.system);
   OpenTrajectory(folder, named.system);
   if (covariances) covariances_ = folder.Create(named.name + "/covariance.bin");
@@ -84,7 +100,12 @@ std::vector<std::string> EstimatorFiles::EstimatesHeader(
     const std::vector<std::string> names = AmbientNames(block.name, block.space);
     const std::vector<std::string> tangents = TangentNames(block.name, block.space);
     const int truth = truth_of[static_cast<std::size_t>(id)];
-    blocks_.push_back({id, names.size(), tangents.size(), recorded_.elements.size(), truth});
+    blocks_.push_back({id, names.size(), tangents.size(), recorded_.elements.size(),
+                       recorded_.sigmas.size(), truth});
+    const std::vector<bool> angles = AreAngles(block.geometry());
+    for (std::size_t i = 0; i < tangents.size(); ++i) {
+      recorded_.sigmas.push_back({tangents[i], angles[i] ? "rad" : UnitOf(system, id)});
+    }
     for (std::size_t i = 0; i < names.size(); ++i) {
       recorded_.elements.push_back({names[i], UnitOf(system, id), names == tangents,
                                     truth >= 0 ? truth_columns[truth][i] : ""});
@@ -113,12 +134,14 @@ std::vector<std::string> EstimatorFiles::GainsHeader(const System& system) {
     for (const BlockColumns& columns : blocks_) {
       const Block& block = system.layout[columns.id];
       if (block.status == BlockStatus::kConstant) continue;
-      for (const std::string& element : TangentNames(block.name, block.space)) {
+      for (std::size_t i = 0; i < columns.tangent; ++i) {
+        const RecordedSigma& element = recorded_.sigmas[columns.sigma + i];
         for (const std::string& measured : TangentNames(space.name, space)) {
-          const std::string name = element + "<-" + measured;
+          const std::string name = element.name + "<-" + measured;
           const auto [cell, is_new] = known.try_emplace(name, known.size());
           if (is_new) header.push_back(name);
-          recorded_.sensors[s].gains.push_back({name, cell->second});
+          recorded_.sensors[s].gains.push_back(
+              {name, UnitOfGain(element.unit, recorded_.sensors[s]), cell->second});
         }
       }
     }
@@ -161,6 +184,7 @@ void EstimatorFiles::AddEstimate(const SourceFrame& frame, const State& state) {
     for (std::size_t i = 0; i < columns.ambient; ++i) {
       RecordedElement& element = recorded_.elements[columns.element + i];
       element.has_value = true;
+      element.varies = element.varies || block.status != BlockStatus::kConstant;
       element.has_truth = element.has_truth || known;
     }
     if (!block.has_covariance()) {
@@ -171,8 +195,10 @@ void EstimatorFiles::AddEstimate(const SourceFrame& frame, const State& state) {
       const double variance =
           state.covariance().Variance(block.tangent_offset + static_cast<int>(i));
       estimates_.Number(std::sqrt(variance));
+      if (!(variance > 0.0)) continue;
+      recorded_.sigmas[columns.sigma + i].is_random = true;
       RecordedElement& element = recorded_.elements[columns.element + i];
-      if (element.has_sigma && variance > 0.0) element.is_random = true;
+      if (element.has_sigma) element.is_random = true;
     }
   }
   estimates_.EndRow();
@@ -219,6 +245,9 @@ void EstimatorFiles::AddInnovation(Timestamp timestamp, const MeasurementReport&
       .Numbers(report.innovation.data(), report.innovation.size(), width)
       .EndRow();
   sensor.has_innovations = sensor.has_innovations || (reached && !report.innovation.empty());
+  Timestamp& before = measured_[static_cast<std::size_t>(report.sensor)];
+  sensor.has_several = sensor.has_several || before == timestamp;
+  before = timestamp;
 }
 
 void EstimatorFiles::AddGain(Timestamp timestamp, const State& state,

@@ -36,6 +36,7 @@ class EstimatorFiles {
     BlockId id;
     std::size_t ambient, tangent;
     std::size_t element;  ///< the first of it in recorded_.elements
+    std::size_t sigma;    ///< likewise in recorded_.sigmas
     int truth;            ///< index into SourceFrame::truth, or -1
   };
 
@@ -56,6 +57,7 @@ class EstimatorFiles {
   RecordedEstimator recorded_;
   std::vector<BlockColumns> blocks_;
   std::size_t gain_columns_ = 0;
+  std::vector<Timestamp> measured_;  ///< by sensor, when it did so last
   CsvFile estimates_, innovations_, gains_;
   ErrorsFile errors_;
   std::optional<CsvFile> reprojection_;

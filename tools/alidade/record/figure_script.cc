@@ -14,14 +14,14 @@ namespace {
 constexpr std::int64_t kMaxRows = 5000;     // of which all are drawn
 constexpr std::int64_t kEnoughRows = 2500;  // of a longer file
 
-/// Every n-th row is enough; n shares no divisor with the number of kinds that take turns.
-std::int64_t Stride(const FigureFile& file) {
+}  // namespace
+
+std::int64_t StrideOf(const FigureFile& file) {
   std::int64_t stride = file.rows > kMaxRows ? file.rows / kEnoughRows : 1;
+  // It shares no divisor with the number of kinds that take turns.
   while (stride > 1 && std::gcd(stride, std::int64_t{file.kinds}) > 1) ++stride;
   return stride;
 }
-
-}  // namespace
 
 std::string GnuplotQuoted(std::string_view text) {
   std::string quoted = "'";
@@ -67,20 +67,31 @@ void FigureScript::Panel(std::string_view title, std::string_view y_label) {
 void FigureScript::Set(std::string_view line) { body_.append(line).append("\n"); }
 
 void FigureScript::Curve(const FigureFile& file, std::string_view how, std::string_view key) {
+  if (!key.empty()) return CurveWithKey(file, how, GnuplotQuoted(key), key.size());
+  AddCurve(file, how);
+  plot_ += " notitle";
+}
+
+void FigureScript::CurveWithKey(const FigureFile& file, std::string_view how, std::string_view key,
+                                std::size_t width) {
+  AddCurve(file, how);
+  longest_key_ = std::max(longest_key_, width);
+  most_keys_ = std::max(most_keys_, ++keys_);
+  plot_.append(" title ").append(key).append(" noenhanced");
+}
+
+void FigureScript::AddCurve(const FigureFile& file, std::string_view how) {
   if (!plot_.empty()) plot_ += ", \\\n     ";
   plot_ += GnuplotQuoted(file.name);
-  const std::int64_t stride = Stride(file);
+  const std::int64_t stride = StrideOf(file);
   if (stride > 1) plot_ += " every " + std::to_string(stride);
   plot_.append(" using ").append(how);
-  longest_key_ = std::max(longest_key_, key.size());
-  if (!key.empty()) most_keys_ = std::max(most_keys_, ++keys_);
-  plot_ += key.empty() ? " notitle" : " title " + GnuplotQuoted(key) + " noenhanced";
 }
 
 void FigureScript::LineOf(const FigureFile& file, std::string_view mine, std::string_view value,
                           int style, std::string_view key) {
   // Rows of one kind are this far apart on average; a line may bridge a few.
-  const double step_s = span_s_ * file.kinds * static_cast<double>(Stride(file)) /
+  const double step_s = span_s_ * file.kinds * static_cast<double>(StrideOf(file)) /
                         static_cast<double>(std::max<std::int64_t>(file.rows, 1));
   if (!plot_.empty()) plot_ += ", \\\n     ";
   plot_ += "gap = " + NumberText(std::max(4.0 * step_s, 0.02 * span_s_)) + ", px = py = NaN";

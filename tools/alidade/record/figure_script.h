@@ -14,6 +14,8 @@ namespace alidade::internal {
 
 /// In one figure.
 inline constexpr std::size_t kMaxPanels = 12;
+/// In one panel, each of a colour of its own.
+inline constexpr std::size_t kMaxCurves = 8;
 
 /// A csv file to draw from. Rows of `kinds` kinds take turns in it, as those of several sensors.
 struct FigureFile {
@@ -46,6 +48,9 @@ class FigureScript {
   /// Adds a curve: what stands behind `using`, and its entry in the key ("": none). Of a long file
   /// it draws every n-th row.
   void Curve(const FigureFile& file, std::string_view how, std::string_view key);
+  /// Likewise, its entry in the key a gnuplot expression that makes about `width` characters.
+  void CurveWithKey(const FigureFile& file, std::string_view how, std::string_view key,
+                    std::size_t width);
   /// Adds a line through the rows for which the expression `mine` is true, broken at gaps.
   void LineOf(const FigureFile& file, std::string_view mine, std::string_view value, int style,
               std::string_view key);
@@ -60,6 +65,7 @@ class FigureScript {
 
  private:
   void EndPanel();
+  void AddCurve(const FigureFile& file, std::string_view how);
   std::string TimeAxis(std::string& label) const;
 
   std::string name_, title_, body_, plot_;
@@ -83,6 +89,8 @@ std::vector<FigureScript> FigurePages(
     const FigureTitle& figure, std::size_t panels,
     const std::function<void(FigureScript& script, std::size_t panel)>& add);
 
+/// Of so many rows of a file, one is drawn.
+std::int64_t StrideOf(const FigureFile& file);
 /// `text` as a gnuplot string.
 std::string GnuplotQuoted(std::string_view text);
 /// The column of that name.

@@ -8,13 +8,12 @@
 #include "alidade/record/figure_script.h"
 #include "alidade/record/gnuplot.h"
 #include "alidade/record/map_figures.h"
+#include "alidade/record/timing_file.h"
 
 namespace alidade::internal {
 namespace {
 
-constexpr std::size_t kMaxCurves = 8;
-
-std::string Sigma(const RecordedElement& element) { return GnuplotColumn("sigma:" + element.name); }
+std::string Sigma(const std::string& element) { return GnuplotColumn("sigma:" + element); }
 
 std::string Is(const char* column, std::string_view text) {
   return "strcol('" + std::string(column) + "') eq " + GnuplotQuoted(text);
@@ -44,13 +43,18 @@ std::string Where(const std::string& condition, const std::string& value) {
 
 int EstimatorStyle(std::size_t index) { return static_cast<int>(index % kMaxCurves) + 1; }
 
-int Kinds(std::size_t count) { return std::max(1, static_cast<int>(count)); }
+/// Of rows in a file: how many of those who may write to it did.
+template <class Some, class Did>
+int Kinds(const Some& some, const Did& did) {
+  return std::max(1, static_cast<int>(std::ranges::count_if(some, did)));
+}
 
 FigureFile Estimates(const RecordedEstimator& e) {
   return {e.name + "/estimates.csv", e.estimate_rows};
 }
 FigureFile Innovations(const RecordedEstimator& e) {
-  return {e.name + "/innovations.csv", e.innovation_rows, Kinds(e.sensors.size())};
+  return {e.name + "/innovations.csv", e.innovation_rows,
+          Kinds(e.sensors, [](const auto& sensor) { return sensor.has_innovations; })};
 }
 
 void TruthCurve(FigureScript& script, const RecordedRun& run, const RecordedElement& element) {
@@ -62,7 +66,7 @@ void TruthCurve(FigureScript& script, const RecordedRun& run, const RecordedElem
 void StateRange(FigureScript& script, const RecordedEstimator& estimator,
                 const RecordedElement& element) {
   script.Quartiles("E", Estimates(estimator).name, GnuplotColumn(element.name));
-  if (element.is_random) script.Quartiles("S", Estimates(estimator).name, Sigma(element));
+  if (element.is_random) script.Quartiles("S", Estimates(estimator).name, Sigma(element.name));
   std::string low = "E_min", high = "E_max";
   if (element.has_truth) {
     script.Quartiles("T", "truth.csv", GnuplotColumn(element.truth));
@@ -76,13 +80,12 @@ void StateRange(FigureScript& script, const RecordedEstimator& estimator,
 
 std::vector<FigureScript> StateFigures(const RecordedRun& run, const RecordedEstimator& estimator) {
   std::vector<RecordedElement> elements;
-  std::ranges::copy_if(estimator.elements, std::back_inserter(elements),
-                       &RecordedElement::has_value);
+  std::ranges::copy_if(estimator.elements, std::back_inserter(elements), &RecordedElement::varies);
   const auto panel = [&](FigureScript& script, std::size_t index) {
     const RecordedElement& element = elements[index];
     script.Panel(element.name, InBrackets(element.unit));
     StateRange(script, estimator, element);
-    const std::string value = GnuplotColumn(element.name), sigma = Sigma(element);
+    const std::string value = GnuplotColumn(element.name), sigma = Sigma(element.name);
     if (element.is_random) {
       script.Curve(Estimates(estimator),
                    OverTime("(" + value + "-3*" + sigma + "):(" + value + "+3*" + sigma + ")") +
@@ -107,19 +110,23 @@ FigureScript CovarianceFigure(const RecordedRun& run, const RecordedEstimator& e
   FigureScript script(estimator.name + ".covariance", estimator.name + ": variance of each element",
                       run.first, run.last);
   std::size_t curves = 0;
-  for (const RecordedElement& element : estimator.elements) {
+  for (const RecordedSigma& element : estimator.sigmas) {
     if (!element.is_random || curves == kMaxPanels) continue;
     if (script.empty()) {
       script.Panel("diagonal of P", "variance");
-      script.Set("set logscale y\nset format y '%.0e'");
+      script.Set("set logscale y\nset format y '%.0e'\nunset mytics");
       script.Set("low = 1e300\nhigh = 1e-300");
     }
-    const std::string variance = Where(Sigma(element) + " > 0", Sigma(element) + "**2");
+    const std::string sigma = Sigma(element.name);
+    const std::string variance = Where(sigma + " > 0", sigma + "**2");
     script.Quartiles("V", Estimates(estimator).name, variance);
     script.Set("low = min(low, V_min)\nhigh = max(high, V_max)");
-    script.Curve(Estimates(estimator),
-                 OverTime(variance) + " with lines ls " + std::to_string(EstimatorStyle(curves++)),
-                 element.name + " " + InBrackets(Squared(element.unit)));
+    const std::string dashes = curves < kMaxCurves ? "" : " dt 2";  // of a colour that comes again
+    script.Curve(
+        Estimates(estimator),
+        OverTime(variance) + " with lines ls " + std::to_string(EstimatorStyle(curves)) + dashes,
+        element.name + " " + InBrackets(Squared(element.unit)));
+    ++curves;
   }
   // Whole decades, and a tick for each, or for every second, third, ... of them.
   script.Set("low = floor(log10(low))\nhigh = max(ceil(log10(high)), low + 1)");
@@ -127,39 +134,44 @@ FigureScript CovarianceFigure(const RecordedRun& run, const RecordedEstimator& e
   return script;
 }
 
+/// What is known of each of a sensor's measurements: a line through them, or dots where a line
+/// would lead from one of a timestamp to another.
+void EachMeasurement(FigureScript& script, const FigureFile& file, bool several,
+                     const std::string& mine, const std::string& value, int style,
+                     const std::string& key) {
+  if (!several) return script.LineOf(file, mine, value, style, key);
+  script.Curve(
+      file,
+      OverTime(Where(mine, value)) + " with points ls " + std::to_string(style) + " pt 7 ps 0.15",
+      key);
+}
+
 /// The panel names the sensor: where that measures one element, the block element says it all.
 std::string KeyOf(const RecordedGain& gain, const RecordedSensor& sensor) {
-  return sensor.tangent > 1 ? gain.name : gain.name.substr(0, gain.name.find("<-"));
+  const std::string name =
+      sensor.tangent > 1 ? gain.name : gain.name.substr(0, gain.name.find("<-"));
+  return gain.unit.empty() ? name : name + ' ' + InBrackets(gain.unit);
 }
 
 FigureScript GainFigure(const RecordedRun& run, const RecordedEstimator& estimator) {
   FigureScript script(estimator.name + ".gain", estimator.name + ": Kalman gain of each sensor",
                       run.first, run.last);
+  const auto is_used = [](const RecordedSensor& sensor) {
+    return std::ranges::any_of(sensor.gains, &RecordedGain::used);
+  };
   const FigureFile file{estimator.name + "/gains.csv", estimator.gain_rows,
-                        Kinds(estimator.sensors.size())};
+                        Kinds(estimator.sensors, is_used)};
   std::size_t panels = 0;
   for (const RecordedSensor& sensor : estimator.sensors) {
     std::size_t curves = 0;
     for (const RecordedGain& gain : sensor.gains) {
       if (!gain.used || curves == kMaxCurves || panels > kMaxPanels) continue;
       if (curves == 0 && panels++ < kMaxPanels) script.Panel(sensor.name, "K");
-      script.LineOf(file, Is("sensor", sensor.name), GnuplotColumn(gain.name),
-                    EstimatorStyle(curves++), KeyOf(gain, sensor));
+      EachMeasurement(script, file, sensor.has_several, Is("sensor", sensor.name),
+                      GnuplotColumn(gain.name), EstimatorStyle(curves++), KeyOf(gain, sensor));
     }
   }
   return script;
-}
-
-/// What is known of each of a sensor's measurements: a line through them, or dots where a line
-/// would lead from landmark to landmark.
-void EachMeasurement(FigureScript& script, const FigureFile& file, bool landmarks,
-                     const std::string& mine, const std::string& value, int style,
-                     const std::string& key) {
-  if (!landmarks) return script.LineOf(file, mine, value, style, key);
-  script.Curve(
-      file,
-      OverTime(Where(mine, value)) + " with points ls " + std::to_string(style) + " pt 7 ps 0.15",
-      key);
 }
 
 /// One element of a sensor's innovation, with +-3 sigma of S. What lies beyond the axis is drawn on
@@ -175,8 +187,8 @@ void InnovationPanel(FigureScript& script, const RecordedEstimator& estimator,
   script.Quartiles("S", file.name, Where(mine, s));
   script.Set("limit = 5 * S_up_quartile");
   script.Set("set yrange [-limit : limit]");
-  EachMeasurement(script, file, sensor.has_landmark, mine, "3 * " + s, 12, "+-3 sqrt(S)");
-  EachMeasurement(script, file, sensor.has_landmark, mine, "-3 * " + s, 12, "");
+  EachMeasurement(script, file, sensor.has_several, mine, "3 * " + s, 12, "+-3 sqrt(S)");
+  EachMeasurement(script, file, sensor.has_several, mine, "-3 * " + s, 12, "");
   const auto points = [&](const std::string& condition, const std::string& value,
                           const std::string& style, const char* key) {
     script.Curve(file, OverTime(Where(mine + " && " + condition, value)) + " with points " + style,
@@ -221,7 +233,8 @@ void ImpliedPanel(FigureScript& script, const RecordedRun& run, const RecordedIm
   int style = 13;
   for (const RecordedImplied& one : run.implied) {
     if (one.block != implied.block || one.rows == 0) continue;
-    script.Curve({"implied_states.csv", run.implied_rows, Kinds(run.implied.size())},
+    script.Curve({"implied_states.csv", run.implied_rows,
+                  Kinds(run.implied, [](const auto& some) { return some.rows > 0; })},
                  OverTime(Where(Is("sensor", one.sensor), GnuplotColumn(one.block))) +
                      " with points ls " + std::to_string(style),
                  "measured: " + one.sensor + (one.rest_at_truth ? ", rest true" : ""));
@@ -248,29 +261,43 @@ std::pair<const RecordedEstimator*, const RecordedSensor*> PredictorOf(const Rec
   return {nullptr, nullptr};
 }
 
+/// The rows of a long file of landmarks: each of some of them, so that their tracks stay whole.
+std::string OfSomeLandmarks(const FigureFile& file) {
+  return " && int(column('landmark')) % " + std::to_string(StrideOf(file)) + " == 0";
+}
+
 void StreamPanel(FigureScript& script, const RecordedRun& run, const RecordedStream& stream,
                  int element) {
+  constexpr std::int64_t kMostRead = 100'000;  // of a file, to draw some of its rows
   const auto [estimator, sensor] = PredictorOf(run, stream.name);
   const std::string count = stream.size > 1 ? " " + std::to_string(element) : "";
   script.Panel("stream " + stream.name + count + ", as measured",
                InBrackets(sensor != nullptr ? sensor->unit : ""));
-  const std::string value =
-      Where(Is("stream", stream.name), GnuplotColumn('v' + std::to_string(element)));
-  script.Quartiles("M", "measurements.csv", value);
+  const std::string mine = Is("stream", stream.name);
+  const std::string value = GnuplotColumn('v' + std::to_string(element));
+  script.Quartiles("M", "measurements.csv", Where(mine, value));
   script.Set("low = max(M_min, M_lo_quartile - 3 * (M_up_quartile - M_lo_quartile))");
   script.Set("high = min(M_max, M_up_quartile + 3 * (M_up_quartile - M_lo_quartile))");
   script.Set("set yrange [low - margin(low, high) : high + margin(low, high)]");
-  script.Curve({"measurements.csv", run.measurement_rows, Kinds(run.streams.size())},
-               OverTime(value) + " with points ls 13", "measured");
-  const bool landmarks = sensor != nullptr && sensor->has_landmark;
+  FigureFile file{"measurements.csv", run.measurement_rows,
+                  Kinds(run.streams, [](const auto& one) { return one.rows > 0; })};
+  std::string drawn = mine;
+  if (sensor != nullptr && sensor->has_landmark && file.rows <= kMostRead) {
+    drawn += OfSomeLandmarks(file);
+    file.rows = 0;
+  }
+  script.Curve(file, OverTime(Where(drawn, value)) + " with points ls 13", "measured");
+  // Truth and prediction of many measurements at a time lie under these; figure NAME.innovation has
+  // what they differ by.
+  if (sensor != nullptr && sensor->has_several) return;
   if (stream.expected_rows > 0) {
-    EachMeasurement(script, {"expected.csv", run.expected_rows, Kinds(run.streams.size())},
-                    landmarks, Is("stream", stream.name),
-                    GnuplotColumn('v' + std::to_string(element)), 11, "truth");
+    script.LineOf({"expected.csv", run.expected_rows,
+                   Kinds(run.streams, [](const auto& one) { return one.expected_rows > 0; })},
+                  mine, value, 11, "truth");
   }
   if (estimator == nullptr) return;
-  EachMeasurement(script, Innovations(*estimator), landmarks, Is("sensor", sensor->name),
-                  GnuplotColumn('h' + std::to_string(element)), 1, "predicted: " + estimator->name);
+  script.LineOf(Innovations(*estimator), Is("sensor", sensor->name),
+                GnuplotColumn('h' + std::to_string(element)), 1, "predicted: " + estimator->name);
 }
 
 FigureScript MeasurementFigure(const RecordedRun& run) {
@@ -303,17 +330,18 @@ const std::string& Identity(const RecordedElement& element) {
   return element.truth.empty() ? element.name : element.truth;
 }
 
-/// All estimators and truth, for each element that any of them has.
+/// All estimators and truth, for each element that any of them has; then their errors.
 std::vector<FigureScript> ComparisonFigures(const RecordedRun& run) {
   const std::size_t count = run.estimators.size();
-  const std::string some =
-      ": the first " + std::to_string(kMaxCurves) + " of " + std::to_string(count);
   if (count < 2) return {};
+  const std::string some = count <= kMaxCurves ? ""
+                                               : ": the first " + std::to_string(kMaxCurves) +
+                                                     " of " + std::to_string(count);
   std::vector<const RecordedElement*> elements;
   for (const RecordedEstimator& estimator : run.estimators) {
     for (const RecordedElement& element : estimator.elements) {
       const auto same = [&](const auto* other) { return Identity(*other) == Identity(element); };
-      if (element.has_value && std::none_of(elements.begin(), elements.end(), same)) {
+      if (element.varies && std::none_of(elements.begin(), elements.end(), same)) {
         elements.push_back(&element);
       }
     }
@@ -332,9 +360,12 @@ std::vector<FigureScript> ComparisonFigures(const RecordedRun& run) {
     }
     TruthCurve(script, run, *first);
   };
-  return FigurePages({"comparison", "estimators side by side" + (count > kMaxCurves ? some : ""),
-                      run.first, run.last},
-                     elements.size(), panel);
+  std::vector<FigureScript> figures =
+      FigurePages({"comparison", "estimators side by side" + some, run.first, run.last},
+                  elements.size(), panel);
+  std::ranges::move(ErrorComparisonFigures(run, "errors side by side" + some),
+                    std::back_inserter(figures));
+  return figures;
 }
 
 /// A figure and the estimator it is of, "" where it is of all.
@@ -349,6 +380,7 @@ std::vector<Plan> PlanFigures(const RecordedRun& run) {
     for (FigureScript& script : scripts) plans.push_back({std::move(script), estimator});
   };
   add(ComparisonFigures(run), "");
+  add({TimingFigure(run)}, "");
   for (const RecordedEstimator& one : run.estimators) {
     add({MapFigure(run, one), ReprojectionFigure(run, one)}, one.name);
     add(ErrorFigures(run, one), one.name);

@@ -42,12 +42,14 @@ void Points(FigureScript& script, const FigureFile& file, const std::string& u,
 /// How landmarks of one status are drawn.
 struct LandmarkStyle {
   const char* status;  ///< as in landmarks.csv
-  const char *bars, *places, *true_places, *key;
+  const char* bars;    ///< null: without, as there may be very many
+  const char *places, *true_places, *key;
 };
 constexpr LandmarkStyle kKept = {"kept", "ls 19", "ls 14 ps 0.6", "ls 18", "landmarks"};
-constexpr LandmarkStyle kRemoved = {"removed", "ls 20", "ls 21", "ls 22", "landmarks, removed"};
+constexpr LandmarkStyle kRemoved = {"removed", nullptr, "ls 20", "ls 21", "landmarks, removed"};
 
-/// The landmarks of one status, of which there is one at least, with bars of 3 sigma and true ones.
+/// The landmarks of one status, of which there is one at least, with true ones, and where the style
+/// has bars with those of 3 sigma.
 void AddLandmarks(FigureScript& script, const MapData& data, const LandmarkStyle& style, int u,
                   int v) {
   const auto place = [&](const std::string& prefix) {
@@ -58,8 +60,10 @@ void AddLandmarks(FigureScript& script, const MapData& data, const LandmarkStyle
     return ":(3 * " + GnuplotColumn(std::string("sigma_") + kAxes[axis]) + ')';
   };
   const std::string key = style.key;
-  script.Curve(data.map_file, place("") + bar(u) + bar(v) + " with xyerrorbars " + style.bars,
-               key + ", +-3 sigma");
+  if (style.bars != nullptr) {
+    script.Curve(data.map_file, place("") + bar(u) + bar(v) + " with xyerrorbars " + style.bars,
+                 key + ", +-3 sigma");
+  }
   script.Curve(data.map_file, place("") + " with points " + style.places, key);
   if (data.map.known == 0) return;
   script.Curve(data.map_file, place("true_") + " with points " + style.true_places, key + ", true");

@@ -21,7 +21,9 @@
 #include "alidade/record/report_html.h"
 #include "alidade/record/run_json.h"
 #include "alidade/record/source_files.h"
+#include "alidade/record/timing_file.h"
 #include "alidade/resume/leftovers.h"
+#include "alidade/resume/replay.h"
 #include "alidade/resume/run_inputs.h"
 #include "alidade/run/metric_rows.h"
 
@@ -50,6 +52,7 @@ struct Recorder::Impl {
   std::vector<std::string> subjects;  ///< of the rows, as SubjectsOf
   std::optional<internal::SourceFiles> source;
   std::optional<internal::DataHash> data;
+  std::optional<internal::TimingFile> timing;
   std::vector<std::unique_ptr<internal::EstimatorFiles>> estimators;
   std::vector<std::string> highlights;
   std::string note;
@@ -105,6 +108,10 @@ internal::RecordedRun Recorder::Impl::CloseFiles() {
     source->Close();
     source->Describe(recorded);
   }
+  if (timing) {
+    timing->Close();
+    timing->Describe(recorded);
+  }
   for (const auto& estimator : estimators) {
     estimator->Close();
     recorded.estimators.push_back(estimator->recorded());
@@ -151,8 +158,12 @@ void Recorder::Impl::WriteReport(const RunResult& result, const internal::Record
     report.figures.note = "figures were not asked for";
   }
   for (const internal::Figure& figure : report.figures.drawn) {
-    const std::filesystem::path svg = folder.partial() / ("figures/" + figure.name + ".svg");
-    report.svgs[figure.name] = AsElement(internal::ReadFile(svg, [](ExitCode, int) {}));
+    const std::string svg = "figures/" + figure.name + ".svg";
+    // The page is the same each time, whatever the clock says.
+    report.svgs[figure.name] =
+        internal::HasWallClock(svg)
+            ? "<img src=\"" + svg + "\" alt=\"" + figure.title + "\">"
+            : AsElement(internal::ReadFile(folder.partial() / svg, [](ExitCode, int) {}));
   }
   folder.Write("report.html", internal::ReportHtml(result, report));
   highlights = {"report.html"};
@@ -172,6 +183,7 @@ void Recorder::Begin(const Experiment& experiment) {
   impl_->subjects = internal::SubjectsOf(experiment);
   impl_->source.emplace(impl_->folder, experiment);
   impl_->data.emplace(experiment.source->streams(), experiment.source->truths());
+  impl_->timing.emplace(impl_->folder, experiment);
   for (const NamedEstimator& named : experiment.estimators) {
     impl_->facts.estimators.emplace(named.name, internal::FactsOf(named, experiment));
     impl_->estimators.push_back(std::make_unique<internal::EstimatorFiles>(
@@ -186,6 +198,12 @@ void Recorder::OnFrame(const SourceFrame& frame) {
   if (!impl_->folder.kept()) impl_->folder.Keep();
   impl_->source->Add(frame);
   impl_->data->Add(frame);
+  impl_->timing->Add(frame);
+}
+
+void Recorder::OnTime(int estimator, double wall_s) {
+  ALIDADE_EXPECTS(impl_->timing.has_value());
+  impl_->timing->AddTime(estimator, wall_s);
 }
 
 void Recorder::OnEstimate(int estimator, const SourceFrame& frame, const State& state,

@@ -44,6 +44,7 @@ class Recorder : public RunObserver {
   /// Writes the headers, once the experiment is known.
   void Begin(const Experiment& experiment) override;
   void OnFrame(const SourceFrame& frame) override;
+  void OnTime(int estimator, double wall_s) override;
   void OnEstimate(int estimator, const SourceFrame& frame, const State& state,
                   const UpdateReport& report) override;
   /// Puts a file of that text into the folder too. Errors: kCannotCreate, kIo.

@@ -20,7 +20,7 @@ struct Report {
   std::vector<std::string> subjects = {};   ///< SubjectsOf the experiment
 };
 
-/// One page with all in it: no script, no other file, no clock.
+/// One page with all in it but figure `timing`: no script, no other file, no clock.
 std::string ReportHtml(const RunResult& result, const Report& report);
 
 /// `text`, as ShownUtf8, with the characters that HTML takes for its own replaced.

@@ -28,9 +28,8 @@ set style line 16 pt 2 ps 0.5 lc rgb '#c03030'
 set style line 17 pt 8 ps 0.6 lc rgb '#c03030'
 set style line 18 pt 6 ps 0.8 lc rgb '#111111'
 set style line 19 pt 0 lw 0.8 lc rgb '#a5c6db'
-set style line 20 pt 0 lw 0.8 lc rgb '#dcd5e6'
-set style line 21 pt 7 ps 0.5 lc rgb '#b294d0'
-set style line 22 pt 6 ps 0.8 lw 0.7 lc rgb '#aaaaaa'
+set style line 20 pt 7 ps 0.5 lc rgb '#b294d0'
+set style line 21 pt 6 ps 0.8 lw 0.7 lc rgb '#aaaaaa'
 max(a, b) = a > b ? a : b
 min(a, b) = a < b ? a : b
 # What a range is widened by at each end; never zero.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/resume/replay.h"
 
+#include <algorithm>
+#include <array>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -64,8 +66,13 @@ RecordedInputs ReadReplayable(const fs::path& folder) {
   return inputs;
 }
 
+bool HasWallClock(std::string_view file) {
+  constexpr std::array<std::string_view, 3> kFiles = {"timing.json", "timing.csv",
+                                                      "figures/timing.svg"};
+  return std::ranges::find(kFiles, file) != kFiles.end();
+}
+
 ReplayResult CompareReplay(const fs::path& before, const fs::path& now) {
-  constexpr const char* kTiming = "timing.json";
   ReplayResult result;
   result.inputs =
       InputDifferences(ReadInputsText(before / kInputsFile), (before / kInputsFile).string(),
@@ -74,7 +81,7 @@ ReplayResult CompareReplay(const fs::path& before, const fs::path& now) {
   std::error_code ignored;
   for (const std::string& name : ListedFiles(before)) {
     const bool is_made = made.erase(name) > 0;
-    if (name == kTiming) {
+    if (HasWallClock(name)) {
       result.left_out.push_back(name);
       continue;
     }
@@ -98,7 +105,7 @@ ReplayResult CompareReplay(const fs::path& before, const fs::path& now) {
     }
   }
   for (const std::string& name : made) {
-    if (name == kTiming) continue;
+    if (HasWallClock(name)) continue;
     ++result.files;
     result.differences.push_back({name, 0, 0, "is new"});
   }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "alidade/resume/run_inputs.h"
@@ -30,7 +31,10 @@ struct ReplayResult {
 /// from a pipe; kBadData where it is unfinished.
 RecordedInputs ReadReplayable(const std::filesystem::path& folder);
 
-/// Compares all files of the two but timing.json.
+/// Whether a file of a run folder has the wall clock in it, and so is another each time.
+bool HasWallClock(std::string_view file);
+
+/// Compares all files of the two but those that HasWallClock.
 ReplayResult CompareReplay(const std::filesystem::path& before, const std::filesystem::path& now);
 
 /// The result as JSON, and for a terminal, `folder` as it was named.

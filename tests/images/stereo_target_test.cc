@@ -208,7 +208,7 @@ TEST_F(StereoTarget, AMatchThatRepeatsIsNone) {
   EXPECT_TRUE(Found("disparity").empty());
   EXPECT_EQ(Found("inverse_scale").size(), 21u);
   // It is the repetition alone.
-  ASSERT_EQ(Measure({"--set", "source.disparity.least_distinct=0"}).code, 0);
+  ASSERT_EQ(Measure({"--set", "source.disparity.min_distinct=0"}).code, 0);
   EXPECT_FALSE(Found("disparity").empty());
 }
 
@@ -283,6 +283,96 @@ TEST_F(StereoTarget, WhatCoversTheTargetIsNotIt) {
   for (int k = 18; k < 21; ++k) {
     ASSERT_TRUE(scale.contains(k)) << k;
     EXPECT_NEAR(scale.at(k), depth.at(k) / depth.at(0), 3e-3 * scale.at(k)) << k;
+  }
+}
+
+/// A textured square before a wall that is textured as well. It grows, and from image 1 on it goes
+/// up and down by 16 px from image to image, and each image is the mean of its exposure, four
+/// fifths of that time. Its size / that in image 0.
+std::vector<double> DrawSwing(const std::filesystem::path& folder, int count) {
+  std::filesystem::create_directories(folder);
+  cv::RNG random(11);
+  cv::Mat texture(64, 64, CV_8U), wall(180, 240, CV_8U);
+  for (cv::Mat* const one : {&texture, &wall}) {
+    random.fill(*one, cv::RNG::UNIFORM, 0, 255);
+    cv::GaussianBlur(*one, *one, {}, 1.5);
+    cv::normalize(*one, *one, 20, 235, cv::NORM_MINMAX);
+    one->convertTo(*one, CV_32F);
+  }
+  std::vector<double> sizes;
+  for (int i = 0; i < count; ++i) {
+    constexpr int kParts = 24;
+    constexpr double kReach = 32.0, kSpeed = 16.0;  // px, px an image
+    cv::Mat mean(wall.size(), CV_32F, cv::Scalar(0.0));
+    for (int part = 0; part < kParts; ++part) {
+      const double t = i + 0.8 * ((part + 0.5) / kParts - 0.5);
+      const double scale = 0.6 * (1.0 + 0.01 * t), middle = 31.5 * scale;
+      const double way = M_PI_2 * kSpeed / kReach * std::max(0.0, t - 1.0);
+      const double y = 90.0 + kReach / M_PI_2 * std::asin(std::sin(way));
+      const cv::Matx23d at(scale, 0, 120.0 - middle, 0, scale, y - middle);
+      cv::Mat image = wall.clone();
+      cv::warpAffine(texture, image, at, image.size(), cv::INTER_LINEAR, cv::BORDER_TRANSPARENT);
+      mean += image / kParts;
+    }
+    cv::Mat noise(mean.size(), CV_32F), image;
+    random.fill(noise, cv::RNG::NORMAL, 0.0, 2.0);
+    cv::Mat(mean + noise).convertTo(image, CV_8U);
+    EXPECT_TRUE(cv::imwrite((folder / cv::format("%03d.png", i)).string(), image));
+    sizes.push_back(1.0 + 0.01 * i);
+  }
+  return sizes;
+}
+
+TEST_F(StereoTarget, ATargetIsMeasuredInImagesThatItsMotionBlurs) {
+  const std::vector<double> sizes = DrawSwing(folder_ / "swing", 40);
+  Write("config.yaml", R"(alidade: 1
+source: {type: stereo_target, left: swing, rate_hz: 20, target: [101, 71, 38, 38]}
+)");
+  const Outcome outcome = Measure();
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Values scale = Found("inverse_scale");
+  EXPECT_GE(scale.size(), 38u);  // 10 without a blurred template
+  for (const auto& [frame, value] : scale) {
+    EXPECT_NEAR(value * sizes[static_cast<std::size_t>(frame)], 1.0, 0.02) << frame;
+  }
+  // What the blur leaves uncertain can be left out.
+  ASSERT_EQ(Measure({"--set", "source.max_relative_sigma=0.01"}).code, 0);
+  EXPECT_LT(Found("inverse_scale").size(), scale.size());
+}
+
+TEST_F(StereoTarget, ATargetThatIsGoneIsNotFoundElsewhere) {
+  DrawSwing(folder_ / "swing", 2);
+  // From then on 54 images of other things of its size: one place is always most like it.
+  cv::RNG random(2);
+  for (int k = 2; k < 56; ++k) {
+    cv::Mat image(180, 240, CV_8U);
+    random.fill(image, cv::RNG::UNIFORM, 0, 255);
+    cv::GaussianBlur(image, image, {}, 3.0);
+    cv::normalize(image, image, 0, 255, cv::NORM_MINMAX);
+    ASSERT_TRUE(cv::imwrite((folder_ / "swing" / cv::format("%03d.png", k)).string(), image));
+  }
+  Write("config.yaml", R"(alidade: 1
+source: {type: stereo_target, left: swing, rate_hz: 20, target: [114, 84, 12, 12]}
+)");
+  const Outcome outcome = Measure();
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Values scale = Found("inverse_scale");
+  EXPECT_GE(scale.size(), 1u);
+  for (const auto& [frame, value] : scale) EXPECT_LT(frame, 2) << value;
+}
+
+TEST_F(StereoTarget, ImagesBeforeTheStartAreLeftOut) {
+  MakePair();
+  ASSERT_EQ(Measure({"--set", "source.start_frame=3", "--set", "source.max_frames=10", "--set",
+                     "source.target=[85, 55, 70, 70]"})
+                .code,
+            0);
+  const Values depth = Depth(), scale = Found("inverse_scale"), disparity = Found("disparity");
+  ASSERT_EQ(scale.size(), 10u);
+  EXPECT_EQ(disparity.size(), 10u);
+  for (const auto& [frame, value] : scale) {
+    EXPECT_NEAR(value, depth.at(frame + 3) / depth.at(3), 2.5e-3 * value) << frame;
+    EXPECT_NEAR(disparity.at(frame), 120.0 * 0.065 / depth.at(frame + 3), 0.05) << frame;
   }
 }
 

@@ -107,16 +107,16 @@ class PatchAlignment {
 
   /// False where it does not settle, less than half of it is on the image, or it has no texture.
   bool Run(cv::Matx33d& warp) {
-    constexpr int kMost = 40;
-    constexpr double kSettled = 2e-3, kNearly = 5e-2, kLongest = 0.25;  // px, px, of the half side
-    for (int i = 0; i < kMost; ++i) {
+    constexpr int kMaxSteps = 40;
+    constexpr double kSettled = 2e-3, kNearly = 5e-2, kMaxStep = 0.25;  // px, px, of the half side
+    for (int i = 0; i < kMaxSteps; ++i) {
       if (!Linearise(warp)) return false;
       const Eigen::VectorXd d = solution_.head(count_) / solution_[count_];
       const double longest = d.cwiseAbs().maxCoeff();
       if (!(longest < 2.0) || !(solution_[count_] > 0.0)) return false;
-      warp = Changed(warp, patch_, std::min(1.0, kLongest / longest) * d);
+      warp = Changed(warp, patch_, std::min(1.0, kMaxStep / longest) * d);
       const double moved_px = longest * HalfSide(patch_);
-      if (moved_px < (i + 1 < kMost ? kSettled : kNearly)) return Linearise(warp);
+      if (moved_px < (i + 1 < kMaxSteps ? kSettled : kNearly)) return Linearise(warp);
     }
     return false;
   }
@@ -168,7 +168,7 @@ class PatchAlignment {
   /// which the alignment would not settle.
   void Sample(const cv::Matx33d& warp) {
     seen_.create(patch_.size(), CV_32F);
-    const int most_column = image_.cols - 2, most_row = image_.rows - 2;
+    const int last_column = image_.cols - 2, last_row = image_.rows - 2;
     for (int y = 0; y < patch_.rows; ++y) {
       auto* const to = seen_.ptr<float>(y);
       for (int x = 0; x < patch_.cols; ++x) {
@@ -176,7 +176,7 @@ class PatchAlignment {
         to[x] = kOutside;
         if (!(at.x >= 0.0 && at.y >= 0.0 && at.x < image_.cols && at.y < image_.rows)) continue;
         const int column = static_cast<int>(at.x), row = static_cast<int>(at.y);
-        if (column > most_column || row > most_row) continue;
+        if (column > last_column || row > last_row) continue;
         const auto a = static_cast<float>(at.x - column), b = static_cast<float>(at.y - row);
         const float* const upper = image_.ptr<float>(row) + column;
         const float* const lower = image_.ptr<float>(row + 1) + column;
@@ -281,7 +281,7 @@ class PatchAlignment {
 /// farther off. None where PatchAlignment::Run() fails in both.
 inline std::optional<Alignment> Align(const cv::Mat& patch, const cv::Mat& image,
                                       const cv::Matx33d& warp, Warp kind) {
-  constexpr int kShrink = 4, kLeastSide = 16;
+  constexpr int kShrink = 4, kMinSide = 16;
   constexpr double kAlike = 0.95;
   const auto settle = [&](cv::Matx33d from) -> std::optional<Alignment> {
     PatchAlignment alignment(patch, image, kind);
@@ -291,7 +291,7 @@ inline std::optional<Alignment> Align(const cv::Mat& patch, const cv::Mat& image
   const cv::Matx33d start = Reduced(warp, patch, kind);
   const std::optional<Alignment> near = settle(start);
   if (near && near->similarity >= kAlike) return near;
-  if (std::min(patch.cols, patch.rows) < kShrink * kLeastSide) return near;
+  if (std::min(patch.cols, patch.rows) < kShrink * kMinSide) return near;
   constexpr double k = kShrink, kOffset = 0.5 * (kShrink - 1);
   const cv::Matx33d from_small(k, 0.0, kOffset, 0.0, k, kOffset, 0.0, 0.0, 1.0);
   cv::Mat small_patch, small_image;

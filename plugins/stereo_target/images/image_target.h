@@ -49,7 +49,8 @@ class ImageTarget : public Source {
     const Node& entry = arguments.entry;
     rate_hz_ = p.Number("rate_hz", "Hz", "images a second; 0: by `timestamps`, or as a video says",
                         {0.0, 1e6}, 0.0);
-    most_ = p.Integer("max_frames", "images at most; 0: all", 0, 1 << 30, 0);
+    start_ = p.Integer("start_frame", "images before it are left out", 0, 1 << 30, 0);
+    max_frames_ = p.Integer("max_frames", "images at most; 0: all", 0, 1 << 30, 0);
     tolerance_ = TimestampFromSeconds(p.Number(
         "truth_tolerance_s", "s", "a true value is at most so far off in time", {0.0, 1e3}, 1e-3));
     sigma_px_ = p.NonNegative("sigma_systematic_px", "px",
@@ -59,7 +60,7 @@ class ImageTarget : public Source {
     estimate_noise_ = p.Flag(
         "estimate_noise", "each measurement brings its variance; false: that of the sensors", true);
     const std::array<double, 4> box = p.Vector<4>(
-        "target", "px", "[x, y, width, height] of the target in the first image; or by `boxes`",
+        "target", "px", "[x, y, width, height] of the target in image start_frame; or by `boxes`",
         kNonNegative, std::array<double, 4>{});
     for (const char* key : {"left", "right", "stereo", "boxes", "timestamps", "truth"}) {
       entry.Declare(key);
@@ -104,7 +105,8 @@ class ImageTarget : public Source {
   const std::vector<StreamInfo>& truths() const override { return truths_; }
   Place place() const override { return left_->place(); }
   std::int64_t size() const override {
-    return most_ > 0 ? std::min<std::int64_t>(most_, left_->size()) : left_->size();
+    const std::int64_t left = std::max<std::int64_t>(0, left_->size() - start_);
+    return max_frames_ > 0 ? std::min(max_frames_, left) : left;
   }
   bool sees() const override { return true; }
   SeenImage Seen() const override {
@@ -120,7 +122,7 @@ class ImageTarget : public Source {
   }
 
   bool Next(SourceFrame& frame) override {
-    if (frames_ == most_ && most_ > 0) return false;
+    if (frames_ == max_frames_ && max_frames_ > 0) return false;
     if (!std::exchange(has_read_, false) && !ReadPair()) return false;
     frame.timestamp = times_->At(left_->number());
     frame.measurements.clear();
@@ -182,7 +184,15 @@ class ImageTarget : public Source {
     }
   }
 
+  /// The next one from `start_frame` on.
   bool ReadPair() {
+    do {
+      if (!ReadOnePair()) return false;
+    } while (left_->number() < start_);
+    return true;
+  }
+
+  bool ReadOnePair() {
     if (!left_->Next(image_[0])) {
       times_->End(left_->number() + 1);
       if (!started_) {
@@ -254,7 +264,7 @@ class ImageTarget : public Source {
   DisparityOptions disparity_options_;
   double rate_hz_ = 0.0, sigma_px_ = 0.0;
   bool estimate_noise_ = true, has_read_ = false, started_ = false;
-  std::int64_t most_ = 0, frames_ = 0;
+  std::int64_t start_ = 0, max_frames_ = 0, frames_ = 0;
   Timestamp tolerance_ = 0;
   std::filesystem::path folder_, stereo_file_;
   std::vector<StreamInfo> streams_, truths_;

@@ -13,13 +13,17 @@
 
 #include "alidade/model/params.h"
 #include "alignment.h"
+#include "motion_blur.h"
+#include "target_search.h"
+#include "target_template.h"
 
 namespace alidade {
 
 /// How a target is followed.
 struct TargetOptions {
   Warp warp;
-  double least_similarity;    ///< of the target and its template, for a measurement
+  double min_similarity;      ///< of the target and its template, for a measurement
+  double max_relative_sigma;  ///< of the scale, relative, likewise
   double refresh_similarity;  ///< below it the template is taken anew
   double refresh_scale;       ///< likewise where the target is so many times larger or smaller
 
@@ -30,9 +34,11 @@ struct TargetOptions {
             "stretched and sheared; or is plane and tilts, which needs `camera` or "
             "`stereo`",
             0))),
-        least_similarity(p.Number("least_similarity", "1",
-                                  "the target is lost where it correlates less with its template",
-                                  {-1.0, 1.0}, 0.7)),
+        min_similarity(p.Number("min_similarity", "1",
+                                "the target is lost where it correlates less with its template",
+                                {-1.0, 1.0}, 0.7)),
+        max_relative_sigma(p.Positive("max_relative_sigma", "1",
+                                      "standard deviation of the scale / scale, at most", 0.2)),
         refresh_similarity(p.Number("refresh_similarity", "1",
                                     "the template is taken anew where it correlates less; each "
                                     "time adds its error to all that follows",
@@ -49,11 +55,15 @@ struct TargetOptions {
 /// put through them, and from there the target is aligned with a template, see Align(): errors do
 /// not add up from image to image. The first template is used as long as it fits well, then of it
 /// and others that were taken on the way the one that tells most of the size; each brings the error
-/// of its own. Where none fits, as in a blurred image, there is no measurement, but the target is
-/// followed on for some images; then it is lost, and looked for in the whole image.
+/// of its own.
+///
+/// Where none fits, the target is looked for about there, see FindNear(), and aligned with the
+/// templates as the motion blurs them [Jin2005]. A blurred image tells the size less well, which
+/// its variance says; it gives no template, and no size to follow on from. What is not found either
+/// is followed on for some images; then it is lost, and looked for in the whole image.
 class TargetTracker {
  public:
-  using Corners = std::array<cv::Point2f, 4>;  ///< clockwise from the upper left
+  using Corners = alidade::Corners;
 
   /// Where the target is, and its size.
   struct Seen {
@@ -75,8 +85,8 @@ class TargetTracker {
     if (corners) {
       const Corners inner = Inset(*corners);
       const bool first = templates_.empty();
-      if (first) TakeTemplate(inner, 1.0, 0.0);
-      seen = Measure(inner, options_.least_similarity, kGuessedArea);
+      if (first) TakeTemplate({grey_, inner, 1.0, 0.0}, inner);
+      seen = Keep(Measure(inner, options_.min_similarity, kGuessedArea));
       lost_ = false;
       if (!seen) outline_ = inner;
       if (first && !seen) templates_.clear();  // without texture it is like nothing
@@ -100,12 +110,17 @@ class TargetTracker {
   static constexpr int kPatience = 10;  ///< images for which it is followed without being measured
   static constexpr double kGuessedArea = 2.0;  ///< times that of a box, or less: as boxes are known
 
-  /// What the target looked like.
-  struct Template {
-    cv::Mat patch;      ///< grey as float
-    cv::Matx33d taken;  ///< where
-    double scale;       ///< inverse scale there
-    double variance;    ///< of scale, relative: of its square
+  /// The target where a template was aligned.
+  struct Fit {
+    Seen seen;
+    Corners outline;
+    std::size_t index;    ///< of the template
+    double most_similar;  ///< of those of all templates
+    bool blurred;
+
+    double relative_variance() const {
+      return seen.variance / (seen.inverse_scale * seen.inverse_scale);
+    }
   };
 
   /// Leaves out the rim, which mixes with what is behind the target, and would pull the size.
@@ -116,130 +131,133 @@ class TargetTracker {
                  {cv::Point2f(kShare, kShare), {kRest, kShare}, {kRest, kRest}, {kShare, kRest}});
   }
 
-  /// From the unit square, its upper left corner first.
-  static cv::Matx33d FromUnit(const Corners& corners) {
-    const Corners unit{cv::Point2f(0.0F, 0.0F), {1.0F, 0.0F}, {1.0F, 1.0F}, {0.0F, 1.0F}};
-    return cv::getPerspectiveTransform(unit.data(), corners.data());
-  }
-  static Corners CornersOf(const cv::Mat& patch) {
-    const auto right = static_cast<float>(patch.cols - 1);
-    const auto bottom = static_cast<float>(patch.rows - 1);
-    return {cv::Point2f(0.0F, 0.0F), {right, 0.0F}, {right, bottom}, {0.0F, bottom}};
-  }
-  static Corners Moved(const cv::Matx33d& warp, const Corners& corners) {
-    Corners moved;
-    std::ranges::transform(corners, moved.begin(),
-                           [&](cv::Point2f at) { return cv::Point2f(Apply(warp, at)); });
-    return moved;
-  }
-  static double AreaOf(const Corners& corners) {
-    return cv::contourArea(std::vector<cv::Point2f>(corners.begin(), corners.end()));
-  }
-
-  void TakeTemplate(const Corners& outline, double scale, double variance) {
-    const float width = 0.5F * static_cast<float>(cv::norm(outline[1] - outline[0]) +
-                                                  cv::norm(outline[2] - outline[3]));
-    const float height = 0.5F * static_cast<float>(cv::norm(outline[3] - outline[0]) +
-                                                   cv::norm(outline[2] - outline[1]));
-    const cv::Size size(std::max(8, cvRound(width)), std::max(8, cvRound(height)));
-    Template taken{cv::Mat(size, CV_32F), {}, scale, variance};
-    taken.taken = cv::getPerspectiveTransform(CornersOf(taken.patch).data(), outline.data());
-    cv::warpPerspective(grey_, taken.patch, taken.taken, size,
-                        cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
+  void TakeTemplate(TargetTemplate taken, const Corners& outline) {
     if (templates_.size() == kTemplates) templates_.erase(templates_.begin() + 1);
-    templates_.push_back(taken);
+    templates_.push_back(std::move(taken));
     last_ = templates_.size() - 1;
     misfits_ = 0;
     outline_ = outline;
   }
 
-  /// From where the target is followed to; where it cannot be followed, from where it was, and it
-  /// is lost if it is not there.
+  /// From where the target is followed to; where it cannot be followed, from where it was. It is
+  /// lost if it is not there, nor near.
   std::optional<Seen> FollowAndMeasure(const cv::Mat& image) {
-    constexpr double kArea = 1.2;
+    constexpr double kArea = 1.2, kNearArea = 1.5;
     const std::optional<Corners> followed = Follow(image);
-    const auto seen = Measure(followed.value_or(outline_), options_.least_similarity, kArea);
-    lost_ = !seen && (!followed || unseen_ >= kPatience);
-    if (followed && !seen) outline_ = *followed;
-    return seen;
+    const Corners start = followed.value_or(outline_);
+    auto fit = Measure(start, options_.min_similarity, kArea);
+    if (!fit) {
+      std::vector<const TargetTemplate*> likely{&templates_[0]};
+      if (last_ > 0) likely.push_back(&templates_[last_]);
+      if (const auto near = FindNear(likely, grey_, start, outline_)) {
+        fit = Measure(near->outline, options_.min_similarity, kNearArea, near->blur);
+      }
+    }
+    lost_ = !fit && (!followed || unseen_ >= kPatience);
+    if (followed && !fit) outline_ = *followed;
+    return Keep(fit);
   }
 
   /// Anywhere in the image. It has to be more like the target than what is where it should be.
   std::optional<Seen> SearchAndMeasure() {
-    const std::optional<Corners> guess = Search();
+    const auto guess = FindAnywhere(templates_, grey_, outline_, options_.min_similarity);
     if (!guess) return std::nullopt;
-    const auto seen = Measure(*guess, 0.5 * (1.0 + options_.least_similarity), kGuessedArea);
-    lost_ = !seen;
-    return seen;
+    const auto fit = Measure(*guess, 0.5 * (1.0 + options_.min_similarity), kGuessedArea);
+    lost_ = !fit;
+    return Keep(fit);
   }
 
   /// From there, with the template that tells most of the size; with the first one alone if it fits
   /// well. Its area is at most `growth` times that of the guess, or as many times less.
-  std::optional<Seen> Measure(const Corners& guess, double least, double growth) {
-    std::optional<Seen> best;
+  std::optional<Fit> Measure(const Corners& guess, double least, double growth,
+                             const MotionBlur& blur = {}) const {
+    std::optional<Fit> best;
     double most_similar = -1.0;
     for (std::size_t i = 0; i < templates_.size(); ++i) {
-      const Template& one = templates_[i];
-      const Corners from = CornersOf(one.patch);
-      const auto found = Align(
-          one.patch, grey_, cv::getPerspectiveTransform(from.data(), guess.data()), options_.warp);
+      const TargetTemplate& one = templates_[i];
+      const auto found = AlignBlurred(one, one.To(guess), blur);
       if (!found || found->similarity < least) continue;
-      const Corners outline = Moved(found->warp, from);
+      const Corners outline = Moved(found->warp, one.corners());
       if (!IsSane(outline, guess, growth, grey_.size())) continue;
       most_similar = std::max(most_similar, found->similarity);
-      const Seen seen = See(one, *found, outline);
-      const auto relative = [](const Seen& of) {
-        return of.variance / (of.inverse_scale * of.inverse_scale);
-      };
-      if (best && relative(seen) >= relative(*best)) continue;
-      best = seen;
-      last_ = i;
-      outline_ = outline;
+      const Fit fit{See(one, *found, outline), outline, i, 0.0, blur.length > 0.0};
+      const double sigma = std::sqrt(fit.relative_variance());
+      if (!(sigma <= options_.max_relative_sigma)) continue;
+      if (best && fit.relative_variance() >= best->relative_variance()) continue;
+      best = fit;
       if (i == 0 && found->similarity >= options_.refresh_similarity) break;
     }
-    if (best) Refresh(*best, most_similar);
+    if (best) best->most_similar = most_similar;
     return best;
   }
 
-  Seen See(const Template& one, const Alignment& found, const Corners& outline) const {
+  /// With that blur or one about as long, whichever is most alike.
+  std::optional<Alignment> AlignBlurred(const TargetTemplate& one, const cv::Matx33d& start,
+                                        const MotionBlur& blur) const {
+    std::optional<Alignment> best;
+    for (const MotionBlur& like : blur.Neighbours()) {
+      const auto found = Align(one.Blurred(like), grey_, best ? best->warp : start, options_.warp);
+      if (found && (!best || found->similarity > best->similarity)) best = found;
+    }
+    return best;
+  }
+
+  /// The target is followed on from there. Of a blurred one only the place is kept.
+  std::optional<Seen> Keep(const std::optional<Fit>& fit) {
+    if (!fit) return std::nullopt;
+    if (fit->blurred) {
+      const cv::Point2f moved = MiddleOf(fit->outline) - MiddleOf(outline_);
+      for (cv::Point2f& corner : outline_) corner += moved;
+    } else {
+      last_ = fit->index;
+      outline_ = fit->outline;
+      Refresh(*fit);
+    }
+    return fit->seen;
+  }
+
+  Seen See(const TargetTemplate& one, const Alignment& found, const Corners& outline) const {
     const auto number = [&](const cv::Matx33d& warp) { return InverseScale(one, warp); };
     const double scale = InverseScale(one, found.warp);
-    const double relative = found.Variance(one.patch, number) / (scale * scale) + one.variance;
-    const double all = one.scale * scale;
+    const double relative = found.Variance(one.patch(), number) / (scale * scale) + one.variance();
+    const double all = one.scale() * scale;
     const cv::Rect2d box =
         cv::boundingRect(std::vector<cv::Point2f>(outline.begin(), outline.end()));
-    return {Apply(found.warp, Middle(one.patch)), box, all, all * all * relative};
+    return {Apply(found.warp, Middle(one.patch())), box, all, all * all * relative};
   }
 
   /// Size of the target where the template was taken / size under `warp`. Of a plane under a
   /// homography the depth of its middle x under `warp` / then: H = s (R + t n' / d) takes x, of
   /// third element 1, to s Z / Z0 times its image, and s is the middle singular value of H
   /// [Ma2004].
-  double InverseScale(const Template& one, const cv::Matx33d& warp) const {
-    const cv::Point2d middle = Middle(one.patch);
+  double InverseScale(const TargetTemplate& one, const cv::Matx33d& warp) const {
+    const cv::Point2d middle = Middle(one.patch());
     if (options_.warp != Warp::kHomography) {
-      return std::sqrt(AreaAt(one.taken, middle) / AreaAt(warp, middle));
+      return std::sqrt(AreaAt(one.taken(), middle) / AreaAt(warp, middle));
     }
-    const cv::Matx33d in_rays = intrinsics_->inv() * warp * one.taken.inv() * *intrinsics_;
+    const cv::Matx33d in_rays = intrinsics_->inv() * warp * one.taken().inv() * *intrinsics_;
     cv::Mat values;
     cv::SVD::compute(cv::Mat(in_rays), values, cv::SVD::NO_UV);
-    const cv::Point2d pixel = Apply(one.taken, middle);
+    const cv::Point2d pixel = Apply(one.taken(), middle);
     const cv::Vec3d ray = intrinsics_->inv() * cv::Vec3d(pixel.x, pixel.y, 1.0);
     return std::abs((in_rays * (ray * (1.0 / ray[2])))[2]) / values.at<double>(1);
   }
 
   /// Takes another template where none has fitted well for some images, or the target is far larger
-  /// or smaller than in the one that is used.
-  void Refresh(const Seen& seen, double most_similar) {
+  /// or smaller than in the one that is used; none that is blurred.
+  void Refresh(const Fit& fit) {
     constexpr int kMisfits = 3;
-    const double scale = seen.inverse_scale / templates_[last_].scale;
+    constexpr double kSharp = 0.4;
+    const TargetTemplate& used = templates_[last_];
+    const double scale = fit.seen.inverse_scale / used.scale();
     const bool other_size = scale > options_.refresh_scale || scale < 1.0 / options_.refresh_scale;
-    misfits_ = most_similar < options_.refresh_similarity ? misfits_ + 1 : 0;
+    misfits_ = fit.most_similar < options_.refresh_similarity ? misfits_ + 1 : 0;
     if (!other_size && misfits_ < kMisfits) return;
     const cv::Rect2d whole(0.0, 0.0, grey_.cols, grey_.rows);
-    if ((seen.box & whole).area() < seen.box.area()) return;  // part of it is not seen
-    TakeTemplate(outline_, seen.inverse_scale,
-                 seen.variance / (seen.inverse_scale * seen.inverse_scale));
+    if ((fit.seen.box & whole).area() < fit.seen.box.area()) return;  // part of it is not seen
+    TargetTemplate taken(grey_, fit.outline, fit.seen.inverse_scale, fit.relative_variance());
+    if (taken.Sharpness() < kSharp * used.Sharpness()) return;
+    TakeTemplate(std::move(taken), fit.outline);
   }
 
   /// Not turned inside out, about as large as guessed, its middle on the image.
@@ -294,40 +312,9 @@ class TargetTracker {
     return Moved(moved, outline_);
   }
 
-  /// Where in the whole image something is most like a template, about as large as the target was.
-  std::optional<Corners> Search() const {
-    constexpr double kSide = 40.0, kMost = 1.5;  // px of the template as it is compared; times
-    std::optional<Corners> best;
-    double most = options_.least_similarity;
-    for (std::size_t index = 0; index < templates_.size(); ++index) {
-      const cv::Mat& patch = templates_[index].patch;
-      const double last = std::sqrt(AreaOf(outline_) / patch.size().area());
-      for (double factor = 1.0 / kMost; factor < kMost * 1.01;
-           factor *= std::sqrt(std::sqrt(kMost))) {
-        const double size = last * factor;  // px of the image for one of the template
-        const double shrink = std::min(1.0, kSide / (size * std::max(patch.cols, patch.rows)));
-        const double least_px = std::min(patch.cols, patch.rows) * size * shrink;
-        if (!(least_px >= 6.0) || std::min(grey_.cols, grey_.rows) * shrink < 6.0) continue;
-        cv::Mat small, looked, scores;
-        cv::resize(grey_, small, {}, shrink, shrink, cv::INTER_AREA);
-        cv::resize(patch, looked, {}, size * shrink, size * shrink, cv::INTER_AREA);
-        if (looked.cols > small.cols || looked.rows > small.rows) continue;
-        cv::matchTemplate(small, looked, scores, cv::TM_CCOEFF_NORMED);
-        double score = 0.0;
-        cv::Point at;
-        cv::minMaxLoc(scores, nullptr, &score, nullptr, &at);
-        if (!(score > most) || score > 1.0 + 1e-3) continue;  // above 1: nothing but one grey
-        most = score;
-        const cv::Matx33d warp(size, 0.0, at.x / shrink, 0.0, size, at.y / shrink, 0.0, 0.0, 1.0);
-        best = Moved(warp, CornersOf(patch));
-      }
-    }
-    return best;
-  }
-
   TargetOptions options_;
   std::optional<cv::Matx33d> intrinsics_;
-  std::vector<Template> templates_;
+  std::vector<TargetTemplate> templates_;
   std::size_t last_ = 0;  ///< the template that fitted the last image
   int misfits_ = 0;       ///< images in which none fitted well
   int unseen_ = 0;        ///< images since it was measured

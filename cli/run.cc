@@ -11,12 +11,14 @@
 
 #include "alidade/record/follower.h"
 #include "alidade/record/recorder.h"
+#include "alidade/record/run_viewer.h"
 #include "alidade/resume/run_inputs.h"
 #include "alidade/run/metric_rows.h"
 #include "alidade/sweep/sweep_config.h"
 #include "command.h"
 #include "console.h"
 #include "resume.h"
+#include "video_name.h"
 #include "watchdog.h"
 
 namespace alidade::cli {
@@ -28,6 +30,7 @@ constexpr const char* kRunFooter = R"(Examples:
   alidade run config.yaml -o runs/b --seed 2 --set estimators.ekf.gate=0.99
   alidade run config.yaml --set source.path=other.csv --force
   alidade run config.yaml -o runs/b --resume       after a crash, a full disk, a signal
+  alidade run images.yaml --save-video run.avi     what a person sees: features, gates, the estimate
   tail -f log.csv | alidade run live.yaml --set source.path=/dev/stdin --follow | my_robot
 
 Ctrl-C finishes the frame, writes all that is done and ends with exit code 75; twice: at once. While
@@ -40,7 +43,8 @@ struct RunArguments {
   std::string folder;
   std::optional<std::uint64_t> seed;
   bool force = false, quiet = false, no_figures = false, covariances = false, all = false;
-  bool follow = false, resume = false;
+  bool follow = false, resume = false, view = false;
+  std::string video;
   std::optional<double> frame_timeout_s = kUsualFrameTimeout_s;
 };
 
@@ -91,7 +95,8 @@ std::string EventSummary(const RunResult& result) {
   return text;
 }
 
-std::string Summary(const RunResult& result, const std::string& table, const Recorder& recorder) {
+std::string Summary(const RunResult& result, const std::string& table, const Recorder& recorder,
+                    const std::string& video) {
   std::string text = table;
   if (const std::string events = EventSummary(result); !events.empty()) text += '\n' + events;
   if (const std::string note = UnoptimisedText(result.unoptimised); !note.empty()) {
@@ -101,7 +106,20 @@ std::string Summary(const RunResult& result, const std::string& table, const Rec
   for (const std::string& path : recorder.highlights()) {
     text += "  " + (recorder.folder() / path).string() + '\n';
   }
+  if (!video.empty()) text += "wrote " + video + '\n';
   return text;
+}
+
+/// What shows the run in a video or a window, if that is asked for.
+std::unique_ptr<RunViewer> ViewerOf(const RunArguments& arguments, const Experiment& experiment,
+                                    const Config& config) {
+  if (arguments.video.empty() && !arguments.view) return nullptr;
+  KeepInputs(arguments.video, config.inputs());
+  const auto title = config.root().Find("title");
+  auto viewer = std::make_unique<RunViewer>(experiment, title ? title->Text() : "alidade run");
+  if (!arguments.video.empty()) viewer->AddVideo(arguments.video, arguments.force);
+  if (arguments.view) viewer->AddWindow();
+  return viewer;
 }
 
 /// Of the options those that a byte of the run folder depends on.
@@ -135,6 +153,7 @@ ExitCode RunConfig(const RunArguments& arguments) {
   Watchdog watchdog(arguments.frame_timeout_s);
   StopOnSignals();  // before a source that waits for its pipe is made
   Experiment experiment = BuildExperiment(config, host);
+  const std::unique_ptr<RunViewer> viewer = ViewerOf(arguments, experiment, config);
   const Recorder::Options record = RecordOf(arguments, config, folder, host);
   if (record.resume && IsFinished(folder, config, record.inputs, record.force, arguments.quiet))
     return ExitCode::kOk;
@@ -150,6 +169,7 @@ ExitCode RunConfig(const RunArguments& arguments) {
   options.observers = {&recorder};
   Follower follower(Print);
   if (arguments.follow) options.observers.push_back(&follower);
+  if (viewer) options.observers.push_back(viewer.get());
   options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
   options.stop = StopRequested;
   const RunResult result =
@@ -159,12 +179,13 @@ ExitCode RunConfig(const RunArguments& arguments) {
   if (result.status == RunStatus::kStopped) PrintNote(result.reason);
   FinishOnSignals();
   WithWhatIsKept(recorder, [&] { recorder.Finish(result); });
+  if (viewer) viewer->Close();
   if (!arguments.quiet) TellKept(recorder.resumed(), folder);
   if (!arguments.quiet && !arguments.follow) {
     const std::string table = arguments.all
                                   ? ComparisonTable(result)
                                   : internal::MainTable(result, internal::SubjectsOf(experiment));
-    Print(Summary(result, table, recorder));
+    Print(Summary(result, table, recorder, arguments.video));
   }
   return result.code;
 }
@@ -185,6 +206,13 @@ void AddRun(CLI::App& program, Action& action, const std::string& command_line) 
   command.add_flag("--quiet", arguments->quiet, "print errors only");
   command.add_flag("--follow", arguments->follow,
                    "print each estimate as it is made, a line of JSON, in place of the table");
+  command
+      .add_option("--save-video", arguments->video,
+                  "writes the images of the source, with what was measured in them and the "
+                  "estimate, as a video; needs OpenCV")
+      ->option_text("FILE")
+      ->check(IsAvi);
+  command.add_flag("--view", arguments->view, "shows the same in a window while it runs");
   AddFrameTimeout(command, arguments->frame_timeout_s);
   command.add_flag("--no-figures", arguments->no_figures, "draw no figures");
   command.add_flag("--covariances", arguments->covariances,

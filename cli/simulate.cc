@@ -7,6 +7,7 @@
 
 #include "command.h"
 #include "console.h"
+#include "video_name.h"
 #include "watchdog.h"
 
 namespace alidade::cli {
@@ -30,11 +31,6 @@ struct SimulateArguments {
   SimulateImages images;
   bool force = false, quiet = false;
 };
-
-std::string IsAvi(const std::string& name) {
-  if (std::filesystem::path(name).extension() == ".avi") return {};
-  return "'" + name + "' is not a video that can be written; expected a name like video.avi";
-}
 
 std::string IsInside(const std::string& name) {
   const std::filesystem::path path = std::filesystem::path(name).lexically_normal();

@@ -8,9 +8,12 @@ namespace alidade {
 
 std::unique_ptr<ImageWriter> OpenImageWriter(const ImageArguments& arguments,
                                              const std::filesystem::path& folder) {
+  const bool window = arguments.form == ImageArguments::Form::kWindow;
   const internal::PluginOnDemand plugin = internal::OpenOnDemand(
-      "images", folder,
-      ErrorLine({arguments.shown}, {}, "this build of alidade draws no images",
+      window ? "image_window" : "images", folder,
+      ErrorLine({arguments.shown}, {},
+                window ? "this build of alidade opens no windows"
+                       : "this build of alidade draws no images",
                 "one that found OpenCV: apt-get install libopencv-dev, then configure and build "
                 "again"));
   if (plugin.table->images == nullptr) internal::Refuse(plugin.file, "draws no images");

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "alidade/host/source.h"
+#include "alidade/record/run_view.h"
 
 namespace alidade {
 
@@ -22,21 +23,24 @@ class ImageWriter {
                    const std::vector<std::array<double, 2>>& pixels) = 0;
   /// Adds an image as it is; all are of one size.
   virtual void Add(std::int64_t number, Timestamp timestamp, const GreyImage& image) = 0;
+  /// Adds the image of a frame with what became of it, next to it the estimate.
+  virtual void Add(const RunView& view) = 0;
   /// Completes what was written. Error: kIo.
   virtual void Close() = 0;
 };
 
 /// What an image writer is made from.
 struct ImageArguments {
-  enum class Form { kVideo, kImages } form;
-  std::filesystem::path path;  ///< of the video, or of the folder of images; its folder is there
-  std::string shown;           ///< the path in messages
-  int width, height;           ///< px, of images that are drawn from points
+  enum class Form { kVideo, kImages, kWindow } form;
+  /// Of the video, or of the folder of images, whose folder is there; or the title of the window.
+  std::filesystem::path path;
+  std::string shown;  ///< the path in messages
+  int width, height;  ///< px, of images that are drawn from points
 };
 
 /// Makes the image writer of the C++ plugin in `folder`; of the one that was built with
 /// this library where "". It is loaded when it is first asked for, because its libraries are slow
-/// to load. Errors: kPlugin, kNotTrusted, kCannotCreate, kIo.
+/// to load. A window is of a plugin of its own. Errors: kPlugin, kNotTrusted, kCannotCreate, kIo.
 std::unique_ptr<ImageWriter> OpenImageWriter(const ImageArguments& arguments,
                                              const std::filesystem::path& folder = {});
 

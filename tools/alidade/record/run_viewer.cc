@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/record/run_viewer.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "alidade/record/feature_trails.h"
+#include "alidade/record/images.h"
+#include "alidade/record/map_from_above.h"
+#include "alidade/record/partial_file.h"
+#include "alidade/record/pose_file.h"
+#include "alidade/state/element_names.h"
+#include "alidade/system/truth_match.h"
+
+namespace alidade {
+namespace {
+
+constexpr std::size_t kMostElements = 8;  // of the state in numbers
+constexpr std::size_t kMostInnovations = 4;
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+/// Index of the first estimator whose estimates come with the frames. Error: kBadConfig.
+int FirstOnline(const Experiment& experiment) {
+  for (std::size_t e = 0; e < experiment.estimators.size(); ++e) {
+    if (!experiment.estimators[e].estimator->offline()) return static_cast<int>(e);
+  }
+  throw Error(ExitCode::kBadConfig,
+              ErrorLine({}, "estimators",
+                        "each waits for the last frame: none has an estimate to "
+                        "show with an image",
+                        "one that is recursive, as ekf"));
+}
+
+}  // namespace
+
+struct RunViewer::Impl {
+  const NamedEstimator* named;
+  int estimator;
+  Source* source;
+  std::vector<int> truth_of;  ///< of each block of the system, or -1
+  std::optional<internal::PosePlace> pose;
+  std::vector<std::unique_ptr<internal::PartialFile>> videos;  ///< go after their writers
+  std::vector<std::unique_ptr<ImageWriter>> writers;
+  RunView view;
+  internal::FeatureTrails trails;
+  internal::MapFromAbove above;
+  std::optional<SourceFrame> pending;  ///< its estimate may come
+
+  void Write() {
+    for (const auto& writer : writers) writer->Add(view);
+  }
+  void Show(const SourceFrame& frame, const State* state, const UpdateReport* report);
+  void TakeInnovations(const Frame& frame, const UpdateReport* report);
+  void TakeElements(const State& state, const Truth& truth);
+  void TakeSeries(Timestamp timestamp);
+  void TakeMap(const State& state, const Truth& truth);
+  /// The true value of a block, or null.
+  const double* TruthOf(std::size_t block, const Truth& truth) const {
+    const int t = block < truth_of.size() ? truth_of[block] : -1;
+    if (t < 0 || t >= std::ssize(truth)) return nullptr;
+    const std::vector<double>& values = truth[static_cast<std::size_t>(t)];
+    return values.empty() ? nullptr : values.data();
+  }
+};
+
+RunViewer::RunViewer(const Experiment& experiment, const std::string& title)
+    : impl_(std::make_unique<Impl>()) {
+  if (!experiment.source->sees() && experiment.source->views() == 0) {
+    throw Error(ExitCode::kBadConfig,
+                ErrorLine({}, "source", "it has no images, so there is nothing to show",
+                          "a source that measures in images, or draws them from `surfaces`"));
+  }
+  if (experiment.out_of_sequence.policy != OutOfSequence::kReject) {
+    throw Error(ExitCode::kBadConfig,
+                ErrorLine({}, "out_of_sequence.policy", "frames are not taken as their images come",
+                          "'reject' for a run that is shown"));
+  }
+  impl_->estimator = FirstOnline(experiment);
+  impl_->named = &experiment.estimators[static_cast<std::size_t>(impl_->estimator)];
+  impl_->source = experiment.source.get();
+  const StateLayout& layout = impl_->named->system.layout;
+  impl_->truth_of = internal::MatchTruths(layout, experiment.source->truths());
+  std::vector<StreamInfo> blocks;
+  for (const Block& block : layout.blocks()) {
+    blocks.push_back({block.name, block.geometry().ambient});
+  }
+  impl_->pose = internal::FindPose(blocks);
+  if (impl_->pose && impl_->pose->planar) impl_->pose.reset();
+  impl_->view.title = title;
+  impl_->view.estimator = impl_->named->name;
+  impl_->view.number = -1;
+}
+
+RunViewer::~RunViewer() = default;
+
+void RunViewer::AddVideo(const std::filesystem::path& file, bool force) {
+  impl_->videos.push_back(std::make_unique<internal::PartialFile>(file, force));
+  const internal::PartialFile& made = *impl_->videos.back();
+  impl_->writers.push_back(
+      OpenImageWriter({ImageArguments::Form::kVideo, made.partial(), file.string(), 0, 0}));
+}
+
+void RunViewer::AddWindow() {
+  if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) {
+    throw Error(ExitCode::kCannotCreate,
+                ErrorLine({}, "--view", "there is no display: DISPLAY is not set",
+                          "a graphical session; --save-video FILE.avi needs none"));
+  }
+  impl_->writers.push_back(OpenImageWriter(
+      {ImageArguments::Form::kWindow, "alidade: " + impl_->view.title, "--view", 0, 0}));
+}
+
+void RunViewer::OnFrame(const SourceFrame& frame) {
+  if (impl_->pending) impl_->Show(*impl_->pending, nullptr, nullptr);
+  impl_->view.image =
+      impl_->source->sees() ? impl_->source->Seen() : SeenImage{impl_->source->Draw(0)};
+  impl_->pending = frame;
+}
+
+void RunViewer::OnEstimate(int estimator, const SourceFrame& frame, const State& state,
+                           const UpdateReport& report) {
+  if (estimator == impl_->estimator && impl_->pending) impl_->Show(frame, &state, &report);
+}
+
+void RunViewer::Close() {
+  if (impl_->pending) impl_->Show(*impl_->pending, nullptr, nullptr);
+  for (const auto& writer : impl_->writers) writer->Close();
+  for (const auto& video : impl_->videos) video->Commit();
+}
+
+void RunViewer::Impl::Show(const SourceFrame& frame, const State* state,
+                           const UpdateReport* report) {
+  ++view.number;
+  view.timestamp = frame.timestamp;
+  view.features = trails.Take(frame, report);
+  TakeInnovations(frame, report);
+  view.counts = {};
+  for (const ViewFeature& one : view.features) ++view.counts[static_cast<std::size_t>(one.mark)];
+  for (const ViewInnovation& one : view.innovations) {
+    ++view.counts[static_cast<std::size_t>(one.mark)];
+  }
+  if (state != nullptr) {
+    TakeElements(*state, frame.truth);
+    if (pose) {
+      TakeMap(*state, frame.truth);
+    } else {
+      TakeSeries(frame.timestamp);
+    }
+  }
+  pending.reset();
+  Write();
+}
+
+void RunViewer::Impl::TakeInnovations(const Frame& frame, const UpdateReport* report) {
+  view.innovations.clear();
+  view.outline = Mark::kLost;
+  if (report == nullptr) return;
+  const std::vector<StreamInfo>& streams = source->streams();
+  for (const MeasurementReport& one : report->measurements()) {
+    if (one.landmark >= 0 || view.innovations.size() == kMostInnovations) continue;
+    const SensorBinding& sensor = named->system.sensors[static_cast<std::size_t>(one.sensor)];
+    const auto of_it = [&](const Measurement& m) {
+      return streams[static_cast<std::size_t>(m.stream)].name == sensor.stream;
+    };
+    const auto measured = std::ranges::find_if(frame.measurements, of_it);
+    if (measured == frame.measurements.end() || measured->values.empty()) continue;
+    double sigmas = kUnknown;
+    if (!one.innovation.empty() && !one.s.empty() && one.s[0] > 0.0) {
+      sigmas = one.innovation[0] / std::sqrt(one.s[0]);
+    }
+    view.innovations.push_back(
+        {sensor.name, internal::MarkOf(one.outcome), measured->values[0], sigmas});
+    // The target is as good as the best that was measured of it.
+    view.outline = std::min(view.outline, view.innovations.back().mark);
+  }
+}
+
+void RunViewer::Impl::TakeElements(const State& state, const Truth& truth) {
+  view.elements.clear();
+  const std::size_t system_blocks = named->system.layout.blocks().size();
+  for (std::size_t b = 0; b < system_blocks; ++b) {
+    const auto id = static_cast<BlockId>(b);
+    const Block& block = state.layout()[id];
+    if (!block.present || block.geometry().ambient != block.geometry().tangent) continue;
+    const std::vector<std::string> names = internal::TangentNames(block.name, block.space);
+    const double* const true_value = TruthOf(b, truth);
+    for (std::size_t i = 0; i < names.size() && view.elements.size() < kMostElements; ++i) {
+      view.elements.push_back({names[i], internal::UnitOf(named->system, id), state.value(id)[i],
+                               state.sigma(id, static_cast<int>(i)),
+                               true_value == nullptr ? kUnknown : true_value[i]});
+    }
+  }
+}
+
+void RunViewer::Impl::TakeSeries(Timestamp timestamp) {
+  if (view.elements.empty()) return;
+  const ViewElement& first = view.elements.front();
+  if (view.series && view.series->name != first.name) view.series.reset();
+  if (!view.series) view.series = {first.name, first.unit, {}, {}, {}, {}};
+  view.series->t_s.push_back(Seconds(timestamp));
+  view.series->value.push_back(first.value);
+  view.series->sigma.push_back(first.sigma);
+  view.series->truth.push_back(first.truth);
+}
+
+void RunViewer::Impl::TakeMap(const State& state, const Truth& truth) {
+  const auto p = static_cast<BlockId>(pose->position), q = static_cast<BlockId>(pose->orientation);
+  if (!state.layout()[p].present || !state.layout()[q].present) return;
+  const double* const w = state.value(q);
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  if (const Block& block = state.layout()[p]; block.has_covariance()) {
+    covariance = state.covariance().Block(block.tangent_offset, 3, block.tangent_offset, 3);
+  }
+  const std::vector<LandmarkEstimate> landmarks = named->estimator->landmarks();
+  above.Add(Eigen::Map<const Eigen::Vector3d>(state.value(p)), covariance,
+            Eigen::Quaterniond(w[0], w[1], w[2], w[3]).matrix(), TruthOf(pose->position, truth),
+            landmarks);
+  view.map = above.map();
+  if (named->system.landmarks) view.landmarks = static_cast<int>(landmarks.size());
+}
+
+}  // namespace alidade

@@ -120,7 +120,7 @@ std::vector<Config> ConfigsOf(const SweepArguments& arguments, const Config& con
   for (const std::string& value : variation.values) {
     try {
       Config with = config.Copy();
-      with.Set(variation.key, value, "--vary");
+      variation.Set(with, value);
       configs.push_back(std::move(with));
     } catch (const Error&) {
     }
@@ -195,7 +195,7 @@ void AddSweep(CLI::App& program, Action& action) {
       ->option_text("i/n");
   command
       .add_option("--vary", arguments->vary,
-                  "run all seeds with each of these values of a key, and compare")
+                  "run all seeds with each of these values of a key, or of KEY+KEY, and compare")
       ->option_text("KEY=v1,v2,...")
       ->check(IsNamed);
   AddOutput(command, arguments->folder,

@@ -68,6 +68,8 @@ ExitCode FinishSweep(SweepFolder& folder, const std::filesystem::path& path,
     TellKept(folder.resumed(), path);
     std::vector<std::string> names = {"table.md", "sweep.csv", "sweep.json", "runs.csv"};
     if (note.empty()) names.insert(names.begin(), "figures/vary.svg");
+    const std::string reprojection = "figures/reprojection.svg";
+    if (std::filesystem::exists(path / reprojection)) names.insert(names.begin(), reprojection);
     TellWritten(path, sweep, names);
   }
   if (!note.empty()) Log(LogLevel::kWarning, "no figure drawn: " + note);

@@ -257,6 +257,48 @@ TEST_F(SweepCli, TheErrorOfTheMapIsInTablesAndFigure) {
   EXPECT_TRUE(Contains(figure, "column('ekf.mean:map.rmse')")) << figure;
 }
 
+TEST_F(SweepCli, SeveralKeysTakeEachValueAndTheReprojectionErrorOfEachIsACurve) {
+  const std::string config = ALIDADE_SOURCE_DIR "/examples/11_slam_reprojection/config.yaml";
+  const std::string keys = "source.sigma_px+sensors.pixels.sigma_px";
+  const Outcome varied = Call({"sweep", config, "--runs", "1", "--first-seed", "3", "-o", "out",
+                               "--set", "source.max_frames=20", "--vary", keys + "=0.5,2"});
+  ASSERT_EQ(varied.code, 0) << varied.err;
+  std::string rows = keys + ",estimator,sensor,frame,runs,rms\n";
+  for (const std::string value : {"0.5", "2"}) {
+    const Outcome run = Call({"run", config, "--seed", "3", "-o", "run" + value, "--no-figures",
+                              "--set", "source.max_frames=20", "--set", "source.sigma_px=" + value,
+                              "--set", "sensors.pixels.sigma_px=" + value});
+    ASSERT_EQ(run.code, 0) << run.err;
+    std::istringstream lines(Rows(Read("run" + value + "/ekf/reprojection.csv")));
+    int frame = 0;
+    for (std::string line; std::getline(lines, line);) {
+      if (!Contains(line, ",pixels,")) continue;
+      // The first frame has no landmark before it.
+      if (frame == 0) rows += value + ",ekf,pixels,1,0,\n", frame = 1;
+      rows += value + ",ekf,pixels," + std::to_string(++frame) + ",1," +
+              line.substr(line.rfind(',') + 1) + '\n';
+    }
+  }
+  std::string found;
+  std::istringstream lines(Read("out/reprojection.csv"));
+  for (std::string line; std::getline(lines, line);) {
+    if (!Contains(line, ",known,")) found += line + '\n';
+  }
+  EXPECT_EQ(found, rows);
+  const bool drawn = Exists("out/figures/reprojection.svg");
+  EXPECT_EQ(drawn, !Contains(varied.err, "no figure drawn")) << varied.err;
+  EXPECT_EQ(drawn, Contains(varied.out, "out/figures/reprojection.svg")) << varied.out;
+}
+
+TEST_F(SweepCli, AKeyIsNotGivenTwice) {
+  for (const std::string keys : {"source.sigma_px+source.sigma_px", "source.sigma_px+", "+a"}) {
+    const Outcome varied =
+        Call({"sweep", "config.yaml", "--runs", "1", "-o", "out", "--vary", keys + "=1,2"});
+    EXPECT_EQ(varied.code, 2) << varied.err;
+    EXPECT_TRUE(Contains(varied.err, "lacks a key, or has one twice")) << varied.err;
+  }
+}
+
 TEST_F(SweepCli, ValuesAreReadWithoutTheBlanksAroundThem) {
   const Outcome varied = Call({"sweep", "config.yaml", "--runs", "1", "-o", "out", "--vary",
                                "estimators.ekf= {type: ekf} ,{type: ekf, gate: 0.99}"});

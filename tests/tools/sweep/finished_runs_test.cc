@@ -29,6 +29,8 @@ SweepRun MakeRun(std::uint64_t seed) {
                  {"zero", -0.0},
                  {"nan", std::numeric_limits<double>::quiet_NaN()},
                  {"inf", -std::numeric_limits<double>::infinity()}};
+  run.reprojection = {{"a", "pixels", "px", {1.0 / 3.0, std::nan(""), 0.5}},
+                      {"a", "pairs", "", {}}};
   return run;
 }
 
@@ -54,6 +56,10 @@ TEST(FinishedRuns, AreReadAsTheyWereWritten) {
   EXPECT_EQ(known->run.code, expected.code);
   EXPECT_EQ(known->run.reason, expected.reason);
   EXPECT_EQ(known->run.withheld, expected.withheld);
+  EXPECT_EQ(RunLine("x=1", known->run), RunLine("x=1", expected));
+  ASSERT_EQ(known->run.reprojection.size(), 2u);
+  EXPECT_EQ(known->run.reprojection[0].rms[0], 1.0 / 3.0);
+  EXPECT_TRUE(std::isnan(known->run.reprojection[0].rms[1]));
   ASSERT_EQ(known->run.estimators.size(), 1u);
   const EstimatorResult &one = known->run.estimators[0], &was = expected.estimators[0];
   EXPECT_EQ(one.name, was.name);

@@ -10,6 +10,7 @@
 #include "alidade/resume/run_inputs.h"
 #include "alidade/run/metric_rows.h"
 #include "alidade/sweep/finished_runs.h"
+#include "alidade/sweep/reprojection.h"
 #include "alidade/sweep/run_line.h"
 #include "alidade/sweep/shards.h"
 #include "alidade/sweep/sweep.h"
@@ -254,7 +255,9 @@ std::string SweepFolder::Write(const VariedSweep& sweep, const Config& config,
   WriteFailures(folder, parts, sweep.variation.key);
   if (impl_->shard && !sweep.stopped()) WriteShardRuns(folder, parts);
   folder.Write("table.md", internal::VariedMarkdown(sweep));
-  const std::string note = internal::DrawVariation(folder, sweep, stop);
+  internal::WriteReprojection(folder, sweep);
+  std::string note = internal::DrawVariation(folder, sweep, stop);
+  if (note.empty()) note = internal::DrawReprojection(folder, sweep, stop);
   impl_->Commit(sweep.stopped());
   return note;
 }

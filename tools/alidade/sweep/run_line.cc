@@ -61,6 +61,27 @@ EstimatorResult EstimatorOf(const Json& json) {
   return one;
 }
 
+std::string TextOfErrors(const FrameErrors& errors) {
+  std::string text = "{\"estimator\":" + JsonString(errors.estimator) +
+                     ",\"sensor\":" + JsonString(errors.sensor) +
+                     ",\"unit\":" + JsonString(errors.unit) + ",\"rms\":[";
+  const char* comma = "";
+  for (const double rms : errors.rms) {
+    text.append(comma).append(TextOfNumber(rms));
+    comma = ",";
+  }
+  return text + "]}";
+}
+
+FrameErrors ErrorsOf(const Json& json) {
+  FrameErrors errors{json.at("estimator").get<std::string>(),
+                     json.at("sensor").get<std::string>(),
+                     json.at("unit").get<std::string>(),
+                     {}};
+  for (const Json& rms : json.at("rms")) errors.rms.push_back(NumberOf(rms));
+  return errors;
+}
+
 SweepRun RunOf(const Json& json) {
   SweepRun run;
   run.seed = json.at("seed").get<std::uint64_t>();
@@ -69,6 +90,7 @@ SweepRun RunOf(const Json& json) {
   run.reason = json.at("reason").get<std::string>();
   run.withheld = json.at("withheld").get<bool>();
   for (const Json& one : json.at("estimators")) run.estimators.push_back(EstimatorOf(one));
+  for (const Json& one : json.at("reprojection")) run.reprojection.push_back(ErrorsOf(one));
   return run;
 }
 
@@ -83,6 +105,11 @@ std::string RunLine(const std::string& value, const SweepRun& run) {
   for (const EstimatorResult& one : run.estimators) {
     line += TextOfResult(one);
     if (&one != &run.estimators.back()) line += ',';
+  }
+  line += "],\"reprojection\":[";
+  for (const FrameErrors& one : run.reprojection) {
+    line += TextOfErrors(one);
+    if (&one != &run.reprojection.back()) line += ',';
   }
   return line + "]}\n";
 }

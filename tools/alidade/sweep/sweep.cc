@@ -14,6 +14,7 @@
 #include "alidade/resume/leftovers.h"
 #include "alidade/sweep/finished_runs.h"
 #include "alidade/sweep/processors.h"
+#include "alidade/sweep/reprojection.h"
 #include "alidade/sweep/run_line.h"
 #include "alidade/sweep/sweep_config.h"
 
@@ -107,6 +108,8 @@ class Queue {
       }
       RunOptions options;
       options.stop = options_.stop;
+      internal::ReprojectionOfRun reprojection;
+      if (!options_.value.empty()) options.observers = {&reprojection};
       RunResult result =
           options_.run ? options_.run(experiment, options) : Run(experiment, options);
       run.status = result.code == ExitCode::kDiverged ? RunStatus::kOk : result.status;
@@ -114,6 +117,7 @@ class Queue {
       run.reason = std::move(result.reason);
       run.withheld = !result.withheld.empty();
       run.estimators = std::move(result.estimators);
+      run.reprojection = reprojection.Take();
       for (EstimatorResult& one : run.estimators) one.events = {};
     } catch (...) {
       Failure failure = CaughtFailure();

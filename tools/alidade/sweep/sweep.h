@@ -41,6 +41,12 @@ struct SweepOptions {
   std::string value = {};  ///< of the varied key, in `finished`
 };
 
+/// The rms of the innovations z - h of one sensor of landmarks, frame by frame, from the first on.
+struct FrameErrors {
+  std::string estimator, sensor, unit;
+  std::vector<double> rms;  ///< not a number where a frame has none
+};
+
 /// One run of a sweep.
 struct SweepRun {
   std::uint64_t seed = 0;
@@ -48,6 +54,7 @@ struct SweepRun {
   ExitCode code = ExitCode::kOk;
   std::string reason;
   std::vector<EstimatorResult> estimators;  ///< without events
+  std::vector<FrameErrors> reprojection;    ///< of a varied sweep, the first 500 frames
   bool withheld = false;                    ///< no reference to compare with, as in RunResult
 
   /// Whether the metrics of `one` count: the run is whole, and it did not diverge.
@@ -70,14 +77,19 @@ struct SweepResult {
 /// was finished before does not give the same again; kIo where a finished run cannot be written.
 SweepResult Sweep(const Config& config, const PluginHost& host, const SweepOptions& options);
 
-/// A key of the config, and the values that it takes one after the other.
+/// Keys of the config, and the values that all of them take one after the other.
 struct Variation {
-  std::string key;                  ///< dotted, as Config::Set takes it
+  std::string key;                  ///< dotted, as Config::Set takes it; of several `KEY+KEY`
   std::vector<std::string> values;  ///< each read as YAML
 
-  /// Reads `KEY=v1,v2,v3`; commas inside brackets, braces and quotes belong to their value. Error:
-  /// kUsage where a key or a value is missing, a bracket is left open, or a value comes twice.
+  /// Reads `KEY=v1,v2,v3` or `KEY+KEY=v1,v2,v3`; commas inside brackets, braces and quotes belong
+  /// to their value. Error: kUsage where a key or a value is missing or comes twice, or a bracket
+  /// is left open.
   static Variation FromText(const std::string& text);
+  /// Each key.
+  std::vector<std::string> Keys() const;
+  /// Gives all keys the value. Errors: those of Config::Set.
+  void Set(Config& config, const std::string& value) const;
 };
 
 /// One sweep for each value, with the same seeds.

@@ -80,9 +80,9 @@ void CheckKey(const Config& config, const std::string& key) {
 }
 
 /// A config of its own for each value.
-Config ConfigWith(const Config& config, const std::string& key, const std::string& value) {
+Config ConfigWith(const Config& config, const Variation& variation, const std::string& value) {
   Config copy = config.Copy();
-  copy.Set(key, value, kOrigin);
+  variation.Set(copy, value);
   return copy;
 }
 
@@ -90,7 +90,7 @@ Config ConfigWith(const Config& config, const std::string& key, const std::strin
 void CheckValues(const Config& config, const PluginHost& host, const Variation& variation) {
   std::vector<std::string> first;
   for (const std::string& value : variation.values) {
-    const Config with = ConfigWith(config, variation.key, value);
+    const Config with = ConfigWith(config, variation, value);
     internal::CheckReadableAgain(with);
     const auto names = internal::NamesOf(BuildExperiment(with, host).estimators);
     if (first.empty()) first = names;
@@ -109,6 +109,11 @@ Variation Variation::FromText(const std::string& text) {
   const std::size_t equals = text.find('=');
   if (equals == text.npos || equals == 0) FailUsage(Quoted(text) + " varies no key");
   Variation variation{text.substr(0, equals), SplitValues(text.substr(equals + 1))};
+  std::vector<std::string> keys = variation.Keys();
+  std::ranges::sort(keys);
+  if (keys.front().empty() || std::ranges::adjacent_find(keys) != keys.end()) {
+    FailUsage(Quoted(text) + " lacks a key, or has one twice");
+  }
   const std::vector<std::string>& values = variation.values;
   for (auto value = values.begin(); value != values.end(); ++value) {
     if (value->empty()) FailUsage(Quoted(text) + " lacks a value");
@@ -119,16 +124,34 @@ Variation Variation::FromText(const std::string& text) {
   return variation;
 }
 
+std::vector<std::string> Variation::Keys() const {
+  std::vector<std::string> keys(1);
+  for (const char c : key) {
+    if (c == '+') {
+      keys.emplace_back();
+    } else {
+      keys.back() += c;
+    }
+  }
+  return keys;
+}
+
+void Variation::Set(Config& config, const std::string& value) const {
+  for (const std::string& one : Keys()) config.Set(one, value, kOrigin);
+}
+
 VariedSweep SweepOver(const Config& config, const PluginHost& host, const SweepOptions& options,
                       const Variation& variation) {
   ALIDADE_EXPECTS(!variation.values.empty());
-  CheckKey(ConfigWith(config, "alidade", "1"), variation.key);
+  Config copy = config.Copy();
+  copy.Set("alidade", "1", kOrigin);
+  for (const std::string& key : variation.Keys()) CheckKey(copy, key);
   CheckValues(config, host, variation);
   const auto uses_seed = [&](const std::string& value) {
-    return internal::UsesSeed(ConfigWith(config, variation.key, value), host, options.first_seed);
+    return internal::UsesSeed(ConfigWith(config, variation, value), host, options.first_seed);
   };
   if (options.runs > 1 && std::ranges::none_of(variation.values, uses_seed)) {
-    internal::FailUnseeded(ConfigWith(config, variation.key, variation.values.front()));
+    internal::FailUnseeded(ConfigWith(config, variation, variation.values.front()));
   }
   VariedSweep sweep{variation, {}};
   SweepOptions each = options;
@@ -141,7 +164,7 @@ VariedSweep SweepOver(const Config& config, const PluginHost& host, const SweepO
         options.progress(before * total + done, values * total);
       };
     }
-    const Config with = ConfigWith(config, variation.key, value);
+    const Config with = ConfigWith(config, variation, value);
     sweep.results.push_back(internal::SweepSeeds(with, host, each));
     if (sweep.stopped()) break;
   }

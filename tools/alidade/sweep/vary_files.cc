@@ -16,6 +16,7 @@
 #include "alidade/record/figures.h"
 #include "alidade/run/metric_rows.h"
 #include "alidade/sweep/table.h"
+#include "alidade/sweep/value_labels.h"
 
 namespace alidade {
 namespace internal {
@@ -108,9 +109,10 @@ std::string SetAxis(FigureScript& script, const VariedSweep& sweep) {
     }
     return '(' + ColumnNamed(sweep.variation.key) + ')';
   }
+  const std::vector<std::string> labels = ValueLabels(values);
   std::string tics;
   for (std::size_t v = 0; v < values.size(); ++v) {
-    tics += (v > 0 ? ", " : "") + GnuplotQuoted(values[v]) + ' ' + std::to_string(v);
+    tics += (v > 0 ? ", " : "") + GnuplotQuoted(labels[v]) + ' ' + std::to_string(v);
   }
   script.Set("set xtics (" + tics + ")\nset xrange [-0.5:" + std::to_string(values.size()) +
              " - 0.5]");

@@ -7,6 +7,7 @@
 #include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <memory>
 #include <system_error>
 
@@ -49,24 +50,22 @@ Watchdog::~Watchdog() {
 
 RunResult Watchdog::Run(Experiment& experiment, RunOptions options, const Recorder* recorder) {
   std::unique_lock lock(mutex_);
-  const auto frames = runs_.insert(runs_.end(), Frames{detail::last_call, recorder});
+  runs_.emplace_back(detail::last_call, recorder);
+  const auto frames = std::prev(runs_.end());
   lock.unlock();
   const auto remove = [&](const Frames*) {
     const std::lock_guard again(mutex_);
     runs_.erase(frames);
   };
   const std::unique_ptr<const Frames, decltype(remove)> removed(&*frames, remove);
-  options.busy = [&](bool busy) {
-    const std::lock_guard again(mutex_);
-    frames->busy = busy;
-    frames->started = frames->started || !busy;
-    frames->spell = {};
+  options.busy = [&frames = *frames](bool busy) {
+    const std::int64_t even = (frames.turns.load(std::memory_order_relaxed) | 1) + 1;
+    frames.turns.store(even + (busy ? 1 : 0), std::memory_order_relaxed);
+    if (!busy) frames.started.store(true, std::memory_order_relaxed);
   };
-  options.progress = [&, progress = options.progress](std::int64_t done, std::int64_t all) {
-    {
-      const std::lock_guard again(mutex_);
-      frames->done = done;
-    }
+  options.progress = [&frames = *frames, progress = options.progress](std::int64_t done,
+                                                                      std::int64_t all) {
+    frames.done.store(done, std::memory_order_relaxed);
     if (progress) progress(done, all);
   };
   return alidade::Run(experiment, options);
@@ -90,7 +89,10 @@ void Watchdog::Watch() {
     constexpr const char* kNoReturn = "a plugin does not return";
     if (call_ != 0) Check(of_call_, passed_s, call.slot, kNoReturn, kNoReturn);
     for (Frames& frames : runs_) {
-      if (!frames.busy) continue;
+      const std::int64_t turn = frames.turns;
+      if (turn != frames.seen) frames.spell = {};
+      frames.seen = turn;
+      if (turn % 2 == 0) continue;
       const std::string of = frames.started
                                  ? "one frame, after " + std::to_string(frames.done) + " others"
                                  : "its start";

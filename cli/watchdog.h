@@ -43,14 +43,16 @@ class Watchdog {
   struct Spell {
     double worked_s = 0.0, after_stop_s = 0.0;
   };
-  /// The frames of a run.
+  /// The frames of a run. Its thread writes without a lock: a frame may take a microsecond, and a
+  /// lock that the threads of a sweep share would be a tenth of that and more.
   struct Frames {
     const std::atomic<const void*>& last_call;  ///< of its thread
     const Recorder* recorder;                   ///< null: none
-    bool busy = false;
-    bool started = false;   ///< the work before the first frame is done
-    std::int64_t done = 0;  ///< frames
-    Spell spell = {};       ///< of what it is busy with
+    std::atomic<std::int64_t> turns{0};  ///< rises where work begins, to an odd number, or ends
+    std::atomic<bool> started{false};    ///< the work before the first frame is done
+    std::atomic<std::int64_t> done{0};   ///< frames
+    std::int64_t seen = 0;               ///< the turns at the last look
+    Spell spell = {};                    ///< of that turn
   };
 
   void Watch();

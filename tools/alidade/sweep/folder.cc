@@ -127,6 +127,13 @@ std::string SweepJson(const VariedSweep& sweep) {
                              {"values", std::move(values)}});
 }
 
+/// Adds the keys of a map to another, both in their order: far cheaper than a search for each.
+template <class Map>
+void AddKeys(const Map& from, Map& to) {
+  auto place = to.begin();
+  for (const auto& [key, value] : from) place = std::next(to.try_emplace(place, key, value));
+}
+
 /// Keys that any run has, in the order of a comparison.
 RunResult AllKeys(const Parts& parts) {
   RunResult all;
@@ -134,8 +141,8 @@ RunResult AllKeys(const Parts& parts) {
   for (const Part& part : parts) {
     for (const SweepRun& run : part.result->done) {
       for (const EstimatorResult& one : run.estimators) {
-        keys.metrics.insert(one.metrics.begin(), one.metrics.end());
-        keys.counts.insert(one.counts.begin(), one.counts.end());
+        AddKeys(one.metrics, keys.metrics);
+        AddKeys(one.counts, keys.counts);
       }
     }
   }

@@ -216,8 +216,12 @@ std::vector<SweepSummary> Summarise(const SweepResult& result) {
         if (!run.Uses(one)) continue;
         ++summary.used;
         summary.inconsistent += one.inconsistent ? 1 : 0;
+        auto place = values.begin();  // both maps are in the order of their keys
         for (const auto& [key, value] : one.metrics) {
-          if (!std::isnan(value)) values[key].push_back(value);
+          if (std::isnan(value)) continue;
+          place = values.try_emplace(place, key);
+          place->second.push_back(value);
+          ++place;
         }
       }
     }

@@ -20,9 +20,10 @@ namespace alidade {
 namespace internal {
 namespace {
 
-constexpr std::array<std::string_view, 11> kOrder = {
-    "rmse",     "lag_ms",        "coverage95",     "nees.mean",    "nees.within95",  "nis.mean",
-    "map.rmse", "map.sim3.rmse", "map.sim3.scale", "reprojection", "settling_frames"};
+constexpr std::array<std::string_view, 12> kOrder = {
+    "rmse",          "implied.rmse",   "lag_ms",       "coverage95",
+    "nees.mean",     "nees.within95",  "nis.mean",     "map.rmse",
+    "map.sim3.rmse", "map.sim3.scale", "reprojection", "settling_frames"};
 
 std::string_view KindOf(std::string_view key) { return key.substr(0, key.find(':')); }
 
@@ -108,7 +109,8 @@ Values ValuesOf(const RunResult& result, const std::string& key) {
 
 /// Errors and differences, in the unit of their block.
 bool IsError(std::string_view kind) {
-  return kind == "rmse" || kind == "final_error" || kind == "rmsd" || kind == "final_difference";
+  return kind == "rmse" || kind == "implied.rmse" || kind == "final_error" || kind == "rmsd" ||
+         kind == "final_difference";
 }
 
 /// Errors and differences of paths and maps, in m.

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 #include <numbers>
+#include <optional>
 
 #include "alidade/base/mahalanobis.h"
 #include "alidade/base/number_text.h"
@@ -15,6 +16,7 @@
 #include "alidade/base/words.h"
 #include "alidade/model/geometry.h"
 #include "alidade/run/frame_innovation.h"
+#include "alidade/run/implied_state.h"
 #include "alidade/state/element_names.h"
 #include "alidade/system/truth_match.h"
 
@@ -58,7 +60,7 @@ struct Metrics::Impl {
     std::string suffix;                   ///< "" or `@SEGMENT`
     std::vector<Tally> squares, covered;  ///< by tracked block
     std::vector<Tally> nees;              ///< by owner
-    std::vector<Tally> nis;               ///< by sensor
+    std::vector<Tally> nis, implied;      ///< by sensor
   };
 
   /// Estimate and truth of a scalar block over evenly spaced timestamps, for its lag. Only the
@@ -126,6 +128,13 @@ struct Metrics::Impl {
     }
   };
 
+  /// The state that single measurements of a sensor imply, where its truth is known.
+  struct Implied {
+    internal::ImpliedState state;
+    std::size_t truth;
+    Geometry geometry;
+  };
+
   struct Owner {
     std::string name;
     std::vector<std::size_t> tracked;
@@ -144,6 +153,7 @@ struct Metrics::Impl {
   std::vector<Tracked> tracked;
   std::vector<Owner> owners;
   std::vector<std::string> sensors, motions;
+  std::map<int, Implied> implied;  ///< by sensor
   bool has_landmarks = false, has_ransac = false;
   std::vector<Tally> far;            ///< inside: far off
   std::vector<bool> angle;           ///< sensors that measure one
@@ -160,6 +170,8 @@ struct Metrics::Impl {
   std::vector<Event> events;
 
   void Track(const System& system, const std::vector<StreamInfo>& truths);
+  void FindImplied(const System& system, const std::vector<StreamInfo>& truths);
+  void AddImplied(const Truth& truth, const std::vector<Sums*>& into, const UpdateReport& report);
   template <class ValueOf>
   void AddErrors(Timestamp timestamp, const Truth& truth, const std::vector<Sums*>& into,
                  const ValueOf& value_of);
@@ -196,6 +208,37 @@ void Metrics::Impl::Track(const System& system, const std::vector<StreamInfo>& t
     if (owner == owners.end()) owner = owners.insert(owner, {block.owner, {}});
     owner->tracked.push_back(tracked.size());
     tracked.push_back(std::move(one));
+  }
+}
+
+void Metrics::Impl::FindImplied(const System& system, const std::vector<StreamInfo>& truths) {
+  const std::vector<int> match = internal::MatchTruths(system.layout, truths);
+  for (std::size_t s = 0; s < system.sensors.size(); ++s) {
+    const SensorBinding& sensor = system.sensors[s];
+    const auto state = internal::ImpliedState::Of(system, sensor, truths);
+    if (!state) continue;
+    const int truth = match[static_cast<std::size_t>(state->block())];
+    if (truth < 0) continue;
+    implied.emplace(static_cast<int>(s), Implied{*state, static_cast<std::size_t>(truth),
+                                                 system.layout[state->block()].geometry()});
+    const std::string unit = internal::UnitOf(system, state->block());
+    if (!unit.empty()) units.emplace(sensor.name, unit);
+  }
+}
+
+void Metrics::Impl::AddImplied(const Truth& truth, const std::vector<Sums*>& into,
+                               const UpdateReport& report) {
+  if (implied.empty()) return;
+  for (const MeasurementReport& m : report.measurements()) {
+    const auto found = implied.find(m.sensor);
+    if (found == implied.end() || m.z.empty()) continue;
+    const Implied& one = found->second;
+    if (one.truth >= truth.size() || truth[one.truth].empty()) continue;
+    const std::optional<double> value = one.state.From(truth, m.z.data());
+    if (!value) continue;
+    double error = 0.0;
+    one.geometry.Minus(truth[one.truth].data(), &*value, &error);
+    for (Sums* s : into) s->implied[static_cast<std::size_t>(m.sensor)].Add(error * error);
   }
 }
 
@@ -368,7 +411,9 @@ void Metrics::Impl::Write(const Sums& s, std::map<std::string, double>& metrics)
     metrics["nees.within95:" + owners[o].name + s.suffix] = s.nees[o].share();
   }
   for (std::size_t i = 0; i < sensors.size(); ++i) {
-    if (s.nis[i].count > 0) metrics["nis.mean:" + sensors[i] + s.suffix] = s.nis[i].mean();
+    const std::string key = sensors[i] + s.suffix;
+    if (s.nis[i].count > 0) metrics["nis.mean:" + key] = s.nis[i].mean();
+    if (s.implied[i].count > 0) metrics["implied.rmse:" + key] = std::sqrt(s.implied[i].mean());
   }
 }
 
@@ -398,6 +443,7 @@ Metrics::Metrics(const NamedEstimator& named, const std::vector<StreamInfo>& tru
                  const std::vector<Segment>& segments)
     : impl_(std::make_unique<Impl>()) {
   impl_->Track(named.system, truths);
+  impl_->FindImplied(named.system, truths);
   impl_->sensors = internal::NamesOf(named.system.sensors);
   impl_->path = internal::PositionBlockOf(named.system);
   impl_->motions = internal::NamesOf(named.system.motions);
@@ -420,6 +466,7 @@ Metrics::Metrics(const NamedEstimator& named, const std::vector<StreamInfo>& tru
     const std::vector<Impl::Tally> blocks(impl_->tracked.size());
     impl_->sums.push_back({std::move(suffix), blocks, blocks,
                            std::vector<Impl::Tally>(impl_->owners.size()),
+                           std::vector<Impl::Tally>(impl_->sensors.size()),
                            std::vector<Impl::Tally>(impl_->sensors.size())});
   };
   add_sums("");
@@ -437,6 +484,7 @@ void Metrics::Add(const SourceFrame& frame, const std::vector<bool>& in_segment,
       return state.layout()[id].present ? state.value(id) : nullptr;
     });
     impl_->AddConsistency(frame.timestamp, into, state);
+    impl_->AddImplied(frame.truth, into, report);
   }
   impl_->AddReport(into, report);
 }

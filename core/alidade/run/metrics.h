@@ -18,6 +18,9 @@ namespace alidade {
 ///                       late.
 ///                       Scalar blocks, steps within 5 % of their mean, a truth that changes
 ///   coverage95:BLOCK    share of timestamps with |e| <= 1.96 sigma (scalar blocks)
+///   implied.rmse:SENSOR     the same of what single measurements of the sensor imply, without a
+///                           filter (ImpliedState): that of its block. All measurements count,
+///                           those that were gated too
 ///   nees.mean:OWNER     mean of e' C^-1 e / dof over the owner's estimated blocks of known truth,
 ///                       jointly; timestamps where C is singular or not finite are left out
 ///   nees.low:OWNER, nees.high:OWNER  bounds: nees.mean of a consistent filter lies between
@@ -40,10 +43,11 @@ namespace alidade {
 ///
 /// C = P + T is the covariance of e, T = diag(StreamInfo::sigma^2) that of the truth, which knows
 /// nothing of the filter; sigma^2 is its diagonal. An exact truth has T = 0.
-/// Over a segment the key ends in `@SEGMENT`: rmse, coverage95, nees.mean, nees.within95 and
-/// nis.mean. Counts are `OUTCOME:SENSOR`, of control inputs `inputs:ENTRY`, and of landmarks
-/// `landmarks.initialised`, `.deleted`, `.converted`, `.negative`, `.hypotheses`, `.rescued`. A
-/// truth is named like the block, `target.depth`, or like its last component where that is unique.
+/// Over a segment the key ends in `@SEGMENT`: rmse, implied.rmse, coverage95, nees.mean,
+/// nees.within95 and nis.mean. Counts are `OUTCOME:SENSOR`, of control inputs `inputs:ENTRY`, and of
+/// landmarks `landmarks.initialised`, `.deleted`, `.converted`, `.negative`, `.hypotheses`,
+/// `.rescued`. A truth is named like the block, `target.depth`, or like its last component where
+/// that is unique.
 /// A frame older than the state, as before `initial_time_s`, adds to the counts alone.
 /// A metric without a timestamp to take it from is left out; an estimate that is not finite makes
 /// its rmse infinite.

@@ -144,6 +144,7 @@ Section AlongSection(const Comparison& comparison, bool smoothed, ReportRows row
               KindsOf(comparison, rows,
                       {{"rmse", "rmse"},
                        {"ratio.rmse", "  ratio"},
+                       {"implied.rmse", "rmse of single measurements,"},
                        {"trajectory.sim3.rmse", "Sim3-aligned trajectory"},
                        {"trajectory.sim3.scale", "trajectory, scale"},
                        {"ratio.trajectory.sim3.rmse", "  ratio, Sim3-aligned trajectory"},

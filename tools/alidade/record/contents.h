@@ -69,15 +69,15 @@ struct RecordedMap {
 
 struct RecordedEstimator {
   std::string name;
-  std::vector<RecordedElement> elements;
+  std::vector<RecordedElement> elements = {};
   std::vector<RecordedSigma> sigmas = {};
   std::vector<RecordedError> errors = {};
-  std::vector<RecordedSensor> sensors;
+  std::vector<RecordedSensor> sensors = {};
   int width = 0;  ///< of the widest measurement: columns z0 .. z<width - 1>, then h, s and r
   int path = -1;  ///< the first of the three elements that landmarks are seen from; -1: none
   std::int64_t estimate_rows = 0, innovation_rows = 0, gain_rows = 0;
   std::int64_t reprojection_rows = 0;
-  RecordedMap map;
+  RecordedMap map = {};
 };
 
 struct RecordedStream {

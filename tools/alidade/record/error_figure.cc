@@ -54,7 +54,7 @@ void ComparisonPanel(FigureScript& script, const RecordedRun& run, const Recorde
       const std::string value = InFigure(error.name, error);
       script.Quartiles("E", Errors(estimator).name, "abs(" + value + ")");
       script.Set("limit = min(E_max, 6 * E_up_quartile)");
-      script.Set("least = min(least, limit)\nlargest = max(largest, limit)");
+      script.Set("least = limit > 0 ? min(least, limit) : least\nlargest = max(largest, limit)");
       script.Curve(Errors(estimator),
                    FigureScript::kTime + ('(' + value + ") with lines ls " + std::to_string(i + 1)),
                    estimator.name);

@@ -59,7 +59,8 @@ void FigureScript::Panel(std::string_view title, std::string_view y_label) {
   EndPanel();
   ++panels_;
   keys_ = 0;
-  body_ += "\nset label 1 " + GnuplotQuoted(title) + " at graph 0, 1.09 left noenhanced\n";
+  body_ += "\nset label 1 " + GnuplotQuoted(title) +
+           " at graph 0, graph 1 offset 0, 0.7 left noenhanced\n";
   body_ += "set ylabel " + GnuplotQuoted(y_label) + " noenhanced\n";
   body_ += "set autoscale y\n";
 }

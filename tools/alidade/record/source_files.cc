@@ -2,7 +2,6 @@
 #include "alidade/record/source_files.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <set>
 
@@ -11,69 +10,6 @@
 
 namespace alidade::internal {
 namespace {
-
-/// True where `binding` tells one scalar block from its measurement alone.
-bool IsInvertible(const System& system, const SensorBinding& binding) {
-  const int role = binding.model.initialised_role();
-  if (role < 0) return false;
-  for (int r = 0; r < static_cast<int>(binding.roles.size()); ++r) {
-    if (r != role && binding.roles[r].block >= 0) return false;
-  }
-  const BlockId block = binding.roles[role].block;
-  return block >= 0 && system.layout[block].geometry().ambient == 1;
-}
-
-/// The truth of each role; empty where one is unbound or has none.
-std::vector<int> TruthsOf(const System& system, const SensorBinding& binding,
-                          const std::vector<StreamInfo>& truths) {
-  const std::vector<int> match = MatchTruths(system.layout, truths);
-  std::vector<int> found;
-  for (const RoleBinding& role : binding.roles) {
-    found.push_back(role.block < 0 ? -1 : match[static_cast<std::size_t>(role.block)]);
-    if (found.back() < 0) return {};
-  }
-  return found;
-}
-
-/// Whether measurement and roles are scalars.
-bool IsScalar(const SensorBinding& binding) {
-  const auto scalar = [](const Space& space) {
-    return space.geometry.kind == GeometryKind::kVector && space.geometry.ambient == 1;
-  };
-  return scalar(binding.model.measurement()) && std::ranges::all_of(binding.model.roles(), scalar);
-}
-
-/// Values of the roles at the frame's truth; empty where one is not known there.
-std::vector<const double*> AtTruth(const SourceFrame& frame, const std::vector<int>& truths) {
-  std::vector<const double*> roles;
-  for (const int truth : truths) {
-    const auto t = static_cast<std::size_t>(truth);
-    if (t >= frame.truth.size() || frame.truth[t].empty()) return {};
-    roles.push_back(frame.truth[t].data());
-  }
-  return roles;
-}
-
-/// x of the first role with h(x) = z, all scalar and the others as they are, by Newton's method
-/// from where it is; none where that does not converge.
-std::optional<double> SolveForFirst(const SensorModel& model, std::vector<const double*> roles,
-                                    double z) {
-  constexpr int kMostSteps = 20;
-  double x = *roles[0];
-  roles[0] = &x;
-  double slope = 0.0, h = 0.0;
-  std::vector<double*> jacobians(roles.size(), nullptr);
-  jacobians[0] = &slope;
-  const std::vector<int> strides(roles.size(), 1);
-  for (int i = 0; i < kMostSteps; ++i) {
-    if (model.Linearise(roles.data(), &h, jacobians.data(), strides.data()) != Status::kOk) break;
-    const double step = (z - h) / slope;
-    if (!std::isfinite(step)) break;
-    x += step;
-    if (std::abs(step) <= 1e-12 * std::abs(x)) return x;
-  }
-  return {};
-}
 
 /// By truth and element.
 std::vector<std::vector<std::string>> TruthColumns(const Experiment& experiment) {
@@ -144,19 +80,17 @@ void SourceFiles::FindInverses(const Experiment& experiment) {
       });
       if (stream == streams_.end() || !sensors.insert(binding.name).second) continue;
       const int s = static_cast<int>(stream - streams_.begin());
-      const std::vector<int> truths = TruthsOf(system, binding, truths_);
-      if (!truths.empty()) expectations_.try_emplace(s, Expectation{binding.model, truths});
-      if (binding.model.known_size() > 0) continue;  // one curve for all would need them
-      const bool by_itself = IsInvertible(system, binding);
-      if (!by_itself && (truths.empty() || !IsScalar(binding))) continue;
-      const int role = by_itself ? binding.model.initialised_role() : 0;
-      const BlockId id = binding.roles[static_cast<std::size_t>(role)].block;
-      const Block& block = system.layout[id];
+      std::vector<int> truths = TruthsOfRoles(system, binding, truths_);
+      if (!truths.empty()) {
+        expectations_.try_emplace(s, Expectation{binding.model, std::move(truths)});
+      }
+      std::optional<ImpliedState> state = ImpliedState::Of(system, binding, truths_);
+      if (!state) continue;
+      const Block& block = system.layout[state->block()];
       const std::size_t cell = cells.try_emplace(block.name, cells.size()).first->second;
-      inverses_.push_back({s,
-                           binding.model,
-                           {binding.name, block.name, UnitOf(system, id), !by_itself, cell, 0},
-                           by_itself ? std::vector<int>{} : truths});
+      RecordedImplied recorded{binding.name, block.name, UnitOf(system, state->block()),
+                               state->rest_at_truth(), cell};
+      inverses_.push_back({s, *std::move(state), std::move(recorded)});
     }
   }
 }
@@ -191,7 +125,7 @@ void SourceFiles::AddExpected(const SourceFrame& frame, const Measurement& m) {
   const auto found = expectations_.find(m.stream);
   if (found == expectations_.end()) return;
   const auto& [model, truths] = found->second;
-  const std::vector<const double*> roles = AtTruth(frame, truths);
+  const std::vector<const double*> roles = RolesAtTruth(frame.truth, truths);
   std::vector<double> z(m.values.size());
   if (roles.empty() || model.Predict(roles.data(), z.data(), m.known.data()) != Status::kOk) {
     return;
@@ -204,23 +138,11 @@ void SourceFiles::AddExpected(const SourceFrame& frame, const Measurement& m) {
 
 void SourceFiles::AddImplied(const SourceFrame& frame, const Measurement& m) {
   for (Inverse& inverse : inverses_) {
-    if (inverse.stream != m.stream || inverse.model.Valid(m.values.data()) != Status::kOk) continue;
-    double value = 0.0;
-    if (inverse.recorded.rest_at_truth) {
-      const std::vector<const double*> roles = AtTruth(frame, inverse.truths);
-      if (roles.empty()) continue;
-      const auto solved = SolveForFirst(inverse.model, roles, m.values[0]);
-      if (!solved) continue;
-      value = *solved;
-    } else {
-      const std::vector<const double*> roles(inverse.model.roles().size(), nullptr);
-      if (inverse.model.Initialise(roles.data(), m.values.data(), &value, nullptr, nullptr) !=
-          Status::kOk) {
-        continue;
-      }
-    }
+    if (inverse.stream != m.stream) continue;
+    const std::optional<double> value = inverse.state.From(frame.truth, m.values.data());
+    if (!value) continue;
     const std::size_t before = inverse.recorded.cell;
-    implied_->Time(m.timestamp).Text(inverse.recorded.sensor).Empty(before).Number(value);
+    implied_->Time(m.timestamp).Text(inverse.recorded.sensor).Empty(before).Number(*value);
     implied_->Empty(blocks_ - before - 1).EndRow();
     ++inverse.recorded.rows;
   }

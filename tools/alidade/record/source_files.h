@@ -8,6 +8,7 @@
 #include "alidade/base/csv_file.h"
 #include "alidade/record/contents.h"
 #include "alidade/record/pose_file.h"
+#include "alidade/run/implied_state.h"
 #include "alidade/run/run.h"
 
 namespace alidade::internal {
@@ -30,9 +31,8 @@ class SourceFiles {
  private:
   struct Inverse {
     int stream;
-    SensorModel model;
+    ImpliedState state;
     RecordedImplied recorded;
-    std::vector<int> truths;  ///< by role; empty: inverted by itself
   };
   /// The first sensor of a stream whose roles all have a truth.
   struct Expectation {

@@ -53,9 +53,9 @@ struct SweepRun {
   RunStatus status = RunStatus::kOk;
   ExitCode code = ExitCode::kOk;
   std::string reason;
-  std::vector<EstimatorResult> estimators;  ///< without events
-  std::vector<FrameErrors> reprojection;    ///< of a varied sweep, the first 500 frames
-  bool withheld = false;                    ///< no reference to compare with, as in RunResult
+  std::vector<EstimatorResult> estimators;     ///< without events
+  std::vector<FrameErrors> reprojection = {};  ///< of a varied sweep, the first 500 frames
+  bool withheld = false;                       ///< no reference to compare with, as in RunResult
 
   /// Whether the metrics of `one` count: the run is whole, and it did not diverge.
   bool Uses(const EstimatorResult& one) const { return status == RunStatus::kOk && !one.diverged; }

@@ -160,22 +160,22 @@ void BlockLdl::SolveOnce(Eigen::VectorXd& b) const {
   }
 }
 
-void BlockLdl::Multiply(const Eigen::VectorXd& x, Eigen::VectorXd& y) const {
-  y.setZero(size_);
+Eigen::VectorXd BlockLdl::Multiply(const Eigen::VectorXd& x) const {
+  Eigen::VectorXd y = Eigen::VectorXd::Zero(size_);
   for (const auto& [i, j, at] : places_) {
     const int a = SizeOf(i), b = SizeOf(j);
     const Eigen::Map<const Eigen::MatrixXd> block(values_.data() + at, a, b);
     y.segment(RowOf(i), a) += block * x.segment(RowOf(j), b);
     if (i != j) y.segment(RowOf(j), b) += block.transpose() * x.segment(RowOf(i), a);
   }
+  return y;
 }
 
 Eigen::VectorXd BlockLdl::Solve(const Eigen::VectorXd& b, int refinements) const {
   Eigen::VectorXd x = b, left;
   SolveOnce(x);
   for (int i = 0; i < refinements; ++i) {
-    Multiply(x, left);
-    left = b - left;
+    left = b - Multiply(x);
     SolveOnce(left);
     x += left;
   }

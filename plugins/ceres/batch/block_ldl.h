@@ -39,6 +39,8 @@ class BlockLdl {
   bool Factorise();
   /// x = M^-1 b, refined so many times by the residual.
   Eigen::VectorXd Solve(const Eigen::VectorXd& b, int refinements = 0) const;
+  /// M x.
+  Eigen::VectorXd Multiply(const Eigen::VectorXd& x) const;
   /// The blocks (i, j) of M^-1, in their order. Each must be of a block of M, or on the diagonal.
   /// By the recursion of Takahashi [Takahashi1973].
   std::vector<Eigen::MatrixXd> Inverse(const std::vector<std::pair<int, int>>& blocks);
@@ -61,7 +63,6 @@ class BlockLdl {
   void SolveOnce(Eigen::VectorXd& b) const;
   Eigen::VectorXd Gather(const std::vector<int>& variables, int rows,
                          const Eigen::VectorXd& from) const;
-  void Multiply(const Eigen::VectorXd& x, Eigen::VectorXd& y) const;
   template <class Visit>
   void ForEachPart(const std::vector<int>& variables, Visit visit) const;
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,20 +10,25 @@
 #include "fixed_lag.h"
 #include "initialising_filter.h"
 #include "map_solve.h"
+#include "sparse_solve.h"
 
 namespace alidade::ceres_batch {
 namespace {
 
-constexpr int kManyInputs = 1000;  // of which a solve takes seconds
+constexpr int kManyInputs = 1000;         // of which a dense solve takes seconds
+constexpr int kFewInputs = 200;           // of which it takes less than 0.1 s
+constexpr int kMostInputs = 100'000'000;  // of a sparse solve, which SparseSolve may refuse before
 
 /// Maximum a posteriori of all states given all data, or given the data so far (the
-/// full-information filter): see CondensedRun for the problem, MapSolve for its solution.
+/// full-information filter): see CondensedRun for the problem, MapSolve and SparseSolve for its
+/// solution.
 class CeresBatch : public Estimator {
  public:
   CeresBatch(const System& system, bool smooths, const SolveOptions& options,
              const std::vector<StreamInfo>& streams)
       : smooths_(smooths),
-        run_(system, streams, options.max_dt_s),
+        options_(options),
+        run_(system, streams, options.max_dt_s, MayBeSparse() ? kMostInputs : kMostDenseInputs),
         solve_(options),
         state_(system.InitialState(/*reserved=*/true)),
         initialiser_(system, options.max_dt_s, streams) {}
@@ -36,7 +42,9 @@ class CeresBatch : public Estimator {
   std::vector<LandmarkEstimate> landmarks() const override { return map_; }
   Timestamp timestamp() const override { return run_.timestamp(); }
   bool diverged() const override { return failed(); }
-  bool failed() const override { return refused_ || solve_.failed(); }
+  bool failed() const override {
+    return refused_ || solve_.failed() || (sparse_ && sparse_->failed());
+  }
 
   const UpdateReport& Process(const Frame& frame) override {
     report_.Clear();
@@ -46,7 +54,7 @@ class CeresBatch : public Estimator {
     refused_ = !run_.Add(frame, filter, initialiser_.filter(), filtered_);
     if (!refused_ && !offline()) SolveSoFar(frame.timestamp);
     if (failed()) report_.events.push_back({frame.timestamp, "no_solution", WhyFailed()});
-    if (!refused_ && were_few && run_.shape().inputs > kManyInputs) {
+    if (!refused_ && !MayBeSparse() && were_few && run_.shape().inputs > kManyInputs) {
       report_.events.push_back({frame.timestamp, "slow",
                                 "more than " + std::to_string(kManyInputs) +
                                     " noise inputs: the time of a solve grows with their cube"});
@@ -56,33 +64,67 @@ class CeresBatch : public Estimator {
   }
 
   void StopWhen(const std::function<bool()>& stop) override {
-    if (offline()) solve_.StopWhen(stop);
+    if (!offline()) return;
+    stop_ = stop;
+    solve_.StopWhen(stop);
   }
 
   void Smooth(const Emit& emit) override {
     const std::size_t frames = run_.shape().frames;
     if (!refused_ && frames == 0) return;
-    const auto put = [&](std::size_t k, const Point& point) {
+    const auto put = [&](std::size_t k, const std::vector<double>& x, const Eigen::MatrixXd& p) {
       solve_.HeedStop();
-      run_.Put(k, point, solve_.u(), state_, report_);
+      run_.Put(k, x, p, state_, report_);
       if (k + 1 == frames) {
-        solve_.Note(run_.timestamp(), report_.events);
-        report_.events.push_back({run_.timestamp(), "solution", solve_.summary()});
+        Note(report_.events);
+        report_.events.push_back({run_.timestamp(), "solution", WhyFailed()});
       }
       emit(k, state_, report_);
     };
-    if (refused_ || !solve_.SolveAll(run_, filtered_, e_) || !PutAll(put)) {
+    if (refused_ || !(IsSparse() ? SmoothSparse(put) : SmoothDense(put))) {
       throw Error(ExitCode::kDiverged, WhyFailed());
     }
   }
 
  private:
-  const std::string& WhyFailed() const { return refused_ ? run_.problem() : solve_.summary(); }
+  const std::string& WhyFailed() const {
+    if (refused_) return run_.problem();
+    return sparse_ ? sparse_->summary() : solve_.summary();
+  }
+
+  bool MayBeSparse() const { return smooths_ && options_.solver != SolverKind::kDense; }
+  /// Few inputs are solved for as fast without.
+  bool IsSparse() const {
+    return MayBeSparse() &&
+           (options_.solver == SolverKind::kSparse || run_.shape().inputs > kFewInputs);
+  }
+
+  bool SmoothDense(const SparseSolve::Take& put) {
+    return solve_.SolveAll(run_, filtered_, e_) && PutAll([&](std::size_t k, const Point& point) {
+             put(k, point.x, CovarianceOf(point, solve_.u()));
+           });
+  }
+
+  bool SmoothSparse(const SparseSolve::Take& put) {
+    sparse_.emplace(run_, options_);
+    sparse_->StopWhen(stop_);
+    map_ = initialiser_.filter().landmarks();
+    return sparse_->SolveAll(filtered_) && sparse_->PutAll(put, map_);
+  }
+
+  void Note(std::vector<Event>& events) const {
+    if (!sparse_) {
+      solve_.Note(run_.timestamp(), events);
+    } else if (!sparse_->note().empty()) {
+      events.push_back({run_.timestamp(), "not_converged", sparse_->note()});
+    }
+  }
 
   void SolveSoFar(Timestamp timestamp) {
     if (!solve_.SolveAnew(run_, filtered_, e_)) return;
     PutAll([&](std::size_t k, const Point& point) {
-      if (k + 1 == run_.shape().frames) run_.Put(k, point, solve_.u(), state_, report_);
+      if (k + 1 == run_.shape().frames)
+        run_.Put(k, point.x, CovarianceOf(point, solve_.u()), state_, report_);
     });
     solve_.Note(timestamp, report_.events);
   }
@@ -96,8 +138,11 @@ class CeresBatch : public Estimator {
   }
 
   bool smooths_;
+  SolveOptions options_;
   CondensedRun run_;
   MapSolve solve_;
+  std::optional<SparseSolve> sparse_;  ///< once it is solved so
+  std::function<bool()> stop_;
   State state_;
   InitialisingFilter initialiser_;  ///< gives the trajectory to start from
   Trajectory filtered_;
@@ -113,8 +158,11 @@ EstimatorMaker Create(const EstimatorArguments& arguments) {
   Params& p = arguments.params;
   const bool smooths = p.Choice("mode", {"smoothing", "filtering"},
                                 "data of an estimate: all frames, or those up to it", 0) == 0;
-  return [smooths, options = ReadSolveOptions(p)](const System& system,
-                                                  const std::vector<StreamInfo>& streams) {
+  SolveOptions options = ReadSolveOptions(p);
+  options.solver = static_cast<SolverKind>(
+      p.Choice("solver", {"auto", "sparse", "dense"},
+               "system of an iteration; auto: sparse, but dense where there are few inputs", 0));
+  return [smooths, options](const System& system, const std::vector<StreamInfo>& streams) {
     ALIDADE_EXPECTS(!FindUnsupported(system, kSupport));
     return std::make_unique<CeresBatch>(system, smooths, options, streams);
   };

@@ -14,18 +14,22 @@
 namespace alidade::ceres_batch {
 namespace {
 
-constexpr int kMostInputs = 4000;  // the dense Jacobian of as many rows takes 128 MB
+constexpr int kMostSteps = 4000;  // of a gap between frames
 
 }  // namespace
 
-bool RunShape::robust() const {
-  return std::ranges::any_of(parts, [](const Part& p) { return p.loss.kind != LossKind::kNone; });
+Eigen::MatrixXd CovarianceOf(const Point& point, const Eigen::MatrixXd& u) {
+  if (point.s.rows() == 0) return {};
+  const Eigen::MatrixXd y = u.transpose().triangularView<Eigen::Lower>().solve(point.s.transpose());
+  return y.transpose() * y;
 }
 
-CondensedRun::CondensedRun(System system, const std::vector<StreamInfo>& streams, double max_dt_s)
+CondensedRun::CondensedRun(System system, const std::vector<StreamInfo>& streams, double max_dt_s,
+                           int most_inputs)
     : binding_(std::move(system), streams),
       initial_(binding_.initial),
-      time_(binding_.system, streams, max_dt_s) {
+      time_(binding_.system, streams, max_dt_s),
+      most_inputs_(most_inputs) {
   for (const Block& block : initial_.layout().blocks()) {
     present_.push_back(block.present);
     if (block.has_covariance()) inputs_ += block.geometry().tangent;
@@ -44,6 +48,9 @@ CondensedRun::CondensedRun(System system, const std::vector<StreamInfo>& streams
   }
   has_unit_vector_ = std::ranges::any_of(initial_.layout().blocks(), [](const Block& block) {
     return block.has_covariance() && block.geometry().kind == GeometryKind::kUnitVector;
+  });
+  robust_ = std::ranges::any_of(binding_.system.sensors, [](const SensorBinding& sensor) {
+    return sensor.loss.kind != LossKind::kNone;
   });
   held_.assign(binding_.motion_places.size(), -1);
   held_l_.resize(binding_.motion_places.size());
@@ -77,7 +84,7 @@ bool CondensedRun::Fail(std::string why) const {
 }
 
 bool CondensedRun::FailTooMany() const {
-  return Fail("more than " + std::to_string(kMostInputs) +
+  return Fail("more than " + std::to_string(most_inputs_) +
               " noise inputs: the batch solves for all of them at once; a shorter series, or a "
               "longer time between frames, has fewer");
 }
@@ -109,7 +116,7 @@ bool CondensedRun::Add(const Frame& frame, const UpdateReport& report, const Est
   if (has_landmarks()) AddLandmarks(report, filter, epoch);
   EndInterval(epoch);
   epochs_.push_back(std::move(epoch));
-  if (inputs_ > kMostInputs) return FailTooMany();
+  if (inputs_ > most_inputs_) return FailTooMany();
   if (!filter.failed()) about.push_back(ValuesOf(filter.state()));
   return true;
 }
@@ -129,9 +136,9 @@ bool CondensedRun::AddSteps(Timestamp from, Timestamp to, Epoch& epoch) {
   std::vector<Event> events;  // the filter tells them
   internal::Timeline::Piece piece;
   for (; from < to; from = piece.end) {
-    if (time_.First(from, to, events, piece) || piece.steps > kMostInputs) {
+    if (time_.First(from, to, events, piece) || piece.steps > kMostSteps) {
       return Fail("a gap before " + internal::SecondsText(piece.end) + " needs more than " +
-                  std::to_string(kMostInputs) + " steps of max_dt_s");
+                  std::to_string(kMostSteps) + " steps of max_dt_s");
     }
     for (Timestamp part = 0; part < piece.steps; ++part) {
       for (std::size_t i = 0; i < binding_.motion_places.size(); ++i) {
@@ -148,7 +155,7 @@ bool CondensedRun::AddSteps(Timestamp from, Timestamp to, Epoch& epoch) {
         if (step.begins) inputs_ += motion.model.noise_size();
         if (binding_.motion_places[i].holds) held_[i] = step.column;
       }
-      if (inputs_ > kMostInputs) return FailTooMany();
+      if (inputs_ > most_inputs_) return FailTooMany();
     }
   }
   return true;
@@ -216,15 +223,16 @@ void CondensedRun::AddFirstValues(Epoch& epoch) {
   }
 }
 
-bool CondensedRun::Begin(const double* e, bool sensitivity, Point& point) const {
+bool CondensedRun::Begin(const double* e, int columns, Point& point) const {
   const Eigen::Index n = l0_.rows(), n0 = l0_.cols();
   const Eigen::VectorXd d = d0_ + l0_ * Eigen::Map<const Eigen::VectorXd>(e, n0);
   initial_.Retract(d.data(), point.x);
   point.offset = Eigen::VectorXd::Zero(n);
   point.s.resize(0, 0);
+  point.before = 0;
   if (!internal::AllFinite(point.x)) return Fail("the initial state is not finite");
-  if (!sensitivity) return true;
-  point.s = Eigen::MatrixXd::Zero(n, inputs_);
+  if (columns < 0) return true;
+  point.s = Eigen::MatrixXd::Zero(n, columns);
   for (std::size_t id = 0; id < initial_.layout().blocks().size(); ++id) {
     const Block& block = initial_.layout().blocks()[id];
     const int at = block.tangent_offset, t = block.geometry().tangent;
@@ -248,7 +256,7 @@ bool CondensedRun::Advance(std::size_t k, const double* e, Point& point) const {
 bool CondensedRun::ForEachFrame(const Eigen::VectorXd& e, std::size_t count, const TakePoint& take,
                                 bool sensitivity) const {
   Point point;
-  if (count > 0 && !Begin(e.data(), sensitivity, point)) return false;
+  if (count > 0 && !Begin(e.data(), sensitivity ? inputs_ : -1, point)) return false;
   for (std::size_t k = 0; k < count; ++k) {
     if (!Advance(k, e.data(), point)) return false;
     take(k, point);
@@ -258,7 +266,7 @@ bool CondensedRun::ForEachFrame(const Eigen::VectorXd& e, std::size_t count, con
 
 bool CondensedRun::Evaluate(const Eigen::VectorXd& e, double* r, double* j) const {
   Point point;
-  if (!Begin(e.data(), j != nullptr, point)) return false;
+  if (!Begin(e.data(), j != nullptr ? inputs_ : -1, point)) return false;
   Eigen::VectorXd residual;
   Eigen::MatrixXd a;
   for (std::size_t k = 0; k < epochs_.size(); ++k) {
@@ -305,7 +313,7 @@ std::optional<double> CondensedRun::Freeze(const Eigen::VectorXd& e) {
   change_ = 0.0;
   Point point;
   std::vector<Point> points;
-  if (!Begin(e.data(), false, point)) return {};
+  if (!Begin(e.data(), -1, point)) return {};
   for (Epoch& epoch : epochs_) {
     if (!FreezeEpoch(epoch, e.data(), point)) return {};
     for (Factor& factor : epoch.factors) {
@@ -361,7 +369,7 @@ bool CondensedRun::StepAbout(Trajectory& trajectory, const Eigen::VectorXd& e,
   Eigen::MatrixXd a;
   Point point;
   std::vector<Point> points;
-  if (!Begin(e.data(), true, point)) return false;
+  if (!Begin(e.data(), inputs_, point)) return false;
   for (std::size_t k = 0; k < epochs_.size(); ++k) {
     if (!FreezeEpoch(epochs_[k], e.data(), point)) return false;
     if (k < trajectory.size()) PutAbout(trajectory[k], point);
@@ -415,7 +423,7 @@ bool CondensedRun::MarginaliseFirst(Eigen::VectorXd& e) {
   const Eigen::Index c = epochs_.size() > 1 ? epochs_[1].column : inputs_;
   const Eigen::Index n = initial_.covariance().size();
   Point point;
-  if (!Begin(e.data(), true, point) || !Advance(0, e.data(), point)) return false;
+  if (!Begin(e.data(), inputs_, point) || !Advance(0, e.data(), point)) return false;
   const Eigen::MatrixXd s = point.s.leftCols(c);
   Eigen::MatrixXd j = Eigen::MatrixXd::Identity(c, c), a;
   Eigen::VectorXd r = e.head(c), residual;
@@ -482,24 +490,21 @@ void CondensedRun::Shift(int columns) {
 
 // Estimates and reports.
 
-void CondensedRun::Put(std::size_t k, const Point& point, const Eigen::MatrixXd& u, State& state,
-                       UpdateReport& report) const {
+void CondensedRun::Put(std::size_t k, const std::vector<double>& x, const Eigen::MatrixXd& p,
+                       State& state, UpdateReport& report) const {
   for (const FirstValue& first : epochs_[k].first_values) {
     const Block& block = initial_.layout()[first.block];
     const int t = block.geometry().tangent;
-    state.Add(first.block, point.x.data() + block.value_offset, Eigen::MatrixXd::Zero(t, t));
+    state.Add(first.block, x.data() + block.value_offset, Eigen::MatrixXd::Zero(t, t));
   }
-  state.values() = point.x;
-  if (point.s.rows() > 0) {  // else all blocks are constant
-    const Eigen::MatrixXd y =
-        u.transpose().triangularView<Eigen::Lower>().solve(point.s.transpose());
-    state.covariance().SetBlock(0, 0, y.transpose() * y);
-  }
-  Report(k, point, report);
+  state.values() = x;
+  if (p.rows() > 0) state.covariance().SetBlock(0, 0, p);  // else all blocks are constant
+  Report(k, x, report);
 }
 
-/// What became of the measurements of frame k, seen from `point`.
-void CondensedRun::Report(std::size_t k, const Point& point, UpdateReport& report) const {
+/// What became of the measurements of frame k, seen from `values`.
+void CondensedRun::Report(std::size_t k, const std::vector<double>& values,
+                          UpdateReport& report) const {
   report = epochs_[k].report;
   for (std::size_t i = 0; i < epochs_[k].factors.size(); ++i) {
     const Factor& factor = epochs_[k].factors[i];
@@ -509,7 +514,7 @@ void CondensedRun::Report(std::size_t k, const Point& point, UpdateReport& repor
     entry.nis = std::nan("");  // what is left after smoothing is no innovation
     const bool of_landmark = factor.landmark >= 0 && factor.outcome == Outcome::kAccepted;
     if (factor.row < 0 && !of_landmark) continue;
-    std::vector<double> x = point.x;
+    std::vector<double> x = values;
     if (of_landmark) {
       x = WithLandmark(x, landmarks_[static_cast<std::size_t>(factor.landmark)].y);
     }

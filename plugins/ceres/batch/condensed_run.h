@@ -66,6 +66,9 @@ struct Point {
   std::vector<double> x;
   Eigen::MatrixXd s;
   Eigen::VectorXd offset;
+  int before = 0;  ///< the first column of s is that of this input
+
+  int ColumnOf(int input) const { return input - before; }
 };
 using TakePoint = std::function<void(std::size_t frame, const Point&)>;
 
@@ -108,6 +111,12 @@ struct Part {
   RobustLoss loss;
 };
 
+/// The dense Jacobian of as many rows takes 128 MB.
+inline constexpr int kMostDenseInputs = 4000;
+
+/// P = y' y of a point, y = U^-T S', for Cov(e) = (U'U)^-1.
+Eigen::MatrixXd CovarianceOf(const Point& point, const Eigen::MatrixXd& u);
+
 /// What a CondensedRun consists of so far.
 struct RunShape {
   int inputs, residuals;  ///< N, M
@@ -116,9 +125,8 @@ struct RunShape {
   /// A block is one: its basis turns over at z = 0, and with it what an input of its motion means,
   /// so that x(e) jumps.
   bool has_unit_vector;
+  bool robust;                  ///< a sensor has a loss
   std::span<const Part> parts;  ///< of the residuals
-
-  bool robust() const;  ///< any of them has a loss
 };
 
 /// The problem in e alone, the landmarks where they cost least given e (variable projection
@@ -155,8 +163,9 @@ struct Reduced {
 /// Source       [Bock1984] (condensing), [Bell1994] (smoothing as least squares).
 class CondensedRun {
  public:
-  /// Gaps longer than `max_dt_s` are stepped in equal parts.
-  CondensedRun(System system, const std::vector<StreamInfo>& streams, double max_dt_s);
+  /// Gaps longer than `max_dt_s` are stepped in equal parts. More than `most_inputs` are refused.
+  CondensedRun(System system, const std::vector<StreamInfo>& streams, double max_dt_s,
+               int most_inputs = kMostDenseInputs);
 
   /// Sets the time of the prior; else the first frame, or initial_time_s, does.
   void Start(Timestamp timestamp) { timestamp_ = timestamp; }
@@ -174,7 +183,8 @@ class CondensedRun {
   bool MarginaliseFirst(Eigen::VectorXd& e);
   /// Its parts are good until one of these is called.
   RunShape shape() const {
-    return {inputs_, residuals_, epochs_.size(), has_landmarks(), has_unit_vector_, parts_};
+    return {inputs_,          residuals_, epochs_.size(), has_landmarks(),
+            has_unit_vector_, robust_,    parts_};
   }
 
   /// Takes Q and R at the states of e: the largest relative change of a factor of them. Nothing
@@ -194,13 +204,13 @@ class CondensedRun {
   /// model is not defined, which ends it.
   bool ForEachFrame(const Eigen::VectorXd& e, std::size_t count, const TakePoint& take,
                     bool sensitivity = true) const;
-  /// The estimate of frame k from its point, for Cov(e) = (U'U)^-1: `state`, that of frame k - 1
-  /// from System::InitialState(reserved) on, becomes the one of frame k, with the covariance y' y
-  /// for y = U^-T S'; `report` says what became of the measurements.
-  void Put(std::size_t k, const Point& point, const Eigen::MatrixXd& u, State& state,
+  /// The estimate of frame k, x and its covariance P: `state`, that of frame k - 1 from
+  /// System::InitialState(reserved) on, becomes the one of frame k; `report` says what became of the
+  /// measurements.
+  void Put(std::size_t k, const std::vector<double>& x, const Eigen::MatrixXd& p, State& state,
            UpdateReport& report) const;
-  /// The same of `map`, the landmarks that a filter has at the end: place and covariance at e.
-  /// False where a model is not defined.
+  /// `map`, the landmarks that a filter has at the end: place and covariance at e, for
+  /// Cov(e) = (U'U)^-1. False where a model is not defined.
   bool PutMap(const Eigen::VectorXd& e, const Eigen::MatrixXd& u,
               std::vector<LandmarkEstimate>& map);
 
@@ -208,6 +218,8 @@ class CondensedRun {
   const std::string& problem() const { return problem_; }
 
  private:
+  friend class KktSystem;  // the same run, linearised by frames instead of condensed
+
   /// What a measurement tells of the roles that its sensor initialises, t in the tangent.
   struct Inverse {
     std::vector<double> y;
@@ -230,8 +242,8 @@ class CondensedRun {
   /// An observation that is not defined makes the problem so, or is skipped.
   enum class Undefined { kFails, kSkipped };
 
-  /// x_0 and S_0.
-  bool Begin(const double* e, bool sensitivity, Point& point) const;
+  /// x_0 and S_0, of so many columns; -1: without.
+  bool Begin(const double* e, int columns, Point& point) const;
   /// From frame k - 1 (or the prior) to frame k.
   bool Advance(std::size_t k, const double* e, Point& point) const;
   std::vector<double> ValuesOf(const State& state) const;
@@ -300,7 +312,7 @@ class CondensedRun {
                 LandmarkEstimate& estimate) const;
   void PutAbout(const std::vector<double>& about, Point& point) const;
   bool StepAbout(Trajectory& trajectory, const Eigen::VectorXd& e, Eigen::VectorXd& step);
-  void Report(std::size_t k, const Point& point, UpdateReport& report) const;
+  void Report(std::size_t k, const std::vector<double>& x, UpdateReport& report) const;
   bool Fail(std::string why) const;  ///< false, with this problem()
   bool FailTooMany() const;
 
@@ -319,8 +331,8 @@ class CondensedRun {
   std::vector<Part> parts_;
   Timestamp timestamp_ = kNoTimestamp;
   internal::Timeline time_;
-  int inputs_ = 0, residuals_ = 0;
-  bool has_unit_vector_ = false;
+  int inputs_ = 0, residuals_ = 0, most_inputs_;
+  bool has_unit_vector_ = false, robust_ = false;
   double change_ = 0.0;
   mutable std::string problem_;
   std::vector<Step> passed_on_;  ///< of frames that were dropped, to the next one

@@ -53,7 +53,7 @@ bool CondensedRun::Move(const Step& step, const double* e, Point& point) const {
   const internal::MotionPlace& place = binding_.motion_places[step.motion];
   const int n = motion.model.tangent_size(), n_w = motion.model.noise_size();
   const Eigen::VectorXd w = step.l * Eigen::Map<const Eigen::VectorXd>(e + step.column, n_w);
-  const bool sensitivity = point.s.size() > 0;
+  const bool sensitivity = point.s.rows() > 0;
   RowMajor f(n, n), g(n, n_w);
   std::vector<double> next(point.x.size());
   const Outcome outcome = internal::StepAt(motion, place, point.x.data(), step.u.data(), w.data(),
@@ -71,7 +71,8 @@ bool CondensedRun::Move(const Step& step, const double* e, Point& point) const {
     rows.push_back(row);
   }
   const Eigen::MatrixXd f_own = f(own, own), gl = g(own, Eigen::all) * step.l;
-  const auto before = Eigen::seqN(0, step.columns), inputs = Eigen::seqN(step.column, n_w);
+  const auto before = Eigen::seqN(0, point.ColumnOf(step.columns)),
+             inputs = Eigen::seqN(point.ColumnOf(step.column), n_w);
   point.s(rows, before) = (f_own * point.s(rows, before)).eval();
   point.s(rows, inputs) += gl;
   point.offset(rows) = (f_own * point.offset(rows)).eval();
@@ -122,11 +123,11 @@ bool CondensedRun::Initialise(const FirstValue& first, const Factor& factor, con
   Inverse inverse;
   if (!Invert(factor, d, nullptr, point, '\'' + block.name + '\'', inverse)) return false;
   std::ranges::copy(inverse.y, point.x.begin() + block.value_offset);
-  if (point.s.size() == 0 || !block.has_covariance()) return true;
+  if (point.s.rows() == 0 || !block.has_covariance()) return true;
   const int t = block.geometry().tangent;
   Eigen::MatrixXd rows = inverse.by_x * point.s;
   const Eigen::VectorXd offset = inverse.by_x * point.offset;
-  rows.middleCols(first.column, m) = inverse.by_d * factor.l;
+  rows.middleCols(point.ColumnOf(first.column), m) = inverse.by_d * factor.l;
   point.s.middleRows(block.tangent_offset, t) = rows;
   point.offset.segment(block.tangent_offset, t) = offset;
   return true;

@@ -101,7 +101,7 @@ class FixedLag : public Estimator {
   bool Keep(std::size_t count) {
     return run_.ForEachFrame(e_, count, [&](std::size_t k, const Point& point) {
       Kept kept;
-      run_.Put(k, point, solve_.u(), state_, kept.report);
+      run_.Put(k, point.x, CovarianceOf(point, solve_.u()), state_, kept.report);
       kept.state = state_;
       kept_.push_back(std::move(kept));
     });
@@ -114,7 +114,8 @@ class FixedLag : public Estimator {
     const std::size_t frames = run_.shape().frames;
     const auto take = [&](std::size_t k, const Point& point) {
       about_.push_back(point.x);
-      if (!offline() && k + 1 == frames) run_.Put(k, point, solve_.u(), state_, report_);
+      if (!offline() && k + 1 == frames)
+        run_.Put(k, point.x, CovarianceOf(point, solve_.u()), state_, report_);
     };
     solve_.FailUnless(run_.ForEachFrame(e_, frames, take), run_);
     solve_.Note(timestamp, report_.events);

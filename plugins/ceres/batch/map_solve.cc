@@ -202,17 +202,16 @@ bool GaussNewtonAt(CondensedRun& run, const Eigen::VectorXd& e, GaussNewton& at)
 
 // What makes them settle.
 
-/// `key (50 here)`
-std::string Setting(const char* key, int value) {
-  return std::string(key) + " (" + std::to_string(value) + " here)";
-}
-
 /// Freezes at e; false where a model is not defined there.
 bool CanStart(CondensedRun& run, const Eigen::VectorXd& e) {
   return run.Freeze(e) && CostAt(run, e);
 }
 
 }  // namespace
+
+std::string SettingText(const char* key, int value) {
+  return std::string(key) + " (" + std::to_string(value) + " here)";
+}
 
 SolveOptions ReadSolveOptions(Params& params) {
   SolveOptions options;
@@ -281,7 +280,7 @@ std::string MapSolve::Minimise(CondensedRun& run, Eigen::VectorXd& e) {
   int iterations = 0, outer = 0;
   bool settled = false;
   summary_ = "the noise that depends on the state did not settle; a larger " +
-             Setting("max_outer_iterations", options_.max_outer_iterations) + " may do";
+             SettingText("max_outer_iterations", options_.max_outer_iterations) + " may do";
   do {
     HeedStop();
     const ceres::Solver::Summary summary =
@@ -292,7 +291,7 @@ std::string MapSolve::Minimise(CondensedRun& run, Eigen::VectorXd& e) {
     at_.cost = summary.final_cost;
     failed_ = summary.termination_type != ceres::CONVERGENCE || !std::isfinite(summary.final_cost);
     if (failed_) summary_ = WhyNot(summary, run);
-    if (!failed_ && run.shape().robust()) iterations += IterateWeights(run, e);
+    if (!failed_ && run.shape().robust) iterations += IterateWeights(run, e);
     if (failed_) break;
     const std::optional<double> change = run.Freeze(e);
     if (!change) {
@@ -314,8 +313,9 @@ std::string MapSolve::WhyNot(const ceres::Solver::Summary& summary, const Conden
   }
   const bool by_count = summary.termination_type == ceres::NO_CONVERGENCE;
   return "not converged, " + summary.message +
-         (by_count ? " A larger " + Setting("max_iterations", options_.max_iterations) + " may do."
-                   : "") +
+         (by_count
+              ? " A larger " + SettingText("max_iterations", options_.max_iterations) + " may do."
+              : "") +
          (run.problem().empty() ? "" : " A step was refused: " + run.problem());
 }
 
@@ -342,15 +342,14 @@ bool MapSolve::TakeLastStep(CondensedRun& run, Eigen::VectorXd& e) {
 /// quadratically: what is left below Ceres' tolerances counts. A step that raises the cost is not
 /// taken, and ends it. How many steps it took.
 int MapSolve::IterateWeights(CondensedRun& run, Eigen::VectorXd& e) {
-  // Of inputs whose sigma is 1; with landmarks a step takes longer.
-  const double settled = run.shape().has_landmarks ? 1e-6 : 1e-10;
+  constexpr double kSettled = 1e-10;  // of inputs whose sigma is 1
   constexpr double kRounding = 1e-9;  // of the cost
   constexpr double kTells = 1e-8;     // sigma
   GaussNewton next;
   note_.clear();
   if (!GaussNewtonAt(run, e, at_)) return 0;
   int steps = 0;
-  for (bool lower = true; lower && at_.step.norm() > settled;) {
+  for (bool lower = true; lower && at_.step.norm() > kSettled;) {
     HeedStop();
     const bool spent = steps == options_.max_iterations;
     const Eigen::VectorXd moved = e + at_.step;
@@ -362,11 +361,12 @@ int MapSolve::IterateWeights(CondensedRun& run, Eigen::VectorXd& e) {
       std::swap(at_, next);
       ++steps;
     } else if (left > kTells) {
-      note_ = "the weights of the losses did not settle in " + std::to_string(steps) +
-              " steps: the next one is " + internal::RoundedText(left, 3) + " sigma long; " +
-              (spent ? "a larger " + Setting("max_iterations", options_.max_iterations) + " may do"
-               : defined ? "it does not lower the cost"
-                         : "then " + run.problem());
+      note_ =
+          "the weights of the losses did not settle in " + std::to_string(steps) +
+          " steps: the next one is " + internal::RoundedText(left, 3) + " sigma long; " +
+          (spent ? "a larger " + SettingText("max_iterations", options_.max_iterations) + " may do"
+           : defined ? "it does not lower the cost"
+                     : "then " + run.problem());
     }
   }
   return steps;

@@ -15,12 +15,18 @@
 
 namespace alidade::ceres_batch {
 
+/// Which way a batch is solved; automatic: sparse, but dense where there are few inputs.
+enum class SolverKind { kAutomatic, kSparse, kDense };
+
 struct SolveOptions {
+  SolverKind solver = SolverKind::kDense;
   int max_iterations = 500;
   int max_outer_iterations = 20;
   double max_dt_s = std::numeric_limits<double>::infinity();  ///< of a step of the motion
 };
 SolveOptions ReadSolveOptions(Params& params);
+/// `key (50 here)`
+std::string SettingText(const char* key, int value);
 
 /// phi(e) = |e|^2 / 2 + sum_i rho_i(|r_i(e)|) of a CondensedRun whose Q and R stand where they were
 /// frozen, about e, with the weights of robust losses as they are there.

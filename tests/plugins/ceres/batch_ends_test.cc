@@ -37,14 +37,14 @@ TEST(CeresBatchEnds, StartsAtTheGivenTime) {
   batch->Smooth([&](std::size_t, const State& state, const UpdateReport&) { expect_equal(state); });
 }
 
-// 4000 inputs fit: 1 of p.v and 1 of p.x, 3998 of steps. The first value of c.x is one more.
+// 4000 inputs fit in a dense system: 1 of p.v and 1 of p.x, 3998 of steps. The first value of c.x is one more.
 TEST(CeresBatchEnds, InputsOfFirstValuesCountToo) {
   System system = LinearSystem();
   testing::AddMotion(system, "c", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});
   AddSensor(system, "y", testing::LinearSensor(1.0, 0.3), {"c.x"});
   system.priors.back().from = "y";
   const auto process = [&](const std::vector<std::pair<int, double>>& values, bool fails) {
-    const auto batch = MakeBatch(system, "max_dt_s: 0.001\n");
+    const auto batch = MakeBatch(system, "solver: dense\nmax_dt_s: 0.001\n");
     batch->Process(FrameAt(0.0, {}));
     const UpdateReport& report = batch->Process(FrameAt(3.998, values));
     EXPECT_EQ(batch->failed(), fails);

@@ -7,7 +7,7 @@ namespace {
 // Two inputs of the prior and one of each step: the 1001st comes with the thousandth frame, which
 // is at 49.95 s.
 TEST(CeresBatchSize, WhatTakesLongIsSaidOnce) {
-  const auto batch = testing::MakeBatch(testing::LinearSystem());
+  const auto batch = testing::MakeBatch(testing::LinearSystem(), "solver: dense\n");
   std::vector<Event> events;
   for (int k = 0; k < 1100; ++k) {
     const UpdateReport& report = batch->Process(testing::FrameAt(0.05 * k, {{0, 2.0}}));

@@ -1,0 +1,964 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "kkt_system.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "alidade/system/landmark_representation.h"
+
+namespace alidade::ceres_batch {
+namespace {
+
+std::uint64_t KeyOf(int i, int j) {
+  return (static_cast<std::uint64_t>(i) << 32U) | static_cast<std::uint32_t>(j);
+}
+
+/// Symmetric, and without what rounding left below zero.
+Eigen::MatrixXd Clipped(const Eigen::MatrixXd& p) {
+  Eigen::MatrixXd symmetric = 0.5 * (p + p.transpose());
+  if (symmetric.ldlt().vectorD().minCoeff() >= 0.0) return symmetric;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(symmetric);
+  const Eigen::VectorXd positive = eigen.eigenvalues().cwiseMax(0.0);
+  return eigen.eigenvectors() * positive.asDiagonal() * eigen.eigenvectors().transpose();
+}
+
+double MedianOfPositive(std::vector<double>& values) {
+  std::erase_if(values, [](double v) { return !(v > 0.0); });
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+/// dp/dy of the point that a landmark is; none where it has no place.
+std::optional<Eigen::MatrixXd> PointJacobian(const std::vector<Space>& roles,
+                                             const std::vector<double>& y) {
+  const auto representation = RepresentationOf(roles);
+  if (!representation) return {};
+  std::vector<const double*> blocks;
+  const double* next = y.data();
+  for (const Space& role : roles) {
+    if (!role.landmark()) continue;
+    blocks.push_back(next);
+    next += role.geometry.ambient;
+  }
+  const auto point = internal::PointOf(*representation, blocks.data());
+  if (!point) return {};
+  return Eigen::MatrixXd(point->jacobian);
+}
+
+}  // namespace
+
+// Structure.
+
+KktSystem::KktSystem(CondensedRun& run) : run_(run), points_(run.landmarks_.size()) {
+  FindConstants();
+  FindNodes();
+  Build();
+}
+
+/// Which rows move, and which of them sensors read; the blocks that do not move.
+void KktSystem::FindConstants() {
+  const auto n = static_cast<std::size_t>(run_.initial_.covariance().size());
+  std::vector<bool> moves(n, false), read(n, false);
+  for (std::size_t i = 0; i < run_.binding_.motion_places.size(); ++i) {
+    if (run_.binding_.system.motions[i].model.stationary()) continue;
+    for (const int row : run_.binding_.motion_places[i].at) {
+      if (row >= 0) moves[static_cast<std::size_t>(row)] = true;
+    }
+  }
+  for (const internal::SensorPlace& place : run_.binding_.sensor_places) {
+    for (const JacobianPart& part : place.parts) {
+      std::fill_n(read.begin() + part.offset, part.size, true);
+    }
+  }
+  for (const Block& block : run_.initial_.layout().blocks()) {
+    if (!block.has_covariance()) continue;
+    std::vector<int> rows(static_cast<std::size_t>(block.geometry().tangent));
+    std::iota(rows.begin(), rows.end(), block.tangent_offset);
+    const auto first = static_cast<std::size_t>(block.tangent_offset);
+    if (moves[first]) {
+      std::vector<int>& into = read[first] ? read_rows_ : rest_rows_;
+      into.insert(into.end(), rows.begin(), rows.end());
+    } else {
+      constants_.emplace_back().rows = std::move(rows);
+    }
+  }
+  rows_ = read_rows_;
+  rows_.insert(rows_.end(), rest_rows_.begin(), rest_rows_.end());
+}
+
+void KktSystem::FindNodes() {
+  const StateLayout& layout = run_.initial_.layout();
+  const auto bear = [&](BlockId id, std::size_t node) {
+    const int offset = layout[id].tangent_offset;
+    for (std::size_t i = 0; i < constants_.size(); ++i) {
+      if (offset < 0 || constants_[i].born || constants_[i].rows.front() != offset) continue;
+      constants_[i].born = true;
+      constants_[i].node = node;
+      nodes_[node].born.push_back(i);
+    }
+  };
+  const std::vector<Epoch>& epochs = run_.epochs_;
+  bool open = false;
+  for (std::size_t k = 0; k < epochs.size(); ++k) {
+    if (!open) {
+      Node& node = nodes_.emplace_back();
+      node.first = k;
+      node.column = epochs[k].column;
+    }
+    open = !epochs[k].ends;
+    nodes_.back().last = k;
+    node_of_.push_back(nodes_.size() - 1);
+  }
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    Node& node = nodes_[k];
+    node.columns = (k + 1 < nodes_.size() ? nodes_[k + 1].column : run_.inputs_) - node.column;
+    for (std::size_t id = 0; k == 0 && id < layout.blocks().size(); ++id) {
+      if (run_.binding_.initial.layout().blocks()[id].present) bear(static_cast<BlockId>(id), 0);
+    }
+    for (std::size_t i = node.first; i <= node.last; ++i) {
+      for (const FirstValue& first : epochs[i].first_values) bear(first.block, k);
+    }
+  }
+}
+
+void KktSystem::Tie(int i, int j) {
+  if (i < 0 || j < 0) return;
+  if (i < j) std::swap(i, j);
+  const auto [at, inserted] = block_of_.try_emplace(KeyOf(i, j), 0);
+  if (inserted) at->second = ldl_.AddBlock(i, j);
+}
+
+/// Adds a term of these variables, of which those that there are none of (-1) do not count.
+void KktSystem::AddTerm(const std::vector<int>& variables) {
+  Term term{variables_.size(), blocks_.size(), 0};
+  for (const int v : variables) {
+    if (v < 0) continue;
+    variables_.push_back(v);
+    ++term.count;
+    for (int u = 0; u < term.count; ++u) {
+      const int w = variables_[term.variables + static_cast<std::size_t>(u)];
+      Tie(v, w);
+      blocks_.push_back(block_of_.at(KeyOf(std::max(v, w), std::min(v, w))));
+    }
+  }
+  terms_.push_back(term);
+}
+
+std::vector<int> KktSystem::ConstantsOf(std::size_t sensor) const {
+  std::vector<int> found;
+  for (const JacobianPart& part : run_.binding_.sensor_places[sensor].parts) {
+    for (std::size_t i = 0; i < constants_.size(); ++i) {
+      const int at = static_cast<int>(i);
+      if (constants_[i].born && constants_[i].rows.front() == part.offset &&
+          std::ranges::find(found, at) == found.end()) {
+        found.push_back(at);
+      }
+    }
+  }
+  return found;
+}
+
+bool KktSystem::ReadsStates(std::size_t sensor) const {
+  const auto moves = [this](const JacobianPart& part) {
+    return std::ranges::find(read_rows_, part.offset) != read_rows_.end();
+  };
+  return std::ranges::any_of(run_.binding_.sensor_places[sensor].parts, moves);
+}
+
+/// The variables of a state, and the rows of its tangent that each is.
+std::vector<KktSystem::Part> KktSystem::PartsOf(std::size_t k) const {
+  std::vector<Part> parts;
+  if (nodes_[k].read >= 0) parts.push_back({nodes_[k].read, &read_rows_});
+  if (nodes_[k].rest >= 0) parts.push_back({nodes_[k].rest, &rest_rows_});
+  for (const Constant& constant : constants_) {
+    if (constant.born && constant.node <= k) parts.push_back({constant.value, &constant.rows});
+  }
+  return parts;
+}
+
+void KktSystem::Build() {
+  ldl_ = {};
+  block_of_.clear();
+  terms_.clear();
+  variables_.clear();
+  blocks_.clear();
+  const auto add = [this](const std::vector<int>& rows) {
+    return rows.empty() ? -1 : ldl_.AddVariable(static_cast<int>(rows.size()));
+  };
+  for (Node& node : nodes_) {
+    node.read = add(read_rows_);
+    node.rest = add(rest_rows_);
+    node.multiplier = add(rows_);
+  }
+  for (Constant& constant : constants_) {
+    if (!constant.born) continue;
+    constant.value = add(constant.rows);
+    constant.multiplier = add(constant.rows);
+  }
+  inputs_ = run_.inputs_;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const auto size = static_cast<int>(run_.landmarks_[i].from.size());
+    points_[i].column = inputs_;
+    points_[i].variable = size > 0 ? ldl_.AddVariable(size) : -1;
+    inputs_ += size;
+  }
+  for (std::size_t k = 0; k < nodes_.size(); ++k) AddConstraints(k);
+  AddTerms();
+  ChooseOrder();
+}
+
+/// The blocks of node k, and those whose inverse its covariance takes.
+void KktSystem::AddConstraints(std::size_t k) {
+  const Node& node = nodes_[k];
+  std::vector<Part> before;
+  if (k > 0) before = PartsOf(k - 1);
+  Tie(node.multiplier, node.multiplier);
+  Tie(node.multiplier, node.read);
+  Tie(node.multiplier, node.rest);
+  if (k > 0) {
+    Tie(node.multiplier, nodes_[k - 1].read);
+    Tie(node.multiplier, nodes_[k - 1].rest);
+  }
+  for (const std::size_t i : node.born) {
+    Tie(constants_[i].multiplier, constants_[i].multiplier);
+    Tie(constants_[i].multiplier, constants_[i].value);
+  }
+  for (const Part& part : PartsOf(k)) {
+    for (const Constant& constant : constants_) {
+      if (constant.born && constant.node <= k) Tie(constant.value, part.variable);
+    }
+  }
+  // First values, a prior that ties blocks, and frames inside the node have all of it.
+  bool joint = node.first != node.last;
+  for (std::size_t i = node.first; i <= node.last; ++i) {
+    joint = joint || !run_.epochs_[i].first_values.empty();
+  }
+  if (k == 0) {
+    Eigen::MatrixXd p = run_.l0_ * run_.l0_.transpose();
+    for (const Constant& constant : constants_) p(constant.rows, constant.rows).setZero();
+    p(rows_, rows_).setZero();
+    joint = joint || (p.array() != 0.0).any();
+  }
+  if (!joint) return;
+  std::vector<int> multipliers{node.multiplier};
+  for (const std::size_t i : node.born) multipliers.push_back(constants_[i].multiplier);
+  for (const int i : multipliers) {
+    for (const int j : multipliers) Tie(i, j);
+    for (const Part& part : before) Tie(i, part.variable);
+  }
+}
+
+/// The terms in the order in which Linearise goes through them.
+void KktSystem::AddTerms() {
+  const std::size_t sensors = run_.binding_.sensor_places.size();
+  std::vector<std::vector<int>> constants(sensors);
+  landmark_constants_.clear();
+  for (std::size_t i = 0; i < sensors; ++i) {
+    constants[i] = ConstantsOf(i);
+    if (!run_.ObservesLandmarks(run_.binding_.system.sensors[i])) continue;
+    for (const int constant : constants[i]) {
+      if (std::ranges::find(landmark_constants_, constant) == landmark_constants_.end()) {
+        landmark_constants_.push_back(constant);
+      }
+    }
+  }
+  const auto with = [this](std::vector<int> variables, const std::vector<int>& more) {
+    for (const int i : more) variables.push_back(constants_[static_cast<std::size_t>(i)].value);
+    return variables;
+  };
+  for (std::size_t k = 0; k < run_.epochs_.size(); ++k) {
+    for (const Factor& factor : run_.epochs_[k].factors) {
+      if (factor.row < 0) continue;
+      const auto sensor = static_cast<std::size_t>(factor.sensor);
+      AddTerm(with({ReadsStates(sensor) ? nodes_[node_of_[k]].read : -1}, constants[sensor]));
+    }
+  }
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const MapLandmark& landmark = run_.landmarks_[i];
+    const Point3& point = points_[i];
+    const int first = landmark.first ? nodes_[node_of_[landmark.first->epoch]].read : -1;
+    AddTerm(landmark.first ? with({point.variable, first}, landmark_constants_)
+                           : std::vector<int>{point.variable});
+    for (const auto& [epoch, index] : landmark.observations) {
+      const int here = nodes_[node_of_[epoch]].read;
+      const bool tied = point.anchored && here != first;
+      AddTerm(with({point.variable, here, tied ? first : -1}, landmark_constants_));
+    }
+  }
+}
+
+/// Time order, a landmark before the last node that sees it, or minimum degree: the one with fewer
+/// flops.
+void KktSystem::ChooseOrder() {
+  std::vector<std::vector<int>> ending(nodes_.size());
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const MapLandmark& landmark = run_.landmarks_[i];
+    std::size_t last = landmark.first ? node_of_[landmark.first->epoch] : 0;
+    if (!landmark.observations.empty()) {
+      last = std::max(last, node_of_[landmark.observations.back().epoch]);
+    }
+    if (points_[i].variable >= 0) ending[last].push_back(points_[i].variable);
+  }
+  Groups groups;
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    for (const int landmark : ending[k]) groups.push_back({landmark});
+    std::vector<int>& pair = groups.emplace_back();
+    for (const int v : {nodes_[k].read, nodes_[k].rest, nodes_[k].multiplier}) {
+      if (v >= 0) pair.push_back(v);
+    }
+    if (pair.empty()) groups.pop_back();
+  }
+  for (const Constant& constant : constants_) {
+    if (constant.born) groups.push_back({constant.value, constant.multiplier});
+  }
+  Elimination time(ldl_.graph(), groups);
+  Elimination least(ldl_.graph(), MinimumDegree(ldl_.graph(), groups));
+  in_time_order_ = time.flops <= least.flops;
+  ldl_.Use(std::move(in_time_order_ ? time : least));
+}
+
+double KktSystem::bytes() const {
+  // The factor, the blocks of the matrix, and one front with its border.
+  double matrix = 0.0, front = 0.0;
+  const BlockGraph& graph = ldl_.graph();
+  const auto size = [&](int v) { return 1.0 * graph.size[static_cast<std::size_t>(v)]; };
+  for (const auto& [i, j] : graph.edges) matrix += size(i) * size(j);
+  for (const Elimination::Front& f : elimination().fronts) {
+    front = std::max(front, double(f.p + f.m) * double(f.p + f.m));
+  }
+  return 8.0 * (elimination().numbers + matrix + 3.0 * front);
+}
+
+// Values.
+
+Eigen::VectorXd KktSystem::Join(const Eigen::VectorXd& e) const {
+  Eigen::VectorXd z = Eigen::VectorXd::Zero(inputs_);
+  z.head(run_.inputs_) = e;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const MapLandmark& landmark = run_.landmarks_[i];
+    const Eigen::VectorXd& l = landmark.l.size() > 0 ? landmark.l : landmark.from;
+    z.segment(points_[i].column, l.size()) = l;
+  }
+  return z;
+}
+
+bool KktSystem::TakeLandmarks(const Eigen::VectorXd& z) {
+  std::vector<Point> points;
+  if (!run_.PointsOf(z.head(run_.inputs_), false, points)) return false;
+  Inverse place;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    MapLandmark& landmark = run_.landmarks_[i];
+    landmark.l = landmark.from = z.segment(points_[i].column, landmark.from.size());
+    if (!run_.Place(landmark, landmark.l, points, place)) return false;
+    landmark.y = place.y;
+  }
+  return true;
+}
+
+std::optional<double> KktSystem::Freeze(const Eigen::VectorXd& z) {
+  const Eigen::VectorXd e = z.head(run_.inputs_);
+  std::vector<Point> points;
+  if (!TakeLandmarks(z)) return {};
+  const std::optional<double> change = run_.Freeze(e);
+  if (!change || !TakeLandmarks(z) || !run_.PointsOf(e, false, points)) return {};
+  const bool anew = left_out_.empty();
+  joined_ = false;
+  std::size_t at = 0;
+  std::vector<double> h;
+  for (const MapLandmark& landmark : run_.landmarks_) {
+    for (const auto& [epoch, index] : landmark.observations) {
+      const Factor& factor = run_.epochs_[epoch].factors[index];
+      if (anew || left_out_[at]) {
+        const bool defined =
+            factor.l.size() > 0 && run_.See(factor, WithLandmark(points[epoch].x, landmark.y), h,
+                                            nullptr) == Outcome::kAccepted;
+        joined_ = joined_ || (!anew && defined);
+        if (anew) left_out_.push_back(!defined);
+        left_out_[at] = !defined;
+      }
+      ++at;
+    }
+  }
+  return change;
+}
+
+std::optional<double> KktSystem::Cost(const Eigen::VectorXd& z) {
+  std::vector<Point> points;
+  double cost = 0.5 * z.squaredNorm();
+  if (!run_.PointsOf(z.head(run_.inputs_), false, points) ||
+      !run_.AddPlain(points, CondensedRun::Undefined::kFails, nullptr, cost)) {
+    return {};
+  }
+  Inverse place;
+  Eigen::VectorXd r;
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const MapLandmark& landmark = run_.landmarks_[i];
+    const Eigen::VectorXd l = z.segment(points_[i].column, landmark.from.size());
+    if (!run_.Place(landmark, l, points, place)) return {};
+    for (const auto& [epoch, index] : landmark.observations) {
+      const Factor& factor = run_.epochs_[epoch].factors[index];
+      if (left_out_[at++]) continue;
+      if (!run_.Residual(factor, WithLandmark(points[epoch].x, place.y), r, nullptr)) return {};
+      cost += Rho(run_.SensorOf(factor).loss, r.norm());
+    }
+  }
+  return std::isfinite(cost) ? std::optional(cost) : std::nullopt;
+}
+
+// The system.
+
+void KktSystem::Set(int i, int j, const Eigen::MatrixXd& value) {
+  if (i < 0 || j < 0) return;
+  if (i >= j) {
+    ldl_.Block(block_of_.at(KeyOf(i, j))) = value;
+  } else {
+    ldl_.Block(block_of_.at(KeyOf(j, i))) = value.transpose();
+  }
+}
+
+/// Adds J'J and -J'r of the next term, whose variables' columns lie in J side by side.
+void KktSystem::Accumulate(const Eigen::MatrixXd& j, const Eigen::VectorXd& r) {
+  const Term& term = terms_[term_++];
+  std::size_t block = term.blocks;
+  Eigen::Index column = 0;
+  for (int a = 0; a < term.count; ++a) {
+    const int v = variables_[term.variables + static_cast<std::size_t>(a)];
+    const auto j_v = j.middleCols(column, ldl_.SizeOf(v));
+    rhs_.segment(ldl_.RowOf(v), j_v.cols()).noalias() -= j_v.transpose() * r;
+    Eigen::Index other = 0;
+    for (int b = 0; b <= a; ++b) {
+      const int u = variables_[term.variables + static_cast<std::size_t>(b)];
+      const auto j_u = j.middleCols(other, ldl_.SizeOf(u));
+      auto into = ldl_.Block(blocks_[block++]);
+      if (v >= u) {
+        into.noalias() += j_v.transpose() * j_u;
+      } else {
+        into.noalias() += j_u.transpose() * j_v;
+      }
+      other += j_u.cols();
+    }
+    column += j_v.cols();
+  }
+}
+
+bool KktSystem::Linearise(const Eigen::VectorXd& z, double damping) {
+  damping_ = damping;
+  if (!LineariseStates(z, nullptr)) return false;
+  const std::vector<bool> anchored = [this] {
+    std::vector<bool> all;
+    for (const Point3& point : points_) all.push_back(point.anchored);
+    return all;
+  }();
+  if (!LineariseLandmarks(z, false)) return false;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (points_[i].anchored == anchored[i]) continue;
+    Build();  // there are more ties than it had
+    return Linearise(z, damping);
+  }
+  ChooseScale();
+  return std::isfinite(cost_);
+}
+
+bool KktSystem::LineariseAbout(const Trajectory& trajectory, Eigen::VectorXd& z) {
+  damping_ = 0.0;
+  // A constant is one variable: about one value.
+  Trajectory about = trajectory;
+  for (std::vector<double>& x : about) {
+    for (const Block& block : run_.initial_.layout().blocks()) {
+      const bool moves = std::ranges::find(rows_, block.tangent_offset) != rows_.end();
+      if (!block.has_covariance() || moves) continue;
+      std::copy_n(about.back().data() + block.value_offset, block.geometry().ambient,
+                  x.data() + block.value_offset);
+    }
+  }
+  if (!LineariseStates(z, &about) || !run_.FreezeLandmarks(at_)) return false;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    MapLandmark& landmark = run_.landmarks_[i];
+    if (!run_.OptimiseLandmark(landmark, at_, CondensedRun::Undefined::kSkipped)) return false;
+    z.segment(points_[i].column, landmark.l.size()) = landmark.l;
+  }
+  z_ = z;
+  return LineariseLandmarks(z, true);
+}
+
+/// The states of z, frame by frame, or those of `about` where it has them; the constraints, and
+/// the measurements of no landmark.
+bool KktSystem::LineariseStates(const Eigen::VectorXd& z, const Trajectory* about) {
+  const auto n = Eigen::Index{run_.initial_.covariance().size()};
+  const Eigen::VectorXd e = z.head(run_.inputs_);
+  ldl_.SetZero();
+  rhs_.setZero(ldl_.size());
+  term_ = 0;
+  alpha_ = next_alpha_;
+  z_ = z;
+  cost_ = 0.5 * z.squaredNorm();
+  at_.resize(run_.epochs_.size());
+  Point point;
+  if (!nodes_.empty() && !run_.Begin(e.data(), nodes_.front().columns, point)) return false;
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    const Node& node = nodes_[k];
+    if (k > 0) {
+      point.s.setZero(n, n + node.columns);
+      point.s.leftCols(n).setIdentity();
+      point.offset.setZero(n);
+      point.before = node.column - static_cast<int>(n);
+    }
+    for (std::size_t i = node.first; i <= node.last; ++i) {
+      if (about != nullptr) {
+        if (!run_.FreezeEpoch(run_.epochs_[i], e.data(), point)) return false;
+        if (i < about->size()) run_.PutAbout((*about)[i], point);
+      } else if (!run_.Advance(i, e.data(), point)) {
+        return false;
+      }
+      if (i < node.last) {
+        at_[i] = point;
+      } else {
+        at_[i].x = point.x;
+      }
+    }
+    PutConstraint(k, point, z);
+    if (!LinearisePlain(node.last, about != nullptr)) return false;
+  }
+  return true;
+}
+
+void KktSystem::PutConstraint(std::size_t k, const Point& point, const Eigen::VectorXd& z) {
+  struct Rows {
+    int multiplier;
+    const std::vector<int>* rows;
+    Eigen::Index at;  ///< in B
+  };
+  Node& node = nodes_[k];
+  std::vector<Rows> all;
+  Eigen::Index count = 0;
+  const auto put = [&](int multiplier, const std::vector<int>& rows) {
+    if (rows.empty()) return;
+    all.push_back({multiplier, &rows, count});
+    count += std::ssize(rows);
+  };
+  put(node.multiplier, rows_);
+  for (const std::size_t i : node.born) put(constants_[i].multiplier, constants_[i].rows);
+  node.b.resize(count, node.columns);
+  std::vector<Part> before;
+  if (k > 0) before = PartsOf(k - 1);
+  const double damped = 1.0 / (1.0 + damping_);
+  const Eigen::VectorXd w = z.segment(node.column, node.columns);
+  for (const auto& [multiplier, rows, at] : all) {
+    const auto size = std::ssize(*rows);
+    node.b.middleRows(at, size) = point.s(*rows, Eigen::lastN(node.columns));
+    const auto b = node.b.middleRows(at, size);
+    rhs_.segment(ldl_.RowOf(multiplier), size) = alpha_ * (point.offset(*rows) - damped * (b * w));
+    for (const Part& part : before) {
+      const auto found = block_of_.find(
+          KeyOf(std::max(multiplier, part.variable), std::min(multiplier, part.variable)));
+      if (found == block_of_.end()) continue;  // nothing of it is in these rows
+      Set(multiplier, part.variable, -alpha_ * point.s(*rows, *part.rows));
+    }
+    for (const Rows& other : all) {
+      if (other.at > at || !block_of_.contains(KeyOf(std::max(multiplier, other.multiplier),
+                                                     std::min(multiplier, other.multiplier)))) {
+        continue;
+      }
+      Set(multiplier, other.multiplier,
+          -alpha_ * alpha_ * damped * b *
+              node.b.middleRows(other.at, std::ssize(*other.rows)).transpose());
+    }
+  }
+  const auto n = std::ssize(rows_), read = std::ssize(read_rows_);
+  const Eigen::MatrixXd own = alpha_ * Eigen::MatrixXd::Identity(n, n);
+  Set(node.multiplier, node.read, own.leftCols(read));
+  Set(node.multiplier, node.rest, own.rightCols(n - read));
+  for (const std::size_t i : node.born) {
+    const auto size = std::ssize(constants_[i].rows);
+    Set(constants_[i].multiplier, constants_[i].value,
+        alpha_ * Eigen::MatrixXd::Identity(size, size));
+  }
+}
+
+bool KktSystem::LinearisePlain(std::size_t k, bool about) {
+  Eigen::VectorXd r;
+  Eigen::MatrixXd a, j;
+  for (Factor& factor : run_.epochs_[k].factors) {
+    if (factor.row < 0) continue;
+    // What is not defined about the filter tells nothing yet; it may be at the solution.
+    const bool frozen = !about || run_.FreezeFactor(factor, at_[k].x);
+    if (!frozen || !run_.Residual(factor, at_[k].x, r, &a)) {
+      if (!about) return false;
+      ++term_;
+      continue;
+    }
+    const RobustLoss& loss = run_.SensorOf(factor).loss;
+    const double d = r.norm(), root = std::sqrt(Weight(loss, d));
+    cost_ += Rho(loss, d);
+    const Term& term = terms_[term_];
+    j.resize(r.size(), 0);
+    for (int i = 0; i < term.count; ++i) {
+      const int v = variables_[term.variables + static_cast<std::size_t>(i)];
+      const std::vector<int>* rows = &read_rows_;
+      for (const Constant& constant : constants_) {
+        if (constant.value == v) rows = &constant.rows;
+      }
+      const Eigen::Index before = j.cols();
+      j.conservativeResize(Eigen::NoChange, before + std::ssize(*rows));
+      j.rightCols(std::ssize(*rows)) = a(Eigen::all, *rows);
+    }
+    Accumulate(root * j, root * r);
+  }
+  return true;
+}
+
+bool KktSystem::LineariseLandmarks(const Eigen::VectorXd& z, bool about) {
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const MapLandmark& landmark = run_.landmarks_[i];
+    const Eigen::VectorXd l = z.segment(points_[i].column, landmark.from.size());
+    if (!LineariseLandmark(i, l, at, about)) return false;
+    at += landmark.observations.size();
+  }
+  return true;
+}
+
+/// C with which q = dl + C dx_f moves the point as l does, and the camera alone does not:
+///
+///   C = (J_p J_l)^-1 J_p J_x   where y = g(x_f, l) is three numbers, or is a point p(y)
+///   C = 0                      else
+Eigen::MatrixXd KktSystem::FollowOf(const MapLandmark& landmark, const Inverse& place,
+                                    int inputs) const {
+  const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(inputs, place.by_x.cols());
+  if (!landmark.first) return none;
+  Eigen::MatrixXd by_l = place.by_d, by_x = place.by_x;
+  if (by_l.rows() != inputs) {
+    const Factor& factor = run_.epochs_[landmark.first->epoch].factors[landmark.first->factor];
+    const auto jacobian = PointJacobian(run_.ModelOf(factor).roles(), place.y);
+    if (!jacobian || inputs != 3) return none;
+    by_l = *jacobian * by_l;
+    by_x = *jacobian * by_x;
+  }
+  Eigen::MatrixXd c = by_l.partialPivLu().solve(by_x);
+  return c.allFinite() ? c : none;
+}
+
+bool KktSystem::LineariseLandmark(std::size_t i, const Eigen::VectorXd& l, std::size_t at,
+                                  bool about) {
+  constexpr double kTied = 1e-7;  // of what the camera moves the point by
+  const MapLandmark& landmark = run_.landmarks_[i];
+  Point3& point = points_[i];
+  Inverse& place = point.place;
+  if (!run_.Place(landmark, l, at_, place)) return false;
+  const auto n = Eigen::Index{run_.initial_.covariance().size()};
+  std::vector<int> rows = read_rows_;  // of x_f
+  for (const int constant : landmark_constants_) {
+    const std::vector<int>& more = constants_[static_cast<std::size_t>(constant)].rows;
+    rows.insert(rows.end(), more.begin(), more.end());
+  }
+  const Eigen::Index inputs = l.size(), read = std::ssize(read_rows_), all = std::ssize(rows);
+  point.c = FollowOf(landmark, place, static_cast<int>(inputs))(Eigen::all, rows);
+  place.by_x = place.by_x(Eigen::all, rows).eval();
+  const Eigen::MatrixXd rest = place.by_x - place.by_d * point.c;  // what is left to the camera
+  const double root_mu = std::sqrt(1.0 + damping_);
+  if (inputs == 0) {
+    ++term_;
+  } else if (landmark.first) {
+    Eigen::MatrixXd j(inputs, inputs + all);
+    j << Eigen::MatrixXd::Identity(inputs, inputs), -point.c;
+    Accumulate(root_mu * j, l / root_mu);
+  } else {
+    Accumulate(root_mu * Eigen::MatrixXd::Identity(inputs, inputs), l / root_mu);
+  }
+  Eigen::VectorXd r;
+  Eigen::MatrixXd a, j;
+  for (const auto& [epoch, index] : landmark.observations) {
+    const Factor& factor = run_.epochs_[epoch].factors[index];
+    const bool out = !about && left_out_[at];
+    ++at;
+    if (out || !run_.Residual(factor, WithLandmark(at_[epoch].x, place.y), r, &a)) {
+      if (!out && !about) return false;
+      ++term_;
+      continue;
+    }
+    const RobustLoss& loss = run_.SensorOf(factor).loss;
+    const double d = r.norm(), root = std::sqrt(Weight(loss, d));
+    cost_ += Rho(loss, d);
+    const auto a_y = a.rightCols(a.cols() - n);
+    const bool here = landmark.first && landmark.first->epoch == epoch;
+    const bool tied = point.anchored && !here && read > 0;
+    j.resize(r.size(), inputs + all + (tied ? read : 0));
+    j.leftCols(inputs).noalias() = a_y * place.by_d;
+    j.middleCols(inputs, read) = a(Eigen::all, read_rows_);
+    Eigen::Index column = inputs + read;
+    for (Eigen::Index c = read; c < all; ++c) {
+      j.col(inputs + c) = a.col(rows[static_cast<std::size_t>(c)]);
+    }
+    if (landmark.first) {
+      const Eigen::MatrixXd left = a_y * rest;
+      if (here) {
+        j.middleCols(inputs, all) += left;
+      } else if (tied) {
+        // In the order of the term: q, the camera here, the first one, constants.
+        const Eigen::MatrixXd constants = j.middleCols(column, all - read);
+        j.middleCols(column, read) = left.leftCols(read);
+        j.middleCols(column + read, all - read) = constants + left.rightCols(all - read);
+      } else {
+        point.anchored = point.anchored || left.norm() > kTied * (a_y * place.by_x).norm();
+      }
+    }
+    j *= root;
+    r *= root;
+    Accumulate(j, r);
+  }
+  return true;
+}
+
+/// alpha for the next time.
+void KktSystem::ChooseScale() {
+  std::vector<double> h, q;
+  for (const Node& node : nodes_) {
+    for (Eigen::Index i = 0; i < node.b.rows(); ++i) q.push_back(node.b.row(i).squaredNorm());
+    if (node.read < 0) continue;
+    const auto found = block_of_.find(KeyOf(node.read, node.read));
+    if (found == block_of_.end()) continue;
+    const Eigen::VectorXd diagonal = ldl_.Block(found->second).diagonal();
+    h.insert(h.end(), diagonal.begin(), diagonal.end());
+  }
+  const double of_h = MedianOfPositive(h), of_q = MedianOfPositive(q);
+  next_alpha_ = of_h > 0.0 && of_q > 0.0 ? std::sqrt(of_h / of_q) : 1.0;
+}
+
+/// Of the rows of B.
+Eigen::VectorXd KktSystem::Multipliers(const Node& node) const {
+  Eigen::VectorXd lambda(node.b.rows());
+  Eigen::Index at = 0;
+  const auto put = [&](int variable) {
+    if (variable < 0) return;
+    const int size = ldl_.SizeOf(variable);
+    lambda.segment(at, size) = solution_.segment(ldl_.RowOf(variable), size);
+    at += size;
+  };
+  put(node.multiplier);
+  for (const std::size_t i : node.born) put(constants_[i].multiplier);
+  return lambda;
+}
+
+bool KktSystem::Solve() {
+  constexpr int kRefinements = 1;
+  if (!ldl_.Factorise()) return run_.Fail("the batch has a singular pivot");
+  solution_ = ldl_.Solve(rhs_, kRefinements);
+  if (!solution_.allFinite()) return run_.Fail("the step of the batch is not finite");
+  step_.resize(inputs_);
+  Eigen::VectorXd states = solution_;  // and no multipliers
+  const auto drop = [&](int variable) {
+    if (variable >= 0) states.segment(ldl_.RowOf(variable), ldl_.SizeOf(variable)).setZero();
+  };
+  for (const Node& node : nodes_) {
+    const auto w = z_.segment(node.column, node.columns);
+    step_.segment(node.column, node.columns) =
+        (alpha_ * (node.b.transpose() * Multipliers(node)) - w) / (1.0 + damping_);
+    drop(node.multiplier);
+  }
+  for (const Constant& constant : constants_) drop(constant.multiplier);
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Point3& point = points_[i];
+    if (point.variable < 0) continue;
+    const int size = ldl_.SizeOf(point.variable);
+    auto l = step_.segment(point.column, size);
+    l = solution_.segment(ldl_.RowOf(point.variable), size);
+    const MapLandmark& landmark = run_.landmarks_[i];
+    if (landmark.first) l -= point.c * CameraOf(landmark, solution_);
+  }
+  // dz' (A + mu I) dz: that of e, and in the states that of r and l.
+  decrement_ =
+      (1.0 + damping_) * step_.head(run_.inputs_).squaredNorm() + states.dot(ldl_.Multiply(states));
+  return true;
+}
+
+/// The part of x_f that a landmark follows.
+Eigen::VectorXd KktSystem::CameraOf(const MapLandmark& landmark,
+                                    const Eigen::VectorXd& from) const {
+  std::vector<int> variables{nodes_[node_of_[landmark.first->epoch]].read};
+  for (const int i : landmark_constants_) {
+    variables.push_back(constants_[static_cast<std::size_t>(i)].value);
+  }
+  Eigen::VectorXd camera;
+  for (const int v : variables) {
+    if (v < 0) continue;
+    const Eigen::Index before = camera.size();
+    camera.conservativeResize(before + ldl_.SizeOf(v));
+    camera.tail(ldl_.SizeOf(v)) = from.segment(ldl_.RowOf(v), ldl_.SizeOf(v));
+  }
+  return camera;
+}
+
+void KktSystem::Move(Trajectory& trajectory) const {
+  const auto n = Eigen::Index{run_.initial_.covariance().size()};
+  trajectory.resize(at_.size());
+  Eigen::VectorXd before = Eigen::VectorXd::Zero(n), now;
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    const Node& node = nodes_[k];
+    now.setZero(n);
+    for (const Part& part : PartsOf(k)) {
+      now(*part.rows) = solution_.segment(ldl_.RowOf(part.variable), ldl_.SizeOf(part.variable));
+    }
+    const auto w = step_.segment(node.column, node.columns);
+    for (std::size_t i = node.first; i <= node.last; ++i) {
+      Eigen::VectorXd d = now;
+      if (i < node.last) {
+        d = at_[i].offset + at_[i].s.rightCols(node.columns) * w;
+        if (k > 0) d += at_[i].s.leftCols(n) * before;
+      }
+      trajectory[i] = at_[i].x;
+      for (const Block& block : run_.initial_.layout().blocks()) {
+        if (!block.has_covariance()) continue;
+        double* const x = trajectory[i].data() + block.value_offset;
+        block.geometry().Plus(x, d.data() + block.tangent_offset, x);
+      }
+    }
+    before = now;
+  }
+}
+
+// Covariances.
+
+void KktSystem::Invert() {
+  std::vector<std::pair<int, int>> wanted;
+  found_.clear();
+  const auto want = [&](int i, int j) {
+    if (i < 0 || j < 0) return;
+    if (found_.try_emplace(KeyOf(std::max(i, j), std::min(i, j)), wanted.size()).second) {
+      wanted.emplace_back(std::max(i, j), std::min(i, j));
+    }
+  };
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    const Node& node = nodes_[k];
+    const std::vector<Part> parts = PartsOf(k);
+    for (const Part& a : parts) {
+      for (const Part& b : parts) want(a.variable, b.variable);
+    }
+    if (node.first == node.last) continue;
+    std::vector<int> multipliers{node.multiplier};
+    for (const std::size_t i : node.born) multipliers.push_back(constants_[i].multiplier);
+    for (const int i : multipliers) {
+      for (const int j : multipliers) want(i, j);
+      if (k == 0) continue;
+      for (const Part& part : PartsOf(k - 1)) want(i, part.variable);
+    }
+  }
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const MapLandmark& landmark = run_.landmarks_[i];
+    want(points_[i].variable, points_[i].variable);
+    if (!landmark.first) continue;
+    want(points_[i].variable, nodes_[node_of_[landmark.first->epoch]].read);
+    for (const int constant : landmark_constants_) {
+      want(points_[i].variable, constants_[static_cast<std::size_t>(constant)].value);
+    }
+  }
+  inverse_ = ldl_.Inverse(wanted);
+}
+
+/// The covariance of two variables.
+Eigen::MatrixXd KktSystem::Found(int i, int j) const {
+  const Eigen::MatrixXd& block = inverse_[found_.at(KeyOf(std::max(i, j), std::min(i, j)))];
+  return i >= j ? block : Eigen::MatrixXd(block.transpose());
+}
+
+/// P of node k.
+Eigen::MatrixXd KktSystem::JointOf(std::size_t k) const {
+  const auto n = Eigen::Index{run_.initial_.covariance().size()};
+  Eigen::MatrixXd p = Eigen::MatrixXd::Zero(n, n);
+  const std::vector<Part> parts = PartsOf(k);
+  for (const Part& a : parts) {
+    for (const Part& b : parts) p(*a.rows, *b.rows) = Found(a.variable, b.variable);
+  }
+  if (k > 0) return p;
+  // What the prior knows exactly has no variance, not that of rounding.
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    if (nodes_[0].b.row(static_cast<Eigen::Index>(i)).any()) continue;
+    p.row(rows_[i]).setZero();
+    p.col(rows_[i]).setZero();
+  }
+  return p;
+}
+
+/// Of a frame inside a node, x = F x_{k-1} + B w:  Cov(w) = I + B' L B, Cov(x_{k-1}, w) = M B, where
+/// L and M are the blocks of the inverse of lambda_k, and of x_{k-1} and lambda_k.
+Eigen::MatrixXd KktSystem::Covariance(std::size_t frame) const {
+  const std::size_t k = node_of_[frame];
+  const Node& node = nodes_[k];
+  if (frame == node.last) return Clipped(JointOf(k));
+  const auto n = Eigen::Index{run_.initial_.covariance().size()};
+  std::vector<int> multipliers;
+  if (node.multiplier >= 0) multipliers.push_back(node.multiplier);
+  for (const std::size_t i : node.born) multipliers.push_back(constants_[i].multiplier);
+  Eigen::MatrixXd of_w = Eigen::MatrixXd::Identity(node.columns, node.columns);
+  Eigen::MatrixXd cross = Eigen::MatrixXd::Zero(n, node.columns);
+  Eigen::Index at = 0;
+  for (const int i : multipliers) {
+    const auto b_i = node.b.middleRows(at, ldl_.SizeOf(i));
+    Eigen::Index other = 0;
+    for (const int j : multipliers) {
+      const auto b_j = node.b.middleRows(other, ldl_.SizeOf(j));
+      of_w += alpha_ * alpha_ * b_i.transpose() * Found(i, j) * b_j;
+      other += b_j.rows();
+    }
+    if (k > 0) {
+      for (const Part& part : PartsOf(k - 1)) {
+        cross(*part.rows, Eigen::all) += alpha_ * Found(part.variable, i) * b_i;
+      }
+    }
+    at += b_i.rows();
+  }
+  const Eigen::MatrixXd& s = at_[frame].s;
+  const Eigen::MatrixXd by_w = s.rightCols(node.columns);
+  Eigen::MatrixXd p = by_w * of_w * by_w.transpose();
+  if (k > 0) {
+    const Eigen::MatrixXd f = s.leftCols(n), fc = f * cross * by_w.transpose();
+    p += f * JointOf(k - 1) * f.transpose() + fc + fc.transpose();
+  }
+  return Clipped(p);
+}
+
+Eigen::MatrixXd KktSystem::LandmarkCovariance(std::size_t i) const {
+  const MapLandmark& landmark = run_.landmarks_[i];
+  const Point3& point = points_[i];
+  const Eigen::MatrixXd own = Found(point.variable, point.variable);
+  const Eigen::MatrixXd& by_l = point.place.by_d;
+  if (!landmark.first) return Clipped(by_l * own * by_l.transpose());
+  std::vector<int> variables{nodes_[node_of_[landmark.first->epoch]].read};
+  for (const int constant : landmark_constants_) {
+    variables.push_back(constants_[static_cast<std::size_t>(constant)].value);
+  }
+  std::erase(variables, -1);
+  variables.insert(variables.begin(), point.variable);
+  Eigen::MatrixXd j(by_l.rows(), by_l.cols() + point.c.cols());
+  j << by_l, point.place.by_x - by_l * point.c;
+  Eigen::MatrixXd p = Eigen::MatrixXd::Zero(j.cols(), j.cols());
+  Eigen::Index row = 0;
+  for (const int a : variables) {
+    Eigen::Index column = 0;
+    for (const int b : variables) {
+      p.block(row, column, ldl_.SizeOf(a), ldl_.SizeOf(b)) = Found(a, b);
+      column += ldl_.SizeOf(b);
+    }
+    row += ldl_.SizeOf(a);
+  }
+  return Clipped(j * p * j.transpose());
+}
+
+void KktSystem::PutMap(std::vector<LandmarkEstimate>& map) const {
+  for (LandmarkEstimate& estimate : map) {
+    const auto found = std::ranges::find_if(run_.landmarks_, [&](const MapLandmark& landmark) {
+      return landmark.id == estimate.id && landmark.generation == estimate.generation;
+    });
+    if (found == run_.landmarks_.end() || found->from.size() == 0) continue;  // known exactly
+    const auto i = static_cast<std::size_t>(found - run_.landmarks_.begin());
+    run_.Describe(*found, LandmarkCovariance(i), estimate);
+  }
+}
+
+}  // namespace alidade::ceres_batch

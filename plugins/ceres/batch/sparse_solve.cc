@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sparse_solve.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "alidade/base/error.h"
+#include "alidade/base/number_text.h"
+
+namespace alidade::ceres_batch {
+
+SparseSolve::SparseSolve(CondensedRun& run, const SolveOptions& options)
+    : run_(run), options_(options), kkt_(run) {}
+
+void SparseSolve::HeedStop() const {
+  if (stop_ && stop_()) throw Error(ExitCode::kStopped, "stopped while the batch was solved");
+}
+
+bool SparseSolve::TooLarge() {
+  constexpr double kMostBytes = 16e9, kMostFlops = 1e13;
+  if (kkt_.bytes() <= kMostBytes && flops() <= kMostFlops) return false;
+  summary_ = "an iteration would take " + internal::RoundedText(flops(), 2) + " flops and " +
+             internal::RoundedText(kkt_.bytes() * 1e-9, 2) +
+             " GB, more than the batch is made for (1e13, 16 GB): a shorter series has fewer";
+  return true;
+}
+
+bool SparseSolve::SolveAll(const Trajectory& about) {
+  note_.clear();
+  if (TooLarge()) {
+    failed_ = true;
+    return false;
+  }
+  if (!Start(about)) {
+    failed_ = true;
+    summary_ = "nowhere to start: " + run_.problem();
+    return false;
+  }
+  failed_ = !Minimise();
+  const std::string cost = "cost " + internal::RoundedText(kkt_.cost(), 9) + ", " +
+                           std::to_string(iterations_) + " iterations in " +
+                           std::to_string(solves_) + (solves_ == 1 ? " solve: " : " solves: ");
+  summary_ = cost + (failed_ ? summary_ : "converged") + "; sparse, " +
+             (kkt_.in_time_order() ? "in the order of time, " : "in order of minimum degree, ") +
+             internal::RoundedText(flops(), 2) + " flops an iteration";
+  return !failed_ || (kkt_.Linearise(z_, 0.0) && kkt_.Solve());
+}
+
+/// From the problem linearised about the filter; where that leaves the domain of a model, from
+/// z = 0.
+bool SparseSolve::Start(const Trajectory& about) {
+  constexpr int kMostPasses = 20;
+  constexpr double kSettled = 1e-9;
+  const RunShape shape = run_.shape();
+  Trajectory trajectory = about;
+  z_ = kkt_.Join(Eigen::VectorXd::Zero(shape.inputs));
+  bool linearised = false;
+  for (int pass = 0; pass < kMostPasses; ++pass) {
+    if (!kkt_.LineariseAbout(trajectory, z_) || !kkt_.Solve()) break;
+    linearised = true;
+    z_ += kkt_.step();
+    if (!shape.has_unit_vector || kkt_.step().norm() <= kSettled) break;
+    kkt_.Move(trajectory);
+  }
+  if (linearised && kkt_.Freeze(z_) && kkt_.Cost(z_)) return true;
+  z_ = kkt_.Join(Eigen::VectorXd::Zero(shape.inputs));
+  return kkt_.Freeze(z_) && kkt_.Cost(z_);
+}
+
+/// Until Q and R settle, and no observation is left out that is defined. In summary_, why it failed.
+bool SparseSolve::Minimise() {
+  constexpr double kSettled = 1e-9;
+  while (true) {
+    ++solves_;
+    if (!Descend()) return false;
+    const std::optional<double> change = kkt_.Freeze(z_);
+    if (!change) {
+      summary_ = run_.problem();
+      return false;
+    }
+    if (*change <= kSettled && !kkt_.joined()) return true;
+    if (solves_ >= options_.max_outer_iterations) {
+      summary_ = "the noise that depends on the state did not settle; a larger " +
+                 SettingText("max_outer_iterations", options_.max_outer_iterations) + " may do";
+      return false;
+    }
+  }
+}
+
+/// Levenberg-Marquardt: with the gain ratio g of a step that is taken,
+///
+///   mu <- mu max(1/3, 1 - (2 g - 1)^3),   and of one that is not, mu <- mu nu, nu <- 2 nu
+bool SparseSolve::Descend() {
+  constexpr double kSettled = 1e-9, kTells = 1e-8, kLong = 1e-3;  // sigma
+  constexpr double kRounding = 1e-13;                             // of the cost
+  constexpr double kLeast = 1e-6, kMost = 1e30;                   // damping: off, and none helps
+  double mu = 0.0, nu = 2.0, left = 0.0, before = 1.0;
+  note_.clear();
+  if (!kkt_.Linearise(z_, mu) || !kkt_.Solve()) {
+    summary_ = run_.problem();
+    return false;
+  }
+  for (int i = 0; i < options_.max_iterations; ++i) {
+    HeedStop();
+    const double cost = kkt_.cost(), decrement = std::max(0.0, kkt_.decrement());
+    const Eigen::VectorXd step = kkt_.step(), moved = z_ + step;
+    if (mu == 0.0) {
+      before = left > 0.0 ? left : 1.0;
+      left = std::sqrt(decrement);
+    }
+    const std::optional<double> next = kkt_.Cost(moved);
+    const double predicted = 0.5 * (decrement + mu * step.squaredNorm());
+    const bool unseen = predicted <= kRounding * (1.0 + cost);
+    const bool taken = next && (*next <= cost || (unseen && *next <= cost * (1.0 + 1e-9)));
+    ++iterations_;
+    if (taken) {
+      z_ = moved;
+      if (mu == 0.0 && (left <= kSettled || (left <= kTells && left > 0.5 * before))) return true;
+      const double gain = unseen ? 1.0 : (cost - *next) / predicted;
+      mu *= std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * gain - 1.0, 3));
+      if (mu < kLeast) mu = 0.0;
+      nu = 2.0;
+    } else {
+      // At first a tenth of the curvature along the step.
+      if (mu == 0.0) mu = std::max(0.1 * decrement / step.squaredNorm(), kLeast) / nu;
+      mu *= nu;
+      nu *= 2.0;
+      if (!(mu < kMost)) break;
+    }
+    if (!kkt_.Linearise(z_, mu) || !kkt_.Solve()) {
+      summary_ = run_.problem();
+      return false;
+    }
+  }
+  const bool spent = mu < kMost;
+  const std::string larger =
+      "a larger " + SettingText("max_iterations", options_.max_iterations) + " may do";
+  if (left <= kLong + 1e-6 * std::sqrt(2.0 * kkt_.cost()) && (!spent || run_.shape().robust)) {
+    if (left > kTells) {
+      note_ = "the weights of the losses did not settle in " + std::to_string(iterations_) +
+              " steps: the next one is " + internal::RoundedText(left, 3) + " sigma long; " +
+              (spent ? larger : "it does not lower the cost");
+    }
+    return kkt_.Linearise(z_, 0.0) && kkt_.Solve();
+  }
+  summary_ = spent ? "not converged, the next step is " + internal::RoundedText(left, 3) +
+                         " sigma long; " + larger
+                   : "not converged: no step lowers the cost although the gradient is not zero; "
+                     "check the models' Jacobians with alidade check";
+  if (!run_.problem().empty()) summary_ += ". A step was refused: " + run_.problem();
+  return false;
+}
+
+bool SparseSolve::PutAll(const Take& take, std::vector<LandmarkEstimate>& map) {
+  kkt_.Invert();
+  const Eigen::VectorXd e = z_.head(run_.shape().inputs);
+  const auto put = [&](std::size_t k, const Point& point) { take(k, point.x, kkt_.Covariance(k)); };
+  if (!kkt_.TakeLandmarks(z_) || !run_.ForEachFrame(e, run_.shape().frames, put, false)) {
+    failed_ = true;
+    summary_ += "; then " + run_.problem();
+    return false;
+  }
+  kkt_.PutMap(map);
+  return true;
+}
+
+}  // namespace alidade::ceres_batch

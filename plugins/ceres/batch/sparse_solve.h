@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "kkt_system.h"
+#include "map_solve.h"
+
+namespace alidade::ceres_batch {
+
+/// The maximum a posteriori of a CondensedRun by a KktSystem: Levenberg-Marquardt in all inputs
+/// z = (e, l), whose damping goes up and down as in [Nielsen1999]; Gauss-Newton as long as the cost
+/// falls. Q and R that depend on the state are frozen, the problem is solved, and so on until they
+/// settle. A step is measured by its decrement, sqrt(-dz' grad phi): its length in sigmas.
+class SparseSolve {
+ public:
+  SparseSolve(CondensedRun& run, const SolveOptions& options);
+
+  void StopWhen(std::function<bool()> stop) { stop_ = std::move(stop); }
+  void HeedStop() const;
+  /// As MapSolve::SolveAll. False, and summary(), where there are no estimates, or where it would
+  /// take too long or too much memory, which is found before anything is solved.
+  bool SolveAll(const Trajectory& about);
+  /// Flops of an iteration, known beforehand.
+  double flops() const { return kkt_.elimination().flops; }
+
+  using Take = std::function<void(std::size_t frame, const std::vector<double>& x,
+                                  const Eigen::MatrixXd& p)>;
+  /// Gives the estimates of all frames, and `map`. False where a model is not defined.
+  bool PutAll(const Take& take, std::vector<LandmarkEstimate>& map);
+
+  bool failed() const { return failed_; }
+  const std::string& summary() const { return summary_; }
+  const std::string& note() const { return note_; }  ///< that the weights of losses did not settle
+
+ private:
+  bool TooLarge();
+  bool Start(const Trajectory& about);
+  bool Minimise();
+  bool Descend();
+
+  CondensedRun& run_;
+  SolveOptions options_;
+  KktSystem kkt_;
+  std::function<bool()> stop_;
+  Eigen::VectorXd z_;
+  int iterations_ = 0, solves_ = 0;
+  std::string summary_, note_;
+  bool failed_ = false;
+};
+
+}  // namespace alidade::ceres_batch

@@ -1,0 +1,264 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The sparse solver of the batch gives what the dense one gives.
+#include <cmath>
+
+#include "alidade/run/run.h"
+#include "batch_landmarks_fixture.h"
+#include "support/manifold_models.h"
+
+namespace alidade {
+namespace {
+
+using testing::Found;
+using testing::FrameAt;
+using testing::MakeBatch;
+using testing::Shipped;
+
+constexpr double kStates = 1e-8;       // sigma
+constexpr double kCovariances = 1e-6;  // sigma_i sigma_j
+
+double CostOf(const Found& found) {
+  const std::string& text = found.events.back().text;
+  return std::stod(text.substr(text.find("cost ") + 5));
+}
+
+/// x (-) y of two states, in the tangent.
+Eigen::VectorXd Apart(const State& x, const State& y) {
+  Eigen::VectorXd d = Eigen::VectorXd::Zero(y.covariance().size());
+  for (std::size_t i = 0; i < y.layout().blocks().size(); ++i) {
+    const Block& block = y.layout().blocks()[i];
+    if (!block.present || !block.has_covariance()) continue;
+    const auto id = static_cast<BlockId>(i);
+    block.geometry().Minus(x.value(id), y.value(id), d.data() + block.tangent_offset);
+  }
+  return d;
+}
+
+void ExpectSame(const Found& found, const Found& expected, double states = kStates,
+                double covariances = kCovariances) {
+  ASSERT_FALSE(found.failed) << found.events.back().text;
+  ASSERT_FALSE(expected.failed) << expected.events.back().text;
+  EXPECT_NE(found.events.back().text.find("sparse"), std::string::npos);
+  EXPECT_EQ(expected.events.back().text.find("sparse"), std::string::npos);
+  EXPECT_NEAR(CostOf(found), CostOf(expected), 2e-8 * (1.0 + CostOf(expected)));  // 9 digits
+  ASSERT_EQ(found.states.size(), expected.states.size());
+  double worst_x = 0.0, worst_p = 0.0;
+  for (std::size_t k = 0; k < found.states.size(); ++k) {
+    const Eigen::VectorXd d = Apart(found.states[k], expected.states[k]);
+    const Eigen::MatrixXd p = expected.states[k].covariance().Dense();
+    const Eigen::MatrixXd e = found.states[k].covariance().Dense() - p;
+    for (Eigen::Index i = 0; i < d.size(); ++i) {
+      // What is exact has a sigma of rounding at most.
+      const double sigma = std::max(std::sqrt(p(i, i)), 1e-5);
+      worst_x = std::max(worst_x, std::abs(d[i]) / sigma);
+      for (Eigen::Index j = 0; j < d.size(); ++j) {
+        worst_p =
+            std::max(worst_p, std::abs(e(i, j)) / (sigma * std::max(std::sqrt(p(j, j)), 1e-5)));
+      }
+    }
+  }
+  EXPECT_LT(worst_x, states);
+  EXPECT_LT(worst_p, covariances);
+  ASSERT_EQ(found.map.size(), expected.map.size());
+  double worst_y = 0.0, worst_c = 0.0;
+  for (std::size_t i = 0; i < found.map.size(); ++i) {
+    const LandmarkEstimate &a = found.map[i], &b = expected.map[i];
+    EXPECT_EQ(a.id, b.id);
+    if (!b.position.allFinite()) continue;
+    const Eigen::LLT<Eigen::Matrix3d> llt(b.covariance);
+    worst_y = std::max(worst_y, llt.matrixL().solve(a.position - b.position).norm());
+    const Eigen::Matrix3d e = a.covariance - b.covariance;
+    worst_c = std::max(worst_c, llt.solve(e).norm());
+    if (!std::isnan(b.sigma)) worst_c = std::max(worst_c, std::abs(a.sigma / b.sigma - 1.0));
+  }
+  // The dense solver stops to move a landmark once its cost no longer falls by rounding.
+  EXPECT_LT(worst_y, 10.0 * states);
+  EXPECT_LT(worst_c, covariances);
+}
+
+/// The dense solver goes on below Ceres' tolerances where there is a loss: one that is none.
+System WithLoss(System system) {
+  for (SensorBinding& sensor : system.sensors) {
+    if (sensor.loss.kind == LossKind::kNone) sensor.loss = {LossKind::kHuber, 1e9};
+  }
+  return system;
+}
+
+void ExpectBothSolve(const System& system, const std::vector<Frame>& frames,
+                     const std::string& options = "", double states = kStates,
+                     double covariances = kCovariances) {
+  ExpectSame(testing::Solve(system, frames, "solver: sparse\n" + options),
+             testing::Solve(WithLoss(system), frames, "solver: dense\n" + options), states,
+             covariances);
+}
+
+std::vector<Frame> Wobble(int count) {
+  std::vector<Frame> frames;
+  for (int k = 0; k < count; ++k) {
+    const double t_s = 0.05 * k, z = 2.0 * std::cos(t_s) + 0.3 * std::sin(37.0 * k);
+    frames.push_back(k % 4 == 3 ? FrameAt(t_s, {}) : FrameAt(t_s, {{0, z}}));
+  }
+  return frames;
+}
+
+void SetPrior(System& system, std::size_t prior, double sigma) {
+  system.priors[prior].covariance.setConstant(sigma * sigma);
+}
+
+/// The two batches of a config, over its whole source.
+struct Both {
+  Found sparse, dense;
+};
+Both SolveBoth(Config config, std::size_t most_frames) {
+  std::vector<std::string> plain;
+  for (const auto& [name, sensor] : config.root().Find("sensors")->Entries()) {
+    if (!sensor.Find("loss")) plain.push_back(name);
+  }
+  for (const std::string& name : plain) {
+    config.Set("sensors." + name + ".loss", "{huber: 1e9}", "--set");
+  }
+  config.Set("estimators",
+             "{ekf: {type: ekf}, sparse: {type: ceres_batch, solver: sparse}, "
+             "dense: {type: ceres_batch, solver: dense}}",
+             "--set");
+  Experiment experiment = BuildExperiment(config, Shipped());
+  std::vector<Frame> frames;
+  for (SourceFrame frame; frames.size() < most_frames && experiment.source->Next(frame);) {
+    frames.push_back(frame);
+  }
+  return {testing::Solve(*experiment.estimators[1].estimator, frames),
+          testing::Solve(*experiment.estimators[2].estimator, frames)};
+}
+Config Example(const std::string& name) {
+  return Config::FromFile(ALIDADE_SOURCE_DIR "/examples/" + name + "/config.yaml");
+}
+
+// Of rank 1 in 2, and 0; a prior that is exact in part and in all.
+TEST(SparseBatch, NoiseAndPriorMayHaveAnyRank) {
+  for (const double acceleration : {0.7, 0.0}) {
+    for (const double sigma_x : {2.0, 0.0}) {
+      for (const double sigma_v : {3.0, 0.0}) {
+        SCOPED_TRACE(::testing::Message() << acceleration << ' ' << sigma_x << ' ' << sigma_v);
+        System system = testing::MovingPoint(acceleration);
+        testing::AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
+        SetPrior(system, 0, sigma_x);
+        SetPrior(system, 1, sigma_v);
+        ExpectBothSolve(system, Wobble(60));
+      }
+    }
+  }
+}
+
+// The noise is held over frames without a measurement: they lie inside a node.
+TEST(SparseBatch, FramesBetweenMeasurementsHaveTheirCovariance) {
+  System system = testing::HeldPoint(0.7);
+  testing::AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
+  std::vector<Frame> frames = Wobble(50);
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    if (k % 5 != 2) frames[k].measurements.clear();
+  }
+  ExpectBothSolve(system, frames);
+  ExpectBothSolve(system, frames, "max_dt_s: 0.02\n");
+}
+
+TEST(SparseBatch, SolvesOnManifolds) {
+  const System system = testing::WalkingOrientation();
+  std::vector<Frame> frames;
+  for (int k = 0; k < 80; ++k) {
+    Frame frame = FrameAt(0.05 * k, {});
+    const double a = 0.05 * std::sin(0.3 * k), b = 0.002 * k;
+    frame.measurements.push_back({frame.timestamp,
+                                  0,
+                                  -1,
+                                  {std::cos(a) * std::cos(b), std::sin(a) * std::cos(b),
+                                   std::sin(b) * std::cos(a), std::sin(a) * std::sin(b)},
+                                  {}});
+    frames.push_back(frame);
+  }
+  ExpectBothSolve(system, frames);
+}
+
+TEST(SparseBatch, SolvesTheExamplesWithoutAMap) {
+  for (const char* name : {"05_depth_principled", "08_depth_all_estimators", "21_poses",
+                           "22_range_bearing", "23_satellites"}) {
+    SCOPED_TRACE(name);
+    const Both both = SolveBoth(Example(name), 150);
+    ExpectSame(both.sparse, both.dense);
+  }
+}
+
+TEST(SparseBatch, SolvesWithLandmarks) {
+  const testing::Problem problem(12, 15);
+  ExpectBothSolve(problem.Filter(), problem.frames);
+  problem.ExpectSolved(testing::Solve(problem.Filter(), problem.frames, "solver: sparse\n"));
+}
+
+TEST(SparseBatch, SolvesTheSlamExamples) {
+  for (const char* representation : {"inverse_depth", "anchored"}) {
+    SCOPED_TRACE(representation);
+    Config config = Example("10_slam_scene");
+    config.Set("landmarks.representation", representation, "--set");
+    const Both both = SolveBoth(config, 40);
+    ExpectSame(both.sparse, both.dense);
+  }
+}
+
+// Driven by odometry, with fewer landmarks than there are frames.
+TEST(SparseBatch, SolvesADriveWithControlInputs) {
+  const Both both = SolveBoth(Example("15_slam_representations"), 60);
+  ExpectSame(both.sparse, both.dense);
+}
+
+// A twentieth of the measurements is wrong.
+TEST(SparseBatch, RobustLossesHaveTheSameOptimum) {
+  for (const RobustLoss loss : {RobustLoss{LossKind::kHuber, 1.345}, {LossKind::kCauchy, 2.4}}) {
+    SCOPED_TRACE(ToString(loss.kind));
+    System system = testing::MovingPoint(0.7);
+    testing::AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
+    system.sensors[0].loss = loss;
+    std::vector<Frame> frames = Wobble(80);
+    for (std::size_t k = 0; k < frames.size(); ++k) {
+      if (k % 20 == 4) frames[k].measurements[0].values[0] += 5.0;
+    }
+    ExpectBothSolve(system, frames);
+    testing::Problem problem(12, 15, 20);
+    problem.loss = loss;
+    ExpectBothSolve(problem.Filter(), problem.frames);
+  }
+}
+
+// The states are rolled out by the models: x' = x + v dt + a dt^2 / 2, v' = v + a dt for some a.
+TEST(SparseBatch, TheMotionHoldsToRounding) {
+  System system = testing::HeldPoint(0.7);
+  testing::AddSensor(system, "z", testing::LinearSensor(2.0, 0.3), {"p.x"});
+  const Found found = testing::Solve(system, Wobble(300), "solver: sparse\n");
+  ASSERT_EQ(found.states.size(), 300u);
+  for (std::size_t k = 1; k < found.states.size(); ++k) {
+    const std::vector<double>&a = found.states[k - 1].values(), &b = found.states[k].values();
+    const double dt = 0.05, acceleration = (b[1] - a[1]) / dt;
+    EXPECT_NEAR(b[0], a[0] + dt * a[1] + 0.5 * dt * dt * acceleration, 1e-12) << k;
+  }
+}
+
+// 5002 inputs, more than a dense system may have; a Kalman filter has the last estimate too.
+TEST(SparseBatch, IsTakenWhereThereAreManyInputs) {
+  const System system = testing::LinearSystem();
+  const std::vector<Frame> frames = Wobble(5001);
+  const Found found = testing::Solve(system, frames);
+  ASSERT_FALSE(found.failed);
+  EXPECT_NE(found.events.back().text.find("converged; sparse"), std::string::npos);
+  Ekf ekf(system, {.gate = 1.0}, testing::StreamsOf(system));
+  for (const Frame& frame : frames) ekf.Process(frame);
+  for (const char* block : {"p.x", "p.v"}) {
+    EXPECT_NEAR(testing::ValueOf(found.states.back(), block), testing::ValueOf(ekf.state(), block),
+                1e-9);
+    EXPECT_NEAR(testing::CovarianceOf(found.states.back(), block, block),
+                testing::CovarianceOf(ekf.state(), block, block), 1e-9);
+  }
+  EXPECT_EQ(testing::Solve(system, Wobble(20)).events.back().text.find("sparse"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace alidade

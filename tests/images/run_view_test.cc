@@ -262,6 +262,13 @@ TEST_F(RunView, AWindowNeedsADisplay) {
                        "session; --save-video FILE.avi needs none"))
       << outcome.err;
   EXPECT_FALSE(Exists("run"));
+
+  ::setenv("DISPLAY", ":4711", 1);  // of nobody
+  const Outcome nobody = Run(kPlate, {"--view"});
+  ::unsetenv("DISPLAY");
+  EXPECT_EQ(nobody.code, 73) << nobody.err;
+  EXPECT_TRUE(Contains(nobody.err, "--view: no window can be opened")) << nobody.err;
+  EXPECT_FALSE(Exists("run"));
 }
 
 }  // namespace

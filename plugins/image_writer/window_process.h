@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/time.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstddef>
+#include <exception>
+#include <opencv2/core.hpp>
+#include <opencv2/highgui.hpp>
+#include <string>
+
+#include "alidade/base/error.h"
+
+namespace alidade {
+
+/// A window in a process of its own: what draws windows ends a process that has no display, and
+/// wants one thread for itself. Images go there by a socket.
+class WindowProcess {
+ public:
+  /// Opens the window. Error: kCannotCreate, with `shown`.
+  WindowProcess(const std::string& title, const std::string& shown) {
+    std::array<int, 2> ends{};
+    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) == 0) {
+      child_ = ::fork();
+      if (child_ == 0) {
+        ::close(ends[0]);
+        Child(ends[1], title);
+      }
+      ::close(ends[1]);
+      socket_ = ends[0];
+    }
+    const timeval patience{10, 0};
+    ::setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+    char opened = 0;
+    if (child_ > 0 && ::recv(socket_, &opened, 1, 0) == 1) return;
+    End();
+    throw Error(ExitCode::kCannotCreate, ErrorLine({}, shown, "no window can be opened",
+                                                   "a display, as DISPLAY names it; --save-video "
+                                                   "FILE.avi needs none"));
+  }
+  ~WindowProcess() { End(); }
+  WindowProcess(const WindowProcess&) = delete;
+  WindowProcess& operator=(const WindowProcess&) = delete;
+
+  /// Shows an image, 8 bit BGR. Does nothing once the window was closed.
+  void Show(const cv::Mat& image) {
+    const std::array<int, 2> size{image.cols, image.rows};
+    const cv::Mat whole = image.isContinuous() ? image : image.clone();
+    closed_ = closed_ || !Send(size.data(), sizeof size) ||
+              !Send(whole.data, whole.total() * whole.elemSize());
+  }
+
+ private:
+  bool Send(const void* data, std::size_t size) const {
+    const char* at = static_cast<const char*>(data);
+    while (size > 0) {
+      const ssize_t sent = ::send(socket_, at, size, MSG_NOSIGNAL);
+      if (sent < 0 && errno == EINTR) continue;
+      if (sent <= 0) return false;
+      at += sent;
+      size -= static_cast<std::size_t>(sent);
+    }
+    return true;
+  }
+  void End() {
+    if (socket_ >= 0) ::close(socket_);
+    socket_ = -1;
+    if (child_ > 0) {
+      ::kill(child_, SIGKILL);  // it may wait for its display
+      ::waitpid(child_, nullptr, 0);
+    }
+    child_ = -1;
+  }
+
+  /// The life of the child: it ends with its parent, at the end of the images, or as its window is
+  /// closed.
+  [[noreturn]] static void Child(int socket, const std::string& title) {
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    for (const int one : {SIGINT, SIGTERM, SIGHUP, SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL}) {
+      ::signal(one, SIG_DFL);
+    }
+    const rlimit no_core{0, 0};
+    ::setrlimit(RLIMIT_CORE, &no_core);
+    // What it has to say of fonts and settings is of no use to anyone.
+    const int nowhere = ::open("/dev/null", O_RDWR);
+    for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+      ::dup2(nowhere, stream);
+    }
+    try {
+      cv::namedWindow(title, cv::WINDOW_NORMAL | cv::WINDOW_KEEPRATIO | cv::WINDOW_GUI_NORMAL);
+      const char opened = 1;
+      if (::send(socket, &opened, 1, MSG_NOSIGNAL) == 1) ShowAll(socket, title);
+    } catch (const std::exception&) {  // the parent sees that it ended
+    }
+    ::_exit(0);
+  }
+  static void ShowAll(int socket, const std::string& title) {
+    bool shown = false;
+    while (true) {
+      pollfd ready{socket, POLLIN, 0};
+      if (::poll(&ready, 1, 0) > 0) {
+        std::array<int, 2> size{};
+        if (!Receive(socket, size.data(), sizeof size)) return;
+        cv::Mat image(size[1], size[0], CV_8UC3);
+        if (!Receive(socket, image.data, image.total() * image.elemSize())) return;
+        if (!shown) cv::resizeWindow(title, image.size());
+        cv::imshow(title, image);
+        shown = true;
+      }
+      cv::waitKey(5);
+      if (shown && cv::getWindowProperty(title, cv::WND_PROP_VISIBLE) < 1.0) return;
+    }
+  }
+  static bool Receive(int socket, void* data, std::size_t size) {
+    char* at = static_cast<char*>(data);
+    while (size > 0) {
+      const ssize_t got = ::recv(socket, at, size, 0);
+      if (got <= 0) return false;
+      at += got;
+      size -= static_cast<std::size_t>(got);
+    }
+    return true;
+  }
+
+  int socket_ = -1;
+  pid_t child_ = -1;
+  bool closed_ = false;
+};
+
+}  // namespace alidade

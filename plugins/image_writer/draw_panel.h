@@ -141,7 +141,8 @@ class Panel {
 
   /// Path, landmarks and 3 sigma from above, all axes to one scale.
   void Map(const ViewMap& map, const cv::Rect2d& box) {
-    const auto& [left, right, bottom, top] = map.bounds;
+    const double left = map.bounds[0], right = map.bounds[1];
+    const double bottom = map.bounds[2], top = map.bounds[3];
     constexpr double kMargin = 14.0;
     const double wide = std::max(right - left, 1e-9), high = std::max(top - bottom, 1e-9);
     const double times =

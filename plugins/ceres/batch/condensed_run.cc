@@ -510,9 +510,9 @@ void CondensedRun::Report(std::size_t k, const std::vector<double>& values,
     const Factor& factor = epochs_[k].factors[i];
     const Geometry& geometry = ModelOf(factor).measurement().geometry;
     MeasurementReport& entry = report.measurements()[i];
-    entry.outcome = factor.outcome;
+    entry.outcome = factor.left_out ? Outcome::kOutOfDomain : factor.outcome;
     entry.nis = std::nan("");  // what is left after smoothing is no innovation
-    const bool of_landmark = factor.landmark >= 0 && factor.outcome == Outcome::kAccepted;
+    const bool of_landmark = factor.landmark >= 0 && entry.outcome == Outcome::kAccepted;
     if (factor.row < 0 && !of_landmark) continue;
     std::vector<double> x = values;
     if (of_landmark) {

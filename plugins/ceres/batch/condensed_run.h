@@ -37,9 +37,10 @@ struct Factor {
   bool xyz = false;  ///< a known landmark: the sensor's model of one that is xyz
   Measurement measurement;
   Outcome outcome = Outcome::kAccepted;
-  int row = -1;       ///< of r; -1: not in use, or of a landmark
-  int landmark = -1;  ///< index of the one that it sees
-  Eigen::MatrixXd l;  ///< frozen
+  int row = -1;           ///< of r; -1: not in use, or of a landmark
+  int landmark = -1;      ///< index of the one that it sees
+  bool left_out = false;  ///< of a landmark: not defined at the start, nor since
+  Eigen::MatrixXd l;      ///< frozen
 };
 
 /// A factor whose measurement gives a block its first value.

@@ -3,6 +3,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -367,25 +368,36 @@ std::optional<double> KktSystem::Freeze(const Eigen::VectorXd& z) {
   if (!TakeLandmarks(z)) return {};
   const std::optional<double> change = run_.Freeze(e);
   if (!change || !TakeLandmarks(z) || !run_.PointsOf(e, false, points)) return {};
-  const bool anew = left_out_.empty();
   joined_ = false;
-  std::size_t at = 0;
   std::vector<double> h;
   for (const MapLandmark& landmark : run_.landmarks_) {
     for (const auto& [epoch, index] : landmark.observations) {
-      const Factor& factor = run_.epochs_[epoch].factors[index];
-      if (anew || left_out_[at]) {
-        const bool defined =
-            factor.l.size() > 0 && run_.See(factor, WithLandmark(points[epoch].x, landmark.y), h,
-                                            nullptr) == Outcome::kAccepted;
-        joined_ = joined_ || (!anew && defined);
-        if (anew) left_out_.push_back(!defined);
-        left_out_[at] = !defined;
-      }
-      ++at;
+      Factor& factor = run_.epochs_[epoch].factors[index];
+      if (chosen_ && !factor.left_out) continue;
+      factor.left_out = factor.l.size() == 0 ||
+                        run_.See(factor, WithLandmark(points[epoch].x, landmark.y), h, nullptr) !=
+                            Outcome::kAccepted;
+      joined_ = joined_ || (chosen_ && !factor.left_out);
     }
   }
+  chosen_ = true;
   return change;
+}
+
+bool KktSystem::Settle(Eigen::VectorXd& z, bool all) {
+  using Undefined = CondensedRun::Undefined;
+  std::vector<Point> points;
+  if (!run_.PointsOf(z.head(run_.inputs_), false, points)) return false;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    MapLandmark& landmark = run_.landmarks_[i];
+    auto l = z.segment(points_[i].column, landmark.from.size());
+    landmark.from = l;
+    if (!run_.OptimiseLandmark(landmark, points, all ? Undefined::kFails : Undefined::kSkipped)) {
+      return false;
+    }
+    l = landmark.l;
+  }
+  return true;
 }
 
 std::optional<double> KktSystem::Cost(const Eigen::VectorXd& z) {
@@ -397,14 +409,13 @@ std::optional<double> KktSystem::Cost(const Eigen::VectorXd& z) {
   }
   Inverse place;
   Eigen::VectorXd r;
-  std::size_t at = 0;
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const MapLandmark& landmark = run_.landmarks_[i];
     const Eigen::VectorXd l = z.segment(points_[i].column, landmark.from.size());
     if (!run_.Place(landmark, l, points, place)) return {};
     for (const auto& [epoch, index] : landmark.observations) {
       const Factor& factor = run_.epochs_[epoch].factors[index];
-      if (left_out_[at++]) continue;
+      if (factor.left_out) continue;
       if (!run_.Residual(factor, WithLandmark(points[epoch].x, place.y), r, nullptr)) return {};
       cost += Rho(run_.SensorOf(factor).loss, r.norm());
     }
@@ -451,19 +462,21 @@ void KktSystem::Accumulate(const Eigen::MatrixXd& j, const Eigen::VectorXd& r) {
 bool KktSystem::Linearise(const Eigen::VectorXd& z, double damping) {
   damping_ = damping;
   if (!LineariseStates(z, nullptr)) return false;
-  const std::vector<bool> anchored = [this] {
-    std::vector<bool> all;
-    for (const Point3& point : points_) all.push_back(point.anchored);
-    return all;
-  }();
   if (!LineariseLandmarks(z, false)) return false;
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    if (points_[i].anchored == anchored[i]) continue;
-    Build();  // there are more ties than it had
-    return Linearise(z, damping);
-  }
+  if (BuildAnew()) return Linearise(z, damping);
   ChooseScale();
   return std::isfinite(cost_);
+}
+
+/// Whether there are more ties than it was built with.
+bool KktSystem::BuildAnew() {
+  bool anew = false;
+  for (Point3& point : points_) {
+    anew = anew || point.ties != point.anchored;
+    point.anchored = point.ties;
+  }
+  if (anew) Build();
+  return anew;
 }
 
 bool KktSystem::LineariseAbout(const Trajectory& trajectory, Eigen::VectorXd& z) {
@@ -485,7 +498,8 @@ bool KktSystem::LineariseAbout(const Trajectory& trajectory, Eigen::VectorXd& z)
     z.segment(points_[i].column, landmark.l.size()) = landmark.l;
   }
   z_ = z;
-  return LineariseLandmarks(z, true);
+  if (!LineariseLandmarks(z, true)) return false;
+  return !BuildAnew() || LineariseAbout(trajectory, z);
 }
 
 /// The states of z, frame by frame, or those of `about` where it has them; the constraints, and
@@ -615,38 +629,37 @@ bool KktSystem::LinearisePlain(std::size_t k, bool about) {
 }
 
 bool KktSystem::LineariseLandmarks(const Eigen::VectorXd& z, bool about) {
-  std::size_t at = 0;
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    const MapLandmark& landmark = run_.landmarks_[i];
-    const Eigen::VectorXd l = z.segment(points_[i].column, landmark.from.size());
-    if (!LineariseLandmark(i, l, at, about)) return false;
-    at += landmark.observations.size();
+    const auto size = run_.landmarks_[i].from.size();
+    if (!LineariseLandmark(i, z.segment(points_[i].column, size), about)) return false;
   }
   return true;
 }
 
-/// C with which q = dl + C dx_f moves the point as l does, and the camera alone does not:
+/// C with which q = dl + C dx_f moves the point as l does, and the camera alone does not: the least
+/// one with  M C = N,
 ///
-///   C = (J_p J_l)^-1 J_p J_x   where y = g(x_f, l) is three numbers, or is a point p(y)
+///   M = J_l, N = J_x           where y = g(x_f, l) has no more numbers than l
+///   M = J_p J_l, N = J_p J_x   where it is a point p(y)
 ///   C = 0                      else
 Eigen::MatrixXd KktSystem::FollowOf(const MapLandmark& landmark, const Inverse& place,
                                     int inputs) const {
   const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(inputs, place.by_x.cols());
   if (!landmark.first) return none;
-  Eigen::MatrixXd by_l = place.by_d, by_x = place.by_x;
-  if (by_l.rows() != inputs) {
+  Eigen::MatrixXd m = place.by_d, n = place.by_x;
+  if (m.rows() > inputs) {
     const Factor& factor = run_.epochs_[landmark.first->epoch].factors[landmark.first->factor];
     const auto jacobian = PointJacobian(run_.ModelOf(factor).roles(), place.y);
-    if (!jacobian || inputs != 3) return none;
-    by_l = *jacobian * by_l;
-    by_x = *jacobian * by_x;
+    if (!jacobian || inputs < 3) return none;
+    m = *jacobian * m;
+    n = *jacobian * n;
   }
-  Eigen::MatrixXd c = by_l.partialPivLu().solve(by_x);
+  Eigen::MatrixXd c = m.rows() == inputs ? Eigen::MatrixXd(m.partialPivLu().solve(n))
+                                         : m.completeOrthogonalDecomposition().solve(n);
   return c.allFinite() ? c : none;
 }
 
-bool KktSystem::LineariseLandmark(std::size_t i, const Eigen::VectorXd& l, std::size_t at,
-                                  bool about) {
+bool KktSystem::LineariseLandmark(std::size_t i, const Eigen::VectorXd& l, bool about) {
   constexpr double kTied = 1e-7;  // of what the camera moves the point by
   const MapLandmark& landmark = run_.landmarks_[i];
   Point3& point = points_[i];
@@ -676,8 +689,7 @@ bool KktSystem::LineariseLandmark(std::size_t i, const Eigen::VectorXd& l, std::
   Eigen::MatrixXd a, j;
   for (const auto& [epoch, index] : landmark.observations) {
     const Factor& factor = run_.epochs_[epoch].factors[index];
-    const bool out = !about && left_out_[at];
-    ++at;
+    const bool out = !about && factor.left_out;
     if (out || !run_.Residual(factor, WithLandmark(at_[epoch].x, place.y), r, &a)) {
       if (!out && !about) return false;
       ++term_;
@@ -706,7 +718,7 @@ bool KktSystem::LineariseLandmark(std::size_t i, const Eigen::VectorXd& l, std::
         j.middleCols(column, read) = left.leftCols(read);
         j.middleCols(column + read, all - read) = constants + left.rightCols(all - read);
       } else {
-        point.anchored = point.anchored || left.norm() > kTied * (a_y * place.by_x).norm();
+        point.ties = point.ties || left.norm() > kTied * (a_y * place.by_x).norm();
       }
     }
     j *= root;

@@ -58,6 +58,9 @@ class KktSystem {
 
   /// phi(z). Nothing where a model is not defined.
   std::optional<double> Cost(const Eigen::VectorXd& z);
+  /// Moves the landmarks of z to where they cost least given e, by the observations that are
+  /// defined there, or by all: false then where one is not.
+  bool Settle(Eigen::VectorXd& z, bool all);
   /// At z, on the states that it gives. False where a model is not defined.
   bool Linearise(const Eigen::VectorXd& z, double damping);
   /// About `trajectory` instead, freezing there, with landmarks where they cost least, in z too.
@@ -101,6 +104,7 @@ class KktSystem {
     int variable = -1;      ///< q
     int column = 0;         ///< of its inputs in z
     bool anchored = false;  ///< its observations tie their cameras to the first one
+    bool ties = false;      ///< so it must be built so
     Eigen::MatrixXd c;      ///< C, by the tangent of x_f
     Inverse place;
   };
@@ -126,7 +130,8 @@ class KktSystem {
   bool LineariseStates(const Eigen::VectorXd& z, const Trajectory* about);
   bool LinearisePlain(std::size_t k, bool about);
   bool LineariseLandmarks(const Eigen::VectorXd& z, bool about);
-  bool LineariseLandmark(std::size_t i, const Eigen::VectorXd& l, std::size_t at, bool about);
+  bool BuildAnew();
+  bool LineariseLandmark(std::size_t i, const Eigen::VectorXd& l, bool about);
   Eigen::MatrixXd FollowOf(const MapLandmark& landmark, const Inverse& place, int inputs) const;
   void PutConstraint(std::size_t k, const Point& point, const Eigen::VectorXd& z);
   Eigen::VectorXd Multipliers(const Node& node) const;
@@ -147,7 +152,7 @@ class KktSystem {
   std::vector<bool> left_out_;  ///< by observation of a landmark, in their order
   int inputs_ = 0;              ///< of z
   BlockLdl ldl_;
-  bool in_time_order_ = true, joined_ = false;
+  bool in_time_order_ = true, joined_ = false, chosen_ = false;
   std::unordered_map<std::uint64_t, std::size_t> block_of_;
   std::vector<Term> terms_;
   std::vector<int> variables_;

@@ -169,6 +169,7 @@ bool CondensedRun::AddObservation(const Factor& factor, std::size_t epoch,
                                   const MapLandmark& landmark, const Inverse& place,
                                   const Point& point, Normal& normal,
                                   Information* information) const {
+  if (factor.left_out) return true;
   const int n = initial_.covariance().size();
   const auto d = std::ssize(read_);
   Eigen::VectorXd r;

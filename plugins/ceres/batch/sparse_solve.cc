@@ -46,8 +46,8 @@ bool SparseSolve::SolveAll(const Trajectory& about) {
   return !failed_ || (kkt_.Linearise(z_, 0.0) && kkt_.Solve());
 }
 
-/// From the problem linearised about the filter; where that leaves the domain of a model, from
-/// z = 0.
+/// From the problem linearised about the filter, the landmarks where they cost least; where that
+/// leaves the domain of a model, from z = 0.
 bool SparseSolve::Start(const Trajectory& about) {
   constexpr int kMostPasses = 20;
   constexpr double kSettled = 1e-9;
@@ -58,13 +58,13 @@ bool SparseSolve::Start(const Trajectory& about) {
   for (int pass = 0; pass < kMostPasses; ++pass) {
     if (!kkt_.LineariseAbout(trajectory, z_) || !kkt_.Solve()) break;
     linearised = true;
-    z_ += kkt_.step();
+    z_.head(shape.inputs) += kkt_.step().head(shape.inputs);
     if (!shape.has_unit_vector || kkt_.step().norm() <= kSettled) break;
     kkt_.Move(trajectory);
   }
-  if (linearised && kkt_.Freeze(z_) && kkt_.Cost(z_)) return true;
-  z_ = kkt_.Join(Eigen::VectorXd::Zero(shape.inputs));
-  return kkt_.Freeze(z_) && kkt_.Cost(z_);
+  if (linearised && kkt_.Settle(z_, false) && kkt_.Freeze(z_) && kkt_.Cost(z_)) return true;
+  z_.setZero();
+  return kkt_.Freeze(z_) && kkt_.Settle(z_, false) && kkt_.Freeze(z_) && kkt_.Cost(z_);
 }
 
 /// Until Q and R settle, and no observation is left out that is defined. In summary_, why it failed.
@@ -90,10 +90,14 @@ bool SparseSolve::Minimise() {
 /// Levenberg-Marquardt: with the gain ratio g of a step that is taken,
 ///
 ///   mu <- mu max(1/3, 1 - (2 g - 1)^3),   and of one that is not, mu <- mu nu, nu <- 2 nu
+///
+/// Where the cost falls by less than it should, landmarks move to where they cost least given e.
 bool SparseSolve::Descend() {
   constexpr double kSettled = 1e-9, kTells = 1e-8, kLong = 1e-3;  // sigma
   constexpr double kRounding = 1e-13;                             // of the cost
-  constexpr double kLeast = 1e-6, kMost = 1e30;                   // damping: off, and none helps
+  constexpr double kLinear = 0.75;  // gain ratio below which landmarks are settled on their own
+  constexpr double kLeast = 1e-6, kMost = 1e30;  // damping: off, and none helps
+  const Eigen::Index inputs = run_.shape().inputs;
   double mu = 0.0, nu = 2.0, left = 0.0, before = 1.0;
   note_.clear();
   if (!kkt_.Linearise(z_, mu) || !kkt_.Solve()) {
@@ -103,13 +107,25 @@ bool SparseSolve::Descend() {
   for (int i = 0; i < options_.max_iterations; ++i) {
     HeedStop();
     const double cost = kkt_.cost(), decrement = std::max(0.0, kkt_.decrement());
-    const Eigen::VectorXd step = kkt_.step(), moved = z_ + step;
+    const Eigen::VectorXd step = kkt_.step();
+    Eigen::VectorXd moved = z_ + step;
     if (mu == 0.0) {
       before = left > 0.0 ? left : 1.0;
       left = std::sqrt(decrement);
     }
-    const std::optional<double> next = kkt_.Cost(moved);
+    std::optional<double> next = kkt_.Cost(moved);
     const double predicted = 0.5 * (decrement + mu * step.squaredNorm());
+    if (run_.shape().has_landmarks && predicted > kRounding * (1.0 + cost) &&
+        !(next && cost - *next > kLinear * predicted)) {
+      Eigen::VectorXd settled = moved;
+      if (!next) settled.tail(z_.size() - inputs) = z_.tail(z_.size() - inputs);
+      const bool defined = kkt_.Settle(settled, true);
+      const std::optional<double> at_settled = defined ? kkt_.Cost(settled) : std::nullopt;
+      if (at_settled && !(next && *next < *at_settled)) {
+        next = at_settled;
+        moved = settled;
+      }
+    }
     const bool unseen = predicted <= kRounding * (1.0 + cost);
     const bool taken = next && (*next <= cost || (unseen && *next <= cost * (1.0 + 1e-9)));
     ++iterations_;

@@ -210,6 +210,34 @@ TEST(SparseBatch, SolvesADriveWithControlInputs) {
   ExpectSame(both.sparse, both.dense);
 }
 
+// A pair of pixels has four numbers, one more than a point.
+TEST(SparseBatch, SolvesWithStereoPairs) {
+  const Both both = SolveBoth(
+      Config::FromFile(ALIDADE_SOURCE_DIR "/examples/26_slam_three_sensors/stereo.yaml"), 30);
+  ExpectSame(both.sparse, both.dense);
+}
+
+// An observation is not defined where the dense solver starts, which cannot go on then.
+TEST(SparseBatch, StartsWhereAnObservationIsNotDefined) {
+  Config config = Example("15_slam_representations");
+  config.Set("estimators", "{batch: {type: ceres_batch, solver: sparse}}", "--set");
+  Experiment experiment = BuildExperiment(config, Shipped());
+  Estimator& batch = *experiment.estimators[0].estimator;
+  SourceFrame frame;
+  for (int k = 0; k < 140 && experiment.source->Next(frame); ++k) batch.Process(frame);
+  int used = 0, undefined = 0;
+  batch.Smooth([&](std::size_t, const State&, const UpdateReport& report) {
+    for (const MeasurementReport& one : report.measurements()) {
+      if (one.outcome != Outcome::kAccepted) continue;
+      ++used;
+      undefined += one.h.empty() ? 1 : 0;
+    }
+  });
+  EXPECT_FALSE(batch.failed());
+  EXPECT_GT(used, 1500);
+  EXPECT_EQ(undefined, 0);
+}
+
 // A twentieth of the measurements is wrong.
 TEST(SparseBatch, RobustLossesHaveTheSameOptimum) {
   for (const RobustLoss loss : {RobustLoss{LossKind::kHuber, 1.345}, {LossKind::kCauchy, 2.4}}) {

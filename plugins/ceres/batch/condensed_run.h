@@ -206,8 +206,8 @@ class CondensedRun {
   bool ForEachFrame(const Eigen::VectorXd& e, std::size_t count, const TakePoint& take,
                     bool sensitivity = true) const;
   /// The estimate of frame k, x and its covariance P: `state`, that of frame k - 1 from
-  /// System::InitialState(reserved) on, becomes the one of frame k; `report` says what became of the
-  /// measurements.
+  /// System::InitialState(reserved) on, becomes the one of frame k; `report` says what became of
+  /// the measurements.
   void Put(std::size_t k, const std::vector<double>& x, const Eigen::MatrixXd& p, State& state,
            UpdateReport& report) const;
   /// `map`, the landmarks that a filter has at the end: place and covariance at e, for

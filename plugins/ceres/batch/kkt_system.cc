@@ -897,8 +897,8 @@ Eigen::MatrixXd KktSystem::JointOf(std::size_t k) const {
   return p;
 }
 
-/// Of a frame inside a node, x = F x_{k-1} + B w:  Cov(w) = I + B' L B, Cov(x_{k-1}, w) = M B, where
-/// L and M are the blocks of the inverse of lambda_k, and of x_{k-1} and lambda_k.
+/// Of a frame inside a node, x = F x_{k-1} + B w:  Cov(w) = I + B' L B, Cov(x_{k-1}, w) = M B,
+/// where L and M are the blocks of the inverse of lambda_k, and of x_{k-1} and lambda_k.
 Eigen::MatrixXd KktSystem::Covariance(std::size_t frame) const {
   const std::size_t k = node_of_[frame];
   const Node& node = nodes_[k];

@@ -27,9 +27,9 @@ namespace alidade::ceres_batch {
 ///
 /// c_k is zero where the states are those of e. The step is that of the condensed problem: neither
 /// Q_k = B_k B_k' nor P_0 is inverted, and they may have any rank. x_k and lambda_k are one pivot.
-/// The block of any such pairs is [H A'; A -Q], where A is unit lower triangular in time: if it takes
-/// (a, b) to zero, a' H a + b' Q b = 0, so H a = 0 and Q b = 0, so A' b = 0 and A a = 0, so both are
-/// zero. So whatever the order, every pivot is nonsingular, without a threshold.
+/// The block of any such pairs is [H A'; A -Q], where A is unit lower triangular in time: if it
+/// takes (a, b) to zero, a' H a + b' Q b = 0, so H a = 0 and Q b = 0, so A' b = 0 and A a = 0, so
+/// both are zero. So whatever the order, every pivot is nonsingular, without a threshold.
 ///
 /// - A constant block is one variable s; it is born at the first node or by a first value, with a
 ///   multiplier of its own.
@@ -38,7 +38,7 @@ namespace alidade::ceres_batch {
 ///   inputs, so later observations do not tie their cameras to the first one. Its prior is
 ///   |l + q - C dx_f|^2 / 2.
 ///
-/// The multipliers are scaled by alpha: lambda = alpha lambda', alpha^2 = median H_ii / median Q_ii.
+/// The multipliers are scaled: lambda = alpha lambda', alpha^2 = median H_ii / median Q_ii.
 class KktSystem {
  public:
   explicit KktSystem(CondensedRun& run);

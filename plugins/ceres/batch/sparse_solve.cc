@@ -67,7 +67,8 @@ bool SparseSolve::Start(const Trajectory& about) {
   return kkt_.Freeze(z_) && kkt_.Settle(z_, false) && kkt_.Freeze(z_) && kkt_.Cost(z_);
 }
 
-/// Until Q and R settle, and no observation is left out that is defined. In summary_, why it failed.
+/// Until Q and R settle, and no observation that is defined is left out. In summary_, why it
+/// failed.
 bool SparseSolve::Minimise() {
   constexpr double kSettled = 1e-9;
   while (true) {

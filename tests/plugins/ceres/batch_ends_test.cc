@@ -37,7 +37,8 @@ TEST(CeresBatchEnds, StartsAtTheGivenTime) {
   batch->Smooth([&](std::size_t, const State& state, const UpdateReport&) { expect_equal(state); });
 }
 
-// 4000 inputs fit in a dense system: 1 of p.v and 1 of p.x, 3998 of steps. The first value of c.x is one more.
+// 4000 inputs fit in a dense system: 1 of p.v and 1 of p.x, 3998 of steps. The first value of c.x
+// is one more.
 TEST(CeresBatchEnds, InputsOfFirstValuesCountToo) {
   System system = LinearSystem();
   testing::AddMotion(system, "c", testing::ConstantMotion(1), {{"x", 0.0, 1.0}});

@@ -234,7 +234,7 @@ TEST(SparseBatch, StartsWhereAnObservationIsNotDefined) {
     }
   });
   EXPECT_FALSE(batch.failed());
-  EXPECT_GT(used, 1500);
+  EXPECT_GT(used, 1000);
   EXPECT_EQ(undefined, 0);
 }
 

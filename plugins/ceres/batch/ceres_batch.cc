@@ -52,7 +52,7 @@ class CeresBatch : public Estimator {
     const UpdateReport& filter = initialiser_.Process(frame);
     const bool were_few = run_.shape().inputs <= kManyInputs;
     refused_ = !run_.Add(frame, filter, initialiser_.filter(), filtered_);
-    if (!refused_ && !offline()) SolveSoFar(frame.timestamp);
+    if (!refused_ && !offline()) SolveSoFar();
     if (failed()) report_.events.push_back({frame.timestamp, "no_solution", WhyFailed()});
     if (!refused_ && !MayBeSparse() && were_few && run_.shape().inputs > kManyInputs) {
       report_.events.push_back({frame.timestamp, "slow",
@@ -92,7 +92,7 @@ class CeresBatch : public Estimator {
     return sparse_ ? sparse_->summary() : solve_.summary();
   }
 
-  bool MayBeSparse() const { return smooths_ && options_.solver != SolverKind::kDense; }
+  bool MayBeSparse() const { return options_.solver != SolverKind::kDense; }
   /// Few inputs are solved for as fast without.
   bool IsSparse() const {
     return MayBeSparse() &&
@@ -120,13 +120,19 @@ class CeresBatch : public Estimator {
     }
   }
 
-  void SolveSoFar(Timestamp timestamp) {
-    if (!solve_.SolveAnew(run_, filtered_, e_)) return;
-    PutAll([&](std::size_t k, const Point& point) {
-      if (k + 1 == run_.shape().frames)
+  void SolveSoFar() {
+    const std::size_t last = run_.shape().frames - 1;
+    if (IsSparse()) {
+      SmoothSparse([&](std::size_t k, const std::vector<double>& x, const Eigen::MatrixXd& p) {
+        if (k == last) run_.Put(k, x, p, state_, report_);
+      });
+    } else if (solve_.SolveAnew(run_, filtered_, e_)) {
+      PutAll([&](std::size_t k, const Point& point) {
+        if (k != last) return;
         run_.Put(k, point.x, CovarianceOf(point, solve_.u()), state_, report_);
-    });
-    solve_.Note(timestamp, report_.events);
+      });
+    }
+    if (!failed()) Note(report_.events);
   }
 
   /// Gives `put` the points of the solution, and makes its map.

@@ -82,6 +82,9 @@ class KktSystem {
 
  private:
   using Inverse = CondensedRun::Inverse;
+  static std::uint64_t KeyOf(int i, int j) {
+    return (static_cast<std::uint64_t>(i) << 32U) | static_cast<std::uint32_t>(j);
+  }
   /// Some rows of a tangent, and the variable that they are.
   struct Part {
     int variable;

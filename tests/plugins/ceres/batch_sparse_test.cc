@@ -238,6 +238,24 @@ TEST(SparseBatch, StartsWhereAnObservationIsNotDefined) {
   EXPECT_EQ(undefined, 0);
 }
 
+// Every frame's estimate of the data so far.
+TEST(SparseBatch, SolvesForTheDataSoFar) {
+  const testing::Problem problem(8, 10);
+  const System system = problem.Filter();
+  const auto sparse = MakeBatch(system, "mode: filtering\nsolver: sparse\n"),
+             dense = MakeBatch(WithLoss(system), "mode: filtering\nsolver: dense\n");
+  for (const Frame& frame : problem.frames) {
+    sparse->Process(frame);
+    dense->Process(frame);
+    ASSERT_FALSE(sparse->failed());
+    const Eigen::MatrixXd p = dense->state().covariance().Dense();
+    const Eigen::VectorXd d = Apart(sparse->state(), dense->state());
+    EXPECT_LE(d.norm(), kStates * std::sqrt(p.trace()));
+    EXPECT_LE((sparse->state().covariance().Dense() - p).norm(), kCovariances * p.norm());
+    EXPECT_EQ(sparse->landmarks().size(), dense->landmarks().size());
+  }
+}
+
 // A twentieth of the measurements is wrong.
 TEST(SparseBatch, RobustLossesHaveTheSameOptimum) {
   for (const RobustLoss loss : {RobustLoss{LossKind::kHuber, 1.345}, {LossKind::kCauchy, 2.4}}) {

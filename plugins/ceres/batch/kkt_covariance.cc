@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+#include "kkt_system.h"
+
+/// The covariances of states and landmarks, from the inverse of a KktSystem.
+namespace alidade::ceres_batch {
+namespace {
+
+/// Symmetric, and without what rounding left below zero.
+Eigen::MatrixXd Clipped(const Eigen::MatrixXd& p) {
+  Eigen::MatrixXd symmetric = 0.5 * (p + p.transpose());
+  if (symmetric.ldlt().vectorD().minCoeff() >= 0.0) return symmetric;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(symmetric);
+  const Eigen::VectorXd positive = eigen.eigenvalues().cwiseMax(0.0);
+  return eigen.eigenvectors() * positive.asDiagonal() * eigen.eigenvectors().transpose();
+}
+
+}  // namespace
+
+void KktSystem::Invert() {
+  std::vector<std::pair<int, int>> wanted;
+  found_.clear();
+  const auto want = [&](int i, int j) {
+    if (i < 0 || j < 0) return;
+    if (found_.try_emplace(KeyOf(std::max(i, j), std::min(i, j)), wanted.size()).second) {
+      wanted.emplace_back(std::max(i, j), std::min(i, j));
+    }
+  };
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    const Node& node = nodes_[k];
+    const std::vector<Part> parts = PartsOf(k);
+    for (const Part& a : parts) {
+      for (const Part& b : parts) want(a.variable, b.variable);
+    }
+    if (node.first == node.last) continue;
+    std::vector<int> multipliers{node.multiplier};
+    for (const std::size_t i : node.born) multipliers.push_back(constants_[i].multiplier);
+    for (const int i : multipliers) {
+      for (const int j : multipliers) want(i, j);
+      if (k == 0) continue;
+      for (const Part& part : PartsOf(k - 1)) want(i, part.variable);
+    }
+  }
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const MapLandmark& landmark = run_.landmarks_[i];
+    want(points_[i].variable, points_[i].variable);
+    if (!landmark.first) continue;
+    want(points_[i].variable, nodes_[node_of_[landmark.first->epoch]].read);
+    for (const int constant : landmark_constants_) {
+      want(points_[i].variable, constants_[static_cast<std::size_t>(constant)].value);
+    }
+  }
+  inverse_ = ldl_.Inverse(wanted);
+}
+
+/// The covariance of two variables.
+Eigen::MatrixXd KktSystem::Found(int i, int j) const {
+  const Eigen::MatrixXd& block = inverse_[found_.at(KeyOf(std::max(i, j), std::min(i, j)))];
+  return i >= j ? block : Eigen::MatrixXd(block.transpose());
+}
+
+/// P of node k.
+Eigen::MatrixXd KktSystem::JointOf(std::size_t k) const {
+  const auto n = Eigen::Index{run_.initial_.covariance().size()};
+  Eigen::MatrixXd p = Eigen::MatrixXd::Zero(n, n);
+  const std::vector<Part> parts = PartsOf(k);
+  for (const Part& a : parts) {
+    for (const Part& b : parts) p(*a.rows, *b.rows) = Found(a.variable, b.variable);
+  }
+  if (k > 0) return p;
+  // What the prior knows exactly has no variance, not that of rounding.
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    if (nodes_[0].b.row(static_cast<Eigen::Index>(i)).any()) continue;
+    p.row(rows_[i]).setZero();
+    p.col(rows_[i]).setZero();
+  }
+  return p;
+}
+
+/// Of a frame inside a node, x = F x_{k-1} + B w:  Cov(w) = I + B' L B, Cov(x_{k-1}, w) = M B,
+/// where L and M are the blocks of the inverse of lambda_k, and of x_{k-1} and lambda_k.
+Eigen::MatrixXd KktSystem::Covariance(std::size_t frame) const {
+  const std::size_t k = node_of_[frame];
+  const Node& node = nodes_[k];
+  if (frame == node.last) return Clipped(JointOf(k));
+  const auto n = Eigen::Index{run_.initial_.covariance().size()};
+  std::vector<int> multipliers;
+  if (node.multiplier >= 0) multipliers.push_back(node.multiplier);
+  for (const std::size_t i : node.born) multipliers.push_back(constants_[i].multiplier);
+  Eigen::MatrixXd of_w = Eigen::MatrixXd::Identity(node.columns, node.columns);
+  Eigen::MatrixXd cross = Eigen::MatrixXd::Zero(n, node.columns);
+  Eigen::Index at = 0;
+  for (const int i : multipliers) {
+    const auto b_i = node.b.middleRows(at, ldl_.SizeOf(i));
+    Eigen::Index other = 0;
+    for (const int j : multipliers) {
+      const auto b_j = node.b.middleRows(other, ldl_.SizeOf(j));
+      of_w += alpha_ * alpha_ * b_i.transpose() * Found(i, j) * b_j;
+      other += b_j.rows();
+    }
+    if (k > 0) {
+      for (const Part& part : PartsOf(k - 1)) {
+        cross(*part.rows, Eigen::all) += alpha_ * Found(part.variable, i) * b_i;
+      }
+    }
+    at += b_i.rows();
+  }
+  const Eigen::MatrixXd& s = at_[frame].s;
+  const Eigen::MatrixXd by_w = s.rightCols(node.columns);
+  Eigen::MatrixXd p = by_w * of_w * by_w.transpose();
+  if (k > 0) {
+    const Eigen::MatrixXd f = s.leftCols(n), fc = f * cross * by_w.transpose();
+    p += f * JointOf(k - 1) * f.transpose() + fc + fc.transpose();
+  }
+  return Clipped(p);
+}
+
+Eigen::MatrixXd KktSystem::LandmarkCovariance(std::size_t i) const {
+  const MapLandmark& landmark = run_.landmarks_[i];
+  const Point3& point = points_[i];
+  const Eigen::MatrixXd own = Found(point.variable, point.variable);
+  const Eigen::MatrixXd& by_l = point.place.by_d;
+  if (!landmark.first) return Clipped(by_l * own * by_l.transpose());
+  std::vector<int> variables{nodes_[node_of_[landmark.first->epoch]].read};
+  for (const int constant : landmark_constants_) {
+    variables.push_back(constants_[static_cast<std::size_t>(constant)].value);
+  }
+  std::erase(variables, -1);
+  variables.insert(variables.begin(), point.variable);
+  Eigen::MatrixXd j(by_l.rows(), by_l.cols() + point.c.cols());
+  j << by_l, point.place.by_x - by_l * point.c;
+  Eigen::MatrixXd p = Eigen::MatrixXd::Zero(j.cols(), j.cols());
+  Eigen::Index row = 0;
+  for (const int a : variables) {
+    Eigen::Index column = 0;
+    for (const int b : variables) {
+      p.block(row, column, ldl_.SizeOf(a), ldl_.SizeOf(b)) = Found(a, b);
+      column += ldl_.SizeOf(b);
+    }
+    row += ldl_.SizeOf(a);
+  }
+  return Clipped(j * p * j.transpose());
+}
+
+void KktSystem::PutMap(std::vector<LandmarkEstimate>& map) const {
+  for (LandmarkEstimate& estimate : map) {
+    const auto found = std::ranges::find_if(run_.landmarks_, [&](const MapLandmark& landmark) {
+      return landmark.id == estimate.id && landmark.generation == estimate.generation;
+    });
+    if (found == run_.landmarks_.end() || found->from.size() == 0) continue;  // known exactly
+    const auto i = static_cast<std::size_t>(found - run_.landmarks_.begin());
+    run_.Describe(*found, LandmarkCovariance(i), estimate);
+  }
+}
+
+}  // namespace alidade::ceres_batch

@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include "kkt_system.h"
+
+/// What a KktSystem consists of: nodes, constants, landmarks, and which of them its blocks tie.
+namespace alidade::ceres_batch {
+
+KktSystem::KktSystem(CondensedRun& run) : run_(run), points_(run.landmarks_.size()) {
+  FindConstants();
+  FindNodes();
+  Build();
+}
+
+/// Which rows move, and which of them sensors read; the blocks that do not move.
+void KktSystem::FindConstants() {
+  const auto n = static_cast<std::size_t>(run_.initial_.covariance().size());
+  std::vector<bool> moves(n, false), read(n, false);
+  for (std::size_t i = 0; i < run_.binding_.motion_places.size(); ++i) {
+    if (run_.binding_.system.motions[i].model.stationary()) continue;
+    for (const int row : run_.binding_.motion_places[i].at) {
+      if (row >= 0) moves[static_cast<std::size_t>(row)] = true;
+    }
+  }
+  for (const internal::SensorPlace& place : run_.binding_.sensor_places) {
+    for (const JacobianPart& part : place.parts) {
+      std::fill_n(read.begin() + part.offset, part.size, true);
+    }
+  }
+  for (const Block& block : run_.initial_.layout().blocks()) {
+    if (!block.has_covariance()) continue;
+    std::vector<int> rows(static_cast<std::size_t>(block.geometry().tangent));
+    std::iota(rows.begin(), rows.end(), block.tangent_offset);
+    const auto first = static_cast<std::size_t>(block.tangent_offset);
+    if (moves[first]) {
+      std::vector<int>& into = read[first] ? read_rows_ : rest_rows_;
+      into.insert(into.end(), rows.begin(), rows.end());
+    } else {
+      constants_.emplace_back().rows = std::move(rows);
+    }
+  }
+  rows_ = read_rows_;
+  rows_.insert(rows_.end(), rest_rows_.begin(), rest_rows_.end());
+}
+
+void KktSystem::FindNodes() {
+  const StateLayout& layout = run_.initial_.layout();
+  const auto bear = [&](BlockId id, std::size_t node) {
+    const int offset = layout[id].tangent_offset;
+    for (std::size_t i = 0; i < constants_.size(); ++i) {
+      if (offset < 0 || constants_[i].born || constants_[i].rows.front() != offset) continue;
+      constants_[i].born = true;
+      constants_[i].node = node;
+      nodes_[node].born.push_back(i);
+    }
+  };
+  const std::vector<Epoch>& epochs = run_.epochs_;
+  bool open = false;
+  for (std::size_t k = 0; k < epochs.size(); ++k) {
+    if (!open) {
+      Node& node = nodes_.emplace_back();
+      node.first = k;
+      node.column = epochs[k].column;
+    }
+    open = !epochs[k].ends;
+    nodes_.back().last = k;
+    node_of_.push_back(nodes_.size() - 1);
+  }
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    Node& node = nodes_[k];
+    node.columns = (k + 1 < nodes_.size() ? nodes_[k + 1].column : run_.inputs_) - node.column;
+    for (std::size_t id = 0; k == 0 && id < layout.blocks().size(); ++id) {
+      if (run_.binding_.initial.layout().blocks()[id].present) bear(static_cast<BlockId>(id), 0);
+    }
+    for (std::size_t i = node.first; i <= node.last; ++i) {
+      for (const FirstValue& first : epochs[i].first_values) bear(first.block, k);
+    }
+  }
+}
+
+void KktSystem::Tie(int i, int j) {
+  if (i < 0 || j < 0) return;
+  if (i < j) std::swap(i, j);
+  const auto [at, inserted] = block_of_.try_emplace(KeyOf(i, j), 0);
+  if (inserted) at->second = ldl_.AddBlock(i, j);
+}
+
+/// Adds a term of these variables, of which those that there are none of (-1) do not count.
+void KktSystem::AddTerm(const std::vector<int>& variables) {
+  Term term{variables_.size(), blocks_.size(), 0};
+  for (const int v : variables) {
+    if (v < 0) continue;
+    variables_.push_back(v);
+    ++term.count;
+    for (int u = 0; u < term.count; ++u) {
+      const int w = variables_[term.variables + static_cast<std::size_t>(u)];
+      Tie(v, w);
+      blocks_.push_back(block_of_.at(KeyOf(std::max(v, w), std::min(v, w))));
+    }
+  }
+  terms_.push_back(term);
+}
+
+std::vector<int> KktSystem::ConstantsOf(std::size_t sensor) const {
+  std::vector<int> found;
+  for (const JacobianPart& part : run_.binding_.sensor_places[sensor].parts) {
+    for (std::size_t i = 0; i < constants_.size(); ++i) {
+      const int at = static_cast<int>(i);
+      if (constants_[i].born && constants_[i].rows.front() == part.offset &&
+          std::ranges::find(found, at) == found.end()) {
+        found.push_back(at);
+      }
+    }
+  }
+  return found;
+}
+
+bool KktSystem::ReadsStates(std::size_t sensor) const {
+  const auto moves = [this](const JacobianPart& part) {
+    return std::ranges::find(read_rows_, part.offset) != read_rows_.end();
+  };
+  return std::ranges::any_of(run_.binding_.sensor_places[sensor].parts, moves);
+}
+
+/// The variables of a state, and the rows of its tangent that each is.
+std::vector<KktSystem::Part> KktSystem::PartsOf(std::size_t k) const {
+  std::vector<Part> parts;
+  if (nodes_[k].read >= 0) parts.push_back({nodes_[k].read, &read_rows_});
+  if (nodes_[k].rest >= 0) parts.push_back({nodes_[k].rest, &rest_rows_});
+  for (const Constant& constant : constants_) {
+    if (constant.born && constant.node <= k) parts.push_back({constant.value, &constant.rows});
+  }
+  return parts;
+}
+
+void KktSystem::Build() {
+  ldl_ = {};
+  block_of_.clear();
+  terms_.clear();
+  variables_.clear();
+  blocks_.clear();
+  const auto add = [this](const std::vector<int>& rows) {
+    return rows.empty() ? -1 : ldl_.AddVariable(static_cast<int>(rows.size()));
+  };
+  for (Node& node : nodes_) {
+    node.read = add(read_rows_);
+    node.rest = add(rest_rows_);
+    node.multiplier = add(rows_);
+  }
+  for (Constant& constant : constants_) {
+    if (!constant.born) continue;
+    constant.value = add(constant.rows);
+    constant.multiplier = add(constant.rows);
+  }
+  inputs_ = run_.inputs_;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const auto size = static_cast<int>(run_.landmarks_[i].from.size());
+    points_[i].column = inputs_;
+    points_[i].variable = size > 0 ? ldl_.AddVariable(size) : -1;
+    inputs_ += size;
+  }
+  for (std::size_t k = 0; k < nodes_.size(); ++k) AddConstraints(k);
+  AddTerms();
+  ChooseOrder();
+}
+
+/// The blocks of node k, and those whose inverse its covariance takes.
+void KktSystem::AddConstraints(std::size_t k) {
+  const Node& node = nodes_[k];
+  std::vector<Part> before;
+  if (k > 0) before = PartsOf(k - 1);
+  Tie(node.multiplier, node.multiplier);
+  Tie(node.multiplier, node.read);
+  Tie(node.multiplier, node.rest);
+  if (k > 0) {
+    Tie(node.multiplier, nodes_[k - 1].read);
+    Tie(node.multiplier, nodes_[k - 1].rest);
+  }
+  for (const std::size_t i : node.born) {
+    Tie(constants_[i].multiplier, constants_[i].multiplier);
+    Tie(constants_[i].multiplier, constants_[i].value);
+  }
+  for (const Part& part : PartsOf(k)) {
+    for (const Constant& constant : constants_) {
+      if (constant.born && constant.node <= k) Tie(constant.value, part.variable);
+    }
+  }
+  // First values, a prior that ties blocks, and frames inside the node have all of it.
+  bool joint = node.first != node.last;
+  for (std::size_t i = node.first; i <= node.last; ++i) {
+    joint = joint || !run_.epochs_[i].first_values.empty();
+  }
+  if (k == 0) {
+    Eigen::MatrixXd p = run_.l0_ * run_.l0_.transpose();
+    for (const Constant& constant : constants_) p(constant.rows, constant.rows).setZero();
+    p(rows_, rows_).setZero();
+    joint = joint || (p.array() != 0.0).any();
+  }
+  if (!joint) return;
+  std::vector<int> multipliers{node.multiplier};
+  for (const std::size_t i : node.born) multipliers.push_back(constants_[i].multiplier);
+  for (const int i : multipliers) {
+    for (const int j : multipliers) Tie(i, j);
+    for (const Part& part : before) Tie(i, part.variable);
+  }
+}
+
+/// The terms in the order in which Linearise goes through them.
+void KktSystem::AddTerms() {
+  const std::size_t sensors = run_.binding_.sensor_places.size();
+  std::vector<std::vector<int>> constants(sensors);
+  landmark_constants_.clear();
+  for (std::size_t i = 0; i < sensors; ++i) {
+    constants[i] = ConstantsOf(i);
+    if (!run_.ObservesLandmarks(run_.binding_.system.sensors[i])) continue;
+    for (const int constant : constants[i]) {
+      if (std::ranges::find(landmark_constants_, constant) == landmark_constants_.end()) {
+        landmark_constants_.push_back(constant);
+      }
+    }
+  }
+  const auto with = [this](std::vector<int> variables, const std::vector<int>& more) {
+    for (const int i : more) variables.push_back(constants_[static_cast<std::size_t>(i)].value);
+    return variables;
+  };
+  for (std::size_t k = 0; k < run_.epochs_.size(); ++k) {
+    for (const Factor& factor : run_.epochs_[k].factors) {
+      if (factor.row < 0) continue;
+      const auto sensor = static_cast<std::size_t>(factor.sensor);
+      AddTerm(with({ReadsStates(sensor) ? nodes_[node_of_[k]].read : -1}, constants[sensor]));
+    }
+  }
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const MapLandmark& landmark = run_.landmarks_[i];
+    const Point3& point = points_[i];
+    const int first = landmark.first ? nodes_[node_of_[landmark.first->epoch]].read : -1;
+    AddTerm(landmark.first ? with({point.variable, first}, landmark_constants_)
+                           : std::vector<int>{point.variable});
+    for (const auto& [epoch, index] : landmark.observations) {
+      const int here = nodes_[node_of_[epoch]].read;
+      const bool tied = point.anchored && here != first;
+      AddTerm(with({point.variable, here, tied ? first : -1}, landmark_constants_));
+    }
+  }
+}
+
+/// Time order, a landmark before the last node that sees it, or minimum degree: the one with fewer
+/// flops.
+void KktSystem::ChooseOrder() {
+  std::vector<std::vector<int>> ending(nodes_.size());
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const MapLandmark& landmark = run_.landmarks_[i];
+    std::size_t last = landmark.first ? node_of_[landmark.first->epoch] : 0;
+    if (!landmark.observations.empty()) {
+      last = std::max(last, node_of_[landmark.observations.back().epoch]);
+    }
+    if (points_[i].variable >= 0) ending[last].push_back(points_[i].variable);
+  }
+  Groups groups;
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    for (const int landmark : ending[k]) groups.push_back({landmark});
+    std::vector<int>& pair = groups.emplace_back();
+    for (const int v : {nodes_[k].read, nodes_[k].rest, nodes_[k].multiplier}) {
+      if (v >= 0) pair.push_back(v);
+    }
+    if (pair.empty()) groups.pop_back();
+  }
+  for (const Constant& constant : constants_) {
+    if (constant.born) groups.push_back({constant.value, constant.multiplier});
+  }
+  Elimination time(ldl_.graph(), groups);
+  Elimination least(ldl_.graph(), MinimumDegree(ldl_.graph(), groups));
+  in_time_order_ = time.flops <= least.flops;
+  ldl_.Use(std::move(in_time_order_ ? time : least));
+}
+
+double KktSystem::bytes() const {
+  // The factor, the blocks of the matrix, and one front with its border.
+  double matrix = 0.0, front = 0.0;
+  const BlockGraph& graph = ldl_.graph();
+  const auto size = [&](int v) { return 1.0 * graph.size[static_cast<std::size_t>(v)]; };
+  for (const auto& [i, j] : graph.edges) matrix += size(i) * size(j);
+  for (const Elimination::Front& f : elimination().fronts) {
+    front = std::max(front, double(f.p + f.m) * double(f.p + f.m));
+  }
+  return 8.0 * (elimination().numbers + matrix + 3.0 * front);
+}
+
+}  // namespace alidade::ceres_batch

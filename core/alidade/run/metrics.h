@@ -44,8 +44,8 @@ namespace alidade {
 /// C = P + T is the covariance of e, T = diag(StreamInfo::sigma^2) that of the truth, which knows
 /// nothing of the filter; sigma^2 is its diagonal. An exact truth has T = 0.
 /// Over a segment the key ends in `@SEGMENT`: rmse, implied.rmse, coverage95, nees.mean,
-/// nees.within95 and nis.mean. Counts are `OUTCOME:SENSOR`, of control inputs `inputs:ENTRY`, and of
-/// landmarks `landmarks.initialised`, `.deleted`, `.converted`, `.negative`, `.hypotheses`,
+/// nees.within95 and nis.mean. Counts are `OUTCOME:SENSOR`, of control inputs `inputs:ENTRY`, and
+/// of landmarks `landmarks.initialised`, `.deleted`, `.converted`, `.negative`, `.hypotheses`,
 /// `.rescued`. A truth is named like the block, `target.depth`, or like its last component where
 /// that is unique.
 /// A frame older than the state, as before `initial_time_s`, adds to the counts alone.

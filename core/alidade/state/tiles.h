@@ -6,8 +6,8 @@
 
 #include "alidade/base/workspace.h"
 
-/// Products and factors of matrices by the vector kernels of the processor; what is left to Eigen is
-/// in tiles that it works on the stack: nothing is allocated in the steady state.
+/// Products and factors of matrices by the vector kernels of the processor; what is left to Eigen
+/// is in tiles that it works on the stack: nothing is allocated in the steady state.
 namespace alidade::internal {
 
 using MatrixRef = Eigen::Ref<Eigen::MatrixXd>;

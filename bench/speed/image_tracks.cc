@@ -6,11 +6,12 @@
 //   bench_image_tracks examples/25_slam_images
 //
 // The images are those of the example, drawn here and kept as files. Source `image_tracks` reads
-// them and gives its features to the EKF of the example. What it does inside is measured by the
-// same calls of OpenCV, made apart from it; its checks and its search for new features are the
-// rest.
+// them and gives its features to the EKF of the example, once guided by it and once not. What it
+// does inside is measured by the same calls, made apart from it; that it aligns features, and
+// searches for new ones, is the rest.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -25,6 +26,7 @@
 
 #include "alidade/base/error.h"
 #include "alidade/base/read_file.h"
+#include "alidade/run/estimator_guide.h"
 #include "alidade/run/experiment.h"
 #include "bench/speed/interleaved.h"
 #include "support/temporary_folder.h"
@@ -77,13 +79,17 @@ class Times {
   /// Goes through the images of a folder once: each part in turn, frame by frame.
   void Add(const Config& config, const PluginHost& host, const fs::path& folder) {
     Experiment experiment = BuildExperiment(config, host);
+    is_guided_ = experiment.guide >= 0;
+    const internal::EstimatorGuide guide(experiment, nullptr);
     Estimator& filter = *experiment.estimators[0].estimator;
     SourceFrame frame;
     std::vector<cv::Point2f> from, to, back;
+    std::vector<std::int64_t> ids;
     std::vector<unsigned char> found;
     std::vector<float> error;
     std::vector<cv::Mat> pyramid_before, pyramid;
     cv::Mat before, image;
+    Timestamp step = 0;
     const auto size = static_cast<int>(experiment.source->size());
     for (int k = 0; k < size; ++k) {
       // The first image has nothing to follow: it is left out, and so is its search.
@@ -93,24 +99,25 @@ class Times {
       if (!from.empty()) {
         times.lk_.Take(k, [&] { cv::calcOpticalFlowPyrLK(before, image, from, to, found, error); });
       }
-      times.pyramid_.Take(k, [&] {
-        cv::buildOpticalFlowPyramid(image, pyramid, {21, 21}, 3, false);
-      });
-      if (!from.empty()) {
-        times.forward_.Take(
-            k, [&] { cv::calcOpticalFlowPyrLK(pyramid_before, pyramid, from, to, found, error); });
-        back = from;
-        times.back_.Take(k, [&] {
-          cv::calcOpticalFlowPyrLK(pyramid, pyramid_before, to, back, found, error, {21, 21}, 0,
-                                   {cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30, 0.01},
-                                   cv::OPTFLOW_USE_INITIAL_FLOW);
+      if (!is_guided_) {
+        times.pyramid_.Take(k, [&] {
+          cv::buildOpticalFlowPyramid(image, pyramid, {21, 21}, 3, false);
         });
       }
+      if (!from.empty() && is_guided_) {
+        times.expect_.Take(k, [&] { guide.Expect(0, frame.timestamp + step, ids); });
+      } else if (!from.empty()) {
+        times.Flow(k, pyramid_before, pyramid, from, to);
+      }
+      const Timestamp last = frame.timestamp;
       times.next_.Take(k, [&] { experiment.source->Next(frame); });
+      step = frame.timestamp - last;
       times.filter_.Take(k, [&] { filter.Process(frame); });
       from.clear();
+      ids.clear();
       for (const Measurement& m : frame.measurements) {
         from.emplace_back(static_cast<float>(m.values[0]), static_cast<float>(m.values[1]));
+        ids.push_back(m.landmark);
       }
       ++times.frames_;
       times.features_ += static_cast<double>(from.size());
@@ -120,30 +127,62 @@ class Times {
   }
 
   void Print() const {
-    const double lk = lk_.Mean(), pyramid = pyramid_.Mean(), forward = forward_.Mean();
-    const double back = back_.Mean(), front_end = next_.Mean() - read_.Mean();
+    const double lk = lk_.Mean(), front_end = next_.Mean() - read_.Mean();
     const double both = front_end + filter_.Mean();
-    std::printf("%.0f features a frame\n", features_ / frames_);
+    const char* const name = is_guided_ ? "guided" : "not guided";
+    std::printf("%s, %.0f features a frame\n", name, features_ / frames_);
     std::printf("%-40s %8s %8s\n", "CPU time of a frame", "ms", "to LK");
-    const auto line = [lk](const char* name, double ns) {
-      std::printf("%-40s %8.3f %8.2f\n", name, 1e-6 * ns, ns / lk);
+    const auto line = [lk](const char* part, double ns) {
+      std::printf("%-40s %8.3f %8.2f\n", part, 1e-6 * ns, ns / lk);
     };
     line("calcOpticalFlowPyrLK alone", lk);
     line("read and decode, PGM", read_.Mean());
     line("front end", front_end);
-    line("  pyramid", pyramid);
-    line("  follow forward", forward);
-    line("  follow back", back);
-    line("  align, check, search for new ones", front_end - pyramid - forward - back);
+    double rest = front_end;
+    const auto part = [&](const char* of, const Part& times) {
+      line(of, times.Mean());
+      rest -= times.Mean();
+    };
+    if (is_guided_) {
+      part("  what the filter expects", expect_);
+    } else {
+      part("  pyramid", pyramid_);
+      part("  follow forward", forward_);
+      part("  follow back", back_);
+    }
+    line("  align, check, search for new ones", rest);
     line("filter", filter_.Mean());
     line("front end and filter", both);
-    std::printf("ratio front_end/lk %.3f\n", front_end / lk);
-    std::printf("ratio filter/lk %.3f\n", filter_.Mean() / lk);
-    std::printf("ratio front_end_and_filter/lk %.3f\n", both / lk);
+    const std::string label = is_guided_ ? "guided_" : "";
+    std::printf("ratio %sfront_end/lk %.3f\n", label.c_str(), front_end / lk);
+    std::printf("ratio %sfilter/lk %.3f\n", label.c_str(), filter_.Mean() / lk);
+    std::printf("ratio %sfront_end_and_filter/lk %.3f\n", label.c_str(), both / lk);
   }
 
  private:
-  Part read_, lk_, pyramid_, forward_, back_, next_, filter_;
+  /// As PyramidFlow does it.
+  void Flow(int k, const std::vector<cv::Mat>& last, const std::vector<cv::Mat>& next,
+            const std::vector<cv::Point2f>& from, std::vector<cv::Point2f>& to) {
+    const cv::TermCriteria stop{cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30, 0.01};
+    std::vector<cv::Point2f> half, back = from;
+    std::vector<unsigned char> found;
+    std::vector<float> error;
+    for (const cv::Point2f& at : from) half.push_back(0.5F * at);
+    to = half;
+    forward_.Take(k, [&] {
+      cv::calcOpticalFlowPyrLK(std::vector(last.begin() + 1, last.end()),
+                               std::vector(next.begin() + 1, next.end()), half, to, found, error,
+                               {21, 21}, 2, stop, cv::OPTFLOW_USE_INITIAL_FLOW);
+    });
+    for (cv::Point2f& at : to) at *= 2.0F;
+    back_.Take(k, [&] {
+      cv::calcOpticalFlowPyrLK(next, last, to, back, found, error, {21, 21}, 0, stop,
+                               cv::OPTFLOW_USE_INITIAL_FLOW);
+    });
+  }
+
+  bool is_guided_ = false;
+  Part read_, lk_, pyramid_, forward_, back_, expect_, next_, filter_;
   double features_ = 0.0, frames_ = 0.0;
 };
 
@@ -174,9 +213,12 @@ int Main(int argc, char** argv) {
     if (equals == setting.npos) throw std::runtime_error("--set takes KEY=VALUE");
     config.Set(setting.substr(0, equals), setting.substr(equals + 1), "--set");
   }
-  Times times;
-  for (int round = 0; round < rounds; ++round) times.Add(config, host, temporary.path());
-  times.Print();
+  for (const char* guide : {"ekf", "none"}) {
+    config.Set("source.guide", guide, "bench");
+    Times times;
+    for (int round = 0; round < rounds; ++round) times.Add(config, host, temporary.path());
+    times.Print();
+  }
   return 0;
 }
 

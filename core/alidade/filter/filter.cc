@@ -29,6 +29,15 @@ void CheckKnown(const std::string& what, int size, const std::vector<double>& kn
                                       std::to_string(known.size()));
 }
 
+/// Index of the sensor, which takes as many known numbers.
+int FindSensor(const System& system, std::string_view name, const std::vector<double>& known) {
+  const int index = system.FindSensor(name);
+  if (index < 0) RefuseName("sensor", name, internal::NamesOf(system.sensors));
+  CheckKnown("sensor '" + std::string(name) + '\'',
+             system.sensors[static_cast<std::size_t>(index)].model.known_size(), known);
+  return index;
+}
+
 void CheckReading(const std::vector<StreamInfo>& streams, const System& system,
                   const Reading& one) {
   if (one.stream < 0 || one.stream >= std::ssize(streams)) {
@@ -116,13 +125,22 @@ State Filter::At(Timestamp timestamp) const {
 std::optional<Prediction> Filter::Expect(std::string_view sensor, Timestamp timestamp,
                                          std::int64_t landmark,
                                          const std::vector<double>& known) const {
-  const int index = system().FindSensor(sensor);
-  if (index < 0) RefuseName("sensor", sensor, internal::NamesOf(system().sensors));
-  CheckKnown("sensor '" + std::string(sensor) + '\'',
-             system().sensors[static_cast<std::size_t>(index)].model.known_size(), known);
+  const int index = FindSensor(system(), sensor, known);
   FrameLoop later(*loop_);
   later.Process({timestamp, {}});
   return later.Expect(index, landmark, known);
+}
+
+std::vector<std::optional<Prediction>> Filter::ExpectEach(
+    std::string_view sensor, Timestamp timestamp,
+    const std::vector<std::int64_t>& landmarks) const {
+  const int index = FindSensor(system(), sensor, {});
+  std::vector<std::optional<Prediction>> each;
+  if (landmarks.empty()) return each;
+  FrameLoop later(*loop_);
+  later.Process({timestamp, {}});
+  for (const std::int64_t landmark : landmarks) each.push_back(later.Expect(index, landmark, {}));
+  return each;
 }
 
 }  // namespace alidade

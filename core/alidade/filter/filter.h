@@ -133,6 +133,11 @@ class Filter : public Estimator {
   std::optional<Prediction> Expect(std::string_view sensor, Timestamp timestamp,
                                    std::int64_t landmark = -1,
                                    const std::vector<double>& known = {}) const;
+  /// The same of each of the landmarks, of a sensor that takes no known numbers; the state is
+  /// stepped once for all.
+  std::vector<std::optional<Prediction>> ExpectEach(
+      std::string_view sensor, Timestamp timestamp,
+      const std::vector<std::int64_t>& landmarks) const;
 
  protected:
   /// @cond

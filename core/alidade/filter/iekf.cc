@@ -31,6 +31,7 @@ class Iterated : public Method {
   std::unique_ptr<Method> Clone() const override { return std::make_unique<Iterated>(*this); }
   Trouble Step(FilterState& f, double dt_s) override { return linear_.Step(f, dt_s); }
   Outcome Predict(FilterState& f, Row& row) override { return linear_.Predict(f, row); }
+  Outcome Expect(FilterState& f, Row& row) override { return linear_.Expect(f, row); }
   Outcome Correct(FilterState& f, std::span<Row* const> rows) override;
 
  private:

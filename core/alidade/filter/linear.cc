@@ -45,6 +45,15 @@ Outcome Linear::Predict(FilterState& f, Row& row) {
   return outcome;
 }
 
+Outcome Linear::Expect(FilterState& f, Row& row) {
+  const Outcome outcome = Linearise(f, row);
+  if (outcome != Outcome::kAccepted) return outcome;
+  row.PHt.clear();
+  row.report->s.assign(row.R.begin(), row.R.end());
+  f.state.covariance().AddProjection(row.jacobian(), row.report->s.data());
+  return outcome;
+}
+
 Outcome Linear::Linearise(FilterState& f, Row& row) {
   MeasurementReport& entry = *row.report;
   RolesAt(row, f.state.values(), f.state.values());

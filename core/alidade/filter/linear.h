@@ -15,6 +15,7 @@ class Linear : public Method {
   std::unique_ptr<Method> Clone() const override { return std::make_unique<Linear>(*this); }
   Trouble Step(FilterState& f, double dt_s) override;
   Outcome Predict(FilterState& f, Row& row) override;
+  Outcome Expect(FilterState& f, Row& row) override;
   Outcome Correct(FilterState& f, std::span<Row* const> rows) override {
     return CorrectBy(f, rows, nullptr);
   }

@@ -62,6 +62,23 @@ struct SeenImage {
   std::vector<std::array<double, 2>> outline = {};
 };
 
+/// What a filter expects of a measurement of size m.
+struct Expected {
+  std::vector<double> z;  ///< h; empty: it cannot tell
+  std::vector<double> s;  ///< S = H P H' + R, m x m
+};
+
+/// What a filter expects that a source will measure, lent to a source that looks for it there:
+/// active search [Davison2007].
+class Guide {
+ public:
+  virtual ~Guide() = default;
+  /// Of each of the landmarks, what `stream`, an index into Source::streams(), will be at
+  /// `timestamp`. The filter stays as it is.
+  virtual std::vector<Expected> Expect(int stream, Timestamp timestamp,
+                                       const std::vector<std::int64_t>& landmarks) const = 0;
+};
+
 /// Where measurements come from: a simulator, a file, a pipe. A C++ plugin.
 class Source {
  public:
@@ -73,6 +90,11 @@ class Source {
   /// values as many as streams() and truths() say: what is not ends the run as internal.
   /// Errors: kBadData, kIo.
   virtual bool Next(SourceFrame& frame) = 0;
+  /// The estimator, a filter, that guides it; empty: none.
+  virtual std::string guided_by() const { return {}; }
+  /// Lends it the guide that it asks for, for the frames from now on; null takes it back. A source
+  /// that has none, as in `alidade simulate`, measures without.
+  virtual void LendGuide(const Guide* /*guide*/) {}
   /// Where the landmark of that id is in the world, m, where the source knows the true map.
   virtual std::optional<std::array<double, 3>> TrueLandmark(std::int64_t /*id*/) const {
     return std::nullopt;

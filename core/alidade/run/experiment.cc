@@ -4,6 +4,7 @@
 #include "alidade/base/text_table.h"
 #include "alidade/base/words.h"
 #include "alidade/config/tree.h"
+#include "alidade/filter/filter.h"
 #include "alidade/host/calibration.h"
 #include "alidade/host/plugin_host.h"
 #include "alidade/run/named_estimator.h"
@@ -129,6 +130,24 @@ int ReadReference(const Node& root, const std::vector<NamedEstimator>& estimator
   return static_cast<int>(found - estimators.begin());
 }
 
+/// Index of the filter that guides the source; -1: none does.
+int ReadGuide(const Node& source, const Experiment& experiment) {
+  const std::string name = experiment.source->guided_by();
+  if (name.empty()) return -1;
+  const Node guide = source.At("guide");
+  const std::vector<NamedEstimator>& estimators = experiment.estimators;
+  const auto found = std::ranges::find(estimators, name, &NamedEstimator::name);
+  if (found == estimators.end()) {
+    const std::vector<std::string> names = NamesOf(estimators);
+    guide.Fail("no estimator '" + name + "'", "a filter: " + internal::Join(names),
+               Nearest(name, names));
+  }
+  if (dynamic_cast<const Filter*>(found->estimator.get()) == nullptr) {
+    guide.Fail("estimator '" + name + "' predicts no measurements", "a recursive filter of core");
+  }
+  return static_cast<int>(found - estimators.begin());
+}
+
 /// Keys of the root that are read before the calibration is there, or by other commands.
 void DeclareCommon(const Node& root) {
   for (const char* key :
@@ -232,6 +251,7 @@ Experiment BuildExperiment(const Config& config, const PluginHost& host) {
     root.At("estimators").Fail("empty", "at least one estimator");
   }
   experiment.reference = ReadReference(root, experiment.estimators);
+  experiment.guide = ReadGuide(source, experiment);
   experiment.truth_sigmas =
       ReadTruthSigmas(root, experiment.source->truths(), experiment.reference < 0);
   CheckTruths(source, experiment, whole);

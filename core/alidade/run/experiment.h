@@ -73,6 +73,7 @@ struct Experiment {
   std::uint64_t seed = 1;
   OutOfSequencePolicy out_of_sequence;
   int reference = -1;  ///< index of the estimator that metrics compare with; -1: truth
+  int guide = -1;      ///< index of the filter that guides the source; -1: none
   std::vector<double> truth_sigmas;  ///< StreamInfo::sigma of the source's truths; empty: its own
   /// Files, without folder, of the plugins in use that were built without optimisation.
   std::set<std::string> unoptimised;

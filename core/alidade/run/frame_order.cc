@@ -34,7 +34,10 @@ std::string In(const Place& place) {
 }  // namespace
 
 FrameOrder::FrameOrder(Experiment& experiment, Check check, std::function<void(bool)> busy)
-    : experiment_(experiment), check_(std::move(check)), busy_(std::move(busy)) {
+    : experiment_(experiment),
+      check_(std::move(check)),
+      busy_(std::move(busy)),
+      guide_(experiment, busy_) {
   if (experiment.out_of_sequence.policy != OutOfSequence::kRollback) return;
   for (const NamedEstimator& named : experiment.estimators) {
     Processed& before = released_.processed.emplace_back();

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "alidade/run/estimator_guide.h"
 #include "alidade/run/run.h"
 
 namespace alidade::internal {
@@ -23,7 +24,7 @@ struct Processed {
 
 /// The frames of an experiment's source in the order of its OutOfSequencePolicy. Under kRollback it
 /// also steers the estimators: they take each frame as it comes, and what came after an
-/// out-of-sequence one again.
+/// out-of-sequence one again. The source is guided, where it asks for it.
 class FrameOrder {
  public:
   using Check = std::function<void(SourceFrame&)>;
@@ -67,6 +68,7 @@ class FrameOrder {
   Experiment& experiment_;
   Check check_;
   std::function<void(bool)> busy_;
+  EstimatorGuide guide_;
   std::deque<Held> held_;  ///< by timestamp
   Held released_;          ///< the one that Next gave last, or what was before the first
   Timestamp newest_ = kNoTimestamp;

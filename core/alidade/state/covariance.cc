@@ -140,6 +140,26 @@ void Covariance::Propagate(std::span<const JacobianPart> parts, const double* f,
   SetParts(parts, own, cross);
 }
 
+void Covariance::AddProjection(const JacobianRows& h, double* s) const {
+  const auto row = [&](int i) { return h.data + static_cast<std::ptrdiff_t>(i) * h.stride; };
+  for (const JacobianPart& right : h.parts) {
+    for (int c = 0; c < right.size; ++c) {
+      const int b = right.offset + c;
+      for (int i = 0; i < h.rows; ++i) {
+        double sum = 0.0;  // row i of H P, column b
+        for (const JacobianPart& left : h.parts) {
+          const double* const j = row(i) + left.column;
+          for (int d = 0; d < left.size; ++d) {
+            const int a = left.offset + d;
+            sum += j[d] * p_(std::max(a, b), std::min(a, b));
+          }
+        }
+        for (int k = 0; k < h.rows; ++k) s[i * h.rows + k] += sum * row(k)[right.column + c];
+      }
+    }
+  }
+}
+
 void Covariance::Project(const JacobianRows& h, double* pht, double* s) const {
   if (internal::IsSmall(*this) && h.whole) {
     const int ld = static_cast<int>(p_.rows());

@@ -69,6 +69,8 @@ class Covariance {
 
   /// pht = P H' (n x m, by columns) and s += H P H' (m x m). O(n m k), k the columns of H's parts.
   void Project(const JacobianRows& h, double* pht, double* s) const;
+  /// s += H P H' alone (m x m). O(m k^2).
+  void AddProjection(const JacobianRows& h, double* s) const;
 
   /// x' = F x + w of the k rows in `parts`, w ~ N(0, Q): P_aa <- F P_aa F' + Q, P_ai <- F P_ai,
   /// F and Q k x k, row-major, of Q the lower triangle; null: zero. O(n k).

@@ -29,6 +29,14 @@ namespace alidade {
 ///   known    3     u, v, depth  of the points of a table `known` in the first image, in place of
 ///                               their first observation
 ///
+/// Under `guide` the features are looked for where that filter expects them, see FeatureTracker.
+///
+/// With `estimate_noise` each measurement of `tracks` brings its covariance,
+///
+///   R = C + sigma^2 I
+///
+/// with C that of FoundPatch, and sigma the config's sigma_systematic_px.
+///
 /// Keys         kImageTracksKeys (tracks.cc), those of TrackerOptions.
 /// Errors       those of ImageReader, TimestampRows and TumRows; kBadConfig.
 class ImageTracks : public Source {
@@ -45,7 +53,13 @@ class ImageTracks : public Source {
     tolerance_ = TimestampFromSeconds(
         p.Number("truth_tolerance_s", "s",
                  "the true pose of an image is at most so far off in time", {0.0, 1e3}, 1e-3));
-    for (const char* key : {"path", "images", "known", "state_entry"}) {
+    estimate_noise_ =
+        p.Flag("estimate_noise",
+               "each measurement brings its covariance; false: that of the sensors", false);
+    systematic_px_ = p.NonNegative(
+        "sigma_systematic_px", "px",
+        "with estimate_noise: what no residual tells, of each coordinate, 1 sigma", 0.15);
+    for (const char* key : {"path", "images", "known", "guide", "state_entry"}) {
       arguments.entry.Declare(key);
     }
     const auto text = [&](const char* key, const char* fallback) {
@@ -56,6 +70,8 @@ class ImageTracks : public Source {
     if (const auto known = arguments.entry.Find("known")) {
       ReadKnown(arguments.folder / known->Text(), *known);
     }
+    guided_by_ = text("guide", "none");
+    if (guided_by_ == "none") guided_by_.clear();
     const std::string state = text("state_entry", "cam");
     if (truth_) truths_ = {{state + ".position", 3}, {state + ".orientation", 4}};
   }
@@ -74,6 +90,9 @@ class ImageTracks : public Source {
     return CalibrationFile::Read(*calibration_);
   }
 
+  std::string guided_by() const override { return guided_by_; }
+  void LendGuide(const Guide* guide) override { guide_ = guide; }
+
   bool Next(SourceFrame& frame) override {
     if (frames_ == most_ && most_ > 0) return false;
     do {
@@ -85,7 +104,8 @@ class ImageTracks : public Source {
     frame.timestamp = times_->At(images_->number());
     frame.measurements.clear();
     if (frames_ == 0 && !known_.empty()) GiveKnown();
-    for (const FeatureTracker::Feature& feature : tracker_.Track(image_)) {
+    for (const FeatureTracker::Feature& feature :
+         tracker_.Track(image_, ExpectedAt(frame.timestamp))) {
       const bool known = frames_ == 0 && feature.id < std::ssize(known_);
       Measurement& one = frame.measurements.emplace_back();
       one.timestamp = frame.timestamp;
@@ -93,6 +113,7 @@ class ImageTracks : public Source {
       one.landmark = feature.id;
       one.values = {feature.at.x, feature.at.y};
       if (known) one.values.push_back(known_[static_cast<std::size_t>(feature.id)].depth_m);
+      if (estimate_noise_ && !known) one.covariance = CovarianceOf(feature);
     }
     frame.truth.assign(truths_.size(), {});
     if (truth_) {
@@ -106,6 +127,28 @@ class ImageTracks : public Source {
   }
 
  private:
+  /// Where the filter that guides expects each feature.
+  FeatureTracker::Expectations ExpectedAt(Timestamp timestamp) const {
+    if (guide_ == nullptr) return {};
+    std::vector<std::int64_t> ids;
+    for (const FeatureTracker::Feature& feature : tracker_.features()) ids.push_back(feature.id);
+    FeatureTracker::Expectations expectations;
+    for (const Expected& one : guide_->Expect(0, timestamp, ids)) {
+      std::optional<ExpectedPoint>& point = expectations.emplace_back();
+      if (one.z.size() != 2) continue;
+      point = {cv::Point2f(cv::Point2d(one.z[0], one.z[1])),
+               cv::Matx22d(one.s[0], one.s[1], one.s[2], one.s[3])};
+    }
+    return expectations;
+  }
+
+  /// R, row-major.
+  std::vector<double> CovarianceOf(const FeatureTracker::Feature& feature) const {
+    const double own = systematic_px_ * systematic_px_;
+    const Eigen::Matrix2d c = feature.found.Covariance().cast<double>();
+    return {c(0, 0) + own, c(0, 1), c(1, 0), c(1, 1) + own};
+  }
+
   struct Known {
     cv::Point2f at;
     double depth_m;
@@ -174,12 +217,14 @@ class ImageTracks : public Source {
   }
 
   FeatureTracker tracker_;
-  double rate_hz_ = 0.0;
+  double rate_hz_ = 0.0, systematic_px_ = 0.0;
+  bool estimate_noise_ = false;
   std::int64_t start_ = 0, most_ = 0, frames_ = 0;
   Timestamp tolerance_ = 0;
   std::vector<StreamInfo> streams_ = {{"tracks", 2}}, truths_;
   std::vector<Known> known_;
-  std::string known_file_;
+  std::string known_file_, guided_by_;
+  const Guide* guide_ = nullptr;
   std::optional<ImageReader> images_;
   std::optional<ImageTimes> times_;
   std::optional<TumRows> truth_;

@@ -159,6 +159,24 @@ TYPED_TEST(Live, ExpectsWhatTheReportThenSaysOfTheMeasurement) {
   EXPECT_NEAR(scale->s(0, 0), report.measurements()[1].s[0], 1e-12 * scale->s(0, 0));
 }
 
+TYPED_TEST(Live, ExpectsOfEachLandmarkWhatItExpectsOfItAlone) {
+  TypeParam filter = MakeLive<TypeParam>();
+  for (const Frame& frame : Swinging(10, 3)) filter.Process(frame);
+  const State before = filter.state();
+  const Timestamp later = filter.timestamp() + 20'000'000;
+  EXPECT_TRUE(filter.ExpectEach("disparity", later, {}).empty());
+  const auto each = filter.ExpectEach("disparity", later, {-1, -1});
+  const auto alone = filter.Expect("disparity", later);
+  ASSERT_EQ(each.size(), 2u);
+  for (const auto& one : each) {
+    ASSERT_TRUE(one && alone);
+    EXPECT_EQ(one->z, alone->z);
+    EXPECT_EQ(one->s, alone->s);
+  }
+  ExpectSame(filter.state(), before);
+  EXPECT_THROW(filter.ExpectEach("stereo", later, {-1}), Error);
+}
+
 TEST(Live, NamesAreThoseOfTheConfigAndAWrongOneIsAnErrorThatListsThem) {
   const Ekf ekf = MakeLive<Ekf>();
   EXPECT_EQ(ekf.stream("inverse_scale"), 1);

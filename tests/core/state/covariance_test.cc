@@ -61,6 +61,9 @@ TEST(Covariance, ProjectEqualsTheDenseProduct) {
   p.Project({h.data(), 2, 4, parts}, pht.data(), s.data());
   EXPECT_LT((pht - p.Dense() * dense_h.transpose()).norm(), kRounding * pht.norm());
   EXPECT_LT((s - dense_h * pht).norm(), kRounding * pht.norm());
+  Eigen::MatrixXd added = Eigen::MatrixXd::Identity(2, 2);
+  p.AddProjection({h.data(), 2, 4, parts}, added.data());
+  EXPECT_LT((added - Eigen::MatrixXd::Identity(2, 2) - s).norm(), kRounding * pht.norm());
 }
 
 TEST(Covariance, PropagateEqualsTheDenseFormForScatteredRows) {

@@ -95,7 +95,8 @@ class FoundPatch {
   float Similarity() const { return gain_ * seen_.dot(patch_) / (length_ * length_); }
 
   /// Covariance of the place that the last alignment found, px^2, from what does not fit: with e
-  /// the place is moved by t = sum k e, and what one pixel of e is says something of those near it, so
+  /// the place is moved by t = sum k e, and what one pixel of e is says something of those near
+  /// it, so
   ///
   ///   C = A (sum over cells of (sum k e) (sum k e)') A',   k = [(J' J)^-1 J']_t
   ///

@@ -255,7 +255,7 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
   command.add_flag("--json", arguments.json, "print all values as JSON");
   command.add_flag("--markdown", arguments.markdown, "print the tables as Markdown")
       ->excludes("--json");
-  command.add_flag("--latex", arguments.latex, "print the tables as LaTeX (booktabs)")
+  command.add_flag("--latex", arguments.latex, "print the tables as LaTeX")
       ->excludes("--json")
       ->excludes("--markdown");
   command.add_flag("--figures", arguments.figures, "draw the figures of the run too")

@@ -43,9 +43,10 @@ class CompareCli : public testing::ProgramTest {
     ProgramTest::SetUp();
     if (!Contains(Call({"plugins", "list"}).out, "ceres_batch")) GTEST_SKIP() << "no batch";
   }
-  /// A comparison as JSON, without the clock.
+  /// A comparison as JSON, without the clocks.
   static std::string WithoutClock(const std::string& json) {
-    return std::regex_replace(json, std::regex(R"(\n *"time_us": (\{[^}]*\}|[^\n]*))"), "");
+    const std::regex clock(R"=(\n *"(time_us|cpu_us|cpu_us.start)": (\{[^}]*\},?|[^\n]*))=");
+    return std::regex_replace(json, clock, "");
   }
   /// Disparities of a target at 0.3 m, at 1 to 20 tenths of a second.
   void WriteTable(const std::string& name, const std::string& fifth = "86.5") const {
@@ -69,8 +70,8 @@ TEST_F(CompareCli, AConfigIsRunAndItsErrorDecomposed) {
         "Online: every estimate from the data up to it", "Smoothed: estimates from later data too",
         "At the end, where all have the same data", "linearisation, ekf against full_information",
         "smoothing, ekf against rts", "rejected measurements, batch_accepted against batch",
-        "of 227 measurements were not used", "rmse target.depth [mm]",
-        "wall clock [us/measurement]"}) {
+        "of 227 measurements were not used", "rmse target.depth [mm]", "CPU time [us/frame]",
+        "  and of the filter it starts from", "ratios are of one run and have no interval"}) {
     EXPECT_TRUE(Contains(compared.out, words)) << words << '\n' << compared.out;
   }
   const Config json = Json("out/compare.json"), run = Json("out/run.json");
@@ -321,6 +322,23 @@ TEST_F(CompareCli, OverSeedsValuesHaveASpread) {
     EXPECT_EQ(rmse(json.root(), "values", what), rmse(summary.root(), "metrics", what));
   }
   EXPECT_LT(rmse(json.root(), "values", "p05"), rmse(json.root(), "values", "p95"));
+  EXPECT_TRUE(Contains(compared.out, "[95 % interval, paired bootstrap")) << compared.out;
+  const Node estimators = json.root().At("estimators"), rts = estimators.At("rts").At("values");
+  const auto mean = [](const Node& values) {
+    return values.At("rmse:target.depth").At("mean").Number();
+  };
+  const Node ratio = rts.At("ratio.rmse:target.depth");
+  EXPECT_NEAR(ratio.At("value").Number(), mean(rts) / mean(estimators.At("batch").At("values")),
+              1e-12);
+  EXPECT_LE(ratio.At("low").Number(), ratio.At("value").Number());
+  EXPECT_GE(ratio.At("high").Number(), ratio.At("value").Number());
+  EXPECT_EQ(ratio.At("runs").Number(), 3);
+  const Node anees = estimators.At("ekf").At("anees").At("target");
+  EXPECT_EQ(anees.At("timestamps").Number(), 61);
+  EXPECT_EQ(std::ssize(anees.At("mean").Items()), 61);
+  // Six degrees of freedom: 1.237 and 14.449 of the tables.
+  EXPECT_NEAR(anees.At("low").Items()[0].Number(), 1.237 / 6.0, 1e-3);
+  EXPECT_NEAR(anees.At("high").Items()[0].Number(), 14.449 / 6.0, 1e-3);
   ASSERT_EQ(Call(compare("2", "two")).code, 0);
   EXPECT_EQ(WithoutClock(Read("one/compare.json")), WithoutClock(Read("two/compare.json")));
 }

@@ -9,7 +9,6 @@
 #include <numbers>
 #include <optional>
 
-#include "alidade/base/mahalanobis.h"
 #include "alidade/base/number_text.h"
 #include "alidade/base/similarity.h"
 #include "alidade/base/statistics.h"
@@ -17,6 +16,7 @@
 #include "alidade/model/geometry.h"
 #include "alidade/run/frame_innovation.h"
 #include "alidade/run/implied_state.h"
+#include "alidade/run/joint_nees.h"
 #include "alidade/state/element_names.h"
 #include "alidade/system/truth_match.h"
 
@@ -309,35 +309,13 @@ void Metrics::Impl::AddConsistency(Timestamp timestamp, const std::vector<Sums*>
 
 void Metrics::Impl::AddNees(Owner& owner, std::size_t index, const std::vector<Sums*>& into,
                             const State& state) {
-  std::vector<std::size_t> used;
-  int dof = 0;
+  std::vector<internal::BlockError> errors;
   for (const std::size_t i : owner.tracked) {
-    const Block& place = state.layout()[tracked[i].id];
-    if (!tracked[i].known || !place.present || place.status != BlockStatus::kEstimated) continue;
-    used.push_back(i);
-    dof += place.geometry().tangent;
+    const Tracked& block = tracked[i];
+    if (block.known) errors.push_back({block.id, &block.error, block.truth_variance});
   }
-  if (dof == 0) return;
-  Eigen::MatrixXd p(dof, dof);
-  Eigen::VectorXd error(dof);
-  int row = 0;
-  for (const std::size_t i : used) {
-    const Block& a = state.layout()[tracked[i].id];
-    const int rows = a.geometry().tangent;
-    error.segment(row, rows) = tracked[i].error;
-    int column = 0;
-    for (const std::size_t j : used) {
-      const Block& b = state.layout()[tracked[j].id];
-      const int columns = b.geometry().tangent;
-      p.block(row, column, rows, columns) =
-          state.covariance().Block(a.tangent_offset, rows, b.tangent_offset, columns);
-      column += columns;
-    }
-    p.diagonal().segment(row, rows).array() += tracked[i].truth_variance;
-    row += rows;
-  }
-  const double nees = internal::SquaredMahalanobis(p, error);
-  if (std::isnan(nees)) return;
+  const auto [nees, dof] = internal::JointNees(state, errors);
+  if (dof == 0 || std::isnan(nees)) return;
   const auto [bound, is_new] = quantiles.try_emplace(dof, 0.0);
   if (is_new) bound->second = ChiSquareQuantile(0.95, dof);
   for (Sums* s : into) s->nees[index].Add(nees / dof, nees <= bound->second);

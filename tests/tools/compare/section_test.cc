@@ -11,8 +11,11 @@ TEST(SectionsText, NamesAreQuotedWhereTheFormAsksForIt) {
   EXPECT_EQ(SectionsText({section}, TableStyle::kMarkdown),
             "**A & b**\n\n|  | x\\|y | z |\n|---|---:|---:|\n| r_1\\|\\\\ | 1 | 2 % |\n");
   EXPECT_EQ(SectionsText({section}, TableStyle::kLatex),
-            "\\paragraph{A \\& b}\n\n\\begin{tabular}{lrr}\n\\toprule\n & x|y & z \\\\\n"
-            "\\midrule\nr\\_1|\\textbackslash{} & 1 & 2 \\% \\\\\n\\bottomrule\n\\end{tabular}\n");
+            "\\paragraph{A \\& b}\n\n\\begin{tabular}{lrr}\n\\hline\n & x|y & z \\\\\n"
+            "\\hline\nr\\_1|\\textbackslash{} & 1 & 2 \\% \\\\\n\\hline\n\\end{tabular}\n");
+  EXPECT_EQ(SectionsText({section}, TableStyle::kHtml),
+            "<h3>A &amp; b</h3>\n<div class=\"scroll\"><table>\n<tr><th></th><th>x|y</th><th>z</th>"
+            "</tr>\n<tr><td>r_1|\\</td><td>1</td><td>2 %</td></tr>\n</table></div>\n");
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ Comparison OneRun(double error, bool filter_diverged = false) {
   if (!filter_diverged) {
     filter.reference = filter.final_reference = "batch";
     filter.reference_runs = filter.final_reference_runs = 1;
-    filter.values["ratio.rmse:x"] = filter.values["rmse:x"];
+    filter.ratios["rmse:x"] = {error, 2.0};
   }
   one.estimators[1].name = "batch";
   DecompositionStep& step = one.decomposition.emplace_back();
@@ -42,7 +42,8 @@ TEST(Summarise, LeavesOutTheRunsInWhichTheFilterDiverged) {
   EXPECT_EQ(filter.reference_runs, 2);
   EXPECT_EQ(filter.values.at("rmse:x").mean, 1.5);
   EXPECT_NEAR(filter.values.at("rmse:x").p50, 1.5, 1e-15);
-  EXPECT_EQ(filter.values.at("ratio.rmse:x").mean, 1.5);
+  EXPECT_EQ(filter.ratios.at("rmse:x").value(), 0.75);
+  EXPECT_EQ(filter.ratios.at("rmse:x").runs, 2);
   EXPECT_EQ(all.estimators[1].used, 3);
   EXPECT_EQ(all.decomposition[0].values.at("rejected").mean, 1.5);
 }

@@ -182,16 +182,16 @@ void AddAll(const std::map<std::string, double>& from, const std::string& kind,
   for (const auto& [key, value] : from) values[kind + key] = Single(value);
 }
 
-/// `ratio.KEY` of the keys that begin like one of `kinds`.
+/// Of the keys that begin like one of `kinds`.
 void AddRatios(const ComparedEntry& one, const ComparedEntry& reference,
-               const std::vector<std::string>& kinds, std::map<std::string, Spread>& values) {
+               const std::vector<std::string>& kinds, std::map<std::string, Ratio>& ratios) {
   for (const auto& [key, value] : one.result.metrics) {
     const auto begins = [&key = key](const std::string& kind) { return key.starts_with(kind); };
     const auto found = reference.result.metrics.find(key);
     if (std::ranges::none_of(kinds, begins) || key.find('@') != key.npos) continue;
     if (found == reference.result.metrics.end() || !(found->second > 0.0)) continue;
     if (!std::isfinite(found->second)) continue;
-    values["ratio." + key] = Single(value / found->second);
+    ratios[key] = {value, found->second};
   }
 }
 
@@ -225,6 +225,18 @@ bool NeedsNoTruth(const std::string& key) {
   return false;
 }
 
+/// CPU time for each frame. What a batch of all data does frame by frame is its start.
+void AddCpuTime(const Candidate& one, ComparedEstimator& compared) {
+  const internal::CpuTime& cpu = one.entry->cpu;
+  const auto frames = static_cast<double>(one.run->frames);
+  const bool timed = one.entry->result.wall_s > 0.0 && cpu.frames_s + cpu.smoothing_s > 0.0;
+  if (!timed || one.run->frames == 0) return;
+  const bool solves_once = one.batch() && one.facts().smoothed;
+  const double own_s = cpu.smoothing_s + (solves_once ? 0.0 : cpu.frames_s);
+  compared.values["cpu_us"] = Single(1e6 * own_s / frames);
+  if (solves_once) compared.values["cpu_us.start"] = Single(1e6 * cpu.frames_s / frames);
+}
+
 ComparedEstimator Compare(const Candidate& one, const References& references, bool truth) {
   const EstimatorResult& result = one.entry->result;
   ComparedEstimator compared;
@@ -245,13 +257,15 @@ ComparedEstimator Compare(const Candidate& one, const References& references, bo
   if (count > 0 && result.wall_s > 0.0) {
     compared.values["time_us"] = Single(1e6 * result.wall_s / static_cast<double>(count));
   }
+  AddCpuTime(one, compared);
+  compared.series = one.entry->errors;
   if (!one.entry->usable()) return compared;
   if (references.along != nullptr && references.along->entry->usable()) {
     const Candidate& along = *references.along;
     compared.reference = along.name;
     compared.reference_runs = 1;
     if (truth)
-      AddRatios(*one.entry, *along.entry, {"rmse:", "trajectory.sim3.rmse"}, compared.values);
+      AddRatios(*one.entry, *along.entry, {"rmse:", "trajectory.sim3.rmse"}, compared.ratios);
     if (along.entry != one.entry) AddRmsd(one, along, compared);
   }
   if (references.final != nullptr && references.final->entry->usable()) {
@@ -260,7 +274,7 @@ ComparedEstimator Compare(const Candidate& one, const References& references, bo
     compared.final_reference_runs = 1;
     if (truth)
       AddRatios(*one.entry, *final.entry, {"final_error:", "map.rmse", "map.sim3.rmse"},
-                compared.values);
+                compared.ratios);
     if (final.entry != one.entry) AddFinal(one, final, compared);
   }
   return compared;

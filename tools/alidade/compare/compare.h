@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "alidade/compare/over_runs.h"
 #include "alidade/run/run.h"
 #include "alidade/sweep/sweep.h"
 
@@ -23,6 +24,9 @@ struct CompareOptions {
   std::string filter;     ///< the one whose error is decomposed; "": the first
   bool decompose = true;  ///< else no error decomposition, and nothing is added to a config for it
   bool over_seeds = false;  ///< the source is read for each of several seeds
+  /// Where it is not enough for all, no more seeds are begun; of one run, what was added goes on no
+  /// longer. s of the wall clock, from the first run on.
+  std::optional<double> budget_s = {};
 };
 
 /// One estimator of a comparison. Values are those of run.json by their keys, where these are
@@ -35,8 +39,9 @@ struct CompareOptions {
 ///   trajectory.sim3.rmsd           RMSD of the trajectory after the similarity that fits best, m
 ///   map.rmsd                       rms of the places of landmarks at the end, m
 ///   map.sim3.rmsd                  likewise after that similarity of the map, m
-///   ratio.KEY                      KEY over that of the reference; of rmse, final_error, map
 ///   time_us                        wall clock for each measurement
+///   cpu_us                         CPU time for each frame, of a batch without
+///   cpu_us.start                   that of the filter that it starts from; as it is run alone
 struct ComparedEstimator {
   std::string name, type;
   bool smoothed = false;        ///< its estimates rest on later data too
@@ -44,9 +49,14 @@ struct ComparedEstimator {
   std::string final_reference;  ///< of the last estimate and the map
   std::int64_t reference_runs = 0, final_reference_runs = 0;  ///< of `used`, those with one
   std::map<std::string, Spread> values;
+  std::map<std::string, Ratio> ratios;  ///< by KEY, to the reference: of rmse, final_error, map
   std::map<std::string, std::string> units;  ///< of blocks
   std::int64_t used = 0;                     ///< runs that values are taken over
   std::int64_t diverged = 0;                 ///< runs in which it did
+  ErrorSeries series;                        ///< of one run of several
+  OverTime over_time;                        ///< of several runs
+  /// Where the mean over several runs lies with probability 0.95, by KEY: of errors.
+  std::map<std::string, Interval> mean_intervals = {};
 };
 
 /// Where a part of the difference between a filter and the batch of all data comes from.
@@ -58,16 +68,17 @@ enum class DecompositionKind {
 /// `linearisation`, `smoothing`, `rejected measurements`.
 const char* ToString(DecompositionKind kind);
 
-/// One step of the way from the filter to the batch. Values: `ratio.rmse:BLOCK`, the RMSE from
-/// truth of `from` over that of `to`; `rmsd:BLOCK` and `rmsd.sigmas:OWNER` between the two;
-/// `rmse.from:BLOCK`, `rmse.to:BLOCK`; `measurements` and `rejected` of kRejected. At the end they
-/// are of the last frame alone, and of BLOCK `map` and `map.sim3` too.
+/// One step of the way from the filter to the batch. Values: `rmsd:BLOCK` and `rmsd.sigmas:OWNER`
+/// between the two; `rmse.from:BLOCK`, `rmse.to:BLOCK`, the RMSE from truth; `measurements` and
+/// `rejected` of kRejected. At the end they are of the last frame alone, and of BLOCK `map` and
+/// `map.sim3` too.
 struct DecompositionStep {
   DecompositionKind kind = DecompositionKind::kLinearisation;
   std::string from, to;
   bool at_end = false;  ///< taken at the last frame, for want of a full-information filter
   std::map<std::string, Spread> values;
-  std::string withheld;  ///< why there are no values, or ""
+  std::map<std::string, Ratio> ratios;  ///< by `rmse:BLOCK`, of `from` to `to`
+  std::string withheld;                 ///< why there are no values, or ""
 };
 
 struct Comparison {
@@ -103,7 +114,9 @@ ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHos
 /// Compares the estimators of a run while it runs.
 class RunComparer : public RunObserver {
  public:
-  explicit RunComparer(const Experiment& experiment);
+  /// Puts a clock on each estimator of the experiment. `over_seeds`: the run is one of several,
+  /// whose errors are wanted timestamp by timestamp.
+  explicit RunComparer(Experiment& experiment, bool over_seeds = false);
   ~RunComparer() override;
   RunComparer(const RunComparer&) = delete;
   RunComparer& operator=(const RunComparer&) = delete;
@@ -135,11 +148,12 @@ struct ComparedSeeds {
 ComparedSeeds CompareSeeds(const ComparedExperiment& compared, const PluginHost& host,
                            const SweepOptions& sweep, const CompareOptions& options);
 
-/// The values of comparisons of the same estimators, at least one, as mean and quantiles over them.
+/// The values of comparisons of the same estimators, at least one, as mean and quantiles over them,
+/// and what they tell together.
 Comparison Summarise(const std::vector<Comparison>& comparisons);
 
 /// How a comparison is written for people.
-enum class TableStyle { kText, kMarkdown, kLatex };
+enum class TableStyle { kText, kMarkdown, kLatex, kHtml };
 /// Which rows its tables have: all, or those that a person reads first, errors, their ratios, NEES
 /// and the wall clock (without truth differences), with the number of those left out.
 enum class ReportRows { kAll, kMain };

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "alidade/compare/candidates.h"
+#include "alidade/compare/error_recorder.h"
 #include "alidade/record/data_hash.h"
 
 namespace alidade {
@@ -14,13 +15,18 @@ using internal::ComparedRun;
 struct RunComparer::Impl {
   ComparedRun run;
   internal::DataHash data;
+  std::vector<std::shared_ptr<internal::CpuTime>> clocks = {};
+  std::vector<internal::ErrorRecorder> errors = {};  ///< empty: they are not wanted
 };
 
-RunComparer::RunComparer(const Experiment& experiment)
+RunComparer::RunComparer(Experiment& experiment, bool over_seeds)
     : impl_(std::make_unique<Impl>(Impl{
           {}, internal::DataHash(experiment.source->streams(), experiment.source->truths())})) {
-  for (const NamedEstimator& named : experiment.estimators) {
+  for (NamedEstimator& named : experiment.estimators) {
     ComparedEntry& entry = impl_->run.estimators.emplace_back();
+    impl_->clocks.push_back(std::make_shared<internal::CpuTime>());
+    named.estimator = internal::WithCpuClock(std::move(named.estimator), impl_->clocks.back());
+    if (over_seeds) impl_->errors.emplace_back(named, experiment);
     entry.facts = internal::FactsOf(named, experiment);
     entry.series.blocks = entry.facts.blocks;
     entry.series.joint = entry.series.tangent() <= internal::Series::kMostJoint;
@@ -34,7 +40,9 @@ void RunComparer::OnFrame(const SourceFrame& frame) { impl_->data.Add(frame); }
 void RunComparer::OnEstimate(int estimator, const SourceFrame& frame, const State& state,
                              const UpdateReport& report) {
   if (report.stale) return;
-  impl_->run.estimators[static_cast<std::size_t>(estimator)].series.Append(frame.timestamp, state);
+  const auto index = static_cast<std::size_t>(estimator);
+  impl_->run.estimators[index].series.Append(frame.timestamp, state);
+  if (!impl_->errors.empty()) impl_->errors[index].Add(frame, state);
 }
 
 Comparison RunComparer::Finish(const RunResult& result, const CompareOptions& options) {
@@ -49,6 +57,8 @@ Comparison RunComparer::Finish(const RunResult& result, const CompareOptions& op
   ALIDADE_EXPECTS(result.estimators.size() <= run.estimators.size());
   for (std::size_t e = 0; e < result.estimators.size(); ++e) {
     run.estimators[e].result = result.estimators[e];
+    run.estimators[e].cpu = *impl_->clocks[e];
+    if (!impl_->errors.empty()) run.estimators[e].errors = impl_->errors[e].Take();
     run.estimators[e].had_rejection_recovery =
         std::ranges::count(result.estimators[e].events, "rejection_recovery", &Event::kind) > 0;
     run.estimators[e].result.events.clear();
@@ -92,7 +102,7 @@ ComparedSeeds CompareSeeds(const ComparedExperiment& compared, const PluginHost&
   std::map<std::uint64_t, Comparison> by_seed;
   SweepOptions with = sweep;
   with.run = [&](Experiment& experiment, const RunOptions& given) {
-    RunComparer comparer(experiment);
+    RunComparer comparer(experiment, true);
     RunOptions observed = given;
     observed.observers.push_back(&comparer);
     RunResult result = sweep.run ? sweep.run(experiment, observed) : Run(experiment, observed);

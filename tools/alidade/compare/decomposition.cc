@@ -56,7 +56,9 @@ void AddErrors(const EstimatorResult& from, const EstimatorResult& to, Decomposi
     if (subject.empty() || other == to.metrics.end()) continue;
     step.values["rmse.from:" + subject] = Single(error);
     step.values["rmse.to:" + subject] = Single(other->second);
-    if (other->second > 0.0) step.values["ratio.rmse:" + subject] = Single(error / other->second);
+    if (other->second > 0.0 && std::isfinite(other->second)) {
+      step.ratios["rmse:" + subject] = {error, other->second};
+    }
   }
 }
 

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "alidade/compare/cpu_clock.h"
+#include "alidade/compare/over_runs.h"
 #include "alidade/record/estimate_series.h"
 #include "alidade/record/run_json.h"
 #include "alidade/run/run.h"
@@ -19,6 +21,8 @@ struct ComparedEntry {
   EstimatorFacts facts;
   EstimatorResult result;  ///< without events
   Series series;
+  CpuTime cpu;                  ///< as far as it is known
+  ErrorSeries errors;           ///< where they are wanted
   std::int64_t not_finite = 0;  ///< rows of estimates.csv with a cell that is not finite
   bool had_rejection_recovery =
       false;  ///< a sensor was rejected again and again, `rejection_recovery` in its events

@@ -28,10 +28,46 @@ struct Column {
   std::string name;
   std::map<std::string, Spread> values;
   std::map<std::string, std::string> units;
+  std::map<std::string, Ratio> ratios = {};
 };
 
+/// `1.011 [0.9930, 1.030] undecided`
+std::string RatioText(const Ratio& ratio) {
+  const auto text = [](double value) {
+    RunResult one;
+    one.estimators.resize(1);
+    one.estimators[0].metrics["ratio"] = value;
+    return RowsOf(one, {{"ratio", ""}})[0].cells[0];
+  };
+  const bool exact = !ratio.interval || ratio.interval->low == ratio.interval->high;
+  if (exact) return text(ratio.value());
+  return text(ratio.value()) + " [" + text(ratio.interval->low) + ", " +
+         text(ratio.interval->high) + ']' + (ratio.undecided() ? " undecided" : "");
+}
+
+/// The ratios of a kind, `rmse` or `map.rmse`.
+std::vector<TableRow> RatioRows(const std::vector<Column>& columns, const RowKind& kind) {
+  std::map<std::string, TableRow> rows;  // by key
+  for (const Column& column : columns) {
+    for (const auto& [key, ratio] : column.ratios) {
+      const std::string of = key.substr(0, key.find(':'));
+      if (of != kind.kind) continue;
+      rows[key].label = kind.label + (of == key ? "" : ' ' + key.substr(of.size() + 1));
+    }
+  }
+  std::vector<TableRow> all;
+  for (auto& [key, row] : rows) {
+    for (const Column& column : columns) {
+      const auto found = column.ratios.find(key);
+      row.cells.push_back(found == column.ratios.end() ? "-" : RatioText(found->second));
+    }
+    all.push_back(std::move(row));
+  }
+  return all;
+}
+
 /// Rows with the mean, and over several runs [p05, p95]. Each column stands as three, so that its
-/// numbers share their unit and decimals with all others of the row.
+/// numbers share their unit and decimals with all others of the row. Kinds `ratio.KIND` are ratios.
 std::vector<TableRow> SpreadRows(const std::vector<Column>& columns, bool several,
                                  const std::vector<RowKind>& kinds) {
   RunResult all;
@@ -42,15 +78,23 @@ std::vector<TableRow> SpreadRows(const std::vector<Column>& columns, bool severa
       for (const auto& [key, spread] : column.values) one.metrics[key] = spread.*member;
     }
   }
-  std::vector<TableRow> rows = RowsOf(all, kinds);
-  for (TableRow& row : rows) {
-    std::vector<std::string> cells;
-    for (std::size_t i = 0; i < row.cells.size(); i += 3) {
-      const std::string* const c = &row.cells[i];
-      const bool spread = several && c[0] != "-";
-      cells.push_back(spread ? c[0] + " [" + c[1] + ", " + c[2] + ']' : c[0]);
+  std::vector<TableRow> rows;
+  for (const RowKind& kind : kinds) {
+    constexpr std::string_view kRatio = "ratio.";
+    if (kind.kind.starts_with(kRatio)) {
+      const auto ratios = RatioRows(columns, {kind.kind.substr(kRatio.size()), kind.label});
+      rows.insert(rows.end(), ratios.begin(), ratios.end());
+      continue;
     }
-    row.cells = std::move(cells);
+    for (TableRow& row : RowsOf(all, {kind})) {
+      std::vector<std::string> cells;
+      for (std::size_t i = 0; i < row.cells.size(); i += 3) {
+        const std::string* const c = &row.cells[i];
+        const bool spread = several && c[0] != "-";
+        cells.push_back(spread ? c[0] + " [" + c[1] + ", " + c[2] + ']' : c[0]);
+      }
+      rows.push_back({row.label, std::move(cells)});
+    }
   }
   return rows;
 }
@@ -87,7 +131,7 @@ Section TableOf(const std::vector<ComparedEstimator>& of, bool several, const st
   TableRow with_reference{"runs with a reference", {}};
   bool fewer = false;
   for (const ComparedEstimator& one : of) {
-    columns.push_back({one.name, one.values, one.units});
+    columns.push_back({one.name, one.values, one.units, one.ratios});
     references.push_back(one.*reference);
     with_reference.cells.push_back(std::to_string(one.*reference_runs));
     fewer = fewer || (one.*reference_runs > 0 && one.*reference_runs < one.used);
@@ -106,21 +150,44 @@ Section TableOf(const std::vector<ComparedEstimator>& of, bool several, const st
 std::vector<RowKind> KindsOf(const Comparison& comparison, ReportRows rows,
                              std::vector<RowKind> kinds) {
   if (rows == ReportRows::kAll) return kinds;
-  static const std::set<std::string> errors = {"rmse",
-                                               "ratio.rmse",
-                                               "trajectory.sim3.rmse",
-                                               "ratio.trajectory.sim3.rmse",
-                                               "nees.mean",
-                                               "time_us",
-                                               "map.rmse",
-                                               "ratio.map.rmse",
-                                               "map.sim3.rmse",
-                                               "ratio.map.sim3.rmse"};
+  static const std::set<std::string> errors = {
+      "rmse",      "ratio.rmse",     "trajectory.sim3.rmse", "ratio.trajectory.sim3.rmse",
+      "nees.mean", "cpu_us",         "cpu_us.start",         "time_us",
+      "map.rmse",  "ratio.map.rmse", "map.sim3.rmse",        "ratio.map.sim3.rmse"};
   static const std::set<std::string> differences = {
-      "rmsd", "trajectory.sim3.rmsd", "rmsd.sigmas", "time_us", "map.rmsd", "map.sim3.rmsd"};
+      "rmsd",     "trajectory.sim3.rmsd", "rmsd.sigmas", "cpu_us", "cpu_us.start", "time_us",
+      "map.rmsd", "map.sim3.rmsd"};
   const auto& main = comparison.reference == "truth" ? errors : differences;
   std::erase_if(kinds, [&](const RowKind& kind) { return !main.contains(kind.kind); });
   return kinds;
+}
+
+/// Rows of cost: CPU time, and where none is known, as of finished runs, the wall clock.
+std::vector<RowKind> CostKinds(const Comparison& comparison) {
+  const bool cpu = std::ranges::any_of(comparison.estimators, [](const ComparedEstimator& one) {
+    return one.values.contains("cpu_us");
+  });
+  if (!cpu) return {{"time_us", "wall clock [us/measurement]"}};
+  return {{"cpu_us", "CPU time [us/frame]"},
+          {"cpu_us.start", "  and of the filter it starts from"}};
+}
+
+/// The share of timestamps at which the average NEES over the runs is within its bounds.
+std::vector<TableRow> AverageNeesRows(const std::vector<ComparedEstimator>& of) {
+  std::set<std::string> owners;
+  for (const ComparedEstimator& one : of) {
+    for (const auto& [owner, nees] : one.over_time.nees) owners.insert(owner);
+  }
+  std::vector<TableRow> rows;
+  for (const std::string& owner : owners) {
+    TableRow& row = rows.emplace_back(TableRow{"ANEES in its bounds " + owner + " [%]", {}});
+    for (const ComparedEstimator& one : of) {
+      const auto found = one.over_time.nees.find(owner);
+      const bool known = found != one.over_time.nees.end();
+      row.cells.push_back(known ? internal::RoundedText(100.0 * found->second.inside, 3) : "-");
+    }
+  }
+  return rows;
 }
 
 /// The estimators along the run, of one kind: filters, or those that know later data.
@@ -136,25 +203,26 @@ Section AlongSection(const Comparison& comparison, bool smoothed, ReportRows row
     any_diverged = any_diverged || one.diverged > 0;
   }
   if (of.empty()) return {};
-  Section section =
-      TableOf(of, comparison.runs > 1,
-              smoothed ? "Smoothed: estimates from later data too"
-                       : "Online: every estimate from the data up to it",
-              &ComparedEstimator::reference, &ComparedEstimator::reference_runs,
-              KindsOf(comparison, rows,
-                      {{"rmse", "rmse"},
-                       {"ratio.rmse", "  ratio"},
-                       {"implied.rmse", "rmse of single measurements,"},
-                       {"trajectory.sim3.rmse", "Sim3-aligned trajectory"},
-                       {"trajectory.sim3.scale", "trajectory, scale"},
-                       {"ratio.trajectory.sim3.rmse", "  ratio, Sim3-aligned trajectory"},
-                       {"rmsd", "RMSD"},
-                       {"trajectory.sim3.rmsd", "RMSD, Sim3-aligned trajectory"},
-                       {"rmsd.sigmas", "RMSD in sigmas"},
-                       {"nees.mean", "NEES"},
-                       {"nees.within95", "in the 95 % region"},
-                       {"nis.mean", "NIS"},
-                       {"time_us", "wall clock [us/measurement]"}}));
+  std::vector<RowKind> kinds = {{"rmse", "rmse"},
+                                {"ratio.rmse", "  ratio"},
+                                {"implied.rmse", "rmse of single measurements,"},
+                                {"trajectory.sim3.rmse", "Sim3-aligned trajectory"},
+                                {"trajectory.sim3.scale", "trajectory, scale"},
+                                {"ratio.trajectory.sim3.rmse", "  ratio, Sim3-aligned trajectory"},
+                                {"rmsd", "RMSD"},
+                                {"trajectory.sim3.rmsd", "RMSD, Sim3-aligned trajectory"},
+                                {"rmsd.sigmas", "RMSD in sigmas"},
+                                {"nees.mean", "NEES"},
+                                {"nees.within95", "in the 95 % region"},
+                                {"nis.mean", "NIS"}};
+  for (RowKind& cost : CostKinds(comparison)) kinds.push_back(std::move(cost));
+  Section section = TableOf(of, comparison.runs > 1,
+                            smoothed ? "Smoothed: estimates from later data too"
+                                     : "Online: every estimate from the data up to it",
+                            &ComparedEstimator::reference, &ComparedEstimator::reference_runs,
+                            KindsOf(comparison, rows, std::move(kinds)));
+  const std::vector<TableRow> average_nees = AverageNeesRows(of);
+  section.rows.insert(section.rows.end(), average_nees.begin(), average_nees.end());
   if (any_diverged) section.rows.push_back(diverged);
   if (comparison.runs > 1) section.rows.push_back(used);
   return section;
@@ -277,11 +345,8 @@ Section DecompositionSection(const Comparison& comparison, const DecompositionSt
     row.label.erase(0, row.label.find_first_not_of(' '));
     const std::string block = row.label.substr(0, row.label.find(' '));
     if (block == "map.sim3") row.label.replace(0, block.size(), "Sim3-aligned map");
-    const auto ratio = step.values.find("ratio.rmse:" + block);
-    if (ratio == step.values.end()) continue;
-    const std::vector<TableRow> text = SpreadRows(
-        {{"", {{"ratio.rmse:" + block, ratio->second}}, {}}}, several, {{"ratio.rmse", ""}});
-    if (!text.empty()) row.cells[2] = text[0].cells[0];
+    const auto ratio = step.ratios.find("rmse:" + block);
+    if (ratio != step.ratios.end()) row.cells[2] = RatioText(ratio->second);
   }
   if (const std::string line = LinesOf(step); !line.empty()) section.lines.push_back(line);
   return section;
@@ -297,6 +362,19 @@ std::string ReferencesText(const Comparison& comparison) {
   return names.empty() ? comparison.reference : internal::Join(names);
 }
 
+/// What a ratio is, and its interval; "" where there is none.
+std::string RatioLine(const Comparison& comparison) {
+  const bool any = std::ranges::any_of(comparison.estimators, [](const ComparedEstimator& one) {
+    return std::ranges::any_of(one.ratios, [](const auto& ratio) {
+      return ratio.second.error != ratio.second.reference_error;
+    });
+  });
+  if (!any) return "";
+  if (comparison.runs == 1) return "ratios are of one run and have no interval: --runs N gives one";
+  return "ratio: mean error over the runs by that of the reference [95 % interval, paired "
+         "bootstrap over the runs]; undecided: the interval includes 1";
+}
+
 std::vector<Section> SectionsOf(const Comparison& comparison, ReportRows rows) {
   std::vector<Section> sections;
   Section& head = sections.emplace_back();
@@ -306,6 +384,7 @@ std::vector<Section> SectionsOf(const Comparison& comparison, ReportRows rows) {
                 : comparison.reference == "truth"
                     ? ", errors against truth"
                     : ", differences from " + ReferencesText(comparison);
+  if (const std::string line = RatioLine(comparison); !line.empty()) head.lines.push_back(line);
   if (!comparison.measurements_sha256.empty()) {
     head.lines.push_back("data sha256 " + comparison.measurements_sha256);
   }
@@ -324,8 +403,19 @@ std::vector<Section> SectionsOf(const Comparison& comparison, ReportRows rows) {
   return sections;
 }
 
-internal::Json JsonOf(const std::map<std::string, Spread>& values, bool several) {
+/// Values, and ratios as `ratio.KEY`.
+internal::Json JsonOf(const std::map<std::string, Spread>& values,
+                      const std::map<std::string, Ratio>& ratios, bool several) {
   internal::Json json = internal::Json::object();
+  for (const auto& [name, ratio] : ratios) {
+    internal::Json& value = json["ratio." + name];
+    value = ratio.value();
+    if (!several) continue;
+    value = {{"value", ratio.value()}, {"runs", ratio.runs}, {"undecided", ratio.undecided()}};
+    if (!ratio.interval) continue;
+    value["low"] = ratio.interval->low;
+    value["high"] = ratio.interval->high;
+  }
   for (const auto& [name, spread] : values) {
     internal::Json& value = json[name];
     if (!several) {
@@ -337,17 +427,41 @@ internal::Json JsonOf(const std::map<std::string, Spread>& values, bool several)
   return json;
 }
 
+/// Numbers, null where there is none.
+internal::Json JsonOf(const std::vector<double>& values) {
+  internal::Json json = internal::Json::array();
+  for (const double value : values) {
+    json.push_back(std::isfinite(value) ? internal::Json(value) : internal::Json());
+  }
+  return json;
+}
+
+/// The average NEES by owner, timestamp by timestamp.
+internal::Json JsonOf(const OverTime& over_time) {
+  std::vector<double> t_s;
+  for (const Timestamp timestamp : over_time.timestamps) t_s.push_back(Seconds(timestamp));
+  internal::Json json = internal::Json::object();
+  for (const auto& [owner, nees] : over_time.nees) {
+    json[owner] = {
+        {"timestamps", nees.timestamps}, {"inside", nees.inside},   {"t_s", JsonOf(t_s)},
+        {"mean", JsonOf(nees.mean)},     {"low", JsonOf(nees.low)}, {"high", JsonOf(nees.high)}};
+  }
+  return json;
+}
+
 internal::Json JsonOf(const ComparedEstimator& one, bool several) {
-  return {{"type", one.type},
-          {"smoothed", one.smoothed},
-          {"reference", one.reference},
-          {"final_reference", one.final_reference},
-          {"diverged", one.diverged},
-          {"used", one.used},
-          {"reference_runs", one.reference_runs},
-          {"final_reference_runs", one.final_reference_runs},
-          {"values", JsonOf(one.values, several)},
-          {"units", one.units}};
+  internal::Json json = {{"type", one.type},
+                         {"smoothed", one.smoothed},
+                         {"reference", one.reference},
+                         {"final_reference", one.final_reference},
+                         {"diverged", one.diverged},
+                         {"used", one.used},
+                         {"reference_runs", one.reference_runs},
+                         {"final_reference_runs", one.final_reference_runs},
+                         {"values", JsonOf(one.values, one.ratios, several)},
+                         {"units", one.units}};
+  if (several) json["anees"] = JsonOf(one.over_time);
+  return json;
 }
 
 internal::Json JsonOfDecomposition(const Comparison& comparison) {
@@ -356,7 +470,7 @@ internal::Json JsonOfDecomposition(const Comparison& comparison) {
     internal::Json json = {{"kind", ToString(step.kind)}, {"from", step.from}, {"to", step.to}};
     if (step.at_end) json["at_end"] = true;
     if (!step.withheld.empty()) json["withheld"] = step.withheld;
-    json["values"] = JsonOf(step.values, comparison.runs > 1);
+    json["values"] = JsonOf(step.values, step.ratios, comparison.runs > 1);
     steps.push_back(std::move(json));
   }
   return {{"filter", comparison.decomposed}, {"steps", std::move(steps)}};

@@ -17,7 +17,7 @@ struct Section {
   std::vector<std::string> lines;
 };
 
-/// All sections, as lines for a terminal, as Markdown or as LaTeX (package booktabs).
+/// All sections, as lines for a terminal, as Markdown, as LaTeX without any package, or as HTML.
 std::string SectionsText(const std::vector<Section>& sections, TableStyle style);
 
 }  // namespace alidade::internal

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
 
 #include "alidade/base/words.h"
 #include "alidade/compare/compare.h"
@@ -13,6 +14,17 @@ class Gathered {
   void Add(const std::map<std::string, Spread>& values) {
     for (const auto& [key, spread] : values) values_[key].push_back(spread.mean);
   }
+  /// Of the mean of each error.
+  std::map<std::string, Interval> MeanIntervals() const {
+    std::map<std::string, Interval> intervals;
+    for (const auto& [key, list] : values_) {
+      const bool is_error = key.starts_with("rmse:") || key.starts_with("final_error:") ||
+                            key == "map.rmse" || key == "map.sim3.rmse";
+      const bool known = std::ranges::none_of(list, [](double v) { return std::isnan(v); });
+      if (is_error && known && list.size() > 1) intervals[key] = IntervalOfMean(list);
+    }
+    return intervals;
+  }
   std::map<std::string, Spread> Spreads() && {
     std::map<std::string, Spread> spreads;
     for (auto& [key, list] : values_) spreads[key] = SpreadOf(std::move(list));
@@ -21,6 +33,24 @@ class Gathered {
 
  private:
   std::map<std::string, std::vector<double>> values_;
+};
+
+/// Gathers ratios likewise.
+class GatheredRatios {
+ public:
+  void Add(const std::map<std::string, Ratio>& ratios) {
+    for (const auto& [key, ratio] : ratios) {
+      if (!std::isnan(ratio.value())) ratios_[key].push_back(ratio);
+    }
+  }
+  std::map<std::string, Ratio> OfMeans() const {
+    std::map<std::string, Ratio> of_means;
+    for (const auto& [key, list] : ratios_) of_means[key] = RatioOfMeans(list);
+    return of_means;
+  }
+
+ private:
+  std::map<std::string, std::vector<Ratio>> ratios_;
 };
 
 bool Diverged(const Comparison& comparison, const std::string& name) {
@@ -38,6 +68,8 @@ ComparedEstimator SummariseEstimator(const std::vector<Comparison>& comparisons,
   all.used = all.diverged = all.reference_runs = all.final_reference_runs = 0;
   std::vector<std::string> references, final_references;
   Gathered gathered;
+  GatheredRatios ratios;
+  std::vector<const ErrorSeries*> series;
   for (const Comparison& one : comparisons) {
     const ComparedEstimator& of_run = one.estimators.at(e);
     all.diverged += of_run.diverged;
@@ -48,10 +80,16 @@ ComparedEstimator SummariseEstimator(const std::vector<Comparison>& comparisons,
     AddName(of_run.reference, references);
     AddName(of_run.final_reference, final_references);
     gathered.Add(of_run.values);
+    ratios.Add(of_run.ratios);
+    series.push_back(&of_run.series);
   }
   all.reference = internal::Join(references);
   all.final_reference = internal::Join(final_references);
+  all.mean_intervals = gathered.MeanIntervals();
   all.values = std::move(gathered).Spreads();
+  all.ratios = ratios.OfMeans();
+  all.over_time = OverRuns(series);
+  all.series = {};
   return all;
 }
 
@@ -68,12 +106,16 @@ DecompositionStep SummariseStep(const std::vector<Comparison>& comparisons, std:
   }
   DecompositionStep all = *known;
   Gathered gathered;
+  GatheredRatios ratios;
   for (const Comparison& one : comparisons) {
     const DecompositionStep& of_run = one.decomposition.at(s);
     const bool same = of_run.from == all.from && of_run.to == all.to;
-    if (same && !Diverged(one, one.decomposed)) gathered.Add(of_run.values);
+    if (!same || Diverged(one, one.decomposed)) continue;
+    gathered.Add(of_run.values);
+    ratios.Add(of_run.ratios);
   }
   all.values = std::move(gathered).Spreads();
+  all.ratios = ratios.OfMeans();
   return all;
 }
 

@@ -4,11 +4,15 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
+#include <chrono>
+#include <cmath>
 #include <memory>
 #include <system_error>
 
+#include "alidade/base/number_text.h"
 #include "alidade/record/recorder.h"
 #include "alidade/resume/run_inputs.h"
+#include "alidade/sweep/processors.h"
 #include "command.h"
 #include "console.h"
 #include "resume.h"
@@ -22,6 +26,7 @@ namespace fs = std::filesystem;
 constexpr const char* kCompareFooter = R"(Examples:
   alidade compare config.yaml                      run it, and decompose the error of a filter
   alidade compare config.yaml --runs 100           over seeds 1 to 100
+  alidade compare config.yaml --runs 200 --budget 600   as many of them as ten minutes allow
   alidade compare config.yaml --no-decomposition --reference batch
   alidade compare runs/a runs/b                    finished runs over the same data
 
@@ -82,6 +87,58 @@ void AddFiles(auto& folder, const Comparison& comparison) {
   folder.AddFile("compare.tex", CompareReport(comparison, TableStyle::kLatex));
 }
 
+/// `83 s`, `12 min`, `3.4 h`
+std::string DurationText(double s) {
+  if (s < 120.0) return internal::RoundedText(s, 2) + " s";
+  return s < 7200.0 ? internal::RoundedText(s / 60.0, 2) + " min"
+                    : internal::RoundedText(s / 3600.0, 2) + " h";
+}
+
+/// Foretells once, from what is done, how long all takes, where that is worth a word.
+class Forecast {
+ public:
+  Forecast(const CompareArguments& arguments, std::int64_t jobs, Progress& progress)
+      : progress_(progress),
+        quiet_(arguments.quiet),
+        budget_s_(arguments.options.budget_s),
+        jobs_(jobs) {}
+
+  /// From the first of several runs.
+  void OfRuns(std::int64_t total) {
+    const double rounds = std::ceil(static_cast<double>(total) / static_cast<double>(jobs_));
+    Tell(rounds * elapsed_s(), "the first of " + std::to_string(total) + " runs took " +
+                                   DurationText(elapsed_s()) + ": all may take ");
+  }
+  /// From the frames of the first seconds. One frame may take longer than another: a batch that
+  /// solves at each has more data each time, one of all data comes after the last.
+  void OfFrames(std::int64_t done, std::int64_t total) {
+    if (total <= 0 || elapsed_s() < 2.0) return;
+    Tell(elapsed_s() * static_cast<double>(total) / static_cast<double>(done),
+         std::to_string(done) + " of " + std::to_string(total) + " frames took " +
+             DurationText(elapsed_s()) + ": all take at least ");
+  }
+
+ private:
+  double elapsed_s() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  }
+  void Tell(double foretold_s, const std::string& words) {
+    constexpr double kWorthAWord_s = 10.0;
+    if (told_ || quiet_) return;
+    told_ = true;
+    if (foretold_s < kWorthAWord_s) return;
+    progress_.Clear();
+    PrintNote(words + DurationText(foretold_s) +
+              (budget_s_ ? ", the budget is " + DurationText(*budget_s_) : ""));
+  }
+
+  Progress& progress_;
+  bool quiet_, told_ = false;
+  std::optional<double> budget_s_;
+  std::int64_t jobs_;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
+
 ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compared,
                     const PluginHost& host, const fs::path& folder, Watchdog& watchdog) {
   Recorder::Options record{folder, arguments.force, arguments.figures, arguments.command,
@@ -94,7 +151,11 @@ ExitCode CompareRun(const CompareArguments& arguments, ComparedExperiment& compa
   Progress progress("frames", arguments.quiet);
   RunOptions options;
   options.observers = {&recorder, &comparer};
-  options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
+  Forecast forecast(arguments, 1, progress);
+  options.progress = [&](std::int64_t done, std::int64_t total) {
+    forecast.OfFrames(done, total);
+    progress.Show(done, total);
+  };
   options.stop = StopRequested;
   const RunResult result = WithWhatIsKept(
       recorder, [&] { return watchdog.Run(compared.experiment, options, &recorder); });
@@ -133,7 +194,12 @@ ExitCode CompareOverSeeds(const CompareArguments& arguments, const ComparedExper
   Progress progress("runs", arguments.quiet);
   SweepOptions options = arguments.sweep;
   if (arguments.seed) options.first_seed = *arguments.seed;
-  options.progress = [&](std::int64_t done, std::int64_t total) { progress.Show(done, total); };
+  const std::int64_t jobs = options.jobs > 0 ? options.jobs : internal::UsableProcessors();
+  Forecast forecast(arguments, std::min(jobs, options.runs), progress);
+  options.progress = [&](std::int64_t done, std::int64_t total) {
+    forecast.OfRuns(total);
+    progress.Show(done, total);
+  };
   options.stop = StopRequested;
   options.run = [&](Experiment& experiment, const RunOptions& given) {
     return watchdog.Run(experiment, given);
@@ -150,10 +216,13 @@ ExitCode CompareOverSeeds(const CompareArguments& arguments, const ComparedExper
   }
   if (failed > 1) PrintErrors(std::to_string(failed) + " runs failed: see failures.csv");
   const bool any = !comparison.estimators.empty();  // else no run came to its end
+  std::string no_figure;
   if (any) AddFiles(out, comparison);
+  if (any) no_figure = WriteSeedReport(out.files(), comparison, compared.config, StopRequested);
+  if (!no_figure.empty()) Log(LogLevel::kWarning, "figures: " + no_figure);
   out.Write(seeds.sweep, compared.config);
   if (any) Report(comparison, arguments, folder);
-  if (seeds.sweep.stopped) {
+  if (seeds.sweep.stopped && seeds.beyond_budget == 0) {
     TellStopped(seeds.sweep.done.size(), options.runs);
     return ExitCode::kStopped;
   }
@@ -204,7 +273,7 @@ bool AreFolders(const std::vector<std::string>& of) {
 /// Of finished runs.
 void CheckOptions(const CLI::App& command) {
   for (const char* option : {"--runs", "--first-seed", "--jobs", "--seed", "--set", "--plugin-path",
-                             "--allow-outside", "--figures", "--frame-timeout"}) {
+                             "--allow-outside", "--figures", "--frame-timeout", "--budget"}) {
     if (command.count(option) == 0) continue;
     throw CLI::ValidationError(option, "a finished run is not run again; expected a config");
   }
@@ -240,6 +309,11 @@ void AddOptions(CLI::App& command, CompareArguments& arguments) {
       ->option_text("J")
       ->check(IsInteger(1, 1024))
       ->needs("--runs");
+  command
+      .add_option("--budget", arguments.options.budget_s,
+                  "begin no run that would end later; of one run, add nothing that takes longer")
+      ->option_text("SECONDS")
+      ->check(CLI::PositiveNumber);
   AddSeed(command, arguments.seed)->excludes("--first-seed");
   AddSets(command, arguments.input.sets,
           "set a key of the config, in dotted form; may be repeated");

@@ -343,6 +343,104 @@ TEST_F(CompareCli, OverSeedsValuesHaveASpread) {
   EXPECT_EQ(WithoutClock(Read("one/compare.json")), WithoutClock(Read("two/compare.json")));
 }
 
+/// The numbers of a column of a csv file without quotes, empty cells left out.
+std::vector<double> ColumnOf(const std::string& csv, const std::string& name) {
+  std::istringstream rows(csv);
+  std::vector<double> numbers;
+  std::size_t column = 0;
+  bool found = false;
+  for (std::string row; std::getline(rows, row);) {
+    std::istringstream cells(row);
+    std::string cell;
+    if (!found) {
+      while (std::getline(cells, cell, ',') && cell != name) ++column;
+      found = true;
+      continue;
+    }
+    for (std::size_t i = 0; i <= column; ++i) std::getline(cells, cell, ',');
+    if (!cell.empty()) numbers.push_back(std::stod(cell));
+  }
+  return numbers;
+}
+
+// What is drawn timestamp by timestamp, taken together, is what the metrics say of whole runs.
+TEST_F(CompareCli, ErrorsOverTimeAreThoseOfTheRuns) {
+  const Outcome compared = Call({"compare", "config.yaml", "--runs", "3", "--set",
+                                 "source.duration_s=2", "--jobs", "1", "-o", "out"});
+  ASSERT_EQ(compared.code, 0) << compared.err;
+  const std::string csv = Read("out/over_time.csv");
+  const Config json = Json("out/compare.json");
+  const Node ekf = json.root().At("estimators").At("ekf"), values = ekf.At("values");
+  // Of three values a <= b <= c the quantiles are a + 0.1 (b - a), b and b + 0.9 (c - b).
+  const auto of = [&](const char* what) {
+    return values.At("rmse:target.depth").At(what).Number();
+  };
+  const double b = of("p50"), a = (of("p05") - 0.1 * b) / 0.9, c = (of("p95") - 0.1 * b) / 0.9;
+  double square = 0.0;
+  const std::vector<double> rms = ColumnOf(csv, "ekf.rms:target.depth");
+  for (const double value : rms) square += value * value / static_cast<double>(rms.size());
+  EXPECT_NEAR(square, (a * a + b * b + c * c) / 3.0, 1e-9 * square);
+  double nees = 0.0;
+  const std::vector<double> anees = ColumnOf(csv, "ekf.anees:target");
+  for (const double value : anees) nees += value / static_cast<double>(anees.size());
+  EXPECT_NEAR(nees, values.At("nees.mean:target").At("mean").Number(), 1e-9);
+  const std::vector<double> low = ColumnOf(csv, "ekf.p16:target.depth");
+  const std::vector<double> high = ColumnOf(csv, "ekf.p84:target.depth");
+  ASSERT_EQ(low.size(), rms.size());
+  for (std::size_t k = 0; k < low.size(); ++k) EXPECT_LE(low[k], high[k]);
+}
+
+TEST_F(CompareCli, OverSeedsThereIsAReportWithFigures) {
+  const Outcome compared = Call({"compare", "config.yaml", "--runs", "2", "--set",
+                                 "source.duration_s=2", "--jobs", "1", "-o", "out"});
+  ASSERT_EQ(compared.code, 0) << compared.err;
+  EXPECT_FALSE(Contains(compared.err, "figures:")) << compared.err;
+  const std::string html = Read("out/report.html"), files = Read("out/files.txt");
+  EXPECT_TRUE(Contains(html, "paired bootstrap"));
+  EXPECT_TRUE(Contains(html, "ANEES in its bounds target [%]"));
+  for (const char* name : {"anees", "rms.target.depth", "rms.template.inverse_distance", "cost",
+                           "cost.online", "cost.smoothed"}) {
+    EXPECT_TRUE(Contains(html, std::string("gnuplot figures/") + name + ".gp")) << name;
+    EXPECT_TRUE(Contains(files, std::string("figures/") + name + ".svg")) << files;
+  }
+  // CPU time of a batch, and of the filter that it starts from.
+  const std::string csv = Read("out/cost.csv");
+  const auto own = ColumnOf(csv, "cpu_us"), all = ColumnOf(csv, "cpu_us.all");
+  ASSERT_EQ(own.size(), all.size());
+  for (std::size_t i = 0; i < own.size(); ++i) EXPECT_LE(own[i], all[i]);
+  EXPECT_FALSE(Contains(Read("out/compare.tex"), "rule"));
+}
+
+// The first run is made whatever the budget.
+TEST_F(CompareCli, BeginsNoRunBeyondTheBudget) {
+  const Outcome compared =
+      Call({"compare", "config.yaml", "--runs", "5", "--first-seed", "11", "--jobs", "1",
+            "--budget", "0.01", "--set", "source.duration_s=2", "-o", "out"});
+  EXPECT_EQ(compared.code, 0) << compared.err;
+  const std::string words =
+      "the budget of 0.01 s was enough for 1 of 5 runs; left out: seeds from 12 on";
+  EXPECT_TRUE(Contains(compared.out, words)) << compared.out;
+  const Config json = Json("out/compare.json");
+  EXPECT_EQ(json.root().At("runs").Number(), 1);
+  EXPECT_EQ(json.root().At("status").Text(), "ok");
+}
+
+TEST_F(CompareCli, AddsNothingBeyondTheBudget) {
+  const Outcome little = Call({"compare", "config.yaml", "--budget", "1e-9", "-o", "little"});
+  EXPECT_EQ(little.code, 0) << little.err;
+  EXPECT_TRUE(Contains(little.out, "foretold from 10 of 152 frames: ")) << little.out;
+  EXPECT_TRUE(Contains(little.out, " s, the budget is 1e-09 s")) << little.out;
+  EXPECT_FALSE(Contains(little.out, "added '")) << little.out;
+  const Outcome much = Call({"compare", "config.yaml", "--budget", "1e6", "-o", "much"});
+  ASSERT_EQ(much.code, 0) << much.err;
+  ASSERT_EQ(Call({"compare", "config.yaml", "-o", "all"}).code, 0);
+  const auto values = [this](const char* folder) {
+    const std::string json = WithoutClock(Read(std::string(folder) + "/compare.json"));
+    return json.substr(0, json.find("\"notes\""));
+  };
+  EXPECT_EQ(values("much"), values("all"));
+}
+
 TEST_F(CompareCli, StopsAtASignalWithTheSeedsThatAreComplete) {
   // One run comes to its end in this time, on this machine and in this build.
   const auto start = std::chrono::steady_clock::now();
@@ -386,6 +484,8 @@ TEST_F(CompareCli, RefusesWhatItCannotCompare) {
   fails({"compare", "config.yaml", "-o", "a"}, 73, "exists already");
   fails({"compare", "config.yaml", "--first-seed", "3"}, 2, "--first-seed requires --runs");
   fails({"compare", "config.yaml", "--jobs", "3"}, 2, "--jobs requires --runs");
+  fails({"compare", "config.yaml", "--budget", "0"}, 2, "--budget");
+  fails({"compare", "a", "--budget", "3"}, 2, "a finished run is not run again");
   fails({"compare", "config.yaml", "--runs", "2", "--seed", "7", "--first-seed", "20"}, 2,
         "--first-seed");
   fails({"compare", "a", "--json", "--markdown"}, 2, "--json");

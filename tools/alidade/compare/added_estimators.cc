@@ -2,8 +2,10 @@
 #include <algorithm>
 #include <map>
 
+#include "alidade/base/number_text.h"
 #include "alidade/base/text_table.h"
 #include "alidade/base/words.h"
+#include "alidade/compare/budget.h"
 #include "alidade/compare/candidates.h"
 #include "alidade/compare/compare.h"
 #include "alidade/filter/built_in.h"
@@ -166,11 +168,10 @@ int FindFilter(const Experiment& experiment, const std::string& name) {
   internal::RefuseFilter(name, known, filters);
 }
 
-}  // namespace
-
-ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHost& host,
-                                           const CompareOptions& options) {
-  if (options.over_seeds) internal::CheckReadableAgain(config);
+/// Without the variants of those names, each for its reason.
+ComparedExperiment Build(const Config& config, const PluginHost& host,
+                         const CompareOptions& options,
+                         const std::map<std::string, std::string>& without) {
   // Errors are taken from truth: what a config compares with besides is done here.
   Config own = config.Copy();
   if (own.root().is_map() && own.root().Find("reference")) {
@@ -190,6 +191,10 @@ ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHos
     const bool there = std::ranges::any_of(
         all, [&](const NamedEstimator& one) { return IsThere(variant, one, of, filter); });
     if (there) continue;
+    if (const auto found = without.find(FreeName(variant.name, all)); found != without.end()) {
+      left_out[found->second].emplace_back(variant.what);
+      continue;
+    }
     if (variant.full_information && of.system.landmarks) {
       left_out["with landmarks a solve at every frame takes long; the config may have it"]
           .emplace_back(variant.what);
@@ -201,6 +206,49 @@ ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHos
     compared.notes.push_back("left out " + internal::Join(what, "; ") + ": " + reason);
   }
   CheckReference(compared.experiment, options.reference);
+  return compared;
+}
+
+/// Which of those that were added take too long, and why; `note` tells what was foretold.
+std::map<std::string, std::string> BeyondBudget(ComparedExperiment& compared, double budget_s,
+                                                std::string& note) {
+  std::map<std::string, std::string> beyond;
+  const std::optional<internal::ForetoldTime> time = internal::ForetellTime(compared.experiment);
+  if (!time) {
+    note = "how long it takes cannot be foretold: nothing is left out for the budget";
+    return beyond;
+  }
+  const auto seconds = [](double s) { return internal::RoundedText(s, 2) + " s"; };
+  double sum_s = 0.0;
+  for (std::size_t e = 0; e < time->of.size(); ++e) {
+    const std::string& name = compared.experiment.estimators[e].name;
+    if (std::ranges::count(compared.added, name) == 0) sum_s += time->of[e];
+  }
+  for (std::size_t e = 0; e < time->of.size(); ++e) {
+    const std::string& name = compared.experiment.estimators[e].name;
+    if (std::ranges::count(compared.added, name) == 0) continue;
+    if (sum_s + time->of[e] <= budget_s) {
+      sum_s += time->of[e];
+    } else {
+      beyond[name] = "it may take " + seconds(time->of[e]) + ", the budget is " + seconds(budget_s);
+    }
+  }
+  note = "foretold from " + std::to_string(time->frames) + " of " +
+         std::to_string(time->all_frames) + " frames: " + seconds(sum_s) + " of CPU time";
+  return beyond;
+}
+
+}  // namespace
+
+ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHost& host,
+                                           const CompareOptions& options) {
+  if (options.over_seeds || options.budget_s) internal::CheckReadableAgain(config);
+  ComparedExperiment compared = Build(config, host, options, {});
+  if (options.over_seeds || !options.budget_s || compared.added.empty()) return compared;
+  std::string note;
+  const auto beyond = BeyondBudget(compared, *options.budget_s, note);
+  compared = Build(config, host, options, beyond);  // the source has been read
+  compared.notes.push_back(note);
   return compared;
 }
 

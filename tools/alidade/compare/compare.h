@@ -24,8 +24,9 @@ struct CompareOptions {
   std::string filter;     ///< the one whose error is decomposed; "": the first
   bool decompose = true;  ///< else no error decomposition, and nothing is added to a config for it
   bool over_seeds = false;  ///< the source is read for each of several seeds
-  /// Where it is not enough for all, no more seeds are begun; of one run, what was added goes on no
-  /// longer. s of the wall clock, from the first run on.
+  /// What a comparison may take, s. Over seeds no run is begun that would end later by the wall
+  /// clock; but for the first. Of one run nothing is added whose CPU time, foretold from its first
+  /// frames, would be too much with that of the others.
   std::optional<double> budget_s = {};
 };
 
@@ -105,9 +106,9 @@ struct ComparedExperiment {
 
 /// Builds the experiment of a config, and adds what its comparison lacks: the batch of all data, of
 /// the data up to each frame, of what the filter accepted, and the smoother, each with the filter's
-/// sensors, overrides and steps. What does not support the system is left out. Errors: those of
-/// BuildExperiment; kUsage where `options` names an estimator that is not there, or one that is no
-/// filter as that whose error is decomposed.
+/// sensors, overrides and steps. What does not support the system is left out, and of one run what
+/// the budget does not allow for. Errors: those of BuildExperiment; kUsage where `options` names an
+/// estimator that is not there, or one that is no filter as that whose error is decomposed.
 ComparedExperiment BuildComparedExperiment(const Config& config, const PluginHost& host,
                                            const CompareOptions& options);
 
@@ -142,6 +143,7 @@ Comparison CompareFolders(const std::vector<std::filesystem::path>& folders,
 struct ComparedSeeds {
   Comparison comparison;
   SweepResult sweep;
+  std::int64_t beyond_budget = 0;  ///< runs that were not begun for want of time
 };
 /// Runs and compares a config once for each seed; the runs in which an estimator diverged count for
 /// none of its values. Errors: those of Sweep and of RunComparer.
@@ -151,6 +153,13 @@ ComparedSeeds CompareSeeds(const ComparedExperiment& compared, const PluginHost&
 /// The values of comparisons of the same estimators, at least one, as mean and quantiles over them,
 /// and what they tell together.
 Comparison Summarise(const std::vector<Comparison>& comparisons);
+
+/// What the folder of a comparison over several seeds shows besides its tables: report.html, the
+/// figures of errors, average NEES and cost over the seeds, and the csv files that they are drawn
+/// from (docs/compare.md). Returns why figures are missing, or "". `stop` ends the drawing. Errors:
+/// kCannotCreate, kIo.
+std::string WriteSeedReport(const internal::OutputFolder& folder, const Comparison& comparison,
+                            const Config& config, const std::function<bool()>& stop);
 
 /// How a comparison is written for people.
 enum class TableStyle { kText, kMarkdown, kLatex, kHtml };

@@ -3,6 +3,8 @@
 #include <mutex>
 #include <set>
 
+#include "alidade/base/number_text.h"
+#include "alidade/compare/budget.h"
 #include "alidade/compare/candidates.h"
 #include "alidade/compare/error_recorder.h"
 #include "alidade/record/data_hash.h"
@@ -100,12 +102,18 @@ ComparedSeeds CompareSeeds(const ComparedExperiment& compared, const PluginHost&
                            const SweepOptions& sweep, const CompareOptions& options) {
   std::mutex mutex;
   std::map<std::uint64_t, Comparison> by_seed;
+  internal::RunBudget budget(options.budget_s);
+  const auto stopped = [&] { return sweep.stop && sweep.stop(); };
   SweepOptions with = sweep;
+  with.stop = [&] { return stopped() || budget.spent(); };
   with.run = [&](Experiment& experiment, const RunOptions& given) {
     RunComparer comparer(experiment, true);
     RunOptions observed = given;
     observed.observers.push_back(&comparer);
+    observed.stop = stopped;  // a run that has begun ends within the budget, about
+    const double begun_s = budget.elapsed_s();
     RunResult result = sweep.run ? sweep.run(experiment, observed) : Run(experiment, observed);
+    budget.Note(budget.elapsed_s() - begun_s);
     const bool whole = result.code == ExitCode::kDiverged || result.status == RunStatus::kOk;
     if (!whole) return result;
     CompareOptions of_run = options;
@@ -116,10 +124,20 @@ ComparedSeeds CompareSeeds(const ComparedExperiment& compared, const PluginHost&
     return result;
   };
   ComparedSeeds seeds{{}, Sweep(compared.config, host, with)};
+  const std::int64_t done = std::ssize(seeds.sweep.done);
   std::vector<Comparison> comparisons;
   for (auto& [seed, comparison] : by_seed) comparisons.push_back(std::move(comparison));
   if (!comparisons.empty()) seeds.comparison = Summarise(comparisons);
-  if (seeds.sweep.stopped) seeds.comparison.status = RunStatus::kStopped;
+  if (seeds.sweep.stopped && stopped()) {
+    seeds.comparison.status = RunStatus::kStopped;
+  } else if (seeds.sweep.stopped) {
+    seeds.beyond_budget = seeds.sweep.runs - done;
+    seeds.comparison.notes.push_back(
+        "the budget of " + internal::RoundedText(*options.budget_s, 3) + " s was enough for " +
+        std::to_string(done) + " of " + std::to_string(seeds.sweep.runs) +
+        " runs; left out: seeds from " +
+        std::to_string(seeds.sweep.first_seed + static_cast<std::uint64_t>(done)) + " on");
+  }
   return seeds;
 }
 

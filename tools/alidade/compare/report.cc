@@ -31,16 +31,18 @@ struct Column {
   std::map<std::string, Ratio> ratios = {};
 };
 
-/// `1.011 [0.9930, 1.030] undecided`
+/// A number as the other rows have it.
+std::string CellOf(double value) {
+  RunResult one;
+  one.estimators.resize(1);
+  one.estimators[0].metrics["value"] = value;
+  return RowsOf(one, {{"value", ""}})[0].cells[0];
+}
+
+/// `1.0110 [0.9930, 1.0302] undecided`
 std::string RatioText(const Ratio& ratio) {
-  const auto text = [](double value) {
-    RunResult one;
-    one.estimators.resize(1);
-    one.estimators[0].metrics["ratio"] = value;
-    return RowsOf(one, {{"ratio", ""}})[0].cells[0];
-  };
-  const bool exact = !ratio.interval || ratio.interval->low == ratio.interval->high;
-  if (exact) return text(ratio.value());
+  const auto text = [](double value) { return internal::FixedText(value, value < 10.0 ? 4 : 1); };
+  if (!ratio.interval || ratio.error == ratio.reference_error) return CellOf(ratio.value());
   return text(ratio.value()) + " [" + text(ratio.interval->low) + ", " +
          text(ratio.interval->high) + ']' + (ratio.undecided() ? " undecided" : "");
 }

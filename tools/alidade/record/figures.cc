@@ -406,11 +406,12 @@ GnuplotResult DrawFigure(const OutputFolder& folder, const std::string& name,
   return result;
 }
 
-Figures DrawFigures(const OutputFolder& folder, const RecordedRun& run,
-                    const DrawingLimits& limits) {
+namespace {
+
+Figures DrawPlans(const OutputFolder& folder, const std::vector<Plan>& plans,
+                  const DrawingLimits& limits) {
   using End = GnuplotResult::End;
   Figures figures;
-  const std::vector<Plan> plans = PlanFigures(run);
   const auto file = [](const Plan& plan) { return "figures/" + plan.script.name() + ".gp"; };
   for (const Plan& plan : plans) folder.Write(file(plan), plan.script.Text());
   std::string why;
@@ -435,6 +436,20 @@ Figures DrawFigures(const OutputFolder& folder, const RecordedRun& run,
                    " figures drawn: " + why;
   }
   return figures;
+}
+
+}  // namespace
+
+Figures DrawFigures(const OutputFolder& folder, const RecordedRun& run,
+                    const DrawingLimits& limits) {
+  return DrawPlans(folder, PlanFigures(run), limits);
+}
+
+Figures DrawScripts(const OutputFolder& folder, const std::vector<FigureScript>& scripts,
+                    const DrawingLimits& limits) {
+  std::vector<Plan> plans;
+  for (const FigureScript& script : scripts) plans.push_back({script, ""});
+  return DrawPlans(folder, plans, limits);
 }
 
 }  // namespace alidade::internal

@@ -6,6 +6,7 @@
 
 #include "alidade/base/output_folder.h"
 #include "alidade/record/contents.h"
+#include "alidade/record/figure_script.h"
 #include "alidade/record/gnuplot.h"
 
 namespace alidade::internal {
@@ -32,6 +33,9 @@ GnuplotResult DrawFigure(const OutputFolder& folder, const std::string& name,
 /// written, and first. What gnuplot cannot do, or not within the limits, is noted, no error.
 /// Errors: kIo.
 Figures DrawFigures(const OutputFolder& folder, const RecordedRun& run,
+                    const DrawingLimits& limits);
+/// Likewise what these scripts draw, in their order.
+Figures DrawScripts(const OutputFolder& folder, const std::vector<FigureScript>& scripts,
                     const DrawingLimits& limits);
 
 }  // namespace alidade::internal

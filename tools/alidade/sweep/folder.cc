@@ -234,6 +234,8 @@ const std::vector<std::filesystem::path>& SweepFolder::resumed() const {
 std::filesystem::path SweepFolder::failed() const { return impl_->folder.failed(); }
 const std::filesystem::path& SweepFolder::partial() const { return impl_->folder.partial(); }
 
+const internal::OutputFolder& SweepFolder::files() const { return impl_->folder; }
+
 void SweepFolder::AddFile(const std::string& name, const std::string& text) {
   impl_->folder.Write(name, text);
 }

@@ -17,7 +17,8 @@ namespace alidade {
 
 namespace internal {
 class FinishedRuns;  // in alidade/sweep/finished_runs.h
-}
+class OutputFolder;  // in alidade/base/output_folder.h
+}  // namespace internal
 
 /// One of so many equal shares of the seeds, in order; counted from 1.
 struct Shard {
@@ -153,6 +154,8 @@ class SweepFolder {
   std::filesystem::path failed() const;
   /// The temporary folder.
   const std::filesystem::path& partial() const;
+  /// For files that it has besides.
+  const internal::OutputFolder& files() const;
   /// Puts a file of that text into the folder too. Errors: kCannotCreate, kIo.
   void AddFile(const std::string& name, const std::string& text);
   /// Errors: kCannotCreate, kIo.

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/compare/budget.h"
+
+#include "alidade/compare/cpu_clock.h"
+
+namespace alidade::internal {
+
+double RunBudget::elapsed_s() const {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+}
+
+void RunBudget::Note(double run_s) {
+  double longest = longest_s_.load();
+  while (run_s > longest && !longest_s_.compare_exchange_weak(longest, run_s)) continue;
+}
+
+bool RunBudget::spent() const {
+  const double longest = longest_s_.load();
+  return limit_s_ && longest > 0.0 && elapsed_s() + longest > *limit_s_;
+}
+
+std::optional<ForetoldTime> ForetellTime(Experiment& experiment) {
+  constexpr std::int64_t kFrames = 10;
+  ForetoldTime foretold;
+  foretold.all_frames = experiment.source->size();
+  if (foretold.all_frames <= 0) return std::nullopt;
+  std::vector<std::shared_ptr<CpuTime>> times;
+  std::vector<bool> solves_each_frame;
+  for (NamedEstimator& named : experiment.estimators) {
+    solves_each_frame.push_back(named.kind == EstimatorKind::kBatch && !named.estimator->offline());
+    times.push_back(std::make_shared<CpuTime>());
+    named.estimator = WithCpuClock(std::move(named.estimator), times.back());
+  }
+  bool asked = false;  // what is stopped are the frames, not the smoothing
+  RunOptions options;
+  options.progress = [&](std::int64_t done, std::int64_t) { foretold.frames = done; };
+  options.stop = [&] { return foretold.frames >= kFrames && !std::exchange(asked, true); };
+  const RunResult result = Run(experiment, options);
+  if (result.frames == 0 || result.status == RunStatus::kFailed) return std::nullopt;
+  foretold.frames = result.frames;
+  const double more =
+      static_cast<double>(foretold.all_frames) / static_cast<double>(foretold.frames);
+  for (std::size_t e = 0; e < times.size(); ++e) {
+    const double each = solves_each_frame[e] ? more : 1.0;
+    foretold.of.push_back(more * (each * times[e]->frames_s + times[e]->smoothing_s));
+  }
+  return foretold;
+}
+
+}  // namespace alidade::internal

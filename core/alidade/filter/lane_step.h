@@ -1,0 +1,507 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <limits>
+#include <tuple>
+#include <utility>
+
+#include "alidade/filter/pack.h"
+#include "alidade/model/static_ekf.h"
+
+/// The arithmetic of StaticEkf for one filter (S = double) or as many as a pack has lanes.
+namespace alidade {
+
+/// What one sensor has measured, once of each filter of an array of `count`.
+template <class Model, int... Roles>
+struct ArrayUpdate {
+  using Sensor = Model;
+  static constexpr int kBound[] = {Roles...};
+  static constexpr std::size_t kRoles = sizeof...(Roles);
+
+  const Model& sensor;  ///< its roles are filled by the blocks Roles
+  const double* z;      ///< element e of filter i at z[e count + i]
+  double gate = std::numeric_limits<double>::infinity();  ///< bound on r' S^-1 r
+  const bool* present = nullptr;      ///< whether there is one, of each filter; null: always
+  StaticOutcome* outcomes = nullptr;  ///< out, of each filter; null: not wanted
+};
+
+namespace internal {
+
+inline bool Less(double a, double b) { return a < b; }
+inline bool LessEqual(double a, double b) { return a <= b; }
+inline bool Equal(double a, double b) { return a == b; }
+inline bool NotEqual(double a, double b) { return a != b; }
+inline bool Any(bool mask) { return mask; }
+
+/// Whether a geometry has one coordinate for each direction of its tangent.
+template <class G>
+struct IsFlat : std::bool_constant<G::kAmbient == G::kTangent> {};
+template <class Spaces>
+struct AreFlat;
+template <class... G>
+struct AreFlat<std::tuple<G...>> : std::bool_constant<(IsFlat<G>::value && ...)> {};
+
+struct PredictCall {
+  template <class Model, class... A>
+  auto operator()(const Model& model, A... a) const -> decltype(model.Predict(a...));
+};
+struct StepCall {
+  template <class Model, class... A>
+  auto operator()(const Model& model, A... a) const -> decltype(model.Step(a...));
+};
+struct SqrtQCall {
+  template <class Model, class... A>
+  auto operator()(const Model& model, A... a) const -> decltype(model.SqrtQ(a...));
+};
+struct LanesValidCall {
+  template <class Model, class... A>
+  auto operator()(const Model& model, A... a) const -> decltype(bool(model.Valid(a...)));
+};
+template <class T, std::size_t>
+using In = const T*;
+template <class T, std::size_t>
+using Out = T*;
+
+template <class Model, class T, class Time, class Indices>
+struct StepsWith;
+template <class Model, class T, class Time, std::size_t... I>
+struct StepsWith<Model, T, Time, std::index_sequence<I...>>
+    : std::is_invocable<StepCall, const Model&, In<T, I>..., const T*, Time, Out<T, I>...> {};
+template <class Model, class T, class Indices>
+struct PredictsWith;
+template <class Model, class T, std::size_t... I>
+struct PredictsWith<Model, T, std::index_sequence<I...>>
+    : std::is_invocable<PredictCall, const Model&, In<T, I>..., T*> {};
+
+/// dt_s of one lane.
+inline double LaneOf(double all, int) { return all; }
+template <int kLanes>
+double LaneOf(const Pack<kLanes>& each, int lane) {
+  return each.v[lane];
+}
+
+/// As detail::CallStep, with a dt_s of any type.
+template <class Model, class T, class Time, std::size_t... I>
+bool StepLanes(const Model& model, const T* const* x, const T* w, const Time& dt_s, T* const* next,
+               std::index_sequence<I...>) {
+  if constexpr (std::is_void_v<decltype(model.Step(x[I]..., w, dt_s, next[I]...))>) {
+    model.Step(x[I]..., w, dt_s, next[I]...);
+    return true;
+  } else {
+    return model.Step(x[I]..., w, dt_s, next[I]...);
+  }
+}
+
+/// As detail::CallSqrtNoise, of any scalar.
+template <class Model, class S, std::size_t... I>
+void NoiseOfLanes(const Model& model, const S* const* roles, const S* z, S* l,
+                  std::index_sequence<I...>) {
+  if constexpr (detail::HasNoiseOfMeasurement<Model, std::index_sequence<I...>>::value) {
+    model.SqrtNoise(roles[I]..., z, l);
+  } else {
+    static_cast<void>(z);
+    model.SqrtNoise(roles[I]..., l);
+  }
+}
+
+/// x, P and noise that is held, of one filter or of a pack of them.
+template <class S, class... Motions>
+struct LaneState {
+  using Composed = StaticEkf<Motions...>;
+  static constexpr int kAmbient = Composed::kAmbient, kTangent = Composed::kTangent;
+  static constexpr int kTriangle = kTangent * (kTangent + 1) / 2;
+  static constexpr int kHeld =
+      ((detail::Blocks<Motions>::kTangent * Motions::kNoise + Motions::kNoise * Motions::kNoise) +
+       ... + 0);
+
+  S x[kAmbient];
+  S p[kTriangle];     ///< lower triangle by rows
+  S held[kHeld + 1];  ///< of each motion model M = Cov(x, w) and Lq, while an interval goes on
+  S in_interval;      ///< 1: P has been stepped since anything else changed it; else 0
+};
+
+/// Lq of a motion model whose noise does not depend on the state.
+template <class Model>
+struct RootQ {
+  double l[Model::kNoise * Model::kNoise + 1] = {};
+
+  RootQ(const Model& model, double dt_s) {
+    if constexpr (detail::HasSimpleSqrtQ<Model>::value) model.SqrtQ(dt_s, {l, Model::kNoise});
+  }
+};
+
+/// A step of a LaneState, and what became of it, lane by lane.
+template <class S, class... Motions>
+class LaneStep {
+ public:
+  using State = LaneState<S, Motions...>;
+  using Spaces = typename State::Composed::Spaces;
+  static constexpr int kAmbient = State::kAmbient, kTangent = State::kTangent;
+  static constexpr int kBlocks = State::Composed::kBlocks;
+  template <int B>
+  using Space = std::tuple_element_t<static_cast<std::size_t>(B), Spaces>;
+
+  LaneStep(State& state, const std::tuple<Motions...>& motions) : s_(state), motions_(motions) {}
+
+  /// false where a model is not defined: for every lane, unless they differ. `roots` are those of
+  /// dt_s; a dt_s for each lane (S) has none.
+  template <class Time>
+  bool Predict(const Time& dt_s, const std::tuple<RootQ<Motions>...>* roots) {
+    return PredictAll(dt_s, roots, std::index_sequence_for<Motions...>{});
+  }
+
+  /// What became of a measurement; of a pack, of the lanes that are active.
+  struct Result {
+    StaticOutcome outcome;  ///< of those that are not accepted
+    S accepted;             ///< 1 or 0
+  };
+  /// `active` is 1 or 0.
+  template <class Model, int... Roles>
+  Result Update(const ArrayUpdate<Model, Roles...>& update, const S* z, const S& active);
+
+  /// Whether all is finite: x, P, and of a pack every S, which besides was positive. Of a pack no
+  /// too where their sum is not.
+  bool IsFinite() const {
+    S sum = doubt_, other(0.0);
+    if constexpr (std::is_same_v<S, double>) {  // 0 times what is not finite is not a number
+      for (const double one : s_.x) sum += 0.0 * one;
+      for (const double one : s_.p) sum += 0.0 * one;
+    } else {
+      For<kAmbient>([&](auto i) { sum += s_.x[i]; });
+      For<State::kTriangle>([&](auto i) { (i % 2 == 0 ? other : sum) += s_.p[i]; });
+    }
+    return !Any(NotEqual(S(0.0 * (sum + other)), S(0.0)));
+  }
+
+ private:
+  using Indices = std::make_index_sequence<static_cast<std::size_t>(kBlocks)>;
+  /// Of block B; all are flat.
+  static constexpr int Offset(int block) { return OffsetOf(block, Indices{}); }
+  template <std::size_t... I>
+  static constexpr int OffsetOf(int block, std::index_sequence<I...>) {
+    const int sizes[] = {Space<static_cast<int>(I)>::kTangent...};
+    int offset = 0;
+    for (int i = 0; i < block; ++i) offset += sizes[i];
+    return offset;
+  }
+  /// Before motion model m.
+  static constexpr int FirstBlock(std::size_t m) {
+    const int counts[] = {detail::Blocks<Motions>::kCount...};
+    int first = 0;
+    for (std::size_t i = 0; i < m; ++i) first += counts[i];
+    return first;
+  }
+  static constexpr int FirstHeld(std::size_t m) {
+    const int counts[] = {(detail::Blocks<Motions>::kTangent * Motions::kNoise +
+                           Motions::kNoise * Motions::kNoise)...};
+    int first = 0;
+    for (std::size_t i = 0; i < m; ++i) first += counts[i];
+    return first;
+  }
+
+  /// Where P(i, j) is, of which the lower triangle is kept.
+  static constexpr int At(int i, int j) { return i >= j ? i * (i + 1) / 2 + j : At(j, i); }
+
+  /// Part of a step of n elements: F, and G Q G'; M and Lq where noise is held.
+  template <int N, int kNoise>
+  struct Transition {
+    S next[N];
+    Partial<S> f[N][N];
+    S q[N * (N + 1) / 2];
+    S m[N * kNoise + 1], l[kNoise * kNoise + 1];
+  };
+  template <class Model>
+  using TransitionOf = Transition<detail::Blocks<Model>::kTangent, Model::kNoise>;
+
+  template <class Time, std::size_t... M>
+  bool PredictAll(const Time& dt_s, const std::tuple<RootQ<Motions>...>* roots,
+                  std::index_sequence<M...>) {
+    std::tuple<TransitionOf<Motions>...> transitions;
+    const bool all = (StepOne<M>(dt_s, roots, std::get<M>(transitions)) && ...);
+    if (!all) return false;
+    (Take<M>(std::get<M>(transitions)), ...);
+    s_.in_interval = S(1.0);
+    return true;
+  }
+  template <std::size_t M, class Model, class Time, std::size_t... I>
+  void NoiseOf(const Model& model, const Time& dt_s, const std::tuple<RootQ<Motions>...>* roots,
+               S* l, std::index_sequence<I...> indices);
+  template <std::size_t M, class Time, int N, int kNoise>
+  bool StepOne(const Time& dt_s, const std::tuple<RootQ<Motions>...>* roots,
+               Transition<N, kNoise>& t);
+  template <std::size_t M, int N, int kNoise>
+  void Hold(const S& goes_on, Transition<N, kNoise>& t);
+  template <std::size_t M, int N, int kNoise>
+  void Take(const Transition<N, kNoise>& t);
+  template <int kRows>
+  Result Correct(const S (&pht)[kTangent][kRows], S (&s)[kRows][kRows], S (&r)[kRows], double gate,
+                 const S& active);
+
+  State& s_;
+  S doubt_{0.0};  ///< not finite where a pack has to be done lane by lane
+  const std::tuple<Motions...>& motions_;
+};
+
+template <class S, class... Motions>
+template <std::size_t M, class Model, class Time, std::size_t... I>
+void LaneStep<S, Motions...>::NoiseOf(const Model& model, const Time& dt_s,
+                                      const std::tuple<RootQ<Motions>...>* roots, S* l,
+                                      std::index_sequence<I...> indices) {
+  constexpr int n_w = Model::kNoise, first = FirstBlock(M);
+  if constexpr (detail::HasSimpleSqrtQ<Model>::value && std::is_same_v<Time, double>) {
+    For<n_w * n_w>([&](auto i) { l[i] = S(std::get<M>(*roots).l[i]); });
+  } else if constexpr (std::is_same_v<S, double>) {
+    const double* const x[] = {s_.x + Offset(first + static_cast<int>(I))...};
+    For<n_w * n_w>([&](auto i) { l[i] = 0.0; });
+    detail::CallSqrtQ(model, x, dt_s, {l, n_w}, indices);
+  } else {  // lane by lane
+    for (int lane = 0; lane < S::kCount; ++lane) {
+      double one[n_w * n_w + 1] = {}, own[kAmbient];
+      For<kAmbient>([&](auto i) { own[i] = s_.x[i].v[lane]; });
+      const double* const x[] = {own + Offset(first + static_cast<int>(I))...};
+      detail::CallSqrtQ(model, x, LaneOf(dt_s, lane), {one, n_w}, indices);
+      For<n_w * n_w>([&](auto i) { l[i].v[lane] = one[i]; });
+    }
+  }
+}
+
+template <class S, class... Motions>
+template <std::size_t M, class Time, int N, int kNoise>
+bool LaneStep<S, Motions...>::StepOne(const Time& dt_s, const std::tuple<RootQ<Motions>...>* roots,
+                                      Transition<N, kNoise>& t) {
+  using Model = std::tuple_element_t<M, std::tuple<Motions...>>;
+  using D = Dual<S, N + kNoise>;
+  using All = detail::Blocks<Model>;
+  constexpr typename All::Indices indices{};
+  constexpr int o = Offset(FirstBlock(M));
+  const Model& model = std::get<M>(motions_);
+  D lifted[N], next[N], noise[kNoise + 1];
+  const D* x[All::kCount];
+  D* y[All::kCount];
+  For<N>([&](auto i) { lifted[i] = D(s_.x[o + i], i); });
+  For<kNoise>([&](auto i) { noise[i] = D(S(0.0), std::integral_constant<int, N + i>{}); });
+  For<All::kCount>([&](auto i) {
+    x[i] = lifted + (Offset(FirstBlock(M) + i) - o);
+    y[i] = next + (Offset(FirstBlock(M) + i) - o);
+  });
+  if (!StepLanes(model, x, static_cast<const D*>(noise), dt_s, y, indices)) return false;
+  For<All::kCount>([&](auto index) {
+    constexpr int b = FirstBlock(M) + index, first = Offset(b) - o;
+    For<Space<b>::kTangent>([&](auto i) {
+      const S& value = next[first + i].a;
+      t.next[first + i] = Space<b>::kGeometry == ALIDADE_ANGLE ? S(Angle::Wrap(value)) : value;
+    });
+  });
+  For<N>([&](auto r) { For<N>([&](auto c) { t.f[r][c] = next[r].d[c]; }); });
+  // M = G Lq, Q = M M'
+  NoiseOf<M>(model, dt_s, roots, t.l, indices);
+  const S goes_on = model.noise_kind() == NoiseKind::kDiscrete ? s_.in_interval : S(0.0);
+  const bool any = Any(Less(S(0.0), goes_on));
+  if (any) {
+    constexpr int l = FirstHeld(M) + N * kNoise;
+    For<kNoise * kNoise>(
+        [&](auto i) { t.l[i] = Select(Less(S(0.0), goes_on), s_.held[l + i], t.l[i]); });
+  }
+  For<N>([&](auto r) {
+    For<kNoise>([&](auto c) {
+      Partial<S> sum = Partial<S>::Zero();
+      For<kNoise>([&](auto k) { sum = sum + t.l[k * kNoise + c] * next[r].d[N + k]; });
+      t.m[r * kNoise + c] = sum.value;
+    });
+  });
+  For<N>([&](auto r) {
+    For<r + 1>([&](auto c) {
+      S sum(0.0);
+      For<kNoise>([&](auto k) { sum += t.m[r * kNoise + k] * t.m[c * kNoise + k]; });
+      t.q[At(r, c)] = sum;
+    });
+  });
+  if (any) Hold<M>(goes_on, t);
+  return true;
+}
+
+/// Of the noise held since before, A = F M_0: Q += A M' + M A', M += A.
+template <class S, class... Motions>
+template <std::size_t M, int N, int kNoise>
+void LaneStep<S, Motions...>::Hold(const S& goes_on, Transition<N, kNoise>& t) {
+  constexpr int first = FirstHeld(M);
+  S a[N * kNoise + 1];
+  For<N>([&](auto r) {
+    For<kNoise>([&](auto c) {
+      Partial<S> sum = Partial<S>::Zero();
+      For<N>([&](auto k) { sum = sum + s_.held[first + k * kNoise + c] * t.f[r][k]; });
+      a[r * kNoise + c] = Select(Less(S(0.0), goes_on), sum.value, S(0.0));
+    });
+  });
+  For<N>([&](auto r) {
+    For<r + 1>([&](auto c) {
+      For<kNoise>([&](auto k) {
+        t.q[At(r, c)] += a[r * kNoise + k] * t.m[c * kNoise + k];
+        t.q[At(r, c)] += t.m[r * kNoise + k] * a[c * kNoise + k];
+      });
+    });
+  });
+  For<N * kNoise>([&](auto i) { t.m[i] += a[i]; });
+}
+
+/// P_aa <- F P_aa F' + Q, P_ai <- F P_ai.
+template <class S, class... Motions>
+template <std::size_t M, int N, int kNoise>
+void LaneStep<S, Motions...>::Take(const Transition<N, kNoise>& t) {
+  constexpr int o = Offset(FirstBlock(M));
+  For<N>([&](auto i) { s_.x[o + i] = t.next[i]; });
+  Partial<S> fp[N][kTangent];
+  For<N>([&](auto r) {
+    For<kTangent>([&](auto c) {
+      Partial<S> sum = Partial<S>::Zero();
+      For<N>([&](auto k) { sum = sum + s_.p[At(o + k, c)] * t.f[r][k]; });
+      fp[r][c] = sum;
+    });
+  });
+  For<N>([&](auto r) {
+    For<kTangent>([&](auto c) {
+      if constexpr (c < o || c >= o + N) s_.p[At(o + r, c)] = fp[r][c].value;
+    });
+    For<r + 1>([&](auto c) {
+      Partial<S> sum = {t.q[At(r, c)], kNoise > 0};
+      For<N>([&](auto k) { sum = sum + fp[r][o + k].value * t.f[c][k]; });
+      s_.p[At(o + r, o + c)] = sum.value;
+    });
+  });
+  if (std::get<M>(motions_).noise_kind() == NoiseKind::kDiscrete) {
+    constexpr int first = FirstHeld(M);
+    For<N * kNoise>([&](auto i) { s_.held[first + i] = t.m[i]; });
+    For<kNoise * kNoise>([&](auto i) { s_.held[first + N * kNoise + i] = t.l[i]; });
+  }
+}
+
+template <class S, class... Motions>
+template <class Model, int... Roles>
+typename LaneStep<S, Motions...>::Result LaneStep<S, Motions...>::Update(
+    const ArrayUpdate<Model, Roles...>& update, const S* z, const S& active) {
+  using Z = typename Model::Measurement;
+  using All = detail::Blocks<Model>;
+  constexpr typename All::Indices indices{};
+  constexpr int n = All::kTangent, m = Z::kTangent;
+  const Model& sensor = update.sensor;
+  // Element k of the roles, side by side, is element kElements[k] of the state.
+  constexpr auto elements = [] {
+    constexpr int bound[] = {Roles...}, sizes[] = {Space<Roles>::kTangent...};
+    std::array<int, n> result{};
+    int used = 0;
+    for (int i = 0; i < All::kCount; ++i) {
+      for (int k = 0; k < sizes[i]; ++k) result[used++] = Offset(bound[i]) + k;
+    }
+    return result;
+  }();
+  using D = Dual<S, n>;
+  D lifted[n], value[m];
+  const D* x[All::kCount];
+  S own[n];
+  const S* roles[All::kCount];
+  For<n>([&](auto k) { own[k] = s_.x[elements[k]]; });
+  For<n>([&](auto k) { lifted[k] = D(own[k], k); });
+  int used = 0;
+  For<All::kCount>([&](auto i) {
+    x[i] = lifted + used;
+    roles[i] = own + used;
+    used += detail::SpaceAt<i, Model>::kTangent;
+  });
+  if (!detail::CallPredict(sensor, x, nullptr, value, indices)) {
+    return {StaticOutcome::kOutOfDomain, S(0.0)};
+  }
+  S l[m * m], h[m], r[m], pht[kTangent][m], s[m][m];
+  For<m * m>([&](auto i) { l[i] = S(0.0); });
+  NoiseOfLanes(sensor, roles, z, l, indices);
+  For<m>([&](auto i) { h[i] = value[i].a; });
+  Z::Minus(z, static_cast<const S*>(h), r);
+  For<kTangent>([&](auto i) {
+    For<m>([&](auto c) {
+      Partial<S> sum = Partial<S>::Zero();
+      For<n>([&](auto k) { sum = sum + s_.p[At(i, elements[k])] * value[c].d[k]; });
+      pht[i][c] = sum.value;
+    });
+  });
+  For<m>([&](auto i) {
+    For<i + 1>([&](auto j) {
+      Partial<S> sum = Partial<S>::Zero();
+      For<n>([&](auto k) { sum = sum + pht[elements[k]][j] * value[i].d[k]; });
+      s[i][j] = sum.value;
+      For<m>([&](auto k) { s[i][j] += l[i * m + k] * l[j * m + k]; });
+    });
+  });
+  return Correct<m>(pht, s, r, update.gate, active);
+}
+
+/// S = L L', y = L^-1 r, W = L^-1 H P: NIS = y'y, x += W'y, P -= W'W.
+template <class S, class... Motions>
+template <int kRows>
+typename LaneStep<S, Motions...>::Result LaneStep<S, Motions...>::Correct(
+    const S (&pht)[kTangent][kRows], S (&s)[kRows][kRows], S (&r)[kRows], double gate,
+    const S& active) {
+  using std::sqrt;
+  const S zero(0.0);
+  S inverse[kRows];  // of the diagonal of L; where there is one row, of S
+  S nis(0.0), sum(0.0);
+  For<kRows>([&](auto i) {
+    r[i] = Select(Less(zero, active), r[i], zero);
+    sum += s[i][i];
+    For<i>([&](auto j) {
+      For<j>([&](auto k) { s[i][j] -= s[i][k] * s[j][k]; });
+      s[i][j] *= inverse[j];
+      s[i][i] -= s[i][j] * s[i][j];
+      r[i] -= s[i][j] * r[j];
+    });
+    // Where S is not positive definite NIS becomes infinite or no number.
+    s[i][i] = Select(Less(zero, s[i][i]), s[i][i], zero);
+    if constexpr (kRows == 1) {
+      inverse[0] = 1.0 / s[0][0];
+      nis = r[0] * r[0] * inverse[0];
+    } else {
+      inverse[i] = 1.0 / sqrt(s[i][i]);
+      r[i] *= inverse[i];
+      nis += r[i] * r[i];
+    }
+  });
+  sum += inverse[kRows - 1];
+  if constexpr (std::is_same_v<S, double>) {
+    if (!std::isfinite(nis) || !std::isfinite(sum)) return {StaticOutcome::kNotFinite, 0.0};
+    if (!(nis <= gate)) return {StaticOutcome::kGated, 0.0};
+  } else {
+    doubt_ += sum + nis;
+  }
+  const S accepted = Select(LessEqual(nis, S(gate)), active, zero);
+  // Of the other lanes gain and innovation are zero.
+  For<kRows>([&](auto i) {
+    r[i] *= accepted;
+    inverse[i] *= accepted;
+  });
+  if constexpr (kRows == 1) {
+    For<kTangent>([&](auto i) {
+      const S k = pht[i][0] * inverse[0];
+      s_.x[i] += k * r[0];
+      For<i + 1>([&](auto j) { s_.p[At(i, j)] -= k * pht[j][0]; });
+    });
+  } else {
+    S w[kTangent][kRows];
+    For<kTangent>([&](auto i) {
+      For<kRows>([&](auto c) {
+        w[i][c] = pht[i][c];
+        For<c>([&](auto k) { w[i][c] -= s[c][k] * w[i][k]; });
+        w[i][c] *= inverse[c];
+        s_.x[i] += w[i][c] * r[c];
+      });
+      For<i + 1>([&](auto j) { For<kRows>([&](auto c) { s_.p[At(i, j)] -= w[i][c] * w[j][c]; }); });
+    });
+  }
+  For<kBlocks>([&](auto b) {
+    constexpr int o = Offset(b);
+    if constexpr (Space<b>::kGeometry == ALIDADE_ANGLE) s_.x[o] = Angle::Wrap(s_.x[o]);
+  });
+  s_.in_interval = s_.in_interval * (1.0 - accepted);
+  return {StaticOutcome::kGated, accepted};
+}
+
+}  // namespace internal
+}  // namespace alidade

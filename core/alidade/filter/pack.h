@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <concepts>
+#include <cstdint>
+#include <cstring>
+#include <utility>
+
+#include "alidade/model/autodiff.h"
+
+/// The scalars of many filters at once, with which models are instantiated: kLanes numbers side by
+/// side, and dual numbers of those.
+namespace alidade::internal {
+
+/// f(integral_constant<int, I>) for I < N: a loop that is unrolled before anything else, so that
+/// arrays become single numbers.
+template <int N, class F>
+void For(const F& f) {
+  detail::ForEach(f, std::make_index_sequence<static_cast<std::size_t>(N)>{});
+}
+
+/// Set where a model has compared packs and the lanes did not agree: what it then computed holds
+/// for lane 0 alone.
+inline constinit thread_local bool lanes_differ = false;
+
+/// Vectors of the compiler.
+template <int kLanes>
+struct VectorsOf;
+#define ALIDADE_VECTORS_OF(LANES)                                        \
+  template <>                                                            \
+  struct VectorsOf<LANES> {                                              \
+    typedef double Numbers __attribute__((vector_size(LANES * 8)));      \
+    typedef std::int64_t Truths __attribute__((vector_size(LANES * 8))); \
+    typedef std::int8_t Bytes __attribute__((vector_size(LANES)));       \
+  };
+ALIDADE_VECTORS_OF(2)
+ALIDADE_VECTORS_OF(4)
+ALIDADE_VECTORS_OF(8)
+#undef ALIDADE_VECTORS_OF
+
+/// A comparison of packs, lane by lane; for Select and AllOf alone. What is combined of several is
+/// a number, 1 for true and 0 for false: of masks AVX-512 has another kind than the others, and
+/// the compiler would take them apart.
+template <int kLanes>
+struct PackMask {
+  typename VectorsOf<kLanes>::Truths v;  ///< -1: true, 0: false
+
+  explicit PackMask(const typename VectorsOf<kLanes>::Truths& lanes) : v(lanes) {}
+  // Not trivial: else packs would go from function to function in registers, of which each
+  // instruction set has others.
+  PackMask(const PackMask& other) : v(other.v) {}
+  /// The lanes' bytes side by side.
+  std::uint64_t Bytes() const {
+    using Byte = typename VectorsOf<kLanes>::Bytes;
+    const Byte bytes = __builtin_convertvector(v, Byte);
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, &bytes, kLanes);
+    return bits;
+  }
+};
+template <int kLanes>
+bool Any(const PackMask<kLanes>& mask) {
+  return mask.Bytes() != 0;
+}
+
+/// kLanes numbers, an element of as many filters. Arithmetic is lane by lane. A comparison is a
+/// bool: that of every lane where they agree, else that of lane 0, and `lanes_differ` is set.
+template <int kLanes>
+struct Pack {
+  using Vector = typename VectorsOf<kLanes>::Numbers;
+  using Mask = PackMask<kLanes>;
+  static constexpr int kCount = kLanes;
+  Vector v;
+
+  Pack() = default;
+  Pack(double all) {  // NOLINT(google-explicit-constructor): as double has it
+    const Vector zero = {};
+    v = zero + all;  // a sum: a mere copy is made number by number
+  }
+  explicit Pack(const Vector& lanes) : v(lanes) {}
+  Pack(const Pack& other) : v(other.v) {}  // not trivial, for the reason of PackMask
+  Pack& operator=(const Pack& other) {
+    v = other.v;
+    return *this;
+  }
+
+  friend Pack operator+(const Pack& a, const Pack& b) { return Pack(a.v + b.v); }
+  friend Pack operator-(const Pack& a, const Pack& b) { return Pack(a.v - b.v); }
+  friend Pack operator*(const Pack& a, const Pack& b) { return Pack(a.v * b.v); }
+  friend Pack operator/(const Pack& a, const Pack& b) { return Pack(a.v / b.v); }
+  friend Pack operator-(const Pack& a) { return Pack(-a.v); }
+  friend Pack operator+(const Pack& a) { return a; }
+  Pack& operator+=(const Pack& other) { return *this = *this + other; }
+  Pack& operator-=(const Pack& other) { return *this = *this - other; }
+  Pack& operator*=(const Pack& other) { return *this = *this * other; }
+  Pack& operator/=(const Pack& other) { return *this = *this / other; }
+
+  friend Mask Less(const Pack& a, const Pack& b) { return Mask(a.v < b.v); }
+  friend Mask LessEqual(const Pack& a, const Pack& b) { return Mask(a.v <= b.v); }
+  friend Mask NotEqual(const Pack& a, const Pack& b) { return Mask(a.v != b.v); }
+  friend Mask Equal(const Pack& a, const Pack& b) { return Mask(a.v == b.v); }
+  friend bool operator<(const Pack& a, const Pack& b) { return Agreed(Less(a, b)); }
+  friend bool operator>(const Pack& a, const Pack& b) { return Agreed(Less(b, a)); }
+  friend bool operator<=(const Pack& a, const Pack& b) { return Agreed(LessEqual(a, b)); }
+  friend bool operator>=(const Pack& a, const Pack& b) { return Agreed(LessEqual(b, a)); }
+  friend bool operator==(const Pack& a, const Pack& b) { return Agreed(Equal(a, b)); }
+  friend bool operator!=(const Pack& a, const Pack& b) { return !(a == b); }
+
+ private:
+  static bool Agreed(const Mask& mask) {
+    constexpr std::uint64_t all = ~std::uint64_t{0} >> (64 - 8 * kLanes);
+    const std::uint64_t bytes = mask.Bytes();
+    if (__builtin_expect(bytes == all, 1)) return true;
+    if (bytes == 0) return false;
+    lanes_differ = true;
+    return (bytes & 1) != 0;
+  }
+};
+
+inline double Select(bool mask, double a, double b) { return mask ? a : b; }
+template <int kLanes>
+Pack<kLanes> Select(const PackMask<kLanes>& mask, const Pack<kLanes>& a, const Pack<kLanes>& b) {
+  return Pack<kLanes>(mask.v ? a.v : b.v);
+}
+
+/// f of each lane.
+template <int kLanes, class F>
+Pack<kLanes> Map(const Pack<kLanes>& a, const F& f) {
+  Pack<kLanes> result;
+  for (int i = 0; i < kLanes; ++i) result.v[i] = f(a.v[i]);
+  return result;
+}
+#define ALIDADE_PACK_FUNCTION(NAME)                           \
+  template <int kLanes>                                       \
+  Pack<kLanes> NAME(const Pack<kLanes>& a) {                  \
+    return Map(a, [](double one) { return std::NAME(one); }); \
+  }
+ALIDADE_PACK_FUNCTION(sin)
+ALIDADE_PACK_FUNCTION(cos)
+ALIDADE_PACK_FUNCTION(tan)
+ALIDADE_PACK_FUNCTION(asin)
+ALIDADE_PACK_FUNCTION(acos)
+ALIDADE_PACK_FUNCTION(atan)
+ALIDADE_PACK_FUNCTION(exp)
+ALIDADE_PACK_FUNCTION(log)
+ALIDADE_PACK_FUNCTION(ceil)
+ALIDADE_PACK_FUNCTION(floor)
+#undef ALIDADE_PACK_FUNCTION
+template <int kLanes>
+Pack<kLanes> sqrt(const Pack<kLanes>& a) {  // the instruction alone, without errno
+  return Map(a, [](double one) { return one < 0.0 ? NAN : __builtin_sqrt(one); });
+}
+template <int kLanes>
+Pack<kLanes> abs(const Pack<kLanes>& a) {
+  return Select(Less(a, Pack<kLanes>(0.0)), -a, a);
+}
+template <int kLanes>
+Pack<kLanes> atan2(const Pack<kLanes>& y, const Pack<kLanes>& x) {
+  Pack<kLanes> result;
+  for (int i = 0; i < kLanes; ++i) result.v[i] = std::atan2(y.v[i], x.v[i]);
+  return result;
+}
+
+/// A derivative, which may be known to be zero: the compiler then leaves its products out.
+template <class S>
+struct Partial {
+  S value;
+  bool some;  ///< false: zero
+
+  static Partial Zero() { return {S(0.0), false}; }
+  friend Partial operator+(const Partial& a, const Partial& b) {
+    if (!a.some) return b;
+    return b.some ? Partial{a.value + b.value, true} : a;
+  }
+  friend Partial operator*(const S& s, const Partial& a) {
+    return a.some ? Partial{s * a.value, true} : a;
+  }
+};
+
+/// A value and its N derivatives: ceres::Jet of any scalar.
+template <class S, int N>
+struct Dual {
+  S a;
+  Partial<S> d[N];
+
+  Dual() = default;
+  template <std::convertible_to<S> A>
+  Dual(const A& value) : a(value) {  // NOLINT(google-explicit-constructor): as double has it
+    For<N>([&](auto i) { d[i] = Partial<S>::Zero(); });
+  }
+  template <int kSeed>
+  Dual(const S& value, std::integral_constant<int, kSeed>) : Dual(value) {
+    d[kSeed] = {S(1.0), true};
+  }
+  Dual(const Dual& other) : a(other.a) {
+    For<N>([&](auto i) { d[i] = other.d[i]; });
+  }
+  Dual& operator=(const Dual& other) {
+    a = other.a;
+    For<N>([&](auto i) { d[i] = other.d[i]; });
+    return *this;
+  }
+
+  friend Dual operator+(const Dual& x, const Dual& y) {
+    return Both(x.a + y.a, x, S(1.0), y, S(1.0));
+  }
+  friend Dual operator-(const Dual& x, const Dual& y) {
+    return Both(x.a - y.a, x, S(1.0), y, S(-1.0));
+  }
+  friend Dual operator*(const Dual& x, const Dual& y) { return Both(x.a * y.a, x, y.a, y, x.a); }
+  friend Dual operator/(const Dual& x, const Dual& y) {
+    const S inverse = 1.0 / y.a, quotient = x.a * inverse;
+    return Both(quotient, x, inverse, y, -quotient * inverse);
+  }
+  friend Dual operator-(const Dual& x) { return Chain(-x.a, x, S(-1.0)); }
+  friend Dual operator+(const Dual& x) { return x; }
+  Dual& operator+=(const Dual& other) { return *this = *this + other; }
+  Dual& operator-=(const Dual& other) { return *this = *this - other; }
+  Dual& operator*=(const Dual& other) { return *this = *this * other; }
+  Dual& operator/=(const Dual& other) { return *this = *this / other; }
+
+  friend bool operator<(const Dual& x, const Dual& y) { return x.a < y.a; }
+  friend bool operator>(const Dual& x, const Dual& y) { return x.a > y.a; }
+  friend bool operator<=(const Dual& x, const Dual& y) { return x.a <= y.a; }
+  friend bool operator>=(const Dual& x, const Dual& y) { return x.a >= y.a; }
+  friend bool operator==(const Dual& x, const Dual& y) { return x.a == y.a; }
+  friend bool operator!=(const Dual& x, const Dual& y) { return x.a != y.a; }
+
+  /// f, of slope df/dx.
+  friend Dual Chain(const S& f, const Dual& x, const S& slope) {
+    Dual result(f);
+    For<N>([&](auto i) { result.d[i] = slope * x.d[i]; });
+    return result;
+  }
+  /// f, of slopes df/dx and df/dy.
+  friend Dual Both(const S& f, const Dual& x, const S& slope_x, const Dual& y, const S& slope_y) {
+    Dual result(f);
+    For<N>([&](auto i) { result.d[i] = slope_x * x.d[i] + slope_y * y.d[i]; });
+    return result;
+  }
+  friend Dual sqrt(const Dual& x) {
+    using std::sqrt;
+    const S root = sqrt(x.a);
+    return Chain(root, x, 0.5 / root);
+  }
+  friend Dual sin(const Dual& x) {
+    using std::cos, std::sin;
+    return Chain(sin(x.a), x, cos(x.a));
+  }
+  friend Dual cos(const Dual& x) {
+    using std::cos, std::sin;
+    return Chain(cos(x.a), x, -sin(x.a));
+  }
+  friend Dual tan(const Dual& x) {
+    using std::tan;
+    const S t = tan(x.a);
+    return Chain(t, x, 1.0 + t * t);
+  }
+  friend Dual asin(const Dual& x) {
+    using std::asin, std::sqrt;
+    return Chain(asin(x.a), x, 1.0 / sqrt(1.0 - x.a * x.a));
+  }
+  friend Dual acos(const Dual& x) {
+    using std::acos, std::sqrt;
+    return Chain(acos(x.a), x, -1.0 / sqrt(1.0 - x.a * x.a));
+  }
+  friend Dual atan(const Dual& x) {
+    using std::atan;
+    return Chain(atan(x.a), x, 1.0 / (1.0 + x.a * x.a));
+  }
+  friend Dual atan2(const Dual& y, const Dual& x) {
+    using std::atan2;
+    const S inverse = 1.0 / (x.a * x.a + y.a * y.a);
+    return Both(atan2(y.a, x.a), y, x.a * inverse, x, -y.a * inverse);
+  }
+  friend Dual exp(const Dual& x) {
+    using std::exp;
+    const S e = exp(x.a);
+    return Chain(e, x, e);
+  }
+  friend Dual log(const Dual& x) {
+    using std::log;
+    return Chain(log(x.a), x, 1.0 / x.a);
+  }
+  friend Dual ceil(const Dual& x) {
+    using std::ceil;
+    return Dual(ceil(x.a));
+  }
+  friend Dual floor(const Dual& x) {
+    using std::floor;
+    return Dual(floor(x.a));
+  }
+  friend Dual abs(const Dual& x) {
+    using std::abs;
+    return Chain(abs(x.a), x, x.a < S(0.0) ? S(-1.0) : S(1.0));
+  }
+};
+
+}  // namespace alidade::internal

@@ -45,6 +45,30 @@ constexpr const char* kFollow = R"(alidade: 1
 source: {type: image_tracks, path: scene/images, rate_hz: 20, features: 40}
 )";
 
+constexpr const char* kGuided = R"(alidade: 1
+camera: {model: pinhole, width: 320, height: 240, fx: 260, fy: 260, cx: 160, cy: 120}
+state:
+  cam:
+    model: quaternion_pose
+    noise: {kind: continuous, linear_acceleration: 0.1, angular_acceleration: 1}
+    initial:
+      position: {mean: [0, 0, 0], sigma: 0}
+      orientation: {mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0}
+      velocity: {mean: [0, 0, 0], sigma: 0.3}
+      angular_velocity: {mean: [0, 0, 0], sigma: 0.5}
+landmarks:
+  representation: inverse_depth
+  prior: {inverse_distance: 0.4, sigma: 0.1}
+sensors:
+  pixels:
+    model: inverse_depth_feature
+    stream: tracks
+    roles: {position: cam.position, orientation: cam.orientation, landmark: landmarks}
+    sigma_px: 0.3
+source: {type: image_tracks, path: scene/images, rate_hz: 10, features: 40, guide: ekf}
+estimators: {ekf: {type: ekf, gate: 0.999}}
+)";
+
 struct Seen {
   int feature;
   double u, v;
@@ -254,6 +278,73 @@ TEST_F(ImageTracks, StandStillInAFrozenImage) {
   EXPECT_EQ(again, static_cast<int>(before.size()));
 }
 
+TEST_F(ImageTracks, HaveTheTimesOfTheLayoutsOfEurocTumAndKitti) {
+  MakeImages();
+  const std::filesystem::path images = folder_ / "scene/images";
+  std::string euroc = "#timestamp [ns],filename\n", tum = "# timestamp filename\n", kitti;
+  for (int k = 0; k < 20; ++k) {
+    const std::string name = std::filesystem::path(ImageFile(k)).filename().string();
+    euroc += std::to_string(1403636579763555584 + 50'000'000L * k) + ',' + name + "\r\n";
+    tum += std::to_string(1305031452 + k) + ".25 rgb/" + name + '\n';
+    kitti += std::to_string(k) + ".5e-01\n";
+  }
+  const auto lay = [&](const std::string& to) {
+    std::filesystem::create_directories(folder_ / to);
+    for (int k = 0; k < 20; ++k) {
+      const std::filesystem::path file = ImageFile(k);
+      std::filesystem::copy_file(file, folder_ / to / file.filename());
+    }
+  };
+  lay("euroc/cam0/data");
+  Write("euroc/cam0/data.csv", euroc);
+  Write("euroc/cam0/sensor.yaml",
+        "sensor_type: camera\nresolution: [320, 240]\ncamera_model: pinhole\n"
+        "intrinsics: [261, 262, 160, 120]\ndistortion_model: radial-tangential\n"
+        "distortion_coefficients: [0.0, 0.0, 0.0, 0.0]\n");
+  lay("tum/rgb");
+  Write("tum/rgb.txt", tum);
+  Write("tum/groundtruth.txt", "# t x y z qx qy qz qw\n1305031453.2504 1 2 3 0 0 0 1\n");
+  lay("kitti/image_0");
+  Write("kitti/times.txt", kitti);
+  const auto track = [&](const std::string& path) {
+    return Track({"--set", "source.rate_hz=0", "--set", "source.path=" + path});
+  };
+  ASSERT_EQ(track("euroc/cam0/data").code, 0);
+  EXPECT_TRUE(Contains(Read("found/timestamps.csv"), "\n1,1403636579.813555584\n"));
+  const std::string guided = kGuided;
+  Write("no_camera.yaml", "alidade: 1\n" + guided.substr(guided.find("state:")));
+  const Outcome explained = Call({"explain", "no_camera.yaml", "--set", "source.rate_hz=0", "--set",
+                                  "source.path=euroc/cam0/data"});
+  EXPECT_TRUE(Contains(explained.out, "261")) << explained.out << explained.err;
+  ASSERT_EQ(track("tum/rgb/").code, 0);
+  EXPECT_TRUE(Contains(Read("found/timestamps.csv"), "\n1,1305031453.250000000\n"));
+  EXPECT_TRUE(Contains(Read("found/truth.tum"), "1305031453.250000000 1 2 3"))
+      << Read("found/truth.tum");
+  ASSERT_EQ(track("kitti/image_0").code, 0);
+  EXPECT_TRUE(Contains(Read("found/timestamps.csv"), "\n19,1.950000000\n"))
+      << Read("found/timestamps.csv");
+
+  // By their names, one that is gone is missed by nothing; a time that is not there is.
+  std::filesystem::remove(folder_ / "tum/rgb/000019.png");
+  EXPECT_EQ(track("tum/rgb").code, 0);
+  Write("tum/rgb.txt", tum.substr(0, tum.find("1305031455")));
+  const Outcome no_time = track("tum/rgb");
+  EXPECT_EQ(no_time.code, 65);
+  EXPECT_TRUE(Contains(no_time.err, "rgb.txt: has no time for image 000003.png")) << no_time.err;
+  Write("kitti/times.txt", kitti + "30\n");
+  const Outcome one_more = track("kitti/image_0");
+  EXPECT_EQ(one_more.code, 65);
+  EXPECT_TRUE(Contains(one_more.err, "has 21 times, but there are 20 images")) << one_more.err;
+  Write("kitti/times.txt", "\n");
+  EXPECT_TRUE(Contains(track("kitti/image_0").err, "no rows")) << track("kitti/image_0").err;
+}
+
+TEST_F(ImageTracks, ADeviceThatIsNoCameraIsNamed) {
+  const Outcome outcome = Track({"--set", "source.path=/dev/null"});
+  EXPECT_EQ(outcome.code, 65);
+  EXPECT_TRUE(Contains(outcome.err, "/dev/null: not a camera that OpenCV reads")) << outcome.err;
+}
+
 TEST_F(ImageTracks, AnImageThatIsGoneIsMissedByItsTime) {
   MakeImages();
   std::ostringstream times;
@@ -355,30 +446,6 @@ TEST_F(ImageTracks, LeadTheFilterAsPerfectTracksDo) {
   EXPECT_LT(perfect, 0.002);  // m
   EXPECT_LT(seen, 1.5 * perfect);
 }
-
-constexpr const char* kGuided = R"(alidade: 1
-camera: {model: pinhole, width: 320, height: 240, fx: 260, fy: 260, cx: 160, cy: 120}
-state:
-  cam:
-    model: quaternion_pose
-    noise: {kind: continuous, linear_acceleration: 0.1, angular_acceleration: 1}
-    initial:
-      position: {mean: [0, 0, 0], sigma: 0}
-      orientation: {mean: {w: 1, x: 0, y: 0, z: 0}, sigma: 0}
-      velocity: {mean: [0, 0, 0], sigma: 0.3}
-      angular_velocity: {mean: [0, 0, 0], sigma: 0.5}
-landmarks:
-  representation: inverse_depth
-  prior: {inverse_distance: 0.4, sigma: 0.1}
-sensors:
-  pixels:
-    model: inverse_depth_feature
-    stream: tracks
-    roles: {position: cam.position, orientation: cam.orientation, landmark: landmarks}
-    sigma_px: 0.3
-source: {type: image_tracks, path: scene/images, rate_hz: 10, features: 40, guide: ekf}
-estimators: {ekf: {type: ekf, gate: 0.999}}
-)";
 
 constexpr const char* kTurning = R"(alidade: 1
 camera: {model: pinhole, width: 320, height: 240, fx: 260, fy: 260, cx: 160, cy: 120}

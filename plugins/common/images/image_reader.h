@@ -20,8 +20,8 @@
 
 namespace alidade {
 
-/// The images of a folder, in the order of their names (2.png before 10.png), or of a video, one at
-/// a time, 8 bit grey.
+/// The images of a folder, in the order of their names (2.png before 10.png), of a video, or of a
+/// camera (a device, /dev/video0) as it takes them; one at a time, 8 bit grey.
 ///
 /// Errors       kInputMissing: no such path, no image in the folder. kBadData, with the file: an
 ///              image that cannot be decoded, is cut short, or has another size than the first.
@@ -40,11 +40,13 @@ class ImageReader {
       List(names, key);
       return;
     }
-    if (!video_.open(path_.string())) {
-      throw Error(ExitCode::kBadData,
-                  ErrorLine({path_.string()}, {}, "not a video that OpenCV reads",
-                            "a video, or a folder of images"));
-    }
+    is_live_ = std::filesystem::is_character_file(path_, error);
+    if (is_live_ ? video_.open(path_.string(), cv::CAP_V4L2) : video_.open(path_.string())) return;
+    throw Error(ExitCode::kBadData,
+                ErrorLine({path_.string()}, {},
+                          is_live_ ? "not a camera that OpenCV reads, or another program has it"
+                                   : "not a video that OpenCV reads",
+                          "a video, a folder of images, or a camera, as /dev/video0"));
   }
 
   /// The next image; false at the end.
@@ -60,6 +62,8 @@ class ImageReader {
   }
 
   bool is_video() const { return files_.empty(); }
+  /// A camera: an image is taken when it is asked for, and there is no last one.
+  bool is_live() const { return is_live_; }
   /// Of the image that was read last, from 0.
   std::int64_t number() const { return number_; }
   /// The file of the image that was read last, or its number in the video.
@@ -67,13 +71,18 @@ class ImageReader {
     if (is_video()) return {path_.string() + ", image " + std::to_string(number_)};
     return {number_ < 0 ? path_.string() : files_[static_cast<std::size_t>(number_)].string()};
   }
-  /// How many there are; of a video as it says.
+  /// Of the file of the image that was read last; empty: of a video.
+  std::string name() const {
+    return is_video() ? "" : files_[static_cast<std::size_t>(number_)].filename().string();
+  }
+  /// How many there are; of a video as it says; 0 of a camera.
   std::int64_t size() const {
+    if (is_live_) return 0;
     return is_video() ? static_cast<std::int64_t>(video_.get(cv::CAP_PROP_FRAME_COUNT))
                       : std::ssize(files_);
   }
   /// Images a second, as a video says; 0: it does not.
-  double rate_hz() const { return is_video() ? video_.get(cv::CAP_PROP_FPS) : 0.0; }
+  double rate_hz() const { return is_video() && !is_live_ ? video_.get(cv::CAP_PROP_FPS) : 0.0; }
 
  private:
   static std::string SizeText(cv::Size size) {
@@ -162,6 +171,7 @@ class ImageReader {
   std::filesystem::path path_;
   std::vector<std::filesystem::path> files_;  ///< of a folder
   cv::VideoCapture video_;
+  bool is_live_ = false;
   cv::Mat colour_;
   cv::Size size_;
   std::int64_t number_ = -1;

@@ -21,8 +21,10 @@ namespace alidade {
 /// Features that are found in the images of one camera and followed through them.
 ///
 /// Beside the images, in their folder or that of the video, may be `timestamps.csv` (`frame,t_s`,
-/// frames counted from 0), or else rate_hz gives image k the time k / rate; `groundtruth.tum` or
-/// `truth.tum` (world_from_cam); and `calibration.yaml`, see CalibrationFile.
+/// frames counted from 0), or a table that ImageTimes::Beside knows, or else rate_hz gives image k
+/// the time k / rate; `groundtruth.tum` or `truth.tum` (world_from_cam), or the `groundtruth.txt` of
+/// TUM; and `calibration.yaml`, or the `sensor.yaml` of EuRoC, see CalibrationFile. Images of a
+/// camera have the times at which they came, from 0.
 ///
 ///   stream   size  values       when
 ///   tracks   2     u, v         a feature is followed; the landmark is its id
@@ -45,7 +47,7 @@ class ImageTracks : public Source {
       : tracker_(TrackerOptions(arguments.params)) {
     Params& p = arguments.params;
     rate_hz_ = p.Number("rate_hz", "Hz",
-                        "images a second, where there is no timestamps.csv; 0: there is, or the "
+                        "images a second, where there is no table of times; 0: there is, or the "
                         "video says",
                         {0.0, 1e6}, 0.0);
     start_ = p.Integer("start_frame", "images before it are left out", 0, 1 << 30, 0);
@@ -101,7 +103,7 @@ class ImageTracks : public Source {
         return false;
       }
     } while (images_->number() < start_);
-    frame.timestamp = times_->At(images_->number());
+    frame.timestamp = times_->At(images_->number(), images_->name());
     frame.measurements.clear();
     if (frames_ == 0 && !known_.empty()) GiveKnown();
     for (const FeatureTracker::Feature& feature :
@@ -190,29 +192,34 @@ class ImageTracks : public Source {
   }
 
   void Open(const Node& key, const std::string& names, const std::filesystem::path& folder) {
-    if (key.Text().empty()) key.Fail("no path", "a folder of images, or a video");
+    if (key.Text().empty())
+      key.Fail("no path", "a folder of images, a video, or a camera, as /dev/video0");
     const std::filesystem::path path = folder / key.Text();
     images_.emplace(path, names, key);
     const std::filesystem::path home = images_->is_video() ? path.parent_path() : path;
-    const auto beside = [&](const char* name) -> std::optional<std::filesystem::path> {
-      std::error_code ignored;
-      const bool there = std::filesystem::exists(home / name, ignored);
-      return there ? std::optional(home / name) : std::nullopt;
+    std::error_code ignored;
+    const std::filesystem::path above =
+        std::filesystem::weakly_canonical(home, ignored).parent_path();
+    const auto first_of = [&](std::initializer_list<std::filesystem::path> files)
+        -> std::optional<std::filesystem::path> {
+      for (const std::filesystem::path& file : files) {
+        if (std::filesystem::exists(file, ignored)) return file;
+      }
+      return std::nullopt;
     };
-    if (rate_hz_ == 0.0) {
-      if (const auto times = beside("timestamps.csv")) {
-        times_.emplace(*times, key);
-      } else {
-        rate_hz_ = images_->rate_hz();
+    if (rate_hz_ == 0.0 && !images_->is_live()) {
+      times_ = ImageTimes::Beside(home, /*by_layout=*/!images_->is_video(), key);
+      if (!times_) rate_hz_ = images_->rate_hz();
+      if (!times_ && !(rate_hz_ > 0.0)) {
+        key.Fail("no timestamps.csv next to the images",
+                 "that file, a table of EuRoC, TUM or KITTI beside the folder, or 'rate_hz'");
       }
     }
-    if (!times_ && !(rate_hz_ > 0.0)) {
-      key.Fail("no timestamps.csv next to the images", "that file, or 'rate_hz'");
-    }
-    if (!times_) times_.emplace(rate_hz_);
-    calibration_ = beside("calibration.yaml");
-    auto truth = beside("groundtruth.tum");
-    if (!truth) truth = beside("truth.tum");
+    if (!times_) times_ = rate_hz_ > 0.0 ? ImageTimes(rate_hz_) : ImageTimes();
+    if (images_->is_live()) return;
+    calibration_ = first_of({home / "calibration.yaml", above / "sensor.yaml"});
+    const auto truth =
+        first_of({home / "groundtruth.tum", home / "truth.tum", above / "groundtruth.txt"});
     if (truth) truth_.emplace(*truth, key.place(), key.path());
   }
 

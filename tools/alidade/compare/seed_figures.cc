@@ -23,8 +23,8 @@ std::string StyleOf(std::size_t index) { return " ls " + std::to_string(index % 
 
 /// A pattern of dashes that lets one curve be seen below another.
 std::string DashesOf(std::size_t index) {
-  constexpr const char* kDashes[] = {"", " dt (18,8)", " dt (6,16)"};
-  return kDashes[index % 3];
+  constexpr const char* kDashes[] = {" dt (18,8)", " dt (10,14)", " dt (5,10)", " dt (2,7)"};
+  return index == 0 ? "" : kDashes[(index - 1) % 4];
 }
 
 /// Of a csv column, in the unit of the figure.

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "alidade/compare/error_recorder.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "support/recording.h"
+
+namespace alidade {
+namespace {
+
+/// Shows a recorder the estimates of the first estimator.
+class ShowsErrors : public RunObserver {
+ public:
+  explicit ShowsErrors(internal::ErrorRecorder& recorder) : recorder_(recorder) {}
+  void OnEstimate(int estimator, const SourceFrame& frame, const State& state,
+                  const UpdateReport&) override {
+    if (estimator == 0) recorder_.Add(frame, state);
+  }
+
+ private:
+  internal::ErrorRecorder& recorder_;
+};
+
+struct Followed {
+  ErrorSeries series;
+  RunResult result;
+};
+
+Followed Follow(int frames) {
+  Experiment experiment = testing::MakeExperiment(frames);
+  internal::ErrorRecorder recorder(experiment.estimators[0], experiment);
+  ShowsErrors shows(recorder);
+  RunOptions options;
+  options.observers = {&shows};
+  RunResult result = Run(experiment, options);
+  return {recorder.Take(), std::move(result)};
+}
+
+// The fourth frame has no truth.
+TEST(ErrorRecorder, HasWhatTheMetricsAreTakenFrom) {
+  const auto [series, result] = Follow(60);
+  ASSERT_EQ(series.blocks, (std::vector<std::string>{"target.depth"}));
+  ASSERT_EQ(series.timestamps.size(), 60u);
+  double square = 0.0, nees = 0.0;
+  for (std::size_t k = 0; k < 60; ++k) {
+    EXPECT_EQ(std::isnan(series.squares[k]), k == 3);
+    if (k == 3) continue;
+    square += series.squares[k] / 59.0;
+    nees += series.nees[k] / series.dofs[k] / 59.0;
+  }
+  const auto& metrics = result.estimators[0].metrics;
+  EXPECT_NEAR(std::sqrt(square), metrics.at("rmse:target.depth"), 1e-15);
+  EXPECT_NEAR(nees, metrics.at("nees.mean:target"), 1e-12);
+}
+
+// 2048 rows are halved at frame 2047, and again at 4094; from then on it is every fourth.
+TEST(ErrorRecorder, KeepsOfALongRunEveryNthTimestamp) {
+  const ErrorSeries all = Follow(1000).series, thinned = Follow(5000).series;
+  ASSERT_EQ(thinned.timestamps.size(), 1250u);
+  ASSERT_EQ(thinned.squares.size(), 1250u);
+  ASSERT_EQ(thinned.nees.size(), 1250u);
+  for (std::size_t k = 1; k < 250; ++k) {
+    EXPECT_EQ(thinned.timestamps[k], all.timestamps[4 * k]);
+    EXPECT_EQ(thinned.squares[k], all.squares[4 * k]);
+    EXPECT_EQ(thinned.nees[k], all.nees[4 * k]);
+  }
+  EXPECT_NEAR(Seconds(thinned.timestamps.back()), 0.033 * 4996, 1e-6);
+}
+
+}  // namespace
+}  // namespace alidade

@@ -171,6 +171,7 @@ class PostponedState : public ::testing::Test {
 
 TEST_F(PostponedState, IsThatWhichWasAlwaysWhole) {
   for (int i = 0; i < 12; ++i) Enter();
+  int most = 0;
   for (int frame = 0; frame < 300; ++frame) {
     Step();
     Measure();
@@ -187,7 +188,11 @@ TEST_F(PostponedState, IsThatWhichWasAlwaysWhole) {
     if (frame % 7 == 3) Postpone();
     if (frame % 50 == 49) postponed_.RecallAll();
     ASSERT_NO_FATAL_FAILURE(ExpectTheSame()) << "frame " << frame;
+    most = std::max(most, whole_.covariance().size());
   }
+  // Rows of what has left are used again.
+  postponed_.RecallAll();
+  EXPECT_LE(postponed_.covariance().size(), 2 * most);
 }
 
 TEST_F(PostponedState, HasTheActivePartAlone) {

@@ -9,7 +9,11 @@
 //   textbook  the update with dense H in Eigen, as this build compiles it: K = P H' S^-1,
 //             P = (I - K H) P
 //
-//   bench_slam [--kernels NAME]
+// Then, with `covariance: compressed`, frames that measure 20 of N landmarks, of which so many
+// change from one to the next, beside frames of the full covariance; to catch up is part of
+// the mean.
+//
+//   bench_slam [--size N/observed ...] [--no-compressed]
 #include <CLI/CLI.hpp>
 #include <Eigen/Cholesky>
 #include <array>
@@ -59,11 +63,12 @@ sensors:
 estimators: {ekf: {type: ekf}}
 )";
 
-/// The filter, and frames of a camera that sways before a box of points.
+/// The filter, and frames of a camera that sways before a box of points. It looks at `observed` of
+/// them, from one frame to the next at so many others.
 class Slam {
  public:
-  Slam(const PluginHost& host, const Config& config, int landmarks, int observed)
-      : filter_(MakeFilter(config, host, "ekf")), observed_(observed) {
+  Slam(const PluginHost& host, const Config& config, int landmarks, int observed, double others)
+      : filter_(MakeFilter(config, host, "ekf")), observed_(observed), others_(others) {
     Random random(1);
     for (int i = 0; i < landmarks; ++i) {
       points_.push_back({2.0 * random.Uniform() - 1.0, 1.6 * random.Uniform() - 0.8,
@@ -83,9 +88,10 @@ class Slam {
   void Take(int count) {
     const double t = count_++ / 30.0;
     const double x = 0.2 * std::sin(t), y = 0.1 * std::sin(1.3 * t);
+    const long first = std::lround(std::floor(others_ * count_));
     std::vector<Reading> readings;
     for (int k = 0; k < count; ++k) {
-      const auto i = static_cast<std::size_t>(next_++ % std::ssize(points_));
+      const auto i = static_cast<std::size_t>((first + k) % std::ssize(points_));
       const auto& p = points_[i];
       readings.push_back({stream_,
                           {320.0 + 525.0 * (p[0] - x) / p[2], 240.0 + 525.0 * (p[1] - y) / p[2]},
@@ -101,7 +107,8 @@ class Slam {
   std::unique_ptr<Filter> filter_;
   std::vector<std::array<double, 3>> points_;
   int observed_, stream_ = 0, count_ = 0;
-  long next_ = 0, taken_ = 0, used_ = 0;
+  double others_;
+  long taken_ = 0, used_ = 0;
 };
 
 /// Operations, multiplications and additions, of an update of n states by m rows whose H has 12
@@ -162,6 +169,49 @@ struct Textbook {
   }
 };
 
+double Mean(const Contender& one) {
+  return std::accumulate(one.ns.begin(), one.ns.end(), 0.0) / static_cast<double>(one.ns.size());
+}
+
+void CompareCompressed(const PluginHost& host, const Config& config, const Config& compressed,
+                       int landmarks, int frames) {
+  constexpr int kObserved = 20, kChunk = 10;
+  const auto of = [&](int count, double others) {
+    return Slam(host, compressed, count, kObserved, others);
+  };
+  Slam full(host, config, landmarks, kObserved, 0.0);
+  std::vector<Contender> contenders;
+  const auto add = [&](const char* name, Slam& slam, int steps) {
+    contenders.push_back({name,
+                          [&slam, steps] {
+                            for (int i = 0; i < steps; ++i) slam();
+                          },
+                          static_cast<double>(steps),
+                          {}});
+  };
+  {
+    Slam small = of(landmarks / 10, 0.0), large = of(landmarks, 0.0);
+    add("small", small, 1);
+    add("large", large, 1);
+    Interleave(contenders, frames);
+    const std::string n = std::to_string(landmarks);
+    std::printf("compressed, %d observed: %.3f ms a frame\n", kObserved,
+                1e-6 * contenders[1].Quantile(0.5));
+    std::printf("ratio compressed_%s/compressed_%d %.3f\n", n.c_str(), landmarks / 10,
+                contenders[1].Quantile(0.5) / contenders[0].Quantile(0.5));
+  }
+  for (const double others : {0.0, 0.3, 1.0}) {
+    Slam slam = of(landmarks, others);
+    contenders.clear();
+    add("full", full, 1);
+    add("compressed", slam, kChunk);
+    Interleave(contenders, frames / kChunk);
+    if (!full.used_all() || !slam.used_all()) throw std::runtime_error("not every one was used");
+    std::printf("ratio full/compressed_%.1f %.2f\n", others,
+                contenders[0].Quantile(0.5) / Mean(contenders[1]));
+  }
+}
+
 int Main(int argc, char** argv) {
   CLI::App app("A frame of an EKF at the size of SLAM, relative to the peak of the processor");
   int rounds = 15;
@@ -171,18 +221,26 @@ int Main(int argc, char** argv) {
   app.add_option("--size", sizes, "landmarks/observed")->capture_default_str();
   std::vector<std::string> settings;
   app.add_option("--set", settings, "KEY=VALUE of the config");
+  bool compressed = true;
+  int frames = 500;
+  app.add_flag("--compressed,!--no-compressed", compressed, "the compressed covariance too");
+  app.add_option("--frames", frames, "of the compressed covariance")->capture_default_str();
   app.add_flag("--peers,!--no-peers", peers, "the dense update and other libraries too");
   CLI11_PARSE(app, argc, argv);
 
   const testing::TemporaryFolder temporary;
   const std::string file = (temporary.path() / "config.yaml").string();
   std::ofstream(file) << kConfig;
-  Config config = Config::FromFile(file);
-  for (const std::string& setting : settings) {
-    const std::size_t equals = setting.find('=');
-    if (equals == setting.npos) throw std::runtime_error("--set takes KEY=VALUE");
-    config.Set(setting.substr(0, equals), setting.substr(equals + 1), "--set");
-  }
+  const auto load = [&] {
+    Config config = Config::FromFile(file);
+    for (const std::string& setting : settings) {
+      const std::size_t equals = setting.find('=');
+      if (equals == setting.npos) throw std::runtime_error("--set takes KEY=VALUE");
+      config.Set(setting.substr(0, equals), setting.substr(equals + 1), "--set");
+    }
+    return config;
+  };
+  const Config config = load();
   const PluginHost host;
   const std::string kernels = internal::BestVectorKernels().name;
   const Peak peak = PeakOf(kernels);
@@ -190,7 +248,7 @@ int Main(int argc, char** argv) {
   for (const std::string& size : sizes) {
     const int landmarks = std::atoi(size.c_str());
     const int observed = std::atoi(size.c_str() + size.find('/') + 1);
-    Slam slam(host, config, landmarks, observed);
+    Slam slam(host, config, landmarks, observed, observed);
     const long n = slam.size(), m = 2L * observed;
     volatile double sink = 0.0;
     std::vector<Contender> contenders = {{"peak", [&] { sink = sink + peak.work(); }, 1.0, {}},
@@ -218,6 +276,11 @@ int Main(int argc, char** argv) {
     for (std::size_t i = 2; i < contenders.size(); ++i) {
       PrintRatio(contenders[i].name + "/update_" + size, contenders[i], contenders[1]);
     }
+  }
+  if (compressed) {
+    Config of_compressed = load();
+    of_compressed.Set("estimators.ekf.covariance", "compressed", "");
+    CompareCompressed(host, config, of_compressed, 1000, frames);
   }
   return 0;
 }

@@ -119,6 +119,7 @@ const UpdateReport& Filter::Push(Timestamp timestamp, const std::vector<Reading>
 State Filter::At(Timestamp timestamp) const {
   FrameLoop later(*loop_);
   later.Process({timestamp, {}});
+  later.f.state.RecallAll();
   return std::move(later.f.state);
 }
 

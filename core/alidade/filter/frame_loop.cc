@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "alidade/base/error.h"
 #include "alidade/filter/first_values.h"
 #include "alidade/filter/linear.h"
 
@@ -17,7 +18,10 @@ FrameLoop::FrameLoop(System system, const EkfOptions& options,
       time_(f.binding->system, streams, options.max_dt_s),
       gate_(f.binding->system, options),
       consensus_(f.binding->system),
-      recovery_(options) {
+      recovery_(options),
+      compression_(f.binding->system, options) {
+  ALIDADE_EXPECTS(options.covariance == CovarianceForm::kFull ||
+                  dynamic_cast<const Linear*>(&*method) != nullptr);
   if (f.binding->system.landmarks) {
     landmarks.emplace(*f.binding);
     landmarks->AddKnown(f);
@@ -62,7 +66,9 @@ void FrameLoop::Run(const Frame& frame) {
   recovery_.RepairCovariance(f, all);
   if (f.said.ended) return;
   recovery_.RecoverRejected(f, gate_, all);
-  if (landmarks) landmarks->Maintain(f, all);
+  if (!landmarks) return;
+  landmarks->Maintain(f, all);
+  compression_.Apply(f, *landmarks, all);
 }
 
 /// Moves the state to `timestamp`; where a step cannot be done it stays at the end of the one

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "alidade/base/indirect.h"
+#include "alidade/filter/compression.h"
 #include "alidade/filter/consensus.h"
 #include "alidade/filter/fast_path.h"
 #include "alidade/filter/filter.h"
@@ -30,7 +31,7 @@ namespace alidade::internal {
 ///   gate         Pass               Gate::Pass of each row; Consensus::Split
 ///   correct      Correct            Gate::Weigh, Method::Correct
 ///   recover      Recovery::RepairCovariance, RecoverRejected
-///   landmarks    Landmarks::Maintain
+///   landmarks    Landmarks::Maintain, Compression::Apply
 ///
 /// Parts point to the binding, which copies share, and not into one another; only the fast path
 /// does, and a copy makes its own. So a copy is a filter by itself.
@@ -76,6 +77,7 @@ class FrameLoop {
   Gate gate_;
   Consensus consensus_;
   Recovery recovery_;
+  Compression compression_;
   Scratch<Rows> rows_;
   Scratch<Groups> groups_;
   Scratch<CurrentPath> fast_;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "alidade/base/error.h"
@@ -22,6 +23,13 @@ Space Xyz() {
 }
 
 bool IsUsed(const Row& row) { return row.report->outcome == Outcome::kAccepted; }
+
+/// Brings what is postponed of it back into x and P.
+void Recall(State& state, const LandmarkRecord& landmark) {
+  for (const BlockId id : landmark.blocks) {
+    if (state.layout()[id].postponed) state.Recall(id);
+  }
+}
 
 /// Of a landmark that has a representation.
 std::array<const double*, 3> ValuesOf(const State& state, const LandmarkRecord& landmark) {
@@ -171,6 +179,7 @@ void Landmarks::Attach(FilterState& f, std::span<Row> rows) {
     if (row.measurement->landmark < 0) {
       outcome = Outcome::kInvalid;
     } else if (found != landmarks_.end() && found->second.in_state()) {
+      Recall(f.state, found->second);
       Attach(f, row, found->second);
     } else {
       outcome = Outcome::kNotReady;
@@ -190,7 +199,7 @@ void Landmarks::Attach(const FilterState& f, Row& row, const LandmarkRecord& lan
 
 void Landmarks::Maintain(FilterState& f, std::span<Row> rows) {
   Count(f, rows);
-  CheckDepths(f);
+  CheckDepths(f, rows);
   Prune(f);
   Convert(f, rows);
   InitialiseNew(f, rows);
@@ -206,9 +215,11 @@ void Landmarks::Count(FilterState& f, std::span<Row> rows) {
     if (landmark.observations == 0 || landmark.seen != frame_) ++landmark.observations;
     landmark.seen = frame_;
     landmark.last = f.timestamp;
+    due_ = std::min(due_, DueOf(landmark));
     if (!row.on_landmark()) continue;
     ++landmark.tried;
     landmark.accepted += IsUsed(row);
+    any_fails_ |= Fails(landmark);
   }
 }
 
@@ -231,27 +242,68 @@ LandmarkRecord& Landmarks::RecordOf(std::int64_t id) {
   return landmarks_.insert(at, std::move(node))->second;
 }
 
-/// Looks for inverse distances that an update left at zero or below.
-void Landmarks::CheckDepths(FilterState& f) {
-  DeleteIf(f, [&](LandmarkRecord& landmark) {
-    const bool negative =
-        HasInverseDistance(landmark) && !(InverseDistance(f.state, landmark) > 0.0);
-    f.report.landmarks.negative += negative && !landmark.negative;
-    landmark.negative = negative;
-    return negative && options_.negative_depth == LandmarkOptions::NegativeDepth::kDelete;
-  });
+/// Looks for inverse distances that an update left at zero or below. Where landmarks are postponed
+/// it looks at those of the rows alone: none of the others is worth a pass over the map.
+void Landmarks::CheckDepths(FilterState& f, std::span<Row> rows) {
+  if (f.state.postponed() == nullptr) {
+    return DeleteIf(f, [&](LandmarkRecord& landmark) {
+      return IsNegative(f, landmark) &&
+             options_.negative_depth == LandmarkOptions::NegativeDepth::kDelete;
+    });
+  }
+  for (const Row& row : rows) {
+    if (row.on_landmark()) IsNegative(f, landmarks_.at(row.measurement->landmark));
+  }
+}
+
+/// Counts it where it has become so.
+bool Landmarks::IsNegative(FilterState& f, LandmarkRecord& landmark) {
+  const bool negative = HasInverseDistance(landmark) && !(InverseDistance(f.state, landmark) > 0.0);
+  f.report.landmarks.negative += negative && !landmark.negative;
+  landmark.negative = negative;
+  return negative;
 }
 
 /// Drops what was not seen for long, or fails too often. Known landmarks stay.
 void Landmarks::Prune(FilterState& f) {
+  if (frame_ < due_ && !any_fails_) return;
+  due_ = std::numeric_limits<std::int64_t>::max();
+  any_fails_ = false;
   DeleteIf(f, [&](const LandmarkRecord& landmark) {
-    const std::int64_t unseen = frame_ - landmark.seen;
-    const int most = landmark.in_state() ? options_.max_missed_frames : kWaitingFrames;
-    const bool lost = most > 0 && unseen >= most;
-    const bool fails = landmark.tried >= options_.min_attempts &&
-                       landmark.accepted < options_.min_match_ratio * landmark.tried;
-    return (lost || fails) && !landmark.known;
+    if (landmark.known) return false;
+    const std::int64_t due = DueOf(landmark);
+    if (frame_ >= due || Fails(landmark)) return true;
+    due_ = std::min(due_, due);
+    return false;
   });
+}
+
+/// Whether too few of its measurements are accepted.
+bool Landmarks::Fails(const LandmarkRecord& landmark) const {
+  return landmark.tried >= options_.min_attempts &&
+         landmark.accepted < options_.min_match_ratio * landmark.tried;
+}
+
+/// The frame at which it is lost, unless it is seen before.
+std::int64_t Landmarks::DueOf(const LandmarkRecord& landmark) const {
+  const int most = landmark.in_state() ? options_.max_missed_frames : kWaitingFrames;
+  return most > 0 ? landmark.seen + most : std::numeric_limits<std::int64_t>::max();
+}
+
+void Landmarks::FindUnseen(const FilterState& f, std::vector<BlockId>& blocks) const {
+  constexpr std::int64_t kRecent = 2;
+  std::vector<BlockId> stay;
+  blocks.clear();
+  for (const auto& [id, landmark] : landmarks_) {
+    const bool seen = frame_ - landmark.seen < kRecent;
+    for (const BlockId block : landmark.blocks) {
+      if (f.state.layout()[block].has_covariance()) (seen ? stay : blocks).push_back(block);
+    }
+  }
+  std::ranges::sort(stay);
+  std::ranges::sort(blocks);
+  blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+  std::erase_if(blocks, [&](BlockId block) { return std::ranges::binary_search(stay, block); });
 }
 
 template <class Condition>
@@ -263,6 +315,7 @@ void Landmarks::DeleteIf(FilterState& f, const Condition& condition) {
 
 Landmarks::ById::iterator Landmarks::Delete(FilterState& f, ById::iterator at) {
   if (at->second.in_state()) {
+    Recall(f.state, at->second);
     NoteRemoval(f, at->first, at->second);
     DropBlocks(f, at->second);
     ++f.report.landmarks.deleted;
@@ -431,11 +484,17 @@ Outcome Landmarks::Initialise(FilterState& f, std::int64_t id, Row& row, Landmar
   }
   f.state.Initialise(fresh, values.data(), inverse.from, by_x, own);
   landmark.representation = family.representation;
+  due_ = std::min(due_, DueOf(landmark));
   f.motions.EndInterval();
   return Outcome::kInitialised;
 }
 
 std::vector<LandmarkEstimate> Landmarks::Estimates(const State& state) const {
+  if (state.postponed() != nullptr) {
+    State whole = state;
+    whole.RecallAll();
+    return Estimates(whole);
+  }
   std::vector<LandmarkEstimate> estimates;
   std::vector<double> pjt(3 * static_cast<std::size_t>(state.covariance().size()));
   for (const auto& [id, landmark] : landmarks_) {

@@ -55,6 +55,10 @@ class Landmarks {
   /// After the updates with those rows.
   void Maintain(FilterState& f, std::span<Row> rows);
 
+  /// The blocks with a covariance of landmarks that are in x and P, and were seen neither in this
+  /// frame nor in the one before; not those that they share with others.
+  void FindUnseen(const FilterState& f, std::vector<BlockId>& blocks) const;
+
   std::vector<LandmarkEstimate> Estimates(const State& state) const;
   /// Frames with a measurement of a landmark.
   std::int64_t frame() const { return frame_; }
@@ -74,7 +78,10 @@ class Landmarks {
   bool Has(const Row& row) const { return FamilyOf(row).first >= 0; }
   void Attach(const FilterState& f, Row& row, const LandmarkRecord& landmark);
   void Count(FilterState& f, std::span<Row> rows);
-  void CheckDepths(FilterState& f);
+  void CheckDepths(FilterState& f, std::span<Row> rows);
+  bool IsNegative(FilterState& f, LandmarkRecord& landmark);
+  bool Fails(const LandmarkRecord& landmark) const;
+  std::int64_t DueOf(const LandmarkRecord& landmark) const;
   void Prune(FilterState& f);
   void Convert(FilterState& f, std::span<Row> rows);
   bool ConvertToXyz(FilterState& f, std::int64_t id, LandmarkRecord& landmark, const Row& row);
@@ -100,6 +107,8 @@ class Landmarks {
   std::vector<int> users_;        ///< by block, where it is shared: landmarks on it
   std::int64_t frame_ = 0;        ///< frames with a measurement of a landmark
   std::int64_t names_ = 0;        ///< blocks named so far
+  std::int64_t due_ = 0;          ///< no landmark is lost before this frame
+  bool any_fails_ = false;        ///< may be
   Generations generations_;
   LandmarkOptions::Prior prior_;  ///< of what is initialised in this frame
 

@@ -134,7 +134,8 @@ Outcome Linear::CorrectBy(FilterState& f, std::span<Row* const> rows, const doub
     return std::ranges::find(consider, true) != consider.end();
   };
   const bool small = IsSmall(f.state.covariance()) && CountOf(rows) <= kSmall &&
-                     !f.blocks.considering && std::ranges::none_of(rows, considers);
+                     !f.blocks.considering && std::ranges::none_of(rows, considers) &&
+                     f.state.postponed() == nullptr;
   return small ? CorrectSmall(f, rows, dx) : CorrectLarge(f, rows, dx);
 }
 
@@ -223,7 +224,7 @@ Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const d
   const Workspace::Vector innovation = InnovationOf(f, rows);
   Workspace::Matrix w = ProjectionOf(f, rows), l = NoiseOf(f, rows);
   const Eigen::Index n = w.rows(), m = w.cols();
-  Workspace::Matrix gain = f.work.Take(n, m);
+  Workspace::Matrix gain = f.work.Take(n, m), outside = OutsideOf(f, rows);
   Workspace::Vector y = f.work.Take(m), dx = f.work.Take(n), left = f.work.Take(n);
   AddProjected(rows, w, l);
   if (!Factorise(l)) return Outcome::kNotPd;
@@ -256,6 +257,10 @@ Outcome Linear::CorrectLarge(FilterState& f, std::span<Row* const> rows, const d
   } else {
     AddOuterProduct(p.lower(), w, -1.0);
     AddOuterProduct(p.lower(), lost_, e);
+  }
+  if (f.state.postponed() != nullptr) {
+    DivideByTransposed(l, outside);
+    f.state.CorrectPostponed(outside, w, y);
   }
   f.state.MoveTo(f.moved);
   if (recorded) RecordGain(f, rows, gain.data());

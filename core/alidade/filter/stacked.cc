@@ -65,6 +65,16 @@ Workspace::Matrix ProjectionOf(FilterState& f, std::span<Row* const> rows) {
   return pht;
 }
 
+Workspace::Matrix OutsideOf(FilterState& f, std::span<Row* const> rows) {
+  const Covariance& p = f.state.covariance();
+  Workspace::Matrix outside = f.work.Take(p.outside(), CountOf(rows));
+  if (p.outside() == 0) return outside;
+  ForEachPlace(rows, [&](const Row& row, Eigen::Index at) {
+    p.ProjectOutside(row.jacobian(), outside.data() + at * outside.rows());
+  });
+  return outside;
+}
+
 void AddProjected(std::span<Row* const> rows, const Workspace::Matrix& pht, Workspace::Matrix& s) {
   constexpr int kColumns = 64, kWidth = 8;  // of P H' that is turned at a time
   std::array<double, kColumns * kWidth> turned;

@@ -22,6 +22,8 @@ Workspace::Matrix JacobianOf(FilterState& f, std::span<Row* const> rows);
 Workspace::Matrix NoiseOf(FilterState& f, std::span<Row* const> rows);
 Workspace::Vector InnovationOf(FilterState& f, std::span<Row* const> rows);
 Workspace::Matrix ProjectionOf(FilterState& f, std::span<Row* const> rows);
+/// (H Phi)' of all rows, k x m, in f.work: see Covariance.
+Workspace::Matrix OutsideOf(FilterState& f, std::span<Row* const> rows);
 /// s += H P H' of all rows, m x m, s symmetric before and after, from P H'.
 void AddProjected(std::span<Row* const> rows, const Workspace::Matrix& pht, Workspace::Matrix& s);
 /// Calls zero(offset, size, at, k) for each part of the gain that consider blocks and roles keep at

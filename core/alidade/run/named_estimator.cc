@@ -8,6 +8,7 @@
 #include "alidade/base/words.h"
 #include "alidade/config/tree.h"
 #include "alidade/filter/built_in.h"
+#include "alidade/filter/compression.h"
 #include "alidade/host/calibration.h"
 #include "alidade/host/foreign_call.h"
 #include "alidade/host/plugin_host.h"
@@ -154,6 +155,7 @@ void RefuseUnsupportedKeys(const std::string& type, const Node& entry) {
       {"gate", "gate"},
       {"fuse", "choice of updates"},
       {"jacobian", "choice of Jacobian"},
+      {"covariance", "choice of covariance"},
       {"rejection_recovery", "rejection recovery"}};
   for (const auto& [key, what] : kKeys) {
     if (!entry.HasUnread(key)) continue;
@@ -172,6 +174,14 @@ void RefuseLoneMatches(const Node& entry, const System& system) {
                    "' asks by its `outlier_rejection`",
                "joint or per_sensor");
   }
+}
+
+/// Refuses `covariance: compressed` where it would not be exact.
+void RefuseInexact(const Node& entry, const System& system) {
+  const auto covariance = entry.Find("covariance");
+  if (!covariance || covariance->Text() != "compressed") return;
+  const std::string why = WhyNotCompressed(system);
+  if (!why.empty()) covariance->Fail("landmarks cannot be postponed: " + why, "full or auto");
 }
 
 /// Refuses overrides of what all estimators share, and of an entry that `root` does not have and
@@ -340,7 +350,10 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   entry.RejectUnread();
   named.system = BuildSystem(own.root(), host, only);
   RefuseUnsupported(named.type, support, own.root(), named.system);
-  if (of_core != nullptr) RefuseLoneMatches(entry, named.system);
+  if (of_core != nullptr) {
+    RefuseLoneMatches(entry, named.system);
+    RefuseInexact(entry, named.system);
+  }
   if (streams != nullptr) CheckStreams(own.root(), named.system, *streams);
   const bool lent = use && use->is_map();  // landmarks are initialised as in the other estimator
   if (lent && named.system.landmarks) named.system.landmarks->min_observations = 1;

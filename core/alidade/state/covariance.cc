@@ -19,7 +19,29 @@ int Covariance::Add(int rows) {
     p_.swap(larger);
   }
   size_ += rows;
+  if (outside_ > 0) GrowOutside(0);
   return offset;
+}
+
+void Covariance::Clear() {
+  p_.topLeftCorner(size_, size_).setZero();
+  phi_.setZero();
+  still_.clear();
+  size_ = outside_ = 0;
+  gaps_.clear();
+}
+
+void Covariance::GrowOutside(int columns) {
+  outside_ += columns;
+  if (std::ssize(still_) < size_) still_.resize(static_cast<std::size_t>(size_), char{0});
+  if (outside_ <= phi_.rows() && size_ <= phi_.cols()) return;
+  const auto room = [](Eigen::Index has, Eigen::Index needs) {
+    return needs <= has ? has : std::max(2 * has, needs);
+  };
+  Eigen::MatrixXd larger =
+      Eigen::MatrixXd::Zero(room(phi_.rows(), outside_), room(phi_.cols(), size_));
+  larger.topLeftCorner(phi_.rows(), phi_.cols()) = phi_;
+  phi_.swap(larger);
 }
 
 /// Takes `rows` rows from the smallest gap that has them, and returns their offset; -1: none has.
@@ -39,6 +61,9 @@ int Covariance::TakeGap(int rows) {
 void Covariance::Clear(int offset, int rows) {
   p_.block(offset, 0, rows, offset).setZero();
   p_.block(offset, offset, size_ - offset, rows).setZero();
+  if (outside_ == 0) return;
+  phi_.middleCols(offset, rows).setZero();
+  std::fill_n(still_.begin() + offset, rows, char{0});
 }
 
 void Covariance::Release(int offset, int rows) {
@@ -69,6 +94,10 @@ int Covariance::MoveToGap(int from, int rows) {
   cross.topRows(from) = p_.block(from, 0, rows, from).transpose();
   cross.bottomRows(size_ - from) = p_.block(from, from, size_ - from, rows);
   SetRows(to, cross.middleRows(from, rows), cross);
+  if (outside_ > 0) {
+    phi_.middleCols(to, rows) = phi_.middleCols(from, rows);
+    std::copy_n(still_.begin() + from, rows, still_.begin() + to);
+  }
   Release(from, rows);
   return to;
 }
@@ -124,6 +153,7 @@ void Covariance::Propagate(std::span<const JacobianPart> parts, const double* f,
   int k = 0;
   for (const JacobianPart& part : parts) k += part.size;
   const Workspace::Use use(memory_);
+  if (outside_ > 0) PropagateOutside(parts, f);
   if (q == nullptr) {
     Workspace::Matrix zero = memory_.Take(k, k);
     zero.setZero();
@@ -138,6 +168,32 @@ void Covariance::Propagate(std::span<const JacobianPart> parts, const double* f,
   Project({f, k, k, parts}, cross.data(), own.data());
   own += Eigen::Map<const RowMajor>(q, k, k);
   SetParts(parts, own, cross);
+}
+
+void Covariance::PropagateOutside(std::span<const JacobianPart> parts, const double* f) {
+  int k = 0;
+  for (const JacobianPart& part : parts) k += part.size;
+  Workspace::Matrix moved = memory_.Take(outside_, k);
+  ProjectOutside({f, k, k, parts}, moved.data());
+  SetOutside(parts, moved);
+}
+
+void Covariance::SetOutside(std::span<const JacobianPart> parts, const ConstMatrix& phi) {
+  for (const JacobianPart& part : parts) {
+    if (outside_ == 0) return;
+    phi_.block(0, part.offset, outside_, part.size) = phi.middleCols(part.column, part.size);
+    std::fill_n(still_.begin() + part.offset, part.size, char{0});
+  }
+}
+
+void Covariance::ProjectOutside(const JacobianRows& h, double* hphi) const {
+  const long k = outside_;
+  std::fill_n(hphi, k * h.rows, 0.0);
+  for (const JacobianPart& part : h.parts) {
+    internal::BestVectorKernels().combine(k, part.size, h.rows,
+                                          phi_.data() + part.offset * phi_.rows(), phi_.rows(),
+                                          h.data + part.column, h.stride, hphi, k);
+  }
 }
 
 void Covariance::AddProjection(const JacobianRows& h, double* s) const {

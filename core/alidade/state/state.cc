@@ -8,6 +8,21 @@
 #include "alidade/base/error.h"
 
 namespace alidade {
+namespace {
+
+/// The offset of `size` numbers of `values`, in a gap of that size or at the end.
+int TakeValues(std::vector<double>& values, std::vector<std::pair<int, int>>& gaps, int size) {
+  const auto gap = std::ranges::find(gaps, size, &std::pair<int, int>::second);
+  if (gap == gaps.end()) {
+    values.resize(values.size() + static_cast<std::size_t>(size));
+    return static_cast<int>(values.size()) - size;
+  }
+  const int offset = gap->first;
+  gaps.erase(gap);
+  return offset;
+}
+
+}  // namespace
 
 BlockId StateLayout::Declare(std::string_view name, std::string_view owner, const Space& space,
                              BlockStatus status) {
@@ -56,18 +71,10 @@ BlockId State::Declare(std::string_view name, std::string_view owner, const Spac
 void State::Reserve(BlockId id) {
   Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
   if (block.value_offset >= 0) return;
-  const int size = block.geometry().ambient;
-  const auto gap = std::find_if(value_gaps_.begin(), value_gaps_.end(),
-                                [size](const auto& g) { return g.second == size; });
-  if (gap != value_gaps_.end()) {
-    block.value_offset = gap->first;
-    value_gaps_.erase(gap);
-  } else {
-    block.value_offset = static_cast<int>(values_.size());
-    values_.resize(values_.size() + static_cast<std::size_t>(size));
-  }
+  block.value_offset = TakeValues(values_, value_gaps_, block.geometry().ambient);
   if (block.status == BlockStatus::kConstant) return;
   block.tangent_offset = covariance_.Add(block.geometry().tangent);
+  placed_.insert(std::ranges::lower_bound(placed_, id), id);
 }
 
 void State::PlaceValue(BlockId id, const double* value) {
@@ -101,8 +108,13 @@ void State::Initialise(std::span<const BlockId> ids, const double* values,
       {jacobian.data(), static_cast<int>(rows), static_cast<int>(jacobian.outerStride()), parts_},
       cross.data(), p.data());
   p += own;
+  Workspace::Matrix phi = memory_.Take(covariance_.outside(), rows);
+  covariance_.ProjectOutside(
+      {jacobian.data(), static_cast<int>(rows), static_cast<int>(jacobian.outerStride()), parts_},
+      phi.data());
   FindParts(ids);
   covariance_.SetParts(parts_, p, cross);
+  covariance_.SetOutside(parts_, phi);
 }
 
 /// Puts the rows of the blocks in P into parts_, and returns the size of their tangents.
@@ -124,6 +136,7 @@ void State::Release(BlockId id) {
   value_gaps_.emplace_back(block.value_offset, block.geometry().ambient);
   if (block.tangent_offset >= 0) {
     covariance_.Release(block.tangent_offset, block.geometry().tangent);
+    placed_.erase(std::ranges::lower_bound(placed_, id));
   }
   block.present = false;
   block.value_offset = block.tangent_offset = -1;
@@ -133,18 +146,25 @@ void State::Release(BlockId id) {
 /// Moves the last block into a gap, as long as one holds it.
 void State::FillGaps() {
   for (;;) {
-    const auto last = std::max_element(
-        layout_.blocks_.begin(), layout_.blocks_.end(),
-        [](const Block& a, const Block& b) { return a.tangent_offset < b.tangent_offset; });
-    if (last == layout_.blocks_.end() || last->tangent_offset < 0) return;
-    const int rows = last->geometry().tangent;
-    const int gap = covariance_.MoveToGap(last->tangent_offset, rows);
+    const auto found = std::ranges::max_element(
+        placed_, {}, [&](BlockId id) { return layout_[id].tangent_offset; });
+    if (found == placed_.end()) return;
+    Block& last = At(*found);
+    const int rows = last.geometry().tangent;
+    const int gap = covariance_.MoveToGap(last.tangent_offset, rows);
     if (gap < 0) return;
-    last->tangent_offset = gap;
+    last.tangent_offset = gap;
   }
 }
 
 void State::Drop(BlockId id) {
+  if (layout_[id].postponed) Recall(id);
+  if (postponed_ && id < std::ssize(postponed_->homes)) {
+    Postponed::Home& home = postponed_->homes[static_cast<std::size_t>(id)];
+    const Geometry& geometry = layout_[id].geometry();
+    if (home.value >= 0) postponed_->left.push_back({home, geometry.tangent, geometry.ambient});
+    home = {};
+  }
   if (layout_[id].value_offset >= 0) Release(id);
   Block& block = layout_.blocks_[static_cast<std::size_t>(id)];
   block.present = false;
@@ -154,8 +174,9 @@ void State::Drop(BlockId id) {
 
 void State::Retract(const double* dx, std::vector<double>& moved) const {
   moved.assign(values_.begin(), values_.end());
-  for (const Block& block : layout_.blocks()) {
-    if (!block.has_covariance()) continue;
+  for (const BlockId id : placed_) {
+    const Block& block = layout_[id];
+    if (!block.present) continue;
     double* x = moved.data() + block.value_offset;
     block.geometry().Plus(x, dx + block.tangent_offset, x);
   }
@@ -163,8 +184,9 @@ void State::Retract(const double* dx, std::vector<double>& moved) const {
 
 void State::MoveTo(const std::vector<double>& values) {
   ALIDADE_EXPECTS(values.size() == values_.size());
-  for (const Block& block : layout_.blocks()) {
-    if (!block.has_covariance() || block.geometry().kind != GeometryKind::kUnitVector) continue;
+  for (const BlockId id : placed_) {
+    const Block& block = layout_[id];
+    if (!block.present || block.geometry().kind != GeometryKind::kUnitVector) continue;
     std::array<double, 4> j;  // a unit vector's tangent has two elements
     block.geometry().Transport(values_.data() + block.value_offset,
                                values.data() + block.value_offset, j.data());
@@ -172,6 +194,130 @@ void State::MoveTo(const std::vector<double>& values) {
     covariance_.Propagate({&part, 1}, j.data(), nullptr);
   }
   std::copy(values.begin(), values.end(), values_.begin());
+}
+
+/// Brings P0 and x0 up to date, and makes them where there are none.
+void State::CatchUp() {
+  const std::size_t count = layout_.blocks().size();
+  if (!postponed_) {
+    postponed_.emplace(std::move(covariance_), std::move(values_), std::move(value_gaps_));
+    covariance_ = {};
+    postponed_->homes.resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const Block& block = layout_.blocks()[i];
+      postponed_->homes[i] = {block.tangent_offset, block.value_offset};
+    }
+    return;
+  }
+  Postponed& outside = *postponed_;
+  outside.homes.resize(count);
+  std::vector<int> homes(static_cast<std::size_t>(covariance_.size()), -1);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Block& block = layout_.blocks()[i];
+    Postponed::Home& home = outside.homes[i];
+    if (block.value_offset < 0) continue;
+    if (home.value < 0) {
+      home.value = TakeValues(outside.x, outside.x_gaps, block.geometry().ambient);
+      if (block.tangent_offset >= 0) home.row = outside.p.Add(block.geometry().tangent);
+    }
+    for (int k = 0; block.tangent_offset >= 0 && k < block.geometry().tangent; ++k) {
+      homes[static_cast<std::size_t>(block.tangent_offset + k)] = home.row + k;
+    }
+  }
+  std::vector<double> dx;
+  outside.CatchUp(covariance_, homes, dx);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Block& block = layout_.blocks()[i];
+    double* const x = outside.x.data() + outside.homes[i].value;
+    if (block.value_offset >= 0) {
+      std::copy_n(values_.data() + block.value_offset, block.geometry().ambient, x);
+    } else if (block.postponed) {
+      block.geometry().Plus(x, dx.data() + outside.homes[i].row, x);
+    }
+  }
+  for (const Postponed::Left& one : outside.left) {
+    outside.x_gaps.emplace_back(one.home.value, one.numbers);
+    if (one.home.row >= 0) outside.p.Release(one.home.row, one.rows);
+  }
+  outside.left.clear();
+}
+
+void State::Postpone(std::span<const BlockId> leaving) {
+  CatchUp();
+  for (const BlockId id : leaving) {
+    Block& block = At(id);
+    ALIDADE_EXPECTS(block.has_covariance());
+    block.present = false;
+    block.postponed = true;
+    block.value_offset = -1;
+  }
+  Compact();
+}
+
+/// Puts what has a place one after the other, in the order it had.
+void State::Compact() {
+  std::vector<BlockId> stay;
+  for (std::size_t i = 0; i < layout_.blocks().size(); ++i) {
+    if (layout_.blocks()[i].value_offset >= 0) stay.push_back(static_cast<BlockId>(i));
+  }
+  std::ranges::sort(stay, {}, [&](BlockId id) { return layout_[id].value_offset; });
+  values_.clear();
+  value_gaps_.clear();
+  for (const BlockId id : stay) {
+    const double* const x =
+        postponed_->x.data() + postponed_->homes[static_cast<std::size_t>(id)].value;
+    At(id).value_offset = static_cast<int>(values_.size());
+    values_.insert(values_.end(), x, x + layout_[id].geometry().ambient);
+  }
+  std::erase_if(placed_, [&](BlockId id) {
+    if (!layout_[id].postponed) return false;
+    At(id).tangent_offset = -1;
+    return true;
+  });
+  stay = placed_;
+  std::ranges::sort(stay, {}, [&](BlockId id) { return layout_[id].tangent_offset; });
+  std::vector<int> rows;
+  for (const BlockId id : stay) {
+    At(id).tangent_offset = static_cast<int>(rows.size());
+    for (int k = 0; k < layout_[id].geometry().tangent; ++k) {
+      rows.push_back(postponed_->homes[static_cast<std::size_t>(id)].row + k);
+    }
+  }
+  postponed_->Begin(rows, covariance_);
+}
+
+void State::Recall(BlockId id) {
+  ALIDADE_EXPECTS(layout_[id].postponed);
+  Reserve(id);
+  Block& block = At(id);
+  const Workspace::Use use(memory_);
+  Workspace::Vector dx = memory_.Take(block.geometry().tangent);
+  const Postponed::Home home = postponed_->homes[static_cast<std::size_t>(id)];
+  postponed_->Recall(home.row, block.geometry().tangent, block.tangent_offset, covariance_,
+                     dx.data());
+  block.geometry().Plus(postponed_->x.data() + home.value, dx.data(),
+                        values_.data() + block.value_offset);
+  block.present = true;
+  block.postponed = false;
+}
+
+void State::RecallAll() {
+  if (!postponed_) return;
+  CatchUp();
+  placed_.clear();
+  for (std::size_t i = 0; i < layout_.blocks().size(); ++i) {
+    Block& block = layout_.blocks_[i];
+    if (block.value_offset < 0 && !block.postponed) continue;
+    block.tangent_offset = postponed_->homes[i].row;
+    block.value_offset = postponed_->homes[i].value;
+    block.present |= block.postponed;
+    block.postponed = false;
+    if (block.tangent_offset >= 0) placed_.push_back(static_cast<BlockId>(i));
+  }
+  covariance_ = std::move(postponed_->p);
+  values_ = std::move(postponed_->x);
+  value_gaps_ = std::move(postponed_->x_gaps);
+  postponed_.reset();
 }
 
 }  // namespace alidade

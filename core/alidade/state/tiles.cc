@@ -40,6 +40,11 @@ void AddOuterProduct(MatrixRef c, const ConstMatrixRef& a, double sign) {
   Add(c, a.cols(), ByColumns(a), Transposed(a), sign, true);
 }
 
+void AddSymmetricProduct(MatrixRef c, const ConstMatrixRef& a, const ConstMatrixRef& b,
+                         double sign) {
+  Add(c, a.cols(), ByColumns(a), Transposed(b), sign, true);
+}
+
 void AddOuterProduct(MatrixRef c, std::span<const int> rows, const ConstMatrixRef& a) {
   for (Eigen::Index i = 0; i < a.rows(); ++i) {
     for (Eigen::Index j = 0; j <= i; ++j) {

@@ -22,6 +22,9 @@ void AddProductWithTransposed(MatrixRef c, const ConstMatrixRef& a, const ConstM
                               double sign = 1.0);
 /// The lower triangle of C <- C + sign A A', sign 1 or -1.
 void AddOuterProduct(MatrixRef c, const ConstMatrixRef& a, double sign);
+/// The lower triangle of C <- C + sign A B', where A B' is symmetric.
+void AddSymmetricProduct(MatrixRef c, const ConstMatrixRef& a, const ConstMatrixRef& b,
+                         double sign);
 /// The lower triangle of C_ab <- C_ab + A A' of the given rows, which A has one after the other.
 void AddOuterProduct(MatrixRef c, std::span<const int> rows, const ConstMatrixRef& a);
 /// B <- B L^-T, L the lower triangle of `l`.

@@ -539,6 +539,108 @@ TEST_F(ImageTracks, OutsideTheirEllipseAreLostWhereMostAreWithinIt) {
   }
 }
 
+/// A sum of waves of 6 to 30 px, moved by `shift`, px; grey, not rounded.
+cv::Mat Waves(cv::Point2f shift) {
+  cv::Mat grey(160, 240, CV_32F, cv::Scalar(128.0));
+  cv::RNG random(11);
+  for (int wave = 0; wave < 40; ++wave) {
+    const double direction = random.uniform(0.0, CV_PI), phase = random.uniform(0.0, 2.0 * CV_PI);
+    const double per_px = 2.0 * CV_PI / random.uniform(6.0, 30.0);
+    const cv::Point2d per(per_px * std::cos(direction), per_px * std::sin(direction));
+    for (int y = 0; y < grey.rows; ++y) {
+      for (int x = 0; x < grey.cols; ++x) {
+        const double angle = per.dot(cv::Point2d(x, y) - cv::Point2d(shift)) + phase;
+        grey.at<float>(y, x) += static_cast<float>(8.0 * std::sin(angle));
+      }
+    }
+  }
+  return grey;
+}
+
+class EstimatedNoise : public ImageTracks {
+ protected:
+  void SetUp() override {
+    ImageTracks::SetUp();
+    Write("config.yaml",
+          "alidade: 1\nsource: {type: image_tracks, path: scene/images, rate_hz: 10, features: 40, "
+          "estimate_noise: true, sigma_systematic_px: 0}\n");
+    std::filesystem::create_directories(folder_ / "scene/images");
+  }
+  void Draw(int k, const cv::Mat& grey) const {
+    cv::Mat image;
+    grey.convertTo(image, CV_8U);
+    ASSERT_TRUE(cv::imwrite(ImageFile(k), image));
+  }
+  /// Calls take(first, now) for each feature of the first image that is in a later one.
+  template <class Take>
+  void Follow(const Take& take) const {
+    Config config = Config::FromFile((folder_ / "config.yaml").string());
+    config.Set("source.path", (folder_ / "scene/images").string(), "test");
+    const PluginHost host;
+    const auto source = host.CreateSource(config, 1);
+    SourceFrame frame;
+    ASSERT_TRUE(source->Next(frame));
+    std::map<std::int64_t, Measurement> first;
+    for (const Measurement& m : frame.measurements) first[m.landmark] = m;
+    while (source->Next(frame)) {
+      for (const Measurement& m : frame.measurements) {
+        if (first.contains(m.landmark)) take(first[m.landmark], m);
+      }
+    }
+  }
+};
+
+TEST_F(EstimatedNoise, IsThatOfThePlacesThatAreFound) {
+  Draw(0, Waves({}));
+  cv::RNG random(3);
+  constexpr int kImages = 30;
+  for (int k = 1; k <= kImages; ++k) {
+    cv::Mat noise(160, 240, CV_32F);
+    random.fill(noise, cv::RNG::NORMAL, 0.0, 6.0);
+    Draw(k, Waves({0.3F, -0.4F}) + noise);
+  }
+  double of_places = 0.0, told = 0.0;
+  int count = 0;
+  Follow([&](const Measurement& first, const Measurement& now) {
+    const double u = now.values[0] - first.values[0] - 0.3;
+    const double v = now.values[1] - first.values[1] + 0.4;
+    of_places += u * u + v * v;
+    ASSERT_EQ(now.covariance.size(), 4u);
+    told += now.covariance[0] + now.covariance[3];
+    ++count;
+  });
+  ASSERT_GT(count, 20 * kImages);
+  // The variance of 600 places is known to 6 %; twenty-five cells, of which six numbers are fitted,
+  // tell a fifth too little.
+  EXPECT_GT(of_places / count, 1e-4);
+  EXPECT_NEAR(told / of_places, 0.85, 0.25) << told << " of " << of_places;
+}
+
+// An edge of depth: what is right of the middle goes another way.
+TEST_F(EstimatedNoise, IsLargeOfPatchesThatMoveInParts) {
+  Draw(0, Waves({}));
+  cv::Mat parted = Waves({0.5F, 0.0F});
+  Waves({2.0F, 0.0F}).colRange(120, 240).copyTo(parted.colRange(120, 240));
+  Draw(1, parted);
+  double across = 0.0, beside = 0.0;
+  int is_across = 0, is_beside = 0;
+  Follow([&](const Measurement& first, const Measurement& now) {
+    const double sigma = std::sqrt(now.covariance[0] + now.covariance[3]);
+    const double off = std::abs(first.values[0] - 120.0);
+    if (off < 8.0) {
+      across += sigma;
+      ++is_across;
+    } else if (off > 15.0) {
+      beside += sigma;
+      ++is_beside;
+    }
+  });
+  ASSERT_GT(is_across, 1);
+  ASSERT_GT(is_beside, 10);
+  EXPECT_LT(beside / is_beside, 0.02);
+  EXPECT_GT(across / is_across, 4.0 * beside / is_beside);
+}
+
 TEST_F(ImageTracks, ThatAFilterGuidesAreGivenWithoutItToo) {
   Write("config.yaml", kGuided);
   MakeImages();

@@ -46,52 +46,14 @@ struct PredictCall {
   template <class Model, class... A>
   auto operator()(const Model& model, A... a) const -> decltype(model.Predict(a...));
 };
-struct StepCall {
-  template <class Model, class... A>
-  auto operator()(const Model& model, A... a) const -> decltype(model.Step(a...));
-};
-struct SqrtQCall {
-  template <class Model, class... A>
-  auto operator()(const Model& model, A... a) const -> decltype(model.SqrtQ(a...));
-};
-struct LanesValidCall {
-  template <class Model, class... A>
-  auto operator()(const Model& model, A... a) const -> decltype(bool(model.Valid(a...)));
-};
 template <class T, std::size_t>
 using In = const T*;
-template <class T, std::size_t>
-using Out = T*;
 
-template <class Model, class T, class Time, class Indices>
-struct StepsWith;
-template <class Model, class T, class Time, std::size_t... I>
-struct StepsWith<Model, T, Time, std::index_sequence<I...>>
-    : std::is_invocable<StepCall, const Model&, In<T, I>..., const T*, Time, Out<T, I>...> {};
 template <class Model, class T, class Indices>
 struct PredictsWith;
 template <class Model, class T, std::size_t... I>
 struct PredictsWith<Model, T, std::index_sequence<I...>>
     : std::is_invocable<PredictCall, const Model&, In<T, I>..., T*> {};
-
-/// dt_s of one lane.
-inline double LaneOf(double all, int) { return all; }
-template <int kLanes>
-double LaneOf(const Pack<kLanes>& each, int lane) {
-  return each.v[lane];
-}
-
-/// As detail::CallStep, with a dt_s of any type.
-template <class Model, class T, class Time, std::size_t... I>
-bool StepLanes(const Model& model, const T* const* x, const T* w, const Time& dt_s, T* const* next,
-               std::index_sequence<I...>) {
-  if constexpr (std::is_void_v<decltype(model.Step(x[I]..., w, dt_s, next[I]...))>) {
-    model.Step(x[I]..., w, dt_s, next[I]...);
-    return true;
-  } else {
-    return model.Step(x[I]..., w, dt_s, next[I]...);
-  }
-}
 
 /// As detail::CallSqrtNoise, of any scalar.
 template <class Model, class S, std::size_t... I>
@@ -145,9 +107,8 @@ class LaneStep {
   LaneStep(State& state, const std::tuple<Motions...>& motions) : s_(state), motions_(motions) {}
 
   /// false where a model is not defined: for every lane, unless they differ. `roots` are those of
-  /// dt_s; a dt_s for each lane (S) has none.
-  template <class Time>
-  bool Predict(const Time& dt_s, const std::tuple<RootQ<Motions>...>* roots) {
+  /// dt_s.
+  bool Predict(double dt_s, const std::tuple<RootQ<Motions>...>* roots) {
     return PredictAll(dt_s, roots, std::index_sequence_for<Motions...>{});
   }
 
@@ -214,8 +175,8 @@ class LaneStep {
   template <class Model>
   using TransitionOf = Transition<detail::Blocks<Model>::kTangent, Model::kNoise>;
 
-  template <class Time, std::size_t... M>
-  bool PredictAll(const Time& dt_s, const std::tuple<RootQ<Motions>...>* roots,
+  template <std::size_t... M>
+  bool PredictAll(double dt_s, const std::tuple<RootQ<Motions>...>* roots,
                   std::index_sequence<M...>) {
     std::tuple<TransitionOf<Motions>...> transitions;
     const bool all = (StepOne<M>(dt_s, roots, std::get<M>(transitions)) && ...);
@@ -224,12 +185,11 @@ class LaneStep {
     s_.in_interval = S(1.0);
     return true;
   }
-  template <std::size_t M, class Model, class Time, std::size_t... I>
-  void NoiseOf(const Model& model, const Time& dt_s, const std::tuple<RootQ<Motions>...>* roots,
-               S* l, std::index_sequence<I...> indices);
-  template <std::size_t M, class Time, int N, int kNoise>
-  bool StepOne(const Time& dt_s, const std::tuple<RootQ<Motions>...>* roots,
-               Transition<N, kNoise>& t);
+  template <std::size_t M, class Model, std::size_t... I>
+  void NoiseOf(const Model& model, double dt_s, const std::tuple<RootQ<Motions>...>* roots, S* l,
+               std::index_sequence<I...> indices);
+  template <std::size_t M, int N, int kNoise>
+  bool StepOne(double dt_s, const std::tuple<RootQ<Motions>...>* roots, Transition<N, kNoise>& t);
   template <std::size_t M, int N, int kNoise>
   void Hold(const S& goes_on, Transition<N, kNoise>& t);
   template <std::size_t M, int N, int kNoise>
@@ -244,12 +204,12 @@ class LaneStep {
 };
 
 template <class S, class... Motions>
-template <std::size_t M, class Model, class Time, std::size_t... I>
-void LaneStep<S, Motions...>::NoiseOf(const Model& model, const Time& dt_s,
+template <std::size_t M, class Model, std::size_t... I>
+void LaneStep<S, Motions...>::NoiseOf(const Model& model, double dt_s,
                                       const std::tuple<RootQ<Motions>...>* roots, S* l,
                                       std::index_sequence<I...> indices) {
   constexpr int n_w = Model::kNoise, first = FirstBlock(M);
-  if constexpr (detail::HasSimpleSqrtQ<Model>::value && std::is_same_v<Time, double>) {
+  if constexpr (detail::HasSimpleSqrtQ<Model>::value) {
     For<n_w * n_w>([&](auto i) { l[i] = S(std::get<M>(*roots).l[i]); });
   } else if constexpr (std::is_same_v<S, double>) {
     const double* const x[] = {s_.x + Offset(first + static_cast<int>(I))...};
@@ -260,15 +220,15 @@ void LaneStep<S, Motions...>::NoiseOf(const Model& model, const Time& dt_s,
       double one[n_w * n_w + 1] = {}, own[kAmbient];
       For<kAmbient>([&](auto i) { own[i] = s_.x[i].v[lane]; });
       const double* const x[] = {own + Offset(first + static_cast<int>(I))...};
-      detail::CallSqrtQ(model, x, LaneOf(dt_s, lane), {one, n_w}, indices);
+      detail::CallSqrtQ(model, x, dt_s, {one, n_w}, indices);
       For<n_w * n_w>([&](auto i) { l[i].v[lane] = one[i]; });
     }
   }
 }
 
 template <class S, class... Motions>
-template <std::size_t M, class Time, int N, int kNoise>
-bool LaneStep<S, Motions...>::StepOne(const Time& dt_s, const std::tuple<RootQ<Motions>...>* roots,
+template <std::size_t M, int N, int kNoise>
+bool LaneStep<S, Motions...>::StepOne(double dt_s, const std::tuple<RootQ<Motions>...>* roots,
                                       Transition<N, kNoise>& t) {
   using Model = std::tuple_element_t<M, std::tuple<Motions...>>;
   using D = Dual<S, N + kNoise>;
@@ -285,7 +245,9 @@ bool LaneStep<S, Motions...>::StepOne(const Time& dt_s, const std::tuple<RootQ<M
     x[i] = lifted + (Offset(FirstBlock(M) + i) - o);
     y[i] = next + (Offset(FirstBlock(M) + i) - o);
   });
-  if (!StepLanes(model, x, static_cast<const D*>(noise), dt_s, y, indices)) return false;
+  const D* const no_input = nullptr;
+  if (!detail::CallStep(model, x, no_input, static_cast<const D*>(noise), dt_s, y, indices))
+    return false;
   For<All::kCount>([&](auto index) {
     constexpr int b = FirstBlock(M) + index, first = Offset(b) - o;
     For<Space<b>::kTangent>([&](auto i) {

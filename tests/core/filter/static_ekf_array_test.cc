@@ -152,7 +152,7 @@ void ExpectSameDepths(int count, int lanes, double walk, const DtOf& dt_of) {
 TEST(StaticEkfArray, EachIsTheSingleFilter) {
   for (const int lanes : AllLanes()) {
     for (const int count : {37, 4}) {
-      SCOPED_TRACE(testing::Message() << lanes << " lanes, " << count << " filters");
+      SCOPED_TRACE(::testing::Message() << lanes << " lanes, " << count << " filters");
       ExpectSameDepths(count, lanes, 0.0, [](int, int) { return 0.033; });
       ExpectSameDepths(count, lanes, 0.2, [](int frame, int) { return 0.01 + 0.001 * frame; });
     }

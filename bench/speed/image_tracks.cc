@@ -79,7 +79,7 @@ class Times {
   /// Goes through the images of a folder once: each part in turn, frame by frame.
   void Add(const Config& config, const PluginHost& host, const fs::path& folder) {
     Experiment experiment = BuildExperiment(config, host);
-    is_guided_ = experiment.guide >= 0;
+    is_guided_ = experiment.guide != nullptr;
     const internal::EstimatorGuide guide(experiment, nullptr);
     Estimator& filter = *experiment.estimators[0].estimator;
     SourceFrame frame;

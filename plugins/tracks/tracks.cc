@@ -7,7 +7,7 @@ namespace alidade {
 namespace {
 
 constexpr const char* kImageTracksKeys =
-    "path           a folder of images, in the order of their names, or a video\n"
+    "path           a folder of images, in the order of their names, a video, or a camera\n"
     "images         which files of the folder: 'left_*.png'; default: all that end like an image\n"
     "known          a table u,v,depth_m of points in the first image: they give the scale\n"
     "guide          a filter of `estimators`: features are looked for where it expects them\n"

@@ -327,6 +327,13 @@ TEST_F(ImageTracks, HaveTheTimesOfTheLayoutsOfEurocTumAndKitti) {
   // By their names, one that is gone is missed by nothing; a time that is not there is.
   std::filesystem::remove(folder_ / "tum/rgb/000019.png");
   EXPECT_EQ(track("tum/rgb").code, 0);
+  std::string back = tum;
+  back.replace(back.find("1305031455"), 10, "1305031454");
+  Write("tum/rgb.txt", back);
+  const Outcome not_after = track("tum/rgb");
+  EXPECT_EQ(not_after.code, 65);
+  EXPECT_TRUE(Contains(not_after.err, "image 000003.png that is not after that of the one before"))
+      << not_after.err;
   Write("tum/rgb.txt", tum.substr(0, tum.find("1305031455")));
   const Outcome no_time = track("tum/rgb");
   EXPECT_EQ(no_time.code, 65);
@@ -489,7 +496,7 @@ TEST_F(ImageTracks, AreFoundWhereTheFilterExpectsThem) {
 /// Expects every feature where it was, but some of them aside, and is sure of it.
 class Aside : public Guide {
  public:
-  explicit Aside(int count) : count_(count) {}
+  Aside(int count, double by_px) : count_(count), by_px_(by_px) {}
   void Take(const SourceFrame& frame) {
     at_.clear();
     for (const Measurement& m : frame.measurements) at_[m.landmark] = m.values;
@@ -500,13 +507,14 @@ class Aside : public Guide {
     std::vector<Expected> all;
     for (const std::int64_t id : ids) {
       Expected& one = all.emplace_back(Expected{at_.at(id), {0.25, 0.0, 0.0, 0.25}});
-      if (std::ssize(all) <= count_) one.z[1] += 3.0;
+      if (std::ssize(all) <= count_) one.z[1] += by_px_;
     }
     return all;
   }
 
  private:
   int count_;
+  double by_px_;
   std::map<std::int64_t, std::vector<double>> at_;
 };
 
@@ -523,7 +531,7 @@ TEST_F(ImageTracks, OutsideTheirEllipseAreLostWhereMostAreWithinIt) {
   // Of 5 that are found outside, all are lost; where it is more than half, the filter is wrong.
   for (const int aside : {0, 5, 1000}) {
     const auto source = host.CreateSource(config, 1);
-    Aside guide(aside);
+    Aside guide(aside, 3.0);
     SourceFrame first, second;
     ASSERT_TRUE(source->Next(first));
     ASSERT_GT(first.measurements.size(), 15u);
@@ -563,7 +571,7 @@ class EstimatedNoise : public ImageTracks {
     ImageTracks::SetUp();
     Write("config.yaml",
           "alidade: 1\nsource: {type: image_tracks, path: scene/images, rate_hz: 10, features: 40, "
-          "estimate_noise: true, sigma_systematic_px: 0}\n");
+          "estimate_noise: true, sigma_systematic_px: 1e-6}\n");
     std::filesystem::create_directories(folder_ / "scene/images");
   }
   void Draw(int k, const cv::Mat& grey) const {
@@ -641,6 +649,65 @@ TEST_F(EstimatedNoise, IsLargeOfPatchesThatMoveInParts) {
   EXPECT_GT(across / is_across, 4.0 * beside / is_beside);
 }
 
+// A filter that is far off is worse than none.
+TEST_F(ImageTracks, AreFoundWithoutAGuideThatIsFarOff) {
+  Write("config.yaml", kGuided);
+  MakeImages();
+  std::filesystem::copy_file(ImageFile(0), ImageFile(1),
+                             std::filesystem::copy_options::overwrite_existing);
+  Config config = Config::FromFile((folder_ / "config.yaml").string());
+  config.Set("source.path", (folder_ / "scene/images").string(), "test");
+  const PluginHost host;
+  const auto source = host.CreateSource(config, 1);
+  Aside guide(1000, 200.0);
+  SourceFrame first, second;
+  ASSERT_TRUE(source->Next(first));
+  guide.Take(first);
+  source->LendGuide(&guide);
+  ASSERT_TRUE(source->Next(second));
+  std::set<std::int64_t> kept;
+  for (const Measurement& m : second.measurements) kept.insert(m.landmark);
+  for (const Measurement& m : first.measurements) EXPECT_TRUE(kept.contains(m.landmark));
+}
+
+TEST_F(ImageTracks, AreFollowedInImagesTooSmallForAPyramid) {
+  Write("config.yaml",
+        "alidade: 1\nsource: {type: image_tracks, path: small, rate_hz: 10, features: 4}\n");
+  std::filesystem::create_directories(folder_ / "small");
+  for (const int k : {0, 1, 2}) {
+    const cv::Mat image = Waves({0.5F * static_cast<float>(k), 0.0F})(cv::Rect(100, 60, 40, 40));
+    cv::Mat grey;
+    image.convertTo(grey, CV_8U);
+    const std::string file = (folder_ / "small" / (std::to_string(k) + ".png")).string();
+    ASSERT_TRUE(cv::imwrite(file, grey));
+  }
+  const Outcome tracked = Track();
+  ASSERT_EQ(tracked.code, 0) << tracked.err;
+  const ByFrame found = Rows("found/tracks.csv");
+  EXPECT_EQ(found.size(), 3u);
+  EXPECT_EQ(found.at(2).front().feature, found.at(0).front().feature);
+}
+
+TEST_F(ImageTracks, ThatBringTheirNoiseAreTakenByTheFilter) {
+  Write("config.yaml", kGuided);
+  MakeImages();
+  const Outcome run =
+      Call({"run", "config.yaml", "-o", "run", "--set", "source.estimate_noise=true"});
+  ASSERT_EQ(run.code, 0) << run.err;
+  const std::string json = Read("run/run.json");
+  EXPECT_TRUE(Contains(json, "\"accepted:pixels\"")) << json;
+  EXPECT_FALSE(Contains(json, "\"invalid:pixels\"")) << json;
+}
+
+TEST_F(ImageTracks, AreGuidedInAComparisonToo) {
+  Write("config.yaml", kGuided);
+  MakeImages();
+  const Outcome compared =
+      Call({"compare", "config.yaml", "--no-decomposition", "--set", "estimators.iekf={type: iekf}",
+            "--set", "source.max_frames=5", "--reference", "iekf", "-o", "compared"});
+  EXPECT_EQ(compared.code, 0) << compared.err;
+}
+
 TEST_F(ImageTracks, ThatAFilterGuidesAreGivenWithoutItToo) {
   Write("config.yaml", kGuided);
   MakeImages();
@@ -655,6 +722,11 @@ TEST_F(ImageTracks, AGuideIsAFilterOfTheConfig) {
   EXPECT_EQ(unknown.code, 78);
   EXPECT_TRUE(Contains(unknown.err, "source.guide: no estimator 'ekff'")) << unknown.err;
   EXPECT_TRUE(Contains(unknown.err, "did you mean 'ekf'")) << unknown.err;
+  const Outcome held = Call({"run", "config.yaml", "--set", "out_of_sequence={policy: buffer}"});
+  EXPECT_EQ(held.code, 78);
+  EXPECT_TRUE(Contains(held.err, "before the next is measured")) << held.err;
+  const Outcome blind = Call({"run", "config.yaml", "--set", "sensors.pixels.stream=other"});
+  EXPECT_EQ(blind.code, 78) << blind.err;
   const Outcome batch = Call({"run", "config.yaml", "--set", "estimators.ekf={type: ceres_batch}"});
   EXPECT_EQ(batch.code, 78);
   EXPECT_TRUE(Contains(batch.err, "estimator 'ekf' predicts no measurements")) << batch.err;

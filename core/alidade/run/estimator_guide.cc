@@ -10,24 +10,29 @@
 
 namespace alidade::internal {
 
+const SensorBinding* GuidingSensor(const System& system, std::string_view stream) {
+  const auto found = std::ranges::find_if(system.sensors, [&](const SensorBinding& sensor) {
+    return sensor.stream == stream && sensor.model.known_size() == 0;
+  });
+  return found == system.sensors.end() ? nullptr : &*found;
+}
+
 EstimatorGuide::EstimatorGuide(Experiment& experiment, std::function<void(bool)> busy)
     : experiment_(experiment), busy_(std::move(busy)) {
-  if (experiment.guide >= 0) experiment.source->LendGuide(this);
+  if (experiment.guide != nullptr) experiment.source->LendGuide(this);
 }
 
 EstimatorGuide::~EstimatorGuide() {
-  if (experiment_.guide >= 0) experiment_.source->LendGuide(nullptr);
+  if (experiment_.guide != nullptr) experiment_.source->LendGuide(nullptr);
 }
 
 std::vector<Expected> EstimatorGuide::Expect(int stream, Timestamp timestamp,
                                              const std::vector<std::int64_t>& landmarks) const {
   std::vector<Expected> all(landmarks.size());
-  const NamedEstimator& named = experiment_.estimators[static_cast<std::size_t>(experiment_.guide)];
-  const auto& filter = dynamic_cast<const Filter&>(*named.estimator);
+  const Filter& filter = *experiment_.guide;
   const std::string& name = experiment_.source->streams().at(static_cast<std::size_t>(stream)).name;
-  const std::vector<SensorBinding>& sensors = filter.system().sensors;
-  const auto sensor = std::ranges::find(sensors, name, &SensorBinding::stream);
-  if (sensor == sensors.end() || sensor->model.known_size() > 0) return all;
+  const SensorBinding* const sensor = GuidingSensor(filter.system(), name);
+  if (sensor == nullptr) return all;
   const BusyWhile works(busy_);  // it calls models
   const std::vector<std::optional<Prediction>> each =
       filter.ExpectEach(sensor->name, timestamp, landmarks);

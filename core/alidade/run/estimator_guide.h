@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <string_view>
 #include <vector>
 
 #include "alidade/host/source.h"
@@ -9,9 +10,12 @@
 
 namespace alidade::internal {
 
+/// The first sensor on that stream that takes no known numbers; null: there is none.
+const SensorBinding* GuidingSensor(const System& system, std::string_view stream);
+
 /// Lends the experiment's source, as long as this lives, what the filter `experiment.guide` expects
-/// of it, as that filter is when it is asked. The first of its sensors on a stream is asked. Does
-/// nothing where none guides.
+/// of it, as that filter is when it is asked, by its GuidingSensor of a stream. Does nothing where
+/// none guides.
 class EstimatorGuide : public Guide {
  public:
   /// `busy` as RunOptions has it.

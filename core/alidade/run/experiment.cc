@@ -7,6 +7,7 @@
 #include "alidade/filter/filter.h"
 #include "alidade/host/calibration.h"
 #include "alidade/host/plugin_host.h"
+#include "alidade/run/estimator_guide.h"
 #include "alidade/run/named_estimator.h"
 #include "alidade/run/run.h"
 #include "alidade/system/truth_match.h"
@@ -130,11 +131,15 @@ int ReadReference(const Node& root, const std::vector<NamedEstimator>& estimator
   return static_cast<int>(found - estimators.begin());
 }
 
-/// Index of the filter that guides the source; -1: none does.
-int ReadGuide(const Node& source, const Experiment& experiment) {
+/// The filter that guides the source, by its key `guide`; null: none does.
+const Filter* ReadGuide(const Node& source, const Experiment& experiment) {
   const std::string name = experiment.source->guided_by();
-  if (name.empty()) return -1;
+  if (name.empty()) return nullptr;
   const Node guide = source.At("guide");
+  if (experiment.out_of_sequence.policy != OutOfSequence::kReject) {
+    guide.Fail("a filter that guides has to process each frame before the next is measured",
+               "out_of_sequence: {policy: reject}");
+  }
   const std::vector<NamedEstimator>& estimators = experiment.estimators;
   const auto found = std::ranges::find(estimators, name, &NamedEstimator::name);
   if (found == estimators.end()) {
@@ -142,10 +147,19 @@ int ReadGuide(const Node& source, const Experiment& experiment) {
     guide.Fail("no estimator '" + name + "'", "a filter: " + internal::Join(names),
                Nearest(name, names));
   }
-  if (dynamic_cast<const Filter*>(found->estimator.get()) == nullptr) {
+  const auto* const filter = dynamic_cast<const Filter*>(found->estimator.get());
+  if (filter == nullptr) {
     guide.Fail("estimator '" + name + "' predicts no measurements", "a recursive filter of core");
   }
-  return static_cast<int>(found - estimators.begin());
+  const std::vector<StreamInfo>& streams = experiment.source->streams();
+  const bool can = std::ranges::any_of(streams, [&](const StreamInfo& stream) {
+    return internal::GuidingSensor(filter->system(), stream.name) != nullptr;
+  });
+  if (!can) {
+    guide.Fail("estimator '" + name + "' has no sensor that tells where features are",
+               "a sensor on a stream of the source that takes no known numbers");
+  }
+  return filter;
 }
 
 /// Keys of the root that are read before the calibration is there, or by other commands.

@@ -16,6 +16,8 @@
 
 namespace alidade {
 
+class Filter;
+
 /// What Estimator::diverged() does to the run. The event `inconsistent` of the metrics, which takes
 /// truth, never ends one.
 enum class OnDivergence { kReport, kFail };
@@ -72,8 +74,8 @@ struct Experiment {
   std::vector<Segment> segments;
   std::uint64_t seed = 1;
   OutOfSequencePolicy out_of_sequence;
-  int reference = -1;  ///< index of the estimator that metrics compare with; -1: truth
-  int guide = -1;      ///< index of the filter that guides the source; -1: none
+  int reference = -1;             ///< index of the estimator that metrics compare with; -1: truth
+  const Filter* guide = nullptr;  ///< the filter that guides the source; null: none
   std::vector<double> truth_sigmas;  ///< StreamInfo::sigma of the source's truths; empty: its own
   /// Files, without folder, of the plugins in use that were built without optimisation.
   std::set<std::string> unoptimised;

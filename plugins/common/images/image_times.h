@@ -7,7 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
+#include <vector>
 
 #include "alidade/base/error.h"
 #include "plugins/common/companion_files.h"
@@ -17,8 +17,9 @@ namespace alidade {
 /// When images were taken: by a table `frame,t_s` that has each of them, by a table of their names,
 /// at a rate, or as they come.
 ///
-/// Errors       kBadData: an image without a time, a time without an image. An image that is gone
-///              would give those after it the times of others.
+/// Errors       kBadData: an image without a time; times that do not increase; a time without an
+///              image in a table by number, for an image that is gone would give those after it the
+///              times of others.
 class ImageTimes {
  public:
   /// By the clock, counted from the first image: a camera.
@@ -48,9 +49,9 @@ class ImageTimes {
     const std::filesystem::path home = whole.parent_path();
     ImageTimes times;
     if (const auto euroc = home / "data.csv"; is_there(euroc)) {
-      times.ReadNamed(NumberRows(euroc, key.place(), key.path()), "t_ns,name");
+      times.ReadNamed(NumberRows(euroc, key.place(), key.path()), true);
     } else if (const auto tum = home / (whole.filename().string() + ".txt"); is_there(tum)) {
-      times.ReadNamed(NumberRows(tum, key.place(), key.path(), ' '), "t_s name");
+      times.ReadNamed(NumberRows(tum, key.place(), key.path(), ' '), false);
     } else if (const auto kitti = home / "times.txt"; is_there(kitti)) {
       times.ReadPlain(NumberRows(kitti, key.place(), key.path()));
     } else {
@@ -61,7 +62,7 @@ class ImageTimes {
 
   /// Of image `number`, from 0, of that file name; asked for in order.
   Timestamp At(std::int64_t number, const std::string& name = {}) {
-    if (!table_.empty()) return Named(number, name);
+    if (!table_.empty()) return InTable(number, name);
     if (rate_hz_ > 0.0) return TimestampFromSeconds(static_cast<double>(number) / rate_hz_);
     if (!rows_) return ByTheClock();
     std::int64_t frame = -1;
@@ -73,8 +74,8 @@ class ImageTimes {
   /// After the last of all images.
   void End(std::int64_t count) {
     const std::string found = ", but there are " + std::to_string(count) + " images";
-    if (by_number_ && std::ssize(times_) > count) {
-      Fail(table_, "has " + std::to_string(times_.size()) + " times" + found);
+    if (std::ssize(by_number_) > count) {
+      Fail(table_, "has " + std::to_string(by_number_.size()) + " times" + found);
     }
     std::int64_t frame = 0;
     Timestamp timestamp = 0;
@@ -83,33 +84,41 @@ class ImageTimes {
   }
 
  private:
-  void ReadNamed(NumberRows&& rows, const char* columns) {
+  void ReadNamed(NumberRows&& rows, bool in_ns) {
     table_ = rows.name();
+    const char* const columns = in_ns ? "t_ns,name" : "t_s name";
     while (rows.Next()) {
       rows.ExpectColumns(2, columns);
-      const Timestamp t = columns[2] == 'n' ? rows.Index(0, "t_ns") : rows.Time(0, "t_s");
+      const Timestamp t = in_ns ? rows.Index(0, "t_ns") : rows.Time(0, "t_s");
       const std::string name = std::filesystem::path(rows.text(1)).filename().string();
-      if (!times_.emplace(name, t).second) rows.FailCell(1, "name", "is there twice", "each once");
+      if (!by_name_.emplace(name, t).second) {
+        rows.FailCell(1, "name", "is there twice", "each once");
+      }
     }
-    CheckNotEmpty(rows, columns);
+    if (by_name_.empty()) rows.FailLine("no rows", "a row `" + std::string(columns) + "` an image");
   }
   void ReadPlain(NumberRows&& rows) {
     table_ = rows.name();
-    by_number_ = true;
     while (rows.Next()) {
       rows.ExpectColumns(1, "t_s");
-      times_.emplace(std::to_string(times_.size()), rows.Time(0, "t_s"));
+      by_number_.push_back(rows.Time(0, "t_s"));
     }
-    CheckNotEmpty(rows, "t_s");
-  }
-  void CheckNotEmpty(const NumberRows& rows, const std::string& columns) const {
-    if (times_.empty()) rows.FailLine("no rows", "a row `" + columns + "` for each image");
+    if (by_number_.empty()) rows.FailLine("no rows", "a row `t_s` for each image");
   }
 
-  Timestamp Named(std::int64_t number, const std::string& name) const {
-    const auto found = times_.find(by_number_ ? std::to_string(number) : name);
-    if (found != times_.end()) return found->second;
-    Fail(table_, "has no time for image " + (by_number_ ? std::to_string(number) : name));
+  Timestamp InTable(std::int64_t number, const std::string& name) {
+    const bool by_name = !by_name_.empty();
+    const auto found = by_name_.find(name);
+    const std::string image = by_name ? name : std::to_string(number);
+    if (by_name ? found == by_name_.end() : number >= std::ssize(by_number_)) {
+      Fail(table_, "has no time for image " + image);
+    }
+    const Timestamp t = by_name ? found->second : by_number_[static_cast<std::size_t>(number)];
+    if (last_ && t <= *last_) {
+      Fail(table_, "has a time for image " + image + " that is not after that of the one before");
+    }
+    last_ = t;
+    return t;
   }
   Timestamp ByTheClock() {
     const auto now = std::chrono::steady_clock::now();
@@ -122,9 +131,10 @@ class ImageTimes {
 
   double rate_hz_ = 0.0;
   std::unique_ptr<TimestampRows> rows_;
-  std::string table_;  ///< file of times_
-  std::map<std::string, Timestamp> times_;
-  bool by_number_ = false;  ///< their names are the numbers of images
+  std::string table_;  ///< file of the times below
+  std::map<std::string, Timestamp> by_name_;
+  std::vector<Timestamp> by_number_;
+  std::optional<Timestamp> last_;  ///< given out of them
   std::optional<std::chrono::steady_clock::time_point> first_;
 };
 

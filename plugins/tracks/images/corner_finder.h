@@ -31,6 +31,7 @@ class CornerFinder {
     const int count = std::clamp(static_cast<int>(std::ceil(share * rows)), 1, rows);
     strongest_.resize(static_cast<std::size_t>(rows), 0.0);
     corners_.clear();
+    if (count == rows) turn_ = 0;  // all at once: none by what an image before had
     const int last = std::min(rows, turn_ + count);
     Search(image, turn_, last);
     if (last < turn_ + count) Search(image, 0, turn_ + count - rows);

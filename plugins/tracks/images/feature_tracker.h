@@ -37,15 +37,15 @@ struct ExpectedPoint {
 /// Follows corners from image to image, and finds new ones [Shi1994] where a cell of the grid has
 /// fewer than its share. Each is aligned with the patch where it was found (FoundPatch), from
 ///
-///   where it is expected   if the ellipse of 3 sigma is small and it is found there [Davison2007]
+///   where it is expected   if its ellipse is small and it is found there [Davison2007]
 ///   optical flow           else (PyramidFlow), begun where it is expected, or was
 ///
 /// It is lost where its patch leaves the image, where it no longer looks as it did when it was
-/// found, and where it comes as close to an older one as half of the least distance; if nothing is
-/// expected, where it is not followed back to where it was [Kalal2010]; if it is, outside the
-/// ellipse, but for when half of all are: then it is the filter that is wrong. Where more than
-/// three quarters are lost at once, all are. It keeps its id as long as it lives, and no other has
-/// it.
+/// found, and where it comes as close to an older one as half of the least distance; if its ellipse
+/// is not small, where it is not followed back to where it was [Kalal2010]; outside its ellipse,
+/// but for when more than half of those found are: then it is the filter that is wrong. Where
+/// fewer than a quarter are found by what is expected, nothing is. Where more than three quarters
+/// are lost at once, all are. It keeps its id as long as it lives, and no other has it.
 ///
 /// Where features are missing, as many rows of cells as they fill are searched for corners in each
 /// image.
@@ -85,13 +85,22 @@ class FeatureTracker {
     to_.assign(size, {});
     found_.assign(size, 0);
     for (std::size_t i = 0; i < size; ++i) {
-      if (!expected_[i] || 3.0 * expected_[i]->LargestSigma() > options_.window_px / 4) continue;
+      if (!IsSure(i)) continue;
       to_[i] = expected_[i]->at;
       found_[i] = static_cast<unsigned char>(Align(features_[i], image, to_[i]));
     }
     FollowFlow(image);
     CheckExpected();
+    if (4 * std::ranges::count(found_, 1) < std::ssize(found_)) {
+      expected_.assign(size, std::nullopt);
+      FollowFlow(image);
+    }
     Keep(image.size());
+  }
+
+  /// Expected within a small ellipse.
+  bool IsSure(std::size_t i) const {
+    return expected_[i] && kFarthest * expected_[i]->LargestSigma() <= options_.window_px / 4;
   }
 
   bool Align(Feature& feature, const cv::Mat& image, cv::Point2f& at) const {
@@ -111,13 +120,13 @@ class FeatureTracker {
     }
     if (rest_.empty()) return;
     flow_.Forward(from_, flowed_, flow_found_);
-    std::size_t unsure = 0;  // those that nothing was expected of
+    std::size_t unsure = 0;
     for (std::size_t k = 0; k < rest_.size(); ++k) {
       const std::size_t i = rest_[k];
       to_[i] = flowed_[k];
       if (flow_found_[k] == 0 || !Align(features_[i], image, to_[i])) continue;
       found_[i] = 1;
-      if (!expected_[i]) rest_[unsure++] = i;
+      if (!IsSure(i)) rest_[unsure++] = i;
     }
     rest_.resize(unsure);
     if (rest_.empty()) return;
@@ -138,13 +147,12 @@ class FeatureTracker {
 
   /// Refuses what lies outside its ellipse.
   void CheckExpected() {
-    constexpr double kFarthest = 9.0;  // 3 sigma
     std::size_t known = 0;
     rest_.clear();
     for (std::size_t i = 0; i < features_.size(); ++i) {
       if (found_[i] == 0 || !expected_[i]) continue;
       ++known;
-      if (!(expected_[i]->SquaredMahalanobis(to_[i]) <= kFarthest)) rest_.push_back(i);
+      if (!(expected_[i]->SquaredMahalanobis(to_[i]) <= kFarthest * kFarthest)) rest_.push_back(i);
     }
     if (2 * rest_.size() > known) return;
     for (const std::size_t i : rest_) found_[i] = 0;
@@ -199,6 +207,7 @@ class FeatureTracker {
     }
     const int share = (options_.features + cells - 1) / cells;
     const int missing = options_.features - static_cast<int>(features_.size());
+    if (missing <= 0) return;
     for (const auto& [response, at] : finder_.Find(image, missing)) {
       if (std::ssize(features_) == options_.features) break;
       if (taken_.at<unsigned char>(at) != 0 || count[cell_of(at)] >= share) continue;
@@ -206,6 +215,9 @@ class FeatureTracker {
       add(StablePoint(image, options_, cv::Point2f(at)));
     }
   }
+
+  /// Sigmas of an ellipse with all but a thousandth of a Gaussian: of chi2(2) it is 13.8.
+  static constexpr double kFarthest = 3.717;
 
   TrackerOptions options_;
   PyramidFlow flow_;

@@ -58,7 +58,7 @@ class ImageTracks : public Source {
     estimate_noise_ =
         p.Flag("estimate_noise",
                "each measurement brings its covariance; false: that of the sensors", false);
-    systematic_px_ = p.NonNegative(
+    systematic_px_ = p.Positive(
         "sigma_systematic_px", "px",
         "with estimate_noise: what no residual tells, of each coordinate, 1 sigma", 0.15);
     for (const char* key : {"path", "images", "known", "guide", "state_entry"}) {
@@ -82,6 +82,7 @@ class ImageTracks : public Source {
   const std::vector<StreamInfo>& truths() const override { return truths_; }
   Place place() const override { return images_->place(); }
   std::int64_t size() const override {
+    if (images_->size() <= 0) return most_ > 0 ? most_ : -1;  // a camera, or a video that is silent
     const std::int64_t left = std::max<std::int64_t>(0, images_->size() - start_);
     return most_ > 0 ? std::min<std::int64_t>(most_, left) : left;
   }
@@ -148,7 +149,8 @@ class ImageTracks : public Source {
   std::vector<double> CovarianceOf(const FeatureTracker::Feature& feature) const {
     const double own = systematic_px_ * systematic_px_;
     const Eigen::Matrix2d c = feature.found.Covariance().cast<double>();
-    return {c(0, 0) + own, c(0, 1), c(1, 0), c(1, 1) + own};
+    const double cross = 0.5 * (c(0, 1) + c(1, 0));  // rounded each for itself
+    return {c(0, 0) + own, cross, cross, c(1, 1) + own};
   }
 
   struct Known {
@@ -197,9 +199,10 @@ class ImageTracks : public Source {
     const std::filesystem::path path = folder / key.Text();
     images_.emplace(path, names, key);
     const std::filesystem::path home = images_->is_video() ? path.parent_path() : path;
+    // Of the layouts: beside the folder of images.
     std::error_code ignored;
     const std::filesystem::path above =
-        std::filesystem::weakly_canonical(home, ignored).parent_path();
+        images_->is_video() ? home : std::filesystem::weakly_canonical(home, ignored).parent_path();
     const auto first_of = [&](std::initializer_list<std::filesystem::path> files)
         -> std::optional<std::filesystem::path> {
       for (const std::filesystem::path& file : files) {

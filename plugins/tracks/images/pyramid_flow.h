@@ -23,15 +23,16 @@ class PyramidFlow {
   }
 
   /// Moves `to` from where the points `from` of the last image are looked for in the next to about
-  /// where they are, by the levels above the image itself. `found`: 0 where they are lost.
+  /// where they are, by the levels above the image itself where there are any. `found`: 0 where
+  /// they are lost.
   void Forward(const std::vector<cv::Point2f>& from, std::vector<cv::Point2f>& to,
                std::vector<unsigned char>& found) {
-    const int skipped = levels_ > 0 ? 1 : 0;
-    const float scale = levels_ > 0 ? 0.5F : 1.0F;
+    const std::vector<cv::Mat>&last = Build(last_), &next = Build(next_);
+    const int skipped = last.size() > 1 ? 1 : 0;  // a small image has no levels above it
+    const float scale = skipped > 0 ? 0.5F : 1.0F;
     from_.clear();
     for (const cv::Point2f& at : from) from_.push_back(scale * at);
     for (cv::Point2f& at : to) at *= scale;
-    const std::vector<cv::Mat>&last = Build(last_), &next = Build(next_);
     cv::calcOpticalFlowPyrLK(std::vector(last.begin() + skipped, last.end()),
                              std::vector(next.begin() + skipped, next.end()), from_, to, found,
                              error_, window_, levels_ - skipped, kStop,

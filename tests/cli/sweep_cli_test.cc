@@ -33,14 +33,20 @@ TEST_F(SweepCli, AComparisonOverSeedsHasTheSameBytesForAnyNumberOfJobs) {
                                      "--jobs", jobs, "-o", "jobs" + jobs});
     EXPECT_EQ(comparison.code, 0) << comparison.err;
     auto all = testing::RunFiles(folder_ / ("jobs" + jobs));
+    // What tells how long it took.
     std::string& json = all["compare.json"];
-    const std::size_t clock = json.find("\"time_us\"");
-    json.erase(clock, json.find('}', clock) - clock);
-    for (const char* table : {"compare.md", "compare.tex"}) {
+    for (const char* key : {"\"cpu_us\"", "\"time_us\""}) {
+      const std::size_t clock = json.find(key);
+      json.erase(clock, json.find('}', clock) - clock);
+    }
+    for (const char* table : {"compare.md", "compare.tex", "report.html"}) {
       std::string& text = all[table];
-      const std::size_t row = text.find("wall clock");
+      const std::size_t row = text.find("CPU time [us/frame]");
       text.erase(row, text.find('\n', row) - row);
     }
+    std::erase_if(all, [](const auto& file) {
+      return file.first == "cost.csv" || file.first.starts_with("figures/cost");
+    });
     return all;
   };
   const auto one = files("1");

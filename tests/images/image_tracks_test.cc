@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <sys/stat.h>
+
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -350,6 +352,10 @@ TEST_F(ImageTracks, ADeviceThatIsNoCameraIsNamed) {
   const Outcome outcome = Track({"--set", "source.path=/dev/null"});
   EXPECT_EQ(outcome.code, 65);
   EXPECT_TRUE(Contains(outcome.err, "/dev/null: not a camera that OpenCV reads")) << outcome.err;
+  ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  const Outcome pipe = Track({"--set", "source.path=pipe"});
+  EXPECT_EQ(pipe.code, 65);
+  EXPECT_TRUE(Contains(pipe.err, "pipe: not a file")) << pipe.err;
 }
 
 TEST_F(ImageTracks, AnImageThatIsGoneIsMissedByItsTime) {

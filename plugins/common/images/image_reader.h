@@ -41,6 +41,10 @@ class ImageReader {
       return;
     }
     is_live_ = std::filesystem::is_character_file(path_, error);
+    if (!is_live_ && !std::filesystem::is_regular_file(path_, error)) {
+      throw Error(ExitCode::kBadData, ErrorLine({path_.string()}, {}, "not a file",  // a pipe, say
+                                                "a video, a folder of images, or a camera"));
+    }
     if (is_live_ ? video_.open(path_.string(), cv::CAP_V4L2) : video_.open(path_.string())) return;
     throw Error(ExitCode::kBadData,
                 ErrorLine({path_.string()}, {},

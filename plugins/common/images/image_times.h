@@ -115,7 +115,8 @@ class ImageTimes {
     }
     const Timestamp t = by_name ? found->second : by_number_[static_cast<std::size_t>(number)];
     if (last_ && t <= *last_) {
-      Fail(table_, "has a time for image " + image + " that is not after that of the one before");
+      Fail(table_, "has a time for image " + image + " that is not after that of the one before",
+           "times that increase");
     }
     last_ = t;
     return t;
@@ -125,8 +126,9 @@ class ImageTimes {
     if (!first_) first_ = now;
     return std::chrono::nanoseconds(now - *first_).count();
   }
-  [[noreturn]] void Fail(const std::string& table, const std::string& what) const {
-    throw Error(ExitCode::kBadData, ErrorLine({table}, {}, what, "a time for each image"));
+  [[noreturn]] void Fail(const std::string& table, const std::string& what,
+                         const char* expected = "a time for each image") const {
+    throw Error(ExitCode::kBadData, ErrorLine({table}, {}, what, expected));
   }
 
   double rate_hz_ = 0.0;

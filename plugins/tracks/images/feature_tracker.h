@@ -100,7 +100,7 @@ class FeatureTracker {
 
   /// Expected within a small ellipse.
   bool IsSure(std::size_t i) const {
-    return expected_[i] && kFarthest * expected_[i]->LargestSigma() <= options_.window_px / 4;
+    return expected_[i] && 4.0 * kFarthest * expected_[i]->LargestSigma() <= options_.window_px;
   }
 
   bool Align(Feature& feature, const cv::Mat& image, cv::Point2f& at) const {
@@ -160,7 +160,8 @@ class FeatureTracker {
 
   /// Those that were found, on an image of that size, and are not too close to one another.
   void Keep(cv::Size size) {
-    const auto margin = static_cast<float>(options_.window_px / 2);
+    const int half = options_.window_px / 2;
+    const auto margin = static_cast<float>(half);
     const cv::Rect2f inside(margin, margin, static_cast<float>(size.width - 1) - 2.0F * margin,
                             static_cast<float>(size.height - 1) - 2.0F * margin);
     taken_.create(size, CV_8UC1);

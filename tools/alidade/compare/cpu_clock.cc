@@ -13,8 +13,8 @@ namespace {
 double ReadingTime_s() {
   double least = 1.0;
   for (int i = 0; i < 50; ++i) {
-    const double first = ThreadCpu_s();
-    least = std::min(least, ThreadCpu_s() - first);
+    const double first = ThreadCpuSeconds();
+    least = std::min(least, ThreadCpuSeconds() - first);
   }
   return least;
 }
@@ -26,18 +26,18 @@ class ClockedEstimator : public Estimator {
 
   void Start(Timestamp timestamp) override { estimator_->Start(timestamp); }
   const UpdateReport& Process(const Frame& frame) override {
-    const double started = ThreadCpu_s();
+    const double started = ThreadCpuSeconds();
     const UpdateReport& report = estimator_->Process(frame);
     time_->frames_s += Since(started);
     return report;
   }
   bool offline() const override { return estimator_->offline(); }
   void Smooth(const Emit& emit) override {
-    double works_since = ThreadCpu_s();
+    double works_since = ThreadCpuSeconds();
     const auto take = [&](std::size_t index, const State& state, const UpdateReport& report) {
       time_->smoothing_s += Since(works_since);
       emit(index, state, report);
-      works_since = ThreadCpu_s();
+      works_since = ThreadCpuSeconds();
     };
     estimator_->Smooth(take);
     time_->smoothing_s += Since(works_since);
@@ -51,7 +51,9 @@ class ClockedEstimator : public Estimator {
   bool failed() const override { return estimator_->failed(); }
 
  private:
-  double Since(double started) const { return std::max(0.0, ThreadCpu_s() - started - reading_s_); }
+  double Since(double started) const {
+    return std::max(0.0, ThreadCpuSeconds() - started - reading_s_);
+  }
 
   std::unique_ptr<Estimator> estimator_;
   std::shared_ptr<CpuTime> time_;
@@ -60,7 +62,7 @@ class ClockedEstimator : public Estimator {
 
 }  // namespace
 
-double ThreadCpu_s() {
+double ThreadCpuSeconds() {
   timespec now{};
   ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);

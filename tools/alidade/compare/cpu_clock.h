@@ -8,7 +8,7 @@
 namespace alidade::internal {
 
 /// CPU time of the calling thread, s, since some time before.
-double ThreadCpu_s();
+double ThreadCpuSeconds();
 
 /// CPU time of the thread of an estimator, without what it takes to read the clock.
 struct CpuTime {

@@ -47,7 +47,8 @@ std::vector<MeanErrors> MeansOf(const SweepResult& result) {
         auto mean = std::ranges::find_if(
             means, [&](const MeanErrors& one) { return IsOf(one.mean, errors); });
         if (mean == means.end()) {
-          mean = means.insert(mean, {{errors.estimator, errors.sensor, errors.unit, {}}});
+          mean = means.insert(mean,
+                              MeanErrors{{errors.estimator, errors.sensor, errors.unit, {}}, {}});
         }
         AddTo(*mean, errors);
       }

@@ -399,6 +399,7 @@ typename LaneStep<S, Motions...>::Result LaneStep<S, Motions...>::Update(
 /// S = L L', y = L^-1 r, W = L^-1 H P: NIS = y'y, x += W'y, P -= W'W.
 template <class S, class... Motions>
 template <int kRows>
+// NOLINTNEXTLINE(readability-function-size): one algorithm, in registers from end to end
 typename LaneStep<S, Motions...>::Result LaneStep<S, Motions...>::Correct(
     const S (&pht)[kTangent][kRows], S (&s)[kRows][kRows], S (&r)[kRows], double gate,
     const S& active) {

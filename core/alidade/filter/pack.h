@@ -196,7 +196,7 @@ struct Dual {
   Dual(const Dual& other) : a(other.a) {
     For<N>([&](auto i) { d[i] = other.d[i]; });
   }
-  Dual& operator=(const Dual& other) {
+  Dual& operator=(const Dual& other) {  // NOLINT(bugprone-unhandled-self-assignment): numbers
     a = other.a;
     For<N>([&](auto i) { d[i] = other.d[i]; });
     return *this;

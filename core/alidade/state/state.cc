@@ -221,7 +221,8 @@ void State::CatchUp() {
       if (block.tangent_offset >= 0) home.row = outside.p.Add(block.geometry().tangent);
     }
     for (int k = 0; block.tangent_offset >= 0 && k < block.geometry().tangent; ++k) {
-      homes[static_cast<std::size_t>(block.tangent_offset + k)] = home.row + k;
+      const int row = block.tangent_offset + k;
+      homes[static_cast<std::size_t>(row)] = home.row + k;
     }
   }
   std::vector<double> dx;

@@ -10,7 +10,7 @@ namespace alidade::internal {
 namespace {
 
 /// What two readings in a row are apart at least, s.
-double ReadingTime_s() {
+double ReadingSeconds() {
   double least = 1.0;
   for (int i = 0; i < 50; ++i) {
     const double first = ThreadCpuSeconds();
@@ -22,7 +22,7 @@ double ReadingTime_s() {
 class ClockedEstimator : public Estimator {
  public:
   ClockedEstimator(std::unique_ptr<Estimator> estimator, std::shared_ptr<CpuTime> time)
-      : estimator_(std::move(estimator)), time_(std::move(time)), reading_s_(ReadingTime_s()) {}
+      : estimator_(std::move(estimator)), time_(std::move(time)), reading_s_(ReadingSeconds()) {}
 
   void Start(Timestamp timestamp) override { estimator_->Start(timestamp); }
   const UpdateReport& Process(const Frame& frame) override {

@@ -127,8 +127,9 @@ int Main(int rounds, int count) {
   }
   Interleave(all, rounds);
   PrintTable(all);
-  for (const Contender& one : all)
+  for (const Contender& one : all) {
     std::printf("ns %s %.2f\n", one.name.c_str(), one.Quantile(0.01));
+  }
   for (std::size_t i = 0; i < widths.size(); ++i) {
     PrintRatio("static/array_" + std::to_string(widths[i]), all[0], all[i + 1]);
   }

@@ -104,6 +104,11 @@ class LaneStep {
   template <int B>
   using Space = std::tuple_element_t<static_cast<std::size_t>(B), Spaces>;
 
+  /// Of a block in x and in the rows of P; all blocks are flat.
+  static constexpr int Offset(int block) { return OffsetOf(block, Indices{}); }
+  /// Where P(i, j) is, of which the lower triangle is kept.
+  static constexpr int At(int i, int j) { return i >= j ? i * (i + 1) / 2 + j : At(j, i); }
+
   LaneStep(State& state, const std::tuple<Motions...>& motions) : s_(state), motions_(motions) {}
 
   /// false where a model is not defined: for every lane, unless they differ. `roots` are those of
@@ -137,8 +142,6 @@ class LaneStep {
 
  private:
   using Indices = std::make_index_sequence<static_cast<std::size_t>(kBlocks)>;
-  /// Of block B; all are flat.
-  static constexpr int Offset(int block) { return OffsetOf(block, Indices{}); }
   template <std::size_t... I>
   static constexpr int OffsetOf(int block, std::index_sequence<I...>) {
     const int sizes[] = {Space<static_cast<int>(I)>::kTangent...};
@@ -160,9 +163,6 @@ class LaneStep {
     for (std::size_t i = 0; i < m; ++i) first += counts[i];
     return first;
   }
-
-  /// Where P(i, j) is, of which the lower triangle is kept.
-  static constexpr int At(int i, int j) { return i >= j ? i * (i + 1) / 2 + j : At(j, i); }
 
   /// Part of a step of n elements: F, and G Q G'; M and Lq where noise is held.
   template <int N, int kNoise>
@@ -246,8 +246,9 @@ bool LaneStep<S, Motions...>::StepOne(double dt_s, const std::tuple<RootQ<Motion
     y[i] = next + (Offset(FirstBlock(M) + i) - o);
   });
   const D* const no_input = nullptr;
-  if (!detail::CallStep(model, x, no_input, static_cast<const D*>(noise), dt_s, y, indices))
+  if (!detail::CallStep(model, x, no_input, static_cast<const D*>(noise), dt_s, y, indices)) {
     return false;
+  }
   For<All::kCount>([&](auto index) {
     constexpr int b = FirstBlock(M) + index, first = Offset(b) - o;
     For<Space<b>::kTangent>([&](auto i) {

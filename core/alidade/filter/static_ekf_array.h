@@ -119,6 +119,7 @@ class StaticEkfArray {
 
  private:
   static constexpr int kTile = 8;
+  using Lanes = internal::LaneStep<double, Motions...>;
   template <class S>
   using State = internal::LaneState<S, Motions...>;
   static constexpr int kAmbient = Composed::kAmbient;
@@ -129,16 +130,8 @@ class StaticEkfArray {
     double in_interval[kTile] = {};
   };
 
-  static constexpr int At(int i, int j) { return i * (i + 1) / 2 + j; }
-  static constexpr int Offset(int block) { return OffsetOf(block, BlockIndices{}); }
-  using BlockIndices = std::make_index_sequence<static_cast<std::size_t>(Composed::kBlocks)>;
-  template <std::size_t... I>
-  static constexpr int OffsetOf(int block, std::index_sequence<I...>) {
-    const int sizes[] = {Space<static_cast<int>(I)>::kTangent...};
-    int offset = 0;
-    for (int i = 0; i < block; ++i) offset += sizes[i];
-    return offset;
-  }
+  static constexpr int At(int i, int j) { return Lanes::At(i, j); }
+  static constexpr int Offset(int block) { return Lanes::Offset(block); }
   Tile& TileOf(int filter) { return tiles_[static_cast<std::size_t>(filter / kTile)]; }
   const Tile& TileOf(int filter) const { return tiles_[static_cast<std::size_t>(filter / kTile)]; }
   static int LaneOf(int filter) { return filter % kTile; }

@@ -90,7 +90,7 @@ class Source {
   /// values as many as streams() and truths() say: what is not ends the run as internal.
   /// Errors: kBadData, kIo.
   virtual bool Next(SourceFrame& frame) = 0;
-  /// The estimator, a filter, that guides it; empty: none.
+  /// The estimator, a filter, that guides it, as its key `guide` names it; empty: none.
   virtual std::string guided_by() const { return {}; }
   /// Lends it the guide that it asks for, for the frames from now on; null takes it back. A source
   /// that has none, as in `alidade simulate`, measures without.

@@ -91,7 +91,7 @@ class FeatureTracker {
     }
     FollowFlow(image);
     CheckExpected();
-    if (4 * std::ranges::count(found_, 1) < std::ssize(found_)) {
+    if (!expected.empty() && 4 * std::ranges::count(found_, 1) < std::ssize(found_)) {
       expected_.assign(size, std::nullopt);
       FollowFlow(image);
     }

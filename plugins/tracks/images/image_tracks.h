@@ -194,8 +194,9 @@ class ImageTracks : public Source {
   }
 
   void Open(const Node& key, const std::string& names, const std::filesystem::path& folder) {
-    if (key.Text().empty())
+    if (key.Text().empty()) {
       key.Fail("no path", "a folder of images, a video, or a camera, as /dev/video0");
+    }
     const std::filesystem::path path = folder / key.Text();
     images_.emplace(path, names, key);
     const std::filesystem::path home = images_->is_video() ? path.parent_path() : path;

@@ -46,6 +46,9 @@ class Watchdog {
   /// The frames of a run. Its thread writes without a lock: a frame may take a microsecond, and a
   /// lock that the threads of a sweep share would be a tenth of that and more.
   struct Frames {
+    Frames(const std::atomic<const void*>& call, const Recorder* of)
+        : last_call(call), recorder(of) {}
+
     const std::atomic<const void*>& last_call;  ///< of its thread
     const Recorder* recorder;                   ///< null: none
     std::atomic<std::int64_t> turns{0};  ///< rises where work begins, to an odd number, or ends

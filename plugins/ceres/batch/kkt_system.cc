@@ -362,6 +362,20 @@ Eigen::MatrixXd KktSystem::FollowOf(const MapLandmark& landmark, const Inverse& 
   return c.allFinite() ? c : none;
 }
 
+namespace {
+
+/// `left` = (of the first camera, of the constants) to columns of j that are, from `column` on, the
+/// constants and then empty: a term is in the order q, the camera here, the first one, constants.
+void PutFirstCamera(const Eigen::MatrixXd& left, Eigen::Index column, Eigen::Index read,
+                    Eigen::MatrixXd& j) {
+  const Eigen::Index constants = left.cols() - read;
+  const Eigen::MatrixXd here = j.middleCols(column, constants);
+  j.middleCols(column, read) = left.leftCols(read);
+  j.middleCols(column + read, constants) = here + left.rightCols(constants);
+}
+
+}  // namespace
+
 bool KktSystem::LineariseLandmark(std::size_t i, const Eigen::VectorXd& l, bool about) {
   constexpr double kTied = 1e-7;  // of what the camera moves the point by
   const MapLandmark& landmark = run_.landmarks_[i];
@@ -381,12 +395,11 @@ bool KktSystem::LineariseLandmark(std::size_t i, const Eigen::VectorXd& l, bool 
   const double root_mu = std::sqrt(1.0 + damping_);
   if (inputs == 0) {
     ++term_;
-  } else if (landmark.first) {
-    Eigen::MatrixXd j(inputs, inputs + all);
-    j << Eigen::MatrixXd::Identity(inputs, inputs), -point.c;
-    Accumulate(root_mu * j, l / root_mu);
   } else {
-    Accumulate(root_mu * Eigen::MatrixXd::Identity(inputs, inputs), l / root_mu);
+    Eigen::MatrixXd prior(inputs, inputs + (landmark.first ? all : 0));
+    prior.setIdentity();
+    if (landmark.first) prior.rightCols(all) = -point.c;
+    Accumulate(root_mu * prior, l / root_mu);
   }
   Eigen::VectorXd r;
   Eigen::MatrixXd a, j;
@@ -406,20 +419,13 @@ bool KktSystem::LineariseLandmark(std::size_t i, const Eigen::VectorXd& l, bool 
     const bool tied = point.anchored && !here && read > 0;
     j.resize(r.size(), inputs + all + (tied ? read : 0));
     j.leftCols(inputs).noalias() = a_y * place.by_d;
-    j.middleCols(inputs, read) = a(Eigen::all, read_rows_);
-    Eigen::Index column = inputs + read;
-    for (Eigen::Index c = read; c < all; ++c) {
-      j.col(inputs + c) = a.col(rows[static_cast<std::size_t>(c)]);
-    }
+    j.middleCols(inputs, all) = a(Eigen::all, rows);
     if (landmark.first) {
       const Eigen::MatrixXd left = a_y * rest;
       if (here) {
         j.middleCols(inputs, all) += left;
       } else if (tied) {
-        // In the order of the term: q, the camera here, the first one, constants.
-        const Eigen::MatrixXd constants = j.middleCols(column, all - read);
-        j.middleCols(column, read) = left.leftCols(read);
-        j.middleCols(column + read, all - read) = constants + left.rightCols(all - read);
+        PutFirstCamera(left, inputs + read, read, j);
       } else {
         point.ties = point.ties || left.norm() > kTied * (a_y * place.by_x).norm();
       }

@@ -88,17 +88,36 @@ bool SparseSolve::Minimise() {
   }
 }
 
+namespace {
+
+constexpr double kTells = 1e-8;      // sigma, of a step
+constexpr double kRounding = 1e-13;  // of the cost
+
+}  // namespace
+
+/// Where the step leads. Where the cost falls by less than it should, landmarks move to where they
+/// cost least given e.
+SparseSolve::Trial SparseSolve::AfterStep(double predicted) {
+  constexpr double kLinear = 0.75;  // gain ratio below which landmarks are settled on their own
+  const double cost = kkt_.cost();
+  Trial next;
+  next.z = z_ + kkt_.step();
+  next.cost = kkt_.Cost(next.z);
+  if (!run_.shape().has_landmarks || predicted <= kRounding * (1.0 + cost)) return next;
+  if (next.cost && cost - *next.cost > kLinear * predicted) return next;
+  Trial settled = next;
+  const Eigen::Index map = z_.size() - run_.shape().inputs;
+  if (!next.cost) settled.z.tail(map) = z_.tail(map);
+  settled.cost = kkt_.Settle(settled.z, true) ? kkt_.Cost(settled.z) : std::nullopt;
+  return settled.cost && !(next.cost && *next.cost < *settled.cost) ? settled : next;
+}
+
 /// Levenberg-Marquardt: with the gain ratio g of a step that is taken,
 ///
 ///   mu <- mu max(1/3, 1 - (2 g - 1)^3),   and of one that is not, mu <- mu nu, nu <- 2 nu
-///
-/// Where the cost falls by less than it should, landmarks move to where they cost least given e.
 bool SparseSolve::Descend() {
-  constexpr double kSettled = 1e-9, kTells = 1e-8, kLong = 1e-3;  // sigma
-  constexpr double kRounding = 1e-13;                             // of the cost
-  constexpr double kLinear = 0.75;  // gain ratio below which landmarks are settled on their own
+  constexpr double kSettled = 1e-9;              // sigma
   constexpr double kLeast = 1e-6, kMost = 1e30;  // damping: off, and none helps
-  const Eigen::Index inputs = run_.shape().inputs;
   double mu = 0.0, nu = 2.0, left = 0.0, before = 1.0;
   note_.clear();
   if (!kkt_.Linearise(z_, mu) || !kkt_.Solve()) {
@@ -108,38 +127,25 @@ bool SparseSolve::Descend() {
   for (int i = 0; i < options_.max_iterations; ++i) {
     HeedStop();
     const double cost = kkt_.cost(), decrement = std::max(0.0, kkt_.decrement());
-    const Eigen::VectorXd step = kkt_.step();
-    Eigen::VectorXd moved = z_ + step;
+    const double squared = kkt_.step().squaredNorm();
     if (mu == 0.0) {
       before = left > 0.0 ? left : 1.0;
       left = std::sqrt(decrement);
     }
-    std::optional<double> next = kkt_.Cost(moved);
-    const double predicted = 0.5 * (decrement + mu * step.squaredNorm());
-    if (run_.shape().has_landmarks && predicted > kRounding * (1.0 + cost) &&
-        !(next && cost - *next > kLinear * predicted)) {
-      Eigen::VectorXd settled = moved;
-      if (!next) settled.tail(z_.size() - inputs) = z_.tail(z_.size() - inputs);
-      const bool defined = kkt_.Settle(settled, true);
-      const std::optional<double> at_settled = defined ? kkt_.Cost(settled) : std::nullopt;
-      if (at_settled && !(next && *next < *at_settled)) {
-        next = at_settled;
-        moved = settled;
-      }
-    }
+    const double predicted = 0.5 * (decrement + mu * squared);
     const bool unseen = predicted <= kRounding * (1.0 + cost);
-    const bool taken = next && (*next <= cost || (unseen && *next <= cost * (1.0 + 1e-9)));
+    Trial next = AfterStep(predicted);
     ++iterations_;
-    if (taken) {
-      z_ = moved;
+    if (next.cost && (*next.cost <= cost || (unseen && *next.cost <= cost * (1.0 + 1e-9)))) {
+      z_ = std::move(next.z);
       if (mu == 0.0 && (left <= kSettled || (left <= kTells && left > 0.5 * before))) return true;
-      const double gain = unseen ? 1.0 : (cost - *next) / predicted;
+      const double gain = unseen ? 1.0 : (cost - *next.cost) / predicted;
       mu *= std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * gain - 1.0, 3));
       if (mu < kLeast) mu = 0.0;
       nu = 2.0;
     } else {
       // At first a tenth of the curvature along the step.
-      if (mu == 0.0) mu = std::max(0.1 * decrement / step.squaredNorm(), kLeast) / nu;
+      if (mu == 0.0) mu = std::max(0.1 * decrement / squared, kLeast) / nu;
       mu *= nu;
       nu *= 2.0;
       if (!(mu < kMost)) break;
@@ -149,7 +155,13 @@ bool SparseSolve::Descend() {
       return false;
     }
   }
-  const bool spent = mu < kMost;
+  return EndUnsettled(left, mu < kMost);
+}
+
+/// Of a descent whose next step is `left` sigma long: spent, as iterations are, or no step lowers
+/// the cost. Whether its end will do.
+bool SparseSolve::EndUnsettled(double left, bool spent) {
+  constexpr double kLong = 1e-3;  // sigma
   const std::string larger =
       "a larger " + SettingText("max_iterations", options_.max_iterations) + " may do";
   if (left <= kLong + 1e-6 * std::sqrt(2.0 * kkt_.cost()) && (!spent || run_.shape().robust)) {

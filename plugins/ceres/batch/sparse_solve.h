@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -42,6 +43,12 @@ class SparseSolve {
   bool Start(const Trajectory& about);
   bool Minimise();
   bool Descend();
+  struct Trial {
+    Eigen::VectorXd z;
+    std::optional<double> cost;  ///< none: a model is not defined there
+  };
+  Trial AfterStep(double predicted);
+  bool EndUnsettled(double left, bool spent);
 
   CondensedRun& run_;
   SolveOptions options_;

@@ -562,5 +562,47 @@ TEST_F(StereoTarget, ABoardOfAChessIsAsFarAsItsCornersSay) {
   RecordProperty("median_by_scale", std::to_string(median(by_scale)));
 }
 
+/// Videos of faces with labelled boxes [Kalal2010]: one config, which is told the first box alone.
+class StereoTargetOfFaces : public StereoTarget {
+ protected:
+  /// Median of the relative error of the size, of at least `fewest` images.
+  void ExpectSizes(const std::string& name, std::size_t fewest) {
+    const char* const data = std::getenv("ALIDADE_DATA");
+    const auto video = std::filesystem::path(data == nullptr ? "" : data) / "tld-boxes" / name;
+    if (data == nullptr || !std::filesystem::exists(video)) {
+      GTEST_SKIP() << "ALIDADE_DATA has no tld-boxes";
+    }
+    std::vector<cv::Rect2d> boxes;
+    std::istringstream rows(testing::ReadText(video.parent_path() / "gt.txt"));
+    for (std::string row; std::getline(rows, row);) {
+      double x0, y0, x1, y1;
+      const int read = std::sscanf(row.c_str(), "%lf,%lf,%lf,%lf", &x0, &y0, &x1, &y1);
+      boxes.push_back(read == 4 ? cv::Rect2d(x0, y0, x1 - x0, y1 - y0) : cv::Rect2d());
+    }
+    const cv::Rect2d& first = boxes.at(0);
+    Write("config.yaml", cv::format("alidade: 1\nsource: {type: stereo_target, left: '%s', target: "
+                                    "[%g, %g, %g, %g], max_relative_sigma: 0.1}\n",
+                                    video.c_str(), first.x, first.y, first.width, first.height));
+    const Outcome outcome = Measure();
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    std::vector<double> errors;
+    for (const auto& [frame, inverse_scale] : Found("inverse_scale")) {
+      const cv::Rect2d& box = boxes.at(static_cast<std::size_t>(frame));
+      if (frame == 0 || !(box.area() > 0.0)) continue;
+      errors.push_back(std::abs(std::sqrt(first.area() / box.area()) / inverse_scale - 1.0));
+    }
+    ASSERT_GT(errors.size(), fewest);
+    const auto middle = errors.begin() + std::ssize(errors) / 2;
+    std::ranges::nth_element(errors, middle);
+    RecordProperty("median", std::to_string(*middle) + " of " + std::to_string(errors.size()));
+    EXPECT_LT(*middle, 0.1);
+  }
+};
+
+TEST_F(StereoTargetOfFaces, AreAsLargeAsTheirBoxes) { ExpectSizes("01_david/david.mpg", 300); }
+TEST_F(StereoTargetOfFaces, AreAsLargeAsTheirBoxesWhereMotionBlursThem) {
+  ExpectSizes("02_jumping/jumping.mpg", 100);
+}
+
 }  // namespace
 }  // namespace alidade

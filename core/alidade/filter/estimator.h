@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -69,6 +70,10 @@ struct Event {
   bool divergence = false;  ///< the estimator diverged or failed by this
 };
 
+/// Parts of the work of a frame, in its order; see Filter.
+enum class FramePart { kStep, kEvaluate, kGate, kUpdate, kLandmarks };
+inline constexpr int kFrameParts = static_cast<int>(FramePart::kLandmarks) + 1;
+
 /// What one frame did. Filled again and again without allocating.
 class UpdateReport {
  public:
@@ -84,6 +89,7 @@ class UpdateReport {
     inputs.clear();
     landmarks = {};
     removed_landmarks.clear();
+    spent_s = {};
     ClearMeasurements();
     events.clear();
   }
@@ -95,6 +101,8 @@ class UpdateReport {
   LandmarkCounts landmarks;
   /// Those that the frame removed from the state, as they were then. Those of a batch are not here.
   std::vector<LandmarkEstimate> removed_landmarks;
+  /// Time of the wall clock, by FramePart: of filters with landmarks; others take too little.
+  std::array<double, kFrameParts> spent_s{};
 
  private:
   std::vector<MeasurementReport> pool_;  ///< the first count_ are in use

@@ -48,9 +48,11 @@ void FrameLoop::Process(const Frame& frame) {
 
 /// What a frame goes through.
 void FrameLoop::Run(const Frame& frame) {
+  if (landmarks) since_ = std::chrono::steady_clock::now();
   if (f.timestamp == kNoTimestamp) f.timestamp = time_.StartFor(frame);
   f.report.stale = frame.timestamp < f.timestamp;
   if (!f.report.stale && !f.said.ended) StepTo(frame.timestamp);
+  Spent(FramePart::kStep);
   std::optional<Outcome> refused;
   if (f.said.ended) refused = Outcome::kEnded;
   if (f.report.stale) refused = Outcome::kStale;
@@ -66,9 +68,20 @@ void FrameLoop::Run(const Frame& frame) {
   recovery_.RepairCovariance(f, all);
   if (f.said.ended) return;
   recovery_.RecoverRejected(f, gate_, all);
+  Spent(FramePart::kUpdate);
   if (!landmarks) return;
   landmarks->Maintain(f, all);
   compression_.Apply(f, *landmarks, all);
+  Spent(FramePart::kLandmarks);
+}
+
+/// The time since the last part goes to this one, in the report.
+void FrameLoop::Spent(FramePart part) {
+  if (!landmarks) return;
+  const auto now = std::chrono::steady_clock::now();
+  f.report.spent_s[static_cast<std::size_t>(part)] +=
+      std::chrono::duration<double>(now - since_).count();
+  since_ = now;
 }
 
 /// Moves the state to `timestamp`; where a step cannot be done it stays at the end of the one
@@ -117,6 +130,7 @@ void FrameLoop::Update(std::span<Row* const> group) {
   groups_.rest.clear();
   consensus_.Split(f, groups_.passed, static_cast<std::uint64_t>(landmarks->frame()),
                    groups_.agreed, groups_.rest);
+  Spent(FramePart::kGate);
   if (!groups_.agreed.empty() && !Correct(groups_.agreed)) {  // what would the rest agree with?
     for (Row* const row : groups_.rest) {
       row->report->outcome = groups_.agreed.front()->report->outcome;
@@ -137,12 +151,14 @@ void FrameLoop::Update(std::span<Row* const> group) {
 /// Predicts all rows of a group at the state, and finds those that pass the gate, each by itself.
 void FrameLoop::Pass(std::span<Row* const> group, std::vector<Row*>& passed) {
   passed.clear();
+  for (Row* const row : group) row->report->outcome = method->Predict(f, *row);
+  Spent(FramePart::kEvaluate);
   for (Row* const row : group) {
     Outcome& outcome = row->report->outcome;
-    outcome = method->Predict(f, *row);
     if (outcome == Outcome::kAccepted) outcome = gate_.Pass(f, *row);
     if (outcome == Outcome::kAccepted) passed.push_back(row);
   }
+  Spent(FramePart::kGate);
 }
 
 /// False where there is no update.
@@ -150,6 +166,7 @@ bool FrameLoop::Correct(std::span<Row* const> rows) {
   if (rows.empty()) return false;
   for (Row* const row : rows) Gate::Weigh(*row);
   const Outcome outcome = method->Correct(f, rows);
+  Spent(FramePart::kUpdate);
   if (outcome == Outcome::kNotPd) {
     Note(f, "not_pd", "the update would leave S or P not positive definite; rolled back");
   } else if (outcome == Outcome::kNotFinite) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <span>
@@ -61,6 +62,7 @@ class FrameLoop {
   void Update(std::span<Row* const> group);
   void Pass(std::span<Row* const> group, std::vector<Row*>& passed);
   bool Correct(std::span<Row* const> rows);
+  void Spent(FramePart part);
 
   /// The fast path, as long as the blocks are those that it was made for.
   struct CurrentPath {
@@ -78,6 +80,7 @@ class FrameLoop {
   Consensus consensus_;
   Recovery recovery_;
   Compression compression_;
+  std::chrono::steady_clock::time_point since_;  ///< the part of the frame at hand goes on
   Scratch<Rows> rows_;
   Scratch<Groups> groups_;
   Scratch<CurrentPath> fast_;

@@ -379,6 +379,8 @@ void Landmarks::InitialiseNew(FilterState& f, std::span<Row> rows) {
   for (Family& family : families_) family.shared.assign(family.roles.size(), -1);
   if (options_.prior) prior_ = *options_.prior;
   bool asked_map = prior_.adapt_after == 0;
+  const int with_prior =
+      prior_.min_observations > 0 ? prior_.min_observations : options_.min_observations;
   for (Row& row : rows) {
     if (measured >= options_.max_per_frame) return;
     if (!Has(row) || row.report->outcome != Outcome::kNotReady || !IsReady(f, row) ||
@@ -386,8 +388,9 @@ void Landmarks::InitialiseNew(FilterState& f, std::span<Row> rows) {
       continue;
     }
     const auto found = landmarks_.find(row.measurement->landmark);
+    const bool takes_prior = row.binding->model.prior_size() > 0;
     if (found == landmarks_.end() || found->second.in_state() ||
-        found->second.observations < options_.min_observations) {
+        found->second.observations < (takes_prior ? with_prior : options_.min_observations)) {
       continue;
     }
     if (!asked_map) prior_.inverse_distance = PriorInverseDistance(f.state);

@@ -356,7 +356,11 @@ NamedEstimator BuildEstimator(const std::string& name, const Node& entry, const 
   }
   if (streams != nullptr) CheckStreams(own.root(), named.system, *streams);
   const bool lent = use && use->is_map();  // landmarks are initialised as in the other estimator
-  if (lent && named.system.landmarks) named.system.landmarks->min_observations = 1;
+  if (lent && named.system.landmarks) {
+    LandmarkOptions& landmarks = *named.system.landmarks;
+    landmarks.min_observations = 1;
+    if (landmarks.prior) landmarks.prior->min_observations = 0;
+  }
   named.estimator = Make(make, named, streams, of_plugin, entry);
   if (use) named.accepted_by = ReadUse(*use, named, config.root().At("estimators"), before);
   return named;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <span>
 
 #include "alidade/base/number_text.h"
@@ -71,6 +72,8 @@ bool Advance(Running& one, const Seen& seen, const Frame& visible, const Source&
   if (!passed) {
     const double wall_s = SecondsSince(started);
     one.result.wall_s += wall_s;
+    std::ranges::transform(one.result.parts_s, report.spent_s, one.result.parts_s.begin(),
+                           std::plus<>());
     for (RunObserver* const observer : options.observers) observer->OnTime(one.index, wall_s);
   }
   one.last = &report;
@@ -78,8 +81,10 @@ bool Advance(Running& one, const Seen& seen, const Frame& visible, const Source&
   one.diverged = passed ? passed->diverged : estimator.diverged();
   one.Note(report.events);
   if (!one.ended && !estimator.offline()) {
+    const auto takes_since = Clock::now();
     one.Take(static_cast<std::size_t>(result.frames), seen,
              passed ? passed->after->state() : estimator.state(), report, options);
+    one.result.record_s += SecondsSince(takes_since);
   }
   if (const std::string why = one.TakeFailures(report); !why.empty()) {
     if (result.status == RunStatus::kOk) {

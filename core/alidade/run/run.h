@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -42,6 +43,9 @@ struct EstimatorResult {
   std::vector<LandmarkEstimate> removed_landmarks;
   /// Time of the wall clock that its frames and smoothing took; not under kRollback.
   double wall_s = 0.0;
+  /// Of that, what filters with landmarks tell of their parts, by FramePart.
+  std::array<double, kFrameParts> parts_s{};
+  double record_s = 0.0;  ///< time that its metrics and its records took besides
 };
 
 struct RunResult {

@@ -17,6 +17,8 @@ LandmarkOptions::Prior ReadPrior(const Node& node) {
   prior.sigma = node.At("sigma", "landmarks.prior").Number(0.0, kInfinity, true);
   if (const auto n = node.Find("adapt_after"))
     prior.adapt_after = static_cast<int>(n->Integer(1, kMost));
+  if (const auto n = node.Find("min_observations"))
+    prior.min_observations = static_cast<int>(n->Integer(1, kMost));
   node.RejectUnread();
   return prior;
 }

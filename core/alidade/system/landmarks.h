@@ -34,6 +34,8 @@ struct LandmarkOptions {
     /// Once so many landmarks that a frame measures have converged, the median of their inverse
     /// distances stands for `inverse_distance`; 0: never.
     int adapt_after = 0;
+    /// As `min_observations` below, of landmarks that take this prior; 0: that one.
+    int min_observations = 0;
   };
   enum class NegativeDepth { kKeep, kDelete };
 

@@ -4,6 +4,9 @@
 // or are linearised elsewhere.
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <numeric>
+
 #include "support/landmark_models.h"
 
 namespace alidade::testing {
@@ -28,6 +31,38 @@ TEST(Landmarks, EnterWithTheObservationThatIsAskedFor) {
   EXPECT_EQ(outcome(0.1), Outcome::kNotReady);
   EXPECT_EQ(outcome(0.2), Outcome::kInitialised);
   EXPECT_EQ(outcome(0.3), Outcome::kAccepted);
+}
+
+TEST(Landmarks, ThatTakeThePriorMayWaitForMoreObservations) {
+  LandmarkOptions options = WithPrior();
+  const auto enters = [&options](const auto& sensor, const std::vector<double>& z) {
+    Ekf ekf = EkfOf(MapSystem(sensor, options));
+    for (int observation = 1; observation < 9; ++observation) {
+      const Frame frame = FrameOf(0.1 * observation, {{5, z}});
+      if (OutcomeFor(ekf.Process(frame), 5) == Outcome::kInitialised) return observation;
+    }
+    return 9;
+  };
+  options.min_observations = 2;
+  EXPECT_EQ(enters(InverseDepthPixels(0.01), {0.1, 0.2}), 2);
+  options.prior->min_observations = 4;
+  EXPECT_EQ(enters(InverseDepthPixels(0.01), {0.1, 0.2}), 4);
+  EXPECT_EQ(enters(Offset(0.1), {0, 0, 1}), 2);
+}
+
+TEST(Landmarks, PartsOfTheirFramesAreTimed) {
+  const auto frames = [](System system) {
+    Ekf ekf = EkfOf(std::move(system));
+    ekf.Process(FrameOf(0.0, {{5, {0, 0, 1}}}));
+    const auto started = std::chrono::steady_clock::now();
+    const auto spent_s = ekf.Process(FrameOf(0.1, {{5, {0, 0, 1}}, {6, {0, 1, 1}}})).spent_s;
+    const std::chrono::duration<double> all = std::chrono::steady_clock::now() - started;
+    EXPECT_LE(std::accumulate(spent_s.begin(), spent_s.end(), 0.0), all.count());
+    return spent_s;
+  };
+  for (const double part_s : frames(MapSystem(Offset(0.1), LandmarkOptions()))) {
+    EXPECT_GT(part_s, 0.0);
+  }
 }
 
 TEST(Landmarks, EnterOnlyBelowTheNumberToKeep) {

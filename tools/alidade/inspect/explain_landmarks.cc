@@ -23,6 +23,9 @@ std::vector<TextRow> LandmarkRows(const System& system) {
     if (const int n = options.prior->adapt_after; n > 0) {
       prior += "; once " + std::to_string(n) + " in view have converged, their median";
     }
+    if (const int n = options.prior->min_observations; n > 0) {
+      prior += "; taken at observation " + std::to_string(n);
+    }
     add("prior", prior);
   }
   std::string initialise = options.min_observations == 1

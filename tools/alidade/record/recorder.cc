@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "alidade/record/recorder.h"
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <ctime>
 #include <exception>
@@ -61,6 +63,10 @@ struct Recorder::Impl {
 };
 
 namespace {
+
+/// In timing.json, by FramePart.
+constexpr std::array<const char*, kFrameParts> kPartNames = {"step", "evaluate", "gate", "update",
+                                                             "landmarks"};
 
 /// The text of a key where there is one, else `fallback`.
 std::string TextOf(const Node& map, std::string_view key, const std::string& fallback) {
@@ -139,7 +145,13 @@ std::string Recorder::Impl::TimingJson(const RunResult& result) const {
                          {"wall_s", wall_s},
                          {"frames_per_s", static_cast<double>(result.frames) / wall_s}};
   internal::Json& times = json["estimators"] = internal::Json::object();
-  for (const EstimatorResult& one : result.estimators) times[one.name]["wall_s"] = one.wall_s;
+  for (const EstimatorResult& one : result.estimators) {
+    internal::Json& entry = times[one.name] = {{"wall_s", one.wall_s}, {"record_s", one.record_s}};
+    if (std::ranges::max(one.parts_s) == 0.0) continue;
+    for (std::size_t i = 0; i < kPartNames.size(); ++i) {
+      entry["parts_s"][kPartNames[i]] = one.parts_s[i];
+    }
+  }
   json["unoptimised"] = result.unoptimised;
   json["arrivals"] = {{"out_of_sequence", result.arrivals.out_of_sequence},
                       {"merged", result.arrivals.merged},
